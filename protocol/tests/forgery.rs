@@ -3,12 +3,13 @@
 mod pair;
 
 use pair::{LinkedEnds, LossyChannel, Setup, auv, patchy, utility};
+use scenecast_protocol::directive::Series;
 use scenecast_protocol::directive::VersionedSlot;
 use scenecast_protocol::mac::Access;
 use scenecast_protocol::map_codec::Codec;
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::{
-    AckStatement, Address, ChunkKind, Envelope, FrameBuilder, FrameKind, Header, Introduction, MissionId, Seal, Series,
+    AckStatement, Address, ChunkKind, Envelope, FrameBuilder, FrameKind, Header, Introduction, MissionId, Seal,
     SessionId,
 };
 use std::time::Duration;

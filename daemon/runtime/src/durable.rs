@@ -140,9 +140,9 @@ fn refuse_earlier_build(storage: &impl Storage) -> Result<(), UserError> {
 mod tests {
     use super::super::journal::disk::{Disk, DiskRefusal};
     use super::*;
+    use scenecast_protocol::directive::Series;
     use scenecast_protocol::link::SlotInboxState;
     use scenecast_protocol::schedule::BackgroundOrder;
-    use scenecast_protocol::wire::Series;
 
     fn begin(disk: &Disk) -> Result<(Keeper<Disk>, Durable), UserError> {
         Keeper::begin_run(disk.clone(), 9, None).map(|run| (run.keeper, run.durable))

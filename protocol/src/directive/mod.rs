@@ -9,6 +9,7 @@ mod limits;
 mod outbox;
 mod polygon;
 mod requests;
+mod series;
 mod settings;
 mod short_decimal;
 mod utility;
@@ -23,6 +24,7 @@ pub use outbox::{OrderStatus, SlotProgress};
 pub(crate) use outbox::{PendingSlot, SlotOutbox};
 pub use polygon::{Polygon, PolygonFault};
 pub use requests::{ExemplarRequest, ExemplarRequests};
+pub use series::Series;
 pub use settings::{CellBand, Change, PlannerKind, Settings, SettingsFault};
 pub use short_decimal::ShortDecimal;
 pub use utility::Utility;
@@ -233,7 +235,7 @@ impl Slot {
 /// |slot |0 0 0 0 0| version                       | payload ...
 /// +-----+---------+-------------------------------+---------------
 /// ```
-/// The version counts in the series of the surface ([`crate::wire::Series`]), which its hello names. A slot of which one of
+/// The version counts in the series of the surface ([`Series`]), which its hello names. A slot of which one of
 /// the five bits after its number is 1 belongs to a later version of the wire, and is skipped.
 ///
 /// ```

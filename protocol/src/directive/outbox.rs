@@ -1,8 +1,8 @@
 //! The surface's side of the directive: which slots to send, and how far each has come.
 
+use super::Series;
 use super::{RefusalReason, SLOTS, Slot, SlotId, SlotReport, SlotState, VersionedSlot};
 use crate::time::Instant;
-use crate::wire::Series;
 
 /// How far an order has come.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -4,10 +4,11 @@ use super::handshake::{Handshake, HandshakeOutcome};
 use super::mismatch::{Mismatch, MismatchReport};
 use super::run::{Authenticity, Identity};
 use super::{DropReason, FrameNumber, LinkStats, LinkWindow, WindowRefusal};
+use crate::directive::Series;
 use crate::seal::{Direction, SessionKey, TAG_BYTES};
 use crate::wire::{
-    Address, ChunkKind, Chunks, Envelope, Frame, FrameBuilder, FrameKind, Header, Introduction, MissionId, Seal,
-    Series, Stamp, WIRE_VERSION,
+    Address, ChunkKind, Chunks, Envelope, Frame, FrameBuilder, FrameKind, Header, Introduction, MissionId, Seal, Stamp,
+    WIRE_VERSION,
 };
 
 /// The content of a verified frame.

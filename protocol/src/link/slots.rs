@@ -1,7 +1,7 @@
 //! The vehicle's side of the directive: it decides about each version of each slot once.
 
+use crate::directive::Series;
 use crate::directive::{SLOTS, SlotId, SlotReport, SlotState, VersionedSlot};
-use crate::wire::Series;
 use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
 

@@ -1,7 +1,7 @@
 //! The content of a hello: the facts about its sender that the other end cannot measure.
 
 use crate::bytes::{Reader, Truncated};
-use serde::{Deserialize, Serialize};
+use crate::directive::Series;
 
 /// The edge of a map cell in tenths of a millimetre, up to 1677 m; 0 if the sender has no map.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -21,25 +21,6 @@ impl CellEdge {
     }
 }
 
-/// The series of a surface: a random number of 48 bits, under which it counts the versions of its orders.
-///
-/// A surface that has forgotten its orders begins a new series. Among a thousand series of one mission, two are equal
-/// with a probability of 2 in 10^9.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
-pub struct Series(u64);
-
-impl Series {
-    /// The series with the low 48 of these random bits.
-    pub fn from_random(bits: u64) -> Self {
-        Self(bits & 0xFFFF_FFFF_FFFF)
-    }
-
-    /// The number on the wire.
-    pub fn get(self) -> u64 {
-        self.0
-    }
-}
-
 /// The payload of an introduction, a chunk of every hello between two ends.
 ///
 /// ```text
@@ -50,7 +31,8 @@ impl Series {
 /// ```
 ///
 /// ```
-/// use scenecast_protocol::wire::{CellEdge, Introduction, Series};
+/// use scenecast_protocol::directive::Series;
+/// use scenecast_protocol::wire::{CellEdge, Introduction};
 ///
 /// let surface = Introduction { cell_edge: CellEdge::from_metres(0.25), series: Some(Series::from_random(0xABCD)) };
 /// assert_eq!(surface.encode(), [0x00, 0x09, 0xC4, 0, 0, 0, 0, 0xAB, 0xCD]);
@@ -73,7 +55,7 @@ impl Introduction {
     pub fn encode(&self) -> Vec<u8> {
         let mut out = self.cell_edge.0.to_be_bytes().get(1..).unwrap_or_default().to_vec();
         if let Some(series) = self.series {
-            out.extend_from_slice(series.0.to_be_bytes().get(2..).unwrap_or_default());
+            out.extend_from_slice(series.get().to_be_bytes().get(2..).unwrap_or_default());
         }
         out
     }
@@ -84,7 +66,9 @@ impl Introduction {
         let cell_edge = CellEdge(u32::from(r.u8()?) << 16 | u32::from(r.u16()?));
         let series = match r.rest().is_empty() {
             true => None,
-            false => Some(Series(u64::from(r.u16()?) << 32 | u64::from(r.u16()?) << 16 | u64::from(r.u16()?))),
+            false => {
+                Some(Series::from_random(u64::from(r.u16()?) << 32 | u64::from(r.u16()?) << 16 | u64::from(r.u16()?)))
+            }
         };
         Ok(Self { cell_edge, series })
     }

@@ -21,7 +21,7 @@ pub(crate) use chunk::room_for_payload;
 pub use chunk::{Chunk, ChunkKind, Chunks};
 pub use frame::{Envelope, Frame, FrameBuilder, FrameError, Seal};
 pub use header::{Address, FrameKind, Header, MissionId, SessionId};
-pub use introduction::{CellEdge, Introduction, Series};
+pub use introduction::{CellEdge, Introduction};
 pub use number::unwrap_number;
 pub use path::PlannedPath;
 pub use placement::Placement;

@@ -2,13 +2,14 @@
 
 use crate::document::{hex, pairs, rows, section};
 use scenecast_protocol::coordinates::{DecimetrePoint, MapPoint};
+use scenecast_protocol::directive::Series;
 use scenecast_protocol::directive::{
     Constraints, RefusalReason, SLOTS, Slot, SlotId, SlotReport, SlotState, VersionedSlot,
 };
 use scenecast_protocol::seal::{MissionKey, SessionKey};
 use scenecast_protocol::wire::{
     AckStatement, Address, Backlog, CellEdge, Chunk, ChunkKind, Envelope, FrameBuilder, FrameKind, Header,
-    Introduction, MissionId, ModeReason, PlannedPath, Seal, Series, SessionId, Stamp, VehicleMode, VehicleStatus,
+    Introduction, MissionId, ModeReason, PlannedPath, Seal, SessionId, Stamp, VehicleMode, VehicleStatus,
 };
 use std::time::Duration;
 

@@ -1,8 +1,8 @@
 //! The part of the vehicle's state that its host stores.
 
 use crate::LastPlace;
+use scenecast_protocol::directive::Series;
 use scenecast_protocol::link::SlotInboxState;
-use scenecast_protocol::wire::Series;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 

@@ -4,12 +4,12 @@ use crate::SharedExemplars;
 use crate::exemplar::{GOOD_SSIM, compress_to, middle};
 use image::RgbImage;
 use scene_model::exemplars::ExemplarPatch;
+use scenecast_protocol::directive::Series;
 use scenecast_protocol::directive::{ExemplarRequest, ExemplarRequests};
 use scenecast_protocol::exemplar::{Exemplar, max_bytes};
 use scenecast_protocol::link::VehicleLink;
 use scenecast_protocol::object::ObjectId;
 use scenecast_protocol::schedule::BackgroundStream;
-use scenecast_protocol::wire::Series;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 

@@ -1,7 +1,7 @@
 //! Arbitrary bytes as every format of the wire and the key file, except the map.
 
 use super::raw::{self, Script};
-use scenecast_protocol::directive::{SlotState, VersionedSlot};
+use scenecast_protocol::directive::{Series, SlotState, VersionedSlot};
 use scenecast_protocol::link::{Flight, LinkWindow, SlotInbox};
 use scenecast_protocol::mac::ClockMap;
 use scenecast_protocol::map::{Assembly, LayerChunk, LayerDescriptor, LayerReplica, LayerSet};
@@ -10,7 +10,7 @@ use scenecast_protocol::seal::{Direction, MissionKey};
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::{
     AckStatement, Address, Envelope, Frame, FrameBuilder, FrameKind, Header, MAX_WINDOW, MissionId, Reader, Seal,
-    Series, SessionId, Stamp, VehicleStatus,
+    SessionId, Stamp, VehicleStatus,
 };
 use std::time::Duration;
 

@@ -1,11 +1,12 @@
 //! The knowledge of an end's true peer, with which any frame can be sealed.
 
 use super::raw::{self, Script};
+use scenecast_protocol::directive::Series;
 use scenecast_protocol::link::{Authenticity, Flight};
 use scenecast_protocol::seal::{Direction, MissionKey};
 use scenecast_protocol::wire::{
-    AckStatement, Address, CellEdge, Envelope, FrameKind, Header, Introduction, MissionId, Reader, Series, SessionId,
-    Stamp, unwrap_number,
+    AckStatement, Address, CellEdge, Envelope, FrameKind, Header, Introduction, MissionId, Reader, SessionId, Stamp,
+    unwrap_number,
 };
 use std::collections::BTreeSet;
 use std::sync::Arc;

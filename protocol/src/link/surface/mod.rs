@@ -17,13 +17,14 @@ pub use event::{IssueError, SurfaceEvent};
 pub use peer::{EndedRun, PeerView};
 pub use polled::Cycle;
 
+use crate::directive::Series;
 use crate::directive::{Slot, VersionedSlot};
 use crate::link::{DropReason, FrameNumber, Transmit};
 use crate::mac::Access;
 use crate::map::{Replica, StateReplica};
 use crate::schedule::{BitBudget, ClassShares, Shares};
 use crate::time::Instant;
-use crate::wire::{Address, Envelope, Introduction, Seal, Series};
+use crate::wire::{Address, Envelope, Introduction, Seal};
 use discovery::Discovery;
 use fleet::Fleet;
 use peer::{Ready, VehiclePeer, room_for_slot};

@@ -17,6 +17,7 @@ pub use ended::EndedRun;
 pub(super) use turn::{Ready, room_for_slot};
 pub use view::PeerView;
 
+use crate::directive::Series;
 use crate::directive::{Slot, SlotId, SlotOutbox};
 use crate::link::{Authenticity, DropReason, FrameNumber, Inbound, LinkPair, LinkStats, SurfaceEvent};
 use crate::mac::{Access, Master, MasterConfig, ModemProfile};
@@ -24,7 +25,7 @@ use crate::map::StateReplica;
 use crate::schedule::Class;
 use crate::time::Instant;
 use crate::wire::{
-    Address, Chunk, ChunkKind, Envelope, FrameKind, Header, Introduction, MissionId, Series, Stamp, VehicleStatus,
+    Address, Chunk, ChunkKind, Envelope, FrameKind, Header, Introduction, MissionId, Stamp, VehicleStatus,
 };
 use content::{ChunkOutcome, PeerContent, class_of};
 use divergence::Divergence;

@@ -1,12 +1,13 @@
 //! The surface's view of a vehicle, for its host.
 
 use super::{EndedRun, VehiclePeer};
+use crate::directive::Series;
 use crate::directive::SlotProgress;
 use crate::link::LinkStats;
 use crate::mac::ClockMap;
 use crate::map::{LayerId, LayerReplica, LayerSet, Replica, StateReplica};
 use crate::time::Instant;
-use crate::wire::{Backlog, Series, VehicleStatus};
+use crate::wire::{Backlog, VehicleStatus};
 use std::time::Duration;
 
 /// A read-only view of a vehicle for the host.
