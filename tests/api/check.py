@@ -116,7 +116,7 @@ def check(document, path, method, operation, state):
     if content:
         kind, described = next(iter(content.items()))
         expect(got["content-type"] == kind, f"{requested} is {got['content-type']} instead of {kind}")
-        if "schema" in described:
+        if "schema" in described and kind.endswith("json"):
             validate(document, described["schema"], json.loads(answer), requested)
     if "{id}" in path:
         refused, _, why = ask(method, path.replace("{id}", "13").replace("{file}", "1.webp"), body, headers)
