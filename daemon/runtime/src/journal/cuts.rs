@@ -4,7 +4,6 @@ use super::disk::{Disk, DiskRefusal, DiskRng, DiskStep};
 use super::record::FILE_BYTES;
 use super::{Found, Journal, JournalNames, Storage};
 use proptest::prelude::*;
-use proptest::test_runner::RngSeed;
 
 pub(super) const NAMES: JournalNames = JournalNames { journal: "test.journal", copy: "test.journal.copy" };
 
@@ -73,8 +72,7 @@ fn actions() -> impl Strategy<Value = Vec<Action>> {
 }
 
 proptest! {
-    // The same cases in each run: see the open fault in docs/explanation/decisions/0032-refusing-disks.md.
-    #![proptest_config(ProptestConfig { rng_seed: RngSeed::Fixed(1), ..ProptestConfig::with_cases(400) })]
+    #![proptest_config(ProptestConfig::with_cases(400))]
     #[test]
     fn a_journal_holds_the_confirmed_or_the_interrupted_state(actions in actions(), seed: u64) {
         let disk = Disk::default();

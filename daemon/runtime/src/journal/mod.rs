@@ -140,7 +140,7 @@ impl<S: Storage> Journal<S> {
     fn write_both(&mut self, state: &[u8]) -> Result<(), JournalError> {
         if let Some(last) = self.last.clone().filter(|_| self.is_journal_uncertain) {
             if self.is_copy_uncertain {
-                self.write(1, &last)?;
+                self.sync_copy(&last)?;
                 self.is_copy_uncertain = false;
             }
             self.write(0, &last)?;
@@ -153,6 +153,18 @@ impl<S: Storage> Journal<S> {
         self.write(0, &next)?;
         self.is_journal_uncertain = false;
         Ok(())
+    }
+
+    /// Syncs the copy, which alone has the last state. Writing it again could tear it.
+    fn sync_copy(&mut self, last: &Record) -> Result<(), JournalError> {
+        match self.storage.open(self.names.name(1), FILE_BYTES).map_err(doing("opening"))? {
+            Some(mut file) => {
+                self.storage.sync(&mut file).map_err(doing("syncing"))?;
+                self.files[1] = Some(file);
+                Ok(())
+            }
+            None => self.write(1, last),
+        }
     }
 
     fn write(&mut self, number: u8, record: &Record) -> Result<(), JournalError> {
