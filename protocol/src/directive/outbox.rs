@@ -1,7 +1,6 @@
 //! The surface's side of the directive: which slots to send, and how far each has come.
 
-use super::Series;
-use super::{RefusalReason, SLOTS, Slot, SlotId, SlotReport, SlotState, VersionedSlot};
+use super::{RefusalReason, SLOTS, Series, Slot, SlotId, SlotReport, SlotState, VersionedSlot};
 use crate::time::Instant;
 
 /// How far an order has come.

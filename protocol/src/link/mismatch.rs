@@ -1,9 +1,10 @@
 //! Settings in which the other end differs, so that its frames are refused.
 
 use crate::wire::WIRE_VERSION;
+use std::collections::BTreeSet;
 
 /// A setting in which the other end differs. It is found in a frame with a valid CRC or tag, apart from [`Self::Tag`].
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, thiserror::Error)]
 pub enum Mismatch {
     /// The other end has this wire version.
     #[error("it has wire version {0}, this end has {WIRE_VERSION}: install the same release at both ends")]
@@ -18,11 +19,11 @@ pub enum Mismatch {
     Tag,
 }
 
-/// Reports each mismatch once until a frame is accepted.
+/// Reports each mismatch once, so that no stranger can fill a log with them.
 #[derive(Debug, Default)]
 pub(super) struct MismatchReport {
-    last: Option<Mismatch>,
-    is_reported: bool,
+    found: Option<Mismatch>,
+    reported: BTreeSet<Mismatch>,
     /// Frames with an unexpected tag, which may also be damaged frames, since the last accepted one.
     tagged: u32,
 }
@@ -34,20 +35,16 @@ impl MismatchReport {
     pub(super) fn note(&mut self, mismatch: Mismatch) {
         self.tagged += u32::from(mismatch == Mismatch::Tag);
         let is_certain = mismatch != Mismatch::Tag || self.tagged >= Self::MIN_TAGGED;
-        if is_certain && self.last != Some(mismatch) {
-            (self.last, self.is_reported) = (Some(mismatch), false);
+        if is_certain && self.reported.insert(mismatch) {
+            self.found = Some(mismatch);
         }
     }
 
-    /// A frame of the other end was accepted.
-    pub(super) fn clear(&mut self) {
-        *self = Self::default();
+    pub(super) fn handle_accepted(&mut self) {
+        self.tagged = 0;
     }
 
     pub(super) fn poll(&mut self) -> Option<Mismatch> {
-        match std::mem::replace(&mut self.is_reported, true) {
-            false => self.last,
-            true => None,
-        }
+        self.found.take()
     }
 }

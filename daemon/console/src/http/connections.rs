@@ -31,8 +31,7 @@ const MAX_HEADERS: usize = 64;
 pub(super) const EVENT_STREAM: &str = "text/event-stream";
 /// For a client to read sent data.
 const READ_TIMEOUT: Duration = Duration::from_secs(20);
-/// For the client of a stream of events. With the time in which events fill the buffers, a stream that
-/// is not read ends within 10 s.
+/// For the client of a stream of events, once the buffers are full.
 const STREAM_READ_TIMEOUT: Duration = Duration::from_secs(5);
 /// The bytes that a client must read within the timeout, unless it reads everything.
 const MIN_PROGRESS_BYTES: usize = 8 * 1024;

@@ -11,6 +11,7 @@ mod handlers;
 mod openapi;
 mod operations;
 mod response;
+mod seats;
 mod server;
 mod shared;
 

@@ -3,7 +3,7 @@
 use super::access::{Access, HostNames};
 use super::response::error;
 use super::shared::{PendingRequest, Shared};
-use super::{assets, compress, connections, guard, handlers, openapi, operations};
+use super::{assets, compress, connections, guard, openapi, operations};
 use crate::snapshot::Snapshot;
 use axum::Router;
 use axum::extract::DefaultBodyLimit;
@@ -70,8 +70,7 @@ pub async fn bind(
 pub fn start(listener: ConsoleListener) -> Console {
     let (sender, requests) = mpsc::channel(MAX_PENDING);
     let (snapshots, receiver) = watch::channel(Arc::new(Snapshot::default()));
-    let shared =
-        Shared::new(sender, receiver, listener.access, handlers::events::MAX_STREAMS, openapi::document().into());
+    let shared = Shared::new(sender, receiver, listener.access, openapi::document().into());
     tokio::spawn(connections::serve(listener.listener, router(shared)));
     Console { requests, snapshots }
 }

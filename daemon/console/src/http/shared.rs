@@ -2,6 +2,7 @@
 
 use super::access::Access;
 use super::response::{error, not_found, respond};
+use super::seats::Seats;
 use crate::request::{ClientRequest, Reply, SurfaceRequest};
 use crate::snapshot::Snapshot;
 use crate::tiles::TiledMap;
@@ -24,8 +25,7 @@ pub(super) struct Shared {
     pub(super) snapshots: watch::Receiver<Arc<Snapshot>>,
     pub(super) maps: Arc<MapCache>,
     pub(super) access: Arc<Access>,
-    /// A permit for each open stream of events.
-    pub(super) streams: Arc<Semaphore>,
+    pub(super) seats: Seats,
     pub(super) document: Bytes,
 }
 
@@ -54,7 +54,6 @@ impl Shared {
         requests: mpsc::Sender<PendingRequest>,
         snapshots: watch::Receiver<Arc<Snapshot>>,
         access: Access,
-        max_streams: usize,
         document: Bytes,
     ) -> Self {
         let mut run = [0; 4];
@@ -69,7 +68,7 @@ impl Shared {
                 run: u32::from_le_bytes(run),
             }),
             access: Arc::new(access),
-            streams: Arc::new(Semaphore::new(max_streams)),
+            seats: Seats::default(),
             document,
         }
     }

@@ -32,7 +32,7 @@ pub enum SurfaceEvent {
     VehicleRestarted(Address),
     /// The copy of a run with this vehicle is kept as [`super::PeerView::ended_run`], because a new run begins.
     RunEnded(Address),
-    /// Frames of a vehicle are refused because a setting differs; reported once until one is accepted.
+    /// Frames of a vehicle are refused because a setting differs; each is reported once.
     Mismatch(Address, Mismatch),
 }
 

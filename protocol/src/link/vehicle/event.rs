@@ -21,7 +21,7 @@ pub enum VehicleEvent {
     ObjectDelivered(ObjectId),
     /// The surface began a new run; everything is sent to it again.
     SurfaceRestarted,
-    /// Frames of the surface are refused because a setting differs; reported once until one is accepted.
+    /// Frames of the surface are refused because a setting differs; each is reported once.
     Mismatch(Mismatch),
     /// A chunk was left out of a frame, and its content waits again.
     Oversized(OversizedChunk),

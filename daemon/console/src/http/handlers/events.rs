@@ -2,6 +2,7 @@
 
 use crate::http::connections::EVENT_STREAM;
 use crate::http::response::error;
+use crate::http::seats::{MAX_STREAMS, Seat};
 use crate::http::shared::Shared;
 use crate::snapshot::Snapshot;
 use crate::state::MapEvent;
@@ -12,10 +13,8 @@ use axum::response::{IntoResponse, Response};
 use std::collections::{BTreeMap, VecDeque};
 use std::convert::Infallible;
 use std::sync::Arc;
-use tokio::sync::{OwnedSemaphorePermit, watch};
-
-/// Open streams at a time.
-pub(in crate::http) const MAX_STREAMS: usize = 64;
+use std::time::Instant;
+use tokio::sync::watch;
 
 /// The stream of one reader.
 struct Feed {
@@ -24,17 +23,17 @@ struct Feed {
     versions: BTreeMap<u8, u64>,
     queue: VecDeque<Bytes>,
     is_first: bool,
-    _permit: OwnedSemaphorePermit,
+    seat: Seat,
 }
 
 /// The latest state after each change, and the maps that have changed. A slow reader misses states, but never the last one.
 pub(in crate::http) async fn events(State(shared): State<Shared>) -> Response {
-    let Ok(permit) = shared.streams.clone().try_acquire_owned() else {
+    let Some(seat) = shared.seats.take(Instant::now()) else {
         let line = format!("{MAX_STREAMS} streams of events are open, which is the maximum");
         return error(StatusCode::SERVICE_UNAVAILABLE, &line);
     };
     let (versions, queue) = (BTreeMap::new(), VecDeque::new());
-    let feed = Feed { snapshots: shared.snapshots, versions, queue, is_first: true, _permit: permit };
+    let feed = Feed { snapshots: shared.snapshots, versions, queue, is_first: true, seat };
     let stream = futures_util::stream::unfold(feed, |mut feed| async move {
         while feed.queue.is_empty() {
             feed.next().await?;
@@ -45,10 +44,13 @@ pub(in crate::http) async fn events(State(shared): State<Shared>) -> Response {
 }
 
 impl Feed {
-    /// Waits for a new state; `None` at the end of the program.
+    /// Waits for a new state; `None` at the end of the program, and when another stream gets the seat.
     async fn next(&mut self) -> Option<()> {
         if !std::mem::take(&mut self.is_first) {
-            self.snapshots.changed().await.ok()?;
+            tokio::select! {
+                change = self.snapshots.changed() => change.ok()?,
+                _ = &mut self.seat.end => return None,
+            }
         }
         let snapshot = self.snapshots.borrow_and_update().clone();
         if snapshot.json.is_empty() {

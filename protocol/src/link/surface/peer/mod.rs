@@ -17,8 +17,7 @@ pub use ended::EndedRun;
 pub(super) use turn::{Ready, room_for_slot};
 pub use view::PeerView;
 
-use crate::directive::Series;
-use crate::directive::{Slot, SlotId, SlotOutbox};
+use crate::directive::{Series, Slot, SlotId, SlotOutbox};
 use crate::link::{Authenticity, DropReason, FrameNumber, Inbound, LinkPair, LinkStats, SurfaceEvent};
 use crate::mac::{Access, Master, MasterConfig, ModemProfile};
 use crate::map::StateReplica;

@@ -1,0 +1,207 @@
+//! Received frames of one peer: hellos, numbered frames, and the reason for which a frame is dropped.
+
+use super::{LinkPair, session_key};
+use crate::link::handshake::HandshakeOutcome;
+use crate::link::mismatch::Mismatch;
+use crate::link::run::Identity;
+use crate::link::{DropReason, FrameNumber, WindowRefusal};
+use crate::wire::{Address, ChunkKind, Chunks, Envelope, Frame, FrameKind, Header, Introduction, Seal, WIRE_VERSION};
+
+/// The content of a verified frame.
+#[derive(Debug)]
+pub struct Inbound<'a, T> {
+    /// Whether the peer has begun a new run, so that it holds none of our state. To be handled before all else.
+    pub restarted: bool,
+    /// The content of own frames that are newly judged, in the order sent, and whether each arrived.
+    pub fates: Vec<(T, bool)>,
+    /// The frame's number, if it was accepted.
+    pub number: Option<FrameNumber>,
+    /// Whether no frame with a higher number came in before.
+    pub is_latest: bool,
+    /// The sender bases its map chunks on every frame up to here.
+    pub base: FrameNumber,
+    /// Whether it was rejected because it builds on frames that we never acknowledged.
+    pub lacks_base: bool,
+    frame: Frame<'a>,
+}
+
+impl<'a, T> Inbound<'a, T> {
+    /// A frame of which only the header counts.
+    fn empty(restarted: bool, frame: Frame<'a>) -> Self {
+        Self { restarted, fates: Vec::new(), number: None, is_latest: true, base: 0, lacks_base: false, frame }
+    }
+
+    /// The header of the frame.
+    pub fn header(&self) -> &Header {
+        &self.frame.header
+    }
+
+    /// The chunks of the frame; none if it was not accepted.
+    pub fn chunks(&self) -> Chunks<'_> {
+        if self.number.is_some() { self.frame.chunks() } else { Chunks::default() }
+    }
+}
+
+impl<T> LinkPair<T> {
+    /// Opens a frame of this peer. `decodes` tells whether the chunks of a frame with this base decode; a frame of which
+    /// one does not changes nothing. The error is the reason for which the frame was dropped and counted.
+    pub fn handle_frame<'a>(
+        &mut self,
+        envelope: &Envelope<'a>,
+        decodes: impl Fn(FrameNumber, Chunks<'_>) -> bool,
+    ) -> Result<Inbound<'a, T>, DropReason> {
+        let result = match envelope.header.kind {
+            FrameKind::Hello => self.read_hello(envelope),
+            FrameKind::Numbered => self.read_numbered(envelope, decodes),
+        };
+        if let Err(reason) = &result {
+            self.stats.drop(*reason);
+        }
+        result
+    }
+
+    fn read_hello<'a>(&mut self, envelope: &Envelope<'a>) -> Result<Inbound<'a, T>, DropReason> {
+        let header = &envelope.header;
+        let own = if self.us == Address::SURFACE { Some(self.handshake.own()) } else { None };
+        let (session, nonce) = own.map_or((0, 0), |o| (o.session.get(), o.nonce));
+        let frame = match &self.authenticity {
+            Some(a) => envelope.open(&Seal::Hello(&a.key, self.mission, session, nonce)),
+            None => envelope.open(&Seal::Crc(self.mission, session)),
+        };
+        let Some(frame) = frame else { return Err(self.refuse(envelope, session)) };
+        let introduction = if envelope.version == WIRE_VERSION {
+            let introduction = introduction_of(&frame).filter(|i| own.is_some() || i.series.is_some());
+            introduction.ok_or(DropReason::Malformed)?
+        } else {
+            self.mismatch.note(Mismatch::Version(envelope.version));
+            if own.is_some() {
+                return Err(DropReason::Version);
+            }
+            // The answer to it names our version. No numbered frame of such a run is ever read.
+            Introduction::default()
+        };
+        let peer = Identity { session: header.session, nonce: header.nonce.unwrap_or_default() };
+        let key = session_key(self.authenticity.clone(), self.mission, self.us, self.peer);
+        let outcome = match own {
+            Some(_) => self.handshake.handle_answer(peer, introduction, key),
+            None => self.handshake.handle_call(peer, introduction, key),
+        };
+        if outcome == HandshakeOutcome::Retired {
+            // A late hello can make the current run look ended; the vehicle's next frames decide.
+            self.strays += u32::from(own.is_some());
+            return Err(DropReason::OldSession);
+        }
+        let is_new = outcome == HandshakeOutcome::New;
+        self.owes_hello = is_new && own.is_none();
+        let restarted = is_new && own.is_some();
+        self.stats.peer_restarts += u64::from(restarted);
+        self.strays = 0;
+        Ok(Inbound::empty(restarted, frame))
+    }
+
+    fn read_numbered<'a>(
+        &mut self,
+        envelope: &Envelope<'a>,
+        decodes: impl Fn(FrameNumber, Chunks<'_>) -> bool,
+    ) -> Result<Inbound<'a, T>, DropReason> {
+        let (mission, direction) = (self.mission, self.direction_in());
+        let keyed = self.is_keyed(direction);
+        let offered = self.handshake.offered().and_then(|r| r.open(envelope, mission, direction, keyed));
+        let restarted = offered.is_some();
+        let known = || self.handshake.run().and_then(|r| r.open(envelope, mission, direction, keyed));
+        let Some(frame) = offered.or_else(known) else {
+            let reason = self.refuse(envelope, self.handshake.own().session.get());
+            let stray = self.handshake.run().is_none_or(|r| r.peer.session != envelope.header.session);
+            // Without a valid CRC the session may be noise; without a valid tag it may be a forgery.
+            self.strays += u32::from(stray && reason == DropReason::OldSession);
+            return Err(reason);
+        };
+        if !frame.chunks().are_sound() {
+            return Err(DropReason::Malformed);
+        }
+        if !restarted && !self.decodes(&frame, decodes) {
+            return Err(DropReason::Undecodable);
+        }
+        self.strays = 0;
+        self.mismatch.handle_accepted();
+        if restarted {
+            self.handshake.accept_offered();
+            self.stats.peer_restarts += 1;
+        }
+        self.owes_hello = self.handshake.is_leaving();
+        if self.owes_hello {
+            return Ok(Inbound::empty(restarted, frame));
+        }
+        self.take(frame, restarted)
+    }
+
+    /// Whether the chunks of a frame decode, if the window would accept it.
+    fn decodes(&self, frame: &Frame<'_>, decodes: impl Fn(FrameNumber, Chunks<'_>) -> bool) -> bool {
+        let Some(run) = self.handshake.run() else { return true };
+        match run.window.preview(frame.header.number, frame.header.base) {
+            Ok((_, base)) => decodes(base, frame.chunks()),
+            Err(_) => true,
+        }
+    }
+
+    fn take<'a>(&mut self, frame: Frame<'a>, restarted: bool) -> Result<Inbound<'a, T>, DropReason> {
+        let header = &frame.header;
+        let Some(run) = self.handshake.run_mut() else { return Err(DropReason::UnknownSender) };
+        let fates = header.ack.as_ref().map_or_else(Vec::new, |ack| run.flight.handle_statement(ack));
+        for (_, delivered) in &fates {
+            self.stats.judge(*delivered);
+        }
+        // A rejected frame has still reported fates of ours, so these are returned with it.
+        let before = run.window.highest();
+        let mut lacks_base = false;
+        let number = match run.window.accept(header.number, header.base) {
+            Ok(number) => {
+                self.stats.take(before, number);
+                Some(number)
+            }
+            Err(refusal) if fates.is_empty() && !restarted => return Err(refusal.into()),
+            Err(refusal) => {
+                lacks_base = refusal == WindowRefusal::NoBase;
+                self.stats.drop(refusal.into());
+                None
+            }
+        };
+        let is_latest = number.is_some_and(|n| n > before);
+        Ok(Inbound { restarted, fates, number, is_latest, base: run.window.base(), lacks_base, frame })
+    }
+
+    /// The most likely reason why a frame does not open.
+    fn refuse(&mut self, envelope: &Envelope<'_>, session: u16) -> DropReason {
+        let kind = envelope.header.kind;
+        let expected = if kind.is_hello() { self.authenticity.is_some() } else { self.is_keyed(self.direction_in()) };
+        let plain = || envelope.open(&Seal::Crc(self.mission, session)).is_some();
+        match (expected, envelope.header.keyed) {
+            (false, true) => {
+                self.mismatch.note(Mismatch::Tag);
+                DropReason::Keyed
+            }
+            (true, false) if plain() => {
+                self.mismatch.note(Mismatch::NoTag);
+                DropReason::Unauthenticated
+            }
+            (false, false) if !kind.is_hello() && plain() => DropReason::OldSession,
+            _ => DropReason::Checksum,
+        }
+    }
+}
+
+/// The introduction in a hello.
+fn introduction_of(frame: &Frame<'_>) -> Option<Introduction> {
+    let chunk = frame.chunks().find(|chunk| chunk.kind == ChunkKind::Introduction)?;
+    Introduction::decode(chunk.payload).ok()
+}
+
+impl From<WindowRefusal> for DropReason {
+    fn from(refusal: WindowRefusal) -> Self {
+        match refusal {
+            WindowRefusal::Duplicate => Self::Duplicate,
+            WindowRefusal::Late => Self::Late,
+            WindowRefusal::NoBase => Self::NoBase,
+        }
+    }
+}
