@@ -1,13 +1,12 @@
 //! The layers of a map in addition to the labels, from the levels that the surface has received.
 
 use crate::export::CellLayer;
-use scenecast_protocol::link::PeerView;
 use scenecast_protocol::map::{LayerReplica, Rect, Replica, Spread};
 use scenecast_protocol::time::Instant;
 
-/// The layers that the vehicle has announced.
-pub(crate) fn layers(view: &PeerView<'_>, bounds: Rect, now: Instant) -> Vec<CellLayer> {
-    view.layers().iter().filter_map(|(id, _)| Some(layer(view.layer(id)?, bounds, now))).collect()
+/// The layers of a map.
+pub(crate) fn layers(layers: &[&LayerReplica], bounds: Rect, now: Instant) -> Vec<CellLayer> {
+    layers.iter().map(|replica| layer(replica, bounds, now)).collect()
 }
 
 /// Seconds since each cell was received, 65535 = never.

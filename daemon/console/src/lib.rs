@@ -20,5 +20,5 @@ pub mod state;
 pub use export::{CellLayer, MapCells};
 pub use http::{Console, ConsoleListener, PendingRequest, bind, start};
 pub use link_meter::LinkMeter;
-pub use request::{Reply, SurfaceRequest, handle_request};
+pub use request::{Reply, SurfaceRequest, archived_cells, handle_request};
 pub use snapshot::{MissionFacts, Snapshot, snapshot};

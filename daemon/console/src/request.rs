@@ -3,15 +3,16 @@
 use crate::export::MapCells;
 use crate::fit::{self, Fit};
 use crate::layers;
-use crate::orders::{BudgetOrder, ExemplarAction, ExemplarOrder};
+use crate::orders::{BudgetOrder, ExemplarAction, ExemplarOrder, LabelOrder, NoteOrder};
 use crate::snapshot::seconds;
-use crate::state::AcceptedOrder;
+use crate::state::{AcceptedOrder, ArchivedMap};
 use scenecast_core::label_picture::MAX_CELLS;
 use scenecast_protocol::directive::{Constraints, SlotId};
 use scenecast_protocol::map::Rect;
 use scenecast_protocol::schedule::{BackgroundOrder, Shares};
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::Address;
+use scenecast_surface::record::{StoredLabel, VehicleMemory};
 use scenecast_surface::{FenceOrder, LimitsOrder, RequestKind, SettingsOrder, Surface};
 use std::collections::BTreeMap;
 
@@ -34,6 +35,15 @@ pub enum SurfaceRequest {
     Settings(u8, SettingsOrder),
     /// Change the bit budget, the shares and the background streams.
     Budget(BudgetOrder),
+    /// Name a label.
+    Label(u8, LabelOrder),
+    Note(u8, NoteOrder),
+    /// Take the earlier map out of view.
+    DismissEarlierMap(u8),
+    /// List the archived maps. The owner of the files handles this request and the next one.
+    Archives,
+    /// Read an archived map by its name.
+    ArchivedMap(String),
 }
 
 /// The reply of the surface.
@@ -47,6 +57,9 @@ pub enum Reply {
     Fit(Box<Fit>),
     /// The order was accepted and waits for its turn.
     Accepted(AcceptedOrder),
+    /// The surface has done what was requested.
+    Done,
+    Archives(Vec<ArchivedMap>),
     /// There is no such vehicle, label or image.
     NotFound,
     /// The order is not allowed: the reason in one line.
@@ -95,7 +108,36 @@ fn handle(surface: &mut Surface, request: SurfaceRequest, cell_m: f64, now: Inst
             accepted(vehicle, SlotId::Settings, surface.set_settings(vehicle, &order, now))
         }
         SurfaceRequest::Budget(order) => budget(surface, order, now),
+        SurfaceRequest::Label(id, LabelOrder { label, name, colour, merged_into }) => {
+            let book = StoredLabel { name, colour, merged_into };
+            done(surface.set_label(known(surface, id)?, label, book))
+        }
+        SurfaceRequest::Note(id, order) => done(surface.add_note(known(surface, id)?, "operator", &order.text, now)),
+        SurfaceRequest::DismissEarlierMap(id) => done(surface.dismiss_earlier_map(known(surface, id)?)),
+        SurfaceRequest::Archives => Reply::Archives(Vec::new()),
+        SurfaceRequest::ArchivedMap(_) => return None,
     })
+}
+
+fn done(result: Result<(), String>) -> Reply {
+    result.map_or_else(Reply::Refused, |()| Reply::Done)
+}
+
+/// The cells of an archived map. Their ages count from the last one that was received.
+pub fn archived_cells(map: &VehicleMemory, cell_m: f64) -> MapCells {
+    let (labels, layers) = (map.map().labels(), map.map().layers().map(|(_, layer)| layer).collect::<Vec<_>>());
+    let at = labels.updated().unwrap_or_default();
+    let bounds = labels.shown().bounds().unwrap_or(Rect { x: 0, y: 0, width: 0, height: 0 });
+    MapCells {
+        version: map.archived().map_or(0, |(_, cells)| cells),
+        at_s: seconds(at),
+        bounds,
+        cell_m,
+        moved_m: map.placement_m().unwrap_or((0.0, 0.0)),
+        labels: bounds.cells().map(|cell| labels.shown().get(cell)).collect(),
+        age_s: layers::ages(labels, bounds, at),
+        layers: layers::layers(&layers, bounds, at),
+    }
 }
 
 fn accepted(vehicle: Address, slot: SlotId, issued: Result<u16, String>) -> Reply {
@@ -133,7 +175,7 @@ fn budget(surface: &mut Surface, order: BudgetOrder, now: Instant) -> Reply {
 
 fn map(surface: &Surface, vehicle: Address, cell_m: f64, now: Instant) -> Option<Reply> {
     let grid = surface.map(vehicle)?;
-    let view = surface.view(vehicle)?;
+    let replica = surface.replica(vehicle)?;
     let bounds = grid.bounds().unwrap_or(Rect { x: 0, y: 0, width: 0, height: 0 });
     if bounds.area() > MAX_CELLS {
         let Rect { width, height, .. } = bounds;
@@ -146,7 +188,7 @@ fn map(surface: &Surface, vehicle: Address, cell_m: f64, now: Instant) -> Option
         cell_m,
         moved_m: (0.0, 0.0),
         labels: bounds.cells().map(|cell| grid.get(cell)).collect(),
-        age_s: layers::ages(view.replica(), bounds, now),
-        layers: layers::layers(&view, bounds, now),
+        age_s: layers::ages(replica, bounds, now),
+        layers: layers::layers(&surface.map_layers(vehicle), bounds, now),
     }))
 }

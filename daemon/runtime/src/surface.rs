@@ -2,30 +2,32 @@
 
 use super::clock::Clock;
 use super::instruments::{Instruments, relay};
-use super::journal::create_folder;
 use super::modem::{self, ModemPort};
 use super::pilot::{self, PilotPort, SimulatedAutopilot};
 use super::refusals::{Refusals, warn_without_key};
 use super::stop::Stop;
+use super::store::SurfaceFiles;
 use crate::port::FromPort;
 use scenecast_config::Config;
 use scenecast_console::{
-    Console, LinkMeter, MissionFacts, PendingRequest, Reply, SurfaceRequest, bind, handle_request, snapshot, start,
+    Console, LinkMeter, MissionFacts, PendingRequest, Reply, SurfaceRequest, archived_cells, bind, handle_request,
+    snapshot, start,
 };
 use scenecast_core::UserError;
-use scenecast_core::label_picture;
-use scenecast_core::world_file;
 use scenecast_host::{Follower, FrameEvent, SurfaceHost, SurfaceHostEvent, modem_station};
 use scenecast_protocol::wire::Address;
 use scenecast_surface::SurfaceOutput;
 use scenecast_surface::position::Follow;
-use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
 use tokio::sync::oneshot;
 
 /// Maximum time between two snapshots for the page.
 const PUBLISH_INTERVAL: Duration = Duration::from_secs(1);
+/// Time after which changes that were not committed yet are looked at again.
+const CATCH_UP_INTERVAL: Duration = Duration::from_millis(100);
+/// The principal whose name is not known.
+const OPERATOR: &str = "operator";
 
 /// Runs the surface until it is interrupted.
 pub fn run_surface(config: Config, simulated: Option<SimulatedAutopilot>) -> Result<(), UserError> {
@@ -38,10 +40,8 @@ pub fn run_surface(config: Config, simulated: Option<SimulatedAutopilot>) -> Res
                 Some(bind(address.as_str(), "console.listen", token, &config.console.host).await?)
             }
         };
-        let dir = config.runtime.state_dir.clone();
-        let is_again = dir.exists();
-        create_folder(&dir).map_err(|e| UserError::file(&dir, e))?;
-        let clock = Clock::new(config.runtime.time_scale);
+        let was_there = config.runtime.state_dir.exists();
+        let (mut files, clock) = SurfaceFiles::open(&config)?;
         let profile = scenecast_drivers::modem::modem_of_process(&config, Address::SURFACE)?;
         warn_without_key(&config);
         let mut surface = scenecast_surface::assemble(
@@ -55,15 +55,17 @@ pub fn run_surface(config: Config, simulated: Option<SimulatedAutopilot>) -> Res
         if let Some(relay) = relay(&config) {
             surface.set_relay(relay);
         }
-        if is_again {
+        if was_there || files.is_again() {
             surface.assume_budget_spent(clock.now());
         }
         let console = listener.zip(config.console.listen.as_ref()).map(|(listener, address)| {
             println!("the operator's page is at http://{address} (end with Ctrl-C)");
             start(listener)
         });
-        let facts = MissionFacts::new(&config, &profile, super::random_bits(), config.runtime.time_scale);
-        let meter = LinkMeter::new(Duration::from_secs_f64(config.link.budget_window_s));
+        files.begin(&mut surface, super::random_bits() as u32, config.mission.id, clock.now());
+        let id = files.store.memory().began().map_or(0, |began| began.id);
+        let facts = MissionFacts::new(&config, &profile, id.into(), config.runtime.time_scale);
+        let meter = LinkMeter::new(Duration::from_secs_f64(config.link.budget_window_s), clock.now());
         let modem = ModemPort::open(&config, clock.now()).await?;
         let instruments = Instruments::open(&config);
         let autopilot = pilot::autopilot(&config, simulated, clock.now())?;
@@ -74,7 +76,8 @@ pub fn run_surface(config: Config, simulated: Option<SimulatedAutopilot>) -> Res
         let follower = autopilot.map(|a| Follower::new(a, follow, vehicle, clock.now()));
         let host = SurfaceHost::new(surface, modem_station(&config, Address::SURFACE, profile)?, follower);
         let refusals = Refusals::default();
-        SurfaceShell { host, ports, console, clock, dir, facts, meter, refusals }.run(stop).await
+        let is_stale = true;
+        SurfaceShell { host, ports, console, clock, files, facts, meter, refusals, is_stale }.run(stop).await
     })
 }
 
@@ -90,10 +93,12 @@ struct SurfaceShell {
     ports: Ports,
     console: Option<Console>,
     clock: Clock,
-    dir: PathBuf,
+    files: SurfaceFiles,
     facts: MissionFacts,
     meter: LinkMeter,
     refusals: Refusals,
+    /// The page lacks changes that are still to be committed.
+    is_stale: bool,
 }
 
 impl SurfaceShell {
@@ -101,18 +106,27 @@ impl SurfaceShell {
         let mut publish = tokio::time::interval(PUBLISH_INTERVAL);
         publish.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Delay);
         loop {
-            if self.pump()? {
+            self.is_stale |= self.pump()?;
+            if self.is_stale && self.files.may_commit() {
                 self.publish();
             }
             let now = self.clock.now();
             let wake = self.host.poll_timeout(now).unwrap_or(now + Duration::from_secs(1));
+            let catch_up = tokio::time::sleep(CATCH_UP_INTERVAL);
             tokio::select! {
                 () = stop.asked() => {
+                    self.publish();
+                    self.files.tend(self.host.surface(), self.facts.cell_m, self.clock.now());
                     modem::log_audit(self.host.link());
                     return Ok(());
                 }
                 _ = tokio::time::sleep_until(self.clock.wall(wake)) => {}
-                _ = publish.tick() => self.publish(),
+                () = catch_up, if self.is_stale => {}
+                _ = publish.tick() => {
+                    self.publish();
+                    self.files.tend(self.host.surface(), self.facts.cell_m, self.clock.now());
+                    self.facts.storage = Some(self.files.info());
+                }
                 report = self.ports.modem.next() => {
                     ModemPort::handle(report, self.host.link_mut(), self.clock.now());
                 }
@@ -135,14 +149,31 @@ impl SurfaceShell {
         }
     }
 
+    /// Handles a request. Its effects are durable before the reply, and before anything is transmitted.
     fn handle_request(&mut self, request: SurfaceRequest, reply: oneshot::Sender<Reply>) {
+        let now = self.clock.now();
+        self.files.commit(self.host.surface_mut(), None, now);
+        let answer = match &request {
+            SurfaceRequest::Archives => Reply::Archives(self.files.archives(now)),
+            SurfaceRequest::ArchivedMap(name) => match self.files.store.archived(name) {
+                Some(map) => Reply::Map(archived_cells(&map, self.facts.cell_m)),
+                None => Reply::NotFound,
+            },
+            _ => handle_request(self.host.surface_mut(), request, self.facts.cell_m, now),
+        };
+        self.files.commit(self.host.surface_mut(), Some(OPERATOR), now);
+        self.is_stale = true;
         // A browser that closed its connection needs no reply.
-        let _ = reply.send(handle_request(self.host.surface_mut(), request, self.facts.cell_m, self.clock.now()));
+        let _ = reply.send(answer);
     }
 
+    /// Shows the state on the page, after it was made durable.
     fn publish(&mut self) {
+        let now = self.clock.now();
+        self.files.commit(self.host.surface_mut(), None, now);
+        self.is_stale = false;
         if let Some(console) = &self.console {
-            let snapshot = snapshot(self.host.surface(), &self.facts, &self.meter, self.clock.now());
+            let snapshot = snapshot(self.host.surface(), &self.facts, &self.meter, now);
             console.snapshots.send_replace(Arc::new(snapshot));
         }
     }
@@ -169,7 +200,7 @@ impl SurfaceShell {
             match event {
                 SurfaceHostEvent::Role(output) => {
                     is_changed = true;
-                    self.handle_output(output)?;
+                    self.handle_output(output);
                 }
                 SurfaceHostEvent::Following(x, y) => {
                     tracing::info!("following: to {x:.0} m east, {y:.0} m north");
@@ -184,9 +215,9 @@ impl SurfaceShell {
         Ok(is_changed)
     }
 
-    fn handle_output(&self, output: SurfaceOutput) -> Result<(), UserError> {
+    fn handle_output(&mut self, output: SurfaceOutput) {
         match output {
-            SurfaceOutput::MapChanged(vehicle) => self.write_map(vehicle)?,
+            SurfaceOutput::MapChanged(vehicle) => self.files.note_map(vehicle),
             SurfaceOutput::VehicleFound(vehicle) => {
                 tracing::info!("vehicle {} answered a call: it is spoken with from now on", vehicle.number());
             }
@@ -195,7 +226,6 @@ impl SurfaceShell {
             }
             SurfaceOutput::SlotDecided(..) | SurfaceOutput::Changed(_) => {}
         }
-        Ok(())
     }
 
     fn measure(&mut self, event: &FrameEvent) {
@@ -211,25 +241,6 @@ impl SurfaceShell {
             }
             _ => {}
         }
-    }
-
-    fn write_map(&self, vehicle: Address) -> Result<(), UserError> {
-        let Some(map) = self.host.surface().map(vehicle) else { return Ok(()) };
-        let png = match label_picture::encode(map) {
-            Ok(png) => png,
-            // Received data must not end the run.
-            Err(e) => {
-                tracing::warn!("operator-map-{}.png is not written: {e}", vehicle.number());
-                return Ok(());
-            }
-        };
-        let file = |extension| self.dir.join(format!("operator-map-{}.{extension}", vehicle.number()));
-        if let (Some(plane), Some(bounds)) = (self.host.surface().relay().and_then(|r| r.plane()), map.bounds()) {
-            let placement = self.host.surface().view(vehicle).and_then(|v| v.status().and_then(|(s, _)| s.placement));
-            let text = world_file(plane, placement, bounds, self.facts.cell_m);
-            scenecast_files::write_whole(&file("pgw"), text.as_bytes())?;
-        }
-        scenecast_files::write_whole(&file("png"), &png)
     }
 }
 

@@ -1,18 +1,21 @@
 //! The surface: it holds the operator's map of each vehicle and sends each vehicle its directive. It does no IO.
 
+mod annotations;
 mod assemble;
 mod exemplar_cache;
 mod orders;
 mod pauses;
 pub mod position;
+pub mod record;
 mod requests;
 mod settings;
 mod surface;
 mod vehicle_record;
 
+pub use annotations::Annotations;
 pub use assemble::assemble;
 pub use exemplar_cache::{ExemplarCache, LabelExemplars, OpenRequest, RequestKind, RequestState, StoredExemplar};
 pub use orders::{FenceOrder, LimitsOrder, MAX_DISTANCE_M};
 pub use settings::{SettingsOrder, SettingsRecord};
 pub use surface::{Surface, SurfaceOutput};
-pub use vehicle_record::VehicleRecord;
+pub use vehicle_record::{EarlierView, SentOrder, Track, VehicleRecord, WholeMaps};

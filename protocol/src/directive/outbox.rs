@@ -53,19 +53,36 @@ pub struct PendingSlot {
 pub struct SlotOutbox {
     series: u16,
     slots: [Option<SlotProgress>; SLOTS],
+    /// Versions to leave out before the next one of each slot.
+    skipped: [u16; SLOTS],
 }
 
 impl SlotOutbox {
     /// An empty directive; `series` must be drawn at random at each start of the surface.
     pub fn new(series: u16) -> Self {
-        Self { series, slots: Default::default() }
+        Self { series, slots: Default::default(), skipped: [0; SLOTS] }
+    }
+
+    /// Versions that are left out after a restart: an order whose record was lost may have used one of them.
+    const RESTART_GAP: u16 = 64;
+
+    /// Continues with the series and the orders of an earlier run of the surface. Orders that the vehicle has not decided
+    /// about are sent again, with their versions.
+    pub fn restore(&mut self, series: u16, orders: impl IntoIterator<Item = SlotProgress>) {
+        (self.series, self.skipped) = (series, [Self::RESTART_GAP; SLOTS]);
+        for order in orders {
+            if let Some(entry) = self.slots.get_mut(order.id.index()) {
+                *entry = Some(SlotProgress { sent: None, ..order });
+            }
+        }
     }
 
     /// Issues a new version of a slot, which supersedes the older one; returns the version.
     pub fn issue(&mut self, slot: Slot, now: Instant) -> u16 {
         let id = slot.id();
         let Some(entry) = self.slots.get_mut(id.index()) else { return 0 };
-        let version = entry.as_ref().map_or(1, |s| s.version.wrapping_add(1));
+        let gap = self.skipped.get_mut(id.index()).map(std::mem::take).unwrap_or_default();
+        let version = entry.as_ref().map_or(1, |s| s.version.wrapping_add(1)).wrapping_add(gap);
         *entry = Some(SlotProgress {
             id,
             version,
@@ -85,14 +102,14 @@ impl SlotOutbox {
 
     /// Whether a version waits that the vehicle is not known to have received.
     pub fn has_backlog(&self) -> bool {
-        self.progress().any(|s| matches!(s.status, OrderStatus::Queued | OrderStatus::OnAir))
+        self.progress().any(is_pending)
     }
 
     /// The slots that the vehicle is not known to have received, commands before fixes, encoded as of `now`;
     /// without those sent after `again_before`.
     pub fn pending(&self, now: Instant, again_before: Instant) -> Vec<PendingSlot> {
         self.progress()
-            .filter(|s| matches!(s.status, OrderStatus::Queued | OrderStatus::OnAir))
+            .filter(|s| is_pending(s))
             .filter(|s| s.sent.is_none_or(|at| at <= again_before))
             .map(|s| PendingSlot {
                 id: s.id,
@@ -110,7 +127,10 @@ impl SlotOutbox {
 
     /// Notes that a frame with this version was written.
     pub fn mark_on_air(&mut self, id: SlotId, version: u16, now: Instant) {
-        self.advance(id, version, OrderStatus::OnAir, now, |status| status == OrderStatus::Queued);
+        let is_first = self.slots.get(id.index()).and_then(Option::as_ref).is_some_and(|s| s.sent.is_none());
+        self.advance(id, version, OrderStatus::OnAir, now, |status| {
+            status == OrderStatus::Queued || is_first && status == OrderStatus::Received
+        });
         if let Some(slot) = self.slots.get_mut(id.index()).and_then(Option::as_mut) {
             slot.sent = Some(now);
         }
@@ -169,6 +189,16 @@ impl SlotOutbox {
             }
             _ => false,
         }
+    }
+}
+
+/// Whether the vehicle is not known to have received an order. One that an earlier run of the surface knew as received, and
+/// not as decided, has not been sent in this run.
+fn is_pending(order: &SlotProgress) -> bool {
+    match order.status {
+        OrderStatus::Queued | OrderStatus::OnAir => true,
+        OrderStatus::Received => order.sent.is_none(),
+        OrderStatus::Applied | OrderStatus::Refused(_) => false,
     }
 }
 

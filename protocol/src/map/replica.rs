@@ -57,6 +57,20 @@ impl Replica {
         self.received.len()
     }
 
+    /// Every cell that a chunk has covered, with its label and when that was received, in the order of the cells.
+    pub fn cells(&self) -> impl Iterator<Item = (Cell, u8, Instant)> + '_ {
+        self.received.iter().map(|(&cell, record)| (cell, self.shown.get(cell), record.at))
+    }
+
+    /// Puts a cell back that an earlier run of the surface has received. Such a replica is only shown: it is no base of a
+    /// chunk.
+    pub fn restore(&mut self, cell: Cell, label: u8, at: Instant) {
+        self.shown.set(cell, label);
+        self.received.insert(cell, CellRecord { number: 0, at });
+        self.updated = self.updated.max(Some(at));
+        self.version += 1;
+    }
+
     /// When a chunk last covered a cell.
     pub fn received_at(&self, cell: Cell) -> Option<Instant> {
         self.received.get(&cell).map(|record| record.at)

@@ -52,6 +52,7 @@ pub fn snapshot(surface: &Surface, facts: &MissionFacts, meter: &LinkMeter, now:
         position: position::surface_position(surface, now),
         link: link::summary(surface, meter, now),
         layers: surface.layers().iter().map(|(_, layer)| layer_info(layer)).collect(),
+        storage: facts.storage.clone(),
     })
 }
 

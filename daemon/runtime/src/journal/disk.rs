@@ -184,6 +184,10 @@ impl Storage for Disk {
         Ok(())
     }
 
+    fn list(&self) -> Result<Vec<String>> {
+        Ok(self.0.borrow().names.last().into_iter().flat_map(BTreeMap::keys).cloned().collect())
+    }
+
     fn sync_folder(&mut self) -> Result<()> {
         self.step(DiskStep::SyncFolder)?;
         let mut platter = self.0.borrow_mut();

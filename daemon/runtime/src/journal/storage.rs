@@ -27,6 +27,9 @@ pub(crate) trait Storage {
     /// Renames a file and replaces one of the new name.
     fn rename(&mut self, from: &str, to: &str) -> io::Result<()>;
 
+    /// The names of the files.
+    fn list(&self) -> io::Result<Vec<String>>;
+
     /// Makes the names in the folder durable.
     fn sync_folder(&mut self) -> io::Result<()>;
 }
@@ -102,6 +105,11 @@ impl Storage for Folder {
 
     fn rename(&mut self, from: &str, to: &str) -> io::Result<()> {
         fs::rename(self.path(from), self.path(to))
+    }
+
+    fn list(&self) -> io::Result<Vec<String>> {
+        let names = fs::read_dir(&self.path)?.filter_map(|entry| entry.ok()?.file_name().into_string().ok());
+        Ok(names.collect())
     }
 
     fn sync_folder(&mut self) -> io::Result<()> {

@@ -17,7 +17,7 @@ pub use event::{IssueError, SurfaceEvent};
 pub use peer::PeerView;
 pub use polled::Cycle;
 
-use crate::directive::{Slot, VersionedSlot};
+use crate::directive::{Slot, SlotProgress, VersionedSlot};
 use crate::link::{DropReason, FrameNumber, Transmit};
 use crate::mac::Access;
 use crate::map::{Replica, StateReplica};
@@ -87,6 +87,29 @@ impl<R: StateReplica> SurfaceLink<R> {
         let c = &self.config;
         let peer = VehiclePeer::new(c.mission, vehicle, c.authenticity.clone(), seed, self.series, c.master, now);
         self.fleet.insert(vehicle, peer);
+    }
+
+    /// The random number that distinguishes the orders of this surface from those of others.
+    pub fn series(&self) -> u16 {
+        self.series
+    }
+
+    /// Continues with the series of an earlier run of the surface, before any order is issued.
+    pub fn restore_series(&mut self, series: u16) {
+        self.series = series;
+        self.fleet.addresses().collect::<Vec<_>>().into_iter().for_each(|v| self.restore_orders(v, [], Instant::ZERO));
+    }
+
+    /// Puts the orders to a vehicle back that an earlier run of the surface has issued in the same series. A vehicle that was
+    /// found by a discovery call is added at `now`.
+    pub fn restore_orders(&mut self, vehicle: Address, orders: impl IntoIterator<Item = SlotProgress>, now: Instant) {
+        if self.fleet.get(vehicle).is_none() {
+            self.add(vehicle, now);
+        }
+        let series = self.series;
+        if let Some(peer) = self.fleet.get_mut(vehicle) {
+            peer.restore_orders(series, orders);
+        }
     }
 
     /// The current view of a vehicle; `None` if it is unknown.

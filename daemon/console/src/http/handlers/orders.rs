@@ -3,7 +3,9 @@
 use crate::http::body::JsonOrder;
 use crate::http::response::error;
 use crate::http::shared::{Shared, VehicleId};
-use crate::orders::{BudgetOrder, ConstraintsOrder, ExemplarOrder, UtilityOrder};
+use crate::orders::{
+    BudgetOrder, ConstraintsOrder, DismissOrder, ExemplarOrder, LabelOrder, NoteOrder, UtilityOrder,
+};
 use crate::request::SurfaceRequest;
 use axum::extract::State;
 use axum::http::StatusCode;
@@ -70,4 +72,28 @@ pub(in crate::http) async fn budget(
     JsonOrder(order): JsonOrder<BudgetOrder>,
 ) -> Response {
     shared.respond(SurfaceRequest::Budget(order)).await
+}
+
+pub(in crate::http) async fn label(
+    State(shared): State<Shared>,
+    VehicleId(id): VehicleId,
+    JsonOrder(order): JsonOrder<LabelOrder>,
+) -> Response {
+    shared.respond(SurfaceRequest::Label(id, order)).await
+}
+
+pub(in crate::http) async fn note(
+    State(shared): State<Shared>,
+    VehicleId(id): VehicleId,
+    JsonOrder(order): JsonOrder<NoteOrder>,
+) -> Response {
+    shared.respond(SurfaceRequest::Note(id, order)).await
+}
+
+pub(in crate::http) async fn dismiss(
+    State(shared): State<Shared>,
+    VehicleId(id): VehicleId,
+    JsonOrder(DismissOrder {}): JsonOrder<DismissOrder>,
+) -> Response {
+    shared.respond(SurfaceRequest::DismissEarlierMap(id)).await
 }

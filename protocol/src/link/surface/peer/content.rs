@@ -41,6 +41,7 @@ pub(super) struct PeerContent<R> {
     pub(super) status: StatusParts,
     pub(super) backlog: Option<ReportedBacklog>,
     objects: ObjectReceiver,
+    generation: u64,
 }
 
 impl<R: StateReplica> PeerContent<R> {
@@ -51,7 +52,13 @@ impl<R: StateReplica> PeerContent<R> {
             status: StatusParts::default(),
             backlog: None,
             objects: ObjectReceiver::default(),
+            generation: 0,
         }
+    }
+
+    /// The number of times that the copy was emptied.
+    pub(super) fn generation(&self) -> u64 {
+        self.generation
     }
 
     /// The vehicle has begun a new run.
@@ -61,6 +68,7 @@ impl<R: StateReplica> PeerContent<R> {
         self.objects.clear();
         self.status = StatusParts::default();
         self.backlog = None;
+        self.generation += 1;
     }
 
     /// Counts changes of the map and its layers.

@@ -14,7 +14,7 @@ mod view;
 pub(super) use turn::{Ready, room_for_slot};
 pub use view::PeerView;
 
-use crate::directive::{Slot, SlotId, SlotOutbox};
+use crate::directive::{Slot, SlotId, SlotOutbox, SlotProgress};
 use crate::link::{Authenticity, DropReason, FrameNumber, Inbound, LinkPair, LinkStats, SurfaceEvent};
 use crate::mac::{Access, Master, MasterConfig, ModemProfile};
 use crate::map::StateReplica;
@@ -117,6 +117,11 @@ impl<R: StateReplica> VehiclePeer<R> {
     /// Issues a new version of a slot; returns the version.
     pub(super) fn issue(&mut self, slot: Slot, now: Instant) -> u16 {
         self.outbox.issue(slot, now)
+    }
+
+    /// Continues with the series and the orders of an earlier run of the surface.
+    pub(super) fn restore_orders(&mut self, series: u16, orders: impl IntoIterator<Item = SlotProgress>) {
+        self.outbox.restore(series, orders);
     }
 
     /// Handles a frame of this vehicle; `bytes` is its length.
