@@ -183,6 +183,7 @@ impl VehicleRecord {
 
     /// Takes a status. A new epoch voids everything that refers to labels.
     pub fn handle_status(&mut self, status: &VehicleStatus, now: Instant) {
+        self.restored = RestoredContact::default();
         if status.epoch != self.epoch {
             self.epoch = status.epoch;
             self.utility = Utility { epoch: status.epoch, ..Utility::default() };

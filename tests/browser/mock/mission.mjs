@@ -100,6 +100,7 @@ export class Mission {
       mission: { name: this.name, id: `mock-${this.name}`, speed: this.speed, ended: this.ended },
       vehicles: this.vehicles.map((v) => v.json(this.nowS)),
       position: this.position ?? null,
+      storage: this.storage ?? null,
       layers: LAYERS.map(({ name, unit }) => ({ name, unit, summary: `what ${name} means` })),
       link: {
         budget_bps: this.budgetBps, shares: this.shares, background: this.background, budget_window_s: 10,

@@ -100,7 +100,11 @@ fn map(
             current_epoch: record.epoch,
             current_cells: surface.current_cells(address) as u32,
         }),
-        placement: record.status(view).and_then(|(s, _)| s.placement).map(position::placement),
+        placement: match record.earlier_map() {
+            Some(earlier) => earlier.placement(),
+            None => record.status(view).and_then(|(s, _)| s.placement),
+        }
+        .map(position::placement),
     }
 }
 

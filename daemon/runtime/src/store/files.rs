@@ -153,7 +153,9 @@ impl SurfaceFiles {
             }
         };
         if let (Some(plane), Some(bounds)) = (surface.relay().and_then(|r| r.plane()), map.bounds()) {
-            let placement = surface.status(vehicle).and_then(|(status, _)| status.placement);
+            let earlier = surface.record(vehicle).and_then(|record| record.earlier_map());
+            let live = || surface.status(vehicle).and_then(|(status, _)| status.placement);
+            let placement = earlier.map_or_else(live, |earlier| earlier.placement());
             let text = world_file(plane, placement, bounds, cell_m);
             scenecast_files::write_whole(&self.picture(number, "pgw"), text.as_bytes())?;
         }

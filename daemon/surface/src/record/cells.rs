@@ -1,8 +1,9 @@
 //! Copies of maps: what the surface has received, cell by cell, with its times.
 
-use super::event::{StoredCells, StoredLabel};
+use super::event::{StoredCells, StoredContact, StoredLabel};
 use scenecast_protocol::map::{Cell, LayerDescriptor, LayerId, LayerReplica, Replica, UNEXPLORED};
 use scenecast_protocol::time::Instant;
+use scenecast_protocol::wire::Placement;
 use std::collections::BTreeMap;
 
 /// Cells in one event; a larger change takes several.
@@ -26,6 +27,15 @@ pub struct EarlierMap {
     /// The operator's names of its labels.
     pub names: BTreeMap<u8, StoredLabel>,
     pub map: MapCopy,
+    /// The last report of its run.
+    pub(super) contact: StoredContact,
+}
+
+impl EarlierMap {
+    /// The placement of the map in its run; `None` while no fix had moved it.
+    pub fn placement(&self) -> Option<Placement> {
+        super::stored::status(&self.contact)?.0.placement
+    }
 }
 
 impl MapCopy {

@@ -8,9 +8,9 @@ const SCHEMA: u16 = 1;
 /// The reason that bytes are no batch of events.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum DecodeError {
-    #[error("written by a later version of scenecast (layout {0}); use that one")]
+    #[error("written by a later version of scenecast (layout {0}); use that one, or move the file away")]
     Later(u16),
-    #[error("the events are unreadable")]
+    #[error("the events are unreadable; restore the file, or move it away")]
     Damaged,
 }
 

@@ -214,7 +214,9 @@ impl VehicleMemory {
         let map = std::mem::take(&mut self.map);
         let is_larger = self.earlier.as_ref().is_none_or(|earlier| map.explored() >= earlier.map.explored());
         if map.explored() > 0 && is_larger {
-            self.earlier = Some(Arc::new(EarlierMap { run: self.id.run, epoch: self.id.epoch, names: self.labels.clone(), map }));
+            let (RunId { run, epoch, .. }, names) = (self.id, self.labels.clone());
+            let contact = StoredContact { usbl: None, ..self.contact.clone() };
+            self.earlier = Some(Arc::new(EarlierMap { run, epoch, names, map, contact }));
         }
     }
 
@@ -226,7 +228,7 @@ impl VehicleMemory {
             all.push(VehicleEvent::Identified(id));
             all.extend(earlier.map.to_events().into_iter().map(VehicleEvent::Cells));
             all.extend(earlier.names.iter().map(named));
-            all.push(VehicleEvent::Replaced);
+            all.extend([VehicleEvent::Contact(earlier.contact.clone()), VehicleEvent::Replaced]);
             let book = StoredLabel::default();
             all.extend(earlier.names.keys().map(|&label| VehicleEvent::Label { label, book: book.clone() }));
         }
