@@ -209,3 +209,43 @@ fn dated(progress: &SlotProgress, now: Instant) -> Slot {
         ref other => other.clone(),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::directive::Constraints;
+
+    fn hold(hold: bool) -> Slot {
+        Slot::Constraints(Constraints { hold, abort: false })
+    }
+
+    #[test]
+    fn restored_orders_are_sent_again_with_their_versions() {
+        let now = Instant::from_secs_f64(5.0);
+        for (status, is_sent) in [
+            (OrderStatus::Queued, true),
+            (OrderStatus::OnAir, true),
+            (OrderStatus::Received, true),
+            (OrderStatus::Applied, false),
+            (OrderStatus::Refused(RefusalReason::Unable), false),
+        ] {
+            let mut before = SlotOutbox::new(9);
+            (0..3).for_each(|i| drop(before.issue(hold(i % 2 == 0), now)));
+            let mut order = before.progress().next().unwrap().clone();
+            (order.status, order.sent) = (status, Some(now));
+            let mut after = SlotOutbox::new(1);
+            after.restore(9, [order]);
+            let pending = after.pending(now, Instant::ZERO);
+            let bytes = VersionedSlot::encode(9, 3, &hold(true));
+            assert_eq!(pending.iter().map(|p| &p.bytes).collect::<Vec<_>>(), Vec::from_iter(is_sent.then_some(&bytes)));
+            assert_eq!(after.progress().next().unwrap().status, status);
+            if is_sent {
+                after.mark_on_air(SlotId::Constraints, 3, now);
+                after.mark_received(SlotId::Constraints, 3, now);
+                assert_eq!(after.progress().next().unwrap().status, OrderStatus::Received);
+                assert!(!after.has_backlog());
+            }
+            assert!(after.issue(hold(false), now) > 3 + 1, "the next version may have been used by a lost order");
+        }
+    }
+}
