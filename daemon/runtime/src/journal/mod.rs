@@ -9,8 +9,6 @@ mod cuts;
 pub(super) mod disk;
 
 pub(super) use record::Damage;
-#[cfg(feature = "surface")]
-pub(crate) use storage::create_folder;
 pub(crate) use storage::{Folder, Storage};
 
 use std::io;

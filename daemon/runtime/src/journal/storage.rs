@@ -64,7 +64,7 @@ impl Folder {
 const HELD: &str = "another process keeps its state there; stop it, or set another runtime.state_dir";
 
 /// Creates a folder and its parents, and syncs the parent of each new one so that its name is durable.
-pub(crate) fn create_folder(path: &Path) -> io::Result<()> {
+fn create_folder(path: &Path) -> io::Result<()> {
     if path.as_os_str().is_empty() || path.is_dir() {
         return Ok(());
     }
