@@ -83,7 +83,7 @@ fn console(port: u16, ends: Instant) -> Vec<f64> {
             updated = state["vehicles"][0]["map"]["updated_s"].as_f64().unwrap_or(0.0);
         } else if line.starts_with("event: map") {
             let mut map = Vec::new();
-            request(port, "/api/v2/vehicles/1/map").read_to_end(&mut map).unwrap();
+            request(port, "/api/v2/vehicles/1/map/tiles").read_to_end(&mut map).unwrap();
             // The map that was there before the console has no arrival to be late from.
             if !std::mem::take(&mut first) {
                 late.push(origin.elapsed().as_secs_f64() - clock - updated);

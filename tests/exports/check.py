@@ -2,7 +2,8 @@
 
     python check.py DIR
 
-DIR has state.json and map.json from the API, and map.png with map.pgw and map.png.aux.xml, map.geojson, map.ply and map.csv.
+DIR has state.json and map.json from the API, and map.png with map.pgw and map.png.aux.xml, map.geojson, map.ply, map.csv,
+map.tif and, with an origin, map.utm.tif and map.wgs84.tif.
 """
 
 import base64
@@ -78,6 +79,41 @@ def check_png(path, api):
         close([tangent_plane(api.origin, *at) for at in zip(lon, lat)], corners, "projection")
 
 
+def check_tiff(path, api):
+    with rasterio.open(path) as image:
+        assert image.is_tiled and image.block_shapes == [(256, 256)] and image.nodata == 0, "tiles"
+        assert image.compression == rasterio.enums.Compression.deflate, "compression"
+        colours = image.colormap(1)
+        assert all(colours[label][:3] != (0, 0, 0) for label in set(api.label.tolist())), "palette"
+        read, place = image.read(1), image.transform
+        x, y = api.x, api.y
+        if api.origin is None:
+            assert image.crs is None, "coordinates of an unknown place"
+        else:
+            mission = rasterio.crs.CRS.from_dict(proj="tmerc", lat_0=api.origin["lat_deg"], lon_0=api.origin["lon_deg"], k=1, datum="WGS84")
+            x, y = (np.array(v) for v in rasterio.warp.transform(mission, image.crs, api.x, api.y))
+            corners = [(0.0, 0.0), (3000.0, 2000.0), (-3000.0, 1000.0)]
+            there = rasterio.warp.transform(mission, image.crs, *zip(*corners))
+            back = rasterio.warp.transform(image.crs, "EPSG:4326", *there)
+            close([tangent_plane(api.origin, *at) for at in zip(*back)], corners, "projection")
+        rows, columns = (np.array(v) for v in rasterio.transform.rowcol(place, x, y))
+        found = read[rows, columns]
+        if path.name == "map.tif":
+            assert (found == api.label).all() and np.count_nonzero(read) == len(api.label), "labels"
+            return
+        zone = 32601 + int((api.origin["lon_deg"] + 180) // 6) + (100 if api.origin["lat_deg"] < 0 else 0)
+        assert image.crs.to_epsg() == (zone if path.name == "map.utm.tif" else 4326), str(image.crs)
+        # The pixel at the centre of a cell belongs to this cell or to a neighbour, so inside a region the labels agree.
+        padded = np.pad(api.labels, 1)
+        around = np.stack([padded[1 + i : 1 + i + api.labels.shape[0], 1 + j : 1 + j + api.labels.shape[1]] for i in (-1, 0, 1) for j in (-1, 0, 1)])
+        inside = (around == api.labels).all(axis=0)[np.nonzero(api.labels)]
+        assert inside.sum() > 100 and (found[inside] == api.label[inside]).all(), "labels inside regions"
+        assert (found == api.label).mean() > 0.8, "labels"
+        # A pixel has about the area of a cell.
+        side = 1 if path.name == "map.utm.tif" else 111320 * math.sqrt(math.cos(math.radians(api.origin["lat_deg"])))
+        assert abs(math.sqrt(abs(place.a * place.e)) * side / api.cell - 1) < 0.01, "pixels"
+
+
 def check_geojson(path, api):
     document = json.loads(path.read_text())
     regions = {f["properties"]["label"]: shapely.geometry.shape(f["geometry"]) for f in document["features"]}
@@ -117,7 +153,10 @@ def check_csv(path, api):
 def main():
     directory = Path(sys.argv[1])
     api = ApiMap(directory)
-    for extension, check in {"png": check_png, "geojson": check_geojson, "ply": check_ply, "csv": check_csv}.items():
+    checks = {"png": check_png, "geojson": check_geojson, "ply": check_ply, "csv": check_csv, "tif": check_tiff}
+    if api.origin is not None:
+        checks.update({"utm.tif": check_tiff, "wgs84.tif": check_tiff})
+    for extension, check in checks.items():
         path = directory / f"map.{extension}"
         try:
             check(path, api)

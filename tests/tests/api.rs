@@ -283,7 +283,8 @@ fn assert_exports_open(name: &str, origin: &[&str]) {
     // A late fix may move the map between two files.
     wait_until("all files with the map in one place", LIMIT, || {
         let before = placement();
-        for file in ["map.json", "map.png", "map.geojson", "map.ply", "map.csv"] {
+        let projected: &[&str] = if origin.is_empty() { &[] } else { &["map.utm.tif", "map.wgs84.tif"] };
+        for file in ["map.json", "map.png", "map.geojson", "map.ply", "map.csv", "map.tif"].iter().chain(projected) {
             let made = ctl(port, &["map", "--out", &path(file)]);
             assert_eq!(made.status.code(), Some(0), "{file}: {}", text(&made));
         }
@@ -301,4 +302,14 @@ fn exports_with_an_origin_open_in_the_right_place() {
 #[test]
 fn exports_without_an_origin_open_in_metres() {
     assert_exports_open("exports-metres", &[]);
+}
+
+#[test]
+fn exports_of_a_wide_survey_have_each_cell_in_its_place() {
+    let dir = scratch("exports-wide");
+    let out = dir.display().to_string();
+    let made = run(&["bench", "wide", "--cells", "12000", "--out", &out, "--json"]);
+    assert_eq!(made.status.code(), Some(0), "{}", text(&made));
+    let Some(python) = python() else { return };
+    run_script(&python, "tests/exports/wide.py", &[&out, "60.17", "-10.25"]);
 }

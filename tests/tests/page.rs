@@ -67,6 +67,37 @@ fn version_1_of_the_api_is_gone_and_names_version_2() {
 }
 
 #[test]
+fn a_map_is_read_by_region_and_by_changed_tiles() {
+    let port = free_port();
+    let _demo = Process::start(&["demo", "--port", &port.to_string(), "--speed", "20", "--duration", "600"]);
+    wait_until("a map", Duration::from_secs(60), || {
+        state(port).is_some_and(|s| s["vehicles"][0]["map"]["explored_cells"].as_u64() > Some(0))
+    });
+    let get = |path: &str| http(port, "GET", &format!("/api/v2/vehicles/1/{path}"), "", "").unwrap();
+    let region = "map?x0=-2&y0=-3&width=4&height=5";
+    let (status, body) = get(region);
+    let body: Value = serde_json::from_slice(&body).unwrap();
+    assert_eq!((status, &body["x0"], &body["y0"], &body["width"]), (200, &(-2).into(), &(-3).into(), &4.into()));
+    assert_eq!(body["labels"].as_str().unwrap().len(), 28, "20 bytes in base64");
+    for wrong in ["map?x0=1", "map?x0=1&y0=a&width=1&height=1", "map?x0=0&y0=0&width=0&height=1"] {
+        assert_eq!(get(wrong).0, 422, "{wrong}");
+    }
+    let (status, body) = get("map?x0=0&y0=0&width=100000&height=100000");
+    assert!(status == 422 && String::from_utf8_lossy(&body).contains("at most 1048576"));
+    let index = |path: &str| -> Value {
+        let (status, body) = get(path);
+        assert_eq!((status, &body[..5]), (200, &b"SCMT\x01"[..]));
+        let length = u32::from_le_bytes(body[8..12].try_into().unwrap()) as usize;
+        serde_json::from_slice(&body[12..12 + length]).unwrap()
+    };
+    let whole = index("map/tiles");
+    assert!(whole["since"].is_null() && !whole["tiles"].as_array().unwrap().is_empty());
+    let changed = index(&format!("map/tiles?since={}", whole["tag"].as_str().unwrap()));
+    assert_eq!(changed["since"], whole["tag"]);
+    assert!(index("map/tiles?since=0000000-1")["since"].is_null());
+}
+
+#[test]
 fn the_page_is_small_and_cached() {
     let port = free_port();
     let _demo = Process::start(&["demo", "--port", &port.to_string(), "--speed", "20", "--duration", "600"]);

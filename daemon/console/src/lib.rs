@@ -16,9 +16,11 @@ pub mod orders;
 mod request;
 mod snapshot;
 pub mod state;
+mod tiles;
 
-pub use export::{CellLayer, MapCells};
-pub use http::{Console, ConsoleListener, PendingRequest, bind, start};
+pub use export::{MapCells, MapFormat};
+pub use http::{Console, ConsoleListener, PendingRequest, bind, gzip, page_files, start};
 pub use link_meter::LinkMeter;
 pub use request::{Reply, SurfaceRequest, archived_cells, handle_request};
-pub use snapshot::{MissionFacts, Snapshot, snapshot};
+pub use snapshot::{MissionFacts, Snapshot, measured_origin, snapshot};
+pub use tiles::TiledMap;

@@ -4,11 +4,8 @@ use crate::export::MapCells;
 use crate::fit::{self, Fit};
 use crate::layers;
 use crate::orders::{BudgetOrder, ExemplarAction, ExemplarOrder, LabelOrder, NoteOrder};
-use crate::snapshot::seconds;
 use crate::state::{AcceptedOrder, ArchivedMap};
-use scenecast_core::label_picture::MAX_CELLS;
 use scenecast_protocol::directive::{Constraints, SlotId};
-use scenecast_protocol::map::Rect;
 use scenecast_protocol::schedule::{BackgroundOrder, Shares};
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::Address;
@@ -19,7 +16,7 @@ use std::collections::BTreeMap;
 /// A reading or an order. The first number is the address of the vehicle.
 #[derive(Debug, Clone, PartialEq)]
 pub enum SurfaceRequest {
-    /// Read the map with the age of its cells.
+    /// Read the map: its tiles with the time of each cell.
     Map(u8),
     /// Read an image of a label: the one with this number, or the latest.
     Exemplar(u8, u8, Option<u8>),
@@ -47,7 +44,7 @@ pub enum SurfaceRequest {
 }
 
 /// The reply of the surface.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub enum Reply {
     /// The cells of a map.
     Map(MapCells),
@@ -126,17 +123,14 @@ fn done(result: Result<(), String>) -> Reply {
 /// The cells of an archived map. Their ages count from the last one that was received.
 pub fn archived_cells(map: &VehicleMemory, cell_m: f64) -> MapCells {
     let (labels, layers) = (map.map().labels(), map.map().layers().map(|(_, layer)| layer).collect::<Vec<_>>());
-    let at = labels.updated().unwrap_or_default();
-    let bounds = labels.shown().bounds().unwrap_or(Rect { x: 0, y: 0, width: 0, height: 0 });
     MapCells {
         version: map.archived().map_or(0, |(_, cells)| cells),
-        at_s: seconds(at),
-        bounds,
+        at: labels.updated().unwrap_or_default(),
+        bounds: labels.bounds(),
         cell_m,
         moved_m: map.placement_m().unwrap_or((0.0, 0.0)),
-        labels: bounds.cells().map(|cell| labels.shown().get(cell)).collect(),
-        age_s: layers::ages(labels, bounds, at),
-        layers: layers::layers(&layers, bounds, at),
+        tiles: labels.tiles().clone(),
+        layers: layers::layers(&layers),
     }
 }
 
@@ -173,22 +167,15 @@ fn budget(surface: &mut Surface, order: BudgetOrder, now: Instant) -> Reply {
     Reply::Accepted(AcceptedOrder { slot: SlotId::Budget.name().to_owned(), version: None, versions })
 }
 
+/// The map, whose tiles the surface shares: the link waits for a list of tiles and not for a copy of their cells.
 fn map(surface: &Surface, vehicle: Address, cell_m: f64, now: Instant) -> Option<Reply> {
-    let grid = surface.map(vehicle)?;
-    let replica = surface.replica(vehicle)?;
-    let bounds = grid.bounds().unwrap_or(Rect { x: 0, y: 0, width: 0, height: 0 });
-    if bounds.area() > MAX_CELLS {
-        let Rect { width, height, .. } = bounds;
-        return Some(Reply::Refused(format!("the map spans {width} x {height} cells: at most {MAX_CELLS} are sent")));
-    }
     Some(Reply::Map(MapCells {
         version: surface.map_version(vehicle),
-        at_s: seconds(now),
-        bounds,
+        at: now,
+        bounds: surface.map_bounds(vehicle),
         cell_m,
         moved_m: (0.0, 0.0),
-        labels: bounds.cells().map(|cell| grid.get(cell)).collect(),
-        age_s: layers::ages(replica, bounds, now),
-        layers: layers::layers(&surface.map_layers(vehicle), bounds, now),
+        tiles: surface.map_tiles(vehicle)?,
+        layers: layers::layers(&surface.map_layers(vehicle)),
     }))
 }

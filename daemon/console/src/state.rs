@@ -8,7 +8,7 @@ mod vehicle;
 
 pub use labels::{ExemplarImage, ExemplarProgress, ExemplarStage, MapLabel};
 pub use link::{ChannelQuality, LinkDirection, LinkRates, LinkSummary, ReportedBacklog, VehicleChannel};
-pub use map::{EarlierMap, LayerBody, MapBody, MapEvent, MapPlacement, MapSummary};
+pub use map::{EarlierMap, LayerBody, MapBody, MapEvent, MapIndex, MapPlacement, MapSummary, TileLayer};
 pub use storage::{ArchiveList, ArchivedMap, StorageInfo, VehicleNote};
 pub use vehicle::{
     AppliedOrder, DirectiveSlots, OrderProgress, OrderStatus, PlannedPath, ReportedMode, ReportedPose, StatusReport,

@@ -24,6 +24,7 @@ mod simulated_autopilot;
 #[cfg(test)]
 mod storm_tests;
 mod virtual_time;
+pub mod wide_bench;
 mod world;
 
 pub use fidelity::{FidelityRow, fidelity};

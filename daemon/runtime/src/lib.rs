@@ -8,6 +8,8 @@ mod instruments;
 mod journal;
 #[cfg(test)]
 mod kept_label_tests;
+#[cfg(feature = "surface")]
+mod map_files;
 mod mapping;
 mod modem;
 mod pilot;

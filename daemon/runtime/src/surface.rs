@@ -2,6 +2,7 @@
 
 use super::clock::Clock;
 use super::instruments::{Instruments, relay};
+use super::map_files::{MapFile, MapFiles};
 use super::modem::{self, ModemPort};
 use super::pilot::{self, PilotPort, SimulatedAutopilot};
 use super::refusals::{Refusals, warn_without_key};
@@ -11,9 +12,10 @@ use crate::port::FromPort;
 use scenecast_config::Config;
 use scenecast_console::{
     Console, LinkMeter, MissionFacts, PendingRequest, Reply, SurfaceRequest, archived_cells, bind, handle_request,
-    snapshot, start,
+    measured_origin, snapshot, start,
 };
 use scenecast_core::UserError;
+use scenecast_core::world_file;
 use scenecast_host::{Follower, FrameEvent, SurfaceHost, SurfaceHostEvent, modem_station};
 use scenecast_protocol::wire::Address;
 use scenecast_surface::SurfaceOutput;
@@ -76,8 +78,9 @@ pub fn run_surface(config: Config, simulated: Option<SimulatedAutopilot>) -> Res
         let follower = autopilot.map(|a| Follower::new(a, follow, vehicle, clock.now()));
         let host = SurfaceHost::new(surface, modem_station(&config, Address::SURFACE, profile)?, follower);
         let refusals = Refusals::default();
+        let maps = MapFiles::start(config.runtime.state_dir.clone());
         let is_stale = true;
-        SurfaceShell { host, ports, console, clock, files, facts, meter, refusals, is_stale }.run(stop).await
+        SurfaceShell { host, ports, console, clock, files, maps, facts, meter, refusals, is_stale }.run(stop).await
     })
 }
 
@@ -94,6 +97,7 @@ struct SurfaceShell {
     console: Option<Console>,
     clock: Clock,
     files: SurfaceFiles,
+    maps: MapFiles,
     facts: MissionFacts,
     meter: LinkMeter,
     refusals: Refusals,
@@ -116,15 +120,15 @@ impl SurfaceShell {
             tokio::select! {
                 () = stop.asked() => {
                     self.publish();
-                    self.files.tend(self.host.surface(), self.facts.cell_m, self.clock.now());
                     modem::log_audit(self.host.link());
+                    self.maps.finish().await;
                     return Ok(());
                 }
                 _ = tokio::time::sleep_until(self.clock.wall(wake)) => {}
                 () = catch_up, if self.is_stale => {}
                 _ = publish.tick() => {
                     self.publish();
-                    self.files.tend(self.host.surface(), self.facts.cell_m, self.clock.now());
+                    self.files.tend(self.clock.now());
                     self.facts.storage = Some(self.files.info());
                 }
                 report = self.ports.modem.next() => {
@@ -217,7 +221,7 @@ impl SurfaceShell {
 
     fn handle_output(&mut self, output: SurfaceOutput) {
         match output {
-            SurfaceOutput::MapChanged(vehicle) => self.files.note_map(vehicle),
+            SurfaceOutput::MapChanged(vehicle) => self.write_map(vehicle),
             SurfaceOutput::VehicleFound(vehicle) => {
                 tracing::info!("vehicle {} answered a call: it is spoken with from now on", vehicle.number());
             }
@@ -241,6 +245,21 @@ impl SurfaceShell {
             }
             _ => {}
         }
+    }
+
+    fn write_map(&mut self, vehicle: Address) {
+        let (now, cell_m) = (self.clock.now(), self.facts.cell_m);
+        let request = SurfaceRequest::Map(vehicle.number());
+        let Reply::Map(mut cells) = handle_request(self.host.surface_mut(), request, cell_m, now) else { return };
+        let surface = self.host.surface();
+        let earlier = surface.record(vehicle).and_then(|record| record.earlier_map());
+        let live = || surface.status(vehicle).and_then(|(status, _)| status.placement);
+        let placement = earlier.map_or_else(live, |earlier| earlier.placement());
+        let place = surface.relay().and_then(|r| r.plane()).zip(cells.bounds);
+        let origin = measured_origin(surface).or(self.facts.origin);
+        let world_file = place.map(|(plane, bounds)| world_file(plane, placement, bounds, cell_m));
+        cells.moved_m = placement.map_or((0.0, 0.0), |p| (p.origin.east_m, p.origin.north_m));
+        self.maps.write(vehicle.number(), MapFile { cells, world_file, origin });
     }
 }
 

@@ -10,11 +10,12 @@ use scenecast_core::tuning_table::{Fit, NoRow, TuningTable};
 use scenecast_protocol::directive::{Budget, Constraints, Fix, OrderStatus, Slot, SlotId, Utility};
 use scenecast_protocol::exemplar::Exemplar;
 use scenecast_protocol::link::{Cycle, PeerView, SurfaceEvent, SurfaceLink, Transmit, Wakeup};
-use scenecast_protocol::map::{LabelGrid, LayerReplica, LayerSet, Replica};
+use scenecast_protocol::map::{LabelGrid, LayerReplica, LayerSet, Rect, Replica, ReplicaTile, ReplicaTileKey};
 use scenecast_protocol::schedule::{BackgroundOrder, Shares};
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::{Address, Placement, VehicleStatus};
 use std::collections::{BTreeMap, VecDeque};
+use std::sync::Arc;
 
 /// News of the surface for its host.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -97,13 +98,31 @@ impl Surface {
     /// The number of cells with a label that the vehicle has sent in its current run, in view or not.
     pub fn current_cells(&self, vehicle: Address) -> usize {
         let whole = self.records.get(&vehicle).and_then(|d| d.whole.last.as_ref());
-        let live = || self.link.vehicle(vehicle).map(|v| v.replica().shown());
-        whole.or_else(live).map_or(0, LabelGrid::explored)
+        let count = |view: PeerView<'_>| view.replica().counts().map(|(_, cells)| cells as usize).sum();
+        let live = || self.link.vehicle(vehicle).map_or(0, count);
+        whole.map_or_else(live, LabelGrid::explored)
     }
 
     /// The last status of a vehicle and when its pose came in, perhaps before the start of the surface.
     pub fn status(&self, vehicle: Address) -> Option<&(VehicleStatus, Instant)> {
         self.records.get(&vehicle)?.status(&self.link.vehicle(vehicle)?)
+    }
+
+    /// The last whole map, if it is in view.
+    fn whole_map(&self, vehicle: Address) -> Option<&LabelGrid> {
+        let record = self.records.get(&vehicle).filter(|record| record.earlier_map().is_none());
+        record.and_then(|record| record.whole.last.as_ref())
+    }
+
+    /// The labels of the map in view in tiles. They are shared, so a clone stays as it is and costs little.
+    pub fn map_tiles(&self, vehicle: Address) -> Option<BTreeMap<ReplicaTileKey, Arc<ReplicaTile>>> {
+        let whole = self.whole_map(vehicle).map(ReplicaTile::tiles_of);
+        whole.or_else(|| Some(self.replica(vehicle)?.tiles().clone()))
+    }
+
+    /// The smallest rectangle around the explored cells of the map in view.
+    pub fn map_bounds(&self, vehicle: Address) -> Option<Rect> {
+        self.whole_map(vehicle).map_or_else(|| self.replica(vehicle)?.bounds(), LabelGrid::bounds)
     }
 
     /// A number that grows whenever the operator's map of a vehicle or one of its layers changes.
@@ -328,8 +347,11 @@ impl Surface {
 
     /// The number of cells of each label on the operator's map.
     pub fn labels(&self, vehicle: Address) -> Option<BTreeMap<u8, u32>> {
+        let Some(whole) = self.whole_map(vehicle) else {
+            return Some(self.replica(vehicle)?.counts().collect());
+        };
         let mut cells = BTreeMap::new();
-        for (_, label) in self.map(vehicle)?.iter() {
+        for (_, label) in whole.iter() {
             *cells.entry(label).or_default() += 1;
         }
         Some(cells)

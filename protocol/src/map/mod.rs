@@ -13,6 +13,7 @@ mod layer;
 mod replica;
 mod source;
 mod stream;
+mod tiles;
 mod value;
 
 pub use crate::grid::{Cell, LabelGrid, MAX_LABEL, Rect, TILE, UNEXPLORED};
@@ -25,3 +26,4 @@ pub use layer::{
 pub use replica::Replica;
 pub use source::MapSource;
 pub use stream::{StateReplica, StateSource};
+pub use tiles::{REPLICA_TILE, ReplicaTile, ReplicaTileKey};

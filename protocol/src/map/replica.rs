@@ -1,20 +1,15 @@
 //! The surface's side of the map: the map to show, and the bases of the next chunks.
 
-use super::{Cell, LabelGrid, MAX_LABEL, MapDigest, StateReplica, UNEXPLORED};
+use super::tiles::{ReplicaTile, ReplicaTileKey, ReplicaTiles};
+use super::{Cell, LabelGrid, MAX_LABEL, MapDigest, Rect, StateReplica, UNEXPLORED};
 use crate::map_codec;
 use crate::time::Instant;
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 /// The most cells that a replica knows, and the most changes that wait for the base: a few bytes
 /// can claim a whole patch.
 const MAX_CELLS: usize = 1 << 23;
-
-/// The replica's knowledge of a cell besides its label.
-#[derive(Debug, Clone, Copy)]
-struct CellRecord {
-    number: u64,
-    at: Instant,
-}
 
 /// The operator's copy of a vehicle's map.
 ///
@@ -26,7 +21,7 @@ pub struct Replica {
     log: BTreeMap<u64, Vec<(Cell, u8)>>,
     logged: usize,
     shown: LabelGrid,
-    received: BTreeMap<Cell, CellRecord>,
+    received: ReplicaTiles,
     version: u64,
     updated: Option<Instant>,
 }
@@ -54,26 +49,45 @@ impl Replica {
 
     /// The number of cells that a chunk has covered.
     pub fn received_cells(&self) -> usize {
-        self.received.len()
+        self.received.received_cells()
     }
 
-    /// Every cell that a chunk has covered, with its label and when that was received, in the order of the cells.
+    /// Every cell that a chunk has covered, with its label and when that was received, tile by tile.
     pub fn cells(&self) -> impl Iterator<Item = (Cell, u8, Instant)> + '_ {
-        self.received.iter().map(|(&cell, record)| (cell, self.shown.get(cell), record.at))
+        self.received.cells()
     }
 
     /// Puts a cell back that an earlier run of the surface has received. Such a replica is only shown: it is no base of a
     /// chunk.
     pub fn restore(&mut self, cell: Cell, label: u8, at: Instant) {
+        if !self.received.has_room(&[(cell, label)]) {
+            return;
+        }
+        self.received.receive(cell, label, 0, at);
         self.shown.set(cell, label);
-        self.received.insert(cell, CellRecord { number: 0, at });
         self.updated = self.updated.max(Some(at));
         self.version += 1;
     }
 
     /// When a chunk last covered a cell.
     pub fn received_at(&self, cell: Cell) -> Option<Instant> {
-        self.received.get(&cell).map(|record| record.at)
+        self.received.received_at(cell)
+    }
+
+    /// The cells of [`Self::shown`] and when they were received, in tiles. A tile that a reader has cloned stays as it is; a
+    /// change of one of its cells, also of the time alone, makes another one.
+    pub fn tiles(&self) -> &BTreeMap<ReplicaTileKey, Arc<ReplicaTile>> {
+        self.received.tiles()
+    }
+
+    /// The labels of [`Self::shown`] with the number of their cells, without a pass over the map.
+    pub fn counts(&self) -> impl Iterator<Item = (u8, u32)> + '_ {
+        self.received.counts()
+    }
+
+    /// The smallest rectangle around the explored cells of [`Self::shown`], without a pass over the map.
+    pub fn bounds(&self) -> Option<Rect> {
+        self.received.bounds()
     }
 }
 
@@ -81,15 +95,14 @@ impl Replica {
     /// Applies a chunk of frame `number`, unless it does not decode here or has a label above `max_label`.
     pub(super) fn apply_up_to(&mut self, max_label: u8, number: u64, chunk: &[u8], now: Instant) -> bool {
         let Ok(changes) = map_codec::decode(&self.base, chunk) else { return false };
-        let is_large = self.received.len().max(self.logged) + changes.len() > MAX_CELLS;
-        if is_large || changes.iter().any(|&(_, label)| label > max_label) {
+        let is_large = self.received_cells().max(self.logged) + changes.len() > MAX_CELLS;
+        if is_large || !self.received.has_room(&changes) || changes.iter().any(|&(_, label)| label > max_label) {
             return false;
         }
         self.updated = Some(now);
         let mut changed = false;
         for &(cell, label) in &changes {
-            if self.received.get(&cell).is_none_or(|record| record.number <= number) {
-                self.received.insert(cell, CellRecord { number, at: now });
+            if self.received.receive(cell, label, number, now).is_some() {
                 changed |= self.shown.set(cell, label) != label;
             }
         }

@@ -11,6 +11,7 @@ export const SCENARIOS = {
   refused: { advance: 330, refuse: true },
   two: { advance: 300, vehicles: 2 },
   big: { advance: 1600, vehicle: { legs: { width: 128, height: 126, x: -64, y: -64 }, speed: 18, footprint: 4 } },
+  wide: { advance: 120, wide: true },
 };
 
 export class Mission {
@@ -35,6 +36,7 @@ export class Mission {
   }
 
   start(plan) {
+    if (plan.wide) this.vehicles[0].surveyWidely();
     this.advance(plan.advance);
     const [first] = this.vehicles;
     if (plan.silent) {

@@ -1,6 +1,6 @@
 // A stand-in for the daemon: serves the page and /api/v2 with a synthetic mission.
 //
-//   node mock/server.mjs [--port 8470] [--scenario rich|empty|start|silent|refused|two|big]
+//   node mock/server.mjs [--port 8470] [--scenario rich|empty|start|silent|refused|two|big|wide]
 //
 // Here the mission follows the clock. In stories it advances only when they say so, so that nothing changes between two reads.
 //
@@ -13,6 +13,7 @@ import http from "node:http";
 import { readFile } from "node:fs/promises";
 import { dirname, extname, join, normalize } from "node:path";
 import { fileURLToPath } from "node:url";
+import { gzipSync } from "node:zlib";
 import { Mission } from "./mission.mjs";
 import { faultOf, fit } from "./settings.mjs";
 
@@ -86,12 +87,20 @@ async function api(mock, req, res, path) {
   const [, id, resource] = path.match(/^vehicles\/(\d+)\/(.+)$/) ?? [];
   const vehicle = mission.vehicles.find((v) => v.id === Number(id));
   if (!vehicle) return reply(res, 404, { error: "no such vehicle" });
-  if (resource === "map") return reply(res, 200, vehicle.mapJson(mission.nowS, mission.layers ? mission.background : []));
+  if (resource === "map/tiles") return tiles(mock, req, res, vehicle);
   if (resource === "fit") return reply(res, 200, fit(new URL(req.url, "http://mock").searchParams.get("bits_per_s"), mission));
   if (resource.startsWith("map.")) return send(res, 200, "application/octet-stream", Buffer.from(`${resource} of the mock`));
   const [, label] = resource.match(/^exemplars\/(\d+)(-\d+)?\.webp$/) ?? [];
   if (!vehicle.exemplars.get(Number(label))?.images.length) return reply(res, 404, { error: "not received" });
   return send(res, 200, "image/webp", await readFile(join(HERE, `exemplars/${(Number(label) - 1) % 6}.webp`)));
+}
+
+/** Tiles in gzip, as the daemon packs them. */
+function tiles({ mission }, req, res, vehicle) {
+  const since = new URL(req.url, "http://mock").searchParams.get("since");
+  const bytes = gzipSync(vehicle.mapBytes(mission.nowS, mission.layers ? mission.background : [], since), { level: 1 });
+  res.writeHead(200, { "content-type": "application/x-scenecast-tiles", "content-encoding": "gzip", "content-length": bytes.length, "cache-control": "no-store" });
+  res.end(bytes);
 }
 
 async function post(mock, req, res, path) {

@@ -100,7 +100,7 @@ export class Vehicle {
       mode: this.aborted ? "abort" : this.hold ? "hold" : "survey",
       activity: this.aborted ? "aborted: order" : this.hold ? "holding: order" : "surveying",
       ...this.path(),
-      cells: this.own.cells.size, labels: this.published.size, fix_age_s: nowS - this.fixS,
+      cells: this.own.size, labels: this.published.size, fix_age_s: nowS - this.fixS,
     };
     this.track.push([nowS, p.x, p.y]);
     this.track = this.track.slice(-500);
@@ -166,7 +166,7 @@ export class Vehicle {
       next_contact_s: this.receivedS === null ? null : this.nextTurnS, status: this.status, track: this.track,
       map: {
         version: this.replica.version, cell_m: this.replica.cellM, ...bounds,
-        explored_cells: this.replica.cells.size, updated_s: this.updatedS ?? null, epoch: 0, placement: this.placement ?? null, earlier: this.earlier ?? null,
+        explored_cells: this.replica.size, updated_s: this.updatedS ?? null, epoch: 0, placement: this.placement ?? null, earlier: this.earlier ?? null,
       },
       labels: counts.map(([id, cells]) => ({
         id, cells, area_m2: cells * area, weight: this.weights.get(id) ?? 0, exemplar: this.exemplarJson(id),
@@ -197,7 +197,17 @@ export class Vehicle {
     };
   }
 
-  mapJson(nowS, streams) {
-    return this.replica.json(nowS, LAYERS.filter((p) => streams.includes(p.name)));
+  mapBytes(nowS, streams, since) {
+    return this.replica.bytes(nowS, LAYERS.filter((p) => streams.includes(p.name)), since);
+  }
+
+  /** A survey of a million cells: lanes along two sides of a box of 20 x 20 km, received long ago. */
+  surveyWidely() {
+    for (const side of [-40000, 39993])
+      for (let along = -40000; along < 40000; along += 1)
+        for (let across = 0; across < 7; across += 1) {
+          this.replica.set(along, side + across, 1 + (((along >> 5) + (across >> 2)) & 3), 10 + ((along + 40000) >> 9));
+        }
+    this.replica.version += 1;
   }
 }

@@ -1,7 +1,7 @@
 import assert from "node:assert/strict";
 import { readFile } from "node:fs/promises";
 
-const EXTENSIONS = ["png", "pgw", "png.aux.xml", "csv", "geojson", "ply"];
+const EXTENSIONS = ["png", "pgw", "png.aux.xml", "tif", "csv", "geojson", "ply"];
 
 /** Clicks a link of the export dialog; resolves to the name and the bytes of the file. */
 async function take(s, title) {
@@ -20,6 +20,15 @@ export default [
       assert.deepEqual(links, EXTENSIONS.map((e) => [`/api/v2/vehicles/1/map.${e}`, `rich-auv-1-v${map.version}.${e}`]));
       const [name, bytes] = await take(s, "CSV");
       assert.deepEqual([name, String(bytes)], [`rich-auv-1-v${map.version}.csv`, "map.csv of the mock"]);
+    },
+  },
+  {
+    name: "a wide map is offered in formats that can hold it",
+    scenario: "wide",
+    async run(s) {
+      await s.button("Export").click();
+      const links = await s.page.locator("#dialog .files a").evaluateAll((all) => all.map((a) => a.getAttribute("href").split("/map.")[1]));
+      assert.deepEqual(links, ["tif", "csv", "geojson", "ply"]);
     },
   },
   {

@@ -10,9 +10,9 @@ async function someCell(s) {
     const m = store.map;
     const box = document.getElementById("chart").getBoundingClientRect();
     const status = store.vehicle.status ?? { x_m: 0, y_m: 0 };
-    for (let i = 0; i < m.labels.length; i += 1) {
-      const x = (m.x0 + (i % m.width) + 0.5) * m.cell_m;
-      const y = (m.y0 + Math.floor(i / m.width) + 0.5) * m.cell_m;
+    for (const cell of m.cells()) {
+      const x = (cell.x + 0.5) * m.cell_m;
+      const y = (cell.y + 0.5) * m.cell_m;
       const path = [status.waypoint ?? [status.x_m, status.y_m], ...(status.path ?? [])];
       const onPath = path.some(([bx, by], k) => {
         const [ax, ay] = k === 0 ? [status.x_m, status.y_m] : path[k - 1];
@@ -22,8 +22,8 @@ async function someCell(s) {
       const near = onPath || store.vehicle.track.some(([, tx, ty]) => Math.hypot(tx - x, ty - y) < 0.2);
       const [px, py] = v.toScreen(...inWorld(store.vehicle, x, y));
       const inside = px > 120 && py > 90 && px < v.width - 120 && py < v.height - 90;
-      if (m.labels[i] === 0 || !inside || near || Math.hypot(status.x_m - x, status.y_m - y) < 3) continue;
-      return { label: m.labels[i], tint: tintOf(shownAs(m.labels[i])), x, y, px, py, left: box.left, top: box.top };
+      if (!inside || near || Math.hypot(status.x_m - x, status.y_m - y) < 3) continue;
+      return { label: cell.label, tint: tintOf(shownAs(cell.label)), x, y, px, py, left: box.left, top: box.top };
     }
     return null;
   });
@@ -377,9 +377,9 @@ export default [
         const m = store.map;
         const box = document.getElementById("chart").getBoundingClientRect();
         const far = ([x, y]) => store.vehicle.track.every(([, tx, ty]) => Math.hypot(tx - x, ty - y) > 1);
-        const place = (b, d) => [(m.x0 + b.x + d) * m.cell_m, (m.y0 + b.y + d) * m.cell_m];
+        const place = (b, d) => [(b.x + d) * m.cell_m, (b.y + d) * m.cell_m];
         const b = coarseBlocks(m).find((k) => far(place(k, 1.5)));
-        return { sent: v.toScreen(...place(b, 0.5)), rest: v.toScreen(...place(b, 2.5)), left: box.left, top: box.top, tint: tintOf(shownAs(m.labels[b.at])), known: m.labels.filter((l) => l > 0).length };
+        return { sent: v.toScreen(...place(b, 0.5)), rest: v.toScreen(...place(b, 2.5)), left: box.left, top: box.top, tint: tintOf(shownAs(b.label)), known: [...m.cells()].length };
       });
       assert.deepEqual(await pixel(s, ...block.sent), block.tint);
       const pale = await pixel(s, ...block.rest);

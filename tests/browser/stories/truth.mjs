@@ -107,10 +107,10 @@ export default [
     scenario: "rich",
     async run(s) {
       const reason = "the map spans 4000000001 x 10 cells: at most 8388608 are sent";
-      await s.page.route("**/vehicles/1/map", (route) => route.fulfill({ status: 422, contentType: "application/json", body: JSON.stringify({ error: reason }) }));
+      await s.page.route("**/vehicles/1/map/tiles*", (route) => route.fulfill({ status: 422, contentType: "application/json", body: JSON.stringify({ error: reason }) }));
       await s.steer({ loss: 0, advance: 14 });
       await s.shows("#banners", /map of auv-1 is not up to date.*4000000001 x 10 cells/s);
-      await s.page.unroute("**/vehicles/1/map");
+      await s.page.unroute("**/vehicles/1/map/tiles*");
       await s.until("the banner to go", async () => !(await s.page.locator("#banners").isVisible()), { advance: 14 });
     },
     tolerates: /422/,

@@ -1,7 +1,11 @@
 // The HTTP API of the daemon: reads, and orders with the header that the server requires.
 
+import { parseTiles } from "./tiles.js";
+
 export const BASE = "/api/v2";
 const TIMEOUT_MS = 10000;
+/** A whole map may have some megabytes. */
+const MAP_TIMEOUT_MS = 60000;
 
 /** The message is one line for people. */
 export class ApiError extends Error {}
@@ -57,29 +61,13 @@ export async function logInIfRequired() {
   if (response?.status === 401) location.assign("/login");
 }
 
-/** The map of a vehicle with its layers as typed arrays, rows from the south. */
-export async function readMap(id) {
-  const m = await read(`/vehicles/${id}/map`);
-  const labels = decode(m.labels);
-  const age = ages(m.age_s);
-  if (labels.length !== m.width * m.height || age.length !== labels.length) {
-    throw new ApiError("the map's layers do not fit its size");
+/** The tiles of a vehicle's map that have changed since the map with the tag `since`, or all of them. */
+export async function readTiles(id, since) {
+  const query = since ? `?since=${encodeURIComponent(since)}` : "";
+  const response = await fetch(`${BASE}/vehicles/${id}/map/tiles${query}`, { cache: "no-store", signal: AbortSignal.timeout(MAP_TIMEOUT_MS) });
+  if (!response.ok) {
+    const body = await response.json().catch(() => ({}));
+    throw new ApiError(body.error ?? `${response.status} ${response.statusText}`);
   }
-  const layers = m.layers.map((p) => ({ ...p, data: decode(p.data), age: p.age_s ? ages(p.age_s) : null }));
-  return { ...m, labels, age, layers };
-}
-
-/** Seconds, two bytes each, little-endian; 65535 = never. */
-function ages(base64) {
-  const raw = decode(base64);
-  const age = new Uint16Array(raw.length / 2);
-  for (let i = 0; i < age.length; i += 1) age[i] = raw[2 * i] | (raw[2 * i + 1] << 8);
-  return age;
-}
-
-function decode(base64) {
-  const text = atob(base64);
-  const out = new Uint8Array(text.length);
-  for (let i = 0; i < out.length; i += 1) out[i] = text.charCodeAt(i);
-  return out;
+  return parseTiles(await response.arrayBuffer());
 }

@@ -1,6 +1,7 @@
 // The data of the page: the last state from the daemon and its age, the selected vehicle, the maps.
 
-import { readMap } from "./api.js";
+import { readTiles } from "./api.js";
+import { TiledMap } from "./tiles.js";
 
 export const store = new (class extends EventTarget {
   snapshot = null;
@@ -57,21 +58,21 @@ export const store = new (class extends EventTarget {
     return this.feed.state === "open";
   }
 
-  /** Fetches a map unless we have its version and epoch; one request at a time for each vehicle. */
+  /** Fetches the tiles that have changed unless we have the map's version and epoch; one request at a time for each vehicle. */
   async fetchMap(id, latest) {
     const have = this.maps.get(id);
     if (have && have.version === latest.version && have.epoch === latest.epoch) return;
     if (this.#fetching.has(id)) return;
     if (latest.width === 0 || latest.height === 0) {
-      this.maps.set(id, { ...latest, labels: new Uint8Array(0), age: new Uint16Array(0), layers: [], fetchedS: this.nowS });
+      this.maps.set(id, Object.assign(TiledMap.empty(latest), { epoch: latest.epoch }));
       this.emit("map", { id });
       return;
     }
     this.#fetching.add(id);
     try {
-      const map = await readMap(id);
+      const answer = await readTiles(id, have?.tag);
       const summary = this.snapshot?.vehicles.find((v) => v.id === id)?.map;
-      this.maps.set(id, { ...map, epoch: summary?.epoch ?? 0, fetchedS: map.at_s ?? this.nowS });
+      this.maps.set(id, Object.assign(new TiledMap(answer, have), { epoch: summary?.epoch ?? 0 }));
       this.mapFaults.delete(id);
       this.emit("map", { id });
     } catch (error) {

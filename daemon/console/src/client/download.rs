@@ -9,15 +9,15 @@ use scenecast_files::write_whole;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-const MAP_FORMATS: [&str; 5] = ["png", "geojson", "ply", "csv", "json"];
+const MAP_FORMATS: [&str; 8] = ["png", "geojson", "ply", "csv", "json", "utm.tif", "wgs84.tif", "tif"];
 const IMAGE_TIMEOUT: Duration = Duration::from_secs(600);
 
 /// Writes the map of a vehicle in the format of the extension.
 pub async fn save_map(session: &Session, out: &Path) -> Result<(), UserError> {
-    let format = out.extension().and_then(|e| e.to_str()).unwrap_or_default();
-    if !MAP_FORMATS.contains(&format) {
+    let name = out.file_name().and_then(|name| name.to_str()).unwrap_or_default();
+    let Some(format) = MAP_FORMATS.into_iter().find(|format| name.ends_with(&format!(".{format}"))) else {
         return Err(UserError::file(out, format!("the name must end in one of .{}", MAP_FORMATS.join(", ."))));
-    }
+    };
     let state = session.state().await?;
     let base = format!("/api/v2/vehicles/{}/map", session.choose(&state)?.id);
     let files: Vec<(String, PathBuf)> = match format {

@@ -1,53 +1,92 @@
-//! The cells of a map, and their form in JSON.
+//! A map in shared tiles, its cells one by one, and its form in JSON.
 
 use crate::state::{LayerBody, MapBody};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
-use scenecast_protocol::map::{LayerDescriptor, Quantity, Rect};
+use scenecast_protocol::map::{
+    Cell, LabelGrid, LayerDescriptor, Quantity, REPLICA_TILE, Rect, ReplicaTile, ReplicaTileKey,
+};
+use scenecast_protocol::time::Instant;
+use std::collections::BTreeMap;
+use std::sync::Arc;
 
-/// A map cell by cell, row by row from the south-west.
-#[derive(Debug, Clone, PartialEq)]
+/// Tiles by row and column. The surface shares them, so a clone costs little and stays as it is.
+pub(crate) type Tiles = BTreeMap<ReplicaTileKey, Arc<ReplicaTile>>;
+
+/// The most cells of a map or a region in JSON.
+pub(crate) const MAX_JSON_CELLS: u64 = 1 << 20;
+
+/// A map of any extent, of which only tiles with received cells exist.
+#[derive(Debug, Clone)]
 pub struct MapCells {
     /// A number that grows with each change of a cell.
     pub version: u64,
-    /// Mission time to which the ages refer, seconds.
-    pub at_s: f64,
-    /// The columns and rows of the cells.
-    pub bounds: Rect,
+    /// The moment of this map.
+    pub at: Instant,
+    /// The smallest rectangle around the explored cells.
+    pub bounds: Option<Rect>,
     /// Width of a cell, metres.
     pub cell_m: f64,
     /// The shift from the map frame to the world frame, metres east and north.
     pub moved_m: (f64, f64),
-    /// The label of each cell, 0 = unexplored.
-    pub labels: Vec<u8>,
-    /// Seconds since each cell was received, 65535 = never.
-    pub age_s: Vec<u16>,
-    pub layers: Vec<CellLayer>,
+    pub(crate) tiles: Tiles,
+    pub(crate) layers: Vec<CellLayer>,
 }
 
 /// A quantity of each cell.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub struct CellLayer {
     /// Its name, unit and colours, and the use of its values.
-    pub descriptor: LayerDescriptor,
+    pub(crate) descriptor: LayerDescriptor,
     /// The level whose bounds are the first two of `edges`.
-    pub lowest: u8,
+    pub(crate) lowest: u8,
     /// The bounds of this level and of those above it, one after the other, in units.
-    pub edges: Vec<f64>,
-    /// The level of each cell, 0 = unknown.
-    pub levels: Vec<u8>,
-    /// Seconds since each cell was received, 65535 = never.
-    pub age_s: Vec<u16>,
+    pub(crate) edges: Vec<f64>,
+    pub(crate) tiles: Tiles,
+}
+
+/// The tile of a cell, and its place in the tile.
+pub(crate) fn place_of(cell: Cell) -> (ReplicaTileKey, usize) {
+    let (row, column) = (cell.y.div_euclid(REPLICA_TILE), cell.x.div_euclid(REPLICA_TILE));
+    let place = cell.y.rem_euclid(REPLICA_TILE) * REPLICA_TILE + cell.x.rem_euclid(REPLICA_TILE);
+    ((row, column), place as usize)
+}
+
+fn level(tiles: &Tiles, cell: Cell) -> u8 {
+    let (key, place) = place_of(cell);
+    tiles.get(&key).map_or(0, |tile| tile.labels()[place])
+}
+
+/// Base64 of levels and of ages in whole seconds, 65535 = never, of the cells of a region.
+fn region_body(tiles: &Tiles, region: Rect, now: Instant) -> (String, String) {
+    let levels: Vec<u8> = region.cells().map(|cell| level(tiles, cell)).collect();
+    let mut ages: Vec<u8> = Vec::new();
+    let mut held: Option<(ReplicaTileKey, Vec<u16>)> = None;
+    for cell in region.cells() {
+        let (key, place) = place_of(cell);
+        if held.as_ref().is_none_or(|(of, _)| *of != key) {
+            let age = |at: Option<Instant>| at.map_or(u16::MAX, |at| age_s(at, now));
+            held = Some((key, tiles.get(&key).map_or_else(Vec::new, |t| t.received().map(age).collect())));
+        }
+        let age = held.as_ref().and_then(|(_, ages)| ages.get(place)).copied().unwrap_or(u16::MAX);
+        ages.extend(age.to_le_bytes());
+    }
+    (STANDARD.encode(levels), STANDARD.encode(ages))
+}
+
+fn age_s(at: Instant, now: Instant) -> u16 {
+    now.since(at).as_secs().min(65_534) as u16
 }
 
 impl CellLayer {
     /// The value of a cell: the middle of its level, if that is known.
-    pub(crate) fn value(&self, at: usize) -> Option<f64> {
-        self.descriptor.middle(*self.levels.get(at)?)
+    pub(crate) fn value(&self, cell: Cell) -> Option<f64> {
+        self.descriptor.middle(level(&self.tiles, cell))
     }
 
-    fn body(&self) -> LayerBody {
+    fn body(&self, region: Rect, now: Instant) -> LayerBody {
         let layer = &self.descriptor;
+        let (data, age_s) = region_body(&self.tiles, region, now);
         LayerBody {
             name: layer.name.clone().into_owned(),
             unit: layer.unit.clone().into_owned(),
@@ -56,54 +95,100 @@ impl CellLayer {
             spread: layer.spread.name().to_owned(),
             lowest: self.lowest,
             edges: self.edges.clone(),
-            data: STANDARD.encode(&self.levels),
-            age_s: ages(&self.age_s),
+            data,
+            age_s,
         }
     }
-}
-
-fn ages(seconds: &[u16]) -> String {
-    STANDARD.encode(seconds.iter().flat_map(|age| age.to_le_bytes()).collect::<Vec<u8>>())
 }
 
 impl MapCells {
-    pub(crate) fn body(&self) -> MapBody {
-        MapBody {
-            version: self.version,
-            at_s: self.at_s,
-            x0: self.bounds.x,
-            y0: self.bounds.y,
-            width: self.bounds.width,
-            height: self.bounds.height,
-            cell_m: self.cell_m,
-            labels: STANDARD.encode(&self.labels),
-            age_s: ages(&self.age_s),
-            layers: self.layers.iter().map(CellLayer::body).collect(),
+    /// A map of labels without layers and times of reception, at the start of the mission.
+    pub fn of_labels(grid: &LabelGrid, cell_m: f64) -> Self {
+        Self {
+            version: 1,
+            at: Instant::ZERO,
+            bounds: grid.bounds(),
+            cell_m,
+            moved_m: (0.0, 0.0),
+            tiles: ReplicaTile::tiles_of(grid),
+            layers: Vec::new(),
         }
     }
 
-    /// The place of a corner of the cells in the world, metres east and north; columns and rows count from the south-west.
-    pub(super) fn corner_m(&self, column: u32, row: u32) -> (f64, f64) {
-        let metres = |first: i32, n: u32, moved: f64| (f64::from(first) + f64::from(n)) * self.cell_m + moved;
-        (metres(self.bounds.x, column, self.moved_m.0), metres(self.bounds.y, row, self.moved_m.1))
+    /// The cells of a region, by default of the bounds. The error is one line for people.
+    pub(crate) fn body(&self, region: Option<Rect>) -> Result<MapBody, String> {
+        let region = region.unwrap_or(self.rectangle());
+        if region.area() > MAX_JSON_CELLS {
+            let Rect { width, height, .. } = region;
+            return Err(format!(
+                "the map spans {width} x {height} cells: JSON has at most {MAX_JSON_CELLS}; request a region with x0, y0, \
+                 width and height in cells, or the tiles of the map"
+            ));
+        }
+        let (labels, age_s) = region_body(&self.tiles, region, self.at);
+        Ok(MapBody {
+            version: self.version,
+            at_s: crate::snapshot::seconds(self.at),
+            x0: region.x,
+            y0: region.y,
+            width: region.width,
+            height: region.height,
+            cell_m: self.cell_m,
+            labels,
+            age_s,
+            layers: self.layers.iter().map(|layer| layer.body(region, self.at)).collect(),
+        })
     }
 
-    pub(super) fn explored(&self) -> impl Iterator<Item = ExploredCell> {
-        let width = self.bounds.width.max(1) as usize;
-        self.labels.iter().zip(&self.age_s).enumerate().filter(|(_, (label, _))| **label != 0).map(
-            move |(at, (&label, &age_s))| {
-                let (x, y) = self.corner_m((at % width) as u32, (at / width) as u32);
-                ExploredCell { at, x: x + self.cell_m / 2.0, y: y + self.cell_m / 2.0, label, age_s }
-            },
-        )
+    /// The bounds, empty for an empty map.
+    pub(crate) fn rectangle(&self) -> Rect {
+        self.bounds.unwrap_or(Rect { x: 0, y: 0, width: 0, height: 0 })
+    }
+
+    /// The south-west corner of a cell in the world, metres east and north.
+    pub(super) fn corner_m(&self, x: i64, y: i64) -> (f64, f64) {
+        (x as f64 * self.cell_m + self.moved_m.0, y as f64 * self.cell_m + self.moved_m.1)
+    }
+
+    /// The label of a cell, 0 = unexplored.
+    pub(super) fn label(&self, cell: Cell) -> u8 {
+        level(&self.tiles, cell)
+    }
+
+    /// The explored cells, row by row from the south, each row from the west.
+    pub(super) fn explored(&self) -> impl Iterator<Item = ExploredCell> + '_ {
+        let mut rows: BTreeMap<i32, Vec<(i32, &ReplicaTile)>> = BTreeMap::new();
+        for (&(row, column), tile) in &self.tiles {
+            rows.entry(row).or_default().push((column, tile));
+        }
+        rows.into_iter().flat_map(move |(row, tiles)| self.explored_in_row(row, &tiles))
+    }
+
+    fn explored_in_row(&self, row: i32, tiles: &[(i32, &ReplicaTile)]) -> Vec<ExploredCell> {
+        let received: Vec<Vec<Option<Instant>>> = tiles.iter().map(|(_, tile)| tile.received().collect()).collect();
+        let mut found = Vec::new();
+        for line in 0..REPLICA_TILE {
+            for (&(column, tile), received) in tiles.iter().zip(&received) {
+                let from = (line * REPLICA_TILE) as usize;
+                let cells = tile.labels()[from..].iter().zip(&received[from..]).take(REPLICA_TILE as usize);
+                found.extend((0i32..).zip(cells).filter(|(_, (label, _))| **label != 0).map(|(x, (&label, &at))| {
+                    let cell = Cell::new(column.wrapping_mul(REPLICA_TILE) + x, row.wrapping_mul(REPLICA_TILE) + line);
+                    let (west, south) = self.corner_m(i64::from(cell.x), i64::from(cell.y));
+                    let half = self.cell_m / 2.0;
+                    let age_s = at.map(|at| age_s(at, self.at));
+                    ExploredCell { cell, x: west + half, y: south + half, label, age_s }
+                }));
+            }
+        }
+        found
     }
 }
 
-/// An explored cell: its index, its centre in metres east and north in the world, its label, seconds since it was received.
+/// An explored cell: its centre in metres east and north in the world, its label, seconds since it was received.
 pub(super) struct ExploredCell {
-    pub(super) at: usize,
+    pub(super) cell: Cell,
     pub(super) x: f64,
     pub(super) y: f64,
     pub(super) label: u8,
-    pub(super) age_s: u16,
+    pub(super) age_s: Option<u16>,
 }

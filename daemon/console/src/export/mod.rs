@@ -2,8 +2,11 @@
 
 mod cells;
 mod files;
+mod format;
+mod geotiff;
 mod projection;
 mod regions;
 
-pub use cells::{CellLayer, MapCells};
-pub(crate) use files::{csv, geojson, indexed_png, ply, projection, world_file};
+pub use cells::MapCells;
+pub(crate) use cells::{CellLayer, Tiles};
+pub use format::MapFormat;

@@ -24,6 +24,11 @@ pub(super) fn find(path: &str) -> Option<(&'static str, &'static [u8])> {
     Some((content_type, bytes))
 }
 
+/// The files of the page with their bytes, the form for the token among them.
+pub fn page_files() -> impl Iterator<Item = (&'static str, &'static [u8])> {
+    FILES.iter().copied()
+}
+
 /// Serves a file of the page.
 pub(super) async fn page(uri: Uri, headers: HeaderMap) -> Response {
     const SUM: Crc<u32> = Crc::<u32>::new(&CRC_32_ISCSI);

@@ -1,6 +1,6 @@
 //! Responses in fewer bytes: gzip for clients that accept it, and status 304 for those that have the same content.
 
-use axum::body::{Body, Bytes, to_bytes};
+use axum::body::{Body, to_bytes};
 use axum::extract::Request;
 use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
 use axum::middleware::Next;
@@ -14,7 +14,7 @@ const MIN_BYTES: usize = 512;
 const MAX_BYTES: usize = 1 << 28;
 
 /// Bytes in gzip (RFC 1952); `None` if there is no memory for them.
-pub(super) fn gzip(bytes: &[u8]) -> Option<Vec<u8>> {
+pub fn gzip(bytes: &[u8]) -> Option<Vec<u8>> {
     let mut encoder = GzEncoder::new(Vec::new(), Compression::fast());
     encoder.write_all(bytes).ok()?;
     encoder.finish().ok()
@@ -70,15 +70,6 @@ pub(super) fn tagged(headers: &HeaderMap, tag: &str, response: impl FnOnce() -> 
         }
     }
     response
-}
-
-/// A text of which both forms exist: in gzip if the client accepts it.
-pub(super) fn either(headers: &HeaderMap, kind: &'static str, plain: &Bytes, packed: &Bytes) -> Response {
-    let kind = (header::CONTENT_TYPE, kind);
-    if accepts_gzip(headers) {
-        return ([kind, (header::CONTENT_ENCODING, "gzip")], packed.clone()).into_response();
-    }
-    ([kind], plain.clone()).into_response()
 }
 
 #[cfg(test)]

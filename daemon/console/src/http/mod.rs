@@ -14,5 +14,7 @@ mod response;
 mod server;
 mod shared;
 
+pub use assets::page_files;
+pub use compress::gzip;
 pub use server::{Console, ConsoleListener, bind, start};
 pub use shared::PendingRequest;

@@ -1,7 +1,8 @@
 //! The OpenAPI document, made from the table of operations and the types of their requests and responses.
 
+use super::handlers::maps::TILES;
 use super::operations::{Content, Operation, SchemaOf, operations};
-use crate::state::{ErrorBody, MapEvent, MissionState};
+use crate::state::{ErrorBody, MapEvent, MapIndex, MissionState};
 use schemars::SchemaGenerator;
 use schemars::generate::SchemaSettings;
 use serde_json::{Map, Value, json};
@@ -104,6 +105,13 @@ fn describe_response(content: &Content, generator: &mut SchemaGenerator) -> Valu
                 },
             } },
         }),
+        Content::Tiles => json!({
+            "description": "An index in JSON, then the tiles",
+            "content": { TILES: {
+                "schema": { "type": "string", "format": "binary" },
+                "x-index": generator.subschema_for::<MapIndex>(),
+            } },
+        }),
         Content::Headers => json!({ "description": "Success; `Location` is the next page" }),
     }
 }
@@ -125,6 +133,22 @@ fn parameters(operation: &Operation) -> Vec<Value> {
         let schema = json!({ "type": "number", "minimum": 1, "maximum": 10_000_000 });
         let text = "Budget of the stream of the map, bit/s; by default the map's share of the vehicle's budget";
         parameters.push(json!({ "name": "bits_per_s", "in": "query", "description": text, "schema": schema }));
+    }
+    if operation.id == "map_tiles" {
+        let text = "The tag of the tiles that the client holds; without it, or with one that is out of date, all tiles";
+        let schema = json!({ "type": "string", "pattern": "^[0-9a-f]{8}-[0-9]+$" });
+        parameters.push(json!({ "name": "since", "in": "query", "description": text, "schema": schema }));
+    }
+    if operation.id == "map" {
+        for (name, text) in [
+            ("x0", "Column of the south-west cell of a region, which needs all four parameters"),
+            ("y0", "Row of the south-west cell of the region"),
+            ("width", "Columns of the region"),
+            ("height", "Rows of the region"),
+        ] {
+            let schema = json!({ "type": "integer" });
+            parameters.push(json!({ "name": name, "in": "query", "description": text, "schema": schema }));
+        }
     }
     if operation.body.is_some() {
         let schema = json!({ "type": "string", "const": "1" });

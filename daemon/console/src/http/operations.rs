@@ -2,6 +2,7 @@
 
 use super::handlers::{events, login, maps, metrics, orders, readings};
 use super::shared::{ArchiveName, Shared, VehicleId};
+use crate::export::MapFormat;
 use crate::fit::Fit;
 use crate::orders::{
     BudgetOrder, ConstraintsOrder, DismissOrder, ExemplarOrder, LabelOrder, NoteOrder, UtilityOrder,
@@ -27,6 +28,8 @@ pub(super) enum Content {
     File(&'static str),
     /// Server-sent events.
     Events,
+    /// Tiles of a map.
+    Tiles,
     Headers,
 }
 
@@ -80,8 +83,8 @@ fn change(
 /// A file format of an archived map.
 macro_rules! archive_file {
     ($path:literal, $id:literal, $summary:literal, $format:expr) => {{
-        const FORMAT: maps::FileFormat = $format;
-        read($path, $id, $summary, Content::File(FORMAT.content_type), || {
+        const FORMAT: MapFormat = $format;
+        read($path, $id, $summary, Content::File(FORMAT.content_type()), || {
             get(|State(shared): State<Shared>, ArchiveName(name): ArchiveName| maps::archived(shared, name, FORMAT))
         })
     }};
@@ -90,8 +93,8 @@ macro_rules! archive_file {
 /// A file format of the map of a vehicle.
 macro_rules! map_file {
     ($path:literal, $id:literal, $summary:literal, $format:expr) => {{
-        const FORMAT: maps::FileFormat = $format;
-        read($path, $id, $summary, Content::File(FORMAT.content_type), || {
+        const FORMAT: MapFormat = $format;
+        read($path, $id, $summary, Content::File(FORMAT.content_type()), || {
             get(|State(shared): State<Shared>, VehicleId(id): VehicleId, headers: HeaderMap| {
                 maps::file(shared, id, headers, FORMAT)
             })
@@ -123,9 +126,17 @@ fn readings() -> Vec<Operation> {
         read(
             "/api/v2/vehicles/{id}/map",
             "map",
-            "The map with the age of its cells",
+            "The map or a region of it in JSON, with the age of its cells: at most 1048576 cells",
             Content::Json(schema::<MapBody>),
             || get(maps::map),
+        ),
+        read(
+            "/api/v2/vehicles/{id}/map/tiles",
+            "map_tiles",
+            "The map in binary tiles, of any extent, or those that have changed since a tag; docs/reference/map-tiles.md has the \
+             format",
+            Content::Tiles,
+            || get(maps::tiles),
         ),
         read(
             "/api/v2/vehicles/{id}/exemplars/{file}",
@@ -160,28 +171,51 @@ fn map_files() -> Vec<Operation> {
             "/api/v2/vehicles/{id}/map.png",
             "map_png",
             "The map as an indexed PNG, north up, pixel value = label",
-            maps::PNG
+            MapFormat::Png
         ),
-        map_file!("/api/v2/vehicles/{id}/map.pgw", "map_world_file", "The world file of that PNG", maps::WORLD),
+        map_file!(
+            "/api/v2/vehicles/{id}/map.pgw",
+            "map_world_file",
+            "The world file of that PNG",
+            MapFormat::WorldFile
+        ),
         map_file!(
             "/api/v2/vehicles/{id}/map.png.aux.xml",
             "map_projection",
             "The projection of that PNG, in the file that GDAL and QGIS read",
-            maps::PROJECTION
+            MapFormat::Projection
         ),
         map_file!(
             "/api/v2/vehicles/{id}/map.geojson",
             "map_geojson",
             "Regions of equal label; in WGS 84 if the mission has an origin, else in metres east and north of it",
-            maps::GEOJSON
+            MapFormat::GeoJson
         ),
         map_file!(
             "/api/v2/vehicles/{id}/map.ply",
             "map_ply",
             "The cells as a coloured point cloud, metres east, north, up",
-            maps::PLY
+            MapFormat::Ply
         ),
-        map_file!("/api/v2/vehicles/{id}/map.csv", "map_csv", "One line for each explored cell", maps::CSV),
+        map_file!("/api/v2/vehicles/{id}/map.csv", "map_csv", "One line for each explored cell", MapFormat::Csv),
+        map_file!(
+            "/api/v2/vehicles/{id}/map.tif",
+            "map_tiff",
+            "The map as a tiled GeoTIFF, a pixel a cell, in transverse Mercator about the mission's origin, or in metres without one",
+            MapFormat::Tiff
+        ),
+        map_file!(
+            "/api/v2/vehicles/{id}/map.utm.tif",
+            "map_utm",
+            "The map as a GeoTIFF in the UTM zone of the origin",
+            MapFormat::UtmTiff
+        ),
+        map_file!(
+            "/api/v2/vehicles/{id}/map.wgs84.tif",
+            "map_wgs84",
+            "The map as a GeoTIFF in EPSG:4326",
+            MapFormat::Wgs84Tiff
+        ),
     ]
 }
 
@@ -198,37 +232,43 @@ fn archive() -> Vec<Operation> {
             "/api/v2/archive/{name}/map.png",
             "archived_map_png",
             "An archived map as an indexed PNG, north up, pixel value = label",
-            maps::PNG
+            MapFormat::Png
         ),
         archive_file!(
             "/api/v2/archive/{name}/map.pgw",
             "archived_map_world_file",
             "The world file of that PNG",
-            maps::WORLD
+            MapFormat::WorldFile
         ),
         archive_file!(
             "/api/v2/archive/{name}/map.png.aux.xml",
             "archived_map_projection",
             "The projection of that PNG, in the file that GDAL and QGIS read",
-            maps::PROJECTION
+            MapFormat::Projection
         ),
         archive_file!(
             "/api/v2/archive/{name}/map.geojson",
             "archived_map_geojson",
             "Regions of equal label of an archived map",
-            maps::GEOJSON
+            MapFormat::GeoJson
         ),
         archive_file!(
             "/api/v2/archive/{name}/map.ply",
             "archived_map_ply",
             "The cells of an archived map as a coloured point cloud",
-            maps::PLY
+            MapFormat::Ply
         ),
         archive_file!(
             "/api/v2/archive/{name}/map.csv",
             "archived_map_csv",
             "One line for each explored cell of an archived map",
-            maps::CSV
+            MapFormat::Csv
+        ),
+        archive_file!(
+            "/api/v2/archive/{name}/map.tif",
+            "archived_map_tiff",
+            "An archived map as a GeoTIFF, a pixel a cell",
+            MapFormat::Tiff
         ),
     ]
 }

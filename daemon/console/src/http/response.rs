@@ -9,7 +9,10 @@ use axum::response::{IntoResponse, Response};
 /// The response to a handled request.
 pub(super) fn respond(reply: Reply) -> Response {
     match reply {
-        Reply::Map(cells) => Json(cells.body()).into_response(),
+        Reply::Map(cells) => match cells.body(None) {
+            Ok(body) => Json(body).into_response(),
+            Err(reason) => error(StatusCode::UNPROCESSABLE_ENTITY, &reason),
+        },
         Reply::File(content_type, bytes) => ([(header::CONTENT_TYPE, content_type)], bytes).into_response(),
         Reply::Fit(fit) => Json(*fit).into_response(),
         Reply::Accepted(accepted) => (StatusCode::ACCEPTED, Json(accepted)).into_response(),

@@ -2,9 +2,9 @@
 
 use super::access::Access;
 use super::response::{error, not_found, respond};
-use crate::export::MapCells;
 use crate::request::{Reply, SurfaceRequest};
 use crate::snapshot::Snapshot;
+use crate::tiles::TiledMap;
 use axum::body::Bytes;
 use axum::extract::{FromRequestParts, Path};
 use axum::http::StatusCode;
@@ -34,15 +34,18 @@ pub(super) struct MapCache {
     pub(super) maps: Mutex<BTreeMap<u8, Arc<CachedMap>>>,
     /// One file is made at a time, so that the link keeps the rest of the machine.
     pub(super) makers: Semaphore,
+    /// A random number that names this run of the server in the tags of maps.
+    pub(super) run: u32,
 }
 
+/// A map, and the responses that were made of it, since several pages request the same.
 #[derive(Debug)]
 pub(super) struct CachedMap {
-    pub(super) cells: MapCells,
+    pub(super) map: TiledMap,
     /// Mission time at which the vehicle confirmed the map last.
     pub(super) updated_s: Option<f64>,
-    pub(super) json: Bytes,
-    pub(super) packed: Bytes,
+    /// Packed tiles, by the tag since which they have changed.
+    pub(super) packed: Mutex<BTreeMap<Option<String>, Bytes>>,
 }
 
 impl Shared {
@@ -53,10 +56,17 @@ impl Shared {
         max_streams: usize,
         document: Bytes,
     ) -> Self {
+        let mut run = [0; 4];
+        // A number that repeats costs a client of an earlier run at most a wrong map until its next one.
+        let _ = getrandom::fill(&mut run);
         Self {
             requests,
             snapshots,
-            maps: Arc::new(MapCache { maps: Mutex::default(), makers: Semaphore::new(1) }),
+            maps: Arc::new(MapCache {
+                maps: Mutex::default(),
+                makers: Semaphore::new(1),
+                run: u32::from_le_bytes(run),
+            }),
             access: Arc::new(access),
             streams: Arc::new(Semaphore::new(max_streams)),
             document,

@@ -8,6 +8,7 @@ mod vehicle;
 
 pub use facts::MissionFacts;
 pub(crate) use facts::seconds;
+pub use position::measured_origin;
 
 use crate::link_meter::LinkMeter;
 use crate::state::{LayerInfo, MissionInfo, MissionState, VehicleState};

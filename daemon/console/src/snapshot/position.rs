@@ -7,7 +7,7 @@ use scenecast_surface::Surface;
 
 /// The place of x = y = 0 on the Earth by the GPS of the surface. 0, 0 stands for a rehearsal without a
 /// place, as in the configuration.
-pub(super) fn measured_origin(surface: &Surface) -> Option<Origin> {
+pub fn measured_origin(surface: &Surface) -> Option<Origin> {
     let origin = surface.relay()?.plane().map(|p| p.origin()).filter(|o| (o.lat_deg, o.lon_deg) != (0.0, 0.0))?;
     Some(Origin { lat_deg: origin.lat_deg, lon_deg: origin.lon_deg })
 }

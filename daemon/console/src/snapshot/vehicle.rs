@@ -83,7 +83,7 @@ fn map(
     explored_cells: u32,
     facts: &MissionFacts,
 ) -> MapSummary {
-    let bounds = surface.map(address).and_then(|m| m.bounds());
+    let bounds = surface.map_bounds(address);
     MapSummary {
         version: surface.map_version(address),
         cell_m: facts.cell_m,

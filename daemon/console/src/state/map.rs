@@ -56,7 +56,53 @@ pub struct MapPlacement {
     pub north_m: f64,
 }
 
-/// A map with its cells, row by row from the south-west.
+/// The JSON index of the tiles of a map.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct MapIndex {
+    /// Names this map. With `since` set to it, the next request gets only the tiles that have changed.
+    pub tag: String,
+    /// The tag to which these tiles are added; null if they are the whole map and replace every tile before.
+    pub since: Option<String>,
+    /// A number that grows with each change of a label or a layer.
+    pub version: u64,
+    /// Mission time of this map.
+    pub at_s: f64,
+    /// Width of a cell, metres.
+    pub cell_m: f64,
+    /// Column of the south-west explored cell. Its west side is `x0 * cell_m` metres east of the map's origin.
+    pub x0: i32,
+    /// Row of the south-west explored cell.
+    pub y0: i32,
+    /// Number of columns, from west to east.
+    pub width: u32,
+    /// Number of rows, from south to north.
+    pub height: u32,
+    /// The layers beside the labels; in the tiles, the first has the number 1.
+    pub layers: Vec<TileLayer>,
+    /// Column and row of each tile that follows, in tiles of 64 cells from the map's origin.
+    pub tiles: Vec<(i32, i32)>,
+}
+
+/// The meaning of a layer's levels in tiles.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct TileLayer {
+    /// Its name, as in the list of layers of the state.
+    pub name: String,
+    /// The unit of its values; empty if they have none.
+    pub unit: String,
+    /// Whether the values are depths of the sea floor below the surface of the water, metres.
+    pub is_depth: bool,
+    /// The colours: cividis or inferno.
+    pub palette: String,
+    /// As in a [`LayerBody`].
+    pub spread: String,
+    /// The level whose bounds are the first two of `edges`.
+    pub lowest: u8,
+    /// The bounds of levels in units: level n lies from `edges[n - lowest]` to the next one.
+    pub edges: Vec<f64>,
+}
+
+/// A map or a region of it with its cells, row by row from the south-west.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct MapBody {
     /// A number that grows with each change of a label or a layer.

@@ -1,16 +1,14 @@
-//! The files of `scenecast asv`: the store, the pictures of the maps, and the state of their disk.
+//! The files of `scenecast asv`: the store, and the state of its disk.
 
-use super::{DiskFaults, SurfaceStore};
+use super::SurfaceStore;
 use crate::clock::Clock;
 use crate::journal::Folder;
 use scenecast_config::Config;
 use scenecast_console::state::{ArchivedMap, StorageInfo};
-use scenecast_core::{UserError, label_picture, world_file};
+use scenecast_core::UserError;
 use scenecast_protocol::time::Instant;
-use scenecast_protocol::wire::Address;
 use scenecast_surface::Surface;
 use scenecast_surface::record::EventTime;
-use std::collections::BTreeSet;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime};
@@ -28,8 +26,6 @@ pub(crate) struct SurfaceFiles {
     /// Seconds of mission time for each second of the clock.
     scale: f64,
     pub(crate) store: SurfaceStore<Folder>,
-    pictures: BTreeSet<Address>,
-    picture_faults: DiskFaults,
     tried: std::time::Instant,
     committed: std::time::Instant,
     pause: Duration,
@@ -62,8 +58,6 @@ impl SurfaceFiles {
             dir,
             scale,
             store,
-            pictures: BTreeSet::new(),
-            picture_faults: DiskFaults::default(),
             tried: now,
             committed: now,
             pause: COMMIT_INTERVAL,
@@ -100,7 +94,6 @@ impl SurfaceFiles {
     /// Restores the surface; `id` and `mission` name a new store.
     pub(crate) fn begin(&mut self, surface: &mut Surface, id: u32, mission: u32, now: Instant) {
         self.store.begin(surface, id, mission, event_time(now));
-        self.pictures = surface.vehicles().map(|(address, _)| address).collect();
     }
 
     /// Makes the changes of the surface durable. Orders since the last call are those of the principal `by`.
@@ -116,50 +109,12 @@ impl SurfaceFiles {
         self.committed.elapsed() >= self.pause
     }
 
-    /// The map of a vehicle has changed: its picture is written with [`Self::tend`].
-    pub(crate) fn note_map(&mut self, vehicle: Address) {
-        self.pictures.insert(vehicle);
-    }
-
-    /// Writes the pictures of changed maps, and tries again to write after the disk has refused.
-    pub(crate) fn tend(&mut self, surface: &Surface, cell_m: f64, now: Instant) {
-        let may_try = self.tried.elapsed() >= RETRY_INTERVAL;
-        if self.store.is_closed() && may_try {
+    /// Tries again to write after the disk has refused.
+    pub(crate) fn tend(&mut self, now: Instant) {
+        if self.store.is_closed() && self.tried.elapsed() >= RETRY_INTERVAL {
             self.tried = std::time::Instant::now();
             self.store.reopen(Folder::hold(&self.dir), event_time(now));
         }
-        if self.picture_faults.failing.is_some() && !may_try {
-            return;
-        }
-        self.tried = if may_try { std::time::Instant::now() } else { self.tried };
-        while let Some(vehicle) = self.pictures.pop_first() {
-            if let Err(error) = self.write_map(surface, vehicle, cell_m) {
-                self.pictures.insert(vehicle);
-                return self.picture_faults.fail("the picture of a map", error);
-            }
-            self.picture_faults.clear();
-        }
-    }
-
-    fn write_map(&self, surface: &Surface, vehicle: Address, cell_m: f64) -> Result<(), UserError> {
-        let Some(map) = surface.map(vehicle).filter(|map| !map.is_empty()) else { return Ok(()) };
-        let number = vehicle.number();
-        let png = match label_picture::encode(map) {
-            Ok(png) => png,
-            // Received data must not end the run.
-            Err(e) => {
-                tracing::warn!("operator-map-{number}.png is not written: {e}");
-                return Ok(());
-            }
-        };
-        if let (Some(plane), Some(bounds)) = (surface.relay().and_then(|r| r.plane()), map.bounds()) {
-            let earlier = surface.record(vehicle).and_then(|record| record.earlier_map());
-            let live = || surface.status(vehicle).and_then(|(status, _)| status.placement);
-            let placement = earlier.map_or_else(live, |earlier| earlier.placement());
-            let text = world_file(plane, placement, bounds, cell_m);
-            scenecast_files::write_whole(&self.picture(number, "pgw"), text.as_bytes())?;
-        }
-        scenecast_files::write_whole(&self.picture(number, "png"), &png)
     }
 
     /// The archived maps, the newest first.
@@ -181,12 +136,12 @@ impl SurfaceFiles {
 
     /// The state of the disk, for the page.
     pub(crate) fn info(&self) -> StorageInfo {
-        let faults = [&self.store.faults, &self.picture_faults];
+        let faults = &self.store.faults;
         StorageInfo {
             folder: self.dir.display().to_string(),
             free_bytes: free_bytes(&self.dir),
-            write_errors: faults.iter().map(|f| f.write_errors).sum(),
-            failing: faults.iter().find_map(|f| f.failing.clone()),
+            write_errors: faults.write_errors,
+            failing: faults.failing.clone(),
         }
     }
 }

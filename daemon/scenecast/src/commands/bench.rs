@@ -5,6 +5,7 @@ use super::bench_link::LinkBench;
 use super::bench_localisation::LocalisationBench;
 use super::bench_modem::ModemBench;
 use super::bench_planning::PlanningBench;
+use super::bench_wide::WideBench;
 use super::sim::WorldArguments;
 use clap::{Args, Subcommand};
 use scenecast_core::UserError;
@@ -25,6 +26,8 @@ pub(super) enum BenchCommand {
     Modem(ModemBench),
     /// The planners: utility collected per metre.
     Planning(PlanningBench),
+    /// A wide survey: CPU time and bytes of updates, of loading the page, and of exports.
+    Wide(WideBench),
 }
 
 /// The same mission at four bit budgets with 10 % loss, once with our stream and once with a baseline that sends the
@@ -48,6 +51,7 @@ impl BenchCommand {
             Self::Localisation(l) => l.run(),
             Self::Modem(m) => m.run(),
             Self::Planning(p) => p.run(),
+            Self::Wide(w) => w.run(),
         }
     }
 }

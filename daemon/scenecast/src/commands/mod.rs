@@ -14,6 +14,8 @@ mod bench_localisation;
 mod bench_modem;
 #[cfg(feature = "rehearsal")]
 mod bench_planning;
+#[cfg(feature = "rehearsal")]
+mod bench_wide;
 mod config;
 #[cfg(feature = "surface")]
 mod ctl;

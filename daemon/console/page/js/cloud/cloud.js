@@ -2,10 +2,10 @@
 
 import { $, h, show, text } from "../dom.js";
 import { metres } from "../format.js";
-import { extent } from "../map/raster.js";
 import { rgb } from "../palette.js";
 import { isStale, store } from "../store.js";
 import { colour, onTheme } from "../theme.js";
+import { extent } from "../tiles.js";
 import { Orbit } from "./orbit.js";
 import { cellPoints, vehicleShape, depthLayer, gridLines, meanHeight } from "./points.js";
 import { Renderer } from "./renderer.js";
@@ -17,6 +17,8 @@ const canvas = h("canvas", { id: "cloud", tabIndex: 0, role: "application", hidd
 const note = h("p.plate", { id: "cloud-note", hidden: true });
 let renderer = null;
 let built = null;
+/** The points of tiles in their present colours. */
+let points = new WeakMap();
 let framed = null;
 let dirty = false;
 
@@ -24,8 +26,9 @@ export function startCloud() {
   $("stage").append(canvas, note);
   steer();
   new ResizeObserver(redraw).observe(canvas);
-  onTheme(rebuild);
-  store.on("map select book", rebuild);
+  onTheme(recolour);
+  store.on("map", rebuild);
+  store.on("select book", recolour);
   store.on("state feed", redraw);
 }
 
@@ -54,6 +57,11 @@ export function fitCloud() {
   rebuild();
 }
 
+function recolour() {
+  points = new WeakMap();
+  rebuild();
+}
+
 function rebuild() {
   built = null;
   redraw();
@@ -69,7 +77,7 @@ function redraw() {
 }
 
 function build(map) {
-  const cells = cellPoints(map);
+  const cells = cellPoints(map, points);
   const floor = meanHeight(cells.places);
   const box = extent(map) ?? [-5, -5, 5, 5];
   const flat = depthLayer(map) === null;

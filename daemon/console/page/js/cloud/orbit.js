@@ -24,7 +24,7 @@ export class Orbit {
   }
 
   zoom(factor) {
-    this.distance = Math.min(5000, Math.max(1, this.distance / factor));
+    this.distance = Math.min(100000, Math.max(1, this.distance / factor));
   }
 
   frame([west, south, east, north], z) {

@@ -4,24 +4,42 @@ import { shownAs, tintOf } from "../book.js";
 import { rgb } from "../palette.js";
 import { nice } from "../format.js";
 import { boundsOf } from "../levels.js";
+import { EDGE } from "../tiles.js";
 
 export const depthLayer = (map) => map.layers.find((l) => l.is_depth) ?? null;
 
-/** Cells as points {places, tints}; z is minus the depth if the map has depths, else 0. */
-export function cellPoints(map) {
+/** Cells as points {places, tints}; z is minus the depth if the map has depths, else 0. `known` keeps the points of tiles. */
+export function cellPoints(map, known) {
   const depth = depthLayer(map);
+  const parts = [...map.tiles.values()].map((tile) => {
+    const kept = known.get(tile);
+    if (kept && kept.hasDepth === Boolean(depth)) return kept;
+    const made = tilePoints(map, tile, depth);
+    known.set(tile, made);
+    return made;
+  });
+  const count = parts.reduce((sum, p) => sum + p.places.length / 3, 0);
+  const all = { places: new Float32Array(3 * count), tints: new Uint8Array(4 * count) };
+  let at = 0;
+  for (const { places, tints } of parts) {
+    all.places.set(places, 3 * at);
+    all.tints.set(tints, 4 * at);
+    at += places.length / 3;
+  }
+  return all;
+}
+
+function tilePoints(map, tile, depth) {
   const places = [];
   const tints = [];
-  for (let at = 0; at < map.labels.length; at += 1) {
-    const label = map.labels[at];
-    if (label === 0 || depth?.data[at] === 0) continue;
-    const x = (map.x0 + (at % map.width) + 0.5) * map.cell_m;
-    const y = (map.y0 + Math.floor(at / map.width) + 0.5) * map.cell_m;
-    const [from, to] = depth ? boundsOf(depth, depth.data[at]) : [0, 0];
-    places.push(x, y, -(from + to) / 2);
+  tile.eachCell((x, y, label) => {
+    const level = depth ? tile.parts[depth.number]?.level(x, y) ?? 0 : 0;
+    if (depth && level === 0) return;
+    const [from, to] = depth ? boundsOf(depth, level) : [0, 0];
+    places.push((tile.column * EDGE + x + 0.5) * map.cell_m, (tile.row * EDGE + y + 0.5) * map.cell_m, -(from + to) / 2);
     tints.push(...tintOf(shownAs(label)), 255);
-  }
-  return { places: new Float32Array(places), tints: new Uint8Array(tints) };
+  });
+  return { places, tints, hasDepth: Boolean(depth) };
 }
 
 export function meanHeight(places) {

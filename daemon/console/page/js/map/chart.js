@@ -5,16 +5,15 @@ import { ago, count, span } from "../format.js";
 import { recall, remember } from "../prefs.js";
 import { ageOf, isStale, store } from "../store.js";
 import { colour, onTheme } from "../theme.js";
+import { EDGE, extent } from "../tiles.js";
 import { drawFences } from "../fence/draw.js";
 import { clickAt, finish, grab, pen, penKeys } from "../fence/edit.js";
 import { drawVehicle, drawSurface } from "./vehicle-marker.js";
-import { overhang } from "./coarse.js";
 import { boxInWorld, inWorld, viewOf } from "./frames.js";
 import { listen } from "./input.js";
-import { canvasOf, coarseCanvasOf, drawLegend, layer } from "./layers.js";
+import { drawLegend, layer, painterOf } from "./layers.js";
 import { addPoint, drawMeasure, measure, toggleMeasure } from "./measure.js";
 import { drawGrid, drawNorth, drawRings, drawScaleBar } from "./overlays.js";
-import { extent, rectangle } from "./raster.js";
 import { showReadout } from "./readout.js";
 import { View } from "./view.js";
 import { pathOf } from "./path.js";
@@ -22,6 +21,9 @@ import { pathOf } from "./path.js";
 export const view = new View();
 export const options = { grid: recall("grid", true), rings: recall("rings", false) };
 const MAX_FIT_RATIO = 4;
+/** Tiles smaller than this are drawn in one colour, at least as large as a mark. */
+const MIN_TILE_PX = 4;
+const MIN_MARK_PX = 2;
 const canvas = $("chart");
 let ink = {};
 let dirty = false;
@@ -101,19 +103,13 @@ function keepInView() {
 }
 let fitted = false;
 
-const extents = new WeakMap();
-function extentOf(map) {
-  if (!extents.has(map)) extents.set(map, extent(map));
-  return extents.get(map);
-}
-
 /** The box that Fit shows: every map, every vehicle and its planned path; fences and the surface as well, unless the map would become tiny. */
 function bounds() {
   const boxes = [];
   for (const v of store.snapshot?.vehicles ?? []) {
     const s = v.status;
     const map = store.maps.get(v.id);
-    const own = [map && extentOf(map), s && [s.x_m - 4, s.y_m - 4, s.x_m + 4, s.y_m + 4], ...(s ? pathOf(s).map(([x, y]) => [x, y, x, y]) : [])];
+    const own = [map && extent(map), s && [s.x_m - 4, s.y_m - 4, s.x_m + 4, s.y_m + 4], ...(s ? pathOf(s).map(([x, y]) => [x, y, x, y]) : [])];
     boxes.push(...own.filter(Boolean).map((box) => boxInWorld(v, box)));
   }
   if (boxes.length === 0) return store.snapshot ? [-10, -10, 10, 10] : null;
@@ -195,17 +191,36 @@ function surfaceAt() {
   return p?.is_valid && p.x_m !== null ? p : null;
 }
 
+/** Draws the tiles in view. Edges lie on whole pixels, so that neighbours leave no gap. */
 function drawMap(c, vehicle) {
   const map = store.maps.get(vehicle.id);
-  if (!map || map.width === 0) return;
-  const [west, south, east, north] = boxInWorld(vehicle, rectangle(map));
-  const [left, top] = view.toScreen(west, north);
-  const [right, bottom] = view.toScreen(east, south);
-  c.imageSmoothingEnabled = (right - left) / map.width < 1;
-  const coarse = coarseCanvasOf(vehicle, map);
-  const over = overhang(map) * view.scale;
-  if (coarse) c.drawImage(coarse, left, top - over, right - left + over, bottom - top + over);
-  c.drawImage(canvasOf(vehicle, map), left, top, right - left, bottom - top);
+  if (!map || map.isEmpty) return;
+  const painter = painterOf(vehicle, map);
+  const side = EDGE * map.cell_m;
+  const size = side * view.scale;
+  const [left, top] = view.toScreen(...inWorld(vehicle, 0, 0));
+  c.imageSmoothingEnabled = size / EDGE < 1;
+  const ratio = devicePixelRatio || 1;
+  const whole = (v) => Math.round(v * ratio) / ratio;
+  for (const tile of map.tiles.values()) {
+    const x = left + tile.column * size;
+    const y = top - (tile.row + 1) * size;
+    if (x > view.width || y > view.height || x + size < 0 || y + size < 0) continue;
+    if (size < MIN_TILE_PX) drawSmall(c, painter.toneOf(tile), x, y, size);
+    else {
+      const [west, north] = [whole(x), whole(y)];
+      c.drawImage(painter.canvasOf(tile), west, north, whole(x + size) - west, whole(y + size) - north);
+    }
+  }
+}
+
+/** A tile of a few pixels, in one colour and large enough to be seen. */
+function drawSmall(c, tone, x, y, size) {
+  if (!tone) return;
+  const [red, green, blue, alpha] = tone;
+  c.fillStyle = `rgb(${Math.round(red)} ${Math.round(green)} ${Math.round(blue)} / ${alpha / 255})`;
+  const side = Math.max(size, MIN_MARK_PX);
+  c.fillRect(x + (size - side) / 2, y + (size - side) / 2, side, side);
 }
 
 function drawCross(c) {

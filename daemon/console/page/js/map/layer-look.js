@@ -10,9 +10,8 @@ const looks = new WeakMap();
 /** The lowest and the highest level on the scale of the layer, and whether cells lie below or above. */
 function ends(layer) {
   const top = layer.lowest + layer.edges.length - 2;
-  const cells = new Uint32Array(256);
-  for (const level of layer.data) cells[level] += 1;
-  const all = layer.data.length - cells[0];
+  const cells = layer.counts;
+  const all = cells.subarray(1).reduce((sum, n) => sum + n, 0);
   const share = BEYOND[layer.spread];
   if (share === undefined || all === 0) return { low: layer.lowest, high: top, below: false, above: false };
   const end = (from, step) => {

@@ -1,4 +1,4 @@
-// The chosen layer of the map, its legend, and the canvases that hold painted maps until they change.
+// The chosen layer of the map, its legend, and the canvases that hold painted tiles until they change.
 
 import { $, h, show } from "../dom.js";
 import { shownAs, tintOf } from "../book.js";
@@ -6,11 +6,15 @@ import { isStale, store } from "../store.js";
 import { nice, span } from "../format.js";
 import { ramp } from "../palette.js";
 import { current as theme, onTheme } from "../theme.js";
-import { coarseBlocks, paintCoarse } from "./coarse.js";
+import { EDGE } from "../tiles.js";
+import { blocksOf, hasCoarse } from "./coarse.js";
 import { lookOf } from "./layer-look.js";
-import { labelTones, paintAge, paintFootprint, paintLabels, paintLayer } from "./raster.js";
+import { ageTones, footprintTones, labelTones, layerTones, paintTile, sampleTone } from "./raster.js";
 
 const AGE_REPAINT_S = 5;
+/** Painted tiles that are kept of a map. */
+const MAX_PAINTED = 4096;
+const NO_BLOCKS = [];
 export const layer = { name: "label", highlight: null };
 const painted = new Map();
 let legendKey = "";
@@ -31,45 +35,54 @@ export function setLayer(name) {
   drawLegend();
 }
 
-/** The canvas of a vehicle's map, painted again only when its key changes. */
-export function canvasOf(vehicle, map) {
+/** How the tiles of a vehicle's map are painted: `canvasOf(tile)`, and `toneOf(tile)` for tiles of a few pixels. A canvas is painted
+ * again only when its tile or the look changes. */
+export function painterOf(vehicle, map) {
   const chosen = vehicle.id === store.selectedId;
   const shown = map.layers.find((p) => p.name === layer.name);
-  const age = layer.name === "age" ? Math.floor((store.nowS - map.fetchedS) / AGE_REPAINT_S) * AGE_REPAINT_S : 0;
+  const nowS = layer.name === "age" ? Math.floor(store.nowS / AGE_REPAINT_S) * AGE_REPAINT_S : 0;
+  const top = layer.name === "age" ? ageTop(map) : 0;
+  const scale = shown ? JSON.stringify([shown.lowest, shown.edges, lookOf(shown).low, lookOf(shown).high]) : "";
   const key = chosen
-    ? `${map.epoch}.${map.version}.${layer.name}.${age}.${layer.highlight}.${isStale(vehicle)}.${bookEdits}`
-    : `${map.epoch}.${map.version}.footprint`;
+    ? `${map.epoch}.${layer.name}.${nowS}.${top}.${layer.highlight}.${isStale(vehicle)}.${bookEdits}.${scale}`
+    : `${map.epoch}.footprint`;
   const have = painted.get(vehicle.id);
-  if (have?.key === key) return have.canvas;
-  const canvas = !chosen
-    ? paintFootprint(map)
-    : shown
-      ? paintLayer(map, shown, isStale(vehicle))
-      : layer.name === "age"
-        ? paintAge(map, age, ageTop(map))
-        : paintLabels(map, { tintOf, shownAs, stale: isStale(vehicle), highlight: layer.highlight });
-  painted.set(vehicle.id, { key, canvas });
-  return canvas;
+  const look = have?.key === key ? have : { key, tones: tonesOf(vehicle, chosen, shown, nowS, top), canvases: new Map() };
+  painted.set(vehicle.id, look);
+  const isCoarse = chosen && layer.name === "label";
+  const paint = (tile) => {
+    const blocks = isCoarse ? blocksOf(map, tile) : NO_BLOCKS;
+    const kept = look.canvases.get(tile);
+    if (kept?.blocks === blocks) return kept.canvas;
+    if (look.canvases.size >= MAX_PAINTED) look.canvases.clear();
+    const canvas = paintTile(tile, look.tones.cell, blocks, look.tones.label);
+    look.canvases.set(tile, { blocks, canvas });
+    return canvas;
+  };
+  forgetReplaced(look, map);
+  return { canvasOf: paint, toneOf: (tile) => sampleTone(tile, look.tones.cell) };
 }
 
-const coarsely = new Map();
+/** Drops the canvases of tiles that a newer version of the map has replaced. */
+function forgetReplaced(look, map) {
+  if (look.map === map) return;
+  look.map = map;
+  for (const tile of look.canvases.keys()) {
+    if (map.tileAt(tile.column * EDGE, tile.row * EDGE) !== tile) look.canvases.delete(tile);
+  }
+}
 
-/** The coarse blocks of a vehicle's map, painted pale below its cells in the label layer, or null. */
-export function coarseCanvasOf(vehicle, map) {
-  if (vehicle.id !== store.selectedId || layer.name !== "label" || coarseBlocks(map).length === 0) return null;
-  const key = `${map.epoch}.${map.version}.${layer.highlight}.${isStale(vehicle)}.${bookEdits}`;
-  const have = coarsely.get(vehicle.id);
-  if (have?.key === key && have.map === map) return have.canvas;
-  const tones = labelTones({ tintOf, shownAs, stale: isStale(vehicle), highlight: layer.highlight });
-  const canvas = paintCoarse(map, tones);
-  coarsely.set(vehicle.id, { key, map, canvas });
-  return canvas;
+function tonesOf(vehicle, chosen, shown, nowS, top) {
+  const label = labelTones({ tintOf, shownAs, stale: isStale(vehicle), highlight: layer.highlight });
+  if (!chosen) return { label, cell: footprintTones() };
+  if (shown) return { label, cell: layerTones(shown, isStale(vehicle)) };
+  if (layer.name === "age") return { label, cell: ageTones(nowS, top) };
+  return { label, cell: (tile, x, y, id) => label(id) };
 }
 
 /** The upper end of the age scale: a round number above the oldest cell. */
 export function ageTop(map) {
-  let oldest = 60;
-  for (const a of map.age) if (a !== 65535 && a > oldest) oldest = a;
+  const oldest = Math.max(60, map.oldestS === null ? 0 : store.nowS - map.oldestS);
   const step = nice(oldest);
   return Math.ceil(oldest / step) * step;
 }
@@ -80,7 +93,7 @@ export function drawLegend() {
   const map = store.map;
   const shown = map?.layers.find((p) => p.name === layer.name);
   const top = layer.name === "age" && map ? ageTop(map) : 0;
-  const coarse = layer.name === "label" && Boolean(map) && coarseBlocks(map).length > 0;
+  const coarse = layer.name === "label" && Boolean(map) && hasCoarse(map);
   const look = shown ? lookOf(shown) : { at: ramp, low: "now", high: span(top) };
   const key = `${layer.name}.${look.low}.${look.high}.${coarse}`;
   if (key === legendKey) return;

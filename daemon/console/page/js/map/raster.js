@@ -1,54 +1,51 @@
-// Paints a version of a map into an offscreen canvas, one pixel a cell, north up.
+// Paints tiles of a map into offscreen canvases, one pixel a cell, north up.
 
 import { ramp } from "../palette.js";
 import { current as theme } from "../theme.js";
+import { EDGE } from "../tiles.js";
+import { paintBlocks } from "./coarse.js";
 import { lookOf } from "./layer-look.js";
 
 const shade = (t) => ramp(t, theme() === "red");
+const UNKNOWN = [128, 128, 128, 90];
 
-/** The extent of explored cells in metres [west, south, east, north], or null. */
-export function extent(map) {
-  let [x0, y0, x1, y1] = [Infinity, Infinity, -1, -1];
-  for (let y = 0; y < map.height; y += 1)
-    for (let x = 0; x < map.width; x += 1) {
-      if (map.labels[y * map.width + x] === 0) continue;
-      x0 = Math.min(x0, x);
-      x1 = Math.max(x1, x);
-      y0 = Math.min(y0, y);
-      y1 = Math.max(y1, y);
-    }
-  if (x1 < 0) return null;
-  const m = map.cell_m;
-  return [(map.x0 + x0) * m, (map.y0 + y0) * m, (map.x0 + x1 + 1) * m, (map.y0 + y1 + 1) * m];
-}
-
-/** The map's rectangle in metres [west, south, east, north]. */
-export function rectangle(map) {
-  const m = map.cell_m;
-  return [map.x0 * m, map.y0 * m, (map.x0 + map.width) * m, (map.y0 + map.height) * m];
-}
-
-/** Paints `map`; `rgbaOf(at, label)` gives [r, g, b, a] for the cell at index `at`. */
-function paint(map, rgbaOf) {
+/** The canvas of a tile; `toneOf(tile, x, y, label)` gives [r, g, b, a] for a cell, `paleOf(label)` for coarse `blocks`. */
+export function paintTile(tile, toneOf, blocks, paleOf) {
   const canvas = document.createElement("canvas");
-  canvas.width = Math.max(1, map.width);
-  canvas.height = Math.max(1, map.height);
+  canvas.width = EDGE;
+  canvas.height = EDGE;
   const context = canvas.getContext("2d");
-  const image = context.createImageData(canvas.width, canvas.height);
-  for (let y = 0; y < map.height; y += 1) {
-    let to = (map.height - 1 - y) * map.width * 4;
-    for (let x = 0; x < map.width; x += 1, to += 4) {
-      const at = y * map.width + x;
-      if (map.labels[at] === 0) continue;
-      const c = rgbaOf(at, map.labels[at]);
-      image.data[to] = c[0];
-      image.data[to + 1] = c[1];
-      image.data[to + 2] = c[2];
-      image.data[to + 3] = c[3];
-    }
-  }
+  const image = context.createImageData(EDGE, EDGE);
+  paintBlocks(image.data, blocks, tile, paleOf);
+  tile.eachCell((x, y, label) => {
+    const c = toneOf(tile, x, y, label);
+    const to = 4 * ((EDGE - 1 - y) * EDGE + x);
+    image.data[to] = c[0];
+    image.data[to + 1] = c[1];
+    image.data[to + 2] = c[2];
+    image.data[to + 3] = c[3];
+  });
   context.putImageData(image, 0, 0);
   return canvas;
+}
+
+const samples = new WeakMap();
+
+/** The colour of a tile that is too small to be drawn: that of a cell with its most frequent label. */
+export function sampleTone(tile, toneOf) {
+  if (!samples.has(tile)) {
+    const cells = new Map();
+    let most = null;
+    tile.eachCell((x, y, label) => {
+      const found = cells.get(label) ?? { x, y, label, count: 0 };
+      found.count += 1;
+      cells.set(label, found);
+      if (!most || found.count > most.count) most = found;
+    });
+    samples.set(tile, most);
+  }
+  const cell = samples.get(tile);
+  return cell && toneOf(tile, cell.x, cell.y, cell.label);
 }
 
 const mix = (a, b, t) => a.map((v, i) => v + (b[i] - v) * t);
@@ -67,31 +64,25 @@ export function labelTones({ tintOf, shownAs, stale, highlight }) {
   return (label) => (table[label] ??= lookup(label));
 }
 
-export function paintLabels(map, look) {
-  const tones = labelTones(look);
-  return paint(map, (_, label) => tones(label));
-}
-
 /** The age of each cell, on the sequential scale from 0 to `top` seconds. */
-export function paintAge(map, sinceFetchS, top) {
-  return paint(map, (at) => {
-    const age = map.age[at];
-    return age === 65535 ? [128, 128, 128, 90] : [...shade(1 - (age + sinceFetchS) / top), 255];
-  });
-}
+export const ageTones = (nowS, top) => (tile, x, y) => {
+  const timeS = tile.labels.time(x, y);
+  return timeS === null ? UNKNOWN : [...shade(1 - Math.max(0, nowS - timeS) / top), 255];
+};
 
 /** A layer of the server: one level a cell, 0 unknown; faint when stale. */
-export function paintLayer(map, layer, stale) {
+export function layerTones(layer, stale) {
   const look = lookOf(layer);
-  return paint(map, (at) => {
-    const level = layer.data[at];
-    if (level === 0) return [128, 128, 128, 90];
+  const table = new Array(256);
+  const lookup = (level) => {
     const full = look.tone(level, theme() === "red");
     return [...(stale ? mix(full, [128, 128, 128], 0.7) : full), 255];
-  });
+  };
+  return (tile, x, y) => {
+    const level = tile.parts[layer.number]?.level(x, y) ?? 0;
+    return level === 0 ? UNKNOWN : (table[level] ??= lookup(level));
+  };
 }
 
 /** Another vehicle's map: only its explored cells, since its label numbers have another meaning. */
-export function paintFootprint(map) {
-  return paint(map, () => [128, 128, 128, 80]);
-}
+export const footprintTones = () => () => [128, 128, 128, 80];

@@ -8,25 +8,21 @@ import { ageOf, store } from "../store.js";
 import { blockAt } from "./coarse.js";
 import { onMap } from "./frames.js";
 
-/** The cell at (x, y) metres in the map's frame: {label, ageS, layers}, each layer with its own age; null outside the map. */
+/** The cell at (x, y) metres in the map's frame: {label, ageS, layers}, each layer with its own age; null if it is unexplored. */
 export function cellAt(map, x, y) {
-  const cx = Math.floor(x / map.cell_m) - map.x0;
-  const cy = Math.floor(y / map.cell_m) - map.y0;
-  if (cx < 0 || cy < 0 || cx >= map.width || cy >= map.height) return null;
-  const at = cy * map.width + cx;
-  if (map.labels[at] === 0) return null;
-  const since = ageOf(map.fetchedS) ?? 0;
-  const seconds = (ages) => (!ages || ages[at] === 65535 ? null : ages[at] + since);
+  const [cx, cy] = [x, y].map((v) => Math.floor(v / map.cell_m));
+  const { level: label, timeS } = map.value(0, cx, cy);
+  if (label === 0) return null;
   const layers = map.layers
-    .filter((l) => l.data[at] !== 0)
-    .map((l) => ({ ...l, level: l.data[at], ageS: seconds(l.age) }));
-  return { label: map.labels[at], ageS: seconds(map.age), layers };
+    .map((l) => ({ ...l, ...map.value(l.number, cx, cy) }))
+    .filter((l) => l.level !== 0)
+    .map((l) => ({ ...l, ageS: ageOf(l.timeS) }));
+  return { label, ageS: ageOf(timeS), layers };
 }
 
 /** The label of the coarse block around the unexplored cell at (x, y) metres, or null. */
 function coarseAt(map, x, y) {
-  const block = blockAt(map, Math.floor(x / map.cell_m) - map.x0, Math.floor(y / map.cell_m) - map.y0);
-  return block && map.labels[block.at];
+  return blockAt(map, Math.floor(x / map.cell_m), Math.floor(y / map.cell_m))?.label ?? null;
 }
 
 export function showReadout(world) {

@@ -11,16 +11,30 @@ const FILES = [
   ["PNG", "one pixel a cell, pixel value = label", "png"],
   ["World file", "the place of the PNG, beside it", "pgw"],
   ["Projection", "the projection of the PNG, beside it", "png.aux.xml"],
+  ["GeoTIFF", "one pixel a cell, of any extent, pixel value = label", "tif"],
+  ["GeoTIFF, UTM", "the same in the UTM zone of the origin", "utm.tif"],
+  ["GeoTIFF, WGS 84", "the same in longitude and latitude", "wgs84.tif"],
   ["CSV", "one line a cell with label, age and layers", "csv"],
   ["GeoJSON", "regions of equal label", "geojson"],
   ["PLY", "coloured points for 3-D tools", "ply"],
 ];
 
+const NEEDS_ORIGIN = ["utm.tif", "wgs84.tif"];
+/** A PNG has no empty tiles: the server makes none of more cells than this. */
+const PNG_FILES = ["png", "pgw", "png.aux.xml"];
+const MAX_PNG_CELLS = 2 ** 23;
+
+/** Whether the server can make a file of this map. */
+function isOffered(extension, { mission }, map) {
+  if (NEEDS_ORIGIN.includes(extension)) return Boolean(mission.origin);
+  return !PNG_FILES.includes(extension) || map.width * map.height <= MAX_PNG_CELLS;
+}
+
 export function openExport() {
   const { map, vehicle } = store;
   const dialog = $("dialog");
   const close = h("button.primary", { type: "button", onclick: () => dialog.close() }, "Close");
-  dialog.replaceChildren(h("h2", { id: "dialog-title" }, "Export the map"), ...(map && map.width > 0 ? offer(vehicle) : [h("p", {}, "No cell has arrived yet.")]), archivedMaps(), h("div.buttons", {}, close));
+  dialog.replaceChildren(h("h2", { id: "dialog-title" }, "Export the map"), ...(map && !map.isEmpty ? offer(vehicle) : [h("p", {}, "No cell has arrived yet.")]), archivedMaps(), h("div.buttons", {}, close));
   dialog.showModal();
 }
 
@@ -32,7 +46,7 @@ function offer(vehicle) {
   const local = mission.origin ? "" : " The mission has no origin in latitude and longitude: coordinates are metres east and north.";
   return [
     h("p", {}, `Version ${vehicle.map.version} of ${vehicle.name}, changed ${ago(ageOf(vehicle.map.updated_s))}.${local}`),
-    h("ul.files", {}, ...FILES.map(item)),
+    h("ul.files", {}, ...FILES.filter(([, , extension]) => isOffered(extension, store.snapshot, vehicle.map)).map(item)),
     h("p.hint", {}, "Files have label numbers, without names, colours and merges."),
   ];
 }

@@ -1,15 +1,25 @@
-//! Maps. Each version is requested from the surface once, however many clients read it.
+//! Maps. Each version is requested from the surface once, however many clients read it, and everything is made of it beside the
+//! link.
 
-use crate::export::{self, MapCells};
-use crate::http::compress::{either, gzip, tagged};
+use crate::export::{MapCells, MapFormat};
+use crate::http::compress::{accepts_gzip, gzip, tagged};
 use crate::http::response::{error, respond};
 use crate::http::shared::{CachedMap, Shared, VehicleId};
 use crate::request::{Reply, SurfaceRequest};
-use crate::state::Origin;
-use axum::extract::State;
+use crate::tiles::TiledMap;
+use axum::Json;
+use axum::body::Bytes;
+use axum::extract::{Query, State};
 use axum::http::{HeaderMap, StatusCode, header};
 use axum::response::{IntoResponse, Response};
+use scenecast_protocol::map::Rect;
+use std::collections::BTreeMap;
 use std::sync::Arc;
+use tokio::sync::Mutex;
+
+pub(in crate::http) const TILES: &str = "application/x-scenecast-tiles";
+/// Packed responses that are kept of one map.
+const MAX_PACKED: usize = 16;
 
 /// The latest map of a vehicle.
 async fn latest(shared: &Shared, id: u8) -> Result<Arc<CachedMap>, Response> {
@@ -19,7 +29,7 @@ async fn latest(shared: &Shared, id: u8) -> Result<Arc<CachedMap>, Response> {
         snapshot.vehicle(id).map(|v| (v.map.version, v.map.updated_s))
     };
     if let (Some(cached), Some((version, updated_s))) = (maps.get(&id), published)
-        && cached.cells.version >= version
+        && cached.map.cells().version >= version
         && cached.updated_s >= updated_s
     {
         return Ok(cached.clone());
@@ -29,63 +39,108 @@ async fn latest(shared: &Shared, id: u8) -> Result<Arc<CachedMap>, Response> {
         other => return Err(respond(other)),
     };
     let updated_s = published.and_then(|(_, at)| at);
-    let cached = tokio::task::spawn_blocking(move || {
-        let json = serde_json::to_vec(&cells.body()).unwrap_or_default();
-        let packed = gzip(&json).unwrap_or_default().into();
-        Arc::new(CachedMap { cells, updated_s, json: json.into(), packed })
+    let (held, run) = (maps.get(&id).cloned(), shared.maps.run);
+    let compared = tokio::task::spawn_blocking(move || {
+        let map = held.map_or_else(|| TiledMap::first(cells.clone(), run), |held| held.map.next(cells.clone()));
+        Arc::new(CachedMap { map, updated_s, packed: Mutex::default() })
     });
-    let cached = cached.await.map_err(|_| StatusCode::INTERNAL_SERVER_ERROR.into_response())?;
+    let cached = compared.await.map_err(|_| StatusCode::INTERNAL_SERVER_ERROR.into_response())?;
     maps.insert(id, cached.clone());
     Ok(cached)
 }
 
-fn tag(shared: &Shared, id: u8, cached: &CachedMap) -> String {
-    let run = shared.snapshots.borrow().state.mission.id.clone();
-    let updated = cached.updated_s.map_or(0.0, |at| at * 100.0);
-    format!("{run}-{id}-{}-{updated:.0}", cached.cells.version)
-}
-
-/// The map with the age of its cells.
+/// The cells of the map or of a region in JSON, with the age of each.
 pub(in crate::http) async fn map(
     State(shared): State<Shared>,
     VehicleId(id): VehicleId,
+    Query(query): Query<BTreeMap<String, String>>,
     headers: HeaderMap,
 ) -> Response {
-    match latest(&shared, id).await {
-        Ok(cached) => tagged(&headers, &tag(&shared, id, &cached), || {
-            either(&headers, "application/json", &cached.json, &cached.packed)
-        }),
-        Err(response) => response,
+    let region = match region(&query) {
+        Ok(region) => region,
+        Err(reason) => return error(StatusCode::UNPROCESSABLE_ENTITY, &reason),
+    };
+    let cached = match latest(&shared, id).await {
+        Ok(cached) => cached,
+        Err(response) => return response,
+    };
+    let tag = format!("{id}-{}-{region:?}", cached.map.tag()).replace(['"', ' '], "");
+    if is_held(&headers, &tag) {
+        return tagged(&headers, &tag, || StatusCode::OK.into_response());
+    }
+    let made = tokio::task::spawn_blocking(move || cached.map.cells().body(region)).await;
+    match made {
+        Ok(Ok(body)) => tagged(&headers, &tag, || Json(body).into_response()),
+        Ok(Err(reason)) => error(StatusCode::UNPROCESSABLE_ENTITY, &reason),
+        Err(_) => StatusCode::INTERNAL_SERVER_ERROR.into_response(),
     }
 }
 
-/// Makes a file of a map; `None` if the encoder fails.
-type Make = fn(&MapCells, Option<Origin>) -> Option<Vec<u8>>;
-
-/// A file format of the map.
-#[derive(Debug, Clone, Copy)]
-pub(in crate::http) struct FileFormat {
-    pub(in crate::http) content_type: &'static str,
-    make: Make,
+fn is_held(headers: &HeaderMap, tag: &str) -> bool {
+    tagged(headers, tag, || StatusCode::OK.into_response()).status() == StatusCode::NOT_MODIFIED
 }
 
-pub(in crate::http) const PNG: FileFormat =
-    FileFormat { content_type: "image/png", make: |cells, _| export::indexed_png(cells) };
-pub(in crate::http) const WORLD: FileFormat =
-    FileFormat { content_type: "text/plain", make: |cells, _| Some(export::world_file(cells).into()) };
-pub(in crate::http) const PROJECTION: FileFormat =
-    FileFormat { content_type: "application/xml", make: |_, origin| Some(export::projection(origin).into()) };
-pub(in crate::http) const GEOJSON: FileFormat = FileFormat {
-    content_type: "application/geo+json",
-    make: |cells, origin| Some(export::geojson(cells, origin).into()),
-};
-pub(in crate::http) const PLY: FileFormat =
-    FileFormat { content_type: "application/ply", make: |cells, _| Some(export::ply(cells).into()) };
-pub(in crate::http) const CSV: FileFormat =
-    FileFormat { content_type: "text/csv", make: |cells, _| Some(export::csv(cells).into()) };
+/// The region of a request, in cells; `None` for the whole map.
+fn region(query: &BTreeMap<String, String>) -> Result<Option<Rect>, String> {
+    const NAMES: [&str; 4] = ["x0", "y0", "width", "height"];
+    if !query.keys().any(|name| NAMES.contains(&name.as_str())) {
+        return Ok(None);
+    }
+    let number = |name: &str, low: i64, high: i64| {
+        let value = query.get(name).and_then(|text| text.parse::<i64>().ok());
+        let range = format!("{name}: a region needs x0, y0, width and height in cells; the range is {low} to {high}");
+        value.filter(|v| (low..=high).contains(v)).ok_or(range)
+    };
+    let corner = |name: &str| number(name, i32::MIN.into(), i32::MAX.into()).map(|v| v as i32);
+    let size = |name: &str| number(name, 1, u32::MAX.into()).map(|v| v as u32);
+    Ok(Some(Rect { x: corner("x0")?, y: corner("y0")?, width: size("width")?, height: size("height")? }))
+}
+
+/// The tiles that have changed since the tag `since`, or all.
+pub(in crate::http) async fn tiles(
+    State(shared): State<Shared>,
+    VehicleId(id): VehicleId,
+    Query(query): Query<BTreeMap<String, String>>,
+    headers: HeaderMap,
+) -> Response {
+    let cached = match latest(&shared, id).await {
+        Ok(cached) => cached,
+        Err(response) => return response,
+    };
+    let is_packed = accepts_gzip(&headers);
+    let made = packed_tiles(cached, query.get("since").cloned(), is_packed).await;
+    let Some(bytes) = made else { return StatusCode::INTERNAL_SERVER_ERROR.into_response() };
+    let mut response = ([(header::CONTENT_TYPE, TILES), (header::CACHE_CONTROL, "no-store")], bytes).into_response();
+    let headers = response.headers_mut();
+    headers.insert(header::VARY, header::HeaderValue::from_static("accept-encoding"));
+    if is_packed {
+        headers.insert(header::CONTENT_ENCODING, header::HeaderValue::from_static("gzip"));
+    }
+    response
+}
+
+async fn packed_tiles(cached: Arc<CachedMap>, since: Option<String>, is_packed: bool) -> Option<Bytes> {
+    if !is_packed {
+        let made = tokio::task::spawn_blocking(move || cached.map.tiles_since(since.as_deref()));
+        return made.await.ok().map(Bytes::from);
+    }
+    // Pages that wait for the same tiles wait for one of them to be packed.
+    let own = cached.clone();
+    let mut kept = own.packed.lock().await;
+    if let Some(bytes) = kept.get(&since) {
+        return Some(bytes.clone());
+    }
+    let wanted = since.clone();
+    let made = tokio::task::spawn_blocking(move || gzip(&cached.map.tiles_since(wanted.as_deref())));
+    let bytes: Bytes = made.await.ok()??.into();
+    if kept.len() < MAX_PACKED {
+        kept.insert(since, bytes.clone());
+    }
+    Some(bytes)
+}
 
 /// The map as a file.
-pub(in crate::http) async fn file(shared: Shared, id: u8, headers: HeaderMap, format: FileFormat) -> Response {
+pub(in crate::http) async fn file(shared: Shared, id: u8, headers: HeaderMap, format: MapFormat) -> Response {
     let cached = match latest(&shared, id).await {
         Ok(cached) => cached,
         Err(response) => return response,
@@ -95,23 +150,23 @@ pub(in crate::http) async fn file(shared: Shared, id: u8, headers: HeaderMap, fo
         (snapshot.state.mission.origin, snapshot.vehicle(id).and_then(|v| v.map.placement.clone()))
     };
     let moves = placement.as_ref().map_or(0, |p| p.version);
-    let tag = format!("{}-{moves}", tag(&shared, id, &cached));
-    let unchanged = tagged(&headers, &tag, || StatusCode::OK.into_response());
-    if unchanged.status() == StatusCode::NOT_MODIFIED {
-        return unchanged;
+    let tag = format!("{id}-{}-{moves}", cached.map.tag());
+    if is_held(&headers, &tag) {
+        return tagged(&headers, &tag, || StatusCode::OK.into_response());
     }
     let Ok(_maker) = shared.maps.makers.acquire().await else {
         return StatusCode::INTERNAL_SERVER_ERROR.into_response();
     };
     let made = tokio::task::spawn_blocking(move || {
         let moved_m = placement.map_or((0.0, 0.0), |p| (p.east_m, p.north_m));
-        (format.make)(&MapCells { moved_m, ..cached.cells.clone() }, origin)
+        MapCells { moved_m, ..cached.map.cells().clone() }.export(format, origin)
     });
     match made.await {
-        Ok(Some(bytes)) => {
-            tagged(&headers, &tag, || ([(header::CONTENT_TYPE, format.content_type)], bytes).into_response())
+        Ok(Ok(bytes)) => {
+            tagged(&headers, &tag, || ([(header::CONTENT_TYPE, format.content_type())], bytes).into_response())
         }
-        _ => error(StatusCode::INTERNAL_SERVER_ERROR, "the file could not be made"),
+        Ok(Err(reason)) => error(StatusCode::UNPROCESSABLE_ENTITY, &reason),
+        Err(_) => error(StatusCode::INTERNAL_SERVER_ERROR, "the file could not be made"),
     }
 }
 
@@ -121,7 +176,7 @@ pub(in crate::http) async fn archives(State(shared): State<Shared>) -> Response 
 }
 
 /// An archived map as a file.
-pub(in crate::http) async fn archived(shared: Shared, name: String, format: FileFormat) -> Response {
+pub(in crate::http) async fn archived(shared: Shared, name: String, format: MapFormat) -> Response {
     let cells = match shared.request(SurfaceRequest::ArchivedMap(name)).await {
         Ok(Reply::Map(cells)) => cells,
         Ok(other) => return respond(other),
@@ -131,8 +186,9 @@ pub(in crate::http) async fn archived(shared: Shared, name: String, format: File
     let Ok(_maker) = shared.maps.makers.acquire().await else {
         return StatusCode::INTERNAL_SERVER_ERROR.into_response();
     };
-    match tokio::task::spawn_blocking(move || (format.make)(&cells, origin)).await {
-        Ok(Some(bytes)) => ([(header::CONTENT_TYPE, format.content_type)], bytes).into_response(),
-        _ => error(StatusCode::INTERNAL_SERVER_ERROR, "the file could not be made"),
+    match tokio::task::spawn_blocking(move || cells.export(format, origin)).await {
+        Ok(Ok(bytes)) => ([(header::CONTENT_TYPE, format.content_type())], bytes).into_response(),
+        Ok(Err(reason)) => error(StatusCode::UNPROCESSABLE_ENTITY, &reason),
+        Err(_) => error(StatusCode::INTERNAL_SERVER_ERROR, "the file could not be made"),
     }
 }

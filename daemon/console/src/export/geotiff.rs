@@ -1,0 +1,309 @@
+//! Tiled GeoTIFF with a palette, in the projection of the mission, in UTM or in WGS 84.
+//!
+//! Tags follow TIFF 6.0 and OGC GeoTIFF 1.1 (19-008r4). Tiles without an explored cell share the data of one empty tile, so
+//! that the size of the file grows with the cells and not with their extent.
+
+use super::cells::MapCells;
+use super::projection::TransverseMercator;
+use crate::state::Origin;
+use flate2::Compression;
+use flate2::write::ZlibEncoder;
+use scenecast_protocol::map::{Cell, REPLICA_TILE, Rect};
+use std::collections::BTreeSet;
+use std::io::{Cursor, Write};
+use tiff::encoder::TiffEncoder;
+use tiff::tags::Tag;
+
+/// Edge of a tile of the file in pixels.
+const TILE: u32 = 256;
+/// The most tiles of a file; their table takes 8 bytes each.
+const MAX_TILES: u64 = 1 << 20;
+/// Metres of one degree of latitude, for the size of a pixel in degrees.
+const DEGREE_M: f64 = 111_320.0;
+
+/// The coordinate reference system of a file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Reference {
+    /// Transverse Mercator about the origin of the mission: each pixel is a cell. Without an origin: metres alone.
+    Mission,
+    /// The UTM zone of the origin.
+    Utm,
+    /// Longitude and latitude, EPSG:4326.
+    Wgs84,
+}
+
+/// The pixels of a file: their size, the north-west corner of the first, and their number.
+#[derive(Debug, Clone, Copy)]
+struct Raster {
+    west: f64,
+    north: f64,
+    pixel: (f64, f64),
+    width: u32,
+    height: u32,
+}
+
+/// From the coordinates of a file to metres in the world frame, and back.
+enum Places {
+    Same,
+    Projected(TransverseMercator, TransverseMercator),
+    Degrees(TransverseMercator),
+}
+
+impl Places {
+    fn to_file(&self, (x, y): (f64, f64)) -> (f64, f64) {
+        match self {
+            Self::Same => (x, y),
+            Self::Projected(mission, utm) => {
+                let (lon, lat) = mission.lon_lat(x, y);
+                utm.metres(lon, lat)
+            }
+            Self::Degrees(mission) => mission.lon_lat(x, y),
+        }
+    }
+
+    fn to_world(&self, (x, y): (f64, f64)) -> (f64, f64) {
+        match self {
+            Self::Same => (x, y),
+            Self::Projected(mission, utm) => {
+                let (lon, lat) = utm.lon_lat(x, y);
+                mission.metres(lon, lat)
+            }
+            Self::Degrees(mission) => mission.metres(x, y),
+        }
+    }
+}
+
+/// The map as a GeoTIFF, pixel value = label, 0 = no data. In UTM and WGS 84, each pixel has the label of the cell at its centre.
+/// The error is one line for people.
+pub(super) fn geotiff(cells: &MapCells, origin: Option<Origin>, reference: Reference) -> Result<Vec<u8>, String> {
+    let no_origin =
+        "the mission has no origin in latitude and longitude: set mission.origin_deg, or take map.tif in metres";
+    let (places, keys) = match (reference, origin) {
+        (Reference::Mission, origin) => (Places::Same, origin.map(mission_keys).unwrap_or_default()),
+        (_, None) => return Err(no_origin.to_owned()),
+        (Reference::Utm, Some(origin)) => {
+            let zone = TransverseMercator::utm(origin);
+            let (utm, epsg) = zone.ok_or("UTM ends at 84 degrees of latitude: take map.wgs84.tif or map.tif")?;
+            (Places::Projected(TransverseMercator::about(origin), utm), utm_keys(epsg))
+        }
+        (Reference::Wgs84, Some(origin)) => (Places::Degrees(TransverseMercator::about(origin)), wgs84_keys()),
+    };
+    let raster = raster(cells, origin, reference, &places)?;
+    let tiles = touched_tiles(cells, &raster, &places);
+    let pixels = |&tile: &(u32, u32)| tile_pixels(cells, &raster, &places, tile);
+    write(&raster, &keys, tiles.iter().map(|tile| (*tile, pixels(tile)))).map_err(|e| e.to_string())
+}
+
+fn raster(cells: &MapCells, origin: Option<Origin>, reference: Reference, places: &Places) -> Result<Raster, String> {
+    let Rect { x, y, width, height } = cells.bounds.unwrap_or(Rect { x: 0, y: 0, width: 1, height: 1 });
+    let (x, y) = (i64::from(x), i64::from(y));
+    let size = cells.cell_m;
+    let pixel = match (reference, origin) {
+        (Reference::Wgs84, Some(o)) => (size / (DEGREE_M * o.lat_deg.to_radians().cos()), size / DEGREE_M),
+        _ => (size, size),
+    };
+    let too_large = || {
+        format!("the map spans {width} x {height} cells: a GeoTIFF has at most {MAX_TILES} tiles of {TILE} x {TILE}")
+    };
+    if u64::from(width.div_ceil(TILE)) * u64::from(height.div_ceil(TILE)) > MAX_TILES {
+        return Err(too_large());
+    }
+    let (x_end, y_end) = (x + i64::from(width), y + i64::from(height));
+    if matches!(places, Places::Same) {
+        let (west, north) = cells.corner_m(x, y_end);
+        return Ok(Raster { west, north, pixel, width, height });
+    }
+    // The sides are nearly straight: corners and middles bound them to a pixel.
+    let steps = |from: i64, to: i64| (0..=8).map(move |k| from + (to - from) * k / 8);
+    let sides = steps(x, x_end).flat_map(|x| [(x, y), (x, y_end)]);
+    let sides = sides.chain(steps(y, y_end).flat_map(|y| [(x, y), (x_end, y)]));
+    let places: Vec<(f64, f64)> = sides.map(|(x, y)| places.to_file(cells.corner_m(x, y))).collect();
+    let range = |of: fn(&(f64, f64)) -> f64| {
+        let values = places.iter().map(of);
+        values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)))
+    };
+    let ((west, east), (south, north)) = (range(|p| p.0), range(|p| p.1));
+    let (columns, rows) = (((east - west) / pixel.0).ceil() + 2.0, ((north - south) / pixel.1).ceil() + 2.0);
+    if !(columns * rows).is_finite() || columns * rows > MAX_TILES as f64 * f64::from(TILE * TILE) {
+        return Err(too_large());
+    }
+    let (west, north) = (west - pixel.0, north + pixel.1);
+    Ok(Raster { west, north, pixel, width: columns as u32, height: rows as u32 })
+}
+
+/// The tiles of the file, as row and column, that may have an explored cell.
+fn touched_tiles(cells: &MapCells, raster: &Raster, places: &Places) -> BTreeSet<(u32, u32)> {
+    let mut touched = BTreeSet::new();
+    let last = (raster.height.saturating_sub(1) / TILE, raster.width.saturating_sub(1) / TILE);
+    for &(row, column) in cells.tiles.keys() {
+        let edge = i64::from(REPLICA_TILE);
+        let (x, y) = (i64::from(column) * edge, i64::from(row) * edge);
+        let corners = [(x, y), (x + edge, y), (x, y + edge), (x + edge, y + edge)];
+        let at = corners.map(|(x, y)| {
+            let (x, y) = places.to_file(cells.corner_m(x, y));
+            ((raster.north - y) / raster.pixel.1, (x - raster.west) / raster.pixel.0)
+        });
+        let span = |of: fn(&(f64, f64)) -> f64, last: u32| {
+            let (low, high) = at.iter().map(of).fold((f64::MAX, f64::MIN), |(l, h), v| (l.min(v), h.max(v)));
+            let tile = |pixel: f64| ((pixel / f64::from(TILE)).floor().max(0.0) as u32).min(last);
+            tile(low - 1.0)..=tile(high + 1.0)
+        };
+        for tile_row in span(|p| p.0, last.0) {
+            touched.extend(span(|p| p.1, last.1).map(|tile_column| (tile_row, tile_column)));
+        }
+    }
+    touched
+}
+
+/// The labels of a tile, row by row from the north-west.
+fn tile_pixels(cells: &MapCells, raster: &Raster, places: &Places, (row, column): (u32, u32)) -> Vec<u8> {
+    let mut pixels = vec![0; (TILE * TILE) as usize];
+    let edge = f64::from(TILE);
+    let (west, north) = (
+        raster.west + f64::from(column) * edge * raster.pixel.0,
+        raster.north - f64::from(row) * edge * raster.pixel.1,
+    );
+    let (east, south) = (west + edge * raster.pixel.0, north - edge * raster.pixel.1);
+    // Over one tile the coordinates are bilinear to less than a millimetre.
+    let [nw, ne, sw, se] = [(west, north), (east, north), (west, south), (east, south)].map(|p| places.to_world(p));
+    let between = |a: f64, b: f64, t: f64| a + (b - a) * t;
+    for (line, out) in pixels.chunks_mut(TILE as usize).enumerate() {
+        let down = (line as f64 + 0.5) / edge;
+        let left = (between(nw.0, sw.0, down), between(nw.1, sw.1, down));
+        let right = (between(ne.0, se.0, down), between(ne.1, se.1, down));
+        for (at, pixel) in out.iter_mut().enumerate() {
+            let across = (at as f64 + 0.5) / edge;
+            let cell = |from: f64, to: f64, moved: f64| ((between(from, to, across) - moved) / cells.cell_m).floor();
+            let (x, y) = (cell(left.0, right.0, cells.moved_m.0), cell(left.1, right.1, cells.moved_m.1));
+            if let Some(label) = label(cells, x, y) {
+                *pixel = label;
+            }
+        }
+    }
+    pixels
+}
+
+/// The label at a column and row; `None` beyond the bounds of the map.
+fn label(cells: &MapCells, x: f64, y: f64) -> Option<u8> {
+    let inside = |v: f64| (f64::from(i32::MIN)..=f64::from(i32::MAX)).contains(&v);
+    (inside(x) && inside(y)).then(|| cells.label(Cell::new(x as i32, y as i32)))
+}
+
+/// The geographic keys of a file: numbers, and the doubles that some of them refer to.
+#[derive(Default)]
+struct GeoKeys {
+    shorts: Vec<(u16, u16)>,
+    doubles: Vec<(u16, f64)>,
+}
+
+const MODEL_TYPE: u16 = 1024;
+const RASTER_TYPE: u16 = 1025;
+const GEODETIC_CRS: u16 = 2048;
+const ANGULAR_UNITS: u16 = 2054;
+const PROJECTED_CRS: u16 = 3072;
+const PROJECTION: u16 = 3074;
+const PROJECTION_METHOD: u16 = 3075;
+const LINEAR_UNITS: u16 = 3076;
+const ORIGIN_LON: u16 = 3080;
+const ORIGIN_LAT: u16 = 3081;
+const FALSE_EASTING: u16 = 3082;
+const FALSE_NORTHING: u16 = 3083;
+const ORIGIN_SCALE: u16 = 3092;
+const USER_DEFINED: u16 = 32_767;
+const WGS_84: u16 = 4326;
+const METRE: u16 = 9001;
+const DEGREE: u16 = 9102;
+
+fn utm_keys(epsg: u16) -> GeoKeys {
+    let shorts = vec![(MODEL_TYPE, 1), (RASTER_TYPE, 1), (PROJECTED_CRS, epsg), (LINEAR_UNITS, METRE)];
+    GeoKeys { shorts, doubles: Vec::new() }
+}
+
+fn wgs84_keys() -> GeoKeys {
+    let shorts = vec![(MODEL_TYPE, 2), (RASTER_TYPE, 1), (GEODETIC_CRS, WGS_84), (ANGULAR_UNITS, DEGREE)];
+    GeoKeys { shorts, doubles: Vec::new() }
+}
+
+fn mission_keys(origin: Origin) -> GeoKeys {
+    let method =
+        [(PROJECTED_CRS, USER_DEFINED), (PROJECTION, USER_DEFINED), (PROJECTION_METHOD, 1), (LINEAR_UNITS, METRE)];
+    let place =
+        [(ORIGIN_LON, origin.lon_deg), (ORIGIN_LAT, origin.lat_deg), (FALSE_EASTING, 0.0), (FALSE_NORTHING, 0.0)];
+    let mut shorts = vec![(MODEL_TYPE, 1), (RASTER_TYPE, 1), (GEODETIC_CRS, WGS_84), (ANGULAR_UNITS, DEGREE)];
+    shorts.extend(method);
+    let mut doubles = place.to_vec();
+    doubles.push((ORIGIN_SCALE, 1.0));
+    GeoKeys { shorts, doubles }
+}
+
+impl GeoKeys {
+    /// The directory of keys, each with its tag (0 = the value itself), count and value or index.
+    fn directory(&self) -> Vec<u16> {
+        let mut directory = vec![1, 1, 0, (self.shorts.len() + self.doubles.len()) as u16];
+        directory.extend(self.shorts.iter().flat_map(|&(key, value)| [key, 0, 1, value]));
+        let tag = Tag::GeoDoubleParamsTag.to_u16();
+        directory.extend(self.doubles.iter().zip(0u16..).flat_map(|(&(key, _), at)| [key, tag, 1, at]));
+        directory
+    }
+}
+
+fn write(
+    raster: &Raster,
+    keys: &GeoKeys,
+    tiles: impl Iterator<Item = ((u32, u32), Vec<u8>)>,
+) -> Result<Vec<u8>, tiff::TiffError> {
+    let (columns, rows) = (raster.width.div_ceil(TILE), raster.height.div_ceil(TILE));
+    let mut file = Cursor::new(Vec::new());
+    let mut encoder = TiffEncoder::new(&mut file)?;
+    let mut directory = encoder.image_directory()?;
+    let empty = deflate(&[0; (TILE * TILE) as usize])?;
+    let empty = (directory.write_data(&empty[..])? as u32, empty.len() as u32);
+    let mut offsets = vec![empty.0; (columns * rows) as usize];
+    let mut counts = vec![empty.1; (columns * rows) as usize];
+    for ((row, column), pixels) in tiles {
+        if pixels.iter().all(|&label| label == 0) {
+            continue;
+        }
+        let packed = deflate(&pixels)?;
+        let at = (row * columns + column) as usize;
+        if let (Some(offset), Some(count)) = (offsets.get_mut(at), counts.get_mut(at)) {
+            (*offset, *count) = (directory.write_data(&packed[..])? as u32, packed.len() as u32);
+        }
+    }
+    directory.write_tag(Tag::ImageWidth, raster.width)?;
+    directory.write_tag(Tag::ImageLength, raster.height)?;
+    directory.write_tag(Tag::BitsPerSample, 8u16)?;
+    directory.write_tag(Tag::SamplesPerPixel, 1u16)?;
+    directory.write_tag(Tag::Compression, 8u16)?; // Adobe deflate
+    directory.write_tag(Tag::PhotometricInterpretation, 3u16)?; // palette
+    directory.write_tag(Tag::PlanarConfiguration, 1u16)?;
+    directory.write_tag(Tag::ColorMap, &colour_map()[..])?;
+    directory.write_tag(Tag::TileWidth, TILE)?;
+    directory.write_tag(Tag::TileLength, TILE)?;
+    directory.write_tag(Tag::TileOffsets, &offsets[..])?;
+    directory.write_tag(Tag::TileByteCounts, &counts[..])?;
+    directory.write_tag(Tag::GdalNodata, "0")?;
+    directory.write_tag(Tag::ModelPixelScaleTag, &[raster.pixel.0, raster.pixel.1, 0.0][..])?;
+    directory.write_tag(Tag::ModelTiepointTag, &[0.0, 0.0, 0.0, raster.west, raster.north, 0.0][..])?;
+    if !keys.shorts.is_empty() {
+        directory.write_tag(Tag::GeoKeyDirectoryTag, &keys.directory()[..])?;
+    }
+    if !keys.doubles.is_empty() {
+        let doubles: Vec<f64> = keys.doubles.iter().map(|(_, value)| *value).collect();
+        directory.write_tag(Tag::GeoDoubleParamsTag, &doubles[..])?;
+    }
+    directory.finish()?;
+    Ok(file.into_inner())
+}
+
+/// The colours of the labels: all reds, then all greens, then all blues, in 16 bits each.
+fn colour_map() -> Vec<u16> {
+    let colours: Vec<[u8; 3]> = (0..=u8::MAX).map(scenecast_core::palette::colour).collect();
+    (0..3).flat_map(|channel| colours.iter().map(move |colour| u16::from(colour[channel]) * 257)).collect()
+}
+
+fn deflate(bytes: &[u8]) -> std::io::Result<Vec<u8>> {
+    let mut encoder = ZlibEncoder::new(Vec::new(), Compression::default());
+    encoder.write_all(bytes)?;
+    encoder.finish()
+}
