@@ -22,6 +22,7 @@ ORDERS = {
     "set_fence": {"fence": [[-500, -500], [500, -500], [500, 500], [-500, 500]], "keep_outs": [], "return_point": [0, 0]},
     "set_limits": {"depth_m": [0, 500], "on_silence": "hold"},
     "set_settings": {"planner": "greedy", "gamma": 1e-5, "cells": "coarse-to-fine", "layers": "depth", "alpha": 0},
+    "change_command": {"action": "take"},
     "set_budget": {"budget_bps": 9000, "shares": {"directive": 10, "status": 5, "fix": 5, "map": 50, "exemplar": 20}},
 }
 

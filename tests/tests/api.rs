@@ -2,6 +2,7 @@
 
 use scenecast_tests::{Process, assert_refused, free_port, http, python, run, run_script, scratch, state, wait_until};
 use serde_json::Value;
+use std::path::Path;
 use std::process::Output;
 use std::time::Duration;
 
@@ -219,11 +220,119 @@ fn other_machines_need_a_token() {
     assert!(cookie.contains("HttpOnly") && cookie.contains("SameSite=Strict"), "{cookie}");
     assert!(!cookie.contains(&token), "the cookie is not the token");
     let session = cookie.split(';').next().unwrap();
-    assert_eq!(status("/", &format!("Cookie: {session}\r\n")), 200);
+    let cookie = format!("Cookie: {session}\r\n");
+    assert_eq!(status("/", &cookie), 200);
+    let logout = http(port, "POST", "/logout", &format!("{cookie}X-Scenecast: 1\r\n"), "").unwrap();
+    assert_eq!((logout.0, status("/", &cookie)), (303, 303), "the session has ended");
     let url = format!("http://127.0.0.1:{port}");
     assert_eq!(run(&["ctl", "status", "--url", &url, "--token-file", file]).status.code(), Some(0));
     let without = run(&["ctl", "status", "--url", &url]);
     assert!(without.status.code() == Some(1) && text(&without).contains("--token-file"), "{}", text(&without));
+}
+
+/// A surface whose tokens are `ROLE NAME` each, with the headers of each principal in the same order.
+fn surface_with_tokens(dir: &Path, principals: &[&str]) -> (Process, u16, Vec<String>) {
+    let tokens: Vec<String> = (0..principals.len()).map(|i| format!("{i:032}")).collect();
+    let lines: String = principals.iter().zip(&tokens).map(|(p, token)| format!("{p} {token}\n")).collect();
+    std::fs::write(dir.join("console.tokens"), lines).unwrap();
+    for (principal, token) in principals.iter().zip(&tokens) {
+        let name = principal.rsplit(' ').next().unwrap();
+        std::fs::write(dir.join(format!("{name}.token")), format!("{principal} {token}\n")).unwrap();
+    }
+    let config = scenecast_tests::workspace().join("config/asv.toml");
+    let (port, modem) = (free_port(), free_port());
+    let sets = [
+        format!("console.listen=127.0.0.1:{port}"),
+        format!("console.token_file={}", dir.join("console.tokens").display()),
+        format!("modem.listen=127.0.0.1:{modem}"),
+        format!("runtime.state_dir=\"{}\"", dir.join("asv").display()),
+    ];
+    let mut arguments = vec!["asv", "--config", config.to_str().unwrap()];
+    arguments.extend(sets.iter().flat_map(|s| ["--set", s]));
+    let surface = Process::start(&arguments);
+    wait_until("the form is served", LIMIT, || http(port, "GET", "/login", "", "").is_some_and(|(s, _)| s == 200));
+    let headers = tokens
+        .iter()
+        .map(|t| format!("Authorization: Bearer {t}\r\nX-Scenecast: 1\r\nContent-Type: application/json\r\n"));
+    (surface, port, headers.collect())
+}
+
+#[test]
+fn a_viewer_changes_nothing_by_any_documented_method() {
+    let dir = scratch("roles");
+    let principals = ["viewer victor", "operator anna", "administrator carla"];
+    let (_surface, port, headers) = surface_with_tokens(&dir, &principals);
+    let ask = |who: usize, method: &str, path: &str, body: &str| http(port, method, path, &headers[who], body).unwrap();
+    let document: Value = serde_json::from_slice(&ask(0, "GET", "/api/openapi.json", "").1).unwrap();
+    let mut refused = Vec::new();
+    for (path, methods) in document["paths"].as_object().unwrap() {
+        let path = path.replace("{id}", "1").replace("{file}", "1.webp");
+        for (method, operation) in methods.as_object().unwrap().iter().filter(|(method, _)| *method != "get") {
+            if ["/login", "/logout"].contains(&&*path) {
+                assert!(operation["x-role"].is_null());
+                continue;
+            }
+            for body in ["", "{}", "{\"hold\": true}", "{\"action\": \"take\"}"] {
+                let (status, line) = ask(0, &method.to_uppercase(), &path, body);
+                let line = String::from_utf8_lossy(&line).into_owned();
+                assert!(status == 403 && line.contains("the role of victor is viewer"), "{path}: {status} {line}");
+            }
+            let role = operation["x-role"].as_str().unwrap();
+            assert_eq!(role == "administrator", ask(1, &method.to_uppercase(), &path, "[]").0 == 403, "{path}");
+            refused.push(path.clone());
+        }
+    }
+    assert!(refused.len() >= 8, "{refused:?}");
+    let holder = |who| {
+        let (status, state) = ask(who, "GET", "/api/v2/state", "");
+        assert_eq!(status, 200);
+        serde_json::from_slice::<Value>(&state).unwrap()["command"]["holder"].clone()
+    };
+    assert_eq!(holder(0), Value::Null);
+    let me: Value = serde_json::from_slice(&ask(0, "GET", "/api/v2/principal", "").1).unwrap();
+    assert_eq!((&me["name"], &me["role"]), (&"victor".into(), &"viewer".into()));
+}
+
+#[test]
+fn command_passes_from_one_operator_to_another_in_a_shell() {
+    let dir = scratch("command");
+    let (_surface, port, headers) = surface_with_tokens(&dir, &["operator anna", "operator bob", "viewer victor"]);
+    let url = format!("http://127.0.0.1:{port}");
+    let as_one = |name: &str, arguments: &[&str]| {
+        let file = dir.join(format!("{name}.token")).display().to_string();
+        run(&[&["ctl", "--url", &url, "--token-file", &file], arguments].concat())
+    };
+    let ok = |name: &str, arguments: &[&str]| {
+        let output = as_one(name, arguments);
+        assert_eq!(output.status.code(), Some(0), "{name} {arguments:?}: {}", text(&output));
+        text(&output)
+    };
+    let refused = |name: &str, arguments: &[&str], words: &[&str]| {
+        let output = as_one(name, arguments);
+        let line = text(&output);
+        assert!(output.status.code() == Some(1) && words.iter().all(|w| line.contains(w)), "{name}: {line}");
+    };
+    wait_until("the first state", LIMIT, || as_one("anna", &["status"]).status.success());
+    assert!(ok("bob", &["command"]).contains("nobody has it"));
+    ok("anna", &["budget", "set", "900"]);
+    assert!(ok("bob", &["command"]).contains("anna for"), "the first order took command");
+    refused("bob", &["budget", "set", "800"], &["anna has command for", "request it", "take it after"]);
+    refused("bob", &["command", "take"], &["anna has command for"]);
+    refused("victor", &["command", "request"], &["needs the role operator", "the role of victor is viewer"]);
+    ok("bob", &["hold"]);
+    let abort = r#"{"hold": false, "abort": true}"#;
+    assert_eq!(http(port, "POST", "/api/v2/vehicles/1/constraints", &headers[1], abort).unwrap().0, 202);
+    let resume = http(port, "POST", "/api/v2/vehicles/1/constraints", &headers[1], r#"{"hold": false}"#).unwrap();
+    assert_eq!(resume.0, 409, "a resume needs command");
+    ok("bob", &["command", "request"]);
+    refused("anna", &["command", "hand-over", "victor"], &["the role of victor is viewer"]);
+    refused("anna", &["command", "hand-over", "dora"], &["dora is not a principal"]);
+    assert!(ok("anna", &["command", "hand-over"]).contains("bob has command"));
+    ok("bob", &["budget", "set", "800"]);
+    let history = ok("anna", &["command"]);
+    assert!(history.contains("anna handed command over to bob"), "{history}");
+    ok("bob", &["command", "release"]);
+    ok("anna", &["budget", "set", "700"]);
 }
 
 #[test]

@@ -362,12 +362,13 @@ fn purpose(file: &Path) -> String {
 fn http_reference(document: &Value) -> String {
     let line =
         |v: &Value| v.as_str().unwrap_or_default().split_whitespace().collect::<Vec<_>>().join(" ").replace('|', "\\|");
-    let mut text = String::from("| method | path | body | purpose |\n|---|---|---|---|\n");
+    let mut text = String::from("| method | path | role | body | purpose |\n|---|---|---|---|---|\n");
     for (path, methods) in document["paths"].as_object().expect("there are paths") {
         for (method, operation) in methods.as_object().expect("there are methods") {
             let schema = &operation["requestBody"]["content"]["application/json"]["schema"];
             let (method, summary) = (method.to_uppercase(), line(&operation["summary"]));
-            let _ = writeln!(text, "| {method} | `{path}` | {} | {summary} |", type_of(schema));
+            let (role, body) = (line(&operation["x-role"]), type_of(schema));
+            let _ = writeln!(text, "| {method} | `{path}` | {role} | {body} | {summary} |");
         }
     }
     for (name, schema) in document["components"]["schemas"].as_object().expect("there are schemas") {

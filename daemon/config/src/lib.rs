@@ -38,4 +38,4 @@ pub use setting::{
     Authenticate, AutopilotKind, BirthRule, CameraSource, GpsPort, HostPort, LayerName, MapCells, MapStream, ModemKind,
     OperatorScript, S2cMode,
 };
-pub use token_file::{load_token, read_token};
+pub use token_file::{TokenGrant, load_tokens, read_token, read_tokens};

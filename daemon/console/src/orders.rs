@@ -135,3 +135,32 @@ pub struct NoteOrder {
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct DismissOrder {}
+
+/// Requests command, hands it over, takes it or gives it up.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct CommandOrder {
+    /// The change.
+    pub action: CommandOrderAction,
+    /// For `hand_over`: the name of the principal; by default the one whose request is the oldest.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub to: Option<String>,
+}
+
+/// A change of command.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum CommandOrderAction {
+    /// Asks the holder for command, for 120 s; takes it if nobody has it.
+    Request,
+    /// Withdraws the request.
+    Withdraw,
+    /// Takes command if nobody has it, or its holder was silent for 120 s.
+    Take,
+    /// Hands command over to `to`.
+    HandOver,
+    /// Gives command up; the next order takes it.
+    Release,
+    /// A sign that the holder is present; ignored from others.
+    Keep,
+}

@@ -4,14 +4,25 @@ use crate::export::MapCells;
 use crate::fit::{self, Fit};
 use crate::layers;
 use crate::orders::{BudgetOrder, ExemplarAction, ExemplarOrder, LabelOrder, NoteOrder};
-use crate::state::{AcceptedOrder, ArchivedMap};
+use crate::snapshot::command_state;
+use crate::state::{AcceptedOrder, ArchivedMap, CommandState};
 use scenecast_protocol::directive::{Constraints, SlotId};
 use scenecast_protocol::schedule::{BackgroundOrder, Shares};
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::Address;
 use scenecast_surface::record::{StoredLabel, VehicleMemory};
-use scenecast_surface::{FenceOrder, LimitsOrder, RequestKind, SettingsOrder, Surface};
+use scenecast_surface::{
+    CommandAction, CommandRefusal, FenceOrder, LimitsOrder, OrderKind, Principal, RequestKind, SettingsOrder, Surface,
+};
 use std::collections::BTreeMap;
+
+/// A request and the principal who makes it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ClientRequest {
+    /// `None` is enough for a reading only.
+    pub principal: Option<Principal>,
+    pub request: SurfaceRequest,
+}
 
 /// A reading or an order. The first number is the address of the vehicle.
 #[derive(Debug, Clone, PartialEq)]
@@ -34,13 +45,35 @@ pub enum SurfaceRequest {
     Budget(BudgetOrder),
     /// Name a label.
     Label(u8, LabelOrder),
-    Note(u8, NoteOrder),
+    /// Add a note of the person or program with this name.
+    Note(u8, String, NoteOrder),
     /// Take the earlier map out of view.
     DismissEarlierMap(u8),
     /// List the archived maps. The owner of the files handles this request and the next one.
     Archives,
     /// Read an archived map by its name.
     ArchivedMap(String),
+    /// Request command, hand it over, take it or give it up.
+    Command(CommandAction),
+}
+
+impl SurfaceRequest {
+    /// The kind of an order; `None` for readings, and for changes of command, which have rules of their own.
+    fn order_kind(&self) -> Option<OrderKind> {
+        match self {
+            Self::Map(_) | Self::Exemplar(..) | Self::Fit(..) | Self::Command(_) => None,
+            Self::Archives | Self::ArchivedMap(_) => None,
+            Self::Label(..) | Self::Note(..) | Self::DismissEarlierMap(_) => Some(OrderKind::Record),
+            Self::Constraints(_, order) if order.hold || order.abort => Some(OrderKind::Stop),
+            Self::Utility(..)
+            | Self::ExemplarOrder(..)
+            | Self::Constraints(..)
+            | Self::Fence(..)
+            | Self::Limits(..)
+            | Self::Budget(_) => Some(OrderKind::Order),
+            Self::Settings(..) => Some(OrderKind::Settings),
+        }
+    }
 }
 
 /// The reply of the surface.
@@ -57,6 +90,12 @@ pub enum Reply {
     /// The surface has done what was requested.
     Done,
     Archives(Vec<ArchivedMap>),
+    /// Who has command after a change.
+    Command(CommandState),
+    /// The role of the principal does not allow it: the reason in one line.
+    Forbidden(String),
+    /// Another principal has command: the reason and the remedy in one line.
+    NotInCommand(String),
     /// There is no such vehicle, label or image.
     NotFound,
     /// The order is not allowed: the reason in one line.
@@ -64,7 +103,40 @@ pub enum Reply {
 }
 
 /// Handles a request between two steps of the surface.
-pub fn handle_request(surface: &mut Surface, request: SurfaceRequest, cell_m: f64, now: Instant) -> Reply {
+pub fn handle_request(surface: &mut Surface, request: ClientRequest, cell_m: f64, now: Instant) -> Reply {
+    let ClientRequest { principal, request } = request;
+    let Some(by) = principal else {
+        let is_reading = request.order_kind().is_none() && !matches!(request, SurfaceRequest::Command(_));
+        let anonymous = || Reply::Forbidden("an order needs a principal".to_owned());
+        return if is_reading { reply(surface, request, cell_m, now) } else { anonymous() };
+    };
+    if let SurfaceRequest::Command(action) = &request {
+        return match surface.change_command(&by, action, now) {
+            Ok(()) => Reply::Command(command_state(surface.command(), now)),
+            Err(refusal) => refused(&refusal),
+        };
+    }
+    let Some(kind) = request.order_kind() else { return reply(surface, request, cell_m, now) };
+    if let Err(refusal) = surface.command().check(&by, kind, now) {
+        return refused(&refusal);
+    }
+    let reply = reply(surface, request, cell_m, now);
+    if matches!(reply, Reply::Accepted(_)) {
+        surface.handle_accepted(&by, kind, now);
+    }
+    reply
+}
+
+fn refused(refusal: &CommandRefusal) -> Reply {
+    let line = refusal.to_string();
+    match refusal {
+        CommandRefusal::Role { .. } => Reply::Forbidden(line),
+        CommandRefusal::Held { .. } => Reply::NotInCommand(line),
+        _ => Reply::Refused(line),
+    }
+}
+
+fn reply(surface: &mut Surface, request: SurfaceRequest, cell_m: f64, now: Instant) -> Reply {
     handle(surface, request, cell_m, now).unwrap_or(Reply::NotFound)
 }
 
@@ -109,10 +181,12 @@ fn handle(surface: &mut Surface, request: SurfaceRequest, cell_m: f64, now: Inst
             let book = StoredLabel { name, colour, merged_into };
             done(surface.set_label(known(surface, id)?, label, book))
         }
-        SurfaceRequest::Note(id, order) => done(surface.add_note(known(surface, id)?, "operator", &order.text, now)),
+        SurfaceRequest::Note(id, by, order) => done(surface.add_note(known(surface, id)?, &by, &order.text, now)),
         SurfaceRequest::DismissEarlierMap(id) => done(surface.dismiss_earlier_map(known(surface, id)?)),
         SurfaceRequest::Archives => Reply::Archives(Vec::new()),
         SurfaceRequest::ArchivedMap(_) => return None,
+        // Handled with its principal, before.
+        SurfaceRequest::Command(_) => return None,
     })
 }
 

@@ -1,11 +1,16 @@
 //! The types of the API's replies, from which the OpenAPI document is made.
 
+mod command;
 mod labels;
 mod link;
 mod map;
 mod storage;
 mod vehicle;
 
+pub use command::{
+    CommandChangeName, CommandChangeState, CommandHolderState, CommandRequestState, CommandState, PrincipalInfo,
+    PrincipalRole,
+};
 pub use labels::{ExemplarImage, ExemplarProgress, ExemplarStage, MapLabel};
 pub use link::{ChannelQuality, LinkDirection, LinkRates, LinkSummary, ReportedBacklog, VehicleChannel};
 pub use map::{EarlierMap, LayerBody, MapBody, MapEvent, MapIndex, MapPlacement, MapSummary, TileLayer};
@@ -33,6 +38,9 @@ pub struct MissionState {
     pub position: Option<SurfacePosition>,
     /// The link to all vehicles together.
     pub link: LinkSummary,
+    /// Who has command, who requests it, and its last changes.
+    #[serde(default)]
+    pub command: CommandState,
     /// The layers that an operator can name in settings and in the order of the background streams.
     #[serde(default)]
     pub layers: Vec<LayerInfo>,

@@ -11,15 +11,15 @@ use super::store::SurfaceFiles;
 use crate::port::FromPort;
 use scenecast_config::Config;
 use scenecast_console::{
-    Console, LinkMeter, MissionFacts, PendingRequest, Reply, SurfaceRequest, archived_cells, bind, handle_request,
-    measured_origin, snapshot, start,
+    ClientRequest, Console, LinkMeter, MissionFacts, PendingRequest, Reply, SurfaceRequest, archived_cells, bind,
+    handle_request, measured_origin, snapshot, start,
 };
 use scenecast_core::UserError;
 use scenecast_core::world_file;
 use scenecast_host::{Follower, FrameEvent, SurfaceHost, SurfaceHostEvent, modem_station};
 use scenecast_protocol::wire::Address;
-use scenecast_surface::SurfaceOutput;
 use scenecast_surface::position::Follow;
+use scenecast_surface::{CommandChange, SurfaceOutput};
 use std::sync::Arc;
 use std::time::Duration;
 use tokio::sync::oneshot;
@@ -28,18 +28,18 @@ use tokio::sync::oneshot;
 const PUBLISH_INTERVAL: Duration = Duration::from_secs(1);
 /// Time after which changes that were not committed yet are looked at again.
 const CATCH_UP_INTERVAL: Duration = Duration::from_millis(100);
-/// The principal whose name is not known.
-const OPERATOR: &str = "operator";
 
 /// Runs the surface until it is interrupted.
 pub fn run_surface(config: Config, simulated: Option<SimulatedAutopilot>) -> Result<(), UserError> {
     super::block_on(async move {
         let stop = Stop::new()?;
+        let mut principals = Vec::new();
         let listener = match &config.console.listen {
             None => None,
             Some(address) => {
-                let token = scenecast_config::load_token(&config)?;
-                Some(bind(address.as_str(), "console.listen", token, &config.console.host).await?)
+                let tokens = scenecast_config::load_tokens(&config)?;
+                principals.extend(tokens.iter().map(|t| t.principal.clone()));
+                Some(bind(address.as_str(), "console.listen", tokens, &config.console.host).await?)
             }
         };
         let was_there = config.runtime.state_dir.exists();
@@ -54,6 +54,7 @@ pub fn run_surface(config: Config, simulated: Option<SimulatedAutopilot>) -> Res
             super::random_bits(),
             clock.now(),
         )?;
+        surface.set_principals(principals);
         if let Some(relay) = relay(&config) {
             surface.set_relay(relay);
         }
@@ -154,10 +155,11 @@ impl SurfaceShell {
     }
 
     /// Handles a request. Its effects are durable before the reply, and before anything is transmitted.
-    fn handle_request(&mut self, request: SurfaceRequest, reply: oneshot::Sender<Reply>) {
+    fn handle_request(&mut self, request: ClientRequest, reply: oneshot::Sender<Reply>) {
         let now = self.clock.now();
         self.files.commit(self.host.surface_mut(), None, now);
-        let answer = match &request {
+        let by = request.principal.as_ref().map(|principal| principal.name().to_owned());
+        let answer = match &request.request {
             SurfaceRequest::Archives => Reply::Archives(self.files.archives(now)),
             SurfaceRequest::ArchivedMap(name) => match self.files.store.archived(name) {
                 Some(map) => Reply::Map(archived_cells(&map, self.facts.cell_m)),
@@ -165,7 +167,7 @@ impl SurfaceShell {
             },
             _ => handle_request(self.host.surface_mut(), request, self.facts.cell_m, now),
         };
-        self.files.commit(self.host.surface_mut(), Some(OPERATOR), now);
+        self.files.commit(self.host.surface_mut(), by.as_deref(), now);
         self.is_stale = true;
         // A browser that closed its connection needs no reply.
         let _ = reply.send(answer);
@@ -228,6 +230,7 @@ impl SurfaceShell {
             SurfaceOutput::ExemplarHere(vehicle, label) => {
                 tracing::info!("an image of label {label} of vehicle {} is here", vehicle.number());
             }
+            SurfaceOutput::CommandChanged(change) => log_command(&change),
             SurfaceOutput::SlotDecided(..) | SurfaceOutput::Changed(_) => {}
         }
     }
@@ -249,7 +252,7 @@ impl SurfaceShell {
 
     fn write_map(&mut self, vehicle: Address) {
         let (now, cell_m) = (self.clock.now(), self.facts.cell_m);
-        let request = SurfaceRequest::Map(vehicle.number());
+        let request = ClientRequest { principal: None, request: SurfaceRequest::Map(vehicle.number()) };
         let Reply::Map(mut cells) = handle_request(self.host.surface_mut(), request, cell_m, now) else { return };
         let surface = self.host.surface();
         let earlier = surface.record(vehicle).and_then(|record| record.earlier_map());
@@ -261,6 +264,12 @@ impl SurfaceShell {
         cells.moved_m = placement.map_or((0.0, 0.0), |p| (p.origin.east_m, p.origin.north_m));
         self.maps.write(vehicle.number(), MapFile { cells, world_file, origin });
     }
+}
+
+fn log_command(change: &CommandChange) {
+    let CommandChange { by, from, to, kind, .. } = change;
+    let [from, to] = [from, to].map(|name| name.as_deref().unwrap_or("nobody"));
+    tracing::info!("command {kind:?} by {by}: before {from}, now {to}");
 }
 
 async fn next_request(console: &mut Option<Console>) -> PendingRequest {

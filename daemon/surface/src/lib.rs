@@ -2,6 +2,9 @@
 
 mod annotations;
 mod assemble;
+mod command;
+#[cfg(test)]
+mod command_tests;
 mod exemplar_cache;
 mod orders;
 mod pauses;
@@ -14,8 +17,13 @@ mod vehicle_record;
 
 pub use annotations::Annotations;
 pub use assemble::assemble;
+pub use command::{
+    COMMAND_SILENCE, Command, CommandAction, CommandChange, CommandChangeKind, CommandHolder, CommandRefusal,
+    CommandRequest, OrderKind,
+};
 pub use exemplar_cache::{ExemplarCache, LabelExemplars, OpenRequest, RequestKind, RequestState, StoredExemplar};
 pub use orders::{FenceOrder, LimitsOrder, MAX_DISTANCE_M};
+pub use scenecast_core::{Principal, Role};
 pub use settings::{SettingsOrder, SettingsRecord};
 pub use surface::{Surface, SurfaceOutput};
 pub use vehicle_record::{EarlierView, SentOrder, Track, VehicleRecord, WholeMaps};

@@ -1,12 +1,13 @@
 //! The surface's role: the link and the operator's data in one state machine without IO.
 
+use super::command::{Command, CommandAction, CommandChange, CommandRefusal, OrderKind};
 use super::orders::{FenceOrder, LimitsOrder};
 use super::position::{Relay, UsblSighting};
 use super::settings::SettingsOrder;
 use super::vehicle_record::{VehicleRecord, WholeMaps};
-use scenecast_core::UsblLine;
 use scenecast_core::label_picture;
 use scenecast_core::tuning_table::{Fit, NoRow, TuningTable};
+use scenecast_core::{Principal, UsblLine};
 use scenecast_protocol::directive::{Budget, Constraints, Fix, OrderStatus, Slot, SlotId, Utility};
 use scenecast_protocol::exemplar::Exemplar;
 use scenecast_protocol::link::{Cycle, PeerView, SurfaceEvent, SurfaceLink, Transmit, Wakeup};
@@ -28,6 +29,8 @@ pub enum SurfaceOutput {
     ExemplarHere(Address, u8),
     /// A slot was applied or refused.
     SlotDecided(Address, SlotId),
+    /// Command was requested, handed over, taken or released.
+    CommandChanged(CommandChange),
     /// Any other fact on the operator's page has changed.
     Changed(Address),
 }
@@ -40,6 +43,7 @@ pub struct Surface {
     /// The localisation relay, if the surface has a GPS.
     relay: Option<Relay>,
     tuning: TuningTable,
+    command: Command,
 }
 
 impl Surface {
@@ -47,13 +51,41 @@ impl Surface {
     pub fn new(link: SurfaceLink, vehicles: impl IntoIterator<Item = (Address, String)>) -> Self {
         let records = vehicles.into_iter().map(|(address, name)| (address, VehicleRecord::new(name))).collect();
         let (tuning, background) = (TuningTable::default(), BackgroundOrder::default());
-        Self { link, records, outputs: VecDeque::new(), background, relay: None, tuning }
+        Self { link, records, outputs: VecDeque::new(), background, relay: None, tuning, command: Command::default() }
     }
 
     /// Sets the tuning table, which predicts the bit rate of settings of the scene model.
     #[must_use]
     pub fn with_tuning_table(self, tuning: TuningTable) -> Self {
         Self { tuning, ..self }
+    }
+
+    /// Sets the principals that command can be handed over to. Nobody has it.
+    pub fn set_principals(&mut self, principals: impl IntoIterator<Item = Principal>) {
+        self.command = Command::new(principals);
+    }
+
+    /// Who has command.
+    pub fn command(&self) -> &Command {
+        &self.command
+    }
+
+    /// An order that the principal was allowed to give was accepted.
+    pub fn handle_accepted(&mut self, by: &Principal, kind: OrderKind, now: Instant) {
+        let change = self.command.handle_order(by, kind, now);
+        self.outputs.extend(change.map(SurfaceOutput::CommandChanged));
+    }
+
+    /// Requests command, hands it over, takes it or gives it up.
+    pub fn change_command(
+        &mut self,
+        by: &Principal,
+        action: &CommandAction,
+        now: Instant,
+    ) -> Result<(), CommandRefusal> {
+        let change = self.command.handle_action(by, action, now)?;
+        self.outputs.extend(change.map(SurfaceOutput::CommandChanged));
+        Ok(())
     }
 
     /// The name of a vehicle that the configuration does not name.

@@ -1,5 +1,6 @@
 // The whole synthetic mission: vehicles, the surface's turns, budget and the state document.
 
+import { Command } from "./command.mjs";
 import { LAYERS, Vehicle } from "./vehicle.mjs";
 import { Direction } from "./link.mjs";
 
@@ -26,6 +27,7 @@ export class Mission {
     this.background = ["finer", "depth", "exemplars", "confidence"];
     this.layers = false;
     this.ended = false;
+    this.command = new Command();
     this.down = new Direction(7);
     this.history = [];
     this.nextDownS = 2;
@@ -103,6 +105,7 @@ export class Mission {
       vehicles: this.vehicles.map((v) => v.json(this.nowS)),
       position: this.position ?? null,
       storage: this.storage ?? null,
+      command: this.command.json(),
       layers: LAYERS.map(({ name, unit }) => ({ name, unit, summary: `what ${name} means` })),
       link: {
         budget_bps: this.budgetBps, shares: this.shares, background: this.background, budget_window_s: 10,

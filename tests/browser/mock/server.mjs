@@ -7,7 +7,8 @@
 // POST /mock controls it in tests:
 //   {"scenario": "rich", "advance": 60, "times": 3, "speed": 20, "silent": true, "refuse": "utility",
 //    "loss": 0.3, "layers": true, "coarse": true, "position": {"x_m": 5, ..},
-//    "placement": {"version": 1, "east_m": 20, "north_m": -5}, "ended": true, "stream": false, "mute": true, "down": true}
+//    "placement": {"version": 1, "east_m": 20, "north_m": -5}, "ended": true,
+//    "principals": [{"name": "anna", "role": "operator"}], "commander": "anna", "stream": false, "mute": true, "down": true}
 
 import http from "node:http";
 import { readFile } from "node:fs/promises";
@@ -82,6 +83,7 @@ function subscribe(mock, res) {
 async function api(mock, req, res, path) {
   const { mission } = mock;
   if (req.method === "POST") return post(mock, req, res, path);
+  if (path === "principal") return reply(res, 200, mission.command.principal(req.headers.cookie));
   if (path === "state") return reply(res, 200, mission.json());
   if (path === "archive") return reply(res, 200, { maps: mission.archive ?? [] });
   const [, id, resource] = path.match(/^vehicles\/(\d+)\/(.+)$/) ?? [];
@@ -107,6 +109,17 @@ async function post(mock, req, res, path) {
   if (req.headers["x-scenecast"] !== "1") return reply(res, 403, { error: "header X-Scenecast is missing" });
   const { mission } = mock;
   const given = await body(req);
+  const by = mission.command.principal(req.headers.cookie);
+  if (path === "command") {
+    const refused = mission.command.act(by, given, mission.nowS);
+    reply(res, refused?.[0] ?? 200, refused ? { error: refused[1] } : mission.command.json());
+    return emit(mock, "state", mission.json());
+  }
+  const isRecord = /\/(labels|notes|dismiss)$/.test(path);
+  const kind = path.endsWith("/settings") ? "settings" : given.hold || given.abort ? "stop" : "order";
+  const refused = isRecord ? null : mission.command.refusal(by, kind);
+  if (refused) return reply(res, refused[0], { error: refused[1] });
+  if (!isRecord) mission.command.order(by, kind, mission.nowS);
   if (path === "budget") {
     const bps = given.budget_bps;
     if (!Number.isInteger(bps) || bps < 100 || bps > 100000) {
@@ -179,6 +192,8 @@ function steer(mock, order, res) {
   if ("coarse" in order) mission.vehicles[0].coarse = order.coarse;
   if ("silent" in order) mission.vehicles[0].silent = order.silent;
   if (order.refuse) mission.vehicles[0].directive.refuseNext.add(order.refuse);
+  if (order.principals) mission.command.principals = order.principals;
+  if (order.commander) mission.command.order(order.principals.find((p) => p.name === order.commander), "order", mission.nowS);
   if ("down" in order) mock.down = order.down;
   if ("mute" in order) mock.mute = order.mute;
   if ("stream" in order) mock.stream = order.stream;

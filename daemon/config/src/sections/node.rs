@@ -43,8 +43,9 @@ section! {
     console: Console {
         /// Address and port of the page. Empty: no page.
         listen: Option<HostPort> = HostPort::parse("127.0.0.1:8460"), ANY, [Asv];
-        /// File of the token that the page and scripts must present (scenecast key token). It is required for every
-        /// listen address except loopback addresses.
+        /// File of the tokens that the page and scripts must present (scenecast key token): lines of role, name and token,
+        /// the role being viewer, operator or administrator; or a single token, for administrators. It is required for
+        /// every listen address except loopback addresses.
         token_file: Option<PathBuf> = None, ANY, [Asv];
         /// Host name under which other machines open the page. Empty: they use the address.
         host: String = String::new(), ANY, [Asv];

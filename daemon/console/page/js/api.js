@@ -55,6 +55,11 @@ export const readFit = (id, bps) => read(`/vehicles/${id}/fit${bps === null ? ""
 export const sendBudget = (bps, shares = null, background = null) =>
   write("/budget", { budget_bps: bps, ...(shares && { shares }), ...(background && { background }) });
 
+export const readPrincipal = () => read("/principal");
+/** `action`: request, withdraw, take, hand_over (to `to`), release or keep. */
+export const sendCommand = (action, to = null) => write("/command", { action, ...(to && { to }) });
+export const logOut = () => fetch("/logout", { method: "POST", headers: { "x-scenecast": "1" }, redirect: "manual" });
+
 /** Opens the login form if the surface requires a token and our session is not valid. */
 export async function logInIfRequired() {
   const response = await fetch(`${BASE}/state`, { cache: "no-store", signal: AbortSignal.timeout(TIMEOUT_MS) }).catch(() => null);

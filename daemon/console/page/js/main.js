@@ -1,10 +1,12 @@
 // Starts the page. Every part listens to the store, and the feed fills it.
 
 import { startCloud } from "./cloud/cloud.js";
+import { startPrincipal } from "./command.js";
 import { startFeed } from "./feed.js";
 import { startChart } from "./map/chart.js";
 import { startBanners } from "./panel/banners.js";
 import { startBar } from "./panel/bar.js";
+import { startCommand } from "./panel/command.js";
 import { startConstraints } from "./panel/constraints.js";
 import { startKeys } from "./panel/keys.js";
 import { startLabels } from "./panel/labels.js";
@@ -17,7 +19,9 @@ import { store } from "./store.js";
 import { onTheme, startTheme } from "./theme.js";
 
 startTheme();
+startPrincipal();
 startBar();
+startCommand();
 startBanners();
 startTabs();
 startConstraints();

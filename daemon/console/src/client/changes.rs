@@ -11,7 +11,7 @@ pub(super) struct StateChange {
     pub(super) t_s: f64,
     /// The address of the vehicle; null for the surface.
     pub(super) vehicle: Option<u8>,
-    /// mission, vehicle, mode, silence, map, label, directive, exemplar or budget.
+    /// mission, command, vehicle, mode, silence, map, label, directive, exemplar or budget.
     pub(super) kind: &'static str,
     /// One line for people.
     pub(super) text: String,
@@ -50,6 +50,9 @@ pub(super) fn changes(before: &MissionState, after: &MissionState) -> Vec<StateC
     }
     if before.link.background != after.link.background {
         add(None, "budget", format!("the background streams are {}", text::background(&after.link)));
+    }
+    for change in after.command.history.iter().filter(|c| !before.command.history.contains(c)) {
+        add(None, "command", text::command_change(change));
     }
     for new in &after.vehicles {
         match before.vehicles.iter().find(|v| v.id == new.id) {
@@ -112,6 +115,7 @@ fn of_labels(old: &VehicleState, new: &VehicleState, add: &mut dyn FnMut(&'stati
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::state::{CommandChangeName, CommandChangeState};
 
     #[test]
     fn only_differences_are_changes() {
@@ -120,7 +124,15 @@ mod tests {
         assert_eq!(changes(&before, &after), []);
         after.link.budget_bps = 700;
         after.mission.ended = true;
+        after.command.history.push(CommandChangeState {
+            at_s: 6.0,
+            kind: CommandChangeName::HandedOver,
+            by: "anna".to_owned(),
+            from: Some("anna".to_owned()),
+            to: Some("bob".to_owned()),
+        });
         let lines: Vec<String> = changes(&before, &after).iter().map(StateChange::line).collect();
-        assert_eq!(lines, ["       6 s  the survey has ended", "       6 s  the budget is 700 bit/s"]);
+        let expected = ["the survey has ended", "the budget is 700 bit/s", "anna handed command over to bob"];
+        assert_eq!(lines, expected.map(|line| format!("       6 s  {line}")));
     }
 }

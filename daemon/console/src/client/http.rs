@@ -1,6 +1,6 @@
 //! Requests over HTTP.
 
-use crate::state::{AcceptedOrder, ErrorBody, MissionState};
+use crate::state::{ErrorBody, MissionState};
 use axum::body::Bytes;
 use http_body_util::{BodyExt, Full, Limited};
 use hyper::body::Incoming;
@@ -8,6 +8,7 @@ use hyper::{Method, Request, Response, StatusCode, Uri, header};
 use hyper_util::rt::TokioIo;
 use scenecast_core::UserError;
 use serde::Serialize;
+use serde::de::DeserializeOwned;
 use std::time::Duration;
 use tokio::net::TcpStream;
 use zeroize::Zeroizing;
@@ -50,7 +51,8 @@ impl Client {
         Ok((self.body(response).await?, tag))
     }
 
-    pub(super) async fn post(&self, path: &str, order: &impl Serialize) -> Result<AcceptedOrder, UserError> {
+    /// Sends an order and reads its receipt.
+    pub(super) async fn post<T: DeserializeOwned>(&self, path: &str, order: &impl Serialize) -> Result<T, UserError> {
         let body = serde_json::to_vec(order).map_err(|e| UserError::Failed(e.to_string()))?;
         let response = self.send(Method::POST, path, body.into()).await?;
         serde_json::from_slice(&self.body(response).await?).map_err(|e| self.unreadable(&e))

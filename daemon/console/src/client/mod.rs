@@ -1,6 +1,7 @@
 //! The client behind `scenecast ctl`: it reads the state, writes files, and gives orders.
 
 mod changes;
+mod command;
 mod constraints;
 mod download;
 mod follow;
@@ -12,6 +13,7 @@ mod settings;
 mod text;
 mod watch;
 
+pub use command::{change_command, show_command};
 pub use constraints::{
     FenceFile, clear_fence, send_constraints, set_fence, set_limits, set_return_point, show_fence, show_limits,
 };

@@ -1,8 +1,8 @@
 //! The state as text.
 
 use crate::state::{
-    ExemplarProgress, ExemplarStage, LinkSummary, MissionState, OrderProgress, OrderStatus, ReportedBacklog,
-    ReportedMode, StatusReport, VehicleState,
+    CommandChangeName, CommandChangeState, CommandState, ExemplarProgress, ExemplarStage, LinkSummary, MissionState,
+    OrderProgress, OrderStatus, PrincipalRole, ReportedBacklog, ReportedMode, StatusReport, VehicleState,
 };
 use std::fmt::Write;
 
@@ -11,6 +11,7 @@ pub(super) fn status(state: &MissionState, only: Option<u8>) -> String {
     let (mission, link) = (&state.mission, &state.link);
     let ended = if mission.ended { ", the survey has ended" } else { "" };
     let mut out = format!("mission {}  at {}{ended}\n", mission.name, span(state.now_s));
+    let _ = writeln!(out, "command {}", command(&state.command, state.now_s));
     let used = 100.0 * link.down.bps_1min / f64::from(link.budget_bps.max(1));
     let shares: Vec<String> = link.shares.iter().map(|(class, percent)| format!("{class} {percent} %")).collect();
     let _ =
@@ -104,6 +105,37 @@ fn image(e: &ExemplarProgress, now_s: f64) -> String {
         ExemplarStage::Refused => "refused".to_owned(),
     };
     e.at_s.map_or(state.clone(), |at| format!("{state}, {} ago", span(now_s - at)))
+}
+
+/// Who has command, and since when.
+pub(super) fn command(command: &CommandState, now_s: f64) -> String {
+    let Some(holder) = &command.holder else { return "nobody has it".to_owned() };
+    let left = holder.takeable_s - now_s;
+    let take = if left > 0.0 { format!("free to take in {}", span(left)) } else { "free to take".to_owned() };
+    let (held, idle) = (span(now_s - holder.since_s), span(now_s - holder.last_active_s));
+    format!("{} for {held}, last active {idle} ago; {take}", holder.name)
+}
+
+/// One line for a change of command.
+pub(super) fn command_change(change: &CommandChangeState) -> String {
+    let CommandChangeState { by, from, to, .. } = change;
+    let [from, to] = [from, to].map(|name| name.as_deref().unwrap_or("nobody"));
+    match change.kind {
+        CommandChangeName::Taken if from == "nobody" => format!("{by} took command"),
+        CommandChangeName::Taken => format!("{by} took command from {from}, who was silent"),
+        CommandChangeName::HandedOver => format!("{by} handed command over to {to}"),
+        CommandChangeName::Released => format!("{by} gave command up"),
+        CommandChangeName::Requested => format!("{by} requested command from {from}"),
+        CommandChangeName::Withdrawn => format!("{by} withdrew the request for command"),
+    }
+}
+
+pub(super) fn role(role: PrincipalRole) -> &'static str {
+    match role {
+        PrincipalRole::Viewer => "viewer",
+        PrincipalRole::Operator => "operator",
+        PrincipalRole::Administrator => "administrator",
+    }
 }
 
 /// The background streams in order.

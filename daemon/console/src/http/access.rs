@@ -1,10 +1,11 @@
-//! Access by a token: programs send it in a header, the page sends a cookie that it received at the login.
+//! Access by tokens: programs send it in a header, the page sends a cookie that it received at the login.
 
 use axum::http::{HeaderMap, header};
+use scenecast_config::TokenGrant;
+use scenecast_surface::Principal;
 use std::collections::VecDeque;
 use std::sync::{Mutex, PoisonError};
 use subtle::ConstantTimeEq;
-use zeroize::Zeroizing;
 
 /// A further login ends the oldest session.
 const MAX_SESSIONS: usize = 64;
@@ -26,91 +27,132 @@ pub(super) enum HostNames {
 #[derive(Debug)]
 pub(super) struct Access {
     pub(super) names: HostNames,
-    token: Option<Zeroizing<String>>,
-    sessions: Mutex<VecDeque<String>>,
+    grants: Vec<TokenGrant>,
+    sessions: Mutex<VecDeque<(String, Principal)>>,
+}
+
+/// Whether anybody may read this path.
+pub(super) fn is_open(path: &str) -> bool {
+    OPEN.contains(&path)
 }
 
 impl Access {
-    /// Without a token, all who reach the listener have access.
-    pub(super) fn new(names: HostNames, token: Option<Zeroizing<String>>) -> Self {
-        Self { names, token, sessions: Mutex::default() }
+    /// Without tokens, all who reach the listener are administrators.
+    pub(super) fn new(names: HostNames, grants: Vec<TokenGrant>) -> Self {
+        Self { names, grants, sessions: Mutex::default() }
     }
 
-    /// Whether the headers of a request to `path` grant access.
-    pub(super) fn admits(&self, path: &str, headers: &HeaderMap) -> bool {
-        if self.token.is_none() || OPEN.contains(&path) {
-            return true;
+    /// The principal that the headers of a request identify.
+    pub(super) fn identify(&self, headers: &HeaderMap) -> Option<Principal> {
+        if self.grants.is_empty() {
+            return Some(Principal::local());
         }
-        let text = |name| headers.get(name).and_then(|v| v.to_str().ok());
-        if let Some(credentials) = text(header::AUTHORIZATION) {
-            let bearer = credentials.split_once(' ').filter(|(scheme, _)| scheme.eq_ignore_ascii_case("bearer"));
-            return bearer.is_some_and(|(_, token)| self.is_token(token.trim()));
+        if let Some(credentials) = headers.get(header::AUTHORIZATION) {
+            let (scheme, token) = credentials.to_str().ok()?.split_once(' ')?;
+            return self.principal_of_token(token.trim()).filter(|_| scheme.eq_ignore_ascii_case("bearer"));
         }
-        let cookies = headers.get_all(header::COOKIE).iter().filter_map(|v| v.to_str().ok());
-        let mut pairs = cookies.flat_map(|list| list.split(';')).filter_map(|one| one.trim().split_once('='));
-        pairs.any(|(name, session)| name == COOKIE && self.is_session(session))
+        cookies(headers).find_map(|session| self.principal_of_session(session))
     }
 
-    /// Whether there is a token and `candidate` equals it.
-    fn is_token(&self, candidate: &str) -> bool {
-        self.token.as_ref().is_some_and(|token| bool::from(token.as_bytes().ct_eq(candidate.as_bytes())))
+    /// The principal with this token. All tokens are compared, so that the duration does not depend on the candidate.
+    pub(super) fn principal_of_token(&self, candidate: &str) -> Option<Principal> {
+        if self.grants.is_empty() {
+            return Some(Principal::local());
+        }
+        let is_it = |grant: &TokenGrant| bool::from(grant.token.as_bytes().ct_eq(candidate.as_bytes()));
+        let found = self.grants.iter().fold(None, |found, grant| if is_it(grant) { Some(grant) } else { found });
+        found.map(|grant| grant.principal.clone())
     }
 
-    fn is_session(&self, candidate: &str) -> bool {
+    fn principal_of_session(&self, candidate: &str) -> Option<Principal> {
         let sessions = self.sessions.lock().unwrap_or_else(PoisonError::into_inner);
-        // All are compared, so that the duration does not depend on the candidate.
-        sessions.iter().fold(false, |found, s| found | bool::from(s.as_bytes().ct_eq(candidate.as_bytes())))
-    }
-
-    /// Whether a login with `candidate` succeeds.
-    pub(super) fn admits_login(&self, candidate: &str) -> bool {
-        self.token.is_none() || self.is_token(candidate)
+        let is_it = |session: &str| bool::from(session.as_bytes().ct_eq(candidate.as_bytes()));
+        let found = sessions.iter().fold(None, |found, (s, principal)| if is_it(s) { Some(principal) } else { found });
+        found.cloned()
     }
 
     /// Begins a session; `None` if the system has no random bytes.
-    pub(super) fn begin_session(&self) -> Option<String> {
+    pub(super) fn begin_session(&self, principal: Principal) -> Option<String> {
         let mut bytes = [0; 16];
         getrandom::fill(&mut bytes).ok()?;
         let session = format!("{:032x}", u128::from_be_bytes(bytes));
         let mut sessions = self.sessions.lock().unwrap_or_else(PoisonError::into_inner);
-        sessions.push_back(session.clone());
+        sessions.push_back((session.clone(), principal));
         if sessions.len() > MAX_SESSIONS {
             sessions.pop_front();
         }
         Some(session)
     }
+
+    /// Ends the sessions of a request's cookies.
+    pub(super) fn end_session(&self, headers: &HeaderMap) {
+        let mut sessions = self.sessions.lock().unwrap_or_else(PoisonError::into_inner);
+        let is_ended = |session: &str| cookies(headers).any(|c| bool::from(c.as_bytes().ct_eq(session.as_bytes())));
+        sessions.retain(|(session, _)| !is_ended(session));
+    }
+}
+
+/// The sessions in the cookies of a request.
+fn cookies(headers: &HeaderMap) -> impl Iterator<Item = &str> {
+    let lists = headers.get_all(header::COOKIE).iter().filter_map(|v| v.to_str().ok());
+    let pairs = lists.flat_map(|list| list.split(';')).filter_map(|one| one.trim().split_once('='));
+    pairs.filter(|(name, _)| *name == COOKIE).map(|(_, session)| session)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use axum::http::HeaderValue;
+    use scenecast_surface::Role;
+    use zeroize::Zeroizing;
 
     fn access() -> Access {
-        Access::new(HostNames::Loopback, Some(Zeroizing::new("0123456789abcdef".to_owned())))
+        let grant = |name, role, token: &str| TokenGrant {
+            principal: Principal::new(name, role).unwrap(),
+            token: Zeroizing::new(token.to_owned()),
+        };
+        let grants =
+            vec![grant("anna", Role::Operator, "0123456789abcdef"), grant("victor", Role::Viewer, "fedcba9876543210")];
+        Access::new(HostNames::Loopback, grants)
     }
 
     fn with(name: header::HeaderName, value: &str) -> HeaderMap {
         HeaderMap::from_iter([(name, HeaderValue::from_str(value).unwrap())])
     }
 
-    #[test]
-    fn only_the_token_grants_access() {
-        let admits = |value: &str| access().admits("/api/v2/state", &with(header::AUTHORIZATION, value));
-        assert!(admits("Bearer 0123456789abcdef") && admits("bearer  0123456789abcdef"));
-        assert!(!admits("Bearer 0123456789abcdeg") && !admits("Bearer ") && !admits("0123456789abcdef"));
-        assert!(!admits("Basic 0123456789abcdef") && !access().admits("/", &HeaderMap::new()));
-        assert!(access().admits("/login", &HeaderMap::new()) && !access().admits("/login/", &HeaderMap::new()));
+    fn name(access: &Access, headers: &HeaderMap) -> Option<String> {
+        access.identify(headers).map(|p| p.name().to_owned())
     }
 
     #[test]
-    fn a_session_ends_after_many_others() {
+    fn each_token_identifies_its_principal() {
+        let found = |value: &str| name(&access(), &with(header::AUTHORIZATION, value));
+        assert_eq!(found("Bearer 0123456789abcdef").as_deref(), Some("anna"));
+        assert_eq!(found("bearer  fedcba9876543210").as_deref(), Some("victor"));
+        for wrong in ["Bearer 0123456789abcdeg", "Bearer ", "0123456789abcdef", "Basic 0123456789abcdef"] {
+            assert_eq!(found(wrong), None, "{wrong}");
+        }
+        assert_eq!(name(&access(), &HeaderMap::new()), None);
+        assert!(is_open("/login") && !is_open("/login/") && !is_open("/logout"));
+    }
+
+    #[test]
+    fn clients_without_tokens_are_administrators() {
+        let open = Access::new(HostNames::Loopback, Vec::new());
+        assert_eq!(open.identify(&HeaderMap::new()).map(|p| p.role()), Some(Role::Administrator));
+    }
+
+    #[test]
+    fn a_session_ends_at_the_logout_and_after_many_others() {
         let access = access();
-        let first = access.begin_session().unwrap();
-        let cookie = with(header::COOKIE, &format!("theme=dark; {COOKIE}={first}"));
-        assert!(access.admits("/", &cookie));
-        assert!(!access.admits("/", &with(header::COOKIE, &format!("{COOKIE}="))));
-        (0..MAX_SESSIONS).for_each(|_| drop(access.begin_session()));
-        assert!(!access.admits("/", &cookie));
+        let begin = |token| access.begin_session(access.principal_of_token(token).unwrap()).unwrap();
+        let cookie = |session: &str| with(header::COOKIE, &format!("theme=dark; {COOKIE}={session}"));
+        let [first, second] = ["fedcba9876543210", "0123456789abcdef"].map(|token| cookie(&begin(token)));
+        assert_eq!([&first, &second].map(|c| name(&access, c).unwrap()), ["victor", "anna"]);
+        assert_eq!(name(&access, &cookie("")), None);
+        access.end_session(&first);
+        assert_eq!((name(&access, &first), name(&access, &second).as_deref()), (None, Some("anna")));
+        (0..MAX_SESSIONS).for_each(|_| drop(begin("0123456789abcdef")));
+        assert_eq!(name(&access, &second), None);
     }
 }

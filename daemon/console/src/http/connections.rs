@@ -31,6 +31,13 @@ const MAX_HEADERS: usize = 64;
 pub(super) const EVENT_STREAM: &str = "text/event-stream";
 /// For a client to read sent data.
 const READ_TIMEOUT: Duration = Duration::from_secs(20);
+/// For the client of a stream of events. With the time in which events fill the buffers, a stream that is not read ends
+/// within 10 s.
+const STREAM_READ_TIMEOUT: Duration = Duration::from_secs(5);
+/// The bytes that a client must read within the timeout, unless it reads everything.
+const MIN_PROGRESS_BYTES: usize = 8 * 1024;
+/// The kernel's send buffer of a stream of events: data in it count as sent, although the client may not have read them.
+const STREAM_SEND_BUFFER_BYTES: usize = 8 * 1024;
 
 /// Serves `router` on `listener` until the runtime ends.
 pub(super) async fn serve(listener: TcpListener, router: Router) {
@@ -58,6 +65,7 @@ pub(super) async fn serve(listener: TcpListener, router: Router) {
 
 async fn serve_one(stream: TcpStream, router: Router, activity: Arc<Activity>) -> Result<(), hyper::Error> {
     let _ = stream.set_nodelay(true);
+    let io = TimeoutStream::new(stream, activity.clone());
     let service = hyper::service::service_fn(move |request: hyper::Request<Incoming>| {
         let active = Arc::new(ActiveRequest::new(&activity));
         let request = request.map(|body| Body::new(RequestBody::new(body, active.clone())));
@@ -81,7 +89,7 @@ async fn serve_one(stream: TcpStream, router: Router, activity: Arc<Activity>) -
         .header_read_timeout(HEAD_TIMEOUT)
         .max_buf_size(MAX_HEAD_BYTES)
         .max_headers(MAX_HEADERS);
-    http.serve_connection(TokioIo::new(TimeoutStream { stream, timeout: None }), service).await
+    http.serve_connection(TokioIo::new(io), service).await
 }
 
 /// The use of a connection.
@@ -207,22 +215,50 @@ impl Connections {
 /// A stream that fails when the client does not read.
 struct TimeoutStream {
     stream: TcpStream,
+    activity: Arc<Activity>,
+    is_bounded: bool,
+    /// Runs while data wait for the client.
     timeout: Option<Pin<Box<Sleep>>>,
+    /// Bytes written since the timeout began.
+    progress: usize,
 }
 
 impl TimeoutStream {
+    fn new(stream: TcpStream, activity: Arc<Activity>) -> Self {
+        Self { stream, activity, is_bounded: false, timeout: None, progress: 0 }
+    }
+
+    /// Bounds the send buffer once the response is known to be a stream of events.
+    fn prepare_write(&mut self) {
+        if !self.is_bounded && self.activity.is_stream.load(Ordering::Relaxed) {
+            self.is_bounded = true;
+            // Without the bound the stream ends too, but later.
+            let _ = socket2::SockRef::from(&self.stream).set_send_buffer_size(STREAM_SEND_BUFFER_BYTES);
+        }
+    }
+
     fn wait(&mut self, cx: &mut Context<'_>) -> Poll<std::io::Error> {
-        let timeout = self.timeout.get_or_insert_with(|| Box::pin(tokio::time::sleep(READ_TIMEOUT)));
+        let limit = if self.is_bounded { STREAM_READ_TIMEOUT } else { READ_TIMEOUT };
+        if self.timeout.is_none() {
+            self.progress = 0;
+        }
+        let timeout = self.timeout.get_or_insert_with(|| Box::pin(tokio::time::sleep(limit)));
         ready!(timeout.as_mut().poll(cx));
         Poll::Ready(std::io::ErrorKind::TimedOut.into())
     }
 
     fn or_wait(&mut self, written: Poll<std::io::Result<usize>>, cx: &mut Context<'_>) -> Poll<std::io::Result<usize>> {
-        if written.is_ready() {
-            self.timeout = None;
-            return written;
+        let Poll::Ready(result) = written else { return self.wait(cx).map(Err) };
+        self.progress += result.as_ref().map_or(0, |n| *n);
+        if self.progress >= MIN_PROGRESS_BYTES {
+            self.handle_progress();
         }
-        self.wait(cx).map(Err)
+        Poll::Ready(result)
+    }
+
+    /// The client reads.
+    fn handle_progress(&mut self) {
+        (self.timeout, self.progress) = (None, 0);
     }
 }
 
@@ -234,6 +270,7 @@ impl AsyncRead for TimeoutStream {
 
 impl AsyncWrite for TimeoutStream {
     fn poll_write(mut self: Pin<&mut Self>, cx: &mut Context<'_>, buf: &[u8]) -> Poll<std::io::Result<usize>> {
+        self.prepare_write();
         let written = Pin::new(&mut self.stream).poll_write(cx, buf);
         self.or_wait(written, cx)
     }
@@ -243,6 +280,7 @@ impl AsyncWrite for TimeoutStream {
         cx: &mut Context<'_>,
         bufs: &[std::io::IoSlice<'_>],
     ) -> Poll<std::io::Result<usize>> {
+        self.prepare_write();
         let written = Pin::new(&mut self.stream).poll_write_vectored(cx, bufs);
         self.or_wait(written, cx)
     }
@@ -251,7 +289,9 @@ impl AsyncWrite for TimeoutStream {
         self.stream.is_write_vectored()
     }
 
+    /// Called when all data are written.
     fn poll_flush(mut self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<std::io::Result<()>> {
+        self.handle_progress();
         Pin::new(&mut self.stream).poll_flush(cx)
     }
 

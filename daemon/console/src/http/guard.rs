@@ -1,12 +1,14 @@
 //! Admits requests.
 
-use super::access::{Access, HostNames};
+use super::access::{self, Access, HostNames};
 use super::response::error;
+use axum::Extension;
 use axum::extract::{Request, State};
 use axum::http::uri::Authority;
 use axum::http::{HeaderMap, HeaderName, HeaderValue, Method, StatusCode, header};
 use axum::middleware::Next;
 use axum::response::{IntoResponse, Redirect, Response};
+use scenecast_surface::{Principal, Role};
 use std::net::IpAddr;
 use std::sync::Arc;
 use std::time::Duration;
@@ -16,13 +18,18 @@ const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; i
 /// From the head of a request to the head of its response.
 const RESPONSE_TIMEOUT: Duration = Duration::from_secs(15);
 
-/// Refuses requests that the page of another site could have made and those without a token, and adds the
-/// headers that isolate our page.
-pub(super) async fn guard(State(access): State<Arc<Access>>, request: Request, next: Next) -> Response {
+/// Refuses requests that the page of another site could have made and those without a token, notes the principal, and
+/// adds the headers that isolate our page.
+pub(super) async fn guard(State(access): State<Arc<Access>>, mut request: Request, next: Next) -> Response {
+    let principal = access.identify(request.headers());
+    let is_admitted = principal.is_some() || access::is_open(request.uri().path());
+    if let Some(principal) = principal {
+        request.extensions_mut().insert(principal);
+    }
     let mut response = match check(request.method(), request.uri().path(), request.headers(), &access.names) {
         _ if !is_known(request.method()) => unknown_method(),
         Err(reason) => error(StatusCode::FORBIDDEN, reason),
-        Ok(()) if !access.admits(request.uri().path(), request.headers()) => unauthorized(request.uri().path()),
+        Ok(()) if !is_admitted => unauthorized(request.uri().path()),
         Ok(()) => match tokio::time::timeout(RESPONSE_TIMEOUT, next.run(request)).await {
             Ok(response) => response,
             Err(_) => error(StatusCode::REQUEST_TIMEOUT, "the request took too long"),
@@ -35,6 +42,24 @@ pub(super) async fn guard(State(access): State<Arc<Access>>, request: Request, n
     headers.insert(HeaderName::from_static("cross-origin-resource-policy"), HeaderValue::from_static("same-origin"));
     headers.entry(header::CACHE_CONTROL).or_insert(HeaderValue::from_static("no-store"));
     response
+}
+
+/// Refuses principals below a role, before the body of the request is read.
+pub(super) async fn require_role(
+    State(needed): State<Role>,
+    principal: Option<Extension<Principal>>,
+    request: Request,
+    next: Next,
+) -> Response {
+    match principal {
+        Some(Extension(principal)) if principal.role() >= needed => next.run(request).await,
+        Some(Extension(principal)) => {
+            let (name, role) = (principal.name(), principal.role());
+            let line = format!("this needs the role {needed}; the role of {name} is {role}");
+            error(StatusCode::FORBIDDEN, &line)
+        }
+        None => unauthorized(request.uri().path()),
+    }
 }
 
 /// Whether the interface has operations with this method. TRACE would return the token of a request to its sender.
@@ -52,7 +77,7 @@ fn unauthorized(path: &str) -> Response {
     if path == "/" {
         return Redirect::to("/login").into_response();
     }
-    let line = "this requires the token of console.token_file, as in Authorization: Bearer TOKEN";
+    let line = "this requires a token of console.token_file, as in Authorization: Bearer TOKEN";
     let mut response = error(StatusCode::UNAUTHORIZED, line);
     response.headers_mut().insert(header::WWW_AUTHENTICATE, HeaderValue::from_static("Bearer"));
     response

@@ -10,7 +10,9 @@ use serde_json::{Map, Value, json};
 const DESCRIPTION: &str = "The interface of the operator's page, for programs as well. A member that ends in `_s` is a mission \
 time in seconds, `now_s` being the present, unless it is called a duration. Metres are east (x), north (y) and up (z). A request \
 needs a `Host` of this machine and, if it has an `Origin`, that of the page; a POST needs the header `X-Scenecast: 1`. If the \
-surface has a `console.token_file`, a request needs its token, in `Authorization: Bearer TOKEN` or as the cookie of `/login`. \
+surface has a `console.token_file`, a request needs a token of it, in `Authorization: Bearer TOKEN` or as the cookie of \
+`/login`; `x-role` is the least role that may use an operation (viewer, operator, administrator). Orders other than hold \
+and abort also need command: see `change_command`. \
 Text is compressed for clients that accept gzip; maps and files carry an `ETag`. `/api/v1` answers 410.";
 
 pub(super) fn document() -> Vec<u8> {
@@ -69,6 +71,9 @@ fn describe_operation(operation: &Operation, schemas: &mut Schemas) -> Value {
     let mut responses = json!({ "default": { "$ref": "#/components/responses/Error" } });
     responses[status.to_string()] = describe_response(content, &mut schemas.response);
     let mut described = json!({ "operationId": operation.id, "summary": operation.summary, "responses": responses });
+    if let Some(role) = operation.role {
+        described["x-role"] = role.name().into();
+    }
     let parameters = parameters(operation);
     if !parameters.is_empty() {
         described["parameters"] = parameters.into();
@@ -81,7 +86,7 @@ fn describe_operation(operation: &Operation, schemas: &mut Schemas) -> Value {
         let content = json!({ "application/x-www-form-urlencoded": { "schema": form } });
         described["requestBody"] = json!({ "required": true, "content": content });
     }
-    if operation.path == "/login" {
+    if operation.role.is_none() {
         described["security"] = json!([{}]);
     }
     described
@@ -150,7 +155,7 @@ fn parameters(operation: &Operation) -> Vec<Value> {
             parameters.push(json!({ "name": name, "in": "query", "description": text, "schema": schema }));
         }
     }
-    if operation.body.is_some() {
+    if operation.body.is_some() || operation.id == "logout" {
         let schema = json!({ "type": "string", "const": "1" });
         let text = "The page of another site cannot send it";
         parameters.push(

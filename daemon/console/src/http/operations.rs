@@ -1,17 +1,17 @@
 //! Every path and method of the server, in one table from which the router and the OpenAPI document are made.
 
-use super::handlers::{events, login, maps, metrics, orders, readings};
+use super::handlers::{command, events, login, maps, metrics, orders, readings};
 use super::shared::{ArchiveName, Shared, VehicleId};
 use crate::export::MapFormat;
 use crate::fit::Fit;
 use crate::orders::{
-    BudgetOrder, ConstraintsOrder, DismissOrder, ExemplarOrder, LabelOrder, NoteOrder, UtilityOrder,
+    BudgetOrder, CommandOrder, ConstraintsOrder, DismissOrder, ExemplarOrder, LabelOrder, NoteOrder, UtilityOrder,
 };
-use crate::state::{AcceptedOrder, ArchiveList, MapBody, MissionState};
+use crate::state::{AcceptedOrder, ArchiveList, CommandState, MapBody, MissionState, PrincipalInfo};
 use axum::extract::State;
 use axum::http::{HeaderMap, Method};
 use axum::routing::{MethodRouter, get, post};
-use scenecast_surface::{FenceOrder, LimitsOrder, SettingsOrder};
+use scenecast_surface::{FenceOrder, LimitsOrder, Role, SettingsOrder};
 use schemars::{JsonSchema, Schema, SchemaGenerator};
 
 /// Adds the schema of a type to a generator.
@@ -39,6 +39,8 @@ pub(super) struct Operation {
     pub(super) path: &'static str,
     /// The name for generated clients.
     pub(super) id: &'static str,
+    /// The least role that may use it; `None` if no principal is needed.
+    pub(super) role: Option<Role>,
     /// One line for people.
     pub(super) summary: &'static str,
     /// The schema of the request's body.
@@ -55,7 +57,8 @@ fn read(
     content: Content,
     route: fn() -> MethodRouter<Shared>,
 ) -> Operation {
-    Operation { method: Method::GET, path, id, summary, body: None, success: (200, content), route }
+    let role = Some(Role::Viewer);
+    Operation { method: Method::GET, path, id, role, summary, body: None, success: (200, content), route }
 }
 
 fn order(
@@ -66,7 +69,8 @@ fn order(
     route: fn() -> MethodRouter<Shared>,
 ) -> Operation {
     let success = (202, Content::Json(schema::<AcceptedOrder>));
-    Operation { method: Method::POST, path, id, summary, body: Some(body), success, route }
+    let role = Some(Role::Operator);
+    Operation { method: Method::POST, path, id, role, summary, body: Some(body), success, route }
 }
 
 /// A change of the surface's own data, which is done at once.
@@ -77,7 +81,8 @@ fn change(
     body: SchemaOf,
     route: fn() -> MethodRouter<Shared>,
 ) -> Operation {
-    Operation { method: Method::POST, path, id, summary, body: Some(body), success: (204, Content::Headers), route }
+    let (role, success) = (Some(Role::Operator), (204, Content::Headers));
+    Operation { method: Method::POST, path, id, role, summary, body: Some(body), success, route }
 }
 
 /// A file format of an archived map.
@@ -108,6 +113,7 @@ pub(super) fn operations() -> Vec<Operation> {
     all.extend(archive());
     all.extend(changes());
     all.extend(orders());
+    all.extend(commands());
     all.extend(logins());
     all
 }
@@ -319,7 +325,7 @@ fn orders() -> Vec<Operation> {
         order(
             "/api/v2/vehicles/{id}/constraints",
             "set_constraints",
-            "Orders the vehicle to hold, to abort, or to resume its survey",
+            "Orders the vehicle to hold, to abort, or to resume its survey. A hold and an abort do not need command.",
             schema::<ConstraintsOrder>,
             || post(orders::constraints),
         ),
@@ -340,15 +346,18 @@ fn orders() -> Vec<Operation> {
             schema::<LimitsOrder>,
             || post(orders::limits),
         ),
-        order(
-            "/api/v2/vehicles/{id}/settings",
-            "set_settings",
-            "Changes how the vehicle builds its map, the cells and layers that it sends, and its planner. A member that is \
+        Operation {
+            role: Some(Role::Administrator),
+            ..order(
+                "/api/v2/vehicles/{id}/settings",
+                "set_settings",
+                "Changes how the vehicle builds its map, the cells and layers that it sends, and its planner. A member that is \
              missing or null leaves the setting unchanged; 0 or an empty text sets it as configured on the vehicle. Labels \
              keep their meaning.",
-            schema::<SettingsOrder>,
-            || post(orders::settings),
-        ),
+                schema::<SettingsOrder>,
+                || post(orders::settings),
+            )
+        },
         order(
             "/api/v2/budget",
             "set_budget",
@@ -360,24 +369,52 @@ fn orders() -> Vec<Operation> {
     ]
 }
 
-fn logins() -> Vec<Operation> {
+fn commands() -> Vec<Operation> {
     vec![
         read(
-            "/login",
-            "login_form",
-            "The form that requests the token",
-            Content::File("text/html; charset=utf-8"),
-            || get(login::login_form),
+            "/api/v2/principal",
+            "principal",
+            "Name and role of the principal that the request's token or cookie identifies",
+            Content::Json(schema::<PrincipalInfo>),
+            || get(command::principal),
         ),
         Operation {
-            method: Method::POST,
-            path: "/login",
-            id: "login",
-            summary: "Sets a cookie in exchange for the token",
-            body: None,
-            success: (303, Content::Headers),
-            route: || post(login::login),
+            success: (200, Content::Json(schema::<CommandState>)),
+            ..order(
+                "/api/v2/command",
+                "change_command",
+                "Requests command, hands it over, takes it or gives it up. Without command, orders other than hold and abort \
+                 are refused with status 409.",
+                schema::<CommandOrder>,
+                || post(command::command),
+            )
         },
+    ]
+}
+
+/// Operations that need no principal.
+fn logins() -> Vec<Operation> {
+    let form = read(
+        "/login",
+        "login_form",
+        "The form that requests the token",
+        Content::File("text/html; charset=utf-8"),
+        || get(login::login_form),
+    );
+    let post_form = |path, id, summary, route| Operation {
+        method: Method::POST,
+        path,
+        id,
+        role: None,
+        summary,
+        body: None,
+        success: (303, Content::Headers),
+        route,
+    };
+    vec![
+        Operation { role: None, ..form },
+        post_form("/login", "login", "Sets a cookie in exchange for the token", || post(login::login)),
+        post_form("/logout", "logout", "Ends the session of the cookie", || post(login::logout)),
     ]
 }
 
@@ -392,5 +429,14 @@ mod tests {
         let names: BTreeSet<&str> = all.iter().map(|o| o.id).collect();
         let paths: BTreeSet<(&str, &str)> = all.iter().map(|o| (o.path, o.method.as_str())).collect();
         assert_eq!((names.len(), paths.len()), (all.len(), all.len()));
+    }
+
+    #[test]
+    fn only_readings_and_logins_are_open_to_viewers() {
+        for o in operations() {
+            let is_open = o.role.is_none_or(|role| role == Role::Viewer);
+            assert_eq!(is_open, o.method == Method::GET || ["login", "logout"].contains(&o.id), "{}", o.path);
+            assert_eq!(o.role.is_none(), o.path.starts_with("/log"), "{}", o.path);
+        }
     }
 }

@@ -18,6 +18,9 @@ pub(super) fn respond(reply: Reply) -> Response {
         Reply::Accepted(accepted) => (StatusCode::ACCEPTED, Json(accepted)).into_response(),
         Reply::Done => StatusCode::NO_CONTENT.into_response(),
         Reply::Archives(maps) => Json(ArchiveList { maps }).into_response(),
+        Reply::Command(command) => Json(command).into_response(),
+        Reply::Forbidden(reason) => error(StatusCode::FORBIDDEN, &reason),
+        Reply::NotInCommand(reason) => error(StatusCode::CONFLICT, &reason),
         Reply::NotFound => not_found(),
         Reply::Refused(reason) => error(StatusCode::UNPROCESSABLE_ENTITY, &reason),
     }

@@ -10,11 +10,11 @@ use axum::extract::DefaultBodyLimit;
 use axum::http::{StatusCode, Uri};
 use axum::response::Response;
 use axum::routing::any;
+use scenecast_config::TokenGrant;
 use scenecast_core::UserError;
 use std::sync::Arc;
 use tokio::net::TcpListener;
 use tokio::sync::{mpsc, watch};
-use zeroize::Zeroizing;
 
 const MAX_BODY_BYTES: usize = 16 * 1024;
 /// Requests that may wait for the surface.
@@ -45,7 +45,7 @@ pub struct ConsoleListener {
 pub async fn bind(
     address: &str,
     option: &str,
-    token: Option<Zeroizing<String>>,
+    tokens: Vec<TokenGrant>,
     name: &str,
 ) -> Result<ConsoleListener, UserError> {
     let addresses: Vec<_> = tokio::net::lookup_host(address)
@@ -53,7 +53,7 @@ pub async fn bind(
         .map_err(|e| UserError::Input(format!("{option}: {address} is not an ADDRESS:PORT to listen on: {e}")))?
         .collect();
     let is_loopback = addresses.iter().all(|a| a.ip().is_loopback());
-    if !is_loopback && token.is_none() {
+    if !is_loopback && tokens.is_empty() {
         return Err(UserError::Input(format!(
             "{option} = {address}: other machines could give orders to the vehicle; set console.token_file to a file \
              written by scenecast key token, or listen on a loopback address such as 127.0.0.1:8460"
@@ -63,7 +63,7 @@ pub async fn bind(
     let listener = TcpListener::bind(address)
         .await
         .map_err(|e| UserError::Input(format!("cannot listen on {address}: {e}; choose another port with {option}")))?;
-    Ok(ConsoleListener { listener, access: Access::new(names, token) })
+    Ok(ConsoleListener { listener, access: Access::new(names, tokens) })
 }
 
 /// Serves the page until the runtime ends.
@@ -77,7 +77,16 @@ pub fn start(listener: ConsoleListener) -> Console {
 }
 
 fn router(shared: Shared) -> Router {
-    let routes = operations::operations().into_iter().fold(Router::new(), |r, o| r.route(o.path, (o.route)()));
+    let routes = operations::operations().into_iter().fold(Router::new(), |router, o| {
+        let route = (o.route)();
+        router.route(
+            o.path,
+            match o.role {
+                Some(role) => route.route_layer(axum::middleware::from_fn_with_state(role, guard::require_role)),
+                None => route,
+            },
+        )
+    });
     routes
         .route("/api/v1/{*rest}", any(version_1))
         .fallback(assets::page)

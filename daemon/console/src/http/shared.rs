@@ -2,7 +2,7 @@
 
 use super::access::Access;
 use super::response::{error, not_found, respond};
-use crate::request::{Reply, SurfaceRequest};
+use crate::request::{ClientRequest, Reply, SurfaceRequest};
 use crate::snapshot::Snapshot;
 use crate::tiles::TiledMap;
 use axum::body::Bytes;
@@ -10,12 +10,13 @@ use axum::extract::{FromRequestParts, Path};
 use axum::http::StatusCode;
 use axum::http::request::Parts;
 use axum::response::Response;
+use scenecast_surface::Principal;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use tokio::sync::{Mutex, Semaphore, mpsc, oneshot, watch};
 
 /// A request that waits for the reply of the surface.
-pub type PendingRequest = (SurfaceRequest, oneshot::Sender<Reply>);
+pub type PendingRequest = (ClientRequest, oneshot::Sender<Reply>);
 
 #[derive(Debug, Clone)]
 pub(super) struct Shared {
@@ -73,17 +74,26 @@ impl Shared {
         }
     }
 
-    /// The reply of the surface; the error is a response with status 503.
+    /// The reply of the surface to a reading; the error is a response with status 503.
     pub(super) async fn request(&self, request: SurfaceRequest) -> Result<Reply, Response> {
+        self.send(ClientRequest { principal: None, request }).await
+    }
+
+    async fn send(&self, request: ClientRequest) -> Result<Reply, Response> {
         let busy = || error(StatusCode::SERVICE_UNAVAILABLE, "too many requests at once");
         let (sender, reply) = oneshot::channel();
         self.requests.try_send((request, sender)).map_err(|_| busy())?;
         reply.await.map_err(|_| busy())
     }
 
-    /// The reply of the surface as a response.
+    /// The reply of the surface to a reading, as a response.
     pub(super) async fn respond(&self, request: SurfaceRequest) -> Response {
         self.request(request).await.map_or_else(|busy| busy, respond)
+    }
+
+    /// The reply of the surface to an order of a principal, as a response.
+    pub(super) async fn order(&self, by: Principal, request: SurfaceRequest) -> Response {
+        self.send(ClientRequest { principal: Some(by), request }).await.map_or_else(|busy| busy, respond)
     }
 }
 

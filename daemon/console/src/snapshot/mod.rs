@@ -1,11 +1,13 @@
 //! The state of the surface at one moment, as all pages show it.
 
+mod command;
 mod exemplar;
 mod facts;
 mod link;
 mod position;
 mod vehicle;
 
+pub(crate) use command::{command_state, principal_info};
 pub use facts::MissionFacts;
 pub(crate) use facts::seconds;
 pub use position::measured_origin;
@@ -52,6 +54,7 @@ pub fn snapshot(surface: &Surface, facts: &MissionFacts, meter: &LinkMeter, now:
         vehicles: vehicle::vehicles(surface, facts, now),
         position: position::surface_position(surface, now),
         link: link::summary(surface, meter, now),
+        command: command_state(surface.command(), now),
         layers: surface.layers().iter().map(|(_, layer)| layer_info(layer)).collect(),
         storage: facts.storage.clone(),
     })

@@ -128,7 +128,7 @@ impl View {
     fn new(config: &Config, survey: &mut Survey) -> Result<Self, UserError> {
         let facts = MissionFacts::new(config, &survey.modem, 1, 1.0);
         let map = TiledMap::first(cells(survey, facts.cell_m)?, 1);
-        let meter = LinkMeter::new(Duration::from_secs_f64(config.link.budget_window_s));
+        let meter = LinkMeter::new(Duration::from_secs_f64(config.link.budget_window_s), Instant::ZERO);
         Ok(Self { facts, meter, map, explored: survey.explored() })
     }
 

@@ -1,7 +1,7 @@
 //! `scenecast key`
 
 use clap::{Args, Subcommand};
-use scenecast_core::UserError;
+use scenecast_core::{Principal, Role, UserError};
 use scenecast_protocol::seal::MissionKey;
 use std::fs::OpenOptions;
 use std::io::{ErrorKind, Write};
@@ -28,13 +28,29 @@ pub(super) struct New {
     out: PathBuf,
 }
 
-/// Write a new random token to a new file that only its owner may read. Its holders may give orders.
+/// Write a new random token to a new file that only its owner may read. Without a role its holders are administrators.
 #[derive(Debug, Args)]
-#[command(after_help = "Example: scenecast key token --out console.token")]
+#[command(after_help = TOKEN_EXAMPLES)]
 pub(super) struct Token {
     /// File to write; it must not exist
     #[arg(long, value_name = "FILE", default_value = "console.token")]
     out: PathBuf,
+    /// Role of its holder: viewer (reads), operator (orders) or administrator (settings, too)
+    #[arg(long, value_name = "ROLE", value_parser = role, requires = "name")]
+    role: Option<Role>,
+    /// Name of its holder, as the page shows it
+    #[arg(long, value_name = "NAME", requires = "role")]
+    name: Option<String>,
+}
+
+const TOKEN_EXAMPLES: &str = "\
+Example: scenecast key token --out console.token
+         scenecast key token --role operator --name anna --out anna.token
+
+console.token_file may have a line of each person: cat anna.token bob.token > console.tokens";
+
+fn role(text: &str) -> Result<Role, String> {
+    Role::from_name(text).ok_or_else(|| "expected viewer, operator or administrator".to_owned())
 }
 
 /// Print the fingerprint of a key. Equal keys have equal fingerprints.
@@ -56,11 +72,17 @@ impl Key {
                 println!("Copy the file to the vehicle and to the surface, and set link.key_file to its path at both.");
             }
             Self::Token(token) => {
-                write_new(&token.out, &random_token()?)?;
+                let line = token_line(token.role.zip(token.name.as_deref()), &random_token()?)?;
+                write_new(&token.out, &line)?;
                 println!("{}: a new token", token.out.display());
-                println!(
-                    "Set console.token_file of the surface to its path, and give a copy to those who may give orders."
-                );
+                match token.name {
+                    None => println!(
+                        "Set console.token_file of the surface to its path, and give a copy to those who may give orders."
+                    ),
+                    Some(name) => println!(
+                        "Append its line to the file in console.token_file of the surface, and give the file to {name}."
+                    ),
+                }
             }
             Self::Show(show) => {
                 let (key, warning) = scenecast_config::read_key(&show.file)?;
@@ -79,6 +101,15 @@ fn random_key() -> Result<MissionKey, UserError> {
     let mut bytes = Zeroizing::new([0; 16]);
     getrandom::fill(&mut *bytes).map_err(|e| UserError::Failed(format!("no random bytes from the system: {e}")))?;
     Ok(MissionKey::from_bytes(*bytes))
+}
+
+/// The text of a token file.
+fn token_line(holder: Option<(Role, &str)>, token: &str) -> Result<Zeroizing<String>, UserError> {
+    let Some((role, name)) = holder else { return Ok(Zeroizing::new(token.to_owned())) };
+    let rule = "1 to 32 letters, digits, dots, hyphens or underscores";
+    let principal = Principal::new(name, role);
+    let principal = principal.ok_or_else(|| UserError::Input(format!("--name {name:?}: a name has {rule}")))?;
+    Ok(Zeroizing::new(format!("{role} {} {token}", principal.name())))
 }
 
 /// A token of 128 bits from the operating system's random source.
@@ -139,6 +170,17 @@ mod tests {
         std::fs::remove_file(&path).unwrap();
         assert_eq!(refused.exit_code(), 2);
         assert!(refused.to_string().contains("not overwritten"), "{refused}");
+    }
+
+    #[test]
+    fn a_token_with_a_role_is_a_line_for_the_surface() {
+        let path = fresh("role");
+        let line = token_line(Some((Role::Operator, "anna")), &random_token().unwrap()).unwrap();
+        write_new(&path, &line).unwrap();
+        let grants = scenecast_config::read_tokens(&path).unwrap();
+        std::fs::remove_file(path).unwrap();
+        assert_eq!(Some(&grants[0].principal), Principal::new("anna", Role::Operator).as_ref());
+        assert_eq!(token_line(Some((Role::Viewer, "a b")), "x").unwrap_err().exit_code(), 2);
     }
 
     #[test]

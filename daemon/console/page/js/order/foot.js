@@ -1,5 +1,6 @@
 // The foot of an order in a panel: send, discard, error, changes by other consoles, order status.
 
+import { denial } from "../command.js";
 import { h, show, text } from "../dom.js";
 import { store } from "../store.js";
 import { replacedNote } from "./sent-versions.js";
@@ -13,17 +14,21 @@ export function orderFoot(order, name, id, caption = () => `Send ${name.toLowerC
   const discard = h("button", { type: "button", onclick: () => order.discard(store.vehicle) }, "Discard");
   discard.setAttribute("aria-label", `Discard ${name.toLowerCase()} edits`);
   const errorLine = h("p.error", { role: "alert" });
+  const deniedLine = h("p.note.denied");
   const replaced = replacedNote(order.sentVersions, name);
   const status = orderStatus(name);
-  const node = h("div.order", {}, h("div.buttons", {}, send, discard), errorLine, replaced.node, status.node);
+  const node = h("div.order", {}, h("div.buttons", {}, send, discard), deniedLine, errorLine, replaced.node, status.node);
 
   function update(vehicle, isFaulty = false) {
     const { busy, error, waiting } = order.progress(vehicle);
     const slot = slotOf(vehicle, order.slot);
     const unsent = order.unsent(vehicle).length;
     const again = slot?.state === "refused" && unsent === 0;
-    send.disabled = busy || isFaulty || !store.connected || (unsent === 0 && !again);
+    const denied = denial(order.slot === "settings" ? "settings" : "order");
+    send.disabled = busy || denied !== null || isFaulty || !store.connected || (unsent === 0 && !again);
     text(send, again ? `Send ${name.toLowerCase()} again` : caption(unsent));
+    show(deniedLine, denied !== null);
+    text(deniedLine, denied ?? "");
     show(discard, unsent > 0);
     show(errorLine, error !== null);
     text(errorLine, error ?? "");

@@ -1,9 +1,10 @@
-// Alarms: no connection, a silent vehicle, a map that is not up to date, the end of the mission.
+// Alarms and requests: no connection, a request for command, a silent vehicle, a map that is not up to date, the end of the mission.
 
+import { dismissEarlierMap, sendCommand } from "../api.js";
+import { hasCommand } from "../command.js";
 import { $, announce, h, keyed, show, text } from "../dom.js";
 import { missionTime, span } from "../format.js";
 import { ageOf, isSilent, store } from "../store.js";
-import { dismissEarlierMap } from "../api.js";
 import { retryNow } from "../feed.js";
 
 let announced = "";
@@ -30,6 +31,7 @@ function current() {
     if (v.map.earlier) found.push(earlier(v));
   }
   if (store.snapshot?.storage?.failing) found.push(refusing(store.snapshot.storage));
+  if (hasCommand()) found.push(...store.snapshot.command.requests.map(requested));
   if (store.snapshot?.mission.ended) found.push(ended());
   return found;
 }
@@ -40,7 +42,7 @@ function lost() {
   const next = wait > 0 ? `trying again in ${span(Math.ceil(wait))}` : "trying now";
   return {
     key: "lost", kind: "bad", head: "No connection to scenecast",
-    body: `for ${since}; ${next}. All displayed values may be out of date.`, retry: true,
+    body: `for ${since}; ${next}. All displayed values may be out of date.`, action: ["Try now", retryNow],
   };
 }
 
@@ -66,7 +68,7 @@ function earlier(v) {
   return {
     key: `earlier-${v.id}`, kind: "info", head: `The map of ${v.name} in view is an earlier one`,
     body: `${which}${last}. ${current_cells} of its ${v.map.explored_cells} cells have been received${now}; the current map replaces it when it has as many.`,
-    action: "Show the current map", run: () => dismissEarlierMap(v.id).catch((error) => announce(error.message)),
+    action: ["Show the current map", () => dismissEarlierMap(v.id).catch((error) => announce(error.message))],
   };
 }
 
@@ -89,9 +91,15 @@ function ended() {
   return { key: "ended", kind: "info", head: "The mission has ended", body: `at ${missionTime(store.nowS)}. The map is final.` };
 }
 
+function requested({ name, at_s: at }) {
+  const body = `${span(ageOf(at))} ago. You have command.`;
+  const handOver = () => sendCommand("hand_over", name).catch(() => {});
+  return { key: `command-${name}`, kind: "info", head: `${name} requests command`, body, action: ["Hand over", handOver] };
+}
+
 function make(banner) {
-  const { action, run } = banner.retry ? { action: "Try now", run: retryNow } : banner;
-  const button = action ? h("button", { type: "button", onclick: run }, action) : null;
+  const [name, onclick] = banner.action ?? [];
+  const button = name ? h("button", { type: "button", onclick }, name) : null;
   return h("p.banner", { data: { kind: banner.kind } }, h("b"), " ", h("span"), " ", button);
 }
 

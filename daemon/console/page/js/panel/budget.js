@@ -1,6 +1,7 @@
 // The bit budget, the minimum shares of the classes and the use of spare capacity. A change is sent when the control is released.
 
 import { sendBudget } from "../api.js";
+import { denial } from "../command.js";
 import { h, show, text } from "../dom.js";
 import { rate } from "../format.js";
 import { Order } from "../order/order.js";
@@ -38,6 +39,7 @@ const streams = backgroundBox(() => value().background, (background) => {
   order.set(store.vehicle, { ...value(), background });
   sendSoon();
 });
+const deniedLine = h("p.note.denied");
 const errorLine = h("p.error", { role: "alert" });
 const replaced = replacedNote(order.sentVersions, "Budget");
 const status = orderStatus("Budget");
@@ -47,7 +49,7 @@ let timer = 0;
 bar.append(...CLASSES.flatMap((c) => [rows[c].segment, rows[c].handle]), free);
 const form = h("form.budget", { onsubmit: submit, onkeydown: (event) => event.key === "Escape" && forget() },
   h("label", { for: "budget" }, "Budget, bit/s"), number, h("button", { type: "submit" }, "Set"));
-export const budgetParts = [form, slider, shareBox, streams.node, errorLine, replaced.node, status.node];
+export const budgetParts = [form, slider, shareBox, streams.node, deniedLine, errorLine, replaced.node, status.node];
 
 function shareRow(name, i) {
   const range = h("input", { type: "range", min: 0, max: 100, step: 1, "aria-label": `Minimum share of ${name}, percent`, oninput: () => setShare(name, range.valueAsNumber), onchange: sendSoon });
@@ -126,6 +128,10 @@ export function refreshBudget() {
   if (!vehicle) return;
   const { error, waiting } = order.progress(vehicle);
   const { budget_bps: bps, shares, background } = value();
+  const denied = denial("order");
+  for (const part of [form, slider, shareBox, streams.node]) part.inert = denied !== null;
+  show(deniedLine, denied !== null);
+  text(deniedLine, denied ?? "");
   if (!typed) number.value = bps;
   if (document.activeElement !== slider || !order.isChanged(vehicle)) slider.value = placeOf(bps);
   slider.setAttribute("aria-valuetext", rate(bps));

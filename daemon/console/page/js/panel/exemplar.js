@@ -1,6 +1,7 @@
 // The exemplars of a label: request them, follow their arrival, view them, request more, cancel.
 
 import { requestExemplar } from "../api.js";
+import { denial } from "../command.js";
 import { $, h, show, text } from "../dom.js";
 import { ago, bytes, percent } from "../format.js";
 import { nameOf } from "../book.js";
@@ -42,6 +43,11 @@ export function refreshExemplar(box, label, name) {
   const received = e.url !== null;
   const pending = PENDING.includes(e.state);
   show(image, received);
+  const denied = denial("order");
+  for (const button of [ask, cancel]) {
+    button.disabled = denied !== null;
+    button.title = denied ?? "";
+  }
   show(ask, !received && !pending);
   text(ask, e.state === "refused" ? "Request again" : "Request");
   ask.setAttribute("aria-label", `${ask.textContent}: an image of ${name}`);
@@ -78,6 +84,7 @@ function view(label) {
     const pending = PENDING.includes(e.state);
     text(state, errors.get(`${store.selectedId}.${now.id}`) ?? (pending ? `${NAMES[e.state]}${e.state === "receiving" ? ` ${percent(e.progress)}` : ""}` : ""));
     show(cancel, pending);
+    for (const button of [another, cancel]) button.disabled = denial("order") !== null;
     const key = e.images.map((i) => `${i.url}${i.at_s}`).join() + pending;
     if (shown.dataset.key === key) return;
     shown.dataset.key = key;
@@ -94,7 +101,7 @@ function view(label) {
 /** One image with its size and age, and the button that requests a larger one. */
 function figure(label, image, pending) {
   const unrequested = image.requested ? "" : ", not requested";
-  const larger = h("button", { type: "button", onclick: () => request(label, "larger", image.number) }, "Larger");
+  const larger = h("button", { type: "button", onclick: () => request(label, "larger", image.number), disabled: denial("order") !== null }, "Larger");
   show(larger, image.can_enlarge && !pending);
   larger.setAttribute("aria-label", `Larger: image ${image.number} of ${nameOf(label.id)}`);
   return h("figure", {},

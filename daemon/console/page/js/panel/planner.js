@@ -1,6 +1,7 @@
 // The choice of the planner on the vehicle.
 
 import { sendPlanner } from "../api.js";
+import { denial } from "../command.js";
 import { h, show, text } from "../dom.js";
 import { Order } from "../order/order.js";
 import { replacedNote } from "../order/sent-versions.js";
@@ -26,7 +27,11 @@ export function refreshPlanner(vehicle) {
   const slot = slotOf(vehicle, "settings");
   const again = slot?.state === "refused" && !order.isChanged(vehicle);
   pick.value = order.value(vehicle);
-  set.disabled = busy || !store.connected || (!order.isChanged(vehicle) && !again);
+  const denied = denial("settings");
+  pick.disabled = denied !== null;
+  pick.title = denied ?? "";
+  set.title = denied ?? "";
+  set.disabled = busy || denied !== null || !store.connected || (!order.isChanged(vehicle) && !again);
   text(errorLine, error ?? "");
   show(note, slot !== null || waiting !== null);
   note.dataset.state = slot?.state ?? "none";

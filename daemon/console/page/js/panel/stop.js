@@ -1,6 +1,7 @@
 // Hold, resume and abort: each needs a second, deliberate action.
 
 import { sendConstraints } from "../api.js";
+import { denial } from "../command.js";
 import { $, h, show, text } from "../dom.js";
 import { SentVersions, replacedNote } from "../order/sent-versions.js";
 import { orderStatus, slotOf } from "../order/status.js";
@@ -18,19 +19,27 @@ const STOPPED = ["return", "surface", "abort"];
 const sentVersions = new SentVersions("constraints");
 const replaced = replacedNote(sentVersions, "Hold");
 const status = orderStatus("Hold and abort");
+const deniedLine = h("p.note.denied");
 const errorLine = h("p.error", { role: "alert" });
 const hold = h("button", { type: "button", id: "hold", onclick: () => confirm(holding(store.vehicle) ? ORDERS.resume : ORDERS.hold) });
 const resume = h("button", { type: "button", id: "resume", onclick: () => confirm(ORDERS.resume) }, "Resume survey");
 const abort = h("button.grave", { type: "button", id: "abort", onclick: () => confirm(ORDERS.abort) }, "Abort mission");
 
-export const stopParts = [h("div.buttons", {}, hold, resume, abort), errorLine, replaced.node, status.node];
+export const stopParts = [h("div.buttons", {}, hold, resume, abort), deniedLine, errorLine, replaced.node, status.node];
 
 const holding = (v) => v.status?.mode === "hold";
 
 export function refreshStop(v) {
   text(hold, holding(v) ? "Resume survey" : "Hold position");
   show(resume, STOPPED.includes(v.status?.mode));
-  for (const b of [hold, resume, abort]) b.disabled = !store.connected;
+  const [stop, order] = [denial("stop"), denial("order")];
+  for (const [b, denied] of [[hold, holding(v) ? order : stop], [resume, order], [abort, stop]]) {
+    b.disabled = !store.connected || denied !== null;
+    b.title = denied ?? "";
+  }
+  const reason = stop ?? (holding(v) || STOPPED.includes(v.status?.mode) ? order : null);
+  show(deniedLine, reason !== null);
+  text(deniedLine, reason ?? "");
   const slot = slotOf(v, "constraints");
   replaced.update(v);
   show(status.node, slot !== null);

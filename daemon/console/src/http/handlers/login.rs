@@ -1,4 +1,4 @@
-//! The login form, which exchanges the token for a cookie.
+//! The login form, which exchanges a token for a cookie, and the end of the session.
 
 use crate::http::access::COOKIE;
 use crate::http::assets;
@@ -7,7 +7,7 @@ use crate::http::shared::Shared;
 use axum::Form;
 use axum::extract::State;
 use axum::extract::rejection::FormRejection;
-use axum::http::{StatusCode, header};
+use axum::http::{HeaderMap, StatusCode, header};
 use axum::response::{Html, IntoResponse, Redirect, Response};
 use serde::Deserialize;
 use zeroize::Zeroizing;
@@ -37,13 +37,20 @@ pub(in crate::http) async fn login(
         Ok(Form(login)) => Zeroizing::new(login.token),
         Err(e) => return error(e.status(), &e.body_text()),
     };
-    if !shared.access.admits_login(token.trim()) {
+    let Some(principal) = shared.access.principal_of_token(token.trim()) else {
         let message = "<p class=\"warn\" role=\"alert\">This is not the token.</p>";
         return (StatusCode::UNAUTHORIZED, form(message)).into_response();
-    }
-    let Some(session) = shared.access.begin_session() else {
+    };
+    let Some(session) = shared.access.begin_session(principal) else {
         return StatusCode::INTERNAL_SERVER_ERROR.into_response();
     };
     let cookie = format!("{COOKIE}={session}; HttpOnly; SameSite=Strict; Path=/");
     ([(header::SET_COOKIE, cookie)], Redirect::to("/")).into_response()
+}
+
+/// Ends the session of the cookie. A client with a token has no session and loses none.
+pub(in crate::http) async fn logout(State(shared): State<Shared>, headers: HeaderMap) -> Response {
+    shared.access.end_session(&headers);
+    let cookie = format!("{COOKIE}=; HttpOnly; SameSite=Strict; Path=/; Max-Age=0");
+    ([(header::SET_COOKIE, cookie)], Redirect::to("/login")).into_response()
 }

@@ -1,5 +1,6 @@
 //! The handlers of all operations.
 
+pub(super) mod command;
 pub(super) mod events;
 pub(super) mod login;
 pub(super) mod maps;

@@ -7,93 +7,107 @@ use crate::orders::{
     BudgetOrder, ConstraintsOrder, DismissOrder, ExemplarOrder, LabelOrder, NoteOrder, UtilityOrder,
 };
 use crate::request::SurfaceRequest;
+use axum::Extension;
 use axum::extract::State;
 use axum::http::StatusCode;
 use axum::response::Response;
 use scenecast_protocol::directive::Constraints;
-use scenecast_surface::{FenceOrder, LimitsOrder, SettingsOrder};
+use scenecast_surface::{FenceOrder, LimitsOrder, Principal, SettingsOrder};
 use std::collections::BTreeMap;
 
 pub(in crate::http) async fn utility(
     State(shared): State<Shared>,
+    Extension(principal): Extension<Principal>,
     VehicleId(id): VehicleId,
     JsonOrder(order): JsonOrder<UtilityOrder>,
 ) -> Response {
     let weight =
         |(label, w): (String, f64)| label.parse().map(|l| (l, w)).map_err(|_| format!("{label:?} is not a label"));
     match order.weights.into_iter().map(weight).collect::<Result<BTreeMap<u8, f64>, String>>() {
-        Ok(weights) => shared.respond(SurfaceRequest::Utility(id, weights, (order.exploration, order.curiosity))).await,
+        Ok(weights) => {
+            shared.order(principal, SurfaceRequest::Utility(id, weights, (order.exploration, order.curiosity))).await
+        }
         Err(line) => error(StatusCode::UNPROCESSABLE_ENTITY, &line),
     }
 }
 
 pub(in crate::http) async fn exemplar(
     State(shared): State<Shared>,
+    Extension(principal): Extension<Principal>,
     VehicleId(id): VehicleId,
     JsonOrder(order): JsonOrder<ExemplarOrder>,
 ) -> Response {
-    shared.respond(SurfaceRequest::ExemplarOrder(id, order)).await
+    shared.order(principal, SurfaceRequest::ExemplarOrder(id, order)).await
 }
 
 pub(in crate::http) async fn constraints(
     State(shared): State<Shared>,
+    Extension(principal): Extension<Principal>,
     VehicleId(id): VehicleId,
     JsonOrder(order): JsonOrder<ConstraintsOrder>,
 ) -> Response {
-    shared.respond(SurfaceRequest::Constraints(id, Constraints { hold: order.hold, abort: order.abort })).await
+    shared.order(principal, SurfaceRequest::Constraints(id, Constraints { hold: order.hold, abort: order.abort })).await
 }
 
 pub(in crate::http) async fn fence(
     State(shared): State<Shared>,
+    Extension(principal): Extension<Principal>,
     VehicleId(id): VehicleId,
     JsonOrder(order): JsonOrder<FenceOrder>,
 ) -> Response {
-    shared.respond(SurfaceRequest::Fence(id, order)).await
+    shared.order(principal, SurfaceRequest::Fence(id, order)).await
 }
 
 pub(in crate::http) async fn limits(
     State(shared): State<Shared>,
+    Extension(principal): Extension<Principal>,
     VehicleId(id): VehicleId,
     JsonOrder(order): JsonOrder<LimitsOrder>,
 ) -> Response {
-    shared.respond(SurfaceRequest::Limits(id, order)).await
+    shared.order(principal, SurfaceRequest::Limits(id, order)).await
 }
 
 pub(in crate::http) async fn settings(
     State(shared): State<Shared>,
+    Extension(principal): Extension<Principal>,
     VehicleId(id): VehicleId,
     JsonOrder(order): JsonOrder<SettingsOrder>,
 ) -> Response {
-    shared.respond(SurfaceRequest::Settings(id, order)).await
+    shared.order(principal, SurfaceRequest::Settings(id, order)).await
 }
 
 pub(in crate::http) async fn budget(
     State(shared): State<Shared>,
+    Extension(principal): Extension<Principal>,
     JsonOrder(order): JsonOrder<BudgetOrder>,
 ) -> Response {
-    shared.respond(SurfaceRequest::Budget(order)).await
+    shared.order(principal, SurfaceRequest::Budget(order)).await
 }
 
 pub(in crate::http) async fn label(
     State(shared): State<Shared>,
+    Extension(principal): Extension<Principal>,
     VehicleId(id): VehicleId,
     JsonOrder(order): JsonOrder<LabelOrder>,
 ) -> Response {
-    shared.respond(SurfaceRequest::Label(id, order)).await
+    shared.order(principal, SurfaceRequest::Label(id, order)).await
 }
 
 pub(in crate::http) async fn note(
     State(shared): State<Shared>,
+    Extension(principal): Extension<Principal>,
     VehicleId(id): VehicleId,
     JsonOrder(order): JsonOrder<NoteOrder>,
 ) -> Response {
-    shared.respond(SurfaceRequest::Note(id, order)).await
+    let author = principal.name().to_owned();
+    shared.order(principal, SurfaceRequest::Note(id, author, order)).await
 }
 
 pub(in crate::http) async fn dismiss(
     State(shared): State<Shared>,
+    Extension(principal): Extension<Principal>,
     VehicleId(id): VehicleId,
     JsonOrder(DismissOrder {}): JsonOrder<DismissOrder>,
 ) -> Response {
-    shared.respond(SurfaceRequest::DismissEarlierMap(id)).await
+    shared.order(principal, SurfaceRequest::DismissEarlierMap(id)).await
 }

@@ -1,8 +1,10 @@
 //! `scenecast ctl`
 
+mod command;
 mod constraints;
 
 use clap::{Args, Subcommand};
+use command::CommandChange;
 use constraints::{FenceCommand, LimitsCommand, ReturnPointCommand};
 use scenecast_console::client::{self, BudgetChange, Client, Session, SettingsChange};
 use scenecast_console::orders::ExemplarAction;
@@ -23,6 +25,7 @@ Example: scenecast ctl status
          scenecast ctl fence set fence.geojson --wait 120
          scenecast ctl limits set --depth 5..30 --silence 300 --on-silence return
          scenecast ctl hold --wait 60
+         scenecast ctl command take
          scenecast ctl watch --json --url http://192.168.1.7:8460 --token-file console.token
 
 Exit codes: 0 success; 1 refused, not applied in time, or no answer; 2 wrong usage";
@@ -39,7 +42,7 @@ pub(super) struct Ctl {
     /// Address of the surface's page
     #[arg(long, global = true, value_name = "URL", default_value = "http://127.0.0.1:8460")]
     url: String,
-    /// File with the token of the surface, if it requires one
+    /// File with your token, if the surface requires one
     #[arg(long, global = true, value_name = "FILE")]
     token_file: Option<PathBuf>,
     /// Print JSON instead of text
@@ -139,6 +142,16 @@ enum Command {
         /// Confirm the abort, which ends the survey
         #[arg(long)]
         yes: bool,
+    },
+    /// Print who has command, the right to give orders other than hold and abort; or request it, hand it over, take it,
+    /// give it up.
+    #[command(
+        name = "command",
+        after_help = "Example: scenecast ctl command\n         scenecast ctl command hand-over bob"
+    )]
+    Authority {
+        #[command(subcommand)]
+        change: Option<CommandChange>,
     },
     /// Print changes as they happen, until Ctrl-C.
     #[command(after_help = "Example: scenecast ctl watch --json")]
@@ -298,6 +311,7 @@ impl Command {
             Self::Hold => constraints::hold(session, true).await,
             Self::Resume => constraints::hold(session, false).await,
             Self::Abort { yes } => constraints::abort(session, yes).await,
+            Self::Authority { change } => command::command(session, change).await,
             Self::Watch => client::watch(session).await,
         }
     }

@@ -1,0 +1,52 @@
+// The principal of this page, who has command, and the actions that both allow.
+
+import { readPrincipal, sendCommand } from "./api.js";
+import { store } from "./store.js";
+
+const ROLES = ["viewer", "operator", "administrator"];
+/** Between two signs of presence; the surface waits 120 s for one. */
+const KEEP_MS = 30000;
+
+let me = null;
+let keptMs = -KEEP_MS;
+
+export const principal = () => me;
+export const holder = () => store.snapshot?.command?.holder ?? null;
+export const hasCommand = () => me !== null && holder()?.name === me.name;
+export const rank = (role) => ROLES.indexOf(role);
+
+/** Reads the principal now, and after each interruption; signs of presence follow the keyboard and the pointer. */
+export function startPrincipal() {
+  let connected = false;
+  store.on("feed", () => {
+    if (store.connected && !connected) identify();
+    connected = store.connected;
+  });
+  for (const event of ["pointerdown", "keydown"]) addEventListener(event, keep, { capture: true, passive: true });
+}
+
+async function identify() {
+  try {
+    me = await readPrincipal();
+  } catch {
+    // The server checks every order in any case.
+    return;
+  }
+  store.emit("edit");
+}
+
+function keep() {
+  const isShared = (store.snapshot?.command?.principals.length ?? 0) > 1;
+  if (!isShared || !hasCommand() || performance.now() - keptMs < KEEP_MS) return;
+  keptMs = performance.now();
+  sendCommand("keep").catch(() => {});
+}
+
+/** Why this page must not give an order of a kind now, or null. `kind`: stop (hold, abort), order or settings. */
+export function denial(kind) {
+  if (!me) return null;
+  const least = kind === "settings" ? "administrator" : "operator";
+  if (rank(me.role) < rank(least)) return `This needs the role ${least}; yours is ${me.role}.`;
+  if (kind === "stop" || holder() === null || hasCommand()) return null;
+  return `${holder().name} has command: request it in the bar at the top.`;
+}

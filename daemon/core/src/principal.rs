@@ -1,0 +1,88 @@
+//! Who uses the surface, and the role that decides which actions are allowed.
+
+use std::fmt;
+
+/// Characters in the name of a principal at most.
+const MAX_NAME: usize = 32;
+
+/// A role. Each one may do everything that the roles before it may do.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Role {
+    /// Reads.
+    Viewer,
+    /// Gives orders.
+    Operator,
+    /// Changes settings and keys.
+    Administrator,
+}
+
+impl Role {
+    pub const ALL: [Self; 3] = [Self::Viewer, Self::Operator, Self::Administrator];
+
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Viewer => "viewer",
+            Self::Operator => "operator",
+            Self::Administrator => "administrator",
+        }
+    }
+
+    pub fn from_name(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|role| role.name() == name)
+    }
+}
+
+impl fmt::Display for Role {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+/// The holder of a token, or a peer that gives orders in another way. Its name is unique at one surface.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Principal {
+    name: String,
+    role: Role,
+}
+
+impl Principal {
+    /// A principal; `None` unless the name has 1 to 32 letters, digits, dots, hyphens or underscores of ASCII.
+    pub fn new(name: &str, role: Role) -> Option<Self> {
+        let is_allowed = |c: char| c.is_ascii_alphanumeric() || matches!(c, '.' | '-' | '_');
+        let is_name = (1..=MAX_NAME).contains(&name.len()) && name.chars().all(is_allowed);
+        is_name.then(|| Self { name: name.to_owned(), role })
+    }
+
+    /// Every client of a surface without tokens, which only this machine can reach.
+    pub fn local() -> Self {
+        Self { name: "local".to_owned(), role: Role::Administrator }
+    }
+
+    /// The holder of the only token of a file that names neither roles nor people.
+    pub fn sole_administrator() -> Self {
+        Self { name: "administrator".to_owned(), role: Role::Administrator }
+    }
+
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    pub fn role(&self) -> Role {
+        self.role
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_have_few_characters_and_roles_are_ordered() {
+        let is_name = |name: &str| Principal::new(name, Role::Viewer).is_some();
+        assert!(is_name("anna") && is_name("bridge-2.ros_a"));
+        assert!(!is_name("") && !is_name("a b") && !is_name("<b>") && !is_name("é") && !is_name(&"a".repeat(33)));
+        assert!(Role::Viewer < Role::Operator && Role::Operator < Role::Administrator);
+        assert!(Role::ALL.into_iter().all(|role| Role::from_name(role.name()) == Some(role)));
+        assert_eq!(Role::from_name("Viewer"), None);
+    }
+}

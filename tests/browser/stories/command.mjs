@@ -1,0 +1,113 @@
+import assert from "node:assert/strict";
+
+const CREW = [
+  { name: "anna", role: "operator" }, { name: "bob", role: "operator" },
+  { name: "carla", role: "administrator" }, { name: "victor", role: "viewer" },
+];
+
+/** Logs the story's page in as one of the crew. */
+async function as(s, name, context = s.context, page = s.page) {
+  await context.addCookies([{ name: "principal", value: name, url: s.url }]);
+  await page.goto(s.url);
+  await page.waitForFunction(() => document.body.dataset.feed === "open");
+  await s.until("the principal", () => page.evaluate(async () => (await import("/js/command.js")).principal()?.name), {});
+}
+
+const crewWithAnna = (s) => s.steer({ principals: CREW, commander: "anna" });
+const weigh = (s) => s.page.locator("#exploration").fill("0.5");
+
+export default [
+  {
+    name: "a viewer reads, and every order is disabled with the reason",
+    scenario: "rich",
+    async run(s) {
+      await s.steer({ principals: CREW });
+      await as(s, "victor");
+      await weigh(s);
+      await s.shows("#send .denied", /needs the role operator; yours is viewer/);
+      for (const id of ["send-weights", "hold", "abort", "planner"]) {
+        await s.until(`${id} to be disabled`, () => s.page.locator(`#${id}`).isDisabled());
+      }
+      await s.shows("#vehicle .denied", /needs the role operator/);
+      await s.page.locator("#command").click();
+      await s.shows("#dialog", /You are victor, viewer/);
+      assert.equal(await s.button("Take command").count(), 0);
+      const answer = await s.page.evaluate(() => fetch("/api/v2/vehicles/1/constraints", { method: "POST", headers: { "x-scenecast": "1" }, body: '{"hold": true}' }).then((r) => r.status));
+      assert.equal(answer, 403);
+    },
+    tolerates: /403/,
+  },
+  {
+    name: "without command an operator stops the vehicle and sends no other order",
+    scenario: "rich",
+    async run(s) {
+      await crewWithAnna(s);
+      await as(s, "bob");
+      await s.shows("#command", /anna has command/);
+      await weigh(s);
+      await s.shows("#send .denied", /anna has command/);
+      assert.ok(await s.page.locator("#send-weights").isDisabled());
+      await s.page.locator("#hold").click();
+      await s.button("Hold").click();
+      await s.until("the order", () => s.posts.some((p) => p.path.endsWith("/constraints") && p.body.hold === true));
+      await s.page.locator("#abort").click();
+      await s.page.locator(".sure input").check();
+      await s.button("Abort").click();
+      await s.until("the abort", () => s.posts.some((p) => p.path.endsWith("/constraints") && p.body.abort === true));
+      await s.shows("#command", /anna has command/);
+      assert.equal(await s.page.locator("#vehicle .error").first().innerText(), "");
+    },
+  },
+  {
+    name: "an operator with command may not change settings",
+    scenario: "rich",
+    async run(s) {
+      await crewWithAnna(s);
+      await as(s, "anna");
+      await s.shows("#command", /You have command/);
+      await s.page.getByRole("tab", { name: "Scene model" }).or(s.page.getByRole("tab", { name: "Model" })).first().click();
+      await s.shows("#model .denied", /needs the role administrator; yours is operator/);
+      assert.ok(await s.page.locator("#send-settings").isDisabled());
+    },
+  },
+  {
+    name: "command is requested on one page and handed over on another",
+    scenario: "rich",
+    async run(s) {
+      await crewWithAnna(s);
+      await as(s, "anna");
+      const context = await s.browser.newContext();
+      const page = await context.newPage();
+      try {
+        await as(s, "bob", context, page);
+        await page.locator("#command").click();
+        await page.getByRole("button", { name: "Request command", exact: true }).click();
+        await s.shows(".banner", /bob requests command/);
+        await s.page.locator(".banner button").click();
+        await s.shows("#command", /bob has command/);
+        await s.until("the other page to have command", async () => /You have command/.test(await page.locator("#command").innerText()));
+        const history = await page.locator("ol.changes").innerText();
+        assert.match(history, /anna handed command over to bob[\s\S]*bob requested command from anna/);
+        await weigh(s);
+        await s.until("the weights to be refused", () => s.page.locator("#send-weights").isDisabled());
+      } finally {
+        await context.close();
+      }
+    },
+  },
+  {
+    name: "command is taken after two minutes of silence",
+    scenario: "rich",
+    async run(s) {
+      await crewWithAnna(s);
+      await as(s, "bob");
+      await s.page.locator("#command").click();
+      assert.ok(await s.button("Take command").isDisabled());
+      await s.steer({ advance: 121 });
+      await s.until("the silence", () => s.button("Take command").isEnabled());
+      await s.button("Take command").click();
+      await s.shows("#command", /You have command/);
+      await s.shows("ol.changes", /bob took command from anna, who was silent/);
+    },
+  },
+];
