@@ -7,7 +7,7 @@ use meter::{CpuMeter, resident_bytes};
 use scenecast_config::Config;
 use scenecast_console::state::Origin;
 use scenecast_console::{
-    LinkMeter, MapCells, MapFormat, MissionFacts, Reply, SurfaceRequest, TiledMap, gzip, handle_request, page_files,
+    ClientRequest, LinkMeter, MapCells, MapFormat, MissionFacts, Reply, SurfaceRequest, TiledMap, gzip, handle_request, page_files,
     snapshot,
 };
 use scenecast_core::UserError;
@@ -128,7 +128,7 @@ impl View {
     fn new(config: &Config, survey: &mut Survey) -> Result<Self, UserError> {
         let facts = MissionFacts::new(config, &survey.modem, 1, 1.0);
         let map = TiledMap::first(cells(survey, facts.cell_m)?, 1);
-        let meter = LinkMeter::new(Duration::from_secs_f64(config.link.budget_window_s), Instant::ZERO);
+        let meter = LinkMeter::new(Duration::from_secs_f64(config.link.budget_window_s), scenecast_protocol::time::Instant::ZERO);
         Ok(Self { facts, meter, map, explored: survey.explored() })
     }
 
@@ -158,7 +158,8 @@ fn packed(map: &TiledMap, since: Option<&str>) -> usize {
 }
 
 fn cells(survey: &mut Survey, cell_m: f64) -> Result<MapCells, UserError> {
-    match handle_request(&mut survey.surface, SurfaceRequest::Map(survey.vehicle.number()), cell_m, survey.now) {
+    let request = ClientRequest { principal: None, request: SurfaceRequest::Map(survey.vehicle.number()) };
+    match handle_request(&mut survey.surface, request, cell_m, survey.now) {
         Reply::Map(cells) => Ok(cells),
         _ => Err(UserError::Failed("the surface has no map".to_owned())),
     }
