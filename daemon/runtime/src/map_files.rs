@@ -72,7 +72,9 @@ async fn write_all(dir: PathBuf, mut receiver: watch::Receiver<Waiting>) {
             match made {
                 Ok(Err(reason)) if !is_failing => {
                     is_failing = true;
-                    tracing::warn!("the map of vehicle {vehicle} is not written: {reason}; further failures are not logged");
+                    tracing::warn!(
+                        "the map of vehicle {vehicle} is not written: {reason}; further failures are not logged"
+                    );
                 }
                 Ok(Ok(())) => is_failing = false,
                 _ => {}

@@ -7,8 +7,8 @@ use meter::{CpuMeter, resident_bytes};
 use scenecast_config::Config;
 use scenecast_console::state::Origin;
 use scenecast_console::{
-    ClientRequest, LinkMeter, MapCells, MapFormat, MissionFacts, Reply, SurfaceRequest, TiledMap, gzip, handle_request, page_files,
-    snapshot,
+    ClientRequest, LinkMeter, MapCells, MapFormat, MissionFacts, Reply, SurfaceRequest, TiledMap, gzip, handle_request,
+    page_files, snapshot,
 };
 use scenecast_core::UserError;
 use serde::Serialize;
@@ -128,7 +128,10 @@ impl View {
     fn new(config: &Config, survey: &mut Survey) -> Result<Self, UserError> {
         let facts = MissionFacts::new(config, &survey.modem, 1, 1.0);
         let map = TiledMap::first(cells(survey, facts.cell_m)?, 1);
-        let meter = LinkMeter::new(Duration::from_secs_f64(config.link.budget_window_s), scenecast_protocol::time::Instant::ZERO);
+        let meter = LinkMeter::new(
+            Duration::from_secs_f64(config.link.budget_window_s),
+            scenecast_protocol::time::Instant::ZERO,
+        );
         Ok(Self { facts, meter, map, explored: survey.explored() })
     }
 

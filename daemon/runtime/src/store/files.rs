@@ -54,14 +54,7 @@ impl SurfaceFiles {
         let off_ms = if store.memory().began().is_some() { unix_ms().saturating_sub(last.unix_ms) } else { 0 };
         let start = Instant::from_micros(last.mission_us) + Duration::from_millis(off_ms).mul_f64(scale);
         let now = std::time::Instant::now();
-        let files = Self {
-            dir,
-            scale,
-            store,
-            tried: now,
-            committed: now,
-            pause: COMMIT_INTERVAL,
-        };
+        let files = Self { dir, scale, store, tried: now, committed: now, pause: COMMIT_INTERVAL };
         files.keep_pictures_of_earlier_builds();
         Ok((files, Clock::starting_at(start, scale)))
     }
