@@ -48,13 +48,14 @@ fn a_disk_that_refuses_is_written_again_once_it_accepts() {
         let disk = Disk::default();
         let (mut store, mut surface) = start(&disk, 0);
         note(&mut store, &mut surface, "first", 1);
-        disk.fail(Some(failing));
+        disk.fail(Some(DiskStep::Append));
         note(&mut store, &mut surface, "second", 2);
+        disk.fail(Some(failing));
         store.reopen(Ok(disk.clone()), at(3));
         assert!(store.is_closed() && store.faults.write_errors > 0, "{failing:?}");
         assert!(store.faults.failing.as_ref().unwrap().contains("input/output error"));
         note(&mut store, &mut surface, "third", 4);
-        assert_eq!(notes(&disk.clone()).first().map(String::as_str), Some("first"), "{failing:?}");
+        assert_eq!(notes(&disk).first().map(String::as_str), Some("first"), "{failing:?}");
         disk.fail(None);
         store.reopen(Ok(disk.clone()), at(5));
         assert!(!store.is_closed() && store.faults.failing.is_none(), "{failing:?}");
