@@ -97,8 +97,11 @@ fn a_killed_surface_shows_the_same_page_again() {
     wait_until("the orders are applied", LIMIT, || is_applied(&pair.auv()));
     vehicle.kill();
     pair.post("vehicles/1/utility", &format!(r#"{{"weights": {{"{label}": 0.5}}, "exploration": 0.2}}"#));
-    let utility = |v: &Value| v["directive"]["slots"].as_array().unwrap().iter().find(|s| s["slot"] == "utility").cloned();
-    wait_until("the order is transmitted", LIMIT, || utility(&pair.auv()).is_some_and(|order| order["state"] == "on_air"));
+    let utility =
+        |v: &Value| v["directive"]["slots"].as_array().unwrap().iter().find(|s| s["slot"] == "utility").cloned();
+    wait_until("the order is transmitted", LIMIT, || {
+        utility(&pair.auv()).is_some_and(|order| order["state"] == "on_air")
+    });
     let (before, map) = (pair.state().unwrap(), cells(&pair));
     surface.kill();
     let began = Instant::now();
@@ -111,7 +114,15 @@ fn a_killed_surface_shows_the_same_page_again() {
     assert_eq!(after["mission"]["id"], before["mission"]["id"]);
     assert!(after["now_s"].as_f64() > before["now_s"].as_f64(), "ages continue");
     assert!(!after["vehicles"][0]["map"]["earlier"].is_null(), "the map is not shown as live");
-    let second = run(&["asv", "--config", &pair.surface_file, "--set", "console.listen=\"\"", "--set", "modem.listen=127.0.0.1:0"]);
+    let second = run(&[
+        "asv",
+        "--config",
+        &pair.surface_file,
+        "--set",
+        "console.listen=\"\"",
+        "--set",
+        "modem.listen=127.0.0.1:0",
+    ]);
     let line = String::from_utf8_lossy(&second.stderr).into_owned();
     assert!(second.status.code() == Some(2) && line.contains("another process"), "{line}");
 

@@ -3,9 +3,7 @@
 use super::handlers::{events, login, maps, metrics, orders, readings};
 use super::shared::{ArchiveName, Shared, VehicleId};
 use crate::fit::Fit;
-use crate::orders::{
-    BudgetOrder, ConstraintsOrder, DismissOrder, ExemplarOrder, LabelOrder, NoteOrder, UtilityOrder,
-};
+use crate::orders::{BudgetOrder, ConstraintsOrder, DismissOrder, ExemplarOrder, LabelOrder, NoteOrder, UtilityOrder};
 use crate::state::{AcceptedOrder, ArchiveList, MapBody, MissionState};
 use axum::extract::State;
 use axum::http::{HeaderMap, Method};

@@ -3,8 +3,9 @@
 use super::facts::{MissionFacts, seconds};
 use super::{exemplar, link, position};
 use crate::state::{
-    AppliedOrder, DirectiveSlots, EarlierMap, MapLabel, MapSummary, OrderProgress, OrderStatus, PlannedPath, ReportedMode,
-    ReportedPose, StatusReport, UsblMeasurement, UtilityTerms, VehicleNote, VehicleOrders, VehicleSettings, VehicleState,
+    AppliedOrder, DirectiveSlots, EarlierMap, MapLabel, MapSummary, OrderProgress, OrderStatus, PlannedPath,
+    ReportedMode, ReportedPose, StatusReport, UsblMeasurement, UtilityTerms, VehicleNote, VehicleOrders,
+    VehicleSettings, VehicleState,
 };
 use scenecast_protocol::coordinates::MapPoint;
 use scenecast_protocol::directive::{self, PlannerKind, SlotProgress};

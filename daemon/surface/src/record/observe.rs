@@ -223,12 +223,7 @@ fn map_updated(record: &VehicleRecord, view: &PeerView<'_>) -> Option<Instant> {
     layers.chain(view.replica().updated()).chain(whole).max()
 }
 
-fn map_changes(
-    record: &VehicleRecord,
-    view: &PeerView<'_>,
-    memory: &VehicleMemory,
-    events: &mut Vec<VehicleEvent>,
-) {
+fn map_changes(record: &VehicleRecord, view: &PeerView<'_>, memory: &VehicleMemory, events: &mut Vec<VehicleEvent>) {
     let labels = match &record.whole.last {
         Some(whole) => memory.map.label_changes(whole.iter().map(|(cell, label)| (cell, label, record.whole.at))),
         None => memory.map.label_changes(view.replica().cells()),
@@ -287,12 +282,7 @@ fn exemplar_changes(record: &VehicleRecord, memory: &VehicleMemory, events: &mut
     }
 }
 
-fn order_changes(
-    record: &VehicleRecord,
-    view: &PeerView<'_>,
-    memory: &VehicleMemory,
-    events: &mut Vec<VehicleEvent>,
-) {
+fn order_changes(record: &VehicleRecord, view: &PeerView<'_>, memory: &VehicleMemory, events: &mut Vec<VehicleEvent>) {
     let orders: Vec<_> = view.slots().map(stored::order).collect();
     if memory.orders != orders {
         events.push(VehicleEvent::Orders(orders));

@@ -1,8 +1,6 @@
 //! The surface's types as they are stored, and back.
 
-use super::event::{
-    StoredContact, StoredImage, StoredIntent, StoredOrder, StoredRange, StoredRequest,
-};
+use super::event::{StoredContact, StoredImage, StoredIntent, StoredOrder, StoredRange, StoredRequest};
 use crate::exemplar_cache::{OpenRequest, RequestState, StoredExemplar};
 use crate::settings::SettingsRecord;
 use crate::vehicle_record::VehicleRecord;

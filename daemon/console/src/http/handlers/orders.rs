@@ -3,9 +3,7 @@
 use crate::http::body::JsonOrder;
 use crate::http::response::error;
 use crate::http::shared::{Shared, VehicleId};
-use crate::orders::{
-    BudgetOrder, ConstraintsOrder, DismissOrder, ExemplarOrder, LabelOrder, NoteOrder, UtilityOrder,
-};
+use crate::orders::{BudgetOrder, ConstraintsOrder, DismissOrder, ExemplarOrder, LabelOrder, NoteOrder, UtilityOrder};
 use crate::request::SurfaceRequest;
 use axum::extract::State;
 use axum::http::StatusCode;
