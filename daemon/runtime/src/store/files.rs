@@ -49,7 +49,7 @@ impl SurfaceFiles {
             Err(e) if e.kind() == ErrorKind::ResourceBusy => return Err(UserError::file(&dir, e)),
             folder => folder,
         };
-        let store = SurfaceStore::load(folder, config.mission.id, config.link.budget_bps)?;
+        let store = SurfaceStore::load(folder, config.mission.id)?;
         let (last, scale) = (store.memory().last(), config.runtime.time_scale);
         let off_ms = if store.memory().began().is_some() { unix_ms().saturating_sub(last.unix_ms) } else { 0 };
         let start = Instant::from_micros(last.mission_us) + Duration::from_millis(off_ms).mul_f64(scale);

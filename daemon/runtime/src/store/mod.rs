@@ -63,8 +63,8 @@ pub(super) struct SurfaceStore<S: Storage> {
 
 impl<S: Storage> SurfaceStore<S> {
     /// Reads the state that survived. Without a storage, or with one that refuses, the state is kept in memory only. The
-    /// state of another mission than `mission` is set aside. `configured_bps` is the configured budget.
-    pub(super) fn load(storage: io::Result<S>, mission: u32, configured_bps: u32) -> Result<Self, UserError> {
+    /// state of another mission than `mission` is set aside.
+    pub(super) fn load(storage: io::Result<S>, mission: u32) -> Result<Self, UserError> {
         let mut store = Self {
             recorder: Recorder::default(),
             log: None,
@@ -74,11 +74,8 @@ impl<S: Storage> SurfaceStore<S> {
             faults: DiskFaults::default(),
         };
         match storage.and_then(|storage| store.read(storage, mission)) {
-            Ok(memory) => store.recorder = Recorder::new(memory?, configured_bps),
-            Err(error) => {
-                store.recorder = Recorder::new(SurfaceMemory::default(), configured_bps);
-                store.faults.fail(STORE, error);
-            }
+            Ok(memory) => store.recorder = Recorder::new(memory?),
+            Err(error) => store.faults.fail(STORE, error),
         }
         Ok(store)
     }

@@ -76,7 +76,7 @@ impl Trial {
         cuts.reverse();
         let mut trial = Self {
             surface: surface(&config, seed, Instant::ZERO),
-            store: SurfaceStore::load(Ok(disk.clone()), MISSION, config.link.budget_bps).unwrap(),
+            store: SurfaceStore::load(Ok(disk.clone()), MISSION).unwrap(),
             vehicle: vehicle(&config, 1, Instant::ZERO),
             epoch: 1,
             config,
@@ -262,7 +262,7 @@ impl Trial {
     fn restart(&mut self) {
         self.starts += 1;
         self.disk.power_cut(DiskRng::new(self.rng.below(1 << 30) as u64));
-        let store = SurfaceStore::load(Ok(self.disk.clone()), MISSION, self.config.link.budget_bps).unwrap();
+        let store = SurfaceStore::load(Ok(self.disk.clone()), MISSION).unwrap();
         let found = store.memory().to_events();
         assert!(self.possible.contains(&found), "a state that never was: {found:?}");
         self.possible = vec![found];

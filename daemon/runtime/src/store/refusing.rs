@@ -9,8 +9,6 @@ use scenecast_surface::Surface;
 use scenecast_surface::record::EventTime;
 use std::io::{Error, ErrorKind};
 
-const BPS: u32 = 1000;
-
 fn surface() -> Surface {
     let config = scenecast_config::load(None, &[]).unwrap();
     let profile = scenecast_config::modem_profile(&config, config.modem.bit_rate);
@@ -26,7 +24,7 @@ fn at(seconds: u64) -> EventTime {
 }
 
 fn start(disk: &Disk, seconds: u64) -> (SurfaceStore<Disk>, Surface) {
-    let mut store = SurfaceStore::load(Ok(disk.clone()), 1, BPS).unwrap();
+    let mut store = SurfaceStore::load(Ok(disk.clone()), 1).unwrap();
     let mut surface = surface();
     store.begin(&mut surface, 9, 1, at(seconds));
     (store, surface)
@@ -70,7 +68,7 @@ fn a_folder_that_appears_later_loses_none_of_its_content() {
     let (mut store, mut surface) = start(&disk, 0);
     note(&mut store, &mut surface, "before", 1);
     let refused = Err(Error::from(ErrorKind::PermissionDenied));
-    let mut later = SurfaceStore::load(refused, 1, BPS).unwrap();
+    let mut later = SurfaceStore::load(refused, 1).unwrap();
     let mut surface = self::surface();
     later.begin(&mut surface, 10, 1, at(50));
     note(&mut later, &mut surface, "after", 51);
@@ -93,7 +91,7 @@ fn damaged_stores_and_those_of_other_missions_are_kept() {
     assert_eq!(notes(&disk), ["note 1"], "everything before the damage");
     let names = crate::journal::Storage::list(&disk).unwrap();
     assert!(names.contains(&"surface-damaged-1.store".to_owned()), "{names:?}");
-    let other = SurfaceStore::load(Ok(disk.clone()), 2, BPS).unwrap();
+    let other = SurfaceStore::load(Ok(disk.clone()), 2).unwrap();
     assert!(other.memory().began().is_none(), "another mission begins without notes");
     let names = crate::journal::Storage::list(&disk).unwrap();
     assert!(names.iter().any(|name| name.starts_with("surface-mission-1-")), "{names:?}");

@@ -37,8 +37,8 @@ pub struct Event {
 pub enum EventKind {
     /// The store was begun: a random name, the number of the mission, and the series of the orders' versions.
     Began { id: u32, mission: u32, series: u64 },
-    /// The operator changed the budget of the surface.
-    Budget(StoredBudget),
+    /// The operator changed the budget of the surface. The order is void once another one is configured.
+    Budget { ordered: StoredBudget, configured: StoredBudget },
     /// A fact about the vehicle with this address.
     Vehicle(u8, VehicleEvent),
 }
@@ -91,8 +91,8 @@ pub struct RunId {
     pub began_unix_ms: u64,
 }
 
-/// The surface's budget as the operator ordered it.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+/// A budget of the surface, as ordered or as configured.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct StoredBudget {
     /// Bits a second.
     pub bits_per_s: u32,
@@ -100,8 +100,6 @@ pub struct StoredBudget {
     pub shares: [u8; 5],
     /// The order of the background streams, as on the wire.
     pub background: Vec<u8>,
-    /// The configured budget when the order was given; the order is void once the configuration has another.
-    pub configured_bps: u32,
 }
 
 /// Cells with their values and the time at which each was received.

@@ -33,7 +33,8 @@ pub struct SurfaceMemory {
     pub(super) last: EventTime,
     /// How the store was begun.
     pub(super) began: Option<Began>,
-    pub(super) budget: Option<StoredBudget>,
+    /// The last order of a budget, and the configured one at that time.
+    pub(super) budget: Option<(StoredBudget, StoredBudget)>,
     pub(super) vehicles: BTreeMap<u8, VehicleMemory>,
 }
 
@@ -73,7 +74,7 @@ impl SurfaceMemory {
         (self.sequence, self.last) = (event.sequence, event.time);
         match &event.kind {
             &EventKind::Began { id, mission, series } => self.began = Some(Began { id, mission, series }),
-            EventKind::Budget(budget) => self.budget = Some(budget.clone()),
+            EventKind::Budget { ordered, configured } => self.budget = Some((ordered.clone(), configured.clone())),
             EventKind::Vehicle(address, event) => self.vehicles.entry(*address).or_default().apply(event),
         }
     }
@@ -92,7 +93,8 @@ impl SurfaceMemory {
     pub fn to_events(&self) -> Vec<EventKind> {
         let began = self.began.map(|Began { id, mission, series }| EventKind::Began { id, mission, series });
         let mut all: Vec<EventKind> = began.into_iter().collect();
-        all.extend(self.budget.clone().map(EventKind::Budget));
+        let budget = self.budget.clone();
+        all.extend(budget.map(|(ordered, configured)| EventKind::Budget { ordered, configured }));
         for (&address, vehicle) in &self.vehicles {
             all.extend(vehicle.to_events().into_iter().map(|event| EventKind::Vehicle(address, event)));
         }

@@ -33,7 +33,8 @@ pub struct Recorder {
     memory: SurfaceMemory,
     /// The state of each vehicle's map when it was last compared.
     seen: BTreeMap<Address, SeenMap>,
-    configured_bps: u32,
+    /// The configured budget.
+    configured: StoredBudget,
 }
 
 #[derive(Debug, Default, Clone, Copy, PartialEq)]
@@ -46,9 +47,9 @@ struct SeenMap {
 }
 
 impl Recorder {
-    /// Follows a surface that was restored from `memory`. `configured_bps` is the configured budget.
-    pub fn new(memory: SurfaceMemory, configured_bps: u32) -> Self {
-        Self { memory, seen: BTreeMap::new(), configured_bps }
+    /// Begins with the state that survived.
+    pub fn new(memory: SurfaceMemory) -> Self {
+        Self { memory, ..Self::default() }
     }
 
     /// The state after all events so far.
@@ -67,6 +68,7 @@ impl Recorder {
     /// maps until the vehicles have sent them again. `id` and `mission` are those of a new store.
     pub fn begin(&mut self, surface: &mut Surface, id: u32, mission: u32, time: EventTime) -> Observation {
         let mut found = Observation::default();
+        self.configured = budget(surface);
         match self.memory.began {
             None => {
                 let series = surface.link.series().into();
@@ -76,7 +78,7 @@ impl Recorder {
                 for address in self.memory.vehicles.keys().copied().collect::<Vec<_>>() {
                     self.replace(&mut found, address, time);
                 }
-                super::restore::restore(surface, &self.memory, self.configured_bps);
+                super::restore::restore(surface, &self.memory, &self.configured);
             }
         }
         let follow = self.observe(surface, None, time);
@@ -103,15 +105,11 @@ impl Recorder {
     }
 
     fn observe_budget(&mut self, surface: &Surface, source: &EventSource, found: &mut Observation, time: EventTime) {
-        let budget = StoredBudget {
-            bits_per_s: surface.budget_bps(),
-            shares: surface.shares().0,
-            background: surface.background().to_bytes(),
-            configured_bps: self.configured_bps,
-        };
-        let is_ordered = self.memory.budget.is_some() || *source != EventSource::Surface;
-        if is_ordered && self.memory.budget.as_ref() != Some(&budget) {
-            self.push(found, source.clone(), time, EventKind::Budget(budget));
+        let ordered = budget(surface);
+        let known = self.memory.budget.as_ref().map_or(&self.configured, |(ordered, _)| ordered);
+        if *known != ordered {
+            let configured = self.configured.clone();
+            self.push(found, source.clone(), time, EventKind::Budget { ordered, configured });
         }
     }
 
@@ -203,6 +201,14 @@ impl Recorder {
         } else if record.earlier.map.as_ref().is_none_or(|shown| !Arc::ptr_eq(shown, earlier)) {
             record.show_earlier(Some(earlier.clone()));
         }
+    }
+}
+
+fn budget(surface: &Surface) -> StoredBudget {
+    StoredBudget {
+        bits_per_s: surface.budget_bps(),
+        shares: surface.shares().0,
+        background: surface.background().to_bytes(),
     }
 }
 

@@ -1,5 +1,6 @@
 //! Puts the stored knowledge back into a surface that has just started.
 
+use super::event::StoredBudget;
 use super::memory::{SurfaceMemory, VehicleMemory};
 use super::stored;
 use crate::Surface;
@@ -11,19 +12,21 @@ use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::Address;
 
 /// Puts everything back but the maps, which the recorder gives to the surface as earlier maps.
-pub(super) fn restore(surface: &mut Surface, memory: &SurfaceMemory, configured_bps: u32) {
+pub(super) fn restore(surface: &mut Surface, memory: &SurfaceMemory, configured: &StoredBudget) {
     let now = Instant::from_micros(memory.last.mission_us);
     if let Some(series) = memory.began.and_then(|began| began.series.try_into().ok()) {
         surface.link.restore_series(series);
     }
-    if let Some(budget) = memory.budget.as_ref().filter(|b| b.configured_bps == configured_bps) {
+    if let Some((budget, _)) = memory.budget.as_ref().filter(|(_, then)| then == configured) {
         surface.link.set_budget(budget.bits_per_s, now);
         surface.link.set_shares(Shares(budget.shares));
         BackgroundOrder::from_bytes(&budget.background).into_iter().for_each(|order| surface.set_background(order));
     }
     for (&number, vehicle) in &memory.vehicles {
         let Some(address) = Address::vehicle(number) else { continue };
-        surface.link.restore_orders(address, vehicle.orders.iter().filter_map(stored::progress), now);
+        if !surface.link.restore_orders(address, vehicle.orders.iter().filter_map(stored::progress), now) {
+            continue;
+        }
         let record = surface.records.entry(address).or_insert_with(|| VehicleRecord::new(vehicle.name.clone()));
         restore_record(record, vehicle);
     }

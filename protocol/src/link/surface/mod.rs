@@ -97,19 +97,27 @@ impl<R: StateReplica> SurfaceLink<R> {
     /// Continues with the series of an earlier run of the surface, before any order is issued.
     pub fn restore_series(&mut self, series: u16) {
         self.series = series;
-        self.fleet.addresses().collect::<Vec<_>>().into_iter().for_each(|v| self.restore_orders(v, [], Instant::ZERO));
+        for vehicle in self.fleet.addresses().collect::<Vec<_>>() {
+            self.restore_orders(vehicle, [], Instant::ZERO);
+        }
     }
 
-    /// Puts the orders to a vehicle back that an earlier run of the surface has issued in the same series. A vehicle that was
-    /// found by a discovery call is added at `now`.
-    pub fn restore_orders(&mut self, vehicle: Address, orders: impl IntoIterator<Item = SlotProgress>, now: Instant) {
-        if self.fleet.get(vehicle).is_none() {
+    /// Puts the orders to a vehicle back that an earlier run of the surface has issued in the same series. A vehicle that is not
+    /// configured is added at `now`, if discovery calls may find vehicles. Returns whether the vehicle is known.
+    pub fn restore_orders(
+        &mut self,
+        vehicle: Address,
+        orders: impl IntoIterator<Item = SlotProgress>,
+        now: Instant,
+    ) -> bool {
+        let is_known = self.fleet.get(vehicle).is_some();
+        if !is_known && self.config.discovery_period.is_some() && self.fleet.has_room() {
             self.add(vehicle, now);
         }
         let series = self.series;
-        if let Some(peer) = self.fleet.get_mut(vehicle) {
-            peer.restore_orders(series, orders);
-        }
+        let Some(peer) = self.fleet.get_mut(vehicle) else { return false };
+        peer.restore_orders(series, orders);
+        true
     }
 
     /// The current view of a vehicle; `None` if it is unknown.
