@@ -130,7 +130,7 @@ impl Surface {
     /// The number of cells with a label that the vehicle has sent in its current run, in view or not.
     pub fn current_cells(&self, vehicle: Address) -> usize {
         let whole = self.records.get(&vehicle).and_then(|d| d.whole.last.as_ref());
-        let count = |view: PeerView<'_>| view.replica().counts().map(|(_, cells)| cells as usize).sum();
+        let count = |view: PeerView<'_>| view.replica().counts().map(|(_, cells)| cells as usize).sum::<usize>();
         let live = || self.link.vehicle(vehicle).map_or(0, count);
         whole.map_or_else(live, LabelGrid::explored)
     }
