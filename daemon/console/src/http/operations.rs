@@ -31,6 +31,7 @@ pub(super) enum Content {
     /// Tiles of a map.
     Tiles,
     Headers,
+    Empty,
 }
 
 /// A path and a method.
@@ -81,7 +82,7 @@ fn change(
     body: SchemaOf,
     route: fn() -> MethodRouter<Shared>,
 ) -> Operation {
-    let (role, success) = (Some(Role::Operator), (204, Content::Headers));
+    let (role, success) = (Some(Role::Operator), (204, Content::Empty));
     Operation { method: Method::POST, path, id, role, summary, body: Some(body), success, route }
 }
 
