@@ -168,7 +168,10 @@ impl SurfaceShell {
             _ => handle_request(self.host.surface_mut(), request, self.facts.cell_m, now),
         };
         self.files.commit(self.host.surface_mut(), by.as_deref(), now);
-        self.is_stale = true;
+        if by.is_some() {
+            // Who reads the state after the reply finds the order in it.
+            self.publish();
+        }
         // A browser that closed its connection needs no reply.
         let _ = reply.send(answer);
     }
