@@ -135,8 +135,13 @@ fn a_killed_surface_shows_the_same_page_again() {
     let (_, list) = http(pair.console, "GET", "/api/v2/archive", "", "").unwrap();
     let list: Value = serde_json::from_slice(&list).unwrap();
     let name = list["maps"][0]["name"].as_str().expect("the map before the restart is archived").to_owned();
-    let (status, png) = http(pair.console, "GET", &format!("/api/v2/archive/{name}/map.png"), "", "").unwrap();
-    assert!(status == 200 && png.starts_with(b"\x89PNG"));
+    for (file, head) in
+        [("map.png", "\u{89}PNG"), ("map.csv", "east"), ("map.geojson", "{"), ("map.ply", "ply"), ("map.tif", "II*")]
+    {
+        let (status, bytes) = http(pair.console, "GET", &format!("/api/v2/archive/{name}/{file}"), "", "").unwrap();
+        let begin: String = bytes.iter().take(16).map(|&b| char::from(b)).collect();
+        assert!(status == 200 && begin.starts_with(head), "{file}: {status} {begin}");
+    }
     assert!(Path::new(&pair.dir.join(format!("asv/{name}.scmap"))).exists());
 }
 
