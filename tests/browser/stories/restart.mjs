@@ -33,7 +33,7 @@ export default [
       await s.page.locator("#tools button", { hasText: "Export" }).click();
       await s.shows("#dialog .archive", /auv-1, run 1, label epoch 0.*40 cells, ended .* ago/s);
       const links = await s.page.locator("#dialog .archive a").evaluateAll((all) => all.map((a) => a.getAttribute("href")));
-      assert.deepEqual(links, ["png", "csv", "geojson", "ply"].map((e) => `/api/v2/archive/${map.name}/map.${e}`));
+      assert.deepEqual(links, ["png", "tif", "csv", "geojson", "ply"].map((e) => `/api/v2/archive/${map.name}/map.${e}`));
     },
   },
 ];

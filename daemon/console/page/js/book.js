@@ -33,16 +33,32 @@ function change(id, edit) {
   edit(current());
   remember(loadedKey, book);
   store.emit("book");
+  send(id);
+}
+
+function send(id) {
   const entry = { label: id, name: book.names[id] ?? null, colour: book.colours[id] ?? null, merged_into: book.merged[id] ?? null };
   if (!store.vehicle) return;
   saving += 1;
   saveLabel(store.vehicle.id, entry).catch((error) => announce(error.message)).finally(() => (saving -= 1));
 }
 
+/** Sends the entries that an earlier build kept in this browser alone to a surface that has none for these labels. */
+function share() {
+  if (book.isShared || !store.vehicle) return;
+  book.isShared = true;
+  remember(loadedKey, book);
+  const has = (part, id) => (book[part][id] ?? null) !== null;
+  const isMissing = (l) => [l.name, l.colour, l.merged_into].every((value) => value === null);
+  const parts = ["names", "colours", "merged"];
+  store.vehicle.labels.filter((l) => isMissing(l) && parts.some((part) => has(part, l.id))).forEach((l) => send(l.id));
+}
+
 /** Takes the entries of the surface over, which other consoles may have changed. */
 function take() {
-  if (saving > 0) return;
   const b = current();
+  share();
+  if (saving > 0) return;
   let changed = false;
   const put = (part, id, value) => {
     if (value === undefined || (b[part][id] ?? null) === value) return;

@@ -5,7 +5,7 @@ import { h } from "../dom.js";
 import { ago } from "../format.js";
 import { ageOf } from "../store.js";
 
-const FORMATS = ["png", "csv", "geojson", "ply"];
+const FORMATS = ["png", "tif", "csv", "geojson", "ply"];
 
 /** The list, which fills itself; it stays empty without archived maps. */
 export function archivedMaps() {
