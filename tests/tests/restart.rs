@@ -164,3 +164,11 @@ fn a_removed_folder_stops_no_surface() {
     let _surface = pair.surface();
     wait_until("the note survives", LIMIT, || pair.auv()["notes"][0]["text"] == "written in memory");
 }
+
+#[test]
+fn restarts_of_either_end_lose_nothing_and_repeat_no_order() {
+    let output = run(&["bench", "restart", "--runs", "20"]);
+    let figures = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert!(output.status.success(), "{figures}{}", String::from_utf8_lossy(&output.stderr));
+    println!("{figures}");
+}

@@ -19,6 +19,7 @@ mod outputs;
 mod panorama;
 pub mod planning_bench;
 mod report;
+pub mod restart_bench;
 mod script;
 mod simulated_autopilot;
 #[cfg(test)]

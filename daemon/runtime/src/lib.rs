@@ -11,12 +11,12 @@ mod kept_label_tests;
 #[cfg(feature = "surface")]
 mod map_files;
 mod mapping;
+mod missing_key;
 mod modem;
 mod pilot;
 mod port;
 #[cfg(all(test, feature = "surface"))]
 mod power_cut_tests;
-mod refusals;
 #[cfg(all(test, feature = "surface"))]
 mod refusing_disk_tests;
 mod reload;

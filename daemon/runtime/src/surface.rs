@@ -3,9 +3,9 @@
 use super::clock::Clock;
 use super::instruments::{Instruments, relay};
 use super::map_files::{MapFile, MapFiles};
+use super::missing_key::warn_without_key;
 use super::modem::{self, ModemPort};
 use super::pilot::{self, PilotPort, SimulatedAutopilot};
-use super::refusals::{Refusals, warn_without_key};
 use super::stop::Stop;
 use super::store::SurfaceFiles;
 use crate::port::FromPort;
@@ -78,10 +78,9 @@ pub fn run_surface(config: Config, simulated: Option<SimulatedAutopilot>) -> Res
         let follow = p.follow.then(|| Follow::new(p.stand_off_m, p.dead_band_m));
         let follower = autopilot.map(|a| Follower::new(a, follow, vehicle, clock.now()));
         let host = SurfaceHost::new(surface, modem_station(&config, Address::SURFACE, profile)?, follower);
-        let refusals = Refusals::default();
         let maps = MapFiles::start(config.runtime.state_dir.clone());
         let is_stale = true;
-        SurfaceShell { host, ports, console, clock, files, maps, facts, meter, refusals, is_stale }.run(stop).await
+        SurfaceShell { host, ports, console, clock, files, maps, facts, meter, is_stale }.run(stop).await
     })
 }
 
@@ -101,7 +100,6 @@ struct SurfaceShell {
     maps: MapFiles,
     facts: MissionFacts,
     meter: LinkMeter,
-    refusals: Refusals,
     /// The page lacks changes that are still to be committed.
     is_stale: bool,
 }
@@ -246,12 +244,7 @@ impl SurfaceShell {
         let bits_on_air = |bytes: usize| self.host.link().profile().bits_on_air(bytes);
         match *event {
             FrameEvent::Sent { bytes, .. } => self.meter.sent(bits_on_air(bytes), now),
-            FrameEvent::Received { bytes } => {
-                self.meter.received(bits_on_air(bytes), now);
-                let surface = self.host.surface();
-                let views = surface.vehicles().filter_map(|(a, _)| surface.view(a));
-                views.for_each(|v| self.refusals.note(v.stats()));
-            }
+            FrameEvent::Received { bytes } => self.meter.received(bits_on_air(bytes), now),
             _ => {}
         }
     }

@@ -4,9 +4,9 @@ use super::clock::Clock;
 use super::durable::{Keeper, StartedRun};
 use super::journal::Folder;
 use super::mapping::{Camera, FromMapper, Mapped, MapperThread, ToMapper};
+use super::missing_key::warn_without_key;
 use super::modem::{self, ModemPort};
 use super::pilot::{self, PilotPort, SimulatedAutopilot};
-use super::refusals::{Refusals, warn_without_key};
 use super::reload::{Load, Reload};
 use super::restore::{Start, start};
 use super::stop::Stop;
@@ -69,8 +69,7 @@ pub fn run_vehicle(load: Load, simulated: Option<SimulatedAutopilot>) -> Result<
         if is_recorded && camera.is_over() {
             host.handle_camera_end();
         }
-        let refusals = Refusals::default();
-        VehicleShell { host, camera, mapper, ports, clock, keeper, reload, refusals, missed: 0 }.run(stop).await
+        VehicleShell { host, camera, mapper, ports, clock, keeper, reload, missed: 0 }.run(stop).await
     })
 }
 
@@ -94,7 +93,6 @@ struct VehicleShell {
     clock: Clock,
     keeper: Keeper<Folder>,
     reload: Reload,
-    refusals: Refusals,
     /// Camera frames that could not be read.
     missed: u64,
 }
@@ -214,12 +212,7 @@ impl VehicleShell {
                         fix.sigma_m
                     );
                 }
-                VehicleHostEvent::Frame(event) => {
-                    modem::log(&event)?;
-                    if matches!(event, FrameEvent::Received { .. }) {
-                        self.refusals.note(self.host.vehicle().stats());
-                    }
-                }
+                VehicleHostEvent::Frame(event) => modem::log(&event)?,
                 VehicleHostEvent::Pilot(event) => pilot::log(event),
             }
         }

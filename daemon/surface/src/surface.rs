@@ -429,10 +429,7 @@ impl Surface {
                 Some(SurfaceOutput::MapChanged(vehicle))
             }
             SurfaceEvent::RunEnded(vehicle) => Some(SurfaceOutput::RunEnded(vehicle)),
-            SurfaceEvent::Mismatch(vehicle, mismatch) => {
-                self.records.get_mut(&vehicle)?.mismatch = Some((mismatch, now));
-                Some(SurfaceOutput::Mismatch(vehicle, mismatch))
-            }
+            SurfaceEvent::Mismatch(vehicle, mismatch) => Some(SurfaceOutput::Mismatch(vehicle, mismatch)),
             SurfaceEvent::SlotDecided(vehicle, slot) => {
                 let decided = self.link.vehicle(vehicle)?.slots().find(|s| s.id == slot)?;
                 let (status, version) = (decided.status, decided.version);

@@ -8,7 +8,7 @@ use super::settings::SettingsRecord;
 use scenecast_core::UsblLine;
 use scenecast_protocol::directive::{ExemplarRequests, Fence, Limits, SlotId, Utility};
 use scenecast_protocol::exemplar::Exemplar;
-use scenecast_protocol::link::{Mismatch, PeerView};
+use scenecast_protocol::link::PeerView;
 use scenecast_protocol::map::LabelGrid;
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::VehicleStatus;
@@ -82,8 +82,6 @@ pub struct VehicleRecord {
     pub pauses: Pauses,
     /// The last measurement of the surface's modem, and its time.
     pub found: Option<(UsblLine, Instant)>,
-    /// The last setting in which the vehicle was found to differ, and when.
-    pub mismatch: Option<(Mismatch, Instant)>,
     pub annotations: Annotations,
     restored: RestoredContact,
 }
@@ -136,7 +134,6 @@ impl VehicleRecord {
             earlier: EarlierView::default(),
             pauses: Pauses::default(),
             found: None,
-            mismatch: None,
             annotations: Annotations::default(),
             restored: RestoredContact::default(),
         }

@@ -23,6 +23,8 @@ pub enum Mismatch {
 #[derive(Debug, Default)]
 pub(super) struct MismatchReport {
     found: Option<Mismatch>,
+    /// The last one since a frame was accepted.
+    current: Option<Mismatch>,
     reported: BTreeSet<Mismatch>,
     /// Frames with an unexpected tag, which may also be damaged frames, since the last accepted one.
     tagged: u32,
@@ -35,13 +37,20 @@ impl MismatchReport {
     pub(super) fn note(&mut self, mismatch: Mismatch) {
         self.tagged += u32::from(mismatch == Mismatch::Tag);
         let is_certain = mismatch != Mismatch::Tag || self.tagged >= Self::MIN_TAGGED;
+        if is_certain {
+            self.current = Some(mismatch);
+        }
         if is_certain && self.reported.insert(mismatch) {
             self.found = Some(mismatch);
         }
     }
 
     pub(super) fn handle_accepted(&mut self) {
-        self.tagged = 0;
+        (self.tagged, self.current) = (0, None);
+    }
+
+    pub(super) fn current(&self) -> Option<Mismatch> {
+        self.current
     }
 
     pub(super) fn poll(&mut self) -> Option<Mismatch> {

@@ -58,6 +58,11 @@ impl<T> LinkPair<T> {
         self.introduction.series.replace(series) != Some(series)
     }
 
+    /// A setting in which the peer differs, until a frame of it is accepted.
+    pub fn mismatch(&self) -> Option<Mismatch> {
+        self.mismatch.current()
+    }
+
     /// A setting in which the peer differs, once after it was found.
     pub fn poll_mismatch(&mut self) -> Option<Mismatch> {
         self.mismatch.poll()

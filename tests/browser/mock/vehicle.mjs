@@ -182,7 +182,7 @@ export class Vehicle {
     const up = { loss, goodput_bps: goodput };
     return {
       up, down: { loss, goodput_bps: 12 }, round_trip_s: this.receivedS === null ? null : 1.62,
-      one_way_s: this.receivedS === null ? null : 0.81, clock_offset_s: 0, dropped: {}, backlog: this.backlog(nowS, goodput),
+      one_way_s: this.receivedS === null ? null : 0.81, clock_offset_s: 0, dropped: {}, mismatch: this.mismatch ?? null, backlog: this.backlog(nowS, goodput),
     };
   }
 

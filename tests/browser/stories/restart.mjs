@@ -25,6 +25,17 @@ export default [
     },
   },
   {
+    name: "frames that are refused are explained until one is accepted",
+    scenario: "rich",
+    async run(s) {
+      const mismatch = "it has wire version 2, this end has 3: install the same release at both ends";
+      await s.steer({ mismatch });
+      await s.shows("#banners", /Frames of auv-1 are refused.*wire version 2, this end has 3/s);
+      await s.steer({ mismatch: null });
+      await s.visible("#banners", false);
+    },
+  },
+  {
     name: "archived maps are listed with their files",
     scenario: "rich",
     async run(s) {

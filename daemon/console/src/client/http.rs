@@ -58,6 +58,22 @@ impl Client {
         serde_json::from_slice(&self.body(response).await?).map_err(|e| self.unreadable(&e))
     }
 
+    /// Reads a resource as JSON.
+    pub async fn read<T: DeserializeOwned>(&self, path: &str) -> Result<T, UserError> {
+        serde_json::from_slice(&self.get(path).await?.0).map_err(|e| self.unreadable(&e))
+    }
+
+    /// Reads a resource.
+    pub async fn read_bytes(&self, path: &str) -> Result<Bytes, UserError> {
+        Ok(self.get(path).await?.0)
+    }
+
+    /// Sends an order, whose receipt does not matter.
+    pub async fn send_order(&self, path: &str, order: &impl Serialize) -> Result<(), UserError> {
+        let body = serde_json::to_vec(order).map_err(|e| UserError::Failed(e.to_string()))?;
+        self.send(Method::POST, path, body.into()).await.map(drop)
+    }
+
     /// Opens the stream of events.
     pub(super) async fn events(&self) -> Result<EventStream<'_>, UserError> {
         let response = self.send(Method::GET, "/api/v2/events", Bytes::new()).await?;

@@ -15,6 +15,8 @@ mod bench_modem;
 #[cfg(feature = "rehearsal")]
 mod bench_planning;
 #[cfg(feature = "rehearsal")]
+mod bench_restart;
+#[cfg(feature = "rehearsal")]
 mod bench_wide;
 mod config;
 #[cfg(feature = "surface")]

@@ -28,6 +28,7 @@ function current() {
   for (const v of store.snapshot?.vehicles ?? []) {
     if (isSilent(v)) found.push(silent(v));
     if (store.connected && store.mapFaults.has(v.id)) found.push(outdated(v));
+    if (v.link.mismatch) found.push(mismatched(v));
     if (v.map.earlier) found.push(earlier(v));
   }
   if (store.snapshot?.storage?.failing) found.push(refusing(store.snapshot.storage));
@@ -56,6 +57,11 @@ function silent(v) {
 
 function outdated(v) {
   return { key: `map-${v.id}`, kind: "warn", head: `The map of ${v.name} is not up to date`, body: `${store.mapFaults.get(v.id)}.` };
+}
+
+/** A setting differs at both ends, or somebody else transmits under the vehicle's address. */
+function mismatched(v) {
+  return { key: `mismatch-${v.id}`, kind: "bad", head: `Frames of ${v.name} are refused`, body: `${v.link.mismatch}.` };
 }
 
 /** The map in view is that of an earlier run of the vehicle or of the surface. */

@@ -1,9 +1,8 @@
 //! The surface's view of a vehicle, for its host.
 
 use super::{EndedRun, VehiclePeer};
-use crate::directive::Series;
-use crate::directive::SlotProgress;
-use crate::link::LinkStats;
+use crate::directive::{Series, SlotProgress};
+use crate::link::{LinkStats, Mismatch};
 use crate::mac::ClockMap;
 use crate::map::{LayerId, LayerReplica, LayerSet, Replica, StateReplica};
 use crate::time::Instant;
@@ -36,6 +35,11 @@ impl<'a, R: StateReplica> PeerView<'a, R> {
     /// The edge of a cell on the vehicle's map in metres, as its hello states it.
     pub fn cell_m(&self) -> Option<f64> {
         self.0.pair.peer_introduction()?.cell_edge.metres()
+    }
+
+    /// A setting in which the vehicle differs, so that its frames are refused; `None` once one is accepted.
+    pub fn mismatch(&self) -> Option<Mismatch> {
+        self.0.pair.mismatch()
     }
 
     /// The series that the versions of its orders belong to.

@@ -1,0 +1,153 @@
+//! The operator's page of a run: what it shows, and the orders of its operator.
+
+use scenecast_console::client::{Client, block_on};
+use scenecast_console::state::{MissionState, OrderStatus, VehicleState};
+use scenecast_core::UserError;
+use serde_json::{Value, json};
+use std::collections::BTreeMap;
+use std::thread::sleep;
+use std::time::{Duration, Instant};
+
+/// Time between two looks at the page.
+const LOOK: Duration = Duration::from_millis(20);
+
+/// The page of a surface.
+pub(super) struct Page(Client);
+
+/// The facts on the page that a restart must not take away.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Shown {
+    cells: u32,
+    track: bool,
+    /// The names of the labels, in their epoch.
+    names: (u8, BTreeMap<u8, String>),
+    notes: Vec<String>,
+    /// Fence and limits as last ordered, and those in force.
+    constraints: [Value; 4],
+    /// Version and status of the latest order of each slot.
+    orders: BTreeMap<String, (u16, OrderStatus)>,
+}
+
+impl Shown {
+    fn of(vehicle: &VehicleState) -> Self {
+        let orders = &vehicle.orders;
+        let value = |order: Result<Value, serde_json::Error>| order.unwrap_or_default();
+        Self {
+            cells: vehicle.map.explored_cells,
+            track: !vehicle.track.is_empty(),
+            names: (vehicle.map.epoch, vehicle.labels.iter().filter_map(|l| Some((l.id, l.name.clone()?))).collect()),
+            notes: vehicle.notes.iter().map(|note| note.text.clone()).collect(),
+            constraints: [
+                value(serde_json::to_value(&orders.fence)),
+                value(serde_json::to_value(&orders.limits)),
+                value(serde_json::to_value(&orders.fence_in_force)),
+                value(serde_json::to_value(&orders.limits_in_force)),
+            ],
+            orders: orders.directive.slots.iter().map(|s| (s.slot.clone(), (s.version, s.state))).collect(),
+        }
+    }
+
+    /// The first fact of `before` that is gone from this page.
+    pub(super) fn lacks(&self, before: &Self) -> Option<String> {
+        if self.cells < before.cells {
+            return Some(format!("cells: {} instead of {}", self.cells, before.cells));
+        }
+        if before.track && !self.track {
+            return Some("track".into());
+        }
+        if self.names.0 == before.names.0 && self.names != before.names {
+            return Some(format!("names: {:?} instead of {:?}", self.names, before.names));
+        }
+        if self.notes != before.notes {
+            return Some(format!("notes: {:?} instead of {:?}", self.notes, before.notes));
+        }
+        for (now, then) in self.constraints.iter().zip(&before.constraints) {
+            if now.is_null() && !then.is_null() {
+                return Some(format!("order: {then}"));
+            }
+        }
+        let is_kept = |slot: &String, then: &(u16, OrderStatus)| {
+            self.orders.get(slot).is_some_and(|now| now.0 > then.0 || now.0 == then.0 && is_not_before(now.1, then.1))
+        };
+        let gone = before.orders.iter().find(|(slot, then)| !is_kept(slot, then));
+        gone.map(|(slot, then)| format!("order {slot}: {:?} instead of {then:?}", self.orders.get(slot)))
+    }
+}
+
+/// An order that the vehicle has received is sent again after a restart of the vehicle.
+fn is_not_before(now: OrderStatus, then: OrderStatus) -> bool {
+    let is_final = |status| matches!(status, OrderStatus::Applied | OrderStatus::Refused);
+    is_final(now) || !is_final(then)
+}
+
+impl Page {
+    pub(super) fn new(port: u16) -> Result<Self, UserError> {
+        Client::new(&format!("http://127.0.0.1:{port}"), None).map(Self)
+    }
+
+    /// The state of the only vehicle; `None` while nobody answers.
+    pub(super) fn vehicle(&self) -> Option<VehicleState> {
+        let mut vehicle = None;
+        let read = block_on(async {
+            let state: MissionState = self.0.read("/api/v2/state").await?;
+            vehicle = state.vehicles.into_iter().next();
+            Ok(())
+        });
+        read.ok().and(vehicle)
+    }
+
+    pub(super) fn shown(&self) -> Option<Shown> {
+        self.vehicle().as_ref().map(Shown::of)
+    }
+
+    /// The label of each cell of the map in view, as lines of east, north and label.
+    pub(super) fn cells(&self) -> Result<Vec<String>, UserError> {
+        let mut bytes = Vec::new();
+        block_on(async {
+            bytes = self.0.read_bytes("/api/v2/vehicles/1/map.csv").await?.to_vec();
+            Ok(())
+        })?;
+        let text = String::from_utf8_lossy(&bytes);
+        Ok(text.lines().map(|line| line.split(',').take(3).collect::<Vec<_>>().join(",")).collect())
+    }
+
+    /// Gives an order; it is durable once this returns.
+    pub(super) fn order(&self, path: &str, order: &Value) -> Result<(), UserError> {
+        block_on(self.0.send_order(&format!("/api/v2/vehicles/1/{path}"), order))
+    }
+
+    /// The orders and records of an operator at the beginning of a mission.
+    pub(super) fn begin(&self) -> Result<(), UserError> {
+        let label = self.vehicle().and_then(|v| v.labels.first().map(|l| l.id));
+        self.order("fence", &json!({"fence": [[-500, -500], [500, -500], [500, 500], [-500, 500]]}))?;
+        self.order("limits", &json!({"silence_s": 3600, "on_silence": "hold"}))?;
+        self.order("notes", &json!({"text": "a wreck"}))?;
+        match label {
+            Some(label) => self.order("labels", &json!({"label": label, "name": "sand"})),
+            None => Ok(()),
+        }
+    }
+
+    /// Waits until `is_so` holds for the state of the vehicle.
+    pub(super) fn wait(
+        &self,
+        what: &str,
+        limit: Duration,
+        mut is_so: impl FnMut(&VehicleState) -> bool,
+    ) -> Result<(), UserError> {
+        let began = Instant::now();
+        while !self.vehicle().is_some_and(|vehicle| is_so(&vehicle)) {
+            if began.elapsed() > limit {
+                return Err(UserError::Failed(format!("{what}: not within {limit:?}")));
+            }
+            sleep(LOOK);
+        }
+        Ok(())
+    }
+}
+
+/// Whether the vehicle has decided about every order.
+pub(super) fn is_decided(vehicle: &VehicleState) -> bool {
+    let slots = &vehicle.orders.directive.slots;
+    slots.iter().all(|s| matches!(s.state, OrderStatus::Applied | OrderStatus::Refused))
+}
