@@ -14,7 +14,7 @@ use crate::port::FromPort;
 use scenecast_config::{CameraSource, Config, survey_depth_m};
 use scenecast_core::{Area, TangentPlane, UserError};
 use scenecast_files::{RecordedFrame, Recording};
-use scenecast_host::{CameraPose, FrameEvent, VehicleHost, VehicleHostEvent, VehiclePilot, modem_station};
+use scenecast_host::{CameraPose, VehicleHost, VehicleHostEvent, VehiclePilot, modem_station};
 use scenecast_protocol::directive::Budget;
 use scenecast_protocol::map::LayerSet;
 use std::time::Duration;
