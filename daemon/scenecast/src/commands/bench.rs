@@ -5,6 +5,7 @@ use super::bench_link::LinkBench;
 use super::bench_localisation::LocalisationBench;
 use super::bench_modem::ModemBench;
 use super::bench_planning::PlanningBench;
+use super::bench_stranger::StrangerBench;
 use super::bench_wide::WideBench;
 use super::sim::WorldArguments;
 use clap::{Args, Subcommand};
@@ -26,6 +27,8 @@ pub(super) enum BenchCommand {
     Modem(ModemBench),
     /// The planners: utility collected per metre.
     Planning(PlanningBench),
+    /// A stranger at the link: forged, replayed and damaged frames, with and without a key.
+    Stranger(StrangerBench),
     /// A wide survey: CPU time and bytes of updates, of loading the page, and of exports.
     Wide(WideBench),
 }
@@ -51,6 +54,7 @@ impl BenchCommand {
             Self::Localisation(l) => l.run(),
             Self::Modem(m) => m.run(),
             Self::Planning(p) => p.run(),
+            Self::Stranger(s) => s.run(),
             Self::Wide(w) => w.run(),
         }
     }
