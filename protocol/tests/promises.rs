@@ -8,7 +8,7 @@ use scenecast_protocol::link::{DropReason, Mismatch, VehicleEvent};
 use scenecast_protocol::mac::Access;
 use scenecast_protocol::map::{Cell, LabelGrid, StateSource};
 use scenecast_protocol::map_codec::Codec;
-use scenecast_protocol::wire::{Address, Envelope, MissionId, Seal};
+use scenecast_protocol::wire::{Address, Envelope, FrameBuilder, Header, MissionId, Seal, SessionId};
 use std::collections::BTreeMap;
 use std::time::Duration;
 
@@ -197,6 +197,30 @@ fn a_keyed_vehicle_refuses_and_counts_unkeyed_frames() {
     assert_eq!(keyed.vehicle.stats().dropped[&DropReason::Unauthenticated], greetings);
     keyless.vehicle.handle_frame(&keyed_hello(), keyless.now);
     assert_eq!(keyless.vehicle.stats().dropped[&DropReason::Keyed], 1);
+}
+
+#[test]
+fn a_frame_with_a_bad_crc_never_begins_a_new_run() {
+    let mut pair = LinkedEnds::new(3, Setup::new(64, 10_000, Codec::Png), STILL);
+    pair.vehicle.set_map(flat(9, 1).iter(), pair.now);
+    pair.run(pair.now + Duration::from_secs(30), false);
+    let header = |bytes: &Vec<u8>| Envelope::decode(bytes, |_| true).ok().map(|e| e.header);
+    let of_vehicle = pair.overheard.iter().filter_map(header).find(|h| h.from == auv()).unwrap();
+    let ours = pair.overheard.iter().filter_map(header).find(|h| h.from == Address::SURFACE).unwrap().session;
+    let session = SessionId::from_random(of_vehicle.session.get() ^ 1);
+    let stray = FrameBuilder::new(&Header { session, ack: None, ..of_vehicle }, 64)
+        .finish(&Seal::Crc(MissionId(7), ours.get()), true);
+    let resyncs = |pair: &LinkedEnds| pair.surface.vehicle(auv()).unwrap().stats().resyncs;
+    (0..3).for_each(|_| pair.surface.handle_frame(&stray, pair.now));
+    pair.mute = [true; 2];
+    pair.run(pair.now + Duration::from_secs(120), false);
+    assert_eq!(resyncs(&pair), 0, "the vehicle has answered until then");
+    let mut damaged = stray.clone();
+    damaged[3] ^= 0x10;
+    pair.surface.handle_frame(&damaged, pair.now);
+    assert_eq!(resyncs(&pair), 0, "by a damaged frame");
+    pair.surface.handle_frame(&stray, pair.now);
+    assert_eq!(resyncs(&pair), 1, "by a whole one");
 }
 
 fn keyed_hello() -> Vec<u8> {

@@ -101,6 +101,7 @@ fn every_command_has_help_with_an_example() {
         &["asv"],
         &["bench", "fidelity"],
         &["bench", "link"],
+        &["bench", "stranger"],
         &["config"],
         &["config", "migrate"],
         &["key", "new"],

@@ -24,6 +24,7 @@ mod script;
 mod simulated_autopilot;
 #[cfg(test)]
 mod storm_tests;
+pub mod stranger_bench;
 mod virtual_time;
 pub mod wide_bench;
 mod world;

@@ -3,6 +3,8 @@
 mod checkpoint;
 mod clock;
 mod durable;
+#[cfg(test)]
+mod fuzz_corpus_tests;
 #[cfg(feature = "surface")]
 mod instruments;
 mod journal;

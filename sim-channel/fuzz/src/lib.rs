@@ -1,10 +1,37 @@
 //! Fuzz targets of sim-channel: emulators accept any bytes from hosts and from the channel.
 
+use sim_channel::modem::micromodem::{Micromodem, MicromodemConfig};
+use sim_channel::modem::s2c::{Interpreter, S2c, S2cConfig};
 use sim_channel::modem::{Emulator, HostId};
-use sim_channel::{Arrival, Duration, NodeId, ReceptionOutcome, NodePosition};
+use sim_channel::{Arrival, Duration, NodeId, NodePosition, ReceptionOutcome};
+
+/// A target accepts any bytes.
+pub type Target = fn(&[u8]);
+
+/// Every target by the name of its corpus.
+pub const ALL: [(&str, Target); 3] = [("s2c", s2c), ("micromodem", micromodem), ("channel", channel)];
+
+/// The host of an S2C, with either interpreter.
+pub fn s2c(data: &[u8]) {
+    for interpreter in [Interpreter::At, Interpreter::Net] {
+        let config = S2cConfig { interpreter, baud: None, boot_ms: 1, remote: 2, ..S2cConfig::new(1) };
+        host(S2c::new(config), data);
+    }
+}
+
+/// The host of a Micromodem.
+pub fn micromodem(data: &[u8]) {
+    host(Micromodem::new(MicromodemConfig { baud: None, ..MicromodemConfig::new(1) }), data);
+}
+
+/// A frame from the channel at each modem.
+pub fn channel(data: &[u8]) {
+    arrive(S2c::new(S2cConfig::new(2)), data);
+    arrive(Micromodem::new(MicromodemConfig::new(2)), data);
+}
 
 /// Feeds bytes of a host in pieces; the data also decide the lengths of the pieces and the pauses between them.
-pub fn host(mut modem: impl Emulator, data: &[u8]) {
+fn host(mut modem: impl Emulator, data: &[u8]) {
     let mut now = Duration::ZERO;
     let mut rest = data;
     while let Some((control, tail)) = rest.split_first() {
@@ -17,8 +44,7 @@ pub fn host(mut modem: impl Emulator, data: &[u8]) {
     drain(&mut modem, now + Duration::from_secs(60));
 }
 
-/// Feeds a frame from the channel.
-pub fn channel(mut modem: impl Emulator, data: &[u8]) {
+fn arrive(mut modem: impl Emulator, data: &[u8]) {
     let now = Duration::from_secs(5);
     let position = NodePosition::default();
     let outcome = ReceptionOutcome::Delivered { bytes: data.to_vec(), copy: 0, corrupted: true };

@@ -7,6 +7,17 @@ use scenecast_drivers::modem::{Class, Destination, Driver};
 use scenecast_protocol::time::Instant;
 use std::time::Duration;
 
+/// A target accepts any bytes.
+pub type Target = fn(&[u8]);
+
+/// Every target by the name of its corpus.
+pub const ALL: [(&str, Target); 4] = [
+    ("s2c_lines", s2c_lines),
+    ("micromodem_sentences", micromodem_sentences),
+    ("s2c_driver", s2c_driver),
+    ("micromodem_driver", micromodem_driver),
+];
+
 /// The parser of an S2C, with and without wrapped lines.
 pub fn s2c_lines(data: &[u8]) {
     for ties in [false, true] {

@@ -15,7 +15,11 @@ mod bench_modem;
 #[cfg(feature = "rehearsal")]
 mod bench_planning;
 #[cfg(feature = "rehearsal")]
+<<<<<<< HEAD
 mod bench_restart;
+=======
+mod bench_stranger;
+>>>>>>> stranger
 #[cfg(feature = "rehearsal")]
 mod bench_wide;
 mod config;
@@ -68,7 +72,7 @@ enum Command {
     /// Emulate modems in one channel, each on a serial device or a TCP port of its own.
     ModemSim(modem_sim::ModemSim),
     #[cfg(feature = "rehearsal")]
-    /// Measure the link, the modems, planners, localisation and exemplars.
+    /// Measure the link, its resistance to strangers, the modems, planners, localisation and exemplars.
     #[command(subcommand)]
     Bench(bench::BenchCommand),
     /// Make or show a mission key, or make a token for the operator's page.

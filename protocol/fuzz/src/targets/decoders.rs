@@ -9,8 +9,8 @@ use scenecast_protocol::object::{MAX_OBJECT, ObjectReceiver, Part, Received};
 use scenecast_protocol::seal::{Direction, MissionKey};
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::{
-    AckStatement, Address, Envelope, Frame, FrameBuilder, FrameKind, Header, MAX_WINDOW, MissionId, Reader, Seal,
-    SessionId, Stamp, VehicleStatus,
+    AckStatement, Address, Envelope, Frame, FrameBuilder, FrameKind, Header, Introduction, MAX_WINDOW, MissionId,
+    Reader, Seal, SessionId, Stamp, VehicleStatus,
 };
 use std::time::Duration;
 
@@ -133,6 +133,15 @@ pub fn stamp(data: &[u8]) {
     map.measure(clock_ms, Duration::from(ago), now);
     assert!(map.to_theirs(at) < 1 << 24);
     let _ = map.to_ours(clock_ms, at);
+}
+
+/// A decoded introduction is written as its first bytes; the rest is of a later version.
+pub fn introduction(data: &[u8]) {
+    let Ok(introduction) = Introduction::decode(data) else { return };
+    let bytes = introduction.encode();
+    assert!(bytes.len() <= Introduction::MAX_BYTES && data.starts_with(&bytes));
+    assert_eq!(Introduction::decode(&bytes), Ok(introduction));
+    assert!(introduction.cell_edge.metres().is_none_or(|edge| edge > 0.0 && edge.is_finite()));
 }
 
 /// A decoded pose or report can be encoded and reads the same.

@@ -162,7 +162,8 @@ impl<R: StateReplica> VehiclePeer<R> {
                 }
                 // The vehicle builds on frames that we never acknowledged, or means another run of ours.
                 let silent = matches!(modem.access, Access::ModemOwned { .. }) || self.master.unanswered() >= 2;
-                let strays = self.pair.seems_out_of_step() && silent;
+                // Only a frame with a valid CRC counts, so only one is a reason to begin a new run.
+                let strays = reason == DropReason::OldSession && self.pair.seems_out_of_step() && silent;
                 self.is_out_of_step |= reason == DropReason::NoBase || strays;
                 return;
             }
