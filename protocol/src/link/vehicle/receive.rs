@@ -125,11 +125,12 @@ impl<S: StateSource> VehicleLink<S> {
     }
 
     /// Where the modem decides when to transmit, an acknowledgement or hello goes out within a second,
-    /// by itself if need be.
+    /// by itself if need be. The first frames after a frame of the surface carry it, as those of a turn do.
     fn owe_answer(&mut self, now: Instant) {
         if matches!(self.config.modem.access, Access::ModemOwned { .. })
             && (self.pair.unstated() > 0 || self.pair.must_send_hello())
         {
+            self.begin_turn();
             self.answer_due.get_or_insert(now + Duration::from_secs(1));
         }
     }

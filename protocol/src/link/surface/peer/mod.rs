@@ -50,6 +50,8 @@ struct Contact {
     last_received: Option<Instant>,
     /// Where the modem decides when to transmit: when an acknowledgement or a hello is due.
     answer_due: Option<Instant>,
+    /// The vehicle's highest frame number when a frame with an acknowledgement was last written.
+    acknowledged: FrameNumber,
     hello_due: Instant,
     /// Hellos since the last answer.
     hellos: u32,
@@ -96,7 +98,7 @@ impl<R: StateReplica> VehiclePeer<R> {
             outbox: SlotOutbox::new(introduction.series.unwrap_or(Series::from_random(seed))),
             content: PeerContent::new(),
             timing: VehicleTiming::default(),
-            contact: Contact { last_received: None, answer_due: None, hello_due: now, hellos: 0 },
+            contact: Contact { last_received: None, answer_due: None, acknowledged: 0, hello_due: now, hellos: 0 },
             last_turn: LastTurn { began: 0, kind: FrameKind::Numbered },
             divergence: Divergence::default(),
             is_out_of_step: false,
@@ -166,7 +168,8 @@ impl<R: StateReplica> VehiclePeer<R> {
             self.contact.hello_due = now + self.slot_timeout().max(Contact::PROOF_TIMEOUT);
             events.push_back(SurfaceEvent::VehicleRestarted(self.address()));
         }
-        self.handle_fates(&inbound.fates, inbound.number.unwrap_or(FrameNumber::MAX), now);
+        // A rejected frame is as old as the newest one at most, or a new run follows.
+        self.handle_fates(&inbound.fates, inbound.number.unwrap_or(self.pair.highest()), now);
         self.is_out_of_step |= inbound.lacks_base;
         let header = inbound.header().clone();
         if header.kind.is_hello() {
@@ -300,6 +303,7 @@ impl<R: StateReplica> VehiclePeer<R> {
         self.divergence.clear();
         self.timing = VehicleTiming::default();
         self.last_turn.began = 0;
+        self.contact.acknowledged = 0;
         self.outbox.handle_peer_restart(now);
         self.contact.hello_due = now;
     }
