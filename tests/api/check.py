@@ -15,14 +15,16 @@ import openapi_spec_validator
 import prometheus_client.parser
 
 URL = sys.argv[1].rstrip("/")
+# Those that are missing here name a label of the map.
 ORDERS = {
     "set_utility": {"weights": {}, "exploration": 0.1},
-    "request_exemplar": None,
     "set_constraints": {"hold": False},
     "set_fence": {"fence": [[-500, -500], [500, -500], [500, 500], [-500, 500]], "keep_outs": [], "return_point": [0, 0]},
     "set_limits": {"depth_m": [0, 500], "on_silence": "hold"},
     "set_settings": {"planner": "greedy", "gamma": 1e-5, "cells": "coarse-to-fine", "layers": "depth", "alpha": 0},
     "change_command": {"action": "take"},
+    "add_note": {"text": "a wreck"},
+    "dismiss_earlier_map": {},
     "set_budget": {"budget_bps": 9000, "shares": {"directive": 10, "status": 5, "fix": 5, "map": 50, "exemplar": 20}},
 }
 
@@ -91,9 +93,24 @@ def events(document, content, state_only):
     sys.exit(f"{URL}: no event {', '.join(wanted)} came")
 
 
+def check_archived(document, path, schema_of_error):
+    """Without an archived map, its files are refused as documented."""
+    names = [m["name"] for m in json.loads(ask("GET", "/api/v2/archive")[2])["maps"]]
+    if names:
+        return path.replace("{name}", names[0])
+    status, _, why = ask("GET", path.replace("{name}", "none"))
+    expect(status == 404, f"{path} of no map: {status}")
+    validate(document, schema_of_error, json.loads(why), f"the refusal of {path}")
+    return None
+
+
 def check(document, path, method, operation, state):
     vehicle = state["vehicles"][0]
     requested = path.replace("{id}", str(vehicle["id"]))
+    if "{name}" in path:
+        requested = check_archived(document, path, {"$ref": "#/components/schemas/ErrorBody"})
+        if requested is None:
+            return
     if "{file}" in path:
         received = [l["id"] for l in vehicle["labels"] if l["exemplar"]["state"] == "received"]
         expect(received, "the surface has no image to read")
@@ -107,7 +124,7 @@ def check(document, path, method, operation, state):
     if name == "login":
         body, headers = b"token=any", {"content-type": "application/x-www-form-urlencoded"}
     elif "requestBody" in operation:
-        order = ORDERS[name] or {"label": vehicle["labels"][0]["id"]}
+        order = ORDERS[name] if name in ORDERS else {"label": vehicle["labels"][0]["id"]}
         schema = operation["requestBody"]["content"]["application/json"]["schema"]
         validate(document, schema, order, f"the example of {name}")
         body = json.dumps(order).encode()

@@ -1,12 +1,11 @@
 //! The layers of a map in addition to the labels, from the levels that the surface has received.
 
 use crate::export::CellLayer;
-use scenecast_protocol::link::PeerView;
 use scenecast_protocol::map::{LayerReplica, Spread};
 
-/// The layers that the vehicle has announced.
-pub(crate) fn layers(view: &PeerView<'_>) -> Vec<CellLayer> {
-    view.layers().iter().filter_map(|(id, _)| Some(layer(view.layer(id)?))).collect()
+/// The layers of a map.
+pub(crate) fn layers(layers: &[&LayerReplica]) -> Vec<CellLayer> {
+    layers.iter().map(|replica| layer(replica)).collect()
 }
 
 /// A layer with the bounds of the levels over which its colours are spread: those on the map, or all of its scale.

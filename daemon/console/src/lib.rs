@@ -21,6 +21,6 @@ mod tiles;
 pub use export::{MapCells, MapFormat};
 pub use http::{Console, ConsoleListener, PendingRequest, bind, gzip, page_files, start};
 pub use link_meter::LinkMeter;
-pub use request::{ClientRequest, Reply, SurfaceRequest, handle_request};
+pub use request::{ClientRequest, Reply, SurfaceRequest, archived_cells, handle_request};
 pub use snapshot::{MissionFacts, Snapshot, measured_origin, snapshot};
 pub use tiles::TiledMap;

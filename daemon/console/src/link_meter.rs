@@ -14,15 +14,16 @@ const MAX_ENTRIES: usize = 240;
 #[derive(Debug)]
 pub struct LinkMeter {
     window: Duration,
+    began: Instant,
     audits: [Audit; 2],
     /// The number of each entry, and its bits up and down.
     history: VecDeque<(u64, [u64; 2])>,
 }
 
 impl LinkMeter {
-    /// A meter with the window of the bit budget.
-    pub fn new(window: Duration) -> Self {
-        Self { window, audits: [Audit::new(window), Audit::new(window)], history: VecDeque::new() }
+    /// A meter with the window of the bit budget, which counts from `began` on.
+    pub fn new(window: Duration, began: Instant) -> Self {
+        Self { window, began, audits: [Audit::new(window), Audit::new(window)], history: VecDeque::new() }
     }
 
     /// Counts a frame of `bits` on air from a vehicle.
@@ -53,7 +54,12 @@ impl LinkMeter {
     pub fn bps_1min(&self, direction: usize, now: Instant) -> f64 {
         let first = (now.as_secs_f64() as u64).saturating_sub(60) / ENTRY_S;
         let bits: u64 = self.history.iter().filter(|(n, _)| *n > first).map(|(_, b)| b[direction]).sum();
-        bits as f64 / now.as_secs_f64().clamp(1.0, 60.0)
+        bits as f64 / self.elapsed_s(now).clamp(1.0, 60.0)
+    }
+
+    /// Seconds since the meter began.
+    pub fn elapsed_s(&self, now: Instant) -> f64 {
+        now.since(self.began).as_secs_f64()
     }
 
     /// The highest rate in a window of the budget, bit/s, up (0) or down (1).

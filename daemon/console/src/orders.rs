@@ -100,6 +100,42 @@ pub struct SharesOrder {
     pub exemplar: u8,
 }
 
+/// The operator's name, colour and merging of a label in the current epoch. They stay at the surface; a member that is missing
+/// or null takes the operator's earlier one away.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct LabelOrder {
+    /// The label.
+    #[schemars(range(min = 1, max = 254))]
+    pub label: u8,
+    /// Its name.
+    #[serde(default)]
+    #[schemars(length(min = 1, max = 40))]
+    pub name: Option<String>,
+    /// Its colour, as in `#a0b1c2`.
+    #[serde(default)]
+    #[schemars(regex(pattern = "^#[0-9a-fA-F]{6}$"))]
+    pub colour: Option<String>,
+    /// Another label, which it is shown as a part of.
+    #[serde(default)]
+    #[schemars(range(min = 1, max = 254))]
+    pub merged_into: Option<u8>,
+}
+
+/// A note about a vehicle.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct NoteOrder {
+    /// The text.
+    #[schemars(length(min = 1, max = 1000))]
+    pub text: String,
+}
+
+/// Takes the map of an earlier run out of view. It stays in the archive.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct DismissOrder {}
+
 /// Requests command, hands it over, takes it or gives it up.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]

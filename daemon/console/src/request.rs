@@ -3,13 +3,14 @@
 use crate::export::MapCells;
 use crate::fit::{self, Fit};
 use crate::layers;
-use crate::orders::{BudgetOrder, ExemplarAction, ExemplarOrder};
+use crate::orders::{BudgetOrder, ExemplarAction, ExemplarOrder, LabelOrder, NoteOrder};
 use crate::snapshot::command_state;
-use crate::state::{AcceptedOrder, CommandState};
+use crate::state::{AcceptedOrder, ArchivedMap, CommandState};
 use scenecast_protocol::directive::{Constraints, SlotId};
 use scenecast_protocol::schedule::{BackgroundOrder, Shares};
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::Address;
+use scenecast_surface::record::{StoredLabel, VehicleMemory};
 use scenecast_surface::{
     CommandAction, CommandRefusal, FenceOrder, LimitsOrder, OrderKind, Principal, RequestKind, SettingsOrder, Surface,
 };
@@ -42,6 +43,16 @@ pub enum SurfaceRequest {
     Settings(u8, SettingsOrder),
     /// Change the bit budget, the shares and the background streams.
     Budget(BudgetOrder),
+    /// Name a label.
+    Label(u8, LabelOrder),
+    /// Add a note of the person or program with this name.
+    Note(u8, String, NoteOrder),
+    /// Take the earlier map out of view.
+    DismissEarlierMap(u8),
+    /// List the archived maps. The owner of the files handles this request and the next one.
+    Archives,
+    /// Read an archived map by its name.
+    ArchivedMap(String),
     /// Request command, hand it over, take it or give it up.
     Command(CommandAction),
 }
@@ -51,6 +62,8 @@ impl SurfaceRequest {
     fn order_kind(&self) -> Option<OrderKind> {
         match self {
             Self::Map(_) | Self::Exemplar(..) | Self::Fit(..) | Self::Command(_) => None,
+            Self::Archives | Self::ArchivedMap(_) => None,
+            Self::Label(..) | Self::Note(..) | Self::DismissEarlierMap(_) => Some(OrderKind::Record),
             Self::Constraints(_, order) if order.hold || order.abort => Some(OrderKind::Stop),
             Self::Utility(..)
             | Self::ExemplarOrder(..)
@@ -74,6 +87,9 @@ pub enum Reply {
     Fit(Box<Fit>),
     /// The order was accepted and waits for its turn.
     Accepted(AcceptedOrder),
+    /// The surface has done what was requested.
+    Done,
+    Archives(Vec<ArchivedMap>),
     /// Who has command after a change.
     Command(CommandState),
     /// The role of the principal does not allow it: the reason in one line.
@@ -161,9 +177,35 @@ fn handle(surface: &mut Surface, request: SurfaceRequest, cell_m: f64, now: Inst
             accepted(vehicle, SlotId::Settings, surface.set_settings(vehicle, &order, now))
         }
         SurfaceRequest::Budget(order) => budget(surface, order, now),
+        SurfaceRequest::Label(id, LabelOrder { label, name, colour, merged_into }) => {
+            let book = StoredLabel { name, colour, merged_into };
+            done(surface.set_label(known(surface, id)?, label, book))
+        }
+        SurfaceRequest::Note(id, by, order) => done(surface.add_note(known(surface, id)?, &by, &order.text, now)),
+        SurfaceRequest::DismissEarlierMap(id) => done(surface.dismiss_earlier_map(known(surface, id)?)),
+        SurfaceRequest::Archives => Reply::Archives(Vec::new()),
+        SurfaceRequest::ArchivedMap(_) => return None,
         // Handled with its principal, before.
         SurfaceRequest::Command(_) => return None,
     })
+}
+
+fn done(result: Result<(), String>) -> Reply {
+    result.map_or_else(Reply::Refused, |()| Reply::Done)
+}
+
+/// The cells of an archived map. Their ages count from the last one that was received.
+pub fn archived_cells(map: &VehicleMemory, cell_m: f64) -> MapCells {
+    let (labels, layers) = (map.map().labels(), map.map().layers().map(|(_, layer)| layer).collect::<Vec<_>>());
+    MapCells {
+        version: map.archived().map_or(0, |(_, cells)| cells),
+        at: labels.updated().unwrap_or_default(),
+        bounds: labels.bounds(),
+        cell_m,
+        moved_m: map.placement_m().unwrap_or((0.0, 0.0)),
+        tiles: labels.tiles().clone(),
+        layers: layers::layers(&layers),
+    }
 }
 
 fn accepted(vehicle: Address, slot: SlotId, issued: Result<u16, String>) -> Reply {
@@ -217,6 +259,6 @@ fn map(surface: &Surface, vehicle: Address, cell_m: f64, now: Instant) -> Option
         cell_m,
         moved_m: (0.0, 0.0),
         tiles: surface.map_tiles(vehicle)?,
-        layers: layers::layers(&view),
+        layers: layers::layers(&surface.map_layers(vehicle)),
     }))
 }

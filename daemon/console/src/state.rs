@@ -4,6 +4,7 @@ mod command;
 mod labels;
 mod link;
 mod map;
+mod storage;
 mod vehicle;
 
 pub use command::{
@@ -12,7 +13,8 @@ pub use command::{
 };
 pub use labels::{ExemplarImage, ExemplarProgress, ExemplarStage, MapLabel};
 pub use link::{ChannelQuality, LinkDirection, LinkRates, LinkSummary, ReportedBacklog, VehicleChannel};
-pub use map::{LayerBody, MapBody, MapEvent, MapIndex, MapPlacement, MapSummary, TileLayer};
+pub use map::{EarlierMap, LayerBody, MapBody, MapEvent, MapIndex, MapPlacement, MapSummary, TileLayer};
+pub use storage::{ArchiveList, ArchivedMap, StorageInfo, VehicleNote};
 pub use vehicle::{
     AppliedOrder, DirectiveSlots, OrderProgress, OrderStatus, PlannedPath, ReportedMode, ReportedPose, StatusReport,
     UsblMeasurement, UtilityTerms, VehicleOrders, VehicleSettings, VehicleState,
@@ -42,6 +44,9 @@ pub struct MissionState {
     /// The layers that an operator can name in settings and in the order of the background streams.
     #[serde(default)]
     pub layers: Vec<LayerInfo>,
+    /// The folder in which the surface keeps its state; null in a rehearsal.
+    #[serde(default)]
+    pub storage: Option<StorageInfo>,
 }
 
 /// A layer of the map that vehicles can send in addition to the labels.

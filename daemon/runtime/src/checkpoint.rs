@@ -39,7 +39,7 @@ impl<S: Storage> CheckpointFile<S> {
 
     fn write(&mut self, bytes: &[u8]) -> io::Result<()> {
         let mut file = self.storage.create(PART)?;
-        self.storage.append(&mut file, bytes)?;
+        self.storage.append(PART, &mut file, bytes)?;
         self.storage.sync(&mut file)?;
         self.storage.rename(PART, NAME)?;
         self.storage.sync_folder()

@@ -23,6 +23,8 @@ mod reload;
 mod restore;
 mod stop;
 #[cfg(feature = "surface")]
+mod store;
+#[cfg(feature = "surface")]
 mod surface;
 mod vehicle;
 

@@ -57,6 +57,7 @@ impl MapFiles {
 
 async fn write_all(dir: PathBuf, mut receiver: watch::Receiver<Waiting>) {
     let mut written: BTreeMap<u8, u64> = BTreeMap::new();
+    let mut is_failing = false;
     // The last change is also seen after its sender has ended.
     while receiver.changed().await.is_ok() {
         let latest = receiver.borrow_and_update().clone();
@@ -68,8 +69,15 @@ async fn write_all(dir: PathBuf, mut receiver: watch::Receiver<Waiting>) {
             let dir = dir.clone();
             let made = tokio::task::spawn_blocking(move || write(&dir, vehicle, &file)).await;
             // A full disk or received data must not end the run.
-            if let Ok(Err(reason)) = made {
-                tracing::warn!("the map of vehicle {vehicle} is not written: {reason}");
+            match made {
+                Ok(Err(reason)) if !is_failing => {
+                    is_failing = true;
+                    tracing::warn!(
+                        "the map of vehicle {vehicle} is not written: {reason}; further failures are not logged"
+                    );
+                }
+                Ok(Ok(())) => is_failing = false,
+                _ => {}
             }
         }
         let pause = (began.elapsed() * PAUSE_FACTOR).min(MAX_PAUSE);

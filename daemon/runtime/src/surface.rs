@@ -2,17 +2,17 @@
 
 use super::clock::Clock;
 use super::instruments::{Instruments, relay};
-use super::journal::create_folder;
 use super::map_files::{MapFile, MapFiles};
 use super::modem::{self, ModemPort};
 use super::pilot::{self, PilotPort, SimulatedAutopilot};
 use super::refusals::{Refusals, warn_without_key};
 use super::stop::Stop;
+use super::store::SurfaceFiles;
 use crate::port::FromPort;
 use scenecast_config::Config;
 use scenecast_console::{
-    ClientRequest, Console, LinkMeter, MissionFacts, PendingRequest, Reply, SurfaceRequest, bind, handle_request,
-    measured_origin, snapshot, start,
+    ClientRequest, Console, LinkMeter, MissionFacts, PendingRequest, Reply, SurfaceRequest, archived_cells, bind,
+    handle_request, measured_origin, snapshot, start,
 };
 use scenecast_core::UserError;
 use scenecast_core::world_file;
@@ -26,6 +26,8 @@ use tokio::sync::oneshot;
 
 /// Maximum time between two snapshots for the page.
 const PUBLISH_INTERVAL: Duration = Duration::from_secs(1);
+/// Time after which changes that were not committed yet are looked at again.
+const CATCH_UP_INTERVAL: Duration = Duration::from_millis(100);
 
 /// Runs the surface until it is interrupted.
 pub fn run_surface(config: Config, simulated: Option<SimulatedAutopilot>) -> Result<(), UserError> {
@@ -40,10 +42,8 @@ pub fn run_surface(config: Config, simulated: Option<SimulatedAutopilot>) -> Res
                 Some(bind(address.as_str(), "console.listen", tokens, &config.console.host).await?)
             }
         };
-        let dir = config.runtime.state_dir.clone();
-        let is_again = dir.exists();
-        create_folder(&dir).map_err(|e| UserError::file(&dir, e))?;
-        let clock = Clock::new(config.runtime.time_scale);
+        let was_there = config.runtime.state_dir.exists();
+        let (mut files, clock) = SurfaceFiles::open(&config)?;
         let profile = scenecast_drivers::modem::modem_of_process(&config, Address::SURFACE)?;
         warn_without_key(&config);
         let mut surface = scenecast_surface::assemble(
@@ -58,15 +58,17 @@ pub fn run_surface(config: Config, simulated: Option<SimulatedAutopilot>) -> Res
         if let Some(relay) = relay(&config) {
             surface.set_relay(relay);
         }
-        if is_again {
+        if was_there || files.is_again() {
             surface.assume_budget_spent(clock.now());
         }
         let console = listener.zip(config.console.listen.as_ref()).map(|(listener, address)| {
             println!("the operator's page is at http://{address} (end with Ctrl-C)");
             start(listener)
         });
-        let facts = MissionFacts::new(&config, &profile, super::random_bits(), config.runtime.time_scale);
-        let meter = LinkMeter::new(Duration::from_secs_f64(config.link.budget_window_s));
+        files.begin(&mut surface, super::random_bits() as u32, config.mission.id, clock.now());
+        let id = files.store.memory().began().map_or(0, |began| began.id);
+        let facts = MissionFacts::new(&config, &profile, id.into(), config.runtime.time_scale);
+        let meter = LinkMeter::new(Duration::from_secs_f64(config.link.budget_window_s), clock.now());
         let modem = ModemPort::open(&config, clock.now()).await?;
         let instruments = Instruments::open(&config);
         let autopilot = pilot::autopilot(&config, simulated, clock.now())?;
@@ -77,8 +79,9 @@ pub fn run_surface(config: Config, simulated: Option<SimulatedAutopilot>) -> Res
         let follower = autopilot.map(|a| Follower::new(a, follow, vehicle, clock.now()));
         let host = SurfaceHost::new(surface, modem_station(&config, Address::SURFACE, profile)?, follower);
         let refusals = Refusals::default();
-        let maps = MapFiles::start(dir);
-        SurfaceShell { host, ports, console, clock, maps, facts, meter, refusals }.run(stop).await
+        let maps = MapFiles::start(config.runtime.state_dir.clone());
+        let is_stale = true;
+        SurfaceShell { host, ports, console, clock, files, maps, facts, meter, refusals, is_stale }.run(stop).await
     })
 }
 
@@ -94,10 +97,13 @@ struct SurfaceShell {
     ports: Ports,
     console: Option<Console>,
     clock: Clock,
+    files: SurfaceFiles,
     maps: MapFiles,
     facts: MissionFacts,
     meter: LinkMeter,
     refusals: Refusals,
+    /// The page lacks changes that are still to be committed.
+    is_stale: bool,
 }
 
 impl SurfaceShell {
@@ -105,19 +111,27 @@ impl SurfaceShell {
         let mut publish = tokio::time::interval(PUBLISH_INTERVAL);
         publish.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Delay);
         loop {
-            if self.pump()? {
+            self.is_stale |= self.pump()?;
+            if self.is_stale && self.files.may_commit() {
                 self.publish();
             }
             let now = self.clock.now();
             let wake = self.host.poll_timeout(now).unwrap_or(now + Duration::from_secs(1));
+            let catch_up = tokio::time::sleep(CATCH_UP_INTERVAL);
             tokio::select! {
                 () = stop.asked() => {
+                    self.publish();
                     modem::log_audit(self.host.link());
                     self.maps.finish().await;
                     return Ok(());
                 }
                 _ = tokio::time::sleep_until(self.clock.wall(wake)) => {}
-                _ = publish.tick() => self.publish(),
+                () = catch_up, if self.is_stale => {}
+                _ = publish.tick() => {
+                    self.publish();
+                    self.files.tend(self.clock.now());
+                    self.facts.storage = Some(self.files.info());
+                }
                 report = self.ports.modem.next() => {
                     ModemPort::handle(report, self.host.link_mut(), self.clock.now());
                 }
@@ -140,14 +154,35 @@ impl SurfaceShell {
         }
     }
 
+    /// Handles a request. Its effects are durable before the reply, and before anything is transmitted.
     fn handle_request(&mut self, request: ClientRequest, reply: oneshot::Sender<Reply>) {
+        let now = self.clock.now();
+        self.files.commit(self.host.surface_mut(), None, now);
+        let by = request.principal.as_ref().map(|principal| principal.name().to_owned());
+        let answer = match &request.request {
+            SurfaceRequest::Archives => Reply::Archives(self.files.archives(now)),
+            SurfaceRequest::ArchivedMap(name) => match self.files.store.archived(name) {
+                Some(map) => Reply::Map(archived_cells(&map, self.facts.cell_m)),
+                None => Reply::NotFound,
+            },
+            _ => handle_request(self.host.surface_mut(), request, self.facts.cell_m, now),
+        };
+        self.files.commit(self.host.surface_mut(), by.as_deref(), now);
+        if by.is_some() {
+            // Who reads the state after the reply finds the order in it.
+            self.publish();
+        }
         // A browser that closed its connection needs no reply.
-        let _ = reply.send(handle_request(self.host.surface_mut(), request, self.facts.cell_m, self.clock.now()));
+        let _ = reply.send(answer);
     }
 
+    /// Shows the state on the page, after it was made durable.
     fn publish(&mut self) {
+        let now = self.clock.now();
+        self.files.commit(self.host.surface_mut(), None, now);
+        self.is_stale = false;
         if let Some(console) = &self.console {
-            let snapshot = snapshot(self.host.surface(), &self.facts, &self.meter, self.clock.now());
+            let snapshot = snapshot(self.host.surface(), &self.facts, &self.meter, now);
             console.snapshots.send_replace(Arc::new(snapshot));
         }
     }
@@ -228,7 +263,9 @@ impl SurfaceShell {
         let request = ClientRequest { principal: None, request: SurfaceRequest::Map(vehicle.number()) };
         let Reply::Map(mut cells) = handle_request(self.host.surface_mut(), request, cell_m, now) else { return };
         let surface = self.host.surface();
-        let placement = surface.view(vehicle).and_then(|v| v.status().and_then(|(s, _)| s.placement));
+        let earlier = surface.record(vehicle).and_then(|record| record.earlier_map());
+        let live = || surface.status(vehicle).and_then(|(status, _)| status.placement);
+        let placement = earlier.map_or_else(live, |earlier| earlier.placement());
         let place = surface.relay().and_then(|r| r.plane()).zip(cells.bounds);
         let origin = measured_origin(surface).or(self.facts.origin);
         let world_file = place.map(|(plane, bounds)| world_file(plane, placement, bounds, cell_m));

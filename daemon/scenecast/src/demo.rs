@@ -46,7 +46,7 @@ impl Demo {
     fn new(mission: Mission, speed: f64) -> Self {
         let facts = MissionFacts::new(mission.config(), mission.modem(), random_bits(), speed);
         let window = Duration::from_secs_f64(mission.config().link.budget_window_s);
-        Self { meter: LinkMeter::new(window), mission, facts, counted: [0; 2], published: None }
+        Self { meter: LinkMeter::new(window, Instant::ZERO), mission, facts, counted: [0; 2], published: None }
     }
 
     async fn run(mut self, mut console: Option<Console>, mut stop: Stop) -> Result<(), UserError> {

@@ -86,6 +86,17 @@ impl ExemplarCache {
         self.labels.iter().map(|(&label, entry)| (label, entry))
     }
 
+    /// Puts an exemplar back that an earlier run of the surface has received.
+    pub(super) fn restore_image(&mut self, label: u8, exemplar: StoredExemplar) {
+        self.labels.entry(label).or_default().stored.push(exemplar);
+    }
+
+    /// Puts a label's request back, and the serial number of its requests.
+    pub(super) fn restore_request(&mut self, label: u8, serial: u8, open: Option<OpenRequest>) {
+        let entry = self.labels.entry(label).or_default();
+        (entry.serial, entry.request) = (serial, open);
+    }
+
     /// Requests an exemplar of a label. It replaces the label's open request. The error is one line for the operator.
     pub fn request(&mut self, label: u8, kind: RequestKind, now: Instant) -> Result<(), String> {
         let others = self.labels.iter().filter(|(l, p)| **l != label && p.is_open()).count();
@@ -187,6 +198,11 @@ impl LabelExemplars {
             Some(number) => self.stored.iter().find(|p| p.number == number),
             None => self.stored.last(),
         }
+    }
+
+    /// The serial number of the last request, and the open request.
+    pub(super) fn open_request(&self) -> (u8, Option<OpenRequest>) {
+        (self.serial, self.request)
     }
 
     fn is_open(&self) -> bool {

@@ -1,5 +1,6 @@
 //! The surface: it holds the operator's map of each vehicle and sends each vehicle its directive. It does no IO.
 
+mod annotations;
 mod assemble;
 mod command;
 #[cfg(test)]
@@ -8,11 +9,13 @@ mod exemplar_cache;
 mod orders;
 mod pauses;
 pub mod position;
+pub mod record;
 mod requests;
 mod settings;
 mod surface;
 mod vehicle_record;
 
+pub use annotations::Annotations;
 pub use assemble::assemble;
 pub use command::{
     COMMAND_SILENCE, Command, CommandAction, CommandChange, CommandChangeKind, CommandHolder, CommandRefusal,
@@ -23,4 +26,4 @@ pub use orders::{FenceOrder, LimitsOrder, MAX_DISTANCE_M};
 pub use scenecast_core::{Principal, Role};
 pub use settings::{SettingsOrder, SettingsRecord};
 pub use surface::{Surface, SurfaceOutput};
-pub use vehicle_record::VehicleRecord;
+pub use vehicle_record::{EarlierView, SentOrder, Track, VehicleRecord, WholeMaps};

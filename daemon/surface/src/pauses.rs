@@ -16,6 +16,11 @@ impl Pauses {
     /// A pause up to this length counts fully, even if it is far beyond the usual one.
     const SHORT: Duration = Duration::from_secs(60);
 
+    /// The pauses as an earlier run of the surface knew them.
+    pub fn restored(longest: Option<Duration>) -> Self {
+        Self { last_frame: None, longest }
+    }
+
     pub fn handle_frame(&mut self, now: Instant) {
         let Some(last) = self.last_frame.replace(now) else { return };
         let pause = now.since(last);

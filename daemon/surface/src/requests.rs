@@ -15,7 +15,7 @@ impl Surface {
         kind: RequestKind,
         now: Instant,
     ) -> Result<u16, String> {
-        if !self.labels(vehicle).ok_or("no such vehicle")?.contains_key(&label) {
+        if !self.labels_for_orders(vehicle)?.contains_key(&label) {
             return Err(format!("label {label} is not on the map"));
         }
         self.change_requests(vehicle, |cache| cache.request(label, kind, now), now)

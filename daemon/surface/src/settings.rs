@@ -131,6 +131,16 @@ impl SettingsRecord {
         &self.requested
     }
 
+    /// The requested settings, those that the vehicle applied last, and whether an order was replaced before its fate was known.
+    pub(super) fn parts(&self) -> (Settings, Settings, bool) {
+        (self.requested, self.in_force, self.is_unsure)
+    }
+
+    /// The record with these [`Self::parts`].
+    pub(super) fn of_parts(requested: Settings, in_force: Settings, is_unsure: bool) -> Self {
+        Self { requested, in_force, is_unsure }
+    }
+
     /// The settings that the vehicle has applied, as far as this surface ordered them; `None` while that is unknown.
     pub fn in_force(&self) -> Option<&Settings> {
         (!self.is_unsure).then_some(&self.in_force)

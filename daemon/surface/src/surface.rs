@@ -4,19 +4,18 @@ use super::command::{Command, CommandAction, CommandChange, CommandRefusal, Orde
 use super::orders::{FenceOrder, LimitsOrder};
 use super::position::{Relay, UsblSighting};
 use super::settings::SettingsOrder;
-use super::vehicle_record::VehicleRecord;
+use super::vehicle_record::{VehicleRecord, WholeMaps};
 use scenecast_core::label_picture;
 use scenecast_core::tuning_table::{Fit, NoRow, TuningTable};
 use scenecast_core::{Principal, UsblLine};
 use scenecast_protocol::directive::{Budget, Constraints, Fix, OrderStatus, Slot, SlotId, Utility};
 use scenecast_protocol::exemplar::Exemplar;
 use scenecast_protocol::link::{Cycle, Mismatch, PeerView, SurfaceEvent, SurfaceLink, Transmit, Wakeup};
-use scenecast_protocol::map::{LabelGrid, LayerSet, Rect, ReplicaTile, ReplicaTileKey};
+use scenecast_protocol::map::{LabelGrid, LayerReplica, LayerSet, Rect, Replica, ReplicaTile, SharedTiles};
 use scenecast_protocol::schedule::{BackgroundOrder, Shares};
 use scenecast_protocol::time::Instant;
-use scenecast_protocol::wire::{Address, Placement};
+use scenecast_protocol::wire::{Address, Placement, VehicleStatus};
 use std::collections::{BTreeMap, VecDeque};
-use std::sync::Arc;
 
 /// News of the surface for its host.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -109,28 +108,61 @@ impl Surface {
     }
 
     pub fn map(&self, vehicle: Address) -> Option<&LabelGrid> {
-        let whole = self.records.get(&vehicle).and_then(|d| d.whole.as_ref());
-        whole.or_else(|| self.link.vehicle(vehicle).map(|v| v.replica().shown()))
+        let record = self.records.get(&vehicle);
+        let earlier = record.and_then(|d| d.earlier_map()).map(|earlier| earlier.map.labels().shown());
+        let in_view = earlier.or_else(|| record.and_then(|d| d.whole.last.as_ref()));
+        in_view.or_else(|| self.link.vehicle(vehicle).map(|v| v.replica().shown()))
     }
 
-    /// The labels of a vehicle's map in tiles. They are shared, so a clone stays as it is and costs little.
-    pub fn map_tiles(&self, vehicle: Address) -> Option<BTreeMap<ReplicaTileKey, Arc<ReplicaTile>>> {
-        if let Some(whole) = self.records.get(&vehicle).and_then(|d| d.whole.as_ref()) {
-            return Some(ReplicaTile::tiles_of(whole));
+    /// The labels of the map in view with the time of each cell: those of the earlier map, if it is in view.
+    pub fn replica(&self, vehicle: Address) -> Option<&Replica> {
+        let earlier = self.records.get(&vehicle).and_then(|d| d.earlier_map()).map(|earlier| earlier.map.labels());
+        earlier.or_else(|| self.link.vehicle(vehicle).map(|v| v.replica()))
+    }
+
+    /// The layers of the map in view.
+    pub fn map_layers(&self, vehicle: Address) -> Vec<&LayerReplica> {
+        if let Some(earlier) = self.records.get(&vehicle).and_then(|d| d.earlier_map()) {
+            return earlier.map.layers().map(|(_, layer)| layer).collect();
         }
-        Some(self.link.vehicle(vehicle)?.replica().tiles().clone())
+        let Some(view) = self.link.vehicle(vehicle) else { return Vec::new() };
+        view.layers().iter().filter_map(|(id, _)| view.layer(id)).collect()
     }
 
-    /// The smallest rectangle around the explored cells of a vehicle's map.
+    /// The number of cells with a label that the vehicle has sent in its current run, in view or not.
+    pub fn current_cells(&self, vehicle: Address) -> usize {
+        let whole = self.records.get(&vehicle).and_then(|d| d.whole.last.as_ref());
+        let count = |view: PeerView<'_>| view.replica().counts().map(|(_, cells)| cells as usize).sum::<usize>();
+        let live = || self.link.vehicle(vehicle).map_or(0, count);
+        whole.map_or_else(live, LabelGrid::explored)
+    }
+
+    /// The last status of a vehicle and when its pose came in, perhaps before the start of the surface.
+    pub fn status(&self, vehicle: Address) -> Option<&(VehicleStatus, Instant)> {
+        self.records.get(&vehicle)?.status(&self.link.vehicle(vehicle)?)
+    }
+
+    /// The last whole map, if it is in view.
+    fn whole_map(&self, vehicle: Address) -> Option<&LabelGrid> {
+        let record = self.records.get(&vehicle).filter(|record| record.earlier_map().is_none());
+        record.and_then(|record| record.whole.last.as_ref())
+    }
+
+    /// The labels of the map in view in tiles. They are shared, so a clone stays as it is and costs little.
+    pub fn map_tiles(&self, vehicle: Address) -> Option<SharedTiles> {
+        let whole = self.whole_map(vehicle).map(ReplicaTile::tiles_of);
+        whole.or_else(|| Some(self.replica(vehicle)?.tiles().clone()))
+    }
+
+    /// The smallest rectangle around the explored cells of the map in view.
     pub fn map_bounds(&self, vehicle: Address) -> Option<Rect> {
-        let whole = self.records.get(&vehicle).and_then(|d| d.whole.as_ref());
-        whole.map_or_else(|| self.link.vehicle(vehicle)?.replica().bounds(), LabelGrid::bounds)
+        self.whole_map(vehicle).map_or_else(|| self.replica(vehicle)?.bounds(), LabelGrid::bounds)
     }
 
     /// A number that grows whenever the operator's map of a vehicle or one of its layers changes.
     pub fn map_version(&self, vehicle: Address) -> u64 {
-        let wholes = self.records.get(&vehicle).map_or(0, |d| d.wholes);
-        wholes + self.link.vehicle(vehicle).map_or(0, |v| v.map_version())
+        let (record, view) = (self.records.get(&vehicle), self.link.vehicle(vehicle));
+        record.zip(view).map_or(0, |(record, view)| record.map_version(&view))
     }
 
     /// The budget of the surface, bit/s.
@@ -166,7 +198,10 @@ impl Surface {
         (exploration, curiosity): (f64, f64),
         now: Instant,
     ) -> Result<u16, String> {
-        let known = self.labels(vehicle).ok_or("no such vehicle")?;
+        let known = match weights.is_empty() {
+            true => BTreeMap::new(),
+            false => self.labels_for_orders(vehicle)?,
+        };
         let hundredths = |what: &str, w: f64| {
             let ok = w.is_finite() && (-1.0..=1.0).contains(&w);
             ok.then_some((w * 100.0).round() as i8).ok_or(format!("{what} {w} is not within -1 to 1"))
@@ -205,7 +240,7 @@ impl Surface {
     pub fn set_fence(&mut self, vehicle: Address, order: &FenceOrder, now: Instant) -> Result<u16, String> {
         let fence = order.read()?;
         let version = self.issue(vehicle, Slot::Fence(fence.clone()), now)?;
-        self.records.get_mut(&vehicle).ok_or("no such vehicle")?.fence = Some(fence);
+        self.records.get_mut(&vehicle).ok_or("no such vehicle")?.fence.sent = Some(fence);
         Ok(version)
     }
 
@@ -213,7 +248,7 @@ impl Surface {
     pub fn set_limits(&mut self, vehicle: Address, order: &LimitsOrder, now: Instant) -> Result<u16, String> {
         let limits = order.read()?;
         let version = self.issue(vehicle, Slot::Limits(limits), now)?;
-        self.records.get_mut(&vehicle).ok_or("no such vehicle")?.limits = Some(limits);
+        self.records.get_mut(&vehicle).ok_or("no such vehicle")?.limits.sent = Some(limits);
         Ok(version)
     }
 
@@ -334,8 +369,7 @@ impl Surface {
 
     /// The reported position of a vehicle in the world frame: metres east and north.
     pub fn vehicle_in_world(&self, vehicle: Address) -> Option<(f64, f64)> {
-        let view = self.link.vehicle(vehicle)?;
-        let (status, _) = view.status()?;
+        let (status, _) = self.link.vehicle(vehicle)?.status()?;
         Some(Placement::map_to_world(status.placement, status.position).xy())
     }
 
@@ -347,14 +381,27 @@ impl Surface {
 
     /// The number of cells of each label on the operator's map.
     pub fn labels(&self, vehicle: Address) -> Option<BTreeMap<u8, u32>> {
-        let Some(whole) = self.records.get(&vehicle).and_then(|d| d.whole.as_ref()) else {
-            return Some(self.link.vehicle(vehicle)?.replica().counts().collect());
+        let Some(whole) = self.whole_map(vehicle) else {
+            return Some(self.replica(vehicle)?.counts().collect());
         };
         let mut cells = BTreeMap::new();
         for (_, label) in whole.iter() {
             *cells.entry(label).or_default() += 1;
         }
         Some(cells)
+    }
+
+    /// The labels of the map in view that an order may name. The error is one line for the operator.
+    pub(super) fn labels_for_orders(&self, vehicle: Address) -> Result<BTreeMap<u8, u32>, String> {
+        let record = self.records.get(&vehicle).ok_or("no such vehicle")?;
+        if let Some(earlier) = record.earlier_map().filter(|earlier| earlier.epoch != record.epoch) {
+            return Err(format!(
+                "the map in view has the labels of epoch {}, and the vehicle is in epoch {}: wait for the current map, or \
+                 dismiss the earlier one",
+                earlier.epoch, record.epoch
+            ));
+        }
+        self.labels(vehicle).ok_or_else(|| "no such vehicle".to_owned())
     }
 
     pub fn handle_frame(&mut self, bytes: &[u8], now: Instant) {
@@ -377,6 +424,7 @@ impl Surface {
             }
             SurfaceEvent::MapChanged(vehicle) => Some(SurfaceOutput::MapChanged(vehicle)),
             SurfaceEvent::VehicleRestarted(vehicle) => {
+                self.records.get_mut(&vehicle).into_iter().for_each(|record| record.run += 1);
                 self.request_again(vehicle, now);
                 Some(SurfaceOutput::MapChanged(vehicle))
             }
@@ -411,8 +459,7 @@ impl Surface {
             SurfaceEvent::Object(vehicle, bytes) => {
                 let record = self.records.get_mut(&vehicle)?;
                 if let Some(whole) = label_picture::read_whole(&bytes) {
-                    record.whole = Some(whole);
-                    record.wholes += 1;
+                    record.whole = WholeMaps { last: Some(whole), count: record.whole.count + 1, at: now };
                     return Some(SurfaceOutput::MapChanged(vehicle));
                 }
                 let exemplar = Exemplar::decode(&bytes)?;

@@ -1,16 +1,64 @@
 //! The operator's data about one vehicle.
 
+use super::annotations::Annotations;
 use super::exemplar_cache::ExemplarCache;
 use super::pauses::Pauses;
+use super::record::{EarlierMap, StoredLabel};
 use super::settings::SettingsRecord;
 use scenecast_core::UsblLine;
 use scenecast_protocol::directive::{ExemplarRequests, Fence, Limits, SlotId, Utility};
 use scenecast_protocol::exemplar::Exemplar;
-use scenecast_protocol::link::Mismatch;
+use scenecast_protocol::link::{Mismatch, PeerView};
 use scenecast_protocol::map::LabelGrid;
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::VehicleStatus;
 use std::collections::VecDeque;
+use std::sync::Arc;
+use std::time::Duration;
+
+/// The last order of a kind that was sent, and the one in force.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SentOrder<T> {
+    /// The last one that was sent.
+    pub sent: Option<T>,
+    /// The one that the vehicle has applied, with its version.
+    pub in_force: Option<(u16, T)>,
+}
+
+impl<T> Default for SentOrder<T> {
+    fn default() -> Self {
+        Self { sent: None, in_force: None }
+    }
+}
+
+/// Whole maps, where the vehicle sends them instead of patches.
+#[derive(Debug, Default)]
+pub struct WholeMaps {
+    /// The last one.
+    pub last: Option<LabelGrid>,
+    /// The number of whole maps that have arrived.
+    pub count: u64,
+    /// When the last one arrived.
+    pub at: Instant,
+}
+
+/// The map of an earlier run, or of an earlier run of the surface, which stays in view until the current one has as many
+/// cells.
+#[derive(Debug, Default)]
+pub struct EarlierView {
+    pub map: Option<Arc<EarlierMap>>,
+    /// The operator does not need it any more.
+    pub is_dismissed: bool,
+    /// Added to the version of the current map, so that each map in view has another version.
+    pub version_base: u64,
+}
+
+/// Facts from before the start of the surface, until the vehicle reports newer ones.
+#[derive(Debug, Default)]
+struct RestoredContact {
+    status: Option<(VehicleStatus, Instant)>,
+    last_received: Option<Instant>,
+}
 
 /// The last orders to a vehicle, and its last reports.
 #[derive(Debug)]
@@ -18,74 +66,141 @@ pub struct VehicleRecord {
     pub name: String,
     /// The last utility that was sent.
     pub utility: Utility,
-    /// The last fence that was sent.
-    pub fence: Option<Fence>,
-    /// The last limits that were sent.
-    pub limits: Option<Limits>,
-    /// The fence that the vehicle has applied, with its version.
-    pub fence_in_force: Option<(u16, Fence)>,
-    /// The limits that the vehicle has applied, with their version.
-    pub limits_in_force: Option<(u16, Limits)>,
+    pub fence: SentOrder<Fence>,
+    pub limits: SentOrder<Limits>,
     /// The settings that were ordered, and those in force.
     pub settings: SettingsRecord,
     pub exemplars: ExemplarCache,
-    /// Reported positions in the map frame: time, metres east, metres north.
-    pub track: VecDeque<(Instant, f64, f64)>,
+    /// Reported positions in the map frame.
+    pub track: Track,
+    /// Counts the runs of the vehicle that this surface has met, from 1.
+    pub run: u32,
     pub epoch: u8,
-    /// The last whole map, where the vehicle sends whole maps.
-    pub whole: Option<LabelGrid>,
-    /// The number of whole maps that have arrived.
-    pub wholes: u64,
+    pub whole: WholeMaps,
+    pub earlier: EarlierView,
     /// The usual length of its silence.
     pub pauses: Pauses,
     /// The last measurement of the surface's modem, and its time.
     pub found: Option<(UsblLine, Instant)>,
     /// The last setting in which the vehicle was found to differ, and when.
     pub mismatch: Option<(Mismatch, Instant)>,
+    pub annotations: Annotations,
+    restored: RestoredContact,
+}
+
+/// Reported positions in the map frame: time, metres east, metres north.
+#[derive(Debug, Clone, Default)]
+pub struct Track {
+    points: VecDeque<(Instant, f64, f64)>,
+    total: u64,
+}
+
+impl Track {
+    /// Maximum number of positions.
+    const MAX_POINTS: usize = 500;
+
+    /// A track that was interrupted after `total` positions, of which these are the last.
+    pub fn restored(points: impl IntoIterator<Item = (Instant, f64, f64)>, total: u64) -> Self {
+        Self { points: points.into_iter().collect(), total }
+    }
+
+    pub fn iter(&self) -> impl DoubleEndedIterator<Item = (Instant, f64, f64)> + ExactSizeIterator + '_ {
+        self.points.iter().copied()
+    }
+
+    /// The number of positions so far, those that were dropped included.
+    pub fn total(&self) -> u64 {
+        self.total
+    }
+
+    fn push(&mut self, at: Instant, x_m: f64, y_m: f64) {
+        self.points.push_back((at, x_m, y_m));
+        self.total += 1;
+        self.points.drain(..self.points.len().saturating_sub(Self::MAX_POINTS));
+    }
 }
 
 impl VehicleRecord {
-    /// Maximum number of positions in the track.
-    const TRACK: usize = 500;
-
     pub fn new(name: String) -> Self {
         Self {
             name,
             utility: Utility::default(),
-            fence: None,
-            limits: None,
-            fence_in_force: None,
-            limits_in_force: None,
+            fence: SentOrder::default(),
+            limits: SentOrder::default(),
             settings: SettingsRecord::default(),
             exemplars: ExemplarCache::default(),
-            track: VecDeque::new(),
+            track: Track::default(),
+            run: 1,
             epoch: 0,
-            whole: None,
-            wholes: 0,
+            whole: WholeMaps::default(),
+            earlier: EarlierView::default(),
             pauses: Pauses::default(),
             found: None,
             mismatch: None,
+            annotations: Annotations::default(),
+            restored: RestoredContact::default(),
         }
+    }
+
+    /// The last status and when its pose came in, perhaps before the start of the surface.
+    pub fn status<'a>(&'a self, view: &PeerView<'a>) -> Option<&'a (VehicleStatus, Instant)> {
+        view.status().or(self.restored.status.as_ref())
+    }
+
+    /// When a frame was last accepted, perhaps before the start of the surface.
+    pub fn last_received(&self, view: &PeerView<'_>) -> Option<Instant> {
+        view.last_received().or(self.restored.last_received)
+    }
+
+    /// Puts facts from before the start of the surface back.
+    pub fn restore_contact(
+        &mut self,
+        status: Option<(VehicleStatus, Instant)>,
+        last_received: Option<Instant>,
+        pause: Option<Duration>,
+    ) {
+        self.restored = RestoredContact { status, last_received };
+        self.pauses = Pauses::restored(pause);
+    }
+
+    /// The earlier map that is in view in place of the current one.
+    pub fn earlier_map(&self) -> Option<&EarlierMap> {
+        self.earlier.map.as_deref()
+    }
+
+    /// The operator's name of a label of the map in view.
+    pub fn label_book(&self, label: u8) -> Option<&StoredLabel> {
+        let of_earlier = self.earlier_map().filter(|earlier| earlier.epoch != self.epoch).map(|e| &e.names);
+        of_earlier.unwrap_or(&self.annotations.labels).get(&label)
+    }
+
+    /// Shows an earlier map in place of the current one, or the current one.
+    pub fn show_earlier(&mut self, map: Option<Arc<EarlierMap>>) {
+        self.earlier = EarlierView { map, is_dismissed: false, version_base: self.earlier.version_base + 1 };
+    }
+
+    /// A number that grows with each change of the map in view.
+    pub fn map_version(&self, view: &PeerView<'_>) -> u64 {
+        self.earlier.version_base + self.whole.count + view.map_version()
     }
 
     /// Takes a status. A new epoch voids everything that refers to labels.
     pub fn handle_status(&mut self, status: &VehicleStatus, now: Instant) {
+        self.restored = RestoredContact::default();
         if status.epoch != self.epoch {
             self.epoch = status.epoch;
             self.utility = Utility { epoch: status.epoch, ..Utility::default() };
             self.exemplars = ExemplarCache::default();
+            self.annotations.labels.clear();
         }
-        self.track.push_back((now, status.position.x_m, status.position.y_m));
-        if self.track.len() > Self::TRACK {
-            self.track.pop_front();
-        }
+        self.track.push(now, status.position.x_m, status.position.y_m);
     }
 
     /// The vehicle has applied the version of a slot that was sent last.
     pub fn handle_applied(&mut self, slot: SlotId, version: u16) {
         match slot {
-            SlotId::Fence => self.fence_in_force = self.fence.clone().map(|fence| (version, fence)),
-            SlotId::Limits => self.limits_in_force = self.limits.map(|limits| (version, limits)),
+            SlotId::Fence => self.fence.in_force = self.fence.sent.clone().map(|fence| (version, fence)),
+            SlotId::Limits => self.limits.in_force = self.limits.sent.map(|limits| (version, limits)),
             _ => {}
         }
     }

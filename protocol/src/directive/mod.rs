@@ -138,11 +138,13 @@ impl RefusalReason {
         Self::Forgotten,
     ];
 
-    pub(crate) fn code(self) -> u8 {
+    /// The number on the wire, 2 to 9.
+    pub fn code(self) -> u8 {
         self as u8 + 2
     }
 
-    pub(crate) fn from_code(code: u8) -> Option<Self> {
+    /// The reason with this number on the wire.
+    pub fn from_code(code: u8) -> Option<Self> {
         Self::ALL.into_iter().find(|r| r.code() == code)
     }
 

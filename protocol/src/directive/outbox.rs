@@ -58,20 +58,36 @@ pub struct SlotOutbox {
     is_forgotten: bool,
     /// The frame that acknowledged each slot that is received.
     received_in: [u64; SLOTS],
+    /// Versions to leave out before the next one of each slot.
+    skipped: [u16; SLOTS],
 }
 
 impl SlotOutbox {
     /// Time after an acknowledgement in which each report from before it has come in.
     const MAX_DECISION: Duration = Duration::from_secs(30);
+    /// Versions that are left out after a restart: an order whose record was lost may have used one of them.
+    const RESTART_GAP: u16 = 64;
 
     /// An empty directive; `series` must be drawn at random by a surface that does not know its last orders.
     pub fn new(series: Series) -> Self {
-        Self { series, slots: Default::default(), is_forgotten: false, received_in: [0; SLOTS] }
+        Self { series, slots: Default::default(), is_forgotten: false, received_in: [0; SLOTS], skipped: [0; SLOTS] }
     }
 
     /// The series that the versions belong to.
     pub fn series(&self) -> Series {
         self.series
+    }
+
+    /// Continues with the series and the orders of an earlier run of the surface. Orders that the vehicle has not decided
+    /// about are sent again, with their versions.
+    pub fn restore(&mut self, series: Series, orders: impl IntoIterator<Item = SlotProgress>) {
+        (self.series, self.skipped) = (series, [Self::RESTART_GAP; SLOTS]);
+        for order in orders {
+            self.is_forgotten |= order.status == OrderStatus::Refused(RefusalReason::Forgotten);
+            if let Some(entry) = self.slots.get_mut(order.id.index()) {
+                *entry = Some(SlotProgress { sent: None, ..order });
+            }
+        }
     }
 
     /// Issues a new version of a slot, which supersedes the older one; returns the version.
@@ -83,7 +99,8 @@ impl SlotOutbox {
         }
         let id = slot.id();
         let Some(entry) = self.slots.get_mut(id.index()) else { return 0 };
-        let version = entry.as_ref().map_or(1, |s| s.version.wrapping_add(1));
+        let gap = self.skipped.get_mut(id.index()).map(std::mem::take).unwrap_or_default();
+        let version = entry.as_ref().map_or(1, |s| s.version.wrapping_add(1)).wrapping_add(gap);
         *entry = Some(SlotProgress {
             id,
             version,
@@ -103,14 +120,14 @@ impl SlotOutbox {
 
     /// Whether a version waits that the vehicle is not known to have received.
     pub fn has_backlog(&self) -> bool {
-        self.progress().any(|s| matches!(s.status, OrderStatus::Queued | OrderStatus::OnAir))
+        self.progress().any(is_pending)
     }
 
     /// The slots that the vehicle is not known to have received, commands before fixes, encoded as of `now`;
     /// without those sent after `again_before`.
     pub fn pending(&self, now: Instant, again_before: Instant) -> Vec<PendingSlot> {
         self.progress()
-            .filter(|s| matches!(s.status, OrderStatus::Queued | OrderStatus::OnAir))
+            .filter(|s| is_pending(s))
             .filter(|s| s.sent.is_none_or(|at| at <= again_before))
             .map(|s| PendingSlot {
                 id: s.id,
@@ -128,7 +145,10 @@ impl SlotOutbox {
 
     /// Notes that a frame with this version was written.
     pub fn mark_on_air(&mut self, id: SlotId, version: u16, now: Instant) {
-        self.advance(id, version, OrderStatus::OnAir, now, |status| status == OrderStatus::Queued);
+        let is_first = self.slots.get(id.index()).and_then(Option::as_ref).is_some_and(|s| s.sent.is_none());
+        self.advance(id, version, OrderStatus::OnAir, now, |status| {
+            status == OrderStatus::Queued || is_first && status == OrderStatus::Received
+        });
         if let Some(slot) = self.slots.get_mut(id.index()).and_then(Option::as_mut) {
             slot.sent = Some(now);
         }
@@ -227,10 +247,60 @@ impl SlotOutbox {
     }
 }
 
+/// Whether the vehicle is not known to have received an order. One that an earlier run of the surface knew as received, and
+/// not as decided, has not been sent in this run.
+fn is_pending(order: &SlotProgress) -> bool {
+    match order.status {
+        OrderStatus::Queued | OrderStatus::OnAir => true,
+        OrderStatus::Received => order.sent.is_none(),
+        OrderStatus::Applied | OrderStatus::Refused(_) => false,
+    }
+}
+
 /// Brings the age of a fix up to date.
 fn dated(progress: &SlotProgress, now: Instant) -> Slot {
     match progress.slot {
         Slot::Fix(fix) => Slot::Fix(super::Fix { age_s: fix.age_s + now.since(progress.issued).as_secs_f64(), ..fix }),
         ref other => other.clone(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::directive::Constraints;
+
+    fn hold(hold: bool) -> Slot {
+        Slot::Constraints(Constraints { hold, abort: false })
+    }
+
+    #[test]
+    fn restored_orders_are_sent_again_with_their_versions() {
+        let now = Instant::from_secs_f64(5.0);
+        for (status, is_sent) in [
+            (OrderStatus::Queued, true),
+            (OrderStatus::OnAir, true),
+            (OrderStatus::Received, true),
+            (OrderStatus::Applied, false),
+            (OrderStatus::Refused(RefusalReason::Unable), false),
+        ] {
+            let mut before = SlotOutbox::new(Series::from_random(9));
+            (0..3).for_each(|i| assert_eq!(before.issue(hold(i % 2 == 0), now), i + 1));
+            let mut order = before.progress().next().unwrap().clone();
+            (order.status, order.sent) = (status, Some(now));
+            let mut after = SlotOutbox::new(Series::from_random(1));
+            after.restore(Series::from_random(9), [order]);
+            let pending = after.pending(now, Instant::ZERO);
+            let bytes = VersionedSlot::encode(3, &hold(true));
+            assert_eq!(pending.iter().map(|p| &p.bytes).collect::<Vec<_>>(), Vec::from_iter(is_sent.then_some(&bytes)));
+            assert_eq!(after.progress().next().unwrap().status, status);
+            if is_sent {
+                after.mark_on_air(SlotId::Constraints, 3, now);
+                after.mark_received(SlotId::Constraints, 3, 1, now);
+                assert_eq!(after.progress().next().unwrap().status, OrderStatus::Received);
+                assert!(!after.has_backlog());
+            }
+            assert!(after.issue(hold(false), now) > 3 + 1, "the next version may have been used by a lost order");
+        }
     }
 }

@@ -26,4 +26,4 @@ pub use layer::{
 pub use replica::Replica;
 pub use source::MapSource;
 pub use stream::{StateReplica, StateSource};
-pub use tiles::{REPLICA_TILE, ReplicaTile, ReplicaTileKey};
+pub use tiles::{REPLICA_TILE, ReplicaTile, ReplicaTileKey, SharedTiles};

@@ -1,11 +1,10 @@
 //! The surface's side of the map: the map to show, and the bases of the next chunks.
 
-use super::tiles::{ReplicaTile, ReplicaTileKey, ReplicaTiles};
+use super::tiles::{ReplicaTiles, SharedTiles};
 use super::{Cell, LabelGrid, MAX_LABEL, MapDigest, Rect, StateReplica, UNEXPLORED};
 use crate::map_codec;
 use crate::time::Instant;
 use std::collections::BTreeMap;
-use std::sync::Arc;
 
 /// The most cells that a replica knows, and the most changes that wait for the base: a few bytes
 /// can claim a whole patch.
@@ -52,6 +51,28 @@ impl Replica {
         self.received.received_cells()
     }
 
+    /// Every cell that a chunk has covered, with its label and when that was received, tile by tile.
+    pub fn cells(&self) -> impl Iterator<Item = (Cell, u8, Instant)> + '_ {
+        self.received.cells()
+    }
+
+    /// [`Self::cells`] of the tiles that have changed since `earlier`, an earlier copy of [`Self::tiles`].
+    pub fn cells_apart_from<'a>(&'a self, earlier: &'a SharedTiles) -> impl Iterator<Item = (Cell, u8, Instant)> + 'a {
+        self.received.cells_apart_from(earlier)
+    }
+
+    /// Puts a cell back that an earlier run of the surface has received. Such a replica is only shown: it is no base of a
+    /// chunk.
+    pub fn restore(&mut self, cell: Cell, label: u8, at: Instant) {
+        if !self.received.has_room(&[(cell, label)]) {
+            return;
+        }
+        self.received.receive(cell, label, 0, at);
+        self.shown.set(cell, label);
+        self.updated = self.updated.max(Some(at));
+        self.version += 1;
+    }
+
     /// When a chunk last covered a cell.
     pub fn received_at(&self, cell: Cell) -> Option<Instant> {
         self.received.received_at(cell)
@@ -59,7 +80,7 @@ impl Replica {
 
     /// The cells of [`Self::shown`] and when they were received, in tiles. A tile that a reader has cloned stays as it is; a
     /// change of one of its cells, also of the time alone, makes another one.
-    pub fn tiles(&self) -> &BTreeMap<ReplicaTileKey, Arc<ReplicaTile>> {
+    pub fn tiles(&self) -> &SharedTiles {
         self.received.tiles()
     }
 

@@ -15,6 +15,10 @@ const MAX_RECEPTIONS: usize = 2 * CELLS;
 
 /// Row and column of a tile of a replica, counted in tiles from the origin.
 pub type ReplicaTileKey = (i32, i32);
+/// Tiles of a replica by their place; a clone shares them.
+pub type SharedTiles = BTreeMap<ReplicaTileKey, Arc<ReplicaTile>>;
+
+static NO_TILES: SharedTiles = BTreeMap::new();
 
 /// A frame that covered cells of a tile.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -46,8 +50,8 @@ impl ReplicaTile {
     }
 
     /// The tiles of a map of which no times are known.
-    pub fn tiles_of(grid: &LabelGrid) -> BTreeMap<ReplicaTileKey, Arc<Self>> {
-        let mut tiles: BTreeMap<ReplicaTileKey, Arc<Self>> = BTreeMap::new();
+    pub fn tiles_of(grid: &LabelGrid) -> SharedTiles {
+        let mut tiles = SharedTiles::new();
         for (cell, label) in grid.iter() {
             let tile = Arc::make_mut(tiles.entry(key(cell)).or_insert_with(|| Arc::new(Self::EMPTY)));
             if let Some(at) = tile.labels.get_mut(place(cell)) {
@@ -98,7 +102,7 @@ impl std::fmt::Debug for ReplicaTile {
 /// The received cells of a replica: labels, times of reception, and figures of the whole map that would take long to count.
 #[derive(Debug)]
 pub(super) struct ReplicaTiles {
-    tiles: BTreeMap<ReplicaTileKey, Arc<ReplicaTile>>,
+    tiles: SharedTiles,
     received: usize,
     /// The number of cells of each label.
     counts: [u32; MAX_LABEL as usize + 2],
@@ -120,7 +124,7 @@ fn place(cell: Cell) -> usize {
 }
 
 impl ReplicaTiles {
-    pub(super) fn tiles(&self) -> &BTreeMap<ReplicaTileKey, Arc<ReplicaTile>> {
+    pub(super) fn tiles(&self) -> &SharedTiles {
         &self.tiles
     }
 
@@ -131,6 +135,27 @@ impl ReplicaTiles {
     pub(super) fn received_at(&self, cell: Cell) -> Option<Instant> {
         let tile = self.tiles.get(&key(cell))?;
         Some(tile.reception(*tile.received.get(place(cell))?)?.at)
+    }
+
+    /// Every cell that a chunk has covered, with its label and when that was received, tile by tile.
+    pub(super) fn cells(&self) -> impl Iterator<Item = (Cell, u8, Instant)> + '_ {
+        self.cells_apart_from(&NO_TILES)
+    }
+
+    /// [`Self::cells`] without the tiles that are the same as those of `earlier`, an earlier copy of [`Self::tiles`].
+    pub(super) fn cells_apart_from<'a>(
+        &'a self,
+        earlier: &'a SharedTiles,
+    ) -> impl Iterator<Item = (Cell, u8, Instant)> + 'a {
+        let is_other = |key, tile| earlier.get(key).is_none_or(|known| !Arc::ptr_eq(known, tile));
+        self.tiles.iter().filter(move |(key, tile)| is_other(*key, *tile)).flat_map(|(&(row, column), tile)| {
+            let cells = (0i32..).zip(&tile.labels).zip(&tile.received);
+            cells.filter_map(move |((place, &label), &index)| {
+                let (x, y) = (place % REPLICA_TILE, place / REPLICA_TILE);
+                let cell = Cell::new(column.wrapping_mul(REPLICA_TILE) + x, row.wrapping_mul(REPLICA_TILE) + y);
+                Some((cell, label, tile.reception(index)?.at))
+            })
+        })
     }
 
     /// Labels on the map with the number of their cells.

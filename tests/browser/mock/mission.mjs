@@ -104,6 +104,7 @@ export class Mission {
       mission: { name: this.name, id: `mock-${this.name}`, speed: this.speed, ended: this.ended },
       vehicles: this.vehicles.map((v) => v.json(this.nowS)),
       position: this.position ?? null,
+      storage: this.storage ?? null,
       command: this.command.json(),
       layers: LAYERS.map(({ name, unit }) => ({ name, unit, summary: `what ${name} means` })),
       link: {

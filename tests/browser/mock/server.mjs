@@ -85,6 +85,7 @@ async function api(mock, req, res, path) {
   if (req.method === "POST") return post(mock, req, res, path);
   if (path === "principal") return reply(res, 200, mission.command.principal(req.headers.cookie));
   if (path === "state") return reply(res, 200, mission.json());
+  if (path === "archive") return reply(res, 200, { maps: mission.archive ?? [] });
   const [, id, resource] = path.match(/^vehicles\/(\d+)\/(.+)$/) ?? [];
   const vehicle = mission.vehicles.find((v) => v.id === Number(id));
   if (!vehicle) return reply(res, 404, { error: "no such vehicle" });
@@ -114,10 +115,11 @@ async function post(mock, req, res, path) {
     reply(res, refused?.[0] ?? 200, refused ? { error: refused[1] } : mission.command.json());
     return emit(mock, "state", mission.json());
   }
+  const isRecord = /\/(labels|notes|dismiss)$/.test(path);
   const kind = path.endsWith("/settings") ? "settings" : given.hold || given.abort ? "stop" : "order";
-  const refused = mission.command.refusal(by, kind);
+  const refused = isRecord ? null : mission.command.refusal(by, kind);
   if (refused) return reply(res, refused[0], { error: refused[1] });
-  mission.command.order(by, kind, mission.nowS);
+  if (!isRecord) mission.command.order(by, kind, mission.nowS);
   if (path === "budget") {
     const bps = given.budget_bps;
     if (!Number.isInteger(bps) || bps < 100 || bps > 100000) {
@@ -129,13 +131,19 @@ async function post(mock, req, res, path) {
     const [response] = mission.vehicles.map((v) => v.directive.issue("budget", mission.nowS));
     return accepted(mock, res, response);
   }
-  const [, id, resource] = path.match(/^vehicles\/(\d+)\/(\w+)$/) ?? [];
+  const [, id, resource] = path.match(/^vehicles\/(\d+)\/([\w-]+)(?:\/dismiss)?$/) ?? [];
   const v = mission.vehicles.find((x) => x.id === Number(id));
   if (!v) return reply(res, 404, { error: "no such vehicle" });
   if (resource === "utility") {
     const bad = Object.entries(given.weights ?? {}).find(([, w]) => !(w >= -1 && w <= 1));
     if (bad) return reply(res, 422, { error: `weight of label ${bad[0]} must be -1 to 1` });
     return accepted(mock, res, mission.utility(v, given));
+  }
+  // The mock keeps no names: the browser's copy counts.
+  if (resource === "labels") return reply(res, 200, {});
+  if (resource === "earlier-map") {
+    v.earlier = null;
+    return accepted(mock, res, {});
   }
   if (resource === "exemplars") return accepted(mock, res, v.request(given, mission.nowS));
   if (resource === "constraints") {
@@ -178,7 +186,8 @@ function accepted(mock, res, response) {
 function steer(mock, order, res) {
   if (order.scenario) mock.mission = new Mission(order.scenario);
   const { mission } = mock;
-  for (const key of ["loss", "layers", "ended", "speed", "position"]) if (key in order) mission[key] = order[key];
+  if ("earlier" in order) mission.vehicles[0].earlier = order.earlier;
+  for (const key of ["archive", "storage", "loss", "layers", "ended", "speed", "position"]) if (key in order) mission[key] = order[key];
   if ("placement" in order) mission.vehicles[0].placement = order.placement;
   if ("coarse" in order) mission.vehicles[0].coarse = order.coarse;
   if ("silent" in order) mission.vehicles[0].silent = order.silent;

@@ -166,7 +166,7 @@ export class Vehicle {
       next_contact_s: this.receivedS === null ? null : this.nextTurnS, status: this.status, track: this.track,
       map: {
         version: this.replica.version, cell_m: this.replica.cellM, ...bounds,
-        explored_cells: this.replica.size, updated_s: this.updatedS ?? null, epoch: 0, placement: this.placement ?? null,
+        explored_cells: this.replica.size, updated_s: this.updatedS ?? null, epoch: 0, placement: this.placement ?? null, earlier: this.earlier ?? null,
       },
       labels: counts.map(([id, cells]) => ({
         id, cells, area_m2: cells * area, weight: this.weights.get(id) ?? 0, exemplar: this.exemplarJson(id),

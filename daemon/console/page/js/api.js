@@ -34,6 +34,12 @@ async function write(path, order) {
   return body;
 }
 
+/** The operator's name, colour and merging of a label; null takes one away. They stay at the surface. */
+export const saveLabel = (id, label) => write(`/vehicles/${id}/labels`, label);
+/** Shows the current map in place of that of an earlier run. */
+export const dismissEarlierMap = (id) => write(`/vehicles/${id}/earlier-map/dismiss`, {});
+/** The maps of runs that have ended, the newest first. */
+export const readArchive = async () => (await read("/archive")).maps;
 export const sendUtility = (id, utility) => write(`/vehicles/${id}/utility`, utility);
 /** `action`: another, larger or cancel; `image`: the number of the image to enlarge. */
 export const requestExemplar = (id, label, action, image = null) =>

@@ -1,6 +1,8 @@
-// The operator's own names, colours and merges of labels. They are kept in this browser only, for each mission, vehicle and
-// epoch, and are not sent: the vehicle knows label numbers only. See README.md.
+// The operator's own names, colours and merges of labels. The surface keeps them for each vehicle and epoch; this browser has
+// a copy. They are not sent to the vehicle, which knows label numbers only. See README.md.
 
+import { saveLabel } from "./api.js";
+import { announce } from "./dom.js";
 import { recall, remember } from "./prefs.js";
 import { store } from "./store.js";
 import { current as theme } from "./theme.js";
@@ -9,6 +11,8 @@ import { redShade, rgb, tableColour } from "./palette.js";
 const EMPTY = { names: {}, colours: {}, merged: {} };
 let loadedKey = null;
 let book = EMPTY;
+/** Changes that the surface has not confirmed yet. */
+let saving = 0;
 
 function key() {
   const v = store.vehicle;
@@ -24,11 +28,39 @@ function current() {
   return book;
 }
 
-function change(edit) {
+/** Changes the book and sends the entry of `id` to the surface, whose next state has it. */
+function change(id, edit) {
   edit(current());
   remember(loadedKey, book);
   store.emit("book");
+  const entry = { label: id, name: book.names[id] ?? null, colour: book.colours[id] ?? null, merged_into: book.merged[id] ?? null };
+  if (!store.vehicle) return;
+  saving += 1;
+  saveLabel(store.vehicle.id, entry).catch((error) => announce(error.message)).finally(() => (saving -= 1));
 }
+
+/** Takes the entries of the surface over, which other consoles may have changed. */
+function take() {
+  if (saving > 0) return;
+  const b = current();
+  let changed = false;
+  const put = (part, id, value) => {
+    if (value === undefined || (b[part][id] ?? null) === value) return;
+    if (value === null) delete b[part][id];
+    else b[part][id] = value;
+    changed = true;
+  };
+  for (const l of store.vehicle?.labels ?? []) {
+    put("names", l.id, l.name);
+    put("colours", l.id, l.colour);
+    put("merged", l.id, l.merged_into);
+  }
+  if (changed) {
+    remember(loadedKey, b);
+    store.emit("book");
+  }
+}
+store.on("state select", take);
 
 /** The label that `id` is shown as: itself, or the label that it was merged into. */
 export function shownAs(id) {
@@ -46,14 +78,14 @@ export const colourOf = (id) => current().colours[id] ?? tableColour(id);
 export const tintOf = (id) => (theme() === "red" ? redShade(id) : rgb(colourOf(id)));
 
 export function rename(id, name) {
-  change((b) => {
+  change(id, (b) => {
     if (name.trim() === "" || name.trim() === `Label ${id}`) delete b.names[id];
     else b.names[id] = name.trim().slice(0, 40);
   });
 }
 
 export function recolour(id, colour) {
-  change((b) => {
+  change(id, (b) => {
     if (colour === tableColour(id)) delete b.colours[id];
     else b.colours[id] = colour;
   });
@@ -61,15 +93,15 @@ export function recolour(id, colour) {
 
 export function merge(id, into) {
   if (shownAs(into) === id) return;
-  change((b) => {
+  change(id, (b) => {
     b.merged[id] = into;
   });
 }
 
 export function split(id) {
-  change((b) => {
-    for (const [from, into] of Object.entries(b.merged)) if (into === id) delete b.merged[from];
-  });
+  for (const [from, into] of Object.entries({ ...current().merged })) {
+    if (into === id) change(Number(from), (b) => delete b.merged[from]);
+  }
 }
 
 /** The vehicle's labels as the operator sees them: merged ones summed up, each with its `members`. */

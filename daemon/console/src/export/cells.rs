@@ -8,10 +8,9 @@ use scenecast_protocol::map::{
 };
 use scenecast_protocol::time::Instant;
 use std::collections::BTreeMap;
-use std::sync::Arc;
 
 /// Tiles by row and column. The surface shares them, so a clone costs little and stays as it is.
-pub(crate) type Tiles = BTreeMap<ReplicaTileKey, Arc<ReplicaTile>>;
+pub(crate) use scenecast_protocol::map::SharedTiles as Tiles;
 
 /// The most cells of a map or a region in JSON.
 pub(crate) const MAX_JSON_CELLS: u64 = 1 << 20;

@@ -117,6 +117,7 @@ fn describe_response(content: &Content, generator: &mut SchemaGenerator) -> Valu
                 "x-index": generator.subschema_for::<MapIndex>(),
             } },
         }),
+        Content::Empty => json!({ "description": "Success; the response has no content" }),
         Content::Headers => json!({ "description": "Success; `Location` is the next page" }),
     }
 }
@@ -127,6 +128,12 @@ fn parameters(operation: &Operation) -> Vec<Value> {
         let schema = json!({ "type": "integer", "minimum": 1, "maximum": 14 });
         let text = "Address of the vehicle";
         parameters.push(json!({ "name": "id", "in": "path", "required": true, "description": text, "schema": schema }));
+    }
+    if operation.path.contains("{name}") {
+        let schema = json!({ "type": "string", "pattern": "^archive-[0-9]+-epoch-[0-9]+-run-[0-9]+-[0-9]+$" });
+        let text = "Name of the archived map, from the list";
+        parameters
+            .push(json!({ "name": "name", "in": "path", "required": true, "description": text, "schema": schema }));
     }
     if operation.path.contains("{file}") {
         let schema = json!({ "type": "string", "pattern": "^[0-9]+(-[0-9]+)?\\.webp$" });

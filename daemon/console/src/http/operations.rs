@@ -1,11 +1,13 @@
 //! Every path and method of the server, in one table from which the router and the OpenAPI document are made.
 
 use super::handlers::{command, events, login, maps, metrics, orders, readings};
-use super::shared::{Shared, VehicleId};
+use super::shared::{ArchiveName, Shared, VehicleId};
 use crate::export::MapFormat;
 use crate::fit::Fit;
-use crate::orders::{BudgetOrder, CommandOrder, ConstraintsOrder, ExemplarOrder, UtilityOrder};
-use crate::state::{AcceptedOrder, CommandState, MapBody, MissionState, PrincipalInfo};
+use crate::orders::{
+    BudgetOrder, CommandOrder, ConstraintsOrder, DismissOrder, ExemplarOrder, LabelOrder, NoteOrder, UtilityOrder,
+};
+use crate::state::{AcceptedOrder, ArchiveList, CommandState, MapBody, MissionState, PrincipalInfo};
 use axum::extract::State;
 use axum::http::{HeaderMap, Method};
 use axum::routing::{MethodRouter, get, post};
@@ -29,6 +31,7 @@ pub(super) enum Content {
     /// Changed tiles of a map, binary.
     Tiles,
     Headers,
+    Empty,
 }
 
 /// A path and a method.
@@ -71,6 +74,28 @@ fn order(
     Operation { method: Method::POST, path, id, role, summary, body: Some(body), success, route }
 }
 
+/// A change of the surface's own data, which is done at once.
+fn change(
+    path: &'static str,
+    id: &'static str,
+    summary: &'static str,
+    body: SchemaOf,
+    route: fn() -> MethodRouter<Shared>,
+) -> Operation {
+    let (role, success) = (Some(Role::Operator), (204, Content::Empty));
+    Operation { method: Method::POST, path, id, role, summary, body: Some(body), success, route }
+}
+
+/// A file format of an archived map.
+macro_rules! archive_file {
+    ($path:literal, $id:literal, $summary:literal, $format:expr) => {{
+        const FORMAT: MapFormat = $format;
+        read($path, $id, $summary, Content::File(FORMAT.content_type()), || {
+            get(|State(shared): State<Shared>, ArchiveName(name): ArchiveName| maps::archived(shared, name, FORMAT))
+        })
+    }};
+}
+
 /// A file format of the map of a vehicle.
 macro_rules! map_file {
     ($path:literal, $id:literal, $summary:literal, $format:expr) => {{
@@ -86,6 +111,8 @@ macro_rules! map_file {
 pub(super) fn operations() -> Vec<Operation> {
     let mut all = readings();
     all.extend(map_files());
+    all.extend(archive());
+    all.extend(changes());
     all.extend(orders());
     all.extend(commands());
     all.extend(logins());
@@ -195,6 +222,86 @@ fn map_files() -> Vec<Operation> {
             "map_wgs84",
             "The map as a GeoTIFF in EPSG:4326",
             MapFormat::Wgs84Tiff
+        ),
+    ]
+}
+
+fn archive() -> Vec<Operation> {
+    vec![
+        read(
+            "/api/v2/archive",
+            "archive",
+            "The maps of runs and label epochs that have ended, the newest first",
+            Content::Json(schema::<ArchiveList>),
+            || get(maps::archives),
+        ),
+        archive_file!(
+            "/api/v2/archive/{name}/map.png",
+            "archived_map_png",
+            "An archived map as an indexed PNG, north up, pixel value = label",
+            MapFormat::Png
+        ),
+        archive_file!(
+            "/api/v2/archive/{name}/map.pgw",
+            "archived_map_world_file",
+            "The world file of that PNG",
+            MapFormat::WorldFile
+        ),
+        archive_file!(
+            "/api/v2/archive/{name}/map.png.aux.xml",
+            "archived_map_projection",
+            "The projection of that PNG, in the file that GDAL and QGIS read",
+            MapFormat::Projection
+        ),
+        archive_file!(
+            "/api/v2/archive/{name}/map.geojson",
+            "archived_map_geojson",
+            "Regions of equal label of an archived map",
+            MapFormat::GeoJson
+        ),
+        archive_file!(
+            "/api/v2/archive/{name}/map.ply",
+            "archived_map_ply",
+            "The cells of an archived map as a coloured point cloud",
+            MapFormat::Ply
+        ),
+        archive_file!(
+            "/api/v2/archive/{name}/map.csv",
+            "archived_map_csv",
+            "One line for each explored cell of an archived map",
+            MapFormat::Csv
+        ),
+        archive_file!(
+            "/api/v2/archive/{name}/map.tif",
+            "archived_map_tiff",
+            "An archived map as a GeoTIFF, a pixel a cell",
+            MapFormat::Tiff
+        ),
+    ]
+}
+
+fn changes() -> Vec<Operation> {
+    vec![
+        change(
+            "/api/v2/vehicles/{id}/labels",
+            "set_label",
+            "Sets name, colour and merging of a label in the current epoch; they stay at the surface",
+            schema::<LabelOrder>,
+            || post(orders::label),
+        ),
+        change(
+            "/api/v2/vehicles/{id}/notes",
+            "add_note",
+            "Adds a note about the vehicle; it stays at the surface",
+            schema::<NoteOrder>,
+            || post(orders::note),
+        ),
+        change(
+            "/api/v2/vehicles/{id}/earlier-map/dismiss",
+            "dismiss_earlier_map",
+            "Shows the current map in place of that of an earlier run, although it has fewer cells",
+            schema::<DismissOrder>,
+            || post(orders::dismiss),
         ),
     ]
 }

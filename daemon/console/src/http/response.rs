@@ -1,7 +1,7 @@
 //! Replies as HTTP responses.
 
 use crate::request::Reply;
-use crate::state::ErrorBody;
+use crate::state::{ArchiveList, ErrorBody};
 use axum::Json;
 use axum::http::{StatusCode, header};
 use axum::response::{IntoResponse, Response};
@@ -16,6 +16,8 @@ pub(super) fn respond(reply: Reply) -> Response {
         Reply::File(content_type, bytes) => ([(header::CONTENT_TYPE, content_type)], bytes).into_response(),
         Reply::Fit(fit) => Json(*fit).into_response(),
         Reply::Accepted(accepted) => (StatusCode::ACCEPTED, Json(accepted)).into_response(),
+        Reply::Done => StatusCode::NO_CONTENT.into_response(),
+        Reply::Archives(maps) => Json(ArchiveList { maps }).into_response(),
         Reply::Command(command) => Json(command).into_response(),
         Reply::Forbidden(reason) => error(StatusCode::FORBIDDEN, &reason),
         Reply::NotInCommand(reason) => error(StatusCode::CONFLICT, &reason),

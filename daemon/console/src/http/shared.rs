@@ -108,3 +108,15 @@ impl<S: Send + Sync> FromRequestParts<S> for VehicleId {
         id.map(Self).ok_or_else(not_found)
     }
 }
+
+/// The name of an archived map in a path.
+pub(super) struct ArchiveName(pub(super) String);
+
+impl<S: Send + Sync> FromRequestParts<S> for ArchiveName {
+    type Rejection = Response;
+
+    async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self, Response> {
+        let found = Path::<BTreeMap<String, String>>::from_request_parts(parts, state).await;
+        found.ok().and_then(|Path(mut names)| names.remove("name")).map(Self).ok_or_else(not_found)
+    }
+}

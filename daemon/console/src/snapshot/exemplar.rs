@@ -36,6 +36,12 @@ pub(super) fn progress(label: u8, record: &VehicleRecord, view: &PeerView<'_>, a
     }
 }
 
+/// A label without images, of which none can be requested.
+pub(super) fn none() -> ExemplarProgress {
+    let (state, images) = (ExemplarStage::None, Vec::new());
+    ExemplarProgress { state, progress: 0.0, bytes: None, url: None, at_s: None, images }
+}
+
 fn image(p: &StoredExemplar, base: &str) -> ExemplarImage {
     ExemplarImage {
         number: p.number,

@@ -1,6 +1,6 @@
 //! Facts of the mission that the surface does not have, and mission time in the API.
 
-use crate::state::Origin;
+use crate::state::{Origin, StorageInfo};
 use scenecast_config::{self as config, Config};
 use scenecast_core::LatLon;
 use scenecast_protocol::mac::ModemProfile;
@@ -11,7 +11,7 @@ use scenecast_protocol::time::Instant;
 pub struct MissionFacts {
     /// The name that people use.
     pub name: String,
-    /// A random name of this run. A browser keeps names of labels under it, so that they are not shown on other labels.
+    /// A random name of this mission at this surface, which a restart does not change. A browser keeps its data under it.
     pub run: String,
     /// Seconds of mission time for each second of the clock.
     pub speed: f64,
@@ -27,10 +27,12 @@ pub struct MissionFacts {
     pub frame_bits: u64,
     /// The configured place of x = y = 0 on the Earth.
     pub origin: Option<Origin>,
+    /// The folder in which the surface keeps its state, if it has one.
+    pub storage: Option<StorageInfo>,
 }
 
 impl MissionFacts {
-    /// A mission that begins; `run` is a random number for each run.
+    /// A mission that begins or continues; `run` is a random number for each mission.
     pub fn new(config: &Config, modem: &ModemProfile, run: u64, speed: f64) -> Self {
         Self {
             name: config.mission.name.clone(),
@@ -42,6 +44,7 @@ impl MissionFacts {
             first_interval_s: config.link.max_idle_s + config.link.max_turn_s,
             frame_bits: modem.bits_on_air(modem.frame_bytes),
             origin: configured_origin(config),
+            storage: None,
         }
     }
 }

@@ -19,7 +19,7 @@ pub(super) fn summary(surface: &Surface, meter: &LinkMeter, now: Instant) -> Lin
     let received = sum(&|s| s.frames_received);
     let numbered = sum(&|s| s.frames_numbered);
     let (lost, delivered) = (sum(&|s| s.frames_lost), sum(&|s| s.frames_delivered));
-    let elapsed = now.as_secs_f64().max(1.0);
+    let elapsed = meter.elapsed_s(now).max(1.0);
     let none: BTreeMap<String, u64> =
         Class::all(&surface.layers()).map(|c| (c.name_in(&surface.layers()), 0)).collect();
     let direction = |i: usize, frames: u64, lost: u64, by_class: fn(&LinkStats) -> &BTreeMap<Class, u64>| {

@@ -56,6 +56,7 @@ pub fn snapshot(surface: &Surface, facts: &MissionFacts, meter: &LinkMeter, now:
         link: link::summary(surface, meter, now),
         command: command_state(surface.command(), now),
         layers: surface.layers().iter().map(|(_, layer)| layer_info(layer)).collect(),
+        storage: facts.storage.clone(),
     })
 }
 

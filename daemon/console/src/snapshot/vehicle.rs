@@ -3,14 +3,16 @@
 use super::facts::{MissionFacts, seconds};
 use super::{exemplar, link, position};
 use crate::state::{
-    AppliedOrder, DirectiveSlots, MapLabel, MapSummary, OrderProgress, OrderStatus, PlannedPath, ReportedMode,
-    ReportedPose, StatusReport, UsblMeasurement, UtilityTerms, VehicleOrders, VehicleSettings, VehicleState,
+    AppliedOrder, DirectiveSlots, EarlierMap, MapLabel, MapSummary, OrderProgress, OrderStatus, PlannedPath,
+    ReportedMode, ReportedPose, StatusReport, UsblMeasurement, UtilityTerms, VehicleNote, VehicleOrders,
+    VehicleSettings, VehicleState,
 };
 use scenecast_protocol::coordinates::MapPoint;
 use scenecast_protocol::directive::{self, PlannerKind, SlotProgress};
 use scenecast_protocol::link::PeerView;
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::{Address, VehicleMode, VehicleStatus};
+use scenecast_surface::record::StoredNote;
 use scenecast_surface::{SettingsOrder, Surface, VehicleRecord};
 
 pub(super) fn vehicles(surface: &Surface, facts: &MissionFacts, now: Instant) -> Vec<VehicleState> {
@@ -30,11 +32,11 @@ fn vehicle(
     Some(VehicleState {
         id: address.number(),
         name: record.name.clone(),
-        last_received_s: view.last_received().map(seconds),
+        last_received_s: record.last_received(&view).map(seconds),
         expected_interval_s: expected_interval_s(surface, &view, record, facts),
         next_contact_s: view.next_contact(now).map(seconds),
-        status: view.status().map(|(s, at)| status(s, *at)),
-        track: record.track.iter().map(|&(at, x, y)| (seconds(at), x, y)).collect(),
+        status: record.status(&view).map(|(s, at)| status(s, *at)),
+        track: record.track.iter().map(|(at, x, y)| (seconds(at), x, y)).collect(),
         map: map(surface, address, record, &view, labels.values().sum(), facts),
         labels: labels.iter().map(|(&l, &n)| label(l, n, record, &view, address, facts)).collect(),
         link: link::channel(&view, now),
@@ -45,8 +47,14 @@ fn vehicle(
             elevation_rad: line.direction_rad.map(|(_, elevation)| elevation),
             accuracy: line.accuracy,
         }),
+        notes: record.annotations.notes.iter().map(note).collect(),
         orders: orders(record, &view),
     })
+}
+
+fn note(note: &StoredNote) -> VehicleNote {
+    let at_s = seconds(Instant::from_micros(note.at));
+    VehicleNote { at_s, author: note.author.clone(), text: note.text.clone() }
 }
 
 fn orders(record: &VehicleRecord, view: &PeerView<'_>) -> VehicleOrders {
@@ -55,10 +63,10 @@ fn orders(record: &VehicleRecord, view: &PeerView<'_>) -> VehicleOrders {
             exploration: f64::from(record.utility.exploration) / 100.0,
             curiosity: f64::from(record.utility.curiosity) / 100.0,
         },
-        fence: record.fence.as_ref().map(Into::into),
-        limits: record.limits.as_ref().map(Into::into),
-        fence_in_force: in_force(&record.fence_in_force),
-        limits_in_force: in_force(&record.limits_in_force),
+        fence: record.fence.sent.as_ref().map(Into::into),
+        limits: record.limits.sent.as_ref().map(Into::into),
+        fence_in_force: in_force(&record.fence.in_force),
+        limits_in_force: in_force(&record.limits.in_force),
         planner: record.settings.requested().planner.value().map(|p| PlannerKind::name(p).to_owned()),
         settings: VehicleSettings {
             requested: SettingsOrder::of(record.settings.requested(), view.layers()),
@@ -85,16 +93,26 @@ fn map(
         width: bounds.map_or(0, |b| b.width),
         height: bounds.map_or(0, |b| b.height),
         explored_cells,
-        updated_s: view.replica().updated().map(seconds),
-        epoch: record.epoch,
-        placement: view.status().and_then(|(s, _)| s.placement).map(position::placement),
+        updated_s: surface.replica(address).and_then(|r| r.updated()).map(seconds),
+        epoch: record.earlier_map().map_or(record.epoch, |earlier| earlier.epoch),
+        earlier: record.earlier_map().map(|earlier| EarlierMap {
+            run: earlier.run,
+            current_run: record.run,
+            current_epoch: record.epoch,
+            current_cells: surface.current_cells(address) as u32,
+        }),
+        placement: match record.earlier_map() {
+            Some(earlier) => earlier.placement(),
+            None => record.status(view).and_then(|(s, _)| s.placement),
+        }
+        .map(position::placement),
     }
 }
 
 /// The longest usual pause between two frames. An idle link or the smaller of both budgets can make it
 /// longer than the measured pauses.
 fn expected_interval_s(surface: &Surface, view: &PeerView<'_>, record: &VehicleRecord, facts: &MissionFacts) -> f64 {
-    let vehicle_bps = view.status().map_or(u32::MAX, |(s, _)| s.budget_bps);
+    let vehicle_bps = record.status(view).map_or(u32::MAX, |(s, _)| s.budget_bps);
     let budget_bps = surface.budget_bps().min(vehicle_bps).max(1);
     let idle_s = facts.idle_s + facts.frame_bits as f64 / f64::from(budget_bps);
     record.pauses.expected().map_or(facts.first_interval_s, |d| d.as_secs_f64()).max(idle_s)
@@ -167,13 +185,22 @@ fn label(
     address: Address,
     facts: &MissionFacts,
 ) -> MapLabel {
+    // Weights and images belong to the labels of the current epoch.
+    let is_current = record.earlier_map().is_none_or(|earlier| earlier.epoch == record.epoch);
+    let book = record.label_book(id);
     let cell_m = view.cell_m().unwrap_or(facts.cell_m);
     MapLabel {
         id,
         cells,
         area_m2: f64::from(cells) * cell_m * cell_m,
-        weight: record.utility.weight(id),
-        exemplar: exemplar::progress(id, record, view, address),
+        weight: if is_current { record.utility.weight(id) } else { 0.0 },
+        exemplar: match is_current {
+            true => exemplar::progress(id, record, view, address),
+            false => exemplar::none(),
+        },
+        name: book.and_then(|book| book.name.clone()),
+        colour: book.and_then(|book| book.colour.clone()),
+        merged_into: book.and_then(|book| book.merged_into),
     }
 }
 

@@ -17,6 +17,15 @@ pub struct MapLabel {
     pub weight: f64,
     /// The exemplars of the label, and the request for another.
     pub exemplar: ExemplarProgress,
+    /// The operator's name of the label; null without one.
+    #[serde(default)]
+    pub name: Option<String>,
+    /// The operator's colour of the label, as in `#a0b1c2`; null without one.
+    #[serde(default)]
+    pub colour: Option<String>,
+    /// The label that it is shown as a part of; null without one.
+    #[serde(default)]
+    pub merged_into: Option<u8>,
 }
 
 /// The exemplars of a label, and the request for another one.

@@ -22,10 +22,27 @@ pub struct MapSummary {
     pub explored_cells: u32,
     /// When the vehicle last confirmed or changed the map.
     pub updated_s: Option<f64>,
-    /// A number that grows when the labels change their meaning.
+    /// A number that grows when the labels change their meaning: that of the map in view.
     pub epoch: u8,
+    /// The map in view, if it is not the current one: it was received in an earlier run of the vehicle or of the surface,
+    /// and stays in view until the current one has as many cells. The other members describe the map in view.
+    #[serde(default)]
+    pub earlier: Option<EarlierMap>,
     /// The place of the map in the world; null while no fix has moved it.
     pub placement: Option<MapPlacement>,
+}
+
+/// A map of an earlier run that is in view.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct EarlierMap {
+    /// Counts the runs of the vehicle that this surface has met, from 1.
+    pub run: u32,
+    /// The run that the vehicle is in.
+    pub current_run: u32,
+    /// The epoch of the labels in the run that the vehicle is in.
+    pub current_epoch: u8,
+    /// Cells with a label that were received in the run that the vehicle is in.
+    pub current_cells: u32,
 }
 
 /// The shift from a vehicle's map to the world frame.

@@ -3,6 +3,7 @@
 use super::labels::MapLabel;
 use super::link::VehicleChannel;
 use super::map::MapSummary;
+use super::storage::VehicleNote;
 use scenecast_surface::{FenceOrder, LimitsOrder, SettingsOrder};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -33,6 +34,9 @@ pub struct VehicleState {
     pub link: VehicleChannel,
     /// The last USBL measurement of the vehicle; null before the first.
     pub usbl: Option<UsblMeasurement>,
+    /// Notes about the vehicle, the newest last; at most 200.
+    #[serde(default)]
+    pub notes: Vec<VehicleNote>,
     /// The orders to the vehicle.
     #[serde(flatten)]
     pub orders: VehicleOrders,

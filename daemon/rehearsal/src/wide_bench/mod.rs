@@ -128,7 +128,10 @@ impl View {
     fn new(config: &Config, survey: &mut WideSurvey) -> Result<Self, UserError> {
         let facts = MissionFacts::new(config, &survey.modem, 1, 1.0);
         let map = TiledMap::first(cells(survey, facts.cell_m)?, 1);
-        let meter = LinkMeter::new(Duration::from_secs_f64(config.link.budget_window_s));
+        let meter = LinkMeter::new(
+            Duration::from_secs_f64(config.link.budget_window_s),
+            scenecast_protocol::time::Instant::ZERO,
+        );
         Ok(Self { facts, meter, map, explored: survey.explored() })
     }
 

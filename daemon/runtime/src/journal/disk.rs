@@ -201,9 +201,7 @@ impl Storage for Disk {
     fn overwrite(&mut self, name: &str, file: &mut usize, bytes: &[u8]) -> Result<()> {
         {
             let mut platter = self.0.borrow_mut();
-            if platter.names.last().and_then(|names| names.get(name)) != Some(&*file) {
-                return Err(Error::other("the file was removed"));
-            }
+            platter.require_name(name, *file)?;
             // A write that is cut off may have written some bytes; a refused one has not.
             if platter.refusal != DiskRefusal::ReadOnly {
                 platter.contents[*file].bytes[..bytes.len()].copy_from_slice(bytes);
@@ -223,7 +221,11 @@ impl Storage for Disk {
         Ok(at)
     }
 
-    fn append(&mut self, file: &mut usize, bytes: &[u8]) -> Result<()> {
+    fn append(&mut self, name: &str, file: &mut usize, bytes: &[u8]) -> Result<()> {
+        self.0.borrow().require_name(name, *file)?;
+        if bytes.is_empty() {
+            return Ok(());
+        }
         // A write that fails or is cut off may have written some bytes.
         self.0.borrow_mut().contents[*file].bytes.extend_from_slice(bytes);
         self.step(DiskStep::Append)
@@ -246,6 +248,10 @@ impl Storage for Disk {
         Ok(())
     }
 
+    fn list(&self) -> Result<Vec<String>> {
+        Ok(self.0.borrow().names.last().into_iter().flat_map(BTreeMap::keys).cloned().collect())
+    }
+
     fn sync_folder(&mut self) -> Result<()> {
         self.step(DiskStep::SyncFolder)?;
         let mut platter = self.0.borrow_mut();
@@ -256,6 +262,11 @@ impl Storage for Disk {
 }
 
 impl Platter {
+    fn require_name(&self, name: &str, file: usize) -> Result<()> {
+        let is_named = self.names.last().and_then(|names| names.get(name)) == Some(&file);
+        if is_named { Ok(()) } else { Err(Error::other("the file was removed")) }
+    }
+
     fn change_names(&mut self) -> BTreeMap<String, usize> {
         if self.names.is_empty() {
             self.names.push(BTreeMap::new());

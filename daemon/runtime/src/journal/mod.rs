@@ -11,8 +11,6 @@ mod damage;
 pub(super) mod disk;
 
 pub(super) use record::Damage;
-#[cfg(feature = "surface")]
-pub(crate) use storage::create_folder;
 pub(crate) use storage::{Folder, Storage};
 
 use record::{FILE_BYTES, Record, RecordContent};
@@ -194,7 +192,7 @@ impl<S: Storage> Journal<S> {
         let (name, at) = (self.names.name(number), usize::from(number));
         let part = format!("{name}.part");
         let mut file = self.storage.create(&part).map_err(doing("creating"))?;
-        self.storage.append(&mut file, bytes).map_err(doing("writing"))?;
+        self.storage.append(&part, &mut file, bytes).map_err(doing("writing"))?;
         self.storage.sync(&mut file).map_err(doing("syncing"))?;
         if self.is_damaged[at] && self.storage.rename(name, &format!("{name}.damaged")).is_ok() {
             self.is_damaged[at] = false;

@@ -29,13 +29,19 @@ pub(crate) trait Storage {
     fn overwrite(&mut self, name: &str, file: &mut Self::File, bytes: &[u8]) -> io::Result<()>;
 
     /// Appends bytes to a file; they are durable after [`Storage::sync`].
-    fn append(&mut self, file: &mut Self::File, bytes: &[u8]) -> io::Result<()>;
+    ///
+    /// # Errors
+    /// As those of [`Storage::overwrite`], also for no bytes.
+    fn append(&mut self, name: &str, file: &mut Self::File, bytes: &[u8]) -> io::Result<()>;
 
     /// Makes the content of a file durable.
     fn sync(&mut self, file: &mut Self::File) -> io::Result<()>;
 
     /// Renames a file and replaces one of the new name.
     fn rename(&mut self, from: &str, to: &str) -> io::Result<()>;
+
+    /// The names of the files.
+    fn list(&self) -> io::Result<Vec<String>>;
 
     /// Makes the names in the folder durable.
     fn sync_folder(&mut self) -> io::Result<()>;
@@ -101,10 +107,19 @@ fn is_at(_file: &File, path: &Path) -> io::Result<bool> {
     path.try_exists()
 }
 
+/// The error is for a file that no longer has its name.
+fn require_name(file: &File, path: &Path) -> io::Result<()> {
+    if is_at(file, path)? {
+        Ok(())
+    } else {
+        Err(io::Error::new(ErrorKind::NotFound, "the file was removed or replaced"))
+    }
+}
+
 const HELD: &str = "another process keeps its state there; stop it, or set another runtime.state_dir";
 
 /// Creates a folder and its parents, and syncs the parent of each new one so that its name is durable.
-pub(crate) fn create_folder(path: &Path) -> io::Result<()> {
+fn create_folder(path: &Path) -> io::Result<()> {
     if path.as_os_str().is_empty() || path.is_dir() {
         return Ok(());
     }
@@ -141,9 +156,7 @@ impl Storage for Folder {
     }
 
     fn overwrite(&mut self, name: &str, file: &mut File, bytes: &[u8]) -> io::Result<()> {
-        if !is_at(file, &self.path(name))? {
-            return Err(io::Error::new(ErrorKind::NotFound, "the file was removed or replaced"));
-        }
+        require_name(file, &self.path(name))?;
         file.seek(SeekFrom::Start(0))?;
         file.write_all(bytes)
     }
@@ -153,7 +166,8 @@ impl Storage for Folder {
         OpenOptions::new().write(true).create(true).truncate(true).open(self.path(name))
     }
 
-    fn append(&mut self, file: &mut File, bytes: &[u8]) -> io::Result<()> {
+    fn append(&mut self, name: &str, file: &mut File, bytes: &[u8]) -> io::Result<()> {
+        require_name(file, &self.path(name))?;
         file.write_all(bytes)
     }
 
@@ -163,6 +177,11 @@ impl Storage for Folder {
 
     fn rename(&mut self, from: &str, to: &str) -> io::Result<()> {
         fs::rename(self.path(from), self.path(to))
+    }
+
+    fn list(&self) -> io::Result<Vec<String>> {
+        let names = fs::read_dir(&self.path)?.filter_map(|entry| entry.ok()?.file_name().into_string().ok());
+        Ok(names.collect())
     }
 
     fn sync_folder(&mut self) -> io::Result<()> {

@@ -17,8 +17,7 @@ pub use event::{IssueError, SurfaceEvent};
 pub use peer::{EndedRun, PeerView};
 pub use polled::Cycle;
 
-use crate::directive::Series;
-use crate::directive::{Slot, VersionedSlot};
+use crate::directive::{Series, Slot, SlotProgress, VersionedSlot};
 use crate::link::{DropReason, FrameNumber, Transmit};
 use crate::mac::Access;
 use crate::map::{Replica, StateReplica};
@@ -89,6 +88,37 @@ impl<R: StateReplica> SurfaceLink<R> {
         let introduction = Introduction { cell_edge: c.cell_edge, series: Some(self.series) };
         let peer = VehiclePeer::new(c.mission, vehicle, c.authenticity.clone(), introduction, seed, c.master, now);
         self.fleet.insert(vehicle, peer);
+    }
+
+    /// The random number that distinguishes the orders of this surface from those of others.
+    pub fn series(&self) -> Series {
+        self.series
+    }
+
+    /// Continues with the series of an earlier run of the surface, before any order is issued.
+    pub fn restore_series(&mut self, series: Series) {
+        self.series = series;
+        for vehicle in self.fleet.addresses().collect::<Vec<_>>() {
+            self.restore_orders(vehicle, series, [], Instant::ZERO);
+        }
+    }
+
+    /// Puts the orders to a vehicle back that an earlier run of the surface has issued in `series`. A vehicle that is not
+    /// configured is added at `now`, if discovery calls may find vehicles. Returns whether the vehicle is known.
+    pub fn restore_orders(
+        &mut self,
+        vehicle: Address,
+        series: Series,
+        orders: impl IntoIterator<Item = SlotProgress>,
+        now: Instant,
+    ) -> bool {
+        let is_known = self.fleet.get(vehicle).is_some();
+        if !is_known && self.config.discovery_period.is_some() && self.fleet.has_room() {
+            self.add(vehicle, now);
+        }
+        let Some(peer) = self.fleet.get_mut(vehicle) else { return false };
+        peer.restore_orders(series, orders);
+        true
     }
 
     /// The current view of a vehicle; `None` if it is unknown.

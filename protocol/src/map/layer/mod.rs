@@ -186,6 +186,11 @@ impl LayerReplica {
         self.levels.decodes_up_to(self.descriptor.levels, horizon, patch)
     }
 
+    /// Puts a level back that an earlier run of the surface has received; see [`Replica::restore`].
+    pub fn restore(&mut self, cell: Cell, level: u8, at: Instant) {
+        self.levels.restore(cell, level, at);
+    }
+
     /// Applies a patch of frame `number`; `false` if it makes no sense on the base, or has levels that the layer lacks.
     pub fn apply(&mut self, number: u64, patch: &[u8], now: Instant) -> bool {
         self.levels.apply_up_to(self.descriptor.levels, number, patch, now)

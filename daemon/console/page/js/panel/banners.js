@@ -1,6 +1,6 @@
 // Alarms and requests: no connection, a request for command, a silent vehicle, a map that is not up to date, the end of the mission.
 
-import { sendCommand } from "../api.js";
+import { dismissEarlierMap, sendCommand } from "../api.js";
 import { hasCommand } from "../command.js";
 import { $, announce, h, keyed, show, text } from "../dom.js";
 import { missionTime, span } from "../format.js";
@@ -28,7 +28,9 @@ function current() {
   for (const v of store.snapshot?.vehicles ?? []) {
     if (isSilent(v)) found.push(silent(v));
     if (store.connected && store.mapFaults.has(v.id)) found.push(outdated(v));
+    if (v.map.earlier) found.push(earlier(v));
   }
+  if (store.snapshot?.storage?.failing) found.push(refusing(store.snapshot.storage));
   if (hasCommand()) found.push(...store.snapshot.command.requests.map(requested));
   if (store.snapshot?.mission.ended) found.push(ended());
   return found;
@@ -54,6 +56,28 @@ function silent(v) {
 
 function outdated(v) {
   return { key: `map-${v.id}`, kind: "warn", head: `The map of ${v.name} is not up to date`, body: `${store.mapFaults.get(v.id)}.` };
+}
+
+/** The map in view is that of an earlier run of the vehicle or of the surface. */
+function earlier(v) {
+  const { run, current_run, current_epoch, current_cells } = v.map.earlier;
+  const again = run === current_run && v.map.epoch === current_epoch;
+  const which = again ? "received before the link was begun again" : `of run ${run}, label epoch ${v.map.epoch}`;
+  const last = v.map.updated_s === null ? "" : `, last changed ${span(ageOf(v.map.updated_s))} ago`;
+  const now = again ? "" : ` in run ${current_run}, label epoch ${current_epoch}`;
+  return {
+    key: `earlier-${v.id}`, kind: "info", head: `The map of ${v.name} in view is an earlier one`,
+    body: `${which}${last}. ${current_cells} of its ${v.map.explored_cells} cells have been received${now}; the current map replaces it when it has as many.`,
+    action: ["Show the current map", () => dismissEarlierMap(v.id).catch((error) => announce(error.message))],
+  };
+}
+
+function refusing(storage) {
+  const free = storage.free_bytes === null ? "" : ` Free: ${Math.floor(storage.free_bytes / 1e6)} MB.`;
+  return {
+    key: "storage", kind: "bad", head: "The surface cannot write its files",
+    body: `${storage.failing} (${storage.folder}).${free} Map and orders are in memory only and would be lost in a restart; the surface tries again.`,
+  };
 }
 
 export function contact(v) {

@@ -1,5 +1,6 @@
 // The export dialog: the files of the map, made by the server.
 
+import { archivedMaps } from "./archive.js";
 import { BASE } from "../api.js";
 import { $, h } from "../dom.js";
 import { ago } from "../format.js";
@@ -33,7 +34,7 @@ export function openExport() {
   const { map, vehicle } = store;
   const dialog = $("dialog");
   const close = h("button.primary", { type: "button", onclick: () => dialog.close() }, "Close");
-  dialog.replaceChildren(h("h2", { id: "dialog-title" }, "Export the map"), ...(map && !map.isEmpty ? offer(vehicle) : [h("p", {}, "No cell has arrived yet.")]), h("div.buttons", {}, close));
+  dialog.replaceChildren(h("h2", { id: "dialog-title" }, "Export the map"), ...(map && !map.isEmpty ? offer(vehicle) : [h("p", {}, "No cell has arrived yet.")]), archivedMaps(), h("div.buttons", {}, close));
   dialog.showModal();
 }
 
@@ -46,6 +47,6 @@ function offer(vehicle) {
   return [
     h("p", {}, `Version ${vehicle.map.version} of ${vehicle.name}, changed ${ago(ageOf(vehicle.map.updated_s))}.${local}`),
     h("ul.files", {}, ...FILES.filter(([, , extension]) => isOffered(extension, store.snapshot, vehicle.map)).map(item)),
-    h("p.hint", {}, "Files have label numbers. Names, colours and merges of labels stay in this browser."),
+    h("p.hint", {}, "Files have label numbers, without names, colours and merges."),
   ];
 }

@@ -169,3 +169,26 @@ pub(in crate::http) async fn file(shared: Shared, id: u8, headers: HeaderMap, fo
         Err(_) => error(StatusCode::INTERNAL_SERVER_ERROR, "the file could not be made"),
     }
 }
+
+/// The list of archived maps.
+pub(in crate::http) async fn archives(State(shared): State<Shared>) -> Response {
+    shared.respond(SurfaceRequest::Archives).await
+}
+
+/// An archived map as a file.
+pub(in crate::http) async fn archived(shared: Shared, name: String, format: MapFormat) -> Response {
+    let cells = match shared.request(SurfaceRequest::ArchivedMap(name)).await {
+        Ok(Reply::Map(cells)) => cells,
+        Ok(other) => return respond(other),
+        Err(busy) => return busy,
+    };
+    let origin = shared.snapshots.borrow().state.mission.origin;
+    let Ok(_maker) = shared.maps.makers.acquire().await else {
+        return StatusCode::INTERNAL_SERVER_ERROR.into_response();
+    };
+    match tokio::task::spawn_blocking(move || cells.export(format, origin)).await {
+        Ok(Ok(bytes)) => ([(header::CONTENT_TYPE, format.content_type())], bytes).into_response(),
+        Ok(Err(reason)) => error(StatusCode::UNPROCESSABLE_ENTITY, &reason),
+        Err(_) => error(StatusCode::INTERNAL_SERVER_ERROR, "the file could not be made"),
+    }
+}

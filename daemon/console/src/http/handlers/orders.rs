@@ -3,7 +3,7 @@
 use crate::http::body::JsonOrder;
 use crate::http::response::error;
 use crate::http::shared::{Shared, VehicleId};
-use crate::orders::{BudgetOrder, ConstraintsOrder, ExemplarOrder, UtilityOrder};
+use crate::orders::{BudgetOrder, ConstraintsOrder, DismissOrder, ExemplarOrder, LabelOrder, NoteOrder, UtilityOrder};
 use crate::request::SurfaceRequest;
 use axum::Extension;
 use axum::extract::State;
@@ -80,4 +80,32 @@ pub(in crate::http) async fn budget(
     JsonOrder(order): JsonOrder<BudgetOrder>,
 ) -> Response {
     shared.order(principal, SurfaceRequest::Budget(order)).await
+}
+
+pub(in crate::http) async fn label(
+    State(shared): State<Shared>,
+    Extension(principal): Extension<Principal>,
+    VehicleId(id): VehicleId,
+    JsonOrder(order): JsonOrder<LabelOrder>,
+) -> Response {
+    shared.order(principal, SurfaceRequest::Label(id, order)).await
+}
+
+pub(in crate::http) async fn note(
+    State(shared): State<Shared>,
+    Extension(principal): Extension<Principal>,
+    VehicleId(id): VehicleId,
+    JsonOrder(order): JsonOrder<NoteOrder>,
+) -> Response {
+    let author = principal.name().to_owned();
+    shared.order(principal, SurfaceRequest::Note(id, author, order)).await
+}
+
+pub(in crate::http) async fn dismiss(
+    State(shared): State<Shared>,
+    Extension(principal): Extension<Principal>,
+    VehicleId(id): VehicleId,
+    JsonOrder(DismissOrder {}): JsonOrder<DismissOrder>,
+) -> Response {
+    shared.order(principal, SurfaceRequest::DismissEarlierMap(id)).await
 }

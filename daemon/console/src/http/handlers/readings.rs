@@ -7,16 +7,20 @@ use axum::extract::{Query, State};
 use axum::http::{StatusCode, Uri, header};
 use axum::response::{IntoResponse, Response};
 use std::collections::BTreeMap;
+use std::time::Duration;
 
 const JSON: &str = "application/json";
 const MAX_FIT_BPS: f64 = 1e7;
+/// For the first state after the start of the surface.
+const START_TIMEOUT: Duration = Duration::from_secs(10);
 
-pub(in crate::http) async fn state(State(shared): State<Shared>) -> Response {
-    let json = shared.snapshots.borrow().json.clone();
-    if json.is_empty() {
-        return error(StatusCode::SERVICE_UNAVAILABLE, "the mission has not begun");
+/// The latest state; just after the start of the surface a client waits for the first one.
+pub(in crate::http) async fn state(State(mut shared): State<Shared>) -> Response {
+    let first = shared.snapshots.wait_for(|snapshot| !snapshot.json.is_empty());
+    match tokio::time::timeout(START_TIMEOUT, first).await {
+        Ok(Ok(snapshot)) => ([(header::CONTENT_TYPE, JSON)], snapshot.json.clone()).into_response(),
+        _ => error(StatusCode::SERVICE_UNAVAILABLE, "the mission has not begun"),
     }
-    ([(header::CONTENT_TYPE, JSON)], json).into_response()
 }
 
 /// An image of a label: the latest as in `3.webp`, or the one with a number as in `3-17.webp`.

@@ -43,6 +43,7 @@ pub(super) struct PeerContent<R> {
     pub(super) backlog: Option<ReportedBacklog>,
     pub(super) ended: Option<EndedRun<R>>,
     objects: ObjectReceiver,
+    generation: u64,
 }
 
 impl<R: StateReplica> PeerContent<R> {
@@ -54,7 +55,13 @@ impl<R: StateReplica> PeerContent<R> {
             backlog: None,
             ended: None,
             objects: ObjectReceiver::default(),
+            generation: 0,
         }
+    }
+
+    /// The number of times that the copy was emptied.
+    pub(super) fn generation(&self) -> u64 {
+        self.generation
     }
 
     /// The vehicle has begun a new run. The larger of the copies of this run and of an earlier one is kept; returns
@@ -70,6 +77,7 @@ impl<R: StateReplica> PeerContent<R> {
         self.objects.clear();
         self.status = StatusParts::default();
         self.backlog = None;
+        self.generation += 1;
         is_kept
     }
 

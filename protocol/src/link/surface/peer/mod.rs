@@ -17,7 +17,7 @@ pub use ended::EndedRun;
 pub(super) use turn::{Ready, room_for_slot};
 pub use view::PeerView;
 
-use crate::directive::{Series, Slot, SlotId, SlotOutbox};
+use crate::directive::{Series, Slot, SlotId, SlotOutbox, SlotProgress};
 use crate::link::{Authenticity, DropReason, FrameNumber, Inbound, LinkPair, LinkStats, SurfaceEvent};
 use crate::mac::{Access, Master, MasterConfig, ModemProfile};
 use crate::map::StateReplica;
@@ -137,6 +137,12 @@ impl<R: StateReplica> VehiclePeer<R> {
     /// The hello names the series, so a new one begins with a new run.
     fn follow_series(&mut self) {
         self.is_out_of_step |= self.pair.set_series(self.outbox.series());
+    }
+
+    /// Continues with the series and the orders of an earlier run of the surface.
+    pub(super) fn restore_orders(&mut self, series: Series, orders: impl IntoIterator<Item = SlotProgress>) {
+        self.outbox.restore(series, orders);
+        self.pair.set_series(series);
     }
 
     /// Handles a frame of this vehicle; `bytes` is its length.

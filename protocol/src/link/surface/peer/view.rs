@@ -58,6 +58,11 @@ impl<'a, R: StateReplica> PeerView<'a, R> {
         self.0.content.map_version()
     }
 
+    /// The number of times that the copy of the vehicle's state was emptied, because one of the two ends has begun a new run.
+    pub fn generation(&self) -> u64 {
+        self.0.content.generation()
+    }
+
     /// The last status, and when its pose came in.
     pub fn status(&self) -> Option<&'a (VehicleStatus, Instant)> {
         self.0.content.status.whole()

@@ -1,0 +1,158 @@
+//! Copies of maps: what the surface has received, cell by cell, with its times.
+
+use super::event::{StoredCells, StoredContact, StoredLabel};
+use scenecast_protocol::map::{Cell, LayerDescriptor, LayerId, LayerReplica, Replica, SharedTiles, UNEXPLORED};
+use scenecast_protocol::time::Instant;
+use scenecast_protocol::wire::Placement;
+use std::collections::BTreeMap;
+
+/// Cells in one event; a larger change takes several.
+const MAX_CELLS: usize = 1 << 16;
+
+/// A copy of a map with its layers.
+#[derive(Debug, Default)]
+pub struct MapCopy {
+    labels: Replica,
+    layers: BTreeMap<LayerId, LayerReplica>,
+    explored: usize,
+}
+
+/// A map that the surface has received before the current one, and that stays in view.
+#[derive(Debug)]
+pub struct EarlierMap {
+    /// Counts the runs of the vehicle that this surface has met.
+    pub run: u32,
+    /// The epoch of its labels.
+    pub epoch: u8,
+    /// The operator's names of its labels.
+    pub names: BTreeMap<u8, StoredLabel>,
+    pub map: MapCopy,
+    /// The last report of its run.
+    pub(super) contact: StoredContact,
+}
+
+impl EarlierMap {
+    /// The placement of the map in its run; `None` while no fix had moved it.
+    pub fn placement(&self) -> Option<Placement> {
+        super::stored::status(&self.contact)?.0.placement
+    }
+}
+
+impl MapCopy {
+    /// The labels, with the time of each cell.
+    pub fn labels(&self) -> &Replica {
+        &self.labels
+    }
+
+    pub fn layers(&self) -> impl Iterator<Item = (LayerId, &LayerReplica)> {
+        self.layers.iter().map(|(&id, layer)| (id, layer))
+    }
+
+    /// The number of cells with a label.
+    pub fn explored(&self) -> usize {
+        self.explored
+    }
+
+    /// Applies stored cells. Cells of a layer whose descriptor is unreadable are left out.
+    pub(super) fn apply(&mut self, stored: &StoredCells) {
+        let Some((index, descriptor)) = &stored.layer else {
+            for (cell, label, at) in unpack(&stored.cells) {
+                let before = self.labels.shown().get(cell);
+                self.labels.restore(cell, label, at);
+                self.explored += usize::from(label != UNEXPLORED);
+                self.explored -= usize::from(before != UNEXPLORED);
+            }
+            return;
+        };
+        let id = LayerId::new(usize::from(*index));
+        let (Some(id), Some(descriptor)) = (id, LayerDescriptor::from_bytes(descriptor)) else { return };
+        let layer = self.layers.entry(id).or_insert_with(|| LayerReplica::new(descriptor.clone()));
+        if *layer.descriptor() != descriptor {
+            *layer = LayerReplica::new(descriptor);
+        }
+        unpack(&stored.cells).for_each(|(cell, level, at)| layer.restore(cell, level, at));
+    }
+
+    /// The events that change this copy of the labels into `live`.
+    pub(super) fn label_changes(&self, live: impl Iterator<Item = (Cell, u8, Instant)>) -> Vec<StoredCells> {
+        pack(None, changed(&self.labels, live))
+    }
+
+    /// The events that change this copy of a layer into `live`. It is equal to `live` in the tiles of `compared`.
+    pub(super) fn layer_changes(&self, id: LayerId, live: &LayerReplica, compared: &SharedTiles) -> Vec<StoredCells> {
+        let head = Some((id.index() as u8, live.descriptor().to_bytes()));
+        match self.layers.get(&id).filter(|kept| kept.descriptor() == live.descriptor()) {
+            Some(kept) => pack(head, changed(kept.levels(), live.levels().cells_apart_from(compared))),
+            None => pack(head, live.levels().cells().collect()),
+        }
+    }
+
+    /// All cells as events.
+    pub(super) fn to_events(&self) -> Vec<StoredCells> {
+        let mut all = pack(None, self.labels.cells().collect());
+        for (id, layer) in &self.layers {
+            let head = Some((id.index() as u8, layer.descriptor().to_bytes()));
+            all.extend(pack(head, layer.levels().cells().collect()));
+        }
+        all
+    }
+}
+
+fn changed(kept: &Replica, live: impl Iterator<Item = (Cell, u8, Instant)>) -> Vec<(Cell, u8, Instant)> {
+    let is_new = |&(cell, value, at): &(Cell, u8, Instant)| {
+        kept.received_at(cell) != Some(at) || kept.shown().get(cell) != value
+    };
+    live.filter(is_new).collect()
+}
+
+fn pack(layer: Option<(u8, Vec<u8>)>, cells: Vec<(Cell, u8, Instant)>) -> Vec<StoredCells> {
+    let mut events = Vec::new();
+    for part in cells.chunks(MAX_CELLS) {
+        let mut before = (0, 0, 0);
+        let packed = part.iter().map(|&(cell, value, at)| {
+            let now = (i64::from(cell.x), i64::from(cell.y), at.as_micros() as i64);
+            let last = std::mem::replace(&mut before, now);
+            (now.0 - last.0, now.1 - last.1, value, now.2.wrapping_sub(last.2))
+        });
+        events.push(StoredCells { layer: layer.clone(), cells: packed.collect() });
+    }
+    events
+}
+
+fn unpack(cells: &[(i64, i64, u8, i64)]) -> impl Iterator<Item = (Cell, u8, Instant)> + '_ {
+    let mut at = (0i64, 0i64, 0i64);
+    cells.iter().filter_map(move |&(x, y, value, time)| {
+        at = (at.0.wrapping_add(x), at.1.wrapping_add(y), at.2.wrapping_add(time));
+        let cell = Cell::new(i32::try_from(at.0).ok()?, i32::try_from(at.1).ok()?);
+        Some((cell, value, Instant::from_micros(at.2 as u64)))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn changes_make_the_copy_equal_to_the_live_map(
+            first in proptest::collection::btree_map((any::<i32>(), -40i32..40), (0u8..5, any::<u64>()), 0..80),
+            second in proptest::collection::btree_map((any::<i32>(), -40i32..40), (0u8..5, any::<u64>()), 0..80),
+        ) {
+            let mut copy = MapCopy::default();
+            let mut live = Replica::default();
+            for cells in [first, second] {
+                for ((x, y), (label, at)) in cells {
+                    live.restore(Cell::new(x, y), label, Instant::from_micros(at));
+                }
+                copy.label_changes(live.cells()).iter().for_each(|event| copy.apply(event));
+                prop_assert!(copy.labels().cells().eq(live.cells()));
+                prop_assert_eq!(copy.explored(), live.shown().explored());
+                prop_assert!(copy.label_changes(live.cells()).is_empty());
+            }
+            let mut again = MapCopy::default();
+            copy.to_events().iter().for_each(|event| again.apply(event));
+            prop_assert!(again.labels().cells().eq(live.cells()));
+        }
+    }
+}

@@ -1,0 +1,86 @@
+//! Batches of events as bytes, with the version of their layout.
+
+use super::event::Event;
+
+/// The version of the layout of events. A build reads its own version and earlier ones.
+const SCHEMA: u16 = 1;
+
+/// The reason that bytes are no batch of events.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum DecodeError {
+    #[error("written by a later version of scenecast (layout {0}); use that one, or move the file away")]
+    Later(u16),
+    #[error("the events are unreadable; restore the file, or move it away")]
+    Damaged,
+}
+
+/// A batch of events: the version of the layout, big-endian, then the events in postcard.
+pub fn encode(events: &[Event]) -> Vec<u8> {
+    let mut bytes = SCHEMA.to_be_bytes().to_vec();
+    // Vectors of bytes and numbers always have a form in postcard.
+    bytes.extend(postcard::to_allocvec(events).unwrap_or_default());
+    bytes
+}
+
+/// Reads a batch of events of this version or of an earlier one.
+pub fn decode(bytes: &[u8]) -> Result<Vec<Event>, DecodeError> {
+    let (version, rest) = bytes.split_first_chunk::<2>().ok_or(DecodeError::Damaged)?;
+    match u16::from_be_bytes(*version) {
+        SCHEMA => match postcard::take_from_bytes(rest) {
+            Ok((events, [])) => Ok(events),
+            _ => Err(DecodeError::Damaged),
+        },
+        later if later > SCHEMA => Err(DecodeError::Later(later)),
+        _ => Err(DecodeError::Damaged),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::event::{EventKind, EventSource, EventTime, RunId, StoredCells, VehicleEvent};
+    use super::*;
+    use proptest::prelude::*;
+
+    fn events() -> Vec<Event> {
+        let time = EventTime { mission_us: 1000, unix_ms: 2000 };
+        let by = EventSource::Principal("ann".to_owned());
+        let cells = StoredCells { layer: None, cells: vec![(3, -4, 7, 1000), (1, 0, 7, 0)] };
+        let id = RunId { run: 2, epoch: 1, began_unix_ms: 300 };
+        let vehicle = |event| EventKind::Vehicle(1, event);
+        let kinds = [
+            (EventSource::Surface, EventKind::Began { id: 300, mission: 5, series: 7 }),
+            (EventSource::Vehicle(1), vehicle(VehicleEvent::Identified(id))),
+            (EventSource::Vehicle(1), vehicle(VehicleEvent::Cells(cells))),
+            (by, vehicle(VehicleEvent::Overtaken)),
+        ];
+        let numbered = kinds.into_iter().zip(1..);
+        numbered.map(|((source, kind), sequence)| Event { sequence, time, source, kind }).collect()
+    }
+
+    #[test]
+    fn the_bytes_of_layout_1_are_read_for_ever() {
+        let golden = [
+            &[0, 1, 4][..],
+            &[1, 0xE8, 0x07, 0xD0, 0x0F, 0, 0, 0xAC, 2, 5, 7],
+            &[2, 0xE8, 0x07, 0xD0, 0x0F, 1, 1, 2, 1, 1, 2, 1, 0xAC, 2],
+            &[3, 0xE8, 0x07, 0xD0, 0x0F, 1, 1, 2, 1, 4, 0, 2, 6, 7, 7, 0xD0, 0x0F, 2, 0, 7, 0],
+            &[4, 0xE8, 0x07, 0xD0, 0x0F, 2, 3, b'a', b'n', b'n', 2, 1, 3],
+        ];
+        assert_eq!(decode(&golden.concat()), Ok(events()));
+        assert_eq!(encode(&events()), golden.concat());
+    }
+
+    #[test]
+    fn a_later_layout_is_refused_by_its_number() {
+        assert_eq!(decode(&[0, 2, 0]), Err(DecodeError::Later(2)));
+        assert_eq!(decode(&[0, 0, 0]), Err(DecodeError::Damaged));
+        assert_eq!(decode(&[0]), Err(DecodeError::Damaged));
+    }
+
+    proptest! {
+        #[test]
+        fn any_bytes_decode_or_are_refused(bytes in proptest::collection::vec(any::<u8>(), 0..200)) {
+            let _ = decode(&[&[0, 1], &bytes[..]].concat());
+        }
+    }
+}

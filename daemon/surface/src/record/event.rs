@@ -1,0 +1,201 @@
+//! The events of the surface's store. Variants are only ever appended, because their order is their number in the file.
+
+use serde::{Deserialize, Serialize};
+
+/// When an event was recorded.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct EventTime {
+    /// Mission time, microseconds; it continues across restarts.
+    pub mission_us: u64,
+    /// Time of the machine's clock, milliseconds since 1970.
+    pub unix_ms: u64,
+}
+
+/// Who or what caused an event.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub enum EventSource {
+    /// The surface's program.
+    Surface,
+    /// A vehicle, by its address.
+    Vehicle(u8),
+    /// A person or a program that may give orders, by name.
+    Principal(String),
+}
+
+/// A change of the surface's knowledge.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Event {
+    /// One more than that of the event before it, across restarts and files.
+    pub sequence: u64,
+    pub time: EventTime,
+    pub source: EventSource,
+    pub kind: EventKind,
+}
+
+/// The kind of an event with its payload.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub enum EventKind {
+    /// The store was begun: a random name, the number of the mission, and the series of the orders' versions.
+    Began { id: u32, mission: u32, series: u64 },
+    /// The operator changed the budget of the surface. The order is void once another one is configured.
+    Budget { ordered: StoredBudget, configured: StoredBudget },
+    /// A fact about the vehicle with this address.
+    Vehicle(u8, VehicleEvent),
+}
+
+/// A change of the knowledge about one vehicle. Times are mission times in microseconds.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub enum VehicleEvent {
+    /// The vehicle's name.
+    Named(String),
+    /// The run and the label epoch that the following events belong to.
+    Identified(RunId),
+    /// The copy of the map was emptied: the cells so far are those of an earlier map.
+    Replaced,
+    /// The earlier map is no longer in view.
+    Overtaken,
+    /// Cells of the labels, or of a layer.
+    Cells(StoredCells),
+    /// A number that grows with each change of the map, across restarts.
+    MapVersion(u64),
+    /// The last report, and when frames came in.
+    Contact(StoredContact),
+    /// The number of positions so far, and the newest ones: time, metres east and north.
+    Track { total: u64, points: Vec<(u64, f64, f64)> },
+    /// The series of the versions, and the latest version of each slot, with its status.
+    Orders { series: u64, orders: Vec<StoredOrder> },
+    /// The orders as they are shown: sent, and in force.
+    Intent(StoredIntent),
+    /// An image of a label arrived.
+    Exemplar { label: u8, image: StoredImage },
+    /// An image of a label was dropped: label, number of the image.
+    ExemplarGone { label: u8, number: u8 },
+    /// The request for an image of a label, or its end, and the label's serial number of requests.
+    Request { label: u8, serial: u8, open: Option<StoredRequest> },
+    /// The operator's name, colour and merging of a label.
+    Label { label: u8, book: StoredLabel },
+    /// A note of a person.
+    Note(StoredNote),
+    /// The end of a run whose map is archived.
+    Archived { ended_us: u64, cells: u64 },
+}
+
+/// A run of a vehicle and the epoch of its labels.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct RunId {
+    /// Counts the runs of the vehicle that this surface has met, from 1.
+    pub run: u32,
+    /// Labels have the same meaning within an epoch.
+    pub epoch: u8,
+    /// When the surface met it, milliseconds since 1970.
+    pub began_unix_ms: u64,
+}
+
+/// A budget of the surface, as ordered or as configured.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct StoredBudget {
+    /// Bits a second.
+    pub bits_per_s: u32,
+    /// Least share of each class, percent.
+    pub shares: [u8; 5],
+    /// The order of the background streams, as on the wire.
+    pub background: Vec<u8>,
+}
+
+/// Cells with their values and the time at which each was received.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct StoredCells {
+    /// The layer's index and descriptor; `None` for the labels.
+    pub layer: Option<(u8, Vec<u8>)>,
+    /// Columns, rows and times as differences to the cell before.
+    pub cells: Vec<(i64, i64, u8, i64)>,
+}
+
+/// The last contact with a vehicle.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct StoredContact {
+    pub last_received: Option<u64>,
+    /// The longest usual pause between two frames, microseconds.
+    pub pause: Option<u64>,
+    /// When the last pose came in; pose and report as on the wire.
+    pub status: Option<(u64, Vec<u8>, Vec<u8>)>,
+    pub usbl: Option<StoredRange>,
+}
+
+/// A measurement of the surface's modem.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct StoredRange {
+    pub at: u64,
+    pub remote: u16,
+    pub range_m: Option<f64>,
+    pub direction_rad: Option<(f64, f64)>,
+    pub accuracy: f64,
+    pub age_s: f64,
+}
+
+/// An order and how far it has come.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct StoredOrder {
+    pub version: u64,
+    /// The slot as on the wire.
+    pub slot: Vec<u8>,
+    /// 0 queued, 1 on air, 2 received, 3 applied, 16 + reason: refused.
+    pub status: u8,
+    pub issued: u64,
+    pub changed: u64,
+}
+
+/// Orders as they are shown; payloads are slots as on the wire.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct StoredIntent {
+    pub utility: Vec<u8>,
+    pub fence: Option<Vec<u8>>,
+    pub limits: Option<Vec<u8>>,
+    pub fence_in_force: Option<(u16, Vec<u8>)>,
+    pub limits_in_force: Option<(u16, Vec<u8>)>,
+    pub settings_requested: Vec<u8>,
+    pub settings_in_force: Vec<u8>,
+    pub settings_unsure: bool,
+}
+
+/// An image of a label.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct StoredImage {
+    pub number: u8,
+    pub size: u8,
+    pub webp: Vec<u8>,
+    pub sent_bytes: u32,
+    pub received: u64,
+    pub requested: bool,
+}
+
+/// An open request for an image.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct StoredRequest {
+    pub serial: u8,
+    pub size: u8,
+    pub picture: u8,
+    /// 0 ordered, 1 not available yet, 2 arriving, 3 refused.
+    pub state: u8,
+    /// Bytes held and bytes in all, while it arrives.
+    pub held: (u32, u32),
+    pub changed: u64,
+}
+
+/// The operator's name, colour and merging of a label.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct StoredLabel {
+    pub name: Option<String>,
+    /// As in `#a0b1c2`.
+    pub colour: Option<String>,
+    /// The label that it is shown as a part of.
+    pub merged_into: Option<u8>,
+}
+
+/// A note about a vehicle.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct StoredNote {
+    pub at: u64,
+    pub author: String,
+    pub text: String,
+}

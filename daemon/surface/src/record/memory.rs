@@ -1,0 +1,274 @@
+//! The surface's knowledge, folded from its events.
+
+use super::cells::{EarlierMap, MapCopy};
+use super::event::{
+    Event, EventKind, EventTime, RunId, StoredBudget, StoredContact, StoredImage, StoredIntent, StoredLabel,
+    StoredNote, StoredOrder, StoredRequest, VehicleEvent,
+};
+use std::collections::{BTreeMap, VecDeque};
+use std::sync::Arc;
+
+/// Positions that are kept of a vehicle's track.
+const MAX_TRACK: usize = 500;
+/// Notes that are kept of a vehicle.
+const MAX_NOTES: usize = 200;
+
+/// How a store was begun.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Began {
+    /// A random name, under which browsers keep their own data.
+    pub id: u32,
+    /// The number of the mission.
+    pub mission: u32,
+    /// The series of the orders' versions.
+    pub series: u64,
+}
+
+/// Everything that the surface keeps.
+#[derive(Debug, Default)]
+pub struct SurfaceMemory {
+    /// The sequence number of the last event.
+    pub(super) sequence: u64,
+    /// The time of the last event.
+    pub(super) last: EventTime,
+    /// How the store was begun.
+    pub(super) began: Option<Began>,
+    /// The last order of a budget, and the configured one at that time.
+    pub(super) budget: Option<(StoredBudget, StoredBudget)>,
+    pub(super) vehicles: BTreeMap<u8, VehicleMemory>,
+}
+
+/// Everything that the surface keeps about one vehicle.
+#[derive(Debug, Default)]
+pub struct VehicleMemory {
+    pub(super) name: String,
+    pub(super) id: RunId,
+    pub(super) map: MapCopy,
+    pub(super) map_version: u64,
+    pub(super) earlier: Option<Arc<EarlierMap>>,
+    pub(super) contact: StoredContact,
+    pub(super) track_total: u64,
+    pub(super) track: VecDeque<(u64, f64, f64)>,
+    pub(super) orders: Vec<StoredOrder>,
+    /// The series of the versions of the orders; 0 before the first.
+    pub(super) series: u64,
+    pub(super) intent: StoredIntent,
+    /// By label, in the order of arrival.
+    pub(super) exemplars: BTreeMap<u8, Vec<StoredImage>>,
+    /// Serial number of requests and the open one, by label.
+    pub(super) requests: BTreeMap<u8, (u8, Option<StoredRequest>)>,
+    pub(super) labels: BTreeMap<u8, StoredLabel>,
+    pub(super) notes: VecDeque<StoredNote>,
+    /// Set in an archived map only: end of the run in microseconds of mission time, number of cells.
+    pub(super) archived: Option<(u64, u64)>,
+}
+
+impl SurfaceMemory {
+    /// The state after these events, oldest first.
+    pub fn fold(events: impl IntoIterator<Item = Event>) -> Self {
+        let mut memory = Self::default();
+        events.into_iter().for_each(|event| memory.apply(&event));
+        memory
+    }
+
+    /// Applies one event.
+    pub fn apply(&mut self, event: &Event) {
+        (self.sequence, self.last) = (event.sequence, event.time);
+        match &event.kind {
+            &EventKind::Began { id, mission, series } => self.began = Some(Began { id, mission, series }),
+            EventKind::Budget { ordered, configured } => self.budget = Some((ordered.clone(), configured.clone())),
+            EventKind::Vehicle(address, event) => self.vehicles.entry(*address).or_default().apply(event),
+        }
+    }
+
+    /// The time of the last event.
+    pub fn last(&self) -> EventTime {
+        self.last
+    }
+
+    /// How the store was begun; `None` before the first event.
+    pub fn began(&self) -> Option<Began> {
+        self.began
+    }
+
+    /// The state as events that make it from nothing.
+    pub fn to_events(&self) -> Vec<EventKind> {
+        let began = self.began.map(|Began { id, mission, series }| EventKind::Began { id, mission, series });
+        let mut all: Vec<EventKind> = began.into_iter().collect();
+        let budget = self.budget.clone();
+        all.extend(budget.map(|(ordered, configured)| EventKind::Budget { ordered, configured }));
+        for (&address, vehicle) in &self.vehicles {
+            all.extend(vehicle.to_events().into_iter().map(|event| EventKind::Vehicle(address, event)));
+        }
+        all
+    }
+
+    /// A vehicle by its address.
+    pub fn vehicle(&self, address: u8) -> Option<&VehicleMemory> {
+        self.vehicles.get(&address)
+    }
+
+    /// The knowledge about one vehicle alone.
+    pub fn take_vehicle(mut self, address: u8) -> Option<VehicleMemory> {
+        self.vehicles.remove(&address)
+    }
+
+    /// The vehicles by their addresses.
+    pub fn vehicles(&self) -> impl Iterator<Item = (u8, &VehicleMemory)> {
+        self.vehicles.iter().map(|(&address, vehicle)| (address, vehicle))
+    }
+}
+
+impl VehicleMemory {
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    pub fn id(&self) -> RunId {
+        self.id
+    }
+
+    /// The map of the current run.
+    pub fn map(&self) -> &MapCopy {
+        &self.map
+    }
+
+    /// The end of the run of an archived map in microseconds of mission time, and its cells.
+    pub fn archived(&self) -> Option<(u64, u64)> {
+        self.archived
+    }
+
+    /// The operator's names of labels.
+    pub fn labels(&self) -> &BTreeMap<u8, StoredLabel> {
+        &self.labels
+    }
+
+    /// The images, by label.
+    pub fn exemplars(&self) -> &BTreeMap<u8, Vec<StoredImage>> {
+        &self.exemplars
+    }
+
+    /// Time in microseconds, metres east and north.
+    pub fn track(&self) -> impl Iterator<Item = (u64, f64, f64)> {
+        self.track.iter().copied()
+    }
+
+    /// The placement of the map, metres to add east and north, if a fix has moved it.
+    pub fn placement_m(&self) -> Option<(f64, f64)> {
+        let status = super::stored::status(&self.contact)?.0;
+        status.placement.map(|p| (p.origin.east_m, p.origin.north_m))
+    }
+
+    pub(super) fn apply(&mut self, event: &VehicleEvent) {
+        match event {
+            VehicleEvent::Named(name) => self.name.clone_from(name),
+            VehicleEvent::Identified(id) => {
+                if id.epoch != self.id.epoch {
+                    // The names are those of labels of the epoch that has ended.
+                    self.labels.clear();
+                }
+                self.id = *id;
+            }
+            VehicleEvent::Replaced => self.replace(),
+            VehicleEvent::Overtaken => self.earlier = None,
+            VehicleEvent::Cells(cells) => self.map.apply(cells),
+            VehicleEvent::MapVersion(version) => self.map_version = *version,
+            VehicleEvent::Contact(contact) => self.contact.clone_from(contact),
+            VehicleEvent::Track { total, points } => {
+                self.track_total = *total;
+                self.track.extend(points.iter().copied());
+                self.track.drain(..self.track.len().saturating_sub(MAX_TRACK));
+            }
+            VehicleEvent::Orders { series, orders } => {
+                self.series = *series;
+                self.orders.clone_from(orders);
+            }
+            VehicleEvent::Intent(intent) => self.intent.clone_from(intent),
+            VehicleEvent::Exemplar { label, image } => {
+                let images = self.exemplars.entry(*label).or_default();
+                images.retain(|kept| kept.number != image.number);
+                images.push(image.clone());
+            }
+            VehicleEvent::ExemplarGone { label, number } => {
+                let images = self.exemplars.entry(*label).or_default();
+                images.retain(|kept| kept.number != *number);
+                if images.is_empty() {
+                    self.exemplars.remove(label);
+                }
+            }
+            VehicleEvent::Request { label, serial, open } => {
+                match (*serial, *open) {
+                    (0, None) => self.requests.remove(label),
+                    request => self.requests.insert(*label, request),
+                };
+            }
+            VehicleEvent::Label { label, book } => {
+                match *book == StoredLabel::default() {
+                    true => self.labels.remove(label),
+                    false => self.labels.insert(*label, book.clone()),
+                };
+            }
+            VehicleEvent::Note(note) => {
+                self.notes.push_back(note.clone());
+                self.notes.drain(..self.notes.len().saturating_sub(MAX_NOTES));
+            }
+            VehicleEvent::Archived { ended_us, cells } => self.archived = Some((*ended_us, *cells)),
+        }
+    }
+
+    /// The map so far becomes the earlier one, unless that has more cells.
+    fn replace(&mut self) {
+        let map = std::mem::take(&mut self.map);
+        let is_larger = self.earlier.as_ref().is_none_or(|earlier| map.explored() >= earlier.map.explored());
+        if map.explored() > 0 && is_larger {
+            let (RunId { run, epoch, .. }, names) = (self.id, self.labels.clone());
+            let contact = StoredContact { usbl: None, ..self.contact.clone() };
+            self.earlier = Some(Arc::new(EarlierMap { run, epoch, names, map, contact }));
+        }
+    }
+
+    fn to_events(&self) -> Vec<VehicleEvent> {
+        let named = |(&label, book): (&u8, &StoredLabel)| VehicleEvent::Label { label, book: book.clone() };
+        let mut all = vec![VehicleEvent::Named(self.name.clone())];
+        if let Some(earlier) = &self.earlier {
+            let id = RunId { run: earlier.run, epoch: earlier.epoch, began_unix_ms: 0 };
+            all.push(VehicleEvent::Identified(id));
+            all.extend(earlier.map.to_events().into_iter().map(VehicleEvent::Cells));
+            all.extend(earlier.names.iter().map(named));
+            all.extend([VehicleEvent::Contact(earlier.contact.clone()), VehicleEvent::Replaced]);
+            let book = StoredLabel::default();
+            all.extend(earlier.names.keys().map(|&label| VehicleEvent::Label { label, book: book.clone() }));
+        }
+        all.extend(self.run_events());
+        all.extend([
+            VehicleEvent::MapVersion(self.map_version),
+            VehicleEvent::Orders { series: self.series, orders: self.orders.clone() },
+            VehicleEvent::Intent(self.intent.clone()),
+        ]);
+        let request = |(&label, &(serial, open))| VehicleEvent::Request { label, serial, open };
+        all.extend(self.requests.iter().map(request));
+        all
+    }
+
+    /// The events that belong to the current run: identity, map, contact, track, images, names, notes.
+    fn run_events(&self) -> Vec<VehicleEvent> {
+        let mut all = vec![VehicleEvent::Identified(self.id)];
+        all.extend(self.map.to_events().into_iter().map(VehicleEvent::Cells));
+        all.push(VehicleEvent::Contact(self.contact.clone()));
+        all.push(VehicleEvent::Track { total: self.track_total, points: self.track.iter().copied().collect() });
+        for (&label, images) in &self.exemplars {
+            all.extend(images.iter().map(|image| VehicleEvent::Exemplar { label, image: image.clone() }));
+        }
+        let named = |(&label, book): (&u8, &StoredLabel)| VehicleEvent::Label { label, book: book.clone() };
+        all.extend(self.labels.iter().map(named));
+        all.extend(self.notes.iter().cloned().map(VehicleEvent::Note));
+        all
+    }
+
+    /// The map of the run with everything that belongs to it, for the archive.
+    pub(super) fn archive(&self, ended_us: u64) -> Vec<VehicleEvent> {
+        let cells = self.map.explored() as u64;
+        let head = [VehicleEvent::Archived { ended_us, cells }, VehicleEvent::Named(self.name.clone())];
+        head.into_iter().chain(self.run_events()).collect()
+    }
+}

@@ -1,0 +1,56 @@
+//! Puts the stored knowledge back into a surface that has just started.
+
+use super::event::StoredBudget;
+use super::memory::{SurfaceMemory, VehicleMemory};
+use super::stored;
+use crate::Surface;
+use crate::annotations::Annotations;
+use crate::exemplar_cache::ExemplarCache;
+use crate::vehicle_record::{Track, VehicleRecord};
+use scenecast_protocol::directive::Series;
+use scenecast_protocol::schedule::{BackgroundOrder, Shares};
+use scenecast_protocol::time::Instant;
+use scenecast_protocol::wire::Address;
+
+/// Puts everything back but the maps, which the recorder gives to the surface as earlier maps.
+pub(super) fn restore(surface: &mut Surface, memory: &SurfaceMemory, configured: &StoredBudget) {
+    let now = Instant::from_micros(memory.last.mission_us);
+    if let Some(began) = memory.began {
+        surface.link.restore_series(Series::from_random(began.series));
+    }
+    if let Some((budget, _)) = memory.budget.as_ref().filter(|(_, then)| then == configured) {
+        surface.link.set_budget(budget.bits_per_s, now);
+        surface.link.set_shares(Shares(budget.shares));
+        BackgroundOrder::from_bytes(&budget.background).into_iter().for_each(|order| surface.set_background(order));
+    }
+    for (&number, vehicle) in &memory.vehicles {
+        let Some(address) = Address::vehicle(number) else { continue };
+        let (series, orders) =
+            (Series::from_random(vehicle.series), vehicle.orders.iter().filter_map(stored::progress));
+        if !surface.link.restore_orders(address, series, orders, now) {
+            continue;
+        }
+        let record = surface.records.entry(address).or_insert_with(|| VehicleRecord::new(vehicle.name.clone()));
+        restore_record(record, vehicle);
+    }
+}
+
+fn restore_record(record: &mut VehicleRecord, memory: &VehicleMemory) {
+    (record.run, record.epoch) = (memory.id.run, memory.id.epoch);
+    stored::restore_intent(&memory.intent, record);
+    let points = memory.track.iter().map(|&(at, x, y)| (Instant::from_micros(at), x, y));
+    record.track = Track::restored(points, memory.track_total);
+    let last_received = memory.contact.last_received.map(Instant::from_micros);
+    record.restore_contact(stored::status(&memory.contact), last_received, stored::pause(&memory.contact));
+    record.found = memory.contact.usbl.as_ref().and_then(stored::range);
+    record.earlier.version_base = memory.map_version + 1;
+    let mut exemplars = ExemplarCache::default();
+    for (&label, images) in &memory.exemplars {
+        images.iter().for_each(|image| exemplars.restore_image(label, stored::exemplar(image)));
+    }
+    for (&label, (serial, open)) in &memory.requests {
+        exemplars.restore_request(label, *serial, open.as_ref().map(|open| stored::open_request(label, open)));
+    }
+    record.exemplars = exemplars;
+    record.annotations = Annotations { labels: memory.labels.clone(), notes: memory.notes.clone() };
+}

@@ -1,0 +1,192 @@
+//! The surface's types as they are stored, and back.
+
+use super::event::{StoredContact, StoredImage, StoredIntent, StoredOrder, StoredRange, StoredRequest};
+use crate::exemplar_cache::{OpenRequest, RequestState, StoredExemplar};
+use crate::settings::SettingsRecord;
+use crate::vehicle_record::VehicleRecord;
+use scenecast_core::UsblLine;
+use scenecast_protocol::directive::{
+    ExemplarRequest, Fence, Limits, OrderStatus, RefusalReason, Settings, Slot, SlotProgress, Utility, VersionedSlot,
+};
+use scenecast_protocol::link::PeerView;
+use scenecast_protocol::time::Instant;
+use scenecast_protocol::wire::VehicleStatus;
+use std::time::Duration;
+
+/// Room for a status with everything in it, bytes.
+const STATUS_ROOM: usize = 1024;
+/// Added to the code of a reason of refusal.
+const REFUSED: u8 = 16;
+
+fn slot_bytes(slot: &Slot) -> Vec<u8> {
+    VersionedSlot::encode(0, slot)
+}
+
+fn slot(bytes: &[u8]) -> Option<Slot> {
+    VersionedSlot::decode(bytes).ok()?.content
+}
+
+pub(super) fn contact(record: &VehicleRecord, view: &PeerView<'_>) -> StoredContact {
+    let (status, last_received) = (record.status(view), record.last_received(view));
+    StoredContact {
+        last_received: last_received.map(Instant::as_micros),
+        pause: record.pauses.expected().map(|d| d.as_micros() as u64),
+        status: status.and_then(|(status, at)| {
+            let report = status.encode_report(STATUS_ROOM, 0)?.0;
+            Some((at.as_micros(), status.encode_pose(STATUS_ROOM), report))
+        }),
+        usbl: record.found.map(|(line, at)| StoredRange {
+            at: at.as_micros(),
+            remote: line.remote.into(),
+            range_m: line.range_m,
+            direction_rad: line.direction_rad,
+            accuracy: line.accuracy,
+            age_s: line.age_s,
+        }),
+    }
+}
+
+/// The stored status and when its pose came in.
+pub(super) fn status(contact: &StoredContact) -> Option<(VehicleStatus, Instant)> {
+    let (at, pose, report) = contact.status.as_ref()?;
+    let mut status = VehicleStatus::default();
+    status.read_pose(pose).ok()?;
+    status.read_report(report).ok()?;
+    Some((status, Instant::from_micros(*at)))
+}
+
+pub(super) fn range(stored: &StoredRange) -> Option<(UsblLine, Instant)> {
+    let StoredRange { at, remote, range_m, direction_rad, accuracy, age_s } = *stored;
+    let line = UsblLine { remote: remote.try_into().ok()?, range_m, direction_rad, accuracy, age_s };
+    Some((line, Instant::from_micros(at)))
+}
+
+pub(super) fn pause(contact: &StoredContact) -> Option<Duration> {
+    contact.pause.map(Duration::from_micros)
+}
+
+pub(super) fn order(progress: &SlotProgress) -> StoredOrder {
+    let status = match progress.status {
+        OrderStatus::Queued => 0,
+        OrderStatus::OnAir => 1,
+        OrderStatus::Received => 2,
+        OrderStatus::Applied => 3,
+        OrderStatus::Refused(reason) => REFUSED + reason.code(),
+    };
+    StoredOrder {
+        version: progress.version.into(),
+        slot: slot_bytes(&progress.slot),
+        status,
+        issued: progress.issued.as_micros(),
+        changed: progress.changed.as_micros(),
+    }
+}
+
+/// `None` if the slot has another layout in this build.
+pub(super) fn progress(order: &StoredOrder) -> Option<SlotProgress> {
+    let slot = slot(&order.slot)?;
+    let status = match order.status {
+        0 => OrderStatus::Queued,
+        1 => OrderStatus::OnAir,
+        2 => OrderStatus::Received,
+        3 => OrderStatus::Applied,
+        code => OrderStatus::Refused(RefusalReason::from_code(code.checked_sub(REFUSED)?)?),
+    };
+    Some(SlotProgress {
+        id: slot.id(),
+        version: order.version.try_into().ok()?,
+        slot,
+        status,
+        issued: Instant::from_micros(order.issued),
+        changed: Instant::from_micros(order.changed),
+        sent: None,
+    })
+}
+
+pub(super) fn intent(record: &VehicleRecord) -> StoredIntent {
+    let fence = |fence: &Fence| slot_bytes(&Slot::Fence(fence.clone()));
+    let limits = |limits: &Limits| slot_bytes(&Slot::Limits(*limits));
+    let (requested, in_force, settings_unsure) = record.settings.parts();
+    StoredIntent {
+        utility: slot_bytes(&Slot::Utility(record.utility.clone())),
+        fence: record.fence.sent.as_ref().map(fence),
+        limits: record.limits.sent.as_ref().map(limits),
+        fence_in_force: record.fence.in_force.as_ref().map(|(version, f)| (*version, fence(f))),
+        limits_in_force: record.limits.in_force.as_ref().map(|(version, l)| (*version, limits(l))),
+        settings_requested: slot_bytes(&Slot::Settings(requested)),
+        settings_in_force: slot_bytes(&Slot::Settings(in_force)),
+        settings_unsure,
+    }
+}
+
+/// Puts the orders back into the record, as far as this build reads them.
+pub(super) fn restore_intent(stored: &StoredIntent, record: &mut VehicleRecord) {
+    let utility = |bytes: &[u8]| match slot(bytes) {
+        Some(Slot::Utility(utility)) => utility,
+        _ => Utility::default(),
+    };
+    let fence = |bytes: &Vec<u8>| match slot(bytes) {
+        Some(Slot::Fence(fence)) => Some(fence),
+        _ => None,
+    };
+    let limits = |bytes: &Vec<u8>| match slot(bytes) {
+        Some(Slot::Limits(limits)) => Some(limits),
+        _ => None,
+    };
+    let settings = |bytes: &[u8]| match slot(bytes) {
+        Some(Slot::Settings(settings)) => settings,
+        _ => Settings::default(),
+    };
+    record.utility = utility(&stored.utility);
+    record.fence.sent = stored.fence.as_ref().and_then(fence);
+    record.limits.sent = stored.limits.as_ref().and_then(limits);
+    record.fence.in_force = stored.fence_in_force.as_ref().and_then(|(v, bytes)| Some((*v, fence(bytes)?)));
+    record.limits.in_force = stored.limits_in_force.as_ref().and_then(|(v, bytes)| Some((*v, limits(bytes)?)));
+    let (requested, in_force) = (settings(&stored.settings_requested), settings(&stored.settings_in_force));
+    record.settings = SettingsRecord::of_parts(requested, in_force, stored.settings_unsure);
+}
+
+pub(super) fn image(exemplar: &StoredExemplar) -> StoredImage {
+    StoredImage {
+        number: exemplar.number,
+        size: exemplar.size,
+        webp: exemplar.webp.clone(),
+        sent_bytes: exemplar.sent_bytes as u32,
+        received: exemplar.received.as_micros(),
+        requested: exemplar.requested,
+    }
+}
+
+pub(super) fn exemplar(image: &StoredImage) -> StoredExemplar {
+    StoredExemplar {
+        number: image.number,
+        size: image.size,
+        webp: image.webp.clone(),
+        sent_bytes: image.sent_bytes as usize,
+        received: Instant::from_micros(image.received),
+        requested: image.requested,
+    }
+}
+
+pub(super) fn request(open: &OpenRequest) -> StoredRequest {
+    let (state, held) = match open.state {
+        RequestState::Ordered => (0, (0, 0)),
+        RequestState::NoneYet => (1, (0, 0)),
+        RequestState::Arriving(held, total) => (2, (held as u32, total as u32)),
+        RequestState::Refused => (3, (0, 0)),
+    };
+    let ExemplarRequest { serial, size, picture, .. } = open.request;
+    StoredRequest { serial, size, picture, state, held, changed: open.changed.as_micros() }
+}
+
+pub(super) fn open_request(label: u8, stored: &StoredRequest) -> OpenRequest {
+    let StoredRequest { serial, size, picture, state, held, changed } = *stored;
+    let state = match state {
+        1 => RequestState::NoneYet,
+        2 => RequestState::Arriving(held.0 as usize, held.1 as usize),
+        3 => RequestState::Refused,
+        _ => RequestState::Ordered,
+    };
+    let request = ExemplarRequest { label, serial, size, picture };
+    OpenRequest { request, state, changed: Instant::from_micros(changed) }
+}

@@ -1,0 +1,39 @@
+import assert from "node:assert/strict";
+
+const EARLIER = { run: 1, current_run: 2, current_epoch: 3, current_cells: 12 };
+
+export default [
+  {
+    name: "an earlier map is marked until the operator dismisses it",
+    scenario: "rich",
+    async run(s) {
+      await s.steer({ earlier: EARLIER });
+      await s.shows("#banners", /map of auv-1 in view is an earlier one.*of run 1, label epoch 0.*12 of its \d+ cells.*in run 2, label epoch 3/s);
+      await s.page.locator("#banners button", { hasText: "Show the current map" }).click();
+      await s.visible("#banners", false);
+    },
+  },
+  {
+    name: "a disk that refuses is reported with its reason",
+    scenario: "rich",
+    async run(s) {
+      const storage = { folder: "state/asv", free_bytes: 1_500_000, write_errors: 3, failing: "surface.store: No space left on device" };
+      await s.steer({ storage });
+      await s.shows("#banners", /cannot write its files.*No space left on device.*state\/asv.*Free: 1 MB/s);
+      await s.steer({ storage: { ...storage, failing: null } });
+      await s.visible("#banners", false);
+    },
+  },
+  {
+    name: "archived maps are listed with their files",
+    scenario: "rich",
+    async run(s) {
+      const map = { name: "archive-1-epoch-0-run-1-5", vehicle: 1, vehicle_name: "auv-1", run: 1, epoch: 0, cells: 40, ended_s: 10 };
+      await s.steer({ archive: [map] });
+      await s.page.locator("#tools button", { hasText: "Export" }).click();
+      await s.shows("#dialog .archive", /auv-1, run 1, label epoch 0.*40 cells, ended .* ago/s);
+      const links = await s.page.locator("#dialog .archive a").evaluateAll((all) => all.map((a) => a.getAttribute("href")));
+      assert.deepEqual(links, ["png", "csv", "geojson", "ply"].map((e) => `/api/v2/archive/${map.name}/map.${e}`));
+    },
+  },
+];

@@ -1,0 +1,166 @@
+//! A surface that is killed and started again shows the same page.
+
+use scenecast_tests::{Process, free_port, http, recorded, run, scratch, wait_until};
+use serde_json::Value;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+const LIMIT: Duration = Duration::from_secs(60);
+
+struct Pair {
+    dir: PathBuf,
+    console: u16,
+    surface_file: String,
+    vehicle_file: String,
+}
+
+fn pair(name: &str) -> Pair {
+    let (recording, _) = recorded();
+    let dir = scratch(name);
+    let (modem, console) = (free_port(), free_port());
+    let file = |name: &str, text: String| {
+        let path = dir.join(name);
+        std::fs::write(&path, text).unwrap();
+        path.display().to_string()
+    };
+    let runtime = |who: &str| format!("[runtime]\ntime_scale = 20\nstate_dir = \"{}\"\n", dir.join(who).display());
+    let surface = format!(
+        "{}[modem]\nlisten = \"127.0.0.1:{modem}\"\n[console]\nlisten = \"127.0.0.1:{console}\"\n",
+        runtime("asv")
+    );
+    let vehicle = format!(
+        "{}[modem]\nconnect = \"127.0.0.1:{modem}\"\n[camera]\nsource = \"frames:{}\"\n",
+        runtime("auv"),
+        recording.display()
+    );
+    let (surface_file, vehicle_file) = (file("asv.toml", surface), file("auv.toml", vehicle));
+    Pair { dir, console, surface_file, vehicle_file }
+}
+
+impl Pair {
+    fn surface(&self) -> Process {
+        Process::start(&["asv", "--config", &self.surface_file])
+    }
+
+    fn vehicle(&self) -> Process {
+        Process::start(&["auv", "--config", &self.vehicle_file])
+    }
+
+    fn state(&self) -> Option<Value> {
+        let (status, body) = http(self.console, "GET", "/api/v2/state", "", "")?;
+        (status == 200).then(|| serde_json::from_slice(&body).unwrap())
+    }
+
+    fn auv(&self) -> Value {
+        self.state().map_or(Value::Null, |state| state["vehicles"][0].clone())
+    }
+
+    fn post(&self, path: &str, body: &str) {
+        let headers = "Content-Type: application/json\r\nX-Scenecast: 1\r\n";
+        let (status, answer) = http(self.console, "POST", &format!("/api/v2/{path}"), headers, body).unwrap();
+        assert!(status < 300, "{path}: {status} {}", String::from_utf8_lossy(&answer));
+    }
+}
+
+/// The members of a vehicle that do not change while it is silent.
+fn lasting(mut vehicle: Value) -> Value {
+    let members = vehicle.as_object_mut().unwrap();
+    for changing in ["link", "next_contact_s", "expected_interval_s"] {
+        members.remove(changing);
+    }
+    let map = members["map"].as_object_mut().unwrap();
+    map.remove("version");
+    map.remove("earlier");
+    vehicle
+}
+
+fn cells(pair: &Pair) -> Vec<String> {
+    let (_, csv) = http(pair.console, "GET", "/api/v2/vehicles/1/map.csv", "", "").unwrap();
+    // East, north and label of each cell; its age goes on.
+    let line = |line: &str| line.split(',').take(3).collect::<Vec<_>>().join(",");
+    String::from_utf8(csv).unwrap().lines().map(line).collect()
+}
+
+#[test]
+fn a_killed_surface_shows_the_same_page_again() {
+    let pair = pair("same-page");
+    let mut surface = pair.surface();
+    let mut vehicle = pair.vehicle();
+    wait_until("a map", LIMIT, || pair.auv()["map"]["explored_cells"].as_u64() > Some(20));
+    let label = pair.auv()["labels"][0]["id"].as_u64().unwrap();
+    pair.post("vehicles/1/fence", r#"{"fence": [[-500,-500],[500,-500],[500,500],[-500,500]]}"#);
+    pair.post("vehicles/1/limits", r#"{"silence_s": 900, "on_silence": "hold"}"#);
+    pair.post("vehicles/1/settings", r#"{"planner": "greedy"}"#);
+    pair.post("vehicles/1/labels", &format!(r##"{{"label": {label}, "name": "sand", "colour": "#112233"}}"##));
+    pair.post("vehicles/1/notes", r#"{"text": "a wreck"}"#);
+    let is_applied = |vehicle: &Value| !vehicle["fence_in_force"].is_null() && !vehicle["limits_in_force"].is_null();
+    wait_until("the orders are applied", LIMIT, || is_applied(&pair.auv()));
+    vehicle.kill();
+    pair.post("vehicles/1/utility", &format!(r#"{{"weights": {{"{label}": 0.5}}, "exploration": 0.2}}"#));
+    let utility =
+        |v: &Value| v["directive"]["slots"].as_array().unwrap().iter().find(|s| s["slot"] == "utility").cloned();
+    let (before, map) = (pair.state().unwrap(), cells(&pair));
+    surface.kill();
+    let began = Instant::now();
+    let _surface = pair.surface();
+    wait_until("the page is back", LIMIT, || pair.state().is_some());
+    assert!(began.elapsed() < Duration::from_secs(2), "{:?}", began.elapsed());
+    let after = pair.state().unwrap();
+    assert_eq!(lasting(after["vehicles"][0].clone()), lasting(before["vehicles"][0].clone()));
+    assert_eq!(cells(&pair), map);
+    assert_eq!(after["mission"]["id"], before["mission"]["id"]);
+    assert!(after["now_s"].as_f64() > before["now_s"].as_f64(), "ages continue");
+    assert!(!after["vehicles"][0]["map"]["earlier"].is_null(), "the map is not shown as live");
+    let second = run(&[
+        "asv",
+        "--config",
+        &pair.surface_file,
+        "--set",
+        "console.listen=\"\"",
+        "--set",
+        "modem.listen=127.0.0.1:0",
+    ]);
+    let line = String::from_utf8_lossy(&second.stderr).into_owned();
+    assert!(second.status.code() == Some(2) && line.contains("another process"), "{line}");
+
+    // The vehicle comes back: the pending order reaches it, and the current map takes the place of the earlier one.
+    let _vehicle = pair.vehicle();
+    let version = |state: &Value| utility(&state["vehicles"][0]).unwrap()["version"].clone();
+    assert_eq!(version(&after), version(&before));
+    wait_until("the order is decided", LIMIT, || {
+        let order = utility(&pair.auv()).unwrap();
+        (order["state"] == "applied" || order["state"] == "refused") && order["version"] == version(&before)
+    });
+    wait_until("the current map is in view", LIMIT * 2, || pair.auv()["map"]["earlier"].is_null());
+    let (_, list) = http(pair.console, "GET", "/api/v2/archive", "", "").unwrap();
+    let list: Value = serde_json::from_slice(&list).unwrap();
+    let name = list["maps"][0]["name"].as_str().expect("the map before the restart is archived").to_owned();
+    for (file, head) in
+        [("map.png", "\u{89}PNG"), ("map.csv", "east"), ("map.geojson", "{"), ("map.ply", "ply"), ("map.tif", "II*")]
+    {
+        let (status, bytes) = http(pair.console, "GET", &format!("/api/v2/archive/{name}/{file}"), "", "").unwrap();
+        let begin: String = bytes.iter().take(16).map(|&b| char::from(b)).collect();
+        assert!(status == 200 && begin.starts_with(head), "{file}: {status} {begin}");
+    }
+    assert!(Path::new(&pair.dir.join(format!("asv/{name}.scmap"))).exists());
+}
+
+#[cfg(unix)]
+#[test]
+fn a_removed_folder_stops_no_surface() {
+    let pair = pair("removed-folder");
+    let mut surface = pair.surface();
+    let _vehicle = pair.vehicle();
+    wait_until("a map", LIMIT, || pair.auv()["map"]["explored_cells"].as_u64() > Some(20));
+    std::fs::remove_dir_all(pair.dir.join("asv")).unwrap();
+    std::fs::write(pair.dir.join("asv"), "in the way of the folder").unwrap();
+    let storage = || pair.state().map_or(Value::Null, |state| state["storage"].clone());
+    wait_until("the page reports the disk", LIMIT, || !storage()["failing"].is_null());
+    assert!(storage()["write_errors"].as_u64() > Some(0));
+    pair.post("vehicles/1/notes", r#"{"text": "written in memory"}"#);
+    std::fs::remove_file(pair.dir.join("asv")).unwrap();
+    wait_until("the files are written again", LIMIT, || storage()["failing"].is_null());
+    surface.kill();
+    let _surface = pair.surface();
+    wait_until("the note survives", LIMIT, || pair.auv()["notes"][0]["text"] == "written in memory");
+}
