@@ -51,7 +51,8 @@ impl<R: StateReplica> VehiclePeer<R> {
         let answer = self.contact.is_answer_due(now);
         let is_late = self.pair.highest() >= self.contact.acknowledged + MAX_UNACKNOWLEDGED;
         let owes = (!self.pair.is_proven() && answer) || (self.pair.unstated() > 0 && (is_late || answer));
-        self.has_numbers() && (owes || !self.outbox.pending(now, now - self.slot_timeout()).is_empty())
+        let inquires = self.in_force.next_inquiry().is_some_and(|at| now >= at);
+        self.has_numbers() && (owes || inquires || !self.outbox.pending(now, now - self.slot_timeout()).is_empty())
     }
 
     /// Whether there is a run with a number left for a frame.
@@ -64,7 +65,11 @@ impl<R: StateReplica> VehiclePeer<R> {
         let again = self.outbox.progress().filter_map(|s| s.sent).min().map(|at| at + self.slot_timeout());
         let again = again.filter(|_| self.outbox.has_backlog());
         let hello = self.contact.next_hello(self.pair.is_proven() && !self.pair.is_full());
-        let numbered = [self.contact.answer_due, again].into_iter().flatten().filter(|_| self.has_numbers()).min();
+        let numbered = [self.contact.answer_due, again, self.in_force.next_inquiry()]
+            .into_iter()
+            .flatten()
+            .filter(|_| self.has_numbers())
+            .min();
         Some(numbered.map_or(hello, |at| at.min(hello)))
     }
 

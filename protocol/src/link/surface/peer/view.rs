@@ -1,8 +1,8 @@
 //! The surface's view of a vehicle, for its host.
 
-use super::{EndedRun, VehiclePeer};
+use super::{EndedRun, InForce, VehiclePeer};
 use crate::directive::Series;
-use crate::directive::SlotProgress;
+use crate::directive::{SlotId, SlotProgress};
 use crate::link::LinkStats;
 use crate::mac::ClockMap;
 use crate::map::{LayerId, LayerReplica, LayerSet, Replica, StateReplica};
@@ -96,6 +96,11 @@ impl<'a, R: StateReplica> PeerView<'a, R> {
     /// The latest version of each issued slot, and how far it has come.
     pub fn slots(&self) -> impl Iterator<Item = &'a SlotProgress> + use<'a, R> {
         self.0.outbox.progress()
+    }
+
+    /// The content of a slot that is in force at the vehicle: utility, settings, budget, limits or fence.
+    pub fn in_force(&self, id: SlotId) -> InForce<'a> {
+        self.0.in_force.get(id)
     }
 
     /// Counters and estimates of the link to this vehicle.
