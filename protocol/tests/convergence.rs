@@ -55,6 +55,24 @@ fn assert_budget(pair: &LinkedEnds, budget_bps: u32) {
     }
 }
 
+/// In each step the map changes and an order is issued. Then an end may restart (0 the vehicle, 1 the surface); during the
+/// step one direction may be interrupted, or both.
+fn play(pair: &mut LinkedEnds, steps: &[(u8, u8)]) {
+    for (step, &(restarts, outage)) in steps.iter().enumerate() {
+        let map = patchy(24, step as u64);
+        pair.mute = [outage & 5 == 1, outage == 2 || outage == 1];
+        pair.vehicle.set_map(map.iter(), pair.now);
+        pair.set_layers(24, step as u64);
+        pair.surface.issue(auv(), utility(step as i8), pair.now).unwrap();
+        pair.run(pair.now + Duration::from_secs(40), false);
+        match restarts {
+            0 => pair.restart_vehicle(&map),
+            1 => pair.restart_surface(),
+            _ => {}
+        }
+    }
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(40))]
 
@@ -67,20 +85,7 @@ proptest! {
     ) {
         let budget = setup.budget_bps;
         let mut pair = LinkedEnds::new(seed, setup, channel);
-        for (step, (what, outage)) in restarts.into_iter().enumerate() {
-            let map = patchy(24, step as u64);
-            // From time to time one direction is interrupted, or both.
-            pair.mute = [outage & 5 == 1, outage == 2 || outage == 1];
-            pair.vehicle.set_map(map.iter(), pair.now);
-            pair.set_layers(24, step as u64);
-            pair.surface.issue(auv(), utility(step as i8), pair.now).unwrap();
-            pair.run(pair.now + Duration::from_secs(40), false);
-            match what {
-                0 => pair.restart_vehicle(&map),
-                1 => pair.restart_surface(),
-                _ => {}
-            }
-        }
+        play(&mut pair, &restarts);
         pair.mute = [false; 2];
         pair.run(pair.now + Duration::from_secs(100_000), true);
         prop_assert!(pair.is_converged(), "maps differ: {:?}", pair.vehicle.stats());
@@ -406,6 +411,54 @@ fn a_late_hello_does_not_block_the_current_run() {
     }
     pair.run(pair.now + Duration::from_secs(10_000), true);
     assert!(pair.is_converged(), "{:?}", pair.vehicle.stats());
+}
+
+/// Found by the property test above: with a key, frames of the run that a late hello had ended were not recognised.
+#[test]
+fn a_late_hello_under_a_key_does_not_block_the_current_run() {
+    let channel = LossyChannel {
+        loss: 0.8939541058649474,
+        duplication: 0.04928500934298382,
+        reordering: 0.11134058088683747,
+        corruption: 0.17988773786369497,
+        talker: 0.18496370067098947,
+        propagation: Duration::from_millis(1863),
+    };
+    let setup = Setup { layers: Some([0, 0]), ..Setup::new(256, 10_000, Codec::Png) }.keyed(true, false);
+    let mut pair = LinkedEnds::new(8_448_571_233_693_620_685, setup, channel);
+    play(&mut pair, &[(1, 1), (1, 1), (3, 4), (1, 0), (0, 2), (2, 2)]);
+    pair.mute = [false; 2];
+    pair.run(pair.now + Duration::from_secs(100_000), true);
+    assert!(pair.is_converged(), "{:?}", pair.vehicle.stats());
+}
+
+/// Found by the property test above: the surface repeated a verdict that did not fit into a frame without a pause, the
+/// vehicle rarely answered it, and the run ended each time that the surface's numbers had run out.
+#[test]
+fn a_modem_owned_link_keeps_its_run_in_the_smallest_frames() {
+    let channel = LossyChannel {
+        loss: 0.8873762400261826,
+        duplication: 0.038560382542167725,
+        reordering: 0.07916988412977231,
+        corruption: 0.16657121819912846,
+        talker: 0.01357248262582063,
+        propagation: Duration::from_millis(1151),
+    };
+    let (access, debounce) = (Access::ModemOwned { pool_frames: 8 }, Duration::from_secs(2));
+    let setup = Setup { access, debounce, layers: Some([0, 0]), ..Setup::new(32, 10_000, Codec::Context) };
+    for seed in [11_273_217_032_599_320_129, 1, 2] {
+        let mut pair = LinkedEnds::new(seed, setup.clone(), channel.clone());
+        let map = patchy(24, 4);
+        pair.vehicle.set_map(map.iter(), pair.now);
+        pair.set_layers(24, 4);
+        pair.surface.issue(auv(), utility(5), pair.now).unwrap();
+        pair.run(pair.now + Duration::from_secs(40), false);
+        pair.restart_surface();
+        pair.run(pair.now + Duration::from_secs(100_000), true);
+        let (sent, surface) = (pair.vehicle.stats(), pair.surface.vehicle(auv()).unwrap().stats());
+        assert!(pair.is_converged() && sent.resyncs == 0, "seed {seed}: {sent:?}");
+        assert!(surface.frames_sent < sent.frames_sent, "{} for {}", surface.frames_sent, sent.frames_sent);
+    }
 }
 
 /// Found by the property test above: verdicts in three bytes fell behind the losses, until numbers ran out.

@@ -2,6 +2,7 @@
 
 use super::{RefusalReason, SLOTS, Series, Slot, SlotId, SlotReport, SlotState, VersionedSlot};
 use crate::time::Instant;
+use std::time::Duration;
 
 /// How far an order has come.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -62,6 +63,8 @@ pub struct SlotOutbox {
 }
 
 impl SlotOutbox {
+    /// Time after an acknowledgement in which each report from before it has come in.
+    const MAX_DECISION: Duration = Duration::from_secs(30);
     /// Versions that are left out after a restart: an order whose record was lost may have used one of them.
     const RESTART_GAP: u16 = 64;
 
@@ -187,14 +190,14 @@ impl SlotOutbox {
 
     /// Begins a new series if the report in frame `number` alone, without earlier ones, shows that the vehicle ignores a
     /// received version: it knows a newer one that was not issued here, from a forged order. A vehicle decides before it
-    /// acknowledges, so the reports after the acknowledgement have the decision.
+    /// acknowledges, so the reports after the acknowledgement have the decision. As the number of the acknowledgement may
+    /// be forged, a report long after it has the decision too.
     pub fn leave_overtaken_series(&mut self, report: &[SlotReport; SLOTS], number: u64, now: Instant) {
         let is_overtaken = self.progress().any(|slot| {
             let (report, received_in) = (report.get(slot.id.index()), self.received_in.get(slot.id.index()));
             let is_other = |r: &SlotReport| r.state != SlotState::Unknown && r.version_low != slot.version as u8;
-            slot.status == OrderStatus::Received
-                && report.is_some_and(is_other)
-                && received_in.is_some_and(|&n| n < number)
+            let is_later = received_in.is_some_and(|&n| n < number) || now.since(slot.changed) >= Self::MAX_DECISION;
+            slot.status == OrderStatus::Received && report.is_some_and(is_other) && is_later
         });
         if is_overtaken {
             self.begin_series(now);

@@ -1,9 +1,9 @@
 //! The handshake: which run of the peer this end communicates with. A hello names a run, and
 //! a numbered frame proves it.
 
-use super::run::{Identity, LinkRun};
-use crate::seal::SessionKey;
-use crate::wire::{Introduction, SessionId};
+use super::run::{EndedPeer, Identity, LinkRun};
+use crate::seal::{Direction, SessionKey};
+use crate::wire::{Envelope, Introduction, SessionId};
 use std::collections::VecDeque;
 
 /// The result of a hello.
@@ -32,7 +32,7 @@ pub(super) struct Handshake<T> {
     offered: Option<LinkRun<T>>,
     /// At the vehicle: `run` serves only to receive grants, because this end has begun a new one.
     leaving: bool,
-    retired: VecDeque<Identity>,
+    retired: VecDeque<EndedPeer>,
     random: u64,
 }
 
@@ -77,7 +77,7 @@ impl<T> Handshake<T> {
         if self.run.as_ref().is_some_and(|r| r.peer == peer) && !self.leaving {
             return HandshakeOutcome::Known;
         }
-        if self.retired.contains(&peer) {
+        if self.is_retired(peer) {
             return HandshakeOutcome::Retired;
         }
         if self.offered.as_ref().is_none_or(|r| r.peer != peer) {
@@ -106,7 +106,7 @@ impl<T> Handshake<T> {
         if self.run.as_ref().is_some_and(|r| r.peer == peer) {
             return HandshakeOutcome::Known;
         }
-        if self.retired.contains(&peer) {
+        if self.is_retired(peer) {
             return HandshakeOutcome::Retired;
         }
         self.replace(LinkRun::new(self.own, peer, introduction, key(self.own, peer)));
@@ -125,7 +125,7 @@ impl<T> Handshake<T> {
     pub(super) fn renew_surface(&mut self) {
         self.own = fresh(&mut self.random);
         if let Some(old) = self.run.take() {
-            self.retire(old.peer);
+            self.retire(old);
         }
     }
 
@@ -134,12 +134,21 @@ impl<T> Handshake<T> {
         if let Some(old) = self.run.replace(run)
             && old.peer != peer
         {
-            self.retire(old.peer);
+            self.retire(old);
         }
     }
 
-    fn retire(&mut self, peer: Identity) {
-        self.retired.push_back(peer);
+    fn is_retired(&self, peer: Identity) -> bool {
+        self.retired.iter().any(|r| r.identity == peer)
+    }
+
+    /// Whether a run of the peer that has ended sent this frame to a run of ours.
+    pub(super) fn is_of_ended(&self, envelope: &Envelope<'_>, direction: Direction) -> bool {
+        self.retired.iter().any(|r| r.has_sent(envelope, direction))
+    }
+
+    fn retire(&mut self, run: LinkRun<T>) {
+        self.retired.push_back(run.end());
         if self.retired.len() > Self::MEMORY {
             self.retired.pop_front();
         }

@@ -22,7 +22,7 @@ use pair::{Inbound, LinkPair};
 pub use run::{Authenticity, Identity};
 pub use slots::{SlotInbox, SlotInboxState};
 pub use stats::{DropReason, LinkStats};
-pub use surface::{Cycle, EndedRun, IssueError, PeerView, SurfaceConfig, SurfaceEvent, SurfaceLink};
+pub use surface::{Cycle, EndedRun, InForce, IssueError, PeerView, SurfaceConfig, SurfaceEvent, SurfaceLink};
 pub use vehicle::{OversizedChunk, VehicleConfig, VehicleEvent, VehicleLink};
 pub use window::{LinkWindow, WindowRefusal};
 

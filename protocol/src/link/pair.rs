@@ -85,7 +85,7 @@ impl<T> LinkPair<T> {
 
     /// Whether a numbered frame has shown that the peer uses the current run.
     pub fn is_proven(&self) -> bool {
-        self.handshake.run().is_some_and(|r| r.window.highest() > 0)
+        self.highest() > 0
     }
 
     /// Whether frames of unknown fate fill the window.
@@ -116,6 +116,11 @@ impl<T> LinkPair<T> {
     /// Whether the peer seems to use other runs than this end does.
     pub fn seems_out_of_step(&self) -> bool {
         self.strays >= Self::STRAYS
+    }
+
+    /// The highest frame number received, 0 before the first.
+    pub fn highest(&self) -> FrameNumber {
+        self.handshake.run().map_or(0, |r| r.window.highest())
     }
 
     /// Received frames that no acknowledgement statement of ours covers yet.

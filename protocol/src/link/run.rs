@@ -1,6 +1,6 @@
 //! A run of this end with a run of the peer.
 
-use super::{Flight, LinkWindow};
+use super::{Flight, FrameNumber, LinkWindow};
 use crate::seal::{Direction, MissionKey, SessionKey};
 use crate::wire::{Envelope, Frame, Introduction, MissionId, Seal, SessionId, unwrap_number};
 use std::sync::Arc;
@@ -25,6 +25,24 @@ pub struct Identity {
     pub nonce: u64,
 }
 
+/// A run of the peer that has ended.
+#[derive(Debug)]
+pub(super) struct EndedPeer {
+    pub(super) identity: Identity,
+    /// The key of its frames to a run of ours, if there is one.
+    key: Option<SessionKey>,
+    highest: FrameNumber,
+}
+
+impl EndedPeer {
+    /// Whether it sent this frame, by a valid tag.
+    pub(super) fn has_sent(&self, envelope: &Envelope<'_>, direction: Direction) -> bool {
+        let number = unwrap_number(envelope.header.number, self.highest);
+        let is_open = |key| envelope.open(&Seal::Session(key, direction, number)).is_some();
+        envelope.header.session == self.identity.session && self.key.as_ref().is_some_and(is_open)
+    }
+}
+
 /// The state of a pair of runs; frame numbers begin at 1.
 #[derive(Debug)]
 pub(super) struct LinkRun<T> {
@@ -40,6 +58,10 @@ pub(super) struct LinkRun<T> {
 impl<T> LinkRun<T> {
     pub(super) fn new(own: Identity, peer: Identity, introduction: Introduction, key: Option<SessionKey>) -> Self {
         Self { own, peer, introduction, key, flight: Flight::default(), window: LinkWindow::default() }
+    }
+
+    pub(super) fn end(self) -> EndedPeer {
+        EndedPeer { identity: self.peer, key: self.key, highest: self.window.highest() }
     }
 
     /// The frame, if the peer's run sealed it to ours. If `keyed`, it must have a tag.

@@ -17,14 +17,27 @@ pub enum ChunkKind {
     Layer,
     /// The introduction of a hello's sender.
     Introduction,
+    /// A part of the content in force of a slot.
+    InForce,
+    /// The digests of the content in force that the surface holds, as a request for the rest.
+    Inquiry,
 }
 
 /// The code after which the first byte of the payload names the kind.
 const EXTENDED: u8 = 7;
 
 impl ChunkKind {
-    const ALL: [Self; 7] =
-        [Self::Map, Self::Pose, Self::Slot, Self::Object, Self::Report, Self::Layer, Self::Introduction];
+    const ALL: [Self; 9] = [
+        Self::Map,
+        Self::Pose,
+        Self::Slot,
+        Self::Object,
+        Self::Report,
+        Self::Layer,
+        Self::Introduction,
+        Self::InForce,
+        Self::Inquiry,
+    ];
 
     /// The code in the header of the chunk, and the byte that begins the payload of an extended kind.
     fn code(self) -> (u8, Option<u8>) {
@@ -36,6 +49,8 @@ impl ChunkKind {
             Self::Report => (5, None),
             Self::Layer => (6, None),
             Self::Introduction => (EXTENDED, Some(0)),
+            Self::InForce => (EXTENDED, Some(1)),
+            Self::Inquiry => (EXTENDED, Some(2)),
         }
     }
 }
@@ -48,7 +63,8 @@ impl ChunkKind {
 /// |kind | length  | [more length]  | payload   |
 /// +-----+---------+----------------+-----------+
 /// kind     0 end of the frame's content, 1 map, 2 pose, 3 slot, 4 object, 5 report, 6 layer;
-///          7 extended: the first byte of the payload is 0 introduction; any other value, or no payload: skipped
+///          7 extended: the first byte of the payload is 0 introduction, 1 content in force, 2 inquiry; any other value,
+///          or no payload: skipped
 /// length   0..26 bytes of payload; 27..30: 27 + 256 x (length - 27) + next byte; 31: to the end of the frame
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -5,7 +5,7 @@ use super::path::PlannedPath;
 use super::placement::Placement;
 use crate::bytes::{Reader, Truncated, decimetres, put24};
 use crate::coordinates::MapPoint;
-use crate::directive::{SLOTS, SlotId, SlotReport, SlotState};
+use crate::directive::{InForceSummary, SLOTS, SlotId, SlotReport, SlotState};
 
 /// The activity of the vehicle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -110,6 +110,7 @@ impl ModeReason {
 /// 10..  8     version of each of them, low 8 bits
 /// then  4     decision about each of them: 1 applied, 2..11 refusal reason, 15 pending; any other value is refused; after an odd number,
 ///             4 bits 0
+/// 3 more      [summary of the content in force, see `InForceSummary`]
 /// 7 more      [placement of the map, see `Placement`]; left out while it has not moved
 /// ```
 ///
@@ -161,6 +162,8 @@ pub struct VehicleStatus {
     pub backlog: Backlog,
     /// Decisions about the slots of the directive, by slot.
     pub slots: [SlotReport; SLOTS],
+    /// The summary of the content in force; `None` if the report has none.
+    pub in_force: Option<InForceSummary>,
     /// The placement of the map; `None` while no fix has moved it.
     pub placement: Option<Placement>,
 }
@@ -200,6 +203,8 @@ fn decode_rate(code: u16) -> u32 {
 impl VehicleStatus {
     /// Length of a report without slots in bytes.
     const REPORT_HEAD: usize = 8 + Backlog::BYTES;
+    /// Length of the items after the slots in bytes.
+    const TAIL: usize = InForceSummary::BYTES + Placement::BYTES;
     /// Length of a pose with a waypoint, without a path, in bytes.
     pub(crate) const POSE: usize = 21;
 
@@ -229,9 +234,9 @@ impl VehicleStatus {
         out
     }
 
-    /// Encodes a report of at most `room` bytes on the decided slots from `first` on, and on the placement.
-    /// Also returns the slot with which the next report must begin, 0 if this one is complete. `None` means
-    /// that not even one slot fits.
+    /// Encodes a report of at most `room` bytes on the decided slots from `first` on, on the content in force (item
+    /// [`SLOTS`]) and on the placement (the item after it). Also returns the item with which the next report must begin, 0
+    /// if this one is complete. `None` means that not even one slot fits.
     pub fn encode_report(&self, room: usize, first: usize) -> Option<(Vec<u8>, usize)> {
         let known = |&(_, s): &(usize, &SlotReport)| s.state != SlotState::Unknown;
         let decided: Vec<(usize, &SlotReport)> = self.slots.iter().enumerate().skip(first).filter(known).collect();
@@ -250,15 +255,28 @@ impl VehicleStatus {
         out.extend(told.iter().map(|(_, s)| s.version_low));
         let code = |of: Option<&(usize, &SlotReport)>| of.map_or(0, |(_, s)| s.state.code());
         out.extend(told.chunks(2).map(|pair| code(pair.first()) << 4 | code(pair.get(1))));
-        let Some(placement) = self.placement.filter(|_| left.is_empty()) else {
-            return Some((out, left.first().map_or(0, |&(slot, _)| slot)));
-        };
-        let has_room = room >= out.len() + Placement::BYTES;
-        if has_room {
-            placement.encode(&mut out);
+        if let Some(&(slot, _)) = left.first() {
+            return Some((out, slot));
         }
-        let next = if has_room || told.is_empty() { 0 } else { SLOTS };
-        Some((out, next))
+        Some(self.encode_tail(out, room, first, told.is_empty()))
+    }
+
+    /// Appends the items after the slots to a report, from `first` on. An item that does not fit waits for the next report,
+    /// unless `is_alone`: it would not fit there either.
+    fn encode_tail(&self, mut out: Vec<u8>, room: usize, first: usize, mut is_alone: bool) -> (Vec<u8>, usize) {
+        let mut items = [Vec::new(), Vec::new()];
+        let [in_force, placement] = &mut items;
+        self.in_force.iter().for_each(|summary| summary.encode(in_force));
+        self.placement.iter().for_each(|moved| moved.encode(placement));
+        for (item, bytes) in (SLOTS..).zip(items).filter(|(item, bytes)| *item >= first && !bytes.is_empty()) {
+            if out.len() + bytes.len() <= room {
+                out.extend(bytes);
+                is_alone = false;
+            } else if !is_alone {
+                return (out, item);
+            }
+        }
+        (out, 0)
     }
 
     /// Decodes a pose into `self`; the fields of the report stay unchanged.
@@ -308,6 +326,9 @@ impl VehicleStatus {
         }
         if codes.next().is_some_and(|padding| padding != 0) {
             return Err(StatusError::BadField);
+        }
+        if matches!(r.rest().len(), InForceSummary::BYTES | Self::TAIL) {
+            read.in_force = Some(InForceSummary::decode(&mut r)?.ok_or(StatusError::BadField)?);
         }
         if !r.rest().is_empty() {
             read.placement = Some(Placement::decode(&mut r)?.ok_or(StatusError::BadField)?);

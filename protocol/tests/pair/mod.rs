@@ -3,9 +3,9 @@
 // Each test program uses a part of this module.
 #![allow(dead_code)]
 
-use scenecast_protocol::directive::{Constraints, Slot, SlotState, Utility};
+use scenecast_protocol::directive::{Constraints, Slot, SlotId, SlotState, Utility};
 use scenecast_protocol::link::{
-    Authenticity, SlotInboxState, SurfaceConfig, SurfaceLink, VehicleConfig, VehicleEvent, VehicleLink,
+    Authenticity, SlotInboxState, SurfaceConfig, SurfaceEvent, SurfaceLink, VehicleConfig, VehicleEvent, VehicleLink,
 };
 use scenecast_protocol::mac::{Access, MasterConfig, ModemProfile};
 use scenecast_protocol::map::{Cell, LabelGrid, LayerDescriptor, LayerId, LayerSet, LayerSource};
@@ -85,6 +85,8 @@ pub(crate) struct LinkedEnds {
     pub(crate) audits: [Audit; 2],
     /// Slots applied at the vehicle. A run of the surface has one series, so versions must not repeat.
     pub(crate) applied: Vec<Slot>,
+    /// The first events of the surface since they were last taken.
+    pub(crate) surface_events: Vec<SurfaceEvent>,
     /// The status of the vehicle.
     pub(crate) status: VehicleStatus,
     setup: Setup,
@@ -96,6 +98,8 @@ pub(crate) struct LinkedEnds {
     pub(crate) overheard: VecDeque<Vec<u8>>,
     serial: u64,
     durable: SlotInboxState,
+    /// The content in force that survives a restart of the vehicle.
+    in_force: BTreeMap<SlotId, Slot>,
     /// The last quantities of the layers.
     quantities: Vec<(LayerId, Vec<(Cell, f64)>)>,
 }
@@ -122,6 +126,7 @@ impl LinkedEnds {
             channel,
             audits: [Audit::new(window), Audit::new(window)],
             applied: Vec::new(),
+            surface_events: Vec::new(),
             status: VehicleStatus { labels: 3, ..VehicleStatus::default() },
             setup,
             random: seed ^ 0xABCD,
@@ -130,6 +135,7 @@ impl LinkedEnds {
             overheard: VecDeque::new(),
             serial: 0,
             durable: SlotInboxState::default(),
+            in_force: BTreeMap::new(),
             quantities: Vec::new(),
         }
     }
@@ -143,6 +149,8 @@ impl LinkedEnds {
         let seed = (self.draw() * 1e15) as u64;
         self.vehicle = vehicle(&self.setup, seed, self.durable.clone(), self.now);
         self.vehicle.assume_budget_spent(self.now);
+        let in_force: Vec<Slot> = self.in_force.values().cloned().collect();
+        in_force.into_iter().for_each(|slot| self.put_in_force(slot));
         self.vehicle.set_map(map.iter(), self.now);
         self.send_layers();
         self.forget_modem(true);
@@ -173,6 +181,21 @@ impl LinkedEnds {
         self.surface = surface(&self.setup, seed, self.now);
         self.surface.assume_budget_spent(self.now);
         self.forget_modem(false);
+    }
+
+    /// Has the vehicle obey a slot, as its host does.
+    pub(crate) fn put_in_force(&mut self, slot: Slot) {
+        let slot = match (slot, self.in_force.get(&SlotId::Settings)) {
+            (Slot::Settings(order), Some(Slot::Settings(before))) => Slot::Settings(before.then(&order)),
+            (slot, _) => slot,
+        };
+        if let Slot::Budget(budget) = &slot {
+            self.vehicle.set_budget(budget.bits_per_s, self.now);
+            self.vehicle.set_shares(budget.shares);
+            self.vehicle.set_background(budget.background);
+        }
+        self.vehicle.set_in_force(slot.id(), Some(slot.clone()), self.now);
+        self.in_force.insert(slot.id(), slot);
     }
 
     fn forget_modem(&mut self, of_vehicle: bool) {
@@ -244,13 +267,18 @@ impl LinkedEnds {
     fn pump(&mut self) {
         while let Some(event) = self.vehicle.poll_event() {
             if let VehicleEvent::Slot { id, content: Some(slot), .. } = event {
-                self.applied.push(slot);
+                self.applied.push(slot.clone());
+                self.put_in_force(slot);
                 self.vehicle.decide(id, SlotState::Applied, self.now);
                 self.durable = self.vehicle.persistent_state().clone();
                 self.vehicle.handle_persisted();
             }
         }
-        while self.surface.poll_event().is_some() {}
+        while let Some(event) = self.surface.poll_event() {
+            if self.surface_events.len() < 1000 {
+                self.surface_events.push(event);
+            }
+        }
         self.vehicle.set_status(self.status.clone());
         self.begin_cycle();
         while let Some(t) = self.vehicle.poll_transmit(self.now) {

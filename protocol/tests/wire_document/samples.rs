@@ -92,6 +92,7 @@ pub(crate) fn status() -> VehicleStatus {
         refused_frames: 3,
         backlog: Backlog { map_bytes: 448, other_bytes: 15 },
         slots,
+        in_force: None,
         placement: None,
     }
 }

@@ -5,11 +5,8 @@ use super::bench_link::LinkBench;
 use super::bench_localisation::LocalisationBench;
 use super::bench_modem::ModemBench;
 use super::bench_planning::PlanningBench;
-<<<<<<< HEAD
 use super::bench_restart::RestartBench;
-=======
 use super::bench_stranger::StrangerBench;
->>>>>>> stranger
 use super::bench_wide::WideBench;
 use super::sim::WorldArguments;
 use clap::{Args, Subcommand};
@@ -31,13 +28,10 @@ pub(super) enum BenchCommand {
     Modem(ModemBench),
     /// The planners: utility collected per metre.
     Planning(PlanningBench),
-<<<<<<< HEAD
     /// Restarts of both ends as processes: what is lost, the time to a full page.
     Restart(RestartBench),
-=======
     /// A stranger at the link: forged, replayed and damaged frames, with and without a key.
     Stranger(StrangerBench),
->>>>>>> stranger
     /// A wide survey: CPU time and bytes of updates, of loading the page, and of exports.
     Wide(WideBench),
 }
@@ -63,11 +57,8 @@ impl BenchCommand {
             Self::Localisation(l) => l.run(),
             Self::Modem(m) => m.run(),
             Self::Planning(p) => p.run(),
-<<<<<<< HEAD
             Self::Restart(r) => r.run(),
-=======
             Self::Stranger(s) => s.run(),
->>>>>>> stranger
             Self::Wide(w) => w.run(),
         }
     }

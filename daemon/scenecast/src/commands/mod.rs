@@ -15,11 +15,8 @@ mod bench_modem;
 #[cfg(feature = "rehearsal")]
 mod bench_planning;
 #[cfg(feature = "rehearsal")]
-<<<<<<< HEAD
 mod bench_restart;
-=======
 mod bench_stranger;
->>>>>>> stranger
 #[cfg(feature = "rehearsal")]
 mod bench_wide;
 mod config;

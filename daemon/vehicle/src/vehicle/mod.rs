@@ -7,6 +7,8 @@ mod durable;
 mod gallery;
 mod guidance;
 #[cfg(test)]
+mod in_force_tests;
+#[cfg(test)]
 mod orders_tests;
 mod publisher;
 mod report;
@@ -122,6 +124,7 @@ impl Vehicle {
         vehicle.publisher.set_settings(&vehicle.settings);
         vehicle.publisher.select(&mut vehicle.link);
         vehicle.follow_utility();
+        vehicle.report_in_force(now);
         vehicle
     }
 
@@ -211,6 +214,7 @@ impl Vehicle {
         self.utility = None;
         self.gallery = Gallery::default();
         self.follow_utility();
+        self.report_in_force(now);
     }
 
     /// Takes the best exemplars of each label, the best first.

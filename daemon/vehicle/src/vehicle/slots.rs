@@ -87,6 +87,22 @@ impl Vehicle {
     }
 
     pub(super) fn apply(&mut self, slot: Slot, now: Instant) -> Result<(), RefusalReason> {
+        let result = self.apply_content(slot, now);
+        self.report_in_force(now);
+        result
+    }
+
+    /// Has the link report the content in force of each slot. The link reports its budget by itself.
+    pub(super) fn report_in_force(&mut self, now: Instant) {
+        let limits = Limits::from_bytes(&self.durable.limits).map(Slot::Limits);
+        let fence = Fence::from_bytes(&self.durable.fence).filter(|fence| fence.check().is_ok()).map(Slot::Fence);
+        self.link.set_in_force(SlotId::Utility, self.utility.clone().map(Slot::Utility), now);
+        self.link.set_in_force(SlotId::Settings, Some(Slot::Settings(self.settings)), now);
+        self.link.set_in_force(SlotId::Limits, limits, now);
+        self.link.set_in_force(SlotId::Fence, fence, now);
+    }
+
+    fn apply_content(&mut self, slot: Slot, now: Instant) -> Result<(), RefusalReason> {
         match slot {
             Slot::Utility(utility) => self.apply_utility(utility),
             Slot::Constraints(constraints) => {

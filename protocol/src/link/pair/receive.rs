@@ -112,8 +112,11 @@ impl<T> LinkPair<T> {
         let Some(frame) = offered.or_else(known) else {
             let reason = self.refuse(envelope, self.handshake.own().session.get());
             let stray = self.handshake.run().is_none_or(|r| r.peer.session != envelope.header.session);
-            // Without a valid CRC the session may be noise; without a valid tag it may be a forgery.
-            self.strays += u32::from(stray && reason == DropReason::OldSession);
+            // Without a valid CRC the session may be noise; without a valid tag it may be a forgery. A frame of a run that a
+            // late hello has ended here has a valid tag.
+            let is_of_ended = || keyed && self.handshake.is_of_ended(envelope, direction);
+            let is_sign = stray && (reason == DropReason::OldSession || is_of_ended());
+            self.strays += u32::from(is_sign);
             return Err(reason);
         };
         if !frame.chunks().are_sound() {

@@ -15,6 +15,8 @@ pub enum SurfaceEvent {
     Status(Address),
     /// A vehicle has applied or refused a slot.
     SlotDecided(Address, SlotId),
+    /// A content in force at a vehicle came in that the surface did not know.
+    InForceLearned(Address, SlotId),
     /// The last part of an object came in.
     Object(Address, Vec<u8>),
     /// A part of an object came in.

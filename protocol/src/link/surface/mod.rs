@@ -14,7 +14,7 @@ mod transmit;
 
 pub use config::SurfaceConfig;
 pub use event::{IssueError, SurfaceEvent};
-pub use peer::{EndedRun, PeerView};
+pub use peer::{EndedRun, InForce, PeerView};
 pub use polled::Cycle;
 
 use crate::directive::{Series, Slot, SlotProgress, VersionedSlot};

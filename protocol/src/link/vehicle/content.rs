@@ -1,6 +1,7 @@
 //! The content of the vehicle's frames: chosen and encoded when a frame is written.
 
 use super::event::OversizedChunk;
+use super::in_force::{InForceSender, SentPart};
 use super::layers::LayerOut;
 use super::status::StatusSender;
 use crate::directive::{SLOTS, SlotReport};
@@ -20,6 +21,7 @@ pub(super) enum Part<C> {
     Object(ObjectId, SymbolRun),
     Pose,
     Report,
+    InForce(SentPart),
 }
 
 impl<C> Part<C> {
@@ -28,7 +30,7 @@ impl<C> Part<C> {
             Self::Map(_) => Class::Map,
             Self::Layer(id, _) | Self::LayerDigest(id) => Class::Layer(*id),
             Self::Object(..) => Class::Exemplar,
-            Self::Pose | Self::Report => Class::Status,
+            Self::Pose | Self::Report | Self::InForce(_) => Class::Status,
         }
     }
 }
@@ -55,6 +57,7 @@ pub(super) struct VehicleContent<S> {
     pub(super) shares: ClassShares,
     pub(super) background: BackgroundOrder,
     pub(super) status: StatusSender,
+    pub(super) in_force: InForceSender,
     /// The last chunk that did not fit into the frame it was made for.
     pub(super) oversized: Option<OversizedChunk>,
 }
@@ -68,6 +71,7 @@ impl<S: StateSource> VehicleContent<S> {
             shares: ClassShares::new(shares),
             background: BackgroundOrder::default(),
             status: StatusSender::new(status_period, now),
+            in_force: InForceSender::default(),
             oversized: None,
         }
     }
@@ -84,6 +88,7 @@ impl<S: StateSource> VehicleContent<S> {
         self.source.handle_peer_restart(now);
         self.layers.iter_mut().for_each(|l| l.source.handle_peer_restart(now));
         self.objects.handle_peer_restart();
+        self.in_force.handle_peer_restart();
         self.status.owe_pose(now);
         self.status.owe_report(now);
     }
@@ -95,7 +100,8 @@ impl<S: StateSource> VehicleContent<S> {
 
     /// Whether no content waits that could be sent now.
     pub(super) fn is_idle(&self, budget: &BitBudget, now: Instant) -> bool {
-        self.source.is_quiet() && self.background_is_quiet(budget, now) && self.objects.has_only_background()
+        let is_quiet = self.source.is_quiet() && self.background_is_quiet(budget, now);
+        is_quiet && self.objects.has_only_background() && self.in_force.backlog_bytes() == 0
     }
 
     /// When a change that is held back becomes due.
@@ -114,7 +120,7 @@ impl<S: StateSource> VehicleContent<S> {
     /// About how many bytes wait and may be sent.
     pub(super) fn backlog_bytes(&self, budget: &BitBudget, now: Instant) -> usize {
         let own = self.source.backlog_bytes() + self.shared_layer_backlog() + self.objects.backlog_bytes();
-        own + self.background_backlog(budget, now)
+        own + self.in_force.backlog_bytes() + self.background_backlog(budget, now)
     }
 
     /// The fate of a chunk is known; returns the object that is complete with it.
@@ -126,6 +132,7 @@ impl<S: StateSource> VehicleContent<S> {
                     layer.source.handle_fate(carried, delivered, now);
                 }
             }
+            Part::InForce(part) => self.in_force.handle_fate(&part, delivered, now),
             Part::Object(id, run) => return self.objects.handle_fate(id, &run, delivered).then_some(id),
             Part::Pose if !delivered => self.status.owe_pose(now),
             Part::Report if !delivered => self.status.owe_report(now),
@@ -192,7 +199,7 @@ impl<S: StateSource> VehicleContent<S> {
 
     fn waiting(&self, now: Instant) -> Vec<Class> {
         [
-            (self.status.is_waiting(now), Class::Status),
+            (self.status.is_waiting(now) || self.in_force.backlog_bytes() > 0, Class::Status),
             (self.source.backlog_bytes() > 0 && !self.is_refining(), Class::Map),
             (self.objects.backlog_bytes() > 0, Class::Exemplar),
         ]
@@ -210,8 +217,11 @@ impl<S: StateSource> VehicleContent<S> {
     ) {
         let backlog = self.backlog(context.budget, context.now);
         let base_digest = self.source.digest();
+        let in_force = self.in_force.digests().summary();
+        self.fill_answer(builder, carried);
         let Some(status) = self.status.status_mut() else { return };
         status.backlog = backlog;
+        status.in_force = Some(in_force);
         status.base_digest = base_digest;
         status.slots = context.slots;
         status.budget_bps = context.budget.bits_per_s();
@@ -222,6 +232,17 @@ impl<S: StateSource> VehicleContent<S> {
         }
         if let Some(bytes) = self.status.fill_pose(builder, context.now) {
             carried.push((Part::Pose, bytes));
+        }
+    }
+
+    /// Puts a part of the content in force into a frame, if the surface has inquired for one.
+    fn fill_answer(&mut self, builder: &mut FrameBuilder, carried: &mut Carried<S::Carried>) {
+        // The kind takes a byte of the payload.
+        let room = room_for_payload(builder.room()).saturating_sub(1);
+        let Some((part, bytes)) = self.in_force.next_part(room) else { return };
+        if builder.push(ChunkKind::InForce, &bytes) {
+            self.in_force.mark_in_flight(&part);
+            carried.push((Part::InForce(part), bytes.len()));
         }
     }
 

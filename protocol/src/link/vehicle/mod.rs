@@ -9,6 +9,7 @@ mod config;
 mod content;
 mod discovery;
 mod event;
+mod in_force;
 mod layers;
 mod receive;
 mod repeat;
@@ -20,7 +21,7 @@ pub use config::VehicleConfig;
 pub use event::{OversizedChunk, VehicleEvent};
 
 use super::{LinkPair, LinkStats, SlotInbox, SlotInboxState, Wakeup};
-use crate::directive::{SlotId, SlotState};
+use crate::directive::{Budget, Slot, SlotId, SlotState};
 use crate::mac::{Access, ClockMap, Floor};
 use crate::map::{Cell, LabelGrid, LayerId, LayerMask, LayerSource, MapSource, StateSource};
 use crate::object::ObjectId;
@@ -59,7 +60,7 @@ impl<S: StateSource> VehicleLink<S> {
     pub fn with_source(config: VehicleConfig, source: S, seed: u64, restored: SlotInboxState, now: Instant) -> Self {
         let introduction = Introduction { cell_edge: config.cell_edge, series: None };
         let (mission, authenticity) = (config.mission, config.authenticity.clone());
-        Self {
+        let mut link = Self {
             pair: LinkPair::new(mission, config.address, Address::SURFACE, authenticity, introduction, seed),
             budget: BitBudget::new(config.budget_bps, config.budget_window, now),
             content: VehicleContent::new(source, config.shares, config.status_period, now),
@@ -72,7 +73,9 @@ impl<S: StateSource> VehicleLink<S> {
             blocked_until: None,
             events: VecDeque::new(),
             config,
-        }
+        };
+        link.follow_budget();
+        link
     }
 
     /// The replicated state as the vehicle holds it.
@@ -163,6 +166,7 @@ impl<S: StateSource> VehicleLink<S> {
     /// Changes the bit budget; the next report informs the surface.
     pub fn set_budget(&mut self, bits_per_s: u32, now: Instant) {
         self.budget.set_rate(bits_per_s, now);
+        self.follow_budget();
         self.content.status.owe_report(now);
     }
 
@@ -174,6 +178,7 @@ impl<S: StateSource> VehicleLink<S> {
     /// Changes the least shares of the classes.
     pub fn set_shares(&mut self, shares: Shares) {
         self.content.shares.set(shares);
+        self.follow_budget();
     }
 
     /// The least shares of the classes.
@@ -184,6 +189,7 @@ impl<S: StateSource> VehicleLink<S> {
     /// Changes the background streams and their order.
     pub fn set_background(&mut self, order: BackgroundOrder) {
         self.content.background = order;
+        self.follow_budget();
     }
 
     /// The background streams in their order.
@@ -195,6 +201,30 @@ impl<S: StateSource> VehicleLink<S> {
     pub fn decide(&mut self, id: SlotId, state: SlotState, now: Instant) {
         self.inbox.decide(id, state);
         self.content.status.owe_report(now);
+    }
+
+    /// Reports the content of utility, settings, limits or fence that is in force; `None`: none is. A new vehicle has none,
+    /// so its host also calls this for what an earlier run has left in force. The budget follows from the link's own.
+    pub fn set_in_force(&mut self, id: SlotId, content: Option<Slot>, now: Instant) {
+        let content = content.filter(|slot| slot.id() == id).and_then(Slot::in_force);
+        if id != SlotId::Budget && self.content.in_force.set(id, content) {
+            self.content.status.owe_report(now);
+        }
+    }
+
+    /// The content in force of a slot, as the next report states it.
+    pub fn in_force(&self, id: SlotId) -> Option<&Slot> {
+        self.content.in_force.get(id)
+    }
+
+    /// Brings the reported budget up to date.
+    pub(super) fn follow_budget(&mut self) {
+        let budget = Budget {
+            bits_per_s: self.budget.bits_per_s(),
+            shares: self.content.shares.shares(),
+            background: self.content.background,
+        };
+        self.content.in_force.set(SlotId::Budget, Some(Slot::Budget(budget)));
     }
 
     /// The state that must survive a restart.

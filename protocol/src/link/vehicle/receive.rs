@@ -3,7 +3,7 @@
 use super::content::Carried;
 use super::discovery::CallReply;
 use super::{VehicleEvent, VehicleLink};
-use crate::directive::{Slot, VersionedSlot};
+use crate::directive::{InForceDigests, Slot, VersionedSlot};
 use crate::link::DropReason;
 use crate::mac::{Access, Grant};
 use crate::map::StateSource;
@@ -43,7 +43,9 @@ impl<S: StateSource> VehicleLink<S> {
         let header = inbound.header().clone();
         let slots: Vec<Vec<u8>> =
             inbound.chunks().filter(|c| c.kind == ChunkKind::Slot).map(|c| c.payload.to_vec()).collect();
-        let foreign = inbound.chunks().any(|c| c.kind != ChunkKind::Slot);
+        let foreign = inbound.chunks().any(|c| !matches!(c.kind, ChunkKind::Slot | ChunkKind::Inquiry));
+        let inquiry = inbound.chunks().find(|c| c.kind == ChunkKind::Inquiry);
+        let inquiry = inquiry.and_then(|chunk| InForceDigests::decode(chunk.payload).ok());
         let (number, is_latest, lacks_base, fates) =
             (inbound.number, inbound.is_latest, inbound.lacks_base, inbound.fates);
         if foreign {
@@ -53,6 +55,12 @@ impl<S: StateSource> VehicleLink<S> {
         self.content.objects.set_loss(self.pair.stats.loss_out.expected());
         for (slot, number) in slots.iter().zip(number.into_iter().cycle()) {
             self.handle_slot(slot, number, bytes.len(), now);
+        }
+        if let Some(held) = inquiry.filter(|_| number.is_some())
+            && !self.content.in_force.handle_inquiry(&held, now)
+        {
+            // The next report shows that the surface holds all of it.
+            self.content.status.owe_report_by(now + Duration::from_secs(2));
         }
         if is_latest {
             if let Some(number) = number {
@@ -125,11 +133,12 @@ impl<S: StateSource> VehicleLink<S> {
     }
 
     /// Where the modem decides when to transmit, an acknowledgement or hello goes out within a second,
-    /// by itself if need be.
+    /// by itself if need be. The first frames after a frame of the surface carry it, as those of a turn do.
     fn owe_answer(&mut self, now: Instant) {
         if matches!(self.config.modem.access, Access::ModemOwned { .. })
             && (self.pair.unstated() > 0 || self.pair.must_send_hello())
         {
+            self.begin_turn();
             self.answer_due.get_or_insert(now + Duration::from_secs(1));
         }
     }

@@ -116,7 +116,7 @@ impl<S: StateSource> VehicleLink<S> {
         let size = self.config.modem.frame_bytes;
         let sent = self.repeater.new_frames();
         let usual = if size < SMALL_FRAME { 3 } else { size / 6 };
-        if sent == 0 && self.pair.statement_bytes() > 4 * usual {
+        if sent.is_multiple_of(ACK_INTERVAL) && self.pair.statement_bytes() > 4 * usual {
             // So many frames were lost that the acknowledgements would fall ever further behind.
             return size / 2;
         }

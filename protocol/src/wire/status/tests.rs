@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::coordinates::WorldPoint;
-use crate::directive::RefusalReason;
+use crate::directive::{InForceDigests, RefusalReason};
 use proptest::prelude::*;
 
 #[test]
@@ -29,6 +29,7 @@ fn golden_bytes_of_a_status() {
         refused_frames: 3,
         backlog: Backlog { map_bytes: 448, other_bytes: 15 },
         slots,
+        in_force: None,
         placement: None,
     };
     let (pose, (report, _)) = (status.encode_pose(99), status.encode_report(99, 0).unwrap());
@@ -62,11 +63,21 @@ fn golden_bytes_of_a_status() {
     assert_eq!(long, [&report[..], &[2, 0, 0, 125, 0xFF, 0xFF, 0xFF]].concat());
     back.read_report(&long).unwrap();
     assert_eq!(back, placed);
-    assert_eq!(placed.encode_report(long.len() - 1, 0).unwrap(), (report.clone(), SLOTS), "no room for it");
-    back.read_report(&placed.encode_report(17, SLOTS).unwrap().0).unwrap();
+    assert_eq!(placed.encode_report(long.len() - 1, 0).unwrap(), (report.clone(), SLOTS + 1), "no room for it");
+    back.read_report(&placed.encode_report(17, SLOTS + 1).unwrap().0).unwrap();
     assert_eq!(back, placed);
     back.read_report(&report).unwrap();
     assert_eq!(back.placement, placement, "it has not moved back");
+    let in_force = Some(InForceDigests::default().summary());
+    let summed = VehicleStatus { in_force, ..placed.clone() };
+    let (longest, _) = summed.encode_report(99, 0).unwrap();
+    assert_eq!(longest, [&report[..], &[0, 0xE1, 0x39], &long[report.len()..]].concat());
+    back.read_report(&longest).unwrap();
+    assert_eq!(back, summed);
+    let (part, next) = summed.encode_report(report.len() + 9, 0).unwrap();
+    assert_eq!((part, next), ([&report[..], &[0, 0xE1, 0x39]].concat(), SLOTS + 1), "the placement waits");
+    let other = [&report[..], &[0x40, 0, 0]].concat();
+    assert_eq!(back.read_report(&other), Err(StatusError::BadField), "the content of constraints is not reported");
 }
 
 proptest! {

@@ -3,6 +3,7 @@
 use super::backlog::ReportedBacklog;
 use super::ended::EndedRun;
 use super::status::StatusParts;
+use crate::directive::InForcePart;
 use crate::link::surface::layers::{LayerOutcome, Layers};
 use crate::link::{FrameNumber, LinkStats, SurfaceEvent};
 use crate::map::{LayerChunk, StateReplica};
@@ -99,7 +100,8 @@ impl<R: StateReplica> PeerContent<R> {
             ChunkKind::Report => VehicleStatus::default().read_report(chunk.payload).is_ok(),
             ChunkKind::Object => Part::decode(chunk.payload).is_ok(),
             ChunkKind::Layer => self.layers.decodes(base, chunk.payload),
-            ChunkKind::Slot | ChunkKind::Introduction => true,
+            ChunkKind::InForce => InForcePart::decode(chunk.payload).is_ok(),
+            ChunkKind::Slot | ChunkKind::Introduction | ChunkKind::Inquiry => true,
         })
     }
 
@@ -136,7 +138,8 @@ impl<R: StateReplica> PeerContent<R> {
                 LayerOutcome::Skipped => ChunkOutcome::Malformed,
                 LayerOutcome::OutOfStep => ChunkOutcome::Contradictory,
             },
-            ChunkKind::Slot | ChunkKind::Introduction => ChunkOutcome::Malformed,
+            ChunkKind::InForce => ChunkOutcome::Accepted,
+            ChunkKind::Slot | ChunkKind::Introduction | ChunkKind::Inquiry => ChunkOutcome::Malformed,
         }
     }
 
@@ -170,8 +173,8 @@ impl<R: StateReplica> PeerContent<R> {
 pub(super) fn class_of(chunk: &Chunk<'_>) -> Class {
     match chunk.kind {
         ChunkKind::Map => Class::Map,
-        ChunkKind::Pose | ChunkKind::Report => Class::Status,
-        ChunkKind::Slot => Class::Directive,
+        ChunkKind::Pose | ChunkKind::Report | ChunkKind::InForce => Class::Status,
+        ChunkKind::Slot | ChunkKind::Inquiry => Class::Directive,
         ChunkKind::Introduction => Class::Overhead,
         ChunkKind::Object => Class::Exemplar,
         ChunkKind::Layer => LayerChunk::decode(chunk.payload).map_or(Class::Overhead, |c| Class::Layer(c.id())),

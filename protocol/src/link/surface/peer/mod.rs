@@ -7,6 +7,7 @@ mod backlog;
 mod content;
 mod divergence;
 mod ended;
+mod in_force;
 mod pool;
 mod status;
 mod timing;
@@ -14,10 +15,11 @@ mod turn;
 mod view;
 
 pub use ended::EndedRun;
+pub use in_force::InForce;
 pub(super) use turn::{Ready, room_for_slot};
 pub use view::PeerView;
 
-use crate::directive::{Series, Slot, SlotId, SlotOutbox, SlotProgress};
+use crate::directive::{InForcePart, Series, Slot, SlotId, SlotOutbox, SlotProgress};
 use crate::link::{Authenticity, DropReason, FrameNumber, Inbound, LinkPair, LinkStats, SurfaceEvent};
 use crate::mac::{Access, Master, MasterConfig, ModemProfile};
 use crate::map::StateReplica;
@@ -28,6 +30,7 @@ use crate::wire::{
 };
 use content::{ChunkOutcome, PeerContent, class_of};
 use divergence::Divergence;
+use in_force::InForceCopy;
 use std::collections::VecDeque;
 use std::time::Duration;
 use timing::VehicleTiming;
@@ -50,6 +53,8 @@ struct Contact {
     last_received: Option<Instant>,
     /// Where the modem decides when to transmit: when an acknowledgement or a hello is due.
     answer_due: Option<Instant>,
+    /// The vehicle's highest frame number when a frame with an acknowledgement was last written.
+    acknowledged: FrameNumber,
     hello_due: Instant,
     /// Hellos since the last answer.
     hellos: u32,
@@ -72,6 +77,7 @@ pub(super) struct VehiclePeer<R> {
     pair: LinkPair<Carried>,
     outbox: SlotOutbox,
     content: PeerContent<R>,
+    in_force: InForceCopy,
     timing: VehicleTiming,
     contact: Contact,
     last_turn: LastTurn,
@@ -95,8 +101,9 @@ impl<R: StateReplica> VehiclePeer<R> {
             pair: LinkPair::new(mission, Address::SURFACE, vehicle, authenticity, introduction, seed),
             outbox: SlotOutbox::new(introduction.series.unwrap_or(Series::from_random(seed))),
             content: PeerContent::new(),
+            in_force: InForceCopy::default(),
             timing: VehicleTiming::default(),
-            contact: Contact { last_received: None, answer_due: None, hello_due: now, hellos: 0 },
+            contact: Contact { last_received: None, answer_due: None, acknowledged: 0, hello_due: now, hellos: 0 },
             last_turn: LastTurn { began: 0, kind: FrameKind::Numbered },
             divergence: Divergence::default(),
             is_out_of_step: false,
@@ -140,6 +147,7 @@ impl<R: StateReplica> VehiclePeer<R> {
     /// Continues with the series and the orders of an earlier run of the surface.
     pub(super) fn restore_orders(&mut self, series: Series, orders: impl IntoIterator<Item = SlotProgress>) {
         self.outbox.restore(series, orders);
+        self.outbox.progress().for_each(|order| self.in_force.apply(order));
         self.pair.set_series(series);
     }
 
@@ -173,7 +181,8 @@ impl<R: StateReplica> VehiclePeer<R> {
             self.contact.hello_due = now + self.slot_timeout().max(Contact::PROOF_TIMEOUT);
             events.push_back(SurfaceEvent::VehicleRestarted(self.address()));
         }
-        self.handle_fates(&inbound.fates, inbound.number.unwrap_or(FrameNumber::MAX), now);
+        // A rejected frame is as old as the newest one at most, or a new run follows.
+        self.handle_fates(&inbound.fates, inbound.number.unwrap_or(self.pair.highest()), now);
         self.is_out_of_step |= inbound.lacks_base;
         let header = inbound.header().clone();
         if header.kind.is_hello() {
@@ -240,12 +249,24 @@ impl<R: StateReplica> VehiclePeer<R> {
         }
         if chunk.kind == ChunkKind::Report {
             let settled = self.outbox.handle_report(&self.content.status.latest().slots, now);
+            for order in self.outbox.progress().filter(|order| settled.contains(&order.id)) {
+                self.in_force.apply(order);
+            }
             events.extend(settled.into_iter().map(|id| SurfaceEvent::SlotDecided(vehicle, id)));
             let mut report = VehicleStatus::default();
             if report.read_report(chunk.payload).is_ok() {
+                if let Some(summary) = report.in_force {
+                    self.in_force.handle_report(summary, number, now);
+                }
                 self.outbox.leave_overtaken_series(&report.slots, number, now);
             }
             self.follow_series();
+        }
+        if let Some(part) =
+            (chunk.kind == ChunkKind::InForce).then(|| InForcePart::decode(chunk.payload).ok()).flatten()
+            && self.in_force.handle_part(&part, number, now)
+        {
+            events.push_back(SurfaceEvent::InForceLearned(vehicle, part.id));
         }
         if matches!(chunk.kind, ChunkKind::Pose | ChunkKind::Report) && self.content.status.whole().is_some() {
             events.push_back(SurfaceEvent::Status(vehicle));
@@ -305,8 +326,10 @@ impl<R: StateReplica> VehiclePeer<R> {
             events.push_back(SurfaceEvent::RunEnded(self.address()));
         }
         self.divergence.clear();
+        self.in_force.handle_peer_restart();
         self.timing = VehicleTiming::default();
         self.last_turn.began = 0;
+        self.contact.acknowledged = 0;
         self.outbox.handle_peer_restart(now);
         self.contact.hello_due = now;
     }

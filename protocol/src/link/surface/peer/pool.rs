@@ -9,7 +9,7 @@ use crate::time::Instant;
 use crate::wire::FrameKind;
 use std::time::Duration;
 
-/// Received frames after which an acknowledgement does not wait any longer.
+/// Frame numbers since the last acknowledgement after which the next one does not wait any longer.
 const MAX_UNACKNOWLEDGED: u64 = 16;
 /// Silence after which a vehicle is sent a hello, because it may have restarted.
 const SILENCE_TIMEOUT: Duration = Duration::from_secs(40);
@@ -23,9 +23,10 @@ impl Contact {
         self.answer_due.is_some_and(|at| now >= at)
     }
 
-    /// When a hello becomes due if no frame comes in. A vehicle that has not proven the run may not know it.
-    fn next_hello(&self, is_proven: bool) -> Instant {
-        let silent = self.last_received.filter(|_| is_proven);
+    /// When a hello becomes due if no frame comes in. Silence matters only in a run that is usable: the vehicle has
+    /// proven it, and there are numbers left.
+    fn next_hello(&self, is_usable: bool) -> Instant {
+        let silent = self.last_received.filter(|_| is_usable);
         silent.map_or(self.hello_due, |at| (at + SILENCE_TIMEOUT).max(self.hello_due))
     }
 
@@ -48,19 +49,28 @@ impl<R: StateReplica> VehiclePeer<R> {
             return true;
         }
         let answer = self.contact.is_answer_due(now);
-        let unstated = self.pair.unstated();
-        let owes = (!self.pair.is_proven() && answer) || (unstated > 0 && (unstated >= MAX_UNACKNOWLEDGED || answer));
-        self.pair.has_run() && (owes || !self.outbox.pending(now, now - self.slot_timeout()).is_empty())
+        let is_late = self.pair.highest() >= self.contact.acknowledged + MAX_UNACKNOWLEDGED;
+        let owes = (!self.pair.is_proven() && answer) || (self.pair.unstated() > 0 && (is_late || answer));
+        let inquires = self.in_force.next_inquiry().is_some_and(|at| now >= at);
+        self.has_numbers() && (owes || inquires || !self.outbox.pending(now, now - self.slot_timeout()).is_empty())
+    }
+
+    /// Whether there is a run with a number left for a frame.
+    fn has_numbers(&self) -> bool {
+        self.pair.has_run() && !self.pair.is_full()
     }
 
     /// When there will be a reason to transmit, if no frame comes in.
     pub(in crate::link::surface) fn next_reason(&self) -> Option<Instant> {
         let again = self.outbox.progress().filter_map(|s| s.sent).min().map(|at| at + self.slot_timeout());
         let again = again.filter(|_| self.outbox.has_backlog());
-        [Some(self.contact.next_hello(self.pair.is_proven())), self.contact.answer_due, again]
+        let hello = self.contact.next_hello(self.pair.is_proven() && !self.pair.is_full());
+        let numbered = [self.contact.answer_due, again, self.in_force.next_inquiry()]
             .into_iter()
             .flatten()
-            .min()
+            .filter(|_| self.has_numbers())
+            .min();
+        Some(numbered.map_or(hello, |at| at.min(hello)))
     }
 
     /// Writes a frame, or postpones it if the budget does not allow it yet.
@@ -85,7 +95,11 @@ impl<R: StateReplica> VehiclePeer<R> {
         let must_prove = self.pair.has_run() && !self.pair.is_proven();
         // After a hello of a run with this vehicle, a numbered frame follows at once.
         let timeout = self.slot_timeout();
-        self.contact.answer_due = must_prove.then(|| if kind.is_hello() { now } else { now + timeout });
+        // A frame may be too small for a verdict on every frame that came in; the next one has the rest.
+        let is_partial = self.pair.unstated() > 0;
+        let next = if must_prove && kind.is_hello() { now } else { now + timeout };
+        self.contact.answer_due = (must_prove || is_partial).then_some(next);
+        self.contact.acknowledged = self.pair.highest();
         if kind.is_hello() {
             self.contact.note_hello(timeout, now);
         }

@@ -1,6 +1,6 @@
 //! The frames of the surface's turn.
 
-use super::{Carried, LastTurn, VehiclePeer};
+use super::{Carried, InForceCopy, LastTurn, VehiclePeer};
 use crate::directive::PendingSlot;
 use crate::link::{FrameNumber, Transmit, TransmitKind};
 use crate::mac::{Grant, ModemProfile};
@@ -27,6 +27,14 @@ pub(in crate::link::surface) struct Ready {
     pub(in crate::link::surface) transmit: Transmit,
     /// Its number, unless it is a hello.
     pub(in crate::link::surface) number: Option<FrameNumber>,
+}
+
+/// The content of a frame to a vehicle.
+#[derive(Debug, Clone, Copy)]
+struct FrameContent<'a> {
+    slots: &'a [PendingSlot],
+    /// The payload of an inquiry for the content in force.
+    inquiry: Option<&'a [u8]>,
 }
 
 /// The slots of each frame of a turn.
@@ -75,9 +83,15 @@ impl<R: StateReplica> VehiclePeer<R> {
         let mut bits_left: u64 = plan.iter().map(|slots| self.bits(slots, modem, turn_kind)).sum();
         let mut at = now;
         let mut turn = Vec::with_capacity(plan.len());
+        let inquiry = self.in_force.inquiry(now).filter(|_| !turn_kind.is_hello() && plan.iter().any(Vec::is_empty));
+        if inquiry.is_some() {
+            self.in_force.note_inquiry(now);
+        }
         for slots in plan {
             bits_left -= self.bits(slots, modem, turn_kind);
-            let ready = self.write_frame(slots, modem, grant, Grant::code_remaining(bits_left), kind, at);
+            let remaining = Grant::code_remaining(bits_left);
+            let content = FrameContent { slots, inquiry: inquiry.as_deref().filter(|_| slots.is_empty()) };
+            let ready = self.write_frame(content, modem, grant, remaining, kind, at);
             at = at + modem.airtime(ready.transmit.bytes.len());
             turn.push(ready);
         }
@@ -87,7 +101,8 @@ impl<R: StateReplica> VehiclePeer<R> {
     /// The most bits on air that a frame with these slots takes.
     pub(in crate::link::surface) fn bits(&self, slots: &[PendingSlot], modem: &ModemProfile, kind: FrameKind) -> u64 {
         const HEAD: usize = 9 + 1 + Stamp::SURFACE_BYTES;
-        let chunks: usize = slots.iter().map(|s| s.bytes.len() + 2).sum();
+        let inquiry = if slots.is_empty() && self.in_force.lacks_any() { InForceCopy::INQUIRY_BYTES } else { 0 };
+        let chunks = inquiry + slots.iter().map(|s| s.bytes.len() + 2).sum::<usize>();
         let bytes = match kind.is_hello() || !self.pair.has_run() {
             true => self.pair.hello_bytes(),
             false => HEAD + chunks + self.pair.statement_bytes() + self.pair.seal_bytes(),
@@ -97,14 +112,15 @@ impl<R: StateReplica> VehiclePeer<R> {
 
     fn write_frame(
         &mut self,
-        slots: &[PendingSlot],
+        FrameContent { slots, inquiry }: FrameContent<'_>,
         modem: &ModemProfile,
         grant: Option<u8>,
         remaining: u8,
         kind: FrameKind,
         at: Instant,
     ) -> Ready {
-        let chunks: usize = slots.iter().map(|s| s.bytes.len() + 2).sum();
+        let inquired = inquiry.map_or(0, |_| InForceCopy::INQUIRY_BYTES);
+        let chunks = inquired + slots.iter().map(|s| s.bytes.len() + 2).sum::<usize>();
         let has_room = modem.frame_bytes >= SMALL_FRAME + chunks;
         let one_way = self.master.round_trip().map(|both| both / 2);
         let stamp = Stamp::Surface { clock_ms: Stamp::clock(at), one_way };
@@ -115,6 +131,13 @@ impl<R: StateReplica> VehiclePeer<R> {
         let mut builder = self.pair.begin_frame(modem.frame_bytes, ack_room, grant, has_room.then_some(stamp), kind);
         builder.set_remaining(remaining);
         let mut carried = Carried::new();
+        let mut payload = 0;
+        if let Some(bytes) = inquiry
+            && builder.push(ChunkKind::Inquiry, bytes)
+        {
+            self.pair.stats.count(Class::Directive, bytes.len());
+            payload += bytes.len();
+        }
         for slot in slots {
             // The age of a fix is that at the start of this transmission.
             let Some(bytes) = self.outbox.encode(slot.id, slot.version, at) else { continue };
@@ -129,7 +152,7 @@ impl<R: StateReplica> VehiclePeer<R> {
             (_, None) => TransmitKind::Grant,
             (_, Some((id, ..))) => TransmitKind::Content(id.class()),
         };
-        let payload: usize = carried.iter().map(|(_, _, n)| n).sum();
+        payload += carried.iter().map(|(_, _, n)| n).sum::<usize>();
         let bytes = self.pair.finish_frame(builder, carried, kind, true);
         self.pair.stats.count(Class::Overhead, bytes.len().saturating_sub(payload));
         Ready { transmit: Transmit { to: self.pair.peer(), bytes, kind: mainly }, number }

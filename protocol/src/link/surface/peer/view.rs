@@ -1,7 +1,7 @@
 //! The surface's view of a vehicle, for its host.
 
-use super::{EndedRun, VehiclePeer};
-use crate::directive::{Series, SlotProgress};
+use super::{EndedRun, InForce, VehiclePeer};
+use crate::directive::{Series, SlotId, SlotProgress};
 use crate::link::{LinkStats, Mismatch};
 use crate::mac::ClockMap;
 use crate::map::{LayerId, LayerReplica, LayerSet, Replica, StateReplica};
@@ -100,6 +100,11 @@ impl<'a, R: StateReplica> PeerView<'a, R> {
     /// The latest version of each issued slot, and how far it has come.
     pub fn slots(&self) -> impl Iterator<Item = &'a SlotProgress> + use<'a, R> {
         self.0.outbox.progress()
+    }
+
+    /// The content of a slot that is in force at the vehicle: utility, settings, budget, limits or fence.
+    pub fn in_force(&self, id: SlotId) -> InForce<'a> {
+        self.0.in_force.get(id)
     }
 
     /// Counters and estimates of the link to this vehicle.

@@ -1,0 +1,139 @@
+//! The content in force at a vehicle, as far as the surface knows it.
+
+use crate::directive::{
+    InForceAssembly, InForceDigests, InForcePart, InForceSummary, OrderStatus, PerSlot, Settings, Slot, SlotId,
+    SlotProgress,
+};
+use crate::link::FrameNumber;
+use crate::time::Instant;
+use std::time::Duration;
+
+/// The content in force of a slot, as the surface knows it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum InForce<'a> {
+    /// The vehicle has not reported it in this pair of runs, or never reports it.
+    NotReported,
+    /// By the vehicle's report no content is in force.
+    None,
+    /// This content is in force.
+    Known(&'a Slot),
+    /// A content is in force that the surface does not know, or not for certain. It inquires for it.
+    Unknown,
+}
+
+/// The content that was last known to be in force, compared with the vehicle's reports.
+#[derive(Debug, Default)]
+pub(super) struct InForceCopy {
+    held: PerSlot<Option<Slot>>,
+    /// Whether the content of a slot came in after the last report that differs.
+    confirmed: PerSlot<bool>,
+    /// Whether the vehicle has put a slot in force since its last summary.
+    decided: PerSlot<bool>,
+    reported: Option<(InForceSummary, FrameNumber)>,
+    is_equal: bool,
+    parts: PerSlot<InForceAssembly>,
+    next_inquiry: Instant,
+    /// Inquiries since the last part of an answer.
+    inquiries: u32,
+}
+
+impl InForceCopy {
+    /// Bytes of an inquiry in a frame.
+    pub(super) const INQUIRY_BYTES: usize = 12;
+    const FIRST_PAUSE: Duration = Duration::from_secs(15);
+    /// The pause after each inquiry is twice the one before, at most 240 s.
+    const MAX_DOUBLINGS: u32 = 4;
+
+    pub(super) fn get(&self, id: SlotId) -> InForce<'_> {
+        let (Some((summary, _)), Some(held)) = (self.reported, self.held.get(id)) else { return InForce::NotReported };
+        let is_decided = self.decided.get(id) == Some(&true);
+        let is_certain = is_decided || self.is_equal || self.confirmed.get(id) == Some(&true);
+        match held {
+            _ if !is_decided && !summary.has(id) => InForce::None,
+            None if is_decided => InForce::None,
+            Some(slot) if is_certain => InForce::Known(slot),
+            _ => InForce::Unknown,
+        }
+    }
+
+    /// An order is in force now, by the vehicle's decision or by what an earlier run of the surface knew.
+    pub(super) fn apply(&mut self, order: &SlotProgress) {
+        let Some(held) = self.held.get_mut(order.id).filter(|_| order.status == OrderStatus::Applied) else { return };
+        *held = match (&order.slot, held.take()) {
+            (Slot::Settings(order), Some(Slot::Settings(before))) => Slot::Settings(before.then(order)).in_force(),
+            (Slot::Settings(order), _) => Slot::Settings(Settings::default().then(order)).in_force(),
+            (slot, _) => slot.clone().in_force(),
+        };
+        if let Some(decided) = self.decided.get_mut(order.id) {
+            *decided = true;
+        }
+    }
+
+    /// Takes the summary of the report in frame `number`.
+    pub(super) fn handle_report(&mut self, summary: InForceSummary, number: FrameNumber, now: Instant) {
+        if self.reported.is_some_and(|(_, before)| number <= before) {
+            return;
+        }
+        let is_same = self.reported.is_some_and(|(before, _)| before == summary);
+        self.reported = Some((summary, number));
+        self.decided = PerSlot::default();
+        let is_equal = self.digests().summary() == summary;
+        let was_equal = std::mem::replace(&mut self.is_equal, is_equal);
+        if !is_same || self.is_equal {
+            self.confirmed = PerSlot::default();
+        }
+        if !self.is_equal && (was_equal || !is_same) {
+            (self.next_inquiry, self.inquiries) = (now, 0);
+        }
+    }
+
+    /// Takes a part of an answer in frame `number`; returns whether a content is known now that was not.
+    pub(super) fn handle_part(&mut self, part: &InForcePart<'_>, number: FrameNumber, now: Instant) -> bool {
+        // Further parts of the answer follow.
+        self.inquiries = self.inquiries.min(1);
+        self.next_inquiry = self.next_inquiry.max(now + Self::FIRST_PAUSE);
+        let Some(content) = self.parts.get_mut(part.id).and_then(|parts| parts.take(part)) else { return false };
+        let was_known = matches!(self.get(part.id), InForce::Known(known) if *known == content);
+        // A part that was written before the last report may be of a content that is not in force any more.
+        let is_later = self.reported.is_some_and(|(_, report)| report <= number);
+        if let (Some(held), Some(confirmed)) = (self.held.get_mut(part.id), self.confirmed.get_mut(part.id)) {
+            (*held, *confirmed) = (Some(content), is_later);
+        }
+        self.is_equal = self.reported.is_some_and(|(summary, _)| summary == self.digests().summary());
+        !was_known && matches!(self.get(part.id), InForce::Known(_))
+    }
+
+    /// Digests of the contents that are held, without those that the vehicle reports as not in force.
+    fn digests(&self) -> InForceDigests {
+        let held = InForceDigests::of(&self.held);
+        let is_present = |id| self.reported.is_none_or(|(summary, _)| summary.has(id));
+        InForceDigests::from_fn(|id| held.get(id).copied().filter(|_| is_present(id)).unwrap_or_default())
+    }
+
+    /// Whether a content in force is not known, so that an inquiry is to be sent.
+    pub(super) fn lacks_any(&self) -> bool {
+        self.reported.is_some() && !self.is_equal
+    }
+
+    /// When the next inquiry is to be sent, if one is.
+    pub(super) fn next_inquiry(&self) -> Option<Instant> {
+        self.lacks_any().then_some(self.next_inquiry)
+    }
+
+    /// The payload of an inquiry, if one is due.
+    pub(super) fn inquiry(&self, now: Instant) -> Option<Vec<u8>> {
+        self.next_inquiry().filter(|&at| now >= at).map(|_| self.digests().encode())
+    }
+
+    /// An inquiry was written.
+    pub(super) fn note_inquiry(&mut self, now: Instant) {
+        self.next_inquiry = now + Self::FIRST_PAUSE * (1 << self.inquiries.min(Self::MAX_DOUBLINGS));
+        self.inquiries += 1;
+    }
+
+    /// One of the two ends has begun a new run. The contents are held until a report differs.
+    pub(super) fn handle_peer_restart(&mut self) {
+        let held = std::mem::take(&mut self.held);
+        *self = Self { held, ..Self::default() };
+    }
+}
