@@ -6,6 +6,7 @@ mod command;
 #[cfg(test)]
 mod command_tests;
 mod exemplar_cache;
+mod in_force;
 mod orders;
 mod pauses;
 pub mod position;

@@ -158,6 +158,11 @@ impl SettingsRecord {
         self.requested = settings;
     }
 
+    /// The vehicle reports settings of another surface, and this one has ordered none.
+    pub(super) fn handle_reported(&mut self, settings: Settings) {
+        *self = Self { requested: settings, in_force: settings, is_unsure: false };
+    }
+
     /// The vehicle has decided about the last order.
     pub(super) fn handle_decision(&mut self, status: OrderStatus) {
         if status == OrderStatus::Applied {

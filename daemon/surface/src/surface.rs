@@ -1,6 +1,7 @@
 //! The surface's role: the link and the operator's data in one state machine without IO.
 
 use super::command::{Command, CommandAction, CommandChange, CommandRefusal, OrderKind};
+use super::in_force;
 use super::orders::{FenceOrder, LimitsOrder};
 use super::position::{Relay, UsblSighting};
 use super::settings::SettingsOrder;
@@ -447,8 +448,9 @@ impl Surface {
                 let (status, _) = self.link.vehicle(vehicle)?.status()?;
                 self.records.get_mut(&vehicle)?.handle_status(status, now);
                 self.relay.iter_mut().for_each(|relay| relay.handle_depth(vehicle, status.depth_m, now));
-                Some(SurfaceOutput::Changed(vehicle))
+                self.follow_in_force(vehicle)
             }
+            SurfaceEvent::InForceLearned(vehicle, _) => self.follow_in_force(vehicle),
             SurfaceEvent::ObjectProgress { vehicle, head, held, total } => {
                 self.records.get_mut(&vehicle)?.handle_progress(head.as_deref(), held, total, now);
                 Some(SurfaceOutput::Changed(vehicle))
@@ -464,6 +466,11 @@ impl Surface {
                 is_new.then_some(SurfaceOutput::ExemplarHere(vehicle, exemplar.label))
             }
         }
+    }
+
+    fn follow_in_force(&mut self, vehicle: Address) -> Option<SurfaceOutput> {
+        in_force::follow(self.records.get_mut(&vehicle)?, &self.link.vehicle(vehicle)?);
+        Some(SurfaceOutput::Changed(vehicle))
     }
 
     /// The last frame of [`Self::poll_transmit`] has left the modem.

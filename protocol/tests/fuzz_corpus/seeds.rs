@@ -89,6 +89,7 @@ fn contents() -> Vec<Seed> {
                 ChunkKind::Slot => seeds.push(("slot", format!("slot-{i}"), framed)),
                 ChunkKind::Layer => seeds.push(("layer_chunk", format!("talk-{i}"), payload)),
                 ChunkKind::Map | ChunkKind::Object | ChunkKind::Introduction => {}
+                ChunkKind::Inquiry | ChunkKind::InForce => {}
             }
         }
         seeds.push(("chunks", format!("{way}-{i}"), body));

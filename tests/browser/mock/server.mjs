@@ -186,6 +186,7 @@ function accepted(mock, res, response) {
 function steer(mock, order, res) {
   if (order.scenario) mock.mission = new Mission(order.scenario);
   const { mission } = mock;
+  if ("in_force" in order) mission.vehicles[0].reported = order.in_force;
   if ("mismatch" in order) mission.vehicles[0].mismatch = order.mismatch;
   if ("earlier" in order) mission.vehicles[0].earlier = order.earlier;
   for (const key of ["archive", "storage", "loss", "layers", "ended", "speed", "position"]) if (key in order) mission[key] = order[key];

@@ -172,6 +172,7 @@ export class Vehicle {
         id, cells, area_m2: cells * area, weight: this.weights.get(id) ?? 0, exemplar: this.exemplarJson(id),
       })),
       utility: this.terms, fence: this.fence, limits: this.limits, planner: this.planner, settings: this.settings.json(),
+      in_force: { utility: "known", settings: "none", budget: "known", limits: this.inForce.limits ? "known" : "none", fence: this.inForce.fence ? "known" : "none", ...this.reported },
       fence_in_force: this.inForce.fence ?? null, limits_in_force: this.inForce.limits ?? null,
       directive: this.directive.json(), link: this.link(nowS), usbl: null,
     };

@@ -25,6 +25,16 @@ export default [
     },
   },
   {
+    name: "orders in force that are unknown here are named until they are known",
+    scenario: "rich",
+    async run(s) {
+      await s.steer({ in_force: { fence: "unknown", utility: "unknown" } });
+      await s.shows("#banners", /auv-1 follows orders that are unknown here.*In force, unknown here: utility, fence/s);
+      await s.steer({ in_force: {} });
+      await s.visible("#banners", false);
+    },
+  },
+  {
     name: "frames that are refused are explained until one is accepted",
     scenario: "rich",
     async run(s) {

@@ -3,13 +3,13 @@
 use super::facts::{MissionFacts, seconds};
 use super::{exemplar, link, position};
 use crate::state::{
-    AppliedOrder, DirectiveSlots, EarlierMap, MapLabel, MapSummary, OrderProgress, OrderStatus, PlannedPath,
-    ReportedMode, ReportedPose, StatusReport, UsblMeasurement, UtilityTerms, VehicleNote, VehicleOrders,
+    AppliedOrder, DirectiveSlots, EarlierMap, InForceKnowledge, MapLabel, MapSummary, OrderProgress, OrderStatus,
+    PlannedPath, ReportedMode, ReportedPose, StatusReport, UsblMeasurement, UtilityTerms, VehicleNote, VehicleOrders,
     VehicleSettings, VehicleState,
 };
 use scenecast_protocol::coordinates::MapPoint;
-use scenecast_protocol::directive::{self, PlannerKind, SlotProgress};
-use scenecast_protocol::link::PeerView;
+use scenecast_protocol::directive::{self, PlannerKind, REPORTED_SLOTS, SlotProgress};
+use scenecast_protocol::link::{InForce, PeerView};
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::{Address, VehicleMode, VehicleStatus};
 use scenecast_surface::record::StoredNote;
@@ -72,7 +72,17 @@ fn orders(record: &VehicleRecord, view: &PeerView<'_>) -> VehicleOrders {
             requested: SettingsOrder::of(record.settings.requested(), view.layers()),
             in_force: record.settings.in_force().map(|settings| SettingsOrder::of(settings, view.layers())),
         },
+        in_force: REPORTED_SLOTS.map(|id| (id.name().to_owned(), knowledge(view.in_force(id)))).into(),
         directive: DirectiveSlots { slots: view.slots().map(order_progress).collect() },
+    }
+}
+
+fn knowledge(in_force: InForce<'_>) -> InForceKnowledge {
+    match in_force {
+        InForce::NotReported => InForceKnowledge::NotReported,
+        InForce::None => InForceKnowledge::None,
+        InForce::Known(_) => InForceKnowledge::Known,
+        InForce::Unknown => InForceKnowledge::Unknown,
     }
 }
 

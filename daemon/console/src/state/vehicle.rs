@@ -7,6 +7,7 @@ use super::storage::VehicleNote;
 use scenecast_surface::{FenceOrder, LimitsOrder, SettingsOrder};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 
 /// A vehicle as the surface knows it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -47,20 +48,38 @@ pub struct VehicleState {
 pub struct VehicleOrders {
     /// The last utility sent, without the weights of the labels.
     pub utility: UtilityTerms,
-    /// The last fence sent; null before the first.
+    /// The last fence sent, or the one in force if this surface sent none; null before the first.
     pub fence: Option<FenceOrder>,
-    /// The last limits sent; null before the first.
+    /// The last limits sent, or those in force if this surface sent none; null before the first.
     pub limits: Option<LimitsOrder>,
-    /// The fence that the vehicle reported last as applied, of those that this surface sent; null before the first.
+    /// The fence that the vehicle reported last as in force, with version 0 if another surface has sent it; null if it is
+    /// unknown.
     pub fence_in_force: Option<AppliedOrder<FenceOrder>>,
-    /// The limits that the vehicle reported last as applied, of those that this surface sent; null before the first.
+    /// The limits that the vehicle reported last as in force, with version 0 if another surface has sent them; null if they
+    /// are unknown.
     pub limits_in_force: Option<AppliedOrder<LimitsOrder>>,
     /// The last planner sent; null means as configured on the vehicle.
     pub planner: Option<String>,
     /// Settings requested and in force.
     pub settings: VehicleSettings,
+    /// What the surface knows of the content in force, by slot: utility, settings, budget, limits and fence.
+    pub in_force: BTreeMap<String, InForceKnowledge>,
     /// The status of each order.
     pub directive: DirectiveSlots,
+}
+
+/// What the surface knows of the content in force of a slot.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum InForceKnowledge {
+    /// The vehicle has not reported it since the surface or the vehicle started.
+    NotReported,
+    /// The vehicle reports that there is none.
+    None,
+    /// The surface has the content that the vehicle reports.
+    Known,
+    /// The vehicle reports a content that the surface does not have; the surface asks for it.
+    Unknown,
 }
 
 /// Settings of a vehicle. A null member is one that this surface has not set; 0 or an empty text means

@@ -45,7 +45,7 @@ impl Storage for Files {
         Ok(())
     }
 
-    fn append(&mut self, file: &mut File, bytes: &[u8]) -> io::Result<()> {
+    fn append(&mut self, _name: &str, file: &mut File, bytes: &[u8]) -> io::Result<()> {
         file.borrow_mut().extend_from_slice(bytes);
         Ok(())
     }
@@ -58,6 +58,10 @@ impl Storage for Files {
         let file = self.0.borrow_mut().remove(from).ok_or(io::ErrorKind::NotFound)?;
         self.0.borrow_mut().insert(to.to_owned(), file);
         Ok(())
+    }
+
+    fn list(&self) -> io::Result<Vec<String>> {
+        Ok(self.0.borrow().keys().cloned().collect())
     }
 
     fn sync_folder(&mut self) -> io::Result<()> {

@@ -29,6 +29,7 @@ function current() {
     if (isSilent(v)) found.push(silent(v));
     if (store.connected && store.mapFaults.has(v.id)) found.push(outdated(v));
     if (v.link.mismatch) found.push(mismatched(v));
+    if (unknownOrders(v).length > 0) found.push(unknownInForce(v));
     if (v.map.earlier) found.push(earlier(v));
   }
   if (store.snapshot?.storage?.failing) found.push(refusing(store.snapshot.storage));
@@ -62,6 +63,15 @@ function outdated(v) {
 /** A setting differs at both ends, or somebody else transmits under the vehicle's address. */
 function mismatched(v) {
   return { key: `mismatch-${v.id}`, kind: "bad", head: `Frames of ${v.name} are refused`, body: `${v.link.mismatch}.` };
+}
+
+const unknownOrders = (v) => Object.keys(v.in_force).filter((slot) => v.in_force[slot] === "unknown");
+
+function unknownInForce(v) {
+  return {
+    key: `in-force-${v.id}`, kind: "info", head: `${v.name} follows orders that are unknown here`,
+    body: `In force, unknown here: ${unknownOrders(v).join(", ")}. Another surface has sent them, or this one lost its files; the surface asks the vehicle for them.`,
+  };
 }
 
 /** The map in view is that of an earlier run of the vehicle or of the surface. */

@@ -143,9 +143,14 @@ function refreshReturnPoint(at, fault) {
 /** The fence in force, as far as the surface knows. */
 function describeInForce(vehicle) {
   const slot = slotOf(vehicle, "fence");
-  if (!slot) return "No fence sent since the surface started; the vehicle keeps the fence that it has.";
-  if (slot.state === "applied") return "In force: the solid lines on the map.";
   const before = vehicle.fence_in_force;
+  if (!slot || slot.state === "applied") {
+    if (vehicle.in_force.fence === "none") return "The vehicle reports that no fence is in force.";
+    if (vehicle.in_force.fence === "unknown") return "In force, unknown here: the vehicle has a fence that this surface has not sent. The surface asks for it.";
+    if (!before) return "The vehicle has not reported yet whether a fence is in force.";
+    if (vehicle.in_force.fence === "not_reported") return "In force by the last report, before a restart: the solid lines on the map.";
+    return before.version === 0 ? "In force: the solid lines on the map, sent by another surface or before its files were lost." : "In force: the solid lines on the map.";
+  }
   if (before && slot.state === "refused") return `Version ${before.version} stays in force (solid lines).`;
   return before ? `Version ${before.version} stays in force meanwhile (solid lines).` : "This surface does not know which fence is in force meanwhile.";
 }

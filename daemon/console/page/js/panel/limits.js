@@ -107,12 +107,16 @@ function reactionLine([key, name]) {
 /** The limits in force, as far as the surface knows. */
 function describeInForce(vehicle) {
   const slot = slotOf(vehicle, "limits");
-  if (!slot) return "No limits sent since the surface started; the vehicle keeps the limits that it has.";
-  if (slot.state === "applied") return "In force as last sent.";
   const before = vehicle.limits_in_force;
+  const list = () => Object.entries(stated(before.order)).map(([key, value]) => `${NAMES[key]} ${value.join?.(" to ") ?? value}`).join("; ") || "no limits";
+  if (!slot || slot.state === "applied") {
+    if (vehicle.in_force.limits === "none") return "The vehicle reports that no limits are in force beside the configured ones.";
+    if (vehicle.in_force.limits === "unknown") return "In force, unknown here: the vehicle has limits that this surface has not sent. The surface asks for them.";
+    if (!before) return "The vehicle has not reported yet whether limits are in force.";
+    return before.version === 0 ? `In force, sent by another surface or before its files were lost: ${list()}.` : "In force as last sent.";
+  }
   if (!before) return "This surface does not know which limits are in force meanwhile.";
-  const items = Object.entries(stated(before.order)).map(([key, value]) => `${NAMES[key]} ${value.join?.(" to ") ?? value}`);
-  return `In force meanwhile: version ${before.version}: ${items.join("; ") || "no limits"}.`;
+  return `In force meanwhile: version ${before.version}: ${list()}.`;
 }
 
 export function update() {
