@@ -40,7 +40,7 @@ fn order(pick: u8) -> Slot {
         4 => Slot::Settings(Settings { beta: figure, alpha: Change::Configured, ..Settings::default() }),
         5 => Slot::Fence(Fence::default()),
         6 => Slot::Limits(Limits::default()),
-        7 => hold(pick % 2 == 0),
+        7 => hold(pick.is_multiple_of(2)),
         _ => Slot::Budget(Budget {
             bits_per_s: 1000,
             shares: Shares([pick % 20, 10, 10, 20, 0]),

@@ -10,7 +10,7 @@ pub mod raw;
 mod surface;
 mod vehicle;
 
-pub use decoders::{ack, chunks, frame, key_text, layer_chunk, object, slot, stamp, status};
+pub use decoders::{ack, chunks, frame, in_force, key_text, layer_chunk, object, slot, stamp, status};
 pub use map_chunk::{base, map_chunk};
 pub use surface::{surface_events, surface_link};
 pub use vehicle::{vehicle_events, vehicle_link};
@@ -19,13 +19,14 @@ pub use vehicle::{vehicle_events, vehicle_link};
 pub type Target = fn(&[u8]);
 
 /// Every target by the name of its corpus.
-pub const ALL: [(&str, Target); 12] = [
+pub const ALL: [(&str, Target); 13] = [
     ("frame", frame),
     ("ack", ack),
     ("chunks", chunks),
     ("stamp", stamp),
     ("status", status),
     ("slot", slot),
+    ("in_force", in_force),
     ("object", object),
     ("map_chunk", map_chunk),
     ("layer_chunk", layer_chunk),
