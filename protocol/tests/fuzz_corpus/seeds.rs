@@ -3,6 +3,7 @@
 use super::targets::base;
 use super::targets::link::{FuzzEnd, Setup, Surface, layers};
 use super::targets::raw;
+use scenecast_protocol::directive::{InForceDigests, InForcePart, PerSlot, Slot, SlotId, Utility, VersionedSlot};
 use scenecast_protocol::map::{Cell, LabelGrid, MapSource};
 use scenecast_protocol::map_codec::{Codec, encode};
 use scenecast_protocol::object::ObjectSender;
@@ -16,7 +17,7 @@ type Seed = (&'static str, String, Vec<u8>);
 
 /// Every file that is generated, not found by a fuzzer.
 pub fn all() -> Vec<Seed> {
-    let mut seeds = [frames(), contents(), objects(), scripts(), golden(), map_chunks()].concat();
+    let mut seeds = [frames(), contents(), objects(), scripts(), golden(), map_chunks(), in_force()].concat();
     seeds.iter_mut().for_each(|(_, _, data)| data.truncate(2000));
     seeds
 }
@@ -88,8 +89,8 @@ fn contents() -> Vec<Seed> {
                 ChunkKind::Report => seeds.push(("status", format!("report-{i}"), payload)),
                 ChunkKind::Slot => seeds.push(("slot", format!("slot-{i}"), framed)),
                 ChunkKind::Layer => seeds.push(("layer_chunk", format!("talk-{i}"), payload)),
+                ChunkKind::InForce | ChunkKind::Inquiry => seeds.push(("in_force", format!("{way}-{i}"), framed)),
                 ChunkKind::Map | ChunkKind::Object | ChunkKind::Introduction => {}
-                ChunkKind::Inquiry | ChunkKind::InForce => {}
             }
         }
         seeds.push(("chunks", format!("{way}-{i}"), body));
@@ -114,6 +115,29 @@ fn objects() -> Vec<Seed> {
         seed("in-order", [parts.concat(), half.concat()].concat());
         seed("backwards", half.iter().rev().chain(parts.iter().rev()).flatten().copied().collect());
         seed("later-half", half.concat());
+    }
+    seeds
+}
+
+/// A content in force in parts of several sizes, and inquiries.
+fn in_force() -> Vec<Seed> {
+    let weights = (1..=60).map(|label| (label, 50)).collect();
+    let slot = Slot::Utility(Utility { weights, ..Utility::default() });
+    let digests = InForceDigests::of(&PerSlot::from_fn(|id| (id == SlotId::Utility).then(|| slot.clone())));
+    let content = VersionedSlot::encode(0, &slot).split_off(3);
+    let framed = |payload: Vec<u8>| [&[payload.len() as u8], &payload[..]].concat();
+    let mut seeds = vec![
+        ("in_force", "inquiry-for-all".to_owned(), framed(InForceDigests::default().encode())),
+        ("in_force", "inquiry-for-others".to_owned(), framed(digests.encode())),
+    ];
+    for room in [10, 40, 200] {
+        let part = |(index, bytes): (usize, &[u8])| {
+            let first = index * room;
+            let (digest, is_last) =
+                (digests.get(SlotId::Utility).copied().unwrap_or(0), first + bytes.len() == content.len());
+            framed(InForcePart { id: SlotId::Utility, digest, first: first as u16, is_last, bytes }.encode())
+        };
+        seeds.push(("in_force", format!("parts-of-{room}"), content.chunks(room).enumerate().flat_map(part).collect()));
     }
     seeds
 }

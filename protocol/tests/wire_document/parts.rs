@@ -4,8 +4,8 @@ use crate::document::{assert_same, pairs, rows, section};
 use crate::samples::{MISSION, auv, clock, frame, header, hold, place, status, vehicle_stamp};
 use scenecast_protocol::coordinates::{MapPoint, WorldPoint};
 use scenecast_protocol::directive::{
-    Band, Budget, CellBand, Change, Constraints, ExemplarRequest, ExemplarRequests, Fence, Fix, Limits, PlannerKind,
-    Polygon, Reaction, Settings, ShortDecimal, Slot, Utility, VersionedSlot,
+    Band, Budget, CellBand, Change, Constraints, ExemplarRequest, ExemplarRequests, Fence, Fix, InForceDigests,
+    InForcePart, Limits, PlannerKind, Polygon, Reaction, Settings, ShortDecimal, Slot, SlotId, Utility, VersionedSlot,
 };
 use scenecast_protocol::map::{
     Cell, DescriptorPart, LabelGrid, LayerChunk, LayerDescriptor, LayerId, LayerMask, LayerSet,
@@ -124,6 +124,8 @@ fn layer_chunks() -> Rows {
 }
 
 fn status_chunks() -> Rows {
+    let utility = |id: SlotId| if id == SlotId::Utility { 0xABCD } else { 0 };
+    let inquiry = InForceDigests::from_fn(utility).encode();
     let pose = |waypoint: Option<(f64, f64)>, path: &[(f64, f64)], continues: bool| {
         let point = |(x_m, y_m)| MapPoint { x_m, y_m };
         let path = PlannedPath { points: path.iter().copied().map(point).collect(), continues };
@@ -152,7 +154,19 @@ fn status_chunks() -> Rows {
             status().encode_report(99, 0).unwrap().0,
         ),
         (
-            "the same with a placement: version 2, 12.5 m east, -0.1 m north",
+            "the same with a summary: no content in force",
+            VehicleStatus { in_force: Some(InForceDigests::default().summary()), ..status() }
+                .encode_report(99, 0)
+                .unwrap()
+                .0,
+        ),
+        ("inquiry of a surface that holds a utility with the digest ABCD", inquiry),
+        (
+            "part of a content in force: fence, digest BEEF, the last bytes 07 08 at offset 300",
+            InForcePart { id: SlotId::Fence, digest: 0xBEEF, first: 300, is_last: true, bytes: &[7, 8] }.encode(),
+        ),
+        (
+            "the same report with a placement: version 2, 12.5 m east, -0.1 m north",
             VehicleStatus {
                 placement: Some(Placement { version: 2, origin: WorldPoint::new(12.5, -0.1) }),
                 ..status()

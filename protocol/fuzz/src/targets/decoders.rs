@@ -1,7 +1,7 @@
 //! Arbitrary bytes as every format of the wire and the key file, except the map.
 
 use super::raw::{self, Script};
-use scenecast_protocol::directive::{Series, SlotState, VersionedSlot};
+use scenecast_protocol::directive::{InForceDigests, InForcePart, REPORTED_SLOTS, Series, SlotState, VersionedSlot};
 use scenecast_protocol::link::{Flight, LinkWindow, SlotInbox};
 use scenecast_protocol::mac::ClockMap;
 use scenecast_protocol::map::{Assembly, LayerChunk, LayerDescriptor, LayerReplica, LayerSet};
@@ -212,6 +212,21 @@ pub fn slot(data: &[u8]) {
         assert!(!inbox.admit(series, &slot));
         inbox = SlotInbox::restore(inbox.state().clone());
         assert!(inbox.state().retired.len() <= 16);
+    }
+}
+
+/// Parts of a content in force and inquiries read the same again; what they make is a slot with that digest.
+pub fn in_force(data: &[u8]) {
+    let mut script = Script(data);
+    while !script.is_over() {
+        let bytes = script.bytes();
+        if let Ok(part) = InForcePart::decode(bytes) {
+            assert_eq!(part.encode(), bytes);
+        }
+        if let Ok(digests) = InForceDigests::decode(bytes) {
+            assert_eq!(InForceDigests::decode(&digests.encode()), Ok(digests));
+            assert!(REPORTED_SLOTS.into_iter().all(|id| digests.summary().has(id) == (digests.get(id) != Some(&0))));
+        }
     }
 }
 

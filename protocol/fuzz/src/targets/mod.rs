@@ -10,7 +10,7 @@ pub mod raw;
 mod surface;
 mod vehicle;
 
-pub use decoders::{ack, chunks, frame, introduction, key_text, layer_chunk, object, slot, stamp, status};
+pub use decoders::{ack, chunks, frame, in_force, introduction, key_text, layer_chunk, object, slot, stamp, status};
 pub use map_chunk::{base, map_chunk};
 pub use surface::{surface_events, surface_link};
 pub use vehicle::{vehicle_events, vehicle_link};
@@ -27,6 +27,7 @@ pub const ALL: [(&str, Target); 13] = [
     ("stamp", stamp),
     ("status", status),
     ("slot", slot),
+    ("in_force", in_force),
     ("object", object),
     ("map_chunk", map_chunk),
     ("layer_chunk", layer_chunk),
