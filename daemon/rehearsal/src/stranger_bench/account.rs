@@ -16,7 +16,7 @@ pub enum AttackKind {
     Replayed,
     /// An unchanged frame of an earlier run or dive.
     Earlier,
-    /// An unchanged frame that the channel had lost, so that it arrives for the first time.
+    /// An unchanged frame that arrives for the first time, because the channel has lost it or is slower.
     Relayed,
     /// An overheard frame, cut or changed, with a good CRC.
     Malformed,

@@ -36,6 +36,21 @@ pub struct KindFigures {
     pub vehicle: BTreeMap<String, u64>,
 }
 
+/// A burst after which the link needed more than 60 s.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct LateRecovery {
+    /// Seconds from the last forged frame; 600 if the wait was given up.
+    pub seconds: f64,
+    pub dive: u64,
+    /// Number of the burst in its dive, from 0.
+    pub burst: usize,
+    pub access: &'static str,
+    /// The state of the link at the start of the burst.
+    pub state: &'static str,
+    /// The only kind of frame in the burst; `None` for a mixture of all.
+    pub kind: Option<AttackKind>,
+}
+
 /// The figures of one protection.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct StrangerFigures {
@@ -47,7 +62,7 @@ pub struct StrangerFigures {
     pub kinds: Vec<KindFigures>,
     /// Cells of the operator's map that changed by a frame of the stranger.
     pub cells_changed: u64,
-    /// Cells that changed by authentic frames that the channel had lost and the stranger delivered.
+    /// Cells that changed by authentic frames that the stranger delivered first.
     pub cells_relayed: u64,
     /// Frames that failed their CRC, tag or decoder and changed the state of an end.
     pub invalid_changes: u64,
@@ -61,20 +76,22 @@ pub struct StrangerFigures {
     pub foreign_orders: u64,
     /// Applied orders that had been applied before or were replaced.
     pub repeated_orders: u64,
-    /// Authentic frames that arrived unharmed during a dive with the stranger.
+    /// Authentic numbered frames that arrived unharmed.
     pub authentic_frames: u64,
     /// Judgements of them.
     pub authentic: BTreeMap<String, u64>,
     /// Share of them that was refused and is no duplicate.
     pub authentic_refused: f64,
-    /// The same share of a dive without the stranger.
+    /// The same share of dives without the stranger.
     pub authentic_refused_control: f64,
+    /// Judgements of authentic hellos. An answer to a replayed hello is refused: it costs airtime only.
+    pub hellos: BTreeMap<String, u64>,
     /// Times from the last forged frame until the maps and the orders agreed, seconds.
     pub recovery_mean_s: f64,
     pub recovery_p95_s: f64,
     pub recovery_max_s: f64,
-    /// Bursts after which the link needed more than 60 s.
-    pub late_recoveries: usize,
+    /// Bursts after which the link needed more than 60 s, the longest first.
+    pub late_recoveries: Vec<LateRecovery>,
     /// Bursts after which the link had not recovered within 600 s.
     pub failed_recoveries: usize,
     /// The same mean without the stranger.
@@ -135,8 +152,9 @@ struct Campaign {
     rng: RandomStream,
     frames: u64,
     judged: BTreeMap<AttackKind, ByEnd>,
-    authentic: Judged,
+    authentic: [Judged; 2],
     recoveries: Vec<f64>,
+    late: Vec<LateRecovery>,
     cells_changed: u64,
     cells_relayed: u64,
     invalid_changes: u64,
@@ -157,8 +175,9 @@ impl Campaign {
             rng: RandomStream::new(seed, &[3]),
             frames: 0,
             judged: BTreeMap::new(),
-            authentic: Judged::new(),
+            authentic: Default::default(),
             recoveries: Vec::new(),
+            late: Vec::new(),
             cells_changed: 0,
             cells_relayed: 0,
             invalid_changes: 0,
@@ -180,20 +199,30 @@ impl Campaign {
             if self.frames >= frames {
                 break;
             }
-            self.burst(&mut ends, burst, frames);
-            self.quiet(&mut ends);
+            let (state, kind) = self.burst(&mut ends, burst, frames);
+            let seconds = self.quiet(&mut ends);
+            if seconds > RECOVERY_S {
+                let access = match access {
+                    Access::Shared => "shared",
+                    Access::ModemOwned { .. } => "modem-owned",
+                    Access::Polled => "polled",
+                };
+                self.late.push(LateRecovery { seconds, dive: number, burst, access, state, kind });
+            }
             progress(self.frames as f64 / frames as f64);
         }
-        for (judgement, count) in std::mem::take(&mut ends.authentic) {
-            *self.authentic.entry(judgement).or_default() += count;
+        for (sums, counts) in self.authentic.iter_mut().zip(&ends.authentic) {
+            counts.iter().for_each(|(&judgement, count)| *sums.entry(judgement).or_default() += count);
         }
         self.erased_maps += ends.erased_maps;
         let counts = [ends.orders.applications, ends.orders.foreign, ends.orders.repeated];
         self.orders.iter_mut().zip(counts).for_each(|(sum, count)| *sum += count);
     }
 
-    /// A burst in one of the states of the link: before contact, in contact, out of range, after a restart of either end.
-    fn burst(&mut self, ends: &mut AttackedEnds, number: usize, frames: u64) {
+    /// A burst in one of the states of the link; returns the state and the only kind of its frames.
+    fn burst(&mut self, ends: &mut AttackedEnds, number: usize, frames: u64) -> (&'static str, Option<AttackKind>) {
+        const STATES: [&str; 5] =
+            ["before contact", "in contact", "out of range", "vehicle restarted", "surface restarted"];
         let state = if number == 0 { 0 } else { 1 + self.rng.below(4) };
         match state {
             2 => ends.is_out_of_range = true,
@@ -213,7 +242,8 @@ impl Campaign {
         // new run ends the forgeries for the one before.
         let is_busy = self.rng.below(3) > 0;
         let at = self.rng.below(2 * AttackKind::ALL.len());
-        let kinds = AttackKind::ALL.get(at..=at).unwrap_or(&AttackKind::ALL);
+        let kind = AttackKind::ALL.get(at).copied();
+        let kinds = kind.as_ref().map_or(&AttackKind::ALL[..], std::slice::from_ref);
         for step in 0..length {
             self.forger.overhear(std::mem::take(&mut ends.overheard));
             self.transmit(ends, kinds);
@@ -226,6 +256,7 @@ impl Campaign {
             }
         }
         ends.is_out_of_range = false;
+        (STATES[state], kind)
     }
 
     /// One frame of the stranger at one of the ends.
@@ -277,8 +308,9 @@ impl Campaign {
         judgement
     }
 
-    /// The operator gives an order after the last forged frame; then the link has time to recover.
-    fn quiet(&mut self, ends: &mut AttackedEnds) {
+    /// The operator gives an order after the last forged frame; then the link has time to recover. Returns the seconds that it
+    /// took.
+    fn quiet(&mut self, ends: &mut AttackedEnds) -> f64 {
         ends.issue();
         let began = ends.now();
         let mut checked = began;
@@ -295,6 +327,7 @@ impl Campaign {
         self.recoveries.push(if is_recovered { time } else { f64::INFINITY });
         self.forger.overhear(std::mem::take(&mut ends.overheard));
         ends.run(Duration::from_secs(1 + self.rng.below(20) as u64));
+        time
     }
 
     fn figures(self, control: &Self) -> StrangerFigures {
@@ -304,10 +337,12 @@ impl Campaign {
             Some(KindFigures { kind, frames, surface: named(surface), vehicle: named(vehicle) })
         });
         let kinds = kinds.collect();
-        let (authentic_frames, authentic_refused) = refused(&self.authentic);
+        let (authentic_frames, authentic_refused) = refused(&self.authentic[0]);
         let finite = |times: &[f64]| times.iter().map(|time| time.min(GIVE_UP_S)).collect::<Vec<_>>();
         let times = finite(&self.recoveries);
         let mean = |times: &[f64]| times.iter().sum::<f64>() / times.len().max(1) as f64;
+        let mut late_recoveries = self.late;
+        late_recoveries.sort_by(|a, b| b.seconds.total_cmp(&a.seconds));
         let sorted = Summary::of(times.clone());
         StrangerFigures {
             protection: self.protection,
@@ -324,13 +359,14 @@ impl Campaign {
             foreign_orders: self.orders[1],
             repeated_orders: self.orders[2],
             authentic_frames,
-            authentic: named(&self.authentic),
+            authentic: named(&self.authentic[0]),
+            hellos: named(&self.authentic[1]),
             authentic_refused,
-            authentic_refused_control: refused(&control.authentic).1,
+            authentic_refused_control: refused(&control.authentic[0]).1,
             recovery_mean_s: mean(&times),
             recovery_p95_s: sorted.p95(),
             recovery_max_s: sorted.quantile(1.0),
-            late_recoveries: self.recoveries.iter().filter(|&&time| time > RECOVERY_S).count(),
+            late_recoveries,
             failed_recoveries: self.recoveries.iter().filter(|time| time.is_infinite()).count(),
             recovery_control_s: mean(&finite(&control.recoveries)),
         }

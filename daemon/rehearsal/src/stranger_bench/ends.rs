@@ -13,7 +13,7 @@ use scenecast_protocol::map_codec::Codec;
 use scenecast_protocol::schedule::Shares;
 use scenecast_protocol::seal::MissionKey;
 use scenecast_protocol::time::Instant;
-use scenecast_protocol::wire::{Address, CellEdge, MissionId, VehicleStatus};
+use scenecast_protocol::wire::{Address, CellEdge, Envelope, MissionId, VehicleStatus};
 use sim_channel::RandomStream;
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::sync::Arc;
@@ -93,20 +93,20 @@ pub(super) struct AttackedEnds {
     pub(super) vehicle: VehicleLink,
     pub(super) surface: SurfaceLink,
     pub(super) orders: OrderBook,
-    /// Authentic frames that arrived unharmed, by judgement.
-    pub(super) authentic: Judged,
+    /// Authentic numbered frames, then authentic hellos, that arrived unharmed, by judgement.
+    pub(super) authentic: [Judged; 2],
     /// Copies of ended runs that were lost without being overtaken.
     pub(super) erased_maps: u64,
     /// Transmitted frames that the stranger has not collected.
     pub(super) overheard: Vec<Vec<u8>>,
-    /// Frames that the channel lost or damaged, and that the stranger has not delivered.
+    /// Frames that the channel has lost, damaged or not yet delivered, and that the stranger has not delivered.
     undelivered: BTreeSet<Vec<u8>>,
     /// Whether all authentic frames are lost.
     pub(super) is_out_of_range: bool,
     /// When the run ended of which the surface keeps a copy, and the size of the copy in cells.
     ended: Option<(Instant, usize)>,
     protection: Protection,
-    access: Access,
+    pub(super) access: Access,
     rng: RandomStream,
     in_channel: BTreeMap<(Instant, u64), ChannelEvent>,
     /// The frames in the modems of surface and vehicle, and whether each transmits.
@@ -127,7 +127,7 @@ impl AttackedEnds {
             vehicle: setup.vehicle(vehicle_seed, SlotInboxState::default(), now),
             surface: setup.surface(surface_seed, now),
             orders: OrderBook::default(),
-            authentic: Judged::new(),
+            authentic: Default::default(),
             erased_maps: 0,
             overheard: Vec::new(),
             undelivered: BTreeSet::new(),
@@ -233,7 +233,9 @@ impl AttackedEnds {
             ChannelEvent::Arrives { at_vehicle, bytes, is_whole } => {
                 let judgement = self.deliver(at_vehicle, &bytes);
                 if is_whole {
-                    *self.authentic.entry(judgement).or_default() += 1;
+                    self.undelivered.remove(&bytes);
+                    let is_hello = Envelope::decode(&bytes, |_| true).is_ok_and(|e| e.header.kind.is_hello());
+                    *self.authentic[usize::from(is_hello)].entry(judgement).or_default() += 1;
                 }
             }
             ChannelEvent::Poll { of_vehicle: true, frames } => self.vehicle.handle_poll(frames),
@@ -257,7 +259,7 @@ impl AttackedEnds {
         LinkJudgement::between(&before, &counters(&self.surface))
     }
 
-    /// Whether a frame is one that the channel lost. It is not afterwards, because the stranger delivers it.
+    /// Whether a frame has not arrived before. It is not so afterwards, because the stranger delivers it.
     pub(super) fn take_undelivered(&mut self, bytes: &[u8]) -> bool {
         self.undelivered.remove(bytes)
     }
@@ -299,11 +301,8 @@ impl AttackedEnds {
         self.schedule(end, ChannelEvent::Sent { by_vehicle });
         self.overheard.push(bytes.clone());
         let (is_lost, is_damaged) = (self.rng.bernoulli(LOSS), self.rng.bernoulli(CORRUPTION));
-        let is_lost = is_lost || self.is_out_of_range;
-        if is_lost || is_damaged {
-            self.undelivered.insert(bytes.clone());
-        }
-        if is_lost {
+        self.undelivered.insert(bytes.clone());
+        if is_lost || self.is_out_of_range {
             return;
         }
         if is_damaged {

@@ -7,7 +7,7 @@ mod forger;
 mod state;
 
 pub use account::{AttackKind, LinkJudgement};
-pub use campaign::{KindFigures, StrangerFigures, measure_stranger};
+pub use campaign::{KindFigures, LateRecovery, StrangerFigures, measure_stranger};
 
 use serde::Serialize;
 

@@ -2,10 +2,13 @@
 
 use clap::Args;
 use scenecast_core::UserError;
-use scenecast_rehearsal::stranger_bench::{KindFigures, Protection, StrangerFigures, measure_stranger};
+use scenecast_rehearsal::stranger_bench::{AttackKind, KindFigures, Protection, StrangerFigures, measure_stranger};
 use scenecast_tools::Progress;
 use std::collections::BTreeMap;
 use std::sync::{Mutex, PoisonError};
+
+/// Late recoveries that the table shows of each row.
+const SHOWN: usize = 10;
 
 /// Both ends of the link in virtual time, attacked by a stranger who hears every frame: noise, changed and replayed frames,
 /// malformed frames, and forged frames of each kind with a good CRC, in every state of the link. Each row has an equal
@@ -89,6 +92,7 @@ fn print(row: &StrangerFigures) {
         row.authentic_refused_control * 100.0
     );
     println!("  how they were judged: {}", list(&row.authentic));
+    println!("  hellos: {}", list(&row.hellos));
     println!(
         "seconds until map and orders agree again              {:>9.1} mean, {:.1} p95, {:.1} worst; {:.1} mean without \
          the stranger",
@@ -96,8 +100,17 @@ fn print(row: &StrangerFigures) {
     );
     println!(
         "  above 60 s                                          {:>9} of {}, {} of them above 600 s",
-        row.late_recoveries, row.bursts, row.failed_recoveries
+        row.late_recoveries.len(),
+        row.bursts,
+        row.failed_recoveries
     );
+    for late in row.late_recoveries.iter().take(SHOWN) {
+        let kind = late.kind.map_or("all kinds", AttackKind::name);
+        println!(
+            "    {:>5.1} s after burst {} of dive {}, {}, {}: {kind}",
+            late.seconds, late.burst, late.dive, late.access, late.state
+        );
+    }
     println!();
 }
 
