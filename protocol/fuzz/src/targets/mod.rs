@@ -19,7 +19,7 @@ pub use vehicle::{vehicle_events, vehicle_link};
 pub type Target = fn(&[u8]);
 
 /// Every target by the name of its corpus.
-pub const ALL: [(&str, Target); 13] = [
+pub const ALL: [(&str, Target); 14] = [
     ("frame", frame),
     ("ack", ack),
     ("chunks", chunks),
