@@ -429,6 +429,7 @@ impl Surface {
                 Some(SurfaceOutput::MapChanged(vehicle))
             }
             SurfaceEvent::RunEnded(vehicle) => Some(SurfaceOutput::RunEnded(vehicle)),
+            SurfaceEvent::InForceLearned(vehicle, _) => Some(SurfaceOutput::Changed(vehicle)),
             SurfaceEvent::Mismatch(vehicle, mismatch) => {
                 self.records.get_mut(&vehicle)?.mismatch = Some((mismatch, now));
                 Some(SurfaceOutput::Mismatch(vehicle, mismatch))
