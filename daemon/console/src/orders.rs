@@ -105,10 +105,10 @@ pub struct SharesOrder {
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LabelOrder {
-    /// The label.
+    /// The number of the label, 1 to 254.
     #[schemars(range(min = 1, max = 254))]
     pub label: u8,
-    /// Its name.
+    /// Its name, at most 40 characters.
     #[serde(default)]
     #[schemars(length(min = 1, max = 40))]
     pub name: Option<String>,
@@ -126,7 +126,7 @@ pub struct LabelOrder {
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct NoteOrder {
-    /// The text.
+    /// The text of the note, at most 1000 characters.
     #[schemars(length(min = 1, max = 1000))]
     pub text: String,
 }

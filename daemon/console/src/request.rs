@@ -43,7 +43,7 @@ pub enum SurfaceRequest {
     Settings(u8, SettingsOrder),
     /// Change the bit budget, the shares and the background streams.
     Budget(BudgetOrder),
-    /// Name a label.
+    /// Set name, colour and merging of a label.
     Label(u8, LabelOrder),
     /// Add a note of the person or program with this name.
     Note(u8, String, NoteOrder),

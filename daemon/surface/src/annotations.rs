@@ -16,7 +16,7 @@ const MAX_NOTE: usize = 1000;
 #[derive(Debug, Clone, Default)]
 pub struct Annotations {
     pub labels: BTreeMap<u8, StoredLabel>,
-    /// The newest last.
+    /// The notes in the order of their times.
     pub notes: VecDeque<StoredNote>,
 }
 

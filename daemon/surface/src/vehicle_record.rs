@@ -34,7 +34,7 @@ impl<T> Default for SentOrder<T> {
 /// Whole maps, where the vehicle sends them instead of patches.
 #[derive(Debug, Default)]
 pub struct WholeMaps {
-    /// The last one.
+    /// The last one that has arrived.
     pub last: Option<LabelGrid>,
     /// The number of whole maps that have arrived.
     pub count: u64,
@@ -94,7 +94,7 @@ pub struct Track {
 }
 
 impl Track {
-    /// Maximum number of positions.
+    /// The most positions that are kept.
     const MAX_POINTS: usize = 500;
 
     /// A track that was interrupted after `total` positions, of which these are the last.

@@ -176,7 +176,7 @@ pub struct InForcePart<'a> {
 }
 
 impl<'a> InForcePart<'a> {
-    /// Bytes before the content.
+    /// Bytes before the part of the content.
     pub(crate) const HEAD: usize = 5;
     /// The longest content in bytes.
     pub(crate) const MAX_CONTENT: usize = 2048;
@@ -191,7 +191,7 @@ impl<'a> InForcePart<'a> {
         out
     }
 
-    /// Reads a payload.
+    /// Reads the payload of a chunk.
     pub fn decode(bytes: &'a [u8]) -> Result<Self, Truncated> {
         let mut r = Reader::new(bytes);
         let head = r.u8()?;

@@ -63,7 +63,7 @@ impl Client {
         serde_json::from_slice(&self.get(path).await?.0).map_err(|e| self.unreadable(&e))
     }
 
-    /// Reads a resource.
+    /// Reads the bytes of a resource.
     pub async fn read_bytes(&self, path: &str) -> Result<Bytes, UserError> {
         Ok(self.get(path).await?.0)
     }

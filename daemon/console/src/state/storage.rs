@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 /// The folder in which the surface keeps its state.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 pub struct StorageInfo {
-    /// The folder, from `runtime.state_dir`.
+    /// The folder of the files, as in `runtime.state_dir`.
     pub folder: String,
     /// Free space of its disk in bytes; null if unknown.
     pub free_bytes: Option<u64>,
@@ -36,10 +36,10 @@ pub struct ArchivedMap {
     pub ended_s: f64,
 }
 
-/// The archived maps.
+/// The maps of runs and label epochs that have ended.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 pub struct ArchiveList {
-    /// The newest first.
+    /// The archived maps, the newest first.
     pub maps: Vec<ArchivedMap>,
 }
 
@@ -50,6 +50,6 @@ pub struct VehicleNote {
     pub at_s: f64,
     /// The name of the person or program that wrote it.
     pub author: String,
-    /// The text.
+    /// The text of the note, as written.
     pub text: String,
 }

@@ -17,12 +17,12 @@ pub(super) enum End {
     Surface,
 }
 
-/// How a process ends.
+/// The signal that ends a process.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Stop {
     /// SIGKILL, as when its power fails.
     Kill,
-    /// SIGTERM.
+    /// SIGTERM, as when systemd stops it.
     Terminate,
 }
 

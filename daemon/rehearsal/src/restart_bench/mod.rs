@@ -24,7 +24,7 @@ pub const PAGE_LIMIT_S: f64 = 2.0;
 /// The settings of the bench.
 #[derive(Debug, Clone)]
 pub struct RestartSetting {
-    /// The `scenecast` program.
+    /// The `scenecast` program that is run.
     pub program: PathBuf,
     /// Folder for the files of the runs.
     pub dir: PathBuf,
@@ -43,7 +43,7 @@ pub struct RestartRun {
     pub cells: usize,
     /// Orders that the vehicle has applied.
     pub applied: usize,
-    /// Broken promises.
+    /// Broken promises, a line each.
     pub faults: Vec<String>,
 }
 

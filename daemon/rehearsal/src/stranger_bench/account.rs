@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum AttackKind {
-    /// Random bytes.
+    /// Random bytes of any length.
     Noise,
     /// An overheard frame with a few bits changed.
     Flipped,
@@ -142,5 +142,5 @@ fn snake_case(name: &str) -> String {
     text
 }
 
-/// Frames by judgement.
+/// The number of frames by their judgement.
 pub(super) type Judged = BTreeMap<LinkJudgement, u64>;

@@ -56,7 +56,7 @@ pub struct LateRecovery {
 pub struct StrangerFigures {
     pub protection: Protection,
     pub seed: u64,
-    /// Frames of the stranger.
+    /// The number of frames of the stranger.
     pub frames: u64,
     pub bursts: usize,
     pub kinds: Vec<KindFigures>,
@@ -70,7 +70,7 @@ pub struct StrangerFigures {
     pub divergences: u64,
     /// Copies of ended runs that were lost without being overtaken.
     pub erased_maps: u64,
-    /// Applications of orders.
+    /// The number of orders that were applied.
     pub orders_applied: u64,
     /// Applied orders that the operator did not give.
     pub foreign_orders: u64,
@@ -78,7 +78,7 @@ pub struct StrangerFigures {
     pub repeated_orders: u64,
     /// Authentic numbered frames that arrived unharmed.
     pub authentic_frames: u64,
-    /// Judgements of them.
+    /// The number of them by their judgement.
     pub authentic: BTreeMap<String, u64>,
     /// Share of them that was refused and is no duplicate.
     pub authentic_refused: f64,

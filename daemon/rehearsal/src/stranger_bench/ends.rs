@@ -113,7 +113,6 @@ pub(super) struct AttackedEnds {
     modems: [(VecDeque<Vec<u8>>, bool); 2],
     serial: u64,
     durable: SlotInboxState,
-    /// Number of surveyed cells.
     surveyed: i32,
 }
 

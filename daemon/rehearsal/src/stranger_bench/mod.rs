@@ -19,7 +19,7 @@ pub enum Protection {
     None,
     /// `authenticate = "down"`: the vehicle's numbered frames have no tag.
     Down,
-    /// `authenticate = "all"`
+    /// A key with `authenticate = "all"`.
     All,
 }
 

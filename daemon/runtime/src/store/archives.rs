@@ -97,7 +97,7 @@ impl Archives {
         self.known.values()
     }
 
-    /// Reads an archived map.
+    /// Reads the archived map of this name.
     pub(super) fn load<S: Storage>(&self, storage: Option<&S>, name: &str) -> Option<VehicleMemory> {
         let vehicle = self.known.get(name)?.vehicle;
         let bytes = storage?.read(&format!("{name}{SUFFIX}")).ok()??;

@@ -5,7 +5,6 @@ use crate::journal::Storage;
 use scenecast_surface::record::{self, DecodeError, Event};
 use std::io;
 
-/// The store's file.
 pub(super) const STORE: &str = "surface.store";
 /// Length of the batches behind the snapshot at which the file is written again, if the snapshot is not longer.
 const MIN_TAIL: usize = 4 << 20;

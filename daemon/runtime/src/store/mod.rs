@@ -169,7 +169,6 @@ impl<S: Storage> SurfaceStore<S> {
         }
     }
 
-    /// The archived maps.
     pub(super) fn archives(&self) -> impl Iterator<Item = &ArchiveInfo> {
         self.archives.list()
     }

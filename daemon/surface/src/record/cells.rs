@@ -87,7 +87,7 @@ impl MapCopy {
         }
     }
 
-    /// All cells as events.
+    /// The events that make this copy from nothing.
     pub(super) fn to_events(&self) -> Vec<StoredCells> {
         let mut all = pack(None, self.labels.cells().collect());
         for (id, layer) in &self.layers {

@@ -14,7 +14,7 @@ pub struct EventTime {
 /// Who or what caused an event.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub enum EventSource {
-    /// The surface's program.
+    /// The surface's program by itself.
     Surface,
     /// A vehicle, by its address.
     Vehicle(u8),
@@ -46,7 +46,7 @@ pub enum EventKind {
 /// A change of the knowledge about one vehicle. Times are mission times in microseconds.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum VehicleEvent {
-    /// The vehicle's name.
+    /// The name that the vehicle has from now on.
     Named(String),
     /// The run and the label epoch that the following events belong to.
     Identified(RunId),
@@ -94,7 +94,7 @@ pub struct RunId {
 /// A budget of the surface, as ordered or as configured.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct StoredBudget {
-    /// Bits a second.
+    /// The budget in bits a second.
     pub bits_per_s: u32,
     /// Least share of each class, percent.
     pub shares: [u8; 5],
@@ -186,7 +186,7 @@ pub struct StoredRequest {
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct StoredLabel {
     pub name: Option<String>,
-    /// As in `#a0b1c2`.
+    /// Its colour, as in `#a0b1c2`.
     pub colour: Option<String>,
     /// The label that it is shown as a part of.
     pub merged_into: Option<u8>,

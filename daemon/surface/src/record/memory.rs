@@ -71,7 +71,6 @@ impl SurfaceMemory {
         memory
     }
 
-    /// Applies one event.
     pub fn apply(&mut self, event: &Event) {
         (self.sequence, self.last) = (event.sequence, event.time);
         match &event.kind {
@@ -143,7 +142,7 @@ impl VehicleMemory {
         &self.labels
     }
 
-    /// The images, by label.
+    /// The images that have arrived, by label.
     pub fn exemplars(&self) -> &BTreeMap<u8, Vec<StoredImage>> {
         &self.exemplars
     }

@@ -34,7 +34,7 @@ pub struct Recorder {
     memory: SurfaceMemory,
     /// The state of each vehicle's map when it was last compared.
     seen: BTreeMap<Address, SeenMap>,
-    /// The configured budget.
+    /// The budget of the configuration file.
     configured: StoredBudget,
 }
 

@@ -21,7 +21,7 @@ struct Answer {
     content: Vec<u8>,
     /// The parts that are to be sent.
     waiting: VecDeque<Range<usize>>,
-    /// Parts of unknown fate.
+    /// The number of parts of unknown fate.
     in_flight: usize,
 }
 

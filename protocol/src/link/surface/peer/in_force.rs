@@ -125,7 +125,7 @@ impl InForceCopy {
         self.next_inquiry().filter(|&at| now >= at).map(|_| self.digests().encode())
     }
 
-    /// An inquiry was written.
+    /// An inquiry was written into a frame.
     pub(super) fn note_inquiry(&mut self, now: Instant) {
         self.next_inquiry = now + Self::FIRST_PAUSE * (1 << self.inquiries.min(Self::MAX_DOUBLINGS));
         self.inquiries += 1;
