@@ -7,7 +7,7 @@ use super::missing_key::warn_without_key;
 use super::modem::{self, ModemPort};
 use super::pilot::{self, PilotPort, SimulatedAutopilot};
 use super::stop::Stop;
-use super::store::SurfaceFiles;
+use super::store::{ArchivedFile, SurfaceFiles};
 use crate::port::FromPort;
 use scenecast_config::Config;
 use scenecast_console::{
@@ -20,7 +20,7 @@ use scenecast_host::{Follower, FrameEvent, SurfaceHost, SurfaceHostEvent, modem_
 use scenecast_protocol::wire::Address;
 use scenecast_surface::position::Follow;
 use scenecast_surface::{CommandChange, SurfaceOutput};
-use std::sync::Arc;
+use std::sync::{Arc, Mutex};
 use std::time::Duration;
 use tokio::sync::oneshot;
 
@@ -79,8 +79,8 @@ pub fn run_surface(config: Config, simulated: Option<SimulatedAutopilot>) -> Res
         let follower = autopilot.map(|a| Follower::new(a, follow, vehicle, clock.now()));
         let host = SurfaceHost::new(surface, modem_station(&config, Address::SURFACE, profile)?, follower);
         let maps = MapFiles::start(config.runtime.state_dir.clone());
-        let is_stale = true;
-        SurfaceShell { host, ports, console, clock, files, maps, facts, meter, is_stale }.run(stop).await
+        let (is_stale, reading) = (true, Arc::default());
+        SurfaceShell { host, ports, console, clock, files, maps, facts, meter, reading, is_stale }.run(stop).await
     })
 }
 
@@ -100,6 +100,8 @@ struct SurfaceShell {
     maps: MapFiles,
     facts: MissionFacts,
     meter: LinkMeter,
+    /// Held while an archived map is read.
+    reading: Arc<Mutex<()>>,
     /// The page lacks changes that are still to be committed.
     is_stale: bool,
 }
@@ -154,15 +156,14 @@ impl SurfaceShell {
 
     /// Handles a request. Its effects are durable before the reply, and before anything is transmitted.
     fn handle_request(&mut self, request: ClientRequest, reply: oneshot::Sender<Reply>) {
+        if let SurfaceRequest::ArchivedMap(name) = &request.request {
+            return self.read_archive(name, reply);
+        }
         let now = self.clock.now();
         self.files.commit(self.host.surface_mut(), None, now);
         let by = request.principal.as_ref().map(|principal| principal.name().to_owned());
         let answer = match &request.request {
             SurfaceRequest::Archives => Reply::Archives(self.files.archives(now)),
-            SurfaceRequest::ArchivedMap(name) => match self.files.store.archived(name) {
-                Some(map) => Reply::Map(archived_cells(&map, self.facts.cell_m)),
-                None => Reply::NotFound,
-            },
             _ => handle_request(self.host.surface_mut(), request, self.facts.cell_m, now),
         };
         self.files.commit(self.host.surface_mut(), by.as_deref(), now);
@@ -172,6 +173,19 @@ impl SurfaceShell {
         }
         // A browser that closed its connection needs no reply.
         let _ = reply.send(answer);
+    }
+
+    /// Reads an archived map beside the loop of the link, one at a time.
+    fn read_archive(&self, name: &str, reply: oneshot::Sender<Reply>) {
+        let (file, cell_m) = (self.files.store.archived(name), self.facts.cell_m);
+        let reading = self.reading.clone();
+        tokio::task::spawn_blocking(move || {
+            let _one = reading.lock();
+            let map = file.and_then(ArchivedFile::read);
+            let answer = map.map_or(Reply::NotFound, |map| Reply::Map(archived_cells(&map, cell_m)));
+            // A browser that closed its connection needs no reply.
+            let _ = reply.send(answer);
+        });
     }
 
     /// Shows the state on the page, after it was made durable.

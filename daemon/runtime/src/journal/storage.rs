@@ -41,6 +41,7 @@ pub(crate) trait Storage {
     fn rename(&mut self, from: &str, to: &str) -> io::Result<()>;
 
     /// The names of the files.
+    #[cfg_attr(not(feature = "surface"), allow(dead_code, reason = "vehicles have no archive"))]
     fn list(&self) -> io::Result<Vec<String>>;
 
     /// Makes the names in the folder durable.

@@ -97,10 +97,24 @@ impl Archives {
         self.known.values()
     }
 
-    /// Reads the archived map of this name.
-    pub(super) fn load<S: Storage>(&self, storage: Option<&S>, name: &str) -> Option<VehicleMemory> {
+    /// The file of the archived map of this name.
+    pub(super) fn file<S: Storage + Clone>(&self, storage: Option<&S>, name: &str) -> Option<ArchivedFile<S>> {
         let vehicle = self.known.get(name)?.vehicle;
-        let bytes = storage?.read(&format!("{name}{SUFFIX}")).ok()??;
-        decode(&bytes)?.take_vehicle(vehicle)
+        Some(ArchivedFile { storage: storage?.clone(), name: name.to_owned(), vehicle })
+    }
+}
+
+/// The file of an archived map. To read a large one takes longer than the link may wait.
+pub(crate) struct ArchivedFile<S> {
+    storage: S,
+    name: String,
+    vehicle: u8,
+}
+
+impl<S: Storage> ArchivedFile<S> {
+    /// The map; `None` if the file is gone or unreadable.
+    pub(crate) fn read(self) -> Option<VehicleMemory> {
+        let bytes = self.storage.read(&format!("{}{SUFFIX}", self.name)).ok()??;
+        decode(&bytes)?.take_vehicle(self.vehicle)
     }
 }

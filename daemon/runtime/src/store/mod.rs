@@ -9,7 +9,7 @@ mod power_cuts;
 #[cfg(test)]
 mod refusing;
 
-pub(super) use archives::ArchiveInfo;
+pub(super) use archives::{ArchiveInfo, ArchivedFile};
 pub(super) use files::SurfaceFiles;
 
 use crate::journal::Storage;
@@ -17,7 +17,7 @@ use archives::Archives;
 use log::{EventLog, Found, STORE};
 use scenecast_core::UserError;
 use scenecast_surface::Surface;
-use scenecast_surface::record::{EventTime, Observation, Recorder, SurfaceMemory, VehicleMemory};
+use scenecast_surface::record::{EventTime, Observation, Recorder, SurfaceMemory};
 use std::io;
 
 /// The state of the disk, for the page.
@@ -173,9 +173,12 @@ impl<S: Storage> SurfaceStore<S> {
         self.archives.list()
     }
 
-    /// An archived map; `None` if there is none of this name or the disk refuses.
-    pub(super) fn archived(&self, name: &str) -> Option<VehicleMemory> {
-        self.archives.load(self.log.as_ref().map(EventLog::storage), name)
+    /// The file of an archived map; `None` if there is none of this name or the disk refuses.
+    pub(super) fn archived(&self, name: &str) -> Option<ArchivedFile<S>>
+    where
+        S: Clone,
+    {
+        self.archives.file(self.log.as_ref().map(EventLog::storage), name)
     }
 }
 

@@ -16,6 +16,7 @@ mod bench_modem;
 mod bench_planning;
 #[cfg(feature = "rehearsal")]
 mod bench_restart;
+#[cfg(feature = "rehearsal")]
 mod bench_stranger;
 #[cfg(feature = "rehearsal")]
 mod bench_wide;
