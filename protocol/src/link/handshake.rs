@@ -27,9 +27,9 @@ pub enum HandshakeOutcome {
 pub(super) struct Handshake<T> {
     own: Identity,
     run: Option<LinkRun<T>>,
-    /// At the vehicle: the runs offered in answer to hellos of different runs of the surface, the last answered one at the
-    /// end, until a numbered frame proves which of them the surface has accepted. The others were late or replayed.
-    offers: VecDeque<LinkRun<T>>,
+    /// At the vehicle: the run offered in answer to a hello, until a numbered frame proves that
+    /// the surface has accepted it.
+    offered: Option<LinkRun<T>>,
     /// At the vehicle: `run` serves only to receive grants, because this end has begun a new one.
     leaving: bool,
     retired: VecDeque<EndedPeer>,
@@ -40,14 +40,11 @@ impl<T> Handshake<T> {
     /// Ended runs that are remembered.
     const MEMORY: usize = 32;
 
-    /// Offers that wait for a numbered frame: replayed hellos must not displace that of the surface.
-    const MAX_OFFERS: usize = 8;
-
     /// A handshake that has not begun; `seed` must be random for each start of the program.
     pub(super) fn new(seed: u64) -> Self {
         let mut random = seed;
         let own = fresh(&mut random);
-        Self { own, run: None, offers: VecDeque::new(), leaving: false, retired: VecDeque::new(), random }
+        Self { own, run: None, offered: None, leaving: false, retired: VecDeque::new(), random }
     }
 
     pub(super) fn own(&self) -> Identity {
@@ -62,14 +59,8 @@ impl<T> Handshake<T> {
         self.run.as_mut()
     }
 
-    /// The run that was offered last.
     pub(super) fn offered(&self) -> Option<&LinkRun<T>> {
-        self.offers.back()
-    }
-
-    /// The offered runs, the last one first.
-    pub(super) fn offers(&self) -> impl Iterator<Item = &LinkRun<T>> {
-        self.offers.iter().rev()
+        self.offered.as_ref()
     }
 
     pub(super) fn is_leaving(&self) -> bool {
@@ -89,22 +80,16 @@ impl<T> Handshake<T> {
         if self.is_retired(peer) {
             return HandshakeOutcome::Retired;
         }
-        let known = self.offers.iter().position(|r| r.peer == peer).and_then(|at| self.offers.remove(at));
-        let offer = known.unwrap_or_else(|| {
+        if self.offered.as_ref().is_none_or(|r| r.peer != peer) {
             let own = fresh(&mut self.random);
-            LinkRun::new(own, peer, introduction, key(own, peer))
-        });
-        self.offers.push_back(offer);
-        if self.offers.len() > Self::MAX_OFFERS {
-            self.offers.pop_front();
+            self.offered = Some(LinkRun::new(own, peer, introduction, key(own, peer)));
         }
         HandshakeOutcome::New
     }
 
-    /// At the vehicle: makes the offered run `own` the current one, because a numbered frame to it came in.
-    pub(super) fn accept_offered(&mut self, own: Identity) {
-        let run = std::mem::take(&mut self.offers).into_iter().find(|r| r.own == own);
-        if let Some(run) = run {
+    /// At the vehicle: makes the offered run the current one, because a numbered frame of it came in.
+    pub(super) fn accept_offered(&mut self) {
+        if let Some(run) = self.offered.take() {
             self.own = run.own;
             self.leaving = false;
             self.replace(run);
@@ -132,7 +117,7 @@ impl<T> Handshake<T> {
     pub(super) fn renew_vehicle(&mut self, key: impl Fn(Identity, Identity) -> Option<SessionKey>) {
         let Some((peer, introduction)) = self.run.as_ref().map(|r| (r.peer, r.introduction)) else { return };
         let own = fresh(&mut self.random);
-        self.offers = VecDeque::from([LinkRun::new(own, peer, introduction, key(own, peer))]);
+        self.offered = Some(LinkRun::new(own, peer, introduction, key(own, peer)));
         self.leaving = true;
     }
 

@@ -3,7 +3,7 @@
 use super::{LinkPair, session_key};
 use crate::link::handshake::HandshakeOutcome;
 use crate::link::mismatch::Mismatch;
-use crate::link::run::{Identity, LinkRun};
+use crate::link::run::Identity;
 use crate::link::{DropReason, FrameNumber, WindowRefusal};
 use crate::wire::{Address, ChunkKind, Chunks, Envelope, Frame, FrameKind, Header, Introduction, Seal, WIRE_VERSION};
 
@@ -106,8 +106,7 @@ impl<T> LinkPair<T> {
     ) -> Result<Inbound<'a, T>, DropReason> {
         let (mission, direction) = (self.mission, self.direction_in());
         let keyed = self.is_keyed(direction);
-        let opened = |r: &LinkRun<T>| Some((r.own, r.open(envelope, mission, direction, keyed)?));
-        let (accepted, offered) = self.handshake.offers().find_map(opened).unzip();
+        let offered = self.handshake.offered().and_then(|r| r.open(envelope, mission, direction, keyed));
         let restarted = offered.is_some();
         let known = || self.handshake.run().and_then(|r| r.open(envelope, mission, direction, keyed));
         let Some(frame) = offered.or_else(known) else {
@@ -128,8 +127,8 @@ impl<T> LinkPair<T> {
         }
         self.strays = 0;
         self.mismatch.handle_accepted();
-        if let Some(own) = accepted {
-            self.handshake.accept_offered(own);
+        if restarted {
+            self.handshake.accept_offered();
             self.stats.peer_restarts += 1;
         }
         self.owes_hello = self.handshake.is_leaving();
