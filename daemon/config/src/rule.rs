@@ -3,7 +3,7 @@
 /// The bounds of a key; each type uses those that concern it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Rule {
-    /// Least and greatest number.
+    /// The least and the greatest number.
     pub range: (f64, f64),
     /// Unit of the numbers; empty without one.
     pub unit: &'static str,

@@ -42,8 +42,8 @@ pub struct WholeMaps {
     pub at: Instant,
 }
 
-/// The map of an earlier run, or of an earlier run of the surface, which stays in view until the current one has as many
-/// cells.
+/// The map of an earlier run, or of an earlier run of the surface, which stays in view until the
+/// current one has as many cells.
 #[derive(Debug, Default)]
 pub struct EarlierView {
     pub map: Option<Arc<EarlierMap>>,

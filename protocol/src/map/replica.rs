@@ -61,8 +61,8 @@ impl Replica {
         self.received.cells_apart_from(earlier)
     }
 
-    /// Puts a cell back that an earlier run of the surface has received. Such a replica is only shown: it is no base of a
-    /// chunk.
+    /// Puts a cell back that an earlier run of the surface has received. Such a replica is only shown: it
+    /// is no base of a chunk.
     pub fn restore(&mut self, cell: Cell, label: u8, at: Instant) {
         if !self.received.has_room(&[(cell, label)]) {
             return;

@@ -13,7 +13,7 @@ pub(super) struct StateChange {
     pub(super) vehicle: Option<u8>,
     /// mission, command, vehicle, mode, silence, map, label, directive, exemplar or budget.
     pub(super) kind: &'static str,
-    /// One line for people.
+    /// One line of text for people.
     pub(super) text: String,
 }
 

@@ -4,7 +4,7 @@ use crate::state::Origin;
 
 /// Semi-major axis of WGS 84, metres.
 const A: f64 = 6_378_137.0;
-/// Its flattening.
+/// The flattening of that ellipsoid.
 const F: f64 = 1.0 / 298.257_223_563;
 
 /// The transverse Mercator projection on WGS 84: the series of Krueger (1912) to the fourth order of the third flattening, as in

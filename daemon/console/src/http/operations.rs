@@ -42,7 +42,7 @@ pub(super) struct Operation {
     pub(super) id: &'static str,
     /// The least role that may use it; `None` if no principal is needed.
     pub(super) role: Option<Role>,
-    /// One line for people.
+    /// One line of text for people.
     pub(super) summary: &'static str,
     /// The schema of the request's body.
     pub(super) body: Option<SchemaOf>,

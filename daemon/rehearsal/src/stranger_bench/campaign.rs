@@ -308,8 +308,8 @@ impl Campaign {
         judgement
     }
 
-    /// The operator gives an order after the last forged frame; then the link has time to recover. Returns the seconds that it
-    /// took.
+    /// The operator gives an order after the last forged frame; then the link has time to recover.
+    /// Returns the seconds that it took.
     fn quiet(&mut self, ends: &mut AttackedEnds) -> f64 {
         ends.issue();
         let began = ends.now();

@@ -73,8 +73,8 @@ impl Forger {
         self.earlier.drain(..excess);
     }
 
-    /// The next frame of one of these kinds; `shown` is the operator's map. A kind for which the stranger knows too little
-    /// becomes noise.
+    /// The next frame of one of these kinds; `shown` is the operator's map. A kind for which
+    /// the stranger knows too little becomes noise.
     pub(super) fn forge(&mut self, kinds: &[AttackKind], shown: Option<&LabelGrid>) -> ForgedFrame {
         let kind = kinds[self.below(kinds.len())];
         let to_vehicle = match kind {

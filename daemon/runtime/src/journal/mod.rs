@@ -73,8 +73,8 @@ pub(super) struct Journal<S: Storage> {
     is_copy_uncertain: bool,
     /// Whether the journal may lack the last state on the disk, while the copy has it.
     is_journal_uncertain: bool,
-    /// Whether the names of both files may be missing after a power cut, because the folder's sync failed or was made by an
-    /// earlier process.
+    /// Whether the names of both files may be missing after a power cut, because the folder's sync failed
+    /// or was made by an earlier process.
     is_folder_uncertain: bool,
     files: [Option<S::File>; 2],
     /// Whether a file is put aside before a new one takes its name.

@@ -64,8 +64,8 @@ impl<S: Storage> EventLog<S> {
         Ok(Self { storage, file, last, snapshot_bytes: bytes.len(), tail_bytes: 0 })
     }
 
-    /// Makes events durable. A power cut before the return of `Ok` leaves all of them or none. A removed file is an error
-    /// without events too.
+    /// Makes events durable. A power cut before the return of `Ok` leaves all of them or none. A
+    /// removed file is an error without events too.
     pub(super) fn append(&mut self, events: &[Event]) -> io::Result<()> {
         let Some(last) = events.last() else { return self.storage.append(STORE, &mut self.file, &[]) };
         let bytes = batch::encode(last.sequence, self.last, &record::encode(events));

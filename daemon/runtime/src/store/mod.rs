@@ -80,8 +80,8 @@ impl<S: Storage> SurfaceStore<S> {
         Ok(store)
     }
 
-    /// Begins a run of the surface: restores `surface` from the state that survived, and writes a new file. `id` and `mission`
-    /// name a new store.
+    /// Begins a run of the surface: restores `surface` from the state that survived, and writes a
+    /// new file. `id` and `mission` name a new store.
     pub(super) fn begin(&mut self, surface: &mut Surface, id: u32, mission: u32, time: EventTime) {
         let observation = self.recorder.begin(surface, id, mission, time);
         self.archives.wait(observation.archives);
