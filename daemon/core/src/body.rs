@@ -3,7 +3,7 @@
 /// An offset in the frame of a vessel's body, metres.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct BodyOffset {
-    /// Towards the bow.
+    /// The part towards the bow.
     pub forward_m: f64,
     /// To the right of an observer who looks forward.
     pub starboard_m: f64,
