@@ -118,6 +118,11 @@ impl<T> LinkPair<T> {
         self.strays >= Self::STRAYS
     }
 
+    /// The number of frames since the last accepted one that are a sign of other runs.
+    pub(super) fn strays(&self) -> u32 {
+        self.strays
+    }
+
     /// The highest frame number received, 0 before the first.
     pub fn highest(&self) -> FrameNumber {
         self.handshake.run().map_or(0, |r| r.window.highest())

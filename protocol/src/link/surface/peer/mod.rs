@@ -161,6 +161,7 @@ impl<R: StateReplica> VehiclePeer<R> {
         events: &mut VecDeque<SurfaceEvent>,
     ) {
         let content = &self.content;
+        let strays_before = self.pair.strays();
         let inbound = match self.pair.handle_frame(envelope, |base, chunks| content.decodes(base, chunks)) {
             Ok(inbound) => inbound,
             Err(reason) => {
@@ -170,8 +171,9 @@ impl<R: StateReplica> VehiclePeer<R> {
                 }
                 // The vehicle builds on frames that we never acknowledged, or means another run of ours.
                 let silent = matches!(modem.access, Access::ModemOwned { .. }) || self.master.unanswered() >= 2;
-                // Only a frame with a valid CRC counts, so only one is a reason to begin a new run.
-                let strays = reason == DropReason::OldSession && self.pair.seems_out_of_step() && silent;
+                // A damaged frame is no sign of another run, so it is no reason to begin a new one.
+                let is_stray = self.pair.strays() > strays_before;
+                let strays = is_stray && self.pair.seems_out_of_step() && silent;
                 self.is_out_of_step |= reason == DropReason::NoBase || strays;
                 return;
             }
