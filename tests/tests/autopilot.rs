@@ -196,6 +196,7 @@ fn a_vehicle_surveys_on_ardusub_and_reports_its_silence() {
     wait_until("the operator sees it move", limit, || {
         status().is_some_and(|s| s["x_m"].as_f64() > Some(8.0) && s["autopilot_silent"] == false)
     });
+    assert_eq!(peer.seen()["targets_refused"].as_u64(), Some(0), "{}", peer.seen());
     peer.order("silent");
     wait_until("the operator sees that it is silent", limit, || {
         status().is_some_and(|s| s["autopilot_silent"] == true)
@@ -204,6 +205,7 @@ fn a_vehicle_surveys_on_ardusub_and_reports_its_silence() {
     wait_until("the link goes on", limit, || status().is_some_and(|s| s["at_s"].as_f64() > at));
     peer.order("speak");
     wait_until("it is back", limit, || status().is_some_and(|s| s["autopilot_silent"] == false));
+    // A target that was on its way when the failsafe of the autopilot began may have been refused.
     let seen = peer.seen();
-    assert_eq!((seen["bad"].as_u64(), seen["targets_refused"].as_u64()), (Some(0), Some(0)), "{seen}");
+    assert_eq!(seen["bad"].as_u64(), Some(0), "{seen}");
 }
