@@ -65,7 +65,8 @@ impl Pair {
 /// The members of a vehicle that do not change while it is silent.
 fn lasting(mut vehicle: Value) -> Value {
     let members = vehicle.as_object_mut().unwrap();
-    for changing in ["link", "next_contact_s", "expected_interval_s"] {
+    // Reports on the content in force begin again with the surface that runs now.
+    for changing in ["link", "next_contact_s", "expected_interval_s", "in_force"] {
         members.remove(changing);
     }
     let map = members["map"].as_object_mut().unwrap();
