@@ -4,7 +4,6 @@ use super::event::StoredBudget;
 use super::memory::{SurfaceMemory, VehicleMemory};
 use super::stored;
 use crate::Surface;
-use crate::annotations::Annotations;
 use crate::exemplar_cache::ExemplarCache;
 use crate::vehicle_record::{Track, VehicleRecord};
 use scenecast_protocol::directive::Series;
@@ -52,5 +51,6 @@ fn restore_record(record: &mut VehicleRecord, memory: &VehicleMemory) {
         exemplars.restore_request(label, *serial, open.as_ref().map(|open| stored::open_request(label, open)));
     }
     record.exemplars = exemplars;
-    record.annotations = Annotations { labels: memory.labels.clone(), notes: memory.notes.clone() };
+    record.annotations.labels.clone_from(&memory.labels);
+    record.annotations.notes.clone_from(&memory.notes);
 }
