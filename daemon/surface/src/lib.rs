@@ -11,6 +11,7 @@ mod orders;
 mod pauses;
 pub mod position;
 pub mod record;
+pub mod recorder;
 mod requests;
 mod settings;
 mod surface;
@@ -24,7 +25,6 @@ pub use command::{
 };
 pub use exemplar_cache::{ExemplarCache, LabelExemplars, OpenRequest, RequestKind, RequestState, StoredExemplar};
 pub use orders::{FenceOrder, LimitsOrder, MAX_DISTANCE_M};
-pub use record::{EarlierMap, StoredLabel};
 pub use scenecast_core::{Principal, Role};
 pub use settings::{SettingsOrder, SettingsRecord};
 pub use surface::{Surface, SurfaceOutput};

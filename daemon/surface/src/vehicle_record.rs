@@ -3,8 +3,8 @@
 use super::annotations::Annotations;
 use super::exemplar_cache::ExemplarCache;
 use super::pauses::Pauses;
+use super::record::{EarlierMap, StoredLabel};
 use super::settings::SettingsRecord;
-use super::{EarlierMap, StoredLabel};
 use scenecast_core::UsblLine;
 use scenecast_protocol::directive::{ExemplarRequests, Fence, Limits, SlotId, Utility};
 use scenecast_protocol::exemplar::Exemplar;

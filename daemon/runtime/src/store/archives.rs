@@ -2,7 +2,8 @@
 
 use super::{batch, log};
 use crate::journal::Storage;
-use scenecast_surface::record::{self, Archive, RunId, SurfaceMemory, VehicleMemory};
+use scenecast_surface::record::{self, RunId, SurfaceMemory, VehicleMemory};
+use scenecast_surface::recorder::Archive;
 use std::collections::{BTreeMap, VecDeque};
 use std::io;
 

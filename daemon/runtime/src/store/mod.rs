@@ -17,7 +17,8 @@ use archives::Archives;
 use log::{EventLog, Found, STORE};
 use scenecast_core::UserError;
 use scenecast_surface::Surface;
-use scenecast_surface::record::{EventTime, Observation, Recorder, SurfaceMemory};
+use scenecast_surface::record::{EventTime, SurfaceMemory};
+use scenecast_surface::recorder::{Observation, Recorder};
 use std::io;
 
 /// The state of the disk, for the page.

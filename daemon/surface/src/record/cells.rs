@@ -1,6 +1,7 @@
 //! Copies of maps: what the surface has received, cell by cell, with its times.
 
-use super::event::{StoredCells, StoredContact, StoredLabel};
+use super::contact::StoredContact;
+use super::event::{StoredCells, StoredLabel};
 use scenecast_protocol::map::{Cell, LayerDescriptor, LayerId, LayerReplica, Replica, SharedTiles, UNEXPLORED};
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::Placement;
@@ -28,13 +29,13 @@ pub struct EarlierMap {
     pub names: BTreeMap<u8, StoredLabel>,
     pub map: MapCopy,
     /// The last report of its run.
-    pub(super) contact: StoredContact,
+    pub(crate) contact: StoredContact,
 }
 
 impl EarlierMap {
     /// The placement of the map in its run; `None` while no fix had moved it.
     pub fn placement(&self) -> Option<Placement> {
-        super::stored::status(&self.contact)?.0.placement
+        self.contact.status()?.0.placement
     }
 }
 
@@ -54,7 +55,7 @@ impl MapCopy {
     }
 
     /// Applies stored cells. Cells of a layer whose descriptor is unreadable are left out.
-    pub(super) fn apply(&mut self, stored: &StoredCells) {
+    pub(crate) fn apply(&mut self, stored: &StoredCells) {
         let Some((index, descriptor)) = &stored.layer else {
             for (cell, label, at) in unpack(&stored.cells) {
                 let before = self.labels.shown().get(cell);
@@ -74,12 +75,12 @@ impl MapCopy {
     }
 
     /// The events that change this copy of the labels into `live`.
-    pub(super) fn label_changes(&self, live: impl Iterator<Item = (Cell, u8, Instant)>) -> Vec<StoredCells> {
+    pub(crate) fn label_changes(&self, live: impl Iterator<Item = (Cell, u8, Instant)>) -> Vec<StoredCells> {
         pack(None, changed(&self.labels, live))
     }
 
     /// The events that change this copy of a layer into `live`. It is equal to `live` in the tiles of `compared`.
-    pub(super) fn layer_changes(&self, id: LayerId, live: &LayerReplica, compared: &SharedTiles) -> Vec<StoredCells> {
+    pub(crate) fn layer_changes(&self, id: LayerId, live: &LayerReplica, compared: &SharedTiles) -> Vec<StoredCells> {
         let head = Some((id.index() as u8, live.descriptor().to_bytes()));
         match self.layers.get(&id).filter(|kept| kept.descriptor() == live.descriptor()) {
             Some(kept) => pack(head, changed(kept.levels(), live.levels().cells_apart_from(compared))),
@@ -88,7 +89,7 @@ impl MapCopy {
     }
 
     /// The events that make this copy from nothing.
-    pub(super) fn to_events(&self) -> Vec<StoredCells> {
+    pub(crate) fn to_events(&self) -> Vec<StoredCells> {
         let mut all = pack(None, self.labels.cells().collect());
         for (id, layer) in &self.layers {
             let head = Some((id.index() as u8, layer.descriptor().to_bytes()));

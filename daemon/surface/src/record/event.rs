@@ -1,5 +1,6 @@
 //! The events of the surface's store. Variants are only ever appended, because their order is their number in the file.
 
+use super::contact::StoredContact;
 use serde::{Deserialize, Serialize};
 
 /// When an event was recorded.
@@ -109,28 +110,6 @@ pub struct StoredCells {
     pub layer: Option<(u8, Vec<u8>)>,
     /// Columns, rows and times as differences to the cell before.
     pub cells: Vec<(i64, i64, u8, i64)>,
-}
-
-/// The last contact with a vehicle.
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
-pub struct StoredContact {
-    pub last_received: Option<u64>,
-    /// The longest usual pause between two frames, microseconds.
-    pub pause: Option<u64>,
-    /// When the last pose came in; pose and report as on the wire.
-    pub status: Option<(u64, Vec<u8>, Vec<u8>)>,
-    pub usbl: Option<StoredRange>,
-}
-
-/// A measurement of the surface's modem.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct StoredRange {
-    pub at: u64,
-    pub remote: u16,
-    pub range_m: Option<f64>,
-    pub direction_rad: Option<(f64, f64)>,
-    pub accuracy: f64,
-    pub age_s: f64,
 }
 
 /// An order and how far it has come.

@@ -1,9 +1,10 @@
 //! The surface's knowledge, folded from its events.
 
 use super::cells::{EarlierMap, MapCopy};
+use super::contact::StoredContact;
 use super::event::{
-    Event, EventKind, EventTime, RunId, StoredBudget, StoredContact, StoredImage, StoredIntent, StoredLabel,
-    StoredNote, StoredOrder, StoredRequest, VehicleEvent,
+    Event, EventKind, EventTime, RunId, StoredBudget, StoredImage, StoredIntent, StoredLabel, StoredNote, StoredOrder,
+    StoredRequest, VehicleEvent,
 };
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
@@ -28,39 +29,39 @@ pub struct Began {
 #[derive(Debug, Default)]
 pub struct SurfaceMemory {
     /// The sequence number of the last event.
-    pub(super) sequence: u64,
+    pub(crate) sequence: u64,
     /// The time of the last event.
-    pub(super) last: EventTime,
+    pub(crate) last: EventTime,
     /// How the store was begun.
-    pub(super) began: Option<Began>,
+    pub(crate) began: Option<Began>,
     /// The last order of a budget, and the configured one at that time.
-    pub(super) budget: Option<(StoredBudget, StoredBudget)>,
-    pub(super) vehicles: BTreeMap<u8, VehicleMemory>,
+    pub(crate) budget: Option<(StoredBudget, StoredBudget)>,
+    pub(crate) vehicles: BTreeMap<u8, VehicleMemory>,
 }
 
 /// Everything that the surface keeps about one vehicle.
 #[derive(Debug, Default)]
 pub struct VehicleMemory {
-    pub(super) name: String,
-    pub(super) id: RunId,
-    pub(super) map: MapCopy,
-    pub(super) map_version: u64,
-    pub(super) earlier: Option<Arc<EarlierMap>>,
-    pub(super) contact: StoredContact,
-    pub(super) track_total: u64,
-    pub(super) track: VecDeque<(u64, f64, f64)>,
-    pub(super) orders: Vec<StoredOrder>,
+    pub(crate) name: String,
+    pub(crate) id: RunId,
+    pub(crate) map: MapCopy,
+    pub(crate) map_version: u64,
+    pub(crate) earlier: Option<Arc<EarlierMap>>,
+    pub(crate) contact: StoredContact,
+    pub(crate) track_total: u64,
+    pub(crate) track: VecDeque<(u64, f64, f64)>,
+    pub(crate) orders: Vec<StoredOrder>,
     /// The series of the versions of the orders; 0 before the first.
-    pub(super) series: u64,
-    pub(super) intent: StoredIntent,
+    pub(crate) series: u64,
+    pub(crate) intent: StoredIntent,
     /// By label, in the order of arrival.
-    pub(super) exemplars: BTreeMap<u8, Vec<StoredImage>>,
+    pub(crate) exemplars: BTreeMap<u8, Vec<StoredImage>>,
     /// Serial number of requests and the open one, by label.
-    pub(super) requests: BTreeMap<u8, (u8, Option<StoredRequest>)>,
-    pub(super) labels: BTreeMap<u8, StoredLabel>,
-    pub(super) notes: VecDeque<StoredNote>,
+    pub(crate) requests: BTreeMap<u8, (u8, Option<StoredRequest>)>,
+    pub(crate) labels: BTreeMap<u8, StoredLabel>,
+    pub(crate) notes: VecDeque<StoredNote>,
     /// Set in an archived map only: end of the run in microseconds of mission time, number of cells.
-    pub(super) archived: Option<(u64, u64)>,
+    pub(crate) archived: Option<(u64, u64)>,
 }
 
 impl SurfaceMemory {
@@ -154,11 +155,11 @@ impl VehicleMemory {
 
     /// The placement of the map, metres to add east and north, if a fix has moved it.
     pub fn placement_m(&self) -> Option<(f64, f64)> {
-        let status = super::stored::status(&self.contact)?.0;
+        let status = self.contact.status()?.0;
         status.placement.map(|p| (p.origin.east_m, p.origin.north_m))
     }
 
-    pub(super) fn apply(&mut self, event: &VehicleEvent) {
+    pub(crate) fn apply(&mut self, event: &VehicleEvent) {
         match event {
             VehicleEvent::Named(name) => self.name.clone_from(name),
             VehicleEvent::Identified(id) => {
@@ -265,7 +266,7 @@ impl VehicleMemory {
     }
 
     /// The map of the run with everything that belongs to it, for the archive.
-    pub(super) fn archive(&self, ended_us: u64) -> Vec<VehicleEvent> {
+    pub(crate) fn archive(&self, ended_us: u64) -> Vec<VehicleEvent> {
         let cells = self.map.explored() as u64;
         let head = [VehicleEvent::Archived { ended_us, cells }, VehicleEvent::Named(self.name.clone())];
         head.into_iter().chain(self.run_events()).collect()

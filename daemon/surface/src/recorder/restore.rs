@@ -1,10 +1,9 @@
 //! Puts the stored knowledge back into a surface that has just started.
 
-use super::event::StoredBudget;
-use super::memory::{SurfaceMemory, VehicleMemory};
 use super::stored;
 use crate::Surface;
 use crate::exemplar_cache::ExemplarCache;
+use crate::record::{StoredBudget, SurfaceMemory, VehicleMemory};
 use crate::vehicle_record::{Track, VehicleRecord};
 use scenecast_protocol::directive::Series;
 use scenecast_protocol::schedule::{BackgroundOrder, Shares};
@@ -40,8 +39,8 @@ fn restore_record(record: &mut VehicleRecord, memory: &VehicleMemory) {
     let points = memory.track.iter().map(|&(at, x, y)| (Instant::from_micros(at), x, y));
     record.track = Track::restored(points, memory.track_total);
     let last_received = memory.contact.last_received.map(Instant::from_micros);
-    record.restore_contact(stored::status(&memory.contact), last_received, stored::pause(&memory.contact));
-    record.found = memory.contact.usbl.as_ref().and_then(stored::range);
+    record.restore_contact(memory.contact.status(), last_received, memory.contact.pause());
+    record.found = memory.contact.range();
     record.earlier.version_base = memory.map_version + 1;
     let mut exemplars = ExemplarCache::default();
     for (&label, images) in &memory.exemplars {

@@ -1,17 +1,14 @@
 //! The surface's types as they are stored, and back.
 
-use super::event::{StoredContact, StoredImage, StoredIntent, StoredOrder, StoredRange, StoredRequest};
 use crate::exemplar_cache::{OpenRequest, RequestState, StoredExemplar};
+use crate::record::{StoredContact, StoredImage, StoredIntent, StoredOrder, StoredRange, StoredRequest};
 use crate::settings::SettingsRecord;
 use crate::vehicle_record::VehicleRecord;
-use scenecast_core::UsblLine;
 use scenecast_protocol::directive::{
     ExemplarRequest, Fence, Limits, OrderStatus, RefusalReason, Settings, Slot, SlotProgress, Utility, VersionedSlot,
 };
 use scenecast_protocol::link::PeerView;
 use scenecast_protocol::time::Instant;
-use scenecast_protocol::wire::VehicleStatus;
-use std::time::Duration;
 
 /// Room for a status with everything in it, bytes.
 const STATUS_ROOM: usize = 1024;
@@ -44,25 +41,6 @@ pub(super) fn contact(record: &VehicleRecord, view: &PeerView<'_>) -> StoredCont
             age_s: line.age_s,
         }),
     }
-}
-
-/// The stored status and when its pose came in.
-pub(super) fn status(contact: &StoredContact) -> Option<(VehicleStatus, Instant)> {
-    let (at, pose, report) = contact.status.as_ref()?;
-    let mut status = VehicleStatus::default();
-    status.read_pose(pose).ok()?;
-    status.read_report(report).ok()?;
-    Some((status, Instant::from_micros(*at)))
-}
-
-pub(super) fn range(stored: &StoredRange) -> Option<(UsblLine, Instant)> {
-    let StoredRange { at, remote, range_m, direction_rad, accuracy, age_s } = *stored;
-    let line = UsblLine { remote: remote.try_into().ok()?, range_m, direction_rad, accuracy, age_s };
-    Some((line, Instant::from_micros(at)))
-}
-
-pub(super) fn pause(contact: &StoredContact) -> Option<Duration> {
-    contact.pause.map(Duration::from_micros)
 }
 
 pub(super) fn order(progress: &SlotProgress) -> StoredOrder {

@@ -1,9 +1,16 @@
 //! Finds the events that lead from the stored knowledge to the surface's present one.
+//!
+//! [`Recorder`] compares the surface with its [`SurfaceMemory`] and yields the [`Event`]s between them; the host writes
+//! these before it shows or sends anything that depends on them.
 
-use super::event::{Event, EventKind, EventSource, EventTime, RunId, StoredBudget, StoredImage, VehicleEvent};
-use super::memory::{SurfaceMemory, VehicleMemory};
-use super::stored;
+mod restore;
+mod stored;
+
 use crate::Surface;
+use crate::record::{
+    Event, EventKind, EventSource, EventTime, RunId, StoredBudget, StoredImage, SurfaceMemory, VehicleEvent,
+    VehicleMemory,
+};
 use crate::vehicle_record::VehicleRecord;
 use scenecast_protocol::link::PeerView;
 use scenecast_protocol::map::{LayerId, SharedTiles};
@@ -82,7 +89,7 @@ impl Recorder {
                 for address in self.memory.vehicles.keys().copied().collect::<Vec<_>>() {
                     self.replace(&mut found, address, time);
                 }
-                super::restore::restore(surface, &self.memory, &self.configured);
+                restore::restore(surface, &self.memory, &self.configured);
             }
         }
         let follow = self.observe(surface, None, time);
