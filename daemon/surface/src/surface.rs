@@ -2,17 +2,15 @@
 
 use super::command::{Command, CommandAction, CommandChange, CommandRefusal, OrderKind};
 use super::in_force;
-use super::orders::{FenceOrder, LimitsOrder};
 use super::position::{Relay, UsblSighting};
-use super::settings::SettingsOrder;
 use super::vehicle_record::{VehicleRecord, WholeMaps};
 use scenecast_core::label_picture;
 use scenecast_core::tuning_table::{Fit, NoRow, TuningTable};
 use scenecast_core::{Principal, UsblLine};
-use scenecast_protocol::directive::{Budget, Constraints, Fix, OrderStatus, Slot, SlotId, Utility};
+use scenecast_protocol::directive::{Budget, OrderStatus, Slot, SlotId};
 use scenecast_protocol::exemplar::Exemplar;
 use scenecast_protocol::link::{Cycle, Mismatch, PeerView, SurfaceEvent, SurfaceLink, Transmit, Wakeup};
-use scenecast_protocol::map::{LabelGrid, LayerReplica, LayerSet, Rect, Replica, ReplicaTile, SharedTiles};
+use scenecast_protocol::map::LayerSet;
 use scenecast_protocol::schedule::{BackgroundOrder, Shares};
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::{Address, Placement, VehicleStatus};
@@ -42,7 +40,7 @@ pub enum SurfaceOutput {
 pub struct Surface {
     pub(super) link: SurfaceLink,
     pub(super) records: BTreeMap<Address, VehicleRecord>,
-    outputs: VecDeque<SurfaceOutput>,
+    pub(super) outputs: VecDeque<SurfaceOutput>,
     background: BackgroundOrder,
     /// The localisation relay, if the surface has a GPS.
     relay: Option<Relay>,
@@ -108,62 +106,9 @@ impl Surface {
         self.link.vehicle(vehicle)
     }
 
-    pub fn map(&self, vehicle: Address) -> Option<&LabelGrid> {
-        let record = self.records.get(&vehicle);
-        let earlier = record.and_then(|d| d.earlier_map()).map(|earlier| earlier.map.labels().shown());
-        let in_view = earlier.or_else(|| record.and_then(|d| d.whole.last.as_ref()));
-        in_view.or_else(|| self.link.vehicle(vehicle).map(|v| v.replica().shown()))
-    }
-
-    /// The labels of the map in view with the time of each cell: those of the earlier map, if it is in view.
-    pub fn replica(&self, vehicle: Address) -> Option<&Replica> {
-        let earlier = self.records.get(&vehicle).and_then(|d| d.earlier_map()).map(|earlier| earlier.map.labels());
-        earlier.or_else(|| self.link.vehicle(vehicle).map(|v| v.replica()))
-    }
-
-    /// The layers of the map in view.
-    pub fn map_layers(&self, vehicle: Address) -> Vec<&LayerReplica> {
-        if let Some(earlier) = self.records.get(&vehicle).and_then(|d| d.earlier_map()) {
-            return earlier.map.layers().map(|(_, layer)| layer).collect();
-        }
-        let Some(view) = self.link.vehicle(vehicle) else { return Vec::new() };
-        view.layers().iter().filter_map(|(id, _)| view.layer(id)).collect()
-    }
-
-    /// The number of cells with a label that the vehicle has sent in its current run, in view or not.
-    pub fn current_cells(&self, vehicle: Address) -> usize {
-        let whole = self.records.get(&vehicle).and_then(|d| d.whole.last.as_ref());
-        let count = |view: PeerView<'_>| view.replica().counts().map(|(_, cells)| cells as usize).sum::<usize>();
-        let live = || self.link.vehicle(vehicle).map_or(0, count);
-        whole.map_or_else(live, LabelGrid::explored)
-    }
-
     /// The last status of a vehicle and when its pose came in, perhaps before the start of the surface.
     pub fn status(&self, vehicle: Address) -> Option<&(VehicleStatus, Instant)> {
         self.records.get(&vehicle)?.status(&self.link.vehicle(vehicle)?)
-    }
-
-    /// The last whole map, if it is in view.
-    fn whole_map(&self, vehicle: Address) -> Option<&LabelGrid> {
-        let record = self.records.get(&vehicle).filter(|record| record.earlier_map().is_none());
-        record.and_then(|record| record.whole.last.as_ref())
-    }
-
-    /// The labels of the map in view in tiles. They are shared, so a clone stays as it is and costs little.
-    pub fn map_tiles(&self, vehicle: Address) -> Option<SharedTiles> {
-        let whole = self.whole_map(vehicle).map(ReplicaTile::tiles_of);
-        whole.or_else(|| Some(self.replica(vehicle)?.tiles().clone()))
-    }
-
-    /// The smallest rectangle around the explored cells of the map in view.
-    pub fn map_bounds(&self, vehicle: Address) -> Option<Rect> {
-        self.whole_map(vehicle).map_or_else(|| self.replica(vehicle)?.bounds(), LabelGrid::bounds)
-    }
-
-    /// A number that grows whenever the operator's map of a vehicle or one of its layers changes.
-    pub fn map_version(&self, vehicle: Address) -> u64 {
-        let (record, view) = (self.records.get(&vehicle), self.link.vehicle(vehicle));
-        record.zip(view).map_or(0, |(record, view)| record.map_version(&view))
     }
 
     /// The budget of the surface, bit/s.
@@ -190,80 +135,6 @@ impl Surface {
         self.outputs.pop_front()
     }
 
-    /// Sends weights of labels, of unexplored cells and of curiosity, each from -1 to 1. The error is
-    /// one line for the operator.
-    pub fn set_utility(
-        &mut self,
-        vehicle: Address,
-        weights: &BTreeMap<u8, f64>,
-        (exploration, curiosity): (f64, f64),
-        now: Instant,
-    ) -> Result<u16, String> {
-        let known = match weights.is_empty() {
-            true => BTreeMap::new(),
-            false => self.labels_for_orders(vehicle)?,
-        };
-        let hundredths = |what: &str, w: f64| {
-            let ok = w.is_finite() && (-1.0..=1.0).contains(&w);
-            ok.then_some((w * 100.0).round() as i8).ok_or(format!("{what} {w} is not within -1 to 1"))
-        };
-        let mut utility = Utility {
-            exploration: hundredths("exploration", exploration)?,
-            curiosity: hundredths("curiosity", curiosity)?,
-            ..Utility::default()
-        };
-        for (&label, &weight) in weights {
-            if !known.contains_key(&label) {
-                return Err(format!("label {label} is not on the map"));
-            }
-            let weight = hundredths(&format!("weight of label {label}:"), weight)?;
-            if weight != 0 {
-                utility.weights.insert(label, weight);
-            }
-        }
-        let record = self.records.get_mut(&vehicle).ok_or("no such vehicle")?;
-        utility.epoch = record.epoch;
-        record.utility = utility.clone();
-        self.issue(vehicle, Slot::Utility(utility), now)
-    }
-
-    /// Orders a vehicle to hold, or to continue.
-    pub fn set_hold(&mut self, vehicle: Address, hold: bool, now: Instant) -> Result<u16, String> {
-        self.set_order(vehicle, Constraints { hold, abort: false }, now)
-    }
-
-    /// Orders a vehicle to hold, to abort, or to continue.
-    pub fn set_order(&mut self, vehicle: Address, order: Constraints, now: Instant) -> Result<u16, String> {
-        self.issue(vehicle, Slot::Constraints(order), now)
-    }
-
-    /// Sends a fence with keep-outs and return point. They replace the last ones.
-    pub fn set_fence(&mut self, vehicle: Address, order: &FenceOrder, now: Instant) -> Result<u16, String> {
-        let fence = order.read()?;
-        let version = self.issue(vehicle, Slot::Fence(fence.clone()), now)?;
-        self.records.get_mut(&vehicle).ok_or("no such vehicle")?.fence.sent = Some(fence);
-        Ok(version)
-    }
-
-    /// Sends limits. They replace the last ones.
-    pub fn set_limits(&mut self, vehicle: Address, order: &LimitsOrder, now: Instant) -> Result<u16, String> {
-        let limits = order.read()?;
-        let version = self.issue(vehicle, Slot::Limits(limits), now)?;
-        self.records.get_mut(&vehicle).ok_or("no such vehicle")?.limits.sent = Some(limits);
-        Ok(version)
-    }
-
-    /// Changes settings of a vehicle. Those that the order does not name stay as they are there.
-    pub fn set_settings(&mut self, vehicle: Address, order: &SettingsOrder, now: Instant) -> Result<u16, String> {
-        let view = self.link.vehicle(vehicle).ok_or("no such vehicle")?;
-        let order = order.read(view.layers())?;
-        let last = self.order_status(vehicle, SlotId::Settings);
-        let settings = self.records.get(&vehicle).ok_or("no such vehicle")?.settings.next_order(&order, last);
-        let version = self.issue(vehicle, Slot::Settings(settings), now)?;
-        self.records.get_mut(&vehicle).ok_or("no such vehicle")?.settings.handle_sent(settings, last);
-        Ok(version)
-    }
-
     /// The share of the map in the budget of a vehicle, bit/s. Without a report of the vehicle, the budget
     /// is that of the surface.
     pub fn map_bits_per_s(&self, vehicle: Address) -> f64 {
@@ -288,11 +159,6 @@ impl Surface {
             }
         }
         all
-    }
-
-    /// The order status of a slot.
-    fn order_status(&self, vehicle: Address, slot: SlotId) -> Option<OrderStatus> {
-        self.link.vehicle(vehicle)?.slots().find(|s| s.id == slot).map(|s| s.status)
     }
 
     /// The order of the background streams of the vehicles, as configured or as last sent.
@@ -332,10 +198,6 @@ impl Surface {
         Ok(())
     }
 
-    pub fn send_fix(&mut self, vehicle: Address, fix: Fix, now: Instant) -> Result<u16, String> {
-        self.issue(vehicle, Slot::Fix(fix), now)
-    }
-
     pub fn set_relay(&mut self, relay: Relay) {
         self.relay = Some(relay);
     }
@@ -372,37 +234,6 @@ impl Surface {
     pub fn vehicle_in_world(&self, vehicle: Address) -> Option<(f64, f64)> {
         let (status, _) = self.link.vehicle(vehicle)?.status()?;
         Some(Placement::map_to_world(status.placement, status.position).xy())
-    }
-
-    pub(super) fn issue(&mut self, vehicle: Address, slot: Slot, now: Instant) -> Result<u16, String> {
-        let version = self.link.issue(vehicle, slot, now).map_err(|e| e.to_string())?;
-        self.outputs.push_back(SurfaceOutput::Changed(vehicle));
-        Ok(version)
-    }
-
-    /// The number of cells of each label on the operator's map.
-    pub fn labels(&self, vehicle: Address) -> Option<BTreeMap<u8, u32>> {
-        let Some(whole) = self.whole_map(vehicle) else {
-            return Some(self.replica(vehicle)?.counts().collect());
-        };
-        let mut cells = BTreeMap::new();
-        for (_, label) in whole.iter() {
-            *cells.entry(label).or_default() += 1;
-        }
-        Some(cells)
-    }
-
-    /// The labels of the map in view that an order may name. The error is one line for the operator.
-    pub(super) fn labels_for_orders(&self, vehicle: Address) -> Result<BTreeMap<u8, u32>, String> {
-        let record = self.records.get(&vehicle).ok_or("no such vehicle")?;
-        if let Some(earlier) = record.earlier_map().filter(|earlier| earlier.epoch != record.epoch) {
-            return Err(format!(
-                "the map in view has the labels of epoch {}, and the vehicle is in epoch {}: wait for the current map, or \
-                 dismiss the earlier one",
-                earlier.epoch, record.epoch
-            ));
-        }
-        self.labels(vehicle).ok_or_else(|| "no such vehicle".to_owned())
     }
 
     pub fn handle_frame(&mut self, bytes: &[u8], now: Instant) {

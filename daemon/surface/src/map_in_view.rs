@@ -1,0 +1,87 @@
+//! The map in view: that of an earlier run until the current one has as many cells, then the current one.
+
+use super::Surface;
+use scenecast_protocol::link::PeerView;
+use scenecast_protocol::map::{LabelGrid, LayerReplica, Rect, Replica, ReplicaTile, SharedTiles};
+use scenecast_protocol::wire::Address;
+use std::collections::BTreeMap;
+
+impl Surface {
+    pub fn map(&self, vehicle: Address) -> Option<&LabelGrid> {
+        let record = self.records.get(&vehicle);
+        let earlier = record.and_then(|d| d.earlier_map()).map(|earlier| earlier.map.labels().shown());
+        let in_view = earlier.or_else(|| record.and_then(|d| d.whole.last.as_ref()));
+        in_view.or_else(|| self.link.vehicle(vehicle).map(|v| v.replica().shown()))
+    }
+
+    /// The labels of the map in view with the time of each cell: those of the earlier map, if it is in view.
+    pub fn replica(&self, vehicle: Address) -> Option<&Replica> {
+        let earlier = self.records.get(&vehicle).and_then(|d| d.earlier_map()).map(|earlier| earlier.map.labels());
+        earlier.or_else(|| self.link.vehicle(vehicle).map(|v| v.replica()))
+    }
+
+    /// The layers of the map in view.
+    pub fn map_layers(&self, vehicle: Address) -> Vec<&LayerReplica> {
+        if let Some(earlier) = self.records.get(&vehicle).and_then(|d| d.earlier_map()) {
+            return earlier.map.layers().map(|(_, layer)| layer).collect();
+        }
+        let Some(view) = self.link.vehicle(vehicle) else { return Vec::new() };
+        view.layers().iter().filter_map(|(id, _)| view.layer(id)).collect()
+    }
+
+    /// The number of cells with a label that the vehicle has sent in its current run, in view or not.
+    pub fn current_cells(&self, vehicle: Address) -> usize {
+        let whole = self.records.get(&vehicle).and_then(|d| d.whole.last.as_ref());
+        let count = |view: PeerView<'_>| view.replica().counts().map(|(_, cells)| cells as usize).sum::<usize>();
+        let live = || self.link.vehicle(vehicle).map_or(0, count);
+        whole.map_or_else(live, LabelGrid::explored)
+    }
+
+    /// The last whole map, if it is in view.
+    fn whole_map(&self, vehicle: Address) -> Option<&LabelGrid> {
+        let record = self.records.get(&vehicle).filter(|record| record.earlier_map().is_none());
+        record.and_then(|record| record.whole.last.as_ref())
+    }
+
+    /// The labels of the map in view in tiles. They are shared, so a clone stays as it is and costs little.
+    pub fn map_tiles(&self, vehicle: Address) -> Option<SharedTiles> {
+        let whole = self.whole_map(vehicle).map(ReplicaTile::tiles_of);
+        whole.or_else(|| Some(self.replica(vehicle)?.tiles().clone()))
+    }
+
+    /// The smallest rectangle around the explored cells of the map in view.
+    pub fn map_bounds(&self, vehicle: Address) -> Option<Rect> {
+        self.whole_map(vehicle).map_or_else(|| self.replica(vehicle)?.bounds(), LabelGrid::bounds)
+    }
+
+    /// A number that grows whenever the operator's map of a vehicle or one of its layers changes.
+    pub fn map_version(&self, vehicle: Address) -> u64 {
+        let (record, view) = (self.records.get(&vehicle), self.link.vehicle(vehicle));
+        record.zip(view).map_or(0, |(record, view)| record.map_version(&view))
+    }
+
+    /// The number of cells of each label on the operator's map.
+    pub fn labels(&self, vehicle: Address) -> Option<BTreeMap<u8, u32>> {
+        let Some(whole) = self.whole_map(vehicle) else {
+            return Some(self.replica(vehicle)?.counts().collect());
+        };
+        let mut cells = BTreeMap::new();
+        for (_, label) in whole.iter() {
+            *cells.entry(label).or_default() += 1;
+        }
+        Some(cells)
+    }
+
+    /// The labels of the map in view that an order may name. The error is one line for the operator.
+    pub(super) fn labels_for_orders(&self, vehicle: Address) -> Result<BTreeMap<u8, u32>, String> {
+        let record = self.records.get(&vehicle).ok_or("no such vehicle")?;
+        if let Some(earlier) = record.earlier_map().filter(|earlier| earlier.epoch != record.epoch) {
+            return Err(format!(
+                "the map in view has the labels of epoch {}, and the vehicle is in epoch {}: wait for the current map, or \
+                 dismiss the earlier one",
+                earlier.epoch, record.epoch
+            ));
+        }
+        self.labels(vehicle).ok_or_else(|| "no such vehicle".to_owned())
+    }
+}
