@@ -13,7 +13,7 @@ pub enum PortAddress {
     /// An address to connect to.
     Connect(String),
     /// Datagrams: an address to receive at, and one to send to; without the first any port, without the second
-    /// to whoever was heard last.
+    /// to the sender that is listened to.
     Datagrams(String, String),
     /// A file to append to.
     File(PathBuf),

@@ -25,8 +25,8 @@ mod pilot;
 mod surface;
 mod vehicle;
 
-pub use link_end::LinkEnd;
-pub use link_host::{FrameEvent, LinkHost, channel_station, modem_station};
+pub use link_end::{FrameCounts, LinkEnd};
+pub use link_host::{FrameEvent, FrameOutcome, LinkHost, channel_station, modem_station};
 pub use pilot::PilotEvent;
 #[cfg(feature = "surface")]
 pub use surface::{Follower, SurfaceHost, SurfaceHostEvent};

@@ -1,11 +1,27 @@
 //! The interface of a link's end toward its modem.
 
 use scenecast_core::UsblLine;
-use scenecast_protocol::link::{Cycle, SurfaceLink, Transmit, VehicleLink};
+use scenecast_protocol::link::{Cycle, LinkStats, SurfaceLink, Transmit, VehicleLink};
 use scenecast_protocol::map::{StateReplica, StateSource};
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::Address;
 use scenecast_vehicle::Vehicle;
+
+/// The frames that an end has received so far.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct FrameCounts {
+    /// Numbered frames that verified and were new.
+    pub accepted: u64,
+    /// Frames that were dropped, for any reason.
+    pub dropped: u64,
+}
+
+impl FrameCounts {
+    fn add(self, stats: &LinkStats) -> Self {
+        let dropped = self.dropped + stats.dropped.values().sum::<u64>();
+        Self { accepted: self.accepted + stats.frames_received, dropped }
+    }
+}
 
 /// An end of the link: a role, or the bare link of a role.
 pub trait LinkEnd {
@@ -14,6 +30,9 @@ pub trait LinkEnd {
 
     /// Takes the bytes of a received frame.
     fn handle_frame(&mut self, bytes: &[u8], now: Instant);
+
+    /// The frames that were given to [`Self::handle_frame`] so far, by their result.
+    fn frame_counts(&self) -> FrameCounts;
 
     /// The modem has sent a transmission, or dropped it.
     fn handle_transmit_outcome(&mut self, now: Instant);
@@ -71,6 +90,10 @@ macro_rules! forward {
 impl LinkEnd for Vehicle {
     forward!();
 
+    fn frame_counts(&self) -> FrameCounts {
+        FrameCounts::default().add(self.stats())
+    }
+
     fn poll_timeout(&self, _now: Instant) -> Option<Instant> {
         self.poll_timeout().map(|(at, _)| at)
     }
@@ -79,6 +102,10 @@ impl LinkEnd for Vehicle {
 impl<S: StateSource> LinkEnd for VehicleLink<S> {
     forward!();
 
+    fn frame_counts(&self) -> FrameCounts {
+        FrameCounts::default().add(self.stats())
+    }
+
     fn poll_timeout(&self, _now: Instant) -> Option<Instant> {
         self.poll_timeout().map(|(at, _)| at)
     }
@@ -86,6 +113,12 @@ impl<S: StateSource> LinkEnd for VehicleLink<S> {
 
 impl<R: StateReplica> LinkEnd for SurfaceLink<R> {
     forward!();
+
+    fn frame_counts(&self) -> FrameCounts {
+        let unknown = FrameCounts { accepted: 0, dropped: self.unknown_senders() };
+        let views = self.vehicles().filter_map(|address| self.vehicle(address));
+        views.fold(unknown, |counts, view| counts.add(view.stats()))
+    }
 
     fn poll_cycle(&mut self, now: Instant) -> Option<Cycle> {
         self.poll_cycle(now)
@@ -99,6 +132,12 @@ impl<R: StateReplica> LinkEnd for SurfaceLink<R> {
 #[cfg(feature = "surface")]
 impl LinkEnd for scenecast_surface::Surface {
     forward!();
+
+    fn frame_counts(&self) -> FrameCounts {
+        let unknown = FrameCounts { accepted: 0, dropped: self.unknown_senders() };
+        let views = self.vehicles().filter_map(|(address, _)| self.view(address));
+        views.fold(unknown, |counts, view| counts.add(view.stats()))
+    }
 
     fn handle_range(&mut self, end: Address, line: &UsblLine, now: Instant) {
         self.handle_range(end, line, now);

@@ -42,6 +42,17 @@ pub enum FrameEvent {
     },
 }
 
+/// The result of a datagram, which tells whether its sender is the other end.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum FrameOutcome {
+    /// It is no frame, or one that the link drops.
+    Dropped,
+    /// The link has read it. It may be the replay of a frame that begins a conversation.
+    Opened,
+    /// A numbered frame that verified and was new: with a key, only the other end can have written it.
+    Accepted,
+}
+
 /// An end of the link at its modem: the only caller of a link's `poll_transmit`.
 #[derive(Debug)]
 pub struct LinkHost<E> {
@@ -98,6 +109,19 @@ impl<E: LinkEnd> LinkHost<E> {
     pub fn handle_bytes(&mut self, bytes: &[u8], now: Instant) {
         self.station.handle_bytes(bytes, now);
         self.deliver(now);
+    }
+
+    /// Takes a datagram, which is a frame of its own, and returns the judgement of the link.
+    pub fn handle_datagram(&mut self, bytes: &[u8], now: Instant) -> FrameOutcome {
+        let (events, before) = (self.events.len(), self.end.frame_counts());
+        self.handle_bytes(bytes, now);
+        let after = self.end.frame_counts();
+        let is_frame = self.events.iter().skip(events).any(|event| matches!(event, FrameEvent::Received { .. }));
+        match is_frame {
+            true if after.accepted > before.accepted => FrameOutcome::Accepted,
+            true if after.dropped == before.dropped => FrameOutcome::Opened,
+            _ => FrameOutcome::Dropped,
+        }
     }
 
     /// Lets time pass in the modem's driver.
@@ -215,4 +239,76 @@ pub fn channel_station(profile: ModemProfile, window: Duration, now: Instant) ->
     let mut station = Station::new(Box::new(driver), AddressBook { surface: 0 }, Audit::new(window));
     station.handle_open(now);
     station
+}
+
+#[cfg(all(test, feature = "surface"))]
+mod tests {
+    use super::*;
+    use scenecast_core::Area;
+    use scenecast_core::tuning_table::TuningTable;
+    use scenecast_protocol::link::Authenticity;
+    use scenecast_protocol::seal::MissionKey;
+    use scenecast_surface::Surface;
+    use scenecast_vehicle::{Durable, Vehicle};
+    use std::sync::Arc;
+
+    fn key() -> Option<Authenticity> {
+        Some(Authenticity { key: Arc::new(MissionKey::from_bytes([7; 16])), all: true, encrypt: false })
+    }
+
+    fn surface(authenticity: Option<Authenticity>, seed: u64) -> LinkHost<Surface> {
+        let config = scenecast_config::load(None, &[]).unwrap();
+        let modem = scenecast_config::modem_profile(&config, 10_000.0);
+        let table = TuningTable::shipped();
+        let end = scenecast_surface::assemble(&config, authenticity, table, modem, seed, Instant::ZERO).unwrap();
+        LinkHost::new(end, channel_station(modem, Duration::from_secs(10), Instant::ZERO))
+    }
+
+    fn vehicle() -> LinkHost<Vehicle> {
+        let config = scenecast_config::load(None, &[]).unwrap();
+        let modem = scenecast_config::modem_profile(&config, 10_000.0);
+        let area = Area { west: 0.0, south: 0.0, east: 20.0, north: 20.0 };
+        let durable = Durable::default();
+        let end = scenecast_vehicle::assemble(&config, key(), modem, area, durable, 3, Instant::ZERO).unwrap();
+        LinkHost::new(end, channel_station(modem, Duration::from_secs(10), Instant::ZERO))
+    }
+
+    /// The frames of the surface up to the first that the vehicle accepts, with the outcome of each.
+    fn exchange(surface: &mut LinkHost<Surface>, vehicle: &mut LinkHost<Vehicle>) -> Vec<(Vec<u8>, FrameOutcome)> {
+        let mut sent = Vec::new();
+        for tick in 0..600 {
+            let now = Instant::ZERO + Duration::from_millis(100) * tick;
+            surface.handle_timeout(now);
+            vehicle.handle_timeout(now);
+            while let Some(bytes) = surface.poll_output(now) {
+                let outcome = vehicle.handle_datagram(&bytes, now);
+                sent.push((bytes, outcome));
+                if outcome == FrameOutcome::Accepted {
+                    return sent;
+                }
+            }
+            while let Some(bytes) = vehicle.poll_output(now) {
+                assert!(surface.handle_datagram(&bytes, now) > FrameOutcome::Dropped);
+            }
+            while surface.poll_event().is_some() || vehicle.poll_event().is_some() {}
+        }
+        sent
+    }
+
+    #[test]
+    fn only_a_new_frame_of_the_other_end_is_accepted() {
+        let (mut own, mut vehicle) = (surface(key(), 4), vehicle());
+        let sent = exchange(&mut own, &mut vehicle);
+        let outcomes: Vec<FrameOutcome> = sent.iter().map(|(_, outcome)| *outcome).collect();
+        let ((hello, _), (last, _)) = (sent.first().unwrap(), sent.last().unwrap());
+        assert_eq!((outcomes[0], outcomes.last()), (FrameOutcome::Opened, Some(&FrameOutcome::Accepted)));
+        let now = Instant::ZERO + Duration::from_secs(90);
+        assert_eq!(vehicle.handle_datagram(last, now), FrameOutcome::Dropped, "a replay of a numbered frame");
+        assert!(vehicle.handle_datagram(hello, now) < FrameOutcome::Accepted, "a replay of a hello");
+        let call = surface(None, 5).poll_output(now).unwrap();
+        assert_eq!(vehicle.handle_datagram(&call, now), FrameOutcome::Dropped, "without the key");
+        assert_eq!(vehicle.handle_datagram(b"junk", now), FrameOutcome::Dropped);
+        assert_eq!(vehicle.handle_datagram(&[], now), FrameOutcome::Dropped);
+        assert_eq!(vehicle.handle_datagram(&[0; 2048], now), FrameOutcome::Dropped, "longer than any frame");
+    }
 }

@@ -46,14 +46,16 @@ impl Instruments {
     /// Hands the host the report of an instrument.
     pub(super) fn handle(&self, report: FromInstrument, host: &mut SurfaceHost, now: Instant) {
         match report {
-            FromInstrument::Gps(FromPort::Bytes(bytes)) => host.handle_gps(&bytes, now),
+            FromInstrument::Gps(FromPort::Bytes(bytes) | FromPort::Datagram(bytes, _)) => host.handle_gps(&bytes, now),
             FromInstrument::Gps(FromPort::Open) => {
                 let hello = host.handle_gps_open();
                 if let (false, Some(gps)) = (hello.is_empty(), &self.gps) {
                     gps.write(hello.to_vec());
                 }
             }
-            FromInstrument::Compass(FromPort::Bytes(bytes)) => host.handle_compass(&bytes, now),
+            FromInstrument::Compass(FromPort::Bytes(bytes) | FromPort::Datagram(bytes, _)) => {
+                host.handle_compass(&bytes, now);
+            }
             FromInstrument::Gps(FromPort::Closed) | FromInstrument::Compass(_) => {}
         }
     }

@@ -21,7 +21,7 @@ impl ModemPort {
     /// Opens the port that the configuration names.
     pub(super) async fn open(config: &Config, now: Instant) -> Result<Self, UserError> {
         let place = scenecast_config::modem_port(config)?;
-        let port = Port::open("modem", place.clone()).await.map_err(|e| not_there(&place, &e))?;
+        let port = Port::open_judged("modem", place.clone()).await.map_err(|e| not_there(&place, &e))?;
         Ok(Self { port, reopened: now })
     }
 
@@ -31,11 +31,12 @@ impl ModemPort {
     }
 
     /// Hands a host the report of the port.
-    pub(super) fn handle<E: LinkEnd>(report: FromPort, link: &mut LinkHost<E>, now: Instant) {
+    pub(super) fn handle<E: LinkEnd>(&self, report: FromPort, link: &mut LinkHost<E>, now: Instant) {
         match report {
             FromPort::Open => link.handle_open(now),
             FromPort::Closed => link.handle_closed(now),
             FromPort::Bytes(bytes) => link.handle_bytes(&bytes, now),
+            FromPort::Datagram(bytes, sender) => self.port.judge(sender, link.handle_datagram(&bytes, now)),
         }
     }
 

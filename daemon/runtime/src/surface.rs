@@ -133,7 +133,7 @@ impl SurfaceShell {
                     self.facts.storage = Some(self.files.info());
                 }
                 report = self.ports.modem.next() => {
-                    ModemPort::handle(report, self.host.link_mut(), self.clock.now());
+                    self.ports.modem.handle(report, self.host.link_mut(), self.clock.now());
                 }
                 report = self.ports.instruments.next() => {
                     self.ports.instruments.handle(report, &mut self.host, self.clock.now());
@@ -149,7 +149,7 @@ impl SurfaceShell {
         let now = self.clock.now();
         match report {
             FromPort::Open => self.host.handle_pilot_open(now),
-            FromPort::Bytes(bytes) => self.host.handle_pilot_bytes(&bytes, now),
+            FromPort::Bytes(bytes) | FromPort::Datagram(bytes, _) => self.host.handle_pilot_bytes(&bytes, now),
             FromPort::Closed => {}
         }
     }

@@ -111,7 +111,7 @@ impl VehicleShell {
                 }
                 _ = tokio::time::sleep_until(self.clock.wall(wake)) => {}
                 report = self.ports.modem.next() => {
-                    ModemPort::handle(report, self.host.link_mut(), self.clock.now());
+                    self.ports.modem.handle(report, self.host.link_mut(), self.clock.now());
                 }
                 report = self.ports.pilot.next() => self.handle_pilot(report),
                 config = self.reload.next() => self.follow(&config),
@@ -130,7 +130,7 @@ impl VehicleShell {
         let now = self.clock.now();
         match report {
             FromPort::Open => self.host.handle_pilot_open(now),
-            FromPort::Bytes(bytes) => self.host.handle_pilot_bytes(&bytes, now),
+            FromPort::Bytes(bytes) | FromPort::Datagram(bytes, _) => self.host.handle_pilot_bytes(&bytes, now),
             FromPort::Closed => {}
         }
     }

@@ -17,9 +17,10 @@ section! {
         device: Option<PathBuf> = None, ANY, [Auv Asv];
         /// Speed of the serial device.
         baud: u32 = 19_200, range(300.0, 4_000_000.0, "bit/s"), [Auv Asv Scenario];
-        /// Address and port to listen on, or to receive datagrams at.
+        /// Address and port to listen on, or to receive datagrams at. Without modem.connect, the sender of the first
+        /// datagram that the link accepts is the other end, until 10 s pass without another one.
         listen: Option<HostPort> = None, ANY, [Auv Asv];
-        /// Address and port to connect to, or to send datagrams to.
+        /// Address and port to connect to, or to send datagrams to. The surface begins, so over UDP it needs this key.
         connect: Option<HostPort> = None, ANY, [Auv Asv];
         /// Bit rate of the modem on air. The rates of S2C instant messages and of Micromodem packets are built in.
         bit_rate: f64 = 10_000.0, range(10.0, 1e7, "bit/s"), [Auv Asv];

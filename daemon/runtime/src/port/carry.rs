@@ -75,6 +75,8 @@ pub(super) async fn carry(
             order = ends.to.recv(), if out.is_empty() => match order {
                 Some(ToPort::Bytes(bytes)) => (out, written) = (bytes, Instant::now()),
                 Some(ToPort::Reopen) => return Err(reopening()),
+                // A stream has one peer.
+                Some(ToPort::Judged(..)) => {}
                 None => return Ok(()),
             },
             n = reader.read(&mut buffer) => {
@@ -116,6 +118,7 @@ pub(super) async fn append(mut file: std::fs::File, ends: &mut PortEnds) -> io::
         match order {
             ToPort::Bytes(bytes) => file.write_all(&bytes)?,
             ToPort::Reopen => return Err(reopening()),
+            ToPort::Judged(..) => {}
         }
     }
     Ok(())

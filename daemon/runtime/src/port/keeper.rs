@@ -1,7 +1,8 @@
 //! Opens a port, and opens it again whenever it fails.
 
 use super::carry::{PortActivity, append, carry};
-use super::{FromPort, PortEnds, tcp, udp};
+use super::udp::{self, PeerRule, UdpPeer};
+use super::{FromPort, PortEnds, tcp};
 use scenecast_core::PortAddress;
 use std::fs::File;
 use std::io;
@@ -56,6 +57,7 @@ pub(super) struct PortKeeper {
     pub(super) name: &'static str,
     pub(super) place: PortAddress,
     pub(super) quiet: Option<Duration>,
+    pub(super) rule: PeerRule,
     pub(super) ends: PortEnds,
 }
 
@@ -101,7 +103,10 @@ impl PortKeeper {
                 carry(stream, self.quiet, &PortActivity::new(), &mut self.ends).await
             }
             Opened::Listener(listener) => return tcp::accept(self.name, listener, self.quiet, &mut self.ends).await,
-            Opened::Socket(socket, remote) => udp::carry(socket, remote, self.quiet, &mut self.ends).await,
+            Opened::Socket(socket, remote) => {
+                let peer = UdpPeer::new(self.name, remote, self.rule, Instant::now());
+                udp::carry(socket, peer, self.quiet, &mut self.ends).await
+            }
             Opened::File(file) => append(file, &mut self.ends).await,
         };
         if result.is_err() && !self.ends.report(FromPort::Closed).await {

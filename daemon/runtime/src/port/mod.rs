@@ -8,9 +8,12 @@ mod udp;
 use bytes::Bytes;
 use keeper::PortKeeper;
 use scenecast_core::PortAddress;
+use scenecast_host::FrameOutcome;
 use std::io;
+use std::net::SocketAddr;
 use std::time::Duration;
 use tokio::sync::mpsc;
+use udp::PeerRule;
 
 /// A request to a port.
 #[derive(Debug)]
@@ -18,6 +21,8 @@ enum ToPort {
     Bytes(Bytes),
     /// Close and open again, for the device does not answer.
     Reopen,
+    /// The host's judgement of a datagram of this sender.
+    Judged(SocketAddr, FrameOutcome),
 }
 
 /// A report of a port.
@@ -27,6 +32,8 @@ pub enum FromPort {
     /// The port is closed and will be opened again.
     Closed,
     Bytes(Bytes),
+    /// A whole datagram and its sender.
+    Datagram(Bytes, SocketAddr),
 }
 
 /// The host's side of a port.
@@ -43,25 +50,27 @@ struct PortEnds {
 }
 
 impl Port {
-    /// Opens the port now. If it fails later, it is opened again. `name` appears in the log.
+    /// Opens the port now. If it fails later, it is opened again. `name` appears in the log. The owner gives
+    /// [`Self::judge`] the result of each datagram.
     ///
     /// # Errors
     /// The port cannot be opened. A TCP peer that refuses the connection is no error: it is tried again.
-    pub async fn open(name: &'static str, place: PortAddress) -> io::Result<Self> {
+    pub async fn open_judged(name: &'static str, place: PortAddress) -> io::Result<Self> {
         let first = match &place {
             PortAddress::Connect(_) => None,
             there => Some(keeper::open(there).await?),
         };
         let (port, ends) = Self::pair();
-        tokio::spawn(PortKeeper { name, place, quiet: None, ends }.run(first));
+        tokio::spawn(PortKeeper { name, place, quiet: None, rule: PeerRule::Judged, ends }.run(first));
         Ok(port)
     }
 
     /// Opens the port as soon as it exists, and again after each failure. If `quiet` is given, a port that is silent
-    /// for this time is opened again: an unplugged adapter or a half-open connection may never report an error.
+    /// for this time is opened again: an unplugged adapter or a half-open connection may never report an error. Of
+    /// datagrams, those of the first sender are taken until it is silent.
     pub fn open_when_there(name: &'static str, place: PortAddress, quiet: Option<Duration>) -> Self {
         let (port, ends) = Self::pair();
-        tokio::spawn(PortKeeper { name, place, quiet, ends }.run(None));
+        tokio::spawn(PortKeeper { name, place, quiet, rule: PeerRule::First, ends }.run(None));
         port
     }
 
@@ -90,6 +99,14 @@ impl Port {
     /// Writes bytes and returns whether the port accepted them. Do not repeat refused bytes: they would be stale.
     pub fn write(&self, bytes: Vec<u8>) -> bool {
         self.to.try_send(ToPort::Bytes(bytes.into())).is_ok()
+    }
+
+    /// Reports the judgement of a datagram of this sender, before the reply to it is written.
+    pub fn judge(&self, sender: SocketAddr, outcome: FrameOutcome) {
+        if outcome > FrameOutcome::Dropped {
+            // Without room, the judgement of the next datagram takes its place.
+            let _ = self.to.try_send(ToPort::Judged(sender, outcome));
+        }
     }
 
     /// Closes the port and opens it again.

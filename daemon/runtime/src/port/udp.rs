@@ -1,7 +1,9 @@
 //! Datagrams with one frame each, for benches, radio links and autopilots.
 
 use super::carry::{reopening, silence};
-use super::{PortEnds, ToPort, read};
+use super::{FromPort, PortEnds, ToPort};
+use bytes::Bytes;
+use scenecast_host::FrameOutcome;
 use std::io;
 use std::net::SocketAddr;
 use std::time::Duration;
@@ -10,7 +12,7 @@ use tokio::time::Instant;
 
 /// Maximum length of a datagram, bytes.
 const MAX_DATAGRAM_BYTES: usize = 2048;
-/// A sender that is silent for this time gives way to another one.
+/// A peer that is silent for this time gives way to another one.
 const SILENCE_TIMEOUT: Duration = Duration::from_secs(10);
 /// Pause after an error of the system.
 const RETRY_INTERVAL: Duration = Duration::from_millis(200);
@@ -31,55 +33,94 @@ pub(super) async fn open(own: &str, remote: &str) -> io::Result<(UdpSocket, Opti
     Ok((UdpSocket::bind(own).await.map_err(wrong)?, remote))
 }
 
-/// The other side of a socket: datagrams go to it, and those of others are dropped.
+/// Who becomes the peer of a socket without a configured address.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum PeerRule {
+    /// The first sender.
+    First,
+    /// The sender of the first datagram that the host accepts.
+    Judged,
+}
+
+/// The other side of a socket. Datagrams go to it, and those of others are dropped while it is pinned.
 #[derive(Debug)]
-struct UdpPeer {
-    /// Whether the address is configured. Then datagrams come from any port of it.
-    is_fixed: bool,
+pub(super) struct UdpPeer {
+    name: &'static str,
+    /// `None` for a configured address, which is always pinned. Then datagrams come from any port of it.
+    rule: Option<PeerRule>,
     address: Option<SocketAddr>,
+    /// The end of the pin, if nothing renews it.
+    pinned_until: Option<Instant>,
     last_read: Instant,
 }
 
 impl UdpPeer {
-    fn new(fixed: Option<SocketAddr>, now: Instant) -> Self {
-        Self { is_fixed: fixed.is_some(), address: fixed, last_read: now }
+    /// The peer `fixed`, or the one that `rule` finds. `name` appears in the log.
+    pub(super) fn new(name: &'static str, fixed: Option<SocketAddr>, rule: PeerRule, now: Instant) -> Self {
+        let rule = if fixed.is_some() { None } else { Some(rule) };
+        Self { name, rule, address: fixed, pinned_until: None, last_read: now }
     }
 
-    /// Whether a datagram is taken. Without a configured address, the first sender is the peer until it is silent.
-    fn takes(&mut self, from: SocketAddr, now: Instant) -> bool {
-        let is_taken = match self.address {
-            Some(address) if self.is_fixed => address.ip().to_canonical() == from.ip().to_canonical(),
-            Some(address) => address == from || now >= self.last_read + SILENCE_TIMEOUT,
-            None => true,
+    /// Whether another sender than this one is pinned.
+    fn excludes(&self, sender: SocketAddr, now: Instant) -> bool {
+        self.address != Some(sender) && self.pinned_until.is_some_and(|until| now < until)
+    }
+
+    /// Whether the host gets a datagram of this sender.
+    fn takes(&mut self, sender: SocketAddr, now: Instant) -> bool {
+        let is_taken = match (self.rule, self.address) {
+            (None, Some(fixed)) => fixed.ip().to_canonical() == sender.ip().to_canonical(),
+            _ => !self.excludes(sender, now),
         };
         if is_taken {
             self.last_read = now;
-            if !self.is_fixed {
-                self.address = Some(from);
+            if self.rule == Some(PeerRule::First) {
+                self.pin(sender, now);
             }
         }
         is_taken
     }
+
+    /// Follows the judgement of a datagram. One that only opened may be a replay: it is answered, but pins nobody.
+    fn handle_judged(&mut self, sender: SocketAddr, outcome: FrameOutcome, now: Instant) {
+        if self.rule != Some(PeerRule::Judged) || self.excludes(sender, now) {
+            return;
+        }
+        match outcome {
+            FrameOutcome::Accepted => self.pin(sender, now),
+            FrameOutcome::Opened if self.address != Some(sender) => {
+                (self.address, self.pinned_until) = (Some(sender), None)
+            }
+            FrameOutcome::Opened | FrameOutcome::Dropped => {}
+        }
+    }
+
+    fn pin(&mut self, sender: SocketAddr, now: Instant) {
+        if self.pinned_until.is_none() || self.address != Some(sender) {
+            tracing::info!("{}: datagrams of others than {sender} are dropped while it is heard", self.name);
+        }
+        self.address = Some(sender);
+        self.pinned_until = Some(now + SILENCE_TIMEOUT);
+    }
 }
 
-/// Carries datagrams to `fixed`, or else to the sender that is listened to. A socket has no
-/// connection, so it is always open.
+/// Carries datagrams to the peer and from it. A socket has no connection, so it is always open.
 pub(super) async fn carry(
     socket: UdpSocket,
-    fixed: Option<SocketAddr>,
+    mut peer: UdpPeer,
     quiet: Option<Duration>,
     ends: &mut PortEnds,
 ) -> io::Result<()> {
     if !ends.report_open().await {
         return Ok(());
     }
-    let mut peer = UdpPeer::new(fixed, Instant::now());
     let mut buffer = [0; MAX_DATAGRAM_BYTES];
     loop {
         tokio::select! {
             order = ends.to.recv() => match (order, peer.address) {
                 (None, _) => return Ok(()),
                 (Some(ToPort::Reopen), _) => return Err(reopening()),
+                (Some(ToPort::Judged(sender, outcome)), _) => peer.handle_judged(sender, outcome, Instant::now()),
                 (Some(ToPort::Bytes(bytes)), Some(peer)) => {
                     // A peer that is not running yet refuses datagrams; it may start later.
                     if let Err(e) = socket.send_to(&bytes, peer).await {
@@ -89,8 +130,9 @@ pub(super) async fn carry(
                 (Some(ToPort::Bytes(_)), None) => {}
             },
             received = socket.recv_from(&mut buffer) => match received {
-                Ok((n, from)) => {
-                    if peer.takes(from, Instant::now()) && !ends.report(read(&buffer, n)).await {
+                Ok((n, sender)) => {
+                    let bytes = Bytes::copy_from_slice(buffer.get(..n).unwrap_or_default());
+                    if peer.takes(sender, Instant::now()) && !ends.report(FromPort::Datagram(bytes, sender)).await {
                         return Ok(());
                     }
                 }
@@ -104,50 +146,132 @@ pub(super) async fn carry(
 
 #[cfg(test)]
 mod tests {
-    use super::super::{FromPort, Port};
+    use super::super::Port;
     use super::*;
 
-    async fn socket() -> (UdpSocket, SocketAddr) {
-        let socket = UdpSocket::bind("127.0.0.1:0").await.unwrap();
-        let address = socket.local_addr().unwrap();
-        (socket, address)
+    /// The other end, or a stranger.
+    struct Sender(UdpSocket);
+
+    impl Sender {
+        async fn new() -> Self {
+            Self(UdpSocket::bind("127.0.0.1:0").await.unwrap())
+        }
+
+        fn address(&self) -> SocketAddr {
+            self.0.local_addr().unwrap()
+        }
+
+        fn datagram(&self, byte: u8) -> FromPort {
+            FromPort::Datagram(vec![byte].into(), self.address())
+        }
     }
 
-    async fn carried(fixed: Option<SocketAddr>) -> (Port, SocketAddr) {
-        let (own, address) = socket().await;
-        let (mut port, mut ends) = Port::pair();
-        tokio::spawn(async move { carry(own, fixed, None, &mut ends).await });
-        assert_eq!(port.next().await, FromPort::Open);
-        (port, address)
+    /// A port without a configured address.
+    struct Carried {
+        port: Port,
+        address: SocketAddr,
+    }
+
+    impl Carried {
+        async fn new(rule: PeerRule) -> Self {
+            let own = UdpSocket::bind("127.0.0.1:0").await.unwrap();
+            let address = own.local_addr().unwrap();
+            let (mut port, mut ends) = Port::pair();
+            let peer = UdpPeer::new("test", None, rule, Instant::now());
+            tokio::spawn(async move { carry(own, peer, None, &mut ends).await });
+            assert_eq!(port.next().await, FromPort::Open);
+            Self { port, address }
+        }
+
+        async fn send(&self, from: &Sender, byte: u8) {
+            from.0.send_to(&[byte], self.address).await.unwrap();
+        }
+
+        /// Sends a datagram that the host gets.
+        async fn reports(&mut self, from: &Sender, byte: u8) {
+            self.send(from, byte).await;
+            assert_eq!(self.port.next().await, from.datagram(byte));
+        }
+
+        /// Writes a datagram that `to` gets; the port has then handled all judgements before it.
+        async fn writes(&self, to: &Sender, byte: u8) {
+            assert!(self.port.write(vec![byte]));
+            let mut buffer = [0; 8];
+            assert_eq!(to.0.recv(&mut buffer).await.unwrap(), 1);
+            assert_eq!(buffer[0], byte);
+        }
+    }
+
+    #[tokio::test]
+    async fn a_stranger_that_speaks_first_does_not_lock_out_the_peer() {
+        let mut carried = Carried::new(PeerRule::Judged).await;
+        let (stranger, peer) = (Sender::new().await, Sender::new().await);
+        carried.reports(&stranger, 1).await;
+        carried.port.judge(stranger.address(), FrameOutcome::Dropped);
+        carried.reports(&peer, 2).await;
+        carried.reports(&stranger, 3).await;
+        carried.port.judge(peer.address(), FrameOutcome::Accepted);
+        carried.port.judge(stranger.address(), FrameOutcome::Accepted);
+        carried.writes(&peer, 4).await;
+        carried.send(&stranger, 5).await;
+        carried.reports(&peer, 6).await;
+    }
+
+    #[tokio::test]
+    async fn the_sender_of_a_replay_is_answered_but_not_pinned() {
+        let mut carried = Carried::new(PeerRule::Judged).await;
+        let (stranger, peer) = (Sender::new().await, Sender::new().await);
+        carried.reports(&stranger, 1).await;
+        carried.port.judge(stranger.address(), FrameOutcome::Opened);
+        carried.writes(&stranger, 2).await;
+        carried.reports(&peer, 3).await;
+        carried.port.judge(peer.address(), FrameOutcome::Opened);
+        carried.writes(&peer, 4).await;
+    }
+
+    #[tokio::test]
+    async fn a_pin_without_accepted_datagrams_lasts_ten_seconds() {
+        let mut carried = Carried::new(PeerRule::Judged).await;
+        let (stranger, peer) = (Sender::new().await, Sender::new().await);
+        carried.reports(&stranger, 1).await;
+        carried.port.judge(stranger.address(), FrameOutcome::Accepted);
+        carried.writes(&stranger, 2).await;
+        tokio::time::pause();
+        tokio::time::advance(SILENCE_TIMEOUT - Duration::from_secs(1)).await;
+        carried.send(&peer, 3).await;
+        carried.reports(&stranger, 4).await;
+        carried.port.judge(stranger.address(), FrameOutcome::Opened);
+        carried.writes(&stranger, 5).await;
+        tokio::time::advance(Duration::from_secs(1)).await;
+        carried.reports(&peer, 6).await;
+        carried.port.judge(peer.address(), FrameOutcome::Accepted);
+        carried.writes(&peer, 7).await;
+        carried.send(&stranger, 8).await;
+        carried.reports(&peer, 9).await;
     }
 
     #[tokio::test]
     async fn the_first_sender_is_the_only_one_until_it_is_silent() {
-        let (mut port, to) = carried(None).await;
-        let ((first, _), (second, _)) = (socket().await, socket().await);
-        first.send_to(&[1], to).await.unwrap();
-        assert_eq!(port.next().await, FromPort::Bytes(vec![1].into()));
-        second.send_to(&[2], to).await.unwrap();
-        first.send_to(&[3], to).await.unwrap();
-        assert_eq!(port.next().await, FromPort::Bytes(vec![3].into()), "the datagram of the other was dropped");
-        assert!(port.write(vec![4]));
-        let mut buffer = [0; 8];
-        assert_eq!(first.recv(&mut buffer).await.unwrap(), 1);
+        let mut carried = Carried::new(PeerRule::First).await;
+        let (first, second) = (Sender::new().await, Sender::new().await);
+        carried.reports(&first, 1).await;
+        carried.send(&second, 2).await;
+        carried.reports(&first, 3).await;
+        carried.writes(&first, 4).await;
         tokio::time::pause();
         tokio::time::advance(SILENCE_TIMEOUT).await;
-        second.send_to(&[5], to).await.unwrap();
-        assert_eq!(port.next().await, FromPort::Bytes(vec![5].into()));
-        first.send_to(&[6], to).await.unwrap();
-        second.send_to(&[7], to).await.unwrap();
-        assert_eq!(port.next().await, FromPort::Bytes(vec![7].into()));
+        carried.reports(&second, 5).await;
+        carried.send(&first, 6).await;
+        carried.reports(&second, 7).await;
     }
 
     #[test]
     fn a_configured_address_is_listened_to_at_any_of_its_ports() {
         let now = Instant::now();
         let address = |text: &str| text.parse::<SocketAddr>().unwrap();
-        let mut peer = UdpPeer::new(Some(address("192.0.2.1:4001")), now);
+        let mut peer = UdpPeer::new("test", Some(address("192.0.2.1:4001")), PeerRule::Judged, now);
         assert!(peer.takes(address("192.0.2.1:9"), now));
+        peer.handle_judged(address("192.0.2.1:9"), FrameOutcome::Accepted, now);
         assert!(!peer.takes(address("192.0.2.2:4001"), now + 9 * SILENCE_TIMEOUT));
         assert_eq!(peer.address, Some(address("192.0.2.1:4001")), "datagrams go to the configured port");
     }
