@@ -2,20 +2,27 @@
 
 use super::contact::StoredContact;
 use super::event::{StoredCells, StoredLabel};
-use scenecast_protocol::map::{Cell, LayerDescriptor, LayerId, LayerReplica, Replica, SharedTiles, UNEXPLORED};
+use scenecast_protocol::map::{Cell, LayerDescriptor, LayerId, LayerReplica, Replica, SharedTiles};
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::Placement;
 use std::collections::BTreeMap;
+use std::fmt;
 
 /// Cells in one event; a larger change takes several.
 const MAX_CELLS: usize = 1 << 16;
 
 /// A copy of a map with its layers.
-#[derive(Debug, Default)]
+#[derive(Default)]
 pub struct MapCopy {
     labels: Replica,
     layers: BTreeMap<LayerId, LayerReplica>,
-    explored: usize,
+}
+
+/// Without the cells, of which there may be a million.
+impl fmt::Debug for MapCopy {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("MapCopy").field("explored", &self.explored()).finish_non_exhaustive()
+    }
 }
 
 /// A map that the surface has received before the current one, and that stays in view.
@@ -51,18 +58,13 @@ impl MapCopy {
 
     /// The number of cells with a label.
     pub fn explored(&self) -> usize {
-        self.explored
+        self.labels.counts().map(|(_, cells)| cells as usize).sum()
     }
 
     /// Applies stored cells. Cells of a layer whose descriptor is unreadable are left out.
     pub(crate) fn apply(&mut self, stored: &StoredCells) {
         let Some((index, descriptor)) = &stored.layer else {
-            for (cell, label, at) in unpack(&stored.cells) {
-                let before = self.labels.shown().get(cell);
-                self.labels.restore(cell, label, at);
-                self.explored += usize::from(label != UNEXPLORED);
-                self.explored -= usize::from(before != UNEXPLORED);
-            }
+            unpack(&stored.cells).for_each(|(cell, label, at)| self.labels.restore(cell, label, at));
             return;
         };
         let id = LayerId::new(usize::from(*index));

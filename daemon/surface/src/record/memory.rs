@@ -230,6 +230,7 @@ impl VehicleMemory {
     fn to_events(&self) -> Vec<VehicleEvent> {
         let named = |(&label, book): (&u8, &StoredLabel)| VehicleEvent::Label { label, book: book.clone() };
         let mut all = vec![VehicleEvent::Named(self.name.clone())];
+        all.extend(self.archived.map(|(ended_us, cells)| VehicleEvent::Archived { ended_us, cells }));
         if let Some(earlier) = &self.earlier {
             let id = RunId { run: earlier.run, epoch: earlier.epoch, began_unix_ms: 0 };
             all.push(VehicleEvent::Identified(id));

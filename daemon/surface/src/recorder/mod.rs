@@ -110,7 +110,7 @@ impl Recorder {
     }
 
     fn push(&mut self, found: &mut Observation, source: EventSource, time: EventTime, kind: EventKind) {
-        let event = Event { sequence: self.memory.sequence + 1, time, source, kind };
+        let event = Event { sequence: self.memory.sequence.saturating_add(1), time, source, kind };
         self.memory.apply(&event);
         found.events.push(event);
     }

@@ -41,7 +41,7 @@ fn restore_record(record: &mut VehicleRecord, memory: &VehicleMemory) {
     let last_received = memory.contact.last_received.map(Instant::from_micros);
     record.restore_contact(memory.contact.status(), last_received, memory.contact.pause());
     record.found = memory.contact.range();
-    record.earlier.version_base = memory.map_version + 1;
+    record.earlier.version_base = memory.map_version.saturating_add(1);
     let mut exemplars = ExemplarCache::default();
     for (&label, images) in &memory.exemplars {
         images.iter().for_each(|image| exemplars.restore_image(label, stored::exemplar(image)));
