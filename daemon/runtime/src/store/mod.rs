@@ -3,6 +3,8 @@
 mod archives;
 mod batch;
 mod files;
+#[cfg(test)]
+mod fuzz_corpus;
 mod log;
 #[cfg(test)]
 mod power_cuts;

@@ -1,3 +1,3 @@
 #![no_main]
 
-libfuzzer_sys::fuzz_target!(|data: &[u8]| scenecast_runtime_fuzz::targets::journal(data));
+libfuzzer_sys::fuzz_target!(|data: &[u8]| scenecast_runtime_fuzz::journal_target::journal(data));
