@@ -151,3 +151,57 @@ pub(super) fn is_decided(vehicle: &VehicleState) -> bool {
     let slots = &vehicle.orders.directive.slots;
     slots.iter().all(|s| matches!(s.state, OrderStatus::Applied | OrderStatus::Refused))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn shown() -> Shown {
+        Shown {
+            cells: 40,
+            track: true,
+            names: (2, BTreeMap::from([(3, "sand".to_owned())])),
+            notes: vec!["a wreck".to_owned()],
+            constraints: [json!([[0, 0]]), Value::Null, Value::Null, Value::Null],
+            orders: BTreeMap::from([
+                ("fence".to_owned(), (2, OrderStatus::Applied)),
+                ("hold".to_owned(), (1, OrderStatus::Received)),
+            ]),
+        }
+    }
+
+    #[test]
+    fn a_page_that_shows_as_much_or_more_lacks_nothing() {
+        let before = shown();
+        assert_eq!(before.lacks(&before), None);
+        let mut more = shown();
+        more.cells = 41;
+        more.constraints[1] = json!({"silence_s": 60});
+        more.orders.insert("hold".to_owned(), (1, OrderStatus::Queued));
+        more.orders.insert("fence".to_owned(), (3, OrderStatus::Queued));
+        assert_eq!(more.lacks(&before), None, "an order that was received is sent again after a restart");
+        let mut renamed = shown();
+        renamed.names = (3, BTreeMap::new());
+        assert_eq!(renamed.lacks(&before), None, "another epoch has other names");
+    }
+
+    #[test]
+    fn each_fact_that_a_page_lacks_is_named() {
+        let changes: [(fn(&mut Shown), &str); 8] = [
+            (|page| page.cells = 39, "cells: 39 instead of 40"),
+            (|page| page.track = false, "track"),
+            (|page| page.names.1.clear(), "names: "),
+            (|page| page.notes.clear(), "notes: [] instead of [\"a wreck\"]"),
+            (|page| page.constraints[0] = Value::Null, "order: [[0,0]]"),
+            (|page| drop(page.orders.remove("hold")), "order hold: None instead of "),
+            (|page| page.orders.get_mut("fence").unwrap().0 = 1, "order fence: "),
+            (|page| page.orders.get_mut("fence").unwrap().1 = OrderStatus::Received, "order fence: "),
+        ];
+        for (change, named) in changes {
+            let mut page = shown();
+            change(&mut page);
+            let lacks = page.lacks(&shown()).unwrap_or_default();
+            assert!(lacks.starts_with(named), "{lacks:?} instead of {named:?}");
+        }
+    }
+}
