@@ -2,7 +2,7 @@
 
 mod pair;
 
-use pair::{LinkedEnds, LossyChannel, Setup, auv, patchy, utility};
+use pair::{CALM, LinkedEnds, LossyChannel, Setup, auv, patchy, utility};
 use scenecast_protocol::directive::Series;
 use scenecast_protocol::directive::VersionedSlot;
 use scenecast_protocol::mac::Access;
@@ -19,14 +19,7 @@ const MISSION: MissionId = MissionId(7);
 const USUAL_RECOVERY: Duration = Duration::from_secs(60);
 const MAX_RECOVERY: Duration = Duration::from_secs(600);
 
-const CALM: LossyChannel = LossyChannel {
-    loss: 0.05,
-    duplication: 0.0,
-    reordering: 0.0,
-    corruption: 0.0,
-    talker: 0.0,
-    propagation: Duration::from_millis(300),
-};
+const CHANNEL: LossyChannel = LossyChannel { propagation: Duration::from_millis(300), ..CALM };
 
 /// A stranger who hears every frame and can write a CRC.
 struct Stranger<'a> {
@@ -170,7 +163,7 @@ fn recovery(pair: &mut LinkedEnds, order: i8, until: Instant) -> Option<Duration
 fn attack(seed: u64) -> Option<Duration> {
     let access = [Access::Shared, Access::Shared, Access::ModemOwned { pool_frames: 8 }, Access::Polled];
     let setup = Setup { access: access[seed as usize % access.len()], ..Setup::new(64, 10_000, Codec::Context) };
-    let mut pair = LinkedEnds::new(seed, setup, CALM);
+    let mut pair = LinkedEnds::new(seed, setup, CHANNEL);
     pair.vehicle.set_map(patchy(12, 1).iter(), pair.now);
     pair.run(pair.now + Duration::from_secs(40), true);
     let mut stranger = Stranger { pair: &mut pair, random: seed ^ 0x5EED };

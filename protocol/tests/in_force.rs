@@ -2,7 +2,7 @@
 
 mod pair;
 
-use pair::{LinkedEnds, LossyChannel, Setup, auv, hold, utility};
+use pair::{CALM, LinkedEnds, LossyChannel, Setup, auv, hold, utility};
 use proptest::prelude::*;
 use scenecast_protocol::coordinates::DecimetrePoint;
 use scenecast_protocol::directive::{
@@ -14,14 +14,7 @@ use scenecast_protocol::map_codec::Codec;
 use scenecast_protocol::schedule::{BackgroundOrder, Class, Shares};
 use std::time::Duration;
 
-const CALM: LossyChannel = LossyChannel {
-    loss: 0.1,
-    duplication: 0.0,
-    reordering: 0.0,
-    corruption: 0.0,
-    talker: 0.0,
-    propagation: Duration::from_millis(300),
-};
+const CHANNEL: LossyChannel = LossyChannel { loss: 0.1, propagation: Duration::from_millis(300), ..CALM };
 
 fn fence(edge: i32) -> Slot {
     let corners = [(-edge, -edge), (edge, -edge), (edge, edge), (-edge, edge)];
@@ -92,7 +85,7 @@ proptest! {
         let frame_bytes = [32, 64, 256][frame_bytes];
         let setup = Setup { access, ..Setup::new(frame_bytes, 1000, Codec::Png) };
         let setup = if is_keyed && frame_bytes > 32 { setup.keyed(true, true) } else { setup };
-        let channel = LossyChannel { loss, duplication, reordering, corruption, ..CALM };
+        let channel = LossyChannel { loss, duplication, reordering, corruption, ..CHANNEL };
         let mut pair = LinkedEnds::new(seed, setup, channel);
         // Content of an earlier mission, too large for a small frame.
         let weights = (1..=60).map(|label| (label, 50)).collect();
@@ -135,7 +128,7 @@ fn learn(pair: &mut LinkedEnds, seconds: u64) -> Vec<SurfaceEvent> {
 fn a_surface_without_memory_learns_what_is_in_force() {
     for access in [Access::Shared, Access::ModemOwned { pool_frames: 8 }, Access::Polled] {
         let setup = Setup { access, ..Setup::new(64, 2000, Codec::Png) };
-        let mut pair = LinkedEnds::new(8, setup, CALM);
+        let mut pair = LinkedEnds::new(8, setup, CHANNEL);
         assert_eq!(shown(&pair, SlotId::Fence), InForce::NotReported);
         learn(&mut pair, 120);
         assert_eq!(shown(&pair, SlotId::Fence), InForce::None, "{access:?}");
@@ -153,7 +146,7 @@ fn a_surface_without_memory_learns_what_is_in_force() {
 
 #[test]
 fn an_answer_of_many_frames_arrives_over_losses() {
-    let channel = LossyChannel { loss: 0.5, reordering: 0.1, ..CALM };
+    let channel = LossyChannel { loss: 0.5, reordering: 0.1, ..CHANNEL };
     let mut pair = LinkedEnds::new(3, Setup::new(32, 2000, Codec::Png), channel);
     let weights = (1..=200).map(|label| (label, 50)).collect();
     let large = Slot::Utility(Utility { weights, ..Utility::default() });
@@ -164,7 +157,7 @@ fn an_answer_of_many_frames_arrives_over_losses() {
 
 #[test]
 fn inquiries_pause_while_no_answer_comes() {
-    let mut pair = LinkedEnds::new(4, Setup::new(64, 2000, Codec::Png), LossyChannel { loss: 0.0, ..CALM });
+    let mut pair = LinkedEnds::new(4, Setup::new(64, 2000, Codec::Png), LossyChannel { loss: 0.0, ..CHANNEL });
     learn(&mut pair, 60);
     pair.put_in_force(fence(200));
     let spent = |pair: &LinkedEnds| {

@@ -1,79 +1,24 @@
 //! Two ends in virtual time with an unreliable channel between them.
 
 // Each test program uses a part of this module.
-#![allow(dead_code)]
+#![allow(dead_code, unused_imports)]
+
+mod setup;
+
+pub(crate) use setup::{CALM, LossyChannel, Setup};
 
 use scenecast_protocol::directive::{Constraints, Slot, SlotId, SlotState, Utility};
 use scenecast_protocol::link::{
-    Authenticity, SlotInboxState, SurfaceConfig, SurfaceEvent, SurfaceLink, VehicleConfig, VehicleEvent, VehicleLink,
+    SlotInboxState, SurfaceConfig, SurfaceEvent, SurfaceLink, VehicleConfig, VehicleEvent, VehicleLink,
 };
-use scenecast_protocol::mac::{Access, MasterConfig, ModemProfile};
+use scenecast_protocol::mac::{Access, MasterConfig};
 use scenecast_protocol::map::{Cell, LabelGrid, LayerDescriptor, LayerId, LayerSet, LayerSource};
 use scenecast_protocol::map_codec::Codec;
 use scenecast_protocol::schedule::{Audit, Shares};
-use scenecast_protocol::seal::MissionKey;
 use scenecast_protocol::time::Instant;
-use scenecast_protocol::wire::{Address, CellEdge, MissionId, VehicleStatus};
+use scenecast_protocol::wire::{Address, CellEdge, VehicleStatus};
 use std::collections::{BTreeMap, VecDeque};
-use std::sync::Arc;
 use std::time::Duration;
-
-/// How the channel treats frames.
-#[derive(Debug, Clone)]
-pub(crate) struct LossyChannel {
-    pub(crate) loss: f64,
-    pub(crate) duplication: f64,
-    pub(crate) reordering: f64,
-    pub(crate) corruption: f64,
-    /// Share of transmissions after which a third party transmits noise or an overheard frame.
-    pub(crate) talker: f64,
-    pub(crate) propagation: Duration,
-}
-
-/// The settings that both ends share.
-#[derive(Debug, Clone)]
-pub(crate) struct Setup {
-    pub(crate) mission: MissionId,
-    pub(crate) frame_bytes: usize,
-    pub(crate) budget_bps: u32,
-    pub(crate) codec: Codec,
-    pub(crate) access: Access,
-    pub(crate) authenticity: Option<Authenticity>,
-    /// How long a new label must be stable.
-    pub(crate) debounce: Duration,
-    /// The share of each layer in percent of the map's; `None`: no layers are sent.
-    pub(crate) layers: Option<[u8; 2]>,
-}
-
-impl Setup {
-    pub(crate) fn new(frame_bytes: usize, budget_bps: u32, codec: Codec) -> Self {
-        Self {
-            mission: MissionId(7),
-            frame_bytes,
-            budget_bps,
-            codec,
-            access: Access::Shared,
-            authenticity: None,
-            debounce: Duration::ZERO,
-            layers: None,
-        }
-    }
-
-    pub(crate) fn keyed(self, all: bool, encrypt: bool) -> Self {
-        let key = Arc::new(MissionKey::from_bytes([42; 16]));
-        Self { authenticity: Some(Authenticity { key, all, encrypt }), ..self }
-    }
-
-    fn modem(&self) -> ModemProfile {
-        ModemProfile {
-            frame_bytes: self.frame_bytes,
-            bit_rate_bps: 10_000.0,
-            overhead_bits: 0,
-            turn_around: Duration::from_millis(200),
-            access: self.access,
-        }
-    }
-}
 
 pub(crate) struct LinkedEnds {
     pub(crate) now: Instant,
@@ -411,6 +356,24 @@ fn surface(setup: &Setup, seed: u64, now: Instant) -> SurfaceLink {
         authenticity: setup.authenticity.clone(),
     };
     SurfaceLink::new(config, seed, now)
+}
+
+/// Neither end has exceeded its budget in a window of 10 s by more than a frame.
+pub(crate) fn assert_budget(pair: &LinkedEnds, budget_bps: u32) {
+    for audit in &pair.audits {
+        let limit = u64::from(budget_bps) * 10 + audit.largest_bits();
+        assert!(audit.worst_window_bits() <= limit, "{} bits in a window, limit {limit}", audit.worst_window_bits());
+    }
+}
+
+/// Labels without any order, so that there is always more to send than the channel carries.
+pub(crate) fn speckled(side: i32, phase: u64) -> Vec<(Cell, u8)> {
+    let mut state = phase;
+    let mut label = || {
+        state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        (state >> 60) as u8 + 1
+    };
+    (0..side * side).map(|i| (Cell::new(i % side, i / side), label())).collect()
 }
 
 /// A patchy map of `side` x `side` cells that differs with `phase`.
