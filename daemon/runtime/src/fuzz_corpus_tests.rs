@@ -4,7 +4,7 @@ use crate::journal;
 use std::path::Path;
 
 #[path = "../fuzz/src/files.rs"]
-mod files;
+pub(crate) mod files;
 #[path = "../fuzz/src/journal_target.rs"]
 mod journal_target;
 

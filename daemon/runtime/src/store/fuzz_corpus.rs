@@ -1,11 +1,8 @@
 //! The fuzz target of the store without a fuzzer: every file of its corpus, and mutations of them.
 
 use super::{batch, log};
-use crate::fuzz_corpus_tests::{corpus, mutate};
-use crate::journal;
+use crate::fuzz_corpus_tests::{corpus, files, mutate};
 
-#[path = "../../fuzz/src/files.rs"]
-mod files;
 #[path = "../../fuzz/src/store_target.rs"]
 mod store_target;
 
