@@ -42,7 +42,7 @@ pub enum FrameEvent {
     },
 }
 
-/// The result of a datagram, which tells whether its sender is the other end.
+/// The result of a datagram, which shows whether its sender is the other end.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum FrameOutcome {
     /// It is no frame, or one that the link drops.
