@@ -97,3 +97,97 @@ fn not_there(place: &PortAddress, e: &std::io::Error) -> UserError {
         PortAddress::File(path) => format!("{}: {e}", path.display()),
     })
 }
+
+#[cfg(all(test, feature = "surface"))]
+mod tests {
+    use super::*;
+    use scenecast_core::Area;
+    use scenecast_core::tuning_table::TuningTable;
+    use scenecast_host::channel_station;
+    use scenecast_protocol::mac::ModemProfile;
+    use scenecast_surface::Surface;
+    use scenecast_vehicle::{Durable, Vehicle};
+    use tokio::net::UdpSocket;
+
+    const WINDOW: Duration = Duration::from_secs(10);
+
+    /// An end of the link at its port.
+    struct PortedEnd<E> {
+        port: ModemPort,
+        link: LinkHost<E>,
+    }
+
+    impl<E: LinkEnd> PortedEnd<E> {
+        async fn new(config: &Config, end: E, modem: ModemProfile) -> Self {
+            let port = ModemPort::open(config, Instant::ZERO).await.unwrap();
+            let mut new = Self { port, link: LinkHost::new(end, channel_station(modem, WINDOW, Instant::ZERO)) };
+            assert_eq!(new.port.next().await, FromPort::Open);
+            new.port.handle(FromPort::Open, &mut new.link, Instant::ZERO);
+            new
+        }
+
+        /// Reads the next datagram.
+        async fn read(&mut self, now: Instant) {
+            let report = self.port.next().await;
+            self.port.handle(report, &mut self.link, now);
+            while self.link.poll_event().is_some() {}
+        }
+
+        /// Writes the frames that are due, and returns their number.
+        fn write(&mut self, now: Instant) -> usize {
+            self.link.handle_timeout(now);
+            let mut frames = 0;
+            while let Some(bytes) = self.link.poll_output(now) {
+                self.port.write(bytes);
+                frames += 1;
+            }
+            while self.link.poll_event().is_some() {}
+            frames
+        }
+
+        fn accepted(&self) -> u64 {
+            self.link.end().frame_counts().accepted
+        }
+    }
+
+    /// Passes frames to and fro for a minute, or until both ends have accepted this many.
+    async fn exchange(surface: &mut PortedEnd<Surface>, vehicle: &mut PortedEnd<Vehicle>, began: Instant, enough: u64) {
+        for tick in 0..600 {
+            let now = began + Duration::from_millis(100) * tick;
+            for _ in 0..surface.write(now) {
+                vehicle.read(now).await;
+            }
+            for _ in 0..vehicle.write(now) {
+                surface.read(now).await;
+            }
+            if surface.accepted() >= enough && vehicle.accepted() >= enough {
+                return;
+            }
+        }
+    }
+
+    #[tokio::test]
+    async fn a_stranger_over_udp_does_not_lock_out_the_surface() {
+        let free = UdpSocket::bind("127.0.0.1:0").await.unwrap().local_addr().unwrap();
+        let load = |end: &str| {
+            let sets = ["modem.kind=udp".to_owned(), format!("modem.{end}={free}"), "link.max_idle_s=4".to_owned()];
+            scenecast_config::load(None, &sets).unwrap()
+        };
+        let (below, above) = (load("listen"), load("connect"));
+        let modem = scenecast_config::modem_profile(&below, 10_000.0);
+        let (area, start) = (Area { west: 0.0, south: 0.0, east: 20.0, north: 20.0 }, Instant::ZERO);
+        let vehicle = scenecast_vehicle::assemble(&below, None, modem, area, Durable::default(), 3, start).unwrap();
+        let surface = scenecast_surface::assemble(&above, None, TuningTable::default(), modem, 4, start).unwrap();
+        let mut vehicle = PortedEnd::new(&below, vehicle, modem).await;
+        let mut surface = PortedEnd::new(&above, surface, modem).await;
+        let stranger = UdpSocket::bind("127.0.0.1:0").await.unwrap();
+        stranger.send_to(b"first", free).await.unwrap();
+        vehicle.read(start).await;
+        exchange(&mut surface, &mut vehicle, start, 2).await;
+        assert!(surface.accepted() >= 2 && vehicle.accepted() >= 2, "the surface is locked out");
+        stranger.send_to(b"second", free).await.unwrap();
+        exchange(&mut surface, &mut vehicle, start + Duration::from_secs(100), 6).await;
+        assert!(surface.accepted() >= 6 && vehicle.accepted() >= 6);
+        assert_eq!(vehicle.link.end().frame_counts().dropped, 1, "only the first datagram of the stranger was read");
+    }
+}
