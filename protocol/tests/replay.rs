@@ -95,3 +95,57 @@ fn replayed_hellos_cost_at_most_two_frames_a_second() {
         assert!(attacked < 1200, "{access:?}: {attacked} frames, {quiet} without replays");
     }
 }
+
+/// Converged ends, and hellos of earlier runs of the surface that the vehicle has never met.
+fn with_unmet_calls(access: Access) -> (LinkedEnds, Vec<Vec<u8>>) {
+    let setup = Setup { access, ..Setup::new(64, 10_000, Codec::Context) }.keyed(true, false);
+    let mut pair = LinkedEnds::new(12, setup, STILL);
+    pair.vehicle.set_map(patchy(12, 1).iter(), pair.now);
+    pair.mute = [true, false];
+    for _ in 0..6 {
+        pair.run(pair.now + Duration::from_secs(30), false);
+        pair.restart_surface();
+    }
+    let calls: Vec<Vec<u8>> = pair.overheard.iter().cloned().collect();
+    pair.mute = [false; 2];
+    pair.run(pair.now + Duration::from_secs(600), true);
+    assert!(pair.is_converged() && calls.len() > 5, "{} calls by {access:?}", calls.len());
+    (pair, calls)
+}
+
+#[test]
+fn replayed_calls_of_the_surface_delay_nothing() {
+    for access in ACCESSES {
+        let (mut pair, calls) = with_unmet_calls(access);
+        let restarts = pair.vehicle.stats().peer_restarts;
+        for step in 0..40 {
+            let map = patchy(12, step as u64);
+            pair.vehicle.set_map(map.iter(), pair.now);
+            pair.surface.issue(auv(), utility(step as i8), pair.now).unwrap();
+            for i in 0..30 {
+                pair.vehicle.handle_frame(&calls[(step + i) % calls.len()], pair.now);
+                pair.run(pair.now + Duration::from_secs(1), false);
+            }
+            assert!(pair.is_converged(), "step {step} by {access:?}");
+            assert_eq!(pair.applied.last(), Some(&utility(step as i8)), "step {step} by {access:?}");
+        }
+        assert_eq!(pair.vehicle.stats().peer_restarts, restarts, "{access:?}");
+    }
+}
+
+#[test]
+fn fifty_replayed_calls_cause_few_answers() {
+    for access in ACCESSES {
+        let (mut pair, calls) = with_unmet_calls(access);
+        pair.mute = [true; 2];
+        pair.run(pair.now + Duration::from_secs(120), false);
+        let before = pair.vehicle.stats().frames_sent;
+        for i in 0..50 {
+            pair.vehicle.handle_frame(&calls[i % calls.len()], pair.now);
+            pair.run(pair.now + Duration::from_secs(1), false);
+        }
+        let sent = pair.vehicle.stats().frames_sent - before;
+        println!("{access:?}: {sent} transmissions after 50 replays in 50 s");
+        assert!(sent <= 20, "{access:?}: {sent} transmissions");
+    }
+}

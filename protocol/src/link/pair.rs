@@ -23,7 +23,7 @@ pub struct LinkPair<T> {
     introduction: Introduction,
     handshake: Handshake<T>,
     mismatch: MismatchReport,
-    /// At the vehicle: the surface's last frame with a turn is to be answered with a hello.
+    /// At the vehicle: the next frame is a hello, although there is a run.
     owes_hello: bool,
     /// Consecutive frames that seem to come from another run of the peer.
     strays: u32,
@@ -183,6 +183,17 @@ impl<T> LinkPair<T> {
         self.owes_hello || self.handshake.run().is_none()
     }
 
+    /// At the vehicle: sends the hello of an offered run again; returns whether there is one beside the current run.
+    pub fn repeat_hello(&mut self) -> bool {
+        self.owes_hello |= self.handshake.offered().is_some();
+        self.owes_hello
+    }
+
+    /// At the vehicle: leaves the last hello of the surface without an answer.
+    pub fn withhold_hello(&mut self) {
+        self.owes_hello = self.handshake.is_leaving();
+    }
+
     /// Starts the next frame, with at most `ack_room` bytes of acknowledgement. It becomes a hello if `purpose` demands it
     /// or the handshake is not complete.
     pub fn begin_frame(
@@ -225,6 +236,8 @@ impl<T> LinkPair<T> {
         self.stats.frames_sent += 1;
         let direction = self.direction_out();
         if purpose.is_hello() || self.must_send_hello() {
+            // The current run may be in use still: the hello of the surface may be a replay.
+            self.owes_hello &= self.handshake.is_leaving();
             let to = self.handshake.offered().filter(|_| self.us != Address::SURFACE).map(|r| r.peer);
             let (session, nonce) = to.map_or((0, 0), |p| (p.session.get(), p.nonce));
             return match &self.authenticity {

@@ -82,11 +82,15 @@ impl<S: StateSource> VehicleLink<S> {
         self.repeater.end_turn();
     }
 
+    fn is_answer_due(&self, now: Instant) -> bool {
+        self.answer_due.is_some_and(|at| now >= at)
+    }
+
     fn has_reason_to_transmit(&self, now: Instant) -> bool {
         if !matches!(self.config.modem.access, Access::ModemOwned { .. }) {
             return true;
         }
-        let answer = self.answer_due.is_some_and(|at| now >= at) || self.call_reply.is_pending();
+        let answer = self.is_answer_due(now) || self.call_reply.is_pending();
         let news = self.content.backlog_bytes(&self.budget, now) > 0;
         answer || (self.pair.has_run() && (news || self.content.status.is_waiting(now)))
     }
@@ -155,6 +159,9 @@ impl<S: StateSource> VehicleLink<S> {
     fn write_frame(&mut self, frames: u32, now: Instant) -> (Transmit, bool) {
         let modem = self.config.modem;
         let size = modem.frame_bytes;
+        if self.is_answer_due(now) && !self.pair.must_send_hello() && self.hello_limit.repeat() {
+            self.pair.repeat_hello();
+        }
         let sends_hello = self.pair.must_send_hello();
         let plan = if sends_hello { FramePlan { remaining: 0, is_last_new: true } } else { self.plan(frames, now) };
         let wish = (plan.is_last_new && !sends_hello).then(|| self.wish(now));
