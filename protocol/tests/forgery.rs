@@ -3,8 +3,8 @@
 mod pair;
 
 use pair::{CALM, LinkedEnds, LossyChannel, Setup, auv, patchy, utility};
-use scenecast_protocol::directive::Series;
-use scenecast_protocol::directive::VersionedSlot;
+use scenecast_protocol::directive::{OrderStatus, Series, SlotId, VersionedSlot};
+use scenecast_protocol::link::InForce;
 use scenecast_protocol::mac::Access;
 use scenecast_protocol::map_codec::Codec;
 use scenecast_protocol::time::Instant;
@@ -147,12 +147,23 @@ impl Stranger<'_> {
     }
 }
 
-/// The time from `from` until the maps agree and the last order is applied, if that is before `until`.
+/// Whether the last order is applied, or the operator sees that another content is in force: a forged order whose version has
+/// the same low 8 bits can stand in its place.
+fn is_settled(pair: &LinkedEnds, order: i8) -> bool {
+    let last = utility(order);
+    let view = pair.surface.vehicle(auv()).unwrap();
+    let is_decided = view.slots().any(|slot| slot.slot == last && slot.status == OrderStatus::Applied);
+    let is_other = matches!(view.in_force(SlotId::Utility), InForce::Known(content) if *content != last);
+    let is_other = is_decided && is_other;
+    pair.applied.last() == Some(&last) || is_other
+}
+
+/// The time until the maps agree and the last order is settled, if that is before `until`.
 fn recovery(pair: &mut LinkedEnds, order: i8, until: Instant) -> Option<Duration> {
     let from = pair.now;
     while pair.now < until {
         pair.run(pair.now + Duration::from_millis(500), false);
-        if pair.is_converged() && pair.applied.last() == Some(&utility(order)) {
+        if pair.is_converged() && is_settled(pair, order) {
             return Some(pair.now.since(from));
         }
     }

@@ -11,24 +11,46 @@ use std::collections::VecDeque;
 pub enum HandshakeOutcome {
     /// It names the current run.
     Known,
-    /// It names a new run.
+    /// It names a new run. At the surface, the run is the current one now.
     New,
+    /// At the surface: it names another run than the current one, which a numbered frame must prove.
+    Offered,
     /// It names a run that has ended, so it is an old frame.
     Retired,
+}
+
+/// The purpose of a frame in the handshake.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum FramePurpose {
+    /// Names the run of the sender.
+    Hello,
+    /// At the surface: an empty numbered frame in the offered run, which proves that run to the vehicle.
+    Proof,
+    /// A numbered frame in the current run.
+    Content,
+}
+
+impl FramePurpose {
+    pub(super) fn hello_if(is_hello: bool) -> Self {
+        if is_hello { Self::Hello } else { Self::Content }
+    }
+
+    pub(super) fn is_hello(self) -> bool {
+        self == Self::Hello
+    }
 }
 
 /// The runs of both ends toward each other.
 ///
 /// The surface begins: its hello names its run. The vehicle answers with a hello that is sealed to that run and names a
 /// run of its own, a new one for each run of the surface. Therefore no frame to or from an earlier run of either end
-/// verifies any more. The vehicle keeps its previous run until a numbered frame of the new one comes in: a hello alone,
-/// which may be late or replayed, has no effect.
+/// verifies any more. Each end keeps its previous run until a numbered frame of the new one comes in: a hello alone,
+/// which may be late or replayed, has no effect. The surface sends the first numbered frame, the proof.
 #[derive(Debug)]
 pub(super) struct Handshake<T> {
     own: Identity,
     run: Option<LinkRun<T>>,
-    /// At the vehicle: the run offered in answer to a hello, until a numbered frame proves that
-    /// the surface has accepted it.
+    /// The run that a hello has offered, until a numbered frame proves that the peer has accepted it.
     offered: Option<LinkRun<T>>,
     /// At the vehicle: `run` serves only to receive grants, because this end has begun a new one.
     leaving: bool,
@@ -87,7 +109,21 @@ impl<T> Handshake<T> {
         HandshakeOutcome::New
     }
 
-    /// At the vehicle: makes the offered run the current one, because a numbered frame of it came in.
+    /// The run whose frames have this purpose; `None` for hellos.
+    pub(super) fn run_for(&mut self, purpose: FramePurpose) -> Option<&mut LinkRun<T>> {
+        match purpose {
+            FramePurpose::Hello => None,
+            FramePurpose::Proof => self.offered.as_mut(),
+            FramePurpose::Content => self.run.as_mut(),
+        }
+    }
+
+    /// At the surface: a frame of the current run came in, so the vehicle uses no other.
+    pub(super) fn refuse_offered(&mut self) {
+        self.offered = None;
+    }
+
+    /// Makes the offered run the current one, because a numbered frame of it came in.
     pub(super) fn accept_offered(&mut self) {
         if let Some(run) = self.offered.take() {
             self.own = run.own;
@@ -109,8 +145,15 @@ impl<T> Handshake<T> {
         if self.is_retired(peer) {
             return HandshakeOutcome::Retired;
         }
-        self.replace(LinkRun::new(self.own, peer, introduction, key(self.own, peer)));
-        HandshakeOutcome::New
+        let new = || LinkRun::new(self.own, peer, introduction, key(self.own, peer));
+        if self.run.is_none() {
+            self.run = Some(new());
+            return HandshakeOutcome::New;
+        }
+        if self.offered.as_ref().is_none_or(|r| r.peer != peer || r.flight.is_full()) {
+            self.offered = Some(new());
+        }
+        HandshakeOutcome::Offered
     }
 
     /// At the vehicle: begins a new run toward the surface's current one.
@@ -124,6 +167,7 @@ impl<T> Handshake<T> {
     /// At the surface: begins a new run, which a new handshake must introduce to the vehicle.
     pub(super) fn renew_surface(&mut self) {
         self.own = fresh(&mut self.random);
+        self.offered = None;
         if let Some(old) = self.run.take() {
             self.retire(old);
         }
@@ -142,9 +186,9 @@ impl<T> Handshake<T> {
         self.retired.iter().any(|r| r.identity == peer)
     }
 
-    /// Whether a run of the peer that has ended sent this frame to a run of ours.
-    pub(super) fn is_of_ended(&self, envelope: &Envelope<'_>, direction: Direction) -> bool {
-        self.retired.iter().any(|r| r.has_sent(envelope, direction))
+    /// Whether a run of the peer that has ended sent this frame to a run of ours, and it came in for the first time.
+    pub(super) fn is_new_of_ended(&mut self, envelope: &Envelope<'_>, direction: Direction) -> bool {
+        self.retired.iter_mut().any(|r| r.accept(envelope, direction))
     }
 
     fn retire(&mut self, run: LinkRun<T>) {

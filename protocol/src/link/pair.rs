@@ -4,7 +4,7 @@ mod receive;
 
 pub use receive::Inbound;
 
-use super::handshake::Handshake;
+use super::handshake::{FramePurpose, Handshake};
 use super::mismatch::{Mismatch, MismatchReport};
 use super::run::{Authenticity, Identity};
 use super::{FrameNumber, LinkStats, LinkWindow};
@@ -23,7 +23,7 @@ pub struct LinkPair<T> {
     introduction: Introduction,
     handshake: Handshake<T>,
     mismatch: MismatchReport,
-    /// At the vehicle: the surface's last frame with a turn is to be answered with a hello.
+    /// At the vehicle: the next frame is a hello, although there is a run.
     owes_hello: bool,
     /// Consecutive frames that seem to come from another run of the peer.
     strays: u32,
@@ -81,6 +81,16 @@ impl<T> LinkPair<T> {
     /// Whether there is a run of the peer, or a hello of one.
     pub fn has_contact(&self) -> bool {
         self.handshake.run().is_some() || self.handshake.offered().is_some()
+    }
+
+    /// At the surface: whether the vehicle has offered another run than the current one, so that a proof is to be sent.
+    pub fn has_offer(&self) -> bool {
+        self.us == Address::SURFACE && self.handshake.offered().is_some_and(|r| !r.flight.is_full())
+    }
+
+    /// The number of proofs that were written in the offered run.
+    pub fn proofs(&self) -> u64 {
+        self.handshake.offered().map_or(0, |r| r.flight.next_number() - 1)
     }
 
     /// Whether a numbered frame has shown that the peer uses the current run.
@@ -173,7 +183,18 @@ impl<T> LinkPair<T> {
         self.owes_hello || self.handshake.run().is_none()
     }
 
-    /// Starts the next frame, with at most `ack_room` bytes of acknowledgement. It becomes a hello if `kind` demands it
+    /// At the vehicle: sends the hello of an offered run again; returns whether there is one beside the current run.
+    pub fn repeat_hello(&mut self) -> bool {
+        self.owes_hello |= self.handshake.offered().is_some();
+        self.owes_hello
+    }
+
+    /// At the vehicle: leaves the last hello of the surface without an answer.
+    pub fn withhold_hello(&mut self) {
+        self.owes_hello = self.handshake.is_leaving();
+    }
+
+    /// Starts the next frame, with at most `ack_room` bytes of acknowledgement. It becomes a hello if `purpose` demands it
     /// or the handshake is not complete.
     pub fn begin_frame(
         &mut self,
@@ -181,14 +202,13 @@ impl<T> LinkPair<T> {
         ack_room: usize,
         turn: Option<u8>,
         stamp: Option<Stamp>,
-        kind: FrameKind,
+        purpose: FramePurpose,
     ) -> FrameBuilder {
-        let kind = FrameKind::hello_if(kind.is_hello() || self.must_send_hello());
-        let hello = kind.is_hello();
+        let hello = purpose.is_hello() || self.must_send_hello();
         let own = self.handshake.offered().filter(|_| hello).map_or(self.handshake.own(), |r| r.own);
         let direction = self.direction_out();
         let keyed = if hello { self.authenticity.is_some() } else { self.is_keyed(direction) };
-        let run = self.handshake.run_mut().filter(|_| !hello);
+        let run = self.handshake.run_for(purpose).filter(|_| !hello);
         let (number, base) = run.as_ref().map_or((0, 1), |r| (r.flight.next_number() as u16, r.flight.base_distance()));
         let header = Header {
             from: self.us,
@@ -201,7 +221,7 @@ impl<T> LinkPair<T> {
             stamp,
             nonce: (hello && keyed).then_some(own.nonce),
             ack: run.and_then(|r| r.window.statement(ack_room)),
-            kind,
+            kind: FrameKind::hello_if(hello),
             keyed,
         };
         let mut builder = FrameBuilder::new(&header, size);
@@ -212,10 +232,12 @@ impl<T> LinkPair<T> {
     }
 
     /// Closes a frame and keeps its content until its fate is known.
-    pub fn finish_frame(&mut self, builder: FrameBuilder, carried: T, kind: FrameKind, short: bool) -> Vec<u8> {
+    pub fn finish_frame(&mut self, builder: FrameBuilder, carried: T, purpose: FramePurpose, short: bool) -> Vec<u8> {
         self.stats.frames_sent += 1;
         let direction = self.direction_out();
-        if kind.is_hello() || self.must_send_hello() {
+        if purpose.is_hello() || self.must_send_hello() {
+            // The current run may be in use still: the hello of the surface may be a replay.
+            self.owes_hello &= self.handshake.is_leaving();
             let to = self.handshake.offered().filter(|_| self.us != Address::SURFACE).map(|r| r.peer);
             let (session, nonce) = to.map_or((0, 0), |p| (p.session.get(), p.nonce));
             return match &self.authenticity {
@@ -224,7 +246,7 @@ impl<T> LinkPair<T> {
             };
         }
         let (mission, keyed) = (self.mission, self.is_keyed(direction));
-        let Some(run) = self.handshake.run_mut() else { return Vec::new() };
+        let Some(run) = self.handshake.run_for(purpose) else { return Vec::new() };
         let number = run.flight.next_number();
         run.flight.push(carried);
         match run.key.as_ref().filter(|_| keyed) {
@@ -269,9 +291,14 @@ mod tests {
     use crate::wire::Envelope;
     use std::sync::Arc;
 
-    fn carry(from: &mut LinkPair<u64>, to: &mut LinkPair<u64>, content: u64, kind: FrameKind) -> Vec<(u64, bool)> {
-        let builder = from.begin_frame(64, 20, Some(4), None, kind);
-        let bytes = from.finish_frame(builder, content, kind, true);
+    fn carry(
+        from: &mut LinkPair<u64>,
+        to: &mut LinkPair<u64>,
+        content: u64,
+        purpose: FramePurpose,
+    ) -> Vec<(u64, bool)> {
+        let builder = from.begin_frame(64, 20, Some(4), None, purpose);
+        let bytes = from.finish_frame(builder, content, purpose, true);
         let us = to.us;
         let envelope = Envelope::decode(&bytes, |a| a == us).unwrap();
         let inbound = to.handle_frame(&envelope, |_, _| true).unwrap();
@@ -286,14 +313,14 @@ mod tests {
         let introduction = Introduction { series: Some(Series::from_random(1)), ..Introduction::default() };
         let mut surface = LinkPair::new(MissionId(1), Address::SURFACE, auv, authenticity.clone(), introduction, 1);
         let mut vehicle = LinkPair::new(MissionId(1), auv, Address::SURFACE, authenticity, introduction, 2);
-        carry(&mut surface, &mut vehicle, 0, FrameKind::Hello);
-        carry(&mut vehicle, &mut surface, 0, FrameKind::Hello);
-        carry(&mut surface, &mut vehicle, 0, FrameKind::Numbered);
+        carry(&mut surface, &mut vehicle, 0, FramePurpose::Hello);
+        carry(&mut vehicle, &mut surface, 0, FramePurpose::Hello);
+        carry(&mut surface, &mut vehicle, 0, FramePurpose::Content);
         let mut delivered = 0;
         for i in 0..140_000 {
-            carry(&mut vehicle, &mut surface, i, FrameKind::Numbered);
+            carry(&mut vehicle, &mut surface, i, FramePurpose::Content);
             if i % 500 == 0 {
-                for (content, held) in carry(&mut surface, &mut vehicle, 0, FrameKind::Numbered) {
+                for (content, held) in carry(&mut surface, &mut vehicle, 0, FramePurpose::Content) {
                     assert!(held && content == delivered);
                     delivered += 1;
                 }

@@ -35,11 +35,17 @@ pub(super) struct EndedPeer {
 }
 
 impl EndedPeer {
-    /// Whether it sent this frame, by a valid tag.
-    pub(super) fn has_sent(&self, envelope: &Envelope<'_>, direction: Direction) -> bool {
+    /// Whether it sent this frame, by a valid tag, after all of its frames that came in before.
+    pub(super) fn accept(&mut self, envelope: &Envelope<'_>, direction: Direction) -> bool {
         let number = unwrap_number(envelope.header.number, self.highest);
         let is_open = |key| envelope.open(&Seal::Session(key, direction, number)).is_some();
-        envelope.header.session == self.identity.session && self.key.as_ref().is_some_and(is_open)
+        let is_new = envelope.header.session == self.identity.session
+            && number > self.highest
+            && self.key.as_ref().is_some_and(is_open);
+        if is_new {
+            self.highest = number;
+        }
+        is_new
     }
 }
 

@@ -43,12 +43,12 @@ impl<'a, T> Inbound<'a, T> {
 }
 
 impl<T> LinkPair<T> {
-    /// Opens a frame of this peer. `decodes` tells whether the chunks of a frame with this base decode; a frame of which
-    /// one does not changes nothing. The error is the reason for which the frame was dropped and counted.
+    /// Opens a frame of this peer. `decodes` tells whether the chunks of a frame with this base decode, or, without a base,
+    /// those of the first frame of a run; a frame of which one does not changes nothing. The error is the reason for which the frame was dropped and counted.
     pub fn handle_frame<'a>(
         &mut self,
         envelope: &Envelope<'a>,
-        decodes: impl Fn(FrameNumber, Chunks<'_>) -> bool,
+        decodes: impl Fn(Option<FrameNumber>, Chunks<'_>) -> bool,
     ) -> Result<Inbound<'a, T>, DropReason> {
         let result = match envelope.header.kind {
             FrameKind::Hello => self.read_hello(envelope),
@@ -87,22 +87,24 @@ impl<T> LinkPair<T> {
             None => self.handshake.handle_call(peer, introduction, key),
         };
         if outcome == HandshakeOutcome::Retired {
-            // A late hello can make the current run look ended; the vehicle's next frames decide.
-            self.strays += u32::from(own.is_some());
+            // Where frames of the vehicle have no tag, a forged one may have proven a false run.
+            self.strays += u32::from(own.is_some() && !self.is_keyed(self.direction_in()));
             return Err(DropReason::OldSession);
         }
         let is_new = outcome == HandshakeOutcome::New;
         self.owes_hello = is_new && own.is_none();
         let restarted = is_new && own.is_some();
         self.stats.peer_restarts += u64::from(restarted);
-        self.strays = 0;
+        if restarted || own.is_none() {
+            self.strays = 0;
+        }
         Ok(Inbound::empty(restarted, frame))
     }
 
     fn read_numbered<'a>(
         &mut self,
         envelope: &Envelope<'a>,
-        decodes: impl Fn(FrameNumber, Chunks<'_>) -> bool,
+        decodes: impl Fn(Option<FrameNumber>, Chunks<'_>) -> bool,
     ) -> Result<Inbound<'a, T>, DropReason> {
         let (mission, direction) = (self.mission, self.direction_in());
         let keyed = self.is_keyed(direction);
@@ -114,18 +116,18 @@ impl<T> LinkPair<T> {
             let stray = self.handshake.run().is_none_or(|r| r.peer.session != envelope.header.session);
             // Without a valid CRC the session may be noise; without a valid tag it may be a forgery. A frame of a run that a
             // late hello has ended here has a valid tag.
-            let is_of_ended = || keyed && self.handshake.is_of_ended(envelope, direction);
-            let is_sign = stray && (reason == DropReason::OldSession || is_of_ended());
+            let is_sign = stray
+                && (reason == DropReason::OldSession || (keyed && self.handshake.is_new_of_ended(envelope, direction)));
             self.strays += u32::from(is_sign);
             return Err(reason);
         };
         if !frame.chunks().are_sound() {
             return Err(DropReason::Malformed);
         }
-        if !restarted && !self.decodes(&frame, decodes) {
+        let is_decoded = if restarted { decodes(None, frame.chunks()) } else { self.decodes(&frame, decodes) };
+        if !is_decoded {
             return Err(DropReason::Undecodable);
         }
-        self.strays = 0;
         self.mismatch.handle_accepted();
         if restarted {
             self.handshake.accept_offered();
@@ -133,16 +135,29 @@ impl<T> LinkPair<T> {
         }
         self.owes_hello = self.handshake.is_leaving();
         if self.owes_hello {
+            self.strays = 0;
             return Ok(Inbound::empty(restarted, frame));
         }
-        self.take(frame, restarted)
+        let inbound = match self.take(frame, restarted) {
+            Ok(inbound) => inbound,
+            Err(reason) => {
+                // Without a tag, a forged frame may have a number so high that all true ones come late.
+                self.strays += u32::from(reason == DropReason::Late && !keyed);
+                return Err(reason);
+            }
+        };
+        self.strays = 0;
+        if self.us == Address::SURFACE && inbound.number.is_some() {
+            self.handshake.refuse_offered();
+        }
+        Ok(inbound)
     }
 
     /// Whether the chunks of a frame decode, if the window would accept it.
-    fn decodes(&self, frame: &Frame<'_>, decodes: impl Fn(FrameNumber, Chunks<'_>) -> bool) -> bool {
+    fn decodes(&self, frame: &Frame<'_>, decodes: impl Fn(Option<FrameNumber>, Chunks<'_>) -> bool) -> bool {
         let Some(run) = self.handshake.run() else { return true };
         match run.window.preview(frame.header.number, frame.header.base) {
-            Ok((_, base)) => decodes(base, frame.chunks()),
+            Ok((_, base)) => decodes(Some(base), frame.chunks()),
             Err(_) => true,
         }
     }

@@ -3,11 +3,12 @@
 use super::SurfaceLink;
 use super::discovery::Discovery;
 use super::peer::Ready;
+use crate::link::handshake::FramePurpose;
 use crate::link::{Transmit, Wakeup};
 use crate::mac::{Access, ModemProfile};
 use crate::map::StateReplica;
 use crate::time::Instant;
-use crate::wire::{Address, FrameKind};
+use crate::wire::Address;
 
 /// Probability that a turn of the surface may be lost with all its copies.
 const TURN_LOSS_RISK: f64 = 0.04;
@@ -59,18 +60,22 @@ impl<R: StateReplica> SurfaceLink<R> {
         let is_plentiful = self.budget.is_plentiful(now);
         let Some(peer) = self.fleet.get_mut(vehicle) else { return false };
         let modem = self.config.modem;
-        let kind = FrameKind::hello_if(is_hello_due(peer.master.unanswered()) || peer.is_full());
+        let purpose = match is_hello_due(peer.master.unanswered()) || peer.is_full() {
+            true => FramePurpose::Hello,
+            false if peer.is_proof_due() => FramePurpose::Proof,
+            false => FramePurpose::Content,
+        };
         let copies = if is_plentiful { peer.stats().loss_out.copies(TURN_LOSS_RISK, 6) } else { 1 };
-        let mut plan = peer.plan_turn(&modem, kind, copies, &self.shares, now);
-        let affordable = self.budget.affordable(plan.iter().map(|slots| (peer.bits(slots, &modem, kind), now)));
+        let mut plan = peer.plan_turn(&modem, purpose, copies, &self.shares, now);
+        let affordable = self.budget.affordable(plan.iter().map(|slots| (peer.bits(slots, &modem, purpose), now)));
         if affordable == 0 {
-            let bits = plan.first().map_or(0, |slots| peer.bits(slots, &modem, kind));
+            let bits = plan.first().map_or(0, |slots| peer.bits(slots, &modem, purpose));
             peer.master.postpone(self.budget.earliest(bits, now));
             return false;
         }
         plan.truncate(affordable);
         let grant = peer.master.grant(&modem, active);
-        self.turn = peer.write_turn(&plan, &modem, Some(grant), kind, now).into();
+        self.turn = peer.write_turn(&plan, &modem, Some(grant), purpose, now).into();
         peer.master.begin(grant, now);
         self.fleet.set_current(vehicle);
         true

@@ -1,14 +1,15 @@
 //! The vehicle's end of the link.
 //!
 //! [`VehicleLink`] joins parts that own their state: `content` (the data to send), `repeat` (copies
-//! of the frames of a turn), `timing` (the surface's clock), `discovery` (the answer to a call). `turn`
-//! writes frames, `receive` handles them.
+//! of the frames of a turn), `timing` (the surface's clock), `discovery` (the answer to a call), `hellos` (how often
+//! hellos are answered). `turn` writes frames, `receive` handles them.
 
 mod background;
 mod config;
 mod content;
 mod discovery;
 mod event;
+mod hellos;
 mod in_force;
 mod layers;
 mod receive;
@@ -30,6 +31,7 @@ use crate::time::Instant;
 use crate::wire::{Address, Introduction, VehicleStatus};
 use content::{Carried, VehicleContent};
 use discovery::CallReply;
+use hellos::HelloLimit;
 use repeat::Repeater;
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -47,6 +49,7 @@ pub struct VehicleLink<S: StateSource = MapSource> {
     repeater: Repeater,
     timing: SurfaceTiming,
     call_reply: CallReply,
+    hello_limit: HelloLimit,
     /// Where the modem decides when to transmit: when an acknowledgement or a hello is due.
     answer_due: Option<Instant>,
     /// When the budget allows the next frame, if it did not allow the last one that was wanted.
@@ -69,6 +72,7 @@ impl<S: StateSource> VehicleLink<S> {
             repeater: Repeater::default(),
             timing: SurfaceTiming::default(),
             call_reply: CallReply::new(seed),
+            hello_limit: HelloLimit::new(now),
             answer_due: None,
             blocked_until: None,
             events: VecDeque::new(),

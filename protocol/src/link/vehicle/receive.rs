@@ -23,6 +23,7 @@ impl<S: StateSource> VehicleLink<S> {
         if envelope.header.to == Address::EVERYBODY {
             return self.handle_call(&envelope, now);
         }
+        let owed_hello = self.pair.must_send_hello();
         let inbound = self.pair.handle_frame(&envelope, |_, _| true);
         self.events.extend(self.pair.poll_mismatch().map(VehicleEvent::Mismatch));
         let inbound = match inbound {
@@ -31,11 +32,21 @@ impl<S: StateSource> VehicleLink<S> {
                 // The surface builds on frames that we never acknowledged: in between it took us for another run.
                 return self.renew(now);
             }
+            Err(DropReason::Late) if self.pair.seems_out_of_step() => {
+                // A forged frame had so high a number that every true one comes late.
+                return self.renew(now);
+            }
             Err(DropReason::Unauthenticated) => {
                 return self.content.status.owe_report_by(now + Duration::from_secs(60));
             }
             Err(_) => return,
         };
+        match inbound.header().kind.is_hello() {
+            true if self.hello_limit.admit(now) => {}
+            true if owed_hello => return,
+            true => return self.pair.withhold_hello(),
+            false => self.hello_limit.handle_numbered(),
+        }
         if inbound.restarted {
             self.forget_peer(now);
             self.events.push_back(VehicleEvent::SurfaceRestarted);
@@ -82,6 +93,9 @@ impl<S: StateSource> VehicleLink<S> {
             return self.pair.stats.drop(DropReason::Checksum);
         }
         if self.pair.has_run() && self.last_received().is_some_and(|at| now.since(at) < CONTACT_TIMEOUT) {
+            return;
+        }
+        if !self.hello_limit.admit(now) {
             return;
         }
         let grant = self.call_reply.handle_call(&self.config, &envelope.header, now);

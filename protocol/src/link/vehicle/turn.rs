@@ -3,12 +3,13 @@
 use super::content::{Carried, FillContext, Part};
 use super::repeat::RepeatTerms;
 use super::{VehicleEvent, VehicleLink};
+use crate::link::handshake::FramePurpose;
 use crate::link::{Transmit, TransmitKind};
 use crate::mac::{Access, quarter_seconds};
 use crate::map::StateSource;
 use crate::schedule::Class;
 use crate::time::Instant;
-use crate::wire::{Address, FrameBuilder, FrameKind};
+use crate::wire::{Address, FrameBuilder};
 use std::time::Duration;
 
 /// Frames smaller than this have no room for both a status and a stamp.
@@ -81,11 +82,15 @@ impl<S: StateSource> VehicleLink<S> {
         self.repeater.end_turn();
     }
 
+    fn is_answer_due(&self, now: Instant) -> bool {
+        self.answer_due.is_some_and(|at| now >= at)
+    }
+
     fn has_reason_to_transmit(&self, now: Instant) -> bool {
         if !matches!(self.config.modem.access, Access::ModemOwned { .. }) {
             return true;
         }
-        let answer = self.answer_due.is_some_and(|at| now >= at) || self.call_reply.is_pending();
+        let answer = self.is_answer_due(now) || self.call_reply.is_pending();
         let news = self.content.backlog_bytes(&self.budget, now) > 0;
         answer || (self.pair.has_run() && (news || self.content.status.is_waiting(now)))
     }
@@ -154,13 +159,16 @@ impl<S: StateSource> VehicleLink<S> {
     fn write_frame(&mut self, frames: u32, now: Instant) -> (Transmit, bool) {
         let modem = self.config.modem;
         let size = modem.frame_bytes;
+        if self.is_answer_due(now) && !self.pair.must_send_hello() && self.hello_limit.repeat() {
+            self.pair.repeat_hello();
+        }
         let sends_hello = self.pair.must_send_hello();
         let plan = if sends_hello { FramePlan { remaining: 0, is_last_new: true } } else { self.plan(frames, now) };
         let wish = (plan.is_last_new && !sends_hello).then(|| self.wish(now));
         let has_stamp = size >= SMALL_FRAME && (plan.is_last_new || self.repeater.new_frames() == 0);
         let stamp = self.timing.stamp(now).filter(|_| has_stamp);
         let ack_room = self.ack_room(plan.is_last_new);
-        let mut builder = self.pair.begin_frame(size, ack_room, wish, stamp, FrameKind::Numbered);
+        let mut builder = self.pair.begin_frame(size, ack_room, wish, stamp, FramePurpose::Content);
         let mut carried = Carried::new();
         if !sends_hello {
             let (slots, refused_frames) = (self.inbox.reports(), self.pair.stats.refused());
@@ -184,8 +192,8 @@ impl<S: StateSource> VehicleLink<S> {
         };
         builder.set_remaining(remaining.min(255) as u8);
         let last = remaining == 0;
-        let kind = FrameKind::hello_if(sends_hello);
-        let transmit = self.close(builder, carried, kind, last || is_complete || !takes_turns);
+        let purpose = FramePurpose::hello_if(sends_hello);
+        let transmit = self.close(builder, carried, purpose, last || is_complete || !takes_turns);
         if !sends_hello {
             let copies = (is_complete && remaining > 0).then_some(remaining);
             self.repeater.keep(self.pair.next_number() - 1, &transmit.bytes, copies);
@@ -194,7 +202,13 @@ impl<S: StateSource> VehicleLink<S> {
         (transmit, last && takes_turns)
     }
 
-    fn close(&mut self, builder: FrameBuilder, carried: Carried<S::Carried>, kind: FrameKind, short: bool) -> Transmit {
+    fn close(
+        &mut self,
+        builder: FrameBuilder,
+        carried: Carried<S::Carried>,
+        purpose: FramePurpose,
+        short: bool,
+    ) -> Transmit {
         let mainly = carried
             .iter()
             .max_by_key(|(_, n)| *n)
@@ -204,7 +218,7 @@ impl<S: StateSource> VehicleLink<S> {
             self.pair.stats.count(part.class(), *n);
             self.pair.stats.chunks_sent += u64::from(matches!(part, Part::Map(_)));
         }
-        let bytes = self.pair.finish_frame(builder, carried, kind, short);
+        let bytes = self.pair.finish_frame(builder, carried, purpose, short);
         self.pair.stats.count(Class::Overhead, bytes.len().saturating_sub(payload));
         Transmit { to: Address::SURFACE, bytes, kind: mainly }
     }

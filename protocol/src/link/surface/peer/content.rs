@@ -92,17 +92,13 @@ impl<R: StateReplica> PeerContent<R> {
         is_overtaken
     }
 
-    /// Whether every chunk of a frame with this base decodes. Chunks that only a vehicle receives are skipped.
-    pub(super) fn decodes(&self, base: FrameNumber, mut chunks: Chunks<'_>) -> bool {
-        chunks.all(|chunk| match chunk.kind {
-            ChunkKind::Map => self.replica.decodes(base, chunk.payload),
-            ChunkKind::Pose => VehicleStatus::default().read_pose(chunk.payload).is_ok(),
-            ChunkKind::Report => VehicleStatus::default().read_report(chunk.payload).is_ok(),
-            ChunkKind::Object => Part::decode(chunk.payload).is_ok(),
-            ChunkKind::Layer => self.layers.decodes(base, chunk.payload),
-            ChunkKind::InForce => InForcePart::decode(chunk.payload).is_ok(),
-            ChunkKind::Slot | ChunkKind::Introduction | ChunkKind::Inquiry => true,
-        })
+    /// Whether every chunk of a frame with this base decodes, or, without a base, of the first frame of a run. Chunks that
+    /// only a vehicle receives are skipped.
+    pub(super) fn decodes(&self, base: Option<FrameNumber>, chunks: Chunks<'_>) -> bool {
+        match base {
+            Some(base) => decode(&self.replica, &self.layers, base, chunks),
+            None => decode(&R::default(), &Layers::default(), 0, chunks),
+        }
     }
 
     /// Counts changes of the map and its layers.
@@ -179,4 +175,16 @@ pub(super) fn class_of(chunk: &Chunk<'_>) -> Class {
         ChunkKind::Object => Class::Exemplar,
         ChunkKind::Layer => LayerChunk::decode(chunk.payload).map_or(Class::Overhead, |c| Class::Layer(c.id())),
     }
+}
+
+fn decode<R: StateReplica>(replica: &R, layers: &Layers, base: FrameNumber, mut chunks: Chunks<'_>) -> bool {
+    chunks.all(|chunk| match chunk.kind {
+        ChunkKind::Map => replica.decodes(base, chunk.payload),
+        ChunkKind::Pose => VehicleStatus::default().read_pose(chunk.payload).is_ok(),
+        ChunkKind::Report => VehicleStatus::default().read_report(chunk.payload).is_ok(),
+        ChunkKind::Object => Part::decode(chunk.payload).is_ok(),
+        ChunkKind::Layer => layers.decodes(base, chunk.payload),
+        ChunkKind::InForce => InForcePart::decode(chunk.payload).is_ok(),
+        ChunkKind::Slot | ChunkKind::Introduction | ChunkKind::Inquiry => true,
+    })
 }

@@ -20,14 +20,13 @@ pub(super) use turn::{Ready, room_for_slot};
 pub use view::PeerView;
 
 use crate::directive::{InForcePart, Series, Slot, SlotId, SlotOutbox, SlotProgress};
+use crate::link::handshake::FramePurpose;
 use crate::link::{Authenticity, DropReason, FrameNumber, Inbound, LinkPair, LinkStats, SurfaceEvent};
 use crate::mac::{Access, Master, MasterConfig, ModemProfile};
 use crate::map::StateReplica;
 use crate::schedule::Class;
 use crate::time::Instant;
-use crate::wire::{
-    Address, Chunk, ChunkKind, Envelope, FrameKind, Header, Introduction, MissionId, Stamp, VehicleStatus,
-};
+use crate::wire::{Address, Chunk, ChunkKind, Envelope, Header, Introduction, MissionId, Stamp, VehicleStatus};
 use content::{ChunkOutcome, PeerContent, class_of};
 use divergence::Divergence;
 use in_force::InForceCopy;
@@ -43,8 +42,8 @@ type Carried = Vec<(SlotId, u16, usize)>;
 struct LastTurn {
     /// Number of its first frame: an answer has judged it.
     began: FrameNumber,
-    /// A hello has no number that an answer could name.
-    kind: FrameKind,
+    /// A hello or a proof has no number in the current run that an answer could name.
+    purpose: FramePurpose,
 }
 
 /// When the vehicle was last in contact, and when it must be contacted without a turn.
@@ -56,6 +55,12 @@ struct Contact {
     /// The vehicle's highest frame number when a frame with an acknowledgement was last written.
     acknowledged: FrameNumber,
     hello_due: Instant,
+    /// When the last proof was written.
+    proved: Option<Instant>,
+    /// When a hello last counted as an answer.
+    hello_admitted: Option<Instant>,
+    /// When the budget allows the next proof.
+    proof_allowed: Instant,
     /// Hellos since the last answer.
     hellos: u32,
 }
@@ -63,6 +68,29 @@ struct Contact {
 impl Contact {
     /// Time in which a vehicle that was met proves the run by a numbered frame; after it, it is sent a hello again.
     const PROOF_TIMEOUT: Duration = Duration::from_secs(5);
+
+    fn new(now: Instant) -> Self {
+        Self {
+            last_received: None,
+            answer_due: None,
+            acknowledged: 0,
+            hello_due: now,
+            proved: None,
+            hello_admitted: None,
+            proof_allowed: now,
+            hellos: 0,
+        }
+    }
+
+    /// Whether a hello counts as an answer: the first one of a run of this end, and otherwise one in five seconds,
+    /// because the others may be replays.
+    fn admit_hello(&mut self, is_first: bool, now: Instant) -> bool {
+        let is_admitted = is_first || self.hello_admitted.is_none_or(|at| now.since(at) >= Self::PROOF_TIMEOUT);
+        if is_admitted {
+            self.hello_admitted = Some(now);
+        }
+        is_admitted
+    }
 
     fn last_received(&self) -> Option<Instant> {
         self.last_received
@@ -103,8 +131,8 @@ impl<R: StateReplica> VehiclePeer<R> {
             content: PeerContent::new(),
             in_force: InForceCopy::default(),
             timing: VehicleTiming::default(),
-            contact: Contact { last_received: None, answer_due: None, acknowledged: 0, hello_due: now, hellos: 0 },
-            last_turn: LastTurn { began: 0, kind: FrameKind::Numbered },
+            contact: Contact::new(now),
+            last_turn: LastTurn { began: 0, purpose: FramePurpose::Content },
             divergence: Divergence::default(),
             is_out_of_step: false,
         }
@@ -116,6 +144,12 @@ impl<R: StateReplica> VehiclePeer<R> {
 
     pub(super) fn stats(&self) -> &LinkStats {
         &self.pair.stats
+    }
+
+    /// Whether the next turn is to prove a run that the vehicle has offered: every second one, because a replayed hello may
+    /// have offered it.
+    pub(super) fn is_proof_due(&self) -> bool {
+        self.pair.has_offer() && self.last_turn.purpose != FramePurpose::Proof
     }
 
     /// Counts a frame that was dropped.
@@ -188,12 +222,19 @@ impl<R: StateReplica> VehiclePeer<R> {
         self.is_out_of_step |= inbound.lacks_base;
         let header = inbound.header().clone();
         if header.kind.is_hello() {
-            self.contact.last_received = Some(now);
-            self.handle_turn(&header, bytes, modem, now);
+            // A hello of the current run may be a replay, so it is no sign of life.
+            if inbound.restarted {
+                self.contact.last_received = Some(now);
+                self.contact.hellos = 0;
+            }
+            if self.contact.admit_hello(inbound.restarted, now) {
+                self.handle_turn(&header, bytes, modem, now);
+            }
             return;
         }
         let Some(number) = inbound.number else { return };
         self.contact.last_received = Some(now);
+        self.contact.hellos = 0;
         if inbound.is_latest {
             self.handle_stamp(&header, modem.airtime(bytes), now);
             self.handle_turn(&header, bytes, modem, now);
@@ -276,9 +317,8 @@ impl<R: StateReplica> VehiclePeer<R> {
     }
 
     fn handle_turn(&mut self, header: &Header, bytes: usize, modem: &ModemProfile, now: Instant) {
-        if self.last_turn.kind.is_hello() || self.pair.horizon() >= self.last_turn.began {
+        if self.last_turn.purpose != FramePurpose::Content || self.pair.horizon() >= self.last_turn.began {
             self.master.handle_answer(bytes, header.remaining, header.turn, modem, now);
-            self.contact.hellos = 0;
         }
     }
 

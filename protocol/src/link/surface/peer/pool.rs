@@ -2,11 +2,11 @@
 
 use super::turn::Ready;
 use super::{Contact, VehiclePeer};
+use crate::link::handshake::FramePurpose;
 use crate::mac::ModemProfile;
 use crate::map::StateReplica;
 use crate::schedule::{BitBudget, ClassShares};
 use crate::time::Instant;
-use crate::wire::FrameKind;
 use std::time::Duration;
 
 /// Frame numbers since the last acknowledgement after which the next one does not wait any longer.
@@ -43,9 +43,17 @@ impl<R: StateReplica> VehiclePeer<R> {
         is_doubtful && now >= self.contact.hello_due
     }
 
-    /// Whether a frame should go out at `now`: a hello, an acknowledgement, or a slot.
+    /// When a run that the vehicle has offered is to be proven.
+    fn proof_due(&self) -> Option<Instant> {
+        let timeout = self.slot_timeout().max(Contact::PROOF_TIMEOUT);
+        let pause = timeout * (1 << (self.pair.proofs().clamp(1, 5) - 1));
+        let again = self.contact.proved.map_or(Instant::ZERO, |at| at + pause);
+        self.pair.has_offer().then(|| again.max(self.contact.proof_allowed))
+    }
+
+    /// Whether a frame should go out at `now`: a hello, a proof, an acknowledgement, or a slot.
     pub(in crate::link::surface) fn has_reason_to_transmit(&self, now: Instant) -> bool {
-        if self.must_send_hello(now) {
+        if self.must_send_hello(now) || self.proof_due().is_some_and(|at| now >= at) {
             return true;
         }
         let answer = self.contact.is_answer_due(now);
@@ -70,7 +78,7 @@ impl<R: StateReplica> VehiclePeer<R> {
             .flatten()
             .filter(|_| self.has_numbers())
             .min();
-        Some(numbered.map_or(hello, |at| at.min(hello)))
+        [Some(hello), self.proof_due(), numbered].into_iter().flatten().min()
     }
 
     /// Writes a frame, or postpones it if the budget does not allow it yet.
@@ -81,26 +89,34 @@ impl<R: StateReplica> VehiclePeer<R> {
         budget: &BitBudget,
         now: Instant,
     ) -> Option<Ready> {
-        let kind = FrameKind::hello_if(self.must_send_hello(now));
-        let plan = self.plan_turn(modem, kind, 1, shares, now - self.slot_timeout());
+        let is_proof = self.proof_due().is_some_and(|at| now >= at);
+        let purpose = if is_proof { FramePurpose::Proof } else { FramePurpose::hello_if(self.must_send_hello(now)) };
+        let plan = self.plan_turn(modem, purpose, 1, shares, now - self.slot_timeout());
         let slots = plan.into_iter().next()?;
-        let allowed = budget.earliest(self.bits(&slots, modem, kind), now);
+        let allowed = budget.earliest(self.bits(&slots, modem, purpose), now);
         if allowed > now {
-            self.contact.answer_due = Some(allowed);
+            match is_proof {
+                true => self.contact.proof_allowed = allowed,
+                false => self.contact.answer_due = Some(allowed),
+            }
             return None;
         }
-        let ready = self.write_turn(&[slots], modem, None, kind, now).pop()?;
+        let ready = self.write_turn(&[slots], modem, None, purpose, now).pop()?;
         self.master.note_begun(now);
+        if is_proof {
+            self.contact.proved = Some(now);
+            return Some(ready);
+        }
         // A run that was met must be proven by a numbered frame, or the vehicle will not transmit.
         let must_prove = self.pair.has_run() && !self.pair.is_proven();
         // After a hello of a run with this vehicle, a numbered frame follows at once.
         let timeout = self.slot_timeout();
         // A frame may be too small for a verdict on every frame that came in; the next one has the rest.
         let is_partial = self.pair.unstated() > 0;
-        let next = if must_prove && kind.is_hello() { now } else { now + timeout };
+        let next = if must_prove && purpose.is_hello() { now } else { now + timeout };
         self.contact.answer_due = (must_prove || is_partial).then_some(next);
         self.contact.acknowledged = self.pair.highest();
-        if kind.is_hello() {
+        if purpose.is_hello() {
             self.contact.note_hello(timeout, now);
         }
         Some(ready)

@@ -2,12 +2,13 @@
 
 use super::{Carried, InForceCopy, LastTurn, VehiclePeer};
 use crate::directive::PendingSlot;
+use crate::link::handshake::FramePurpose;
 use crate::link::{FrameNumber, Transmit, TransmitKind};
 use crate::mac::{Grant, ModemProfile};
 use crate::map::StateReplica;
 use crate::schedule::{Class, ClassShares};
 use crate::time::Instant;
-use crate::wire::{ChunkKind, FrameKind, Stamp, room_for_payload};
+use crate::wire::{ChunkKind, Stamp, room_for_payload};
 
 /// Bytes of acknowledgement that every frame of the surface has room for.
 const SHORT_ACK: usize = 2;
@@ -46,13 +47,13 @@ impl<R: StateReplica> VehiclePeer<R> {
     pub(in crate::link::surface) fn plan_turn(
         &self,
         modem: &ModemProfile,
-        kind: FrameKind,
+        purpose: FramePurpose,
         copies: u32,
         shares: &ClassShares,
         again_before: Instant,
     ) -> TurnPlan {
         let copies = copies as usize;
-        if kind.is_hello() || !self.pair.has_run() {
+        if purpose != FramePurpose::Content || !self.pair.has_run() {
             return vec![Vec::new(); copies.min(2)];
         }
         let groups = pack(
@@ -75,23 +76,24 @@ impl<R: StateReplica> VehiclePeer<R> {
         plan: &[Vec<PendingSlot>],
         modem: &ModemProfile,
         grant: Option<u8>,
-        kind: FrameKind,
+        purpose: FramePurpose,
         now: Instant,
     ) -> Vec<Ready> {
-        let turn_kind = FrameKind::hello_if(kind.is_hello() || !self.pair.has_run());
-        self.last_turn = LastTurn { began: self.pair.next_number(), kind: turn_kind };
-        let mut bits_left: u64 = plan.iter().map(|slots| self.bits(slots, modem, turn_kind)).sum();
+        let purpose = if self.pair.has_run() { purpose } else { FramePurpose::Hello };
+        self.last_turn = LastTurn { began: self.pair.next_number(), purpose };
+        let mut bits_left: u64 = plan.iter().map(|slots| self.bits(slots, modem, purpose)).sum();
         let mut at = now;
         let mut turn = Vec::with_capacity(plan.len());
-        let inquiry = self.in_force.inquiry(now).filter(|_| !turn_kind.is_hello() && plan.iter().any(Vec::is_empty));
+        let has_room = purpose == FramePurpose::Content && plan.iter().any(Vec::is_empty);
+        let inquiry = self.in_force.inquiry(now).filter(|_| has_room);
         if inquiry.is_some() {
             self.in_force.note_inquiry(now);
         }
         for slots in plan {
-            bits_left -= self.bits(slots, modem, turn_kind);
+            bits_left -= self.bits(slots, modem, purpose);
             let remaining = Grant::code_remaining(bits_left);
             let content = FrameContent { slots, inquiry: inquiry.as_deref().filter(|_| slots.is_empty()) };
-            let ready = self.write_frame(content, modem, grant, remaining, kind, at);
+            let ready = self.write_frame(content, modem, grant, remaining, purpose, at);
             at = at + modem.airtime(ready.transmit.bytes.len());
             turn.push(ready);
         }
@@ -99,11 +101,16 @@ impl<R: StateReplica> VehiclePeer<R> {
     }
 
     /// The most bits on air that a frame with these slots takes.
-    pub(in crate::link::surface) fn bits(&self, slots: &[PendingSlot], modem: &ModemProfile, kind: FrameKind) -> u64 {
+    pub(in crate::link::surface) fn bits(
+        &self,
+        slots: &[PendingSlot],
+        modem: &ModemProfile,
+        purpose: FramePurpose,
+    ) -> u64 {
         const HEAD: usize = 9 + 1 + Stamp::SURFACE_BYTES;
         let inquiry = if slots.is_empty() && self.in_force.lacks_any() { InForceCopy::INQUIRY_BYTES } else { 0 };
         let chunks = inquiry + slots.iter().map(|s| s.bytes.len() + 2).sum::<usize>();
-        let bytes = match kind.is_hello() || !self.pair.has_run() {
+        let bytes = match purpose.is_hello() || !self.pair.has_run() {
             true => self.pair.hello_bytes(),
             false => HEAD + chunks + self.pair.statement_bytes() + self.pair.seal_bytes(),
         };
@@ -116,7 +123,7 @@ impl<R: StateReplica> VehiclePeer<R> {
         modem: &ModemProfile,
         grant: Option<u8>,
         remaining: u8,
-        kind: FrameKind,
+        purpose: FramePurpose,
         at: Instant,
     ) -> Ready {
         let inquired = inquiry.map_or(0, |_| InForceCopy::INQUIRY_BYTES);
@@ -126,9 +133,9 @@ impl<R: StateReplica> VehiclePeer<R> {
         let stamp = Stamp::Surface { clock_ms: Stamp::clock(at), one_way };
         let fixed = 9 + 1 + Stamp::SURFACE_BYTES + self.pair.seal_bytes();
         let ack_room = modem.frame_bytes.saturating_sub(chunks + fixed).max(SHORT_ACK);
-        let number = (!kind.is_hello() && self.pair.has_run()).then(|| self.pair.next_number());
+        let number = (purpose == FramePurpose::Content && self.pair.has_run()).then(|| self.pair.next_number());
         let has_room = has_room && number.is_some();
-        let mut builder = self.pair.begin_frame(modem.frame_bytes, ack_room, grant, has_room.then_some(stamp), kind);
+        let mut builder = self.pair.begin_frame(modem.frame_bytes, ack_room, grant, has_room.then_some(stamp), purpose);
         builder.set_remaining(remaining);
         let mut carried = Carried::new();
         let mut payload = 0;
@@ -153,7 +160,7 @@ impl<R: StateReplica> VehiclePeer<R> {
             (_, Some((id, ..))) => TransmitKind::Content(id.class()),
         };
         payload += carried.iter().map(|(_, _, n)| n).sum::<usize>();
-        let bytes = self.pair.finish_frame(builder, carried, kind, true);
+        let bytes = self.pair.finish_frame(builder, carried, purpose, true);
         self.pair.stats.count(Class::Overhead, bytes.len().saturating_sub(payload));
         Ready { transmit: Transmit { to: self.pair.peer(), bytes, kind: mainly }, number }
     }

@@ -1,0 +1,73 @@
+//! How often the vehicle answers hellos, which may be replays.
+
+use crate::time::Instant;
+use std::time::Duration;
+
+/// A few answers at once, and one every five seconds in the long run.
+#[derive(Debug)]
+pub(super) struct HelloLimit {
+    /// Answers that are allowed at once.
+    left: u32,
+    /// When the last one was added.
+    since: Instant,
+    /// When the last hello was admitted.
+    admitted: Option<Instant>,
+    /// How often a hello is still repeated while the surface does not use the offered run.
+    repeats: u32,
+}
+
+impl HelloLimit {
+    const MOST: u32 = 6;
+    const INTERVAL: Duration = Duration::from_secs(5);
+    /// Hellos within this time are copies of one.
+    const COPIES: Duration = Duration::from_millis(1500);
+    const REPEATS: u32 = 3;
+
+    pub(super) fn new(now: Instant) -> Self {
+        Self { left: Self::MOST, since: now, admitted: None, repeats: 0 }
+    }
+
+    /// Whether a hello that came in may be answered.
+    pub(super) fn admit(&mut self, now: Instant) -> bool {
+        if self.admitted.is_some_and(|at| now.since(at) < Self::COPIES) {
+            return false;
+        }
+        let added = now.since(self.since).as_secs() / Self::INTERVAL.as_secs();
+        if added > 0 {
+            self.left = u64::from(self.left).saturating_add(added).min(u64::from(Self::MOST)) as u32;
+            self.since = now;
+        }
+        let is_admitted = self.left > 0;
+        if is_admitted {
+            self.left -= 1;
+            self.admitted = Some(now);
+            self.repeats = Self::REPEATS;
+        }
+        is_admitted
+    }
+
+    /// The surface uses the current run, so a hello that names another one is not repeated.
+    pub(super) fn handle_numbered(&mut self) {
+        self.repeats = 0;
+    }
+
+    /// Whether the last answer may be repeated.
+    pub(super) fn repeat(&mut self) -> bool {
+        self.repeats.checked_sub(1).map(|left| self.repeats = left).is_some()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_storm_of_hellos_is_answered_once_in_five_seconds() {
+        let begin = Instant::from_secs_f64(100.0);
+        let mut limit = HelloLimit::new(begin);
+        let at = |ms: u64| begin + Duration::from_millis(ms);
+        let admitted = (0..1000).filter(|&i| limit.admit(at(i * 100))).count();
+        assert_eq!(admitted, 6 + 19);
+        assert!(limit.admit(at(1_000_000)), "after a pause");
+    }
+}
