@@ -73,6 +73,8 @@ fn budget_and_shares_change_from_either_end_under_a_key() {
     assert_eq!(budget(), Some(2000));
     let vehicle = &state(page).unwrap()["vehicles"][0];
     assert_eq!(vehicle["status"]["refused_frames"], 0);
+    let disk = &vehicle["status"]["disk"];
+    assert!(disk["free_bytes"].is_u64() && disk["journal_refused"] == false, "{disk}");
     assert!(vehicle["link"]["round_trip_s"].is_number() && vehicle["link"]["clock_offset_s"].is_number(), "{vehicle}");
 }
 

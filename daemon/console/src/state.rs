@@ -16,8 +16,9 @@ pub use link::{ChannelQuality, LinkDirection, LinkRates, LinkSummary, ReportedBa
 pub use map::{EarlierMap, LayerBody, MapBody, MapEvent, MapIndex, MapPlacement, MapSummary, TileLayer};
 pub use storage::{ArchiveList, ArchivedMap, StorageInfo, VehicleNote};
 pub use vehicle::{
-    AppliedOrder, DirectiveSlots, InForceKnowledge, OrderProgress, OrderStatus, PlannedPath, ReportedMode,
-    ReportedPose, StatusReport, UsblMeasurement, UtilityTerms, VehicleOrders, VehicleSettings, VehicleState,
+    AppliedOrder, DirectiveSlots, InForceKnowledge, OrderProgress, OrderStatus, PlannedPath, ReportedDisk,
+    ReportedMode, ReportedPose, StatusReport, UsblMeasurement, UtilityTerms, VehicleOrders, VehicleSettings,
+    VehicleState,
 };
 
 use schemars::JsonSchema;

@@ -8,7 +8,7 @@ use scenecast_drivers::modem::Station;
 use scenecast_protocol::coordinates::MapPoint;
 use scenecast_protocol::directive::{Budget, Fix, Settings};
 use scenecast_protocol::time::Instant;
-use scenecast_vehicle::{AppliedSlot, MapUpdate, SharedExemplars, Vehicle, VehicleOutput};
+use scenecast_vehicle::{AppliedSlot, MapUpdate, SharedExemplars, Vehicle, VehicleDisk, VehicleOutput};
 use std::collections::VecDeque;
 
 /// Maximum age of a fix that is given to the autopilot, seconds.
@@ -256,6 +256,11 @@ impl VehicleHost {
     pub fn handle_persist_failed(&mut self, now: Instant) {
         self.is_persisting = false;
         self.link.end_mut().handle_persist_failed(now);
+    }
+
+    /// Sets the state of the disk; the next status reports it.
+    pub fn handle_disk(&mut self, disk: VehicleDisk) {
+        self.link.end_mut().set_disk(disk);
     }
 
     /// The next request or event; `None` while the state is being made durable.

@@ -144,6 +144,8 @@ mod tests {
     use scenecast_protocol::link::SlotInboxState;
     use scenecast_protocol::schedule::BackgroundOrder;
 
+    const NAMES: [&str; 2] = [JOURNAL.journal, JOURNAL.copy];
+
     fn begin(disk: &Disk) -> Result<(Keeper<Disk>, Durable), UserError> {
         Keeper::begin_run(disk.clone(), 9, None).map(|run| (run.keeper, run.durable))
     }
@@ -266,6 +268,46 @@ mod tests {
         let disk = Disk::default();
         disk.put("scene.checkpoint", b"any");
         lost(&disk);
+    }
+
+    /// The bytes of both files after each of `count` states, the last of which does not hold.
+    fn files_after_states(disk: &Disk, count: u32) -> (Vec<[Vec<u8>; 2]>, Durable) {
+        let (mut keeper, durable) = begin(disk).unwrap();
+        let state = |number| Durable { budget_bps: Some(number), hold: number % 3 == 1, ..durable.clone() };
+        let mut files = Vec::new();
+        for number in 0..count {
+            assert!(keeper.save(&state(number)));
+            files.push(NAMES.map(|name| disk.read(name).unwrap().unwrap()));
+        }
+        (files, state(count - 1))
+    }
+
+    #[test]
+    fn no_cut_or_shift_of_the_journal_restarts_an_older_state() {
+        let disk = Disk::default();
+        let (files, last) = files_after_states(&disk, 37);
+        assert!(!last.hold);
+        let whole = files.last().unwrap();
+        // Among them each place at which a file ended after one of the states.
+        let cut = |bytes: &[u8], at: usize| bytes[..at.min(bytes.len())].to_vec();
+        let left = |bytes: &[u8], by: usize| bytes[by.min(bytes.len())..].to_vec();
+        let shifted = |bytes: &[u8], by: usize| [&bytes[by..], &vec![0; by]].concat();
+        let longest = whole.iter().map(Vec::len).max().unwrap();
+        let borders = files.iter().flatten().map(Vec::len).filter(|&border| border < longest);
+        for at in (1..600).chain((600..longest).step_by(97)).chain(borders) {
+            for damaged in [&cut as &dyn Fn(&[u8], usize) -> Vec<u8>, &left, &shifted] {
+                let pair = [damaged(&whole[0], at), damaged(&whole[1], at)];
+                NAMES.iter().zip(&pair).for_each(|(name, bytes)| disk.put(name, bytes));
+                let run = begin(&disk).unwrap().1;
+                assert!(run.hold && run.lost == LostOrders::Present && run.budget_bps.is_none(), "{at}: {run:?}");
+                for number in [0, 1] {
+                    disk.put(NAMES[number], &pair[number]);
+                    disk.put(NAMES[1 - number], &whole[1 - number]);
+                    let run = begin(&disk).unwrap().1;
+                    assert_eq!((run.budget_bps, run.lost), (last.budget_bps, last.lost), "{at}: an older state");
+                }
+            }
+        }
     }
 
     #[test]

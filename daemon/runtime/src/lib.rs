@@ -2,6 +2,7 @@
 
 mod checkpoint;
 mod clock;
+mod disk_space;
 mod durable;
 #[cfg(test)]
 mod fuzz_corpus_tests;

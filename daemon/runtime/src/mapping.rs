@@ -24,6 +24,8 @@ pub(super) enum FromMapper {
     Mapped(Mapped),
     /// A camera frame that could not be read.
     Missed(UserError),
+    /// A checkpoint was refused, or the first one after a refusal was written.
+    Checkpoint { is_refused: bool },
 }
 
 /// The mapper's results after a camera frame.
@@ -45,7 +47,7 @@ impl MapperThread {
     pub(super) fn start(mapper: Mapper, keep: Keep) -> Result<Self, UserError> {
         let (orders, incoming) = mpsc::unbounded_channel();
         let (outgoing, mapped) = mpsc::channel(4);
-        let work = move || Work { mapper, keep, outgoing }.run(incoming);
+        let work = move || Work { mapper, keep, outgoing, is_refusal_reported: false }.run(incoming);
         let thread = std::thread::Builder::new().name("scene-model".to_owned()).spawn(work);
         let thread = thread.map_err(|e| UserError::Failed(format!("the scene model's thread did not start: {e}")))?;
         Ok(Self { orders, mapped, thread })
@@ -68,6 +70,8 @@ pub(super) struct Keep {
     pub(super) every_s: f64,
     /// Mission time of the last checkpoint, or of the first frame.
     pub(super) last_s: Option<f64>,
+    /// Whether the last checkpoint was refused.
+    pub(super) is_refused: bool,
 }
 
 impl Keep {
@@ -77,7 +81,9 @@ impl Keep {
         if !is_due(self.last_s.map_or(f64::INFINITY, |last_s| (now_s - last_s).abs())) {
             return;
         }
-        match self.file.keep(&mapper.save(self.lineage)) {
+        let kept = self.file.keep(&mapper.save(self.lineage));
+        self.is_refused = kept.is_err();
+        match kept {
             Ok(()) => self.last_s = Some(now_s),
             Err(error) => tracing::error!("no checkpoint of the scene model at {now_s} s: {error}"),
         }
@@ -99,6 +105,8 @@ struct Work {
     mapper: Mapper,
     keep: Keep,
     outgoing: mpsc::Sender<FromMapper>,
+    /// Whether the host knows that the last checkpoint was refused.
+    is_refusal_reported: bool,
 }
 
 impl Work {
@@ -111,7 +119,10 @@ impl Work {
         while is_host_alive && let Some(order) = incoming.blocking_recv() {
             match order {
                 ToMapper::Tune(settings) => self.mapper.tune(&settings),
-                ToMapper::Keep => self.keep.keep_now(&self.mapper),
+                ToMapper::Keep => {
+                    self.keep.keep_now(&self.mapper);
+                    is_host_alive = self.report_checkpoint();
+                }
                 // A frame beyond the frame rate only changes the vehicle's pose.
                 ToMapper::Frame(frame) if !self.mapper.takes(frame.t_s) => {
                     is_host_alive = self.report_current(Some(*frame));
@@ -120,7 +131,7 @@ impl Work {
                     let report = self.see(*frame);
                     // The checkpoint comes first, so that it contains every label that the surface receives.
                     self.keep.keep_if_due(&self.mapper);
-                    is_host_alive = self.report(report);
+                    is_host_alive = self.report_checkpoint() && self.report(report);
                 }
             }
         }
@@ -129,6 +140,13 @@ impl Work {
 
     fn report(&self, report: FromMapper) -> bool {
         self.outgoing.blocking_send(report).is_ok()
+    }
+
+    /// Sends whether checkpoints are refused, if that has changed.
+    fn report_checkpoint(&mut self) -> bool {
+        let is_refused = self.keep.is_refused;
+        let is_known = std::mem::replace(&mut self.is_refusal_reported, is_refused) == is_refused;
+        is_known || self.report(FromMapper::Checkpoint { is_refused })
     }
 
     /// Sends the map as it is, without a new frame in it.

@@ -33,6 +33,12 @@ fn status(trial: &PowerCutTrial, id: SlotId) -> OrderStatus {
     slot.status
 }
 
+/// Whether the surface knows that the vehicle's journal is refused.
+fn is_refusal_reported(trial: &PowerCutTrial) -> bool {
+    let status = trial.surface.surface().status(trial.auv());
+    status.and_then(|(status, _)| status.disk).is_some_and(|disk| disk.journal_refused)
+}
+
 fn durable(trial: &PowerCutTrial) -> &Durable {
     trial.onboard.host.vehicle().durable()
 }
@@ -54,7 +60,7 @@ fn a_refusing_disk_leaves_hold_and_abort_and_the_link() {
         assert_eq!(status(&trial, SlotId::Budget), refused);
         assert_eq!(status(&trial, SlotId::Constraints), OrderStatus::Received, "in force, and not on the disk");
         assert_eq!(trial.onboard.host.vehicle().mode(), (VehicleMode::Hold, ModeReason::Order));
-        assert!(trial.onboard.host.vehicle().disk_refusals().0);
+        assert!(trial.onboard.host.vehicle().disk_refusals().0 && is_refusal_reported(&trial));
         order(&mut trial, false, true);
         run(&mut trial, 200);
         assert_eq!(trial.onboard.host.vehicle().mode(), (VehicleMode::Surface, ModeReason::Order));
@@ -72,7 +78,7 @@ fn a_refusing_disk_leaves_hold_and_abort_and_the_link() {
         run(&mut trial, 200);
         assert_eq!(status(&trial, SlotId::Budget), OrderStatus::Applied);
         assert_eq!(status(&trial, SlotId::Constraints), OrderStatus::Applied);
-        assert!(!durable(&trial).abort && !durable(&trial).hold);
+        assert!(!durable(&trial).abort && !durable(&trial).hold && !is_refusal_reported(&trial));
     }
 }
 

@@ -52,7 +52,7 @@ pub(super) fn start(config: &Config, dir: &Path) -> Result<Start, UserError> {
         }
     };
     let last_s = mapper.last_s();
-    let keep = Keep { file, lineage: durable.lineage, every_s: config.scene.checkpoint_s, last_s };
+    let keep = Keep { file, lineage: durable.lineage, every_s: config.scene.checkpoint_s, last_s, is_refused: false };
     Ok(Start { run, mapper, keep })
 }
 

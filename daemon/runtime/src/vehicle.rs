@@ -1,6 +1,7 @@
 //! `scenecast auv`: ports, disk and clock around the vehicle's host.
 
 use super::clock::Clock;
+use super::disk_space::DiskWatch;
 use super::durable::{Keeper, StartedRun};
 use super::journal::Folder;
 use super::mapping::{Camera, FromMapper, Mapped, MapperThread, ToMapper};
@@ -69,7 +70,8 @@ pub fn run_vehicle(load: Load, simulated: Option<SimulatedAutopilot>) -> Result<
         if is_recorded && camera.is_over() {
             host.handle_camera_end();
         }
-        VehicleShell { host, camera, mapper, ports, clock, keeper, reload, missed: 0 }.run(stop).await
+        let disk = DiskWatch::new(dir);
+        VehicleShell { host, camera, mapper, ports, clock, keeper, disk, reload, missed: 0 }.run(stop).await
     })
 }
 
@@ -92,6 +94,7 @@ struct VehicleShell {
     ports: Ports,
     clock: Clock,
     keeper: Keeper<Folder>,
+    disk: DiskWatch,
     reload: Reload,
     /// Camera frames that could not be read.
     missed: u64,
@@ -119,6 +122,7 @@ impl VehicleShell {
                 mapped = self.mapper.mapped.recv() => match mapped {
                     Some(FromMapper::Mapped(mapped)) => self.handle_seen(mapped),
                     Some(FromMapper::Missed(error)) => self.handle_missed(&error),
+                    Some(FromMapper::Checkpoint { is_refused }) => self.disk.handle_checkpoint(is_refused),
                     None => return Err(UserError::Failed("the scene model's thread ended".to_owned())),
                 },
             }
@@ -169,6 +173,9 @@ impl VehicleShell {
     /// Acts on every event of the host, then writes the bytes for the ports.
     fn pump(&mut self) -> Result<(), UserError> {
         let now = self.clock.now();
+        if let Some(disk) = self.disk.look(std::time::Instant::now()) {
+            self.host.handle_disk(disk);
+        }
         self.host.steer(now);
         self.handle_events()?;
         while let Some(bytes) = self.host.poll_output(now) {

@@ -21,4 +21,4 @@ pub use failsafe::{Failsafe, FailsafePolicy};
 pub use mapper::{MapUpdate, Mapper, SharedExemplars};
 pub use navigator::{FixVerdict, LastPlace, Navigator};
 pub use steering::{Course, Footprint, Steering};
-pub use vehicle::{AppliedSlot, Durable, LostOrders, Vehicle, VehicleOutput};
+pub use vehicle::{AppliedSlot, Durable, LostOrders, Vehicle, VehicleDisk, VehicleOutput};

@@ -5,6 +5,7 @@
 mod ack;
 mod backlog;
 mod chunk;
+mod disk;
 mod frame;
 mod header;
 mod introduction;
@@ -19,6 +20,7 @@ pub use ack::{AckStatement, MAX_WINDOW};
 pub use backlog::Backlog;
 pub(crate) use chunk::room_for_payload;
 pub use chunk::{Chunk, ChunkKind, Chunks};
+pub use disk::DiskReport;
 pub use frame::{Envelope, Frame, FrameBuilder, FrameError, Seal};
 pub use header::{Address, FrameKind, Header, MissionId, SessionId};
 pub use introduction::{CellEdge, Introduction};

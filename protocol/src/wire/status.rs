@@ -1,6 +1,7 @@
 //! The vehicle's status.
 
 use super::backlog::Backlog;
+use super::disk::DiskReport;
 use super::path::PlannedPath;
 use super::placement::Placement;
 use crate::bytes::{Reader, Truncated, decimetres, put24};
@@ -112,6 +113,7 @@ impl ModeReason {
 ///             4 bits 0
 /// 3 more      [summary of the content in force, see `InForceSummary`]
 /// 7 more      [placement of the map, see `Placement`]; left out while it has not moved
+/// 1 more      [state of the disk, see `DiskReport`]; left out by a vehicle without files
 /// ```
 ///
 /// ```
@@ -166,6 +168,8 @@ pub struct VehicleStatus {
     pub in_force: Option<InForceSummary>,
     /// The placement of the map; `None` while no fix has moved it.
     pub placement: Option<Placement>,
+    /// The state of the vehicle's disk; `None` if no report has had it.
+    pub disk: Option<DiskReport>,
 }
 
 /// Why bytes are not a status.
@@ -203,8 +207,6 @@ fn decode_rate(code: u16) -> u32 {
 impl VehicleStatus {
     /// Length of a report without slots in bytes.
     const REPORT_HEAD: usize = 8 + Backlog::BYTES;
-    /// Length of the items after the slots in bytes.
-    const TAIL: usize = InForceSummary::BYTES + Placement::BYTES;
     /// Length of a pose with a waypoint, without a path, in bytes.
     pub(crate) const POSE: usize = 21;
 
@@ -235,8 +237,8 @@ impl VehicleStatus {
     }
 
     /// Encodes a report of at most `room` bytes on the decided slots from `first` on, on the content in force (item
-    /// [`SLOTS`]) and on the placement (the item after it). Also returns the item with which the next report must begin, 0
-    /// if this one is complete. `None` means that not even one slot fits.
+    /// [`SLOTS`]), on the placement and on the disk (the items after it). Also returns the item with which the next report
+    /// must begin, 0 if this one is complete. `None` means that not even one slot fits.
     pub fn encode_report(&self, room: usize, first: usize) -> Option<(Vec<u8>, usize)> {
         let known = |&(_, s): &(usize, &SlotReport)| s.state != SlotState::Unknown;
         let decided: Vec<(usize, &SlotReport)> = self.slots.iter().enumerate().skip(first).filter(known).collect();
@@ -264,10 +266,11 @@ impl VehicleStatus {
     /// Appends the items after the slots to a report, from `first` on. An item that does not fit waits for the next report,
     /// unless `is_alone`: it would not fit there either.
     fn encode_tail(&self, mut out: Vec<u8>, room: usize, first: usize, mut is_alone: bool) -> (Vec<u8>, usize) {
-        let mut items = [Vec::new(), Vec::new()];
-        let [in_force, placement] = &mut items;
+        let mut items = [Vec::new(), Vec::new(), Vec::new()];
+        let [in_force, placement, disk] = &mut items;
         self.in_force.iter().for_each(|summary| summary.encode(in_force));
         self.placement.iter().for_each(|moved| moved.encode(placement));
+        self.disk.iter().for_each(|state| state.encode(disk));
         for (item, bytes) in (SLOTS..).zip(items).filter(|(item, bytes)| *item >= first && !bytes.is_empty()) {
             if out.len() + bytes.len() <= room {
                 out.extend(bytes);
@@ -308,7 +311,29 @@ impl VehicleStatus {
         Ok(())
     }
 
-    /// Decodes a report into `self`; other fields, and slots and placement that it does not have, stay unchanged.
+    /// Decodes the items after the slots. No two selections of them have the same length, so the length shows which are
+    /// there.
+    fn read_tail(&mut self, r: &mut Reader<'_>) -> Result<(), StatusError> {
+        const IN_FORCE: usize = InForceSummary::BYTES;
+        const PLACEMENT: usize = Placement::BYTES;
+        const BOTH: usize = IN_FORCE + PLACEMENT;
+        let length = r.rest().len();
+        let without_disk = length.checked_sub(DiskReport::BYTES);
+        let has_disk = matches!(without_disk, Some(0 | IN_FORCE | PLACEMENT | BOTH));
+        let before = without_disk.filter(|_| has_disk).unwrap_or(length);
+        if matches!(before, IN_FORCE | BOTH) {
+            self.in_force = Some(InForceSummary::decode(r)?.ok_or(StatusError::BadField)?);
+        }
+        if matches!(before, PLACEMENT | BOTH) {
+            self.placement = Some(Placement::decode(r)?.ok_or(StatusError::BadField)?);
+        }
+        if has_disk {
+            self.disk = Some(DiskReport::decode(r)?.ok_or(StatusError::BadField)?);
+        }
+        if r.rest().is_empty() { Ok(()) } else { Err(StatusError::Length) }
+    }
+
+    /// Decodes a report into `self`; other fields, and slots, placement and disk that it does not have, stay unchanged.
     pub fn read_report(&mut self, bytes: &[u8]) -> Result<(), StatusError> {
         let mut r = Reader::new(bytes);
         let mut read = Self { epoch: r.u8()?, labels: r.u8()?, base_digest: r.u16()?, ..self.clone() };
@@ -327,15 +352,7 @@ impl VehicleStatus {
         if codes.next().is_some_and(|padding| padding != 0) {
             return Err(StatusError::BadField);
         }
-        if matches!(r.rest().len(), InForceSummary::BYTES | Self::TAIL) {
-            read.in_force = Some(InForceSummary::decode(&mut r)?.ok_or(StatusError::BadField)?);
-        }
-        if !r.rest().is_empty() {
-            read.placement = Some(Placement::decode(&mut r)?.ok_or(StatusError::BadField)?);
-        }
-        if !r.rest().is_empty() {
-            return Err(StatusError::Length);
-        }
+        read.read_tail(&mut r)?;
         *self = read;
         Ok(())
     }

@@ -13,7 +13,8 @@ use scenecast_protocol::map::{
 use scenecast_protocol::map_codec;
 use scenecast_protocol::schedule::{BackgroundOrder, BackgroundStream, Shares};
 use scenecast_protocol::wire::{
-    AckStatement, Address, ChunkKind, Header, Placement, PlannedPath, Reader, Seal, Stamp, VehicleStatus, unwrap_number,
+    AckStatement, Address, ChunkKind, DiskReport, Header, Placement, PlannedPath, Reader, Seal, Stamp, VehicleStatus,
+    unwrap_number,
 };
 use std::collections::BTreeMap;
 
@@ -169,6 +170,16 @@ fn status_chunks() -> Rows {
             "the same report with a placement: version 2, 12.5 m east, -0.1 m north",
             VehicleStatus {
                 placement: Some(Placement { version: 2, origin: WorldPoint::new(12.5, -0.1) }),
+                ..status()
+            }
+            .encode_report(99, 0)
+            .unwrap()
+            .0,
+        ),
+        (
+            "the same report with the state of a disk: the journal is refused, 1 to 2 GB are free",
+            VehicleStatus {
+                disk: Some(DiskReport { journal_refused: true, checkpoint_refused: false, free_bytes: Some(1 << 30) }),
                 ..status()
             }
             .encode_report(99, 0)

@@ -94,6 +94,7 @@ pub(crate) fn status() -> VehicleStatus {
         slots,
         in_force: None,
         placement: None,
+        disk: None,
     }
 }
 

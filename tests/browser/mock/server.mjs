@@ -190,6 +190,11 @@ function steer(mock, order, res) {
   if ("mismatch" in order) mission.vehicles[0].mismatch = order.mismatch;
   if ("earlier" in order) mission.vehicles[0].earlier = order.earlier;
   for (const key of ["archive", "storage", "loss", "layers", "ended", "speed", "position"]) if (key in order) mission[key] = order[key];
+  if ("disk" in order) {
+    const [vehicle] = mission.vehicles;
+    vehicle.disk = order.disk;
+    if (vehicle.status) vehicle.status.disk = order.disk;
+  }
   if ("placement" in order) mission.vehicles[0].placement = order.placement;
   if ("coarse" in order) mission.vehicles[0].coarse = order.coarse;
   if ("silent" in order) mission.vehicles[0].silent = order.silent;

@@ -34,6 +34,7 @@ export class Vehicle {
     this.silent = false;
     this.receivedS = null;
     this.status = null;
+    this.disk = { journal_refused: false, checkpoint_refused: false, free_bytes: 2 ** 34 };
     this.alongM = 0;
     this.pending = new Map();
     this.nextTurnS = 4 + 3 * id;
@@ -100,7 +101,7 @@ export class Vehicle {
       mode: this.aborted ? "abort" : this.hold ? "hold" : "survey",
       activity: this.aborted ? "aborted: order" : this.hold ? "holding: order" : "surveying",
       ...this.path(),
-      cells: this.own.size, labels: this.published.size, fix_age_s: nowS - this.fixS,
+      cells: this.own.size, labels: this.published.size, fix_age_s: nowS - this.fixS, disk: this.disk,
     };
     this.track.push([nowS, p.x, p.y]);
     this.track = this.track.slice(-500);

@@ -25,6 +25,30 @@ export default [
     },
   },
   {
+    name: "a vehicle's disk is shown with its refusals and its free space",
+    scenario: "rich",
+    async run(s) {
+      const disk = { journal_refused: false, checkpoint_refused: false, free_bytes: 2 ** 34 };
+      const row = s.page.locator("#vehicle .values > div", { hasText: "Vehicle's disk" });
+      const isWarning = () => row.evaluate((node) => node.classList.contains("warn"));
+      await s.shows("#vehicle .values", /Vehicle's disk\s*at least 17\sGB free/);
+      assert.equal(await isWarning(), false);
+      await s.visible("#banners", false);
+      await s.steer({ disk: { ...disk, free_bytes: 2 ** 29 } });
+      await s.shows("#vehicle .values", /Vehicle's disk\s*at least 536\sMB free/);
+      assert.equal(await isWarning(), true);
+      await s.visible("#banners", false);
+      await s.steer({ disk: { ...disk, checkpoint_refused: true, free_bytes: 0 } });
+      await s.shows("#banners", /auv-1 cannot write its checkpoint.*less than 1\sMB free.*lose the scene model/s);
+      await s.steer({ disk: { ...disk, journal_refused: true } });
+      await s.shows("#banners", /auv-1 cannot write its journal.*Reported .* ago.*obeys hold and abort from memory and refuses other orders/s);
+      await s.shows("#vehicle .values", /refuses journal, at least 17\sGB free/);
+      assert.equal(await isWarning(), true);
+      await s.steer({ disk });
+      await s.visible("#banners", false);
+    },
+  },
+  {
     name: "orders in force that are unknown here are named until they are known",
     scenario: "rich",
     async run(s) {

@@ -55,6 +55,13 @@ export function bytes(n) {
   return n < 1000 ? `${n}${THIN}B` : `${(n / 1000).toFixed(1)}${THIN}kB`;
 }
 
+/** Free space that is known as a lower bound, a power of two. */
+export function freeSpace(n) {
+  if (n === null) return "free space unknown";
+  if (n < 1e6) return `less than 1${THIN}MB free`;
+  return n < 1e9 ? `at least ${Math.floor(n / 1e6)}${THIN}MB free` : `at least ${Math.floor(n / 1e9)}${THIN}GB free`;
+}
+
 export const count = (n) => String(Math.round(n)).replace(/\B(?=(\d{3})+$)/g, THIN);
 
 /** The largest 1, 2 or 5 times a power of ten that is not above x. */

@@ -2,7 +2,7 @@
 
 use crate::state::{
     CommandChangeName, CommandChangeState, CommandState, ExemplarProgress, ExemplarStage, LinkSummary, MissionState,
-    OrderProgress, OrderStatus, PrincipalRole, ReportedBacklog, ReportedMode, StatusReport, VehicleState,
+    OrderProgress, OrderStatus, PrincipalRole, ReportedBacklog, ReportedDisk, ReportedMode, StatusReport, VehicleState,
 };
 use std::fmt::Write;
 
@@ -41,6 +41,9 @@ fn vehicle(out: &mut String, v: &VehicleState, state: &MissionState) {
         if let Some(path) = path(s) {
             let _ = writeln!(out, "  path       {path}");
         }
+        if let Some(state) = &s.disk {
+            let _ = writeln!(out, "  disk       {}", disk(state));
+        }
     }
     let changed = v.map.updated_s.map_or("no cell yet".to_owned(), |at| format!("changed {} ago", span(now - at)));
     let cells = format!("version {}, {} cells, {} labels", v.map.version, v.map.explored_cells, v.labels.len());
@@ -67,6 +70,23 @@ fn path(s: &StatusReport) -> Option<String> {
         if plan.path.is_empty() { "1 waypoint".to_owned() } else { format!("{} waypoints", 1 + plan.path.len()) };
     let further = if plan.path_continues { ", continues" } else { "" };
     Some(format!("{count}, {metres:.1} m{further}"))
+}
+
+/// The files that a vehicle's disk refuses, and its free space.
+fn disk(disk: &ReportedDisk) -> String {
+    let files = match (disk.journal_refused, disk.checkpoint_refused) {
+        (true, true) => "REFUSES JOURNAL AND CHECKPOINT",
+        (true, false) => "REFUSES THE JOURNAL",
+        (false, true) => "REFUSES THE CHECKPOINT",
+        (false, false) => "takes all files",
+    };
+    let free = match disk.free_bytes {
+        None => "free space unknown".to_owned(),
+        Some(0) => "less than 1 MB free".to_owned(),
+        Some(bytes) if bytes < 1_000_000_000 => format!("at least {} MB free", bytes / 1_000_000),
+        Some(bytes) => format!("at least {} GB free", bytes / 1_000_000_000),
+    };
+    format!("{files}, {free}")
 }
 
 fn backlog(b: &ReportedBacklog, now_s: f64) -> String {
@@ -215,7 +235,19 @@ mod tests {
             labels: 0,
             budget_bps: 0,
             refused_frames: 0,
+            disk: None,
         }
+    }
+
+    #[test]
+    fn a_disk_is_described_by_refused_files_and_free_space() {
+        let text = |journal_refused, checkpoint_refused, free_bytes| {
+            disk(&ReportedDisk { journal_refused, checkpoint_refused, free_bytes })
+        };
+        assert_eq!(text(false, false, Some(1 << 34)), "takes all files, at least 17 GB free");
+        assert_eq!(text(true, false, Some(1 << 29)), "REFUSES THE JOURNAL, at least 536 MB free");
+        assert_eq!(text(true, true, Some(0)), "REFUSES JOURNAL AND CHECKPOINT, less than 1 MB free");
+        assert_eq!(text(false, true, None), "REFUSES THE CHECKPOINT, free space unknown");
     }
 
     #[test]

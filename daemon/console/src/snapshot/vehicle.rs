@@ -4,14 +4,14 @@ use super::facts::{MissionFacts, seconds};
 use super::{exemplar, link, position};
 use crate::state::{
     AppliedOrder, DirectiveSlots, EarlierMap, InForceKnowledge, MapLabel, MapSummary, OrderProgress, OrderStatus,
-    PlannedPath, ReportedMode, ReportedPose, StatusReport, UsblMeasurement, UtilityTerms, VehicleNote, VehicleOrders,
-    VehicleSettings, VehicleState,
+    PlannedPath, ReportedDisk, ReportedMode, ReportedPose, StatusReport, UsblMeasurement, UtilityTerms, VehicleNote,
+    VehicleOrders, VehicleSettings, VehicleState,
 };
 use scenecast_protocol::coordinates::MapPoint;
 use scenecast_protocol::directive::{self, PlannerKind, REPORTED_SLOTS, SlotProgress};
 use scenecast_protocol::link::{InForce, PeerView};
 use scenecast_protocol::time::Instant;
-use scenecast_protocol::wire::{Address, VehicleMode, VehicleStatus};
+use scenecast_protocol::wire::{Address, DiskReport, VehicleMode, VehicleStatus};
 use scenecast_surface::record::StoredNote;
 use scenecast_surface::{SettingsOrder, Surface, VehicleRecord};
 
@@ -157,7 +157,13 @@ fn status(s: &VehicleStatus, at: Instant) -> StatusReport {
         labels: u32::from(s.labels),
         budget_bps: s.budget_bps,
         refused_frames: u32::from(s.refused_frames),
+        disk: s.disk.map(disk),
     }
+}
+
+fn disk(disk: DiskReport) -> ReportedDisk {
+    let DiskReport { journal_refused, checkpoint_refused, free_bytes } = disk;
+    ReportedDisk { journal_refused, checkpoint_refused, free_bytes }
 }
 
 fn mode(mode: VehicleMode) -> ReportedMode {

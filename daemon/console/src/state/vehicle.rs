@@ -134,6 +134,20 @@ pub struct StatusReport {
     pub budget_bps: u32,
     /// Frames that it rejected since they were not authentic; 255 stands for 255 or more.
     pub refused_frames: u32,
+    /// The disk with its files; null if it has not reported one.
+    #[serde(default)]
+    pub disk: Option<ReportedDisk>,
+}
+
+/// The disk with a vehicle's files.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+pub struct ReportedDisk {
+    /// Whether its journal cannot be written: it obeys hold and abort from memory and refuses other orders.
+    pub journal_refused: bool,
+    /// Whether the checkpoint of its scene model cannot be written: a restart would lose the part since the last one.
+    pub checkpoint_refused: bool,
+    /// Free space is at least this and less than twice this, bytes; 0 is less than 1048576. Null if unknown.
+    pub free_bytes: Option<u64>,
 }
 
 /// The position and the heading of a vehicle by its own estimate, on its own map.

@@ -51,6 +51,19 @@ fn a_journal_truncated_at_any_byte_is_recognised_as_damaged() {
 }
 
 #[test]
+fn records_in_a_row_would_read_as_an_older_state_at_each_border() {
+    // The layout of earlier builds, which these tests must be able to reject.
+    let records: Vec<Vec<u8>> = (1..=37).map(|n| earlier::encode(n, &state(n as u32, 300))).collect();
+    for kept in 1..37 {
+        let disk = Disk::default();
+        disk.put(NAMES.journal, &records[..kept].concat());
+        let found = Journal::open(disk, NAMES).1;
+        assert!(!is_recognised(&found, &state(37, 300)), "{kept} records");
+        assert!(matches!(found, Found::State { is_earlier: true, body, .. } if body == state(kept as u32, 300)));
+    }
+}
+
+#[test]
 fn a_journal_shifted_by_any_distance_is_never_an_older_state() {
     let Written { disk, journal, copy, last } = written(300);
     let left = |bytes: &[u8], by: usize| [&bytes[by..], &vec![0; by]].concat();

@@ -2,6 +2,7 @@
 
 use super::SurfaceStore;
 use crate::clock::Clock;
+use crate::disk_space::free_bytes;
 use crate::journal::Folder;
 use scenecast_config::Config;
 use scenecast_console::state::{ArchivedMap, StorageInfo};
@@ -10,7 +11,7 @@ use scenecast_protocol::time::Instant;
 use scenecast_surface::Surface;
 use scenecast_surface::record::EventTime;
 use std::io::ErrorKind;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::{Duration, SystemTime};
 
 /// Time between two attempts to write after the disk has refused.
@@ -137,17 +138,4 @@ impl SurfaceFiles {
             failing: faults.failing.clone(),
         }
     }
-}
-
-/// Bytes that this user may still write to the disk of a folder; `None` if that is unknown.
-#[cfg(unix)]
-fn free_bytes(dir: &Path) -> Option<u64> {
-    let stats = nix::sys::statvfs::statvfs(dir).ok()?;
-    #[allow(clippy::useless_conversion, reason = "the types differ between systems")]
-    Some(u64::from(stats.blocks_available()).saturating_mul(u64::from(stats.fragment_size())))
-}
-
-#[cfg(not(unix))]
-fn free_bytes(_: &Path) -> Option<u64> {
-    None
 }

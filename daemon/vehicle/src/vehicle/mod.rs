@@ -17,6 +17,7 @@ mod storing;
 mod whole_png;
 
 pub use durable::{Durable, LostOrders};
+pub use storing::VehicleDisk;
 
 use super::failsafe::FailsafePolicy;
 use super::mapper::{MapUpdate, SharedExemplars};
@@ -154,6 +155,11 @@ impl Vehicle {
     /// Sets whether the autopilot does not answer; the next status reports it.
     pub fn set_autopilot_silent(&mut self, is_silent: bool) {
         self.autopilot_silent = is_silent;
+    }
+
+    /// Sets the state of the disk; the next status reports it.
+    pub fn set_disk(&mut self, disk: VehicleDisk) {
+        self.storing.set_disk(disk);
     }
 
     /// The next request to the host.

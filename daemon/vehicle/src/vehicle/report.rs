@@ -113,7 +113,34 @@ impl Vehicle {
             labels: self.publisher.labels(),
             explored_cells: self.publisher.explored(),
             placement: self.navigator.placement(),
+            disk: self.storing.disk_report(),
             ..VehicleStatus::default()
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::VehicleDisk;
+    use scenecast_config::Config;
+    use scenecast_core::Area;
+    use scenecast_protocol::wire::DiskReport;
+
+    #[test]
+    fn a_vehicle_without_files_reports_no_disk_until_one_refuses() {
+        let (config, now) = (Config::default(), Instant::ZERO);
+        let profile = scenecast_config::modem_profile(&config, config.modem.bit_rate);
+        let area = Area { west: 0.0, south: 0.0, east: 20.0, north: 20.0 };
+        let mut vehicle = crate::assemble(&config, None, profile, area, Durable::default(), 1, now).unwrap();
+        assert_eq!(vehicle.status(now).disk, None);
+        vehicle.handle_persist_failed(now);
+        let refused = DiskReport { journal_refused: true, ..DiskReport::default() };
+        assert_eq!(vehicle.status(now).disk, Some(refused));
+        vehicle.handle_persisted();
+        assert_eq!(vehicle.status(now).disk, Some(DiskReport::default()), "it has recovered");
+        vehicle.set_disk(VehicleDisk { free_bytes: Some(7), is_checkpoint_refused: true });
+        let full = DiskReport { journal_refused: false, checkpoint_refused: true, free_bytes: Some(7) };
+        assert_eq!(vehicle.status(now).disk, Some(full));
     }
 }

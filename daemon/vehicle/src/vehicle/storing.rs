@@ -4,10 +4,21 @@ use crate::{MapUpdate, SharedExemplars};
 use scenecast_protocol::directive::{Slot, SlotId, SlotState};
 use scenecast_protocol::link::SlotInboxState;
 use scenecast_protocol::time::Instant;
+use scenecast_protocol::wire::DiskReport;
 use std::time::Duration;
 
 /// Time after which a state that the disk has refused is given to it again.
 const RETRY_INTERVAL: Duration = Duration::from_secs(10);
+
+/// The state of the host's disk, for the reports of the vehicle. Refusals of the journal are not part of it: see
+/// [`super::Vehicle::handle_persist_failed`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct VehicleDisk {
+    /// Bytes that may still be written; `None` if that is unknown.
+    pub free_bytes: Option<u64>,
+    /// Whether the last checkpoint of the scene model could not be written.
+    pub is_checkpoint_refused: bool,
+}
 
 /// An order that waits until the disk has taken a record, so that it can be refused if the disk does not.
 #[derive(Debug)]
@@ -42,6 +53,8 @@ pub(super) struct Storing {
     /// When the refused state is given to the disk again; `None` while the disk takes everything.
     retry_at: Option<Instant>,
     refusals: u64,
+    /// `None` if the host has no files.
+    disk: Option<VehicleDisk>,
 }
 
 impl Storing {
@@ -61,6 +74,17 @@ impl Storing {
 
     pub(super) fn is_refused(&self) -> bool {
         self.retry_at.is_some()
+    }
+
+    pub(super) fn set_disk(&mut self, disk: VehicleDisk) {
+        self.disk = Some(disk);
+    }
+
+    /// The state of the disk for a report; `None` if the host has no files. A disk that has refused is one.
+    pub(super) fn disk_report(&self) -> Option<DiskReport> {
+        let disk = self.disk.or((self.refusals > 0).then(VehicleDisk::default))?;
+        let VehicleDisk { free_bytes, is_checkpoint_refused } = disk;
+        Some(DiskReport { journal_refused: self.is_refused(), checkpoint_refused: is_checkpoint_refused, free_bytes })
     }
 
     /// Has an order wait in the place of an older version; returns whether it is the first one that waits.

@@ -31,6 +31,7 @@ fn golden_bytes_of_a_status() {
         slots,
         in_force: None,
         placement: None,
+        disk: None,
     };
     let (pose, (report, _)) = (status.encode_pose(99), status.encode_report(99, 0).unwrap());
     assert_eq!(pose, [0x22, 0, 0, 15, 0xFF, 0xFF, 0xFF, 0, 180, 64, 5, 8, 0, 0x0F, 0xA0]);
@@ -76,8 +77,19 @@ fn golden_bytes_of_a_status() {
     assert_eq!(back, summed);
     let (part, next) = summed.encode_report(report.len() + 9, 0).unwrap();
     assert_eq!((part, next), ([&report[..], &[0, 0xE1, 0x39]].concat(), SLOTS + 1), "the placement waits");
+    let disk = Some(DiskReport { journal_refused: true, checkpoint_refused: false, free_bytes: Some(1 << 30) });
+    let full = VehicleStatus { disk, ..summed.clone() };
+    assert_eq!(full.encode_report(99, 0).unwrap(), ([&longest[..], &[0x4C]].concat(), 0));
+    back.read_report(&[&longest[..], &[0x4C]].concat()).unwrap();
+    assert_eq!(back, full);
+    assert_eq!(full.encode_report(longest.len(), 0).unwrap(), (longest.clone(), SLOTS + 2), "the disk waits");
+    back.read_report(&full.encode_report(11, SLOTS + 2).unwrap().0).unwrap();
+    assert_eq!(back, full);
+    back.read_report(&report).unwrap();
+    assert_eq!(back.disk, disk, "a report without it changes it not");
     let other = [&report[..], &[0x40, 0, 0]].concat();
     assert_eq!(back.read_report(&other), Err(StatusError::BadField), "the content of constraints is not reported");
+    assert_eq!(back.read_report(&[&report[..], &[0x80]].concat()), Err(StatusError::BadField), "the reserved bit");
 }
 
 proptest! {
@@ -94,17 +106,19 @@ proptest! {
     fn reports_of_any_size_cover_every_decided_slot(
         decided in proptest::collection::vec((any::<u8>(), 0u8..12), SLOTS),
         room in 0usize..30,
-        moved in any::<bool>(),
+        (moved, summed, with_disk) in any::<(bool, bool, bool)>(),
     ) {
         let placement = moved.then_some(Placement { version: 1, origin: WorldPoint::new(2.5, -7.0) });
-        let mut status = VehicleStatus { budget_bps: 100, placement, ..VehicleStatus::default() };
+        let in_force = summed.then(|| InForceDigests::default().summary());
+        let disk = with_disk.then_some(DiskReport { free_bytes: Some(0), ..DiskReport::default() });
+        let mut status = VehicleStatus { budget_bps: 100, in_force, placement, disk, ..VehicleStatus::default() };
         for (slot, (version_low, code)) in status.slots.iter_mut().zip(decided) {
             let state = SlotState::from_code(code).unwrap();
             let version_low = if state == SlotState::Unknown { 0 } else { version_low };
             *slot = SlotReport { version_low, state };
         }
         let (mut received, mut first) = (VehicleStatus::default(), 0);
-        for _ in 0..=SLOTS {
+        for _ in 0..=SLOTS + 3 {
             let Some((bytes, next)) = status.encode_report(room, first) else {
                 prop_assert!(room < 12);
                 return Ok(());
@@ -116,9 +130,10 @@ proptest! {
                 break;
             }
         }
-        if room < 17 {
-            status.placement = None;
-        }
+        // An item without room in a report of its own is left out.
+        status.in_force = in_force.filter(|_| room >= 13);
+        status.placement = placement.filter(|_| room >= 17);
+        status.disk = disk.filter(|_| room >= 11);
         prop_assert_eq!((first, received), (0, status));
     }
 

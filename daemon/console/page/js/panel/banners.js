@@ -3,7 +3,7 @@
 import { dismissEarlierMap, sendCommand } from "../api.js";
 import { hasCommand } from "../command.js";
 import { $, announce, h, keyed, show, text } from "../dom.js";
-import { missionTime, span } from "../format.js";
+import { freeSpace, missionTime, span } from "../format.js";
 import { ageOf, isSilent, store } from "../store.js";
 import { retryNow } from "../feed.js";
 
@@ -31,6 +31,7 @@ function current() {
     if (v.link.mismatch) found.push(mismatched(v));
     if (unknownOrders(v).length > 0) found.push(unknownInForce(v));
     if (v.map.earlier) found.push(earlier(v));
+    if (v.status?.disk?.journal_refused || v.status?.disk?.checkpoint_refused) found.push(refusingVehicle(v));
   }
   if (store.snapshot?.storage?.failing) found.push(refusing(store.snapshot.storage));
   if (hasCommand()) found.push(...store.snapshot.command.requests.map(requested));
@@ -93,6 +94,22 @@ function refusing(storage) {
   return {
     key: "storage", kind: "bad", head: "The surface cannot write its files",
     body: `${storage.failing} (${storage.folder}).${free} Map and orders are in memory only and would be lost in a restart; the surface tries again.`,
+  };
+}
+
+/** The vehicle's last report: its disk may take the files again by now. */
+function refusingVehicle(v) {
+  const { journal_refused: journal, checkpoint_refused: checkpoint, free_bytes: free } = v.status.disk;
+  const files = [journal && "journal", checkpoint && "checkpoint"].filter(Boolean).join(" and ");
+  const body = [
+    `Reported ${span(ageOf(v.status.at_s))} ago; ${freeSpace(free)}.`,
+    journal && "It obeys hold and abort from memory and refuses other orders.",
+    checkpoint && "A restart would lose the scene model since its last checkpoint.",
+    "The vehicle tries again.",
+  ];
+  return {
+    key: `disk-${v.id}`, kind: journal ? "bad" : "warn", head: `${v.name} cannot write its ${files}`,
+    body: body.filter(Boolean).join(" "),
   };
 }
 

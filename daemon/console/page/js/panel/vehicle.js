@@ -1,7 +1,7 @@
 // The selected vehicle: its position and activity as it reports them, and the slots of its directive.
 
 import { $, h, keyed, row, show, text } from "../dom.js";
-import { ago, count, degrees, metres, missionTime, none, span } from "../format.js";
+import { ago, count, degrees, freeSpace, metres, missionTime, none, span } from "../format.js";
 import { inWorld } from "../map/frames.js";
 import { bearing } from "../map/measure.js";
 import { lengthOf, pathOf } from "../map/path.js";
@@ -13,7 +13,10 @@ const NAMES = { utility: "Weights", constraints: "Hold, abort", limits: "Limits"
 const title = h("h2", { id: "vehicle-title" });
 const mode = h("span.mode");
 const age = h("p.age");
+/** Free space in bytes below which the panel warns. */
+const LOW_SPACE = 1e9;
 const values = {};
+const lines = {};
 const list = h("dl.values");
 const slots = h("ul.slots");
 const noOrders = h("p.note", {}, "No order sent yet.");
@@ -23,11 +26,13 @@ export function startVehicle() {
     ["position", "East, north"], ["depth", "Depth"], ["heading", "Heading"],
     ["sigma", "Position \u03c3", "Standard deviation of the position; the ring on the map has twice this radius"],
     ["fix", "Last fix"], ["waypoint", "Waypoint"], ["path", "Path", "The plan from the reported position through the waypoint to the last reported place; dashed on the map"], ["cells", "Vehicle's map"], ["contact", "Next contact"],
+    ["disk", "Vehicle's disk", "The files that the vehicle cannot write, and its free space, by its last report"],
     ["gps", "Surface GPS", "The position of the surface by GPS, and the number of fixes sent to vehicles"],
   ]) {
     const [node, set] = row(name, hint);
     values[key] = set;
-    node.classList.toggle("whole", key === "path");
+    lines[key] = node;
+    node.classList.toggle("whole", key === "path" || key === "disk");
     list.append(node);
   }
   $("vehicle").append(h("header", {}, title, mode), age, list,
@@ -54,6 +59,8 @@ function update() {
   values.path(s?.waypoint ? plannedPath(s) : none);
   values.cells(s ? `${count(s.cells)} cells, ${s.labels} labels` : none);
   values.contact(v.next_contact_s === null ? "unknown" : `${missionTime(v.next_contact_s)}, ${due(v)}`);
+  values.disk(disk(s?.disk));
+  lines.disk.classList.toggle("warn", isDiskWanting(s?.disk));
   values.gps(gps(store.snapshot.position));
   keyed(slots, v.directive.slots, (x) => x.slot, makeSlot, refreshSlot);
   show(noOrders, v.directive.slots.length === 0);
@@ -68,6 +75,14 @@ function gps(p) {
   const state = p.is_valid ? `\u00b1 ${metres(p.sigma_m)}` : "no position";
   return `${state}, ${count(p.fixes_sent)} fixes${rejected ? `, ${count(rejected)} USBL rejected` : ""}`;
 }
+
+function disk(d) {
+  if (!d) return "not reported";
+  const files = [d.journal_refused && "journal", d.checkpoint_refused && "checkpoint"].filter(Boolean);
+  return `${files.length > 0 ? `refuses ${files.join(" and ")}, ` : ""}${freeSpace(d.free_bytes)}`;
+}
+
+const isDiskWanting = (d) => Boolean(d && (d.journal_refused || d.checkpoint_refused || (d.free_bytes ?? LOW_SPACE) < LOW_SPACE));
 
 const due = (v) => (v.next_contact_s >= store.nowS ? `in ${span(v.next_contact_s - store.nowS)}` : "overdue");
 
