@@ -213,3 +213,42 @@ impl Camera {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use image::{Rgb, RgbImage};
+
+    #[test]
+    fn refused_checkpoints_are_reported_until_one_is_written() {
+        let dir = std::env::temp_dir().join(format!("scenecast-{}-refused-checkpoint", std::process::id()));
+        let _ = std::fs::remove_dir_all(&dir);
+        let in_the_way = dir.join("scene.checkpoint.part");
+        std::fs::create_dir_all(&in_the_way).unwrap();
+        let image = dir.join("frame.png");
+        RgbImage::from_fn(160, 120, |x, y| Rgb([x as u8, y as u8, (x * y % 31) as u8])).save(&image).unwrap();
+        let mapper = Mapper::new(&scenecast_config::load(None, &[]).unwrap(), None, 0, 1).unwrap();
+        let file = CheckpointFile::new(Folder::hold(&dir).unwrap());
+        let keep = Keep { file, lineage: 1, every_s: 1.0, last_s: None, is_refused: false };
+        let mut thread = MapperThread::start(mapper, keep).unwrap();
+        let mut reports = |t_s: f64| {
+            let (x_m, y_m, depth_m, heading_rad, scale) = (0.0, 0.0, 4.0, 0.0, 1.0);
+            let frame = RecordedFrame { t_s, file: image.clone(), x_m, y_m, depth_m, heading_rad, scale };
+            assert!(thread.orders.send(ToMapper::Frame(Box::new(frame))).is_ok());
+            let mut reports: Vec<bool> = Vec::new();
+            loop {
+                match thread.mapped.blocking_recv().unwrap() {
+                    FromMapper::Checkpoint { is_refused } => reports.push(is_refused),
+                    FromMapper::Mapped(_) => return reports,
+                    FromMapper::Missed(error) => panic!("{error}"),
+                }
+            }
+        };
+        assert!(reports(0.0).is_empty(), "none is due");
+        assert_eq!(reports(2.0), [true]);
+        assert!(reports(4.0).is_empty(), "it is known");
+        std::fs::remove_dir(&in_the_way).unwrap();
+        assert_eq!(reports(6.0), [false]);
+        thread.finish();
+    }
+}
