@@ -3,7 +3,7 @@
 use crate::time::Instant;
 use std::time::Duration;
 
-/// A few answers at once, and one every five seconds in the long run.
+/// A few answers at once, and one every three seconds in the long run.
 #[derive(Debug)]
 pub(super) struct HelloLimit {
     /// Answers that are allowed at once.
@@ -17,8 +17,8 @@ pub(super) struct HelloLimit {
 }
 
 impl HelloLimit {
-    const MOST: u32 = 6;
-    const INTERVAL: Duration = Duration::from_secs(5);
+    const MOST: u32 = 8;
+    const INTERVAL: Duration = Duration::from_secs(3);
     /// Hellos within this time are copies of one.
     const COPIES: Duration = Duration::from_millis(1500);
     const REPEATS: u32 = 3;
@@ -62,12 +62,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_storm_of_hellos_is_answered_once_in_five_seconds() {
+    fn a_storm_of_hellos_is_answered_once_in_three_seconds() {
         let begin = Instant::from_secs_f64(100.0);
         let mut limit = HelloLimit::new(begin);
         let at = |ms: u64| begin + Duration::from_millis(ms);
         let admitted = (0..1000).filter(|&i| limit.admit(at(i * 100))).count();
-        assert_eq!(admitted, 6 + 19);
+        assert_eq!(admitted, 8 + 33);
         assert!(limit.admit(at(1_000_000)), "after a pause");
     }
 }

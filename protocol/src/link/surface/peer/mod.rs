@@ -63,6 +63,8 @@ struct Contact {
     proof_allowed: Instant,
     /// Hellos since the last answer.
     hellos: u32,
+    /// No frame of the current run has come in since the last turn in it.
+    is_doubtful: bool,
 }
 
 impl Contact {
@@ -79,6 +81,7 @@ impl Contact {
             hello_admitted: None,
             proof_allowed: now,
             hellos: 0,
+            is_doubtful: false,
         }
     }
 
@@ -146,10 +149,10 @@ impl<R: StateReplica> VehiclePeer<R> {
         &self.pair.stats
     }
 
-    /// Whether the next turn is to prove a run that the vehicle has offered: every second one, because a replayed hello may
-    /// have offered it.
+    /// Whether the next turn is to prove a run that the vehicle has offered. A replayed hello may have offered it, so a turn
+    /// in the current run must have remained without an answer, and every second turn belongs to that run.
     pub(super) fn is_proof_due(&self) -> bool {
-        self.pair.has_offer() && self.last_turn.purpose != FramePurpose::Proof
+        self.pair.has_offer() && self.contact.is_doubtful && self.last_turn.purpose != FramePurpose::Proof
     }
 
     /// Counts a frame that was dropped.
@@ -235,6 +238,7 @@ impl<R: StateReplica> VehiclePeer<R> {
         let Some(number) = inbound.number else { return };
         self.contact.last_received = Some(now);
         self.contact.hellos = 0;
+        self.contact.is_doubtful = false;
         if inbound.is_latest {
             self.handle_stamp(&header, modem.airtime(bytes), now);
             self.handle_turn(&header, bytes, modem, now);

@@ -32,7 +32,7 @@ impl Contact {
 
     /// A hello went out; the next ones follow at growing intervals.
     fn note_hello(&mut self, timeout: Duration, now: Instant) {
-        self.hello_due = now + timeout.max(Self::PROOF_TIMEOUT) * (1 << self.hellos.min(4));
+        self.hello_due = now + timeout.max(Self::PROOF_TIMEOUT) * (1 << self.hellos.min(2));
         self.hellos += 1;
     }
 }
@@ -43,12 +43,13 @@ impl<R: StateReplica> VehiclePeer<R> {
         is_doubtful && now >= self.contact.hello_due
     }
 
-    /// When a run that the vehicle has offered is to be proven.
+    /// When a run that the vehicle has offered is to be proven, unless a frame of the current run comes in before.
     fn proof_due(&self) -> Option<Instant> {
         let timeout = self.slot_timeout().max(Contact::PROOF_TIMEOUT);
-        let pause = timeout * (1 << (self.pair.proofs().clamp(1, 5) - 1));
+        let pause = timeout * (1 << (self.pair.proofs().clamp(1, 3) - 1));
         let again = self.contact.proved.map_or(Instant::ZERO, |at| at + pause);
-        self.pair.has_offer().then(|| again.max(self.contact.proof_allowed))
+        let silent = self.contact.last_received.map_or(Instant::ZERO, |at| at + timeout);
+        self.pair.has_offer().then(|| again.max(silent).max(self.contact.proof_allowed))
     }
 
     /// Whether a frame should go out at `now`: a hello, a proof, an acknowledgement, or a slot.

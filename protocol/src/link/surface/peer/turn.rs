@@ -80,6 +80,7 @@ impl<R: StateReplica> VehiclePeer<R> {
         now: Instant,
     ) -> Vec<Ready> {
         let purpose = if self.pair.has_run() { purpose } else { FramePurpose::Hello };
+        self.contact.is_doubtful |= purpose == FramePurpose::Content;
         self.last_turn = LastTurn { began: self.pair.next_number(), purpose };
         let mut bits_left: u64 = plan.iter().map(|slots| self.bits(slots, modem, purpose)).sum();
         let mut at = now;
