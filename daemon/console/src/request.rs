@@ -179,10 +179,16 @@ fn handle(surface: &mut Surface, request: SurfaceRequest, cell_m: f64, now: Inst
         SurfaceRequest::Budget(order) => budget(surface, order, now),
         SurfaceRequest::Label(id, LabelOrder { label, name, colour, merged_into }) => {
             let book = StoredLabel { name, colour, merged_into };
-            done(surface.set_label(known(surface, id)?, label, book))
+            done(surface.record_mut(Address::vehicle(id)?)?.set_label(label, book))
         }
-        SurfaceRequest::Note(id, by, order) => done(surface.add_note(known(surface, id)?, &by, &order.text, now)),
-        SurfaceRequest::DismissEarlierMap(id) => done(surface.dismiss_earlier_map(known(surface, id)?)),
+        SurfaceRequest::Note(id, by, order) => {
+            let record = surface.record_mut(Address::vehicle(id)?)?;
+            done(record.annotations.add_note(&by, &order.text, now))
+        }
+        SurfaceRequest::DismissEarlierMap(id) => {
+            surface.record_mut(Address::vehicle(id)?)?.dismiss_earlier_map();
+            Reply::Done
+        }
         SurfaceRequest::Archives => Reply::Archives(Vec::new()),
         SurfaceRequest::ArchivedMap(_) => return None,
         // Handled with its principal, before.

@@ -13,7 +13,6 @@ mod pauses;
 pub mod position;
 pub mod record;
 pub mod recorder;
-mod requests;
 mod send_orders;
 mod settings;
 mod surface;

@@ -102,6 +102,10 @@ impl Surface {
         self.records.get(&vehicle)
     }
 
+    pub fn record_mut(&mut self, vehicle: Address) -> Option<&mut VehicleRecord> {
+        self.records.get_mut(&vehicle)
+    }
+
     pub fn view(&self, vehicle: Address) -> Option<PeerView<'_>> {
         self.link.vehicle(vehicle)
     }

@@ -171,6 +171,19 @@ impl VehicleRecord {
         of_earlier.unwrap_or(&self.annotations.labels).get(&label)
     }
 
+    /// Sets name, colour and merging of a label in the current epoch. The error is one line for the operator.
+    pub fn set_label(&mut self, label: u8, book: StoredLabel) -> Result<(), String> {
+        if self.earlier_map().is_some_and(|earlier| earlier.epoch != self.epoch) {
+            return Err("the map in view has the labels of an earlier epoch".to_owned());
+        }
+        self.annotations.set_label(label, book)
+    }
+
+    /// Takes the earlier map out of view, although the current one has fewer cells. The map stays in the archive.
+    pub fn dismiss_earlier_map(&mut self) {
+        self.earlier.is_dismissed = self.earlier.map.is_some();
+    }
+
     /// Shows an earlier map in place of the current one, or the current one.
     pub fn show_earlier(&mut self, map: Option<Arc<EarlierMap>>) {
         self.earlier = EarlierView { map, is_dismissed: false, version_base: self.earlier.version_base + 1 };

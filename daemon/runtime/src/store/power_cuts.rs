@@ -180,10 +180,10 @@ impl Trial {
             60 => drop(surface.set_fence(auv, &FenceOrder { fence: square, ..FenceOrder::default() }, now).unwrap()),
             90 => drop(surface.set_utility(auv, &BTreeMap::new(), (0.5, 0.0), now).unwrap()),
             120 => surface.set_budget(9000, None, None, now).unwrap(),
-            130 => surface.add_note(auv, "ann", "a wreck", now).unwrap(),
+            130 => surface.record_mut(auv).unwrap().annotations.add_note("ann", "a wreck", now).unwrap(),
             140 => {
                 let sand = StoredLabel { name: Some("sand".into()), ..StoredLabel::default() };
-                surface.set_label(auv, 1, sand).unwrap();
+                surface.record_mut(auv).unwrap().set_label(1, sand).unwrap();
             }
             _ => drop(surface.set_hold(auv, false, now).unwrap()),
         }

@@ -31,7 +31,7 @@ fn start(disk: &Disk, seconds: u64) -> (SurfaceStore<Disk>, Surface) {
 }
 
 fn note(store: &mut SurfaceStore<Disk>, surface: &mut Surface, text: &str, seconds: u64) {
-    surface.add_note(auv(), "ann", text, Instant::ZERO).unwrap();
+    surface.record_mut(auv()).unwrap().annotations.add_note("ann", text, Instant::ZERO).unwrap();
     store.commit(surface, Some("ann"), at(seconds));
 }
 

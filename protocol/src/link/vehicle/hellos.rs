@@ -17,14 +17,14 @@ pub(super) struct HelloLimit {
 }
 
 impl HelloLimit {
-    const MOST: u32 = 8;
+    const MAX_ANSWERS: u32 = 8;
     const INTERVAL: Duration = Duration::from_secs(3);
     /// Hellos within this time are copies of one.
     const COPIES: Duration = Duration::from_millis(1500);
     const REPEATS: u32 = 3;
 
     pub(super) fn new(now: Instant) -> Self {
-        Self { left: Self::MOST, since: now, admitted: None, repeats: 0 }
+        Self { left: Self::MAX_ANSWERS, since: now, admitted: None, repeats: 0 }
     }
 
     /// Whether a hello that came in may be answered.
@@ -34,7 +34,7 @@ impl HelloLimit {
         }
         let added = now.since(self.since).as_secs() / Self::INTERVAL.as_secs();
         if added > 0 {
-            self.left = u64::from(self.left).saturating_add(added).min(u64::from(Self::MOST)) as u32;
+            self.left = u64::from(self.left).saturating_add(added).min(u64::from(Self::MAX_ANSWERS)) as u32;
             self.since = now;
         }
         let is_admitted = self.left > 0;
