@@ -22,8 +22,6 @@ const GIVE_UP_S: f64 = 600.0;
 const BURSTS: usize = 12;
 /// The most frames of a burst.
 const MAX_BURST: usize = 600;
-/// Share of dives without a stranger, as a control of the authentic frames that are refused.
-const CONTROL: u64 = 8;
 
 /// How the frames of one kind were judged.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
@@ -132,9 +130,8 @@ pub fn measure_stranger(
     let mut dive = 0;
     while attack.frames < frames {
         attack.dive(dive, frames, progress);
-        if dive.is_multiple_of(CONTROL) {
-            control.dive(dive, control.frames + frames, &mut |_| ());
-        }
+        // The same restarts in the same kind of access, without the stranger.
+        control.dive(dive, frames, &mut |_| ());
         dive += 1;
     }
     attack.figures(&control)
