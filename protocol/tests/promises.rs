@@ -76,8 +76,10 @@ fn hours_without_an_answer_do_not_make_the_ends_grow() {
                 pair.run(pair.now + Duration::from_secs(300), false);
                 sizes.push(pair.size());
             }
-            let (early, late) = (sizes[4..14].iter().max().unwrap(), sizes[30..].iter().max().unwrap());
-            assert!(*late < early * 2, "{access:?}, mute {mute:?}: {early} and {late} bytes");
+            // The queues fill during the first hour, and then the sizes vary with the losses.
+            let (early, late) = (sizes[10..25].iter().max().unwrap(), sizes[25..].iter().max().unwrap());
+            assert!(*late * 2 < early * 3, "{access:?}, mute {mute:?}: {early} and {late} bytes");
+            assert!(*late < 600_000, "{access:?}, mute {mute:?}: {late} bytes");
         }
     }
 }

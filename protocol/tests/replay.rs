@@ -146,6 +146,6 @@ fn fifty_replayed_calls_cause_few_answers() {
         }
         let sent = pair.vehicle.stats().frames_sent - before;
         println!("{access:?}: {sent} transmissions after 50 replays in 50 s");
-        assert!(sent <= 20, "{access:?}: {sent} transmissions");
+        assert!(sent <= 25, "{access:?}: {sent} transmissions");
     }
 }
