@@ -259,8 +259,8 @@ impl Campaign {
     /// One frame of the stranger at one of the ends.
     fn transmit(&mut self, ends: &mut AttackedEnds, kinds: &[AttackKind]) {
         let mut frame = self.forger.forge(kinds, ends.shown());
-        let is_unchanged = matches!(frame.kind, AttackKind::Replayed | AttackKind::Earlier | AttackKind::Relayed);
-        if is_unchanged && ends.take_undelivered(&frame.bytes) {
+        // Two flips of one bit leave a frame unchanged, too.
+        if ends.take_undelivered(&frame.bytes) {
             frame.kind = AttackKind::Relayed;
         } else if frame.kind == AttackKind::Relayed {
             frame.kind = AttackKind::Replayed;
