@@ -1,4 +1,4 @@
-//! The CPU time of a mission of 20 minutes: 600 frames of 640 x 480 pixels over a procedural reef, extraction included.
+//! The CPU time of a mission of 20 minutes: 600 frames of 640 x 480 pixels over a procedural sea floor, extraction included.
 #![allow(clippy::disallowed_methods, missing_docs, unreachable_pub)]
 
 mod cpu;
@@ -11,13 +11,13 @@ use scene_model::publish::{LabelBook, PublishedCell};
 use scene_model::topics::{SceneConfig, SceneModel};
 use scene_model::words::{WordConfig, WordExtractor};
 use scenecast_scoring::mutual_information_nats;
-use scenecast_worlds::{Reef, reef};
+use scenecast_worlds::{Patches, patches};
 
 fn main() {
     let mut parts = [0.0; 5];
     let mut timed = |part: usize, start: f64| parts[part] += cpu_seconds() - start;
     let start = cpu_seconds();
-    let reef = reef(1, 2800, 1900, 150, 8);
+    let world = patches(1, 2800, 1900, 150, 8);
     println!("reef {:.2} s", cpu_seconds() - start);
     let camera = DownCamera { metres_per_pixel: 0.01, altitude_m: 3.0 };
     let mut extractor = WordExtractor::new(&WordConfig::default());
@@ -28,7 +28,7 @@ fn main() {
     for frame in 0..600u32 {
         let (line, along) = (frame / 60, frame % 60);
         let (left, top) = (along * 2160 / 60, line * 1420 / 10);
-        let view = image::imageops::crop_imm(&reef.image, left, top, 640, 480).to_image();
+        let view = image::imageops::crop_imm(&world.image, left, top, 640, 480).to_image();
         let pose = Pose { x: f64::from(left) * 0.01, y: -f64::from(top) * 0.01, z: 3.0, yaw_rad: 0.0 };
         let start = cpu_seconds();
         let words = extractor.extract(&view, 25.0);
@@ -63,19 +63,19 @@ fn main() {
         book.labels().count()
     );
     println!("{:.1} of the cells already shown change their label a frame", changes as f64 / 600.0);
-    let before = truth_mi(&reef, &model);
+    let before = truth_mi(&world, &model);
     model.sweep(30);
-    println!("MI with the truth {before:.3} nats at the end, {:.3} after 30 more sweeps", truth_mi(&reef, &model));
+    println!("MI with the truth {before:.3} nats at the end, {:.3} after 30 more sweeps", truth_mi(&world, &model));
 }
 
 /// The mutual information of the map with the class at each cell's centre, nats.
-fn truth_mi(reef: &Reef, model: &SceneModel) -> f64 {
+fn truth_mi(world: &Patches, model: &SceneModel) -> f64 {
     // The first frame's centre is the origin of the world.
     let pairs = model.label_map().into_iter().filter_map(|cell| {
         let (u, v) = (320 + cell.x * 25 + 12, 240 - cell.y * 25 - 12);
         let (u, v) = (u32::try_from(u).ok()?, u32::try_from(v).ok()?);
-        (u < reef.width && v < reef.height)
-            .then(|| (cell.topic.0, u32::from(reef.truth[(v * reef.width + u) as usize])))
+        (u < world.width && v < world.height)
+            .then(|| (cell.topic.0, u32::from(world.truth[(v * world.width + u) as usize])))
     });
     mutual_information_nats(pairs).nats
 }

@@ -6,7 +6,7 @@
 use divan::Bencher;
 use divan::counter::ItemsCount;
 use scene_model::words::{WordConfig, WordExtractor};
-use scenecast_worlds::reef;
+use scenecast_worlds::patches;
 
 const NONE: WordConfig = WordConfig { colour: 0, context: 0, spread: 0, texture: 0, binary: 0, warm_up_frames: 1 };
 
@@ -36,7 +36,7 @@ fn binary_alone(bencher: Bencher<'_, '_>) {
 }
 
 fn frames(bencher: Bencher<'_, '_>, config: WordConfig) {
-    let frame = reef(1, 640, 480, 150, 8).image;
+    let frame = patches(1, 640, 480, 150, 8).image;
     let mut extractor = WordExtractor::new(&config);
     extractor.extract(&frame, 25.0);
     bencher.counter(ItemsCount::new(1usize)).bench_local(|| extractor.extract(&frame, 25.0));

@@ -8,21 +8,21 @@ use image::GrayImage;
 use scene_model::topics::FlatCell;
 use scene_model::{DownCamera, Pose, SceneConfig, SceneModel, WordConfig, WordExtractor};
 use scenecast_scoring::{AnnotatedScene, Method, Trial, mutual_information_nats};
-use scenecast_worlds::reef;
+use scenecast_worlds::patches;
 
 const WIDTH: u32 = 480;
 const HEIGHT: u32 = 320;
 const CELL_PX: u32 = 10;
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let reef = reef(6, WIDTH, HEIGHT, 50, 6);
+    let world = patches(6, WIDTH, HEIGHT, 50, 6);
     // The class of the pixel in the middle of a cell; in the map, y grows upwards from the lower edge of the image.
     let truth = |cell: &FlatCell| {
         let (u, v) = (cell.x as u32 * CELL_PX + CELL_PX / 2, HEIGHT - 1 - (cell.y as u32 * CELL_PX + CELL_PX / 2));
-        u32::from(reef.truth[(v * WIDTH + u) as usize])
+        u32::from(world.truth[(v * WIDTH + u) as usize])
     };
 
-    let words = WordExtractor::new(&WordConfig::default()).extract(&reef.image, CELL_PX as f32);
+    let words = WordExtractor::new(&WordConfig::default()).extract(&world.image, CELL_PX as f32);
     let camera = DownCamera { metres_per_pixel: 1.0 / f64::from(CELL_PX), altitude_m: 0.0 };
     let cells = |px: u32| f64::from(px) / f64::from(CELL_PX);
     let middle = Pose { x: cells(WIDTH) / 2.0, y: cells(HEIGHT) / 2.0, ..Pose::default() };
@@ -41,9 +41,9 @@ fn main() -> Result<(), Box<dyn Error>> {
         println!("{sweeps:6} {:6.3} {:12.3} {labels:7} {perplexity:11.0}", mi.nats, mi.normalised);
     }
 
-    let classes = GrayImage::from_raw(WIDTH, HEIGHT, reef.truth.clone()).ok_or("the truth has another size")?;
+    let classes = GrayImage::from_raw(WIDTH, HEIGHT, world.truth.clone()).ok_or("the truth has another size")?;
     let trial = Trial { labels: 16, cells_across: WIDTH / CELL_PX, sweeps: 30, seeds: 1 };
-    let scene = AnnotatedScene::new(trial, &reef.image, &classes, &[255])?;
+    let scene = AnnotatedScene::new(trial, &world.image, &classes, &[255])?;
     println!("\nmethod                   MI   null  excess");
     for method in Method::ALL {
         let score = scene.mean_score(method)?;

@@ -1,6 +1,6 @@
 //! Labels all images of a folder with one scene model, so that a letter means the same ground in every image.
 //!
-//! `cargo run -p scene-model --example label_images -- DIR`; without a folder it labels three procedural reefs.
+//! `cargo run -p scene-model --example label_images -- DIR`; without a folder it labels three procedural sea floors.
 
 use std::collections::BTreeMap;
 use std::error::Error;
@@ -17,9 +17,9 @@ const SPACING: i32 = 1000;
 fn main() -> Result<(), Box<dyn Error>> {
     let images = match std::env::args().nth(1) {
         Some(folder) => read(&folder)?,
-        None => {
-            (1..4).map(|seed| (format!("reef {seed}"), scenecast_worlds::reef(seed, 480, 200, 50, 5).image)).collect()
-        }
+        None => (1..4)
+            .map(|seed| (format!("reef {seed}"), scenecast_worlds::patches(seed, 480, 200, 50, 5).image))
+            .collect(),
     };
     let mut extractor = WordExtractor::new(&WordConfig::default());
     let config = SceneConfig { cell_m: [1.0, 1.0, 1e4], max_labels: 8, ..SceneConfig::for_images() };

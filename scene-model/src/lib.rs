@@ -27,7 +27,7 @@
 //!   once a minute <------- SceneModel::save         everything as bytes; SceneModel::load continues from them
 //! ```
 //!
-//! The same loop in code, over three frames of a procedural reef in place of a camera:
+//! The same loop in code, over three frames of a procedural sea floor in place of a camera:
 //!
 //! ```
 //! use scene_model::{DownCamera, LabelBook, Pose, SceneConfig, SceneModel, WordConfig, WordExtractor};
@@ -40,7 +40,7 @@
 //!
 //! for second in 0..3 {
 //!     // A frame of 320 x 240 pixels, 3 m above the ground and 1 m further east each second.
-//!     let image = scenecast_worlds::reef(second, 320, 240, 60, 5).image;
+//!     let image = scenecast_worlds::patches(second, 320, 240, 60, 5).image;
 //!     let pose = Pose { x: second as f64, y: 0.0, z: -10.0, yaw_rad: 0.0 };
 //!     let camera = DownCamera { metres_per_pixel: 0.01, altitude_m: 3.0 };
 //!

@@ -16,7 +16,7 @@ pub fn recorded() -> &'static (PathBuf, Vec<u8>) {
         let fly = |sets: &[String], record| {
             let sets: Vec<String> = SHARED.iter().map(|s| (*s).to_owned()).chain(sets.iter().cloned()).collect();
             let config = scenecast_config::load(None, &sets).expect("the settings are allowed");
-            let options = MissionOptions { world: World::procedural(2, 0.01), seed: 1, record };
+            let options = MissionOptions { world: World::patches(2, 0.01), seed: 1, record };
             let mut mission = Mission::new(config, options).expect("a mission");
             mission.run(Duration::from_secs(3600), &mut |_| {}).expect("the mission ends");
             mission

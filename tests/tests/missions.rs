@@ -18,7 +18,7 @@ fn config(sets: &[&str]) -> Config {
 /// A small reef, drawn once.
 fn reef() -> World {
     static REEF: std::sync::OnceLock<World> = std::sync::OnceLock::new();
-    REEF.get_or_init(|| World::procedural(5, 0.01)).clone()
+    REEF.get_or_init(|| World::patches(5, 0.01)).clone()
 }
 
 fn fly(sets: &[&str], seed: u64) -> Value {

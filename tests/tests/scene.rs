@@ -171,9 +171,9 @@ fn a_wrong_words_file_is_refused_with_its_line() {
 }
 
 fn reef(dir: &Path) -> String {
-    let reef = scenecast_worlds::reef(3, 400, 300, 60, 5);
-    reef.image.save(dir.join("reef.png")).unwrap();
-    image::GrayImage::from_raw(400, 300, reef.truth).unwrap().save(dir.join("classes.png")).unwrap();
+    let world = scenecast_worlds::patches(3, 400, 300, 60, 5);
+    world.image.save(dir.join("reef.png")).unwrap();
+    image::GrayImage::from_raw(400, 300, world.truth).unwrap().save(dir.join("classes.png")).unwrap();
     path(dir.join("reef.png"))
 }
 
@@ -207,11 +207,11 @@ fn a_mosaic_is_scored_and_unfit_annotations_are_refused() {
 fn tum(dir: &Path) -> PathBuf {
     let dir = dir.join("tum");
     std::fs::create_dir_all(dir.join("rgb")).unwrap();
-    let reef = scenecast_worlds::reef(3, 400, 300, 60, 5).image;
+    let world = scenecast_worlds::patches(3, 400, 300, 60, 5).image;
     let (mut rgb, mut depth, mut truth) = ("# color images\n".to_owned(), String::new(), String::new());
     for i in 0..6u32 {
         let time = 100.0 + f64::from(i) * 0.5;
-        let view = image::imageops::crop_imm(&reef, i * 20, 0, 160, 120).to_image();
+        let view = image::imageops::crop_imm(&world, i * 20, 0, 160, 120).to_image();
         view.save(dir.join(format!("rgb/{i}.png"))).unwrap();
         // The left half of each depth image has no reading; the last frame has no depth image at all.
         let metres = |x: u32, _| image::Luma([if x < 80 { 0u16 } else { 5000 }]);
@@ -259,10 +259,10 @@ fn a_tum_sequence_is_projected_and_gaps_are_counted() {
 #[test]
 fn frames_with_poses_are_labelled_and_bad_ones_are_counted() {
     let dir = scratch("scene-frames");
-    let reef = scenecast_worlds::reef(3, 400, 300, 60, 5).image;
+    let world = scenecast_worlds::patches(3, 400, 300, 60, 5).image;
     let mut poses = "t_s,file,x_m,y_m,depth_m,heading_deg\n".to_owned();
     for i in 0..5u32 {
-        image::imageops::crop_imm(&reef, i * 40, 0, 160, 120).to_image().save(dir.join(format!("{i}.png"))).unwrap();
+        image::imageops::crop_imm(&world, i * 40, 0, 160, 120).to_image().save(dir.join(format!("{i}.png"))).unwrap();
         let _ = writeln!(poses, "{},{i}.png,{},0,10,0", f64::from(i) * 2.0, f64::from(i) * 0.4);
     }
     poses.push_str("10,missing.png,0,0,10,0\n");

@@ -8,10 +8,10 @@
 //! use image::GrayImage;
 //! use scenecast_scoring::{AnnotatedScene, Method, Trial};
 //!
-//! let reef = scenecast_worlds::reef(3, 240, 180, 40, 4);
-//! let classes = GrayImage::from_raw(reef.width, reef.height, reef.truth).ok_or("wrong size")?;
+//! let world = scenecast_worlds::patches(3, 240, 180, 40, 4);
+//! let classes = GrayImage::from_raw(world.width, world.height, world.truth).ok_or("wrong size")?;
 //! let trial = Trial { labels: 8, cells_across: 30, sweeps: 5, seeds: 1 };
-//! let scene = AnnotatedScene::new(trial, &reef.image, &classes, &[255])?;
+//! let scene = AnnotatedScene::new(trial, &world.image, &classes, &[255])?;
 //!
 //! let score = scene.mean_score(Method::SceneModel)?;
 //! assert!(score.excess_nats > 0.3);

@@ -14,9 +14,9 @@ use scene_model::words::{Measures, WordConfig, WordExtractor};
 /// use scene_model::words::{WordConfig, WordExtractor};
 /// use scenecast_scoring::train_vocabulary;
 ///
-/// let site = || (1..4).map(|seed| (scenecast_worlds::reef(seed, 120, 90, 20, 5).image, 25.0));
+/// let site = || (1..4).map(|seed| (scenecast_worlds::patches(seed, 120, 90, 20, 5).image, 25.0));
 /// let mut extractor = WordExtractor::from_measures(train_vocabulary(&WordConfig::default(), site));
-/// let image = scenecast_worlds::reef(9, 120, 90, 20, 5).image;
+/// let image = scenecast_worlds::patches(9, 120, 90, 20, 5).image;
 /// assert_eq!(extractor.extract(&image, 25.0), extractor.extract(&image, 25.0));
 /// ```
 pub fn train_vocabulary<I: Iterator<Item = (RgbImage, f32)>>(config: &WordConfig, images: impl Fn() -> I) -> Measures {

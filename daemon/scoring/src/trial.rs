@@ -208,14 +208,14 @@ impl MeanScore {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use scenecast_worlds::reef;
+    use scenecast_worlds::patches;
 
     #[test]
     fn scene_model_finds_more_of_a_reef_than_the_baselines() {
-        let reef = reef(3, 480, 360, 60, 5);
-        let classes = GrayImage::from_raw(reef.width, reef.height, reef.truth).unwrap();
+        let world = patches(3, 480, 360, 60, 5);
+        let classes = GrayImage::from_raw(world.width, world.height, world.truth).unwrap();
         let trial = Trial { labels: 8, cells_across: 40, sweeps: 10, seeds: 1 };
-        let scene = AnnotatedScene::new(trial, &reef.image, &classes, &[255]).unwrap();
+        let scene = AnnotatedScene::new(trial, &world.image, &classes, &[255]).unwrap();
         let scores = Method::ALL.map(|method| scene.mean_score(method).unwrap());
         assert!(scores.iter().all(|score| score.excess_nats > 0.5 && score.labels_used <= 8.0), "{scores:?}");
         assert!(scores[2].excess_nats > scores[1].excess_nats, "{scores:?}");

@@ -51,10 +51,10 @@ impl<'a> Site<'a> {
 
     /// A procedural sea floor, with every pixel annotated.
     pub fn procedural(seed: u64, config: &'a Config) -> Self {
-        let reef = scenecast_worlds::reef(seed, REEF_PX.0, REEF_PX.1, REEF_PX.2, 8);
-        let classes = GrayImage::from_raw(reef.width, reef.height, reef.truth).unwrap_or_default();
-        let crc = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC).checksum(reef.image.as_raw());
-        Self { image: reef.image, classes, ignore: &[], config, crc }
+        let world = scenecast_worlds::patches(seed, REEF_PX.0, REEF_PX.1, REEF_PX.2, 8);
+        let classes = GrayImage::from_raw(world.width, world.height, world.truth).unwrap_or_default();
+        let crc = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC).checksum(world.image.as_raw());
+        Self { image: world.image, classes, ignore: &[], config, crc }
     }
 
     /// 16 hexadecimal digits over all inputs of a measurement of these sites except the setting.

@@ -1,0 +1,118 @@
+//! Light on a surface: the sun's soft shadows, the relief's slopes, and the dark of crevices.
+
+use super::fields::{Colour, ramp, scale};
+use super::surface::Surface;
+
+/// Direction to the sun: east, north and up.
+const SUN: [f32; 3] = [-0.42, 0.52, 0.744];
+/// Light from the whole sky and from the water.
+const AMBIENT: f32 = 0.36;
+/// Radii of the neighbourhoods whose mean height tells a crevice, metres.
+const NEAR_M: f32 = 0.05;
+const WIDE_M: f32 = 0.22;
+
+/// Longest shadow, and width of the widest crevice, metres: a surface needs so much more around what is shown.
+pub(super) const SHADOW_M: f32 = 0.48;
+pub(super) const CREVICE_M: f32 = WIDE_M + 0.03;
+
+/// The light that each node sends back, row by row.
+pub(super) fn shade(surface: &Surface) -> Vec<Colour> {
+    let (columns, rows, pitch) = (surface.columns, surface.rows, surface.pitch_m);
+    let height = &surface.height_m;
+    let shadow = shadows(surface);
+    let radius = |metres: f32| ((metres / pitch).round() as usize).max(1);
+    let (near, wide) = (mean(height, columns, radius(NEAR_M)), mean(height, columns, radius(WIDE_M)));
+    let mut light = Vec::with_capacity(height.len());
+    for row in 0..rows {
+        let (below, above) = (row.saturating_sub(1) * columns, (row + 1).min(rows - 1) * columns);
+        for column in 0..columns {
+            let at = row * columns + column;
+            let east = height[row * columns + (column + 1).min(columns - 1)];
+            let west = height[row * columns + column.saturating_sub(1)];
+            let slope =
+                [(east - west) / (2.0 * pitch), (height[above + column] - height[below + column]) / (2.0 * pitch)];
+            let length = (1.0 + slope[0] * slope[0] + slope[1] * slope[1]).sqrt();
+            let facing = (SUN[2] - slope[0] * SUN[0] - slope[1] * SUN[1]).max(0.0) / (length * SUN[2]);
+            let sunk = 26.0 * (near[at] - height[at]).max(0.0) + 9.0 * (wide[at] - height[at]).max(0.0);
+            let open = 1.0 / (1.0 + sunk);
+            let raised = 1.0 + 2.0 * (height[at] - wide[at]).clamp(0.0, 0.2);
+            let sun = (1.0 - AMBIENT) * facing.min(1.6) * (1.0 - shadow[at]);
+            light.push(scale(surface.colour[at], (AMBIENT * raised + sun) * open));
+        }
+    }
+    light
+}
+
+/// How far each node lies in the shadow of what is between it and the sun, 0 to 1.
+fn shadows(surface: &Surface) -> Vec<f32> {
+    let (columns, rows) = (surface.columns, surface.rows);
+    // Towards the sun a ray moves this many columns for each row, and gains this much height.
+    let shift = SUN[0] / SUN[1];
+    let rise = SUN[2] / SUN[1] * surface.pitch_m;
+    let (whole, part) = (shift.floor() as i64, shift - shift.floor());
+    let mut shadow = vec![0.0; columns * rows];
+    let mut edge: Vec<f32> = surface.height_m[(rows - 1) * columns..].to_vec();
+    for row in (0..rows - 1).rev() {
+        let heights = &surface.height_m[row * columns..][..columns];
+        let mut next = heights.to_vec();
+        for column in 0..columns {
+            let from = column as i64 + whole;
+            let at = |c: i64| edge[c.clamp(0, columns as i64 - 1) as usize];
+            let ray = at(from) + part * (at(from + 1) - at(from)) - rise;
+            if ray > heights[column] {
+                next[column] = ray;
+                shadow[row * columns + column] = 0.9 * ramp(0.0, 0.05, ray - heights[column]);
+            }
+        }
+        edge = next;
+    }
+    shadow
+}
+
+/// The mean over a square of the given radius around each node; at the border, over the part inside.
+fn mean(values: &[f32], columns: usize, radius: usize) -> Vec<f32> {
+    let rows = values.len() / columns;
+    let mut across = vec![0.0; values.len()];
+    for (line, out) in values.chunks_exact(columns).zip(across.chunks_exact_mut(columns)) {
+        running(columns, radius, |i| line[i], |i, value| out[i] = value);
+    }
+    let mut sums = vec![0.0f32; columns];
+    let mut result = vec![0.0; values.len()];
+    for row in 0..rows.min(radius) {
+        add(&mut sums, &across[row * columns..][..columns], 1.0);
+    }
+    for row in 0..rows {
+        if row + radius < rows {
+            add(&mut sums, &across[(row + radius) * columns..][..columns], 1.0);
+        }
+        if row > radius {
+            add(&mut sums, &across[(row - radius - 1) * columns..][..columns], -1.0);
+        }
+        let count = (row + radius).min(rows - 1) - row.saturating_sub(radius) + 1;
+        let share = 1.0 / count as f32;
+        for (out, sum) in result[row * columns..][..columns].iter_mut().zip(&sums) {
+            *out = sum * share;
+        }
+    }
+    result
+}
+
+fn add(sums: &mut [f32], line: &[f32], sign: f32) {
+    for (sum, value) in sums.iter_mut().zip(line) {
+        *sum += sign * value;
+    }
+}
+
+fn running(count: usize, radius: usize, value: impl Fn(usize) -> f32, mut put: impl FnMut(usize, f32)) {
+    let mut sum: f32 = (0..count.min(radius)).map(&value).sum();
+    for i in 0..count {
+        if i + radius < count {
+            sum += value(i + radius);
+        }
+        if i > radius {
+            sum -= value(i - radius - 1);
+        }
+        let inside = (i + radius).min(count - 1) - i.saturating_sub(radius) + 1;
+        put(i, sum / inside as f32);
+    }
+}
