@@ -3,15 +3,17 @@
 mod pair;
 
 use pair::{CALM, LinkedEnds, LossyChannel, Setup, auv, patchy, utility};
-use scenecast_protocol::directive::{OrderStatus, Series, SlotId, VersionedSlot};
+use scenecast_protocol::directive::{Budget, Constraints, OrderStatus, Series, Slot, SlotId, VersionedSlot};
 use scenecast_protocol::link::InForce;
 use scenecast_protocol::mac::Access;
 use scenecast_protocol::map_codec::Codec;
+use scenecast_protocol::schedule::{BackgroundOrder, Shares};
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::{
     AckStatement, Address, ChunkKind, Envelope, FrameBuilder, FrameKind, Header, Introduction, MissionId, Seal,
     SessionId,
 };
+use std::collections::{BTreeSet, VecDeque};
 use std::time::Duration;
 
 const MISSION: MissionId = MissionId(7);
@@ -37,6 +39,12 @@ impl Stranger<'_> {
     fn session(&self, of: Address) -> Option<SessionId> {
         let to_any = |bytes: &Vec<u8>| Envelope::decode(bytes, |_| true).ok().map(|e| e.header);
         self.pair.overheard.iter().filter_map(to_any).find(|h| h.from == of).map(|h| h.session)
+    }
+
+    /// The session in the last hello of the vehicle, if it is among these frames.
+    fn hello_of_vehicle(overheard: &VecDeque<Vec<u8>>) -> Option<SessionId> {
+        let headers = overheard.iter().filter_map(|bytes| Envelope::decode(bytes, |_| true).ok()).map(|e| e.header);
+        headers.filter(|h| h.from == auv() && h.kind.is_hello()).map(|h| h.session).next()
     }
 
     /// Writes one frame to one of the ends.
@@ -202,4 +210,96 @@ fn a_link_recovers_from_forgeries_that_it_accepted() {
     println!("{} of {ATTACKS} links took longer than {USUAL_RECOVERY:?}: {late:?}", late.len());
     assert!(times.iter().all(Option::is_some), "not within {MAX_RECOVERY:?}: {late:?}");
     assert!(late.len() as u64 * 50 <= ATTACKS, "longer than {USUAL_RECOVERY:?}: {late:?}");
+}
+
+/// Begins a run of the surface at the vehicle by a forged hello, and gives it an order of a series.
+fn give_forged_order(pair: &mut LinkedEnds, series: Series, order: &[u8]) {
+    let forged = SessionId::from_random(0x5A5A);
+    let header = Stranger { pair, random: 1 }.header(Address::SURFACE, auv(), forged);
+    let mut hello = FrameBuilder::new(&Header { number: 0, base: 1, kind: FrameKind::Hello, ..header.clone() }, 64);
+    let introduction = Introduction { series: Some(series), ..Introduction::default() };
+    hello.push(ChunkKind::Introduction, &introduction.encode());
+    let hello = hello.finish(&Seal::Crc(MISSION, 0), true);
+    pair.overheard.clear();
+    let give_up = pair.now + Duration::from_secs(1000);
+    let answer = loop {
+        if let Some(session) = Stranger::hello_of_vehicle(&pair.overheard) {
+            break session;
+        }
+        assert!(pair.now < give_up, "no answer to the forged hello");
+        pair.vehicle.handle_frame(&hello, pair.now);
+        pair.run(pair.now + Duration::from_millis(100), false);
+    };
+    let mut frame = FrameBuilder::new(&Header { number: 1, base: 1, ..header }, 64);
+    assert!(frame.push(ChunkKind::Slot, order));
+    pair.vehicle.handle_frame(&frame.finish(&Seal::Crc(MISSION, answer.get()), true), pair.now);
+}
+
+#[test]
+fn an_order_gets_through_after_a_forged_series_ended_its_own() {
+    for access in [Access::Shared, Access::ModemOwned { pool_frames: 8 }, Access::Polled] {
+        let setup = Setup { access, ..Setup::new(64, 10_000, Codec::Context) };
+        let mut pair = LinkedEnds::new(3, setup, CHANNEL);
+        pair.surface.issue(auv(), utility(5), pair.now).unwrap();
+        pair.run(pair.now + Duration::from_secs(40), false);
+        assert_eq!(pair.applied, [utility(5)]);
+
+        let forged = Series::from_random(1);
+        give_forged_order(&mut pair, forged, &VersionedSlot::encode(1, &Slot::Constraints(Constraints::default())));
+        assert_eq!(pair.vehicle.persistent_state().series, Some(forged), "the forged series is in force");
+
+        pair.surface.issue(auv(), utility(77), pair.now).unwrap();
+        let until = pair.now + USUAL_RECOVERY;
+        assert!(recovery(&mut pair, 77, until).is_some(), "{access:?}");
+        assert_eq!(pair.applied.last(), Some(&utility(77)), "{access:?}");
+    }
+}
+
+#[test]
+fn an_order_gets_through_although_a_forged_one_has_the_same_low_bits() {
+    for access in [Access::Shared, Access::ModemOwned { pool_frames: 8 }, Access::Polled] {
+        let setup = Setup { access, ..Setup::new(64, 10_000, Codec::Context) };
+        let mut pair = LinkedEnds::new(5, setup, CHANNEL);
+        pair.run(pair.now + Duration::from_secs(60), false);
+        let series = pair.surface.vehicle(auv()).unwrap().series();
+        // The operator's order will have version 1.
+        give_forged_order(&mut pair, series, &VersionedSlot::encode(0x1701, &utility(-9)));
+        pair.run(pair.now + Duration::from_millis(100), false);
+        assert_eq!(pair.applied, [utility(-9)], "{access:?}");
+
+        pair.surface.issue(auv(), utility(77), pair.now).unwrap();
+        let until = pair.now + Duration::from_secs(120);
+        let is_in_force = |pair: &LinkedEnds| pair.applied.last() == Some(&utility(77));
+        while !is_in_force(&pair) {
+            assert!(pair.now < until, "{access:?}: {:?}", pair.applied);
+            pair.run(pair.now + Duration::from_secs(1), false);
+        }
+        let applied = pair.applied.len();
+        pair.run(pair.now + Duration::from_secs(200), false);
+        assert_eq!(pair.applied.len(), applied, "no order is sent again: {access:?}");
+    }
+}
+
+#[test]
+fn an_order_is_sent_again_once_only_to_a_vehicle_that_keeps_its_own_content() {
+    let mut pair = LinkedEnds::new(8, Setup::new(64, 10_000, Codec::Context), CHANNEL);
+    pair.run(pair.now + Duration::from_secs(60), false);
+    let series = pair.surface.vehicle(auv()).unwrap().series();
+    let own = Budget { bits_per_s: 10_000, shares: Shares::default(), background: BackgroundOrder::default() };
+    pair.surface.issue(auv(), Slot::Budget(Budget { bits_per_s: 9_000, ..own }), pair.now).unwrap();
+    let mut all_series = BTreeSet::from([series]);
+    for _ in 0..6000 {
+        pair.run(pair.now + Duration::from_millis(100), false);
+        if pair.vehicle.budget_bps() != own.bits_per_s {
+            pair.put_in_force(Slot::Budget(own));
+        }
+        all_series.insert(pair.surface.vehicle(auv()).unwrap().series());
+    }
+    assert_eq!((pair.applied.len(), all_series.len()), (2, 2), "{:?}", pair.applied);
+    let view = pair.surface.vehicle(auv()).unwrap();
+    assert_eq!(
+        view.in_force(SlotId::Budget),
+        InForce::Known(&Slot::Budget(own)),
+        "the surface shows the content in force"
+    );
 }

@@ -68,7 +68,7 @@ fn hours_without_an_answer_do_not_make_the_ends_grow() {
         for mute in [[true, false], [false, true], [true, true], [false, false]] {
             let mut pair = LinkedEnds::new(5, Setup { access, ..Setup::new(64, 10_000, Codec::Png) }, ROUGH);
             let mut sizes = Vec::new();
-            for phase in 0..40u8 {
+            for phase in 0..60u8 {
                 pair.vehicle.set_map(flat(20, phase + 1).iter(), pair.now);
                 pair.vehicle.push_object(vec![phase; 700]);
                 pair.surface.issue(auv(), utility(phase as i8), pair.now).unwrap();
@@ -76,10 +76,16 @@ fn hours_without_an_answer_do_not_make_the_ends_grow() {
                 pair.run(pair.now + Duration::from_secs(300), false);
                 sizes.push(pair.size());
             }
-            // The queues fill during the first hour, and then the sizes vary with the losses.
-            let (early, late) = (sizes[10..25].iter().max().unwrap(), sizes[25..].iter().max().unwrap());
-            assert!(*late * 2 < early * 3, "{access:?}, mute {mute:?}: {early} and {late} bytes");
-            assert!(*late < 600_000, "{access:?}, mute {mute:?}: {late} bytes");
+            // The queues fill during the first hours; then the sizes vary with the losses, and jump for a while in a new run.
+            let median = |phases: std::ops::Range<usize>| {
+                let mut sizes = sizes[phases].to_vec();
+                sizes.sort_unstable();
+                sizes[sizes.len() / 2]
+            };
+            let (early, late) = (median(20..40), median(40..60));
+            assert!(late * 2 < early * 3, "{access:?}, mute {mute:?}: {early} and {late} bytes");
+            let most = sizes.iter().max().unwrap();
+            assert!(*most < 600_000, "{access:?}, mute {mute:?}: {most} bytes");
         }
     }
 }

@@ -1,6 +1,7 @@
 //! The directive: the operator's orders to a vehicle, as independent versioned slots.
 
 mod budget;
+mod choices;
 mod constraints;
 mod decision;
 mod fence;
@@ -16,6 +17,7 @@ mod short_decimal;
 mod utility;
 
 pub use budget::Budget;
+pub use choices::{AtEnd, CellBand, Change, PlannerKind};
 pub use constraints::Constraints;
 pub use decision::{SlotReport, SlotState};
 pub use fence::{Fence, FenceFault};
@@ -28,7 +30,7 @@ pub(crate) use outbox::{PendingSlot, SlotOutbox};
 pub use polygon::{Polygon, PolygonFault};
 pub use requests::{ExemplarRequest, ExemplarRequests};
 pub use series::Series;
-pub use settings::{CellBand, Change, PlannerKind, Settings, SettingsFault};
+pub use settings::{Settings, SettingsFault};
 pub use short_decimal::ShortDecimal;
 pub use utility::Utility;
 
@@ -318,6 +320,7 @@ mod tests {
         let figure = Change::To(ShortDecimal::new(0.01).unwrap());
         let settings = Settings {
             planner: Change::To(PlannerKind::Greedy),
+            at_end: Change::To(AtEnd::Hold),
             cells: Change::To(CellBand::CoarseToFine),
             layers: Change::To(LayerMask(u16::MAX)),
             alpha: figure,
@@ -327,7 +330,7 @@ mod tests {
             frames_per_s: figure,
         };
         let bytes = VersionedSlot::encode(1, &Slot::Settings(settings));
-        assert_eq!(bytes.len(), 17);
+        assert_eq!(bytes.len(), 18);
         let back = VersionedSlot::decode(&bytes).map(|slot| slot.content);
         assert_eq!(back, Ok(Some(Slot::Settings(settings))));
     }

@@ -60,6 +60,8 @@ pub struct SlotOutbox {
     received_in: [u64; SLOTS],
     /// Versions to leave out before the next one of each slot.
     skipped: [u16; SLOTS],
+    /// The displaced version of each slot for which a series was left.
+    displaced: [Option<u16>; SLOTS],
 }
 
 impl SlotOutbox {
@@ -70,7 +72,14 @@ impl SlotOutbox {
 
     /// An empty directive; `series` must be drawn at random by a surface that does not know its last orders.
     pub fn new(series: Series) -> Self {
-        Self { series, slots: Default::default(), is_forgotten: false, received_in: [0; SLOTS], skipped: [0; SLOTS] }
+        Self {
+            series,
+            slots: Default::default(),
+            is_forgotten: false,
+            received_in: [0; SLOTS],
+            skipped: [0; SLOTS],
+            displaced: [None; SLOTS],
+        }
     }
 
     /// The series that the versions belong to.
@@ -175,7 +184,7 @@ impl SlotOutbox {
                     self.advance(id, slot.version, OrderStatus::Queued, now, forgotten);
                     continue;
                 }
-                SlotState::Pending => continue,
+                SlotState::Pending | SlotState::SeriesEnded => continue,
                 _ if slot.version as u8 != report.version_low => continue,
                 SlotState::Applied => OrderStatus::Applied,
                 SlotState::Refused(reason) => OrderStatus::Refused(reason),
@@ -189,13 +198,17 @@ impl SlotOutbox {
     }
 
     /// Begins a new series if the report in frame `number` alone, without earlier ones, shows that the vehicle ignores a
-    /// received version: it knows a newer one that was not issued here, from a forged order. A vehicle decides before it
-    /// acknowledges, so the reports after the acknowledgement have the decision. As the number of the acknowledgement may
-    /// be forged, a report long after it has the decision too.
+    /// received version: the series has ended there, or the vehicle knows a newer version that was not issued here, either
+    /// of which takes a forged frame. A vehicle decides before it acknowledges, so the reports after the acknowledgement
+    /// have the decision. As the number of the acknowledgement may be forged, a report long after it has the decision too.
     pub fn leave_overtaken_series(&mut self, report: &[SlotReport; SLOTS], number: u64, now: Instant) {
         let is_overtaken = self.progress().any(|slot| {
             let (report, received_in) = (report.get(slot.id.index()), self.received_in.get(slot.id.index()));
-            let is_other = |r: &SlotReport| r.state != SlotState::Unknown && r.version_low != slot.version as u8;
+            let is_other = |r: &SlotReport| match r.state {
+                SlotState::Unknown => false,
+                SlotState::SeriesEnded => true,
+                _ => r.version_low != slot.version as u8,
+            };
             let is_later = received_in.is_some_and(|&n| n < number) || now.since(slot.changed) >= Self::MAX_DECISION;
             slot.status == OrderStatus::Received && report.is_some_and(is_other) && is_later
         });
@@ -210,6 +223,16 @@ impl SlotOutbox {
             if matches!(slot.status, OrderStatus::OnAir | OrderStatus::Received) {
                 (slot.status, slot.changed, slot.sent) = (OrderStatus::Queued, now, None);
             }
+        }
+    }
+
+    /// Begins a new series, because the latest order of a slot was displaced by one that was not issued here. An order is
+    /// sent again for this reason once only, because a vehicle could report another content for ever.
+    pub fn leave_series_of_displaced(&mut self, id: SlotId, now: Instant) {
+        let version = self.slots.get(id.index()).and_then(Option::as_ref).map(|order| order.version);
+        if self.displaced.get_mut(id.index()).is_some_and(|displaced| std::mem::replace(displaced, version) != version)
+        {
+            self.begin_series(now);
         }
     }
 

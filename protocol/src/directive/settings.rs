@@ -1,112 +1,9 @@
 //! Settings of the vehicle: how it builds its map, which cells and layers it sends, and how it plans its path.
 
-use super::ShortDecimal;
+use super::{AtEnd, CellBand, Change, PlannerKind, ShortDecimal};
 use crate::bytes::{Reader, Truncated};
 use crate::map::{LayerId, LayerMask};
 use std::ops::RangeInclusive;
-
-/// An order about one setting.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Change<T> {
-    /// The setting stays as it is.
-    #[default]
-    Keep,
-    /// The setting returns to the vehicle's configured value.
-    Configured,
-    /// The setting gets this value.
-    To(T),
-}
-
-impl<T: Copy> Change<T> {
-    /// The combination of this order and a later one: the later one, unless it keeps the setting.
-    pub fn then(self, later: Self) -> Self {
-        if matches!(later, Self::Keep) { self } else { later }
-    }
-
-    /// The ordered value; `None` if the configured value is in force.
-    pub fn value(self) -> Option<T> {
-        match self {
-            Self::To(value) => Some(value),
-            Self::Keep | Self::Configured => None,
-        }
-    }
-
-    fn code(self, index: impl FnOnce(T) -> u8) -> u8 {
-        match self {
-            Self::Keep => 0,
-            Self::Configured => 1,
-            Self::To(value) => index(value) + 2,
-        }
-    }
-
-    fn from_code(code: u8, value: impl FnOnce(u8) -> Option<T>) -> Result<Self, Truncated> {
-        match code {
-            0 => Ok(Self::Keep),
-            1 => Ok(Self::Configured),
-            _ => value(code - 2).map(Self::To).ok_or(Truncated),
-        }
-    }
-}
-
-/// The planner that chooses the next waypoints.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum PlannerKind {
-    /// Parallel legs over the whole survey.
-    Lawnmower,
-    /// Always the place with the highest gain for each metre of path.
-    Greedy,
-    /// The best path over the whole remaining distance and time.
-    Horizon,
-}
-
-impl PlannerKind {
-    /// Every planner, in wire order.
-    pub const ALL: [Self; 3] = [Self::Lawnmower, Self::Greedy, Self::Horizon];
-
-    /// Name in files and in the API.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Lawnmower => "lawnmower",
-            Self::Greedy => "greedy",
-            Self::Horizon => "horizon",
-        }
-    }
-
-    /// The planner of that name.
-    pub fn from_name(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|p| p.name() == name)
-    }
-}
-
-/// The cells of the map that a vehicle sends. The cells of its scene model do not change.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum CellBand {
-    /// Every cell of the map, in no order of size.
-    Fine,
-    /// Where the backlog is long, every fourth cell in both directions first; then every cell.
-    CoarseToFine,
-    /// Every fourth cell in both directions. Other cells that the surface already knows stay up to date.
-    Coarse,
-}
-
-impl CellBand {
-    /// Every band, in wire order.
-    pub const ALL: [Self; 3] = [Self::Fine, Self::CoarseToFine, Self::Coarse];
-
-    /// Name in files and in the API.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Fine => "fine",
-            Self::CoarseToFine => "coarse-to-fine",
-            Self::Coarse => "coarse",
-        }
-    }
-
-    /// The band of that name.
-    pub fn from_name(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|band| band.name() == name)
-    }
-}
 
 /// A setting that no vehicle could obey.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -131,6 +28,7 @@ pub struct SettingsFault {
 ///       +---+---+---+---+---+---+---+---+
 /// then 2 bytes, a mask of layers, if layers is 3
 /// then 2 bytes, a [`ShortDecimal`], for each of a, b, g, r, f that is 1
+/// then 1 byte, the end of the survey, unless it stays
 /// ```
 /// * planner: 0 stays, 1 as configured, 2 lawnmower, 3 greedy, 4 horizon.
 /// * cells: 0 stays, 1 as configured, 2 fine, 3 coarse to fine, 4 coarse.
@@ -138,6 +36,7 @@ pub struct SettingsFault {
 ///   is layer 0; 3 only if the mask has other layers than these three.
 /// * a, b, g: alpha, beta, gamma of the scene model; r: words resampled a second of mission time; f: camera frames a
 ///   second that the scene model sees.
+/// * end of the survey: 1 as configured, 2 repeat, 3 explore, 4 hold ([`AtEnd`]).
 ///
 /// ```
 /// use scenecast_protocol::directive::{Change, PlannerKind, Settings, ShortDecimal};
@@ -152,6 +51,8 @@ pub struct SettingsFault {
 pub struct Settings {
     /// The planner that chooses the next waypoints.
     pub planner: Change<PlannerKind>,
+    /// What an adaptive survey does once no look pays any more.
+    pub at_end: Change<AtEnd>,
     /// The cells of the map that it sends.
     pub cells: Change<CellBand>,
     /// The layers that it sends beside the labels.
@@ -178,7 +79,7 @@ impl Settings {
     /// Frames a second that the scene model may see.
     pub const FRAMES_PER_S: RangeInclusive<f64> = 0.01..=30.0;
     /// Most bytes of the payload.
-    pub const MAX_BYTES: usize = 14;
+    pub const MAX_BYTES: usize = 15;
     /// The layers that have a bit in byte 1.
     const SHORT_LAYERS: [(u8, LayerId); 3] =
         [(0x80, LayerId::CONFIDENCE), (0x40, LayerId::DEPTH), (0x20, LayerId::CURIOSITY)];
@@ -188,6 +89,7 @@ impl Settings {
     pub fn then(&self, later: &Self) -> Self {
         Self {
             planner: self.planner.then(later.planner),
+            at_end: self.at_end.then(later.at_end),
             cells: self.cells.then(later.cells),
             layers: self.layers.then(later.layers),
             alpha: self.alpha.then(later.alpha),
@@ -241,6 +143,9 @@ impl Settings {
             out.extend_from_slice(&mask.0.to_be_bytes());
         }
         out.append(&mut numbers);
+        if !matches!(self.at_end, Change::Keep) {
+            out.push(self.at_end.code(|choice| choice as u8));
+        }
         out
     }
 
@@ -262,12 +167,23 @@ impl Settings {
         let (choices, given) = (r.u8()?, r.u8()?);
         let layers = Self::decode_layers(choices & 3, given, r)?;
         let mut figure = |bit: u8| if given & bit != 0 { ShortDecimal::decode(r) } else { Ok(Change::Keep) };
+        let (alpha, beta, gamma) = (figure(0x10)?, figure(0x08)?, figure(0x04)?);
+        let (refine_words_per_s, frames_per_s) = (figure(0x02)?, figure(0x01)?);
+        // The choice that stays is left out.
+        let at_end = match r.rest().is_empty() {
+            true => Change::Keep,
+            false => match r.u8()? {
+                0 => return Err(Truncated),
+                code => Change::from_code(code, |code| AtEnd::ALL.get(usize::from(code)).copied())?,
+            },
+        };
         Ok(Self {
-            alpha: figure(0x10)?,
-            beta: figure(0x08)?,
-            gamma: figure(0x04)?,
-            refine_words_per_s: figure(0x02)?,
-            frames_per_s: figure(0x01)?,
+            alpha,
+            beta,
+            gamma,
+            refine_words_per_s,
+            frames_per_s,
+            at_end,
             planner: Change::from_code(choices >> 5, |code| PlannerKind::ALL.get(usize::from(code)).copied())?,
             cells: Change::from_code(choices >> 2 & 7, |code| CellBand::ALL.get(usize::from(code)).copied())?,
             layers,
@@ -303,19 +219,23 @@ mod tests {
     fn settings() -> impl Strategy<Value = Settings> {
         let choices = (
             change(proptest::sample::select(PlannerKind::ALL.to_vec())),
+            change(proptest::sample::select(AtEnd::ALL.to_vec())),
             change(proptest::sample::select(CellBand::ALL.to_vec())),
             change(prop_oneof![0u16..8, any::<u16>()].prop_map(LayerMask)),
         );
         let figures = (change(figure()), change(figure()), change(figure()), change(figure()), change(figure()));
-        (choices, figures).prop_map(|((planner, cells, layers), (alpha, beta, gamma, refine, frames))| Settings {
-            planner,
-            cells,
-            layers,
-            alpha,
-            beta,
-            gamma,
-            refine_words_per_s: refine,
-            frames_per_s: frames,
+        (choices, figures).prop_map(|((planner, at_end, cells, layers), (alpha, beta, gamma, refine, frames))| {
+            Settings {
+                planner,
+                at_end,
+                cells,
+                layers,
+                alpha,
+                beta,
+                gamma,
+                refine_words_per_s: refine,
+                frames_per_s: frames,
+            }
         })
     }
 
@@ -334,6 +254,8 @@ mod tests {
         assert_eq!(settings.to_bytes(), bytes);
         assert_eq!(Settings::from_bytes(&bytes), Some(settings));
         assert_eq!(Settings::default().to_bytes(), [0, 0]);
+        let of_end = |at_end| Settings { at_end, ..Settings::default() }.to_bytes();
+        assert_eq!((of_end(Change::Configured), of_end(Change::To(AtEnd::Hold))), (vec![0, 0, 1], vec![0, 0, 4]));
         let of_layers = |mask| Settings { layers: Change::To(LayerMask(mask)), ..Settings::default() }.to_bytes();
         assert_eq!(of_layers(0b100), [2, 0x20]);
         assert_eq!(
@@ -378,7 +300,10 @@ mod tests {
         ] {
             assert_eq!(Settings::from_bytes(bytes), None, "{bytes:02X?}");
         }
-        assert_eq!(Settings::from_bytes(&[0, 0, 0]), None);
+        for end in [0, 5, 255] {
+            assert_eq!(Settings::from_bytes(&[0, 0, end]), None, "the end of the survey {end}");
+        }
+        assert_eq!(Settings::from_bytes(&[0, 0, 2, 2]), None);
     }
 
     proptest! {
@@ -390,7 +315,7 @@ mod tests {
         }
 
         #[test]
-        fn any_bytes_are_settings_or_are_refused(bytes in proptest::collection::vec(any::<u8>(), 0..14)) {
+        fn any_bytes_are_settings_or_are_refused(bytes in proptest::collection::vec(any::<u8>(), 0..16)) {
             if let Some(settings) = Settings::from_bytes(&bytes) {
                 prop_assert_eq!(settings.to_bytes(), bytes);
             }

@@ -3,7 +3,7 @@
 
 use super::run::{EndedPeer, Identity, LinkRun};
 use crate::seal::{Direction, SessionKey};
-use crate::wire::{Envelope, Introduction, SessionId};
+use crate::wire::{Envelope, Frame, Introduction, MissionId, SessionId};
 use std::collections::VecDeque;
 
 /// The result of a hello.
@@ -15,7 +15,7 @@ pub enum HandshakeOutcome {
     New,
     /// At the surface: it names another run than the current one, which a numbered frame must prove.
     Offered,
-    /// It names a run that has ended, so it is an old frame.
+    /// It names a run that has ended, so it is an old frame or, without a key, a forged one.
     Retired,
 }
 
@@ -50,8 +50,10 @@ impl FramePurpose {
 pub(super) struct Handshake<T> {
     own: Identity,
     run: Option<LinkRun<T>>,
-    /// The run that a hello has offered, until a numbered frame proves that the peer has accepted it.
-    offered: Option<LinkRun<T>>,
+    /// The runs that hellos have offered, the latest last, until a numbered frame proves that the peer has accepted one: at
+    /// the vehicle at most one. At the surface, the hello of a run that the vehicle does not use may come in late, and must
+    /// not displace the one that it uses.
+    offered: Vec<LinkRun<T>>,
     /// At the vehicle: `run` serves only to receive grants, because this end has begun a new one.
     leaving: bool,
     retired: VecDeque<EndedPeer>,
@@ -61,12 +63,16 @@ pub(super) struct Handshake<T> {
 impl<T> Handshake<T> {
     /// Ended runs that are remembered.
     const MEMORY: usize = 32;
+    /// Offered runs that the surface keeps.
+    const OFFERS: usize = 4;
+    /// Frames without any acknowledgement after which a vehicle doubts that the surface knows its run.
+    const DOUBTFUL: u64 = 128;
 
     /// A handshake that has not begun; `seed` must be random for each start of the program.
     pub(super) fn new(seed: u64) -> Self {
         let mut random = seed;
         let own = fresh(&mut random);
-        Self { own, run: None, offered: None, leaving: false, retired: VecDeque::new(), random }
+        Self { own, run: None, offered: Vec::new(), leaving: false, retired: VecDeque::new(), random }
     }
 
     pub(super) fn own(&self) -> Identity {
@@ -81,30 +87,61 @@ impl<T> Handshake<T> {
         self.run.as_mut()
     }
 
+    /// The run of the latest offer.
     pub(super) fn offered(&self) -> Option<&LinkRun<T>> {
-        self.offered.as_ref()
+        self.offered.last()
+    }
+
+    /// The offered run in which the next proof goes out: the one with the fewest, the latest of several.
+    pub(super) fn provable(&self) -> Option<&LinkRun<T>> {
+        self.offered.iter().rev().filter(|r| !r.flight.is_full()).min_by_key(|r| r.flight.next_number())
+    }
+
+    /// The number of proofs that were written in all offered runs.
+    pub(super) fn proofs(&self) -> u64 {
+        self.offered.iter().map(|r| r.flight.next_number() - 1).sum()
+    }
+
+    /// The frame, if it is sealed in an offered run, and the index of that run.
+    pub(super) fn open_offered<'a>(
+        &self,
+        envelope: &Envelope<'a>,
+        mission: MissionId,
+        direction: Direction,
+        keyed: bool,
+    ) -> Option<(usize, Frame<'a>)> {
+        let mut opened = self.offered.iter().map(|r| r.open(envelope, mission, direction, keyed));
+        let index = opened.clone().position(|frame| frame.is_some())?;
+        opened.nth(index).flatten().map(|frame| (index, frame))
     }
 
     pub(super) fn is_leaving(&self) -> bool {
         self.leaving
     }
 
-    /// At the vehicle: handles a hello of the surface. A new run of the surface is offered a new run of ours.
+    /// At the vehicle: handles a hello of the surface. A new run of the surface is offered a new run of ours, and so is one
+    /// that has ended here if `accepts_ended`, and the current one if it has acknowledged none of many frames of ours: it
+    /// may have taken us for another run. A hello of another version has no introduction that can be read.
     pub(super) fn handle_call(
         &mut self,
         peer: Identity,
-        introduction: Introduction,
+        introduction: Option<Introduction>,
+        accepts_ended: bool,
         key: impl Fn(Identity, Identity) -> Option<SessionKey>,
     ) -> HandshakeOutcome {
-        if self.run.as_ref().is_some_and(|r| r.peer == peer) && !self.leaving {
+        let is_doubtful = |r: &LinkRun<T>| r.flight.horizon() == 0 && r.flight.next_number() > Self::DOUBTFUL;
+        if self.run.as_ref().is_some_and(|r| r.peer == peer && !is_doubtful(r)) && !self.leaving {
             return HandshakeOutcome::Known;
         }
-        if self.is_retired(peer) {
+        if self.is_retired(peer) && !accepts_ended {
             return HandshakeOutcome::Retired;
         }
-        if self.offered.as_ref().is_none_or(|r| r.peer != peer) {
-            let own = fresh(&mut self.random);
-            self.offered = Some(LinkRun::new(own, peer, introduction, key(own, peer)));
+        match self.offered.last_mut().filter(|r| r.peer == peer) {
+            Some(run) => run.introduce(introduction),
+            None => {
+                let own = fresh(&mut self.random);
+                self.offered = vec![LinkRun::of_any_version(own, peer, introduction, key(own, peer))];
+            }
         }
         HandshakeOutcome::New
     }
@@ -113,19 +150,22 @@ impl<T> Handshake<T> {
     pub(super) fn run_for(&mut self, purpose: FramePurpose) -> Option<&mut LinkRun<T>> {
         match purpose {
             FramePurpose::Hello => None,
-            FramePurpose::Proof => self.offered.as_mut(),
+            FramePurpose::Proof => {
+                let peer = self.provable().map(|r| r.peer);
+                self.offered.iter_mut().find(|r| Some(r.peer) == peer)
+            }
             FramePurpose::Content => self.run.as_mut(),
         }
     }
 
     /// At the surface: a frame of the current run came in, so the vehicle uses no other.
     pub(super) fn refuse_offered(&mut self) {
-        self.offered = None;
+        self.offered.clear();
     }
 
-    /// Makes the offered run the current one, because a numbered frame of it came in.
-    pub(super) fn accept_offered(&mut self) {
-        if let Some(run) = self.offered.take() {
+    /// Makes an offered run the current one, because a numbered frame of it came in.
+    pub(super) fn accept_offered(&mut self, index: usize) {
+        if let Some(run) = std::mem::take(&mut self.offered).into_iter().nth(index) {
             self.own = run.own;
             self.leaving = false;
             self.replace(run);
@@ -150,9 +190,12 @@ impl<T> Handshake<T> {
             self.run = Some(new());
             return HandshakeOutcome::New;
         }
-        if self.offered.as_ref().is_none_or(|r| r.peer != peer || r.flight.is_full()) {
-            self.offered = Some(new());
+        let known = self.offered.iter().position(|r| r.peer == peer).map(|index| self.offered.remove(index));
+        let offer = known.filter(|r| !r.flight.is_full()).unwrap_or_else(new);
+        if self.offered.len() == Self::OFFERS {
+            self.offered.remove(0);
         }
+        self.offered.push(offer);
         HandshakeOutcome::Offered
     }
 
@@ -160,14 +203,14 @@ impl<T> Handshake<T> {
     pub(super) fn renew_vehicle(&mut self, key: impl Fn(Identity, Identity) -> Option<SessionKey>) {
         let Some((peer, introduction)) = self.run.as_ref().map(|r| (r.peer, r.introduction)) else { return };
         let own = fresh(&mut self.random);
-        self.offered = Some(LinkRun::new(own, peer, introduction, key(own, peer)));
+        self.offered = vec![LinkRun::new(own, peer, introduction, key(own, peer))];
         self.leaving = true;
     }
 
     /// At the surface: begins a new run, which a new handshake must introduce to the vehicle.
     pub(super) fn renew_surface(&mut self) {
         self.own = fresh(&mut self.random);
-        self.offered = None;
+        self.offered.clear();
         if let Some(old) = self.run.take() {
             self.retire(old);
         }

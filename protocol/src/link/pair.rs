@@ -27,6 +27,8 @@ pub struct LinkPair<T> {
     owes_hello: bool,
     /// Consecutive frames that seem to come from another run of the peer.
     strays: u32,
+    /// At the vehicle: hellos of ended runs of the surface since the last frame that was accepted.
+    ended_hellos: u32,
     /// Counters and estimates of this link.
     pub stats: LinkStats,
 }
@@ -34,6 +36,8 @@ pub struct LinkPair<T> {
 impl<T> LinkPair<T> {
     /// Strays after which the two ends are taken to have lost each other's runs.
     const STRAYS: u32 = 3;
+    /// Hellos of an ended run, with no accepted frame between them, after which a forged frame seems to have ended it.
+    const ENDED_HELLOS: u32 = 2;
 
     /// A pair without contact; `seed` must be random for each start of the program.
     pub fn new(
@@ -45,7 +49,19 @@ impl<T> LinkPair<T> {
         seed: u64,
     ) -> Self {
         let (handshake, mismatch, stats) = (Handshake::new(seed), MismatchReport::default(), LinkStats::default());
-        Self { mission, us, peer, authenticity, introduction, handshake, mismatch, owes_hello: false, strays: 0, stats }
+        Self {
+            mission,
+            us,
+            peer,
+            authenticity,
+            introduction,
+            handshake,
+            mismatch,
+            owes_hello: false,
+            strays: 0,
+            ended_hellos: 0,
+            stats,
+        }
     }
 
     /// The introduction of the peer's current run.
@@ -85,12 +101,12 @@ impl<T> LinkPair<T> {
 
     /// At the surface: whether the vehicle has offered another run than the current one, so that a proof is to be sent.
     pub fn has_offer(&self) -> bool {
-        self.us == Address::SURFACE && self.handshake.offered().is_some_and(|r| !r.flight.is_full())
+        self.us == Address::SURFACE && self.handshake.provable().is_some()
     }
 
-    /// The number of proofs that were written in the offered run.
+    /// The number of proofs that were written in all offered runs.
     pub fn proofs(&self) -> u64 {
-        self.handshake.offered().map_or(0, |r| r.flight.next_number() - 1)
+        self.handshake.proofs()
     }
 
     /// Whether a numbered frame has shown that the peer uses the current run.
@@ -287,6 +303,7 @@ fn session_key(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::link::DropReason;
     use crate::seal::MissionKey;
     use crate::wire::Envelope;
     use std::sync::Arc;
@@ -327,5 +344,70 @@ mod tests {
             }
         }
         assert!(delivered > 139_000, "{delivered}");
+    }
+
+    fn sent(from: &mut LinkPair<u64>, purpose: FramePurpose) -> Vec<u8> {
+        let builder = from.begin_frame(64, 20, None, None, purpose);
+        from.finish_frame(builder, 0, purpose, true)
+    }
+
+    fn received(to: &mut LinkPair<u64>, bytes: &[u8]) -> Result<(), DropReason> {
+        let us = to.us;
+        let envelope = Envelope::decode(bytes, |a| a == us).unwrap();
+        to.handle_frame(&envelope, |_, _| true).map(drop)
+    }
+
+    #[test]
+    fn a_late_hello_of_the_vehicle_does_not_displace_the_run_that_it_uses() {
+        let key = Arc::new(MissionKey::from_bytes([9; 16]));
+        let authenticity = Some(Authenticity { key, all: true, encrypt: false });
+        let auv = Address::vehicle(3).unwrap();
+        let introduction = Introduction { series: Some(Series::from_random(1)), ..Introduction::default() };
+        let end = |us, peer, seed| LinkPair::new(MissionId(1), us, peer, authenticity.clone(), introduction, seed);
+        let mut surface = end(Address::SURFACE, auv, 1);
+        let mut before = end(auv, Address::SURFACE, 2);
+        let replayed = sent(&mut end(Address::SURFACE, auv, 4), FramePurpose::Hello);
+        let hello = sent(&mut surface, FramePurpose::Hello);
+        received(&mut before, &hello).unwrap();
+        received(&mut surface, &sent(&mut before, FramePurpose::Hello)).unwrap();
+        received(&mut before, &sent(&mut surface, FramePurpose::Content)).unwrap();
+        received(&mut surface, &sent(&mut before, FramePurpose::Content)).unwrap();
+
+        // The vehicle restarts. Its first answer comes late; a replayed hello makes it forget the run of that answer.
+        let mut vehicle = end(auv, Address::SURFACE, 3);
+        received(&mut vehicle, &hello).unwrap();
+        let late = sent(&mut vehicle, FramePurpose::Hello);
+        received(&mut vehicle, &replayed).unwrap();
+        received(&mut vehicle, &hello).unwrap();
+        received(&mut surface, &sent(&mut vehicle, FramePurpose::Hello)).unwrap();
+        received(&mut vehicle, &sent(&mut surface, FramePurpose::Proof)).unwrap();
+        received(&mut surface, &late).unwrap();
+        received(&mut surface, &sent(&mut vehicle, FramePurpose::Content)).unwrap();
+        assert!(surface.is_proven() && surface.highest() == 1);
+    }
+
+    #[test]
+    fn a_forged_hello_of_another_version_leaves_the_series_of_the_true_one() {
+        let auv = Address::vehicle(3).unwrap();
+        let introduction = Introduction { series: Some(Series::from_random(1)), ..Introduction::default() };
+        for is_first in [true, false] {
+            let end = |us, peer, seed| LinkPair::new(MissionId(1), us, peer, None, introduction, seed);
+            let (mut surface, mut vehicle) = (end(Address::SURFACE, auv, 1), end(auv, Address::SURFACE, 2));
+            let hello = sent(&mut surface, FramePurpose::Hello);
+            // Its first three bits are the version, and its last three bytes the CRC over mission, session and frame.
+            let mut other = hello[..hello.len() - 3].to_vec();
+            other[0] = 7 << 5 | other[0] & 31;
+            let crc = crc::Crc::<u32>::new(&crc::CRC_24_OPENPGP);
+            let sealed = [&MissionId(1).0.to_be_bytes()[..], &[0, 0], &other].concat();
+            other.extend_from_slice(&crc.checksum(&sealed).to_be_bytes()[1..]);
+            let mut hellos = [other, hello];
+            if !is_first {
+                hellos.reverse();
+            }
+            hellos.iter().for_each(|bytes| received(&mut vehicle, bytes).unwrap());
+            received(&mut surface, &sent(&mut vehicle, FramePurpose::Hello)).unwrap();
+            received(&mut vehicle, &sent(&mut surface, FramePurpose::Content)).unwrap();
+            assert_eq!(vehicle.peer_introduction().unwrap().series, introduction.series);
+        }
     }
 }

@@ -56,6 +56,8 @@ pub(super) struct LinkRun<T> {
     pub(super) peer: Identity,
     /// The introduction in the peer's hello.
     pub(super) introduction: Introduction,
+    /// Whether the hello had this version of the wire. Without, no frame of the run is read.
+    is_readable: bool,
     pub(super) key: Option<SessionKey>,
     pub(super) flight: Flight<T>,
     pub(super) window: LinkWindow,
@@ -63,7 +65,26 @@ pub(super) struct LinkRun<T> {
 
 impl<T> LinkRun<T> {
     pub(super) fn new(own: Identity, peer: Identity, introduction: Introduction, key: Option<SessionKey>) -> Self {
-        Self { own, peer, introduction, key, flight: Flight::default(), window: LinkWindow::default() }
+        let (flight, window) = (Flight::default(), LinkWindow::default());
+        Self { own, peer, introduction, is_readable: true, key, flight, window }
+    }
+
+    /// A run of which the hello may have another version of the wire, so that its introduction is not known.
+    pub(super) fn of_any_version(
+        own: Identity,
+        peer: Identity,
+        introduction: Option<Introduction>,
+        key: Option<SessionKey>,
+    ) -> Self {
+        let is_readable = introduction.is_some();
+        Self { is_readable, ..Self::new(own, peer, introduction.unwrap_or_default(), key) }
+    }
+
+    /// Takes the introduction of another hello of this run, if none was read before.
+    pub(super) fn introduce(&mut self, introduction: Option<Introduction>) {
+        if let Some(introduction) = introduction.filter(|_| !self.is_readable) {
+            (self.introduction, self.is_readable) = (introduction, true);
+        }
     }
 
     pub(super) fn end(self) -> EndedPeer {
@@ -78,7 +99,7 @@ impl<T> LinkRun<T> {
         direction: Direction,
         keyed: bool,
     ) -> Option<Frame<'a>> {
-        if envelope.header.session != self.peer.session {
+        if envelope.header.session != self.peer.session || !self.is_readable {
             return None;
         }
         match self.key.as_ref().filter(|_| keyed) {

@@ -59,9 +59,13 @@ impl SlotInbox {
         self.reports
     }
 
-    /// Whether a version of a series is new; if so, it counts as received from now on.
+    /// Whether a version of a series is new; if so, it counts as received from now on. A version of a series that has
+    /// ended is not, and the report names it.
     pub fn admit(&mut self, series: Series, slot: &VersionedSlot) -> bool {
         if self.state.retired.contains(&series) {
+            if let Some(report) = self.reports.get_mut(slot.id.index()) {
+                *report = SlotReport { version_low: slot.version as u8, state: SlotState::SeriesEnded };
+            }
             return false;
         }
         if self.state.series != Some(series) {
@@ -127,6 +131,18 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn the_report_names_a_version_of_a_series_that_has_ended() {
+        let (mut inbox, [ended, present]) = (SlotInbox::default(), [1, 2].map(Series::from_random));
+        assert!(inbox.admit(ended, &slot(3)) && inbox.admit(present, &slot(1)));
+        inbox.decide(SlotId::Utility, SlotState::Applied);
+        assert!(!inbox.admit(ended, &slot(4)));
+        let named = SlotReport { version_low: 4, state: SlotState::SeriesEnded };
+        assert_eq!(inbox.reports()[SlotId::Utility.index()], named);
+        let after = SlotInbox::restore(inbox.state().clone()).reports()[SlotId::Utility.index()];
+        assert_eq!(after, SlotReport { version_low: 1, state: SlotState::Applied }, "the decision is kept");
     }
 
     #[test]

@@ -21,13 +21,17 @@ pub enum ChunkKind {
     InForce,
     /// The digests of the content in force that the surface holds, as a request for the rest.
     Inquiry,
+    /// The corners of the track before a pose.
+    Trail,
+    /// The purpose of the plan of a pose.
+    Intent,
 }
 
 /// The code after which the first byte of the payload names the kind.
 const EXTENDED: u8 = 7;
 
 impl ChunkKind {
-    const ALL: [Self; 9] = [
+    const ALL: [Self; 11] = [
         Self::Map,
         Self::Pose,
         Self::Slot,
@@ -37,6 +41,8 @@ impl ChunkKind {
         Self::Introduction,
         Self::InForce,
         Self::Inquiry,
+        Self::Trail,
+        Self::Intent,
     ];
 
     /// The code in the header of the chunk, and the byte that begins the payload of an extended kind.
@@ -51,6 +57,8 @@ impl ChunkKind {
             Self::Introduction => (EXTENDED, Some(0)),
             Self::InForce => (EXTENDED, Some(1)),
             Self::Inquiry => (EXTENDED, Some(2)),
+            Self::Trail => (EXTENDED, Some(3)),
+            Self::Intent => (EXTENDED, Some(4)),
         }
     }
 }
@@ -63,7 +71,7 @@ impl ChunkKind {
 /// |kind | length  | [more length]  | payload   |
 /// +-----+---------+----------------+-----------+
 /// kind     0 end of the frame's content, 1 map, 2 pose, 3 slot, 4 object, 5 report, 6 layer;
-///          7 extended: the first byte of the payload is 0 introduction, 1 content in force, 2 inquiry; any other value,
+///          7 extended: the first byte of the payload is 0 introduction, 1 content in force, 2 inquiry, 3 trail, 4 intent; any other value,
 ///          or no payload: skipped
 /// length   0..26 bytes of payload; 27..30: 27 + 256 x (length - 27) + next byte; 31: to the end of the frame
 /// ```

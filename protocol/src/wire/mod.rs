@@ -8,12 +8,14 @@ mod chunk;
 mod disk;
 mod frame;
 mod header;
+mod intent;
 mod introduction;
 mod number;
 mod path;
 mod placement;
 mod stamp;
 mod status;
+mod trail;
 
 pub use crate::bytes::{Reader, Truncated};
 pub use ack::{AckStatement, MAX_WINDOW};
@@ -23,12 +25,14 @@ pub use chunk::{Chunk, ChunkKind, Chunks};
 pub use disk::DiskReport;
 pub use frame::{Envelope, Frame, FrameBuilder, FrameError, Seal};
 pub use header::{Address, FrameKind, Header, MissionId, SessionId};
+pub use intent::Intent;
 pub use introduction::{CellEdge, Introduction};
 pub use number::unwrap_number;
 pub use path::PlannedPath;
 pub use placement::Placement;
 pub use stamp::Stamp;
 pub use status::{ModeReason, StatusError, VehicleMode, VehicleStatus};
+pub use trail::{Trail, TrailCorner};
 
 /// The version of the wire format. Of another version only hellos are read, so that both ends can name the difference.
 pub const WIRE_VERSION: u8 = 3;

@@ -2,8 +2,10 @@
 
 use super::backlog::Backlog;
 use super::disk::DiskReport;
+use super::intent::Intent;
 use super::path::PlannedPath;
 use super::placement::Placement;
+use super::trail::TrailCorner;
 use crate::bytes::{Reader, Truncated, decimetres, put24};
 use crate::coordinates::MapPoint;
 use crate::directive::{InForceSummary, SLOTS, SlotId, SlotReport, SlotState};
@@ -148,6 +150,10 @@ pub struct VehicleStatus {
     pub waypoint: Option<MapPoint>,
     /// The planned path after the waypoint; it is sent only with a waypoint.
     pub path: PlannedPath,
+    /// The purpose of the plan, a chunk of its own; `None` if no adaptive planner steers.
+    pub intent: Option<Intent>,
+    /// The corners of the track before the position, the latest first; they are a chunk of their own, see [`super::Trail`].
+    pub trail: Vec<TrailCorner>,
     /// Number of explored cells on the map.
     pub explored_cells: u32,
     /// The epoch of the label ids.
@@ -282,7 +288,7 @@ impl VehicleStatus {
         (out, 0)
     }
 
-    /// Decodes a pose into `self`; the fields of the report stay unchanged.
+    /// Decodes a pose into `self`, without a trail and an intent; the fields of the report stay unchanged.
     pub fn read_pose(&mut self, bytes: &[u8]) -> Result<(), StatusError> {
         let mut r = Reader::new(bytes);
         let head = r.u8()?;
@@ -295,6 +301,7 @@ impl VehicleStatus {
         read.fix_age_s = Some(r.u8()?).filter(|&age| age != 255).map(f64::from);
         read.explored_cells = r.u24()?;
         (read.waypoint, read.path) = (None, PlannedPath::default());
+        (read.trail, read.intent) = (Vec::new(), None);
         read.autopilot_silent = head & 0b1000 != 0;
         if head & 0b1_0000 != 0 {
             let waypoint = take_point(&mut r)?;

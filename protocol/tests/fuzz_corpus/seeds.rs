@@ -85,6 +85,8 @@ fn contents() -> Vec<Seed> {
         for (kind, payload) in chunks(&body) {
             let framed = [&[payload.len() as u8], &payload[..]].concat();
             match kind {
+                ChunkKind::Intent => seeds.push(("status", format!("intent-{i}"), payload)),
+                ChunkKind::Trail => seeds.push(("status", format!("trail-{i}"), payload)),
                 ChunkKind::Pose => seeds.push(("status", format!("pose-{i}"), payload)),
                 ChunkKind::Report => seeds.push(("status", format!("report-{i}"), payload)),
                 ChunkKind::Slot => seeds.push(("slot", format!("slot-{i}"), framed)),
@@ -234,6 +236,8 @@ fn golden() -> Vec<Seed> {
         seed("layer_chunk", "unknown", vec![14, 0x07, 0xF0, 0x40]),
         seed("layer_chunk", "first-part", vec![0x80, 0xBE, 0xEF, 0, 0x44, 0, 0xFE, 0, 0, 0, 5, 0xFF]),
         seed("layer_chunk", "last-part", vec![0x80, 0xBE, 0xEF, 0x8E, b'e', b'p', b't', b'h', b'm']),
+        seed("status", "golden-intent", vec![2, 5]),
+        seed("status", "golden-trail", vec![0x25, 0x09, 0x3B, 0x20, 0xC8, 0x80]),
         seed("status", "golden-pose", vec![0x20, 0, 0, 15, 0xFF, 0xFF, 0xFF, 0, 180, 64, 5, 8, 0, 0x0F, 0xA0]),
         seed(
             "status",

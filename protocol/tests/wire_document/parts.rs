@@ -4,7 +4,7 @@ use crate::document::{assert_same, pairs, rows, section};
 use crate::samples::{MISSION, auv, clock, frame, header, hold, place, status, vehicle_stamp};
 use scenecast_protocol::coordinates::{MapPoint, WorldPoint};
 use scenecast_protocol::directive::{
-    Band, Budget, CellBand, Change, Constraints, ExemplarRequest, ExemplarRequests, Fence, Fix, InForceDigests,
+    AtEnd, Band, Budget, CellBand, Change, Constraints, ExemplarRequest, ExemplarRequests, Fence, Fix, InForceDigests,
     InForcePart, Limits, PlannerKind, Polygon, Reaction, Settings, ShortDecimal, Slot, SlotId, Utility, VersionedSlot,
 };
 use scenecast_protocol::map::{
@@ -13,8 +13,8 @@ use scenecast_protocol::map::{
 use scenecast_protocol::map_codec;
 use scenecast_protocol::schedule::{BackgroundOrder, BackgroundStream, Shares};
 use scenecast_protocol::wire::{
-    AckStatement, Address, ChunkKind, DiskReport, Header, Placement, PlannedPath, Reader, Seal, Stamp, VehicleStatus,
-    unwrap_number,
+    AckStatement, Address, ChunkKind, DiskReport, Header, Intent, Placement, PlannedPath, Reader, Seal, Stamp, Trail,
+    TrailCorner, VehicleStatus, unwrap_number,
 };
 use std::collections::BTreeMap;
 
@@ -134,6 +134,8 @@ fn status_chunks() -> Rows {
         assert_eq!(VehicleStatus::default().read_pose(&bytes), Ok(()));
         bytes
     };
+    let corner = |ago_s, x_m, y_m| TrailCorner { ago_s, place: MapPoint::new(x_m, y_m) };
+    let trail = Trail::new(MapPoint::new(1.0, -2.0), &[corner(9, 2.4, -3.4), corner(12, -0.6, -3.4)], 99).unwrap();
     vec![
         (
             "pose: hold by order, x 1.5 m, y -0.1 m, depth 18 m, heading 90 degrees, sigma 1.25 m, fix 8 s ago, 4000 cells",
@@ -149,6 +151,8 @@ fn status_chunks() -> Rows {
             "the first pose with an autopilot that does not answer",
             VehicleStatus { autopilot_silent: true, ..status() }.encode_pose(99),
         ),
+        ("intent: more of label 5", Intent::Label(5).encode()),
+        ("trail to (1, -2) m: 9 s ago at (2.4, -3.4), 12 s ago at (-0.6, -3.4)", trail.encode()),
         (
             "report: epoch 1, 9 labels, digest BEEF, budget 10 000 bit/s (2500 x 2^2), 3 frames refused, 448 bytes of labels (14 x 2^5) \
              and 15 of all else wait, utility version 7 applied, fix version 2 refused (2)",
@@ -287,6 +291,10 @@ fn settings_and_budgets() -> Rows {
         (
             "slot: version 2, settings: layers 2 and 15 alone",
             slot(2, Slot::Settings(Settings { layers: Change::To(LayerMask(0x8004)), ..Settings::default() })),
+        ),
+        (
+            "slot: version 2, settings: at the end of the survey hold",
+            slot(2, Slot::Settings(Settings { at_end: Change::To(AtEnd::Hold), ..Settings::default() })),
         ),
     ]
 }

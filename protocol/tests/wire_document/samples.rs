@@ -84,6 +84,8 @@ pub(crate) fn status() -> VehicleStatus {
         fix_age_s: Some(8.0),
         waypoint: None,
         path: PlannedPath::default(),
+        intent: None,
+        trail: Vec::new(),
         explored_cells: 4000,
         epoch: 1,
         labels: 9,

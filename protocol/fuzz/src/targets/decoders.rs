@@ -9,8 +9,8 @@ use scenecast_protocol::object::{MAX_OBJECT, ObjectReceiver, Part, Received};
 use scenecast_protocol::seal::{Direction, MissionKey};
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::{
-    AckStatement, Address, Envelope, Frame, FrameBuilder, FrameKind, Header, Introduction, MAX_WINDOW, MissionId,
-    Reader, Seal, SessionId, Stamp, VehicleStatus,
+    AckStatement, Address, Envelope, Frame, FrameBuilder, FrameKind, Header, Intent, Introduction, MAX_WINDOW,
+    MissionId, Reader, Seal, SessionId, Stamp, Trail, VehicleStatus,
 };
 use std::time::Duration;
 
@@ -146,6 +146,12 @@ pub fn introduction(data: &[u8]) {
 
 /// A decoded pose or report can be encoded and reads the same.
 pub fn status(data: &[u8]) {
+    if let Ok(trail) = Trail::decode(data) {
+        assert_eq!(trail.encode(), data);
+    }
+    if let Ok(intent) = Intent::decode(data) {
+        assert_eq!(intent.encode(), data);
+    }
     let (mut pose, mut report) = (VehicleStatus::default(), VehicleStatus::default());
     if pose.read_pose(data).is_ok() {
         assert_eq!(pose.encode_pose(usize::MAX), data);

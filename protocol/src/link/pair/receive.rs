@@ -71,26 +71,33 @@ impl<T> LinkPair<T> {
         let Some(frame) = frame else { return Err(self.refuse(envelope, session)) };
         let introduction = if envelope.version == WIRE_VERSION {
             let introduction = introduction_of(&frame).filter(|i| own.is_some() || i.series.is_some());
-            introduction.ok_or(DropReason::Malformed)?
+            Some(introduction.ok_or(DropReason::Malformed)?)
         } else {
             self.mismatch.note(Mismatch::Version(envelope.version));
             if own.is_some() {
                 return Err(DropReason::Version);
             }
-            // The answer to it names our version. No numbered frame of such a run is ever read.
-            Introduction::default()
+            // The answer to it names our version.
+            None
         };
         let peer = Identity { session: header.session, nonce: header.nonce.unwrap_or_default() };
         let key = session_key(self.authenticity.clone(), self.mission, self.us, self.peer);
         let outcome = match own {
-            Some(_) => self.handshake.handle_answer(peer, introduction, key),
-            None => self.handshake.handle_call(peer, introduction, key),
+            Some(_) => self.handshake.handle_answer(peer, introduction.unwrap_or_default(), key),
+            None => {
+                // Without a key, a forged frame may have ended the run. If the hello is old indeed, it has no effect: no frame
+                // of that run is sealed to the run that it is offered.
+                let accepts_ended = self.authenticity.is_none() && self.ended_hellos + 1 >= Self::ENDED_HELLOS;
+                self.handshake.handle_call(peer, introduction, accepts_ended, key)
+            }
         };
         if outcome == HandshakeOutcome::Retired {
+            self.ended_hellos += 1;
             // Where frames of the vehicle have no tag, a forged one may have proven a false run.
             self.strays += u32::from(own.is_some() && !self.is_keyed(self.direction_in()));
             return Err(DropReason::OldSession);
         }
+        self.ended_hellos = 0;
         let is_new = outcome == HandshakeOutcome::New;
         self.owes_hello = is_new && own.is_none();
         let restarted = is_new && own.is_some();
@@ -108,7 +115,7 @@ impl<T> LinkPair<T> {
     ) -> Result<Inbound<'a, T>, DropReason> {
         let (mission, direction) = (self.mission, self.direction_in());
         let keyed = self.is_keyed(direction);
-        let offered = self.handshake.offered().and_then(|r| r.open(envelope, mission, direction, keyed));
+        let (offer, offered) = self.handshake.open_offered(envelope, mission, direction, keyed).unzip();
         let restarted = offered.is_some();
         let known = || self.handshake.run().and_then(|r| r.open(envelope, mission, direction, keyed));
         let Some(frame) = offered.or_else(known) else {
@@ -129,8 +136,9 @@ impl<T> LinkPair<T> {
             return Err(DropReason::Undecodable);
         }
         self.mismatch.handle_accepted();
-        if restarted {
-            self.handshake.accept_offered();
+        self.ended_hellos = 0;
+        if let Some(index) = offer {
+            self.handshake.accept_offered(index);
             self.stats.peer_restarts += 1;
         }
         self.owes_hello = self.handshake.is_leaving();

@@ -3,7 +3,7 @@
 use super::content::Carried;
 use super::discovery::CallReply;
 use super::{VehicleEvent, VehicleLink};
-use crate::directive::{InForceDigests, Slot, VersionedSlot};
+use crate::directive::{InForceDigests, Slot, SlotState, VersionedSlot};
 use crate::link::DropReason;
 use crate::mac::{Access, Grant};
 use crate::map::StateSource;
@@ -133,6 +133,10 @@ impl<S: StateSource> VehicleLink<S> {
             return self.pair.stats.drop(DropReason::Malformed);
         };
         if !self.inbox.admit(series, &slot) {
+            if self.inbox.reports().get(slot.id.index()).is_some_and(|r| r.state == SlotState::SeriesEnded) {
+                // A forged hello may have ended the surface's series, which begins another one when it knows.
+                self.content.status.owe_report_by(now + Duration::from_secs(5));
+            }
             return;
         }
         if let Some(window) = self.pair.window_mut() {

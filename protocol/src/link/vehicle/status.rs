@@ -1,7 +1,7 @@
 //! The vehicle's status: when its two chunks, pose and report, are due, and how much of a frame they take.
 
 use crate::time::Instant;
-use crate::wire::{ChunkKind, FrameBuilder, VehicleStatus, room_for_payload};
+use crate::wire::{ChunkKind, FrameBuilder, Intent, Trail, TrailCorner, VehicleStatus, room_for_payload};
 use std::time::Duration;
 
 /// Sends the latest status at most once a period, and with at most a tenth of the bit budget.
@@ -11,13 +11,16 @@ pub(super) struct StatusSender {
     status: Option<VehicleStatus>,
     pose_due: Instant,
     report_due: Instant,
+    /// When the last three poses were sent, the earliest first: a trail begins with the first of them, so that the surface
+    /// knows the track if two frames in a row are lost.
+    sent: [Option<Instant>; 3],
     /// Slot with which the next report begins: a report that does not fit into a frame continues in the next.
     report_from: usize,
 }
 
 impl StatusSender {
     pub(super) fn new(period: Duration, now: Instant) -> Self {
-        Self { period, status: None, pose_due: now, report_due: now, report_from: 0 }
+        Self { period, status: None, pose_due: now, report_due: now, sent: [None; 3], report_from: 0 }
     }
 
     pub(super) fn set(&mut self, status: VehicleStatus) {
@@ -75,16 +78,44 @@ impl StatusSender {
     pub(super) fn fill_pose(&mut self, builder: &mut FrameBuilder, now: Instant) -> Option<usize> {
         let status = self.status.as_ref().filter(|_| now >= self.pose_due)?;
         let period = self.period.max(ten_times_airtime(status, VehicleStatus::POSE));
-        // The path may take a hundredth of the budget.
-        let path = (period.as_secs_f64() * f64::from(status.budget_bps) / 800.0) as usize;
-        let room = room_for_payload(builder.room()).min(VehicleStatus::POSE.saturating_add(path));
+        // The path and the trail may take a hundredth of the budget each.
+        let share = (period.as_secs_f64() * f64::from(status.budget_bps) / 800.0) as usize;
+        let mut length = 0;
+        if let Some(bytes) = status.intent.map(Intent::encode)
+            && bytes.len() <= room_before_pose(builder.room())
+            && builder.push(ChunkKind::Intent, &bytes)
+        {
+            length += bytes.len();
+        }
+        if let Some(bytes) = self.trail(status, share.min(room_before_pose(builder.room())), now)
+            && builder.push(ChunkKind::Trail, &bytes)
+        {
+            length += bytes.len();
+        }
+        let room = room_for_payload(builder.room()).min(VehicleStatus::POSE.saturating_add(share));
         let bytes = status.encode_pose(room);
         if !builder.push(ChunkKind::Pose, &bytes) {
             return None;
         }
+        length += bytes.len();
         self.pose_due = now + self.period.max(ten_times_airtime(status, bytes.len().min(VehicleStatus::POSE)));
-        Some(bytes.len())
+        self.sent = [self.sent[1], self.sent[2], Some(now)];
+        Some(length)
     }
+
+    /// The trail before a pose, in at most `room` bytes.
+    fn trail(&self, status: &VehicleStatus, room: usize, now: Instant) -> Option<Vec<u8>> {
+        let is_new = |corner: &&TrailCorner| {
+            self.sent[0].is_none_or(|since| f64::from(corner.ago_s) <= now.since(since).as_secs_f64())
+        };
+        let corners: Vec<TrailCorner> = status.trail.iter().take_while(is_new).copied().collect();
+        Trail::new(status.position, &corners, room).map(|trail| trail.encode())
+    }
+}
+
+/// The longest payload of a chunk before a pose that leaves room for the pose. The headers of both take up to five bytes.
+fn room_before_pose(room: usize) -> usize {
+    room.saturating_sub(VehicleStatus::POSE + 5)
 }
 
 /// The period in which `bytes`, sent twice, take a tenth of the budget.

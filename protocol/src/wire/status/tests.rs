@@ -21,6 +21,8 @@ fn golden_bytes_of_a_status() {
         fix_age_s: Some(8.0),
         waypoint: None,
         path: PlannedPath::default(),
+        intent: None,
+        trail: Vec::new(),
         explored_cells: 4000,
         epoch: 1,
         labels: 9,

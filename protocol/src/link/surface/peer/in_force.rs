@@ -29,6 +29,10 @@ pub(super) struct InForceCopy {
     confirmed: PerSlot<bool>,
     /// Whether the vehicle has put a slot in force since its last summary.
     decided: PerSlot<bool>,
+    /// The content before a slot was decided.
+    before: PerSlot<Option<Slot>>,
+    /// Whether a report has proved that the last applied order of a slot was in force.
+    proved: PerSlot<bool>,
     reported: Option<(InForceSummary, FrameNumber)>,
     is_equal: bool,
     parts: PerSlot<InForceAssembly>,
@@ -59,14 +63,37 @@ impl InForceCopy {
     /// An order is in force now, by the vehicle's decision or by what an earlier run of the surface knew.
     pub(super) fn apply(&mut self, order: &SlotProgress) {
         let Some(held) = self.held.get_mut(order.id).filter(|_| order.status == OrderStatus::Applied) else { return };
+        if let Some(before) = self.before.get_mut(order.id).filter(|_| self.decided.get(order.id) == Some(&false)) {
+            before.clone_from(held);
+        }
         *held = match (&order.slot, held.take()) {
             (Slot::Settings(order), Some(Slot::Settings(before))) => Slot::Settings(before.then(order)).in_force(),
             (Slot::Settings(order), _) => Slot::Settings(Settings::default().then(order)).in_force(),
             (slot, _) => slot.clone().in_force(),
         };
-        if let Some(decided) = self.decided.get_mut(order.id) {
-            *decided = true;
+        for (of_slot, is_so) in [(&mut self.decided, true), (&mut self.proved, false), (&mut self.confirmed, false)] {
+            if let Some(of_slot) = of_slot.get_mut(order.id) {
+                *of_slot = is_so;
+            }
         }
+    }
+
+    /// Whether everything in force is known and shows that an order never was, although the vehicle reports its version as
+    /// applied: the report has a part of the version only, and a forged order can have the same. Settings are not judged,
+    /// because the vehicle joins them with earlier ones.
+    pub(super) fn refutes(&self, order: &SlotProgress) -> bool {
+        let (Some(Some(held)), Some(false), Some(false)) =
+            (self.held.get(order.id), self.decided.get(order.id), self.proved.get(order.id))
+        else {
+            return false;
+        };
+        let is_judged = self.is_equal && !matches!(held, Slot::Settings(_)) && order.status == OrderStatus::Applied;
+        is_judged && order.slot.clone().in_force().map(|slot| slot.payload()) != Some(held.payload())
+    }
+
+    /// The orders that are in force by now were so in an earlier run of the surface.
+    pub(super) fn trust(&mut self) {
+        self.proved = PerSlot::from_fn(|_| true);
     }
 
     /// Takes the summary of the report in frame `number`.
@@ -76,15 +103,33 @@ impl InForceCopy {
         }
         let is_same = self.reported.is_some_and(|(before, _)| before == summary);
         self.reported = Some((summary, number));
-        self.decided = PerSlot::default();
-        let is_equal = self.digests().summary() == summary;
+        let decided = std::mem::take(&mut self.decided);
+        let is_proved = self.digests().summary() == summary;
+        let is_equal = is_proved || self.is_unchanged(&decided, summary);
         let was_equal = std::mem::replace(&mut self.is_equal, is_equal);
         if !is_same || self.is_equal {
             self.confirmed = PerSlot::default();
         }
+        if is_proved {
+            self.trust();
+        }
         if !self.is_equal && (was_equal || !is_same) {
             (self.next_inquiry, self.inquiries) = (now, 0);
         }
+    }
+
+    /// Whether the contents before the decisions are still in force, by a summary after them; they are held again if so.
+    fn is_unchanged(&mut self, decided: &PerSlot<bool>, summary: InForceSummary) -> bool {
+        let held = PerSlot::from_fn(|id| {
+            let from = if decided.get(id) == Some(&true) { &self.before } else { &self.held };
+            from.get(id).cloned().flatten()
+        });
+        let now_held = std::mem::replace(&mut self.held, held);
+        let is_unchanged = self.digests().summary() == summary;
+        if !is_unchanged {
+            self.held = now_held;
+        }
+        is_unchanged
     }
 
     /// Takes a part of an answer in frame `number`; returns whether a content is known now that was not.
@@ -133,7 +178,7 @@ impl InForceCopy {
 
     /// One of the two ends has begun a new run. The contents are held until a report differs.
     pub(super) fn handle_peer_restart(&mut self) {
-        let held = std::mem::take(&mut self.held);
-        *self = Self { held, ..Self::default() };
+        let (held, proved) = (std::mem::take(&mut self.held), std::mem::take(&mut self.proved));
+        *self = Self { held, proved, ..Self::default() };
     }
 }

@@ -50,6 +50,8 @@ struct LastTurn {
 #[derive(Debug)]
 struct Contact {
     last_received: Option<Instant>,
+    /// Where the modem decides when to transmit: when an order first went out after that.
+    ordered: Option<Instant>,
     /// Where the modem decides when to transmit: when an acknowledgement or a hello is due.
     answer_due: Option<Instant>,
     /// The vehicle's highest frame number when a frame with an acknowledgement was last written.
@@ -74,6 +76,7 @@ impl Contact {
     fn new(now: Instant) -> Self {
         Self {
             last_received: None,
+            ordered: None,
             answer_due: None,
             acknowledged: 0,
             hello_due: now,
@@ -176,6 +179,14 @@ impl<R: StateReplica> VehiclePeer<R> {
         version
     }
 
+    /// Begins a new series of orders if one of the present series was never in force, although the vehicle reports so.
+    fn leave_refuted_series(&mut self, now: Instant) {
+        let refuted = self.outbox.progress().find(|order| self.in_force.refutes(order)).map(|order| order.id);
+        if let Some(id) = refuted {
+            self.outbox.leave_series_of_displaced(id, now);
+        }
+    }
+
     /// The hello names the series, so a new one begins with a new run.
     fn follow_series(&mut self) {
         self.is_out_of_step |= self.pair.set_series(self.outbox.series());
@@ -185,6 +196,7 @@ impl<R: StateReplica> VehiclePeer<R> {
     pub(super) fn restore_orders(&mut self, series: Series, orders: impl IntoIterator<Item = SlotProgress>) {
         self.outbox.restore(series, orders);
         self.outbox.progress().for_each(|order| self.in_force.apply(order));
+        self.in_force.trust();
         self.pair.set_series(series);
     }
 
@@ -227,7 +239,7 @@ impl<R: StateReplica> VehiclePeer<R> {
         if header.kind.is_hello() {
             // A hello of the current run may be a replay, so it is no sign of life.
             if inbound.restarted {
-                self.contact.last_received = Some(now);
+                (self.contact.last_received, self.contact.ordered) = (Some(now), None);
                 self.contact.hellos = 0;
             }
             if self.contact.admit_hello(inbound.restarted, now) {
@@ -236,7 +248,7 @@ impl<R: StateReplica> VehiclePeer<R> {
             return;
         }
         let Some(number) = inbound.number else { return };
-        self.contact.last_received = Some(now);
+        (self.contact.last_received, self.contact.ordered) = (Some(now), None);
         self.contact.hellos = 0;
         self.contact.is_doubtful = false;
         if inbound.is_latest {
@@ -306,6 +318,7 @@ impl<R: StateReplica> VehiclePeer<R> {
                     self.in_force.handle_report(summary, number, now);
                 }
                 self.outbox.leave_overtaken_series(&report.slots, number, now);
+                self.leave_refuted_series(now);
             }
             self.follow_series();
         }
@@ -314,6 +327,8 @@ impl<R: StateReplica> VehiclePeer<R> {
             && self.in_force.handle_part(&part, number, now)
         {
             events.push_back(SurfaceEvent::InForceLearned(vehicle, part.id));
+            self.leave_refuted_series(now);
+            self.follow_series();
         }
         if matches!(chunk.kind, ChunkKind::Pose | ChunkKind::Report) && self.content.status.whole().is_some() {
             events.push_back(SurfaceEvent::Status(vehicle));

@@ -13,10 +13,15 @@ use std::time::Duration;
 const MAX_UNACKNOWLEDGED: u64 = 16;
 /// Silence after which a vehicle is sent a hello, because it may have restarted.
 const SILENCE_TIMEOUT: Duration = Duration::from_secs(40);
+/// Transmissions of an order without any frame of the vehicle after which it is sent a hello.
+const UNACKNOWLEDGED_ORDERS: u32 = 2;
 
 impl Contact {
-    fn is_silent(&self, now: Instant) -> bool {
-        self.last_received.is_none_or(|at| now.since(at) >= SILENCE_TIMEOUT)
+    /// When the vehicle has been silent for so long that it may have restarted; an order that nobody acknowledges
+    /// shows it before `SILENCE_TIMEOUT`. `slot_timeout` is the time after which an order goes out again.
+    fn silent_from(&self, slot_timeout: Duration) -> Option<Instant> {
+        let heard = self.last_received? + SILENCE_TIMEOUT;
+        Some(self.ordered.map_or(heard, |at| heard.min(at + slot_timeout * UNACKNOWLEDGED_ORDERS)))
     }
 
     fn is_answer_due(&self, now: Instant) -> bool {
@@ -25,22 +30,22 @@ impl Contact {
 
     /// When a hello becomes due if no frame comes in. Silence matters only in a run that is usable: the vehicle has
     /// proven it, and there are numbers left.
-    fn next_hello(&self, is_usable: bool) -> Instant {
-        let silent = self.last_received.filter(|_| is_usable);
-        silent.map_or(self.hello_due, |at| (at + SILENCE_TIMEOUT).max(self.hello_due))
+    fn next_hello(&self, is_usable: bool, slot_timeout: Duration) -> Instant {
+        let silent = self.silent_from(slot_timeout).filter(|_| is_usable);
+        silent.map_or(self.hello_due, |at| at.max(self.hello_due))
     }
 
     /// A hello went out; the next ones follow at growing intervals.
     fn note_hello(&mut self, timeout: Duration, now: Instant) {
-        self.hello_due = now + timeout.max(Self::PROOF_TIMEOUT) * (1 << self.hellos.min(2));
+        self.hello_due = now + timeout.max(Self::PROOF_TIMEOUT) * (1 << self.hellos.min(1));
         self.hellos += 1;
     }
 }
 
 impl<R: StateReplica> VehiclePeer<R> {
     fn must_send_hello(&self, now: Instant) -> bool {
-        let is_doubtful = !self.pair.is_proven() || self.contact.is_silent(now) || self.pair.is_full();
-        is_doubtful && now >= self.contact.hello_due
+        let is_silent = self.contact.silent_from(self.slot_timeout()).is_none_or(|at| now >= at);
+        (!self.pair.is_proven() || is_silent || self.pair.is_full()) && now >= self.contact.hello_due
     }
 
     /// When a run that the vehicle has offered is to be proven, unless a frame of the current run comes in before.
@@ -73,7 +78,7 @@ impl<R: StateReplica> VehiclePeer<R> {
     pub(in crate::link::surface) fn next_reason(&self) -> Option<Instant> {
         let again = self.outbox.progress().filter_map(|s| s.sent).min().map(|at| at + self.slot_timeout());
         let again = again.filter(|_| self.outbox.has_backlog());
-        let hello = self.contact.next_hello(self.pair.is_proven() && !self.pair.is_full());
+        let hello = self.contact.next_hello(self.pair.is_proven() && !self.pair.is_full(), self.slot_timeout());
         let numbered = [self.contact.answer_due, again, self.in_force.next_inquiry()]
             .into_iter()
             .flatten()
@@ -102,11 +107,15 @@ impl<R: StateReplica> VehiclePeer<R> {
             }
             return None;
         }
+        let has_orders = !slots.is_empty() && purpose == FramePurpose::Content;
         let ready = self.write_turn(&[slots], modem, None, purpose, now).pop()?;
         self.master.note_begun(now);
         if is_proof {
             self.contact.proved = Some(now);
             return Some(ready);
+        }
+        if has_orders {
+            self.contact.ordered.get_or_insert(now);
         }
         // A run that was met must be proven by a numbered frame, or the vehicle will not transmit.
         let must_prove = self.pair.has_run() && !self.pair.is_proven();

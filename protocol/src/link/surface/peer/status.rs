@@ -3,7 +3,7 @@
 use crate::directive::{SlotId, SlotReport, SlotState};
 use crate::link::FrameNumber;
 use crate::time::Instant;
-use crate::wire::{PlannedPath, VehicleStatus};
+use crate::wire::{Intent, PlannedPath, Trail, VehicleStatus};
 
 /// The pose and the report of a vehicle, of which one may come in before the other.
 #[derive(Debug, Default)]
@@ -11,6 +11,10 @@ pub(super) struct StatusParts {
     latest: VehicleStatus,
     /// When the pose came in, and in which frame.
     pose: Option<(Instant, FrameNumber)>,
+    /// The trail of the last frame that had one.
+    trail: Option<(Trail, FrameNumber)>,
+    /// The intent of the last frame that had one.
+    intent: Option<(Intent, FrameNumber)>,
     has_report: bool,
     whole: Option<(VehicleStatus, Instant)>,
 }
@@ -36,10 +40,28 @@ impl StatusParts {
         let mut read = self.latest.clone();
         let is_read = read.read_pose(payload).is_ok();
         if is_read && self.pose.is_none_or(|(_, before)| before < number) {
+            if let Some((trail, _)) = self.trail.take_if(|(_, of)| *of == number) {
+                read.trail = trail.corners(read.position);
+            }
+            read.intent = self.intent.filter(|(_, of)| *of == number).map(|(intent, _)| intent);
             (self.latest, self.pose) = (read, Some((now, number)));
         }
         self.join();
         is_read
+    }
+
+    /// Reads a trail, which waits for the pose of its frame; returns whether it makes sense.
+    pub(super) fn read_trail(&mut self, payload: &[u8], number: FrameNumber) -> bool {
+        let read = Trail::decode(payload).ok();
+        let is_read = read.is_some();
+        self.trail = read.map(|trail| (trail, number));
+        is_read
+    }
+
+    /// Reads an intent, which waits for the pose of its frame; returns whether it makes sense.
+    pub(super) fn read_intent(&mut self, payload: &[u8], number: FrameNumber) -> bool {
+        self.intent = Intent::decode(payload).ok().map(|intent| (intent, number));
+        self.intent.is_some()
     }
 
     /// Reads a report; returns whether it makes sense.
@@ -54,6 +76,7 @@ impl StatusParts {
         if SlotId::ALL.into_iter().zip(before).any(newly) {
             // The path was planned before the slot was applied; a pose with the new path is still to come.
             (self.latest.waypoint, self.latest.path) = (None, PlannedPath::default());
+            self.latest.intent = None;
         }
         self.join();
         is_read

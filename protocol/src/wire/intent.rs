@@ -1,0 +1,65 @@
+//! The purpose of an adaptive survey's plan.
+
+use super::status::StatusError;
+
+/// The purpose of the plan that a pose has.
+///
+/// ```text
+/// byte  bits  field   range
+///  0    8     kind    0 unseen floor, 1 curiosity, 2 label
+///  1    8     label   1..254; only after kind 2
+/// ```
+///
+/// Source: vehicle, in the frame of a pose and before it, while it surveys by an adaptive planner.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Intent {
+    /// Floor that the camera has not seen yet.
+    Unseen,
+    /// Cells that the scene model finds unusual.
+    Curiosity,
+    /// More of a label, where it is seen or expected.
+    Label(u8),
+}
+
+impl Intent {
+    /// The bytes on the wire.
+    pub fn encode(self) -> Vec<u8> {
+        match self {
+            Self::Unseen => vec![0],
+            Self::Curiosity => vec![1],
+            Self::Label(label) => vec![2, label],
+        }
+    }
+
+    /// Reads an intent; each has exactly one encoding.
+    pub fn decode(bytes: &[u8]) -> Result<Self, StatusError> {
+        match *bytes {
+            [0] => Ok(Self::Unseen),
+            [1] => Ok(Self::Curiosity),
+            [2, label @ 1..=254] => Ok(Self::Label(label)),
+            [0..=2] | [] | [_, _, ..] => Err(StatusError::Length),
+            [_] => Err(StatusError::BadField),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn golden_bytes_of_an_intent() {
+        for (intent, bytes) in [
+            (Intent::Unseen, &[0][..]),
+            (Intent::Curiosity, &[1]),
+            (Intent::Label(1), &[2, 1]),
+            (Intent::Label(254), &[2, 254]),
+        ] {
+            assert_eq!(intent.encode(), bytes);
+            assert_eq!(Intent::decode(bytes), Ok(intent));
+        }
+        for bytes in [&[][..], &[2], &[3], &[0, 0], &[2, 0], &[2, 255], &[2, 1, 0]] {
+            assert!(Intent::decode(bytes).is_err(), "{bytes:?}");
+        }
+    }
+}
