@@ -36,6 +36,6 @@ pub use sections::{
 };
 pub use setting::{
     Authenticate, AutopilotKind, BirthRule, CameraSource, GpsPort, HostPort, LayerName, MapCells, MapStream, ModemKind,
-    OperatorScript, S2cMode,
+    OperatorScript, S2cMode, WorldKind,
 };
 pub use token_file::{TokenGrant, load_tokens, read_token, read_tokens};

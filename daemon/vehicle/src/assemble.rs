@@ -40,7 +40,8 @@ pub fn assemble(
     }
     link.source_mut().set_debounce(Duration::from_secs_f64(config.map.debounce_s));
     let planner = config.survey.planner;
-    let steering = Steering::new(area, footprint(config), cell_m(config), planner, config.survey.clearance_m);
+    let steering = Steering::new(area, footprint(config), cell_m(config), planner, config.survey.clearance_m)
+        .with_end(config.survey.at_end);
     let (x, y) = steering.start();
     let depth = (config.survey.depth_m - config.survey.altitude_m).max(0.0);
     let drift = config.navigation.drift_percent / 100.0;

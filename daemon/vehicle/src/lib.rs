@@ -13,6 +13,7 @@ mod picker;
 pub mod planning;
 mod relief;
 mod steering;
+mod track;
 mod vehicle;
 
 pub use assemble::assemble;

@@ -3,16 +3,23 @@
 mod ahead;
 mod choice;
 mod grounds;
+mod purpose;
+#[cfg(test)]
+mod settling_tests;
+mod views;
+mod worth;
 
 pub use ahead::PathAhead;
 
 use choice::PlannerChoice;
 use grounds::Grounds;
+use views::Views;
 
 use super::planning::{BlockValues, Bounds, CellWindow, Knowledge, Node, PlanRequest, Point, distance};
 use scenecast_core::Area;
-use scenecast_protocol::directive::{Fence, PlannerKind, Utility};
+use scenecast_protocol::directive::{AtEnd, Fence, PlannerKind, Utility};
 use scenecast_protocol::map::{Cell, LabelGrid};
+use scenecast_protocol::wire::Intent;
 use std::collections::VecDeque;
 
 /// The extent of a camera frame on the sea floor, metres.
@@ -49,14 +56,24 @@ pub enum Course {
 pub struct Steering {
     grounds: Grounds,
     choice: PlannerChoice,
+    /// The end of the survey: as configured, and as ordered.
+    at_end: (AtEnd, Option<AtEnd>),
     window: CellWindow,
     known: Knowledge,
     /// The origin of the map frame in the world frame: metres east and north.
     map_origin: Point,
     plan: VecDeque<Node>,
+    views: Views,
     /// The version of the map for which the plan was made.
     planned_for: u64,
+    /// The purpose of an adaptive plan.
+    intent: Option<Intent>,
+    /// An adaptive plan found nothing that pays.
+    is_complete: bool,
 }
+
+/// The weight of unseen cells, in hundredths, once no look at a label pays any more.
+const EXPLORATION: i8 = 10;
 
 /// Steps up to one waypoint where the plan depends on the map. With two, `horizon` collects 2 % less, because
 /// each step shows new cells.
@@ -66,17 +83,25 @@ impl Steering {
     /// Steers within `area`. Cells have edges of `cell_m` metres, and the vehicle keeps
     /// `clearance_m` metres from every outline.
     pub fn new(area: Area, footprint: Footprint, cell_m: f64, configured: PlannerKind, clearance_m: f64) -> Self {
-        let mut steering = Self {
+        Self {
             grounds: Grounds::new(area, footprint.reach(), clearance_m),
             choice: PlannerChoice::new(configured),
+            at_end: (AtEnd::Explore, None),
             window: CellWindow::new(area, cell_m),
             known: Knowledge::default(),
             map_origin: (0.0, 0.0),
             plan: VecDeque::new(),
+            views: Views::default(),
             planned_for: 0,
-        };
-        steering.choice.planner_mut().handle_change();
-        steering
+            intent: None,
+            is_complete: false,
+        }
+    }
+
+    /// The same with another configured end of the survey than [`AtEnd::Explore`].
+    pub fn with_end(mut self, configured: AtEnd) -> Self {
+        self.at_end.0 = configured;
+        self
     }
 
     /// The first place of the survey.
@@ -98,7 +123,7 @@ impl Steering {
         if self.map_origin != (east_m, north_m) {
             self.map_origin = (east_m, north_m);
             self.window = CellWindow::new(self.grounds.area().moved(-east_m, -north_m), self.window.cell_m);
-            self.plan.clear();
+            self.replan();
         }
     }
 
@@ -109,31 +134,42 @@ impl Steering {
 
     /// Puts a fence in force that was checked.
     pub fn set_fence(&mut self, fence: &Fence) {
-        self.grounds.set_fence(fence);
-        self.choice.planner_mut().handle_change();
-        self.plan.clear();
+        let before = self.grounds.set_fence(fence);
+        self.choice.planner_mut().handle_change(&before);
+        self.replan();
     }
 
-    /// Sets the planner that the operator ordered; `None`: the configured one.
-    pub fn set_planner(&mut self, chosen: Option<PlannerKind>) {
-        self.choice.choose(chosen);
-        self.plan.clear();
+    /// Sets the planner and the end of the survey that the operator ordered; `None`: the configured one.
+    pub fn set_choices(&mut self, planner: Option<PlannerKind>, at_end: Option<AtEnd>) {
+        self.choice.choose(planner);
+        self.at_end.1 = at_end;
+        self.replan();
     }
 
+    /// The purpose of the plan; `None` if no adaptive planner steers, or nothing pays any more.
+    pub fn intent(&self) -> Option<Intent> {
+        self.intent
+    }
+
+    /// Drops the plan, so that the next waypoint follows a new one.
     pub fn replan(&mut self) {
         self.plan.clear();
+        self.intent = None;
+        self.is_complete = false;
     }
 
-    /// The camera saw the sea floor around `at`, a point of the map frame.
+    /// The camera saw the sea floor around `at`, a point of the map frame. A cell gets a look
+    /// for each step of the lattice along the track, whatever the rate of the frames.
     pub fn handle_view(&mut self, at: Point) {
         let reach = self.grounds.reach_m();
+        let track_steps = self.views.handle_view(at) / self.grounds.lattice().step_m();
         // The cells whose centre was visible.
         let cells = |middle: f64| {
             let edge = |metres: f64| metres / self.window.cell_m - 0.5;
             edge(middle - reach).ceil() as i32..=edge(middle + reach).floor() as i32
         };
         for (y, x) in cells(at.1).flat_map(|y| cells(at.0).map(move |x| (y, x))) {
-            self.known.look(Cell::new(x, y));
+            self.known.look(Cell::new(x, y), track_steps);
         }
     }
 
@@ -146,7 +182,7 @@ impl Steering {
     /// still be travelled in metres.
     pub fn next(&mut self, from: Point, map: (&LabelGrid, u64), utility: Option<&Utility>, left_m: f64) -> Course {
         if self.choice.follow(utility.is_some()) {
-            self.plan.clear();
+            self.replan();
         }
         let left_m = left_m - self.grounds.last_leg_m();
         let Some(at) = self.grounds.entry(from) else { return Course::NoPath };
@@ -158,25 +194,70 @@ impl Steering {
         }
         let is_next = |n: &Node| self.grounds.lattice().around(at).any(|(to, _)| to == *n);
         let follows = self.plan.front().is_some_and(is_next);
-        if changed || !follows || !self.can_go(at, &self.plan, left_m - approach) {
+        let is_usable = follows && self.can_go(at, &self.plan, left_m - approach);
+        let is_settled = self.is_complete && !changed;
+        if (changed || !is_usable) && !is_settled {
             self.planned_for = map.1;
-            self.plan = self.make_plan(at, map.0, utility, left_m - approach).into();
+            let present = if is_usable { std::mem::take(&mut self.plan).into() } else { Vec::new() };
+            let utility = utility.cloned().unwrap_or_default();
+            let (plan, intent) = self.make_plan(at, map.0, &utility, left_m - approach, present);
+            self.is_complete = adapts && plan.is_empty();
+            self.intent = intent;
+            self.plan = plan.into();
         }
         self.waypoint(from, at, if adapts { STEPS_AHEAD } else { usize::MAX }, left_m)
     }
 
-    fn make_plan(&mut self, from: Node, map: &LabelGrid, utility: Option<&Utility>, left_m: f64) -> Vec<Node> {
-        let Some(return_paths) = self.grounds.return_paths() else { return Vec::new() };
-        let none = Utility::default();
-        let values = BlockValues::new(
-            self.grounds.lattice(),
-            (&self.window, self.map_origin),
-            map,
-            &self.known,
-            utility.unwrap_or(&none),
-        );
-        let request = PlanRequest { lattice: self.grounds.lattice(), values: &values, from, return_paths, left_m };
-        self.choice.planner_mut().plan(&request)
+    /// A plan from a place, or the rest of the `present` one, if that is as good, and its purpose. Where no look pays any
+    /// more, the survey explores or repeats its looks, as ordered; an adaptive plan is empty if that does not pay either.
+    fn make_plan(
+        &mut self,
+        from: Node,
+        map: &LabelGrid,
+        utility: &Utility,
+        left_m: f64,
+        present: Vec<Node>,
+    ) -> (Vec<Node>, Option<Intent>) {
+        let at_end = self.at_end.1.unwrap_or(self.at_end.0);
+        let found = self.paying_plan(from, map, utility, left_m, &present, at_end != AtEnd::Hold);
+        let repeats = at_end == AtEnd::Repeat && self.choice.adapts() && found.0.is_empty();
+        if repeats && self.views.begin_round(self.grounds.lattice().step_m()) && self.known.forget_looks(map, utility) {
+            return self.paying_plan(from, map, utility, left_m, &present, false);
+        }
+        found
+    }
+
+    /// The plan that pays by the utility or, if `may_explore`, by exploration; empty if none does.
+    fn paying_plan(
+        &mut self,
+        from: Node,
+        map: &LabelGrid,
+        utility: &Utility,
+        left_m: f64,
+        present: &[Node],
+        may_explore: bool,
+    ) -> (Vec<Node>, Option<Intent>) {
+        let Some(return_paths) = self.grounds.return_paths() else { return (Vec::new(), None) };
+        let (lattice, adapts) = (self.grounds.lattice(), self.choice.adapts());
+        // A negative weight is the operator's order not to explore.
+        let explores = may_explore && (0..EXPLORATION).contains(&utility.exploration);
+        let exploring = explores.then(|| Utility { exploration: EXPLORATION, ..utility.clone() });
+        let value =
+            |utility: &Utility| BlockValues::new(lattice, (&self.window, self.map_origin), map, &self.known, utility);
+        for utility in std::iter::once(utility).chain(&exploring) {
+            let values = value(utility);
+            let request = PlanRequest { lattice, values: &values, from, return_paths, left_m };
+            let plan = self.choice.planner_mut().plan(&request);
+            if !adapts {
+                return (plan, None);
+            }
+            let plan = if worth::keeps(&request, present, &plan) { present.to_vec() } else { plan };
+            if worth::pays(&request, &plan, utility, (lattice.step_m() / self.window.cell_m).powi(2)) {
+                let intent = purpose::purpose(utility, |part| worth::gain(&value(part), &plan));
+                return (plan, intent);
+            }
+        }
+        (Vec::new(), None)
     }
 
     /// Whether the first place of a plan leaves enough distance for the return path.
@@ -230,7 +311,7 @@ impl Steering {
 
     /// The next waypoint of the return path.
     pub fn next_return(&mut self, from: Point) -> Course {
-        self.plan.clear();
+        self.replan();
         let home = self.return_place();
         if distance(from, home) <= self.arrival_m() {
             return Course::Arrived;
@@ -263,6 +344,8 @@ impl Steering {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use scenecast_protocol::coordinates::DecimetrePoint;
+    use scenecast_protocol::directive::Polygon;
 
     const AREA: Area = Area { west: 0.0, south: 0.0, east: 20.0, north: 12.0 };
     const FOOTPRINT: Footprint = Footprint { across: 4.0, along: 3.0 };
@@ -289,6 +372,56 @@ mod tests {
         let legs = drive(&mut steering(PlannerKind::Horizon), &LabelGrid::default(), None, 20);
         assert!(legs.iter().all(|&(x, y)| (0.0..=20.0).contains(&x) && (0.0..=12.0).contains(&y)), "{legs:?}");
         assert!(legs.iter().any(|l| l.1 > 9.0) && legs.iter().any(|l| l.1 < 2.0), "{legs:?}");
+    }
+
+    #[test]
+    fn a_fence_that_leaves_a_leg_as_it_is_keeps_the_progress() {
+        let map = LabelGrid::default();
+        let around = |margin: i32| -> Polygon {
+            let (low, east, north) = (-10 * margin, 10 * (20 + margin), 10 * (12 + margin));
+            Polygon(
+                [(low, low), (east, low), (east, north), (low, north)].map(|(x, y)| DecimetrePoint::new(x, y)).into(),
+            )
+        };
+        let block = Polygon([(20, 10), (40, 10), (40, 20), (20, 20)].map(|(x, y)| DecimetrePoint::new(x, y)).into());
+        let return_point = Some(DecimetrePoint::new(100, 60));
+        for fence in [
+            Fence { fence: Some(around(1)), ..Fence::default() },
+            Fence { fence: Some(around(9)), return_point, ..Fence::default() },
+            Fence { keep_outs: vec![block], ..Fence::default() },
+        ] {
+            let mut steering = steering(PlannerKind::Horizon);
+            let track = drive(&mut steering, &map, None, 6);
+            let at = track[6];
+            let Course::Go(expected) = steering.next(at, (&map, 6), None, f64::INFINITY) else { panic!("no leg") };
+            steering.set_fence(&fence);
+            let Course::Go(next) = steering.next(at, (&map, 7), None, f64::INFINITY) else { panic!("no leg") };
+            assert!(distance(next, expected) < 0.1, "{next:?} instead of {expected:?} from {at:?}: {fence:?}");
+        }
+    }
+
+    #[test]
+    fn an_adaptive_plan_has_a_purpose_until_nothing_pays() {
+        let mut map = LabelGrid::default();
+        (0..48).for_each(|y| {
+            (0..40).for_each(|x| {
+                map.set(Cell::new(x, y), if x > 20 { 2 } else { 1 });
+            })
+        });
+        let mut steering = steering(PlannerKind::Horizon);
+        drive(&mut steering, &map, None, 2);
+        assert_eq!(steering.intent(), None, "a lawnmower has no purpose of its own");
+        let favour = Utility { weights: [(2, 100)].into(), ..Utility::default() };
+        drive(&mut steering, &map, Some(&favour), 1);
+        assert_eq!(steering.intent(), Some(Intent::Label(2)));
+        steering.replan();
+        let explore = Utility { exploration: 100, ..Utility::default() };
+        drive(&mut steering, &map, Some(&explore), 1);
+        assert_eq!(steering.intent(), Some(Intent::Unseen));
+        steering.replan();
+        let averse = Utility { exploration: -10, weights: [(1, -50), (2, -50)].into(), ..Utility::default() };
+        drive(&mut steering, &map, Some(&averse), 1);
+        assert_eq!(steering.intent(), None, "nothing pays");
     }
 
     #[test]

@@ -12,7 +12,7 @@ mod survey;
 pub use link::Link;
 pub use map::{Camera, Map, Scene};
 pub use modem::{Channel, Modem};
-pub use node::{Console, Mission, Operator, Runtime, VehicleSection};
+pub use node::{Console, Mission, Operator, Runtime, VehicleSection, WorldSection};
 pub use survey::{Autopilot, Navigation, Position, Survey};
 
 use crate::key::Section;
@@ -32,6 +32,7 @@ pub struct Config {
     pub navigation: Navigation,
     pub autopilot: Autopilot,
     pub position: Position,
+    pub world: WorldSection,
     pub operator: Operator,
     pub console: Console,
     pub runtime: Runtime,
@@ -52,6 +53,7 @@ impl Section {
         Navigation::SECTION,
         Autopilot::SECTION,
         Position::SECTION,
+        WorldSection::SECTION,
         Operator::SECTION,
         Console::SECTION,
         Runtime::SECTION,

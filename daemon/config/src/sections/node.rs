@@ -2,7 +2,7 @@
 
 use crate::key::section;
 use crate::rule::{ANY, range};
-use crate::setting::{HostPort, OperatorScript};
+use crate::setting::{HostPort, OperatorScript, WorldKind};
 use scenecast_core::LatLon;
 use std::path::PathBuf;
 
@@ -35,6 +35,15 @@ section! {
         /// Orders that the rehearsal gives. scripted: two utilities and some exemplar requests at fixed times;
         /// fenced: the same orders, within a fence and limits.
         script: OperatorScript = OperatorScript::Scripted, ANY, [Scenario];
+    }
+}
+
+section! {
+    /// The sea floor of a rehearsal.
+    world: WorldSection {
+        /// Sea floor of a rehearsal without a mosaic. reef: 120 x 80 m of sand, rubble, seagrass, corals and a wreck, seen
+        /// through water; patches: 26 x 18 m drawn from the scene model's own generative process.
+        kind: WorldKind = WorldKind::Reef, ANY, [Scenario];
     }
 }
 

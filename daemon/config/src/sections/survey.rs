@@ -4,7 +4,7 @@ use crate::key::section;
 use crate::rule::{ANY, ports, range};
 use crate::setting::{AutopilotKind, GpsPort};
 use scenecast_core::{Area, PortAddress};
-use scenecast_protocol::directive::{PlannerKind, Reaction};
+use scenecast_protocol::directive::{AtEnd, PlannerKind, Reaction};
 
 section! {
     /// The survey.
@@ -18,10 +18,14 @@ section! {
         /// Depth of the sea floor.
         depth_m: f64 = 20.0, range(0.0, 11_000.0, "m"), [Auv Scenario];
         /// West, south, east and north limits in the world. All 0: the limits of the recording
-        /// or of the rehearsal's image.
+        /// or of the rehearsal's mosaic; of the world "reef", 30 x 25 m in its middle.
         area_m: Option<Area> = None, range(-1e6, 1e6, "m"), [Auv Scenario];
         /// Planner of the vehicle's path once the operator has sent a utility. The operator may choose another.
         planner: PlannerKind = PlannerKind::Horizon, ANY, [Auv Scenario];
+        /// What an adaptive survey does once no look pays any more. repeat: it explores the rest of the area, then looks at
+        /// the favoured labels again; explore: it explores the rest, then holds; hold: it holds. The operator may choose
+        /// another.
+        at_end: AtEnd = AtEnd::Repeat, ANY, [Auv Scenario];
         /// Distance that planned paths keep from the fence and from keep-outs, to allow for the
         /// vehicle's size, turns and drift.
         clearance_m: f64 = 1.0, range(0.0, 1000.0, "m"), [Auv Scenario];

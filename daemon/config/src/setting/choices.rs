@@ -2,7 +2,7 @@
 
 use super::{Setting, one_of};
 use crate::rule::Rule;
-use scenecast_protocol::directive::{CellBand, PlannerKind, Reaction};
+use scenecast_protocol::directive::{AtEnd, CellBand, PlannerKind, Reaction};
 use scenecast_protocol::map_codec::Codec;
 use strum::{Display, IntoStaticStr, VariantArray};
 use toml::Value;
@@ -50,6 +50,14 @@ impl Choice for Codec {
 }
 
 impl Choice for PlannerKind {
+    const CHOICES: &'static [Self] = &Self::ALL;
+
+    fn word(self) -> &'static str {
+        self.name()
+    }
+}
+
+impl Choice for AtEnd {
     const CHOICES: &'static [Self] = &Self::ALL;
 
     fn word(self) -> &'static str {
@@ -139,6 +147,14 @@ choices! {
         Collapsed,
         /// As in the program ROST.
         Rost,
+    }
+
+    /// The sea floor of a rehearsal without a mosaic.
+    WorldKind "lowercase" {
+        /// Sand, rubble, meadows, corals and a wreck, seen through water.
+        Reef,
+        /// Patches drawn from the scene model's own generative process.
+        Patches,
     }
 
     /// The driver of the autopilot.

@@ -8,7 +8,9 @@ mod ports;
 mod tables;
 mod texts;
 
-pub use choices::{Authenticate, AutopilotKind, BirthRule, MapCells, MapStream, ModemKind, OperatorScript, S2cMode};
+pub use choices::{
+    Authenticate, AutopilotKind, BirthRule, MapCells, MapStream, ModemKind, OperatorScript, S2cMode, WorldKind,
+};
 pub use layers::LayerName;
 pub use ports::{GpsPort, HostPort};
 pub use texts::CameraSource;

@@ -175,8 +175,8 @@ mod tests {
     #[test]
     fn hidden_cells_are_predicted_better_than_by_overall_shares() {
         for seed in 1..=6 {
-            let reef = scenecast_worlds::reef(seed, 120, 90, 8, 8);
-            let truth: Vec<u8> = reef.truth.iter().map(|c| c + 1).collect();
+            let world = scenecast_worlds::patches(seed, 120, 90, 8, 8);
+            let truth: Vec<u8> = world.truth.iter().map(|c| c + 1).collect();
             let (by_place, by_mix) = likelihoods(&truth, 120, seed);
             assert!(by_place > by_mix + 0.05, "seed {seed}: {by_place} against {by_mix}");
         }

@@ -55,8 +55,8 @@ pub trait Planner: std::fmt::Debug + Send {
         Vec::new()
     }
 
-    /// The lattice has changed, and with it the numbers of the places.
-    fn handle_change(&mut self) {}
+    /// The lattice has changed, and with it the numbers of the places. `before` is the last one.
+    fn handle_change(&mut self, _before: &Lattice) {}
 }
 
 pub fn planner(kind: PlannerKind) -> Box<dyn Planner> {

@@ -11,14 +11,32 @@ use scenecast_protocol::map::{Cell, LabelGrid};
 pub struct Knowledge {
     /// The number of looks of the camera at each cell, at most 255.
     looks: LabelGrid,
+    /// The part of the track on which each cell was last looked at: [`PARTS_PER_STEP`] a step, from 1 to 255 and again from 1.
+    parts: LabelGrid,
     /// Twenty times the natural logarithm of the perplexity of each cell, 1 to 255.
     surprise: LabelGrid,
 }
 
 impl Knowledge {
-    pub fn look(&mut self, cell: Cell) {
-        let looks = self.looks.get(cell);
-        self.looks.set(cell, looks.saturating_add(1));
+    /// Takes a view of a cell after `track_steps` of the track, in steps of the lattice. It counts as a look if the last one
+    /// lies three quarters of a step behind, so that the rate of the frames changes nothing.
+    pub fn look(&mut self, cell: Cell, track_steps: f64) {
+        let part = (track_steps * f64::from(PARTS_PER_STEP)).max(0.0) as u64 % 255;
+        let last = self.parts.get(cell);
+        let is_fresh = last == 0 || (part + 256 - u64::from(last)) % 255 >= 3;
+        if is_fresh {
+            self.parts.set(cell, part as u8 + 1);
+            self.looks.set(cell, self.looks.get(cell).saturating_add(1));
+        }
+    }
+
+    /// Forgets the looks at the cells of favoured labels; returns whether there are any.
+    pub fn forget_looks(&mut self, map: &LabelGrid, utility: &Utility) -> bool {
+        let favoured: Vec<Cell> = map.iter().filter(|(_, l)| utility.weight(*l) > 0.0).map(|(cell, _)| cell).collect();
+        for &cell in &favoured {
+            self.looks.set(cell, 0);
+        }
+        !favoured.is_empty()
     }
 
     /// Takes the scene model's perplexity of a cell, 1 or more.
@@ -27,6 +45,9 @@ impl Knowledge {
         self.surprise.set(cell, level as u8);
     }
 }
+
+/// Parts of a step of the lattice in which the track is counted.
+const PARTS_PER_STEP: u8 = 4;
 
 /// The value of a repeated look at a cell, divided by the value of the look before.
 const REPEATED_LOOK: f32 = 0.2;

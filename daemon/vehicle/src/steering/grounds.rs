@@ -64,18 +64,21 @@ impl Grounds {
         self.return_point.unwrap_or(self.start)
     }
 
-    pub(super) fn set_fence(&mut self, fence: &Fence) {
+    /// Lays out the lattice within a fence; returns the last one.
+    pub(super) fn set_fence(&mut self, fence: &Fence) -> Lattice {
         self.bounds = Bounds::new(fence, self.clearance_m);
         self.return_point = fence.return_point.map(|p| p.to_world().xy());
-        self.lay_out();
+        self.lay_out()
     }
 
-    fn lay_out(&mut self) {
+    fn lay_out(&mut self) -> Lattice {
         let inner = self.area.shrunk(self.reach_m);
-        self.lattice = Lattice::new(inner, &[self.return_place()], STEP * self.reach_m, &self.bounds);
+        let lattice = Lattice::new(inner, &[self.return_place()], STEP * self.reach_m, &self.bounds);
+        let before = std::mem::replace(&mut self.lattice, lattice);
         let end = self.entry(self.return_place());
         self.return_paths = end.map(|n| self.lattice.paths(n));
         self.last_leg_m = end.map_or(0.0, |n| distance(self.return_place(), self.lattice.place(n)));
+        before
     }
 
     /// The place at which a path from `from` enters the lattice.

@@ -6,10 +6,10 @@ use crate::failsafe::{Failsafe, FailsafePolicy};
 use crate::planning::{Point, distance};
 use crate::steering::{Course, PathAhead, Steering};
 use scenecast_protocol::coordinates::{MapPoint, WorldPoint};
-use scenecast_protocol::directive::{Constraints, Fence, Limits, PlannerKind, Reaction, Utility};
+use scenecast_protocol::directive::{Constraints, Fence, Limits, Reaction, Settings, Utility};
 use scenecast_protocol::map::{Cell, LabelGrid};
 use scenecast_protocol::time::Instant;
-use scenecast_protocol::wire::{ModeReason, PlannedPath, VehicleMode};
+use scenecast_protocol::wire::{Intent, ModeReason, PlannedPath, VehicleMode};
 
 /// The last request to the host.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -53,12 +53,12 @@ pub(super) struct Guidance {
 }
 
 impl Guidance {
-    /// Starts with the limits, the fence and the unanswered breach of the last run. `planner` is the ordered one, if any.
+    /// Starts with the limits, the fence and the unanswered breach of the last run. `settings` are the ordered ones.
     pub(super) fn new(
         steering: Steering,
         policy: FailsafePolicy,
         durable: &Durable,
-        planner: Option<PlannerKind>,
+        settings: &Settings,
         now: Instant,
     ) -> Self {
         let (failsafe, activity, path) = (Failsafe::new(policy, now), Activity::default(), PlannedPath::default());
@@ -72,7 +72,7 @@ impl Guidance {
         if let Some(reason) = ModeReason::from_code(durable.breach) {
             failsafe.handle_breach(reason);
         }
-        guidance.steering.set_planner(planner);
+        guidance.steering.set_choices(settings.planner.value(), settings.at_end.value());
         if let Some(fence) = Fence::from_bytes(&durable.fence).filter(|f| f.check().is_ok()) {
             guidance.steering.set_fence(&fence);
         }
@@ -86,6 +86,11 @@ impl Guidance {
 
     pub(super) fn waypoint(&self) -> Option<MapPoint> {
         self.waypoint
+    }
+
+    /// The purpose of the plan while the vehicle surveys by an adaptive planner.
+    pub(super) fn intent(&self) -> Option<Intent> {
+        self.steering.intent().filter(|_| self.activity.mode == VehicleMode::Survey)
     }
 
     pub(super) fn path(&self) -> &PlannedPath {
@@ -156,9 +161,9 @@ impl Guidance {
         self.clear_breach();
     }
 
-    /// Sets the planner that the operator ordered; `None`: the configured one.
-    pub(super) fn set_planner(&mut self, planner: Option<PlannerKind>) {
-        self.steering.set_planner(planner);
+    /// Sets the planner and the end of the survey that the operator ordered.
+    pub(super) fn set_choices(&mut self, settings: &Settings) {
+        self.steering.set_choices(settings.planner.value(), settings.at_end.value());
         self.replan();
     }
 

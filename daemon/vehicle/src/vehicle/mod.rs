@@ -23,6 +23,7 @@ use super::failsafe::FailsafePolicy;
 use super::mapper::{MapUpdate, SharedExemplars};
 use super::navigator::Navigator;
 use super::steering::Steering;
+use super::track::RecentTrack;
 use gallery::Gallery;
 use guidance::{Guidance, Situation};
 use publisher::MapPublisher;
@@ -69,6 +70,7 @@ pub struct AppliedSlot {
 pub struct Vehicle {
     link: VehicleLink,
     navigator: Navigator,
+    track: RecentTrack,
     guidance: Guidance,
     publisher: MapPublisher,
     gallery: Gallery,
@@ -103,7 +105,8 @@ impl Vehicle {
         let mut vehicle = Self {
             link,
             navigator,
-            guidance: Guidance::new(steering, policy, &durable, settings.planner.value(), now),
+            track: RecentTrack::default(),
+            guidance: Guidance::new(steering, policy, &durable, &settings, now),
             publisher: MapPublisher::default(),
             gallery: Gallery::default(),
             // The weights are those of labels of their epoch; a new epoch has no labels yet.
@@ -170,6 +173,7 @@ impl Vehicle {
     /// The vehicle's own sensors measured a displacement since the last call: metres east and north.
     pub fn handle_odometry(&mut self, dx_m: f64, dy_m: f64, heading_rad: f64, depth_m: f64, now: Instant) {
         self.navigator.handle_odometry(dx_m, dy_m, heading_rad, depth_m, now);
+        self.track.handle_place(self.navigator.position(), now);
         self.guidance.handle_travel(dx_m.hypot(dy_m));
     }
 
@@ -177,6 +181,7 @@ impl Vehicle {
     pub fn set_pose(&mut self, x_m: f64, y_m: f64, heading_rad: f64, depth_m: f64, now: Instant) {
         let before = self.navigator.position();
         self.navigator.set_pose(x_m, y_m, heading_rad, depth_m, now);
+        self.track.handle_place(self.navigator.position(), now);
         self.guidance.handle_travel(before.distance_m(MapPoint { x_m, y_m }));
     }
 

@@ -109,6 +109,8 @@ impl Vehicle {
             fix_age_s: self.navigator.last_fix().map(|at| now.since(at).as_secs_f64()),
             waypoint: self.guidance.waypoint(),
             path: self.guidance.path().clone(),
+            intent: self.guidance.intent(),
+            trail: self.track.corners(self.navigator.position(), now),
             epoch: self.storing.epoch(),
             labels: self.publisher.labels(),
             explored_cells: self.publisher.explored(),

@@ -220,8 +220,9 @@ impl Vehicle {
         let before = self.settings;
         self.settings = before.then(settings);
         self.durable.settings = self.settings.to_bytes();
-        if self.settings.planner.value() != before.planner.value() {
-            self.guidance.set_planner(self.settings.planner.value());
+        let choices = |settings: &Settings| (settings.planner.value(), settings.at_end.value());
+        if choices(&self.settings) != choices(&before) {
+            self.guidance.set_choices(&self.settings);
         }
         self.publisher.set_settings(&self.settings);
         self.publisher.select(&mut self.link);

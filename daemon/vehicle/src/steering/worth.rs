@@ -1,0 +1,42 @@
+//! The worth of a planned path: whether a new plan is better than the present one, and whether one pays at all.
+
+use crate::planning::{BlockValues, Node, PlanRequest, distance};
+use scenecast_protocol::directive::Utility;
+
+/// The gain a metre of a new plan, divided by that of the present one, from which the new one replaces it. Without such a
+/// margin two far goals of like worth take the vehicle to and fro, because each step changes the map.
+const MARGIN: f64 = 1.15;
+/// The mean value of a cell, divided by the largest weight, from which a look at it pays: a third look at a favoured label
+/// does, and a fourth one does not.
+const PAYS: f64 = 0.02;
+
+/// Whether the present plan is kept although another one was made from the same place.
+pub(super) fn keeps(q: &PlanRequest<'_>, present: &[Node], other: &[Node]) -> bool {
+    let rate = gain_a_metre(q, present);
+    rate > 0.0 && gain_a_metre(q, other) < MARGIN * rate
+}
+
+/// Whether a path shows a block of which the cells are worth another look.
+pub(super) fn pays(q: &PlanRequest<'_>, path: &[Node], utility: &Utility, cells_in_block: f64) -> bool {
+    let weights = utility.weights.values().map(|&weight| f64::from(weight.max(0)) / 100.0);
+    let others = [utility.exploration, utility.curiosity].map(|weight| f64::from(weight) / 100.0);
+    let largest = weights.chain(others).fold(0.0, f64::max);
+    let values = path.iter().flat_map(|&node| q.values.shown(node)).map(|block| f64::from(q.values.of(block)));
+    values.fold(0.0, f64::max) > PAYS * largest * cells_in_block
+}
+
+/// The values of all blocks that a path shows, each once.
+pub(super) fn gain(values: &BlockValues, path: &[Node]) -> f64 {
+    let mut blocks: Vec<usize> = path.iter().flat_map(|&node| values.shown(node)).collect();
+    blocks.sort_unstable();
+    blocks.dedup();
+    blocks.into_iter().map(|block| f64::from(values.of(block))).sum()
+}
+
+/// The gain of a path for each of its metres.
+fn gain_a_metre(q: &PlanRequest<'_>, path: &[Node]) -> f64 {
+    let places = std::iter::once(&q.from).chain(path);
+    let metres: f64 = places.zip(path).map(|(&a, &b)| distance(q.lattice.place(a), q.lattice.place(b))).sum();
+    // A stop and a turn cost as much as one step of the lattice.
+    gain(q.values, path) / (metres + q.lattice.step_m())
+}
