@@ -62,7 +62,7 @@ async function run(story, browser, scene) {
   try {
     await stage.open(browser, scene, story);
     await story.run(stage);
-    stage.noErrors(story.tolerates);
+    await stage.noErrors(story.tolerates);
     console.log(`ok    ${story.name} (${Math.round(performance.now() - start)} ms)`);
     if (stage.figures.length > 0) console.log(`      figures: ${stage.figures.join(", ")}`);
     return "ok";

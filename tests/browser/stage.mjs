@@ -15,6 +15,27 @@ const START_MS = Date.UTC(2026, 0, 1);
 /** The colours of CSS custom properties and pixels as [r, g, b]; a source text, since it runs in the page. */
 const IN_PAGE = `const ink = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).match(/[0-9a-f]{2}/gi).map((x) => parseInt(x, 16));`;
 
+/** Reports each text on the page, and each help text of an element, that has a value of the program in it. It runs in the page. */
+function watchTexts() {
+  const ATTRIBUTES = ["title", "aria-label", "aria-valuetext", "placeholder"];
+  const check = (value, where) => /\b(null|undefined|NaN)\b/.test(value) && window.reportProgramText(`${where}: ${value.slice(0, 120)}`);
+  const look = (node) => {
+    if (node.nodeType === Node.TEXT_NODE) {
+      if (!node.parentElement?.closest("script, style")) check(node.data, node.parentElement?.tagName);
+      return;
+    }
+    for (const name of ATTRIBUTES) if (node.getAttribute?.(name)) check(node.getAttribute(name), `${node.tagName} ${name}`);
+    node.childNodes.forEach(look);
+  };
+  new MutationObserver((changes) => {
+    for (const { type, target, addedNodes } of changes) {
+      if (type === "childList") addedNodes.forEach(look);
+      else if (type === "attributes") look(target.cloneNode(false));
+      else look(target);
+    }
+  }).observe(document, { subtree: true, childList: true, characterData: true, attributes: true, attributeFilter: ATTRIBUTES });
+}
+
 export class Stage {
   /** Measurements of a story, for the log. */
   figures = [];
@@ -23,10 +44,12 @@ export class Stage {
   async open(browser, { url, mocked, token }, story) {
     Object.assign(this, { url, mocked, token, browser });
     this.errors = [];
+    this.texts = [];
     this.posts = [];
     if (mocked) await this.steer({ scenario: story.scenario ?? "rich", down: false, stream: true, mute: false });
     const size = story.size ?? WIDE;
     this.context = await browser.newContext({ viewport: size, hasTouch: size === PHONE, acceptDownloads: true });
+    await this.watch(this.context);
     this.page = await this.context.newPage();
     this.page.setDefaultTimeout(TIMEOUT_MS);
     this.page.on("pageerror", (error) => this.errors.push(`page: ${error.stack}`));
@@ -42,6 +65,12 @@ export class Stage {
     if (story.stopped) await this.stopClock();
     await this.page.goto(url);
     if (!story.bare) await this.ready();
+  }
+
+  /** Collects texts of a context's pages that contain a value of the program. */
+  async watch(context) {
+    await context.exposeFunction("reportProgramText", (found) => this.texts.push(found));
+    await context.addInitScript(watchTexts);
   }
 
   /** From here on the page's clock stands still: its timers and frames run only in `tick`. */
@@ -138,7 +167,10 @@ export class Stage {
     return this.page.getByRole("button", { name, exact: true });
   }
 
-  noErrors(tolerated) {
+  async noErrors(tolerated) {
+    // Texts are reported in order, so all that were there before are here now.
+    if (!this.page.isClosed()) await this.page.evaluate(() => 0);
+    assert.deepEqual(this.texts, [], "no value of the program on the page");
     const bad = this.errors.filter((e) => !tolerated?.test(e));
     assert.deepEqual(bad, [], "no errors in the console");
   }

@@ -17,6 +17,7 @@ mod request;
 mod snapshot;
 pub mod state;
 mod tiles;
+mod truth;
 
 pub use export::{MapCells, MapFormat};
 pub use http::{Console, ConsoleListener, PendingRequest, bind, gzip, page_files, start};
@@ -24,3 +25,4 @@ pub use link_meter::LinkMeter;
 pub use request::{ClientRequest, Reply, SurfaceRequest, archived_cells, handle_request};
 pub use snapshot::{MissionFacts, Snapshot, measured_origin, snapshot};
 pub use tiles::TiledMap;
+pub use truth::Truth;

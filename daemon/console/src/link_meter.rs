@@ -3,6 +3,7 @@
 use crate::state::LinkRates;
 use scenecast_protocol::schedule::Audit;
 use scenecast_protocol::time::Instant;
+use scenecast_surface::Surface;
 use std::collections::VecDeque;
 use std::time::Duration;
 
@@ -15,6 +16,8 @@ const MAX_ENTRIES: usize = 240;
 pub struct LinkMeter {
     window: Duration,
     began: Instant,
+    /// The budgets up and down for which the audits count, bit/s.
+    budgets: [u32; 2],
     audits: [Audit; 2],
     /// The number of each entry, and its bits up and down.
     history: VecDeque<(u64, [u64; 2])>,
@@ -23,7 +26,22 @@ pub struct LinkMeter {
 impl LinkMeter {
     /// A meter with the window of the bit budget, which counts from `began` on.
     pub fn new(window: Duration, began: Instant) -> Self {
-        Self { window, began, audits: [Audit::new(window), Audit::new(window)], history: VecDeque::new() }
+        let audits = [Audit::new(window), Audit::new(window)];
+        Self { window, began, budgets: [0; 2], audits, history: VecDeque::new() }
+    }
+
+    /// Counts the highest rate anew in a direction of which the budget has changed. The bits before the change were within
+    /// the earlier budget.
+    pub fn handle_budgets(&mut self, surface: &Surface) {
+        let reported =
+            surface.vehicles().filter_map(|(vehicle, _)| surface.view(vehicle)?.status().map(|s| s.0.budget_bps));
+        let budgets = [reported.max().unwrap_or_else(|| surface.budget_bps()), surface.budget_bps()];
+        for ((audit, before), now) in self.audits.iter_mut().zip(&self.budgets).zip(budgets) {
+            if *before != now {
+                *audit = Audit::new(self.window);
+            }
+        }
+        self.budgets = budgets;
     }
 
     /// Counts a frame of `bits` on air from a vehicle.
@@ -62,7 +80,7 @@ impl LinkMeter {
         now.since(self.began).as_secs_f64()
     }
 
-    /// The highest rate in a window of the budget, bit/s, up (0) or down (1).
+    /// The highest rate in a window of the budget since it last changed, bit/s, up (0) or down (1).
     pub fn max_window_bps(&self, direction: usize) -> f64 {
         self.audits[direction].worst_window_bps()
     }

@@ -209,6 +209,7 @@ pub fn archived_cells(map: &VehicleMemory, cell_m: f64) -> MapCells {
         bounds: labels.bounds(),
         cell_m,
         moved_m: map.placement_m().unwrap_or((0.0, 0.0)),
+        names: map.labels().iter().filter_map(|(&label, book)| Some((label, book.name.clone()?))).collect(),
         tiles: labels.tiles().clone(),
         layers: layers::layers(&layers),
     }
@@ -264,6 +265,7 @@ fn map(surface: &Surface, vehicle: Address, cell_m: f64, now: Instant) -> Option
         bounds: surface.map_bounds(vehicle),
         cell_m,
         moved_m: (0.0, 0.0),
+        names: BTreeMap::new(),
         tiles: surface.map_tiles(vehicle)?,
         layers: layers::layers(&surface.map_layers(vehicle)),
     }))

@@ -48,6 +48,35 @@ pub struct MissionState {
     /// The folder in which the surface keeps its state; null in a rehearsal.
     #[serde(default)]
     pub storage: Option<StorageInfo>,
+    /// The true classes of a simulated sea floor; null where they are not known, and so in each real mission.
+    #[serde(default)]
+    pub truth: Option<TruthInfo>,
+}
+
+/// The true classes of a part of a simulated sea floor, of which `/api/v2/truth.png` is the picture. No vehicle knows them.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct TruthInfo {
+    /// The western edge of the picture in the world frame, metres.
+    pub west_m: f64,
+    /// The southern edge.
+    pub south_m: f64,
+    /// The eastern edge.
+    pub east_m: f64,
+    /// The northern edge.
+    pub north_m: f64,
+    /// The classes in the picture.
+    pub classes: Vec<TrueClass>,
+}
+
+/// A true class.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub struct TrueClass {
+    /// The value of its pixels.
+    pub value: u8,
+    /// Its name, such as "seagrass".
+    pub name: String,
+    /// The colour of its pixels, such as "#e69f00".
+    pub colour: String,
 }
 
 /// A layer of the map that vehicles can send in addition to the labels.

@@ -194,6 +194,7 @@ impl SurfaceShell {
         self.files.commit(self.host.surface_mut(), None, now);
         self.is_stale = false;
         if let Some(console) = &self.console {
+            self.meter.handle_budgets(self.host.surface());
             let snapshot = snapshot(self.host.surface(), &self.facts, &self.meter, now);
             console.snapshots.send_replace(Arc::new(snapshot));
         }

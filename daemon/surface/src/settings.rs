@@ -1,6 +1,6 @@
 //! The operator's settings of a vehicle: as typed, as ordered, and as in force.
 
-use scenecast_protocol::directive::{CellBand, Change, OrderStatus, PlannerKind, Settings, ShortDecimal};
+use scenecast_protocol::directive::{AtEnd, CellBand, Change, OrderStatus, PlannerKind, Settings, ShortDecimal};
 use scenecast_protocol::map::{LayerMask, LayerSet};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -12,6 +12,9 @@ use serde::{Deserialize, Serialize};
 pub struct SettingsOrder {
     /// The planner: lawnmower, greedy or horizon.
     pub planner: Option<String>,
+    /// What an adaptive survey does once no look pays any more: repeat (explore the rest of the area, then look at the
+    /// favoured labels again), explore (explore the rest, then hold) or hold.
+    pub at_end: Option<String>,
     /// The cells of the map that are sent: fine (all), coarse (every fourth in both directions), or coarse-to-fine (the
     /// coarse ones first where the backlog is large). The scene model keeps all cells.
     pub cells: Option<String>,
@@ -46,6 +49,7 @@ impl SettingsOrder {
         let names: Vec<&str> = layers.iter().map(|(_, layer)| &*layer.name).collect();
         let mut settings = Settings {
             planner: choice("planner", &self.planner, PlannerKind::from_name, "lawnmower, greedy or horizon")?,
+            at_end: choice("at_end", &self.at_end, AtEnd::from_name, "repeat, explore or hold")?,
             cells: choice("cells", &self.cells, CellBand::from_name, "fine, coarse-to-fine or coarse")?,
             layers: choice(
                 "layers",
@@ -104,6 +108,7 @@ impl SettingsOrder {
         let figure = |change| typed(change, 0.0, ShortDecimal::value);
         Self {
             planner: typed(settings.planner, String::new(), |p| text(p.name())),
+            at_end: typed(settings.at_end, String::new(), |choice| text(choice.name())),
             cells: typed(settings.cells, String::new(), |c| text(c.name())),
             layers: typed(settings.layers, String::new(), |mask| layer_names(mask, layers)),
             alpha: figure(settings.alpha),

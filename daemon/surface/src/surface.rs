@@ -280,8 +280,8 @@ impl Surface {
                 Some(SurfaceOutput::SlotDecided(vehicle, slot))
             }
             SurfaceEvent::Status(vehicle) => {
-                let (status, _) = self.link.vehicle(vehicle)?.status()?;
-                self.records.get_mut(&vehicle)?.handle_status(status, now);
+                let &(ref status, at) = self.link.vehicle(vehicle)?.status()?;
+                self.records.get_mut(&vehicle)?.handle_status(status, at);
                 self.relay.iter_mut().for_each(|relay| relay.handle_depth(vehicle, status.depth_m, now));
                 self.follow_in_force(vehicle)
             }

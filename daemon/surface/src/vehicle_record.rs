@@ -11,7 +11,7 @@ use scenecast_protocol::exemplar::Exemplar;
 use scenecast_protocol::link::PeerView;
 use scenecast_protocol::map::LabelGrid;
 use scenecast_protocol::time::Instant;
-use scenecast_protocol::wire::VehicleStatus;
+use scenecast_protocol::wire::{TrailCorner, VehicleStatus};
 use std::collections::VecDeque;
 use std::sync::Arc;
 use std::time::Duration;
@@ -86,6 +86,10 @@ pub struct VehicleRecord {
     restored: RestoredContact,
 }
 
+/// Ages of corners are whole seconds, and frames take their time through the water: a corner counts as later than a position
+/// from this difference on.
+const TRAIL_MARGIN_S: f64 = 0.5;
+
 /// Reported positions in the map frame: time, metres east, metres north.
 #[derive(Debug, Clone, Default)]
 pub struct Track {
@@ -109,6 +113,23 @@ impl Track {
     /// The number of positions so far, those that were dropped included.
     pub fn total(&self) -> u64 {
         self.total
+    }
+
+    /// Appends a pose that came in at `now`, and before it those corners of its trail that are later than the track so far. A
+    /// status whose pose is older than that changes nothing.
+    fn handle_pose(&mut self, status: &VehicleStatus, now: Instant) {
+        let last = self.points.back().map(|&(at, ..)| at);
+        if last.is_some_and(|last| now <= last) {
+            return;
+        }
+        let known_s = last.map_or(0.0, |last| last.as_secs_f64() + TRAIL_MARGIN_S);
+        for &TrailCorner { ago_s, place } in status.trail.iter().rev() {
+            let at_s = now.as_secs_f64() - f64::from(ago_s);
+            if at_s > known_s {
+                self.push(Instant::from_secs_f64(at_s), place.x_m, place.y_m);
+            }
+        }
+        self.push(now, status.position.x_m, status.position.y_m);
     }
 
     fn push(&mut self, at: Instant, x_m: f64, y_m: f64) {
@@ -194,8 +215,8 @@ impl VehicleRecord {
         self.earlier.version_base + self.whole.count + view.map_version()
     }
 
-    /// Takes a status. A new epoch voids everything that refers to labels.
-    pub fn handle_status(&mut self, status: &VehicleStatus, now: Instant) {
+    /// Takes a status, of which the pose came in at `at`. A new epoch voids everything that refers to labels.
+    pub fn handle_status(&mut self, status: &VehicleStatus, at: Instant) {
         self.restored = RestoredContact::default();
         if status.epoch != self.epoch {
             self.epoch = status.epoch;
@@ -203,7 +224,7 @@ impl VehicleRecord {
             self.exemplars = ExemplarCache::default();
             self.annotations.labels.clear();
         }
-        self.track.push(now, status.position.x_m, status.position.y_m);
+        self.track.handle_pose(status, at);
     }
 
     /// The vehicle has applied the version of a slot that was sent last.

@@ -3,6 +3,7 @@
 import { Command } from "./command.mjs";
 import { LAYERS, Vehicle } from "./vehicle.mjs";
 import { Direction } from "./link.mjs";
+import { TRUTH } from "./truth.mjs";
 
 export const SCENARIOS = {
   empty: { advance: 0 },
@@ -27,6 +28,7 @@ export class Mission {
     this.background = ["finer", "depth", "exemplars", "confidence"];
     this.layers = false;
     this.ended = false;
+    this.truth = false;
     this.command = new Command();
     this.down = new Direction(7);
     this.history = [];
@@ -92,6 +94,11 @@ export class Mission {
     return this.vehicles.reduce((sum, v) => sum + v.up.rateAt(this.nowS), 0);
   }
 
+  /** The highest rates count from the change of the budget on. */
+  handleBudget() {
+    for (const direction of [this.down, ...this.vehicles.map((v) => v.up)]) direction.maxBps = 0;
+  }
+
   utility(v, { weights, exploration = 0, curiosity = 0 }) {
     for (const [id, w] of Object.entries(weights)) v.weights.set(Number(id), w);
     Object.assign(v.terms, { exploration, curiosity });
@@ -106,6 +113,7 @@ export class Mission {
       position: this.position ?? null,
       storage: this.storage ?? null,
       command: this.command.json(),
+      truth: this.truth ? TRUTH : null,
       layers: LAYERS.map(({ name, unit }) => ({ name, unit, summary: `what ${name} means` })),
       link: {
         budget_bps: this.budgetBps, shares: this.shares, background: this.background, budget_window_s: 10,

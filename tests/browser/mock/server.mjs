@@ -7,7 +7,7 @@
 // POST /mock controls it in tests:
 //   {"scenario": "rich", "advance": 60, "times": 3, "speed": 20, "silent": true, "refuse": "utility",
 //    "loss": 0.3, "layers": true, "coarse": true, "position": {"x_m": 5, ..},
-//    "placement": {"version": 1, "east_m": 20, "north_m": -5}, "ended": true,
+//    "placement": {"version": 1, "east_m": 20, "north_m": -5}, "ended": true, "truth": true,
 //    "principals": [{"name": "anna", "role": "operator"}], "commander": "anna", "stream": false, "mute": true, "down": true}
 
 import http from "node:http";
@@ -17,6 +17,7 @@ import { fileURLToPath } from "node:url";
 import { gzipSync } from "node:zlib";
 import { Mission } from "./mission.mjs";
 import { faultOf, fit } from "./settings.mjs";
+import { PICTURE } from "./truth.mjs";
 
 const HERE = dirname(fileURLToPath(import.meta.url));
 const ASSETS = join(HERE, "../../../daemon/console/page");
@@ -85,6 +86,7 @@ async function api(mock, req, res, path) {
   if (req.method === "POST") return post(mock, req, res, path);
   if (path === "principal") return reply(res, 200, mission.command.principal(req.headers.cookie));
   if (path === "state") return reply(res, 200, mission.json());
+  if (path === "truth.png" && mission.truth) return send(res, 200, "image/png", PICTURE);
   if (path === "archive") return reply(res, 200, { maps: mission.archive ?? [] });
   const [, id, resource] = path.match(/^vehicles\/(\d+)\/(.+)$/) ?? [];
   const vehicle = mission.vehicles.find((v) => v.id === Number(id));
@@ -128,8 +130,9 @@ async function post(mock, req, res, path) {
     const sum = Object.values(given.shares ?? {}).reduce((a, b) => a + b, 0);
     if (sum > 100) return reply(res, 422, { error: `shares add up to ${sum} percent: allowed is 100 or less` });
     Object.assign(mission, { budgetBps: bps, shares: given.shares ?? mission.shares, background: given.background ?? mission.background });
-    const [response] = mission.vehicles.map((v) => v.directive.issue("budget", mission.nowS));
-    return accepted(mock, res, response);
+    mission.handleBudget();
+    const versions = mission.vehicles.map((v) => [v.id, v.directive.issue("budget", mission.nowS).version]);
+    return accepted(mock, res, { slot: "budget", versions: Object.fromEntries(versions) });
   }
   const [, id, resource] = path.match(/^vehicles\/(\d+)\/([\w-]+)(?:\/dismiss)?$/) ?? [];
   const v = mission.vehicles.find((x) => x.id === Number(id));
@@ -189,7 +192,7 @@ function steer(mock, order, res) {
   if ("in_force" in order) mission.vehicles[0].reported = order.in_force;
   if ("mismatch" in order) mission.vehicles[0].mismatch = order.mismatch;
   if ("earlier" in order) mission.vehicles[0].earlier = order.earlier;
-  for (const key of ["archive", "storage", "loss", "layers", "ended", "speed", "position"]) if (key in order) mission[key] = order[key];
+  for (const key of ["archive", "storage", "loss", "layers", "ended", "speed", "position", "truth"]) if (key in order) mission[key] = order[key];
   if ("disk" in order) {
     const [vehicle] = mission.vehicles;
     vehicle.disk = order.disk;

@@ -3,7 +3,7 @@
 const NUMBERS = {
   alpha: [1e-9, 1e3], beta: [1e-9, 1e3], gamma: [1e-12, 1e3], refine_words_per_s: [1, 1e8], frames_per_s: [0.01, 30],
 };
-const KEYS = ["planner", "cells", "layers", ...Object.keys(NUMBERS)];
+const KEYS = ["planner", "at_end", "cells", "layers", ...Object.keys(NUMBERS)];
 const nothing = () => Object.fromEntries(KEYS.map((k) => [k, null]));
 const stated = (order) => Object.fromEntries(Object.entries(order).filter(([k, v]) => KEYS.includes(k) && v !== null));
 
@@ -27,7 +27,7 @@ export class Settings {
 export function faultOf(order) {
   for (const [key, [low, high]] of Object.entries(NUMBERS)) {
     const value = order[key] ?? 0;
-    if (value !== 0 && !(value >= low && value <= high)) return `${key} ${value}: the range is ${low} to ${high}, or 0 as configured`;
+    if (value !== 0 && !(value >= low && value <= high)) return `${key} ${value}: the range is ${low} to ${high}, or 0 for the vehicle's default`;
   }
   return null;
 }

@@ -77,6 +77,7 @@ export default [
       await crewWithAnna(s);
       await as(s, "anna");
       const context = await s.browser.newContext();
+      await s.watch(context);
       const page = await context.newPage();
       try {
         await as(s, "bob", context, page);

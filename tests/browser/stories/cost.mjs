@@ -112,7 +112,8 @@ async function latency(s) {
   const samples = await s.page.evaluate(async () => {
     const { store } = await import("/js/store.js");
     const painted = () => new Promise((resolve) => requestAnimationFrame(() => requestAnimationFrame(resolve)));
-    const { speed } = store.snapshot.mission;
+    // The mission's clock in milliseconds of wall time, by the speed that each state reports.
+    let [clock, last] = [0, null];
     // The offset of the mission's clock: no state arrives before it was made, so the quickest one is the best estimate.
     let offset = Infinity;
     const updates = new Map();
@@ -120,9 +121,12 @@ async function latency(s) {
     source.addEventListener("state", (event) => {
       const at = performance.now();
       const state = JSON.parse(event.data);
-      offset = Math.min(offset, at - (1000 * state.now_s) / speed);
+      const wall = (s) => (1000 * s) / state.mission.speed;
+      clock += wall(state.now_s - (last ?? state.now_s));
+      last = state.now_s;
+      offset = Math.min(offset, at - clock);
       const { version, updated_s } = state.vehicles[0].map;
-      if (!updates.has(version)) updates.set(version, updated_s);
+      if (!updates.has(version)) updates.set(version, clock - wall(state.now_s - updated_s));
     });
     const found = [];
     let shown = store.map?.version ?? 0;
@@ -134,7 +138,7 @@ async function latency(s) {
       if (version > shown && updates.has(version)) {
         await (await fetch("/api/v2/state")).json();
         await painted();
-        found.push({ at, updated: (1000 * updates.get(version)) / speed, roundTrip: performance.now() - at });
+        found.push({ at, updated: updates.get(version), roundTrip: performance.now() - at });
       }
       shown = version;
     }

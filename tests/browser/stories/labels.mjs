@@ -37,6 +37,27 @@ async function firstImage(s) {
 
 export default [
   {
+    name: "the first mission follows the state, and stays closed once it is closed",
+    scenario: "rich",
+    async run(s) {
+      const card = ".first-mission summary";
+      await s.shows(card, /step 2 of 5: name/);
+      await s.inPage(({ rename }) => rename(1, "sand"));
+      await s.shows(card, /step 3 of 5: weigh/);
+      await s.page.locator("#label-list input[type=range]").first().focus();
+      await s.page.keyboard.press("ArrowRight");
+      await s.page.locator("#send-weights").click();
+      await s.until("the order", () => s.posts.some((p) => p.path.endsWith("/utility")));
+      await s.shows(card, /step [45] of 5/, { ms: 240000, advance: 2 });
+      await s.page.locator(".exemplar .request").first().click();
+      await s.shows(card, /all five steps are done/, { ms: 240000, advance: 2 });
+      await s.page.getByRole("button", { name: "Close for good" }).click();
+      await s.page.reload();
+      await s.ready();
+      assert.equal(await s.page.locator(".first-mission").count(), 0);
+    },
+  },
+  {
     name: "the list shows every label with its area",
     async run(s) {
       const labels = await firstLabels(s);
@@ -224,6 +245,17 @@ export default [
       assert.deepEqual(s.posts.at(-1).body, { planner: "greedy" });
       await s.shows(".planner .note", /applied/, { ms: 240000, advance: 2 });
       assert.equal((await s.vehicle()).planner, "greedy");
+    },
+  },
+  {
+    name: "the end of the survey is chosen and set without another choice of the planner",
+    async run(s) {
+      await s.page.selectOption("#at-end", "hold");
+      await s.page.locator("#send-planner").click();
+      await s.until("the message", () => s.posts.some((p) => p.path.endsWith("/settings")));
+      assert.deepEqual(s.posts.at(-1).body, { at_end: "hold" });
+      await s.until("the choice in force", async () => (await s.vehicle()).settings.in_force.at_end === "hold", { advance: 2 });
+      assert.equal(await s.page.locator("#at-end").inputValue(), "hold");
     },
   },
   {

@@ -4,6 +4,25 @@ const bits = (text) => text.replaceAll("\u202f", " ");
 
 export default [
   {
+    name: "a budget that was lowered is judged from its change on",
+    scenario: "rich",
+    async run(s) {
+      await s.until("a rate", async () => (await s.get("/state")).link.up.max_window_bps > 200, { advance: 2 });
+      await s.page.locator("#budget").fill("100");
+      await s.page.locator(".budget").getByRole("button", { name: "Set" }).click();
+      await s.until("the budget", async () => (await s.get("/state")).link.budget_bps === 100);
+      await s.until("no direction to be over the budget", async () => (await s.page.locator("#link .bar.over").count()) === 0);
+      await s.shows("#link .steps", /Version \d+|Queued|On air/);
+    },
+  },
+  {
+    name: "loss is not known while no frame comes in",
+    scenario: "silent",
+    async run(s) {
+      await s.shows("#link dl", /Recent loss, up \/ down\s+not known/);
+    },
+  },
+  {
     name: "the link shows rate, budget line, loss and bits by class",
     async run(s) {
       await s.shows("#link .direction", /max\. in \d+ s: \d+ % of budget/);

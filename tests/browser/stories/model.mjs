@@ -14,7 +14,7 @@ export default [
       await s.shows("#vehicle .age", /Status/, { ms: 60000, advance: 5 });
       await open(s);
       await field(s, "gamma").fill("5000");
-      await s.shows("#gamma-fault", /The range is 1e-12 to 1000, or 0 as configured/);
+      await s.shows("#gamma-fault", /The range is 1e-12 to 1000, or 0 for the vehicle's default/);
       assert.ok(await send(s).isDisabled());
       await field(s, "gamma").fill("1e-5");
       await field(s, "frames_per_s").fill("0.001");
@@ -34,7 +34,7 @@ export default [
     },
   },
   {
-    name: "a cleared field means as configured, an empty one unchanged",
+    name: "a cleared field means the default, an empty one unchanged",
     scenario: "rich",
     async run(s) {
       await open(s);
@@ -45,7 +45,7 @@ export default [
       assert.deepEqual(sent(s)[0], { alpha: 0.5 });
       await field(s, "alpha").fill("");
       await s.page.locator("#model-title").click();
-      await s.until("the placeholder", async () => (await field(s, "alpha").getAttribute("placeholder")) === "as configured");
+      await s.until("the placeholder", async () => (await field(s, "alpha").getAttribute("placeholder")) === "the vehicle's default");
       await send(s).click();
       await s.until("the message", () => sent(s).length === 2);
       assert.deepEqual(sent(s)[1], { alpha: 0 });

@@ -4,6 +4,26 @@ const greyed = (s, wanted = true) => s.visible("#map-age.stale", wanted);
 
 export default [
   {
+    name: "an announcement does not replace one before it, and equal ones in a burst are one",
+    scenario: "rich",
+    async run(s) {
+      const spoken = () => s.page.locator("#announce > span").allInnerTexts();
+      await s.page.evaluate(async () => {
+        const { announce } = await import("/js/dom.js");
+        for (const message of ["Utility: Applied", "Fence: Refused", "Fence: Refused"]) announce(message);
+      });
+      assert.deepEqual((await spoken()).slice(-2), ["Utility: Applied", "Fence: Refused"]);
+      await s.steer({ silent: true, advance: 200 });
+      await s.until("the silence", async () => (await spoken()).some((line) => / is silent/.test(line)));
+      assert.ok((await spoken()).includes("Fence: Refused"), "the announcement before it is still there");
+      await s.page.evaluate(async () => {
+        const { announce } = await import("/js/dom.js");
+        for (let i = 0; i < 50; i += 1) announce(`line ${i}`);
+      });
+      assert.equal((await spoken()).length, 20);
+    },
+  },
+  {
     name: "a silent vehicle has a lasting banner and everything of it is stale",
     scenario: "silent",
     async run(s) {

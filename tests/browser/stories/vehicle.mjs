@@ -2,6 +2,21 @@ import assert from "node:assert/strict";
 
 export default [
   {
+    name: "a contact is not overdue while frames come in",
+    scenario: "rich",
+    async run(s) {
+      const set = (received, next) => s.inPage(({ store }, [r, n]) => {
+        const state = structuredClone(store.snapshot);
+        Object.assign(state.vehicles.find((v) => v.id === store.selectedId), { last_received_s: state.now_s - r, next_contact_s: state.now_s - n });
+        store.setSnapshot(state);
+      }, [received, next]);
+      await set(0, 4);
+      await s.shows("#vehicle dl", /Next contact\s+T\+[\d:]+, now/);
+      await set(300, 290);
+      await s.shows("#vehicle dl", /Next contact\s+T\+[\d:]+, overdue/);
+    },
+  },
+  {
     name: "the vehicle's status is shown with its age",
     async run(s) {
       await s.shows("#vehicle .age", /Status .* old · received .* ago, due every/, { ms: 60000, advance: 5 });

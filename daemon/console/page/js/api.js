@@ -12,9 +12,9 @@ export class ApiError extends Error {}
 
 async function read(path) {
   const response = await fetch(BASE + path, { cache: "no-store", signal: AbortSignal.timeout(TIMEOUT_MS) });
-  const body = await response.json().catch(() => ({}));
-  if (!response.ok) throw new ApiError(body.error ?? `${response.status} ${response.statusText}`);
-  return body;
+  if (response.ok) return response.json();
+  const { error } = await response.json().catch(() => ({}));
+  throw new ApiError(error ?? `${response.status} ${response.statusText}`);
 }
 
 async function write(path, order) {
@@ -24,6 +24,8 @@ async function write(path, order) {
       method: "POST",
       headers: { "content-type": "application/json", "x-scenecast": "1" },
       body: JSON.stringify(order),
+      // An order is sent even if the page is closed or loaded again at once.
+      keepalive: true,
       signal: AbortSignal.timeout(TIMEOUT_MS),
     });
   } catch {
@@ -47,7 +49,6 @@ export const requestExemplar = (id, label, action, image = null) =>
 export const sendConstraints = (id, order) => write(`/vehicles/${id}/constraints`, order);
 export const sendFence = (id, fence) => write(`/vehicles/${id}/fence`, fence);
 export const sendLimits = (id, limits) => write(`/vehicles/${id}/limits`, limits);
-export const sendPlanner = (id, planner) => write(`/vehicles/${id}/settings`, { planner });
 export const sendSettings = (id, settings) => write(`/vehicles/${id}/settings`, settings);
 /** The most informative settings within `bps` bit/s; null: within the map's share of the vehicle's budget. */
 export const readFit = (id, bps) => read(`/vehicles/${id}/fit${bps === null ? "" : `?bits_per_s=${bps}`}`);

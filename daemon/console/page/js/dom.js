@@ -11,8 +11,13 @@ export function h(spec, props = {}, ...children) {
     else if (key.includes("-") || key === "role" || key === "for") node.setAttribute(key, value);
     else node[key] = value;
   }
-  node.append(...children.filter((c) => c !== null && c !== undefined));
+  fill(node, ...children);
   return node;
+}
+
+/** Replaces the children of a node; null and undefined stand for no child. */
+export function fill(node, ...children) {
+  node.replaceChildren(...children.filter((c) => c !== null && c !== undefined));
 }
 
 export const $ = (id) => document.getElementById(id);
@@ -30,9 +35,17 @@ export function show(node, visible) {
   if (node.hidden === visible) node.hidden = !visible;
 }
 
-/** Announces `message` once to screen readers; values that change each second are not announced. */
+const MAX_ANNOUNCED = 20;
+const BURST_MS = 2000;
+
+/** Announces `message` once to screen readers; values that change each second are not announced. Each announcement is a line of
+ * its own, so that none replaces one that is not spoken yet; equal ones in a burst are one. */
 export function announce(message) {
-  $("announce").textContent = message;
+  const list = $("announce");
+  const last = list.lastElementChild;
+  if (last?.textContent === message && performance.now() - Number(last.dataset.at) < BURST_MS) return;
+  list.append(h("span", { data: { at: performance.now() } }, message));
+  while (list.childElementCount > MAX_ANNOUNCED) list.firstElementChild.remove();
 }
 
 /** Keeps one child per key in `list`, in the order of `items`; `make` builds, `update` refreshes. */

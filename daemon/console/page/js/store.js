@@ -99,5 +99,8 @@ export function isSilent(vehicle) {
   return age > 3 * vehicle.expected_interval_s;
 }
 
+/** Whether a frame of the vehicle came in within the interval in which one is expected. */
+export const isHeard = (vehicle) => vehicle.last_received_s !== null && ageOf(vehicle.last_received_s) <= vehicle.expected_interval_s;
+
 /** Stale: the values shown of this vehicle may have changed since. */
 export const isStale = (vehicle) => !store.connected || isSilent(vehicle);

@@ -28,6 +28,8 @@ pub struct MapCells {
     pub cell_m: f64,
     /// The shift from the map frame to the world frame, metres east and north.
     pub moved_m: (f64, f64),
+    /// The operator's names of labels.
+    pub names: BTreeMap<u8, String>,
     pub(crate) tiles: Tiles,
     pub(crate) layers: Vec<CellLayer>,
 }
@@ -109,6 +111,7 @@ impl MapCells {
             bounds: grid.bounds(),
             cell_m,
             moved_m: (0.0, 0.0),
+            names: BTreeMap::new(),
             tiles: ReplicaTile::tiles_of(grid),
             layers: Vec::new(),
         }

@@ -51,10 +51,11 @@ pub(super) fn geojson(cells: &MapCells, origin: Option<Origin>) -> String {
     let feature = |(label, polygons): (u8, Vec<Polygon>)| {
         let count = counts.get(&label).copied().unwrap_or(0);
         let rings = |polygon: &Polygon| polygon.iter().map(|r| r.iter().map(corner).collect()).collect::<Vec<Value>>();
+        let (name, area_m2) = (cells.names.get(&label), count as f64 * cells.cell_m * cells.cell_m);
         json!({
             "type": "Feature",
             "id": label,
-            "properties": { "label": label, "area_m2": count as f64 * cells.cell_m * cells.cell_m },
+            "properties": { "label": label, "name": name, "area_m2": area_m2 },
             "geometry": { "type": "MultiPolygon", "coordinates": polygons.iter().map(rings).collect::<Vec<_>>() },
         })
     };

@@ -159,6 +159,14 @@ fn readings() -> Vec<Operation> {
             Content::Json(schema::<Fit>),
             || get(readings::fit),
         ),
+        read(
+            "/api/v2/truth.png",
+            "truth",
+            "The true classes of a simulated sea floor as an indexed PNG, north up; `truth` of the state has its outline and its \
+             classes",
+            Content::File("image/png"),
+            || get(readings::truth),
+        ),
         read("/api/openapi.json", "openapi", "This document", Content::File("application/json"), || {
             get(readings::document)
         }),

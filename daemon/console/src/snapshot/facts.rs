@@ -1,10 +1,12 @@
 //! Facts of the mission that the surface does not have, and mission time in the API.
 
 use crate::state::{Origin, StorageInfo};
+use crate::truth::Truth;
 use scenecast_config::{self as config, Config};
 use scenecast_core::LatLon;
 use scenecast_protocol::mac::ModemProfile;
 use scenecast_protocol::time::Instant;
+use std::sync::Arc;
 
 /// Facts of the mission that the surface does not have.
 #[derive(Debug, Clone, PartialEq)]
@@ -29,6 +31,8 @@ pub struct MissionFacts {
     pub origin: Option<Origin>,
     /// The folder in which the surface keeps its state, if it has one.
     pub storage: Option<StorageInfo>,
+    /// The true classes of a simulated sea floor, once they are known.
+    pub truth: Option<Arc<Truth>>,
 }
 
 impl MissionFacts {
@@ -45,6 +49,7 @@ impl MissionFacts {
             frame_bits: modem.bits_on_air(modem.frame_bytes),
             origin: configured_origin(config),
             storage: None,
+            truth: None,
         }
     }
 }

@@ -14,10 +14,12 @@ pub use position::measured_origin;
 
 use crate::link_meter::LinkMeter;
 use crate::state::{LayerInfo, MissionInfo, MissionState, VehicleState};
+use crate::truth::Truth;
 use axum::body::Bytes;
 use scenecast_protocol::map::{BUILT_IN_LAYERS, LayerDescriptor};
 use scenecast_protocol::time::Instant;
 use scenecast_surface::Surface;
+use std::sync::Arc;
 
 /// The state at one moment.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -25,13 +27,15 @@ pub struct Snapshot {
     pub state: MissionState,
     /// The same state as JSON; empty before the first.
     pub json: Bytes,
+    /// The true classes of a simulated sea floor.
+    pub truth: Option<Arc<Truth>>,
 }
 
 impl Snapshot {
-    fn new(state: MissionState) -> Self {
+    fn new(state: MissionState, truth: Option<Arc<Truth>>) -> Self {
         // All keys of maps in these types are strings or numbers, so this cannot fail.
         let json = serde_json::to_vec(&state).unwrap_or_default().into();
-        Self { state, json }
+        Self { state, json, truth }
     }
 
     /// A vehicle by its address.
@@ -42,7 +46,7 @@ impl Snapshot {
 
 /// The state of the surface.
 pub fn snapshot(surface: &Surface, facts: &MissionFacts, meter: &LinkMeter, now: Instant) -> Snapshot {
-    Snapshot::new(MissionState {
+    let state = MissionState {
         now_s: seconds(now),
         mission: MissionInfo {
             name: facts.name.clone(),
@@ -57,7 +61,9 @@ pub fn snapshot(surface: &Surface, facts: &MissionFacts, meter: &LinkMeter, now:
         command: command_state(surface.command(), now),
         layers: surface.layers().iter().map(|(_, layer)| layer_info(layer)).collect(),
         storage: facts.storage.clone(),
-    })
+        truth: facts.truth.as_ref().map(|truth| truth.info.clone()),
+    };
+    Snapshot::new(state, facts.truth.clone())
 }
 
 fn layer_info(layer: &LayerDescriptor) -> LayerInfo {

@@ -11,7 +11,7 @@ use scenecast_protocol::coordinates::MapPoint;
 use scenecast_protocol::directive::{self, PlannerKind, REPORTED_SLOTS, SlotProgress};
 use scenecast_protocol::link::{InForce, PeerView};
 use scenecast_protocol::time::Instant;
-use scenecast_protocol::wire::{Address, DiskReport, VehicleMode, VehicleStatus};
+use scenecast_protocol::wire::{Address, DiskReport, Intent, VehicleMode, VehicleStatus};
 use scenecast_surface::record::StoredNote;
 use scenecast_surface::{SettingsOrder, Surface, VehicleRecord};
 
@@ -35,7 +35,7 @@ fn vehicle(
         last_received_s: record.last_received(&view).map(seconds),
         expected_interval_s: expected_interval_s(surface, &view, record, facts),
         next_contact_s: view.next_contact(now).map(seconds),
-        status: record.status(&view).map(|(s, at)| status(s, *at)),
+        status: record.status(&view).map(|(s, at)| status(s, record, *at)),
         track: record.track.iter().map(|(at, x, y)| (seconds(at), x, y)).collect(),
         map: map(surface, address, record, &view, labels.values().sum(), facts),
         labels: labels.iter().map(|(&l, &n)| label(l, n, record, &view, address, facts)).collect(),
@@ -133,7 +133,7 @@ fn in_force<T, O: for<'a> From<&'a T>>(applied: &Option<(u16, T)>) -> Option<App
     Some(AppliedOrder { version: *version, order: order.into() })
 }
 
-fn status(s: &VehicleStatus, at: Instant) -> StatusReport {
+fn status(s: &VehicleStatus, record: &VehicleRecord, at: Instant) -> StatusReport {
     StatusReport {
         at_s: seconds(at),
         pose: ReportedPose {
@@ -147,7 +147,7 @@ fn status(s: &VehicleStatus, at: Instant) -> StatusReport {
         mode: mode(s.mode),
         autopilot_silent: s.autopilot_silent,
         reason: s.reason.name().map(str::to_owned),
-        activity: activity(s),
+        activity: activity(s, record),
         plan: PlannedPath {
             waypoint: s.waypoint.map(MapPoint::xy),
             path: s.path.points.iter().copied().map(MapPoint::xy).collect(),
@@ -177,8 +177,8 @@ fn mode(mode: VehicleMode) -> ReportedMode {
     }
 }
 
-/// Mode and reason as a text.
-fn activity(s: &VehicleStatus) -> String {
+/// Mode with its reason or purpose as a text.
+fn activity(s: &VehicleStatus, record: &VehicleRecord) -> String {
     let mode = match s.mode {
         VehicleMode::Survey => "surveying",
         VehicleMode::Hold => "holding",
@@ -188,9 +188,23 @@ fn activity(s: &VehicleStatus) -> String {
         VehicleMode::Done => "done",
     };
     if s.has_arrived() {
-        return format!("{mode}: arrived");
+        return format!("{mode}: nothing left to survey");
+    }
+    if let Some(intent) = s.intent {
+        return format!("{mode}: {}", purpose(intent, record));
     }
     s.reason.name().map_or(mode.to_owned(), |reason| format!("{mode}: {reason}"))
+}
+
+fn purpose(intent: Intent, record: &VehicleRecord) -> String {
+    match intent {
+        Intent::Unseen => "looking at unseen floor".to_owned(),
+        Intent::Curiosity => "looking at unusual places".to_owned(),
+        Intent::Label(label) => {
+            let name = record.label_book(label).and_then(|book| book.name.clone());
+            format!("looking for {}", name.unwrap_or_else(|| format!("label {label}")))
+        }
+    }
 }
 
 fn label(

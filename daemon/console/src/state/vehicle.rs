@@ -121,7 +121,8 @@ pub struct StatusReport {
     pub autopilot_silent: bool,
     /// The reason for the mode, unless it is the survey: order, fence, distance, time, silence, depth or altitude, no path.
     pub reason: Option<String>,
-    /// Mode and reason as a text, such as "holding: fence"; "holding: arrived" at the end of the survey's plan.
+    /// Mode with its reason or purpose as a text, such as "holding: fence", "surveying: looking for label 5" or, at the end of the
+    /// plan, "holding: nothing left to survey".
     pub activity: String,
     /// The planned path of the vehicle, where reported.
     #[serde(flatten)]

@@ -11,10 +11,11 @@ import { clickAt, finish, grab, pen, penKeys } from "../fence/edit.js";
 import { drawVehicle, drawSurface } from "./vehicle-marker.js";
 import { boxInWorld, inWorld, viewOf } from "./frames.js";
 import { listen } from "./input.js";
-import { drawLegend, layer, painterOf } from "./layers.js";
+import { drawLegend, layer, painterOf, toggleTruth } from "./layers.js";
 import { addPoint, drawMeasure, measure, toggleMeasure } from "./measure.js";
 import { drawGrid, drawNorth, drawRings, drawScaleBar } from "./overlays.js";
 import { showReadout } from "./readout.js";
+import { TRUTH, drawTruth } from "./truth.js";
 import { View } from "./view.js";
 import { pathOf } from "./path.js";
 
@@ -38,7 +39,7 @@ export function startChart() {
     point: hover,
     click,
     grab: (px, py) => (measure.on ? null : grab(view, px, py)),
-    keys: { ...penKeys(view), 0: fit, f: follow, F: follow, m: measureKey, M: measureKey, Escape: end, Enter: () => click(view.width / 2, view.height / 2) },
+    keys: { ...penKeys(view), 0: fit, f: follow, F: follow, m: measureKey, M: measureKey, t: truthKey, T: truthKey, Escape: end, Enter: () => click(view.width / 2, view.height / 2) },
   });
   canvas.addEventListener("focus", redraw);
   canvas.addEventListener("blur", redraw);
@@ -85,6 +86,11 @@ function end() {
 
 function measureKey() {
   toggleMeasure();
+  store.emit("view");
+}
+
+function truthKey() {
+  toggleTruth();
   store.emit("view");
 }
 
@@ -167,7 +173,8 @@ function draw() {
   c.fillRect(0, 0, view.width, view.height);
   const vehicles = store.snapshot?.vehicles ?? [];
   const byChoice = [...vehicles].sort((a, b) => (a.id === store.selectedId) - (b.id === store.selectedId));
-  for (const v of byChoice) drawMap(c, v);
+  if (layer.name === TRUTH) drawTruth(c, view, redraw);
+  else for (const v of byChoice) drawMap(c, v);
   if (options.grid) drawGrid(c, view, ink);
   const surface = surfaceAt();
   const s = store.vehicle?.status;

@@ -10,12 +10,15 @@ import { EDGE } from "../tiles.js";
 import { blocksOf, hasCoarse } from "./coarse.js";
 import { lookOf } from "./layer-look.js";
 import { ageTones, footprintTones, labelTones, layerTones, paintTile, sampleTone } from "./raster.js";
+import { TRUTH, truthInfo, truthLegend } from "./truth.js";
 
 const AGE_REPAINT_S = 5;
 /** Painted tiles that are kept of a map. */
 const MAX_PAINTED = 4096;
 const NO_BLOCKS = [];
 export const layer = { name: "label", highlight: null };
+/** The layer to which the key T returns. */
+let beforeTruth = "label";
 const painted = new Map();
 let legendKey = "";
 let bookEdits = 0;
@@ -25,9 +28,16 @@ onTheme(() => {
   legendKey = "";
 });
 
-/** The layers that the chosen vehicle's map can show. */
+/** The layers that can be shown: those of the chosen vehicle's map, and the true classes of a simulated sea floor. */
 export function layerNames() {
-  return ["label", "age", ...(store.map?.layers.map((p) => p.name).sort() ?? [])];
+  return ["label", "age", ...(store.map?.layers.map((p) => p.name).sort() ?? []), ...(truthInfo() ? [TRUTH] : [])];
+}
+
+/** Changes between the true classes and the layer that was shown before. */
+export function toggleTruth() {
+  const isTruth = layer.name === TRUTH;
+  if (!isTruth) beforeTruth = layer.name;
+  setLayer(isTruth ? beforeTruth : TRUTH);
 }
 
 export function setLayer(name) {
@@ -87,6 +97,14 @@ export function ageTop(map) {
   return Math.ceil(oldest / step) * step;
 }
 
+function drawTruthLegend() {
+  const key = JSON.stringify(truthInfo());
+  if (key === legendKey) return;
+  legendKey = key;
+  show($("legend"), truthInfo() !== null);
+  if (truthInfo()) $("legend").replaceChildren(...truthLegend());
+}
+
 const summaryOf = (name) => store.snapshot?.layers.find((l) => l.name === name)?.summary ?? "";
 
 export function drawLegend() {
@@ -94,6 +112,7 @@ export function drawLegend() {
   const shown = map?.layers.find((p) => p.name === layer.name);
   const top = layer.name === "age" && map ? ageTop(map) : 0;
   const coarse = layer.name === "label" && Boolean(map) && hasCoarse(map);
+  if (layer.name === TRUTH) return drawTruthLegend();
   const look = shown ? lookOf(shown) : { at: ramp, low: "now", high: span(top) };
   const key = `${layer.name}.${look.low}.${look.high}.${coarse}`;
   if (key === legendKey) return;

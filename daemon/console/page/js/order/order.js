@@ -91,10 +91,17 @@ export class Order {
     Object.assign(edit, { busy: true, error: null });
     store.emit("edit");
     try {
-      const { version } = await this.post(vehicle, (part = WHOLE) => (sending.has(part) ? sending.get(part).value : this.read(vehicle, part)));
-      this.sentVersions.add(vehicle, version);
+      const accepted = await this.post(vehicle, (part = WHOLE) => (sending.has(part) ? sending.get(part).value : this.read(vehicle, part)));
+      // An order to all vehicles has a version for each.
+      const version = accepted.version ?? accepted.versions?.[vehicle.id];
+      if (version !== undefined) this.sentVersions.add(vehicle, version);
       edit.version = version;
       for (const [part, sent] of sending) {
+        if (version === undefined) {
+          // The surface alone obeys it, so there is no order to wait for.
+          if (edit.parts.get(part) === sent) edit.parts.delete(part);
+          continue;
+        }
         sent.version = version;
         const now = edit.parts.get(part);
         // The operator continued to edit while the order was on its way.

@@ -4,7 +4,7 @@ import { dismissEarlierMap, sendCommand } from "../api.js";
 import { hasCommand } from "../command.js";
 import { $, announce, h, keyed, show, text } from "../dom.js";
 import { freeSpace, missionTime, span } from "../format.js";
-import { ageOf, isSilent, store } from "../store.js";
+import { ageOf, isHeard, isSilent, store } from "../store.js";
 import { retryNow } from "../feed.js";
 
 let announced = "";
@@ -117,6 +117,7 @@ export function contact(v) {
   if (v.next_contact_s === null) return "The next contact is unknown.";
   const wait = v.next_contact_s - store.nowS;
   const when = missionTime(v.next_contact_s);
+  if (wait < 0 && isHeard(v)) return "The vehicle is in contact.";
   return wait >= 0 ? `Next contact in ${span(wait)}, at ${when}.` : `Contact was due ${span(-wait)} ago, at ${when}.`;
 }
 

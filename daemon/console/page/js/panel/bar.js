@@ -14,7 +14,7 @@ function update() {
   text(feed, store.connected ? "Live" : lost ? "Not connected" : "Connecting");
   if (!store.snapshot) return;
   const { mission, vehicles } = store.snapshot;
-  text($("mission"), mission.speed === 1 ? mission.name : `${mission.name} ×${mission.speed}`);
+  text($("mission"), mission.speed === 1 ? mission.name : `${mission.name} ×${Number(mission.speed.toPrecision(3))}`);
   text($("clock"), missionTime(store.nowS));
   keyed($("vehicles"), vehicles, (v) => v.id, make, refresh);
   document.title = `${vehicles.some(isSilent) ? "(silent) " : ""}scenecast: ${mission.name}`;

@@ -2,21 +2,26 @@
 
 import { $, h } from "../dom.js";
 
+const ANYWHERE = [["Shift+H", "hold the vehicle, or resume; asks first"], ["Shift+A", "abort the mission; asks first"]];
 const KEYS = [
   ["Arrows", "pan the map"], ["+ and \u2212", "zoom"], ["0", "show everything"], ["F", "follow the vehicle"],
   ["N, P", "constraints: next, previous corner; Shift with an arrow key moves it, Delete removes it"],
   ["Enter", "set a corner, a point to measure, the return point at the cross; Escape ends"],
-  ["M", "measure"], ["Tab", "move to the next control"],
+  ["M", "measure"], ["T", "in a rehearsal: the true sea floor, or the map again"], ["Tab", "move to the next control"],
   ["Wheel, drag, pinch", "zoom and pan with mouse or fingers"],
 ];
+
+const list = (keys) => h("dl.keys", {}, ...keys.map(([key, does]) => h("div", {}, h("dt", {}, key), h("dd", {}, does))));
 
 export function startKeys() {
   $("keys-open").addEventListener("click", () => {
     const dialog = $("dialog");
     dialog.replaceChildren(
       h("h2", { id: "dialog-title" }, "Keys"),
+      h("p", {}, "Everywhere, except while you type:"),
+      list(ANYWHERE),
       h("p", {}, "On the map, while it has the focus:"),
-      h("dl.keys", {}, ...KEYS.map(([k, does]) => h("div", {}, h("dt", {}, k), h("dd", {}, does)))),
+      list(KEYS),
       h("div.buttons", {}, h("button.primary", { type: "button", onclick: () => dialog.close() }, "Close")),
     );
     dialog.showModal();

@@ -13,7 +13,7 @@ const latest = new WeakMap();
 
 export function makeRow(label) {
   const of = () => latest.get(node);
-  const chip = h("button.chip", { type: "button", onclick: () => highlight(label.id) });
+  const chip = h("button.chip", { type: "button", title: "Show only this label on the map; press again for all labels", onclick: () => highlight(label.id) });
   const name = h("button.name", { type: "button", title: "Name, colour, merge", onclick: () => editLabel(of()) });
   const size = h("span.area");
   const slider = h("input", { type: "range", min: -1, max: 1, step: 0.05, oninput: () => weightsOrder.set(store.vehicle, slider.valueAsNumber, label.id) });

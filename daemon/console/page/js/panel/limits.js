@@ -99,7 +99,7 @@ function amountLine([key, name, hint, max]) {
 
 function reactionLine([key, name]) {
   const pick = h("select", { onchange: () => set(key, pick.value || null) },
-    h("option", { value: "" }, "as configured"), ...["hold", "return", "surface"].map((r) => h("option", { value: r }, r)));
+    h("option", { value: "" }, "the vehicle's default"), ...["hold", "return", "surface"].map((r) => h("option", { value: r }, r)));
   const node = h("label.limit", {}, h("span.caption", {}, name), pick);
   return { node, update: (limits) => (pick.value = limits[key] ?? "") };
 }

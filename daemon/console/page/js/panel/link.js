@@ -2,7 +2,7 @@
 
 import { $, h, row, text } from "../dom.js";
 import { ago, bits, count, none, percent, rate, span } from "../format.js";
-import { ageOf, isStale, store } from "../store.js";
+import { ageOf, isSilent, isStale, store } from "../store.js";
 import { budgetParts, refreshBudget } from "./budget.js";
 import { drawHistory } from "./history.js";
 
@@ -14,6 +14,8 @@ function classNames(link) {
 }
 const classLine = (c) => h("tr", { data: { class: c } }, h("th", { scope: "row" }, c), h("td"), h("td", {}, h("span.share", {}, h("span"))), h("td"));
 const directions = { up: direction("Up", "vehicle to surface"), down: direction("Down", "surface to vehicle") };
+/** Loss while no frame comes in. */
+const UNKNOWN = "not known";
 const history = h("canvas", { role: "img" });
 const values = {};
 /** Rows with reports of the selected vehicle or measurements of it: grey while it is silent. */
@@ -64,11 +66,13 @@ function update() {
   const link = store.snapshot?.link;
   if (!link) return;
   $("link").classList.toggle("stale", !store.connected);
-  refreshDirection(directions.up, link.up, link);
-  refreshDirection(directions.down, link.down, link);
-  values.loss(`${percent(link.up.loss, 1)} / ${percent(link.down.loss, 1)}`);
+  const reportedBudgets = store.snapshot.vehicles.map((v) => v.status?.budget_bps ?? 0);
+  refreshDirection(directions.up, link.up, link, Math.max(...reportedBudgets, 0) || link.budget_bps);
+  refreshDirection(directions.down, link.down, link, link.budget_bps);
+  const losses = ({ up, down }) => `${percent(up.loss, 1)} / ${percent(down.loss, 1)}`;
   const own = store.vehicle?.link;
-  values.recent(own ? `${percent(own.up.loss, 1)} / ${percent(own.down.loss, 1)}` : none);
+  values.loss(link.up.frames > 0 ? losses(link) : UNKNOWN);
+  values.recent(own && !isSilent(store.vehicle) && store.vehicle.last_received_s !== null ? losses(own) : UNKNOWN);
   values.refused(`${store.vehicle?.status?.refused_frames ?? 0} / ${own?.dropped.unauthenticated ?? 0}`);
   const ownBudget = store.vehicle?.status?.budget_bps;
   values.own(ownBudget ? rate(ownBudget) : none);
@@ -100,13 +104,13 @@ function lag() {
 }
 
 /** The bar runs to the budget line at 80 % of its length, so that a breach would show. */
-function refreshDirection(d, side, link) {
-  const place = (bps) => `${Math.min(100, (80 * bps) / link.budget_bps)}%`;
+function refreshDirection(d, side, link, budgetBps) {
+  const place = (bps) => `${Math.min(100, (80 * bps) / budgetBps)}%`;
   d.bar.children[0].style.width = place(side.bps_1min);
   d.bar.children[1].style.left = place(side.max_window_bps);
-  d.bar.classList.toggle("over", side.max_window_bps > link.budget_bps);
+  d.bar.classList.toggle("over", side.max_window_bps > budgetBps);
   text(d.now, rate(side.bps_1min));
-  text(d.max, `max. in ${link.budget_window_s} s: ${percent(side.max_window_bps / link.budget_bps)} of budget`);
+  text(d.max, `max. in ${link.budget_window_s} s: ${percent(side.max_window_bps / budgetBps)} of budget`);
   d.node.title = `${count(side.frames)} frames, ${count(side.lost)} lost`;
 }
 

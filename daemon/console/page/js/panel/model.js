@@ -20,17 +20,17 @@ const CELLS = { fine: (m) => `all, ${m(1)}`, "coarse-to-fine": (m) => `${m(SIDE)
 const KEYS = [...NUMBERS.map(([key]) => key), "cells", "layers"];
 const MAX_BPS = 1e7;
 const UNCHANGED = "unchanged";
-const CONFIGURED = "as configured";
+const DEFAULT = "the vehicle's default";
 
 const read = (v) => Object.fromEntries(KEYS.map((k) => [k, v.settings?.requested[k] ?? null]));
 const stated = (settings) => Object.fromEntries(Object.entries(settings).filter(([, value]) => value !== null));
 // The planner uses the same slot, so both orders share the list of versions that this page sent.
 export const order = new Order("settings", read, (v, value) => sendSettings(v.id, stated(value())), plannerOrder.sentVersions);
 
-/** The fault of a number, or null. Null leaves the setting unchanged, 0 sets it as configured. */
+/** The fault of a number, or null. Null leaves the setting unchanged, 0 means the default. */
 export function numberFault(value, low, high) {
   if (value === null || value === 0) return null;
-  return Number.isFinite(value) && value >= low && value <= high ? null : `The range is ${low} to ${high}, or 0 ${CONFIGURED}`;
+  return Number.isFinite(value) && value >= low && value <= high ? null : `The range is ${low} to ${high}, or 0 for ${DEFAULT}`;
 }
 
 const foot = orderFoot(order, "Settings", "send-settings");
@@ -43,7 +43,7 @@ let pendingFit = null;
 
 export function startModel() {
   $("model").append(h("header", {}, h("h2", { id: "model-title" }, "Scene model")), h("div.part", {},
-    h("p.hint", {}, `An empty field leaves the setting unchanged; 0 means ${CONFIGURED} on the vehicle. Labels keep their meaning.`),
+    h("p.hint", {}, `An empty field leaves the setting unchanged; 0 means ${DEFAULT}. Labels keep their meaning.`),
     ...lines.map((l) => l.node),
     h("div.fit", { role: "group", "aria-label": "Fit to budget" }, h("label", { for: "fit-bps" }, "Map stream, bit/s"), limit, fit), fitted, fitErrorLine, foot.node));
   store.on("state select edit feed tab", update);
@@ -60,7 +60,7 @@ function inForce(key) {
   if (!known) return "unknown";
   const value = known[key] ?? null;
   if (value === null) return "not set by this surface";
-  return value === 0 || value === "" ? CONFIGURED : key === "layers" ? layersText(value) : key === "cells" ? value.replaceAll("-", " ") : String(value);
+  return value === 0 || value === "" ? DEFAULT : key === "layers" ? layersText(value) : key === "cells" ? value.replaceAll("-", " ") : String(value);
 }
 
 /** Shows the value in force where it differs from the field. */
@@ -83,7 +83,7 @@ function numberLine([key, name, hint, low, high]) {
   };
   const update = (value) => {
     if (document.activeElement !== input) input.value = value === null || value === 0 || Number.isNaN(value) ? "" : value;
-    input.placeholder = value === 0 ? CONFIGURED : UNCHANGED;
+    input.placeholder = value === 0 ? DEFAULT : UNCHANGED;
     const wrong = numberFault(value, low, high);
     show(fault, wrong !== null);
     text(fault, wrong ?? "");
@@ -112,7 +112,7 @@ function choiceLine(key, name, hint) {
   const update = (value) => {
     const size = (cells) => metres(cells * store.vehicle.map.cell_m, 2);
     const choices = key === "cells" ? Object.entries(CELLS).map(([v, of]) => [v, of(size)]) : layerSets(value).map((v) => [v, layersText(v)]);
-    const options = [["-", UNCHANGED], ["", CONFIGURED], ...choices];
+    const options = [["-", UNCHANGED], ["", DEFAULT], ...choices];
     if (pick.dataset.key !== options.join()) {
       pick.dataset.key = options.join();
       pick.replaceChildren(...options.map(([value, words]) => h("option", { value }, words)));

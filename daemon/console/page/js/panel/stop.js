@@ -2,7 +2,7 @@
 
 import { sendConstraints } from "../api.js";
 import { denial } from "../command.js";
-import { $, h, show, text } from "../dom.js";
+import { $, fill, h, show, text } from "../dom.js";
 import { SentVersions, replacedNote } from "../order/sent-versions.js";
 import { orderStatus, slotOf } from "../order/status.js";
 import { store } from "../store.js";
@@ -25,6 +25,21 @@ const hold = h("button", { type: "button", id: "hold", onclick: () => confirm(ho
 const resume = h("button", { type: "button", id: "resume", onclick: () => confirm(ORDERS.resume) }, "Resume survey");
 const abort = h("button.grave", { type: "button", id: "abort", onclick: () => confirm(ORDERS.abort) }, "Abort mission");
 
+/** The same orders in the bar, which is on every page and comes first in the order of the keyboard. */
+const barHold = h("button", { type: "button", id: "bar-hold", "aria-haspopup": "dialog", "aria-keyshortcuts": "Shift+H", onclick: () => hold.click() });
+const barAbort = h("button.grave", { type: "button", id: "bar-abort", "aria-haspopup": "dialog", "aria-keyshortcuts": "Shift+A", onclick: () => abort.click() }, "Abort");
+
+export function startStop() {
+  $("stop").append(barHold, barAbort);
+  addEventListener("keydown", (event) => {
+    const button = { H: barHold, A: barAbort }[event.key];
+    const isTyping = event.target.closest?.("input:not([type=range]):not([type=checkbox]), select, textarea");
+    if (!button || !event.shiftKey || event.ctrlKey || event.altKey || event.metaKey || isTyping || $("dialog").open) return;
+    event.preventDefault();
+    button.click();
+  });
+}
+
 export const stopParts = [h("div.buttons", {}, hold, resume, abort), deniedLine, errorLine, replaced.node, status.node];
 
 const holding = (v) => v.status?.mode === "hold";
@@ -33,7 +48,11 @@ export function refreshStop(v) {
   text(hold, holding(v) ? "Resume survey" : "Hold position");
   show(resume, STOPPED.includes(v.status?.mode));
   const [stop, order] = [denial("stop"), denial("order")];
-  for (const [b, denied] of [[hold, holding(v) ? order : stop], [resume, order], [abort, stop]]) {
+  text(barHold, holding(v) ? "Resume" : "Hold");
+  barHold.setAttribute("aria-label", `${barHold.textContent} ${v.name}`);
+  barAbort.setAttribute("aria-label", `Abort ${v.name}`);
+  const held = holding(v) ? order : stop;
+  for (const [b, denied] of [[hold, held], [barHold, held], [resume, order], [abort, stop], [barAbort, stop]]) {
     b.disabled = !store.connected || denied !== null;
     b.title = denied ?? "";
   }
@@ -51,8 +70,8 @@ function confirm(order) {
   const dialog = $("dialog");
   const go = h("button.primary", { type: "button", disabled: Boolean(order.grave), onclick: () => (send(v, order), dialog.close()) }, order.button);
   const sure = h("input", { type: "checkbox", onchange: () => (go.disabled = !sure.checked) });
-  const reaction = v.limits?.on_abort ?? "as configured on the vehicle";
-  dialog.replaceChildren(
+  const reaction = v.limits?.on_abort ?? "the vehicle's default";
+  fill(dialog,
     h("h2", { id: "dialog-title" }, order.question(v)),
     order.grave ? h("p", {}, `The survey ends. Reaction on abort: ${reaction}.`) : null,
     h("p", {}, `The surface sends the order in its next turn. ${contact(v)}`),

@@ -42,8 +42,8 @@ export function startTools() {
     button("measure", "Measure", "Measure distance and bearing (M)", after(toggleMeasure)),
     button("export", "Export", "PNG, CSV, GeoJSON, PLY", openExport),
   );
-  store.on("view", mark);
-  store.on("map select", () => (offer(pick), mark()));
+  store.on("view", () => (offer(pick), mark()));
+  store.on("map select state", () => (offer(pick), mark()));
   offer(pick);
   mark();
 }

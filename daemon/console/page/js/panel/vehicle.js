@@ -6,7 +6,7 @@ import { inWorld } from "../map/frames.js";
 import { bearing } from "../map/measure.js";
 import { lengthOf, pathOf } from "../map/path.js";
 import { describe, nameOfStatus } from "../order/status.js";
-import { ageOf, isStale, store } from "../store.js";
+import { ageOf, isHeard, isStale, store } from "../store.js";
 import { refreshStop, stopParts } from "./stop.js";
 
 const NAMES = { utility: "Weights", constraints: "Hold, abort", limits: "Limits", fence: "Fence", settings: "Settings", budget: "Budget", requests: "Images", fix: "Position fix" };
@@ -84,7 +84,11 @@ function disk(d) {
 
 const isDiskWanting = (d) => Boolean(d && (d.journal_refused || d.checkpoint_refused || (d.free_bytes ?? LOW_SPACE) < LOW_SPACE));
 
-const due = (v) => (v.next_contact_s >= store.nowS ? `in ${span(v.next_contact_s - store.nowS)}` : "overdue");
+/** A contact that was due counts as overdue once the vehicle has been silent for longer than a frame is expected to take. */
+const due = (v) => {
+  if (v.next_contact_s >= store.nowS) return `in ${span(v.next_contact_s - store.nowS)}`;
+  return isHeard(v) ? "now" : "overdue";
+};
 
 function leg(s) {
   const to = s.waypoint;

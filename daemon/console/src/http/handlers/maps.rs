@@ -14,6 +14,7 @@ use axum::http::{HeaderMap, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use scenecast_protocol::map::Rect;
 use std::collections::BTreeMap;
+use std::hash::{DefaultHasher, Hash, Hasher};
 use std::sync::Arc;
 use tokio::sync::Mutex;
 
@@ -145,12 +146,17 @@ pub(in crate::http) async fn file(shared: Shared, id: u8, headers: HeaderMap, fo
         Ok(cached) => cached,
         Err(response) => return response,
     };
-    let (origin, placement) = {
+    let (origin, placement, names) = {
         let snapshot = shared.snapshots.borrow();
-        (snapshot.state.mission.origin, snapshot.vehicle(id).and_then(|v| v.map.placement.clone()))
+        let vehicle = snapshot.vehicle(id);
+        let labels = vehicle.iter().flat_map(|v| &v.labels);
+        let names: BTreeMap<u8, String> = labels.filter_map(|l| Some((l.id, l.name.clone()?))).collect();
+        (snapshot.state.mission.origin, vehicle.and_then(|v| v.map.placement.clone()), names)
     };
     let moves = placement.as_ref().map_or(0, |p| p.version);
-    let tag = format!("{id}-{}-{moves}", cached.map.tag());
+    let mut named = DefaultHasher::new();
+    names.hash(&mut named);
+    let tag = format!("{id}-{}-{moves}-{:x}", cached.map.tag(), named.finish());
     if is_held(&headers, &tag) {
         return tagged(&headers, &tag, || StatusCode::OK.into_response());
     }
@@ -159,7 +165,7 @@ pub(in crate::http) async fn file(shared: Shared, id: u8, headers: HeaderMap, fo
     };
     let made = tokio::task::spawn_blocking(move || {
         let moved_m = placement.map_or((0.0, 0.0), |p| (p.east_m, p.north_m));
-        MapCells { moved_m, ..cached.map.cells().clone() }.export(format, origin)
+        MapCells { moved_m, names, ..cached.map.cells().clone() }.export(format, origin)
     });
     match made.await {
         Ok(Ok(bytes)) => {

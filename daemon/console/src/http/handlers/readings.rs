@@ -53,6 +53,12 @@ pub(in crate::http) async fn fit(
     shared.respond(SurfaceRequest::Fit(id, bits_per_s)).await
 }
 
+/// The picture of the true classes of a simulated sea floor.
+pub(in crate::http) async fn truth(State(shared): State<Shared>) -> Response {
+    let picture = shared.snapshots.borrow().truth.as_ref().map(|truth| truth.picture.clone());
+    picture.map_or_else(not_found, |picture| ([(header::CONTENT_TYPE, "image/png")], picture).into_response())
+}
+
 pub(in crate::http) async fn document(State(shared): State<Shared>) -> Response {
     ([(header::CONTENT_TYPE, JSON)], shared.document).into_response()
 }

@@ -1,0 +1,65 @@
+// The first mission in five steps. Each step is done by the state of the mission, not by a click, and the card can be closed for good.
+
+import { hasName, shownLabels } from "../book.js";
+import { denial } from "../command.js";
+import { $, data, h, show, text } from "../dom.js";
+import { slotOf } from "../order/status.js";
+import { recall, remember } from "../prefs.js";
+import { store } from "../store.js";
+import { weightsOrder } from "./weights.js";
+
+/** Cells from which a map shows more than one kind of sea floor. */
+const FIRST_CELLS = 200;
+
+const hasWeight = (v) => shownLabels(v).some((l) => weightsOrder.value(v, l.id) !== 0);
+const utility = (v) => slotOf(v, "utility");
+const isInForce = (v) => utility(v)?.state === "applied";
+
+/** Name, instruction, and whether the step is done. */
+const STEPS = [
+  ["Look", "Each colour on the map is a label: sea floor that looks alike to the vehicle. The map grows while the vehicle surveys.",
+    (v) => v.map.explored_cells >= FIRST_CELLS],
+  ["Name", "Click the name of a label and enter a word for it, such as sand.",
+    (v) => shownLabels(v).some((l) => hasName(l.id))],
+  ["Weigh", "Move the slider of a label that you want to see more of to the right, then press Send weights.",
+    (v) => isInForce(v) && hasWeight(v)],
+  ["Steer", "The vehicle plans its path by your weights. Its next report shows the plan as a dashed line.",
+    (v) => isInForce(v) && Boolean(v.status?.waypoint) && v.status.at_s > utility(v).changed_s],
+  ["Picture", "Press Request beside a label. The vehicle sends an image of that sea floor.",
+    (v) => v.labels.some((l) => l.exemplar.url !== null)],
+];
+
+const lines = STEPS.map(([name, instruction]) => {
+  const state = h("span.unseen");
+  const node = h("li", {}, h("b", {}, name), " ", h("span", {}, instruction), state);
+  return { node, state };
+});
+const summary = h("summary");
+const close = h("button.quiet", { type: "button", onclick: dismiss }, "Close for good");
+const card = h("details.first-mission", { hidden: true, ontoggle: () => remember("first-mission-open", card.open) }, summary, h("ol", {}, ...lines.map((l) => l.node)), close);
+
+export function startFirstMission() {
+  if (recall("first-mission-closed", false)) return;
+  card.open = recall("first-mission-open", matchMedia("(min-width: 721px)").matches);
+  $("label-scroll").before(card);
+  store.on("state select edit book", update);
+}
+
+function dismiss() {
+  remember("first-mission-closed", true);
+  card.remove();
+  $("labels").focus();
+}
+
+function update() {
+  const v = store.vehicle;
+  show(card, Boolean(v) && denial("order") === null);
+  if (!v) return;
+  const done = STEPS.map(([, , isDone]) => isDone(v));
+  const next = done.indexOf(false);
+  text(summary, next < 0 ? "First mission: all five steps are done" : `First mission, step ${next + 1} of 5: ${STEPS[next][0].toLowerCase()}`);
+  lines.forEach(({ node, state }, i) => {
+    data(node, "state", done[i] ? "done" : i === next ? "next" : "later");
+    text(state, done[i] ? " (done)" : "");
+  });
+}
