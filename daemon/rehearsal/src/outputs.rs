@@ -3,6 +3,7 @@
 use super::mission::Mission;
 use super::panorama::panorama;
 use super::report::Report;
+use super::truth::true_classes;
 use scenecast_core::UserError;
 use scenecast_core::label_picture;
 use scenecast_protocol::map::{LabelGrid, Rect};
@@ -18,7 +19,8 @@ pub fn write_outputs(mission: &Mission, report: &Report, wall: Value, dir: &Path
     write_map(&dir.join("vehicle-map.png"), mission.vehicle().map(), bounds)?;
     write_map(&dir.join("operator-map.png"), &mission.operator_map(), bounds)?;
     if mission.camera.world.is_annotated() {
-        write_map(&dir.join("truth.png"), &truth(mission, bounds), bounds)?;
+        let classes = true_classes(&mission.camera.world, bounds, mission.cell_m());
+        write_map(&dir.join("truth.png"), &classes, bounds)?;
     }
     let panorama = panorama(mission).map_err(|e| UserError::Failed(e.to_string()))?;
     scenecast_files::write_whole(&dir.join("mission.png"), &panorama)?;
@@ -51,10 +53,4 @@ fn write_map(path: &Path, map: &LabelGrid, bounds: Rect) -> Result<(), UserError
     let png =
         label_picture::encode_within(map, bounds).map_err(|e| UserError::Failed(format!("{}: {e}", path.display())))?;
     scenecast_files::write_whole(path, &png)
-}
-
-/// Classes of the annotation on the cells of the map, shifted by one: 0 = not annotated.
-fn truth(mission: &Mission, bounds: Rect) -> LabelGrid {
-    let class = |cell| mission.camera.world.class_of(cell, mission.cell_m());
-    bounds.cells().filter_map(|cell| Some((cell, class(cell)?.saturating_add(1).min(254)))).collect()
 }

@@ -13,18 +13,19 @@ const UNSEEN: Rgb<u8> = Rgb([226, 232, 236]);
 
 /// The panorama as a PNG file.
 pub(super) fn panorama(mission: &Mission) -> image::ImageResult<Vec<u8>> {
-    let area = mission.camera.world.area();
+    let area = mission.pictured_area();
     let metres_per_column = (area.east - area.west) / f64::from(HALF);
     let rows = ((area.north - area.south) / metres_per_column).round().clamp(1.0, 4000.0) as u32;
     let mut image = RgbImage::from_pixel(2 * HALF + GAP, rows, PAPER);
     let operator = mission.operator_map();
+    let floor = mission.camera.world.picture(&area, HALF, rows, metres_per_column);
     let cell = |metres: f64| (metres / mission.cell_m()).floor() as i32;
     for row in 0..rows {
         for column in 0..HALF {
             let x = area.west + (f64::from(column) + 0.5) * metres_per_column;
             let y = area.north - (f64::from(row) + 0.5) * metres_per_column;
-            if let Some(floor) = mission.camera.world.colour_at(x, y) {
-                image.put_pixel(column, row, Rgb(floor));
+            if let Some(colour) = floor[(row * HALF + column) as usize] {
+                image.put_pixel(column, row, colour);
             }
             let label = operator.get(Cell::new(cell(x), cell(y)));
             let seen = if label == 0 { UNSEEN } else { Rgb(colour(label)) };

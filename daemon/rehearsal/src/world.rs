@@ -1,134 +1,156 @@
 //! The sea floor of a rehearsal.
 
-use image::RgbImage;
-use scenecast_core::Area;
-use scenecast_core::UserError;
-use scenecast_files::{read_classes, read_image};
+use crate::mosaic::Mosaic;
+use image::{Rgb, RgbImage};
+use scenecast_config::{Config, WorldKind};
+use scenecast_core::{Area, UserError};
 use scenecast_protocol::map::Cell;
+use scenecast_worlds::{Reef, ReefCamera, View};
 use std::path::Path;
 
-/// An image of the sea floor with its south-west corner at the origin, and the classes of its pixels if they are known.
+/// Metres that a picture shows around the survey of a reef.
+const MARGIN_M: f64 = 3.0;
+
+/// An image of the sea floor, or a reef that is drawn where the camera looks. The south-west corner is the origin.
 #[derive(Debug, Clone)]
-pub struct World {
-    image: RgbImage,
-    metres_per_pixel: f64,
-    classes: Option<Vec<u8>>,
+pub struct World(Floor);
+
+#[derive(Debug, Clone)]
+enum Floor {
+    Mosaic(Mosaic),
+    Reef(Box<ReefCamera>),
 }
 
-/// Class value for "not annotated".
-const IGNORE: u8 = 255;
-
 impl World {
-    /// A procedural reef of about 26 x 18 m drawn from the scene model's own generative process.
-    pub fn procedural(seed: u64, metres_per_pixel: f64) -> Self {
-        let reef = scenecast_worlds::reef(seed, 2600, 1800, 25, 8);
-        Self { image: reef.image, metres_per_pixel, classes: Some(reef.truth) }
+    /// The sea floor of `world.kind`.
+    pub fn procedural(config: &Config, seed: u64) -> Self {
+        let metres_per_pixel = config.camera.metres_per_pixel;
+        match config.world.kind {
+            WorldKind::Reef => Self::reef(seed, metres_per_pixel),
+            WorldKind::Patches => Self::patches(seed, metres_per_pixel),
+        }
     }
 
-    /// A reef that was generated before.
-    pub(crate) fn from_reef(reef: &scenecast_worlds::Reef, metres_per_pixel: f64) -> Self {
-        Self { image: reef.image.clone(), metres_per_pixel, classes: Some(reef.truth.clone()) }
+    /// A reef of 120 x 80 m, seen by a camera with pixels of the given size.
+    pub fn reef(seed: u64, metres_per_pixel: f64) -> Self {
+        Self(Floor::Reef(Box::new(ReefCamera::new(Reef::new(seed), metres_per_pixel))))
+    }
+
+    /// Patches of about 26 x 18 m in all, drawn from the scene model's own generative process.
+    pub fn patches(seed: u64, metres_per_pixel: f64) -> Self {
+        Self::from_patches(scenecast_worlds::patches(seed, 2600, 1800, 25, 8), metres_per_pixel)
+    }
+
+    /// A world of patches that was drawn before.
+    pub(crate) fn from_patches(world: scenecast_worlds::Patches, metres_per_pixel: f64) -> Self {
+        Self(Floor::Mosaic(Mosaic::new(world.image, metres_per_pixel, Some(world.truth))))
     }
 
     /// Reads a mosaic, and its annotation from a file of the same size.
     pub fn from_files(mosaic: &Path, annotations: Option<&Path>, metres_per_pixel: f64) -> Result<Self, UserError> {
-        let image = read_image(mosaic)?.to_rgb8();
-        if image.width() < 64 || image.height() < 64 {
-            let (w, h) = image.dimensions();
-            return Err(UserError::file(
-                mosaic,
-                format!("the image has {w} x {h} pixels; a mosaic needs at least 64 x 64"),
-            ));
-        }
-        let classes = annotations.map(|path| read_classes(path, image.dimensions())).transpose()?;
-        Ok(Self { image, metres_per_pixel, classes })
+        Ok(Self(Floor::Mosaic(Mosaic::from_files(mosaic, annotations, metres_per_pixel)?)))
     }
 
-    /// The bounds of the image, metres.
+    /// The bounds of the sea floor, metres.
     pub fn area(&self) -> Area {
-        let (w, h) = self.image.dimensions();
-        let mpp = self.metres_per_pixel;
-        Area { west: 0.0, south: 0.0, east: f64::from(w) * mpp, north: f64::from(h) * mpp }
+        match &self.0 {
+            Floor::Mosaic(mosaic) => mosaic.area(),
+            Floor::Reef(_) => {
+                let [east, north] = Reef::SIZE_M;
+                Area { west: 0.0, south: 0.0, east, north }
+            }
+        }
     }
 
-    /// Whether the world has annotated classes.
+    /// The area of a survey that has no configured one: a mosaic as a whole, or the middle of a reef.
+    pub fn survey_area(&self) -> Area {
+        match &self.0 {
+            Floor::Mosaic(mosaic) => mosaic.area(),
+            Floor::Reef(_) => {
+                let [west, south, east, north] = Reef::SURVEY_M;
+                Area { west, south, east, north }
+            }
+        }
+    }
+
+    /// The part of the world around a surveyed area that pictures of a mission show, metres.
+    pub(crate) fn pictured_area(&self, surveyed: &Area) -> Area {
+        match &self.0 {
+            Floor::Mosaic(mosaic) => mosaic.area(),
+            Floor::Reef(_) => Area {
+                west: surveyed.west - MARGIN_M,
+                south: surveyed.south - MARGIN_M,
+                east: surveyed.east + MARGIN_M,
+                north: surveyed.north + MARGIN_M,
+            },
+        }
+    }
+
+    /// Whether the world has known classes.
     pub fn is_annotated(&self) -> bool {
-        self.classes.is_some()
+        match &self.0 {
+            Floor::Mosaic(mosaic) => mosaic.is_annotated(),
+            Floor::Reef(_) => true,
+        }
     }
 
-    /// The colour of the sea floor at a position in metres; `None` outside the image.
-    pub fn colour_at(&self, x_m: f64, y_m: f64) -> Option<[u8; 3]> {
-        let (column, line) =
-            (x_m / self.metres_per_pixel, f64::from(self.image.height()) - y_m / self.metres_per_pixel);
-        let inside = column >= 0.0 && line >= 0.0;
-        inside.then(|| self.image.get_pixel_checked(column as u32, line as u32)).flatten().map(|p| p.0)
+    /// The name of a class.
+    pub(crate) fn class_name(&self, class: u8) -> String {
+        let name = match &self.0 {
+            Floor::Mosaic(_) => None,
+            Floor::Reef(_) => Reef::class_names().get(usize::from(class)),
+        };
+        name.map_or_else(|| format!("class {class}"), |&name| name.to_owned())
     }
 
-    /// The view of a down-looking camera at a position (metres) and heading (radians clockwise from north). The image
-    /// is mirrored beyond its bounds.
-    pub fn view(&self, x_m: f64, y_m: f64, heading_rad: f64, width: u32, height: u32) -> RgbImage {
-        let (w, h) = self.image.dimensions();
-        let (sin, cos) = heading_rad.sin_cos();
-        let (cx, cy) = (x_m / self.metres_per_pixel, f64::from(h) - y_m / self.metres_per_pixel);
-        let mut view = RgbImage::new(width, height);
-        for (v, row) in view.rows_mut().enumerate() {
-            let back = v as f64 + 0.5 - f64::from(height) / 2.0;
-            for (u, pixel) in row.enumerate() {
-                let right = u as f64 + 0.5 - f64::from(width) / 2.0;
-                let column = cx + cos * right - sin * back;
-                let line = cy + sin * right + cos * back;
-                *pixel = *self.image.get_pixel(mirror(column, w), mirror(line, h));
+    /// Depth of the sea floor where it is `nominal_m` on the whole, metres.
+    pub fn depth_m(&self, nominal_m: f64, x_m: f64, y_m: f64) -> f64 {
+        match &self.0 {
+            Floor::Mosaic(_) => nominal_m,
+            Floor::Reef(camera) => (nominal_m - camera.reef().relief_m(x_m, y_m)).max(0.0),
+        }
+    }
+
+    /// The sea floor from above in pixels of a given size, from a north-west corner; black outside of a mosaic.
+    pub(crate) fn picture(&self, area: &Area, columns: u32, rows: u32, metres_per_pixel: f64) -> Vec<Option<Rgb<u8>>> {
+        let place = |i: u32| {
+            let (column, row) = (f64::from(i % columns), f64::from(i / columns));
+            (area.west + (column + 0.5) * metres_per_pixel, area.north - (row + 0.5) * metres_per_pixel)
+        };
+        match &self.0 {
+            Floor::Mosaic(mosaic) => (0..columns * rows)
+                .map(|i| {
+                    let (x, y) = place(i);
+                    mosaic.colour_at(x, y).map(Rgb)
+                })
+                .collect(),
+            Floor::Reef(camera) => {
+                let south = area.north - f64::from(rows) * metres_per_pixel;
+                let image = camera.reef().picture(area.west, south, columns, rows, metres_per_pixel);
+                image.pixels().copied().map(Some).collect()
             }
         }
-        view
     }
 
-    /// The class of most annotated pixels of a cell; `None` outside the image or the annotated parts.
+    /// The view of a down-looking camera. A mosaic is mirrored beyond its bounds and seen as it is; a reef is seen
+    /// through water.
+    pub fn view(&mut self, view: &View) -> RgbImage {
+        match &mut self.0 {
+            Floor::Mosaic(mosaic) => mosaic.view(view.x_m, view.y_m, view.heading_rad, view.width_px, view.height_px),
+            Floor::Reef(camera) => camera.frame(view),
+        }
+    }
+
+    /// The class of most annotated pixels of a cell; `None` outside the world or the annotated parts.
     pub fn class_of(&self, cell: Cell, cell_m: f64) -> Option<u8> {
-        let classes = self.classes.as_ref()?;
-        let (w, h) = (self.image.width() as i64, self.image.height() as i64);
-        let px = cell_m / self.metres_per_pixel;
-        let column = |c: i32| (f64::from(c) * px).round() as i64;
-        let mut counts = [0u32; 256];
-        for x in column(cell.x).max(0)..column(cell.x.saturating_add(1)).min(w) {
-            for y in column(cell.y).max(0)..column(cell.y.saturating_add(1)).min(h) {
-                counts[usize::from(classes[((h - 1 - y) * w + x) as usize])] += 1;
+        match &self.0 {
+            Floor::Mosaic(mosaic) => mosaic.class_of(cell, cell_m),
+            Floor::Reef(camera) => {
+                let (west, south) = (f64::from(cell.x) * cell_m, f64::from(cell.y) * cell_m);
+                let [east, north] = Reef::SIZE_M;
+                let inside = west >= 0.0 && south >= 0.0 && west + cell_m <= east && south + cell_m <= north;
+                inside.then(|| camera.reef().class_of_square(west, south, cell_m))
             }
         }
-        counts[usize::from(IGNORE)] = 0;
-        let (class, &n) = counts.iter().enumerate().rev().max_by_key(|(_, n)| **n)?;
-        (n > 0).then_some(class as u8)
-    }
-}
-
-fn mirror(at: f64, size: u32) -> u32 {
-    let period = 2 * i64::from(size);
-    let p = (at.floor() as i64).rem_euclid(period);
-    (if p < i64::from(size) { p } else { period - 1 - p }) as u32
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use image::Rgb;
-
-    #[test]
-    fn the_camera_has_north_at_the_top_and_turns_with_the_heading() {
-        let image = RgbImage::from_fn(200, 200, |x, y| Rgb([x as u8, y as u8, 0]));
-        let world = World { image, metres_per_pixel: 0.1, classes: None };
-        let north = world.view(10.0, 10.0, 0.0, 64, 64);
-        assert!(north.get_pixel(32, 0)[1] < north.get_pixel(32, 63)[1], "top is north: small row of the image");
-        let east = world.view(10.0, 10.0, 90f64.to_radians(), 64, 64);
-        assert!(east.get_pixel(32, 0)[0] > east.get_pixel(32, 63)[0], "heading east, top is east: large column");
-    }
-
-    #[test]
-    fn a_cell_has_the_class_of_most_of_its_pixels_and_none_outside() {
-        let classes = (0..100 * 50).map(|i| if i % 100 < 50 { 3 } else { IGNORE }).collect();
-        let image = RgbImage::from_pixel(100, 50, Rgb([120, 120, 120]));
-        let world = World { image, metres_per_pixel: 0.1, classes: Some(classes) };
-        assert_eq!(world.class_of(Cell::new(0, 0), 1.0), Some(3));
-        assert_eq!(world.class_of(Cell::new(8, 2), 1.0), None, "not annotated");
-        assert_eq!(world.class_of(Cell::new(-1, 0), 1.0), None, "outside");
     }
 }

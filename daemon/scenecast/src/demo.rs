@@ -1,11 +1,14 @@
 //! A rehearsal in real time, with the operator's page.
 
+use scenecast_console::state::{TrueClass, TruthInfo};
 use scenecast_console::{Console, LinkMeter, MissionFacts, bind, handle_request, snapshot, start};
-use scenecast_core::UserError;
+use scenecast_core::palette::colour;
+use scenecast_core::{Area, UserError};
 use scenecast_protocol::time::Instant;
-use scenecast_rehearsal::Mission;
+use scenecast_rehearsal::{Mission, Truth};
 use scenecast_runtime::{Stop, block_on, random_bits};
 use std::sync::Arc;
+use std::thread::JoinHandle;
 use std::time::Duration;
 
 /// Wall time between two steps.
@@ -34,10 +37,64 @@ pub fn run_demo(mission: Mission, speed: f64, port: Option<u16>) -> Result<(), U
     })
 }
 
+/// The speed of a mission: the demanded one, and the one that the machine reaches.
+struct Pace {
+    demanded: f64,
+    /// Wall time and mission time at the start of the present measurement.
+    since: (std::time::Instant, Instant),
+    measured: f64,
+}
+
+impl Pace {
+    /// Wall time of a measurement.
+    const PERIOD: Duration = Duration::from_secs(4);
+    /// Share of the demanded speed from which it counts as reached.
+    const REACHED: f64 = 0.95;
+
+    fn new(demanded: f64, now: Instant) -> Self {
+        Self { demanded, since: (std::time::Instant::now(), now), measured: demanded }
+    }
+
+    /// Mission seconds per second of wall time, with two digits where the machine is too slow.
+    fn reached(&mut self, now: Instant) -> f64 {
+        let wall = self.since.0.elapsed();
+        if wall >= Self::PERIOD {
+            self.measured = now.since(self.since.1).as_secs_f64() / wall.as_secs_f64();
+            self.since = (std::time::Instant::now(), now);
+        }
+        if self.measured >= Self::REACHED * self.demanded {
+            return self.demanded;
+        }
+        let unit = 10f64.powf(self.measured.max(1e-3).log10().floor() - 1.0);
+        (self.measured / unit).round() * unit
+    }
+}
+
+/// Draws the true classes in a thread of its own, since a large sea floor takes seconds.
+fn make_truth(mission: &Mission) -> JoinHandle<Result<Option<Truth>, UserError>> {
+    let (world, area, cell_m) = (mission.world().clone(), mission.pictured_area(), mission.cell_m());
+    std::thread::spawn(move || Truth::new(&world, &area, cell_m))
+}
+
+/// The true classes as the page shows them.
+fn shown(truth: Truth) -> scenecast_console::Truth {
+    let Area { west, south, east, north } = truth.area;
+    let class = |(value, name)| {
+        let [red, green, blue] = colour(value);
+        TrueClass { value, name, colour: format!("#{red:02x}{green:02x}{blue:02x}") }
+    };
+    let classes = truth.classes.into_iter().map(class).collect();
+    let info = TruthInfo { west_m: west, south_m: south, east_m: east, north_m: north, classes };
+    scenecast_console::Truth { info, picture: truth.png.into() }
+}
+
 struct Demo {
     mission: Mission,
+    /// Makes the picture of the true classes.
+    truth: Option<JoinHandle<Result<Option<Truth>, UserError>>>,
     meter: LinkMeter,
     facts: MissionFacts,
+    pace: Pace,
     counted: [u64; 2],
     published: Option<std::time::Instant>,
 }
@@ -46,7 +103,9 @@ impl Demo {
     fn new(mission: Mission, speed: f64) -> Self {
         let facts = MissionFacts::new(mission.config(), mission.modem(), random_bits(), speed);
         let window = Duration::from_secs_f64(mission.config().link.budget_window_s);
-        Self { meter: LinkMeter::new(window, Instant::ZERO), mission, facts, counted: [0; 2], published: None }
+        let meter = LinkMeter::new(window, mission.now());
+        let pace = Pace::new(speed, mission.now());
+        Self { meter, pace, truth: Some(make_truth(&mission)), mission, facts, counted: [0; 2], published: None }
     }
 
     async fn run(mut self, mut console: Option<Console>, mut stop: Stop) -> Result<(), UserError> {
@@ -62,7 +121,7 @@ impl Demo {
             // takes longer than the last.
             let passed = before.elapsed().min(MAX_STEP + TICK);
             before = std::time::Instant::now();
-            self.fly(self.mission.now() + passed.mul_f64(self.facts.speed))?;
+            self.fly(self.mission.now() + passed.mul_f64(self.pace.demanded))?;
             self.count();
             let changed = !self.mission.take_events().is_empty();
             match &mut console {
@@ -89,8 +148,19 @@ impl Demo {
         Ok(())
     }
 
+    /// Shows the true classes once their picture is made.
+    fn take_truth(&mut self) {
+        let Some(made) = self.truth.take_if(|thread| thread.is_finished()) else { return };
+        match made.join() {
+            Ok(Ok(truth)) => self.facts.truth = truth.map(|truth| Arc::new(shown(truth))),
+            Ok(Err(error)) => eprintln!("scenecast: the page cannot show the true classes: {error}"),
+            Err(panic) => std::panic::resume_unwind(panic),
+        }
+    }
+
     fn serve(&mut self, console: &mut Console, mut changed: bool) {
         let now = self.mission.now();
+        self.take_truth();
         while let Ok((request, reply)) = console.requests.try_recv() {
             let cell_m = self.facts.cell_m;
             // A browser that closed its connection needs no reply.
@@ -100,6 +170,8 @@ impl Demo {
         let due = self.published.is_none_or(|at| at.elapsed() >= PUBLISH_INTERVAL);
         if changed || due {
             self.published = Some(std::time::Instant::now());
+            self.meter.handle_budgets(self.mission.surface());
+            self.facts.speed = self.pace.reached(now);
             let snapshot = snapshot(self.mission.surface(), &self.facts, &self.meter, now);
             console.snapshots.send_replace(Arc::new(snapshot));
         }

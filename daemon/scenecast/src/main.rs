@@ -1,7 +1,7 @@
 //! The `scenecast` command.
 
 use clap::Parser;
-use clap::error::{ContextKind, ContextValue};
+use clap::error::{ContextKind, ContextValue, ErrorKind};
 use std::process::ExitCode;
 
 /// Old and new names of renamed options.
@@ -10,7 +10,8 @@ const OLD_OPTIONS: [(&str, &str); 2] = [("--planes", "--layers"), ("--spend", "-
 fn main() -> ExitCode {
     let arguments = match scenecast::commands::Arguments::try_parse() {
         Ok(arguments) => arguments,
-        Err(e) if !e.use_stderr() => e.exit(),
+        // Help, version, or the list of commands where none is given.
+        Err(e) if !e.use_stderr() || e.kind() == ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand => e.exit(),
         Err(e) => {
             let renamed = renamed(&e);
             eprintln!("scenecast: {}", renamed.unwrap_or_else(|| one_line(&e.to_string())));

@@ -6,4 +6,4 @@ pub mod commands;
 mod progress;
 mod scene;
 
-pub use progress::Progress;
+pub use progress::{Progress, ProgressForm};

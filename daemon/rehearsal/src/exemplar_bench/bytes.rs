@@ -11,6 +11,7 @@ use scenecast_protocol::exemplar::edge_px;
 use scenecast_protocol::exemplar::{HEAD, max_bytes};
 use scenecast_vehicle::Mapper;
 use scenecast_vehicle::exemplar::{GOOD_SSIM, compress, compress_to, middle};
+use scenecast_worlds::View;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -75,8 +76,8 @@ pub fn photos(dir: &Path) -> Result<Vec<PatchSource>, UserError> {
 pub fn patches(source: &PatchSource, seed: u64) -> Result<Vec<RgbImage>, UserError> {
     let config = Config::default();
     let mpp = config.camera.metres_per_pixel;
-    let world = match source {
-        PatchSource::Reef(seed) => World::procedural(*seed, mpp),
+    let mut world = match source {
+        PatchSource::Reef(seed) => World::patches(*seed, mpp),
         PatchSource::Photo(path) => World::from_files(path, None, mpp)?,
     };
     let mut mapper =
@@ -86,7 +87,11 @@ pub fn patches(source: &PatchSource, seed: u64) -> Result<Vec<RgbImage>, UserErr
         let along = |k: u32, n: u32, low: f64, high: f64| low + (high - low) * (f64::from(k) + 0.5) / f64::from(n);
         let x = along(i % FRAMES.0, FRAMES.0, area.west, area.east);
         let y = along(i / FRAMES.0, FRAMES.1, area.south, area.north);
-        let view = world.view(x, y, 0.0, camera.width_px, camera.height_px);
+        let (width_px, height_px) = (camera.width_px, camera.height_px);
+        let altitude_m = config.survey.altitude_m;
+        let moment = u64::from(i);
+        let view = View { x_m: x, y_m: y, heading_rad: 0.0, altitude_m, width_px, height_px, moment };
+        let view = world.view(&view);
         let pose = Pose { x, y, z: -16.0, yaw_rad: 0.0 };
         mapper.handle_frame(&view, &pose, 1.0, f64::from(i) / camera.rate_hz);
     }

@@ -7,6 +7,7 @@ use scenecast_core::{Area, UserError};
 use scenecast_files::{RecordedFrame, Recorder, Recording};
 use scenecast_motion::Motion;
 use scenecast_protocol::time::Instant;
+use scenecast_worlds::View;
 use std::path::Path;
 
 /// The next frame of the camera.
@@ -44,26 +45,31 @@ impl Camera {
         self.recording.is_some()
     }
 
-    /// The survey's area: the configured one, or else the whole image.
+    /// The survey's area: the configured one, or else that of the recording or of the sea floor.
     ///
     /// # Errors
-    /// The configured area is outside of the image.
+    /// The configured area is outside of the sea floor.
     pub(super) fn survey_area(&self, config: &Config) -> Result<Area, UserError> {
-        let all = || self.recording.as_ref().map_or_else(|| self.world.area(), Recording::area);
+        let all = || self.recording.as_ref().map_or_else(|| self.world.survey_area(), Recording::area);
         let area = config.survey.area_m.unwrap_or_else(all);
         if self.recording.is_none() && !overlap(&area, &self.world.area()) {
             let a = self.world.area();
             let limits = format!("{} to {} m east, {} to {} m north", a.west, a.east, a.south, a.north);
-            return Err(UserError::Input(format!("survey.area_m lies outside the image, which covers {limits}")));
+            return Err(UserError::Input(format!("survey.area_m lies outside the sea floor, which covers {limits}")));
         }
         Ok(area)
     }
 
-    pub(super) fn next_frame(&mut self, config: &Config, motion: &Motion, now: Instant) -> NextFrame {
+    /// The next frame of a vehicle with the given motion and depth.
+    pub(super) fn next_frame(&mut self, config: &Config, motion: &Motion, depth_m: f64, now: Instant) -> NextFrame {
         let Some(recording) = &self.recording else {
             let Motion { x_m, y_m, heading_rad, .. } = *motion;
             let camera = &config.camera;
-            return NextFrame::Simulated(self.world.view(x_m, y_m, heading_rad, camera.width_px, camera.height_px));
+            let (width_px, height_px) = (camera.width_px, camera.height_px);
+            let altitude_m = self.world.depth_m(config.survey.depth_m, x_m, y_m) - depth_m;
+            let moment = (now.as_secs_f64() * 1000.0) as u64;
+            let view = View { x_m, y_m, heading_rad, altitude_m, width_px, height_px, moment };
+            return NextFrame::Simulated(self.world.view(&view));
         };
         let Some(frame) = recording.frames.get(self.next) else { return NextFrame::Over };
         let due = Instant::from_secs_f64(frame.t_s);

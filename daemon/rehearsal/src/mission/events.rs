@@ -129,8 +129,10 @@ impl Mission {
         self.carrier.place(VEHICLE, place);
     }
 
+    /// The depth at which the vehicle keeps its altitude here.
     fn survey_depth_m(&self) -> f64 {
-        (self.config.survey.depth_m - self.config.survey.altitude_m).max(0.0)
+        let floor_m = self.camera.world.depth_m(self.config.survey.depth_m, self.motion.x_m, self.motion.y_m);
+        (floor_m - self.config.survey.altitude_m).max(0.0)
     }
 
     /// Whether the sea floor is out of the camera's sight.
@@ -150,7 +152,8 @@ impl Mission {
             self.times.frame = self.times.frame + interval;
             return Ok(());
         }
-        match self.camera.next_frame(&self.config, &self.motion, now) {
+        let depth_m = self.vehicle.vehicle().navigator().depth_m();
+        match self.camera.next_frame(&self.config, &self.motion, depth_m, now) {
             NextFrame::Over => self.end_survey(),
             NextFrame::DueAt(at) => self.times.frame = at,
             NextFrame::Recorded(frame) => {

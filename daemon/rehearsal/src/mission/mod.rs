@@ -10,6 +10,8 @@ mod meters;
 mod planned_tests;
 mod timetable;
 #[cfg(test)]
+mod track_tests;
+#[cfg(test)]
 mod tuned_tests;
 
 use crate::frames_log::FramesLog;
@@ -224,6 +226,17 @@ impl Mission {
     pub fn position_error_m(&self) -> f64 {
         let (x, y) = self.vehicle().navigator().world().xy();
         (x - self.motion.x_m).hypot(y - self.motion.y_m)
+    }
+
+    /// The simulated sea floor.
+    pub fn world(&self) -> &World {
+        &self.camera.world
+    }
+
+    /// The part of the sea floor that pictures of the mission show, in the world frame.
+    pub fn pictured_area(&self) -> Area {
+        let surveyed = self.config.survey.area_m.unwrap_or_else(|| self.camera.world.survey_area());
+        self.camera.world.pictured_area(&surveyed)
     }
 
     /// Edge of a map cell, metres.

@@ -22,7 +22,7 @@ pub(super) fn mission(sets: &[&str]) -> Mission {
     let config =
         scenecast_config::load(None, &small.iter().chain(sets).map(|s| (*s).to_owned()).collect::<Vec<_>>()).unwrap();
     static REEF: std::sync::OnceLock<World> = std::sync::OnceLock::new();
-    let world = REEF.get_or_init(|| World::procedural(5, 0.01)).clone();
+    let world = REEF.get_or_init(|| World::patches(5, 0.01)).clone();
     Mission::new(config, MissionOptions { world, seed: 3, record: None }).unwrap()
 }
 

@@ -111,7 +111,7 @@ pub fn measure_burst(seed: u64, time: Duration, directives: usize) -> Result<Bur
 pub fn survey(name: &str, sets: &[&str], seed: u64, duration_s: f64) -> Result<SurveyRow, UserError> {
     let mut config = scenario(sets)?;
     config.survey.duration_s = duration_s;
-    let options = MissionOptions { world: World::procedural(seed, config.camera.metres_per_pixel), seed, record: None };
+    let options = MissionOptions { world: World::patches(seed, config.camera.metres_per_pixel), seed, record: None };
     let mut mission = Mission::new(config, options)?;
     mission.run(Duration::from_secs(7200), &mut |_| {})?;
     let report = report(&mission, name);

@@ -1,8 +1,10 @@
 //! A comparison of the planners: utility per metre on label maps that the vehicle sees cell by cell.
 
+mod label_file;
 mod planner_run;
 mod plot;
 mod scene;
+mod table;
 
 use planner_run::{MapKnowledge, PlannerRun, Task};
 pub use plot::plot;
@@ -11,12 +13,48 @@ use scenecast_core::UserError;
 use scenecast_protocol::directive::PlannerKind;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
+use table::Row;
+pub use table::{Estimate, PlanningTable, SourceTable};
 
-pub const SEEDS: u64 = 32;
+/// Where the label maps of a comparison come from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Source {
+    /// Drawn patches, labelled by the scene model.
+    Patches,
+    /// A drawn reef, labelled by the scene model.
+    Reef,
+    /// Annotated images, labelled by the scene model.
+    Images,
+    /// Label maps from files.
+    Files,
+}
+
+impl Source {
+    /// The name for people.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Patches => "patches",
+            Self::Reef => "reef",
+            Self::Images => "images",
+            Self::Files => "files",
+        }
+    }
+}
+
+/// The scenes of a comparison that are read from files.
+#[derive(Debug, Default)]
+pub struct PlanningFiles {
+    /// Images with their annotations.
+    pub images: Vec<(PathBuf, PathBuf)>,
+    /// Indexed PNG files: pixel value = label. If there are any, no other scene is used.
+    pub labels: Vec<PathBuf>,
+}
 
 /// One scene with one start, run with every planner.
 #[derive(Debug)]
 pub struct Trial {
+    pub source: Source,
     pub name: String,
     /// Utility per metre in units of the scene's mean, by planner in the order of [`PlannerKind::ALL`].
     pub utility_per_m: [f64; 3],
@@ -27,26 +65,6 @@ pub struct Trial {
     pub(crate) scene: Scene,
     pub(crate) task: Task,
     pub(crate) runs: Vec<PlannerRun>,
-}
-
-/// Medians over all trials, by planner.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Medians {
-    pub lawnmower: f64,
-    pub greedy: f64,
-    /// The planner of the best path over a horizon.
-    pub horizon: f64,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct PlanningTable {
-    /// Utility per metre in units of the scene's mean utility of a metre on which all is new, so that rare and
-    /// common classes have equal weight.
-    pub median: Medians,
-    /// Median of `horizon` if it knows the whole map from the start: the difference is the cost of not knowing it.
-    pub map_known: f64,
-    pub violations: usize,
-    pub seeds: u64,
 }
 
 /// The images with annotations in a folder, in the order of their names.
@@ -62,32 +80,67 @@ pub fn annotated_images(dir: &Path) -> Vec<(PathBuf, PathBuf)> {
     found
 }
 
-/// Runs every trial: each seed has a procedural reef and, if there are any, one of the annotated images.
+/// Runs `seeds` trials of each source from `seed` on; files are used in turn, each with all seeds if they are label maps.
+/// `each` is called after each trial with the share of the work that is done.
+///
+/// # Errors
+///
+/// A file that cannot be read, and the errors of `each`.
 pub fn run_all(
-    seed: u64,
-    images: &[(PathBuf, PathBuf)],
+    (seed, seeds): (u64, u64),
+    files: &PlanningFiles,
     each: &mut dyn FnMut(f64, &Trial) -> Result<(), UserError>,
 ) -> Result<PlanningTable, UserError> {
-    let real = images.iter().map(|(i, l)| Scene::from_files(i, l, seed)).collect::<Result<Vec<_>, _>>()?;
-    let (mut found, mut map_known) = (Vec::new(), Vec::new());
-    let mut violations = 0;
-    for n in 0..SEEDS {
-        let reef = Scene::procedural(seed.wrapping_add(n));
-        let here = (!real.is_empty()).then(|| real[n as usize % real.len()].clone());
-        for scene in here.into_iter().chain([reef]) {
-            let trial = trial(scene, seed.wrapping_add(n));
-            violations += trial.violations;
-            found.push(trial.utility_per_m);
-            map_known.push(trial.map_known_per_m);
-            each((n + 1) as f64 / SEEDS as f64, &trial)?;
-        }
+    let scenes = Scenes::read(files, seed)?;
+    let all: Vec<(Source, usize, u64)> = scenes.plan(seeds);
+    let mut rows = Vec::new();
+    for (done, &(source, file, nth)) in (1..).zip(&all) {
+        let seed = seed.wrapping_add(nth);
+        let trial = trial((source, scenes.scene(source, file, seed)), seed);
+        rows.push(Row::of(&trial));
+        each(f64::from(done) / all.len() as f64, &trial)?;
     }
-    let [lawnmower, greedy, horizon] = [0, 1, 2].map(|i| median(found.iter().map(|f| f[i]).collect()));
-    let median_of = Medians { lawnmower, greedy, horizon };
-    Ok(PlanningTable { median: median_of, map_known: median(map_known), violations, seeds: SEEDS })
+    Ok(PlanningTable::new(&rows, seeds))
 }
 
-fn trial(scene: Scene, seed: u64) -> Trial {
+/// The scenes that are read once, and used with several seeds.
+struct Scenes {
+    images: Vec<Scene>,
+    labels: Vec<Scene>,
+}
+
+impl Scenes {
+    fn read(files: &PlanningFiles, seed: u64) -> Result<Self, UserError> {
+        let labels = files.labels.iter().map(|path| Scene::from_label_map(path)).collect::<Result<Vec<_>, _>>()?;
+        let used = if labels.is_empty() { files.images.as_slice() } else { &[] };
+        let images = used.iter().map(|(i, l)| Scene::from_files(i, l, seed)).collect::<Result<_, _>>()?;
+        Ok(Self { images, labels })
+    }
+
+    /// The source, the number of its file and the number of the seed of each trial.
+    fn plan(&self, seeds: u64) -> Vec<(Source, usize, u64)> {
+        if !self.labels.is_empty() {
+            return (0..self.labels.len()).flat_map(|f| (0..seeds).map(move |n| (Source::Files, f, n))).collect();
+        }
+        let drawn = [Source::Patches, Source::Reef];
+        let mut all: Vec<_> = drawn.into_iter().flat_map(|s| (0..seeds).map(move |n| (s, 0, n))).collect();
+        if !self.images.is_empty() {
+            all.extend((0..seeds).map(|n| (Source::Images, n as usize % self.images.len(), n)));
+        }
+        all
+    }
+
+    fn scene(&self, source: Source, file: usize, seed: u64) -> Scene {
+        match source {
+            Source::Patches => Scene::patches(seed),
+            Source::Reef => Scene::reef(seed),
+            Source::Images => self.images[file].clone(),
+            Source::Files => self.labels[file].clone(),
+        }
+    }
+}
+
+fn trial((source, scene): (Source, Scene), seed: u64) -> Trial {
     let task = Task::draw(&scene, seed);
     let runs = PlannerKind::ALL.map(|kind| planner_run::run_planner(&scene, &task, kind, MapKnowledge::Seen));
     let all = planner_run::run_planner(&scene, &task, PlannerKind::Horizon, MapKnowledge::All);
@@ -95,18 +148,8 @@ fn trial(scene: Scene, seed: u64) -> Trial {
     let utility_per_m = runs.each_ref().map(rate);
     let map_known_per_m = rate(&all);
     let violations = runs.iter().chain([&all]).map(|d| d.violations(&task)).sum();
-    Trial { name: scene.name.clone(), utility_per_m, map_known_per_m, violations, scene, task, runs: runs.into() }
-}
-
-/// Median of the values, rounded to a thousandth.
-fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    let middle = values.len() / 2;
-    let value = match values.len() % 2 {
-        0 if middle > 0 => (values[middle - 1] + values[middle]) / 2.0,
-        _ => values.get(middle).copied().unwrap_or(0.0),
-    };
-    (value * 1e3).round() / 1e3
+    let name = format!("{}-{seed}", scene.name);
+    Trial { source, name, utility_per_m, map_known_per_m, violations, scene, task, runs: runs.into() }
 }
 
 #[cfg(test)]
@@ -116,7 +159,7 @@ mod tests {
     #[test]
     fn a_trial_is_repeatable_and_violates_no_constraint() {
         let scene = Scene::small(3);
-        let (a, b) = (trial(scene.clone(), 3), trial(scene, 3));
+        let (a, b) = (trial((Source::Patches, scene.clone()), 3), trial((Source::Patches, scene), 3));
         assert_eq!(a.utility_per_m, b.utility_per_m);
         assert_eq!(a.violations, 0);
         assert!(a.utility_per_m.iter().all(|&u| u > 0.0), "{:?}", a.utility_per_m);

@@ -11,17 +11,20 @@ use scenecast_core::Area;
 use scenecast_core::UserError;
 use scenecast_protocol::directive::Utility;
 use scenecast_protocol::map::{Cell, LabelGrid};
+use scenecast_worlds::Reef;
 use std::collections::BTreeMap;
 use std::path::Path;
 
 /// Edge of a cell, metres; a scene is about a hundred cells wide.
 pub(crate) const CELL_M: f64 = 0.25;
 const CELLS: f64 = 100.0;
+/// Pixels of a cell in a drawn scene.
+const DRAWN_PX: u32 = 10;
 /// Number of sweeps over all words.
 const SWEEPS: u64 = 25;
-const EXPLORATION: i8 = 5;
+pub(crate) const EXPLORATION: i8 = 5;
 /// Minimum share of the annotated cells for the class that the operator favours.
-const MIN_SHARE: f64 = 0.05;
+pub(crate) const MIN_SHARE: f64 = 0.05;
 
 /// A label map of the scene model, and the operator's utility on it.
 #[derive(Debug, Clone)]
@@ -42,29 +45,47 @@ impl Scene {
         Ok(Self::new(name, &rgb, px, &world, seed))
     }
 
-    /// A procedural reef of 125 x 100 cells.
-    pub fn procedural(seed: u64) -> Self {
-        Self::reef(seed, 1250, 1000)
+    /// Drawn patches of 125 x 100 cells.
+    pub fn patches(seed: u64) -> Self {
+        Self::draw_patches(seed, 1250, 1000)
     }
 
-    /// A procedural reef of 50 x 40 cells.
+    /// Drawn patches of 50 x 40 cells.
     #[cfg(test)]
     pub fn small(seed: u64) -> Self {
-        Self::reef(seed, 500, 400)
+        Self::draw_patches(seed, 500, 400)
     }
 
-    fn reef(seed: u64, width: u32, height: u32) -> Self {
-        const PX: u32 = 10;
-        let reef = scenecast_worlds::reef(seed, width, height, 3 * PX, 8);
-        let world = World::from_reef(&reef, CELL_M / f64::from(PX));
-        Self::new(format!("reef-{seed}"), &reef.image, f64::from(PX), &world, seed)
+    fn draw_patches(seed: u64, width: u32, height: u32) -> Self {
+        let patches = scenecast_worlds::patches(seed, width, height, 3 * DRAWN_PX, 8);
+        let image = patches.image.clone();
+        let world = World::from_patches(patches, CELL_M / f64::from(DRAWN_PX));
+        Self::new("patches".to_owned(), &image, f64::from(DRAWN_PX), &world, seed)
+    }
+
+    /// The survey area of a drawn reef, 120 x 100 cells.
+    pub fn reef(seed: u64) -> Self {
+        let reef = Reef::new(seed);
+        let [west, south, east, north] = Reef::SURVEY_M;
+        let (pitch, cells) = (CELL_M / f64::from(DRAWN_PX), |metres: f64| (metres / CELL_M).round() as u32);
+        let (columns, rows) = (cells(east - west), cells(north - south));
+        let image = reef.picture(west, south, columns * DRAWN_PX, rows * DRAWN_PX, pitch);
+        let class = |cell: Cell| {
+            let (x, y) = (west + f64::from(cell.x) * CELL_M, south + f64::from(cell.y) * CELL_M);
+            Some(reef.class_of_square(x, y, CELL_M))
+        };
+        Self::labelled("reef".to_owned(), &image, f64::from(DRAWN_PX), class, seed)
     }
 
     fn new(name: String, image: &RgbImage, px: f64, world: &World, seed: u64) -> Self {
+        Self::labelled(name, image, px, |cell| world.class_of(cell, CELL_M), seed)
+    }
+
+    fn labelled(name: String, image: &RgbImage, px: f64, class_of: impl Fn(Cell) -> Option<u8>, seed: u64) -> Self {
         let labels = label(image, px, seed);
         let cells = |n: u32| (f64::from(n) / px).floor() * CELL_M;
         let area = Area { west: 0.0, south: 0.0, east: cells(image.width()), north: cells(image.height()) };
-        let utility = favour(&labels, world);
+        let utility = favour(&labels, class_of);
         Self { name, labels, area, utility }
     }
 }
@@ -102,11 +123,11 @@ fn label(image: &RgbImage, px: f64, seed: u64) -> LabelGrid {
 /// The utility of an operator who looks for the rarest class that covers at least a twentieth of the scene.
 /// The weight of a label grows with the share of that class in it: 1 for the best label, 0 at or below the
 /// share in the whole scene.
-fn favour(labels: &LabelGrid, world: &World) -> Utility {
+fn favour(labels: &LabelGrid, class_of: impl Fn(Cell) -> Option<u8>) -> Utility {
     let mut counts: BTreeMap<u8, BTreeMap<u8, f64>> = BTreeMap::new();
     let mut classes: BTreeMap<u8, f64> = BTreeMap::new();
     for (cell, label) in labels.iter() {
-        let Some(class) = world.class_of(cell, CELL_M) else { continue };
+        let Some(class) = class_of(cell) else { continue };
         *classes.entry(class).or_default() += 1.0;
         *counts.entry(label).or_default().entry(class).or_default() += 1.0;
     }

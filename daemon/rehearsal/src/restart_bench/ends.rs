@@ -26,6 +26,30 @@ pub(super) enum Stop {
     Terminate,
 }
 
+/// The disk that a process has from its start to its end.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Disk {
+    Sound,
+    /// It takes no bytes.
+    Full,
+    /// No file can be written, made or removed.
+    ReadOnly,
+}
+
+impl Disk {
+    /// The command of a shell that runs its arguments with this disk; `None` if it needs none. The superuser writes
+    /// read-only files too, unless he drops that capability.
+    fn command(self) -> Option<&'static str> {
+        match self {
+            Self::Sound => None,
+            Self::Full => Some("trap '' XFSZ; ulimit -f 0; exec \"$0\" \"$@\""),
+            Self::ReadOnly => {
+                Some("[ $(id -u) = 0 ] || exec \"$0\" \"$@\"; exec setpriv --bounding-set -dac_override \"$0\" \"$@\"")
+            }
+        }
+    }
+}
+
 /// The folder, the ports and the processes of a run.
 pub(super) struct Ends {
     program: PathBuf,
@@ -74,27 +98,36 @@ impl Ends {
         fs::read_to_string(self.dir.join(format!("{}.log", name(end))))
     }
 
-    /// Starts an end. With `is_full` its disk takes no bytes.
-    pub(super) fn start(&mut self, end: End, is_full: bool) -> io::Result<()> {
+    /// Starts an end, which has `disk` until it is stopped.
+    pub(super) fn start(&mut self, end: End, disk: Disk) -> io::Result<()> {
         let command = match end {
             End::Vehicle => "auv",
             End::Surface => "asv",
         };
+        if disk == Disk::ReadOnly {
+            self.set_writable(end, false)?;
+        }
         let config = self.dir.join(format!("{}.toml", name(end)));
-        // The log goes through a pipe, because the limit holds for every file.
-        let mut process = match is_full {
-            false => Command::new(&self.program),
-            true => {
+        let mut process = match disk.command() {
+            None => Command::new(&self.program),
+            Some(shell_command) => {
                 let mut shell = Command::new("sh");
-                shell.args(["-c", "trap '' XFSZ; ulimit -f 0; exec \"$0\" \"$@\""]).arg(&self.program);
+                shell.args(["-c", shell_command]).arg(&self.program);
                 shell
             }
         };
         process.arg(command).arg("--config").arg(config).stdin(Stdio::null()).stdout(Stdio::null());
-        process.stderr(if is_full { Stdio::null() } else { self.open_log(end)?.into() });
+        // A full disk would hold for the log too.
+        process.stderr(if disk == Disk::Full { Stdio::null() } else { self.open_log(end)?.into() });
         let child = process.env("RUST_LOG", "info").spawn()?;
         *self.child(end) = Some(child);
         Ok(())
+    }
+
+    fn set_writable(&self, end: End, is_writable: bool) -> io::Result<()> {
+        let mode = if is_writable { "u+w" } else { "a-w" };
+        let changed = Command::new("chmod").args(["-R", mode]).arg(self.state_dir(end)).status()?;
+        changed.success().then_some(()).ok_or_else(|| io::Error::other("chmod has failed"))
     }
 
     fn open_log(&self, end: End) -> io::Result<File> {
@@ -108,7 +141,8 @@ impl Ends {
             Stop::Kill => child.kill()?,
             Stop::Terminate => drop(Command::new("kill").arg("-TERM").arg(child.id().to_string()).status()?),
         }
-        child.wait().map(drop)
+        child.wait()?;
+        self.set_writable(end, true)
     }
 
     /// Makes the surface forget everything, for a comparison with a surface without a past.

@@ -119,6 +119,6 @@ fn record(dir: &Path) -> Result<(), UserError> {
         "operator.script=none".to_owned(),
     ];
     let config = scenecast_config::load(None, &sets)?;
-    let options = MissionOptions { world: World::procedural(2, 0.01), seed: 1, record: Some(dir.to_owned()) };
+    let options = MissionOptions { world: World::patches(2, 0.01), seed: 1, record: Some(dir.to_owned()) };
     Mission::new(config, options)?.run(Duration::ZERO, &mut |_| {})
 }

@@ -26,10 +26,15 @@ pub(super) struct Shown {
     constraints: [Value; 4],
     /// Version and status of the latest order of each slot.
     orders: BTreeMap<String, (u16, OrderStatus)>,
+    /// The exemplars, by label and number.
+    images: BTreeMap<(u8, u8), Vec<u8>>,
 }
 
+/// The exemplars that the surface keeps of a label.
+const MAX_IMAGES: usize = 8;
+
 impl Shown {
-    fn of(vehicle: &VehicleState) -> Self {
+    fn of(vehicle: &VehicleState, images: BTreeMap<(u8, u8), Vec<u8>>) -> Self {
         let orders = &vehicle.orders;
         let value = |order: Result<Value, serde_json::Error>| order.unwrap_or_default();
         Self {
@@ -44,6 +49,7 @@ impl Shown {
                 value(serde_json::to_value(&orders.limits_in_force)),
             ],
             orders: orders.directive.slots.iter().map(|s| (s.slot.clone(), (s.version, s.state))).collect(),
+            images,
         }
     }
 
@@ -66,11 +72,22 @@ impl Shown {
                 return Some(format!("order: {then}"));
             }
         }
+        if let Some((label, number)) = self.lost_image(before) {
+            return Some(format!("image {number} of label {label}"));
+        }
         let is_kept = |slot: &String, then: &(u16, OrderStatus)| {
             self.orders.get(slot).is_some_and(|now| now.0 > then.0 || now.0 == then.0 && is_not_before(now.1, then.1))
         };
         let gone = before.orders.iter().find(|(slot, then)| !is_kept(slot, then));
         gone.map(|(slot, then)| format!("order {slot}: {:?} instead of {then:?}", self.orders.get(slot)))
+    }
+
+    /// The first image of the same epoch that is gone or another, and was not replaced by newer ones of its label.
+    fn lost_image(&self, before: &Self) -> Option<(u8, u8)> {
+        let is_full = |label: u8| self.images.keys().filter(|(of, _)| *of == label).count() >= MAX_IMAGES;
+        let is_kept = |at: &(u8, u8), image: &Vec<u8>| self.images.get(at) == Some(image) || is_full(at.0);
+        let lost = before.images.iter().find(|(at, image)| !is_kept(at, image));
+        lost.filter(|_| self.names.0 == before.names.0).map(|(at, _)| *at)
     }
 }
 
@@ -97,7 +114,21 @@ impl Page {
     }
 
     pub(super) fn shown(&self) -> Option<Shown> {
-        self.vehicle().as_ref().map(Shown::of)
+        let vehicle = self.vehicle()?;
+        Some(Shown::of(&vehicle, self.images(&vehicle)))
+    }
+
+    /// The exemplars that the page shows and the surface serves.
+    fn images(&self, vehicle: &VehicleState) -> BTreeMap<(u8, u8), Vec<u8>> {
+        let mut images = BTreeMap::new();
+        for (label, image) in vehicle.labels.iter().flat_map(|l| l.exemplar.images.iter().map(|image| (l.id, image))) {
+            // An image that is not served is missing from the page.
+            let _ = block_on(async {
+                images.insert((label, image.number), self.0.read_bytes(&image.url).await?.to_vec());
+                Ok(())
+            });
+        }
+        images
     }
 
     /// The label of each cell of the map in view, as lines of east, north and label.
@@ -123,7 +154,10 @@ impl Page {
         self.order("limits", &json!({"silence_s": 3600, "on_silence": "hold"}))?;
         self.order("notes", &json!({"text": "a wreck"}))?;
         match label {
-            Some(label) => self.order("labels", &json!({"label": label, "name": "sand"})),
+            Some(label) => {
+                self.order("labels", &json!({"label": label, "name": "sand"}))?;
+                self.order("exemplars", &json!({"label": label}))
+            }
             None => Ok(()),
         }
     }
@@ -167,6 +201,7 @@ mod tests {
                 ("fence".to_owned(), (2, OrderStatus::Applied)),
                 ("hold".to_owned(), (1, OrderStatus::Received)),
             ]),
+            images: BTreeMap::from([((3, 1), vec![7]), ((3, 2), vec![8])]),
         }
     }
 
@@ -182,7 +217,11 @@ mod tests {
         assert_eq!(more.lacks(&before), None, "an order that was received is sent again after a restart");
         let mut renamed = shown();
         renamed.names = (3, BTreeMap::new());
-        assert_eq!(renamed.lacks(&before), None, "another epoch has other names");
+        renamed.images.clear();
+        assert_eq!(renamed.lacks(&before), None, "another epoch has other names and images");
+        let mut replaced = shown();
+        replaced.images = (2..10).map(|number| ((3, number), vec![number])).collect();
+        assert_eq!(replaced.lacks(&before), None, "newer images have replaced the first");
     }
 
     /// Whether a page lacks this fact after a change.
@@ -199,6 +238,8 @@ mod tests {
         assert!(is_missed("names: ", |page| page.names.1.clear()));
         assert!(is_missed("notes: [] instead of [\"a wreck\"]", |page| page.notes.clear()));
         assert!(is_missed("order: [[0,0]]", |page| page.constraints[0] = Value::Null));
+        assert!(is_missed("image 2 of label 3", |page| drop(page.images.remove(&(3, 2)))));
+        assert!(is_missed("image 1 of label 3", |page| page.images.extend([((3, 1), vec![])])));
         assert!(is_missed("order hold: None", |page| page.orders.retain(|slot, _| slot != "hold")));
         let fence = |order| move |page: &mut Shown| page.orders.extend([("fence".to_owned(), order)]);
         assert!(is_missed("order fence: ", fence((1, OrderStatus::Applied))));

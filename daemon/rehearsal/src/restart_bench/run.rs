@@ -1,6 +1,6 @@
 //! One run: a mission with random restarts, and the check of its promises.
 
-use super::ends::{End, Ends, Stop, failed};
+use super::ends::{Disk, End, Ends, Stop, failed};
 use super::page::{Page, Shown, is_decided};
 use super::{PAGE_LIMIT_S, RestartRun, RestartSetting};
 use scenecast_core::UserError;
@@ -20,16 +20,6 @@ const PAGE_TIMEOUT: Duration = Duration::from_secs(20);
 /// Time without a change after which the map counts as complete.
 const QUIET: Duration = Duration::from_secs(2);
 
-/// What happens to the disk of an end at its restart.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Disk {
-    Sound,
-    /// The process runs for a while with a disk that takes no bytes, and is killed.
-    Full,
-    /// The surface's folder is removed while it runs, and written again.
-    Removed,
-}
-
 struct Run<'a> {
     ends: Ends,
     page: Page,
@@ -48,8 +38,8 @@ pub(super) fn run(
     let ends = Ends::new(&setting.program, dir, recording).map_err(failed("preparing a run"))?;
     let page = Page::new(ends.page())?;
     let mut run = Run { ends, page, rng, figures: &mut figures };
-    run.start(End::Surface, false)?;
-    run.start(End::Vehicle, false)?;
+    run.start(End::Surface, Disk::Sound)?;
+    run.start(End::Vehicle, Disk::Sound)?;
     if let Err(error) = run.mission() {
         figures.faults.push(error.to_string());
     }
@@ -77,25 +67,27 @@ impl Run<'_> {
     fn restart(&mut self) -> Result<(), UserError> {
         let end = [End::Vehicle, End::Surface][self.rng.below(2)];
         let stop = [Stop::Kill, Stop::Terminate][self.rng.below(2)];
-        let disk = match self.rng.below(4) {
-            0 => Disk::Full,
-            1 if end == End::Surface => Disk::Removed,
-            _ => Disk::Sound,
+        let (is_removed, disk) = match self.rng.below(5) {
+            0 => (false, Disk::Full),
+            1 => (false, Disk::ReadOnly),
+            2 if end == End::Surface => (true, Disk::Sound),
+            _ => (false, Disk::Sound),
         };
-        self.figures.steps.push(format!("{end:?} {stop:?}, disk {disk:?}"));
-        if disk == Disk::Removed {
+        let folder = if is_removed { ", folder removed before" } else { "" };
+        self.figures.steps.push(format!("{end:?} {stop:?}, disk {disk:?}{folder}"));
+        if is_removed {
             self.remove_folder()?;
         }
         let before = self.page.shown();
         self.stop(end, stop)?;
         self.pause(0.5);
-        if disk == Disk::Full {
-            self.start(end, true)?;
+        if disk != Disk::Sound {
+            self.start(end, disk)?;
             self.pause(1.0);
             self.stop(end, Stop::Kill)?;
         }
         let began = Instant::now();
-        self.start(end, false)?;
+        self.start(end, Disk::Sound)?;
         match before {
             Some(before) if end == End::Surface => self.check_page(&before, began),
             _ => Ok(()),
@@ -105,7 +97,10 @@ impl Run<'_> {
     /// Removes the folder of the surface and waits until the surface has written it again.
     fn remove_folder(&mut self) -> Result<(), UserError> {
         let dir = self.ends.state_dir(End::Surface);
-        std::fs::remove_dir_all(&dir).map_err(failed("removing a folder"))?;
+        // The surface writes into it meanwhile, so it is moved away first.
+        let removed = dir.with_extension("removed");
+        std::fs::rename(&dir, &removed).map_err(failed("moving a folder"))?;
+        std::fs::remove_dir_all(&removed).map_err(failed("removing a folder"))?;
         let (began, store) = (Instant::now(), dir.join("surface.store"));
         while !store.exists() {
             if began.elapsed() > LIMIT {
@@ -174,7 +169,7 @@ impl Run<'_> {
         self.figures.cells = operator.len().saturating_sub(1);
         self.stop(End::Surface, Stop::Kill)?;
         self.ends.forget_surface().map_err(failed("removing a folder"))?;
-        self.start(End::Surface, false)?;
+        self.start(End::Surface, Disk::Sound)?;
         self.page.wait("the map at a new surface", LIMIT, |v| v.map.explored_cells > 0)?;
         self.wait_quiet()?;
         let received = self.page.cells()?;
@@ -186,8 +181,8 @@ impl Run<'_> {
         Ok(())
     }
 
-    fn start(&mut self, end: End, is_full: bool) -> Result<(), UserError> {
-        self.ends.start(end, is_full).map_err(failed("starting a process"))
+    fn start(&mut self, end: End, disk: Disk) -> Result<(), UserError> {
+        self.ends.start(end, disk).map_err(failed("starting a process"))
     }
 
     fn stop(&mut self, end: End, how: Stop) -> Result<(), UserError> {

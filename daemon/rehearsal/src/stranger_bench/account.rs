@@ -16,7 +16,7 @@ pub enum AttackKind {
     Replayed,
     /// An unchanged frame of an earlier run or dive.
     Earlier,
-    /// An unchanged frame that arrives for the first time, because the channel has lost it or is slower.
+    /// An unchanged frame whose content no end has taken: the channel has lost it or is slower, or it was refused.
     Relayed,
     /// An overheard frame, cut or changed, with a good CRC.
     Malformed,
@@ -107,6 +107,11 @@ impl LinkJudgement {
             Some(reason) if after.received == before.received => Self::Refused(reason),
             _ => Self::Accepted,
         }
+    }
+
+    /// Whether the end has the content of the frame. A duplicate has brought it before.
+    pub(super) fn is_kept(self) -> bool {
+        matches!(self, Self::Accepted | Self::Refused(DropReason::Duplicate))
     }
 
     /// Whether the frame failed its CRC, its tag or its decoder. Other refused frames passed them, but come late, twice, or

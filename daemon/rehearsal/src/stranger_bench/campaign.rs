@@ -260,7 +260,7 @@ impl Campaign {
     fn transmit(&mut self, ends: &mut AttackedEnds, kinds: &[AttackKind]) {
         let mut frame = self.forger.forge(kinds, ends.shown());
         // Two flips of one bit leave a frame unchanged, too.
-        if ends.take_undelivered(&frame.bytes) {
+        if ends.is_untaken(&frame.bytes) {
             frame.kind = AttackKind::Relayed;
         } else if frame.kind == AttackKind::Relayed {
             frame.kind = AttackKind::Replayed;
@@ -376,9 +376,8 @@ fn named(judged: &Judged) -> BTreeMap<String, u64> {
 
 /// The number of frames, and the share of them that was refused. A duplicate is none of these: its content is here.
 fn refused(judged: &Judged) -> (u64, f64) {
-    const KEPT: [LinkJudgement; 2] = [LinkJudgement::Accepted, LinkJudgement::Refused(DropReason::Duplicate)];
     let all: u64 = judged.values().sum();
-    let refused: u64 = judged.iter().filter(|(judgement, _)| !KEPT.contains(judgement)).map(|(_, count)| count).sum();
+    let refused: u64 = judged.iter().filter(|(judgement, _)| !judgement.is_kept()).map(|(_, count)| count).sum();
     (all, refused as f64 / all.max(1) as f64)
 }
 

@@ -99,8 +99,8 @@ pub(super) struct AttackedEnds {
     pub(super) erased_maps: u64,
     /// Transmitted frames that the stranger has not collected.
     pub(super) overheard: Vec<Vec<u8>>,
-    /// Frames that the channel has lost, damaged or not yet delivered, and that the stranger has not delivered.
-    undelivered: BTreeSet<Vec<u8>>,
+    /// Authentic frames whose content no end has taken: lost, damaged, in the channel, or refused when they arrived.
+    untaken: BTreeSet<Vec<u8>>,
     /// Whether all authentic frames are lost.
     pub(super) is_out_of_range: bool,
     /// When the run ended of which the surface keeps a copy, and the size of the copy in cells.
@@ -129,7 +129,7 @@ impl AttackedEnds {
             authentic: Default::default(),
             erased_maps: 0,
             overheard: Vec::new(),
-            undelivered: BTreeSet::new(),
+            untaken: BTreeSet::new(),
             is_out_of_range: false,
             ended: None,
             protection,
@@ -150,9 +150,13 @@ impl AttackedEnds {
     /// The vehicle's process starts again, with its journal.
     pub(super) fn restart_vehicle(&mut self) {
         let map: Vec<(Cell, u8)> = self.vehicle.map().iter().collect();
+        let in_force = SlotId::ALL.map(|id| (id, self.vehicle.in_force(id).cloned()));
         let seed = seed(&mut self.rng);
         self.vehicle = self.setup().vehicle(seed, self.durable.clone(), self.now);
         self.vehicle.assume_budget_spent(self.now);
+        for (id, content) in in_force {
+            self.vehicle.set_in_force(id, content, self.now);
+        }
         self.vehicle.set_map(map, self.now);
         self.empty_modem(true);
     }
@@ -232,7 +236,6 @@ impl AttackedEnds {
             ChannelEvent::Arrives { at_vehicle, bytes, is_whole } => {
                 let judgement = self.deliver(at_vehicle, &bytes);
                 if is_whole {
-                    self.undelivered.remove(&bytes);
                     let is_hello = Envelope::decode(&bytes, |_| true).is_ok_and(|e| e.header.kind.is_hello());
                     *self.authentic[usize::from(is_hello)].entry(judgement).or_default() += 1;
                 }
@@ -244,23 +247,30 @@ impl AttackedEnds {
 
     /// Gives a frame to an end, which judges it.
     pub(super) fn deliver(&mut self, at_vehicle: bool, bytes: &[u8]) -> LinkJudgement {
+        let before = self.counters(at_vehicle);
         if at_vehicle {
-            let before = LinkCounters::of(self.vehicle.stats());
             self.vehicle.handle_frame(bytes, self.now);
-            return LinkJudgement::between(&before, &LinkCounters::of(self.vehicle.stats()));
+        } else {
+            self.surface.handle_frame(bytes, self.now);
+            self.note_ended();
         }
-        let counters = |surface: &SurfaceLink| {
-            surface.vehicle(auv()).map(|view| LinkCounters::of(view.stats())).unwrap_or_default()
-        };
-        let before = counters(&self.surface);
-        self.surface.handle_frame(bytes, self.now);
-        self.note_ended();
-        LinkJudgement::between(&before, &counters(&self.surface))
+        let judgement = LinkJudgement::between(&before, &self.counters(at_vehicle));
+        if judgement.is_kept() {
+            self.untaken.remove(bytes);
+        }
+        judgement
     }
 
-    /// Whether a frame has not arrived before. It is not so afterwards, because the stranger delivers it.
-    pub(super) fn take_undelivered(&mut self, bytes: &[u8]) -> bool {
-        self.undelivered.remove(bytes)
+    fn counters(&self, of_vehicle: bool) -> LinkCounters {
+        if of_vehicle {
+            return LinkCounters::of(self.vehicle.stats());
+        }
+        self.surface.vehicle(auv()).map(|view| LinkCounters::of(view.stats())).unwrap_or_default()
+    }
+
+    /// Whether a frame is authentic and no end has taken its content.
+    pub(super) fn is_untaken(&self, bytes: &[u8]) -> bool {
+        self.untaken.contains(bytes)
     }
 
     /// Lets the vehicle's host decide about the orders that came in.
@@ -270,6 +280,7 @@ impl AttackedEnds {
             let decision = match &content {
                 Some(slot) => {
                     self.orders.note_applied(slot);
+                    self.vehicle.set_in_force(id, Some(slot.clone()), self.now);
                     SlotState::Applied
                 }
                 None => SlotState::Refused(RefusalReason::Malformed),
@@ -300,7 +311,7 @@ impl AttackedEnds {
         self.schedule(end, ChannelEvent::Sent { by_vehicle });
         self.overheard.push(bytes.clone());
         let (is_lost, is_damaged) = (self.rng.bernoulli(LOSS), self.rng.bernoulli(CORRUPTION));
-        self.undelivered.insert(bytes.clone());
+        self.untaken.insert(bytes.clone());
         if is_lost || self.is_out_of_range {
             return;
         }

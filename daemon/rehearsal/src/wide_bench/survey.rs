@@ -4,7 +4,7 @@ use super::WideSetting;
 use scenecast_config::{Config, cell_m, vehicle_address};
 use scenecast_core::UserError;
 use scenecast_core::tuning_table::TuningTable;
-use scenecast_protocol::directive::SlotState;
+use scenecast_protocol::directive::{Slot, SlotState};
 use scenecast_protocol::link::{SlotInboxState, VehicleConfig, VehicleEvent, VehicleLink};
 use scenecast_protocol::mac::{Access, ModemProfile};
 use scenecast_protocol::map::{Cell, LayerDescriptor, LayerId, LayerSource};
@@ -106,7 +106,12 @@ impl WideSurvey {
     fn exchange(&mut self) -> Result<(), UserError> {
         for _ in 0..MAX_IDLE_FRAMES {
             while let Some(event) = self.link.poll_event() {
-                if let VehicleEvent::Slot { id, .. } = event {
+                if let VehicleEvent::Slot { id, content, .. } = event {
+                    if let Some(Slot::Budget(budget)) = content {
+                        self.link.set_budget(budget.bits_per_s, self.now);
+                        self.link.set_shares(budget.shares);
+                        self.link.set_background(budget.background);
+                    }
                     self.link.decide(id, SlotState::Applied, self.now);
                     self.link.handle_persisted();
                 }

@@ -6,6 +6,7 @@ use super::bench_localisation::LocalisationBench;
 use super::bench_modem::ModemBench;
 use super::bench_planning::PlanningBench;
 use super::bench_restart::RestartBench;
+use super::bench_steering::SteeringBench;
 use super::bench_stranger::StrangerBench;
 use super::bench_wide::WideBench;
 use super::sim::WorldArguments;
@@ -30,6 +31,8 @@ pub(super) enum BenchCommand {
     Planning(PlanningBench),
     /// Restarts of both ends as processes: what is lost, the time to a full page.
     Restart(RestartBench),
+    /// Steering: the camera's time over a weighed label, with and without the order.
+    Steering(SteeringBench),
     /// A stranger at the link: forged, replayed and damaged frames, with and without a key.
     Stranger(StrangerBench),
     /// A wide survey: CPU time and bytes of updates, of loading the page, and of exports.
@@ -58,6 +61,7 @@ impl BenchCommand {
             Self::Modem(m) => m.run(),
             Self::Planning(p) => p.run(),
             Self::Restart(r) => r.run(),
+            Self::Steering(s) => s.run(),
             Self::Stranger(s) => s.run(),
             Self::Wide(w) => w.run(),
         }
@@ -67,7 +71,7 @@ impl BenchCommand {
 impl Fidelity {
     fn run(mut self) -> Result<(), UserError> {
         // Defaults of all rows, which the user's own settings override: small frames suit small budgets.
-        let defaults = ["channel.loss=0.1", "link.frame_bytes=64"].map(str::to_owned);
+        let defaults = ["channel.loss=0.1", "link.frame_bytes=64", "world.kind=patches"].map(str::to_owned);
         self.world.sets.splice(0..0, defaults);
         let config = self.world.config()?;
         let world = self.world.world(&config)?;

@@ -3,18 +3,21 @@
 use clap::Args;
 use scenecast_core::UserError;
 use scenecast_files::write_whole;
-use scenecast_rehearsal::planning_bench::{Trial, annotated_images, plot, run_all};
+use scenecast_rehearsal::planning_bench::{
+    Estimate, PlanningFiles, PlanningTable, SourceTable, Trial, annotated_images, plot, run_all,
+};
 use scenecast_tools::Progress;
 use std::path::PathBuf;
 
 /// Utility that each planner collects per metre, with a fence, keep-outs and 40 % of the
 /// distance that full coverage takes.
 ///
-/// The label maps are made by the scene model from procedural reefs and annotated images; the operator favours
-/// one class through the labels that cover it. The planner learns the map cell by cell. The unit is the scene's
-/// mean utility of a metre on which every cell in view is new. `known map` is the result of `horizon` if it knows
-/// the whole map before it starts, close to the maximum that the limit allows. It takes a few minutes; the same
-/// seed gives the same table.
+/// The label maps are made by the scene model from drawn patches, from drawn reefs and from annotated images, or are read
+/// from files with --labels. The operator favours one class through the labels that cover it; in a label map from a file,
+/// the rarest label that covers at least 5 %. The planner learns the map cell by cell. The unit is the scene's mean utility
+/// of a metre on which every cell in view is new. `known map` is the result of `horizon` if it knows the whole map before
+/// it starts, close to the maximum that the limit allows. The last lines are means with their standard errors. It takes a
+/// few minutes; the same seed gives the same table.
 #[derive(Debug, Args)]
 #[command(after_help = "Example: scenecast bench planning --seed 3 --out tracks")]
 pub(super) struct PlanningBench {
@@ -24,9 +27,16 @@ pub(super) struct PlanningBench {
     /// Seed of all random numbers
     #[arg(long, default_value_t = 1)]
     seed: u64,
+    /// Number of seeds, from --seed on; each draws scenes, fence, keep-outs and start
+    #[arg(long, value_name = "N", default_value_t = 10, value_parser = clap::value_parser!(u64).range(1..=1000))]
+    seeds: u64,
     /// Folder of images NAME.jpg with classes in NAME_label.png; skipped if it does not exist
     #[arg(long, value_name = "DIR", default_value = "../shared/data/eilatmixx")]
     scenes: PathBuf,
+    /// Label maps instead of all other scenes: indexed PNG files, pixel value = label, 0 = no label; made coarser to at
+    /// most 125 cells of 0.25 m
+    #[arg(long, value_name = "PNG", num_args = 1..)]
+    labels: Vec<PathBuf>,
     /// Folder for an image of the tracks of each trial
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
@@ -35,19 +45,18 @@ pub(super) struct PlanningBench {
 impl PlanningBench {
     pub(super) fn run(self) -> Result<(), UserError> {
         let images = annotated_images(&self.scenes);
-        if images.is_empty() {
-            eprintln!("skipped: no annotated images in {}; procedural reefs only", self.scenes.display());
+        if images.is_empty() && self.labels.is_empty() {
+            eprintln!("skipped: no annotated images in {}; drawn scenes only", self.scenes.display());
         }
         if let Some(dir) = &self.out {
             std::fs::create_dir_all(dir).map_err(|e| UserError::file(dir, e))?;
         }
         if !self.json {
-            println!(
-                "scene             lawnmower   greedy  horizon known map  horizon/lawnmower  horizon/greedy  violations"
-            );
+            println!("{:<22} {HEAD}", "scene");
         }
         let mut progress = Progress::new("planning");
-        let table = run_all(self.seed, &images, &mut |share, trial| {
+        let files = PlanningFiles { images, labels: self.labels.clone() };
+        let table = run_all((self.seed, self.seeds), &files, &mut |share, trial| {
             progress.show(share);
             if !self.json {
                 print_trial(trial);
@@ -59,15 +68,7 @@ impl PlanningBench {
             println!("{}", serde_json::to_string(&table).map_err(|e| UserError::Failed(e.to_string()))?);
             return Ok(());
         }
-        let m = table.median;
-        println!("{:<17} {:>9.3} {:>8.3} {:>8.3} {:>9.3}", "median", m.lawnmower, m.greedy, m.horizon, table.map_known);
-        println!(
-            "horizon: {:.2} x lawnmower, {:.2} x greedy; {} violations; {} seeds",
-            m.horizon / m.lawnmower.max(1e-9),
-            m.horizon / m.greedy.max(1e-9),
-            table.violations,
-            table.seeds
-        );
+        print_means(&table);
         Ok(())
     }
 
@@ -78,14 +79,44 @@ impl PlanningBench {
     }
 }
 
+const HEAD: &str =
+    "   lawnmower        greedy       horizon     known map  horizon/lawnmower  horizon/greedy  violations";
+
 fn print_trial(t: &Trial) {
     let [lawnmower, greedy, horizon] = t.utility_per_m;
     println!(
-        "{:<17} {lawnmower:>9.3} {greedy:>8.3} {horizon:>8.3} {:>9.3} {:>18.2} {:>15.2} {:>11}",
+        "{:<22} {lawnmower:>12.3} {greedy:>13.3} {horizon:>13.3} {:>13.3} {:>18.2} {:>15.2} {:>11}",
         t.name,
         t.map_known_per_m,
         horizon / lawnmower.max(1e-9),
         horizon / greedy.max(1e-9),
         t.violations
     );
+}
+
+fn print_means(table: &PlanningTable) {
+    let text = |e: Estimate| format!("{:.3}±{:.3}", e.value, e.standard_error);
+    for SourceTable {
+        source,
+        trials,
+        lawnmower,
+        greedy,
+        horizon,
+        map_known,
+        horizon_by_lawnmower,
+        horizon_by_greedy,
+    } in &table.sources
+    {
+        println!(
+            "{:<22} {:>12} {:>13} {:>13} {:>13} {:>18} {:>15}",
+            format!("mean of {trials}, {}", source.name()),
+            text(*lawnmower),
+            text(*greedy),
+            text(*horizon),
+            text(*map_known),
+            text(*horizon_by_lawnmower),
+            text(*horizon_by_greedy)
+        );
+    }
+    println!("{} violations; {} seeds", table.violations, table.seeds);
 }

@@ -17,6 +17,8 @@ mod bench_planning;
 #[cfg(feature = "rehearsal")]
 mod bench_restart;
 #[cfg(feature = "rehearsal")]
+mod bench_steering;
+#[cfg(feature = "rehearsal")]
 mod bench_stranger;
 #[cfg(feature = "rehearsal")]
 mod bench_wide;
@@ -26,6 +28,8 @@ mod ctl;
 #[cfg(feature = "rehearsal")]
 mod demo;
 mod key;
+#[cfg(feature = "tools")]
+mod manual;
 #[cfg(feature = "rehearsal")]
 mod modem_sim;
 mod node;
@@ -34,8 +38,16 @@ mod sim;
 
 use clap::{Parser, Subcommand};
 use scenecast_core::UserError;
+use scenecast_protocol::wire::WIRE_VERSION;
 #[cfg(feature = "tools")]
-use scenecast_tools::commands as tools;
+use scenecast_tools::{ProgressForm, commands as tools};
+use std::sync::LazyLock;
+
+/// The version of the program, the commit of its source, and the version of the wire.
+static VERSION: LazyLock<String> = LazyLock::new(|| {
+    let (version, commit) = (env!("CARGO_PKG_VERSION"), env!("SCENECAST_COMMIT"));
+    format!("{version} (commit {commit}, wire version {WIRE_VERSION})")
+});
 
 #[cfg(feature = "rehearsal")]
 const EXAMPLE: &str = "Example: scenecast demo, then open http://127.0.0.1:8460";
@@ -44,8 +56,12 @@ const EXAMPLE: &str = "Example: scenecast config --role auv > auv.toml";
 
 /// Streams the scene map of an underwater robot over an acoustic link to a scientist at the surface.
 #[derive(Debug, Parser)]
-#[command(name = "scenecast", version, after_help = EXAMPLE)]
+#[command(name = "scenecast", version, long_version = VERSION.as_str(), after_help = EXAMPLE)]
 pub struct Arguments {
+    #[cfg(feature = "tools")]
+    /// Form of the progress of long work, on the standard error output
+    #[arg(long, global = true, value_enum, default_value_t, value_name = "FORM")]
+    progress: ProgressForm,
     #[command(subcommand)]
     command: Command,
 }
@@ -93,10 +109,18 @@ enum Command {
     Tune(Box<tools::Tune>),
     /// Print a configuration file with every key explained, or rewrite an old one.
     Config(config::ConfigCommand),
+    #[cfg(feature = "tools")]
+    /// Print the completions of commands and options for a shell.
+    Completions(manual::Completions),
+    #[cfg(feature = "tools")]
+    /// Write the manual pages.
+    Man(manual::Man),
 }
 
 /// Runs the command that was parsed; an error has its exit code.
 pub fn run(arguments: Arguments) -> Result<(), UserError> {
+    #[cfg(feature = "tools")]
+    arguments.progress.choose();
     match arguments.command {
         #[cfg(feature = "rehearsal")]
         Command::Demo(demo) => demo.run(),
@@ -121,5 +145,9 @@ pub fn run(arguments: Arguments) -> Result<(), UserError> {
         #[cfg(feature = "tools")]
         Command::Tune(tune) => tune.run(),
         Command::Config(config) => config.run(),
+        #[cfg(feature = "tools")]
+        Command::Completions(completions) => completions.run(),
+        #[cfg(feature = "tools")]
+        Command::Man(man) => man.run(),
     }
 }

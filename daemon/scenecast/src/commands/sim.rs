@@ -15,7 +15,7 @@ pub(super) struct WorldArguments {
     /// Scenario: a configuration file [default: every key at its default]
     #[arg(long, value_name = "FILE")]
     pub scenario: Option<PathBuf>,
-    /// Image of a sea floor [default: a procedural reef]
+    /// Image of a sea floor [default: the one of world.kind]
     #[arg(long, value_name = "IMG")]
     pub mosaic: Option<PathBuf>,
     /// Classes of the image's pixels: a grey or indexed image of the same size; 255 is not annotated
@@ -54,7 +54,7 @@ impl WorldArguments {
     pub fn world(&self, config: &Config) -> Result<World, UserError> {
         match &self.mosaic {
             Some(mosaic) => World::from_files(mosaic, self.annotations.as_deref(), config.camera.metres_per_pixel),
-            None => Ok(World::procedural(self.seed, config.camera.metres_per_pixel)),
+            None => Ok(World::procedural(config, self.seed)),
         }
     }
 

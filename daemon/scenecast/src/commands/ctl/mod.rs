@@ -191,6 +191,10 @@ struct SettingsArgs {
     /// lawnmower, greedy, horizon; "": as configured
     #[arg(long, value_name = "NAME")]
     planner: Option<String>,
+    /// Once no look pays any more: repeat (look at favoured labels again), explore (the rest, then hold), hold; "": as
+    /// configured
+    #[arg(long, value_name = "NAME")]
+    at_end: Option<String>,
     /// Use the most informative settings whose stream fits a budget [default: the map's share of the
     /// vehicle's budget]. The options above have precedence
     #[arg(long, value_name = "BIT/S", num_args = 0..=1, allow_negative_numbers = true)]
@@ -204,6 +208,7 @@ impl SettingsArgs {
     fn change(self) -> SettingsChange {
         let order = SettingsOrder {
             planner: self.planner,
+            at_end: self.at_end,
             cells: self.cells,
             layers: self.layers,
             alpha: self.alpha,
