@@ -30,7 +30,10 @@ fn wrong_input_gets_one_line_with_the_rule() {
     assert_refused(&["sim", "--set", "map.codec=jpeg", "--out", out], &["map.codec", "auto, png, context"]);
     assert_refused(&["sim", "--duration", "nan", "--out", out], &["survey.duration_s"]);
     assert_refused(&["sim", "--set", "survey.area_m=[5,5,1,1]", "--out", out], &["survey.area_m", "at least 1 m"]);
-    assert_refused(&["sim", "--set", "survey.area_m=[500,500,600,600]", "--out", out], &["survey.area_m", "26 m east"]);
+    assert_refused(
+        &["sim", "--set", "survey.area_m=[500,500,600,600]", "--out", out],
+        &["survey.area_m", "120 m east"],
+    );
     assert_refused(&["sim", "--duration", "-5", "--out", out], &["survey.duration_s", "from 0"]);
     assert_refused(&["sim"], &["--out"]);
     assert_refused(&["auv", "--config", "nowhere.toml"], &["nowhere.toml"]);
@@ -258,4 +261,74 @@ fn tuning_goes_on_where_it_was_and_gives_a_configuration() {
     }
     assert_eq!(run_with(&["--budget", "0.001"]).status.code(), Some(1));
     assert!(!best.exists(), "what does not fit the budget is not left to pass for the answer");
+}
+
+#[test]
+fn without_a_command_the_list_of_commands_is_printed() {
+    let output = run(&[]);
+    assert_eq!(output.status.code(), Some(2));
+    let text = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(text.contains("Usage: scenecast") && text.contains("Run a simulated mission in real time"), "{text}");
+    assert_refused(&["demoo"], &["demoo", "demo"]);
+    assert_refused(&["sim", "--durration", "5"], &["--durration", "--duration"]);
+}
+
+#[test]
+fn the_version_has_the_commit_and_the_version_of_the_wire() {
+    let text = |argument| String::from_utf8(run(&[argument]).stdout).unwrap();
+    let version = env!("CARGO_PKG_VERSION");
+    assert_eq!(text("-V"), format!("scenecast {version}\n"));
+    let long = text("--version");
+    let wire = scenecast_protocol::wire::WIRE_VERSION;
+    let commit = long.strip_prefix(&format!("scenecast {version} (commit ")).unwrap_or_else(|| panic!("{long}"));
+    let commit = commit.strip_suffix(&format!(", wire version {wire})\n")).unwrap_or_else(|| panic!("{long}"));
+    assert!(commit == "unknown" || (commit.len() >= 12 && commit.chars().all(|c| c.is_ascii_hexdigit())), "{long}");
+}
+
+#[test]
+fn bash_completes_commands_and_options() {
+    let dir = scratch("completions");
+    let script = dir.join("scenecast.bash");
+    std::fs::write(&script, run(&["completions", "bash"]).stdout).unwrap();
+    let complete = |words: &[&str]| {
+        let (count, last) = (words.len() - 1, words[words.len() - 1]);
+        let before = words[count - 1];
+        let line = format!(
+            "source {}; COMP_WORDS=({}); COMP_CWORD={count}; _scenecast scenecast '{last}' '{before}'; echo \"${{COMPREPLY[@]}}\"",
+            script.display(),
+            words.join(" "),
+        );
+        let output = std::process::Command::new("bash").args(["-c", &line]).output().unwrap();
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        String::from_utf8(output.stdout).unwrap().trim().to_owned()
+    };
+    assert_eq!(complete(&["scenecast", "de"]), "demo");
+    assert_eq!(complete(&["scenecast", "bench", "stra"]), "stranger");
+    assert_eq!(complete(&["scenecast", "sim", "--mos"]), "--mosaic");
+}
+
+#[test]
+fn every_command_has_a_manual_page() {
+    let dir = scratch("man");
+    let output = run(&["man", "--out", dir.to_str().unwrap()]);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    for page in ["scenecast.1", "scenecast-demo.1", "scenecast-ctl-utility-set.1"] {
+        let text = std::fs::read_to_string(dir.join(page)).unwrap_or_else(|e| panic!("{page}: {e}"));
+        assert!(text.contains(".TH") && text.contains(".SH OPTIONS"), "{page}: {text}");
+    }
+}
+
+#[test]
+fn progress_comes_as_lines_of_json_with_a_growing_share() {
+    let dir = scratch("progress");
+    let out = dir.join("out");
+    let settings = ["--duration", "120", "--set", "world.kind=patches", "--progress", "json"];
+    let output = run(&[&["sim", "--out", out.to_str().unwrap()], &settings[..]].concat());
+    let text = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(output.status.success(), "{text}");
+    let lines: Vec<serde_json::Value> =
+        text.lines().map(|line| serde_json::from_str(line).unwrap_or_else(|e| panic!("{line}: {e}"))).collect();
+    let shares: Vec<f64> = lines.iter().map(|line| line["share"].as_f64().unwrap()).collect();
+    assert!(lines.iter().all(|line| line["task"] == "survey"), "{text}");
+    assert!(shares.is_sorted() && shares.last() == Some(&1.0), "{text}");
 }

@@ -143,6 +143,10 @@ fn a_killed_surface_shows_the_same_page_again() {
         let begin: String = bytes.iter().take(16).map(|&b| char::from(b)).collect();
         assert!(status == 200 && begin.starts_with(head), "{file}: {status} {begin}");
     }
+    let (_, regions) = http(pair.console, "GET", &format!("/api/v2/archive/{name}/map.geojson"), "", "").unwrap();
+    let regions: Value = serde_json::from_slice(&regions).unwrap();
+    let of_label = regions["features"].as_array().unwrap().iter().find(|region| region["id"] == label);
+    assert_eq!(of_label.expect("the label is on the map")["properties"]["name"], "sand");
     assert!(Path::new(&pair.dir.join(format!("asv/{name}.scmap"))).exists());
 }
 
