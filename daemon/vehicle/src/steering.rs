@@ -6,6 +6,8 @@ mod grounds;
 mod purpose;
 #[cfg(test)]
 mod settling_tests;
+#[cfg(test)]
+mod tests;
 mod views;
 mod worth;
 
@@ -338,105 +340,5 @@ impl Steering {
     /// The distance in metres at which a waypoint counts as reached.
     pub fn arrival_m(&self) -> f64 {
         self.grounds.arrival_m()
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use scenecast_protocol::coordinates::DecimetrePoint;
-    use scenecast_protocol::directive::Polygon;
-
-    const AREA: Area = Area { west: 0.0, south: 0.0, east: 20.0, north: 12.0 };
-    const FOOTPRINT: Footprint = Footprint { across: 4.0, along: 3.0 };
-
-    fn steering(kind: PlannerKind) -> Steering {
-        Steering::new(AREA, FOOTPRINT, 0.25, kind, 1.0)
-    }
-
-    /// Steers from waypoint to waypoint, and returns them.
-    fn drive(steering: &mut Steering, map: &LabelGrid, utility: Option<&Utility>, legs: usize) -> Vec<Point> {
-        let mut at = steering.start();
-        let mut track = vec![at];
-        for version in 0..legs {
-            let Course::Go(to) = steering.next(at, (map, version as u64), utility, f64::INFINITY) else { break };
-            at = to;
-            track.push(at);
-            steering.handle_view(at);
-        }
-        track
-    }
-
-    #[test]
-    fn the_lawnmower_covers_the_area_and_stays_inside_it() {
-        let legs = drive(&mut steering(PlannerKind::Horizon), &LabelGrid::default(), None, 20);
-        assert!(legs.iter().all(|&(x, y)| (0.0..=20.0).contains(&x) && (0.0..=12.0).contains(&y)), "{legs:?}");
-        assert!(legs.iter().any(|l| l.1 > 9.0) && legs.iter().any(|l| l.1 < 2.0), "{legs:?}");
-    }
-
-    #[test]
-    fn a_fence_that_leaves_a_leg_as_it_is_keeps_the_progress() {
-        let map = LabelGrid::default();
-        let around = |margin: i32| -> Polygon {
-            let (low, east, north) = (-10 * margin, 10 * (20 + margin), 10 * (12 + margin));
-            Polygon(
-                [(low, low), (east, low), (east, north), (low, north)].map(|(x, y)| DecimetrePoint::new(x, y)).into(),
-            )
-        };
-        let block = Polygon([(20, 10), (40, 10), (40, 20), (20, 20)].map(|(x, y)| DecimetrePoint::new(x, y)).into());
-        let return_point = Some(DecimetrePoint::new(100, 60));
-        for fence in [
-            Fence { fence: Some(around(1)), ..Fence::default() },
-            Fence { fence: Some(around(9)), return_point, ..Fence::default() },
-            Fence { keep_outs: vec![block], ..Fence::default() },
-        ] {
-            let mut steering = steering(PlannerKind::Horizon);
-            let track = drive(&mut steering, &map, None, 6);
-            let at = track[6];
-            let Course::Go(expected) = steering.next(at, (&map, 6), None, f64::INFINITY) else { panic!("no leg") };
-            steering.set_fence(&fence);
-            let Course::Go(next) = steering.next(at, (&map, 7), None, f64::INFINITY) else { panic!("no leg") };
-            assert!(distance(next, expected) < 0.1, "{next:?} instead of {expected:?} from {at:?}: {fence:?}");
-        }
-    }
-
-    #[test]
-    fn an_adaptive_plan_has_a_purpose_until_nothing_pays() {
-        let mut map = LabelGrid::default();
-        (0..48).for_each(|y| {
-            (0..40).for_each(|x| {
-                map.set(Cell::new(x, y), if x > 20 { 2 } else { 1 });
-            })
-        });
-        let mut steering = steering(PlannerKind::Horizon);
-        drive(&mut steering, &map, None, 2);
-        assert_eq!(steering.intent(), None, "a lawnmower has no purpose of its own");
-        let favour = Utility { weights: [(2, 100)].into(), ..Utility::default() };
-        drive(&mut steering, &map, Some(&favour), 1);
-        assert_eq!(steering.intent(), Some(Intent::Label(2)));
-        steering.replan();
-        let explore = Utility { exploration: 100, ..Utility::default() };
-        drive(&mut steering, &map, Some(&explore), 1);
-        assert_eq!(steering.intent(), Some(Intent::Unseen));
-        steering.replan();
-        let averse = Utility { exploration: -10, weights: [(1, -50), (2, -50)].into(), ..Utility::default() };
-        drive(&mut steering, &map, Some(&averse), 1);
-        assert_eq!(steering.intent(), None, "nothing pays");
-    }
-
-    #[test]
-    fn a_favoured_label_draws_the_vehicle_to_it() {
-        let mut map = LabelGrid::default();
-        for y in 0..48 {
-            for x in 0..80 {
-                map.set(Cell::new(x, y), if x > 60 && y > 30 { 2 } else { 1 });
-            }
-        }
-        let weights = [(2, 100), (1, -5)].into_iter().collect();
-        let utility = Utility { weights, ..Utility::default() };
-        for kind in [PlannerKind::Greedy, PlannerKind::Horizon] {
-            let track = drive(&mut steering(kind), &map, Some(&utility), 12);
-            assert!(track.iter().any(|to| to.0 > 14.0 && to.1 > 7.0), "{kind:?}: {track:?}");
-        }
     }
 }

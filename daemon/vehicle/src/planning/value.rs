@@ -174,3 +174,28 @@ fn oddness(surprise: &[u8]) -> Vec<f32> {
     let mean = known().map(|s| (s - least) * scale).sum::<f32>() / count;
     surprise.iter().map(|&s| if s == 0 { mean } else { (f32::from(s) - least) * scale }).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_rate_of_the_frames_does_not_change_the_number_of_looks() {
+        let cell = Cell::new(3, 4);
+        for frames_per_step in [1u32, 4, 40] {
+            let mut known = Knowledge::default();
+            for frame in 0..=10 * frames_per_step {
+                known.look(cell, f64::from(frame) / f64::from(frames_per_step));
+            }
+            let looks = known.looks.get(cell);
+            assert!((10..=14).contains(&looks), "{looks} looks on 10 steps, {frames_per_step} frames a step");
+        }
+    }
+
+    #[test]
+    fn a_vehicle_that_stays_looks_once() {
+        let mut known = Knowledge::default();
+        (0..100).for_each(|_| known.look(Cell::new(0, 0), 77.3));
+        assert_eq!(known.looks.get(Cell::new(0, 0)), 1);
+    }
+}
