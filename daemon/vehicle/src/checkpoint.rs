@@ -6,7 +6,7 @@ use scene_model::envelope::{Envelope, EnvelopeError};
 use scene_model::exemplars::ExemplarStore;
 use scene_model::publish::LabelBook;
 use scene_model::topics::{CheckpointError, SceneConfig, SceneModel};
-use scene_model::words::{Measures, WordExtractor};
+use scene_model::words::{FlatField, Measures, WordExtractor};
 use scenecast_config::Config;
 use scenecast_core::UserError;
 use serde::{Deserialize, Serialize};
@@ -63,6 +63,7 @@ impl Mapper {
         };
         let mut content = postcard::to_allocvec(&kept).unwrap_or_default();
         content.extend(postcard::to_allocvec(&self.last_seen_s).unwrap_or_default());
+        content.extend(postcard::to_allocvec(&self.light).unwrap_or_default());
         ENVELOPE.seal(&content)
     }
 
@@ -72,8 +73,9 @@ impl Mapper {
         let content = ENVELOPE.open(bytes)?;
         let (kept, rest): (CheckpointContent<Vec<u8>, LabelBook, Measures, ExemplarStore, Relief>, _) =
             postcard::take_from_bytes(content).map_err(|_| RestoreError::Inconsistent)?;
-        // A checkpoint of an earlier build ends here.
-        let last_seen_s = if rest.is_empty() { Ok(BTreeMap::new()) } else { postcard::from_bytes(rest) };
+        // Checkpoints of earlier builds end here, or after the times of the cells.
+        let (last_seen_s, rest) = part(rest, BTreeMap::new())?;
+        let (light, _) = part(rest, None::<FlatField>)?;
         let model = SceneModel::load(&kept.model)?;
         let fresh = Mapper::new(config, vocabulary, kept.book.epoch(), config.runtime.seed)?;
         let &SceneConfig { alpha, beta, gamma, seed, .. } = model.config();
@@ -86,13 +88,22 @@ impl Mapper {
             return Err(RestoreError::OtherParameters);
         }
         let mut mapper = fresh;
-        mapper.last_seen_s = last_seen_s.map_err(|_| RestoreError::Inconsistent)?;
+        mapper.last_seen_s = last_seen_s;
+        mapper.light = mapper.light.map(|fresh| light.unwrap_or(fresh));
         mapper.extractor = WordExtractor::from_measures(kept.words);
         (mapper.model, mapper.book) = (model, kept.book);
         (mapper.exemplars, mapper.relief, mapper.last_s) = (kept.exemplars, kept.relief, kept.last_s);
         mapper.flat = mapper.model.label_map();
         Ok(Restored { mapper, lineage: kept.lineage })
     }
+}
+
+/// A part of the content, and the bytes after it; `missing` at the end of the content.
+fn part<'a, T: Deserialize<'a>>(bytes: &'a [u8], missing: T) -> Result<(T, &'a [u8]), RestoreError> {
+    if bytes.is_empty() {
+        return Ok((missing, bytes));
+    }
+    postcard::take_from_bytes(bytes).map_err(|_| RestoreError::Inconsistent)
 }
 
 fn is_same(a: &Measures, b: &Measures) -> bool {
@@ -157,12 +168,17 @@ mod tests {
     }
 
     #[test]
-    fn an_earlier_checkpoint_lacks_only_the_times_of_sights() {
+    fn an_earlier_checkpoint_lacks_only_the_times_of_sights_and_the_flat_field() {
         let mut mapper = Mapper::new(&config(&[]), None, 3, 1).unwrap();
         (0..5).for_each(|at| drop(frame(&mut mapper, at)));
         let bytes = mapper.save(7);
+        let content = ENVELOPE.open(&bytes).unwrap();
+        let light = postcard::to_allocvec(&mapper.light).unwrap();
+        let without_light = content.strip_suffix(light.as_slice()).unwrap();
+        let restored = Mapper::restore(&config(&[]), None, &ENVELOPE.seal(without_light)).unwrap().mapper;
+        assert_eq!((restored.current(), restored.light), (mapper.current(), Some(FlatField::default())));
         let times = postcard::to_allocvec(&mapper.last_seen_s).unwrap();
-        let earlier = ENVELOPE.open(&bytes).unwrap().strip_suffix(times.as_slice()).unwrap();
+        let earlier = without_light.strip_suffix(times.as_slice()).unwrap();
         let restored = Mapper::restore(&config(&[]), None, &ENVELOPE.seal(earlier)).unwrap().mapper;
         let mut expected = mapper.current();
         expected.layers.insert(LayerId::LAST_SEEN, Vec::new());

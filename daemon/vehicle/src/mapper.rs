@@ -7,7 +7,7 @@ use scene_model::exemplars::{ExemplarPatch, ExemplarStore};
 use scene_model::project::{DownCamera, Pose};
 use scene_model::publish::{LabelBook, PublishedCell};
 use scene_model::topics::{Birth, FlatCell, SceneConfig, SceneModel};
-use scene_model::words::{Measures, WordConfig, WordExtractor};
+use scene_model::words::{FlatField, Measures, WordConfig, WordExtractor};
 use scenecast_config::{BirthRule, Config, cell_m};
 use scenecast_core::UserError;
 use scenecast_protocol::directive::{Change, Settings, ShortDecimal};
@@ -39,6 +39,8 @@ pub struct MapUpdate {
 /// The scene model of one vehicle.
 pub struct Mapper {
     pub(super) extractor: WordExtractor,
+    /// The unevenness of the light in the frames; `None` if frames are mapped as they are.
+    pub(super) light: Option<FlatField>,
     camera: DownCamera,
     cell_m: f64,
     pub(super) model: SceneModel,
@@ -94,6 +96,7 @@ impl Mapper {
         };
         Ok(Self {
             extractor,
+            light: config.camera.flat_field.then(FlatField::default),
             camera: DownCamera {
                 metres_per_pixel: config.camera.metres_per_pixel,
                 altitude_m: config.survey.altitude_m,
@@ -150,7 +153,14 @@ impl Mapper {
     /// `scale` is the size of a pixel on the sea floor, divided by the configured size.
     pub fn handle_frame(&mut self, image: &RgbImage, pose: &Pose, scale: f64, t_s: f64) -> MapUpdate {
         let camera = DownCamera { metres_per_pixel: scale * self.camera.metres_per_pixel, ..self.camera };
-        let words = self.extractor.extract(image, (self.cell_m / camera.metres_per_pixel) as f32);
+        let cell_px = (self.cell_m / camera.metres_per_pixel) as f32;
+        let words = match &mut self.light {
+            Some(light) => {
+                light.learn(image);
+                self.extractor.extract(&light.corrected(image), cell_px)
+            }
+            None => self.extractor.extract(image, cell_px),
+        };
         let observations = camera.project(image.width(), image.height(), pose, &words);
         self.model.insert(t_s, &observations);
         for seen in &observations {

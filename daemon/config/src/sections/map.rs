@@ -47,6 +47,9 @@ section! {
         height_px: u32 = 480, range(64.0, 4096.0, "pixel"), [Scenario];
         /// Size of a pixel on the sea floor.
         metres_per_pixel: f64 = 0.01, range(0.0001, 10.0, "m"), [Auv Scenario];
+        /// Whether frames are corrected for a light that depends on the place in the frame alone: lamps, the lens, the water
+        /// between. It is learnt from the first 500 frames. Exemplars show the frame as it is.
+        flat_field: bool = true, ANY, [Auv Scenario];
     }
 }
 
