@@ -7,6 +7,7 @@ mod command;
 mod command_tests;
 mod exemplar_cache;
 mod in_force;
+mod label_gains;
 mod map_in_view;
 mod orders;
 mod pauses;
@@ -25,6 +26,7 @@ pub use command::{
     CommandRequest, OrderKind,
 };
 pub use exemplar_cache::{ExemplarCache, LabelExemplars, OpenRequest, RequestKind, RequestState, StoredExemplar};
+pub use label_gains::LabelGains;
 pub use orders::{FenceOrder, LimitsOrder, MAX_DISTANCE_M};
 pub use scenecast_core::{Principal, Role};
 pub use settings::{SettingsOrder, SettingsRecord};

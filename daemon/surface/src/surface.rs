@@ -250,6 +250,18 @@ impl Surface {
         let link = &self.link;
         let speaks = |vehicle| link.vehicle(vehicle).and_then(|v| v.last_received()) == Some(now);
         self.records.iter_mut().filter(|(a, _)| speaks(**a)).for_each(|(_, record)| record.pauses.handle_frame(now));
+        self.count_gains(now);
+    }
+
+    /// Keeps the number of cells of each label, for the gains of the last minutes.
+    fn count_gains(&mut self, now: Instant) {
+        let due: Vec<Address> = self.vehicles().filter(|(_, r)| r.gains.is_due(now)).map(|(a, _)| a).collect();
+        for vehicle in due {
+            let Some(cells) = self.labels(vehicle) else { continue };
+            if let Some(record) = self.records.get_mut(&vehicle).filter(|_| !cells.is_empty()) {
+                record.gains.handle_cells(cells, now);
+            }
+        }
     }
 
     fn handle_event(&mut self, event: SurfaceEvent, now: Instant) -> Option<SurfaceOutput> {
@@ -260,7 +272,7 @@ impl Surface {
             }
             SurfaceEvent::MapChanged(vehicle) => Some(SurfaceOutput::MapChanged(vehicle)),
             SurfaceEvent::VehicleRestarted(vehicle) => {
-                self.records.get_mut(&vehicle).into_iter().for_each(|record| record.run += 1);
+                self.records.get_mut(&vehicle).into_iter().for_each(VehicleRecord::begin_run);
                 self.request_again(vehicle, now);
                 Some(SurfaceOutput::MapChanged(vehicle))
             }

@@ -2,6 +2,7 @@
 
 use super::annotations::Annotations;
 use super::exemplar_cache::ExemplarCache;
+use super::label_gains::LabelGains;
 use super::pauses::Pauses;
 use super::record::{EarlierMap, StoredLabel};
 use super::settings::SettingsRecord;
@@ -77,6 +78,7 @@ pub struct VehicleRecord {
     pub run: u32,
     pub epoch: u8,
     pub whole: WholeMaps,
+    pub gains: LabelGains,
     pub earlier: EarlierView,
     /// The usual length of its silence.
     pub pauses: Pauses,
@@ -152,12 +154,19 @@ impl VehicleRecord {
             run: 1,
             epoch: 0,
             whole: WholeMaps::default(),
+            gains: LabelGains::default(),
             earlier: EarlierView::default(),
             pauses: Pauses::default(),
             found: None,
             annotations: Annotations::default(),
             restored: RestoredContact::default(),
         }
+    }
+
+    /// The vehicle has begun another run, with a map of its own.
+    pub fn begin_run(&mut self) {
+        self.run += 1;
+        self.gains = LabelGains::default();
     }
 
     /// The last status and when its pose came in, perhaps before the start of the surface.
@@ -223,6 +232,7 @@ impl VehicleRecord {
             self.utility = Utility { epoch: status.epoch, ..Utility::default() };
             self.exemplars = ExemplarCache::default();
             self.annotations.labels.clear();
+            self.gains = LabelGains::default();
         }
         self.track.handle_pose(status, at);
     }

@@ -170,7 +170,7 @@ export class Vehicle {
         explored_cells: this.replica.size, updated_s: this.updatedS ?? null, epoch: 0, placement: this.placement ?? null, earlier: this.earlier ?? null,
       },
       labels: counts.map(([id, cells]) => ({
-        id, cells, area_m2: cells * area, weight: this.weights.get(id) ?? 0, exemplar: this.exemplarJson(id),
+        id, cells, area_m2: cells * area, gained_m2: (id % 2 ? 0.25 : -0.125) * cells * area, weight: this.weights.get(id) ?? 0, exemplar: this.exemplarJson(id),
       })),
       utility: this.terms, fence: this.fence, limits: this.limits, planner: this.planner, settings: this.settings.json(),
       in_force: { utility: "known", settings: "none", budget: "known", limits: this.inForce.limits ? "known" : "none", fence: this.inForce.fence ? "known" : "none", ...this.reported },

@@ -237,6 +237,17 @@ export default [
     },
   },
   {
+    name: "a label shows what the last five minutes brought",
+    scenario: "rich",
+    async run(s) {
+      const labels = (await s.vehicle()).labels.filter((l) => Math.abs(l.gained_m2) >= 1);
+      const gains = await s.page.locator(".label .gain:visible").allInnerTexts();
+      assert.ok(gains.length > 0 && labels.length > 0);
+      assert.equal(gains.some((gain) => gain.startsWith("+")), labels.some((l) => l.gained_m2 > 0));
+      assert.equal(gains.some((gain) => gain.startsWith("\u2212")), labels.some((l) => l.gained_m2 < 0));
+    },
+  },
+  {
     name: "the planner is chosen and set",
     async run(s) {
       await s.page.selectOption("#planner", "greedy");

@@ -127,11 +127,12 @@ export function shownLabels(vehicle) {
   for (const label of vehicle.labels) {
     const into = shownAs(label.id);
     const id = ids.has(into) ? into : label.id;
-    if (!shown.has(id)) shown.set(id, { members: [], cells: 0, area_m2: 0 });
+    if (!shown.has(id)) shown.set(id, { members: [], cells: 0, area_m2: 0, gained_m2: 0 });
     const sum = shown.get(id);
     sum.members.push(label.id);
     sum.cells += label.cells;
     sum.area_m2 += label.area_m2;
+    sum.gained_m2 += label.gained_m2 ?? 0;
   }
   return vehicle.labels.filter((l) => shown.has(l.id)).map((l) => ({ ...l, ...shown.get(l.id) }));
 }

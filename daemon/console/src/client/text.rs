@@ -102,10 +102,14 @@ fn backlog(b: &ReportedBacklog, now_s: f64) -> String {
 
 /// The labels of a vehicle as a table.
 pub(super) fn labels(v: &VehicleState, now_s: f64) -> String {
-    let mut out = format!("{:>5} {:>8} {:>10} {:>7}  image\n", "label", "cells", "area m2", "weight");
+    let mut out = format!("{:>5} {:>8} {:>10} {:>9} {:>7}  image\n", "label", "cells", "area m2", "5 min m2", "weight");
     for l in &v.labels {
         let image = image(&l.exemplar, now_s);
-        let _ = writeln!(out, "{:>5} {:>8} {:>10.2} {:>7.2}  {image}", l.id, l.cells, l.area_m2, l.weight);
+        let _ = writeln!(
+            out,
+            "{:>5} {:>8} {:>10.2} {:>+9.2} {:>7.2}  {image}",
+            l.id, l.cells, l.area_m2, l.gained_m2, l.weight
+        );
     }
     let _ = writeln!(out, "weight of unexplored cells {:.2}", v.orders.utility.exploration);
     out

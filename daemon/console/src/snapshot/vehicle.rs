@@ -223,6 +223,7 @@ fn label(
         id,
         cells,
         area_m2: f64::from(cells) * cell_m * cell_m,
+        gained_m2: if is_current { record.gains.gained(id, cells) as f64 * cell_m * cell_m } else { 0.0 },
         weight: if is_current { record.utility.weight(id) } else { 0.0 },
         exemplar: match is_current {
             true => exemplar::progress(id, record, view, address),

@@ -13,6 +13,10 @@ pub struct MapLabel {
     pub cells: u32,
     /// The area of its cells, square metres.
     pub area_m2: f64,
+    /// The area that it has gained in the last five minutes, or since the surface began to count, square metres. What other
+    /// labels took from it is negative.
+    #[serde(default)]
+    pub gained_m2: f64,
     /// The last weight sent, -1 to 1.
     pub weight: f64,
     /// The exemplars of the label, and the request for another.

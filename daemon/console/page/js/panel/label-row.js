@@ -15,16 +15,17 @@ export function makeRow(label) {
   const of = () => latest.get(node);
   const chip = h("button.chip", { type: "button", title: "Show only this label on the map; press again for all labels", onclick: () => highlight(label.id) });
   const name = h("button.name", { type: "button", title: "Name, colour, merge", onclick: () => editLabel(of()) });
-  const size = h("span.area");
+  const size = h("span.area", { title: "Area on the map" });
+  const gain = h("span.gain", { title: "Area gained in the last five minutes" });
   const slider = h("input", { type: "range", min: -1, max: 1, step: 0.05, oninput: () => weightsOrder.set(store.vehicle, slider.valueAsNumber, label.id) });
   const value = h("output.value");
   const undo = h("button.undo", { type: "button", onclick: () => weightsOrder.undo(store.vehicle, label.id) }, "Undo");
   const note = h("p.note");
   const node = h("li.label", {}, chip,
-    h("div.head", {}, name, size),
+    h("div.head", {}, name, gain, size),
     h("div.weight", {}, slider, value, undo),
     exemplar(of), note);
-  node.parts = { chip, name, size, slider, value, undo, note };
+  node.parts = { chip, name, gain, size, slider, value, undo, note };
   latest.set(node, label);
   return node;
 }
@@ -46,6 +47,9 @@ export function refreshRow(node, label) {
   parts.chip.setAttribute("aria-pressed", String(layer.highlight === label.id));
   text(parts.name, name + extra);
   text(parts.size, area(label.area_m2));
+  const gained = label.gained_m2 ?? 0;
+  show(parts.gain, Math.abs(gained) >= 0.5);
+  text(parts.gain, `${gained < 0 ? "\u2212" : "+"}${area(Math.abs(gained))}`);
   if (Number(parts.slider.value) !== w) parts.slider.value = w;
   parts.slider.setAttribute("aria-label", `Weight of ${name}`);
   parts.slider.setAttribute("aria-valuetext", signed(w));
