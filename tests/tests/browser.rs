@@ -55,7 +55,7 @@ fn every_story_without_mock_passes_against_a_demo() {
         return;
     }
     let port = free_port();
-    let _demo = Process::start(&["demo", "--port", &port.to_string(), "--speed", "8", "--duration", "100000"]);
+    let _demo = Process::start(&["demo", "--port", &port.to_string(), "--speed", "5", "--duration", "100000"]);
     wait_until("labels on the map", LIMIT, || {
         state(port).is_some_and(|s| s["vehicles"][0]["labels"].as_array().is_some_and(|l| l.len() > 3))
     });

@@ -164,7 +164,8 @@ impl Steering {
     /// for each step of the lattice along the track, whatever the rate of the frames.
     pub fn handle_view(&mut self, at: Point) {
         let reach = self.grounds.reach_m();
-        let track_steps = self.views.handle_view(at) / self.grounds.lattice().step_m();
+        let step_m = self.grounds.lattice().step_m();
+        let track_steps = self.views.handle_view(at) / step_m;
         // The cells whose centre was visible.
         let cells = |middle: f64| {
             let edge = |metres: f64| metres / self.window.cell_m - 0.5;
@@ -172,6 +173,21 @@ impl Steering {
         };
         for (y, x) in cells(at.1).flat_map(|y| cells(at.0).map(move |x| (y, x))) {
             self.known.look(Cell::new(x, y), track_steps);
+        }
+        if self.views.take_turn_on_the_spot(step_m) {
+            self.exhaust_around(at);
+        }
+    }
+
+    /// What is left to gain around a place, in the map frame, does not keep the vehicle there.
+    fn exhaust_around(&mut self, at: Point) {
+        let metres = self.grounds.reach_m() + self.grounds.lattice().step_m();
+        let around = |middle: f64| {
+            let edge = |metres: f64| ((middle + metres) / self.window.cell_m - 0.5).round() as i32;
+            edge(-metres)..=edge(metres)
+        };
+        for (y, x) in around(at.1).flat_map(|y| around(at.0).map(move |x| (y, x))) {
+            self.known.exhaust(Cell::new(x, y));
         }
     }
 
@@ -223,7 +239,10 @@ impl Steering {
         let at_end = self.at_end.1.unwrap_or(self.at_end.0);
         let found = self.paying_plan(from, map, utility, left_m, &present, at_end != AtEnd::Hold);
         let repeats = at_end == AtEnd::Repeat && self.choice.adapts() && found.0.is_empty();
-        if repeats && self.views.begin_round(self.grounds.lattice().step_m()) && self.known.forget_looks(map, utility) {
+        let begins = repeats && self.views.begin_round(self.grounds.lattice().step_m());
+        if begins && self.known.forget_looks(map, utility) {
+            // The next round begins elsewhere.
+            self.views.last().into_iter().for_each(|at| self.exhaust_around(at));
             return self.paying_plan(from, map, utility, left_m, &present, false);
         }
         found

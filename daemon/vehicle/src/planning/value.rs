@@ -15,6 +15,8 @@ pub struct Knowledge {
     parts: LabelGrid,
     /// Twenty times the natural logarithm of the perplexity of each cell, 1 to 255.
     surprise: LabelGrid,
+    /// Favoured labels are looked at again.
+    repeats: bool,
 }
 
 impl Knowledge {
@@ -30,12 +32,18 @@ impl Knowledge {
         }
     }
 
-    /// Forgets the looks at the cells of favoured labels; returns whether there are any.
+    /// No further look at a cell pays, until the looks at it are forgotten.
+    pub fn exhaust(&mut self, cell: Cell) {
+        self.looks.set(cell, u8::MAX);
+    }
+
+    /// Forgets the looks at the cells of favoured labels and begins a round of further looks; returns whether there are any.
     pub fn forget_looks(&mut self, map: &LabelGrid, utility: &Utility) -> bool {
         let favoured: Vec<Cell> = map.iter().filter(|(_, l)| utility.weight(*l) > 0.0).map(|(cell, _)| cell).collect();
         for &cell in &favoured {
             self.looks.set(cell, 0);
         }
+        self.repeats = true;
         !favoured.is_empty()
     }
 
@@ -49,8 +57,10 @@ impl Knowledge {
 /// Parts of a step of the lattice in which the track is counted.
 const PARTS_PER_STEP: u8 = 4;
 
-/// The value of a repeated look at a cell, divided by the value of the look before.
+/// The value of a repeated look at a cell, divided by the value of the look before: while there is floor that was not seen,
+/// and in the rounds after that, in which more looks at dense places are better than a first one at each sparse place.
 const REPEATED_LOOK: f32 = 0.2;
+const REPEATED_LOOK_IN_ROUNDS: f32 = 0.7;
 
 /// The value of the next look at each block, the square between four places of a lattice. A place shows
 /// the four blocks around it.
@@ -160,7 +170,8 @@ impl CellWindow {
             values.iter_mut().zip(odd).for_each(|(w, odd)| *w += curiosity * odd);
         }
         let looks = self.copy(&known.looks);
-        values.iter_mut().zip(&looks).for_each(|(w, &n)| *w *= REPEATED_LOOK.powi(i32::from(n)));
+        let repeated = if known.repeats { REPEATED_LOOK_IN_ROUNDS } else { REPEATED_LOOK };
+        values.iter_mut().zip(&looks).for_each(|(w, &n)| *w *= repeated.powi(i32::from(n)));
         values
     }
 }

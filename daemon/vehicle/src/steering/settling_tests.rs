@@ -84,7 +84,8 @@ fn an_adaptive_survey_never_turns_on_the_spot() {
         for seed in 1..=8 {
             for at_end in AtEnd::ALL {
                 let Survey { track, is_over, .. } = survey(kind, at_end, 0, seed);
-                assert!(longest_stay(&track) <= 8, "{kind:?}, {at_end:?}, seed {seed}: {track:?}");
+                // At 0.5 m/s less than a minute.
+                assert!(longest_stay(&track) <= 12, "{kind:?}, {at_end:?}, seed {seed}: {track:?}");
                 if at_end != AtEnd::Repeat {
                     assert!(is_over, "{kind:?}, {at_end:?}, seed {seed}: {track:?}");
                 }
