@@ -32,9 +32,11 @@ impl Knowledge {
         }
     }
 
-    /// No further look at a cell pays, until the looks at it are forgotten.
+    /// No further look at a cell that was seen pays, until the looks at it are forgotten.
     pub fn exhaust(&mut self, cell: Cell) {
-        self.looks.set(cell, u8::MAX);
+        if self.parts.get(cell) != 0 {
+            self.looks.set(cell, u8::MAX);
+        }
     }
 
     /// Forgets the looks at the cells of favoured labels and begins a round of further looks; returns whether there are any.

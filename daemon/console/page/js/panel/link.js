@@ -14,6 +14,16 @@ function classNames(link) {
 }
 const classLine = (c) => h("tr", { data: { class: c } }, h("th", { scope: "row" }, c), h("td"), h("td", {}, h("span.share", {}, h("span"))), h("td"));
 const directions = { up: direction("Up", "vehicle to surface"), down: direction("Down", "surface to vehicle") };
+const LINES = [
+  ["loss", "Frames lost, up / down", "Share of the frames that were lost or damaged since the start, from all vehicles and to them"],
+  ["recent", "Recent loss, up / down", "The same share among the last frames from this vehicle and to it"],
+  ["refused", "Refused, vehicle / surface", "Frames without a valid tag, where a key is set"],
+  ["own", "Vehicle's budget", "The bit budget that the vehicle keeps to, by its last report"],
+  ["goodput", "Goodput, up / down", "The rate of payload that arrived and was useful"],
+  ["trip", "Round trip", "Time that sound takes to the vehicle and back, as measured"],
+  ["backlog", "Backlog", "The bits that the vehicle still has to send: those of its last report, minus the bits received since. The survey continues meanwhile."],
+  ["lag", "Map lag", "How far this map is behind the vehicle's: its approximate age and the missing bits"],
+];
 /** Loss while no frame comes in. */
 const UNKNOWN = "not known";
 const history = h("canvas", { role: "img" });
@@ -32,9 +42,7 @@ function direction(name, title) {
 }
 
 export function startLink() {
-  for (const [key, name, hint] of [["loss", "Frames lost, up / down"], ["recent", "Recent loss, up / down"], ["refused", "Refused, vehicle / surface"], ["own", "Vehicle's budget"], ["goodput", "Goodput, up / down"], ["trip", "Round trip"],
-    ["backlog", "Backlog", "The bits that the vehicle still has to send: those of its last report, minus the bits received since. The survey continues meanwhile."],
-    ["lag", "Map lag", "How far this map is behind the vehicle's: its approximate age and the missing bits"]]) {
+  for (const [key, name, hint] of LINES) {
     const [node, set] = row(name, hint);
     values[key] = set;
     node.classList.toggle("whole", key === "backlog" || key === "lag");

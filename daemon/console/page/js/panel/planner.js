@@ -8,7 +8,7 @@ import { replacedNote } from "../order/sent-versions.js";
 import { describe, slotOf } from "../order/status.js";
 import { store } from "../store.js";
 
-const DEFAULT = ["", "the vehicle's default"];
+const DEFAULT = ["", "vehicle's default"];
 const LINES = [
   {
     key: "planner", name: "Planner", hint: "Planner of the vehicle's path once it has a utility",

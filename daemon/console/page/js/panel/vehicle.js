@@ -15,6 +15,7 @@ const mode = h("span.mode");
 const age = h("p.age");
 /** Free space in bytes below which the panel warns. */
 const LOW_SPACE = 1e9;
+const WHOLE_LINES = ["path", "cells", "disk"];
 const values = {};
 const lines = {};
 const list = h("dl.values");
@@ -23,16 +24,22 @@ const noOrders = h("p.note", {}, "No order sent yet.");
 
 export function startVehicle() {
   for (const [key, name, hint] of [
-    ["position", "East, north"], ["depth", "Depth"], ["heading", "Heading"],
+    ["position", "East, north", "The position that the vehicle reported last, metres east and north of the origin"],
+    ["depth", "Depth", "The depth of the vehicle below the surface of the water"],
+    ["heading", "Heading", "The direction of the vehicle's bow, clockwise from north"],
     ["sigma", "Position \u03c3", "Standard deviation of the position; the ring on the map has twice this radius"],
-    ["fix", "Last fix"], ["waypoint", "Waypoint"], ["path", "Path", "The plan from the reported position through the waypoint to the last reported place; dashed on the map"], ["cells", "Vehicle's map"], ["contact", "Next contact"],
+    ["fix", "Last fix", "The age of the last position fix that the vehicle has used"],
+    ["waypoint", "Waypoint", "Distance and direction from the reported position to the next place of the plan"],
+    ["path", "Path", "The plan from the reported position through the waypoint to the last reported place; dashed on the map"],
+    ["cells", "Vehicle's map", "Explored cells and labels of the vehicle's own map, by its last report"],
+    ["contact", "Next contact", "When the next frame of the vehicle is due"],
     ["disk", "Vehicle's disk", "The files that the vehicle cannot write, and its free space, by its last report"],
     ["gps", "Surface GPS", "The position of the surface by GPS, and the number of fixes sent to vehicles"],
   ]) {
     const [node, set] = row(name, hint);
     values[key] = set;
     lines[key] = node;
-    node.classList.toggle("whole", key === "path" || key === "disk");
+    node.classList.toggle("whole", WHOLE_LINES.includes(key));
     list.append(node);
   }
   $("vehicle").append(h("header", {}, title, mode), age, list,
