@@ -256,7 +256,7 @@ fn an_order_gets_through_after_a_forged_series_ended_its_own() {
 }
 
 #[test]
-fn an_order_gets_through_although_a_forged_one_has_the_same_low_bits() {
+fn an_order_gets_through_beside_a_forged_one_of_the_same_bits() {
     for access in [Access::Shared, Access::ModemOwned { pool_frames: 8 }, Access::Polled] {
         let setup = Setup { access, ..Setup::new(64, 10_000, Codec::Context) };
         let mut pair = LinkedEnds::new(5, setup, CHANNEL);
@@ -281,7 +281,7 @@ fn an_order_gets_through_although_a_forged_one_has_the_same_low_bits() {
 }
 
 #[test]
-fn an_order_is_sent_again_once_only_to_a_vehicle_that_keeps_its_own_content() {
+fn a_vehicle_that_keeps_its_own_content_is_sent_an_order_twice() {
     let mut pair = LinkedEnds::new(8, Setup::new(64, 10_000, Codec::Context), CHANNEL);
     pair.run(pair.now + Duration::from_secs(60), false);
     let series = pair.surface.vehicle(auv()).unwrap().series();

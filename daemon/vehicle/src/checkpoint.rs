@@ -168,7 +168,7 @@ mod tests {
     }
 
     #[test]
-    fn an_earlier_checkpoint_lacks_only_the_times_of_sights_and_the_flat_field() {
+    fn an_earlier_checkpoint_lacks_only_what_was_added_since() {
         let mut mapper = Mapper::new(&config(&[]), None, 3, 1).unwrap();
         (0..5).for_each(|at| drop(frame(&mut mapper, at)));
         let bytes = mapper.save(7);

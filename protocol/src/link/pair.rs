@@ -358,7 +358,7 @@ mod tests {
     }
 
     #[test]
-    fn a_late_hello_of_the_vehicle_does_not_displace_the_run_that_it_uses() {
+    fn a_late_hello_does_not_displace_the_run_in_use() {
         let key = Arc::new(MissionKey::from_bytes([9; 16]));
         let authenticity = Some(Authenticity { key, all: true, encrypt: false });
         let auv = Address::vehicle(3).unwrap();
@@ -387,7 +387,7 @@ mod tests {
     }
 
     #[test]
-    fn a_forged_hello_of_another_version_leaves_the_series_of_the_true_one() {
+    fn a_forged_hello_of_another_version_leaves_the_true_series() {
         let auv = Address::vehicle(3).unwrap();
         let introduction = Introduction { series: Some(Series::from_random(1)), ..Introduction::default() };
         for is_first in [true, false] {

@@ -10,7 +10,7 @@ const HALF_FRAMES: f32 = 12.0;
 /// Frames that are learnt from. Later frames change nothing, so that words keep their meaning.
 const FRAMES: u32 = 500;
 /// The largest correction of a channel, as the natural logarithm of its factor.
-const MOST: f32 = 1.5;
+const MAX_LOG: f32 = 1.5;
 
 type Field = [[f32; 3]; COLUMNS * ROWS];
 
@@ -85,7 +85,7 @@ impl FlatField {
             std::array::from_fn(|channel| {
                 let fit = |k: usize| self.moments[k][channel] as f32 / norm[k] * term(k, node);
                 let log: f32 = (0..TERMS).map(fit).sum();
-                (-share * log).clamp(-MOST, MOST).exp()
+                (-share * log).clamp(-MAX_LOG, MAX_LOG).exp()
             })
         })
     }

@@ -62,7 +62,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_label_nearest_to_a_tenth_with_more_of_its_area_elsewhere_is_chosen() {
+    fn the_label_near_a_tenth_with_more_area_elsewhere_is_chosen() {
         // Twenty seen cells: label 1 on 15, label 2 on 3, label 3 on 2. Ten unseen cells: label 3 on one, label 2 on nine.
         let seen_label = |x: i32| {
             if x < 15 {

@@ -106,7 +106,7 @@ fn a_survey_explores_before_it_ends_unless_an_order_forbids_it() {
 }
 
 #[test]
-fn a_survey_that_repeats_first_explores_and_then_passes_places_again() {
+fn a_survey_that_repeats_explores_before_it_looks_again() {
     let mut repeats = 0;
     for seed in 1..=4 {
         let once = survey(PlannerKind::Horizon, AtEnd::Explore, 0, seed);

@@ -3,7 +3,7 @@
 use crate::planning::{Point, distance};
 
 /// The shortest round that is flown again, in steps of the lattice. A shorter one would be a turn on the spot.
-const LEAST_ROUND: f64 = 12.0;
+const MIN_ROUND: f64 = 12.0;
 
 /// A track of this length within a circle is a turn on the spot, in steps of the lattice.
 const SPOT_TRACK: f64 = 5.0;
@@ -46,7 +46,7 @@ impl Views {
 
     /// Begins another round of looks, unless the present one was too short to be flown again.
     pub(super) fn begin_round(&mut self, step_m: f64) -> bool {
-        let is_long = self.round_from_m.is_none_or(|from| self.track_m - from >= LEAST_ROUND * step_m);
+        let is_long = self.round_from_m.is_none_or(|from| self.track_m - from >= MIN_ROUND * step_m);
         if is_long {
             self.round_from_m = Some(self.track_m);
         }
@@ -59,7 +59,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_vehicle_that_goes_to_and_fro_turns_on_the_spot_and_one_that_goes_far_does_not() {
+    fn going_to_and_fro_is_a_turn_on_the_spot_and_a_long_leg_is_not() {
         let turns = |to_m: f64| {
             let mut views = Views::default();
             let place = |i: u32| (to_m / 2.0 * (1.0 - (f64::from(i) * 0.5 / to_m * std::f64::consts::PI).cos()), 0.0);
