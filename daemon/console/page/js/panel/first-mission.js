@@ -21,12 +21,12 @@ const STEPS = [
     (v) => v.map.explored_cells >= FIRST_CELLS],
   ["Name", "Click the name of a label and enter a word for it, such as sand.",
     (v) => shownLabels(v).some((l) => hasName(l.id))],
-  ["Weigh", "Move the slider of a label that you want to see more of to the right, then press Send weights.",
+  ["Weigh", "Move the slider of a label that you want to see more of to the right, then press Send below the list.",
     (v) => isInForce(v) && hasWeight(v)],
   ["Steer", "The vehicle plans its path by your weights. Its next report shows the plan as a dashed line.",
     (v) => isInForce(v) && Boolean(v.status?.waypoint) && v.status.at_s > utility(v).changed_s],
   ["Picture", "Press Request beside a label. The vehicle sends an image of that sea floor.",
-    (v) => v.labels.some((l) => l.exemplar.url !== null)],
+    (v) => v.labels.some((l) => l.exemplar.images.some((image) => image.requested))],
 ];
 
 const lines = STEPS.map(([name, instruction]) => {
