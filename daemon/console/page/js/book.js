@@ -11,8 +11,10 @@ import { redShade, rgb, tableColour } from "./palette.js";
 const EMPTY = { names: {}, colours: {}, merged: {} };
 let loadedKey = null;
 let book = EMPTY;
-/** Changes that the surface has not confirmed yet. */
-let saving = 0;
+/** Labels with a change that is not sent, and those of which one is on its way. A label has one request at a time, so that no
+ * change overtakes a later one. */
+const unsent = new Set();
+const onTheWay = new Set();
 
 function key() {
   const v = store.vehicle;
@@ -36,11 +38,23 @@ function change(id, edit) {
   send(id);
 }
 
+/** Sends the entry of `id` once the changes of this moment are all made. */
 function send(id) {
-  const entry = { label: id, name: book.names[id] ?? null, colour: book.colours[id] ?? null, merged_into: book.merged[id] ?? null };
   if (!store.vehicle) return;
-  saving += 1;
-  saveLabel(store.vehicle.id, entry).catch((error) => announce(error.message)).finally(() => (saving -= 1));
+  unsent.add(id);
+  queueMicrotask(flush);
+}
+
+function flush() {
+  for (const id of [...unsent].filter((waiting) => !onTheWay.has(waiting))) {
+    const entry = { label: id, name: book.names[id] ?? null, colour: book.colours[id] ?? null, merged_into: book.merged[id] ?? null };
+    unsent.delete(id);
+    onTheWay.add(id);
+    saveLabel(store.vehicle.id, entry).catch((error) => announce(error.message)).finally(() => {
+      onTheWay.delete(id);
+      flush();
+    });
+  }
 }
 
 /** Sends the entries that an earlier build kept in this browser alone to a surface that has none for these labels. */
@@ -58,7 +72,7 @@ function share() {
 function take() {
   const b = current();
   share();
-  if (saving > 0) return;
+  if (unsent.size + onTheWay.size > 0) return;
   let changed = false;
   const put = (part, id, value) => {
     if (value === undefined || (b[part][id] ?? null) === value) return;
