@@ -72,6 +72,10 @@ fn lasting(mut vehicle: Value) -> Value {
     let map = members["map"].as_object_mut().unwrap();
     map.remove("version");
     map.remove("earlier");
+    // Gains are counted from the start of the surface on.
+    for label in members["labels"].as_array_mut().unwrap() {
+        label.as_object_mut().unwrap().remove("gained_m2");
+    }
     vehicle
 }
 
