@@ -20,7 +20,7 @@ pub use flight::Flight;
 pub use mismatch::Mismatch;
 use pair::{Inbound, LinkPair};
 pub use run::{Authenticity, Identity};
-pub use slots::{SlotInbox, SlotInboxState};
+pub use slots::{Admission, SlotInbox, SlotInboxState};
 pub use stats::{DropReason, LinkStats};
 pub use surface::{Cycle, EndedRun, InForce, IssueError, PeerView, SurfaceConfig, SurfaceEvent, SurfaceLink};
 pub use vehicle::{OversizedChunk, VehicleConfig, VehicleEvent, VehicleLink};

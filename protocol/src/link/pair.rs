@@ -199,10 +199,9 @@ impl<T> LinkPair<T> {
         self.owes_hello || self.handshake.run().is_none()
     }
 
-    /// At the vehicle: sends the hello of an offered run again; returns whether there is one beside the current run.
-    pub fn repeat_hello(&mut self) -> bool {
+    /// At the vehicle: sends the hello of an offered run again.
+    pub fn repeat_hello(&mut self) {
         self.owes_hello |= self.handshake.offered().is_some();
-        self.owes_hello
     }
 
     /// At the vehicle: leaves the last hello of the surface without an answer.

@@ -27,6 +27,17 @@ impl SlotInboxState {
     }
 }
 
+/// Whether a version of a slot counts as received.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Admission {
+    /// No version of the series that is as late was received before.
+    New,
+    /// This version of the series or a later one was received before.
+    Known,
+    /// The series has ended; the report names it.
+    SeriesEnded,
+}
+
 /// Filters the slots that come in, and keeps the decisions for the report.
 #[derive(Debug, Default)]
 pub struct SlotInbox {
@@ -59,28 +70,27 @@ impl SlotInbox {
         self.reports
     }
 
-    /// Whether a version of a series is new; if so, it counts as received from now on. A version of a series that has
-    /// ended is not, and the report names it.
-    pub fn admit(&mut self, series: Series, slot: &VersionedSlot) -> bool {
+    /// Judges a version of a series; a new one counts as received from now on.
+    pub fn admit(&mut self, series: Series, slot: &VersionedSlot) -> Admission {
         if self.state.retired.contains(&series) {
             if let Some(report) = self.reports.get_mut(slot.id.index()) {
                 *report = SlotReport { version_low: slot.version as u8, state: SlotState::SeriesEnded };
             }
-            return false;
+            return Admission::SeriesEnded;
         }
         if self.state.series != Some(series) {
             self.begin_series(series);
         }
         let i = slot.id.index();
         let (Some(seen), Some(report)) = (self.state.versions.get_mut(i), self.reports.get_mut(i)) else {
-            return false;
+            return Admission::Known;
         };
-        let newer = seen.is_none_or(|v| (slot.version.wrapping_sub(v) as i16) > 0);
-        if newer {
-            *seen = Some(slot.version);
-            *report = SlotReport { version_low: slot.version as u8, state: SlotState::Pending };
+        if seen.is_some_and(|v| (slot.version.wrapping_sub(v) as i16) <= 0) {
+            return Admission::Known;
         }
-        newer
+        *seen = Some(slot.version);
+        *report = SlotReport { version_low: slot.version as u8, state: SlotState::Pending };
+        Admission::New
     }
 
     /// Keeps the host's decision about the latest version of a slot.
@@ -123,7 +133,7 @@ mod tests {
             let mut inbox = SlotInbox::default();
             let mut admitted = BTreeSet::new();
             for (series, version, restart) in arrivals {
-                if inbox.admit(Series::from_random(series), &slot(version)) {
+                if inbox.admit(Series::from_random(series), &slot(version)) == Admission::New {
                     prop_assert!(admitted.insert((series, version)));
                 }
                 if restart {
@@ -136,9 +146,9 @@ mod tests {
     #[test]
     fn the_report_names_a_version_of_a_series_that_has_ended() {
         let (mut inbox, [ended, present]) = (SlotInbox::default(), [1, 2].map(Series::from_random));
-        assert!(inbox.admit(ended, &slot(3)) && inbox.admit(present, &slot(1)));
+        assert_eq!([inbox.admit(ended, &slot(3)), inbox.admit(present, &slot(1))], [Admission::New; 2]);
         inbox.decide(SlotId::Utility, SlotState::Applied);
-        assert!(!inbox.admit(ended, &slot(4)));
+        assert_eq!(inbox.admit(ended, &slot(4)), Admission::SeriesEnded);
         let named = SlotReport { version_low: 4, state: SlotState::SeriesEnded };
         assert_eq!(inbox.reports()[SlotId::Utility.index()], named);
         let after = SlotInbox::restore(inbox.state().clone()).reports()[SlotId::Utility.index()];
@@ -148,8 +158,7 @@ mod tests {
     #[test]
     fn versions_wrap_without_going_back() {
         let (mut inbox, series) = (SlotInbox::default(), Series::from_random(1));
-        assert!(inbox.admit(series, &slot(65_535)));
-        assert!(inbox.admit(series, &slot(0)));
-        assert!(!inbox.admit(series, &slot(65_535)));
+        let admissions = [65_535, 0, 65_535].map(|version| inbox.admit(series, &slot(version)));
+        assert_eq!(admissions, [Admission::New, Admission::New, Admission::Known]);
     }
 }

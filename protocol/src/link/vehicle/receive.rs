@@ -3,8 +3,8 @@
 use super::content::Carried;
 use super::discovery::CallReply;
 use super::{VehicleEvent, VehicleLink};
-use crate::directive::{InForceDigests, Slot, SlotState, VersionedSlot};
-use crate::link::DropReason;
+use crate::directive::{InForceDigests, Slot, VersionedSlot};
+use crate::link::{Admission, DropReason};
 use crate::mac::{Access, Grant};
 use crate::map::StateSource;
 use crate::time::Instant;
@@ -132,12 +132,11 @@ impl<S: StateSource> VehicleLink<S> {
         let (Some(series), Ok(mut slot)) = (series, VersionedSlot::decode(payload)) else {
             return self.pair.stats.drop(DropReason::Malformed);
         };
-        if !self.inbox.admit(series, &slot) {
-            if self.inbox.reports().get(slot.id.index()).is_some_and(|r| r.state == SlotState::SeriesEnded) {
-                // A forged hello may have ended the surface's series, which begins another one when it knows.
-                self.content.status.owe_report_by(now + Duration::from_secs(5));
-            }
-            return;
+        match self.inbox.admit(series, &slot) {
+            Admission::New => {}
+            Admission::Known => return,
+            // A forged hello may have ended the surface's series, which begins another one when it knows.
+            Admission::SeriesEnded => return self.content.status.owe_report_by(now + Duration::from_secs(5)),
         }
         if let Some(window) = self.pair.window_mut() {
             window.hold_back(number);
