@@ -166,13 +166,8 @@ impl Steering {
         let reach = self.grounds.reach_m();
         let step_m = self.grounds.lattice().step_m();
         let track_steps = self.views.handle_view(at) / step_m;
-        // The cells whose centre was visible.
-        let cells = |middle: f64| {
-            let edge = |metres: f64| metres / self.window.cell_m - 0.5;
-            edge(middle - reach).ceil() as i32..=edge(middle + reach).floor() as i32
-        };
-        for (y, x) in cells(at.1).flat_map(|y| cells(at.0).map(move |x| (y, x))) {
-            self.known.look(Cell::new(x, y), track_steps);
+        for cell in self.window.cells_around(at, reach) {
+            self.known.look(cell, track_steps);
         }
         if self.views.take_turn_on_the_spot(step_m) {
             self.exhaust_around(at);
@@ -181,13 +176,9 @@ impl Steering {
 
     /// What is left to gain around a place, in the map frame, does not keep the vehicle there.
     fn exhaust_around(&mut self, at: Point) {
-        let metres = self.grounds.reach_m() + self.grounds.lattice().step_m();
-        let around = |middle: f64| {
-            let edge = |metres: f64| ((middle + metres) / self.window.cell_m - 0.5).round() as i32;
-            edge(-metres)..=edge(metres)
-        };
-        for (y, x) in around(at.1).flat_map(|y| around(at.0).map(move |x| (y, x))) {
-            self.known.exhaust(Cell::new(x, y));
+        let metres = self.grounds.reach_m() + self.grounds.lattice().step_m() + self.window.cell_m / 2.0;
+        for cell in self.window.cells_around(at, metres) {
+            self.known.exhaust(cell);
         }
     }
 

@@ -4,6 +4,7 @@ mod account;
 mod campaign;
 mod ends;
 mod forger;
+mod orders;
 mod state;
 
 pub use account::{AttackKind, LinkJudgement};

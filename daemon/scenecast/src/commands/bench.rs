@@ -39,6 +39,17 @@ pub(super) enum BenchCommand {
     Wide(WideBench),
 }
 
+/// The seeds of a measurement that is repeated.
+#[derive(Debug, Clone, Copy, Args)]
+pub(super) struct SeedArguments {
+    /// First seed
+    #[arg(long = "seed", value_name = "SEED", default_value_t = 1)]
+    pub(super) first: u64,
+    /// Number of seeds, from --seed on; each draws all that is random
+    #[arg(long = "seeds", value_name = "N", default_value_t = 10, value_parser = clap::value_parser!(u64).range(1..=1000))]
+    pub(super) count: u64,
+}
+
 /// The same mission at four bit budgets with 10 % loss, once with our stream and once with a baseline that sends the
 /// whole PNG again after each change. Frames, acknowledgements, repair and turns are the same.
 #[derive(Debug, Args)]

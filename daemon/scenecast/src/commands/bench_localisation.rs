@@ -1,5 +1,6 @@
 //! `scenecast bench localisation`
 
+use super::bench::SeedArguments;
 use clap::Args;
 use scenecast_core::UserError;
 use scenecast_files::write_whole;
@@ -16,12 +17,8 @@ pub(super) struct LocalisationBench {
     /// Print JSON instead of a table
     #[arg(long)]
     json: bool,
-    /// Seed of the first track, any whole number
-    #[arg(long, default_value_t = 1)]
-    seed: u64,
-    /// Number of tracks; each has the seed after that of the one before
-    #[arg(long, default_value_t = 10, value_parser = clap::value_parser!(u64).range(1..=1000))]
-    seeds: u64,
+    #[command(flatten)]
+    seeds: SeedArguments,
     /// Draw the first track with outliers as DIR/localisation.svg
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
@@ -30,14 +27,14 @@ pub(super) struct LocalisationBench {
 impl LocalisationBench {
     pub(super) fn run(self) -> Result<(), UserError> {
         let mut progress = Progress::new("localisation");
-        let found = localisation(self.seed, self.seeds, &mut |share| progress.show(share));
+        let found = localisation(self.seeds.first, self.seeds.count, &mut |share| progress.show(share));
         drop(progress);
         if let Some(dir) = &self.out {
             std::fs::create_dir_all(dir).map_err(|e| UserError::file(dir, e))?;
-            let (tracks, _) = run_with_outliers(self.seed, 0.1);
+            let (tracks, _) = run_with_outliers(self.seeds.first, 0.1);
             let title = format!(
                 "3 km, drift 1 % of the distance, a fix each 10 s, 10 % lost, 10 % outliers; seed {}",
-                self.seed
+                self.seeds.first
             );
             let svg = localisation_plot(&tracks, &title).map_err(|e| UserError::Failed(e.to_string()))?;
             write_whole(&dir.join("localisation.svg"), svg.as_bytes())?;

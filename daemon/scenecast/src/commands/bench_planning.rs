@@ -1,5 +1,6 @@
 //! `scenecast bench planning`
 
+use super::bench::SeedArguments;
 use clap::Args;
 use scenecast_core::UserError;
 use scenecast_files::write_whole;
@@ -24,12 +25,8 @@ pub(super) struct PlanningBench {
     /// Print JSON instead of a table
     #[arg(long)]
     json: bool,
-    /// Seed of all random numbers
-    #[arg(long, default_value_t = 1)]
-    seed: u64,
-    /// Number of seeds, from --seed on; each draws scenes, fence, keep-outs and start
-    #[arg(long, value_name = "N", default_value_t = 10, value_parser = clap::value_parser!(u64).range(1..=1000))]
-    seeds: u64,
+    #[command(flatten)]
+    seeds: SeedArguments,
     /// Folder of images NAME.jpg with classes in NAME_label.png; skipped if it does not exist
     #[arg(long, value_name = "DIR", default_value = "../shared/data/eilatmixx")]
     scenes: PathBuf,
@@ -56,7 +53,7 @@ impl PlanningBench {
         }
         let mut progress = Progress::new("planning");
         let files = PlanningFiles { images, labels: self.labels.clone() };
-        let table = run_all((self.seed, self.seeds), &files, &mut |share, trial| {
+        let table = run_all((self.seeds.first, self.seeds.count), &files, &mut |share, trial| {
             progress.show(share);
             if !self.json {
                 print_trial(trial);

@@ -1,5 +1,6 @@
 //! `scenecast bench steering`
 
+use super::bench::SeedArguments;
 use clap::Args;
 use scenecast_core::UserError;
 use scenecast_rehearsal::steering_bench::{SteeringFigures, SteeringPair, measure_steering};
@@ -21,12 +22,8 @@ pub(super) struct SteeringBench {
     /// Print JSON instead of a table
     #[arg(long)]
     json: bool,
-    /// First seed
-    #[arg(long, default_value_t = 1)]
-    seed: u64,
-    /// Number of seeds
-    #[arg(long, value_name = "N", default_value_t = 10, value_parser = clap::value_parser!(u64).range(1..=1000))]
-    seeds: u64,
+    #[command(flatten)]
+    seeds: SeedArguments,
     /// Set a configuration value, as in survey.planner=greedy; may be repeated
     #[arg(long = "set", value_name = "KEY=VALUE")]
     sets: Vec<String>,
@@ -44,9 +41,9 @@ impl SteeringBench {
         }
         let mut progress = Progress::new("seeds");
         let mut done = 0.0;
-        let figures = measure_steering(&config, (self.seed, self.seeds), &mut |pair| {
+        let figures = measure_steering(&config, (self.seeds.first, self.seeds.count), &mut |pair| {
             done += 1.0;
-            progress.show(done / self.seeds as f64);
+            progress.show(done / self.seeds.count as f64);
             if !self.json {
                 print(pair);
             }

@@ -148,6 +148,16 @@ impl CellWindow {
         Self { x, y, width: width.min(MAX_CELLS) as usize, height: height as usize, cell_m }
     }
 
+    /// The cells whose centre lies in the square around a point, up to `reach_m` from it in either direction.
+    pub fn cells_around(&self, at: Point, reach_m: f64) -> impl Iterator<Item = Cell> {
+        let cell_m = self.cell_m;
+        let span = move |middle: f64| {
+            let edge = |metres: f64| metres / cell_m - 0.5;
+            edge(middle - reach_m).ceil() as i32..=edge(middle + reach_m).floor() as i32
+        };
+        span(at.1).flat_map(move |y| span(at.0).map(move |x| Cell::new(x, y)))
+    }
+
     /// The centre of a cell of the window, metres.
     fn centre(&self, index: i64, first: i32) -> f64 {
         (f64::from(first) + index as f64 + 0.5) * self.cell_m
