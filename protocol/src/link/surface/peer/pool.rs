@@ -13,6 +13,8 @@ use std::time::Duration;
 const MAX_UNACKNOWLEDGED: u64 = 16;
 /// Silence after which a vehicle is sent a hello, because it may have restarted.
 const SILENCE_TIMEOUT: Duration = Duration::from_secs(40);
+/// The number of unanswered hellos after which the interval doubles: by then the vehicle is out of reach rather than unlucky.
+const PROMPT_HELLOS: u32 = 5;
 /// Transmissions of an order without any frame of the vehicle after which it is sent a hello.
 const UNACKNOWLEDGED_ORDERS: u32 = 2;
 
@@ -35,10 +37,10 @@ impl Contact {
         silent.map_or(self.hello_due, |at| at.max(self.hello_due))
     }
 
-    /// A hello went out; the next ones follow at growing intervals.
+    /// A hello went out; the interval to the next one doubles once the vehicle has left several unanswered.
     fn note_hello(&mut self, timeout: Duration, now: Instant) {
-        self.hello_due = now + timeout.max(Self::PROOF_TIMEOUT) * (1 << self.hellos.min(1));
-        self.hellos += 1;
+        self.hellos = self.hellos.saturating_add(1);
+        self.hello_due = now + timeout.max(Self::PROOF_TIMEOUT) * if self.hellos < PROMPT_HELLOS { 1 } else { 2 };
     }
 }
 
