@@ -99,6 +99,11 @@ proptest! {
             match what {
                 0 => pair.restart_vehicle(&pair::patchy(2, 0)),
                 1 | 2 => pair.restart_surface(),
+                // The surface remembers a content that may be in force no more.
+                3 => {
+                    pair.restart_surface();
+                    pair.surface.restore_in_force(auv(), [order(first), order(second)]);
+                }
                 _ => {}
             }
         }
@@ -141,6 +146,19 @@ fn a_surface_without_memory_learns_what_is_in_force() {
         assert!(events.contains(&SurfaceEvent::InForceLearned(auv(), SlotId::Fence)), "{events:?}");
         assert_eq!(pair.surface.vehicle(auv()).unwrap().slots().count(), 0, "an answer is no order");
         assert_eq!(shown(&pair, SlotId::Fix), InForce::NotReported);
+    }
+}
+
+#[test]
+fn a_remembered_content_is_confirmed_by_the_report_alone_and_a_wrong_one_is_not_shown() {
+    for (remembered, is_right) in [(fence(300), true), (fence(200), false)] {
+        let mut pair = LinkedEnds::new(9, Setup::new(64, 2000, Codec::Png), CHANNEL);
+        pair.put_in_force(fence(300));
+        pair.surface.restore_in_force(auv(), [remembered]);
+        let events = learn(&mut pair, 120);
+        assert_eq!(shown(&pair, SlotId::Fence), InForce::Known(&fence(300)));
+        let is_learned = events.contains(&SurfaceEvent::InForceLearned(auv(), SlotId::Fence));
+        assert_eq!(is_learned, !is_right, "{events:?}");
     }
 }
 

@@ -28,6 +28,7 @@ pub(super) fn restore(surface: &mut Surface, memory: &SurfaceMemory, configured:
         if !surface.link.restore_orders(address, series, orders, now) {
             continue;
         }
+        surface.link.restore_in_force(address, stored::learned(&vehicle.intent));
         let record = surface.records.entry(address).or_insert_with(|| VehicleRecord::new(vehicle.name.clone()));
         restore_record(record, vehicle);
     }

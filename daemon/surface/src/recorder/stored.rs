@@ -97,6 +97,14 @@ pub(super) fn intent(record: &VehicleRecord) -> StoredIntent {
     }
 }
 
+/// The contents in force of the fence, the limits and the settings, which need not be those of this surface's orders.
+pub(super) fn learned(stored: &StoredIntent) -> impl Iterator<Item = Slot> {
+    let settings = (!stored.settings_unsure).then_some(&stored.settings_in_force);
+    let orders = [&stored.fence_in_force, &stored.limits_in_force];
+    let orders = orders.into_iter().filter_map(|order| order.as_ref().map(|(_, bytes)| bytes));
+    orders.chain(settings).filter_map(|bytes| slot(bytes))
+}
+
 /// Puts the orders back into the record, as far as this build reads them.
 pub(super) fn restore_intent(stored: &StoredIntent, record: &mut VehicleRecord) {
     let utility = |bytes: &[u8]| match slot(bytes) {

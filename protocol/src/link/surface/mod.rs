@@ -121,6 +121,13 @@ impl<R: StateReplica> SurfaceLink<R> {
         true
     }
 
+    /// Puts contents back that an earlier run of the surface knew to be in force. They count once a report of the vehicle
+    /// confirms their digests.
+    pub fn restore_in_force(&mut self, vehicle: Address, contents: impl IntoIterator<Item = Slot>) {
+        let Some(peer) = self.fleet.get_mut(vehicle) else { return };
+        contents.into_iter().for_each(|content| peer.restore_in_force(content));
+    }
+
     /// The current view of a vehicle; `None` if it is unknown.
     pub fn vehicle(&self, vehicle: Address) -> Option<PeerView<'_, R>> {
         self.fleet.get(vehicle).map(PeerView)

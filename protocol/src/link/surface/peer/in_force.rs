@@ -78,6 +78,13 @@ impl InForceCopy {
         }
     }
 
+    /// Takes a content that was known to be in force. It is not certain until a report confirms it.
+    pub(super) fn restore(&mut self, content: Slot) {
+        if let Some(held) = self.held.get_mut(content.id()) {
+            *held = content.in_force();
+        }
+    }
+
     /// Whether everything in force is known and shows that an order never was, although the vehicle reports its version as
     /// applied: the report has a part of the version only, and a forged order can have the same. Settings are not judged,
     /// because the vehicle joins them with earlier ones.

@@ -200,6 +200,11 @@ impl<R: StateReplica> VehiclePeer<R> {
         self.pair.set_series(series);
     }
 
+    /// Takes a content that an earlier run of the surface knew to be in force.
+    pub(super) fn restore_in_force(&mut self, content: Slot) {
+        self.in_force.restore(content);
+    }
+
     /// Handles a frame of this vehicle; `bytes` is its length.
     pub(super) fn handle_frame(
         &mut self,
