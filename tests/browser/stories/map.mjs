@@ -272,9 +272,9 @@ export default [
     scenario: "start",
     async run(s) {
       const names = () => s.page.locator("#layer option").allInnerTexts();
-      assert.deepEqual(await names(), ["label", "age"]);
+      assert.deepEqual(await names(), ["label", "natural", "age"]);
       await s.steer({ layers: true, advance: 30 });
-      await s.until("more layers", async () => (await names()).join() === "label,age,confidence,depth");
+      await s.until("more layers", async () => (await names()).join() === "label,natural,age,confidence,depth");
       await s.page.selectOption("#layer", "depth");
       await s.shows("#legend", /depth.*10 m.*25 m/s);
       await s.page.selectOption("#layer", "confidence");

@@ -37,6 +37,9 @@ export function redShade(id) {
 
 const redLevel = (t) => [Math.round(255 * t), Math.round(50 * t * t), Math.round(36 * t * t)];
 
+/** A shade of red as bright as [r, g, b]. */
+export const redTone = ([r, g, b]) => redLevel((0.3 * r + 0.59 * g + 0.11 * b) / 255);
+
 /** Colour of t in 0..1 on a sequential scale, in shades of red if `red`. */
 export function ramp(t, red = false, knots = CIVIDIS) {
   if (red) return redLevel(0.14 + 0.86 * Math.min(1, Math.max(0, t)));

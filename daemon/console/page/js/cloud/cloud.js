@@ -3,6 +3,9 @@
 import { $, h, show, text } from "../dom.js";
 import { metres } from "../format.js";
 import { rgb } from "../palette.js";
+import { tintOf } from "../book.js";
+import { layer, toggleLayer } from "../map/layers.js";
+import { NATURAL, loadLooks, naturalTone } from "../map/natural.js";
 import { isStale, store } from "../store.js";
 import { colour, onTheme } from "../theme.js";
 import { extent } from "../tiles.js";
@@ -13,7 +16,7 @@ import { Renderer } from "./renderer.js";
 export const cloud = { on: false };
 const orbit = new Orbit();
 const canvas = h("canvas", { id: "cloud", tabIndex: 0, role: "application", hidden: true,
-  "aria-label": "Point cloud. Arrow keys turn, plus and minus zoom." });
+  "aria-label": "Point cloud. Arrow keys turn, plus and minus zoom, L changes the colours." });
 const note = h("p.plate", { id: "cloud-note", hidden: true });
 let renderer = null;
 let built = null;
@@ -28,7 +31,7 @@ export function startCloud() {
   new ResizeObserver(redraw).observe(canvas);
   onTheme(recolour);
   store.on("map", rebuild);
-  store.on("select book", recolour);
+  store.on("select book natural", recolour);
   store.on("state feed", redraw);
 }
 
@@ -57,6 +60,12 @@ export function fitCloud() {
   rebuild();
 }
 
+function toggleNatural() {
+  toggleLayer(NATURAL);
+  recolour();
+  store.emit("view");
+}
+
 function recolour() {
   points = new WeakMap();
   rebuild();
@@ -77,7 +86,9 @@ function redraw() {
 }
 
 function build(map) {
-  const cells = cellPoints(map, points);
+  const isNatural = layer.name === NATURAL;
+  if (isNatural) loadLooks(store.vehicle);
+  const cells = cellPoints(map, isNatural ? (id) => naturalTone(store.vehicle, id).slice(0, 3) : tintOf, points);
   const floor = meanHeight(cells.places);
   const box = extent(map) ?? [-5, -5, 5, 5];
   const flat = depthLayer(map) === null;
@@ -89,7 +100,7 @@ function build(map) {
     orbit.frame(box, floor);
     framed = store.selectedId;
   }
-  text(note, `Grid ${metres(grid.step, 0)}. ${flat ? "The vehicle sends no depths: the cells are shown flat." : "Heights are to scale."}`);
+  text(note, `Grid ${metres(grid.step, 0)}. ${flat ? "The vehicle sends no depths: the cells are shown flat." : "Heights are to scale."}${isNatural ? " Colours: an illustration made of images; key L: the colours of the labels." : ""}`);
   return { floor, flat };
 }
 
@@ -137,7 +148,7 @@ function steer() {
     const act = {
       ArrowLeft: () => orbit.turn(20, 0), ArrowRight: () => orbit.turn(-20, 0),
       ArrowUp: () => orbit.turn(0, 15), ArrowDown: () => orbit.turn(0, -15),
-      "+": () => orbit.zoom(1.2), "=": () => orbit.zoom(1.2), "-": () => orbit.zoom(1 / 1.2),
+      "+": () => orbit.zoom(1.2), "=": () => orbit.zoom(1.2), "-": () => orbit.zoom(1 / 1.2), l: toggleNatural, L: toggleNatural,
     }[event.key];
     if (!act) return;
     event.preventDefault();

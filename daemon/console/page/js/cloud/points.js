@@ -1,6 +1,6 @@
 // The map as vertices: cells at their depth, the vehicle, its track, a grid.
 
-import { shownAs, tintOf } from "../book.js";
+import { shownAs } from "../book.js";
 import { rgb } from "../palette.js";
 import { nice } from "../format.js";
 import { boundsOf } from "../levels.js";
@@ -8,13 +8,14 @@ import { EDGE } from "../tiles.js";
 
 export const depthLayer = (map) => map.layers.find((l) => l.is_depth) ?? null;
 
-/** Cells as points {places, tints}; z is minus the depth if the map has depths, else 0. `known` keeps the points of tiles. */
-export function cellPoints(map, known) {
+/** Cells as points {places, tints}; z is minus the depth if the map has depths, else 0. `tone(label)` is the colour [r, g, b] of a
+ * shown label; `known` keeps the points of tiles. */
+export function cellPoints(map, tone, known) {
   const depth = depthLayer(map);
   const parts = [...map.tiles.values()].map((tile) => {
     const kept = known.get(tile);
     if (kept && kept.hasDepth === Boolean(depth)) return kept;
-    const made = tilePoints(map, tile, depth);
+    const made = tilePoints(map, tile, depth, tone);
     known.set(tile, made);
     return made;
   });
@@ -29,7 +30,7 @@ export function cellPoints(map, known) {
   return all;
 }
 
-function tilePoints(map, tile, depth) {
+function tilePoints(map, tile, depth, tone) {
   const places = [];
   const tints = [];
   tile.eachCell((x, y, label) => {
@@ -37,7 +38,7 @@ function tilePoints(map, tile, depth) {
     if (depth && level === 0) return;
     const [from, to] = depth ? boundsOf(depth, level) : [0, 0];
     places.push((tile.column * EDGE + x + 0.5) * map.cell_m, (tile.row * EDGE + y + 0.5) * map.cell_m, -(from + to) / 2);
-    tints.push(...tintOf(shownAs(label)), 255);
+    tints.push(...tone(shownAs(label)), 255);
   });
   return { places, tints, hasDepth: Boolean(depth) };
 }

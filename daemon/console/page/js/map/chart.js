@@ -11,7 +11,8 @@ import { clickAt, finish, grab, pen, penKeys } from "../fence/edit.js";
 import { drawVehicle, drawSurface } from "./vehicle-marker.js";
 import { boxInWorld, inWorld, viewOf } from "./frames.js";
 import { listen } from "./input.js";
-import { drawLegend, layer, painterOf, toggleTruth } from "./layers.js";
+import { drawLegend, layer, painterOf, toggleLayer } from "./layers.js";
+import { NATURAL } from "./natural.js";
 import { addPoint, drawMeasure, measure, toggleMeasure } from "./measure.js";
 import { drawGrid, drawNorth, drawRings, drawScaleBar } from "./overlays.js";
 import { showReadout } from "./readout.js";
@@ -39,11 +40,11 @@ export function startChart() {
     point: hover,
     click,
     grab: (px, py) => (measure.on ? null : grab(view, px, py)),
-    keys: { ...penKeys(view), 0: fit, f: follow, F: follow, m: measureKey, M: measureKey, t: truthKey, T: truthKey, Escape: end, Enter: () => click(view.width / 2, view.height / 2) },
+    keys: { ...penKeys(view), 0: fit, f: follow, F: follow, m: measureKey, M: measureKey, t: layerKey(TRUTH), T: layerKey(TRUTH), l: layerKey(NATURAL), L: layerKey(NATURAL), Escape: end, Enter: () => click(view.width / 2, view.height / 2) },
   });
   canvas.addEventListener("focus", redraw);
   canvas.addEventListener("blur", redraw);
-  store.on("state map select feed book highlight tick edit", () => {
+  store.on("state map select feed book highlight tick edit natural", () => {
     keepInView();
     redraw();
   });
@@ -89,10 +90,10 @@ function measureKey() {
   store.emit("view");
 }
 
-function truthKey() {
-  toggleTruth();
+const layerKey = (name) => () => {
+  toggleLayer(name);
   store.emit("view");
-}
+};
 
 function keepInView() {
   if (pen.tool && view.mode !== "free") {
@@ -217,6 +218,7 @@ function drawMap(c, vehicle) {
     else {
       const [west, north] = [whole(x), whole(y)];
       c.drawImage(painter.canvasOf(tile), west, north, whole(x + size) - west, whole(y + size) - north);
+      painter.drawOver(c, tile, [west, north, whole(x + size) - west]);
     }
   }
 }

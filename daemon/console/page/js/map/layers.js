@@ -10,6 +10,7 @@ import { EDGE } from "../tiles.js";
 import { blocksOf, hasCoarse } from "./coarse.js";
 import { lookOf } from "./layer-look.js";
 import { ageTones, footprintTones, labelTones, layerTones, paintTile, sampleTone } from "./raster.js";
+import { NATURAL, NaturalOver, loadLooks, naturalEdits, naturalLegend, naturalTone, withoutImage } from "./natural.js";
 import { TRUTH, truthInfo, truthLegend } from "./truth.js";
 
 const AGE_REPAINT_S = 5;
@@ -17,8 +18,8 @@ const AGE_REPAINT_S = 5;
 const MAX_PAINTED = 4096;
 const NO_BLOCKS = [];
 export const layer = { name: "label", highlight: null };
-/** The layer to which the key T returns. */
-let beforeTruth = "label";
+/** The layer to which the keys T and L return. */
+let before = "label";
 const painted = new Map();
 let legendKey = "";
 let bookEdits = 0;
@@ -30,14 +31,14 @@ onTheme(() => {
 
 /** The layers that can be shown: those of the chosen vehicle's map, and the true classes of a simulated sea floor. */
 export function layerNames() {
-  return ["label", "age", ...(store.map?.layers.map((p) => p.name).sort() ?? []), ...(truthInfo() ? [TRUTH] : [])];
+  return ["label", NATURAL, "age", ...(store.map?.layers.map((p) => p.name).sort() ?? []), ...(truthInfo() ? [TRUTH] : [])];
 }
 
-/** Changes between the true classes and the layer that was shown before. */
-export function toggleTruth() {
-  const isTruth = layer.name === TRUTH;
-  if (!isTruth) beforeTruth = layer.name;
-  setLayer(isTruth ? beforeTruth : TRUTH);
+/** Changes between the layer `name` and the one that was shown before. */
+export function toggleLayer(name) {
+  const isShown = layer.name === name;
+  if (!isShown) before = layer.name;
+  setLayer(isShown ? before : name);
 }
 
 export function setLayer(name) {
@@ -45,23 +46,12 @@ export function setLayer(name) {
   drawLegend();
 }
 
-/** How the tiles of a vehicle's map are painted: `canvasOf(tile)`, and `toneOf(tile)` for tiles of a few pixels. A canvas is painted
- * again only when its tile or the look changes. */
+/** How the tiles of a vehicle's map are painted: `canvasOf(tile)`, `toneOf(tile)` for tiles of a few pixels, and `drawOver(c, tile,
+ * [x, y, side])` for what lies over a tile. A canvas is painted again only when its tile or the look changes. */
 export function painterOf(vehicle, map) {
-  const chosen = vehicle.id === store.selectedId;
-  const shown = map.layers.find((p) => p.name === layer.name);
-  const nowS = layer.name === "age" ? Math.floor(store.nowS / AGE_REPAINT_S) * AGE_REPAINT_S : 0;
-  const top = layer.name === "age" ? ageTop(map) : 0;
-  const scale = shown ? JSON.stringify([shown.lowest, shown.edges, lookOf(shown).low, lookOf(shown).high]) : "";
-  const key = chosen
-    ? `${map.epoch}.${layer.name}.${nowS}.${top}.${layer.highlight}.${isStale(vehicle)}.${bookEdits}.${scale}`
-    : `${map.epoch}.footprint`;
-  const have = painted.get(vehicle.id);
-  const look = have?.key === key ? have : { key, tones: tonesOf(vehicle, chosen, shown, nowS, top), canvases: new Map() };
-  painted.set(vehicle.id, look);
-  const isCoarse = chosen && layer.name === "label";
+  const look = currentLook(vehicle, map);
   const paint = (tile) => {
-    const blocks = isCoarse ? blocksOf(map, tile) : NO_BLOCKS;
+    const blocks = look.isCoarse ? blocksOf(map, tile) : NO_BLOCKS;
     const kept = look.canvases.get(tile);
     if (kept?.blocks === blocks) return kept.canvas;
     if (look.canvases.size >= MAX_PAINTED) look.canvases.clear();
@@ -70,7 +60,29 @@ export function painterOf(vehicle, map) {
     return canvas;
   };
   forgetReplaced(look, map);
-  return { canvasOf: paint, toneOf: (tile) => sampleTone(tile, look.tones.cell) };
+  return { canvasOf: paint, toneOf: (tile) => sampleTone(tile, look.tones.cell), drawOver: (c, tile, at) => look.over?.draw(c, vehicle, map, tile, at) };
+}
+
+/** The look of a vehicle's map, with the canvases that were painted in it. */
+function currentLook(vehicle, map) {
+  const chosen = vehicle.id === store.selectedId;
+  const isNatural = chosen && layer.name === NATURAL;
+  if (isNatural) loadLooks(vehicle);
+  const shown = map.layers.find((p) => p.name === layer.name);
+  const nowS = layer.name === "age" ? Math.floor(store.nowS / AGE_REPAINT_S) * AGE_REPAINT_S : 0;
+  const top = layer.name === "age" ? ageTop(map) : 0;
+  const scale = shown ? JSON.stringify([shown.lowest, shown.edges, lookOf(shown).low, lookOf(shown).high]) : "";
+  const edits = isNatural ? `${bookEdits}.${naturalEdits}` : bookEdits;
+  const key = chosen
+    ? `${map.epoch}.${layer.name}.${nowS}.${top}.${layer.highlight}.${isStale(vehicle)}.${edits}.${scale}`
+    : `${map.epoch}.footprint`;
+  const have = painted.get(vehicle.id);
+  if (have?.key === key) return have;
+  const look = { key, tones: tonesOf(vehicle, chosen, shown, nowS, top), canvases: new Map() };
+  look.over = isNatural ? new NaturalOver(layer.highlight) : null;
+  look.isCoarse = isNatural || (chosen && layer.name === "label");
+  painted.set(vehicle.id, look);
+  return look;
 }
 
 /** Drops the canvases of tiles that a newer version of the map has replaced. */
@@ -83,7 +95,8 @@ function forgetReplaced(look, map) {
 }
 
 function tonesOf(vehicle, chosen, shown, nowS, top) {
-  const label = labelTones({ tintOf, shownAs, stale: isStale(vehicle), highlight: layer.highlight });
+  const toneOf = chosen && layer.name === NATURAL ? (id) => naturalTone(vehicle, id) : (id) => [...tintOf(id), 255];
+  const label = labelTones({ toneOf, shownAs, stale: isStale(vehicle), highlight: layer.highlight });
   if (!chosen) return { label, cell: footprintTones() };
   if (shown) return { label, cell: layerTones(shown, isStale(vehicle)) };
   if (layer.name === "age") return { label, cell: ageTones(nowS, top) };
@@ -95,6 +108,15 @@ export function ageTop(map) {
   const oldest = Math.max(60, map.oldestS === null ? 0 : store.nowS - map.oldestS);
   const step = nice(oldest);
   return Math.ceil(oldest / step) * step;
+}
+
+function drawNaturalLegend() {
+  const missing = withoutImage();
+  const key = `${NATURAL}.${missing}`;
+  if (key === legendKey) return;
+  legendKey = key;
+  show($("legend"), store.map !== null);
+  $("legend").replaceChildren(...naturalLegend(missing));
 }
 
 function drawTruthLegend() {
@@ -113,6 +135,7 @@ export function drawLegend() {
   const top = layer.name === "age" && map ? ageTop(map) : 0;
   const coarse = layer.name === "label" && Boolean(map) && hasCoarse(map);
   if (layer.name === TRUTH) return drawTruthLegend();
+  if (layer.name === NATURAL) return drawNaturalLegend();
   const look = shown ? lookOf(shown) : { at: ramp, low: "now", high: span(top) };
   const key = `${layer.name}.${look.low}.${look.high}.${coarse}`;
   if (key === legendKey) return;

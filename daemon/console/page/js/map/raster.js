@@ -50,16 +50,17 @@ export function sampleTone(tile, toneOf) {
 
 const mix = (a, b, t) => a.map((v, i) => v + (b[i] - v) * t);
 
-/** The colour of each label, label -> [r, g, b, a]: grey when stale, faint when another label is highlighted. */
-export function labelTones({ tintOf, shownAs, stale, highlight }) {
+/** The colour of each label, label -> [r, g, b, a], from `toneOf(label)`: grey when stale, faint when another label is highlighted. */
+export function labelTones({ toneOf, shownAs, stale, highlight }) {
   const table = new Array(256);
   const lookup = (label) => {
     const shown = shownAs(label);
-    const full = tintOf(shown);
+    const [...full] = toneOf(shown);
+    const alpha = full.pop();
     const grey = 0.3 * full[0] + 0.59 * full[1] + 0.11 * full[2];
     const pale = theme() === "red" ? [grey, 0, 0] : [grey, grey, grey];
     const tone = stale ? mix(full, pale, 0.7) : full;
-    return [...tone, highlight === null || highlight === shown ? 255 : 36];
+    return [...tone, highlight === null || highlight === shown ? alpha : 36];
   };
   return (label) => (table[label] ??= lookup(label));
 }
