@@ -86,6 +86,17 @@ fn cells(pair: &Pair) -> Vec<String> {
     String::from_utf8(csv).unwrap().lines().map(line).collect()
 }
 
+/// Text and place of the only marker in the exported file.
+fn marker_of(pair: &Pair) -> (String, Vec<f64>) {
+    let (_, file) = http(pair.console, "GET", "/api/v2/vehicles/1/map.geojson", "", "").unwrap();
+    let file: Value = serde_json::from_slice(&file).unwrap();
+    let points = file["features"].as_array().unwrap().iter().filter(|f| f["geometry"]["type"] == "Point");
+    let [point] = points.collect::<Vec<_>>()[..] else { panic!("one marker is left") };
+    let place = point["geometry"]["coordinates"].as_array().unwrap();
+    let place = place.iter().filter_map(Value::as_f64).collect();
+    (point["properties"]["marker"].as_str().unwrap().to_owned(), place)
+}
+
 #[test]
 fn a_killed_surface_shows_the_same_page_again() {
     let pair = pair("same-page");
@@ -98,6 +109,10 @@ fn a_killed_surface_shows_the_same_page_again() {
     pair.post("vehicles/1/settings", r#"{"planner": "greedy"}"#);
     pair.post("vehicles/1/labels", &format!(r##"{{"label": {label}, "name": "sand", "colour": "#112233"}}"##));
     pair.post("vehicles/1/notes", r#"{"text": "a wreck"}"#);
+    for text in ["a wreck", "a mistake"] {
+        pair.post("vehicles/1/markers", &format!(r#"{{"x_m": 4.5, "y_m": -3, "text": "{text}"}}"#));
+    }
+    pair.post("vehicles/1/markers/remove", r#"{"number": 2}"#);
     let is_applied = |vehicle: &Value| !vehicle["fence_in_force"].is_null() && !vehicle["limits_in_force"].is_null();
     wait_until("the orders are applied", LIMIT, || is_applied(&pair.auv()));
     vehicle.kill();
@@ -113,6 +128,7 @@ fn a_killed_surface_shows_the_same_page_again() {
     let after = pair.state().unwrap();
     assert_eq!(lasting(after["vehicles"][0].clone()), lasting(before["vehicles"][0].clone()));
     assert_eq!(cells(&pair), map);
+    assert_eq!(marker_of(&pair), ("a wreck".to_owned(), vec![4.5, -3.0]));
     assert_eq!(after["mission"]["id"], before["mission"]["id"]);
     assert!(after["now_s"].as_f64() > before["now_s"].as_f64(), "ages continue");
     assert!(!after["vehicles"][0]["map"]["earlier"].is_null(), "the map is not shown as live");

@@ -131,6 +131,27 @@ pub struct NoteOrder {
     pub text: String,
 }
 
+/// A marker on the map; it stays at the surface.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct MarkerOrder {
+    /// Metres east of the origin in the world frame.
+    pub x_m: f64,
+    /// Metres north of the origin in the world frame.
+    pub y_m: f64,
+    /// The text of the marker, at most 200 characters.
+    #[schemars(length(min = 1, max = 200))]
+    pub text: String,
+}
+
+/// Removes a marker.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RemoveMarkerOrder {
+    /// The number of the marker.
+    pub number: u32,
+}
+
 /// Takes the map of an earlier run out of view. It stays in the archive.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]

@@ -3,9 +3,12 @@
 use crate::export::MapCells;
 use crate::fit::{self, Fit};
 use crate::layers;
-use crate::orders::{BudgetOrder, ExemplarAction, ExemplarOrder, LabelOrder, NoteOrder};
+use crate::orders::{
+    BudgetOrder, ExemplarAction, ExemplarOrder, LabelOrder, MarkerOrder, NoteOrder, RemoveMarkerOrder,
+};
 use crate::snapshot::command_state;
 use crate::state::{AcceptedOrder, ArchivedMap, CommandState};
+use scenecast_protocol::coordinates::WorldPoint;
 use scenecast_protocol::directive::{Constraints, SlotId};
 use scenecast_protocol::schedule::{BackgroundOrder, Shares};
 use scenecast_protocol::time::Instant;
@@ -47,6 +50,9 @@ pub enum SurfaceRequest {
     Label(u8, LabelOrder),
     /// Add a note of the person or program with this name.
     Note(u8, String, NoteOrder),
+    /// Set a marker of the person or program with this name.
+    Marker(u8, String, MarkerOrder),
+    RemoveMarker(u8, RemoveMarkerOrder),
     /// Take the earlier map out of view.
     DismissEarlierMap(u8),
     /// List the archived maps. The owner of the files handles this request and the next one.
@@ -63,7 +69,11 @@ impl SurfaceRequest {
         match self {
             Self::Map(_) | Self::Exemplar(..) | Self::Fit(..) | Self::Command(_) => None,
             Self::Archives | Self::ArchivedMap(_) => None,
-            Self::Label(..) | Self::Note(..) | Self::DismissEarlierMap(_) => Some(OrderKind::Record),
+            Self::Label(..)
+            | Self::Note(..)
+            | Self::Marker(..)
+            | Self::RemoveMarker(..)
+            | Self::DismissEarlierMap(_) => Some(OrderKind::Record),
             Self::Constraints(_, order) if order.hold || order.abort => Some(OrderKind::Stop),
             Self::Utility(..)
             | Self::ExemplarOrder(..)
@@ -185,6 +195,13 @@ fn handle(surface: &mut Surface, request: SurfaceRequest, cell_m: f64, now: Inst
             let record = surface.record_mut(Address::vehicle(id)?)?;
             done(record.annotations.add_note(&by, &order.text, now))
         }
+        SurfaceRequest::Marker(id, by, MarkerOrder { x_m, y_m, text }) => {
+            let place = WorldPoint { east_m: x_m, north_m: y_m };
+            done(surface.record_mut(Address::vehicle(id)?)?.annotations.add_marker(&by, &text, place, now))
+        }
+        SurfaceRequest::RemoveMarker(id, RemoveMarkerOrder { number }) => {
+            done(surface.record_mut(Address::vehicle(id)?)?.annotations.remove_marker(number))
+        }
         SurfaceRequest::DismissEarlierMap(id) => {
             surface.record_mut(Address::vehicle(id)?)?.dismiss_earlier_map();
             Reply::Done
@@ -210,6 +227,7 @@ pub fn archived_cells(map: &VehicleMemory, cell_m: f64) -> MapCells {
         cell_m,
         moved_m: map.placement_m().unwrap_or((0.0, 0.0)),
         names: map.labels().iter().filter_map(|(&label, book)| Some((label, book.name.clone()?))).collect(),
+        markers: map.markers().map(crate::snapshot::marker).collect(),
         tiles: labels.tiles().clone(),
         layers: layers::layers(&layers),
     }
@@ -266,6 +284,7 @@ fn map(surface: &Surface, vehicle: Address, cell_m: f64, now: Instant) -> Option
         cell_m,
         moved_m: (0.0, 0.0),
         names: BTreeMap::new(),
+        markers: Vec::new(),
         tiles: surface.map_tiles(vehicle)?,
         layers: layers::layers(&surface.map_layers(vehicle)),
     }))

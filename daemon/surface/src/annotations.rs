@@ -1,6 +1,7 @@
-//! The operator's own names of labels, and notes about a vehicle. They stay at the surface.
+//! The operator's own names of labels, notes about a vehicle, and markers on its map. They stay at the surface.
 
-use super::record::{StoredLabel, StoredNote};
+use super::record::{MAX_MARKERS, StoredLabel, StoredMarker, StoredNote};
+use scenecast_protocol::coordinates::{DecimetrePoint, WorldPoint};
 use scenecast_protocol::map::MAX_LABEL;
 use scenecast_protocol::time::Instant;
 use std::collections::{BTreeMap, VecDeque};
@@ -10,12 +11,17 @@ const MAX_NAME: usize = 40;
 /// Maximum length of a note, characters.
 const MAX_NOTE: usize = 1000;
 
-/// Names of labels of the current epoch, and notes.
+/// Maximum length of a marker's text, characters.
+const MAX_MARKER: usize = 200;
+
+/// Names of labels of the current epoch, notes, and markers.
 #[derive(Debug, Clone, Default)]
 pub struct Annotations {
     pub labels: BTreeMap<u8, StoredLabel>,
     /// The notes in the order of their times.
     pub notes: VecDeque<StoredNote>,
+    /// The markers by their numbers.
+    pub markers: BTreeMap<u32, StoredMarker>,
 }
 
 impl Annotations {
@@ -53,5 +59,30 @@ impl Annotations {
         self.notes.push_back(StoredNote { at: now.as_micros(), author, text });
         self.notes.drain(..self.notes.len().saturating_sub(Self::MAX_NOTES));
         Ok(())
+    }
+
+    /// Adds a marker. The error is one line for the operator.
+    pub fn add_marker(&mut self, author: &str, text: &str, place: WorldPoint, now: Instant) -> Result<(), String> {
+        let text = text.trim();
+        if text.is_empty() || text.chars().count() > MAX_MARKER {
+            return Err(format!("text: it takes 1 to {MAX_MARKER} characters"));
+        }
+        if DecimetrePoint::nearest(place).is_none() {
+            return Err("x_m, y_m: the place lies more than 838 km from the origin".to_owned());
+        }
+        if self.markers.len() >= MAX_MARKERS {
+            return Err(format!("{MAX_MARKERS} markers are set: remove one first"));
+        }
+        let number = self.markers.last_key_value().map_or(1, |(last, _)| last.saturating_add(1));
+        let (x_m, y_m) = place.xy();
+        let marker =
+            StoredMarker { number, x_m, y_m, at: now.as_micros(), author: author.to_owned(), text: text.to_owned() };
+        self.markers.insert(number, marker);
+        Ok(())
+    }
+
+    /// Removes a marker. The error is one line for the operator.
+    pub fn remove_marker(&mut self, number: u32) -> Result<(), String> {
+        self.markers.remove(&number).map(|_| ()).ok_or_else(|| format!("number: there is no marker {number}"))
     }
 }

@@ -117,7 +117,7 @@ async function post(mock, req, res, path) {
     reply(res, refused?.[0] ?? 200, refused ? { error: refused[1] } : mission.command.json());
     return emit(mock, "state", mission.json());
   }
-  const isRecord = /\/(labels|notes|dismiss)$/.test(path);
+  const isRecord = /\/(labels|notes|dismiss|markers|markers\/remove)$/.test(path);
   const kind = path.endsWith("/settings") ? "settings" : given.hold || given.abort ? "stop" : "order";
   const refused = isRecord ? null : mission.command.refusal(by, kind);
   if (refused) return reply(res, refused[0], { error: refused[1] });
@@ -134,7 +134,7 @@ async function post(mock, req, res, path) {
     const versions = mission.vehicles.map((v) => [v.id, v.directive.issue("budget", mission.nowS).version]);
     return accepted(mock, res, { slot: "budget", versions: Object.fromEntries(versions) });
   }
-  const [, id, resource] = path.match(/^vehicles\/(\d+)\/([\w-]+)(?:\/dismiss)?$/) ?? [];
+  const [, id, resource] = path.match(/^vehicles\/(\d+)\/([\w-]+)(?:\/(?:dismiss|remove))?$/) ?? [];
   const v = mission.vehicles.find((x) => x.id === Number(id));
   if (!v) return reply(res, 404, { error: "no such vehicle" });
   if (resource === "utility") {
@@ -144,6 +144,10 @@ async function post(mock, req, res, path) {
   }
   // The mock keeps no names: the browser's copy counts.
   if (resource === "labels") return reply(res, 200, {});
+  if (resource === "markers") {
+    v.mark(path.endsWith("/remove") ? { remove: given.number } : { ...given, author: by.name }, mission.nowS);
+    return accepted(mock, res, {});
+  }
   if (resource === "earlier-map") {
     v.earlier = null;
     return accepted(mock, res, {});

@@ -29,6 +29,7 @@ export class Vehicle {
     this.terms = { exploration: 0.2, curiosity: 0 };
     Object.assign(this, { reported: null, inForce: {}, fence: null, limits: null, planner: null, settings: new Settings(), coarse: false, aborted: false });
     this.exemplars = new Map();
+    this.markers = [];
     this.track = [];
     this.hold = false;
     this.silent = false;
@@ -149,6 +150,12 @@ export class Vehicle {
     });
   }
 
+  /** Sets a marker, or removes the one with the number `remove`. */
+  mark({ remove, ...marker }, nowS) {
+    this.markers = this.markers.filter((m) => m.number !== remove);
+    if (remove === undefined) this.markers.push({ number: 1 + (this.markers.at(-1)?.number ?? 0), at_s: nowS, ...marker });
+  }
+
   exemplarJson(label) {
     const e = this.exemplars.get(label);
     if (!e) return { state: "none", progress: 0, bytes: null, url: null, at_s: null, images: [] };
@@ -175,7 +182,7 @@ export class Vehicle {
       utility: this.terms, fence: this.fence, limits: this.limits, planner: this.planner, settings: this.settings.json(),
       in_force: { utility: "known", settings: "none", budget: "known", limits: this.inForce.limits ? "known" : "none", fence: this.inForce.fence ? "known" : "none", ...this.reported },
       fence_in_force: this.inForce.fence ?? null, limits_in_force: this.inForce.limits ?? null,
-      directive: this.directive.json(), link: this.link(nowS), usbl: null,
+      directive: this.directive.json(), link: this.link(nowS), usbl: null, markers: this.markers,
     };
   }
 

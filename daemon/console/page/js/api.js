@@ -38,6 +38,9 @@ async function write(path, order) {
 
 /** The operator's name, colour and merging of a label; null takes one away. They stay at the surface. */
 export const saveLabel = (id, label) => write(`/vehicles/${id}/labels`, label);
+/** Sets a marker at metres east and north in the world frame. It stays at the surface. */
+export const addMarker = (id, x, y, text) => write(`/vehicles/${id}/markers`, { x_m: x, y_m: y, text });
+export const removeMarker = (id, number) => write(`/vehicles/${id}/markers/remove`, { number });
 /** Shows the current map in place of that of an earlier run. */
 export const dismissEarlierMap = (id) => write(`/vehicles/${id}/earlier-map/dismiss`, {});
 /** The maps of runs that have ended, the newest first. */

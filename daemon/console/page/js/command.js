@@ -42,11 +42,12 @@ function keep() {
   sendCommand("keep").catch(() => {});
 }
 
-/** Why this page must not give an order of a kind now, or null. `kind`: stop (hold, abort), order or settings. */
+/** Why this page must not give an order of a kind now, or null. `kind`: stop (hold, abort), record (what stays at the surface), order
+ * or settings. */
 export function denial(kind) {
   if (!me) return null;
   const least = kind === "settings" ? "administrator" : "operator";
   if (rank(me.role) < rank(least)) return `This needs the role ${least}; yours is ${me.role}.`;
-  if (kind === "stop" || holder() === null || hasCommand()) return null;
+  if (["stop", "record"].includes(kind) || holder() === null || hasCommand()) return null;
   return `${holder().name} has command: request it in the bar at the top.`;
 }

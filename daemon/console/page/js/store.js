@@ -13,7 +13,7 @@ export const store = new (class extends EventTarget {
   mapFaults = new Map();
   #fetching = new Set();
 
-  /** Calls `fn` on each named event: state, map, feed, select, tick, tab, view, edit, book, highlight, natural, theme. */
+  /** Calls `fn` on each named event: state, map, feed, select, tick, tab, view, edit, book, highlight, natural, place, theme. */
   on(names, fn) {
     for (const name of names.split(" ")) this.addEventListener(name, fn);
   }

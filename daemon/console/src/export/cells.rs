@@ -1,6 +1,6 @@
 //! A map in shared tiles, its cells one by one, and its form in JSON.
 
-use crate::state::{LayerBody, MapBody};
+use crate::state::{LayerBody, MapBody, VehicleMarker};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use scenecast_protocol::map::{
@@ -30,6 +30,8 @@ pub struct MapCells {
     pub moved_m: (f64, f64),
     /// The operator's names of labels.
     pub names: BTreeMap<u8, String>,
+    /// The operator's markers.
+    pub markers: Vec<VehicleMarker>,
     pub(crate) tiles: Tiles,
     pub(crate) layers: Vec<CellLayer>,
 }
@@ -112,6 +114,7 @@ impl MapCells {
             cell_m,
             moved_m: (0.0, 0.0),
             names: BTreeMap::new(),
+            markers: Vec::new(),
             tiles: ReplicaTile::tiles_of(grid),
             layers: Vec::new(),
         }

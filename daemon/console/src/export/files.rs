@@ -3,7 +3,7 @@
 use super::cells::{ExploredCell, MapCells};
 use super::projection::{TransverseMercator, well_known_text};
 use super::regions::{Polygon, regions};
-use crate::state::Origin;
+use crate::state::{Origin, VehicleMarker};
 use scenecast_core::label_picture;
 use scenecast_protocol::map::{LabelGrid, Quantity, Rect};
 use serde_json::{Value, json};
@@ -37,15 +37,15 @@ pub(super) fn projection(origin: Option<Origin>) -> String {
     format!("<PAMDataset>\n  <SRS dataAxisToSRSAxisMapping=\"1,2\">{text}</SRS>\n</PAMDataset>\n")
 }
 
-/// Regions of equal label: WGS 84 if the mission has an origin, else metres east and north of it.
+/// Regions of equal label, and markers: WGS 84 if the mission has an origin, else metres east and north of it.
 pub(super) fn geojson(cells: &MapCells, origin: Option<Origin>) -> String {
     let projection = origin.map(TransverseMercator::about);
-    let corner = |&(column, row): &(i64, i64)| {
-        let (x, y) = cells.corner_m(column, row);
+    let position = |(x, y): (f64, f64)| {
         let Some(projection) = &projection else { return json!([x, y]) };
         let (lon, lat) = projection.lon_lat(x, y);
         json!([tidy(lon), tidy(lat)])
     };
+    let corner = |&(column, row): &(i64, i64)| position(cells.corner_m(column, row));
     let mut counts: BTreeMap<u8, usize> = BTreeMap::new();
     cells.explored().for_each(|c| *counts.entry(c.label).or_default() += 1);
     let feature = |(label, polygons): (u8, Vec<Polygon>)| {
@@ -64,7 +64,15 @@ pub(super) fn geojson(cells: &MapCells, origin: Option<Origin>) -> String {
     if origin.is_none() {
         facts["coordinates"] = json!("metres east and north of the mission's origin");
     }
-    let features: Vec<Value> = all.into_iter().map(feature).collect();
+    let marker = |m: &VehicleMarker| {
+        json!({
+            "type": "Feature",
+            "id": format!("marker-{}", m.number),
+            "properties": { "marker": m.text, "author": m.author, "mission_time_s": m.at_s },
+            "geometry": { "type": "Point", "coordinates": position((m.x_m, m.y_m)) },
+        })
+    };
+    let features: Vec<Value> = all.into_iter().map(feature).chain(cells.markers.iter().map(marker)).collect();
     json!({ "type": "FeatureCollection", "scenecast": facts, "features": features }).to_string()
 }
 

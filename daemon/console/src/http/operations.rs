@@ -5,7 +5,8 @@ use super::shared::{ArchiveName, Shared, VehicleId};
 use crate::export::MapFormat;
 use crate::fit::Fit;
 use crate::orders::{
-    BudgetOrder, CommandOrder, ConstraintsOrder, DismissOrder, ExemplarOrder, LabelOrder, NoteOrder, UtilityOrder,
+    BudgetOrder, CommandOrder, ConstraintsOrder, DismissOrder, ExemplarOrder, LabelOrder, MarkerOrder, NoteOrder,
+    RemoveMarkerOrder, UtilityOrder,
 };
 use crate::state::{AcceptedOrder, ArchiveList, CommandState, MapBody, MissionState, PrincipalInfo};
 use axum::extract::State;
@@ -303,6 +304,20 @@ fn changes() -> Vec<Operation> {
             "Adds a note about the vehicle; it stays at the surface",
             schema::<NoteOrder>,
             || post(orders::note),
+        ),
+        change(
+            "/api/v2/vehicles/{id}/markers",
+            "add_marker",
+            "Sets a marker on the map; it stays at the surface",
+            schema::<MarkerOrder>,
+            || post(orders::marker),
+        ),
+        change(
+            "/api/v2/vehicles/{id}/markers/remove",
+            "remove_marker",
+            "Removes a marker from the map",
+            schema::<RemoveMarkerOrder>,
+            || post(orders::remove_marker),
         ),
         change(
             "/api/v2/vehicles/{id}/earlier-map/dismiss",

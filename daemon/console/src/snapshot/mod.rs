@@ -11,6 +11,7 @@ pub(crate) use command::{command_state, principal_info};
 pub use facts::MissionFacts;
 pub(crate) use facts::seconds;
 pub use position::measured_origin;
+pub(crate) use vehicle::marker;
 
 use crate::link_meter::LinkMeter;
 use crate::state::{LayerInfo, MissionInfo, MissionState, VehicleState};

@@ -4,15 +4,15 @@ use super::facts::{MissionFacts, seconds};
 use super::{exemplar, link, position};
 use crate::state::{
     AppliedOrder, DirectiveSlots, EarlierMap, InForceKnowledge, MapLabel, MapSummary, OrderProgress, OrderStatus,
-    PlannedPath, ReportedDisk, ReportedMode, ReportedPose, StatusReport, UsblMeasurement, UtilityTerms, VehicleNote,
-    VehicleOrders, VehicleSettings, VehicleState,
+    PlannedPath, ReportedDisk, ReportedMode, ReportedPose, StatusReport, UsblMeasurement, UtilityTerms, VehicleMarker,
+    VehicleNote, VehicleOrders, VehicleSettings, VehicleState,
 };
 use scenecast_protocol::coordinates::MapPoint;
 use scenecast_protocol::directive::{self, PlannerKind, REPORTED_SLOTS, SlotProgress};
 use scenecast_protocol::link::{InForce, PeerView};
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::{Address, DiskReport, Intent, VehicleMode, VehicleStatus};
-use scenecast_surface::record::StoredNote;
+use scenecast_surface::record::{StoredMarker, StoredNote};
 use scenecast_surface::{SettingsOrder, Surface, VehicleRecord};
 
 pub(super) fn vehicles(surface: &Surface, facts: &MissionFacts, now: Instant) -> Vec<VehicleState> {
@@ -48,8 +48,14 @@ fn vehicle(
             accuracy: line.accuracy,
         }),
         notes: record.annotations.notes.iter().map(note).collect(),
+        markers: record.annotations.markers.values().map(marker).collect(),
         orders: orders(record, &view),
     })
+}
+
+pub(crate) fn marker(marker: &StoredMarker) -> VehicleMarker {
+    let StoredMarker { number, x_m, y_m, at, author, text } = marker.clone();
+    VehicleMarker { number, x_m, y_m, at_s: seconds(Instant::from_micros(at)), author, text }
 }
 
 fn note(note: &StoredNote) -> VehicleNote {

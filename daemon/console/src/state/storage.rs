@@ -1,4 +1,4 @@
-//! The files of the surface: the state of their disk, archived maps, notes.
+//! The files of the surface: the state of their disk, archived maps, markers, notes.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -41,6 +41,23 @@ pub struct ArchivedMap {
 pub struct ArchiveList {
     /// The archived maps, the newest first.
     pub maps: Vec<ArchivedMap>,
+}
+
+/// A marker on a vehicle's map.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct VehicleMarker {
+    /// Its number among the markers of this vehicle's map.
+    pub number: u32,
+    /// Metres east of the origin in the world frame.
+    pub x_m: f64,
+    /// Metres north of the origin in the world frame.
+    pub y_m: f64,
+    /// Mission time at which it was set.
+    pub at_s: f64,
+    /// The name of the person or program that set it.
+    pub author: String,
+    /// The text of the marker, as written.
+    pub text: String,
 }
 
 /// A note about a vehicle.

@@ -3,7 +3,7 @@
 use super::labels::MapLabel;
 use super::link::VehicleChannel;
 use super::map::MapSummary;
-use super::storage::VehicleNote;
+use super::storage::{VehicleMarker, VehicleNote};
 use scenecast_surface::{FenceOrder, LimitsOrder, SettingsOrder};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -38,6 +38,9 @@ pub struct VehicleState {
     /// Notes about the vehicle, the newest last; at most 200.
     #[serde(default)]
     pub notes: Vec<VehicleNote>,
+    /// Markers on the map, in the order of their numbers; at most 200.
+    #[serde(default)]
+    pub markers: Vec<VehicleMarker>,
     /// The orders to the vehicle.
     #[serde(flatten)]
     pub orders: VehicleOrders,

@@ -3,7 +3,8 @@
 use super::event::Event;
 
 /// The version of the layout of events. A build reads its own version and earlier ones.
-const SCHEMA: u16 = 1;
+/// Layout 2 appends events to layout 1.
+const SCHEMA: u16 = 2;
 
 /// The reason that bytes are no batch of events.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
@@ -26,7 +27,7 @@ pub fn encode(events: &[Event]) -> Vec<u8> {
 pub fn decode(bytes: &[u8]) -> Result<Vec<Event>, DecodeError> {
     let (version, rest) = bytes.split_first_chunk::<2>().ok_or(DecodeError::Damaged)?;
     match u16::from_be_bytes(*version) {
-        SCHEMA => match postcard::take_from_bytes(rest) {
+        1..=SCHEMA => match postcard::take_from_bytes(rest) {
             Ok((events, [])) => Ok(events),
             _ => Err(DecodeError::Damaged),
         },
@@ -37,7 +38,7 @@ pub fn decode(bytes: &[u8]) -> Result<Vec<Event>, DecodeError> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::event::{EventKind, EventSource, EventTime, RunId, StoredCells, VehicleEvent};
+    use super::super::event::{EventKind, EventSource, EventTime, RunId, StoredCells, StoredMarker, VehicleEvent};
     use super::*;
     use proptest::prelude::*;
 
@@ -58,21 +59,49 @@ mod tests {
     }
 
     #[test]
-    fn the_bytes_of_layout_1_are_read_for_ever() {
+    fn the_bytes_of_each_layout_are_read_for_ever() {
+        let golden = |layout: u8| {
+            [
+                &[0, layout, 4][..],
+                &[1, 0xE8, 0x07, 0xD0, 0x0F, 0, 0, 0xAC, 2, 5, 7],
+                &[2, 0xE8, 0x07, 0xD0, 0x0F, 1, 1, 2, 1, 1, 2, 1, 0xAC, 2],
+                &[3, 0xE8, 0x07, 0xD0, 0x0F, 1, 1, 2, 1, 4, 0, 2, 6, 7, 7, 0xD0, 0x0F, 2, 0, 7, 0],
+                &[4, 0xE8, 0x07, 0xD0, 0x0F, 2, 3, b'a', b'n', b'n', 2, 1, 3],
+            ]
+            .concat()
+        };
+        assert_eq!(decode(&golden(1)), Ok(events()));
+        assert_eq!(decode(&golden(2)), Ok(events()));
+        assert_eq!(encode(&events()), golden(2));
+    }
+
+    #[test]
+    fn golden_bytes_of_a_marker() {
+        let (at, author, text) = (1000, "ann".to_owned(), "wreck".to_owned());
+        let marker = VehicleEvent::Marker(StoredMarker { number: 300, x_m: 1.5, y_m: -2.0, at, author, text });
+        let time = EventTime { mission_us: 1000, unix_ms: 2000 };
+        let event = |event, sequence| Event {
+            sequence,
+            time,
+            source: EventSource::Surface,
+            kind: EventKind::Vehicle(1, event),
+        };
+        let events = [event(marker, 1), event(VehicleEvent::MarkerGone(300), 2)];
         let golden = [
-            &[0, 1, 4][..],
-            &[1, 0xE8, 0x07, 0xD0, 0x0F, 0, 0, 0xAC, 2, 5, 7],
-            &[2, 0xE8, 0x07, 0xD0, 0x0F, 1, 1, 2, 1, 1, 2, 1, 0xAC, 2],
-            &[3, 0xE8, 0x07, 0xD0, 0x0F, 1, 1, 2, 1, 4, 0, 2, 6, 7, 7, 0xD0, 0x0F, 2, 0, 7, 0],
-            &[4, 0xE8, 0x07, 0xD0, 0x0F, 2, 3, b'a', b'n', b'n', 2, 1, 3],
+            &[0, 2, 2][..],
+            &[1, 0xE8, 0x07, 0xD0, 0x0F, 0, 2, 1, 16, 0xAC, 2],
+            &1.5f64.to_le_bytes(),
+            &(-2.0f64).to_le_bytes(),
+            &[0xE8, 0x07, 3, b'a', b'n', b'n', 5, b'w', b'r', b'e', b'c', b'k'],
+            &[2, 0xE8, 0x07, 0xD0, 0x0F, 0, 2, 1, 17, 0xAC, 2],
         ];
-        assert_eq!(decode(&golden.concat()), Ok(events()));
-        assert_eq!(encode(&events()), golden.concat());
+        assert_eq!(encode(&events), golden.concat());
+        assert_eq!(decode(&golden.concat()).as_deref(), Ok(&events[..]));
     }
 
     #[test]
     fn a_later_layout_is_refused_by_its_number() {
-        assert_eq!(decode(&[0, 2, 0]), Err(DecodeError::Later(2)));
+        assert_eq!(decode(&[0, 3, 0]), Err(DecodeError::Later(3)));
         assert_eq!(decode(&[0, 0, 0]), Err(DecodeError::Damaged));
         assert_eq!(decode(&[0]), Err(DecodeError::Damaged));
     }
@@ -80,7 +109,7 @@ mod tests {
     proptest! {
         #[test]
         fn any_bytes_decode_or_are_refused(bytes in proptest::collection::vec(any::<u8>(), 0..200)) {
-            let _ = decode(&[&[0, 1], &bytes[..]].concat());
+            let _ = decode(&[&[0, 2], &bytes[..]].concat());
         }
     }
 }

@@ -79,6 +79,10 @@ pub enum VehicleEvent {
     Note(StoredNote),
     /// The end of a run whose map is archived.
     Archived { ended_us: u64, cells: u64 },
+    /// A marker that was set. Since layout 2.
+    Marker(StoredMarker),
+    /// The number of a marker that was removed. Since layout 2.
+    MarkerGone(u32),
 }
 
 /// A run of a vehicle and the epoch of its labels.
@@ -169,6 +173,18 @@ pub struct StoredLabel {
     pub colour: Option<String>,
     /// The label that it is shown as a part of.
     pub merged_into: Option<u8>,
+}
+
+/// A marker on a vehicle's map.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct StoredMarker {
+    pub number: u32,
+    /// Metres east and north in the world frame.
+    pub x_m: f64,
+    pub y_m: f64,
+    pub at: u64,
+    pub author: String,
+    pub text: String,
 }
 
 /// A note about a vehicle.

@@ -3,8 +3,8 @@
 use super::cells::{EarlierMap, MapCopy};
 use super::contact::StoredContact;
 use super::event::{
-    Event, EventKind, EventTime, RunId, StoredBudget, StoredImage, StoredIntent, StoredLabel, StoredNote, StoredOrder,
-    StoredRequest, VehicleEvent,
+    Event, EventKind, EventTime, RunId, StoredBudget, StoredImage, StoredIntent, StoredLabel, StoredMarker, StoredNote,
+    StoredOrder, StoredRequest, VehicleEvent,
 };
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
@@ -13,6 +13,8 @@ use std::sync::Arc;
 const MAX_TRACK: usize = 500;
 /// Notes that are kept of a vehicle.
 const MAX_NOTES: usize = 200;
+/// The most markers that are kept; a surface sets no more.
+pub(crate) const MAX_MARKERS: usize = 200;
 
 /// How a store was begun.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -60,6 +62,7 @@ pub struct VehicleMemory {
     pub(crate) requests: BTreeMap<u8, (u8, Option<StoredRequest>)>,
     pub(crate) labels: BTreeMap<u8, StoredLabel>,
     pub(crate) notes: VecDeque<StoredNote>,
+    pub(crate) markers: BTreeMap<u32, StoredMarker>,
     /// Set in an archived map only: end of the run in microseconds of mission time, number of cells.
     pub(crate) archived: Option<(u64, u64)>,
 }
@@ -143,6 +146,11 @@ impl VehicleMemory {
         &self.labels
     }
 
+    /// The markers on the map.
+    pub fn markers(&self) -> impl Iterator<Item = &StoredMarker> {
+        self.markers.values()
+    }
+
     /// The images that have arrived, by label.
     pub fn exemplars(&self) -> &BTreeMap<u8, Vec<StoredImage>> {
         &self.exemplars
@@ -212,6 +220,15 @@ impl VehicleMemory {
                 self.notes.push_back(note.clone());
                 self.notes.drain(..self.notes.len().saturating_sub(MAX_NOTES));
             }
+            VehicleEvent::Marker(marker) => {
+                self.markers.insert(marker.number, marker.clone());
+                while self.markers.len() > MAX_MARKERS {
+                    self.markers.pop_first();
+                }
+            }
+            VehicleEvent::MarkerGone(number) => {
+                self.markers.remove(number);
+            }
             VehicleEvent::Archived { ended_us, cells } => self.archived = Some((*ended_us, *cells)),
         }
     }
@@ -251,7 +268,7 @@ impl VehicleMemory {
         all
     }
 
-    /// The events that belong to the current run: identity, map, contact, track, images, names, notes.
+    /// The events that belong to the current run: identity, map, contact, track, images, names, notes, markers.
     fn run_events(&self) -> Vec<VehicleEvent> {
         let mut all = vec![VehicleEvent::Identified(self.id)];
         all.extend(self.map.to_events().into_iter().map(VehicleEvent::Cells));
@@ -263,6 +280,7 @@ impl VehicleMemory {
         let named = |(&label, book): (&u8, &StoredLabel)| VehicleEvent::Label { label, book: book.clone() };
         all.extend(self.labels.iter().map(named));
         all.extend(self.notes.iter().cloned().map(VehicleEvent::Note));
+        all.extend(self.markers.values().cloned().map(VehicleEvent::Marker));
         all
     }
 

@@ -328,4 +328,9 @@ fn order_changes(record: &VehicleRecord, view: &PeerView<'_>, memory: &VehicleMe
     let known = memory.notes.back();
     let first_new = record.annotations.notes.iter().rposition(|note| Some(note) == known).map_or(0, |at| at + 1);
     events.extend(record.annotations.notes.iter().skip(first_new).cloned().map(VehicleEvent::Note));
+    let markers = &record.annotations.markers;
+    let gone = memory.markers.keys().filter(|number| !markers.contains_key(number));
+    events.extend(gone.copied().map(VehicleEvent::MarkerGone));
+    let news = markers.values().filter(|marker| memory.markers.get(&marker.number) != Some(marker));
+    events.extend(news.cloned().map(VehicleEvent::Marker));
 }

@@ -16,6 +16,7 @@ import { NATURAL } from "./natural.js";
 import { addPoint, drawMeasure, measure, toggleMeasure } from "./measure.js";
 import { drawGrid, drawNorth, drawRings, drawScaleBar } from "./overlays.js";
 import { showReadout } from "./readout.js";
+import { choosePlace, chosen, clearPlace, drawPlaces } from "./place.js";
 import { TRUTH, drawTruth } from "./truth.js";
 import { View } from "./view.js";
 import { pathOf } from "./path.js";
@@ -44,7 +45,7 @@ export function startChart() {
   });
   canvas.addEventListener("focus", redraw);
   canvas.addEventListener("blur", redraw);
-  store.on("state map select feed book highlight tick edit natural", () => {
+  store.on("state map select feed book highlight tick edit natural place", () => {
     keepInView();
     redraw();
   });
@@ -83,6 +84,7 @@ export function toggle(option) {
 function end() {
   if (pen.tool) finish();
   else if (measure.on) measureKey();
+  else if (chosen.at) clearPlace();
 }
 
 function measureKey() {
@@ -154,7 +156,8 @@ function hover(px, py) {
 }
 
 function click(px, py) {
-  if (clickAt(...view.toWorld(px, py)) || !measure.on) return;
+  if (clickAt(...view.toWorld(px, py))) return;
+  if (!measure.on) return choosePlace(view, px, py);
   addPoint(...view.toWorld(px, py));
   redraw();
 }
@@ -184,6 +187,7 @@ function draw() {
   if (surface) drawSurface(c, view, ink, surface);
   for (const v of byChoice) drawFences(c, view, ink, v, v.id === store.selectedId);
   for (const v of byChoice) drawVehicle(c, viewOf(view, v), ink, v, v.id === store.selectedId);
+  drawPlaces(c, view, ink);
   drawMeasure(c, view, ink);
   if (byKeys()) drawCross(c);
   drawScaleBar(c, view, ink);

@@ -37,7 +37,7 @@ export function showReadout(world) {
   if (cell) {
     parts.push(nameOf(shownAs(cell.label)));
     parts.push(cell.ageS === null ? `age ${none}` : `received ${span(cell.ageS)} ago`);
-    for (const p of cell.layers) parts.push(`${p.name} ${levelOf(p)}${p.ageS === null ? "" : `, received ${span(p.ageS)} ago`}`);
+    for (const p of cell.layers) parts.push(`${p.name} ${layerText(p)}${p.ageS === null ? "" : `, received ${span(p.ageS)} ago`}`);
   } else {
     const block = store.map ? coarseAt(store.map, ...own) : null;
     parts.push(block === null ? "unexplored" : `not sent; ${nameOf(shownAs(block))} at the one cell of 16 that was sent`);
@@ -47,7 +47,7 @@ export function showReadout(world) {
 }
 
 /** The bounds of the level of a cell. */
-const levelOf = (l) => boundsOf(l, l.level).map((value) => valueText(l, value)).join(" to ");
+export const layerText = (l) => boundsOf(l, l.level).map((value) => valueText(l, value)).join(" to ");
 
 const A = 6378137;
 const E2 = (2 - 1 / 298.257223563) / 298.257223563;

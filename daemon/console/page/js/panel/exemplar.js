@@ -15,7 +15,7 @@ let viewer = null;
 
 export function exemplar(of) {
   const ask = h("button.request", { type: "button", onclick: () => request(of()) }, "Request");
-  const image = h("button.image", { type: "button", onclick: () => view(of()) }, h("img", { alt: "", width: 44, height: 44 }));
+  const image = h("button.image", { type: "button", onclick: () => viewExemplars(of()) }, h("img", { alt: "", width: 44, height: 44 }));
   const state = h("span.state");
   const bar = h("progress", { max: 1 });
   const cancel = h("button.cancel", { type: "button", onclick: () => request(of(), "cancel") }, "Cancel");
@@ -71,7 +71,8 @@ export function refreshExemplar(box, label, name) {
   image.setAttribute("aria-label", `Image of ${name}, enlarge`);
 }
 
-function view(label) {
+/** The dialog with all images of a label. */
+export function viewExemplars(label) {
   const dialog = $("dialog");
   const close = () => dialog.close();
   const shown = h("div.images");

@@ -6,7 +6,7 @@ const ANYWHERE = [["Shift+H", "hold the vehicle, or resume; asks first"], ["Shif
 const KEYS = [
   ["Arrows", "pan the map"], ["+ and \u2212", "zoom"], ["0", "show everything"], ["F", "follow the vehicle"],
   ["N, P", "constraints: next, previous corner; Shift with an arrow key moves it, Delete removes it"],
-  ["Enter", "set a corner, a point to measure, the return point at the cross; Escape ends"],
+  ["Enter", "choose the place at the cross, or set a corner, a point to measure, the return point; Escape ends"],
   ["M", "measure"], ["L", "the colours of the labels, or of their images"], ["T", "in a rehearsal: the true sea floor, or the map again"], ["Tab", "move to the next control"],
   ["Wheel, drag, pinch", "zoom and pan with mouse or fingers"],
 ];

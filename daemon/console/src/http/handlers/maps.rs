@@ -146,16 +146,18 @@ pub(in crate::http) async fn file(shared: Shared, id: u8, headers: HeaderMap, fo
         Ok(cached) => cached,
         Err(response) => return response,
     };
-    let (origin, placement, names) = {
+    let (origin, placement, names, markers) = {
         let snapshot = shared.snapshots.borrow();
         let vehicle = snapshot.vehicle(id);
         let labels = vehicle.iter().flat_map(|v| &v.labels);
         let names: BTreeMap<u8, String> = labels.filter_map(|l| Some((l.id, l.name.clone()?))).collect();
-        (snapshot.state.mission.origin, vehicle.and_then(|v| v.map.placement.clone()), names)
+        let markers = vehicle.map(|v| v.markers.clone()).unwrap_or_default();
+        (snapshot.state.mission.origin, vehicle.and_then(|v| v.map.placement.clone()), names, markers)
     };
     let moves = placement.as_ref().map_or(0, |p| p.version);
     let mut named = DefaultHasher::new();
     names.hash(&mut named);
+    markers.iter().for_each(|m| (m.number, &m.text, m.at_s.to_bits()).hash(&mut named));
     let tag = format!("{id}-{}-{moves}-{:x}", cached.map.tag(), named.finish());
     if is_held(&headers, &tag) {
         return tagged(&headers, &tag, || StatusCode::OK.into_response());
@@ -165,7 +167,7 @@ pub(in crate::http) async fn file(shared: Shared, id: u8, headers: HeaderMap, fo
     };
     let made = tokio::task::spawn_blocking(move || {
         let moved_m = placement.map_or((0.0, 0.0), |p| (p.east_m, p.north_m));
-        MapCells { moved_m, names, ..cached.map.cells().clone() }.export(format, origin)
+        MapCells { moved_m, names, markers, ..cached.map.cells().clone() }.export(format, origin)
     });
     match made.await {
         Ok(Ok(bytes)) => {

@@ -3,7 +3,10 @@
 use crate::http::body::JsonOrder;
 use crate::http::response::error;
 use crate::http::shared::{Shared, VehicleId};
-use crate::orders::{BudgetOrder, ConstraintsOrder, DismissOrder, ExemplarOrder, LabelOrder, NoteOrder, UtilityOrder};
+use crate::orders::{
+    BudgetOrder, ConstraintsOrder, DismissOrder, ExemplarOrder, LabelOrder, MarkerOrder, NoteOrder, RemoveMarkerOrder,
+    UtilityOrder,
+};
 use crate::request::SurfaceRequest;
 use axum::Extension;
 use axum::extract::State;
@@ -99,6 +102,25 @@ pub(in crate::http) async fn note(
 ) -> Response {
     let author = principal.name().to_owned();
     shared.order(principal, SurfaceRequest::Note(id, author, order)).await
+}
+
+pub(in crate::http) async fn marker(
+    State(shared): State<Shared>,
+    Extension(principal): Extension<Principal>,
+    VehicleId(id): VehicleId,
+    JsonOrder(order): JsonOrder<MarkerOrder>,
+) -> Response {
+    let author = principal.name().to_owned();
+    shared.order(principal, SurfaceRequest::Marker(id, author, order)).await
+}
+
+pub(in crate::http) async fn remove_marker(
+    State(shared): State<Shared>,
+    Extension(principal): Extension<Principal>,
+    VehicleId(id): VehicleId,
+    JsonOrder(order): JsonOrder<RemoveMarkerOrder>,
+) -> Response {
+    shared.order(principal, SurfaceRequest::RemoveMarker(id, order)).await
 }
 
 pub(in crate::http) async fn dismiss(

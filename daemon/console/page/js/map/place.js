@@ -1,0 +1,63 @@
+// The place that the operator has chosen on the map, and the markers around it. Places are in the world frame, metres.
+
+import { FONT, haloText } from "../canvas.js";
+import { store } from "../store.js";
+
+const REACH_PX = 14;
+const MAX_TEXT = 24;
+
+/** The chosen place [x, y], or null, and the number of the chosen marker, or null. */
+export const chosen = { at: null, marker: null };
+
+store.on("select", clearPlace);
+
+export const markers = () => store.vehicle?.markers ?? [];
+
+/** The chosen marker, or null once it was removed. */
+export const chosenMarker = () => markers().find((m) => m.number === chosen.marker) ?? null;
+
+/** Chooses the place at a click on the map, or the marker within reach of it. */
+export function choosePlace(view, px, py) {
+  const away = (m) => Math.hypot(...view.toScreen(m.x_m, m.y_m).map((v, i) => v - [px, py][i]));
+  const near = markers().filter((m) => away(m) <= REACH_PX).sort((a, b) => away(a) - away(b))[0];
+  chosen.at = near ? [near.x_m, near.y_m] : view.toWorld(px, py);
+  chosen.marker = near?.number ?? null;
+  store.emit("place");
+}
+
+export function clearPlace() {
+  if (chosen.at === null) return;
+  [chosen.at, chosen.marker] = [null, null];
+  store.emit("place");
+}
+
+export function drawPlaces(c, view, ink) {
+  c.font = FONT;
+  c.textAlign = "left";
+  for (const marker of markers()) drawMarker(c, ink, view.toScreen(marker.x_m, marker.y_m), marker.text);
+  if (!chosen.at) return;
+  const [px, py] = view.toScreen(...chosen.at);
+  for (const [style, width] of [[ink.sea, 4], [ink.accent, 2]]) {
+    c.strokeStyle = style;
+    c.lineWidth = width;
+    c.beginPath();
+    c.arc(px, py, 9, 0, 2 * Math.PI);
+    c.stroke();
+  }
+}
+
+/** A pin with the beginning of its text. */
+function drawMarker(c, ink, [px, py], words) {
+  c.beginPath();
+  c.moveTo(px, py);
+  c.lineTo(px - 5, py - 11);
+  c.arc(px, py - 13, 5.4, Math.PI * 0.88, Math.PI * 0.12);
+  c.closePath();
+  c.lineJoin = "round";
+  c.lineWidth = 3;
+  c.strokeStyle = ink.sea;
+  c.stroke();
+  c.fillStyle = ink.accent;
+  c.fill();
+  haloText(c, words.length > MAX_TEXT ? `${words.slice(0, MAX_TEXT - 1)}…` : words, px + 9, py - 9, ink);
+}

@@ -1,0 +1,114 @@
+// The plate of the chosen place: its label with images and ages, its marker, and the button that sets one.
+
+import { addMarker, removeMarker } from "../api.js";
+import { nameOf, shownAs, tintOf } from "../book.js";
+import { denial } from "../command.js";
+import { $, announce, fill, h, text } from "../dom.js";
+import { ago, metres, span } from "../format.js";
+import { chosen, chosenMarker, clearPlace } from "../map/place.js";
+import { onMap } from "../map/frames.js";
+import { cellAt, layerText } from "../map/readout.js";
+import { ageOf, store } from "../store.js";
+import { viewExemplars } from "./exemplar.js";
+
+const MAX_IMAGES = 4;
+const title = h("h2", { id: "place-title" });
+const facts = h("div");
+const images = h("div.place-images");
+const marked = h("div");
+const words = h("input", { type: "text", maxLength: 200, required: true, placeholder: "a wreck", "aria-label": "Text of the marker" });
+const set = h("button.primary", { type: "submit" }, "Set marker");
+const form = h("form", { onsubmit: mark }, words, set);
+const error = h("p.error", { role: "alert" });
+const plate = h("section.plate", { id: "place", hidden: true, "aria-labelledby": "place-title" },
+  h("header", {}, title, h("button.quiet", { type: "button", onclick: clearPlace, "aria-label": "Close the place" }, "\u00d7")),
+  facts, images, marked, form, error);
+/** What the plate shows, so that it is built again only when that changes. */
+let shown = "";
+
+export function startPlace() {
+  $("stage").append(plate);
+  plate.addEventListener("keydown", (event) => event.key === "Escape" && clearPlace());
+  store.on("place", () => {
+    text(error, "");
+    words.value = "";
+    refresh();
+    const label = labelHere();
+    if (label !== null) showRow(label);
+  });
+  store.on("state map book tick", refresh);
+}
+
+/** The cell at the chosen place, or null. */
+const cellHere = () => (store.map && chosen.at ? cellAt(store.map, ...onMap(store.vehicle, ...chosen.at)) : null);
+
+function labelHere() {
+  const cell = cellHere();
+  return cell && shownAs(cell.label);
+}
+
+/** Brings the row of a label into view and marks it. */
+function showRow(label) {
+  for (const row of document.querySelectorAll("#label-list > .here")) row.classList.remove("here");
+  const row = document.querySelector(`#label-list > .label[data-key='${label}']`);
+  row?.classList.add("here");
+  row?.scrollIntoView({ block: "nearest" });
+}
+
+function refresh() {
+  plate.hidden = chosen.at === null || !store.vehicle;
+  if (plate.hidden) {
+    for (const row of document.querySelectorAll("#label-list > .here")) row.classList.remove("here");
+    return;
+  }
+  const cell = cellHere();
+  const marker = chosenMarker();
+  const label = cell && store.vehicle.labels.find((l) => l.id === shownAs(cell.label));
+  text(title, `E ${metres(chosen.at[0])}  N ${metres(chosen.at[1])}`);
+  const denied = denial("record");
+  set.disabled = denied !== null || !store.connected;
+  set.title = denied ?? "";
+  form.hidden = marker !== null;
+  const lines = cell ? [`received ${cell.ageS === null ? "at an unknown time" : `${span(cell.ageS)} ago`}`, ...cell.layers.map((l) => `${l.name} ${layerText(l)}`)] : ["unexplored"];
+  const pictures = label?.exemplar.images.slice(-MAX_IMAGES).reverse() ?? [];
+  const now = JSON.stringify([lines, label?.id, label && nameOf(label.id), pictures.map((i) => [i.url, i.at_s]), marker, marker && ago(ageOf(marker.at_s))]);
+  if (now === shown) return;
+  shown = now;
+  fill(facts, label && labelLine(label), ...lines.map((line) => h("p", {}, line)));
+  fill(images, ...pictures.map((i) => picture(label, i)));
+  fill(marked, marker && markerPart(marker));
+}
+
+function labelLine(label) {
+  const square = h("i.truth-chip", { "aria-hidden": "true" });
+  square.style.background = `rgb(${tintOf(label.id).join(" ")})`;
+  return h("p", {}, square, " ", h("b", {}, nameOf(label.id)));
+}
+
+const picture = (label, image) =>
+  h("button.image", { type: "button", "aria-label": `Images of ${nameOf(label.id)}`, onclick: () => viewExemplars(label) },
+    h("img", { alt: "", width: 44, height: 44, src: `${image.url}?at=${image.at_s}` }));
+
+function markerPart(marker) {
+  const remove = h("button", { type: "button", disabled: denial("record") !== null, onclick: () => take(marker) }, "Remove marker");
+  return h("div", {}, h("p", {}, h("b", {}, marker.text)), h("p.note", {}, `${marker.author}, ${ago(ageOf(marker.at_s))}`), remove);
+}
+
+async function mark(event) {
+  event.preventDefault();
+  const [x, y] = chosen.at;
+  await send(() => addMarker(store.vehicle.id, x, y, words.value.trim()), `marker set: ${words.value.trim()}`);
+}
+
+const take = (marker) => send(() => removeMarker(store.vehicle.id, marker.number), `marker removed: ${marker.text}`);
+
+/** Sends a change; the next state of the surface shows it. */
+async function send(change, message) {
+  try {
+    await change();
+    announce(message);
+    clearPlace();
+  } catch (fault) {
+    text(error, fault.message);
+  }
+}

@@ -1,0 +1,69 @@
+import assert from "node:assert/strict";
+
+/** An explored cell near the middle of the view: its label, its place on the page, and in the world. */
+const aCell = (s) =>
+  s.inPage(({ store, view: v, inWorld, shownAs }) => {
+    const m = store.map;
+    const box = document.getElementById("chart").getBoundingClientRect();
+    const cells = [...m.cells()].map((cell) => {
+      const [x, y] = inWorld(store.vehicle, (cell.x + 0.5) * m.cell_m, (cell.y + 0.5) * m.cell_m);
+      const [px, py] = v.toScreen(x, y);
+      return { label: shownAs(cell.label), x, y, px: px + box.left, py: py + box.top, away: Math.hypot(px - v.width / 2, py - v.height / 2) };
+    });
+    return cells.sort((a, b) => a.away - b.away)[0];
+  });
+
+const plate = "#place";
+
+export default [
+  {
+    name: "a click on the map chooses the place: its label, its age, the row in the list",
+    scenario: "start",
+    async run(s) {
+      const cell = await aCell(s);
+      await s.page.locator(`.label[data-key='${cell.label}'] .request`).click();
+      await s.until("an image", () => s.page.locator(`.label[data-key='${cell.label}'] .image`).isVisible(), { advance: 20 });
+      await s.page.mouse.click(cell.px, cell.py);
+      const name = await s.inPage(({ nameOf }, id) => nameOf(id), cell.label);
+      await s.shows(plate, new RegExp(`E .* N .*${name}.*received .* ago`, "s"));
+      assert.ok(await s.page.locator(`.label.here[data-key='${cell.label}']`).isVisible(), "the row is marked and in view");
+      await s.page.locator(`${plate} .place-images .image`).first().click();
+      await s.shows("#dialog", new RegExp(name));
+      await s.page.locator("#dialog").getByRole("button", { name: "Close" }).click();
+      await s.page.getByRole("button", { name: "Close the place" }).click();
+      assert.equal(await s.page.locator(plate).isVisible(), false);
+      assert.equal(await s.page.locator(".label.here").count(), 0);
+    },
+  },
+  {
+    name: "a marker is set at a place, is shown on the map, and is removed",
+    scenario: "start",
+    async run(s) {
+      const cell = await aCell(s);
+      await s.page.mouse.click(cell.px, cell.py);
+      await s.page.getByLabel("Text of the marker").fill("an old anchor");
+      await s.page.getByRole("button", { name: "Set marker" }).click();
+      await s.until("the marker", () => s.inPage(({ store }) => store.vehicle.markers.length === 1), { advance: 1 });
+      const marker = (await s.get("/state")).vehicles[0].markers[0];
+      assert.ok(Math.hypot(marker.x_m - cell.x, marker.y_m - cell.y) < 0.3, JSON.stringify([marker, cell]));
+      assert.equal(await s.page.locator(plate).isVisible(), false);
+      // The pin stands above its place; its foot chooses it.
+      await s.page.mouse.click(cell.px + 3, cell.py - 4);
+      await s.shows(plate, /an old anchor/);
+      await s.page.getByRole("button", { name: "Remove marker" }).click();
+      await s.until("no marker", () => s.inPage(({ store }) => store.vehicle.markers.length === 0), { advance: 1 });
+    },
+  },
+  {
+    name: "with the keyboard the cross chooses the place, and Escape leaves it",
+    scenario: "start",
+    async run(s) {
+      await s.page.locator("#chart").focus();
+      await s.page.keyboard.press("ArrowLeft");
+      await s.page.keyboard.press("Enter");
+      await s.shows(plate, /E .* N/);
+      await s.page.keyboard.press("Escape");
+      assert.equal(await s.page.locator(plate).isVisible(), false);
+    },
+  },
+];
