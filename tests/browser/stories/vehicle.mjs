@@ -1,6 +1,40 @@
 import assert from "node:assert/strict";
 
+/** Counts the tones that the page plays from now on, as `tones` of its window. */
+const countTones = (s) =>
+  s.page.evaluate(() => {
+    window.tones = 0;
+    const part = () => ({ connect: (to) => to, start: () => (window.tones += 1), stop() {}, frequency: {}, gain: { setValueAtTime() {}, exponentialRampToValueAtTime() {} } });
+    window.AudioContext = class {
+      currentTime = 0;
+      resume() {}
+      createOscillator = part;
+      createGain = part;
+    };
+  });
+
 export default [
+  {
+    name: "a new alarm sounds once where the operator has switched the sound on",
+    scenario: "rich",
+    async run(s) {
+      await countTones(s);
+      const tones = () => s.page.evaluate(() => window.tones);
+      const silence = async (silent) => {
+        await s.steer({ silent, advance: 60 });
+        await s.until(silent ? "a silent vehicle" : "no silence", async () => (await s.page.locator(".banner", { hasText: "is silent" }).isVisible()) === silent, { advance: 2 });
+      };
+      await silence(true);
+      assert.equal(await tones(), 0, "it is off at first");
+      await silence(false);
+      await s.page.locator("#sound").click();
+      assert.equal(await s.page.locator("#sound").getAttribute("aria-pressed"), "true");
+      const played = await tones();
+      assert.ok(played > 0, "the press plays the sound");
+      await silence(true);
+      assert.equal(await tones(), 2 * played);
+    },
+  },
   {
     name: "a contact is not overdue while frames come in",
     scenario: "rich",

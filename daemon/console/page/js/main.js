@@ -1,5 +1,6 @@
 // Starts the page. Every part listens to the store, and the feed fills it.
 
+import { startAlarm } from "./alarm.js";
 import { startCloud } from "./cloud/cloud.js";
 import { startPrincipal } from "./command.js";
 import { startFeed } from "./feed.js";
@@ -25,6 +26,7 @@ startTheme();
 startPrincipal();
 startBar();
 startCommand();
+startAlarm();
 startBanners();
 startStop();
 startTabs();

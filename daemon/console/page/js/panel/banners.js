@@ -1,5 +1,6 @@
 // Alarms and requests: no connection, a request for command, a silent vehicle, a map that is not up to date, the end of the mission.
 
+import { soundAlarm } from "../alarm.js";
 import { dismissEarlierMap, sendCommand } from "../api.js";
 import { hasCommand } from "../command.js";
 import { $, announce, h, keyed, show, text } from "../dom.js";
@@ -8,6 +9,8 @@ import { ageOf, isHeard, isSilent, store } from "../store.js";
 import { retryNow } from "../feed.js";
 
 let announced = "";
+/** Keys of the alarms that have sounded and are not over. */
+let sounded = new Set();
 
 export function startBanners() {
   store.on("state feed tick", update);
@@ -18,6 +21,9 @@ function update() {
   const heads = banners.map((b) => b.head).join(". ");
   if (heads !== announced) announce(heads || "All alarms have cleared.");
   announced = heads;
+  const alarms = banners.filter((b) => b.kind !== "info").map((b) => b.key);
+  if (alarms.some((key) => !sounded.has(key))) soundAlarm();
+  sounded = new Set(alarms);
   keyed($("banners"), banners, (b) => b.key, make, refresh);
   show($("banners"), $("banners").childElementCount > 0);
 }
