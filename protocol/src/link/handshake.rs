@@ -54,6 +54,8 @@ pub(super) struct Handshake<T> {
     /// the vehicle at most one. At the surface, the hello of a run that the vehicle does not use may come in late, and must
     /// not displace the one that it uses.
     offered: Vec<LinkRun<T>>,
+    /// At the surface: the offered run whose hello came in last, until a proof goes out.
+    unproved: Option<Identity>,
     /// At the vehicle: `run` serves only to receive grants, because this end has begun a new one.
     leaving: bool,
     retired: VecDeque<EndedPeer>,
@@ -72,7 +74,7 @@ impl<T> Handshake<T> {
     pub(super) fn new(seed: u64) -> Self {
         let mut random = seed;
         let own = fresh(&mut random);
-        Self { own, run: None, offered: Vec::new(), leaving: false, retired: VecDeque::new(), random }
+        Self { own, run: None, offered: Vec::new(), unproved: None, leaving: false, retired: VecDeque::new(), random }
     }
 
     pub(super) fn own(&self) -> Identity {
@@ -92,9 +94,22 @@ impl<T> Handshake<T> {
         self.offered.last()
     }
 
-    /// The offered run in which the next proof goes out: the one with the fewest, the latest of several.
+    /// The offered run in which the next proof goes out: one whose hello has come in since the last proof, or the one with
+    /// the fewest proofs, the latest of several.
     pub(super) fn provable(&self) -> Option<&LinkRun<T>> {
-        self.offered.iter().rev().filter(|r| !r.flight.is_full()).min_by_key(|r| r.flight.next_number())
+        let with_room = || self.offered.iter().rev().filter(|r| !r.flight.is_full());
+        let waiting = with_room().find(|r| self.unproved == Some(r.peer));
+        waiting.or_else(|| with_room().min_by_key(|r| r.flight.next_number()))
+    }
+
+    /// Whether the hello of an offered run has come in since the last proof: its sender still waits for one.
+    pub(super) fn owes_proof(&self) -> bool {
+        self.unproved.is_some() && self.provable().is_some_and(|r| self.unproved == Some(r.peer))
+    }
+
+    /// A proof was written.
+    pub(super) fn note_proof(&mut self) {
+        self.unproved = None;
     }
 
     /// The number of proofs that were written in all offered runs.
@@ -196,6 +211,7 @@ impl<T> Handshake<T> {
             self.offered.remove(0);
         }
         self.offered.push(offer);
+        self.unproved = Some(peer);
         HandshakeOutcome::Offered
     }
 

@@ -104,6 +104,11 @@ impl<T> LinkPair<T> {
         self.us == Address::SURFACE && self.handshake.provable().is_some()
     }
 
+    /// Whether the hello of an offered run has come in since the last proof.
+    pub fn owes_proof(&self) -> bool {
+        self.handshake.owes_proof()
+    }
+
     /// The number of proofs that were written in all offered runs.
     pub fn proofs(&self) -> u64 {
         self.handshake.proofs()
@@ -264,10 +269,14 @@ impl<T> LinkPair<T> {
         let Some(run) = self.handshake.run_for(purpose) else { return Vec::new() };
         let number = run.flight.next_number();
         run.flight.push(carried);
-        match run.key.as_ref().filter(|_| keyed) {
+        let bytes = match run.key.as_ref().filter(|_| keyed) {
             Some(key) => builder.finish(&Seal::Session(key, direction, number), short),
             None => builder.finish(&Seal::Crc(mission, run.peer.session.get()), short),
+        };
+        if purpose == FramePurpose::Proof {
+            self.handshake.note_proof();
         }
+        bytes
     }
 
     /// Begins a new run toward the peer, because the states of the two ends do not agree.

@@ -53,7 +53,8 @@ impl<R: StateReplica> VehiclePeer<R> {
     /// When a run that the vehicle has offered is to be proven, unless a frame of the current run comes in before.
     fn proof_due(&self) -> Option<Instant> {
         let timeout = self.slot_timeout().max(Contact::PROOF_TIMEOUT);
-        let pause = timeout * (1 << (self.pair.proofs().clamp(1, 3) - 1));
+        // A vehicle that repeats its hello has not received the last proof; a forged offer is silent.
+        let pause = timeout * if self.pair.owes_proof() { 1 } else { 1 << (self.pair.proofs().clamp(1, 3) - 1) };
         let again = self.contact.proved.map_or(Instant::ZERO, |at| at + pause);
         let silent = self.contact.last_received.map_or(Instant::ZERO, |at| at + timeout);
         self.pair.has_offer().then(|| again.max(silent).max(self.contact.proof_allowed))
