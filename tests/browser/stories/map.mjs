@@ -345,7 +345,7 @@ export default [
       await s.steer({ layers: true, advance: 30 });
       await s.page.getByRole("group", { name: "Use of spare capacity" }).getByRole("checkbox", { name: "curiosity" }).check();
       await s.until("the order", () => s.posts.at(-1)?.body.background?.at(-1) === "curiosity");
-      await s.until("the layer", async () => (await names()).join() === "label,age,confidence,curiosity,depth", { advance: 2 });
+      await s.until("the layer", async () => (await names()).join() === "label,natural,age,confidence,curiosity,depth", { advance: 2 });
       const cell = await someCell(s);
       await s.page.selectOption("#layer", "curiosity");
       await s.shows("#legend", /curiosity\s*up to \d bit\s*\d+ bit and more/);
