@@ -15,7 +15,10 @@ const hasWeight = (v) => shownLabels(v).some((l) => weightsOrder.value(v, l.id) 
 const utility = (v) => slotOf(v, "utility");
 const isInForce = (v) => utility(v)?.state === "applied";
 
-/** Name, instruction, and whether the step is done. */
+/** A label without an image has the button Request; the others have an image, because spare capacity brings them. */
+const requestable = (v) => shownLabels(v).some((l) => l.exemplar.url === null && ["none", "refused"].includes(l.exemplar.state));
+
+/** Name, instruction (which may depend on the vehicle), and whether the step is done. */
 const STEPS = [
   ["Look", "Each colour on the map is a label: sea floor that looks alike to the vehicle. The map grows while the vehicle surveys.",
     (v) => v.map.explored_cells >= FIRST_CELLS],
@@ -25,14 +28,16 @@ const STEPS = [
     (v) => isInForce(v) && hasWeight(v)],
   ["Steer", "The vehicle plans its path by your weights. Its next report shows the plan as a dashed line.",
     (v) => isInForce(v) && Boolean(v.status?.waypoint) && v.status.at_s > utility(v).changed_s],
-  ["Picture", "Press Request beside a label. The vehicle sends an image of that sea floor.",
+  ["Picture", (v) => (requestable(v)
+    ? "Press Request beside a label. The vehicle sends an image of that sea floor."
+    : "Click the image beside a label, then press Another. The vehicle sends one more image of that sea floor."),
     (v) => v.labels.some((l) => l.exemplar.images.some((image) => image.requested))],
 ];
 
 const lines = STEPS.map(([name, instruction]) => {
-  const state = h("span.unseen");
-  const node = h("li", {}, h("b", {}, name), " ", h("span", {}, instruction), state);
-  return { node, state };
+  const [words, state] = [h("span"), h("span.unseen")];
+  const node = h("li", {}, h("b", {}, name), " ", words, state);
+  return { node, state, refresh: (v) => text(words, typeof instruction === "string" ? instruction : instruction(v)) };
 });
 const summary = h("summary");
 const close = h("button.quiet", { type: "button", onclick: dismiss }, "Close for good");
@@ -58,7 +63,8 @@ function update() {
   const done = STEPS.map(([, , isDone]) => isDone(v));
   const next = done.indexOf(false);
   text(summary, next < 0 ? "First mission: all five steps are done" : `First mission, step ${next + 1} of 5: ${STEPS[next][0].toLowerCase()}`);
-  lines.forEach(({ node, state }, i) => {
+  lines.forEach(({ node, state, refresh }, i) => {
+    refresh(v);
     data(node, "state", done[i] ? "done" : i === next ? "next" : "later");
     text(state, done[i] ? " (done)" : "");
   });
