@@ -33,6 +33,30 @@ const audits = ["light", "dark", "red"].flatMap((theme) =>
     },
   })));
 
+const pointing = [WIDE, PHONE].flatMap((size) => ["light", "dark", "red"].map((theme) => ({
+  name: `axe finds no fault in the plate of a marked place and the natural layer: ${theme}, ${size.width} px`,
+  theme, size,
+  scenario: "rich",
+  async run(s) {
+    await s.page.selectOption("#layer", "natural");
+    const box = await s.page.locator("#chart").boundingBox();
+    const place = [box.x + 0.4 * box.width, box.y + 0.5 * box.height];
+    await s.page.mouse.click(...place);
+    await s.page.getByLabel("Text of the marker").fill("a wreck");
+    await clean(s);
+    await s.page.getByRole("button", { name: "Set marker" }).click();
+    await s.until("the marker", () => s.inPage(({ store }) => store.vehicle.markers.length > 0), { advance: 1 });
+    await s.page.mouse.click(...place);
+    await s.shows("#place", /a wreck.*marked by|marked by.*a wreck/s);
+    const remove = s.page.getByRole("button", { name: "Remove marker" });
+    await remove.focus();
+    await s.steer({ advance: 3 });
+    await s.until("a later age", async () => /marked by .* [2-9].s ago/s.test(await s.page.locator("#place").innerText()), { advance: 1 });
+    assert.ok(await remove.evaluate((button) => button === document.activeElement), "the button keeps the focus");
+    await clean(s);
+  },
+})));
+
 const editing = ["light", "dark", "red"].map((theme) => ({
   name: `axe finds no fault in a fence edit and an abort: ${theme}`,
   theme,
@@ -82,6 +106,7 @@ const stopping = [WIDE, PHONE].map((size) => ({
 export default [
   ...audits,
   ...editing,
+  ...pointing,
   ...stopping,
   {
     name: "the keys of hold and abort do nothing while a text is typed",

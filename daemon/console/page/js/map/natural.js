@@ -19,6 +19,8 @@ const NO_IMAGE = 100;
 const FULL_VEIL = 0.7;
 /** The most images that a texture is made of. */
 const MAX_IMAGES = 4;
+/** The pause before images that could not be loaded are requested again. */
+const RETRY_MS = 10_000;
 
 /** What a label looks like, by mission, vehicle, epoch and label: the addresses of its images, and once they are loaded their mean
  * colour and a pattern of their texture. */
@@ -46,7 +48,10 @@ export function loadLooks(vehicle) {
 async function load(look, id) {
   const loaded = await Promise.allSettled(look.key.split(" ").map(pixelsOf));
   const pixels = loaded.filter((l) => l.status === "fulfilled").map((l) => l.value);
-  if (pixels.length === 0) return;
+  if (pixels.length === 0) {
+    setTimeout(() => (look.key = null), RETRY_MS);
+    return;
+  }
   look.mean = meanOf(pixels);
   const woven = weave(pixels, look.mean, id);
   const texture = canvasOf(woven.width, woven.height, (c) => c.putImageData(new ImageData(woven.data, woven.width, woven.height), 0, 0));
@@ -105,9 +110,8 @@ export class NaturalOver {
     for (const [label, path] of this.#paths.get(tile)) {
       const pattern = this.highlight === null || this.highlight === label ? lookOf(vehicle, label)?.pattern : null;
       if (!pattern) continue;
-      const scale = 1 / PX_PER_CELL;
       // The texture continues from tile to tile.
-      pattern.setTransform(new DOMMatrix([scale, 0, 0, scale, -tile.column * EDGE, tile.row * EDGE]));
+      pattern.setTransform(new DOMMatrix([1 / PX_PER_CELL, 0, 0, 1 / PX_PER_CELL, -tile.column * EDGE, tile.row * EDGE]));
       c.fillStyle = pattern;
       c.fill(path);
     }

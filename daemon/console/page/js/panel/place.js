@@ -23,8 +23,6 @@ const error = h("p.error", { role: "alert" });
 const plate = h("section.plate", { id: "place", hidden: true, "aria-labelledby": "place-title" },
   h("header", {}, title, h("button.quiet", { type: "button", onclick: clearPlace, "aria-label": "Close the place" }, "\u00d7")),
   facts, images, marked, form, error);
-/** What the plate shows, so that it is built again only when that changes. */
-let shown = "";
 
 export function startPlace() {
   $("stage").append(plate);
@@ -69,14 +67,25 @@ function refresh() {
   set.disabled = denied !== null || !store.connected;
   set.title = denied ?? "";
   form.hidden = marker !== null;
-  const lines = cell ? [`received ${cell.ageS === null ? "at an unknown time" : `${span(cell.ageS)} ago`}`, ...cell.layers.map((l) => `${l.name} ${layerText(l)}`)] : ["unexplored"];
+  fill(facts, label && labelLine(label), ...linesOf(cell, marker).map((line) => h("p", {}, line)));
   const pictures = label?.exemplar.images.slice(-MAX_IMAGES).reverse() ?? [];
-  const now = JSON.stringify([lines, label?.id, label && nameOf(label.id), pictures.map((i) => [i.url, i.at_s]), marker, marker && ago(ageOf(marker.at_s))]);
-  if (now === shown) return;
-  shown = now;
-  fill(facts, label && labelLine(label), ...lines.map((line) => h("p", {}, line)));
-  fill(images, ...pictures.map((i) => picture(label, i)));
-  fill(marked, marker && markerPart(marker));
+  // Buttons are replaced only when they change: one of them may have the focus.
+  renew(images, [label && nameOf(label.id), pictures.map((i) => [i.url, i.at_s])], () => pictures.map((i) => picture(label, i)));
+  renew(marked, [marker, denied], () => (marker ? [markerPart(marker, denied)] : []));
+}
+
+/** The lines of text about the place. */
+function linesOf(cell, marker) {
+  const age = cell?.ageS === null ? "at an unknown time" : `${span(cell?.ageS)} ago`;
+  const lines = cell ? [`received ${age}`, ...cell.layers.map((l) => `${l.name} ${layerText(l)}`)] : ["unexplored"];
+  return marker ? [...lines, `marked by ${marker.author}, ${ago(ageOf(marker.at_s))}`] : lines;
+}
+
+function renew(node, facts, make) {
+  const key = JSON.stringify(facts);
+  if (node.dataset.key === key) return;
+  node.dataset.key = key;
+  fill(node, ...make());
 }
 
 function labelLine(label) {
@@ -89,9 +98,9 @@ const picture = (label, image) =>
   h("button.image", { type: "button", "aria-label": `Images of ${nameOf(label.id)}`, onclick: () => viewExemplars(label) },
     h("img", { alt: "", width: 44, height: 44, src: `${image.url}?at=${image.at_s}` }));
 
-function markerPart(marker) {
-  const remove = h("button", { type: "button", disabled: denial("record") !== null, onclick: () => take(marker) }, "Remove marker");
-  return h("div", {}, h("p", {}, h("b", {}, marker.text)), h("p.note", {}, `${marker.author}, ${ago(ageOf(marker.at_s))}`), remove);
+function markerPart(marker, denied) {
+  const remove = h("button", { type: "button", disabled: denied !== null, onclick: () => take(marker) }, "Remove marker");
+  return h("div", {}, h("p", {}, h("b", {}, marker.text)), remove);
 }
 
 async function mark(event) {
