@@ -24,6 +24,8 @@ ORDERS = {
     "set_settings": {"planner": "greedy", "gamma": 1e-5, "cells": "coarse-to-fine", "layers": "depth", "alpha": 0},
     "change_command": {"action": "take"},
     "add_note": {"text": "a wreck"},
+    "add_marker": {"x_m": 12.5, "y_m": -3, "text": "a wreck"},
+    "remove_marker": {"number": 1},
     "dismiss_earlier_map": {},
     "set_budget": {"budget_bps": 9000, "shares": {"directive": 10, "status": 5, "fix": 5, "map": 50, "exemplar": 20}},
 }
