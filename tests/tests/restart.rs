@@ -177,13 +177,17 @@ fn a_removed_folder_stops_no_surface() {
     let mut surface = pair.surface();
     let _vehicle = pair.vehicle();
     wait_until("a map", LIMIT, || pair.auv()["map"]["explored_cells"].as_u64() > Some(20));
-    std::fs::remove_dir_all(pair.dir.join("asv")).unwrap();
-    std::fs::write(pair.dir.join("asv"), "in the way of the folder").unwrap();
+    let folder = pair.dir.join("asv");
+    // The surface writes meanwhile, and makes the folder again.
+    wait_until("a file is in the way of the folder", LIMIT, || {
+        let _ = std::fs::remove_dir_all(&folder);
+        std::fs::write(&folder, "in the way of the folder").is_ok()
+    });
     let storage = || pair.state().map_or(Value::Null, |state| state["storage"].clone());
     wait_until("the page reports the disk", LIMIT, || !storage()["failing"].is_null());
     assert!(storage()["write_errors"].as_u64() > Some(0));
     pair.post("vehicles/1/notes", r#"{"text": "written in memory"}"#);
-    std::fs::remove_file(pair.dir.join("asv")).unwrap();
+    std::fs::remove_file(folder).unwrap();
     wait_until("the files are written again", LIMIT, || storage()["failing"].is_null());
     surface.kill();
     let _surface = pair.surface();
