@@ -1,5 +1,6 @@
 //! The fence: where the vehicle may be.
 
+use super::outline::{point_at, put_outline, step_to, take_outline};
 use super::polygon::{Polygon, PolygonFault};
 use crate::bytes::{BitReader, BitWriter, DecimetreStep, take_width, width_of};
 use crate::coordinates::DecimetrePoint;
@@ -170,40 +171,6 @@ impl Fence {
         }
         bits.rest_of_bytes().filter(|rest| rest.is_empty()).map(|_| read)
     }
-}
-
-fn put_outline(bits: &mut BitWriter, outline: &Polygon, anchor: DecimetrePoint, is_first: bool) {
-    let vertices = outline.0.get(..Polygon::MAX_VERTICES).unwrap_or(&outline.0);
-    let before = std::iter::once(anchor).chain(vertices.iter().copied());
-    let steps = vertices.iter().zip(before).map(|(&v, b)| step_to(v).since(step_to(b)));
-    let steps: Vec<DecimetreStep> = steps.skip(usize::from(is_first)).collect();
-    let width = width_of(steps.iter().copied());
-    bits.put((vertices.len() as u64).saturating_sub(3), 5);
-    bits.put(u64::from(width), 5);
-    steps.into_iter().for_each(|step| step.put(bits, width));
-}
-
-fn take_outline(bits: &mut BitReader<'_>, anchor: DecimetreStep, is_first: bool) -> Option<Polygon> {
-    let n = bits.take(5)? + 3;
-    let width = take_width(bits)?;
-    let mut vertices = Vec::with_capacity(n as usize);
-    if is_first {
-        vertices.push(anchor);
-    }
-    while (vertices.len() as u64) < n {
-        let before = vertices.last().copied().unwrap_or(anchor);
-        vertices.push(before.plus(DecimetreStep::take(bits, width)?));
-    }
-    Some(Polygon(vertices.into_iter().map(point_at).collect()))
-}
-
-/// The step from the origin to a point.
-fn step_to(point: DecimetrePoint) -> DecimetreStep {
-    DecimetreStep { x_dm: point.east_dm, y_dm: point.north_dm }
-}
-
-fn point_at(step: DecimetreStep) -> DecimetrePoint {
-    DecimetrePoint { east_dm: step.x_dm, north_dm: step.y_dm }
 }
 
 #[cfg(test)]

@@ -8,8 +8,20 @@ use std::collections::BTreeMap;
 const CRC: Crc<u16> = Crc::<u16>::new(&CRC_16_IBM_3740);
 
 /// The slots of which a vehicle reports the content in force.
-pub const REPORTED_SLOTS: [SlotId; 5] =
-    [SlotId::Utility, SlotId::Settings, SlotId::Budget, SlotId::Limits, SlotId::Fence];
+pub const REPORTED_SLOTS: [SlotId; 7] = [
+    SlotId::Utility,
+    SlotId::Settings,
+    SlotId::Budget,
+    SlotId::Limits,
+    SlotId::Fence,
+    SlotId::Destination,
+    SlotId::Areas,
+];
+
+/// The place of a slot among [`REPORTED_SLOTS`], which stands for it in summaries and parts.
+fn place_of(id: SlotId) -> Option<u8> {
+    REPORTED_SLOTS.iter().position(|&reported| reported == id).map(|place| place as u8)
+}
 
 /// A value for each of [`REPORTED_SLOTS`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -39,12 +51,14 @@ impl<T> PerSlot<T> {
 
 impl Slot {
     /// The payload in the form in which it is in force; `None` if this order leaves no content in force: limits without
-    /// a limit, a fence without an outline and a return point, settings that are all as configured.
+    /// a limit, a fence without an outline and a return point, settings that are all as configured, no destination, no area.
     pub fn in_force(self) -> Option<Self> {
         let is_empty = match &self {
             Self::Limits(limits) => *limits == Default::default(),
             Self::Fence(fence) => *fence == Default::default(),
             Self::Settings(settings) => settings.to_bytes() == [0, 0],
+            Self::Destination(destination) => destination.place.is_none(),
+            Self::Areas(areas) => areas.0.is_empty(),
             Self::Utility(_) | Self::Budget(_) => false,
             Self::Constraints(_) | Self::Requests(_) | Self::Fix(_) => true,
         };
@@ -86,16 +100,15 @@ impl InForceDigests {
 
     /// The summary that a report carries.
     pub fn summary(&self) -> InForceSummary {
-        let present = self.iter().filter(|(_, digest)| **digest != 0);
-        let slots = present.fold(0, |bits, (id, _)| bits | 0x80 >> id.index());
+        let slots = (0..).zip(&self.0).fold(0, |bits, (place, digest)| bits | u8::from(*digest != 0) << (7 - place));
         InForceSummary { slots, digest: CRC.checksum(&self.encode()) }
     }
 
     /// The payload of an inquiry.
     ///
     /// ```text
-    /// 2 bytes each: the digest of the content that the surface holds of utility, settings, budget, limits, fence;
-    ///               0: it holds none
+    /// 2 bytes each: the digest of the content that the surface holds of utility, settings, budget, limits, fence,
+    ///               destination, areas; 0: it holds none
     /// after them:   reserved for later versions; skipped
     /// ```
     #[must_use]
@@ -118,9 +131,9 @@ impl InForceDigests {
 ///
 /// ```text
 /// byte  bits  field
-///  0    8     slots with content in force, a bit each, the first slot in the highest bit; only utility, settings, budget,
-///             limits and fence have one
-///  1-2  16    CRC-16/IBM-3740 over the digests of these five slots in this order, 2 bytes each, 0 for no content
+///  0    7     slots with content in force, a bit each: utility, settings, budget, limits, fence, destination, areas
+///  0    1     reserved, 0
+///  1-2  16    CRC-16/IBM-3740 over the digests of these seven slots in this order, 2 bytes each, 0 for no content
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct InForceSummary {
@@ -134,7 +147,7 @@ impl InForceSummary {
 
     /// Whether a slot has content in force.
     pub fn has(self, id: SlotId) -> bool {
-        self.slots & 0x80 >> id.index() != 0
+        place_of(id).is_some_and(|place| self.slots & 0x80 >> place != 0)
     }
 
     pub(crate) fn encode(self, out: &mut Vec<u8>) {
@@ -142,11 +155,10 @@ impl InForceSummary {
         out.extend_from_slice(&self.digest.to_be_bytes());
     }
 
-    /// `None` stands for a slot whose content is not reported.
+    /// `None` stands for a reserved bit that is set.
     pub(crate) fn decode(r: &mut Reader<'_>) -> Result<Option<Self>, Truncated> {
         let read = Self { slots: r.u8()?, digest: r.u16()? };
-        let known = REPORTED_SLOTS.iter().fold(0u8, |bits, id| bits | 0x80 >> id.index());
-        Ok((read.slots & !known == 0).then_some(read))
+        Ok((read.slots & 1 == 0).then_some(read))
     }
 }
 
@@ -154,7 +166,7 @@ impl InForceSummary {
 ///
 /// ```text
 /// byte  bits  field
-///  0    3     slot
+///  0    3     slot: 0 utility, 1 settings, 2 budget, 3 limits, 4 fence, 5 destination, 6 areas
 ///  0    1     whether this part is the last
 ///  0    4     reserved, 0
 ///  1-2  16    digest of the whole content
@@ -184,7 +196,7 @@ impl<'a> InForcePart<'a> {
     /// The bytes of the payload.
     #[must_use]
     pub fn encode(&self) -> Vec<u8> {
-        let mut out = vec![(self.id.index() as u8) << 5 | u8::from(self.is_last) << 4];
+        let mut out = vec![place_of(self.id).unwrap_or_default() << 5 | u8::from(self.is_last) << 4];
         out.extend_from_slice(&self.digest.to_be_bytes());
         out.extend_from_slice(&self.first.to_be_bytes());
         out.extend_from_slice(self.bytes);
@@ -195,12 +207,13 @@ impl<'a> InForcePart<'a> {
     pub fn decode(bytes: &'a [u8]) -> Result<Self, Truncated> {
         let mut r = Reader::new(bytes);
         let head = r.u8()?;
-        let id = SlotId::ALL.get(usize::from(head >> 5)).copied().filter(|_| head & 15 == 0).ok_or(Truncated)?;
+        let id = REPORTED_SLOTS.get(usize::from(head >> 5)).copied().filter(|_| head & 15 == 0).ok_or(Truncated)?;
         let (digest, first) = (r.u16()?, r.u16()?);
         let bytes = r.take(r.rest().len())?;
-        let is_sound = REPORTED_SLOTS.contains(&id) && !bytes.is_empty();
         let is_short = usize::from(first) + bytes.len() <= Self::MAX_CONTENT;
-        (is_sound && is_short).then_some(Self { id, digest, first, is_last: head & 16 != 0, bytes }).ok_or(Truncated)
+        (is_short && !bytes.is_empty())
+            .then_some(Self { id, digest, first, is_last: head & 16 != 0, bytes })
+            .ok_or(Truncated)
     }
 }
 
@@ -252,16 +265,16 @@ mod tests {
     #[test]
     fn golden_bytes_of_content_in_force() {
         let mut contents = PerSlot::<Option<Slot>>::default();
-        assert_eq!(InForceDigests::of(&contents).summary(), InForceSummary { slots: 0, digest: 0xE139 });
+        assert_eq!(InForceDigests::of(&contents).summary(), InForceSummary { slots: 0, digest: 0xA96A });
         *contents.get_mut(SlotId::Utility).unwrap() = Some(utility(2));
         *contents.get_mut(SlotId::Limits).unwrap() =
             Some(Slot::Limits(Limits { time_s: Some(60), ..Limits::default() }));
         let digests = InForceDigests::of(&contents);
         let (mut summary, bytes) = (Vec::new(), digests.encode());
         digests.summary().encode(&mut summary);
-        assert_eq!((summary[0], InForceDigests::decode(&bytes)), (0b1000_0010, Ok(digests)));
+        assert_eq!((summary[0], InForceDigests::decode(&bytes)), (0b1001_0000, Ok(digests)));
         let part = InForcePart { id: SlotId::Fence, digest: 0xBEEF, first: 300, is_last: true, bytes: &[7, 8] };
-        assert_eq!(part.encode(), [0xF0, 0xBE, 0xEF, 1, 44, 7, 8]);
+        assert_eq!(part.encode(), [0x90, 0xBE, 0xEF, 1, 44, 7, 8]);
         assert_eq!(InForcePart::decode(&part.encode()), Ok(part));
     }
 

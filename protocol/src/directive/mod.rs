@@ -1,14 +1,17 @@
 //! The directive: the operator's orders to a vehicle, as independent versioned slots.
 
+mod areas;
 mod budget;
 mod choices;
 mod constraints;
 mod decision;
+mod destination;
 mod fence;
 mod fix;
 mod in_force;
 mod limits;
 mod outbox;
+mod outline;
 mod polygon;
 mod requests;
 mod series;
@@ -16,10 +19,12 @@ mod settings;
 mod short_decimal;
 mod utility;
 
+pub use areas::{Areas, AreasFault, WeightedArea};
 pub use budget::Budget;
 pub use choices::{AtEnd, CellBand, Change, PlannerKind};
 pub use constraints::Constraints;
 pub use decision::{SlotReport, SlotState};
+pub use destination::Destination;
 pub use fence::{Fence, FenceFault};
 pub use fix::Fix;
 pub(crate) use in_force::InForceAssembly;
@@ -38,7 +43,7 @@ use crate::bytes::{Reader, Truncated};
 use crate::schedule::Class;
 
 /// The number of slots of the directive.
-pub const SLOTS: usize = 8;
+pub const SLOTS: usize = 10;
 
 /// A slot of the directive; a newer version supersedes the older one of the same slot only.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -59,6 +64,10 @@ pub enum SlotId {
     Limits,
     /// The outline of the survey area, and keep-outs.
     Fence,
+    /// The place to which the vehicle goes at once.
+    Destination,
+    /// Weighted areas.
+    Areas,
 }
 
 impl SlotId {
@@ -72,11 +81,22 @@ impl SlotId {
         Self::Fix,
         Self::Limits,
         Self::Fence,
+        Self::Destination,
+        Self::Areas,
     ];
 
     /// The index in [`Self::ALL`], which is the number on the wire.
     pub fn index(self) -> usize {
         self as usize
+    }
+
+    /// The first byte of the slot on the wire: the low three bits of its number, then the high five.
+    fn to_head(self) -> u8 {
+        (self as u8).rotate_right(3)
+    }
+
+    fn of_head(head: u8) -> Option<Self> {
+        Self::ALL.get(usize::from(head.rotate_left(3))).copied()
     }
 
     /// The class that its bytes count as.
@@ -86,7 +106,7 @@ impl SlotId {
 
     /// Whether a vehicle that applies it plans its path again.
     pub fn steers(self) -> bool {
-        matches!(self, Self::Utility | Self::Constraints | Self::Settings | Self::Limits | Self::Fence)
+        !matches!(self, Self::Budget | Self::Requests | Self::Fix)
     }
 
     /// The name for people and in the API.
@@ -100,6 +120,8 @@ impl SlotId {
             Self::Fix => "fix",
             Self::Limits => "limits",
             Self::Fence => "fence",
+            Self::Destination => "destination",
+            Self::Areas => "areas",
         }
     }
 }
@@ -189,6 +211,10 @@ pub enum Slot {
     Limits(Limits),
     /// Fence, keep-outs and return point.
     Fence(Fence),
+    /// A place to go to at once.
+    Destination(Destination),
+    /// Weighted areas.
+    Areas(Areas),
 }
 
 impl Slot {
@@ -203,6 +229,8 @@ impl Slot {
             Self::Fix(_) => SlotId::Fix,
             Self::Limits(_) => SlotId::Limits,
             Self::Fence(_) => SlotId::Fence,
+            Self::Destination(_) => SlotId::Destination,
+            Self::Areas(_) => SlotId::Areas,
         }
     }
 
@@ -216,6 +244,8 @@ impl Slot {
             Self::Fix(v) => v.encode(out),
             Self::Limits(v) => out.extend(v.to_bytes()),
             Self::Fence(v) => out.extend(v.to_bytes()),
+            Self::Destination(v) => v.encode(out),
+            Self::Areas(v) => out.extend(v.to_bytes()),
         }
     }
 
@@ -229,6 +259,8 @@ impl Slot {
             SlotId::Fix => Self::Fix(Fix::decode(r)?),
             SlotId::Limits => Self::Limits(Limits::from_bytes(r.take(r.rest().len())?).ok_or(Truncated)?),
             SlotId::Fence => Self::Fence(Fence::from_bytes(r.take(r.rest().len())?).ok_or(Truncated)?),
+            SlotId::Destination => Self::Destination(Destination::decode(r)?),
+            SlotId::Areas => Self::Areas(Areas::from_bytes(r.take(r.rest().len())?).ok_or(Truncated)?),
         })
     }
 }
@@ -239,11 +271,11 @@ impl Slot {
 ///  0                   1                   2                   3
 ///  0 1 2 3 4 5 6 7 8 9 0 1 2 3 4 5 6 7 8 9 0 1 2 3 4 5 6 7 8 9 0 1
 /// +-----+---------+-------------------------------+---------------
-/// |slot |0 0 0 0 0| version                       | payload ...
+/// | low | high    | version                       | payload ...
 /// +-----+---------+-------------------------------+---------------
 /// ```
-/// The version counts in the series of the surface ([`Series`]), which its hello names. A slot of which one of
-/// the five bits after its number is 1 belongs to a later version of the wire, and is skipped.
+/// The number of the slot is `8 high + low`, 0 to 9; a slot with another number belongs to a later version of the wire, and
+/// is skipped. The version counts in the series of the surface ([`Series`]), which its hello names.
 ///
 /// ```
 /// use scenecast_protocol::directive::{Constraints, Slot, VersionedSlot};
@@ -267,7 +299,7 @@ impl VersionedSlot {
     /// The bytes of `slot` at `version`.
     #[must_use]
     pub fn encode(version: u16, slot: &Slot) -> Vec<u8> {
-        let mut out = vec![(slot.id() as u8) << 5];
+        let mut out = vec![slot.id().to_head()];
         out.extend_from_slice(&version.to_be_bytes());
         slot.encode_payload(&mut out);
         out
@@ -277,7 +309,7 @@ impl VersionedSlot {
     pub fn decode(bytes: &[u8]) -> Result<Self, Truncated> {
         let mut r = Reader::new(bytes);
         let head = r.u8()?;
-        let id = SlotId::ALL.get(usize::from(head >> 5)).copied().filter(|_| head & 31 == 0).ok_or(Truncated)?;
+        let id = SlotId::of_head(head).ok_or(Truncated)?;
         let version = r.u16()?;
         let content = Slot::decode_payload(id, &mut r).ok().filter(|_| r.rest().is_empty());
         Ok(Self { id, version, content })

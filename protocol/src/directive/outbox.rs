@@ -19,6 +19,13 @@ pub enum OrderStatus {
     Refused(RefusalReason),
 }
 
+impl OrderStatus {
+    /// Whether the vehicle's decision is not known yet.
+    pub fn is_pending(self) -> bool {
+        matches!(self, Self::Queued | Self::OnAir | Self::Received)
+    }
+}
+
 /// The latest version of a slot, and how far it has come.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SlotProgress {

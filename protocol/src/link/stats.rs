@@ -94,6 +94,11 @@ impl LinkStats {
         *self.dropped.entry(reason).or_default() += 1;
     }
 
+    /// The number of received frames that were dropped, for any reason.
+    pub fn dropped_total(&self) -> u64 {
+        self.dropped.values().sum()
+    }
+
     /// Frames that were refused because they were not authentic.
     pub fn refused(&self) -> u64 {
         self.dropped.get(&DropReason::Unauthenticated).copied().unwrap_or_default()

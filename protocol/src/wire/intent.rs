@@ -6,11 +6,11 @@ use super::status::StatusError;
 ///
 /// ```text
 /// byte  bits  field   range
-///  0    8     kind    0 unseen floor, 1 curiosity, 2 label
-///  1    8     label   1..254; only after kind 2
+///  0    8     kind    0 unseen floor, 1 curiosity, 2 label, 3 destination, 4 weighted area
+///  1    8     number  of the label, 1..254, after kind 2; of the area, 1..4, after kind 4
 /// ```
 ///
-/// Source: vehicle, in the frame of a pose and before it, while it surveys by an adaptive planner.
+/// Source: vehicle, in the frame of a pose and before it, while it surveys by an adaptive planner or goes to a destination.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Intent {
     /// Floor that the camera has not seen yet.
@@ -19,6 +19,10 @@ pub enum Intent {
     Curiosity,
     /// More of a label, where it is seen or expected.
     Label(u8),
+    /// The place to which the operator has ordered the vehicle.
+    Destination,
+    /// The weighted area with this number, from 1.
+    Area(u8),
 }
 
 impl Intent {
@@ -28,6 +32,8 @@ impl Intent {
             Self::Unseen => vec![0],
             Self::Curiosity => vec![1],
             Self::Label(label) => vec![2, label],
+            Self::Destination => vec![3],
+            Self::Area(number) => vec![4, number],
         }
     }
 
@@ -37,7 +43,9 @@ impl Intent {
             [0] => Ok(Self::Unseen),
             [1] => Ok(Self::Curiosity),
             [2, label @ 1..=254] => Ok(Self::Label(label)),
-            [0..=2] | [] | [_, _, ..] => Err(StatusError::Length),
+            [3] => Ok(Self::Destination),
+            [4, number @ 1..=4] => Ok(Self::Area(number)),
+            [0..=4] | [] | [_, _, ..] => Err(StatusError::Length),
             [_] => Err(StatusError::BadField),
         }
     }
@@ -54,11 +62,13 @@ mod tests {
             (Intent::Curiosity, &[1]),
             (Intent::Label(1), &[2, 1]),
             (Intent::Label(254), &[2, 254]),
+            (Intent::Destination, &[3]),
+            (Intent::Area(4), &[4, 4]),
         ] {
             assert_eq!(intent.encode(), bytes);
             assert_eq!(Intent::decode(bytes), Ok(intent));
         }
-        for bytes in [&[][..], &[2], &[3], &[0, 0], &[2, 0], &[2, 255], &[2, 1, 0]] {
+        for bytes in [&[][..], &[2], &[4], &[5], &[0, 0], &[3, 0], &[4, 0], &[4, 5], &[2, 0], &[2, 255], &[2, 1, 0]] {
             assert!(Intent::decode(bytes).is_err(), "{bytes:?}");
         }
     }

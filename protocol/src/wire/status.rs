@@ -109,8 +109,9 @@ impl ModeReason {
 ///  4-5  16    budget in force       bits a second: 12 bits of value, then 4 bits by how many it is shifted left
 ///  6    8     frames refused for want of authenticity, 255 = that or more
 ///  7-8  16    backlog, see `Backlog`
-///  9    8     slots in this report, a bit each, the first slot in the highest bit
-/// 10..  8     version of each of them, low 8 bits
+///  9-10 10    slots in this report, a bit each, the first slot in the highest bit
+/// 10    6     reserved, 0
+/// 11..  8     version of each of them, low 8 bits
 /// then  4     decision about each of them: 1 applied, 2..11 refusal reason, 15 pending; any other value is refused; after an odd number,
 ///             4 bits 0
 /// 3 more      [summary of the content in force, see `InForceSummary`]
@@ -210,9 +211,12 @@ fn decode_rate(code: u16) -> u32 {
     u32::from(code >> 4) << (code & 15)
 }
 
+/// The bit of the first slot in a report.
+const FIRST_SLOT: u16 = 0x8000;
+
 impl VehicleStatus {
     /// Length of a report without slots in bytes.
-    const REPORT_HEAD: usize = 8 + Backlog::BYTES;
+    const REPORT_HEAD: usize = 9 + Backlog::BYTES;
     /// Length of a pose with a waypoint, without a path, in bytes.
     pub(crate) const POSE: usize = 21;
 
@@ -259,7 +263,7 @@ impl VehicleStatus {
         out.extend_from_slice(&code_rate(self.budget_bps).to_be_bytes());
         out.push(self.refused_frames);
         out.extend(self.backlog.encode());
-        out.push(told.iter().fold(0, |bits, (slot, _)| bits | 0x80 >> slot));
+        out.extend(told.iter().fold(0u16, |bits, (slot, _)| bits | FIRST_SLOT >> slot).to_be_bytes());
         out.extend(told.iter().map(|(_, s)| s.version_low));
         let code = |of: Option<&(usize, &SlotReport)>| of.map_or(0, |(_, s)| s.state.code());
         out.extend(told.chunks(2).map(|pair| code(pair.first()) << 4 | code(pair.get(1))));
@@ -347,11 +351,14 @@ impl VehicleStatus {
         read.budget_bps = decode_rate(r.u16()?);
         read.refused_frames = r.u8()?;
         read.backlog = Backlog::decode(&mut r)?;
-        let told = r.u8()?;
+        let told = r.u16()?;
+        if told & ((FIRST_SLOT >> (SLOTS - 1)) - 1) != 0 {
+            return Err(StatusError::BadField);
+        }
         let count = told.count_ones() as usize;
         let versions = r.take(count)?;
         let mut codes = r.take(count.div_ceil(2))?.iter().flat_map(|b| [b >> 4, b & 15]);
-        let slots = read.slots.iter_mut().enumerate().filter(|(slot, _)| told & 0x80 >> slot != 0);
+        let slots = read.slots.iter_mut().enumerate().filter(|(slot, _)| told & FIRST_SLOT >> slot != 0);
         for ((_, slot), &version_low) in slots.zip(versions) {
             let state = codes.next().and_then(SlotState::from_code).filter(|&s| s != SlotState::Unknown);
             *slot = SlotReport { version_low, state: state.ok_or(StatusError::BadField)? };

@@ -2,10 +2,11 @@
 
 use crate::document::{assert_same, pairs, rows, section};
 use crate::samples::{MISSION, auv, clock, frame, header, hold, place, status, vehicle_stamp};
-use scenecast_protocol::coordinates::{MapPoint, WorldPoint};
+use scenecast_protocol::coordinates::{DecimetrePoint, MapPoint, WorldPoint};
 use scenecast_protocol::directive::{
-    AtEnd, Band, Budget, CellBand, Change, Constraints, ExemplarRequest, ExemplarRequests, Fence, Fix, InForceDigests,
-    InForcePart, Limits, PlannerKind, Polygon, Reaction, Settings, ShortDecimal, Slot, SlotId, Utility, VersionedSlot,
+    Areas, AtEnd, Band, Budget, CellBand, Change, Constraints, Destination, ExemplarRequest, ExemplarRequests, Fence,
+    Fix, InForceDigests, InForcePart, Limits, PlannerKind, Polygon, Reaction, Settings, ShortDecimal, Slot, SlotId,
+    Utility, VersionedSlot, WeightedArea,
 };
 use scenecast_protocol::map::{
     Cell, DescriptorPart, LabelGrid, LayerChunk, LayerDescriptor, LayerId, LayerMask, LayerSet,
@@ -152,6 +153,8 @@ fn status_chunks() -> Rows {
             VehicleStatus { autopilot_silent: true, ..status() }.encode_pose(99),
         ),
         ("intent: more of label 5", Intent::Label(5).encode()),
+        ("intent: the destination", Intent::Destination.encode()),
+        ("intent: the second weighted area", Intent::Area(2).encode()),
         ("trail to (1, -2) m: 9 s ago at (2.4, -3.4), 12 s ago at (-0.6, -3.4)", trail.encode()),
         (
             "report: epoch 1, 9 labels, digest BEEF, budget 10 000 bit/s (2500 x 2^2), 3 frames refused, 448 bytes of labels (14 x 2^5) \
@@ -225,6 +228,11 @@ fn orders() -> Rows {
         keep_outs: vec![outline(&[(10, 10), (15, 10), (10, 18)])],
         return_point: Some(place(2, 3)),
     };
+    let destination = Destination { place: Some(DecimetrePoint::new(1200, -3)) };
+    let areas = Areas(vec![
+        WeightedArea { outline: outline(&[(10, 5), (30, 5), (30, 20)]), weight: 60 },
+        WeightedArea { outline: outline(&[(0, 0), (4, 0), (0, 4)]), weight: -20 },
+    ]);
     vec![
         (
             "slot: version 4, utility: epoch 1, unseen 20, perplexity 0, label 3: 80, label 5: -20",
@@ -235,6 +243,11 @@ fn orders() -> Rows {
         (
             "slot: version 6, limits: depth 5 to 40 m, 3000 m, silence 600 s, on silence return",
             slot(6, Slot::Limits(limits)),
+        ),
+        ("slot: version 5, destination: (120, -0.3) m", slot(5, Slot::Destination(destination))),
+        (
+            "slot: version 6, areas: (10, 5), (30, 5), (30, 20) m with weight 60, (0, 0), (4, 0), (0, 4) m with -20",
+            slot(6, Slot::Areas(areas)),
         ),
         (
             "slot: version 7, fence: (0, 0), (40, 0), (40, 30), (0, 30) m, keep-out (10, 10), (15, 10), \

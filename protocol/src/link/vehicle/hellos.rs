@@ -14,6 +14,8 @@ pub(super) struct HelloLimit {
     admitted: Option<Instant>,
     /// How often a hello is still repeated while the surface does not use the offered run.
     repeats: u32,
+    /// When it is repeated next.
+    next_repeat: Option<Instant>,
 }
 
 impl HelloLimit {
@@ -22,9 +24,10 @@ impl HelloLimit {
     /// Hellos within this time are copies of one.
     const COPIES: Duration = Duration::from_millis(1500);
     const REPEATS: u32 = 3;
+    const REPEAT_INTERVAL: Duration = Duration::from_secs(10);
 
     pub(super) fn new(now: Instant) -> Self {
-        Self { left: Self::MAX_ANSWERS, since: now, admitted: None, repeats: 0 }
+        Self { left: Self::MAX_ANSWERS, since: now, admitted: None, repeats: 0, next_repeat: None }
     }
 
     /// Whether a hello that came in may be answered.
@@ -48,12 +51,27 @@ impl HelloLimit {
 
     /// The surface uses the current run, so a hello that names another one is not repeated.
     pub(super) fn handle_numbered(&mut self) {
-        self.repeats = 0;
+        (self.repeats, self.next_repeat) = (0, None);
     }
 
-    /// Whether the last answer may be repeated.
-    pub(super) fn repeat(&mut self) -> bool {
-        self.repeats.checked_sub(1).map(|left| self.repeats = left).is_some()
+    /// An answer was written.
+    pub(super) fn note_answer(&mut self, now: Instant) {
+        self.next_repeat = (self.repeats > 0).then(|| now + Self::REPEAT_INTERVAL);
+    }
+
+    /// When the last answer is to be repeated, whatever else goes out meanwhile.
+    pub(super) fn next_repeat(&self) -> Option<Instant> {
+        self.next_repeat
+    }
+
+    /// Whether the last answer is repeated now.
+    pub(super) fn repeat(&mut self, now: Instant) -> bool {
+        let is_due = self.next_repeat.is_some_and(|at| now >= at);
+        if is_due {
+            self.repeats -= 1;
+            self.next_repeat = None;
+        }
+        is_due
     }
 }
 
@@ -69,5 +87,23 @@ mod tests {
         let admitted = (0..1000).filter(|&i| limit.admit(at(i * 100))).count();
         assert_eq!(admitted, 8 + 33);
         assert!(limit.admit(at(1_000_000)), "after a pause");
+    }
+
+    #[test]
+    fn an_answer_is_repeated_three_times_until_a_numbered_frame_comes_in() {
+        let begin = Instant::from_secs_f64(100.0);
+        let mut limit = HelloLimit::new(begin);
+        let repeats = |limit: &mut HelloLimit| {
+            assert!(limit.admit(begin));
+            limit.note_answer(begin);
+            let times = (1..100).map(|s| begin + Duration::from_secs(s));
+            times.filter(|&now| limit.repeat(now).then(|| limit.note_answer(now)).is_some()).count()
+        };
+        assert_eq!(repeats(&mut limit), 3);
+        let mut limit = HelloLimit::new(begin);
+        assert!(limit.admit(begin));
+        limit.note_answer(begin);
+        limit.handle_numbered();
+        assert_eq!(limit.next_repeat(), None);
     }
 }

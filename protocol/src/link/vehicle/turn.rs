@@ -90,7 +90,8 @@ impl<S: StateSource> VehicleLink<S> {
         if !matches!(self.config.modem.access, Access::ModemOwned { .. }) {
             return true;
         }
-        let answer = self.is_answer_due(now) || self.call_reply.is_pending();
+        let is_repeat_due = self.hello_limit.next_repeat().is_some_and(|at| now >= at);
+        let answer = self.is_answer_due(now) || is_repeat_due || self.call_reply.is_pending();
         let news = self.content.backlog_bytes(&self.budget, now) > 0;
         answer || (self.pair.has_run() && (news || self.content.status.is_waiting(now)))
     }
@@ -101,7 +102,7 @@ impl<S: StateSource> VehicleLink<S> {
         }
         let status = self.content.status.next_due().filter(|_| self.pair.has_run());
         let held = self.content.next_due().filter(|_| self.pair.has_run());
-        let due = [status, held, self.answer_due].into_iter().flatten().min();
+        let due = [status, held, self.answer_due, self.hello_limit.next_repeat()].into_iter().flatten().min();
         match self.blocked_until {
             Some(blocked) => Some(due.map_or(blocked, |at| at.max(blocked))),
             None => due,
@@ -159,7 +160,7 @@ impl<S: StateSource> VehicleLink<S> {
     fn write_frame(&mut self, frames: u32, now: Instant) -> (Transmit, bool) {
         let modem = self.config.modem;
         let size = modem.frame_bytes;
-        if self.is_answer_due(now) && !self.pair.must_send_hello() && self.hello_limit.repeat() {
+        if self.hello_limit.repeat(now) {
             self.pair.repeat_hello();
         }
         let sends_hello = self.pair.must_send_hello();
@@ -197,6 +198,9 @@ impl<S: StateSource> VehicleLink<S> {
         if !sends_hello {
             let copies = (is_complete && remaining > 0).then_some(remaining);
             self.repeater.keep(self.pair.next_number() - 1, &transmit.bytes, copies);
+        }
+        if sends_hello {
+            self.hello_limit.note_answer(now);
         }
         self.answer_due = sends_hello.then(|| now + Duration::from_secs(10));
         (transmit, last && takes_turns)

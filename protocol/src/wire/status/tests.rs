@@ -37,7 +37,7 @@ fn golden_bytes_of_a_status() {
     };
     let (pose, (report, _)) = (status.encode_pose(99), status.encode_report(99, 0).unwrap());
     assert_eq!(pose, [0x22, 0, 0, 15, 0xFF, 0xFF, 0xFF, 0, 180, 64, 5, 8, 0, 0x0F, 0xA0]);
-    assert_eq!(report, [1, 9, 0xBE, 0xEF, 0x9C, 0x42, 3, 0xE5, 0xF0, 0b1000_0100, 7, 2, 0x12]);
+    assert_eq!(report, [1, 9, 0xBE, 0xEF, 0x9C, 0x42, 3, 0xE5, 0xF0, 0b1000_0100, 0, 7, 2, 0x12]);
     let mut back = VehicleStatus { waypoint: Some(MapPoint::new(1.0, 2.0)), ..VehicleStatus::default() };
     back.read_pose(&pose).unwrap();
     back.read_report(&report).unwrap();
@@ -67,31 +67,46 @@ fn golden_bytes_of_a_status() {
     back.read_report(&long).unwrap();
     assert_eq!(back, placed);
     assert_eq!(placed.encode_report(long.len() - 1, 0).unwrap(), (report.clone(), SLOTS + 1), "no room for it");
-    back.read_report(&placed.encode_report(17, SLOTS + 1).unwrap().0).unwrap();
+    back.read_report(&placed.encode_report(18, SLOTS + 1).unwrap().0).unwrap();
     assert_eq!(back, placed);
     back.read_report(&report).unwrap();
     assert_eq!(back.placement, placement, "it has not moved back");
     let in_force = Some(InForceDigests::default().summary());
     let summed = VehicleStatus { in_force, ..placed.clone() };
     let (longest, _) = summed.encode_report(99, 0).unwrap();
-    assert_eq!(longest, [&report[..], &[0, 0xE1, 0x39], &long[report.len()..]].concat());
+    assert_eq!(longest, [&report[..], &[0, 0xA9, 0x6A], &long[report.len()..]].concat());
     back.read_report(&longest).unwrap();
     assert_eq!(back, summed);
     let (part, next) = summed.encode_report(report.len() + 9, 0).unwrap();
-    assert_eq!((part, next), ([&report[..], &[0, 0xE1, 0x39]].concat(), SLOTS + 1), "the placement waits");
+    assert_eq!((part, next), ([&report[..], &[0, 0xA9, 0x6A]].concat(), SLOTS + 1), "the placement waits");
     let disk = Some(DiskReport { journal_refused: true, checkpoint_refused: false, free_bytes: Some(1 << 30) });
     let full = VehicleStatus { disk, ..summed.clone() };
     assert_eq!(full.encode_report(99, 0).unwrap(), ([&longest[..], &[0x4C]].concat(), 0));
     back.read_report(&[&longest[..], &[0x4C]].concat()).unwrap();
     assert_eq!(back, full);
     assert_eq!(full.encode_report(longest.len(), 0).unwrap(), (longest.clone(), SLOTS + 2), "the disk waits");
-    back.read_report(&full.encode_report(11, SLOTS + 2).unwrap().0).unwrap();
+    back.read_report(&full.encode_report(12, SLOTS + 2).unwrap().0).unwrap();
     assert_eq!(back, full);
     back.read_report(&report).unwrap();
     assert_eq!(back.disk, disk, "a report without it changes it not");
-    let other = [&report[..], &[0x40, 0, 0]].concat();
-    assert_eq!(back.read_report(&other), Err(StatusError::BadField), "the content of constraints is not reported");
-    assert_eq!(back.read_report(&[&report[..], &[0x80]].concat()), Err(StatusError::BadField), "the reserved bit");
+    let refusal = |back: &mut VehicleStatus, bytes: &[u8]| back.read_report(bytes).unwrap_err();
+    let other = [&report[..], &[0x01, 0, 0]].concat();
+    assert_eq!(refusal(&mut back, &other), StatusError::BadField, "a reserved bit of the summary");
+    assert_eq!(refusal(&mut back, &[&report[..], &[0x80]].concat()), StatusError::BadField, "that of the disk");
+    let eleventh = [&report[..10], &[0x20], &report[11..]].concat();
+    assert_eq!(refusal(&mut back, &eleventh), StatusError::BadField, "an eleventh slot");
+}
+
+#[test]
+fn golden_bytes_of_a_report_on_the_last_slots() {
+    let mut status = VehicleStatus::default();
+    status.slots[8] = SlotReport { version_low: 5, state: SlotState::Applied };
+    status.slots[9] = SlotReport { version_low: 6, state: SlotState::Pending };
+    let (report, _) = status.encode_report(99, 0).unwrap();
+    assert_eq!(report, [0, 0, 0, 0, 0, 0, 0, 0, 0, 0x00, 0xC0, 5, 6, 0x1F]);
+    let mut back = VehicleStatus::default();
+    back.read_report(&report).unwrap();
+    assert_eq!(back, status);
 }
 
 proptest! {
@@ -122,10 +137,10 @@ proptest! {
         let (mut received, mut first) = (VehicleStatus::default(), 0);
         for _ in 0..=SLOTS + 3 {
             let Some((bytes, next)) = status.encode_report(room, first) else {
-                prop_assert!(room < 12);
+                prop_assert!(room < 13);
                 return Ok(());
             };
-            prop_assert!(bytes.len() <= room.max(10));
+            prop_assert!(bytes.len() <= room.max(11));
             received.read_report(&bytes).unwrap();
             first = next;
             if first == 0 {
@@ -133,9 +148,9 @@ proptest! {
             }
         }
         // An item without room in a report of its own is left out.
-        status.in_force = in_force.filter(|_| room >= 13);
-        status.placement = placement.filter(|_| room >= 17);
-        status.disk = disk.filter(|_| room >= 11);
+        status.in_force = in_force.filter(|_| room >= 14);
+        status.placement = placement.filter(|_| room >= 18);
+        status.disk = disk.filter(|_| room >= 12);
         prop_assert_eq!((first, received), (0, status));
     }
 

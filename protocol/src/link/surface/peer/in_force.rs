@@ -1,8 +1,8 @@
 //! The content in force at a vehicle, as far as the surface knows it.
 
 use crate::directive::{
-    InForceAssembly, InForceDigests, InForcePart, InForceSummary, OrderStatus, PerSlot, Settings, Slot, SlotId,
-    SlotProgress,
+    InForceAssembly, InForceDigests, InForcePart, InForceSummary, OrderStatus, PerSlot, REPORTED_SLOTS, Settings, Slot,
+    SlotId, SlotProgress,
 };
 use crate::link::FrameNumber;
 use crate::time::Instant;
@@ -41,9 +41,18 @@ pub(super) struct InForceCopy {
     inquiries: u32,
 }
 
+/// The content in force after an order. Settings join the earlier ones.
+fn joined(order: &Slot, before: Option<Slot>) -> Option<Slot> {
+    match (order, before) {
+        (Slot::Settings(order), Some(Slot::Settings(before))) => Slot::Settings(before.then(order)).in_force(),
+        (Slot::Settings(order), _) => Slot::Settings(Settings::default().then(order)).in_force(),
+        (slot, _) => slot.clone().in_force(),
+    }
+}
+
 impl InForceCopy {
     /// Bytes of an inquiry in a frame.
-    pub(super) const INQUIRY_BYTES: usize = 12;
+    pub(super) const INQUIRY_BYTES: usize = 2 + 2 * REPORTED_SLOTS.len();
     const FIRST_PAUSE: Duration = Duration::from_secs(15);
     /// The pause after each inquiry is twice the one before, at most 240 s.
     const MAX_DOUBLINGS: u32 = 4;
@@ -66,11 +75,7 @@ impl InForceCopy {
         if let Some(before) = self.before.get_mut(order.id).filter(|_| self.decided.get(order.id) == Some(&false)) {
             before.clone_from(held);
         }
-        *held = match (&order.slot, held.take()) {
-            (Slot::Settings(order), Some(Slot::Settings(before))) => Slot::Settings(before.then(order)).in_force(),
-            (Slot::Settings(order), _) => Slot::Settings(Settings::default().then(order)).in_force(),
-            (slot, _) => slot.clone().in_force(),
-        };
+        *held = joined(&order.slot, held.take());
         for (of_slot, is_so) in [(&mut self.decided, true), (&mut self.proved, false), (&mut self.confirmed, false)] {
             if let Some(of_slot) = of_slot.get_mut(order.id) {
                 *of_slot = is_so;
@@ -103,8 +108,14 @@ impl InForceCopy {
         self.proved = PerSlot::from_fn(|_| true);
     }
 
-    /// Takes the summary of the report in frame `number`.
-    pub(super) fn handle_report(&mut self, summary: InForceSummary, number: FrameNumber, now: Instant) {
+    /// Takes the summary of the report in frame `number`. `pending` are the orders of which no decision has come in.
+    pub(super) fn handle_report(
+        &mut self,
+        summary: InForceSummary,
+        pending: &[Slot],
+        number: FrameNumber,
+        now: Instant,
+    ) {
         if self.reported.is_some_and(|(_, before)| number <= before) {
             return;
         }
@@ -112,7 +123,7 @@ impl InForceCopy {
         self.reported = Some((summary, number));
         let decided = std::mem::take(&mut self.decided);
         let is_proved = self.digests().summary() == summary;
-        let is_equal = is_proved || self.is_unchanged(&decided, summary);
+        let is_equal = is_proved || self.is_unchanged(&decided, summary) || self.is_of_pending(pending, summary);
         let was_equal = std::mem::replace(&mut self.is_equal, is_equal);
         if !is_same || self.is_equal {
             self.confirmed = PerSlot::default();
@@ -137,6 +148,26 @@ impl InForceCopy {
             self.held = now_held;
         }
         is_unchanged
+    }
+
+    /// Whether the contents in force are those that are held with all pending orders, or with one of them; they are held
+    /// then. So an order whose decision follows in a later frame, or was reported to an earlier run of the surface, makes
+    /// nothing unknown.
+    fn is_of_pending(&mut self, pending: &[Slot], summary: InForceSummary) -> bool {
+        let sets = std::iter::once(pending).chain(pending.chunks(1)).filter(|set| !set.is_empty());
+        for set in sets {
+            let before = self.held.clone();
+            for slot in set {
+                if let Some(held) = self.held.get_mut(slot.id()) {
+                    *held = joined(slot, held.take());
+                }
+            }
+            if self.digests().summary() == summary {
+                return true;
+            }
+            self.held = before;
+        }
+        false
     }
 
     /// Takes a part of an answer in frame `number`; returns whether a content is known now that was not.
@@ -187,5 +218,34 @@ impl InForceCopy {
     pub(super) fn handle_peer_restart(&mut self) {
         let (held, proved) = (std::mem::take(&mut self.held), std::mem::take(&mut self.proved));
         *self = Self { held, proved, ..Self::default() };
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::directive::Limits;
+
+    fn limits(time_s: u32) -> Slot {
+        Slot::Limits(Limits { time_s: Some(time_s), ..Limits::default() })
+    }
+
+    fn summary(contents: &[Slot]) -> InForceSummary {
+        let of = |id| contents.iter().find(|slot| slot.id() == id).cloned();
+        InForceDigests::of(&PerSlot::from_fn(of)).summary()
+    }
+
+    #[test]
+    fn a_pending_order_that_is_in_force_makes_nothing_unknown() {
+        let (utility, now) = (Slot::Utility(Default::default()), Instant::ZERO);
+        let mut copy = InForceCopy::default();
+        copy.restore(utility.clone());
+        copy.handle_report(summary(&[utility.clone(), limits(60)]), &[limits(60)], 1, now);
+        assert_eq!(copy.get(SlotId::Utility), InForce::Known(&utility));
+        assert_eq!(copy.get(SlotId::Limits), InForce::Known(&limits(60)));
+        copy.handle_report(summary(&[utility.clone(), limits(90)]), &[limits(70)], 2, now);
+        assert_eq!(copy.get(SlotId::Limits), InForce::Unknown, "those of another surface");
+        copy.handle_report(summary(&[utility, limits(60)]), &[limits(70)], 3, now);
+        assert_eq!(copy.get(SlotId::Limits), InForce::Known(&limits(60)), "the pending one is not in force yet");
     }
 }

@@ -65,6 +65,8 @@ struct Contact {
     proof_allowed: Instant,
     /// Hellos since the last answer.
     hellos: u32,
+    /// Dropped frames up to the last hello.
+    dropped: u64,
     /// No frame of the current run has come in since the last turn in it.
     is_doubtful: bool,
 }
@@ -84,6 +86,7 @@ impl Contact {
             hello_admitted: None,
             proof_allowed: now,
             hellos: 0,
+            dropped: 0,
             is_doubtful: false,
         }
     }
@@ -320,7 +323,10 @@ impl<R: StateReplica> VehiclePeer<R> {
             let mut report = VehicleStatus::default();
             if report.read_report(chunk.payload).is_ok() {
                 if let Some(summary) = report.in_force {
-                    self.in_force.handle_report(summary, number, now);
+                    let is_pending = |order: &&SlotProgress| order.status.is_pending();
+                    let pending: Vec<Slot> =
+                        self.outbox.progress().filter(is_pending).map(|o| o.slot.clone()).collect();
+                    self.in_force.handle_report(summary, &pending, number, now);
                 }
                 self.outbox.leave_overtaken_series(&report.slots, number, now);
                 self.leave_refuted_series(now);

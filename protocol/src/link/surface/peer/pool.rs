@@ -37,9 +37,11 @@ impl Contact {
         silent.map_or(self.hello_due, |at| at.max(self.hello_due))
     }
 
-    /// A hello went out; the interval to the next one doubles once the vehicle has left several unanswered.
-    fn note_hello(&mut self, timeout: Duration, now: Instant) {
-        self.hellos = self.hellos.saturating_add(1);
+    /// A hello went out after `dropped` frames in all; the interval to the next one doubles once the vehicle has left
+    /// several unanswered and not even a frame came in that could not be used.
+    fn note_hello(&mut self, timeout: Duration, dropped: u64, now: Instant) {
+        let is_silent = std::mem::replace(&mut self.dropped, dropped) == dropped;
+        self.hellos = if is_silent { self.hellos.saturating_add(1) } else { 1 };
         self.hello_due = now + timeout.max(Self::PROOF_TIMEOUT) * if self.hellos < PROMPT_HELLOS { 1 } else { 2 };
     }
 }
@@ -130,7 +132,7 @@ impl<R: StateReplica> VehiclePeer<R> {
         self.contact.answer_due = (must_prove || is_partial).then_some(next);
         self.contact.acknowledged = self.pair.highest();
         if purpose.is_hello() {
-            self.contact.note_hello(timeout, now);
+            self.contact.note_hello(timeout, self.pair.stats.dropped_total(), now);
         }
         Some(ready)
     }
