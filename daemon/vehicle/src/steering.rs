@@ -8,6 +8,7 @@ mod purpose;
 mod settling_tests;
 #[cfg(test)]
 mod tests;
+mod to_place;
 mod views;
 mod worth;
 
@@ -17,9 +18,9 @@ use choice::PlannerChoice;
 use grounds::Grounds;
 use views::Views;
 
-use super::planning::{BlockValues, Bounds, CellWindow, Knowledge, Node, PlanRequest, Point, distance};
+use super::planning::{BlockValues, Bounds, CellWindow, Interest, Knowledge, Node, PlanRequest, Point, distance};
 use scenecast_core::Area;
-use scenecast_protocol::directive::{AtEnd, Fence, PlannerKind, Utility};
+use scenecast_protocol::directive::{Areas, AtEnd, Fence, PlannerKind, Utility, WeightedArea};
 use scenecast_protocol::map::{Cell, LabelGrid};
 use scenecast_protocol::wire::Intent;
 use std::collections::VecDeque;
@@ -60,6 +61,9 @@ pub struct Steering {
     choice: PlannerChoice,
     /// The end of the survey: as configured, and as ordered.
     at_end: (AtEnd, Option<AtEnd>),
+    areas: Vec<WeightedArea>,
+    /// The place to which the operator has ordered the vehicle.
+    destination: Option<Point>,
     window: CellWindow,
     known: Knowledge,
     /// The origin of the map frame in the world frame: metres east and north.
@@ -89,6 +93,8 @@ impl Steering {
             grounds: Grounds::new(area, footprint.reach(), clearance_m),
             choice: PlannerChoice::new(configured),
             at_end: (AtEnd::Explore, None),
+            areas: Vec::new(),
+            destination: None,
             window: CellWindow::new(area, cell_m),
             known: Knowledge::default(),
             map_origin: (0.0, 0.0),
@@ -148,9 +154,15 @@ impl Steering {
         self.replan();
     }
 
+    /// Puts weighted areas in force that were checked.
+    pub fn set_areas(&mut self, areas: Areas) {
+        self.areas = areas.0;
+        self.replan();
+    }
+
     /// The purpose of the plan; `None` if no adaptive planner steers, or nothing pays any more.
     pub fn intent(&self) -> Option<Intent> {
-        self.intent
+        if self.has_destination() { Some(Intent::Destination) } else { self.intent }
     }
 
     /// Drops the plan, so that the next waypoint follows a new one.
@@ -190,7 +202,7 @@ impl Steering {
     /// The next waypoint from `from`. `map` is the label map with its version, `left_m` the distance that may
     /// still be travelled in metres.
     pub fn next(&mut self, from: Point, map: (&LabelGrid, u64), utility: Option<&Utility>, left_m: f64) -> Course {
-        if self.choice.follow(utility.is_some()) {
+        if self.choice.follow(utility.is_some() || !self.areas.is_empty()) {
             self.replan();
         }
         let left_m = left_m - self.grounds.last_leg_m();
@@ -231,7 +243,7 @@ impl Steering {
         let found = self.paying_plan(from, map, utility, left_m, &present, at_end != AtEnd::Hold);
         let repeats = at_end == AtEnd::Repeat && self.choice.adapts() && found.0.is_empty();
         let begins = repeats && self.views.begin_round(self.grounds.lattice().step_m());
-        if begins && self.known.forget_looks(map, utility) {
+        if begins && self.forget_looks(map, utility) {
             // The next round begins elsewhere.
             self.views.last().into_iter().for_each(|at| self.exhaust_around(at));
             return self.paying_plan(from, map, utility, left_m, &present, false);
@@ -239,7 +251,17 @@ impl Steering {
         found
     }
 
-    /// The plan that pays by the utility or, if `may_explore`, by exploration; empty if none does.
+    /// Forgets the looks at favoured labels and in favoured areas; returns whether there were any.
+    fn forget_looks(&mut self, map: &LabelGrid, utility: &Utility) -> bool {
+        let Self { known, areas, window, map_origin, .. } = self;
+        let interest = Interest { utility, areas };
+        known.forget_looks(map, |cell, label| {
+            let (x, y) = window.centre_of(cell);
+            utility.weight(label) > 0.0 || interest.weight_of_place((x + map_origin.0, y + map_origin.1)) > 0.0
+        })
+    }
+
+    /// The plan that pays by the operator's interest or, if `may_explore`, by exploration; empty if none does.
     fn paying_plan(
         &mut self,
         from: Node,
@@ -254,18 +276,20 @@ impl Steering {
         // A negative weight is the operator's order not to explore.
         let explores = may_explore && (0..EXPLORATION).contains(&utility.exploration);
         let exploring = explores.then(|| Utility { exploration: EXPLORATION, ..utility.clone() });
-        let value =
-            |utility: &Utility| BlockValues::new(lattice, (&self.window, self.map_origin), map, &self.known, utility);
+        let value = |interest: Interest<'_>| {
+            BlockValues::new(lattice, (&self.window, self.map_origin), map, &self.known, interest)
+        };
         for utility in std::iter::once(utility).chain(&exploring) {
-            let values = value(utility);
+            let interest = Interest { utility, areas: &self.areas };
+            let values = value(interest);
             let request = PlanRequest { lattice, values: &values, from, return_paths, left_m };
             let plan = self.choice.planner_mut().plan(&request);
             if !adapts {
                 return (plan, None);
             }
             let plan = if worth::keeps(&request, present, &plan) { present.to_vec() } else { plan };
-            if worth::pays(&request, &plan, utility, (lattice.step_m() / self.window.cell_m).powi(2)) {
-                let intent = purpose::purpose(utility, |part| worth::gain(&value(part), &plan));
+            if worth::pays(&request, &plan, interest, (lattice.step_m() / self.window.cell_m).powi(2)) {
+                let intent = purpose::purpose(interest, |part| worth::gain(&value(part), &plan));
                 return (plan, intent);
             }
         }
@@ -318,27 +342,6 @@ impl Steering {
             (true, _) => Course::LimitReached,
             (false, true) => Course::Arrived,
             (false, false) => Course::NoPath,
-        }
-    }
-
-    /// The next waypoint of the return path.
-    pub fn next_return(&mut self, from: Point) -> Course {
-        self.replan();
-        let home = self.return_place();
-        if distance(from, home) <= self.arrival_m() {
-            return Course::Arrived;
-        }
-        let Some((at, end, path)) = self.grounds.return_path(from) else { return Course::NoPath };
-        if at != end && path.is_empty() {
-            return Course::NoPath;
-        }
-        let entry = self.grounds.lattice().place(at);
-        match path.first().map(|&n| self.grounds.lattice().place(n)) {
-            None if distance(from, entry) > self.arrival_m() => Course::Go(entry),
-            None if self.grounds.bounds().allows_exit(home, entry) => Course::Go(home),
-            None => Course::Arrived,
-            Some(next) if self.grounds.bounds().allows_leg(from, next) => Course::Go(next),
-            Some(_) => Course::Go(entry),
         }
     }
 

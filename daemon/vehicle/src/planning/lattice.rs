@@ -109,10 +109,14 @@ impl Lattice {
         if !bounds.holds(from) {
             return nearest(&mut open());
         }
-        let mut by_distance: Vec<Node> =
-            open().filter(|&n| distance(from, self.place(n)) <= 6.0 * self.step_m).collect();
-        by_distance.sort_by(|&a, &b| distance(from, self.place(a)).total_cmp(&distance(from, self.place(b))));
-        by_distance.into_iter().find(|&n| bounds.allows_exit(from, self.place(n)))
+        let near_m = 6.0 * self.step_m;
+        let first_reached = |mut nodes: Vec<Node>| {
+            nodes.sort_by(|&a, &b| distance(from, self.place(a)).total_cmp(&distance(from, self.place(b))));
+            nodes.into_iter().find(|&n| bounds.allows_exit(from, self.place(n)))
+        };
+        let near = open().filter(|&n| distance(from, self.place(n)) <= near_m).collect();
+        // A vehicle far from all places comes back from a destination.
+        first_reached(near).or_else(|| first_reached(open().collect()))
     }
 
     /// The places from the one after `from` up to `to`, if `to` lies in one of the eight directions

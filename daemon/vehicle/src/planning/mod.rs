@@ -4,6 +4,7 @@ mod bounds;
 mod expect;
 mod greedy;
 mod horizon;
+mod interest;
 mod lattice;
 mod lawnmower;
 mod return_gain;
@@ -13,6 +14,7 @@ pub use bounds::{Bounds, Point, distance};
 pub use expect::{Expectation, SeenLabels};
 pub use greedy::Greedy;
 pub use horizon::Horizon;
+pub use interest::Interest;
 pub use lattice::{Lattice, Node, Paths};
 pub use lawnmower::Lawnmower;
 pub use value::{BlockValues, CellWindow, Knowledge, ShownBlocks};
@@ -94,7 +96,7 @@ mod tests {
             (&CellWindow::new(AREA, 0.25), (0.0, 0.0)),
             &map,
             &Knowledge::default(),
-            &utility,
+            Interest::in_labels(&utility),
         );
         let open: Vec<Node> = (0..lattice.places()).filter(|&n| lattice.is_open(n)).collect();
         let (from, home) = (open[start % open.len()], lattice.paths(open[(start / 7) % open.len()]));

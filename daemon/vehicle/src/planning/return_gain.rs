@@ -53,7 +53,7 @@ impl ReturnGains {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{BlockValues, Bounds, CellWindow, Knowledge, Lattice};
+    use super::super::{BlockValues, Bounds, CellWindow, Interest, Knowledge, Lattice};
     use super::*;
     use scenecast_core::Area;
     use scenecast_protocol::directive::Utility;
@@ -69,7 +69,13 @@ mod tests {
         };
         let map: LabelGrid = (0..56).flat_map(|y| (0..80).map(move |x| cell(x, y))).collect();
         let utility = Utility { weights: [(1, 100)].into_iter().collect(), ..Utility::default() };
-        BlockValues::new(lattice, (&CellWindow::new(AREA, 0.25), (0.0, 0.0)), &map, &Knowledge::default(), &utility)
+        BlockValues::new(
+            lattice,
+            (&CellWindow::new(AREA, 0.25), (0.0, 0.0)),
+            &map,
+            &Knowledge::default(),
+            Interest::in_labels(&utility),
+        )
     }
 
     #[test]

@@ -2,8 +2,8 @@
 
 use super::bounds::Point;
 use super::expect::{Expectation, SeenLabels};
+use super::interest::Interest;
 use super::lattice::{Lattice, Node};
-use scenecast_protocol::directive::Utility;
 use scenecast_protocol::map::{Cell, LabelGrid};
 
 /// The state of knowledge about the sea floor.
@@ -39,9 +39,10 @@ impl Knowledge {
         }
     }
 
-    /// Forgets the looks at the cells of favoured labels and begins a round of further looks; returns whether there are any.
-    pub fn forget_looks(&mut self, map: &LabelGrid, utility: &Utility) -> bool {
-        let favoured: Vec<Cell> = map.iter().filter(|(_, l)| utility.weight(*l) > 0.0).map(|(cell, _)| cell).collect();
+    /// Forgets the looks at the favoured cells and begins a round of further looks; returns whether there are any.
+    pub fn forget_looks(&mut self, map: &LabelGrid, is_favoured: impl Fn(Cell, u8) -> bool) -> bool {
+        let favoured = map.iter().filter(|&(cell, label)| is_favoured(cell, label));
+        let favoured: Vec<Cell> = favoured.map(|(cell, _)| cell).collect();
         for &cell in &favoured {
             self.looks.set(cell, 0);
         }
@@ -77,21 +78,21 @@ pub struct BlockValues {
 pub type ShownBlocks = [usize; 4];
 
 impl BlockValues {
-    /// Values by the operator's utility; one whole cell of weight 1 has the value 1. Cells outside the window have
+    /// Values by the operator's interest; one whole cell of weight 1 has the value 1. Cells outside the window have
     /// none. `map_origin` is the origin of the map frame in the world frame, metres.
     pub fn new(
         lattice: &Lattice,
         (window, map_origin): (&CellWindow, Point),
         map: &LabelGrid,
         known: &Knowledge,
-        utility: &Utility,
+        interest: Interest<'_>,
     ) -> Self {
         let (places, rows) = lattice.size();
         let columns = places + 1;
         let mut values = Self { columns, blocks: vec![0.0; columns * (rows + 1)] };
         let (south_west, step) = (lattice.place(0), lattice.step_m());
         let block = |at: f64, origin: f64| ((at - origin) / step).floor() as i64 + 1;
-        let cells = window.cell_values(map, known, utility);
+        let cells = window.cell_values(map_origin, map, known, interest);
         for (row, line) in (0..).zip(cells.chunks(window.width.max(1))) {
             let y = block(window.centre(row, window.y) + map_origin.1, south_west.1);
             if !(0..=rows as i64).contains(&y) {
@@ -167,7 +168,8 @@ impl CellWindow {
         grid.copy_area(i64::from(self.x), i64::from(self.y), self.width, self.height)
     }
 
-    fn cell_values(&self, map: &LabelGrid, known: &Knowledge, utility: &Utility) -> Vec<f32> {
+    fn cell_values(&self, map_origin: Point, map: &LabelGrid, known: &Knowledge, interest: Interest<'_>) -> Vec<f32> {
+        let utility = interest.utility;
         let labels = self.copy(map);
         let seen = SeenLabels { labels: &labels, width: self.width };
         let weight: Vec<f32> = (0..=255).map(|l| utility.weight(l) as f32).collect();
@@ -181,10 +183,30 @@ impl CellWindow {
             let odd = oddness(&self.copy(&known.surprise));
             values.iter_mut().zip(odd).for_each(|(w, odd)| *w += curiosity * odd);
         }
+        if !interest.areas.is_empty() {
+            self.add_areas(&mut values, map_origin, interest);
+        }
         let looks = self.copy(&known.looks);
         let repeated = if known.repeats { REPEATED_LOOK_IN_ROUNDS } else { REPEATED_LOOK };
         values.iter_mut().zip(&looks).for_each(|(w, &n)| *w *= repeated.powi(i32::from(n)));
         values
+    }
+}
+
+impl CellWindow {
+    /// Adds the weights of areas to the values of the cells with their centre inside.
+    fn add_areas(&self, values: &mut [f32], map_origin: Point, interest: Interest<'_>) {
+        for (row, line) in (0..).zip(values.chunks_mut(self.width.max(1))) {
+            let north = self.centre(row, self.y) + map_origin.1;
+            for (column, value) in (0..).zip(line) {
+                *value += interest.weight_of_place((self.centre(column, self.x) + map_origin.0, north));
+            }
+        }
+    }
+
+    /// The centre of a cell in the map frame, metres.
+    pub fn centre_of(&self, cell: Cell) -> Point {
+        (self.centre(0, cell.x), self.centre(0, cell.y))
     }
 }
 

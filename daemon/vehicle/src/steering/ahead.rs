@@ -86,12 +86,23 @@ impl Steering {
 
     /// The return path after one of its waypoints.
     pub fn path_after_return(&self, waypoint: Point) -> PathAhead {
+        self.path_to(waypoint, self.return_place())
+    }
+
+    /// The path to the destination after one of its waypoints.
+    pub fn path_after_detour(&self, waypoint: Point) -> PathAhead {
+        self.destination.map_or_else(PathAhead::default, |to| self.path_to(waypoint, to))
+    }
+
+    fn path_to(&self, waypoint: Point, to: Point) -> PathAhead {
         let mut path = Corners::new(waypoint);
-        let home = self.return_place();
-        if let Some((_, end, nodes)) = self.grounds.return_path(waypoint) {
+        if waypoint == to {
+            return path.finish();
+        }
+        if let Some((_, end, nodes)) = self.grounds.path(waypoint, to) {
             nodes.into_iter().for_each(|node| path.go(self.grounds.lattice().place(node)));
-            if self.grounds.bounds().allows_exit(home, self.grounds.lattice().place(end)) {
-                path.go(home);
+            if self.grounds.bounds().allows_exit(to, self.grounds.lattice().place(end)) {
+                path.go(to);
             }
         }
         path.finish()

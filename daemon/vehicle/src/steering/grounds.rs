@@ -91,10 +91,9 @@ impl Grounds {
         !left_m.is_finite() || self.return_paths.as_ref().is_some_and(|w| gone_m + w.metres[node] <= left_m)
     }
 
-    /// The place at which a return path enters the lattice, the place at which it leaves it, and
-    /// the places after the first.
-    pub(super) fn return_path(&self, from: Point) -> Option<(Node, Node, Vec<Node>)> {
-        let (at, end) = (self.entry(from)?, self.entry(self.return_place())?);
+    /// The place at which a path enters the lattice, the place at which it leaves it, and the places after the first.
+    pub(super) fn path(&self, from: Point, to: Point) -> Option<(Node, Node, Vec<Node>)> {
+        let (at, end) = (self.entry(from)?, self.entry(to)?);
         Some((at, end, self.lattice.paths(at).to(end)))
     }
 

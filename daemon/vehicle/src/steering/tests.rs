@@ -2,7 +2,7 @@
 
 use super::*;
 use scenecast_protocol::coordinates::DecimetrePoint;
-use scenecast_protocol::directive::Polygon;
+use scenecast_protocol::directive::{Areas, Polygon, WeightedArea};
 
 const AREA: Area = Area { west: 0.0, south: 0.0, east: 20.0, north: 12.0 };
 const FOOTPRINT: Footprint = Footprint { across: 4.0, along: 3.0 };
@@ -93,4 +93,21 @@ fn a_favoured_label_draws_the_vehicle_to_it() {
         let track = drive(&mut steering(kind), &map, Some(&utility), 12);
         assert!(track.iter().any(|to| to.0 > 14.0 && to.1 > 7.0), "{kind:?}: {track:?}");
     }
+}
+
+#[test]
+fn a_weighted_area_draws_the_vehicle_without_a_utility_and_an_unwanted_one_repels_it() {
+    let map: LabelGrid = (0..48 * 80).map(|i| (Cell::new(i % 80, i / 80), 1)).collect();
+    let corners = [(140, 70), (195, 70), (195, 115), (140, 115)].map(|(x, y)| DecimetrePoint::new(x, y));
+    let area = |weight| Areas(vec![WeightedArea { outline: Polygon(corners.into()), weight }]);
+    let mut steering = steering(PlannerKind::Horizon);
+    steering.set_areas(area(80));
+    let track = drive(&mut steering, &map, None, 12);
+    assert_eq!(steering.intent(), Some(Intent::Area(1)));
+    assert!(track.iter().any(|&(x, y)| x > 13.0 && y > 6.0), "{track:?}");
+    let mut steering = self::steering(PlannerKind::Horizon);
+    steering.set_areas(area(-100));
+    let utility = Utility { weights: [(1, 50)].into(), ..Utility::default() };
+    let track = drive(&mut steering, &map, Some(&utility), 12);
+    assert!(!track.iter().any(|&(x, y)| x > 15.0 && y > 8.0), "{track:?}");
 }

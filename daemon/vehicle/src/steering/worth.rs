@@ -1,7 +1,6 @@
 //! The worth of a planned path: whether a new plan is better than the present one, and whether one pays at all.
 
-use crate::planning::{BlockValues, Node, PlanRequest, distance};
-use scenecast_protocol::directive::Utility;
+use crate::planning::{BlockValues, Interest, Node, PlanRequest, distance};
 
 /// The gain a metre of a new plan, divided by that of the present one, from which the new one replaces it. Without such a
 /// margin two far goals of like worth take the vehicle to and fro, because each step changes the map.
@@ -17,12 +16,9 @@ pub(super) fn keeps(q: &PlanRequest<'_>, present: &[Node], other: &[Node]) -> bo
 }
 
 /// Whether a path shows a block of which the cells are worth another look.
-pub(super) fn pays(q: &PlanRequest<'_>, path: &[Node], utility: &Utility, cells_in_block: f64) -> bool {
-    let weights = utility.weights.values().map(|&weight| f64::from(weight.max(0)) / 100.0);
-    let others = [utility.exploration, utility.curiosity].map(|weight| f64::from(weight) / 100.0);
-    let largest = weights.chain(others).fold(0.0, f64::max);
+pub(super) fn pays(q: &PlanRequest<'_>, path: &[Node], interest: Interest<'_>, cells_in_block: f64) -> bool {
     let values = path.iter().flat_map(|&node| q.values.shown(node)).map(|block| f64::from(q.values.of(block)));
-    values.fold(0.0, f64::max) > PAYS * largest * cells_in_block
+    values.fold(0.0, f64::max) > PAYS * interest.largest_weight() * cells_in_block
 }
 
 /// The values of all blocks that a path shows, each once.

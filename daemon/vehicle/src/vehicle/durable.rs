@@ -1,6 +1,7 @@
 //! The part of the vehicle's state that its host stores.
 
 use crate::LastPlace;
+use scenecast_protocol::coordinates::DecimetrePoint;
 use scenecast_protocol::directive::Series;
 use scenecast_protocol::link::SlotInboxState;
 use serde::{Deserialize, Serialize};
@@ -42,6 +43,17 @@ pub struct Durable {
     pub place: Option<LastPlace>,
     /// The orders that this state knows nothing of, because an earlier state was lost.
     pub lost: LostOrders,
+    /// Destination in force in the world frame: decimetres east and north.
+    pub destination: Option<(i32, i32)>,
+    /// Weighted areas in force as on the wire. Empty: none.
+    pub areas: Vec<u8>,
+}
+
+impl Durable {
+    /// The destination in force.
+    pub fn destination(&self) -> Option<DecimetrePoint> {
+        self.destination.map(|(east_dm, north_dm)| DecimetrePoint::new(east_dm, north_dm))
+    }
 }
 
 /// The series of orders of which the vehicle no longer knows which versions it has applied.

@@ -5,8 +5,8 @@ use crate::Navigator;
 use crate::failsafe::{Failsafe, FailsafePolicy};
 use crate::planning::{Point, distance};
 use crate::steering::{Course, PathAhead, Steering};
-use scenecast_protocol::coordinates::{MapPoint, WorldPoint};
-use scenecast_protocol::directive::{Constraints, Fence, Limits, Reaction, Settings, Utility};
+use scenecast_protocol::coordinates::{DecimetrePoint, MapPoint, WorldPoint};
+use scenecast_protocol::directive::{Areas, Constraints, Fence, Limits, Reaction, Settings, Utility};
 use scenecast_protocol::map::{Cell, LabelGrid};
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::{Intent, ModeReason, PlannedPath, VehicleMode};
@@ -76,6 +76,10 @@ impl Guidance {
         if let Some(fence) = Fence::from_bytes(&durable.fence).filter(|f| f.check().is_ok()) {
             guidance.steering.set_fence(&fence);
         }
+        if let Some(areas) = Areas::from_bytes(&durable.areas).filter(|areas| areas.check().is_ok()) {
+            guidance.steering.set_areas(areas);
+        }
+        guidance.steering.set_destination(durable.destination());
         guidance
     }
 
@@ -88,7 +92,7 @@ impl Guidance {
         self.waypoint
     }
 
-    /// The purpose of the plan while the vehicle surveys by an adaptive planner.
+    /// The purpose of the plan while the vehicle surveys by an adaptive planner or goes to a destination.
     pub(super) fn intent(&self) -> Option<Intent> {
         self.steering.intent().filter(|_| self.activity.mode == VehicleMode::Survey)
     }
@@ -159,6 +163,29 @@ impl Guidance {
     pub(super) fn set_fence(&mut self, fence: &Fence) {
         self.steering.set_fence(fence);
         self.clear_breach();
+    }
+
+    /// Puts weighted areas in force that were checked.
+    pub(super) fn set_areas(&mut self, areas: Areas) {
+        self.steering.set_areas(areas);
+        self.drop_path();
+    }
+
+    /// Whether an allowed path leads from the vehicle to a place, and enough is left of the limits for it and the return.
+    pub(super) fn can_reach(&self, navigator: &Navigator, place: DecimetrePoint) -> bool {
+        let at = navigator.to_world(navigator.position()).xy();
+        self.steering.can_reach(at, place, self.failsafe.left_m())
+    }
+
+    /// Orders the vehicle to a place before it resumes its survey; `None` withdraws the order.
+    pub(super) fn set_destination(&mut self, place: Option<DecimetrePoint>) {
+        self.steering.set_destination(place);
+        self.drop_path();
+    }
+
+    /// Whether the vehicle has yet to go to a destination.
+    pub(super) fn has_destination(&self) -> bool {
+        self.steering.has_destination()
     }
 
     /// Sets the planner and the end of the survey that the operator ordered.
@@ -244,9 +271,14 @@ impl Guidance {
             return None;
         }
         let left_m = self.failsafe.left_m();
-        match self.steering.next(at, known.map, known.utility, left_m) {
+        let detour = self.steering.next_detour(at, left_m);
+        let course = detour.unwrap_or_else(|| self.steering.next(at, known.map, known.utility, left_m));
+        match course {
             Course::Go(to) => {
-                let path = self.steering.path_after(to, left_m - distance(at, to));
+                let path = match self.steering.has_destination() {
+                    true => self.steering.path_after_detour(to),
+                    false => self.steering.path_after(to, left_m - distance(at, to)),
+                };
                 Some(self.go((to, path), VehicleMode::Survey, ModeReason::Survey, known.navigator))
             }
             Course::LimitReached => self.go_back(at, self.failsafe.tighter(), known.navigator),

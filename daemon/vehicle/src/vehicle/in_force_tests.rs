@@ -7,8 +7,8 @@ use scenecast_config::Config;
 use scenecast_core::Area;
 use scenecast_protocol::coordinates::DecimetrePoint;
 use scenecast_protocol::directive::{
-    Budget, Change, Constraints, Fence, Limits, PerSlot, Polygon, REPORTED_SLOTS, RefusalReason, Settings,
-    ShortDecimal, Slot, SlotId, Utility,
+    Areas, Budget, Change, Constraints, Destination, Fence, Limits, PerSlot, Polygon, REPORTED_SLOTS, RefusalReason,
+    Settings, ShortDecimal, Slot, SlotId, Utility, WeightedArea,
 };
 use scenecast_protocol::schedule::Shares;
 use scenecast_protocol::time::Instant;
@@ -50,6 +50,16 @@ fn order() -> impl Strategy<Value = Slot> {
         Just(Slot::Limits(Limits::default())),
         (100i32..200).prop_map(|metres| Slot::Fence(fence(metres))),
         Just(Slot::Fence(Fence::default())),
+        (-90i32..90).prop_map(|east_m| {
+            let place = DecimetrePoint::new(10 * east_m, 50);
+            Slot::Destination(Destination { place: Some(place) })
+        }),
+        Just(Slot::Destination(Destination::default())),
+        (-100i8..100).prop_map(|weight| {
+            let outline = fence(20).fence.unwrap_or_default();
+            Slot::Areas(Areas(vec![WeightedArea { outline, weight }]))
+        }),
+        Just(Slot::Areas(Areas::default())),
         (1u8..9).prop_map(move |n| Slot::Settings(Settings { alpha: to(f64::from(n)), ..Settings::default() })),
         (1u8..9).prop_map(move |n| Slot::Settings(Settings { beta: to(f64::from(n)), ..Settings::default() })),
         Just(Slot::Settings(Settings { alpha: Change::Configured, ..Settings::default() })),

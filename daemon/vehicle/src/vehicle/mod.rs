@@ -283,10 +283,21 @@ impl Vehicle {
         let (navigator, map, utility) = (&self.navigator, self.publisher.seen(), self.utility.as_ref());
         let request = self.guidance.steer(&Situation { navigator, map, utility });
         self.outputs.extend(request);
+        self.follow_destination(now);
         if std::mem::take(&mut self.has_new_orders) {
             self.link.owe_pose(now);
         }
         self.record();
+    }
+
+    /// A destination is in force no longer once it is reached.
+    fn follow_destination(&mut self, now: Instant) {
+        if self.durable.destination.is_some() && !self.guidance.has_destination() {
+            self.durable.destination = None;
+            self.report_in_force(now);
+            self.has_new_orders = true;
+            self.outputs.push_back(VehicleOutput::Persist);
+        }
     }
 
     /// Stores the use of the limits and the breach when they have changed enough.

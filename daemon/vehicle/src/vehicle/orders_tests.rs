@@ -9,13 +9,13 @@ use scenecast_motion::Motion;
 use scenecast_motion::stretches_outside;
 use scenecast_protocol::coordinates::{DecimetrePoint, MapPoint, WorldPoint};
 use scenecast_protocol::directive::{
-    CellBand, Change, Constraints, Fence, Limits, PlannerKind, Polygon, Reaction, RefusalReason, Settings,
-    ShortDecimal, Slot, Utility,
+    Areas, CellBand, Change, Constraints, Destination, Fence, Limits, PlannerKind, Polygon, Reaction, RefusalReason,
+    Settings, ShortDecimal, Slot, SlotId, Utility, WeightedArea,
 };
 use scenecast_protocol::mac::ModemProfile;
 use scenecast_protocol::map::Cell;
 use scenecast_protocol::time::Instant;
-use scenecast_protocol::wire::{ModeReason, VehicleMode};
+use scenecast_protocol::wire::{Intent, ModeReason, VehicleMode};
 use std::collections::BTreeMap;
 use std::time::Duration;
 
@@ -155,6 +155,14 @@ fn order() -> impl Strategy<Value = Slot> {
         }),
         2 => (-100i8..=100, -100i8..=100, -100i8..=100, -20i8..=100).prop_map(|(a, b, c, exploration)| {
             Slot::Utility(Utility { epoch: 0, exploration, curiosity: c / 2, weights: [(1, a), (2, b), (3, c)].into() })
+        }),
+        1 => proptest::option::of((-20i32..420, -20i32..320)).prop_map(|place| {
+            let place = place.map(|(x, y)| DecimetrePoint::new(x, y));
+            Slot::Destination(Destination { place })
+        }),
+        1 => (0i32..300, 0i32..200, -100i8..=100).prop_map(|(x, y, weight)| {
+            let corners = [(x, y), (x + 90, y), (x + 40, y + 80)].map(|(x, y)| DecimetrePoint::new(x, y));
+            Slot::Areas(Areas(vec![WeightedArea { outline: Polygon(corners.into()), weight }]))
         }),
         1 => (any::<bool>(), prop::bool::weighted(0.2)).prop_map(|(hold, abort)| Slot::Constraints(Constraints { hold, abort })),
         1 => Just(Slot::Constraints(Constraints::default())),
@@ -338,4 +346,33 @@ fn bad_settings_are_refused_and_good_ones_survive_a_restart() {
     let durable = sea.vehicle.durable().clone();
     let again = crate::assemble(&config, None, profile(&config), AREA, durable, 1, sea.now).unwrap();
     assert_eq!(again.settings(), &asked.then(&more));
+}
+
+#[test]
+fn a_destination_is_reached_and_then_no_longer_in_force() {
+    let mut sea = Sea::new(0.0, 3);
+    let place = DecimetrePoint::new(300, 200);
+    let order = Slot::Destination(Destination { place: Some(place) });
+    sea.order(order.clone());
+    assert_eq!(sea.vehicle.link.in_force(SlotId::Destination), Some(&order));
+    (0..20).for_each(|_| sea.step());
+    assert_eq!(sea.vehicle.guidance.intent(), Some(Intent::Destination));
+    assert_eq!(sea.vehicle.durable().destination(), Some(place));
+    let away_m = |sea: &Sea| {
+        let navigator = sea.vehicle.navigator();
+        navigator.to_world(navigator.position()).distance_m(place.to_world())
+    };
+    let mut least_m = f64::INFINITY;
+    for _ in 0..400 {
+        sea.step();
+        least_m = least_m.min(away_m(&sea));
+    }
+    assert!(least_m < 0.6, "{least_m} m");
+    assert_eq!((sea.vehicle.durable().destination(), sea.vehicle.link.in_force(SlotId::Destination)), (None, None));
+    assert_eq!(sea.vehicle.mode().0, VehicleMode::Survey);
+    assert!(away_m(&sea) > 1.0, "the survey is resumed");
+    let corners = [(-900, -900), (900, -900), (900, 900), (-900, 900)].map(|(x, y)| DecimetrePoint::new(x, y));
+    sea.order(Slot::Fence(Fence { fence: Some(Polygon(corners.into())), ..Fence::default() }));
+    let outside = Slot::Destination(Destination { place: Some(DecimetrePoint::new(9000, 9000)) });
+    assert_eq!(sea.vehicle.apply(outside, sea.now), Err(RefusalReason::Contradiction));
 }

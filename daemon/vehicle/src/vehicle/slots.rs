@@ -7,8 +7,8 @@ use crate::FixVerdict;
 use crate::LastPlace;
 use scenecast_protocol::coordinates::DecimetrePoint;
 use scenecast_protocol::directive::{
-    Budget, Constraints, ExemplarRequests, Fence, Fix, Limits, LimitsFault, RefusalReason, Settings, Slot, SlotId,
-    SlotState, Utility,
+    Areas, AreasFault, Budget, Constraints, Destination, ExemplarRequests, Fence, Fix, Limits, LimitsFault,
+    RefusalReason, Settings, Slot, SlotId, SlotState, Utility,
 };
 use scenecast_protocol::time::Instant;
 use std::time::Duration;
@@ -100,6 +100,10 @@ impl Vehicle {
         self.link.set_in_force(SlotId::Settings, Some(Slot::Settings(self.settings)), now);
         self.link.set_in_force(SlotId::Limits, limits, now);
         self.link.set_in_force(SlotId::Fence, fence, now);
+        let areas = Areas::from_bytes(&self.durable.areas).filter(|areas| areas.check().is_ok()).map(Slot::Areas);
+        self.link.set_in_force(SlotId::Areas, areas, now);
+        let destination = Destination { place: self.durable.destination() };
+        self.link.set_in_force(SlotId::Destination, Some(Slot::Destination(destination)), now);
     }
 
     fn apply_content(&mut self, slot: Slot, now: Instant) -> Result<(), RefusalReason> {
@@ -119,6 +123,8 @@ impl Vehicle {
             Slot::Limits(limits) => self.apply_limits(limits),
             Slot::Fence(fence) => self.apply_fence(&fence),
             Slot::Fix(fix) => self.apply_fix(fix, now),
+            Slot::Destination(destination) => self.apply_destination(destination),
+            Slot::Areas(areas) => self.apply_areas(areas),
         }
     }
 
@@ -184,6 +190,26 @@ impl Vehicle {
         self.durable.fence = fence.to_bytes();
         self.durable.breach = 0;
         self.guidance.set_fence(fence);
+        Ok(())
+    }
+
+    /// A place that the fence does not allow is refused at once, so that the operator learns it before the vehicle goes.
+    fn apply_destination(&mut self, Destination { place }: Destination) -> Result<(), RefusalReason> {
+        if place.is_some_and(|place| !self.guidance.can_reach(&self.navigator, place)) {
+            return Err(RefusalReason::Contradiction);
+        }
+        self.durable.destination = place.map(|place| (place.east_dm, place.north_dm));
+        self.guidance.set_destination(place);
+        Ok(())
+    }
+
+    fn apply_areas(&mut self, areas: Areas) -> Result<(), RefusalReason> {
+        areas.check().map_err(|fault| match fault {
+            AreasFault::Weight(..) => RefusalReason::OutOfRange,
+            _ => RefusalReason::Contradiction,
+        })?;
+        self.durable.areas = if areas.0.is_empty() { Vec::new() } else { areas.to_bytes() };
+        self.guidance.set_areas(areas);
         Ok(())
     }
 
