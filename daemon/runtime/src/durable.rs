@@ -1,9 +1,13 @@
 //! The vehicle's durable state: read at the start of a run, and kept during it.
 
 use super::checkpoint;
-use super::journal::{Damage, Found, Journal, JournalNames, Storage};
+use super::journal::{BodyLayout, Damage, Found, Journal, JournalNames, Storage};
 use scenecast_core::UserError;
+use scenecast_protocol::directive::Series;
+use scenecast_protocol::link::SlotInboxState;
 use scenecast_vehicle::{Durable, LastPlace, LostOrders};
+use serde::Deserialize;
+use std::collections::VecDeque;
 
 /// The journal's files. Their records hold a [`Durable`] in postcard; another layout needs another version of the files.
 const JOURNAL: JournalNames = JournalNames { journal: "vehicle.journal", copy: "vehicle.journal.copy" };
@@ -50,7 +54,7 @@ impl<S: Storage> Keeper<S> {
             }
             Found::Absent => (forgetful(storage, JOURNAL.journal, &Damage::Missing, lineage), true),
             Found::Lost(name, damage) => (forgetful(storage, name, &damage, lineage), true),
-            Found::State { body, is_earlier, damage } => match decode(body, is_earlier) {
+            Found::State { body, layout, damage } => match decode(body, layout) {
                 Some(last) => {
                     let mut durable = continued(last, checkpoint);
                     if let Some((name, damage)) = damage {
@@ -113,10 +117,33 @@ fn forgetful(storage: &impl Storage, name: &str, damage: &Damage, lineage: u64) 
     Durable { lineage, epoch, hold: true, lost: LostOrders::Present, ..Durable::default() }
 }
 
-/// Reads a state; earlier builds wrote it without its last member, [`Durable::lost`].
-fn decode(mut state: Vec<u8>, is_earlier: bool) -> Option<Durable> {
-    if is_earlier {
+/// The first member of a state, [`Durable::inbox`], with eight slots.
+#[derive(Deserialize)]
+struct EightSlots {
+    series: Option<Series>,
+    retired: VecDeque<Series>,
+    versions: [Option<u16>; 8],
+    decisions: [u8; 8],
+}
+
+/// A state as this build writes it, from one with eight slots, which ends before [`Durable::destination`].
+fn with_all_slots(state: &[u8]) -> Option<Vec<u8>> {
+    let (EightSlots { series, retired, versions, decisions }, rest) = postcard::take_from_bytes(state).ok()?;
+    let mut inbox = SlotInboxState { series, retired, ..SlotInboxState::default() };
+    inbox.versions.iter_mut().zip(versions).for_each(|(slot, version)| *slot = version);
+    inbox.decisions.iter_mut().zip(decisions).for_each(|(slot, decision)| *slot = decision);
+    let inbox = postcard::to_allocvec(&inbox).ok()?;
+    // Neither a destination nor areas.
+    Some([&inbox, rest, &[0, 0]].concat())
+}
+
+/// Reads a state in this layout.
+fn decode(mut state: Vec<u8>, layout: BodyLayout) -> Option<Durable> {
+    if layout == BodyLayout::WithoutLostOrders {
         state.push(0);
+    }
+    if layout != BodyLayout::Present {
+        state = with_all_slots(&state)?;
     }
     match postcard::take_from_bytes(&state) {
         Ok((durable, [])) => Some(durable),
@@ -140,8 +167,6 @@ fn refuse_earlier_build(storage: &impl Storage) -> Result<(), UserError> {
 mod tests {
     use super::super::journal::disk::{Disk, DiskRefusal};
     use super::*;
-    use scenecast_protocol::directive::Series;
-    use scenecast_protocol::link::SlotInboxState;
     use scenecast_protocol::schedule::BackgroundOrder;
 
     const NAMES: [&str; 2] = [JOURNAL.journal, JOURNAL.copy];
@@ -182,12 +207,12 @@ mod tests {
 
     #[test]
     fn the_bytes_of_a_state_are_those_of_this_version_of_the_file() {
-        let versions = [None, Some(300), None, None, None, Some(1), None, None];
+        let versions = [None, Some(300), None, None, None, Some(1), None, None, None, Some(2)];
         let inbox = SlotInboxState {
             series: Some(Series::from_random(7)),
             retired: [5, 6].map(Series::from_random).into(),
             versions,
-            decisions: [0, 1, 0, 0, 0, 2, 0, 0],
+            decisions: [0, 1, 0, 0, 0, 2, 0, 0, 0, 1],
         };
         let utility = Some((3, 50, -1, [(2, -3)].into()));
         let durable = Durable {
@@ -208,36 +233,41 @@ mod tests {
             fence: vec![0],
             place: None,
             lost: LostOrders::Of(Series::from_random(300)),
+            destination: Some((-3, 100)),
+            areas: vec![0],
         };
         let golden = [
             &[1, 7, 2, 5, 6][..],
-            &[0, 1, 172, 2, 0, 0, 0, 1, 1, 0, 0],
-            &[0, 1, 0, 0, 0, 2, 0, 0],
+            &[0, 1, 172, 2, 0, 0, 0, 1, 1, 0, 0, 0, 1, 2],
+            &[0, 1, 0, 0, 0, 2, 0, 0, 0, 1],
             &[3, 12, 172, 2],
             &[1, 3, 50, 255, 1, 2, 253, 1, 0, 1, 244, 3, 1, 10, 5, 5, 50, 20, 1, 128, 100],
             &[2, 0x40, 0, 2, 0, 4, 130, 1, 2, 2, 1, 0, 0, 2, 172, 2],
+            &[1, 5, 200, 1, 1, 0],
         ];
         assert_eq!(postcard::to_allocvec(&durable).unwrap(), golden.concat());
-        assert_eq!(decode(golden.concat(), false), Some(durable.clone()));
-        let earlier = golden.concat()[..golden.concat().len() - 3].to_vec();
-        assert_eq!(decode(earlier, true), Some(Durable { lost: LostOrders::None, ..durable }), "an earlier build's");
+        assert_eq!(decode(golden.concat(), BodyLayout::Present), Some(durable.clone()));
+        let eight_slots = [golden[0], &golden[1][..11], &golden[2][..8], golden[3], golden[4], golden[5]].concat();
+        let mut before = Durable { destination: None, areas: Vec::new(), ..durable };
+        before.inbox.versions[9] = None;
+        before.inbox.decisions[9] = 0;
+        assert_eq!(decode(eight_slots.clone(), BodyLayout::EightSlots), Some(before.clone()));
+        let first = eight_slots[..eight_slots.len() - 3].to_vec();
+        before.lost = LostOrders::None;
+        assert_eq!(decode(first, BodyLayout::WithoutLostOrders), Some(before));
     }
 
     #[test]
     fn a_state_with_two_bytes_of_background_order_reads_as_before() {
         let stored = |background: &[u8]| [&[0; 26][..], background, &[0; 8]].concat();
         let zeros = Durable::default();
-        assert_eq!(decode(stored(&[0]), false), Some(zeros.clone()));
+        assert_eq!(decode(stored(&[0]), BodyLayout::EightSlots), Some(zeros.clone()));
         let codes = (0..0x8000u16).filter(|&code| BackgroundOrder::from_code(u128::from(code)).is_some());
         for code in codes {
             // Earlier builds held the order as a `u16`, because it had no long form.
             let bytes = stored(&postcard::to_allocvec(&Some(code)).unwrap());
             let durable = Durable { background: Some(u128::from(code)), ..zeros.clone() };
-            assert_eq!(
-                (decode(bytes.clone(), false), postcard::to_allocvec(&durable).unwrap()),
-                (Some(durable), bytes),
-                "{code:04x}"
-            );
+            assert_eq!(decode(bytes, BodyLayout::EightSlots), Some(durable), "{code:04x}");
         }
     }
 

@@ -17,6 +17,14 @@ pub(super) fn follow(record: &mut VehicleRecord, view: &PeerView<'_>) {
         Slot::Limits(limits) => Some(*limits),
         _ => None,
     });
+    follow_order(&mut record.areas, SlotId::Areas, view, |slot| match slot {
+        Slot::Areas(areas) => Some(areas.clone()),
+        _ => None,
+    });
+    follow_order(&mut record.destination, SlotId::Destination, view, |slot| match slot {
+        Slot::Destination(destination) => Some(*destination),
+        _ => None,
+    });
     if let (InForce::Known(Slot::Utility(utility)), None) =
         (view.in_force(SlotId::Utility), status(view, SlotId::Utility))
         && utility.epoch == record.epoch
@@ -44,7 +52,8 @@ fn follow_order<T: Clone + Default + PartialEq>(
         InForce::Known(slot) => {
             let Some(content) = content(slot) else { return };
             if order.in_force.as_ref().is_none_or(|(_, known)| *known != content) {
-                order.in_force = Some((VERSION_OF_OTHERS, content.clone()));
+                let own = view.slots().find(|slot| slot.id == id && order.sent.as_ref() == Some(&content));
+                order.in_force = Some((own.map_or(VERSION_OF_OTHERS, |slot| slot.version), content.clone()));
             }
             if status(view, id).is_none() {
                 order.sent = Some(content);

@@ -27,7 +27,7 @@ pub use command::{
 };
 pub use exemplar_cache::{ExemplarCache, LabelExemplars, OpenRequest, RequestKind, RequestState, StoredExemplar};
 pub use label_gains::LabelGains;
-pub use orders::{FenceOrder, LimitsOrder, MAX_DISTANCE_M};
+pub use orders::{AreaOrder, AreasOrder, DestinationOrder, FenceOrder, LimitsOrder, MAX_DISTANCE_M};
 pub use scenecast_core::{Principal, Role};
 pub use settings::{SettingsOrder, SettingsRecord};
 pub use surface::{Surface, SurfaceOutput};

@@ -1,7 +1,7 @@
-//! Fences and limits as the operator types them. Every error is one line that names the allowed values.
+//! Fences, limits, weighted areas and destinations as the operator types them. Every error is one line that names the allowed values.
 
 use scenecast_protocol::coordinates::{DecimetrePoint, WorldPoint};
-use scenecast_protocol::directive::{Band, Fence, Limits, Polygon, Reaction};
+use scenecast_protocol::directive::{Areas, Band, Destination, Fence, Limits, Polygon, Reaction, WeightedArea};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -53,13 +53,63 @@ pub struct LimitsOrder {
     pub on_abort: Option<String>,
 }
 
+/// Weighted areas as they are typed. They replace the last ones.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct AreasOrder {
+    /// Empty: no area has a weight any more.
+    #[schemars(length(max = 4))]
+    pub areas: Vec<AreaOrder>,
+}
+
+/// An area whose cells have a weight in addition to that of their label.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct AreaOrder {
+    /// Vertices in metres east and north of the origin.
+    #[schemars(length(min = 3, max = 34))]
+    pub outline: Vec<[f64; 2]>,
+    #[schemars(range(min = -1.0, max = 1.0))]
+    pub weight: f64,
+}
+
+/// A destination as it is typed.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct DestinationOrder {
+    /// Metres east and north of the origin; `None` withdraws the destination.
+    pub place: Option<[f64; 2]>,
+}
+
+impl From<&Areas> for AreasOrder {
+    fn from(areas: &Areas) -> Self {
+        let area = |area: &WeightedArea| AreaOrder {
+            outline: vertices(&area.outline),
+            weight: f64::from(area.weight) / 100.0,
+        };
+        Self { areas: areas.0.iter().map(area).collect() }
+    }
+}
+
+impl From<&Destination> for DestinationOrder {
+    fn from(destination: &Destination) -> Self {
+        Self { place: destination.place.as_ref().map(vertex) }
+    }
+}
+
+fn vertex(p: &DecimetrePoint) -> [f64; 2] {
+    [p.to_world().east_m, p.to_world().north_m]
+}
+
+fn vertices(outline: &Polygon) -> Vec<[f64; 2]> {
+    outline.0.iter().map(vertex).collect()
+}
+
 impl From<&Fence> for FenceOrder {
     fn from(fence: &Fence) -> Self {
-        let vertex = |p: &DecimetrePoint| [p.to_world().east_m, p.to_world().north_m];
-        let outline = |p: &Polygon| p.0.iter().map(vertex).collect();
         Self {
-            fence: fence.fence.as_ref().map(outline),
-            keep_outs: fence.keep_outs.iter().map(outline).collect(),
+            fence: fence.fence.as_ref().map(vertices),
+            keep_outs: fence.keep_outs.iter().map(vertices).collect(),
             return_point: fence.return_point.as_ref().map(vertex),
         }
     }
@@ -92,6 +142,29 @@ impl FenceOrder {
         };
         fence.check().map_err(|fault| fault.to_string())?;
         Ok(fence)
+    }
+}
+
+impl AreasOrder {
+    /// Converts the order into the content of the slot. The error is one line for the operator.
+    pub fn read(&self) -> Result<Areas, String> {
+        let area = |(number, order): (usize, &AreaOrder)| {
+            let is_allowed = (-1.0..=1.0).contains(&order.weight);
+            let weight = is_allowed.then_some((order.weight * 100.0).round() as i8);
+            let refusal = || format!("area {number}: weight {} is not within -1 to 1", order.weight);
+            let outline = outline(&format!("area {number}"), &order.outline)?;
+            Ok(WeightedArea { outline, weight: weight.ok_or_else(refusal)? })
+        };
+        let areas = Areas((1..).zip(&self.areas).map(area).collect::<Result<_, String>>()?);
+        areas.check().map_err(|fault| fault.to_string())?;
+        Ok(areas)
+    }
+}
+
+impl DestinationOrder {
+    /// Converts the order into the content of the slot. The error is one line for the operator.
+    pub fn read(&self) -> Result<Destination, String> {
+        Ok(Destination { place: self.place.map(|p| place("place", p)).transpose()? })
     }
 }
 
@@ -179,6 +252,24 @@ mod tests {
             "on_silence \"panic\": it takes hold, return or surface"
         );
         assert!(limits(r#"{"altitude_m": [-1, 10]}"#).unwrap_err().contains("0 to 6553.5 m"));
+    }
+
+    #[test]
+    fn areas_and_destinations_are_read_or_refused_with_the_allowed_values() {
+        let areas = |json: &str| serde_json::from_str::<AreasOrder>(json).map_err(|e| e.to_string())?.read();
+        let sent = areas(r#"{"areas": [{"outline": [[0,0],[9.04,0],[9,9]], "weight": -0.255}]}"#).unwrap();
+        assert_eq!((sent.0[0].outline.0[1], sent.0[0].weight), (DecimetrePoint::new(90, 0), -26));
+        assert_eq!(AreasOrder::from(&sent).areas[0].weight, -0.26);
+        let heavy = areas(r#"{"areas": [{"outline": [[0,0],[9,0],[9,9]], "weight": 1.5}]}"#);
+        assert_eq!(heavy.unwrap_err(), "area 1: weight 1.5 is not within -1 to 1");
+        let flat = areas(r#"{"areas": [{"outline": [[0,0],[1,1],[2,2]], "weight": 1}]}"#);
+        assert_eq!(flat.unwrap_err(), "area 1: it has no area");
+        let five = AreasOrder { areas: vec![AreasOrder::from(&sent).areas[0].clone(); 5] };
+        assert_eq!(five.read().unwrap_err(), "5 areas: it takes 4 or fewer");
+        let to = |place| DestinationOrder { place }.read();
+        assert_eq!(to(Some([1.26, -3.0])).unwrap().place, Some(DecimetrePoint::new(13, -30)));
+        assert_eq!(to(None), Ok(Destination::default()));
+        assert!(to(Some([1e9, 0.0])).unwrap_err().contains("within 100 km"));
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! The surface sends its vehicles orders and requests for exemplars.
 
 use super::exemplar_cache::{ExemplarCache, RequestKind};
-use super::orders::{FenceOrder, LimitsOrder};
+use super::orders::{AreasOrder, DestinationOrder, FenceOrder, LimitsOrder};
 use super::settings::SettingsOrder;
 use super::{Surface, SurfaceOutput, VehicleRecord};
 use scenecast_protocol::directive::{Constraints, Fix, OrderStatus, Slot, SlotId, SlotProgress, Utility};
@@ -70,6 +70,22 @@ impl Surface {
         let limits = order.read()?;
         let version = self.issue(vehicle, Slot::Limits(limits), now)?;
         self.records.get_mut(&vehicle).ok_or("no such vehicle")?.limits.sent = Some(limits);
+        Ok(version)
+    }
+
+    /// Sends weighted areas. They replace the last ones.
+    pub fn set_areas(&mut self, vehicle: Address, order: &AreasOrder, now: Instant) -> Result<u16, String> {
+        let areas = order.read()?;
+        let version = self.issue(vehicle, Slot::Areas(areas.clone()), now)?;
+        self.records.get_mut(&vehicle).ok_or("no such vehicle")?.areas.sent = Some(areas);
+        Ok(version)
+    }
+
+    /// Sends a vehicle to a place before it resumes its survey, or withdraws that order.
+    pub fn set_destination(&mut self, vehicle: Address, order: &DestinationOrder, now: Instant) -> Result<u16, String> {
+        let destination = order.read()?;
+        let version = self.issue(vehicle, Slot::Destination(destination), now)?;
+        self.records.get_mut(&vehicle).ok_or("no such vehicle")?.destination.sent = Some(destination);
         Ok(version)
     }
 

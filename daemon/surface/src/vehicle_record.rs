@@ -7,7 +7,7 @@ use super::pauses::Pauses;
 use super::record::{EarlierMap, StoredLabel};
 use super::settings::SettingsRecord;
 use scenecast_core::UsblLine;
-use scenecast_protocol::directive::{ExemplarRequests, Fence, Limits, SlotId, Utility};
+use scenecast_protocol::directive::{Areas, Destination, ExemplarRequests, Fence, Limits, SlotId, Utility};
 use scenecast_protocol::exemplar::Exemplar;
 use scenecast_protocol::link::PeerView;
 use scenecast_protocol::map::LabelGrid;
@@ -69,6 +69,8 @@ pub struct VehicleRecord {
     pub utility: Utility,
     pub fence: SentOrder<Fence>,
     pub limits: SentOrder<Limits>,
+    pub areas: SentOrder<Areas>,
+    pub destination: SentOrder<Destination>,
     /// The settings that were ordered, and those in force.
     pub settings: SettingsRecord,
     pub exemplars: ExemplarCache,
@@ -148,6 +150,8 @@ impl VehicleRecord {
             utility: Utility::default(),
             fence: SentOrder::default(),
             limits: SentOrder::default(),
+            areas: SentOrder::default(),
+            destination: SentOrder::default(),
             settings: SettingsRecord::default(),
             exemplars: ExemplarCache::default(),
             track: Track::default(),
@@ -242,6 +246,8 @@ impl VehicleRecord {
         match slot {
             SlotId::Fence => self.fence.in_force = self.fence.sent.clone().map(|fence| (version, fence)),
             SlotId::Limits => self.limits.in_force = self.limits.sent.map(|limits| (version, limits)),
+            SlotId::Areas => self.areas.in_force = self.areas.sent.clone().map(|areas| (version, areas)),
+            SlotId::Destination => self.destination.in_force = self.destination.sent.map(|place| (version, place)),
             _ => {}
         }
     }

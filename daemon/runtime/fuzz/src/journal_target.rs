@@ -1,7 +1,7 @@
 //! The properties of the journal for any bytes: plain functions, run by libFuzzer and by the ordinary tests alike.
 
 use super::files::{Damaged, Files, Script};
-use super::journal::{Found, Journal, JournalNames};
+use super::journal::{BodyLayout, Found, Journal, JournalNames};
 
 const NAMES: JournalNames = JournalNames { journal: "state", copy: "state.copy" };
 const MAGICS: [&[u8; 8]; 3] = [b"scVJRN03", b"scVJRN02", b"scVJRN04"];
@@ -73,7 +73,7 @@ pub fn journal(data: &[u8]) {
     let (mut again, found) = Journal::open(files.clone(), NAMES);
     judge(&found, last.as_deref().filter(|_| !is_forged));
     again.persist(b"next").expect("a state fits");
-    let whole = Found::State { body: b"next".to_vec(), is_earlier: false, damage: None };
+    let whole = Found::State { body: b"next".to_vec(), layout: BodyLayout::Present, damage: None };
     assert_eq!(Journal::open(files, NAMES).1, whole);
 }
 

@@ -3,7 +3,7 @@
 use super::cuts::{NAMES, state};
 use super::disk::Disk;
 use super::record::{FILE_BYTES, earlier};
-use super::{Damage, Found, Journal, Storage};
+use super::{BodyLayout, Damage, Found, Journal, Storage};
 use proptest::prelude::*;
 
 /// Disk, both files after five states, and the last state.
@@ -59,7 +59,9 @@ fn records_in_a_row_would_read_as_an_older_state_at_each_border() {
         disk.put(NAMES.journal, &records[..kept].concat());
         let found = Journal::open(disk, NAMES).1;
         assert!(!is_recognised(&found, &state(37, 300)), "{kept} records");
-        assert!(matches!(found, Found::State { is_earlier: true, body, .. } if body == state(kept as u32, 300)));
+        assert!(
+            matches!(found, Found::State { layout: BodyLayout::WithoutLostOrders, body, .. } if body == state(kept as u32, 300))
+        );
     }
 }
 
@@ -78,7 +80,7 @@ fn a_journal_shifted_by_any_distance_is_never_an_older_state() {
                 disk.put(NAMES.journal, one);
                 disk.put(NAMES.copy, other);
                 // A stop while one file was written could leave the same, so it is no damage: no state is lost.
-                let whole = Found::State { body: last.clone(), is_earlier: false, damage: None };
+                let whole = Found::State { body: last.clone(), layout: BodyLayout::Present, damage: None };
                 assert_eq!(Journal::open(disk.clone(), NAMES).1, whole, "shifted by {by}");
             }
         }
@@ -97,7 +99,7 @@ fn an_old_file_in_the_place_of_the_last_is_recognised() {
         disk.put(NAMES.copy, other);
         let found = Journal::open(disk.clone(), NAMES).1;
         let damage = Some((damaged, Damage::Older));
-        assert_eq!(found, Found::State { body: last.clone(), is_earlier: false, damage });
+        assert_eq!(found, Found::State { body: last.clone(), layout: BodyLayout::Present, damage });
     }
     disk.put(NAMES.journal, &new_copy);
     disk.put(NAMES.copy, &new);
@@ -111,7 +113,7 @@ fn a_missing_file_is_damage_unless_both_are() {
         disk.remove(name);
         let damage = Some((name, Damage::Missing));
         let found = Journal::open(disk.clone(), NAMES).1;
-        assert_eq!(found, Found::State { body: last, is_earlier: false, damage });
+        assert_eq!(found, Found::State { body: last, layout: BodyLayout::Present, damage });
         disk.remove(other);
         assert_eq!(Journal::open(disk, NAMES).1, Found::Absent);
     }
@@ -124,7 +126,7 @@ fn a_damaged_file_is_put_aside_and_both_are_whole_again() {
         disk.put(name, cut);
         let mut run = Journal::open(disk.clone(), NAMES).0;
         run.persist(b"next").unwrap();
-        let whole = Found::State { body: b"next".to_vec(), is_earlier: false, damage: None };
+        let whole = Found::State { body: b"next".to_vec(), layout: BodyLayout::Present, damage: None };
         assert_eq!(Journal::open(disk.clone(), NAMES).1, whole);
         assert_eq!(disk.read(&format!("{name}.damaged")).unwrap().as_deref(), Some(cut));
     }
@@ -135,9 +137,9 @@ fn the_journal_of_an_earlier_build_is_continued() {
     let disk = Disk::default();
     disk.put(NAMES.journal, &(1..=4).flat_map(|n| earlier::encode(n, &state(n as u32, 50))).collect::<Vec<u8>>());
     let (mut journal, found) = Journal::open(disk.clone(), NAMES);
-    assert_eq!(found, Found::State { body: state(4, 50), is_earlier: true, damage: None });
+    assert_eq!(found, Found::State { body: state(4, 50), layout: BodyLayout::WithoutLostOrders, damage: None });
     journal.persist(b"next").unwrap();
-    let whole = Found::State { body: b"next".to_vec(), is_earlier: false, damage: None };
+    let whole = Found::State { body: b"next".to_vec(), layout: BodyLayout::Present, damage: None };
     assert_eq!(Journal::open(disk, NAMES).1, whole);
 }
 

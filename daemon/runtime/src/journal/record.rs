@@ -3,7 +3,9 @@
 /// Kind of file, without its version.
 const KIND: &[u8; 6] = b"scVJRN";
 /// Magic bytes and version of a record.
-const MAGIC: &[u8; 8] = b"scVJRN03";
+const MAGIC: &[u8; 8] = b"scVJRN04";
+/// Those of the version before, which differs in the body only.
+const MAGIC_OF_EIGHT_SLOTS: &[u8; 8] = b"scVJRN03";
 const HEAD: usize = 21;
 const TAIL: usize = 4;
 
@@ -55,18 +57,29 @@ impl RecordContent {
     }
 }
 
+/// The layout of a body.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum BodyLayout {
+    /// Version 2: eight slots, and no lost orders.
+    WithoutLostOrders,
+    /// Version 3: eight slots.
+    EightSlots,
+    Present,
+}
+
 /// A record as it was read.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Record {
     /// One more than that of the record before it, across files and runs.
     pub(super) sequence: u64,
+    pub(super) layout: BodyLayout,
     pub(super) body: Vec<u8>,
 }
 
 /// The bytes of a file: one record, and zeros up to the length of the file. `None` if the state is too long.
 ///
 /// ```text
-/// bytes 0-7     "scVJRN03"
+/// bytes 0-7     "scVJRN04"
 /// byte  8       number of the file: 0 for vehicle.journal, 1 for its copy
 /// bytes 9-16    sequence number, big-endian
 /// bytes 17-20   n, length of the body, big-endian
@@ -75,7 +88,7 @@ pub(super) struct Record {
 /// to 16384      zero
 /// ```
 pub(super) fn encode(number: u8, record: &Record) -> Option<Vec<u8>> {
-    let Record { sequence, body } = record;
+    let Record { sequence, body, .. } = record;
     let length = u32::try_from(body.len()).ok().filter(|_| body.len() <= MAX_BODY_BYTES)?;
     let mut bytes = [&MAGIC[..], &[number], &sequence.to_be_bytes(), &length.to_be_bytes(), body].concat();
     let crc = CRC.checksum(&bytes);
@@ -105,11 +118,18 @@ pub(super) fn read(number: u8, bytes: &[u8]) -> RecordContent {
 
 fn is_other_version(bytes: &[u8]) -> bool {
     let version = bytes.strip_prefix(KIND).and_then(|rest| rest.first_chunk::<2>());
-    version.is_some_and(|v| v.iter().all(u8::is_ascii_digit) && !bytes.starts_with(MAGIC))
+    version.is_some_and(|v| v.iter().all(u8::is_ascii_digit) && body_layout(bytes).is_none())
+}
+
+/// The layout of the body in a file of a fixed length.
+fn body_layout(bytes: &[u8]) -> Option<BodyLayout> {
+    let layouts = [(MAGIC, BodyLayout::Present), (MAGIC_OF_EIGHT_SLOTS, BodyLayout::EightSlots)];
+    layouts.into_iter().find(|(magic, _)| bytes.starts_with(*magic)).map(|(_, layout)| layout)
 }
 
 fn decode(number: u8, bytes: &[u8]) -> Option<Record> {
-    let rest = bytes.strip_prefix(MAGIC)?.strip_prefix(&[number])?;
+    let layout = body_layout(bytes)?;
+    let rest = bytes.get(MAGIC.len()..)?.strip_prefix(&[number])?;
     let (sequence, rest) = rest.split_first_chunk::<8>()?;
     let (length, rest) = rest.split_first_chunk::<4>()?;
     let length = u32::from_be_bytes(*length) as usize;
@@ -117,12 +137,12 @@ fn decode(number: u8, bytes: &[u8]) -> Option<Record> {
     let (crc, _) = rest.split_first_chunk::<TAIL>()?;
     let covered = bytes.get(..HEAD + length)?;
     let sound = CRC.checksum(covered) == u32::from_be_bytes(*crc);
-    sound.then(|| Record { sequence: u64::from_be_bytes(*sequence), body: body.to_vec() })
+    sound.then(|| Record { sequence: u64::from_be_bytes(*sequence), layout, body: body.to_vec() })
 }
 
 /// The layout of earlier builds: a growing file of records at multiples of 4096 bytes, the last of which is valid.
 pub(super) mod earlier {
-    use super::{CRC, Record, TAIL};
+    use super::{BodyLayout, CRC, Record, TAIL};
 
     pub(super) const MAGIC: &[u8; 8] = b"scVJRN02";
     const HEAD: usize = 20;
@@ -136,7 +156,8 @@ pub(super) mod earlier {
         let (crc, _) = rest.split_first_chunk::<TAIL>()?;
         let covered = bytes.get(..HEAD + length)?;
         let sound = CRC.checksum(covered) == u32::from_be_bytes(*crc);
-        sound.then(|| Record { sequence: u64::from_be_bytes(*sequence), body: body.to_vec() })
+        let layout = BodyLayout::WithoutLostOrders;
+        sound.then(|| Record { sequence: u64::from_be_bytes(*sequence), layout, body: body.to_vec() })
     }
 
     /// The last whole record; `None` if there is none, or if an unreadable one precedes an intact one.
@@ -172,17 +193,27 @@ mod tests {
     use super::*;
 
     fn record(sequence: u64, body: &[u8]) -> Record {
-        Record { sequence, body: body.to_vec() }
+        Record { sequence, layout: BodyLayout::Present, body: body.to_vec() }
+    }
+
+    #[test]
+    fn a_record_of_the_version_before_is_read() {
+        let mut bytes = encode(1, &record(0x0102, b"abc")).unwrap();
+        bytes[7] = b'3';
+        let crc = CRC.checksum(&bytes[..24]).to_be_bytes();
+        bytes[24..28].copy_from_slice(&crc);
+        let before = Record { layout: BodyLayout::EightSlots, ..record(0x0102, b"abc") };
+        assert_eq!(read(1, &bytes), RecordContent::Sound(before));
     }
 
     #[test]
     fn the_layout_is_as_documented() {
         let bytes = encode(1, &record(0x0102, b"abc")).unwrap();
         assert_eq!(bytes.len(), FILE_BYTES);
-        assert_eq!(bytes[..24], *b"scVJRN03\x01\0\0\0\0\0\0\x01\x02\0\0\0\x03abc");
+        assert_eq!(bytes[..24], *b"scVJRN04\x01\0\0\0\0\0\0\x01\x02\0\0\0\x03abc");
         assert_eq!(bytes[24..28], CRC.checksum(&bytes[..24]).to_be_bytes());
         assert!(bytes[28..].iter().all(|&b| b == 0));
-        assert_eq!(read(1, &bytes), RecordContent::Sound(Record { sequence: 0x0102, body: b"abc".to_vec() }));
+        assert_eq!(read(1, &bytes), RecordContent::Sound(record(0x0102, b"abc")));
         assert_eq!(read(0, &bytes), RecordContent::Torn, "the copy in the place of the journal");
     }
 
@@ -208,7 +239,9 @@ mod tests {
     #[test]
     fn the_last_record_of_an_earlier_build_is_read() {
         let file = |numbers: &[u64]| numbers.iter().flat_map(|&n| earlier::encode(n, &[n as u8; 5000])).collect();
-        let last = |sequence: u64| RecordContent::Earlier(Record { sequence, body: vec![sequence as u8; 5000] });
+        let layout = BodyLayout::WithoutLostOrders;
+        let last =
+            |sequence: u64| RecordContent::Earlier(Record { sequence, layout, body: vec![sequence as u8; 5000] });
         let whole: Vec<u8> = file(&[5, 6, 7]);
         assert_eq!(read(0, &whole), last(7));
         assert_eq!(read(0, &whole[..whole.len() - 8192]), last(6), "this layout does not show a lost end");

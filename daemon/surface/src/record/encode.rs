@@ -3,8 +3,8 @@
 use super::event::Event;
 
 /// The version of the layout of events. A build reads its own version and earlier ones.
-/// Layout 2 appends events to layout 1.
-const SCHEMA: u16 = 2;
+/// Layouts 2 and 3 append events to the layout before.
+const SCHEMA: u16 = 3;
 
 /// The reason that bytes are no batch of events.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
@@ -38,7 +38,9 @@ pub fn decode(bytes: &[u8]) -> Result<Vec<Event>, DecodeError> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::event::{EventKind, EventSource, EventTime, RunId, StoredCells, StoredMarker, VehicleEvent};
+    use super::super::event::{
+        EventKind, EventSource, EventTime, RunId, StoredCells, StoredMarker, StoredPlaces, VehicleEvent,
+    };
     use super::*;
     use proptest::prelude::*;
 
@@ -72,7 +74,8 @@ mod tests {
         };
         assert_eq!(decode(&golden(1)), Ok(events()));
         assert_eq!(decode(&golden(2)), Ok(events()));
-        assert_eq!(encode(&events()), golden(2));
+        assert_eq!(decode(&golden(3)), Ok(events()));
+        assert_eq!(encode(&events()), golden(3));
     }
 
     #[test]
@@ -88,7 +91,7 @@ mod tests {
         };
         let events = [event(marker, 1), event(VehicleEvent::MarkerGone(300), 2)];
         let golden = [
-            &[0, 2, 2][..],
+            &[0, 3, 2][..],
             &[1, 0xE8, 0x07, 0xD0, 0x0F, 0, 2, 1, 16, 0xAC, 2],
             &1.5f64.to_le_bytes(),
             &(-2.0f64).to_le_bytes(),
@@ -100,8 +103,19 @@ mod tests {
     }
 
     #[test]
+    fn golden_bytes_of_places() {
+        let places = StoredPlaces { areas_in_force: Some((300, vec![7, 8])), ..StoredPlaces::default() };
+        let kind = EventKind::Vehicle(1, VehicleEvent::Places(places));
+        let time = EventTime { mission_us: 1000, unix_ms: 2000 };
+        let events = [Event { sequence: 1, time, source: EventSource::Surface, kind }];
+        let golden = [0, 3, 1, 1, 0xE8, 0x07, 0xD0, 0x0F, 0, 2, 1, 18, 0, 1, 0xAC, 2, 2, 7, 8, 0, 0];
+        assert_eq!(encode(&events), golden);
+        assert_eq!(decode(&golden).as_deref(), Ok(&events[..]));
+    }
+
+    #[test]
     fn a_later_layout_is_refused_by_its_number() {
-        assert_eq!(decode(&[0, 3, 0]), Err(DecodeError::Later(3)));
+        assert_eq!(decode(&[0, 4, 0]), Err(DecodeError::Later(4)));
         assert_eq!(decode(&[0, 0, 0]), Err(DecodeError::Damaged));
         assert_eq!(decode(&[0]), Err(DecodeError::Damaged));
     }
@@ -109,7 +123,7 @@ mod tests {
     proptest! {
         #[test]
         fn any_bytes_decode_or_are_refused(bytes in proptest::collection::vec(any::<u8>(), 0..200)) {
-            let _ = decode(&[&[0, 2], &bytes[..]].concat());
+            let _ = decode(&[&[0, 3], &bytes[..]].concat());
         }
     }
 }

@@ -83,6 +83,8 @@ pub enum VehicleEvent {
     Marker(StoredMarker),
     /// The number of a marker that was removed. Since layout 2.
     MarkerGone(u32),
+    /// Areas and destination as they are shown. Since layout 3.
+    Places(StoredPlaces),
 }
 
 /// A run of a vehicle and the epoch of its labels.
@@ -126,6 +128,15 @@ pub struct StoredOrder {
     pub status: u8,
     pub issued: u64,
     pub changed: u64,
+}
+
+/// Weighted areas and the destination as they are shown; payloads are slots as on the wire.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct StoredPlaces {
+    pub areas: Option<Vec<u8>>,
+    pub areas_in_force: Option<(u16, Vec<u8>)>,
+    pub destination: Option<Vec<u8>>,
+    pub destination_in_force: Option<(u16, Vec<u8>)>,
 }
 
 /// Orders as they are shown; payloads are slots as on the wire.

@@ -4,7 +4,7 @@ use super::cells::{EarlierMap, MapCopy};
 use super::contact::StoredContact;
 use super::event::{
     Event, EventKind, EventTime, RunId, StoredBudget, StoredImage, StoredIntent, StoredLabel, StoredMarker, StoredNote,
-    StoredOrder, StoredRequest, VehicleEvent,
+    StoredOrder, StoredPlaces, StoredRequest, VehicleEvent,
 };
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
@@ -56,6 +56,7 @@ pub struct VehicleMemory {
     /// The series of the versions of the orders; 0 before the first.
     pub(crate) series: u64,
     pub(crate) intent: StoredIntent,
+    pub(crate) places: StoredPlaces,
     /// By label, in the order of arrival.
     pub(crate) exemplars: BTreeMap<u8, Vec<StoredImage>>,
     /// Serial number of requests and the open one, by label.
@@ -192,6 +193,7 @@ impl VehicleMemory {
                 self.orders.clone_from(orders);
             }
             VehicleEvent::Intent(intent) => self.intent.clone_from(intent),
+            VehicleEvent::Places(places) => self.places.clone_from(places),
             VehicleEvent::Exemplar { label, image } => {
                 let images = self.exemplars.entry(*label).or_default();
                 images.retain(|kept| kept.number != image.number);
@@ -262,6 +264,7 @@ impl VehicleMemory {
             VehicleEvent::MapVersion(self.map_version),
             VehicleEvent::Orders { series: self.series, orders: self.orders.clone() },
             VehicleEvent::Intent(self.intent.clone()),
+            VehicleEvent::Places(self.places.clone()),
         ]);
         let request = |(&label, &(serial, open))| VehicleEvent::Request { label, serial, open };
         all.extend(self.requests.iter().map(request));

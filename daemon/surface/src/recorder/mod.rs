@@ -318,6 +318,10 @@ fn order_changes(record: &VehicleRecord, view: &PeerView<'_>, memory: &VehicleMe
     if memory.intent != intent {
         events.push(VehicleEvent::Intent(intent));
     }
+    let places = stored::places(record);
+    if memory.places != places {
+        events.push(VehicleEvent::Places(places));
+    }
     let labels: BTreeSet<u8> = record.annotations.labels.keys().chain(memory.labels.keys()).copied().collect();
     for label in labels {
         let book = record.annotations.labels.get(&label).cloned().unwrap_or_default();

@@ -28,7 +28,7 @@ pub(super) fn restore(surface: &mut Surface, memory: &SurfaceMemory, configured:
         if !surface.link.restore_orders(address, series, orders, now) {
             continue;
         }
-        surface.link.restore_in_force(address, stored::learned(&vehicle.intent));
+        surface.link.restore_in_force(address, stored::learned(&vehicle.intent, &vehicle.places));
         let record = surface.records.entry(address).or_insert_with(|| VehicleRecord::new(vehicle.name.clone()));
         restore_record(record, vehicle);
     }
@@ -37,6 +37,7 @@ pub(super) fn restore(surface: &mut Surface, memory: &SurfaceMemory, configured:
 fn restore_record(record: &mut VehicleRecord, memory: &VehicleMemory) {
     (record.run, record.epoch) = (memory.id.run, memory.id.epoch);
     stored::restore_intent(&memory.intent, record);
+    stored::restore_places(&memory.places, record);
     let points = memory.track.iter().map(|&(at, x, y)| (Instant::from_micros(at), x, y));
     record.track = Track::restored(points, memory.track_total);
     let last_received = memory.contact.last_received.map(Instant::from_micros);

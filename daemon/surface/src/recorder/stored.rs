@@ -1,11 +1,12 @@
 //! The surface's types as they are stored, and back.
 
 use crate::exemplar_cache::{OpenRequest, RequestState, StoredExemplar};
-use crate::record::{StoredContact, StoredImage, StoredIntent, StoredOrder, StoredRange, StoredRequest};
+use crate::record::{StoredContact, StoredImage, StoredIntent, StoredOrder, StoredPlaces, StoredRange, StoredRequest};
 use crate::settings::SettingsRecord;
 use crate::vehicle_record::VehicleRecord;
 use scenecast_protocol::directive::{
-    ExemplarRequest, Fence, Limits, OrderStatus, RefusalReason, Settings, Slot, SlotProgress, Utility, VersionedSlot,
+    Areas, Destination, ExemplarRequest, Fence, Limits, OrderStatus, RefusalReason, Settings, Slot, SlotProgress,
+    Utility, VersionedSlot,
 };
 use scenecast_protocol::link::PeerView;
 use scenecast_protocol::time::Instant;
@@ -97,10 +98,38 @@ pub(super) fn intent(record: &VehicleRecord) -> StoredIntent {
     }
 }
 
-/// The contents in force of the fence, the limits and the settings, which need not be those of this surface's orders.
-pub(super) fn learned(stored: &StoredIntent) -> impl Iterator<Item = Slot> {
+pub(super) fn places(record: &VehicleRecord) -> StoredPlaces {
+    let areas = |areas: &Areas| slot_bytes(&Slot::Areas(areas.clone()));
+    let place = |place: &Destination| slot_bytes(&Slot::Destination(*place));
+    StoredPlaces {
+        areas: record.areas.sent.as_ref().map(areas),
+        areas_in_force: record.areas.in_force.as_ref().map(|(version, a)| (*version, areas(a))),
+        destination: record.destination.sent.as_ref().map(place),
+        destination_in_force: record.destination.in_force.as_ref().map(|(version, d)| (*version, place(d))),
+    }
+}
+
+/// Puts areas and destination back into the record, as far as this build reads them.
+pub(super) fn restore_places(stored: &StoredPlaces, record: &mut VehicleRecord) {
+    let areas = |bytes: &Vec<u8>| match slot(bytes) {
+        Some(Slot::Areas(areas)) => Some(areas),
+        _ => None,
+    };
+    let place = |bytes: &Vec<u8>| match slot(bytes) {
+        Some(Slot::Destination(destination)) => Some(destination),
+        _ => None,
+    };
+    record.areas.sent = stored.areas.as_ref().and_then(areas);
+    record.areas.in_force = stored.areas_in_force.as_ref().and_then(|(v, bytes)| Some((*v, areas(bytes)?)));
+    record.destination.sent = stored.destination.as_ref().and_then(place);
+    record.destination.in_force = stored.destination_in_force.as_ref().and_then(|(v, bytes)| Some((*v, place(bytes)?)));
+}
+
+/// The contents in force of fence, limits, settings, areas and destination, which need not be those of this surface's orders.
+pub(super) fn learned<'a>(stored: &'a StoredIntent, places: &'a StoredPlaces) -> impl Iterator<Item = Slot> + 'a {
     let settings = (!stored.settings_unsure).then_some(&stored.settings_in_force);
-    let orders = [&stored.fence_in_force, &stored.limits_in_force];
+    let orders =
+        [&stored.fence_in_force, &stored.limits_in_force, &places.areas_in_force, &places.destination_in_force];
     let orders = orders.into_iter().filter_map(|order| order.as_ref().map(|(_, bytes)| bytes));
     orders.chain(settings).filter_map(|bytes| slot(bytes))
 }
