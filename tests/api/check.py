@@ -20,6 +20,8 @@ ORDERS = {
     "set_utility": {"weights": {}, "exploration": 0.1},
     "set_constraints": {"hold": False},
     "set_fence": {"fence": [[-500, -500], [500, -500], [500, 500], [-500, 500]], "keep_outs": [], "return_point": [0, 0]},
+    "set_areas": {"areas": [{"outline": [[0, 0], [30, 0], [30, 20]], "weight": 0.5}]},
+    "set_destination": {"place": [20, 10]},
     "set_limits": {"depth_m": [0, 500], "on_silence": "hold"},
     "set_settings": {"planner": "greedy", "gamma": 1e-5, "cells": "coarse-to-fine", "layers": "depth", "alpha": 0},
     "change_command": {"action": "take"},

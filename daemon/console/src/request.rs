@@ -15,7 +15,8 @@ use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::Address;
 use scenecast_surface::record::{StoredLabel, VehicleMemory};
 use scenecast_surface::{
-    CommandAction, CommandRefusal, FenceOrder, LimitsOrder, OrderKind, Principal, RequestKind, SettingsOrder, Surface,
+    AreasOrder, CommandAction, CommandRefusal, DestinationOrder, FenceOrder, LimitsOrder, OrderKind, Principal,
+    RequestKind, SettingsOrder, Surface,
 };
 use std::collections::BTreeMap;
 
@@ -43,6 +44,8 @@ pub enum SurfaceRequest {
     Constraints(u8, Constraints),
     Fence(u8, FenceOrder),
     Limits(u8, LimitsOrder),
+    Areas(u8, AreasOrder),
+    Destination(u8, DestinationOrder),
     Settings(u8, SettingsOrder),
     /// Change the bit budget, the shares and the background streams.
     Budget(BudgetOrder),
@@ -80,6 +83,8 @@ impl SurfaceRequest {
             | Self::Constraints(..)
             | Self::Fence(..)
             | Self::Limits(..)
+            | Self::Areas(..)
+            | Self::Destination(..)
             | Self::Budget(_) => Some(OrderKind::Order),
             Self::Settings(..) => Some(OrderKind::Settings),
         }
@@ -181,6 +186,14 @@ fn handle(surface: &mut Surface, request: SurfaceRequest, cell_m: f64, now: Inst
         SurfaceRequest::Limits(id, order) => {
             let vehicle = known(surface, id)?;
             accepted(vehicle, SlotId::Limits, surface.set_limits(vehicle, &order, now))
+        }
+        SurfaceRequest::Areas(id, order) => {
+            let vehicle = known(surface, id)?;
+            accepted(vehicle, SlotId::Areas, surface.set_areas(vehicle, &order, now))
+        }
+        SurfaceRequest::Destination(id, order) => {
+            let vehicle = known(surface, id)?;
+            accepted(vehicle, SlotId::Destination, surface.set_destination(vehicle, &order, now))
         }
         SurfaceRequest::Settings(id, order) => {
             let vehicle = known(surface, id)?;

@@ -1,6 +1,6 @@
 // The order status of the directive slots: queued -> on_air -> received -> applied | refused.
 
-const SLOTS = ["utility", "constraints", "settings", "budget", "requests", "fix", "limits", "fence"];
+const SLOTS = ["utility", "constraints", "settings", "budget", "requests", "fix", "limits", "fence", "destination", "areas"];
 const REASONS = {
   utility: "label 3 was retired under epoch 1",
   constraints: "holding here would break the return margin",
@@ -8,6 +8,7 @@ const REASONS = {
   limits: "depth_m: the vehicle flies at 16.4 m",
   settings: "a value is outside what the vehicle accepts",
   budget: "below the 500 bit/s that status needs",
+  destination: "it contradicts itself or a constraint in force",
   requests: "no image kept for this label",
 };
 

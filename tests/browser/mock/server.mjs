@@ -166,7 +166,7 @@ async function post(mock, req, res, path) {
     if ("planner" in given) v.planner = given.planner || null;
     return accepted(mock, res, v.directive.issue("settings", mission.nowS, (s) => v.settings.finish(s)));
   }
-  const orders = { fence: () => fence(given), limits: () => limits(given) };
+  const orders = { fence: () => fence(given), limits: () => limits(given), areas: () => given, destination: () => given };
   if (resource in orders) {
     const order = orders[resource]();
     v[resource] = order;

@@ -59,6 +59,39 @@ export default [
     },
   },
   {
+    name: "a weighted area is drawn, weighed, sent and shown as in force; its corners and those of the fence are edited apart",
+    async run(s) {
+      await s.shows("#vehicle .age", /Status/, { ms: 60000, advance: 5 });
+      await clear(s);
+      await s.button("Fit").click();
+      await draw(s, "Draw area", [0.3, 0.3], [0.6, 0.3], [0.6, 0.6]);
+      await field(s, "Weight of Area 1").fill("-0.4");
+      await s.shows("[aria-labelledby=areas-title] output", /−0\.40/);
+      await s.page.locator("#send-areas").click();
+      await s.until("the message", () => s.posts.some((p) => p.path.endsWith("/areas")));
+      const sent = s.posts.at(-1).body.areas;
+      assert.deepEqual([sent.length, sent[0].outline.length, sent[0].weight], [1, 3, -0.4]);
+      await s.shows("[aria-labelledby=areas-title] .steps [aria-current]", /Applied/, { ms: 240000, advance: 2 });
+      await s.until("the area in force", async () => (await state(s)).areas_in_force?.order.areas.length === 1, { advance: 2 });
+      await draw(s, "Draw fence", ...AROUND);
+      // The drag takes hold of a corner of the area; the fence stays as it was drawn.
+      const box = await s.page.locator("#chart").boundingBox();
+      await s.page.mouse.move(box.x + 0.6 * box.width, box.y + 0.6 * box.height);
+      await s.page.mouse.down();
+      await s.page.mouse.move(box.x + 0.65 * box.width, box.y + 0.7 * box.height, { steps: 4 });
+      await s.page.mouse.up();
+      await s.until("the edit", () => s.page.locator("#send-areas").isEnabled());
+      await s.page.locator("#send-areas").click();
+      await s.until("another message", () => s.posts.filter((p) => p.path.endsWith("/areas")).length === 2);
+      const moved = s.posts.at(-1).body.areas[0].outline;
+      assert.deepEqual(moved.slice(0, 2), sent[0].outline.slice(0, 2));
+      assert.notDeepEqual(moved[2], sent[0].outline[2]);
+      await s.page.getByRole("button", { name: "Delete Area 1" }).click();
+      await s.page.locator("#send-areas").click();
+      await s.until("no area", () => s.posts.filter((p) => p.path.endsWith("/areas")).at(-1).body.areas.length === 0);
+    },
+  },
+  {
     name: "a fence under way is dashed, one in force solid",
     scenario: "rich",
     async run(s) {
@@ -134,7 +167,10 @@ export default [
     async run(s) {
       await open(s);
       await draw(s, "Draw fence", ...AROUND);
-      const plan = () => s.inPage(async () => (await import("/js/fence/edit.js")).plan().outlines[0].points);
+      const plan = () => s.inPage(async () => {
+        const { fenceOrder, planOf } = await import("/js/fence/edit.js");
+        return planOf(fenceOrder).outlines[0].points;
+      });
       const first = await plan();
       const box = await s.page.locator("#chart").boundingBox();
       const drag = async (from, to) => {
@@ -170,7 +206,10 @@ export default [
       await press("ArrowDown", 8), await press("Enter", 1);
       await press("ArrowLeft", 10), await press("Enter", 1);
       await press("Escape", 1);
-      const plan = () => s.inPage(async () => (await import("/js/fence/edit.js")).plan().outlines[0].points);
+      const plan = () => s.inPage(async () => {
+        const { fenceOrder, planOf } = await import("/js/fence/edit.js");
+        return planOf(fenceOrder).outlines[0].points;
+      });
       const drawn = await plan();
       assert.equal(drawn.length, 4);
       await press("n", 1);

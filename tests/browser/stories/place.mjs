@@ -55,6 +55,38 @@ export default [
     },
   },
   {
+    name: "the vehicle is sent to a place, the plate shows how far the order has come, and the order is withdrawn",
+    scenario: "start",
+    async run(s) {
+      const cell = await aCell(s);
+      await s.page.mouse.click(cell.px, cell.py);
+      await s.button("Go there").click();
+      await s.shows(`${plate} .steps [aria-current]`, /Applied/, { ms: 240000, advance: 2 });
+      const vehicle = (await s.get("/state")).vehicles[0];
+      const [x, y] = vehicle.destination_in_force.order.place;
+      assert.ok(Math.hypot(x - cell.x, y - cell.y) < 0.3, JSON.stringify([x, y, cell]));
+      await s.button("Close the place").click();
+      const [px, py] = await s.inPage(({ view }, place) => view.toScreen(...place), [x, y]);
+      const box = await s.page.locator("#chart").boundingBox();
+      await s.page.mouse.click(box.x + px + 2, box.y + py + 2);
+      await s.button("Withdraw the destination").click();
+      await s.until("no destination", () => s.inPage(({ store }) => store.vehicle.destination_in_force === null), { ms: 240000, advance: 2 });
+      assert.ok(await s.button("Go there").isVisible());
+    },
+  },
+  {
+    name: "a destination that the vehicle refuses shows the reason",
+    scenario: "start",
+    async run(s) {
+      await s.steer({ refuse: "destination", loss: 0 });
+      const cell = await aCell(s);
+      await s.page.mouse.click(cell.px, cell.py);
+      await s.button("Go there").click();
+      await s.shows(`${plate} .order-status`, /Refused.*a constraint in force/s, { advance: 3 });
+      assert.ok(await s.button("Go there").isVisible(), "it can be given again");
+    },
+  },
+  {
     name: "with the keyboard the cross chooses the place, and Escape leaves it",
     scenario: "start",
     async run(s) {

@@ -51,6 +51,10 @@ export const requestExemplar = (id, label, action, image = null) =>
   write(`/vehicles/${id}/exemplars`, { label, action, ...(image && { image }) });
 export const sendConstraints = (id, order) => write(`/vehicles/${id}/constraints`, order);
 export const sendFence = (id, fence) => write(`/vehicles/${id}/fence`, fence);
+/** `areas`: [{ outline: [[x, y], ..], weight }]. */
+export const sendAreas = (id, areas) => write(`/vehicles/${id}/areas`, { areas });
+/** `place`: [x, y], or null to withdraw the destination. */
+export const sendDestination = (id, place) => write(`/vehicles/${id}/destination`, { place });
 export const sendLimits = (id, limits) => write(`/vehicles/${id}/limits`, limits);
 export const sendSettings = (id, settings) => write(`/vehicles/${id}/settings`, settings);
 /** The most informative settings within `bps` bit/s; null: within the map's share of the vehicle's budget. */

@@ -15,10 +15,10 @@ use std::path::Path;
 
 /// The last order sent, its progress, and the order in force.
 #[derive(Debug, Serialize)]
-struct OrderView<'a, T> {
-    sent: &'a Option<T>,
-    slot: Option<&'a OrderProgress>,
-    in_force: &'a Option<AppliedOrder<T>>,
+pub(super) struct OrderView<'a, T> {
+    pub(super) sent: &'a Option<T>,
+    pub(super) slot: Option<&'a OrderProgress>,
+    pub(super) in_force: &'a Option<AppliedOrder<T>>,
 }
 
 /// Prints the last fence sent and the one in force.
@@ -100,7 +100,7 @@ pub async fn send_constraints(session: &Session, order: ConstraintsOrder) -> Res
     send(session, session.choose(&state)?, "constraints", &order).await
 }
 
-async fn send(
+pub(super) async fn send(
     session: &Session,
     vehicle: &VehicleState,
     resource: &str,
@@ -112,7 +112,7 @@ async fn send(
 
 /// Longitude and latitude if the mission has an origin, as in the files of `ctl map`.
 /// Degrees have a place only around the mission's origin.
-fn degrees(state: &MissionState) -> Result<CoordinateFrame, UserError> {
+pub(super) fn degrees(state: &MissionState) -> Result<CoordinateFrame, UserError> {
     let origin = state.mission.origin.and_then(|o| LatLon::new(o.lat_deg, o.lon_deg));
     let origin = origin.ok_or(UserError::Input(
         "the mission has no origin (mission.origin_deg), so degrees have no place; --metres reads metres east and north"
@@ -121,12 +121,12 @@ fn degrees(state: &MissionState) -> Result<CoordinateFrame, UserError> {
     Ok(CoordinateFrame::Wgs84(TangentPlane::new(origin)))
 }
 
-fn slot<'a>(vehicle: &'a VehicleState, name: &str) -> Option<&'a OrderProgress> {
+pub(super) fn slot<'a>(vehicle: &'a VehicleState, name: &str) -> Option<&'a OrderProgress> {
     vehicle.orders.directive.slots.iter().find(|s| s.slot == name)
 }
 
 impl<T: PartialEq> OrderView<'_, T> {
-    fn text(&self, now_s: f64, describe: fn(&T) -> String) -> String {
+    pub(super) fn text(&self, now_s: f64, describe: fn(&T) -> String) -> String {
         let Some((sent, slot)) = self.sent.as_ref().zip(self.slot) else {
             return "none sent since the surface started; the vehicle keeps those that it has\n".to_owned();
         };

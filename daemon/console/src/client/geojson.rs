@@ -1,8 +1,8 @@
-//! Reads a fence from a GeoJSON file (RFC 7946).
+//! Reads a fence, or weighted areas, from a GeoJSON file (RFC 7946).
 
 use scenecast_core::UserError;
 use scenecast_core::{LatLon, TangentPlane};
-use scenecast_surface::{FenceOrder, MAX_DISTANCE_M};
+use scenecast_surface::{AreaOrder, AreasOrder, FenceOrder, MAX_DISTANCE_M};
 use serde_json::Value;
 use std::path::Path;
 
@@ -28,15 +28,46 @@ enum FeatureRole {
 /// Reads fence, keep-outs and return point.
 pub(super) fn read_fence(file: &Path, frame: CoordinateFrame) -> Result<FenceOrder, UserError> {
     let error = |line: String| UserError::file(file, line);
+    let order = fence_of(&read_json(file)?, frame).map_err(error)?;
+    order.read().map_err(error)?;
+    Ok(order)
+}
+
+/// Reads weighted areas: polygons with the property `weight`.
+pub(super) fn read_areas(file: &Path, frame: CoordinateFrame) -> Result<AreasOrder, UserError> {
+    let error = |line: String| UserError::file(file, line);
+    let order = areas_of(&read_json(file)?, frame).map_err(error)?;
+    order.read().map_err(error)?;
+    Ok(order)
+}
+
+fn areas_of(whole: &Value, frame: CoordinateFrame) -> Result<AreasOrder, String> {
+    let features = match whole["type"].as_str() {
+        Some("FeatureCollection") => whole["features"].as_array().ok_or("the collection has no list of features")?,
+        Some("Feature") => std::slice::from_ref(whole),
+        other => return Err(format!("type {}: expected a FeatureCollection", other.unwrap_or("is missing"))),
+    };
+    let area = |(i, feature): (usize, &Value)| {
+        let geometry = &feature["geometry"];
+        let weight = feature["properties"]["weight"].as_f64().ok_or("the property weight is not a number");
+        let outline = match geometry["type"].as_str() {
+            Some("Polygon") => outline(&geometry["coordinates"], frame),
+            other => Err(format!("geometry {}: expected a Polygon", other.unwrap_or("null"))),
+        };
+        let area = outline.and_then(|outline| Ok(AreaOrder { outline, weight: weight? }));
+        area.map_err(|line| format!("features[{i}]: {line}"))
+    };
+    Ok(AreasOrder { areas: features.iter().enumerate().map(area).collect::<Result<_, _>>()? })
+}
+
+fn read_json(file: &Path) -> Result<Value, UserError> {
+    let error = |line: String| UserError::file(file, line);
     let size = std::fs::metadata(file).map_err(|e| error(e.to_string()))?.len();
     if size > MAX_BYTES {
         return Err(error(format!("it has {size} bytes: at most {MAX_BYTES} are read")));
     }
     let text = std::fs::read(file).map_err(|e| error(e.to_string()))?;
-    let whole: Value = serde_json::from_slice(&text).map_err(|e| error(format!("it is not JSON: {e}")))?;
-    let order = fence_of(&whole, frame).map_err(error)?;
-    order.read().map_err(error)?;
-    Ok(order)
+    serde_json::from_slice(&text).map_err(|e| error(format!("it is not JSON: {e}")))
 }
 
 fn fence_of(whole: &Value, frame: CoordinateFrame) -> Result<FenceOrder, String> {
@@ -170,6 +201,22 @@ mod tests {
         assert_eq!(order.keep_outs, [vec![[1.0, 1.0], [2.0, 1.0], [2.0, 2.0]]]);
         assert_eq!(order.return_point, Some([5.0, 6.0]));
         assert_eq!(read(SQUARE, CoordinateFrame::Metres).unwrap().fence, order.fence);
+    }
+
+    #[test]
+    fn polygons_with_a_weight_become_areas() {
+        let areas = |json: &str| areas_of(&serde_json::from_str(json).unwrap(), CoordinateFrame::Metres);
+        let feature = format!(r#"{{"type": "Feature", "properties": {{"weight": -0.5}}, "geometry": {SQUARE}}}"#);
+        let outline = vec![[0.0, 0.0], [90.0, 0.0], [90.0, 60.0], [0.0, 60.0]];
+        let order = AreasOrder { areas: vec![AreaOrder { outline, weight: -0.5 }] };
+        assert_eq!(areas(&feature), Ok(order.clone()));
+        let list = format!(r#"{{"type": "FeatureCollection", "features": [{feature}]}}"#);
+        assert_eq!(areas(&list), Ok(order));
+        let refused =
+            |feature: &str| areas(&format!(r#"{{"type": "FeatureCollection", "features": [{feature}]}}"#)).unwrap_err();
+        assert_eq!(refused(&feature.replace("-0.5", "null")), "features[0]: the property weight is not a number");
+        let point = r#"{"properties": {"weight": 1}, "geometry": {"type": "Point", "coordinates": [1, 2]}}"#;
+        assert_eq!(refused(point), "features[0]: geometry Point: expected a Polygon");
     }
 
     #[test]

@@ -8,6 +8,7 @@ mod follow;
 mod geojson;
 mod http;
 mod orders;
+mod places;
 mod session;
 mod settings;
 mod text;
@@ -20,6 +21,7 @@ pub use constraints::{
 pub use download::{cancel_exemplar, save_exemplar, save_map};
 pub use http::Client;
 pub use orders::{BudgetChange, set_budget, set_utility, show_budget, show_utility};
+pub use places::{AreasFile, go, set_areas, show_areas};
 pub use session::Session;
 pub use settings::{SettingsChange, change_settings};
 pub use watch::{show_labels, show_status, watch};

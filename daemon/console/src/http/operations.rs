@@ -1,18 +1,17 @@
 //! Every path and method of the server, in one table from which the router and the OpenAPI document are made.
 
+mod directive;
+
 use super::handlers::{command, events, login, maps, metrics, orders, readings};
 use super::shared::{ArchiveName, Shared, VehicleId};
 use crate::export::MapFormat;
 use crate::fit::Fit;
-use crate::orders::{
-    BudgetOrder, CommandOrder, ConstraintsOrder, DismissOrder, ExemplarOrder, LabelOrder, MarkerOrder, NoteOrder,
-    RemoveMarkerOrder, UtilityOrder,
-};
+use crate::orders::{CommandOrder, DismissOrder, LabelOrder, MarkerOrder, NoteOrder, RemoveMarkerOrder};
 use crate::state::{AcceptedOrder, ArchiveList, CommandState, MapBody, MissionState, PrincipalInfo};
 use axum::extract::State;
 use axum::http::{HeaderMap, Method};
 use axum::routing::{MethodRouter, get, post};
-use scenecast_surface::{FenceOrder, LimitsOrder, Role, SettingsOrder};
+use scenecast_surface::Role;
 use schemars::{JsonSchema, Schema, SchemaGenerator};
 
 /// Adds the schema of a type to a generator.
@@ -114,7 +113,7 @@ pub(super) fn operations() -> Vec<Operation> {
     all.extend(map_files());
     all.extend(archive());
     all.extend(changes());
-    all.extend(orders());
+    all.extend(directive::operations());
     all.extend(commands());
     all.extend(logins());
     all
@@ -325,70 +324,6 @@ fn changes() -> Vec<Operation> {
             "Shows the current map in place of that of an earlier run, although it has fewer cells",
             schema::<DismissOrder>,
             || post(orders::dismiss),
-        ),
-    ]
-}
-
-fn orders() -> Vec<Operation> {
-    vec![
-        order(
-            "/api/v2/vehicles/{id}/utility",
-            "set_utility",
-            "Sends the weights of labels, of unexplored cells and of curiosity",
-            schema::<UtilityOrder>,
-            || post(orders::utility),
-        ),
-        order(
-            "/api/v2/vehicles/{id}/exemplars",
-            "request_exemplar",
-            "Requests an image of a label: first the best, then another or a larger one; or cancels the request. At most 8 \
-             requests are pending at a time.",
-            schema::<ExemplarOrder>,
-            || post(orders::exemplar),
-        ),
-        order(
-            "/api/v2/vehicles/{id}/constraints",
-            "set_constraints",
-            "Orders the vehicle to hold, to abort, or to resume its survey. A hold and an abort do not need command.",
-            schema::<ConstraintsOrder>,
-            || post(orders::constraints),
-        ),
-        order(
-            "/api/v2/vehicles/{id}/fence",
-            "set_fence",
-            "Replaces the fence. Vertices are in metres east and north in the world frame and stay there when a fix moves the \
-             vehicle's map; 3 to 34 for each outline, at most 15 keep-outs. Refused: edges that cross or touch, no area, a \
-             keep-out around the whole fence, a return point where the vehicle must not be, more than fits a frame. The \
-             vehicle refuses a fence that it is outside of.",
-            schema::<FenceOrder>,
-            || post(orders::fence),
-        ),
-        order(
-            "/api/v2/vehicles/{id}/limits",
-            "set_limits",
-            "Replaces the limits. Reactions are hold, return or surface. The vehicle refuses a band that it is outside of.",
-            schema::<LimitsOrder>,
-            || post(orders::limits),
-        ),
-        Operation {
-            role: Some(Role::Administrator),
-            ..order(
-                "/api/v2/vehicles/{id}/settings",
-                "set_settings",
-                "Changes how the vehicle builds its map, the cells and layers that it sends, and its planner. A member that is \
-             missing or null leaves the setting unchanged; 0 or an empty text sets it as configured on the vehicle. Labels \
-             keep their meaning.",
-                schema::<SettingsOrder>,
-                || post(orders::settings),
-            )
-        },
-        order(
-            "/api/v2/budget",
-            "set_budget",
-            "Changes the budget of the surface, at once, and of each vehicle, with the directive, and the use of spare \
-             capacity",
-            schema::<BudgetOrder>,
-            || post(orders::budget),
         ),
     ]
 }

@@ -73,6 +73,10 @@ fn orders(record: &VehicleRecord, view: &PeerView<'_>) -> VehicleOrders {
         limits: record.limits.sent.as_ref().map(Into::into),
         fence_in_force: in_force(&record.fence.in_force),
         limits_in_force: in_force(&record.limits.in_force),
+        areas: record.areas.sent.as_ref().map(Into::into),
+        areas_in_force: in_force(&record.areas.in_force),
+        destination: record.destination.sent.as_ref().map(Into::into),
+        destination_in_force: in_force(&record.destination.in_force),
         planner: record.settings.requested().planner.value().map(|p| PlannerKind::name(p).to_owned()),
         settings: VehicleSettings {
             requested: SettingsOrder::of(record.settings.requested(), view.layers()),
@@ -206,6 +210,8 @@ fn purpose(intent: Intent, record: &VehicleRecord) -> String {
     match intent {
         Intent::Unseen => "looking at unseen floor".to_owned(),
         Intent::Curiosity => "looking at unusual places".to_owned(),
+        Intent::Destination => "going to the destination".to_owned(),
+        Intent::Area(number) => format!("looking at weighted area {number}"),
         Intent::Label(label) => {
             let name = record.label_book(label).and_then(|book| book.name.clone());
             format!("looking for {}", name.unwrap_or_else(|| format!("label {label}")))

@@ -4,7 +4,7 @@ use super::labels::MapLabel;
 use super::link::VehicleChannel;
 use super::map::MapSummary;
 use super::storage::{VehicleMarker, VehicleNote};
-use scenecast_surface::{FenceOrder, LimitsOrder, SettingsOrder};
+use scenecast_surface::{AreasOrder, DestinationOrder, FenceOrder, LimitsOrder, SettingsOrder};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -61,11 +61,22 @@ pub struct VehicleOrders {
     /// The limits that the vehicle reported last as in force, with version 0 if another surface has sent them; null if they
     /// are unknown.
     pub limits_in_force: Option<AppliedOrder<LimitsOrder>>,
+    /// The last weighted areas sent, or those in force if this surface sent none; null before the first.
+    pub areas: Option<AreasOrder>,
+    /// The areas that the vehicle reported last as in force, with version 0 if another surface has sent them; null if they
+    /// are unknown.
+    pub areas_in_force: Option<AppliedOrder<AreasOrder>>,
+    /// The last destination sent, or the one in force if this surface sent none; null before the first.
+    pub destination: Option<DestinationOrder>,
+    /// The destination to which the vehicle has yet to go, with version 0 if another surface has sent it; null if there is
+    /// none, or if it is unknown.
+    pub destination_in_force: Option<AppliedOrder<DestinationOrder>>,
     /// The last planner sent; null means as configured on the vehicle.
     pub planner: Option<String>,
     /// Settings requested and in force.
     pub settings: VehicleSettings,
-    /// What the surface knows of the content in force, by slot: utility, settings, budget, limits and fence.
+    /// What the surface knows of the content in force, by slot: utility, settings, budget, limits, fence, destination and
+    /// areas.
     pub in_force: BTreeMap<String, InForceKnowledge>,
     /// The status of each order.
     pub directive: DirectiveSlots,

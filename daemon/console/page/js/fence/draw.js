@@ -1,26 +1,33 @@
-// Fences on the map: solid in force, dashed on the way, dotted when refused; and the edited one with its corners.
+// Fences and weighted areas on the map: solid in force, dashed on the way, dotted when refused; and the edited ones with
+// their corners.
 
 import { FONT, haloText } from "../canvas.js";
+import { signed } from "../format.js";
 import { slotOf } from "../order/status.js";
 import { store } from "../store.js";
-import { fenceOrder, middle, pen } from "./edit.js";
-import { faults, fromServer, nameOutline } from "./plan.js";
+import { areasOrder, fenceOrder, middle, pen } from "./edit.js";
+import { faults, fromAreas, fromServer, nameOutline } from "./plan.js";
 
 const DASH = { applied: [], queued: [9, 6], on_air: [9, 6], received: [9, 6], refused: [2, 5] };
 
-export function drawFences(c, view, ink, vehicle, chosen) {
-  const slot = slotOf(vehicle, "fence");
+export function drawOutlines(c, view, ink, vehicle, chosen) {
+  const { areas, areas_in_force, fence, fence_in_force } = vehicle;
+  drawOrder(c, view, ink, vehicle, chosen, { order: areasOrder, read: fromAreas, sent: areas, inForce: areas_in_force });
+  drawOrder(c, view, ink, vehicle, chosen, { order: fenceOrder, read: fromServer, sent: fence, inForce: fence_in_force });
+}
+
+function drawOrder(c, view, ink, vehicle, chosen, { order, read, sent, inForce }) {
+  const slot = slotOf(vehicle, order.slot);
   c.globalAlpha = chosen ? 1 : 0.55;
-  const inForce = vehicle.fence_in_force;
-  if (inForce) drawPlan(c, view, ink, fromServer(inForce.order), [], "");
-  if (slot && slot.state !== "applied" && vehicle.fence) {
-    drawPlan(c, view, ink, fromServer(vehicle.fence), DASH[slot.state] ?? [9, 6], slot.state === "refused" ? "refused" : "not in force yet");
+  if (inForce) drawPlan(c, view, ink, read(inForce.order), [], "");
+  if (slot && slot.state !== "applied" && sent) {
+    drawPlan(c, view, ink, read(sent), DASH[slot.state] ?? [9, 6], slot.state === "refused" ? "refused" : "not in force yet");
   }
   c.globalAlpha = 1;
   if (!chosen || !pen.shown) return;
-  const plan = fenceOrder.value(vehicle);
-  if (fenceOrder.isChanged(vehicle)) drawEdited(c, view, ink, plan, fromServer(vehicle.fence));
-  drawHandles(c, view, ink, plan);
+  const plan = order.value(vehicle);
+  if (order.isChanged(vehicle)) drawEdited(c, view, ink, plan, read(sent));
+  drawHandles(c, view, ink, plan, order);
 }
 
 /** Draws as a draft only those parts that the edit has changed. */
@@ -45,9 +52,10 @@ function stroke(c, ink, tone, dash, width = 2.5) {
 }
 
 function drawPlan(c, view, ink, plan, dash, word, wrong = null, changed = null) {
-  for (const [i, { kind, points }] of plan.outlines.entries()) {
+  const tones = { fence: ink.fence, keep_out: ink.keepout, area: ink.accent };
+  for (const [i, { kind, points, weight }] of plan.outlines.entries()) {
     if (points.length === 0 || changed?.[i] === false) continue;
-    const tone = wrong?.outlines[i] ? ink.bad : kind === "fence" ? ink.fence : ink.keepout;
+    const tone = wrong?.outlines[i] ? ink.bad : tones[kind];
     const corners = points.map((p) => view.toScreen(...p));
     c.beginPath();
     for (const p of corners) c.lineTo(...p);
@@ -57,7 +65,8 @@ function drawPlan(c, view, ink, plan, dash, word, wrong = null, changed = null) 
     for (const p of corners) c.lineTo(...p);
     c.closePath();
     stroke(c, ink, tone, dash);
-    name(c, view, ink, corners, nameOutline(plan, i) + (word && `, ${word}`));
+    const title = nameOutline(plan, i) + (kind === "area" ? ` ${signed(weight)}` : "");
+    name(c, view, ink, corners, title + (word && `, ${word}`));
   }
   if (plan.returnPoint) drawReturnPoint(c, view, ink, plan.returnPoint, wrong?.returnPoint ? ink.bad : ink.fence, word);
 }
@@ -105,12 +114,12 @@ function drawReturnPoint(c, view, ink, place, tone, word) {
   haloText(c, word ? `Return point, ${word}` : "Return point", x + 13, y + 4, ink);
 }
 
-function drawHandles(c, view, ink, plan) {
+function drawHandles(c, view, ink, plan, order) {
   for (const [i, { points }] of plan.outlines.entries()) {
     points.forEach((p, k) => {
       const [x, y] = view.toScreen(...p);
       if (points.length > 2 && pen.tool === null) dot(c, ink, view.toScreen(...middle(p, points[(k + 1) % points.length])), 3.5, ink.sea);
-      const chosen = pen.outline === i && pen.corner === k;
+      const chosen = pen.order === order && pen.outline === i && pen.corner === k;
       dot(c, ink, [x, y], chosen ? 8 : 6, chosen ? ink.accent : ink.vehicle);
     });
   }

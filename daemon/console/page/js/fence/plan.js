@@ -1,6 +1,8 @@
-// A plan: the fence, the keep-outs and the return point of one vehicle, and its form in the API.
+// A plan: outlines on the map, and their form in the API. One has the fence, the keep-outs and the return point of a vehicle,
+// another its weighted areas.
 //
-//   { outlines: [{ kind: "fence" | "keep_out", points: [[x, y], ..] }], returnPoint: [x, y] | null }   metres in the world
+//   { outlines: [{ kind: "fence" | "keep_out" | "area", points: [[x, y], ..], weight }], returnPoint: [x, y] | null }
+//   metres in the world; only an area has a weight, and only the first plan a return point
 
 import { covers, holds, MAX_KEEP_OUTS, outlineFault } from "./polygon.js";
 
@@ -18,8 +20,17 @@ export function toOrder({ outlines, returnPoint }) {
   return order;
 }
 
+/** The plan of weighted areas. */
+export const fromAreas = (order) => ({
+  outlines: (order?.areas ?? []).map(({ outline, weight }) => ({ kind: "area", points: outline, weight })),
+  returnPoint: null,
+});
+
+export const toAreas = ({ outlines }) => outlines.map(({ points, weight }) => ({ outline: points, weight }));
+
 export function nameOutline({ outlines }, i) {
   if (outlines[i].kind === "fence") return "Fence";
+  if (outlines[i].kind === "area") return `Area ${i + 1}`;
   return `Keep-out ${outlines.slice(0, i + 1).filter((o) => o.kind === "keep_out").length}`;
 }
 

@@ -2,6 +2,7 @@
 
 import { FONT, haloText } from "../canvas.js";
 import { store } from "../store.js";
+import { destinationOf, isSamePlace } from "./destination.js";
 
 const REACH_PX = 14;
 const MAX_TEXT = 24;
@@ -16,11 +17,17 @@ export const markers = () => store.vehicle?.markers ?? [];
 /** The chosen marker, or null once it was removed. */
 export const chosenMarker = () => markers().find((m) => m.number === chosen.marker) ?? null;
 
-/** Chooses the place at a click on the map, or the marker within reach of it. */
+/** Whether the chosen place is the destination of the vehicle. */
+export const isDestination = () => isSamePlace(destinationOf(store.vehicle), chosen.at);
+
+/** Chooses the place at a click on the map, or the marker or the destination within reach of it. */
 export function choosePlace(view, px, py) {
-  const away = (m) => Math.hypot(...view.toScreen(m.x_m, m.y_m).map((v, i) => v - [px, py][i]));
-  const near = markers().filter((m) => away(m) <= REACH_PX).sort((a, b) => away(a) - away(b))[0];
-  chosen.at = near ? [near.x_m, near.y_m] : view.toWorld(px, py);
+  const away = (place) => Math.hypot(...view.toScreen(...place).map((v, i) => v - [px, py][i]));
+  const at = (m) => [m.x_m, m.y_m];
+  const near = markers().filter((m) => away(at(m)) <= REACH_PX).sort((a, b) => away(at(a)) - away(at(b)))[0];
+  const destination = destinationOf(store.vehicle);
+  const isNear = destination !== null && away(destination) <= REACH_PX;
+  chosen.at = near ? at(near) : isNear ? destination : view.toWorld(px, py);
   chosen.marker = near?.number ?? null;
   store.emit("place");
 }

@@ -1,13 +1,16 @@
-// The plate of the chosen place: its label with images and ages, its marker, and the button that sets one.
+// The plate of the chosen place: its label with images and ages, its marker, and the buttons that set one and send the
+// vehicle there.
 
-import { addMarker, removeMarker } from "../api.js";
+import { addMarker, removeMarker, sendDestination } from "../api.js";
 import { nameOf, shownAs, tintOf } from "../book.js";
 import { denial } from "../command.js";
 import { $, announce, fill, h, text } from "../dom.js";
 import { ago, metres, span } from "../format.js";
-import { chosen, chosenMarker, clearPlace } from "../map/place.js";
+import { chosen, chosenMarker, clearPlace, isDestination } from "../map/place.js";
+import { isSamePlace } from "../map/destination.js";
 import { onMap } from "../map/frames.js";
 import { cellAt, layerText } from "../map/readout.js";
+import { orderStatus, slotOf } from "../order/status.js";
 import { ageOf, store } from "../store.js";
 import { viewExemplars } from "./exemplar.js";
 
@@ -19,10 +22,13 @@ const marked = h("div");
 const words = h("input", { type: "text", maxLength: 200, required: true, placeholder: "a wreck", "aria-label": "Text of the marker" });
 const set = h("button.primary", { type: "submit" }, "Set marker");
 const form = h("form", { onsubmit: mark }, words, set);
+const go = h("button", { type: "button", onclick: () => order(chosen.at) }, "Go there");
+const status = orderStatus("Destination");
+const withdraw = h("button", { type: "button", onclick: () => order(null) }, "Withdraw the destination");
 const error = h("p.error", { role: "alert" });
 const plate = h("section.plate", { id: "place", hidden: true, "aria-labelledby": "place-title" },
   h("header", {}, title, h("button.quiet", { type: "button", onclick: clearPlace, "aria-label": "Close the place" }, "\u00d7")),
-  facts, images, marked, form, error);
+  facts, images, h("div.buttons", {}, go, withdraw), status.node, marked, form, error);
 
 export function startPlace() {
   $("stage").append(plate);
@@ -67,6 +73,15 @@ function refresh() {
   set.disabled = denied !== null || !store.connected;
   set.title = denied ?? "";
   form.hidden = marker !== null;
+  const refusal = denial("order");
+  for (const button of [go, withdraw]) {
+    button.disabled = refusal !== null || !store.connected;
+    button.title = refusal ?? (button === go ? "The vehicle goes there at once, then it resumes its survey" : "");
+  }
+  go.hidden = isDestination();
+  withdraw.hidden = !isDestination();
+  status.node.hidden = !isSamePlace(store.vehicle.destination?.place, chosen.at);
+  status.update(slotOf(store.vehicle, "destination"));
   fill(facts, label && labelLine(label), ...linesOf(cell, marker).map((line) => h("p", {}, line)));
   const pictures = label?.exemplar.images.slice(-MAX_IMAGES).reverse() ?? [];
   // Buttons are replaced only when they change: one of them may have the focus.
@@ -107,6 +122,16 @@ async function mark(event) {
   event.preventDefault();
   const [x, y] = chosen.at;
   await send(() => addMarker(store.vehicle.id, x, y, words.value.trim()), `marker set: ${words.value.trim()}`);
+}
+
+/** Sends the vehicle to a place, or withdraws the order. The plate stays open and shows how far the order has come. */
+async function order(place) {
+  try {
+    await sendDestination(store.vehicle.id, place);
+    announce(place ? `destination sent: E ${metres(place[0])} N ${metres(place[1])}` : "the order to withdraw the destination is sent");
+  } catch (fault) {
+    text(error, fault.message);
+  }
 }
 
 const take = (marker) => send(() => removeMarker(store.vehicle.id, marker.number), `marker removed: ${marker.text}`);

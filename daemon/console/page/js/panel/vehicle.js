@@ -9,7 +9,7 @@ import { describe, nameOfStatus } from "../order/status.js";
 import { ageOf, isHeard, isStale, store } from "../store.js";
 import { refreshStop, stopParts } from "./stop.js";
 
-const NAMES = { utility: "Weights", constraints: "Hold, abort", limits: "Limits", fence: "Fence", settings: "Settings", budget: "Budget", requests: "Images", fix: "Position fix" };
+const NAMES = { utility: "Weights", constraints: "Hold, abort", limits: "Limits", fence: "Fence", areas: "Areas", destination: "Destination", settings: "Settings", budget: "Budget", requests: "Images", fix: "Position fix" };
 const title = h("h2", { id: "vehicle-title" });
 const mode = h("span.mode");
 const age = h("p.age");

@@ -13,7 +13,7 @@ use axum::extract::State;
 use axum::http::StatusCode;
 use axum::response::Response;
 use scenecast_protocol::directive::Constraints;
-use scenecast_surface::{FenceOrder, LimitsOrder, Principal, SettingsOrder};
+use scenecast_surface::{AreasOrder, DestinationOrder, FenceOrder, LimitsOrder, Principal, SettingsOrder};
 use std::collections::BTreeMap;
 
 pub(in crate::http) async fn utility(
@@ -66,6 +66,24 @@ pub(in crate::http) async fn limits(
     JsonOrder(order): JsonOrder<LimitsOrder>,
 ) -> Response {
     shared.order(principal, SurfaceRequest::Limits(id, order)).await
+}
+
+pub(in crate::http) async fn areas(
+    State(shared): State<Shared>,
+    Extension(principal): Extension<Principal>,
+    VehicleId(id): VehicleId,
+    JsonOrder(order): JsonOrder<AreasOrder>,
+) -> Response {
+    shared.order(principal, SurfaceRequest::Areas(id, order)).await
+}
+
+pub(in crate::http) async fn destination(
+    State(shared): State<Shared>,
+    Extension(principal): Extension<Principal>,
+    VehicleId(id): VehicleId,
+    JsonOrder(order): JsonOrder<DestinationOrder>,
+) -> Response {
+    shared.order(principal, SurfaceRequest::Destination(id, order)).await
 }
 
 pub(in crate::http) async fn settings(

@@ -2,10 +2,12 @@
 
 mod command;
 mod constraints;
+mod places;
 
 use clap::{Args, Subcommand};
 use command::CommandChange;
 use constraints::{FenceCommand, LimitsCommand, ReturnPointCommand};
+use places::{AreasCommand, Go};
 use scenecast_console::client::{self, BudgetChange, Client, Session, SettingsChange};
 use scenecast_console::orders::ExemplarAction;
 use scenecast_core::UserError;
@@ -115,6 +117,15 @@ enum CtlCommand {
     Fence {
         #[command(subcommand)]
         change: Option<FenceCommand>,
+    },
+    /// Send the vehicle to a place at once; there it resumes its survey.
+    #[command(after_help = "Example: scenecast ctl go 12.5 -40 --wait 120")]
+    Go(Go),
+    /// Print the weighted areas, last sent and in force, or send others.
+    #[command(after_help = "Example: scenecast ctl areas set areas.geojson --wait 120")]
+    Areas {
+        #[command(subcommand)]
+        change: Option<AreasCommand>,
     },
     /// Move the point that the vehicle returns to.
     #[command(after_help = "Example: scenecast ctl return-point set 12.5 -40 --wait 120")]
@@ -311,6 +322,8 @@ impl CtlCommand {
             }
             Self::Exemplar { label, out: None, .. } => client::cancel_exemplar(session, label).await,
             Self::Fence { change } => constraints::fence(session, change).await,
+            Self::Go(go) => places::go(session, go).await,
+            Self::Areas { change } => places::areas(session, change).await,
             Self::ReturnPoint { change } => constraints::return_point(session, change).await,
             Self::Limits { change } => constraints::limits(session, change).await,
             Self::Hold => constraints::hold(session, true).await,

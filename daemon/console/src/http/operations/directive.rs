@@ -1,0 +1,89 @@
+//! The operations that give orders.
+
+use super::{Operation, order, schema};
+use crate::http::handlers::orders as handlers;
+use crate::orders::{BudgetOrder, ConstraintsOrder, ExemplarOrder, UtilityOrder};
+use axum::routing::post;
+use scenecast_surface::{AreasOrder, DestinationOrder, FenceOrder, LimitsOrder, Role, SettingsOrder};
+
+/// The operations that give a vehicle orders.
+pub(super) fn operations() -> Vec<Operation> {
+    vec![
+        order(
+            "/api/v2/vehicles/{id}/utility",
+            "set_utility",
+            "Sends the weights of labels, of unexplored cells and of curiosity",
+            schema::<UtilityOrder>,
+            || post(handlers::utility),
+        ),
+        order(
+            "/api/v2/vehicles/{id}/exemplars",
+            "request_exemplar",
+            "Requests an image of a label: first the best, then another or a larger one; or cancels the request. At most 8 \
+             requests are pending at a time.",
+            schema::<ExemplarOrder>,
+            || post(handlers::exemplar),
+        ),
+        order(
+            "/api/v2/vehicles/{id}/constraints",
+            "set_constraints",
+            "Orders the vehicle to hold, to abort, or to resume its survey. A hold and an abort do not need command.",
+            schema::<ConstraintsOrder>,
+            || post(handlers::constraints),
+        ),
+        order(
+            "/api/v2/vehicles/{id}/fence",
+            "set_fence",
+            "Replaces the fence. Vertices are in metres east and north in the world frame and stay there when a fix moves the \
+             vehicle's map; 3 to 34 for each outline, at most 15 keep-outs. Refused: edges that cross or touch, no area, a \
+             keep-out around the whole fence, a return point where the vehicle must not be, more than fits a frame. The \
+             vehicle refuses a fence that it is outside of.",
+            schema::<FenceOrder>,
+            || post(handlers::fence),
+        ),
+        order(
+            "/api/v2/vehicles/{id}/limits",
+            "set_limits",
+            "Replaces the limits. Reactions are hold, return or surface. The vehicle refuses a band that it is outside of.",
+            schema::<LimitsOrder>,
+            || post(handlers::limits),
+        ),
+        order(
+            "/api/v2/vehicles/{id}/areas",
+            "set_areas",
+            "Replaces the weighted areas: 0 to 4 outlines in metres east and north in the world frame, each with a weight from -1 \
+             to 1 that its cells have in addition to that of their label. Refused: edges that cross or touch, no area, more \
+             than fits a frame.",
+            schema::<AreasOrder>,
+            || post(handlers::areas),
+        ),
+        order(
+            "/api/v2/vehicles/{id}/destination",
+            "set_destination",
+            "Sends the vehicle to a place in the world frame at once; there it resumes its survey. Null withdraws the order. The \
+             vehicle refuses a place that the fence does not allow, or to which no allowed path leads.",
+            schema::<DestinationOrder>,
+            || post(handlers::destination),
+        ),
+        Operation {
+            role: Some(Role::Administrator),
+            ..order(
+                "/api/v2/vehicles/{id}/settings",
+                "set_settings",
+                "Changes how the vehicle builds its map, the cells and layers that it sends, and its planner. A member that is \
+             missing or null leaves the setting unchanged; 0 or an empty text sets it as configured on the vehicle. Labels \
+             keep their meaning.",
+                schema::<SettingsOrder>,
+                || post(handlers::settings),
+            )
+        },
+        order(
+            "/api/v2/budget",
+            "set_budget",
+            "Changes the budget of the surface, at once, and of each vehicle, with the directive, and the use of spare \
+             capacity",
+            schema::<BudgetOrder>,
+            || post(handlers::budget),
+        ),
+    ]
+}
