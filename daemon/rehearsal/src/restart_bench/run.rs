@@ -120,7 +120,7 @@ impl Run<'_> {
                     let page_s = began.elapsed().as_secs_f64();
                     self.figures.page_s.push(page_s);
                     if page_s > PAGE_LIMIT_S {
-                        self.figures.faults.push(format!("the full page came after {page_s:.1} s"));
+                        self.figures.faults.push(format!("the full page came after {page_s:.1} s; before: {gone}"));
                     }
                     return Ok(());
                 }
