@@ -160,10 +160,8 @@ impl Master {
     pub fn handle_turn_sent(&mut self, profile: &ModemProfile, losable: u32, now: Instant) {
         let flight =
             self.round_trip().map_or(self.config.max_propagation * 2, |rtt| rtt + rtt / 4 + Duration::from_millis(200));
-        // A vehicle farther away than assumed must get the chance to answer, and a near one that has lost a grant must not
-        // wait as long for the next; a modem that polls waits by itself.
-        let is_patient = profile.access != Access::Polled && self.unanswered % 2 == 1;
-        let doubts = if is_patient { self.unanswered.saturating_sub(4).min(10) } else { 0 };
+        // A vehicle farther away than assumed must get the chance to answer; a modem that polls waits by itself.
+        let doubts = if profile.access == Access::Polled { 0 } else { self.unanswered.saturating_sub(4).min(10) };
         let patience = Duration::from_secs(1) * doubts;
         let frames = if self.is_saturated { losable + 1 } else { 1 };
         let answer = (profile.frame_airtime() * frames).min(self.granted_airtime.max(profile.frame_airtime()));
