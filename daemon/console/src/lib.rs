@@ -7,6 +7,7 @@
 //! bottom; `snapshot` and `request` fill them from the surface; `http` serves them; [`client`] reads them.
 
 pub mod client;
+mod described;
 mod export;
 pub mod fit;
 mod http;

@@ -1,5 +1,6 @@
 //! Requests of clients that only the surface can handle.
 
+use crate::described::describe;
 use crate::export::MapCells;
 use crate::fit::{self, Fit};
 use crate::layers;
@@ -15,8 +16,8 @@ use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::Address;
 use scenecast_surface::record::{StoredLabel, VehicleMemory};
 use scenecast_surface::{
-    AreasOrder, CommandAction, CommandRefusal, DestinationOrder, FenceOrder, LimitsOrder, OrderKind, Principal,
-    RequestKind, SettingsOrder, Surface,
+    AreasOrder, CommandAction, CommandRefusal, DestinationOrder, FenceOrder, LimitsOrder, LogEntry, OrderKind,
+    Principal, RequestKind, SettingsOrder, Surface,
 };
 use std::collections::BTreeMap;
 
@@ -58,6 +59,8 @@ pub enum SurfaceRequest {
     RemoveMarker(u8, RemoveMarkerOrder),
     /// Take the earlier map out of view.
     DismissEarlierMap(u8),
+    /// Read the log of the mission.
+    Log,
     /// List the archived maps. The owner of the files handles this request and the next one.
     Archives,
     /// Read an archived map by its name.
@@ -71,7 +74,7 @@ impl SurfaceRequest {
     fn order_kind(&self) -> Option<OrderKind> {
         match self {
             Self::Map(_) | Self::Exemplar(..) | Self::Fit(..) | Self::Command(_) => None,
-            Self::Archives | Self::ArchivedMap(_) => None,
+            Self::Log | Self::Archives | Self::ArchivedMap(_) => None,
             Self::Label(..)
             | Self::Note(..)
             | Self::Marker(..)
@@ -105,6 +108,8 @@ pub enum Reply {
     /// The surface has done what was requested.
     Done,
     Archives(Vec<ArchivedMap>),
+    /// The entries of the log, the oldest first.
+    Log(Vec<LogEntry>),
     /// Who has command after a change.
     Command(CommandState),
     /// The role of the principal does not allow it: the reason in one line.
@@ -135,9 +140,13 @@ pub fn handle_request(surface: &mut Surface, request: ClientRequest, cell_m: f64
     if let Err(refusal) = surface.command().check(&by, kind, now) {
         return refused(&refusal);
     }
+    let entry = describe(&request);
     let reply = reply(surface, request, cell_m, now);
     if matches!(reply, Reply::Accepted(_)) {
         surface.handle_accepted(&by, kind, now);
+    }
+    if let (Reply::Accepted(_) | Reply::Done, Some((vehicle, kind, text))) = (&reply, entry) {
+        surface.log_action(vehicle, kind, by.name(), &text, now);
     }
     reply
 }
@@ -219,6 +228,7 @@ fn handle(surface: &mut Surface, request: SurfaceRequest, cell_m: f64, now: Inst
             surface.record_mut(Address::vehicle(id)?)?.dismiss_earlier_map();
             Reply::Done
         }
+        SurfaceRequest::Log => Reply::Log(surface.log().entries().cloned().collect()),
         SurfaceRequest::Archives => Reply::Archives(Vec::new()),
         SurfaceRequest::ArchivedMap(_) => return None,
         // Handled with its principal, before.

@@ -3,6 +3,7 @@
 mod command;
 mod labels;
 mod link;
+mod log;
 mod map;
 mod storage;
 mod vehicle;
@@ -13,6 +14,7 @@ pub use command::{
 };
 pub use labels::{ExemplarImage, ExemplarProgress, ExemplarStage, MapLabel};
 pub use link::{ChannelQuality, LinkDirection, LinkRates, LinkSummary, ReportedBacklog, VehicleChannel};
+pub use log::{LogLine, LogList};
 pub use map::{EarlierMap, LayerBody, MapBody, MapEvent, MapIndex, MapPlacement, MapSummary, TileLayer};
 pub use storage::{ArchiveList, ArchivedMap, StorageInfo, VehicleMarker, VehicleNote};
 pub use vehicle::{
@@ -48,6 +50,9 @@ pub struct MissionState {
     /// The folder in which the surface keeps its state; null in a rehearsal.
     #[serde(default)]
     pub storage: Option<StorageInfo>,
+    /// The number of the last entry of the log; 0 before the first.
+    #[serde(default)]
+    pub log: u64,
     /// The true classes of a simulated sea floor; null where they are not known, and so in each real mission.
     #[serde(default)]
     pub truth: Option<TruthInfo>,

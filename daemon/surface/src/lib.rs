@@ -8,6 +8,8 @@ mod command_tests;
 mod exemplar_cache;
 mod in_force;
 mod label_gains;
+mod log;
+mod logging;
 mod map_in_view;
 mod orders;
 mod pauses;
@@ -27,6 +29,7 @@ pub use command::{
 };
 pub use exemplar_cache::{ExemplarCache, LabelExemplars, OpenRequest, RequestKind, RequestState, StoredExemplar};
 pub use label_gains::LabelGains;
+pub use log::{LogEntry, LogKind, MissionLog};
 pub use orders::{AreaOrder, AreasOrder, DestinationOrder, FenceOrder, LimitsOrder, MAX_DISTANCE_M};
 pub use scenecast_core::{Principal, Role};
 pub use settings::{SettingsOrder, SettingsRecord};

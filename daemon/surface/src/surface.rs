@@ -2,6 +2,7 @@
 
 use super::command::{Command, CommandAction, CommandChange, CommandRefusal, OrderKind};
 use super::in_force;
+use super::log::{LogKind, MissionLog, Watch};
 use super::position::{Relay, UsblSighting};
 use super::vehicle_record::{VehicleRecord, WholeMaps};
 use scenecast_core::label_picture;
@@ -46,6 +47,9 @@ pub struct Surface {
     relay: Option<Relay>,
     tuning: TuningTable,
     command: Command,
+    pub(super) log: MissionLog,
+    /// What the log has about each vehicle.
+    pub(super) watches: BTreeMap<Address, Watch>,
 }
 
 impl Surface {
@@ -53,7 +57,8 @@ impl Surface {
     pub fn new(link: SurfaceLink, vehicles: impl IntoIterator<Item = (Address, String)>) -> Self {
         let records = vehicles.into_iter().map(|(address, name)| (address, VehicleRecord::new(name))).collect();
         let (tuning, background) = (TuningTable::default(), BackgroundOrder::default());
-        Self { link, records, outputs: VecDeque::new(), background, relay: None, tuning, command: Command::default() }
+        let (command, log, watches) = (Command::default(), MissionLog::default(), BTreeMap::new());
+        Self { link, records, outputs: VecDeque::new(), background, relay: None, tuning, command, log, watches }
     }
 
     /// Sets the tuning table, which predicts the bit rate of settings of the scene model.
@@ -74,6 +79,7 @@ impl Surface {
     /// An order that the principal was allowed to give was accepted.
     pub fn handle_accepted(&mut self, by: &Principal, kind: OrderKind, now: Instant) {
         let change = self.command.handle_order(by, kind, now);
+        change.iter().for_each(|change| self.log_command(change));
         self.outputs.extend(change.map(SurfaceOutput::CommandChanged));
     }
 
@@ -85,6 +91,7 @@ impl Surface {
         now: Instant,
     ) -> Result<(), CommandRefusal> {
         let change = self.command.handle_action(by, action, now)?;
+        change.iter().for_each(|change| self.log_command(change));
         self.outputs.extend(change.map(SurfaceOutput::CommandChanged));
         Ok(())
     }
@@ -249,7 +256,11 @@ impl Surface {
         }
         let link = &self.link;
         let speaks = |vehicle| link.vehicle(vehicle).and_then(|v| v.last_received()) == Some(now);
-        self.records.iter_mut().filter(|(a, _)| speaks(**a)).for_each(|(_, record)| record.pauses.handle_frame(now));
+        let speakers: Vec<Address> = self.records.keys().copied().filter(|&vehicle| speaks(vehicle)).collect();
+        for vehicle in &speakers {
+            self.records.get_mut(vehicle).into_iter().for_each(|record| record.pauses.handle_frame(now));
+        }
+        self.log_received(&speakers, now);
         self.count_gains(now);
     }
 
@@ -258,6 +269,9 @@ impl Surface {
         let due: Vec<Address> = self.vehicles().filter(|(_, r)| r.gains.is_due(now)).map(|(a, _)| a).collect();
         for vehicle in due {
             let Some(cells) = self.labels(vehicle) else { continue };
+            if self.records.get(&vehicle).is_none_or(|record| record.earlier_map().is_none()) {
+                self.log_labels(vehicle, cells.keys().copied(), now);
+            }
             if let Some(record) = self.records.get_mut(&vehicle).filter(|_| !cells.is_empty()) {
                 record.gains.handle_cells(cells, now);
             }
@@ -273,6 +287,7 @@ impl Surface {
             SurfaceEvent::MapChanged(vehicle) => Some(SurfaceOutput::MapChanged(vehicle)),
             SurfaceEvent::VehicleRestarted(vehicle) => {
                 self.records.get_mut(&vehicle).into_iter().for_each(VehicleRecord::begin_run);
+                self.log_fact(vehicle, LogKind::Contact, "another run begins", now);
                 self.request_again(vehicle, now);
                 Some(SurfaceOutput::MapChanged(vehicle))
             }
@@ -289,12 +304,14 @@ impl Surface {
                     record.handle_applied(slot, version);
                 }
                 self.handle_decision(vehicle, slot, now);
+                self.log_decision(vehicle, slot, now);
                 Some(SurfaceOutput::SlotDecided(vehicle, slot))
             }
             SurfaceEvent::Status(vehicle) => {
                 let &(ref status, at) = self.link.vehicle(vehicle)?.status()?;
                 self.records.get_mut(&vehicle)?.handle_status(status, at);
                 self.relay.iter_mut().for_each(|relay| relay.handle_depth(vehicle, status.depth_m, now));
+                self.log_mode(vehicle, now);
                 self.follow_in_force(vehicle)
             }
             SurfaceEvent::InForceLearned(vehicle, _) => self.follow_in_force(vehicle),
@@ -310,6 +327,9 @@ impl Surface {
                 }
                 let exemplar = Exemplar::decode(&bytes)?;
                 let is_new = record.handle_exemplar(&exemplar, now);
+                if is_new {
+                    self.log_fact(vehicle, LogKind::Image, &format!("image of label {}", exemplar.label), now);
+                }
                 is_new.then_some(SurfaceOutput::ExemplarHere(vehicle, exemplar.label))
             }
         }
@@ -353,6 +373,7 @@ impl Surface {
     }
 
     pub fn poll_transmit(&mut self, now: Instant) -> Option<Transmit> {
+        self.log_silences(now);
         self.link.poll_transmit(now)
     }
 

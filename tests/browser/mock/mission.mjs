@@ -30,6 +30,7 @@ export class Mission {
     this.ended = false;
     this.truth = false;
     this.command = new Command();
+    this.log = [];
     this.down = new Direction(7);
     this.history = [];
     this.nextDownS = 2;
@@ -112,6 +113,7 @@ export class Mission {
       vehicles: this.vehicles.map((v) => v.json(this.nowS)),
       position: this.position ?? null,
       storage: this.storage ?? null,
+      log: this.log.length,
       command: this.command.json(),
       truth: this.truth ? TRUTH : null,
       layers: LAYERS.map(({ name, unit }) => ({ name, unit, summary: `what ${name} means` })),

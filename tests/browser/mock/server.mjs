@@ -87,6 +87,11 @@ async function api(mock, req, res, path) {
   if (path === "principal") return reply(res, 200, mission.command.principal(req.headers.cookie));
   if (path === "state") return reply(res, 200, mission.json());
   if (path === "truth.png" && mission.truth) return send(res, 200, "image/png", PICTURE);
+  if (path === "log") {
+    const since = Number(new URL(req.url, "http://mock").searchParams.get("since") ?? 0);
+    return reply(res, 200, { entries: mission.log.filter((e) => e.number > since) });
+  }
+  if (path === "log.csv") return send(res, 200, "text/csv", Buffer.from("number,utc,mission_s,vehicle,kind,by,text\n"));
   if (path === "archive") return reply(res, 200, { maps: mission.archive ?? [] });
   const [, id, resource] = path.match(/^vehicles\/(\d+)\/(.+)$/) ?? [];
   const vehicle = mission.vehicles.find((v) => v.id === Number(id));
@@ -196,6 +201,7 @@ function steer(mock, order, res) {
   if ("in_force" in order) mission.vehicles[0].reported = order.in_force;
   if ("mismatch" in order) mission.vehicles[0].mismatch = order.mismatch;
   if ("earlier" in order) mission.vehicles[0].earlier = order.earlier;
+  for (const entry of order.log ?? []) mission.log.push({ number: mission.log.length + 1, at_s: mission.nowS, utc: "2026-11-23T10:00:00Z", by: null, vehicle: null, ...entry });
   for (const key of ["archive", "storage", "loss", "layers", "ended", "speed", "position", "truth"]) if (key in order) mission[key] = order[key];
   if ("disk" in order) {
     const [vehicle] = mission.vehicles;

@@ -57,6 +57,18 @@ const pointing = [WIDE, PHONE].flatMap((size) => ["light", "dark", "red"].map((t
   },
 })));
 
+const logs = ["light", "dark", "red"].map((theme) => ({
+  name: `axe finds no fault in the log: ${theme}`,
+  theme,
+  scenario: "start",
+  async run(s) {
+    await s.page.getByRole("tab", { name: "Log" }).click();
+    await s.steer({ log: [{ kind: "order", by: "ann", vehicle: 1, text: "weights: label 3 +0.80" }] });
+    await s.shows("#log .log", /weights: label 3/, { advance: 1 });
+    await clean(s);
+  },
+}));
+
 const editing = ["light", "dark", "red"].map((theme) => ({
   name: `axe finds no fault in a fence edit and an abort: ${theme}`,
   theme,
@@ -105,7 +117,7 @@ const stopping = [WIDE, PHONE].map((size) => ({
 
 export default [
   ...audits,
-  ...editing,
+  ...logs, ...editing,
   ...pointing,
   ...stopping,
   {

@@ -45,6 +45,8 @@ export const removeMarker = (id, number) => write(`/vehicles/${id}/markers/remov
 export const dismissEarlierMap = (id) => write(`/vehicles/${id}/earlier-map/dismiss`, {});
 /** The maps of runs that have ended, the newest first. */
 export const readArchive = async () => (await read("/archive")).maps;
+/** The entries of the mission's log after number `since`, the oldest first. */
+export const readLog = async (since) => (await read(`/log?since=${since}`)).entries;
 export const sendUtility = (id, utility) => write(`/vehicles/${id}/utility`, utility);
 /** `action`: another, larger or cancel; `image`: the number of the image to enlarge. */
 export const requestExemplar = (id, label, action, image = null) =>

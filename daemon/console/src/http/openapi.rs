@@ -3,6 +3,7 @@
 use super::handlers::maps::TILES;
 use super::operations::{Content, Operation, SchemaOf, operations};
 use crate::state::{ErrorBody, MapEvent, MapIndex, MissionState};
+use scenecast_surface::LogKind;
 use schemars::SchemaGenerator;
 use schemars::generate::SchemaSettings;
 use serde_json::{Map, Value, json};
@@ -150,6 +151,15 @@ fn parameters(operation: &Operation) -> Vec<Value> {
         let text = "The tag of the tiles that the client holds; without it, or with one that is out of date, all tiles";
         let schema = json!({ "type": "string", "pattern": "^[0-9a-f]{8}-[0-9]+$" });
         parameters.push(json!({ "name": "since", "in": "query", "description": text, "schema": schema }));
+    }
+    if matches!(operation.id, "log" | "log_csv") {
+        for (name, text, schema) in [
+            ("vehicle", "Only the entries of the vehicle with this address", json!({ "type": "integer" })),
+            ("kind", "Only the entries of this kind", json!({ "enum": LogKind::ALL.map(LogKind::name) })),
+            ("since", "Only the entries with a higher number", json!({ "type": "integer", "minimum": 0 })),
+        ] {
+            parameters.push(json!({ "name": name, "in": "query", "description": text, "schema": schema }));
+        }
     }
     if operation.id == "map" {
         for (name, text) in [

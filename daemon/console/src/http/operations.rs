@@ -2,12 +2,12 @@
 
 mod directive;
 
-use super::handlers::{command, events, login, maps, metrics, orders, readings};
+use super::handlers::{command, events, log, login, maps, metrics, orders, readings};
 use super::shared::{ArchiveName, Shared, VehicleId};
 use crate::export::MapFormat;
 use crate::fit::Fit;
 use crate::orders::{CommandOrder, DismissOrder, LabelOrder, MarkerOrder, NoteOrder, RemoveMarkerOrder};
-use crate::state::{AcceptedOrder, ArchiveList, CommandState, MapBody, MissionState, PrincipalInfo};
+use crate::state::{AcceptedOrder, ArchiveList, CommandState, LogList, MapBody, MissionState, PrincipalInfo};
 use axum::extract::State;
 use axum::http::{HeaderMap, Method};
 use axum::routing::{MethodRouter, get, post};
@@ -121,6 +121,21 @@ pub(super) fn operations() -> Vec<Operation> {
 
 fn readings() -> Vec<Operation> {
     vec![
+        read(
+            "/api/v2/log",
+            "log",
+            "The log of the mission: orders and edits with their authors, answers, silences, new labels, images; its last 2000 \
+             entries at most. `vehicle`, `kind` and `since` (a number) select some.",
+            Content::Json(schema::<LogList>),
+            || get(log::log),
+        ),
+        read(
+            "/api/v2/log.csv",
+            "log_csv",
+            "The same as a table, with the same selections",
+            Content::File("text/csv; charset=utf-8"),
+            || get(log::table),
+        ),
         read("/api/v2/state", "state", "The state", Content::Json(schema::<MissionState>), || get(readings::state)),
         read(
             "/api/v2/events",

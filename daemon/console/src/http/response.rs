@@ -17,6 +17,8 @@ pub(super) fn respond(reply: Reply) -> Response {
         Reply::Fit(fit) => Json(*fit).into_response(),
         Reply::Accepted(accepted) => (StatusCode::ACCEPTED, Json(accepted)).into_response(),
         Reply::Done => StatusCode::NO_CONTENT.into_response(),
+        // The handler of the log makes its lines.
+        Reply::Log(_) => not_found(),
         Reply::Archives(maps) => Json(ArchiveList { maps }).into_response(),
         Reply::Command(command) => Json(command).into_response(),
         Reply::Forbidden(reason) => error(StatusCode::FORBIDDEN, &reason),

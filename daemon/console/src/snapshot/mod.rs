@@ -62,6 +62,7 @@ pub fn snapshot(surface: &Surface, facts: &MissionFacts, meter: &LinkMeter, now:
         command: command_state(surface.command(), now),
         layers: surface.layers().iter().map(|(_, layer)| layer_info(layer)).collect(),
         storage: facts.storage.clone(),
+        log: surface.log().last(),
         truth: facts.truth.as_ref().map(|truth| truth.info.clone()),
     };
     Snapshot::new(state, facts.truth.clone())

@@ -5,6 +5,8 @@ mod batch;
 mod files;
 #[cfg(test)]
 mod fuzz_corpus;
+#[cfg(test)]
+mod kept_log;
 mod log;
 #[cfg(test)]
 mod power_cuts;

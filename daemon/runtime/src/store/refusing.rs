@@ -15,15 +15,15 @@ fn surface() -> Surface {
     scenecast_surface::assemble(&config, None, TuningTable::shipped(), profile, 5, Instant::ZERO).unwrap()
 }
 
-fn auv() -> Address {
+pub(super) fn auv() -> Address {
     Address::vehicle(1).unwrap()
 }
 
-fn at(seconds: u64) -> EventTime {
+pub(super) fn at(seconds: u64) -> EventTime {
     EventTime { mission_us: seconds * 1_000_000, unix_ms: seconds * 1000 }
 }
 
-fn start(disk: &Disk, seconds: u64) -> (SurfaceStore<Disk>, Surface) {
+pub(super) fn start(disk: &Disk, seconds: u64) -> (SurfaceStore<Disk>, Surface) {
     let mut store = SurfaceStore::load(Ok(disk.clone()), 1).unwrap();
     let mut surface = surface();
     store.begin(&mut surface, 9, 1, at(seconds));

@@ -39,7 +39,7 @@ pub fn decode(bytes: &[u8]) -> Result<Vec<Event>, DecodeError> {
 #[cfg(test)]
 mod tests {
     use super::super::event::{
-        EventKind, EventSource, EventTime, RunId, StoredCells, StoredMarker, StoredPlaces, VehicleEvent,
+        EventKind, EventSource, EventTime, RunId, StoredCells, StoredLogEntry, StoredMarker, StoredPlaces, VehicleEvent,
     };
     use super::*;
     use proptest::prelude::*;
@@ -109,6 +109,16 @@ mod tests {
         let time = EventTime { mission_us: 1000, unix_ms: 2000 };
         let events = [Event { sequence: 1, time, source: EventSource::Surface, kind }];
         let golden = [0, 3, 1, 1, 0xE8, 0x07, 0xD0, 0x0F, 0, 2, 1, 18, 0, 1, 0xAC, 2, 2, 7, 8, 0, 0];
+        assert_eq!(encode(&events), golden);
+        assert_eq!(decode(&golden).as_deref(), Ok(&events[..]));
+    }
+
+    #[test]
+    fn golden_bytes_of_an_entry_of_the_log() {
+        let entry = StoredLogEntry { number: 300, at: 5, vehicle: Some(1), kind: 7, by: None, text: "ab".to_owned() };
+        let time = EventTime { mission_us: 1000, unix_ms: 2000 };
+        let events = [Event { sequence: 1, time, source: EventSource::Surface, kind: EventKind::Logged(entry) }];
+        let golden = [0, 3, 1, 1, 0xE8, 0x07, 0xD0, 0x0F, 0, 3, 0xAC, 2, 5, 1, 1, 7, 0, 2, b'a', b'b'];
         assert_eq!(encode(&events), golden);
         assert_eq!(decode(&golden).as_deref(), Ok(&events[..]));
     }

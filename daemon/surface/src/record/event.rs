@@ -42,6 +42,22 @@ pub enum EventKind {
     Budget { ordered: StoredBudget, configured: StoredBudget },
     /// A fact about the vehicle with this address.
     Vehicle(u8, VehicleEvent),
+    /// An entry of the mission's log. Since layout 3.
+    Logged(StoredLogEntry),
+}
+
+/// An entry of the mission's log.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct StoredLogEntry {
+    /// One more than that of the entry before.
+    pub number: u64,
+    pub at: u64,
+    /// The address of the vehicle that it concerns, if one.
+    pub vehicle: Option<u8>,
+    /// 0 order, 1 answer, 2 contact, 3 mode, 4 label, 5 image, 6 record, 7 command.
+    pub kind: u8,
+    pub by: Option<String>,
+    pub text: String,
 }
 
 /// A change of the knowledge about one vehicle. Times are mission times in microseconds.

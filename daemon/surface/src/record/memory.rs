@@ -3,9 +3,10 @@
 use super::cells::{EarlierMap, MapCopy};
 use super::contact::StoredContact;
 use super::event::{
-    Event, EventKind, EventTime, RunId, StoredBudget, StoredImage, StoredIntent, StoredLabel, StoredMarker, StoredNote,
-    StoredOrder, StoredPlaces, StoredRequest, VehicleEvent,
+    Event, EventKind, EventTime, RunId, StoredBudget, StoredImage, StoredIntent, StoredLabel, StoredLogEntry,
+    StoredMarker, StoredNote, StoredOrder, StoredPlaces, StoredRequest, VehicleEvent,
 };
+use crate::log::MissionLog;
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
 
@@ -39,6 +40,8 @@ pub struct SurfaceMemory {
     /// The last order of a budget, and the configured one at that time.
     pub(crate) budget: Option<(StoredBudget, StoredBudget)>,
     pub(crate) vehicles: BTreeMap<u8, VehicleMemory>,
+    /// The last entries of the log.
+    pub(crate) log: VecDeque<StoredLogEntry>,
 }
 
 /// Everything that the surface keeps about one vehicle.
@@ -82,6 +85,10 @@ impl SurfaceMemory {
             &EventKind::Began { id, mission, series } => self.began = Some(Began { id, mission, series }),
             EventKind::Budget { ordered, configured } => self.budget = Some((ordered.clone(), configured.clone())),
             EventKind::Vehicle(address, event) => self.vehicles.entry(*address).or_default().apply(event),
+            EventKind::Logged(entry) => {
+                self.log.push_back(entry.clone());
+                self.log.drain(..self.log.len().saturating_sub(MissionLog::MAX));
+            }
         }
     }
 
@@ -104,6 +111,7 @@ impl SurfaceMemory {
         for (&address, vehicle) in &self.vehicles {
             all.extend(vehicle.to_events().into_iter().map(|event| EventKind::Vehicle(address, event)));
         }
+        all.extend(self.log.iter().cloned().map(EventKind::Logged));
         all
     }
 

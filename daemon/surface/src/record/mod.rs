@@ -11,7 +11,7 @@ pub use contact::{StoredContact, StoredRange};
 pub use encode::{DecodeError, decode, encode};
 pub use event::{
     Event, EventKind, EventSource, EventTime, RunId, StoredBudget, StoredCells, StoredImage, StoredIntent, StoredLabel,
-    StoredMarker, StoredNote, StoredOrder, StoredPlaces, StoredRequest, VehicleEvent,
+    StoredLogEntry, StoredMarker, StoredNote, StoredOrder, StoredPlaces, StoredRequest, VehicleEvent,
 };
 pub(crate) use memory::MAX_MARKERS;
 pub use memory::{Began, SurfaceMemory, VehicleMemory};

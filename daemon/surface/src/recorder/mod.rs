@@ -8,8 +8,8 @@ mod stored;
 
 use crate::Surface;
 use crate::record::{
-    Event, EventKind, EventSource, EventTime, RunId, StoredBudget, StoredImage, SurfaceMemory, VehicleEvent,
-    VehicleMemory,
+    Event, EventKind, EventSource, EventTime, RunId, StoredBudget, StoredImage, StoredLogEntry, SurfaceMemory,
+    VehicleEvent, VehicleMemory,
 };
 use crate::vehicle_record::VehicleRecord;
 use scenecast_protocol::link::PeerView;
@@ -106,6 +106,7 @@ impl Recorder {
         for address in surface.records.keys().copied().collect::<Vec<_>>() {
             self.observe_vehicle(surface, address, by, &mut found, time);
         }
+        self.observe_log(surface, &mut found, time);
         found
     }
 
@@ -113,6 +114,15 @@ impl Recorder {
         let event = Event { sequence: self.memory.sequence.saturating_add(1), time, source, kind };
         self.memory.apply(&event);
         found.events.push(event);
+    }
+
+    fn observe_log(&mut self, surface: &Surface, found: &mut Observation, time: EventTime) {
+        let known = self.memory.log.back().map_or(0, |entry| entry.number);
+        let news = surface.log.entries().rev().take_while(|entry| entry.number > known);
+        let news: Vec<StoredLogEntry> = news.map(StoredLogEntry::from).collect();
+        for entry in news.into_iter().rev() {
+            self.push(found, EventSource::Surface, time, EventKind::Logged(entry));
+        }
     }
 
     fn observe_budget(&mut self, surface: &Surface, source: &EventSource, found: &mut Observation, time: EventTime) {

@@ -21,6 +21,7 @@ pub(super) fn restore(surface: &mut Surface, memory: &SurfaceMemory, configured:
         surface.link.set_shares(Shares(budget.shares));
         BackgroundOrder::from_bytes(&budget.background).into_iter().for_each(|order| surface.set_background(order));
     }
+    surface.restore_log(&memory.log);
     for (&number, vehicle) in &memory.vehicles {
         let Some(address) = Address::vehicle(number) else { continue };
         let (series, orders) =

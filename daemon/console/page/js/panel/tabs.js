@@ -3,9 +3,9 @@
 import { $, h } from "../dom.js";
 import { store } from "../store.js";
 
-const PANELS = [["labels", "Labels"], ["vehicle", "Vehicle"], ["constraints", "Constraints"], ["link", "Link"], ["model", "Model"]];
+const PANELS = [["labels", "Labels"], ["vehicle", "Vehicle"], ["constraints", "Constraints"], ["link", "Link"], ["model", "Model"], ["log", "Log"]];
 const WIDE = matchMedia("(min-width: 1101px)");
-const ofWide = (id) => (["constraints", "model"].includes(id) ? id : "vehicle");
+const ofWide = (id) => (["constraints", "model", "log"].includes(id) ? id : "vehicle");
 
 export function startTabs() {
   const bar = $("tabs");

@@ -2,6 +2,7 @@
 
 pub(super) mod command;
 pub(super) mod events;
+pub(super) mod log;
 pub(super) mod login;
 pub(super) mod maps;
 pub(super) mod metrics;

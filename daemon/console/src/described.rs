@@ -1,0 +1,95 @@
+//! Requests in words, for the log of the mission.
+
+use crate::orders::{ExemplarAction, LabelOrder};
+use crate::request::SurfaceRequest;
+use scenecast_protocol::directive::Constraints;
+use scenecast_protocol::wire::Address;
+use scenecast_surface::LogKind;
+use std::collections::BTreeMap;
+
+/// The vehicle, the kind and the text of the entry for a request; `None` if it changes nothing that the log has.
+pub(crate) fn describe(request: &SurfaceRequest) -> Option<(Option<Address>, LogKind, String)> {
+    use SurfaceRequest as R;
+    let order = |id: u8, text: String| (Address::vehicle(id), LogKind::Order, text);
+    let record = |id: u8, text: String| (Address::vehicle(id), LogKind::Record, text);
+    Some(match request {
+        R::Map(_) | R::Exemplar(..) | R::Fit(..) | R::Log | R::Archives | R::ArchivedMap(_) | R::Command(_) => {
+            return None;
+        }
+        R::Utility(id, weights, terms) => order(*id, utility(weights, *terms)),
+        R::ExemplarOrder(id, wanted) => {
+            let verb = match wanted.action {
+                ExemplarAction::Another => "image requested",
+                ExemplarAction::Larger => "larger image requested",
+                ExemplarAction::Cancel => "request for an image withdrawn",
+            };
+            order(*id, format!("{verb}: label {}", wanted.label))
+        }
+        R::Constraints(id, Constraints { abort: true, .. }) => order(*id, "abort".into()),
+        R::Constraints(id, Constraints { hold: true, .. }) => order(*id, "hold".into()),
+        R::Constraints(id, _) => order(*id, "resume".into()),
+        R::Fence(id, fence) => {
+            let outline = fence.fence.as_ref().map_or("no fence".to_owned(), |f| format!("{} corners", f.len()));
+            order(*id, format!("fence: {outline}, {} keep-outs", fence.keep_outs.len()))
+        }
+        R::Limits(id, limits) => order(*id, format!("limits: {}", members(limits))),
+        R::Areas(id, areas) => {
+            let weights: Vec<String> = areas.areas.iter().map(|area| format!("{:+.2}", area.weight)).collect();
+            order(*id, if weights.is_empty() { "no areas".into() } else { format!("areas: {}", weights.join(", ")) })
+        }
+        R::Destination(id, to) => order(
+            *id,
+            to.place.map_or("destination withdrawn".into(), |[x, y]| format!("destination: E {x:.1} N {y:.1} m")),
+        ),
+        R::Settings(id, settings) => order(*id, format!("settings: {}", members(settings))),
+        R::Budget(budget) => (None, LogKind::Order, format!("budget: {} bit/s", budget.budget_bps)),
+        R::Label(id, LabelOrder { label, name, .. }) => {
+            let name = name.as_ref().map_or("its colour or its merging".to_owned(), |name| format!("name {name}"));
+            record(*id, format!("label {label}: {name}"))
+        }
+        R::Note(id, _, note) => record(*id, format!("note: {}", note.text.trim())),
+        R::Marker(id, _, marker) => {
+            record(*id, format!("marker at E {:.1} N {:.1} m: {}", marker.x_m, marker.y_m, marker.text.trim()))
+        }
+        R::RemoveMarker(id, marker) => record(*id, format!("marker {} removed", marker.number)),
+        R::DismissEarlierMap(id) => record(*id, "the earlier map is out of view".into()),
+    })
+}
+
+fn utility(weights: &BTreeMap<u8, f64>, (exploration, curiosity): (f64, f64)) -> String {
+    let others =
+        [("unexplored", exploration), ("curiosity", curiosity)].map(|(name, weight)| (name.to_owned(), weight));
+    let labels = weights.iter().map(|(label, weight)| (format!("label {label}"), *weight));
+    let all = labels.chain(others).filter(|(_, weight)| *weight != 0.0);
+    let all: Vec<String> = all.map(|(name, weight)| format!("{name} {weight:+.2}")).collect();
+    if all.is_empty() { "weights: all 0".to_owned() } else { format!("weights: {}", all.join(", ")) }
+}
+
+/// The members of an order that it states.
+fn members(order: &impl serde::Serialize) -> String {
+    let value = serde_json::to_value(order).unwrap_or_default();
+    let stated = value.as_object().into_iter().flatten().filter(|(_, value)| !value.is_null());
+    let stated: Vec<String> = stated.map(|(name, value)| format!("{name} {value}")).collect();
+    if stated.is_empty() { "none".to_owned() } else { stated.join(", ").replace('"', "") }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use scenecast_surface::{DestinationOrder, LimitsOrder};
+
+    #[test]
+    fn requests_are_described_by_what_they_change() {
+        let text = |request: SurfaceRequest| describe(&request).map(|(_, kind, text)| (kind.name(), text));
+        let weights = SurfaceRequest::Utility(1, [(3, 0.8), (4, 0.0)].into(), (0.1, 0.0));
+        assert_eq!(text(weights), Some(("order", "weights: label 3 +0.80, unexplored +0.10".into())));
+        let limits = LimitsOrder { time_s: Some(600.0), on_silence: Some("hold".into()), ..LimitsOrder::default() };
+        assert_eq!(
+            text(SurfaceRequest::Limits(1, limits)),
+            Some(("order", "limits: on_silence hold, time_s 600.0".into()))
+        );
+        let to = DestinationOrder { place: Some([1.0, -2.5]) };
+        assert_eq!(text(SurfaceRequest::Destination(1, to)), Some(("order", "destination: E 1.0 N -2.5 m".into())));
+        assert_eq!(text(SurfaceRequest::Map(1)), None);
+    }
+}

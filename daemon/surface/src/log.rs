@@ -1,0 +1,157 @@
+//! The log of the mission: orders and edits with their authors, the answers of the vehicles, silences, new labels, images.
+
+mod watch;
+
+pub(super) use watch::Watch;
+
+use super::record::StoredLogEntry;
+use scenecast_protocol::time::Instant;
+use scenecast_protocol::wire::Address;
+use std::collections::VecDeque;
+
+/// The kind of an entry.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum LogKind {
+    /// An order was given.
+    Order,
+    /// A vehicle has applied or refused an order.
+    Answer,
+    /// A vehicle has fallen silent, is received again, or has begun another run.
+    Contact,
+    /// The mode of a vehicle has changed.
+    Mode,
+    /// A label is on the map for the first time.
+    Label,
+    /// An image of a label has arrived.
+    Image,
+    /// Something that stays at the surface was changed: a name, a note, a marker.
+    Record,
+    /// Command was requested, taken, handed over or released.
+    Command,
+}
+
+impl LogKind {
+    /// Every kind, in the order of the numbers in files.
+    pub const ALL: [Self; 8] =
+        [Self::Order, Self::Answer, Self::Contact, Self::Mode, Self::Label, Self::Image, Self::Record, Self::Command];
+
+    /// The name for people and in the API.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Order => "order",
+            Self::Answer => "answer",
+            Self::Contact => "contact",
+            Self::Mode => "mode",
+            Self::Label => "label",
+            Self::Image => "image",
+            Self::Record => "record",
+            Self::Command => "command",
+        }
+    }
+}
+
+/// One entry of the log.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct LogEntry {
+    /// One more than that of the entry before.
+    pub number: u64,
+    pub at: Instant,
+    /// `None`: the entry concerns the surface, or all vehicles.
+    pub vehicle: Option<Address>,
+    pub kind: LogKind,
+    /// The principal who caused it; `None`: the surface or the vehicle.
+    pub by: Option<String>,
+    /// One line for people.
+    pub text: String,
+}
+
+/// The last entries of the log.
+#[derive(Debug, Default)]
+pub struct MissionLog {
+    entries: VecDeque<LogEntry>,
+    last: u64,
+}
+
+impl MissionLog {
+    /// The most entries that are kept; the oldest go first.
+    pub const MAX: usize = 2000;
+    /// The most characters of a text.
+    const MAX_TEXT: usize = 240;
+
+    /// The entries, the oldest first.
+    pub fn entries(&self) -> impl DoubleEndedIterator<Item = &LogEntry> {
+        self.entries.iter()
+    }
+
+    /// The number of the last entry; 0 before the first.
+    pub fn last(&self) -> u64 {
+        self.last
+    }
+
+    pub(super) fn add(&mut self, vehicle: Option<Address>, kind: LogKind, by: Option<&str>, text: &str, at: Instant) {
+        let text = text.chars().take(Self::MAX_TEXT).collect();
+        let number = self.last + 1;
+        self.push(LogEntry { number, at, vehicle, kind, by: by.map(str::to_owned), text });
+    }
+
+    fn push(&mut self, entry: LogEntry) {
+        self.last = entry.number;
+        self.entries.push_back(entry);
+        self.entries.drain(..self.entries.len().saturating_sub(Self::MAX));
+    }
+
+    /// Puts the entries of an earlier run of the surface back, before any other entry.
+    pub(super) fn restore(&mut self, stored: impl IntoIterator<Item = LogEntry>) {
+        stored.into_iter().for_each(|entry| self.push(entry));
+    }
+}
+
+impl From<&LogEntry> for StoredLogEntry {
+    fn from(entry: &LogEntry) -> Self {
+        Self {
+            number: entry.number,
+            at: entry.at.as_micros(),
+            vehicle: entry.vehicle.map(Address::number),
+            kind: entry.kind as u8,
+            by: entry.by.clone(),
+            text: entry.text.clone(),
+        }
+    }
+}
+
+impl StoredLogEntry {
+    /// `None` if this build does not know the kind.
+    pub(super) fn entry(&self) -> Option<LogEntry> {
+        Some(LogEntry {
+            number: self.number,
+            at: Instant::from_micros(self.at),
+            vehicle: self.vehicle.and_then(Address::vehicle),
+            kind: *LogKind::ALL.get(usize::from(self.kind))?,
+            by: self.by.clone(),
+            text: self.text.clone(),
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_log_keeps_its_last_entries_and_their_numbers_across_a_restart() {
+        let mut log = MissionLog::default();
+        let long = "x".repeat(1000);
+        for second in 0..2500 {
+            let at = Instant::from_secs_f64(f64::from(second));
+            log.add(Address::vehicle(1), LogKind::Order, Some("ann"), &long, at);
+        }
+        assert_eq!((log.entries().count(), log.last()), (MissionLog::MAX, 2500));
+        assert_eq!(log.entries().next().unwrap().text.len(), MissionLog::MAX_TEXT);
+        let stored: Vec<StoredLogEntry> = log.entries().map(StoredLogEntry::from).collect();
+        let mut restored = MissionLog::default();
+        restored.restore(stored.iter().filter_map(StoredLogEntry::entry));
+        assert!(restored.entries().eq(log.entries()));
+        restored.add(None, LogKind::Command, None, "ann took command", Instant::ZERO);
+        assert_eq!(restored.last(), 2501);
+    }
+}

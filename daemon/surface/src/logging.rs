@@ -1,0 +1,113 @@
+//! The surface keeps the log of the mission.
+
+use super::command::{CommandChange, CommandChangeKind};
+use super::log::{LogKind, MissionLog};
+use super::record::StoredLogEntry;
+use super::{Surface, VehicleRecord};
+use scenecast_protocol::directive::{OrderStatus, SlotId};
+use scenecast_protocol::time::Instant;
+use scenecast_protocol::wire::{Address, VehicleMode};
+
+impl Surface {
+    /// The log of the mission.
+    pub fn log(&self) -> &MissionLog {
+        &self.log
+    }
+
+    /// Adds what a principal has done.
+    pub fn log_action(&mut self, vehicle: Option<Address>, kind: LogKind, by: &str, text: &str, now: Instant) {
+        self.log.add(vehicle, kind, Some(by), text, now);
+    }
+
+    /// Puts the log of an earlier run of the surface back. The labels on the first map are not new then.
+    pub(super) fn restore_log<'a>(&mut self, stored: impl IntoIterator<Item = &'a StoredLogEntry>) {
+        self.log.restore(stored.into_iter().filter_map(StoredLogEntry::entry));
+        for &vehicle in self.records.keys() {
+            self.watches.entry(vehicle).or_default().assume_labels_known();
+        }
+    }
+
+    pub(super) fn log_fact(&mut self, vehicle: Address, kind: LogKind, text: &str, now: Instant) {
+        self.log.add(Some(vehicle), kind, None, text, now);
+    }
+
+    pub(super) fn log_command(&mut self, change: &CommandChange) {
+        let text = match (change.kind, &change.to) {
+            (CommandChangeKind::Taken, _) => "takes command".to_owned(),
+            (CommandChangeKind::HandedOver, Some(to)) => format!("hands command over to {to}"),
+            (CommandChangeKind::HandedOver, None) => "hands command over".to_owned(),
+            (CommandChangeKind::Released, _) => "releases command".to_owned(),
+            (CommandChangeKind::Requested, _) => "requests command".to_owned(),
+            (CommandChangeKind::Withdrawn, _) => "withdraws the request for command".to_owned(),
+        };
+        self.log.add(None, LogKind::Command, Some(&change.by), &text, change.at);
+    }
+
+    pub(super) fn log_decision(&mut self, vehicle: Address, slot: SlotId, now: Instant) {
+        // Fixes are measured and sent by the program, several a minute.
+        let Some(decided) = self.link.vehicle(vehicle).and_then(|v| v.slots().find(|s| s.id == slot)) else { return };
+        let text = match decided.status {
+            OrderStatus::Applied if slot == SlotId::Fix => return,
+            OrderStatus::Applied => format!("{} version {} applied", slot.name(), decided.version),
+            OrderStatus::Refused(reason) => {
+                format!("{} version {} refused: {}", slot.name(), decided.version, reason.explain())
+            }
+            _ => return,
+        };
+        self.log_fact(vehicle, LogKind::Answer, &text, now);
+    }
+
+    /// Frames of these vehicles were accepted.
+    pub(super) fn log_received(&mut self, vehicles: &[Address], now: Instant) {
+        for &vehicle in vehicles {
+            if let Some(text) = self.watches.entry(vehicle).or_default().handle_frame(now) {
+                self.log_fact(vehicle, LogKind::Contact, &text, now);
+            }
+        }
+    }
+
+    /// Time passes: vehicles may have fallen silent.
+    pub(super) fn log_silences(&mut self, now: Instant) {
+        for vehicle in self.records.keys().copied().collect::<Vec<_>>() {
+            let usual = self.records.get(&vehicle).and_then(|record| record.pauses.expected());
+            if let Some(text) = self.watches.entry(vehicle).or_default().handle_time(usual, now) {
+                self.log_fact(vehicle, LogKind::Contact, &text, now);
+            }
+        }
+    }
+
+    pub(super) fn log_mode(&mut self, vehicle: Address, now: Instant) {
+        let Some((status, _)) = self.link.vehicle(vehicle).and_then(|view| view.status()) else { return };
+        let (mode, reason) = (status.mode, status.reason);
+        if self.watches.entry(vehicle).or_default().handle_mode(mode, reason) {
+            let text = match (mode, reason.name()) {
+                (_, Some(reason)) => format!("{}: {reason}", name_of_mode(mode)),
+                (VehicleMode::Hold, None) => "holding: nothing left to survey".to_owned(),
+                (_, None) => name_of_mode(mode).to_owned(),
+            };
+            self.log_fact(vehicle, LogKind::Mode, &text, now);
+        }
+    }
+
+    /// The labels on the map of a vehicle are these.
+    pub(super) fn log_labels(&mut self, vehicle: Address, labels: impl Iterator<Item = u8>, now: Instant) {
+        let epoch = self.records.get(&vehicle).map_or(0, |record| record.epoch);
+        for label in self.watches.entry(vehicle).or_default().handle_labels(epoch, labels) {
+            let name = |record: &VehicleRecord| record.label_book(label).and_then(|book| book.name.clone());
+            let name = self.records.get(&vehicle).and_then(name).map_or(String::new(), |name| format!(" ({name})"));
+            self.log_fact(vehicle, LogKind::Label, &format!("label {label}{name} is on the map"), now);
+        }
+    }
+}
+
+/// The mode for people.
+fn name_of_mode(mode: VehicleMode) -> &'static str {
+    match mode {
+        VehicleMode::Survey => "surveying",
+        VehicleMode::Hold => "holding",
+        VehicleMode::Return => "returning",
+        VehicleMode::Surface => "surfacing",
+        VehicleMode::Abort => "aborted",
+        VehicleMode::Done => "done",
+    }
+}
