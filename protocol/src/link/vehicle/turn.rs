@@ -160,7 +160,10 @@ impl<S: StateSource> VehicleLink<S> {
     fn write_frame(&mut self, frames: u32, now: Instant) -> (Transmit, bool) {
         let modem = self.config.modem;
         let size = modem.frame_bytes;
-        if self.hello_limit.repeat(now) {
+        // Where the surface polls or grants turns, content shows that it uses the current run: a late hello alone is no reason
+        // to leave it.
+        let may_repeat = matches!(modem.access, Access::ModemOwned { .. }) || self.is_answer_due(now);
+        if may_repeat && self.hello_limit.repeat(now) {
             self.pair.repeat_hello();
         }
         let sends_hello = self.pair.must_send_hello();
