@@ -11,6 +11,9 @@ use crate::time::Instant;
 use crate::wire::{Address, ChunkKind, Envelope, Header};
 use std::time::Duration;
 
+/// Time without an accepted frame after which late frames are taken for a sign of a forged one.
+const STRAYS_TIMEOUT: Duration = Duration::from_secs(20);
+
 impl<S: StateSource> VehicleLink<S> {
     /// Handles the bytes of one received frame; a frame that cannot be used is counted in [`Self::stats`] and dropped.
     pub fn handle_frame(&mut self, bytes: &[u8], now: Instant) {
@@ -32,7 +35,7 @@ impl<S: StateSource> VehicleLink<S> {
                 // The surface builds on frames that we never acknowledged: in between it took us for another run.
                 return self.renew(now);
             }
-            Err(DropReason::Late) if self.pair.seems_out_of_step() => {
+            Err(DropReason::Late) if self.pair.seems_out_of_step() && self.is_silent_for(STRAYS_TIMEOUT, now) => {
                 // A forged frame had so high a number that every true one comes late.
                 return self.renew(now);
             }
@@ -84,6 +87,10 @@ impl<S: StateSource> VehicleLink<S> {
             self.renew(now);
         }
         self.owe_answer(now);
+    }
+
+    fn is_silent_for(&self, time: Duration, now: Instant) -> bool {
+        self.last_received().is_none_or(|at| now.since(at) >= time)
     }
 
     /// Answers a discovery call, unless the surface is in contact with us.

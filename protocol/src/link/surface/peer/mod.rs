@@ -46,6 +46,9 @@ struct LastTurn {
     purpose: FramePurpose,
 }
 
+/// Time without an accepted frame after which frames of other runs, or late ones, are taken for a sign of another run.
+const STRAYS_TIMEOUT: Duration = Duration::from_secs(20);
+
 /// When the vehicle was last in contact, and when it must be contacted without a turn.
 #[derive(Debug)]
 struct Contact {
@@ -103,6 +106,10 @@ impl Contact {
 
     fn last_received(&self) -> Option<Instant> {
         self.last_received
+    }
+
+    fn is_silent_for(&self, time: Duration, now: Instant) -> bool {
+        self.last_received.is_none_or(|at| now.since(at) >= time)
     }
 }
 
@@ -227,7 +234,9 @@ impl<R: StateReplica> VehiclePeer<R> {
                     self.is_out_of_step |= self.divergence.note_undecodable(now);
                 }
                 // The vehicle builds on frames that we never acknowledged, or means another run of ours.
-                let silent = matches!(modem.access, Access::ModemOwned { .. }) || self.master.unanswered() >= 2;
+                let unanswered = matches!(modem.access, Access::ModemOwned { .. }) || self.master.unanswered() >= 2;
+                // Over a channel that reorders, several late frames in a row are usual.
+                let silent = unanswered && self.contact.is_silent_for(STRAYS_TIMEOUT, now);
                 // A damaged frame is no sign of another run, so it is no reason to begin a new one.
                 let is_stray = self.pair.strays() > strays_before;
                 let strays = is_stray && self.pair.seems_out_of_step() && silent;
