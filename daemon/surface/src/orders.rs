@@ -69,6 +69,7 @@ pub struct AreaOrder {
     /// Vertices in metres east and north of the origin.
     #[schemars(length(min = 3, max = 34))]
     pub outline: Vec<[f64; 2]>,
+    /// Added to the weights of labels and of unexplored cells inside.
     #[schemars(range(min = -1.0, max = 1.0))]
     pub weight: f64,
 }
@@ -77,7 +78,7 @@ pub struct AreaOrder {
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct DestinationOrder {
-    /// Metres east and north of the origin; `None` withdraws the destination.
+    /// Metres east and north of the origin; null withdraws the destination.
     pub place: Option<[f64; 2]>,
 }
 
