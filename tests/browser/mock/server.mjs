@@ -7,8 +7,8 @@
 // POST /mock controls it in tests:
 //   {"scenario": "rich", "advance": 60, "times": 3, "speed": 20, "silent": true, "refuse": "utility",
 //    "loss": 0.3, "layers": true, "coarse": true, "position": {"x_m": 5, ..},
-//    "placement": {"version": 1, "east_m": 20, "north_m": -5}, "ended": true, "truth": true,
-//    "principals": [{"name": "anna", "role": "operator"}], "commander": "anna", "stream": false, "mute": true, "down": true}
+//    "placement": {"version": 1, "east_m": 20, "north_m": -5}, "contact": {"received_s_ago": 300, "due_s_ago": 290},
+//    "ended": true, "truth": true, "principals": [{"name": "anna", "role": "operator"}], "commander": "anna", "stream": false, "mute": true, "down": true}
 
 import http from "node:http";
 import { readFile } from "node:fs/promises";
@@ -198,7 +198,8 @@ function accepted(mock, res, response) {
 function steer(mock, order, res) {
   if (order.scenario) mock.mission = new Mission(order.scenario);
   const { mission } = mock;
-  if ("in_force" in order) mission.vehicles[0].reported = order.in_force;
+  if ("in_force" in order) mission.vehicles[0].knownInForce = order.in_force;
+  if (order.contact) mission.vehicles[0].setContact(mission.nowS, order.contact);
   if ("mismatch" in order) mission.vehicles[0].mismatch = order.mismatch;
   if ("earlier" in order) mission.vehicles[0].earlier = order.earlier;
   for (const entry of order.log ?? []) mission.log.push({ number: mission.log.length + 1, at_s: mission.nowS, utc: "2026-11-23T10:00:00Z", by: null, vehicle: null, ...entry });

@@ -39,14 +39,9 @@ export default [
     name: "a contact is not overdue while frames come in",
     scenario: "rich",
     async run(s) {
-      const set = (received, next) => s.inPage(({ store }, [r, n]) => {
-        const state = structuredClone(store.snapshot);
-        Object.assign(state.vehicles.find((v) => v.id === store.selectedId), { last_received_s: state.now_s - r, next_contact_s: state.now_s - n });
-        store.setSnapshot(state);
-      }, [received, next]);
-      await set(0, 4);
+      await s.steer({ contact: { received_s_ago: 0, due_s_ago: 4 } });
       await s.shows("#vehicle dl", /Next contact\s+T\+[\d:]+, now/);
-      await set(300, 290);
+      await s.steer({ contact: { received_s_ago: 300, due_s_ago: 290 } });
       await s.shows("#vehicle dl", /Next contact\s+T\+[\d:]+, overdue/);
     },
   },
