@@ -4,6 +4,7 @@ use super::bounds::{Bounds, Point, distance};
 use scenecast_core::Area;
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
+use std::ops::Range;
 
 const MAX_SIDE: usize = 192;
 /// Steps to the eight places around, in the order of the bits of a move mask.
@@ -17,6 +18,8 @@ pub struct Lattice {
     step_m: f64,
     columns: usize,
     rows: usize,
+    /// The columns and the rows over the area itself.
+    area: (Range<usize>, Range<usize>),
     /// Allowed moves from each place, one bit for each direction. 0: the vehicle may not be there.
     moves: Vec<u8>,
 }
@@ -47,7 +50,12 @@ impl Lattice {
         let origin = (area.west - before(west, area.west) * step_m, area.south - before(south, area.south) * step_m);
         let count = |from: f64, to: f64| ((to - from) / step_m + 1e-9).floor() as usize + 1;
         let (columns, rows) = (count(origin.0, east), count(origin.1, north));
-        let mut lattice = Self { origin, step_m, columns, rows, moves: vec![0; columns * rows] };
+        let over = |first: f64, count: usize| (first as usize)..(first as usize + count);
+        let area = (
+            over(before(west, area.west), count(area.west, area.east)),
+            over(before(south, area.south), count(area.south, area.north)),
+        );
+        let mut lattice = Self { origin, step_m, columns, rows, area, moves: vec![0; columns * rows] };
         let open: Vec<bool> = (0..columns * rows).map(|n| bounds.allows(lattice.place(n))).collect();
         for node in 0..columns * rows {
             let allowed = (0..MOVES.len()).filter(|&m| {
@@ -67,6 +75,12 @@ impl Lattice {
     /// The number of columns and of rows.
     pub fn size(&self) -> (usize, usize) {
         (self.columns, self.rows)
+    }
+
+    /// The places of each row over the area, from the south, without those beyond it.
+    pub fn area_rows(&self) -> impl Iterator<Item = Range<Node>> + '_ {
+        let (columns, rows) = self.area.clone();
+        rows.map(move |row| row * self.columns + columns.start..row * self.columns + columns.end)
     }
 
     pub fn places(&self) -> usize {

@@ -78,13 +78,12 @@ impl Planner for Lawnmower {
     }
 }
 
-/// The ends of the open stretches of every other row, in alternating direction.
+/// The ends of the open stretches of every other row of the area, in alternating direction.
 fn legs(q: &PlanRequest<'_>) -> Vec<Node> {
-    let (columns, rows) = q.lattice.size();
     let mut legs = Vec::new();
-    for (leg, row) in (0..rows).step_by(2).enumerate() {
+    for (leg, row) in q.lattice.area_rows().step_by(2).enumerate() {
         let is_open = |n: &Node| q.lattice.is_open(*n) && q.return_paths.metres[*n].is_finite();
-        let mut stretch: Vec<Node> = (row * columns..(row + 1) * columns).filter(is_open).collect();
+        let mut stretch: Vec<Node> = row.filter(is_open).collect();
         if leg % 2 == 1 {
             stretch.reverse();
         }

@@ -32,6 +32,17 @@ fn the_lawnmower_covers_the_area_and_stays_inside_it() {
 }
 
 #[test]
+fn a_return_point_outside_the_area_adds_no_leg() {
+    let mut steering = steering(PlannerKind::Lawnmower);
+    let fence = Fence { return_point: Some(DecimetrePoint::new(-600, -400)), ..Fence::default() };
+    steering.set_fence(&fence);
+    let track = drive(&mut steering, &LabelGrid::default(), None, 40);
+    let legs: Vec<_> = track.into_iter().skip_while(|at| at.0 < 0.0).collect();
+    assert!(legs.iter().all(|&(x, y)| (0.0..=20.0).contains(&x) && (0.0..=12.0).contains(&y)), "{legs:?}");
+    assert!(legs.iter().any(|l| l.1 > 9.0) && legs.iter().any(|l| l.1 < 2.0), "{legs:?}");
+}
+
+#[test]
 fn a_fence_that_leaves_a_leg_as_it_is_keeps_the_progress() {
     let map = LabelGrid::default();
     let around = |margin: i32| -> Polygon {
