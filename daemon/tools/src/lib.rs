@@ -3,7 +3,9 @@
 //! Internal to scenecast.
 
 pub mod commands;
+mod figures;
 mod progress;
 mod scene;
 
+pub use figures::print_figures;
 pub use progress::{Progress, ProgressForm};

@@ -84,6 +84,9 @@ pub(super) struct Sim {
     /// Folder for report.json, maps, images and frames.log
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
+    /// Print the report as JSON instead of a line of figures
+    #[arg(long)]
+    json: bool,
 }
 
 impl Sim {
@@ -103,6 +106,10 @@ impl Sim {
         let seconds = started.elapsed().as_secs_f64();
         let speedup = mission.now().as_secs_f64() / seconds;
         write_outputs(&mission, &report, json!({ "seconds": seconds, "speedup": speedup }), &self.out)?;
+        if self.json {
+            println!("{}", report.json);
+            return Ok(());
+        }
         let map = &report.json["map"];
         println!(
             "{}: {} cells, {} labels, agreement {} at the end, {} on the mean, {seconds:.1} s",

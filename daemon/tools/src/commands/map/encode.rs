@@ -3,13 +3,14 @@
 use super::Coding;
 use super::change::{encode, sizes};
 use super::files::{read_map, same_size};
+use crate::print_figures;
 use clap::Args;
 use scenecast_core::UserError;
 use scenecast_files::write_whole;
 use scenecast_protocol::map_codec::LabelRaster;
 use std::path::PathBuf;
 
-/// Write the chunks that turn one map into another, and print their sizes as JSON.
+/// Write the chunks that turn one map into another, and print their sizes: in a pipe or a file as one line of JSON.
 ///
 /// Maps are indexed PNG files: pixel value = label, 0 = unexplored, at most 254. "bytes" counts all bytes of all chunks
 /// with their heads. "png_full_bytes" and "png_delta_bytes" are the sizes of the best PNG files (zopfli; the delta as a
@@ -28,6 +29,9 @@ pub struct Encode {
     /// File of chunks to write
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
+    /// Print JSON at a terminal too
+    #[arg(long)]
+    json: bool,
 }
 
 impl Encode {
@@ -43,9 +47,7 @@ impl Encode {
         };
         let (file, cells_changed) = encode(&self.coding, &base, &target)?;
         let sizes = sizes(&self.coding, &base, &target, &file, cells_changed);
-        let text = serde_json::to_string(&sizes).map_err(|e| UserError::Failed(e.to_string()))?;
         write_whole(&self.out, &file.to_bytes())?;
-        println!("{text}");
-        Ok(())
+        print_figures(&sizes, self.json)
     }
 }

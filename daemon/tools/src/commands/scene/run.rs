@@ -1,5 +1,6 @@
 //! `scenecast scene run`
 
+use crate::print_figures;
 use crate::progress::Progress;
 use crate::scene::{
     Annotated, CELL_PX, FLAT_M, Frames, Intrinsics, Mosaic, RunReport, Schedule, Tum, WordSource, WordsFile, learn,
@@ -11,7 +12,7 @@ use scene_model::words::{WordConfig, WordExtractor};
 use scenecast_core::UserError;
 use std::path::{Path, PathBuf};
 
-/// Label words, a mosaic or a sequence of images, and print the measurements as one line of JSON.
+/// Label words, a mosaic or a sequence of images, and print the measurements: in a pipe or a file as one line of JSON.
 ///
 /// Writes labels.png (indexed; pixel = label, 0 = unexplored; x to the right, y up; for stacked cells the label with
 /// most words in the column) and labels.csv (for each cell: its centre in metres, label, confidence and perplexity; of
@@ -53,6 +54,9 @@ pub struct Run {
     /// Folder for labels.png and labels.csv
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
+    /// Print JSON at a terminal too
+    #[arg(long)]
+    json: bool,
 }
 
 /// The input: words, a mosaic or a sequence of images.
@@ -170,10 +174,8 @@ impl Run {
             eprintln!("scenecast: no cell of the map is annotated, so the labels are not scored");
         }
         let report = RunReport::new(&model, &effort, quality.as_ref());
-        let line = serde_json::to_string(&report).map_err(|e| UserError::Failed(e.to_string()))?;
         write(&model, &self.out)?;
-        println!("{line}");
-        Ok(())
+        print_figures(&report, self.json)
     }
 
     fn schedule(&self) -> Result<Schedule, UserError> {
