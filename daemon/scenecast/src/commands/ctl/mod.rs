@@ -4,14 +4,15 @@ mod command;
 mod constraints;
 mod places;
 
+use clap::builder::PossibleValuesParser;
 use clap::{Args, Subcommand};
 use command::CommandChange;
 use constraints::{FenceCommand, LimitsCommand, ReturnPointCommand};
 use places::{AreasCommand, Go};
-use scenecast_console::client::{self, BudgetChange, Client, Session, SettingsChange};
+use scenecast_console::client::{self, BudgetChange, Client, LogSelection, Session, SettingsChange};
 use scenecast_console::orders::ExemplarAction;
 use scenecast_core::UserError;
-use scenecast_surface::SettingsOrder;
+use scenecast_surface::{LogKind, SettingsOrder};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::time::Duration;
@@ -28,6 +29,7 @@ Example: scenecast ctl status
          scenecast ctl limits set --depth 5..30 --silence 300 --on-silence return
          scenecast ctl hold --wait 60
          scenecast ctl command take
+         scenecast ctl log --kind order
          scenecast ctl watch --json --url http://192.168.1.7:8460 --token-file console.token
 
 Exit codes: 0 success; 1 refused, not applied in time, or no answer; 2 wrong usage";
@@ -36,6 +38,11 @@ const EXEMPLAR_EXAMPLES: &str = "\
 Example: scenecast ctl exemplar 3 --out label-3.webp --wait 300
          scenecast ctl exemplar 3 --out label-3-large.webp --larger
          scenecast ctl exemplar 3 --cancel";
+
+const LOG_EXAMPLES: &str = "\
+Example: scenecast ctl log --kind order
+         scenecast ctl log --since 250 --json
+         scenecast ctl log --out log.csv";
 
 /// Show the state of a running surface and give orders.
 #[derive(Debug, Args)]
@@ -164,6 +171,20 @@ enum CtlCommand {
         #[command(subcommand)]
         change: Option<CommandChange>,
     },
+    /// Print the log of the mission: orders and edits with their authors, answers, silences, new
+    /// labels, images; its last 2000 entries at most.
+    #[command(after_help = LOG_EXAMPLES)]
+    Log {
+        /// Only entries of this kind
+        #[arg(long, value_name = "KIND", value_parser = kinds())]
+        kind: Option<String>,
+        /// Only entries with a higher number
+        #[arg(long, value_name = "NUMBER")]
+        since: Option<u64>,
+        /// CSV file to write instead of printing, replaced if it exists
+        #[arg(long, value_name = "FILE")]
+        out: Option<PathBuf>,
+    },
     /// Print changes as they happen, until Ctrl-C.
     #[command(after_help = "Example: scenecast ctl watch --json")]
     Watch,
@@ -267,6 +288,11 @@ enum BudgetCommand {
     },
 }
 
+/// The kinds of entries of the log, as values of an option.
+fn kinds() -> PossibleValuesParser {
+    PossibleValuesParser::new(LogKind::ALL.map(LogKind::name))
+}
+
 fn weight(text: &str) -> Result<f64, String> {
     let weight = text.parse().ok().filter(|w| (-1.0..=1.0).contains(w));
     weight.ok_or_else(|| "expected a number from -1 to 1".to_owned())
@@ -330,6 +356,13 @@ impl CtlCommand {
             Self::Resume => constraints::hold(session, false).await,
             Self::Abort { yes } => constraints::abort(session, yes).await,
             Self::Authority { change } => command::command(session, change).await,
+            Self::Log { kind, since, out } => {
+                let selection = LogSelection { kind, since };
+                match out {
+                    Some(out) => client::save_log(session, &selection, &out).await,
+                    None => client::show_log(session, &selection).await,
+                }
+            }
             Self::Watch => client::watch(session).await,
         }
     }
