@@ -25,6 +25,7 @@ ORDERS = {
     "set_limits": {"depth_m": [0, 500], "on_silence": "hold"},
     "set_settings": {"planner": "greedy", "gamma": 1e-5, "cells": "coarse-to-fine", "layers": "depth", "alpha": 0},
     "change_command": {"action": "take"},
+    "keep_draft": {"weights": {"1": 0.5}, "exploration": 0.1},
     "add_note": {"text": "a wreck"},
     "add_marker": {"x_m": 12.5, "y_m": -3, "text": "a wreck"},
     "remove_marker": {"number": 1},
@@ -110,7 +111,7 @@ def check_archived(document, path, schema_of_error):
 
 def check(document, path, method, operation, state):
     vehicle = state["vehicles"][0]
-    requested = path.replace("{id}", str(vehicle["id"]))
+    requested = path.replace("{id}", str(vehicle["id"])).replace("{x}", "0").replace("{y}", "-1")
     if "{name}" in path:
         requested = check_archived(document, path, {"$ref": "#/components/schemas/ErrorBody"})
         if requested is None:
@@ -140,7 +141,7 @@ def check(document, path, method, operation, state):
         if "schema" in described and kind.endswith("json"):
             validate(document, described["schema"], json.loads(answer), requested)
     if "{id}" in path:
-        refused, _, why = ask(method, path.replace("{id}", "13").replace("{file}", "1.webp"), body, headers)
+        refused, _, why = ask(method, path.replace("{id}", "13").replace("{file}", "1.webp").replace("{x}", "0").replace("{y}", "0"), body, headers)
         expect(refused == 404, f"{method} {path} of no vehicle: {refused}")
         validate(document, {"$ref": "#/components/schemas/ErrorBody"}, json.loads(why), f"the refusal of {path}")
     other = "POST" if "post" not in document["paths"][path] else "DELETE"

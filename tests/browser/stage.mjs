@@ -58,7 +58,8 @@ export class Stage {
     this.page.on("request", (r) => {
       if (r.method() !== "POST") return;
       this.orders.push(r);
-      this.posts.push({ path: new URL(r.url()).pathname, body: r.postDataJSON() });
+      // Drafts follow the sliders by themselves.
+      if (!r.url().endsWith("/draft")) this.posts.push({ path: new URL(r.url()).pathname, body: r.postDataJSON() });
     });
     const theme = story.theme ?? "light";
     await this.page.addInitScript((t) => localStorage.getItem("scenecast.theme") ?? localStorage.setItem("scenecast.theme", JSON.stringify(t)), theme);

@@ -179,6 +179,16 @@ fn a_shell_sets_fence_and_limits_and_holds_and_resumes() {
     assert_refused(&["ctl", "--url", &url, "return-point", "set", "500", "0"], &["return_point", "outside"]);
     applied(&["abort", "--yes"]);
     wait_until("it has aborted", LIMIT, || vehicle()["status"]["mode"] != "survey");
+    let orders = ctl(port, &["log", "--kind", "order"]);
+    assert!(
+        text(&orders).contains("hold (by") && text(&orders).trim().ends_with("abort (by local)"),
+        "{}",
+        text(&orders)
+    );
+    let table = dir.join("log.csv");
+    assert!(ctl(port, &["log", "--out", table.to_str().unwrap()]).status.success());
+    assert!(std::fs::read_to_string(&table).unwrap().starts_with("number,utc,mission_s,"));
+    assert_refused(&["ctl", "log", "--kind", "orders"], &["orders", "order, answer"]);
 }
 
 #[test]

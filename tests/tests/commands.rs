@@ -117,6 +117,7 @@ fn every_command_has_help_with_an_example() {
         &["ctl", "utility", "set"],
         &["ctl", "budget", "set"],
         &["ctl", "exemplar"],
+        &["ctl", "log"],
         &["ctl", "watch"],
         &["map", "encode"],
         &["map", "decode"],

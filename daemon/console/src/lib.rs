@@ -7,7 +7,6 @@
 //! bottom; `snapshot` and `request` fill them from the surface; `http` serves them; [`client`] reads them.
 
 pub mod client;
-mod described;
 mod export;
 pub mod fit;
 mod http;
@@ -23,7 +22,7 @@ mod truth;
 pub use export::{MapCells, MapFormat};
 pub use http::{Console, ConsoleListener, PendingRequest, bind, gzip, page_files, start};
 pub use link_meter::LinkMeter;
-pub use request::{ClientRequest, Reply, SurfaceRequest, archived_cells, handle_request};
+pub use request::{ClientRequest, Reply, SurfaceRequest, archived_cells, former_labels, handle_request};
 pub use snapshot::{MissionFacts, Snapshot, measured_origin, snapshot};
 pub use tiles::TiledMap;
 pub use truth::Truth;

@@ -22,6 +22,25 @@ pub struct UtilityOrder {
     pub curiosity: f64,
 }
 
+/// The weights that an operator has set and not sent, in place of the draft before; without any, there is no draft. It stays
+/// at the surface, where the pages of all operators show it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct DraftOrder {
+    /// -1 to 1 by label.
+    #[schemars(extend("propertyNames" = { "pattern": "^[1-9][0-9]{0,2}$" }))]
+    #[schemars(extend("additionalProperties" = { "type": "number", "minimum": -1, "maximum": 1 }))]
+    pub weights: BTreeMap<String, f64>,
+    /// The weight of unexplored cells, -1 to 1; by default as last sent.
+    #[serde(default)]
+    #[schemars(range(min = -1.0, max = 1.0))]
+    pub exploration: Option<f64>,
+    /// The weight of cells that the scene model explains badly, -1 to 1; by default as last sent.
+    #[serde(default)]
+    #[schemars(range(min = -1.0, max = 1.0))]
+    pub curiosity: Option<f64>,
+}
+
 /// Requests an image of a label in place of an earlier request for that label, or cancels the request.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]

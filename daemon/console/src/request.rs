@@ -1,16 +1,19 @@
 //! Requests of clients that only the surface can handle.
 
-use crate::described::describe;
+mod described;
+
 use crate::export::MapCells;
 use crate::fit::{self, Fit};
 use crate::layers;
 use crate::orders::{
     BudgetOrder, ExemplarAction, ExemplarOrder, LabelOrder, MarkerOrder, NoteOrder, RemoveMarkerOrder,
 };
-use crate::snapshot::command_state;
-use crate::state::{AcceptedOrder, ArchivedMap, CommandState};
+use crate::snapshot::{command_state, seconds};
+use crate::state::{AcceptedOrder, ArchivedMap, CellHistory, CommandState, FormerLabel};
+use described::describe;
 use scenecast_protocol::coordinates::WorldPoint;
 use scenecast_protocol::directive::{Constraints, SlotId};
+use scenecast_protocol::map::Cell;
 use scenecast_protocol::schedule::{BackgroundOrder, Shares};
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::Address;
@@ -34,6 +37,8 @@ pub struct ClientRequest {
 pub enum SurfaceRequest {
     /// Read the map: its tiles with the time of each cell.
     Map(u8),
+    /// Read the labels that a cell had before. The owner of the files handles this request.
+    FormerLabels(u8, Cell),
     /// Read an image of a label: the one with this number, or the latest.
     Exemplar(u8, u8, Option<u8>),
     /// Read the settings that fit a budget in bit/s, by default the share of the map.
@@ -52,6 +57,9 @@ pub enum SurfaceRequest {
     Budget(BudgetOrder),
     /// Set name, colour and merging of a label.
     Label(u8, LabelOrder),
+    /// Keep the weights that the person or program with this name has set and not sent: of labels, of unexplored cells, of
+    /// curiosity.
+    Draft(u8, String, BTreeMap<u8, f64>, (Option<f64>, Option<f64>)),
     /// Add a note of the person or program with this name.
     Note(u8, String, NoteOrder),
     /// Set a marker of the person or program with this name.
@@ -73,9 +81,10 @@ impl SurfaceRequest {
     /// The kind of an order; `None` for readings, and for changes of command, which have rules of their own.
     fn order_kind(&self) -> Option<OrderKind> {
         match self {
-            Self::Map(_) | Self::Exemplar(..) | Self::Fit(..) | Self::Command(_) => None,
+            Self::Map(_) | Self::FormerLabels(..) | Self::Exemplar(..) | Self::Fit(..) | Self::Command(_) => None,
             Self::Log | Self::Archives | Self::ArchivedMap(_) => None,
             Self::Label(..)
+            | Self::Draft(..)
             | Self::Note(..)
             | Self::Marker(..)
             | Self::RemoveMarker(..)
@@ -108,6 +117,8 @@ pub enum Reply {
     /// The surface has done what was requested.
     Done,
     Archives(Vec<ArchivedMap>),
+    /// The labels that a cell had before.
+    FormerLabels(CellHistory),
     /// The entries of the log, the oldest first.
     Log(Vec<LogEntry>),
     /// Who has command after a change.
@@ -213,6 +224,9 @@ fn handle(surface: &mut Surface, request: SurfaceRequest, cell_m: f64, now: Inst
             let book = StoredLabel { name, colour, merged_into };
             done(surface.record_mut(Address::vehicle(id)?)?.set_label(label, book))
         }
+        SurfaceRequest::Draft(id, by, weights, terms) => {
+            done(surface.record_mut(Address::vehicle(id)?)?.annotations.set_draft(&by, weights, terms, now))
+        }
         SurfaceRequest::Note(id, by, order) => {
             let record = surface.record_mut(Address::vehicle(id)?)?;
             done(record.annotations.add_note(&by, &order.text, now))
@@ -230,10 +244,17 @@ fn handle(surface: &mut Surface, request: SurfaceRequest, cell_m: f64, now: Inst
         }
         SurfaceRequest::Log => Reply::Log(surface.log().entries().cloned().collect()),
         SurfaceRequest::Archives => Reply::Archives(Vec::new()),
-        SurfaceRequest::ArchivedMap(_) => return None,
+        SurfaceRequest::FormerLabels(..) | SurfaceRequest::ArchivedMap(_) => return None,
         // Handled with its principal, before.
         SurfaceRequest::Command(_) => return None,
     })
+}
+
+/// The labels that a cell had before, of what the surface has kept about the vehicle.
+pub fn former_labels(kept: Option<&VehicleMemory>, cell: Cell) -> Reply {
+    let Some(kept) = kept else { return Reply::NotFound };
+    let former = kept.former_labels(cell).map(|(label, until)| FormerLabel { label, until_s: seconds(until) });
+    Reply::FormerLabels(CellHistory { former: former.collect() })
 }
 
 fn done(result: Result<(), String>) -> Reply {

@@ -15,12 +15,14 @@ pub use command::{
 pub use labels::{ExemplarImage, ExemplarProgress, ExemplarStage, MapLabel};
 pub use link::{ChannelQuality, LinkDirection, LinkRates, LinkSummary, ReportedBacklog, VehicleChannel};
 pub use log::{LogLine, LogList};
-pub use map::{EarlierMap, LayerBody, MapBody, MapEvent, MapIndex, MapPlacement, MapSummary, TileLayer};
+pub use map::{
+    CellHistory, EarlierMap, FormerLabel, LayerBody, MapBody, MapEvent, MapIndex, MapPlacement, MapSummary, TileLayer,
+};
 pub use storage::{ArchiveList, ArchivedMap, StorageInfo, VehicleMarker, VehicleNote};
 pub use vehicle::{
     AppliedOrder, DirectiveSlots, InForceKnowledge, OrderProgress, OrderStatus, PlannedPath, ReportedDisk,
     ReportedMode, ReportedPose, StatusReport, UsblMeasurement, UtilityTerms, VehicleOrders, VehicleSettings,
-    VehicleState,
+    VehicleState, WeightDraft,
 };
 
 use schemars::JsonSchema;

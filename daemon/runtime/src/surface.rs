@@ -12,7 +12,7 @@ use crate::port::FromPort;
 use scenecast_config::Config;
 use scenecast_console::{
     ClientRequest, Console, LinkMeter, MissionFacts, PendingRequest, Reply, SurfaceRequest, archived_cells, bind,
-    handle_request, measured_origin, snapshot, start,
+    former_labels, handle_request, measured_origin, snapshot, start,
 };
 use scenecast_core::UserError;
 use scenecast_core::world_file;
@@ -163,6 +163,9 @@ impl SurfaceShell {
         self.files.commit(self.host.surface_mut(), None, now);
         let by = request.principal.as_ref().map(|principal| principal.name().to_owned());
         let answer = match &request.request {
+            &SurfaceRequest::FormerLabels(vehicle, cell) => {
+                former_labels(self.files.store.memory().vehicle(vehicle), cell)
+            }
             SurfaceRequest::Archives => Reply::Archives(self.files.archives(now)),
             _ => handle_request(self.host.surface_mut(), request, self.facts.cell_m, now),
         };

@@ -1,6 +1,7 @@
-//! The operator's own names of labels, notes about a vehicle, and markers on its map. They stay at the surface.
+//! The operator's own names of labels, notes about a vehicle, markers on its map, and weights that are not sent. They stay
+//! at the surface.
 
-use super::record::{MAX_MARKERS, StoredLabel, StoredMarker, StoredNote};
+use super::record::{MAX_MARKERS, StoredDraft, StoredLabel, StoredMarker, StoredNote};
 use scenecast_protocol::coordinates::{DecimetrePoint, WorldPoint};
 use scenecast_protocol::map::MAX_LABEL;
 use scenecast_protocol::time::Instant;
@@ -14,7 +15,7 @@ const MAX_NOTE: usize = 1000;
 /// Maximum length of a marker's text, characters.
 const MAX_MARKER: usize = 200;
 
-/// Names of labels of the current epoch, notes, and markers.
+/// Names of labels of the current epoch, notes, markers, and the weights that are not sent.
 #[derive(Debug, Clone, Default)]
 pub struct Annotations {
     pub labels: BTreeMap<u8, StoredLabel>,
@@ -22,6 +23,8 @@ pub struct Annotations {
     pub notes: VecDeque<StoredNote>,
     /// The markers by their numbers.
     pub markers: BTreeMap<u32, StoredMarker>,
+    /// The weights that an operator has set and not sent.
+    pub draft: StoredDraft,
 }
 
 impl Annotations {
@@ -47,6 +50,32 @@ impl Annotations {
         }
         self.labels.insert(label, book);
         Ok(())
+    }
+
+    /// Replaces the draft of the weights, -1 to 1. The error is one line for the operator.
+    pub fn set_draft(
+        &mut self,
+        author: &str,
+        weights: BTreeMap<u8, f64>,
+        (exploration, curiosity): (Option<f64>, Option<f64>),
+        now: Instant,
+    ) -> Result<(), String> {
+        if let Some(label) = weights.keys().find(|label| !(1..=MAX_LABEL).contains(*label)) {
+            return Err(format!("weights: {label} is no label; they are 1 to {MAX_LABEL}"));
+        }
+        let mut all = weights.values().chain(&exploration).chain(&curiosity);
+        if let Some(weight) = all.find(|weight| !(-1.0..=1.0).contains(*weight)) {
+            return Err(format!("weight {weight}: it takes -1 to 1"));
+        }
+        let (number, author, at) = (self.draft.number.saturating_add(1), author.to_owned(), now.as_micros());
+        self.draft = StoredDraft { number, weights, exploration, curiosity, at, author };
+        Ok(())
+    }
+
+    /// Forgets everything that refers to labels, since another epoch has begun.
+    pub(super) fn handle_epoch(&mut self) {
+        self.labels.clear();
+        self.draft = StoredDraft { number: self.draft.number.saturating_add(1), ..StoredDraft::default() };
     }
 
     /// Adds a note. The error is one line for the operator.

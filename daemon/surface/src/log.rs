@@ -4,7 +4,7 @@ mod watch;
 
 pub(super) use watch::Watch;
 
-use super::record::StoredLogEntry;
+use super::record::{MAX_LOG, StoredLogEntry};
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::Address;
 use std::collections::VecDeque;
@@ -74,7 +74,7 @@ pub struct MissionLog {
 
 impl MissionLog {
     /// The most entries that are kept; the oldest go first.
-    pub const MAX: usize = 2000;
+    pub const MAX: usize = MAX_LOG;
     /// The most characters of a text.
     const MAX_TEXT: usize = 240;
 

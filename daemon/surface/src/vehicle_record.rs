@@ -235,7 +235,7 @@ impl VehicleRecord {
             self.epoch = status.epoch;
             self.utility = Utility { epoch: status.epoch, ..Utility::default() };
             self.exemplars = ExemplarCache::default();
-            self.annotations.labels.clear();
+            self.annotations.handle_epoch();
             self.gains = LabelGains::default();
         }
         self.track.handle_pose(status, at);

@@ -13,6 +13,8 @@ export class Grid {
     this.box = null;
     this.labels = new Map();
     this.layers = "";
+    /** Labels that another one replaced, the newest first. */
+    this.former = [];
     this.run = (runs += 1);
   }
 
@@ -26,6 +28,7 @@ export class Grid {
     const tile = this.tile(Math.floor(x / EDGE), Math.floor(y / EDGE));
     const at = (y - tile.row * EDGE) * EDGE + x - tile.column * EDGE;
     const old = tile.labels[at];
+    if (old !== 0 && old !== label) this.former.unshift({ x, y, label: old, until_s: atS });
     tile.labels[at] = label;
     tile.times[at] = Math.floor(atS);
     // The version is counted when all cells of a frame are here.

@@ -8,6 +8,7 @@
 //   {"scenario": "rich", "advance": 60, "times": 3, "speed": 20, "silent": true, "refuse": "utility",
 //    "loss": 0.3, "layers": true, "coarse": true, "position": {"x_m": 5, ..},
 //    "placement": {"version": 1, "east_m": 20, "north_m": -5}, "contact": {"received_s_ago": 300, "due_s_ago": 290},
+//    "label_at": {"x_m": 5.1, "y_m": -3, "label": 2},
 //    "ended": true, "truth": true, "principals": [{"name": "anna", "role": "operator"}], "commander": "anna", "stream": false, "mute": true, "down": true}
 
 import http from "node:http";
@@ -96,6 +97,8 @@ async function api(mock, req, res, path) {
   const [, id, resource] = path.match(/^vehicles\/(\d+)\/(.+)$/) ?? [];
   const vehicle = mission.vehicles.find((v) => v.id === Number(id));
   if (!vehicle) return reply(res, 404, { error: "no such vehicle" });
+  const [, x, y] = resource.match(/^cells\/(-?\d+)\/(-?\d+)$/) ?? [];
+  if (x) return reply(res, 200, { former: vehicle.replica.former.filter((f) => f.x === Number(x) && f.y === Number(y)).map(({ label, until_s }) => ({ label, until_s })) });
   if (resource === "map/tiles") return tiles(mock, req, res, vehicle);
   if (resource === "fit") return reply(res, 200, fit(new URL(req.url, "http://mock").searchParams.get("bits_per_s"), mission));
   if (resource.startsWith("map.")) return send(res, 200, "application/octet-stream", Buffer.from(`${resource} of the mock`));
@@ -122,7 +125,7 @@ async function post(mock, req, res, path) {
     reply(res, refused?.[0] ?? 200, refused ? { error: refused[1] } : mission.command.json());
     return emit(mock, "state", mission.json());
   }
-  const isRecord = /\/(labels|notes|dismiss|markers|markers\/remove)$/.test(path);
+  const isRecord = /\/(labels|draft|notes|dismiss|markers|markers\/remove)$/.test(path);
   const kind = path.endsWith("/settings") ? "settings" : given.hold || given.abort ? "stop" : "order";
   const refused = isRecord ? null : mission.command.refusal(by, kind);
   if (refused) return reply(res, refused[0], { error: refused[1] });
@@ -149,6 +152,10 @@ async function post(mock, req, res, path) {
   }
   // The mock keeps no names: the browser's copy counts.
   if (resource === "labels") return reply(res, 200, {});
+  if (resource === "draft") {
+    v.draft = { exploration: null, curiosity: null, ...given, number: v.draft.number + 1, at_s: mission.nowS, author: by.name };
+    return accepted(mock, res, {});
+  }
   if (resource === "markers") {
     v.mark(path.endsWith("/remove") ? { remove: given.number } : { ...given, author: by.name }, mission.nowS);
     return accepted(mock, res, {});
@@ -209,6 +216,7 @@ function steer(mock, order, res) {
     vehicle.disk = order.disk;
     if (vehicle.status) vehicle.status.disk = order.disk;
   }
+  if (order.label_at) mission.vehicles[0].setLabel(order.label_at, mission.nowS);
   if ("placement" in order) mission.vehicles[0].placement = order.placement;
   if ("coarse" in order) mission.vehicles[0].coarse = order.coarse;
   if ("silent" in order) mission.vehicles[0].silent = order.silent;

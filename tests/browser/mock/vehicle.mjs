@@ -27,7 +27,7 @@ export class Vehicle {
     this.published = new Map();
     this.weights = new Map();
     this.terms = { exploration: 0.2, curiosity: 0 };
-    Object.assign(this, { reported: null, knownInForce: {}, inForce: {}, fence: null, limits: null, areas: null, destination: null, planner: null, settings: new Settings(), coarse: false, aborted: false });
+    Object.assign(this, { reported: null, knownInForce: {}, inForce: {}, draft: { number: 0, weights: {}, exploration: null, curiosity: null, at_s: 0, author: "" }, fence: null, limits: null, areas: null, destination: null, planner: null, settings: new Settings(), coarse: false, aborted: false });
     this.exemplars = new Map();
     this.markers = [];
     this.track = [];
@@ -165,6 +165,13 @@ export class Vehicle {
     return { state, progress: e.progress, bytes: e.bytes, url, at_s: e.at_s ?? e.images.at(-1)?.at_s ?? null, images: e.images };
   }
 
+  /** Gives the cell at a place of the map another label, as a frame of now. */
+  setLabel({ x_m, y_m, label }, nowS) {
+    this.replica.set(Math.floor(x_m / this.replica.cellM), Math.floor(y_m / this.replica.cellM), label, nowS);
+    this.replica.version += 1;
+    this.updatedS = nowS;
+  }
+
   /** Sets when the last frame came in and when the next one was due, for as long as the mission does not advance. */
   setContact(nowS, { received_s_ago, due_s_ago }) {
     this.receivedS = nowS - received_s_ago;
@@ -185,7 +192,7 @@ export class Vehicle {
       labels: counts.map(([id, cells]) => ({
         id, cells, area_m2: cells * area, gained_m2: (id % 2 ? 0.25 : -0.125) * cells * area, weight: this.weights.get(id) ?? 0, exemplar: this.exemplarJson(id),
       })),
-      utility: this.terms, fence: this.fence, limits: this.limits, areas: this.areas, destination: this.destination, planner: this.planner, settings: this.settings.json(),
+      draft: this.draft, utility: this.terms, fence: this.fence, limits: this.limits, areas: this.areas, destination: this.destination, planner: this.planner, settings: this.settings.json(),
       in_force: { utility: "known", settings: "none", budget: "known", limits: this.inForce.limits ? "known" : "none", fence: this.inForce.fence ? "known" : "none", areas: this.inForce.areas ? "known" : "none", destination: this.inForce.destination ? "known" : "none", ...this.knownInForce },
       fence_in_force: this.inForce.fence ?? null, limits_in_force: this.inForce.limits ?? null,
       areas_in_force: this.inForce.areas ?? null, destination_in_force: this.inForce.destination?.order.place ? this.inForce.destination : null,

@@ -122,6 +122,25 @@ export default [
     },
   },
   {
+    name: "a weight that is not sent survives a reload and shows on the pages of others",
+    scenario: "rich",
+    async run(s) {
+      const draft = async () => (await s.get("/state")).vehicles[0].draft;
+      await slider(s, "Label 1").fill("0.4");
+      await s.until("the draft at the surface", async () => (await draft()).weights[1] === 0.4);
+      await s.page.reload();
+      await s.ready();
+      await s.until("the draft", async () => (await slider(s, "Label 1").inputValue()) === "0.4");
+      assert.equal(await send(s).innerText(), "Send 1 change");
+      await s.post("/vehicles/1/draft", { weights: { 2: -0.3 }, exploration: 0.5, author: "anna" });
+      await s.until("the other draft", async () => (await slider(s, "Label 2").inputValue()) === "-0.3");
+      assert.notEqual(await slider(s, "Label 1").inputValue(), "0.4");
+      await s.until("two changes", async () => (await send(s).innerText()) === "Send 2 changes");
+      await send(s).click();
+      await s.until("no draft", async () => Object.keys((await draft()).weights).length === 0 && (await draft()).exploration === null);
+    },
+  },
+  {
     name: "a refused order shows the reason and can be sent again",
     scenario: "refused",
     async run(s) {

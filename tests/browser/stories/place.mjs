@@ -36,6 +36,19 @@ export default [
     },
   },
   {
+    name: "the plate of a place names the labels that the cell had before",
+    scenario: "start",
+    async run(s) {
+      const cell = await aCell(s);
+      await s.page.mouse.click(cell.px, cell.py);
+      await s.shows(plate, /received .* ago/);
+      const other = cell.label === 1 ? 2 : 1;
+      await s.steer({ label_at: { x_m: cell.x, y_m: cell.y, label: other } });
+      const names = await s.inPage(({ nameOf }, ids) => ids.map(nameOf), [other, cell.label]);
+      await s.shows(plate, new RegExp(`${names[0]}.*received .* ago.*${names[1]} until .* ago`, "s"));
+    },
+  },
+  {
     name: "a marker is set at a place, is shown on the map, and is removed",
     scenario: "start",
     async run(s) {

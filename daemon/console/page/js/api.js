@@ -45,8 +45,12 @@ export const removeMarker = (id, number) => write(`/vehicles/${id}/markers/remov
 export const dismissEarlierMap = (id) => write(`/vehicles/${id}/earlier-map/dismiss`, {});
 /** The maps of runs that have ended, the newest first. */
 export const readArchive = async () => (await read("/archive")).maps;
+/** The labels that a cell had before: {label, until_s}, the newest first. */
+export const readCellHistory = async (id, x, y) => (await read(`/vehicles/${id}/cells/${x}/${y}`)).former;
 /** The entries of the mission's log after number `since`, the oldest first. */
 export const readLog = async (since) => (await read(`/log?since=${since}`)).entries;
+/** Keeps weights that are not sent; `exploration` and `curiosity` may be null. They stay at the surface. */
+export const keepDraft = (id, draft) => write(`/vehicles/${id}/draft`, draft);
 export const sendUtility = (id, utility) => write(`/vehicles/${id}/utility`, utility);
 /** `action`: another, larger or cancel; `image`: the number of the image to enlarge. */
 export const requestExemplar = (id, label, action, image = null) =>

@@ -7,6 +7,7 @@ mod download;
 mod follow;
 mod geojson;
 mod http;
+mod log;
 mod orders;
 mod places;
 mod session;
@@ -20,6 +21,7 @@ pub use constraints::{
 };
 pub use download::{cancel_exemplar, save_exemplar, save_map};
 pub use http::Client;
+pub use log::{LogSelection, save_log, show_log};
 pub use orders::{BudgetChange, set_budget, set_utility, show_budget, show_utility};
 pub use places::{AreasFile, go, set_areas, show_areas};
 pub use session::Session;

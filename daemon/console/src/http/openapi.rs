@@ -136,6 +136,13 @@ fn parameters(operation: &Operation) -> Vec<Value> {
         parameters
             .push(json!({ "name": "name", "in": "path", "required": true, "description": text, "schema": schema }));
     }
+    if operation.path.contains("{x}") {
+        for (name, text) in [("x", "Column of the cell"), ("y", "Row of the cell")] {
+            let schema = json!({ "type": "integer", "minimum": i32::MIN, "maximum": i32::MAX });
+            parameters
+                .push(json!({ "name": name, "in": "path", "required": true, "description": text, "schema": schema }));
+        }
+    }
     if operation.path.contains("{file}") {
         let schema = json!({ "type": "string", "pattern": "^[0-9]+(-[0-9]+)?\\.webp$" });
         let text = "Label and .webp, or label, number of the image and .webp";

@@ -6,8 +6,10 @@ use super::handlers::{command, events, log, login, maps, metrics, orders, readin
 use super::shared::{ArchiveName, Shared, VehicleId};
 use crate::export::MapFormat;
 use crate::fit::Fit;
-use crate::orders::{CommandOrder, DismissOrder, LabelOrder, MarkerOrder, NoteOrder, RemoveMarkerOrder};
-use crate::state::{AcceptedOrder, ArchiveList, CommandState, LogList, MapBody, MissionState, PrincipalInfo};
+use crate::orders::{CommandOrder, DismissOrder, DraftOrder, LabelOrder, MarkerOrder, NoteOrder, RemoveMarkerOrder};
+use crate::state::{
+    AcceptedOrder, ArchiveList, CellHistory, CommandState, LogList, MapBody, MissionState, PrincipalInfo,
+};
 use axum::extract::State;
 use axum::http::{HeaderMap, Method};
 use axum::routing::{MethodRouter, get, post};
@@ -161,6 +163,13 @@ fn readings() -> Vec<Operation> {
             || get(maps::tiles),
         ),
         read(
+            "/api/v2/vehicles/{id}/cells/{x}/{y}",
+            "cell_history",
+            "The labels that a cell had before its present one, the newest first; of the last 131072 changes of the map",
+            Content::Json(schema::<CellHistory>),
+            || get(maps::cell_history),
+        ),
+        read(
             "/api/v2/vehicles/{id}/exemplars/{file}",
             "exemplar",
             "A received image of a label: the latest as in 3.webp, or the one with a number as in 3-17.webp",
@@ -311,6 +320,13 @@ fn changes() -> Vec<Operation> {
             "Sets name, colour and merging of a label in the current epoch; they stay at the surface",
             schema::<LabelOrder>,
             || post(orders::label),
+        ),
+        change(
+            "/api/v2/vehicles/{id}/draft",
+            "keep_draft",
+            "Keeps the weights that an operator has set and not sent, for all pages; they stay at the surface",
+            schema::<DraftOrder>,
+            || post(orders::draft),
         ),
         change(
             "/api/v2/vehicles/{id}/notes",

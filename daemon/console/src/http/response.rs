@@ -19,6 +19,7 @@ pub(super) fn respond(reply: Reply) -> Response {
         Reply::Done => StatusCode::NO_CONTENT.into_response(),
         // The handler of the log makes its lines.
         Reply::Log(_) => not_found(),
+        Reply::FormerLabels(history) => Json(history).into_response(),
         Reply::Archives(maps) => Json(ArchiveList { maps }).into_response(),
         Reply::Command(command) => Json(command).into_response(),
         Reply::Forbidden(reason) => error(StatusCode::FORBIDDEN, &reason),

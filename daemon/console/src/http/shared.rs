@@ -11,6 +11,7 @@ use axum::extract::{FromRequestParts, Path};
 use axum::http::StatusCode;
 use axum::http::request::Parts;
 use axum::response::Response;
+use scenecast_protocol::map::Cell;
 use scenecast_surface::Principal;
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -106,6 +107,20 @@ impl<S: Send + Sync> FromRequestParts<S> for VehicleId {
         let found = Path::<BTreeMap<String, String>>::from_request_parts(parts, state).await;
         let id = found.ok().and_then(|Path(names)| names.get("id")?.parse().ok());
         id.map(Self).ok_or_else(not_found)
+    }
+}
+
+/// The column and the row of a cell in a path.
+pub(super) struct MapCell(pub(super) Cell);
+
+impl<S: Send + Sync> FromRequestParts<S> for MapCell {
+    type Rejection = Response;
+
+    async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self, Response> {
+        let found = Path::<BTreeMap<String, String>>::from_request_parts(parts, state).await;
+        let cell =
+            found.ok().and_then(|Path(names)| Some((names.get("x")?.parse().ok()?, names.get("y")?.parse().ok()?)));
+        cell.map(|(x, y)| Self(Cell::new(x, y))).ok_or_else(not_found)
     }
 }
 

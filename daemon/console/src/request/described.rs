@@ -1,21 +1,21 @@
 //! Requests in words, for the log of the mission.
 
+use super::SurfaceRequest;
 use crate::orders::{ExemplarAction, LabelOrder};
-use crate::request::SurfaceRequest;
 use scenecast_protocol::directive::Constraints;
 use scenecast_protocol::wire::Address;
 use scenecast_surface::LogKind;
 use std::collections::BTreeMap;
 
 /// The vehicle, the kind and the text of the entry for a request; `None` if it changes nothing that the log has.
-pub(crate) fn describe(request: &SurfaceRequest) -> Option<(Option<Address>, LogKind, String)> {
+pub(super) fn describe(request: &SurfaceRequest) -> Option<(Option<Address>, LogKind, String)> {
     use SurfaceRequest as R;
     let order = |id: u8, text: String| (Address::vehicle(id), LogKind::Order, text);
     let record = |id: u8, text: String| (Address::vehicle(id), LogKind::Record, text);
     Some(match request {
-        R::Map(_) | R::Exemplar(..) | R::Fit(..) | R::Log | R::Archives | R::ArchivedMap(_) | R::Command(_) => {
-            return None;
-        }
+        R::Map(_) | R::FormerLabels(..) | R::Exemplar(..) | R::Fit(..) => return None,
+        // A draft changes with each move of a slider.
+        R::Draft(..) | R::Log | R::Archives | R::ArchivedMap(_) | R::Command(_) => return None,
         R::Utility(id, weights, terms) => order(*id, utility(weights, *terms)),
         R::ExemplarOrder(id, wanted) => {
             let verb = match wanted.action {

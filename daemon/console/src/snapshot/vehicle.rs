@@ -5,14 +5,14 @@ use super::{exemplar, link, position};
 use crate::state::{
     AppliedOrder, DirectiveSlots, EarlierMap, InForceKnowledge, MapLabel, MapSummary, OrderProgress, OrderStatus,
     PlannedPath, ReportedDisk, ReportedMode, ReportedPose, StatusReport, UsblMeasurement, UtilityTerms, VehicleMarker,
-    VehicleNote, VehicleOrders, VehicleSettings, VehicleState,
+    VehicleNote, VehicleOrders, VehicleSettings, VehicleState, WeightDraft,
 };
 use scenecast_protocol::coordinates::MapPoint;
 use scenecast_protocol::directive::{self, PlannerKind, REPORTED_SLOTS, SlotProgress};
 use scenecast_protocol::link::{InForce, PeerView};
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::{Address, DiskReport, Intent, VehicleMode, VehicleStatus};
-use scenecast_surface::record::{StoredMarker, StoredNote};
+use scenecast_surface::record::{StoredDraft, StoredMarker, StoredNote};
 use scenecast_surface::{SettingsOrder, Surface, VehicleRecord};
 
 pub(super) fn vehicles(surface: &Surface, facts: &MissionFacts, now: Instant) -> Vec<VehicleState> {
@@ -49,6 +49,7 @@ fn vehicle(
         }),
         notes: record.annotations.notes.iter().map(note).collect(),
         markers: record.annotations.markers.values().map(marker).collect(),
+        draft: draft(&record.annotations.draft),
         orders: orders(record, &view),
     })
 }
@@ -56,6 +57,11 @@ fn vehicle(
 pub(crate) fn marker(marker: &StoredMarker) -> VehicleMarker {
     let StoredMarker { number, x_m, y_m, at, author, text } = marker.clone();
     VehicleMarker { number, x_m, y_m, at_s: seconds(Instant::from_micros(at)), author, text }
+}
+
+fn draft(draft: &StoredDraft) -> WeightDraft {
+    let StoredDraft { number, weights, exploration, curiosity, at, author } = draft.clone();
+    WeightDraft { number, weights, exploration, curiosity, at_s: seconds(Instant::from_micros(at)), author }
 }
 
 fn note(note: &StoredNote) -> VehicleNote {

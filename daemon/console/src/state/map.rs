@@ -153,6 +153,21 @@ pub struct LayerBody {
     pub age_s: String,
 }
 
+/// The labels that a cell had before its present one.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct CellHistory {
+    /// The newest first.
+    pub former: Vec<FormerLabel>,
+}
+
+/// A label that a cell had before.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct FormerLabel {
+    pub label: u8,
+    /// Mission time at which the label that replaced it was received.
+    pub until_s: f64,
+}
+
 /// A label or a layer of a map has changed.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct MapEvent {

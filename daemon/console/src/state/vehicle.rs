@@ -41,9 +41,29 @@ pub struct VehicleState {
     /// Markers on the map, in the order of their numbers; at most 200.
     #[serde(default)]
     pub markers: Vec<VehicleMarker>,
+    /// The weights that an operator has set and not sent.
+    #[serde(default)]
+    pub draft: WeightDraft,
     /// The orders to the vehicle.
     #[serde(flatten)]
     pub orders: VehicleOrders,
+}
+
+/// Weights that an operator has set and not sent. Those that are not listed are as last sent.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
+pub struct WeightDraft {
+    /// Grows with each change; 0 before the first.
+    pub number: u32,
+    /// -1 to 1 by label.
+    pub weights: BTreeMap<u8, f64>,
+    /// The weight of unexplored cells.
+    pub exploration: Option<f64>,
+    /// The weight of cells that the scene model explains badly.
+    pub curiosity: Option<f64>,
+    /// Mission time of the last change.
+    pub at_s: f64,
+    /// The name of the person or program that made it.
+    pub author: String,
 }
 
 /// The orders to a vehicle: last sent, in force, and on their way.

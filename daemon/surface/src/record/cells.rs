@@ -108,7 +108,7 @@ fn changed(kept: &Replica, live: impl Iterator<Item = (Cell, u8, Instant)>) -> V
     live.filter(is_new).collect()
 }
 
-fn pack(layer: Option<(u8, Vec<u8>)>, cells: Vec<(Cell, u8, Instant)>) -> Vec<StoredCells> {
+pub(super) fn pack(layer: Option<(u8, Vec<u8>)>, cells: Vec<(Cell, u8, Instant)>) -> Vec<StoredCells> {
     let mut events = Vec::new();
     for part in cells.chunks(MAX_CELLS) {
         let mut before = (0, 0, 0);
@@ -122,7 +122,7 @@ fn pack(layer: Option<(u8, Vec<u8>)>, cells: Vec<(Cell, u8, Instant)>) -> Vec<St
     events
 }
 
-fn unpack(cells: &[(i64, i64, u8, i64)]) -> impl Iterator<Item = (Cell, u8, Instant)> + '_ {
+pub(super) fn unpack(cells: &[(i64, i64, u8, i64)]) -> impl Iterator<Item = (Cell, u8, Instant)> + '_ {
     let mut at = (0i64, 0i64, 0i64);
     cells.iter().filter_map(move |&(x, y, value, time)| {
         at = (at.0.wrapping_add(x), at.1.wrapping_add(y), at.2.wrapping_add(time));

@@ -39,7 +39,8 @@ pub fn decode(bytes: &[u8]) -> Result<Vec<Event>, DecodeError> {
 #[cfg(test)]
 mod tests {
     use super::super::event::{
-        EventKind, EventSource, EventTime, RunId, StoredCells, StoredLogEntry, StoredMarker, StoredPlaces, VehicleEvent,
+        EventKind, EventSource, EventTime, RunId, StoredCells, StoredDraft, StoredLogEntry, StoredMarker, StoredPlaces,
+        VehicleEvent,
     };
     use super::*;
     use proptest::prelude::*;
@@ -111,6 +112,32 @@ mod tests {
         let golden = [0, 3, 1, 1, 0xE8, 0x07, 0xD0, 0x0F, 0, 2, 1, 18, 0, 1, 0xAC, 2, 2, 7, 8, 0, 0];
         assert_eq!(encode(&events), golden);
         assert_eq!(decode(&golden).as_deref(), Ok(&events[..]));
+    }
+
+    #[test]
+    fn golden_bytes_of_former_labels_and_of_a_draft() {
+        let former = StoredCells { layer: None, cells: vec![(3, -4, 7, 1000)] };
+        let (weights, author) = ([(3, 0.5)].into(), "ann".to_owned());
+        let draft = StoredDraft { number: 300, weights, exploration: Some(-1.0), curiosity: None, at: 5, author };
+        let time = EventTime { mission_us: 1000, unix_ms: 2000 };
+        let event = |sequence, event| Event {
+            sequence,
+            time,
+            source: EventSource::Surface,
+            kind: EventKind::Vehicle(1, event),
+        };
+        let events = [event(1, VehicleEvent::Former(former)), event(2, VehicleEvent::Draft(draft))];
+        let golden = [
+            &[0, 3, 2][..],
+            &[1, 0xE8, 0x07, 0xD0, 0x0F, 0, 2, 1, 19, 0, 1, 6, 7, 7, 0xD0, 0x0F],
+            &[2, 0xE8, 0x07, 0xD0, 0x0F, 0, 2, 1, 20, 0xAC, 2, 1, 3],
+            &0.5f64.to_le_bytes(),
+            &[1],
+            &(-1.0f64).to_le_bytes(),
+            &[0, 5, 3, b'a', b'n', b'n'],
+        ];
+        assert_eq!(encode(&events), golden.concat());
+        assert_eq!(decode(&golden.concat()).as_deref(), Ok(&events[..]));
     }
 
     #[test]

@@ -2,6 +2,7 @@
 
 use super::contact::StoredContact;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 
 /// When an event was recorded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -101,6 +102,10 @@ pub enum VehicleEvent {
     MarkerGone(u32),
     /// Areas and destination as they are shown. Since layout 3.
     Places(StoredPlaces),
+    /// Labels that cells had before their present ones; the times are those of their replacement. Since layout 3.
+    Former(StoredCells),
+    /// The weights that are set and not sent. Since layout 3.
+    Draft(StoredDraft),
 }
 
 /// A run of a vehicle and the epoch of its labels.
@@ -200,6 +205,19 @@ pub struct StoredLabel {
     pub colour: Option<String>,
     /// The label that it is shown as a part of.
     pub merged_into: Option<u8>,
+}
+
+/// Weights that an operator has set and not sent.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct StoredDraft {
+    /// Grows with each change; 0 before the first.
+    pub number: u32,
+    /// -1 to 1 by label.
+    pub weights: BTreeMap<u8, f64>,
+    pub exploration: Option<f64>,
+    pub curiosity: Option<f64>,
+    pub at: u64,
+    pub author: String,
 }
 
 /// A marker on a vehicle's map.

@@ -3,10 +3,12 @@
 use super::cells::{EarlierMap, MapCopy};
 use super::contact::StoredContact;
 use super::event::{
-    Event, EventKind, EventTime, RunId, StoredBudget, StoredImage, StoredIntent, StoredLabel, StoredLogEntry,
-    StoredMarker, StoredNote, StoredOrder, StoredPlaces, StoredRequest, VehicleEvent,
+    Event, EventKind, EventTime, RunId, StoredBudget, StoredDraft, StoredImage, StoredIntent, StoredLabel,
+    StoredLogEntry, StoredMarker, StoredNote, StoredOrder, StoredPlaces, StoredRequest, VehicleEvent,
 };
-use crate::log::MissionLog;
+use super::former_labels::FormerLabels;
+use scenecast_protocol::map::Cell;
+use scenecast_protocol::time::Instant;
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
 
@@ -14,6 +16,8 @@ use std::sync::Arc;
 const MAX_TRACK: usize = 500;
 /// Notes that are kept of a vehicle.
 const MAX_NOTES: usize = 200;
+/// Entries that are kept of the mission's log.
+pub(crate) const MAX_LOG: usize = 2000;
 /// The most markers that are kept; a surface sets no more.
 pub(crate) const MAX_MARKERS: usize = 200;
 
@@ -50,6 +54,7 @@ pub struct VehicleMemory {
     pub(crate) name: String,
     pub(crate) id: RunId,
     pub(crate) map: MapCopy,
+    pub(crate) former: FormerLabels,
     pub(crate) map_version: u64,
     pub(crate) earlier: Option<Arc<EarlierMap>>,
     pub(crate) contact: StoredContact,
@@ -67,6 +72,7 @@ pub struct VehicleMemory {
     pub(crate) labels: BTreeMap<u8, StoredLabel>,
     pub(crate) notes: VecDeque<StoredNote>,
     pub(crate) markers: BTreeMap<u32, StoredMarker>,
+    pub(crate) draft: StoredDraft,
     /// Set in an archived map only: end of the run in microseconds of mission time, number of cells.
     pub(crate) archived: Option<(u64, u64)>,
 }
@@ -87,7 +93,7 @@ impl SurfaceMemory {
             EventKind::Vehicle(address, event) => self.vehicles.entry(*address).or_default().apply(event),
             EventKind::Logged(entry) => {
                 self.log.push_back(entry.clone());
-                self.log.drain(..self.log.len().saturating_sub(MissionLog::MAX));
+                self.log.drain(..self.log.len().saturating_sub(MAX_LOG));
             }
         }
     }
@@ -145,6 +151,11 @@ impl VehicleMemory {
         &self.map
     }
 
+    /// The labels that a cell had before its present one with the times of their replacement, the newest first.
+    pub fn former_labels(&self, cell: Cell) -> impl Iterator<Item = (u8, Instant)> + '_ {
+        self.former.of(cell)
+    }
+
     /// The end of the run of an archived map in microseconds of mission time, and its cells.
     pub fn archived(&self) -> Option<(u64, u64)> {
         self.archived
@@ -181,14 +192,19 @@ impl VehicleMemory {
             VehicleEvent::Named(name) => self.name.clone_from(name),
             VehicleEvent::Identified(id) => {
                 if id.epoch != self.id.epoch {
-                    // The names are those of labels of the epoch that has ended.
+                    // Names and former labels are those of the epoch that has ended.
                     self.labels.clear();
+                    self.former = FormerLabels::default();
                 }
                 self.id = *id;
             }
             VehicleEvent::Replaced => self.replace(),
             VehicleEvent::Overtaken => self.earlier = None,
-            VehicleEvent::Cells(cells) => self.map.apply(cells),
+            VehicleEvent::Cells(cells) => {
+                self.former.handle_cells(self.map.labels(), cells);
+                self.map.apply(cells);
+            }
+            VehicleEvent::Former(changes) => self.former.restore(changes),
             VehicleEvent::MapVersion(version) => self.map_version = *version,
             VehicleEvent::Contact(contact) => self.contact.clone_from(contact),
             VehicleEvent::Track { total, points } => {
@@ -239,6 +255,7 @@ impl VehicleMemory {
             VehicleEvent::MarkerGone(number) => {
                 self.markers.remove(number);
             }
+            VehicleEvent::Draft(draft) => self.draft.clone_from(draft),
             VehicleEvent::Archived { ended_us, cells } => self.archived = Some((*ended_us, *cells)),
         }
     }
@@ -273,16 +290,18 @@ impl VehicleMemory {
             VehicleEvent::Orders { series: self.series, orders: self.orders.clone() },
             VehicleEvent::Intent(self.intent.clone()),
             VehicleEvent::Places(self.places.clone()),
+            VehicleEvent::Draft(self.draft.clone()),
         ]);
         let request = |(&label, &(serial, open))| VehicleEvent::Request { label, serial, open };
         all.extend(self.requests.iter().map(request));
         all
     }
 
-    /// The events that belong to the current run: identity, map, contact, track, images, names, notes, markers.
+    /// The events that belong to the current run: identity, map, former labels, contact, track, images, names, notes, markers.
     fn run_events(&self) -> Vec<VehicleEvent> {
         let mut all = vec![VehicleEvent::Identified(self.id)];
         all.extend(self.map.to_events().into_iter().map(VehicleEvent::Cells));
+        all.extend(self.former.to_events().into_iter().map(VehicleEvent::Former));
         all.push(VehicleEvent::Contact(self.contact.clone()));
         all.push(VehicleEvent::Track { total: self.track_total, points: self.track.iter().copied().collect() });
         for (&label, images) in &self.exemplars {

@@ -4,14 +4,15 @@ mod cells;
 mod contact;
 mod encode;
 mod event;
+mod former_labels;
 mod memory;
 
 pub use cells::{EarlierMap, MapCopy};
 pub use contact::{StoredContact, StoredRange};
 pub use encode::{DecodeError, decode, encode};
 pub use event::{
-    Event, EventKind, EventSource, EventTime, RunId, StoredBudget, StoredCells, StoredImage, StoredIntent, StoredLabel,
-    StoredLogEntry, StoredMarker, StoredNote, StoredOrder, StoredPlaces, StoredRequest, VehicleEvent,
+    Event, EventKind, EventSource, EventTime, RunId, StoredBudget, StoredCells, StoredDraft, StoredImage, StoredIntent,
+    StoredLabel, StoredLogEntry, StoredMarker, StoredNote, StoredOrder, StoredPlaces, StoredRequest, VehicleEvent,
 };
-pub(crate) use memory::MAX_MARKERS;
 pub use memory::{Began, SurfaceMemory, VehicleMemory};
+pub(crate) use memory::{MAX_LOG, MAX_MARKERS};

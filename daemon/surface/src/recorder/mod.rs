@@ -342,6 +342,9 @@ fn order_changes(record: &VehicleRecord, view: &PeerView<'_>, memory: &VehicleMe
     let known = memory.notes.back();
     let first_new = record.annotations.notes.iter().rposition(|note| Some(note) == known).map_or(0, |at| at + 1);
     events.extend(record.annotations.notes.iter().skip(first_new).cloned().map(VehicleEvent::Note));
+    if memory.draft != record.annotations.draft {
+        events.push(VehicleEvent::Draft(record.annotations.draft.clone()));
+    }
     let markers = &record.annotations.markers;
     let gone = memory.markers.keys().filter(|number| !markers.contains_key(number));
     events.extend(gone.copied().map(VehicleEvent::MarkerGone));

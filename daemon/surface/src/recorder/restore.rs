@@ -56,4 +56,5 @@ fn restore_record(record: &mut VehicleRecord, memory: &VehicleMemory) {
     record.annotations.labels.clone_from(&memory.labels);
     record.annotations.notes.clone_from(&memory.notes);
     record.annotations.markers.clone_from(&memory.markers);
+    record.annotations.draft.clone_from(&memory.draft);
 }

@@ -8,7 +8,7 @@ import { ageOf, store } from "../store.js";
 import { blockAt } from "./coarse.js";
 import { onMap } from "./frames.js";
 
-/** The cell at (x, y) metres in the map's frame: {label, ageS, layers}, each layer with its own age; null if it is unexplored. */
+/** The cell at (x, y) metres in the map's frame: {at, label, ageS, layers}, `at` being its column and row, each layer with its own age; null if it is unexplored. */
 export function cellAt(map, x, y) {
   const [cx, cy] = [x, y].map((v) => Math.floor(v / map.cell_m));
   const { level: label, timeS } = map.value(0, cx, cy);
@@ -17,7 +17,7 @@ export function cellAt(map, x, y) {
     .map((l) => ({ ...l, ...map.value(l.number, cx, cy) }))
     .filter((l) => l.level !== 0)
     .map((l) => ({ ...l, ageS: ageOf(l.timeS) }));
-  return { label, ageS: ageOf(timeS), layers };
+  return { at: [cx, cy], label, ageS: ageOf(timeS), layers };
 }
 
 /** The label of the coarse block around the unexplored cell at (x, y) metres, or null. */

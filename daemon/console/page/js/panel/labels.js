@@ -2,12 +2,14 @@
 
 import { $, h, keyed, show, text } from "../dom.js";
 import { shownLabels } from "../book.js";
+import { principal } from "../command.js";
+import { ago } from "../format.js";
 import { orderFoot } from "../order/foot.js";
 import { recall, remember } from "../prefs.js";
-import { isStale, store } from "../store.js";
+import { ageOf, isStale, store } from "../store.js";
 import { makeRow, refreshRow } from "./label-row.js";
 import { plannerPart, refreshPlanner } from "./planner.js";
-import { TERMS, weightsOrder } from "./weights.js";
+import { TERMS, weightsDraft, weightsOrder } from "./weights.js";
 
 const weight = (label) => weightsOrder.value(store.vehicle, label.id);
 const SORTINGS = {
@@ -23,6 +25,7 @@ const empty = h("p.empty", {}, "No labels yet. They appear with the first cells 
 const terms = TERMS.map(termRow);
 const caption = (unsent) => (unsent === 0 ? "Send weights" : `Send ${unsent} change${unsent === 1 ? "" : "s"}`);
 const foot = orderFoot(weightsOrder, "Weights", "send-weights", caption);
+const draftNote = h("p.note");
 let shownVehicle = null;
 
 function termRow(term) {
@@ -47,7 +50,8 @@ export function startLabels() {
     update();
   });
   $("label-list").before(plannerPart, ...terms.map((t) => t.node), empty);
-  $("send").append(foot.node);
+  $("send").append(draftNote, foot.node);
+  weightsDraft.start();
   store.on("state select edit book highlight feed theme", update);
   store.on("tick", refreshOrders);
 }
@@ -69,5 +73,9 @@ function refreshOrders() {
   const vehicle = store.vehicle;
   if (!vehicle) return;
   refreshPlanner(vehicle);
+  const { author, at_s } = vehicle.draft;
+  const isOfOther = weightsOrder.isChanged(vehicle) && author !== "" && author !== principal()?.name;
+  show(draftNote, isOfOther);
+  text(draftNote, isOfOther ? `Set by ${author} ${ago(ageOf(at_s))}, not sent yet.` : "");
   foot.update(vehicle, vehicle.labels.length === 0);
 }

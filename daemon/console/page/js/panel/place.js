@@ -1,4 +1,4 @@
-// The plate of the chosen place: its label with images and ages, its marker, and the buttons that set one and send the
+// The plate of the chosen place: its label with images and ages, the labels that it had before, its marker, and the buttons that set one and send the
 // vehicle there.
 
 import { addMarker, removeMarker, sendDestination } from "../api.js";
@@ -13,6 +13,7 @@ import { cellAt, layerText } from "../map/readout.js";
 import { orderStatus, slotOf } from "../order/status.js";
 import { ageOf, store } from "../store.js";
 import { viewExemplars } from "./exemplar.js";
+import { historyLines } from "./place-history.js";
 
 const MAX_IMAGES = 4;
 const title = h("h2", { id: "place-title" });
@@ -92,7 +93,8 @@ function refresh() {
 /** The lines of text about the place. */
 function linesOf(cell, marker) {
   const age = cell?.ageS === null ? "at an unknown time" : `${span(cell?.ageS)} ago`;
-  const lines = cell ? [`received ${age}`, ...cell.layers.map((l) => `${l.name} ${layerText(l)}`)] : ["unexplored"];
+  const before = historyLines(cell, refresh);
+  const lines = cell ? [`received ${age}`, ...before, ...cell.layers.map((l) => `${l.name} ${layerText(l)}`)] : ["unexplored"];
   return marker ? [...lines, `marked by ${marker.author}, ${ago(ageOf(marker.at_s))}`] : lines;
 }
 

@@ -1,8 +1,10 @@
-// The order of weights: one part for each label by its number, one for unexplored and one for surprising ground.
+// The order of weights: one part for each label by its number, one for unexplored and one for surprising ground. The surface keeps
+// what is set and not sent.
 
-import { sendUtility } from "../api.js";
+import { keepDraft, sendUtility } from "../api.js";
 import { shownLabels } from "../book.js";
 import { Order } from "../order/order.js";
+import { SharedDraft } from "../order/shared-draft.js";
 
 /** Weights of ground rather than of labels. */
 export const TERMS = ["exploration", "curiosity"];
@@ -18,3 +20,17 @@ function post(vehicle, value) {
 }
 
 export const weightsOrder = new Order("utility", read, post);
+
+/** The draft at the surface, part by part. */
+function readDraft({ draft }) {
+  const weights = Object.entries(draft.weights).map(([label, weight]) => [Number(label), weight]);
+  return { number: draft.number, parts: [...weights, ...TERMS.map((term) => [term, draft[term]]).filter(([, weight]) => weight !== null)] };
+}
+
+function writeDraft(vehicle, parts) {
+  const all = new Map(parts);
+  const terms = Object.fromEntries(TERMS.map((term) => [term, all.get(term) ?? null]));
+  return keepDraft(vehicle.id, { weights: Object.fromEntries(parts.filter(([part]) => !TERMS.includes(part))), ...terms });
+}
+
+export const weightsDraft = new SharedDraft(weightsOrder, readDraft, writeDraft);

@@ -4,7 +4,7 @@
 use crate::export::{MapCells, MapFormat};
 use crate::http::compress::{accepts_gzip, gzip, tagged};
 use crate::http::response::{error, respond};
-use crate::http::shared::{CachedMap, Shared, VehicleId};
+use crate::http::shared::{CachedMap, MapCell, Shared, VehicleId};
 use crate::request::{Reply, SurfaceRequest};
 use crate::tiles::TiledMap;
 use axum::Json;
@@ -75,6 +75,15 @@ pub(in crate::http) async fn map(
         Ok(Err(reason)) => error(StatusCode::UNPROCESSABLE_ENTITY, &reason),
         Err(_) => StatusCode::INTERNAL_SERVER_ERROR.into_response(),
     }
+}
+
+/// The labels that a cell had before.
+pub(in crate::http) async fn cell_history(
+    State(shared): State<Shared>,
+    VehicleId(id): VehicleId,
+    MapCell(cell): MapCell,
+) -> Response {
+    shared.respond(SurfaceRequest::FormerLabels(id, cell)).await
 }
 
 fn is_held(headers: &HeaderMap, tag: &str) -> bool {

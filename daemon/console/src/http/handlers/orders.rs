@@ -4,8 +4,8 @@ use crate::http::body::JsonOrder;
 use crate::http::response::error;
 use crate::http::shared::{Shared, VehicleId};
 use crate::orders::{
-    BudgetOrder, ConstraintsOrder, DismissOrder, ExemplarOrder, LabelOrder, MarkerOrder, NoteOrder, RemoveMarkerOrder,
-    UtilityOrder,
+    BudgetOrder, ConstraintsOrder, DismissOrder, DraftOrder, ExemplarOrder, LabelOrder, MarkerOrder, NoteOrder,
+    RemoveMarkerOrder, UtilityOrder,
 };
 use crate::request::SurfaceRequest;
 use axum::Extension;
@@ -22,14 +22,35 @@ pub(in crate::http) async fn utility(
     VehicleId(id): VehicleId,
     JsonOrder(order): JsonOrder<UtilityOrder>,
 ) -> Response {
-    let weight =
-        |(label, w): (String, f64)| label.parse().map(|l| (l, w)).map_err(|_| format!("{label:?} is not a label"));
-    match order.weights.into_iter().map(weight).collect::<Result<BTreeMap<u8, f64>, String>>() {
+    match by_label(order.weights) {
         Ok(weights) => {
             shared.order(principal, SurfaceRequest::Utility(id, weights, (order.exploration, order.curiosity))).await
         }
         Err(line) => error(StatusCode::UNPROCESSABLE_ENTITY, &line),
     }
+}
+
+pub(in crate::http) async fn draft(
+    State(shared): State<Shared>,
+    Extension(principal): Extension<Principal>,
+    VehicleId(id): VehicleId,
+    JsonOrder(order): JsonOrder<DraftOrder>,
+) -> Response {
+    let author = principal.name().to_owned();
+    match by_label(order.weights) {
+        Ok(weights) => {
+            let terms = (order.exploration, order.curiosity);
+            shared.order(principal, SurfaceRequest::Draft(id, author, weights, terms)).await
+        }
+        Err(line) => error(StatusCode::UNPROCESSABLE_ENTITY, &line),
+    }
+}
+
+/// The weights by the numbers of their labels. The error is one line for the operator.
+fn by_label(weights: BTreeMap<String, f64>) -> Result<BTreeMap<u8, f64>, String> {
+    let number =
+        |(label, w): (String, f64)| label.parse().map(|l| (l, w)).map_err(|_| format!("{label:?} is not a label"));
+    weights.into_iter().map(number).collect()
 }
 
 pub(in crate::http) async fn exemplar(
