@@ -22,7 +22,7 @@ function update() {
 
 function make(vehicle) {
   return h("button.vehicle-choice", { type: "button", onclick: () => store.select(vehicle.id) },
-    h("span.dot", { "aria-hidden": "true" }), h("span.name"), h("span.received"));
+    h("span.dot", { "aria-hidden": "true" }), h("span.name"), h("span.received", { title: "Time since the last frame of this vehicle was received" }));
 }
 
 function refresh(node, vehicle) {

@@ -9,6 +9,7 @@ import { replacedNote } from "../order/sent-versions.js";
 import { orderStatus, slotOf } from "../order/status.js";
 import { store } from "../store.js";
 import { backgroundBox } from "./background.js";
+import { classHelp } from "./class-help.js";
 
 const CLASSES = ["directive", "status", "fix", "map", "exemplar"];
 const RELEASE_MS = 400;
@@ -33,7 +34,7 @@ const rows = Object.fromEntries(CLASSES.map((c, i) => [c, shareRow(c, i)]));
 const rest = h("output.value");
 const shareBox = h("div.shares", { role: "group", "aria-label": "Minimum shares of the classes" },
   h("h3", {}, "Minimum shares, %"), bar, ...CLASSES.map((c) => rows[c].row),
-  h("div.share-row", {}, h("span.swatch"), h("span", {}, "free"), h("span"), rest));
+  h("div.share-row", { title: "The rest, for whatever is waiting" }, h("span.swatch"), h("span", {}, "free"), h("span"), rest));
 const streams = backgroundBox(() => value().background, (background) => {
   clearTimeout(timer);
   order.set(store.vehicle, { ...value(), background });
@@ -54,7 +55,7 @@ export const budgetParts = [form, slider, shareBox, streams.node, deniedLine, er
 function shareRow(name, i) {
   const range = h("input", { type: "range", min: 0, max: 100, step: 1, "aria-label": `Minimum share of ${name}, percent`, oninput: () => setShare(name, range.valueAsNumber), onchange: sendSoon });
   const value = h("output.value");
-  const row = h("div.share-row", { data: { share: name } }, h("span.swatch", { data: { tone: String(i) } }), h("span", {}, name), range, value);
+  const row = h("div.share-row", { data: { share: name }, title: `${classHelp(name)}: at least this share of the budget while there are any to send` }, h("span.swatch", { data: { tone: String(i) } }), h("span", {}, name), range, value);
   const handle = h("span.handle", { title: `Drag: minimum share of ${name}`, onpointerdown: (event) => drag(event, name, handle) });
   return { row, range, value, segment: h("span.segment", { data: { tone: String(i) } }), handle };
 }

@@ -23,7 +23,7 @@ export function makeRow(label) {
   const note = h("p.note");
   const node = h("li.label", {}, chip,
     h("div.head", {}, name, gain, size),
-    h("div.weight", {}, slider, value, undo),
+    h("div.weight", { title: "How much the survey favours this label, -1 to 1" }, slider, value, undo),
     exemplar(of), note);
   node.parts = { chip, name, gain, size, slider, value, undo, note };
   latest.set(node, label);

@@ -32,7 +32,7 @@ function termRow(term) {
   const [caption, hint] = TERM_TEXTS[term];
   const slider = h("input", { type: "range", min: -1, max: 1, step: 0.05, id: term, oninput: () => weightsOrder.set(store.vehicle, slider.valueAsNumber, term) });
   const value = h("output.value", { for: term });
-  const node = h("div.exploration", { data: { term } }, h("label", { for: term, title: hint }, caption), slider, value);
+  const node = h("div.exploration", { data: { term }, title: hint }, h("label", { for: term }, caption), slider, value);
   const update = (vehicle) => {
     const w = weightsOrder.value(vehicle, term);
     if (slider.valueAsNumber !== w) slider.value = w;

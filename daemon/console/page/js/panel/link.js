@@ -4,6 +4,7 @@ import { $, h, row, text } from "../dom.js";
 import { ago, bits, count, none, percent, rate, span } from "../format.js";
 import { ageOf, isSilent, isStale, store } from "../store.js";
 import { budgetParts, refreshBudget } from "./budget.js";
+import { classHelp } from "./class-help.js";
 import { drawHistory } from "./history.js";
 
 const CLASSES = ["status", "directive", "fix", "exemplar", "overhead"];
@@ -12,7 +13,7 @@ function classNames(link) {
   const layers = [...store.snapshot.layers.map((l) => l.name), ...Object.keys(link.up.bytes_by_class)];
   return [...new Set(["map", ...layers.filter((c) => c !== "map" && !CLASSES.includes(c)).sort(), ...CLASSES])];
 }
-const classLine = (c) => h("tr", { data: { class: c } }, h("th", { scope: "row" }, c), h("td"), h("td", {}, h("span.share", {}, h("span"))), h("td"));
+const classLine = (c) => h("tr", { data: { class: c }, title: classHelp(c) }, h("th", { scope: "row" }, c), h("td"), h("td", {}, h("span.share", {}, h("span"))), h("td"));
 const directions = { up: direction("Up", "vehicle to surface"), down: direction("Down", "surface to vehicle") };
 const LINES = [
   ["loss", "Frames lost, up / down", "Share of the frames that were lost or damaged since the start, from all vehicles and to them"],

@@ -12,7 +12,7 @@ import { refreshStop, stopParts } from "./stop.js";
 const NAMES = { utility: "Weights", constraints: "Hold, abort", limits: "Limits", fence: "Fence", areas: "Areas", destination: "Destination", settings: "Settings", budget: "Budget", requests: "Images", fix: "Position fix" };
 const title = h("h2", { id: "vehicle-title" });
 const mode = h("span.mode");
-const age = h("p.age");
+const age = h("p.age", { title: "The age of the last report, the time since the last frame, and the longest usual pause between two frames" });
 /** Free space in bytes below which the panel warns. */
 const LOW_SPACE = 1e9;
 const WHOLE_LINES = ["path", "cells", "disk"];
