@@ -7,9 +7,9 @@ use super::surface::Surface;
 use crate::noise::floor;
 
 /// Nodes along the edge of a tile.
-pub(super) const EDGE: usize = 128;
-/// Bound of the memory: so many tiles of 192 KiB.
-const MAX_TILES: usize = 256;
+pub(super) const EDGE: usize = 256;
+/// Bound of the memory: so many tiles of 768 KiB.
+const MAX_TILES: usize = 64;
 /// Most nodes around a tile that are computed for its shadows.
 const MAX_APRON: usize = 96;
 
