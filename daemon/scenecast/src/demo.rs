@@ -1,12 +1,17 @@
 //! A rehearsal in real time, with the operator's page.
 
 use scenecast_console::state::{TrueClass, TruthInfo};
-use scenecast_console::{Console, LinkMeter, MissionFacts, bind, handle_request, snapshot, start};
+use scenecast_console::{
+    ClientRequest, Console, LinkMeter, MissionFacts, Reply, SurfaceRequest, bind, former_labels, handle_request,
+    snapshot, start,
+};
 use scenecast_core::palette::colour;
 use scenecast_core::{Area, UserError};
 use scenecast_protocol::time::Instant;
 use scenecast_rehearsal::{Mission, Truth};
 use scenecast_runtime::{Stop, block_on, random_bits};
+use scenecast_surface::record::EventTime;
+use scenecast_surface::recorder::Recorder;
 use std::sync::Arc;
 use std::thread::JoinHandle;
 use std::time::Duration;
@@ -94,18 +99,23 @@ struct Demo {
     truth: Option<JoinHandle<Result<Option<Truth>, UserError>>>,
     meter: LinkMeter,
     facts: MissionFacts,
+    /// What a surface would keep on its disk.
+    recorder: Recorder,
     pace: Pace,
     counted: [u64; 2],
     published: Option<std::time::Instant>,
 }
 
 impl Demo {
-    fn new(mission: Mission, speed: f64) -> Self {
+    fn new(mut mission: Mission, speed: f64) -> Self {
         let facts = MissionFacts::new(mission.config(), mission.modem(), random_bits(), speed);
         let window = Duration::from_secs_f64(mission.config().link.budget_window_s);
         let meter = LinkMeter::new(window, mission.now());
         let pace = Pace::new(speed, mission.now());
-        Self { meter, pace, truth: Some(make_truth(&mission)), mission, facts, counted: [0; 2], published: None }
+        let truth = Some(make_truth(&mission));
+        let mut recorder = Recorder::default();
+        recorder.begin(mission.surface_mut(), 0, 0, EventTime::default());
+        Self { meter, pace, truth, mission, facts, recorder, counted: [0; 2], published: None }
     }
 
     async fn run(mut self, mut console: Option<Console>, mut stop: Stop) -> Result<(), UserError> {
@@ -162,9 +172,8 @@ impl Demo {
         let now = self.mission.now();
         self.take_truth();
         while let Ok((request, reply)) = console.requests.try_recv() {
-            let cell_m = self.facts.cell_m;
             // A browser that closed its connection needs no reply.
-            let _ = reply.send(handle_request(self.mission.surface_mut(), request, cell_m, now));
+            let _ = reply.send(self.answer(request));
             changed = true;
         }
         let due = self.published.is_none_or(|at| at.elapsed() >= PUBLISH_INTERVAL);
@@ -172,9 +181,24 @@ impl Demo {
             self.published = Some(std::time::Instant::now());
             self.meter.handle_budgets(self.mission.surface());
             self.facts.speed = self.pace.reached(now);
+            self.record();
             let snapshot = snapshot(self.mission.surface(), &self.facts, &self.meter, now);
             console.snapshots.send_replace(Arc::new(snapshot));
         }
+    }
+
+    fn answer(&mut self, request: ClientRequest) -> Reply {
+        if let SurfaceRequest::FormerLabels(vehicle, cell) = request.request {
+            return former_labels(self.recorder.memory().vehicle(vehicle), cell);
+        }
+        let now = self.mission.now();
+        handle_request(self.mission.surface_mut(), request, self.facts.cell_m, now)
+    }
+
+    /// Follows the surface's knowledge, as its store would.
+    fn record(&mut self) {
+        let time = EventTime { mission_us: self.mission.now().as_micros(), unix_ms: 0 };
+        self.recorder.observe(self.mission.surface_mut(), None, time);
     }
 
     /// Counts the bits that the surface received and sent, for the page's link panel.
