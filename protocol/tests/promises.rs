@@ -76,16 +76,12 @@ fn hours_without_an_answer_do_not_make_the_ends_grow() {
                 pair.run(pair.now + Duration::from_secs(300), false);
                 sizes.push(pair.size());
             }
-            // The queues fill during the first hours; then the sizes vary with the losses, and jump for a while in a new run.
-            let median = |phases: std::ops::Range<usize>| {
-                let mut sizes = sizes[phases].to_vec();
-                sizes.sort_unstable();
-                sizes[sizes.len() / 2]
-            };
-            let (early, late) = (median(20..40), median(40..60));
+            // The sizes grow with the frames of unknown fate until a new run begins, and then again: twice as much in the second
+            // half would be growth without an end.
+            let most = |phases: std::ops::Range<usize>| sizes[phases].iter().copied().max().unwrap_or_default();
+            let (early, late) = (most(0..30), most(30..60));
             assert!(late * 2 < early * 3, "{access:?}, mute {mute:?}: {early} and {late} bytes");
-            let most = sizes.iter().max().unwrap();
-            assert!(*most < 600_000, "{access:?}, mute {mute:?}: {most} bytes");
+            assert!(early.max(late) < 600_000, "{access:?}, mute {mute:?}: {early} and {late} bytes");
         }
     }
 }

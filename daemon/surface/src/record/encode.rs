@@ -3,8 +3,8 @@
 use super::event::Event;
 
 /// The version of the layout of events. A build reads its own version and earlier ones.
-/// Layouts 2 and 3 append events to the layout before.
-const SCHEMA: u16 = 3;
+/// Layouts 2 to 4 append events to the layout before.
+const SCHEMA: u16 = 4;
 
 /// The reason that bytes are no batch of events.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
@@ -76,7 +76,8 @@ mod tests {
         assert_eq!(decode(&golden(1)), Ok(events()));
         assert_eq!(decode(&golden(2)), Ok(events()));
         assert_eq!(decode(&golden(3)), Ok(events()));
-        assert_eq!(encode(&events()), golden(3));
+        assert_eq!(decode(&golden(4)), Ok(events()));
+        assert_eq!(encode(&events()), golden(4));
     }
 
     #[test]
@@ -92,7 +93,7 @@ mod tests {
         };
         let events = [event(marker, 1), event(VehicleEvent::MarkerGone(300), 2)];
         let golden = [
-            &[0, 3, 2][..],
+            &[0, 4, 2][..],
             &[1, 0xE8, 0x07, 0xD0, 0x0F, 0, 2, 1, 16, 0xAC, 2],
             &1.5f64.to_le_bytes(),
             &(-2.0f64).to_le_bytes(),
@@ -109,7 +110,7 @@ mod tests {
         let kind = EventKind::Vehicle(1, VehicleEvent::Places(places));
         let time = EventTime { mission_us: 1000, unix_ms: 2000 };
         let events = [Event { sequence: 1, time, source: EventSource::Surface, kind }];
-        let golden = [0, 3, 1, 1, 0xE8, 0x07, 0xD0, 0x0F, 0, 2, 1, 18, 0, 1, 0xAC, 2, 2, 7, 8, 0, 0];
+        let golden = [0, 4, 1, 1, 0xE8, 0x07, 0xD0, 0x0F, 0, 2, 1, 18, 0, 1, 0xAC, 2, 2, 7, 8, 0, 0];
         assert_eq!(encode(&events), golden);
         assert_eq!(decode(&golden).as_deref(), Ok(&events[..]));
     }
@@ -128,7 +129,7 @@ mod tests {
         };
         let events = [event(1, VehicleEvent::Former(former)), event(2, VehicleEvent::Draft(draft))];
         let golden = [
-            &[0, 3, 2][..],
+            &[0, 4, 2][..],
             &[1, 0xE8, 0x07, 0xD0, 0x0F, 0, 2, 1, 19, 0, 1, 6, 7, 7, 0xD0, 0x0F],
             &[2, 0xE8, 0x07, 0xD0, 0x0F, 0, 2, 1, 20, 0xAC, 2, 1, 3],
             &0.5f64.to_le_bytes(),
@@ -141,18 +142,28 @@ mod tests {
     }
 
     #[test]
+    fn golden_bytes_of_the_contents_in_force() {
+        let kind = EventKind::Vehicle(1, VehicleEvent::InForce(vec![vec![7, 8], vec![9]]));
+        let time = EventTime { mission_us: 1000, unix_ms: 2000 };
+        let events = [Event { sequence: 1, time, source: EventSource::Surface, kind }];
+        let golden = [0, 4, 1, 1, 0xE8, 0x07, 0xD0, 0x0F, 0, 2, 1, 21, 2, 2, 7, 8, 1, 9];
+        assert_eq!(encode(&events), golden);
+        assert_eq!(decode(&golden).as_deref(), Ok(&events[..]));
+    }
+
+    #[test]
     fn golden_bytes_of_an_entry_of_the_log() {
         let entry = StoredLogEntry { number: 300, at: 5, vehicle: Some(1), kind: 7, by: None, text: "ab".to_owned() };
         let time = EventTime { mission_us: 1000, unix_ms: 2000 };
         let events = [Event { sequence: 1, time, source: EventSource::Surface, kind: EventKind::Logged(entry) }];
-        let golden = [0, 3, 1, 1, 0xE8, 0x07, 0xD0, 0x0F, 0, 3, 0xAC, 2, 5, 1, 1, 7, 0, 2, b'a', b'b'];
+        let golden = [0, 4, 1, 1, 0xE8, 0x07, 0xD0, 0x0F, 0, 3, 0xAC, 2, 5, 1, 1, 7, 0, 2, b'a', b'b'];
         assert_eq!(encode(&events), golden);
         assert_eq!(decode(&golden).as_deref(), Ok(&events[..]));
     }
 
     #[test]
     fn a_later_layout_is_refused_by_its_number() {
-        assert_eq!(decode(&[0, 4, 0]), Err(DecodeError::Later(4)));
+        assert_eq!(decode(&[0, 5, 0]), Err(DecodeError::Later(5)));
         assert_eq!(decode(&[0, 0, 0]), Err(DecodeError::Damaged));
         assert_eq!(decode(&[0]), Err(DecodeError::Damaged));
     }
@@ -160,7 +171,7 @@ mod tests {
     proptest! {
         #[test]
         fn any_bytes_decode_or_are_refused(bytes in proptest::collection::vec(any::<u8>(), 0..200)) {
-            let _ = decode(&[&[0, 3], &bytes[..]].concat());
+            let _ = decode(&[&[0, 4], &bytes[..]].concat());
         }
     }
 }

@@ -106,6 +106,8 @@ pub enum VehicleEvent {
     Former(StoredCells),
     /// The weights that are set and not sent. Since layout 3.
     Draft(StoredDraft),
+    /// The contents that are or may be in force, slots as on the wire: of each slot the last known one first. Since layout 4.
+    InForce(Vec<Vec<u8>>),
 }
 
 /// A run of a vehicle and the epoch of its labels.

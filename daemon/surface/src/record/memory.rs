@@ -65,6 +65,8 @@ pub struct VehicleMemory {
     pub(crate) series: u64,
     pub(crate) intent: StoredIntent,
     pub(crate) places: StoredPlaces,
+    /// The contents that are or may be in force, slots as on the wire.
+    pub(crate) in_force: Vec<Vec<u8>>,
     /// By label, in the order of arrival.
     pub(crate) exemplars: BTreeMap<u8, Vec<StoredImage>>,
     /// Serial number of requests and the open one, by label.
@@ -218,6 +220,7 @@ impl VehicleMemory {
             }
             VehicleEvent::Intent(intent) => self.intent.clone_from(intent),
             VehicleEvent::Places(places) => self.places.clone_from(places),
+            VehicleEvent::InForce(contents) => self.in_force.clone_from(contents),
             VehicleEvent::Exemplar { label, image } => {
                 let images = self.exemplars.entry(*label).or_default();
                 images.retain(|kept| kept.number != image.number);
@@ -290,6 +293,7 @@ impl VehicleMemory {
             VehicleEvent::Orders { series: self.series, orders: self.orders.clone() },
             VehicleEvent::Intent(self.intent.clone()),
             VehicleEvent::Places(self.places.clone()),
+            VehicleEvent::InForce(self.in_force.clone()),
             VehicleEvent::Draft(self.draft.clone()),
         ]);
         let request = |(&label, &(serial, open))| VehicleEvent::Request { label, serial, open };

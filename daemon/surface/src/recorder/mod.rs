@@ -332,6 +332,10 @@ fn order_changes(record: &VehicleRecord, view: &PeerView<'_>, memory: &VehicleMe
     if memory.places != places {
         events.push(VehicleEvent::Places(places));
     }
+    let in_force: Vec<Vec<u8>> = view.in_force_memory().map(stored::slot_bytes).collect();
+    if memory.in_force != in_force {
+        events.push(VehicleEvent::InForce(in_force));
+    }
     let labels: BTreeSet<u8> = record.annotations.labels.keys().chain(memory.labels.keys()).copied().collect();
     for label in labels {
         let book = record.annotations.labels.get(&label).cloned().unwrap_or_default();

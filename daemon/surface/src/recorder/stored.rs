@@ -16,11 +16,11 @@ const STATUS_ROOM: usize = 1024;
 /// Added to the code of a reason of refusal.
 const REFUSED: u8 = 16;
 
-fn slot_bytes(slot: &Slot) -> Vec<u8> {
+pub(super) fn slot_bytes(slot: &Slot) -> Vec<u8> {
     VersionedSlot::encode(0, slot)
 }
 
-fn slot(bytes: &[u8]) -> Option<Slot> {
+pub(super) fn slot(bytes: &[u8]) -> Option<Slot> {
     VersionedSlot::decode(bytes).ok()?.content
 }
 

@@ -121,11 +121,11 @@ impl<R: StateReplica> SurfaceLink<R> {
         true
     }
 
-    /// Puts contents back that an earlier run of the surface knew to be in force. They count once a report of the vehicle
+    /// Puts the contents of [`PeerView::in_force_memory`] of an earlier run of the surface back. They count once a report of the vehicle
     /// confirms their digests.
     pub fn restore_in_force(&mut self, vehicle: Address, contents: impl IntoIterator<Item = Slot>) {
         let Some(peer) = self.fleet.get_mut(vehicle) else { return };
-        contents.into_iter().for_each(|content| peer.restore_in_force(content));
+        peer.restore_in_force(contents);
     }
 
     /// The current view of a vehicle; `None` if it is unknown.

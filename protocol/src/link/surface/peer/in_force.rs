@@ -31,6 +31,8 @@ pub(super) struct InForceCopy {
     decided: PerSlot<bool>,
     /// The content before a slot was decided.
     before: PerSlot<Option<Slot>>,
+    /// Contents that may be in force: those of orders that were replaced before their decision came in.
+    candidates: PerSlot<Vec<Slot>>,
     /// Whether a report has proved that the last applied order of a slot was in force.
     proved: PerSlot<bool>,
     reported: Option<(InForceSummary, FrameNumber)>,
@@ -54,6 +56,10 @@ impl InForceCopy {
     /// Bytes of an inquiry in a frame.
     pub(super) const INQUIRY_BYTES: usize = 2 + 2 * REPORTED_SLOTS.len();
     const FIRST_PAUSE: Duration = Duration::from_secs(15);
+    /// Candidates that are kept of a slot, the latest ones.
+    const MAX_CANDIDATES: usize = 3;
+    /// Combinations that are compared with a summary. Its digest has 16 bits, so of many some would match by chance.
+    const MAX_COMBINATIONS: usize = 64;
     /// The pause after each inquiry is twice the one before, at most 240 s.
     const MAX_DOUBLINGS: u32 = 4;
 
@@ -81,12 +87,43 @@ impl InForceCopy {
                 *of_slot = is_so;
             }
         }
+        if let Some(candidates) = self.candidates.get_mut(order.id) {
+            candidates.clear();
+        }
     }
 
-    /// Takes a content that was known to be in force. It is not certain until a report confirms it.
-    pub(super) fn restore(&mut self, content: Slot) {
-        if let Some(held) = self.held.get_mut(content.id()) {
-            *held = content.in_force();
+    /// Takes a content of [`Self::memory`], of an earlier run of the surface. It is not certain until a report confirms it.
+    pub(super) fn restore(&mut self, contents: impl IntoIterator<Item = Slot>) {
+        let mut is_restored = PerSlot::<bool>::default();
+        for content in contents {
+            let id = content.id();
+            let is_further = is_restored.get_mut(id).is_some_and(|is_restored| std::mem::replace(is_restored, true));
+            if is_further {
+                self.add_candidate(id, content.in_force());
+            } else if let Some(held) = self.held.get_mut(id) {
+                *held = content.in_force();
+            }
+        }
+    }
+
+    /// The contents that are held, each followed by the candidates of its slot.
+    pub(super) fn memory(&self) -> impl Iterator<Item = &Slot> {
+        let candidates = |id| self.candidates.get(id).into_iter().flatten();
+        self.held.iter().flat_map(move |(id, held)| held.iter().chain(candidates(id)))
+    }
+
+    /// An order is replaced by a newer one before its decision has come in: the vehicle may have put it in force.
+    pub(super) fn note_replaced(&mut self, order: &Slot) {
+        let held = self.held.get(order.id()).cloned().flatten();
+        self.add_candidate(order.id(), joined(order, held));
+    }
+
+    fn add_candidate(&mut self, id: SlotId, content: Option<Slot>) {
+        let (Some(content), Some(candidates)) = (content, self.candidates.get_mut(id)) else { return };
+        if !candidates.contains(&content) {
+            candidates.push(content);
+            let surplus = candidates.len().saturating_sub(Self::MAX_CANDIDATES);
+            candidates.drain(..surplus);
         }
     }
 
@@ -123,7 +160,7 @@ impl InForceCopy {
         self.reported = Some((summary, number));
         let decided = std::mem::take(&mut self.decided);
         let is_proved = self.digests().summary() == summary;
-        let is_equal = is_proved || self.is_unchanged(&decided, summary) || self.is_of_pending(pending, summary);
+        let is_equal = is_proved || self.is_unchanged(&decided, summary) || self.is_of_candidates(pending, summary);
         let was_equal = std::mem::replace(&mut self.is_equal, is_equal);
         if !is_same || self.is_equal {
             self.confirmed = PerSlot::default();
@@ -144,30 +181,56 @@ impl InForceCopy {
         });
         let now_held = std::mem::replace(&mut self.held, held);
         let is_unchanged = self.digests().summary() == summary;
-        if !is_unchanged {
+        if is_unchanged {
+            // The decision may have come in before the content was put in force.
+            let decided = decided.iter().filter(|(_, is_decided)| **is_decided).map(|(id, _)| id);
+            decided.for_each(|id| self.add_candidate(id, now_held.get(id).cloned().flatten()));
+        } else {
             self.held = now_held;
         }
         is_unchanged
     }
 
-    /// Whether the contents in force are those that are held with all pending orders, or with one of them; they are held
-    /// then. So an order whose decision follows in a later frame, or was reported to an earlier run of the surface, makes
-    /// nothing unknown.
-    fn is_of_pending(&mut self, pending: &[Slot], summary: InForceSummary) -> bool {
-        let sets = std::iter::once(pending).chain(pending.chunks(1)).filter(|set| !set.is_empty());
-        for set in sets {
-            let before = self.held.clone();
-            for slot in set {
-                if let Some(held) = self.held.get_mut(slot.id()) {
-                    *held = joined(slot, held.take());
+    /// Whether the contents in force are those that are held with some of the pending orders and of the candidates; they are
+    /// held then. So an order whose decision follows in a later frame, was reported to an earlier run of the surface, or never
+    /// came in because a newer order replaced it, makes nothing unknown.
+    fn is_of_candidates(&mut self, pending: &[Slot], summary: InForceSummary) -> bool {
+        let options = PerSlot::from_fn(|id| self.options(id, pending, summary));
+        let combinations =
+            options.iter().map(|(_, options)| options.len()).product::<usize>().min(Self::MAX_COMBINATIONS);
+        let before = self.held.clone();
+        // The first combination is what is held.
+        for number in 1..combinations {
+            let mut rest = number;
+            for (id, options) in options.iter() {
+                let option = options.get(rest % options.len()).cloned();
+                rest /= options.len();
+                if let (Some(held), Some(option)) = (self.held.get_mut(id), option) {
+                    *held = option;
                 }
             }
             if self.digests().summary() == summary {
                 return true;
             }
-            self.held = before;
         }
+        self.held = before;
         false
+    }
+
+    /// The contents of a slot that may be in force, at first the one that is held.
+    fn options(&self, id: SlotId, pending: &[Slot], summary: InForceSummary) -> Vec<Option<Slot>> {
+        let held = self.held.get(id).cloned().flatten();
+        let mut options = vec![held.clone()];
+        if summary.has(id) {
+            let pending = pending.iter().filter(|slot| slot.id() == id).map(|slot| joined(slot, held.clone()));
+            let candidates = self.candidates.get(id).into_iter().flatten().cloned().map(Some);
+            for option in pending.chain(candidates) {
+                if !options.contains(&option) {
+                    options.push(option);
+                }
+            }
+        }
+        options
     }
 
     /// Takes a part of an answer in frame `number`; returns whether a content is known now that was not.
@@ -217,7 +280,8 @@ impl InForceCopy {
     /// One of the two ends has begun a new run. The contents are held until a report differs.
     pub(super) fn handle_peer_restart(&mut self) {
         let (held, proved) = (std::mem::take(&mut self.held), std::mem::take(&mut self.proved));
-        *self = Self { held, proved, ..Self::default() };
+        let candidates = std::mem::take(&mut self.candidates);
+        *self = Self { held, proved, candidates, ..Self::default() };
     }
 }
 
@@ -239,7 +303,7 @@ mod tests {
     fn a_pending_order_that_is_in_force_makes_nothing_unknown() {
         let (utility, now) = (Slot::Utility(Default::default()), Instant::ZERO);
         let mut copy = InForceCopy::default();
-        copy.restore(utility.clone());
+        copy.restore([utility.clone()]);
         copy.handle_report(summary(&[utility.clone(), limits(60)]), &[limits(60)], 1, now);
         assert_eq!(copy.get(SlotId::Utility), InForce::Known(&utility));
         assert_eq!(copy.get(SlotId::Limits), InForce::Known(&limits(60)));
@@ -247,5 +311,43 @@ mod tests {
         assert_eq!(copy.get(SlotId::Limits), InForce::Unknown, "those of another surface");
         copy.handle_report(summary(&[utility, limits(60)]), &[limits(70)], 3, now);
         assert_eq!(copy.get(SlotId::Limits), InForce::Known(&limits(60)), "the pending one is not in force yet");
+    }
+
+    #[test]
+    fn an_order_that_was_replaced_on_its_way_makes_nothing_unknown() {
+        let (utility, now) = (Slot::Utility(Default::default()), Instant::ZERO);
+        let mut copy = InForceCopy::default();
+        copy.restore([utility.clone(), limits(60)]);
+        copy.note_replaced(&limits(70));
+        copy.note_replaced(&limits(80));
+        copy.handle_report(summary(&[utility.clone(), limits(70)]), &[limits(90)], 1, now);
+        assert_eq!(copy.get(SlotId::Limits), InForce::Known(&limits(70)));
+        copy.handle_report(summary(&[utility.clone(), limits(90)]), &[limits(90)], 2, now);
+        assert_eq!(copy.get(SlotId::Limits), InForce::Known(&limits(90)));
+
+        // The surface starts again, and the vehicle still gets the second one.
+        let memory: Vec<Slot> = copy.memory().cloned().collect();
+        let mut restarted = InForceCopy::default();
+        restarted.restore(memory);
+        restarted.handle_report(summary(&[utility.clone(), limits(80)]), &[limits(90)], 1, now);
+        assert_eq!(restarted.get(SlotId::Limits), InForce::Known(&limits(80)));
+        assert_eq!(restarted.get(SlotId::Utility), InForce::Known(&utility));
+        restarted.handle_report(summary(&[utility, limits(50)]), &[limits(90)], 2, now);
+        assert_eq!(restarted.get(SlotId::Limits), InForce::Unknown, "those of another surface");
+    }
+
+    #[test]
+    fn a_decision_that_comes_before_the_content_is_in_force_makes_nothing_unknown() {
+        let (utility, now) = (Slot::Utility(Default::default()), Instant::ZERO);
+        let mut copy = InForceCopy::default();
+        copy.restore([utility.clone(), limits(60)]);
+        copy.handle_report(summary(&[utility.clone(), limits(60)]), &[], 1, now);
+        let (id, slot, status) = (SlotId::Limits, limits(70), OrderStatus::Applied);
+        copy.apply(&SlotProgress { id, version: 1, slot, status, issued: now, changed: now, sent: None });
+        copy.handle_report(summary(&[utility.clone(), limits(60)]), &[], 2, now);
+        assert_eq!(copy.get(SlotId::Limits), InForce::Known(&limits(60)));
+        copy.handle_report(summary(&[utility.clone(), limits(70)]), &[], 3, now);
+        assert_eq!(copy.get(SlotId::Limits), InForce::Known(&limits(70)));
+        assert_eq!(copy.get(SlotId::Utility), InForce::Known(&utility));
     }
 }

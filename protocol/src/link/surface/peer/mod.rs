@@ -184,6 +184,8 @@ impl<R: StateReplica> VehiclePeer<R> {
 
     /// Issues a new version of a slot; returns the version.
     pub(super) fn issue(&mut self, slot: Slot, now: Instant) -> u16 {
+        let replaced = self.outbox.progress().find(|order| order.id == slot.id() && order.status.is_pending());
+        replaced.into_iter().for_each(|order| self.in_force.note_replaced(&order.slot));
         let version = self.outbox.issue(slot, now);
         self.follow_series();
         version
@@ -210,9 +212,9 @@ impl<R: StateReplica> VehiclePeer<R> {
         self.pair.set_series(series);
     }
 
-    /// Takes a content that an earlier run of the surface knew to be in force.
-    pub(super) fn restore_in_force(&mut self, content: Slot) {
-        self.in_force.restore(content);
+    /// Takes the contents that an earlier run of the surface knew to be in force.
+    pub(super) fn restore_in_force(&mut self, contents: impl IntoIterator<Item = Slot>) {
+        self.in_force.restore(contents);
     }
 
     /// Handles a frame of this vehicle; `bytes` is its length.
@@ -239,6 +241,9 @@ impl<R: StateReplica> VehiclePeer<R> {
                 let silent = unanswered && self.contact.is_silent_for(STRAYS_TIMEOUT, now);
                 // A damaged frame is no sign of another run, so it is no reason to begin a new one.
                 let is_stray = self.pair.strays() > strays_before;
+                if is_stray && reason == DropReason::OldSession {
+                    self.master.handle_stray(envelope.header.remaining, modem, now);
+                }
                 let strays = is_stray && self.pair.seems_out_of_step() && silent;
                 self.is_out_of_step |= reason == DropReason::NoBase || strays;
                 return;

@@ -1,7 +1,7 @@
 //! The surface's view of a vehicle, for its host.
 
 use super::{EndedRun, InForce, VehiclePeer};
-use crate::directive::{Series, SlotId, SlotProgress};
+use crate::directive::{Series, Slot, SlotId, SlotProgress};
 use crate::link::{LinkStats, Mismatch};
 use crate::mac::ClockMap;
 use crate::map::{LayerId, LayerReplica, LayerSet, Replica, StateReplica};
@@ -105,6 +105,12 @@ impl<'a, R: StateReplica> PeerView<'a, R> {
     /// The content of a slot that is in force at the vehicle: utility, settings, budget, limits or fence.
     pub fn in_force(&self, id: SlotId) -> InForce<'a> {
         self.0.in_force.get(id)
+    }
+
+    /// The contents that are or may be in force, as far as the surface knows them: of each slot the last known one first, then
+    /// those of replaced orders that the vehicle may have put in force. A store keeps them for a restart.
+    pub fn in_force_memory(&self) -> impl Iterator<Item = &'a Slot> {
+        self.0.in_force.memory()
     }
 
     /// Counters and estimates of the link to this vehicle.
