@@ -197,7 +197,9 @@ impl<T> Handshake<T> {
         if self.run.as_ref().is_some_and(|r| r.peer == peer) {
             return HandshakeOutcome::Known;
         }
-        if self.is_retired(peer) {
+        // A hello that is sealed to a new run of ours cannot be of a run that ended before, although without a key it may have
+        // the same number.
+        if self.retired.iter().any(|r| r.identity == peer && r.own == self.own) {
             return HandshakeOutcome::Retired;
         }
         let new = || LinkRun::new(self.own, peer, introduction, key(self.own, peer));

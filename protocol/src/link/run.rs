@@ -28,6 +28,8 @@ pub struct Identity {
 /// A run of the peer that has ended.
 #[derive(Debug)]
 pub(super) struct EndedPeer {
+    /// Our run that it communicated with.
+    pub(super) own: Identity,
     pub(super) identity: Identity,
     /// The key of its frames to a run of ours, if there is one.
     key: Option<SessionKey>,
@@ -88,7 +90,7 @@ impl<T> LinkRun<T> {
     }
 
     pub(super) fn end(self) -> EndedPeer {
-        EndedPeer { identity: self.peer, key: self.key, highest: self.window.highest() }
+        EndedPeer { own: self.own, identity: self.peer, key: self.key, highest: self.window.highest() }
     }
 
     /// The frame, if the peer's run sealed it to ours. If `keyed`, it must have a tag.

@@ -63,6 +63,8 @@ pub struct Master {
 
 impl Master {
     const ROUND_TRIPS: usize = 4;
+    /// Unanswered grants above which an answer is waited for longer: the vehicle may be farther away than assumed.
+    const NEAR_DOUBTS: u32 = 4;
 
     /// A master that may grant its first turn at `now`.
     pub fn new(config: MasterConfig, now: Instant) -> Self {
@@ -161,7 +163,11 @@ impl Master {
         let flight =
             self.round_trip().map_or(self.config.max_propagation * 2, |rtt| rtt + rtt / 4 + Duration::from_millis(200));
         // A vehicle farther away than assumed must get the chance to answer; a modem that polls waits by itself.
-        let doubts = if profile.access == Access::Polled { 0 } else { self.unanswered.saturating_sub(4).min(10) };
+        let doubts = if profile.access == Access::Polled {
+            0
+        } else {
+            self.unanswered.saturating_sub(Self::NEAR_DOUBTS).min(10)
+        };
         let patience = Duration::from_secs(1) * doubts;
         let frames = if self.is_saturated { losable + 1 } else { 1 };
         let answer = (profile.frame_airtime() * frames).min(self.granted_airtime.max(profile.frame_airtime()));
@@ -204,14 +210,28 @@ impl Master {
         let taken = self.granted.map_or(Duration::ZERO, |at| now.since(at)) + rest;
         self.is_saturated = taken >= self.granted_airtime.mul_f64(0.6);
         if remaining > 0 {
-            let margin = profile.turn_around + profile.frame_airtime() / 2;
-            let until = now + rest.min(self.granted_airtime) + margin;
-            self.state = MediumState::Listening { until };
+            self.state = MediumState::Listening { until: now + self.rest_of_turn(remaining, profile) };
             return;
         }
         let pause = wish.map_or(Duration::ZERO, |quarters| Duration::from_millis(250) * u32::from(quarters));
         let ready = now + profile.turn_around;
         self.state = MediumState::Idle { ready, next: ready + pause.min(self.config.max_idle) };
+    }
+
+    /// A frame of the vehicle came in that announces `remaining` further frames and belongs to another pair of runs: the
+    /// vehicle hears the grants, although it does not answer them.
+    pub fn handle_stray(&mut self, remaining: u8, profile: &ModemProfile, now: Instant) {
+        self.unanswered = self.unanswered.min(Self::NEAR_DOUBTS);
+        let end = now + self.rest_of_turn(remaining, profile);
+        if let MediumState::Granted { until, .. } = &mut self.state {
+            *until = (*until).min(end);
+        }
+    }
+
+    /// Longest time in which the `remaining` further frames of a turn come in.
+    fn rest_of_turn(&self, remaining: u8, profile: &ModemProfile) -> Duration {
+        let rest = profile.frame_airtime() * u32::from(remaining);
+        rest.min(self.granted_airtime) + profile.turn_around + profile.frame_airtime() / 2
     }
 
     /// Waits until `at`, because the budget allows no transmission before.

@@ -44,9 +44,18 @@ impl HelloLimit {
         if is_admitted {
             self.left -= 1;
             self.admitted = Some(now);
-            self.repeats = Self::REPEATS;
         }
         is_admitted
+    }
+
+    /// An admitted hello named another run than the current one: the answer is repeated.
+    pub(super) fn handle_offer(&mut self) {
+        self.repeats = Self::REPEATS;
+    }
+
+    /// An admitted hello named the current run: a repeated answer to another run must not displace its answer.
+    pub(super) fn handle_known(&mut self, now: Instant) {
+        self.next_repeat = self.next_repeat.map(|at| at.max(now + Self::REPEAT_INTERVAL));
     }
 
     /// The surface uses the current run, so a hello that names another one is not repeated.
@@ -95,6 +104,7 @@ mod tests {
         let mut limit = HelloLimit::new(begin);
         let repeats = |limit: &mut HelloLimit| {
             assert!(limit.admit(begin));
+            limit.handle_offer();
             limit.note_answer(begin);
             let times = (1..100).map(|s| begin + Duration::from_secs(s));
             times.filter(|&now| limit.repeat(now).then(|| limit.note_answer(now)).is_some()).count()
@@ -105,5 +115,20 @@ mod tests {
         limit.note_answer(begin);
         limit.handle_numbered();
         assert_eq!(limit.next_repeat(), None);
+    }
+
+    #[test]
+    fn an_answer_to_another_run_never_displaces_those_to_the_current_run() {
+        let begin = Instant::from_secs_f64(100.0);
+        let mut limit = HelloLimit::new(begin);
+        assert!(limit.admit(begin));
+        limit.handle_offer();
+        limit.note_answer(begin);
+        for seconds in [9, 12, 24, 36, 48, 60] {
+            let now = begin + Duration::from_secs(seconds);
+            assert!(limit.admit(now));
+            limit.handle_known(now);
+            assert!(!limit.repeat(now), "after {seconds} s");
+        }
     }
 }

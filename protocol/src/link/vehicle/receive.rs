@@ -45,7 +45,10 @@ impl<S: StateSource> VehicleLink<S> {
             Err(_) => return,
         };
         match inbound.header().kind.is_hello() {
-            true if self.hello_limit.admit(now) => {}
+            true if self.hello_limit.admit(now) => match self.pair.must_send_hello() {
+                true => self.hello_limit.handle_offer(),
+                false => self.hello_limit.handle_known(now),
+            },
             true if owed_hello => return,
             true => return self.pair.withhold_hello(),
             false => self.hello_limit.handle_numbered(),
