@@ -6,14 +6,14 @@
 
 mod large;
 mod real;
-mod zopfli_bytes;
+mod zopfli;
 
 use cpu_time::ThreadTime;
 use scenecast_protocol::map::LabelGrid;
 use scenecast_protocol::map_codec::{Codec, LabelRaster, decode, encode_all};
 use scenecast_training::{Flips, MapRng, MapScene, Survey};
 use std::time::Duration;
-use zopfli_bytes::zopfli_bytes;
+use zopfli::Zopfli;
 
 const ROOMS: [usize; 3] = [64, 256, 1000];
 const SIDE: usize = 192;
@@ -169,8 +169,8 @@ fn series(maps: &[LabelRaster]) -> Totals {
         }
         totals.steps += 1;
         if !std::env::args().any(|argument| argument == "no-png") {
-            totals.full_png += after.smallest_png(&mut zopfli_bytes);
-            totals.best_png += after.smallest_delta_png(before, &mut zopfli_bytes);
+            totals.full_png += after.smallest_png(&mut Zopfli);
+            totals.best_png += after.smallest_delta_png(before, &mut Zopfli);
         }
         let (base, target) = (before.to_grid(), after.to_grid());
         for (i, &room) in ROOMS.iter().enumerate() {

@@ -3,44 +3,81 @@
 use super::LabelRaster;
 use std::collections::BTreeMap;
 
-/// Length of the shortest raw deflate stream of some bytes.
-pub type Deflated<'a> = &'a mut dyn FnMut(&[u8]) -> usize;
+/// Lengths of raw deflate streams of some bytes.
+pub trait Deflate {
+    /// The length by a fast compressor, at least that of [`Self::shortest`].
+    fn quick(&mut self, data: &[u8]) -> usize;
+    /// The length by the best compressor.
+    fn shortest(&mut self, data: &[u8]) -> usize;
+}
+
+/// An image whose quick length is more than the shortest quick one by this factor is not compressed again: the best
+/// compressors save 3 to 8 % of a quick stream.
+const WORTH_TRYING: f64 = 1.1;
+
+/// One way to write a map as an indexed PNG.
+struct PngImage {
+    /// Bytes of the file beside the deflate stream.
+    container_bytes: usize,
+    scanlines: Vec<u8>,
+}
 
 impl LabelRaster {
     /// Bytes of the map as an indexed PNG: filter None, and the best of every depth and palette order that may win.
     ///
     /// The palette holds the values in use only, by value or by frequency; filter None wins on label maps.
-    pub fn smallest_png(&self, deflated: Deflated<'_>) -> usize {
-        let mut counts: BTreeMap<u8, usize> = BTreeMap::new();
-        self.labels.iter().for_each(|&label| *counts.entry(label).or_default() += 1);
-        let by_value: Vec<u8> = counts.keys().copied().collect();
-        let mut by_count = by_value.clone();
-        by_count.sort_by_key(|value| std::cmp::Reverse(counts.get(value).copied()));
-        let orders = if by_value == by_count { vec![by_value] } else { vec![by_value, by_count] };
-        orders.iter().map(|order| with_palette(self, order, deflated)).min().unwrap_or(0)
+    pub fn smallest_png(&self, deflate: &mut impl Deflate) -> usize {
+        smallest(&self.png_images(), deflate)
     }
 
     /// Bytes of the change from `before` as an indexed PNG: the smaller of delta image and its dirty box.
     ///
     /// Pixel 0 = untouched; 0 bytes without a change.
-    pub fn smallest_delta_png(&self, before: &Self, deflated: Deflated<'_>) -> usize {
+    pub fn smallest_delta_png(&self, before: &Self, deflate: &mut impl Deflate) -> usize {
         if self == before {
             return 0;
         }
         let delta = self.delta_from(before);
         let dirty_box = delta.trimmed();
-        let whole = delta.smallest_png(deflated);
-        if dirty_box == delta { whole } else { whole.min(dirty_box.smallest_png(deflated)) }
+        let mut images = delta.png_images();
+        if dirty_box != delta {
+            images.extend(dirty_box.png_images());
+        }
+        smallest(&images, deflate)
+    }
+
+    fn png_images(&self) -> Vec<PngImage> {
+        let mut counts: BTreeMap<u8, usize> = BTreeMap::new();
+        self.labels.iter().for_each(|&label| *counts.entry(label).or_default() += 1);
+        let by_value: Vec<u8> = counts.keys().copied().collect();
+        let mut by_count = by_value.clone();
+        by_count.sort_by_key(|value| std::cmp::Reverse(counts.get(value).copied()));
+        let mut images = with_palette(self, &by_value, &[1, 2, 4, 8]);
+        if by_value != by_count {
+            // With a byte a pixel the order changes a few bytes of code lengths only.
+            images.extend(with_palette(self, &by_count, &[1, 2, 4]));
+        }
+        images
     }
 }
 
-fn with_palette(map: &LabelRaster, order: &[u8], deflated: Deflated<'_>) -> usize {
+/// Bytes of the smallest file.
+fn smallest(images: &[PngImage], deflate: &mut impl Deflate) -> usize {
+    let quick: Vec<usize> = images.iter().map(|image| deflate.quick(&image.scanlines)).collect();
+    let limit = quick.iter().min().map_or(0.0, |&least| least as f64 * WORTH_TRYING);
+    let tried = images.iter().zip(&quick).filter(|(_, quick)| **quick as f64 <= limit);
+    let sizes = tried.map(|(image, _)| image.container_bytes + deflate.shortest(&image.scanlines));
+    sizes.min().unwrap_or(0)
+}
+
+/// The map with a palette, at each of these depths, bits a pixel, in which the palette has room.
+fn with_palette(map: &LabelRaster, order: &[u8], depths: &[usize]) -> Vec<PngImage> {
     let place = |value: &u8| order.iter().position(|o| o == value).unwrap_or_default() as u8;
     let map = LabelRaster { labels: map.labels.iter().map(place).collect(), ..*map };
-    let depths = [1, 2, 4, 8].into_iter().filter(|&depth| order.len() <= 1 << depth);
-    let data = depths.map(|depth| deflated(&scanlines(&map, depth))).min().unwrap_or(0);
     // Signature, IHDR, PLTE, IDAT with zlib head and Adler-32, IEND.
-    8 + 25 + (12 + 3 * order.len()) + (12 + 6 + data) + 12
+    let container_bytes = 8 + 25 + (12 + 3 * order.len()) + (12 + 6) + 12;
+    let depths = depths.iter().filter(|&depth| order.len() <= 1 << depth);
+    depths.map(|&depth| PngImage { container_bytes, scanlines: scanlines(&map, depth) }).collect()
 }
 
 fn scanlines(map: &LabelRaster, depth: usize) -> Vec<u8> {
@@ -60,23 +97,32 @@ fn scanlines(map: &LabelRaster, depth: usize) -> Vec<u8> {
 mod tests {
     use super::*;
 
-    fn stored(data: &[u8]) -> usize {
-        data.len()
+    /// Stores without compression.
+    struct Stored;
+
+    impl Deflate for Stored {
+        fn quick(&mut self, data: &[u8]) -> usize {
+            data.len()
+        }
+
+        fn shortest(&mut self, data: &[u8]) -> usize {
+            data.len()
+        }
     }
 
     #[test]
     fn the_shallowest_depth_is_found_and_the_container_counted() {
         let map = LabelRaster { width: 8, height: 2, labels: [[0u8, 9]; 8].concat() };
         // Two rows of a filter byte and eight pixels of a bit; two colours.
-        assert_eq!(map.smallest_png(&mut stored), 8 + 25 + 12 + 6 + 12 + 6 + 4 + 12);
+        assert_eq!(map.smallest_png(&mut Stored), 8 + 25 + 12 + 6 + 12 + 6 + 4 + 12);
     }
 
     #[test]
     fn the_smaller_of_box_and_delta_counts() {
         let before = LabelRaster::uniform(40, 40, 1);
         let mut after = before.clone();
-        assert_eq!(after.smallest_delta_png(&before, &mut stored), 0);
+        assert_eq!(after.smallest_delta_png(&before, &mut Stored), 0);
         after.set(7, 9, 2);
-        assert_eq!(after.smallest_delta_png(&before, &mut stored), 8 + 25 + 12 + 3 + 12 + 6 + 2 + 12);
+        assert_eq!(after.smallest_delta_png(&before, &mut Stored), 8 + 25 + 12 + 3 + 12 + 6 + 2 + 12);
     }
 }

@@ -25,6 +25,7 @@ mod tests;
 #[allow(clippy::indexing_slicing)] // Columns and rows of its own square.
 mod window;
 
+pub use best_png::Deflate;
 pub use chunk::{DecodeError, MapChunk, decode, encode, encode_every};
 pub use codec::Codec;
 pub use context::training;

@@ -1,7 +1,7 @@
 //! Sizes of the chunks of one change.
 
 use super::Coding;
-use super::zopfli_bytes::zopfli_bytes;
+use super::zopfli::Zopfli;
 use scenecast_core::UserError;
 use scenecast_protocol::map_codec::{ChunkFile, ChunkFileError, LabelRaster};
 use serde::Serialize;
@@ -54,8 +54,8 @@ pub fn sizes(
         frames: frames(file.chunks.iter().map(Vec::len), coding.frame_bytes.into()),
         cells_changed,
         codec: coding.codec.to_string(),
-        png_full_bytes: target.smallest_png(&mut zopfli_bytes),
-        png_delta_bytes: target.smallest_delta_png(base, &mut zopfli_bytes),
+        png_full_bytes: target.smallest_png(&mut Zopfli),
+        png_delta_bytes: target.smallest_delta_png(base, &mut Zopfli),
     }
 }
 

@@ -6,7 +6,7 @@ mod decode;
 mod encode;
 mod files;
 mod train;
-mod zopfli_bytes;
+mod zopfli;
 
 use clap::{Args, Subcommand};
 use scenecast_core::UserError;
