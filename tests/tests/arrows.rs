@@ -8,12 +8,13 @@ const IO_CRATES: [&str; 8] =
     ["axum", "hyper", "nix", "serialport", "scenecast-files", "tokio", "tokio-serial", "tracing-subscriber"];
 
 /// Crates that do no IO.
-const SANS_IO: [&str; 11] = [
+const SANS_IO: [&str; 12] = [
     "scenecast-core",
     "scenecast-drivers",
     "scenecast-host",
     "scenecast-motion",
     "scenecast-protocol",
+    "scenecast-registration",
     "scenecast-scoring",
     "scenecast-surface",
     "scenecast-vehicle",

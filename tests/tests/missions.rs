@@ -160,11 +160,18 @@ fn position_error(sets: &[&str]) -> f64 {
 
 #[test]
 fn without_fixes_dead_reckoning_drifts_and_fixes_correct_it() {
-    let sets = ["survey.duration_s=400", "navigation.drift_percent=15"];
+    let sets = ["survey.duration_s=400", "navigation.drift_percent=15", "registration.enabled=false"];
     let adrift = position_error(&[&sets[..], &["navigation.fix_period_s=0"]].concat());
     let fixed = position_error(&sets);
     assert!(adrift > 3.0 * fixed && adrift > 1.0, "{adrift} m without fixes, {fixed} m with");
     assert!(fixed < 1.0, "{fixed} m: a fix is good to half a metre");
+}
+
+#[test]
+fn registration_keeps_the_position_without_fixes() {
+    let sets = ["survey.duration_s=400", "navigation.drift_percent=15", "navigation.fix_period_s=0"];
+    let registered = position_error(&sets);
+    assert!(registered < 0.4, "{registered} m without fixes");
 }
 
 #[test]

@@ -8,7 +8,9 @@ use scenecast_drivers::modem::Station;
 use scenecast_protocol::coordinates::MapPoint;
 use scenecast_protocol::directive::{Budget, Fix, Settings};
 use scenecast_protocol::time::Instant;
-use scenecast_vehicle::{AppliedSlot, MapUpdate, SharedExemplars, Vehicle, VehicleDisk, VehicleOutput};
+use scenecast_vehicle::{
+    AppliedSlot, MapUpdate, RegisteredFrame, SharedExemplars, Vehicle, VehicleDisk, VehicleOutput,
+};
 use std::collections::VecDeque;
 
 /// Maximum age of a fix that is given to the autopilot, seconds.
@@ -191,7 +193,7 @@ impl VehicleHost {
             return recorded;
         }
         let navigator = self.vehicle().navigator();
-        let (x_m, y_m) = navigator.position().xy();
+        let (x_m, y_m) = navigator.dead_reckoned().xy();
         CameraPose { x_m, y_m, heading_rad: navigator.heading_rad(), depth_m: navigator.depth_m() }
     }
 
@@ -200,10 +202,12 @@ impl VehicleHost {
         self.mapper.is_over = true;
     }
 
-    /// The mapper has handled the frame of `pose`; `None` at the start, when the map is that of a checkpoint.
+    /// The mapper has handled the frame of `pose` and placed it; `None` at the start, when the map is that of a
+    /// checkpoint, and for a frame that was not mapped.
     pub fn handle_mapped(
         &mut self,
         pose: Option<CameraPose>,
+        registered: Option<&RegisteredFrame>,
         update: &MapUpdate,
         exemplars: SharedExemplars,
         now: Instant,
@@ -211,6 +215,9 @@ impl VehicleHost {
         if let Some(pose) = pose {
             self.mapper.outstanding -= 1;
             self.handle_pose(pose, now);
+        }
+        if let Some(frame) = registered {
+            self.handle_registration(frame, now);
         }
         self.handle_map(update, now);
         self.handle_exemplars(exemplars);
@@ -221,6 +228,11 @@ impl VehicleHost {
     pub fn handle_missed(&mut self) {
         self.mapper.outstanding -= 1;
         self.finish_after_last_frame();
+    }
+
+    /// The mapper has placed a camera frame.
+    pub fn handle_registration(&mut self, frame: &RegisteredFrame, now: Instant) {
+        self.link.end_mut().handle_registration(frame, now);
     }
 
     /// Takes a new map of the mapper.

@@ -28,6 +28,7 @@ pub fn report(mission: &Mission, scenario: &str) -> Report {
             "scenario": scenario,
         },
         "scene": scene(mission),
+        "registration": registration(mission),
         "map": map(mission),
         "link": link(mission),
         "directives": directives(mission),
@@ -76,6 +77,23 @@ fn scene(m: &Mission) -> Value {
         "mutual_information_nats": mi.map(|v| round(v.0)),
         "normalised_mutual_information": mi.map(|v| round(v.1)),
         "operator_mutual_information_nats": operator.map(|v| round(v.0)),
+    })
+}
+
+/// The evidence by which frames were placed, and their errors where the truth is known.
+fn registration(m: &Mission) -> Value {
+    let Some(tally) = m.mapper.registration() else { return json!({ "enabled": false }) };
+    let error = m.registration_error_m();
+    json!({
+        "enabled": true,
+        "frames": tally.frames,
+        "chained": tally.chained,
+        "looped": tally.looped,
+        "loops": tally.loops,
+        "contradicted": tally.contradicted,
+        "unseen": tally.unseen,
+        "error_rigid_m": error.map(|e| round(e.rigid_m)),
+        "error_placed_m": error.map(|e| round(e.placed_m)),
     })
 }
 

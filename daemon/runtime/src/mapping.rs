@@ -7,7 +7,7 @@ use scene_model::project::Pose;
 use scenecast_core::UserError;
 use scenecast_files::{RecordedFrame, Recording};
 use scenecast_protocol::directive::Settings;
-use scenecast_vehicle::{MapUpdate, Mapper, SharedExemplars};
+use scenecast_vehicle::{MapUpdate, Mapper, RegisteredFrame, SharedExemplars};
 use std::thread::JoinHandle;
 use tokio::sync::mpsc;
 
@@ -32,6 +32,8 @@ pub(super) enum FromMapper {
 pub(super) struct Mapped {
     /// `None` at the start, when the map is that of a checkpoint.
     pub(super) frame: Option<RecordedFrame>,
+    /// The place of a frame that was mapped.
+    pub(super) registered: Option<RegisteredFrame>,
     pub(super) update: MapUpdate,
     /// The best images of each label so far.
     pub(super) exemplars: SharedExemplars,
@@ -152,7 +154,7 @@ impl Work {
     /// Sends the map as it is, without a new frame in it.
     fn report_current(&mut self, frame: Option<RecordedFrame>) -> bool {
         let update = self.mapper.current();
-        let mapped = self.mapped(frame, update);
+        let mapped = self.mapped(frame, None, update);
         self.report(FromMapper::Mapped(mapped))
     }
 
@@ -160,15 +162,21 @@ impl Work {
         match frame.image() {
             Ok(image) => {
                 let pose = Pose { x: frame.x_m, y: frame.y_m, z: -frame.depth_m, yaw_rad: -frame.heading_rad };
-                let update = self.mapper.handle_frame(&image, &pose, frame.scale, frame.t_s);
-                FromMapper::Mapped(self.mapped(Some(frame), update))
+                let placed = self.mapper.register(&image, &pose, frame.scale);
+                let update = self.mapper.handle_frame(&image, &placed.pose, placed.scale, frame.t_s);
+                FromMapper::Mapped(self.mapped(Some(frame), Some(placed), update))
             }
             Err(error) => FromMapper::Missed(error),
         }
     }
 
-    fn mapped(&mut self, frame: Option<RecordedFrame>, update: MapUpdate) -> Mapped {
-        Mapped { frame, update, exemplars: self.mapper.shared_exemplars() }
+    fn mapped(
+        &mut self,
+        frame: Option<RecordedFrame>,
+        registered: Option<RegisteredFrame>,
+        update: MapUpdate,
+    ) -> Mapped {
+        Mapped { frame, registered, update, exemplars: self.mapper.shared_exemplars() }
     }
 }
 

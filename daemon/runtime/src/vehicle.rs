@@ -12,7 +12,7 @@ use super::reload::{Load, Reload};
 use super::restore::{Start, start};
 use super::stop::Stop;
 use crate::port::FromPort;
-use scenecast_config::{CameraSource, Config, survey_depth_m};
+use scenecast_config::{AutopilotKind, CameraSource, Config, survey_depth_m};
 use scenecast_core::{Area, TangentPlane, UserError};
 use scenecast_files::{RecordedFrame, Recording};
 use scenecast_host::{CameraPose, VehicleHost, VehicleHostEvent, VehiclePilot, modem_station};
@@ -58,6 +58,10 @@ pub fn run_vehicle(load: Load, simulated: Option<SimulatedAutopilot>) -> Result<
         let is_recorded = recording.is_some();
         let mut camera = Camera::new(recording, clock, mapper.last_s());
         mapper.tune(vehicle.settings());
+        if config.autopilot.kind != AutopilotKind::None {
+            // The odometry of an autopilot starts again with each run.
+            mapper.handle_gap();
+        }
         let mapper = MapperThread::start(mapper, keep)?;
         let modem = ModemPort::open(&config, clock.now()).await?;
         let station = modem_station(&config, address, profile)?;
@@ -160,7 +164,8 @@ impl VehicleShell {
 
     fn handle_seen(&mut self, mapped: Mapped) {
         let now = self.clock.now();
-        self.host.handle_mapped(mapped.frame.as_ref().map(pose_of), &mapped.update, mapped.exemplars, now);
+        let (pose, registered) = (mapped.frame.as_ref().map(pose_of), mapped.registered.as_ref());
+        self.host.handle_mapped(pose, registered, &mapped.update, mapped.exemplars, now);
     }
 
     /// Logs an unreadable frame; it does not end the mission.

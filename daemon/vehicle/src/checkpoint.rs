@@ -9,6 +9,7 @@ use scene_model::topics::{CheckpointError, SceneConfig, SceneModel};
 use scene_model::words::{FlatField, Measures, WordExtractor};
 use scenecast_config::Config;
 use scenecast_core::UserError;
+use scenecast_registration::Registrar;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -64,6 +65,8 @@ impl Mapper {
         let mut content = postcard::to_allocvec(&kept).unwrap_or_default();
         content.extend(postcard::to_allocvec(&self.last_seen_s).unwrap_or_default());
         content.extend(postcard::to_allocvec(&self.light).unwrap_or_default());
+        let registration = self.registrar.as_ref().map(Registrar::save);
+        content.extend(postcard::to_allocvec(&registration).unwrap_or_default());
         ENVELOPE.seal(&content)
     }
 
@@ -73,9 +76,10 @@ impl Mapper {
         let content = ENVELOPE.open(bytes)?;
         let (kept, rest): (CheckpointContent<Vec<u8>, LabelBook, Measures, ExemplarStore, Relief>, _) =
             postcard::take_from_bytes(content).map_err(|_| RestoreError::Inconsistent)?;
-        // Checkpoints of earlier builds end here, or after the times of the cells.
+        // Checkpoints of earlier builds end here, after the times of the cells, or after the light.
         let (last_seen_s, rest) = part(rest, BTreeMap::new())?;
-        let (light, _) = part(rest, None::<FlatField>)?;
+        let (light, rest) = part(rest, None::<FlatField>)?;
+        let (registration, _) = part(rest, None::<&[u8]>)?;
         let model = SceneModel::load(&kept.model)?;
         let fresh = Mapper::new(config, vocabulary, kept.book.epoch(), config.runtime.seed)?;
         let &SceneConfig { alpha, beta, gamma, seed, .. } = model.config();
@@ -90,6 +94,8 @@ impl Mapper {
         let mut mapper = fresh;
         mapper.last_seen_s = last_seen_s;
         mapper.light = mapper.light.map(|fresh| light.unwrap_or(fresh));
+        let kept_registrar = registration.and_then(registrar_of).map(|kept| kept.with_loops(config.registration.loops));
+        mapper.registrar = mapper.registrar.map(|fresh| kept_registrar.unwrap_or(fresh));
         mapper.extractor = WordExtractor::from_measures(kept.words);
         (mapper.model, mapper.book) = (model, kept.book);
         (mapper.exemplars, mapper.relief, mapper.last_s) = (kept.exemplars, kept.relief, kept.last_s);
@@ -104,6 +110,11 @@ fn part<'a, T: Deserialize<'a>>(bytes: &'a [u8], missing: T) -> Result<(T, &'a [
         return Ok((missing, bytes));
     }
     postcard::take_from_bytes(bytes).map_err(|_| RestoreError::Inconsistent)
+}
+
+/// A registration from its bytes. Without a usable one, frames are placed against those that come.
+fn registrar_of(bytes: &[u8]) -> Option<Registrar> {
+    Registrar::restore(bytes).inspect_err(|why| tracing::warn!("the registration starts again: {why}")).ok()
 }
 
 fn is_same(a: &Measures, b: &Measures) -> bool {
@@ -173,8 +184,11 @@ mod tests {
         (0..5).for_each(|at| drop(frame(&mut mapper, at)));
         let bytes = mapper.save(7);
         let content = ENVELOPE.open(&bytes).unwrap();
+        let registration = mapper.registrar.as_ref().map(Registrar::save);
+        let registration = postcard::to_allocvec(&registration).unwrap();
+        let unregistered = content.strip_suffix(registration.as_slice()).unwrap();
         let light = postcard::to_allocvec(&mapper.light).unwrap();
-        let without_light = content.strip_suffix(light.as_slice()).unwrap();
+        let without_light = unregistered.strip_suffix(light.as_slice()).unwrap();
         let restored = Mapper::restore(&config(&[]), None, &ENVELOPE.seal(without_light)).unwrap().mapper;
         assert_eq!((restored.current(), restored.light), (mapper.current(), Some(FlatField::default())));
         let times = postcard::to_allocvec(&mapper.last_seen_s).unwrap();

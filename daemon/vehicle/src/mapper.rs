@@ -12,6 +12,7 @@ use scenecast_config::{BirthRule, Config, cell_m};
 use scenecast_core::UserError;
 use scenecast_protocol::directive::{Change, Settings, ShortDecimal};
 use scenecast_protocol::map::{Cell, LayerId};
+use scenecast_registration::Registrar;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -49,6 +50,8 @@ pub struct Mapper {
     /// The exemplars of the last [`Mapper::shared_exemplars`].
     shared: SharedExemplars,
     pub(super) relief: Relief,
+    /// `None` if frames are mapped where dead reckoning places them.
+    pub(super) registrar: Option<Registrar>,
     /// Mission time of the last frame that had a word in the cell, by the cell's x and y, seconds.
     pub(super) last_seen_s: BTreeMap<(i32, i32), f64>,
     refine_words_per_s: f64,
@@ -69,6 +72,11 @@ struct Configured {
 /// A configured frame rate, where 0 stands for every frame.
 fn every_frame_or(rate: f64) -> Option<f64> {
     (rate > 0.0).then_some(rate)
+}
+
+fn registrar(config: &Config) -> Option<Registrar> {
+    let registrar = || Registrar::new(config.navigation.drift_percent / 100.0).with_loops(config.registration.loops);
+    config.registration.enabled.then(registrar)
 }
 
 impl Mapper {
@@ -108,6 +116,7 @@ impl Mapper {
                 .with_distance(f64::from(PATCH_PX) * config.camera.metres_per_pixel),
             shared: SharedExemplars::default(),
             relief: Relief::default(),
+            registrar: registrar(config),
             last_seen_s: BTreeMap::new(),
             refine_words_per_s: f64::from(config.scene.refine_words_per_s),
             frames_per_s: every_frame_or(config.scene.frames_per_s),
@@ -215,6 +224,11 @@ impl Mapper {
         } else {
             self.book.begin_epoch(epoch);
         }
+    }
+
+    /// The configured size of a pixel on the sea floor, metres.
+    pub(super) fn metres_per_pixel(&self) -> f64 {
+        self.camera.metres_per_pixel
     }
 
     /// Mission time of the last frame, seconds.

@@ -3,11 +3,13 @@
 mod filter;
 mod last_place;
 mod odometer;
+mod origin;
 
 pub use last_place::LastPlace;
 
 use filter::Filter;
 use odometer::Odometer;
+use origin::Origin;
 use scenecast_protocol::coordinates::{MapPoint, WorldPoint};
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::Placement;
@@ -25,6 +27,14 @@ pub struct Navigator {
     depth_m: f64,
     filter: Filter,
     odometer: Odometer,
+    /// The position by dead reckoning, without corrections by registration.
+    dead_reckoned: MapPoint,
+    /// Once a frame was registered, the place of the map's origin in the world is a mean of all fixes.
+    origin: Origin,
+    is_registered: bool,
+    /// Path since the last registered frame, metres.
+    unregistered_m: f64,
+    drift: f64,
     placement: Option<Placement>,
     last_fix: Option<Instant>,
     /// Whether the vehicle may have moved while it was off. The first fix then corrects the position on the map.
@@ -62,6 +72,8 @@ impl Navigator {
     const MIN_SHIFT_M: f64 = 0.2;
     /// Standard deviation of the drift while the vehicle was off, metres.
     const RESUMED_SIGMA_M: f64 = 50.0;
+    /// Drift of registered frames, metres for each metre of path.
+    const REGISTERED_DRIFT: f64 = 0.0005;
     /// The maximum distance of a mission from its origin, metres.
     const MAX_DISTANCE_M: f64 = 800_000.0;
 
@@ -73,6 +85,11 @@ impl Navigator {
             depth_m,
             filter: Filter::new((x_m, y_m), drift),
             odometer: Odometer::default(),
+            dead_reckoned: MapPoint { x_m, y_m },
+            origin: Origin::new((0.0, 0.0), 0.0),
+            is_registered: false,
+            unregistered_m: 0.0,
+            drift,
             placement: None,
             last_fix: None,
             is_displaced: false,
@@ -86,7 +103,9 @@ impl Navigator {
         let at = last.at();
         let mut navigator = Self::new(at.x_m, at.y_m, depth_m, drift).with_start_sigma(Self::RESUMED_SIGMA_M);
         let world = Placement::map_to_world(last.placement(), at);
-        navigator.filter.shift(world.east_m - at.x_m, world.north_m - at.y_m);
+        let shift = (world.east_m - at.x_m, world.north_m - at.y_m);
+        navigator.filter.shift(shift.0, shift.1);
+        navigator.origin = Origin::new(shift, Self::RESUMED_SIGMA_M);
         (navigator.placement, navigator.is_displaced) = (last.placement(), true);
         navigator
     }
@@ -94,6 +113,7 @@ impl Navigator {
     /// Adds the standard deviation of the start position, metres.
     pub fn with_start_sigma(mut self, sigma_m: f64) -> Self {
         self.filter.add_uncertainty(sigma_m);
+        self.origin.add_uncertainty(sigma_m);
         self
     }
 
@@ -102,8 +122,17 @@ impl Navigator {
         self.at
     }
 
+    /// The position by dead reckoning since the start, which registration does not correct.
+    pub fn dead_reckoned(&self) -> MapPoint {
+        self.dead_reckoned
+    }
+
     /// The best estimate of the position in the world frame.
     pub fn world(&self) -> WorldPoint {
+        if self.is_registered {
+            let (east_m, north_m) = self.origin.at();
+            return WorldPoint { east_m: self.at.x_m + east_m, north_m: self.at.y_m + north_m };
+        }
         let (east_m, north_m) = self.filter.position();
         WorldPoint { east_m, north_m }
     }
@@ -149,22 +178,52 @@ impl Navigator {
             return;
         }
         (self.heading_rad, self.depth_m) = (heading_rad, depth_m);
+        self.unregistered_m += dx_m.hypot(dy_m);
         let (x, y) = self.filter.handle_travel(dx_m, dy_m);
-        self.at = MapPoint { x_m: self.at.x_m + x, y_m: self.at.y_m + y };
+        self.travel(x, y);
         self.odometer.handle_travel(dx_m, dy_m, now, Self::MEMORY_S);
+    }
+
+    fn travel(&mut self, dx_m: f64, dy_m: f64) {
+        let moved = |at: MapPoint| MapPoint { x_m: at.x_m + dx_m, y_m: at.y_m + dy_m };
+        (self.at, self.dead_reckoned) = (moved(self.at), moved(self.dead_reckoned));
+    }
+
+    /// A camera frame that was taken at `dead_reckoned` is at `placed` on the map. `is_seen` tells whether it overlaps
+    /// with an earlier one.
+    pub fn handle_registration(&mut self, dead_reckoned: MapPoint, placed: MapPoint, is_seen: bool, now: Instant) {
+        let all = [dead_reckoned.x_m, dead_reckoned.y_m, placed.x_m, placed.y_m];
+        if !all.into_iter().all(f64::is_finite) {
+            return;
+        }
+        self.is_registered |= is_seen;
+        let before = (self.at.x_m - self.dead_reckoned.x_m, self.at.y_m - self.dead_reckoned.y_m);
+        let after = (placed.x_m - dead_reckoned.x_m, placed.y_m - dead_reckoned.y_m);
+        let (dx, dy) = (after.0 - before.0, after.1 - before.1);
+        self.at = MapPoint { x_m: self.at.x_m + dx, y_m: self.at.y_m + dy };
+        self.filter.shift(dx, dy);
+        self.odometer.handle_travel(dx, dy, now, Self::MEMORY_S);
+        let path = std::mem::replace(&mut self.unregistered_m, 0.0);
+        let drift = if is_seen { Self::REGISTERED_DRIFT } else { self.drift };
+        self.origin.drift(drift * path);
     }
 
     /// The vehicle may have travelled so far in any direction without a measurement.
     pub fn handle_unmeasured(&mut self, metres: f64) {
         // The distance is the root mean square over two directions, so each gets its share of the variance.
         self.filter.add_uncertainty(metres.max(0.0) / std::f64::consts::SQRT_2);
+        self.origin.add_uncertainty(metres.max(0.0) / std::f64::consts::SQRT_2);
     }
 
-    /// Sets the pose in the map frame from another source, such as a recorded mission.
+    /// Sets the dead-reckoned pose from another source, such as a recorded mission.
     pub fn set_pose(&mut self, x_m: f64, y_m: f64, heading_rad: f64, depth_m: f64, now: Instant) {
         self.is_displaced = false;
-        let (dx, dy) = (x_m - self.at.x_m, y_m - self.at.y_m);
-        (self.at, self.heading_rad, self.depth_m) = (MapPoint { x_m, y_m }, heading_rad, depth_m);
+        let (dx, dy) = (x_m - self.dead_reckoned.x_m, y_m - self.dead_reckoned.y_m);
+        (self.heading_rad, self.depth_m) = (heading_rad, depth_m);
+        self.unregistered_m += dx.hypot(dy);
+        let off = (self.at.x_m - self.dead_reckoned.x_m, self.at.y_m - self.dead_reckoned.y_m);
+        self.dead_reckoned = MapPoint { x_m, y_m };
+        self.at = MapPoint { x_m: x_m + off.0, y_m: y_m + off.1 };
         self.filter.shift(dx, dy);
         self.odometer.handle_travel(dx, dy, now, Self::MEMORY_S);
     }
@@ -185,9 +244,11 @@ impl Navigator {
         }
         self.refused = (0, (0.0, 0.0));
         self.filter.correct(&since, (x_m, y_m), sigma);
+        let then = (self.at.x_m - since.dx_m, self.at.y_m - since.dy_m);
+        self.origin.correct((x_m - then.0, y_m - then.1), sigma);
         self.last_fix = Some(now);
         if std::mem::take(&mut self.is_displaced) {
-            self.at = self.to_map(self.world());
+            self.displace();
         }
         self.place();
         FixVerdict::Used
@@ -203,6 +264,16 @@ impl Navigator {
             self.filter.add_uncertainty(off.0.hypot(off.1));
         }
         row >= Self::MIN_AGREEING
+    }
+
+    /// Moves the vehicle on the map to where the fixes say that it is.
+    fn displace(&mut self) {
+        let (east_m, north_m) = self.filter.position();
+        let at = self.to_map(WorldPoint { east_m, north_m });
+        let by = (at.x_m - self.at.x_m, at.y_m - self.at.y_m);
+        self.dead_reckoned = MapPoint { x_m: self.dead_reckoned.x_m + by.0, y_m: self.dead_reckoned.y_m + by.1 };
+        self.at = at;
+        self.origin = Origin::new((east_m - at.x_m, north_m - at.y_m), self.filter.sigma_m());
     }
 
     fn place(&mut self) {
@@ -263,6 +334,21 @@ mod tests {
         assert!((x - 60.0).abs() < 0.3 && (y - 3.0).abs() < 0.3, "{x} {y}");
         nav.handle_fix(WorldPoint::new(60.0, 3.0), 0.1, at(60.0), at(60.0));
         assert_eq!(nav.placement().unwrap().version, 1, "a move that is not worth telling");
+    }
+
+    #[test]
+    fn registration_moves_the_vehicle_on_the_map_but_not_the_map() {
+        let mut nav = under_way();
+        nav.handle_fix(WorldPoint::new(60.0, 3.0), 0.1, at(60.0), at(60.0));
+        let placement = nav.placement();
+        nav.handle_registration(MapPoint::new(60.0, 0.0), MapPoint::new(57.0, 1.0), true, at(61.0));
+        assert_eq!((nav.position(), nav.dead_reckoned()), (MapPoint::new(57.0, 1.0), MapPoint::new(60.0, 0.0)));
+        assert_eq!(nav.placement(), placement);
+        // The next step is added to the registered position, and a pose of a recording is one by dead reckoning.
+        nav.handle_odometry(1.0, 0.0, 0.0, 18.0, at(62.0));
+        let east = nav.position().x_m - nav.dead_reckoned().x_m;
+        nav.set_pose(70.0, 0.0, 0.0, 18.0, at(63.0));
+        assert!((nav.position().x_m - 67.0).abs() < 1e-9 && (east + 3.0).abs() < 1e-9, "{:?}", nav.position());
     }
 
     #[test]

@@ -13,7 +13,7 @@ pub use link::Link;
 pub use map::{Camera, Map, Scene};
 pub use modem::{Channel, Modem};
 pub use node::{Console, Mission, Operator, Runtime, VehicleSection, WorldSection};
-pub use survey::{Autopilot, Navigation, Position, Survey};
+pub use survey::{Autopilot, Navigation, Position, Registration, Survey};
 
 use crate::key::Section;
 
@@ -30,6 +30,7 @@ pub struct Config {
     pub scene: Scene,
     pub survey: Survey,
     pub navigation: Navigation,
+    pub registration: Registration,
     pub autopilot: Autopilot,
     pub position: Position,
     pub world: WorldSection,
@@ -51,6 +52,7 @@ impl Section {
         Scene::SECTION,
         Survey::SECTION,
         Navigation::SECTION,
+        Registration::SECTION,
         Autopilot::SECTION,
         Position::SECTION,
         WorldSection::SECTION,

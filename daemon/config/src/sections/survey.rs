@@ -58,6 +58,18 @@ section! {
 }
 
 section! {
+    /// The registration of camera frames.
+    registration: Registration {
+        /// Whether each frame is placed on the map by its overlap with earlier frames. Where images show no overlap,
+        /// frames are placed by dead reckoning and compass, as all of them are without registration.
+        enabled: bool = true, ANY, [Auv Scenario];
+        /// Earlier frames, besides the one before, that each frame is compared with. More of them keep a long survey
+        /// straighter, and take about 2 ms each. 0: only the frame before.
+        loops: u8 = 3, range(0.0, 8.0, ""), [Auv Scenario];
+    }
+}
+
+section! {
     /// The autopilot of the vehicle or of the surface vehicle.
     autopilot: Autopilot {
         /// Kind of autopilot. none: waypoints are logged only; rehearsal: a simulated vehicle; mavlink: ArduSub or

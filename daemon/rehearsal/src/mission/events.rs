@@ -2,6 +2,7 @@
 
 use super::Mission;
 use super::camera::NextFrame;
+use super::logbook::FramePoses;
 use super::timetable::STEP_S;
 use crate::modem_rig::{SURFACE, VEHICLE};
 use scene_model::project::Pose;
@@ -175,15 +176,21 @@ impl Mission {
         let t_s = now.as_secs_f64();
         let navigator = self.vehicle.vehicle().navigator();
         let ((x_m, y_m), depth_m, heading_rad) =
-            (navigator.position().xy(), navigator.depth_m(), navigator.heading_rad());
+            (navigator.dead_reckoned().xy(), navigator.depth_m(), navigator.heading_rad());
         let file = Default::default();
         self.camera.record(image, &RecordedFrame { t_s, file, x_m, y_m, depth_m, heading_rad, scale })?;
         if !self.mapper.takes(t_s) {
             return Ok(());
         }
-        self.logbook.track.push((x_m, y_m));
         let pose = Pose { x: x_m, y: y_m, z: -depth_m, yaw_rad: -heading_rad };
-        let update = self.mapper.handle_frame(image, &pose, scale, t_s);
+        let placed = self.mapper.register(image, &pose, scale);
+        self.vehicle.handle_registration(&placed, now);
+        self.logbook.track.push(self.vehicle.vehicle().navigator().position().xy());
+        self.logbook.poses.push(FramePoses {
+            true_at: (self.motion.x_m, self.motion.y_m),
+            mapped_at: (placed.pose.x, placed.pose.y),
+        });
+        let update = self.mapper.handle_frame(image, &placed.pose, placed.scale, t_s);
         self.vehicle.handle_map(&update, now);
         self.vehicle.handle_exemplars(self.mapper.shared_exemplars());
         self.logbook.note_update(self.vehicle.vehicle(), update);

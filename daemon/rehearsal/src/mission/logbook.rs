@@ -10,6 +10,13 @@ use std::collections::BTreeMap;
 /// Start and end of a leg in the world frame.
 pub type Leg = ((f64, f64), (f64, f64));
 
+/// Where a camera frame was taken, in the world frame, and where the mapper placed it, in the map frame; metres.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct FramePoses {
+    pub(crate) true_at: (f64, f64),
+    pub(crate) mapped_at: (f64, f64),
+}
+
 /// The events of a mission that its report counts.
 #[derive(Default)]
 pub(crate) struct Logbook {
@@ -23,6 +30,8 @@ pub(crate) struct Logbook {
     pub(crate) legs_before_fence: usize,
     /// Estimated position of the vehicle at each frame that the mapper took.
     pub(crate) track: Vec<(f64, f64)>,
+    /// The true and the mapped place of each frame that the mapper took.
+    pub(crate) poses: Vec<FramePoses>,
     pub(crate) update: Option<MapUpdate>,
     /// Bytes that the map would have taken as a PNG file at each of its versions.
     pub(crate) png_full_bytes: u64,

@@ -1,5 +1,6 @@
 //! A mission in virtual time: both hosts, the medium between them, and the simulated world around them.
 
+mod accuracy;
 mod anchored;
 mod camera;
 mod carrier;

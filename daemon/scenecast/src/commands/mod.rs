@@ -4,24 +4,6 @@
 
 #[cfg(feature = "rehearsal")]
 mod bench;
-#[cfg(feature = "rehearsal")]
-mod bench_exemplar;
-#[cfg(feature = "rehearsal")]
-mod bench_link;
-#[cfg(feature = "rehearsal")]
-mod bench_localisation;
-#[cfg(feature = "rehearsal")]
-mod bench_modem;
-#[cfg(feature = "rehearsal")]
-mod bench_planning;
-#[cfg(feature = "rehearsal")]
-mod bench_restart;
-#[cfg(feature = "rehearsal")]
-mod bench_steering;
-#[cfg(feature = "rehearsal")]
-mod bench_stranger;
-#[cfg(feature = "rehearsal")]
-mod bench_wide;
 mod config;
 #[cfg(feature = "surface")]
 mod ctl;

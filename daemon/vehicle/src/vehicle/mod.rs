@@ -22,6 +22,7 @@ pub use storing::VehicleDisk;
 use super::failsafe::FailsafePolicy;
 use super::mapper::{MapUpdate, SharedExemplars};
 use super::navigator::Navigator;
+use super::registration::RegisteredFrame;
 use super::steering::Steering;
 use super::track::RecentTrack;
 use gallery::Gallery;
@@ -177,12 +178,19 @@ impl Vehicle {
         self.guidance.handle_travel(dx_m.hypot(dy_m));
     }
 
-    /// Sets the pose in the map frame from another source, such as a recorded mission.
+    /// Sets the dead-reckoned pose from another source, such as a recorded mission.
     pub fn set_pose(&mut self, x_m: f64, y_m: f64, heading_rad: f64, depth_m: f64, now: Instant) {
         let before = self.navigator.position();
         self.navigator.set_pose(x_m, y_m, heading_rad, depth_m, now);
         self.track.handle_place(self.navigator.position(), now);
-        self.guidance.handle_travel(before.distance_m(MapPoint { x_m, y_m }));
+        self.guidance.handle_travel(before.distance_m(self.navigator.position()));
+    }
+
+    /// The mapper has placed a camera frame on the map.
+    pub fn handle_registration(&mut self, frame: &RegisteredFrame, now: Instant) {
+        let placed = MapPoint { x_m: frame.pose.x, y_m: frame.pose.y };
+        self.navigator.handle_registration(frame.dead_reckoned, placed, frame.is_seen, now);
+        self.track.handle_place(self.navigator.position(), now);
     }
 
     /// No sensor measured the vehicle's motion for `time`. The distance that it could have gone adds to the position's

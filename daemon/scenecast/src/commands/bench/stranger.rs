@@ -17,7 +17,7 @@ const SHOWN: usize = 10;
 /// The exit code is 1 if a promise is broken. The same seed gives the same figures.
 #[derive(Debug, Args)]
 #[command(after_help = "Example: scenecast bench stranger --frames 20000")]
-pub(super) struct StrangerBench {
+pub(crate) struct StrangerBench {
     /// Print JSON instead of a table
     #[arg(long)]
     json: bool,

@@ -13,7 +13,7 @@ use std::path::PathBuf;
 /// The map arrives through the link, frame by frame, without loss. The same seed gives the same bytes.
 #[derive(Debug, Args)]
 #[command(after_help = "Example: scenecast bench wide --cells 250000 --box 5000")]
-pub(super) struct WideBench {
+pub(crate) struct WideBench {
     /// Print JSON instead of a table
     #[arg(long)]
     json: bool,

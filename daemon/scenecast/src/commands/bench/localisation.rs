@@ -1,6 +1,6 @@
 //! `scenecast bench localisation`
 
-use super::bench::SeedArguments;
+use super::SeedArguments;
 use clap::Args;
 use scenecast_core::UserError;
 use scenecast_files::write_whole;
@@ -13,7 +13,7 @@ use std::path::PathBuf;
 /// and errors that the surface cannot detect. It takes some seconds; the same seed gives the same table.
 #[derive(Debug, Args)]
 #[command(after_help = "Example: scenecast bench localisation --seed 3 --out tracks")]
-pub(super) struct LocalisationBench {
+pub(crate) struct LocalisationBench {
     /// Print JSON instead of a table
     #[arg(long)]
     json: bool,

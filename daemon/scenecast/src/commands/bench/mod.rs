@@ -1,18 +1,30 @@
 //! `scenecast bench`
 
-use super::bench_exemplar::ExemplarBench;
-use super::bench_link::LinkBench;
-use super::bench_localisation::LocalisationBench;
-use super::bench_modem::ModemBench;
-use super::bench_planning::PlanningBench;
-use super::bench_restart::RestartBench;
-use super::bench_steering::SteeringBench;
-use super::bench_stranger::StrangerBench;
-use super::bench_wide::WideBench;
+mod exemplar;
+mod link;
+mod localisation;
+mod modem;
+mod planning;
+mod registration;
+mod restart;
+mod steering;
+mod stranger;
+mod wide;
+
 use super::sim::WorldArguments;
 use clap::{Args, Subcommand};
+use exemplar::ExemplarBench;
+use link::LinkBench;
+use localisation::LocalisationBench;
+use modem::ModemBench;
+use planning::PlanningBench;
+use registration::RegistrationBench;
+use restart::RestartBench;
 use scenecast_core::UserError;
 use scenecast_rehearsal::{FidelityRow, fidelity};
+use steering::SteeringBench;
+use stranger::StrangerBench;
+use wide::WideBench;
 
 /// Reproducible measurements of the parts of scenecast.
 #[derive(Debug, Subcommand)]
@@ -29,6 +41,8 @@ pub(super) enum BenchCommand {
     Modem(ModemBench),
     /// The planners: utility collected per metre.
     Planning(PlanningBench),
+    /// Registration of camera frames: errors of their places, share of the sea floor that the map shows.
+    Registration(RegistrationBench),
     /// Restarts of both ends as processes: what is lost, the time to a full page.
     Restart(RestartBench),
     /// Steering: the camera's time over a weighed label, with and without the order.
@@ -71,6 +85,7 @@ impl BenchCommand {
             Self::Localisation(l) => l.run(),
             Self::Modem(m) => m.run(),
             Self::Planning(p) => p.run(),
+            Self::Registration(r) => r.run(),
             Self::Restart(r) => r.run(),
             Self::Steering(s) => s.run(),
             Self::Stranger(s) => s.run(),

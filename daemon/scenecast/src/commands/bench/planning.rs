@@ -1,6 +1,6 @@
 //! `scenecast bench planning`
 
-use super::bench::SeedArguments;
+use super::SeedArguments;
 use clap::Args;
 use scenecast_core::UserError;
 use scenecast_files::write_whole;
@@ -21,7 +21,7 @@ use std::path::PathBuf;
 /// few minutes; the same seed gives the same table.
 #[derive(Debug, Args)]
 #[command(after_help = "Example: scenecast bench planning --seed 3 --out tracks")]
-pub(super) struct PlanningBench {
+pub(crate) struct PlanningBench {
     /// Print JSON instead of a table
     #[arg(long)]
     json: bool,

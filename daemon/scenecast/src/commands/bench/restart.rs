@@ -12,7 +12,7 @@ use scenecast_rehearsal::restart_bench::{PAGE_LIMIT_S, RestartRun, RestartSettin
 /// such a run are kept.
 #[derive(Debug, Args)]
 #[command(after_help = "Example: scenecast bench restart --runs 5")]
-pub(super) struct RestartBench {
+pub(crate) struct RestartBench {
     /// Print JSON instead of a table
     #[arg(long)]
     json: bool,

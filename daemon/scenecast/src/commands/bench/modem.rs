@@ -10,7 +10,7 @@ use scenecast_tools::Progress;
 /// minutes through slow modems. The same seed gives the same table.
 #[derive(Debug, Args)]
 #[command(after_help = "Example: scenecast bench modem --seed 3 --json")]
-pub(super) struct ModemBench {
+pub(crate) struct ModemBench {
     /// Print JSON instead of a table
     #[arg(long)]
     json: bool,

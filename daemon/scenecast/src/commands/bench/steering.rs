@@ -1,6 +1,6 @@
 //! `scenecast bench steering`
 
-use super::bench::SeedArguments;
+use super::SeedArguments;
 use clap::Args;
 use scenecast_core::UserError;
 use scenecast_rehearsal::steering_bench::{SteeringFigures, SteeringPair, measure_steering};
@@ -18,7 +18,7 @@ use scenecast_tools::Progress;
 /// The exit code is 1 if the median gain is below 2 or a stay lasts a minute. The same seed gives the same figures.
 #[derive(Debug, Args)]
 #[command(after_help = "Example: scenecast bench steering --seeds 4 --seed 9")]
-pub(super) struct SteeringBench {
+pub(crate) struct SteeringBench {
     /// Print JSON instead of a table
     #[arg(long)]
     json: bool,

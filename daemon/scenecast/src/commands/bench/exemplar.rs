@@ -20,7 +20,7 @@ const REEFS: u64 = 6;
 /// pixel. It takes a minute or two; the same seed gives the same table.
 #[derive(Debug, Args)]
 #[command(after_help = "Example: scenecast bench exemplar --images photos --images more-photos")]
-pub(super) struct ExemplarBench {
+pub(crate) struct ExemplarBench {
     /// Print JSON instead of a table
     #[arg(long)]
     json: bool,

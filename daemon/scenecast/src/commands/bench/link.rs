@@ -9,7 +9,7 @@ use scenecast_tools::Progress;
 /// the surface. It takes less than a minute; the same seed gives the same table.
 #[derive(Debug, Args)]
 #[command(after_help = "Example: scenecast bench link --seed 3 --json")]
-pub(super) struct LinkBench {
+pub(crate) struct LinkBench {
     /// Print JSON, without the speed of this machine
     #[arg(long)]
     json: bool,

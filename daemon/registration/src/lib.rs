@@ -1,0 +1,34 @@
+//! Places camera frames on the map by their overlap with earlier frames. No IO.
+//!
+//! [`Registrar::handle_frame`] takes a frame with its pose by dead reckoning, compass and altitude, and returns its pose
+//! on the map. It matches the frame with the one before and with up to three older ones.
+
+mod altitude;
+mod camera_image;
+mod checkpoint;
+mod compass;
+mod consensus;
+mod correlate;
+mod fft;
+mod flat_field;
+mod kept_frames;
+mod odometry;
+mod pair;
+mod plane;
+mod pose;
+mod refine;
+mod registrar;
+#[cfg(test)]
+mod registrar_tests;
+mod similarity;
+#[cfg(test)]
+mod skerki_tests;
+mod tally;
+mod thumbnail;
+mod tiles;
+
+pub use camera_image::CameraImage;
+pub use checkpoint::RestoreError;
+pub use pose::FramePose;
+pub use registrar::{FrameInput, Placed, Registrar};
+pub use tally::Tally;

@@ -1,0 +1,110 @@
+//! Places camera frames by their overlap with earlier ones before they are mapped.
+
+use crate::mapper::Mapper;
+use image::RgbImage;
+use scene_model::project::Pose;
+use scenecast_protocol::coordinates::MapPoint;
+use scenecast_registration::{CameraImage, FrameInput, Registrar, Tally};
+
+/// Standard deviation of the position after a gap in dead reckoning, metres.
+const GAP_SIGMA_M: f64 = 3.0;
+
+/// A frame's place on the map.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RegisteredFrame {
+    pub pose: Pose,
+    /// The size of a pixel on the sea floor, divided by the configured size.
+    pub scale: f64,
+    /// The place by dead reckoning.
+    pub dead_reckoned: MapPoint,
+    /// Whether the frame overlaps with an earlier one, as the images show.
+    pub is_seen: bool,
+}
+
+impl Mapper {
+    /// Places a frame that was taken at `pose` by dead reckoning, compass and altitude; without registration, there.
+    ///
+    /// `scale` is the size of a pixel on the sea floor, divided by the configured size.
+    pub fn register(&mut self, image: &RgbImage, pose: &Pose, scale: f64) -> RegisteredFrame {
+        let dead_reckoned = MapPoint::new(pose.x, pose.y);
+        let unregistered = RegisteredFrame { pose: *pose, scale, dead_reckoned, is_seen: false };
+        let metres_per_pixel = scale * self.metres_per_pixel();
+        let image = CameraImage::rgb(image.width() as usize, image.height() as usize, image.as_raw());
+        let (Some(registrar), Some(image)) = (&mut self.registrar, image) else { return unregistered };
+        let input = FrameInput { image, metres_per_pixel, dead_reckoned, compass_rad: -pose.yaw_rad };
+        let placed = registrar.handle_frame(&input);
+        let (x, y) = placed.pose.at().xy();
+        RegisteredFrame {
+            pose: Pose { x, y, z: pose.z, yaw_rad: -placed.pose.heading_rad },
+            scale: scale * placed.pose.scale(),
+            is_seen: placed.is_chained || placed.loops > 0,
+            ..unregistered
+        }
+    }
+
+    /// The vehicle may have moved unmeasured, so that dead reckoning continues at another place.
+    pub fn handle_gap(&mut self) {
+        self.registrar.iter_mut().for_each(|registrar| registrar.handle_gap(GAP_SIGMA_M));
+    }
+
+    /// The evidence of the registration so far; `None` without registration.
+    pub fn registration(&self) -> Option<Tally> {
+        self.registrar.as_ref().map(Registrar::tally)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Restored;
+    use image::Rgb;
+    use scenecast_config::Config;
+
+    fn config(sets: &[&str]) -> Config {
+        let sets: Vec<String> = sets.iter().map(|set| (*set).to_owned()).collect();
+        scenecast_config::load(None, &sets).unwrap()
+    }
+
+    /// A frame of a floor of blotches, taken `at` metres north of the start.
+    fn frame(at: f64) -> RgbImage {
+        RgbImage::from_fn(320, 240, |x, y| {
+            let (column, row) = (x / 12, ((f64::from(y) - 100.0 * at + 4000.0) / 12.0) as u32);
+            let bits = (column.wrapping_mul(0x9E37_79B9) ^ row.wrapping_mul(0x85EB_CA6B)).wrapping_mul(0xC2B2_AE35);
+            Rgb([(bits >> 24) as u8; 3])
+        })
+    }
+
+    /// The vehicle moves 0.48 m a frame, and believes that it moves 0.50 m.
+    fn step(mapper: &mut Mapper, i: u32) -> RegisteredFrame {
+        let pose = Pose { x: 0.0, y: 0.5 * f64::from(i), z: -16.0, yaw_rad: 0.0 };
+        mapper.register(&frame(0.48 * f64::from(i)), &pose, 1.0)
+    }
+
+    #[test]
+    fn frames_are_placed_where_the_images_show_them() {
+        let mut mapper = Mapper::new(&config(&["navigation.drift_percent=5"]), None, 0, 1).unwrap();
+        let last = (0..12).map(|i| step(&mut mapper, i)).last().unwrap();
+        assert!(last.is_seen && (last.pose.y - 0.48 * 11.0).abs() < 0.02, "{last:?}");
+        assert_eq!((last.dead_reckoned, last.pose.z), (MapPoint::new(0.0, 5.5), -16.0));
+        assert_eq!(mapper.registration().unwrap().chained, 11);
+    }
+
+    #[test]
+    fn a_restored_mapper_places_frames_like_the_saved_one() {
+        let config = config(&["navigation.drift_percent=5"]);
+        let mut whole = Mapper::new(&config, None, 0, 1).unwrap();
+        for i in 0..6 {
+            step(&mut whole, i);
+        }
+        let Restored { mapper: mut restored, .. } = Mapper::restore(&config, None, &whole.save(1)).unwrap();
+        (6..12).for_each(|i| assert_eq!(step(&mut restored, i), step(&mut whole, i)));
+    }
+
+    #[test]
+    fn without_registration_frames_stay_where_dead_reckoning_places_them() {
+        let mut mapper = Mapper::new(&config(&["registration.enabled=false"]), None, 0, 1).unwrap();
+        let last = (0..4).map(|i| step(&mut mapper, i)).last().unwrap();
+        assert_eq!((last.pose.y, last.scale, last.is_seen), (1.5, 1.0, false));
+        assert_eq!(mapper.registration(), None);
+    }
+}
