@@ -5,11 +5,9 @@
 
 #![allow(clippy::disallowed_methods, reason = "an example reads files")]
 
-#[path = "flights/fit.rs"]
-mod fit;
-
 use scenecast_protocol::coordinates::MapPoint;
 use scenecast_registration::{CameraImage, FrameInput, Registrar};
+use scenecast_scoring::{PointPair, RigidFit, rms_distance};
 use std::path::Path;
 
 /// A frame with its given pose.
@@ -55,7 +53,7 @@ fn place(
     let (scale, turn) = (1.0 + drift * normal(), drift * normal());
     let mut registrar = Registrar::new(drift);
     let (mut dead, mut before) = ((0.0, 0.0), None::<(f64, f64)>);
-    let [mut truth, mut believed, mut placed] = [const { Vec::new() }; 3];
+    let [mut believed, mut placed] = [const { Vec::new() }; 2];
     for given in frames {
         let at = (given.x, -given.y);
         let (dx, dy) = before.map_or((0.0, 0.0), |b| (at.0 - b.0, at.1 - b.1));
@@ -70,17 +68,12 @@ fn place(
             dead_reckoned: MapPoint::new(dead.0, dead.1),
             compass_rad: (given.yaw_deg + compass_deg * normal()).to_radians(),
         });
-        truth.push(at);
-        believed.push(dead);
-        placed.push(placed_frame.pose.at().xy());
+        believed.push((dead, at));
+        placed.push((placed_frame.pose.at().xy(), at));
     }
-    let rms = |track: &[(f64, f64)]| {
-        let errors = fit::rigid_errors(track, &truth);
-        if std::env::var_os("ERRORS").is_some() {
-            errors.iter().for_each(|error| eprint!("{error:.0} "));
-            eprintln!();
-        }
-        (errors.iter().map(|e| e * e).sum::<f64>() / errors.len() as f64).sqrt()
+    let rms = |track: &[PointPair]| {
+        let fit = RigidFit::new(track);
+        rms_distance(track.iter().map(|&(at, truth)| (fit.apply(at), truth)))
     };
     (rms(&believed), rms(&placed), registrar.tally())
 }

@@ -22,7 +22,6 @@ pub mod planning_bench;
 pub mod registration_bench;
 mod report;
 pub mod restart_bench;
-mod rigid;
 mod script;
 mod simulated_autopilot;
 pub mod steering_bench;

@@ -1,4 +1,4 @@
-//! Scores label maps against expert annotations, and trains vocabularies. Offline work: no vehicle needs it, and it
+//! Scores label maps against expert annotations and tracks against true ones, and trains vocabularies. Offline work: no vehicle needs it, and it
 //! does no IO.
 //!
 //! On a small scene, mutual information alone is misleading: any map made of patches has some mutual information with
@@ -24,6 +24,7 @@ mod k_means;
 mod label_grid;
 mod mutual_information;
 mod null;
+mod rigid_fit;
 mod training;
 mod trial;
 
@@ -32,5 +33,6 @@ pub use baselines::mosaic_classes;
 pub use label_grid::LabelGrid;
 pub use mutual_information::{MutualInformation, mutual_information_nats};
 pub use null::{SceneScore, score};
+pub use rigid_fit::{PointPair, RigidFit, rms_distance};
 pub use training::train_vocabulary;
 pub use trial::{AnnotatedScene, MeanScore, Method, Trial, TrialError};

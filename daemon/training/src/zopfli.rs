@@ -1,4 +1,4 @@
-//! Deflate streams of the reference PNG files.
+//! Deflate streams of the PNG files that a codec is compared with.
 
 use flate2::Compression;
 use flate2::write::DeflateEncoder;
@@ -7,7 +7,7 @@ use std::io::Write;
 use std::num::NonZeroU64;
 
 /// Iterations without a gain after which zopfli stops; more of them save less than 0.1 %.
-const PATIENCE: NonZeroU64 = NonZeroU64::new(3).expect("three is not zero");
+const MAX_ITERATIONS_WITHOUT_GAIN: NonZeroU64 = NonZeroU64::new(3).expect("three is not zero");
 
 /// zlib's best level first, then zopfli.
 pub struct Zopfli;
@@ -22,7 +22,8 @@ impl Deflate for Zopfli {
 
     fn shortest(&mut self, data: &[u8]) -> usize {
         let mut counted = Counted(0);
-        let options = zopfli::Options { iterations_without_improvement: PATIENCE, ..Default::default() };
+        let options =
+            zopfli::Options { iterations_without_improvement: MAX_ITERATIONS_WITHOUT_GAIN, ..Default::default() };
         // Neither memory nor counting fails.
         let _ = zopfli::compress(options, zopfli::Format::Deflate, data, &mut counted);
         counted.0

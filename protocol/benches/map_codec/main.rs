@@ -6,14 +6,13 @@
 
 mod large;
 mod real;
-mod zopfli;
 
 use cpu_time::ThreadTime;
 use scenecast_protocol::map::LabelGrid;
 use scenecast_protocol::map_codec::{Codec, LabelRaster, decode, encode_all};
+use scenecast_training::Zopfli;
 use scenecast_training::{Flips, MapRng, MapScene, Survey};
 use std::time::Duration;
-use zopfli::Zopfli;
 
 const ROOMS: [usize; 3] = [64, 256, 1000];
 const SIDE: usize = 192;

@@ -1,10 +1,10 @@
 //! One flight: a lawnmower survey of 600 s with a camera of 6.4 x 4.8 m at 0.5 frames/s.
 
-use crate::fit::rigid_errors;
 use crate::floor::{Floor, View};
 use scenecast_motion::Motion;
 use scenecast_protocol::coordinates::MapPoint;
 use scenecast_registration::{CameraImage, FrameInput, Registrar, Tally};
+use scenecast_scoring::{PointPair, RigidFit};
 use std::time::Instant;
 
 /// The conditions of a flight.
@@ -84,7 +84,7 @@ pub fn fly(floor: &Floor, case: &Case, seed: u64) -> Outcome {
     let (mut dead, mut offset) = (legs[0], (0.0, 0.0));
     let mut next = 1;
     let phase = random.unit() * std::f64::consts::TAU;
-    let [mut truth, mut believed, mut placed] = [const { Vec::new() }; 3];
+    let [mut believed, mut placed] = [const { Vec::new() }; 2];
     let mut times = Vec::new();
     for frame in 0..case.frames {
         for _ in 0..if frame == 0 { 0 } else { 4 } {
@@ -109,25 +109,38 @@ pub fn fly(floor: &Floor, case: &Case, seed: u64) -> Outcome {
         let pose = registrar.handle_frame(&input).pose;
         times.push(start.elapsed().as_secs_f64() * 1e3);
         offset = (pose.at().x_m - dead.0, pose.at().y_m - dead.1);
-        truth.push((motion.x_m, motion.y_m));
-        believed.push(dead);
-        placed.push(pose.at().xy());
+        let true_at = (motion.x_m, motion.y_m);
+        believed.push((dead, true_at));
+        placed.push((pose.at().xy(), true_at));
     }
-    let rms = |errors: &[f64]| (errors.iter().map(|e| e * e).sum::<f64>() / errors.len() as f64).sqrt() / CELL_M;
-    let mut errors = rigid_errors(&placed, &truth);
-    let placed = rms(&errors);
+    let mut errors = errors_cells(&placed);
     if std::env::var_os("ERRORS").is_some() {
-        errors.iter().enumerate().for_each(|(i, error)| eprintln!("{i} {:.3}", error / CELL_M));
+        errors.iter().enumerate().for_each(|(i, error)| eprintln!("{i} {error:.3}"));
     }
+    let placed = rms(&errors);
     errors.sort_by(f64::total_cmp);
     Outcome {
-        dead: rms(&rigid_errors(&believed, &truth)),
+        dead: rms(&errors_cells(&believed)),
         placed,
-        p95: errors[errors.len() * 95 / 100] / CELL_M,
+        p95: errors[errors.len() * 95 / 100],
         ms: times.iter().sum::<f64>() / times.len() as f64,
         slowest_ms: times.iter().copied().fold(0.0, f64::max),
         tally: registrar.tally(),
     }
+}
+
+/// The distance of each point from its true place after the best rigid fit of all, cells.
+fn errors_cells(track: &[PointPair]) -> Vec<f64> {
+    let fit = RigidFit::new(track);
+    let distance = |&(at, (x, y)): &PointPair| {
+        let (fit_x, fit_y) = fit.apply(at);
+        (fit_x - x).hypot(fit_y - y) / CELL_M
+    };
+    track.iter().map(distance).collect()
+}
+
+fn rms(errors: &[f64]) -> f64 {
+    (errors.iter().map(|e| e * e).sum::<f64>() / errors.len() as f64).sqrt()
 }
 
 /// Amplitude times a harmonic of the heading, radians.

@@ -6,7 +6,6 @@
 
 #![allow(clippy::disallowed_methods, reason = "an example reads files and measures its duration")]
 
-mod fit;
 mod flight;
 mod floor;
 

@@ -1,10 +1,9 @@
 //! How true the map of a mission is: the errors of its frames, and its mutual information with the sea floor.
 
 use super::Mission;
-use crate::rigid::{Rigid, rms};
 use scenecast_protocol::coordinates::{MapPoint, WorldPoint};
 use scenecast_protocol::map::{Cell, LabelGrid};
-use scenecast_scoring::mutual_information_nats;
+use scenecast_scoring::{RigidFit, mutual_information_nats, rms_distance};
 
 /// Root mean square errors of the places of all frames, metres.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -29,12 +28,12 @@ impl Mission {
         if self.camera.is_recorded() || pairs.is_empty() {
             return None;
         }
-        let fit = Rigid::fit(&pairs);
+        let fit = RigidFit::new(&pairs);
         let navigator = self.vehicle().navigator();
         let placed = |(x_m, y_m): (f64, f64)| navigator.to_world(MapPoint { x_m, y_m }).xy();
         Some(FrameErrors {
-            rigid_m: rms(pairs.iter().map(|&(mapped, truth)| (fit.apply(mapped), truth))),
-            placed_m: rms(pairs.iter().map(|&(mapped, truth)| (placed(mapped), truth))),
+            rigid_m: rms_distance(pairs.iter().map(|&(mapped, truth)| (fit.apply(mapped), truth))),
+            placed_m: rms_distance(pairs.iter().map(|&(mapped, truth)| (placed(mapped), truth))),
         })
     }
 
@@ -44,7 +43,7 @@ impl Mission {
             return None;
         }
         let to_map: Vec<_> = self.logbook.poses.iter().map(|poses| (poses.true_at, poses.mapped_at)).collect();
-        let fit = Rigid::fit(&to_map);
+        let fit = RigidFit::new(&to_map);
         let navigator = self.vehicle().navigator();
         let placed = |(east_m, north_m): (f64, f64)| navigator.to_map(WorldPoint { east_m, north_m }).xy();
         Some(MapInformation {

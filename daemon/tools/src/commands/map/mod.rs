@@ -6,7 +6,6 @@ mod decode;
 mod encode;
 mod files;
 mod train;
-mod zopfli;
 
 use clap::{Args, Subcommand};
 use scenecast_core::UserError;
