@@ -64,7 +64,7 @@ pub struct Master {
 impl Master {
     const ROUND_TRIPS: usize = 4;
     /// Unanswered grants above which an answer is waited for longer: the vehicle may be farther away than assumed.
-    const NEAR_DOUBTS: u32 = 4;
+    const MAX_UNANSWERED_NEARBY: u32 = 4;
 
     /// A master that may grant its first turn at `now`.
     pub fn new(config: MasterConfig, now: Instant) -> Self {
@@ -166,7 +166,7 @@ impl Master {
         let doubts = if profile.access == Access::Polled {
             0
         } else {
-            self.unanswered.saturating_sub(Self::NEAR_DOUBTS).min(10)
+            self.unanswered.saturating_sub(Self::MAX_UNANSWERED_NEARBY).min(10)
         };
         let patience = Duration::from_secs(1) * doubts;
         let frames = if self.is_saturated { losable + 1 } else { 1 };
@@ -221,7 +221,7 @@ impl Master {
     /// A frame of the vehicle came in that announces `remaining` further frames and belongs to another pair of runs: the
     /// vehicle hears the grants, although it does not answer them.
     pub fn handle_stray(&mut self, remaining: u8, profile: &ModemProfile, now: Instant) {
-        self.unanswered = self.unanswered.min(Self::NEAR_DOUBTS);
+        self.unanswered = self.unanswered.min(Self::MAX_UNANSWERED_NEARBY);
         let end = now + self.rest_of_turn(remaining, profile);
         if let MediumState::Granted { until, .. } = &mut self.state {
             *until = (*until).min(end);

@@ -13,7 +13,7 @@ pub trait Deflate {
 
 /// An image whose quick length is more than the shortest quick one by this factor is not compressed again: the best
 /// compressors save 3 to 8 % of a quick stream.
-const WORTH_TRYING: f64 = 1.1;
+const MAX_QUICK_RATIO: f64 = 1.1;
 
 /// One way to write a map as an indexed PNG.
 struct PngImage {
@@ -64,7 +64,7 @@ impl LabelRaster {
 /// Bytes of the smallest file.
 fn smallest(images: &[PngImage], deflate: &mut impl Deflate) -> usize {
     let quick: Vec<usize> = images.iter().map(|image| deflate.quick(&image.scanlines)).collect();
-    let limit = quick.iter().min().map_or(0.0, |&least| least as f64 * WORTH_TRYING);
+    let limit = quick.iter().min().map_or(0.0, |&least| least as f64 * MAX_QUICK_RATIO);
     let tried = images.iter().zip(&quick).filter(|(_, quick)| **quick as f64 <= limit);
     let sizes = tried.map(|(image, _)| image.container_bytes + deflate.shortest(&image.scanlines));
     sizes.min().unwrap_or(0)

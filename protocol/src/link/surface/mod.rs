@@ -121,8 +121,8 @@ impl<R: StateReplica> SurfaceLink<R> {
         true
     }
 
-    /// Puts the contents of [`PeerView::in_force_memory`] of an earlier run of the surface back. They count once a report of the vehicle
-    /// confirms their digests.
+    /// Takes the contents of [`PeerView::in_force_memory`] of an earlier run of the surface. They count once a report of the
+    /// vehicle confirms their digests.
     pub fn restore_in_force(&mut self, vehicle: Address, contents: impl IntoIterator<Item = Slot>) {
         let Some(peer) = self.fleet.get_mut(vehicle) else { return };
         peer.restore_in_force(contents);

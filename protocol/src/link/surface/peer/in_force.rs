@@ -29,9 +29,8 @@ pub(super) struct InForceCopy {
     confirmed: PerSlot<bool>,
     /// Whether the vehicle has put a slot in force since its last summary.
     decided: PerSlot<bool>,
-    /// The content before a slot was decided.
-    before: PerSlot<Option<Slot>>,
-    /// Contents that may be in force: those of orders that were replaced before their decision came in.
+    /// Contents that may be in force: those of orders that were replaced before their decision came in, and those that a
+    /// decision replaced before the vehicle did.
     candidates: PerSlot<Vec<Slot>>,
     /// Whether a report has proved that the last applied order of a slot was in force.
     proved: PerSlot<bool>,
@@ -78,17 +77,18 @@ impl InForceCopy {
     /// An order is in force now, by the vehicle's decision or by what an earlier run of the surface knew.
     pub(super) fn apply(&mut self, order: &SlotProgress) {
         let Some(held) = self.held.get_mut(order.id).filter(|_| order.status == OrderStatus::Applied) else { return };
-        if let Some(before) = self.before.get_mut(order.id).filter(|_| self.decided.get(order.id) == Some(&false)) {
-            before.clone_from(held);
-        }
+        let former = held.clone();
         *held = joined(&order.slot, held.take());
+        if let Some(candidates) =
+            self.candidates.get_mut(order.id).filter(|_| self.decided.get(order.id) == Some(&false))
+        {
+            candidates.clear();
+        }
+        self.add_candidate(order.id, former);
         for (of_slot, is_so) in [(&mut self.decided, true), (&mut self.proved, false), (&mut self.confirmed, false)] {
             if let Some(of_slot) = of_slot.get_mut(order.id) {
                 *of_slot = is_so;
             }
-        }
-        if let Some(candidates) = self.candidates.get_mut(order.id) {
-            candidates.clear();
         }
     }
 
@@ -120,7 +120,8 @@ impl InForceCopy {
 
     fn add_candidate(&mut self, id: SlotId, content: Option<Slot>) {
         let (Some(content), Some(candidates)) = (content, self.candidates.get_mut(id)) else { return };
-        if !candidates.contains(&content) {
+        let is_held = self.held.get(id).is_some_and(|held| held.as_ref() == Some(&content));
+        if !is_held && !candidates.contains(&content) {
             candidates.push(content);
             let surplus = candidates.len().saturating_sub(Self::MAX_CANDIDATES);
             candidates.drain(..surplus);
@@ -158,9 +159,9 @@ impl InForceCopy {
         }
         let is_same = self.reported.is_some_and(|(before, _)| before == summary);
         self.reported = Some((summary, number));
-        let decided = std::mem::take(&mut self.decided);
+        self.decided = PerSlot::default();
         let is_proved = self.digests().summary() == summary;
-        let is_equal = is_proved || self.is_unchanged(&decided, summary) || self.is_of_candidates(pending, summary);
+        let is_equal = is_proved || self.is_of_candidates(pending, summary);
         let was_equal = std::mem::replace(&mut self.is_equal, is_equal);
         if !is_same || self.is_equal {
             self.confirmed = PerSlot::default();
@@ -173,27 +174,9 @@ impl InForceCopy {
         }
     }
 
-    /// Whether the contents before the decisions are still in force, by a summary after them; they are held again if so.
-    fn is_unchanged(&mut self, decided: &PerSlot<bool>, summary: InForceSummary) -> bool {
-        let held = PerSlot::from_fn(|id| {
-            let from = if decided.get(id) == Some(&true) { &self.before } else { &self.held };
-            from.get(id).cloned().flatten()
-        });
-        let now_held = std::mem::replace(&mut self.held, held);
-        let is_unchanged = self.digests().summary() == summary;
-        if is_unchanged {
-            // The decision may have come in before the content was put in force.
-            let decided = decided.iter().filter(|(_, is_decided)| **is_decided).map(|(id, _)| id);
-            decided.for_each(|id| self.add_candidate(id, now_held.get(id).cloned().flatten()));
-        } else {
-            self.held = now_held;
-        }
-        is_unchanged
-    }
-
     /// Whether the contents in force are those that are held with some of the pending orders and of the candidates; they are
-    /// held then. So an order whose decision follows in a later frame, was reported to an earlier run of the surface, or never
-    /// came in because a newer order replaced it, makes nothing unknown.
+    /// held then. So an order makes nothing unknown if its decision comes in before it is in force, follows in a later frame,
+    /// was reported to an earlier run of the surface, or never comes in because a newer order replaced it.
     fn is_of_candidates(&mut self, pending: &[Slot], summary: InForceSummary) -> bool {
         let options = PerSlot::from_fn(|id| self.options(id, pending, summary));
         let combinations =
@@ -210,6 +193,7 @@ impl InForceCopy {
                 }
             }
             if self.digests().summary() == summary {
+                before.iter().for_each(|(id, former)| self.add_candidate(id, former.clone()));
                 return true;
             }
         }
