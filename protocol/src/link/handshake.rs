@@ -1,6 +1,7 @@
 //! The handshake: which run of the peer this end communicates with. A hello names a run, and
 //! a numbered frame proves it.
 
+use super::FrameNumber;
 use super::run::{EndedPeer, Identity, LinkRun};
 use crate::seal::{Direction, SessionKey};
 use crate::wire::{Envelope, Frame, Introduction, MissionId, SessionId};
@@ -56,6 +57,8 @@ pub(super) struct Handshake<T> {
     offered: Vec<LinkRun<T>>,
     /// At the surface: the offered run whose hello came in last, until a proof goes out.
     unproved: Option<Identity>,
+    /// At the surface: the number in the current run of the next frame when an offer last came in or a proof went out.
+    doubted_from: FrameNumber,
     /// At the vehicle: `run` serves only to receive grants, because this end has begun a new one.
     leaving: bool,
     retired: VecDeque<EndedPeer>,
@@ -74,7 +77,16 @@ impl<T> Handshake<T> {
     pub(super) fn new(seed: u64) -> Self {
         let mut random = seed;
         let own = fresh(&mut random);
-        Self { own, run: None, offered: Vec::new(), unproved: None, leaving: false, retired: VecDeque::new(), random }
+        Self {
+            own,
+            run: None,
+            offered: Vec::new(),
+            unproved: None,
+            doubted_from: 0,
+            leaving: false,
+            retired: VecDeque::new(),
+            random,
+        }
     }
 
     pub(super) fn own(&self) -> Identity {
@@ -110,6 +122,12 @@ impl<T> Handshake<T> {
     /// A proof was written.
     pub(super) fn note_proof(&mut self) {
         self.unproved = None;
+        self.doubt();
+    }
+
+    /// Frames of ours from here on show that the vehicle uses the current run, if it acknowledges them.
+    fn doubt(&mut self) {
+        self.doubted_from = self.run.as_ref().map_or(0, |r| r.flight.next_number());
     }
 
     /// The number of proofs that were written in all offered runs.
@@ -173,9 +191,12 @@ impl<T> Handshake<T> {
         }
     }
 
-    /// At the surface: a frame of the current run came in, so the vehicle uses no other.
-    pub(super) fn refuse_offered(&mut self) {
-        self.offered.clear();
+    /// At the surface: a frame of the current run came in. The vehicle uses no other run if it acknowledges a frame that went
+    /// out after the last offer and the last proof; any other frame may be a late one, of before the vehicle took a proof.
+    pub(super) fn handle_current(&mut self) {
+        if self.run.as_ref().is_some_and(|r| r.flight.horizon() >= self.doubted_from) {
+            self.offered.clear();
+        }
     }
 
     /// Makes an offered run the current one, because a numbered frame of it came in.
@@ -214,6 +235,7 @@ impl<T> Handshake<T> {
         }
         self.offered.push(offer);
         self.unproved = Some(peer);
+        self.doubt();
         HandshakeOutcome::Offered
     }
 

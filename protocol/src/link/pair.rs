@@ -395,6 +395,52 @@ mod tests {
     }
 
     #[test]
+    fn a_late_frame_of_the_former_run_does_not_cost_the_run_that_the_vehicle_took() {
+        let key = Arc::new(MissionKey::from_bytes([9; 16]));
+        let authenticity = Some(Authenticity { key, all: true, encrypt: false });
+        let auv = Address::vehicle(3).unwrap();
+        let introduction = Introduction { series: Some(Series::from_random(1)), ..Introduction::default() };
+        let end = |us, peer, seed| LinkPair::new(MissionId(1), us, peer, authenticity.clone(), introduction, seed);
+        let (mut surface, mut before) = (end(Address::SURFACE, auv, 1), end(auv, Address::SURFACE, 2));
+        let hello = sent(&mut surface, FramePurpose::Hello);
+        received(&mut before, &hello).unwrap();
+        received(&mut surface, &sent(&mut before, FramePurpose::Hello)).unwrap();
+        received(&mut before, &sent(&mut surface, FramePurpose::Content)).unwrap();
+        received(&mut surface, &sent(&mut before, FramePurpose::Content)).unwrap();
+        let late = sent(&mut before, FramePurpose::Content);
+
+        // The vehicle restarts and takes the proof. A frame of its former run comes in before its first one.
+        let mut vehicle = end(auv, Address::SURFACE, 3);
+        received(&mut vehicle, &hello).unwrap();
+        received(&mut surface, &sent(&mut vehicle, FramePurpose::Hello)).unwrap();
+        received(&mut vehicle, &sent(&mut surface, FramePurpose::Proof)).unwrap();
+        received(&mut surface, &late).unwrap();
+        received(&mut surface, &sent(&mut vehicle, FramePurpose::Content)).unwrap();
+        assert!(surface.is_proven() && surface.highest() == 1);
+        received(&mut vehicle, &sent(&mut surface, FramePurpose::Content)).unwrap();
+    }
+
+    #[test]
+    fn an_acknowledgement_in_the_current_run_ends_the_offers_of_before() {
+        let auv = Address::vehicle(3).unwrap();
+        let introduction = Introduction { series: Some(Series::from_random(1)), ..Introduction::default() };
+        let end = |us, peer, seed| LinkPair::new(MissionId(1), us, peer, None, introduction, seed);
+        let (mut surface, mut vehicle) = (end(Address::SURFACE, auv, 1), end(auv, Address::SURFACE, 2));
+        let hello = sent(&mut surface, FramePurpose::Hello);
+        received(&mut vehicle, &hello).unwrap();
+        received(&mut surface, &sent(&mut vehicle, FramePurpose::Hello)).unwrap();
+        received(&mut vehicle, &sent(&mut surface, FramePurpose::Content)).unwrap();
+        let mut forger = end(auv, Address::SURFACE, 3);
+        received(&mut forger, &hello).unwrap();
+        received(&mut surface, &sent(&mut forger, FramePurpose::Hello)).unwrap();
+        received(&mut surface, &sent(&mut vehicle, FramePurpose::Content)).unwrap();
+        assert!(surface.has_offer(), "the frame may have been sent before the offer");
+        received(&mut vehicle, &sent(&mut surface, FramePurpose::Content)).unwrap();
+        received(&mut surface, &sent(&mut vehicle, FramePurpose::Content)).unwrap();
+        assert!(!surface.has_offer());
+    }
+
+    #[test]
     fn a_forged_hello_of_another_version_leaves_the_true_series() {
         let auv = Address::vehicle(3).unwrap();
         let introduction = Introduction { series: Some(Series::from_random(1)), ..Introduction::default() };

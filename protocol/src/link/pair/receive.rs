@@ -156,7 +156,7 @@ impl<T> LinkPair<T> {
         };
         self.strays = 0;
         if self.us == Address::SURFACE && inbound.number.is_some() {
-            self.handshake.refuse_offered();
+            self.handshake.handle_current();
         }
         Ok(inbound)
     }
