@@ -62,6 +62,7 @@ impl<R: StateReplica> SurfaceLink<R> {
         let modem = self.config.modem;
         let purpose = match is_hello_due(peer.master.unanswered()) || peer.is_full() {
             true => FramePurpose::Hello,
+            false if peer.seems_elsewhere() => FramePurpose::Hello,
             false if peer.is_proof_due() => FramePurpose::Proof,
             false => FramePurpose::Content,
         };

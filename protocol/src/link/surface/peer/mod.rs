@@ -168,6 +168,11 @@ impl<R: StateReplica> VehiclePeer<R> {
         self.pair.has_offer() && self.contact.is_doubtful && self.last_turn.purpose != FramePurpose::Proof
     }
 
+    /// Whether the vehicle answers in a run that is not known here, so that no numbered frame of ours reaches it.
+    pub(super) fn seems_elsewhere(&self) -> bool {
+        self.pair.strays() > 0 && self.master.unanswered() > 0 && !self.pair.has_offer()
+    }
+
     /// Counts a frame that was dropped.
     pub(super) fn drop_frame(&mut self, reason: DropReason) {
         self.pair.stats.drop(reason);
