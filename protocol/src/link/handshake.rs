@@ -199,12 +199,16 @@ impl<T> Handshake<T> {
         }
     }
 
-    /// Makes an offered run the current one, because a numbered frame of it came in.
+    /// Makes an offered run the current one, because a numbered frame of it came in. Later offers remain: the frame may be a
+    /// late one, of before the vehicle took another proof.
     pub(super) fn accept_offered(&mut self, index: usize) {
-        if let Some(run) = std::mem::take(&mut self.offered).into_iter().nth(index) {
+        let mut runs = std::mem::take(&mut self.offered).into_iter().skip(index);
+        if let Some(run) = runs.next() {
+            self.offered = runs.collect();
             self.own = run.own;
             self.leaving = false;
             self.replace(run);
+            self.doubt();
         }
     }
 

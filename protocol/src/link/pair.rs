@@ -12,6 +12,14 @@ use crate::directive::Series;
 use crate::seal::{Direction, SessionKey, TAG_BYTES};
 use crate::wire::{Address, ChunkKind, FrameBuilder, FrameKind, Header, Introduction, MissionId, Seal, Stamp};
 
+/// Refused frames since the last accepted one that are a sign of other runs.
+#[derive(Debug, Default)]
+struct Strays {
+    count: u32,
+    /// Whether one of them was sent in a run that is unknown here.
+    of_unknown_run: bool,
+}
+
 /// Handshake, flight, window and counters toward one peer. `T` is the content of a sent frame.
 #[derive(Debug)]
 pub struct LinkPair<T> {
@@ -25,8 +33,7 @@ pub struct LinkPair<T> {
     mismatch: MismatchReport,
     /// At the vehicle: the next frame is a hello, although there is a run.
     owes_hello: bool,
-    /// Consecutive frames that seem to come from another run of the peer.
-    strays: u32,
+    strays: Strays,
     /// At the vehicle: hellos of ended runs of the surface since the last frame that was accepted.
     ended_hellos: u32,
     /// Counters and estimates of this link.
@@ -58,7 +65,7 @@ impl<T> LinkPair<T> {
             handshake,
             mismatch,
             owes_hello: false,
-            strays: 0,
+            strays: Strays::default(),
             ended_hellos: 0,
             stats,
         }
@@ -146,12 +153,17 @@ impl<T> LinkPair<T> {
 
     /// Whether the peer seems to use other runs than this end does.
     pub fn seems_out_of_step(&self) -> bool {
-        self.strays >= Self::STRAYS
+        self.strays.count >= Self::STRAYS
+    }
+
+    /// Whether a frame has come in since the last accepted one that the peer seems to have sent in a run that is unknown here.
+    pub(super) fn hears_unknown_run(&self) -> bool {
+        self.strays.of_unknown_run
     }
 
     /// The number of frames since the last accepted one that are a sign of other runs.
     pub(super) fn strays(&self) -> u32 {
-        self.strays
+        self.strays.count
     }
 
     /// The highest frame number received, 0 before the first.
@@ -282,7 +294,7 @@ impl<T> LinkPair<T> {
     /// Begins a new run toward the peer, because the states of the two ends do not agree.
     pub fn renew(&mut self) {
         self.stats.resyncs += 1;
-        self.strays = 0;
+        self.strays = Strays::default();
         if self.us == Address::SURFACE {
             self.handshake.renew_surface();
         } else {
@@ -418,6 +430,33 @@ mod tests {
         received(&mut surface, &sent(&mut vehicle, FramePurpose::Content)).unwrap();
         assert!(surface.is_proven() && surface.highest() == 1);
         received(&mut vehicle, &sent(&mut surface, FramePurpose::Content)).unwrap();
+    }
+
+    #[test]
+    fn a_late_frame_of_an_offered_run_does_not_cost_the_run_that_was_offered_after_it() {
+        let key = Arc::new(MissionKey::from_bytes([9; 16]));
+        let authenticity = Some(Authenticity { key, all: true, encrypt: false });
+        let auv = Address::vehicle(3).unwrap();
+        let introduction = Introduction { series: Some(Series::from_random(1)), ..Introduction::default() };
+        let end = |us, peer, seed| LinkPair::new(MissionId(1), us, peer, authenticity.clone(), introduction, seed);
+        let mut surface = end(Address::SURFACE, auv, 1);
+        let hello = sent(&mut surface, FramePurpose::Hello);
+        let mut late = Vec::new();
+        for (seed, purpose) in [(2, FramePurpose::Content), (3, FramePurpose::Proof), (4, FramePurpose::Proof)] {
+            let mut vehicle = end(auv, Address::SURFACE, seed);
+            received(&mut vehicle, &hello).unwrap();
+            received(&mut surface, &sent(&mut vehicle, FramePurpose::Hello)).unwrap();
+            received(&mut vehicle, &sent(&mut surface, purpose)).unwrap();
+            match seed {
+                3 => late = sent(&mut vehicle, FramePurpose::Content),
+                4 => received(&mut surface, &late).unwrap(),
+                _ => {}
+            }
+            if seed != 3 {
+                received(&mut surface, &sent(&mut vehicle, FramePurpose::Content)).unwrap();
+                received(&mut vehicle, &sent(&mut surface, FramePurpose::Content)).unwrap();
+            }
+        }
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! Received frames of one peer: hellos, numbered frames, and the reason for which a frame is dropped.
 
-use super::{LinkPair, session_key};
+use super::{LinkPair, Strays, session_key};
 use crate::link::handshake::HandshakeOutcome;
 use crate::link::mismatch::Mismatch;
 use crate::link::run::Identity;
@@ -94,7 +94,7 @@ impl<T> LinkPair<T> {
         if outcome == HandshakeOutcome::Retired {
             self.ended_hellos += 1;
             // Where frames of the vehicle have no tag, a forged one may have proven a false run.
-            self.strays += u32::from(own.is_some() && !self.is_keyed(self.direction_in()));
+            self.strays.count += u32::from(own.is_some() && !self.is_keyed(self.direction_in()));
             return Err(DropReason::OldSession);
         }
         self.ended_hellos = 0;
@@ -103,7 +103,7 @@ impl<T> LinkPair<T> {
         let restarted = is_new && own.is_some();
         self.stats.peer_restarts += u64::from(restarted);
         if restarted || own.is_none() {
-            self.strays = 0;
+            self.strays = Strays::default();
         }
         Ok(Inbound::empty(restarted, frame))
     }
@@ -125,7 +125,8 @@ impl<T> LinkPair<T> {
             // late hello has ended here has a valid tag.
             let is_sign = stray
                 && (reason == DropReason::OldSession || (keyed && self.handshake.is_new_of_ended(envelope, direction)));
-            self.strays += u32::from(is_sign);
+            self.strays.count += u32::from(is_sign);
+            self.strays.of_unknown_run |= is_sign;
             return Err(reason);
         };
         if !frame.chunks().are_sound() {
@@ -143,18 +144,18 @@ impl<T> LinkPair<T> {
         }
         self.owes_hello = self.handshake.is_leaving();
         if self.owes_hello {
-            self.strays = 0;
+            self.strays = Strays::default();
             return Ok(Inbound::empty(restarted, frame));
         }
         let inbound = match self.take(frame, restarted) {
             Ok(inbound) => inbound,
             Err(reason) => {
                 // Without a tag, a forged frame may have a number so high that all true ones come late.
-                self.strays += u32::from(reason == DropReason::Late && !keyed);
+                self.strays.count += u32::from(reason == DropReason::Late && !keyed);
                 return Err(reason);
             }
         };
-        self.strays = 0;
+        self.strays = Strays::default();
         if self.us == Address::SURFACE && inbound.number.is_some() {
             self.handshake.handle_current();
         }

@@ -29,8 +29,8 @@ pub(super) struct InForceCopy {
     confirmed: PerSlot<bool>,
     /// Whether the vehicle has put a slot in force since its last summary.
     decided: PerSlot<bool>,
-    /// Contents that may be in force: those of orders that were replaced before their decision came in, and those that a
-    /// decision replaced before the vehicle did.
+    /// Contents that may be in force: those of orders that were replaced before their decision came in, and the former
+    /// content, because the vehicle may report a decision before it puts the order in force.
     candidates: PerSlot<Vec<Slot>>,
     /// Whether a report has proved that the last applied order of a slot was in force.
     proved: PerSlot<bool>,

@@ -168,9 +168,9 @@ impl<R: StateReplica> VehiclePeer<R> {
         self.pair.has_offer() && self.contact.is_doubtful && self.last_turn.purpose != FramePurpose::Proof
     }
 
-    /// Whether the vehicle answers in a run that is not known here, so that no numbered frame of ours reaches it.
+    /// Whether the vehicle seems to use a run that the surface does not know, so that it receives no numbered frame.
     pub(super) fn seems_elsewhere(&self) -> bool {
-        self.pair.strays() > 0 && self.master.unanswered() > 0 && !self.pair.has_offer()
+        self.pair.hears_unknown_run() && self.master.unanswered() > 0 && !self.pair.has_offer()
     }
 
     /// Counts a frame that was dropped.
