@@ -328,6 +328,24 @@ mod tests {
     use crate::wire::Envelope;
     use std::sync::Arc;
 
+    fn introduction() -> Introduction {
+        Introduction { series: Some(Series::from_random(1)), ..Introduction::default() }
+    }
+
+    fn keyed(encrypt: bool) -> Option<Authenticity> {
+        Some(Authenticity { key: Arc::new(MissionKey::from_bytes([9; 16])), all: true, encrypt })
+    }
+
+    fn end_of_surface(authenticity: Option<Authenticity>, seed: u64) -> LinkPair<u64> {
+        let auv = Address::vehicle(3).unwrap();
+        LinkPair::new(MissionId(1), Address::SURFACE, auv, authenticity, introduction(), seed)
+    }
+
+    fn end_of_vehicle(authenticity: Option<Authenticity>, seed: u64) -> LinkPair<u64> {
+        let auv = Address::vehicle(3).unwrap();
+        LinkPair::new(MissionId(1), auv, Address::SURFACE, authenticity, introduction(), seed)
+    }
+
     fn carry(
         from: &mut LinkPair<u64>,
         to: &mut LinkPair<u64>,
@@ -344,12 +362,7 @@ mod tests {
 
     #[test]
     fn tags_verify_across_every_wrap_of_the_frame_counter() {
-        let key = Arc::new(MissionKey::from_bytes([9; 16]));
-        let authenticity = Some(Authenticity { key, all: true, encrypt: true });
-        let auv = Address::vehicle(3).unwrap();
-        let introduction = Introduction { series: Some(Series::from_random(1)), ..Introduction::default() };
-        let mut surface = LinkPair::new(MissionId(1), Address::SURFACE, auv, authenticity.clone(), introduction, 1);
-        let mut vehicle = LinkPair::new(MissionId(1), auv, Address::SURFACE, authenticity, introduction, 2);
+        let (mut surface, mut vehicle) = (end_of_surface(keyed(true), 1), end_of_vehicle(keyed(true), 2));
         carry(&mut surface, &mut vehicle, 0, FramePurpose::Hello);
         carry(&mut vehicle, &mut surface, 0, FramePurpose::Hello);
         carry(&mut surface, &mut vehicle, 0, FramePurpose::Content);
@@ -377,24 +390,25 @@ mod tests {
         to.handle_frame(&envelope, |_, _| true).map(drop)
     }
 
+    /// The handshake, and a numbered frame of each end; returns the hello of the surface.
+    fn meet(surface: &mut LinkPair<u64>, vehicle: &mut LinkPair<u64>) -> Vec<u8> {
+        let hello = sent(surface, FramePurpose::Hello);
+        received(vehicle, &hello).unwrap();
+        received(surface, &sent(vehicle, FramePurpose::Hello)).unwrap();
+        received(vehicle, &sent(surface, FramePurpose::Content)).unwrap();
+        received(surface, &sent(vehicle, FramePurpose::Content)).unwrap();
+        hello
+    }
+
     #[test]
     fn a_late_hello_does_not_displace_the_run_in_use() {
-        let key = Arc::new(MissionKey::from_bytes([9; 16]));
-        let authenticity = Some(Authenticity { key, all: true, encrypt: false });
-        let auv = Address::vehicle(3).unwrap();
-        let introduction = Introduction { series: Some(Series::from_random(1)), ..Introduction::default() };
-        let end = |us, peer, seed| LinkPair::new(MissionId(1), us, peer, authenticity.clone(), introduction, seed);
-        let mut surface = end(Address::SURFACE, auv, 1);
-        let mut before = end(auv, Address::SURFACE, 2);
-        let replayed = sent(&mut end(Address::SURFACE, auv, 4), FramePurpose::Hello);
-        let hello = sent(&mut surface, FramePurpose::Hello);
-        received(&mut before, &hello).unwrap();
-        received(&mut surface, &sent(&mut before, FramePurpose::Hello)).unwrap();
-        received(&mut before, &sent(&mut surface, FramePurpose::Content)).unwrap();
-        received(&mut surface, &sent(&mut before, FramePurpose::Content)).unwrap();
+        let mut surface = end_of_surface(keyed(false), 1);
+        let mut before = end_of_vehicle(keyed(false), 2);
+        let replayed = sent(&mut end_of_surface(keyed(false), 4), FramePurpose::Hello);
+        let hello = meet(&mut surface, &mut before);
 
         // The vehicle restarts. Its first answer comes late; a replayed hello makes it forget the run of that answer.
-        let mut vehicle = end(auv, Address::SURFACE, 3);
+        let mut vehicle = end_of_vehicle(keyed(false), 3);
         received(&mut vehicle, &hello).unwrap();
         let late = sent(&mut vehicle, FramePurpose::Hello);
         received(&mut vehicle, &replayed).unwrap();
@@ -408,21 +422,12 @@ mod tests {
 
     #[test]
     fn a_late_frame_of_the_former_run_does_not_cost_the_run_that_the_vehicle_took() {
-        let key = Arc::new(MissionKey::from_bytes([9; 16]));
-        let authenticity = Some(Authenticity { key, all: true, encrypt: false });
-        let auv = Address::vehicle(3).unwrap();
-        let introduction = Introduction { series: Some(Series::from_random(1)), ..Introduction::default() };
-        let end = |us, peer, seed| LinkPair::new(MissionId(1), us, peer, authenticity.clone(), introduction, seed);
-        let (mut surface, mut before) = (end(Address::SURFACE, auv, 1), end(auv, Address::SURFACE, 2));
-        let hello = sent(&mut surface, FramePurpose::Hello);
-        received(&mut before, &hello).unwrap();
-        received(&mut surface, &sent(&mut before, FramePurpose::Hello)).unwrap();
-        received(&mut before, &sent(&mut surface, FramePurpose::Content)).unwrap();
-        received(&mut surface, &sent(&mut before, FramePurpose::Content)).unwrap();
+        let (mut surface, mut before) = (end_of_surface(keyed(false), 1), end_of_vehicle(keyed(false), 2));
+        let hello = meet(&mut surface, &mut before);
         let late = sent(&mut before, FramePurpose::Content);
 
         // The vehicle restarts and takes the proof. A frame of its former run comes in before its first one.
-        let mut vehicle = end(auv, Address::SURFACE, 3);
+        let mut vehicle = end_of_vehicle(keyed(false), 3);
         received(&mut vehicle, &hello).unwrap();
         received(&mut surface, &sent(&mut vehicle, FramePurpose::Hello)).unwrap();
         received(&mut vehicle, &sent(&mut surface, FramePurpose::Proof)).unwrap();
@@ -434,16 +439,11 @@ mod tests {
 
     #[test]
     fn a_late_frame_of_an_offered_run_does_not_cost_the_run_that_was_offered_after_it() {
-        let key = Arc::new(MissionKey::from_bytes([9; 16]));
-        let authenticity = Some(Authenticity { key, all: true, encrypt: false });
-        let auv = Address::vehicle(3).unwrap();
-        let introduction = Introduction { series: Some(Series::from_random(1)), ..Introduction::default() };
-        let end = |us, peer, seed| LinkPair::new(MissionId(1), us, peer, authenticity.clone(), introduction, seed);
-        let mut surface = end(Address::SURFACE, auv, 1);
+        let mut surface = end_of_surface(keyed(false), 1);
         let hello = sent(&mut surface, FramePurpose::Hello);
         let mut late = Vec::new();
         for (seed, purpose) in [(2, FramePurpose::Content), (3, FramePurpose::Proof), (4, FramePurpose::Proof)] {
-            let mut vehicle = end(auv, Address::SURFACE, seed);
+            let mut vehicle = end_of_vehicle(keyed(false), seed);
             received(&mut vehicle, &hello).unwrap();
             received(&mut surface, &sent(&mut vehicle, FramePurpose::Hello)).unwrap();
             received(&mut vehicle, &sent(&mut surface, purpose)).unwrap();
@@ -461,15 +461,12 @@ mod tests {
 
     #[test]
     fn an_acknowledgement_in_the_current_run_ends_the_offers_of_before() {
-        let auv = Address::vehicle(3).unwrap();
-        let introduction = Introduction { series: Some(Series::from_random(1)), ..Introduction::default() };
-        let end = |us, peer, seed| LinkPair::new(MissionId(1), us, peer, None, introduction, seed);
-        let (mut surface, mut vehicle) = (end(Address::SURFACE, auv, 1), end(auv, Address::SURFACE, 2));
+        let (mut surface, mut vehicle) = (end_of_surface(None, 1), end_of_vehicle(None, 2));
         let hello = sent(&mut surface, FramePurpose::Hello);
         received(&mut vehicle, &hello).unwrap();
         received(&mut surface, &sent(&mut vehicle, FramePurpose::Hello)).unwrap();
         received(&mut vehicle, &sent(&mut surface, FramePurpose::Content)).unwrap();
-        let mut forger = end(auv, Address::SURFACE, 3);
+        let mut forger = end_of_vehicle(None, 3);
         received(&mut forger, &hello).unwrap();
         received(&mut surface, &sent(&mut forger, FramePurpose::Hello)).unwrap();
         received(&mut surface, &sent(&mut vehicle, FramePurpose::Content)).unwrap();
@@ -481,11 +478,8 @@ mod tests {
 
     #[test]
     fn a_forged_hello_of_another_version_leaves_the_true_series() {
-        let auv = Address::vehicle(3).unwrap();
-        let introduction = Introduction { series: Some(Series::from_random(1)), ..Introduction::default() };
         for is_first in [true, false] {
-            let end = |us, peer, seed| LinkPair::new(MissionId(1), us, peer, None, introduction, seed);
-            let (mut surface, mut vehicle) = (end(Address::SURFACE, auv, 1), end(auv, Address::SURFACE, 2));
+            let (mut surface, mut vehicle) = (end_of_surface(None, 1), end_of_vehicle(None, 2));
             let hello = sent(&mut surface, FramePurpose::Hello);
             // Its first three bits are the version, and its last three bytes the CRC over mission, session and frame.
             let mut other = hello[..hello.len() - 3].to_vec();
@@ -500,7 +494,7 @@ mod tests {
             hellos.iter().for_each(|bytes| received(&mut vehicle, bytes).unwrap());
             received(&mut surface, &sent(&mut vehicle, FramePurpose::Hello)).unwrap();
             received(&mut vehicle, &sent(&mut surface, FramePurpose::Content)).unwrap();
-            assert_eq!(vehicle.peer_introduction().unwrap().series, introduction.series);
+            assert_eq!(vehicle.peer_introduction().unwrap().series, introduction().series);
         }
     }
 }
