@@ -4,6 +4,7 @@
 //! [`Contact`] (when it was last in contact). `turn` writes the frames of a turn, `pool` those that go out without one.
 
 mod backlog;
+mod contact;
 mod content;
 mod divergence;
 mod ended;
@@ -27,6 +28,7 @@ use crate::map::StateReplica;
 use crate::schedule::Class;
 use crate::time::Instant;
 use crate::wire::{Address, Chunk, ChunkKind, Envelope, Header, Introduction, MissionId, Stamp, VehicleStatus};
+use contact::Contact;
 use content::{ChunkOutcome, PeerContent, class_of};
 use divergence::Divergence;
 use in_force::InForceCopy;
@@ -48,70 +50,6 @@ struct LastTurn {
 
 /// Time without an accepted frame after which frames of other runs, or late ones, are taken for a sign of another run.
 const STRAYS_TIMEOUT: Duration = Duration::from_secs(20);
-
-/// When the vehicle was last in contact, and when it must be contacted without a turn.
-#[derive(Debug)]
-struct Contact {
-    last_received: Option<Instant>,
-    /// Where the modem decides when to transmit: when an order first went out after that.
-    ordered: Option<Instant>,
-    /// Where the modem decides when to transmit: when an acknowledgement or a hello is due.
-    answer_due: Option<Instant>,
-    /// The vehicle's highest frame number when a frame with an acknowledgement was last written.
-    acknowledged: FrameNumber,
-    hello_due: Instant,
-    /// When the last proof was written.
-    proved: Option<Instant>,
-    /// When a hello last counted as an answer.
-    hello_admitted: Option<Instant>,
-    /// When the budget allows the next proof.
-    proof_allowed: Instant,
-    /// Hellos since the last answer.
-    hellos: u32,
-    /// Dropped frames up to the last hello.
-    dropped: u64,
-    /// No frame of the current run has come in since the last turn in it.
-    is_doubtful: bool,
-}
-
-impl Contact {
-    /// Time in which a vehicle that was met proves the run by a numbered frame; after it, it is sent a hello again.
-    const PROOF_TIMEOUT: Duration = Duration::from_secs(5);
-
-    fn new(now: Instant) -> Self {
-        Self {
-            last_received: None,
-            ordered: None,
-            answer_due: None,
-            acknowledged: 0,
-            hello_due: now,
-            proved: None,
-            hello_admitted: None,
-            proof_allowed: now,
-            hellos: 0,
-            dropped: 0,
-            is_doubtful: false,
-        }
-    }
-
-    /// Whether a hello counts as an answer: the first one of a run of this end, and otherwise one in five seconds,
-    /// because the others may be replays.
-    fn admit_hello(&mut self, is_first: bool, now: Instant) -> bool {
-        let is_admitted = is_first || self.hello_admitted.is_none_or(|at| now.since(at) >= Self::PROOF_TIMEOUT);
-        if is_admitted {
-            self.hello_admitted = Some(now);
-        }
-        is_admitted
-    }
-
-    fn last_received(&self) -> Option<Instant> {
-        self.last_received
-    }
-
-    fn is_silent_for(&self, time: Duration, now: Instant) -> bool {
-        self.last_received.is_none_or(|at| now.since(at) >= time)
-    }
-}
 
 /// A vehicle as the surface knows it.
 #[derive(Debug)]

@@ -1,7 +1,8 @@
 //! Frames that go out without a turn, through a modem that does half duplex by itself.
 
+use super::VehiclePeer;
+use super::contact::Contact;
 use super::turn::Ready;
-use super::{Contact, VehiclePeer};
 use crate::link::handshake::FramePurpose;
 use crate::mac::ModemProfile;
 use crate::map::StateReplica;
@@ -11,40 +12,6 @@ use std::time::Duration;
 
 /// Frame numbers since the last acknowledgement after which the next one does not wait any longer.
 const MAX_UNACKNOWLEDGED: u64 = 16;
-/// Silence after which a vehicle is sent a hello, because it may have restarted.
-const SILENCE_TIMEOUT: Duration = Duration::from_secs(40);
-/// The number of unanswered hellos after which the interval doubles: by then the vehicle is out of reach rather than unlucky.
-const PROMPT_HELLOS: u32 = 5;
-/// Transmissions of an order without any frame of the vehicle after which it is sent a hello.
-const UNACKNOWLEDGED_ORDERS: u32 = 2;
-
-impl Contact {
-    /// When the vehicle has been silent for so long that it may have restarted; an order that nobody acknowledges
-    /// shows it before `SILENCE_TIMEOUT`. `slot_timeout` is the time after which an order goes out again.
-    fn silent_from(&self, slot_timeout: Duration) -> Option<Instant> {
-        let heard = self.last_received? + SILENCE_TIMEOUT;
-        Some(self.ordered.map_or(heard, |at| heard.min(at + slot_timeout * UNACKNOWLEDGED_ORDERS)))
-    }
-
-    fn is_answer_due(&self, now: Instant) -> bool {
-        self.answer_due.is_some_and(|at| now >= at)
-    }
-
-    /// When a hello becomes due if no frame comes in. Silence matters only in a run that is usable: the vehicle has
-    /// proven it, and there are numbers left.
-    fn next_hello(&self, is_usable: bool, slot_timeout: Duration) -> Instant {
-        let silent = self.silent_from(slot_timeout).filter(|_| is_usable);
-        silent.map_or(self.hello_due, |at| at.max(self.hello_due))
-    }
-
-    /// A hello went out after `dropped` frames in all; the interval to the next one doubles once the vehicle has left
-    /// several unanswered and not even a frame came in that could not be used.
-    fn note_hello(&mut self, timeout: Duration, dropped: u64, now: Instant) {
-        let is_silent = std::mem::replace(&mut self.dropped, dropped) == dropped;
-        self.hellos = if is_silent { self.hellos.saturating_add(1) } else { 1 };
-        self.hello_due = now + timeout.max(Self::PROOF_TIMEOUT) * if self.hellos < PROMPT_HELLOS { 1 } else { 2 };
-    }
-}
 
 impl<R: StateReplica> VehiclePeer<R> {
     fn must_send_hello(&self, now: Instant) -> bool {

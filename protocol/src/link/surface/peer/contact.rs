@@ -1,0 +1,102 @@
+//! When a vehicle was last in contact, and when it must be contacted without a turn.
+
+use crate::link::FrameNumber;
+use crate::time::Instant;
+use std::time::Duration;
+
+/// Silence after which a vehicle is sent a hello, because it may have restarted.
+const SILENCE_TIMEOUT: Duration = Duration::from_secs(40);
+/// The number of unanswered hellos after which the interval doubles: by then the vehicle is out of reach rather than unlucky.
+const PROMPT_HELLOS: u32 = 5;
+/// Transmissions of an order without any frame of the vehicle after which it is sent a hello.
+const UNACKNOWLEDGED_ORDERS: u32 = 2;
+
+/// When the vehicle was last in contact, and when it must be contacted without a turn.
+#[derive(Debug)]
+pub(super) struct Contact {
+    pub(super) last_received: Option<Instant>,
+    /// Where the modem decides when to transmit: when an order first went out after that.
+    pub(super) ordered: Option<Instant>,
+    /// Where the modem decides when to transmit: when an acknowledgement or a hello is due.
+    pub(super) answer_due: Option<Instant>,
+    /// The vehicle's highest frame number when a frame with an acknowledgement was last written.
+    pub(super) acknowledged: FrameNumber,
+    pub(super) hello_due: Instant,
+    /// When the last proof was written.
+    pub(super) proved: Option<Instant>,
+    /// When a hello last counted as an answer.
+    pub(super) hello_admitted: Option<Instant>,
+    /// When the budget allows the next proof.
+    pub(super) proof_allowed: Instant,
+    /// Hellos since the last answer.
+    pub(super) hellos: u32,
+    /// Dropped frames up to the last hello.
+    pub(super) dropped: u64,
+    /// No frame of the current run has come in since the last turn in it.
+    pub(super) is_doubtful: bool,
+}
+
+impl Contact {
+    /// Time in which a vehicle that was met proves the run by a numbered frame; after it, it is sent a hello again.
+    pub(super) const PROOF_TIMEOUT: Duration = Duration::from_secs(5);
+
+    pub(super) fn new(now: Instant) -> Self {
+        Self {
+            last_received: None,
+            ordered: None,
+            answer_due: None,
+            acknowledged: 0,
+            hello_due: now,
+            proved: None,
+            hello_admitted: None,
+            proof_allowed: now,
+            hellos: 0,
+            dropped: 0,
+            is_doubtful: false,
+        }
+    }
+
+    /// Whether a hello counts as an answer: the first one of a run of this end, and otherwise one in five seconds,
+    /// because the others may be replays.
+    pub(super) fn admit_hello(&mut self, is_first: bool, now: Instant) -> bool {
+        let is_admitted = is_first || self.hello_admitted.is_none_or(|at| now.since(at) >= Self::PROOF_TIMEOUT);
+        if is_admitted {
+            self.hello_admitted = Some(now);
+        }
+        is_admitted
+    }
+
+    pub(super) fn last_received(&self) -> Option<Instant> {
+        self.last_received
+    }
+
+    pub(super) fn is_silent_for(&self, time: Duration, now: Instant) -> bool {
+        self.last_received.is_none_or(|at| now.since(at) >= time)
+    }
+
+    /// When the vehicle has been silent for so long that it may have restarted; an order that nobody acknowledges
+    /// shows it before `SILENCE_TIMEOUT`. `slot_timeout` is the time after which an order goes out again.
+    pub(super) fn silent_from(&self, slot_timeout: Duration) -> Option<Instant> {
+        let heard = self.last_received? + SILENCE_TIMEOUT;
+        Some(self.ordered.map_or(heard, |at| heard.min(at + slot_timeout * UNACKNOWLEDGED_ORDERS)))
+    }
+
+    pub(super) fn is_answer_due(&self, now: Instant) -> bool {
+        self.answer_due.is_some_and(|at| now >= at)
+    }
+
+    /// When a hello becomes due if no frame comes in. Silence matters only in a run that is usable: the vehicle has
+    /// proven it, and there are numbers left.
+    pub(super) fn next_hello(&self, is_usable: bool, slot_timeout: Duration) -> Instant {
+        let silent = self.silent_from(slot_timeout).filter(|_| is_usable);
+        silent.map_or(self.hello_due, |at| at.max(self.hello_due))
+    }
+
+    /// A hello went out after `dropped` frames in all; the interval to the next one doubles once the vehicle has left
+    /// several unanswered and not even a frame came in that could not be used.
+    pub(super) fn note_hello(&mut self, timeout: Duration, dropped: u64, now: Instant) {
+        let is_silent = std::mem::replace(&mut self.dropped, dropped) == dropped;
+        self.hellos = if is_silent { self.hellos.saturating_add(1) } else { 1 };
+        self.hello_due = now + timeout.max(Self::PROOF_TIMEOUT) * if self.hellos < PROMPT_HELLOS { 1 } else { 2 };
+    }
+}
