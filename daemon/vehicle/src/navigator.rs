@@ -34,7 +34,6 @@ pub struct Navigator {
     is_registered: bool,
     /// Path since the last registered frame, metres.
     unregistered_m: f64,
-    drift: f64,
     placement: Option<Placement>,
     last_fix: Option<Instant>,
     /// Whether the vehicle may have moved while it was off. The first fix then corrects the position on the map.
@@ -89,7 +88,6 @@ impl Navigator {
             origin: Origin::new((0.0, 0.0), 0.0),
             is_registered: false,
             unregistered_m: 0.0,
-            drift,
             placement: None,
             last_fix: None,
             is_displaced: false,
@@ -204,7 +202,7 @@ impl Navigator {
         self.filter.shift(dx, dy);
         self.odometer.handle_travel(dx, dy, now, Self::MEMORY_S);
         let path = std::mem::replace(&mut self.unregistered_m, 0.0);
-        let drift = if is_seen { Self::REGISTERED_DRIFT } else { self.drift };
+        let drift = if is_seen { Self::REGISTERED_DRIFT } else { self.filter.drift() };
         self.origin.drift(drift * path);
     }
 

@@ -47,6 +47,11 @@ impl Filter {
         Self { state: [x_m, y_m, 0.0, 0.0, 0.0, 0.0], p, drift }
     }
 
+    /// The expected error in metres for each metre of path.
+    pub(super) fn drift(&self) -> f64 {
+        self.drift
+    }
+
     pub(super) fn position(&self) -> (f64, f64) {
         (self.state[0], self.state[1])
     }
