@@ -310,3 +310,18 @@ fn verdicts_keep_up_with_losses_in_the_smallest_frames() {
         assert!(pair.is_converged(), "seed {seed}: {:?}", pair.vehicle.stats());
     }
 }
+
+/// Found by the property test above: poses and reports, which losses made due again, took nearly every frame.
+#[test]
+fn layers_converge_beside_the_status_in_the_smallest_frames() {
+    let channel = LossyChannel { loss: 0.84, talker: 0.05, propagation: Duration::from_millis(951), ..CALM };
+    for seed in [0, 2] {
+        let setup = Setup { access: Access::Polled, layers: Some([0, 0]), ..Setup::new(32, 1000, Codec::Png) };
+        let mut pair = LinkedEnds::new(seed, setup, channel.clone());
+        pair.vehicle.set_map(patchy(24, 5).iter(), pair.now);
+        pair.set_layers(24, 5);
+        pair.surface.issue(auv(), utility(5), pair.now).unwrap();
+        pair.run(pair.now + Duration::from_secs(30_000), true);
+        assert!(pair.is_converged(), "seed {seed}: {:?}", pair.vehicle.stats());
+    }
+}

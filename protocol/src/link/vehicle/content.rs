@@ -58,6 +58,9 @@ pub(super) struct VehicleContent<S> {
     pub(super) background: BackgroundOrder,
     pub(super) status: StatusSender,
     pub(super) in_force: InForceSender,
+    /// Whether the status comes last in the next frame, because the last frame had no room for anything else. On a lossy link
+    /// with small frames, a status that is due again after each loss would take every frame.
+    is_status_last: bool,
     /// The last chunk that did not fit into the frame it was made for.
     pub(super) oversized: Option<OversizedChunk>,
 }
@@ -72,6 +75,7 @@ impl<S: StateSource> VehicleContent<S> {
             background: BackgroundOrder::default(),
             status: StatusSender::new(status_period, now),
             in_force: InForceSender::default(),
+            is_status_last: false,
             oversized: None,
         }
     }
@@ -145,20 +149,43 @@ impl<S: StateSource> VehicleContent<S> {
     /// most valuable chunk goes first.
     pub(super) fn fill(&mut self, builder: &mut FrameBuilder, context: &FillContext<'_>) -> Carried<S::Carried> {
         let mut carried = Carried::new();
-        let mut unfit: Vec<Class> = Vec::new();
+        let has_other_content = self.has_other_content(context);
+        if self.is_status_last {
+            self.fill_shared(vec![Class::Status], builder, &mut carried, context);
+            self.fill_background(builder, &mut carried, context);
+        }
+        self.fill_shared(Vec::new(), builder, &mut carried, context);
+        self.fill_background(builder, &mut carried, context);
+        let is_status_alone = !carried.is_empty() && carried.iter().all(|(part, _)| part.class() == Class::Status);
+        self.is_status_last = is_status_alone && has_other_content;
+        self.fill_digests(builder, &mut carried);
+        carried
+    }
+
+    /// Whether anything but the status waits.
+    fn has_other_content(&self, context: &FillContext<'_>) -> bool {
+        let waits = self.waiting(context.now).iter().any(|class| *class != Class::Status);
+        waits || self.background_streams(context.budget, context.now).next().is_some()
+    }
+
+    /// Fills a frame with the classes that have shares, those in `unfit` excepted.
+    fn fill_shared(
+        &mut self,
+        mut unfit: Vec<Class>,
+        builder: &mut FrameBuilder,
+        carried: &mut Carried<S::Carried>,
+        context: &FillContext<'_>,
+    ) {
         loop {
             let waiting = self.waiting(context.now);
             let candidates: Vec<Class> = waiting.iter().copied().filter(|c| !unfit.contains(c)).collect();
-            let Some(class) = self.shares.next(&candidates) else { break };
-            let bytes = self.fill_class(class, false, builder, &mut carried, context);
+            let Some(class) = self.shares.next(&candidates) else { return };
+            let bytes = self.fill_class(class, false, builder, carried, context);
             if bytes == 0 {
                 unfit.push(class);
             }
             self.shares.spend(class, bytes, &waiting);
         }
-        self.fill_background(builder, &mut carried, context);
-        self.fill_digests(builder, &mut carried);
-        carried
     }
 
     /// Fills the rest of a frame with background streams.
