@@ -143,9 +143,8 @@ impl<T> Handshake<T> {
         direction: Direction,
         keyed: bool,
     ) -> Option<(usize, Frame<'a>)> {
-        let mut opened = self.offered.iter().map(|r| r.open(envelope, mission, direction, keyed));
-        let index = opened.clone().position(|frame| frame.is_some())?;
-        opened.nth(index).flatten().map(|frame| (index, frame))
+        let opened = |run: &LinkRun<T>| run.open(envelope, mission, direction, keyed);
+        self.offered.iter().enumerate().find_map(|(index, run)| Some((index, opened(run)?)))
     }
 
     pub(super) fn is_leaving(&self) -> bool {

@@ -176,6 +176,11 @@ impl<T> LinkPair<T> {
         self.handshake.run().map_or(0, |r| r.window.unstated())
     }
 
+    /// Whether no frame shows yet that the peer has received our last acknowledgement statement.
+    pub fn is_unconfirmed(&self) -> bool {
+        self.handshake.run().is_some_and(|r| r.window.is_unconfirmed())
+    }
+
     /// Bytes of the acknowledgement statement on all received frames.
     pub fn statement_bytes(&self) -> usize {
         self.handshake.run().map_or(0, |r| r.window.statement_bytes())

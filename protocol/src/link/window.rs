@@ -43,6 +43,11 @@ impl LinkWindow {
         self.highest - self.closed
     }
 
+    /// Whether no frame shows yet that the peer has received the last statement.
+    pub fn is_unconfirmed(&self) -> bool {
+        self.closed > self.base
+    }
+
     /// Number and base of a frame that [`Self::accept`] would accept, or the reason for which it would reject it.
     pub fn preview(&self, number_low: u16, base_distance: u16) -> Result<(FrameNumber, FrameNumber), WindowRefusal> {
         let number = unwrap_number(number_low, self.highest);

@@ -160,8 +160,6 @@ impl Master {
 
     /// The last frame of the surface's turn is on air. Up to `losable` consecutive frames of the answer may be lost.
     pub fn handle_turn_sent(&mut self, profile: &ModemProfile, losable: u32, now: Instant) {
-        let flight =
-            self.round_trip().map_or(self.config.max_propagation * 2, |rtt| rtt + rtt / 4 + Duration::from_millis(200));
         // A vehicle farther away than assumed must get the chance to answer; a modem that polls waits by itself.
         let doubts = if profile.access == Access::Polled {
             0
@@ -171,7 +169,7 @@ impl Master {
         let patience = Duration::from_secs(1) * doubts;
         let frames = if self.is_saturated { losable + 1 } else { 1 };
         let answer = (profile.frame_airtime() * frames).min(self.granted_airtime.max(profile.frame_airtime()));
-        let until = now + patience + flight + profile.turn_around * 2 + answer;
+        let until = now + patience + self.flight() + profile.turn_around * 2 + answer;
         self.granted = Some(now);
         self.state = MediumState::Granted { granted: now, until };
     }
@@ -219,13 +217,20 @@ impl Master {
     }
 
     /// A frame of the vehicle came in that announces `remaining` further frames and belongs to another pair of runs: the
-    /// vehicle hears the grants, although it does not answer them.
+    /// vehicle hears the grants, although it does not answer them. Its turn ends with these frames, or with the airtime that
+    /// was granted: whoever forges such frames cannot keep the surface waiting.
     pub fn handle_stray(&mut self, remaining: u8, profile: &ModemProfile, now: Instant) {
         self.unanswered = self.unanswered.min(Self::MAX_UNANSWERED_NEARBY);
         let end = now + self.rest_of_turn(remaining, profile);
-        if let MediumState::Granted { until, .. } = &mut self.state {
-            *until = (*until).min(end);
+        let longest = self.flight() + profile.turn_around * 2 + self.granted_airtime.max(profile.frame_airtime());
+        if let MediumState::Granted { granted, until } = &mut self.state {
+            *until = end.min(*granted + longest);
         }
+    }
+
+    /// Time to allow for both ways through the water.
+    fn flight(&self) -> Duration {
+        self.round_trip().map_or(self.config.max_propagation * 2, |rtt| rtt + rtt / 4 + Duration::from_millis(200))
     }
 
     /// Longest time in which the `remaining` further frames of a turn come in.
@@ -240,5 +245,35 @@ impl Master {
             self.unanswered += 1;
         }
         self.state = MediumState::Idle { ready: at, next: at };
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const PROFILE: ModemProfile = ModemProfile {
+        frame_bytes: 256,
+        bit_rate_bps: 10_000.0,
+        overhead_bits: 0,
+        turn_around: Duration::from_millis(300),
+        access: Access::Shared,
+    };
+
+    #[test]
+    fn the_surface_waits_for_the_end_of_a_turn_in_another_run_but_no_longer_than_it_granted() {
+        let now = Instant::from_secs_f64(100.0);
+        let mut master = Master::new(MasterConfig::default(), now);
+        master.handle_round_trip(Duration::from_secs(1));
+        master.begin(40, now);
+        master.handle_turn_sent(&PROFILE, 0, now);
+        let heard = now + Duration::from_secs(1);
+        master.handle_stray(10, &PROFILE, heard);
+        let end = heard + PROFILE.frame_airtime() * 10;
+        assert!(!master.may_speak(true, end) && master.may_speak(true, end + Duration::from_secs(2)));
+        (0..100).for_each(|i| master.handle_stray(255, &PROFILE, heard + Duration::from_millis(100) * i));
+        assert!(master.may_speak(true, now + Duration::from_secs(14)));
+        master.handle_stray(0, &PROFILE, heard);
+        assert!(master.may_speak(true, heard + Duration::from_secs(1)));
     }
 }

@@ -58,8 +58,8 @@ pub(super) struct VehicleContent<S> {
     pub(super) background: BackgroundOrder,
     pub(super) status: StatusSender,
     pub(super) in_force: InForceSender,
-    /// Whether the status comes last in the next frame, because the last frame had no room for anything else. On a lossy link
-    /// with small frames, a status that is due again after each loss would take every frame.
+    /// Whether the status comes last in the next frame, because it took room from other content in the last one. On a lossy
+    /// link with small frames, a status that is due again after each loss would leave no room to the map and its layers.
     is_status_last: bool,
     /// The last chunk that did not fit into the frame it was made for.
     pub(super) oversized: Option<OversizedChunk>,
@@ -149,15 +149,14 @@ impl<S: StateSource> VehicleContent<S> {
     /// most valuable chunk goes first.
     pub(super) fn fill(&mut self, builder: &mut FrameBuilder, context: &FillContext<'_>) -> Carried<S::Carried> {
         let mut carried = Carried::new();
-        let has_other_content = self.has_other_content(context);
         if self.is_status_last {
             self.fill_shared(vec![Class::Status], builder, &mut carried, context);
             self.fill_background(builder, &mut carried, context);
         }
         self.fill_shared(Vec::new(), builder, &mut carried, context);
         self.fill_background(builder, &mut carried, context);
-        let is_status_alone = !carried.is_empty() && carried.iter().all(|(part, _)| part.class() == Class::Status);
-        self.is_status_last = is_status_alone && has_other_content;
+        let has_status = carried.iter().any(|(part, _)| part.class() == Class::Status);
+        self.is_status_last = has_status && self.has_other_content(context);
         self.fill_digests(builder, &mut carried);
         carried
     }

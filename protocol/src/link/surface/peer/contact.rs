@@ -19,6 +19,8 @@ pub(super) struct Contact {
     pub(super) ordered: Option<Instant>,
     /// Where the modem decides when to transmit: when an acknowledgement or a hello is due.
     pub(super) answer_due: Option<Instant>,
+    /// Where the modem decides when to transmit: how often the acknowledgement goes out, unless a frame confirms it before.
+    pub(super) answers_left: u32,
     /// The vehicle's highest frame number when a frame with an acknowledgement was last written.
     pub(super) acknowledged: FrameNumber,
     pub(super) hello_due: Instant,
@@ -45,6 +47,7 @@ impl Contact {
             last_received: None,
             ordered: None,
             answer_due: None,
+            answers_left: 0,
             acknowledged: 0,
             hello_due: now,
             proved: None,

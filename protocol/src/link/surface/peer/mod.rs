@@ -51,6 +51,11 @@ struct LastTurn {
 /// Time without an accepted frame after which frames of other runs, or late ones, are taken for a sign of another run.
 const STRAYS_TIMEOUT: Duration = Duration::from_secs(20);
 
+/// Where the modem decides when to transmit: probability that all copies of an acknowledgement may be lost, and the most
+/// copies. Below a loss of one half there is one, because the next frame of the vehicle causes the next.
+const ANSWER_LOSS_RISK: f64 = 0.5;
+const MAX_ANSWERS: u32 = 6;
+
 /// A vehicle as the surface knows it.
 #[derive(Debug)]
 pub(super) struct VehiclePeer<R> {
@@ -330,7 +335,9 @@ impl<R: StateReplica> VehiclePeer<R> {
         let is_proven = self.pair.is_proven();
         let wait = if is_proven { Duration::from_secs(2) } else { Duration::ZERO };
         if self.pair.unstated() > 0 || (self.pair.has_run() && !is_proven) {
-            self.contact.answer_due.get_or_insert(now + wait);
+            let due = now + wait;
+            self.contact.answer_due = Some(self.contact.answer_due.map_or(due, |at| at.min(due)));
+            self.contact.answers_left = self.pair.stats.loss_out.copies(ANSWER_LOSS_RISK, MAX_ANSWERS);
         }
     }
 

@@ -36,9 +36,16 @@ impl<R: StateReplica> VehiclePeer<R> {
         }
         let answer = self.contact.is_answer_due(now);
         let is_late = self.pair.highest() >= self.contact.acknowledged + MAX_UNACKNOWLEDGED;
-        let owes = (!self.pair.is_proven() && answer) || (self.pair.unstated() > 0 && (is_late || answer));
+        let owes = (self.owes_answer() && answer) || (self.pair.unstated() > 0 && is_late);
         let inquires = self.in_force.next_inquiry().is_some_and(|at| now >= at);
         self.has_numbers() && (owes || inquires || !self.outbox.pending(now, now - self.slot_timeout()).is_empty())
+    }
+
+    /// Whether the vehicle may lack an acknowledgement, or a proof of the run.
+    fn owes_answer(&self) -> bool {
+        !self.pair.is_proven()
+            || self.pair.unstated() > 0
+            || (self.pair.is_unconfirmed() && self.contact.answers_left > 0)
     }
 
     /// Whether there is a run with a number left for a frame.
@@ -51,11 +58,9 @@ impl<R: StateReplica> VehiclePeer<R> {
         let again = self.outbox.progress().filter_map(|s| s.sent).min().map(|at| at + self.slot_timeout());
         let again = again.filter(|_| self.outbox.has_backlog());
         let hello = self.contact.next_hello(self.pair.is_proven() && !self.pair.is_full(), self.slot_timeout());
-        let numbered = [self.contact.answer_due, again, self.in_force.next_inquiry()]
-            .into_iter()
-            .flatten()
-            .filter(|_| self.has_numbers())
-            .min();
+        let answer = self.contact.answer_due.filter(|_| self.owes_answer());
+        let numbered =
+            [answer, again, self.in_force.next_inquiry()].into_iter().flatten().filter(|_| self.has_numbers()).min();
         [Some(hello), self.proof_due(), numbered].into_iter().flatten().min()
     }
 
@@ -96,7 +101,9 @@ impl<R: StateReplica> VehiclePeer<R> {
         // A frame may be too small for a verdict on every frame that came in; the next one has the rest.
         let is_partial = self.pair.unstated() > 0;
         let next = if must_prove && purpose.is_hello() { now } else { now + timeout };
-        self.contact.answer_due = (must_prove || is_partial).then_some(next);
+        self.contact.answers_left = self.contact.answers_left.saturating_sub(1);
+        let is_repeated = self.contact.answers_left > 0 && self.pair.is_unconfirmed();
+        self.contact.answer_due = (must_prove || is_partial || is_repeated).then_some(next);
         self.contact.acknowledged = self.pair.highest();
         if purpose.is_hello() {
             self.contact.note_hello(timeout, self.pair.stats.dropped_total(), now);
