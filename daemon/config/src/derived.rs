@@ -65,6 +65,6 @@ pub fn default_name(address: Address) -> String {
 /// A file that cannot be read, with its line.
 pub fn tuning_table(config: &Config) -> Result<TuningTable, UserError> {
     let Some(path) = &config.scene.tuning_table else { return Ok(TuningTable::shipped()) };
-    let text = std::fs::read_to_string(path).map_err(|e| UserError::file(path, e))?;
+    let text = crate::read_regular_text(path)?;
     TuningTable::parse(&path.display().to_string(), &text)
 }

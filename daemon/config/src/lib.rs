@@ -14,6 +14,7 @@ mod modem;
 mod old_keys;
 mod print;
 mod reference;
+mod regular_file;
 mod rule;
 mod schema;
 mod sections;
@@ -28,6 +29,7 @@ pub use migrate::{Migration, migrate};
 pub use modem::{full_frame_bytes, modem_port};
 pub use print::{print, shipped_files};
 pub use reference::reference;
+pub use regular_file::{open_regular, read_regular, read_regular_text};
 pub use rule::Rule;
 pub use schema::schema;
 pub use sections::{

@@ -23,7 +23,7 @@ struct Given {
 pub fn load(file: Option<&Path>, sets: &[String]) -> Result<Config, UserError> {
     let mut given = Vec::new();
     if let Some(path) = file {
-        let text = std::fs::read_to_string(path).map_err(|e| UserError::file(path, e))?;
+        let text = crate::read_regular_text(path)?;
         read_file(path, &text, &mut given)?;
     }
     for set in sets {

@@ -1,5 +1,6 @@
 //! Images of the sea floor and their annotations, from files.
 
+use scenecast_config::read_regular;
 use scenecast_core::UserError;
 use scenecast_core::label_picture::{Indices, read_indices};
 use std::path::Path;
@@ -7,21 +8,9 @@ use std::path::Path;
 /// Size of the largest image file that is read, bytes.
 const MAX_BYTES: u64 = 4 << 30;
 
-/// The bytes of a file. A device or a pipe is refused: it may have no end.
-fn read_regular(path: &Path) -> Result<Vec<u8>, UserError> {
-    let about = std::fs::metadata(path).map_err(|e| UserError::file(path, e))?;
-    if !about.is_file() {
-        return Err(UserError::file(path, "not a regular file"));
-    }
-    if about.len() > MAX_BYTES {
-        return Err(UserError::file(path, format!("{} bytes; at most {MAX_BYTES} are read", about.len())));
-    }
-    std::fs::read(path).map_err(|e| UserError::file(path, e))
-}
-
 /// An image in any format that the program knows; a JPEG that is cut off is refused.
 pub fn read_image(path: &Path) -> Result<image::DynamicImage, UserError> {
-    let bytes = read_regular(path)?;
+    let bytes = read_regular(path, MAX_BYTES)?;
     // The decoder fills the missing part of a cut JPEG with grey, which would be surveyed as sea floor.
     let cut = bytes.starts_with(&[0xFF, 0xD8]) && !bytes.windows(2).rev().take(4096).any(|w| w == [0xFF, 0xD9]);
     if cut {
@@ -37,7 +26,7 @@ pub fn read_image(path: &Path) -> Result<image::DynamicImage, UserError> {
 
 /// Classes from a grey or indexed image of `size` pixels: the pixel value is the class.
 pub fn read_classes(path: &Path, size: (u32, u32)) -> Result<Vec<u8>, UserError> {
-    let bytes = read_regular(path)?;
+    let bytes = read_regular(path, MAX_BYTES)?;
     let unreadable = |e| UserError::file(path, format!("not an image that can be read: {e}"));
     let indices = read_indices(&bytes, u64::from(u32::MAX)).map_err(unreadable)?;
     let (classes, width, height) = match indices {

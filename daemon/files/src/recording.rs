@@ -48,10 +48,7 @@ impl Recording {
     /// Reads the table of a folder; an error names the line. A pixel of a mosaic is `metres_per_pixel` wide.
     pub fn open(dir: &Path, metres_per_pixel: f64) -> Result<Self, UserError> {
         let path = table(dir)?;
-        let file = std::fs::File::open(&path).map_err(|e| UserError::file(&path, e))?;
-        if file.metadata().is_ok_and(|about| about.len() > MAX_TABLE_BYTES) {
-            return Err(UserError::file(&path, format!("larger than {MAX_TABLE_BYTES} bytes")));
-        }
+        let file = scenecast_config::open_regular(&path, MAX_TABLE_BYTES)?;
         let mut reader = csv::ReaderBuilder::new()
             .flexible(true)
             .trim(csv::Trim::All)
@@ -75,8 +72,10 @@ impl Recording {
                 false => of_metres(dir, row),
             };
             let frame = frame.map_err(|wrong| UserError::Input(format!("{place}: {wrong}")))?;
-            if frames.last().is_some_and(|last| last.t_s > frame.t_s) {
-                return Err(UserError::Input(format!("{place}: the time is earlier than on the line before")));
+            if let Some(last) = frames.last().filter(|last| last.t_s > frame.t_s) {
+                let (before, now) = (last.t_s, frame.t_s);
+                let line = format!("{place}: the time {now} s is earlier than {before} s on the line before");
+                return Err(UserError::Input(line));
             }
             frames.push(frame);
         }

@@ -2,7 +2,6 @@
 
 use scene_model::words::Measures;
 use scenecast_core::UserError;
-use std::io::Read;
 use std::path::Path;
 
 /// Most bytes of a vocabulary; one takes some kilobytes.
@@ -10,9 +9,7 @@ const MAX_BYTES: u64 = 1 << 20;
 
 /// Reads a vocabulary that `scenecast vocabulary train` wrote.
 pub fn read_vocabulary(path: &Path) -> Result<Measures, UserError> {
-    let file = std::fs::File::open(path).map_err(|e| UserError::file(path, e))?;
-    let mut bytes = Vec::new();
-    file.take(MAX_BYTES).read_to_end(&mut bytes).map_err(|e| UserError::file(path, e))?;
+    let bytes = scenecast_config::read_regular(path, MAX_BYTES)?;
     let advice = "make one with scenecast vocabulary train";
     scene_model::vocabulary::load(&bytes).map_err(|e| UserError::file(path, format!("{e}; {advice}")))
 }

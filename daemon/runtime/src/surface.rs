@@ -32,7 +32,6 @@ const CATCH_UP_INTERVAL: Duration = Duration::from_millis(100);
 /// Runs the surface until it is interrupted.
 pub fn run_surface(config: Config, simulated: Option<SimulatedAutopilot>) -> Result<(), UserError> {
     super::block_on(async move {
-        let stop = Stop::new()?;
         let mut principals = Vec::new();
         let listener = match &config.console.listen {
             None => None,
@@ -54,6 +53,8 @@ pub fn run_surface(config: Config, simulated: Option<SimulatedAutopilot>) -> Res
             super::random_bits(),
             clock.now(),
         )?;
+        // Files that do not end, such as a pipe for a key, are read above: until there a signal ends the program at once.
+        let stop = Stop::new()?;
         surface.set_principals(principals);
         if let Some(relay) = relay(&config) {
             surface.set_relay(relay);

@@ -26,7 +26,6 @@ const MAX_SLEEP: Duration = Duration::from_secs(1);
 /// Runs the vehicle until it is interrupted; on SIGHUP it calls `load` for a new budget and new shares.
 pub fn run_vehicle(load: Load, simulated: Option<SimulatedAutopilot>) -> Result<(), UserError> {
     super::block_on(async move {
-        let stop = Stop::new()?;
         let config = load()?;
         warn_without_key(&config);
         let dir = config.runtime.state_dir.as_path();
@@ -49,6 +48,8 @@ pub fn run_vehicle(load: Load, simulated: Option<SimulatedAutopilot>) -> Result<
             super::random_bits(),
             clock.now(),
         )?;
+        // Files that do not end, such as a pipe for a key, are read above: until there a signal ends the program at once.
+        let stop = Stop::new()?;
         if is_again {
             vehicle.assume_budget_spent(clock.now());
         }

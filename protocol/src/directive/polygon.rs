@@ -17,7 +17,7 @@ pub enum PolygonFault {
     #[error("vertex {0} lies more than 838 km from the origin")]
     TooFar(usize),
     /// Two neighbouring vertices are equal.
-    #[error("vertex {0} is at the same place as the one before it")]
+    #[error("vertex {0} is at the same place as the one before it, to the decimetre")]
     Repeated(usize),
     /// All vertices lie on one line.
     #[error("it has no area")]

@@ -45,7 +45,9 @@ fn areas_of(whole: &Value, frame: CoordinateFrame) -> Result<AreasOrder, String>
     let features = match whole["type"].as_str() {
         Some("FeatureCollection") => whole["features"].as_array().ok_or("the collection has no list of features")?,
         Some("Feature") => std::slice::from_ref(whole),
-        other => return Err(format!("type {}: expected a FeatureCollection", other.unwrap_or("is missing"))),
+        other => {
+            return Err(format!("type {}: expected a FeatureCollection or a Feature", other.unwrap_or("is missing")));
+        }
     };
     let area = |(i, feature): (usize, &Value)| {
         let geometry = &feature["geometry"];
@@ -57,17 +59,15 @@ fn areas_of(whole: &Value, frame: CoordinateFrame) -> Result<AreasOrder, String>
         let area = outline.and_then(|outline| Ok(AreaOrder { outline, weight: weight? }));
         area.map_err(|line| format!("features[{i}]: {line}"))
     };
+    if features.is_empty() {
+        return Err("it has no area; scenecast ctl areas clear removes all areas".to_owned());
+    }
     Ok(AreasOrder { areas: features.iter().enumerate().map(area).collect::<Result<_, _>>()? })
 }
 
 fn read_json(file: &Path) -> Result<Value, UserError> {
-    let error = |line: String| UserError::file(file, line);
-    let size = std::fs::metadata(file).map_err(|e| error(e.to_string()))?.len();
-    if size > MAX_BYTES {
-        return Err(error(format!("it has {size} bytes: at most {MAX_BYTES} are read")));
-    }
-    let text = std::fs::read(file).map_err(|e| error(e.to_string()))?;
-    serde_json::from_slice(&text).map_err(|e| error(format!("it is not JSON: {e}")))
+    let text = scenecast_config::read_regular(file, MAX_BYTES)?;
+    serde_json::from_slice(&text).map_err(|e| UserError::file(file, format!("it is not JSON: {e}")))
 }
 
 fn fence_of(whole: &Value, frame: CoordinateFrame) -> Result<FenceOrder, String> {
@@ -83,7 +83,10 @@ fn fence_of(whole: &Value, frame: CoordinateFrame) -> Result<FenceOrder, String>
         Some("Polygon" | "MultiPolygon" | "Point") => {
             add(&mut order, &serde_json::json!({ "geometry": whole }), frame)?;
         }
-        other => return Err(format!("type {}: expected a FeatureCollection", other.unwrap_or("is missing"))),
+        other => {
+            let expected = "expected a FeatureCollection, a Feature, or a geometry: Polygon, MultiPolygon, Point";
+            return Err(format!("type {}: {expected}", other.unwrap_or("is missing")));
+        }
     }
     if order == FenceOrder::default() {
         return Err("it contains neither polygon nor point".to_owned());

@@ -165,8 +165,8 @@ fn file(table: &TableReader<'_>) -> Result<(std::path::PathBuf, String), UserErr
     let name =
         table.text("file")?.ok_or_else(|| table.missing("file", "the name of a file, relative to the scenario"))?;
     let path = table.path().parent().unwrap_or(std::path::Path::new(".")).join(name);
-    let text =
-        std::fs::read_to_string(&path).map_err(|e| table.wrong("file", format!("a file that can be read ({e})")))?;
+    let text = scenecast_config::read_regular_text(&path)
+        .map_err(|e| table.wrong("file", format!("a file that can be read ({e})")))?;
     Ok((path, text))
 }
 

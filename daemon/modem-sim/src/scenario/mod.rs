@@ -38,7 +38,7 @@ pub struct Scenario {
 impl Scenario {
     /// Reads a file; errors name the file, the line, the key and the allowed values.
     pub fn load(path: &Path) -> Result<Self, UserError> {
-        let text = std::fs::read_to_string(path).map_err(|e| UserError::file(path, e))?;
+        let text = scenecast_config::read_regular_text(path)?;
         Self::read(ScenarioSource { path, text: &text })
     }
 

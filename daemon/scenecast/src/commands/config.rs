@@ -70,7 +70,7 @@ impl From<ReaderRole> for scenecast_config::Role {
 }
 
 fn migrate(file: &std::path::Path) -> Result<(), UserError> {
-    let text = std::fs::read_to_string(file).map_err(|e| UserError::file(file, e))?;
+    let text = scenecast_config::read_regular_text(file)?;
     let migration = scenecast_config::migrate(file, &text)?;
     if migration.changes.is_empty() {
         println!("{}: all names are up to date", file.display());
