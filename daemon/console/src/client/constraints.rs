@@ -5,7 +5,7 @@ use super::geojson::{self, CoordinateFrame};
 use super::session::Session;
 use super::text;
 use crate::orders::ConstraintsOrder;
-use crate::state::{AppliedOrder, MissionState, OrderProgress, OrderStatus, VehicleState};
+use crate::state::{AppliedOrder, InForceKnowledge, MissionState, OrderProgress, OrderStatus, VehicleState};
 use scenecast_core::UserError;
 use scenecast_core::{LatLon, TangentPlane};
 use scenecast_surface::{FenceOrder, LimitsOrder};
@@ -58,11 +58,13 @@ pub async fn clear_fence(session: &Session) -> Result<(), UserError> {
     send(session, session.choose(&state)?, "fence", &FenceOrder::default()).await
 }
 
-/// Moves the return point, in metres in the world frame, or removes it. Fence and keep-outs stay as last sent.
+/// Moves the return point, in metres in the world frame, or removes it. Fence and keep-outs stay.
 pub async fn set_return_point(session: &Session, at: Option<[f64; 2]>) -> Result<(), UserError> {
     let state = session.state().await?;
     let v = session.choose(&state)?;
-    let order = FenceOrder { return_point: at, ..v.orders.fence.clone().unwrap_or_default() };
+    let advice = "scenecast ctl fence set FILE replaces fence, keep-outs and return point as a whole";
+    let present = present_order(v, "fence", &v.orders.fence, &v.orders.fence_in_force, advice)?;
+    let order = FenceOrder { return_point: at, ..present };
     order.read().map_err(UserError::Input)?;
     send(session, v, "fence", &order).await
 }
@@ -75,11 +77,44 @@ pub async fn show_limits(session: &Session) -> Result<(), UserError> {
     session.print(&view, || view.text(state.now_s, limits_text))
 }
 
-/// Sends limits. Limits that are not given stay as last sent if `keep`, else they are removed.
+/// The order that a change of a part of it begins with: the one that is on its way to the vehicle, or else the one in force.
+///
+/// # Errors
+/// The vehicle may obey an order that this surface does not know, and the change would remove the rest of it.
+fn present_order<T: Clone + Default>(
+    vehicle: &VehicleState,
+    resource: &str,
+    sent: &Option<T>,
+    in_force: &Option<AppliedOrder<T>>,
+    advice: &str,
+) -> Result<T, UserError> {
+    let is_pending = |order: &OrderProgress| !matches!(order.state, OrderStatus::Applied | OrderStatus::Refused);
+    if slot(vehicle, resource).is_some_and(is_pending) {
+        return Ok(sent.clone().unwrap_or_default());
+    }
+    let reported = in_force.as_ref().map(|applied| applied.order.clone());
+    let known = match vehicle.orders.in_force.get(resource) {
+        Some(InForceKnowledge::None) => Some(T::default()),
+        Some(InForceKnowledge::Known) => reported,
+        Some(InForceKnowledge::NotReported) | None => reported.or_else(|| sent.clone()),
+        Some(InForceKnowledge::Unknown) => None,
+    };
+    known.ok_or_else(|| {
+        UserError::Input(format!(
+            "{}: this surface does not know yet which {resource} the vehicle obeys, so it cannot change a part: wait for \
+             the vehicle's report; {advice}",
+            vehicle.name
+        ))
+    })
+}
+
+/// Sends limits. Limits that are not given stay if `keep`, else they are removed.
 pub async fn set_limits(session: &Session, given: LimitsOrder, keep: bool) -> Result<(), UserError> {
     let state = session.state().await?;
     let v = session.choose(&state)?;
-    let last = v.orders.limits.clone().filter(|_| keep).unwrap_or_default();
+    let advice = "without --keep the limits that are not given are removed";
+    let present = || present_order(v, "limits", &v.orders.limits, &v.orders.limits_in_force, advice);
+    let last = if keep { present()? } else { LimitsOrder::default() };
     let order = LimitsOrder {
         depth_m: given.depth_m.or(last.depth_m),
         altitude_m: given.altitude_m.or(last.altitude_m),

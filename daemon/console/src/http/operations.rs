@@ -1,15 +1,14 @@
 //! Every path and method of the server, in one table from which the router and the OpenAPI document are made.
 
+mod archive;
 mod directive;
 
 use super::handlers::{command, events, log, login, maps, metrics, orders, readings};
-use super::shared::{ArchiveName, Shared, VehicleId};
+use super::shared::{Shared, VehicleId};
 use crate::export::MapFormat;
 use crate::fit::Fit;
 use crate::orders::{CommandOrder, DismissOrder, DraftOrder, LabelOrder, MarkerOrder, NoteOrder, RemoveMarkerOrder};
-use crate::state::{
-    AcceptedOrder, ArchiveList, CellHistory, CommandState, LogList, MapBody, MissionState, PrincipalInfo,
-};
+use crate::state::{AcceptedOrder, CellHistory, CommandState, LogList, MapBody, MissionState, PrincipalInfo};
 use axum::extract::State;
 use axum::http::{HeaderMap, Method};
 use axum::routing::{MethodRouter, get, post};
@@ -88,16 +87,6 @@ fn change(
     Operation { method: Method::POST, path, id, role, summary, body: Some(body), success, route }
 }
 
-/// A file format of an archived map.
-macro_rules! archive_file {
-    ($path:literal, $id:literal, $summary:literal, $format:expr) => {{
-        const FORMAT: MapFormat = $format;
-        read($path, $id, $summary, Content::File(FORMAT.content_type()), || {
-            get(|State(shared): State<Shared>, ArchiveName(name): ArchiveName| maps::archived(shared, name, FORMAT))
-        })
-    }};
-}
-
 /// A file format of the map of a vehicle.
 macro_rules! map_file {
     ($path:literal, $id:literal, $summary:literal, $format:expr) => {{
@@ -113,7 +102,7 @@ macro_rules! map_file {
 pub(super) fn operations() -> Vec<Operation> {
     let mut all = readings();
     all.extend(map_files());
-    all.extend(archive());
+    all.extend(archive::operations());
     all.extend(changes());
     all.extend(directive::operations());
     all.extend(commands());
@@ -254,60 +243,6 @@ fn map_files() -> Vec<Operation> {
             "map_wgs84",
             "The map as a GeoTIFF in EPSG:4326",
             MapFormat::Wgs84Tiff
-        ),
-    ]
-}
-
-fn archive() -> Vec<Operation> {
-    vec![
-        read(
-            "/api/v2/archive",
-            "archive",
-            "The maps of runs and label epochs that have ended, the newest first",
-            Content::Json(schema::<ArchiveList>),
-            || get(maps::archives),
-        ),
-        archive_file!(
-            "/api/v2/archive/{name}/map.png",
-            "archived_map_png",
-            "An archived map as an indexed PNG, north up, pixel value = label",
-            MapFormat::Png
-        ),
-        archive_file!(
-            "/api/v2/archive/{name}/map.pgw",
-            "archived_map_world_file",
-            "The world file of that PNG",
-            MapFormat::WorldFile
-        ),
-        archive_file!(
-            "/api/v2/archive/{name}/map.png.aux.xml",
-            "archived_map_projection",
-            "The projection of that PNG, in the file that GDAL and QGIS read",
-            MapFormat::Projection
-        ),
-        archive_file!(
-            "/api/v2/archive/{name}/map.geojson",
-            "archived_map_geojson",
-            "Regions of equal label of an archived map",
-            MapFormat::GeoJson
-        ),
-        archive_file!(
-            "/api/v2/archive/{name}/map.ply",
-            "archived_map_ply",
-            "The cells of an archived map as a coloured point cloud",
-            MapFormat::Ply
-        ),
-        archive_file!(
-            "/api/v2/archive/{name}/map.csv",
-            "archived_map_csv",
-            "One line for each explored cell of an archived map",
-            MapFormat::Csv
-        ),
-        archive_file!(
-            "/api/v2/archive/{name}/map.tif",
-            "archived_map_tiff",
-            "An archived map as a GeoTIFF, a pixel a cell",
-            MapFormat::Tiff
         ),
     ]
 }

@@ -4,7 +4,7 @@
 //   { outlines: [{ kind: "fence" | "keep_out" | "area", points: [[x, y], ..], weight }], returnPoint: [x, y] | null }
 //   metres in the world; only an area has a weight, and only the first plan a return point
 
-import { covers, holds, MAX_KEEP_OUTS, outlineFault } from "./polygon.js";
+import { covers, holds, MAX_DISTANCE_M, MAX_KEEP_OUTS, outlineFault } from "./polygon.js";
 
 export function fromServer(fence) {
   const outlines = (fence?.keep_outs ?? []).map((points) => ({ kind: "keep_out", points }));
@@ -49,7 +49,7 @@ export function faults({ outlines, returnPoint }) {
 }
 
 function returnPointFault(sound, place) {
-  if (!place.every((m) => Math.abs(m) <= 838860.7)) return "It is not a place within 838 km";
+  if (!place.every((m) => Math.abs(m) <= MAX_DISTANCE_M)) return `It is farther than ${MAX_DISTANCE_M / 1000} km from the origin`;
   const bad = sound.find((o) => holds(o.points, place) !== (o.kind === "fence"));
   if (!bad) return null;
   return bad.kind === "fence" ? "It lies outside the fence" : "It lies in a keep-out";

@@ -3,7 +3,8 @@
 
 export const MAX_CORNERS = 34;
 export const MAX_KEEP_OUTS = 15;
-const MAX_DM = 8388607;
+/** The distance from the origin beyond which the daemon takes a place for a typing error. */
+export const MAX_DISTANCE_M = 100000;
 
 const dm = ([x, y]) => [Math.round(x * 10), Math.round(y * 10)];
 
@@ -43,8 +44,8 @@ export function outlineFault(metres) {
   const points = metres.map(dm);
   const n = points.length;
   if (n < 3 || n > MAX_CORNERS) return `${n} ${n === 1 ? "corner" : "corners"}: an outline has 3 to ${MAX_CORNERS}`;
-  const far = points.findIndex((p) => !p.every((d) => Math.abs(d) <= MAX_DM));
-  if (far >= 0) return `Corner ${far + 1} is not a place within 838 km`;
+  const far = metres.findIndex((p) => !p.every((m) => Math.abs(m) <= MAX_DISTANCE_M));
+  if (far >= 0) return `Corner ${far + 1} is farther than ${MAX_DISTANCE_M / 1000} km from the origin`;
   const sides = edges(points);
   const twice = sides.findIndex(([a, b]) => same(a, b));
   if (twice >= 0) return `Corners ${twice + 1} and ${((twice + 1) % n) + 1} are at the same place`;

@@ -43,7 +43,7 @@ export function update() {
   const { outlines, returnPoint } = plan;
   const isDrawing = pen.order === fenceOrder && pen.tool === "corner";
   if (isDrawing && !outlines[pen.outline]) pickTool(fenceOrder, null);
-  foot.update(vehicle, !isSound(plan));
+  foot.update(vehicle, !isSound(plan) || wouldLiftUnknown(vehicle, plan));
   text(tools.fence, outlines[0]?.kind === "fence" ? "Extend fence" : "Draw fence");
   tools.returnPoint.setAttribute("aria-pressed", String(pen.tool === "return_point"));
   for (const [name, node] of Object.entries(tools)) show(node, (name === "done") === isDrawing);
@@ -51,7 +51,8 @@ export function update() {
   list.update();
   show(returnBox, returnPoint !== null);
   if (returnPoint) refreshReturnPoint(returnPoint, faults(plan).returnPoint);
-  text(state, describeInForce(vehicle));
+  const reason = wouldLiftUnknown(vehicle, plan) ? " Without a fence, this plan would lift the one in force: draw a fence, or wait for the report." : "";
+  text(state, describeInForce(vehicle) + reason);
   const by = vehicle.map.placement;
   show(frame, Boolean(by));
   if (by) text(frame, `In metres of the world frame. Fixes have moved the map by ${metres(by.east_m)} east and ${metres(by.north_m)} north; outlines stay.`);
@@ -62,6 +63,12 @@ function refreshReturnPoint(at, fault) {
   returnFields.update(at);
   show(returnFault, fault !== null);
   text(returnFault, fault ?? "");
+}
+
+/** Whether the plan, sent as a whole, would lift a fence that the vehicle may have and this surface does not know. */
+function wouldLiftUnknown(vehicle, { outlines, returnPoint }) {
+  const isKnown = vehicle.fence_in_force || slotOf(vehicle, "fence") || vehicle.in_force.fence === "none";
+  return !isKnown && outlines[0]?.kind !== "fence" && (outlines.length > 0 || returnPoint !== null);
 }
 
 /** The fence in force, as far as the surface knows. */
