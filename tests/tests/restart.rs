@@ -127,6 +127,8 @@ fn a_killed_surface_shows_the_same_page_again() {
     assert!(began.elapsed() < Duration::from_secs(2), "{:?}", began.elapsed());
     let after = pair.state().unwrap();
     assert_eq!(lasting(after["vehicles"][0].clone()), lasting(before["vehicles"][0].clone()));
+    assert_eq!(after["command"], before["command"]);
+    assert_eq!(after["command"]["holder"]["name"], "local");
     assert_eq!(cells(&pair), map);
     assert_eq!(marker_of(&pair), ("a wreck".to_owned(), vec![4.5, -3.0]));
     assert_eq!(after["mission"]["id"], before["mission"]["id"]);

@@ -3,6 +3,7 @@
 //! Every way in (page, `scenecast ctl`, API, later other peers) passes [`Command::check`] before an order and
 //! [`Command::handle_order`] after it was accepted.
 
+use crate::record::MAX_COMMAND_CHANGES;
 use scenecast_core::{Principal, Role};
 use scenecast_protocol::time::Instant;
 use std::collections::VecDeque;
@@ -14,8 +15,6 @@ pub const COMMAND_SILENCE: Duration = Duration::from_secs(120);
 const REQUEST_LIFETIME: Duration = Duration::from_secs(120);
 /// Pending requests at most; a further one replaces the oldest.
 const MAX_REQUESTS: usize = 16;
-/// Changes that are kept for the page at most.
-const MAX_CHANGES: usize = 32;
 
 /// An action, as far as it decides who may take it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -117,6 +116,11 @@ pub enum CommandChangeKind {
     Withdrawn,
 }
 
+impl CommandChangeKind {
+    /// Every kind, in the order of the numbers in files.
+    pub(super) const ALL: [Self; 5] = [Self::Taken, Self::HandedOver, Self::Released, Self::Requested, Self::Withdrawn];
+}
+
 /// A change of command, for the page's history.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct CommandChange {
@@ -143,6 +147,29 @@ impl Command {
     /// Nobody has command. It can be handed over to these principals.
     pub fn new(principals: impl IntoIterator<Item = Principal>) -> Self {
         Self { principals: principals.into_iter().collect(), ..Self::default() }
+    }
+
+    /// Takes over the state before a restart. A principal that this surface does not know any more has no command and no
+    /// request.
+    pub(super) fn restore(
+        &mut self,
+        holder: Option<(&str, Instant, Instant)>,
+        requests: impl IntoIterator<Item = (String, Instant)>,
+        changes: impl IntoIterator<Item = CommandChange>,
+    ) {
+        let holds = |name: &str| self.known(name).filter(|principal| principal.role() >= Role::Operator);
+        let holder = holder
+            .and_then(|(name, since, last_active)| Some(CommandHolder { principal: holds(name)?, since, last_active }));
+        let requests =
+            requests.into_iter().filter_map(|(name, at)| Some(CommandRequest { principal: holds(&name)?, at }));
+        let requests = requests.take(MAX_REQUESTS).collect();
+        (self.holder, self.requests, self.changes) = (holder, requests, changes.into_iter().collect());
+    }
+
+    /// A principal by name. Without tokens there is one, `local`.
+    fn known(&self, name: &str) -> Option<Principal> {
+        let local = self.principals.is_empty().then(Principal::local);
+        self.principals.iter().cloned().chain(local).find(|principal| principal.name() == name)
     }
 
     pub fn principals(&self) -> &[Principal] {
@@ -291,7 +318,7 @@ impl Command {
 
     fn record(&mut self, kind: CommandChangeKind, by: &Principal, from: Option<String>, now: Instant) -> CommandChange {
         let change = CommandChange { at: now, kind, by: by.name().to_owned(), from, to: self.holder_name() };
-        if self.changes.len() >= MAX_CHANGES {
+        if self.changes.len() >= MAX_COMMAND_CHANGES {
             self.changes.pop_front();
         }
         self.changes.push_back(change.clone());

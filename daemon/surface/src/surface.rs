@@ -46,7 +46,7 @@ pub struct Surface {
     /// The localisation relay, if the surface has a GPS.
     relay: Option<Relay>,
     tuning: TuningTable,
-    command: Command,
+    pub(super) command: Command,
     pub(super) log: MissionLog,
     /// What the log has about each vehicle.
     pub(super) watches: BTreeMap<Address, Watch>,

@@ -1,7 +1,7 @@
 //! Maps of runs that have ended, one file for each vehicle, epoch and run.
 
-use super::{batch, log};
-use crate::journal::Storage;
+use super::batch;
+use crate::journal::{Storage, write_whole};
 use scenecast_surface::record::{self, RunId, SurfaceMemory, VehicleMemory};
 use scenecast_surface::recorder::Archive;
 use std::collections::{BTreeMap, VecDeque};
@@ -86,7 +86,7 @@ impl Archives {
             let is_smaller = |info: &ArchiveInfo| self.known.get(&name).is_some_and(|known| known.cells > info.cells);
             if let Some(info) = found.filter(|info| !is_smaller(info)) {
                 let bytes = batch::encode(memory.last().unix_ms, 0, &record::encode(&archive.events));
-                log::write_whole(storage, &format!("{name}{SUFFIX}"), &bytes)?;
+                write_whole(storage, &format!("{name}{SUFFIX}"), &bytes)?;
                 self.known.insert(name, info);
             }
             self.waiting.pop_front();

@@ -1,7 +1,7 @@
 //! The store's file: a snapshot, and after it the batches of events since.
 
 use super::batch;
-use crate::journal::Storage;
+use crate::journal::{Storage, write_whole};
 use scenecast_surface::record::{self, DecodeError, Event};
 use std::io;
 
@@ -33,17 +33,6 @@ pub(super) fn read<S: Storage>(storage: &S) -> io::Result<Option<Result<Found, D
     }
     let damaged_at = scan.is_damaged.then(|| scan.unreadable.unwrap_or(0));
     Ok(Some(Ok(Found { events, damaged_at })))
-}
-
-/// Writes a file beside the one of this name, and puts it in its place.
-pub(super) fn write_whole<S: Storage>(storage: &mut S, name: &str, bytes: &[u8]) -> io::Result<S::File> {
-    let part = format!("{name}.part");
-    let mut file = storage.create(&part)?;
-    storage.append(&part, &mut file, bytes)?;
-    storage.sync(&mut file)?;
-    storage.rename(&part, name)?;
-    storage.sync_folder()?;
-    Ok(file)
 }
 
 /// A file that is open for appending. After an error its end is unknown, so it must be dropped.

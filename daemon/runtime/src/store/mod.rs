@@ -6,6 +6,8 @@ mod files;
 #[cfg(test)]
 mod fuzz_corpus;
 #[cfg(test)]
+mod kept_command;
+#[cfg(test)]
 mod kept_log;
 mod log;
 #[cfg(test)]
@@ -16,7 +18,7 @@ mod refusing;
 pub(super) use archives::{ArchiveInfo, ArchivedFile};
 pub(super) use files::SurfaceFiles;
 
-use crate::journal::Storage;
+use crate::journal::{Storage, write_whole};
 use archives::Archives;
 use log::{EventLog, Found, STORE};
 use scenecast_core::UserError;
@@ -190,5 +192,5 @@ impl<S: Storage> SurfaceStore<S> {
 /// Copies the file under another name, before it is replaced.
 fn set_aside<S: Storage>(storage: &mut S, name: &str) -> io::Result<()> {
     let Some(bytes) = storage.read(STORE)? else { return Ok(()) };
-    log::write_whole(storage, name, &bytes).map(drop)
+    write_whole(storage, name, &bytes).map(drop)
 }

@@ -3,8 +3,8 @@
 use super::event::Event;
 
 /// The version of the layout of events. A build reads its own version and earlier ones.
-/// Layouts 2 to 4 append events to the layout before.
-const SCHEMA: u16 = 4;
+/// Layouts 2 to 5 append events to the layout before.
+const SCHEMA: u16 = 5;
 
 /// The reason that bytes are no batch of events.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
@@ -39,8 +39,8 @@ pub fn decode(bytes: &[u8]) -> Result<Vec<Event>, DecodeError> {
 #[cfg(test)]
 mod tests {
     use super::super::event::{
-        EventKind, EventSource, EventTime, RunId, StoredCells, StoredDraft, StoredLogEntry, StoredMarker, StoredPlaces,
-        VehicleEvent,
+        EventKind, EventSource, EventTime, RunId, StoredCells, StoredCommand, StoredCommandChange, StoredDraft,
+        StoredLogEntry, StoredMarker, StoredPlaces, VehicleEvent,
     };
     use super::*;
     use proptest::prelude::*;
@@ -93,7 +93,7 @@ mod tests {
         };
         let events = [event(marker, 1), event(VehicleEvent::MarkerGone(300), 2)];
         let golden = [
-            &[0, 4, 2][..],
+            &[0, 5, 2][..],
             &[1, 0xE8, 0x07, 0xD0, 0x0F, 0, 2, 1, 16, 0xAC, 2],
             &1.5f64.to_le_bytes(),
             &(-2.0f64).to_le_bytes(),
@@ -110,7 +110,7 @@ mod tests {
         let kind = EventKind::Vehicle(1, VehicleEvent::Places(places));
         let time = EventTime { mission_us: 1000, unix_ms: 2000 };
         let events = [Event { sequence: 1, time, source: EventSource::Surface, kind }];
-        let golden = [0, 4, 1, 1, 0xE8, 0x07, 0xD0, 0x0F, 0, 2, 1, 18, 0, 1, 0xAC, 2, 2, 7, 8, 0, 0];
+        let golden = [0, 5, 1, 1, 0xE8, 0x07, 0xD0, 0x0F, 0, 2, 1, 18, 0, 1, 0xAC, 2, 2, 7, 8, 0, 0];
         assert_eq!(encode(&events), golden);
         assert_eq!(decode(&golden).as_deref(), Ok(&events[..]));
     }
@@ -129,7 +129,7 @@ mod tests {
         };
         let events = [event(1, VehicleEvent::Former(former)), event(2, VehicleEvent::Draft(draft))];
         let golden = [
-            &[0, 4, 2][..],
+            &[0, 5, 2][..],
             &[1, 0xE8, 0x07, 0xD0, 0x0F, 0, 2, 1, 19, 0, 1, 6, 7, 7, 0xD0, 0x0F],
             &[2, 0xE8, 0x07, 0xD0, 0x0F, 0, 2, 1, 20, 0xAC, 2, 1, 3],
             &0.5f64.to_le_bytes(),
@@ -146,7 +146,7 @@ mod tests {
         let kind = EventKind::Vehicle(1, VehicleEvent::InForce(vec![vec![7, 8], vec![9]]));
         let time = EventTime { mission_us: 1000, unix_ms: 2000 };
         let events = [Event { sequence: 1, time, source: EventSource::Surface, kind }];
-        let golden = [0, 4, 1, 1, 0xE8, 0x07, 0xD0, 0x0F, 0, 2, 1, 21, 2, 2, 7, 8, 1, 9];
+        let golden = [0, 5, 1, 1, 0xE8, 0x07, 0xD0, 0x0F, 0, 2, 1, 21, 2, 2, 7, 8, 1, 9];
         assert_eq!(encode(&events), golden);
         assert_eq!(decode(&golden).as_deref(), Ok(&events[..]));
     }
@@ -156,14 +156,44 @@ mod tests {
         let entry = StoredLogEntry { number: 300, at: 5, vehicle: Some(1), kind: 7, by: None, text: "ab".to_owned() };
         let time = EventTime { mission_us: 1000, unix_ms: 2000 };
         let events = [Event { sequence: 1, time, source: EventSource::Surface, kind: EventKind::Logged(entry) }];
-        let golden = [0, 4, 1, 1, 0xE8, 0x07, 0xD0, 0x0F, 0, 3, 0xAC, 2, 5, 1, 1, 7, 0, 2, b'a', b'b'];
+        let golden = [0, 5, 1, 1, 0xE8, 0x07, 0xD0, 0x0F, 0, 3, 0xAC, 2, 5, 1, 1, 7, 0, 2, b'a', b'b'];
         assert_eq!(encode(&events), golden);
         assert_eq!(decode(&golden).as_deref(), Ok(&events[..]));
     }
 
     #[test]
+    fn golden_bytes_of_command() {
+        let holder = Some(("ann".to_owned(), 5, 300));
+        let command = StoredCommand { holder, requests: vec![("bo".to_owned(), 6)] };
+        let to = Some("ann".to_owned());
+        let change = StoredCommandChange { at: 5, kind: 1, by: "bo".to_owned(), from: None, to };
+        let time = EventTime { mission_us: 1000, unix_ms: 2000 };
+        let event = |sequence, kind| Event { sequence, time, source: EventSource::Surface, kind };
+        let events = [event(1, EventKind::Command(command)), event(2, EventKind::CommandChanged(change))];
+        let head = [0xE8, 0x07, 0xD0, 0x0F, 0];
+        let golden = [
+            &[0, 5, 2][..],
+            &[1],
+            &head,
+            &[4, 1, 3, b'a', b'n', b'n', 5, 0xAC, 2, 1, 2, b'b', b'o', 6],
+            &[2],
+            &head,
+            &[5, 5, 1, 2, b'b', b'o', 0, 1, 3, b'a', b'n', b'n'],
+        ];
+        assert_eq!(encode(&events), golden.concat());
+        assert_eq!(decode(&golden.concat()).as_deref(), Ok(&events[..]));
+    }
+
+    #[test]
+    fn the_layout_before_is_read() {
+        let events = events();
+        let [_, _, rest @ ..] = &encode(&events)[..] else { panic!("two bytes of version") };
+        assert_eq!(decode(&[&[0, 4], rest].concat()), Ok(events));
+    }
+
+    #[test]
     fn a_later_layout_is_refused_by_its_number() {
-        assert_eq!(decode(&[0, 5, 0]), Err(DecodeError::Later(5)));
+        assert_eq!(decode(&[0, 6, 0]), Err(DecodeError::Later(6)));
         assert_eq!(decode(&[0, 0, 0]), Err(DecodeError::Damaged));
         assert_eq!(decode(&[0]), Err(DecodeError::Damaged));
     }
@@ -171,7 +201,7 @@ mod tests {
     proptest! {
         #[test]
         fn any_bytes_decode_or_are_refused(bytes in proptest::collection::vec(any::<u8>(), 0..200)) {
-            let _ = decode(&[&[0, 4], &bytes[..]].concat());
+            let _ = decode(&[&[0, 5], &bytes[..]].concat());
         }
     }
 }

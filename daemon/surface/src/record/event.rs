@@ -45,6 +45,30 @@ pub enum EventKind {
     Vehicle(u8, VehicleEvent),
     /// An entry of the mission's log. Since layout 3.
     Logged(StoredLogEntry),
+    /// The holder of command and the requests for it. Since layout 5.
+    Command(StoredCommand),
+    /// A change of command, for its history. Since layout 5.
+    CommandChanged(StoredCommandChange),
+}
+
+/// Who has command and who requests it, by name. Times are mission times in microseconds.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct StoredCommand {
+    /// The holder, the time since when, and that of the last sign of presence.
+    pub holder: Option<(String, u64, u64)>,
+    /// Requests with their times, the oldest first.
+    pub requests: Vec<(String, u64)>,
+}
+
+/// A change of command.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct StoredCommandChange {
+    pub at: u64,
+    /// 0 taken, 1 handed over, 2 released, 3 requested, 4 withdrawn.
+    pub kind: u8,
+    pub by: String,
+    pub from: Option<String>,
+    pub to: Option<String>,
 }
 
 /// An entry of the mission's log.

@@ -3,8 +3,9 @@
 use super::cells::{EarlierMap, MapCopy};
 use super::contact::StoredContact;
 use super::event::{
-    Event, EventKind, EventTime, RunId, StoredBudget, StoredDraft, StoredImage, StoredIntent, StoredLabel,
-    StoredLogEntry, StoredMarker, StoredNote, StoredOrder, StoredPlaces, StoredRequest, VehicleEvent,
+    Event, EventKind, EventTime, RunId, StoredBudget, StoredCommand, StoredCommandChange, StoredDraft, StoredImage,
+    StoredIntent, StoredLabel, StoredLogEntry, StoredMarker, StoredNote, StoredOrder, StoredPlaces, StoredRequest,
+    VehicleEvent,
 };
 use super::former_labels::FormerLabels;
 use scenecast_protocol::map::Cell;
@@ -16,6 +17,8 @@ use std::sync::Arc;
 const MAX_TRACK: usize = 500;
 /// Notes that are kept of a vehicle.
 const MAX_NOTES: usize = 200;
+/// Changes of command that are kept.
+pub(crate) const MAX_COMMAND_CHANGES: usize = 32;
 /// Entries that are kept of the mission's log.
 pub(crate) const MAX_LOG: usize = 2000;
 /// The most markers that are kept; a surface sets no more.
@@ -46,6 +49,10 @@ pub struct SurfaceMemory {
     pub(crate) vehicles: BTreeMap<u8, VehicleMemory>,
     /// The last entries of the log.
     pub(crate) log: VecDeque<StoredLogEntry>,
+    /// The holder of command and the requests for it.
+    pub(crate) command: StoredCommand,
+    /// The last changes of command.
+    pub(crate) command_changes: VecDeque<StoredCommandChange>,
 }
 
 /// Everything that the surface keeps about one vehicle.
@@ -97,6 +104,11 @@ impl SurfaceMemory {
                 self.log.push_back(entry.clone());
                 self.log.drain(..self.log.len().saturating_sub(MAX_LOG));
             }
+            EventKind::Command(command) => self.command = command.clone(),
+            EventKind::CommandChanged(change) => {
+                self.command_changes.push_back(change.clone());
+                self.command_changes.drain(..self.command_changes.len().saturating_sub(MAX_COMMAND_CHANGES));
+            }
         }
     }
 
@@ -120,6 +132,8 @@ impl SurfaceMemory {
             all.extend(vehicle.to_events().into_iter().map(|event| EventKind::Vehicle(address, event)));
         }
         all.extend(self.log.iter().cloned().map(EventKind::Logged));
+        all.extend(Some(self.command.clone()).filter(|c| *c != StoredCommand::default()).map(EventKind::Command));
+        all.extend(self.command_changes.iter().cloned().map(EventKind::CommandChanged));
         all
     }
 

@@ -11,8 +11,9 @@ pub use cells::{EarlierMap, MapCopy};
 pub use contact::{StoredContact, StoredRange};
 pub use encode::{DecodeError, decode, encode};
 pub use event::{
-    Event, EventKind, EventSource, EventTime, RunId, StoredBudget, StoredCells, StoredDraft, StoredImage, StoredIntent,
-    StoredLabel, StoredLogEntry, StoredMarker, StoredNote, StoredOrder, StoredPlaces, StoredRequest, VehicleEvent,
+    Event, EventKind, EventSource, EventTime, RunId, StoredBudget, StoredCells, StoredCommand, StoredCommandChange,
+    StoredDraft, StoredImage, StoredIntent, StoredLabel, StoredLogEntry, StoredMarker, StoredNote, StoredOrder,
+    StoredPlaces, StoredRequest, VehicleEvent,
 };
 pub use memory::{Began, SurfaceMemory, VehicleMemory};
-pub(crate) use memory::{MAX_LOG, MAX_MARKERS};
+pub(crate) use memory::{MAX_COMMAND_CHANGES, MAX_LOG, MAX_MARKERS};

@@ -3,6 +3,7 @@
 //! [`Recorder`] compares the surface with its [`SurfaceMemory`] and yields the [`Event`]s between them; the host writes
 //! these before it shows or sends anything that depends on them.
 
+mod command;
 mod restore;
 mod stored;
 
@@ -107,6 +108,7 @@ impl Recorder {
             self.observe_vehicle(surface, address, by, &mut found, time);
         }
         self.observe_log(surface, &mut found, time);
+        self.observe_command(surface, &source, &mut found, time);
         found
     }
 
@@ -122,6 +124,16 @@ impl Recorder {
         let news: Vec<StoredLogEntry> = news.map(StoredLogEntry::from).collect();
         for entry in news.into_iter().rev() {
             self.push(found, EventSource::Surface, time, EventKind::Logged(entry));
+        }
+    }
+
+    fn observe_command(&mut self, surface: &Surface, source: &EventSource, found: &mut Observation, time: EventTime) {
+        for change in command::news(&surface.command, &self.memory) {
+            self.push(found, source.clone(), time, EventKind::CommandChanged(change));
+        }
+        let present = command::stored(&surface.command, Instant::from_micros(time.mission_us));
+        if present != self.memory.command {
+            self.push(found, source.clone(), time, EventKind::Command(present));
         }
     }
 

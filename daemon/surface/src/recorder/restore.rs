@@ -1,6 +1,6 @@
 //! Puts the stored knowledge back into a surface that has just started.
 
-use super::stored;
+use super::{command, stored};
 use crate::Surface;
 use crate::exemplar_cache::ExemplarCache;
 use crate::record::{StoredBudget, SurfaceMemory, VehicleMemory};
@@ -22,6 +22,7 @@ pub(super) fn restore(surface: &mut Surface, memory: &SurfaceMemory, configured:
         BackgroundOrder::from_bytes(&budget.background).into_iter().for_each(|order| surface.set_background(order));
     }
     surface.restore_log(&memory.log);
+    command::restore(surface, memory);
     for (&number, vehicle) in &memory.vehicles {
         let Some(address) = Address::vehicle(number) else { continue };
         let (series, orders) =

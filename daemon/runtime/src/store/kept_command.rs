@@ -1,0 +1,40 @@
+//! Command across restarts.
+
+use super::refusing::{at, start};
+use crate::journal::disk::Disk;
+use scenecast_core::{Principal, Role};
+use scenecast_protocol::time::Instant;
+use scenecast_surface::{CommandAction, OrderKind, Surface};
+
+fn principal(name: &str) -> Principal {
+    Principal::new(name, Role::Operator).unwrap()
+}
+
+/// Holder, requests and the number of changes.
+fn shown(surface: &Surface, now: Instant) -> (Option<String>, Vec<String>, usize) {
+    let command = surface.command();
+    let holder = command.holder().map(|holder| holder.principal.name().to_owned());
+    let requests = command.requests(now).map(|request| request.principal.name().to_owned()).collect();
+    (holder, requests, command.changes().count())
+}
+
+#[test]
+fn command_its_requests_and_its_history_survive_a_restart() {
+    let (disk, now) = (Disk::default(), Instant::from_secs_f64(1.0));
+    let (mut store, mut surface) = start(&disk, 0);
+    surface.handle_accepted(&Principal::local(), OrderKind::Order, now);
+    store.commit(&mut surface, Some("local"), at(1));
+    surface.change_command(&principal("bo"), &CommandAction::Request, now).unwrap();
+    store.commit(&mut surface, Some("bo"), at(2));
+    assert_eq!(shown(&surface, now), (Some("local".to_owned()), vec!["bo".to_owned()], 2));
+    drop(store);
+    let (store, mut surface) = start(&disk, 3);
+    let is_held = surface.command().check(&principal("bo"), OrderKind::Order, now).is_err();
+    // Without tokens there is no principal "bo" any more.
+    assert_eq!((is_held, shown(&surface, now)), (true, (Some("local".to_owned()), vec![], 2)));
+    surface.change_command(&Principal::local(), &CommandAction::Release, now).unwrap();
+    let mut store = store;
+    store.commit(&mut surface, Some("local"), at(4));
+    drop(store);
+    assert_eq!(shown(&start(&disk, 5).1, now), (None, vec![], 3));
+}
