@@ -1,12 +1,10 @@
 //! The file of the scene model's checkpoint. It is replaced atomically.
 
-use super::journal::Storage;
+use super::journal::{Storage, write_whole};
 use scenecast_core::UserError;
 use std::io;
 
 const NAME: &str = "scene.checkpoint";
-/// Name of the file while it is being written.
-const PART: &str = "scene.checkpoint.part";
 
 /// Whether the folder has a checkpoint, readable or not.
 pub(super) fn is_there(storage: &impl Storage) -> bool {
@@ -38,11 +36,7 @@ impl<S: Storage> CheckpointFile<S> {
     }
 
     fn write(&mut self, bytes: &[u8]) -> io::Result<()> {
-        let mut file = self.storage.create(PART)?;
-        self.storage.append(PART, &mut file, bytes)?;
-        self.storage.sync(&mut file)?;
-        self.storage.rename(PART, NAME)?;
-        self.storage.sync_folder()
+        write_whole(&mut self.storage, NAME, bytes).map(drop)
     }
 
     fn failed(&self, e: io::Error) -> UserError {

@@ -70,7 +70,7 @@ pub(super) struct Keep {
     pub(super) lineage: u64,
     /// Seconds of mission time between two checkpoints; 0 for none.
     pub(super) every_s: f64,
-    /// Mission time of the last checkpoint, or of the first frame.
+    /// Mission time of the last attempt to write a checkpoint, or of the first frame.
     pub(super) last_s: Option<f64>,
     /// Whether the last checkpoint was refused.
     pub(super) is_refused: bool,
@@ -84,10 +84,17 @@ impl Keep {
             return;
         }
         let kept = self.file.keep(&mapper.save(self.lineage));
-        self.is_refused = kept.is_err();
+        self.last_s = Some(now_s);
+        let was_refused = std::mem::replace(&mut self.is_refused, kept.is_err());
         match kept {
-            Ok(()) => self.last_s = Some(now_s),
-            Err(error) => tracing::error!("no checkpoint of the scene model at {now_s} s: {error}"),
+            Ok(()) if was_refused => tracing::info!("checkpoints of the scene model are written again"),
+            Err(error) if !was_refused => {
+                tracing::error!(
+                    "no checkpoint of the scene model at {now_s} s, tried again every {} s: {error}",
+                    self.every_s
+                );
+            }
+            Ok(()) | Err(_) => {}
         }
     }
 

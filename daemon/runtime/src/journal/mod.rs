@@ -11,7 +11,7 @@ mod damage;
 pub(super) mod disk;
 
 pub(super) use record::{BodyLayout, Damage};
-pub(crate) use storage::{Folder, Storage};
+pub(crate) use storage::{Folder, Storage, write_whole};
 
 use record::{FILE_BYTES, Record, RecordContent};
 use std::io;

@@ -48,6 +48,25 @@ pub(crate) trait Storage {
     fn sync_folder(&mut self) -> io::Result<()>;
 }
 
+/// Writes a file beside the one of this name, and puts it in its place. An error frees the space of the unfinished file.
+pub(crate) fn write_whole<S: Storage>(storage: &mut S, name: &str, bytes: &[u8]) -> io::Result<S::File> {
+    let part = format!("{name}.part");
+    let written = storage.create(&part).and_then(|mut file| {
+        storage.append(&part, &mut file, bytes)?;
+        storage.sync(&mut file)?;
+        storage.rename(&part, name)?;
+        Ok(file)
+    });
+    match written {
+        Ok(file) => storage.sync_folder().map(|()| file),
+        Err(e) => {
+            // An unfinished file could be all that fills the disk.
+            let _ = storage.create(&part);
+            Err(e)
+        }
+    }
+}
+
 /// A folder of the machine's file system, held by one process. Clones share the lock.
 #[derive(Clone)]
 pub(crate) struct Folder {
