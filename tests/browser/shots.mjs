@@ -11,13 +11,13 @@ import { join } from "node:path";
 import { chromium } from "playwright-core";
 import { LAUNCH } from "./browser.mjs";
 import { startMock } from "./mock/server.mjs";
-import { PHONE, WIDE } from "./stage.mjs";
+import { MIDDLE, PHONE, WIDE } from "./stage.mjs";
 
 const option = (name, otherwise) => {
   const at = process.argv.indexOf(`--${name}`);
   return at > 0 ? process.argv[at + 1] : otherwise;
 };
-const SIZES = { wide: WIDE, phone: PHONE };
+const SIZES = { wide: WIDE, middle: MIDDLE, phone: PHONE };
 const THEMES = ["light", "dark", "red"];
 const out = option("out", new URL("../../out/console-shots", import.meta.url).pathname);
 const given = option("url", null);

@@ -3,6 +3,7 @@
 import assert from "node:assert/strict";
 
 export const WIDE = { width: 1440, height: 900 };
+export const MIDDLE = { width: 1024, height: 768 };
 export const PHONE = { width: 390, height: 844 };
 export const API = "/api/v2";
 
