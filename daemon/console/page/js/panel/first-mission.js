@@ -1,6 +1,6 @@
 // The first mission in five steps. Each step is done by the state of the mission, not by a click, and the card can be closed for good.
 
-import { hasName, shownLabels } from "../book.js";
+import { hasName, nameOf, shownLabels } from "../book.js";
 import { denial } from "../command.js";
 import { $, data, h, show, text } from "../dom.js";
 import { slotOf } from "../order/status.js";
@@ -18,6 +18,16 @@ const isInForce = (v) => utility(v)?.state === "applied";
 /** A label without an image has the button Request; the others have an image, because spare capacity brings them. */
 const requestable = (v) => shownLabels(v).some((l) => l.exemplar.url === null && ["none", "refused"].includes(l.exemplar.state));
 
+/** What to do for an image. A vehicle keeps images of some labels only, so a request can wait long while another is served at once. */
+function pictureInstruction(v) {
+  const waiting = shownLabels(v).filter((l) => l.exemplar.state === "not_available").map((l) => nameOf(l.id));
+  if (waiting.length > 0) return `The vehicle has no new image of ${waiting.join(", ")} yet and sends it later. ${requestAnother(v)}`;
+  if (requestable(v)) return "Press Request beside a label. The vehicle sends an image of that sea floor.";
+  return "Click the image beside a label, then press Another. The vehicle sends one more image of that sea floor.";
+}
+
+const requestAnother = (v) => (requestable(v) ? "Press Request beside another label." : "Click the image beside another label, then press Another.");
+
 /** Name, instruction (which may depend on the vehicle), and whether the step is done. */
 const STEPS = [
   ["Look", "Each colour on the map is a label: sea floor that looks alike to the vehicle. The map grows while the vehicle surveys.",
@@ -28,9 +38,7 @@ const STEPS = [
     (v) => isInForce(v) && hasWeight(v)],
   ["Steer", "The vehicle plans its path by your weights. Its next report shows the plan as a dashed line.",
     (v) => isInForce(v) && Boolean(v.status?.waypoint) && v.status.at_s > utility(v).changed_s],
-  ["Picture", (v) => (requestable(v)
-    ? "Press Request beside a label. The vehicle sends an image of that sea floor."
-    : "Click the image beside a label, then press Another. The vehicle sends one more image of that sea floor."),
+  ["Picture", pictureInstruction,
     (v) => v.labels.some((l) => l.exemplar.images.some((image) => image.requested))],
 ];
 
