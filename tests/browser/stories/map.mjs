@@ -444,9 +444,9 @@ export default [
     },
   },
   {
-    name: "an empty map says so",
+    name: "an empty map says what appears and when",
     scenario: "empty",
-    run: (s) => s.shows("#map-empty", /No frame received from auv-1 yet/),
+    run: (s) => s.shows("#map-empty", /No frame received from auv-1 yet.*appear here.*expected every \d+.s/),
   },
   {
     name: "a second vehicle can be selected",

@@ -250,10 +250,17 @@ function drawCross(c) {
   c.stroke();
 }
 
+/** What an empty map shows soon. */
+function emptyText(v) {
+  const when = `a frame is expected every ${span(v.expected_interval_s)}.`;
+  if (v.last_received_s === null) return `No frame received from ${v.name} yet. Its position and its map appear here with the first frames; ${when}`;
+  return `No cell of the map has arrived yet. The map appears here while ${v.name} surveys; ${when}`;
+}
+
 function plates() {
   const v = store.vehicle;
   show($("map-empty"), Boolean(v) && v.map.explored_cells === 0);
-  text($("map-empty"), v?.last_received_s === null ? `No frame received from ${v.name} yet.` : "No cell of the map has arrived yet.");
+  if (v) text($("map-empty"), emptyText(v));
   show($("map-age"), Boolean(v));
   if (!v) return;
   const age = ageOf(v.map.updated_s);
