@@ -80,7 +80,7 @@ function gps(p) {
   if (!p) return "none";
   const rejected = total(p.usbl_rejected);
   const state = p.is_valid ? `\u00b1 ${metres(p.sigma_m)}` : "no position";
-  return `${state}, ${count(p.fixes_sent)} fixes${rejected ? `, ${count(rejected)} USBL rejected` : ""}`;
+  return `${state}, ${count(p.fixes_sent)} fix${p.fixes_sent === 1 ? "" : "es"} sent${rejected ? `, ${count(rejected)} USBL rejected` : ""}`;
 }
 
 function disk(d) {
