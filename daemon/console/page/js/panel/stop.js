@@ -8,7 +8,6 @@ import { orderStatus, slotOf } from "../order/status.js";
 import { store } from "../store.js";
 import { contact } from "./banners.js";
 
-
 const ORDERS = {
   hold: { button: "Hold", question: (v) => `Hold ${v.name} where it is?`, body: { hold: true } },
   resume: { button: "Resume", question: (v) => `Let ${v.name} resume its survey?`, body: { hold: false } },
@@ -28,6 +27,8 @@ const abort = h("button.grave", { type: "button", id: "abort", onclick: () => co
 /** The same orders in the bar, which is on every page and comes first in the order of the keyboard. */
 const barHold = h("button", { type: "button", id: "bar-hold", "aria-haspopup": "dialog", "aria-keyshortcuts": "Shift+H", onclick: () => hold.click() });
 const barAbort = h("button.grave", { type: "button", id: "bar-abort", "aria-haspopup": "dialog", "aria-keyshortcuts": "Shift+A", onclick: () => abort.click() }, "Abort");
+
+const HELP = new Map([[barHold, "Asks first; the keys are Shift+H"], [barAbort, "Asks first; the keys are Shift+A"]]);
 
 export function startStop() {
   $("stop").append(barHold, barAbort);
@@ -54,7 +55,7 @@ export function refreshStop(v) {
   const held = holding(v) ? order : stop;
   for (const [b, denied] of [[hold, held], [barHold, held], [resume, order], [abort, stop], [barAbort, stop]]) {
     b.disabled = !store.connected || denied !== null;
-    b.title = denied ?? "";
+    b.title = denied ?? HELP.get(b) ?? "";
   }
   const reason = stop ?? (holding(v) || STOPPED.includes(v.status?.mode) ? order : null);
   show(deniedLine, reason !== null);
