@@ -1,4 +1,5 @@
 import assert from "node:assert/strict";
+import { PHONE, WIDE } from "../stage.mjs";
 
 /** An explored cell near the middle of the view: its label, its place on the page, and in the world. */
 const aCell = (s) =>
@@ -15,7 +16,27 @@ const aCell = (s) =>
 
 const plate = "#place";
 
+const uncovered = [WIDE, PHONE].map((size) => ({
+  name: `the plate of a place leaves the place in view: ${size.width} px`,
+  size,
+  scenario: "rich",
+  async run(s) {
+    const map = await s.page.locator("#chart").boundingBox();
+    for (const [x, y] of [[0.1, 0.9], [0.48, 0.6], [0.52, 0.6], [0.95, 0.9]]) {
+      const at = [map.x + x * map.width, map.y + y * map.height];
+      await s.page.mouse.click(...at);
+      await s.visible(plate);
+      const box = await s.page.locator(plate).boundingBox();
+      const isCovered = at[0] >= box.x && at[0] <= box.x + box.width && at[1] >= box.y && at[1] <= box.y + box.height;
+      assert.ok(!isCovered, `${at} in ${JSON.stringify(box)}`);
+      assert.ok(box.x >= map.x && box.x + box.width <= map.x + map.width, `within the map: ${JSON.stringify(box)}`);
+      await s.button("Close the place").click();
+    }
+  },
+}));
+
 export default [
+  ...uncovered,
   {
     name: "a click on the map chooses the place: its label, its age, the row in the list",
     scenario: "start",

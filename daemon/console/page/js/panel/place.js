@@ -6,6 +6,7 @@ import { nameOf, shownAs, tintOf } from "../book.js";
 import { denial } from "../command.js";
 import { $, announce, fill, h, text } from "../dom.js";
 import { ago, metres, span } from "../format.js";
+import { view } from "../map/chart.js";
 import { chosen, chosenMarker, clearPlace, isDestination } from "../map/place.js";
 import { isSamePlace } from "../map/destination.js";
 import { onMap } from "../map/frames.js";
@@ -37,11 +38,19 @@ export function startPlace() {
   store.on("place", () => {
     text(error, "");
     words.value = "";
+    keepOffPlace();
     refresh();
     const label = labelHere();
     if (label !== null) showRow(label);
   });
   store.on("state map book tick", refresh);
+}
+
+/** Moves the plate to the half of the map in which the chosen place is not, since it would cover the place. */
+function keepOffPlace() {
+  if (chosen.at === null) return;
+  const [px] = view.toScreen(...chosen.at);
+  plate.classList.toggle("at-left", px > view.width / 2);
 }
 
 /** The cell at the chosen place, or null. */
