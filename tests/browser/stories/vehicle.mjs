@@ -33,6 +33,9 @@ export default [
       assert.ok(played > 0, "the press plays the sound");
       await silence(true);
       assert.equal(await tones(), 2 * played);
+      await s.page.reload();
+      await s.ready();
+      assert.equal(await s.page.locator("#sound").getAttribute("aria-pressed"), "true", "it stays on after a reload");
     },
   },
   {
