@@ -1,17 +1,6 @@
 import assert from "node:assert/strict";
-import { createRequire } from "node:module";
+import { clean } from "../axe.mjs";
 import { PHONE, WIDE } from "../stage.mjs";
-
-const AXE = createRequire(import.meta.url).resolve("axe-core/axe.min.js");
-
-/** No violation of WCAG 2.2 A and AA. The policy of the page forbids inline scripts, so axe is loaded through the devtools. */
-async function clean(s) {
-  await s.page.evaluate(await (await import("node:fs/promises")).readFile(AXE, "utf8"));
-  const { violations, passes } = await s.page.evaluate(() =>
-    window.axe.run(document, { runOnly: ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa", "wcag22aa", "best-practice"] }));
-  assert.ok(passes.length > 20, "axe looked at the page");
-  assert.deepEqual(violations.map((v) => `${v.id}: ${v.nodes.map((n) => `${n.target} ${n.failureSummary}`).join("; ")}`), []);
-}
 
 const states = [["rich", null], ["empty", "empty"], ["silent", "silent"], ["refused", "refused"]];
 const audits = ["light", "dark", "red"].flatMap((theme) =>
