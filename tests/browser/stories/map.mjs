@@ -282,36 +282,6 @@ export default [
     },
   },
   {
-    name: "T shows the true sea floor of a rehearsal, and the layer before it again",
-    scenario: "start",
-    async run(s) {
-      const names = () => s.page.locator("#layer option").allInnerTexts();
-      assert.ok(!(await names()).includes("truth"), "without a simulated sea floor there is no truth");
-      await s.page.locator("#chart").focus();
-      await s.page.keyboard.press("t");
-      assert.equal(await s.page.locator("#layer").inputValue(), "label");
-      await s.steer({ truth: true, advance: 2 });
-      await s.until("the layer truth", async () => (await names()).includes("truth"));
-      await s.page.selectOption("#layer", "age");
-      await s.page.locator("#chart").focus();
-      await s.page.keyboard.press("t");
-      await s.shows("#legend", /true sea floor.*sand.*seagrass/s);
-      await s.page.evaluate(async () => {
-        const { view: v, redraw } = await import("/js/map/chart.js");
-        Object.assign(v, { mode: "free", east: 0, north: 12, scale: 10 });
-        redraw();
-      });
-      const at = (x, y) => s.inPage(({ view: v }, place) => v.toScreen(...place), [x, y]);
-      const tone = async (x, y) => pixel(s, ...(await at(x, y)));
-      await s.until("sand in the west", async () => (await tone(-18.3, 13.2)).join() === "230,159,0", { advance: 1 });
-      await s.until("seagrass in the east", async () => (await tone(18.3, 13.2)).join() === "86,180,233");
-      assert.notEqual((await tone(18.3, 16.2)).join(), "86,180,233", "north of the picture");
-      await s.page.keyboard.press("t");
-      await s.shows("#legend", /age of cells/);
-      await s.until("the map again", async () => (await tone(-18.3, 13.2)).join() !== "230,159,0");
-    },
-  },
-  {
     name: "every layer of the server is painted on a scale in its unit",
     scenario: "start",
     async run(s) {
