@@ -6,7 +6,7 @@
 //
 // POST /mock controls it in tests:
 //   {"scenario": "rich", "advance": 60, "times": 3, "speed": 20, "silent": true, "refuse": "utility",
-//    "loss": 0.3, "layers": true, "coarse": true, "position": {"x_m": 5, ..},
+//    "loss": 0.3, "layers": true, "coarse": true, "without_image": [3], "position": {"x_m": 5, ..},
 //    "placement": {"version": 1, "east_m": 20, "north_m": -5}, "contact": {"received_s_ago": 300, "due_s_ago": 290},
 //    "label_at": {"x_m": 5.1, "y_m": -3, "label": 2},
 //    "ended": true, "truth": true, "principals": [{"name": "anna", "role": "operator"}], "commander": "anna", "stream": false, "mute": true, "down": true}
@@ -219,6 +219,7 @@ function steer(mock, order, res) {
   if (order.label_at) mission.vehicles[0].setLabel(order.label_at, mission.nowS);
   if ("placement" in order) mission.vehicles[0].placement = order.placement;
   if ("coarse" in order) mission.vehicles[0].coarse = order.coarse;
+  if (order.without_image) mission.vehicles[0].withoutImage = new Set(order.without_image);
   if ("silent" in order) mission.vehicles[0].silent = order.silent;
   if (order.refuse) mission.vehicles[0].directive.refuseNext.add(order.refuse);
   if (order.principals) mission.command.principals = order.principals;

@@ -29,6 +29,7 @@ export class Vehicle {
     this.terms = { exploration: 0.2, curiosity: 0 };
     Object.assign(this, { reported: null, knownInForce: {}, inForce: {}, draft: { number: 0, weights: {}, exploration: null, curiosity: null, at_s: 0, author: "" }, fence: null, limits: null, areas: null, destination: null, planner: null, settings: new Settings(), coarse: false, aborted: false });
     this.exemplars = new Map();
+    this.withoutImage = new Set();
     this.markers = [];
     this.track = [];
     this.hold = false;
@@ -146,7 +147,7 @@ export class Vehicle {
     this.exemplars.set(label, { label, state, progress: 0, bytes, at_s: null, larger, images });
     return this.directive.issue("requests", nowS, (done) => {
       const queued = [...this.exemplars.values()].filter((x) => x.state === "queued");
-      for (const x of queued) x.state = done === "refused" ? "refused" : "receiving";
+      for (const x of queued) x.state = done === "refused" ? "refused" : this.withoutImage.has(x.label) ? "not_available" : "receiving";
     });
   }
 

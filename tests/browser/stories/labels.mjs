@@ -58,6 +58,22 @@ export default [
     },
   },
   {
+    name: "the first mission names the label without an image, and another label can be requested",
+    scenario: "rich",
+    async run(s) {
+      const picture = ".first-mission li:has(b:text-is('Picture'))";
+      await s.steer({ loss: 0, without_image: [1] });
+      await s.inPage(({ rename }) => rename(2, "sand"));
+      await slider(s, "sand").fill("0.5");
+      await send(s).click();
+      await s.shows(picture, /Press Request beside a label/, { ms: 240000, advance: 2 });
+      await s.button("Request: an image of Label 1").click();
+      await s.shows(picture, /no new image of Label 1 yet.*Press Request beside another label/, { ms: 240000, advance: 2 });
+      await s.button("Request: an image of sand").click();
+      await s.shows(".first-mission summary", /all five steps are done/, { ms: 240000, advance: 2 });
+    },
+  },
+  {
     name: "the list shows every label with its area",
     async run(s) {
       const labels = await firstLabels(s);
