@@ -87,18 +87,25 @@ async function tuned(page, steer) {
   await page.locator("#set-beta").fill("5000");
 }
 
+/** Advances the mission until the map has a layer. */
+async function arrive(page, steer, name) {
+  const layer = page.locator(`#layer option[value=${name}]`);
+  for (let i = 0; i < 20 && (await layer.count()) === 0; i += 1) await steer({ advance: 14 });
+  await layer.waitFor({ state: "attached" });
+}
+
 /** A layer that the operator requested, and the level under the pointer. */
 async function curious(page, steer) {
-  await page.getByRole("checkbox", { name: "curiosity" }).check();
   await steer({ layers: true, advance: 14 });
-  await page.locator("#layer option[value=curiosity]").waitFor({ state: "attached" });
+  await page.getByRole("checkbox", { name: "curiosity" }).check();
+  await arrive(page, steer, "curiosity");
   await page.selectOption("#layer", "curiosity");
   await page.mouse.move(820, 380);
 }
 
 async function cloud(page, steer) {
   await steer({ layers: true, advance: 14 });
-  await page.locator("#layer option[value=depth]").waitFor({ state: "attached" });
+  await arrive(page, steer, "depth");
   await page.getByRole("button", { name: "3-D" }).click();
 }
 
