@@ -199,6 +199,25 @@ export default [
     },
   },
   {
+    name: "a row keeps its height while its image is requested and received",
+    scenario: "rich",
+    async run(s) {
+      const row = s.page.locator(".label", { hasText: "Label 3" });
+      const heights = new Map();
+      const measure = async () => {
+        const [state, height] = await row.evaluate((node) => [node.querySelector(".exemplar .state").dataset.state, node.getBoundingClientRect().height]);
+        heights.set(state, height);
+        return state;
+      };
+      await s.steer({ loss: 0 });
+      await measure();
+      await row.locator(".request").click();
+      await s.until("the image", async () => (await measure()) === "received", { advance: 2 });
+      assert.ok(heights.has("none") && heights.has("receiving"), [...heights.keys()].join(", "));
+      assert.equal(new Set(heights.values()).size, 1, JSON.stringify([...heights]));
+    },
+  },
+  {
     name: "larger and further images arrive, and a request is cancelled",
     // In a rehearsal the vehicle may have no second image of the label.
     scenario: "rich",

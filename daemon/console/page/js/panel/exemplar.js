@@ -36,6 +36,11 @@ async function request(label, action = "another", image = null) {
   store.emit("edit");
 }
 
+function hintOf(e) {
+  if (e.state === "not_available") return "The vehicle has no such image yet and will send one as soon as it has it";
+  return e.state === "receiving" ? `${percent(e.progress)} of the image has arrived` : "";
+}
+
 export function refreshExemplar(box, label, name) {
   const e = label.exemplar;
   const { ask, image, state, bar, cancel } = box.parts;
@@ -52,10 +57,9 @@ export function refreshExemplar(box, label, name) {
   text(ask, e.state === "refused" ? "Request again" : "Request");
   ask.setAttribute("aria-label", `${ask.textContent}: an image of ${name}`);
   show(state, error !== undefined || pending || e.state === "refused");
-  const done = e.state === "receiving" ? ` ${percent(e.progress)}` : "";
-  text(state, error ?? `${NAMES[e.state] ?? ""}${done}`);
+  text(state, error ?? NAMES[e.state] ?? "");
   const why = e.state === "refused" ? slotOf(store.vehicle, "requests")?.reason : null;
-  state.title = error ?? why ?? (e.state === "not_available" ? "The vehicle has no such image yet and will send one as soon as it has it" : "");
+  state.title = error ?? why ?? hintOf(e);
   state.dataset.state = error ? "refused" : e.state;
   show(bar, e.state === "receiving");
   bar.value = e.progress;
