@@ -205,15 +205,20 @@ export default [
       const row = s.page.locator(".label", { hasText: "Label 3" });
       const heights = new Map();
       const measure = async () => {
-        const [state, height] = await row.evaluate((node) => [node.querySelector(".exemplar .state").dataset.state, node.getBoundingClientRect().height]);
-        heights.set(state, height);
+        const [state, hasImage, height] = await row.evaluate((node) => [node.querySelector(".exemplar .state").dataset.state, !node.querySelector(".image").hidden, node.getBoundingClientRect().height]);
+        heights.set(`${state}${hasImage ? " beside an image" : ""}`, height);
         return state;
       };
       await s.steer({ loss: 0 });
       await measure();
       await row.locator(".request").click();
       await s.until("the image", async () => (await measure()) === "received", { advance: 2 });
-      assert.ok(heights.has("none") && heights.has("receiving"), [...heights.keys()].join(", "));
+      await row.locator(".image").click();
+      await s.button("Another").click();
+      await s.button("Close").click();
+      await s.until("the request", async () => (await measure()) !== "received", { advance: 1 });
+      await s.until("another image", async () => (await measure()) === "received", { advance: 2 });
+      assert.ok(heights.has("receiving") && heights.has("receiving beside an image"), [...heights.keys()].join(", "));
       assert.equal(new Set(heights.values()).size, 1, JSON.stringify([...heights]));
     },
   },

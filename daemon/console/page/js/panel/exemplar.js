@@ -61,10 +61,11 @@ export function refreshExemplar(box, label, name) {
   const why = e.state === "refused" ? slotOf(store.vehicle, "requests")?.reason : null;
   state.title = error ?? why ?? hintOf(e);
   state.dataset.state = error ? "refused" : e.state;
-  show(bar, e.state === "receiving");
+  // Beside an image there is no room for them: the dialog of the image shows both.
+  show(bar, e.state === "receiving" && !received);
   bar.value = e.progress;
   bar.setAttribute("aria-label", `Image of ${name}`);
-  show(cancel, pending);
+  show(cancel, pending && !received);
   cancel.setAttribute("aria-label", `Cancel the image of ${name}`);
   if (viewer?.id === label.id) viewer.refresh(label);
   if (!received) return;
