@@ -45,13 +45,16 @@ fn branch(
     let (sin, cos) = direction.sin_cos();
     let (mut dx, mut dy) = (cos * step_m, sin * step_m);
     let curl = (rng.unit() as f32 - 0.5) * 0.9 / steps;
-    let shade = 0.75 + 0.5 * rng.unit() as f32;
+    let shade = 0.45 + 0.9 * rng.unit() as f32;
     for step in 0..steps as u32 {
         let t = step as f32 / steps;
         let body = scale(colony.tone, shade * (0.35 + 0.75 * t));
         let pale = ((t - 0.65) / 0.35).clamp(0.0, 1.0);
-        let colour = blend(body, [0.40, 0.40, 0.36], 0.65 * pale);
-        draw(&Segment { x, y, height_m: top_m * (0.35 + 0.65 * t), colour }, radius_m * (1.1 - 0.35 * t));
+        let colour = blend(body, [0.40, 0.40, 0.36], 0.65 * pale * shade.min(1.0));
+        draw(
+            &Segment { x, y, height_m: top_m * (0.35 + 0.65 * t), colour },
+            radius_m * (1.35 - 0.6 * t) * (0.8 + 0.4 * shade),
+        );
         (dx, dy) = (dx - curl * dy, dy + curl * dx);
         x += dx;
         y += dy;

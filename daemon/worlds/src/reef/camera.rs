@@ -49,14 +49,14 @@ impl ReefCamera {
 
     /// The frame of a view: the same reef and view give the same frame, bit for bit.
     pub fn frame(&mut self, view: &View) -> RgbImage {
-        let optics = Optics::new(view, self.metres_per_pixel, self.reef.key);
+        let optics = Optics::new(view, self.metres_per_pixel, &self.reef);
         let mut image = RgbImage::new(view.width_px, view.height_px);
+        let mut above = vec![[0.0; 3]; view.width_px as usize];
         self.look(view, |v, row| {
             let line = &mut image.as_mut()[3 * v * row.len()..][..3 * row.len()];
-            for (u, (pixel, light)) in line.as_chunks_mut::<3>().0.iter_mut().zip(row).enumerate() {
-                *pixel = optics.expose(u, v, *light);
-            }
+            optics.expose(v, row, &mut above, line.as_chunks_mut().0);
         });
+        optics::soften_colour(&mut image);
         image
     }
 

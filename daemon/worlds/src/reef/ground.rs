@@ -1,17 +1,12 @@
-//! The floor between the things that lie and grow on it: sand, rubble's bed, meadow mats and reef rock.
+//! The floor between the things that lie and grow on it: layers of sand, rubble, reef rock and meadow. What is higher
+//! covers what is lower, so every edge is as irregular as the pieces at it.
 
-use super::fields::{Colour, blend, fbm, nearest_knob, ramp, scale, speck};
+use super::fields::{Colour, blend, fbm, ramp, scale, speck};
 use super::layout::Habitat;
+use super::patterns::{Patterns, patterns};
 use super::{CORAL, ROCK, RUBBLE, SAND, SEAGRASS, THICKET};
 use crate::noise::{Noise, floor};
-
-const SAND_TONE: Colour = [0.335, 0.305, 0.235];
-const MAT_TONE: Colour = [0.075, 0.075, 0.045];
-const RUBBLE_TONE: Colour = [0.165, 0.150, 0.118];
-const TURF_TONE: Colour = [0.098, 0.092, 0.060];
-const PALE_TURF: Colour = [0.330, 0.300, 0.230];
-/// Crustose coralline algae.
-const CRUST_TONE: Colour = [0.175, 0.125, 0.130];
+use scene_model::random::{CounterRng, derive};
 
 /// One place of the sea floor.
 #[derive(Clone, Copy, Debug)]
@@ -24,36 +19,67 @@ pub(super) struct Spot {
 
 /// Fields of the ground that vary so slowly that they are computed at some places only.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Slow {
-    /// Shift of the ripples' phase: it makes them bend, fork and end.
-    bend: f32,
-    worn: f32,
-    litter: f32,
-    film: f32,
-    bumps: f32,
-    mottle: f32,
-    patch: f32,
-    crust: f32,
-    bumpy: f32,
-    algae: f32,
-}
+pub(super) struct Slow([f32; 14]);
+
+/// Shift of the patterns' places, metres: it bends them, so that they do not repeat.
+const WARP: [usize; 2] = [0, 1];
+/// Shift of the ripples' phase: it makes them bend, fork and end.
+const BEND: usize = 2;
+const WORN: usize = 3;
+/// Share of the sand under scattered fragments.
+const LITTER: usize = 4;
+const FILM: usize = 5;
+const MOUNDS: usize = 6;
+const MOTTLE: usize = 7;
+/// What grows on the rock.
+const TURF: usize = 8;
+const CRUST: usize = 9;
+const ALGAE: usize = 10;
+const COARSE: usize = 11;
+/// Age of the seagrass.
+const AGE: usize = 12;
+const CLUMP: usize = 13;
 
 impl Slow {
     /// The values between two neighbours: `t` = 0 gives `self`, 1 gives `other`.
     #[inline]
     pub(super) fn towards(&self, other: &Self, t: f32) -> Self {
-        let mix = |a: f32, b: f32| a + t * (b - a);
+        Self(std::array::from_fn(|i| self.0[i] + t * (other.0[i] - self.0[i])))
+    }
+}
+
+/// The colours of a world: sand is grey, white or tan, and turf is brown or green.
+#[derive(Clone, Debug)]
+struct Palette {
+    sand: Colour,
+    film: Colour,
+    rubble: Colour,
+    turf: Colour,
+    sediment: Colour,
+    /// Crustose coralline algae.
+    crust: Colour,
+    algae: Colour,
+    young: Colour,
+    old: Colour,
+}
+
+impl Palette {
+    fn new(key: u64) -> Self {
+        let mut rng = CounterRng::new(key);
+        let mut between = |a: Colour, b: Colour| {
+            let light = 0.88 + 0.24 * rng.unit() as f32;
+            scale(blend(a, b, rng.unit() as f32), light)
+        };
         Self {
-            bend: mix(self.bend, other.bend),
-            worn: mix(self.worn, other.worn),
-            litter: mix(self.litter, other.litter),
-            film: mix(self.film, other.film),
-            bumps: mix(self.bumps, other.bumps),
-            mottle: mix(self.mottle, other.mottle),
-            patch: mix(self.patch, other.patch),
-            crust: mix(self.crust, other.crust),
-            bumpy: mix(self.bumpy, other.bumpy),
-            algae: mix(self.algae, other.algae),
+            sand: between([0.40, 0.385, 0.34], [0.40, 0.345, 0.25]),
+            film: between([0.19, 0.185, 0.11], [0.21, 0.17, 0.12]),
+            rubble: between([0.215, 0.200, 0.165], [0.200, 0.170, 0.120]),
+            turf: between([0.118, 0.100, 0.060], [0.098, 0.104, 0.066]),
+            sediment: between([0.30, 0.285, 0.235], [0.29, 0.245, 0.170]),
+            crust: between([0.215, 0.135, 0.150], [0.195, 0.150, 0.190]),
+            algae: between([0.085, 0.098, 0.040], [0.120, 0.088, 0.035]),
+            young: between([0.090, 0.125, 0.048], [0.075, 0.098, 0.046]),
+            old: between([0.165, 0.140, 0.085], [0.120, 0.115, 0.080]),
         }
     }
 }
@@ -65,11 +91,16 @@ pub(super) struct Ground {
     key: u64,
     /// Direction across the ripples.
     turn: [f32; 2],
+    /// Where this world's patterns begin, metres.
+    shift: [f32; 2],
+    palette: Palette,
 }
 
 impl Ground {
     pub(super) fn new(key: u64, turn: [f32; 2]) -> Self {
-        Self { noise: Noise::new(key), key, turn }
+        let mut rng = CounterRng::new(derive(key, 1));
+        let shift = [0, 1].map(|_| 300.0 + 100.0 * rng.unit() as f32);
+        Self { noise: Noise::new(key), key, turn, shift, palette: Palette::new(derive(key, 2)) }
     }
 
     /// Meadow at a place, 0 to 1, with a ragged edge.
@@ -78,123 +109,159 @@ impl Ground {
         if habitat.grass <= 0.01 {
             return 0.0;
         }
-        let rag = fbm(&self.noise, x / 0.8, y / 0.8 + 40.0, 2) - 0.5;
-        ramp(0.30, 0.62, habitat.grass + 0.9 * rag)
+        let rag = 0.6 * self.noise.value(x / 1.9 + 9.0, y / 1.9) + fbm(&self.noise, x / 0.7, y / 0.7 + 40.0, 3) - 0.8;
+        ramp(0.28, 0.66, habitat.grass + 1.1 * rag)
     }
 
     pub(super) fn slow(&self, x: f32, y: f32) -> Slow {
         let n = &self.noise;
-        Slow {
-            bend: 2.2 * n.value(x / 1.1, y / 1.1 + 9.0) + 5.0 * n.value(x / 6.1 + 2.0, y / 6.1),
-            worn: ramp(0.28, 0.62, n.value(x / 3.3 + 70.0, y / 3.3)),
-            litter: ramp(0.45, 0.8, n.value(x / 2.4, y / 2.4 + 31.0)),
-            film: ramp(0.48, 0.75, fbm(n, x / 1.3 + 44.0, y / 1.3, 3)),
-            bumps: ramp(0.4, 0.7, n.value(x / 2.7, y / 2.7 + 90.0)),
-            mottle: 0.82 + 0.26 * n.value(x / 1.9 + 5.0, y / 1.9),
-            patch: fbm(n, x / 0.6 + 14.0, y / 0.6, 3),
-            crust: n.value(x / 1.4 + 3.0, y / 1.4),
-            bumpy: ramp(0.25, 0.75, n.value(x / 0.5 + 27.0, y / 0.5)),
-            algae: ramp(0.42, 0.62, n.value(x / 0.44 + 60.0, y / 0.44 + 3.0)),
-        }
+        let warp = |off: f32| {
+            0.42 * (n.value(x / 2.1 + off, y / 2.1) - 0.5) + 0.07 * (n.value(x / 0.45, y / 0.45 + off) - 0.5)
+        };
+        let mut slow = Slow::default();
+        let mut put = |index: usize, value: f32| slow.0[index] = value;
+        put(WARP[0], warp(3.0));
+        put(WARP[1], warp(55.0));
+        put(BEND, 2.2 * n.value(x / 1.1, y / 1.1 + 9.0) + 5.0 * n.value(x / 6.1 + 2.0, y / 6.1));
+        put(WORN, ramp(0.42, 0.72, fbm(n, x / 3.3 + 70.0, y / 3.3, 2)));
+        put(LITTER, ramp(0.50, 0.85, fbm(n, x / 1.7, y / 1.7 + 31.0, 3)));
+        put(FILM, ramp(0.45, 0.75, fbm(n, x / 1.3 + 44.0, y / 1.3, 3)));
+        put(MOUNDS, ramp(0.4, 0.7, n.value(x / 2.7, y / 2.7 + 90.0)));
+        put(MOTTLE, 0.80 + 0.40 * fbm(n, x / 1.9 + 5.0, y / 1.9, 3));
+        put(TURF, fbm(n, x / 0.9 + 14.0, y / 0.9, 3));
+        put(CRUST, ramp(0.45, 0.65, fbm(n, x / 1.2 + 3.0, y / 1.2, 2)));
+        put(ALGAE, ramp(0.45, 0.62, fbm(n, x / 0.6 + 60.0, y / 0.6 + 3.0, 2)));
+        put(COARSE, ramp(0.25, 0.75, n.value(x / 1.5 + 27.0, y / 1.5)));
+        put(AGE, ramp(0.30, 0.75, fbm(n, x / 1.6 + 15.0, y / 1.6, 2)));
+        put(CLUMP, fbm(n, x / 0.5 + 70.0, y / 0.5, 2));
+        slow
     }
 
     pub(super) fn spot(&self, x: f32, y: f32, habitat: &Habitat, slow: &Slow) -> Spot {
         let n = &self.noise;
         let rag = n.value(x / 0.37, y / 0.37) - 0.5;
-        let reef = ramp(0.35, 0.65, habitat.reef + 0.5 * rag);
-        let mottle = slow.mottle + 0.12 * n.value(x / 0.21, y / 0.21);
-        let grain = speck(self.key, (x * 110.0) as i32, (y * 110.0) as i32) - 0.5;
-        let mut spot = if reef < 1.0 {
-            self.sand(x, y, habitat, slow, rag)
-        } else {
-            Spot { height_m: 0.0, colour: scale(SAND_TONE, 0.8), class: SAND }
-        };
-        if reef > 0.0 {
-            let rock = self.rock(x, y, habitat, slow);
-            // Sand fills the pockets of the rock.
-            let filled = ramp(-0.01, 0.02, rock.height_m - 0.05 + 0.12 * reef) * reef;
-            spot.height_m += filled * (rock.height_m - spot.height_m);
-            spot.colour = blend(spot.colour, rock.colour, filled);
-            if filled > 0.5 || reef > 0.5 {
-                spot.class = rock.class;
-            }
+        // Where the patterns are looked up.
+        let at = [x + self.shift[0] + slow.0[WARP[0]], y + self.shift[1] + slow.0[WARP[1]]];
+        let patterns = patterns();
+        let mut spot = self.sand(patterns, [x, y], at, habitat, slow);
+        let littered = 0.55 * slow.0[LITTER] * (1.0 - habitat.grass);
+        let rubble = ramp(0.30, 0.70, habitat.rubble + 0.9 * rag).max(littered).max(0.7 * habitat.reef);
+        if rubble > 0.05 {
+            self.lay_rubble(patterns, &mut spot, at, rubble, slow);
         }
-        spot.height_m += habitat.lump_m + (0.004 + 0.014 * reef) * grain;
-        // Single grains and fragments, light and dark.
-        let speckled = 0.26 + 0.3 * reef;
-        let fleck = if grain > 0.492 {
-            0.3
-        } else if grain < -0.49 {
-            -0.3
+        let reef = ramp(0.35, 0.65, habitat.reef + 0.5 * rag);
+        if reef > 0.0 {
+            self.lay_rock(patterns, &mut spot, at, reef, habitat, slow);
+        }
+        spot.class = if reef > 0.5 {
+            rock_class(habitat)
+        } else if habitat.rubble + 0.9 * rag > 0.5 {
+            RUBBLE
         } else {
-            0.0
+            SAND
         };
-        spot.colour = scale(spot.colour, mottle * (1.0 + speckled * grain + fleck));
+        let meadow = self.meadow(x, y, habitat) * (1.0 - reef);
+        if meadow > 0.0 {
+            self.lay_meadow(patterns, &mut spot, at, meadow, slow);
+        }
+        let grain = speck(self.key, (x * 110.0) as i32, (y * 110.0) as i32) - 0.5;
+        spot.height_m += habitat.lump_m + (0.003 + 0.006 * reef) * grain;
+        spot.colour = scale(spot.colour, slow.0[MOTTLE] * (1.0 + 0.22 * grain));
         spot
     }
 
-    fn sand(&self, x: f32, y: f32, habitat: &Habitat, slow: &Slow, rag: f32) -> Spot {
+    fn sand(&self, patterns: &Patterns, [x, y]: [f32; 2], at: [f32; 2], habitat: &Habitat, slow: &Slow) -> Spot {
         let n = &self.noise;
         let wave_m = if habitat.channel > 0.5 { 0.30 } else { 0.155 };
         let across = x * self.turn[0] + y * self.turn[1];
-        let phase = across / wave_m + slow.bend;
+        let phase = across / wave_m + slow.0[BEND];
         let part = phase - floor(phase) as f32 - 0.5;
         let crest = 4.0 * part * part;
-        let worn = slow.worn * (1.0 - 0.8 * habitat.rubble);
-        let rough = 0.6 * n.value(x / 0.05 + 3.0, y / 0.05) + 0.4 * n.value(x / 0.017, y / 0.017) - 0.5;
-        let bumps = 0.05 * ramp(0.62, 0.95, n.value(x / 0.16 + 13.0, y / 0.16)) * slow.bumps;
-        let height_m = (0.011 + 0.012 * habitat.channel) * (crest - 0.35) * worn + 0.014 * rough + bumps;
-        let litter = (1.0 - crest) * worn * slow.litter;
-        let mut colour = scale(SAND_TONE, 1.0 - 0.40 * litter - 0.10 * habitat.channel);
-        colour = blend(colour, [0.175, 0.165, 0.105], 0.55 * slow.film);
-        let mut class = SAND;
-        let rubble = ramp(0.35, 0.65, habitat.rubble + 0.9 * rag);
-        if rubble > 0.0 {
-            colour = blend(colour, RUBBLE_TONE, 0.75 * rubble);
-            if rubble > 0.5 {
-                class = RUBBLE;
-            }
-        }
-        let meadow = self.meadow(x, y, habitat);
-        if meadow > 0.0 {
-            colour = blend(colour, MAT_TONE, 0.85 * meadow);
-            if meadow > 0.5 {
-                class = SEAGRASS;
-            }
-        }
-        Spot { height_m, colour, class }
+        let worn = slow.0[WORN] * (1.0 - 0.8 * habitat.rubble);
+        let rough = 0.6 * n.value(x / 0.09 + 3.0, y / 0.09) + 0.4 * n.value(x / 0.03, y / 0.03) - 0.5;
+        let mounds = 0.06 * ramp(0.55, 0.95, n.value(x / 0.21 + 13.0, y / 0.21)) * slow.0[MOUNDS];
+        let [grit_m, tone, hue] = patterns.grit.at(at[0], at[1]);
+        let coarse = 0.35 + 0.65 * slow.0[COARSE];
+        let ripple_m = (0.010 + 0.010 * habitat.channel) * (crest - 0.35) * worn;
+        let height_m = ripple_m + 0.022 * rough + mounds + 0.9 * coarse * grit_m;
+        let trough = (1.0 - crest) * worn * slow.0[FILM];
+        let mut colour = blend(self.palette.sand, self.palette.film, 0.60 * slow.0[FILM] * (0.6 + 0.8 * rough));
+        // Shell grit is white, fragments with turf are dark.
+        let fleck = ramp(0.93, 0.97, hue) * 0.45 - ramp(0.10, 0.05, hue) * 0.45;
+        let tone = 1.0 + coarse * (0.85 * (tone - 0.85) + fleck);
+        colour = scale(colour, tone * (1.0 - 0.25 * trough) * (1.0 - 0.10 * habitat.channel));
+        Spot { height_m, colour, class: SAND }
     }
 
-    fn rock(&self, x: f32, y: f32, habitat: &Habitat, slow: &Slow) -> Spot {
-        let n = &self.noise;
-        let rough = fbm(n, x / 0.42, y / 0.42 + 80.0, 5) - 0.5;
-        let (distance, own) = {
-            let sway = [n.value(x / 0.085 + 7.0, y / 0.085), n.value(x / 0.085, y / 0.085 + 7.0)];
-            nearest_knob(self.key, x / 0.07 + 1.9 * sway[0], y / 0.07 + 1.9 * sway[1])
-        };
-        let bumpy = slow.bumpy;
-        let knob = (1.0 - ramp(0.1, 0.75, distance)) * bumpy * (0.4 + 0.8 * own) + 0.4 * (1.0 - bumpy);
-        let grit =
-            0.55 * n.value(x / 0.038 + 2.0 * rough, y / 0.038 + 19.0) + 0.45 * n.value(x / 0.016, y / 0.016 + 2.0);
-        let hole = ramp(0.70, 0.92, n.value(x / 0.21 + 5.0, y / 0.21 + 52.0) - 0.4 * rough);
-        let height_m = 0.50 * rough + 0.05 * knob - 0.05 * hole + 0.035 * grit;
-        let patch = slow.patch + 0.7 * rough + 0.30 * (own - 0.5);
-        let mut colour = blend(TURF_TONE, PALE_TURF, ramp(0.30, 0.75, patch));
-        let crust = n.value(x / 0.12, y / 0.12 + 23.0) * slow.crust + 0.3 * (own - 0.5);
-        colour = blend(colour, CRUST_TONE, 0.7 * ramp(0.30, 0.46, crust));
-        colour = scale(colour, (0.30 + 0.45 * knob + 0.5 * rough + 0.85 * grit) * (1.0 - 0.3 * hole));
-        let is_thicket = habitat.thicket > 0.5 * habitat.reef;
-        let is_rock = habitat.rock > 0.5 * habitat.reef;
-        if is_rock {
-            colour = blend(colour, [0.085, 0.095, 0.045], 0.7 * slow.algae);
+    /// Lays pieces of dead coral that lie the deeper in the sand the fewer there are.
+    fn lay_rubble(&self, patterns: &Patterns, spot: &mut Spot, at: [f32; 2], share: f32, slow: &Slow) {
+        let [height_m, tone, hue] = patterns.rubble.at(at[0], at[1]);
+        let height_m = height_m - 0.115 * (1.0 - share) + 0.01;
+        let seen = ramp(-0.004, 0.012, height_m - spot.height_m);
+        if seen > 0.0 {
+            let palette = &self.palette;
+            let bare = if hue > 0.9 { scale(palette.sand, 0.9) } else { palette.rubble };
+            let mut colour = blend(bare, palette.crust, 0.7 * ramp(0.72, 0.80, hue) * (1.0 - ramp(0.86, 0.90, hue)));
+            colour = blend(colour, palette.turf, 0.85 * ramp(0.45, 0.25, hue));
+            // Dust of sand lies on what is flat.
+            colour = blend(colour, spot.colour, 0.25 * slow.0[COARSE]);
+            spot.height_m += seen * (height_m - spot.height_m);
+            spot.colour = blend(spot.colour, scale(colour, 0.2 + 0.9 * tone), seen);
         }
-        let class = if is_rock {
-            ROCK
-        } else if is_thicket {
-            THICKET
-        } else {
-            CORAL
-        };
-        Spot { height_m, colour, class }
+    }
+
+    fn lay_rock(&self, patterns: &Patterns, spot: &mut Spot, at: [f32; 2], reef: f32, habitat: &Habitat, slow: &Slow) {
+        let n = &self.noise;
+        let palette = &self.palette;
+        let [lump_m, tone, hue] = patterns.rock.at(at[0], at[1]);
+        let [grit_m, fine, other] = patterns.grit.at(1.3 * at[1], 1.3 * at[0]);
+        let rough = n.value(at[0] / 0.55, at[1] / 0.55 + 80.0) - 0.5;
+        // Borers and shade leave dark holes.
+        let hole = ramp(0.72, 0.86, n.value(at[0] / 0.13 + 5.0, at[1] / 0.13 + 52.0) - 0.25 * rough);
+        let height_m = lump_m + 0.30 * rough - 0.06 * hole + 1.4 * grit_m - 0.34 * (1.0 - reef);
+        let seen = ramp(-0.01, 0.02, height_m - spot.height_m);
+        if seen <= 0.0 {
+            return;
+        }
+        let grown = 0.55 * hue + 0.9 * (slow.0[TURF] - 0.5) + 0.25 * (other - 0.5) + 0.3 * rough;
+        let mut colour = blend(palette.turf, palette.sediment, ramp(0.12, 0.52, grown));
+        let crust = slow.0[CRUST] * ramp(0.60, 0.72, hue + 0.3 * (fine - 0.8));
+        colour = blend(colour, palette.crust, 0.8 * crust);
+        let algae = slow.0[ALGAE] * ramp(0.55, 0.35, hue + 0.3 * (other - 0.5));
+        colour = blend(colour, palette.algae, if is_rock(habitat) { 0.9 } else { 0.55 } * algae);
+        let light = (0.25 + 0.85 * tone) * (0.30 + 0.85 * fine) * (1.0 - 0.55 * hole);
+        spot.height_m += seen * (height_m - spot.height_m);
+        spot.colour = blend(spot.colour, scale(colour, light), seen);
+    }
+
+    fn lay_meadow(&self, patterns: &Patterns, spot: &mut Spot, at: [f32; 2], meadow: f32, slow: &Slow) {
+        let palette = &self.palette;
+        let [lift_m, tone, hue] = patterns.canopy.at(at[0], at[1]);
+        let dense = meadow * ramp(0.20, 0.50, slow.0[CLUMP] + 0.35 * (meadow - 0.4));
+        let height_m = lift_m + 0.10 * (dense - 0.75) + 0.10 * (slow.0[CLUMP] - 0.5);
+        let seen = ramp(-0.03, 0.02, height_m - spot.height_m) * ramp(0.05, 0.3, dense);
+        let old = (hue * hue * 0.7 + 0.6 * slow.0[AGE]).min(1.0);
+        let mut colour = blend(palette.young, palette.old, old);
+        // Epiphytes whiten the tips of old blades.
+        colour = blend(colour, [0.24, 0.235, 0.20], 0.6 * ramp(0.75, 0.95, hue) * ramp(0.7, 1.2, tone));
+        spot.colour = blend(scale(spot.colour, 1.0 - 0.45 * dense), scale(colour, 0.15 + 0.95 * tone), seen);
+        spot.height_m += seen * (height_m - spot.height_m);
+        if meadow > 0.5 {
+            spot.class = SEAGRASS;
+        }
+    }
+}
+
+fn is_rock(habitat: &Habitat) -> bool {
+    habitat.rock > 0.5 * habitat.reef
+}
+
+fn rock_class(habitat: &Habitat) -> u8 {
+    if is_rock(habitat) {
+        ROCK
+    } else if habitat.thicket > 0.5 * habitat.reef {
+        THICKET
+    } else {
+        CORAL
     }
 }

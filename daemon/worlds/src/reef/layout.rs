@@ -94,9 +94,9 @@ impl Layout {
         let [a, b] = askew(x, y);
         let channel = 1.0 - ramp(-0.5, 0.7, bed);
         let clear = (1.0 - channel) * scour;
-        let reef = ramp(0.26, 0.36, exposure) * clear;
-        let rubble = ramp(0.04, 0.12, exposure) * (1.0 - reef) * clear;
-        let grass = ramp(0.08, 0.18, -exposure) * ramp(0.26, 0.38, n.value(b / 5.5 + 11.0, a / 5.5 + o)) * clear;
+        let reef = ramp(0.22, 0.40, exposure) * clear;
+        let rubble = ramp(0.00, 0.16, exposure) * (1.0 - reef) * clear;
+        let grass = ramp(0.04, 0.26, -exposure) * ramp(0.24, 0.42, n.value(b / 5.5 + 11.0, a / 5.5 + o)) * clear;
         let kind = 0.75 * n.value(b / 6.5 + 33.0, a / 6.5 + o) + 0.25 * n.value(a / 2.6, b / 2.6 + 50.0);
         let (thicket, rock) = (reef * ramp(0.58, 0.63, kind), reef * (1.0 - ramp(0.33, 0.38, kind)));
         let slow = n.value(smooth[0] / 27.0 + o, smooth[1] / 27.0) - 0.5;

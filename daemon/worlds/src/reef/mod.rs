@@ -5,17 +5,21 @@
 
 mod branches;
 mod camera;
+mod corals;
 mod fields;
 mod grass;
 mod ground;
 mod jittered;
 mod layout;
 mod optics;
+mod patterns;
 mod scatter;
 mod shading;
 mod surface;
+mod texture;
 mod things;
 mod tiles;
+mod water;
 mod wreck;
 
 pub use camera::{ReefCamera, View};
@@ -25,6 +29,7 @@ use image::RgbImage;
 use layout::Layout;
 use scene_model::random::{CounterRng, derive};
 use surface::Surface;
+use water::Water;
 
 const SAND: u8 = 0;
 const RUBBLE: u8 = 1;
@@ -56,6 +61,7 @@ pub struct Reef {
     key: u64,
     layout: Layout,
     ground: Ground,
+    water: Water,
 }
 
 impl Reef {
@@ -69,7 +75,12 @@ impl Reef {
     pub fn new(seed: u64) -> Self {
         let key = derive(seed, 0x5EA);
         let (sin, cos) = (std::f64::consts::PI * CounterRng::new(derive(key, 3)).unit()).sin_cos();
-        Self { key, layout: Layout::new(key), ground: Ground::new(derive(key, 4), [cos as f32, sin as f32]) }
+        Self {
+            key,
+            layout: Layout::new(key),
+            ground: Ground::new(derive(key, 4), [cos as f32, sin as f32]),
+            water: Water::new(derive(key, 5)),
+        }
     }
 
     /// The names of the classes, by their number.

@@ -1,21 +1,20 @@
-//! Water, lamp, lens and sensor.
+//! Lamp, lens and sensor.
 
+use super::Reef;
 use super::camera::View;
-use super::fields::Colour;
+use super::fields::{Colour, blend, scale};
+use super::water::Light;
 use image::RgbImage;
 use scene_model::random::{CounterRng, derive, mix};
 
-/// Attenuation of red, green and blue light by water, 1/m.
-const ATTENUATION: [f32; 3] = [0.32, 0.082, 0.052];
-/// What the camera's white balance leaves of the colours at the altitude for which it is set: red is the first to go.
-const BALANCED: [f32; 3] = [0.60, 0.96, 1.04];
-const BALANCED_M: f32 = 4.0;
-/// Light that the water scatters back from an endless depth, and the rate at which it grows, 1/m.
-const VEIL: [f32; 3] = [0.003, 0.040, 0.046];
-const VEIL_RATE: f32 = 0.10;
+/// Exposure of pictures without water.
 const EXPOSURE: f32 = 2.2;
+/// Most of a row's light that smears into the next one while the shutter is open.
+const MAX_SMEAR: f32 = 0.36;
+/// Pixels that share a gain: it changes slowly.
+const RUN: usize = 4;
 /// Standard deviation of the sensor's noise in display values: of the dark, and per root of the light.
-const NOISE: [f32; 2] = [0.006, 0.012];
+const NOISE: [f32; 2] = [0.007, 0.018];
 const STEPS: usize = 512;
 const TONES: usize = 2048;
 /// The light at which the sensor saturates.
@@ -27,7 +26,8 @@ pub(super) struct Optics {
     height: usize,
     key: u64,
     pitch_m: f32,
-    altitude_m: f32,
+    light: Light,
+    smear: f32,
     /// Gain and veil over the squared distance from the middle.
     paths: Vec<(Colour, Colour)>,
     to_path: f32,
@@ -38,38 +38,37 @@ pub(super) struct Optics {
 }
 
 impl Optics {
-    pub(super) fn new(view: &View, pitch_m: f64, key: u64) -> Self {
+    pub(super) fn new(view: &View, pitch_m: f64, reef: &Reef) -> Self {
         let altitude_m = view.altitude_m.clamp(0.2, 60.0) as f32;
+        let key = derive(derive(reef.key, 40), view.moment);
         let (width, height) = (view.width_px as usize, view.height_px as usize);
         let corner = (width * width + height * height) as f32 / 4.0;
         let mut optics = Self {
             width,
             height,
-            key: derive(derive(key, 40), view.moment),
+            key,
             pitch_m: pitch_m as f32,
-            altitude_m,
+            light: reef.water.light(&reef.ground.noise, view.x_m as f32, view.y_m as f32, altitude_m),
+            smear: MAX_SMEAR * CounterRng::new(derive(key, 2)).unit() as f32,
             paths: Vec::new(),
             to_path: STEPS as f32 / corner.max(1.0),
             snow: vec![0.0; width * height],
-            tones: tones(),
+            tones: tones(reef.water.contrast),
         };
-        optics.paths = (0..=STEPS).map(|i| optics.path(i as f32 / STEPS as f32, corner)).collect();
+        optics.paths = (0..=STEPS).map(|i| optics.path(i as f32 / STEPS as f32, corner, altitude_m)).collect();
         optics.let_snow();
         optics
     }
 
     /// Gain and veil at a squared distance from the middle, a share of that of the corners, in pixels.
-    fn path(&self, share: f32, corner: f32) -> (Colour, Colour) {
+    fn path(&self, share: f32, corner: f32, altitude_m: f32) -> (Colour, Colour) {
         let square = share * corner;
-        let range = (self.altitude_m * self.altitude_m + square * self.pitch_m * self.pitch_m).sqrt();
-        let slant = self.altitude_m / range;
+        let range = (altitude_m * altitude_m + square * self.pitch_m * self.pitch_m).sqrt();
+        let slant = altitude_m / range;
         let vignette = 0.70 + 0.30 * slant * slant * slant;
         let lamp = 0.82 + 0.28 / (1.0 + 1.6 * share);
-        // The sun's part of the way does not grow towards the corners.
-        let way = 0.4 * range + 0.6 * self.altitude_m;
-        let gain = |i: usize| BALANCED[i] * (ATTENUATION[i] * (BALANCED_M - way)).exp() * vignette * lamp * EXPOSURE;
-        let veil = |i: usize| VEIL[i] * (1.0 - (-VEIL_RATE * range).exp()) * EXPOSURE;
-        (std::array::from_fn(gain), std::array::from_fn(veil))
+        let (gain, veil) = self.light.along(range);
+        (scale(gain, vignette * lamp), veil)
     }
 
     /// Marine snow: a few sharp specks, and blurred ones near the lens.
@@ -82,7 +81,7 @@ impl Optics {
             let near = rng.unit() * rng.unit() * rng.unit();
             let radius = 0.8 + 5.0 * near * near + 0.6 * rng.unit();
             let glow = (0.05 + 0.22 * rng.unit() * rng.unit()) / (0.6 + 0.35 * radius * radius);
-            self.add_speck(x as f32, y as f32, radius as f32, glow as f32 * EXPOSURE);
+            self.add_speck(x as f32, y as f32, radius as f32, 1.6 * glow as f32);
         }
     }
 
@@ -100,21 +99,53 @@ impl Optics {
         }
     }
 
-    /// The display values of a pixel that looks at the given light of the floor.
-    #[inline]
-    pub(super) fn expose(&self, u: usize, v: usize, floor: Colour) -> [u8; 3] {
-        let at = v * self.width + u;
-        let (dx, dy) = (u as f32 + 0.5 - self.width as f32 / 2.0, v as f32 + 0.5 - self.height as f32 / 2.0);
-        let (gain, veil) = &self.paths[((dx * dx + dy * dy) * self.to_path) as usize];
-        // Neighbouring colours share a part of their noise, as after demosaicing.
-        let bits = mix(self.key.wrapping_add(at as u64));
-        let (shared, snow) = (0.75 * bell(bits), self.snow[at]);
-        std::array::from_fn(|i| {
-            let light = floor[i] * gain[i] + veil[i] + snow;
-            let [value, sigma] = self.tones[step(light)];
-            display(value + sigma * (shared + 0.65 * bell(bits >> (16 * (i + 1)))))
-        })
+    /// The display values of a row of pixels that look at the given light of the floor. `above` is the light of the row
+    /// before it, with what smeared into that.
+    pub(super) fn expose(&self, v: usize, floor: &[Colour], above: &mut [Colour], line: &mut [[u8; 3]]) {
+        let dy = v as f32 + 0.5 - self.height as f32 / 2.0;
+        let smear = if v == 0 { 0.0 } else { self.smear };
+        let snow = &self.snow[v * self.width..];
+        for start in (0..line.len()).step_by(RUN) {
+            let dx = (start + RUN / 2) as f32 - self.width as f32 / 2.0;
+            let step = ((dx * dx + dy * dy) * self.to_path) as usize;
+            let (gain, veil) = &self.paths[step.min(STEPS)];
+            for u in start..(start + RUN).min(line.len()) {
+                above[u] = blend(floor[u], above[u], smear);
+                let noise = bell(mix(self.key.wrapping_add((v * self.width + u) as u64)));
+                line[u] = std::array::from_fn(|i| {
+                    let light = above[u][i] * gain[i] + veil[i] + snow[u];
+                    let [value, sigma] = self.tones[step_of(light)];
+                    display(value + sigma * noise)
+                });
+            }
+        }
     }
+}
+
+/// Averages the colour of squares of 2 x 2 pixels, as JPEG does, and keeps the lightness of each.
+pub(super) fn soften_colour(image: &mut RgbImage) {
+    let width = image.width() as usize;
+    for rows in image.as_mut().as_chunks_mut::<3>().0.chunks_exact_mut(2 * width) {
+        let (upper, lower) = rows.split_at_mut(width);
+        for (upper, lower) in upper.chunks_exact_mut(2).zip(lower.chunks_exact_mut(2)) {
+            let (mut red, mut blue) = (2, 2);
+            for pixel in upper.iter().chain(lower.iter()) {
+                red += i32::from(pixel[0]) - lightness(*pixel);
+                blue += i32::from(pixel[2]) - lightness(*pixel);
+            }
+            let (red, blue) = (red >> 2, blue >> 2);
+            let green = -(77 * red + 29 * blue) / 150;
+            for pixel in upper.iter_mut().chain(lower) {
+                let light = lightness(*pixel);
+                *pixel = [red, green, blue].map(|tint| (light + tint).clamp(0, 255) as u8);
+            }
+        }
+    }
+}
+
+#[inline]
+fn lightness([red, green, blue]: [u8; 3]) -> i32 {
+    (77 * i32::from(red) + 150 * i32::from(green) + 29 * i32::from(blue)) >> 8
 }
 
 /// A value of a triangular distribution around 0 with unit variance, from 16 random bits.
@@ -125,18 +156,18 @@ fn bell(bits: u64) -> f32 {
 }
 
 /// Display values of light, a gamma curve with a soft shoulder and deepened shadows, and the noise's standard deviation.
-fn tones() -> Vec<[f32; 2]> {
+fn tones(contrast: f32) -> Vec<[f32; 2]> {
     let tone = |i: usize| {
         let light = BRIGHTEST * i as f32 / TONES as f32;
         let soft = light * (1.0 + light * 0.16) / (1.0 + light * 0.42);
         let value = soft.powf(1.0 / 2.1).min(1.0);
-        [value + 0.55 * (value * value * (3.0 - 2.0 * value) - value), NOISE[0] + NOISE[1] * light.sqrt()]
+        [value + contrast * (value * value * (3.0 - 2.0 * value) - value), NOISE[0] + NOISE[1] * light.sqrt()]
     };
     (0..=TONES).map(tone).collect()
 }
 
 #[inline]
-fn step(light: f32) -> usize {
+fn step_of(light: f32) -> usize {
     (light.clamp(0.0, BRIGHTEST) * (TONES as f32 / BRIGHTEST)) as usize
 }
 
@@ -147,10 +178,10 @@ fn display(value: f32) -> u8 {
 
 /// Light as display values, without any effect of the camera.
 pub(super) fn develop(light: &[Colour], width: u32, height: u32) -> RgbImage {
-    let table = tones();
+    let table = tones(0.55);
     let mut image = RgbImage::new(width, height);
     for (pixel, light) in image.as_mut().as_chunks_mut::<3>().0.iter_mut().zip(light) {
-        *pixel = light.map(|value| display(table[step(EXPOSURE * value)][0]));
+        *pixel = light.map(|value| display(table[step_of(EXPOSURE * value)][0]));
     }
     image
 }

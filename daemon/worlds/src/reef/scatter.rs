@@ -27,17 +27,21 @@ const SIGNS: Sizes = Sizes { spacing_m: 1.7, median_m: 0.24, largest_m: 0.5, str
 /// Edge of the squares within which the places of a dense lattice share their habitat.
 const SHARED_M: f32 = 0.3;
 
-const LIVE_TONES: [Colour; 10] = [
+const LIVE_TONES: [Colour; 14] = [
     [0.205, 0.165, 0.090],
     [0.175, 0.150, 0.085],
-    [0.230, 0.200, 0.130],
+    [0.270, 0.230, 0.140],
     [0.160, 0.155, 0.085],
-    [0.195, 0.180, 0.145],
-    [0.170, 0.128, 0.090],
-    [0.240, 0.220, 0.130],
-    [0.190, 0.150, 0.150],
+    [0.225, 0.205, 0.160],
+    [0.170, 0.118, 0.080],
+    [0.290, 0.260, 0.150],
+    [0.205, 0.160, 0.160],
     [0.150, 0.152, 0.120],
-    [0.270, 0.250, 0.200],
+    [0.330, 0.310, 0.250],
+    [0.165, 0.165, 0.180],
+    [0.185, 0.180, 0.100],
+    [0.130, 0.095, 0.060],
+    [0.240, 0.175, 0.110],
 ];
 
 /// Chooses the thing of a lattice's place, given the habitat, the clustering and the index of the lattice.
@@ -101,7 +105,7 @@ fn grown(choice: &Choice, sizes: &Sizes, place: &mut Place) -> Thing {
     let angle = std::f64::consts::TAU * rng.unit();
     let (sin, cos) = angle.sin_cos();
     let key = rng.next_u64();
-    let tint = (0.75 + 0.5 * rng.unit()) as f32;
+    let tint = (0.60 + 0.75 * rng.unit()) as f32;
     Thing {
         x: *x,
         y: *y,
@@ -213,12 +217,12 @@ fn debris(habitat: &Habitat, cluster: f32, rng: &mut CounterRng, _: usize) -> Op
         return Some(Choice { form: Form::Stick, tone, aspect: (1.2 + 4.5 * rng.unit()) as f32 });
     }
     let shells = 0.010 * (1.0 - habitat.reef) * (1.0 - habitat.grass);
-    (chance > 1.0 - shells).then_some(Choice { form: Form::Shell, tone: [0.55, 0.52, 0.46], aspect: 1.4 })
+    (chance > 1.0 - shells).then_some(Choice { form: Form::Shell, tone: [0.50, 0.47, 0.41], aspect: 1.4 })
 }
 
 /// Signs of animals on sand.
 fn sign(habitat: &Habitat, cluster: f32, rng: &mut CounterRng, _: usize) -> Option<Choice> {
     let bare = (1.0 - habitat.reef - habitat.rubble - habitat.grass).max(0.0);
     let chance = rng.unit() as f32;
-    (chance < 0.16 * bare * cluster).then_some(Choice { form: Form::Pit, tone: [0.36, 0.33, 0.26], aspect: 1.25 })
+    (chance < 0.10 * bare * cluster).then_some(Choice { form: Form::Pit, tone: [0.36, 0.33, 0.26], aspect: 1.25 })
 }

@@ -2,7 +2,7 @@
 
 use super::Reef;
 use super::branches::branches;
-use super::fields::Colour;
+use super::fields::{Colour, blend};
 use super::grass::blades;
 use super::ground::Slow;
 use super::jittered::Region;
@@ -137,12 +137,17 @@ impl Surface {
                 let at = row * self.columns + column;
                 if thing.is_pit() {
                     self.height_m[at] += spot.height_m - thing.base_m;
-                } else if spot.height_m > self.height_m[at] {
-                    self.height_m[at] = spot.height_m;
-                    self.colour[at] = spot.colour;
-                    if thing.has_class() {
-                        self.class[at] = spot.class;
-                    }
+                    continue;
+                }
+                // An edge is soft where both surfaces are nearly as high.
+                let above = spot.height_m - self.height_m[at];
+                let seen = ((above + 0.006) / 0.014).clamp(0.0, 1.0);
+                if seen > 0.0 {
+                    self.height_m[at] += above.max(0.0);
+                    self.colour[at] = blend(self.colour[at], spot.colour, seen);
+                }
+                if seen > 0.5 && thing.has_class() {
+                    self.class[at] = spot.class;
                 }
             }
         }
