@@ -2,10 +2,11 @@
 //! `cargo run --release -p scenecast-worlds --example crops -- OUT PHOTO=METRES_PER_PIXEL...`
 //!
 //! OUT/mixed.png has 20 crops in rows of 5, OUT/key.txt tells which of them are drawn, OUT/drawn.png and OUT/real.png
-//! have ten each. All show 2.6 x 2 m, are resampled alike and have the same size. The photos are not part of the project.
+//! have ten each. All show 2.6 x 2 m, or as much of that as a photo has, and are resampled and blurred alike. The photos
+//! are not part of the project.
 #![allow(clippy::disallowed_methods)]
 
-use image::imageops::{FilterType, crop_imm, overlay, resize};
+use image::imageops::{FilterType, blur, crop_imm, overlay, resize};
 use image::{Rgb, RgbImage};
 use scene_model::random::CounterRng;
 use scenecast_worlds::{Reef, ReefCamera, View};
@@ -14,6 +15,8 @@ use scenecast_worlds::{Reef, ReefCamera, View};
 const CROP_PX: (u32, u32) = (260, 200);
 const CROP_M: (f64, f64) = (2.6, 2.0);
 const GAP: u32 = 6;
+/// Standard deviation of the blur of all crops, pixels: photos that were scaled down would be sharper than others.
+const BLUR_PX: f32 = 0.6;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut arguments = std::env::args().skip(1);
@@ -28,11 +31,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             photos[i % photos.len()].rsplit_once('=').ok_or("a photo is given as FILE=METRES_PER_PIXEL")?;
         let photo = image::open(path)?.to_rgb8();
         let scale: f64 = scale.parse()?;
-        let size = [CROP_M.0 / scale, CROP_M.1 / scale].map(|pixels| pixels as u32);
-        let free = [photo.width().saturating_sub(size[0]), photo.height().saturating_sub(size[1])];
-        let [left, top] = free.map(|free| (rng.unit() * f64::from(free)) as u32);
-        let crop = crop_imm(&photo, left, top, size[0], size[1]).to_image();
-        real.push(resize(&crop, CROP_PX.0, CROP_PX.1, FilterType::Triangle));
+        real.push(crop(&photo, scale, &mut rng));
     }
     if !real.is_empty() {
         sheet(&real).save(format!("{out}/real.png"))?;
@@ -69,10 +68,19 @@ fn drawn(number: u64, rng: &mut CounterRng) -> RgbImage {
     let view =
         View { x_m: at.0, y_m: at.1, heading_rad, altitude_m: 4.0, width_px: 640, height_px: 480, moment: number };
     let frame = ReefCamera::new(reef, 0.01).frame(&view);
-    let size = [CROP_M.0 / 0.01, CROP_M.1 / 0.01].map(|pixels| pixels as u32);
-    let [left, top] = [640 - size[0], 480 - size[1]].map(|free| (rng.unit() * f64::from(free)) as u32);
-    let crop = crop_imm(&frame, left, top, size[0], size[1]).to_image();
-    resize(&crop, CROP_PX.0, CROP_PX.1, FilterType::Triangle)
+    crop(&frame, 0.01, rng)
+}
+
+/// A part of an image at random, in the size of all crops.
+fn crop(image: &RgbImage, metres_per_pixel: f64, rng: &mut CounterRng) -> RgbImage {
+    let wanted = [CROP_M.0 / metres_per_pixel, CROP_M.1 / metres_per_pixel];
+    let [width, height] = [image.width(), image.height()].map(f64::from);
+    let share = (width / wanted[0]).min(height / wanted[1]).min(1.0);
+    let size = wanted.map(|pixels| ((pixels * share) as u32).max(1));
+    let free = [image.width().saturating_sub(size[0]), image.height().saturating_sub(size[1])];
+    let [left, top] = free.map(|free| (rng.unit() * f64::from(free)) as u32);
+    let part = crop_imm(image, left, top, size[0], size[1]).to_image();
+    blur(&resize(&part, CROP_PX.0, CROP_PX.1, FilterType::Triangle), BLUR_PX)
 }
 
 fn sheet(crops: &[RgbImage]) -> RgbImage {
