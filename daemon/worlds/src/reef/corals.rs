@@ -84,7 +84,7 @@ impl Thing {
         let [ridge, ..] = self.pattern(&patterns().maze, [x + bend(0.0), y + bend(40.0)], zoom);
         let [lump_m, lump, _] = self.pattern(&patterns().rock, [x, y], 1.3);
         let height_m = 0.55 * self.radius_m * dome + 0.018 * ridge + 0.9 * lump_m * dome;
-        self.worn(noise, [x, y], height_m, (0.22 + 0.95 * ridge) * (0.55 + 0.55 * lump))
+        self.worn(noise, [x, y], height_m, (0.42 + 0.65 * ridge) * (0.55 + 0.55 * lump))
     }
 
     /// Lobes with polyps that are dark in the middle.

@@ -7,14 +7,14 @@ use super::layout::{Habitat, Layout};
 use scene_model::random::{CounterRng, derive};
 
 /// Distance of neighbouring shoots, metres.
-const SPACING_M: f32 = 0.046;
+const SPACING_M: f32 = 0.064;
 /// Shoots along the edge of a block.
 const BLOCK: i32 = 4;
 /// The longest blade.
 const MAX_BLADE_M: f32 = 0.36;
 
-const YOUNG: Colour = [0.100, 0.138, 0.058];
-const OLD: Colour = [0.190, 0.165, 0.105];
+const YOUNG: Colour = [0.090, 0.150, 0.050];
+const OLD: Colour = [0.165, 0.155, 0.095];
 const DARK: Colour = [0.040, 0.058, 0.024];
 
 /// A part of a blade, about as long as wide.
@@ -58,7 +58,7 @@ fn blade(ground: &Ground, at: [f32; 2], step_m: f32, rng: &mut CounterRng, draw:
     let lift_m = 0.05 + 0.13 * rng.unit() as f32;
     let age = rng.unit() as f32;
     let dead = ramp(0.45, 0.7, ground.noise.value(x / 1.6 + 15.0, y / 1.6));
-    let tone = scale(blend(YOUNG, OLD, (age * age + 0.5 * dead).min(1.0)), 0.55 + 0.9 * rng.unit() as f32);
+    let tone = scale(blend(YOUNG, OLD, (age * age + 0.5 * dead).min(1.0)), 0.40 + 0.9 * rng.unit() as f32);
     let steps = (length_m / step_m).ceil().max(1.0);
     let (mut px, mut py, mut dx, mut dy) = (x, y, cos * step_m, sin * step_m);
     let turn = curl / steps;

@@ -59,6 +59,8 @@ struct Palette {
     /// Crustose coralline algae.
     crust: Colour,
     algae: Colour,
+    /// Sponges, ascidians and red algae: small, bright and few.
+    sponge: [Colour; 2],
     young: Colour,
     old: Colour,
 }
@@ -74,12 +76,13 @@ impl Palette {
             sand: between([0.40, 0.385, 0.34], [0.40, 0.345, 0.25]),
             film: between([0.19, 0.185, 0.11], [0.21, 0.17, 0.12]),
             rubble: between([0.215, 0.200, 0.165], [0.200, 0.170, 0.120]),
-            turf: between([0.118, 0.100, 0.060], [0.098, 0.104, 0.066]),
-            sediment: between([0.30, 0.285, 0.235], [0.29, 0.245, 0.170]),
-            crust: between([0.215, 0.135, 0.150], [0.195, 0.150, 0.190]),
-            algae: between([0.085, 0.098, 0.040], [0.120, 0.088, 0.035]),
-            young: between([0.090, 0.125, 0.048], [0.075, 0.098, 0.046]),
-            old: between([0.165, 0.140, 0.085], [0.120, 0.115, 0.080]),
+            turf: between([0.135, 0.098, 0.045], [0.100, 0.108, 0.058]),
+            sediment: between([0.30, 0.285, 0.235], [0.31, 0.240, 0.145]),
+            crust: between([0.270, 0.110, 0.125], [0.215, 0.150, 0.180]),
+            algae: between([0.075, 0.110, 0.028], [0.140, 0.085, 0.022]),
+            sponge: [between([0.34, 0.15, 0.05], [0.30, 0.06, 0.05]), between([0.36, 0.27, 0.07], [0.22, 0.05, 0.09])],
+            young: between([0.080, 0.140, 0.042], [0.078, 0.108, 0.046]),
+            old: between([0.150, 0.138, 0.075], [0.115, 0.118, 0.075]),
         }
     }
 }
@@ -110,7 +113,7 @@ impl Ground {
             return 0.0;
         }
         let rag = 0.6 * self.noise.value(x / 1.9 + 9.0, y / 1.9) + fbm(&self.noise, x / 0.7, y / 0.7 + 40.0, 3) - 0.8;
-        ramp(0.28, 0.66, habitat.grass + 1.1 * rag)
+        ramp(0.25, 0.70, habitat.grass + 1.7 * rag)
     }
 
     pub(super) fn slow(&self, x: f32, y: f32) -> Slow {
@@ -124,10 +127,10 @@ impl Ground {
         put(WARP[1], warp(55.0));
         put(BEND, 2.2 * n.value(x / 1.1, y / 1.1 + 9.0) + 5.0 * n.value(x / 6.1 + 2.0, y / 6.1));
         put(WORN, ramp(0.42, 0.72, fbm(n, x / 3.3 + 70.0, y / 3.3, 2)));
-        put(LITTER, ramp(0.50, 0.85, fbm(n, x / 1.7, y / 1.7 + 31.0, 3)));
+        put(LITTER, ramp(0.46, 0.72, fbm(n, x / 1.7, y / 1.7 + 31.0, 3)));
         put(FILM, ramp(0.45, 0.75, fbm(n, x / 1.3 + 44.0, y / 1.3, 3)));
         put(MOUNDS, ramp(0.4, 0.7, n.value(x / 2.7, y / 2.7 + 90.0)));
-        put(MOTTLE, 0.80 + 0.40 * fbm(n, x / 1.9 + 5.0, y / 1.9, 3));
+        put(MOTTLE, 0.70 + 0.60 * fbm(n, x / 1.9 + 5.0, y / 1.9, 3));
         put(TURF, fbm(n, x / 0.9 + 14.0, y / 0.9, 3));
         put(CRUST, ramp(0.45, 0.65, fbm(n, x / 1.2 + 3.0, y / 1.2, 2)));
         put(ALGAE, ramp(0.45, 0.62, fbm(n, x / 0.6 + 60.0, y / 0.6 + 3.0, 2)));
@@ -144,12 +147,12 @@ impl Ground {
         let at = [x + self.shift[0] + slow.0[WARP[0]], y + self.shift[1] + slow.0[WARP[1]]];
         let patterns = patterns();
         let mut spot = self.sand(patterns, [x, y], at, habitat, slow);
-        let littered = 0.55 * slow.0[LITTER] * (1.0 - habitat.grass);
-        let rubble = ramp(0.30, 0.70, habitat.rubble + 0.9 * rag).max(littered).max(0.7 * habitat.reef);
+        let littered = 0.62 * slow.0[LITTER] * (1.0 - habitat.grass);
+        let rubble = ramp(0.30, 0.70, habitat.rubble + 0.9 * rag).max(littered);
         if rubble > 0.05 {
             self.lay_rubble(patterns, &mut spot, at, rubble, slow);
         }
-        let reef = ramp(0.35, 0.65, habitat.reef + 0.5 * rag);
+        let reef = ramp(0.30, 0.70, habitat.reef + 0.4 * rag + 1.1 * (slow.0[CLUMP] - 0.5));
         if reef > 0.0 {
             self.lay_rock(patterns, &mut spot, at, reef, habitat, slow);
         }
@@ -178,19 +181,22 @@ impl Ground {
         let part = phase - floor(phase) as f32 - 0.5;
         let crest = 4.0 * part * part;
         let worn = slow.0[WORN] * (1.0 - 0.8 * habitat.rubble);
-        let rough = 0.6 * n.value(x / 0.09 + 3.0, y / 0.09) + 0.4 * n.value(x / 0.03, y / 0.03) - 0.5;
+        let rough = fbm(n, x / 0.28 + 3.0, y / 0.28, 3) - 0.5;
         let mounds = 0.06 * ramp(0.55, 0.95, n.value(x / 0.21 + 13.0, y / 0.21)) * slow.0[MOUNDS];
         let [grit_m, tone, hue] = patterns.grit.at(at[0], at[1]);
-        let coarse = 0.35 + 0.65 * slow.0[COARSE];
+        let coarse = 0.12 + 0.88 * slow.0[COARSE];
         let ripple_m = (0.010 + 0.010 * habitat.channel) * (crest - 0.35) * worn;
-        let height_m = ripple_m + 0.022 * rough + mounds + 0.9 * coarse * grit_m;
+        let height_m = ripple_m + 0.034 * rough + mounds + (0.15 + 0.55 * coarse) * grit_m;
         let trough = (1.0 - crest) * worn * slow.0[FILM];
         let mut colour = blend(self.palette.sand, self.palette.film, 0.60 * slow.0[FILM] * (0.6 + 0.8 * rough));
         // Shell grit is white, fragments with turf are dark.
         let fleck = ramp(0.93, 0.97, hue) * 0.45 - ramp(0.10, 0.05, hue) * 0.45;
-        let tone = 1.0 + coarse * (0.85 * (tone - 0.85) + fleck);
+        let tone = 1.0 + coarse * (1.1 * (tone - 0.85) + fleck);
         colour = scale(colour, tone * (1.0 - 0.25 * trough) * (1.0 - 0.10 * habitat.channel));
-        Spot { height_m, colour, class: SAND }
+        // Turf grows in tufts on what is raised.
+        let tuft = ramp(0.10, 0.22, rough + 0.8 * (slow.0[TURF] - 0.60));
+        colour = blend(colour, scale(self.palette.turf, 0.35 + 0.8 * tone), 0.8 * tuft);
+        Spot { height_m: height_m + 0.03 * tuft * tone, colour, class: SAND }
     }
 
     /// Lays pieces of dead coral that lie the deeper in the sand the fewer there are.
@@ -201,7 +207,7 @@ impl Ground {
         if seen > 0.0 {
             let palette = &self.palette;
             let bare = if hue > 0.9 { scale(palette.sand, 0.9) } else { palette.rubble };
-            let mut colour = blend(bare, palette.crust, 0.7 * ramp(0.72, 0.80, hue) * (1.0 - ramp(0.86, 0.90, hue)));
+            let mut colour = blend(bare, palette.crust, 0.40 * ramp(0.72, 0.80, hue) * (1.0 - ramp(0.86, 0.90, hue)));
             colour = blend(colour, palette.turf, 0.85 * ramp(0.45, 0.25, hue));
             // Dust of sand lies on what is flat.
             colour = blend(colour, spot.colour, 0.25 * slow.0[COARSE]);
@@ -215,10 +221,10 @@ impl Ground {
         let palette = &self.palette;
         let [lump_m, tone, hue] = patterns.rock.at(at[0], at[1]);
         let [grit_m, fine, other] = patterns.grit.at(1.3 * at[1], 1.3 * at[0]);
-        let rough = n.value(at[0] / 0.55, at[1] / 0.55 + 80.0) - 0.5;
+        let rough = fbm(n, at[0] / 0.62, at[1] / 0.62 + 80.0, 2) - 0.5;
         // Borers and shade leave dark holes.
         let hole = ramp(0.72, 0.86, n.value(at[0] / 0.13 + 5.0, at[1] / 0.13 + 52.0) - 0.25 * rough);
-        let height_m = lump_m + 0.30 * rough - 0.06 * hole + 1.4 * grit_m - 0.34 * (1.0 - reef);
+        let height_m = 1.15 * lump_m + 0.50 * rough - 0.09 * hole + 1.5 * grit_m - 0.34 * (1.0 - reef);
         let seen = ramp(-0.01, 0.02, height_m - spot.height_m);
         if seen <= 0.0 {
             return;
@@ -229,6 +235,12 @@ impl Ground {
         colour = blend(colour, palette.crust, 0.8 * crust);
         let algae = slow.0[ALGAE] * ramp(0.55, 0.35, hue + 0.3 * (other - 0.5));
         colour = blend(colour, palette.algae, if is_rock(habitat) { 0.9 } else { 0.55 } * algae);
+        let rare = slow.0[TURF] + 0.5 * slow.0[CRUST];
+        if other > 0.5 {
+            colour = blend(colour, palette.sponge[0], 0.8 * ramp(0.955, 0.975, hue) * ramp(0.45, 0.7, rare));
+        } else {
+            colour = blend(colour, palette.sponge[1], 0.8 * ramp(0.045, 0.025, hue) * ramp(0.45, 0.7, rare));
+        }
         let light = (0.25 + 0.85 * tone) * (0.30 + 0.85 * fine) * (1.0 - 0.55 * hole);
         spot.height_m += seen * (height_m - spot.height_m);
         spot.colour = blend(spot.colour, scale(colour, light), seen);
@@ -236,7 +248,7 @@ impl Ground {
 
     fn lay_meadow(&self, patterns: &Patterns, spot: &mut Spot, at: [f32; 2], meadow: f32, slow: &Slow) {
         let palette = &self.palette;
-        let [lift_m, tone, hue] = patterns.canopy.at(at[0], at[1]);
+        let [lift_m, tone, hue] = patterns.canopy.at(0.8 * at[0], 0.8 * at[1]);
         let dense = meadow * ramp(0.20, 0.50, slow.0[CLUMP] + 0.35 * (meadow - 0.4));
         let height_m = lift_m + 0.10 * (dense - 0.75) + 0.10 * (slow.0[CLUMP] - 0.5);
         let seen = ramp(-0.03, 0.02, height_m - spot.height_m) * ramp(0.05, 0.3, dense);
@@ -244,7 +256,11 @@ impl Ground {
         let mut colour = blend(palette.young, palette.old, old);
         // Epiphytes whiten the tips of old blades.
         colour = blend(colour, [0.24, 0.235, 0.20], 0.6 * ramp(0.75, 0.95, hue) * ramp(0.7, 1.2, tone));
-        spot.colour = blend(scale(spot.colour, 1.0 - 0.45 * dense), scale(colour, 0.15 + 0.95 * tone), seen);
+        spot.colour = blend(
+            scale(spot.colour, 1.0 - 0.45 * dense),
+            scale(colour, (0.12 + 0.95 * tone) * (0.5 + 1.0 * slow.0[CLUMP])),
+            seen,
+        );
         spot.height_m += seen * (height_m - spot.height_m);
         if meadow > 0.5 {
             spot.class = SEAGRASS;

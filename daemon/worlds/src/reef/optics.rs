@@ -11,7 +11,7 @@ use scene_model::random::{CounterRng, derive, mix};
 const EXPOSURE: f32 = 2.2;
 /// Most of a row's light that smears into the next one while the shutter is open.
 const MAX_SMEAR: f32 = 0.36;
-/// Pixels that share a gain: it changes slowly.
+/// Pixels that share a gain, which changes slowly, and 64 random bits.
 const RUN: usize = 4;
 /// Standard deviation of the sensor's noise in display values: of the dark, and per root of the light.
 const NOISE: [f32; 2] = [0.007, 0.018];
@@ -109,14 +109,18 @@ impl Optics {
             let dx = (start + RUN / 2) as f32 - self.width as f32 / 2.0;
             let step = ((dx * dx + dy * dy) * self.to_path) as usize;
             let (gain, veil) = &self.paths[step.min(STEPS)];
-            for u in start..(start + RUN).min(line.len()) {
-                above[u] = blend(floor[u], above[u], smear);
-                let noise = bell(mix(self.key.wrapping_add((v * self.width + u) as u64)));
-                line[u] = std::array::from_fn(|i| {
-                    let light = above[u][i] * gain[i] + veil[i] + snow[u];
-                    let [value, sigma] = self.tones[step_of(light)];
-                    display(value + sigma * noise)
-                });
+            let end = (start + RUN).min(line.len());
+            let mut bits = mix(self.key.wrapping_add((v * self.width + start) as u64));
+            let row = floor[start..end].iter().zip(&mut above[start..end]).zip(&snow[start..end]);
+            for (((floor, above), snow), pixel) in row.zip(&mut line[start..end]) {
+                *above = blend(*floor, *above, smear);
+                let light: Colour = std::array::from_fn(|i| above[i] * gain[i] + veil[i] + snow);
+                // Green carries most of the lightness, so its noise is that of all.
+                let green = self.tones[step_of(light[1])];
+                let noise = bell(bits) * green[1];
+                *pixel = [self.tones[step_of(light[0])][0], green[0], self.tones[step_of(light[2])][0]]
+                    .map(|value| display(value + noise));
+                bits >>= 16;
             }
         }
     }

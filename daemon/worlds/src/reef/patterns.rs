@@ -47,8 +47,15 @@ impl Patterns {
             key: 0x11,
             ..rubble
         };
-        let grit =
-            Pieces { side: 512, radius_m: [0.007, 0.03], aspect: 1.8, contrast: 0.34, cover: 3.0, key: 0x12, ..rubble };
+        let grit = Pieces {
+            side: 512,
+            radius_m: [0.006, 0.026],
+            aspect: 2.2,
+            contrast: 0.42,
+            cover: 3.0,
+            key: 0x12,
+            ..rubble
+        };
         let fingers = Strands {
             side: 512,
             texel_m: 0.007,
@@ -61,8 +68,8 @@ impl Patterns {
             key: 0x13,
         };
         let canopy = Strands {
-            length_m: [0.10, 0.42],
-            half_width_m: [0.004, 0.010],
+            length_m: [0.12, 0.60],
+            half_width_m: [0.004, 0.014],
             curl: 1.2,
             spread: 0.9,
             rise_m: 0.10,

@@ -6,10 +6,13 @@ use super::surface::Surface;
 /// Direction to the sun: east, north and up.
 const SUN: [f32; 3] = [-0.42, 0.52, 0.744];
 /// Light from the whole sky and from the water.
-const AMBIENT: f32 = 0.36;
+const AMBIENT: f32 = 0.30;
 /// Radii of the neighbourhoods whose mean height tells a crevice, metres.
 const NEAR_M: f32 = 0.05;
 const WIDE_M: f32 = 0.22;
+
+/// How much sharper the camera makes its frames.
+const SHARPEN: f32 = 0.45;
 
 /// Longest shadow, and width of the widest crevice, metres: a surface needs so much more around what is shown.
 pub(super) const SHADOW_M: f32 = 0.48;
@@ -33,14 +36,30 @@ pub(super) fn shade(surface: &Surface) -> Vec<Colour> {
                 [(east - west) / (2.0 * pitch), (height[above + column] - height[below + column]) / (2.0 * pitch)];
             let length = (1.0 + slope[0] * slope[0] + slope[1] * slope[1]).sqrt();
             let facing = (SUN[2] - slope[0] * SUN[0] - slope[1] * SUN[1]).max(0.0) / (length * SUN[2]);
-            let sunk = 26.0 * (near[at] - height[at]).max(0.0) + 9.0 * (wide[at] - height[at]).max(0.0);
+            let sunk = 30.0 * (near[at] - height[at]).max(0.0) + 14.0 * (wide[at] - height[at]).max(0.0);
             let open = 1.0 / (1.0 + sunk);
             let raised = 1.0 + 2.0 * (height[at] - wide[at]).clamp(0.0, 0.2);
             let sun = (1.0 - AMBIENT) * facing.min(1.6) * (1.0 - shadow[at]);
             light.push(scale(surface.colour[at], (AMBIENT * raised + sun) * open));
         }
     }
-    light
+    sharpened(&light, columns)
+}
+
+/// The light with stronger differences between neighbours, as cameras compute it.
+fn sharpened(light: &[Colour], columns: usize) -> Vec<Colour> {
+    let mut sharp = light.to_vec();
+    for at in columns..light.len().saturating_sub(columns) {
+        if (1..columns - 1).contains(&(at % columns)) {
+            let around = [light[at - 1], light[at + 1], light[at - columns], light[at + columns]];
+            sharp[at] = std::array::from_fn(|i| {
+                let mean = 0.25 * (around[0][i] + around[1][i] + around[2][i] + around[3][i]);
+                let value = light[at][i];
+                (value + SHARPEN * (value - mean)).clamp(0.3 * value, 2.0 * value)
+            });
+        }
+    }
+    sharp
 }
 
 /// How far each node lies in the shadow of what is between it and the sun, 0 to 1.

@@ -12,12 +12,12 @@ const BALANCED_M: f32 = 4.0;
 const VEIL: [f32; 3] = [0.012, 0.042, 0.046];
 /// What a white balance leaves of red, green and blue: red is the first to go, and some cameras restore it.
 const BALANCES: [Colour; 6] = [
-    [0.34, 0.96, 1.00],
-    [0.46, 0.98, 0.94],
-    [0.62, 0.97, 0.98],
-    [0.92, 0.96, 0.84],
-    [0.66, 1.00, 0.74],
-    [0.56, 0.84, 1.12],
+    [0.20, 0.88, 1.10],
+    [0.36, 0.90, 1.07],
+    [0.60, 0.92, 1.08],
+    [0.95, 0.95, 0.98],
+    [0.68, 0.98, 0.86],
+    [0.50, 0.80, 1.20],
 ];
 /// Distances over which the light changes along a survey, metres.
 const LIGHT_M: f32 = 14.0;
@@ -48,9 +48,9 @@ impl Water {
         let balance = blend(pick(unit()), pick(unit()), 0.6 * unit());
         Self {
             balance,
-            exposure: 1.25 + 0.85 * unit(),
-            turbidity: 0.25 + 1.0 * unit() * unit(),
-            contrast: 0.55 + 0.45 * unit(),
+            exposure: 1.45 + 1.15 * unit(),
+            turbidity: 0.10 + 0.9 * unit() * unit(),
+            contrast: 0.65 + 0.35 * unit(),
         }
     }
 

@@ -27,8 +27,12 @@ impl Berth {
 
     /// The wreck at a place, if it covers the place.
     pub(super) fn spot(&self, noise: &Noise, x: f32, y: f32) -> Option<Spot> {
+        let [along, abeam] = self.to_hull(x, y);
+        if along.abs() > HALF_LENGTH_M + 0.2 || abeam.abs() > HALF_BEAM_M + 0.4 {
+            return None;
+        }
         // Growth and rot leave no straight line.
-        let ragged = |at: f32| 0.16 * (fbm(noise, x / 0.3 + at, y / 0.3, 3) - 0.5);
+        let ragged = |at: f32| 0.34 * (fbm(noise, x / 0.5 + at, y / 0.5, 4) - 0.5);
         let [along, abeam] = self.to_hull(x + ragged(5.0), y + ragged(77.0));
         let grit = 0.6 * noise.value(x / 0.045, y / 0.045 + 31.0) + 0.4 * noise.value(x / 0.02 + 31.0, y / 0.02);
         let t = along / HALF_LENGTH_M;
@@ -49,7 +53,7 @@ impl Berth {
         let wood = scale(WOOD, 0.3 + 0.6 * noise.value(along / 0.5, abeam / 0.025) + 0.6 * grit);
         let [heap_m, heap, _] = patterns().rubble.at(x + 101.0, y + 53.0);
         // Silt and debris fill the hull and bury most of what has fallen.
-        let fill_m = 0.30 * fbm(noise, along / 0.9, abeam / 0.9 + 33.0, 3) + 0.8 * heap_m;
+        let fill_m = 0.36 * fbm(noise, x / 0.9, y / 0.9 + 33.0, 3) + 0.9 * heap_m;
         let mut spot = Spot { height_m: fill_m, colour: scale(SILT, 0.15 + 0.95 * heap), class: WRECK };
         let mut put = |height_m: f32, colour: Colour| {
             if height_m > spot.height_m {
@@ -72,7 +76,7 @@ impl Berth {
         if decay > 0.54 && plank > 0.13 && noise.value(along / 0.8, (abeam / 0.19).floor() * 3.7) > 0.35 {
             put(0.40, scale(wood, 1.25));
         }
-        if from_wall < 0.05 + 0.12 * grit {
+        if from_wall < 0.02 + 0.22 * grit * decay.max(0.3) && own + decay > 0.55 {
             put(0.15 + 0.75 * standing * (0.4 + 0.6 * decay), blend(wood, RUST, ramp(0.45, 0.65, stain)));
         }
         let (a, b) = ((along + 1.6) / 0.95, (abeam - 0.25) / 0.55);
@@ -82,7 +86,8 @@ impl Berth {
         }
         // Turf, corallines and sponges cover all of it.
         let growth = blend([0.100, 0.092, 0.056], [0.23, 0.20, 0.16], ramp(0.55, 0.9, hue));
-        spot.colour = blend(spot.colour, scale(growth, 0.2 + 0.9 * lump), ramp(0.25, 0.60, stain + 0.25 * (hue - 0.5)));
+        spot.colour =
+            blend(spot.colour, scale(growth, 0.2 + 0.9 * lump), 0.85 * ramp(0.30, 0.65, stain + 0.25 * (hue - 0.5)));
         spot.height_m += 0.55 * lump_m;
         spot.colour = blend(spot.colour, RUST, 0.35 * ramp(0.55, 0.75, stain));
         spot.colour =
