@@ -52,7 +52,7 @@ fn branch(
         let pale = ((t - 0.65) / 0.35).clamp(0.0, 1.0);
         let colour = blend(body, [0.40, 0.40, 0.36], 0.65 * pale * shade.min(1.0));
         draw(
-            &Segment { x, y, height_m: top_m * (0.35 + 0.65 * t), colour },
+            &Segment { x, y, height_m: top_m * (0.35 + 0.65 * t), colour, cover: [1.0, 0.0] },
             radius_m * (1.35 - 0.6 * t) * (0.8 + 0.4 * shade),
         );
         (dx, dy) = (dx - curl * dy, dy + curl * dx);

@@ -56,7 +56,7 @@ impl ReefCamera {
             let line = &mut image.as_mut()[3 * v * row.len()..][..3 * row.len()];
             optics.expose(v, row, &mut above, line.as_chunks_mut().0);
         });
-        optics::soften_colour(&mut image);
+        optics::render_colour(&mut image, self.reef.water.saturation);
         image
     }
 

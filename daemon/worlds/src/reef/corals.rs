@@ -26,7 +26,7 @@ impl Thing {
             Form::Staghorn => {
                 // The ground between the branches, which are drawn one by one.
                 let [height_m, tone, _] = self.pattern(&patterns().rubble, at, 1.0);
-                Spot { height_m: 0.6 * height_m, colour: scale(self.tone, 0.05 + 0.45 * tone), class: THICKET }
+                Spot { height_m: 0.6 * height_m, colour: scale(self.tone, 0.10 + 0.55 * tone), class: THICKET }
             }
             Form::Crust => {
                 let [grit_m, tone, _] = self.pattern(&patterns().grit, at, 1.0);

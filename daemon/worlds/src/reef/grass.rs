@@ -23,6 +23,8 @@ pub(super) struct Segment {
     pub y: f32,
     pub height_m: f32,
     pub colour: Colour,
+    /// Shares of the node below it and of the next node that it covers, 0 to 1.
+    pub cover: [f32; 2],
 }
 
 /// Draws the blades that may reach into the region, in steps of `step_m`.
@@ -59,13 +61,18 @@ fn blade(ground: &Ground, at: [f32; 2], step_m: f32, rng: &mut CounterRng, draw:
     let age = rng.unit() as f32;
     let dead = ramp(0.45, 0.7, ground.noise.value(x / 1.6 + 15.0, y / 1.6));
     let tone = scale(blend(YOUNG, OLD, (age * age + 0.5 * dead).min(1.0)), 0.40 + 0.9 * rng.unit() as f32);
+    // Blades near the camera are wide, and those that sway are blurred.
+    let cover = [0.45 + 0.5 * rng.unit() as f32, (1.6 * rng.unit() as f32 - 0.7).max(0.0)];
     let steps = (length_m / step_m).ceil().max(1.0);
     let (mut px, mut py, mut dx, mut dy) = (x, y, cos * step_m, sin * step_m);
     let turn = curl / steps;
     for step in 0..steps as u32 {
         let t = step as f32 / steps;
         let height_m = 0.02 + lift_m * (4.0 * t * (1.0 - 0.75 * t)).min(1.0);
-        draw(&Segment { x: px, y: py, height_m, colour: blend(DARK, tone, (0.35 + 1.1 * t).min(1.0)) });
+        // Epiphytes mottle the blade.
+        let mottle = 0.7 + 0.6 * ground.noise.value(px / 0.05, py / 0.05);
+        let colour = scale(blend(DARK, tone, (0.25 + 1.1 * t).min(1.0)), mottle);
+        draw(&Segment { x: px, y: py, height_m, colour, cover });
         (dx, dy) = (dx - turn * dy, dy + turn * dx);
         px += dx;
         py += dy;

@@ -79,9 +79,9 @@ impl Palette {
             turf: between([0.135, 0.098, 0.045], [0.100, 0.108, 0.058]),
             sediment: between([0.30, 0.285, 0.235], [0.31, 0.240, 0.145]),
             crust: between([0.270, 0.110, 0.125], [0.215, 0.150, 0.180]),
-            algae: between([0.075, 0.110, 0.028], [0.140, 0.085, 0.022]),
+            algae: between([0.084, 0.100, 0.038], [0.135, 0.088, 0.030]),
             sponge: [between([0.34, 0.15, 0.05], [0.30, 0.06, 0.05]), between([0.36, 0.27, 0.07], [0.22, 0.05, 0.09])],
-            young: between([0.080, 0.140, 0.042], [0.078, 0.108, 0.046]),
+            young: between([0.084, 0.130, 0.048], [0.078, 0.108, 0.046]),
             old: between([0.150, 0.138, 0.075], [0.115, 0.118, 0.075]),
         }
     }
@@ -146,13 +146,24 @@ impl Ground {
         // Where the patterns are looked up.
         let at = [x + self.shift[0] + slow.0[WARP[0]], y + self.shift[1] + slow.0[WARP[1]]];
         let patterns = patterns();
-        let mut spot = self.sand(patterns, [x, y], at, habitat, slow);
+        // The class depends on this, so it must not depend on how far apart the nodes are.
+        let reef = if habitat.reef > 0.0 {
+            let wide = n.value(x / 0.75 + 31.0, y / 0.75) - 0.5;
+            ramp(0.30, 0.70, habitat.reef + 0.4 * rag + 0.8 * wide)
+        } else {
+            0.0
+        };
+        // Between rocks only pockets of sand can be seen.
+        let mut spot = if reef < 1.0 {
+            self.sand(patterns, [x, y], at, habitat, slow)
+        } else {
+            Spot { height_m: 0.0, colour: scale(self.palette.sand, 0.85), class: SAND }
+        };
         let littered = 0.62 * slow.0[LITTER] * (1.0 - habitat.grass);
         let rubble = ramp(0.30, 0.70, habitat.rubble + 0.9 * rag).max(littered);
-        if rubble > 0.05 {
+        if rubble > 0.05 && reef < 1.0 {
             self.lay_rubble(patterns, &mut spot, at, rubble, slow);
         }
-        let reef = ramp(0.30, 0.70, habitat.reef + 0.4 * rag + 1.1 * (slow.0[CLUMP] - 0.5));
         if reef > 0.0 {
             self.lay_rock(patterns, &mut spot, at, reef, habitat, slow);
         }
@@ -168,8 +179,8 @@ impl Ground {
             self.lay_meadow(patterns, &mut spot, at, meadow, slow);
         }
         let grain = speck(self.key, (x * 110.0) as i32, (y * 110.0) as i32) - 0.5;
-        spot.height_m += habitat.lump_m + (0.003 + 0.006 * reef) * grain;
-        spot.colour = scale(spot.colour, slow.0[MOTTLE] * (1.0 + 0.22 * grain));
+        spot.height_m += habitat.lump_m + (0.0015 + 0.006 * reef) * grain;
+        spot.colour = scale(spot.colour, slow.0[MOTTLE] * (1.0 + (0.12 + 0.12 * reef) * grain));
         spot
     }
 
@@ -182,7 +193,11 @@ impl Ground {
         let crest = 4.0 * part * part;
         let worn = slow.0[WORN] * (1.0 - 0.8 * habitat.rubble);
         let rough = fbm(n, x / 0.28 + 3.0, y / 0.28, 3) - 0.5;
-        let mounds = 0.06 * ramp(0.55, 0.95, n.value(x / 0.21 + 13.0, y / 0.21)) * slow.0[MOUNDS];
+        let mounds = if slow.0[MOUNDS] > 0.0 {
+            0.06 * ramp(0.55, 0.95, n.value(x / 0.21 + 13.0, y / 0.21)) * slow.0[MOUNDS]
+        } else {
+            0.0
+        };
         let [grit_m, tone, hue] = patterns.grit.at(at[0], at[1]);
         let coarse = 0.12 + 0.88 * slow.0[COARSE];
         let ripple_m = (0.010 + 0.010 * habitat.channel) * (crest - 0.35) * worn;
@@ -194,8 +209,8 @@ impl Ground {
         let tone = 1.0 + coarse * (1.1 * (tone - 0.85) + fleck);
         colour = scale(colour, tone * (1.0 - 0.25 * trough) * (1.0 - 0.10 * habitat.channel));
         // Turf grows in tufts on what is raised.
-        let tuft = ramp(0.10, 0.22, rough + 0.8 * (slow.0[TURF] - 0.60));
-        colour = blend(colour, scale(self.palette.turf, 0.35 + 0.8 * tone), 0.8 * tuft);
+        let tuft = ramp(0.06, 0.26, rough + 0.8 * (slow.0[TURF] - 0.60) + 0.22 * (hue - 0.5));
+        colour = blend(colour, scale(self.palette.turf, 0.25 + 0.8 * tone), 0.75 * tuft);
         Spot { height_m: height_m + 0.03 * tuft * tone, colour, class: SAND }
     }
 

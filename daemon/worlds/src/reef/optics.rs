@@ -126,8 +126,9 @@ impl Optics {
     }
 }
 
-/// Averages the colour of squares of 2 x 2 pixels, as JPEG does, and keeps the lightness of each.
-pub(super) fn soften_colour(image: &mut RgbImage) {
+/// Averages the colour of squares of 2 x 2 pixels, as JPEG does, strengthens it and keeps the lightness of each.
+pub(super) fn render_colour(image: &mut RgbImage, saturation: f32) {
+    let strength = (256.0 * saturation) as i32;
     let width = image.width() as usize;
     for rows in image.as_mut().as_chunks_mut::<3>().0.chunks_exact_mut(2 * width) {
         let (upper, lower) = rows.split_at_mut(width);
@@ -137,7 +138,7 @@ pub(super) fn soften_colour(image: &mut RgbImage) {
                 red += i32::from(pixel[0]) - lightness(*pixel);
                 blue += i32::from(pixel[2]) - lightness(*pixel);
             }
-            let (red, blue) = (red >> 2, blue >> 2);
+            let (red, blue) = ((red * strength) >> 10, (blue * strength) >> 10);
             let green = -(77 * red + 29 * blue) / 150;
             for pixel in upper.iter_mut().chain(lower) {
                 let light = lightness(*pixel);

@@ -32,18 +32,16 @@ impl Patterns {
             radius_m: [0.011, 0.085],
             aspect: 4.5,
             rise: 0.75,
-            round: 0.45,
             contrast: 0.42,
-            cover: 4.0,
+            cover: 3.0,
             key: 0x10,
         };
         let rock = Pieces {
             radius_m: [0.018, 0.24],
             aspect: 1.7,
             rise: 0.62,
-            round: 0.6,
             contrast: 0.34,
-            cover: 4.0,
+            cover: 3.0,
             key: 0x11,
             ..rubble
         };

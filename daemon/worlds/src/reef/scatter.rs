@@ -1,6 +1,6 @@
 //! Where things are: jittered lattices of several spacings, thinned by habitat.
 
-use super::fields::{Colour, scale};
+use super::fields::{Colour, blend, scale};
 use super::ground::Ground;
 use super::jittered::{JitteredLattice, Place, Region};
 use super::layout::{Habitat, Layout};
@@ -106,13 +106,16 @@ fn grown(choice: &Choice, sizes: &Sizes, place: &mut Place) -> Thing {
     let (sin, cos) = angle.sin_cos();
     let key = rng.next_u64();
     let tint = (0.60 + 0.75 * rng.unit()) as f32;
+    // Water without red turns olive into green, so tones are nearly grey.
+    let grey = (choice.tone[0] + choice.tone[1] + choice.tone[2]) / 3.0;
+    let tone = blend(choice.tone, [grey; 3], 0.30 * rng.unit() as f32);
     Thing {
         x: *x,
         y: *y,
         radius_m,
         base_m: habitat.lump_m - 0.02,
         form: choice.form,
-        tone: scale(choice.tone, tint),
+        tone: scale(tone, tint),
         turn: [cos as f32, sin as f32],
         aspect: choice.aspect,
         key,

@@ -43,19 +43,24 @@ pub(super) fn shade(surface: &Surface) -> Vec<Colour> {
             light.push(scale(surface.colour[at], (AMBIENT * raised + sun) * open));
         }
     }
-    sharpened(&light, columns)
+    // A picture from far away is sharp as it is.
+    let strength = SHARPEN * (1.0 - ramp(0.015, 0.04, pitch));
+    sharpened(light, columns, strength)
 }
 
 /// The light with stronger differences between neighbours, as cameras compute it.
-fn sharpened(light: &[Colour], columns: usize) -> Vec<Colour> {
-    let mut sharp = light.to_vec();
+fn sharpened(light: Vec<Colour>, columns: usize, strength: f32) -> Vec<Colour> {
+    if strength == 0.0 {
+        return light;
+    }
+    let mut sharp = light.clone();
     for at in columns..light.len().saturating_sub(columns) {
         if (1..columns - 1).contains(&(at % columns)) {
             let around = [light[at - 1], light[at + 1], light[at - columns], light[at + columns]];
             sharp[at] = std::array::from_fn(|i| {
                 let mean = 0.25 * (around[0][i] + around[1][i] + around[2][i] + around[3][i]);
                 let value = light[at][i];
-                (value + SHARPEN * (value - mean)).clamp(0.3 * value, 2.0 * value)
+                (value + strength * (value - mean)).clamp(0.3 * value, 2.0 * value)
             });
         }
     }

@@ -177,11 +177,14 @@ impl Surface {
         blades(reef.key, &reef.layout, &reef.ground, region, step_m, &mut |segment| {
             let column = (segment.x / self.pitch_m).floor() as i64 - i64::from(self.west);
             let row = (segment.y / self.pitch_m).floor() as i64 - i64::from(self.south);
-            if (0..self.columns as i64).contains(&column) && (0..self.rows as i64).contains(&row) {
-                let at = row as usize * self.columns + column as usize;
-                if segment.height_m > self.height_m[at] {
-                    self.height_m[at] = segment.height_m;
-                    self.colour[at] = segment.colour;
+            for (shift, cover) in [0, 1].into_iter().zip(segment.cover) {
+                let column = column + shift;
+                if (0..self.columns as i64).contains(&column) && (0..self.rows as i64).contains(&row) {
+                    let at = row as usize * self.columns + column as usize;
+                    if cover > 0.0 && segment.height_m > self.height_m[at] {
+                        self.height_m[at] += cover * (segment.height_m - self.height_m[at]);
+                        self.colour[at] = blend(self.colour[at], segment.colour, cover);
+                    }
                 }
             }
         });

@@ -64,8 +64,6 @@ pub(super) struct Pieces {
     pub aspect: f32,
     /// Height in radii.
     pub rise: f32,
-    /// 0.5 for the profile of a ball, less for flat tops.
-    pub round: f32,
     /// Contrast between pieces.
     pub contrast: f32,
     /// Mean number of pieces over a place.
@@ -127,7 +125,7 @@ impl Pieces {
                 let d = distance / piece.radius * (1.0 + rag);
                 let share = ((1.0 - d) * piece.radius).clamp(0.0, 1.0);
                 if share > 0.0 {
-                    let dome = (1.0 - d * d).max(0.0).powf(self.round);
+                    let dome = (1.0 - d * d).max(0.0).sqrt();
                     let height = base + self.rise * piece.radius * self.texel_m * dome * (1.0 + 0.5 * rag);
                     let grain = 0.82 + 0.36 * noise.value(x / 1.7, y / 1.7);
                     let tone = piece.tone * grain * (0.55 + 0.45 * dome) * (1.0 + 0.5 * rag);

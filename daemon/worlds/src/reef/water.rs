@@ -12,12 +12,12 @@ const BALANCED_M: f32 = 4.0;
 const VEIL: [f32; 3] = [0.012, 0.042, 0.046];
 /// What a white balance leaves of red, green and blue: red is the first to go, and some cameras restore it.
 const BALANCES: [Colour; 6] = [
-    [0.20, 0.88, 1.10],
-    [0.36, 0.90, 1.07],
-    [0.60, 0.92, 1.08],
-    [0.95, 0.95, 0.98],
+    [0.20, 0.87, 1.16],
+    [0.36, 0.89, 1.12],
+    [0.60, 0.92, 1.10],
+    [0.95, 0.95, 0.95],
     [0.68, 0.98, 0.86],
-    [0.50, 0.80, 1.20],
+    [0.54, 0.85, 1.15],
 ];
 /// Distances over which the light changes along a survey, metres.
 const LIGHT_M: f32 = 14.0;
@@ -30,6 +30,8 @@ pub(super) struct Water {
     turbidity: f32,
     /// Share of the curve that deepens shadows and lightens what is light, 0 to 1.
     pub contrast: f32,
+    /// Strength of the colours that the camera renders.
+    pub saturation: f32,
 }
 
 /// The light at one place and altitude.
@@ -51,6 +53,7 @@ impl Water {
             exposure: 1.45 + 1.15 * unit(),
             turbidity: 0.10 + 0.9 * unit() * unit(),
             contrast: 0.65 + 0.35 * unit(),
+            saturation: 1.05 + 0.40 * unit(),
         }
     }
 

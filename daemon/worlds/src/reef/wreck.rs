@@ -32,7 +32,7 @@ impl Berth {
             return None;
         }
         // Growth and rot leave no straight line.
-        let ragged = |at: f32| 0.34 * (fbm(noise, x / 0.5 + at, y / 0.5, 4) - 0.5);
+        let ragged = |at: f32| 0.22 * (fbm(noise, x / 0.5 + at, y / 0.5, 4) - 0.5);
         let [along, abeam] = self.to_hull(x + ragged(5.0), y + ragged(77.0));
         let grit = 0.6 * noise.value(x / 0.045, y / 0.045 + 31.0) + 0.4 * noise.value(x / 0.02 + 31.0, y / 0.02);
         let t = along / HALF_LENGTH_M;
