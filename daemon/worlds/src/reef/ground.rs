@@ -245,7 +245,7 @@ impl Ground {
             return;
         }
         let grown = 0.55 * hue + 0.9 * (slow.0[TURF] - 0.5) + 0.25 * (other - 0.5) + 0.3 * rough;
-        let mut colour = blend(palette.turf, palette.sediment, ramp(0.12, 0.52, grown));
+        let mut colour = blend(palette.turf, palette.sediment, ramp(0.10, 0.48, grown));
         let crust = slow.0[CRUST] * ramp(0.60, 0.72, hue + 0.3 * (fine - 0.8));
         colour = blend(colour, palette.crust, 0.8 * crust);
         let algae = slow.0[ALGAE] * ramp(0.55, 0.35, hue + 0.3 * (other - 0.5));
@@ -256,7 +256,7 @@ impl Ground {
         } else {
             colour = blend(colour, palette.sponge[1], 0.8 * ramp(0.045, 0.025, hue) * ramp(0.45, 0.7, rare));
         }
-        let light = (0.25 + 0.85 * tone) * (0.30 + 0.85 * fine) * (1.0 - 0.55 * hole);
+        let light = (0.30 + 0.85 * tone) * (0.32 + 0.88 * fine) * (1.0 - 0.55 * hole);
         spot.height_m += seen * (height_m - spot.height_m);
         spot.colour = blend(spot.colour, scale(colour, light), seen);
     }
