@@ -1,6 +1,7 @@
 //! One flight: a lawnmower survey of 600 s with a camera of 6.4 x 4.8 m at 0.5 frames/s.
 
 use crate::floor::{Floor, View};
+use crate::relief::Relief;
 use scenecast_motion::Motion;
 use scenecast_protocol::coordinates::MapPoint;
 use scenecast_registration::{CameraImage, FrameInput, Registrar, Tally};
@@ -58,7 +59,9 @@ impl Case {
             hard,
             relief("relief .1 m", 0.1),
             relief("relief .3 m", 0.3),
+            relief("relief .45 m", 0.45),
             relief("relief .6 m", 0.6),
+            relief("relief 1 m", 1.0),
         ]
     }
 
@@ -76,8 +79,10 @@ impl Case {
     }
 }
 
-pub fn fly(floor: &Floor, case: &Case, seed: u64) -> Outcome {
+/// Flies once. Each `kind` has another relief.
+pub fn fly(floor: &Floor, case: &Case, seed: u64, kind: u64) -> Outcome {
     let mut random = Random(seed);
+    let relief = Relief::new(case.relief_m, kind);
     let legs = legs(floor);
     let mut motion = Motion::new(legs[0].0, legs[0].1, 0.5, case.drift, seed);
     let mut registrar = Registrar::new(case.drift);
@@ -98,7 +103,7 @@ pub fn fly(floor: &Floor, case: &Case, seed: u64) -> Outcome {
             dead = (dead.0 + cos * step.dx_m + sin * step.dy_m, dead.1 + cos * step.dy_m - sin * step.dx_m);
         }
         let scale = 1.0 + case.altitude_noise * random.normal();
-        let image = photograph(floor, case, &motion, scale, &mut random);
+        let image = photograph((floor, &relief), case, &motion, scale, &mut random);
         let input = FrameInput {
             image: CameraImage::grey(COLUMNS, ROWS, &image).expect("the size of the image"),
             metres_per_pixel: METRES_PER_PIXEL,
@@ -162,18 +167,23 @@ fn legs(floor: &Floor) -> Vec<(f64, f64)> {
     legs
 }
 
-fn photograph(floor: &Floor, case: &Case, motion: &Motion, scale: f64, random: &mut Random) -> Vec<u8> {
+fn photograph(
+    (floor, relief): (&Floor, &Relief),
+    case: &Case,
+    motion: &Motion,
+    scale: f64,
+    random: &mut Random,
+) -> Vec<u8> {
     let view = View {
         x_m: motion.x_m,
         y_m: motion.y_m,
         heading_rad: motion.heading_rad,
         metres_per_pixel: scale * METRES_PER_PIXEL,
         altitude_m: ALTITUDE_M,
-        relief_m: case.relief_m,
         columns: COLUMNS,
         rows: ROWS,
     };
-    let mut light = floor.view(&view);
+    let mut light = floor.view(&view, relief);
     if case.is_murky {
         blur(&mut light);
         for (i, value) in light.iter_mut().enumerate() {

@@ -1,5 +1,6 @@
 //! A sea floor with relief, and the view of a camera over it.
 
+use crate::relief::Relief;
 use image::GrayImage;
 
 /// Brightness on a grid with its north-west corner at the origin, mirrored beyond its bounds.
@@ -18,8 +19,6 @@ pub struct View {
     pub heading_rad: f64,
     pub metres_per_pixel: f64,
     pub altitude_m: f64,
-    /// Standard deviation of the height of the floor, metres.
-    pub relief_m: f64,
     pub columns: usize,
     pub rows: usize,
 }
@@ -64,7 +63,7 @@ impl Floor {
     }
 
     /// The brightness of each pixel of a view.
-    pub fn view(&self, view: &View) -> Vec<f32> {
+    pub fn view(&self, view: &View, relief: &Relief) -> Vec<f32> {
         let (sin, cos) = view.heading_rad.sin_cos();
         let mut pixels = Vec::with_capacity(view.columns * view.rows);
         for row in 0..view.rows {
@@ -73,9 +72,9 @@ impl Floor {
                 let right = (column as f64 + 0.5 - view.columns as f64 / 2.0) * view.metres_per_pixel;
                 let (dx, dy) = (cos * right + sin * ahead, cos * ahead - sin * right);
                 let mut share = 1.0;
-                if view.relief_m > 0.0 {
+                if !relief.is_flat() {
                     for _ in 0..4 {
-                        let height = view.relief_m * relief(view.x_m + share * dx, view.y_m + share * dy);
+                        let height = relief.height_m(view.x_m + share * dx, view.y_m + share * dy);
                         share = 1.0 - height / view.altitude_m;
                     }
                 }
@@ -91,17 +90,3 @@ fn mirror(at: i64, size: usize) -> usize {
     if at < size { at } else { 2 * size - 1 - at }
 }
 
-/// Smooth relief of about unit standard deviation, with bumps of 3 to 9 m.
-fn relief(x_m: f64, y_m: f64) -> f64 {
-    const WAVES: [[f64; 3]; 8] = [
-        [0.71, 0.12, 0.3],
-        [-0.2, 0.93, 1.7],
-        [0.55, 0.61, 4.4],
-        [1.1, -0.52, 2.9],
-        [-0.83, 0.97, 5.1],
-        [1.46, 0.7, 0.9],
-        [0.4, -1.62, 3.6],
-        [-1.3, -1.25, 2.2],
-    ];
-    WAVES.iter().map(|[a, b, phase]| (a * x_m + b * y_m + phase).sin()).sum::<f64>() / 2.0
-}

@@ -1,13 +1,15 @@
 //! Flies virtual cameras over mosaics and prints the error of the registration.
 //!
-//! `cargo run --release -p scenecast-registration --example flights -- FOLDER [case ...]`, where `FOLDER` has the images
-//! `eilatmixx/*.jpg` and `scripps_2014/2014_RGB_crop_1000.png`. The motion is made up, the texture is real. Errors are in
+//! `cargo run --release -p scenecast-registration --example flights -- FOLDER [case ...] [seeds=N]`, where `FOLDER` has the
+//! images `eilatmixx/*.jpg` and `scripps_2014/2014_RGB_crop_1000.png`. Each scene is flown `N` times, with other motion and
+//! relief. The motion is made up, the texture is real. Errors are in
 //! cells of 0.25 m after the best rigid fit of all frames.
 
 #![allow(clippy::disallowed_methods, reason = "an example reads files and measures its duration")]
 
 mod flight;
 mod floor;
+mod relief;
 
 use flight::{Case, Outcome, fly};
 use floor::Floor;
@@ -16,21 +18,21 @@ use std::path::Path;
 fn main() {
     let mut arguments = std::env::args().skip(1);
     let folder = arguments.next().expect("the folder of the images");
-    let wanted: Vec<String> = arguments.collect();
+    let (numbers, wanted): (Vec<String>, Vec<String>) = arguments.partition(|word| word.starts_with("seeds="));
+    let seeds = numbers.last().map_or(1, |word| word["seeds=".len()..].parse().expect("a number of seeds"));
     let is_wanted = |name: &str| wanted.is_empty() || wanted.iter().any(|word| word == name);
     let scenes = scenes(Path::new(&folder));
     assert!(!scenes.is_empty(), "no images in {folder}");
     println!("{:22} {:>6} {:>7} {:>7} {:>7}  evidence", "flight", "dead", "placed", "p95", "ms");
     for case in Case::all().iter().filter(|case| is_wanted(case.name)) {
-        let outcomes: Vec<Outcome> = scenes
-            .iter()
-            .enumerate()
-            .map(|(i, (name, floor))| {
-                let outcome = fly(floor, case, i as u64 + 1);
+        let mut outcomes: Vec<Outcome> = Vec::new();
+        for kind in 0..seeds {
+            for (i, (name, floor)) in scenes.iter().enumerate() {
+                let outcome = fly(floor, case, i as u64 + 1 + 100 * kind, kind);
                 print_row(&format!("  {name}"), &outcome);
-                outcome
-            })
-            .collect();
+                outcomes.push(outcome);
+            }
+        }
         let mean = |of: fn(&Outcome) -> f64| outcomes.iter().map(of).sum::<f64>() / outcomes.len() as f64;
         println!(
             "{:22} {:6.2} {:7.3} {:7.3} {:7.2}",
@@ -43,7 +45,7 @@ fn main() {
     }
     for (name, floor) in [("ripples", Floor::ripples()), ("without texture", Floor::even())] {
         if is_wanted(name) {
-            print_row(name, &fly(&floor, &Case::long(), 1));
+            print_row(name, &fly(&floor, &Case::long(), 1, 0));
         }
     }
 }
