@@ -8,7 +8,7 @@
 use crate::registrar::Registrar;
 
 const MAGIC: [u8; 8] = *b"SCNREGIS";
-const VERSION: u16 = 1;
+const VERSION: u16 = 2;
 
 /// The reason why bytes are no registration.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]

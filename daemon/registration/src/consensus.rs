@@ -12,6 +12,8 @@ const STEPS: usize = 8;
 const HUBER: f64 = 1.5;
 /// Errors of a tile besides the noise of its pixels, pixels.
 const FLOOR_PX: f64 = 0.12;
+/// The largest variance of a tile's errors beyond the expected one.
+const MAX_EXCESS_PX2: f64 = 4.0;
 /// Neighbouring tiles have about the same height, so this many tiles count as one.
 const TILES_ALIKE: f64 = 5.0;
 
@@ -69,6 +71,8 @@ pub(crate) fn agree(tiles: &[TileMatch], start: &Similarity, before: &Before) ->
     let projector = along * along.transpose();
     let mut now = *start;
     let mut relief = before.relief;
+    // Variance of the tiles' errors beyond the expected one, as slopes distort tiles; seen across the parallax.
+    let mut excess2 = 0.0;
     let mut normal = Matrix4::identity();
     for _ in 0..STEPS {
         let height2 = relief * baseline * baseline;
@@ -83,22 +87,24 @@ pub(crate) fn agree(tiles: &[TileMatch], start: &Similarity, before: &Before) ->
         for tile in tiles {
             let arm = now.apply(tile.new) - now.apply(anchor);
             let off = tile.old - now.apply(tile.new);
-            let noise2 = tile.sigma * tile.sigma + FLOOR_PX * FLOOR_PX;
-            let inverse = (Matrix2::identity() * noise2 + projector * height2).try_inverse()?;
-            let distance = (off.transpose() * inverse * off)[0].sqrt();
+            let expected2 = tile.sigma * tile.sigma + FLOOR_PX * FLOOR_PX;
+            let covariance = Matrix2::identity() * expected2 + projector * height2;
+            let distance = off.dot(&(covariance.try_inverse()? * off)).sqrt();
+            let inverse = (covariance + Matrix2::identity() * excess2).try_inverse()?;
             let weight = (HUBER / distance.max(1e-9)).min(1.0);
             let slopes = Matrix2x4::new(-arm.y, arm.x, 1.0, 0.0, arm.x, arm.y, 0.0, 1.0);
             normal += slopes.transpose() * inverse * slopes * weight;
             right += slopes.transpose() * inverse * off * weight;
             let part = off.dot(&along);
-            along_squares += weight * (part * part - noise2);
-            across_squares += weight * (off.norm_squared() - part * part - noise2);
+            along_squares += weight * (part * part - expected2);
+            across_squares += weight * (off.norm_squared() - part * part - expected2);
             weights += weight;
         }
         let change = normal.cholesky()?.solve(&right);
         let turned = Similarity::new(change[0], change[1].exp(), Vector2::zeros());
         let at = now.apply(anchor) + Vector2::new(change[2], change[3]);
         now = turned.after(&now).through(anchor, at);
+        excess2 = (across_squares / weights).clamp(0.0, MAX_EXCESS_PX2);
         if baseline > 1.0 {
             // Heights are learnt from the difference of both directions: other errors have none.
             let seen = (along_squares - across_squares.max(0.0)).max(0.0) / weights / (baseline * baseline);

@@ -12,6 +12,7 @@ mod correlate;
 mod fft;
 mod flat_field;
 mod kept_frames;
+mod link;
 mod odometry;
 mod pair;
 mod plane;

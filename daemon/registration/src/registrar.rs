@@ -5,8 +5,9 @@ use crate::camera_image::CameraImage;
 use crate::compass::HeadingFilter;
 use crate::flat_field::FlatField;
 use crate::kept_frames::{KeptFrame, KeptFrames};
-use crate::odometry::OdometryFilter;
-use crate::pair::{Attempts, Expected, Gates, Match};
+use crate::link::{Link, PLACED_SPREAD};
+use crate::odometry::{OdometryFilter, Seen};
+use crate::pair::{Attempts, Expected, Gates};
 use crate::pose::FramePose;
 use crate::tally::Tally;
 use crate::thumbnail::Thumbnail;
@@ -22,8 +23,10 @@ const CHAIN_SPREAD: f64 = 0.025;
 const LOOP_SPREAD: f64 = 0.012;
 /// Standard deviation of the map itself from place to place, in pixels of a thumbnail.
 const MAP_SIGMA_PX: f64 = 0.3;
-/// Standard deviation of a frame's heading and log scale once it is placed.
-const PLACED_SPREAD: f64 = 0.001;
+/// Turns of successive frames have errors that are alike, as are those of several loops, so that their sum is this much
+/// less certain than the sum of independent ones.
+const CHAIN_ALIKE: f64 = 3.0;
+const LOOPS_ALIKE: f64 = 2.0;
 /// Variance of the heights before any was seen, in squares of the altitude, and the links that it is averaged over.
 const FIRST_RELIEF: f64 = 4e-4;
 const RELIEF_LINKS: f64 = 12.0;
@@ -64,6 +67,8 @@ pub struct Registrar {
     pub(crate) kept: KeptFrames,
     /// Variance of the heights of the floor, in squares of the altitude.
     pub(crate) relief: f64,
+    /// Links in it.
+    relief_links: f64,
     /// Earlier frames that each frame is compared with.
     loops: u8,
     pub(crate) tally: Tally,
@@ -81,44 +86,10 @@ pub(crate) struct Last {
     pub(crate) scale: ScaleFilter,
     /// Covariance of the place against earlier parts of the map, square metres.
     pub(crate) covariance_m2: Matrix2<f64>,
+    /// Loops that showed the same floor as this frame: errors by its mean height are the same in all of them.
+    pub(crate) shared: f64,
     /// `None` for a frame without texture.
     pub(crate) thumbnail: Option<Thumbnail>,
-}
-
-/// A match with a frame that is placed.
-struct Link {
-    found: Match,
-    pose: FramePose,
-}
-
-impl Link {
-    fn heading_rad(&self) -> f64 {
-        self.pose.heading_rad - self.found.similarity.turn_rad()
-    }
-
-    fn log_scale(&self) -> f64 {
-        self.pose.log_scale + self.found.similarity.scale().ln()
-    }
-
-    /// The place of a new frame with a heading and a scale.
-    fn place(&self, heading_rad: f64, log_scale: f64) -> Vector2<f64> {
-        let on_map = self.pose.to_map().apply(self.found.similarity.apply(self.found.anchor));
-        on_map - direction(heading_rad, log_scale).to_map().apply(self.found.anchor)
-    }
-
-    /// Covariance of the place on the map, where the heading and the scale of both frames are uncertain, square metres.
-    fn covariance_m2(&self) -> Matrix2<f64> {
-        let lever2 = self.found.anchor.norm_squared() + self.found.similarity.apply(self.found.anchor).norm_squared();
-        let along = Rotation2::new(-self.pose.heading_rad) * self.found.along;
-        let across2 = self.found.across_sigma_m.powi(2);
-        let parallax = along * along.transpose() * (self.found.along_sigma_m.powi(2) - across2);
-        parallax + Matrix2::identity() * (across2 + PLACED_SPREAD.powi(2) * lever2)
-    }
-}
-
-/// A pose at the origin.
-fn direction(heading_rad: f64, log_scale: f64) -> FramePose {
-    FramePose::new(MapPoint::new(0.0, 0.0), heading_rad, log_scale)
 }
 
 impl Registrar {
@@ -130,6 +101,7 @@ impl Registrar {
             last: None,
             kept: KeptFrames::default(),
             relief: FIRST_RELIEF,
+            relief_links: 0.0,
             loops: MAX_LOOPS,
             tally: Tally::default(),
         }
@@ -183,7 +155,7 @@ impl Registrar {
     fn begin(&mut self, input: &FrameInput, thumbnail: Option<Thumbnail>) -> Placed {
         let pose = FramePose::new(input.dead_reckoned, input.compass_rad, 0.0);
         let (heading, scale) = (HeadingFilter::new(input.compass_rad), ScaleFilter::new());
-        self.keep(input, pose, heading, scale, Matrix2::zeros(), thumbnail);
+        self.keep(input, pose, heading, scale, (Matrix2::zeros(), 0.0), thumbnail);
         Placed { pose, is_chained: false, loops: 0 }
     }
 
@@ -196,6 +168,7 @@ impl Registrar {
         let (by, sigma_m) = self.odometry.corrected(moved);
         let scales = thumbnail.as_ref().and_then(Thumbnail::unpacked);
         let pixel_m = input.metres_per_pixel * input.image.reduction();
+        let reach_m = thumbnail.as_ref().map_or(1.0, |new| new.extent_m().iter().sum::<f64>() / 2.0);
         let window_m = 16.0 * pixel_m + 4.0 * (sigma(&last.covariance_m2) + sigma_m);
         let mut attempts = scales.as_ref().map(|scales| Attempts::new(scales, window_m, Gates::default()));
         let guess_heading = last.heading.corrected(input.compass_rad).0 + last.heading_offset();
@@ -203,10 +176,12 @@ impl Registrar {
         let window_m = 16.0 * pixel_m + 5.0 * sigma_m;
         let chain = attempts.as_mut().and_then(|attempts| last.chain(attempts, &guess, window_m, self.relief));
         last.take_chain(input, chain.as_ref());
+        chain.iter().for_each(|link| self.learn_relief(link));
         let by = match &chain {
-            Some(link) => self.fused_step(&mut last, link, moved),
+            Some(link) => self.fused_step(&mut last, link, moved, reach_m),
             None => {
                 last.drift(sigma_m);
+                last.shared = 0.0;
                 by
             }
         };
@@ -218,22 +193,29 @@ impl Registrar {
             _ => Vec::new(),
         };
         let (pose, loops) = self.close(&mut last, &now, &links, pixel_m);
-        for link in chain.iter().chain(&links) {
-            self.relief += (link.found.relief - self.relief) / RELIEF_LINKS;
-        }
-        self.keep(input, pose, last.heading, last.scale, last.covariance_m2, thumbnail);
+        links.iter().for_each(|link| self.learn_relief(link));
+        self.keep(input, pose, last.heading, last.scale, (last.covariance_m2, last.shared), thumbnail);
         Placed { pose, is_chained: chain.is_some(), loops }
     }
 
+    fn learn_relief(&mut self, link: &Link) {
+        self.relief_links = (self.relief_links + 1.0).min(RELIEF_LINKS);
+        self.relief += (link.found.relief - self.relief) / self.relief_links;
+    }
+
     /// The displacement by odometry and images. Its covariance is added to that of the place.
-    fn fused_step(&mut self, last: &mut Last, link: &Link, moved: Vector2<f64>) -> Vector2<f64> {
-        let seen = link.place(last.heading.heading_rad(), last.scale.log_scale()) - last.pose.place();
-        let covariance = link.covariance_m2();
-        self.odometry.learn(moved, seen, &covariance);
-        let (by, sigma_m) = self.odometry.corrected(moved);
-        let gain = gain(&covariance, &(Matrix2::identity() * sigma_m * sigma_m));
-        last.covariance_m2 += (Matrix2::identity() - gain) * covariance;
-        seen + gain * (by - seen)
+    fn fused_step(&mut self, last: &mut Last, link: &Link, moved: Vector2<f64>, reach_m: f64) -> Vector2<f64> {
+        let seen = Seen {
+            by: link.place(last.heading.heading_rad(), last.scale.log_scale()) - last.pose.place(),
+            covariance_m2: link.covariance_m2(),
+            relief: self.relief,
+            alike: link.alike().min(1.0),
+            reach_m: reach_m / 2.0,
+        };
+        let (by, covariance_m2) = self.odometry.fuse(moved, &seen);
+        last.covariance_m2 += covariance_m2;
+        last.shared *= (-by.norm() / reach_m).exp();
+        by
     }
 
     /// Matches with earlier frames.
@@ -254,14 +236,19 @@ impl Registrar {
 
     /// Corrects the pose by the loops that agree with it, and returns their number.
     fn close(&mut self, last: &mut Last, now: &FramePose, links: &[Link], pixel_m: f64) -> (FramePose, u8) {
-        let covariance = |link: &Link| link.covariance_m2() + Matrix2::identity() * (MAP_SIGMA_PX * pixel_m).powi(2);
+        let shared = last.shared + links.len() as f64;
+        let covariance = |link: &Link| {
+            let map2 = Matrix2::identity() * (MAP_SIGMA_PX * pixel_m).powi(2);
+            link.covariance_m2() + map2 + link.parallax_m2(self.relief)
+        };
         let place = |link: &Link| link.place(now.heading_rad, now.log_scale);
         let distance = |off: Vector2<f64>, covariance: Matrix2<f64>| {
             let wider = covariance + Matrix2::identity() * (0.5 * pixel_m).powi(2);
             wider.try_inverse().map_or(f64::INFINITY, |inverse| off.dot(&(inverse * off)).max(0.0).sqrt())
         };
         let agrees = |link: &Link| {
-            let is_near = distance(place(link) - now.place(), last.covariance_m2 + covariance(link)) < GATE;
+            let drifted = self.odometry.systematic_m2(now.place() - link.pose.place());
+            let is_near = distance(place(link) - now.place(), last.covariance_m2 + drifted + covariance(link)) < GATE;
             // Two loops that agree with each other are trusted.
             let is_confirmed = links.iter().any(|other| {
                 let both = covariance(link) + covariance(other);
@@ -273,17 +260,20 @@ impl Registrar {
         let agreeing: Vec<&Link> = links.iter().filter(|link| agrees(link)).collect();
         self.tally.contradicted += (links.len() - agreeing.len()) as u32;
         for link in &agreeing {
-            last.heading.measure(link.heading_rad(), link.found.turn_sigma.hypot(PLACED_SPREAD));
+            last.heading.measure(link.heading_rad(), (LOOPS_ALIKE * link.found.turn_sigma).hypot(PLACED_SPREAD));
             last.scale.measure(link.log_scale(), link.found.log_scale_sigma.hypot(PLACED_SPREAD));
         }
         let (heading, log_scale) = (last.heading.heading_rad(), last.scale.log_scale());
         let mut at = now.place();
         for link in &agreeing {
-            let gain = gain(&last.covariance_m2, &covariance(link));
+            let drifted = self.odometry.systematic_m2(now.place() - link.pose.place());
+            let measured = covariance(link) + link.parallax_m2(self.relief) * (shared - 1.0).max(0.0);
+            let gain = gain(&(last.covariance_m2 + drifted), &measured);
             at += gain * (link.place(heading, log_scale) - at);
             last.covariance_m2 = (Matrix2::identity() - gain) * last.covariance_m2;
             last.covariance_m2 = (last.covariance_m2 + last.covariance_m2.transpose()) / 2.0;
         }
+        last.shared += agreeing.len() as f64;
         (FramePose::new(point(at), heading, log_scale), agreeing.len() as u8)
     }
 
@@ -293,7 +283,7 @@ impl Registrar {
         pose: FramePose,
         heading: HeadingFilter,
         scale: ScaleFilter,
-        covariance_m2: Matrix2<f64>,
+        (covariance_m2, shared): (Matrix2<f64>, f64),
         thumbnail: Option<Thumbnail>,
     ) {
         if let Some(thumbnail) = &thumbnail {
@@ -309,6 +299,7 @@ impl Registrar {
             heading,
             scale,
             covariance_m2,
+            shared,
             thumbnail,
         });
     }
@@ -354,7 +345,7 @@ impl Last {
 
     /// Heading and scale of a new frame, by its match with this one, compass and altitude.
     fn take_chain(&mut self, input: &FrameInput, chain: Option<&Link>) {
-        let turned = chain.map(|link| (-link.found.similarity.turn_rad(), link.found.turn_sigma));
+        let turned = chain.map(|link| (-link.found.similarity.turn_rad(), CHAIN_ALIKE * link.found.turn_sigma));
         let scaled = chain.map(|link| (link.found.similarity.scale().ln(), link.found.log_scale_sigma));
         self.heading.advance(input.compass_rad, turned);
         self.heading.measure_compass();

@@ -89,4 +89,3 @@ fn mirror(at: i64, size: usize) -> usize {
     let at = at.rem_euclid(2 * size as i64) as usize;
     if at < size { at } else { 2 * size - 1 - at }
 }
-
