@@ -85,7 +85,7 @@ fn the_same_arguments_give_the_same_report() {
         ]);
         assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
         let text = std::fs::read_to_string(out.join("report.json")).unwrap();
-        for file in ["vehicle-map.png", "operator-map.png", "truth.png", "frames.log"] {
+        for file in ["vehicle-map.png", "operator-map.png", "truth.png", "quality.csv", "quality.svg", "frames.log"] {
             assert!(out.join(file).is_file(), "{file}");
         }
         let size = |f: &str| image::image_dimensions(out.join(f)).unwrap();

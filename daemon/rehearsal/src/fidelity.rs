@@ -1,12 +1,46 @@
-//! The agreement of the operator's map with the vehicle's at a given bit budget.
+//! The operator's map over time at a given bit budget.
 
 use super::baseline::whole_png;
-use super::mission::{Mission, MissionOptions};
+use super::mission::{MapQuality, Mission, MissionOptions};
+use super::quality::{Curve, Line, Panel};
 use super::world::World;
 use scenecast_config::Config;
 use scenecast_core::UserError;
+use scenecast_protocol::schedule::Class;
 use serde::Serialize;
 use std::time::Duration;
+
+/// Bytes that the vehicle put on air, by use.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub struct Uplink {
+    pub map: u64,
+    pub status: u64,
+    /// Headers, acknowledgement statements and integrity checks.
+    pub overhead: u64,
+    /// Copies of earlier frames.
+    pub repeated: u64,
+    /// Layers and images.
+    pub other: u64,
+}
+
+impl Uplink {
+    fn of(mission: &Mission, map: Class) -> Self {
+        let stats = mission.vehicle().stats();
+        let of = |class| stats.bytes_by_class.get(&class).copied().unwrap_or(0);
+        let [map, status, overhead] = [map, Class::Status, Class::Overhead].map(of);
+        let all: u64 = stats.bytes_by_class.values().sum();
+        Self { map, status, overhead, repeated: stats.repeated_bytes, other: all - map - status - overhead }
+    }
+
+    pub fn all(&self) -> u64 {
+        self.map + self.status + self.overhead + self.repeated + self.other
+    }
+
+    /// The part of all bytes that is map, 0..=1.
+    pub fn map_share(&self) -> f64 {
+        self.map as f64 / self.all().max(1) as f64
+    }
+}
 
 /// One mission of the comparison.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -21,23 +55,33 @@ pub struct FidelityRow {
     pub age_s_median: f64,
     pub age_s_p95: f64,
     pub age_s_max: f64,
-    /// Mutual information of the operator's map with the true classes at the end of the survey, nats.
-    pub mutual_information_nats: Option<f64>,
+    /// Both maps at the end of the survey.
+    pub end: MapQuality,
+    /// The operator's mutual information divided by the vehicle's, after the best rigid fit: at the end, and mean over the
+    /// survey.
+    pub operator_share: Option<f64>,
+    pub operator_share_mean: Option<f64>,
     /// Number of bits that the vehicle put on air.
     pub sent_bits: u64,
-    /// Bytes of map data; those of directives, exemplars and fixes are the same for both streams.
-    pub map_bytes: u64,
+    /// The vehicle's bytes; whole PNG files count as map.
+    pub uplink_bytes: Uplink,
+    /// The part of these bytes that is map, and the part that belongs to frames of mainly map, 0..=1.
+    pub map_share: f64,
+    pub map_frames_share: f64,
+    /// Both maps over time.
+    pub series: Vec<MapQuality>,
 }
 
-/// Runs the same mission at four budgets, for the delta stream and for whole PNGs.
+/// Runs the same mission at each budget, for the delta stream and for whole PNGs.
 pub fn fidelity(
     config: &Config,
     world: &World,
     seed: u64,
+    budgets_bps: &[u32],
     progress: &mut dyn FnMut(&FidelityRow),
 ) -> Result<Vec<FidelityRow>, UserError> {
     let mut rows = Vec::new();
-    for budget_bps in [100, 250, 1000, 10_000] {
+    for &budget_bps in budgets_bps {
         let mut delta = config.clone();
         delta.link.budget_bps = budget_bps;
         let whole = whole_png(&delta);
@@ -59,14 +103,12 @@ fn run(
 ) -> Result<FidelityRow, UserError> {
     let mut mission = Mission::new(config, MissionOptions { world: world.clone(), seed, record: None })?;
     mission.run(Duration::ZERO, &mut |_| {})?;
-    let operator = mission.operator_map();
     let [median, p95, max] = mission.meters.labels.delays(mission.now()).summary();
-    let stats = mission.vehicle().stats();
-    let class = if stream == "delta" {
-        scenecast_protocol::schedule::Class::Map
-    } else {
-        scenecast_protocol::schedule::Class::Exemplar
-    };
+    let class = if stream == "delta" { Class::Map } else { Class::Exemplar };
+    let (uplink_bytes, by_kind) = (Uplink::of(&mission, class), &mission.frames().up_bytes);
+    let of_map = by_kind.get(class.name()).copied().unwrap_or(0);
+    let end = mission.quality();
+    let series: Vec<MapQuality> = mission.quality_series().iter().copied().chain([end]).collect();
     Ok(FidelityRow {
         budget_bps,
         stream,
@@ -74,8 +116,42 @@ fn run(
         age_s_median: median,
         age_s_p95: p95,
         age_s_max: max,
-        mutual_information_nats: mission.mutual_information(&operator).map(|v| v.0),
+        end,
+        operator_share: end.operator_share(),
+        operator_share_mean: mean_share(&series),
         sent_bits: mission.audits()[0].total_bits(),
-        map_bytes: stats.bytes_by_class.get(&class).copied().unwrap_or(0),
+        map_share: uplink_bytes.map_share(),
+        map_frames_share: of_map as f64 / by_kind.values().sum::<u64>().max(1) as f64,
+        uplink_bytes,
+        series,
     })
+}
+
+/// The operator's information over that of the vehicle, both added up over time.
+pub(crate) fn mean_share(series: &[MapQuality]) -> Option<f64> {
+    let sum = |of: fn(&MapQuality) -> Option<f64>| series.iter().map(of).sum::<Option<f64>>();
+    let vehicle = sum(|s| s.vehicle.map(|v| v.rigid_nats)).filter(|nats| *nats > 0.0)?;
+    Some(sum(|s| s.operator.map(|o| o.rigid_nats))? / vehicle)
+}
+
+/// A chart for each budget: the information of both maps over time, for both streams.
+pub fn fidelity_panels(rows: &[FidelityRow]) -> Vec<Panel> {
+    let of_budget = |rows: &[FidelityRow]| {
+        let mut curves = Vec::new();
+        for row in rows {
+            let line = if row.stream == "delta" { Line::OURS } else { Line::BASELINE };
+            let mut curve = |name: String, line, of: &dyn Fn(&MapQuality) -> Option<f64>| {
+                curves.push(Curve::new(&name, line, &row.series, of));
+            };
+            if row.stream == "delta" {
+                curve("vehicle, rigid".into(), Line::REFERENCE, &|s| s.vehicle.map(|i| i.rigid_nats));
+                curve("vehicle, placed".into(), Line::REFERENCE.thin(), &|s| s.vehicle.map(|i| i.placed_nats));
+            }
+            curve(format!("{}, rigid", row.stream), line, &|s| s.operator.map(|i| i.rigid_nats));
+            curve(format!("{}, placed", row.stream), line.thin(), &|s| s.operator.map(|i| i.placed_nats));
+        }
+        let budget_bps = rows.first().map_or(0, |row| row.budget_bps);
+        Panel { title: format!("{budget_bps} bit/s"), unit: "nats", curves }
+    };
+    rows.chunk_by(|a, b| a.budget_bps == b.budget_bps).map(of_budget).collect()
 }

@@ -32,12 +32,14 @@ pub struct FramesLog {
     pub sent: [u64; 2],
     /// Number of frames lost in the channel, up and down.
     pub lost: [u64; 2],
+    /// Bytes of the vehicle's frames by their kind.
+    pub up_bytes: BTreeMap<&'static str, u64>,
 }
 
 impl Default for FramesLog {
     fn default() -> Self {
         let text = "# time_s direction bytes kind fate [reason]\n".to_owned();
-        Self { open: BTreeMap::new(), text, sent: [0; 2], lost: [0; 2] }
+        Self { open: BTreeMap::new(), text, sent: [0; 2], lost: [0; 2], up_bytes: BTreeMap::new() }
     }
 }
 
@@ -46,6 +48,9 @@ impl FramesLog {
     pub fn handle_sent(&mut self, transmission: u64, up: bool, bytes: usize, kind: &'static str, at_s: f64) {
         let direction = if up { "up" } else { "down" };
         self.sent[usize::from(!up)] += 1;
+        if up {
+            *self.up_bytes.entry(kind).or_default() += bytes as u64;
+        }
         self.open.insert(transmission, Sent { at_s, direction, bytes, kind });
     }
 

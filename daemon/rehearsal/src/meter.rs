@@ -31,7 +31,8 @@ pub struct Meter {
     delays: Delays,
     seen: Option<(u64, u64)>,
     agreement: f64,
-    mapped: bool,
+    /// Explored cells of the vehicle's map.
+    explored: u32,
     integral: f64,
     seconds: f64,
     last: Option<Instant>,
@@ -43,7 +44,7 @@ impl Meter {
     pub fn look(&mut self, vehicle: &LabelGrid, operator: &LabelGrid, versions: (u64, u64), now: Instant) {
         if let Some(last) = self.last.replace(now) {
             // Agreement is undefined before the vehicle has a map.
-            let passed = if self.mapped { now.since(last).as_secs_f64() } else { 0.0 };
+            let passed = if self.explored > 0 { now.since(last).as_secs_f64() } else { 0.0 };
             self.integral += self.agreement * passed;
             self.seconds += passed;
         }
@@ -59,7 +60,7 @@ impl Meter {
                 still.insert(cell, self.differing.remove(&cell).unwrap_or(now));
             }
         }
-        self.mapped = explored > 0;
+        self.explored = explored;
         self.agreement = if explored == 0 { 1.0 } else { 1.0 - still.len() as f64 / f64::from(explored) };
         for since in std::mem::replace(&mut self.differing, still).into_values() {
             self.delays.push(now.since(since).as_secs_f64());
@@ -69,6 +70,12 @@ impl Meter {
     /// Share of explored cells on which the maps agree, at the last comparison.
     pub fn agreement(&self) -> f64 {
         self.agreement
+    }
+
+    /// Seconds for which the labels have differed, mean over the explored cells; 0 where the maps agree.
+    pub fn age_s(&self, now: Instant) -> f64 {
+        let sum: f64 = self.differing.values().map(|since| now.since(*since).as_secs_f64()).sum();
+        sum / f64::from(self.explored.max(1))
     }
 
     /// Mean over time of [`Self::agreement`].
@@ -109,7 +116,7 @@ mod tests {
         meter.look(&vehicle, &operator, (1, 0), at(0.0));
         operator.set(Cell::new(0, 0), 1);
         meter.look(&vehicle, &operator, (1, 1), at(4.0));
-        assert_eq!(meter.agreement(), 0.5);
+        assert_eq!((meter.agreement(), meter.age_s(at(6.0))), (0.5, 3.0));
         operator.set(Cell::new(1, 0), 2);
         meter.look(&vehicle, &operator, (1, 2), at(10.0));
         assert_eq!(meter.delays(at(10.0)).summary(), [4.0, 4.0, 10.0]);

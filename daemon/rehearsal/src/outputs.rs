@@ -2,6 +2,7 @@
 
 use super::mission::Mission;
 use super::panorama::panorama;
+use super::quality::{mission_panels, quality_csv, quality_plot};
 use super::report::Report;
 use super::truth::true_classes;
 use scenecast_core::UserError;
@@ -24,6 +25,7 @@ pub fn write_outputs(mission: &Mission, report: &Report, wall: Value, dir: &Path
     }
     let panorama = panorama(mission).map_err(|e| UserError::Failed(e.to_string()))?;
     scenecast_files::write_whole(&dir.join("mission.png"), &panorama)?;
+    write_quality(mission, dir)?;
     let exemplars = dir.join("exemplars");
     std::fs::create_dir_all(&exemplars).map_err(|e| failed(&exemplars, e))?;
     for (label, webp) in mission.exemplars() {
@@ -34,6 +36,15 @@ pub fn write_outputs(mission: &Mission, report: &Report, wall: Value, dir: &Path
     json["wall"] = wall;
     let text = serde_json::to_string_pretty(&json).map_err(|e| UserError::Failed(e.to_string()))? + "\n";
     scenecast_files::write_whole(&dir.join("report.json"), text.as_bytes())
+}
+
+/// Writes the quality of both maps over time as a table and as charts.
+fn write_quality(mission: &Mission, dir: &Path) -> Result<(), UserError> {
+    let samples = mission.quality_series();
+    scenecast_files::write_whole(&dir.join("quality.csv"), quality_csv(samples).as_bytes())?;
+    let title = format!("{} bit/s, seed {}", mission.config.link.budget_bps, mission.seed);
+    let svg = quality_plot(&mission_panels(samples), &title).map_err(|e| UserError::Failed(e.to_string()))?;
+    scenecast_files::write_whole(&dir.join("quality.svg"), svg.as_bytes())
 }
 
 /// Removes files of an earlier run that this one might not replace.

@@ -1,6 +1,7 @@
 //! The report of a mission.
 
-use super::mission::Mission;
+use super::fidelity::mean_share;
+use super::mission::{MapInformation, MapQuality, Mission};
 use scenecast_core::drop_counts::dropped;
 use scenecast_protocol::directive::SlotId;
 use scenecast_protocol::directive::SlotState;
@@ -30,6 +31,7 @@ pub fn report(mission: &Mission, scenario: &str) -> Report {
         "scene": scene(mission),
         "registration": registration(mission),
         "map": map(mission),
+        "quality": quality(mission),
         "link": link(mission),
         "directives": directives(mission),
         "exemplars": exemplars(mission),
@@ -94,6 +96,27 @@ fn registration(m: &Mission) -> Value {
         "unseen": tally.unseen,
         "error_rigid_m": error.map(|e| round(e.rigid_m)),
         "error_placed_m": error.map(|e| round(e.placed_m)),
+    })
+}
+
+/// How true both maps were at the end of the survey, and on the mean over it.
+fn quality(m: &Mission) -> Value {
+    let end = m.ended().unwrap_or(m.now()).as_secs_f64();
+    let survey: Vec<MapQuality> = m.quality_series().iter().copied().filter(|s| s.t_s <= end).collect();
+    let last = survey.last().copied().unwrap_or_else(|| m.quality());
+    let information = |map: Option<MapInformation>| {
+        map.map(|i| json!({ "rigid_nats": round(i.rigid_nats), "placed_nats": round(i.placed_nats) }))
+    };
+    json!({
+        "t_s": round(last.t_s),
+        "vehicle": information(last.vehicle),
+        "operator": information(last.operator),
+        "operator_share": last.operator_share().map(round),
+        "operator_share_mean": mean_share(&survey).map(round),
+        "agreement": round(last.agreement),
+        "age_s": round(last.age_s),
+        "error_rigid_cells": last.error_rigid_cells.map(round),
+        "error_placed_cells": last.error_placed_cells.map(round),
     })
 }
 

@@ -2,8 +2,10 @@
 
 use super::Mission;
 use scenecast_protocol::coordinates::{MapPoint, WorldPoint};
-use scenecast_protocol::map::{Cell, LabelGrid};
-use scenecast_scoring::{RigidFit, mutual_information_nats, rms_distance};
+use scenecast_protocol::map::LabelGrid;
+use scenecast_protocol::wire::Placement;
+use scenecast_scoring::{RigidFit, rms_distance};
+use serde::Serialize;
 
 /// Root mean square errors of the places of all frames, metres.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -14,11 +16,13 @@ pub(crate) struct FrameErrors {
     pub(crate) placed_m: f64,
 }
 
-/// Mutual information over all cells of the survey's area with a known class, unexplored being a label, in nats.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct MapInformation {
-    pub(crate) rigid_nats: f64,
-    pub(crate) placed_nats: f64,
+/// Mutual information of a map with the true classes over the survey's area, unexplored being a label of its own, nats.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct MapInformation {
+    /// After the best turn and shift of the whole map.
+    pub rigid_nats: f64,
+    /// With the placement of the map that its owner knows.
+    pub placed_nats: f64,
 }
 
 impl Mission {
@@ -37,35 +41,29 @@ impl Mission {
         })
     }
 
-    /// The mutual information of a map in the map frame with the true classes; `None` if they are not known.
+    /// The mutual information of a map in the map frame with the true classes, placed as the vehicle places it; `None` if
+    /// the classes are not known.
     pub(crate) fn map_information(&self, map: &LabelGrid) -> Option<MapInformation> {
-        if !self.camera.world.is_annotated() {
-            return None;
-        }
-        let to_map: Vec<_> = self.logbook.poses.iter().map(|poses| (poses.true_at, poses.mapped_at)).collect();
-        let fit = RigidFit::new(&to_map);
         let navigator = self.vehicle().navigator();
-        let placed = |(east_m, north_m): (f64, f64)| navigator.to_map(WorldPoint { east_m, north_m }).xy();
-        Some(MapInformation {
-            rigid_nats: self.information_by(map, |at| fit.apply(at)),
-            placed_nats: self.information_by(map, placed),
-        })
+        self.information(map, |at| navigator.to_map(at))
     }
 
-    /// The mutual information where `to_map` says which place of the map shows a place of the world.
-    fn information_by(&self, map: &LabelGrid, to_map: impl Fn((f64, f64)) -> (f64, f64)) -> f64 {
-        let cell_m = self.cell_m();
-        let area = self.config.survey.area_m.unwrap_or_else(|| self.camera.world.survey_area());
-        let cells = |low: f64, high: f64| (low / cell_m).ceil() as i32..(high / cell_m).floor() as i32;
-        let columns = cells(area.west, area.east);
-        let all = cells(area.south, area.north).flat_map(|y| columns.clone().map(move |x| Cell::new(x, y)));
-        let pairs = all.filter_map(|cell| {
-            let class = self.camera.world.class_of(cell, cell_m)?;
-            let middle = ((f64::from(cell.x) + 0.5) * cell_m, (f64::from(cell.y) + 0.5) * cell_m);
-            let (x, y) = to_map(middle);
-            let label = map.get(Cell::new((x / cell_m).floor() as i32, (y / cell_m).floor() as i32));
-            Some((u32::from(label), u32::from(class)))
-        });
-        mutual_information_nats(pairs).nats
+    /// The mutual information of the operator's map with the true classes, placed by the last report that came in; `None`
+    /// if the classes are not known.
+    pub(crate) fn operator_information(&self) -> Option<MapInformation> {
+        let placement = self.surface().status(self.address()).and_then(|(status, _)| status.placement);
+        self.information(&self.operator_map(), |at| Placement::world_to_map(placement, at))
+    }
+
+    fn information(&self, map: &LabelGrid, to_map: impl Fn(WorldPoint) -> MapPoint) -> Option<MapInformation> {
+        let truth = self.camera.true_cells(&self.config)?;
+        // The map of a recording is in the frame of its poses, which have no other truth.
+        let poses = self.logbook.poses.iter().filter(|_| !self.camera.is_recorded());
+        let fit = RigidFit::new(&poses.map(|poses| (poses.true_at, poses.mapped_at)).collect::<Vec<_>>());
+        let placed = |(east_m, north_m): (f64, f64)| to_map(WorldPoint { east_m, north_m }).xy();
+        Some(MapInformation {
+            rigid_nats: truth.information_nats(map, |at| fit.apply(at)),
+            placed_nats: truth.information_nats(map, placed),
+        })
     }
 }

@@ -1,14 +1,16 @@
 //! The camera of a rehearsal: a view of the simulated sea floor, or a recording.
 
+use super::true_cells::TrueCells;
 use crate::world::World;
 use image::RgbImage;
-use scenecast_config::{CameraSource, Config};
+use scenecast_config::{CameraSource, Config, cell_m};
 use scenecast_core::{Area, UserError};
 use scenecast_files::{RecordedFrame, Recorder, Recording};
 use scenecast_motion::Motion;
 use scenecast_protocol::time::Instant;
 use scenecast_worlds::View;
 use std::path::Path;
+use std::sync::OnceLock;
 
 /// The next frame of the camera.
 pub(super) enum NextFrame {
@@ -28,6 +30,8 @@ pub(crate) struct Camera {
     /// Index of the next frame of the recording.
     next: usize,
     recorder: Option<Recorder>,
+    /// The truth of the survey's area, once it was needed.
+    true_cells: OnceLock<TrueCells>,
 }
 
 impl Camera {
@@ -37,7 +41,8 @@ impl Camera {
             CameraSource::Rehearsal => None,
             CameraSource::Frames(dir) => Some(Recording::open(dir, config.camera.metres_per_pixel)?),
         };
-        Ok(Self { world, recording, next: 0, recorder: record.map(Recorder::new).transpose()? })
+        let recorder = record.map(Recorder::new).transpose()?;
+        Ok(Self { world, recording, next: 0, recorder, true_cells: OnceLock::new() })
     }
 
     /// Whether the frames, and so the vehicle's path, come from a recording.
@@ -58,6 +63,12 @@ impl Camera {
             return Err(UserError::Input(format!("survey.area_m lies outside the sea floor, which covers {limits}")));
         }
         Ok(area)
+    }
+
+    /// The true classes of the survey's area; `None` if they are not known.
+    pub(super) fn true_cells(&self, config: &Config) -> Option<&TrueCells> {
+        let area = self.survey_area(config).ok().filter(|_| self.world.is_annotated())?;
+        Some(self.true_cells.get_or_init(|| TrueCells::new(&self.world, &area, cell_m(config))))
     }
 
     /// The next frame of a vehicle with the given motion and depth.

@@ -208,5 +208,6 @@ impl Mission {
 
     pub(super) fn look(&mut self) {
         self.meters.look(self.vehicle.vehicle(), self.surface.surface(), self.address, self.times.now);
+        self.sample_quality();
     }
 }

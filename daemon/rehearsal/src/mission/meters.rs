@@ -1,5 +1,6 @@
 //! Agreement and delay of the operator's map, layer by layer.
 
+use super::quality::QualitySeries;
 use crate::meter::Meter;
 use scenecast_protocol::map::{LabelGrid, LayerId, LayerReplica};
 use scenecast_protocol::time::Instant;
@@ -13,6 +14,7 @@ use std::collections::BTreeMap;
 pub(crate) struct Meters {
     pub(crate) labels: Meter,
     pub(crate) layers: BTreeMap<LayerId, Meter>,
+    pub(super) quality: QualitySeries,
     /// Changes of the operator's map so far.
     operator_version: u64,
 }

@@ -9,9 +9,11 @@ mod logbook;
 mod meters;
 #[cfg(test)]
 mod planned_tests;
+mod quality;
 mod timetable;
 #[cfg(test)]
 mod track_tests;
+mod true_cells;
 #[cfg(test)]
 mod tuned_tests;
 
@@ -19,12 +21,14 @@ use crate::frames_log::FramesLog;
 use crate::modem_rig::SURFACE;
 use crate::script::Script;
 use crate::world::World;
+pub use accuracy::MapInformation;
 use anchored::Anchored;
 use camera::Camera;
 use carrier::Carrier;
 pub use logbook::Leg;
 use logbook::Logbook;
 use meters::Meters;
+pub use quality::MapQuality;
 use scenecast_config::{Config, OperatorScript, cell_m};
 use scenecast_core::{Area, UserError};
 use scenecast_drivers::modem::Station;

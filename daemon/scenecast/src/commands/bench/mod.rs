@@ -1,6 +1,7 @@
 //! `scenecast bench`
 
 mod exemplar;
+mod fidelity;
 mod link;
 mod localisation;
 mod modem;
@@ -11,9 +12,9 @@ mod steering;
 mod stranger;
 mod wide;
 
-use super::sim::WorldArguments;
 use clap::{Args, Subcommand};
 use exemplar::ExemplarBench;
+use fidelity::FidelityBench;
 use link::LinkBench;
 use localisation::LocalisationBench;
 use modem::ModemBench;
@@ -21,7 +22,6 @@ use planning::PlanningBench;
 use registration::RegistrationBench;
 use restart::RestartBench;
 use scenecast_core::UserError;
-use scenecast_rehearsal::{FidelityRow, fidelity};
 use steering::SteeringBench;
 use stranger::StrangerBench;
 use wide::WideBench;
@@ -31,8 +31,8 @@ use wide::WideBench;
 pub(super) enum BenchCommand {
     /// Exemplars: seconds from the order to the image under full load, bytes for a similarity of 0.9.
     Exemplar(ExemplarBench),
-    /// The operator's map at 100, 250, 1000 and 10 000 bit/s: our stream against whole PNGs.
-    Fidelity(Fidelity),
+    /// The operator's map over time at 100 to 10 000 bit/s: our stream against whole PNGs.
+    Fidelity(FidelityBench),
     /// The link over range, frame size and loss: efficiency, latency of directives, convergence.
     Link(LinkBench),
     /// The vehicle's position over 3 km: dead reckoning, with the relay, with outliers.
@@ -64,18 +64,6 @@ pub(super) struct SeedArguments {
     pub(super) count: u64,
 }
 
-/// The same mission at four bit budgets with 10 % loss, once with our stream and once with a baseline that sends the
-/// whole PNG again after each change. Frames, acknowledgements, repair and turns are the same.
-#[derive(Debug, Args)]
-#[command(after_help = "Example: scenecast bench fidelity --seed 3")]
-pub(super) struct Fidelity {
-    /// Print JSON instead of a table
-    #[arg(long)]
-    json: bool,
-    #[command(flatten)]
-    world: WorldArguments,
-}
-
 impl BenchCommand {
     pub(super) fn run(self) -> Result<(), UserError> {
         match self {
@@ -92,35 +80,4 @@ impl BenchCommand {
             Self::Wide(w) => w.run(),
         }
     }
-}
-
-impl Fidelity {
-    fn run(mut self) -> Result<(), UserError> {
-        // Defaults of all rows, which the user's own settings override: small frames suit small budgets.
-        let defaults = ["channel.loss=0.1", "link.frame_bytes=64", "world.kind=patches"].map(str::to_owned);
-        self.world.sets.splice(0..0, defaults);
-        let config = self.world.config()?;
-        let world = self.world.world(&config)?;
-        if !self.json {
-            println!("budget_bps stream     agreement_mean  age_s median     p95     max  MI nats  map bytes");
-        }
-        let rows = fidelity(&config, &world, self.world.seed, &mut |row| {
-            if !self.json {
-                print_row(row);
-            }
-        })?;
-        if self.json {
-            let text = serde_json::to_string_pretty(&rows).map_err(|e| UserError::Failed(e.to_string()))?;
-            println!("{text}");
-        }
-        Ok(())
-    }
-}
-
-fn print_row(r: &FidelityRow) {
-    let mi = r.mutual_information_nats.map_or("-".to_owned(), |v| format!("{v:.3}"));
-    println!(
-        "{:>10} {:<10} {:>14.4} {:>13.1} {:>7.1} {:>7.1} {:>8} {:>10}",
-        r.budget_bps, r.stream, r.agreement_mean, r.age_s_median, r.age_s_p95, r.age_s_max, mi, r.map_bytes
-    );
 }
