@@ -27,10 +27,12 @@ pub(super) struct Debounce {
 }
 
 impl Debounce {
-    /// Sets the wait of a cell that has not flipped recently; zero disables all waits.
+    /// Sets the wait of a cell that has not flipped recently; zero disables all waits. Another wait forgets all flips.
     pub(super) fn set_wait(&mut self, calm: Duration) {
-        self.calm = calm;
-        self.flips.clear();
+        if calm != self.calm {
+            self.calm = calm;
+            self.flips.clear();
+        }
     }
 
     /// Notes a flip of `cell`; returns how long its new label must be stable.

@@ -23,7 +23,7 @@ pub struct VehicleConfig {
     pub budget_window: Duration,
     /// Least share of each class while it has something to send.
     pub shares: Shares,
-    /// Time between two statuses; longer where the budget is small, so that they take at most a tenth of it.
+    /// Time between two statuses; longer where the budget is small, so that they take at most a twentieth of it.
     pub status_period: Duration,
     /// Key and scope of authentication; `None` sends frames with a CRC only.
     pub authenticity: Option<Authenticity>,

@@ -201,10 +201,14 @@ impl<S: StateSource> VehicleLink<S> {
         self.content.background
     }
 
-    /// Takes the host's decision about the latest version of a slot.
+    /// Takes the host's decision about the latest version of a slot. The next report, which has the decision, is due at
+    /// once; that on a fix is due within the share of reports, because fixes come regularly and nobody waits for them.
     pub fn decide(&mut self, id: SlotId, state: SlotState, now: Instant) {
         self.inbox.decide(id, state);
-        self.content.status.owe_report(now);
+        match id {
+            SlotId::Fix => self.content.status.owe_report_in_share(now),
+            _ => self.content.status.owe_report(now),
+        }
     }
 
     /// Reports the content of utility, settings, limits or fence that is in force; `None`: none is. A new vehicle has none,

@@ -4,7 +4,10 @@ use crate::time::Instant;
 use crate::wire::{ChunkKind, FrameBuilder, Intent, Trail, TrailCorner, VehicleStatus, room_for_payload};
 use std::time::Duration;
 
-/// Sends the latest status at most once a period, and with at most a tenth of the bit budget.
+/// Part of the bit budget that each of pose and report may take at most, in a period of its own.
+const SHARE: f64 = 1.0 / 40.0;
+
+/// Sends the latest status at most once a period, and with at most a twentieth of the bit budget.
 #[derive(Debug)]
 pub(super) struct StatusSender {
     period: Duration,
@@ -14,13 +17,15 @@ pub(super) struct StatusSender {
     /// When the last three poses were sent, the earliest first: a trail begins with the first of them, so that the surface
     /// knows the track if two frames in a row are lost.
     sent: [Option<Instant>; 3],
+    /// When the last report was sent, and its bytes.
+    reported: Option<(Instant, usize)>,
     /// Slot with which the next report begins: a report that does not fit into a frame continues in the next.
     report_from: usize,
 }
 
 impl StatusSender {
     pub(super) fn new(period: Duration, now: Instant) -> Self {
-        Self { period, status: None, pose_due: now, report_due: now, sent: [None; 3], report_from: 0 }
+        Self { period, status: None, pose_due: now, report_due: now, sent: [None; 3], reported: None, report_from: 0 }
     }
 
     pub(super) fn set(&mut self, status: VehicleStatus) {
@@ -60,6 +65,13 @@ impl StatusSender {
         self.report_due = self.report_due.min(at);
     }
 
+    /// Makes a report due as soon as its share of the budget allows it.
+    pub(super) fn owe_report_in_share(&mut self, now: Instant) {
+        let Some(budget_bps) = self.status.as_ref().map(|s| s.budget_bps) else { return };
+        let at = self.reported.map_or(now, |(at, bytes)| now.max(at + time_of_share(budget_bps, bytes)));
+        self.owe_report_by(at);
+    }
+
     /// Puts a report into a frame if one is due; returns its bytes.
     pub(super) fn fill_report(&mut self, builder: &mut FrameBuilder, now: Instant) -> Option<usize> {
         let status = self.status.as_ref().filter(|_| now >= self.report_due)?;
@@ -68,8 +80,9 @@ impl StatusSender {
             return None;
         }
         self.report_from = next;
+        self.reported = Some((now, bytes.len()));
         if next == 0 {
-            self.report_due = now + self.period.max(ten_times_airtime(status, bytes.len()));
+            self.report_due = now + self.period.max(time_of_share(status.budget_bps, bytes.len()));
         }
         Some(bytes.len())
     }
@@ -77,7 +90,7 @@ impl StatusSender {
     /// Puts a pose into a frame if one is due; returns its bytes.
     pub(super) fn fill_pose(&mut self, builder: &mut FrameBuilder, now: Instant) -> Option<usize> {
         let status = self.status.as_ref().filter(|_| now >= self.pose_due)?;
-        let period = self.period.max(ten_times_airtime(status, VehicleStatus::POSE));
+        let period = self.period.max(time_of_share(status.budget_bps, VehicleStatus::POSE));
         // The path and the trail may take a hundredth of the budget each.
         let share = (period.as_secs_f64() * f64::from(status.budget_bps) / 800.0) as usize;
         let mut length = 0;
@@ -98,7 +111,8 @@ impl StatusSender {
             return None;
         }
         length += bytes.len();
-        self.pose_due = now + self.period.max(ten_times_airtime(status, bytes.len().min(VehicleStatus::POSE)));
+        let pose = bytes.len().min(VehicleStatus::POSE);
+        self.pose_due = now + self.period.max(time_of_share(status.budget_bps, pose));
         self.sent = [self.sent[1], self.sent[2], Some(now)];
         Some(length)
     }
@@ -118,7 +132,48 @@ fn room_before_pose(room: usize) -> usize {
     room.saturating_sub(VehicleStatus::POSE + 5)
 }
 
-/// The period in which `bytes`, sent twice, take a tenth of the budget.
-fn ten_times_airtime(status: &VehicleStatus, bytes: usize) -> Duration {
-    Duration::from_secs_f64(bytes as f64 * 160.0 / f64::from(status.budget_bps.max(1)))
+/// The time in which the share of a chunk is its `bytes`.
+fn time_of_share(budget_bps: u32, bytes: usize) -> Duration {
+    Duration::from_secs_f64(bytes as f64 * 8.0 / SHARE / f64::from(budget_bps.max(1)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::wire::{Address, FrameKind, Header, SessionId};
+
+    fn builder() -> FrameBuilder {
+        let header = Header {
+            from: Address::vehicle(1).unwrap(),
+            to: Address::SURFACE,
+            session: SessionId::from_random(1),
+            number: 1,
+            base: 1,
+            remaining: 0,
+            turn: None,
+            stamp: None,
+            nonce: None,
+            ack: None,
+            kind: FrameKind::Numbered,
+            keyed: false,
+        };
+        FrameBuilder::new(&header, 64)
+    }
+
+    /// Seconds from a report until one on a fix is due.
+    fn wait_for_fix_report(budget_bps: u32) -> f64 {
+        let (sent, decided) = (Instant::from_secs_f64(100.0), Instant::from_secs_f64(105.0));
+        let mut sender = StatusSender::new(Duration::from_secs(3600), Instant::ZERO);
+        sender.set(VehicleStatus { budget_bps, ..VehicleStatus::default() });
+        assert_eq!(sender.fill_report(&mut builder(), sent), Some(11));
+        sender.owe_report_in_share(decided);
+        sender.report_due.since(decided).as_secs_f64()
+    }
+
+    #[test]
+    fn a_report_on_a_fix_waits_where_the_budget_is_small() {
+        assert_eq!([wait_for_fix_report(10_000), wait_for_fix_report(1000)], [0.0, 0.0]);
+        // 11 bytes are a fortieth of 100 bit/s in 35.2 s.
+        assert!((wait_for_fix_report(100) - 30.2).abs() < 0.01, "{}", wait_for_fix_report(100));
+    }
 }

@@ -18,7 +18,14 @@ pub(super) struct SurfaceTiming {
     latest: Option<LatestFrame>,
     clock: Option<ClockMap>,
     one_way: Option<Duration>,
+    /// When the last turn with stamps began.
+    stamped: Option<Instant>,
+    /// Whether the frames of the current turn have stamps.
+    is_stamped: bool,
 }
+
+/// The part of the bit budget that stamps may take once the surface has measured the distance.
+const STAMP_SHARE: f64 = 0.01;
 
 impl SurfaceTiming {
     /// A numbered frame came in that was on air for `airtime`. Hellos are not passed in: they may be replays.
@@ -33,7 +40,7 @@ impl SurfaceTiming {
 
     /// The surface has begun a new run, which numbers its frames again.
     pub(super) fn handle_peer_restart(&mut self) {
-        self.latest = None;
+        (self.latest, self.stamped) = (None, None);
     }
 
     /// Time from the start of a transmission of `airtime` at the surface to its end here.
@@ -55,13 +62,43 @@ impl SurfaceTiming {
         self.latest.map(|l| l.at)
     }
 
-    /// The stamp of a frame written at `now`.
+    /// Decides whether the frames of a turn that begins at `now` have stamps: those of each turn until the surface has
+    /// measured the distance, then of as many turns as the share of the stamps allows.
+    pub(super) fn begin_turn(&mut self, budget_bps: u32, now: Instant) {
+        let bits = Stamp::VEHICLE_BYTES as f64 * 8.0;
+        let pause = Duration::from_secs_f64(bits / STAMP_SHARE / f64::from(budget_bps.max(1)));
+        self.is_stamped = self.one_way.is_none() || self.stamped.is_none_or(|at| now.since(at) >= pause);
+        if self.is_stamped {
+            self.stamped = Some(now);
+        }
+    }
+
+    /// The stamp of a frame written at `now`, if those of this turn have one.
     pub(super) fn stamp(&self, now: Instant) -> Option<Stamp> {
-        let latest = self.latest?;
+        let latest = self.latest.filter(|_| self.is_stamped)?;
         Some(Stamp::Vehicle {
             clock_ms: Stamp::clock(now),
             last_received: latest.number as u8,
             held: now.since(latest.at),
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_small_budget_stamps_few_turns_once_the_distance_is_known() {
+        let at = |s: u64| Instant::from_micros(s * 1_000_000);
+        let stamped = |budget_bps: u32, one_way: Option<Duration>| {
+            let mut timing = SurfaceTiming::default();
+            let stamp = Stamp::Surface { clock_ms: 0, one_way };
+            timing.handle_frame(1, Some(&stamp), Duration::ZERO, at(0));
+            let turns = (0..10).map(|turn| at(turn * 10));
+            turns.filter(|&now| (timing.begin_turn(budget_bps, now), timing.stamp(now)).1.is_some()).count()
+        };
+        let known = Some(Duration::from_millis(300));
+        assert_eq!([stamped(100, None), stamped(100, known), stamped(1000, known)], [10, 2, 10]);
     }
 }

@@ -9,7 +9,7 @@ use crate::mac::{Access, quarter_seconds};
 use crate::map::StateSource;
 use crate::schedule::Class;
 use crate::time::Instant;
-use crate::wire::{Address, FrameBuilder};
+use crate::wire::{Address, FrameBuilder, Stamp};
 use std::time::Duration;
 
 /// Frames smaller than this have no room for both a status and a stamp.
@@ -169,8 +169,7 @@ impl<S: StateSource> VehicleLink<S> {
         let sends_hello = self.pair.must_send_hello();
         let plan = if sends_hello { FramePlan { remaining: 0, is_last_new: true } } else { self.plan(frames, now) };
         let wish = (plan.is_last_new && !sends_hello).then(|| self.wish(now));
-        let has_stamp = size >= SMALL_FRAME && (plan.is_last_new || self.repeater.new_frames() == 0);
-        let stamp = self.timing.stamp(now).filter(|_| has_stamp);
+        let stamp = self.stamp(plan.is_last_new, now);
         let ack_room = self.ack_room(plan.is_last_new);
         let mut builder = self.pair.begin_frame(size, ack_room, wish, stamp, FramePurpose::Content);
         let mut carried = Carried::new();
@@ -207,6 +206,16 @@ impl<S: StateSource> VehicleLink<S> {
         }
         self.answer_due = sends_hello.then(|| now + Duration::from_secs(10));
         (transmit, last && takes_turns)
+    }
+
+    /// The stamp of the next frame, which only the first and the last frame of a turn have.
+    fn stamp(&mut self, is_last_new: bool, now: Instant) -> Option<Stamp> {
+        let is_first = self.repeater.new_frames() == 0;
+        if is_first {
+            self.timing.begin_turn(self.budget.bits_per_s(), now);
+        }
+        let has_stamp = self.config.modem.frame_bytes >= SMALL_FRAME && (is_first || is_last_new);
+        self.timing.stamp(now).filter(|_| has_stamp)
     }
 
     fn close(
