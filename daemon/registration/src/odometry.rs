@@ -19,6 +19,9 @@ const MIN_PATH_M: f64 = 0.05;
 /// covers more of a frame, and steep ground matches less often.
 const MEAN_HEIGHT: f64 = 6.0;
 
+/// No floor is believed to be higher or lower than this, in multiples of the altitude.
+const MAX_HEIGHT: f64 = 1.0;
+
 /// A displacement that images measured, metres.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Seen {
@@ -105,7 +108,7 @@ impl OdometryFilter {
         self.along = step * self.along;
         self.along_covariance = step * self.along_covariance * step;
         let allowed = [seen.relief * seen.alike, (MEAN_HEIGHT * seen.relief).powi(2)];
-        self.along_covariance[(1, 1)] += (1.0 - kept * kept) * allowed[0];
+        self.along_covariance[(1, 1)] += (1.0 - kept * kept) * self.allowed[0].min(allowed[0]);
         // Where the floor turns out to be rougher, its height was less certain than believed.
         for (i, variance) in allowed.into_iter().enumerate() {
             self.along_covariance[(i + 1, i + 1)] += (variance - self.allowed[i]).max(0.0);
@@ -127,6 +130,8 @@ impl OdometryFilter {
             self.learn_noise((off * off - measured) / path, measured / path);
             self.along += shared * (off / total);
             self.along[0] = self.bounded(self.along[0]);
+            self.along[1] = self.along[1].clamp(-MAX_HEIGHT, MAX_HEIGHT);
+            self.along[2] = self.along[2].clamp(-MAX_HEIGHT, MAX_HEIGHT);
             self.along_covariance -= shared * shared.transpose() / total;
         }
         (path * (1.0 + self.along[0]) + random / total * off, random * (1.0 - random / total))

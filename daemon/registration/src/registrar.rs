@@ -30,6 +30,8 @@ const LOOPS_ALIKE: f64 = 2.0;
 /// Variance of the heights before any was seen, in squares of the altitude, and the links that it is averaged over.
 const FIRST_RELIEF: f64 = 4e-4;
 const RELIEF_LINKS: f64 = 12.0;
+/// The relief is never taken for larger: heights with a standard deviation of a third of the altitude.
+const MAX_RELIEF: f64 = 0.1;
 /// A loop that is further from the pose than so many standard deviations contradicts it.
 const GATE: f64 = 5.0;
 
@@ -133,7 +135,8 @@ impl Registrar {
         self.flat.is_sound()
             && self.odometry.is_sound()
             && self.kept.is_sound()
-            && (0.0..1.0).contains(&self.relief)
+            && (0.0..=MAX_RELIEF).contains(&self.relief)
+            && (0.0..=RELIEF_LINKS).contains(&self.relief_links)
             && self.last.as_ref().is_none_or(Last::is_sound)
     }
 
@@ -200,7 +203,7 @@ impl Registrar {
 
     fn learn_relief(&mut self, link: &Link) {
         self.relief_links = (self.relief_links + 1.0).min(RELIEF_LINKS);
-        self.relief += (link.found.relief - self.relief) / self.relief_links;
+        self.relief += (link.found.relief.clamp(0.0, MAX_RELIEF) - self.relief) / self.relief_links;
     }
 
     /// The displacement by odometry and images. Its covariance is added to that of the place.
@@ -264,14 +267,16 @@ impl Registrar {
             last.scale.measure(link.log_scale(), link.found.log_scale_sigma.hypot(PLACED_SPREAD));
         }
         let (heading, log_scale) = (last.heading.heading_rad(), last.scale.log_scale());
-        let mut at = now.place();
+        let drifted = agreeing.iter().map(|link| self.odometry.systematic_m2(now.place() - link.pose.place()));
+        let drifted = drifted.max_by(|a, b| a.trace().total_cmp(&b.trace())).unwrap_or_default();
+        // The drift is corrected by the first link as the place is; a later one finds what is left of both.
+        let (mut at, mut whole) = (now.place(), last.covariance_m2 + drifted);
         for link in &agreeing {
-            let drifted = self.odometry.systematic_m2(now.place() - link.pose.place());
             let measured = covariance(link) + link.parallax_m2(self.relief) * (shared - 1.0).max(0.0);
-            let gain = gain(&(last.covariance_m2 + drifted), &measured);
+            let gain = gain(&whole, &measured);
             at += gain * (link.place(heading, log_scale) - at);
-            last.covariance_m2 = (Matrix2::identity() - gain) * last.covariance_m2;
-            last.covariance_m2 = (last.covariance_m2 + last.covariance_m2.transpose()) / 2.0;
+            whole = reduced(&whole, &measured);
+            last.covariance_m2 = reduced(&last.covariance_m2, &measured);
         }
         last.shared += agreeing.len() as f64;
         (FramePose::new(point(at), heading, log_scale), agreeing.len() as u8)
@@ -309,8 +314,12 @@ impl Last {
     fn is_sound(&self) -> bool {
         let others = [self.dead_reckoned[0], self.dead_reckoned[1], self.compass_rad];
         let mut numbers = self.covariance_m2.iter().copied().chain(others);
+        let variances = self.covariance_m2.diagonal();
         self.pose.is_sound()
             && numbers.all(f64::is_finite)
+            && variances.min() >= 0.0
+            && self.covariance_m2.determinant() >= -1e-9 * variances.max().powi(2)
+            && (0.0..=1e9).contains(&self.shared)
             && self.heading.is_sound()
             && self.scale.is_sound()
             && self.thumbnail.as_ref().is_none_or(Thumbnail::is_sound)
@@ -357,6 +366,12 @@ impl Last {
 /// The share of a measurement in an estimate, by the covariances of both.
 fn gain(estimate: &Matrix2<f64>, measurement: &Matrix2<f64>) -> Matrix2<f64> {
     (estimate + measurement).try_inverse().map_or(Matrix2::zeros(), |inverse| estimate * inverse)
+}
+
+/// The covariance of an estimate after a measurement.
+fn reduced(estimate: &Matrix2<f64>, measurement: &Matrix2<f64>) -> Matrix2<f64> {
+    let left = (Matrix2::identity() - gain(estimate, measurement)) * estimate;
+    (left + left.transpose()) / 2.0
 }
 
 /// The root of the mean variance of both directions.

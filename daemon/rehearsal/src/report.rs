@@ -99,7 +99,7 @@ fn registration(m: &Mission) -> Value {
     })
 }
 
-/// How true both maps were at the end of the survey, and on the mean over it.
+/// How true both maps were at the last sample before the end of the survey, and on the mean over it.
 fn quality(m: &Mission) -> Value {
     let end = m.ended().unwrap_or(m.now()).as_secs_f64();
     let survey: Vec<MapQuality> = m.quality_series().iter().copied().filter(|s| s.t_s <= end).collect();

@@ -17,7 +17,7 @@ impl Scene {
     /// Reads an indexed PNG: pixel value = label. The value 0 stands for the sea floor without a label. The operator
     /// favours the rarest label that covers at least a twentieth of the map, or else the most common one.
     pub fn from_label_map(path: &Path) -> Result<Self, UserError> {
-        let bytes = std::fs::read(path).map_err(|e| UserError::file(path, e))?;
+        let bytes = scenecast_config::read_regular(path, 1 << 30)?;
         let raster = LabelRaster::from_png(&bytes).map_err(|e| UserError::file(path, e))?;
         let name = path.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
         Self::from_raster(name, &raster).map_err(|fault| UserError::file(path, fault))

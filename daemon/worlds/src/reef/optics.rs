@@ -126,10 +126,14 @@ impl Optics {
     }
 }
 
-/// Averages the colour of squares of 2 x 2 pixels, as JPEG does, strengthens it and keeps the lightness of each.
+/// Averages the colour of squares of 2 x 2 pixels, as JPEG does, strengthens it and keeps the lightness of each. An odd last
+/// row or column stays as it is.
 pub(super) fn render_colour(image: &mut RgbImage, saturation: f32) {
     let strength = (256.0 * saturation) as i32;
     let width = image.width() as usize;
+    if width == 0 {
+        return;
+    }
     for rows in image.as_mut().as_chunks_mut::<3>().0.chunks_exact_mut(2 * width) {
         let (upper, lower) = rows.split_at_mut(width);
         for (upper, lower) in upper.chunks_exact_mut(2).zip(lower.chunks_exact_mut(2)) {

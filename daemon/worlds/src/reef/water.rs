@@ -46,7 +46,7 @@ impl Water {
     pub(super) fn new(key: u64) -> Self {
         let mut rng = CounterRng::new(key);
         let mut unit = || rng.unit() as f32;
-        let pick = |unit: f32| BALANCES[(unit * BALANCES.len() as f32) as usize];
+        let pick = |unit: f32| BALANCES[((unit * BALANCES.len() as f32) as usize).min(BALANCES.len() - 1)];
         let balance = blend(pick(unit()), pick(unit()), 0.6 * unit());
         Self {
             balance,

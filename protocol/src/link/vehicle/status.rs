@@ -68,6 +68,10 @@ impl StatusSender {
     /// Makes a report due as soon as its share of the budget allows it.
     pub(super) fn owe_report_in_share(&mut self, now: Instant) {
         let Some(budget_bps) = self.status.as_ref().map(|s| s.budget_bps) else { return };
+        if self.report_from != 0 {
+            // The part of the report that is under way may have had the fix before.
+            return self.owe_report(now);
+        }
         let at = self.reported.map_or(now, |(at, bytes)| now.max(at + time_of_share(budget_bps, bytes)));
         self.owe_report_by(at);
     }

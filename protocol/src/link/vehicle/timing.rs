@@ -24,7 +24,8 @@ pub(super) struct SurfaceTiming {
     is_stamped: bool,
 }
 
-/// The part of the bit budget that stamps may take once the surface has measured the distance.
+/// The part of the bit budget that the first stamps of turns may take once the surface has measured the distance. A turn has
+/// two at most.
 const STAMP_SHARE: f64 = 0.01;
 
 impl SurfaceTiming {
@@ -68,7 +69,7 @@ impl SurfaceTiming {
         let bits = Stamp::VEHICLE_BYTES as f64 * 8.0;
         let pause = Duration::from_secs_f64(bits / STAMP_SHARE / f64::from(budget_bps.max(1)));
         self.is_stamped = self.one_way.is_none() || self.stamped.is_none_or(|at| now.since(at) >= pause);
-        if self.is_stamped {
+        if self.is_stamped && self.latest.is_some() {
             self.stamped = Some(now);
         }
     }
@@ -93,6 +94,8 @@ mod tests {
         let at = |s: u64| Instant::from_micros(s * 1_000_000);
         let stamped = |budget_bps: u32, one_way: Option<Duration>| {
             let mut timing = SurfaceTiming::default();
+            // A turn of hellos, before the first frame of a new run, has no stamp.
+            timing.begin_turn(budget_bps, at(0));
             let stamp = Stamp::Surface { clock_ms: 0, one_way };
             timing.handle_frame(1, Some(&stamp), Duration::ZERO, at(0));
             let turns = (0..10).map(|turn| at(turn * 10));

@@ -1,6 +1,6 @@
 //! `scenecast map decode`
 
-use super::files::read_map;
+use super::files::{MAX_MAP_BYTES, read_map};
 use clap::Args;
 use scenecast_core::UserError;
 use scenecast_files::write_whole;
@@ -25,7 +25,7 @@ pub struct Decode {
 impl Decode {
     pub fn run(self) -> Result<(), UserError> {
         let refused = |e| UserError::file(&self.input, e);
-        let bytes = std::fs::read(&self.input).map_err(|e| UserError::file(&self.input, e))?;
+        let bytes = scenecast_config::read_regular(&self.input, MAX_MAP_BYTES)?;
         let file = ChunkFile::from_bytes(&bytes).map_err(refused)?;
         let base = self.base.as_deref().map(read_map).transpose()?;
         let map = file.apply(base.as_ref()).map_err(refused)?;

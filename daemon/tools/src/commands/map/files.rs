@@ -4,9 +4,12 @@ use scenecast_core::UserError;
 use scenecast_protocol::map_codec::LabelRaster;
 use std::path::{Path, PathBuf};
 
+/// Largest file of a map, bytes.
+pub const MAX_MAP_BYTES: u64 = 1 << 30;
+
 /// Reads a map from an indexed PNG.
 pub fn read_map(path: &Path) -> Result<LabelRaster, UserError> {
-    let bytes = std::fs::read(path).map_err(|e| UserError::file(path, e))?;
+    let bytes = scenecast_config::read_regular(path, MAX_MAP_BYTES)?;
     LabelRaster::from_png(&bytes).map_err(|e| UserError::file(path, e))
 }
 

@@ -48,7 +48,7 @@ impl Grid {
         let mut grid = match path {
             None => Self::default(),
             Some(path) => {
-                let text = std::fs::read_to_string(path).map_err(|e| UserError::file(path, e))?;
+                let text = scenecast_config::read_regular_text(path)?;
                 Self::read(&text).map_err(|cause| UserError::Input(format!("{}{cause}", path.display())))?
             }
         };

@@ -185,12 +185,12 @@ impl GrowingTable {
 /// The table of an earlier run with the same inputs, or an empty one.
 fn open(path: &Path, inputs: &str) -> Result<TuningTable, UserError> {
     let refused = |line: usize, cause: String| UserError::Input(format!("{}:{line}: {cause}", path.display()));
-    let table = match std::fs::read_to_string(path) {
-        Ok(text) => {
+    let table = match path.exists() {
+        true => {
+            let text = scenecast_config::read_regular_text(path)?;
             TuningTable::read(&text).map_err(|(line, cause)| refused(line, format!("{cause}; give another --out")))?
         }
-        Err(e) if e.kind() == std::io::ErrorKind::NotFound => TuningTable::default(),
-        Err(e) => return Err(UserError::file(path, e)),
+        false => TuningTable::default(),
     };
     let cause = "was measured with another sea floor, annotations or options than this run's";
     match table.line_of_others(inputs) {

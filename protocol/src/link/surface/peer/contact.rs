@@ -19,8 +19,10 @@ pub(super) struct Contact {
     pub(super) ordered: Option<Instant>,
     /// Where the modem decides when to transmit: when an acknowledgement or a hello is due.
     pub(super) answer_due: Option<Instant>,
-    /// Where the modem decides when to transmit: how often the acknowledgement goes out, unless a frame confirms it before.
+    /// Where the modem decides when to transmit: how often the acknowledgement still goes out, and when next, unless a frame
+    /// confirms it before.
     pub(super) answers_left: u32,
+    pub(super) repeat_due: Option<Instant>,
     /// The vehicle's highest frame number when a frame with an acknowledgement was last written.
     pub(super) acknowledged: FrameNumber,
     pub(super) hello_due: Instant,
@@ -48,6 +50,7 @@ impl Contact {
             ordered: None,
             answer_due: None,
             answers_left: 0,
+            repeat_due: None,
             acknowledged: 0,
             hello_due: now,
             proved: None,

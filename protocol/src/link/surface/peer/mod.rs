@@ -335,9 +335,10 @@ impl<R: StateReplica> VehiclePeer<R> {
         let is_proven = self.pair.is_proven();
         let wait = if is_proven { Duration::from_secs(2) } else { Duration::ZERO };
         if self.pair.unstated() > 0 || (self.pair.has_run() && !is_proven) {
-            let due = now + wait;
-            self.contact.answer_due = Some(self.contact.answer_due.map_or(due, |at| at.min(due)));
-            self.contact.answers_left = self.pair.stats.loss_out.copies(ANSWER_LOSS_RISK, MAX_ANSWERS);
+            if self.contact.answer_due.is_none() {
+                self.contact.answers_left = self.pair.stats.loss_out.copies(ANSWER_LOSS_RISK, MAX_ANSWERS);
+            }
+            self.contact.answer_due.get_or_insert(now + wait);
         }
     }
 

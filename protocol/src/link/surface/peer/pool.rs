@@ -36,16 +36,16 @@ impl<R: StateReplica> VehiclePeer<R> {
         }
         let answer = self.contact.is_answer_due(now);
         let is_late = self.pair.highest() >= self.contact.acknowledged + MAX_UNACKNOWLEDGED;
-        let owes = (self.owes_answer() && answer) || (self.pair.unstated() > 0 && is_late);
+        let is_repeat_due = self.next_repeat().is_some_and(|at| now >= at);
+        let owes =
+            (!self.pair.is_proven() && answer) || (self.pair.unstated() > 0 && (is_late || answer)) || is_repeat_due;
         let inquires = self.in_force.next_inquiry().is_some_and(|at| now >= at);
         self.has_numbers() && (owes || inquires || !self.outbox.pending(now, now - self.slot_timeout()).is_empty())
     }
 
-    /// Whether the vehicle may lack an acknowledgement, or a proof of the run.
-    fn owes_answer(&self) -> bool {
-        !self.pair.is_proven()
-            || self.pair.unstated() > 0
-            || (self.pair.is_unconfirmed() && self.contact.answers_left > 0)
+    /// When the last acknowledgement goes out again, if no frame confirms it.
+    fn next_repeat(&self) -> Option<Instant> {
+        self.contact.repeat_due.filter(|_| self.pair.is_unconfirmed())
     }
 
     /// Whether there is a run with a number left for a frame.
@@ -58,9 +58,11 @@ impl<R: StateReplica> VehiclePeer<R> {
         let again = self.outbox.progress().filter_map(|s| s.sent).min().map(|at| at + self.slot_timeout());
         let again = again.filter(|_| self.outbox.has_backlog());
         let hello = self.contact.next_hello(self.pair.is_proven() && !self.pair.is_full(), self.slot_timeout());
-        let answer = self.contact.answer_due.filter(|_| self.owes_answer());
-        let numbered =
-            [answer, again, self.in_force.next_inquiry()].into_iter().flatten().filter(|_| self.has_numbers()).min();
+        let numbered = [self.contact.answer_due, self.next_repeat(), again, self.in_force.next_inquiry()]
+            .into_iter()
+            .flatten()
+            .filter(|_| self.has_numbers())
+            .min();
         [Some(hello), self.proof_due(), numbered].into_iter().flatten().min()
     }
 
@@ -82,6 +84,7 @@ impl<R: StateReplica> VehiclePeer<R> {
                 true => self.contact.proof_allowed = allowed,
                 false => self.contact.answer_due = Some(allowed),
             }
+            self.contact.repeat_due = self.contact.repeat_due.map(|at| at.max(allowed));
             return None;
         }
         let has_orders = !slots.is_empty() && purpose == FramePurpose::Content;
@@ -102,8 +105,8 @@ impl<R: StateReplica> VehiclePeer<R> {
         let is_partial = self.pair.unstated() > 0;
         let next = if must_prove && purpose.is_hello() { now } else { now + timeout };
         self.contact.answers_left = self.contact.answers_left.saturating_sub(1);
-        let is_repeated = self.contact.answers_left > 0 && self.pair.is_unconfirmed();
-        self.contact.answer_due = (must_prove || is_partial || is_repeated).then_some(next);
+        self.contact.repeat_due = (self.contact.answers_left > 0).then_some(now + timeout);
+        self.contact.answer_due = (must_prove || is_partial).then_some(next);
         self.contact.acknowledged = self.pair.highest();
         if purpose.is_hello() {
             self.contact.note_hello(timeout, self.pair.stats.dropped_total(), now);

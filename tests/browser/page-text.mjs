@@ -1,0 +1,39 @@
+// What the operator's page shows, as text: the panels of a running daemon, each a list of lines.
+//
+//   node page-text.mjs --url http://HOST:PORT
+//
+// Ages, clock times, and figures that count from the start of the program (the link's statistics and the gains of labels) are left
+// out, so that the page before and after a restart of the surface can be compared.
+
+import { chromium } from "playwright-core";
+import { LAUNCH } from "./browser.mjs";
+import { WIDE } from "./stage.mjs";
+
+const TABS = ["vehicle", "constraints", "model", "log"];
+/** Rows of figures that count from the start of the program, or that depend on whether frames come in. */
+const COUNTED = ["Next contact", "Last frame", "Heard", "Round trip", "Range", "Gained", "Backlog"];
+
+const url = process.argv[process.argv.indexOf("--url") + 1];
+const browser = await chromium.launch(LAUNCH);
+const page = await browser.newPage({ viewport: WIDE });
+await page.goto(url);
+await page.locator("#label-list .label").first().waitFor();
+
+const lines = (text) => text.split("\n").map(lasting).filter((line) => line && !COUNTED.some((word) => line.startsWith(word)));
+
+/** A line without its times and durations. */
+function lasting(line) {
+  return line
+    .replaceAll("\u00a0", " ")
+    .replace(/\d+:\d\d(:\d\d)?/g, "TIME")
+    .replace(/(\d+(\.\d+)? (h|min|s)\b ?)+/g, "AGE ")
+    .trim();
+}
+
+const shown = { labels: lines(await page.locator("#labels").innerText()) };
+for (const tab of TABS) {
+  await page.locator(`#tab-${tab}`).click();
+  shown[tab] = lines(await page.locator(`#${tab}`).innerText());
+}
+console.log(JSON.stringify(shown, null, 1));
+await browser.close();
