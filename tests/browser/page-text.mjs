@@ -10,8 +10,8 @@ import { LAUNCH } from "./browser.mjs";
 import { WIDE } from "./stage.mjs";
 
 const TABS = ["vehicle", "constraints", "model", "log"];
-/** Rows of figures that count from the start of the program, or that depend on whether frames come in. */
-const COUNTED = ["Next contact", "Last frame", "Heard", "Round trip", "Range", "Gained", "Backlog"];
+/** What counts from the start of the program: gains of labels, and whether the vehicle has reported since then. */
+const OF_THIS_RUN = /^\+[\d.]+ m²$|^In force|^The vehicle (has not reported|reports)/;
 
 const url = process.argv[process.argv.indexOf("--url") + 1];
 const browser = await chromium.launch(LAUNCH);
@@ -19,12 +19,12 @@ const page = await browser.newPage({ viewport: WIDE });
 await page.goto(url);
 await page.locator("#label-list .label").first().waitFor();
 
-const lines = (text) => text.split("\n").map(lasting).filter((line) => line && !COUNTED.some((word) => line.startsWith(word)));
+const lines = (text) => text.split("\n").map(lasting).filter((line) => line && !OF_THIS_RUN.test(line));
 
 /** A line without its times and durations. */
 function lasting(line) {
   return line
-    .replaceAll("\u00a0", " ")
+    .replace(/[\u00a0\u202f]/g, " ")
     .replace(/\d+:\d\d(:\d\d)?/g, "TIME")
     .replace(/(\d+(\.\d+)? (h|min|s)\b ?)+/g, "AGE ")
     .trim();
@@ -33,6 +33,7 @@ function lasting(line) {
 const shown = { labels: lines(await page.locator("#labels").innerText()) };
 for (const tab of TABS) {
   await page.locator(`#tab-${tab}`).click();
+  if (tab === "log") await page.locator("#log li").first().waitFor();
   shown[tab] = lines(await page.locator(`#${tab}`).innerText());
 }
 console.log(JSON.stringify(shown, null, 1));

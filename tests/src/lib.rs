@@ -205,3 +205,20 @@ pub fn state(port: u16) -> Option<serde_json::Value> {
     let (status, body) = http(port, "GET", "/api/v2/state", "", "")?;
     (status == 200).then(|| serde_json::from_slice(&body).ok()).flatten()
 }
+
+/// Whether this machine cannot show the page in a browser; in CI that is a failure.
+pub fn lacks_browser() -> bool {
+    let chromium = std::env::var("CHROMIUM").unwrap_or_else(|_| "/usr/bin/chromium".to_owned());
+    let packages = workspace().join("tests/browser/node_modules/playwright-core");
+    let missing = match () {
+        () if !std::path::Path::new(&chromium).exists() => format!("no browser at {chromium}"),
+        () if Command::new("node").arg("--version").output().is_err() => "no node".to_owned(),
+        () if !packages.exists() => "no packages: run npm ci in tests/browser".to_owned(),
+        () => return false,
+    };
+    let line = format!("SKIPPED: the page in a browser: {missing}\n");
+    assert!(std::env::var_os("CI").is_none_or(|ci| ci != "true"), "{line}");
+    // The harness hides the captured output of a test that passes.
+    let _ = std::io::Write::write_all(&mut std::io::stderr(), line.as_bytes());
+    true
+}

@@ -1,6 +1,6 @@
 //! The operator's page in headless Chromium: the stories of `tests/browser`, against the mock and against real processes.
 
-use scenecast_tests::{Process, free_port, http, run, scratch, state, wait_until, workspace};
+use scenecast_tests::{Process, free_port, http, lacks_browser, run, scratch, state, wait_until, workspace};
 use std::collections::BTreeMap;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -11,23 +11,6 @@ use std::time::Duration;
 const LIMIT: Duration = Duration::from_secs(120);
 /// One browser at a time, since the stories measure CPU time.
 static BROWSER: Mutex<()> = Mutex::new(());
-
-/// Whether this machine cannot run the stories; in CI that is a failure.
-fn is_skipped() -> bool {
-    let chromium = std::env::var("CHROMIUM").unwrap_or_else(|_| "/usr/bin/chromium".to_owned());
-    let packages = workspace().join("tests/browser/node_modules/playwright-core");
-    let missing = match () {
-        () if !Path::new(&chromium).exists() => format!("no browser at {chromium}"),
-        () if Command::new("node").arg("--version").output().is_err() => "no node".to_owned(),
-        () if !packages.exists() => "no packages: run npm ci in tests/browser".to_owned(),
-        () => return false,
-    };
-    let line = format!("SKIPPED: stories of the page in a browser: {missing}\n");
-    assert!(std::env::var_os("CI").is_none_or(|ci| ci != "true"), "{line}");
-    // The harness hides the captured output of a test that passes.
-    let _ = std::io::stderr().write_all(line.as_bytes());
-    true
-}
 
 /// Runs the stories for the given target. Prints their number and measurements, or fails with their output.
 fn assert_stories_pass(arguments: &[&str]) {
@@ -44,14 +27,14 @@ fn assert_stories_pass(arguments: &[&str]) {
 
 #[test]
 fn every_story_passes_against_the_mock() {
-    if !is_skipped() {
+    if !lacks_browser() {
         assert_stories_pass(&[]);
     }
 }
 
 #[test]
 fn every_story_without_mock_passes_against_a_demo() {
-    if is_skipped() {
+    if lacks_browser() {
         return;
     }
     let port = free_port();
@@ -64,7 +47,7 @@ fn every_story_without_mock_passes_against_a_demo() {
 
 #[test]
 fn a_surface_with_a_token_shows_the_login() {
-    if is_skipped() {
+    if lacks_browser() {
         return;
     }
     let dir = scratch("browser-token");

@@ -1,8 +1,9 @@
 //! A surface that is killed and started again shows the same page.
 
-use scenecast_tests::{Process, free_port, http, recorded, run, scratch, wait_until};
+use scenecast_tests::{Process, free_port, http, lacks_browser, recorded, run, scratch, wait_until, workspace};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
+use std::process::Command;
 use std::time::{Duration, Instant};
 
 const LIMIT: Duration = Duration::from_secs(60);
@@ -97,6 +98,18 @@ fn marker_of(pair: &Pair) -> (String, Vec<f64>) {
     (point["properties"]["marker"].as_str().unwrap().to_owned(), place)
 }
 
+/// The panels of the page as text, without ages; `None` where there is no browser.
+fn page_text(pair: &Pair) -> Option<Value> {
+    if lacks_browser() {
+        return None;
+    }
+    let url = format!("http://127.0.0.1:{}", pair.console);
+    let script = workspace().join("tests/browser/page-text.mjs");
+    let output = Command::new("node").arg(script).args(["--url", &url]).output().expect("node runs");
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    Some(serde_json::from_slice(&output.stdout).expect("the script prints JSON"))
+}
+
 #[test]
 fn a_killed_surface_shows_the_same_page_again() {
     let pair = pair("same-page");
@@ -119,7 +132,7 @@ fn a_killed_surface_shows_the_same_page_again() {
     pair.post("vehicles/1/utility", &format!(r#"{{"weights": {{"{label}": 0.5}}, "exploration": 0.2}}"#));
     let utility =
         |v: &Value| v["directive"]["slots"].as_array().unwrap().iter().find(|s| s["slot"] == "utility").cloned();
-    let (before, map) = (pair.state().unwrap(), cells(&pair));
+    let (text, before, map) = (page_text(&pair), pair.state().unwrap(), cells(&pair));
     surface.kill();
     let began = Instant::now();
     let _surface = pair.surface();
@@ -127,6 +140,7 @@ fn a_killed_surface_shows_the_same_page_again() {
     assert!(began.elapsed() < Duration::from_secs(2), "{:?}", began.elapsed());
     let after = pair.state().unwrap();
     assert_eq!(lasting(after["vehicles"][0].clone()), lasting(before["vehicles"][0].clone()));
+    assert_eq!(page_text(&pair), text);
     assert_eq!(after["command"], before["command"]);
     assert_eq!(after["command"]["holder"]["name"], "local");
     assert_eq!(cells(&pair), map);
