@@ -55,9 +55,11 @@ fn the_shown_plan_is_the_vehicles_and_soon_the_current_one() {
     let (status, _) = mission.surface().view(address).unwrap().status().unwrap();
     assert_eq!((status.mode, mission.shown_plan()), (VehicleMode::Hold, Some(Plan::default())));
     mission.surface.surface_mut().set_hold(address, false, mission.times.now).unwrap();
-    // A plan that leads straight to its end has one place after the waypoint.
+    // The vehicle may have passed the first places of its plan while the report was under way.
+    let places = |(waypoint, path): Plan| waypoint.into_iter().chain(path).collect::<Vec<_>>();
     let in_force = |m: &Mission| {
-        m.shown_plan().is_some_and(|p| !p.1.is_empty() && p == plan(m.vehicle().waypoint(), m.vehicle().path()))
+        let current = places(plan(m.vehicle().waypoint(), m.vehicle().path()));
+        !current.is_empty() && m.shown_plan().is_some_and(|shown| places(shown).ends_with(&current))
     };
     let give_up = mission.now() + Duration::from_secs(10);
     while !in_force(&mission) {
