@@ -26,6 +26,14 @@ fn labels(port: u16) -> Vec<u64> {
     labels.iter().filter_map(|l| l["id"].as_u64()).collect()
 }
 
+/// The label with the largest area. Of a rare one the vehicle may have no image yet.
+fn largest_label(port: u16) -> u64 {
+    let state = state(port).unwrap_or_default();
+    let labels = state["vehicles"][0]["labels"].as_array().cloned().unwrap_or_default();
+    let largest = labels.iter().max_by_key(|l| l["cells"].as_u64());
+    largest.and_then(|l| l["id"].as_u64()).expect("a label is on the map")
+}
+
 /// `scenecast ctl` to the surface on a port.
 fn ctl(port: u16, arguments: &[&str]) -> Output {
     let url = format!("http://127.0.0.1:{port}");
@@ -86,7 +94,8 @@ fn orders_are_followed_until_applied_or_refused() {
     );
 
     let image = scratch("ctl-image").join("label.webp");
-    let saved = ctl(port, &["exemplar", &label.to_string(), "--out", image.to_str().unwrap(), "--wait", "80"]);
+    let pictured = largest_label(port).to_string();
+    let saved = ctl(port, &["exemplar", &pictured, "--out", image.to_str().unwrap(), "--wait", "80"]);
     assert_eq!(saved.status.code(), Some(0), "{}", text(&saved));
     assert!(std::fs::read(&image).unwrap().starts_with(b"RIFF"));
 
