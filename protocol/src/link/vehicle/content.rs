@@ -295,7 +295,7 @@ impl<S: StateSource> VehicleContent<S> {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use crate::wire::{AckStatement, Address, FrameKind, Header, SessionId};
 
@@ -331,7 +331,7 @@ mod tests {
         }
     }
 
-    fn builder(size: usize) -> FrameBuilder {
+    pub(in crate::link::vehicle) fn builder(size: usize) -> FrameBuilder {
         let header = Header {
             from: Address::vehicle(1).unwrap(),
             to: Address::SURFACE,

@@ -144,32 +144,14 @@ fn time_of_share(budget_bps: u32, bytes: usize) -> Duration {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::wire::{Address, FrameKind, Header, SessionId};
-
-    fn builder() -> FrameBuilder {
-        let header = Header {
-            from: Address::vehicle(1).unwrap(),
-            to: Address::SURFACE,
-            session: SessionId::from_random(1),
-            number: 1,
-            base: 1,
-            remaining: 0,
-            turn: None,
-            stamp: None,
-            nonce: None,
-            ack: None,
-            kind: FrameKind::Numbered,
-            keyed: false,
-        };
-        FrameBuilder::new(&header, 64)
-    }
+    use crate::link::vehicle::content::tests::builder;
 
     /// Seconds from a report until one on a fix is due.
     fn wait_for_fix_report(budget_bps: u32) -> f64 {
         let (sent, decided) = (Instant::from_secs_f64(100.0), Instant::from_secs_f64(105.0));
         let mut sender = StatusSender::new(Duration::from_secs(3600), Instant::ZERO);
         sender.set(VehicleStatus { budget_bps, ..VehicleStatus::default() });
-        assert_eq!(sender.fill_report(&mut builder(), sent), Some(11));
+        assert_eq!(sender.fill_report(&mut builder(64), sent), Some(11));
         sender.owe_report_in_share(decided);
         sender.report_due.since(decided).as_secs_f64()
     }
