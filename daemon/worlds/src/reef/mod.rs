@@ -25,7 +25,7 @@ mod wreck;
 pub use camera::{ReefCamera, View};
 
 use ground::Ground;
-use image::RgbImage;
+use image::{GrayImage, RgbImage};
 use layout::Layout;
 use scene_model::random::{CounterRng, derive};
 use surface::Surface;
@@ -123,16 +123,44 @@ impl Reef {
     /// The floor from above, without the effects of water and camera; the first row is the northern one.
     #[must_use]
     pub fn picture(&self, west_m: f64, south_m: f64, columns: u32, rows: u32, metres_per_pixel: f64) -> RgbImage {
+        let raster = Raster::new([west_m, south_m], [columns, rows], metres_per_pixel);
+        let mut light = shading::shade(&Surface::new(self, raster.corner, raster.size, raster.pitch_m));
+        raster.turn_north_up(&mut light);
+        optics::develop(&light, raster.size[0] as u32, raster.size[1] as u32)
+    }
+
+    /// The class of each pixel of [`Reef::picture`] with the same arguments.
+    #[must_use]
+    pub fn classes(&self, west_m: f64, south_m: f64, columns: u32, rows: u32, metres_per_pixel: f64) -> GrayImage {
+        let raster = Raster::new([west_m, south_m], [columns, rows], metres_per_pixel);
+        let mut classes = Surface::of_classes(self, raster.corner, raster.size, raster.pitch_m).class;
+        raster.turn_north_up(&mut classes);
+        GrayImage::from_raw(raster.size[0] as u32, raster.size[1] as u32, classes).unwrap_or_default()
+    }
+}
+
+/// The pixels of a picture from above, as nodes of the floor.
+struct Raster {
+    corner: [i32; 2],
+    /// Columns and rows, at least one each.
+    size: [usize; 2],
+    pitch_m: f32,
+}
+
+impl Raster {
+    fn new(south_west_m: [f64; 2], size: [u32; 2], metres_per_pixel: f64) -> Self {
         let pitch = metres_per_pixel.max(0.001);
-        let corner = [west_m, south_m].map(|low| (low / pitch).round() as i32);
-        let size = [columns.max(1) as usize, rows.max(1) as usize];
-        let mut light = shading::shade(&Surface::new(self, corner, size, pitch as f32));
-        let width = size[0];
-        for row in 0..size[1] / 2 {
-            let (upper, lower) = light.split_at_mut((size[1] - 1 - row) * width);
-            upper[row * width..][..width].swap_with_slice(&mut lower[..width]);
+        let corner = south_west_m.map(|low| (low / pitch).round() as i32);
+        Self { corner, size: size.map(|count| count.max(1) as usize), pitch_m: pitch as f32 }
+    }
+
+    /// Reverses rows that begin in the south.
+    fn turn_north_up<T>(&self, values: &mut [T]) {
+        let [width, height] = self.size;
+        for row in 0..height / 2 {
+            let (lower, upper) = values.split_at_mut((height - 1 - row) * width);
+            lower[row * width..][..width].swap_with_slice(&mut upper[..width]);
         }
-        optics::develop(&light, size[0] as u32, size[1] as u32)
     }
 }
 

@@ -141,3 +141,15 @@ fn classes_look_different() {
         assert!(far > 15.0, "{} and {}: {:?} {:?}", NAMES[usize::from(a)], NAMES[usize::from(b)], mean(a), mean(b));
     }
 }
+
+#[test]
+fn pictured_classes_are_those_of_the_places() {
+    let reef = Reef::new(6);
+    let [west, south] = reef.wreck_m().map(|middle| (middle - 1.0).round());
+    let classes = reef.classes(west, south, 300, 200, 0.01);
+    assert_eq!(classes.dimensions(), reef.picture(west, south, 300, 200, 0.01).dimensions());
+    for (u, v, class) in classes.enumerate_pixels().filter(|(u, v, _)| u % 7 == 0 && v % 7 == 0) {
+        let (x, y) = (west + (f64::from(u) + 0.5) * 0.01, south + (199.5 - f64::from(v)) * 0.01);
+        assert_eq!(class[0], reef.class_at(x, y), "at {x} m east, {y} m north");
+    }
+}

@@ -4,11 +4,12 @@ use image::{GrayImage, RgbImage};
 use scene_model::project::{DownCamera, Observation, Pose};
 use scene_model::topics::{Birth, SceneConfig};
 use scene_model::words::{Word, WordConfig, WordExtractor};
-use scenecast_config::{BirthRule, Config};
+use scenecast_config::{BirthRule, Config, WorldKind};
 use scenecast_core::UserError;
 use scenecast_core::tuning_table::Setting;
 use scenecast_files::{read_classes, read_image};
 use scenecast_scoring::{Annotations, mosaic_classes};
+use scenecast_worlds::Reef;
 use std::path::Path;
 
 /// Minimum overlap of neighbouring frames and lines, as a share of a frame's edge.
@@ -16,8 +17,8 @@ const MIN_OVERLAP: f64 = 0.1;
 /// Maximum number of words of a survey: 1.5 GB of memory.
 const MAX_WORDS: f64 = 1e8;
 const MIN_PX: u32 = 64;
-/// Width and height of a procedural sea floor, and the approximate size of its patches, pixels.
-const REEF_PX: (u32, u32, u32) = (2600, 1800, 100);
+/// Width and height of a sea floor of patches, and the approximate size of the patches, pixels.
+const PATCHES_PX: (u32, u32, u32) = (2600, 1800, 100);
 
 /// The inputs that all settings share.
 pub struct Site<'a> {
@@ -49,12 +50,26 @@ impl<'a> Site<'a> {
         Ok(Self { image, classes, ignore, config, crc: digest.finalize() })
     }
 
-    /// A procedural sea floor, with every pixel annotated.
+    /// The procedural sea floor of `world.kind` from above, with every pixel annotated: the survey area of a reef, or
+    /// patches.
     pub fn procedural(seed: u64, config: &'a Config) -> Self {
-        let world = scenecast_worlds::patches(seed, REEF_PX.0, REEF_PX.1, REEF_PX.2, 8);
-        let classes = GrayImage::from_raw(world.width, world.height, world.truth).unwrap_or_default();
-        let crc = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC).checksum(world.image.as_raw());
-        Self { image: world.image, classes, ignore: &[], config, crc }
+        let (image, classes) = match config.world.kind {
+            WorldKind::Reef => {
+                let (reef, pitch) = (Reef::new(seed), config.camera.metres_per_pixel);
+                let [west, south, east, north] = Reef::SURVEY_M;
+                let pixels = |metres: f64| (metres / pitch).round() as u32;
+                let (columns, rows) = (pixels(east - west), pixels(north - south));
+                let image = reef.picture(west, south, columns, rows, pitch);
+                (image, reef.classes(west, south, columns, rows, pitch))
+            }
+            WorldKind::Patches => {
+                let (columns, rows, patch) = PATCHES_PX;
+                let world = scenecast_worlds::patches(seed, columns, rows, patch, 8);
+                (world.image, GrayImage::from_raw(columns, rows, world.truth).unwrap_or_default())
+            }
+        };
+        let crc = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC).checksum(image.as_raw());
+        Self { image, classes, ignore: &[], config, crc }
     }
 
     /// 16 hexadecimal digits over all inputs of a measurement of these sites except the setting.
