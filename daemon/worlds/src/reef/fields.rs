@@ -1,7 +1,6 @@
 //! Small functions that fields over the sea floor are made of.
 
-use crate::noise::{Noise, floor};
-use scene_model::random::mix;
+use crate::noise::Noise;
 
 /// Colours are reflectances of red, green and blue light, 0 to 1.
 pub(super) type Colour = [f32; 3];
@@ -41,29 +40,4 @@ pub(super) fn scale(colour: Colour, factor: f32) -> Colour {
 #[inline]
 pub(super) fn place_number(column: i32, row: i32) -> u64 {
     u64::from(column as u32) << 32 | u64::from(row as u32)
-}
-
-/// A random value of a place on a lattice, 0 to 1.
-#[inline]
-pub(super) fn speck(key: u64, column: i32, row: i32) -> f32 {
-    (mix(key ^ mix(place_number(column, row))) >> 40) as f32 / 16_777_216.0
-}
-
-/// The distance to the nearest point of a jittered lattice, and a random value of that point.
-#[inline]
-pub(super) fn nearest_knob(key: u64, x: f32, y: f32) -> (f32, f32) {
-    let (column, row) = (floor(x - 0.5), floor(y - 0.5));
-    let mut best = (9.0f32, 0.0);
-    for j in row..=row + 1 {
-        for i in column..=column + 1 {
-            let bits = mix(key.wrapping_add(place_number(i, j).wrapping_mul(0x9e37_79b9_7f4a_7c15)));
-            let part = |shift: u32| ((bits >> shift) & 0xFFFF) as f32 / 65_536.0;
-            let (dx, dy) = (i as f32 + 0.2 + 0.6 * part(0) - x, j as f32 + 0.2 + 0.6 * part(16) - y);
-            let squared = dx * dx + dy * dy;
-            if squared < best.0 {
-                best = (squared, part(32));
-            }
-        }
-    }
-    (best.0.sqrt(), best.1)
 }

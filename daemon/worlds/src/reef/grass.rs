@@ -13,9 +13,9 @@ const BLOCK: i32 = 4;
 /// The longest blade.
 const MAX_BLADE_M: f32 = 0.36;
 
-const YOUNG: Colour = [0.090, 0.150, 0.050];
-const OLD: Colour = [0.165, 0.155, 0.095];
-const DARK: Colour = [0.040, 0.058, 0.024];
+const YOUNG: Colour = [0.085, 0.112, 0.050];
+const OLD: Colour = [0.150, 0.138, 0.090];
+const DARK: Colour = [0.036, 0.044, 0.022];
 
 /// A part of a blade, about as long as wide.
 pub(super) struct Segment {
@@ -42,7 +42,7 @@ pub(super) fn blades(
         let (x, y) = (shoot.x, shoot.y);
         // Shoots stand in clumps, with thin places between.
         let clump = fbm(&ground.noise, x / 0.45 + 70.0, y / 0.45, 3);
-        if (shoot.rng.unit() as f32) < ground.meadow(x, y, &shoot.habitat) * ramp(0.28, 0.62, clump) {
+        if (shoot.rng.unit() as f32) < ground.meadow(x, y, &shoot.habitat) * ramp(0.35, 0.75, clump) {
             blade(ground, [x, y], step_m, &mut shoot.rng, draw);
         }
     });

@@ -13,6 +13,7 @@ mod jittered;
 mod layout;
 mod optics;
 mod patterns;
+mod relief;
 mod scatter;
 mod shading;
 mod surface;

@@ -14,7 +14,7 @@ const MAX_SMEAR: f32 = 0.36;
 /// Pixels that share a gain, which changes slowly, and 64 random bits.
 const RUN: usize = 4;
 /// Standard deviation of the sensor's noise in display values: of the dark, and per root of the light.
-const NOISE: [f32; 2] = [0.007, 0.018];
+const NOISE: [f32; 2] = [0.006, 0.012];
 const STEPS: usize = 512;
 const TONES: usize = 2048;
 /// The light at which the sensor saturates.

@@ -1,17 +1,22 @@
 //! The patterns that all worlds share. A world turns and shifts them, so none of their places looks alike twice.
 
+use super::relief::{Relief, cups, with_crevices};
 use super::texture::{Pieces, Strands, Texture, maze};
 use std::sync::OnceLock;
 
 pub(super) struct Patterns {
+    /// Sand with dents, small mounds and grit.
+    pub sand: Texture,
     /// Broken coral: sticks and chunks on each other.
     pub rubble: Texture,
-    /// Lumps of reef rock, each with its own colour.
+    /// Lumps of reef rock with creases and holes.
     pub rock: Texture,
-    /// Grains, shell grit and small fragments.
+    /// Turf and small fragments that roughen stone.
     pub grit: Texture,
-    /// The branchlets of a bushy coral from above.
-    pub fingers: Texture,
+    /// The knobs of a bushy coral from above.
+    pub knobs: Texture,
+    /// The cups of a massive coral.
+    pub cups: Texture,
     /// The blades of a dense meadow from above.
     pub canopy: Texture,
     /// The ridges of a brain coral.
@@ -24,63 +29,69 @@ pub(super) fn patterns() -> &'static Patterns {
     PATTERNS.get_or_init(Patterns::paint)
 }
 
+const SAND: Relief = Relief {
+    side: 1024,
+    texel_m: 0.009,
+    octaves: &[[0.62, 0.030], [0.27, 0.013], [0.13, 0.0065], [0.062, 0.0042], [0.033, 0.0030]],
+    fold: 0.15,
+    warp_m: 0.07,
+    hole_m: 0.003,
+    key: 0x20,
+};
+
+const ROCK: Relief = Relief {
+    octaves: &[[0.66, 0.22], [0.31, 0.10], [0.15, 0.040], [0.075, 0.016], [0.038, 0.009]],
+    fold: 0.85,
+    warp_m: 0.10,
+    hole_m: 0.050,
+    key: 0x21,
+    ..SAND
+};
+
+const RUBBLE: Pieces = Pieces {
+    side: 1024,
+    texel_m: 0.009,
+    radius_m: [0.014, 0.10],
+    aspect: 3.2,
+    rise: 0.75,
+    contrast: 0.25,
+    cover: 3.0,
+    key: 0x10,
+};
+
+const CANOPY: Strands = Strands {
+    side: 512,
+    texel_m: 0.007,
+    length_m: [0.20, 0.65],
+    half_width_m: [0.004, 0.009],
+    curl: 1.0,
+    spread: 0.9,
+    rise_m: 0.10,
+    cover: 6.0,
+    key: 0x14,
+};
+
 impl Patterns {
     fn paint() -> Self {
-        let rubble = Pieces {
-            side: 1024,
-            texel_m: 0.009,
-            radius_m: [0.011, 0.085],
-            aspect: 4.5,
-            rise: 0.75,
-            contrast: 0.42,
-            cover: 3.0,
-            key: 0x10,
-        };
-        let rock = Pieces {
-            radius_m: [0.018, 0.24],
-            aspect: 1.7,
-            rise: 0.62,
-            contrast: 0.34,
-            cover: 3.0,
-            key: 0x11,
-            ..rubble
-        };
-        let grit = Pieces {
+        let grit = Pieces { side: 512, radius_m: [0.008, 0.040], aspect: 1.8, contrast: 0.20, key: 0x12, ..RUBBLE };
+        let knobs = Pieces {
             side: 512,
-            radius_m: [0.006, 0.026],
-            aspect: 2.2,
-            contrast: 0.42,
-            cover: 3.0,
-            key: 0x12,
-            ..rubble
-        };
-        let fingers = Strands {
-            side: 512,
-            texel_m: 0.007,
-            length_m: [0.025, 0.085],
-            half_width_m: [0.008, 0.015],
-            curl: 0.6,
-            spread: 3.2,
-            rise_m: 0.05,
-            cover: 5.0,
+            radius_m: [0.016, 0.036],
+            aspect: 1.5,
+            rise: 1.5,
+            contrast: 0.14,
+            cover: 1.5,
             key: 0x13,
-        };
-        let canopy = Strands {
-            length_m: [0.12, 0.60],
-            half_width_m: [0.004, 0.014],
-            curl: 1.2,
-            spread: 0.9,
-            rise_m: 0.10,
-            cover: 7.0,
-            key: 0x14,
-            ..fingers
+            ..RUBBLE
         };
         Self {
-            rubble: rubble.paint(),
-            rock: rock.paint(),
-            grit: grit.paint(),
-            fingers: fingers.paint(),
-            canopy: canopy.paint(),
+            sand: with_crevices(SAND.paint(), 0.5),
+            rubble: with_crevices(RUBBLE.paint(), 1.2),
+            rock: with_crevices(ROCK.paint(), 1.0),
+            grit: with_crevices(grit.paint(), 0.8),
+            knobs: with_crevices(knobs.paint(), 1.0),
+            cups: with_crevices(cups(512, 0.009, 0.085, 0x16), 0.8),
+            canopy: with_crevices(CANOPY.paint(), 0.5),
             maze: maze(256, 0.008, 0x15),
         }
     }

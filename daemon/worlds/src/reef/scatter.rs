@@ -16,8 +16,8 @@ struct Sizes {
 }
 
 const HEADS: [Sizes; 4] = [
-    Sizes { spacing_m: 2.3, median_m: 0.48, largest_m: 1.15, stream: 10 },
-    Sizes { spacing_m: 0.85, median_m: 0.20, largest_m: 0.46, stream: 11 },
+    Sizes { spacing_m: 2.3, median_m: 0.52, largest_m: 1.15, stream: 10 },
+    Sizes { spacing_m: 0.85, median_m: 0.24, largest_m: 0.50, stream: 11 },
     Sizes { spacing_m: 0.36, median_m: 0.085, largest_m: 0.20, stream: 12 },
     Sizes { spacing_m: 0.15, median_m: 0.036, largest_m: 0.08, stream: 13 },
 ];
@@ -27,21 +27,18 @@ const SIGNS: Sizes = Sizes { spacing_m: 1.7, median_m: 0.24, largest_m: 0.5, str
 /// Edge of the squares within which the places of a dense lattice share their habitat.
 const SHARED_M: f32 = 0.3;
 
-const LIVE_TONES: [Colour; 14] = [
-    [0.205, 0.165, 0.090],
-    [0.175, 0.150, 0.085],
-    [0.270, 0.230, 0.140],
-    [0.160, 0.155, 0.085],
-    [0.225, 0.205, 0.160],
-    [0.170, 0.118, 0.080],
-    [0.290, 0.260, 0.150],
-    [0.205, 0.160, 0.160],
-    [0.150, 0.152, 0.120],
-    [0.330, 0.310, 0.250],
-    [0.165, 0.165, 0.180],
-    [0.185, 0.180, 0.100],
-    [0.130, 0.095, 0.060],
-    [0.240, 0.175, 0.110],
+/// Living corals are brown, tan, olive or grey, and nearly as one.
+const LIVE_TONES: [Colour; 10] = [
+    [0.205, 0.175, 0.105],
+    [0.175, 0.155, 0.095],
+    [0.265, 0.235, 0.155],
+    [0.160, 0.155, 0.095],
+    [0.225, 0.210, 0.170],
+    [0.170, 0.135, 0.095],
+    [0.285, 0.260, 0.170],
+    [0.310, 0.290, 0.240],
+    [0.185, 0.178, 0.176],
+    [0.140, 0.110, 0.075],
 ];
 
 /// Chooses the thing of a lattice's place, given the habitat, the clustering and the index of the lattice.
@@ -83,7 +80,12 @@ fn scatter(
             let (x, y) = (place.x, place.y);
             let cluster = ground.noise.value(x / (3.1 * spacing_m) + 7.0, y / (3.1 * spacing_m));
             if let Some(choice) = chooser(&place.habitat, cluster, &mut place.rng, size as usize) {
-                found(&grown(&choice, sizes, &mut place));
+                let mut thing = grown(&choice, sizes, &mut place);
+                if !thing.is_thin() && !thing.is_pit() {
+                    let floor = ground.spot(x, y, &place.habitat, &ground.slow(x, y));
+                    thing.base_m = floor.height_m - 0.05 * thing.radius_m;
+                }
+                found(&thing);
             }
         },
     );
@@ -106,9 +108,9 @@ fn grown(choice: &Choice, sizes: &Sizes, place: &mut Place) -> Thing {
     let (sin, cos) = angle.sin_cos();
     let key = rng.next_u64();
     let tint = (0.60 + 0.75 * rng.unit()) as f32;
-    // Water without red turns olive into green, so tones are nearly grey.
+    // Silt, turf and the algae inside corals give nearly the same hue to all of them.
     let grey = (choice.tone[0] + choice.tone[1] + choice.tone[2]) / 3.0;
-    let tone = blend(choice.tone, [grey; 3], 0.30 * rng.unit() as f32);
+    let tone = blend(choice.tone, scale([1.12, 1.03, 0.85], grey), 0.35 + 0.50 * rng.unit() as f32);
     Thing {
         x: *x,
         y: *y,
@@ -126,8 +128,8 @@ fn grown(choice: &Choice, sizes: &Sizes, place: &mut Place) -> Thing {
 fn head(habitat: &Habitat, cluster: f32, rng: &mut CounterRng, size: usize) -> Option<Choice> {
     let chance = rng.unit() as f32;
     let garden = (habitat.reef - habitat.thicket - habitat.rock).max(0.0);
-    let dense = [0.60, 1.1, 1.3, 1.2][size] * (0.25 + 1.5 * cluster);
-    let stony = [0.75, 0.9, 0.6, 0.5][size];
+    let dense = [0.95, 1.2, 0.8, 0.4][size] * (0.25 + 1.5 * cluster);
+    let stony = [0.75, 0.7, 0.4, 0.2][size];
     let thick = [1.0, 1.0, 0.5, 0.2][size];
     let stray = [0.012, 0.02, 0.012, 0.01][size] * (1.0 - habitat.grass) * (1.0 - habitat.channel);
     let tone = LIVE_TONES[rng.below(LIVE_TONES.len())];

@@ -1,18 +1,23 @@
 //! Light on a surface: the sun's soft shadows, the relief's slopes, and the dark of crevices.
 
-use super::fields::{Colour, ramp, scale};
+use super::fields::{Colour, blend, ramp, scale};
 use super::surface::Surface;
 
 /// Direction to the sun: east, north and up.
-const SUN: [f32; 3] = [-0.42, 0.52, 0.744];
+const SUN: [f32; 3] = [-0.49, 0.60, 0.632];
 /// Light from the whole sky and from the water.
-const AMBIENT: f32 = 0.30;
+const AMBIENT: f32 = 0.25;
 /// Radii of the neighbourhoods whose mean height tells a crevice, metres.
 const NEAR_M: f32 = 0.05;
 const WIDE_M: f32 = 0.22;
 
+/// Nodes along the edge of the squares from which the haze is computed.
+const GLOW: usize = 8;
+/// Share of the light that is scattered on its way to the camera.
+const HAZE: f32 = 0.10;
+
 /// How much sharper the camera makes its frames.
-const SHARPEN: f32 = 0.45;
+const SHARPEN: f32 = 0.20;
 
 /// Longest shadow, and width of the widest crevice, metres: a surface needs so much more around what is shown.
 pub(super) const SHADOW_M: f32 = 0.48;
@@ -36,16 +41,57 @@ pub(super) fn shade(surface: &Surface) -> Vec<Colour> {
                 [(east - west) / (2.0 * pitch), (height[above + column] - height[below + column]) / (2.0 * pitch)];
             let length = (1.0 + slope[0] * slope[0] + slope[1] * slope[1]).sqrt();
             let facing = (SUN[2] - slope[0] * SUN[0] - slope[1] * SUN[1]).max(0.0) / (length * SUN[2]);
-            let sunk = 30.0 * (near[at] - height[at]).max(0.0) + 14.0 * (wide[at] - height[at]).max(0.0);
+            let sunk = 16.0 * (near[at] - height[at]).max(0.0) + 10.0 * (wide[at] - height[at]).max(0.0);
             let open = 1.0 / (1.0 + sunk);
             let raised = 1.0 + 2.0 * (height[at] - wide[at]).clamp(0.0, 0.2);
-            let sun = (1.0 - AMBIENT) * facing.min(1.6) * (1.0 - shadow[at]);
+            let sun = (1.0 - AMBIENT) * facing.min(1.5) * (1.0 - shadow[at]);
             light.push(scale(surface.colour[at], (AMBIENT * raised + sun) * open));
         }
     }
+    haze(surface, &mut light);
     // A picture from far away is sharp as it is.
     let strength = SHARPEN * (1.0 - ramp(0.015, 0.04, pitch));
     sharpened(light, columns, strength)
+}
+
+/// Adds the light that the water scatters forward: everything glows a little over what is around it.
+fn haze(surface: &Surface, light: &mut [Colour]) {
+    let (columns, rows) = (surface.columns, surface.rows);
+    // Squares of the coarse grid are multiples of their edge in the world, so that neighbouring surfaces agree.
+    let first = [surface.west, surface.south].map(|node| node.rem_euclid(GLOW as i32) as usize);
+    let (wide, high) = ((columns + first[0]) / GLOW + 1, (rows + first[1]) / GLOW + 1);
+    let mut sums = vec![[0.0f32; 4]; wide * high];
+    for (at, light) in light.iter().enumerate() {
+        let (i, j) = ((at % columns + first[0]) / GLOW, (at / columns + first[1]) / GLOW);
+        let sum = &mut sums[j * wide + i];
+        (0..3).for_each(|k| sum[k] += light[k]);
+        sum[3] += 1.0;
+    }
+    let around = |i: usize, j: usize| {
+        let mut sum = [0.0f32; 4];
+        for row in j.saturating_sub(1)..=(j + 1).min(high - 1) {
+            for column in i.saturating_sub(1)..=(i + 1).min(wide - 1) {
+                (0..4).for_each(|k| sum[k] += sums[row * wide + column][k]);
+            }
+        }
+        [sum[0] / sum[3], sum[1] / sum[3], sum[2] / sum[3]]
+    };
+    let glow: Vec<Colour> = (0..wide * high).map(|at| around(at % wide, at / wide)).collect();
+    let middle = |node: usize, first: usize, count: usize| {
+        let at = ((node + first) as f32 + 0.5) / GLOW as f32 - 0.5;
+        let low = (at.max(0.0) as usize).min(count.saturating_sub(2));
+        (low, (at - low as f32).clamp(0.0, 1.0))
+    };
+    for row in 0..rows {
+        let (j, up) = middle(row, first[1], high);
+        let next = (j + 1).min(high - 1);
+        let line: Vec<Colour> = (0..wide).map(|i| blend(glow[j * wide + i], glow[next * wide + i], up)).collect();
+        for column in 0..columns {
+            let (i, right) = middle(column, first[0], wide);
+            let at = row * columns + column;
+            light[at] = blend(light[at], blend(line[i], line[(i + 1).min(wide - 1)], right), HAZE);
+        }
+    }
 }
 
 /// The light with stronger differences between neighbours, as cameras compute it.
@@ -82,10 +128,13 @@ fn shadows(surface: &Surface) -> Vec<f32> {
         for column in 0..columns {
             let from = column as i64 + whole;
             let at = |c: i64| edge[c.clamp(0, columns as i64 - 1) as usize];
-            let ray = at(from) + part * (at(from + 1) - at(from)) - rise;
+            // The ray of the whole sun is wide, so that shadows blur the more the longer they are.
+            let inner = at(from) + part * (at(from + 1) - at(from));
+            let outer = at(from - 1) + part * (at(from + 2) - at(from - 1));
+            let ray = 0.8 * inner + 0.2 * outer - rise;
             if ray > heights[column] {
                 next[column] = ray;
-                shadow[row * columns + column] = 0.9 * ramp(0.0, 0.05, ray - heights[column]);
+                shadow[row * columns + column] = 0.90 * ramp(0.0, 0.12, ray - heights[column]);
             }
         }
         edge = next;

@@ -140,6 +140,14 @@ impl Surface {
                     continue;
                 }
                 // An edge is soft where both surfaces are nearly as high.
+                if thing.is_thin() {
+                    self.height_m[at] += spot.height_m - thing.base_m;
+                    self.colour[at] = spot.colour;
+                    if thing.has_class() {
+                        self.class[at] = spot.class;
+                    }
+                    continue;
+                }
                 let above = spot.height_m - self.height_m[at];
                 let seen = ((above + 0.006) / 0.014).clamp(0.0, 1.0);
                 if seen > 0.0 {
@@ -161,11 +169,11 @@ impl Surface {
                 for column in columns.clone() {
                     let (dx, dy) = ((self.x(column) - x) / radius_m, (self.y(row) - y) / radius_m);
                     let round = 1.0 - dx * dx - dy * dy;
-                    let height_m = segment.height_m + 0.6 * radius_m * round;
+                    let height_m = segment.height_m + 0.9 * radius_m * round;
                     let at = row * self.columns + column;
                     if round > -0.3 && height_m > self.height_m[at] {
                         self.height_m[at] = height_m;
-                        self.colour[at] = segment.colour.map(|c| c * (0.8 + 0.25 * round));
+                        self.colour[at] = segment.colour.map(|c| c * (0.6 + 0.45 * round));
                     }
                 }
             }
@@ -197,9 +205,11 @@ impl Surface {
         }
         for row in 0..self.rows {
             for column in 0..self.columns {
-                if let Some(spot) = berth.spot(&reef.ground.noise, self.x(column), self.y(row)) {
+                if let Some((spot, cover)) = berth.spot(&reef.ground.noise, self.x(column), self.y(row)) {
                     let at = row * self.columns + column;
-                    (self.height_m[at], self.colour[at], self.class[at]) = (spot.height_m, spot.colour, spot.class);
+                    self.height_m[at] += cover * (spot.height_m - self.height_m[at]);
+                    self.colour[at] = blend(self.colour[at], spot.colour, cover);
+                    self.class[at] = spot.class;
                 }
             }
         }

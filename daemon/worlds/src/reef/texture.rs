@@ -1,6 +1,7 @@
 //! Periodic patterns of the sea floor that are painted once and then only looked up.
 
 use super::fields::ramp;
+use super::relief::blurred;
 use crate::noise::{Noise, floor};
 use scene_model::random::{CounterRng, derive, mix};
 use std::f32::consts::TAU;
@@ -23,6 +24,22 @@ impl Texture {
 
     pub(super) fn from_texels(texel_m: f32, texels: Vec<Texel>) -> Self {
         Self { side: texels.len().isqrt(), per_m: 1.0 / texel_m, texels }
+    }
+
+    pub(super) fn side(&self) -> usize {
+        self.side
+    }
+
+    pub(super) fn texel_m(&self) -> f32 {
+        1.0 / self.per_m
+    }
+
+    pub(super) fn texels(&self) -> &[Texel] {
+        &self.texels
+    }
+
+    pub(super) fn texels_mut(&mut self) -> &mut [Texel] {
+        &mut self.texels
     }
 
     /// The texel at a position in metres, interpolated.
@@ -183,7 +200,7 @@ impl Strands {
         let (mut x, mut y) = (self.side as f32 * unit(), self.side as f32 * unit());
         let mut angle = self.spread * (2.0 * unit() - 1.0);
         let bend = self.curl * (2.0 * unit() - 1.0) / length;
-        let (tone, hue) = (0.35 + 0.8 * unit() + 0.6 * unit() * unit(), unit());
+        let (tone, hue) = (0.45 + 0.7 * unit() + 0.3 * unit() * unit(), unit());
         let lift = self.rise_m * (0.6 + 0.4 * unit());
         for step in 0..length.ceil() as u32 {
             let t = step as f32 / length;
@@ -223,26 +240,4 @@ pub(super) fn maze(side: usize, texel_m: f32, key: u64) -> Texture {
     }
     let ridge = |value: f32| ramp(-0.7, 0.9, value);
     Texture::from_texels(texel_m, blurred(&field, side, 1).into_iter().map(|v| [ridge(v), ridge(v), 0.5]).collect())
-}
-
-/// The mean over periodic squares of a radius, taken twice so that it is nearly round.
-fn blurred(field: &[f32], side: usize, radius: usize) -> Vec<f32> {
-    let share = 1.0 / (2 * radius + 1) as f32;
-    let mut result = field.to_vec();
-    for _ in 0..2 {
-        for step in [1, side] {
-            let line = |at: usize, shift: usize| {
-                let (row, column) = (at / side, at % side);
-                if step == 1 {
-                    row * side + (column + shift + side - radius) % side
-                } else {
-                    (row + shift + side - radius) % side * side + column
-                }
-            };
-            result = (0..result.len())
-                .map(|at| (0..=2 * radius).map(|shift| result[line(at, shift)]).sum::<f32>() * share)
-                .collect();
-        }
-    }
-    result
 }

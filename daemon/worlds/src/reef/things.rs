@@ -59,6 +59,11 @@ impl Thing {
         !matches!(self.form, Form::Stick | Form::Shell | Form::Pit)
     }
 
+    /// Whether it lies on whatever is below it, as a cloth does.
+    pub(super) fn is_thin(&self) -> bool {
+        matches!(self.form, Form::Crust | Form::Stick | Form::Shell | Form::Urchin)
+    }
+
     /// Whether it changes the floor's height instead of covering it.
     pub(super) fn is_pit(&self) -> bool {
         self.form == Form::Pit

@@ -12,12 +12,12 @@ const BALANCED_M: f32 = 4.0;
 const VEIL: [f32; 3] = [0.012, 0.042, 0.046];
 /// What a white balance leaves of red, green and blue: red is the first to go, and some cameras restore it.
 const BALANCES: [Colour; 6] = [
-    [0.20, 0.87, 1.16],
-    [0.36, 0.89, 1.12],
-    [0.60, 0.92, 1.10],
+    [0.30, 0.94, 1.02],
+    [0.42, 0.92, 1.03],
+    [0.60, 0.94, 1.00],
     [0.95, 0.95, 0.95],
-    [0.68, 0.98, 0.86],
-    [0.54, 0.85, 1.15],
+    [0.72, 0.97, 0.94],
+    [0.56, 0.92, 0.98],
 ];
 /// Distances over which the light changes along a survey, metres.
 const LIGHT_M: f32 = 14.0;
@@ -50,10 +50,10 @@ impl Water {
         let balance = blend(pick(unit()), pick(unit()), 0.6 * unit());
         Self {
             balance,
-            exposure: 1.45 + 1.15 * unit(),
-            turbidity: 0.10 + 0.9 * unit() * unit(),
-            contrast: 0.65 + 0.35 * unit(),
-            saturation: 1.05 + 0.40 * unit(),
+            exposure: 1.05 + 1.25 * unit(),
+            turbidity: 0.06 + 0.7 * unit() * unit(),
+            contrast: 0.80 + 0.30 * unit(),
+            saturation: 0.95 + 0.30 * unit(),
         }
     }
 

@@ -1,4 +1,4 @@
-//! A small wooden wreck with iron fittings: the outline of the hull, ribs, planks, a boiler and rust.
+//! A small wooden wreck with iron fittings: a hull full of silt, fallen timbers, a boiler and rust.
 
 use super::fields::{Colour, blend, fbm, ramp, scale};
 use super::ground::Spot;
@@ -10,12 +10,10 @@ use crate::noise::Noise;
 /// Half of the length and of the beam, metres.
 const HALF_LENGTH_M: f32 = 5.6;
 const HALF_BEAM_M: f32 = 1.75;
-/// Distance of neighbouring ribs, metres.
-const RIB_M: f32 = 0.48;
 
 const WOOD: Colour = [0.115, 0.100, 0.072];
 const RUST: Colour = [0.175, 0.098, 0.055];
-const SILT: Colour = [0.19, 0.18, 0.14];
+const SILT: Colour = [0.185, 0.160, 0.120];
 
 impl Berth {
     /// Whether the wreck may cover a part of the region.
@@ -25,16 +23,15 @@ impl Berth {
         near(region.west, region.east, self.x) && near(region.south, region.north, self.y)
     }
 
-    /// The wreck at a place, if it covers the place.
-    pub(super) fn spot(&self, noise: &Noise, x: f32, y: f32) -> Option<Spot> {
+    /// The wreck at a place, and the share of the floor that it covers there.
+    pub(super) fn spot(&self, noise: &Noise, x: f32, y: f32) -> Option<(Spot, f32)> {
         let [along, abeam] = self.to_hull(x, y);
         if along.abs() > HALF_LENGTH_M + 0.2 || abeam.abs() > HALF_BEAM_M + 0.4 {
             return None;
         }
         // Growth and rot leave no straight line.
-        let ragged = |at: f32| 0.22 * (fbm(noise, x / 0.5 + at, y / 0.5, 4) - 0.5);
+        let ragged = |at: f32| 0.20 * (fbm(noise, x / 0.5 + at, y / 0.5, 3) - 0.5);
         let [along, abeam] = self.to_hull(x + ragged(5.0), y + ragged(77.0));
-        let grit = 0.6 * noise.value(x / 0.045, y / 0.045 + 31.0) + 0.4 * noise.value(x / 0.02 + 31.0, y / 0.02);
         let t = along / HALF_LENGTH_M;
         if t.abs() >= 1.0 {
             return None;
@@ -47,53 +44,87 @@ impl Berth {
         if from_wall < -0.05 {
             return None;
         }
-        let decay = fbm(noise, along / 1.3 + 60.0, abeam / 1.3, 3);
-        let stain = fbm(noise, x / 0.22, y / 0.22 + 11.0, 3);
-        let [lump_m, lump, hue] = patterns().rock.at(x + 311.0, y + 177.0);
-        let wood = scale(WOOD, 0.3 + 0.6 * noise.value(along / 0.5, abeam / 0.025) + 0.6 * grit);
-        let [heap_m, heap, _] = patterns().rubble.at(x + 101.0, y + 53.0);
-        // Silt and debris fill the hull and bury most of what has fallen.
-        let fill_m = 0.36 * fbm(noise, x / 0.9, y / 0.9 + 33.0, 3) + 0.9 * heap_m;
-        let mut spot = Spot { height_m: fill_m, colour: scale(SILT, 0.15 + 0.95 * heap), class: WRECK };
+        // Silt fills the hull, deepest along the keel, and buries most of what has fallen.
+        let [dent_m, sunk, hue] = patterns().sand.at(x + 311.0, y + 177.0);
+        let [lump_m, lump, stain] = patterns().rock.at(x + 101.0, y + 53.0);
+        let [_, fine, _] = patterns().grit.at(y + 31.0, x + 7.0);
+        let mound = fbm(noise, x / 1.1, y / 1.1 + 33.0, 2);
+        let silt_m = 0.30 * (from_wall / side).min(0.6) + 0.45 * (mound - 0.35) + dent_m;
+        let silt = scale(SILT, (0.3 + 0.7 * sunk) * (0.7 + 0.3 * fine));
+        let mut spot = Spot { height_m: silt_m, colour: blend(silt, RUST, 0.45 * ramp(0.4, 0.8, hue)), class: WRECK };
+        let worn = scale(blend(WOOD, RUST, 0.7 * ramp(0.5, 0.8, stain)), (0.25 + 0.8 * lump) * (0.4 + 0.7 * fine));
+        // Silt drifts over the edge of the hull in both directions.
+        let mut cover = ramp(-0.05, 0.15 + 0.9 * mound * mound, from_wall);
         let mut put = |height_m: f32, colour: Colour| {
-            if height_m > spot.height_m {
-                (spot.height_m, spot.colour) = (height_m, colour);
-            }
+            cover = cover.max(ramp(-0.01, 0.02, height_m - spot.height_m));
+            let seen = ramp(-0.01, 0.02, height_m - spot.height_m);
+            spot.height_m += seen * (height_m - spot.height_m);
+            spot.colour = blend(spot.colour, colour, seen);
         };
-        let standing = ramp(0.32, 0.5, decay);
-        // Ribs lean, break off and are grown over, each in its own way.
-        let number = (along / RIB_M + 0.25 * abeam.signum()).floor();
-        let own = noise.value(number * 3.7 + 8.0, 2.0 * abeam.signum());
-        let lean = (0.5 * (own - 0.5) + 0.25 * noise.value(number * 5.1, abeam / 0.6)) * RIB_M;
-        let rib = (along + lean - (number + 0.5 - 0.25 * abeam.signum()) * RIB_M).abs();
-        if rib < 0.03 + 0.05 * grit + 0.03 * own && from_wall < side * (0.15 + 0.9 * decay * own * 1.6) {
-            put(0.12 + 0.35 * (1.0 - from_wall / side) * (0.5 + own), scale(wood, 0.9));
+        let [heap_m, heap, _] = patterns().rubble.at(x + 51.0, y + 3.0);
+        put(0.10 + 1.1 * heap_m + 0.5 * (mound - 0.4), scale(WOOD, 0.3 + 0.8 * heap));
+        for timber in &TIMBERS {
+            if let Some(height_m) = timber.height_m(along, abeam) {
+                put(height_m + 0.4 * lump_m, worn);
+            }
         }
-        if abeam.abs() < 0.07 + 0.08 * grit && decay > 0.42 {
-            put(0.30, scale(wood, 0.8));
+        // The planking stands where it has not fallen, and leans outwards.
+        let broken = 0.6 * noise.value(along / 1.6 + 60.0, 3.0 + 5.0 * abeam.signum()) + 0.4 * noise.value(along / 0.4, 7.0);
+        let standing = ramp(0.46, 0.60, broken);
+        let thick = (0.05 + 0.14 * mound) * standing;
+        if standing > 0.1 && from_wall < thick {
+            let round = 1.0 - (2.0 * from_wall.max(0.0) / thick - 1.0).powi(2);
+            put(0.20 + 0.30 * standing + 0.5 * thick * round + 0.7 * lump_m, worn);
         }
-        let plank = abeam / 0.19 - (abeam / 0.19).floor();
-        if decay > 0.54 && plank > 0.13 && noise.value(along / 0.8, (abeam / 0.19).floor() * 3.7) > 0.35 {
-            put(0.40, scale(wood, 1.25));
+        // The boiler, half sunk, with its hoops.
+        let (a, b) = ((along + 1.6 + 0.2 * abeam) / 0.85, (abeam - 0.25) / 0.43);
+        if a.abs() < 0.97 + 0.1 * stain && b.abs() < 1.0 {
+            let hoop = ramp(0.10, 0.06, (2.5 * a - (2.5 * a).round()).abs());
+            let rust = scale(blend(RUST, WOOD, 0.8 * stain), (0.45 + 0.55 * lump) * (0.4 + 0.6 * fine));
+            let top = (1.0 - b * b).sqrt();
+            put(0.16 + 0.40 * top + 0.025 * hoop + 0.25 * lump_m, blend(rust, silt, 0.6 * ramp(0.6, 1.0, top) * hue));
         }
-        if from_wall < 0.02 + 0.22 * grit * decay.max(0.3) && own + decay > 0.55 {
-            put(0.15 + 0.75 * standing * (0.4 + 0.6 * decay), blend(wood, RUST, ramp(0.45, 0.65, stain)));
+        spot.colour = scale(spot.colour, 0.8 + 0.4 * mound);
+        Some((spot, cover))
+    }
+}
+
+/// A fallen timber in the hull: a long beam with round edges, one end of which is buried.
+struct Timber {
+    /// The middle, metres along the keel and to port of it.
+    at: [f32; 2],
+    /// Cosine and sine of its direction against the keel.
+    turn: [f32; 2],
+    half_length_m: f32,
+    half_width_m: f32,
+    tilt: f32,
+}
+
+const fn timber(at: [f32; 2], turn: [f32; 2], half_length_m: f32, half_width_m: f32, tilt: f32) -> Timber {
+    Timber { at, turn, half_length_m, half_width_m, tilt }
+}
+
+const TIMBERS: [Timber; 9] = [
+    timber([0.4, -0.1], [0.995, 0.100], 2.7, 0.115, 0.03),
+    timber([2.4, 0.5], [0.340, 0.940], 1.0, 0.085, 0.22),
+    timber([3.1, -0.4], [-0.200, 0.980], 0.8, 0.075, 0.20),
+    timber([1.1, -0.8], [0.500, -0.866], 0.9, 0.080, -0.25),
+    timber([-3.2, 0.3], [0.100, 0.995], 1.1, 0.090, 0.18),
+    timber([-3.9, -0.6], [0.640, 0.768], 0.9, 0.070, -0.20),
+    timber([-0.4, 0.9], [0.940, -0.342], 1.3, 0.070, 0.10),
+    timber([-2.6, -0.9], [0.906, 0.423], 0.8, 0.095, 0.15),
+    timber([0.3, 0.5], [0.259, 0.966], 0.8, 0.070, -0.28),
+];
+
+impl Timber {
+    fn height_m(&self, along: f32, abeam: f32) -> Option<f32> {
+        let (dx, dy) = (along - self.at[0], abeam - self.at[1]);
+        let t = dx * self.turn[0] + dy * self.turn[1];
+        let across = (dy * self.turn[0] - dx * self.turn[1]) / self.half_width_m;
+        if t.abs() > self.half_length_m || across.abs() > 1.0 {
+            return None;
         }
-        let (a, b) = ((along + 1.6) / 0.95, (abeam - 0.25) / 0.55);
-        let dent = 0.3 * (stain - 0.5);
-        if a.abs() < 1.0 + dent && b.abs() < 1.0 {
-            put(0.35 + 0.5 * (1.0 - b * b).sqrt() + dent, scale(RUST, 0.45 + 0.9 * stain));
-        }
-        // Turf, corallines and sponges cover all of it.
-        let growth = blend([0.100, 0.092, 0.056], [0.23, 0.20, 0.16], ramp(0.55, 0.9, hue));
-        spot.colour =
-            blend(spot.colour, scale(growth, 0.2 + 0.9 * lump), 0.85 * ramp(0.30, 0.65, stain + 0.25 * (hue - 0.5)));
-        spot.height_m += 0.55 * lump_m;
-        spot.colour = blend(spot.colour, RUST, 0.35 * ramp(0.55, 0.75, stain));
-        spot.colour =
-            blend(spot.colour, [0.085, 0.09, 0.05], 0.7 * ramp(0.5, 0.7, noise.value(x / 0.31 + 8.0, y / 0.31)));
-        spot.height_m += 0.05 * grit + 0.10 * (decay - 0.5);
-        spot.colour = scale(spot.colour, 0.55 + 0.8 * grit);
-        Some(spot)
+        let round = (1.0 - across * across).sqrt();
+        Some(0.20 + self.tilt * t + 1.3 * self.half_width_m * round)
     }
 }
