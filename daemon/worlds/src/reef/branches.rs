@@ -33,7 +33,7 @@ pub(super) fn branches(colony: &Thing, step_m: f32, draw: &mut dyn FnMut(&Segmen
         let (sin, cos) = angle.sin_cos();
         let from = [colony.x + 0.8 * out * colony.radius_m * cos, colony.y + 0.8 * out * colony.radius_m * sin];
         // Branches in the middle point up, those at the edge lean outwards, and all follow the light a little.
-        let lean = if unit() < 0.25 { slant } else { angle + (unit() + unit() - 1.0) * (2.4 - 1.2 * out) };
+        let lean = if unit() < 0.20 { slant } else { angle + (unit() + unit() - 1.0) * (1.7 - 1.0 * out) };
         let length_m = (stout * (0.04 + 0.06 * unit() + 0.08 * spreading * out)).min(0.7 * colony.radius_m);
         let top_m = 0.10 + 0.55 * colony.radius_m.min(0.5) * (1.0 - 0.8 * out * out) + 0.12 * unit();
         let radius_m = 0.017 * stout * (0.8 + 0.4 * unit());

@@ -104,7 +104,7 @@ impl Thing {
         let choice = (self.key >> 24 & 0xFF) as f32 / 255.0;
         let zoom = 0.7 + 1.3 * choice * choice;
         let [cup_m, tone, _] = self.pattern(&patterns().cups, [x, y], zoom);
-        let depth = 0.75 * ramp(0.1, 0.5, choice);
+        let depth = 0.62 * ramp(0.1, 0.5, choice);
         let height_m = self.lobed(noise, [x, y], dome) + zoom * depth * cup_m;
         self.worn(noise, [x, y], height_m, 0.75 + (0.25 + 0.75 * depth) * (tone - 0.75))
     }
@@ -141,7 +141,8 @@ impl Thing {
     fn soft(&self, noise: &Noise, [x, y]: [f32; 2], dome: f32) -> Spot {
         let fold = noise.value(x / 0.14 + self.offset(), y / 0.14);
         let finger = noise.value(x / 0.05 + 9.0, y / 0.05 + self.offset());
-        let colour = scale(self.tone, 0.35 + 0.45 * fold + 0.35 * finger);
+        let [_, fine, _] = self.pattern(&patterns().knobs, [x, y], 0.6);
+        let colour = scale(self.tone, (0.35 + 0.45 * fold + 0.35 * finger) * (0.35 + 0.65 * fine));
         let height_m = 0.30 * self.radius_m * dome + (0.07 * fold + 0.03 * finger) * (0.4 + 0.6 * dome);
         Spot { height_m, colour, class: CORAL }
     }

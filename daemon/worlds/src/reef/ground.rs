@@ -55,8 +55,9 @@ struct Palette {
     rubble: Colour,
     turf: Colour,
     sediment: Colour,
-    /// Crustose coralline algae.
+    /// Coralline algae and thin sponges, and how much of the rock they cover, 0 to 1: from almost none to most of it.
     crust: Colour,
+    crusted: f32,
     algae: Colour,
     young: Colour,
     old: Colour,
@@ -65,6 +66,10 @@ struct Palette {
 impl Palette {
     fn new(key: u64) -> Self {
         let mut rng = CounterRng::new(key);
+        let crusted = 0.15 + 0.85 * (rng.unit() * rng.unit()) as f32;
+        // Where they are many they are red, pink or violet.
+        let vivid = [[0.27, 0.075, 0.065], [0.30, 0.150, 0.155], [0.23, 0.140, 0.200], [0.25, 0.150, 0.050]][rng.below(4)];
+        let crust = blend([0.195, 0.155, 0.150], vivid, crusted);
         let mut between = |a: Colour, b: Colour| {
             let light = 0.88 + 0.24 * rng.unit() as f32;
             scale(blend(a, b, rng.unit() as f32), light)
@@ -75,7 +80,8 @@ impl Palette {
             rubble: between([0.185, 0.170, 0.130], [0.175, 0.150, 0.110]),
             turf: between([0.125, 0.105, 0.065], [0.105, 0.105, 0.068]),
             sediment: between([0.29, 0.270, 0.215], [0.29, 0.240, 0.170]),
-            crust: between([0.200, 0.145, 0.140], [0.190, 0.160, 0.160]),
+            crust,
+            crusted,
             algae: between([0.072, 0.076, 0.036], [0.092, 0.070, 0.036]),
             young: between([0.082, 0.096, 0.048], [0.080, 0.088, 0.050]),
             old: between([0.145, 0.128, 0.084], [0.118, 0.108, 0.076]),
@@ -181,7 +187,7 @@ impl Ground {
         let [dent_m, tone, hue] = patterns.sand.at(at[0], at[1]);
         let [grit_m, fine, own] = patterns.grit.at(at[0], at[1]);
         let coarse = slow.0[COARSE];
-        let mut height_m = slow.0[DUNE] + (0.6 + 0.6 * coarse) * dent_m + (0.04 + 0.16 * coarse) * grit_m;
+        let mut height_m = slow.0[DUNE] + (0.6 + 0.6 * coarse) * dent_m + (0.08 + 0.22 * coarse) * grit_m;
         let rippled = slow.0[RIPPLED].max(0.6 * habitat.channel * slow.0[FILM]) * (1.0 - habitat.rubble);
         if rippled > 0.0 {
             let wave_m = if habitat.channel > 0.5 { 0.34 } else { 0.19 };
@@ -192,7 +198,7 @@ impl Ground {
         }
         let film = 0.65 * slow.0[FILM] * ramp(0.2, 0.8, hue + 0.3 * slow.0[TURF]);
         let mut colour = blend(self.palette.sand, self.palette.film, film);
-        colour = scale(colour, (0.25 + 0.75 * tone) * (1.0 + (0.10 + 0.30 * coarse) * (fine - 0.75)));
+        colour = scale(colour, (0.25 + 0.75 * tone) * (1.0 + (0.22 + 0.36 * coarse) * (fine - 0.75)));
         // Turf grows in tufts on what is raised.
         let tuft = ramp(0.08, 0.50, 7.0 * dent_m + 1.6 * (slow.0[TURF] - 0.60) + 0.15 * (own - 0.5));
         colour = blend(colour, scale(self.palette.turf, 0.45 + 0.6 * fine), 0.70 * tuft);
@@ -241,7 +247,8 @@ impl Ground {
         // Sediment lies on top, turf and algae grow on the sides.
         let grown = 0.8 * hue + 0.5 * (slow.0[TURF] - 0.5) + 0.15 * (own - 0.5) + 0.9 * lump_m;
         let mut colour = blend(palette.turf, palette.sediment, ramp(0.15, 0.75, grown));
-        colour = blend(colour, palette.crust, 0.55 * ramp(0.62, 0.85, hue) * slow.0[COARSE]);
+        let crust = palette.crusted * (0.35 + slow.0[COARSE]) * ramp(0.0, 0.35, hue + 0.5 * own + 0.9 * lump_m - 0.55);
+        colour = blend(colour, scale(palette.crust, 0.65 + 0.7 * own), (0.9 * crust).min(0.9));
         let algae = ramp(0.42, 0.62, slow.0[CLUMP]) * ramp(0.75, 0.35, hue);
         colour = blend(colour, palette.algae, if is_rock(habitat) { 0.85 } else { 0.4 } * algae);
         let light = (0.08 + 1.0 * tone) * (0.55 + 0.50 * fine) * (0.45 + 0.65 * ramp(-0.2, 0.7, mass));
@@ -254,7 +261,9 @@ impl Ground {
         let clump = slow.0[CLUMP];
         // The current turns the blades, each clump of them a little differently.
         let [lift_m, tone, hue] = patterns.canopy.at(at[0] + 0.3 * clump, at[1] - 0.4 * clump);
-        let dense = ramp(0.05, 0.75, meadow) * ramp(0.22, 0.62, clump + 0.6 * (meadow - 0.5));
+        // Its edge dissolves into tufts.
+        let tuft = self.noise.value(at[0] / 0.16, at[1] / 0.16) - 0.5;
+        let dense = ramp(0.05, 0.75, meadow + 1.1 * tuft * (1.0 - meadow)) * ramp(0.22, 0.62, clump + 0.6 * (meadow - 0.5));
         let height_m = lift_m + 0.10 * (dense - 0.5) + 0.24 * (clump - 0.5) + slow.0[DUNE];
         // Where the meadow thins out, whole blades are missing.
         let grows = ramp(-0.10, 0.12, 1.25 * dense - 0.12 - hue);

@@ -91,7 +91,7 @@ impl Patterns {
             grit: with_crevices(grit.paint(), 0.8),
             knobs: with_crevices(knobs.paint(), 1.0),
             cups: with_crevices(cups(512, 0.009, 0.085, 0x16), 0.8),
-            canopy: with_crevices(CANOPY.paint(), 0.5),
+            canopy: with_crevices(CANOPY.paint(), 0.3),
             maze: maze(256, 0.008, 0x15),
         }
     }

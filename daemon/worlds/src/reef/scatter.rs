@@ -174,17 +174,17 @@ fn garden_form(size: usize, kind: f64) -> Form {
         0 => [
             (0.26, Form::Massive),
             (0.40, Form::Brain),
-            (0.62, Form::Plate),
+            (0.52, Form::Plate),
             (0.85, Form::Branching),
-            (0.95, Form::Soft),
+            (0.89, Form::Soft),
             (1.1, Form::Crust),
         ],
         1 => [
             (0.18, Form::Massive),
             (0.30, Form::Brain),
-            (0.44, Form::Plate),
+            (0.38, Form::Plate),
             (0.74, Form::Branching),
-            (0.87, Form::Soft),
+            (0.78, Form::Soft),
             (1.1, Form::Crust),
         ],
         2 => [
