@@ -34,7 +34,7 @@ pub(super) fn branches(colony: &Thing, step_m: f32, draw: &mut dyn FnMut(&Segmen
         let from = [colony.x + 0.8 * out * colony.radius_m * cos, colony.y + 0.8 * out * colony.radius_m * sin];
         // Branches in the middle point up, those at the edge lean outwards, and all follow the light a little.
         let lean = if unit() < 0.20 { slant } else { angle + (unit() + unit() - 1.0) * (1.7 - 1.0 * out) };
-        let length_m = (stout * (0.04 + 0.06 * unit() + 0.08 * spreading * out)).min(0.7 * colony.radius_m);
+        let length_m = (stout * (0.06 + 0.08 * unit() + 0.10 * spreading * out)).min(0.7 * colony.radius_m);
         let top_m = 0.10 + 0.55 * colony.radius_m.min(0.5) * (1.0 - 0.8 * out * out) + 0.12 * unit();
         let radius_m = 0.017 * stout * (0.8 + 0.4 * unit());
         let base_m = colony.base_m + 0.35 * top_m;
@@ -60,12 +60,12 @@ fn branch(colony: &Thing, stem: &Branch, step_m: f32, rng: &mut CounterRng, draw
     let [mut x, mut y] = stem.from;
     let (mut dx, mut dy) = (cos * step_m, sin * step_m);
     let curl = (rng.unit() as f32 - 0.5) * 1.1 / steps;
-    let pale = (colony.key >> 20 & 0xFF) as f32 / 255.0 * 0.7;
+    let pale = (colony.key >> 20 & 0xFF) as f32 / 255.0 * 0.45;
     let shade = 0.75 + 0.4 * rng.unit() as f32;
     for step in 0..steps as u32 {
         let t = step as f32 / steps;
         // Growing ends have fewer algae and are a little paler.
-        let body = scale(colony.tone, shade * (0.45 + 0.75 * t));
+        let body = scale(colony.tone, shade * (0.55 + 0.60 * t));
         let colour = blend(body, scale([0.34, 0.34, 0.32], shade), pale * t * t);
         let height_m = stem.base_m + (stem.top_m - stem.base_m) * t;
         draw(&Segment { x, y, height_m, colour, cover: [1.0, 0.0] }, stem.radius_m * (1.2 - 0.35 * t));

@@ -78,8 +78,8 @@ impl Palette {
             sand: between([0.36, 0.345, 0.30], [0.34, 0.30, 0.225]),
             film: between([0.17, 0.160, 0.105], [0.18, 0.150, 0.110]),
             rubble: between([0.185, 0.170, 0.130], [0.175, 0.150, 0.110]),
-            turf: between([0.125, 0.105, 0.065], [0.105, 0.105, 0.068]),
-            sediment: between([0.29, 0.270, 0.215], [0.29, 0.240, 0.170]),
+            turf: between([0.140, 0.105, 0.055], [0.112, 0.106, 0.058]),
+            sediment: between([0.29, 0.262, 0.190], [0.30, 0.235, 0.145]),
             crust,
             crusted,
             algae: between([0.072, 0.076, 0.036], [0.092, 0.070, 0.036]),
@@ -185,7 +185,8 @@ impl Ground {
 
     fn sand(&self, patterns: &Patterns, [x, y]: [f32; 2], at: [f32; 2], habitat: &Habitat, slow: &Slow) -> Spot {
         let [dent_m, tone, hue] = patterns.sand.at(at[0], at[1]);
-        let [grit_m, fine, own] = patterns.grit.at(at[0], at[1]);
+        // Grains are too small to be seen, but not their differences.
+        let [grit_m, fine, own] = patterns.grit.at(1.9 * at[0], 1.9 * at[1]);
         let coarse = slow.0[COARSE];
         let mut height_m = slow.0[DUNE] + (0.6 + 0.6 * coarse) * dent_m + (0.08 + 0.22 * coarse) * grit_m;
         let rippled = slow.0[RIPPLED].max(0.6 * habitat.channel * slow.0[FILM]) * (1.0 - habitat.rubble);
@@ -198,7 +199,7 @@ impl Ground {
         }
         let film = 0.65 * slow.0[FILM] * ramp(0.2, 0.8, hue + 0.3 * slow.0[TURF]);
         let mut colour = blend(self.palette.sand, self.palette.film, film);
-        colour = scale(colour, (0.25 + 0.75 * tone) * (1.0 + (0.22 + 0.36 * coarse) * (fine - 0.75)));
+        colour = scale(colour, (0.25 + 0.75 * tone) * (1.0 + (0.28 + 0.50 * coarse) * (fine - 0.75)));
         // Turf grows in tufts on what is raised.
         let tuft = ramp(0.08, 0.50, 7.0 * dent_m + 1.6 * (slow.0[TURF] - 0.60) + 0.15 * (own - 0.5));
         colour = blend(colour, scale(self.palette.turf, 0.45 + 0.6 * fine), 0.70 * tuft);

@@ -32,7 +32,7 @@ pub(super) fn patterns() -> &'static Patterns {
 const SAND: Relief = Relief {
     side: 1024,
     texel_m: 0.009,
-    octaves: &[[0.62, 0.030], [0.27, 0.013], [0.13, 0.0065], [0.062, 0.0042], [0.033, 0.0030]],
+    octaves: &[[0.62, 0.030], [0.27, 0.013], [0.13, 0.0045], [0.062, 0.0022], [0.033, 0.0020]],
     fold: 0.15,
     warp_m: 0.07,
     hole_m: 0.003,
@@ -51,7 +51,7 @@ const ROCK: Relief = Relief {
 const RUBBLE: Pieces = Pieces {
     side: 1024,
     texel_m: 0.009,
-    radius_m: [0.014, 0.10],
+    radius_m: [0.014, 0.075],
     aspect: 3.2,
     rise: 0.75,
     contrast: 0.25,

@@ -110,7 +110,7 @@ fn grown(choice: &Choice, sizes: &Sizes, place: &mut Place) -> Thing {
     let tint = (0.60 + 0.75 * rng.unit()) as f32;
     // Silt, turf and the algae inside corals give nearly the same hue to all of them.
     let grey = (choice.tone[0] + choice.tone[1] + choice.tone[2]) / 3.0;
-    let tone = blend(choice.tone, scale([1.12, 1.03, 0.85], grey), 0.35 + 0.50 * rng.unit() as f32);
+    let tone = blend(choice.tone, scale([1.22, 1.03, 0.68], grey), 0.35 + 0.50 * rng.unit() as f32);
     Thing {
         x: *x,
         y: *y,

@@ -1,12 +1,13 @@
 //! Light on a surface: the sun's soft shadows, the relief's slopes, and the dark of crevices.
 
-use super::fields::{Colour, blend, ramp, scale};
+use super::fields::{Colour, blend, ramp};
 use super::surface::Surface;
 
 /// Direction to the sun: east, north and up.
 const SUN: [f32; 3] = [-0.49, 0.60, 0.632];
-/// Light from the whole sky and from the water.
-const AMBIENT: f32 = 0.25;
+/// Light from the whole sky and from the water, which is bluer than the sun's: red, green and blue.
+const AMBIENT: Colour = [0.185, 0.260, 0.290];
+const DIRECT: Colour = [0.79, 0.75, 0.71];
 /// Radii of the neighbourhoods whose mean height tells a crevice, metres.
 const NEAR_M: f32 = 0.05;
 const WIDE_M: f32 = 0.22;
@@ -44,8 +45,9 @@ pub(super) fn shade(surface: &Surface) -> Vec<Colour> {
             let sunk = 16.0 * (near[at] - height[at]).max(0.0) + 10.0 * (wide[at] - height[at]).max(0.0);
             let open = 1.0 / (1.0 + sunk);
             let raised = 1.0 + 2.0 * (height[at] - wide[at]).clamp(0.0, 0.2);
-            let sun = (1.0 - AMBIENT) * facing.min(1.5) * (1.0 - shadow[at]);
-            light.push(scale(surface.colour[at], (AMBIENT * raised + sun) * open));
+            let sun = facing.min(1.5) * (1.0 - shadow[at]);
+            let colour = surface.colour[at];
+            light.push(std::array::from_fn(|i| colour[i] * (AMBIENT[i] * raised + DIRECT[i] * sun) * open));
         }
     }
     haze(surface, &mut light);

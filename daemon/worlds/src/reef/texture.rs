@@ -138,7 +138,7 @@ impl Pieces {
                 }
                 let (x, y) = (column as f32 + 97.0 * piece.hue, row as f32 + 61.0 * piece.tone);
                 let rag =
-                    0.75 * (noise.value(x / wide, y / wide) - 0.5) + 0.45 * (noise.value(x / fine, y / fine) - 0.5);
+                    0.55 * (noise.value(x / wide, y / wide) - 0.5) + 0.40 * (noise.value(x / fine, y / fine) - 0.5);
                 let d = distance / piece.radius * (1.0 + rag);
                 let share = ((1.0 - d) * piece.radius).clamp(0.0, 1.0);
                 if share > 0.0 {
