@@ -6,7 +6,7 @@ use super::things::Thing;
 use scene_model::random::CounterRng;
 
 /// The largest number of branches of a colony.
-const MAX_BRANCHES: usize = 220;
+const MAX_BRANCHES: usize = 320;
 
 /// A branch that is being drawn: lengths and heights in metres, the direction in radians.
 struct Branch {
@@ -22,7 +22,7 @@ struct Branch {
 pub(super) fn branches(colony: &Thing, step_m: f32, draw: &mut dyn FnMut(&Segment, f32)) {
     let mut rng = CounterRng::new(colony.key);
     // Each colony has its own habit: stout or slender, upright or spreading.
-    let stout = 0.95 + 0.85 * rng.unit() as f32;
+    let stout = (0.95 + 0.85 * rng.unit() as f32) * (0.8 + 0.5 * colony.radius_m.min(1.0));
     let spreading = 0.5 + 0.9 * rng.unit() as f32;
     let slant = std::f32::consts::TAU * rng.unit() as f32;
     let count = ((colony.radius_m / (0.029 * stout)).powi(2) as usize).clamp(9, MAX_BRANCHES);

@@ -27,7 +27,7 @@ impl Thing {
                 // The ground between the branches, which are drawn one by one.
                 let [height_m, tone, _] = self.pattern(&patterns().rubble, at, 1.0);
                 let colour = scale(blend(self.tone, FOUL, 0.6), 0.10 + 0.45 * tone);
-                Spot { height_m: 0.6 * height_m + 0.25 * r * dome, colour, class: THICKET }
+                Spot { height_m: 0.5 * height_m + 0.10 * r * dome, colour, class: THICKET }
             }
             Form::Crust => {
                 let [grit_m, tone, _] = self.pattern(&patterns().grit, at, 1.0);

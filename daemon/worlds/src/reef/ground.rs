@@ -160,7 +160,7 @@ impl Ground {
             self.pocket(patterns, at, slow)
         };
         let littered = 0.62 * slow.0[LITTER] * (1.0 - habitat.grass);
-        let rubble = ramp(0.30, 0.70, habitat.rubble + 0.9 * rag).max(littered);
+        let rubble = ramp(0.12, 0.88, habitat.rubble + 0.9 * rag).max(littered);
         if rubble > 0.05 && reef < 1.0 {
             self.lay_rubble(patterns, &mut spot, at, rubble, slow);
         }
@@ -186,9 +186,9 @@ impl Ground {
     fn sand(&self, patterns: &Patterns, [x, y]: [f32; 2], at: [f32; 2], habitat: &Habitat, slow: &Slow) -> Spot {
         let [dent_m, tone, hue] = patterns.sand.at(at[0], at[1]);
         // Grains are too small to be seen, but not their differences.
-        let [grit_m, fine, own] = patterns.grit.at(1.9 * at[0], 1.9 * at[1]);
+        let [grit_m, fine, own] = patterns.grit.at(1.5 * at[0], 1.5 * at[1]);
         let coarse = slow.0[COARSE];
-        let mut height_m = slow.0[DUNE] + (0.6 + 0.6 * coarse) * dent_m + (0.08 + 0.22 * coarse) * grit_m;
+        let mut height_m = slow.0[DUNE] + (0.6 + 0.6 * coarse) * dent_m + (0.04 + 0.12 * coarse) * grit_m;
         let rippled = slow.0[RIPPLED].max(0.6 * habitat.channel * slow.0[FILM]) * (1.0 - habitat.rubble);
         if rippled > 0.0 {
             let wave_m = if habitat.channel > 0.5 { 0.34 } else { 0.19 };
@@ -199,7 +199,10 @@ impl Ground {
         }
         let film = 0.65 * slow.0[FILM] * ramp(0.2, 0.8, hue + 0.3 * slow.0[TURF]);
         let mut colour = blend(self.palette.sand, self.palette.film, film);
-        colour = scale(colour, (0.25 + 0.75 * tone) * (1.0 + (0.28 + 0.50 * coarse) * (fine - 0.75)));
+        // Bits of shell are white, bits with turf on them dark.
+        let fleck = ramp(0.94, 0.98, own) - ramp(0.06, 0.02, own);
+        let grain = 1.0 + (0.10 + 0.30 * coarse) * (fine - 0.75) + (0.06 + 0.26 * coarse) * fleck;
+        colour = scale(colour, (0.25 + 0.75 * tone) * grain);
         // Turf grows in tufts on what is raised.
         let tuft = ramp(0.08, 0.50, 7.0 * dent_m + 1.6 * (slow.0[TURF] - 0.60) + 0.15 * (own - 0.5));
         colour = blend(colour, scale(self.palette.turf, 0.45 + 0.6 * fine), 0.70 * tuft);

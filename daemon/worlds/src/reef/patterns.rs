@@ -66,7 +66,7 @@ const CANOPY: Strands = Strands {
     half_width_m: [0.004, 0.009],
     curl: 1.0,
     spread: 0.9,
-    rise_m: 0.10,
+    rise_m: 0.06,
     cover: 6.0,
     key: 0x14,
 };
