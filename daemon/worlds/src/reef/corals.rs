@@ -95,7 +95,7 @@ impl Thing {
         let zoom = (0.45 + 0.5 * self.radius_m).min(0.9) * (0.8 + 0.5 * (self.key & 0xFF) as f32 / 255.0);
         let [ridge, ..] = self.pattern(&patterns().maze, [x + bend(0.0), y + bend(40.0)], zoom);
         let height_m = self.lobed(noise, [x, y], dome) + 0.022 * zoom * ridge;
-        self.worn(noise, [x, y], height_m, 0.40 + 0.75 * ridge)
+        self.worn(noise, [x, y], height_m, 0.52 + 0.55 * ridge)
     }
 
     /// Lobes with cups that are dark in the middle.
@@ -104,7 +104,7 @@ impl Thing {
         let choice = (self.key >> 24 & 0xFF) as f32 / 255.0;
         let zoom = 0.7 + 1.3 * choice * choice;
         let [cup_m, tone, _] = self.pattern(&patterns().cups, [x, y], zoom);
-        let depth = 0.62 * ramp(0.1, 0.5, choice);
+        let depth = 0.50 * ramp(0.1, 0.5, choice);
         let height_m = self.lobed(noise, [x, y], dome) + zoom * depth * cup_m;
         self.worn(noise, [x, y], height_m, 0.75 + (0.25 + 0.75 * depth) * (tone - 0.75))
     }
@@ -116,7 +116,7 @@ impl Thing {
         let bend = |shift: f32| 0.10 * noise.value(x / 0.23 + shift, y / 0.23 + self.offset());
         let [knob_m, tone, hue] = self.pattern(&patterns().knobs, [x + bend(3.0), y + bend(60.0)], zoom);
         let crown = noise.value(x / (0.5 * r) + self.offset(), y / (0.5 * r));
-        let body = scale(self.tone, 0.04 + 1.05 * tone + 0.12 * (hue - 0.5) * tone);
+        let body = scale(self.tone, 0.10 + 0.98 * tone + 0.12 * (hue - 0.5) * tone);
         let pale = 0.35 * ramp(0.8, 1.4, tone) * (self.key >> 32 & 0xFF) as f32 / 255.0;
         let colour = blend(body, scale([0.30, 0.31, 0.31], tone), pale);
         let old = ramp(0.55, 0.85, noise.value(x / 0.3 + 17.0, y / 0.3 + self.offset()) + 0.25 * (1.0 - dome));

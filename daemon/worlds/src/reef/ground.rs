@@ -197,7 +197,9 @@ impl Ground {
             // Crests are sharper than troughs, and some of them are worn away.
             height_m += 0.085 * wave_m * (4.0 * part * part - 0.35) * rippled * (0.4 + 1.2 * hue);
         }
-        let film = 0.65 * slow.0[FILM] * ramp(0.2, 0.8, hue + 0.3 * slow.0[TURF]);
+        // Algae and detritus gather in spots between the grains.
+        let spots = 0.35 + 1.0 * ramp(0.70, 0.45, fine + 0.35 * (hue - 0.5));
+        let film = (0.75 * slow.0[FILM] * ramp(0.15, 0.75, hue + 0.4 * (slow.0[TURF] - 0.4)) * spots).min(0.95);
         let mut colour = blend(self.palette.sand, self.palette.film, film);
         // Bits of shell are white, bits with turf on them dark.
         let fleck = ramp(0.94, 0.98, own) - ramp(0.06, 0.02, own);

@@ -211,7 +211,7 @@ fn garden_form(size: usize, kind: f64) -> Form {
 fn debris(habitat: &Habitat, cluster: f32, rng: &mut CounterRng, _: usize) -> Option<Choice> {
     let chance = rng.unit() as f32;
     let kind = rng.unit();
-    let sticks = habitat.rubble * (0.35 + 0.9 * cluster) + 0.22 * habitat.reef * cluster + 0.006;
+    let sticks = habitat.rubble * (0.35 + 0.9 * cluster) + 0.10 * habitat.reef * cluster + 0.003;
     if chance < sticks {
         let tone = match kind {
             k if k < 0.5 => [0.29, 0.265, 0.21],

@@ -12,12 +12,12 @@ const BALANCED_M: f32 = 4.0;
 const VEIL: [f32; 3] = [0.012, 0.042, 0.046];
 /// What a white balance leaves of red, green and blue: red is the first to go, and some cameras restore it.
 const BALANCES: [Colour; 6] = [
-    [0.30, 0.94, 1.02],
-    [0.42, 0.92, 1.03],
-    [0.60, 0.94, 1.00],
-    [1.00, 0.93, 0.97],
-    [0.72, 0.97, 0.94],
-    [0.56, 0.92, 0.98],
+    [0.32, 0.92, 1.08],
+    [0.42, 0.91, 1.09],
+    [0.58, 0.92, 1.08],
+    [0.98, 0.92, 1.05],
+    [0.70, 0.95, 1.00],
+    [0.54, 0.91, 1.05],
 ];
 /// Distances over which the light changes along a survey, metres.
 const LIGHT_M: f32 = 14.0;
