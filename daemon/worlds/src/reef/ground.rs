@@ -68,7 +68,8 @@ impl Palette {
         let mut rng = CounterRng::new(key);
         let crusted = 0.15 + 0.85 * (rng.unit() * rng.unit()) as f32;
         // Where they are many they are red, pink or violet.
-        let vivid = [[0.27, 0.075, 0.065], [0.30, 0.150, 0.155], [0.23, 0.140, 0.200], [0.25, 0.150, 0.050]][rng.below(4)];
+        let vivid =
+            [[0.27, 0.075, 0.065], [0.30, 0.150, 0.155], [0.23, 0.140, 0.200], [0.25, 0.150, 0.050]][rng.below(4)];
         let crust = blend([0.195, 0.155, 0.150], vivid, crusted);
         let mut between = |a: Colour, b: Colour| {
             let light = 0.88 + 0.24 * rng.unit() as f32;
@@ -154,18 +155,21 @@ impl Ground {
             0.0
         };
         // Between rocks only pockets of sand can be seen.
-        let mut spot = if reef < 1.0 {
-            self.sand(patterns, [x, y], at, habitat, slow)
-        } else {
-            self.pocket(patterns, at, slow)
+        let rock = (reef > 0.0).then(|| self.rock(patterns, at, reef, habitat, slow));
+        let mut spot = match rock {
+            Some(rock) if reef >= 1.0 && rock.height_m > slow.0[DUNE] + 0.12 => rock,
+            _ if reef >= 1.0 => self.pocket(patterns, at, slow),
+            _ => self.sand(patterns, [x, y], at, habitat, slow),
         };
         let littered = 0.62 * slow.0[LITTER] * (1.0 - habitat.grass);
         let rubble = ramp(0.12, 0.88, habitat.rubble + 0.9 * rag).max(littered);
         if rubble > 0.05 && reef < 1.0 {
             self.lay_rubble(patterns, &mut spot, at, rubble, slow);
         }
-        if reef > 0.0 {
-            self.lay_rock(patterns, &mut spot, at, reef, habitat, slow);
+        if let Some(rock) = rock {
+            let seen = ramp(-0.01, 0.02, rock.height_m - spot.height_m);
+            spot.height_m += seen * (rock.height_m - spot.height_m);
+            spot.colour = blend(spot.colour, rock.colour, seen);
         }
         spot.class = if reef > 0.5 {
             rock_class(habitat)
@@ -198,7 +202,7 @@ impl Ground {
             height_m += 0.085 * wave_m * (4.0 * part * part - 0.35) * rippled * (0.4 + 1.2 * hue);
         }
         // Algae and detritus gather in spots between the grains.
-        let spots = 0.35 + 1.0 * ramp(0.70, 0.45, fine + 0.35 * (hue - 0.5));
+        let spots = 0.65 + 0.50 * ramp(0.85, 0.40, fine + 0.5 * (hue - 0.5));
         let film = (0.75 * slow.0[FILM] * ramp(0.15, 0.75, hue + 0.4 * (slow.0[TURF] - 0.4)) * spots).min(0.95);
         let mut colour = blend(self.palette.sand, self.palette.film, film);
         // Bits of shell are white, bits with turf on them dark.
@@ -238,7 +242,7 @@ impl Ground {
         }
     }
 
-    fn lay_rock(&self, patterns: &Patterns, spot: &mut Spot, at: [f32; 2], reef: f32, habitat: &Habitat, slow: &Slow) {
+    fn rock(&self, patterns: &Patterns, at: [f32; 2], reef: f32, habitat: &Habitat, slow: &Slow) -> Spot {
         let palette = &self.palette;
         let [lump_m, tone, hue] = patterns.rock.at(0.8 * at[0], 0.8 * at[1]);
         let [grit_m, fine, own] = patterns.grit.at(1.3 * at[1], 1.3 * at[0]);
@@ -246,10 +250,6 @@ impl Ground {
         // Bare rock stands higher than a garden of corals.
         let tall = if is_rock(habitat) { 0.50 } else { 0.30 };
         let height_m = tall * mass + 0.9 * lump_m + 0.6 * grit_m - 0.04 - 0.5 * (1.0 - reef);
-        let seen = ramp(-0.01, 0.02, height_m - spot.height_m);
-        if seen <= 0.0 {
-            return;
-        }
         // Sediment lies on top, turf and algae grow on the sides.
         let grown = 0.8 * hue + 0.5 * (slow.0[TURF] - 0.5) + 0.15 * (own - 0.5) + 0.9 * lump_m;
         let mut colour = blend(palette.turf, palette.sediment, ramp(0.15, 0.75, grown));
@@ -258,8 +258,7 @@ impl Ground {
         let algae = ramp(0.42, 0.62, slow.0[CLUMP]) * ramp(0.75, 0.35, hue);
         colour = blend(colour, palette.algae, if is_rock(habitat) { 0.85 } else { 0.4 } * algae);
         let light = (0.08 + 1.0 * tone) * (0.55 + 0.50 * fine) * (0.45 + 0.65 * ramp(-0.2, 0.7, mass));
-        spot.height_m += seen * (height_m - spot.height_m);
-        spot.colour = blend(spot.colour, scale(colour, light), seen);
+        Spot { height_m, colour: scale(colour, light), class: rock_class(habitat) }
     }
 
     fn lay_meadow(&self, patterns: &Patterns, spot: &mut Spot, at: [f32; 2], meadow: f32, slow: &Slow) {
@@ -269,7 +268,8 @@ impl Ground {
         let [lift_m, tone, hue] = patterns.canopy.at(at[0] + 0.3 * clump, at[1] - 0.4 * clump);
         // Its edge dissolves into tufts.
         let tuft = self.noise.value(at[0] / 0.16, at[1] / 0.16) - 0.5;
-        let dense = ramp(0.05, 0.75, meadow + 1.1 * tuft * (1.0 - meadow)) * ramp(0.22, 0.62, clump + 0.6 * (meadow - 0.5));
+        let dense =
+            ramp(0.05, 0.75, meadow + 1.1 * tuft * (1.0 - meadow)) * ramp(0.22, 0.62, clump + 0.6 * (meadow - 0.5));
         let height_m = lift_m + 0.10 * (dense - 0.5) + 0.24 * (clump - 0.5) + slow.0[DUNE];
         // Where the meadow thins out, whole blades are missing.
         let grows = ramp(-0.10, 0.12, 1.25 * dense - 0.12 - hue);

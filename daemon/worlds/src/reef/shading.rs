@@ -22,6 +22,8 @@ const SHARPEN: f32 = 0.20;
 
 /// Longest shadow, and width of the widest crevice, metres: a surface needs so much more around what is shown.
 pub(super) const SHADOW_M: f32 = 0.48;
+/// Most nodes around a tile that are computed for its shadows.
+pub(super) const MAX_APRON: usize = 96;
 pub(super) const CREVICE_M: f32 = WIDE_M + 0.03;
 
 /// The light that each node sends back, row by row.
@@ -122,24 +124,34 @@ fn shadows(surface: &Surface) -> Vec<f32> {
     let shift = SUN[0] / SUN[1];
     let rise = SUN[2] / SUN[1] * surface.pitch_m;
     let (whole, part) = (shift.floor() as i64, shift - shift.floor());
+    // A shadow is filled by light from around it before it leaves the margin of a tile.
+    let longest = (SHADOW_M / surface.pitch_m).clamp(4.0, MAX_APRON as f32);
     let mut shadow = vec![0.0; columns * rows];
-    let mut edge: Vec<f32> = surface.height_m[(rows - 1) * columns..].to_vec();
+    // The height of the ray over each node of the last row, and the rows since it touched something.
+    let mut edge: Vec<[f32; 2]> =
+        surface.height_m[(rows - 1) * columns..].iter().map(|&height| [height, 0.0]).collect();
+    let mut next = edge.clone();
     for row in (0..rows - 1).rev() {
         let heights = &surface.height_m[row * columns..][..columns];
-        let mut next = heights.to_vec();
         for column in 0..columns {
             let from = column as i64 + whole;
             let at = |c: i64| edge[c.clamp(0, columns as i64 - 1) as usize];
             // The ray of the whole sun is wide, so that shadows blur the more the longer they are.
-            let inner = at(from) + part * (at(from + 1) - at(from));
-            let outer = at(from - 1) + part * (at(from + 2) - at(from - 1));
+            let [first, second] = [at(from), at(from + 1)];
+            let inner = first[0] + part * (second[0] - first[0]);
+            let outer = at(from - 1)[0] + part * (at(from + 2)[0] - at(from - 1)[0]);
             let ray = 0.8 * inner + 0.2 * outer - rise;
-            if ray > heights[column] {
-                next[column] = ray;
-                shadow[row * columns + column] = 0.90 * ramp(0.0, 0.12, ray - heights[column]);
-            }
+            let length = first[1] + part * (second[1] - first[1]) + 1.0;
+            let deep = ray - heights[column];
+            next[column] = if deep > 0.0 && length < longest {
+                let fade = 1.0 - ramp(0.5, 1.0, length / longest);
+                shadow[row * columns + column] = 0.90 * fade * ramp(0.0, 0.12, deep);
+                [ray, length]
+            } else {
+                [heights[column], 0.0]
+            };
         }
-        edge = next;
+        std::mem::swap(&mut edge, &mut next);
     }
     shadow
 }

@@ -2,7 +2,7 @@
 
 use super::Reef;
 use super::fields::Colour;
-use super::shading::{CREVICE_M, SHADOW_M, shade};
+use super::shading::{CREVICE_M, MAX_APRON, SHADOW_M, shade};
 use super::surface::Surface;
 use crate::noise::floor;
 
@@ -10,8 +10,6 @@ use crate::noise::floor;
 pub(super) const EDGE: usize = 256;
 /// Bound of the memory: so many tiles of 768 KiB.
 const MAX_TILES: usize = 64;
-/// Most nodes around a tile that are computed for its shadows.
-const MAX_APRON: usize = 96;
 
 #[derive(Clone, Debug)]
 struct Tile {

@@ -69,7 +69,8 @@ impl Berth {
             }
         }
         // The planking stands where it has not fallen, and leans outwards.
-        let broken = 0.6 * noise.value(along / 1.6 + 60.0, 3.0 + 5.0 * abeam.signum()) + 0.4 * noise.value(along / 0.4, 7.0);
+        let broken =
+            0.6 * noise.value(along / 1.6 + 60.0, 3.0 + 5.0 * abeam.signum()) + 0.4 * noise.value(along / 0.4, 7.0);
         let standing = ramp(0.46, 0.60, broken);
         let thick = (0.05 + 0.14 * mound) * standing;
         if standing > 0.1 && from_wall < thick {
