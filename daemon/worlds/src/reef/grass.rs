@@ -55,12 +55,12 @@ fn blade(ground: &Ground, at: [f32; 2], step_m: f32, rng: &mut CounterRng, draw:
         + 2.4 * (ground.noise.value(x / 0.6, y / 0.6) - 0.5);
     let own = (rng.unit() + rng.unit() - 1.0) as f32;
     let (sin, cos) = (sway + 1.5 * own).sin_cos();
-    let curl = 2.6 * (rng.unit() as f32 - 0.5);
+    let curl = 1.8 * (rng.unit() as f32 - 0.5);
     let length_m = 0.10 + (MAX_BLADE_M - 0.10) * (rng.unit() * rng.unit()) as f32;
-    let lift_m = 0.05 + 0.13 * rng.unit() as f32;
+    let lift_m = 0.03 + 0.07 * rng.unit() as f32;
     let age = rng.unit() as f32;
     let dead = ramp(0.45, 0.7, ground.noise.value(x / 1.6 + 15.0, y / 1.6));
-    let tone = scale(blend(YOUNG, OLD, (age * age + 0.5 * dead).min(1.0)), 0.40 + 0.9 * rng.unit() as f32);
+    let tone = scale(blend(YOUNG, OLD, (age * age + 0.5 * dead).min(1.0)), 0.55 + 0.6 * rng.unit() as f32);
     // Blades near the camera are wide, and those that sway are blurred.
     let cover = [0.45 + 0.5 * rng.unit() as f32, (1.6 * rng.unit() as f32 - 0.7).max(0.0)];
     let steps = (length_m / step_m).ceil().max(1.0);
@@ -70,7 +70,7 @@ fn blade(ground: &Ground, at: [f32; 2], step_m: f32, rng: &mut CounterRng, draw:
         let t = step as f32 / steps;
         let height_m = 0.02 + lift_m * (4.0 * t * (1.0 - 0.75 * t)).min(1.0);
         // Epiphytes mottle the blade.
-        let mottle = 0.7 + 0.6 * ground.noise.value(px / 0.05, py / 0.05);
+        let mottle = 0.85 + 0.3 * ground.noise.value(px / 0.05, py / 0.05);
         let colour = scale(blend(DARK, tone, (0.25 + 1.1 * t).min(1.0)), mottle);
         draw(&Segment { x: px, y: py, height_m, colour, cover });
         (dx, dy) = (dx - turn * dy, dy + turn * dx);

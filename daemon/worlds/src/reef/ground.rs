@@ -69,7 +69,7 @@ impl Palette {
         let crusted = 0.15 + 0.85 * (rng.unit() * rng.unit()) as f32;
         // Where they are many they are red, pink or violet.
         let vivid =
-            [[0.27, 0.075, 0.065], [0.30, 0.150, 0.155], [0.23, 0.140, 0.200], [0.25, 0.150, 0.050]][rng.below(4)];
+            [[0.27, 0.075, 0.065], [0.30, 0.150, 0.155], [0.215, 0.150, 0.180], [0.25, 0.150, 0.050]][rng.below(4)];
         let crust = blend([0.195, 0.155, 0.150], vivid, crusted);
         let mut between = |a: Colour, b: Colour| {
             let light = 0.88 + 0.24 * rng.unit() as f32;
@@ -84,7 +84,7 @@ impl Palette {
             crust,
             crusted,
             algae: between([0.072, 0.076, 0.036], [0.092, 0.070, 0.036]),
-            young: between([0.082, 0.096, 0.048], [0.080, 0.088, 0.050]),
+            young: between([0.080, 0.097, 0.048], [0.079, 0.090, 0.049]),
             old: between([0.145, 0.128, 0.084], [0.118, 0.108, 0.076]),
         }
     }
@@ -130,10 +130,10 @@ impl Ground {
         put(WARP[1], warp(55.0));
         put(BEND, 2.6 * n.value(x / 0.9, y / 0.9 + 9.0) + 6.0 * n.value(x / 4.1 + 2.0, y / 4.1));
         put(RIPPLED, ramp(0.52, 0.78, fbm(n, x / 2.7 + 70.0, y / 2.7, 3)));
-        put(LITTER, ramp(0.54, 0.76, fbm(n, x / 1.7, y / 1.7 + 31.0, 3)));
+        put(LITTER, ramp(0.51, 0.78, fbm(n, x / 1.7, y / 1.7 + 31.0, 3)));
         put(FILM, ramp(0.42, 0.78, fbm(n, x / 1.3 + 44.0, y / 1.3, 3)));
-        put(DUNE, 0.30 * (fbm(n, x / 1.5, y / 1.5 + 90.0, 2) - 0.5));
-        put(MOTTLE, 0.62 + 0.76 * fbm(n, x / 1.9 + 5.0, y / 1.9, 2));
+        put(DUNE, 0.42 * (fbm(n, x / 1.5, y / 1.5 + 90.0, 2) - 0.5));
+        put(MOTTLE, 0.72 + 0.56 * fbm(n, x / 1.9 + 5.0, y / 1.9, 2));
         put(TURF, fbm(n, x / 0.9 + 14.0, y / 0.9, 2));
         put(MASS, 2.0 * (fbm(n, x / 1.15 + 3.0, y / 1.15, 2) - 0.5).abs().sqrt() - 0.35);
         put(COARSE, ramp(0.25, 0.75, n.value(x / 1.5 + 27.0, y / 1.5)));
@@ -256,7 +256,9 @@ impl Ground {
         let crust = palette.crusted * (0.35 + slow.0[COARSE]) * ramp(0.0, 0.35, hue + 0.5 * own + 0.9 * lump_m - 0.55);
         colour = blend(colour, scale(palette.crust, 0.65 + 0.7 * own), (0.9 * crust).min(0.9));
         let algae = ramp(0.42, 0.62, slow.0[CLUMP]) * ramp(0.75, 0.35, hue);
-        colour = blend(colour, palette.algae, if is_rock(habitat) { 0.85 } else { 0.4 } * algae);
+        // Algae keep corals off the bare rock.
+        let algae = if is_rock(habitat) { 0.40 + 0.45 * algae } else { 0.35 * algae };
+        colour = blend(colour, palette.algae, algae);
         let light = (0.08 + 1.0 * tone) * (0.55 + 0.50 * fine) * (0.45 + 0.65 * ramp(-0.2, 0.7, mass));
         Spot { height_m, colour: scale(colour, light), class: rock_class(habitat) }
     }
@@ -278,7 +280,7 @@ impl Ground {
         let mut colour = blend(palette.young, palette.old, old);
         // Silt and epiphytes grey the blades in places.
         colour = blend(colour, palette.film, 0.55 * slow.0[FILM]);
-        let light = (0.25 + 0.60 * tone) * (0.25 + 1.3 * ramp(0.2, 0.75, clump));
+        let light = (0.25 + 0.60 * tone) * (0.20 + 1.00 * ramp(0.2, 0.75, clump));
         spot.colour = blend(scale(spot.colour, 1.0 - 0.55 * dense), scale(colour, light), seen);
         spot.height_m += seen * (height_m - spot.height_m);
         if meadow > 0.5 {

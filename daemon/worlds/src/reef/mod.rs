@@ -1,7 +1,7 @@
 //! A sea floor of 120 x 80 m that looks like one: rippled sand, a channel, rubble, seagrass, corals, boulders, a wreck.
 //!
 //! Everything is a function of the seed and of the position. Nothing of a floor is stored except the tiles that the
-//! camera has drawn last; patterns of 36 MB, which all floors share, are painted at the first use.
+//! camera has drawn last; patterns of 51 MB, which all floors share, are painted at the first use.
 
 mod branches;
 mod camera;

@@ -141,7 +141,7 @@ pub(super) fn with_crevices(mut texture: Texture, strength: f32) -> Texture {
         let per_m = strength / (radius as f32 * texel_m);
         for ((texel, mean), height) in texture.texels_mut().iter_mut().zip(mean).zip(&height) {
             let sunk = (mean - height) * per_m;
-            texel[1] *= if sunk > 0.0 { 1.0 / (1.0 + 2.2 * sunk) } else { 1.0 + 0.4 * (-sunk).min(0.8) };
+            texel[1] *= if sunk > 0.0 { 1.0 / (1.0 + 2.2 * sunk) } else { 1.0 + 0.2 * (-sunk).min(0.8) };
         }
     }
     texture

@@ -107,7 +107,7 @@ fn grown(choice: &Choice, sizes: &Sizes, place: &mut Place) -> Thing {
     let angle = std::f64::consts::TAU * rng.unit();
     let (sin, cos) = angle.sin_cos();
     let key = rng.next_u64();
-    let tint = (0.60 + 0.75 * rng.unit()) as f32;
+    let tint = (0.74 + 0.58 * rng.unit()) as f32;
     // Silt, turf and the algae inside corals give nearly the same hue to all of them.
     let grey = (choice.tone[0] + choice.tone[1] + choice.tone[2]) / 3.0;
     let tone = blend(choice.tone, scale([1.22, 1.03, 0.68], grey), 0.35 + 0.50 * rng.unit() as f32);
@@ -145,7 +145,7 @@ fn head(habitat: &Habitat, cluster: f32, rng: &mut CounterRng, size: usize) -> O
     }
     if chance < habitat.rock * stony {
         if kind < 0.82 {
-            return Some(Choice { form: Form::Boulder, tone: [0.17, 0.16, 0.13], aspect: 1.3 });
+            return Some(Choice { form: Form::Boulder, tone: [0.165, 0.145, 0.100], aspect: 1.3 });
         }
         return plain(if kind < 0.92 { Form::Soft } else { Form::Crust });
     }

@@ -53,7 +53,7 @@ impl Water {
             exposure: 1.05 + 1.25 * unit(),
             turbidity: 0.06 + 0.7 * unit() * unit(),
             contrast: 0.80 + 0.30 * unit(),
-            saturation: 1.08 + 0.34 * unit(),
+            saturation: 1.05 + 0.28 * unit(),
         }
     }
 

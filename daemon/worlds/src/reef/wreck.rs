@@ -13,7 +13,7 @@ const HALF_BEAM_M: f32 = 1.75;
 
 const WOOD: Colour = [0.115, 0.100, 0.072];
 const RUST: Colour = [0.175, 0.098, 0.055];
-const SILT: Colour = [0.185, 0.160, 0.120];
+const SILT: Colour = [0.215, 0.162, 0.108];
 
 impl Berth {
     /// Whether the wreck may cover a part of the region.
@@ -62,7 +62,7 @@ impl Berth {
             spot.colour = blend(spot.colour, colour, seen);
         };
         let [heap_m, heap, _] = patterns().rubble.at(x + 51.0, y + 3.0);
-        put(0.10 + 1.1 * heap_m + 0.5 * (mound - 0.4), scale(WOOD, 0.3 + 0.8 * heap));
+        put(0.03 + 1.2 * heap_m + 0.7 * (mound - 0.45), scale(blend(WOOD, SILT, 0.35), 0.25 + 0.85 * heap));
         for timber in &TIMBERS {
             if let Some(height_m) = timber.height_m(along, abeam) {
                 put(height_m + 0.4 * lump_m, worn);
