@@ -1,6 +1,6 @@
 //! Things that lie and grow on the floor: corals of several growth forms, boulders, rubble, shells, pits.
 
-use super::fields::Colour;
+use super::fields::{Colour, ramp};
 use super::ground::Spot;
 use crate::noise::Noise;
 
@@ -91,7 +91,9 @@ impl Thing {
         // Turf and sediment gnaw at every edge.
         let gnaw = (noise.value(x / 0.11 + off, y / 0.11) + 0.4 * noise.value(x / 0.035 + off, y / 0.035) - 0.7)
             * (0.035 / self.radius_m.max(0.03)).min(0.5);
-        let d = square.sqrt() * (1.0 + lobes * bend) + gnaw;
+        // Lobes end before the reach does, so that nothing is cut off.
+        let end = 0.6 * ramp(1.0, 1.3, square.sqrt());
+        let d = square.sqrt() * (1.0 + lobes * bend) + gnaw + end;
         if d >= 1.0 {
             return None;
         }
