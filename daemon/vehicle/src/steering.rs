@@ -287,7 +287,8 @@ impl Steering {
             if !adapts {
                 return (plan, None);
             }
-            let plan = if worth::keeps(&request, present, &plan) { present.to_vec() } else { plan };
+            let margin = if self.known.repeats() { worth::MARGIN_IN_ROUNDS } else { self.choice.planner().margin() };
+            let plan = if worth::keeps(&request, present, &plan, margin) { present.to_vec() } else { plan };
             if worth::pays(&request, &plan, interest, (lattice.step_m() / self.window.cell_m).powi(2)) {
                 let intent = purpose::purpose(interest, |part| worth::gain(&value(part), &plan));
                 return (plan, intent);

@@ -50,6 +50,11 @@ impl Knowledge {
         !favoured.is_empty()
     }
 
+    /// Whether the survey is in a round of further looks.
+    pub fn repeats(&self) -> bool {
+        self.repeats
+    }
+
     /// Takes the scene model's perplexity of a cell, 1 or more.
     pub fn set_perplexity(&mut self, cell: Cell, perplexity: f32) {
         let level = (20.0 * perplexity.max(1.0).ln()).round().clamp(1.0, 255.0);
@@ -62,7 +67,7 @@ const PARTS_PER_STEP: u8 = 4;
 
 /// The value of a repeated look at a cell, divided by the value of the look before: while there is floor that was not seen,
 /// and in the rounds after that, in which more looks at dense places are better than a first one at each sparse place.
-const REPEATED_LOOK: f32 = 0.2;
+const REPEATED_LOOK: f32 = 0.4;
 const REPEATED_LOOK_IN_ROUNDS: f32 = 0.7;
 
 /// The value of the next look at each block, the square between four places of a lattice. A place shows

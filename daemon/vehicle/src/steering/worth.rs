@@ -2,17 +2,18 @@
 
 use crate::planning::{BlockValues, Interest, Node, PlanRequest, distance};
 
-/// The gain a metre of a new plan, divided by that of the present one, from which the new one replaces it. Without such a
-/// margin two far goals of like worth take the vehicle to and fro, because each step changes the map.
-const MARGIN: f64 = 1.15;
-/// The mean value of a cell, divided by the largest weight, from which a look at it pays: a third look at a favoured label
-/// does, and a fourth one does not.
+/// The margin of all planners in rounds of repeated looks, where a place keeps much of its value after a look and holds the
+/// vehicle otherwise.
+pub(super) const MARGIN_IN_ROUNDS: f64 = 1.15;
+/// The mean value of a cell, divided by the largest weight, from which a look at it pays: a fifth look at a favoured label
+/// does, and a sixth one does not.
 const PAYS: f64 = 0.02;
 
-/// Whether the present plan is kept although another one was made from the same place.
-pub(super) fn keeps(q: &PlanRequest<'_>, present: &[Node], other: &[Node]) -> bool {
+/// Whether the present plan is kept although another one was made from the same place: the other one has less than
+/// `margin` times its gain a metre.
+pub(super) fn keeps(q: &PlanRequest<'_>, present: &[Node], other: &[Node], margin: f64) -> bool {
     let rate = gain_a_metre(q, present);
-    rate > 0.0 && gain_a_metre(q, other) < MARGIN * rate
+    rate > 0.0 && gain_a_metre(q, other) < margin * rate
 }
 
 /// Whether a path shows a block of which the cells are worth another look.
