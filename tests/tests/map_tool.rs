@@ -61,6 +61,8 @@ fn a_map_comes_back_exactly_from_its_chunks_with_every_codec() {
         assert!(of(&still, "frames") * 64 >= of(&still, "bytes"));
         assert!(of(&delta, "png_delta_bytes") < of(&delta, "png_full_bytes"));
         assert_eq!(delta["codec"], codec);
+        let alone = json(&[&["map", "encode", "--target", text(&target), "--no-png"][..], &common].concat());
+        assert_eq!((&alone["bytes"], alone.get("png_full_bytes")), (&still["bytes"], None));
     }
 }
 

@@ -1,7 +1,7 @@
 //! `scenecast map bench`
 
 use super::Coding;
-use super::change::{Sizes, encode, refused, sizes};
+use super::change::{PngSizes, Sizes, encode, refused, sizes};
 use super::files::{numbered, read_map, same_size};
 use crate::progress::Progress;
 use clap::Args;
@@ -86,18 +86,21 @@ impl Totals {
         self.steps += 1;
         self.step_ms_mean += ms;
         self.step_ms_max = self.step_ms_max.max(ms);
-        self.sizes.add(&sizes(coding, base, target, &file, cells_changed));
+        let png = PngSizes::measure(base, target);
+        self.sizes.add(&sizes(coding, &file, cells_changed, Some(png)));
         Ok(())
     }
 
     fn finish(&mut self) {
         let ratio = |of: usize| (of > 0).then(|| self.sizes.bytes as f64 / of as f64);
-        (self.ratio_full, self.ratio_delta) = (ratio(self.sizes.png_full_bytes), ratio(self.sizes.png_delta_bytes));
+        let PngSizes { png_full_bytes, png_delta_bytes } = self.sizes.png.unwrap_or_default();
+        (self.ratio_full, self.ratio_delta) = (ratio(png_full_bytes), ratio(png_delta_bytes));
         self.step_ms_mean /= self.steps.max(1) as f64;
     }
 
     fn print(&self) {
-        let Sizes { bytes, frames, cells_changed, codec, png_full_bytes, png_delta_bytes } = &self.sizes;
+        let Sizes { bytes, frames, cells_changed, codec, png } = &self.sizes;
+        let PngSizes { png_full_bytes, png_delta_bytes } = png.unwrap_or_default();
         let shown = |ratio: Option<f64>| ratio.map_or("-".to_owned(), |r| format!("{r:.3}"));
         println!("{} steps, {cells_changed} cells changed, frames of {} bytes", self.steps, self.frame_bytes);
         println!("{:<16} {:>10} {:>12}", "", "bytes", "ours to it");

@@ -15,10 +15,28 @@ pub struct Sizes {
     pub(super) frames: usize,
     pub(super) cells_changed: usize,
     pub(super) codec: String,
+    /// `None`: not compared with PNG files.
+    #[serde(flatten)]
+    pub(super) png: Option<PngSizes>,
+}
+
+/// Sizes of the PNG files that the chunks are compared with.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
+pub struct PngSizes {
     /// Bytes of the whole map as the best PNG.
     pub(super) png_full_bytes: usize,
     /// Bytes of the change as the best PNG: delta image or dirty box.
     pub(super) png_delta_bytes: usize,
+}
+
+impl PngSizes {
+    /// Compresses with zopfli, which takes most of the time of an encoding.
+    pub fn measure(base: &LabelRaster, target: &LabelRaster) -> Self {
+        Self {
+            png_full_bytes: target.smallest_png(&mut Zopfli),
+            png_delta_bytes: target.smallest_delta_png(base, &mut Zopfli),
+        }
+    }
 }
 
 impl Sizes {
@@ -26,8 +44,11 @@ impl Sizes {
         self.bytes += other.bytes;
         self.frames += other.frames;
         self.cells_changed += other.cells_changed;
-        self.png_full_bytes += other.png_full_bytes;
-        self.png_delta_bytes += other.png_delta_bytes;
+        if let Some(png) = other.png {
+            let sum = self.png.get_or_insert_default();
+            sum.png_full_bytes += png.png_full_bytes;
+            sum.png_delta_bytes += png.png_delta_bytes;
+        }
     }
 }
 
@@ -41,21 +62,14 @@ pub fn refused(error: ChunkFileError) -> UserError {
     UserError::Input(error.to_string())
 }
 
-/// Sizes of an encoded change, beside those of the PNG files.
-pub fn sizes(
-    coding: &Coding,
-    base: &LabelRaster,
-    target: &LabelRaster,
-    file: &ChunkFile,
-    cells_changed: usize,
-) -> Sizes {
+/// Sizes of an encoded change, beside those of PNG files.
+pub fn sizes(coding: &Coding, file: &ChunkFile, cells_changed: usize, png: Option<PngSizes>) -> Sizes {
     Sizes {
         bytes: file.chunks.iter().map(Vec::len).sum(),
         frames: frames(file.chunks.iter().map(Vec::len), coding.frame_bytes.into()),
         cells_changed,
         codec: coding.codec.to_string(),
-        png_full_bytes: target.smallest_png(&mut Zopfli),
-        png_delta_bytes: target.smallest_delta_png(base, &mut Zopfli),
+        png,
     }
 }
 

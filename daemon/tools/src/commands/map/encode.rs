@@ -1,7 +1,7 @@
 //! `scenecast map encode`
 
 use super::Coding;
-use super::change::{encode, sizes};
+use super::change::{PngSizes, encode, sizes};
 use super::files::{read_map, same_size};
 use crate::print_figures;
 use clap::Args;
@@ -29,6 +29,9 @@ pub struct Encode {
     /// File of chunks to write
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
+    /// Do not compare with PNG files, which takes most of the time
+    #[arg(long)]
+    no_png: bool,
     /// Print JSON at a terminal too
     #[arg(long)]
     json: bool,
@@ -46,7 +49,8 @@ impl Encode {
             None => LabelRaster::uniform(target.width, target.height, 0),
         };
         let (file, cells_changed) = encode(&self.coding, &base, &target)?;
-        let sizes = sizes(&self.coding, &base, &target, &file, cells_changed);
+        let png = (!self.no_png).then(|| PngSizes::measure(&base, &target));
+        let sizes = sizes(&self.coding, &file, cells_changed, png);
         write_whole(&self.out, &file.to_bytes())?;
         print_figures(&sizes, self.json)
     }
