@@ -143,6 +143,15 @@ impl Registrar {
     /// Places a frame. The first one is placed by its input.
     pub fn handle_frame(&mut self, input: &FrameInput) -> Placed {
         let thumbnail = Thumbnail::new(&input.image, input.metres_per_pixel, &mut self.flat);
+        self.place(input, thumbnail)
+    }
+
+    /// Places a frame by odometry and compass alone, whatever its image shows.
+    pub fn handle_unmatched_frame(&mut self, input: &FrameInput) -> Placed {
+        self.place(input, None)
+    }
+
+    fn place(&mut self, input: &FrameInput, thumbnail: Option<Thumbnail>) -> Placed {
         self.tally.frames += 1;
         let placed = match self.last.take() {
             None => self.begin(input, thumbnail),

@@ -1,6 +1,8 @@
 //! The operator's settings of a vehicle: as typed, as ordered, and as in force.
 
-use scenecast_protocol::directive::{AtEnd, CellBand, Change, OrderStatus, PlannerKind, Settings, ShortDecimal};
+use scenecast_protocol::directive::{
+    AtEnd, CellBand, Change, OrderStatus, PlannerKind, Registration, Settings, ShortDecimal,
+};
 use scenecast_protocol::map::{LayerMask, LayerSet};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -15,6 +17,8 @@ pub struct SettingsOrder {
     /// What an adaptive survey does once no look pays any more: repeat (explore the rest of the area, then look at the
     /// favoured labels again), explore (explore the rest, then hold) or hold.
     pub at_end: Option<String>,
+    /// Whether images place the frames of the camera on the map: on, or off for odometry and compass alone.
+    pub registration: Option<String>,
     /// The cells of the map that are sent: fine (all), coarse (every fourth in both directions), or coarse-to-fine (the
     /// coarse ones first where the backlog is large). The scene model keeps all cells.
     pub cells: Option<String>,
@@ -50,6 +54,7 @@ impl SettingsOrder {
         let mut settings = Settings {
             planner: choice("planner", &self.planner, PlannerKind::from_name, "lawnmower, greedy or horizon")?,
             at_end: choice("at_end", &self.at_end, AtEnd::from_name, "repeat, explore or hold")?,
+            registration: choice("registration", &self.registration, Registration::from_name, "on or off")?,
             cells: choice("cells", &self.cells, CellBand::from_name, "fine, coarse-to-fine or coarse")?,
             layers: choice(
                 "layers",
@@ -109,6 +114,7 @@ impl SettingsOrder {
         Self {
             planner: typed(settings.planner, String::new(), |p| text(p.name())),
             at_end: typed(settings.at_end, String::new(), |choice| text(choice.name())),
+            registration: typed(settings.registration, String::new(), |choice| text(choice.name())),
             cells: typed(settings.cells, String::new(), |c| text(c.name())),
             layers: typed(settings.layers, String::new(), |mask| layer_names(mask, layers)),
             alpha: figure(settings.alpha),
@@ -209,13 +215,17 @@ mod tests {
             let said = refused(&format!(r#"{{"layers": "{layers}"}}"#));
             assert!(said.contains(&allowed), "{said}");
         }
+        assert_eq!(
+            refused(r#"{"registration": "no"}"#),
+            "registration \"no\": it takes on or off, or \"\" as configured"
+        );
         assert!(refused(r#"{"planner": "random"}"#).contains("lawnmower, greedy or horizon"));
         assert!(refused(r#"{"delta": 1}"#).contains("unknown field `delta`"));
     }
 
     #[test]
     fn an_order_is_shown_as_it_was_typed() {
-        let typed = r#"{"planner":"","cells":"coarse","layers":"depth","alpha":0.05,"gamma":0.0,"frames_per_s":0.2}"#;
+        let typed = r#"{"planner":"","registration":"off","cells":"coarse","layers":"depth","alpha":0.05,"gamma":0.0,"frames_per_s":0.2}"#;
         let order: SettingsOrder = serde_json::from_str(typed).unwrap();
         assert_eq!(SettingsOrder::of(&order.read(&LayerSet::default()).unwrap(), &LayerSet::default()), order);
         let layers = |names: &str| read(&format!(r#"{{"layers": "{names}"}}"#)).unwrap();

@@ -95,7 +95,7 @@ impl Mapper {
         mapper.last_seen_s = last_seen_s;
         mapper.light = mapper.light.map(|fresh| light.unwrap_or(fresh));
         let kept_registrar = registration.and_then(registrar_of).map(|kept| kept.with_loops(config.registration.loops));
-        mapper.registrar = mapper.registrar.map(|fresh| kept_registrar.unwrap_or(fresh));
+        mapper.registrar = kept_registrar.or(mapper.registrar);
         mapper.extractor = WordExtractor::from_measures(kept.words);
         (mapper.model, mapper.book) = (model, kept.book);
         (mapper.exemplars, mapper.relief, mapper.last_s) = (kept.exemplars, kept.relief, kept.last_s);

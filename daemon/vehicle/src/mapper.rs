@@ -10,7 +10,7 @@ use scene_model::topics::{Birth, FlatCell, SceneConfig, SceneModel};
 use scene_model::words::{FlatField, Measures, WordConfig, WordExtractor};
 use scenecast_config::{BirthRule, Config, cell_m};
 use scenecast_core::UserError;
-use scenecast_protocol::directive::{Change, Settings, ShortDecimal};
+use scenecast_protocol::directive::{Change, Registration, Settings, ShortDecimal};
 use scenecast_protocol::map::{Cell, LayerId};
 use scenecast_registration::Registrar;
 use std::collections::BTreeMap;
@@ -50,8 +50,10 @@ pub struct Mapper {
     /// The exemplars of the last [`Mapper::shared_exemplars`].
     shared: SharedExemplars,
     pub(super) relief: Relief,
-    /// `None` if frames are mapped where dead reckoning places them.
+    /// `None` as long as no frame was to be placed by images.
     pub(super) registrar: Option<Registrar>,
+    /// Whether images place the frames; otherwise odometry and compass do.
+    pub(super) registers: bool,
     /// Mission time of the last frame that had a word in the cell, by the cell's x and y, seconds.
     pub(super) last_seen_s: BTreeMap<(i32, i32), f64>,
     refine_words_per_s: f64,
@@ -65,6 +67,9 @@ pub struct Mapper {
 /// The configured values that the operator's settings override.
 struct Configured {
     priors: [f64; 3],
+    registers: bool,
+    /// A registration that has placed no frame.
+    registrar: Registrar,
     refine_words_per_s: f64,
     frames_per_s: Option<f64>,
 }
@@ -74,9 +79,8 @@ fn every_frame_or(rate: f64) -> Option<f64> {
     (rate > 0.0).then_some(rate)
 }
 
-fn registrar(config: &Config) -> Option<Registrar> {
-    let registrar = || Registrar::new(config.navigation.drift_percent / 100.0).with_loops(config.registration.loops);
-    config.registration.enabled.then(registrar)
+fn registrar(config: &Config) -> Registrar {
+    Registrar::new(config.navigation.drift_percent / 100.0).with_loops(config.registration.loops)
 }
 
 impl Mapper {
@@ -116,12 +120,15 @@ impl Mapper {
                 .with_distance(f64::from(PATCH_PX) * config.camera.metres_per_pixel),
             shared: SharedExemplars::default(),
             relief: Relief::default(),
-            registrar: registrar(config),
+            registrar: config.registration.enabled.then(|| registrar(config)),
+            registers: config.registration.enabled,
             last_seen_s: BTreeMap::new(),
             refine_words_per_s: f64::from(config.scene.refine_words_per_s),
             frames_per_s: every_frame_or(config.scene.frames_per_s),
             configured: Configured {
                 priors: [config.scene.alpha, config.scene.beta, config.scene.gamma],
+                registers: config.registration.enabled,
+                registrar: registrar(config),
                 refine_words_per_s: f64::from(config.scene.refine_words_per_s),
                 frames_per_s: every_frame_or(config.scene.frames_per_s),
             },
@@ -140,6 +147,11 @@ impl Mapper {
             tracing::error!("the scene model keeps its priors: {e}");
         }
         self.refine_words_per_s = or(settings.refine_words_per_s, self.configured.refine_words_per_s);
+        let registration = settings.registration.value().map(|choice| choice == Registration::On);
+        self.registers = registration.unwrap_or(self.configured.registers);
+        if self.registers && self.registrar.is_none() {
+            self.registrar = Some(self.configured.registrar.clone());
+        }
         self.frames_per_s = settings.frames_per_s.value().map(ShortDecimal::value).or(self.configured.frames_per_s);
     }
 

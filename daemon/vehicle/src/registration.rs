@@ -22,7 +22,9 @@ pub struct RegisteredFrame {
 }
 
 impl Mapper {
-    /// Places a frame that was taken at `pose` by dead reckoning, compass and altitude; without registration, there.
+    /// Places a frame that was taken at `pose` by dead reckoning, compass and altitude. A vehicle that never registered
+    /// frames places it there; one on which registration was switched off continues from the last frame's place by
+    /// odometry and compass, so that the map does not jump.
     ///
     /// `scale` is the size of a pixel on the sea floor, divided by the configured size.
     pub fn register(&mut self, image: &RgbImage, pose: &Pose, scale: f64) -> RegisteredFrame {
@@ -32,7 +34,8 @@ impl Mapper {
         let image = CameraImage::rgb(image.width() as usize, image.height() as usize, image.as_raw());
         let (Some(registrar), Some(image)) = (&mut self.registrar, image) else { return unregistered };
         let input = FrameInput { image, metres_per_pixel, dead_reckoned, compass_rad: -pose.yaw_rad };
-        let placed = registrar.handle_frame(&input);
+        let placed =
+            if self.registers { registrar.handle_frame(&input) } else { registrar.handle_unmatched_frame(&input) };
         let (x, y) = placed.pose.at().xy();
         RegisteredFrame {
             pose: Pose { x, y, z: pose.z, yaw_rad: -placed.pose.heading_rad },
@@ -59,6 +62,7 @@ mod tests {
     use crate::Restored;
     use image::Rgb;
     use scenecast_config::Config;
+    use scenecast_protocol::directive::{Change, Registration, Settings};
 
     fn config(sets: &[&str]) -> Config {
         let sets: Vec<String> = sets.iter().map(|set| (*set).to_owned()).collect();
@@ -98,6 +102,33 @@ mod tests {
         }
         let Restored { mapper: mut restored, .. } = Mapper::restore(&config, None, &whole.save(1)).unwrap();
         (6..12).for_each(|i| assert_eq!(step(&mut restored, i), step(&mut whole, i)));
+    }
+
+    #[test]
+    fn an_order_switches_registration_off_without_a_jump_and_on_again() {
+        let mut mapper = Mapper::new(&config(&["navigation.drift_percent=5"]), None, 0, 1).unwrap();
+        let set = |mapper: &mut Mapper, registration| mapper.tune(&Settings { registration, ..Settings::default() });
+        let on = (0..6).map(|i| step(&mut mapper, i)).last().unwrap();
+        set(&mut mapper, Change::To(Registration::Off));
+        let off = step(&mut mapper, 6);
+        assert!(on.is_seen && !off.is_seen);
+        let moved = off.pose.y - on.pose.y;
+        assert!((0.46..=0.51).contains(&moved), "{moved} m by odometry, as it was learnt");
+        set(&mut mapper, Change::Configured);
+        let again = (7..10).map(|i| step(&mut mapper, i)).last().unwrap();
+        assert!(again.is_seen && (again.pose.y - 0.48 * 9.0).abs() < 0.06, "{again:?}");
+    }
+
+    #[test]
+    fn an_order_switches_registration_on_where_it_is_not_configured() {
+        let config = config(&["registration.enabled=false", "navigation.drift_percent=5"]);
+        let mut mapper = Mapper::new(&config, None, 0, 1).unwrap();
+        let before = step(&mut mapper, 0);
+        mapper.tune(&Settings { registration: Change::To(Registration::On), ..Settings::default() });
+        let last = (1..6).map(|i| step(&mut mapper, i)).last().unwrap();
+        assert!(!before.is_seen && last.is_seen, "{last:?}");
+        let restored = Mapper::restore(&config, None, &mapper.save(1)).unwrap().mapper;
+        assert_eq!(restored.registration(), mapper.registration(), "a checkpoint has it, whatever is configured");
     }
 
     #[test]

@@ -105,6 +105,33 @@ impl AtEnd {
     }
 }
 
+/// Whether the images of the camera place its frames on the map.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Registration {
+    /// Odometry and compass place them.
+    Off,
+    /// Their overlap with earlier frames places them too.
+    On,
+}
+
+impl Registration {
+    /// Every choice, in wire order.
+    pub const ALL: [Self; 2] = [Self::Off, Self::On];
+
+    /// Name in files and in the API.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Off => "off",
+            Self::On => "on",
+        }
+    }
+
+    /// The choice of that name.
+    pub fn from_name(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|choice| choice.name() == name)
+    }
+}
+
 /// The cells of the map that a vehicle sends. The cells of its scene model do not change.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum CellBand {

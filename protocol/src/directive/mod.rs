@@ -21,7 +21,7 @@ mod utility;
 
 pub use areas::{Areas, AreasFault, WeightedArea};
 pub use budget::Budget;
-pub use choices::{AtEnd, CellBand, Change, PlannerKind};
+pub use choices::{AtEnd, CellBand, Change, PlannerKind, Registration};
 pub use constraints::Constraints;
 pub use decision::{SlotReport, SlotState};
 pub use destination::Destination;
@@ -353,6 +353,7 @@ mod tests {
         let settings = Settings {
             planner: Change::To(PlannerKind::Greedy),
             at_end: Change::To(AtEnd::Hold),
+            registration: Change::To(Registration::Off),
             cells: Change::To(CellBand::CoarseToFine),
             layers: Change::To(LayerMask(u16::MAX)),
             alpha: figure,

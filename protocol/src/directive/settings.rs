@@ -1,6 +1,6 @@
-//! Settings of the vehicle: how it builds its map, which cells and layers it sends, and how it plans its path.
+//! Settings of the vehicle: how it places its frames and builds its map, which cells and layers it sends, and how it plans its path.
 
-use super::{AtEnd, CellBand, Change, PlannerKind, ShortDecimal};
+use super::{AtEnd, CellBand, Change, PlannerKind, Registration, ShortDecimal};
 use crate::bytes::{Reader, Truncated};
 use crate::map::{LayerId, LayerMask};
 use std::ops::RangeInclusive;
@@ -28,7 +28,10 @@ pub struct SettingsFault {
 ///       +---+---+---+---+---+---+---+---+
 /// then 2 bytes, a mask of layers, if layers is 3
 /// then 2 bytes, a [`ShortDecimal`], for each of a, b, g, r, f that is 1
-/// then 1 byte, the end of the survey, unless it stays
+/// then 1 byte, unless both stay:
+///       +-----------+-------+-----------+
+///       | 0   0   0 | reg.  | end       |
+///       +-----------+-------+-----------+
 /// ```
 /// * planner: 0 stays, 1 as configured, 2 lawnmower, 3 greedy, 4 horizon.
 /// * cells: 0 stays, 1 as configured, 2 fine, 3 coarse to fine, 4 coarse.
@@ -36,7 +39,8 @@ pub struct SettingsFault {
 ///   is layer 0; 3 only if the mask has other layers than these three.
 /// * a, b, g: alpha, beta, gamma of the scene model; r: words resampled a second of mission time; f: camera frames a
 ///   second that the scene model sees.
-/// * end of the survey: 1 as configured, 2 repeat, 3 explore, 4 hold ([`AtEnd`]).
+/// * end of the survey: 0 stays, 1 as configured, 2 repeat, 3 explore, 4 hold ([`AtEnd`]).
+/// * registration: 0 stays, 1 as configured, 2 off, 3 on ([`Registration`]).
 ///
 /// ```
 /// use scenecast_protocol::directive::{Change, PlannerKind, Settings, ShortDecimal};
@@ -53,6 +57,8 @@ pub struct Settings {
     pub planner: Change<PlannerKind>,
     /// What an adaptive survey does once no look pays any more.
     pub at_end: Change<AtEnd>,
+    /// Whether images place the frames of the camera.
+    pub registration: Change<Registration>,
     /// The cells of the map that it sends.
     pub cells: Change<CellBand>,
     /// The layers that it sends beside the labels.
@@ -90,6 +96,7 @@ impl Settings {
         Self {
             planner: self.planner.then(later.planner),
             at_end: self.at_end.then(later.at_end),
+            registration: self.registration.then(later.registration),
             cells: self.cells.then(later.cells),
             layers: self.layers.then(later.layers),
             alpha: self.alpha.then(later.alpha),
@@ -143,8 +150,9 @@ impl Settings {
             out.extend_from_slice(&mask.0.to_be_bytes());
         }
         out.append(&mut numbers);
-        if !matches!(self.at_end, Change::Keep) {
-            out.push(self.at_end.code(|choice| choice as u8));
+        let choices = self.registration.code(|choice| choice as u8) << 3 | self.at_end.code(|choice| choice as u8);
+        if choices != 0 {
+            out.push(choices);
         }
         out
     }
@@ -169,13 +177,10 @@ impl Settings {
         let mut figure = |bit: u8| if given & bit != 0 { ShortDecimal::decode(r) } else { Ok(Change::Keep) };
         let (alpha, beta, gamma) = (figure(0x10)?, figure(0x08)?, figure(0x04)?);
         let (refine_words_per_s, frames_per_s) = (figure(0x02)?, figure(0x01)?);
-        // The choice that stays is left out.
-        let at_end = match r.rest().is_empty() {
-            true => Change::Keep,
-            false => match r.u8()? {
-                0 => return Err(Truncated),
-                code => Change::from_code(code, |code| AtEnd::ALL.get(usize::from(code)).copied())?,
-            },
+        // Choices that both stay are left out.
+        let more = match r.rest().is_empty() {
+            true => 0,
+            false => r.u8().ok().filter(|&more| more != 0).ok_or(Truncated)?,
         };
         Ok(Self {
             alpha,
@@ -183,7 +188,8 @@ impl Settings {
             gamma,
             refine_words_per_s,
             frames_per_s,
-            at_end,
+            at_end: Change::from_code(more & 7, |code| AtEnd::ALL.get(usize::from(code)).copied())?,
+            registration: Change::from_code(more >> 3, |code| Registration::ALL.get(usize::from(code)).copied())?,
             planner: Change::from_code(choices >> 5, |code| PlannerKind::ALL.get(usize::from(code)).copied())?,
             cells: Change::from_code(choices >> 2 & 7, |code| CellBand::ALL.get(usize::from(code)).copied())?,
             layers,
@@ -220,14 +226,16 @@ mod tests {
         let choices = (
             change(proptest::sample::select(PlannerKind::ALL.to_vec())),
             change(proptest::sample::select(AtEnd::ALL.to_vec())),
+            change(proptest::sample::select(Registration::ALL.to_vec())),
             change(proptest::sample::select(CellBand::ALL.to_vec())),
             change(prop_oneof![0u16..8, any::<u16>()].prop_map(LayerMask)),
         );
         let figures = (change(figure()), change(figure()), change(figure()), change(figure()), change(figure()));
-        (choices, figures).prop_map(|((planner, at_end, cells, layers), (alpha, beta, gamma, refine, frames))| {
-            Settings {
+        (choices, figures).prop_map(
+            |((planner, at_end, registration, cells, layers), (alpha, beta, gamma, refine, frames))| Settings {
                 planner,
                 at_end,
+                registration,
                 cells,
                 layers,
                 alpha,
@@ -235,8 +243,8 @@ mod tests {
                 gamma,
                 refine_words_per_s: refine,
                 frames_per_s: frames,
-            }
-        })
+            },
+        )
     }
 
     #[test]
@@ -256,6 +264,15 @@ mod tests {
         assert_eq!(Settings::default().to_bytes(), [0, 0]);
         let of_end = |at_end| Settings { at_end, ..Settings::default() }.to_bytes();
         assert_eq!((of_end(Change::Configured), of_end(Change::To(AtEnd::Hold))), (vec![0, 0, 1], vec![0, 0, 4]));
+        let of_registration = |registration| Settings { registration, ..Settings::default() }.to_bytes();
+        assert_eq!(of_registration(Change::Configured), [0, 0, 8]);
+        assert_eq!(of_registration(Change::To(Registration::Off)), [0, 0, 0x10]);
+        let both = Settings {
+            at_end: Change::To(AtEnd::Repeat),
+            registration: Change::To(Registration::On),
+            ..Settings::default()
+        };
+        assert_eq!(both.to_bytes(), [0, 0, 0x1A]);
         let of_layers = |mask| Settings { layers: Change::To(LayerMask(mask)), ..Settings::default() }.to_bytes();
         assert_eq!(of_layers(0b100), [2, 0x20]);
         assert_eq!(
@@ -300,8 +317,12 @@ mod tests {
         ] {
             assert_eq!(Settings::from_bytes(bytes), None, "{bytes:02X?}");
         }
-        for end in [0, 5, 255] {
-            assert_eq!(Settings::from_bytes(&[0, 0, end]), None, "the end of the survey {end}");
+        for choices in [0, 5, 0x20, 0x25, 255] {
+            assert_eq!(
+                Settings::from_bytes(&[0, 0, choices]),
+                None,
+                "the end of the survey and registration {choices}"
+            );
         }
         assert_eq!(Settings::from_bytes(&[0, 0, 2, 2]), None);
     }

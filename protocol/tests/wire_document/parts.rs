@@ -5,8 +5,8 @@ use crate::samples::{MISSION, auv, clock, frame, header, hold, place, status, ve
 use scenecast_protocol::coordinates::{DecimetrePoint, MapPoint, WorldPoint};
 use scenecast_protocol::directive::{
     Areas, AtEnd, Band, Budget, CellBand, Change, Constraints, Destination, ExemplarRequest, ExemplarRequests, Fence,
-    Fix, InForceDigests, InForcePart, Limits, PlannerKind, Polygon, Reaction, Settings, ShortDecimal, Slot, SlotId,
-    Utility, VersionedSlot, WeightedArea,
+    Fix, InForceDigests, InForcePart, Limits, PlannerKind, Polygon, Reaction, Registration, Settings, ShortDecimal,
+    Slot, SlotId, Utility, VersionedSlot, WeightedArea,
 };
 use scenecast_protocol::map::{
     Cell, DescriptorPart, LabelGrid, LayerChunk, LayerDescriptor, LayerId, LayerMask, LayerSet,
@@ -308,6 +308,10 @@ fn settings_and_budgets() -> Rows {
         (
             "slot: version 2, settings: at the end of the survey hold",
             slot(2, Slot::Settings(Settings { at_end: Change::To(AtEnd::Hold), ..Settings::default() })),
+        ),
+        (
+            "slot: version 2, settings: registration off",
+            slot(2, Slot::Settings(Settings { registration: Change::To(Registration::Off), ..Settings::default() })),
         ),
     ]
 }

@@ -3,7 +3,7 @@
 const NUMBERS = {
   alpha: [1e-9, 1e3], beta: [1e-9, 1e3], gamma: [1e-12, 1e3], refine_words_per_s: [1, 1e8], frames_per_s: [0.01, 30],
 };
-const KEYS = ["planner", "at_end", "cells", "layers", ...Object.keys(NUMBERS)];
+const KEYS = ["planner", "at_end", "registration", "cells", "layers", ...Object.keys(NUMBERS)];
 const nothing = () => Object.fromEntries(KEYS.map((k) => [k, null]));
 const stated = (order) => Object.fromEntries(Object.entries(order).filter(([k, v]) => KEYS.includes(k) && v !== null));
 

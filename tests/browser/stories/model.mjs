@@ -52,6 +52,18 @@ export default [
     },
   },
   {
+    name: "registration is switched off and returns to the vehicle's default",
+    async run(s) {
+      await open(s);
+      for (const choice of ["off", ""]) {
+        await field(s, "registration").selectOption(choice);
+        await send(s).click();
+        await s.until("the message", () => sent(s).at(-1)?.registration === choice);
+        await s.until("the choice in force", async () => (await s.vehicle()).settings.in_force.registration === choice, { advance: 2 });
+      }
+    },
+  },
+  {
     name: "fit to budget fills the fields, names the trade-off, and sends no order",
     scenario: "rich",
     async run(s) {

@@ -65,6 +65,7 @@ fn merged(given: SettingsOrder, fitted: SettingsOrder) -> SettingsOrder {
     SettingsOrder {
         planner: given.planner.or(fitted.planner),
         at_end: given.at_end.or(fitted.at_end),
+        registration: given.registration.or(fitted.registration),
         cells: given.cells.or(fitted.cells),
         layers: given.layers.or(fitted.layers),
         alpha: given.alpha.or(fitted.alpha),
@@ -76,12 +77,13 @@ fn merged(given: SettingsOrder, fitted: SettingsOrder) -> SettingsOrder {
 }
 
 /// The name of each setting, and its value if the order has one.
-fn values(order: &SettingsOrder) -> [(&'static str, Option<String>); 9] {
+fn values(order: &SettingsOrder) -> [(&'static str, Option<String>); 10] {
     let text = |value: &Option<String>| value.as_ref().map(|v| if v.is_empty() { configured() } else { v.clone() });
     let number = |value: Option<f64>| value.map(|v| if v == 0.0 { configured() } else { v.to_string() });
     [
         ("planner", text(&order.planner)),
         ("at_end", text(&order.at_end)),
+        ("registration", text(&order.registration)),
         ("cells", text(&order.cells)),
         ("layers", text(&order.layers)),
         ("alpha", number(order.alpha)),

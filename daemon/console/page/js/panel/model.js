@@ -17,7 +17,8 @@ const NUMBERS = [
 ];
 const SIDE = 4;
 const CELLS = { fine: (m) => `all, ${m(1)}`, "coarse-to-fine": (m) => `${m(SIDE)} first, then ${m(1)}`, coarse: (m) => `every fourth, ${m(SIDE)}` };
-const KEYS = [...NUMBERS.map(([key]) => key), "cells", "layers"];
+const REGISTRATION = { on: "on: by their overlap", off: "off: by odometry and compass" };
+const KEYS = [...NUMBERS.map(([key]) => key), "cells", "layers", "registration"];
 const MAX_BPS = 1e7;
 const UNCHANGED = "unchanged";
 const DEFAULT = "the vehicle's default";
@@ -34,7 +35,7 @@ export function numberFault(value, low, high) {
 }
 
 const foot = orderFoot(order, "Settings", "send-settings");
-const lines = [...NUMBERS.map(numberLine), choiceLine("cells", "Cells sent", "Cells of the vehicle's map that it sends; the cells of its scene model do not change"), choiceLine("layers", "Layers sent", "Layers that the vehicle sends in addition to the labels")];
+const lines = [...NUMBERS.map(numberLine), choiceLine("cells", "Cells sent", "Cells of the vehicle's map that it sends; the cells of its scene model do not change"), choiceLine("layers", "Layers sent", "Layers that the vehicle sends in addition to the labels"), choiceLine("registration", "Frames placed", "Whether the overlap of camera frames with earlier ones places them on the map; switch it off where the map bends")];
 const limit = h("input", { type: "number", id: "fit-bps", min: 1, max: MAX_BPS, step: "any", oninput: () => forget(), onkeydown: (event) => event.key === "Enter" && pick() });
 const fit = h("button", { type: "button", id: "fit", onclick: pick }, "Fit to budget");
 const fitted = h("p.note", { id: "fitted", role: "status" });
@@ -111,7 +112,11 @@ function choiceLine(key, name, hint) {
   const node = h("div.limit", { title: hint }, h("label.caption", { for: pick.id }, name), pick, force);
   const update = (value) => {
     const size = (cells) => metres(cells * store.vehicle.map.cell_m, 2);
-    const choices = key === "cells" ? Object.entries(CELLS).map(([v, of]) => [v, of(size)]) : layerSets(value).map((v) => [v, layersText(v)]);
+    const choices = {
+      cells: () => Object.entries(CELLS).map(([v, of]) => [v, of(size)]),
+      layers: () => layerSets(value).map((v) => [v, layersText(v)]),
+      registration: () => Object.entries(REGISTRATION),
+    }[key]();
     const options = [["-", UNCHANGED], ["", DEFAULT], ...choices];
     if (pick.dataset.key !== options.join()) {
       pick.dataset.key = options.join();

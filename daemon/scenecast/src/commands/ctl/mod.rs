@@ -227,6 +227,9 @@ struct SettingsArgs {
     /// configured
     #[arg(long, value_name = "NAME")]
     at_end: Option<String>,
+    /// Whether images place the frames of the camera on the map: on, off (odometry and compass alone); "": as configured
+    #[arg(long, value_name = "ON|OFF")]
+    registration: Option<String>,
     /// Use the most informative settings whose stream fits a budget [default: the map's share of the
     /// vehicle's budget]. The options above have precedence
     #[arg(long, value_name = "BIT/S", num_args = 0..=1, allow_negative_numbers = true)]
@@ -241,6 +244,7 @@ impl SettingsArgs {
         let order = SettingsOrder {
             planner: self.planner,
             at_end: self.at_end,
+            registration: self.registration,
             cells: self.cells,
             layers: self.layers,
             alpha: self.alpha,
