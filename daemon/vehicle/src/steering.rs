@@ -69,6 +69,7 @@ pub struct Steering {
     /// The origin of the map frame in the world frame: metres east and north.
     map_origin: Point,
     plan: VecDeque<Node>,
+    track: LatticeTrack,
     views: Views,
     /// The version of the map for which the plan was made.
     planned_for: u64,
@@ -76,6 +77,21 @@ pub struct Steering {
     intent: Option<Intent>,
     /// An adaptive plan found nothing that pays.
     is_complete: bool,
+}
+
+/// The last two places of the lattice that the vehicle was at.
+#[derive(Debug, Default)]
+struct LatticeTrack {
+    here: Option<Node>,
+    before: Option<Node>,
+}
+
+impl LatticeTrack {
+    fn handle_place(&mut self, at: Node) {
+        if self.here != Some(at) {
+            self.before = self.here.replace(at);
+        }
+    }
 }
 
 /// The weight of unseen cells, in hundredths, once no look at a label pays any more.
@@ -99,6 +115,7 @@ impl Steering {
             known: Knowledge::default(),
             map_origin: (0.0, 0.0),
             plan: VecDeque::new(),
+            track: LatticeTrack::default(),
             views: Views::default(),
             planned_for: 0,
             intent: None,
@@ -144,6 +161,7 @@ impl Steering {
     pub fn set_fence(&mut self, fence: &Fence) {
         let before = self.grounds.set_fence(fence);
         self.choice.planner_mut().handle_change(&before);
+        self.track = LatticeTrack::default();
         self.replan();
     }
 
@@ -208,6 +226,7 @@ impl Steering {
         let left_m = left_m - self.grounds.last_leg_m();
         let Some(at) = self.grounds.entry(from) else { return Course::NoPath };
         let approach = distance(from, self.grounds.lattice().place(at));
+        self.track.handle_place(at);
         let adapts = self.choice.adapts();
         let changed = adapts && self.planned_for != map.1;
         if self.plan.front() == Some(&at) {
@@ -287,7 +306,7 @@ impl Steering {
             if !adapts {
                 return (plan, None);
             }
-            let margin = if self.known.repeats() { worth::MARGIN_IN_ROUNDS } else { self.choice.planner().margin() };
+            let margin = worth::margin(&plan, self.track.before, self.known.repeats());
             let plan = if worth::keeps(&request, present, &plan, margin) { present.to_vec() } else { plan };
             if worth::pays(&request, &plan, interest, (lattice.step_m() / self.window.cell_m).powi(2)) {
                 let intent = purpose::purpose(interest, |part| worth::gain(&value(part), &plan));

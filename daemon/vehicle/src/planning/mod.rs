@@ -57,13 +57,6 @@ pub trait Planner: std::fmt::Debug + Send {
         Vec::new()
     }
 
-    /// The gain a metre of a new plan, divided by that of the present one, from which the new one replaces it. A planner
-    /// that takes the nearest of two far goals of like value needs a margin: each step changes the map, and the vehicle
-    /// would go to and fro.
-    fn margin(&self) -> f64 {
-        1.15
-    }
-
     /// The lattice has changed, and with it the numbers of the places. `before` is the last one.
     fn handle_change(&mut self, _before: &Lattice) {}
 }
