@@ -138,6 +138,8 @@ pub struct MissionInfo {
     pub speed: f64,
     /// Whether the survey has ended.
     pub ended: bool,
+    /// Mission time at which it ended, seconds; null before.
+    pub ended_s: Option<f64>,
     /// The place of x = y = 0 on the Earth; null while it is unknown.
     pub origin: Option<Origin>,
 }

@@ -148,10 +148,10 @@ impl Demo {
         let began = std::time::Instant::now();
         while self.mission.now() < until && began.elapsed() < MAX_STEP {
             let next = until.min(self.mission.now() + STRIDE);
-            if next >= end && !self.facts.ended {
+            if next >= end && self.facts.ended_s.is_none() {
                 self.mission.advance(end)?;
                 self.mission.end_survey();
-                self.facts.ended = true;
+                self.facts.ended_s = Some(end.as_secs_f64());
             }
             self.mission.advance(next)?;
         }

@@ -82,11 +82,15 @@ impl Surface {
         if self.watches.entry(vehicle).or_default().handle_mode(mode, reason) {
             let text = match (mode, reason.name()) {
                 (_, Some(reason)) => format!("{}: {reason}", name_of_mode(mode)),
-                (VehicleMode::Hold, None) => "holding: nothing left to survey".to_owned(),
+                (VehicleMode::Hold, None) => format!("holding: {}", self.end_of_survey(vehicle)),
                 (_, None) => name_of_mode(mode).to_owned(),
             };
             self.log_fact(vehicle, LogKind::Mode, &text, now);
         }
+    }
+
+    fn end_of_survey(&self, vehicle: Address) -> &'static str {
+        self.records.get(&vehicle).map_or("the survey is complete", VehicleRecord::end_of_survey)
     }
 
     /// The labels on the map of a vehicle are these.

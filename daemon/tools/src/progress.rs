@@ -1,7 +1,7 @@
 //! Progress of long work, on the standard error output.
 
 use clap::ValueEnum;
-use indicatif::{ProgressBar, ProgressStyle};
+use indicatif::{FormattedDuration, ProgressBar, ProgressState, ProgressStyle};
 use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use std::thread::JoinHandle;
@@ -40,7 +40,7 @@ enum Shown {
 /// Steps of a bar.
 const STEPS: u64 = 1000;
 /// The task, the bar, the share of the work, the time since the start and the time that is left.
-const TEMPLATE: &str = "{prefix} {wide_bar} {percent:>3} %  {elapsed_precise} gone, {eta_precise} left";
+const TEMPLATE: &str = "{prefix} {wide_bar} {percent:>3} %  {elapsed_precise} gone{left}";
 
 impl Progress {
     /// Shows that `task` begins.
@@ -74,6 +74,12 @@ impl Drop for Progress {
 /// A bar; it is hidden where the standard error output is no terminal.
 fn bar(task: &'static str) -> ProgressBar {
     let style = ProgressStyle::with_template(TEMPLATE).unwrap_or_else(|_| ProgressStyle::default_bar());
+    let style = style.with_key("left", |state: &ProgressState, out: &mut dyn std::fmt::Write| {
+        // Before the first step nothing is known; a text that cannot be written is left out.
+        if state.pos() > 0 {
+            let _ = write!(out, ", {} left", FormattedDuration(state.eta()));
+        }
+    });
     let bar = ProgressBar::new(STEPS).with_style(style.progress_chars("=> ")).with_prefix(task);
     bar.enable_steady_tick(Duration::from_secs(1));
     bar

@@ -204,7 +204,8 @@ impl Steering {
         }
     }
 
-    /// What is left to gain around a place, in the map frame, does not keep the vehicle there.
+    /// What is left to gain around a place, in the map frame, does not keep the vehicle there. This includes cells that it
+    /// has not seen: from where it stops, up to half a metre short of its waypoints, it cannot see them.
     fn exhaust_around(&mut self, at: Point) {
         let metres = self.grounds.reach_m() + self.grounds.lattice().step_m() + self.window.cell_m / 2.0;
         for cell in self.window.cells_around(at, metres) {
@@ -310,6 +311,13 @@ impl Steering {
             let plan = if worth::keeps(&request, present, &plan, margin) { present.to_vec() } else { plan };
             if worth::pays(&request, &plan, interest, (lattice.step_m() / self.window.cell_m).powi(2)) {
                 let intent = purpose::purpose(interest, |part| worth::gain(&value(part), &plan));
+                let intent = intent.map(|intent| {
+                    purpose::after_looks(intent, interest, |part| {
+                        let window = (&self.window, self.map_origin);
+                        let seen = BlockValues::of_seen(lattice, window, map, &self.known, part);
+                        [worth::gain(&seen, &plan), worth::gain(&value(part), &plan)]
+                    })
+                });
                 return (plan, intent);
             }
         }

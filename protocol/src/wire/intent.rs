@@ -6,8 +6,9 @@ use super::status::StatusError;
 ///
 /// ```text
 /// byte  bits  field   range
-///  0    8     kind    0 unseen floor, 1 curiosity, 2 label, 3 destination, 4 weighted area
-///  1    8     number  of the label, 1..254, after kind 2; of the area, 1..4, after kind 4
+///  0    8     kind    0 unseen floor, 1 curiosity, 2 label, 3 destination, 4 weighted area,
+///                     5 label that was seen before
+///  1    8     number  of the label, 1..254, after kinds 2 and 5; of the area, 1..4, after kind 4
 /// ```
 ///
 /// Source: vehicle, in the frame of a pose and before it, while it surveys by an adaptive planner or goes to a destination.
@@ -19,6 +20,8 @@ pub enum Intent {
     Curiosity,
     /// More of a label, where it is seen or expected.
     Label(u8),
+    /// Another look at a label, where it was seen before.
+    LabelAgain(u8),
     /// The place to which the operator has ordered the vehicle.
     Destination,
     /// The weighted area with this number, from 1.
@@ -34,6 +37,7 @@ impl Intent {
             Self::Label(label) => vec![2, label],
             Self::Destination => vec![3],
             Self::Area(number) => vec![4, number],
+            Self::LabelAgain(label) => vec![5, label],
         }
     }
 
@@ -45,7 +49,8 @@ impl Intent {
             [2, label @ 1..=254] => Ok(Self::Label(label)),
             [3] => Ok(Self::Destination),
             [4, number @ 1..=4] => Ok(Self::Area(number)),
-            [0..=4] | [] | [_, _, ..] => Err(StatusError::Length),
+            [5, label @ 1..=254] => Ok(Self::LabelAgain(label)),
+            [0..=5] | [] | [_, _, ..] => Err(StatusError::Length),
             [_] => Err(StatusError::BadField),
         }
     }
@@ -64,11 +69,27 @@ mod tests {
             (Intent::Label(254), &[2, 254]),
             (Intent::Destination, &[3]),
             (Intent::Area(4), &[4, 4]),
+            (Intent::LabelAgain(7), &[5, 7]),
         ] {
             assert_eq!(intent.encode(), bytes);
             assert_eq!(Intent::decode(bytes), Ok(intent));
         }
-        for bytes in [&[][..], &[2], &[4], &[5], &[0, 0], &[3, 0], &[4, 0], &[4, 5], &[2, 0], &[2, 255], &[2, 1, 0]] {
+        for bytes in [
+            &[][..],
+            &[2],
+            &[4],
+            &[5],
+            &[6],
+            &[5, 0],
+            &[5, 255],
+            &[0, 0],
+            &[3, 0],
+            &[4, 0],
+            &[4, 5],
+            &[2, 0],
+            &[2, 255],
+            &[2, 1, 0],
+        ] {
             assert!(Intent::decode(bytes).is_err(), "{bytes:?}");
         }
     }

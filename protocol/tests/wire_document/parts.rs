@@ -153,6 +153,7 @@ fn status_chunks() -> Rows {
             VehicleStatus { autopilot_silent: true, ..status() }.encode_pose(99),
         ),
         ("intent: more of label 5", Intent::Label(5).encode()),
+        ("intent: another look at label 7", Intent::LabelAgain(7).encode()),
         ("intent: the destination", Intent::Destination.encode()),
         ("intent: the second weighted area", Intent::Area(2).encode()),
         ("trail to (1, -2) m: 9 s ago at (2.4, -3.4), 12 s ago at (-0.6, -3.4)", trail.encode()),

@@ -109,7 +109,7 @@ export class Mission {
   json() {
     return {
       now_s: this.nowS,
-      mission: { name: this.name, id: `mock-${this.name}`, speed: this.speed, ended: this.ended },
+      mission: { name: this.name, id: `mock-${this.name}`, speed: this.speed, ended: this.ended, ended_s: this.ended ? this.nowS : null },
       vehicles: this.vehicles.map((v) => v.json(this.nowS)),
       position: this.position ?? null,
       storage: this.storage ?? null,

@@ -46,6 +46,7 @@ function keep() {
  * or settings. */
 export function denial(kind) {
   if (!me) return null;
+  if (kind !== "record" && store.snapshot?.mission.ended) return "The mission has ended: the vehicle takes no more orders.";
   const least = kind === "settings" ? "administrator" : "operator";
   if (rank(me.role) < rank(least)) return `This needs the role ${least}; yours is ${me.role}.`;
   if (["stop", "record"].includes(kind) || holder() === null || hasCommand()) return null;

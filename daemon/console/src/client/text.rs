@@ -38,6 +38,9 @@ fn vehicle(out: &mut String, v: &VehicleState, state: &MissionState) {
         let place = format!("E {:.1} m  N {:.1} m  up {:.1} m  heading {:03.0}", p.x_m, p.y_m, p.z_m, p.heading_deg);
         let age = span(now - s.at_s);
         let _ = writeln!(out, "  {:<10} {place}  +-{:.1} m, reported {age} ago", mode(s.mode), p.sigma_m);
+        if !s.activity.is_empty() {
+            let _ = writeln!(out, "  activity   {}", s.activity);
+        }
         if let Some(path) = path(s) {
             let _ = writeln!(out, "  path       {path}");
         }

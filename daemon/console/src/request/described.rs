@@ -34,7 +34,7 @@ pub(super) fn describe(request: &SurfaceRequest) -> Option<(Option<Address>, Log
         }
         R::Limits(id, limits) => order(*id, format!("limits: {}", members(limits))),
         R::Areas(id, areas) => {
-            let weights: Vec<String> = areas.areas.iter().map(|area| format!("{:+.2}", area.weight)).collect();
+            let weights: Vec<String> = areas.areas.iter().map(|area| place(&area.outline, area.weight)).collect();
             order(*id, if weights.is_empty() { "no areas".into() } else { format!("areas: {}", weights.join(", ")) })
         }
         R::Destination(id, to) => order(
@@ -43,10 +43,7 @@ pub(super) fn describe(request: &SurfaceRequest) -> Option<(Option<Address>, Log
         ),
         R::Settings(id, settings) => order(*id, format!("settings: {}", members(settings))),
         R::Budget(budget) => (None, LogKind::Order, format!("budget: {} bit/s", budget.budget_bps)),
-        R::Label(id, LabelOrder { label, name, .. }) => {
-            let name = name.as_ref().map_or("its colour or its merging".to_owned(), |name| format!("name {name}"));
-            record(*id, format!("label {label}: {name}"))
-        }
+        R::Label(id, order) => record(*id, label(order)),
         R::Note(id, _, note) => record(*id, format!("note: {}", note.text.trim())),
         R::Marker(id, _, marker) => {
             record(*id, format!("marker at E {:.1} N {:.1} m: {}", marker.x_m, marker.y_m, marker.text.trim()))
@@ -54,6 +51,21 @@ pub(super) fn describe(request: &SurfaceRequest) -> Option<(Option<Address>, Log
         R::RemoveMarker(id, marker) => record(*id, format!("marker {} removed", marker.number)),
         R::DismissEarlierMap(id) => record(*id, "the earlier map is out of view".into()),
     })
+}
+
+/// The name, the colour and the merging of a label, as an edit leaves them.
+fn label(order: &LabelOrder) -> String {
+    let name = order.name.as_ref().map_or("no name".to_owned(), |name| format!("name {name}"));
+    let colour = order.colour.as_ref().map(|colour| format!("colour {colour}"));
+    let merged = order.merged_into.map(|into| format!("merged into label {into}"));
+    let all: Vec<String> = [Some(name), colour, merged].into_iter().flatten().collect();
+    format!("label {}: {}", order.label, all.join(", "))
+}
+
+/// The weight of an area and the middle of its corners.
+fn place(outline: &[[f64; 2]], weight: f64) -> String {
+    let middle = |axis: usize| outline.iter().map(|corner| corner[axis]).sum::<f64>() / outline.len().max(1) as f64;
+    format!("{weight:+.2} around E {:.1} N {:.1} m", middle(0), middle(1))
 }
 
 fn utility(weights: &BTreeMap<u8, f64>, (exploration, curiosity): (f64, f64)) -> String {
@@ -69,7 +81,7 @@ fn utility(weights: &BTreeMap<u8, f64>, (exploration, curiosity): (f64, f64)) ->
 fn members(order: &impl serde::Serialize) -> String {
     let value = serde_json::to_value(order).unwrap_or_default();
     let stated = value.as_object().into_iter().flatten().filter(|(_, value)| !value.is_null());
-    let stated: Vec<String> = stated.map(|(name, value)| format!("{name} {value}")).collect();
+    let stated: Vec<String> = stated.map(|(name, value)| format!("{} {value}", name.replace('_', " "))).collect();
     if stated.is_empty() { "none".to_owned() } else { stated.join(", ").replace('"', "") }
 }
 
@@ -86,7 +98,7 @@ mod tests {
         let limits = LimitsOrder { time_s: Some(600.0), on_silence: Some("hold".into()), ..LimitsOrder::default() };
         assert_eq!(
             text(SurfaceRequest::Limits(1, limits)),
-            Some(("order", "limits: on_silence hold, time_s 600.0".into()))
+            Some(("order", "limits: on silence hold, time s 600.0".into()))
         );
         let to = DestinationOrder { place: Some([1.0, -2.5]) };
         assert_eq!(text(SurfaceRequest::Destination(1, to)), Some(("order", "destination: E 1.0 N -2.5 m".into())));

@@ -17,8 +17,8 @@ pub struct MissionFacts {
     pub run: String,
     /// Seconds of mission time for each second of the clock.
     pub speed: f64,
-    /// Whether the survey has ended.
-    pub ended: bool,
+    /// Mission time at which the survey ended, seconds.
+    pub ended_s: Option<f64>,
     /// Width of a cell, metres.
     pub cell_m: f64,
     /// Longest pause between two turns of an idle link, seconds.
@@ -42,7 +42,7 @@ impl MissionFacts {
             name: config.mission.name.clone(),
             run: format!("{:08x}", run as u32),
             speed,
-            ended: false,
+            ended_s: None,
             cell_m: config::cell_m(config),
             idle_s: config.link.max_idle_s,
             first_interval_s: config.link.max_idle_s + config.link.max_turn_s,

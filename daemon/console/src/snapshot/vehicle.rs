@@ -204,7 +204,7 @@ fn activity(s: &VehicleStatus, record: &VehicleRecord) -> String {
         VehicleMode::Done => "done",
     };
     if s.has_arrived() {
-        return format!("{mode}: nothing left to survey");
+        return format!("{mode}: {}", record.end_of_survey());
     }
     if let Some(intent) = s.intent {
         return format!("{mode}: {}", purpose(intent, record));
@@ -213,15 +213,17 @@ fn activity(s: &VehicleStatus, record: &VehicleRecord) -> String {
 }
 
 fn purpose(intent: Intent, record: &VehicleRecord) -> String {
+    let name = |label| {
+        let name = record.label_book(label).and_then(|book| book.name.clone());
+        name.unwrap_or_else(|| format!("label {label}"))
+    };
     match intent {
         Intent::Unseen => "looking at unseen floor".to_owned(),
         Intent::Curiosity => "looking at unusual places".to_owned(),
         Intent::Destination => "going to the destination".to_owned(),
         Intent::Area(number) => format!("looking at weighted area {number}"),
-        Intent::Label(label) => {
-            let name = record.label_book(label).and_then(|book| book.name.clone());
-            format!("looking for {}", name.unwrap_or_else(|| format!("label {label}")))
-        }
+        Intent::Label(label) => format!("looking for {}", name(label)),
+        Intent::LabelAgain(label) => format!("revisiting {}", name(label)),
     }
 }
 

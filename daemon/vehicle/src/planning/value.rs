@@ -32,11 +32,9 @@ impl Knowledge {
         }
     }
 
-    /// No further look at a cell that was seen pays, until the looks at it are forgotten.
+    /// No further look at a cell pays, until the looks at it are forgotten.
     pub fn exhaust(&mut self, cell: Cell) {
-        if self.parts.get(cell) != 0 {
-            self.looks.set(cell, u8::MAX);
-        }
+        self.looks.set(cell, u8::MAX);
     }
 
     /// Forgets the looks at the favoured cells and begins a round of further looks; returns whether there are any.
@@ -65,10 +63,9 @@ impl Knowledge {
 /// Parts of a step of the lattice in which the track is counted.
 const PARTS_PER_STEP: u8 = 4;
 
-/// The value of a repeated look at a cell, divided by the value of the look before: while there is floor that was not seen,
-/// and in the rounds after that, in which more looks at dense places are better than a first one at each sparse place.
-const REPEATED_LOOK: f32 = 0.4;
-const REPEATED_LOOK_IN_ROUNDS: f32 = 0.7;
+/// The value of a repeated look at a cell, divided by the value of the look before. More looks at dense places are better than
+/// a first one at each sparse place.
+const REPEATED_LOOK: f32 = 0.7;
 
 /// The value of the next look at each block, the square between four places of a lattice. A place shows
 /// the four blocks around it.
@@ -92,12 +89,28 @@ impl BlockValues {
         known: &Knowledge,
         interest: Interest<'_>,
     ) -> Self {
+        Self::of_cells(lattice, (window, map_origin), &window.cell_values(map_origin, map, known, interest))
+    }
+
+    /// The part of the same values that seen cells have: another look at them.
+    pub fn of_seen(
+        lattice: &Lattice,
+        (window, map_origin): (&CellWindow, Point),
+        map: &LabelGrid,
+        known: &Knowledge,
+        interest: Interest<'_>,
+    ) -> Self {
+        let mut cells = window.cell_values(map_origin, map, known, interest);
+        cells.iter_mut().zip(window.copy(map)).filter(|(_, label)| *label == 0).for_each(|(value, _)| *value = 0.0);
+        Self::of_cells(lattice, (window, map_origin), &cells)
+    }
+
+    fn of_cells(lattice: &Lattice, (window, map_origin): (&CellWindow, Point), cells: &[f32]) -> Self {
         let (places, rows) = lattice.size();
         let columns = places + 1;
         let mut values = Self { columns, blocks: vec![0.0; columns * (rows + 1)] };
         let (south_west, step) = (lattice.place(0), lattice.step_m());
         let block = |at: f64, origin: f64| ((at - origin) / step).floor() as i64 + 1;
-        let cells = window.cell_values(map_origin, map, known, interest);
         for (row, line) in (0..).zip(cells.chunks(window.width.max(1))) {
             let y = block(window.centre(row, window.y) + map_origin.1, south_west.1);
             if !(0..=rows as i64).contains(&y) {
@@ -192,8 +205,7 @@ impl CellWindow {
             self.add_areas(&mut values, map_origin, interest);
         }
         let looks = self.copy(&known.looks);
-        let repeated = if known.repeats { REPEATED_LOOK_IN_ROUNDS } else { REPEATED_LOOK };
-        values.iter_mut().zip(&looks).for_each(|(w, &n)| *w *= repeated.powi(i32::from(n)));
+        values.iter_mut().zip(&looks).for_each(|(w, &n)| *w *= REPEATED_LOOK.powi(i32::from(n)));
         values
     }
 }

@@ -18,6 +18,17 @@ pub(super) fn purpose(interest: Interest<'_>, gain: impl Fn(Interest<'_>) -> f64
     (gains[best] > 0.0).then(|| parts.swap_remove(best).0)
 }
 
+/// The purpose in words of the looks so far: a label is revisited if more than half of what it gains along the plan is on
+/// seen floor. `gains` returns the gain of a part of the interest on seen floor, and in all.
+pub(super) fn after_looks(intent: Intent, interest: Interest<'_>, gains: impl Fn(Interest<'_>) -> [f64; 2]) -> Intent {
+    let Intent::Label(label) = intent else { return intent };
+    let Some((_, utility, areas)) = parts(interest).into_iter().find(|(part, ..)| *part == intent) else {
+        return intent;
+    };
+    let [seen, all] = gains(Interest { utility: &utility, areas });
+    if seen > 0.5 * all { Intent::LabelAgain(label) } else { intent }
+}
+
 /// The parts with a positive weight, each as an interest of its own.
 fn parts<'a>(Interest { utility, areas }: Interest<'a>) -> Vec<(Intent, Utility, &'a [WeightedArea])> {
     const NOWHERE: &[WeightedArea] = &[];
@@ -62,6 +73,9 @@ mod tests {
         let areas = [-50, 60].map(|weight| WeightedArea { outline: Polygon::default(), weight });
         let in_places = Interest { areas: &areas, ..in_labels };
         assert_eq!(purpose(in_places, weigh([1.0, 1.0, 1.0, 9.0])), Some(Intent::Area(2)));
+        let again = |seen| after_looks(Intent::Label(3), in_labels, |_| [seen, 1.0]);
+        assert_eq!((again(0.4), again(0.6)), (Intent::Label(3), Intent::LabelAgain(3)));
+        assert_eq!(after_looks(Intent::Unseen, in_labels, |_| [1.0, 1.0]), Intent::Unseen);
         let only = Utility { curiosity: 5, ..Utility::default() };
         let unreachable = |_: Interest<'_>| unreachable!("one part needs no gain");
         assert_eq!(purpose(Interest::in_labels(&only), unreachable), Some(Intent::Curiosity));

@@ -6,7 +6,7 @@ use crate::planning::{Point, distance};
 const MIN_ROUND: f64 = 12.0;
 
 /// A track of this length within a circle is a turn on the spot, in steps of the lattice.
-const SPOT_TRACK: f64 = 5.0;
+const SPOT_TRACK: f64 = 4.0;
 /// The radius of the circle, in steps of the lattice: all eight neighbours of a place lie in it.
 const SPOT_RADIUS: f64 = 1.5;
 

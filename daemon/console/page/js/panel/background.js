@@ -4,7 +4,9 @@ import { h, show, text } from "../dom.js";
 import { store } from "../store.js";
 
 const NAMES = { finer: "finer cells, while the map is coarse", exemplars: "images of new labels" };
-const nameOf = (stream) => NAMES[stream] ?? stream;
+const HELP = { finer: "Cells between the coarse ones", exemplars: "Images that nobody has requested, one for each new label" };
+const nameOf = (stream) => NAMES[stream] ?? `layer ${stream.replaceAll("_", " ")}`;
+const helpOf = (stream) => `${HELP[stream] ?? "Values of this layer of the map"}, sent while nothing else waits`;
 /** Every stream: two of the page, and the layers that the surface lists. */
 const streams = () => [...Object.keys(NAMES), ...(store.snapshot?.layers.map((l) => l.name) ?? [])];
 
@@ -36,7 +38,7 @@ export function backgroundBox(value, change) {
     const toggle = () => change(place === null ? [...value(), kind] : value().filter((k) => k !== kind));
     const button = (act, name, sign, onclick, off) => h("button", { type: "button", title: name, "aria-label": `${name}: ${nameOf(kind)}`, data: { act: `${act}-${kind}` }, disabled: off, onclick }, sign);
     const box = h("input", { type: "checkbox", checked: place !== null, "aria-label": nameOf(kind), data: { act: `use-${kind}` }, onchange: toggle });
-    const name = h("span", {});
+    const name = h("span", { title: helpOf(kind) });
     text(name, nameOf(kind));
     const last = value().length - 1;
     return h("li", { data: { stream: kind } }, h("label", {}, box, name),

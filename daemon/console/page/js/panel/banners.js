@@ -128,7 +128,7 @@ export function contact(v) {
 }
 
 function ended() {
-  return { key: "ended", kind: "info", head: "The mission has ended", body: `at ${missionTime(store.nowS)}. The map is final.` };
+  return { key: "ended", kind: "info", head: "The mission has ended", body: `at ${missionTime(store.snapshot.mission.ended_s)}. The map is final, and the vehicle takes no more orders.` };
 }
 
 function requested({ name, at_s: at }) {

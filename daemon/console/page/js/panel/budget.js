@@ -49,7 +49,7 @@ let timer = 0;
 
 bar.append(...CLASSES.flatMap((c) => [rows[c].segment, rows[c].handle]), free);
 const form = h("form.budget", { onsubmit: submit, onkeydown: (event) => event.key === "Escape" && forget() },
-  h("label", { for: "budget" }, "Budget, bit/s"), number, h("button", { type: "submit" }, "Set"));
+  h("label", { for: "budget", title: "Bits a second that the vehicle may transmit on the mean; the modem is silent for the rest of the time" }, "Budget, bit/s"), number, h("button", { type: "submit" }, "Set"));
 export const budgetParts = [form, slider, shareBox, streams.node, deniedLine, errorLine, replaced.node, status.node];
 
 function shareRow(name, i) {

@@ -10,4 +10,4 @@ const HELP = {
 };
 
 /** A class that is none of these is a layer of the map. */
-export const classHelp = (name) => HELP[name] ?? `Values of the layer ${name}`;
+export const classHelp = (name) => HELP[name] ?? `Values of the map's layer ${name.replaceAll("_", " ")}`;

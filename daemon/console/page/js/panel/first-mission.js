@@ -15,6 +15,12 @@ const hasWeight = (v) => shownLabels(v).some((l) => weightsOrder.value(v, l.id) 
 const utility = (v) => slotOf(v, "utility");
 const isInForce = (v) => utility(v)?.state === "applied";
 
+/** What to expect after an order of weights. A vehicle without a plan holds because the weighed labels are done. */
+function steerInstruction(v) {
+  if (!isInForce(v) || v.status?.mode !== "hold") return "The vehicle plans its path by your weights. Its next report shows the plan as a dashed line.";
+  return "The vehicle holds, because no further look at the weighed labels pays. Weigh another label, or weigh unseen floor.";
+}
+
 /** A label without an image has the button Request; the others have an image, because spare capacity brings them. */
 const requestable = (v) => shownLabels(v).some((l) => l.exemplar.url === null && ["none", "refused"].includes(l.exemplar.state));
 
@@ -36,11 +42,20 @@ const STEPS = [
     (v) => shownLabels(v).some((l) => hasName(l.id))],
   ["Weigh", "Move the slider of a label that you want to see more of to the right, then press Send below the list.",
     (v) => isInForce(v) && hasWeight(v)],
-  ["Steer", "The vehicle plans its path by your weights. Its next report shows the plan as a dashed line.",
+  ["Steer", steerInstruction,
     (v) => isInForce(v) && Boolean(v.status?.waypoint) && v.status.at_s > utility(v).changed_s],
   ["Picture", pictureInstruction,
     (v) => v.labels.some((l) => l.exemplar.images.some((image) => image.requested))],
 ];
+
+/** The steps that were done, for each vehicle: a step that was done once stays done. */
+const reached = new Map();
+
+function doneSteps(v) {
+  const done = reached.get(v.id) ?? STEPS.map(() => false);
+  reached.set(v.id, done.map((was, i) => was || STEPS[i][2](v)));
+  return reached.get(v.id);
+}
 
 const lines = STEPS.map(([name, instruction]) => {
   const [words, state] = [h("span"), h("span.unseen")];
@@ -68,7 +83,7 @@ function update() {
   const v = store.vehicle;
   show(card, Boolean(v) && denial("order") === null);
   if (!v) return;
-  const done = STEPS.map(([, , isDone]) => isDone(v));
+  const done = doneSteps(v);
   const next = done.indexOf(false);
   text(summary, next < 0 ? "First mission: all five steps are done" : `First mission, step ${next + 1} of 5: ${STEPS[next][0].toLowerCase()}`);
   lines.forEach(({ node, state, refresh }, i) => {

@@ -14,9 +14,9 @@ const latest = new WeakMap();
 export function makeRow(label) {
   const of = () => latest.get(node);
   const chip = h("button.chip", { type: "button", title: "Show only this label on the map; press again for all labels", onclick: () => highlight(label.id) });
-  const name = h("button.name", { type: "button", title: "Name, colour, merge", onclick: () => editLabel(of()) });
+  const name = h("button.name", { type: "button", onclick: () => editLabel(of()) });
   const size = h("span.area", { title: "Area on the map" });
-  const gain = h("span.gain", { title: "Area gained in the last five minutes" });
+  const gain = h("span.gain", { title: "Change of the area in the last five minutes; it shrinks where the vehicle gives cells another label" });
   const slider = h("input", { type: "range", min: -1, max: 1, step: 0.05, oninput: () => weightsOrder.set(store.vehicle, slider.valueAsNumber, label.id) });
   const value = h("output.value");
   const undo = h("button.undo", { type: "button", onclick: () => weightsOrder.undo(store.vehicle, label.id) }, "Undo");
@@ -46,6 +46,7 @@ export function refreshRow(node, label) {
   parts.chip.setAttribute("aria-label", `Show only ${name} on the map`);
   parts.chip.setAttribute("aria-pressed", String(layer.highlight === label.id));
   text(parts.name, name + extra);
+  parts.name.title = `${name}${extra && `, with ${label.members.length - 1} merged into it`}: name, colour, merge`;
   text(parts.size, area(label.area_m2));
   const gained = label.gained_m2 ?? 0;
   show(parts.gain, Math.abs(gained) >= 0.5);

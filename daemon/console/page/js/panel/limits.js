@@ -18,7 +18,11 @@ const AMOUNTS = [
   ["time_s", "Time, s", "Duration of the survey, including the return path", MAX_AMOUNT],
   ["silence_s", "Silence, s", "Longest time without a frame from the surface", 65535],
 ];
-const REACTIONS = [["on_silence", "On silence"], ["on_breach", "On a breach"], ["on_abort", "On abort"]];
+const REACTIONS = [
+  ["on_silence", "On silence", "What the vehicle does after the time in Silence without a frame from the surface"],
+  ["on_breach", "On a breach", "What the vehicle does once it has left the fence, a band or a limit"],
+  ["on_abort", "On abort", "What the vehicle does when an abort is in force"],
+];
 
 const NAMES = Object.fromEntries([...BANDS, ...AMOUNTS, ...REACTIONS].map(([key, name]) => [key, name.toLowerCase()]));
 const KEYS = [...BANDS, ...AMOUNTS, ...REACTIONS].map(([key]) => key);
@@ -97,10 +101,10 @@ function amountLine([key, name, hint, max]) {
   } };
 }
 
-function reactionLine([key, name]) {
+function reactionLine([key, name, hint]) {
   const pick = h("select", { onchange: () => set(key, pick.value || null) },
     h("option", { value: "" }, "the vehicle's default"), ...["hold", "return", "surface"].map((r) => h("option", { value: r }, r)));
-  const node = h("label.limit", {}, h("span.caption", {}, name), pick);
+  const node = h("label.limit", { title: hint }, h("span.caption", {}, name), pick);
   return { node, update: (limits) => (pick.value = limits[key] ?? "") };
 }
 

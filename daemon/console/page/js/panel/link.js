@@ -50,7 +50,7 @@ export function startLink() {
     if (["recent", "own", "backlog", "lag"].includes(key)) ofVehicle.push(node);
     list.append(node);
   }
-  classes.append(h("caption", {}, "Bits by class since the start"), h("thead", {}, h("tr", {}, h("th", { scope: "col" }, "Class"), h("th", { scope: "col" }, "Up"), h("th", { scope: "col" }, "Share"), h("th", { scope: "col" }, "Down"))),
+  classes.append(h("caption", {}, "Bits by class since the start"), h("thead", {}, h("tr", {}, h("th", { scope: "col", title: "Kind of data in the frames" }, "Class"), h("th", { scope: "col", title: "Bits from the vehicle to the surface" }, "Up"), h("th", { scope: "col", title: "Its part of all bits from the vehicle" }, "Share"), h("th", { scope: "col", title: "Bits from the surface to the vehicle" }, "Down"))),
     h("tbody"));
   $("link").append(h("header", {}, h("h2", { id: "link-title" }, "Link"), age),
     directions.up.node, directions.down.node, history, list, classes, ...budgetParts);

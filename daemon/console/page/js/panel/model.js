@@ -46,7 +46,7 @@ export function startModel() {
   $("model").append(h("header", {}, h("h2", { id: "model-title" }, "Scene model")), h("div.part", {},
     h("p.hint", {}, `An empty field leaves the setting unchanged; 0 means ${DEFAULT}. Labels keep their meaning.`),
     ...lines.map((l) => l.node),
-    h("div.fit", { role: "group", "aria-label": "Fit to budget" }, h("label", { for: "fit-bps" }, "Map stream, bit/s"), limit, fit), fitted, fitErrorLine, foot.node));
+    h("div.fit", { role: "group", "aria-label": "Fit to budget" }, h("label", { for: "fit-bps", title: "Bits a second that changes of the map may take on the mean" }, "Map stream, bit/s"), limit, fit), fitted, fitErrorLine, foot.node));
   store.on("state select edit feed tab", update);
   store.on("select", forget);
 }

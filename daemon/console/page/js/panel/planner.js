@@ -16,7 +16,7 @@ const LINES = [
     read: (v) => v.planner ?? "",
   },
   {
-    key: "at_end", name: "At the end", hint: "What the vehicle does once no look at a weighed label pays any more",
+    key: "at_end", name: "At the end", hint: "What the vehicle does once no look at a weighed label pays any more. It holds where a repeated round would be a turn on the spot",
     choices: [DEFAULT, ["repeat", "repeat: explore, then look again"], ["explore", "explore, then hold"], ["hold", "hold"]],
     read: (v) => v.settings?.requested.at_end ?? "",
   },

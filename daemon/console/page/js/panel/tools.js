@@ -24,7 +24,7 @@ function button(name, label, title, onclick) {
 
 export function startTools() {
   const pick = h("select", { id: "layer", onchange: () => (setLayer(pick.value), redraw()) });
-  const layers = h("label.tool-field", {}, "Layer", pick);
+  const layers = h("label.tool-field", { title: "What the colours of the map show" }, "Layer", pick);
   const after = (fn) => () => {
     fn();
     mark();
@@ -51,7 +51,7 @@ export function startTools() {
 function offer(pick) {
   const names = layerNames();
   if (names.join() !== [...pick.options].map((o) => o.value).join()) {
-    pick.replaceChildren(...names.map((n) => h("option", { value: n }, n)));
+    pick.replaceChildren(...names.map((n) => h("option", { value: n }, n.replaceAll("_", " "))));
   }
   if (!names.includes(layer.name)) setLayer("label");
   pick.value = layer.name;
