@@ -63,9 +63,10 @@ impl Knowledge {
 /// Parts of a step of the lattice in which the track is counted.
 const PARTS_PER_STEP: u8 = 4;
 
-/// The value of a repeated look at a cell, divided by the value of the look before. More looks at dense places are better than
-/// a first one at each sparse place.
-const REPEATED_LOOK: f32 = 0.7;
+/// The value of a repeated look at a cell, divided by the value of the look before: while there is floor that was not seen,
+/// and in the rounds after that, in which more looks at dense places are better than a first one at each sparse place.
+const REPEATED_LOOK: f32 = 0.4;
+const REPEATED_LOOK_IN_ROUNDS: f32 = 0.7;
 
 /// The value of the next look at each block, the square between four places of a lattice. A place shows
 /// the four blocks around it.
@@ -205,7 +206,8 @@ impl CellWindow {
             self.add_areas(&mut values, map_origin, interest);
         }
         let looks = self.copy(&known.looks);
-        values.iter_mut().zip(&looks).for_each(|(w, &n)| *w *= REPEATED_LOOK.powi(i32::from(n)));
+        let repeated = if known.repeats { REPEATED_LOOK_IN_ROUNDS } else { REPEATED_LOOK };
+        values.iter_mut().zip(&looks).for_each(|(w, &n)| *w *= repeated.powi(i32::from(n)));
         values
     }
 }

@@ -8,8 +8,8 @@ use crate::planning::{BlockValues, Interest, Node, PlanRequest, distance};
 /// planner a tenth of its gain.
 const TURN_BACK: f64 = 1.3;
 const IN_ROUNDS: f64 = 1.15;
-/// The mean value of a cell, divided by the largest weight, from which a look at it pays: an eleventh look at a favoured
-/// label does, and a twelfth one does not.
+/// The mean value of a cell, divided by the largest weight, from which a look at it pays: a fifth look at a favoured label
+/// does, and a sixth one does not.
 const PAYS: f64 = 0.02;
 
 /// The least gain a metre of a plan that replaces the present one, in gains a metre of that. `before` is the place that the
