@@ -287,9 +287,9 @@ export default [
     async run(s) {
       await s.steer({ layers: true, advance: 30 });
       const streams = s.page.getByRole("group", { name: "Use of spare capacity" });
-      const names = () => s.page.locator("#layer option").allInnerTexts();
+      const names = () => s.page.locator("#layer option").evaluateAll((options) => options.map((option) => option.value));
       for (const { name, unit } of LAYERS) {
-        await streams.getByRole("checkbox", { name }).check();
+        await streams.getByRole("checkbox", { name: name.replaceAll("_", " ") }).check();
         await s.until(`the layer ${name}`, async () => (await names()).includes(name), { advance: 2 });
         await s.page.selectOption("#layer", name);
         await s.shows("#legend", new RegExp(`${name}.*\\d.?${unit || "%"}`, "s"));
