@@ -79,10 +79,6 @@ fn every_frame_or(rate: f64) -> Option<f64> {
     (rate > 0.0).then_some(rate)
 }
 
-fn registrar(config: &Config) -> Registrar {
-    Registrar::new(config.navigation.drift_percent / 100.0).with_loops(config.registration.loops)
-}
-
 impl Mapper {
     /// An empty mapper. Its labels belong to `epoch`.
     pub fn new(config: &Config, vocabulary: Option<Measures>, epoch: u8, seed: u64) -> Result<Self, UserError> {
@@ -106,6 +102,8 @@ impl Mapper {
             seed,
             ..SceneConfig::for_images()
         };
+        let registrar = Registrar::new(config.navigation.drift_percent / 100.0).with_loops(config.registration.loops);
+        let registers = config.registration.enabled;
         Ok(Self {
             extractor,
             light: config.camera.flat_field.then(FlatField::default),
@@ -120,15 +118,15 @@ impl Mapper {
                 .with_distance(f64::from(PATCH_PX) * config.camera.metres_per_pixel),
             shared: SharedExemplars::default(),
             relief: Relief::default(),
-            registrar: config.registration.enabled.then(|| registrar(config)),
-            registers: config.registration.enabled,
+            registrar: registers.then(|| registrar.clone()),
+            registers,
             last_seen_s: BTreeMap::new(),
             refine_words_per_s: f64::from(config.scene.refine_words_per_s),
             frames_per_s: every_frame_or(config.scene.frames_per_s),
             configured: Configured {
                 priors: [config.scene.alpha, config.scene.beta, config.scene.gamma],
-                registers: config.registration.enabled,
-                registrar: registrar(config),
+                registers,
+                registrar,
                 refine_words_per_s: f64::from(config.scene.refine_words_per_s),
                 frames_per_s: every_frame_or(config.scene.frames_per_s),
             },

@@ -311,13 +311,6 @@ impl Steering {
             let plan = if worth::keeps(&request, present, &plan, margin) { present.to_vec() } else { plan };
             if worth::pays(&request, &plan, interest, (lattice.step_m() / self.window.cell_m).powi(2)) {
                 let intent = purpose::purpose(interest, |part| worth::gain(&value(part), &plan));
-                let intent = intent.map(|intent| {
-                    purpose::after_looks(intent, interest, |part| {
-                        let window = (&self.window, self.map_origin);
-                        let seen = BlockValues::of_seen(lattice, window, map, &self.known, part);
-                        [worth::gain(&seen, &plan), worth::gain(&value(part), &plan)]
-                    })
-                });
                 return (plan, intent);
             }
         }

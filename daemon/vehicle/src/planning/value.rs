@@ -75,6 +75,8 @@ pub struct BlockValues {
     /// The number of blocks in a row: one more than there are places.
     columns: usize,
     blocks: Vec<f32>,
+    /// The part of each value that seen cells have: another look at them.
+    seen: Vec<f32>,
 }
 
 /// The indices of the blocks that a place shows.
@@ -90,37 +92,26 @@ impl BlockValues {
         known: &Knowledge,
         interest: Interest<'_>,
     ) -> Self {
-        Self::of_cells(lattice, (window, map_origin), &window.cell_values(map_origin, map, known, interest))
-    }
-
-    /// The part of the same values that seen cells have: another look at them.
-    pub fn of_seen(
-        lattice: &Lattice,
-        (window, map_origin): (&CellWindow, Point),
-        map: &LabelGrid,
-        known: &Knowledge,
-        interest: Interest<'_>,
-    ) -> Self {
-        let mut cells = window.cell_values(map_origin, map, known, interest);
-        cells.iter_mut().zip(window.copy(map)).filter(|(_, label)| *label == 0).for_each(|(value, _)| *value = 0.0);
-        Self::of_cells(lattice, (window, map_origin), &cells)
-    }
-
-    fn of_cells(lattice: &Lattice, (window, map_origin): (&CellWindow, Point), cells: &[f32]) -> Self {
         let (places, rows) = lattice.size();
         let columns = places + 1;
-        let mut values = Self { columns, blocks: vec![0.0; columns * (rows + 1)] };
+        let none = vec![0.0; columns * (rows + 1)];
+        let mut values = Self { columns, blocks: none.clone(), seen: none };
         let (south_west, step) = (lattice.place(0), lattice.step_m());
         let block = |at: f64, origin: f64| ((at - origin) / step).floor() as i64 + 1;
-        for (row, line) in (0..).zip(cells.chunks(window.width.max(1))) {
+        let labels = window.copy(map);
+        let cells = window.cell_values(map_origin, &labels, known, interest);
+        let width = window.width.max(1);
+        for (row, (line, labels)) in (0..).zip(cells.chunks(width).zip(labels.chunks(width))) {
             let y = block(window.centre(row, window.y) + map_origin.1, south_west.1);
             if !(0..=rows as i64).contains(&y) {
                 continue;
             }
-            for (column, value) in (0..).zip(line) {
+            for (column, (value, label)) in (0..).zip(line.iter().zip(labels)) {
                 let x = block(window.centre(column, window.x) + map_origin.0, south_west.0);
                 if (0..columns as i64).contains(&x) {
-                    values.blocks[y as usize * columns + x as usize] += value;
+                    let at = y as usize * columns + x as usize;
+                    values.blocks[at] += value;
+                    values.seen[at] += if *label == 0 { 0.0 } else { *value };
                 }
             }
         }
@@ -135,6 +126,11 @@ impl BlockValues {
 
     pub fn of(&self, block: usize) -> f32 {
         self.blocks[block]
+    }
+
+    /// The part of a block's value that its seen cells have.
+    pub fn of_seen(&self, block: usize) -> f32 {
+        self.seen[block]
     }
 
     pub fn blocks(&self) -> usize {
@@ -187,15 +183,14 @@ impl CellWindow {
         grid.copy_area(i64::from(self.x), i64::from(self.y), self.width, self.height)
     }
 
-    fn cell_values(&self, map_origin: Point, map: &LabelGrid, known: &Knowledge, interest: Interest<'_>) -> Vec<f32> {
+    fn cell_values(&self, map_origin: Point, labels: &[u8], known: &Knowledge, interest: Interest<'_>) -> Vec<f32> {
         let utility = interest.utility;
-        let labels = self.copy(map);
-        let seen = SeenLabels { labels: &labels, width: self.width };
+        let seen = SeenLabels { labels, width: self.width };
         let weight: Vec<f32> = (0..=255).map(|l| utility.weight(l) as f32).collect();
         let (exploration, curiosity) = (f32::from(utility.exploration) / 100.0, f32::from(utility.curiosity) / 100.0);
         let expectation = Expectation::new(seen);
         let mut values = expectation.of(|label| weight[usize::from(label)], 0.0);
-        for (w, &label) in values.iter_mut().zip(&labels) {
+        for (w, &label) in values.iter_mut().zip(labels) {
             *w = if label == 0 { *w + exploration } else { weight[usize::from(label)] };
         }
         if curiosity != 0.0 {

@@ -1,5 +1,6 @@
 //! The purpose of a plan: the part of the operator's interest that gains most along it.
 
+use super::worth::Gain;
 use crate::planning::Interest;
 use scenecast_protocol::directive::{Utility, WeightedArea};
 use scenecast_protocol::wire::Intent;
@@ -8,29 +9,29 @@ use scenecast_protocol::wire::Intent;
 const MAX_LABELS: usize = 4;
 
 /// The part of `interest` with the greatest `gain`; `None` if no part gains anything.
-pub(super) fn purpose(interest: Interest<'_>, gain: impl Fn(Interest<'_>) -> f64) -> Option<Intent> {
-    let mut parts = parts(interest);
-    if let [(intent, ..)] = parts[..] {
-        return Some(intent);
+pub(super) fn purpose(interest: Interest<'_>, gain: impl Fn(Interest<'_>) -> Gain) -> Option<Intent> {
+    let parts = parts(interest);
+    let gain_of = |(_, utility, areas): &Part<'_>| gain(Interest { utility, areas });
+    if let [only] = &parts[..] {
+        return Some(after_looks(only.0, || gain_of(only)));
     }
-    let gains: Vec<f64> = parts.iter().map(|(_, utility, areas)| gain(Interest { utility, areas })).collect();
-    let best = (0..parts.len()).max_by(|&a, &b| gains[a].total_cmp(&gains[b]).then(b.cmp(&a)))?;
-    (gains[best] > 0.0).then(|| parts.swap_remove(best).0)
+    let gains: Vec<Gain> = parts.iter().map(gain_of).collect();
+    let best = (0..parts.len()).max_by(|&a, &b| gains[a].whole.total_cmp(&gains[b].whole).then(b.cmp(&a)))?;
+    (gains[best].whole > 0.0).then(|| after_looks(parts[best].0, || gains[best]))
 }
 
-/// The purpose in words of the looks so far: a label is revisited if more than half of what it gains along the plan is on
-/// seen floor. `gains` returns the gain of a part of the interest on seen floor, and in all.
-pub(super) fn after_looks(intent: Intent, interest: Interest<'_>, gains: impl Fn(Interest<'_>) -> [f64; 2]) -> Intent {
+/// The intent in view of the looks so far: a label is revisited if more than half of what it gains is on seen floor.
+fn after_looks(intent: Intent, gain: impl FnOnce() -> Gain) -> Intent {
     let Intent::Label(label) = intent else { return intent };
-    let Some((_, utility, areas)) = parts(interest).into_iter().find(|(part, ..)| *part == intent) else {
-        return intent;
-    };
-    let [seen, all] = gains(Interest { utility: &utility, areas });
-    if seen > 0.5 * all { Intent::LabelAgain(label) } else { intent }
+    let Gain { whole, on_seen } = gain();
+    if on_seen > 0.5 * whole { Intent::LabelAgain(label) } else { intent }
 }
 
-/// The parts with a positive weight, each as an interest of its own.
-fn parts<'a>(Interest { utility, areas }: Interest<'a>) -> Vec<(Intent, Utility, &'a [WeightedArea])> {
+/// A part of an interest, as an interest of its own.
+type Part<'a> = (Intent, Utility, &'a [WeightedArea]);
+
+/// The parts with a positive weight.
+fn parts<'a>(Interest { utility, areas }: Interest<'a>) -> Vec<Part<'a>> {
     const NOWHERE: &[WeightedArea] = &[];
     let none = Utility { epoch: utility.epoch, ..Utility::default() };
     let mut labels: Vec<(u8, i8)> = utility.weights.iter().map(|(&l, &w)| (l, w)).filter(|&(_, w)| w > 0).collect();
@@ -62,7 +63,8 @@ mod tests {
         let weigh = |by: [f64; 4]| {
             move |Interest { utility, areas }: Interest<'_>| {
                 let labels = by[0] * utility.weight(3) + by[1] * utility.weight(7);
-                labels + by[2] * f64::from(utility.exploration) / 100.0 + by[3] * areas.len() as f64
+                let whole = labels + by[2] * f64::from(utility.exploration) / 100.0 + by[3] * areas.len() as f64;
+                Gain { whole, on_seen: 0.0 }
             }
         };
         let in_labels = Interest::in_labels(&utility);
@@ -73,12 +75,13 @@ mod tests {
         let areas = [-50, 60].map(|weight| WeightedArea { outline: Polygon::default(), weight });
         let in_places = Interest { areas: &areas, ..in_labels };
         assert_eq!(purpose(in_places, weigh([1.0, 1.0, 1.0, 9.0])), Some(Intent::Area(2)));
-        let again = |seen| after_looks(Intent::Label(3), in_labels, |_| [seen, 1.0]);
-        assert_eq!((again(0.4), again(0.6)), (Intent::Label(3), Intent::LabelAgain(3)));
-        assert_eq!(after_looks(Intent::Unseen, in_labels, |_| [1.0, 1.0]), Intent::Unseen);
+        let again = |intent, on_seen| after_looks(intent, || Gain { whole: 1.0, on_seen });
+        assert_eq!(again(Intent::Label(3), 0.4), Intent::Label(3));
+        assert_eq!(again(Intent::Label(3), 0.6), Intent::LabelAgain(3));
+        assert_eq!(again(Intent::Unseen, 1.0), Intent::Unseen);
         let only = Utility { curiosity: 5, ..Utility::default() };
         let unreachable = |_: Interest<'_>| unreachable!("one part needs no gain");
         assert_eq!(purpose(Interest::in_labels(&only), unreachable), Some(Intent::Curiosity));
-        assert_eq!(purpose(Interest::in_labels(&Utility::default()), |_| 1.0), None);
+        assert_eq!(purpose(Interest::in_labels(&Utility::default()), |_| Gain { whole: 1.0, on_seen: 0.0 }), None);
     }
 }

@@ -32,12 +32,21 @@ pub(super) fn pays(q: &PlanRequest<'_>, path: &[Node], interest: Interest<'_>, c
     values.fold(0.0, f64::max) > PAYS * interest.largest_weight() * cells_in_block
 }
 
+/// What a path gains.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Gain {
+    pub whole: f64,
+    /// The part of it on seen floor.
+    pub on_seen: f64,
+}
+
 /// The values of all blocks that a path shows, each once.
-pub(super) fn gain(values: &BlockValues, path: &[Node]) -> f64 {
+pub(super) fn gain(values: &BlockValues, path: &[Node]) -> Gain {
     let mut blocks: Vec<usize> = path.iter().flat_map(|&node| values.shown(node)).collect();
     blocks.sort_unstable();
     blocks.dedup();
-    blocks.into_iter().map(|block| f64::from(values.of(block))).sum()
+    let sum = |value: fn(&BlockValues, usize) -> f32| blocks.iter().map(|&block| f64::from(value(values, block))).sum();
+    Gain { whole: sum(BlockValues::of), on_seen: sum(BlockValues::of_seen) }
 }
 
 /// The gain of a path for each of its metres.
@@ -45,5 +54,5 @@ fn gain_a_metre(q: &PlanRequest<'_>, path: &[Node]) -> f64 {
     let places = std::iter::once(&q.from).chain(path);
     let metres: f64 = places.zip(path).map(|(&a, &b)| distance(q.lattice.place(a), q.lattice.place(b))).sum();
     // A stop and a turn cost as much as one step of the lattice.
-    gain(q.values, path) / (metres + q.lattice.step_m())
+    gain(q.values, path).whole / (metres + q.lattice.step_m())
 }
