@@ -1,7 +1,7 @@
 //! Relief that is painted once: lumps over lumps with creases between them, cells of corals, and the dark of crevices.
 
 use super::fields::ramp;
-use super::texture::Texture;
+use super::texture::{Texture, blurred};
 use crate::noise::floor;
 use scene_model::random::{CounterRng, derive};
 use std::f32::consts::TAU;
@@ -145,25 +145,4 @@ pub(super) fn with_crevices(mut texture: Texture, strength: f32) -> Texture {
         }
     }
     texture
-}
-
-/// The mean over periodic squares of a radius, taken twice so that it is nearly round.
-pub(super) fn blurred(field: &[f32], side: usize, radius: usize) -> Vec<f32> {
-    let share = 1.0 / (2 * radius + 1) as f32;
-    let mut result = field.to_vec();
-    let mut line = vec![0.0; side];
-    for pass in 0..4 {
-        let (step, next) = if pass % 2 == 0 { (1, side) } else { (side, 1) };
-        for number in 0..side {
-            let place = |i: usize| number * next + (i & (side - 1)) * step;
-            (0..side).for_each(|i| line[i] = result[place(i)]);
-            let get = |i: usize| line[i & (side - 1)];
-            let mut sum: f32 = (0..=2 * radius).map(|i| get(i + side - radius)).sum();
-            for i in 0..side {
-                result[place(i)] = sum * share;
-                sum += get(i + radius + 1) - get(i + side - radius);
-            }
-        }
-    }
-    result
 }

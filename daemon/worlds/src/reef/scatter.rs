@@ -81,7 +81,7 @@ fn scatter(
             let cluster = ground.noise.value(x / (3.1 * spacing_m) + 7.0, y / (3.1 * spacing_m));
             if let Some(choice) = chooser(&place.habitat, cluster, &mut place.rng, size as usize) {
                 let mut thing = grown(&choice, sizes, &mut place);
-                if !thing.is_thin() && !thing.is_pit() {
+                if !thing.follows_floor() {
                     let floor = ground.spot(x, y, &place.habitat, &ground.slow(x, y));
                     thing.base_m = floor.height_m - 0.05 * thing.radius_m;
                 }

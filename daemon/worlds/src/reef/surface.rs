@@ -126,7 +126,7 @@ impl Surface {
         }
     }
 
-    /// Lays a thing on the floor: it covers what is lower, and a pit bends the floor.
+    /// Lays a thing on the floor: it covers what is lower, or follows the floor below it.
     fn lay(&mut self, reef: &Reef, thing: &Thing) {
         let reach = thing.reach_m();
         let (columns, rows) = self.span([thing.x - reach, thing.y - reach, thing.x + reach, thing.y + reach]);
@@ -135,19 +135,17 @@ impl Surface {
             for column in columns.clone() {
                 let Some(spot) = thing.spot(&reef.ground.noise, self.x(column), y) else { continue };
                 let at = row * self.columns + column;
-                if thing.is_pit() {
+                if thing.follows_floor() {
                     self.height_m[at] += spot.height_m - thing.base_m;
-                    continue;
-                }
-                // An edge is soft where both surfaces are nearly as high.
-                if thing.is_thin() {
-                    self.height_m[at] += spot.height_m - thing.base_m;
-                    self.colour[at] = spot.colour;
+                    if !thing.is_pit() {
+                        self.colour[at] = spot.colour;
+                    }
                     if thing.has_class() {
                         self.class[at] = spot.class;
                     }
                     continue;
                 }
+                // An edge is soft where both surfaces are nearly as high.
                 let above = spot.height_m - self.height_m[at];
                 let seen = ((above + 0.006) / 0.014).clamp(0.0, 1.0);
                 if seen > 0.0 {

@@ -1,7 +1,6 @@
 //! Periodic patterns of the sea floor that are painted once and then only looked up.
 
 use super::fields::ramp;
-use super::relief::blurred;
 use crate::noise::{Noise, floor};
 use scene_model::random::{CounterRng, derive, mix};
 use std::f32::consts::TAU;
@@ -240,4 +239,25 @@ pub(super) fn maze(side: usize, texel_m: f32, key: u64) -> Texture {
     }
     let ridge = |value: f32| ramp(-0.7, 0.9, value);
     Texture::from_texels(texel_m, blurred(&field, side, 1).into_iter().map(|v| [ridge(v), ridge(v), 0.5]).collect())
+}
+
+/// The mean over periodic squares of a radius, taken twice so that it is nearly round.
+pub(super) fn blurred(field: &[f32], side: usize, radius: usize) -> Vec<f32> {
+    let share = 1.0 / (2 * radius + 1) as f32;
+    let mut result = field.to_vec();
+    let mut line = vec![0.0; side];
+    for pass in 0..4 {
+        let (step, next) = if pass % 2 == 0 { (1, side) } else { (side, 1) };
+        for number in 0..side {
+            let place = |i: usize| number * next + (i & (side - 1)) * step;
+            (0..side).for_each(|i| line[i] = result[place(i)]);
+            let get = |i: usize| line[i & (side - 1)];
+            let mut sum: f32 = (0..=2 * radius).map(|i| get(i + side - radius)).sum();
+            for i in 0..side {
+                result[place(i)] = sum * share;
+                sum += get(i + radius + 1) - get(i + side - radius);
+            }
+        }
+    }
+    result
 }

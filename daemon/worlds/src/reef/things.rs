@@ -59,12 +59,12 @@ impl Thing {
         !matches!(self.form, Form::Stick | Form::Shell | Form::Pit)
     }
 
-    /// Whether it lies on whatever is below it, as a cloth does.
-    pub(super) fn is_thin(&self) -> bool {
-        matches!(self.form, Form::Crust | Form::Stick | Form::Shell | Form::Urchin)
+    /// Whether its height adds to that of whatever is below it, as that of a cloth does.
+    pub(super) fn follows_floor(&self) -> bool {
+        matches!(self.form, Form::Crust | Form::Stick | Form::Shell | Form::Urchin | Form::Pit)
     }
 
-    /// Whether it changes the floor's height instead of covering it.
+    /// Whether it changes the floor's height only, and not its colour.
     pub(super) fn is_pit(&self) -> bool {
         self.form == Form::Pit
     }

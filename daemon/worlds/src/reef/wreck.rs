@@ -56,8 +56,8 @@ impl Berth {
         // Silt drifts over the edge of the hull in both directions.
         let mut cover = ramp(-0.05, 0.15 + 0.9 * mound * mound, from_wall);
         let mut put = |height_m: f32, colour: Colour| {
-            cover = cover.max(ramp(-0.01, 0.02, height_m - spot.height_m));
             let seen = ramp(-0.01, 0.02, height_m - spot.height_m);
+            cover = cover.max(seen);
             spot.height_m += seen * (height_m - spot.height_m);
             spot.colour = blend(spot.colour, colour, seen);
         };
