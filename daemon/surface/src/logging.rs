@@ -79,26 +79,23 @@ impl Surface {
     pub(super) fn log_mode(&mut self, vehicle: Address, now: Instant) {
         let Some((status, _)) = self.link.vehicle(vehicle).and_then(|view| view.status()) else { return };
         let (mode, reason) = (status.mode, status.reason);
+        let Some(end) = self.records.get(&vehicle).map(VehicleRecord::end_of_survey) else { return };
         if self.watches.entry(vehicle).or_default().handle_mode(mode, reason) {
             let text = match (mode, reason.name()) {
                 (_, Some(reason)) => format!("{}: {reason}", name_of_mode(mode)),
-                (VehicleMode::Hold, None) => format!("holding: {}", self.end_of_survey(vehicle)),
+                (VehicleMode::Hold, None) => format!("holding: {end}"),
                 (_, None) => name_of_mode(mode).to_owned(),
             };
             self.log_fact(vehicle, LogKind::Mode, &text, now);
         }
     }
 
-    fn end_of_survey(&self, vehicle: Address) -> &'static str {
-        self.records.get(&vehicle).map_or("the survey is complete", VehicleRecord::end_of_survey)
-    }
-
     /// The labels on the map of a vehicle are these.
     pub(super) fn log_labels(&mut self, vehicle: Address, labels: impl Iterator<Item = u8>, now: Instant) {
         let epoch = self.records.get(&vehicle).map_or(0, |record| record.epoch);
         for label in self.watches.entry(vehicle).or_default().handle_labels(epoch, labels) {
-            let name = |record: &VehicleRecord| record.label_book(label).and_then(|book| book.name.clone());
-            let name = self.records.get(&vehicle).and_then(name).map_or(String::new(), |name| format!(" ({name})"));
+            let name = self.records.get(&vehicle).and_then(|record| record.label_name(label));
+            let name = name.map_or(String::new(), |name| format!(" ({name})"));
             self.log_fact(vehicle, LogKind::Label, &format!("label {label}{name} is on the map"), now);
         }
     }

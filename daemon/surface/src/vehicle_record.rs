@@ -206,6 +206,11 @@ impl VehicleRecord {
     }
 
     /// The operator's name of a label of the map in view.
+    pub fn label_name(&self, label: u8) -> Option<&str> {
+        self.label_book(label)?.name.as_deref()
+    }
+
+    /// Name, colour and merging of a label of the map in view.
     pub fn label_book(&self, label: u8) -> Option<&StoredLabel> {
         let of_earlier = self.earlier_map().filter(|earlier| earlier.epoch != self.epoch).map(|e| &e.names);
         of_earlier.unwrap_or(&self.annotations.labels).get(&label)

@@ -1,4 +1,5 @@
-//! Settings of the vehicle: how it places its frames and builds its map, which cells and layers it sends, and how it plans its path.
+//! Settings of the vehicle: how it places its frames and builds its map, which cells and layers it sends, and how it plans
+//! its path.
 
 use super::{AtEnd, CellBand, Change, PlannerKind, Registration, ShortDecimal};
 use crate::bytes::{Reader, Truncated};
@@ -178,9 +179,10 @@ impl Settings {
         let (alpha, beta, gamma) = (figure(0x10)?, figure(0x08)?, figure(0x04)?);
         let (refine_words_per_s, frames_per_s) = (figure(0x02)?, figure(0x01)?);
         // Choices that both stay are left out.
-        let more = match r.rest().is_empty() {
-            true => 0,
-            false => r.u8().ok().filter(|&more| more != 0).ok_or(Truncated)?,
+        let more = match r.rest() {
+            [] => 0,
+            [0, ..] => return Err(Truncated),
+            _ => r.u8()?,
         };
         Ok(Self {
             alpha,

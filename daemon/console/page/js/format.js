@@ -23,6 +23,9 @@ export function missionTime(s) {
   return `T+${Math.floor(t / 3600)}:${two(Math.floor(t / 60) % 60)}:${two(t % 60)}`;
 }
 
+/** The name of a layer or another one of the API, for people. */
+export const plain = (name) => name.replaceAll("_", " ");
+
 export function metres(m, digits = 1) {
   if (m === null || m === undefined) return DASH;
   if (Math.abs(m) >= 1000) return `${(m / 1000).toFixed(2)}${THIN}km`;

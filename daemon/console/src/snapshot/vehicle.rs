@@ -213,10 +213,7 @@ fn activity(s: &VehicleStatus, record: &VehicleRecord) -> String {
 }
 
 fn purpose(intent: Intent, record: &VehicleRecord) -> String {
-    let name = |label| {
-        let name = record.label_book(label).and_then(|book| book.name.clone());
-        name.unwrap_or_else(|| format!("label {label}"))
-    };
+    let name = |label| record.label_name(label).map_or_else(|| format!("label {label}"), str::to_owned);
     match intent {
         Intent::Unseen => "looking at unseen floor".to_owned(),
         Intent::Curiosity => "looking at unusual places".to_owned(),

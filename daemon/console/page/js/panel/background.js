@@ -1,11 +1,12 @@
 // The background streams that use spare capacity, in an order that the operator changes.
 
 import { h, show, text } from "../dom.js";
+import { plain } from "../format.js";
 import { store } from "../store.js";
 
 const NAMES = { finer: "finer cells, while the map is coarse", exemplars: "images of new labels" };
 const HELP = { finer: "Cells between the coarse ones", exemplars: "Images that nobody has requested, one for each new label" };
-const nameOf = (stream) => NAMES[stream] ?? `layer ${stream.replaceAll("_", " ")}`;
+const nameOf = (stream) => NAMES[stream] ?? `layer ${plain(stream)}`;
 const helpOf = (stream) => `${HELP[stream] ?? "Values of this layer of the map"}, sent while nothing else waits`;
 /** Every stream: two of the page, and the layers that the surface lists. */
 const streams = () => [...Object.keys(NAMES), ...(store.snapshot?.layers.map((l) => l.name) ?? [])];

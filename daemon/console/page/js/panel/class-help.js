@@ -1,5 +1,7 @@
 // What the classes of data on the link are, for hovering.
 
+import { plain } from "../format.js";
+
 const HELP = {
   map: "Labels of the map",
   status: "Reports of the vehicle: its position, mode and plan",
@@ -10,4 +12,4 @@ const HELP = {
 };
 
 /** A class that is none of these is a layer of the map. */
-export const classHelp = (name) => HELP[name] ?? `Values of the map's layer ${name.replaceAll("_", " ")}`;
+export const classHelp = (name) => HELP[name] ?? `Values of the map's layer ${plain(name)}`;

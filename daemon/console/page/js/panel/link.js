@@ -14,6 +14,12 @@ function classNames(link) {
   return [...new Set(["map", ...layers.filter((c) => c !== "map" && !CLASSES.includes(c)).sort(), ...CLASSES])];
 }
 const classLine = (c) => h("tr", { data: { class: c }, title: classHelp(c) }, h("th", { scope: "row" }, c), h("td"), h("td", {}, h("span.share", {}, h("span"))), h("td"));
+const COLUMNS = [
+  ["Class", "Kind of data in the frames"],
+  ["Up", "Bits from the vehicle to the surface"],
+  ["Share", "Its part of all bits from the vehicle"],
+  ["Down", "Bits from the surface to the vehicle"],
+];
 const directions = { up: direction("Up", "vehicle to surface"), down: direction("Down", "surface to vehicle") };
 const LINES = [
   ["loss", "Frames lost, up / down", "Share of the frames that were lost or damaged since the start, from all vehicles and to them"],
@@ -50,7 +56,7 @@ export function startLink() {
     if (["recent", "own", "backlog", "lag"].includes(key)) ofVehicle.push(node);
     list.append(node);
   }
-  classes.append(h("caption", {}, "Bits by class since the start"), h("thead", {}, h("tr", {}, h("th", { scope: "col", title: "Kind of data in the frames" }, "Class"), h("th", { scope: "col", title: "Bits from the vehicle to the surface" }, "Up"), h("th", { scope: "col", title: "Its part of all bits from the vehicle" }, "Share"), h("th", { scope: "col", title: "Bits from the surface to the vehicle" }, "Down"))),
+  classes.append(h("caption", {}, "Bits by class since the start"), h("thead", {}, h("tr", {}, ...COLUMNS.map(([name, title]) => h("th", { scope: "col", title }, name)))),
     h("tbody"));
   $("link").append(h("header", {}, h("h2", { id: "link-title" }, "Link"), age),
     directions.up.node, directions.down.node, history, list, classes, ...budgetParts);

@@ -2,6 +2,7 @@
 
 import { cloud, fitCloud, toggleCloud, zoomCloud } from "../cloud/cloud.js";
 import { $, h, show } from "../dom.js";
+import { plain } from "../format.js";
 import { fit, follow, options, redraw, toggle, view } from "../map/chart.js";
 import { layer, layerNames, setLayer } from "../map/layers.js";
 import { measure, toggleMeasure } from "../map/measure.js";
@@ -51,7 +52,7 @@ export function startTools() {
 function offer(pick) {
   const names = layerNames();
   if (names.join() !== [...pick.options].map((o) => o.value).join()) {
-    pick.replaceChildren(...names.map((n) => h("option", { value: n }, n.replaceAll("_", " "))));
+    pick.replaceChildren(...names.map((n) => h("option", { value: n }, plain(n))));
   }
   if (!names.includes(layer.name)) setLayer("label");
   pick.value = layer.name;
