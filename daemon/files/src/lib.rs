@@ -8,6 +8,6 @@ mod vocabulary;
 mod whole;
 
 pub use images::{read_classes, read_image};
-pub use recording::{RecordedFrame, Recorder, Recording};
+pub use recording::{RecordedFrame, Recorder, Recording, write_poses};
 pub use vocabulary::{configured_vocabulary, read_vocabulary};
 pub use whole::{sync_folder, write_whole};

@@ -32,7 +32,8 @@ impl RecordedFrame {
 /// A folder with images and a table of their poses, in order of time: `poses.csv`, or the only `poses*.csv`.
 ///
 /// The table is CSV (RFC 4180), and its first line names the columns, in any order; further columns are ignored. Either
-/// they are `t_s,file,x_m,y_m,depth_m,heading_deg`; or `file,time_utc_hms,x_px,y_px,yaw_deg,scale`: the position of the
+/// they are `t_s,file,x_m,y_m,depth_m,heading_deg`, to which `scale` may be added, the size of the frame's pixels in the
+/// camera's usual ones; or `file,time_utc_hms,x_px,y_px,yaw_deg,scale`: the position of the
 /// frame's middle in a mosaic, in the mosaic's pixels with rows that grow downwards, and the size of the frame's pixels
 /// in those of the mosaic.
 #[derive(Debug, Clone, PartialEq)]
@@ -45,9 +46,10 @@ pub struct Recording {
 const MAX_TABLE_BYTES: u64 = 1 << 30;
 
 impl Recording {
-    /// Reads the table of a folder; an error names the line. A pixel of a mosaic is `metres_per_pixel` wide.
-    pub fn open(dir: &Path, metres_per_pixel: f64) -> Result<Self, UserError> {
-        let path = table(dir)?;
+    /// Reads a table of poses, or else that of the folder; an error names the line. A pixel of a mosaic is
+    /// `metres_per_pixel` wide.
+    pub fn open(dir: &Path, poses: Option<&Path>, metres_per_pixel: f64) -> Result<Self, UserError> {
+        let path = poses.map_or_else(|| table(dir), |path| Ok(path.to_owned()))?;
         let file = scenecast_config::open_regular(&path, MAX_TABLE_BYTES)?;
         let mut reader = csv::ReaderBuilder::new()
             .flexible(true)
@@ -104,7 +106,10 @@ const METRE_COLUMNS: [&str; 6] = ["t_s", "file", "x_m", "y_m", "depth_m", "headi
 const MOSAIC_COLUMNS: [&str; 6] = ["file", "time_utc_hms", "x_px", "y_px", "yaw_deg", "scale"];
 
 /// Where the wanted columns are in a row.
-struct Columns([(&'static str, usize); 6]);
+struct Columns {
+    wanted: [(&'static str, usize); 6],
+    scale: Option<usize>,
+}
 
 impl Columns {
     /// The name of a column that is missing is the error.
@@ -113,7 +118,7 @@ impl Columns {
         for (name, place) in &mut found {
             *place = names.iter().position(|other| other == *name).ok_or(*name)?;
         }
-        Ok(Self(found))
+        Ok(Self { wanted: found, scale: names.iter().position(|name| name == "scale") })
     }
 }
 
@@ -125,7 +130,7 @@ struct PoseRow<'a> {
 
 impl<'a> PoseRow<'a> {
     fn text(self, name: &str) -> Result<&'a str, String> {
-        let place = self.columns.0.iter().find(|(column, _)| *column == name).map(|(_, place)| *place);
+        let place = self.columns.wanted.iter().find(|(column, _)| *column == name).map(|(_, place)| *place);
         let text = place.and_then(|place| self.fields.get(place)).filter(|text| !text.is_empty());
         text.ok_or_else(|| format!("{name} is missing"))
     }
@@ -141,6 +146,13 @@ impl<'a> PoseRow<'a> {
     fn depth_m(self) -> Result<f64, String> {
         let depth_m = self.number("depth_m")?;
         if depth_m >= 0.0 { Ok(depth_m) } else { Err(format!("depth_m is {depth_m}; expected 0 or more, downwards")) }
+    }
+
+    /// The scale of a table in metres, in which it may be missing.
+    fn scale(self) -> Result<f64, String> {
+        let Some(text) = self.columns.scale.and_then(|place| self.fields.get(place)) else { return Ok(1.0) };
+        let value = text.parse::<f64>().ok().filter(|value| (1e-3..=1e3).contains(value));
+        value.ok_or_else(|| format!("scale is {text:?}; expected 0.001 to 1000"))
     }
 
     fn number(self, name: &str) -> Result<f64, String> {
@@ -162,7 +174,7 @@ fn of_metres(dir: &Path, row: PoseRow<'_>) -> Result<RecordedFrame, String> {
         y_m: row.number("y_m")?,
         depth_m: row.depth_m()?,
         heading_rad: row.number("heading_deg")?.to_radians(),
-        scale: 1.0,
+        scale: row.scale()?,
     })
 }
 
@@ -221,6 +233,22 @@ fn table(dir: &Path) -> Result<PathBuf, UserError> {
     }
 }
 
+/// Writes a table of poses of a folder's frames, with their scales.
+pub fn write_poses(path: &Path, dir: &Path, frames: &[RecordedFrame]) -> Result<(), UserError> {
+    let mut writer = csv::Writer::from_writer(Vec::new());
+    let failed = |e: csv::Error| UserError::Failed(format!("{}: {e}", path.display()));
+    writer.write_record(METRE_COLUMNS.iter().chain(&["scale"])).map_err(failed)?;
+    for frame in frames {
+        let file = frame.file.strip_prefix(dir).unwrap_or(&frame.file).to_string_lossy().into_owned();
+        let numbers =
+            [frame.x_m, frame.y_m, frame.depth_m, frame.heading_rad.to_degrees().rem_euclid(360.0), frame.scale];
+        let row = [frame.t_s.to_string(), file].into_iter().chain(numbers.map(|number| number.to_string()));
+        writer.write_record(row).map_err(failed)?;
+    }
+    let bytes = writer.into_inner().map_err(|e| UserError::Failed(format!("{}: {e}", path.display())))?;
+    crate::write_whole(path, &bytes)
+}
+
 /// Writes a recording while a mission runs.
 #[derive(Debug)]
 pub struct Recorder {
@@ -263,7 +291,7 @@ mod tests {
         let _ = std::fs::remove_dir_all(&dir);
         std::fs::create_dir_all(&dir).unwrap();
         std::fs::write(dir.join(table), text).unwrap();
-        Recording::open(&dir, 0.5)
+        Recording::open(&dir, None, 0.5)
     }
 
     #[test]

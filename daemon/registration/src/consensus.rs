@@ -39,8 +39,28 @@ pub(crate) struct Agreed {
 pub(crate) struct Before {
     /// Standard deviation of turn and log scale.
     pub(crate) spread: f64,
+    pub(crate) relief: ExpectedRelief,
+}
+
+/// The heights of the floor before a match.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct ExpectedRelief {
     /// Variance of the heights, in squares of the altitude.
-    pub(crate) relief: f64,
+    pub(crate) variance: f64,
+    /// The number of tiles that it counts for.
+    tiles: f64,
+}
+
+impl ExpectedRelief {
+    /// As earlier matches showed.
+    pub(crate) fn known(variance: f64) -> Self {
+        Self { variance, tiles: TILES_ALIKE }
+    }
+
+    /// Before any match.
+    pub(crate) fn guessed(variance: f64) -> Self {
+        Self { variance, tiles: 0.2 }
+    }
 }
 
 impl Agreed {
@@ -50,12 +70,12 @@ impl Agreed {
         Self {
             similarity: fit.similarity,
             anchor: fit.anchor,
-            turn_sigma: fit.spread_sigma.hypot(before.relief.sqrt()),
-            log_scale_sigma: fit.spread_sigma.hypot(before.relief.sqrt()),
+            turn_sigma: fit.spread_sigma.hypot(before.relief.variance.sqrt()),
+            log_scale_sigma: fit.spread_sigma.hypot(before.relief.variance.sqrt()),
             along: fit.similarity.shift().try_normalize(1.0).unwrap_or(Vector2::new(1.0, 0.0)),
-            along_sigma: fit.shift_sigma.hypot(FLOOR_PX).hypot(before.relief.sqrt() * baseline),
+            along_sigma: fit.shift_sigma.hypot(FLOOR_PX).hypot(before.relief.variance.sqrt() * baseline),
             across_sigma: fit.shift_sigma.hypot(FLOOR_PX),
-            relief: before.relief,
+            relief: before.relief.variance,
         }
     }
 }
@@ -70,7 +90,7 @@ pub(crate) fn agree(tiles: &[TileMatch], start: &Similarity, before: &Before) ->
     let along = if baseline > 1.0 { start.shift() / baseline } else { Vector2::new(1.0, 0.0) };
     let projector = along * along.transpose();
     let mut now = *start;
-    let mut relief = before.relief;
+    let mut relief = before.relief.variance;
     // Variance of the tiles' errors beyond the expected one, as slopes distort tiles; seen across the parallax.
     let mut excess2 = 0.0;
     let mut normal = Matrix4::identity();
@@ -108,7 +128,8 @@ pub(crate) fn agree(tiles: &[TileMatch], start: &Similarity, before: &Before) ->
         if baseline > 1.0 {
             // Heights are learnt from the difference of both directions: other errors have none.
             let seen = (along_squares - across_squares.max(0.0)).max(0.0) / weights / (baseline * baseline);
-            relief = (before.relief * TILES_ALIKE + seen * weights) / (TILES_ALIKE + weights);
+            let ExpectedRelief { variance, tiles } = before.relief;
+            relief = (variance * tiles + seen * weights) / (tiles + weights);
         }
         if !now.is_finite() {
             return None;
@@ -146,7 +167,7 @@ mod tests {
         (0..30).map(tile).collect()
     }
 
-    const BEFORE: Before = Before { spread: 0.012, relief: 1e-5 };
+    const BEFORE: Before = Before { spread: 0.012, relief: ExpectedRelief { variance: 1e-5, tiles: TILES_ALIKE } };
 
     #[test]
     fn a_flat_floor_gives_an_exact_similarity() {

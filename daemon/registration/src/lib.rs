@@ -9,8 +9,12 @@ mod checkpoint;
 mod compass;
 mod consensus;
 mod correlate;
+mod evidence;
 mod fft;
 mod flat_field;
+mod graph;
+#[cfg(test)]
+mod graph_tests;
 mod kept_frames;
 mod link;
 mod odometry;
@@ -24,12 +28,15 @@ mod registrar_tests;
 mod similarity;
 #[cfg(test)]
 mod skerki_tests;
+mod sparse;
 mod tally;
 mod thumbnail;
 mod tiles;
 
 pub use camera_image::CameraImage;
 pub use checkpoint::RestoreError;
+pub use evidence::Evidence;
+pub use graph::FrameGraph;
 pub use pose::FramePose;
 pub use registrar::{FrameInput, Placed, Registrar};
 pub use tally::Tally;

@@ -1,6 +1,6 @@
 //! One attempt to match a new frame with an earlier one.
 
-use crate::consensus::{Agreed, Before, agree};
+use crate::consensus::{Agreed, Before, ExpectedRelief, agree};
 use crate::correlate::{Correlator, Peak};
 use crate::refine::{Fit, Reference};
 use crate::similarity::Similarity;
@@ -37,8 +37,7 @@ pub(crate) struct Expected {
     pub(crate) window_m: f64,
     /// Standard deviation of the turn and of the log scale.
     pub(crate) spread: f64,
-    /// Variance of the heights of the floor, in squares of the altitude.
-    pub(crate) relief: f64,
+    pub(crate) relief: ExpectedRelief,
 }
 
 /// A match between a new frame and an earlier one.
@@ -168,7 +167,7 @@ impl<'a> Attempts<'a> {
             return None;
         }
         let baseline = fit.similarity.shift().norm();
-        let reach = (MAX_HEIGHT_SIGMAS * expected.relief.sqrt() * baseline).clamp(MIN_REACH_PX, MAX_REACH_PX);
+        let reach = (MAX_HEIGHT_SIGMAS * expected.relief.variance.sqrt() * baseline).clamp(MIN_REACH_PX, MAX_REACH_PX);
         let tiles = match_tiles(&self.fine, &old.fine, &fit.similarity, reach);
         let before = Before { spread: expected.spread, relief: expected.relief };
         let agreed = agree(&tiles, &fit.similarity, &before).unwrap_or_else(|| Agreed::of_fit(fit, &before));

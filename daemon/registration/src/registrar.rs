@@ -3,6 +3,8 @@
 use crate::altitude::ScaleFilter;
 use crate::camera_image::CameraImage;
 use crate::compass::HeadingFilter;
+use crate::consensus::ExpectedRelief;
+use crate::evidence::{Evidence, Loop, Step};
 use crate::flat_field::FlatField;
 use crate::kept_frames::{KeptFrame, KeptFrames};
 use crate::link::{Link, PLACED_SPREAD};
@@ -25,11 +27,13 @@ const LOOP_SPREAD: f64 = 0.012;
 const MAP_SIGMA_PX: f64 = 0.3;
 /// Turns of successive frames have errors that are alike, as are those of several loops, so that their sum is this much
 /// less certain than the sum of independent ones.
-const CHAIN_ALIKE: f64 = 3.0;
-const LOOPS_ALIKE: f64 = 2.0;
+pub(crate) const CHAIN_ALIKE: f64 = 3.0;
+pub(crate) const LOOPS_ALIKE: f64 = 2.0;
 /// Variance of the heights before any was seen, in squares of the altitude, and the links that it is averaged over.
 const FIRST_RELIEF: f64 = 4e-4;
 const RELIEF_LINKS: f64 = 12.0;
+/// The same for the first match. Were it taken for flat, a rough floor's slopes would turn the frame.
+const UNSEEN_RELIEF: f64 = 0.02;
 /// The relief is never taken for larger: heights with a standard deviation of a third of the altitude.
 const MAX_RELIEF: f64 = 0.1;
 /// A loop that is further from the pose than so many standard deviations contradicts it.
@@ -48,13 +52,16 @@ pub struct FrameInput<'a> {
 }
 
 /// The pose of a frame, and the evidence for it.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Placed {
     pub pose: FramePose,
     /// Whether the frame was matched with the one before.
     pub is_chained: bool,
     /// Matches with earlier frames.
     pub loops: u8,
+    /// Standard deviation of the place against earlier parts of the map, metres.
+    pub sigma_m: f64,
+    pub evidence: Evidence,
 }
 
 /// Places frames on the map. A frame is never moved once it is placed.
@@ -79,6 +86,7 @@ pub struct Registrar {
 /// The state after the last frame.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Last {
+    number: u32,
     pub(crate) pose: FramePose,
     dead_reckoned: [f64; 2],
     /// Whether dead reckoning continues at another place.
@@ -168,11 +176,12 @@ impl Registrar {
         let pose = FramePose::new(input.dead_reckoned, input.compass_rad, 0.0);
         let (heading, scale) = (HeadingFilter::new(input.compass_rad), ScaleFilter::new());
         self.keep(input, pose, heading, scale, (Matrix2::zeros(), 0.0), thumbnail);
-        Placed { pose, is_chained: false, loops: 0 }
+        Placed { pose, is_chained: false, loops: 0, sigma_m: 0.0, evidence: Evidence::default() }
     }
 
     fn advance(&mut self, mut last: Last, input: &FrameInput, thumbnail: Option<Thumbnail>) -> Placed {
-        if last.is_displaced {
+        let is_displaced = last.is_displaced;
+        if is_displaced {
             last.pose = FramePose::new(input.dead_reckoned, last.pose.heading_rad, last.pose.log_scale);
             last.dead_reckoned = [input.dead_reckoned.x_m, input.dead_reckoned.y_m];
         }
@@ -186,28 +195,40 @@ impl Registrar {
         let guess_heading = last.heading.corrected(input.compass_rad).0 + last.heading_offset();
         let guess = FramePose::new(point(last.pose.place() + by), wrap_rad(guess_heading), 0.0);
         let window_m = 16.0 * pixel_m + 5.0 * sigma_m;
-        let chain = attempts.as_mut().and_then(|attempts| last.chain(attempts, &guess, window_m, self.relief));
+        let chain =
+            attempts.as_mut().and_then(|attempts| last.chain(attempts, &guess, window_m, self.expected_relief()));
         last.take_chain(input, chain.as_ref());
         chain.iter().for_each(|link| self.learn_relief(link));
-        let by = match &chain {
+        let step = match &chain {
             Some(link) => self.fused_step(&mut last, link, moved, reach_m),
-            None => {
-                last.drift(sigma_m);
-                last.shared = 0.0;
-                by
-            }
+            None => last.unseen_step(by, sigma_m),
         };
-        let place = last.pose.place() + by;
+        let place = last.pose.place() + step.by;
         let now = FramePose::new(point(place), last.heading.heading_rad(), last.scale.log_scale());
         let window_m = 16.0 * pixel_m + 4.0 * sigma(&last.covariance_m2);
         let links = match (&mut attempts, &thumbnail) {
             (Some(attempts), Some(thumbnail)) => self.loops(attempts, thumbnail, &now, window_m),
             _ => Vec::new(),
         };
-        let (pose, loops) = self.close(&mut last, &now, &links, pixel_m);
+        let (pose, agreeing) = self.close(&mut last, &now, &links, pixel_m);
         links.iter().for_each(|link| self.learn_relief(link));
+        let (loops, sigma_m) = (agreeing.len() as u8, sigma(&last.covariance_m2));
+        let evidence = Evidence {
+            step: (!is_displaced).then_some(step),
+            chain: chain.map(|link| link.found),
+            loops: agreeing,
+            relief: self.relief,
+        };
         self.keep(input, pose, last.heading, last.scale, (last.covariance_m2, last.shared), thumbnail);
-        Placed { pose, is_chained: chain.is_some(), loops }
+        Placed { pose, is_chained: evidence.chain.is_some(), loops, sigma_m, evidence }
+    }
+
+    /// What is known of the heights before a match. The first match has to find them by itself.
+    fn expected_relief(&self) -> ExpectedRelief {
+        match self.relief_links > 0.0 {
+            true => ExpectedRelief::known(self.relief),
+            false => ExpectedRelief::guessed(UNSEEN_RELIEF),
+        }
     }
 
     fn learn_relief(&mut self, link: &Link) {
@@ -216,7 +237,7 @@ impl Registrar {
     }
 
     /// The displacement by odometry and images. Its covariance is added to that of the place.
-    fn fused_step(&mut self, last: &mut Last, link: &Link, moved: Vector2<f64>, reach_m: f64) -> Vector2<f64> {
+    fn fused_step(&mut self, last: &mut Last, link: &Link, moved: Vector2<f64>, reach_m: f64) -> Step {
         let seen = Seen {
             by: link.place(last.heading.heading_rad(), last.scale.log_scale()) - last.pose.place(),
             covariance_m2: link.covariance_m2(),
@@ -227,7 +248,7 @@ impl Registrar {
         let (by, covariance_m2) = self.odometry.fuse(moved, &seen);
         last.covariance_m2 += covariance_m2;
         last.shared *= (-by.norm() / reach_m).exp();
-        by
+        Step { by, from_heading_rad: last.pose.heading_rad, covariance_m2 }
     }
 
     /// Matches with earlier frames.
@@ -239,19 +260,19 @@ impl Registrar {
             let similarity = frame.pose.to_map().inverse().after(&now.to_map());
             let found = attempts.attempt(
                 &frame.thumbnail.unpacked()?,
-                &Expected { similarity, window_m, spread: LOOP_SPREAD, relief: self.relief },
+                &Expected { similarity, window_m, spread: LOOP_SPREAD, relief: self.expected_relief() },
             )?;
-            Some(Link { found, pose: frame.pose })
+            Some(Link { found, pose: frame.pose, older: frame.number })
         });
         links.collect()
     }
 
-    /// Corrects the pose by the loops that agree with it, and returns their number.
-    fn close(&mut self, last: &mut Last, now: &FramePose, links: &[Link], pixel_m: f64) -> (FramePose, u8) {
-        let shared = last.shared + links.len() as f64;
+    /// Corrects the pose by the loops that agree with it, and returns them.
+    fn close(&mut self, last: &mut Last, now: &FramePose, links: &[Link], pixel_m: f64) -> (FramePose, Vec<Loop>) {
+        let (shared, relief) = (last.shared + links.len() as f64, self.relief);
         let covariance = |link: &Link| {
             let map2 = Matrix2::identity() * (MAP_SIGMA_PX * pixel_m).powi(2);
-            link.covariance_m2() + map2 + link.parallax_m2(self.relief)
+            link.covariance_m2() + map2 + link.parallax_m2(relief)
         };
         let place = |link: &Link| link.place(now.heading_rad, now.log_scale);
         let distance = |off: Vector2<f64>, covariance: Matrix2<f64>| {
@@ -281,14 +302,15 @@ impl Registrar {
         // The drift is corrected by the first link as the place is; a later one finds what is left of both.
         let (mut at, mut whole) = (now.place(), last.covariance_m2 + drifted);
         for link in &agreeing {
-            let measured = covariance(link) + link.parallax_m2(self.relief) * (shared - 1.0).max(0.0);
+            let measured = covariance(link) + link.parallax_m2(relief) * (shared - 1.0).max(0.0);
             let gain = gain(&whole, &measured);
             at += gain * (link.place(heading, log_scale) - at);
             whole = reduced(&whole, &measured);
             last.covariance_m2 = reduced(&last.covariance_m2, &measured);
         }
         last.shared += agreeing.len() as f64;
-        (FramePose::new(point(at), heading, log_scale), agreeing.len() as u8)
+        let loops = agreeing.iter().map(|link| Loop { older: link.older, found: link.found }).collect();
+        (FramePose::new(point(at), heading, log_scale), loops)
     }
 
     fn keep(
@@ -306,6 +328,7 @@ impl Registrar {
         let MapPoint { x_m, y_m } = input.dead_reckoned;
         let (dead_reckoned, compass_rad) = ([x_m, y_m], input.compass_rad);
         self.last = Some(Last {
+            number: self.tally.frames,
             pose,
             dead_reckoned,
             is_displaced: false,
@@ -334,10 +357,12 @@ impl Last {
             && self.thumbnail.as_ref().is_none_or(Thumbnail::is_sound)
     }
 
-    /// Adds the error of a displacement that no image shows. Such errors add up, as they are alike.
-    fn drift(&mut self, sigma_m: f64) {
+    /// A displacement that no image shows. Such errors add up, as they are alike.
+    fn unseen_step(&mut self, by: Vector2<f64>, sigma_m: f64) -> Step {
         let before = sigma(&self.covariance_m2);
         self.covariance_m2 += Matrix2::identity() * (sigma_m * sigma_m + 2.0 * sigma_m * before);
+        self.shared = 0.0;
+        Step { by, from_heading_rad: self.pose.heading_rad, covariance_m2: Matrix2::identity() * sigma_m * sigma_m }
     }
 
     /// The turn of the map against the corrected compass at the last frame.
@@ -354,11 +379,11 @@ impl Last {
     }
 
     /// The match of a frame at `guess` with this one.
-    fn chain(&self, attempts: &mut Attempts, guess: &FramePose, window_m: f64, relief: f64) -> Option<Link> {
+    fn chain(&self, attempts: &mut Attempts, guess: &FramePose, window_m: f64, relief: ExpectedRelief) -> Option<Link> {
         let old = self.thumbnail.as_ref()?.unpacked()?;
         let similarity = self.pose.to_map().inverse().after(&guess.to_map());
         let found = attempts.attempt(&old, &Expected { similarity, window_m, spread: CHAIN_SPREAD, relief })?;
-        Some(Link { found, pose: self.pose })
+        Some(Link { found, pose: self.pose, older: self.number })
     }
 
     /// Heading and scale of a new frame, by its match with this one, compass and altitude.

@@ -3,6 +3,7 @@
 #![allow(clippy::disallowed_methods, reason = "the test reads recorded frames")]
 
 use crate::camera_image::CameraImage;
+use crate::consensus::ExpectedRelief;
 use crate::flat_field::FlatField;
 use crate::pair::{Attempts, Expected, Gates, Match};
 use crate::pose::FramePose;
@@ -52,7 +53,7 @@ fn attempt(new: &Frame, old: &Frame, off: Vector2<f64>) -> Option<(Match, f64)> 
     let truth = old.pose.to_map().inverse().after(&new.pose.to_map());
     let similarity = truth.through(Vector2::zeros(), truth.apply(Vector2::zeros()) + off);
     let mut attempts = Attempts::new(&scales, 90.0, Gates::default());
-    let expected = Expected { similarity, window_m: 90.0, spread: 0.012, relief: 4e-4 };
+    let expected = Expected { similarity, window_m: 90.0, spread: 0.012, relief: ExpectedRelief::known(4e-4) };
     let found = attempts.attempt(&old.thumbnail.unpacked().unwrap(), &expected)?;
     let error = (found.similarity.apply(found.anchor) - truth.apply(found.anchor)).norm();
     Some((found, error))

@@ -29,6 +29,8 @@ pub struct RegistrationRow {
     pub error_rigid_cells: f64,
     /// The same with the vehicle's own placement of the map.
     pub error_placed_cells: f64,
+    /// As rigid, when the whole graph is solved after the survey; 0 without registration.
+    pub error_solved_cells: f64,
     /// Mutual information of the operator's map with the true classes over the survey's area, unexplored being a label
     /// of its own, after the best turn and shift of the map, nats; `None` without annotation.
     pub information_rigid_nats: Option<f64>,
@@ -47,6 +49,7 @@ pub struct RegistrationSummary {
     pub navigation: Navigation,
     pub error_rigid_cells: f64,
     pub error_placed_cells: f64,
+    pub error_solved_cells: f64,
     /// The mean mutual information divided by that with perfect navigation, rigid and placed.
     pub information_rigid: Option<f64>,
     pub information_placed: Option<f64>,
@@ -98,6 +101,7 @@ fn fly(
         navigation,
         error_rigid_cells: cells(errors.map(|e| e.rigid_m)),
         error_placed_cells: cells(errors.map(|e| e.placed_m)),
+        error_solved_cells: cells(mission.solved_error_m()),
         information_rigid_nats: information.map(|i| i.rigid_nats),
         information_placed_nats: information.map(|i| i.placed_nats),
         frames: tally.frames,
@@ -123,6 +127,7 @@ pub fn summarise(rows: &[RegistrationRow]) -> Vec<RegistrationSummary> {
         navigation,
         error_rigid_cells: mean(navigation, |row| Some(row.error_rigid_cells)).unwrap_or(0.0),
         error_placed_cells: mean(navigation, |row| Some(row.error_placed_cells)).unwrap_or(0.0),
+        error_solved_cells: mean(navigation, |row| Some(row.error_solved_cells)).unwrap_or(0.0),
         information_rigid: share(navigation, |row| row.information_rigid_nats),
         information_placed: share(navigation, |row| row.information_placed_nats),
     };

@@ -9,7 +9,7 @@ use scenecast_protocol::map::{LabelGrid, LayerSource};
 use scenecast_protocol::schedule::Class;
 use scenecast_scoring::mutual_information_nats;
 use serde_json::{Value, json};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// The measurements of a mission that has ended.
 #[derive(Debug, Clone, PartialEq)]
@@ -96,7 +96,16 @@ fn registration(m: &Mission) -> Value {
         "unseen": tally.unseen,
         "error_rigid_m": error.map(|e| round(e.rigid_m)),
         "error_placed_m": error.map(|e| round(e.placed_m)),
+        "closed_at_m": closed_at_m(m),
+        "error_solved_m": m.solved_error_m().map(round),
     })
+}
+
+/// The places on the map at which frames closed a loop, metres east and north, the last 500.
+fn closed_at_m(m: &Mission) -> Vec<[f64; 2]> {
+    let closing: BTreeSet<usize> = m.logbook.graph.loops().map(|(newer, _)| newer).collect();
+    let places = closing.iter().filter_map(|&frame| m.logbook.poses.get(frame)).map(|poses| poses.mapped_at);
+    places.skip(closing.len().saturating_sub(500)).map(|(x, y)| [round(x), round(y)]).collect()
 }
 
 /// How true both maps were at the last sample before the end of the survey, and on the mean over it.

@@ -21,7 +21,7 @@ pub(super) enum ToMapper {
 /// A report of the mapper's thread.
 pub(super) enum FromMapper {
     /// The map after a camera frame, or at the start of the run.
-    Mapped(Mapped),
+    Mapped(Box<Mapped>),
     /// A camera frame that could not be read.
     Missed(UserError),
     /// A checkpoint was refused, or the first one after a refusal was written.
@@ -162,7 +162,7 @@ impl Work {
     fn report_current(&mut self, frame: Option<RecordedFrame>) -> bool {
         let update = self.mapper.current();
         let mapped = self.mapped(frame, None, update);
-        self.report(FromMapper::Mapped(mapped))
+        self.report(FromMapper::Mapped(Box::new(mapped)))
     }
 
     fn see(&mut self, frame: RecordedFrame) -> FromMapper {
@@ -171,7 +171,7 @@ impl Work {
                 let pose = Pose { x: frame.x_m, y: frame.y_m, z: -frame.depth_m, yaw_rad: -frame.heading_rad };
                 let placed = self.mapper.register(&image, &pose, frame.scale);
                 let update = self.mapper.handle_frame(&image, &placed.pose, placed.scale, frame.t_s);
-                FromMapper::Mapped(self.mapped(Some(frame), Some(placed), update))
+                FromMapper::Mapped(Box::new(self.mapped(Some(frame), Some(placed), update)))
             }
             Err(error) => FromMapper::Missed(error),
         }

@@ -36,7 +36,7 @@ pub fn run_vehicle(load: Load, simulated: Option<SimulatedAutopilot>) -> Result<
         let profile = scenecast_drivers::modem::modem_of_process(&config, address)?;
         let recording = match &config.camera.source {
             CameraSource::Rehearsal => None,
-            CameraSource::Frames(dir) => Some(Recording::open(dir, config.camera.metres_per_pixel)?),
+            CameraSource::Frames(dir) => Some(Recording::open(dir, None, config.camera.metres_per_pixel)?),
         };
         let area = survey_area(&config, recording.as_ref())?;
         let mut vehicle = scenecast_vehicle::assemble(
@@ -125,7 +125,7 @@ impl VehicleShell {
                 config = self.reload.next() => self.follow(&config),
                 frame = self.camera.next() => self.handle_camera(frame),
                 mapped = self.mapper.mapped.recv() => match mapped {
-                    Some(FromMapper::Mapped(mapped)) => self.handle_seen(mapped),
+                    Some(FromMapper::Mapped(mapped)) => self.handle_seen(*mapped),
                     Some(FromMapper::Missed(error)) => self.handle_missed(&error),
                     Some(FromMapper::Checkpoint { is_refused }) => self.disk.handle_checkpoint(is_refused),
                     None => return Err(UserError::Failed("the scene model's thread ended".to_owned())),

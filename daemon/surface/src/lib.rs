@@ -16,6 +16,7 @@ mod pauses;
 pub mod position;
 pub mod record;
 pub mod recorder;
+mod registration_record;
 mod send_orders;
 mod settings;
 mod surface;
@@ -31,6 +32,7 @@ pub use exemplar_cache::{ExemplarCache, LabelExemplars, OpenRequest, RequestKind
 pub use label_gains::LabelGains;
 pub use log::{LogEntry, LogKind, MissionLog};
 pub use orders::{AreaOrder, AreasOrder, DestinationOrder, FenceOrder, LimitsOrder, MAX_DISTANCE_M};
+pub use registration_record::RegistrationRecord;
 pub use scenecast_core::{Principal, Role};
 pub use settings::{SettingsOrder, SettingsRecord};
 pub use surface::{Surface, SurfaceOutput};

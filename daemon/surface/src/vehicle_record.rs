@@ -5,6 +5,7 @@ use super::exemplar_cache::ExemplarCache;
 use super::label_gains::LabelGains;
 use super::pauses::Pauses;
 use super::record::{EarlierMap, StoredLabel};
+use super::registration_record::RegistrationRecord;
 use super::settings::SettingsRecord;
 use scenecast_core::UsblLine;
 use scenecast_protocol::directive::{Areas, Destination, ExemplarRequests, Fence, Limits, SlotId, Utility};
@@ -76,6 +77,8 @@ pub struct VehicleRecord {
     pub exemplars: ExemplarCache,
     /// Reported positions in the map frame.
     pub track: Track,
+    /// How its camera frames were placed on the map.
+    pub registration: RegistrationRecord,
     /// Counts the runs of the vehicle that this surface has met, from 1.
     pub run: u32,
     pub epoch: u8,
@@ -161,6 +164,7 @@ impl VehicleRecord {
             settings: SettingsRecord::default(),
             exemplars: ExemplarCache::default(),
             track: Track::default(),
+            registration: RegistrationRecord::default(),
             run: 1,
             epoch: 0,
             whole: WholeMaps::default(),
@@ -250,6 +254,7 @@ impl VehicleRecord {
             self.gains = LabelGains::default();
         }
         self.track.handle_pose(status, at);
+        self.registration.handle_status(status, at);
     }
 
     /// The vehicle has applied the version of a slot that was sent last.

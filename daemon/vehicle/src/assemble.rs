@@ -41,6 +41,7 @@ pub fn assemble(
     link.source_mut().set_debounce(Duration::from_secs_f64(config.map.debounce_s));
     let planner = config.survey.planner;
     let steering = Steering::new(area, footprint(config), cell_m(config), planner, config.survey.clearance_m)
+        .with_leg_overlap(footprint(config), config.survey.leg_overlap_percent / 100.0)
         .with_end(config.survey.at_end);
     let (x, y) = steering.start();
     let depth = (config.survey.depth_m - config.survey.altitude_m).max(0.0);

@@ -4,21 +4,38 @@ use crate::mapper::Mapper;
 use image::RgbImage;
 use scene_model::project::Pose;
 use scenecast_protocol::coordinates::MapPoint;
-use scenecast_registration::{CameraImage, FrameInput, Registrar, Tally};
+use scenecast_registration::{CameraImage, FrameInput, Placed, Registrar, Tally};
 
 /// Standard deviation of the position after a gap in dead reckoning, metres.
 const GAP_SIGMA_M: f64 = 3.0;
 
 /// A frame's place on the map.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct RegisteredFrame {
     pub pose: Pose,
     /// The size of a pixel on the sea floor, divided by the configured size.
     pub scale: f64,
     /// The place by dead reckoning.
     pub dead_reckoned: MapPoint,
+    /// What the registration found; `None` where frames were never registered.
+    pub found: Option<FoundFrame>,
+}
+
+/// A frame's place by the registration.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FoundFrame {
+    pub placed: Placed,
+    /// Frames that closed a loop since the mission's start.
+    pub closed: u32,
+    /// Whether images place frames; otherwise the registration was switched off.
+    pub is_on: bool,
+}
+
+impl RegisteredFrame {
     /// Whether the frame overlaps with an earlier one, as the images show.
-    pub is_seen: bool,
+    pub fn is_seen(&self) -> bool {
+        self.found.as_ref().is_some_and(|found| found.placed.is_chained || found.placed.loops > 0)
+    }
 }
 
 impl Mapper {
@@ -29,7 +46,7 @@ impl Mapper {
     /// `scale` is the size of a pixel on the sea floor, divided by the configured size.
     pub fn register(&mut self, image: &RgbImage, pose: &Pose, scale: f64) -> RegisteredFrame {
         let dead_reckoned = MapPoint::new(pose.x, pose.y);
-        let unregistered = RegisteredFrame { pose: *pose, scale, dead_reckoned, is_seen: false };
+        let unregistered = RegisteredFrame { pose: *pose, scale, dead_reckoned, found: None };
         let metres_per_pixel = scale * self.metres_per_pixel();
         let image = CameraImage::rgb(image.width() as usize, image.height() as usize, image.as_raw());
         let (Some(registrar), Some(image)) = (&mut self.registrar, image) else { return unregistered };
@@ -40,7 +57,7 @@ impl Mapper {
         RegisteredFrame {
             pose: Pose { x, y, z: pose.z, yaw_rad: -placed.pose.heading_rad },
             scale: scale * placed.pose.scale(),
-            is_seen: placed.is_chained || placed.loops > 0,
+            found: Some(FoundFrame { closed: registrar.tally().looped, is_on: self.registers, placed }),
             ..unregistered
         }
     }
@@ -88,7 +105,7 @@ mod tests {
     fn frames_are_placed_where_the_images_show_them() {
         let mut mapper = Mapper::new(&config(&["navigation.drift_percent=5"]), None, 0, 1).unwrap();
         let last = (0..12).map(|i| step(&mut mapper, i)).last().unwrap();
-        assert!(last.is_seen && (last.pose.y - 0.48 * 11.0).abs() < 0.02, "{last:?}");
+        assert!(last.is_seen() && (last.pose.y - 0.48 * 11.0).abs() < 0.02, "{last:?}");
         assert_eq!((last.dead_reckoned, last.pose.z), (MapPoint::new(0.0, 5.5), -16.0));
         assert_eq!(mapper.registration().unwrap().chained, 11);
     }
@@ -111,12 +128,12 @@ mod tests {
         let on = (0..6).map(|i| step(&mut mapper, i)).last().unwrap();
         set(&mut mapper, Change::To(Registration::Off));
         let off = step(&mut mapper, 6);
-        assert!(on.is_seen && !off.is_seen);
+        assert!(on.is_seen() && !off.is_seen());
         let moved = off.pose.y - on.pose.y;
         assert!((0.46..=0.51).contains(&moved), "{moved} m by odometry, as it was learnt");
         set(&mut mapper, Change::Configured);
         let again = (7..10).map(|i| step(&mut mapper, i)).last().unwrap();
-        assert!(again.is_seen && (again.pose.y - 0.48 * 9.0).abs() < 0.06, "{again:?}");
+        assert!(again.is_seen() && (again.pose.y - 0.48 * 9.0).abs() < 0.06, "{again:?}");
     }
 
     #[test]
@@ -126,7 +143,7 @@ mod tests {
         let before = step(&mut mapper, 0);
         mapper.tune(&Settings { registration: Change::To(Registration::On), ..Settings::default() });
         let last = (1..6).map(|i| step(&mut mapper, i)).last().unwrap();
-        assert!(!before.is_seen && last.is_seen, "{last:?}");
+        assert!(!before.is_seen() && last.is_seen(), "{last:?}");
         let restored = Mapper::restore(&config, None, &mapper.save(1)).unwrap().mapper;
         assert_eq!(restored.registration(), mapper.registration(), "a checkpoint has it, whatever is configured");
     }
@@ -135,7 +152,7 @@ mod tests {
     fn without_registration_frames_stay_where_dead_reckoning_places_them() {
         let mut mapper = Mapper::new(&config(&["registration.enabled=false"]), None, 0, 1).unwrap();
         let last = (0..4).map(|i| step(&mut mapper, i)).last().unwrap();
-        assert_eq!((last.pose.y, last.scale, last.is_seen), (1.5, 1.0, false));
+        assert_eq!((last.pose.y, last.scale, last.is_seen()), (1.5, 1.0, false));
         assert_eq!(mapper.registration(), None);
     }
 }

@@ -5,6 +5,7 @@ use super::disk::DiskReport;
 use super::intent::Intent;
 use super::path::PlannedPath;
 use super::placement::Placement;
+use super::registration::RegistrationReport;
 use super::trail::TrailCorner;
 use crate::bytes::{Reader, Truncated, decimetres, put24};
 use crate::coordinates::MapPoint;
@@ -153,6 +154,8 @@ pub struct VehicleStatus {
     pub path: PlannedPath,
     /// The purpose of the plan, a chunk of its own; `None` if no adaptive planner steers.
     pub intent: Option<Intent>,
+    /// How the last camera frames were placed on the map; `None` where frames were never registered.
+    pub registration: Option<RegistrationReport>,
     /// The corners of the track before the position, the latest first; they are a chunk of their own, see [`super::Trail`].
     pub trail: Vec<TrailCorner>,
     /// Number of explored cells on the map.
@@ -292,7 +295,7 @@ impl VehicleStatus {
         (out, 0)
     }
 
-    /// Decodes a pose into `self`, without a trail and an intent; the fields of the report stay unchanged.
+    /// Decodes a pose into `self`, without a trail, an intent and a registration; the fields of the report stay unchanged.
     pub fn read_pose(&mut self, bytes: &[u8]) -> Result<(), StatusError> {
         let mut r = Reader::new(bytes);
         let head = r.u8()?;
@@ -305,7 +308,7 @@ impl VehicleStatus {
         read.fix_age_s = Some(r.u8()?).filter(|&age| age != 255).map(f64::from);
         read.explored_cells = r.u24()?;
         (read.waypoint, read.path) = (None, PlannedPath::default());
-        (read.trail, read.intent) = (Vec::new(), None);
+        (read.trail, read.intent, read.registration) = (Vec::new(), None, None);
         read.autopilot_silent = head & 0b1000 != 0;
         if head & 0b1_0000 != 0 {
             let waypoint = take_point(&mut r)?;

@@ -14,8 +14,8 @@ use scenecast_protocol::map::{
 use scenecast_protocol::map_codec;
 use scenecast_protocol::schedule::{BackgroundOrder, BackgroundStream, Shares};
 use scenecast_protocol::wire::{
-    AckStatement, Address, ChunkKind, DiskReport, Header, Intent, Placement, PlannedPath, Reader, Seal, Stamp, Trail,
-    TrailCorner, VehicleStatus, unwrap_number,
+    AckStatement, Address, ChunkKind, DiskReport, FrameTie, Header, Intent, Placement, PlannedPath, Reader,
+    RegistrationReport, Seal, Stamp, Trail, TrailCorner, VehicleStatus, unwrap_number,
 };
 use std::collections::BTreeMap;
 
@@ -135,6 +135,8 @@ fn status_chunks() -> Rows {
         assert_eq!(VehicleStatus::default().read_pose(&bytes), Ok(()));
         bytes
     };
+    let (tie, share) = (FrameTie::EarlierTrack, 1.0 / 3.0);
+    let registration = RegistrationReport { tie, share, sigma_m: 0.1, closed: 258 };
     let corner = |ago_s, x_m, y_m| TrailCorner { ago_s, place: MapPoint::new(x_m, y_m) };
     let trail = Trail::new(MapPoint::new(1.0, -2.0), &[corner(9, 2.4, -3.4), corner(12, -0.6, -3.4)], 99).unwrap();
     vec![
@@ -156,6 +158,10 @@ fn status_chunks() -> Rows {
         ("intent: another look at label 7", Intent::LabelAgain(7).encode()),
         ("intent: the destination", Intent::Destination.encode()),
         ("intent: the second weighted area", Intent::Area(2).encode()),
+        (
+            "registration: by an earlier track, a third of the last 32 frames by images, 10 cm, 258 frames on a loop",
+            registration.encode().to_vec(),
+        ),
         ("trail to (1, -2) m: 9 s ago at (2.4, -3.4), 12 s ago at (-0.6, -3.4)", trail.encode()),
         (
             "report: epoch 1, 9 labels, digest BEEF, budget 10 000 bit/s (2500 x 2^2), 3 frames refused, 448 bytes of labels (14 x 2^5) \

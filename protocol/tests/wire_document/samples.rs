@@ -84,6 +84,7 @@ pub(crate) fn status() -> VehicleStatus {
         fix_age_s: Some(8.0),
         waypoint: None,
         path: PlannedPath::default(),
+        registration: None,
         intent: None,
         trail: Vec::new(),
         explored_cells: 4000,

@@ -20,6 +20,10 @@ section! {
         /// West, south, east and north limits in the world. All 0: the limits of the recording
         /// or of the rehearsal's mosaic; of the world "reef", 30 x 25 m in its middle.
         area_m: Option<Area> = None, range(-1e6, 1e6, "m"), [Auv Scenario];
+        /// Least overlap of camera frames on neighbouring legs, in percent of a frame's width across the track. Registration
+        /// needs 10 % of overlap to close loops between legs. Legs are never further apart than nine tenths of a frame's
+        /// shorter side, so that 30 % changes nothing for a frame of 4:3, and brings the legs of a square one closer.
+        leg_overlap_percent: f64 = 30.0, range(0.0, 90.0, "%"), [Auv Scenario];
         /// Planner of the vehicle's path once the operator has sent a utility. The operator may choose another.
         planner: PlannerKind = PlannerKind::Horizon, ANY, [Auv Scenario];
         /// What an adaptive survey does once no look pays any more. repeat: it explores the rest of the area, then looks at

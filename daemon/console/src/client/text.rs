@@ -2,7 +2,8 @@
 
 use crate::state::{
     CommandChangeName, CommandChangeState, CommandState, ExemplarProgress, ExemplarStage, LinkSummary, MissionState,
-    OrderProgress, OrderStatus, PrincipalRole, ReportedBacklog, ReportedDisk, ReportedMode, StatusReport, VehicleState,
+    OrderProgress, OrderStatus, PrincipalRole, ReportedBacklog, ReportedDisk, ReportedMode, ReportedRegistration,
+    ReportedTie, StatusReport, VehicleState,
 };
 use std::fmt::Write;
 
@@ -48,6 +49,9 @@ fn vehicle(out: &mut String, v: &VehicleState, state: &MissionState) {
             let _ = writeln!(out, "  disk       {}", disk(state));
         }
     }
+    if let Some(r) = &v.registration {
+        let _ = writeln!(out, "  frames     {}, reported {} ago", registration(r), span(now - r.at_s));
+    }
     let changed = v.map.updated_s.map_or("no cell yet".to_owned(), |at| format!("changed {} ago", span(now - at)));
     let cells = format!("version {}, {} cells, {} labels", v.map.version, v.map.explored_cells, v.labels.len());
     let _ = writeln!(out, "  map        {cells}, {changed}");
@@ -60,6 +64,18 @@ fn vehicle(out: &mut String, v: &VehicleState, state: &MissionState) {
     for s in &v.orders.directive.slots {
         let _ = writeln!(out, "  {:<10} {}, {} ago", s.slot, order(s), span(now - s.changed_s));
     }
+}
+
+/// How the last camera frames were placed.
+fn registration(r: &ReportedRegistration) -> String {
+    let tie = match r.tie {
+        ReportedTie::Off => return "placed by odometry, as registration is off".to_owned(),
+        ReportedTie::Odometry => "lost: placed by odometry",
+        ReportedTie::FrameBefore => "placed by the frame before",
+        ReportedTie::EarlierTrack => "placed by an earlier track",
+    };
+    let share = (100.0 * r.share).round();
+    format!("{tie}, +-{:.2} m, {share} % of the last 32 by images, {} on a loop", r.sigma_m, r.closed)
 }
 
 /// The number of waypoints and the length of the planned path.

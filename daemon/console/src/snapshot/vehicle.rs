@@ -4,14 +4,15 @@ use super::facts::{MissionFacts, seconds};
 use super::{exemplar, link, position};
 use crate::state::{
     AppliedOrder, DirectiveSlots, EarlierMap, InForceKnowledge, MapLabel, MapSummary, OrderProgress, OrderStatus,
-    PlannedPath, ReportedDisk, ReportedMode, ReportedPose, StatusReport, UsblMeasurement, UtilityTerms, VehicleMarker,
-    VehicleNote, VehicleOrders, VehicleSettings, VehicleState, WeightDraft,
+    PlannedPath, ReportedDisk, ReportedMode, ReportedPose, ReportedRegistration, ReportedTie, StatusReport,
+    UsblMeasurement, UtilityTerms, VehicleMarker, VehicleNote, VehicleOrders, VehicleSettings, VehicleState,
+    WeightDraft,
 };
 use scenecast_protocol::coordinates::MapPoint;
 use scenecast_protocol::directive::{self, PlannerKind, REPORTED_SLOTS, SlotProgress};
 use scenecast_protocol::link::{InForce, PeerView};
 use scenecast_protocol::time::Instant;
-use scenecast_protocol::wire::{Address, DiskReport, Intent, VehicleMode, VehicleStatus};
+use scenecast_protocol::wire::{Address, DiskReport, FrameTie, Intent, RegistrationReport, VehicleMode, VehicleStatus};
 use scenecast_surface::record::{StoredDraft, StoredMarker, StoredNote};
 use scenecast_surface::{SettingsOrder, Surface, VehicleRecord};
 
@@ -37,6 +38,8 @@ fn vehicle(
         next_contact_s: view.next_contact(now).map(seconds),
         status: record.status(&view).map(|(s, at)| status(s, record, *at)),
         track: record.track.iter().map(|(at, x, y)| (seconds(at), x, y)).collect(),
+        registration: record.registration.latest().map(registration),
+        closed_loops: record.registration.closures().map(|(at, x, y)| (seconds(at), x, y)).collect(),
         map: map(surface, address, record, &view, labels.values().sum(), facts),
         labels: labels.iter().map(|(&l, &n)| label(l, n, record, &view, address, facts)).collect(),
         link: link::channel(&view, now),
@@ -175,6 +178,17 @@ fn status(s: &VehicleStatus, record: &VehicleRecord, at: Instant) -> StatusRepor
         refused_frames: u32::from(s.refused_frames),
         disk: s.disk.map(disk),
     }
+}
+
+fn registration((report, at): (RegistrationReport, Instant)) -> ReportedRegistration {
+    let tie = match report.tie {
+        FrameTie::Odometry => ReportedTie::Odometry,
+        FrameTie::FrameBefore => ReportedTie::FrameBefore,
+        FrameTie::EarlierTrack => ReportedTie::EarlierTrack,
+        FrameTie::Off => ReportedTie::Off,
+    };
+    let RegistrationReport { share, sigma_m, closed, .. } = report;
+    ReportedRegistration { at_s: seconds(at), tie, share, sigma_m, closed }
 }
 
 fn disk(disk: DiskReport) -> ReportedDisk {

@@ -27,6 +27,13 @@ pub struct VehicleState {
     pub status: Option<StatusReport>,
     /// Mission time, metres east and metres north on the vehicle's map of the last 500 reports.
     pub track: Vec<(f64, f64, f64)>,
+    /// How its last camera frames were placed on the map; null if the vehicle never reported it.
+    #[serde(default)]
+    pub registration: Option<ReportedRegistration>,
+    /// Mission time, metres east and metres north on the vehicle's map of the last 500 reports from a place at which a frame
+    /// overlapped with an earlier track.
+    #[serde(default)]
+    pub closed_loops: Vec<(f64, f64, f64)>,
     /// The map without its cells.
     pub map: MapSummary,
     /// The labels on the map.
@@ -172,6 +179,35 @@ pub struct StatusReport {
     /// The disk with its files; null if it has not reported one.
     #[serde(default)]
     pub disk: Option<ReportedDisk>,
+}
+
+/// How a vehicle's last camera frames were placed on its map.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct ReportedRegistration {
+    /// When the report came in.
+    pub at_s: f64,
+    /// What placed the last frame.
+    pub tie: ReportedTie,
+    /// The part of the last 32 frames that images placed, 0 to 1.
+    pub share: f64,
+    /// Standard deviation of the last frame's place against earlier parts of the map, metres; at most 5.1.
+    pub sigma_m: f64,
+    /// Frames that closed a loop since the start of the mission; at most 65535.
+    pub closed: u16,
+}
+
+/// What placed a camera frame on the map.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum ReportedTie {
+    /// Odometry and compass alone: the image shows no overlap with an earlier one.
+    Odometry,
+    /// The overlap with the frame before.
+    FrameBefore,
+    /// The overlap with a frame of an earlier track.
+    EarlierTrack,
+    /// Odometry and compass alone: the registration of frames is off.
+    Off,
 }
 
 /// The disk with a vehicle's files.

@@ -4,7 +4,7 @@ use crate::floor::{Floor, View};
 use crate::relief::Relief;
 use scenecast_motion::Motion;
 use scenecast_protocol::coordinates::MapPoint;
-use scenecast_registration::{CameraImage, FrameInput, Registrar, Tally};
+use scenecast_registration::{CameraImage, FrameGraph, FrameInput, Registrar, Tally};
 use scenecast_scoring::{PointPair, RigidFit};
 use std::time::Instant;
 
@@ -28,6 +28,8 @@ pub struct Outcome {
     pub dead: f64,
     pub placed: f64,
     pub p95: f64,
+    /// Of the graph of all frames after the flight.
+    pub solved: f64,
     pub ms: f64,
     pub slowest_ms: f64,
     pub tally: Tally,
@@ -90,7 +92,7 @@ pub fn fly(floor: &Floor, case: &Case, seed: u64, kind: u64) -> Outcome {
     let mut next = 1;
     let phase = random.unit() * std::f64::consts::TAU;
     let [mut believed, mut placed] = [const { Vec::new() }; 2];
-    let mut times = Vec::new();
+    let (mut times, mut graph) = (Vec::new(), FrameGraph::default());
     for frame in 0..case.frames {
         for _ in 0..if frame == 0 { 0 } else { 4 } {
             let at = (dead.0 + offset.0, dead.1 + offset.1);
@@ -111,8 +113,10 @@ pub fn fly(floor: &Floor, case: &Case, seed: u64, kind: u64) -> Outcome {
             compass_rad: motion.heading_rad + deviation(case, phase, motion.heading_rad),
         };
         let start = Instant::now();
-        let pose = registrar.handle_frame(&input).pose;
+        let found = registrar.handle_frame(&input);
         times.push(start.elapsed().as_secs_f64() * 1e3);
+        graph.add(&found);
+        let pose = found.pose;
         offset = (pose.at().x_m - dead.0, pose.at().y_m - dead.1);
         let true_at = (motion.x_m, motion.y_m);
         believed.push((dead, true_at));
@@ -122,11 +126,14 @@ pub fn fly(floor: &Floor, case: &Case, seed: u64, kind: u64) -> Outcome {
     if std::env::var_os("ERRORS").is_some() {
         errors.iter().enumerate().for_each(|(i, error)| eprintln!("{i} {error:.3}"));
     }
-    let placed = rms(&errors);
+    let placed_rms = rms(&errors);
     errors.sort_by(f64::total_cmp);
+    let solved: Vec<PointPair> =
+        graph.solve().iter().zip(&placed).map(|(pose, (_, true_at))| (pose.at().xy(), *true_at)).collect();
     Outcome {
         dead: rms(&errors_cells(&believed)),
-        placed,
+        placed: placed_rms,
+        solved: rms(&errors_cells(&solved)),
         p95: errors[errors.len() * 95 / 100],
         ms: times.iter().sum::<f64>() / times.len() as f64,
         slowest_ms: times.iter().copied().fold(0.0, f64::max),

@@ -23,7 +23,7 @@ fn main() {
     let is_wanted = |name: &str| wanted.is_empty() || wanted.iter().any(|word| word == name);
     let scenes = scenes(Path::new(&folder));
     assert!(!scenes.is_empty(), "no images in {folder}");
-    println!("{:22} {:>6} {:>7} {:>7} {:>7}  evidence", "flight", "dead", "placed", "p95", "ms");
+    println!("{:22} {:>6} {:>7} {:>7} {:>7} {:>7}  evidence", "flight", "dead", "placed", "p95", "solved", "ms");
     for case in Case::all().iter().filter(|case| is_wanted(case.name)) {
         let mut outcomes: Vec<Outcome> = Vec::new();
         for kind in 0..seeds {
@@ -35,11 +35,12 @@ fn main() {
         }
         let mean = |of: fn(&Outcome) -> f64| outcomes.iter().map(of).sum::<f64>() / outcomes.len() as f64;
         println!(
-            "{:22} {:6.2} {:7.3} {:7.3} {:7.2}",
+            "{:22} {:6.2} {:7.3} {:7.3} {:7.3} {:7.2}",
             case.name,
             mean(|o| o.dead),
             mean(|o| o.placed),
             mean(|o| o.p95),
+            mean(|o| o.solved),
             mean(|o| o.ms)
         );
     }
@@ -51,8 +52,10 @@ fn main() {
 }
 
 fn print_row(name: &str, outcome: &Outcome) {
-    let Outcome { dead, placed, p95, ms, slowest_ms, tally } = outcome;
-    println!("{name:22} {dead:6.2} {placed:7.3} {p95:7.3} {ms:7.2}  slowest {slowest_ms:.1} ms, {tally:?}");
+    let Outcome { dead, placed, p95, solved, ms, slowest_ms, tally } = outcome;
+    println!(
+        "{name:22} {dead:6.2} {placed:7.3} {p95:7.3} {solved:7.3} {ms:7.2}  slowest {slowest_ms:.1} ms, {tally:?}"
+    );
 }
 
 /// The mosaics of the folder, each with its name.

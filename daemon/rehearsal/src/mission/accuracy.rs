@@ -41,6 +41,19 @@ impl Mission {
         })
     }
 
+    /// The root mean square error of the frames' places when the whole graph is solved after the survey, after the best turn
+    /// and shift, metres; `None` where the truth is not known, or where not all frames were registered.
+    pub(crate) fn solved_error_m(&self) -> Option<f64> {
+        let solved = self.logbook.graph.solve();
+        if self.camera.is_recorded() || solved.is_empty() || solved.len() != self.logbook.poses.len() {
+            return None;
+        }
+        let places = solved.iter().map(|pose| pose.at().xy());
+        let pairs: Vec<_> = places.zip(self.logbook.poses.iter().map(|poses| poses.true_at)).collect();
+        let fit = RigidFit::new(&pairs);
+        Some(rms_distance(pairs.iter().map(|&(solved, truth)| (fit.apply(solved), truth))))
+    }
+
     /// The mutual information of a map in the map frame with the true classes, placed as the vehicle places it; `None` if
     /// the classes are not known.
     pub(crate) fn map_information(&self, map: &LabelGrid) -> Option<MapInformation> {

@@ -39,7 +39,7 @@ impl Camera {
     pub(super) fn new(config: &Config, world: World, record: Option<&Path>) -> Result<Self, UserError> {
         let recording = match &config.camera.source {
             CameraSource::Rehearsal => None,
-            CameraSource::Frames(dir) => Some(Recording::open(dir, config.camera.metres_per_pixel)?),
+            CameraSource::Frames(dir) => Some(Recording::open(dir, None, config.camera.metres_per_pixel)?),
         };
         let recorder = record.map(Recorder::new).transpose()?;
         Ok(Self { world, recording, next: 0, recorder, true_cells: OnceLock::new() })

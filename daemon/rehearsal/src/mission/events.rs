@@ -185,6 +185,9 @@ impl Mission {
         let pose = Pose { x: x_m, y: y_m, z: -depth_m, yaw_rad: -heading_rad };
         let placed = self.mapper.register(image, &pose, scale);
         self.vehicle.handle_registration(&placed, now);
+        if let Some(found) = &placed.found {
+            self.logbook.graph.add(&found.placed);
+        }
         self.logbook.track.push(self.vehicle.vehicle().navigator().position().xy());
         self.logbook.poses.push(FramePoses {
             true_at: (self.motion.x_m, self.motion.y_m),

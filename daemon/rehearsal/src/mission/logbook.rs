@@ -4,6 +4,7 @@ use scenecast_protocol::coordinates::MapPoint;
 use scenecast_protocol::directive::SlotId;
 use scenecast_protocol::link::PeerView;
 use scenecast_protocol::time::Instant;
+use scenecast_registration::FrameGraph;
 use scenecast_vehicle::{AppliedSlot, MapUpdate, Vehicle};
 use std::collections::BTreeMap;
 
@@ -32,6 +33,8 @@ pub(crate) struct Logbook {
     pub(crate) track: Vec<(f64, f64)>,
     /// The true and the mapped place of each frame that the mapper took.
     pub(crate) poses: Vec<FramePoses>,
+    /// All registered frames, to place them together after the survey.
+    pub(crate) graph: FrameGraph,
     pub(crate) update: Option<MapUpdate>,
     /// Bytes that the map would have taken as a PNG file at each of its versions.
     pub(crate) png_full_bytes: u64,

@@ -132,6 +132,9 @@ pub enum VehicleEvent {
     Draft(StoredDraft),
     /// The contents that are or may be in force, slots as on the wire: of each slot the last known one first. Since layout 4.
     InForce(Vec<Vec<u8>>),
+    /// The last report on the registration of frames as on the wire, with its time; the number of positions at which
+    /// frames closed a loop, and the newest ones: time, metres east and north. Since layout 6.
+    Registration { report: Option<(u64, Vec<u8>)>, total: u64, closures: Vec<(u64, f64, f64)> },
 }
 
 /// A run of a vehicle and the epoch of its labels.

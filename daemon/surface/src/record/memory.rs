@@ -8,6 +8,7 @@ use super::event::{
     VehicleEvent,
 };
 use super::former_labels::FormerLabels;
+use crate::registration_record::RegistrationRecord;
 use scenecast_protocol::map::Cell;
 use scenecast_protocol::time::Instant;
 use std::collections::{BTreeMap, VecDeque};
@@ -67,6 +68,10 @@ pub struct VehicleMemory {
     pub(crate) contact: StoredContact,
     pub(crate) track_total: u64,
     pub(crate) track: VecDeque<(u64, f64, f64)>,
+    /// The last report on the registration of frames, with its time; the positions of closed loops, and their number.
+    pub(crate) registration: Option<(u64, Vec<u8>)>,
+    pub(crate) closures_total: u64,
+    pub(crate) closures: VecDeque<(u64, f64, f64)>,
     pub(crate) orders: Vec<StoredOrder>,
     /// The series of the versions of the orders; 0 before the first.
     pub(crate) series: u64,
@@ -228,6 +233,11 @@ impl VehicleMemory {
                 self.track.extend(points.iter().copied());
                 self.track.drain(..self.track.len().saturating_sub(MAX_TRACK));
             }
+            VehicleEvent::Registration { report, total, closures } => {
+                (self.registration, self.closures_total) = (report.clone(), *total);
+                self.closures.extend(closures.iter().copied());
+                self.closures.drain(..self.closures.len().saturating_sub(RegistrationRecord::MAX_CLOSURES));
+            }
             VehicleEvent::Orders { series, orders } => {
                 self.series = *series;
                 self.orders.clone_from(orders);
@@ -315,13 +325,18 @@ impl VehicleMemory {
         all
     }
 
-    /// The events that belong to the current run: identity, map, former labels, contact, track, images, names, notes, markers.
+    /// The events that belong to the current run: identity, map, former labels, contact, track, registration,
+    /// images, names, notes, markers.
     fn run_events(&self) -> Vec<VehicleEvent> {
         let mut all = vec![VehicleEvent::Identified(self.id)];
         all.extend(self.map.to_events().into_iter().map(VehicleEvent::Cells));
         all.extend(self.former.to_events().into_iter().map(VehicleEvent::Former));
         all.push(VehicleEvent::Contact(self.contact.clone()));
         all.push(VehicleEvent::Track { total: self.track_total, points: self.track.iter().copied().collect() });
+        if self.registration.is_some() {
+            let (total, closures) = (self.closures_total, self.closures.iter().copied().collect());
+            all.push(VehicleEvent::Registration { report: self.registration.clone(), total, closures });
+        }
         for (&label, images) in &self.exemplars {
             all.extend(images.iter().map(|image| VehicleEvent::Exemplar { label, image: image.clone() }));
         }

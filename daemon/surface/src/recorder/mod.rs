@@ -299,6 +299,15 @@ fn contact_changes(
         let points = points.map(|(at, x, y)| (at.as_micros(), x, y)).collect();
         events.push(VehicleEvent::Track { total: record.track.total(), points });
     }
+    let report = record.registration.latest().map(|(report, at)| (at.as_micros(), report.encode().to_vec()));
+    if memory.registration != report {
+        let total = record.registration.total();
+        let news = total.saturating_sub(memory.closures_total) as usize;
+        let closures = record.registration.closures();
+        let skipped = closures.len().saturating_sub(news);
+        let closures = closures.skip(skipped).map(|(at, x, y)| (at.as_micros(), x, y)).collect();
+        events.push(VehicleEvent::Registration { report, total, closures });
+    }
     exemplar_changes(record, memory, events);
 }
 

@@ -4,11 +4,12 @@ use super::{command, stored};
 use crate::Surface;
 use crate::exemplar_cache::ExemplarCache;
 use crate::record::{StoredBudget, SurfaceMemory, VehicleMemory};
+use crate::registration_record::RegistrationRecord;
 use crate::vehicle_record::{Track, VehicleRecord};
 use scenecast_protocol::directive::Series;
 use scenecast_protocol::schedule::{BackgroundOrder, Shares};
 use scenecast_protocol::time::Instant;
-use scenecast_protocol::wire::Address;
+use scenecast_protocol::wire::{Address, RegistrationReport};
 
 /// Puts everything back but the maps, which the recorder gives to the surface as earlier maps.
 pub(super) fn restore(surface: &mut Surface, memory: &SurfaceMemory, configured: &StoredBudget) {
@@ -45,6 +46,12 @@ fn restore_record(record: &mut VehicleRecord, memory: &VehicleMemory) {
     stored::restore_places(&memory.places, record);
     let points = memory.track.iter().map(|&(at, x, y)| (Instant::from_micros(at), x, y));
     record.track = Track::restored(points, memory.track_total);
+    let report = memory
+        .registration
+        .as_ref()
+        .and_then(|(at, bytes)| Some((RegistrationReport::decode(bytes).ok()?, Instant::from_micros(*at))));
+    let closures = memory.closures.iter().map(|&(at, x, y)| (Instant::from_micros(at), x, y));
+    record.registration = RegistrationRecord::restored(report, closures, memory.closures_total);
     let last_received = memory.contact.last_received.map(Instant::from_micros);
     record.restore_contact(memory.contact.status(), last_received, memory.contact.pause());
     record.found = memory.contact.range();

@@ -19,12 +19,12 @@ pub(crate) struct Frames {
 
 impl Frames {
     pub(crate) fn open(
-        dir: &Path,
+        (dir, poses): (&Path, Option<&Path>),
         extractor: WordExtractor,
         metres_per_pixel: f64,
         cell_m: f64,
     ) -> Result<Self, UserError> {
-        let recording = Recording::open(dir, metres_per_pixel)?;
+        let recording = Recording::open(dir, poses, metres_per_pixel)?;
         Ok(Self { recording, extractor, metres_per_pixel, cell_m, next: 0, unreadable: Vec::new() })
     }
 }

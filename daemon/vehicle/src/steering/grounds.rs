@@ -4,14 +4,14 @@ use crate::planning::{Bounds, Lattice, Node, Paths, Point, distance};
 use scenecast_core::Area;
 use scenecast_protocol::directive::Fence;
 
-/// Distance between two places of the lattice, in reaches of the camera. Views overlap by a tenth.
-const STEP: f64 = 0.9;
 /// The lattice over area and fence, in the world frame.
 #[derive(Debug)]
 pub(super) struct Grounds {
     area: Area,
     /// Metres around the centre of a frame that are visible at any heading.
     reach_m: f64,
+    /// Distance between two places of the lattice, metres; legs are two of them apart.
+    step_m: f64,
     clearance_m: f64,
     bounds: Bounds,
     /// The first place of the survey. Without a return point the vehicle returns to it.
@@ -24,19 +24,23 @@ pub(super) struct Grounds {
 }
 
 impl Grounds {
-    pub(super) fn new(area: Area, reach_m: f64, clearance_m: f64) -> Self {
+    pub(super) fn new(area: Area, (reach_m, step_m): (f64, f64), clearance_m: f64) -> Self {
         let bounds = Bounds::default();
-        let lattice = Lattice::new(area.shrunk(reach_m), &[], STEP * reach_m, &bounds);
+        let lattice = Lattice::new(area.shrunk(reach_m), &[], step_m, &bounds);
         let start = lattice.place(0);
         let (return_point, return_paths, last_leg_m) = (None, None, 0.0);
         let mut grounds =
-            Self { area, reach_m, clearance_m, bounds, start, return_point, lattice, return_paths, last_leg_m };
+            Self { area, reach_m, step_m, clearance_m, bounds, start, return_point, lattice, return_paths, last_leg_m };
         grounds.lay_out();
         grounds
     }
 
     pub(super) fn area(&self) -> Area {
         self.area
+    }
+
+    pub(super) fn clearance_m(&self) -> f64 {
+        self.clearance_m
     }
 
     pub(super) fn reach_m(&self) -> f64 {
@@ -73,7 +77,7 @@ impl Grounds {
 
     fn lay_out(&mut self) -> Lattice {
         let inner = self.area.shrunk(self.reach_m);
-        let lattice = Lattice::new(inner, &[self.return_place()], STEP * self.reach_m, &self.bounds);
+        let lattice = Lattice::new(inner, &[self.return_place()], self.step_m, &self.bounds);
         let before = std::mem::replace(&mut self.lattice, lattice);
         let end = self.entry(self.return_place());
         self.return_paths = end.map(|n| self.lattice.paths(n));
@@ -107,5 +111,18 @@ impl Grounds {
     /// The distance in metres at which a waypoint counts as reached.
     pub(super) fn arrival_m(&self) -> f64 {
         0.5f64.min(self.clearance_m.max(0.1) / 2.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::Footprint;
+
+    #[test]
+    fn legs_overlap_by_the_configured_part_of_a_frame() {
+        let legs_m = |across, along, overlap| 2.0 * Footprint { across, along }.lattice_step(overlap);
+        assert!((legs_m(6.4, 4.8, 0.3) - 4.32).abs() < 1e-9, "nine tenths of the shorter side");
+        assert!((legs_m(4.8, 4.8, 0.3) - 0.7 * 4.8).abs() < 1e-9);
+        assert!((legs_m(3.0, 4.8, 0.5) - 0.5 * 3.0).abs() < 1e-9);
     }
 }

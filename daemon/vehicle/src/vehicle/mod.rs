@@ -23,6 +23,7 @@ use super::failsafe::FailsafePolicy;
 use super::mapper::{MapUpdate, SharedExemplars};
 use super::navigator::Navigator;
 use super::registration::RegisteredFrame;
+use super::registration_monitor::RegistrationMonitor;
 use super::steering::Steering;
 use super::track::RecentTrack;
 use gallery::Gallery;
@@ -71,6 +72,7 @@ pub struct AppliedSlot {
 pub struct Vehicle {
     link: VehicleLink,
     navigator: Navigator,
+    registration: RegistrationMonitor,
     track: RecentTrack,
     guidance: Guidance,
     publisher: MapPublisher,
@@ -106,6 +108,7 @@ impl Vehicle {
         let mut vehicle = Self {
             link,
             navigator,
+            registration: RegistrationMonitor::default(),
             track: RecentTrack::default(),
             guidance: Guidance::new(steering, policy, &durable, &settings, now),
             publisher: MapPublisher::default(),
@@ -189,7 +192,8 @@ impl Vehicle {
     /// The mapper has placed a camera frame on the map.
     pub fn handle_registration(&mut self, frame: &RegisteredFrame, now: Instant) {
         let placed = MapPoint { x_m: frame.pose.x, y_m: frame.pose.y };
-        self.navigator.handle_registration(frame.dead_reckoned, placed, frame.is_seen, now);
+        self.navigator.handle_registration(frame.dead_reckoned, placed, frame.is_seen(), now);
+        self.registration.handle_frame(frame);
         self.track.handle_place(self.navigator.position(), now);
     }
 

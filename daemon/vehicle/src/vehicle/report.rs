@@ -110,6 +110,7 @@ impl Vehicle {
             waypoint: self.guidance.waypoint(),
             path: self.guidance.path().clone(),
             intent: self.guidance.intent(),
+            registration: self.registration.report(),
             trail: self.track.corners(self.navigator.position(), now),
             epoch: self.storing.epoch(),
             labels: self.publisher.labels(),

@@ -10,7 +10,7 @@ use scenecast_protocol::seal::{Direction, MissionKey};
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::{
     AckStatement, Address, Envelope, Frame, FrameBuilder, FrameKind, Header, Intent, Introduction, MAX_WINDOW,
-    MissionId, Reader, Seal, SessionId, Stamp, Trail, VehicleStatus,
+    MissionId, Reader, RegistrationReport, Seal, SessionId, Stamp, Trail, VehicleStatus,
 };
 use std::time::Duration;
 
@@ -151,6 +151,9 @@ pub fn status(data: &[u8]) {
     }
     if let Ok(intent) = Intent::decode(data) {
         assert_eq!(intent.encode(), data);
+    }
+    if let Ok(registration) = RegistrationReport::decode(data) {
+        assert_eq!(registration.encode(), data);
     }
     let (mut pose, mut report) = (VehicleStatus::default(), VehicleStatus::default());
     if pose.read_pose(data).is_ok() {

@@ -95,12 +95,18 @@ impl StatusSender {
     pub(super) fn fill_pose(&mut self, builder: &mut FrameBuilder, now: Instant) -> Option<usize> {
         let status = self.status.as_ref().filter(|_| now >= self.pose_due)?;
         let period = self.period.max(time_of_share(status.budget_bps, VehicleStatus::POSE));
-        // The path and the trail may take a hundredth of the budget each.
+        // The path, the registration and the trail may take a hundredth of the budget each.
         let share = (period.as_secs_f64() * f64::from(status.budget_bps) / 800.0) as usize;
         let mut length = 0;
         if let Some(bytes) = status.intent.map(Intent::encode)
             && bytes.len() <= room_before_pose(builder.room())
             && builder.push(ChunkKind::Intent, &bytes)
+        {
+            length += bytes.len();
+        }
+        if let Some(bytes) = status.registration.map(|report| report.encode())
+            && bytes.len() <= share.min(room_before_pose(builder.room()))
+            && builder.push(ChunkKind::Registration, &bytes)
         {
             length += bytes.len();
         }

@@ -21,6 +21,7 @@ fn golden_bytes_of_a_status() {
         fix_age_s: Some(8.0),
         waypoint: None,
         path: PlannedPath::default(),
+        registration: None,
         intent: None,
         trail: Vec::new(),
         explored_cells: 4000,

@@ -9,6 +9,7 @@ export function drawVehicle(c, view, ink, vehicle, chosen) {
   const stale = isStale(vehicle);
   c.globalAlpha = chosen ? 1 : 0.6;
   drawTrack(c, view, ink, vehicle.track);
+  drawClosedLoops(c, view, ink, vehicle.closed_loops ?? []);
   if (vehicle.status) {
     const s = vehicle.status;
     const tone = stale ? ink.stale : ink.vehicle;
@@ -57,6 +58,19 @@ function drawTrack(c, view, ink, track) {
     c.beginPath();
     for (const [, x, y] of track) c.lineTo(...view.toScreen(x, y));
     c.stroke();
+  }
+}
+
+/** Small rings where a frame overlapped with an earlier track, which straightens the map. */
+function drawClosedLoops(c, view, ink, places) {
+  for (const [style, width] of [[ink.sea, 3.5], [ink.track, 1.5]]) {
+    c.strokeStyle = style;
+    c.lineWidth = width;
+    for (const [, x, y] of places) {
+      c.beginPath();
+      c.arc(...view.toScreen(x, y), 3.5, 0, 2 * Math.PI);
+      c.stroke();
+    }
   }
 }
 

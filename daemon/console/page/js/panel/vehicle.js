@@ -15,7 +15,7 @@ const mode = h("span.mode");
 const age = h("p.age", { title: "The age of the last report, the time since the last frame, and the longest usual pause between two frames" });
 /** Free space in bytes below which the panel warns. */
 const LOW_SPACE = 1e9;
-const WHOLE_LINES = ["path", "cells", "disk"];
+const WHOLE_LINES = ["registration", "path", "cells", "disk"];
 const values = {};
 const lines = {};
 const list = h("dl.values");
@@ -29,6 +29,7 @@ export function startVehicle() {
     ["heading", "Heading", "The direction of the vehicle's bow, clockwise from north"],
     ["sigma", "Position \u03c3", "Standard deviation of the position; the ring on the map has twice this radius"],
     ["fix", "Last fix", "The age of the last position fix that the vehicle has used"],
+    ["registration", "Camera frames", "What placed the last camera frame on the map, and how exactly against earlier parts of it; rings on the track mark places where a frame overlapped with an earlier track"],
     ["waypoint", "Waypoint", "Distance and direction from the reported position to the next place of the plan"],
     ["path", "Path", "The plan from the reported position through the waypoint to the last reported place; dashed on the map"],
     ["cells", "Vehicle's map", "Explored cells and labels of the vehicle's own map, by its last report"],
@@ -62,6 +63,8 @@ function update() {
   values.heading(s ? degrees(s.heading_deg) : none);
   values.sigma(s ? metres(s.sigma_m) : none);
   values.fix(s?.fix_age_s === null || !s ? "none" : `${span(s.fix_age_s + ageOf(s.at_s))} ago`);
+  values.registration(registration(v.registration));
+  lines.registration.classList.toggle("warn", v.registration?.tie === "odometry");
   values.waypoint(s?.waypoint ? leg(s) : none);
   values.path(s?.waypoint ? plannedPath(s) : none);
   values.cells(s ? `${count(s.cells)} cells, ${s.labels} labels` : none);
@@ -75,6 +78,16 @@ function update() {
 }
 
 const total = (counts) => Object.values(counts).reduce((sum, n) => sum + n, 0);
+
+const TIES = { odometry: "lost, by odometry", frame_before: "by the frame before", earlier_track: "by an earlier track", off: "by odometry, registration is off" };
+
+/** What placed the last camera frames on the map. */
+function registration(r) {
+  if (!r) return none;
+  if (r.tie === "off") return TIES.off;
+  const share = r.share < 0.995 ? `, ${Math.round(100 * r.share)} % of the last 32 by images` : "";
+  return `${TIES[r.tie]}, \u00b1 ${metres(r.sigma_m, 2)}${share}, ${count(r.closed)} on a loop`;
+}
 
 function gps(p) {
   if (!p) return "none";

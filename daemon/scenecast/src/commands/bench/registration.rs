@@ -52,12 +52,13 @@ impl RegistrationBench {
         let surveys = self.surveys(&config)?;
         if !self.json {
             println!(
-                "{:<20} {:>4} {:<13} {:>6} {:>7} {:>6} {:>7} {:>6} {:>7} {:>5} {:>12}",
+                "{:<20} {:>4} {:<13} {:>6} {:>7} {:>6} {:>6} {:>7} {:>6} {:>7} {:>5} {:>12}",
                 "scene",
                 "seed",
                 "navigation",
                 "rigid",
                 "placed",
+                "solved",
                 "nats",
                 "placed",
                 "frames",
@@ -129,12 +130,13 @@ fn name(navigation: Navigation) -> &'static str {
 fn print(row: &RegistrationRow) {
     let nats = |value: Option<f64>| value.map_or("-".to_owned(), |nats| format!("{nats:.3}"));
     println!(
-        "{:<20} {:>4} {:<13} {:>6.3} {:>7.3} {:>6} {:>7} {:>6} {:>7} {:>5} {:>12}",
+        "{:<20} {:>4} {:<13} {:>6.3} {:>7.3} {:>6.3} {:>6} {:>7} {:>6} {:>7} {:>5} {:>12}",
         row.scene,
         row.seed,
         name(row.navigation),
         row.error_rigid_cells,
         row.error_placed_cells,
+        row.error_solved_cells,
         nats(row.information_rigid_nats),
         nats(row.information_placed_nats),
         row.frames,
@@ -147,10 +149,11 @@ fn print(row: &RegistrationRow) {
 fn print_mean(mean: &RegistrationSummary) {
     let share = |value: Option<f64>| value.map_or("-".to_owned(), |share| format!("{share:.3}"));
     println!(
-        "mean {:<13}: error {:.3} rigid, {:.3} placed; share of the information {} rigid, {} placed",
+        "mean {:<13}: error {:.3} rigid, {:.3} placed, {:.3} solved; share of the information {} rigid, {} placed",
         name(mean.navigation),
         mean.error_rigid_cells,
         mean.error_placed_cells,
+        mean.error_solved_cells,
         share(mean.information_rigid),
         share(mean.information_placed)
     );

@@ -1,6 +1,7 @@
 //! `scenecast scene`
 
 mod pairs;
+mod register;
 mod run;
 mod sample;
 mod score;
@@ -12,6 +13,7 @@ use scenecast_core::UserError;
 #[derive(Debug, Subcommand)]
 pub enum Scene {
     Run(Box<run::Run>),
+    Register(register::Register),
     Sample(sample::Sample),
     /// Score the scene model and two baselines on annotated images.
     Score(score::Score),
@@ -21,6 +23,7 @@ impl Scene {
     pub fn run(self) -> Result<(), UserError> {
         match self {
             Self::Run(run) => run.run(),
+            Self::Register(register) => register.run(),
             Self::Sample(sample) => sample.run(),
             Self::Score(score) => score.run(),
         }

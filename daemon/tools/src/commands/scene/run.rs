@@ -64,6 +64,9 @@ pub struct Run {
 struct Input {
     #[command(flatten)]
     which: Which,
+    /// Poses of a frames source, as of scenecast scene register [default: poses.csv of its folder]
+    #[arg(long, value_name = "FILE.csv", requires = "source")]
+    poses: Option<PathBuf>,
     /// Size of a pixel on the ground, mosaic and frames [default: 0.01]
     #[arg(long, value_name = "M", allow_negative_numbers = true)]
     metres_per_pixel: Option<f64>,
@@ -216,7 +219,10 @@ impl Run {
             "frames" => {
                 let metres_per_pixel = self.metres_per_pixel()?;
                 let cell_m = self.columns(CELL_PX * metres_per_pixel);
-                (Box::new(Frames::open(dir, extractor, metres_per_pixel, cell_m[0])?), cell_m)
+                (
+                    Box::new(Frames::open((dir, self.input.poses.as_deref()), extractor, metres_per_pixel, cell_m[0])?),
+                    cell_m,
+                )
             }
             _ => return Err(UserError::Input("--source: it takes tum:DIR or frames:DIR".to_owned())),
         };

@@ -10,7 +10,7 @@ use crate::map::{LayerChunk, StateReplica};
 use crate::object::{ObjectReceiver, Part, Received};
 use crate::schedule::Class;
 use crate::time::Instant;
-use crate::wire::{Address, Chunk, ChunkKind, Chunks, Intent, Trail, VehicleStatus};
+use crate::wire::{Address, Chunk, ChunkKind, Chunks, Intent, RegistrationReport, Trail, VehicleStatus};
 use std::collections::VecDeque;
 
 /// The result of handling a chunk.
@@ -128,6 +128,7 @@ impl<R: StateReplica> PeerContent<R> {
             ChunkKind::Map => ChunkOutcome::Contradictory,
             ChunkKind::Pose => accepted_if(self.status.read_pose(chunk.payload, number, now)),
             ChunkKind::Intent => accepted_if(self.status.read_intent(chunk.payload, number)),
+            ChunkKind::Registration => accepted_if(self.status.read_registration(chunk.payload, number)),
             ChunkKind::Trail => accepted_if(self.status.read_trail(chunk.payload, number)),
             ChunkKind::Report => self.handle_report(chunk.payload, stats, now),
             ChunkKind::Object => accepted_if(self.handle_object(vehicle, chunk.payload, events)),
@@ -171,9 +172,8 @@ impl<R: StateReplica> PeerContent<R> {
 pub(super) fn class_of(chunk: &Chunk<'_>) -> Class {
     match chunk.kind {
         ChunkKind::Map => Class::Map,
-        ChunkKind::Pose | ChunkKind::Trail | ChunkKind::Intent | ChunkKind::Report | ChunkKind::InForce => {
-            Class::Status
-        }
+        ChunkKind::Pose | ChunkKind::Trail | ChunkKind::Intent | ChunkKind::Registration => Class::Status,
+        ChunkKind::Report | ChunkKind::InForce => Class::Status,
         ChunkKind::Slot | ChunkKind::Inquiry => Class::Directive,
         ChunkKind::Introduction => Class::Overhead,
         ChunkKind::Object => Class::Exemplar,
@@ -186,6 +186,7 @@ fn decode<R: StateReplica>(replica: &R, layers: &Layers, base: FrameNumber, mut 
         ChunkKind::Map => replica.decodes(base, chunk.payload),
         ChunkKind::Pose => VehicleStatus::default().read_pose(chunk.payload).is_ok(),
         ChunkKind::Intent => Intent::decode(chunk.payload).is_ok(),
+        ChunkKind::Registration => RegistrationReport::decode(chunk.payload).is_ok(),
         ChunkKind::Trail => Trail::decode(chunk.payload).is_ok(),
         ChunkKind::Report => VehicleStatus::default().read_report(chunk.payload).is_ok(),
         ChunkKind::Object => Part::decode(chunk.payload).is_ok(),

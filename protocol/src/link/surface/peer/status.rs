@@ -3,7 +3,7 @@
 use crate::directive::{SlotId, SlotReport, SlotState};
 use crate::link::FrameNumber;
 use crate::time::Instant;
-use crate::wire::{Intent, PlannedPath, Trail, VehicleStatus};
+use crate::wire::{Intent, PlannedPath, RegistrationReport, Trail, VehicleStatus};
 
 /// The pose and the report of a vehicle, of which one may come in before the other.
 #[derive(Debug, Default)]
@@ -15,6 +15,8 @@ pub(super) struct StatusParts {
     trail: Option<(Trail, FrameNumber)>,
     /// The intent of the last frame that had one.
     intent: Option<(Intent, FrameNumber)>,
+    /// The registration of the last frame that had one.
+    registration: Option<(RegistrationReport, FrameNumber)>,
     has_report: bool,
     whole: Option<(VehicleStatus, Instant)>,
 }
@@ -44,6 +46,7 @@ impl StatusParts {
                 read.trail = trail.corners(read.position);
             }
             read.intent = self.intent.filter(|(_, of)| *of == number).map(|(intent, _)| intent);
+            read.registration = self.registration.filter(|(_, of)| *of == number).map(|(report, _)| report);
             (self.latest, self.pose) = (read, Some((now, number)));
         }
         self.join();
@@ -62,6 +65,12 @@ impl StatusParts {
     pub(super) fn read_intent(&mut self, payload: &[u8], number: FrameNumber) -> bool {
         self.intent = Intent::decode(payload).ok().map(|intent| (intent, number));
         self.intent.is_some()
+    }
+
+    /// Reads a registration, which waits for the pose of its frame; returns whether it makes sense.
+    pub(super) fn read_registration(&mut self, payload: &[u8], number: FrameNumber) -> bool {
+        self.registration = RegistrationReport::decode(payload).ok().map(|report| (report, number));
+        self.registration.is_some()
     }
 
     /// Reads a report; returns whether it makes sense.
