@@ -159,7 +159,7 @@ fn status_chunks() -> Rows {
         ("intent: the destination", Intent::Destination.encode()),
         ("intent: the second weighted area", Intent::Area(2).encode()),
         (
-            "registration: by an earlier track, a third of the last 32 frames by images, 10 cm, 258 frames on a loop",
+            "registration: by an earlier track, a third of the last 32 frames by images, 10 cm, 258 closed loops",
             registration.encode().to_vec(),
         ),
         ("trail to (1, -2) m: 9 s ago at (2.4, -3.4), 12 s ago at (-0.6, -3.4)", trail.encode()),

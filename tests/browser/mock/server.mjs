@@ -8,6 +8,7 @@
 //   {"scenario": "rich", "advance": 60, "times": 3, "speed": 20, "silent": true, "refuse": "utility",
 //    "loss": 0.3, "layers": true, "coarse": true, "without_image": [3], "position": {"x_m": 5, ..},
 //    "placement": {"version": 1, "east_m": 20, "north_m": -5}, "contact": {"received_s_ago": 300, "due_s_ago": 290},
+//    "registration": {"at_s": 5, "tie": "earlier_track", "share": 1, "sigma_m": 0.04, "closed": 12}, "closed_loops": [[5, 1.5, -2]],
 //    "label_at": {"x_m": 5.1, "y_m": -3, "label": 2},
 //    "ended": true, "truth": true, "principals": [{"name": "anna", "role": "operator"}], "commander": "anna", "stream": false, "mute": true, "down": true}
 
@@ -207,6 +208,8 @@ function steer(mock, order, res) {
   const { mission } = mock;
   if ("in_force" in order) mission.vehicles[0].knownInForce = order.in_force;
   if (order.contact) mission.vehicles[0].setContact(mission.nowS, order.contact);
+  if ("registration" in order) mission.vehicles[0].registration = order.registration;
+  if ("closed_loops" in order) mission.vehicles[0].closedLoops = order.closed_loops;
   if ("mismatch" in order) mission.vehicles[0].mismatch = order.mismatch;
   if ("earlier" in order) mission.vehicles[0].earlier = order.earlier;
   for (const entry of order.log ?? []) mission.log.push({ number: mission.log.length + 1, at_s: mission.nowS, utc: "2026-11-23T10:00:00Z", by: null, vehicle: null, ...entry });

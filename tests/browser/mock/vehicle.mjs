@@ -186,6 +186,7 @@ export class Vehicle {
     return {
       id: this.id, name: this.name, last_received_s: this.receivedS, expected_interval_s: this.turnS,
       next_contact_s: this.receivedS === null ? null : this.nextTurnS, status: this.status, track: this.track,
+      registration: this.registration ?? null, closed_loops: this.closedLoops ?? [],
       map: {
         version: this.replica.version, cell_m: this.replica.cellM, ...bounds,
         explored_cells: this.replica.size, updated_s: this.updatedS ?? null, epoch: 0, placement: this.placement ?? null, earlier: this.earlier ?? null,

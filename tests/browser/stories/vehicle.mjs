@@ -49,6 +49,36 @@ export default [
     },
   },
   {
+    name: "what places the camera frames is shown, with closed loops on the map",
+    scenario: "rich",
+    async run(s) {
+      await s.shows("#vehicle dl", /Camera frames\s+\u2013/);
+      const report = { at_s: 5, share: 1, sigma_m: 0.04, closed: 12 };
+      await s.steer({ registration: { ...report, tie: "earlier_track" } });
+      await s.shows("#vehicle dl", /Camera frames\s+by an earlier track, \u00b1 0\.04\sm, 12 closed loops/);
+      const lost = () => s.page.locator("#vehicle .warn", { hasText: "Camera frames" });
+      assert.equal(await lost().count(), 0);
+      const place = await s.inPage(({ store, view, onMap }) => {
+        const box = document.getElementById("chart").getBoundingClientRect();
+        return onMap(store.vehicle, ...view.toWorld(box.width * 0.15, box.height * 0.85));
+      });
+      const ring = () =>
+        s.inPage(({ store, view, inWorld, ink }, [x, y]) => {
+          const [px, py] = view.toScreen(...inWorld(store.vehicle, x, y)).map(Math.round);
+          const c = document.getElementById("chart").getContext("2d");
+          const track = ink("--map-track");
+          const pixels = c.getImageData(px - 6, py - 6, 13, 13).data;
+          return [...Array(169).keys()].filter((i) => track.every((w, n) => Math.abs(w - pixels[4 * i + n]) < 60)).length;
+        }, place);
+      const before = await ring();
+      await s.steer({ closed_loops: [[5, ...place]] });
+      await s.until("a ring on the map", async () => (await ring()) > before + 8);
+      await s.steer({ registration: { ...report, tie: "odometry", share: 0.5, sigma_m: 0.3 } });
+      await s.shows("#vehicle dl", /Camera frames\s+lost, by odometry, \u00b1 0\.30\sm, 50 % of the last 32 by images, 12 closed loops/);
+      await s.until("a warning", async () => (await lost().count()) === 1);
+    },
+  },
+  {
     name: "the vehicle's status is shown with its age",
     async run(s) {
       await s.shows("#vehicle .age", /Status .* old · received .* ago, due every/, { ms: 60000, advance: 5 });

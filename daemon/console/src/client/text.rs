@@ -75,7 +75,7 @@ fn registration(r: &ReportedRegistration) -> String {
         ReportedTie::EarlierTrack => "placed by an earlier track",
     };
     let share = (100.0 * r.share).round();
-    format!("{tie}, +-{:.2} m, {share} % of the last 32 by images, {} on a loop", r.sigma_m, r.closed)
+    format!("{tie}, +-{:.2} m, {share} % of the last 32 by images, {} closed loops", r.sigma_m, r.closed)
 }
 
 /// The number of waypoints and the length of the planned path.

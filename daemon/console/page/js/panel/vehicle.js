@@ -86,7 +86,7 @@ function registration(r) {
   if (!r) return none;
   if (r.tie === "off") return TIES.off;
   const share = r.share < 0.995 ? `, ${Math.round(100 * r.share)} % of the last 32 by images` : "";
-  return `${TIES[r.tie]}, \u00b1 ${metres(r.sigma_m, 2)}${share}, ${count(r.closed)} on a loop`;
+  return `${TIES[r.tie]}, \u00b1 ${metres(r.sigma_m, 2)}${share}, ${count(r.closed)} closed loops`;
 }
 
 function gps(p) {
