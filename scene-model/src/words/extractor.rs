@@ -8,6 +8,7 @@ use super::colour::ColourWords;
 use super::colour_field::ColourField;
 use super::config::{WordConfig, first_id};
 use super::context::{ContextWords, SpreadWords};
+use super::discriminant::{Discriminant, MEASURES, MeasuredPlace};
 use super::grey_plane::GreyPlane;
 use super::moments::Moments;
 use super::stretch::Stretch;
@@ -27,6 +28,9 @@ pub struct Measures {
     context: ContextWords,
     spread: SpreadWords,
     texture: [Moments; 3],
+    /// Stored beside the measures, since files of earlier builds have none.
+    #[serde(skip)]
+    discriminant: Option<Discriminant>,
 }
 
 impl Measures {
@@ -35,7 +39,34 @@ impl Measures {
     pub fn config(&self) -> &WordConfig {
         &self.config
     }
+
+    /// The discriminant of the extractor.
+    #[must_use]
+    pub fn discriminant(&self) -> Option<&Discriminant> {
+        self.discriminant.as_ref()
+    }
+
+    /// Returns these measures with a discriminant. Serialised measures do not contain it.
+    #[must_use]
+    pub fn with_discriminant(self, discriminant: Option<Discriminant>) -> Self {
+        Self { discriminant, ..self }
+    }
+
+    /// Returns whether the measures are frozen, so that frames change none of them.
+    #[must_use]
+    pub fn are_frozen(&self) -> bool {
+        self.frames == FROZEN
+    }
+
+    /// Returns the number of different words (V).
+    #[must_use]
+    pub fn vocabulary_size(&self) -> u32 {
+        vocabulary_size(&self.config, self.discriminant.as_ref())
+    }
 }
+
+/// The number of frames of an extractor whose warm-up has ended.
+const FROZEN: u32 = u32::MAX;
 
 /// Extracts the visual words of frames, one after another.
 ///
@@ -65,6 +96,7 @@ pub struct WordExtractor {
     spread: SpreadWords,
     texture: TextureWords,
     binary: BinaryWords,
+    discriminant: Option<Discriminant>,
 }
 
 impl WordExtractor {
@@ -80,6 +112,7 @@ impl WordExtractor {
             spread: SpreadWords::default(),
             texture: TextureWords::default(),
             binary: BinaryWords::default(),
+            discriminant: None,
         }
     }
 
@@ -95,6 +128,7 @@ impl WordExtractor {
             spread: measures.spread,
             texture: TextureWords::with_energy(measures.texture),
             binary: BinaryWords::default(),
+            discriminant: measures.discriminant,
         }
     }
 
@@ -112,13 +146,13 @@ impl WordExtractor {
     /// `cell_px` is the edge of a cell in pixels. An image that [`Self::extract`] refuses is ignored.
     pub fn learn_statistics(&mut self, image: &RgbImage, cell_px: f32) {
         if is_usable(image, cell_px) {
-            self.words(image, cell_px, true);
+            self.words(image, cell_px, Pass { learn: true, measure: false });
         }
     }
 
     /// Ends the warm-up: later frames change no measure.
     pub fn freeze(&mut self) {
-        self.frames = u32::MAX;
+        self.frames = FROZEN;
     }
 
     /// Returns a copy of the measures so far, to be stored with the model.
@@ -132,13 +166,14 @@ impl WordExtractor {
             context: self.context.clone(),
             spread: self.spread.clone(),
             texture: self.texture.learnt(),
+            discriminant: self.discriminant.clone(),
         }
     }
 
     /// Returns the number of different words (V).
     #[must_use]
     pub fn vocabulary_size(&self) -> u32 {
-        self.config.vocabulary_size()
+        vocabulary_size(&self.config, self.discriminant.as_ref())
     }
 
     /// Returns the words of a frame; `cell_px` is the edge of a cell in pixels at this altitude.
@@ -149,25 +184,49 @@ impl WordExtractor {
         if !is_usable(frame, cell_px) {
             return Vec::new();
         }
+        let learn = self.begin_frame(frame);
+        self.words(frame, cell_px, Pass { learn, measure: false }).0
+    }
+
+    /// Returns the measures of a frame, from which directions are learnt: a place for each word of a
+    /// [`Discriminant`]. The frame counts as one of [`Self::extract`].
+    ///
+    /// There are none if [`WordConfig`] has no colour words, or different numbers of context, spread and texture words.
+    pub fn measure(&mut self, frame: &RgbImage, cell_px: f32) -> Vec<MeasuredPlace> {
+        if !is_usable(frame, cell_px) {
+            return Vec::new();
+        }
+        let learn = self.begin_frame(frame);
+        self.words(frame, cell_px, Pass { learn, measure: true }).1
+    }
+
+    /// Counts a frame; returns whether it is learnt from.
+    fn begin_frame(&mut self, frame: &RgbImage) -> bool {
         let learn = self.frames < self.config.warm_up_frames.max(1);
         self.frames = self.frames.saturating_add(1);
         if learn {
             self.stretch.learn(frame);
         }
-        self.words(frame, cell_px, learn)
+        learn
     }
 
-    fn words(&mut self, frame: &RgbImage, cell_px: f32, learn: bool) -> Vec<Word> {
-        let mut words = Vec::new();
-        self.colour_words(frame, cell_px, learn, &mut words);
-        self.texture_words(frame, cell_px, learn, &mut words);
-        words
+    fn words(&mut self, frame: &RgbImage, cell_px: f32, pass: Pass) -> (Vec<Word>, Vec<MeasuredPlace>) {
+        let (mut words, learn) = (Vec::new(), pass.learn);
+        let pass = Pass { measure: pass.measure || self.discriminant.is_some(), ..pass };
+        let colours = self.colour_words(frame, cell_px, pass, &mut words);
+        let textures = self.texture_words(frame, cell_px, learn, &mut words);
+        let places = if pass.measure { colours.places(&textures) } else { Vec::new() };
+        if let Some(discriminant) = &self.discriminant {
+            discriminant.extract(&places, first_id(5), &mut words);
+        }
+        (words, places)
     }
 
-    fn colour_words(&mut self, frame: &RgbImage, cell_px: f32, learn: bool, words: &mut Vec<Word>) {
+    fn colour_words(&mut self, frame: &RgbImage, cell_px: f32, pass: Pass, words: &mut Vec<Word>) -> ColourScores {
         let WordConfig { colour, context, spread, .. } = self.config;
+        let (mut scores, learn) = (ColourScores::default(), pass.learn);
         if colour + context + spread == 0 {
-            return;
+            return scores;
         }
         let field =
             ColourField::new(frame, &self.stretch, spacing(cell_px, if colour > 0 { colour } else { 36 }), cell_px);
@@ -175,26 +234,72 @@ impl WordExtractor {
             self.colour.extract(&field, learn, first_id(0), words);
         }
         if context > 0 {
-            self.context.extract(&field, spacing(cell_px, context), learn, first_id(1), words);
+            scores.context = self.context.extract(&field, spacing(cell_px, context), learn, first_id(1), words);
         }
         if spread > 0 {
-            self.spread.extract(&field, spacing(cell_px, spread), learn, first_id(2), words);
+            scores.spread = self.spread.extract(&field, spacing(cell_px, spread), learn, first_id(2), words);
         }
+        if pass.measure && colour > 0 && context > 0 {
+            scores.colour = self.colour.scores(&field, spacing(cell_px, context));
+        }
+        scores
     }
 
-    fn texture_words(&mut self, frame: &RgbImage, cell_px: f32, learn: bool, words: &mut Vec<Word>) {
+    fn texture_words(&mut self, frame: &RgbImage, cell_px: f32, learn: bool, words: &mut Vec<Word>) -> Vec<[f32; 3]> {
         let WordConfig { texture, binary, .. } = self.config;
+        let mut scores = Vec::new();
         if texture + binary == 0 {
-            return;
+            return scores;
         }
         let levels = GreyPlane::pyramid(self.stretch.grey(frame));
         if texture > 0 {
-            self.texture.extract(&levels, spacing(cell_px, texture), learn, first_id(3), words);
+            scores = self.texture.extract(&levels, spacing(cell_px, texture), learn, first_id(3), words);
         }
         if binary > 0 {
             self.binary.extract(&levels[1], spacing(cell_px, binary), first_id(4), words);
         }
+        scores
     }
+}
+
+/// How a frame is used beside its words.
+#[derive(Clone, Copy)]
+struct Pass {
+    /// Adds the frame to the moments of the measures.
+    learn: bool,
+    /// Keeps the measures of the places.
+    measure: bool,
+}
+
+/// The z-scores behind the words of colour, each list in the order of its words.
+#[derive(Default)]
+struct ColourScores {
+    colour: Vec<(f32, f32, [f32; 3])>,
+    context: Vec<[f32; 4]>,
+    spread: Vec<[f32; 3]>,
+}
+
+impl ColourScores {
+    /// The measures of the places, if all kinds lie on one grid.
+    fn places(&self, textures: &[[f32; 3]]) -> Vec<MeasuredPlace> {
+        if [self.context.len(), self.spread.len(), textures.len()] != [self.colour.len(); 3] {
+            return Vec::new();
+        }
+        let place = |i: usize| {
+            let (u, v, colour) = self.colour[i];
+            let mut scores = [0.0; MEASURES];
+            scores[..3].copy_from_slice(&colour);
+            scores[3..7].copy_from_slice(&self.context[i]);
+            scores[7..10].copy_from_slice(&self.spread[i]);
+            scores[10..].copy_from_slice(&textures[i]);
+            MeasuredPlace { u, v, scores }
+        };
+        (0..textures.len()).map(place).collect()
+    }
+}
+
+fn vocabulary_size(config: &WordConfig, discriminant: Option<&Discriminant>) -> u32 {
+    config.vocabulary_size() + discriminant.map_or(0, Discriminant::vocabulary_size)
 }
 
 fn is_usable(frame: &RgbImage, cell_px: f32) -> bool {

@@ -1,8 +1,9 @@
 //! `scenecast scene`
 
-mod pairs;
+mod choices;
 mod run;
 mod sample;
+mod scenes;
 mod score;
 
 use clap::Subcommand;
