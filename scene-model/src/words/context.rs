@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::colour::level;
 use super::colour_field::ColourField;
+use super::extractor::{Pass, kept};
 use super::moments::{Moments, standardised};
 use super::texture::sextile;
 use super::word::Word;
@@ -30,19 +31,20 @@ pub(crate) struct ContextWords {
 }
 
 impl ContextWords {
-    /// Appends one word for each position on a grid of `spacing` pixels, and returns the z-scores behind each.
+    /// Appends one word for each position on a grid of `spacing` pixels, and returns the z-scores behind each if `pass`
+    /// measures.
     pub(crate) fn extract(
         &mut self,
         field: &ColourField,
         spacing: f32,
-        learn: bool,
+        pass: Pass,
         first_id: u32,
         words: &mut Vec<Word>,
     ) -> Vec<[f32; 4]> {
         let (means, spreads) = field.windows(CONTEXT_CELLS);
         let measure = |(mean, spread): (&[f32; 3], &[f32; 3])| [mean[0], mean[1], mean[2], (spread[0] + 1.0).ln()];
         let measures: Vec<[f32; 4]> = means.iter().zip(&spreads).map(measure).collect();
-        if learn {
+        if pass.learn {
             Moments::learn(&mut self.measures, &measures);
         }
         let scales = self.measures.map(|moments| moments.scale());
@@ -56,7 +58,7 @@ impl ContextWords {
             words.push(Word { id: first_id + id, u, v });
             scores
         });
-        scored.collect()
+        kept(scored, pass)
     }
 }
 
@@ -67,19 +69,20 @@ pub(crate) struct SpreadWords {
 }
 
 impl SpreadWords {
-    /// Appends one word for each position on a grid of `spacing` pixels, and returns the z-scores behind each.
+    /// Appends one word for each position on a grid of `spacing` pixels, and returns the z-scores behind each if `pass`
+    /// measures.
     pub(crate) fn extract(
         &mut self,
         field: &ColourField,
         spacing: f32,
-        learn: bool,
+        pass: Pass,
         first_id: u32,
         words: &mut Vec<Word>,
     ) -> Vec<[f32; 3]> {
         let (_, spreads) = field.windows(SPREAD_CELLS);
         let measures: Vec<[f32; 3]> =
             spreads.into_iter().map(|spread| spread.map(|value| (value + 0.5).ln())).collect();
-        if learn {
+        if pass.learn {
             Moments::learn(&mut self.measures, &measures);
         }
         let scales = self.measures.map(|moments| moments.scale());
@@ -89,6 +92,6 @@ impl SpreadWords {
             words.push(Word { id: first_id + id, u, v });
             scores
         });
-        scored.collect()
+        kept(scored, pass)
     }
 }

@@ -66,11 +66,11 @@ pub struct Discriminant {
     blocks: Vec<Block>,
 }
 
-/// Prototypes side by side, and half of the square of the length of each; unused lanes are at infinity.
+/// Prototypes side by side, and minus half of the square of the length of each; unused lanes are infinitely far.
 #[derive(Clone, Debug, PartialEq)]
 struct Block {
     coordinates: [[f32; LANES]; MAX_DIRECTIONS],
-    half_square: [f32; LANES],
+    negative_half_square: [f32; LANES],
 }
 
 /// The numbers of a discriminant, row by row: a row for each direction with its weights, one for each prototype with its
@@ -125,28 +125,38 @@ impl Discriminant {
     }
 
     /// Appends a word for each place.
-    pub(super) fn extract(&self, places: &[MeasuredPlace], first_id: u32, words: &mut Vec<Word>) {
-        words.extend(places.iter().map(|place| {
-            let id = first_id + self.nearest(&self.coordinates(place));
+    pub(super) fn extract(&self, places: impl Iterator<Item = MeasuredPlace>, first_id: u32, words: &mut Vec<Word>) {
+        words.extend(places.map(|place| {
+            let id = first_id + self.nearest(&self.coordinates(&place));
             Word { id, u: place.u, v: place.v }
         }));
     }
 
     /// The nearest prototype; of equally near ones the first.
     fn nearest(&self, coordinates: &[f32; MAX_DIRECTIONS]) -> u32 {
-        let (mut best, mut nearness) = (0, f32::NEG_INFINITY);
-        for (index, block) in self.blocks.iter().enumerate() {
-            let mut lanes = block.half_square.map(|half| -half);
-            for (coordinate, row) in coordinates.iter().zip(&block.coordinates).take(self.directions) {
+        // The best block of each lane, and its nearness: half of the square of the place's length minus half of the
+        // squared distance.
+        let (mut blocks, mut nearness) = ([0u32; LANES], [f32::NEG_INFINITY; LANES]);
+        for (index, block) in (0..).zip(&self.blocks) {
+            let mut lanes = block.negative_half_square;
+            for (coordinate, row) in coordinates.iter().zip(&block.coordinates) {
                 lanes.iter_mut().zip(row).for_each(|(lane, other)| *lane += coordinate * other);
             }
-            let largest = lanes.iter().copied().fold(f32::NEG_INFINITY, f32::max);
-            if largest > nearness {
-                let lane = lanes.iter().position(|&lane| lane == largest).unwrap_or(0);
-                (best, nearness) = (index * LANES + lane, largest);
+            for lane in 0..LANES {
+                let is_nearer = lanes[lane] > nearness[lane];
+                nearness[lane] = if is_nearer { lanes[lane] } else { nearness[lane] };
+                blocks[lane] = if is_nearer { index } else { blocks[lane] };
             }
         }
-        best as u32
+        let (mut best, mut highest) = (0, f32::NEG_INFINITY);
+        for (lane, (block, near)) in (0..).zip(blocks.into_iter().zip(nearness)) {
+            let prototype = block * LANES as u32 + lane;
+            if near > highest || (near == highest && prototype < best) {
+                (best, highest) = (prototype, near);
+            }
+        }
+        // Coordinates that are not finite have no nearest prototype.
+        if highest > f32::NEG_INFINITY { best } else { 0 }
     }
 
     fn stored(&self) -> Stored {
@@ -194,9 +204,10 @@ impl TryFrom<Stored> for Discriminant {
 
 impl Block {
     fn new(prototypes: &[f32], directions: usize) -> Self {
-        let mut block = Self { coordinates: [[0.0; LANES]; MAX_DIRECTIONS], half_square: [f32::INFINITY; LANES] };
+        let mut block =
+            Self { coordinates: [[0.0; LANES]; MAX_DIRECTIONS], negative_half_square: [f32::NEG_INFINITY; LANES] };
         for (lane, prototype) in prototypes.chunks_exact(directions).enumerate() {
-            block.half_square[lane] = 0.5 * prototype.iter().map(|x| x * x).sum::<f32>();
+            block.negative_half_square[lane] = -0.5 * prototype.iter().map(|x| x * x).sum::<f32>();
             prototype.iter().zip(&mut block.coordinates).for_each(|(&x, row)| row[lane] = x);
         }
         block
@@ -233,7 +244,7 @@ mod tests {
         assert_eq!((discriminant.directions(), discriminant.vocabulary_size()), (2, 100));
         let mut words = Vec::new();
         let places = [place(&[(5, 2.1), (11, 6.8)]), place(&[(5, -50.0), (11, 9.4)]), place(&[(4, 7.0)])];
-        discriminant.extract(&places, 1000, &mut words);
+        discriminant.extract(places.into_iter(), 1000, &mut words);
         assert_eq!(words.iter().map(|word| word.id).collect::<Vec<_>>(), [1072, 1090, 1000]);
         assert_eq!((words[0].u, words[0].v), (3.0, 4.0));
     }

@@ -197,7 +197,7 @@ impl WordExtractor {
             return Vec::new();
         }
         let learn = self.begin_frame(frame);
-        self.words(frame, cell_px, Pass { learn, measure: true }).1
+        self.words(frame, cell_px, Pass { learn, measure: true }).1.places().collect()
     }
 
     /// Counts a frame; returns whether it is learnt from.
@@ -210,91 +210,101 @@ impl WordExtractor {
         learn
     }
 
-    fn words(&mut self, frame: &RgbImage, cell_px: f32, pass: Pass) -> (Vec<Word>, Vec<MeasuredPlace>) {
-        let (mut words, learn) = (Vec::new(), pass.learn);
+    fn words(&mut self, frame: &RgbImage, cell_px: f32, pass: Pass) -> (Vec<Word>, Scores) {
+        let (mut words, mut scores) = (Vec::new(), Scores::default());
         let pass = Pass { measure: pass.measure || self.discriminant.is_some(), ..pass };
-        let colours = self.colour_words(frame, cell_px, pass, &mut words);
-        let textures = self.texture_words(frame, cell_px, learn, &mut words);
-        let places = if pass.measure { colours.places(&textures) } else { Vec::new() };
+        self.colour_words(frame, cell_px, pass, &mut words, &mut scores);
+        self.texture_words(frame, cell_px, pass, &mut words, &mut scores);
         if let Some(discriminant) = &self.discriminant {
-            discriminant.extract(&places, first_id(5), &mut words);
+            discriminant.extract(scores.places(), first_id(5), &mut words);
         }
-        (words, places)
+        (words, scores)
     }
 
-    fn colour_words(&mut self, frame: &RgbImage, cell_px: f32, pass: Pass, words: &mut Vec<Word>) -> ColourScores {
+    fn colour_words(&mut self, frame: &RgbImage, cell_px: f32, pass: Pass, words: &mut Vec<Word>, scores: &mut Scores) {
         let WordConfig { colour, context, spread, .. } = self.config;
-        let (mut scores, learn) = (ColourScores::default(), pass.learn);
         if colour + context + spread == 0 {
-            return scores;
+            return;
         }
         let field =
             ColourField::new(frame, &self.stretch, spacing(cell_px, if colour > 0 { colour } else { 36 }), cell_px);
         if colour > 0 {
-            self.colour.extract(&field, learn, first_id(0), words);
+            self.colour.extract(&field, pass.learn, first_id(0), words);
         }
         if context > 0 {
-            scores.context = self.context.extract(&field, spacing(cell_px, context), learn, first_id(1), words);
+            scores.context = self.context.extract(&field, spacing(cell_px, context), pass, first_id(1), words);
         }
         if spread > 0 {
-            scores.spread = self.spread.extract(&field, spacing(cell_px, spread), learn, first_id(2), words);
+            scores.spread = self.spread.extract(&field, spacing(cell_px, spread), pass, first_id(2), words);
         }
         if pass.measure && colour > 0 && context > 0 {
             scores.colour = self.colour.scores(&field, spacing(cell_px, context));
         }
-        scores
     }
 
-    fn texture_words(&mut self, frame: &RgbImage, cell_px: f32, learn: bool, words: &mut Vec<Word>) -> Vec<[f32; 3]> {
+    fn texture_words(
+        &mut self,
+        frame: &RgbImage,
+        cell_px: f32,
+        pass: Pass,
+        words: &mut Vec<Word>,
+        scores: &mut Scores,
+    ) {
         let WordConfig { texture, binary, .. } = self.config;
-        let mut scores = Vec::new();
         if texture + binary == 0 {
-            return scores;
+            return;
         }
         let levels = GreyPlane::pyramid(self.stretch.grey(frame));
         if texture > 0 {
-            scores = self.texture.extract(&levels, spacing(cell_px, texture), learn, first_id(3), words);
+            scores.texture = self.texture.extract(&levels, spacing(cell_px, texture), pass, first_id(3), words);
         }
         if binary > 0 {
             self.binary.extract(&levels[1], spacing(cell_px, binary), first_id(4), words);
         }
-        scores
     }
 }
 
 /// How a frame is used beside its words.
 #[derive(Clone, Copy)]
-struct Pass {
+pub(super) struct Pass {
     /// Adds the frame to the moments of the measures.
-    learn: bool,
-    /// Keeps the measures of the places.
-    measure: bool,
+    pub(super) learn: bool,
+    /// Keeps the z-scores behind the words.
+    pub(super) measure: bool,
 }
 
-/// The z-scores behind the words of colour, each list in the order of its words.
+/// The z-scores behind words, of which those that are not measured are not kept.
+pub(super) fn kept<const N: usize>(scores: impl Iterator<Item = [f32; N]>, pass: Pass) -> Vec<[f32; N]> {
+    if pass.measure {
+        return scores.collect();
+    }
+    scores.for_each(drop);
+    Vec::new()
+}
+
+/// The z-scores behind the words of a frame, each list in the order of its words.
 #[derive(Default)]
-struct ColourScores {
+struct Scores {
     colour: Vec<(f32, f32, [f32; 3])>,
     context: Vec<[f32; 4]>,
     spread: Vec<[f32; 3]>,
+    texture: Vec<[f32; 3]>,
 }
 
-impl ColourScores {
+impl Scores {
     /// The measures of the places, if all kinds lie on one grid.
-    fn places(&self, textures: &[[f32; 3]]) -> Vec<MeasuredPlace> {
-        if [self.context.len(), self.spread.len(), textures.len()] != [self.colour.len(); 3] {
-            return Vec::new();
-        }
-        let place = |i: usize| {
+    fn places(&self) -> impl Iterator<Item = MeasuredPlace> {
+        let of_kinds = [self.context.len(), self.spread.len(), self.texture.len()];
+        let count = if of_kinds == [self.colour.len(); 3] { self.colour.len() } else { 0 };
+        (0..count).map(|i| {
             let (u, v, colour) = self.colour[i];
             let mut scores = [0.0; MEASURES];
             scores[..3].copy_from_slice(&colour);
             scores[3..7].copy_from_slice(&self.context[i]);
             scores[7..10].copy_from_slice(&self.spread[i]);
-            scores[10..].copy_from_slice(&textures[i]);
+            scores[10..].copy_from_slice(&self.texture[i]);
             MeasuredPlace { u, v, scores }
-        };
-        (0..textures.len()).map(place).collect()
+        })
     }
 }
 

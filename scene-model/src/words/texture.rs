@@ -1,5 +1,6 @@
 //! Texture words: Gabor energy at three scales, each quantised into six levels of equal probability.
 
+use super::extractor::{Pass, kept};
 use super::grey_plane::GreyPlane;
 use super::grid::centres;
 use super::moments::{Moments, standardised};
@@ -43,12 +44,13 @@ impl TextureWords {
         self.energy
     }
 
-    /// Appends one word for each position on a grid of `spacing` pixels, and returns the z-scores behind each.
+    /// Appends one word for each position on a grid of `spacing` pixels, and returns the z-scores behind each if `pass`
+    /// measures.
     pub(crate) fn extract(
         &mut self,
         levels: &[GreyPlane; SCALES],
         spacing: f32,
-        learn: bool,
+        pass: Pass,
         first_id: u32,
         words: &mut Vec<Word>,
     ) -> Vec<[f32; SCALES]> {
@@ -56,7 +58,7 @@ impl TextureWords {
         let down = centres(levels[0].height as u32, spacing);
         let places = || down.iter().flat_map(|&v| across.iter().map(move |&u| (u, v)));
         let energies: Vec<[f32; SCALES]> = places().map(|(u, v)| self.energies(levels, u, v)).collect();
-        if learn {
+        if pass.learn {
             Moments::learn(&mut self.energy, &energies);
         }
         let scales = self.energy.map(|moments| moments.scale());
@@ -66,7 +68,7 @@ impl TextureWords {
             words.push(Word { id: first_id + id, u, v });
             scores
         });
-        scored.collect()
+        kept(scored, pass)
     }
 
     /// The log energy over all orientations, at each scale.
