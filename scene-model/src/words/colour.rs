@@ -36,11 +36,11 @@ impl ColourWords {
         }));
     }
 
-    /// The z-scores of the field's colours at positions about `spacing` pixels apart, and the positions.
-    pub(crate) fn scores(&self, field: &ColourField, spacing: f32) -> Vec<(f32, f32, [f32; 3])> {
+    /// Appends the positions about `spacing` pixels apart, and the z-scores of the field's colours there, to `kept`.
+    pub(crate) fn scores(&self, field: &ColourField, spacing: f32, kept: &mut Vec<(f32, f32, [f32; 3])>) {
         let scales = self.lab.map(|moments| moments.scale());
         let scored = |(u, v, index): (f32, f32, usize)| (u, v, standardised(&field.lab[index], &scales));
-        field.sample(spacing).into_iter().map(scored).collect()
+        kept.extend(field.sample(spacing).into_iter().map(scored));
     }
 }
 

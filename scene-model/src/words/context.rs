@@ -7,7 +7,6 @@ use serde::{Deserialize, Serialize};
 
 use super::colour::level;
 use super::colour_field::ColourField;
-use super::extractor::{Pass, kept};
 use super::moments::{Moments, standardised};
 use super::texture::sextile;
 use super::word::Word;
@@ -31,24 +30,24 @@ pub(crate) struct ContextWords {
 }
 
 impl ContextWords {
-    /// Appends one word for each position on a grid of `spacing` pixels, and returns the z-scores behind each if `pass`
-    /// measures.
+    /// Appends one word for each position on a grid of `spacing` pixels, and the z-scores behind each to `kept`.
     pub(crate) fn extract(
         &mut self,
         field: &ColourField,
         spacing: f32,
-        pass: Pass,
+        learn: bool,
         first_id: u32,
         words: &mut Vec<Word>,
-    ) -> Vec<[f32; 4]> {
+        mut kept: Option<&mut Vec<[f32; 4]>>,
+    ) {
         let (means, spreads) = field.windows(CONTEXT_CELLS);
         let measure = |(mean, spread): (&[f32; 3], &[f32; 3])| [mean[0], mean[1], mean[2], (spread[0] + 1.0).ln()];
         let measures: Vec<[f32; 4]> = means.iter().zip(&spreads).map(measure).collect();
-        if pass.learn {
+        if learn {
             Moments::learn(&mut self.measures, &measures);
         }
         let scales = self.measures.map(|moments| moments.scale());
-        let scored = field.sample(spacing).into_iter().map(|(u, v, index)| {
+        for (u, v, index) in field.sample(spacing) {
             let scores = standardised(&measures[index], &scales);
             let mut id = 0;
             for (i, score) in scores.into_iter().enumerate() {
@@ -56,9 +55,10 @@ impl ContextWords {
                 id = id * levels + level(score, REACH, levels);
             }
             words.push(Word { id: first_id + id, u, v });
-            scores
-        });
-        kept(scored, pass)
+            if let Some(kept) = &mut kept {
+                kept.push(scores);
+            }
+        }
     }
 }
 
@@ -69,29 +69,30 @@ pub(crate) struct SpreadWords {
 }
 
 impl SpreadWords {
-    /// Appends one word for each position on a grid of `spacing` pixels, and returns the z-scores behind each if `pass`
-    /// measures.
+    /// Appends one word for each position on a grid of `spacing` pixels, and the z-scores behind each to `kept`.
     pub(crate) fn extract(
         &mut self,
         field: &ColourField,
         spacing: f32,
-        pass: Pass,
+        learn: bool,
         first_id: u32,
         words: &mut Vec<Word>,
-    ) -> Vec<[f32; 3]> {
+        mut kept: Option<&mut Vec<[f32; 3]>>,
+    ) {
         let (_, spreads) = field.windows(SPREAD_CELLS);
         let measures: Vec<[f32; 3]> =
             spreads.into_iter().map(|spread| spread.map(|value| (value + 0.5).ln())).collect();
-        if pass.learn {
+        if learn {
             Moments::learn(&mut self.measures, &measures);
         }
         let scales = self.measures.map(|moments| moments.scale());
-        let scored = field.sample(spacing).into_iter().map(|(u, v, index)| {
+        for (u, v, index) in field.sample(spacing) {
             let scores = standardised(&measures[index], &scales);
             let id = scores.iter().fold(0, |id, &score| id * 6 + sextile(score));
             words.push(Word { id: first_id + id, u, v });
-            scores
-        });
-        kept(scored, pass)
+            if let Some(kept) = &mut kept {
+                kept.push(scores);
+            }
+        }
     }
 }

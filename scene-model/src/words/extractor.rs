@@ -97,6 +97,8 @@ pub struct WordExtractor {
     texture: TextureWords,
     binary: BinaryWords,
     discriminant: Option<Discriminant>,
+    /// Those of the last frame that was measured; their memory is used again for the next.
+    scores: Scores,
 }
 
 impl WordExtractor {
@@ -113,6 +115,7 @@ impl WordExtractor {
             texture: TextureWords::default(),
             binary: BinaryWords::default(),
             discriminant: None,
+            scores: Scores::default(),
         }
     }
 
@@ -129,6 +132,7 @@ impl WordExtractor {
             texture: TextureWords::with_energy(measures.texture),
             binary: BinaryWords::default(),
             discriminant: measures.discriminant,
+            scores: Scores::default(),
         }
     }
 
@@ -146,7 +150,7 @@ impl WordExtractor {
     /// `cell_px` is the edge of a cell in pixels. An image that [`Self::extract`] refuses is ignored.
     pub fn learn_statistics(&mut self, image: &RgbImage, cell_px: f32) {
         if is_usable(image, cell_px) {
-            self.words(image, cell_px, Pass { learn: true, measure: false });
+            self.words(image, cell_px, true, false);
         }
     }
 
@@ -185,7 +189,7 @@ impl WordExtractor {
             return Vec::new();
         }
         let learn = self.begin_frame(frame);
-        self.words(frame, cell_px, Pass { learn, measure: false }).0
+        self.words(frame, cell_px, learn, self.discriminant.is_some())
     }
 
     /// Returns the measures of a frame, from which directions are learnt: a place for each word of a
@@ -197,7 +201,8 @@ impl WordExtractor {
             return Vec::new();
         }
         let learn = self.begin_frame(frame);
-        self.words(frame, cell_px, Pass { learn, measure: true }).1.places().collect()
+        self.words(frame, cell_px, learn, true);
+        self.scores.places().collect()
     }
 
     /// Counts a frame; returns whether it is learnt from.
@@ -210,18 +215,18 @@ impl WordExtractor {
         learn
     }
 
-    fn words(&mut self, frame: &RgbImage, cell_px: f32, pass: Pass) -> (Vec<Word>, Scores) {
-        let (mut words, mut scores) = (Vec::new(), Scores::default());
-        let pass = Pass { measure: pass.measure || self.discriminant.is_some(), ..pass };
-        self.colour_words(frame, cell_px, pass, &mut words, &mut scores);
-        self.texture_words(frame, cell_px, pass, &mut words, &mut scores);
+    fn words(&mut self, frame: &RgbImage, cell_px: f32, learn: bool, measure: bool) -> Vec<Word> {
+        let mut words = Vec::new();
+        self.scores.clear();
+        self.colour_words(frame, cell_px, learn, measure, &mut words);
+        self.texture_words(frame, cell_px, learn, measure, &mut words);
         if let Some(discriminant) = &self.discriminant {
-            discriminant.extract(scores.places(), first_id(5), &mut words);
+            discriminant.extract(self.scores.places(), first_id(5), &mut words);
         }
-        (words, scores)
+        words
     }
 
-    fn colour_words(&mut self, frame: &RgbImage, cell_px: f32, pass: Pass, words: &mut Vec<Word>, scores: &mut Scores) {
+    fn colour_words(&mut self, frame: &RgbImage, cell_px: f32, learn: bool, measure: bool, words: &mut Vec<Word>) {
         let WordConfig { colour, context, spread, .. } = self.config;
         if colour + context + spread == 0 {
             return;
@@ -229,34 +234,30 @@ impl WordExtractor {
         let field =
             ColourField::new(frame, &self.stretch, spacing(cell_px, if colour > 0 { colour } else { 36 }), cell_px);
         if colour > 0 {
-            self.colour.extract(&field, pass.learn, first_id(0), words);
+            self.colour.extract(&field, learn, first_id(0), words);
         }
         if context > 0 {
-            scores.context = self.context.extract(&field, spacing(cell_px, context), pass, first_id(1), words);
+            let kept = measure.then_some(&mut self.scores.context);
+            self.context.extract(&field, spacing(cell_px, context), learn, first_id(1), words, kept);
         }
         if spread > 0 {
-            scores.spread = self.spread.extract(&field, spacing(cell_px, spread), pass, first_id(2), words);
+            let kept = measure.then_some(&mut self.scores.spread);
+            self.spread.extract(&field, spacing(cell_px, spread), learn, first_id(2), words, kept);
         }
-        if pass.measure && colour > 0 && context > 0 {
-            scores.colour = self.colour.scores(&field, spacing(cell_px, context));
+        if measure && colour > 0 && context > 0 {
+            self.colour.scores(&field, spacing(cell_px, context), &mut self.scores.colour);
         }
     }
 
-    fn texture_words(
-        &mut self,
-        frame: &RgbImage,
-        cell_px: f32,
-        pass: Pass,
-        words: &mut Vec<Word>,
-        scores: &mut Scores,
-    ) {
+    fn texture_words(&mut self, frame: &RgbImage, cell_px: f32, learn: bool, measure: bool, words: &mut Vec<Word>) {
         let WordConfig { texture, binary, .. } = self.config;
         if texture + binary == 0 {
             return;
         }
         let levels = GreyPlane::pyramid(self.stretch.grey(frame));
         if texture > 0 {
-            scores.texture = self.texture.extract(&levels, spacing(cell_px, texture), pass, first_id(3), words);
+            let kept = measure.then_some(&mut self.scores.texture);
+            self.texture.extract(&levels, spacing(cell_px, texture), learn, first_id(3), words, kept);
         }
         if binary > 0 {
             self.binary.extract(&levels[1], spacing(cell_px, binary), first_id(4), words);
@@ -264,26 +265,8 @@ impl WordExtractor {
     }
 }
 
-/// How a frame is used beside its words.
-#[derive(Clone, Copy)]
-pub(super) struct Pass {
-    /// Adds the frame to the moments of the measures.
-    pub(super) learn: bool,
-    /// Keeps the z-scores behind the words.
-    pub(super) measure: bool,
-}
-
-/// The z-scores behind words, of which those that are not measured are not kept.
-pub(super) fn kept<const N: usize>(scores: impl Iterator<Item = [f32; N]>, pass: Pass) -> Vec<[f32; N]> {
-    if pass.measure {
-        return scores.collect();
-    }
-    scores.for_each(drop);
-    Vec::new()
-}
-
 /// The z-scores behind the words of a frame, each list in the order of its words.
-#[derive(Default)]
+#[derive(Clone, Debug, Default)]
 struct Scores {
     colour: Vec<(f32, f32, [f32; 3])>,
     context: Vec<[f32; 4]>,
@@ -292,6 +275,13 @@ struct Scores {
 }
 
 impl Scores {
+    fn clear(&mut self) {
+        self.colour.clear();
+        self.context.clear();
+        self.spread.clear();
+        self.texture.clear();
+    }
+
     /// The measures of the places, if all kinds lie on one grid.
     fn places(&self) -> impl Iterator<Item = MeasuredPlace> {
         let of_kinds = [self.context.len(), self.spread.len(), self.texture.len()];

@@ -1,6 +1,5 @@
 //! Texture words: Gabor energy at three scales, each quantised into six levels of equal probability.
 
-use super::extractor::{Pass, kept};
 use super::grey_plane::GreyPlane;
 use super::grid::centres;
 use super::moments::{Moments, standardised};
@@ -44,31 +43,32 @@ impl TextureWords {
         self.energy
     }
 
-    /// Appends one word for each position on a grid of `spacing` pixels, and returns the z-scores behind each if `pass`
-    /// measures.
+    /// Appends one word for each position on a grid of `spacing` pixels, and the z-scores behind each to `kept`.
     pub(crate) fn extract(
         &mut self,
         levels: &[GreyPlane; SCALES],
         spacing: f32,
-        pass: Pass,
+        learn: bool,
         first_id: u32,
         words: &mut Vec<Word>,
-    ) -> Vec<[f32; SCALES]> {
+        mut kept: Option<&mut Vec<[f32; SCALES]>>,
+    ) {
         let across = centres(levels[0].width as u32, spacing);
         let down = centres(levels[0].height as u32, spacing);
         let places = || down.iter().flat_map(|&v| across.iter().map(move |&u| (u, v)));
         let energies: Vec<[f32; SCALES]> = places().map(|(u, v)| self.energies(levels, u, v)).collect();
-        if pass.learn {
+        if learn {
             Moments::learn(&mut self.energy, &energies);
         }
         let scales = self.energy.map(|moments| moments.scale());
-        let scored = energies.iter().zip(places()).map(|(energy, (u, v))| {
+        for (energy, (u, v)) in energies.iter().zip(places()) {
             let scores = standardised(energy, &scales);
             let id = scores.iter().fold(0, |id, &score| id * 6 + sextile(score));
             words.push(Word { id: first_id + id, u, v });
-            scores
-        });
-        kept(scored, pass)
+            if let Some(kept) = &mut kept {
+                kept.push(scores);
+            }
+        }
     }
 
     /// The log energy over all orientations, at each scale.
