@@ -226,6 +226,26 @@ mod tests {
     }
 
     #[test]
+    fn every_choice_is_scored_on_every_image() {
+        let dir = std::env::temp_dir().join(format!("scenecast-{}-choices", std::process::id()));
+        let _ = std::fs::remove_dir_all(&dir);
+        std::fs::create_dir_all(&dir).unwrap();
+        for seed in 1..4 {
+            let world = scenecast_worlds::patches(seed, 240, 160, 60, 4);
+            world.image.save(dir.join(format!("{seed}.png"))).unwrap();
+            let classes = image::GrayImage::from_raw(240, 160, world.truth).unwrap();
+            classes.save(dir.join(format!("{seed}_label.png"))).unwrap();
+        }
+        let trial = Trial { labels: 4, cells_across: 20, sweeps: 5, seeds: 2 };
+        let report = compare(trial, &crate::annotated_images::pairs(&dir).unwrap(), &[255]).unwrap();
+        let rows: Vec<_> = report.choices.iter().map(|choice| (choice.max_labels, choice.vocabulary)).collect();
+        assert_eq!(rows, [(4, "built-in"), (8, "built-in"), (4, "annotated"), (8, "annotated")]);
+        assert!(report.choices.iter().all(|choice| choice.excess_nats.len() == 3 && choice.excess_mean_nats > 0.1));
+        assert!(report.choices[0].excess_nats != report.choices[2].excess_nats);
+        std::fs::remove_dir_all(&dir).unwrap();
+    }
+
+    #[test]
     fn a_uniform_map_takes_fewer_bits_than_a_mixed_one() {
         let map = |label: fn(usize) -> u32| LabelGrid {
             columns: 40,
