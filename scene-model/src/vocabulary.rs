@@ -1,7 +1,10 @@
 //! A vocabulary file: the [`Measures`] that turn features into words, as bytes.
 //!
 //! Measures that were learnt from images of a similar site before the mission give words the same meaning in every
-//! mission.
+//! mission. A [`Discriminant`] that was learnt from annotated images adds words of its own.
+//!
+//! The content of a file's envelope, in postcard: version 1 has the number of words and the measures, version 2 also the
+//! discriminant or none. Both are read, version 2 is written.
 //!
 //! ```
 //! use image::{Rgb, RgbImage};
@@ -21,9 +24,12 @@
 //! ```
 
 use crate::envelope::{Envelope, EnvelopeError};
-use crate::words::Measures;
+use crate::words::{Discriminant, Measures};
+use serde::Deserialize;
 
-const ENVELOPE: Envelope = Envelope { magic: *b"SCNVOCAB", version: 1 };
+const ENVELOPE: Envelope = Envelope { magic: *b"SCNVOCAB", version: 2 };
+/// The version without a discriminant.
+const PLAIN: Envelope = Envelope { version: 1, ..ENVELOPE };
 /// The maximum number of words of one kind in a cell.
 const MAX_WORDS_PER_CELL: u32 = 1024;
 
@@ -42,15 +48,19 @@ pub enum VocabularyError {
 /// Returns the measures as bytes, for [`load`].
 #[must_use]
 pub fn save(measures: &Measures) -> Vec<u8> {
-    let content = (measures.config().vocabulary_size(), measures);
+    let content = (measures.config().vocabulary_size(), measures, measures.discriminant());
     ENVELOPE.seal(&postcard::to_allocvec(&content).unwrap_or_default())
 }
 
 /// Returns the measures of bytes that [`save`] returned. Other content is refused and never panics.
 pub fn load(bytes: &[u8]) -> Result<Measures, VocabularyError> {
-    let content = ENVELOPE.open(bytes)?;
-    let (size, measures): (u32, Measures) =
-        postcard::from_bytes(content).map_err(|_| VocabularyError::Inconsistent("fields do not parse"))?;
+    let (size, measures, discriminant) = match ENVELOPE.open(bytes) {
+        Err(EnvelopeError::Version { found: 1, .. }) => {
+            let (size, measures): (u32, Measures) = parsed(PLAIN.open(bytes)?)?;
+            (size, measures, None)
+        }
+        content => parsed::<(u32, Measures, Option<Discriminant>)>(content?)?,
+    };
     let config = measures.config();
     if size != config.vocabulary_size() {
         return Err(VocabularyError::Inconsistent("this program has another number of words"));
@@ -59,13 +69,23 @@ pub fn load(bytes: &[u8]) -> Result<Measures, VocabularyError> {
     if kinds.iter().any(|&words| words > MAX_WORDS_PER_CELL) {
         return Err(VocabularyError::Inconsistent("more than 1024 words of a kind in a cell"));
     }
-    Ok(measures)
+    let on_one_grid = config.colour > 0 && config.context > 0 && config.spread == config.context;
+    if discriminant.is_some() && !(on_one_grid && config.texture == config.context) {
+        return Err(VocabularyError::Inconsistent(
+            "a discriminant needs as many spread and texture words as context words",
+        ));
+    }
+    Ok(measures.with_discriminant(discriminant))
+}
+
+fn parsed<'a, T: Deserialize<'a>>(content: &'a [u8]) -> Result<T, VocabularyError> {
+    postcard::from_bytes(content).map_err(|_| VocabularyError::Inconsistent("fields do not parse"))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::words::{WordConfig, WordExtractor};
+    use crate::words::{FEATURES, Word, WordConfig, WordExtractor};
     use image::{Rgb, RgbImage};
 
     fn image() -> RgbImage {
@@ -80,11 +100,51 @@ mod tests {
         extractor.measures()
     }
 
+    fn discriminant() -> Discriminant {
+        let direction = |measure: usize| std::array::from_fn::<f32, FEATURES, _>(|i| f32::from(u8::from(i == measure)));
+        let prototypes: Vec<Vec<f32>> = (0..20).map(|i| vec![(i % 5) as f32 - 2.0, (i / 5) as f32 - 1.5]).collect();
+        Discriminant::new(&[direction(3), direction(10)], &prototypes).unwrap()
+    }
+
+    fn words(measures: Measures) -> Vec<Word> {
+        WordExtractor::from_measures(measures).extract(&image(), 20.0)
+    }
+
     #[test]
     fn loaded_vocabulary_gives_the_same_words() {
-        let loaded = load(&save(&trained())).unwrap();
-        let words = |measures| WordExtractor::from_measures(measures).extract(&image(), 20.0);
-        assert_eq!(words(loaded), words(trained()));
+        assert_eq!(words(load(&save(&trained())).unwrap()), words(trained()));
+        let annotated = trained().with_discriminant(Some(discriminant()));
+        let loaded = load(&save(&annotated)).unwrap();
+        assert_eq!(loaded.vocabulary_size(), WordConfig::default().vocabulary_size() + 20);
+        assert_eq!(words(loaded), words(annotated));
+    }
+
+    #[test]
+    fn a_discriminant_adds_words_and_changes_none() {
+        let plain = words(trained());
+        let annotated = words(trained().with_discriminant(Some(discriminant())));
+        assert_eq!(annotated[..plain.len()], plain);
+        let added = &annotated[plain.len()..];
+        let ids = WordConfig::default().vocabulary_size()..WordConfig::default().vocabulary_size() + 20;
+        assert!(added.iter().all(|word| ids.contains(&word.id)));
+        // Nine for each cell of 20 pixels.
+        assert_eq!(added.len(), 14 * 11);
+    }
+
+    #[test]
+    fn a_vocabulary_of_an_earlier_build_is_read() {
+        let content = postcard::to_allocvec(&(WordConfig::default().vocabulary_size(), trained())).unwrap();
+        let loaded = load(&PLAIN.seal(&content)).unwrap();
+        assert_eq!((loaded.discriminant(), words(loaded.clone())), (None, words(trained())));
+        let newer = Envelope { version: 3, ..ENVELOPE }.seal(&content);
+        assert_eq!(load(&newer).unwrap_err(), EnvelopeError::Version { found: 3, wanted: 2 }.into());
+    }
+
+    #[test]
+    fn a_discriminant_without_its_measures_is_refused() {
+        let config = WordConfig { spread: 4, ..WordConfig::default() };
+        let measures = WordExtractor::new(&config).measures().with_discriminant(Some(discriminant()));
+        assert!(load(&save(&measures)).unwrap_err().to_string().contains("as many spread and texture words"));
     }
 
     #[test]
@@ -97,7 +157,7 @@ mod tests {
 
     #[test]
     fn content_with_a_right_checksum_never_panics() {
-        let sealed = save(&trained());
+        let sealed = save(&trained().with_discriminant(Some(discriminant())));
         let content = ENVELOPE.open(&sealed).unwrap();
         for at in 0..content.len() {
             let mut other = content.to_vec();

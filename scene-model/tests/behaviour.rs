@@ -2,6 +2,7 @@
 
 use scene_model::project::{DownCamera, Observation, Pose};
 use scene_model::publish::LabelBook;
+use scene_model::random::mix;
 use scene_model::topics::{FlatCell, SceneConfig, SceneModel};
 use scene_model::words::{WordConfig, WordExtractor};
 use scenecast_scoring::mutual_information_nats;
@@ -160,4 +161,18 @@ fn stacked_cells_have_labels_and_heights_of_their_own() {
     assert!(volume[0].topic != volume[1].topic);
     let map = model.label_map();
     assert_eq!((map.len(), map[0].z, map[0].topic, map[0].words), (2, 9, volume[0].topic, 140));
+}
+
+#[test]
+fn words_without_a_discriminant_are_those_of_earlier_builds() {
+    let mut extractor = WordExtractor::new(&WordConfig::default());
+    let (mut count, mut hash) = (0, 0);
+    for seed in 1..4 {
+        for word in extractor.extract(&patches(seed, 203, 151, 40, 5).image, 24.0) {
+            let parts = [word.id, word.u.to_bits(), word.v.to_bits()];
+            hash = parts.iter().fold(hash, |hash, &part| mix(hash ^ u64::from(part)));
+            count += 1;
+        }
+    }
+    assert_eq!((count, hash), (10_752, 0x1435_4c8c_adca_f660));
 }

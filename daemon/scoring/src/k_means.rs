@@ -1,4 +1,5 @@
-//! k-means with k-means++ seeding (Arthur and Vassilvitskii, SODA 2007), for the baselines.
+//! k-means with k-means++ seeding (Arthur and Vassilvitskii, SODA 2007), for the baselines and for the
+//! prototypes of discriminant words.
 
 use scene_model::random::CounterRng;
 
@@ -10,10 +11,21 @@ const STARTS: usize = 4;
 pub(crate) fn k_means(points: &[f32], width: usize, k: usize, seed: u64) -> Vec<u32> {
     let mut rng = CounterRng::new(seed);
     let runs = (0..STARTS).map(|_| one_start(points, width, k, &mut rng));
-    runs.min_by(|a, b| a.1.total_cmp(&b.1)).map(|best| best.0).unwrap_or_default()
+    runs.min_by(|a, b| a.cost.total_cmp(&b.cost)).map(|best| best.owners).unwrap_or_default()
 }
 
-fn one_start(points: &[f32], width: usize, k: usize, rng: &mut CounterRng) -> (Vec<u32>, f64) {
+/// The centres of at most `k` clusters from one start, each a row of `width` numbers.
+pub(crate) fn cluster_centres(points: &[f32], width: usize, k: usize, seed: u64) -> Vec<f32> {
+    one_start(points, width, k, &mut CounterRng::new(seed)).centres
+}
+
+struct Clusters {
+    owners: Vec<u32>,
+    cost: f64,
+    centres: Vec<f32>,
+}
+
+fn one_start(points: &[f32], width: usize, k: usize, rng: &mut CounterRng) -> Clusters {
     let mut centres = seeds(points, width, k, rng);
     let mut owners = vec![u32::MAX; points.len() / width];
     let mut cost = 0.0;
@@ -30,7 +42,7 @@ fn one_start(points: &[f32], width: usize, k: usize, rng: &mut CounterRng) -> (V
         }
         centres = means(points, width, &owners, &centres);
     }
-    (owners, cost)
+    Clusters { owners, cost, centres }
 }
 
 fn seeds(points: &[f32], width: usize, k: usize, rng: &mut CounterRng) -> Vec<f32> {

@@ -20,6 +20,7 @@
 
 mod annotations;
 mod baselines;
+mod discriminant;
 mod k_means;
 mod label_grid;
 mod mutual_information;
@@ -30,6 +31,7 @@ mod trial;
 
 pub use annotations::{AnnotationError, Annotations};
 pub use baselines::mosaic_classes;
+pub use discriminant::{ClassStatistics, DiscriminantTrainingError, MIN_CLASS_CELLS};
 pub use label_grid::LabelGrid;
 pub use mutual_information::{MutualInformation, mutual_information_nats};
 pub use null::{SceneScore, score};

@@ -56,6 +56,14 @@ impl Default for Trial {
     }
 }
 
+impl Trial {
+    /// Returns the edge of a cell of an image that is `width` pixels wide, pixels.
+    #[must_use]
+    pub fn cell_px(&self, width: u32) -> f32 {
+        (width as f32 / self.cells_across.max(1) as f32).max(MIN_CELL_PX)
+    }
+}
+
 /// The score of a method on a scene: means over the seeds.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct MeanScore {
@@ -108,18 +116,28 @@ impl<'a> AnnotatedScene<'a> {
     /// Extracts the words of an image. `classes` has the class of each pixel; pixels with a class in
     /// `ignore` count as not annotated.
     pub fn new(trial: Trial, image: &'a RgbImage, classes: &GrayImage, ignore: &[u8]) -> Result<Self, TrialError> {
+        Self::with_words(trial, image, classes, ignore, WordExtractor::new(&WordConfig::default()))
+    }
+
+    /// As [`Self::new`], with the words of an extractor.
+    pub fn with_words(
+        trial: Trial,
+        image: &'a RgbImage,
+        classes: &GrayImage,
+        ignore: &[u8],
+        mut extractor: WordExtractor,
+    ) -> Result<Self, TrialError> {
         let size = image.dimensions();
         if size.0.min(size.1) < MIN_IMAGE_PX {
             return Err(TrialError::Tiny(size.0, size.1));
         }
-        let cell_px = (size.0 as f32 / trial.cells_across.max(1) as f32).max(MIN_CELL_PX);
+        let cell_px = trial.cell_px(size.0);
         let annotations = Annotations::new(classes, size, cell_px, ignore)?;
         if annotations.cells().is_none() {
             return Err(TrialError::NoClasses);
         }
-        let config = WordConfig::default();
-        let words = WordExtractor::new(&config).extract(image, cell_px);
-        Ok(Self { trial, image, cell_px, annotations, words, vocabulary: config.vocabulary_size() })
+        let words = extractor.extract(image, cell_px);
+        Ok(Self { trial, image, cell_px, annotations, words, vocabulary: extractor.vocabulary_size() })
     }
 
     /// Returns the edge of a cell, pixels.

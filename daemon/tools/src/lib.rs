@@ -2,6 +2,7 @@
 //!
 //! Internal to scenecast.
 
+mod annotated_images;
 pub mod commands;
 mod figures;
 mod progress;

@@ -6,7 +6,7 @@ use scene_model::envelope::{Envelope, EnvelopeError};
 use scene_model::exemplars::ExemplarStore;
 use scene_model::publish::LabelBook;
 use scene_model::topics::{CheckpointError, SceneConfig, SceneModel};
-use scene_model::words::{FlatField, Measures, WordExtractor};
+use scene_model::words::{Discriminant, FlatField, Measures, WordExtractor};
 use scenecast_config::Config;
 use scenecast_core::UserError;
 use scenecast_registration::Registrar;
@@ -67,6 +67,7 @@ impl Mapper {
         content.extend(postcard::to_allocvec(&self.light).unwrap_or_default());
         let registration = self.registrar.as_ref().map(Registrar::save);
         content.extend(postcard::to_allocvec(&registration).unwrap_or_default());
+        content.extend(postcard::to_allocvec(&self.extractor.measures().discriminant()).unwrap_or_default());
         ENVELOPE.seal(&content)
     }
 
@@ -76,19 +77,18 @@ impl Mapper {
         let content = ENVELOPE.open(bytes)?;
         let (kept, rest): (CheckpointContent<Vec<u8>, LabelBook, Measures, ExemplarStore, Relief>, _) =
             postcard::take_from_bytes(content).map_err(|_| RestoreError::Inconsistent)?;
-        // Checkpoints of earlier builds end here, after the times of the cells, or after the light.
+        // Checkpoints of earlier builds end here, after the times of the cells, after the light, or after the registration.
         let (last_seen_s, rest) = part(rest, BTreeMap::new())?;
         let (light, rest) = part(rest, None::<FlatField>)?;
-        let (registration, _) = part(rest, None::<&[u8]>)?;
+        let (registration, rest) = part(rest, None::<&[u8]>)?;
+        let (discriminant, _) = part(rest, None::<Discriminant>)?;
+        let kept_words = kept.words.with_discriminant(discriminant);
         let model = SceneModel::load(&kept.model)?;
         let fresh = Mapper::new(config, vocabulary, kept.book.epoch(), config.runtime.seed)?;
         let &SceneConfig { alpha, beta, gamma, seed, .. } = model.config();
         let configured = SceneConfig { alpha, beta, gamma, seed, ..fresh.model.config().clone() };
-        let (words, configured_words) = (kept.words.config(), fresh.extractor.measures());
-        if *model.config() != configured || words != configured_words.config() {
-            return Err(RestoreError::OtherParameters);
-        }
-        if config.scene.vocabulary.is_some() && !is_same(&kept.words, &configured_words) {
+        let configured_words = fresh.extractor.measures();
+        if *model.config() != configured || !continues(&kept_words, &configured_words) {
             return Err(RestoreError::OtherParameters);
         }
         let mut mapper = fresh;
@@ -96,7 +96,7 @@ impl Mapper {
         mapper.light = mapper.light.map(|fresh| light.unwrap_or(fresh));
         let kept_registrar = registration.and_then(registrar_of).map(|kept| kept.with_loops(config.registration.loops));
         mapper.registrar = kept_registrar.or(mapper.registrar);
-        mapper.extractor = WordExtractor::from_measures(kept.words);
+        mapper.extractor = WordExtractor::from_measures(kept_words);
         (mapper.model, mapper.book) = (model, kept.book);
         (mapper.exemplars, mapper.relief, mapper.last_s) = (kept.exemplars, kept.relief, kept.last_s);
         mapper.flat = mapper.model.label_map();
@@ -117,8 +117,13 @@ fn registrar_of(bytes: &[u8]) -> Option<Registrar> {
     Registrar::restore(bytes).inspect_err(|why| tracing::warn!("the registration starts again: {why}")).ok()
 }
 
-fn is_same(a: &Measures, b: &Measures) -> bool {
-    scene_model::vocabulary::save(a) == scene_model::vocabulary::save(b)
+/// Whether measures can have come from those of the configuration: a frozen vocabulary stays as it is, otherwise frames
+/// change all but the words' numbers and the discriminant.
+fn continues(kept: &Measures, configured: &Measures) -> bool {
+    if configured.are_frozen() {
+        return scene_model::vocabulary::save(kept) == scene_model::vocabulary::save(configured);
+    }
+    kept.config() == configured.config() && kept.discriminant() == configured.discriminant()
 }
 
 #[cfg(test)]
@@ -127,6 +132,7 @@ mod tests {
     use crate::MapUpdate;
     use image::{Rgb, RgbImage};
     use scene_model::project::Pose;
+    use scene_model::words::{FEATURES, WordConfig};
     use scenecast_protocol::directive::{Change, Settings, ShortDecimal};
     use scenecast_protocol::map::LayerId;
 
@@ -183,7 +189,7 @@ mod tests {
         let mut mapper = Mapper::new(&config(&[]), None, 3, 1).unwrap();
         (0..5).for_each(|at| drop(frame(&mut mapper, at)));
         let bytes = mapper.save(7);
-        let content = ENVELOPE.open(&bytes).unwrap();
+        let content = ENVELOPE.open(&bytes).unwrap().strip_suffix(&[0]).unwrap();
         let registration = mapper.registrar.as_ref().map(Registrar::save);
         let registration = postcard::to_allocvec(&registration).unwrap();
         let unregistered = content.strip_suffix(registration.as_slice()).unwrap();
@@ -199,6 +205,28 @@ mod tests {
         assert_eq!(restored.current(), expected);
         let damaged = ENVELOPE.seal(&[earlier, &[3]].concat());
         assert!(matches!(Mapper::restore(&config(&[]), None, &damaged), Err(RestoreError::Inconsistent)));
+    }
+
+    #[test]
+    fn a_checkpoint_continues_with_its_own_discriminant_alone() {
+        let along = |measure: usize| -> [f32; FEATURES] { std::array::from_fn(|i| f32::from(u8::from(i == measure))) };
+        let vocabulary = |measure: usize| {
+            let prototypes: Vec<Vec<f32>> = (0..9).map(|i| vec![i as f32 * 0.5 - 2.0]).collect();
+            let discriminant = Discriminant::new(&[along(measure)], &prototypes).unwrap();
+            Some(WordExtractor::new(&WordConfig::default()).measures().with_discriminant(Some(discriminant)))
+        };
+        let config = config(&[]);
+        let mut whole = Mapper::new(&config, vocabulary(4), 3, 1).unwrap();
+        (0..5).for_each(|at| drop(frame(&mut whole, at)));
+        let bytes = whole.save(1);
+        let mut restored = Mapper::restore(&config, vocabulary(4), &bytes).unwrap().mapper;
+        assert_eq!(restored.extractor.measures().discriminant(), vocabulary(4).unwrap().discriminant());
+        for at in 5..9 {
+            assert_eq!(frame(&mut restored, at), frame(&mut whole, at));
+        }
+        for other in [vocabulary(7), None] {
+            assert!(matches!(Mapper::restore(&config, other, &bytes), Err(RestoreError::OtherParameters)));
+        }
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::colour_field::ColourField;
-use super::moments::Moments;
+use super::moments::{Moments, standardised};
 use super::word::Word;
 
 /// The levels of L, of a and of b on the lattice of colour words: the first 8 x 8 x 8 ids are (L x 8 + a) x 8 + b.
@@ -34,6 +34,13 @@ impl ColourWords {
             }
             Word { id: first_id + id, u, v }
         }));
+    }
+
+    /// Appends the positions about `spacing` pixels apart, and the z-scores of the field's colours there, to `kept`.
+    pub(crate) fn scores(&self, field: &ColourField, spacing: f32, kept: &mut Vec<(f32, f32, [f32; 3])>) {
+        let scales = self.lab.map(|moments| moments.scale());
+        let scored = |(u, v, index): (f32, f32, usize)| (u, v, standardised(&field.lab[index], &scales));
+        kept.extend(field.sample(spacing).into_iter().map(scored));
     }
 }
 

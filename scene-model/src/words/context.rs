@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::colour::level;
 use super::colour_field::ColourField;
-use super::moments::Moments;
+use super::moments::{Moments, standardised};
 use super::texture::sextile;
 use super::word::Word;
 
@@ -30,7 +30,7 @@ pub(crate) struct ContextWords {
 }
 
 impl ContextWords {
-    /// Appends one word for each position on a grid of `spacing` pixels.
+    /// Appends one word for each position on a grid of `spacing` pixels, and the z-scores behind each to `kept`.
     pub(crate) fn extract(
         &mut self,
         field: &ColourField,
@@ -38,6 +38,7 @@ impl ContextWords {
         learn: bool,
         first_id: u32,
         words: &mut Vec<Word>,
+        mut kept: Option<&mut Vec<[f32; 4]>>,
     ) {
         let (means, spreads) = field.windows(CONTEXT_CELLS);
         let measure = |(mean, spread): (&[f32; 3], &[f32; 3])| [mean[0], mean[1], mean[2], (spread[0] + 1.0).ln()];
@@ -46,14 +47,18 @@ impl ContextWords {
             Moments::learn(&mut self.measures, &measures);
         }
         let scales = self.measures.map(|moments| moments.scale());
-        words.extend(field.sample(spacing).into_iter().map(|(u, v, index)| {
+        for (u, v, index) in field.sample(spacing) {
+            let scores = standardised(&measures[index], &scales);
             let mut id = 0;
-            for (i, (value, (mean, gain))) in measures[index].iter().zip(scales).enumerate() {
+            for (i, score) in scores.into_iter().enumerate() {
                 let levels = if i < 3 { COLOUR_LEVELS } else { CONTRAST_LEVELS };
-                id = id * levels + level((value - mean) * gain, REACH, levels);
+                id = id * levels + level(score, REACH, levels);
             }
-            Word { id: first_id + id, u, v }
-        }));
+            words.push(Word { id: first_id + id, u, v });
+            if let Some(kept) = &mut kept {
+                kept.push(scores);
+            }
+        }
     }
 }
 
@@ -64,7 +69,7 @@ pub(crate) struct SpreadWords {
 }
 
 impl SpreadWords {
-    /// Appends one word for each position on a grid of `spacing` pixels.
+    /// Appends one word for each position on a grid of `spacing` pixels, and the z-scores behind each to `kept`.
     pub(crate) fn extract(
         &mut self,
         field: &ColourField,
@@ -72,6 +77,7 @@ impl SpreadWords {
         learn: bool,
         first_id: u32,
         words: &mut Vec<Word>,
+        mut kept: Option<&mut Vec<[f32; 3]>>,
     ) {
         let (_, spreads) = field.windows(SPREAD_CELLS);
         let measures: Vec<[f32; 3]> =
@@ -80,10 +86,13 @@ impl SpreadWords {
             Moments::learn(&mut self.measures, &measures);
         }
         let scales = self.measures.map(|moments| moments.scale());
-        words.extend(field.sample(spacing).into_iter().map(|(u, v, index)| {
-            let levels = measures[index].iter().zip(scales);
-            let id = levels.fold(0, |id, (value, (mean, gain))| id * 6 + sextile((value - mean) * gain));
-            Word { id: first_id + id, u, v }
-        }));
+        for (u, v, index) in field.sample(spacing) {
+            let scores = standardised(&measures[index], &scales);
+            let id = scores.iter().fold(0, |id, &score| id * 6 + sextile(score));
+            words.push(Word { id: first_id + id, u, v });
+            if let Some(kept) = &mut kept {
+                kept.push(scores);
+            }
+        }
     }
 }

@@ -8,6 +8,7 @@ use super::colour::ColourWords;
 use super::colour_field::ColourField;
 use super::config::{WordConfig, first_id};
 use super::context::{ContextWords, SpreadWords};
+use super::discriminant::{Discriminant, MEASURES, MeasuredPlace};
 use super::grey_plane::GreyPlane;
 use super::moments::Moments;
 use super::stretch::Stretch;
@@ -27,6 +28,9 @@ pub struct Measures {
     context: ContextWords,
     spread: SpreadWords,
     texture: [Moments; 3],
+    /// Stored beside the measures, since files of earlier builds have none.
+    #[serde(skip)]
+    discriminant: Option<Discriminant>,
 }
 
 impl Measures {
@@ -35,7 +39,34 @@ impl Measures {
     pub fn config(&self) -> &WordConfig {
         &self.config
     }
+
+    /// The discriminant of the extractor.
+    #[must_use]
+    pub fn discriminant(&self) -> Option<&Discriminant> {
+        self.discriminant.as_ref()
+    }
+
+    /// Returns these measures with a discriminant. Serialised measures do not contain it.
+    #[must_use]
+    pub fn with_discriminant(self, discriminant: Option<Discriminant>) -> Self {
+        Self { discriminant, ..self }
+    }
+
+    /// Returns whether the measures are frozen, so that frames change none of them.
+    #[must_use]
+    pub fn are_frozen(&self) -> bool {
+        self.frames == FROZEN
+    }
+
+    /// Returns the number of different words (V).
+    #[must_use]
+    pub fn vocabulary_size(&self) -> u32 {
+        vocabulary_size(&self.config, self.discriminant.as_ref())
+    }
 }
+
+/// The number of frames of an extractor whose warm-up has ended.
+const FROZEN: u32 = u32::MAX;
 
 /// Extracts the visual words of frames, one after another.
 ///
@@ -65,6 +96,9 @@ pub struct WordExtractor {
     spread: SpreadWords,
     texture: TextureWords,
     binary: BinaryWords,
+    discriminant: Option<Discriminant>,
+    /// Those of the last frame that was measured; their memory is used again for the next.
+    scores: Scores,
 }
 
 impl WordExtractor {
@@ -80,6 +114,8 @@ impl WordExtractor {
             spread: SpreadWords::default(),
             texture: TextureWords::default(),
             binary: BinaryWords::default(),
+            discriminant: None,
+            scores: Scores::default(),
         }
     }
 
@@ -95,6 +131,8 @@ impl WordExtractor {
             spread: measures.spread,
             texture: TextureWords::with_energy(measures.texture),
             binary: BinaryWords::default(),
+            discriminant: measures.discriminant,
+            scores: Scores::default(),
         }
     }
 
@@ -112,13 +150,13 @@ impl WordExtractor {
     /// `cell_px` is the edge of a cell in pixels. An image that [`Self::extract`] refuses is ignored.
     pub fn learn_statistics(&mut self, image: &RgbImage, cell_px: f32) {
         if is_usable(image, cell_px) {
-            self.words(image, cell_px, true);
+            self.words(image, cell_px, true, false);
         }
     }
 
     /// Ends the warm-up: later frames change no measure.
     pub fn freeze(&mut self) {
-        self.frames = u32::MAX;
+        self.frames = FROZEN;
     }
 
     /// Returns a copy of the measures so far, to be stored with the model.
@@ -132,13 +170,14 @@ impl WordExtractor {
             context: self.context.clone(),
             spread: self.spread.clone(),
             texture: self.texture.learnt(),
+            discriminant: self.discriminant.clone(),
         }
     }
 
     /// Returns the number of different words (V).
     #[must_use]
     pub fn vocabulary_size(&self) -> u32 {
-        self.config.vocabulary_size()
+        vocabulary_size(&self.config, self.discriminant.as_ref())
     }
 
     /// Returns the words of a frame; `cell_px` is the edge of a cell in pixels at this altitude.
@@ -149,22 +188,45 @@ impl WordExtractor {
         if !is_usable(frame, cell_px) {
             return Vec::new();
         }
+        let learn = self.begin_frame(frame);
+        self.words(frame, cell_px, learn, self.discriminant.is_some())
+    }
+
+    /// Returns the measures of a frame, from which directions are learnt: a place for each word of a
+    /// [`Discriminant`]. The frame counts as one of [`Self::extract`].
+    ///
+    /// There are none if [`WordConfig`] has no colour words, or different numbers of context, spread and texture words.
+    pub fn measure(&mut self, frame: &RgbImage, cell_px: f32) -> Vec<MeasuredPlace> {
+        if !is_usable(frame, cell_px) {
+            return Vec::new();
+        }
+        let learn = self.begin_frame(frame);
+        self.words(frame, cell_px, learn, true);
+        self.scores.places().collect()
+    }
+
+    /// Counts a frame; returns whether it is learnt from.
+    fn begin_frame(&mut self, frame: &RgbImage) -> bool {
         let learn = self.frames < self.config.warm_up_frames.max(1);
         self.frames = self.frames.saturating_add(1);
         if learn {
             self.stretch.learn(frame);
         }
-        self.words(frame, cell_px, learn)
+        learn
     }
 
-    fn words(&mut self, frame: &RgbImage, cell_px: f32, learn: bool) -> Vec<Word> {
+    fn words(&mut self, frame: &RgbImage, cell_px: f32, learn: bool, measure: bool) -> Vec<Word> {
         let mut words = Vec::new();
-        self.colour_words(frame, cell_px, learn, &mut words);
-        self.texture_words(frame, cell_px, learn, &mut words);
+        self.scores.clear();
+        self.colour_words(frame, cell_px, learn, measure, &mut words);
+        self.texture_words(frame, cell_px, learn, measure, &mut words);
+        if let Some(discriminant) = &self.discriminant {
+            discriminant.extract(self.scores.places(), first_id(5), &mut words);
+        }
         words
     }
 
-    fn colour_words(&mut self, frame: &RgbImage, cell_px: f32, learn: bool, words: &mut Vec<Word>) {
+    fn colour_words(&mut self, frame: &RgbImage, cell_px: f32, learn: bool, measure: bool, words: &mut Vec<Word>) {
         let WordConfig { colour, context, spread, .. } = self.config;
         if colour + context + spread == 0 {
             return;
@@ -175,26 +237,69 @@ impl WordExtractor {
             self.colour.extract(&field, learn, first_id(0), words);
         }
         if context > 0 {
-            self.context.extract(&field, spacing(cell_px, context), learn, first_id(1), words);
+            let kept = measure.then_some(&mut self.scores.context);
+            self.context.extract(&field, spacing(cell_px, context), learn, first_id(1), words, kept);
         }
         if spread > 0 {
-            self.spread.extract(&field, spacing(cell_px, spread), learn, first_id(2), words);
+            let kept = measure.then_some(&mut self.scores.spread);
+            self.spread.extract(&field, spacing(cell_px, spread), learn, first_id(2), words, kept);
+        }
+        if measure && colour > 0 && context > 0 {
+            self.colour.scores(&field, spacing(cell_px, context), &mut self.scores.colour);
         }
     }
 
-    fn texture_words(&mut self, frame: &RgbImage, cell_px: f32, learn: bool, words: &mut Vec<Word>) {
+    fn texture_words(&mut self, frame: &RgbImage, cell_px: f32, learn: bool, measure: bool, words: &mut Vec<Word>) {
         let WordConfig { texture, binary, .. } = self.config;
         if texture + binary == 0 {
             return;
         }
         let levels = GreyPlane::pyramid(self.stretch.grey(frame));
         if texture > 0 {
-            self.texture.extract(&levels, spacing(cell_px, texture), learn, first_id(3), words);
+            let kept = measure.then_some(&mut self.scores.texture);
+            self.texture.extract(&levels, spacing(cell_px, texture), learn, first_id(3), words, kept);
         }
         if binary > 0 {
             self.binary.extract(&levels[1], spacing(cell_px, binary), first_id(4), words);
         }
     }
+}
+
+/// The z-scores behind the words of a frame, each list in the order of its words.
+#[derive(Clone, Debug, Default)]
+struct Scores {
+    colour: Vec<(f32, f32, [f32; 3])>,
+    context: Vec<[f32; 4]>,
+    spread: Vec<[f32; 3]>,
+    texture: Vec<[f32; 3]>,
+}
+
+impl Scores {
+    fn clear(&mut self) {
+        self.colour.clear();
+        self.context.clear();
+        self.spread.clear();
+        self.texture.clear();
+    }
+
+    /// The measures of the places, if all kinds lie on one grid.
+    fn places(&self) -> impl Iterator<Item = MeasuredPlace> {
+        let of_kinds = [self.context.len(), self.spread.len(), self.texture.len()];
+        let count = if of_kinds == [self.colour.len(); 3] { self.colour.len() } else { 0 };
+        (0..count).map(|i| {
+            let (u, v, colour) = self.colour[i];
+            let mut scores = [0.0; MEASURES];
+            scores[..3].copy_from_slice(&colour);
+            scores[3..7].copy_from_slice(&self.context[i]);
+            scores[7..10].copy_from_slice(&self.spread[i]);
+            scores[10..].copy_from_slice(&self.texture[i]);
+            MeasuredPlace { u, v, scores }
+        })
+    }
+}
+
+fn vocabulary_size(config: &WordConfig, discriminant: Option<&Discriminant>) -> u32 {
+    config.vocabulary_size() + discriminant.map_or(0, Discriminant::vocabulary_size)
 }
 
 fn is_usable(frame: &RgbImage, cell_px: f32) -> bool {

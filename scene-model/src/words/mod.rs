@@ -10,6 +10,7 @@ mod colour;
 mod colour_field;
 mod config;
 mod context;
+mod discriminant;
 mod extractor;
 mod flat_field;
 mod grey_plane;
@@ -22,6 +23,9 @@ mod word;
 pub(crate) use colour::LEVELS as COLOUR_LEVELS;
 pub use colour_field::lab as cie_lab;
 pub use config::WordConfig;
+pub use discriminant::{
+    Discriminant, DiscriminantError, FEATURES, MAX_DIRECTIONS, MAX_PROTOTYPES, MEASURES, MeasuredPlace,
+};
 pub use extractor::{Measures, WordExtractor};
 pub use flat_field::FlatField;
 pub use word::Word;

@@ -33,3 +33,8 @@ impl Moments {
         (mean as f32, inverse as f32)
     }
 }
+
+/// The z-scores of values, given the mean and 1 / standard deviation of each.
+pub(super) fn standardised<const N: usize>(values: &[f32; N], scales: &[(f32, f32); N]) -> [f32; N] {
+    std::array::from_fn(|i| (values[i] - scales[i].0) * scales[i].1)
+}

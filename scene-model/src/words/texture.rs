@@ -2,7 +2,7 @@
 
 use super::grey_plane::GreyPlane;
 use super::grid::centres;
-use super::moments::Moments;
+use super::moments::{Moments, standardised};
 use super::word::Word;
 
 const SCALES: usize = 3;
@@ -43,7 +43,7 @@ impl TextureWords {
         self.energy
     }
 
-    /// Appends one word for each position on a grid of `spacing` pixels.
+    /// Appends one word for each position on a grid of `spacing` pixels, and the z-scores behind each to `kept`.
     pub(crate) fn extract(
         &mut self,
         levels: &[GreyPlane; SCALES],
@@ -51,6 +51,7 @@ impl TextureWords {
         learn: bool,
         first_id: u32,
         words: &mut Vec<Word>,
+        mut kept: Option<&mut Vec<[f32; SCALES]>>,
     ) {
         let across = centres(levels[0].width as u32, spacing);
         let down = centres(levels[0].height as u32, spacing);
@@ -60,13 +61,14 @@ impl TextureWords {
             Moments::learn(&mut self.energy, &energies);
         }
         let scales = self.energy.map(|moments| moments.scale());
-        words.extend(energies.iter().zip(places()).map(|(energy, (u, v))| {
-            let mut id = 0;
-            for (value, (mean, gain)) in energy.iter().zip(scales) {
-                id = id * 6 + sextile((value - mean) * gain);
+        for (energy, (u, v)) in energies.iter().zip(places()) {
+            let scores = standardised(energy, &scales);
+            let id = scores.iter().fold(0, |id, &score| id * 6 + sextile(score));
+            words.push(Word { id: first_id + id, u, v });
+            if let Some(kept) = &mut kept {
+                kept.push(scores);
             }
-            Word { id: first_id + id, u, v }
-        }));
+        }
     }
 
     /// The log energy over all orientations, at each scale.

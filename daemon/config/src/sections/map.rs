@@ -67,7 +67,8 @@ section! {
         /// Interpretation of gamma. literal: gamma, as in the paper; collapsed: gamma divided by the size of the
         /// vocabulary; rost: alpha times gamma divided by the size of the vocabulary, as in the program ROST.
         birth: BirthRule = BirthRule::Literal, ANY, [Auv Scenario];
-        /// Maximum number of labels at a time.
+        /// Maximum number of labels at a time. 32 show more of a reef than 16 for a third more bits; choose them where the
+        /// budget allows. The number cannot be changed during a mission.
         max_labels: u32 = 16, range(2.0, 254.0, ""), [Auv Scenario];
         /// Words that are resampled per second of mission time.
         refine_words_per_s: u32 = 50_000, range(0.0, 1e8, "1/s"), [Auv Scenario];
@@ -76,7 +77,8 @@ section! {
         frames_per_s: f64 = 0.0, range(0.0, 30.0, "1/s"), [Auv Scenario];
         /// Maximum number of words that are kept in a cell.
         max_words_per_cell: u32 = 200, range(8.0, 60_000.0, ""), [Auv Scenario];
-        /// File of a vocabulary (scenecast vocabulary train). Empty: the built-in vocabulary.
+        /// File of a vocabulary (scenecast vocabulary train), learnt from images or from annotated images of a similar
+        /// site. Empty: the built-in vocabulary.
         vocabulary: Option<PathBuf> = None, ANY, [Auv Scenario];
         /// Mission time between two checkpoints of the scene model. A restarted vehicle continues from the
         /// last one. 0: no checkpoints.

@@ -1,9 +1,10 @@
 //! `scenecast scene`
 
-mod pairs;
+mod choices;
 mod register;
 mod run;
 mod sample;
+mod scenes;
 mod score;
 
 use clap::Subcommand;

@@ -1,18 +1,15 @@
 //! `scenecast scene score`
 
-use super::pairs::{Pair, pairs};
-use crate::progress::Progress;
+use super::choices::compare;
+use super::scenes::Scenes;
+use crate::annotated_images::{AnnotatedImage, Pair, pairs};
 use clap::Args;
-use image::GrayImage;
 use scene_model::topics::Kernel;
 use scenecast_core::UserError;
-use scenecast_files::{read_classes, read_image};
-use scenecast_scoring::{AnnotatedScene, MeanScore, Method, Trial, TrialError};
+use scenecast_scoring::{AnnotatedScene, MeanScore, Method, Trial};
 use serde::Serialize;
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::path::PathBuf;
 
 /// Score the scene model and two baselines on annotated images of the sea floor.
 ///
@@ -20,7 +17,8 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 /// size. The spatial null value is the mean mutual information of a method's map after 3 flips and 12 torus shifts:
 /// that of any map with such patches. The excess over it measures the information that the map takes from the image.
 #[derive(Debug, Args)]
-#[command(after_help = "Example: scenecast scene score --dir reefs --seeds 3 --json")]
+#[command(after_help = "Example: scenecast scene score --dir reefs --seeds 3 --json
+Example: scenecast scene score --dir reefs --seeds 9 --choices")]
 pub struct Score {
     /// Folder of images with NAME_label.png beside them
     #[arg(long, value_name = "DIR")]
@@ -40,6 +38,10 @@ pub struct Score {
     /// Classes that are ignored, separated by commas
     #[arg(long, value_name = "CLASSES", value_delimiter = ',', default_value = "255")]
     ignore: Vec<u8>,
+    /// Compare the choices of an operator instead of the methods: --max-labels and twice as many labels, each with the
+    /// built-in vocabulary and with one learnt from the annotations of all other images, and the bits of a whole map
+    #[arg(long)]
+    choices: bool,
     /// Print JSON instead of a table
     #[arg(long)]
     json: bool,
@@ -84,44 +86,15 @@ impl Score {
         let pairs = pairs(&self.dir)?;
         let trial =
             Trial { labels: self.max_labels, cells_across: self.cells_across, sweeps: self.sweeps, seeds: self.seeds };
-        let scenes = self.scenes(trial, &pairs)?;
         let json = self.json;
-        let report = self.report(scenes);
-        if json {
-            let text = serde_json::to_string_pretty(&report).map_err(|e| UserError::Failed(e.to_string()))?;
-            println!("{text}");
-        } else {
-            report.print();
+        if self.choices {
+            let report = compare(trial, &pairs, &self.ignore)?;
+            return if json { print_json(&report) } else { Ok(report.print()) };
         }
-        Ok(())
-    }
-
-    /// Scores of all scenes in the order of their names, on all cores; or the first error in that order.
-    fn scenes(&self, trial: Trial, pairs: &[Pair]) -> Result<Vec<SceneReport>, UserError> {
-        let (next, steps) = (AtomicUsize::new(0), pairs.len() * Method::ALL.len());
-        let done = Mutex::new((BTreeMap::new(), Progress::new("scenes"), 0));
-        let step = || {
-            let mut done = done.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
-            done.2 += 1;
-            let share = f64::from(done.2) / steps as f64;
-            done.1.show(share);
-        };
-        let work = || {
-            loop {
-                let index = next.fetch_add(1, Ordering::Relaxed);
-                let Some(pair) = pairs.get(index) else { return };
-                let scene = scene(trial, pair, &self.ignore, &step);
-                let failed = scene.is_err();
-                done.lock().unwrap_or_else(std::sync::PoisonError::into_inner).0.insert(index, scene);
-                if failed {
-                    next.store(pairs.len(), Ordering::Relaxed);
-                }
-            }
-        };
-        let threads = std::thread::available_parallelism().map_or(1, usize::from).min(pairs.len());
-        std::thread::scope(|scope| (0..threads).for_each(|_| drop(scope.spawn(work))));
-        let (scenes, ..) = done.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner);
-        scenes.into_values().collect()
+        let scenes = Scenes::new("scenes", &pairs, Method::ALL.len());
+        let scenes = scenes.each(|_, pair, step| scene(trial, pair, &self.ignore, step))?;
+        let report = self.report(scenes);
+        if json { print_json(&report) } else { Ok(report.print()) }
     }
 
     fn report(self, scenes: Vec<SceneReport>) -> ScoreReport {
@@ -150,25 +123,18 @@ impl Score {
 }
 
 fn scene(trial: Trial, pair: &Pair, ignore: &[u8], step: &dyn Fn()) -> Result<SceneReport, UserError> {
-    let image = read_image(&pair.image)?.to_rgb8();
+    let AnnotatedImage { image, classes } = pair.read()?;
     let (width_px, height_px) = image.dimensions();
-    let classes = read_classes(&pair.classes, image.dimensions())?;
-    let classes = GrayImage::from_raw(width_px, height_px, classes)
-        .ok_or_else(|| UserError::file(&pair.classes, "has another number of pixels than its header states"))?;
-    let refused = |error: TrialError| {
-        let of_classes = matches!(error, TrialError::Annotations(_) | TrialError::NoClasses);
-        UserError::file(if of_classes { &pair.classes } else { &pair.image }, error)
-    };
-    let scene = AnnotatedScene::new(trial, &image, &classes, ignore).map_err(refused)?;
+    let scene = AnnotatedScene::new(trial, &image, &classes, ignore).map_err(|e| pair.refused(e))?;
     let mut methods = BTreeMap::new();
     for method in Method::ALL {
-        methods.insert(method.name(), scene.mean_score(method).map_err(refused)?);
+        methods.insert(method.name(), scene.mean_score(method).map_err(|e| pair.refused(e))?);
         step();
     }
     let (columns, rows) = scene.annotations().size();
     let (annotated_cells, classes) = scene.annotations().cells().unwrap_or_default();
     Ok(SceneReport {
-        scene: name(&pair.image),
+        scene: pair.name(),
         width_px,
         height_px,
         cell_px: scene.cell_px(),
@@ -179,8 +145,9 @@ fn scene(trial: Trial, pair: &Pair, ignore: &[u8], step: &dyn Fn()) -> Result<Sc
     })
 }
 
-fn name(path: &Path) -> String {
-    path.file_stem().unwrap_or_default().to_string_lossy().into_owned()
+fn print_json(report: &impl Serialize) -> Result<(), UserError> {
+    println!("{}", serde_json::to_string_pretty(report).map_err(|e| UserError::Failed(e.to_string()))?);
+    Ok(())
 }
 
 impl ScoreReport {

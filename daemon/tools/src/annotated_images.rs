@@ -1,17 +1,73 @@
 //! Images with their annotations in the same folder.
 
+use image::{GrayImage, RgbImage};
 use scenecast_core::UserError;
+use scenecast_files::{read_classes, read_image};
+use scenecast_scoring::{Annotations, TrialError};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 const SUFFIX: &str = "_label.png";
 const EXTENSIONS: [&str; 5] = ["jpg", "jpeg", "png", "tif", "tiff"];
 
-/// An image and the classes of its pixels.
+/// The files of an image and of the classes of its pixels.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Pair {
-    pub(super) image: PathBuf,
-    pub(super) classes: PathBuf,
+    image: PathBuf,
+    classes: PathBuf,
+}
+
+/// An image and the classes of its pixels, of one size.
+pub struct AnnotatedImage {
+    pub image: RgbImage,
+    pub classes: GrayImage,
+}
+
+impl Pair {
+    /// The name of the image without its folder and extension.
+    pub fn name(&self) -> String {
+        self.image.file_stem().unwrap_or_default().to_string_lossy().into_owned()
+    }
+
+    pub fn read(&self) -> Result<AnnotatedImage, UserError> {
+        let image = read_image(&self.image)?.to_rgb8();
+        let (width, height) = image.dimensions();
+        let classes = GrayImage::from_raw(width, height, read_classes(&self.classes, (width, height))?)
+            .ok_or_else(|| UserError::file(&self.classes, "has another number of pixels than its header states"))?;
+        Ok(AnnotatedImage { image, classes })
+    }
+
+    /// Reads both, and the annotations of cells of `cell_px` pixels without the classes in `ignore`. At least one cell
+    /// must be annotated.
+    pub fn read_cells(&self, cell_px: impl Fn(u32) -> f32, ignore: &[u8]) -> Result<AnnotatedCells, UserError> {
+        let AnnotatedImage { image, classes } = self.read()?;
+        let cell_px = cell_px(image.width());
+        let (width, height) = image.dimensions();
+        if (width.min(height) as f32) < cell_px {
+            let cause = format!("{width} x {height} pixels are less than a cell of {cell_px}");
+            return Err(UserError::file(&self.image, cause));
+        }
+        let annotations = Annotations::new(&classes, (width, height), cell_px, ignore);
+        let annotations = annotations.map_err(|e| self.refused(e.into()))?;
+        if annotations.cells().is_none() {
+            return Err(self.refused(TrialError::NoClasses));
+        }
+        Ok(AnnotatedCells { image, cell_px, annotations })
+    }
+
+    /// The error with the file that it is about.
+    pub fn refused(&self, error: TrialError) -> UserError {
+        let of_classes = matches!(error, TrialError::Annotations(_) | TrialError::NoClasses);
+        UserError::file(if of_classes { &self.classes } else { &self.image }, error)
+    }
+}
+
+/// An image with the classes of its cells.
+pub struct AnnotatedCells {
+    pub image: RgbImage,
+    /// Edge of a cell, pixels.
+    pub cell_px: f32,
+    pub annotations: Annotations,
 }
 
 /// Every `NAME_label.png` of a folder with the image `NAME`, by name; one without an image or with two is refused.
