@@ -89,12 +89,20 @@ impl Score {
         let json = self.json;
         if self.choices {
             let report = compare(trial, &pairs, &self.ignore)?;
-            return if json { print_json(&report) } else { Ok(report.print()) };
+            if json {
+                return print_json(&report);
+            }
+            report.print();
+            return Ok(());
         }
         let scenes = Scenes::new("scenes", &pairs, Method::ALL.len());
         let scenes = scenes.each(|_, pair, step| scene(trial, pair, &self.ignore, step))?;
         let report = self.report(scenes);
-        if json { print_json(&report) } else { Ok(report.print()) }
+        if json {
+            return print_json(&report);
+        }
+        report.print();
+        Ok(())
     }
 
     fn report(self, scenes: Vec<SceneReport>) -> ScoreReport {
