@@ -2,6 +2,7 @@
 
 mod accuracy;
 mod anchored;
+mod blocks;
 mod camera;
 mod carrier;
 mod events;
