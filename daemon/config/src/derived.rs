@@ -27,6 +27,13 @@ pub fn modem_profile(config: &Config, bit_rate_bps: f64) -> ModemProfile {
     }
 }
 
+/// The energy of a bit on air in joules: the power of the transmitter for the time of a bit. `None` if energy is not
+/// counted.
+pub fn joules_per_bit(config: &Config, profile: &ModemProfile) -> Option<f64> {
+    let watts = config.modem.tx_watts;
+    (watts > 0.0).then(|| watts / profile.bit_rate_bps.max(1.0))
+}
+
 /// The depth at which the survey is flown, metres.
 pub fn survey_depth_m(config: &Config) -> f64 {
     (config.survey.depth_m - config.survey.altitude_m).max(0.0)

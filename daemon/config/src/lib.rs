@@ -21,7 +21,9 @@ mod sections;
 mod setting;
 mod token_file;
 
-pub use derived::{authenticity, cell_m, modem_profile, survey_depth_m, tuning_table, vehicle_address, vehicle_names};
+pub use derived::{
+    authenticity, cell_m, joules_per_bit, modem_profile, survey_depth_m, tuning_table, vehicle_address, vehicle_names,
+};
 pub use key::{Key, Role};
 pub use key_file::{load_key, read_key};
 pub use load::load;
@@ -37,7 +39,7 @@ pub use sections::{
     Scene, Survey, VehicleSection,
 };
 pub use setting::{
-    Authenticate, AutopilotKind, BirthRule, CameraSource, GpsPort, HostPort, LayerName, MapCells, MapStream, ModemKind,
-    OperatorScript, S2cMode, WorldKind,
+    Authenticate, AutopilotKind, BirthRule, CameraSource, Debounce, GpsPort, HostPort, LayerName, MapCells, MapStream,
+    ModemKind, OperatorScript, S2cMode, WorldKind,
 };
 pub use token_file::{TokenGrant, load_tokens, read_token, read_tokens};

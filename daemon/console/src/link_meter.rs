@@ -19,6 +19,8 @@ pub struct LinkMeter {
     /// The budgets up and down for which the audits count, bit/s.
     budgets: [u32; 2],
     audits: [Audit; 2],
+    /// Bits on air since the meter began, up and down.
+    totals: [u64; 2],
     /// The number of each entry, and its bits up and down.
     history: VecDeque<(u64, [u64; 2])>,
 }
@@ -27,7 +29,7 @@ impl LinkMeter {
     /// A meter with the window of the bit budget, which counts from `began` on.
     pub fn new(window: Duration, began: Instant) -> Self {
         let audits = [Audit::new(window), Audit::new(window)];
-        Self { window, began, budgets: [0; 2], audits, history: VecDeque::new() }
+        Self { window, began, budgets: [0; 2], audits, totals: [0; 2], history: VecDeque::new() }
     }
 
     /// Counts the highest rate anew in a direction of which the budget has changed. The bits before the change were within
@@ -56,6 +58,7 @@ impl LinkMeter {
 
     fn count(&mut self, direction: usize, bits: u64, now: Instant) {
         self.audits[direction].record(bits, now);
+        self.totals[direction] += bits;
         let number = now.as_secs_f64() as u64 / ENTRY_S;
         if self.history.back().is_none_or(|(n, _)| *n != number) {
             self.history.push_back((number, [0; 2]));
@@ -73,6 +76,11 @@ impl LinkMeter {
         let first = (now.as_secs_f64() as u64).saturating_sub(60) / ENTRY_S;
         let bits: u64 = self.history.iter().filter(|(n, _)| *n > first).map(|(_, b)| b[direction]).sum();
         bits as f64 / self.elapsed_s(now).clamp(1.0, 60.0)
+    }
+
+    /// Bits on air since the meter began, up (0) or down (1).
+    pub fn total_bits(&self, direction: usize) -> u64 {
+        self.totals[direction]
     }
 
     /// Seconds since the meter began.
@@ -95,5 +103,20 @@ impl LinkMeter {
         let rate = |bits: u64| bits as f64 / ENTRY_S as f64;
         let entry = |(n, b): &(u64, [u64; 2])| LinkRates { t_s: n * ENTRY_S, up_bps: rate(b[0]), down_bps: rate(b[1]) };
         self.history.iter().map(entry).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn totals_outlive_the_history() {
+        let mut meter = LinkMeter::new(Duration::from_secs(10), Instant::ZERO);
+        for minute in 0..60 {
+            meter.received(1000, Instant::from_secs_f64(f64::from(minute) * 60.0));
+        }
+        meter.sent(500, Instant::from_secs_f64(3600.0));
+        assert_eq!([meter.total_bits(0), meter.total_bits(1)], [60_000, 500]);
     }
 }

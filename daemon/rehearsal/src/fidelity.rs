@@ -3,44 +3,13 @@
 use super::baseline::whole_png;
 use super::mission::{MapQuality, Mission, MissionOptions};
 use super::quality::{Curve, Line, Panel};
+use super::uplink::{Repeats, Uplink};
 use super::world::World;
 use scenecast_config::Config;
 use scenecast_core::UserError;
 use scenecast_protocol::schedule::Class;
 use serde::Serialize;
 use std::time::Duration;
-
-/// Bytes that the vehicle put on air, by use.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-pub struct Uplink {
-    pub map: u64,
-    pub status: u64,
-    /// Headers, acknowledgement statements and integrity checks.
-    pub overhead: u64,
-    /// Copies of earlier frames.
-    pub repeated: u64,
-    /// Layers and images.
-    pub other: u64,
-}
-
-impl Uplink {
-    fn of(mission: &Mission, map: Class) -> Self {
-        let stats = mission.vehicle().stats();
-        let of = |class| stats.bytes_by_class.get(&class).copied().unwrap_or(0);
-        let [map, status, overhead] = [map, Class::Status, Class::Overhead].map(of);
-        let all: u64 = stats.bytes_by_class.values().sum();
-        Self { map, status, overhead, repeated: stats.repeated_bytes, other: all - map - status - overhead }
-    }
-
-    pub fn all(&self) -> u64 {
-        self.map + self.status + self.overhead + self.repeated + self.other
-    }
-
-    /// The part of all bytes that is map, 0..=1.
-    pub fn map_share(&self) -> f64 {
-        self.map as f64 / self.all().max(1) as f64
-    }
-}
 
 /// One mission of the comparison.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -68,6 +37,11 @@ pub struct FidelityRow {
     /// The part of these bytes that is map, and the part that belongs to frames of mainly map, 0..=1.
     pub map_share: f64,
     pub map_frames_share: f64,
+    /// Copies of the vehicle's frames.
+    pub repeats: Repeats,
+    /// Energy that the vehicle's modem has transmitted with, joules, in all and for each bit of the map that arrived.
+    pub energy_j: Option<f64>,
+    pub energy_per_map_bit_j: Option<f64>,
     /// Both maps over time.
     pub series: Vec<MapQuality>,
 }
@@ -105,8 +79,8 @@ fn run(
     mission.run(Duration::ZERO, &mut |_| {})?;
     let [median, p95, max] = mission.meters.labels.delays(mission.now()).summary();
     let class = if stream == "delta" { Class::Map } else { Class::Exemplar };
-    let (uplink_bytes, by_kind) = (Uplink::of(&mission, class), &mission.frames().up_bytes);
-    let of_map = by_kind.get(class.name()).copied().unwrap_or(0);
+    let (uplink_bytes, by_kind) = (Uplink::of(&mission, class), &mission.frames().up);
+    let of_map = by_kind.get(class.name()).map_or(0, |sum| sum.bytes);
     let end = mission.quality();
     let series: Vec<MapQuality> = mission.quality_series().iter().copied().chain([end]).collect();
     Ok(FidelityRow {
@@ -121,7 +95,10 @@ fn run(
         operator_share_mean: mean_share(&series),
         sent_bits: mission.audits()[0].total_bits(),
         map_share: uplink_bytes.map_share(),
-        map_frames_share: of_map as f64 / by_kind.values().sum::<u64>().max(1) as f64,
+        map_frames_share: of_map as f64 / by_kind.values().map(|sum| sum.bytes).sum::<u64>().max(1) as f64,
+        repeats: Repeats::of(&mission),
+        energy_j: mission.energy_j().map(|[up, _]| up),
+        energy_per_map_bit_j: mission.energy_per_map_bit_j(class),
         uplink_bytes,
         series,
     })

@@ -32,14 +32,21 @@ pub struct FramesLog {
     pub sent: [u64; 2],
     /// Number of frames lost in the channel, up and down.
     pub lost: [u64; 2],
-    /// Bytes of the vehicle's frames by their kind.
-    pub up_bytes: BTreeMap<&'static str, u64>,
+    /// The vehicle's frames by their kind.
+    pub up: BTreeMap<&'static str, FrameSum>,
+}
+
+/// Frames of one kind.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct FrameSum {
+    pub frames: u64,
+    pub bytes: u64,
 }
 
 impl Default for FramesLog {
     fn default() -> Self {
         let text = "# time_s direction bytes kind fate [reason]\n".to_owned();
-        Self { open: BTreeMap::new(), text, sent: [0; 2], lost: [0; 2], up_bytes: BTreeMap::new() }
+        Self { open: BTreeMap::new(), text, sent: [0; 2], lost: [0; 2], up: BTreeMap::new() }
     }
 }
 
@@ -49,7 +56,8 @@ impl FramesLog {
         let direction = if up { "up" } else { "down" };
         self.sent[usize::from(!up)] += 1;
         if up {
-            *self.up_bytes.entry(kind).or_default() += bytes as u64;
+            let sum = self.up.entry(kind).or_default();
+            (sum.frames, sum.bytes) = (sum.frames + 1, sum.bytes + bytes as u64);
         }
         self.open.insert(transmission, Sent { at_s, direction, bytes, kind });
     }

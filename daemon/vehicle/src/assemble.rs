@@ -1,6 +1,6 @@
 //! Builds a vehicle from a configuration.
 
-use crate::{Durable, FailsafePolicy, Footprint, Navigator, Steering, Vehicle};
+use crate::{Durable, FailsafePolicy, Footprint, MapSelection, Navigator, Steering, Vehicle};
 use scenecast_config::{Config, LayerName, MapCells, MapStream, cell_m, vehicle_address};
 use scenecast_core::{Area, UserError};
 use scenecast_protocol::link::{Authenticity, VehicleConfig, VehicleLink};
@@ -38,7 +38,6 @@ pub fn assemble(
     for layer in layers(config, codec) {
         link.add_layer(layer);
     }
-    link.source_mut().set_debounce(Duration::from_secs_f64(config.map.debounce_s));
     let planner = config.survey.planner;
     let steering = Steering::new(area, footprint(config), cell_m(config), planner, config.survey.clearance_m)
         .with_leg_overlap(footprint(config), config.survey.leg_overlap_percent / 100.0)
@@ -52,7 +51,12 @@ pub fn assemble(
     };
     link.set_background(durable.background.and_then(BackgroundOrder::from_code).unwrap_or(config.link.background));
     let mut vehicle = Vehicle::new(link, navigator, steering, policy(config), durable, now);
-    vehicle.configure_map(config.map.cells == MapCells::Coarse, config.map.coarse_after_s, selected_layers(config));
+    vehicle.configure_map(MapSelection {
+        is_coarse: config.map.cells == MapCells::Coarse,
+        coarse_after_s: config.map.coarse_after_s,
+        debounce: config.map.debounce_s,
+        layers: selected_layers(config),
+    });
     if config.map.stream == MapStream::WholePng {
         vehicle.send_whole_png();
     }
@@ -84,7 +88,7 @@ fn selected_layers(config: &Config) -> LayerMask {
 /// Every layer that the operator can select, with its part of the map's share.
 fn layers(config: &Config, codec: Codec) -> impl Iterator<Item = LayerSource> {
     let map = &config.map;
-    let debounce = Duration::from_secs_f64(map.debounce_s);
+    let debounce = map.debounce_s.of_layers();
     let possible = BUILT_IN_LAYERS.iter().zip(LayerName::all()).filter(|_| map.stream == MapStream::Delta);
     possible.map(move |(layer, name)| {
         let built_in = match layer.id {

@@ -25,4 +25,4 @@ pub use mapper::{MapUpdate, Mapper, SharedExemplars};
 pub use navigator::{FixVerdict, LastPlace, Navigator};
 pub use registration::{FoundFrame, RegisteredFrame};
 pub use steering::{Course, Footprint, Steering};
-pub use vehicle::{AppliedSlot, Durable, LostOrders, Vehicle, VehicleDisk, VehicleOutput};
+pub use vehicle::{AppliedSlot, Durable, LostOrders, MapSelection, Vehicle, VehicleDisk, VehicleOutput};

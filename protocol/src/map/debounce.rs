@@ -12,6 +12,46 @@ const MEMORY: u64 = 16;
 /// A difference is sent at the latest after this many times the wait of a stable cell.
 const MAX_WAITS: u32 = 16;
 
+/// How long a new label must be stable in a cell that has not flipped recently.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Hold {
+    /// Always so long; zero sends everything at once.
+    For(Duration),
+    /// As long as the backlog takes at this many bits a second, at most a minute: a label that does not last that long is not
+    /// worth sending. While nothing else waits, the labels that are held back are sent.
+    Backlog(u32),
+}
+
+impl Hold {
+    const MAX_AUTOMATIC: Duration = Duration::from_secs(60);
+    /// The wait from which the memory of flips follows where the wait itself varies.
+    const TYPICAL: Duration = Duration::from_secs(20);
+
+    /// The wait of a cell that has not flipped recently, while so many bytes wait.
+    pub(super) fn calm(self, backlog_bytes: usize) -> Duration {
+        match self {
+            Self::For(wait) => wait,
+            Self::Backlog(bits_per_s) => {
+                let seconds = backlog_bytes as f64 * 8.0 / f64::from(bits_per_s.max(1));
+                Self::MAX_AUTOMATIC.min(Duration::from_secs_f64(seconds))
+            }
+        }
+    }
+
+    fn typical(self) -> Duration {
+        match self {
+            Self::For(wait) => wait,
+            Self::Backlog(_) => Self::TYPICAL,
+        }
+    }
+}
+
+impl Default for Hold {
+    fn default() -> Self {
+        Self::For(Duration::ZERO)
+    }
+}
+
 /// Remembers which cells have flipped recently, in eight bits for each cell that ever did.
 ///
 /// ```text
@@ -22,34 +62,43 @@ const MAX_WAITS: u32 = 16;
 /// ```
 #[derive(Debug, Default)]
 pub(super) struct Debounce {
-    calm: Duration,
+    hold: Hold,
     flips: LabelGrid,
 }
 
 impl Debounce {
-    /// Sets the wait of a cell that has not flipped recently; zero disables all waits. Another wait forgets all flips.
-    pub(super) fn set_wait(&mut self, calm: Duration) {
-        if calm != self.calm {
-            self.calm = calm;
+    /// Sets the wait of a cell that has not flipped recently. Another memory forgets all flips.
+    pub(super) fn set_hold(&mut self, hold: Hold) {
+        if hold.typical() != self.hold.typical() {
             self.flips.clear();
         }
+        self.hold = hold;
     }
 
-    /// Notes a flip of `cell`; returns how long its new label must be stable.
-    pub(super) fn flip(&mut self, cell: Cell, confidence: u8, now: Instant) -> Duration {
-        if self.calm.is_zero() {
+    pub(super) fn hold(&self) -> Hold {
+        self.hold
+    }
+
+    /// Whether labels are held back only while others wait.
+    pub(super) fn is_automatic(&self) -> bool {
+        matches!(self.hold, Hold::Backlog(_))
+    }
+
+    /// Notes a flip of `cell`; returns how long its new label must be stable if that of a calm cell must for `calm`.
+    pub(super) fn flip(&mut self, cell: Cell, confidence: u8, calm: Duration, now: Instant) -> Duration {
+        if self.hold.typical().is_zero() {
             return Duration::ZERO;
         }
-        let epoch = now.as_micros() / (self.calm.as_micros() as u64 * MEMORY).max(1);
+        let epoch = now.as_micros() / (self.hold.typical().as_micros() as u64 * MEMORY).max(1);
         let (present, flips) = self.recall(cell, epoch);
         self.flips.set(cell, present << 3 | (flips + 1).min(MAX_FLIPS));
         let doubt = u32::from(MAX_CONFIDENCE.saturating_sub(confidence));
-        self.calm * (1 + u32::from(flips)) * doubt / u32::from(MAX_CONFIDENCE)
+        calm * (1 + u32::from(flips)) * doubt / u32::from(MAX_CONFIDENCE)
     }
 
     /// The longest time for which a difference is held back.
-    pub(super) fn longest(&self) -> Duration {
-        self.calm * MAX_WAITS
+    pub(super) fn longest(calm: Duration) -> Duration {
+        calm * MAX_WAITS
     }
 
     /// The current epoch as it is stored, and the flips still remembered; one is forgotten each epoch.
@@ -69,13 +118,20 @@ mod tests {
     #[test]
     fn a_cell_that_flips_often_waits_longer_and_is_forgiven() {
         let mut settling = Debounce::default();
-        settling.set_wait(Duration::from_secs(4));
+        let calm = Duration::from_secs(4);
+        settling.set_hold(Hold::For(calm));
         let cell = Cell::new(3, -9);
         let at = |s: u64| Instant::from_micros(s * 1_000_000);
-        let waits: Vec<u64> = (0..10).map(|i| settling.flip(cell, 0, at(i)).as_secs()).collect();
+        let waits: Vec<u64> = (0..10).map(|i| settling.flip(cell, 0, calm, at(i)).as_secs()).collect();
         assert_eq!(waits, [4, 8, 12, 16, 20, 24, 28, 32, 32, 32]);
-        assert_eq!(settling.flip(cell, MAX_CONFIDENCE, at(10)), Duration::ZERO);
-        assert_eq!(settling.flip(cell, 0, at(64 * 8)).as_secs(), 4);
-        assert_eq!(settling.flip(Cell::new(0, 0), 2, at(0)).as_millis(), 1333);
+        assert_eq!(settling.flip(cell, MAX_CONFIDENCE, calm, at(10)), Duration::ZERO);
+        assert_eq!(settling.flip(cell, 0, calm, at(64 * 8)).as_secs(), 4);
+        assert_eq!(settling.flip(Cell::new(0, 0), 2, calm, at(0)).as_millis(), 1333);
+    }
+
+    #[test]
+    fn a_long_backlog_holds_labels_back_longer() {
+        let wait = |bytes, bits_per_s| Hold::Backlog(bits_per_s).calm(bytes).as_secs_f64();
+        assert_eq!([wait(0, 100), wait(250, 100), wait(250, 10_000), wait(9999, 100)], [0.0, 20.0, 0.2, 60.0]);
     }
 }

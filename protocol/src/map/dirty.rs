@@ -235,6 +235,18 @@ impl Dirty {
         self.counts.waiting > waiting
     }
 
+    /// Releases all cells that are held back.
+    pub(super) fn release_all(&mut self) {
+        self.due = Tick::MAX;
+        for tile in self.tiles.values_mut().filter(|tile| !tile.held.is_empty()) {
+            let before = tile.counts();
+            tile.held = TileSet::default();
+            tile.due = Tick::MAX;
+            tile.value = None;
+            self.counts.replace(before, tile.counts());
+        }
+    }
+
     /// A lower bound of the times at which held cells become due.
     pub(super) fn next_due(&self) -> Option<Instant> {
         (self.counts.held > 0).then(|| moment(self.due))

@@ -17,7 +17,7 @@ mod tiles;
 mod value;
 
 pub use crate::grid::{Cell, LabelGrid, MAX_LABEL, Rect, TILE, UNEXPLORED};
-pub use debounce::MAX_CONFIDENCE;
+pub use debounce::{Hold, MAX_CONFIDENCE};
 pub use digest::MapDigest;
 pub use layer::{
     Assembly, BUILT_IN_LAYERS, BuiltInLayer, Decimal, DescriptorPart, LayerCarried, LayerChunk, LayerDescriptor,

@@ -1,7 +1,7 @@
 //! The vehicle's side of the map: the map itself, the surface's known copy, and the cells in flight.
 
 use super::coarse::Coarse;
-use super::debounce::Debounce;
+use super::debounce::{Debounce, Hold};
 use super::dirty::{CellChange, Dirty};
 use super::value::Interest;
 use super::{Cell, LabelGrid, MAX_CONFIDENCE, MapDigest, StateSource, UNEXPLORED};
@@ -57,11 +57,22 @@ impl MapSource {
         self.dirty.revalue();
     }
 
-    /// Sets how long a new label of a cell that the surface knows must be stable before it is sent: `calm` for a cell
-    /// that has not flipped recently, up to eight times that for one that has. A difference is held back for at most
-    /// sixteen times `calm`. Zero sends everything at once.
+    /// Sets how long a new label of a cell that the surface knows must be stable before it is sent: the wait of `hold` for
+    /// a cell that has not flipped recently, up to eight times that for one that has. A difference is held back for at most
+    /// sixteen times that wait.
+    pub fn set_hold(&mut self, hold: Hold) {
+        self.debounce.set_hold(hold);
+    }
+
+    /// As [`Self::set_hold`], with a wait that does not depend on the backlog.
     pub fn set_debounce(&mut self, calm: Duration) {
-        self.debounce.set_wait(calm);
+        self.set_hold(Hold::For(calm));
+    }
+
+    /// The number of cells that may be sent now.
+    fn ready(&self) -> usize {
+        let counts = self.dirty.counts();
+        if counts.waiting == 0 && self.debounce.is_automatic() { counts.held } else { counts.waiting }
     }
 
     /// A backlog of more than about this many bytes goes out coarse to fine: first every fourth cell in both
@@ -90,11 +101,12 @@ impl MapSource {
     /// labels are not held back.
     pub fn set_confident(&mut self, cells: impl IntoIterator<Item = (Cell, u8, u8)>, now: Instant) -> usize {
         let mut changed = 0;
+        let calm = self.debounce.hold().calm(self.expected_backlog_bytes());
         for (cell, label, confidence) in cells {
             let old = self.target.set(cell, label);
             if old != label {
                 changed += 1;
-                self.note_change(cell, (old, label), confidence, now);
+                self.note_change(cell, (old, label), (confidence, calm), now);
             } else if confidence >= MAX_CONFIDENCE {
                 self.dirty.settle(cell);
             }
@@ -103,15 +115,15 @@ impl MapSource {
         changed
     }
 
-    fn note_change(&mut self, cell: Cell, (old, label): (u8, u8), confidence: u8, now: Instant) {
+    fn note_change(&mut self, cell: Cell, (old, label): (u8, u8), (confidence, calm): (u8, Duration), now: Instant) {
         let seen = old != UNEXPLORED && label != UNEXPLORED;
-        let wait = if seen { self.debounce.flip(cell, confidence, now) } else { Duration::ZERO };
+        let wait = if seen { self.debounce.flip(cell, confidence, calm, now) } else { Duration::ZERO };
         let acked = self.acked.get(cell);
         let change = CellChange {
             differs: label != acked,
             known: acked != UNEXPLORED,
             due: now + wait,
-            longest: self.debounce.longest(),
+            longest: Debounce::longest(calm),
         };
         self.flips_suppressed += self.dirty.change(cell, change, now);
     }
@@ -136,6 +148,9 @@ impl StateSource for MapSource {
     type Carried = Vec<(Cell, u8)>;
 
     fn next_chunk(&mut self, room: usize, now: Instant) -> Option<(Vec<u8>, Self::Carried)> {
+        if self.dirty.counts().waiting == 0 && self.debounce.is_automatic() {
+            self.dirty.release_all();
+        }
         let stride = self.coarse.stride(&self.dirty.counts());
         let seed = self.dirty.best(stride, &self.acked, &self.target, &self.interest, now)?;
         let (base, waiting) = (&self.acked, self.dirty.waiting());
@@ -177,7 +192,7 @@ impl StateSource for MapSource {
     }
 
     fn backlog_bytes(&self) -> usize {
-        (self.dirty.counts().waiting as f64 * self.bytes_per_cell).ceil() as usize
+        (self.ready() as f64 * self.bytes_per_cell).ceil() as usize
     }
 
     fn is_refining(&self) -> bool {
@@ -186,12 +201,11 @@ impl StateSource for MapSource {
 
     fn expected_backlog_bytes(&self) -> usize {
         let (bytes, cells) = self.spent;
-        (self.dirty.counts().waiting as f64 * bytes / cells.max(1.0)).ceil() as usize
+        (self.ready() as f64 * bytes / cells.max(1.0)).ceil() as usize
     }
 
     fn is_quiet(&self) -> bool {
-        let counts = self.dirty.counts();
-        counts.waiting == 0 && counts.flying == 0
+        self.ready() == 0 && self.dirty.counts().flying == 0
     }
 
     fn is_converged(&self) -> bool {

@@ -1,5 +1,8 @@
 // One direction of the acoustic link as the page sees it: rates, loss, bits by class.
 
+/** Energy of a bit on air: 8 W at 10 kbit/s. */
+const JOULES_PER_BIT = 8 / 10_000;
+
 export class Direction {
   constructor(seed) {
     this.seed = seed;
@@ -45,6 +48,7 @@ export class Direction {
       frames: this.frames,
       lost: this.lost,
       goodput_bps: Math.round(recent.reduce((a, x) => a + x.bits * x.kept * 0.86, 0) / window),
+      energy_j: Object.values(this.bytes).reduce((a, b) => a + b, 0) * 8 * JOULES_PER_BIT,
       bytes_by_class: { ...this.bytes },
     };
   }

@@ -121,9 +121,15 @@ export class Mission {
         budget_bps: this.budgetBps, shares: this.shares, background: this.background, budget_window_s: 10,
         down: this.down.json(this.nowS), up: this.vehicles[0].up.json(this.nowS),
         round_trip_s: this.vehicles[0].receivedS === null ? null : 1.62,
+        energy_per_map_bit_j: this.energyPerMapBit(),
         backlog_bits: this.vehicles[0].reported?.bits ?? null,
         history: this.history,
       },
     };
+  }
+
+  energyPerMapBit() {
+    const { energy_j: energy, bytes_by_class: bytes } = this.vehicles[0].up.json(this.nowS);
+    return bytes.map > 0 ? energy / (8 * bytes.map) : null;
   }
 }

@@ -2,7 +2,7 @@
 
 use crate::key::section;
 use crate::rule::{ANY, range};
-use crate::setting::{BirthRule, CameraSource, LayerName, MapCells, MapStream};
+use crate::setting::{BirthRule, CameraSource, Debounce, LayerName, MapCells, MapStream};
 use scenecast_protocol::map_codec::Codec;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -15,8 +15,10 @@ section! {
         /// delta sends changes. whole-png sends the whole map again whenever it has changed, for comparison only.
         stream: MapStream = MapStream::Delta, ANY, [Auv Scenario];
         /// Time for which a new value of a cell must be stable before it is sent, if the operator already has a value
-        /// of that cell. A cell that changes repeatedly must be stable for up to eight times as long. 0: no delay.
-        debounce_s: f64 = 0.0, range(0.0, 600.0, "s"), [Auv Scenario];
+        /// of that cell. A cell that changes repeatedly must be stable for up to eight times as long. 0: no delay. auto:
+        /// as long as the backlog takes at the budget, at most 60 s, and no longer than something else waits; this holds
+        /// for labels only.
+        debounce_s: Debounce = Debounce::Automatic, range(0.0, 600.0, "s"), [Auv Scenario];
         /// Longest backlog, in seconds of the budget, that is sent in plain order. A longer backlog is sent coarse to
         /// fine: every fourth cell in both directions first. 0: never coarse to fine.
         coarse_after_s: f64 = 0.0, range(0.0, 86_400.0, "s"), [Auv Scenario];

@@ -44,6 +44,10 @@ section! {
         packet_ms: u16 = 750, range(50.0, 1000.0, "ms"), [Auv Asv Scenario];
         /// Packet rate of a Micromodem, the same at both ends.
         rate: u8 = 1, range(0.0, 5.0, ""), [Auv Asv Scenario];
+        /// Electrical power that a modem draws while it transmits, from which the energy of the link is counted. Data
+        /// sheets name 1.5 W (Nanomodem, 2 km), 2.8, 8 or 35 W (S2C R 18/34 at 1, 2 or 3.5 km) and 10 to 50 W
+        /// (Micromodem). The surface counts the vehicles' frames with its own value. 0: energy is not counted.
+        tx_watts: f64 = 8.0, range(0.0, 10_000.0, "W"), [Auv Asv Scenario];
     }
 }
 

@@ -2,6 +2,7 @@
 
 mod addresses;
 mod choices;
+mod debounce;
 mod layers;
 mod numbers;
 mod ports;
@@ -11,6 +12,7 @@ mod texts;
 pub use choices::{
     Authenticate, AutopilotKind, BirthRule, MapCells, MapStream, ModemKind, OperatorScript, S2cMode, WorldKind,
 };
+pub use debounce::Debounce;
 pub use layers::LayerName;
 pub use ports::{GpsPort, HostPort};
 pub use texts::CameraSource;

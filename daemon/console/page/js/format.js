@@ -54,6 +54,12 @@ export function bits(n) {
 
 export const rate = (n) => (n === null || n === undefined ? DASH : `${bits(n)}/s`);
 
+export function joules(j) {
+  if (j === null || j === undefined) return DASH;
+  if (j < 1) return `${(1000 * j).toFixed(j < 0.1 ? 2 : 0)}${THIN}mJ`;
+  return j < 1e4 ? `${j.toFixed(j < 10 ? 2 : 0)}${THIN}J` : `${(j / 1000).toFixed(1)}${THIN}kJ`;
+}
+
 export function bytes(n) {
   return n < 1000 ? `${n}${THIN}B` : `${(n / 1000).toFixed(1)}${THIN}kB`;
 }

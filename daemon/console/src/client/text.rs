@@ -22,10 +22,19 @@ pub(super) fn status(state: &MissionState, only: Option<u8>) -> String {
         let rates = format!("{:>6.0} bit/s on air, {:>6.0} bit/s useful", d.bps_1min, d.goodput_bps);
         let _ = writeln!(out, "{name:<7} {rates}; {} frames, {lost:.1} % lost", d.frames);
     }
+    if let (Some(up), Some(down)) = (link.up.energy_j, link.down.energy_j) {
+        let per_bit = link.energy_per_map_bit_j.map_or(String::new(), |j| format!(" ({:.2} mJ per map bit)", j * 1e3));
+        let _ = writeln!(out, "energy  up {}{per_bit}, down {}", energy(up), energy(down));
+    }
     for v in state.vehicles.iter().filter(|v| only.is_none_or(|id| v.id == id)) {
         vehicle(&mut out, v, state);
     }
     out
+}
+
+/// Joules as text.
+fn energy(joules: f64) -> String {
+    if joules < 10_000.0 { format!("{joules:.1} J") } else { format!("{:.1} kJ", joules / 1e3) }
 }
 
 fn vehicle(out: &mut String, v: &VehicleState, state: &MissionState) {

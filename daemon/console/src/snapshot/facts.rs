@@ -27,6 +27,8 @@ pub struct MissionFacts {
     pub first_interval_s: f64,
     /// Bits on air of a full frame.
     pub frame_bits: u64,
+    /// Energy of a bit on air, joules; `None` if energy is not counted.
+    pub joules_per_bit: Option<f64>,
     /// The configured place of x = y = 0 on the Earth.
     pub origin: Option<Origin>,
     /// The folder in which the surface keeps its state, if it has one.
@@ -47,6 +49,7 @@ impl MissionFacts {
             idle_s: config.link.max_idle_s,
             first_interval_s: config.link.max_idle_s + config.link.max_turn_s,
             frame_bits: modem.bits_on_air(modem.frame_bytes),
+            joules_per_bit: config::joules_per_bit(config, modem),
             origin: configured_origin(config),
             storage: None,
             truth: None,

@@ -1,6 +1,6 @@
 //! The acoustic link: budget, rates, losses, backlogs.
 
-use super::facts::seconds;
+use super::facts::{MissionFacts, seconds};
 use crate::link_meter::LinkMeter;
 use crate::state::{ChannelQuality, LinkDirection, LinkSummary, ReportedBacklog, VehicleChannel};
 use scenecast_core::drop_counts::dropped;
@@ -13,7 +13,7 @@ use scenecast_surface::Surface;
 use std::collections::BTreeMap;
 
 /// The link to all vehicles together.
-pub(super) fn summary(surface: &Surface, meter: &LinkMeter, now: Instant) -> LinkSummary {
+pub(super) fn summary(surface: &Surface, facts: &MissionFacts, meter: &LinkMeter, now: Instant) -> LinkSummary {
     let views: Vec<PeerView<'_>> = surface.vehicles().filter_map(|(a, _)| surface.view(a)).collect();
     let sum = |of: &dyn Fn(&LinkStats) -> u64| views.iter().map(|v| of(v.stats())).sum::<u64>();
     let received = sum(&|s| s.frames_received);
@@ -30,23 +30,31 @@ pub(super) fn summary(surface: &Surface, meter: &LinkMeter, now: Instant) -> Lin
                 useful += if class == Class::Overhead { 0 } else { bytes };
             }
         }
+        let loss = if frames > 0 { lost as f64 / frames as f64 } else { 0.0 };
+        // Frames of the vehicles are counted where they arrive.
+        let unseen = if i == 0 { loss.min(0.99) } else { 0.0 };
+        let energy_j = facts.joules_per_bit.map(|joules| meter.total_bits(i) as f64 * joules / (1.0 - unseen));
         LinkDirection {
             bps_1min: meter.bps_1min(i, now).round(),
             max_window_bps: meter.max_window_bps(i),
-            loss: if frames > 0 { lost as f64 / frames as f64 } else { 0.0 },
+            loss,
             frames,
             lost,
             goodput_bps: (useful as f64 * 8.0 / elapsed).round(),
+            energy_j,
             bytes_by_class,
         }
     };
+    let up = direction(0, numbered, numbered.saturating_sub(received), |s| &s.received_by_class);
+    let map_bits = up.bytes_by_class.get(Class::Map.name()).copied().unwrap_or(0) * 8;
     LinkSummary {
         budget_bps: surface.budget_bps(),
         budget_window_s: meter.window_s(),
         shares: Class::SHARED.iter().zip(surface.shares().0).map(|(c, s)| (c.name().to_owned(), s)).collect(),
         background: surface.background().names(&surface.layers()),
         unknown_senders: surface.unknown_senders(),
-        up: direction(0, numbered, numbered.saturating_sub(received), |s| &s.received_by_class),
+        energy_per_map_bit_j: up.energy_j.filter(|_| map_bits > 0).map(|joules| joules / map_bits as f64),
+        up,
         down: direction(1, lost + delivered, lost, |s| &s.bytes_by_class),
         round_trip_s: views.iter().find_map(PeerView::round_trip).map(|d| d.as_secs_f64()),
         backlog_bits: total_bits(views.iter().filter_map(PeerView::backlog)),

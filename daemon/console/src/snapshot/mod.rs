@@ -59,7 +59,7 @@ pub fn snapshot(surface: &Surface, facts: &MissionFacts, meter: &LinkMeter, now:
         },
         vehicles: vehicle::vehicles(surface, facts, now),
         position: position::surface_position(surface, now),
-        link: link::summary(surface, meter, now),
+        link: link::summary(surface, facts, meter, now),
         command: command_state(surface.command(), now),
         layers: surface.layers().iter().map(|(_, layer)| layer_info(layer)).collect(),
         storage: facts.storage.clone(),

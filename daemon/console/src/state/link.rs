@@ -24,6 +24,10 @@ pub struct LinkSummary {
     pub down: LinkDirection,
     /// Two-way travel time to the first vehicle with a measurement, a duration.
     pub round_trip_s: Option<f64>,
+    /// Energy of the vehicles' frames divided by the bits of the map in those received, joules; null without any, or if energy
+    /// is not counted.
+    #[serde(default)]
+    pub energy_per_map_bit_j: Option<f64>,
     /// Bits that wait at the vehicles; null while it is unknown.
     pub backlog_bits: Option<u64>,
     /// Rates on air, one every 5 s for the last 20 minutes.
@@ -45,6 +49,10 @@ pub struct LinkDirection {
     pub lost: u64,
     /// The mean rate of useful payload, bit/s.
     pub goodput_bps: f64,
+    /// Energy of the senders' modems for all frames, joules, by modem.tx_watts of the surface. For the frames of the vehicles
+    /// it is an estimate: that of the received frames, divided by the share of frames that arrive. Null if it is not counted.
+    #[serde(default)]
+    pub energy_j: Option<f64>,
     /// Bytes by class: directive, status, fix, map, exemplar, overhead, and each layer by its name.
     pub bytes_by_class: BTreeMap<String, u64>,
 }

@@ -1,6 +1,7 @@
 //! How true the map of a mission is: the errors of its frames, and its mutual information with the sea floor.
 
 use super::Mission;
+use super::blocks::with_blocks;
 use scenecast_protocol::coordinates::{MapPoint, WorldPoint};
 use scenecast_protocol::map::LabelGrid;
 use scenecast_protocol::wire::Placement;
@@ -61,11 +62,11 @@ impl Mission {
         self.information(map, |at| navigator.to_map(at))
     }
 
-    /// The mutual information of the operator's map with the true classes, placed by the last report that came in; `None`
-    /// if the classes are not known.
+    /// The mutual information of the operator's map, as the page shows it, with the true classes, placed by the last report
+    /// that came in; `None` if the classes are not known.
     pub(crate) fn operator_information(&self) -> Option<MapInformation> {
         let placement = self.surface().status(self.address()).and_then(|(status, _)| status.placement);
-        self.information(&self.operator_map(), |at| Placement::world_to_map(placement, at))
+        self.information(&with_blocks(&self.operator_map()), |at| Placement::world_to_map(placement, at))
     }
 
     fn information(&self, map: &LabelGrid, to_map: impl Fn(WorldPoint) -> MapPoint) -> Option<MapInformation> {

@@ -2,6 +2,7 @@
 
 mod accuracy;
 mod anchored;
+mod blocks;
 mod camera;
 mod carrier;
 mod events;
@@ -169,6 +170,12 @@ impl Mission {
     /// Bits on air of vehicle and surface.
     pub fn audits(&self) -> [&Audit; 2] {
         [self.vehicle.link().audit(), self.surface.link().audit()]
+    }
+
+    /// Bits on air of vehicle and surface, repeats of the modems themselves included.
+    pub fn bits_on_air(&self) -> [u64; 2] {
+        let (vehicle, surface) = (self.vehicle.link(), self.surface.link());
+        [vehicle.audit().total_bits() + vehicle.repeated_bits(), surface.audit().total_bits() + surface.repeated_bits()]
     }
 
     pub fn frames(&self) -> &FramesLog {

@@ -111,8 +111,14 @@ impl Sim {
             return Ok(());
         }
         let map = &report.json["map"];
+        let link = &report.json["link"];
+        let energy = match (link["up"]["energy_j"].as_f64(), link["energy_per_map_bit_j"].as_f64()) {
+            (Some(joules), Some(per_bit)) => format!("{joules:.1} J up ({:.2} mJ per map bit), ", per_bit * 1e3),
+            (Some(joules), None) => format!("{joules:.1} J up, "),
+            _ => String::new(),
+        };
         println!(
-            "{}: {} cells, {} labels, agreement {} at the end, {} on the mean, {seconds:.1} s",
+            "{}: {} cells, {} labels, agreement {} at the end, {} on the mean, {energy}{seconds:.1} s",
             self.out.join("report.json").display(),
             report.json["scene"]["cells"],
             report.json["scene"]["labels"],

@@ -29,10 +29,10 @@ use super::track::RecentTrack;
 use gallery::Gallery;
 use guidance::{Guidance, Situation};
 use publisher::MapPublisher;
+pub use publisher::MapSelection;
 use scenecast_protocol::coordinates::MapPoint;
 use scenecast_protocol::directive::{Fix, RefusalReason, Settings, SlotId, SlotState, Utility};
 use scenecast_protocol::link::{Transmit, VehicleEvent, VehicleLink, Wakeup};
-use scenecast_protocol::map::LayerMask;
 use scenecast_protocol::time::Instant;
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -136,10 +136,9 @@ impl Vehicle {
         vehicle
     }
 
-    /// Sets the part of the map that is sent unless the operator orders another: only coarse cells or all of them, a
-    /// backlog of more than `coarse_after_s` seconds of the budget coarse to fine (0: never), and these layers.
-    pub fn configure_map(&mut self, is_coarse: bool, coarse_after_s: f64, layers: LayerMask) {
-        self.publisher.configure(is_coarse, coarse_after_s, layers);
+    /// Sets the part of the map that is sent unless the operator orders another.
+    pub fn configure_map(&mut self, selection: MapSelection) {
+        self.publisher.configure(selection);
         self.publisher.select(&mut self.link);
     }
 

@@ -2,6 +2,7 @@
 
 use super::whole_png::WholePng;
 use crate::MapUpdate;
+use scenecast_config::Debounce;
 use scenecast_protocol::directive::{CellBand, Settings};
 use scenecast_protocol::link::VehicleLink;
 use scenecast_protocol::map::{Cell, LabelGrid, LayerId, LayerMask, UNEXPLORED};
@@ -14,13 +15,23 @@ use std::collections::BTreeMap;
 /// configuration has no such limit.
 const DEFAULT_COARSE_AFTER_S: f64 = 30.0;
 
-/// The cells and layers that are sent unless the operator orders others.
-#[derive(Debug, Clone, Copy, Default)]
-struct Selection {
-    is_coarse: bool,
+/// The part of the map that is sent unless the operator orders another.
+#[derive(Debug, Clone, Copy)]
+pub struct MapSelection {
+    /// Whether only the coarse cells are sent.
+    pub is_coarse: bool,
     /// A backlog beyond so many seconds of the budget is sent coarse to fine. 0: never.
-    coarse_after_s: f64,
-    layers: LayerMask,
+    pub coarse_after_s: f64,
+    /// How long new labels of known cells are held back.
+    pub debounce: Debounce,
+    pub layers: LayerMask,
+}
+
+impl Default for MapSelection {
+    fn default() -> Self {
+        let (debounce, layers) = (Debounce::Automatic, LayerMask::default());
+        Self { is_coarse: false, coarse_after_s: 0.0, debounce, layers }
+    }
 }
 
 /// Gives the link the part of the scene model's map that is to be sent.
@@ -32,7 +43,7 @@ pub(super) struct MapPublisher {
     layers: BTreeMap<LayerId, Vec<(Cell, f64)>>,
     labels: u8,
     explored: u32,
-    configured: Selection,
+    configured: MapSelection,
     ordered_cells: Option<CellBand>,
     ordered_layers: Option<LayerMask>,
     /// Takes the place of the link's map, for comparison.
@@ -77,8 +88,8 @@ impl MapPublisher {
     }
 
     /// Sets the configured selection, which orders override.
-    pub(super) fn configure(&mut self, is_coarse: bool, coarse_after_s: f64, layers: LayerMask) {
-        self.configured = Selection { is_coarse, coarse_after_s, layers };
+    pub(super) fn configure(&mut self, selection: MapSelection) {
+        self.configured = selection;
     }
 
     /// Takes cells and layers from the settings in force.
@@ -111,6 +122,8 @@ impl MapPublisher {
         let limit = self.coarse_limit(link.budget_bps());
         let is_coarse = self.cells() == CellBand::Coarse;
         link.source_mut().set_coarse_limit(limit);
+        let hold = self.configured.debounce.hold(link.budget_bps());
+        link.source_mut().set_hold(hold);
         link.set_coarse_layers(is_coarse.then_some(0));
         link.select_layers(self.ordered_layers.unwrap_or(self.configured.layers));
     }

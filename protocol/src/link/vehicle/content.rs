@@ -127,6 +127,11 @@ impl<S: StateSource> VehicleContent<S> {
         own + self.in_force.backlog_bytes() + self.background_backlog(budget, now)
     }
 
+    /// Whether changes of the state or of its layers wait.
+    pub(super) fn has_news(&self) -> bool {
+        self.source.backlog_bytes() > 0 || self.shared_layer_backlog() > 0
+    }
+
     /// The fate of a chunk is known; returns the object that is complete with it.
     pub(super) fn handle_fate(&mut self, part: Part<S::Carried>, delivered: bool, now: Instant) -> Option<ObjectId> {
         match part {

@@ -1,7 +1,7 @@
 //! Repetition of frames, byte for byte, to save the turn that a loss would cost.
 //!
-//! A turn ends with copies of its frames as long as a copy costs less airtime than the turn it is likely to save, and
-//! begins with the frames of the previous turn that the surface has not acknowledged.
+//! A turn ends with copies of its frames as long as a copy costs less airtime and energy than the wait it is likely to save,
+//! and begins with the frames of the previous turn that the surface has not acknowledged.
 
 use crate::mac::{Access, ModemProfile};
 use std::collections::VecDeque;
@@ -35,6 +35,12 @@ pub(super) struct Repeater {
     /// New frames of this turn, including those that are no longer kept.
     new_frames: usize,
     queue: VecDeque<Vec<u8>>,
+    /// Whether all data was sent with the last turn.
+    is_complete: bool,
+    /// Share of the recent turns that began with new data although the turn before had sent all, in 0..=1.
+    news: f64,
+    /// Frames that the surface had declared lost when this turn began.
+    lost: u64,
 }
 
 impl Repeater {
@@ -43,10 +49,26 @@ impl Repeater {
     /// Frames of a turn that are kept.
     const MAX_KEPT: usize = 64;
     const MAX_COPIES: i32 = 6;
+    /// A smaller share of turns with new data counts as none.
+    const RARE_NEWS: f64 = 0.25;
+    /// Weight of the latest turn in the share of recent turns with new data.
+    const NEWS_WEIGHT: f64 = 1.0 / 16.0;
 
-    /// Begins a turn. Where turns alternate, the surface has transmitted since the end of our last turn, so it has
-    /// missed every frame after `horizon`. If these are few and no other frame is outstanding, they are queued again.
-    pub(super) fn begin_turn(&mut self, horizon: u64, outstanding: u64, may_repeat: bool) {
+    /// Begins a turn with the last frame of known fate, the number of frames of unknown fate and that of lost ones;
+    /// `has_news` is whether changes wait. Where turns alternate, the surface has transmitted since the end of our last
+    /// turn, so it has missed every frame after `horizon`. If these are few and no other frame is outstanding, they are
+    /// queued again.
+    pub(super) fn begin_turn(
+        &mut self,
+        (horizon, outstanding, lost): (u64, u64, u64),
+        may_repeat: bool,
+        has_news: bool,
+    ) {
+        // What was lost waits again, and is no news.
+        let has_lost = std::mem::replace(&mut self.lost, lost) != lost;
+        if std::mem::take(&mut self.is_complete) && !has_lost {
+            self.news += (f64::from(u8::from(has_news)) - self.news) * Self::NEWS_WEIGHT;
+        }
         self.sent.retain(|s| s.number > horizon);
         self.new_frames = 0;
         let has_all = self.sent.len() as u64 == outstanding;
@@ -58,6 +80,11 @@ impl Repeater {
 
     pub(super) fn end_turn(&mut self) {
         self.queue.clear();
+    }
+
+    /// No data waits any more.
+    pub(super) fn note_complete(&mut self) {
+        self.is_complete = true;
     }
 
     /// Drops every kept frame: the state has changed, so their content is outdated.
@@ -88,22 +115,36 @@ impl Repeater {
         self.new_frames
     }
 
-    /// How often a turn of `frames` frames, `bytes` in all, is sent when no new data is left: another copy is sent as
-    /// long as it takes less time than the next turn would, times the probability that it makes that turn needless.
-    /// There are no copies where the budget limits the link, or where frames of earlier turns are outstanding: then
-    /// another turn is needed anyway.
+    /// How often a turn of `frames` frames, `bytes` in all, is sent when no new data is left. Another copy is sent as long as
+    /// it costs less than it gains, both in seconds.
+    ///
+    /// * If new data will wait, the next turn comes anyway. A copy gains the cycle that the content of a lost frame would
+    ///   wait, times the probability that only the copy arrives. It costs its airtime twice: once for what follows it, and
+    ///   once for the energy, of which a second on air counts as much as a second of age.
+    /// * Otherwise a copy that makes the next turn needless gains that turn. Nothing follows that could wait, so its airtime
+    ///   counts once.
+    ///
+    /// The share of recent turns with new data weighs both cases. There are no copies where the budget limits the link, or
+    /// where frames of earlier turns are outstanding: then another turn is needed anyway.
     pub(super) fn copies(&self, frames: u32, bytes: usize, terms: &RepeatTerms) -> u32 {
         let modem = &terms.modem;
         let is_covered = terms.outstanding <= self.sent.len() as u64;
         if modem.access != Access::Shared || !is_covered || terms.is_budget_bound {
             return 1;
         }
-        let loss = terms.loss.clamp(0.0, 0.95);
-        let incomplete = |copies: i32| 1.0 - (1.0 - loss.powi(copies)).powi(frames.min(1000) as i32);
         let copy_s = modem.time_of(bytes as u64 * 8 + modem.overhead_bits * u64::from(frames)).as_secs_f64();
         let next_turn_s = terms.handover.as_secs_f64();
-        let pays_off = |copies: i32| copy_s < (incomplete(copies) - incomplete(copies + 1)) * next_turn_s;
-        (1..Self::MAX_COPIES).find(|&copies| !pays_off(copies)).unwrap_or(Self::MAX_COPIES) as u32
+        let loss = terms.loss.clamp(0.0, 0.95);
+        let news = if self.news < Self::RARE_NEWS { 0.0 } else { self.news };
+        let frame_lost = |copies: i32| loss.powi(copies);
+        let turn_incomplete = |copies: i32| 1.0 - (1.0 - frame_lost(copies)).powi(frames.min(1000) as i32);
+        let gain_s = |copies: i32| {
+            let sooner = (frame_lost(copies) - frame_lost(copies + 1)) * (next_turn_s + copy_s);
+            let needless = (turn_incomplete(copies) - turn_incomplete(copies + 1)) * next_turn_s;
+            news * sooner + (1.0 - news) * needless
+        };
+        let cost_s = copy_s * (1.0 + news);
+        (1..Self::MAX_COPIES).find(|&copies| cost_s >= gain_s(copies)).unwrap_or(Self::MAX_COPIES) as u32
     }
 
     /// Keeps a new frame of this turn. If it is the last new one, `copies` further frames fill the rest of the turn:
@@ -119,5 +160,36 @@ impl Repeater {
             self.queue = latest_first.take(copies as usize).collect();
             self.queue.make_contiguous().reverse();
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Copies of a turn of one frame of 64 bytes at 10 kbit/s, by loss, after turns that all had changes or none.
+    fn copies(range_m: f64, loss: f64, has_news: bool) -> u32 {
+        let turn_around = Duration::from_millis(200);
+        let modem = ModemProfile {
+            frame_bytes: 64,
+            bit_rate_bps: 10_000.0,
+            overhead_bits: 0,
+            turn_around,
+            access: Access::Shared,
+        };
+        let one_way = Duration::from_secs_f64(range_m / 1500.0);
+        let handover = (turn_around + one_way) * 2 + modem.airtime(32);
+        let terms = RepeatTerms { modem, outstanding: 0, loss, is_budget_bound: false, handover };
+        let mut repeater = Repeater::default();
+        (0..200).for_each(|_| (repeater.note_complete(), repeater.begin_turn((0, 0, 0), true, has_news)).1);
+        repeater.copies(1, 64, &terms)
+    }
+
+    #[test]
+    fn copies_go_out_where_a_loss_costs_more_than_they_do() {
+        let at_rest = [0.0, 0.1, 0.3, 0.5].map(|loss| copies(500.0, loss, false));
+        let changing = [0.0, 0.1, 0.3, 0.5].map(|loss| copies(500.0, loss, true));
+        assert_eq!((at_rest, changing), ([1, 2, 3, 4], [1, 2, 2, 3]));
+        assert_eq!([copies(100.0, 0.1, true), copies(3000.0, 0.1, true)], [1, 2]);
     }
 }

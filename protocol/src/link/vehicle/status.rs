@@ -7,6 +7,10 @@ use std::time::Duration;
 /// Part of the bit budget that each of pose and report may take at most, in a period of its own.
 const SHARE: f64 = 1.0 / 40.0;
 
+/// Up to this budget in bit/s, regular reports and those on fixes take half of their usual part, so that frames carry more
+/// of the map. Reports of other decisions, and poses, are not delayed by it.
+const SMALL_BUDGET_BPS: u32 = 250;
+
 /// Sends the latest status at most once a period, and with at most a twentieth of the bit budget.
 #[derive(Debug)]
 pub(super) struct StatusSender {
@@ -72,7 +76,7 @@ impl StatusSender {
             // The part of the report that is under way may have had the fix before.
             return self.owe_report(now);
         }
-        let at = self.reported.map_or(now, |(at, bytes)| now.max(at + time_of_share(budget_bps, bytes)));
+        let at = self.reported.map_or(now, |(at, bytes)| now.max(at + time_of_report(budget_bps, bytes)));
         self.owe_report_by(at);
     }
 
@@ -86,7 +90,7 @@ impl StatusSender {
         self.report_from = next;
         self.reported = Some((now, bytes.len()));
         if next == 0 {
-            self.report_due = now + self.period.max(time_of_share(status.budget_bps, bytes.len()));
+            self.report_due = now + self.period.max(time_of_report(status.budget_bps, bytes.len()));
         }
         Some(bytes.len())
     }
@@ -142,6 +146,11 @@ fn room_before_pose(room: usize) -> usize {
     room.saturating_sub(VehicleStatus::POSE + 5)
 }
 
+/// The time between two reports of `bytes` that no order has made urgent.
+fn time_of_report(budget_bps: u32, bytes: usize) -> Duration {
+    time_of_share(budget_bps, bytes) * if budget_bps <= SMALL_BUDGET_BPS { 2 } else { 1 }
+}
+
 /// The time in which the share of a chunk is its `bytes`.
 fn time_of_share(budget_bps: u32, bytes: usize) -> Duration {
     Duration::from_secs_f64(bytes as f64 * 8.0 / SHARE / f64::from(budget_bps.max(1)))
@@ -165,7 +174,7 @@ mod tests {
     #[test]
     fn a_report_on_a_fix_waits_where_the_budget_is_small() {
         assert_eq!([wait_for_fix_report(10_000), wait_for_fix_report(1000)], [0.0, 0.0]);
-        // 11 bytes are a fortieth of 100 bit/s in 35.2 s.
-        assert!((wait_for_fix_report(100) - 30.2).abs() < 0.01, "{}", wait_for_fix_report(100));
+        // 11 bytes are an eightieth of 100 bit/s in 70.4 s.
+        assert!((wait_for_fix_report(100) - 65.4).abs() < 0.01, "{}", wait_for_fix_report(100));
     }
 }

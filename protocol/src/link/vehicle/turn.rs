@@ -74,7 +74,8 @@ impl<S: StateSource> VehicleLink<S> {
 
     pub(super) fn begin_turn(&mut self) {
         let may_repeat = self.config.modem.access == Access::Shared && !self.pair.must_send_hello();
-        self.repeater.begin_turn(self.pair.horizon(), self.pair.outstanding(), may_repeat);
+        let frames = (self.pair.horizon(), self.pair.outstanding(), self.pair.stats.frames_lost);
+        self.repeater.begin_turn(frames, may_repeat, self.content.has_news());
     }
 
     fn end_turn(&mut self) {
@@ -181,6 +182,9 @@ impl<S: StateSource> VehicleLink<S> {
         }
         let takes_turns = !matches!(modem.access, Access::ModemOwned { .. });
         let is_complete = takes_turns && !sends_hello && self.content.backlog_bytes(&self.budget, now) == 0;
+        if is_complete {
+            self.repeater.note_complete();
+        }
         let remaining = match is_complete {
             // The rest of the turn is filled with copies as far as they pay off.
             true if !carried.is_empty() => {

@@ -160,3 +160,23 @@ fn choosing_a_chunk_inspects_changed_tiles_only() {
     let most = 256 * (2 + tiles.len() as u64 * 3 + 300);
     assert!(source.dirty.looked_at() - before <= most, "{} cells", source.dirty.looked_at() - before);
 }
+
+#[test]
+fn labels_held_back_by_the_backlog_go_out_once_nothing_else_waits() {
+    let mut ends = TestEnds::new(0.0);
+    ends.source.set_hold(Hold::Backlog(10));
+    ends.source.set(square(20, |_| 3), at(0.0));
+    ends.send_all(at(1.0));
+    // A backlog of new cells, then a flip of known ones: these wait, although their age would put them first.
+    ends.source.set((0..4000).map(|i| (Cell::new(100 + i % 80, i / 80), (i * i % 7) as u8)), at(2.0));
+    ends.source.set(square(4, |_| 5), at(3.0));
+    assert!(ends.send(60, true, at(5.0)));
+    let known = |ends: &TestEnds| ends.replica.shown().get(Cell::new(-20, 0));
+    assert_eq!((known(&ends), ends.source.dirty.counts().held), (3, 16));
+    while ends.source.dirty.counts().waiting > 0 {
+        assert!(ends.send(200, true, at(6.0)));
+    }
+    assert!(ends.source.backlog_bytes() > 0 && !ends.source.is_quiet());
+    ends.send_all(at(6.0));
+    assert!(ends.is_equal() && known(&ends) == 5);
+}

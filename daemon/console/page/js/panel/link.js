@@ -1,7 +1,7 @@
 // The acoustic link: rates and budget, bits by class, loss, delay, backlog.
 
 import { $, h, row, text } from "../dom.js";
-import { ago, bits, count, none, percent, rate, span } from "../format.js";
+import { ago, bits, count, joules, none, percent, rate, span } from "../format.js";
 import { ageOf, isSilent, isStale, store } from "../store.js";
 import { budgetParts, refreshBudget } from "./budget.js";
 import { classHelp } from "./class-help.js";
@@ -27,6 +27,8 @@ const LINES = [
   ["refused", "Refused, vehicle / surface", "Frames without a valid tag, where a key is set"],
   ["own", "Vehicle's budget", "The bit budget that the vehicle keeps to, by its last report"],
   ["goodput", "Goodput, up / down", "The rate of payload that arrived and was useful"],
+  ["energy", "Energy, up / down", "Electrical energy of the modems for all frames since the start; that of the vehicles is estimated from the frames received and the loss"],
+  ["mapEnergy", "Energy per map bit", "Energy of the vehicles' frames for each bit of the map received"],
   ["trip", "Round trip", "Time that sound takes to the vehicle and back, as measured"],
   ["backlog", "Backlog", "The bits that the vehicle still has to send: those of its last report, minus the bits received since. The survey continues meanwhile."],
   ["lag", "Map lag", "How far this map is behind the vehicle's: its approximate age and the missing bits"],
@@ -92,6 +94,8 @@ function update() {
   const ownBudget = store.vehicle?.status?.budget_bps;
   values.own(ownBudget ? rate(ownBudget) : none);
   values.goodput(`${rate(link.up.goodput_bps)} / ${rate(link.down.goodput_bps)}`);
+  values.energy(`${joules(link.up.energy_j)} / ${joules(link.down.energy_j)}`);
+  values.mapEnergy(joules(link.energy_per_map_bit_j));
   values.trip(link.round_trip_s === null ? none : `${link.round_trip_s.toFixed(2)} s`);
   refreshClasses(link);
   history.setAttribute("aria-label", `Rate over time. Up now ${rate(link.up.bps_1min)}, down ${rate(link.down.bps_1min)}, budget ${rate(link.budget_bps)}.`);

@@ -103,6 +103,14 @@ fn link(out: &mut String, state: &MissionState) {
         "Frames that were malformed or of an unknown vehicle.",
     )
     .sample(&[], link.unknown_senders as f64);
+    let energy = [("up", link.up.energy_j), ("down", link.down.energy_j)];
+    if energy.iter().any(|(_, joules)| joules.is_some()) {
+        let help = "Energy that modems have transmitted with, estimated for the vehicles.";
+        let mut metric = metric(out, "scenecast_link_energy_joules", "gauge", help);
+        for (direction, joules) in energy {
+            joules.into_iter().for_each(|j| metric.sample(&[("direction", direction)], j));
+        }
+    }
     if let Some(bits) = link.backlog_bits {
         metric(out, "scenecast_link_backlog_bits", "gauge", "Bits that wait at the vehicles.").sample(&[], bits as f64);
     }

@@ -62,10 +62,15 @@ fn print_head() {
     println!(
         "Bytes up: all, of the map, and the shares of the map and of its frames. Error: of registration, cells rms."
     );
-    println!();
-    println!("                      vehicle         operator       share            age s         bytes up");
     println!(
-        "budget stream      rigid placed   rigid placed    end  mean  agree   p50   p95    all    map   map frames  error"
+        "Copies: of the vehicle's frames, and how many frames arrived twice. Energy: of its modem, J and mJ a map bit."
+    );
+    println!();
+    println!(
+        "                      vehicle         operator       share            age s         bytes up                          copies        energy"
+    );
+    println!(
+        "budget stream      rigid placed   rigid placed    end  mean  agree   p50   p95    all    map   map frames  error   sent twice      J    mJ"
     );
 }
 
@@ -73,7 +78,7 @@ fn print_row(r: &FidelityRow) {
     let number = |value: Option<f64>| value.map_or("-".to_owned(), |v| format!("{v:.3}"));
     let (vehicle, operator) = (r.end.vehicle, r.end.operator);
     println!(
-        "{:>6} {:<10} {:>6} {:>6} {:>7} {:>6} {:>6} {:>5} {:>6.3} {:>5.0} {:>5.0} {:>6} {:>6} {:>5.3} {:>6.3} {:>6}",
+        "{:>6} {:<10} {:>6} {:>6} {:>7} {:>6} {:>6} {:>5} {:>6.3} {:>5.0} {:>5.0} {:>6} {:>6} {:>5.3} {:>6.3} {:>6} {:>6} {:>5} {:>6} {:>5}",
         r.budget_bps,
         r.stream,
         number(vehicle.map(|i| i.rigid_nats)),
@@ -90,5 +95,9 @@ fn print_row(r: &FidelityRow) {
         r.map_share,
         r.map_frames_share,
         number(r.end.error_rigid_cells),
+        r.repeats.frames,
+        r.repeats.arrived_twice,
+        r.energy_j.map_or("-".to_owned(), |j| format!("{j:.0}")),
+        r.energy_per_map_bit_j.map_or("-".to_owned(), |j| format!("{:.2}", j * 1e3)),
     );
 }
