@@ -282,6 +282,11 @@ impl Mapper {
         self.model.words()
     }
 
+    /// The scene model.
+    pub fn model(&self) -> &SceneModel {
+        &self.model
+    }
+
     /// Perplexity of all words under the model.
     pub fn perplexity(&self) -> f64 {
         self.model.perplexity()
