@@ -4,6 +4,7 @@ use super::mapper::Mapper;
 use super::relief::Relief;
 use scene_model::envelope::{Envelope, EnvelopeError};
 use scene_model::exemplars::ExemplarStore;
+use scene_model::online::OnlineInference;
 use scene_model::publish::LabelBook;
 use scene_model::topics::{CheckpointError, SceneConfig, SceneModel};
 use scene_model::words::{FlatField, Measures, WordExtractor};
@@ -67,6 +68,7 @@ impl Mapper {
         content.extend(postcard::to_allocvec(&self.light).unwrap_or_default());
         let registration = self.registrar.as_ref().map(Registrar::save);
         content.extend(postcard::to_allocvec(&registration).unwrap_or_default());
+        content.extend(postcard::to_allocvec(&self.online).unwrap_or_default());
         ENVELOPE.seal(&content)
     }
 
@@ -76,11 +78,13 @@ impl Mapper {
         let content = ENVELOPE.open(bytes)?;
         let (kept, rest): (CheckpointContent<Vec<u8>, LabelBook, Measures, ExemplarStore, Relief>, _) =
             postcard::take_from_bytes(content).map_err(|_| RestoreError::Inconsistent)?;
-        // Checkpoints of earlier builds end here, after the times of the cells, or after the light.
+        // Checkpoints of earlier builds end here, after the times of the cells, after the light, or after
+        // the registration.
         let (last_seen_s, rest) = part(rest, BTreeMap::new())?;
         let (light, rest) = part(rest, None::<FlatField>)?;
-        let (registration, _) = part(rest, None::<&[u8]>)?;
+        let (registration, rest) = part(rest, None::<&[u8]>)?;
         let model = SceneModel::load(&kept.model)?;
+        let (online, _) = part(rest, OnlineInference::of_model(&model))?;
         let fresh = Mapper::new(config, vocabulary, kept.book.epoch(), config.runtime.seed)?;
         let &SceneConfig { alpha, beta, gamma, seed, .. } = model.config();
         let configured = SceneConfig { alpha, beta, gamma, seed, ..fresh.model.config().clone() };
@@ -99,7 +103,8 @@ impl Mapper {
         mapper.extractor = WordExtractor::from_measures(kept.words);
         (mapper.model, mapper.book) = (model, kept.book);
         (mapper.exemplars, mapper.relief, mapper.last_s) = (kept.exemplars, kept.relief, kept.last_s);
-        mapper.flat = mapper.model.label_map();
+        mapper.online = online;
+        mapper.flat = mapper.online.map(&mapper.model);
         Ok(Restored { mapper, lineage: kept.lineage })
     }
 }
@@ -184,6 +189,8 @@ mod tests {
         (0..5).for_each(|at| drop(frame(&mut mapper, at)));
         let bytes = mapper.save(7);
         let content = ENVELOPE.open(&bytes).unwrap();
+        let online = postcard::to_allocvec(&mapper.online).unwrap();
+        let content = content.strip_suffix(online.as_slice()).unwrap();
         let registration = mapper.registrar.as_ref().map(Registrar::save);
         let registration = postcard::to_allocvec(&registration).unwrap();
         let unregistered = content.strip_suffix(registration.as_slice()).unwrap();

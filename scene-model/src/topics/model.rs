@@ -156,6 +156,14 @@ impl SceneModel {
         Ok(())
     }
 
+    /// Lets no topic be born while `limit` or more are in use; [`max_labels`](SceneConfig::max_labels) bounds them anyway.
+    /// Topics in use stay. A new model has no such limit, and a loaded one neither.
+    ///
+    /// With few words, literal birth weights make a topic of every nuance, and no slot is left for what comes later.
+    pub fn limit_labels(&mut self, limit: usize) {
+        self.labels.set_limit(limit);
+    }
+
     /// The vector instructions in use.
     #[must_use]
     pub fn kernel(&self) -> Kernel {
