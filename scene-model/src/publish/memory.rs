@@ -12,9 +12,10 @@ const MEMORY_S: f64 = 100.0;
 const MAX_STEP_S: f64 = 60.0;
 /// A cell changes its topic for one that has this many times the votes of the topic that it shows.
 const MARGIN: f32 = 2.0;
-/// Topics of a cell with less than this part of the most votes are forgotten.
+/// Topics of a cell with fewer votes are forgotten. A vote of a usual map is more, so that a topic that comes up between
+/// many votes for another one can gather its own.
 const FORGOTTEN: f32 = 0.01;
-/// Maximum number of topics that are remembered of a cell.
+/// Maximum number of topics that are remembered of a cell; a further one takes the place of the one with fewest votes.
 const MAX_TOPICS: usize = 8;
 
 /// The topics that the cells of a map have shown, with weights that decay over 100 s.
@@ -82,16 +83,17 @@ impl CellMemory {
     fn learn(&mut self, cell: &FlatCell, kept: f32, alive: &BTreeSet<TopicId>) {
         self.votes.iter_mut().for_each(|vote| vote.1 *= kept);
         self.maps = self.maps * kept + 1.0;
+        self.votes.retain(|vote| vote.1 >= FORGOTTEN && alive.contains(&vote.0));
         match self.votes.iter_mut().find(|vote| vote.0 == cell.topic) {
             Some(vote) => vote.1 += cell.confidence,
-            None => self.votes.push((cell.topic, cell.confidence)),
+            None => {
+                self.votes.truncate(MAX_TOPICS - 1);
+                self.votes.push((cell.topic, cell.confidence));
+            }
         }
-        self.votes.retain(|vote| alive.contains(&vote.0));
         // Ties to the oldest topic, so that the order of the votes depends on nothing else.
         self.votes.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
         let Some(&(best, most)) = self.votes.first() else { return };
-        self.votes.retain(|vote| vote.1 >= FORGOTTEN * most);
-        self.votes.truncate(MAX_TOPICS);
         if self.votes_for(self.shown) * MARGIN < most || !alive.contains(&self.shown) {
             self.shown = best;
         }
