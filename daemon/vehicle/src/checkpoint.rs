@@ -191,6 +191,9 @@ mod tests {
         let content = ENVELOPE.open(&bytes).unwrap();
         let online = postcard::to_allocvec(&mapper.online).unwrap();
         let content = content.strip_suffix(online.as_slice()).unwrap();
+        // Without a memory, the confidence is that of the last map.
+        mapper.online = OnlineInference::of_model(&mapper.model);
+        mapper.flat = mapper.online.map(&mapper.model);
         let registration = mapper.registrar.as_ref().map(Registrar::save);
         let registration = postcard::to_allocvec(&registration).unwrap();
         let unregistered = content.strip_suffix(registration.as_slice()).unwrap();
