@@ -80,6 +80,7 @@
 //! | [`words`] | visual words: colour, context, spread, texture and binary features |
 //! | [`project`] | from pixels to the world: a camera that looks down, or a pinhole camera with depth |
 //! | [`topics`] | the model: cells, the sampler, the label map, checkpoints |
+//! | [`online`] | inference under way: growth of the labels, memory of the topics of cells |
 //! | [`publish`] | labels that keep their meaning within an epoch, restarts included |
 //! | [`exemplars`] | the image patches that best show each topic |
 //! | [`vocabulary`], [`envelope`] | files: measures that were learnt before the mission; magic, version, length, CRC |
@@ -89,6 +90,7 @@
 
 pub mod envelope;
 pub mod exemplars;
+pub mod online;
 pub mod project;
 pub mod publish;
 pub mod random;

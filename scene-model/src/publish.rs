@@ -1,7 +1,10 @@
 //! Published labels: numbers from 1 to 254 whose meaning never changes within an epoch.
 
+mod memory;
+
 use std::collections::BTreeMap;
 
+pub use memory::TopicMemory;
 use serde::{Deserialize, Serialize};
 
 use crate::topics::{FlatCell, TopicId};

@@ -3,11 +3,13 @@
 mod baseline;
 #[cfg(test)]
 mod conformance_tests;
+mod cpu_meter;
 #[cfg(test)]
 mod discovery_tests;
 pub mod exemplar_bench;
 mod fidelity;
 mod frames_log;
+pub mod inference_bench;
 mod instruments;
 pub mod link_bench;
 mod localisation;

@@ -4,6 +4,7 @@ use super::mapper::Mapper;
 use super::relief::Relief;
 use scene_model::envelope::{Envelope, EnvelopeError};
 use scene_model::exemplars::ExemplarStore;
+use scene_model::online::OnlineInference;
 use scene_model::publish::LabelBook;
 use scene_model::topics::{CheckpointError, SceneConfig, SceneModel};
 use scene_model::words::{Discriminant, FlatField, Measures, WordExtractor};
@@ -68,6 +69,7 @@ impl Mapper {
         let registration = self.registrar.as_ref().map(Registrar::save);
         content.extend(postcard::to_allocvec(&registration).unwrap_or_default());
         content.extend(postcard::to_allocvec(&self.extractor.measures().discriminant()).unwrap_or_default());
+        content.extend(postcard::to_allocvec(&self.online).unwrap_or_default());
         ENVELOPE.seal(&content)
     }
 
@@ -77,13 +79,15 @@ impl Mapper {
         let content = ENVELOPE.open(bytes)?;
         let (kept, rest): (CheckpointContent<Vec<u8>, LabelBook, Measures, ExemplarStore, Relief>, _) =
             postcard::take_from_bytes(content).map_err(|_| RestoreError::Inconsistent)?;
-        // Checkpoints of earlier builds end here, after the times of the cells, after the light, or after the registration.
+        // Checkpoints of earlier builds end here, after the times of the cells, after the light, after the registration, or
+        // after the discriminant.
         let (last_seen_s, rest) = part(rest, BTreeMap::new())?;
         let (light, rest) = part(rest, None::<FlatField>)?;
         let (registration, rest) = part(rest, None::<&[u8]>)?;
-        let (discriminant, _) = part(rest, None::<Discriminant>)?;
+        let (discriminant, rest) = part(rest, None::<Discriminant>)?;
         let kept_words = kept.words.with_discriminant(discriminant);
         let model = SceneModel::load(&kept.model)?;
+        let (online, _) = part(rest, OnlineInference::of_model(&model))?;
         let fresh = Mapper::new(config, vocabulary, kept.book.epoch(), config.runtime.seed)?;
         let &SceneConfig { alpha, beta, gamma, seed, .. } = model.config();
         let configured = SceneConfig { alpha, beta, gamma, seed, ..fresh.model.config().clone() };
@@ -99,7 +103,8 @@ impl Mapper {
         mapper.extractor = WordExtractor::from_measures(kept_words);
         (mapper.model, mapper.book) = (model, kept.book);
         (mapper.exemplars, mapper.relief, mapper.last_s) = (kept.exemplars, kept.relief, kept.last_s);
-        mapper.flat = mapper.model.label_map();
+        mapper.online = online;
+        mapper.flat = mapper.online.map(&mapper.model);
         Ok(Restored { mapper, lineage: kept.lineage })
     }
 }
@@ -189,7 +194,14 @@ mod tests {
         let mut mapper = Mapper::new(&config(&[]), None, 3, 1).unwrap();
         (0..5).for_each(|at| drop(frame(&mut mapper, at)));
         let bytes = mapper.save(7);
-        let content = ENVELOPE.open(&bytes).unwrap().strip_suffix(&[0]).unwrap();
+        let content = ENVELOPE.open(&bytes).unwrap();
+        let online = postcard::to_allocvec(&mapper.online).unwrap();
+        let content = content.strip_suffix(online.as_slice()).unwrap();
+        // No discriminant.
+        let content = content.strip_suffix(&[0]).unwrap();
+        // Without a memory, the confidence is that of the last map.
+        mapper.online = OnlineInference::of_model(&mapper.model);
+        mapper.flat = mapper.online.map(&mapper.model);
         let registration = mapper.registrar.as_ref().map(Registrar::save);
         let registration = postcard::to_allocvec(&registration).unwrap();
         let unregistered = content.strip_suffix(registration.as_slice()).unwrap();

@@ -4,6 +4,7 @@ use super::picker::{Judge, PATCH_PX};
 use super::relief::Relief;
 use image::RgbImage;
 use scene_model::exemplars::{ExemplarPatch, ExemplarStore};
+use scene_model::online::OnlineInference;
 use scene_model::project::{DownCamera, Pose};
 use scene_model::publish::{LabelBook, PublishedCell};
 use scene_model::topics::{Birth, FlatCell, SceneConfig, SceneModel};
@@ -45,6 +46,7 @@ pub struct Mapper {
     camera: DownCamera,
     cell_m: f64,
     pub(super) model: SceneModel,
+    pub(super) online: OnlineInference,
     pub(super) book: LabelBook,
     pub(super) exemplars: ExemplarStore,
     /// The exemplars of the last [`Mapper::shared_exemplars`].
@@ -113,6 +115,7 @@ impl Mapper {
             },
             cell_m,
             model: SceneModel::new(scene).map_err(|e| UserError::Input(format!("scene.{e}")))?,
+            online: OnlineInference::default(),
             book: LabelBook::new(epoch),
             exemplars: ExemplarStore::new(EXEMPLARS_KEPT, PATCH_PX)
                 .with_distance(f64::from(PATCH_PX) * config.camera.metres_per_pixel),
@@ -181,6 +184,7 @@ impl Mapper {
             None => self.extractor.extract(image, cell_px),
         };
         let observations = camera.project(image.width(), image.height(), pose, &words);
+        self.online.expect(observations.len(), &mut self.model);
         self.model.insert(t_s, &observations);
         for seen in &observations {
             let cell = Cell::new(self.cell(seen.x), self.cell(seen.y));
@@ -189,7 +193,7 @@ impl Mapper {
         }
         let passed = t_s - self.last_s.replace(t_s).unwrap_or(t_s - 2.0);
         self.model.refine((self.refine_words_per_s * passed.clamp(0.0, 60.0)) as u64);
-        self.flat = self.model.label_map();
+        self.flat = self.online.learn(t_s, &self.model);
         let published = self.book.publish(&self.flat);
         let (cell_m, metres_per_pixel) = (self.cell_m, camera.metres_per_pixel);
         let judge = Judge { flat: &self.flat, cell_m, metres_per_pixel };
@@ -280,6 +284,11 @@ impl Mapper {
 
     pub fn words(&self) -> u64 {
         self.model.words()
+    }
+
+    /// The scene model.
+    pub fn model(&self) -> &SceneModel {
+        &self.model
     }
 
     /// Perplexity of all words under the model.

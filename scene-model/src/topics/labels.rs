@@ -63,6 +63,8 @@ pub(crate) struct Labels {
     birth_weight: f32,
     word_mass: f64,
     max_labels: usize,
+    /// No topic is born while this many are in use.
+    limit: usize,
     totals: Vec<u64>,
     topics: Vec<Option<TopicId>>,
     birth_slot: Option<u32>,
@@ -84,6 +86,7 @@ impl Labels {
             birth_weight: config.birth_weight() as f32,
             word_mass: f64::from(config.vocabulary) * config.beta,
             max_labels,
+            limit: max_labels,
             totals: vec![0; blocks * LANES],
             topics: vec![None; max_labels],
             birth_slot: None,
@@ -100,6 +103,14 @@ impl Labels {
         self.birth_weight = config.birth_weight() as f32;
         self.word_mass = f64::from(config.vocabulary) * config.beta;
         self.assign_topics();
+    }
+
+    /// As [`SceneModel::limit_labels`](super::SceneModel::limit_labels).
+    pub(crate) fn set_limit(&mut self, limit: usize) {
+        if self.limit != limit {
+            self.limit = limit;
+            self.assign_topics();
+        }
     }
 
     /// The slots of a checkpoint, with all counts 0; [`Self::count`] adds the words.
@@ -174,7 +185,8 @@ impl Labels {
             }
         }
         let free = self.topics.iter().position(Option::is_none).map(|slot| slot as u32);
-        let wanted = self.birth_weight > 0.0 || self.in_use() == 0;
+        let in_use = self.in_use();
+        let wanted = (self.birth_weight > 0.0 && in_use < self.limit) || in_use == 0;
         self.birth_slot = free.filter(|_| wanted);
         self.refresh();
     }

@@ -4,10 +4,10 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use super::cells::Cells;
 use super::config::{ConfigError, SceneConfig};
-use super::grid::coord_of;
+use super::grid::{centre_of, coord_of};
 use super::kernel::Kernel;
 use super::label_map::{FlatCell, MapCache};
-use super::labels::{Labels, TopicId};
+use super::labels::{Labels, TopicId, word_of};
 use super::sampler::SamplerPool;
 use super::schedule::{MixedSchedule, phase_words};
 use super::snapshot::Snapshot;
@@ -154,6 +154,14 @@ impl SceneModel {
         self.labels.set_priors(&self.config);
         (0..self.cells.len() as u32).for_each(|cell| self.mark_stale(cell));
         Ok(())
+    }
+
+    /// Lets no topic be born while `limit` or more are in use; [`max_labels`](SceneConfig::max_labels) bounds them anyway.
+    /// Topics in use stay. A new model has no such limit, and a loaded one neither.
+    ///
+    /// With few words, literal birth weights make a topic of every nuance, and no slot is left for what comes later.
+    pub fn limit_labels(&mut self, limit: usize) {
+        self.labels.set_limit(limit);
     }
 
     /// The vector instructions in use.
@@ -309,6 +317,15 @@ impl SceneModel {
     #[must_use]
     pub fn words(&self) -> u64 {
         self.cells.total()
+    }
+
+    /// Returns every word that the model holds, at the middle of its cell, in the order of the first observation of the
+    /// cells.
+    pub fn observations(&self) -> impl Iterator<Item = Observation> {
+        (0..self.cells.len() as u32).flat_map(|cell| {
+            let [x, y, z] = centre_of(self.cells.coord(cell), self.config.cell_m);
+            self.cells.words(cell).iter().map(move |&packed| Observation { word: word_of(packed), x, y, z })
+        })
     }
 
     /// The number of topics in use. It tends to run up to [`max_labels`](SceneConfig::max_labels).

@@ -73,7 +73,7 @@ section! {
         /// budget allows. The number cannot be changed during a mission.
         max_labels: u32 = 16, range(2.0, 254.0, ""), [Auv Scenario];
         /// Words that are resampled per second of mission time.
-        refine_words_per_s: u32 = 50_000, range(0.0, 1e8, "1/s"), [Auv Scenario];
+        refine_words_per_s: u32 = 250_000, range(0.0, 1e8, "1/s"), [Auv Scenario];
         /// Maximum rate of camera frames into the scene model. The first frame of each interval
         /// is used. 0: every frame.
         frames_per_s: f64 = 0.0, range(0.0, 30.0, "1/s"), [Auv Scenario];

@@ -3,6 +3,7 @@
 use scenecast_protocol::coordinates::MapPoint;
 use scenecast_protocol::directive::SlotId;
 use scenecast_protocol::link::PeerView;
+use scenecast_protocol::map::Cell;
 use scenecast_protocol::time::Instant;
 use scenecast_registration::FrameGraph;
 use scenecast_vehicle::{AppliedSlot, MapUpdate, Vehicle};
@@ -39,6 +40,8 @@ pub(crate) struct Logbook {
     /// Bytes that the map would have taken as a PNG file at each of its versions.
     pub(crate) png_full_bytes: u64,
     map_version: u64,
+    /// Changes of the label of a cell that had one on the published map.
+    pub(crate) flips: u64,
     /// Bits on air of the frames that the surface received.
     pub(crate) received_bits: u64,
 }
@@ -69,6 +72,18 @@ impl Logbook {
             let png = scenecast_core::label_picture::encode(vehicle.map());
             self.png_full_bytes += png.map_or(0, |png| png.len() as u64);
         }
+        self.flips += self.update.as_ref().map_or(0, |last| flips(last, &update));
         self.update = Some(update);
     }
+}
+
+/// The number of cells with different labels on two maps, both sorted by y and x.
+fn flips(before: &MapUpdate, after: &MapUpdate) -> u64 {
+    let place = |cell: &Cell| (cell.y, cell.x);
+    let mut before = before.cells.iter().peekable();
+    let is_flipped = |(cell, label): &&(Cell, u8)| {
+        while before.next_if(|(earlier, _)| place(earlier) < place(cell)).is_some() {}
+        before.next_if(|(earlier, _)| earlier == cell).is_some_and(|(_, earlier)| earlier != label)
+    };
+    after.cells.iter().filter(is_flipped).count() as u64
 }

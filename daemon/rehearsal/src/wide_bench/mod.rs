@@ -1,9 +1,8 @@
 //! A wide survey at the surface: the cost of an update, of loading the whole map, of exports, and of memory.
 
-mod meter;
 mod survey;
 
-use meter::{CpuMeter, resident_bytes};
+use crate::cpu_meter::{CpuMeter, resident_bytes};
 use scenecast_config::Config;
 use scenecast_console::state::Origin;
 use scenecast_console::{

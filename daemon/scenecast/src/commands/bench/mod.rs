@@ -2,6 +2,7 @@
 
 mod exemplar;
 mod fidelity;
+mod inference;
 mod link;
 mod localisation;
 mod modem;
@@ -15,6 +16,7 @@ mod wide;
 use clap::{Args, Subcommand};
 use exemplar::ExemplarBench;
 use fidelity::FidelityBench;
+use inference::InferenceBench;
 use link::LinkBench;
 use localisation::LocalisationBench;
 use modem::ModemBench;
@@ -33,6 +35,8 @@ pub(super) enum BenchCommand {
     Exemplar(ExemplarBench),
     /// The operator's map over time at 100 to 10 000 bit/s: our stream against whole PNGs.
     Fidelity(FidelityBench),
+    /// Inference under way: information of the online map against a batch over the same frames, and bytes of the map.
+    Inference(InferenceBench),
     /// The link over range, frame size and loss: efficiency, latency of directives, convergence.
     Link(LinkBench),
     /// The vehicle's position over 3 km: dead reckoning, with the relay, with outliers.
@@ -69,6 +73,7 @@ impl BenchCommand {
         match self {
             Self::Exemplar(e) => e.run(),
             Self::Fidelity(f) => f.run(),
+            Self::Inference(i) => i.run(),
             Self::Link(l) => l.run(),
             Self::Localisation(l) => l.run(),
             Self::Modem(m) => m.run(),

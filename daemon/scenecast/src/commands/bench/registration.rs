@@ -112,7 +112,7 @@ struct Surveys {
     seeds: (u64, u64),
 }
 
-fn scene(path: &Path, metres_per_pixel: f64) -> Result<(String, World), UserError> {
+pub(super) fn scene(path: &Path, metres_per_pixel: f64) -> Result<(String, World), UserError> {
     let stem = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
     let classes = path.with_file_name(format!("{stem}_label.png"));
     let world = World::from_files(path, Some(classes.as_path()).filter(|path| path.is_file()), metres_per_pixel)?;

@@ -1,6 +1,7 @@
 //! Measurement of one setting: the quality of its map and the bytes of its stream.
 
 use super::survey::Survey;
+use scene_model::online::OnlineInference;
 use scene_model::publish::LabelBook;
 use scene_model::topics::{FlatCell, SceneModel};
 use scenecast_core::UserError;
@@ -22,12 +23,14 @@ pub fn measure(survey: &Survey<'_>, setting: &Setting, sweeps: u32, seed: u64) -
         Ok::<usize, UserError>(chunks.iter().map(|chunk| chunk.bytes.len()).sum())
     };
     let mut model = SceneModel::new(survey.scene(setting, seed)).map_err(|e| UserError::Input(format!("scene.{e}")))?;
-    let (mut book, mut sent, mut streamed) = (LabelBook::new(0), map::LabelGrid::default(), 0);
+    let (mut book, mut online) = (LabelBook::new(0), OnlineInference::default());
+    let (mut sent, mut streamed) = (map::LabelGrid::default(), 0);
     let is_coarse = setting.cells == CellBand::Coarse;
     let interval = |index: usize| (index as f64 * survey.step_s * setting.frames_per_s + 1e-6).floor();
     let (mut last, mut refined) = (None, 0);
     // A topic gets a label when it has lasted for two maps, so the last map is published again after the last frame.
     for (index, seen) in survey.frames().map(Some).chain([None]).enumerate() {
+        let t_s = index as f64 * survey.step_s;
         if let Some(seen) = seen {
             // As on the vehicle: of each interval of the frame rate only the first frame is used; its refinement also
             // covers the skipped ones.
@@ -35,13 +38,14 @@ pub fn measure(survey: &Survey<'_>, setting: &Setting, sweeps: u32, seed: u64) -
                 continue;
             }
             last = Some(index);
-            model.insert(index as f64 * survey.step_s, &seen);
+            online.expect(seen.len(), &mut model);
+            model.insert(t_s, &seen);
             let words = (setting.refine_words_per_s * survey.step_s * (index + 1) as f64) as u64;
             model.refine(words - refined);
             refined = words;
         }
         let epoch = book.epoch();
-        let published = book.publish(&model.label_map());
+        let published = book.publish(&online.learn(t_s, &model));
         if book.epoch() != epoch {
             sent = map::LabelGrid::default();
         }
@@ -49,6 +53,7 @@ pub fn measure(survey: &Survey<'_>, setting: &Setting, sweeps: u32, seed: u64) -
         streamed += bytes(&sent, &target)?;
         sent = target;
     }
+    model.limit_labels(usize::MAX);
     model.sweep(sweeps);
     let map = model.label_map();
     let cells = if is_coarse { blocks(&map) } else { map.clone() };
