@@ -127,5 +127,6 @@ fn while_the_map_waits_background_images_get_only_frame_ends() {
         map
     };
     let (without, with) = (map_bytes(&[]), map_bytes(&["exemplars"]));
-    assert!(without > 100_000 && with.abs_diff(without) < without / 100, "{with} with, {without} without");
+    // The map may have more: while images wait, no frame is repeated.
+    assert!(without > 100_000 && with > without - without / 100, "{with} with, {without} without");
 }
