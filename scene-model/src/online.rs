@@ -7,16 +7,14 @@ use crate::topics::{FlatCell, SceneModel};
 
 /// Labels that the first frame may have.
 const FIRST_LABELS: f64 = 2.0;
-/// The square root of the words seen divided by this, and that of the cells, are numbers of further labels.
+/// The square root of the words seen divided by this is the number of further labels.
 const WORDS_ROOT: f64 = 140.0;
-const CELLS_ROOT: f64 = 6.7;
 
-/// Lets the labels of a model grow with its words and cells, and remembers the topics of its cells.
+/// Lets the labels of a model grow with its words, and remembers the topics of its cells.
 ///
 /// If the first frames may use all labels, these stand for nuances of the first floor, and what comes later shares them
-/// for the whole mission. The bound on labels therefore grows with the square root of the words seen, or with that of the
-/// cells, where a small camera gives few words to each: 2 + max(sqrt(words) / 140, sqrt(cells) / 6.7). A model whose words are
-/// all there from the start needs no such bound.
+/// for the whole mission. The bound on labels therefore grows with the square root of the words seen:
+/// 2 + sqrt(words) / 140. A model whose words are all there from the start needs no such bound.
 ///
 /// ```
 /// use scene_model::online::OnlineInference;
@@ -51,12 +49,10 @@ impl OnlineInference {
         Self { seen_words: model.words(), memory: TopicMemory::default() }
     }
 
-    /// Makes room for the labels of a frame with `words` words, before they are inserted. The cells are those so far.
+    /// Makes room for the labels of a frame with `words` words, before they are inserted.
     pub fn expect(&mut self, words: usize, model: &mut SceneModel) {
         self.seen_words = self.seen_words.saturating_add(words as u64);
-        let by_words = (self.seen_words as f64).sqrt() / WORDS_ROOT;
-        let by_cells = (model.cells() as f64).sqrt() / CELLS_ROOT;
-        model.limit_labels((FIRST_LABELS + by_words.max(by_cells)).round() as usize);
+        model.limit_labels((FIRST_LABELS + (self.seen_words as f64).sqrt() / WORDS_ROOT).round() as usize);
     }
 
     /// Returns the map of the model after a frame of the time `t_s`, in seconds.
