@@ -181,7 +181,7 @@ mod tests {
         assert_eq!(settings.len(), 36);
         let first = settings[0];
         assert_eq!((first.cell_m, first.alpha, first.beta, first.gamma), (0.25, 1.0, 10.0, 1e-3));
-        assert_eq!((first.refine_words_per_s, first.frames_per_s, first.cells), (5e4, 0.5, CellBand::Fine));
+        assert_eq!((first.refine_words_per_s, first.frames_per_s, first.cells), (2.5e5, 0.5, CellBand::Fine));
         assert_eq!(settings[35], Setting { alpha: 0.001, beta: 0.1, gamma: 1e-5, ..first });
     }
 
