@@ -56,10 +56,6 @@ impl FrameGraph {
         self.frames.push(Frame { placed: placed.pose, evidence: placed.evidence.clone() });
     }
 
-    pub fn is_empty(&self) -> bool {
-        self.frames.is_empty()
-    }
-
     /// The pairs of frames that closed a loop: the indices of the newer and of the older one.
     pub fn loops(&self) -> impl Iterator<Item = (usize, usize)> {
         self.matches().filter(|(.., is_chain)| !is_chain).map(|(newer, older, ..)| (newer, older))
@@ -143,16 +139,15 @@ impl FrameGraph {
         let mut shifts: Vec<Shift> = Vec::new();
         for (i, frame) in self.frames.iter().enumerate() {
             shifts.extend(frame.evidence.step.iter().filter(|_| i > 0).map(|step| Shift::of_step(step, i, headings)));
-            let loops = frame.evidence.loops.len() as f64;
-            let links = frame.evidence.loops.iter().filter(|found| (1..=i).contains(&(found.older as usize)));
-            shifts.extend(links.map(|found| {
-                let older = found.older as usize - 1;
-                let link = Link { found: found.found, pose: turned[older], older: found.older };
-                let heights_m2 = link.parallax_m2(frame.evidence.relief) * loops;
-                let by = link.place(headings[i], log_scales[i]);
-                Shift { newer: i, older, by, covariance_m2: link.covariance_m2() + heights_m2 }
-            }));
         }
+        let of_loop = |(newer, older, found, _): (usize, usize, &Match, bool)| {
+            let link = Link { found: *found, pose: turned[older] };
+            let evidence = &self.frames[newer].evidence;
+            let heights_m2 = link.parallax_m2(evidence.relief) * evidence.loops.len() as f64;
+            let by = link.place(headings[newer], log_scales[newer]);
+            Shift { newer, older, by, covariance_m2: link.covariance_m2() + heights_m2 }
+        };
+        shifts.extend(self.matches().filter(|(.., is_chain)| !is_chain).map(of_loop));
         let mut now = placed.clone();
         for _ in 0..ROUNDS {
             now = solve_shifts(&placed, &shifts, &now);

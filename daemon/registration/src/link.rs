@@ -13,9 +13,7 @@ const DISTORTED: f64 = 0.1;
 /// A match with a frame that is placed.
 pub(crate) struct Link {
     pub(crate) found: Match,
-    /// The pose of the earlier frame, and its number.
     pub(crate) pose: FramePose,
-    pub(crate) older: u32,
 }
 
 impl Link {

@@ -86,7 +86,6 @@ pub struct Registrar {
 /// The state after the last frame.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Last {
-    number: u32,
     pub(crate) pose: FramePose,
     dead_reckoned: [f64; 2],
     /// Whether dead reckoning continues at another place.
@@ -206,21 +205,23 @@ impl Registrar {
         let place = last.pose.place() + step.by;
         let now = FramePose::new(point(place), last.heading.heading_rad(), last.scale.log_scale());
         let window_m = 16.0 * pixel_m + 4.0 * sigma(&last.covariance_m2);
-        let links = match (&mut attempts, &thumbnail) {
-            (Some(attempts), Some(thumbnail)) => self.loops(attempts, thumbnail, &now, window_m),
-            _ => Vec::new(),
+        let (numbers, links): (Vec<u32>, Vec<Link>) = match (&mut attempts, &thumbnail) {
+            (Some(attempts), Some(thumbnail)) => self.loops(attempts, thumbnail, &now, window_m).into_iter().unzip(),
+            _ => Default::default(),
         };
-        let (pose, agreeing) = self.close(&mut last, &now, &links, pixel_m);
+        let (pose, agrees) = self.close(&mut last, &now, &links, pixel_m);
         links.iter().for_each(|link| self.learn_relief(link));
-        let (loops, sigma_m) = (agreeing.len() as u8, sigma(&last.covariance_m2));
+        let agreeing = numbers.iter().zip(&links).zip(agrees).filter(|(_, agrees)| *agrees);
+        let loops: Vec<Loop> = agreeing.map(|((&older, link), _)| Loop { older, found: link.found }).collect();
+        let (closed, sigma_m) = (loops.len() as u8, sigma(&last.covariance_m2));
         let evidence = Evidence {
             step: (!is_displaced).then_some(step),
             chain: chain.map(|link| link.found),
-            loops: agreeing,
+            loops,
             relief: self.relief,
         };
         self.keep(input, pose, last.heading, last.scale, (last.covariance_m2, last.shared), thumbnail);
-        Placed { pose, is_chained: evidence.chain.is_some(), loops, sigma_m, evidence }
+        Placed { pose, is_chained: evidence.chain.is_some(), loops: closed, sigma_m, evidence }
     }
 
     /// What is known of the heights before a match. The first match has to find them by itself.
@@ -251,8 +252,8 @@ impl Registrar {
         Step { by, from_heading_rad: last.pose.heading_rad, covariance_m2 }
     }
 
-    /// Matches with earlier frames.
-    fn loops(&mut self, attempts: &mut Attempts, new: &Thumbnail, now: &FramePose, window_m: f64) -> Vec<Link> {
+    /// Matches with earlier frames, each with the number of that frame.
+    fn loops(&mut self, attempts: &mut Attempts, new: &Thumbnail, now: &FramePose, window_m: f64) -> Vec<(u32, Link)> {
         let chosen = self.kept.candidates(self.tally.frames, now, new.extent_m(), self.loops.into());
         self.tally.attempts += chosen.len() as u32;
         let frames = chosen.into_iter().filter_map(|i| self.kept.get(i));
@@ -262,13 +263,13 @@ impl Registrar {
                 &frame.thumbnail.unpacked()?,
                 &Expected { similarity, window_m, spread: LOOP_SPREAD, relief: self.expected_relief() },
             )?;
-            Some(Link { found, pose: frame.pose, older: frame.number })
+            Some((frame.number, Link { found, pose: frame.pose }))
         });
         links.collect()
     }
 
-    /// Corrects the pose by the loops that agree with it, and returns them.
-    fn close(&mut self, last: &mut Last, now: &FramePose, links: &[Link], pixel_m: f64) -> (FramePose, Vec<Loop>) {
+    /// Corrects the pose by the loops that agree with it, and returns which do.
+    fn close(&mut self, last: &mut Last, now: &FramePose, links: &[Link], pixel_m: f64) -> (FramePose, Vec<bool>) {
         let (shared, relief) = (last.shared + links.len() as f64, self.relief);
         let covariance = |link: &Link| {
             let map2 = Matrix2::identity() * (MAP_SIGMA_PX * pixel_m).powi(2);
@@ -290,7 +291,9 @@ impl Registrar {
             });
             is_near || is_confirmed
         };
-        let agreeing: Vec<&Link> = links.iter().filter(|link| agrees(link)).collect();
+        let agrees: Vec<bool> = links.iter().map(agrees).collect();
+        let agreeing: Vec<&Link> =
+            links.iter().zip(&agrees).filter(|(_, agrees)| **agrees).map(|(link, _)| link).collect();
         self.tally.contradicted += (links.len() - agreeing.len()) as u32;
         for link in &agreeing {
             last.heading.measure(link.heading_rad(), (LOOPS_ALIKE * link.found.turn_sigma).hypot(PLACED_SPREAD));
@@ -309,8 +312,7 @@ impl Registrar {
             last.covariance_m2 = reduced(&last.covariance_m2, &measured);
         }
         last.shared += agreeing.len() as f64;
-        let loops = agreeing.iter().map(|link| Loop { older: link.older, found: link.found }).collect();
-        (FramePose::new(point(at), heading, log_scale), loops)
+        (FramePose::new(point(at), heading, log_scale), agrees)
     }
 
     fn keep(
@@ -328,7 +330,6 @@ impl Registrar {
         let MapPoint { x_m, y_m } = input.dead_reckoned;
         let (dead_reckoned, compass_rad) = ([x_m, y_m], input.compass_rad);
         self.last = Some(Last {
-            number: self.tally.frames,
             pose,
             dead_reckoned,
             is_displaced: false,
@@ -383,7 +384,7 @@ impl Last {
         let old = self.thumbnail.as_ref()?.unpacked()?;
         let similarity = self.pose.to_map().inverse().after(&guess.to_map());
         let found = attempts.attempt(&old, &Expected { similarity, window_m, spread: CHAIN_SPREAD, relief })?;
-        Some(Link { found, pose: self.pose, older: self.number })
+        Some(Link { found, pose: self.pose })
     }
 
     /// Heading and scale of a new frame, by its match with this one, compass and altitude.

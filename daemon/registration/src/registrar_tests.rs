@@ -156,3 +156,26 @@ proptest! {
         }
     }
 }
+
+/// The state after two frames without a match, of which the layout must not change without its version.
+fn unmatched_state() -> Vec<u8> {
+    let mut registrar = Registrar::new(0.25);
+    let pixels = [100; 32 * 24];
+    for east in [0.0, 2.0] {
+        registrar.handle_unmatched_frame(&FrameInput {
+            image: CameraImage::grey(32, 24, &pixels).unwrap(),
+            metres_per_pixel: 0.125,
+            dead_reckoned: MapPoint::new(east, -1.0),
+            compass_rad: 0.5,
+        });
+    }
+    registrar.save()
+}
+
+#[test]
+fn golden_layout_of_a_state() {
+    let bytes = unmatched_state();
+    assert_eq!((bytes.len(), &bytes[..10]), (594, &b"SCNREGIS\x02\x00"[..]), "another layout needs another version");
+    assert_eq!(bytes[594 - 7..], [2, 0, 0, 0, 0, 0, 2], "two frames, both unseen");
+    assert!(Registrar::restore(&bytes).is_ok_and(|restored| restored.save() == bytes));
+}
