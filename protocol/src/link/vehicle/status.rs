@@ -101,24 +101,12 @@ impl StatusSender {
         let period = self.period.max(time_of_share(status.budget_bps, VehicleStatus::POSE));
         // The path, the registration and the trail may take a hundredth of the budget each.
         let share = (period.as_secs_f64() * f64::from(status.budget_bps) / 800.0) as usize;
-        let mut length = 0;
-        if let Some(bytes) = status.intent.map(Intent::encode)
-            && bytes.len() <= room_before_pose(builder.room())
-            && builder.push(ChunkKind::Intent, &bytes)
-        {
-            length += bytes.len();
-        }
-        if let Some(bytes) = status.registration.map(|report| report.encode())
-            && bytes.len() <= share.min(room_before_pose(builder.room()))
-            && builder.push(ChunkKind::Registration, &bytes)
-        {
-            length += bytes.len();
-        }
-        if let Some(bytes) = self.trail(status, share.min(room_before_pose(builder.room())), now)
-            && builder.push(ChunkKind::Trail, &bytes)
-        {
-            length += bytes.len();
-        }
+        let intent = status.intent.map(Intent::encode);
+        let mut length = push_before_pose(builder, ChunkKind::Intent, intent, usize::MAX);
+        let registration = status.registration.map(|report| report.encode());
+        length += push_before_pose(builder, ChunkKind::Registration, registration, share);
+        let trail = self.trail(status, share.min(room_before_pose(builder.room())), now);
+        length += push_before_pose(builder, ChunkKind::Trail, trail, share);
         let room = room_for_payload(builder.room()).min(VehicleStatus::POSE.saturating_add(share));
         let bytes = status.encode_pose(room);
         if !builder.push(ChunkKind::Pose, &bytes) {
@@ -139,6 +127,19 @@ impl StatusSender {
         let corners: Vec<TrailCorner> = status.trail.iter().take_while(is_new).copied().collect();
         Trail::new(status.position, &corners, room).map(|trail| trail.encode())
     }
+}
+
+/// Puts a chunk of at most `most` bytes before the pose, if it leaves room for that; returns its bytes.
+fn push_before_pose(
+    builder: &mut FrameBuilder,
+    kind: ChunkKind,
+    payload: Option<impl AsRef<[u8]>>,
+    most: usize,
+) -> usize {
+    let Some(payload) = payload else { return 0 };
+    let bytes = payload.as_ref();
+    let is_pushed = bytes.len() <= most.min(room_before_pose(builder.room())) && builder.push(kind, bytes);
+    if is_pushed { bytes.len() } else { 0 }
 }
 
 /// The longest payload of a chunk before a pose that leaves room for the pose. The headers of both take up to five bytes.

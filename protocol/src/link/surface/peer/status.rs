@@ -11,14 +11,34 @@ pub(super) struct StatusParts {
     latest: VehicleStatus,
     /// When the pose came in, and in which frame.
     pose: Option<(Instant, FrameNumber)>,
-    /// The trail of the last frame that had one.
-    trail: Option<(Trail, FrameNumber)>,
-    /// The intent of the last frame that had one.
-    intent: Option<(Intent, FrameNumber)>,
-    /// The registration of the last frame that had one.
-    registration: Option<(RegistrationReport, FrameNumber)>,
+    trail: BeforePose<Trail>,
+    intent: BeforePose<Intent>,
+    registration: BeforePose<RegistrationReport>,
     has_report: bool,
     whole: Option<(VehicleStatus, Instant)>,
+}
+
+/// The content of a chunk that waits for the pose of its frame.
+#[derive(Debug)]
+struct BeforePose<T>(Option<(T, FrameNumber)>);
+
+impl<T> Default for BeforePose<T> {
+    fn default() -> Self {
+        Self(None)
+    }
+}
+
+impl<T> BeforePose<T> {
+    /// Keeps what was read of the frame `number`, in place of that of an earlier one; returns whether it makes sense.
+    fn put(&mut self, read: Option<T>, number: FrameNumber) -> bool {
+        self.0 = read.map(|content| (content, number));
+        self.0.is_some()
+    }
+
+    /// The content, if it is of the frame `number`.
+    fn take(&mut self, number: FrameNumber) -> Option<T> {
+        self.0.take_if(|(_, of)| *of == number).map(|(content, _)| content)
+    }
 }
 
 impl StatusParts {
@@ -42,11 +62,10 @@ impl StatusParts {
         let mut read = self.latest.clone();
         let is_read = read.read_pose(payload).is_ok();
         if is_read && self.pose.is_none_or(|(_, before)| before < number) {
-            if let Some((trail, _)) = self.trail.take_if(|(_, of)| *of == number) {
+            if let Some(trail) = self.trail.take(number) {
                 read.trail = trail.corners(read.position);
             }
-            read.intent = self.intent.filter(|(_, of)| *of == number).map(|(intent, _)| intent);
-            read.registration = self.registration.filter(|(_, of)| *of == number).map(|(report, _)| report);
+            (read.intent, read.registration) = (self.intent.take(number), self.registration.take(number));
             (self.latest, self.pose) = (read, Some((now, number)));
         }
         self.join();
@@ -55,22 +74,17 @@ impl StatusParts {
 
     /// Reads a trail, which waits for the pose of its frame; returns whether it makes sense.
     pub(super) fn read_trail(&mut self, payload: &[u8], number: FrameNumber) -> bool {
-        let read = Trail::decode(payload).ok();
-        let is_read = read.is_some();
-        self.trail = read.map(|trail| (trail, number));
-        is_read
+        self.trail.put(Trail::decode(payload).ok(), number)
     }
 
     /// Reads an intent, which waits for the pose of its frame; returns whether it makes sense.
     pub(super) fn read_intent(&mut self, payload: &[u8], number: FrameNumber) -> bool {
-        self.intent = Intent::decode(payload).ok().map(|intent| (intent, number));
-        self.intent.is_some()
+        self.intent.put(Intent::decode(payload).ok(), number)
     }
 
     /// Reads a registration, which waits for the pose of its frame; returns whether it makes sense.
     pub(super) fn read_registration(&mut self, payload: &[u8], number: FrameNumber) -> bool {
-        self.registration = RegistrationReport::decode(payload).ok().map(|report| (report, number));
-        self.registration.is_some()
+        self.registration.put(RegistrationReport::decode(payload).ok(), number)
     }
 
     /// Reads a report; returns whether it makes sense.
