@@ -1,28 +1,20 @@
 //! How a vehicle's camera frames were placed on the map, as its reports say.
 
+use crate::vehicle_record::Track;
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::{FrameTie, RegistrationReport, VehicleStatus};
-use std::collections::VecDeque;
 
 /// The last report, and the places at which frames closed a loop.
-#[derive(Debug, Clone, Default, PartialEq)]
+#[derive(Debug, Clone, Default)]
 pub struct RegistrationRecord {
     latest: Option<(RegistrationReport, Instant)>,
-    closures: VecDeque<(Instant, f64, f64)>,
-    total: u64,
+    closures: Track,
 }
 
 impl RegistrationRecord {
-    /// The most places that are kept.
-    pub(crate) const MAX_CLOSURES: usize = 500;
-
-    /// A record that was interrupted after `total` places, of which these are the last.
-    pub(crate) fn restored(
-        latest: Option<(RegistrationReport, Instant)>,
-        closures: impl IntoIterator<Item = (Instant, f64, f64)>,
-        total: u64,
-    ) -> Self {
-        Self { latest, closures: closures.into_iter().collect(), total }
+    /// A record that was interrupted.
+    pub(crate) fn restored(latest: Option<(RegistrationReport, Instant)>, closures: Track) -> Self {
+        Self { latest, closures }
     }
 
     /// The last report and its time; `None` if the vehicle never sent one.
@@ -30,14 +22,9 @@ impl RegistrationRecord {
         self.latest
     }
 
-    /// Reported positions of frames that overlapped with an earlier track: time, metres east and north in the map frame.
-    pub fn closures(&self) -> impl DoubleEndedIterator<Item = (Instant, f64, f64)> + ExactSizeIterator + '_ {
-        self.closures.iter().copied()
-    }
-
-    /// The number of these positions so far, those that were dropped included.
-    pub(crate) fn total(&self) -> u64 {
-        self.total
+    /// Reported positions of frames that overlapped with an earlier track.
+    pub fn closures(&self) -> &Track {
+        &self.closures
     }
 
     /// Takes the report of a status whose pose came in at `now`; a pose that is not newer changes nothing.
@@ -48,9 +35,7 @@ impl RegistrationRecord {
         }
         self.latest = Some((report, now));
         if report.tie == FrameTie::EarlierTrack {
-            self.closures.push_back((now, status.position.x_m, status.position.y_m));
-            self.total += 1;
-            self.closures.drain(..self.closures.len().saturating_sub(Self::MAX_CLOSURES));
+            self.closures.push(now, status.position.x_m, status.position.y_m);
         }
     }
 }
@@ -73,9 +58,9 @@ mod tests {
         record.handle_status(&status(FrameTie::EarlierTrack, 2.0), at(2.0));
         record.handle_status(&status(FrameTie::EarlierTrack, 2.0), at(2.0));
         record.handle_status(&VehicleStatus::default(), at(3.0));
-        assert_eq!(record.closures().collect::<Vec<_>>(), [(at(2.0), 2.0, 2.0)]);
+        assert_eq!(record.closures().iter().collect::<Vec<_>>(), [(at(2.0), 2.0, 2.0)]);
         assert_eq!(record.latest().map(|(report, at)| (report.tie, at)), Some((FrameTie::EarlierTrack, at(2.0))));
         (0..600).for_each(|i| record.handle_status(&status(FrameTie::EarlierTrack, 0.0), at(10.0 + f64::from(i))));
-        assert_eq!((record.closures().len(), record.total()), (RegistrationRecord::MAX_CLOSURES, 601));
+        assert_eq!((record.closures().iter().len(), record.closures().total()), (Track::MAX_POINTS, 601));
     }
 }

@@ -106,7 +106,7 @@ pub struct Track {
 
 impl Track {
     /// The most positions that are kept.
-    const MAX_POINTS: usize = 500;
+    pub(crate) const MAX_POINTS: usize = 500;
 
     /// A track that was interrupted after `total` positions, of which these are the last.
     pub fn restored(points: impl IntoIterator<Item = (Instant, f64, f64)>, total: u64) -> Self {
@@ -139,7 +139,7 @@ impl Track {
         self.push(now, status.position.x_m, status.position.y_m);
     }
 
-    fn push(&mut self, at: Instant, x_m: f64, y_m: f64) {
+    pub(crate) fn push(&mut self, at: Instant, x_m: f64, y_m: f64) {
         self.points.push_back((at, x_m, y_m));
         self.total += 1;
         self.points.drain(..self.points.len().saturating_sub(Self::MAX_POINTS));

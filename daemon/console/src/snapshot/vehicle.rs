@@ -14,7 +14,7 @@ use scenecast_protocol::link::{InForce, PeerView};
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::{Address, DiskReport, FrameTie, Intent, RegistrationReport, VehicleMode, VehicleStatus};
 use scenecast_surface::record::{StoredDraft, StoredMarker, StoredNote};
-use scenecast_surface::{SettingsOrder, Surface, VehicleRecord};
+use scenecast_surface::{SettingsOrder, Surface, Track, VehicleRecord};
 
 pub(super) fn vehicles(surface: &Surface, facts: &MissionFacts, now: Instant) -> Vec<VehicleState> {
     let all = surface.vehicles();
@@ -37,9 +37,9 @@ fn vehicle(
         expected_interval_s: expected_interval_s(surface, &view, record, facts),
         next_contact_s: view.next_contact(now).map(seconds),
         status: record.status(&view).map(|(s, at)| status(s, record, *at)),
-        track: record.track.iter().map(|(at, x, y)| (seconds(at), x, y)).collect(),
+        track: track(&record.track),
         registration: record.registration.latest().map(registration),
-        closed_loops: record.registration.closures().map(|(at, x, y)| (seconds(at), x, y)).collect(),
+        closed_loops: track(record.registration.closures()),
         map: map(surface, address, record, &view, labels.values().sum(), facts),
         labels: labels.iter().map(|(&l, &n)| label(l, n, record, &view, address, facts)).collect(),
         link: link::channel(&view, now),
@@ -178,6 +178,10 @@ fn status(s: &VehicleStatus, record: &VehicleRecord, at: Instant) -> StatusRepor
         refused_frames: u32::from(s.refused_frames),
         disk: s.disk.map(disk),
     }
+}
+
+fn track(track: &Track) -> Vec<(f64, f64, f64)> {
+    track.iter().map(|(at, x, y)| (seconds(at), x, y)).collect()
 }
 
 fn registration((report, at): (RegistrationReport, Instant)) -> ReportedRegistration {

@@ -8,13 +8,12 @@ use super::event::{
     VehicleEvent,
 };
 use super::former_labels::FormerLabels;
-use crate::registration_record::RegistrationRecord;
 use scenecast_protocol::map::Cell;
 use scenecast_protocol::time::Instant;
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
 
-/// Positions that are kept of a vehicle's track.
+/// Positions that are kept of a vehicle's track, and of its closed loops.
 const MAX_TRACK: usize = 500;
 /// Notes that are kept of a vehicle.
 const MAX_NOTES: usize = 200;
@@ -236,7 +235,7 @@ impl VehicleMemory {
             VehicleEvent::Registration { report, total, closures } => {
                 (self.registration, self.closures_total) = (report.clone(), *total);
                 self.closures.extend(closures.iter().copied());
-                self.closures.drain(..self.closures.len().saturating_sub(RegistrationRecord::MAX_CLOSURES));
+                self.closures.drain(..self.closures.len().saturating_sub(MAX_TRACK));
             }
             VehicleEvent::Orders { series, orders } => {
                 self.series = *series;

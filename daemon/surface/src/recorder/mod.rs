@@ -12,7 +12,7 @@ use crate::record::{
     Event, EventKind, EventSource, EventTime, RunId, StoredBudget, StoredImage, StoredLogEntry, SurfaceMemory,
     VehicleEvent, VehicleMemory,
 };
-use crate::vehicle_record::VehicleRecord;
+use crate::vehicle_record::{Track, VehicleRecord};
 use scenecast_protocol::link::PeerView;
 use scenecast_protocol::map::{LayerId, SharedTiles};
 use scenecast_protocol::time::Instant;
@@ -293,22 +293,24 @@ fn contact_changes(
     if memory.contact != contact {
         events.push(VehicleEvent::Contact(contact));
     }
-    let news = (record.track.total() - memory.track_total.min(record.track.total())) as usize;
-    if news > 0 {
-        let points = record.track.iter().skip(record.track.iter().len().saturating_sub(news));
-        let points = points.map(|(at, x, y)| (at.as_micros(), x, y)).collect();
+    let points = new_points(&record.track, memory.track_total);
+    if !points.is_empty() {
         events.push(VehicleEvent::Track { total: record.track.total(), points });
     }
     let report = record.registration.latest().map(|(report, at)| (at.as_micros(), report.encode().to_vec()));
     if memory.registration != report {
-        let total = record.registration.total();
-        let news = total.saturating_sub(memory.closures_total) as usize;
         let closures = record.registration.closures();
-        let skipped = closures.len().saturating_sub(news);
-        let closures = closures.skip(skipped).map(|(at, x, y)| (at.as_micros(), x, y)).collect();
+        let (total, closures) = (closures.total(), new_points(closures, memory.closures_total));
         events.push(VehicleEvent::Registration { report, total, closures });
     }
     exemplar_changes(record, memory, events);
+}
+
+/// The points of a track after the first `known` ones, as far as they are kept; times in microseconds.
+fn new_points(track: &Track, known: u64) -> Vec<(u64, f64, f64)> {
+    let news = track.total().saturating_sub(known) as usize;
+    let points = track.iter().skip(track.iter().len().saturating_sub(news));
+    points.map(|(at, x, y)| (at.as_micros(), x, y)).collect()
 }
 
 fn exemplar_changes(record: &VehicleRecord, memory: &VehicleMemory, events: &mut Vec<VehicleEvent>) {

@@ -10,6 +10,7 @@ use scenecast_protocol::directive::Series;
 use scenecast_protocol::schedule::{BackgroundOrder, Shares};
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::{Address, RegistrationReport};
+use std::collections::VecDeque;
 
 /// Puts everything back but the maps, which the recorder gives to the surface as earlier maps.
 pub(super) fn restore(surface: &mut Surface, memory: &SurfaceMemory, configured: &StoredBudget) {
@@ -44,14 +45,15 @@ fn restore_record(record: &mut VehicleRecord, memory: &VehicleMemory) {
     (record.run, record.epoch) = (memory.id.run, memory.id.epoch);
     stored::restore_intent(&memory.intent, record);
     stored::restore_places(&memory.places, record);
-    let points = memory.track.iter().map(|&(at, x, y)| (Instant::from_micros(at), x, y));
-    record.track = Track::restored(points, memory.track_total);
+    let track = |points: &VecDeque<(u64, f64, f64)>, total| {
+        Track::restored(points.iter().map(|&(at, x, y)| (Instant::from_micros(at), x, y)), total)
+    };
+    record.track = track(&memory.track, memory.track_total);
     let report = memory
         .registration
         .as_ref()
         .and_then(|(at, bytes)| Some((RegistrationReport::decode(bytes).ok()?, Instant::from_micros(*at))));
-    let closures = memory.closures.iter().map(|&(at, x, y)| (Instant::from_micros(at), x, y));
-    record.registration = RegistrationRecord::restored(report, closures, memory.closures_total);
+    record.registration = RegistrationRecord::restored(report, track(&memory.closures, memory.closures_total));
     let last_received = memory.contact.last_received.map(Instant::from_micros);
     record.restore_contact(memory.contact.status(), last_received, memory.contact.pause());
     record.found = memory.contact.range();
