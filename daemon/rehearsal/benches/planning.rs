@@ -24,7 +24,8 @@ fn steering(kind: PlannerKind, sight_cells: f64) -> (Steering, LabelGrid, Utilit
     let side = f64::from(SIDE) * CELL_M;
     let sight = sight_cells * CELL_M;
     let area = Area { west: 0.0, south: 0.0, east: side, north: side };
-    let mut steering = Steering::new(area, Footprint { across: sight, along: sight }, CELL_M, kind, 0.5);
+    let mut steering =
+        Steering::new(area, Footprint { across: sight, along: sight, leg_overlap: 0.0 }, CELL_M, kind, 0.5);
     let place = |x, y| DecimetrePoint::new(x, y);
     let fence = Polygon(vec![place(0, 0), place(480, 20), place(500, 480), place(30, 500)]);
     let keep_out = Polygon(vec![place(200, 200), place(260, 210), place(240, 280)]);

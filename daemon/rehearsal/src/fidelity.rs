@@ -7,7 +7,6 @@ use super::uplink::{Repeats, Uplink};
 use super::world::World;
 use scenecast_config::Config;
 use scenecast_core::UserError;
-use scenecast_protocol::schedule::Class;
 use serde::Serialize;
 use std::time::Duration;
 
@@ -78,9 +77,8 @@ fn run(
     let mut mission = Mission::new(config, MissionOptions { world: world.clone(), seed, record: None })?;
     mission.run(Duration::ZERO, &mut |_| {})?;
     let [median, p95, max] = mission.meters.labels.delays(mission.now()).summary();
-    let class = if stream == "delta" { Class::Map } else { Class::Exemplar };
-    let (uplink_bytes, by_kind) = (Uplink::of(&mission, class), &mission.frames().up);
-    let of_map = by_kind.get(class.name()).map_or(0, |sum| sum.bytes);
+    let (uplink_bytes, by_kind) = (Uplink::of(&mission), &mission.frames().up);
+    let of_map = by_kind.get(mission.map_class().name()).map_or(0, |sum| sum.bytes);
     let end = mission.quality();
     let series: Vec<MapQuality> = mission.quality_series().iter().copied().chain([end]).collect();
     Ok(FidelityRow {
@@ -98,7 +96,7 @@ fn run(
         map_frames_share: of_map as f64 / by_kind.values().map(|sum| sum.bytes).sum::<u64>().max(1) as f64,
         repeats: Repeats::of(&mission),
         energy_j: mission.energy_j().map(|[up, _]| up),
-        energy_per_map_bit_j: mission.energy_per_map_bit_j(class),
+        energy_per_map_bit_j: mission.energy_per_map_bit_j(),
         uplink_bytes,
         series,
     })

@@ -2,6 +2,7 @@
 
 use crate::cpu_meter::CpuMeter;
 use crate::mission::{Mission, MissionOptions};
+use crate::registration_bench::navigate_perfectly;
 use crate::world::World;
 use scene_model::topics::{ConfigError, FlatCell, SceneConfig, SceneModel, TopicId};
 use scenecast_config::Config;
@@ -81,10 +82,7 @@ pub fn measure_inference(
 
 fn fly(config: &Config, world: &World, seed: u64) -> Result<Mission, UserError> {
     let mut config = config.clone();
-    config.registration.enabled = false;
-    config.navigation.drift_percent = 0.0;
-    config.navigation.fix_period_s = 0.0;
-    config.navigation.start_sigma_m = 0.0;
+    navigate_perfectly(&mut config);
     let mut mission = Mission::new(config, MissionOptions { world: world.clone(), seed, record: None })?;
     mission.run(Duration::ZERO, &mut |_| {})?;
     Ok(mission)

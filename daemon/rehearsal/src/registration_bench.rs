@@ -85,9 +85,7 @@ fn fly(
     let mut config = config.clone();
     config.registration.enabled = navigation == Navigation::Registered;
     if navigation == Navigation::Perfect {
-        config.navigation.drift_percent = 0.0;
-        config.navigation.fix_period_s = 0.0;
-        config.navigation.start_sigma_m = 0.0;
+        navigate_perfectly(&mut config);
     }
     let mut mission = Mission::new(config, MissionOptions { world: world.clone(), seed, record: None })?;
     mission.run(Duration::ZERO, &mut |_| {})?;
@@ -109,6 +107,14 @@ fn fly(
         loops: tally.loops,
         contradicted: tally.contradicted,
     })
+}
+
+/// No drift, no fixes, a known start, and no registration.
+pub(crate) fn navigate_perfectly(config: &mut Config) {
+    config.registration.enabled = false;
+    config.navigation.drift_percent = 0.0;
+    config.navigation.fix_period_s = 0.0;
+    config.navigation.start_sigma_m = 0.0;
 }
 
 /// The means for each kind of navigation.

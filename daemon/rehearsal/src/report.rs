@@ -3,7 +3,6 @@
 use super::fidelity::mean_share;
 use super::mission::{MapInformation, MapQuality, Mission};
 use super::uplink::{Repeats, Uplink};
-use scenecast_config::MapStream;
 use scenecast_core::drop_counts::dropped;
 use scenecast_protocol::directive::SlotId;
 use scenecast_protocol::directive::SlotState;
@@ -51,14 +50,6 @@ fn round(x: f64) -> f64 {
 /// As [`round`], to nine digits.
 fn round_small(x: f64) -> f64 {
     (x * 1e9).round() / 1e9
-}
-
-/// The class that carries the map.
-fn map_class(m: &Mission) -> Class {
-    match m.config.map.stream {
-        MapStream::Delta => Class::Map,
-        MapStream::WholePng => Class::Exemplar,
-    }
 }
 
 fn summary([median, p95, max]: [f64; 3]) -> Value {
@@ -223,8 +214,8 @@ fn link(m: &Mission) -> Value {
         "frames_lost": m.frames().lost.iter().sum::<u64>(),
         "goodput_bps": round(goodput),
         "bytes_by_class": by_class(m),
-        "energy_per_map_bit_j": m.energy_per_map_bit_j(map_class(m)).map(round_small),
-        "uplink_bytes": Uplink::of(m, map_class(m)),
+        "energy_per_map_bit_j": m.energy_per_map_bit_j().map(round_small),
+        "uplink_bytes": Uplink::of(m),
         "repeats": Repeats::of(m),
         "round_trip_s": view.and_then(|v| v.round_trip()).map(|d| round(d.as_secs_f64())),
         "up": one(0),

@@ -1,6 +1,7 @@
 //! The bytes and the energy of the vehicle's transmissions.
 
 use super::mission::Mission;
+use scenecast_config::MapStream;
 use scenecast_protocol::link::{DropReason, TransmitKind};
 use scenecast_protocol::schedule::Class;
 use serde::Serialize;
@@ -19,11 +20,10 @@ pub struct Uplink {
 }
 
 impl Uplink {
-    /// The bytes of a mission; `map` is the class that carries the map.
-    pub fn of(mission: &Mission, map: Class) -> Self {
+    pub fn of(mission: &Mission) -> Self {
         let stats = mission.vehicle().stats();
         let of = |class| stats.bytes_by_class.get(&class).copied().unwrap_or(0);
-        let [map, status, overhead] = [map, Class::Status, Class::Overhead].map(of);
+        let [map, status, overhead] = [mission.map_class(), Class::Status, Class::Overhead].map(of);
         let all: u64 = stats.bytes_by_class.values().sum();
         Self { map, status, overhead, repeated: stats.repeated_bytes, other: all - map - status - overhead }
     }
@@ -57,6 +57,14 @@ impl Repeats {
 }
 
 impl Mission {
+    /// The class that carries the map: a whole PNG file counts as an image.
+    pub(crate) fn map_class(&self) -> Class {
+        match self.config.map.stream {
+            MapStream::Delta => Class::Map,
+            MapStream::WholePng => Class::Exemplar,
+        }
+    }
+
     /// Energy that the modems of vehicle and surface have transmitted with, joules; `None` if it is not counted.
     pub fn energy_j(&self) -> Option<[f64; 2]> {
         let joules = scenecast_config::joules_per_bit(&self.config, self.modem())?;
@@ -65,8 +73,9 @@ impl Mission {
 
     /// The vehicle's energy divided by the bits of the map that the surface has acknowledged, joules; `None` without any, or if
     /// energy is not counted.
-    pub fn energy_per_map_bit_j(&self, map: Class) -> Option<f64> {
-        let delivered = self.vehicle().stats().delivered_by_class.get(&map).copied().filter(|&bytes| bytes > 0)?;
+    pub fn energy_per_map_bit_j(&self) -> Option<f64> {
+        let delivered =
+            self.vehicle().stats().delivered_by_class.get(&self.map_class()).copied().filter(|&bytes| bytes > 0)?;
         Some(self.energy_j()?[0] / (delivered * 8) as f64)
     }
 }

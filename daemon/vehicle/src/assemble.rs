@@ -40,7 +40,6 @@ pub fn assemble(
     }
     let planner = config.survey.planner;
     let steering = Steering::new(area, footprint(config), cell_m(config), planner, config.survey.clearance_m)
-        .with_leg_overlap(footprint(config), config.survey.leg_overlap_percent / 100.0)
         .with_end(config.survey.at_end);
     let (x, y) = steering.start();
     let depth = (config.survey.depth_m - config.survey.altitude_m).max(0.0);
@@ -65,7 +64,11 @@ pub fn assemble(
 
 fn footprint(config: &Config) -> Footprint {
     let mpp = config.camera.metres_per_pixel;
-    Footprint { across: f64::from(config.camera.width_px) * mpp, along: f64::from(config.camera.height_px) * mpp }
+    Footprint {
+        across: f64::from(config.camera.width_px) * mpp,
+        along: f64::from(config.camera.height_px) * mpp,
+        leg_overlap: config.survey.leg_overlap_percent / 100.0,
+    }
 }
 
 fn policy(config: &Config) -> FailsafePolicy {

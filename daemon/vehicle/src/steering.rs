@@ -30,6 +30,8 @@ use std::collections::VecDeque;
 pub struct Footprint {
     pub across: f64,
     pub along: f64,
+    /// The least part of a frame's width across the track by which frames of neighbouring legs overlap, 0..=0.9.
+    pub leg_overlap: f64,
 }
 
 impl Footprint {
@@ -39,9 +41,9 @@ impl Footprint {
     }
 
     /// The largest distance between two places of a lattice of which every other row is a leg, metres. Views at any heading
-    /// overlap by a tenth, and those of neighbouring legs by this part of their width.
-    fn lattice_step(&self, leg_overlap: f64) -> f64 {
-        (0.9 * self.reach()).min((1.0 - leg_overlap) * self.across / 2.0)
+    /// overlap by a tenth.
+    fn lattice_step(&self) -> f64 {
+        (0.9 * self.reach()).min((1.0 - self.leg_overlap) * self.across / 2.0)
     }
 }
 
@@ -112,7 +114,7 @@ impl Steering {
     /// `clearance_m` metres from every outline.
     pub fn new(area: Area, footprint: Footprint, cell_m: f64, configured: PlannerKind, clearance_m: f64) -> Self {
         Self {
-            grounds: Grounds::new(area, (footprint.reach(), footprint.lattice_step(0.0)), clearance_m),
+            grounds: Grounds::new(area, (footprint.reach(), footprint.lattice_step()), clearance_m),
             choice: PlannerChoice::new(configured),
             at_end: (AtEnd::Explore, None),
             areas: Vec::new(),
@@ -127,13 +129,6 @@ impl Steering {
             intent: None,
             is_complete: false,
         }
-    }
-
-    /// The same with legs that overlap by at least a part of a frame's width across the track, 0..=0.9.
-    pub fn with_leg_overlap(mut self, footprint: Footprint, leg_overlap: f64) -> Self {
-        let (area, clearance_m) = (self.grounds.area(), self.grounds.clearance_m());
-        self.grounds = Grounds::new(area, (footprint.reach(), footprint.lattice_step(leg_overlap)), clearance_m);
-        self
     }
 
     /// The same with another configured end of the survey than [`AtEnd::Explore`].

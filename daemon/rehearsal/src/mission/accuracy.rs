@@ -5,7 +5,7 @@ use super::blocks::with_blocks;
 use scenecast_protocol::coordinates::{MapPoint, WorldPoint};
 use scenecast_protocol::map::LabelGrid;
 use scenecast_protocol::wire::Placement;
-use scenecast_scoring::{RigidFit, rms_distance};
+use scenecast_scoring::{PointPair, RigidFit, rms_distance};
 use serde::Serialize;
 
 /// Root mean square errors of the places of all frames, metres.
@@ -33,11 +33,10 @@ impl Mission {
         if self.camera.is_recorded() || pairs.is_empty() {
             return None;
         }
-        let fit = RigidFit::new(&pairs);
         let navigator = self.vehicle().navigator();
         let placed = |(x_m, y_m): (f64, f64)| navigator.to_world(MapPoint { x_m, y_m }).xy();
         Some(FrameErrors {
-            rigid_m: rms_distance(pairs.iter().map(|&(mapped, truth)| (fit.apply(mapped), truth))),
+            rigid_m: rigid_error_m(&pairs),
             placed_m: rms_distance(pairs.iter().map(|&(mapped, truth)| (placed(mapped), truth))),
         })
     }
@@ -51,8 +50,7 @@ impl Mission {
         }
         let places = solved.iter().map(|pose| pose.at().xy());
         let pairs: Vec<_> = places.zip(self.logbook.poses.iter().map(|poses| poses.true_at)).collect();
-        let fit = RigidFit::new(&pairs);
-        Some(rms_distance(pairs.iter().map(|&(solved, truth)| (fit.apply(solved), truth))))
+        Some(rigid_error_m(&pairs))
     }
 
     /// The mutual information of a map in the map frame with the true classes, placed as the vehicle places it; `None` if
@@ -80,4 +78,10 @@ impl Mission {
             placed_nats: truth.information_nats(map, placed),
         })
     }
+}
+
+/// The root mean square distance of places from the truth after the best turn and shift of all.
+fn rigid_error_m(pairs: &[PointPair]) -> f64 {
+    let fit = RigidFit::new(pairs);
+    rms_distance(pairs.iter().map(|&(place, truth)| (fit.apply(place), truth)))
 }

@@ -105,7 +105,7 @@ pub(crate) enum MapKnowledge {
 
 /// Runs a planner until the rest of the limit is needed for the return path, then returns.
 pub(crate) fn run_planner(scene: &Scene, task: &Task, kind: PlannerKind, knowledge: MapKnowledge) -> PlannerRun {
-    let sight = Footprint { across: SIGHT_M, along: SIGHT_M };
+    let sight = Footprint { across: SIGHT_M, along: SIGHT_M, leg_overlap: 0.0 };
     let mut steering = Steering::new(scene.area, sight, CELL_M, kind, CLEARANCE_M);
     steering.set_fence(&task.fence);
     let mut map = LabelGrid::default();

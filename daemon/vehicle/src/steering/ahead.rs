@@ -119,7 +119,7 @@ mod tests {
     use scenecast_protocol::map::{Cell, LabelGrid};
 
     const AREA: Area = Area { west: 0.0, south: 0.0, east: 20.0, north: 12.0 };
-    const FOOTPRINT: Footprint = Footprint { across: 4.0, along: 4.0 };
+    const FOOTPRINT: Footprint = Footprint { across: 4.0, along: 4.0, leg_overlap: 0.0 };
 
     fn steering(kind: PlannerKind) -> Steering {
         Steering::new(AREA, FOOTPRINT, 0.25, kind, 1.0)

@@ -39,10 +39,6 @@ impl Grounds {
         self.area
     }
 
-    pub(super) fn clearance_m(&self) -> f64 {
-        self.clearance_m
-    }
-
     pub(super) fn reach_m(&self) -> f64 {
         self.reach_m
     }
@@ -120,7 +116,7 @@ mod tests {
 
     #[test]
     fn legs_overlap_by_the_configured_part_of_a_frame() {
-        let legs_m = |across, along, overlap| 2.0 * Footprint { across, along }.lattice_step(overlap);
+        let legs_m = |across, along, leg_overlap| 2.0 * Footprint { across, along, leg_overlap }.lattice_step();
         assert!((legs_m(6.4, 4.8, 0.3) - 4.32).abs() < 1e-9, "nine tenths of the shorter side");
         assert!((legs_m(4.8, 4.8, 0.3) - 0.7 * 4.8).abs() < 1e-9);
         assert!((legs_m(3.0, 4.8, 0.5) - 0.5 * 3.0).abs() < 1e-9);

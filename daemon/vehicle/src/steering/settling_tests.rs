@@ -8,7 +8,7 @@ use scenecast_protocol::map::{Cell, LabelGrid};
 
 const CELLS: (i32, i32) = (104, 72);
 const CELL_M: f64 = 0.25;
-const FOOTPRINT: Footprint = Footprint { across: 6.4, along: 4.8 };
+const FOOTPRINT: Footprint = Footprint { across: 6.4, along: 4.8, leg_overlap: 0.0 };
 
 /// The labels that the vehicle sees around a place.
 fn look(truth: &[u8], at: Point, map: &mut LabelGrid) {

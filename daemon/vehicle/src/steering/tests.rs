@@ -5,7 +5,7 @@ use scenecast_protocol::coordinates::DecimetrePoint;
 use scenecast_protocol::directive::{Areas, Polygon, WeightedArea};
 
 const AREA: Area = Area { west: 0.0, south: 0.0, east: 20.0, north: 12.0 };
-const FOOTPRINT: Footprint = Footprint { across: 4.0, along: 3.0 };
+const FOOTPRINT: Footprint = Footprint { across: 4.0, along: 3.0, leg_overlap: 0.0 };
 
 fn steering(kind: PlannerKind) -> Steering {
     Steering::new(AREA, FOOTPRINT, 0.25, kind, 1.0)

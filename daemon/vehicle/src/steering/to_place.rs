@@ -100,7 +100,7 @@ mod tests {
     }
 
     fn steering(keep_outs: Vec<Polygon>) -> Steering {
-        let footprint = Footprint { across: 4.0, along: 3.0 };
+        let footprint = Footprint { across: 4.0, along: 3.0, leg_overlap: 0.0 };
         let mut steering = Steering::new(AREA, footprint, 0.25, PlannerKind::Horizon, 1.0);
         steering.set_fence(&Fence { keep_outs, ..Fence::default() });
         steering
