@@ -1,14 +1,10 @@
 //! `scenecast bench inference`
 
-use super::SeedArguments;
-use super::registration::scene;
+use super::surveys::{SurveyArguments, fly_all, nats, print_json};
 use clap::Args;
 use scenecast_config::Config;
 use scenecast_core::UserError;
-use scenecast_rehearsal::World;
 use scenecast_rehearsal::inference_bench::{InferenceRow, InferenceSummary, measure_inference, summarise};
-use scenecast_tools::Progress;
-use std::path::PathBuf;
 
 const DEFAULT_CURVE: &str = "scene.refine_words_per_s=10000,50000,250000,1000000";
 
@@ -29,13 +25,7 @@ pub(crate) struct InferenceBench {
     #[arg(long)]
     json: bool,
     #[command(flatten)]
-    seeds: SeedArguments,
-    /// Images of sea floors [default: a drawn reef for each seed]
-    #[arg(long, value_name = "IMG", num_args = 1..)]
-    mosaics: Vec<PathBuf>,
-    /// Duration of each survey in seconds
-    #[arg(long, value_name = "SECONDS", default_value_t = 600.0, allow_negative_numbers = true)]
-    duration: f64,
+    surveys: SurveyArguments,
     /// Fly each survey with each of several values of a configuration key, for a curve of information against bytes
     #[arg(long, value_name = "KEY=VALUE,VALUE", num_args = 0..=1, default_missing_value = DEFAULT_CURVE)]
     curve: Option<String>,
@@ -46,51 +36,32 @@ pub(crate) struct InferenceBench {
 
 impl InferenceBench {
     pub(super) fn run(self) -> Result<(), UserError> {
-        if !self.duration.is_finite() || self.duration <= 0.0 {
-            return Err(UserError::Input(format!(
-                "--duration {} is not allowed; allowed: more than 0 s",
-                self.duration
-            )));
-        }
         let settings = self.settings()?;
-        let surveys = self.surveys(&settings[0].1)?;
+        let surveys = self.surveys.surveys(&settings[0].1)?;
         if !self.json {
             println!(
                 "{:<20} {:>4} {:<36} {:>6} {:>8} {:>6} {:>6} {:>6} {:>6} {:>6} {:>6}",
                 "scene", "seed", "setting", "online", "operator", "batch", "sweeps", "bytes", "cells", "flips", "cpu"
             );
         }
-        let flights: u64 = surveys.iter().map(|(scenes, seeds)| seeds.1 * scenes.len() as u64).sum();
-        let mut progress = Progress::new("surveys");
-        let mut rows = Vec::new();
-        let mut done = 0.0;
-        for (scenes, seeds) in &surveys {
-            rows.extend(measure_inference(&settings, scenes, *seeds, &mut |row| {
-                done += 1.0;
-                progress.show(done / (flights * settings.len() as u64) as f64);
-                if !self.json {
-                    print(row);
-                }
-            })?);
-        }
-        drop(progress);
+        let print_row = (!self.json).then_some(print as fn(&InferenceRow));
+        let rows = fly_all(&surveys, settings.len() as u64, print_row, |survey, progress| {
+            measure_inference(&settings, &survey.scenes, survey.seeds, progress)
+        })?;
         let means = summarise(&rows);
         if self.json {
-            let all = serde_json::json!({ "surveys": rows, "means": means });
-            println!("{}", serde_json::to_string_pretty(&all).map_err(|e| UserError::Failed(e.to_string()))?);
-        } else {
-            println!();
-            means.iter().for_each(print_mean);
+            return print_json(&serde_json::json!({ "surveys": rows, "means": means }));
         }
+        println!();
+        means.iter().for_each(print_mean);
         Ok(())
     }
 
     /// The configurations to compare, each with its name.
     fn settings(&self) -> Result<Vec<(String, Config)>, UserError> {
-        let ours = ["operator.script=none".to_owned(), format!("survey.duration_s={:?}", self.duration)];
         let load = |varied: Option<String>| {
-            let sets: Vec<String> = ours.iter().chain(&self.sets).cloned().chain(varied.clone()).collect();
-            Ok((varied.unwrap_or_else(|| "as set".to_owned()), scenecast_config::load(None, &sets)?))
+            let config = self.surveys.config(self.sets.iter().chain(&varied))?;
+            Ok((varied.unwrap_or_else(|| "as set".to_owned()), config))
         };
         let Some(curve) = &self.curve else { return Ok(vec![load(None)?]) };
         let Some((key, values)) = curve.split_once('=') else {
@@ -98,25 +69,6 @@ impl InferenceBench {
         };
         values.split(',').map(|value| load(Some(format!("{key}={value}")))).collect()
     }
-
-    /// A reef for each seed, or each seed over every mosaic.
-    fn surveys(&self, config: &Config) -> Result<Vec<Surveys>, UserError> {
-        let SeedArguments { first, count } = self.seeds;
-        if self.mosaics.is_empty() {
-            let reef = |seed| (vec![(format!("reef {seed}"), World::procedural(config, seed))], (seed, 1));
-            return Ok((first..first + count).map(reef).collect());
-        }
-        let mpp = config.camera.metres_per_pixel;
-        let scenes = self.mosaics.iter().map(|path| scene(path, mpp)).collect::<Result<_, _>>()?;
-        Ok(vec![(scenes, (first, count))])
-    }
-}
-
-/// Sea floors by their names, and the first seed and the number of seeds of each.
-type Surveys = (Vec<(String, World)>, (u64, u64));
-
-fn nats(value: Option<f64>) -> String {
-    value.map_or("-".to_owned(), |nats| format!("{nats:.3}"))
 }
 
 fn print(row: &InferenceRow) {

@@ -11,6 +11,7 @@ mod registration;
 mod restart;
 mod steering;
 mod stranger;
+mod surveys;
 mod wide;
 
 use clap::{Args, Subcommand};
