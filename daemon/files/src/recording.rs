@@ -261,7 +261,7 @@ impl Recorder {
     /// Records into a folder, which is made.
     pub fn new(dir: &Path) -> Result<Self, UserError> {
         std::fs::create_dir_all(dir).map_err(|e| UserError::file(dir, e))?;
-        let poses = "t_s,file,x_m,y_m,depth_m,heading_deg\n".to_owned();
+        let poses = METRE_COLUMNS.join(",") + "\n";
         Ok(Self { dir: dir.to_owned(), poses, frames: 0 })
     }
 
@@ -304,6 +304,25 @@ mod tests {
         assert_eq!((frames[1].t_s, frames[1].y_m), (20.0, -4.0));
         let bad = open("bad", "poses.csv", &text.replace("235950", "2359")).unwrap_err().to_string();
         assert!(bad.contains("poses.csv:2: time_utc_hms is \"2359\"; expected hhmmss"), "{bad}");
+    }
+
+    #[test]
+    fn written_poses_are_read_back_with_their_scales() {
+        let text = "t_s,file,x_m,y_m,depth_m,heading_deg\n0,a.png,1,2,3,90\n1.5,\"sub/b, c.png\",-1,2.25,3,350\n";
+        let mut recording = open("written", "poses.csv", text).unwrap();
+        recording.frames[1].scale = 1.02;
+        let dir = recording.frames[0].file.parent().unwrap().to_owned();
+        let table = dir.join("placed.csv");
+        write_poses(&table, &dir, &recording.frames).unwrap();
+        let read = Recording::open(&dir, Some(&table), 0.5).unwrap();
+        for (read, written) in read.frames.iter().zip(&recording.frames) {
+            assert_eq!((&read.file, read.t_s, read.scale), (&written.file, written.t_s, written.scale));
+            assert!((read.x_m, read.y_m, read.depth_m) == (written.x_m, written.y_m, written.depth_m));
+            assert!((read.heading_rad - written.heading_rad).abs() < 1e-12);
+        }
+        let text = "t_s,file,x_m,y_m,depth_m,heading_deg,scale\n0,a.png,1,2,3,4,0\n";
+        let wrong = open("scale", "poses.csv", text).unwrap_err().to_string();
+        assert!(wrong.contains("poses.csv:2: scale is \"0\"; expected 0.001 to 1000"), "{wrong}");
     }
 
     #[test]

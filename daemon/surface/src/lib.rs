@@ -20,6 +20,7 @@ mod registration_record;
 mod send_orders;
 mod settings;
 mod surface;
+mod track;
 mod vehicle_record;
 
 pub use annotations::Annotations;
@@ -36,4 +37,5 @@ pub use registration_record::RegistrationRecord;
 pub use scenecast_core::{Principal, Role};
 pub use settings::{SettingsOrder, SettingsRecord};
 pub use surface::{Surface, SurfaceOutput};
-pub use vehicle_record::{EarlierView, SentOrder, Track, VehicleRecord, WholeMaps};
+pub use track::Track;
+pub use vehicle_record::{EarlierView, SentOrder, VehicleRecord, WholeMaps};

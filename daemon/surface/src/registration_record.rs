@@ -1,6 +1,6 @@
 //! How a vehicle's camera frames were placed on the map, as its reports say.
 
-use crate::vehicle_record::Track;
+use crate::track::Track;
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::{FrameTie, RegistrationReport, VehicleStatus};
 

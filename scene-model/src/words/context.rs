@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::colour::level;
 use super::colour_field::ColourField;
 use super::moments::{Moments, standardised};
-use super::texture::sextile;
+use super::texture::sextiles;
 use super::word::Word;
 
 const COLOUR_LEVELS: u32 = 6;
@@ -88,8 +88,7 @@ impl SpreadWords {
         let scales = self.measures.map(|moments| moments.scale());
         for (u, v, index) in field.sample(spacing) {
             let scores = standardised(&measures[index], &scales);
-            let id = scores.iter().fold(0, |id, &score| id * 6 + sextile(score));
-            words.push(Word { id: first_id + id, u, v });
+            words.push(Word { id: first_id + sextiles(&scores), u, v });
             if let Some(kept) = &mut kept {
                 kept.push(scores);
             }

@@ -63,8 +63,7 @@ impl TextureWords {
         let scales = self.energy.map(|moments| moments.scale());
         for (energy, (u, v)) in energies.iter().zip(places()) {
             let scores = standardised(energy, &scales);
-            let id = scores.iter().fold(0, |id, &score| id * 6 + sextile(score));
-            words.push(Word { id: first_id + id, u, v });
+            words.push(Word { id: first_id + sextiles(&scores), u, v });
             if let Some(kept) = &mut kept {
                 kept.push(scores);
             }
@@ -96,8 +95,13 @@ impl TextureWords {
     }
 }
 
+/// The number of a combination of sextiles, one for each z-score.
+pub(super) fn sextiles(scores: &[f32; 3]) -> u32 {
+    scores.iter().fold(0, |id, &score| id * 6 + sextile(score))
+}
+
 /// The sextile of the normal distribution that a z-score falls in, 0 to 5.
-pub(super) fn sextile(z: f32) -> u32 {
+fn sextile(z: f32) -> u32 {
     CUTS.iter().map(|&cut| u32::from(z > cut)).sum()
 }
 

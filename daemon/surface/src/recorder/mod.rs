@@ -12,7 +12,8 @@ use crate::record::{
     Event, EventKind, EventSource, EventTime, RunId, StoredBudget, StoredImage, StoredLogEntry, SurfaceMemory,
     VehicleEvent, VehicleMemory,
 };
-use crate::vehicle_record::{Track, VehicleRecord};
+use crate::track::Track;
+use crate::vehicle_record::VehicleRecord;
 use scenecast_protocol::link::PeerView;
 use scenecast_protocol::map::{LayerId, SharedTiles};
 use scenecast_protocol::time::Instant;
