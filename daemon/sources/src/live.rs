@@ -1,0 +1,207 @@
+//! A source on a thread of its own, which opens it again when it is lost.
+
+use crate::Picture;
+use scenecast_sensors::{CameraFault, SensorPose, Stamp};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+use tokio::sync::mpsc;
+
+/// A camera that is lost or cannot be opened, as one line for people.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{0}")]
+pub struct SourceError(pub String);
+
+/// An image of a source.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct SourceImage {
+    /// The time at which the image was taken, if the source knows it.
+    pub stamp: Option<Stamp>,
+    /// The time at which the image came in.
+    pub arrival: Stamp,
+    pub picture: Picture,
+}
+
+/// A camera.
+pub trait ImageSource: Send + 'static {
+    /// Opens the camera, again if it was open.
+    fn open(&mut self) -> Result<(), SourceError>;
+
+    /// Waits for the next image, at most for `timeout`; `None` if there is none until then. Images that cannot be used are
+    /// passed to `fault` with one line for people.
+    fn next(
+        &mut self,
+        timeout: Duration,
+        fault: &mut dyn FnMut(CameraFault, String),
+    ) -> Result<Option<SourceImage>, SourceError>;
+
+    /// Whether a camera that has stalled is opened again.
+    fn is_reopened_after_stall(&self) -> bool;
+
+    /// Closes the camera, as far as there is something to close.
+    fn close(&mut self) {}
+}
+
+/// A report of a source to the vehicle.
+#[derive(Debug, Clone, PartialEq)]
+pub enum SourceReport {
+    /// The source is open, at first or again.
+    Open,
+    Image(SourceImage),
+    Pose(Stamp, SensorPose),
+    /// Something that a person should read, counted by its kind.
+    Fault(CameraFault, String),
+}
+
+/// Longest wait for an image before the stop flag is looked at.
+const POLL: Duration = Duration::from_millis(200);
+
+/// First and longest time before a lost source is opened again.
+const BACK_OFF: (Duration, Duration) = (Duration::from_millis(250), Duration::from_secs(4));
+
+/// A source that stayed open for this long is opened again at once when it is lost.
+const HEALTHY: Duration = Duration::from_secs(10);
+
+/// Reports that wait for the vehicle; when they are full, new images are dropped.
+const MAX_REPORTS: usize = 64;
+
+/// A running source.
+pub struct LiveSource {
+    reports: mpsc::Receiver<SourceReport>,
+    is_stopped: Arc<AtomicBool>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl LiveSource {
+    /// Starts the thread of a source. Without an image for `stall`, the source counts as stalled.
+    ///
+    /// # Errors
+    /// The system refuses a thread.
+    pub fn start(source: impl ImageSource, stall: Duration) -> std::io::Result<Self> {
+        let (sender, reports) = mpsc::channel(MAX_REPORTS);
+        let is_stopped = Arc::new(AtomicBool::new(false));
+        let mut supervisor =
+            Supervisor { source, stall, reports: sender, is_stopped: is_stopped.clone(), overtaken: 0 };
+        let thread = std::thread::Builder::new().name("camera".to_owned()).spawn(move || supervisor.run())?;
+        Ok(Self { reports, is_stopped, thread: Some(thread) })
+    }
+
+    /// The next report; never returns after the end of the source's thread. Cancel-safe.
+    pub async fn next(&mut self) -> SourceReport {
+        match self.reports.recv().await {
+            Some(report) => report,
+            None => std::future::pending().await,
+        }
+    }
+}
+
+impl Drop for LiveSource {
+    fn drop(&mut self) {
+        self.is_stopped.store(true, Ordering::Relaxed);
+        self.reports.close();
+        if let Some(thread) = self.thread.take() {
+            let _ = thread.join();
+        }
+    }
+}
+
+struct Supervisor<S> {
+    source: S,
+    stall: Duration,
+    reports: mpsc::Sender<SourceReport>,
+    is_stopped: Arc<AtomicBool>,
+    /// Images that found no room for their report, not yet reported.
+    overtaken: u64,
+}
+
+impl<S: ImageSource> Supervisor<S> {
+    fn run(&mut self) {
+        let mut back_off = BACK_OFF.0;
+        let mut last_error = None;
+        while !self.is_stopped.load(Ordering::Relaxed) {
+            let opened = Instant::now();
+            let error = match self.source.open() {
+                Ok(()) => {
+                    last_error = None;
+                    self.report(SourceReport::Open);
+                    self.forward()
+                }
+                Err(error) => Some(error),
+            };
+            let Some(error) = error else { break };
+            if opened.elapsed() >= HEALTHY {
+                back_off = BACK_OFF.0;
+            }
+            // A camera that stays away is named once.
+            if last_error.as_ref() != Some(&error) {
+                self.report(SourceReport::Fault(CameraFault::SourceLost, error.0.clone()));
+                last_error = Some(error);
+            }
+            self.wait(back_off);
+            back_off = (back_off * 2).min(BACK_OFF.1);
+        }
+        self.source.close();
+    }
+
+    /// Passes images on until the source is lost, which is returned, or the vehicle stops.
+    fn forward(&mut self) -> Option<SourceError> {
+        let (mut last, mut is_stalled) = (Instant::now(), false);
+        while !self.is_stopped.load(Ordering::Relaxed) {
+            let reports = self.reports.clone();
+            let mut fault = |fault, text| {
+                let _ = reports.try_send(SourceReport::Fault(fault, text));
+            };
+            match self.source.next(POLL, &mut fault) {
+                Ok(Some(image)) => {
+                    (last, is_stalled) = (Instant::now(), false);
+                    self.report(SourceReport::Image(image));
+                }
+                Ok(None) if last.elapsed() >= self.stall && !is_stalled => {
+                    is_stalled = true;
+                    let text = format!("no image for {:.0} s", last.elapsed().as_secs_f64());
+                    self.report(SourceReport::Fault(CameraFault::Stalled, text.clone()));
+                    if self.source.is_reopened_after_stall() {
+                        return Some(SourceError(format!("{text}: it is started again")));
+                    }
+                }
+                Ok(None) => {}
+                Err(error) => return Some(error),
+            }
+        }
+        None
+    }
+
+    /// Never waits for the vehicle: the oldest reports are the vehicle's, and an image without room is dropped and counted.
+    fn report(&mut self, report: SourceReport) {
+        let is_image = matches!(report, SourceReport::Image(_));
+        match self.reports.try_send(report) {
+            Ok(()) => {
+                while self.overtaken > 0 {
+                    let text = "the vehicle was busy".to_owned();
+                    match self.reports.try_send(SourceReport::Fault(CameraFault::Overtaken, text)) {
+                        Ok(()) => self.overtaken -= 1,
+                        Err(_) => break,
+                    }
+                }
+            }
+            Err(mpsc::error::TrySendError::Full(_)) => self.overtaken += u64::from(is_image),
+            Err(mpsc::error::TrySendError::Closed(_)) => self.is_stopped.store(true, Ordering::Relaxed),
+        }
+    }
+
+    fn wait(&self, time: Duration) {
+        let until = Instant::now() + time;
+        while !self.is_stopped.load(Ordering::Relaxed) && Instant::now() < until {
+            std::thread::sleep(POLL.min(until.saturating_duration_since(Instant::now())));
+        }
+    }
+}
+
+impl SourceImage {
+    /// An image of a stream or a file: without a `stamp`, its own one counts, if it has one.
+    pub(crate) fn compressed(stamp: Option<Stamp>, arrival: Stamp, bytes: Vec<u8>) -> Self {
+        let stamp = stamp.or_else(|| scenecast_sensors::own_stamp(&bytes));
+        Self { stamp, arrival, picture: Picture::Compressed(bytes) }
+    }
+}
