@@ -1,7 +1,7 @@
 //! Conditions that several keys must satisfy together.
 
 use crate::key::Key;
-use crate::{Authenticate, AutopilotKind, Config, ModemKind};
+use crate::{Authenticate, AutopilotKind, Config, ModemKind, NavigationSource};
 use scenecast_core::{PortAddress, UserError};
 
 /// The longest time on air of a frame, seconds.
@@ -21,6 +21,7 @@ pub(crate) fn check_together(config: &Config) -> Result<(), UserError> {
     }
     crate::modem::check(config)?;
     check_ports(config)?;
+    check_camera(config)?;
     check_frame(config)?;
     check_airtime(config)
 }
@@ -48,6 +49,27 @@ fn check_ports(config: &Config) -> Result<(), UserError> {
     let port = Key::find("autopilot.port").map(|key| key.value(config).to_string()).unwrap_or_default();
     let given = format!("autopilot.port = {port} is not allowed with autopilot.kind = \"{}\"", autopilot.kind);
     Err(UserError::Input(format!("{given}; allowed: {allowed}")))
+}
+
+/// The images of a live camera need poses and the pace of real time.
+fn check_camera(config: &Config) -> Result<(), UserError> {
+    if !config.camera.source.is_live() {
+        return Ok(());
+    }
+    let source = Key::find("camera.source").map(|key| key.value(config).to_string()).unwrap_or_default();
+    let has_autopilot = config.autopilot.kind != AutopilotKind::None;
+    if config.navigation.source == NavigationSource::Autopilot && !has_autopilot {
+        return Err(UserError::Input(format!(
+            "camera.source = {source} is not allowed without poses; set autopilot.kind or navigation.source"
+        )));
+    }
+    if config.runtime.time_scale != 1.0 {
+        let scale = config.runtime.time_scale;
+        return Err(UserError::Input(format!(
+            "runtime.time_scale = {scale} is not allowed with camera.source = {source}; allowed: 1"
+        )));
+    }
+    Ok(())
 }
 
 fn check_follow(config: &Config) -> Result<(), UserError> {

@@ -39,7 +39,7 @@ pub use sections::{
     Scene, Survey, VehicleSection,
 };
 pub use setting::{
-    Authenticate, AutopilotKind, BirthRule, CameraSource, Debounce, GpsPort, HostPort, LayerName, MapCells, MapStream,
-    ModemKind, OperatorScript, S2cMode, WorldKind,
+    Authenticate, AutopilotKind, BirthRule, CameraSource, CameraStamps, Debounce, GpsPort, HostPort, LayerName,
+    MapCells, MapStream, ModemKind, NavigationSource, OperatorScript, S2cMode, WorldKind,
 };
 pub use token_file::{TokenGrant, load_tokens, read_token, read_tokens};

@@ -58,18 +58,30 @@ pub struct VehiclePilot {
     depth_m: f64,
     /// Whether the vehicle is surfacing at its position.
     is_rising: bool,
+    /// Whether its odometry is the vehicle's.
+    measures: bool,
 }
 
 impl VehiclePilot {
     /// An autopilot for a survey at `depth_m` metres.
     pub fn new(autopilot: Box<dyn Autopilot>, plane: Option<TangentPlane>, depth_m: f64, now: Instant) -> Self {
-        Self { pilot: Pilot::new(autopilot, now), plane, depth_m, is_rising: false }
+        Self { pilot: Pilot::new(autopilot, now), plane, depth_m, is_rising: false, measures: true }
+    }
+
+    /// Whether the autopilot's odometry counts; otherwise another source gives the vehicle's pose.
+    #[must_use]
+    pub fn measuring(mut self, measures: bool) -> Self {
+        self.measures = measures;
+        self
     }
 
     /// Gives the autopilot's odometry to the vehicle, and the vehicle's goal to the autopilot.
     fn fly(&mut self, vehicle: &mut Vehicle, now: Instant) {
         let autopilot = &mut self.pilot.autopilot;
         while let Some(step) = autopilot.poll_step() {
+            if !self.measures {
+                continue;
+            }
             vehicle.handle_odometry(step.dx_m, step.dy_m, step.heading_rad, step.depth_m, now);
             vehicle.handle_unmeasured(step.unseen);
         }
@@ -174,9 +186,13 @@ impl VehicleHost {
         self.link.end_mut().handle_odometry(dx_m, dy_m, heading_rad, depth_m, now);
     }
 
-    /// Takes the pose of a recording, for a vehicle without an autopilot.
+    fn is_measured_by_pilot(&self) -> bool {
+        self.pilot.as_ref().is_some_and(|pilot| pilot.measures)
+    }
+
+    /// Takes the pose of a recording or of a navigation source, unless an autopilot measures it.
     pub fn handle_pose(&mut self, pose: CameraPose, now: Instant) {
-        if self.pilot.is_none() {
+        if !self.is_measured_by_pilot() {
             self.link.end_mut().set_pose(pose.x_m, pose.y_m, pose.heading_rad, pose.depth_m, now);
         }
     }
@@ -189,9 +205,28 @@ impl VehicleHost {
     /// A camera frame is given to the mapper. Returns its pose: that of the autopilot, or else `recorded`.
     pub fn handle_camera(&mut self, recorded: CameraPose) -> CameraPose {
         self.mapper.outstanding += 1;
-        if self.pilot.is_none() {
+        if !self.is_measured_by_pilot() {
             return recorded;
         }
+        self.dead_reckoned_pose()
+    }
+
+    /// A frame of a live camera, whose pose is that of its own time, is given to the mapper.
+    pub fn handle_matched_camera(&mut self) {
+        self.mapper.outstanding += 1;
+    }
+
+    /// Frames that the mapper has not reported on yet.
+    pub fn frames_in_mapper(&self) -> u32 {
+        self.mapper.outstanding
+    }
+
+    /// The vehicle's pose by the odometry of its autopilot; `None` if another source measures it.
+    pub fn measured_pose(&self) -> Option<CameraPose> {
+        self.is_measured_by_pilot().then(|| self.dead_reckoned_pose())
+    }
+
+    fn dead_reckoned_pose(&self) -> CameraPose {
         let navigator = self.vehicle().navigator();
         let (x_m, y_m) = navigator.dead_reckoned().xy();
         CameraPose { x_m, y_m, heading_rad: navigator.heading_rad(), depth_m: navigator.depth_m() }

@@ -1,5 +1,6 @@
 //! The tokio shells around the hosts: they move bytes, read the clock and write files.
 
+mod camera;
 mod checkpoint;
 mod clock;
 mod disk_space;

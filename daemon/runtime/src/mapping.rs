@@ -1,11 +1,10 @@
-//! The scene model's own thread, fed by a recorded camera.
+//! The scene model's own thread, fed by the camera.
 
 use super::checkpoint::CheckpointFile;
-use super::clock::Clock;
 use super::journal::Folder;
+use crate::camera::CameraFrame;
 use scene_model::project::Pose;
 use scenecast_core::UserError;
-use scenecast_files::{RecordedFrame, Recording};
 use scenecast_protocol::directive::Settings;
 use scenecast_vehicle::{MapUpdate, Mapper, RegisteredFrame, SharedExemplars};
 use std::thread::JoinHandle;
@@ -14,7 +13,7 @@ use tokio::sync::mpsc;
 /// A request to the mapper's thread.
 pub(super) enum ToMapper {
     Tune(Settings),
-    Frame(Box<RecordedFrame>),
+    Frame(Box<CameraFrame>),
     Keep,
 }
 
@@ -31,7 +30,7 @@ pub(super) enum FromMapper {
 /// The mapper's results after a camera frame.
 pub(super) struct Mapped {
     /// `None` at the start, when the map is that of a checkpoint.
-    pub(super) frame: Option<RecordedFrame>,
+    pub(super) frame: Option<CameraFrame>,
     /// The place of a frame that was mapped.
     pub(super) registered: Option<RegisteredFrame>,
     pub(super) update: MapUpdate,
@@ -159,16 +158,17 @@ impl Work {
     }
 
     /// Sends the map as it is, without a new frame in it.
-    fn report_current(&mut self, frame: Option<RecordedFrame>) -> bool {
+    fn report_current(&mut self, frame: Option<CameraFrame>) -> bool {
         let update = self.mapper.current();
         let mapped = self.mapped(frame, None, update);
         self.report(FromMapper::Mapped(Box::new(mapped)))
     }
 
-    fn see(&mut self, frame: RecordedFrame) -> FromMapper {
-        match frame.image() {
+    fn see(&mut self, mut frame: CameraFrame) -> FromMapper {
+        match frame.take_image() {
             Ok(image) => {
-                let pose = Pose { x: frame.x_m, y: frame.y_m, z: -frame.depth_m, yaw_rad: -frame.heading_rad };
+                let at = &frame.pose;
+                let pose = Pose { x: at.x_m, y: at.y_m, z: -at.depth_m, yaw_rad: -at.heading_rad };
                 let placed = self.mapper.register(&image, &pose, frame.scale);
                 let update = self.mapper.handle_frame(&image, &placed.pose, placed.scale, frame.t_s);
                 FromMapper::Mapped(Box::new(self.mapped(Some(frame), Some(placed), update)))
@@ -177,55 +177,8 @@ impl Work {
         }
     }
 
-    fn mapped(
-        &mut self,
-        frame: Option<RecordedFrame>,
-        registered: Option<RegisteredFrame>,
-        update: MapUpdate,
-    ) -> Mapped {
+    fn mapped(&mut self, frame: Option<CameraFrame>, registered: Option<RegisteredFrame>, update: MapUpdate) -> Mapped {
         Mapped { frame, registered, update, exemplars: self.mapper.shared_exemplars() }
-    }
-}
-
-/// The frames of the camera in order, each at its time; no frames without a camera.
-pub(super) struct Camera {
-    frames: std::iter::Peekable<std::vec::IntoIter<RecordedFrame>>,
-    clock: Clock,
-    /// Mission time at which this run's clock began.
-    began_s: f64,
-}
-
-impl Camera {
-    /// A camera that plays a recording, if there is one. Playback resumes after the frame of `seen_s`, the
-    /// last one in the checkpoint.
-    pub(super) fn new(recording: Option<Recording>, clock: Clock, seen_s: Option<f64>) -> Self {
-        let mut frames = recording.map(|r| r.frames).unwrap_or_default();
-        let mapped = seen_s.and_then(|t_s| frames.iter().rposition(|frame| frame.t_s == t_s));
-        let began_s = match mapped {
-            Some(index) => frames.drain(..=index).next_back().map_or(0.0, |frame| frame.t_s),
-            None => 0.0,
-        };
-        Self { frames: frames.into_iter().peekable(), clock, began_s }
-    }
-
-    /// Whether the recording has ended.
-    pub(super) fn is_over(&mut self) -> bool {
-        self.frames.peek().is_none()
-    }
-
-    /// Waits until the next frame is due and returns it; never returns after the last one.
-    pub(super) async fn next(&mut self) -> RecordedFrame {
-        match self.frames.peek() {
-            Some(frame) => {
-                let at = scenecast_protocol::time::Instant::from_secs_f64((frame.t_s - self.began_s).max(0.0));
-                tokio::time::sleep_until(self.clock.wall(at)).await;
-            }
-            None => std::future::pending().await,
-        }
-        match self.frames.next() {
-            Some(frame) => frame,
-            None => std::future::pending().await,
-        }
     }
 }
 
@@ -233,6 +186,7 @@ impl Camera {
 mod tests {
     use super::*;
     use image::{Rgb, RgbImage};
+    use scenecast_files::RecordedFrame;
 
     #[test]
     fn refused_checkpoints_are_reported_until_one_is_written() {
@@ -249,7 +203,7 @@ mod tests {
         let mut reports = |t_s: f64| {
             let (x_m, y_m, depth_m, heading_rad, scale) = (0.0, 0.0, 4.0, 0.0, 1.0);
             let frame = RecordedFrame { t_s, file: image.clone(), x_m, y_m, depth_m, heading_rad, scale };
-            assert!(thread.orders.send(ToMapper::Frame(Box::new(frame))).is_ok());
+            assert!(thread.orders.send(ToMapper::Frame(Box::new(frame.into()))).is_ok());
             let mut reports: Vec<bool> = Vec::new();
             loop {
                 match thread.mapped.blocking_recv().unwrap() {

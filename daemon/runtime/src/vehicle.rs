@@ -4,24 +4,28 @@ use super::clock::Clock;
 use super::disk_space::DiskWatch;
 use super::durable::{Keeper, StartedRun};
 use super::journal::Folder;
-use super::mapping::{Camera, FromMapper, Mapped, MapperThread, ToMapper};
+use super::mapping::{FromMapper, Mapped, MapperThread, ToMapper};
 use super::missing_key::warn_without_key;
 use super::modem::{self, ModemPort};
 use super::pilot::{self, PilotPort, SimulatedAutopilot};
 use super::reload::{Load, Reload};
 use super::restore::{Start, start};
 use super::stop::Stop;
+use crate::camera::{Camera, CameraFrame, LiveCamera, RecordedCamera};
 use crate::port::FromPort;
-use scenecast_config::{AutopilotKind, CameraSource, Config, survey_depth_m};
+use scenecast_config::{AutopilotKind, CameraSource, Config, NavigationSource, survey_depth_m};
 use scenecast_core::{Area, TangentPlane, UserError};
-use scenecast_files::{RecordedFrame, Recording};
-use scenecast_host::{CameraPose, VehicleHost, VehicleHostEvent, VehiclePilot, modem_station};
+use scenecast_files::Recording;
+use scenecast_host::{VehicleHost, VehicleHostEvent, VehiclePilot, modem_station};
 use scenecast_protocol::directive::Budget;
 use scenecast_protocol::map::LayerSet;
 use std::time::Duration;
 
 /// Maximum time between two calls of the host.
 const MAX_SLEEP: Duration = Duration::from_secs(1);
+
+/// Mission time that is assumed to pass between two runs of a live camera, seconds.
+const RESTART_S: f64 = 2.0;
 
 /// Runs the vehicle until it is interrupted; on SIGHUP it calls `load` for a new budget and new shares.
 pub fn run_vehicle(load: Load, simulated: Option<SimulatedAutopilot>) -> Result<(), UserError> {
@@ -37,6 +41,7 @@ pub fn run_vehicle(load: Load, simulated: Option<SimulatedAutopilot>) -> Result<
         let recording = match &config.camera.source {
             CameraSource::Rehearsal => None,
             CameraSource::Frames(dir) => Some(Recording::open(dir, None, config.camera.metres_per_pixel)?),
+            _ => None,
         };
         let area = survey_area(&config, recording.as_ref())?;
         let mut vehicle = scenecast_vehicle::assemble(
@@ -57,7 +62,11 @@ pub fn run_vehicle(load: Load, simulated: Option<SimulatedAutopilot>) -> Result<
             vehicle.assume_start_refused(clock.now());
         }
         let is_recorded = recording.is_some();
-        let mut camera = Camera::new(recording, clock, mapper.last_s());
+        let camera = match config.camera.source.is_live() {
+            // The time since the end of the former run is unknown.
+            true => Camera::Live(Box::new(LiveCamera::start(&config, mapper.last_s().map_or(0.0, |s| s + RESTART_S))?)),
+            false => Camera::Recorded(RecordedCamera::new(recording, clock, mapper.last_s())),
+        };
         mapper.tune(vehicle.settings());
         if config.autopilot.kind != AutopilotKind::None {
             // The odometry of an autopilot starts again with each run.
@@ -70,7 +79,9 @@ pub fn run_vehicle(load: Load, simulated: Option<SimulatedAutopilot>) -> Result<
         let autopilot = pilot::autopilot(&config, simulated, clock.now())?;
         let ports = Ports { modem, pilot: PilotPort::open(&config, autopilot.is_some()) };
         let plane = config.mission.origin_deg.map(TangentPlane::new);
-        let pilot = autopilot.map(|a| VehiclePilot::new(a, plane, survey_depth_m(&config), clock.now()));
+        let measures = config.navigation.source == NavigationSource::Autopilot;
+        let depth_m = survey_depth_m(&config);
+        let pilot = autopilot.map(|a| VehiclePilot::new(a, plane, depth_m, clock.now()).measuring(measures));
         let mut host = VehicleHost::new(vehicle, station, pilot);
         if is_recorded && camera.is_over() {
             host.handle_camera_end();
@@ -123,7 +134,7 @@ impl VehicleShell {
                 }
                 report = self.ports.pilot.next() => self.handle_pilot(report),
                 config = self.reload.next() => self.follow(&config),
-                frame = self.camera.next() => self.handle_camera(frame),
+                () = self.camera.wait() => {}
                 mapped = self.mapper.mapped.recv() => match mapped {
                     Some(FromMapper::Mapped(mapped)) => self.handle_seen(*mapped),
                     Some(FromMapper::Missed(error)) => self.handle_missed(&error),
@@ -132,6 +143,20 @@ impl VehicleShell {
                 },
             }
             self.host.handle_timeout(self.clock.now());
+            self.poll_camera();
+        }
+    }
+
+    /// Gives the camera the vehicle's pose, and the camera's frames that are due to the scene model.
+    fn poll_camera(&mut self) {
+        if let Some(pose) = self.camera.poll_pose() {
+            self.host.handle_pose(pose, self.clock.now());
+        }
+        if let Some(pose) = self.host.measured_pose() {
+            self.camera.handle_pose(pose);
+        }
+        while let Some(frame) = self.camera.poll_frame(self.host.frames_in_mapper()) {
+            self.handle_camera(frame);
         }
     }
 
@@ -153,10 +178,15 @@ impl VehicleShell {
         self.host.handle_budget(budget, self.clock.now());
     }
 
-    fn handle_camera(&mut self, mut frame: RecordedFrame) {
-        let pose = self.host.handle_camera(pose_of(&frame));
-        (frame.x_m, frame.y_m) = (pose.x_m, pose.y_m);
-        (frame.heading_rad, frame.depth_m) = (pose.heading_rad, pose.depth_m);
+    fn handle_camera(&mut self, mut frame: CameraFrame) {
+        match &self.camera {
+            Camera::Recorded(_) => {
+                let pose = self.host.handle_camera(frame.camera_pose());
+                (frame.pose.x_m, frame.pose.y_m) = (pose.x_m, pose.y_m);
+                (frame.pose.heading_rad, frame.pose.depth_m) = (pose.heading_rad, pose.depth_m);
+            }
+            Camera::Live(_) => self.host.handle_matched_camera(),
+        }
         let _ = self.mapper.orders.send(ToMapper::Frame(Box::new(frame)));
         if self.camera.is_over() {
             self.host.handle_camera_end();
@@ -165,13 +195,16 @@ impl VehicleShell {
 
     fn handle_seen(&mut self, mapped: Mapped) {
         let now = self.clock.now();
-        let (pose, registered) = (mapped.frame.as_ref().map(pose_of), mapped.registered.as_ref());
+        // A pose that came in after the frame stays the vehicle's.
+        let pose = mapped.frame.as_ref().map(|frame| self.camera.newest_pose().unwrap_or(frame.camera_pose()));
+        let registered = mapped.registered.as_ref();
         self.host.handle_mapped(pose, registered, &mapped.update, mapped.exemplars, now);
     }
 
     /// Logs an unreadable frame; it does not end the mission.
     fn handle_missed(&mut self, error: &UserError) {
         self.missed += 1;
+        self.camera.handle_missed();
         tracing::error!("a camera frame was skipped, {} so far: {error}", self.missed);
         self.host.handle_missed();
     }
@@ -231,9 +264,4 @@ impl VehicleShell {
         }
         Ok(())
     }
-}
-
-fn pose_of(frame: &RecordedFrame) -> CameraPose {
-    let RecordedFrame { x_m, y_m, heading_rad, depth_m, .. } = *frame;
-    CameraPose { x_m, y_m, heading_rad, depth_m }
 }

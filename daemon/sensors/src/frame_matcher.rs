@@ -50,7 +50,20 @@ pub struct FrameMatcher<I> {
     /// Stamp, arrival and mission time of the last matched image.
     last: Option<(Stamp, Stamp, f64)>,
     start_s: f64,
+    delays: Delays,
     tally: CameraTally,
+}
+
+/// Mean time between the stamps and the arrivals of images and of poses, seconds.
+#[derive(Debug, Clone, Copy, Default)]
+struct Delays {
+    image_s: Option<f64>,
+    pose_s: Option<f64>,
+}
+
+/// A mean in which the newest value has a tenth of the weight.
+fn follow(mean: &mut Option<f64>, value: f64) {
+    *mean = Some(mean.map_or(value, |mean| mean + 0.1 * (value - mean)));
 }
 
 /// Images that are earlier than the newest one by more than this may be of another clock.
@@ -70,12 +83,19 @@ impl<I> FrameMatcher<I> {
             earlier: (0, None),
             last: None,
             start_s,
+            delays: Delays::default(),
             tally: CameraTally::default(),
         }
     }
 
-    /// Takes a pose of the time `stamp`.
-    pub fn handle_pose(&mut self, stamp: Stamp, pose: SensorPose) {
+    /// Takes all poses of a mission, in order of time; those in a file need no time of arrival.
+    pub fn set_poses(&mut self, poses: impl IntoIterator<Item = (Stamp, SensorPose)>) {
+        self.track = PoseTrack::of(poses, self.limits.max_gap);
+    }
+
+    /// Takes a pose of the time `stamp` that came in at `arrival`.
+    pub fn handle_pose(&mut self, stamp: Stamp, arrival: Stamp, pose: SensorPose) {
+        follow(&mut self.delays.pose_s, arrival.seconds_since(stamp));
         let last = self.track.last();
         if self.track.push(stamp, pose) {
             self.tally.count(CameraFault::PoseClockJump);
@@ -90,6 +110,7 @@ impl<I> FrameMatcher<I> {
             self.tally.count(CameraFault::NotLater);
             return;
         }
+        follow(&mut self.delays.image_s, arrival.seconds_since(stamp));
         self.earlier = (0, None);
         self.newest = Some(stamp);
         self.waiting.push_back(Waiting { stamp, arrival, image });
@@ -153,6 +174,18 @@ impl<I> FrameMatcher<I> {
         self.waiting.front().map(|first| first.arrival.after(self.limits.max_wait))
     }
 
+    /// The times of images and poses, for people who look for a wrong clock.
+    pub fn times(&self) -> String {
+        let newest = self.newest.or(self.last.map(|(last, ..)| last));
+        let image = newest.map_or("no image".to_owned(), |stamp| format!("the last image is of {stamp}"));
+        let pose = self.track.last().map_or("no pose".to_owned(), |(stamp, _)| format!("the last pose of {stamp}"));
+        let delay = |what: &str, s: Option<f64>| {
+            s.map_or(String::new(), |s| format!("; {what} arrive {s:.3} s after their times"))
+        };
+        let (images, poses) = (delay("images", self.delays.image_s), delay("poses", self.delays.pose_s));
+        format!("{image}, {pose}{images}{poses}")
+    }
+
     /// The last pose and its stamp.
     pub fn last_pose(&self) -> Option<(Stamp, SensorPose)> {
         self.track.last()
@@ -188,10 +221,10 @@ mod tests {
     #[test]
     fn an_image_waits_for_the_pose_after_it() {
         let mut matcher = FrameMatcher::new(Limits::default(), 5.0);
-        matcher.handle_pose(at(100.0), pose(0.0));
+        matcher.handle_pose(at(100.0), at(100.0), pose(0.0));
         matcher.handle_image(at(100.5), at(7.0), 1);
         assert_eq!(frames(&mut matcher, 7.5), []);
-        matcher.handle_pose(at(101.0), pose(2.0));
+        matcher.handle_pose(at(101.0), at(101.0), pose(2.0));
         let frame = matcher.poll_frame(at(7.6)).unwrap();
         assert_eq!((frame.image, frame.pose.x_m, frame.t_s), (1, 1.0, 5.0));
         matcher.handle_image(at(101.0), at(8.0), 2);
@@ -202,13 +235,13 @@ mod tests {
     #[test]
     fn without_a_pose_at_its_time_an_image_is_dropped_and_named() {
         let mut matcher = FrameMatcher::new(Limits::default(), 0.0);
-        matcher.handle_pose(at(100.0), pose(0.0));
+        matcher.handle_pose(at(100.0), at(100.0), pose(0.0));
         matcher.handle_image(at(99.0), at(1.0), 1);
         matcher.handle_image(at(9000.0), at(1.1), 2);
         assert_eq!(matcher.poll_timeout(), Some(at(3.0)));
         assert_eq!(frames(&mut matcher, 3.2), []);
         // The image of a wrong time does not stand in the way of the next one.
-        matcher.handle_pose(at(101.0), pose(1.0));
+        matcher.handle_pose(at(101.0), at(101.0), pose(1.0));
         matcher.handle_image(at(101.0), at(3.3), 3);
         assert_eq!(frames(&mut matcher, 3.4), [(3, 1.0)]);
         let text = matcher.tally().to_string();
@@ -218,7 +251,7 @@ mod tests {
     #[test]
     fn the_newest_images_are_kept_when_the_model_is_slow() {
         let mut matcher = FrameMatcher::new(Limits { max_images: 2, ..Limits::default() }, 0.0);
-        (0..5).for_each(|i| matcher.handle_pose(at(f64::from(i)), pose(f64::from(i))));
+        (0..5).for_each(|i| matcher.handle_pose(at(f64::from(i)), at(f64::from(i)), pose(f64::from(i))));
         (0..5).for_each(|i| matcher.handle_image(at(f64::from(i)), at(f64::from(i)), i));
         assert_eq!(frames(&mut matcher, 5.0), [(3, 3.0), (4, 4.0)]);
         assert_eq!(matcher.tally().of(CameraFault::Overtaken), 3);
@@ -227,12 +260,12 @@ mod tests {
     #[test]
     fn a_restarted_camera_with_an_earlier_clock_is_mapped_again() {
         let mut matcher = FrameMatcher::new(Limits::default(), 0.0);
-        matcher.handle_pose(at(500.0), pose(0.0));
+        matcher.handle_pose(at(500.0), at(500.0), pose(0.0));
         matcher.handle_image(at(500.0), at(1.0), 0);
         assert_eq!(frames(&mut matcher, 1.0), [(0, 0.0)]);
         for i in 1..8_u32 {
             let s = 0.5 * f64::from(i);
-            matcher.handle_pose(at(s), pose(s));
+            matcher.handle_pose(at(s), at(s), pose(s));
             matcher.handle_image(at(s), at(1.0 + s), i);
         }
         assert_eq!(frames(&mut matcher, 5.0), [(3, 1.5), (4, 2.0), (5, 2.5), (6, 3.0), (7, 3.5)]);
@@ -252,7 +285,7 @@ mod tests {
                 let s = f64::from(stamp) / 10.0;
                 if is_pose {
                     // The pose is a function of the time.
-                    matcher.handle_pose(at(s), pose(3.0 * s));
+                    matcher.handle_pose(at(s), at(s), pose(3.0 * s));
                 } else {
                     matcher.handle_image(at(s), at(now), stamp);
                     given += 1;

@@ -87,6 +87,17 @@ impl PoseTrack {
         Self { poses: VecDeque::new(), max_gap, earlier: 0 }
     }
 
+    /// A track of all these poses, however many; those that are not later than the one before are left out.
+    pub fn of(poses: impl IntoIterator<Item = (Stamp, SensorPose)>, max_gap: Duration) -> Self {
+        let mut track = Self::new(max_gap);
+        for (stamp, pose) in poses {
+            if pose.is_finite() && track.poses.back().is_none_or(|(last, _)| *last < stamp) {
+                track.poses.push_back((stamp, pose));
+            }
+        }
+        track
+    }
+
     /// Takes a pose. Returns whether the clock of the poses went back, so that earlier poses were forgotten. A pose of the
     /// time of the last one replaces it, and one that is a little earlier is ignored, as is one that is not finite.
     pub fn push(&mut self, stamp: Stamp, pose: SensorPose) -> bool {

@@ -5,6 +5,7 @@ use crate::live::{ImageSource, SourceError, SourceImage};
 use scenecast_sensors::{CameraFault, ImageStream, Stamp};
 use std::collections::VecDeque;
 use std::io::Read;
+use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -46,6 +47,13 @@ struct Running {
 impl CommandSource {
     pub fn new(command: &str, clock: ArrivalClock) -> Self {
         Self { command: command.to_owned(), clock, running: None, ready: VecDeque::new() }
+    }
+
+    /// A camera of the system, whose images ffmpeg passes on as they are or encodes as JPEG.
+    pub fn of_device(device: &Path, clock: ArrivalClock) -> Self {
+        let quoted = device.to_string_lossy().replace('\'', "'\\''");
+        let input = "exec ffmpeg -nostdin -loglevel error -f v4l2 -fflags nobuffer -i";
+        Self::new(&format!("{input} '{quoted}' -c:v mjpeg -q:v 3 -f image2pipe -"), clock)
     }
 
     fn spawn(&self) -> std::io::Result<Running> {

@@ -1,7 +1,7 @@
 //! A folder into which a camera's program writes its images.
 
-use crate::live::{ImageSource, SourceError, SourceImage};
 use crate::ArrivalClock;
+use crate::live::{ImageSource, SourceError, SourceImage};
 use scenecast_sensors::{CameraFault, MAX_IMAGE_BYTES, Stamp, complete_length};
 use std::collections::{BTreeMap, VecDeque};
 use std::fs::DirEntry;

@@ -2,7 +2,7 @@
 
 use crate::key::section;
 use crate::rule::{ANY, range};
-use crate::setting::{BirthRule, CameraSource, Debounce, LayerName, MapCells, MapStream};
+use crate::setting::{BirthRule, CameraSource, CameraStamps, Debounce, LayerName, MapCells, MapStream};
 use scenecast_protocol::map_codec::Codec;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -38,9 +38,19 @@ section! {
 section! {
     /// The camera.
     camera: Camera {
-        /// Source of the frames. frames:DIR: images with DIR/poses.csv; empty: the image of the rehearsal; a vehicle at
-        /// sea then has no camera frames.
+        /// Source of the frames. frames:DIR: images with DIR/poses.csv. watch:DIR: images, as they are written to a folder.
+        /// command:COMMAND: images that a shell command writes to its standard output, MJPEG, PNG or PPM. v4l2:DEVICE: a
+        /// camera of the system, by ffmpeg. Empty: the image of the rehearsal; a vehicle at sea then has no camera frames.
         source: CameraSource = CameraSource::Rehearsal, ANY, [Auv Scenario];
+        /// Time of the images of a live camera. own: the time that the image, its file name or its message gives; an image
+        /// that gives none was taken camera.delay_s before its arrival. arrival: so for all images.
+        stamps: CameraStamps = CameraStamps::Own, ANY, [Auv];
+        /// Time between the exposure and the arrival of an image that does not give its time.
+        delay_s: f64 = 0.0, range(0.0, 60.0, "s"), [Auv];
+        /// Added to the times that images give, where the camera's clock differs from that of the poses.
+        clock_offset_s: f64 = 0.0, range(-86_400.0, 86_400.0, "s"), [Auv];
+        /// Time without an image after which a live camera counts as stalled; a command is then started again.
+        timeout_s: f64 = 10.0, range(1.0, 3600.0, "s"), [Auv];
         /// Frames per second.
         rate_hz: f64 = 0.5, range(0.01, 30.0, "1/s"), [Scenario];
         /// Columns of a frame.

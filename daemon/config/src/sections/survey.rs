@@ -2,7 +2,7 @@
 
 use crate::key::section;
 use crate::rule::{ANY, ports, range};
-use crate::setting::{AutopilotKind, GpsPort};
+use crate::setting::{AutopilotKind, GpsPort, NavigationSource};
 use scenecast_core::{Area, PortAddress};
 use scenecast_protocol::directive::{AtEnd, PlannerKind, Reaction};
 
@@ -49,6 +49,11 @@ section! {
 section! {
     /// The vehicle's navigation.
     navigation: Navigation {
+        /// Source of the vehicle's pose. Empty: the autopilot, or the recording of the camera. tum:FILE: a file of poses with
+        /// the times of the images. The autopilot, if there is one, then only follows waypoints.
+        source: NavigationSource = NavigationSource::Autopilot, ANY, [Auv];
+        /// Longest time between two poses within which the pose of an image is interpolated.
+        max_gap_s: f64 = 1.0, range(0.01, 60.0, "s"), [Auv];
         /// Drift of dead reckoning, in percent of the distance travelled.
         drift_percent: f64 = 1.0, range(0.0, 50.0, "%"), [Auv Scenario];
         /// Standard deviation of the vehicle's position at the start of the survey. It limits how far the first

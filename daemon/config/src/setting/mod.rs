@@ -6,16 +6,18 @@ mod debounce;
 mod layers;
 mod numbers;
 mod ports;
+mod sources;
 mod tables;
 mod texts;
 
 pub use choices::{
-    Authenticate, AutopilotKind, BirthRule, MapCells, MapStream, ModemKind, OperatorScript, S2cMode, WorldKind,
+    Authenticate, AutopilotKind, BirthRule, CameraStamps, MapCells, MapStream, ModemKind, OperatorScript, S2cMode,
+    WorldKind,
 };
 pub use debounce::Debounce;
 pub use layers::LayerName;
 pub use ports::{GpsPort, HostPort};
-pub use texts::CameraSource;
+pub use sources::{CameraSource, NavigationSource};
 
 use crate::rule::Rule;
 use serde_json::json;

@@ -40,6 +40,10 @@ impl Camera {
         let recording = match &config.camera.source {
             CameraSource::Rehearsal => None,
             CameraSource::Frames(dir) => Some(Recording::open(dir, None, config.camera.metres_per_pixel)?),
+            other => {
+                let what = format!("camera.source: {other:?} cannot be rehearsed: it is not recorded");
+                return Err(UserError::Input(what));
+            }
         };
         let recorder = record.map(Recorder::new).transpose()?;
         Ok(Self { world, recording, next: 0, recorder, true_cells: OnceLock::new() })

@@ -1,0 +1,176 @@
+//! A live camera: its images wait for their poses, and the newest ones go to the scene model.
+
+use super::fault_log::FaultLog;
+use super::{CameraFrame, FramePicture};
+use scenecast_config::{CameraSource, CameraStamps, Config, NavigationSource};
+use scenecast_core::UserError;
+use scenecast_host::CameraPose;
+use scenecast_sensors::{CameraFault, FrameMatcher, Limits, MatchedImage, SensorPose, Stamp};
+use scenecast_sources::{
+    ArrivalClock, CommandSource, LiveSource, Picture, SourceImage, SourceReport, WatchSource, read_tum_poses,
+};
+use std::collections::BTreeMap;
+use std::time::Duration;
+
+/// Frames that may wait for the scene model; further ones stay with the matcher, which drops the oldest.
+const MAX_MAPPING: u32 = 2;
+
+/// Longest time between two poses of a vehicle that does not move.
+const MAX_POSE_INTERVAL_S: f64 = 0.2;
+
+/// A camera whose images come in while the vehicle dives.
+pub(crate) struct LiveCamera {
+    source: LiveSource,
+    matcher: FrameMatcher<Picture>,
+    clock: ArrivalClock,
+    stamps: CameraStamps,
+    delay: Duration,
+    clock_offset: ClockOffset,
+    has_own_poses: bool,
+    /// The newest pose of the navigation source.
+    newest_pose: Option<CameraPose>,
+    /// Whether the vehicle does not know the newest pose yet.
+    is_pose_new: bool,
+    log: FaultLog,
+    /// What the source said last about a kind of fault.
+    said: BTreeMap<CameraFault, String>,
+    was_matched: bool,
+}
+
+/// Difference between the clocks of the poses and of the camera.
+#[derive(Debug, Clone, Copy)]
+struct ClockOffset(f64);
+
+impl ClockOffset {
+    fn apply(self, stamp: Stamp) -> Stamp {
+        let by = Duration::from_secs_f64(self.0.abs());
+        if self.0 < 0.0 { stamp.before(by) } else { stamp.after(by) }
+    }
+}
+
+impl LiveCamera {
+    /// Starts the configured live camera; the first frame has the mission time `start_s`.
+    pub(crate) fn start(config: &Config, start_s: f64) -> Result<Self, UserError> {
+        let clock = ArrivalClock::start();
+        let c = &config.camera;
+        let stall = Duration::from_secs_f64(c.timeout_s);
+        let source = match &c.source {
+            CameraSource::Watch(dir) => LiveSource::start(WatchSource::new(dir, clock), stall),
+            CameraSource::Command(command) => LiveSource::start(CommandSource::new(command, clock), stall),
+            CameraSource::V4l2(device) => LiveSource::start(CommandSource::of_device(device, clock), stall),
+            other => return Err(UserError::Input(format!("camera.source: {other:?} is not a live camera"))),
+        };
+        let source = source.map_err(|e| UserError::Failed(format!("the camera's thread did not start: {e}")))?;
+        let max_gap = Duration::from_secs_f64(config.navigation.max_gap_s);
+        let mut matcher = FrameMatcher::new(Limits { max_gap, ..Limits::default() }, start_s);
+        if let NavigationSource::Tum(file) = &config.navigation.source {
+            matcher.set_poses(read_tum_poses(file)?);
+        }
+        Ok(Self {
+            source,
+            matcher,
+            clock,
+            stamps: c.stamps,
+            delay: Duration::from_secs_f64(c.delay_s),
+            clock_offset: ClockOffset(c.clock_offset_s),
+            has_own_poses: config.navigation.source != NavigationSource::Autopilot,
+            newest_pose: None,
+            is_pose_new: false,
+            log: FaultLog::default(),
+            said: BTreeMap::new(),
+            was_matched: false,
+        })
+    }
+
+    /// Waits for a report of the source, or until an image has waited too long for its pose. Cancel-safe.
+    pub(super) async fn wait(&mut self) {
+        let timeout = self.matcher.poll_timeout().map(|at| tokio::time::Instant::from_std(self.clock.instant(at)));
+        let overdue = async {
+            match timeout {
+                Some(at) => tokio::time::sleep_until(at).await,
+                None => std::future::pending().await,
+            }
+        };
+        tokio::select! {
+            report = self.source.next() => self.handle_report(report),
+            () = overdue => {}
+        }
+    }
+
+    fn handle_report(&mut self, report: SourceReport) {
+        match report {
+            SourceReport::Open => tracing::info!("camera: open"),
+            SourceReport::Image(image) => self.handle_image(image),
+            SourceReport::Pose(stamp, pose) => {
+                self.matcher.handle_pose(stamp, self.clock.now(), pose);
+                let SensorPose { x_m, y_m, heading_rad, depth_m, .. } = pose;
+                self.is_pose_new = true;
+                self.newest_pose = Some(CameraPose { x_m, y_m, heading_rad, depth_m });
+            }
+            SourceReport::Fault(fault, text) => {
+                self.matcher.count(fault);
+                self.said.insert(fault, text);
+            }
+        }
+        self.log_faults();
+    }
+
+    fn handle_image(&mut self, image: SourceImage) {
+        let own = image.stamp.filter(|_| self.stamps == CameraStamps::Own);
+        let stamp = own.map_or_else(|| image.arrival.before(self.delay), |stamp| self.clock_offset.apply(stamp));
+        self.matcher.handle_image(stamp, image.arrival, image.picture);
+    }
+
+    pub(super) fn handle_pose(&mut self, pose: CameraPose) {
+        if self.has_own_poses {
+            return;
+        }
+        let now = self.clock.now();
+        let CameraPose { x_m, y_m, heading_rad, depth_m } = pose;
+        let pose = SensorPose { x_m, y_m, heading_rad, depth_m, ..SensorPose::default() };
+        let is_due = self
+            .matcher
+            .last_pose()
+            .is_none_or(|(at, last)| last != pose || now.seconds_since(at) >= MAX_POSE_INTERVAL_S);
+        if is_due {
+            self.matcher.handle_pose(now, now, pose);
+        }
+    }
+
+    pub(super) fn poll_pose(&mut self) -> Option<CameraPose> {
+        std::mem::take(&mut self.is_pose_new).then_some(self.newest_pose)?
+    }
+
+    pub(super) fn newest_pose(&self) -> Option<CameraPose> {
+        self.newest_pose
+    }
+
+    pub(super) fn handle_missed(&mut self) {
+        self.matcher.count(CameraFault::Unreadable);
+    }
+
+    pub(super) fn poll_frame(&mut self, mapping: u32) -> Option<CameraFrame> {
+        if mapping >= MAX_MAPPING {
+            return None;
+        }
+        let frame = self.matcher.poll_frame(self.clock.now());
+        if !self.was_matched && frame.is_some() {
+            self.was_matched = true;
+            tracing::info!("camera: the first image has a pose");
+        }
+        self.log_faults();
+        let MatchedImage { image, pose, t_s, .. } = frame?;
+        Some(CameraFrame { t_s, picture: FramePicture::Received(image), pose, scale: 1.0 })
+    }
+
+    fn log_faults(&mut self) {
+        let (matcher, said) = (&self.matcher, &self.said);
+        let explain = |fault| match fault {
+            CameraFault::NoPose => Some(matcher.times()),
+            _ => said.get(&fault).cloned(),
+        };
+        for line in self.log.lines(matcher.tally(), std::time::Instant::now(), explain) {
+            tracing::warn!("{line}");
+        }
+    }
+}
