@@ -6,7 +6,7 @@ use serde::de::DeserializeOwned;
 use std::fmt::Debug;
 
 /// A message of ROS 2.
-pub trait Message: Serialize + DeserializeOwned + Default + Clone + PartialEq + Debug + Send + 'static {
+pub trait Message: Serialize + DeserializeOwned + Default + Clone + PartialEq + Debug + Send + Sync + 'static {
     const DEFINITION: &'static Definition;
 }
 
