@@ -6,6 +6,7 @@ mod debounce;
 mod layers;
 mod numbers;
 mod ports;
+mod ros2;
 mod sources;
 mod tables;
 mod texts;
@@ -17,6 +18,7 @@ pub use choices::{
 pub use debounce::Debounce;
 pub use layers::LayerName;
 pub use ports::{GpsPort, HostPort};
+pub use ros2::{Remap, RosName};
 pub use sources::{CameraSource, NavigationSource};
 
 use crate::rule::Rule;
