@@ -10,6 +10,7 @@ use super::modem::{self, ModemPort};
 use super::pilot::{self, PilotPort, SimulatedAutopilot};
 use super::reload::{Load, Reload};
 use super::restore::{Start, start};
+use super::ros::RosAccess;
 use super::stop::Stop;
 use crate::camera::{Camera, CameraFrame, LiveCamera, RecordedCamera};
 use crate::port::FromPort;
@@ -64,7 +65,11 @@ pub fn run_vehicle(load: Load, simulated: Option<SimulatedAutopilot>) -> Result<
         let is_recorded = recording.is_some();
         let camera = match config.camera.source.is_live() {
             // The time since the end of the former run is unknown.
-            true => Camera::Live(Box::new(LiveCamera::start(&config, mapper.last_s().map_or(0.0, |s| s + RESTART_S))?)),
+            true => Camera::Live(Box::new(LiveCamera::start(
+                &config,
+                mapper.last_s().map_or(0.0, |s| s + RESTART_S),
+                &RosAccess::start(&config)?,
+            )?)),
             false => Camera::Recorded(RecordedCamera::new(recording, clock, mapper.last_s())),
         };
         mapper.tune(vehicle.settings());

@@ -30,6 +30,10 @@ pub enum CameraFault {
     SourceLost,
     /// The source sent no image for longer than allowed.
     Stalled,
+    /// The source of the poses was lost, and was opened again.
+    PosesLost,
+    /// No pose came in for longer than allowed.
+    PosesStalled,
 }
 
 impl CameraFault {
@@ -48,6 +52,8 @@ impl CameraFault {
             Self::PoseGap => "gap between poses",
             Self::SourceLost => "source lost",
             Self::Stalled => "camera stalled",
+            Self::PosesLost => "poses lost",
+            Self::PosesStalled => "poses stalled",
         }
     }
 

@@ -6,6 +6,7 @@
 //! | raw pixels of ROS 2 become RGB | [`RawImage`] |
 //! | compressed images become RGB, and say when they were taken | [`decode`], [`own_stamp`] |
 //! | quaternions become headings and tilts | [`Rotation`] |
+//! | messages of ROS 2 become images and poses | [`rgb_of`], [`pose_of`] |
 //! | poses are interpolated at the time of an image | [`PoseTrack`] |
 //! | images wait for their poses, and are dropped with a reason | [`FrameMatcher`] |
 //!
@@ -18,6 +19,7 @@ mod frame_matcher;
 mod image_stream;
 mod pose_track;
 mod raw_image;
+mod ros_messages;
 mod rotation;
 mod stamp;
 
@@ -27,5 +29,6 @@ pub use frame_matcher::{FrameMatcher, Limits, MatchedImage};
 pub use image_stream::{ImageStream, MAX_IMAGE_BYTES, complete_length};
 pub use pose_track::{PoseMatch, PoseTrack, SensorPose};
 pub use raw_image::{RawImage, RawImageError};
+pub use ros_messages::{pose_of, rgb_of, stamp_of};
 pub use rotation::Rotation;
 pub use stamp::Stamp;

@@ -1,7 +1,7 @@
 //! A program that writes images to its standard output.
 
 use crate::ArrivalClock;
-use crate::live::{ImageSource, SourceError, SourceImage};
+use crate::live::{Reading, SensorKind, SensorSource, SourceError, SourceImage};
 use scenecast_sensors::{CameraFault, ImageStream, Stamp};
 use std::collections::VecDeque;
 use std::io::Read;
@@ -160,7 +160,11 @@ enum Signal {
     Kill,
 }
 
-impl ImageSource for CommandSource {
+impl SensorSource for CommandSource {
+    fn kind(&self) -> SensorKind {
+        SensorKind::Camera
+    }
+
     fn open(&mut self) -> Result<(), SourceError> {
         self.close();
         let running = self.spawn().map_err(|e| SourceError(format!("the command does not start: {e}")))?;
@@ -172,12 +176,12 @@ impl ImageSource for CommandSource {
         &mut self,
         timeout: Duration,
         fault: &mut dyn FnMut(CameraFault, String),
-    ) -> Result<Option<SourceImage>, SourceError> {
+    ) -> Result<Option<Reading>, SourceError> {
         let until = Instant::now() + timeout;
         let Some(running) = &mut self.running else { return Err(SourceError("the command is not open".to_owned())) };
         loop {
             if let Some(image) = self.ready.pop_front() {
-                return Ok(Some(image));
+                return Ok(Some(Reading::Image(image)));
             }
             match running.pieces.recv_timeout(until.saturating_duration_since(Instant::now())) {
                 Ok((arrival, bytes)) => {
@@ -238,7 +242,8 @@ mod tests {
         let (mut source, mut images, mut faults) = (opened(command), Vec::new(), Vec::new());
         loop {
             match source.next(LONG, &mut |fault, _| faults.push(fault)) {
-                Ok(image) => images.extend(image),
+                Ok(Some(Reading::Image(image))) => images.push(image),
+                Ok(_) => {}
                 Err(error) => return (images, faults, error.to_string()),
             }
         }

@@ -1,19 +1,23 @@
-//! Live cameras, each on a thread of its own.
+//! Live cameras and navigation sensors, each on a thread of its own.
 //!
-//! An [`ImageSource`] waits for the images of a camera. [`LiveSource`] opens it, opens it again with back-off when it is lost,
-//! and reports images and faults to the vehicle. Which image is mapped at which pose is decided by
+//! A [`SensorSource`] waits for the readings of a sensor. [`LiveSource`] opens it, opens it again with back-off when it is lost,
+//! and reports readings and faults to the vehicle. Which image is mapped at which pose is decided by
 //! [`scenecast_sensors::FrameMatcher`].
 
 mod arrival_clock;
 mod command;
 mod live;
 mod picture;
+#[cfg(feature = "ros2")]
+mod ros2;
 mod tum_poses;
 mod watch;
 
 pub use arrival_clock::ArrivalClock;
 pub use command::CommandSource;
-pub use live::{ImageSource, LiveSource, SourceError, SourceImage, SourceReport};
+pub use live::{LiveSource, Reading, SensorKind, SensorSource, SourceError, SourceImage, SourceReport};
 pub use picture::Picture;
+#[cfg(feature = "ros2")]
+pub use ros2::{RosCamera, RosNavigation};
 pub use tum_poses::read_tum_poses;
 pub use watch::WatchSource;

@@ -23,23 +23,57 @@ pub struct SourceImage {
     pub picture: Picture,
 }
 
-/// A camera.
-pub trait ImageSource: Send + 'static {
-    /// Opens the camera, again if it was open.
+/// A measurement of a sensor.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Reading {
+    Image(SourceImage),
+    /// The pose of the vehicle at a time.
+    Pose(Stamp, SensorPose),
+}
+
+/// The sensor that a source is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum SensorKind {
+    Camera,
+    /// It measures the pose of the vehicle.
+    Navigation,
+}
+
+impl SensorKind {
+    fn lost(self) -> CameraFault {
+        match self {
+            Self::Camera => CameraFault::SourceLost,
+            Self::Navigation => CameraFault::PosesLost,
+        }
+    }
+
+    fn stalled(self) -> CameraFault {
+        match self {
+            Self::Camera => CameraFault::Stalled,
+            Self::Navigation => CameraFault::PosesStalled,
+        }
+    }
+}
+
+/// A live sensor.
+pub trait SensorSource: Send + 'static {
+    fn kind(&self) -> SensorKind;
+
+    /// Opens the sensor, again if it was open.
     fn open(&mut self) -> Result<(), SourceError>;
 
-    /// Waits for the next image, at most for `timeout`; `None` if there is none until then. Images that cannot be used are
+    /// Waits for the next reading, at most for `timeout`; `None` if there is none until then. Readings that cannot be used are
     /// passed to `fault` with one line for people.
     fn next(
         &mut self,
         timeout: Duration,
         fault: &mut dyn FnMut(CameraFault, String),
-    ) -> Result<Option<SourceImage>, SourceError>;
+    ) -> Result<Option<Reading>, SourceError>;
 
-    /// Whether a camera that has stalled is opened again.
+    /// Whether a sensor that has stalled is opened again.
     fn is_reopened_after_stall(&self) -> bool;
 
-    /// Closes the camera, as far as there is something to close.
+    /// Closes the sensor, as far as there is something to close.
     fn close(&mut self) {}
 }
 
@@ -48,8 +82,7 @@ pub trait ImageSource: Send + 'static {
 pub enum SourceReport {
     /// The source is open, at first or again.
     Open,
-    Image(SourceImage),
-    Pose(Stamp, SensorPose),
+    Reading(Reading),
     /// Something that a person should read, counted by its kind.
     Fault(CameraFault, String),
 }
@@ -74,16 +107,16 @@ pub struct LiveSource {
 }
 
 impl LiveSource {
-    /// Starts the thread of a source. Without an image for `stall`, the source counts as stalled.
+    /// Starts the thread of a source. Without a reading for `stall`, the source counts as stalled.
     ///
     /// # Errors
     /// The system refuses a thread.
-    pub fn start(source: impl ImageSource, stall: Duration) -> std::io::Result<Self> {
+    pub fn start(source: impl SensorSource, stall: Duration) -> std::io::Result<Self> {
         let (sender, reports) = mpsc::channel(MAX_REPORTS);
         let is_stopped = Arc::new(AtomicBool::new(false));
         let mut supervisor =
             Supervisor { source, stall, reports: sender, is_stopped: is_stopped.clone(), overtaken: 0 };
-        let thread = std::thread::Builder::new().name("camera".to_owned()).spawn(move || supervisor.run())?;
+        let thread = std::thread::Builder::new().name("sensor".to_owned()).spawn(move || supervisor.run())?;
         Ok(Self { reports, is_stopped, thread: Some(thread) })
     }
 
@@ -115,7 +148,7 @@ struct Supervisor<S> {
     overtaken: u64,
 }
 
-impl<S: ImageSource> Supervisor<S> {
+impl<S: SensorSource> Supervisor<S> {
     fn run(&mut self) {
         let mut back_off = BACK_OFF.0;
         let mut last_error = None;
@@ -135,7 +168,7 @@ impl<S: ImageSource> Supervisor<S> {
             }
             // A camera that stays away is named once.
             if last_error.as_ref() != Some(&error) {
-                self.report(SourceReport::Fault(CameraFault::SourceLost, error.0.clone()));
+                self.report(SourceReport::Fault(self.source.kind().lost(), error.0.clone()));
                 last_error = Some(error);
             }
             self.wait(back_off);
@@ -153,14 +186,14 @@ impl<S: ImageSource> Supervisor<S> {
                 let _ = reports.try_send(SourceReport::Fault(fault, text));
             };
             match self.source.next(POLL, &mut fault) {
-                Ok(Some(image)) => {
+                Ok(Some(reading)) => {
                     (last, is_stalled) = (Instant::now(), false);
-                    self.report(SourceReport::Image(image));
+                    self.report(SourceReport::Reading(reading));
                 }
                 Ok(None) if last.elapsed() >= self.stall && !is_stalled => {
                     is_stalled = true;
-                    let text = format!("no image for {:.0} s", last.elapsed().as_secs_f64());
-                    self.report(SourceReport::Fault(CameraFault::Stalled, text.clone()));
+                    let text = format!("silent for {:.0} s", last.elapsed().as_secs_f64());
+                    self.report(SourceReport::Fault(self.source.kind().stalled(), text.clone()));
                     if self.source.is_reopened_after_stall() {
                         return Some(SourceError(format!("{text}: it is started again")));
                     }
@@ -174,7 +207,7 @@ impl<S: ImageSource> Supervisor<S> {
 
     /// Never waits for the vehicle: the oldest reports are the vehicle's, and an image without room is dropped and counted.
     fn report(&mut self, report: SourceReport) {
-        let is_image = matches!(report, SourceReport::Image(_));
+        let is_image = matches!(report, SourceReport::Reading(Reading::Image(_)));
         match self.reports.try_send(report) {
             Ok(()) => {
                 while self.overtaken > 0 {

@@ -1,7 +1,7 @@
 //! A folder into which a camera's program writes its images.
 
 use crate::ArrivalClock;
-use crate::live::{ImageSource, SourceError, SourceImage};
+use crate::live::{Reading, SensorKind, SensorSource, SourceError, SourceImage};
 use scenecast_sensors::{CameraFault, MAX_IMAGE_BYTES, Stamp, complete_length};
 use std::collections::{BTreeMap, VecDeque};
 use std::fs::DirEntry;
@@ -101,7 +101,11 @@ impl WatchSource {
     }
 }
 
-impl ImageSource for WatchSource {
+impl SensorSource for WatchSource {
+    fn kind(&self) -> SensorKind {
+        SensorKind::Camera
+    }
+
     fn open(&mut self) -> Result<(), SourceError> {
         self.changed = None;
         let is_old = |entry: &DirEntry| {
@@ -117,11 +121,11 @@ impl ImageSource for WatchSource {
         &mut self,
         timeout: Duration,
         fault: &mut dyn FnMut(CameraFault, String),
-    ) -> Result<Option<SourceImage>, SourceError> {
+    ) -> Result<Option<Reading>, SourceError> {
         let until = Instant::now() + timeout;
         loop {
             if let Some(image) = self.ready.pop_front() {
-                return Ok(Some(image));
+                return Ok(Some(Reading::Image(image)));
             }
             self.look(fault)?;
             if self.ready.is_empty() {
@@ -184,7 +188,14 @@ mod tests {
     /// The next image of a source; a fault is none.
     fn next(source: &mut WatchSource) -> Option<Picture> {
         let image = source.next(Duration::ZERO, &mut |fault, text| panic!("{fault:?} {text}")).unwrap();
-        image.map(|image| image.picture)
+        image.map(|reading| image_of(reading).picture)
+    }
+
+    fn image_of(reading: Reading) -> SourceImage {
+        match reading {
+            Reading::Image(image) => image,
+            Reading::Pose(..) => panic!("a folder has no poses"),
+        }
     }
 
     #[test]
@@ -208,7 +219,8 @@ mod tests {
         for name in ["10.5.ppm", "9.25.ppm", "100.ppm"] {
             folder.write(name, PPM);
         }
-        let mut stamp = || source.next(Duration::ZERO, &mut |_, _| ()).unwrap().and_then(|image| image.stamp);
+        let mut stamp =
+            || source.next(Duration::ZERO, &mut |_, _| ()).unwrap().and_then(|reading| image_of(reading).stamp);
         let stamps: Vec<Option<Stamp>> = std::iter::repeat_with(&mut stamp).take(4).collect();
         assert_eq!(stamps, [Stamp::parse("9.25"), Stamp::parse("10.5"), Stamp::parse("100"), None]);
     }

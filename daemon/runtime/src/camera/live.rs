@@ -2,12 +2,13 @@
 
 use super::fault_log::FaultLog;
 use super::{CameraFrame, FramePicture};
+use crate::ros::RosAccess;
 use scenecast_config::{CameraSource, CameraStamps, Config, NavigationSource};
 use scenecast_core::UserError;
 use scenecast_host::CameraPose;
 use scenecast_sensors::{CameraFault, FrameMatcher, Limits, MatchedImage, SensorPose, Stamp};
 use scenecast_sources::{
-    ArrivalClock, CommandSource, LiveSource, Picture, SourceImage, SourceReport, WatchSource, read_tum_poses,
+    ArrivalClock, CommandSource, LiveSource, Picture, Reading, SourceImage, SourceReport, WatchSource, read_tum_poses,
 };
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -21,6 +22,8 @@ const MAX_POSE_INTERVAL_S: f64 = 0.2;
 /// A camera whose images come in while the vehicle dives.
 pub(crate) struct LiveCamera {
     source: LiveSource,
+    /// The source of the poses, if it is not the autopilot or a file.
+    navigation: Option<LiveSource>,
     matcher: FrameMatcher<Picture>,
     clock: ArrivalClock,
     stamps: CameraStamps,
@@ -48,9 +51,17 @@ impl ClockOffset {
     }
 }
 
+/// The next report of a source; without one it never returns.
+async fn next_of(source: &mut Option<LiveSource>) -> SourceReport {
+    match source {
+        Some(source) => source.next().await,
+        None => std::future::pending().await,
+    }
+}
+
 impl LiveCamera {
-    /// Starts the configured live camera; the first frame has the mission time `start_s`.
-    pub(crate) fn start(config: &Config, start_s: f64) -> Result<Self, UserError> {
+    /// Starts the configured live camera and the source of its poses; the first frame has the mission time `start_s`.
+    pub(crate) fn start(config: &Config, start_s: f64, ros: &RosAccess) -> Result<Self, UserError> {
         let clock = ArrivalClock::start();
         let c = &config.camera;
         let stall = Duration::from_secs_f64(c.timeout_s);
@@ -58,16 +69,25 @@ impl LiveCamera {
             CameraSource::Watch(dir) => LiveSource::start(WatchSource::new(dir, clock), stall),
             CameraSource::Command(command) => LiveSource::start(CommandSource::new(command, clock), stall),
             CameraSource::V4l2(device) => LiveSource::start(CommandSource::of_device(device, clock), stall),
+            CameraSource::Ros2(topic) => ros.camera(topic, clock, c.stamps == CameraStamps::Own, stall)?,
             other => return Err(UserError::Input(format!("camera.source: {other:?} is not a live camera"))),
         };
-        let source = source.map_err(|e| UserError::Failed(format!("the camera's thread did not start: {e}")))?;
+        let failed = |e: std::io::Error| UserError::Failed(format!("a sensor's thread did not start: {e}"));
+        let source = source.map_err(failed)?;
         let max_gap = Duration::from_secs_f64(config.navigation.max_gap_s);
         let mut matcher = FrameMatcher::new(Limits { max_gap, ..Limits::default() }, start_s);
-        if let NavigationSource::Tum(file) = &config.navigation.source {
-            matcher.set_poses(read_tum_poses(file)?);
-        }
+        let navigation = match &config.navigation.source {
+            NavigationSource::Autopilot => None,
+            NavigationSource::Tum(file) => {
+                matcher.set_poses(read_tum_poses(file)?);
+                None
+            }
+            NavigationSource::Ros2(topic) => Some(ros.navigation(topic, stall)?.map_err(failed)?),
+            NavigationSource::Dvl(_) => return Err(UserError::Input("navigation.source: not yet".to_owned())),
+        };
         Ok(Self {
             source,
+            navigation,
             matcher,
             clock,
             stamps: c.stamps,
@@ -93,6 +113,7 @@ impl LiveCamera {
         };
         tokio::select! {
             report = self.source.next() => self.handle_report(report),
+            report = next_of(&mut self.navigation) => self.handle_report(report),
             () = overdue => {}
         }
     }
@@ -100,8 +121,8 @@ impl LiveCamera {
     fn handle_report(&mut self, report: SourceReport) {
         match report {
             SourceReport::Open => tracing::info!("camera: open"),
-            SourceReport::Image(image) => self.handle_image(image),
-            SourceReport::Pose(stamp, pose) => {
+            SourceReport::Reading(Reading::Image(image)) => self.handle_image(image),
+            SourceReport::Reading(Reading::Pose(stamp, pose)) => {
                 self.matcher.handle_pose(stamp, self.clock.now(), pose);
                 let SensorPose { x_m, y_m, heading_rad, depth_m, .. } = pose;
                 self.is_pose_new = true;
