@@ -19,12 +19,13 @@ const IO_CRATES: [&str; 11] = [
 ];
 
 /// Crates that do no IO.
-const SANS_IO: [&str; 13] = [
+const SANS_IO: [&str; 14] = [
     "scenecast-core",
     "scenecast-drivers",
     "scenecast-host",
     "scenecast-messages",
     "scenecast-motion",
+    "scenecast-outlets",
     "scenecast-protocol",
     "scenecast-registration",
     "scenecast-scoring",

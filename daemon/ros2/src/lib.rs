@@ -21,7 +21,11 @@ mod names;
 mod node;
 mod publisher;
 mod qos;
+mod stop;
 mod subscribe;
+#[cfg(feature = "surface")]
+mod surface;
+mod vehicle;
 mod watch;
 
 pub use inbox::{Inbox, Received};
@@ -29,3 +33,6 @@ pub use names::{topic, valid_part};
 pub use node::{Peers, RosNode};
 pub use publisher::Publisher;
 pub use qos::Qos;
+#[cfg(feature = "surface")]
+pub use surface::{SurfaceOutlet, start_surface};
+pub use vehicle::{VehicleMap, VehicleOutlet, VehicleView, start_vehicle};

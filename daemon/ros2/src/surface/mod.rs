@@ -1,0 +1,106 @@
+//! The surface in ROS 2: the operator's map and each vehicle's state, and orders.
+//!
+//! A thread of its own reads the snapshots that the page shows, and makes requests as the page does. So the link waits for no
+//! subscriber, and orders pass the same checks.
+
+mod health;
+mod map;
+mod order;
+mod orders;
+mod stamps;
+mod state;
+mod vehicle;
+
+use crate::node::RosNode;
+use crate::stop::{self, Owned, Owner};
+use scenecast_config::Ros2;
+use scenecast_console::{ClientRequest, PendingRequest, Reply, Snapshot};
+use scenecast_core::{Principal, UserError};
+use stamps::Stamps;
+use std::collections::BTreeMap;
+use std::sync::Arc;
+use std::time::Duration;
+use tokio::sync::{mpsc, oneshot, watch};
+use vehicle::VehicleTopics;
+
+/// Time between two looks at snapshots, subscribers and orders.
+const TICK: Duration = Duration::from_millis(100);
+/// Requests that may wait for the surface.
+const MAX_PENDING: usize = 4;
+
+/// The host's end of ROS 2 at the surface, of the same form as the console's.
+#[derive(Debug)]
+pub struct SurfaceOutlet {
+    /// Requests for maps and exemplars, and orders, to be handled between two steps.
+    pub requests: mpsc::Receiver<PendingRequest>,
+    /// The state that is published.
+    pub snapshots: watch::Sender<Arc<Snapshot>>,
+    _thread: Owner,
+}
+
+/// Joins ROS 2. Orders are taken in the name of `principal`; without one, none are.
+///
+/// # Errors
+///
+/// DDS or a thread did not start.
+pub fn start_surface(settings: &Ros2, principal: Option<Principal>) -> Result<SurfaceOutlet, UserError> {
+    let node = RosNode::start(settings, "scenecast_surface")?;
+    let (sender, requests) = mpsc::channel(MAX_PENDING);
+    let (snapshots, receiver) = watch::channel(Arc::new(Snapshot::default()));
+    let (owner, owned) = stop::ends();
+    let desk = Desk { requests: sender, principal };
+    let worker = Worker { node, desk, snapshots: receiver, vehicles: BTreeMap::new() };
+    let thread = std::thread::Builder::new().name("ros2-surface".to_owned());
+    thread.spawn(move || worker.run(&owned)).map_err(|e| UserError::Failed(format!("ROS 2: no thread: {e}")))?;
+    Ok(SurfaceOutlet { requests, snapshots, _thread: owner })
+}
+
+/// Makes requests of the surface.
+struct Desk {
+    requests: mpsc::Sender<PendingRequest>,
+    principal: Option<Principal>,
+}
+
+impl Desk {
+    /// The reply of the surface; `None` once it has ended, or while it is busy.
+    fn request(&self, request: ClientRequest) -> Option<Reply> {
+        let (sender, reply) = oneshot::channel();
+        self.requests.try_send((request, sender)).ok()?;
+        reply.blocking_recv().ok()
+    }
+}
+
+struct Worker {
+    node: RosNode,
+    desk: Desk,
+    snapshots: watch::Receiver<Arc<Snapshot>>,
+    /// By address; `None` if DDS refused a topic.
+    vehicles: BTreeMap<u8, Option<VehicleTopics>>,
+}
+
+impl Worker {
+    fn run(mut self, owned: &Owned) {
+        let mut stamps = Stamps::default();
+        let mut snapshot = Arc::default();
+        while owned.wait(TICK) {
+            if self.snapshots.has_changed().unwrap_or(false) {
+                snapshot = self.snapshots.borrow_and_update().clone();
+                stamps = Stamps::new(&snapshot.state);
+            }
+            self.handle(&snapshot, &stamps);
+        }
+    }
+
+    fn handle(&mut self, snapshot: &Snapshot, stamps: &Stamps) {
+        for vehicle in &snapshot.state.vehicles {
+            let topics = self.vehicles.entry(vehicle.id).or_insert_with(|| {
+                let topics = VehicleTopics::new(&self.node, vehicle, self.desk.principal.is_some());
+                topics.inspect_err(|e| tracing::error!("{e}; {} is not published", vehicle.name)).ok()
+            });
+            if let Some(topics) = topics {
+                topics.handle_orders(&self.desk, vehicle, stamps);
+                topics.publish(&self.desk, &snapshot.state, vehicle, stamps);
+            }
+        }
+    }
+}
