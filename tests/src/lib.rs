@@ -177,7 +177,7 @@ fn exchange(port: u16, method: &str, path: &str, headers: &str, body: &str) -> O
 /// Without it a test says that it is skipped, which `.ci/run` takes for a failure.
 pub fn python() -> Option<String> {
     let python = std::env::var("SCENECAST_PYTHON").unwrap_or_else(|_| "python3".to_owned());
-    let packages = "import jsonschema, openapi_spec_validator, plyfile, prometheus_client, rasterio, shapely";
+    let packages = "import cyclonedds, jsonschema, openapi_spec_validator, PIL, plyfile, prometheus_client, rasterio, rosbags, shapely";
     let output = Command::new(&python).args(["-c", packages]).output();
     if output.is_ok_and(|o| o.status.success()) {
         return Some(python);

@@ -2,7 +2,7 @@
 
 use image::RgbImage;
 use scenecast_files::{RecordedFrame, Recording};
-use scenecast_tests::{Process, free_port, recorded, scratch, wait_until};
+use scenecast_tests::{Process, free_port, python, recorded, run_script, scratch, wait_until};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -12,12 +12,22 @@ struct Dive {
     dir: PathBuf,
     frames: Vec<RecordedFrame>,
     map: PathBuf,
-    _processes: [Process; 2],
+    _processes: Vec<Process>,
 }
 
 impl Dive {
     /// Starts a surface, and a vehicle with the camera `source` and the poses of the recording in a file.
     fn start(name: &str, source: &dyn Fn(&Path) -> String) -> Self {
+        Self::with_settings(name, &|dir| {
+            vec![
+                format!("camera.source={}", source(dir)),
+                format!("navigation.source=tum:{}", dir.join("poses.txt").display()),
+            ]
+        })
+    }
+
+    /// Starts a surface, and a vehicle with these settings.
+    fn with_settings(name: &str, sets: &dyn Fn(&Path) -> Vec<String>) -> Self {
         let dir = scratch(name);
         let frames = Recording::open(&recorded().0, None, 0.01).unwrap().frames;
         let poses = dir.join("poses.txt");
@@ -25,13 +35,12 @@ impl Dive {
         let port = free_port();
         let state = |who: &str| format!("runtime.state_dir={}", dir.join(who).display());
         let surface = [state("asv"), format!("modem.listen=127.0.0.1:{port}"), "console.listen=".to_owned()];
-        let vehicle = [
+        let mut vehicle = vec![
             state("auv"),
             format!("modem.connect=127.0.0.1:{port}"),
-            format!("camera.source={}", source(&dir)),
-            format!("navigation.source=tum:{}", poses.display()),
             "survey.area_m=[-10, -10, 60, 60]".to_owned(),
         ];
+        vehicle.extend(sets(&dir));
         let empty = dir.join("empty.toml");
         std::fs::write(&empty, "").unwrap();
         let start = |command: &str, sets: &[String]| {
@@ -39,7 +48,7 @@ impl Dive {
             let sets = sets.iter().flat_map(|set| ["--set", set]);
             Process::start(&config.into_iter().chain(sets).collect::<Vec<_>>())
         };
-        let processes = [start("asv", &surface), start("auv", &vehicle)];
+        let processes = vec![start("asv", &surface), start("auv", &vehicle)];
         Self { map: dir.join("asv/operator-map-1.png"), dir, frames, _processes: processes }
     }
 
@@ -103,4 +112,36 @@ fn images_of_a_command_give_the_map_of_the_recording() {
         format!("command:{script}")
     });
     dive.assert_map_of_the_rehearsal();
+}
+
+/// A domain of DDS for one test of this process.
+fn domain(offset: u32) -> u32 {
+    1 + (std::process::id() * 2 + offset) % 200
+}
+
+fn assert_topics_give_the_map(name: &str, domain: u32, topic: &str, options: &[&str]) {
+    let Some(python) = python() else { return };
+    let dive = Dive::with_settings(name, &|_| {
+        vec![
+            format!("camera.source=ros2:{topic}"),
+            "navigation.source=ros2:/odometry".to_owned(),
+            format!("ros2.domain={domain}"),
+            "ros2.networks=[\"127.0.0.1\"]".to_owned(),
+        ]
+    });
+    let folder = recorded().0.display().to_string();
+    let domain = domain.to_string();
+    let arguments = [&[folder.as_str(), "--domain", &domain], options].concat();
+    run_script(&python, "tests/python/ros2_camera.py", &arguments);
+    dive.assert_map_of_the_rehearsal();
+}
+
+#[test]
+fn topics_of_cyclone_dds_give_the_map_of_the_recording() {
+    assert_topics_give_the_map("ros2", domain(0), "/camera/image_raw", &[]);
+}
+
+#[test]
+fn compressed_topics_of_cyclone_dds_give_the_map_of_the_recording() {
+    assert_topics_give_the_map("ros2-compressed", domain(1), "/camera/image_raw/compressed", &["--compressed"]);
 }
