@@ -2,6 +2,7 @@
 
 use image::RgbImage;
 use scenecast_files::{RecordedFrame, Recording};
+use scenecast_rehearsal::{Mission, MissionOptions, World};
 use scenecast_tests::{Process, free_port, python, recorded, run_script, scratch, wait_until};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -86,7 +87,7 @@ fn images_written_to_a_folder_give_the_map_of_the_recording() {
         format!("watch:{}", camera.display())
     });
     for frame in &dive.frames {
-        let bytes = std::fs::read(&frame.file).unwrap();
+        let bytes = std::fs::read(frame.image.file().unwrap()).unwrap();
         let path = dive.dir.join(format!("camera/{:.9}.png", frame.t_s));
         // A writer that is slow: the file stays half written for a moment.
         std::fs::write(&path, &bytes[..bytes.len() / 2]).unwrap();
@@ -103,11 +104,12 @@ fn images_of_a_command_give_the_map_of_the_recording() {
         let frames = Recording::open(&recorded().0, None, 0.01).unwrap().frames;
         for (index, frame) in frames.iter().enumerate() {
             let path = dir.join(format!("{index:03}.ppm"));
-            std::fs::write(path, stamped_ppm(&frame.image().unwrap(), frame.t_s)).unwrap();
+            std::fs::write(path, stamped_ppm(&frame.image.read().unwrap(), frame.t_s)).unwrap();
         }
         let pace = PACE.as_secs_f64();
         // The command ends once and is started again where it was; each image is written once.
-        let script = "cd DIR && for f in *.ppm; do cat $f; rm $f; sleep PACE; case $f in 010*) exit 1;; esac; done; sleep 600";
+        let script =
+            "cd DIR && for f in *.ppm; do cat $f; rm $f; sleep PACE; case $f in 010*) exit 1;; esac; done; sleep 600";
         let script = script.replace("DIR", &dir.display().to_string()).replace("PACE", &pace.to_string());
         format!("command:{script}")
     });
@@ -144,4 +146,32 @@ fn topics_of_cyclone_dds_give_the_map_of_the_recording() {
 #[test]
 fn compressed_topics_of_cyclone_dds_give_the_map_of_the_recording() {
     assert_topics_give_the_map("ros2-compressed", domain(1), "/camera/image_raw/compressed", &["--compressed"]);
+}
+
+/// A bag of the recording, which rosbags writes; `None` without Python.
+fn bag(name: &str, options: &[&str]) -> Option<String> {
+    let python = python()?;
+    let bag = scratch(name).join("bag").display().to_string();
+    let folder = recorded().0.display().to_string();
+    run_script(&python, "tests/python/write_bag.py", &[&[folder.as_str(), &bag], options].concat());
+    Some(bag)
+}
+
+#[test]
+fn a_bag_of_ros_gives_the_map_of_the_recording_at_sea() {
+    let Some(bag) = bag("bag", &[]) else { return };
+    let sets = vec![format!("camera.source=bag:{bag}"), "runtime.time_scale=20".to_owned()];
+    Dive::with_settings("bag-dive", &|_| sets.clone()).assert_map_of_the_rehearsal();
+}
+
+#[test]
+fn a_bag_of_compressed_images_gives_the_map_in_rehearsal() {
+    let Some(bag) = bag("bag-compressed", &["--compressed"]) else { return };
+    let sets = ["operator.script=none", "survey.duration_s=90", &format!("camera.source=bag:{bag}")];
+    let config = scenecast_config::load(None, &sets.map(str::to_owned)).unwrap();
+    let options = MissionOptions { world: World::patches(2, 0.01), seed: 1, record: None };
+    let mut mission = Mission::new(config, options).unwrap();
+    mission.run(Duration::from_secs(3600), &mut |_| {}).unwrap();
+    let map = scenecast_core::label_picture::encode(mission.vehicle().map()).unwrap();
+    assert!(map == recorded().1, "the maps differ");
 }

@@ -186,7 +186,7 @@ impl Work {
 mod tests {
     use super::*;
     use image::{Rgb, RgbImage};
-    use scenecast_files::RecordedFrame;
+    use scenecast_files::{FrameImage, RecordedFrame};
 
     #[test]
     fn refused_checkpoints_are_reported_until_one_is_written() {
@@ -202,7 +202,8 @@ mod tests {
         let mut thread = MapperThread::start(mapper, keep).unwrap();
         let mut reports = |t_s: f64| {
             let (x_m, y_m, depth_m, heading_rad, scale) = (0.0, 0.0, 4.0, 0.0, 1.0);
-            let frame = RecordedFrame { t_s, file: image.clone(), x_m, y_m, depth_m, heading_rad, scale };
+            let shot = FrameImage::File(image.clone());
+            let frame = RecordedFrame { t_s, image: shot, x_m, y_m, depth_m, heading_rad, scale };
             assert!(thread.orders.send(ToMapper::Frame(Box::new(frame.into()))).is_ok());
             let mut reports: Vec<bool> = Vec::new();
             loop {

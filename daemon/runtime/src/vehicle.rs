@@ -14,9 +14,9 @@ use super::ros::RosAccess;
 use super::stop::Stop;
 use crate::camera::{Camera, CameraFrame, LiveCamera, RecordedCamera};
 use crate::port::FromPort;
-use scenecast_config::{AutopilotKind, CameraSource, Config, NavigationSource, survey_depth_m};
+use scenecast_config::{AutopilotKind, Config, NavigationSource, survey_depth_m};
 use scenecast_core::{Area, TangentPlane, UserError};
-use scenecast_files::Recording;
+use scenecast_files::{Recording, configured_recording};
 use scenecast_host::{VehicleHost, VehicleHostEvent, VehiclePilot, modem_station};
 use scenecast_protocol::directive::Budget;
 use scenecast_protocol::map::LayerSet;
@@ -39,11 +39,10 @@ pub fn run_vehicle(load: Load, simulated: Option<SimulatedAutopilot>) -> Result<
         let clock = Clock::new(config.runtime.time_scale);
         let address = scenecast_config::vehicle_address(&config)?;
         let profile = scenecast_drivers::modem::modem_of_process(&config, address)?;
-        let recording = match &config.camera.source {
-            CameraSource::Rehearsal => None,
-            CameraSource::Frames(dir) => Some(Recording::open(dir, None, config.camera.metres_per_pixel)?),
-            _ => None,
-        };
+        let recording = configured_recording(&config)?;
+        for note in recording.iter().flat_map(|recording| &recording.notes) {
+            tracing::warn!("camera.source: {note}");
+        }
         let area = survey_area(&config, recording.as_ref())?;
         let mut vehicle = scenecast_vehicle::assemble(
             &config,

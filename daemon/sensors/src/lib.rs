@@ -29,6 +29,6 @@ pub use frame_matcher::{FrameMatcher, Limits, MatchedImage};
 pub use image_stream::{ImageStream, MAX_IMAGE_BYTES, complete_length};
 pub use pose_track::{PoseMatch, PoseTrack, SensorPose};
 pub use raw_image::{RawImage, RawImageError};
-pub use ros_messages::{pose_of, rgb_of, stamp_of};
+pub use ros_messages::{pose_of, rgb_of, stamp_of, stamp_of_cdr};
 pub use rotation::Rotation;
 pub use stamp::Stamp;

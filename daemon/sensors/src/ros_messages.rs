@@ -12,6 +12,18 @@ pub fn stamp_of(header: &Header) -> Option<Stamp> {
     (stamp != Stamp::default()).then_some(stamp)
 }
 
+/// The time of a message in CDR that begins with a header, without the rest of the message.
+pub fn stamp_of_cdr(bytes: &[u8]) -> Option<Stamp> {
+    let (head, time) = (bytes.first_chunk::<4>()?, bytes.get(4..12)?.first_chunk::<8>()?);
+    let [a, b, c, d, e, f, g, h] = *time;
+    let (sec, nanosec) = match head[1] {
+        0 => (i32::from_be_bytes([a, b, c, d]), u32::from_be_bytes([e, f, g, h])),
+        1 => (i32::from_le_bytes([a, b, c, d]), u32::from_le_bytes([e, f, g, h])),
+        _ => return None,
+    };
+    Stamp::from_ros(sec, nanosec).filter(|stamp| *stamp != Stamp::default())
+}
+
 /// The pixels of a raw image.
 pub fn rgb_of(image: &Image) -> Result<RgbImage, RawImageError> {
     let Image { width, height, ref encoding, is_bigendian, step, ref data, .. } = *image;
@@ -40,6 +52,7 @@ mod tests {
         odometry.pose.pose.position.z = -7.0;
         let (stamp, pose) = pose_of(&odometry).unwrap();
         assert_eq!((stamp, pose.depth_m, pose.heading_rad.to_degrees()), (Stamp::parse("5").unwrap(), 7.0, 90.0));
+        assert_eq!(stamp_of_cdr(&scenecast_messages::encode(&odometry)), Some(stamp));
         odometry.pose.pose.position.x = f64::NAN;
         assert_eq!(pose_of(&odometry), None);
     }

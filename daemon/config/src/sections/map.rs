@@ -38,9 +38,12 @@ section! {
 section! {
     /// The camera.
     camera: Camera {
-        /// Source of the frames. frames:DIR: images with DIR/poses.csv. watch:DIR: images, as they are written to a folder.
-        /// command:COMMAND: images that a shell command writes to its standard output, MJPEG, PNG or PPM. v4l2:DEVICE: a
-        /// camera of the system, by ffmpeg. Empty: the image of the rehearsal; a vehicle at sea then has no camera frames.
+        /// Source of the frames. frames:DIR: images with DIR/poses.csv. bag:FILE: images and odometry that ROS 2 recorded in
+        /// MCAP, a file or the folder of a bag, with #TOPIC behind it where there are several topics of images. watch:DIR:
+        /// images, as they are written to a folder. command:COMMAND: images that a shell command writes to its standard
+        /// output, MJPEG, PNG or PPM. v4l2:DEVICE: a camera of the system, by ffmpeg. ros2:TOPIC: images of ROS 2, compressed
+        /// if the name of the topic ends in /compressed. Empty: the image of the rehearsal; a vehicle at sea then has no
+        /// camera frames.
         source: CameraSource = CameraSource::Rehearsal, ANY, [Auv Scenario];
         /// Time of the images of a live camera. own: the time that the image, its file name or its message gives; an image
         /// that gives none was taken camera.delay_s before its arrival. arrival: so for all images.

@@ -50,7 +50,7 @@ section! {
     /// The vehicle's navigation.
     navigation: Navigation {
         /// Source of the vehicle's pose. Empty: the autopilot, or the recording of the camera. tum:FILE: a file of poses with
-        /// the times of the images. The autopilot, if there is one, then only follows waypoints.
+        /// the times of the images. ros2:TOPIC: odometry of ROS 2 in a frame of east, north, up. The autopilot, if there is one, then only follows waypoints.
         source: NavigationSource = NavigationSource::Autopilot, ANY, [Auv];
         /// Longest time between two poses within which the pose of an image is interpolated.
         max_gap_s: f64 = 1.0, range(0.01, 60.0, "s"), [Auv];

@@ -82,8 +82,8 @@ sources! {
         Command(String) = "command" "SHELL COMMAND",
         /// A camera of the system, read by ffmpeg.
         V4l2(PathBuf) = "v4l2" "DEVICE",
-        /// A recording of ROS 2 in the format MCAP.
-        Bag(PathBuf) = "bag" "FILE",
+        /// A recording of ROS 2 in the format MCAP, with the topic of the images if there are several.
+        Bag(String) = "bag" "FILE#TOPIC",
         /// A topic of images in ROS 2.
         Ros2(String) = "ros2" "TOPIC",
     }

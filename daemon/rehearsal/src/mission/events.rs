@@ -7,7 +7,7 @@ use super::timetable::STEP_S;
 use crate::modem_rig::{SURFACE, VEHICLE};
 use scene_model::project::Pose;
 use scenecast_core::UserError;
-use scenecast_files::RecordedFrame;
+use scenecast_files::{FrameImage, RecordedFrame};
 use scenecast_host::{CameraPose, FrameEvent, SurfaceHostEvent, VehicleHostEvent};
 use scenecast_protocol::time::Instant;
 use scenecast_surface::SurfaceOutput;
@@ -160,7 +160,7 @@ impl Mission {
             NextFrame::Recorded(frame) => {
                 let RecordedFrame { x_m, y_m, heading_rad, depth_m, .. } = frame;
                 self.vehicle.handle_pose(CameraPose { x_m, y_m, heading_rad, depth_m }, now);
-                self.map(&frame.image()?, frame.scale)?;
+                self.map(&frame.image.read()?, frame.scale)?;
             }
             NextFrame::Simulated(image) => {
                 self.times.frame = self.times.frame + interval;
@@ -177,8 +177,8 @@ impl Mission {
         let navigator = self.vehicle.vehicle().navigator();
         let ((x_m, y_m), depth_m, heading_rad) =
             (navigator.dead_reckoned().xy(), navigator.depth_m(), navigator.heading_rad());
-        let file = Default::default();
-        self.camera.record(image, &RecordedFrame { t_s, file, x_m, y_m, depth_m, heading_rad, scale })?;
+        let shot = FrameImage::File(Default::default());
+        self.camera.record(image, &RecordedFrame { t_s, image: shot, x_m, y_m, depth_m, heading_rad, scale })?;
         if !self.mapper.takes(t_s) {
             return Ok(());
         }

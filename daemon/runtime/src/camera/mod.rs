@@ -9,11 +9,10 @@ pub(crate) use recorded::RecordedCamera;
 
 use image::RgbImage;
 use scenecast_core::UserError;
-use scenecast_files::RecordedFrame;
+use scenecast_files::{FrameImage, RecordedFrame};
 use scenecast_host::CameraPose;
 use scenecast_sensors::SensorPose;
 use scenecast_sources::Picture;
-use std::path::PathBuf;
 
 /// An image and where it was taken.
 #[derive(Debug, Clone, PartialEq)]
@@ -29,18 +28,21 @@ pub(crate) struct CameraFrame {
 /// The pixels of a frame, which are read where the frame is mapped.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum FramePicture {
-    File(PathBuf),
+    Recorded(FrameImage),
     Received(Picture),
+    /// It was read.
+    Taken,
 }
 
 impl CameraFrame {
     /// The image, and the frame without its pixels.
     pub(crate) fn take_image(&mut self) -> Result<RgbImage, UserError> {
-        match std::mem::replace(&mut self.picture, FramePicture::File(PathBuf::new())) {
-            FramePicture::File(path) => Ok(scenecast_files::read_image(&path)?.to_rgb8()),
+        match std::mem::replace(&mut self.picture, FramePicture::Taken) {
+            FramePicture::Recorded(image) => image.read(),
             FramePicture::Received(picture) => {
                 picture.into_rgb().map_err(|error| UserError::Input(format!("the image at {:.1} s: {error}", self.t_s)))
             }
+            FramePicture::Taken => Err(UserError::Failed("the image was already read".to_owned())),
         }
     }
 
@@ -52,9 +54,9 @@ impl CameraFrame {
 
 impl From<RecordedFrame> for CameraFrame {
     fn from(frame: RecordedFrame) -> Self {
-        let RecordedFrame { t_s, file, x_m, y_m, depth_m, heading_rad, scale } = frame;
+        let RecordedFrame { t_s, image, x_m, y_m, depth_m, heading_rad, scale } = frame;
         let pose = SensorPose { x_m, y_m, depth_m, heading_rad, ..SensorPose::default() };
-        Self { t_s, picture: FramePicture::File(file), pose, scale }
+        Self { t_s, picture: FramePicture::Recorded(image), pose, scale }
     }
 }
 

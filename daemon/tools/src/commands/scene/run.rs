@@ -10,7 +10,12 @@ use clap::Args;
 use scene_model::topics::{Birth, SceneConfig, SceneModel};
 use scene_model::words::{WordConfig, WordExtractor};
 use scenecast_core::UserError;
+use scenecast_files::open_bag;
 use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+/// Longest time between two poses of a bag within which the pose of an image is interpolated.
+const MAX_POSE_GAP: Duration = Duration::from_secs(1);
 
 /// Label words, a mosaic or a sequence of images, and print the measurements: in a pipe or a file as one line of JSON.
 ///
@@ -94,8 +99,8 @@ struct Which {
     #[arg(long, value_name = "IMG")]
     mosaic: Option<PathBuf>,
     /// tum:DIR: an RGB-D sequence with rgb.txt, depth.txt and groundtruth.txt;
-    /// frames:DIR: downward images and poses.csv
-    #[arg(long, value_name = "KIND:DIR")]
+    /// frames:DIR: downward images and poses.csv; bag:FILE or bag:FILE#TOPIC: images and odometry in MCAP
+    #[arg(long, value_name = "KIND:PLACE")]
     source: Option<String>,
 }
 
@@ -224,7 +229,13 @@ impl Run {
                     cell_m,
                 )
             }
-            _ => return Err(UserError::Input("--source: it takes tum:DIR or frames:DIR".to_owned())),
+            "bag" => {
+                let metres_per_pixel = self.metres_per_pixel()?;
+                let cell_m = self.columns(CELL_PX * metres_per_pixel);
+                let recording = open_bag(&dir.to_string_lossy(), None, MAX_POSE_GAP)?;
+                (Box::new(Frames::of(recording, extractor, metres_per_pixel, cell_m[0])), cell_m)
+            }
+            _ => return Err(UserError::Input("--source: it takes tum:DIR, frames:DIR or bag:FILE".to_owned())),
         };
         Ok(Opened { source, vocabulary, cell_m, cell_px: 1.0, annotated })
     }
