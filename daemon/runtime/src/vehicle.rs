@@ -10,6 +10,7 @@ use super::modem::{self, ModemPort};
 use super::pilot::{self, PilotPort, SimulatedAutopilot};
 use super::reload::{Load, Reload};
 use super::restore::{Start, start};
+use super::ros2::VehicleRos2;
 use super::stop::Stop;
 use crate::port::FromPort;
 use scenecast_config::{AutopilotKind, CameraSource, Config, survey_depth_m};
@@ -76,7 +77,8 @@ pub fn run_vehicle(load: Load, simulated: Option<SimulatedAutopilot>) -> Result<
             host.handle_camera_end();
         }
         let disk = DiskWatch::new(dir);
-        VehicleShell { host, camera, mapper, ports, clock, keeper, disk, reload, missed: 0 }.run(stop).await
+        let ros2 = VehicleRos2::start(&config)?;
+        VehicleShell { host, camera, mapper, ports, ros2, clock, keeper, disk, reload, missed: 0 }.run(stop).await
     })
 }
 
@@ -97,6 +99,7 @@ struct VehicleShell {
     camera: Camera,
     mapper: MapperThread,
     ports: Ports,
+    ros2: VehicleRos2,
     clock: Clock,
     keeper: Keeper<Folder>,
     disk: DiskWatch,
@@ -183,6 +186,7 @@ impl VehicleShell {
             self.host.handle_disk(disk);
         }
         self.host.steer(now);
+        self.ros2.publish(&self.host);
         self.handle_events()?;
         while let Some(bytes) = self.host.poll_output(now) {
             self.ports.modem.write(bytes);
