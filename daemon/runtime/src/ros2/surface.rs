@@ -16,7 +16,7 @@ impl SurfaceRos2 {
     ///
     /// # Errors
     ///
-    /// A name of the principal that is not allowed, DDS that does not start, or a build without ROS 2.
+    /// A name of the principal that is not allowed, a thread that does not start, or a build without ROS 2.
     pub fn start(config: &Config, principals: &mut Vec<Principal>) -> Result<Self, UserError> {
         let is_enabled = super::is_enabled(config)?;
         let principal = principal(&config.ros2.principal, principals)?.filter(|_| is_enabled);

@@ -13,7 +13,7 @@ pub(crate) struct VehicleRos2 {
 impl VehicleRos2 {
     /// # Errors
     ///
-    /// DDS does not start, or the build has no ROS 2.
+    /// The thread does not start, or the build has no ROS 2.
     pub fn start(config: &Config) -> Result<Self, UserError> {
         let is_enabled = super::is_enabled(config)?;
         #[cfg(not(feature = "ros2"))]
