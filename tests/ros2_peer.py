@@ -4,8 +4,9 @@ usage: ros2_peer.py map DOMAIN TOPIC SECONDS
            waits for a map with at least one label; prints its size, frame, labels and the seconds until it arrived, as JSON
        ros2_peer.py camera DOMAIN TOPIC COUNT HERTZ WIDTH HEIGHT
            publishes COUNT images, their calibration beside them, and odometry at 10 times the rate
-       ros2_peer.py hold DOMAIN PREFIX SECONDS
-           orders hold on PREFIX/orders/hold, and prints the event that reports it, as JSON
+       ros2_peer.py hold DOMAIN PREFIX SECONDS true|false [AGE]
+           orders hold, or its end, on PREFIX/orders/hold with a stamp of AGE seconds ago; prints the event that answers it, as
+           JSON
        ros2_peer.py all DOMAIN PREFIX SECONDS
            waits for one message of every topic of a vehicle at the surface; prints their sizes, as JSON
 """
@@ -355,13 +356,13 @@ def camera(domain, topic, count, hertz, width, height):
     time.sleep(2)
 
 
-def hold(domain, prefix, seconds):
+def hold(domain, prefix, seconds, is_held, age="0"):
     participant = DomainParticipant(int(domain))
     events = reader(participant, prefix + "/events", Event, STATE)
     orders = writer(participant, prefix + "/orders/hold", Hold, STATE)
     ready = lambda: True if orders.get_matched_subscriptions() and events.get_matched_publications() else None
     wait(ready, float(seconds), "orders/hold")
-    orders.write(Hold(Header(stamp(time.time()), ""), True))
+    orders.write(Hold(Header(stamp(time.time() - float(age)), ""), is_held == "true"))
     event, _ = wait(lambda: next(iter(events.take(1)), None), float(seconds), "events")
     print(json.dumps({"level": event.level, "text": event.text, "source": event.source, "vehicle": event.vehicle}))
 

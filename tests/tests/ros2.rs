@@ -158,14 +158,26 @@ fn an_order_of_cyclone_passes_the_surfaces_checks() {
     let (dir, page, domain) = (scratch("ros2-orders"), free_port(), domain(2));
     let _ends = ends(&dir, page, domain);
     wait_until("the vehicle is met", Duration::from_secs(60), || explored(page) > 0);
-    let event = peer(&python, &["hold", &domain.to_string(), "/scenecast/auv_1", "30"]);
-    assert_eq!((&event["level"], &event["vehicle"]), (&Value::from(20), &Value::from("auv-1")), "{event}");
-    assert!(event["text"].as_str().unwrap().starts_with("hold of ros: accepted as constraints"), "{event}");
+    let domain = domain.to_string();
+    let hold = |arguments: &[&str]| {
+        let event = peer(&python, &[&["hold", &domain, "/scenecast/auv_1", "30"], arguments].concat());
+        assert_eq!(event["vehicle"], "auv-1");
+        (event["level"].as_u64().unwrap(), event["text"].as_str().unwrap().to_owned())
+    };
+    let (level, text) = hold(&["true"]);
+    assert!(level == 20 && text.starts_with("hold of ros: accepted as constraints"), "{text}");
     wait_until("the vehicle applies it", Duration::from_secs(60), || {
         let slots = state(page).map(|state| state["vehicles"][0]["directive"]["slots"].clone());
         let slots = slots.as_ref().and_then(Value::as_array).cloned().unwrap_or_default();
         slots.iter().any(|slot| slot["slot"] == "constraints" && slot["state"] == "applied")
     });
+    let headers = "X-Scenecast: 1\r\nContent-Type: application/json\r\n";
+    let (status, _) = http(page, "POST", "/api/v2/command", headers, "{\"action\": \"take\"}").unwrap();
+    assert_eq!(status, 200, "the page takes command");
+    let (level, text) = hold(&["false"]);
+    assert!(level == 30 && text.contains("refused") && text.contains("local has command"), "{text}");
+    let (level, text) = hold(&["true", "100"]);
+    assert!(level == 30 && text.contains("its stamp is 100 s old"), "{text}");
 }
 
 #[test]
