@@ -1,6 +1,6 @@
 """Starts the surface of scenecast and RViz.
 
-ros2 launch scenecast.launch.py config:=surface.toml vehicle:=auv_1 namespace:=/scenecast domain:=0 rviz:=true
+ros2 launch scenecast.launch.py config:=asv.toml vehicle:=auv_1 namespace:=/scenecast domain:=0 rviz:=true
 """
 
 from pathlib import Path
@@ -19,7 +19,7 @@ def generate_launch_description():
     value = LaunchConfiguration
     remaps = [(f"/vehicle/{topic}", PathJoinSubstitution([value("namespace"), value("vehicle"), topic])) for topic in TOPICS]
     return LaunchDescription([
-        DeclareLaunchArgument("config", default_value=str(HERE / "surface.toml"), description="configuration of the surface"),
+        DeclareLaunchArgument("config", default_value=str(HERE / "asv.toml"), description="configuration of the surface"),
         DeclareLaunchArgument("vehicle", default_value="auv_1", description="name of the vehicle in topics"),
         DeclareLaunchArgument("namespace", default_value="/scenecast", description="ros2.namespace of the configuration"),
         DeclareLaunchArgument("domain", default_value="0", description="domain of DDS"),
