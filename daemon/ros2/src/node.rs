@@ -4,6 +4,7 @@ use crate::inbox::{Filler, Inbox};
 use crate::names::remapped;
 use crate::publisher::Publisher;
 use crate::qos::Qos;
+use crate::stop::Owned;
 use crate::watch::{self, Wanted};
 use futures_util::StreamExt;
 use ros2_client::{Context, MessageTypeName, Name, Node, NodeName, NodeOptions, Subscription};
@@ -13,6 +14,10 @@ use scenecast_core::UserError;
 use scenecast_messages::Message;
 use std::collections::BTreeSet;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
+
+/// Time between two tries to start.
+const RETRY_INTERVAL: Duration = Duration::from_secs(5);
 
 /// A node of ROS 2 with threads of its own, which end with it.
 pub struct RosNode {
@@ -86,6 +91,19 @@ impl RosNode {
         runtime.spawn(watch::run(Arc::downgrade(&shared)));
         tracing::info!("ROS 2: node {name} in domain {} of DDS", settings.domain);
         Ok(Self { shared, runtime: Some(runtime) })
+    }
+
+    /// As [`Self::start`], tried again at intervals until it works; `None` once the thread that waits is told to end.
+    pub(crate) fn start_when_possible(settings: &Ros2, name: &str, owned: &Owned) -> Option<Self> {
+        loop {
+            match Self::start(settings, name) {
+                Ok(node) => return Some(node),
+                Err(error) => tracing::error!("{error}; the next try is in {} s", RETRY_INTERVAL.as_secs()),
+            }
+            if !owned.wait(RETRY_INTERVAL) {
+                return None;
+            }
+        }
     }
 
     /// The topic with this name below the namespace of the settings, such as `auv_1/map`.

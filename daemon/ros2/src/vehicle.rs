@@ -26,7 +26,7 @@ const MAP_INTERVAL: Duration = Duration::from_secs(1);
 /// Minimum distance between two places of the path, metres.
 const PATH_STEP_M: f64 = 0.25;
 /// Places of the path at most; the oldest ones are dropped.
-const MAX_PATH: usize = 5000;
+const MAX_PATH: usize = 2000;
 
 /// The state of a vehicle at one moment, in its map frame.
 #[derive(Debug, Clone)]
@@ -86,19 +86,24 @@ impl VehicleOutlet {
     }
 }
 
-/// Joins ROS 2.
+/// Joins ROS 2, as soon as DDS starts: the vehicle does not wait for it.
 ///
 /// # Errors
 ///
-/// DDS or a thread did not start.
+/// The thread did not start.
 pub fn start_vehicle(settings: &Ros2) -> Result<VehicleOutlet, UserError> {
-    let node = RosNode::start(settings, "scenecast_vehicle")?;
-    let topics = VehicleTopics::new(&node)?;
     let desk = Arc::new(Desk::default());
     let (owner, owned) = stop::ends();
-    let worker = Worker { _node: node, topics, desk: desk.clone() };
+    let (settings, shared) = (settings.clone(), desk.clone());
+    let run = move || {
+        let Some(node) = RosNode::start_when_possible(&settings, "scenecast_vehicle", &owned) else { return };
+        match VehicleTopics::new(&node) {
+            Ok(topics) => Worker { _node: node, topics, desk: shared }.run(&owned),
+            Err(error) => tracing::error!("{error}; nothing is published"),
+        }
+    };
     let thread = std::thread::Builder::new().name("ros2-vehicle".to_owned());
-    thread.spawn(move || worker.run(&owned)).map_err(|e| UserError::Failed(format!("ROS 2: no thread: {e}")))?;
+    thread.spawn(run).map_err(|e| UserError::Failed(format!("ROS 2: no thread: {e}")))?;
     Ok(VehicleOutlet { desk, _thread: owner })
 }
 

@@ -25,7 +25,7 @@ mod power_cut_tests;
 mod refusing_disk_tests;
 mod reload;
 mod restore;
-mod ros;
+mod ros2;
 mod stop;
 #[cfg(feature = "surface")]
 mod store;

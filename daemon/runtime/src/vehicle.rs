@@ -10,7 +10,7 @@ use super::modem::{self, ModemPort};
 use super::pilot::{self, PilotPort, SimulatedAutopilot};
 use super::reload::{Load, Reload};
 use super::restore::{Start, start};
-use super::ros::RosAccess;
+use super::ros2::{RosSensors, VehicleRos2};
 use super::stop::Stop;
 use crate::camera::{Camera, CameraFrame, LiveCamera, RecordedCamera};
 use crate::port::FromPort;
@@ -67,7 +67,7 @@ pub fn run_vehicle(load: Load, simulated: Option<SimulatedAutopilot>) -> Result<
             true => Camera::Live(Box::new(LiveCamera::start(
                 &config,
                 mapper.last_s().map_or(0.0, |s| s + RESTART_S),
-                &RosAccess::start(&config)?,
+                &RosSensors::new(&config)?,
             )?)),
             false => Camera::Recorded(RecordedCamera::new(recording, clock, mapper.last_s())),
         };
@@ -91,7 +91,8 @@ pub fn run_vehicle(load: Load, simulated: Option<SimulatedAutopilot>) -> Result<
             host.handle_camera_end();
         }
         let disk = DiskWatch::new(dir);
-        VehicleShell { host, camera, mapper, ports, clock, keeper, disk, reload, missed: 0 }.run(stop).await
+        let ros2 = VehicleRos2::start(&config)?;
+        VehicleShell { host, camera, mapper, ports, ros2, clock, keeper, disk, reload, missed: 0 }.run(stop).await
     })
 }
 
@@ -112,6 +113,7 @@ struct VehicleShell {
     camera: Camera,
     mapper: MapperThread,
     ports: Ports,
+    ros2: VehicleRos2,
     clock: Clock,
     keeper: Keeper<Folder>,
     disk: DiskWatch,
@@ -220,6 +222,7 @@ impl VehicleShell {
             self.host.handle_disk(disk);
         }
         self.host.steer(now);
+        self.ros2.publish(&self.host);
         self.handle_events()?;
         while let Some(bytes) = self.host.poll_output(now) {
             self.ports.modem.write(bytes);

@@ -18,6 +18,6 @@ pub use command::CommandSource;
 pub use live::{LiveSource, Reading, SensorKind, SensorSource, SourceError, SourceImage, SourceReport};
 pub use picture::Picture;
 #[cfg(feature = "ros2")]
-pub use ros2::{RosCamera, RosNavigation};
+pub use ros2::{RosCamera, RosNavigation, SensorNode};
 pub use tum_poses::read_tum_poses;
 pub use watch::WatchSource;

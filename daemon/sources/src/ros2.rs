@@ -2,23 +2,45 @@
 
 use crate::live::{Reading, SensorKind, SensorSource, SourceError, SourceImage};
 use crate::{ArrivalClock, Picture};
-use scenecast_config::RosName;
+use scenecast_config::{Ros2, RosName};
 use scenecast_messages::nav_msgs::Odometry;
 use scenecast_messages::sensor_msgs::{CompressedImage, Image};
 use scenecast_messages::std_msgs::Header;
 use scenecast_ros2::{Inbox, RosNode, topic};
 use scenecast_sensors::{CameraFault, Stamp, pose_of, rgb_of, stamp_of};
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 fn parsed(name: &str) -> Result<RosName, SourceError> {
     topic(name).map_err(|error| SourceError(error.to_string()))
 }
 
+/// The node of the sensors, which starts when the first of them is opened.
+pub struct SensorNode {
+    settings: Ros2,
+    node: Mutex<Option<Arc<RosNode>>>,
+}
+
+impl SensorNode {
+    pub fn new(settings: &Ros2) -> Self {
+        Self { settings: settings.clone(), node: Mutex::default() }
+    }
+
+    fn get(&self) -> Result<Arc<RosNode>, SourceError> {
+        let mut node = self.node.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(node) = &*node {
+            return Ok(node.clone());
+        }
+        let started = RosNode::start(&self.settings, "scenecast_sensors");
+        let started = Arc::new(started.map_err(|error| SourceError(error.to_string()))?);
+        Ok(node.insert(started).clone())
+    }
+}
+
 /// The topic of a camera: of `sensor_msgs/msg/CompressedImage` if its name ends in `/compressed`, or else of
 /// `sensor_msgs/msg/Image`.
 pub struct RosCamera {
-    node: Arc<RosNode>,
+    node: Arc<SensorNode>,
     topic: String,
     clock: ArrivalClock,
     /// Whether stamps of the messages are used, so that a message without one is dropped.
@@ -51,7 +73,7 @@ impl Counted {
 }
 
 impl RosCamera {
-    pub fn new(node: Arc<RosNode>, topic: &str, clock: ArrivalClock, needs_stamps: bool) -> Self {
+    pub fn new(node: Arc<SensorNode>, topic: &str, clock: ArrivalClock, needs_stamps: bool) -> Self {
         Self { node, topic: topic.to_owned(), clock, needs_stamps, inbox: None, counted: Counted::default() }
     }
 
@@ -84,11 +106,12 @@ impl SensorSource for RosCamera {
 
     fn open(&mut self) -> Result<(), SourceError> {
         let name = parsed(&self.topic)?;
+        let node = self.node.get()?;
         let failed = |error: scenecast_core::UserError| SourceError(error.to_string());
         self.inbox = Some(if self.topic.ends_with("/compressed") {
-            CameraInbox::Compressed(self.node.subscribe_compressed_images(&name).map_err(failed)?)
+            CameraInbox::Compressed(node.subscribe_compressed_images(&name).map_err(failed)?)
         } else {
-            CameraInbox::Raw(self.node.subscribe_images(&name).map_err(failed)?)
+            CameraInbox::Raw(node.subscribe_images(&name).map_err(failed)?)
         });
         Ok(())
     }
@@ -133,13 +156,13 @@ impl SensorSource for RosCamera {
 
 /// A topic of `nav_msgs/msg/Odometry` in a frame of east, north, up.
 pub struct RosNavigation {
-    node: Arc<RosNode>,
+    node: Arc<SensorNode>,
     topic: String,
     inbox: Option<Inbox<Odometry>>,
 }
 
 impl RosNavigation {
-    pub fn new(node: Arc<RosNode>, topic: &str) -> Self {
+    pub fn new(node: Arc<SensorNode>, topic: &str) -> Self {
         Self { node, topic: topic.to_owned(), inbox: None }
     }
 }
@@ -150,7 +173,7 @@ impl SensorSource for RosNavigation {
     }
 
     fn open(&mut self) -> Result<(), SourceError> {
-        let inbox = self.node.subscribe_odometry(&parsed(&self.topic)?);
+        let inbox = self.node.get()?.subscribe_odometry(&parsed(&self.topic)?);
         self.inbox = Some(inbox.map_err(|error| SourceError(error.to_string()))?);
         Ok(())
     }

@@ -38,20 +38,25 @@ pub struct SurfaceOutlet {
     _thread: Owner,
 }
 
-/// Joins ROS 2. Orders are taken in the name of `principal`; without one, none are.
+/// Joins ROS 2, as soon as DDS starts: the surface does not wait for it. Orders are taken in the name of `principal`; without
+/// one, none are.
 ///
 /// # Errors
 ///
-/// DDS or a thread did not start.
+/// The thread did not start.
 pub fn start_surface(settings: &Ros2, principal: Option<Principal>) -> Result<SurfaceOutlet, UserError> {
-    let node = RosNode::start(settings, "scenecast_surface")?;
     let (sender, requests) = mpsc::channel(MAX_PENDING);
     let (snapshots, receiver) = watch::channel(Arc::new(Snapshot::default()));
     let (owner, owned) = stop::ends();
     let desk = Desk { requests: sender, principal };
-    let worker = Worker { node, desk, snapshots: receiver, vehicles: BTreeMap::new() };
+    let settings = settings.clone();
+    let run = move || {
+        if let Some(node) = RosNode::start_when_possible(&settings, "scenecast_surface", &owned) {
+            Worker { node, desk, snapshots: receiver, vehicles: BTreeMap::new() }.run(&owned);
+        }
+    };
     let thread = std::thread::Builder::new().name("ros2-surface".to_owned());
-    thread.spawn(move || worker.run(&owned)).map_err(|e| UserError::Failed(format!("ROS 2: no thread: {e}")))?;
+    thread.spawn(run).map_err(|e| UserError::Failed(format!("ROS 2: no thread: {e}")))?;
     Ok(SurfaceOutlet { requests, snapshots, _thread: owner })
 }
 

@@ -2,7 +2,7 @@
 
 use super::fault_log::FaultLog;
 use super::{CameraFrame, FramePicture};
-use crate::ros::RosAccess;
+use crate::ros2::RosSensors;
 use scenecast_config::{CameraSource, CameraStamps, Config, NavigationSource};
 use scenecast_core::UserError;
 use scenecast_host::CameraPose;
@@ -61,7 +61,7 @@ async fn next_of(source: &mut Option<LiveSource>) -> SourceReport {
 
 impl LiveCamera {
     /// Starts the configured live camera and the source of its poses; the first frame has the mission time `start_s`.
-    pub(crate) fn start(config: &Config, start_s: f64, ros: &RosAccess) -> Result<Self, UserError> {
+    pub(crate) fn start(config: &Config, start_s: f64, ros: &RosSensors) -> Result<Self, UserError> {
         let clock = ArrivalClock::start();
         let c = &config.camera;
         let stall = Duration::from_secs_f64(c.timeout_s);
@@ -69,7 +69,7 @@ impl LiveCamera {
             CameraSource::Watch(dir) => LiveSource::start(WatchSource::new(dir, clock), stall),
             CameraSource::Command(command) => LiveSource::start(CommandSource::new(command, clock), stall),
             CameraSource::V4l2(device) => LiveSource::start(CommandSource::of_device(device, clock), stall),
-            CameraSource::Ros2(topic) => ros.camera(topic, clock, c.stamps == CameraStamps::Own, stall)?,
+            CameraSource::Ros2(topic) => ros.camera(topic, clock, c.stamps == CameraStamps::Own, stall),
             other => return Err(UserError::Input(format!("camera.source: {other:?} is not a live camera"))),
         };
         let failed = |e: std::io::Error| UserError::Failed(format!("a sensor's thread did not start: {e}"));
@@ -82,7 +82,7 @@ impl LiveCamera {
                 matcher.set_poses(read_tum_poses(file)?);
                 None
             }
-            NavigationSource::Ros2(topic) => Some(ros.navigation(topic, stall)?.map_err(failed)?),
+            NavigationSource::Ros2(topic) => Some(ros.navigation(topic, stall).map_err(failed)?),
             NavigationSource::Dvl(_) => return Err(UserError::Input("navigation.source: not yet".to_owned())),
         };
         Ok(Self {
