@@ -8,6 +8,7 @@
 //! | quaternions become headings and tilts | [`Rotation`] |
 //! | messages of ROS 2 become images and poses | [`rgb_of`], [`pose_of`] |
 //! | poses are interpolated at the time of an image | [`PoseTrack`] |
+//! | the pose of a vehicle becomes that of its camera | [`CameraMounting`] |
 //! | images wait for their poses, and are dropped with a reason | [`FrameMatcher`] |
 //!
 //! The crate does no IO: bytes and times of arrival come in as arguments.
@@ -17,6 +18,7 @@ mod camera_tally;
 mod compressed;
 mod frame_matcher;
 mod image_stream;
+mod mounting;
 mod pose_track;
 mod raw_image;
 mod ros_messages;
@@ -27,6 +29,7 @@ pub use camera_tally::{CameraFault, CameraTally};
 pub use compressed::{DecodeError, MAX_PIXELS, decode, own_stamp};
 pub use frame_matcher::{FrameMatcher, Limits, MatchedImage};
 pub use image_stream::{ImageStream, MAX_IMAGE_BYTES, complete_length};
+pub use mounting::CameraMounting;
 pub use pose_track::{PoseMatch, PoseTrack, SensorPose};
 pub use raw_image::{RawImage, RawImageError};
 pub use ros_messages::{pose_of, rgb_of, stamp_of, stamp_of_cdr};

@@ -62,6 +62,11 @@ section! {
         height_px: u32 = 480, range(64.0, 4096.0, "pixel"), [Scenario];
         /// Size of a pixel on the sea floor.
         metres_per_pixel: f64 = 0.01, range(0.0001, 10.0, "m"), [Auv Scenario];
+        /// Place of a live camera on the vehicle: metres forward, to starboard and down from the point whose pose is measured.
+        mount_m: [f64; 3] = [0.0, 0.0, 0.0], range(-20.0, 20.0, "m"), [Auv];
+        /// Direction of a live camera: rotation of the image's upper edge from the bow, clockwise from above; then tilt of the
+        /// optical axis from straight down, towards the bow and to starboard. Roll and pitch of the vehicle are added.
+        mount_deg: [f64; 3] = [0.0, 0.0, 0.0], range(-180.0, 180.0, "deg"), [Auv];
         /// Whether frames are corrected for a light that depends on the place in the frame alone: lamps, the lens, the water
         /// between. It is learnt from the first 500 frames. Exemplars show the frame as it is.
         flat_field: bool = true, ANY, [Auv Scenario];

@@ -6,7 +6,7 @@ use crate::ros2::RosSensors;
 use scenecast_config::{CameraSource, CameraStamps, Config, NavigationSource};
 use scenecast_core::UserError;
 use scenecast_host::CameraPose;
-use scenecast_sensors::{CameraFault, FrameMatcher, Limits, MatchedImage, SensorPose, Stamp};
+use scenecast_sensors::{CameraFault, CameraMounting, FrameMatcher, Limits, MatchedImage, SensorPose, Stamp};
 use scenecast_sources::{
     ArrivalClock, CommandSource, LiveSource, Picture, Reading, SourceImage, SourceReport, WatchSource, read_tum_poses,
 };
@@ -19,6 +19,9 @@ const MAX_MAPPING: u32 = 2;
 /// Longest time between two poses of a vehicle that does not move.
 const MAX_POSE_INTERVAL_S: f64 = 0.2;
 
+/// Smallest and largest size of pixels that a measured altitude gives, in configured ones.
+const SCALES: (f64, f64) = (0.1, 10.0);
+
 /// A camera whose images come in while the vehicle dives.
 pub(crate) struct LiveCamera {
     source: LiveSource,
@@ -30,6 +33,9 @@ pub(crate) struct LiveCamera {
     delay: Duration,
     clock_offset: ClockOffset,
     has_own_poses: bool,
+    mounting: CameraMounting,
+    /// Height of the camera at which its pixels have the configured size, metres.
+    altitude_m: f64,
     /// The newest pose of the navigation source.
     newest_pose: Option<CameraPose>,
     /// Whether the vehicle does not know the newest pose yet.
@@ -49,6 +55,11 @@ impl ClockOffset {
         let by = Duration::from_secs_f64(self.0.abs());
         if self.0 < 0.0 { stamp.before(by) } else { stamp.after(by) }
     }
+}
+
+fn mounting(config: &Config) -> CameraMounting {
+    let [turn_rad, ahead, aside] = config.camera.mount_deg.map(f64::to_radians);
+    CameraMounting { place_m: config.camera.mount_m, turn_rad, tilt_rad: [ahead, aside] }
 }
 
 /// The next report of a source; without one it never returns.
@@ -94,6 +105,8 @@ impl LiveCamera {
             delay: Duration::from_secs_f64(c.delay_s),
             clock_offset: ClockOffset(c.clock_offset_s),
             has_own_poses: config.navigation.source != NavigationSource::Autopilot,
+            mounting: mounting(config),
+            altitude_m: config.survey.altitude_m,
             newest_pose: None,
             is_pose_new: false,
             log: FaultLog::default(),
@@ -181,7 +194,10 @@ impl LiveCamera {
         }
         self.log_faults();
         let MatchedImage { image, pose, t_s, .. } = frame?;
-        Some(CameraFrame { t_s, picture: FramePicture::Received(image), pose, scale: 1.0 })
+        let pose = self.mounting.camera_pose(&pose, self.altitude_m);
+        // A pixel's size on the floor grows with the height.
+        let scale = pose.altitude_m.map_or(1.0, |height| (height / self.altitude_m).clamp(SCALES.0, SCALES.1));
+        Some(CameraFrame { t_s, picture: FramePicture::Received(image), pose, scale })
     }
 
     fn log_faults(&mut self) {
