@@ -1,9 +1,10 @@
 """Publishes a recorded folder as a robot's camera and odometry would come, by Cyclone DDS without a ROS installation.
 
-Usage: ros2_camera.py FOLDER --domain N [--pace S] [--compressed] [--rest S]
+Usage: ros2_camera.py FOLDER --domain N [--pace S] [--compressed] [--rest S] [--rows FROM:TO] [--faulty]
 
 The folder has poses.csv with t_s, file, x_m, y_m, depth_m and heading_deg. Each image has the stamp t_s + 1000 s; its
-odometry is published a moment later, as estimators do.
+odometry is published a moment later, as estimators do. With --faulty, wrong images come between the good ones, and some good ones
+have 16 bits a channel.
 """
 
 import argparse
@@ -129,6 +130,24 @@ def odometry(row):
     return Odometry(header(float(row["t_s"]), "odom"), "base_link", pose)
 
 
+def faulty(number, t_s, picture):
+    """An image that must not be mapped."""
+    grey = bytes(3 * picture.width * picture.height)
+    wrong = Image(header(t_s, "camera"), picture.height, picture.width, "rgb8", 0, 3 * picture.width, grey)
+    match number % 5:
+        case 0:
+            wrong.header = Header(Time(0, 0), "camera")
+        case 1:
+            wrong.encoding = "nv21"
+        case 2:
+            wrong.header = header(t_s + 3600, "camera")
+        case 3:
+            wrong.header = header(t_s - 60, "camera")
+        case 4:
+            wrong.data = grey[:100]
+    return wrong
+
+
 def wait_for_reader(writer):
     until = time.monotonic() + 60
     while not writer.get_matched_subscriptions():
@@ -143,8 +162,11 @@ def main():
     parser.add_argument("--pace", type=float, default=0.25)
     parser.add_argument("--compressed", action="store_true")
     parser.add_argument("--rest", type=float, default=5.0)
+    parser.add_argument("--rows", default=":")
+    parser.add_argument("--faulty", action="store_true")
     options = parser.parse_args()
-    rows = list(csv.DictReader(open(options.folder / "poses.csv", newline="")))
+    begin, end = (int(part) if part else None for part in options.rows.split(":"))
+    rows = list(csv.DictReader(open(options.folder / "poses.csv", newline="")))[begin:end]
     participant = DomainParticipant(options.domain)
     reliable = Qos(Policy.Reliability.Reliable(duration(seconds=1)), Policy.History.KeepLast(5))
     kind, name = (CompressedImage, "rt/camera/image_raw/compressed") if options.compressed else (Image, "rt/camera/image_raw")
@@ -153,14 +175,21 @@ def main():
     wait_for_reader(images)
     wait_for_reader(poses)
     time.sleep(0.5)
-    for row in rows:
+    for number, row in enumerate(rows):
         path = options.folder / row["file"]
         head = header(float(row["t_s"]), "camera")
         if options.compressed:
             images.write(CompressedImage(head, "png", path.read_bytes()))
         else:
             picture = Picture.open(path).convert("RGB")
-            images.write(Image(head, picture.height, picture.width, "rgb8", 0, 3 * picture.width, picture.tobytes()))
+            if options.faulty:
+                images.write(faulty(number, float(row["t_s"]), picture))
+            if options.faulty and number % 2 == 1:
+                # The high and the low byte are the same, which is the same level in 16 bits.
+                doubled = bytes(byte for byte in picture.tobytes() for _ in range(2))
+                images.write(Image(head, picture.height, picture.width, "rgb16", 1, 6 * picture.width, doubled))
+            else:
+                images.write(Image(head, picture.height, picture.width, "rgb8", 0, 3 * picture.width, picture.tobytes()))
         poses.write(odometry(row))
         time.sleep(options.pace)
     time.sleep(options.rest)

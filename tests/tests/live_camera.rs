@@ -118,10 +118,10 @@ fn images_of_a_command_give_the_map_of_the_recording() {
 
 /// A domain of DDS for one test of this process.
 fn domain(offset: u32) -> u32 {
-    1 + (std::process::id() * 2 + offset) % 200
+    1 + (std::process::id() * 3 + offset) % 200
 }
 
-fn assert_topics_give_the_map(name: &str, domain: u32, topic: &str, options: &[&str]) {
+fn assert_topics_give_the_map(name: &str, domain: u32, topic: &str, publishers: &[&[&str]]) {
     let Some(python) = python() else { return };
     let dive = Dive::with_settings(name, &|_| {
         vec![
@@ -133,19 +133,27 @@ fn assert_topics_give_the_map(name: &str, domain: u32, topic: &str, options: &[&
     });
     let folder = recorded().0.display().to_string();
     let domain = domain.to_string();
-    let arguments = [&[folder.as_str(), "--domain", &domain], options].concat();
-    run_script(&python, "tests/python/ros2_camera.py", &arguments);
+    for options in publishers {
+        let arguments = [&[folder.as_str(), "--domain", &domain], *options].concat();
+        run_script(&python, "tests/python/ros2_camera.py", &arguments);
+    }
     dive.assert_map_of_the_rehearsal();
 }
 
 #[test]
 fn topics_of_cyclone_dds_give_the_map_of_the_recording() {
-    assert_topics_give_the_map("ros2", domain(0), "/camera/image_raw", &[]);
+    assert_topics_give_the_map("ros2", domain(0), "/camera/image_raw", &[&[]]);
+}
+
+#[test]
+fn wrong_images_and_a_restarted_publisher_leave_the_map_as_it_is() {
+    let runs: [&[&str]; 2] = [&["--faulty", "--rows", ":15", "--rest", "0"], &["--faulty", "--rows", "15:"]];
+    assert_topics_give_the_map("ros2-faults", domain(2), "/camera/image_raw", &runs);
 }
 
 #[test]
 fn compressed_topics_of_cyclone_dds_give_the_map_of_the_recording() {
-    assert_topics_give_the_map("ros2-compressed", domain(1), "/camera/image_raw/compressed", &["--compressed"]);
+    assert_topics_give_the_map("ros2-compressed", domain(1), "/camera/image_raw/compressed", &[&["--compressed"]]);
 }
 
 /// A bag of the recording, which rosbags writes; `None` without Python.

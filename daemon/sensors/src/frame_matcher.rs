@@ -106,6 +106,10 @@ impl<I> FrameMatcher<I> {
 
     /// Takes an image of the time `stamp` that came in at `arrival`.
     pub fn handle_image(&mut self, stamp: Stamp, arrival: Stamp, image: I) {
+        if self.is_in_future(stamp) {
+            self.tally.count(CameraFault::NoPose);
+            return;
+        }
         if self.newest.is_some_and(|newest| stamp <= newest) && !self.is_clock_back(stamp) {
             self.tally.count(CameraFault::NotLater);
             return;
@@ -118,6 +122,13 @@ impl<I> FrameMatcher<I> {
             self.waiting.pop_front();
             self.tally.count(CameraFault::Overtaken);
         }
+    }
+
+    /// Whether the time is so much later than the last pose that no pose for it would come in while the image waits. Such an
+    /// image must not stand before others, nor make them count as old ones.
+    fn is_in_future(&self, stamp: Stamp) -> bool {
+        let most_s = (self.limits.max_wait + self.limits.max_gap).as_secs_f64();
+        self.track.last().is_some_and(|(last, _)| stamp.seconds_since(last) > most_s)
     }
 
     /// Whether this image confirms that the camera's clock went back; then the images of the former clock are dropped.
@@ -237,15 +248,24 @@ mod tests {
         let mut matcher = FrameMatcher::new(Limits::default(), 0.0);
         matcher.handle_pose(at(100.0), at(100.0), pose(0.0));
         matcher.handle_image(at(99.0), at(1.0), 1);
-        matcher.handle_image(at(9000.0), at(1.1), 2);
+        matcher.handle_image(at(102.0), at(1.1), 2);
         assert_eq!(matcher.poll_timeout(), Some(at(3.0)));
         assert_eq!(frames(&mut matcher, 3.2), []);
-        // The image of a wrong time does not stand in the way of the next one.
         matcher.handle_pose(at(101.0), at(101.0), pose(1.0));
         matcher.handle_image(at(101.0), at(3.3), 3);
         assert_eq!(frames(&mut matcher, 3.4), [(3, 1.0)]);
         let text = matcher.tally().to_string();
         assert_eq!(text, "1 images mapped, 2 dropped (no pose at its time 2)");
+    }
+
+    #[test]
+    fn an_image_from_the_future_does_not_hold_up_the_next_ones() {
+        let mut matcher = FrameMatcher::new(Limits::default(), 0.0);
+        matcher.handle_pose(at(100.0), at(1.0), pose(0.0));
+        matcher.handle_image(at(9000.0), at(1.0), 1);
+        matcher.handle_image(at(100.0), at(1.1), 2);
+        assert_eq!(frames(&mut matcher, 1.2), [(2, 0.0)]);
+        assert_eq!(matcher.tally().of(CameraFault::NoPose), 1);
     }
 
     #[test]

@@ -238,3 +238,88 @@ impl SourceImage {
         Self { stamp, arrival, picture: Picture::Compressed(bytes) }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A sensor that does these things in turn, and then says nothing more.
+    struct Scripted(std::vec::IntoIter<Step>);
+
+    enum Step {
+        Refuse,
+        Open,
+        Image,
+        Lose,
+        /// Silence until the source counts as stalled.
+        Stall,
+    }
+
+    impl SensorSource for Scripted {
+        fn kind(&self) -> SensorKind {
+            SensorKind::Camera
+        }
+
+        fn open(&mut self) -> Result<(), SourceError> {
+            match self.0.next() {
+                Some(Step::Refuse) => Err(SourceError("no lens".to_owned())),
+                _ => Ok(()),
+            }
+        }
+
+        fn next(
+            &mut self,
+            _: Duration,
+            _: &mut dyn FnMut(CameraFault, String),
+        ) -> Result<Option<Reading>, SourceError> {
+            match self.0.as_slice().first() {
+                Some(Step::Stall) => {
+                    std::thread::yield_now();
+                    return Ok(None);
+                }
+                None => {
+                    std::thread::park_timeout(POLL);
+                    return Ok(None);
+                }
+                Some(_) => {}
+            }
+            match self.0.next() {
+                Some(Step::Lose) => Err(SourceError("unplugged".to_owned())),
+                _ => {
+                    let picture = Picture::Compressed(vec![1]);
+                    Ok(Some(Reading::Image(SourceImage { stamp: None, arrival: Stamp::default(), picture })))
+                }
+            }
+        }
+
+        fn is_reopened_after_stall(&self) -> bool {
+            true
+        }
+    }
+
+    /// The names of the first reports of a sensor.
+    fn reports(steps: Vec<Step>, stall: Duration, count: usize) -> Vec<String> {
+        let mut source = LiveSource::start(Scripted(steps.into_iter()), stall).unwrap();
+        let next = || source.reports.blocking_recv().unwrap();
+        let name = |report| match report {
+            SourceReport::Open => "open".to_owned(),
+            SourceReport::Reading(_) => "image".to_owned(),
+            SourceReport::Fault(fault, _) => fault.name().to_owned(),
+        };
+        std::iter::repeat_with(next).take(count).map(name).collect()
+    }
+
+    #[test]
+    fn a_lost_camera_is_opened_again_and_a_missing_one_is_named_once() {
+        let steps = vec![Step::Open, Step::Image, Step::Lose, Step::Refuse, Step::Refuse, Step::Open, Step::Image];
+        let names = ["open", "image", "source lost", "source lost", "open", "image"];
+        assert_eq!(reports(steps, Duration::from_secs(60), 6), names);
+    }
+
+    #[test]
+    fn a_stalled_camera_is_named_and_opened_again() {
+        let steps = vec![Step::Open, Step::Image, Step::Stall];
+        let names = ["open", "image", "camera stalled", "source lost", "open"];
+        assert_eq!(reports(steps, Duration::from_millis(20), 5), names);
+    }
+}
