@@ -10,7 +10,7 @@ const TIMEOUT: Duration = Duration::from_secs(20);
 
 /// A node in a domain of this test process, so that tests on one machine do not meet.
 fn node(name: &str, offset: u32) -> RosNode {
-    let domain = (1 + (std::process::id() + 60 * offset) % 200) as u8;
+    let domain = (1 + (std::process::id() + 50 * offset) % 100) as u8;
     RosNode::start(&Ros2 { domain, networks: vec!["127.0.0.1".parse().unwrap()], ..Ros2::default() }, name).unwrap()
 }
 
