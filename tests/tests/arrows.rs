@@ -8,10 +8,11 @@ const IO_CRATES: [&str; 8] =
     ["axum", "hyper", "nix", "serialport", "scenecast-files", "tokio", "tokio-serial", "tracing-subscriber"];
 
 /// Crates that do no IO.
-const SANS_IO: [&str; 12] = [
+const SANS_IO: [&str; 13] = [
     "scenecast-core",
     "scenecast-drivers",
     "scenecast-host",
+    "scenecast-labels",
     "scenecast-motion",
     "scenecast-protocol",
     "scenecast-registration",

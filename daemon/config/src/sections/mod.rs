@@ -10,7 +10,7 @@ mod node;
 mod survey;
 
 pub use link::Link;
-pub use map::{Camera, Map, Scene};
+pub use map::{Camera, Labels, Map, Scene};
 pub use modem::{Channel, Modem};
 pub use node::{Console, Mission, Operator, Runtime, VehicleSection, WorldSection};
 pub use survey::{Autopilot, Navigation, Position, Registration, Survey};
@@ -28,6 +28,7 @@ pub struct Config {
     pub map: Map,
     pub camera: Camera,
     pub scene: Scene,
+    pub labels: Labels,
     pub survey: Survey,
     pub navigation: Navigation,
     pub registration: Registration,
@@ -50,6 +51,7 @@ impl Section {
         Map::SECTION,
         Camera::SECTION,
         Scene::SECTION,
+        Labels::SECTION,
         Survey::SECTION,
         Navigation::SECTION,
         Registration::SECTION,

@@ -3,6 +3,7 @@
 mod addresses;
 mod choices;
 mod debounce;
+mod labels;
 mod layers;
 mod numbers;
 mod ports;
@@ -13,6 +14,7 @@ pub use choices::{
     Authenticate, AutopilotKind, BirthRule, MapCells, MapStream, ModemKind, OperatorScript, S2cMode, WorldKind,
 };
 pub use debounce::Debounce;
+pub use labels::{LabelSource, Votes};
 pub use layers::LayerName;
 pub use ports::{GpsPort, HostPort};
 pub use texts::CameraSource;

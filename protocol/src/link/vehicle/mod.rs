@@ -24,7 +24,7 @@ pub use event::{OversizedChunk, VehicleEvent};
 use super::{LinkPair, LinkStats, SlotInbox, SlotInboxState, Wakeup};
 use crate::directive::{Budget, Slot, SlotId, SlotState};
 use crate::mac::{Access, ClockMap, Floor};
-use crate::map::{Cell, LabelGrid, LayerId, LayerMask, LayerSource, MapSource, StateSource};
+use crate::map::{Cell, ClassEntry, ClassSource, LabelGrid, LayerId, LayerMask, LayerSource, MapSource, StateSource};
 use crate::object::ObjectId;
 use crate::schedule::{BackgroundOrder, BitBudget, Shares};
 use crate::time::Instant;
@@ -97,6 +97,22 @@ impl<S: StateSource> VehicleLink<S> {
     pub fn add_layer(&mut self, layer: LayerSource) -> bool {
         self.repeater.forget();
         self.content.add_layer(layer)
+    }
+
+    /// Announces the name and the colour of a label. A label keeps its first name until [`Self::begin_epoch`]: returns whether
+    /// this entry is the one that is announced.
+    pub fn add_class(&mut self, entry: &ClassEntry) -> bool {
+        let waiting = self.content.classes.backlog_bytes();
+        let is_first = self.content.classes.add(entry);
+        if self.content.classes.backlog_bytes() > waiting {
+            self.repeater.forget();
+        }
+        is_first
+    }
+
+    /// The announced names of labels.
+    pub fn classes(&self) -> &ClassSource {
+        &self.content.classes
     }
 
     /// The layers that are sent: those that are selected and have a share or are a background stream.
@@ -338,6 +354,7 @@ impl VehicleLink {
     /// Empties the map and begins a new run, so that label ids can be assigned again.
     pub fn begin_epoch(&mut self, now: Instant) {
         self.content.source.clear(now);
+        self.content.classes.clear();
         self.content.layers.iter_mut().for_each(|l| l.source.clear(now));
         self.renew(now);
         self.cancel_objects();
