@@ -9,6 +9,7 @@ mod fuzz_corpus_tests;
 #[cfg(feature = "surface")]
 mod instruments;
 mod journal;
+mod labels;
 #[cfg(test)]
 mod kept_label_tests;
 #[cfg(feature = "surface")]

@@ -4,6 +4,7 @@ use super::clock::Clock;
 use super::disk_space::DiskWatch;
 use super::durable::{Keeper, StartedRun};
 use super::journal::Folder;
+use super::labels::{Feed, FromLabels, LabelThread};
 use super::mapping::{Camera, FromMapper, Mapped, MapperThread, ToMapper};
 use super::missing_key::warn_without_key;
 use super::modem::{self, ModemPort};
@@ -16,8 +17,10 @@ use scenecast_config::{AutopilotKind, CameraSource, Config, survey_depth_m};
 use scenecast_core::{Area, TangentPlane, UserError};
 use scenecast_files::{RecordedFrame, Recording};
 use scenecast_host::{CameraPose, VehicleHost, VehicleHostEvent, VehiclePilot, modem_station};
+use scenecast_labels::ImagePose;
 use scenecast_protocol::directive::Budget;
 use scenecast_protocol::map::LayerSet;
+use scenecast_vehicle::ForeignUpdate;
 use std::time::Duration;
 
 /// Maximum time between two calls of the host.
@@ -29,7 +32,7 @@ pub fn run_vehicle(load: Load, simulated: Option<SimulatedAutopilot>) -> Result<
         let config = load()?;
         warn_without_key(&config);
         let dir = config.runtime.state_dir.as_path();
-        let Start { run, mut mapper, keep } = start(&config, dir)?;
+        let Start { run, mut mapper, keep, labels } = start(&config, dir)?;
         let StartedRun { keeper, durable, is_again, is_stored } = run;
         let clock = Clock::new(config.runtime.time_scale);
         let address = scenecast_config::vehicle_address(&config)?;
@@ -64,6 +67,11 @@ pub fn run_vehicle(load: Load, simulated: Option<SimulatedAutopilot>) -> Result<
             mapper.handle_gap();
         }
         let mapper = MapperThread::start(mapper, keep)?;
+        let labels = labels.map(|(map, keep)| {
+            let feed = Feed::open(&config, map.mark())?;
+            LabelThread::start(map, feed, keep, clock)
+        });
+        let labels = labels.transpose()?;
         let modem = ModemPort::open(&config, clock.now()).await?;
         let station = modem_station(&config, address, profile)?;
         let reload = Reload::new(load)?;
@@ -76,7 +84,7 @@ pub fn run_vehicle(load: Load, simulated: Option<SimulatedAutopilot>) -> Result<
             host.handle_camera_end();
         }
         let disk = DiskWatch::new(dir);
-        VehicleShell { host, camera, mapper, ports, clock, keeper, disk, reload, missed: 0 }.run(stop).await
+        VehicleShell { host, camera, mapper, labels, ports, clock, keeper, disk, reload, missed: 0 }.run(stop).await
     })
 }
 
@@ -96,6 +104,8 @@ struct VehicleShell {
     host: VehicleHost,
     camera: Camera,
     mapper: MapperThread,
+    /// Labels of another program, in place of the scene model's.
+    labels: Option<LabelThread>,
     ports: Ports,
     clock: Clock,
     keeper: Keeper<Folder>,
@@ -115,6 +125,7 @@ impl VehicleShell {
                 () = stop.asked() => {
                     modem::log_audit(self.host.link());
                     self.mapper.finish();
+                    self.labels.into_iter().for_each(LabelThread::finish);
                     return Ok(());
                 }
                 _ = tokio::time::sleep_until(self.clock.wall(wake)) => {}
@@ -124,6 +135,11 @@ impl VehicleShell {
                 report = self.ports.pilot.next() => self.handle_pilot(report),
                 config = self.reload.next() => self.follow(&config),
                 frame = self.camera.next() => self.handle_camera(frame),
+                report = LabelThread::next(&mut self.labels) => match report {
+                    Some(FromLabels::Mapped(update, pose)) => self.handle_labels(&update, pose),
+                    Some(FromLabels::Checkpoint { is_refused }) => self.disk.handle_checkpoint(is_refused),
+                    None => return Err(UserError::Failed("the labels' thread ended".to_owned())),
+                },
                 mapped = self.mapper.mapped.recv() => match mapped {
                     Some(FromMapper::Mapped(mapped)) => self.handle_seen(*mapped),
                     Some(FromMapper::Missed(error)) => self.handle_missed(&error),
@@ -153,7 +169,26 @@ impl VehicleShell {
         self.host.handle_budget(budget, self.clock.now());
     }
 
+    /// Takes the map of another program. Without an autopilot, the vehicle is where its last image was taken.
+    fn handle_labels(&mut self, update: &ForeignUpdate, pose: Option<ImagePose>) {
+        let now = self.clock.now();
+        if let Some(ImagePose { x_m, y_m, depth_m, heading_rad }) = pose {
+            self.host.handle_pose(CameraPose { x_m, y_m, heading_rad, depth_m }, now);
+        }
+        if let Some(label) = self.host.handle_foreign(update, now) {
+            tracing::warn!("labels: class {} has another name already, which it keeps", label - 1);
+        }
+    }
+
     fn handle_camera(&mut self, mut frame: RecordedFrame) {
+        if self.labels.is_some() {
+            // The frames of a recording still move the vehicle.
+            self.host.handle_pose(pose_of(&frame), self.clock.now());
+            if self.camera.is_over() {
+                self.host.finish_survey();
+            }
+            return;
+        }
         let pose = self.host.handle_camera(pose_of(&frame));
         (frame.x_m, frame.y_m) = (pose.x_m, pose.y_m);
         (frame.heading_rad, frame.depth_m) = (pose.heading_rad, pose.depth_m);
@@ -181,6 +216,11 @@ impl VehicleShell {
         let now = self.clock.now();
         if let Some(disk) = self.disk.look(std::time::Instant::now()) {
             self.host.handle_disk(disk);
+        }
+        if let Some(labels) = &self.labels {
+            let navigator = self.host.vehicle().navigator();
+            let ((x_m, y_m), depth_m) = (navigator.dead_reckoned().xy(), navigator.depth_m());
+            labels.set_pose(ImagePose { x_m, y_m, depth_m, heading_rad: navigator.heading_rad() });
         }
         self.host.steer(now);
         self.handle_events()?;

@@ -19,6 +19,7 @@ struct Content {
     epoch: u8,
     cell_m: f64,
     last_s: Option<f64>,
+    mark: Option<String>,
     votes: Votes,
     labels: Cells,
     erased: Cells,
@@ -57,6 +58,7 @@ impl ForeignMap {
             epoch: self.epoch,
             cell_m: self.cell_m,
             last_s: self.last_s,
+            mark: self.mark.clone(),
             votes: self.votes.clone(),
             labels: pack(&self.labels),
             erased: pack(&self.erased),
@@ -83,7 +85,7 @@ impl ForeignMap {
             let entry = ClassEntry::from_bytes(*label, bytes).ok_or(ForeignRestoreError::Inconsistent)?;
             map.classes.insert(*label, entry);
         }
-        (map.votes, map.last_s) = (content.votes, content.last_s);
+        (map.votes, map.last_s, map.mark) = (content.votes, content.last_s, content.mark);
         (map.labels, map.erased) = (unpack(&content.labels), unpack(&content.erased));
         Ok((map, content.lineage))
     }

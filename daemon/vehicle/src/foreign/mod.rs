@@ -46,6 +46,8 @@ pub struct ForeignMap {
     bands: BTreeMap<String, BandMap>,
     classes: BTreeMap<u8, ClassEntry>,
     last_s: Option<f64>,
+    /// The name of the last item that has one.
+    mark: Option<String>,
 }
 
 impl ForeignMap {
@@ -69,6 +71,7 @@ impl ForeignMap {
             bands: BTreeMap::new(),
             classes: BTreeMap::new(),
             last_s: None,
+            mark: None,
         }
     }
 
@@ -88,8 +91,18 @@ impl ForeignMap {
             Content::Band { band, ground, levels } => self.take_band(band, *ground, levels)?,
         }
         self.classes.extend(item.classes.iter().map(|entry| (entry.label(), entry.clone())));
-        self.last_s = Some(self.last_s.map_or(t_s, |last_s| last_s.max(t_s)));
+        self.last_s = Some(t_s);
         Ok(())
+    }
+
+    /// Notes the name of an item that was handled, for its source after a restart.
+    pub fn set_mark(&mut self, name: &str) {
+        self.mark = Some(name.to_owned());
+    }
+
+    /// The name of the last item that was handled, before a restart too.
+    pub fn mark(&self) -> Option<&str> {
+        self.mark.as_deref()
     }
 
     /// A class keeps its name and its colour.

@@ -100,6 +100,7 @@ fn a_restored_foreign_map_is_the_saved_one() {
     let mut before = map(&[]);
     before.handle_item(&grid(2, &[0, 253, 255, 9]), None, 5.0).unwrap();
     before.handle_item(&grid(1, &[255]), None, 6.0).unwrap();
+    before.set_mark("000017");
     before.classes.insert(10, ClassEntry::new(10, "kelp", Some([1, 2, 3])).unwrap());
     let config = config(&["scene.cell_m=0.5"]);
     let bytes = before.save(77);
