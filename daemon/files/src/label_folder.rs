@@ -55,6 +55,12 @@ impl LabelFolder {
         Ok(names.into_iter().filter(is_new).collect())
     }
 
+    /// Reads the item of a name whose files nobody writes any more.
+    pub fn read_settled(&mut self, name: &str) -> FolderItem {
+        self.done.insert(name.to_owned());
+        FolderItem { name: name.to_owned(), item: self.try_read(name).0 }
+    }
+
     /// Reads the item of a name at `now_s`; `None` while its files are still being written.
     pub fn read(&mut self, name: &str, now_s: f64) -> Option<FolderItem> {
         let (item, lengths) = self.try_read(name);
