@@ -254,7 +254,7 @@ mod tests {
             (&grid(""), &[1, 2], "2 bytes, and the header names 1 x 1"),
             (&grid(r#","t_s":-1"#), &[0], "t_s -1 is not within 0 to 1e9 s"),
             (&grid(r#","classes":[{"class":254,"name":"x"}]"#), &[0], "class 254"),
-            (&grid(r#","classes":[{"class":3,"name":""}]"#), &[0], "class 3: the name takes 1 to 40 bytes"),
+            (&grid(r#","classes":[{"class":3,"name":""}]"#), &[0], "class 3: the name takes 1 to 60 bytes"),
             (&grid(r##","classes":[{"class":3,"name":"x","colour":"#12345"}]"##), &[0], "class 3: the colour takes #"),
             (r#"{"kind":"grid","south_m":0,"cell_m":1}"#, &[0], "west_m is missing"),
             (r#"{"kind":"grid","west_m":0,"south_m":0,"cell_m":0}"#, &[0], "cell_m 0 is not within"),

@@ -8,7 +8,7 @@ use scenecast_protocol::time::Instant;
 use std::collections::{BTreeMap, VecDeque};
 
 /// Maximum length of a label's name, characters.
-const MAX_NAME: usize = 40;
+const MAX_NAME: usize = 60;
 /// Maximum length of a note, characters.
 const MAX_NOTE: usize = 1000;
 

@@ -23,7 +23,7 @@ pub use event::{OversizedChunk, VehicleEvent};
 
 use super::{LinkPair, LinkStats, SlotInbox, SlotInboxState, Wakeup};
 use crate::directive::{Budget, Slot, SlotId, SlotState};
-use crate::mac::{Access, ClockMap, Floor};
+use crate::mac::{ClockMap, Floor};
 use crate::map::{Cell, ClassEntry, ClassSource, LabelGrid, LayerId, LayerMask, LayerSource, MapSource, StateSource};
 use crate::object::ObjectId;
 use crate::schedule::{BackgroundOrder, BitBudget, Shares};
@@ -291,7 +291,7 @@ impl<S: StateSource> VehicleLink<S> {
 
     /// The transmission that was handed out has left the modem.
     pub fn handle_transmit_outcome(&mut self, now: Instant) {
-        if let Access::ModemOwned { .. } = self.config.modem.access {
+        if self.config.modem.access.is_free() {
             self.budget.handle_delay(self.floor.in_modem() as usize, now);
         }
         self.floor.handle_sent();

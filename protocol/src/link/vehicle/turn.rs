@@ -88,7 +88,7 @@ impl<S: StateSource> VehicleLink<S> {
     }
 
     fn has_reason_to_transmit(&self, now: Instant) -> bool {
-        if !matches!(self.config.modem.access, Access::ModemOwned { .. }) {
+        if !self.config.modem.access.is_free() {
             return true;
         }
         let is_repeat_due = self.hello_limit.next_repeat().is_some_and(|at| now >= at);
@@ -98,7 +98,7 @@ impl<S: StateSource> VehicleLink<S> {
     }
 
     pub(super) fn next_wakeup(&self) -> Option<Instant> {
-        if !matches!(self.config.modem.access, Access::ModemOwned { .. }) {
+        if !self.config.modem.access.is_free() {
             return self.floor.next_wakeup();
         }
         let status = self.content.status.next_due().filter(|_| self.pair.has_run());
@@ -148,7 +148,7 @@ impl<S: StateSource> VehicleLink<S> {
     }
 
     fn plan(&self, frames: u32, now: Instant) -> FramePlan {
-        if matches!(self.config.modem.access, Access::ModemOwned { .. }) {
+        if self.config.modem.access.is_free() {
             return FramePlan { remaining: 0, is_last_new: false };
         }
         let wanted = self.frames_wanted(now);
@@ -163,7 +163,7 @@ impl<S: StateSource> VehicleLink<S> {
         let size = modem.frame_bytes;
         // Where the surface polls or grants turns, content shows that it uses the current run: a late hello alone is no reason
         // to leave it.
-        let may_repeat = matches!(modem.access, Access::ModemOwned { .. }) || self.is_answer_due(now);
+        let may_repeat = modem.access.is_free() || self.is_answer_due(now);
         if may_repeat && self.hello_limit.repeat(now) {
             self.pair.repeat_hello();
         }
@@ -180,7 +180,7 @@ impl<S: StateSource> VehicleLink<S> {
             carried = self.content.fill(&mut builder, &context);
             self.events.extend(self.content.oversized.take().map(VehicleEvent::Oversized));
         }
-        let takes_turns = !matches!(modem.access, Access::ModemOwned { .. });
+        let takes_turns = !modem.access.is_free();
         let is_complete = takes_turns && !sends_hello && self.content.backlog_bytes(&self.budget, now) == 0;
         if is_complete {
             self.repeater.note_complete();

@@ -16,7 +16,7 @@ pub const MAX_CLASS: u8 = MAX_LABEL - 1;
 /// +-+-+-----------+---------------+---------------+---------------+
 /// ```
 /// * C: 1 = there is a colour; else the three bytes of it are left out.
-/// * n: 1 to 40; the name is UTF-8 without control characters.
+/// * n: 1 to 60; the name is UTF-8 without control characters.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ClassEntry {
     label: u8,
@@ -26,7 +26,7 @@ pub struct ClassEntry {
 
 impl ClassEntry {
     /// Most bytes of a name.
-    pub const MAX_NAME: usize = 40;
+    pub const MAX_NAME: usize = 60;
     /// Most bytes of an entry.
     pub const MAX_BYTES: usize = 4 + Self::MAX_NAME;
 
@@ -103,7 +103,7 @@ mod tests {
         assert_eq!(ClassEntry::digest_of(3, &[0x83, 0xE0, 0xC0, 0x80, b's', b'a', b'n', b'd']), 0x0DB4);
         assert!(ClassEntry::new(0, "x", None).is_none() && ClassEntry::new(255, "x", None).is_none());
         assert!(ClassEntry::new(1, "", None).is_none() && ClassEntry::new(1, "a\nb", None).is_none());
-        assert!(ClassEntry::new(1, &"x".repeat(40), None).is_some() && ClassEntry::new(1, &"x".repeat(41), None).is_none());
+        assert!(ClassEntry::new(1, &"x".repeat(60), None).is_some() && ClassEntry::new(1, &"x".repeat(61), None).is_none());
         assert_eq!((ClassEntry::label_of(0), ClassEntry::label_of(253), ClassEntry::label_of(254)), (Some(1), Some(254), None));
     }
 

@@ -70,7 +70,7 @@ mod tests {
         #[test]
         fn names_arrive_whatever_is_lost(rooms in proptest::collection::vec((10usize..60, any::<bool>()), 40..80)) {
             let (mut source, mut replica) = (ClassSource::default(), ClassReplica::default());
-            let entries = [entry(1, "sand"), entry(9, &"x".repeat(40)), entry(254, "Posidonia oceanica")];
+            let entries = [entry(1, "sand"), entry(9, &"x".repeat(60)), entry(254, "Posidonia oceanica")];
             entries.iter().for_each(|e| assert!(source.add(e)));
             for (room, is_delivered) in rooms.into_iter().chain([(60, true); 20]) {
                 let Some((chunk, carried)) = source.next_chunk(room) else { continue };

@@ -12,6 +12,8 @@ use std::time::Duration;
 
 /// Frame numbers since the last acknowledgement after which the next one does not wait any longer.
 const MAX_UNACKNOWLEDGED: u64 = 16;
+/// Over a medium that carries both directions at once, the time beside two round trips after which a slot goes out again.
+const FULL_DUPLEX_REPEAT: Duration = Duration::from_millis(400);
 
 impl<R: StateReplica> VehiclePeer<R> {
     fn must_send_hello(&self, now: Instant) -> bool {
@@ -116,6 +118,9 @@ impl<R: StateReplica> VehiclePeer<R> {
 
     /// Time after which a slot that was not acknowledged goes out again.
     pub(super) fn slot_timeout(&self) -> Duration {
-        self.master.round_trip().unwrap_or(Duration::from_secs(4)) * 2 + Duration::from_secs(4)
+        match self.is_full_duplex {
+            true => self.master.round_trip().unwrap_or(Duration::from_secs(1)) * 2 + FULL_DUPLEX_REPEAT,
+            false => self.master.round_trip().unwrap_or(Duration::from_secs(4)) * 2 + Duration::from_secs(4),
+        }
     }
 }
