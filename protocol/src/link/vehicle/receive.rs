@@ -126,6 +126,9 @@ impl<S: StateSource> VehicleLink<S> {
     }
 
     fn handle_fates(&mut self, fates: Vec<(Carried<S::Carried>, bool)>, now: Instant) {
+        if !fates.is_empty() {
+            self.probe.handle_fates(self.pair.outstanding());
+        }
         for (carried, delivered) in fates {
             for (part, bytes) in carried {
                 if delivered {

@@ -54,6 +54,11 @@ impl<S: StateSource> VehicleLink<S> {
             self.renew(now);
         }
         let (transmit, last) = self.next_frame(frames, now);
+        if modem.access == Access::FullDuplex {
+            let round_trip = self.timing.one_way().unwrap_or_default() * 2;
+            let wait = modem.answer_wait(Duration::ZERO) * 2 + modem.airtime(transmit.bytes.len()) + round_trip;
+            self.probe.handle_transmit(wait, now);
+        }
         self.floor.spend(last);
         self.budget.spend(modem.bits_on_air(transmit.bytes.len()), now);
         Some(transmit)
@@ -92,7 +97,8 @@ impl<S: StateSource> VehicleLink<S> {
             return true;
         }
         let is_repeat_due = self.hello_limit.next_repeat().is_some_and(|at| now >= at);
-        let answer = self.is_answer_due(now) || is_repeat_due || self.call_reply.is_pending();
+        let is_probe_due = self.probe.is_due(now) && self.pair.has_run();
+        let answer = is_probe_due || self.is_answer_due(now) || is_repeat_due || self.call_reply.is_pending();
         let news = self.content.backlog_bytes(&self.budget, now) > 0;
         answer || (self.pair.has_run() && (news || self.content.status.is_waiting(now)))
     }
@@ -103,7 +109,8 @@ impl<S: StateSource> VehicleLink<S> {
         }
         let status = self.content.status.next_due().filter(|_| self.pair.has_run());
         let held = self.content.next_due().filter(|_| self.pair.has_run());
-        let due = [status, held, self.answer_due, self.hello_limit.next_repeat()].into_iter().flatten().min();
+        let probe = self.probe.due().filter(|_| self.pair.has_run());
+        let due = [status, held, probe, self.answer_due, self.hello_limit.next_repeat()].into_iter().flatten().min();
         match self.blocked_until {
             Some(blocked) => Some(due.map_or(blocked, |at| at.max(blocked))),
             None => due,
