@@ -76,7 +76,7 @@ impl<S: StateSource> VehicleLink<S> {
             repeater: Repeater::default(),
             timing: SurfaceTiming::default(),
             call_reply: CallReply::new(seed),
-            hello_limit: HelloLimit::new(now),
+            hello_limit: HelloLimit::new(config.modem.access, now),
             probe: TailProbe::default(),
             answer_due: None,
             blocked_until: None,

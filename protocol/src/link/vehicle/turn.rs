@@ -215,7 +215,7 @@ impl<S: StateSource> VehicleLink<S> {
         if sends_hello {
             self.hello_limit.note_answer(now);
         }
-        self.answer_due = sends_hello.then(|| now + Duration::from_secs(10));
+        self.answer_due = sends_hello.then(|| now + self.hello_limit.repeat_interval());
         (transmit, last && takes_turns)
     }
 
