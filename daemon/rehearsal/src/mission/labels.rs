@@ -97,6 +97,11 @@ impl Mission {
         self.labels.as_ref().filter(|_| self.times.ended.is_none())?.next_due()
     }
 
+    /// Whether another program makes the map.
+    pub fn has_foreign_labels(&self) -> bool {
+        self.labels.is_some()
+    }
+
     /// The files of another program that were refused so far, each with the cause.
     pub fn refused_labels(&self) -> &[String] {
         self.labels.as_ref().map_or(&[], |labels| &labels.refused)

@@ -6,6 +6,8 @@ mod blocks;
 mod camera;
 mod carrier;
 mod events;
+#[cfg(test)]
+mod label_tests;
 mod labels;
 mod logbook;
 mod meters;

@@ -23,7 +23,8 @@ use tokio::sync::mpsc;
 
 /// Longest time for which items are collected before the vehicle gets the map with them.
 const BATCH: Duration = Duration::from_millis(200);
-/// Shortest time between two lines of the log about refused items.
+/// Most lines of the log about refused items in [`LOG_PAUSE`]; the others are counted.
+const LOG_LINES: u32 = 10;
 const LOG_PAUSE: Duration = Duration::from_secs(1);
 
 /// A report of the thread.
@@ -92,23 +93,27 @@ impl LabelThread {
 struct Counts {
     taken: u64,
     refused: u64,
-    /// Refused items that were not logged, and when one was logged last.
+    /// Refused items that were not logged, and the lines of the log since a moment.
     unsaid: u64,
-    said: Option<Instant>,
+    said: u32,
+    since: Option<Instant>,
 }
 
 impl Counts {
     fn refuse(&mut self, origin: &str, why: &Refusal) {
         self.refused += 1;
-        if self.said.is_some_and(|at| at.elapsed() < LOG_PAUSE) {
+        if self.since.is_none_or(|at| at.elapsed() >= LOG_PAUSE) {
+            (self.said, self.since) = (0, Some(Instant::now()));
+        }
+        if self.said >= LOG_LINES {
             self.unsaid += 1;
             return;
         }
+        self.said += 1;
         let more = match std::mem::take(&mut self.unsaid) {
             0 => String::new(),
             others => format!(", {others} of them since the last line"),
         };
-        self.said = Some(Instant::now());
         tracing::warn!("labels: {origin}: {why}; refused so far: {}{more}", self.refused);
     }
 }

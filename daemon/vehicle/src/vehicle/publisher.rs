@@ -41,6 +41,8 @@ pub(super) struct MapPublisher {
     /// Every cell that the scene model has a label for.
     map: LabelGrid,
     version: u64,
+    /// Whether cells have lost their labels, as those of another program may.
+    has_erased: bool,
     layers: BTreeMap<LayerId, Vec<(Cell, f64)>>,
     labels: u8,
     explored: u32,
@@ -139,6 +141,7 @@ impl MapPublisher {
         self.explored = update.cells.iter().filter(|&&(_, label)| label != UNEXPLORED).count() as u32;
         let changed = update.cells.iter().filter(|&&(cell, label)| self.map.set(cell, label) != label).count();
         self.version += u64::from(changed > 0);
+        self.has_erased |= (self.explored as usize) < update.cells.len();
         self.layers.retain(|id, _| self.bands.get(*id).is_some());
         self.layers.extend(update.layers.iter().map(|(&id, cells)| (id, cells.clone())));
         match &mut self.whole_png {
@@ -181,7 +184,11 @@ impl MapPublisher {
         let is_sent = |sent: &LabelGrid, cell: Cell| {
             !is_coarse || Stride::Four.on_lattice(cell).is_some() || sent.get(cell) != UNEXPLORED
         };
-        let cells: Vec<(Cell, u8)> = self.map.iter().filter(|&(cell, _)| is_sent(link.map(), cell)).collect();
+        let mut cells: Vec<(Cell, u8)> = self.map.iter().filter(|&(cell, _)| is_sent(link.map(), cell)).collect();
+        if self.has_erased {
+            let gone = link.map().iter().filter(|&(cell, _)| self.map.get(cell) == UNEXPLORED);
+            cells.extend(gone.map(|(cell, _)| (cell, UNEXPLORED)));
+        }
         link.set_map(cells, now);
         for (&id, cells) in &self.layers {
             let cells: Vec<(Cell, f64)> =
