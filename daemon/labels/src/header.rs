@@ -104,12 +104,15 @@ impl Header {
             Kind::Classes => Content::Classes,
             Kind::Image => {
                 let metres_per_pixel = members.metres_per_pixel;
-                let metres_per_pixel = metres_per_pixel.map(|m| within("metres_per_pixel", m, 1e-5, 100.0, "1e-5 to 100 m"));
+                let metres_per_pixel =
+                    metres_per_pixel.map(|m| within("metres_per_pixel", m, 1e-5, 100.0, "1e-5 to 100 m"));
                 let metres_per_pixel = metres_per_pixel.transpose()?;
                 Content::Image { pose: members.pose()?, metres_per_pixel, classes: members.classes_of(picture)? }
             }
             Kind::Grid => Content::Grid { ground: members.ground()?, classes: members.classes_of(picture)? },
-            Kind::Band => Content::Band { band: members.band()?, ground: members.ground()?, levels: members.raster(picture)? },
+            Kind::Band => {
+                Content::Band { band: members.band()?, ground: members.ground()?, levels: members.raster(picture)? }
+            }
         };
         Ok(Item { t_s, classes, content })
     }
@@ -226,15 +229,27 @@ mod tests {
             "width": 2, "height": 1, "classes": [{"class": 0, "name": "sand", "colour": "#E0c080"}]}"##;
         let item = read(image, &[0, 255]).unwrap();
         assert_eq!((item.t_s, item.classes.len()), (Some(2.5), 1));
-        assert_eq!((item.classes[0].label(), item.classes[0].name(), item.classes[0].colour()), (1, "sand", Some([0xE0, 0xC0, 0x80])));
+        assert_eq!(
+            (item.classes[0].label(), item.classes[0].name(), item.classes[0].colour()),
+            (1, "sand", Some([0xE0, 0xC0, 0x80]))
+        );
         let Content::Image { pose: Some(pose), metres_per_pixel: None, classes } = item.content else { panic!() };
-        assert_eq!((pose.x_m, pose.y_m, pose.heading_rad, &classes.values[..]), (3.0, -4.0, 90f64.to_radians(), &[0, 255][..]));
+        assert_eq!(
+            (pose.x_m, pose.y_m, pose.heading_rad, &classes.values[..]),
+            (3.0, -4.0, 90f64.to_radians(), &[0, 255][..])
+        );
         let grid = r#"{"kind":"grid","west_m":0,"south_m":1,"cell_m":0.5,"encoding":"raw","width":1,"height":1}"#;
-        assert!(matches!(read(grid, &[253]).unwrap().content, Content::Grid { ground: Ground { south_m: 1.0, .. }, .. }));
+        assert!(matches!(
+            read(grid, &[253]).unwrap().content,
+            Content::Grid { ground: Ground { south_m: 1.0, .. }, .. }
+        ));
         let band = r#"{"kind":"band","name":"backscatter","unit":"dB","scale":0.5,"offset":-80,"west_m":0,"south_m":0,
             "cell_m":1,"encoding":"raw","width":1,"height":1}"#;
         let Content::Band { band, levels, .. } = read(band, &[254]).unwrap().content else { panic!() };
-        assert_eq!((band.scale, band.offset, band.no_data, levels.values[0]), (Decimal::new(5, -1), Decimal::new(-80, 0), 255, 254));
+        assert_eq!(
+            (band.scale, band.offset, band.no_data, levels.values[0]),
+            (Decimal::new(5, -1), Decimal::new(-80, 0), 255, 254)
+        );
         assert_eq!(read(r#"{"kind":"classes"}"#, &[]).unwrap().content, Content::Classes);
         let own = r#"{"kind":"image","encoding":"raw","width":1,"height":1}"#;
         assert!(matches!(read(own, &[0]).unwrap().content, Content::Image { pose: None, .. }));
@@ -243,7 +258,9 @@ mod tests {
     #[test]
     fn refused_items_are_named() {
         let grid = |more: &str| {
-            format!(r#"{{"kind":"grid","west_m":0,"south_m":0,"cell_m":1,"encoding":"raw","width":1,"height":1{more}}}"#)
+            format!(
+                r#"{{"kind":"grid","west_m":0,"south_m":0,"cell_m":1,"encoding":"raw","width":1,"height":1{more}}}"#
+            )
         };
         for (header, picture, said) in [
             ("{", &[0][..], "the header: EOF"),

@@ -100,7 +100,10 @@ mod tests {
         for colour in [ColorType::Grayscale, ColorType::Indexed] {
             let eight = Raster::png(&png(colour, BitDepth::Eight, (3, 2), &[0, 9, 255, 1, 2, 253])).unwrap();
             assert_eq!((eight.width, eight.height, &eight.values[..]), (3, 2, &[0, 9, 255, 1, 2, 253][..]));
-            assert_eq!((eight.get(2, 0), eight.get(0, 1), eight.get(3, 0), eight.get(0, 2)), (Some(255), Some(1), None, None));
+            assert_eq!(
+                (eight.get(2, 0), eight.get(0, 1), eight.get(3, 0), eight.get(0, 2)),
+                (Some(255), Some(1), None, None)
+            );
             let two = Raster::png(&png(colour, BitDepth::Two, (3, 2), &[0b01_11_10_00, 0b00_01_10_00])).unwrap();
             assert_eq!(two.values, [1, 3, 2, 0, 1, 2]);
         }

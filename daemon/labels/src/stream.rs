@@ -94,7 +94,8 @@ mod tests {
     use crate::Content;
     use proptest::prelude::*;
 
-    const GRID: &str = r#"{"kind":"grid","west_m":0,"south_m":0,"cell_m":1,"encoding":"raw","width":3,"height":1,"bytes":3}"#;
+    const GRID: &str =
+        r#"{"kind":"grid","west_m":0,"south_m":0,"cell_m":1,"encoding":"raw","width":3,"height":1,"bytes":3}"#;
 
     fn sent() -> Vec<u8> {
         let mut bytes = b"\n{\"kind\":\"classes\",\"classes\":[{\"class\":1,\"name\":\"rock\"}]}\r\n".to_vec();

@@ -9,9 +9,9 @@ mod fuzz_corpus_tests;
 #[cfg(feature = "surface")]
 mod instruments;
 mod journal;
-mod labels;
 #[cfg(test)]
 mod kept_label_tests;
+mod labels;
 #[cfg(feature = "surface")]
 mod map_files;
 mod mapping;

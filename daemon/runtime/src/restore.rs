@@ -3,8 +3,8 @@
 use super::checkpoint::CheckpointFile;
 use super::durable::{Keeper, StartedRun};
 use super::journal::Folder;
-use super::mapping::Keep;
 use super::labels;
+use super::mapping::Keep;
 use scenecast_config::{Config, LabelSource};
 use scenecast_core::UserError;
 use scenecast_files::configured_vocabulary;

@@ -114,7 +114,8 @@ fn layer_chunks() -> Rows {
     let named = |label: u8, name: &str, colour: Option<[u8; 3]>, to: Option<usize>| {
         let entry = ClassEntry::new(label, name, colour).unwrap().to_bytes();
         let (digest, is_last) = (ClassEntry::digest_of(label, &entry), to.is_none());
-        let bytes = ClassChunk { label, digest, first: 0, is_last, bytes: &entry[..to.unwrap_or(entry.len())] }.encode();
+        let bytes =
+            ClassChunk { label, digest, first: 0, is_last, bytes: &entry[..to.unwrap_or(entry.len())] }.encode();
         assert_eq!(ClassChunk::decode(&bytes).map(|chunk| chunk.encode()), Some(bytes.clone()));
         bytes
     };

@@ -56,7 +56,8 @@ fn fed(grid: i32) -> LabelGrid {
 #[test]
 fn a_fed_map_converges_with_names_bands_and_refusals() {
     let dir = folder("fed-labels");
-    let names = r##","classes":[{"class":0,"name":"sand","colour":"#E0C080"},{"class":40,"name":"Posidonia oceanica"}]"##;
+    let names =
+        r##","classes":[{"class":0,"name":"sand","colour":"#E0C080"},{"class":40,"name":"Posidonia oceanica"}]"##;
     for grid in 0..4 {
         let more = if grid == 0 { names } else { "" };
         write(&dir, &format!("{grid}"), &header("grid", 10 + 5 * grid, more), Some(&picture(|x, y| class(x, y, grid))));
@@ -65,10 +66,13 @@ fn a_fed_map_converges_with_names_bands_and_refusals() {
     write(&dir, "band", &header("band", 12, band), Some(&picture(|x, y| if x == y { 255 } else { (x * 6) as u8 })));
     write(&dir, "wrong", &header("grid", 13, r#","classes":[{"class":0,"name":"mud"}]"#), Some(&picture(|_, _| 0)));
     write(&dir, "lonely", &header("grid", 14, ""), None);
-    for sets in [&[][..], &["modem.kind=udp", "modem.full_duplex=true", "channel.half_duplex=false", "channel.range_m=10"]] {
+    for sets in
+        [&[][..], &["modem.kind=udp", "modem.full_duplex=true", "channel.half_duplex=false", "channel.range_m=10"]]
+    {
         let mut mission = mission(&dir, sets);
         let mut until = 40.0;
-        let is_done = |m: &Mission| m.surface().map(m.address()).is_some_and(|map| map == &fed(3)) && m.vehicle().is_converged();
+        let is_done =
+            |m: &Mission| m.surface().map(m.address()).is_some_and(|map| map == &fed(3)) && m.vehicle().is_converged();
         while !is_done(&mission) {
             assert!(until < 400.0, "not equal after {until} s");
             mission.advance(Instant::from_secs_f64(until)).unwrap();

@@ -5,8 +5,8 @@ mod grid;
 mod rig;
 mod whole;
 
-pub use grid::Pattern;
 use grid::ChangingGrid;
+pub use grid::Pattern;
 use rig::{RadioRig, address};
 use scenecast_protocol::directive::{OrderStatus, Slot, Utility};
 use scenecast_protocol::link::IssueError;
@@ -161,7 +161,8 @@ fn measure<S: Sends>(
         }
         if rig.now >= next_order && order.is_none() {
             next_order = rig.now + ORDER_INTERVAL;
-            let slot = Slot::Utility(Utility { exploration: (rig.now.as_secs_f64() as i64 % 90) as i8, ..Utility::default() });
+            let slot =
+                Slot::Utility(Utility { exploration: (rig.now.as_secs_f64() as i64 % 90) as i8, ..Utility::default() });
             order = Some((rig.surface.end_mut().issue(address(), slot, rig.now)?, rig.now));
         }
         rig.run_for(LOOK);
@@ -268,7 +269,10 @@ mod tests {
             RasterFigures { vehicle_cpu: 0.0, surface_cpu: 0.0, ..changes(&setting, 3, &mut |_| {}).unwrap() }
         );
         let theirs = whole(&setting, 3, &mut |_| {}).unwrap();
-        assert!(ours.equal > 0.98 && ours.age_median_s < 1.0 && ours.status_s <= 3.0 && ours.order_s <= 2.0, "{ours:?}");
+        assert!(
+            ours.equal > 0.98 && ours.age_median_s < 1.0 && ours.status_s <= 3.0 && ours.order_s <= 2.0,
+            "{ours:?}"
+        );
         assert!(theirs.equal < ours.equal && theirs.age_median_s > ours.age_median_s, "{theirs:?}");
     }
 }

@@ -23,7 +23,9 @@ impl Feed {
     pub(crate) fn open(config: &Config, mark: Option<&str>) -> Result<Self, UserError> {
         match &config.labels.source {
             LabelSource::SceneModel => Err(UserError::Input("labels.source is empty".to_owned())),
-            LabelSource::Folder(dir) if !dir.is_dir() => Err(UserError::file(dir, "labels.source: there is no such folder")),
+            LabelSource::Folder(dir) if !dir.is_dir() => {
+                Err(UserError::file(dir, "labels.source: there is no such folder"))
+            }
             LabelSource::Folder(dir) => Ok(Self::folder(LabelFolder::new(dir, mark.map(str::to_owned)))),
             LabelSource::Network(place) => super::serve::network(place.as_str()),
             #[cfg(unix)]

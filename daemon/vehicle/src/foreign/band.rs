@@ -3,8 +3,8 @@
 use super::ground::GroundRaster;
 use scenecast_labels::{Band, Ground, Raster, Refusal};
 use scenecast_protocol::map::{
-    BUILT_IN_LAYERS, Cell, Decimal, LabelGrid, LayerDescriptor, MAX_LABEL, Palette, Quantity, Spread, Steps, UNEXPLORED,
-    UpperEnd,
+    BUILT_IN_LAYERS, Cell, Decimal, LabelGrid, LayerDescriptor, MAX_LABEL, Palette, Quantity, Spread, Steps,
+    UNEXPLORED, UpperEnd,
 };
 
 /// A band in cells of the map.

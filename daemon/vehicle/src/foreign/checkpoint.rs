@@ -1,8 +1,8 @@
 //! The checkpoint of the map that another program makes.
 
+use super::ForeignMap;
 use super::band::BandMap;
 use super::votes::Votes;
-use super::ForeignMap;
 use scene_model::envelope::{Envelope, EnvelopeError};
 use scenecast_config::Config;
 use scenecast_protocol::map::{Cell, ClassEntry, LabelGrid, LayerDescriptor};

@@ -43,7 +43,8 @@ impl<'a> GroundRaster<'a> {
                     let of_row = |north: u32| across(x, west_m).filter_map(move |column| self.at(column, north));
                     values.extend(across(y, south_m).flat_map(of_row));
                 } else {
-                    let place = |cell: i32, origin: f64| (((f64::from(cell) + 0.5) * self.cell_m - origin) / edge).floor();
+                    let place =
+                        |cell: i32, origin: f64| (((f64::from(cell) + 0.5) * self.cell_m - origin) / edge).floor();
                     values.extend(self.at(place(x, west_m) as u32, place(y, south_m) as u32));
                 }
                 if !values.is_empty() {
@@ -80,7 +81,8 @@ mod tests {
         let raster = Raster { width: 3, height: 2, values: vec![1, 2, 3, 4, 5, 6] };
         for cell_m in [0.1, 0.25, 1.0 / 3.0] {
             let ground = Ground { west_m: -2.0 * cell_m, south_m: 7.0 * cell_m, cell_m };
-            let cells: Vec<(i32, i32, u8)> = read(&raster, ground, cell_m).into_iter().map(|(x, y, v)| (x, y, v[0])).collect();
+            let cells: Vec<(i32, i32, u8)> =
+                read(&raster, ground, cell_m).into_iter().map(|(x, y, v)| (x, y, v[0])).collect();
             assert_eq!(cells, [(-2, 7, 4), (-1, 7, 5), (0, 7, 6), (-2, 8, 1), (-1, 8, 2), (0, 8, 3)]);
         }
     }
@@ -90,7 +92,9 @@ mod tests {
         let raster = Raster { width: 2, height: 2, values: vec![1, 2, 3, 4] };
         let coarse = read(&raster, Ground { west_m: 0.0, south_m: 0.0, cell_m: 2.0 }, 1.0);
         assert_eq!(coarse.len(), 16);
-        assert!(coarse.contains(&(0, 0, vec![3])) && coarse.contains(&(3, 3, vec![2])) && coarse.contains(&(1, 2, vec![1])));
+        assert!(
+            coarse.contains(&(0, 0, vec![3])) && coarse.contains(&(3, 3, vec![2])) && coarse.contains(&(1, 2, vec![1]))
+        );
         let fine = read(&raster, Ground { west_m: 1.0, south_m: 0.0, cell_m: 0.5 }, 1.0);
         assert_eq!(fine, [(1, 0, vec![3, 4, 1, 2])]);
         let huge = Raster { width: 4096, height: 4096, values: Vec::new() };

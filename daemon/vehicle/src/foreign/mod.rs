@@ -236,11 +236,8 @@ fn image_votes(image: &Raster, camera: &DownCamera, pose: ImagePose, cell_m: f64
     let cell = |metres: f64| (metres / cell_m).floor() as i32;
     let mut seen: BTreeMap<(i32, i32), CellVotes> = BTreeMap::new();
     for (row, classes) in image.values.chunks(image.width.max(1) as usize).enumerate() {
-        let pixel = |(column, &class): (usize, &u8)| Word {
-            id: u32::from(class),
-            u: column as f32 + 0.5,
-            v: row as f32 + 0.5,
-        };
+        let pixel =
+            |(column, &class): (usize, &u8)| Word { id: u32::from(class), u: column as f32 + 0.5, v: row as f32 + 0.5 };
         let words: Vec<Word> = classes.iter().enumerate().filter(|(_, class)| **class != UNKNOWN).map(pixel).collect();
         // Neighbours mostly vote for the same class of the same cell.
         let mut run: Option<((i32, i32), u8, u32)> = None;

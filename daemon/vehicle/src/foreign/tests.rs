@@ -30,7 +30,9 @@ fn labels(map: &ForeignMap) -> Vec<(i32, i32, u8)> {
 fn a_segmented_image_is_projected_like_a_camera_frame() {
     // A pixel of 0.5 m is a cell; the vehicle heads east, so that the top of the image lies in the east.
     let pose = ImagePose { x_m: 1.0, y_m: 1.0, depth_m: 5.0, heading_rad: f64::to_radians(90.0) };
-    let image = |values: &[u8]| item(Content::Image { pose: Some(pose), metres_per_pixel: Some(0.5), classes: raster(2, values) });
+    let image = |values: &[u8]| {
+        item(Content::Image { pose: Some(pose), metres_per_pixel: Some(0.5), classes: raster(2, values) })
+    };
     let mut seen = map(&[]);
     seen.handle_item(&image(&[0, 1, 255, 7]), None, 4.0).unwrap();
     // Left and right of the top row: north-east and south-east.
@@ -46,7 +48,9 @@ fn a_segmented_image_is_projected_like_a_camera_frame() {
 #[test]
 fn images_vote_and_the_newest_wins_if_configured() {
     let pose = ImagePose { x_m: 0.25, y_m: 0.25, depth_m: 0.0, heading_rad: 0.0 };
-    let image = |class: u8| item(Content::Image { pose: Some(pose), metres_per_pixel: Some(0.1), classes: raster(2, &[class; 4]) });
+    let image = |class: u8| {
+        item(Content::Image { pose: Some(pose), metres_per_pixel: Some(0.1), classes: raster(2, &[class; 4]) })
+    };
     for (sets, expected) in [(&[][..], 5), (&["labels.votes=newest"][..], 9)] {
         let mut seen = map(sets);
         for class in [4, 4, 8] {
@@ -72,10 +76,7 @@ fn a_grid_states_each_cell_and_can_make_it_unknown() {
 #[test]
 fn a_class_keeps_its_name_and_a_band_its_scale() {
     let mut map = map(&[]);
-    let named = |name: &str| Item {
-        classes: vec![ClassEntry::new(4, name, None).unwrap()],
-        ..grid(1, &[3])
-    };
+    let named = |name: &str| Item { classes: vec![ClassEntry::new(4, name, None).unwrap()], ..grid(1, &[3]) };
     map.handle_item(&named("rock"), None, 0.0).unwrap();
     let refused = map.handle_item(&named("mud"), None, 1.0).unwrap_err();
     assert_eq!(refused, Refusal::OtherName(3, "rock".to_owned()));

@@ -26,7 +26,12 @@ impl Bands {
 
     /// The layer of a band, which the link has from then on; `None` if it has no further one. A band with the name of a
     /// built-in layer has that layer's levels.
-    pub(super) fn add(&mut self, descriptor: &LayerDescriptor, codec: Codec, link: &mut VehicleLink) -> Option<LayerId> {
+    pub(super) fn add(
+        &mut self,
+        descriptor: &LayerDescriptor,
+        codec: Codec,
+        link: &mut VehicleLink,
+    ) -> Option<LayerId> {
         if let Some(id) = self.set.id(&descriptor.name) {
             self.ids.0 |= 1 << id.index();
             return Some(id);

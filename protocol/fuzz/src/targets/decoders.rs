@@ -4,7 +4,9 @@ use super::raw::{self, Script};
 use scenecast_protocol::directive::{InForceDigests, InForcePart, REPORTED_SLOTS, Series, SlotState, VersionedSlot};
 use scenecast_protocol::link::{Admission, Flight, LinkWindow, SlotInbox};
 use scenecast_protocol::mac::ClockMap;
-use scenecast_protocol::map::{Assembly, ClassChunk, ClassEntry, ClassReplica, LayerChunk, LayerDescriptor, LayerReplica, LayerSet};
+use scenecast_protocol::map::{
+    Assembly, ClassChunk, ClassEntry, ClassReplica, LayerChunk, LayerDescriptor, LayerReplica, LayerSet,
+};
 use scenecast_protocol::object::{MAX_OBJECT, ObjectReceiver, Part, Received};
 use scenecast_protocol::seal::{Direction, MissionKey};
 use scenecast_protocol::time::Instant;

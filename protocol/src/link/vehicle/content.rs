@@ -130,7 +130,10 @@ impl<S: StateSource> VehicleContent<S> {
 
     /// About how many bytes wait and may be sent.
     pub(super) fn backlog_bytes(&self, budget: &BitBudget, now: Instant) -> usize {
-        let own = self.source.backlog_bytes() + self.classes.backlog_bytes() + self.shared_layer_backlog() + self.objects.backlog_bytes();
+        let own = self.source.backlog_bytes()
+            + self.classes.backlog_bytes()
+            + self.shared_layer_backlog()
+            + self.objects.backlog_bytes();
         own + self.in_force.backlog_bytes() + self.background_backlog(budget, now)
     }
 

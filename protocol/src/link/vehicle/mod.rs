@@ -63,7 +63,13 @@ pub struct VehicleLink<S: StateSource = MapSource> {
 impl<S: StateSource> VehicleLink<S> {
     /// An end without contact that replicates `source`. `seed` must be random for each run; `restored` is the state
     /// that survived the last one.
-    pub fn with_source(config: VehicleConfig, mut source: S, seed: u64, restored: SlotInboxState, now: Instant) -> Self {
+    pub fn with_source(
+        config: VehicleConfig,
+        mut source: S,
+        seed: u64,
+        restored: SlotInboxState,
+        now: Instant,
+    ) -> Self {
         source.set_quick(config.modem.access == Access::FullDuplex);
         let introduction = Introduction { cell_edge: config.cell_edge, series: None };
         let (mission, authenticity) = (config.mission, config.authenticity.clone());

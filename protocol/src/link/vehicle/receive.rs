@@ -165,9 +165,7 @@ impl<S: StateSource> VehicleLink<S> {
     /// Where the modem decides when to transmit, an acknowledgement or hello goes out within a second,
     /// by itself if need be. The first frames after a frame of the surface carry it, as those of a turn do.
     fn owe_answer(&mut self, now: Instant) {
-        if self.config.modem.access.is_free()
-            && (self.pair.unstated() > 0 || self.pair.must_send_hello())
-        {
+        if self.config.modem.access.is_free() && (self.pair.unstated() > 0 || self.pair.must_send_hello()) {
             self.begin_turn();
             let wait = self.config.modem.answer_wait(Duration::from_secs(1));
             self.answer_due.get_or_insert(now + wait);

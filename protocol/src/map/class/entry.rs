@@ -94,7 +94,10 @@ mod tests {
     #[test]
     fn golden_bytes_of_class_entries() {
         for (entry, bytes) in [
-            (ClassEntry::new(3, "sand", Some([0xE0, 0xC0, 0x80])).unwrap(), &[0x83, 0xE0, 0xC0, 0x80, b's', b'a', b'n', b'd'][..]),
+            (
+                ClassEntry::new(3, "sand", Some([0xE0, 0xC0, 0x80])).unwrap(),
+                &[0x83, 0xE0, 0xC0, 0x80, b's', b'a', b'n', b'd'][..],
+            ),
             (ClassEntry::new(254, "é", None).unwrap(), &[0x01, 0xC3, 0xA9]),
         ] {
             assert_eq!(entry.to_bytes(), bytes);
@@ -103,8 +106,13 @@ mod tests {
         assert_eq!(ClassEntry::digest_of(3, &[0x83, 0xE0, 0xC0, 0x80, b's', b'a', b'n', b'd']), 0xF534);
         assert!(ClassEntry::new(0, "x", None).is_none() && ClassEntry::new(255, "x", None).is_none());
         assert!(ClassEntry::new(1, "", None).is_none() && ClassEntry::new(1, "a\nb", None).is_none());
-        assert!(ClassEntry::new(1, &"x".repeat(60), None).is_some() && ClassEntry::new(1, &"x".repeat(61), None).is_none());
-        assert_eq!((ClassEntry::label_of(0), ClassEntry::label_of(253), ClassEntry::label_of(254)), (Some(1), Some(254), None));
+        assert!(
+            ClassEntry::new(1, &"x".repeat(60), None).is_some() && ClassEntry::new(1, &"x".repeat(61), None).is_none()
+        );
+        assert_eq!(
+            (ClassEntry::label_of(0), ClassEntry::label_of(253), ClassEntry::label_of(254)),
+            (Some(1), Some(254), None)
+        );
     }
 
     proptest! {

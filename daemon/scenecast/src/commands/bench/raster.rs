@@ -94,7 +94,9 @@ impl RasterBench {
             100.0 * change,
             100.0 * loss
         );
-        println!("row                           first s   equal %   least %  age median s   p95 s  status s  order s  up bit/s  down bit/s  CPU vehicle  surface");
+        println!(
+            "row                           first s   equal %   least %  age median s   p95 s  status s  order s  up bit/s  down bit/s  CPU vehicle  surface"
+        );
         for (name, f) in rows {
             println!(
                 "{name:<28} {:>8.1} {:>9.2} {:>9.2} {:>13.2} {:>7.2} {:>9.2} {:>8.2} {:>9.0} {:>11.0} {:>12.3} {:>8.3}",
