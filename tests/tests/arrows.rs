@@ -4,7 +4,7 @@ use serde_json::Value;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Crates that would give a core a clock, a socket, a disk or a runtime.
-const IO_CRATES: [&str; 11] = [
+const IO_CRATES: [&str; 12] = [
     "axum",
     "hyper",
     "nix",
@@ -13,17 +13,20 @@ const IO_CRATES: [&str; 11] = [
     "serialport",
     "scenecast-files",
     "scenecast-ros2",
+    "scenecast-sources",
     "tokio",
     "tokio-serial",
     "tracing-subscriber",
 ];
 
 /// Crates that do no IO.
-const SANS_IO: [&str; 14] = [
+const SANS_IO: [&str; 16] = [
     "scenecast-core",
     "scenecast-drivers",
     "scenecast-host",
+    "scenecast-labels",
     "scenecast-messages",
+    "scenecast-sensors",
     "scenecast-motion",
     "scenecast-outlets",
     "scenecast-protocol",

@@ -9,7 +9,7 @@ use scenecast_protocol::coordinates::MapPoint;
 use scenecast_protocol::directive::{Budget, Fix, Settings};
 use scenecast_protocol::time::Instant;
 use scenecast_vehicle::{
-    AppliedSlot, MapUpdate, RegisteredFrame, SharedExemplars, Vehicle, VehicleDisk, VehicleOutput,
+    AppliedSlot, ForeignUpdate, MapUpdate, RegisteredFrame, SharedExemplars, Vehicle, VehicleDisk, VehicleOutput,
 };
 use std::collections::VecDeque;
 
@@ -273,6 +273,11 @@ impl VehicleHost {
     /// Takes a new map of the mapper.
     pub fn handle_map(&mut self, update: &MapUpdate, now: Instant) {
         self.link.end_mut().handle_map(update, now);
+    }
+
+    /// Takes a new map of another program. Returns the label whose name is refused, because it has another one already.
+    pub fn handle_foreign(&mut self, update: &ForeignUpdate, now: Instant) -> Option<u8> {
+        self.link.end_mut().handle_foreign(update, now)
     }
 
     /// Takes the mapper's exemplars of each label, the best first.

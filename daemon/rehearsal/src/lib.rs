@@ -22,6 +22,7 @@ mod outputs;
 mod panorama;
 pub mod planning_bench;
 mod quality;
+pub mod raster_bench;
 pub mod registration_bench;
 mod report;
 pub mod restart_bench;

@@ -6,7 +6,7 @@ use crate::camera::CameraFrame;
 use scene_model::project::Pose;
 use scenecast_core::UserError;
 use scenecast_protocol::directive::Settings;
-use scenecast_vehicle::{MapUpdate, Mapper, RegisteredFrame, SharedExemplars};
+use scenecast_vehicle::{MapProducer, MapUpdate, Mapper, RegisteredFrame, SharedExemplars};
 use std::thread::JoinHandle;
 use tokio::sync::mpsc;
 
@@ -77,7 +77,7 @@ pub(super) struct Keep {
 
 impl Keep {
     /// Keeps a checkpoint if one is due. A failing disk does not end the mission: the previous checkpoint stays.
-    fn keep(&mut self, mapper: &Mapper, is_due: impl Fn(f64) -> bool) {
+    fn keep(&mut self, mapper: &impl MapProducer, is_due: impl Fn(f64) -> bool) {
         let Some(now_s) = mapper.last_s().filter(|_| self.every_s > 0.0) else { return };
         if !is_due(self.last_s.map_or(f64::INFINITY, |last_s| (now_s - last_s).abs())) {
             return;
@@ -97,14 +97,14 @@ impl Keep {
         }
     }
 
-    fn keep_if_due(&mut self, mapper: &Mapper) {
+    pub(super) fn keep_if_due(&mut self, mapper: &impl MapProducer) {
         let every_s = self.every_s;
         // The interval begins at the first frame, whose map is not worth a checkpoint of its own.
         self.last_s = self.last_s.or(mapper.last_s());
         self.keep(mapper, |since_s| since_s >= every_s);
     }
 
-    fn keep_now(&mut self, mapper: &Mapper) {
+    pub(super) fn keep_now(&mut self, mapper: &impl MapProducer) {
         self.keep(mapper, |since_s| since_s > 0.0);
     }
 }

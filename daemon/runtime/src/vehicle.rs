@@ -4,6 +4,7 @@ use super::clock::Clock;
 use super::disk_space::DiskWatch;
 use super::durable::{Keeper, StartedRun};
 use super::journal::Folder;
+use super::labels::{Feed, FromLabels, LabelThread};
 use super::mapping::{FromMapper, Mapped, MapperThread, ToMapper};
 use super::missing_key::warn_without_key;
 use super::modem::{self, ModemPort};
@@ -17,9 +18,11 @@ use crate::port::FromPort;
 use scenecast_config::{AutopilotKind, Config, NavigationSource, survey_depth_m};
 use scenecast_core::{Area, TangentPlane, UserError};
 use scenecast_files::{Recording, configured_recording};
-use scenecast_host::{VehicleHost, VehicleHostEvent, VehiclePilot, modem_station};
+use scenecast_host::{CameraPose, VehicleHost, VehicleHostEvent, VehiclePilot, modem_station};
+use scenecast_labels::ImagePose;
 use scenecast_protocol::directive::Budget;
 use scenecast_protocol::map::LayerSet;
+use scenecast_vehicle::ForeignUpdate;
 use std::time::Duration;
 
 /// Maximum time between two calls of the host.
@@ -34,7 +37,7 @@ pub fn run_vehicle(load: Load, simulated: Option<SimulatedAutopilot>) -> Result<
         let config = load()?;
         warn_without_key(&config);
         let dir = config.runtime.state_dir.as_path();
-        let Start { run, mut mapper, keep } = start(&config, dir)?;
+        let Start { run, mut mapper, keep, labels } = start(&config, dir)?;
         let StartedRun { keeper, durable, is_again, is_stored } = run;
         let clock = Clock::new(config.runtime.time_scale);
         let address = scenecast_config::vehicle_address(&config)?;
@@ -77,6 +80,11 @@ pub fn run_vehicle(load: Load, simulated: Option<SimulatedAutopilot>) -> Result<
             mapper.handle_gap();
         }
         let mapper = MapperThread::start(mapper, keep)?;
+        let labels = labels.map(|(map, keep)| {
+            let feed = Feed::open(&config, map.mark())?;
+            LabelThread::start(map, feed, keep, clock)
+        });
+        let labels = labels.transpose()?;
         let modem = ModemPort::open(&config, clock.now()).await?;
         let station = modem_station(&config, address, profile)?;
         let reload = Reload::new(load)?;
@@ -92,7 +100,9 @@ pub fn run_vehicle(load: Load, simulated: Option<SimulatedAutopilot>) -> Result<
         }
         let disk = DiskWatch::new(dir);
         let ros2 = VehicleRos2::start(&config)?;
-        VehicleShell { host, camera, mapper, ports, ros2, clock, keeper, disk, reload, missed: 0 }.run(stop).await
+        VehicleShell { host, camera, mapper, labels, ports, ros2, clock, keeper, disk, reload, missed: 0 }
+            .run(stop)
+            .await
     })
 }
 
@@ -112,6 +122,8 @@ struct VehicleShell {
     host: VehicleHost,
     camera: Camera,
     mapper: MapperThread,
+    /// Labels of another program, in place of the scene model's.
+    labels: Option<LabelThread>,
     ports: Ports,
     ros2: VehicleRos2,
     clock: Clock,
@@ -132,6 +144,7 @@ impl VehicleShell {
                 () = stop.asked() => {
                     modem::log_audit(self.host.link());
                     self.mapper.finish();
+                    self.labels.into_iter().for_each(LabelThread::finish);
                     return Ok(());
                 }
                 _ = tokio::time::sleep_until(self.clock.wall(wake)) => {}
@@ -141,6 +154,11 @@ impl VehicleShell {
                 report = self.ports.pilot.next() => self.handle_pilot(report),
                 config = self.reload.next() => self.follow(&config),
                 () = self.camera.wait() => {}
+                report = LabelThread::next(&mut self.labels) => match report {
+                    Some(FromLabels::Mapped(update, pose)) => self.handle_labels(&update, pose),
+                    Some(FromLabels::Checkpoint { is_refused }) => self.disk.handle_checkpoint(is_refused),
+                    None => return Err(UserError::Failed("the labels' thread ended".to_owned())),
+                },
                 mapped = self.mapper.mapped.recv() => match mapped {
                     Some(FromMapper::Mapped(mapped)) => self.handle_seen(*mapped),
                     Some(FromMapper::Missed(error)) => self.handle_missed(&error),
@@ -184,7 +202,27 @@ impl VehicleShell {
         self.host.handle_budget(budget, self.clock.now());
     }
 
+    /// Takes the map of another program. Without an autopilot, the vehicle is where its last image was taken.
+    fn handle_labels(&mut self, update: &ForeignUpdate, pose: Option<ImagePose>) {
+        let now = self.clock.now();
+        if let Some(ImagePose { x_m, y_m, depth_m, heading_rad }) = pose {
+            self.host.handle_pose(CameraPose { x_m, y_m, heading_rad, depth_m }, now);
+        }
+        if let Some(label) = self.host.handle_foreign(update, now) {
+            tracing::warn!("labels: class {} has another name already, which it keeps", label - 1);
+        }
+    }
+
     fn handle_camera(&mut self, mut frame: CameraFrame) {
+        if self.labels.is_some() {
+            // The frames still move the vehicle.
+            let pose = self.camera.newest_pose().unwrap_or(frame.camera_pose());
+            self.host.handle_pose(pose, self.clock.now());
+            if self.camera.is_over() {
+                self.host.finish_survey();
+            }
+            return;
+        }
         match &self.camera {
             Camera::Recorded(_) => {
                 let pose = self.host.handle_camera(frame.camera_pose());
@@ -220,6 +258,11 @@ impl VehicleShell {
         let now = self.clock.now();
         if let Some(disk) = self.disk.look(std::time::Instant::now()) {
             self.host.handle_disk(disk);
+        }
+        if let Some(labels) = &self.labels {
+            let navigator = self.host.vehicle().navigator();
+            let ((x_m, y_m), depth_m) = (navigator.dead_reckoned().xy(), navigator.depth_m());
+            labels.set_pose(ImagePose { x_m, y_m, depth_m, heading_rad: navigator.heading_rad() });
         }
         self.host.steer(now);
         self.ros2.publish(&self.host);

@@ -2,7 +2,9 @@
 
 use crate::key::section;
 use crate::rule::{ANY, range};
-use crate::setting::{BirthRule, CameraSource, CameraStamps, Debounce, LayerName, MapCells, MapStream};
+use crate::setting::{
+    BirthRule, CameraSource, CameraStamps, Debounce, LabelSource, LayerName, MapCells, MapStream, Votes,
+};
 use scenecast_protocol::map_codec::Codec;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -106,5 +108,21 @@ section! {
         /// File of a table of scenecast tune, from which "fit to budget" takes settings of the scene model. Empty: the
         /// built-in table, measured on procedural sea floors.
         tuning_table: Option<PathBuf> = None, ANY, [Asv];
+    }
+}
+
+section! {
+    /// Labels of another program in place of those of the scene model.
+    labels: Labels {
+        /// Where the labels come from. Empty: the scene model. dir:FOLDER: files NAME.json and NAME.png; socket:HOST:PORT
+        /// and socket:/PATH: programs that connect and send the same; ros2:TOPIC: a topic of ROS 2. A rehearsal takes
+        /// dir: alone.
+        source: LabelSource = LabelSource::SceneModel, ANY, [Auv Scenario];
+        /// Which segmented images decide about the class of a cell: the class that most of their pixels in it have. all:
+        /// every image that has shown the cell; newest: the last one. A grid decides alone.
+        votes: Votes = Votes::All, ANY, [Auv Scenario];
+        /// Minimum share of each band within the map's share of link.shares while labels wait too. The shares of all
+        /// layers add up to 100 % or less; a band beyond that has what is left.
+        band_share: u8 = 8, range(0.0, 100.0, "%"), [Auv Scenario];
     }
 }

@@ -11,7 +11,7 @@ mod ros2;
 mod survey;
 
 pub use link::Link;
-pub use map::{Camera, Map, Scene};
+pub use map::{Camera, Labels, Map, Scene};
 pub use modem::{Channel, Modem};
 pub use node::{Console, Mission, Operator, Runtime, VehicleSection, WorldSection};
 pub use ros2::Ros2;
@@ -30,6 +30,7 @@ pub struct Config {
     pub map: Map,
     pub camera: Camera,
     pub scene: Scene,
+    pub labels: Labels,
     pub survey: Survey,
     pub navigation: Navigation,
     pub registration: Registration,
@@ -53,6 +54,7 @@ impl Section {
         Map::SECTION,
         Camera::SECTION,
         Scene::SECTION,
+        Labels::SECTION,
         Survey::SECTION,
         Navigation::SECTION,
         Registration::SECTION,

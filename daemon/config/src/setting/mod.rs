@@ -3,6 +3,7 @@
 mod addresses;
 mod choices;
 mod debounce;
+mod labels;
 mod layers;
 mod numbers;
 mod ports;
@@ -16,6 +17,7 @@ pub use choices::{
     WorldKind,
 };
 pub use debounce::Debounce;
+pub use labels::{LabelSource, Votes};
 pub use layers::LayerName;
 pub use ports::{GpsPort, HostPort};
 pub use ros2::{Remap, RosName};

@@ -23,7 +23,7 @@ impl Mission {
         let hosts = [self.vehicle.poll_timeout(now), self.surface.poll_timeout(now)];
         let script = self.script.poll_timeout().filter(|_| self.times.ended.is_none());
         let others = hosts.into_iter().chain([script, self.carrier.poll_timeout()]).flatten();
-        others.chain([self.times.next_event()]).min().unwrap_or(now)
+        others.chain(self.labels_due()).chain([self.times.next_event()]).min().unwrap_or(now)
     }
 
     pub(super) fn handle_timeouts(&mut self) -> Result<(), UserError> {
@@ -35,6 +35,7 @@ impl Mission {
         if now >= self.times.frame {
             self.take_frame()?;
         }
+        self.handle_labels();
         if self.times.takes_fix() {
             self.fix();
         }
@@ -172,6 +173,9 @@ impl Mission {
 
     /// Records a frame and gives it to the mapper, at the pose that the vehicle estimates.
     fn map(&mut self, image: &image::RgbImage, scale: f64) -> Result<(), UserError> {
+        if self.labels.is_some() {
+            return Ok(());
+        }
         let now = self.times.now;
         let t_s = now.as_secs_f64();
         let navigator = self.vehicle.vehicle().navigator();

@@ -7,6 +7,7 @@ mod link;
 mod localisation;
 mod modem;
 mod planning;
+mod raster;
 mod registration;
 mod restart;
 mod steering;
@@ -22,6 +23,7 @@ use link::LinkBench;
 use localisation::LocalisationBench;
 use modem::ModemBench;
 use planning::PlanningBench;
+use raster::RasterBench;
 use registration::RegistrationBench;
 use restart::RestartBench;
 use scenecast_core::UserError;
@@ -46,6 +48,8 @@ pub(super) enum BenchCommand {
     Modem(ModemBench),
     /// The planners: utility collected per metre.
     Planning(PlanningBench),
+    /// A grid of which a part changes every second, over a radio that loses frames, against whole grids.
+    Raster(RasterBench),
     /// Registration of camera frames: errors of their places, share of the sea floor that the map shows.
     Registration(RegistrationBench),
     /// Restarts of both ends as processes: what is lost, the time to a full page.
@@ -79,6 +83,7 @@ impl BenchCommand {
             Self::Localisation(l) => l.run(),
             Self::Modem(m) => m.run(),
             Self::Planning(p) => p.run(),
+            Self::Raster(r) => r.run(),
             Self::Registration(r) => r.run(),
             Self::Restart(r) => r.run(),
             Self::Steering(s) => s.run(),

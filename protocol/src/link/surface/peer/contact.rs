@@ -103,6 +103,6 @@ impl Contact {
     pub(super) fn note_hello(&mut self, timeout: Duration, dropped: u64, now: Instant) {
         let is_silent = std::mem::replace(&mut self.dropped, dropped) == dropped;
         self.hellos = if is_silent { self.hellos.saturating_add(1) } else { 1 };
-        self.hello_due = now + timeout.max(Self::PROOF_TIMEOUT) * if self.hellos < PROMPT_HELLOS { 1 } else { 2 };
+        self.hello_due = now + timeout * if self.hellos < PROMPT_HELLOS { 1 } else { 2 };
     }
 }
