@@ -11,8 +11,8 @@ mod recording;
 mod vocabulary;
 mod whole;
 
-pub use bag::{Bag, BagTopics};
-pub use configured::{configured_recording, open_bag};
+pub use bag::{Bag, BagTiming, BagTopics};
+pub use configured::{configured_mounting, configured_recording, open_bag};
 pub use frame_image::FrameImage;
 pub use images::{read_classes, read_image};
 pub use label_folder::{FolderItem, LabelFolder};

@@ -40,6 +40,7 @@ mod world;
 
 pub use fidelity::{FidelityRow, fidelity, fidelity_panels};
 pub use frames_log::FramesLog;
+pub use scenecast_worlds::View;
 pub use localisation::{Localisation, LocalisationRun, Tracks, localisation, localisation_plot, run_with_outliers};
 pub use meter::Delays;
 pub use mission::{MapInformation, MapQuality, Mission, MissionOptions};

@@ -143,6 +143,7 @@ impl VehicleShell {
             tokio::select! {
                 () = stop.asked() => {
                     modem::log_audit(self.host.link());
+                    self.camera.log_end();
                     self.mapper.finish();
                     self.labels.into_iter().for_each(LabelThread::finish);
                     return Ok(());

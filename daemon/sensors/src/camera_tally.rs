@@ -12,6 +12,8 @@ pub enum CameraFault {
     NotLater,
     /// No pose is known at the time of the image.
     NoPose,
+    /// The camera was tilted too much.
+    Tilted,
     /// A newer image came before the scene model was ready for this one.
     Overtaken,
     /// The bytes are not an image that can be read.
@@ -30,6 +32,8 @@ pub enum CameraFault {
     SourceLost,
     /// The source sent no image for longer than allowed.
     Stalled,
+    /// A pose cannot be used.
+    UnusablePose,
     /// The source of the poses was lost, and was opened again.
     PosesLost,
     /// No pose came in for longer than allowed.
@@ -43,6 +47,7 @@ impl CameraFault {
             Self::NoStamp => "without a time stamp",
             Self::NotLater => "not later than the one before",
             Self::NoPose => "no pose at its time",
+            Self::Tilted => "tilted too much",
             Self::Overtaken => "overtaken by a newer one",
             Self::Unreadable => "unreadable",
             Self::CutOff => "cut off",
@@ -52,6 +57,7 @@ impl CameraFault {
             Self::PoseGap => "gap between poses",
             Self::SourceLost => "source lost",
             Self::Stalled => "camera stalled",
+            Self::UnusablePose => "unusable pose",
             Self::PosesLost => "poses lost",
             Self::PosesStalled => "poses stalled",
         }
@@ -64,6 +70,7 @@ impl CameraFault {
             Self::NoStamp
                 | Self::NotLater
                 | Self::NoPose
+                | Self::Tilted
                 | Self::Overtaken
                 | Self::Unreadable
                 | Self::CutOff

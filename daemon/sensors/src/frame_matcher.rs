@@ -210,6 +210,24 @@ impl<I> FrameMatcher<I> {
     pub fn count(&mut self, fault: CameraFault) {
         self.tally.count(fault);
     }
+
+    /// A matched image was dropped after all.
+    pub fn drop_matched(&mut self, fault: CameraFault) {
+        self.tally.matched = self.tally.matched.saturating_sub(1);
+        self.tally.count(fault);
+    }
+
+    /// Drops images that have waited for the scene model longer than [`Limits::max_wait`], as long as a newer one has a pose.
+    pub fn keep_recent(&mut self, now: Stamp) {
+        while let (Some(first), Some(next)) = (self.waiting.front(), self.waiting.get(1)) {
+            let is_late = now.seconds_since(first.arrival) > self.limits.max_wait.as_secs_f64();
+            if !is_late || !matches!(self.track.at(next.stamp), PoseMatch::Found(_)) {
+                return;
+            }
+            self.waiting.pop_front();
+            self.tally.count(CameraFault::Overtaken);
+        }
+    }
 }
 
 #[cfg(test)]
@@ -275,6 +293,16 @@ mod tests {
         (0..5).for_each(|i| matcher.handle_image(at(f64::from(i)), at(f64::from(i)), i));
         assert_eq!(frames(&mut matcher, 5.0), [(3, 3.0), (4, 4.0)]);
         assert_eq!(matcher.tally().of(CameraFault::Overtaken), 3);
+    }
+
+    #[test]
+    fn a_slow_model_gets_the_images_of_the_last_two_seconds() {
+        let mut matcher = FrameMatcher::new(Limits::default(), 0.0);
+        (0..4).for_each(|i| matcher.handle_pose(at(f64::from(i)), at(f64::from(i)), pose(f64::from(i))));
+        (0..6).for_each(|i| matcher.handle_image(at(f64::from(i)), at(f64::from(i)), i));
+        matcher.keep_recent(at(4.5));
+        assert_eq!(matcher.tally().of(CameraFault::Overtaken), 3);
+        assert_eq!(frames(&mut matcher, 4.5), [(3, 3.0)]);
     }
 
     #[test]

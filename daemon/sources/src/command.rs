@@ -38,6 +38,8 @@ struct Running {
     child: Child,
     pieces: Receiver<Piece>,
     stream: ImageStream,
+    /// When the image began that is not complete yet.
+    begun: Option<Stamp>,
     /// The last line that the program wrote to its standard error.
     last_line: Arc<Mutex<String>>,
     /// Bytes between images that are already reported.
@@ -76,7 +78,7 @@ impl CommandSource {
             let read = move || keep_last_line(messages, &last_line);
             std::thread::Builder::new().name("camera messages".to_owned()).spawn(read)?;
         }
-        Ok(Running { child, pieces, stream: ImageStream::default(), last_line, skipped: 0 })
+        Ok(Running { child, pieces, stream: ImageStream::default(), begun: None, last_line, skipped: 0 })
     }
 }
 
@@ -186,9 +188,12 @@ impl SensorSource for CommandSource {
             match running.pieces.recv_timeout(until.saturating_duration_since(Instant::now())) {
                 Ok((arrival, bytes)) => {
                     running.stream.handle_bytes(&bytes);
+                    let mut began = running.begun.take().unwrap_or(arrival);
                     while let Some(image) = running.stream.poll_image() {
-                        self.ready.push_back(SourceImage::compressed(None, arrival, image));
+                        self.ready.push_back(SourceImage::compressed(None, began, image));
+                        began = arrival;
                     }
+                    running.begun = running.stream.is_within_image().then_some(began);
                     let skipped = running.stream.skipped();
                     if skipped > running.skipped && self.ready.is_empty() {
                         let bytes = skipped - running.skipped;

@@ -2,6 +2,7 @@
 
 use crate::Picture;
 use scenecast_sensors::{CameraFault, SensorPose, Stamp};
+use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
@@ -44,6 +45,14 @@ impl SensorKind {
         match self {
             Self::Camera => CameraFault::SourceLost,
             Self::Navigation => CameraFault::PosesLost,
+        }
+    }
+
+    /// Reports that wait for the vehicle at most: each of a camera may be an image of many megabytes.
+    fn max_reports(self) -> usize {
+        match self {
+            Self::Camera => 8,
+            Self::Navigation => 512,
         }
     }
 
@@ -96,8 +105,6 @@ const BACK_OFF: (Duration, Duration) = (Duration::from_millis(250), Duration::fr
 /// A source that stayed open for this long is opened again at once when it is lost.
 const HEALTHY: Duration = Duration::from_secs(10);
 
-/// Reports that wait for the vehicle; when they are full, new images are dropped.
-const MAX_REPORTS: usize = 64;
 
 /// A running source.
 pub struct LiveSource {
@@ -112,10 +119,10 @@ impl LiveSource {
     /// # Errors
     /// The system refuses a thread.
     pub fn start(source: impl SensorSource, stall: Duration) -> std::io::Result<Self> {
-        let (sender, reports) = mpsc::channel(MAX_REPORTS);
+        let (sender, reports) = mpsc::channel(source.kind().max_reports());
         let is_stopped = Arc::new(AtomicBool::new(false));
-        let mut supervisor =
-            Supervisor { source, stall, reports: sender, is_stopped: is_stopped.clone(), overtaken: 0 };
+        let outlet = Outlet { reports: sender, is_stopped: is_stopped.clone(), waiting: BTreeMap::new() };
+        let mut supervisor = Supervisor { source, stall, outlet };
         let thread = std::thread::Builder::new().name("sensor".to_owned()).spawn(move || supervisor.run())?;
         Ok(Self { reports, is_stopped, thread: Some(thread) })
     }
@@ -142,22 +149,65 @@ impl Drop for LiveSource {
 struct Supervisor<S> {
     source: S,
     stall: Duration,
+    outlet: Outlet,
+}
+
+/// Hands reports to the vehicle, and never waits for it.
+struct Outlet {
     reports: mpsc::Sender<SourceReport>,
     is_stopped: Arc<AtomicBool>,
-    /// Images that found no room for their report, not yet reported.
-    overtaken: u64,
+    /// Faults that found no room, with their numbers and their last texts.
+    waiting: BTreeMap<CameraFault, (u64, String)>,
+}
+
+impl Outlet {
+    fn is_stopped(&self) -> bool {
+        self.is_stopped.load(Ordering::Relaxed)
+    }
+
+    /// Passes a report on. A fault without room waits; an image is dropped, and counted as overtaken.
+    fn report(&mut self, report: SourceReport) {
+        self.report_waiting();
+        match self.reports.try_send(report) {
+            Ok(()) => {}
+            Err(mpsc::error::TrySendError::Closed(_)) => self.is_stopped.store(true, Ordering::Relaxed),
+            Err(mpsc::error::TrySendError::Full(SourceReport::Reading(Reading::Image(_)))) => {
+                self.wait_with(CameraFault::Overtaken, "the vehicle was busy".to_owned());
+            }
+            Err(mpsc::error::TrySendError::Full(SourceReport::Fault(fault, text))) => self.wait_with(fault, text),
+            Err(mpsc::error::TrySendError::Full(_)) => {}
+        }
+    }
+
+    fn wait_with(&mut self, fault: CameraFault, text: String) {
+        let waiting = self.waiting.entry(fault).or_default();
+        *waiting = (waiting.0 + 1, text);
+    }
+
+    fn report_waiting(&mut self) {
+        while let Some(mut entry) = self.waiting.first_entry() {
+            let (fault, (_, text)) = (*entry.key(), entry.get().clone());
+            if self.reports.try_send(SourceReport::Fault(fault, text)).is_err() {
+                return;
+            }
+            entry.get_mut().0 -= 1;
+            if entry.get().0 == 0 {
+                entry.remove();
+            }
+        }
+    }
 }
 
 impl<S: SensorSource> Supervisor<S> {
     fn run(&mut self) {
         let mut back_off = BACK_OFF.0;
         let mut last_error = None;
-        while !self.is_stopped.load(Ordering::Relaxed) {
+        while !self.outlet.is_stopped() {
             let opened = Instant::now();
             let error = match self.source.open() {
                 Ok(()) => {
                     last_error = None;
-                    self.report(SourceReport::Open);
+                    self.outlet.report(SourceReport::Open);
                     self.forward()
                 }
                 Err(error) => Some(error),
@@ -168,7 +218,7 @@ impl<S: SensorSource> Supervisor<S> {
             }
             // A camera that stays away is named once.
             if last_error.as_ref() != Some(&error) {
-                self.report(SourceReport::Fault(self.source.kind().lost(), error.0.clone()));
+                self.outlet.report(SourceReport::Fault(self.source.kind().lost(), error.0.clone()));
                 last_error = Some(error);
             }
             self.wait(back_off);
@@ -180,20 +230,26 @@ impl<S: SensorSource> Supervisor<S> {
     /// Passes images on until the source is lost, which is returned, or the vehicle stops.
     fn forward(&mut self) -> Option<SourceError> {
         let (mut last, mut is_stalled) = (Instant::now(), false);
-        while !self.is_stopped.load(Ordering::Relaxed) {
-            let reports = self.reports.clone();
+        while !self.outlet.is_stopped() {
+            let (outlet, mut has_fault) = (&mut self.outlet, false);
             let mut fault = |fault, text| {
-                let _ = reports.try_send(SourceReport::Fault(fault, text));
+                has_fault = true;
+                outlet.report(SourceReport::Fault(fault, text));
             };
-            match self.source.next(POLL, &mut fault) {
+            let reading = self.source.next(POLL, &mut fault);
+            if has_fault {
+                // A sensor whose readings cannot be used is not silent.
+                (last, is_stalled) = (Instant::now(), false);
+            }
+            match reading {
                 Ok(Some(reading)) => {
                     (last, is_stalled) = (Instant::now(), false);
-                    self.report(SourceReport::Reading(reading));
+                    self.outlet.report(SourceReport::Reading(reading));
                 }
                 Ok(None) if last.elapsed() >= self.stall && !is_stalled => {
                     is_stalled = true;
                     let text = format!("silent for {:.0} s", last.elapsed().as_secs_f64());
-                    self.report(SourceReport::Fault(self.source.kind().stalled(), text.clone()));
+                    self.outlet.report(SourceReport::Fault(self.source.kind().stalled(), text.clone()));
                     if self.source.is_reopened_after_stall() {
                         return Some(SourceError(format!("{text}: it is started again")));
                     }
@@ -205,27 +261,9 @@ impl<S: SensorSource> Supervisor<S> {
         None
     }
 
-    /// Never waits for the vehicle: the oldest reports are the vehicle's, and an image without room is dropped and counted.
-    fn report(&mut self, report: SourceReport) {
-        let is_image = matches!(report, SourceReport::Reading(Reading::Image(_)));
-        match self.reports.try_send(report) {
-            Ok(()) => {
-                while self.overtaken > 0 {
-                    let text = "the vehicle was busy".to_owned();
-                    match self.reports.try_send(SourceReport::Fault(CameraFault::Overtaken, text)) {
-                        Ok(()) => self.overtaken -= 1,
-                        Err(_) => break,
-                    }
-                }
-            }
-            Err(mpsc::error::TrySendError::Full(_)) => self.overtaken += u64::from(is_image),
-            Err(mpsc::error::TrySendError::Closed(_)) => self.is_stopped.store(true, Ordering::Relaxed),
-        }
-    }
-
     fn wait(&self, time: Duration) {
         let until = Instant::now() + time;
-        while !self.is_stopped.load(Ordering::Relaxed) && Instant::now() < until {
+        while !self.outlet.is_stopped() && Instant::now() < until {
             std::thread::sleep(POLL.min(until.saturating_duration_since(Instant::now())));
         }
     }

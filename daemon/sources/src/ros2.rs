@@ -62,6 +62,13 @@ struct Counted {
 }
 
 impl Counted {
+    fn report_poses(&mut self, dropped: u64, malformed: u64, fault: &mut dyn FnMut(CameraFault, String)) {
+        let lost = std::mem::replace(&mut self.dropped, dropped)..dropped;
+        let wrong = std::mem::replace(&mut self.malformed, malformed)..malformed;
+        lost.for_each(|_| fault(CameraFault::UnusablePose, "a pose was dropped: the vehicle was busy".to_owned()));
+        wrong.for_each(|_| fault(CameraFault::UnusablePose, "the message has another type than the topic".to_owned()));
+    }
+
     fn report(&mut self, dropped: u64, malformed: u64, fault: &mut dyn FnMut(CameraFault, String)) {
         for _ in std::mem::replace(&mut self.dropped, dropped)..dropped {
             fault(CameraFault::Overtaken, "a newer message came before it was read".to_owned());
@@ -159,11 +166,12 @@ pub struct RosNavigation {
     node: Arc<SensorNode>,
     topic: String,
     inbox: Option<Inbox<Odometry>>,
+    counted: Counted,
 }
 
 impl RosNavigation {
     pub fn new(node: Arc<SensorNode>, topic: &str) -> Self {
-        Self { node, topic: topic.to_owned(), inbox: None }
+        Self { node, topic: topic.to_owned(), inbox: None, counted: Counted::default() }
     }
 }
 
@@ -181,11 +189,17 @@ impl SensorSource for RosNavigation {
     fn next(
         &mut self,
         timeout: Duration,
-        _: &mut dyn FnMut(CameraFault, String),
+        fault: &mut dyn FnMut(CameraFault, String),
     ) -> Result<Option<Reading>, SourceError> {
         let Some(inbox) = &self.inbox else { return Err(SourceError("the topic is not open".to_owned())) };
         inbox.wait(timeout);
-        let pose = inbox.take().and_then(|received| pose_of(&received.message));
+        self.counted.report_poses(inbox.dropped(), inbox.malformed(), fault);
+        let Some(received) = inbox.take() else { return Ok(None) };
+        let pose = pose_of(&received.message);
+        if pose.is_none() {
+            let text = "odometry without a time, or whose quaternion has not the length 1".to_owned();
+            fault(CameraFault::UnusablePose, text);
+        }
         Ok(pose.map(|(stamp, pose)| Reading::Pose(stamp, pose)))
     }
 

@@ -11,6 +11,12 @@ use std::time::{Duration, Instant, SystemTime};
 /// Time between two looks into the folder.
 const LOOK: Duration = Duration::from_millis(50);
 
+/// Time between two readings of a folder whose own time of change says nothing new.
+const READ: Duration = Duration::from_millis(500);
+
+/// Most complete files that are taken in one look; of more, the last ones.
+const MAX_FILES: usize = 8;
+
 /// A file that has not grown for this long is not completed any more.
 const ABANDONED: Duration = Duration::from_secs(5);
 
@@ -28,6 +34,8 @@ pub struct WatchSource {
     files: BTreeMap<PathBuf, FileState>,
     /// Time of change of the folder when it was last read.
     changed: Option<SystemTime>,
+    /// When it was last read.
+    read: Option<Instant>,
     ready: VecDeque<SourceImage>,
 }
 
@@ -43,7 +51,7 @@ enum FileState {
 
 impl WatchSource {
     pub fn new(dir: &Path, clock: ArrivalClock) -> Self {
-        Self { dir: dir.to_owned(), clock, files: BTreeMap::new(), changed: None, ready: VecDeque::new() }
+        Self { dir: dir.to_owned(), clock, files: BTreeMap::new(), changed: None, read: None, ready: VecDeque::new() }
     }
 
     fn entries(&self) -> Result<Vec<DirEntry>, SourceError> {
@@ -52,14 +60,27 @@ impl WatchSource {
         Ok(entries.filter_map(Result::ok).filter(|entry| is_image(&entry.path())).collect())
     }
 
+    /// Of many new files at once, only the last ones are read: the others would be overtaken.
+    fn skip_all_but_the_newest(&mut self, fault: &mut dyn FnMut(CameraFault, String)) {
+        let is_open = |state: &FileState| matches!(state, FileState::Growing { .. });
+        let mut open: Vec<(Option<Stamp>, PathBuf)> =
+            self.files.iter().filter(|(_, state)| is_open(state)).map(|(p, _)| (stamp_of_name(p), p.clone())).collect();
+        open.sort();
+        open.truncate(open.len().saturating_sub(MAX_FILES));
+        for (_, path) in open {
+            fault(CameraFault::Overtaken, format!("more than {MAX_FILES} images came at once"));
+            self.files.insert(path, FileState::Done);
+        }
+    }
+
     /// Takes new files in, and every file that is complete now.
     fn look(&mut self, fault: &mut dyn FnMut(CameraFault, String)) -> Result<(), SourceError> {
         let changed = std::fs::metadata(&self.dir).and_then(|folder| folder.modified());
         let changed = changed.map_err(|e| SourceError(format!("{}: {e}", self.dir.display())))?;
-        // A time of change that is not older than its own resolution may hide a file that came later.
-        let is_fresh = changed.elapsed().is_ok_and(|age| age < LIVE);
-        if self.changed != Some(changed) || is_fresh {
-            self.changed = Some(changed);
+        // A time of change may hide a file that came later, within its resolution or on a network disk.
+        let is_due = self.read.is_none_or(|read| read.elapsed() >= READ);
+        if self.changed != Some(changed) || is_due {
+            (self.changed, self.read) = (Some(changed), Some(Instant::now()));
             let found = self.entries()?.into_iter().map(|entry| entry.path());
             let mut before = std::mem::take(&mut self.files);
             let begun = FileState::Growing { length: 0, since: Instant::now() };
@@ -70,6 +91,7 @@ impl WatchSource {
                 })
                 .collect();
         }
+        self.skip_all_but_the_newest(fault);
         let mut complete: Vec<(Option<Stamp>, PathBuf, Vec<u8>)> = Vec::new();
         for (path, state) in &mut self.files {
             let FileState::Growing { length, since } = state else { continue };

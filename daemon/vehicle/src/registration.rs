@@ -38,10 +38,10 @@ impl RegisteredFrame {
     }
 }
 
-/// The pose in steps of 2^-20 metres and radians, so that sources of the same pose in other forms, such as degrees and
+/// The pose in steps of 2^-30 metres and radians, so that sources of the same pose in other forms, such as degrees and
 /// quaternions, give the same map.
 fn on_grid(pose: &Pose) -> Pose {
-    const STEPS: f64 = (1 << 20) as f64;
+    const STEPS: f64 = (1 << 30) as f64;
     let round = |value: f64| (value * STEPS).round() / STEPS;
     Pose { x: round(pose.x), y: round(pose.y), z: round(pose.z), yaw_rad: round(pose.yaw_rad) }
 }

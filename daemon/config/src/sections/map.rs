@@ -67,7 +67,8 @@ section! {
         /// Place of a live camera on the vehicle: metres forward, to starboard and down from the point whose pose is measured.
         mount_m: [f64; 3] = [0.0, 0.0, 0.0], range(-20.0, 20.0, "m"), [Auv];
         /// Direction of a live camera: rotation of the image's upper edge from the bow, clockwise from above; then tilt of the
-        /// optical axis from straight down, towards the bow and to starboard. Roll and pitch of the vehicle are added.
+        /// optical axis from straight down, towards the bow and to starboard. Roll and pitch of the vehicle are added; a frame
+        /// that is tilted by more than 34 degrees in all is not mapped.
         mount_deg: [f64; 3] = [0.0, 0.0, 0.0], range(-180.0, 180.0, "deg"), [Auv];
         /// Whether frames are corrected for a light that depends on the place in the frame alone: lamps, the lens, the water
         /// between. It is learnt from the first 500 frames. Exemplars show the frame as it is.

@@ -74,8 +74,6 @@ sources! {
         Rehearsal,
         /// A folder of images with `poses.csv`.
         Frames(PathBuf) = "frames" "DIR",
-        /// An RGB-D sequence in the layout of the TUM benchmark.
-        Tum(PathBuf) = "tum" "DIR",
         /// A folder into which a program writes images.
         Watch(PathBuf) = "watch" "DIR",
         /// A shell command that writes images to its standard output.
@@ -116,7 +114,7 @@ mod tests {
     #[test]
     fn a_source_is_a_kind_and_a_place() {
         for text in
-            ["", "frames:a", "command:ffmpeg -i rtsp://x:1/y -", "watch:/a b", "ros2:/camera/image_raw", "tum:x"]
+            ["", "frames:a", "command:ffmpeg -i rtsp://x:1/y -", "watch:/a b", "ros2:/camera/image_raw"]
         {
             let value = Value::String(text.to_owned());
             assert_eq!(CameraSource::read(&value, &ANY).unwrap().write(), value);

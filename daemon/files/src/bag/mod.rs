@@ -9,7 +9,7 @@ use scenecast_core::UserError;
 use scenecast_messages::decode as decode_cdr;
 use scenecast_messages::nav_msgs::Odometry;
 use scenecast_messages::sensor_msgs::{CompressedImage, Image};
-use scenecast_sensors::{PoseMatch, PoseTrack, Stamp, pose_of, rgb_of, stamp_of_cdr};
+use scenecast_sensors::{CameraMounting, PoseMatch, PoseTrack, Stamp, pose_of, rgb_of, stamp_of_cdr};
 use std::collections::BTreeSet;
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -138,18 +138,37 @@ pub struct BagTopics<'a> {
     pub odometry: Option<&'a str>,
 }
 
+/// How poses and images of a bag belong together.
+#[derive(Debug, Clone, Copy)]
+pub struct BagTiming {
+    /// Longest time between two poses within which the pose of an image is interpolated.
+    pub max_gap: Duration,
+    /// Added to the times of images, seconds.
+    pub clock_offset_s: f64,
+    pub mounting: CameraMounting,
+    /// Height of the camera above the sea floor, metres.
+    pub altitude_m: f64,
+}
+
+impl BagTiming {
+    fn on_the_clock_of_poses(&self, stamp: Stamp) -> Stamp {
+        let by = Duration::from_secs_f64(self.clock_offset_s.abs());
+        if self.clock_offset_s < 0.0 { stamp.before(by) } else { stamp.after(by) }
+    }
+}
+
 impl Recording {
-    /// The images of a bag at the poses of its odometry, interpolated between two that are at most `max_gap` apart.
+    /// The images of a bag at the poses of its odometry.
     ///
     /// # Errors
     /// No images or odometry, topics that are not clear, or no image with a pose.
-    pub fn open_bag(path: &Path, topics: BagTopics<'_>, max_gap: Duration) -> Result<Self, UserError> {
+    pub fn open_bag(path: &Path, topics: BagTopics<'_>, timing: &BagTiming) -> Result<Self, UserError> {
         let contents = Contents::read(path)?;
         let images = contents.choose(path, topics.images, &[RAW, COMPRESSED], "bag:FILE#TOPIC")?;
         let odometry = contents.choose(path, topics.odometry, &[ODOMETRY], "navigation.source = \"ros2:TOPIC\"")?;
         let mut poses: Vec<_> = contents.poses.iter().filter(|(topic, ..)| *topic == odometry).collect();
         poses.sort_by_key(|(_, stamp, _)| *stamp);
-        let track = PoseTrack::of(poses.iter().map(|(_, stamp, pose)| (*stamp, *pose)), max_gap);
+        let track = PoseTrack::of(poses.iter().map(|(_, stamp, pose)| (*stamp, *pose)), timing.max_gap);
         let position = Mutex::new(Position { stream: None, next: 0 });
         let bag = Arc::new(Bag { path: path.to_owned(), topic: images, position });
         let mut frames: Vec<(Stamp, RecordedFrame)> = Vec::new();
@@ -161,7 +180,8 @@ impl Recording {
                 without_time += 1;
                 continue;
             };
-            let PoseMatch::Found(pose) = track.at(stamp) else { continue };
+            let PoseMatch::Found(pose) = track.at(timing.on_the_clock_of_poses(stamp)) else { continue };
+            let Some(pose) = timing.mounting.camera_pose(&pose, timing.altitude_m) else { continue };
             let (x_m, y_m, depth_m, heading_rad) = (pose.x_m, pose.y_m, pose.depth_m, pose.heading_rad);
             let image = FrameImage::Bag(bag.clone(), number);
             frames.push((stamp, RecordedFrame { t_s: 0.0, image, x_m, y_m, depth_m, heading_rad, scale: 1.0 }));
@@ -173,7 +193,7 @@ impl Recording {
         let dropped = all - frames.len() as u64;
         let mut notes = Vec::new();
         if dropped > 0 {
-            notes.push(format!("{dropped} of {all} images have no time or no pose at their time"));
+            notes.push(format!("{dropped} of {all} images have no time or no pose at their time, or were tilted too much"));
         }
         notes.extend(contents.damage.map(|damage| format!("the file breaks off: {damage}")));
         let frames =

@@ -5,6 +5,7 @@ use super::{CameraFrame, FramePicture};
 use crate::ros2::RosSensors;
 use scenecast_config::{CameraSource, CameraStamps, Config, NavigationSource};
 use scenecast_core::UserError;
+use scenecast_files::configured_mounting;
 use scenecast_host::CameraPose;
 use scenecast_sensors::{CameraFault, CameraMounting, FrameMatcher, Limits, MatchedImage, SensorPose, Stamp};
 use scenecast_sources::{
@@ -44,6 +45,8 @@ pub(crate) struct LiveCamera {
     /// What the source said last about a kind of fault.
     said: BTreeMap<CameraFault, String>,
     was_matched: bool,
+    /// Whether the scene model has frames enough, so that images wait for it.
+    is_model_busy: bool,
 }
 
 /// Difference between the clocks of the poses and of the camera.
@@ -55,11 +58,6 @@ impl ClockOffset {
         let by = Duration::from_secs_f64(self.0.abs());
         if self.0 < 0.0 { stamp.before(by) } else { stamp.after(by) }
     }
-}
-
-fn mounting(config: &Config) -> CameraMounting {
-    let [turn_rad, ahead, aside] = config.camera.mount_deg.map(f64::to_radians);
-    CameraMounting { place_m: config.camera.mount_m, turn_rad, tilt_rad: [ahead, aside] }
 }
 
 /// The next report of a source; without one it never returns.
@@ -105,19 +103,22 @@ impl LiveCamera {
             delay: Duration::from_secs_f64(c.delay_s),
             clock_offset: ClockOffset(c.clock_offset_s),
             has_own_poses: config.navigation.source != NavigationSource::Autopilot,
-            mounting: mounting(config),
+            mounting: configured_mounting(config),
             altitude_m: config.survey.altitude_m,
             newest_pose: None,
             is_pose_new: false,
             log: FaultLog::default(),
             said: BTreeMap::new(),
             was_matched: false,
+            is_model_busy: false,
         })
     }
 
     /// Waits for a report of the source, or until an image has waited too long for its pose. Cancel-safe.
     pub(super) async fn wait(&mut self) {
-        let timeout = self.matcher.poll_timeout().map(|at| tokio::time::Instant::from_std(self.clock.instant(at)));
+        // While the scene model is busy, its next report wakes the vehicle.
+        let timeout = self.matcher.poll_timeout().filter(|_| !self.is_model_busy);
+        let timeout = timeout.map(|at| tokio::time::Instant::from_std(self.clock.instant(at)));
         let overdue = async {
             match timeout {
                 Some(at) => tokio::time::sleep_until(at).await,
@@ -180,24 +181,39 @@ impl LiveCamera {
     }
 
     pub(super) fn handle_missed(&mut self) {
-        self.matcher.count(CameraFault::Unreadable);
+        self.matcher.drop_matched(CameraFault::Unreadable);
     }
 
     pub(super) fn poll_frame(&mut self, mapping: u32) -> Option<CameraFrame> {
-        if mapping >= MAX_MAPPING {
-            return None;
-        }
-        let frame = self.matcher.poll_frame(self.clock.now());
+        self.is_model_busy = mapping >= MAX_MAPPING;
+        let frame = if self.is_model_busy { None } else { self.next_frame() };
         if !self.was_matched && frame.is_some() {
             self.was_matched = true;
             tracing::info!("camera: the first image has a pose");
         }
         self.log_faults();
-        let MatchedImage { image, pose, t_s, .. } = frame?;
-        let pose = self.mounting.camera_pose(&pose, self.altitude_m);
+        frame
+    }
+
+    /// The next image that was taken near enough to straight down, at the pose of the camera.
+    fn next_frame(&mut self) -> Option<CameraFrame> {
+        let now = self.clock.now();
+        self.matcher.keep_recent(now);
+        let (MatchedImage { image, t_s, .. }, pose) = loop {
+            let frame = self.matcher.poll_frame(now)?;
+            match self.mounting.camera_pose(&frame.pose, self.altitude_m) {
+                Some(pose) => break (frame, pose),
+                None => self.matcher.drop_matched(CameraFault::Tilted),
+            }
+        };
         // A pixel's size on the floor grows with the height.
         let scale = pose.altitude_m.map_or(1.0, |height| (height / self.altitude_m).clamp(SCALES.0, SCALES.1));
         Some(CameraFrame { t_s, picture: FramePicture::Received(image), pose, scale })
+    }
+
+    /// Logs the account of the run.
+    pub(super) fn log_end(&self) {
+        tracing::info!("camera: {}", self.matcher.tally());
     }
 
     fn log_faults(&mut self) {

@@ -115,6 +115,13 @@ impl Camera {
         }
     }
 
+    /// The run ends.
+    pub(crate) fn log_end(&self) {
+        if let Self::Live(camera) = self {
+            camera.log_end();
+        }
+    }
+
     /// Counts an image that could not be decoded.
     pub(crate) fn handle_missed(&mut self) {
         if let Self::Live(camera) = self {

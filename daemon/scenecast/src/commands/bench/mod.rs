@@ -4,6 +4,8 @@ mod exemplar;
 mod fidelity;
 mod inference;
 mod link;
+#[cfg(feature = "ros2")]
+mod live;
 mod localisation;
 mod modem;
 mod planning;
@@ -20,6 +22,8 @@ use exemplar::ExemplarBench;
 use fidelity::FidelityBench;
 use inference::InferenceBench;
 use link::LinkBench;
+#[cfg(feature = "ros2")]
+use live::LiveBench;
 use localisation::LocalisationBench;
 use modem::ModemBench;
 use planning::PlanningBench;
@@ -42,6 +46,9 @@ pub(super) enum BenchCommand {
     Inference(InferenceBench),
     /// The link over range, frame size and loss: efficiency, latency of directives, convergence.
     Link(LinkBench),
+    /// A vehicle with a live camera, by ROS 2: images that reach the scene model, processor time, memory.
+    #[cfg(feature = "ros2")]
+    Live(LiveBench),
     /// The vehicle's position over 3 km: dead reckoning, with the relay, with outliers.
     Localisation(LocalisationBench),
     /// Drivers and emulated modems: throughput, latency of directives, surveys through slow modems.
@@ -80,6 +87,8 @@ impl BenchCommand {
             Self::Fidelity(f) => f.run(),
             Self::Inference(i) => i.run(),
             Self::Link(l) => l.run(),
+            #[cfg(feature = "ros2")]
+            Self::Live(l) => l.run(),
             Self::Localisation(l) => l.run(),
             Self::Modem(m) => m.run(),
             Self::Planning(p) => p.run(),

@@ -10,12 +10,17 @@ use clap::Args;
 use scene_model::topics::{Birth, SceneConfig, SceneModel};
 use scene_model::words::{WordConfig, WordExtractor};
 use scenecast_core::UserError;
-use scenecast_files::open_bag;
+use scenecast_files::{BagTiming, open_bag};
+use scenecast_sensors::CameraMounting;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-/// Longest time between two poses of a bag within which the pose of an image is interpolated.
-const MAX_POSE_GAP: Duration = Duration::from_secs(1);
+/// A camera at the point whose pose is measured, with poses that are interpolated within a second. Its height is not known, so
+/// that tilt moves nothing.
+fn level_camera() -> BagTiming {
+    let max_gap = Duration::from_secs(1);
+    BagTiming { max_gap, clock_offset_s: 0.0, mounting: CameraMounting::default(), altitude_m: 0.0 }
+}
 
 /// Label words, a mosaic or a sequence of images, and print the measurements: in a pipe or a file as one line of JSON.
 ///
@@ -232,7 +237,7 @@ impl Run {
             "bag" => {
                 let metres_per_pixel = self.metres_per_pixel()?;
                 let cell_m = self.columns(CELL_PX * metres_per_pixel);
-                let recording = open_bag(&dir.to_string_lossy(), None, MAX_POSE_GAP)?;
+                let recording = open_bag(&dir.to_string_lossy(), None, &level_camera())?;
                 (Box::new(Frames::of(recording, extractor, metres_per_pixel, cell_m[0])), cell_m)
             }
             _ => return Err(UserError::Input("--source: it takes tum:DIR, frames:DIR or bag:FILE".to_owned())),
