@@ -40,13 +40,13 @@ mod world;
 
 pub use fidelity::{FidelityRow, fidelity, fidelity_panels};
 pub use frames_log::FramesLog;
-pub use scenecast_worlds::View;
 pub use localisation::{Localisation, LocalisationRun, Tracks, localisation, localisation_plot, run_with_outliers};
 pub use meter::Delays;
 pub use mission::{MapInformation, MapQuality, Mission, MissionOptions};
 pub use outputs::write_outputs;
 pub use quality::{Curve, Line, Panel, quality_plot};
 pub use report::{Report, report};
+pub use scenecast_worlds::View;
 pub use simulated_autopilot::{SimulatedAutopilot, simulated_autopilot};
 pub use truth::Truth;
 pub use uplink::{Repeats, Uplink};

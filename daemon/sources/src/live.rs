@@ -105,7 +105,6 @@ const BACK_OFF: (Duration, Duration) = (Duration::from_millis(250), Duration::fr
 /// A source that stayed open for this long is opened again at once when it is lost.
 const HEALTHY: Duration = Duration::from_secs(10);
 
-
 /// A running source.
 pub struct LiveSource {
     reports: mpsc::Receiver<SourceReport>,

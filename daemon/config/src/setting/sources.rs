@@ -113,9 +113,7 @@ mod tests {
 
     #[test]
     fn a_source_is_a_kind_and_a_place() {
-        for text in
-            ["", "frames:a", "command:ffmpeg -i rtsp://x:1/y -", "watch:/a b", "ros2:/camera/image_raw"]
-        {
+        for text in ["", "frames:a", "command:ffmpeg -i rtsp://x:1/y -", "watch:/a b", "ros2:/camera/image_raw"] {
             let value = Value::String(text.to_owned());
             assert_eq!(CameraSource::read(&value, &ANY).unwrap().write(), value);
         }

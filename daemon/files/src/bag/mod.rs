@@ -193,7 +193,9 @@ impl Recording {
         let dropped = all - frames.len() as u64;
         let mut notes = Vec::new();
         if dropped > 0 {
-            notes.push(format!("{dropped} of {all} images have no time or no pose at their time, or were tilted too much"));
+            notes.push(format!(
+                "{dropped} of {all} images have no time or no pose at their time, or were tilted too much"
+            ));
         }
         notes.extend(contents.damage.map(|damage| format!("the file breaks off: {damage}")));
         let frames =

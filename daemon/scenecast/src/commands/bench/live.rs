@@ -9,7 +9,6 @@ use scenecast_messages::sensor_msgs::Image;
 use scenecast_messages::std_msgs::Header;
 use scenecast_rehearsal::{View, World};
 use scenecast_ros2::{Publisher, Qos, RosNode, topic};
-use serde::Serialize;
 use std::f64::consts::PI;
 use std::fs::File;
 use std::net::TcpListener;
@@ -61,7 +60,7 @@ fn rate(text: &str) -> Result<f64, String> {
     rate.ok_or_else(|| "it takes 0.1 to 30 images a second".to_owned())
 }
 
-#[derive(Debug, Serialize)]
+#[derive(Debug)]
 struct Figures {
     images: u32,
     mapped: u64,
@@ -81,7 +80,7 @@ impl LiveBench {
         let figures = self.measure(&dir)?;
         let _ = std::fs::remove_dir_all(&dir);
         if self.json {
-            println!("{}", serde_json::to_string(&figures).map_err(|e| UserError::Failed(e.to_string()))?);
+            println!("{}", figures.json());
         } else {
             figures.print();
         }
@@ -114,7 +113,8 @@ impl LiveBench {
             None => self.publish(&RosNode::start(&settings, "scenecast_bench")?)?,
         }
         std::thread::sleep(Duration::from_secs(3));
-        let cores = cpu_s(&vehicle.0).zip(cpu_before).map(|(now, before)| (now - before) / began.elapsed().as_secs_f64());
+        let cores =
+            cpu_s(&vehicle.0).zip(cpu_before).map(|(now, before)| (now - before) / began.elapsed().as_secs_f64());
         let (memory, late_map_s) = (memory_mb(&vehicle.0), late_map(&settings)?);
         vehicle.interrupt();
         let (mapped, dropped) = tally(&dir.join("auv.log"))?;
@@ -301,6 +301,14 @@ impl Figures {
             && self.late_map_s.is_some_and(|s| s < late_s)
     }
 
+    fn json(&self) -> serde_json::Value {
+        let Self { images, mapped, dropped, vehicle_cores, vehicle_mb, late_map_s } = self;
+        serde_json::json!({
+            "images": images, "mapped": mapped, "dropped": dropped,
+            "vehicle_cores": vehicle_cores, "vehicle_mb": vehicle_mb, "late_map_s": late_map_s,
+        })
+    }
+
     fn print(&self) {
         let or_unknown = |value: Option<f64>, unit: &str| match value {
             Some(value) => format!("{value:.2} {unit}"),
@@ -308,7 +316,11 @@ impl Figures {
         };
         let (cores, megabytes, late_s) = LIMITS;
         println!("images   {} of {} mapped, {} dropped", self.mapped, self.images, self.dropped);
-        println!("vehicle  {} (limit {cores}), {} (limit {megabytes})", or_unknown(self.vehicle_cores, "cores"), or_unknown(self.vehicle_mb, "MB"));
+        println!(
+            "vehicle  {} (limit {cores}), {} (limit {megabytes})",
+            or_unknown(self.vehicle_cores, "cores"),
+            or_unknown(self.vehicle_mb, "MB")
+        );
         println!("late map {} (limit {late_s})", or_unknown(self.late_map_s, "s"));
     }
 }
