@@ -9,6 +9,7 @@ use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
 use std::sync::{Arc, Mutex, PoisonError};
+use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 /// Bytes of one read.
@@ -40,6 +41,8 @@ struct Running {
     stream: ImageStream,
     /// When the image began that is not complete yet.
     begun: Option<Stamp>,
+    /// The thread that reads the program's messages.
+    messages: Option<JoinHandle<()>>,
     /// The last line that the program wrote to its standard error.
     last_line: Arc<Mutex<String>>,
     /// Bytes between images that are already reported.
@@ -73,12 +76,13 @@ impl CommandSource {
             let read = move || read_pieces(output, clock, &sender);
             std::thread::Builder::new().name("camera output".to_owned()).spawn(read)?;
         }
-        if let Some(messages) = child.stderr.take() {
+        let messages = child.stderr.take().map(|messages| {
             let last_line = last_line.clone();
             let read = move || keep_last_line(messages, &last_line);
-            std::thread::Builder::new().name("camera messages".to_owned()).spawn(read)?;
-        }
-        Ok(Running { child, pieces, stream: ImageStream::default(), begun: None, last_line, skipped: 0 })
+            std::thread::Builder::new().name("camera messages".to_owned()).spawn(read)
+        });
+        let messages = messages.transpose()?;
+        Ok(Running { child, pieces, stream: ImageStream::default(), begun: None, messages, last_line, skipped: 0 })
     }
 }
 
@@ -115,7 +119,8 @@ impl Running {
     fn end(&mut self) -> SourceError {
         let until = Instant::now() + GRACE;
         let mut status = self.child.try_wait();
-        while matches!(status, Ok(None)) && Instant::now() < until {
+        let is_read = |running: &Self| running.messages.as_ref().is_none_or(JoinHandle::is_finished);
+        while (matches!(status, Ok(None)) || !is_read(self)) && Instant::now() < until {
             std::thread::sleep(Duration::from_millis(10));
             status = self.child.try_wait();
         }
