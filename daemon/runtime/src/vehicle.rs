@@ -62,7 +62,10 @@ pub fn run_vehicle(load: Load, simulated: Option<SimulatedAutopilot>) -> Result<
             vehicle.assume_start_refused(clock.now());
         }
         let is_recorded = recording.is_some();
-        let camera = match config.camera.source.is_live() {
+        // Without a camera, poses of a navigation source move the vehicle.
+        let is_live = config.camera.source.is_live()
+            || !is_recorded && matches!(config.navigation.source, NavigationSource::Dvl(_) | NavigationSource::Ros2(_));
+        let camera = match is_live {
             // The time since the end of the former run is unknown.
             true => Camera::Live(Box::new(LiveCamera::start(
                 &config,
