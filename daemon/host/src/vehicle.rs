@@ -3,7 +3,7 @@
 use crate::link_host::{FrameEvent, LinkHost};
 use crate::pilot::{Pilot, PilotEvent};
 use scenecast_core::TangentPlane;
-use scenecast_drivers::autopilot::{Autopilot, Goal, Step};
+use scenecast_drivers::autopilot::{Autopilot, Counters, Goal, Health, Step};
 use scenecast_drivers::modem::Station;
 use scenecast_protocol::coordinates::MapPoint;
 use scenecast_protocol::directive::{Budget, Fix, Settings};
@@ -243,6 +243,12 @@ impl VehicleHost {
     pub fn measured_pose(&self) -> Option<MeasuredPose> {
         let (Step { roll_rad, pitch_rad, altitude_m, .. }, at) = self.pilot.as_ref()?.last_step?;
         Some(MeasuredPose { pose: self.dead_reckoned_pose(), roll_rad, pitch_rad, altitude_m, at })
+    }
+
+    /// State and counters of the autopilot, if there is one.
+    pub fn autopilot(&self) -> Option<(Health, Counters)> {
+        let pilot = &self.pilot.as_ref()?.pilot;
+        Some((pilot.health(), pilot.autopilot.counters()))
     }
 
     fn dead_reckoned_pose(&self) -> CameraPose {

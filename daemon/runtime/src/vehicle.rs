@@ -225,7 +225,7 @@ impl VehicleShell {
             self.host.handle_disk(disk);
         }
         self.host.steer(now);
-        self.ros2.publish(&self.host);
+        self.ros2.publish(&self.host, self.camera.tally());
         self.handle_events()?;
         while let Some(bytes) = self.host.poll_output(now) {
             self.ports.modem.write(bytes);

@@ -7,7 +7,7 @@ use scenecast_config::{CameraSource, CameraStamps, Config, NavigationSource};
 use scenecast_core::UserError;
 use scenecast_host::{CameraPose, MeasuredPose};
 use scenecast_protocol::time::Instant;
-use scenecast_sensors::{CameraFault, FrameMatcher, Limits, MatchedImage, SensorPose, Stamp};
+use scenecast_sensors::{CameraFault, CameraTally, FrameMatcher, Limits, MatchedImage, SensorPose, Stamp};
 use scenecast_sources::{
     ArrivalClock, CommandSource, DvlSource, LiveSource, Picture, Reading, SensorKind, SourceImage, SourceReport,
     WatchSource, read_tum_poses,
@@ -173,6 +173,10 @@ impl LiveCamera {
 
     pub(super) fn newest_pose(&self) -> Option<CameraPose> {
         self.newest_pose
+    }
+
+    pub(super) fn tally(&self) -> &CameraTally {
+        self.matcher.tally()
     }
 
     pub(super) fn handle_missed(&mut self) {

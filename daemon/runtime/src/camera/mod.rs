@@ -11,7 +11,7 @@ use image::RgbImage;
 use scenecast_core::UserError;
 use scenecast_files::{FrameImage, RecordedFrame};
 use scenecast_host::{CameraPose, MeasuredPose};
-use scenecast_sensors::SensorPose;
+use scenecast_sensors::{CameraTally, SensorPose};
 use scenecast_sources::Picture;
 
 /// An image and where it was taken.
@@ -112,6 +112,14 @@ impl Camera {
         match self {
             Self::Recorded(_) => None,
             Self::Live(camera) => camera.newest_pose(),
+        }
+    }
+
+    /// What became of the images of a live camera.
+    pub(crate) fn tally(&self) -> Option<&CameraTally> {
+        match self {
+            Self::Recorded(_) => None,
+            Self::Live(camera) => Some(camera.tally()),
         }
     }
 
