@@ -79,6 +79,13 @@ impl Process {
         Self(child.expect("scenecast starts"))
     }
 
+    /// Starts it with its log in a file.
+    pub fn start_logged(arguments: &[&str], log: &Path) -> Self {
+        let log = std::fs::File::create(log).expect("the log can be written");
+        let child = scenecast().args(arguments).stdout(Stdio::null()).stderr(log).spawn();
+        Self(child.expect("scenecast starts"))
+    }
+
     /// Kills it as a power cut would.
     pub fn kill(&mut self) {
         let _ = self.0.kill();

@@ -3,7 +3,7 @@
 use crate::link_host::{FrameEvent, LinkHost};
 use crate::pilot::{Pilot, PilotEvent};
 use scenecast_core::TangentPlane;
-use scenecast_drivers::autopilot::{Autopilot, Goal};
+use scenecast_drivers::autopilot::{Autopilot, Counters, Goal, Health, Step};
 use scenecast_drivers::modem::Station;
 use scenecast_protocol::coordinates::MapPoint;
 use scenecast_protocol::directive::{Budget, Fix, Settings};
@@ -49,6 +49,20 @@ pub struct CameraPose {
     pub depth_m: f64,
 }
 
+/// What an autopilot measured last.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MeasuredPose {
+    pub pose: CameraPose,
+    /// Rotation about the forward axis, starboard down, radians.
+    pub roll_rad: f64,
+    /// Rotation about the starboard axis, bow up, radians.
+    pub pitch_rad: f64,
+    /// Height above the sea floor, metres, where it is measured.
+    pub altitude_m: Option<f64>,
+    /// Time of the measurement.
+    pub at: Instant,
+}
+
 /// A vehicle's autopilot with the data for its goals.
 pub struct VehiclePilot {
     pilot: Pilot,
@@ -60,12 +74,14 @@ pub struct VehiclePilot {
     is_rising: bool,
     /// Whether its odometry is the vehicle's.
     measures: bool,
+    /// The last stretch of way, and when it came in.
+    last_step: Option<(Step, Instant)>,
 }
 
 impl VehiclePilot {
     /// An autopilot for a survey at `depth_m` metres.
     pub fn new(autopilot: Box<dyn Autopilot>, plane: Option<TangentPlane>, depth_m: f64, now: Instant) -> Self {
-        Self { pilot: Pilot::new(autopilot, now), plane, depth_m, is_rising: false, measures: true }
+        Self { pilot: Pilot::new(autopilot, now), plane, depth_m, is_rising: false, measures: true, last_step: None }
     }
 
     /// Whether the autopilot's odometry counts; otherwise another source gives the vehicle's pose.
@@ -84,6 +100,7 @@ impl VehiclePilot {
             }
             vehicle.handle_odometry(step.dx_m, step.dy_m, step.heading_rad, step.depth_m, now);
             vehicle.handle_unmeasured(step.unseen);
+            self.last_step = Some((step, now));
         }
         vehicle.set_autopilot_silent(autopilot.health(now).is_silent());
         let navigator = vehicle.navigator();
@@ -221,9 +238,17 @@ impl VehicleHost {
         self.mapper.outstanding
     }
 
-    /// The vehicle's pose by the odometry of its autopilot; `None` if another source measures it.
-    pub fn measured_pose(&self) -> Option<CameraPose> {
-        self.is_measured_by_pilot().then(|| self.dead_reckoned_pose())
+    /// The vehicle's pose by the last report of its autopilot; `None` if there is none yet, or if another source measures the
+    /// pose.
+    pub fn measured_pose(&self) -> Option<MeasuredPose> {
+        let (Step { roll_rad, pitch_rad, altitude_m, .. }, at) = self.pilot.as_ref()?.last_step?;
+        Some(MeasuredPose { pose: self.dead_reckoned_pose(), roll_rad, pitch_rad, altitude_m, at })
+    }
+
+    /// State and counters of the autopilot, if there is one.
+    pub fn autopilot(&self) -> Option<(Health, Counters)> {
+        let pilot = &self.pilot.as_ref()?.pilot;
+        Some((pilot.health(), pilot.autopilot.counters()))
     }
 
     fn dead_reckoned_pose(&self) -> CameraPose {

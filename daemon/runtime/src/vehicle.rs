@@ -65,7 +65,10 @@ pub fn run_vehicle(load: Load, simulated: Option<SimulatedAutopilot>) -> Result<
             vehicle.assume_start_refused(clock.now());
         }
         let is_recorded = recording.is_some();
-        let camera = match config.camera.source.is_live() {
+        // Without a camera, poses of a navigation source move the vehicle.
+        let is_live = config.camera.source.is_live()
+            || !is_recorded && matches!(config.navigation.source, NavigationSource::Dvl(_) | NavigationSource::Ros2(_));
+        let camera = match is_live {
             // The time since the end of the former run is unknown.
             true => Camera::Live(Box::new(LiveCamera::start(
                 &config,
@@ -266,7 +269,7 @@ impl VehicleShell {
             labels.set_pose(ImagePose { x_m, y_m, depth_m, heading_rad: navigator.heading_rad() });
         }
         self.host.steer(now);
-        self.ros2.publish(&self.host);
+        self.ros2.publish(&self.host, self.camera.tally());
         self.handle_events()?;
         while let Some(bytes) = self.host.poll_output(now) {
             self.ports.modem.write(bytes);

@@ -38,6 +38,14 @@ pub enum CameraFault {
     PosesLost,
     /// No pose came in for longer than allowed.
     PosesStalled,
+    /// A message of the source of the poses could not be read.
+    PosesUnreadable,
+    /// The source of the poses says that its pose is not valid.
+    PoseRefused,
+    /// The velocity log does not see the sea floor, so that its dead reckoning drifts.
+    NoBottomLock,
+    /// The dead reckoning of the source began anew, and its track continues at the last pose.
+    DeadReckoningReset,
 }
 
 impl CameraFault {
@@ -60,7 +68,25 @@ impl CameraFault {
             Self::UnusablePose => "unusable pose",
             Self::PosesLost => "poses lost",
             Self::PosesStalled => "poses stalled",
+            Self::PosesUnreadable => "unreadable message about the pose",
+            Self::PoseRefused => "pose not valid",
+            Self::NoBottomLock => "no bottom lock",
+            Self::DeadReckoningReset => "dead reckoning began anew",
         }
+    }
+
+    /// Whether it is the source of the poses that has failed, and not the camera.
+    pub fn is_of_navigation(self) -> bool {
+        matches!(
+            self,
+            Self::PoseClockJump
+                | Self::PosesLost
+                | Self::PosesStalled
+                | Self::PosesUnreadable
+                | Self::PoseRefused
+                | Self::NoBottomLock
+                | Self::DeadReckoningReset
+        )
     }
 
     /// Whether each count is an image that was not mapped.

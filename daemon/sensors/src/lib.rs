@@ -7,6 +7,7 @@
 //! | compressed images become RGB, and say when they were taken | [`decode`], [`own_stamp`] |
 //! | quaternions become headings and tilts | [`Rotation`] |
 //! | messages of ROS 2 become images and poses | [`rgb_of`], [`pose_of`] |
+//! | lines of a Doppler velocity log become poses | [`DvlReport`], [`DvlTrack`] |
 //! | poses are interpolated at the time of an image | [`PoseTrack`] |
 //! | the pose of a vehicle becomes that of its camera | [`CameraMounting`] |
 //! | images wait for their poses, and are dropped with a reason | [`FrameMatcher`] |
@@ -16,6 +17,7 @@
 mod bayer;
 mod camera_tally;
 mod compressed;
+mod dvl;
 mod frame_matcher;
 mod image_stream;
 mod mounting;
@@ -27,6 +29,7 @@ mod stamp;
 
 pub use camera_tally::{CameraFault, CameraTally};
 pub use compressed::{DecodeError, MAX_PIXELS, decode, own_stamp};
+pub use dvl::{DvlError, DvlPosition, DvlReport, DvlTrack, MAX_DVL_LINE};
 pub use frame_matcher::{FrameMatcher, Limits, MatchedImage};
 pub use image_stream::{ImageStream, MAX_IMAGE_BYTES, complete_length};
 pub use mounting::CameraMounting;

@@ -6,6 +6,7 @@
 
 mod arrival_clock;
 mod command;
+mod dvl;
 mod live;
 mod picture;
 #[cfg(feature = "ros2")]
@@ -15,6 +16,7 @@ mod watch;
 
 pub use arrival_clock::ArrivalClock;
 pub use command::CommandSource;
+pub use dvl::DvlSource;
 pub use live::{LiveSource, Reading, SensorKind, SensorSource, SourceError, SourceImage, SourceReport};
 pub use picture::Picture;
 #[cfg(feature = "ros2")]

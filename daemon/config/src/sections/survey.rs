@@ -50,10 +50,17 @@ section! {
     /// The vehicle's navigation.
     navigation: Navigation {
         /// Source of the vehicle's pose. Empty: the autopilot, or the recording of the camera. tum:FILE: a file of poses with
-        /// the times of the images. ros2:TOPIC: odometry of ROS 2 in a frame of east, north, up. The autopilot, if there is one, then only follows waypoints.
+        /// the times of the images. dvl:HOST:PORT: the dead reckoning of a Doppler velocity log of Water Linked (A50, A125),
+        /// which begins at the origin of the map; the port is 16171. ros2:TOPIC: odometry of ROS 2 in a frame of east, north,
+        /// up. The autopilot, if there is one, then only follows waypoints.
         source: NavigationSource = NavigationSource::Autopilot, ANY, [Auv];
-        /// Longest time between two poses within which the pose of an image is interpolated.
-        max_gap_s: f64 = 1.0, range(0.01, 60.0, "s"), [Auv];
+        /// Heading of the vehicle at the last reset of the velocity log's dead reckoning, clockwise from north.
+        dvl_heading_deg: f64 = 0.0, range(-360.0, 360.0, "degrees"), [Auv];
+        /// Silence of the source after which it counts as stalled; a velocity log is then connected to again.
+        timeout_s: f64 = 5.0, range(0.5, 600.0, "s"), [Auv];
+        /// Longest time between two poses within which the pose of an image is interpolated. Poses that come once a second
+        /// need 1.5 s or more.
+        max_gap_s: f64 = 2.0, range(0.01, 60.0, "s"), [Auv];
         /// Drift of dead reckoning, in percent of the distance travelled.
         drift_percent: f64 = 1.0, range(0.0, 50.0, "%"), [Auv Scenario];
         /// Standard deviation of the vehicle's position at the start of the survey. It limits how far the first

@@ -1,4 +1,4 @@
-//! Log lines about a camera: each kind of fault at once when it is new, and then seldom.
+//! Log lines about a camera and the source of its poses: each kind of fault at once when it is new, and then seldom.
 
 use scenecast_sensors::{CameraFault, CameraTally};
 use std::collections::BTreeMap;
@@ -36,7 +36,8 @@ impl FaultLog {
             self.logged.insert(fault, Logged { at: now, count });
             let what = if fault.is_dropped_image() { "dropped, " } else { "" };
             let why = explain(fault).map(|text| format!(": {text}")).unwrap_or_default();
-            lines.push(format!("camera: {what}{} ({count} so far){why}", fault.name()));
+            let of = if fault.is_of_navigation() { "navigation" } else { "camera" };
+            lines.push(format!("{of}: {what}{} ({count} so far){why}", fault.name()));
         }
         lines
     }

@@ -6,10 +6,14 @@ use crate::ros2::RosSensors;
 use scenecast_config::{CameraSource, CameraStamps, Config, NavigationSource};
 use scenecast_core::UserError;
 use scenecast_files::configured_mounting;
-use scenecast_host::CameraPose;
-use scenecast_sensors::{CameraFault, CameraMounting, FrameMatcher, Limits, MatchedImage, SensorPose, Stamp};
+use scenecast_host::{CameraPose, MeasuredPose};
+use scenecast_protocol::time::Instant;
+use scenecast_sensors::{
+    CameraFault, CameraMounting, CameraTally, FrameMatcher, Limits, MatchedImage, SensorPose, Stamp,
+};
 use scenecast_sources::{
-    ArrivalClock, CommandSource, LiveSource, Picture, Reading, SourceImage, SourceReport, WatchSource, read_tum_poses,
+    ArrivalClock, CommandSource, DvlSource, LiveSource, Picture, Reading, SensorKind, SourceImage, SourceReport,
+    WatchSource, read_tum_poses,
 };
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -17,15 +21,13 @@ use std::time::Duration;
 /// Frames that may wait for the scene model; further ones stay with the matcher, which drops the oldest.
 const MAX_MAPPING: u32 = 2;
 
-/// Longest time between two poses of a vehicle that does not move.
-const MAX_POSE_INTERVAL_S: f64 = 0.2;
-
 /// Smallest and largest size of pixels that a measured altitude gives, in configured ones.
 const SCALES: (f64, f64) = (0.1, 10.0);
 
 /// A camera whose images come in while the vehicle dives.
 pub(crate) struct LiveCamera {
-    source: LiveSource,
+    /// The source of the images; without it the poses only move the vehicle.
+    source: Option<LiveSource>,
     /// The source of the poses, if it is not the autopilot or a file.
     navigation: Option<LiveSource>,
     matcher: FrameMatcher<Picture>,
@@ -37,6 +39,8 @@ pub(crate) struct LiveCamera {
     mounting: CameraMounting,
     /// Height of the camera at which its pixels have the configured size, metres.
     altitude_m: f64,
+    /// Time of the autopilot's last pose.
+    measured_at: Option<Instant>,
     /// The newest pose of the navigation source.
     newest_pose: Option<CameraPose>,
     /// Whether the vehicle does not know the newest pose yet.
@@ -69,30 +73,36 @@ async fn next_of(source: &mut Option<LiveSource>) -> SourceReport {
 }
 
 impl LiveCamera {
-    /// Starts the configured live camera and the source of its poses; the first frame has the mission time `start_s`.
+    /// Starts the configured live camera, if there is one, and the source of its poses; the first frame has the mission
+    /// time `start_s`.
     pub(crate) fn start(config: &Config, start_s: f64, ros: &RosSensors) -> Result<Self, UserError> {
         let clock = ArrivalClock::start();
         let c = &config.camera;
         let stall = Duration::from_secs_f64(c.timeout_s);
         let source = match &c.source {
-            CameraSource::Watch(dir) => LiveSource::start(WatchSource::new(dir, clock), stall),
-            CameraSource::Command(command) => LiveSource::start(CommandSource::new(command, clock), stall),
-            CameraSource::V4l2(device) => LiveSource::start(CommandSource::of_device(device, clock), stall),
-            CameraSource::Ros2(topic) => ros.camera(topic, clock, c.stamps == CameraStamps::Own, stall),
+            CameraSource::Rehearsal => None,
+            CameraSource::Watch(dir) => Some(LiveSource::start(WatchSource::new(dir, clock), stall)),
+            CameraSource::Command(command) => Some(LiveSource::start(CommandSource::new(command, clock), stall)),
+            CameraSource::V4l2(device) => Some(LiveSource::start(CommandSource::of_device(device, clock), stall)),
+            CameraSource::Ros2(topic) => Some(ros.camera(topic, clock, c.stamps == CameraStamps::Own, stall)),
             other => return Err(UserError::Input(format!("camera.source: {other:?} is not a live camera"))),
         };
         let failed = |e: std::io::Error| UserError::Failed(format!("a sensor's thread did not start: {e}"));
-        let source = source.map_err(failed)?;
+        let source = source.transpose().map_err(failed)?;
         let max_gap = Duration::from_secs_f64(config.navigation.max_gap_s);
         let mut matcher = FrameMatcher::new(Limits { max_gap, ..Limits::default() }, start_s);
+        let nav_stall = Duration::from_secs_f64(config.navigation.timeout_s);
         let navigation = match &config.navigation.source {
             NavigationSource::Autopilot => None,
             NavigationSource::Tum(file) => {
                 matcher.set_poses(read_tum_poses(file)?);
                 None
             }
-            NavigationSource::Ros2(topic) => Some(ros.navigation(topic, stall).map_err(failed)?),
-            NavigationSource::Dvl(_) => return Err(UserError::Input("navigation.source: not yet".to_owned())),
+            NavigationSource::Ros2(topic) => Some(ros.navigation(topic, nav_stall).map_err(failed)?),
+            NavigationSource::Dvl(address) => {
+                let dvl = DvlSource::new(address, config.navigation.dvl_heading_deg.to_radians(), clock);
+                Some(LiveSource::start(dvl, nav_stall).map_err(failed)?)
+            }
         };
         Ok(Self {
             source,
@@ -105,6 +115,7 @@ impl LiveCamera {
             has_own_poses: config.navigation.source != NavigationSource::Autopilot,
             mounting: configured_mounting(config),
             altitude_m: config.survey.altitude_m,
+            measured_at: None,
             newest_pose: None,
             is_pose_new: false,
             log: FaultLog::default(),
@@ -126,15 +137,18 @@ impl LiveCamera {
             }
         };
         tokio::select! {
-            report = self.source.next() => self.handle_report(report),
-            report = next_of(&mut self.navigation) => self.handle_report(report),
+            report = next_of(&mut self.source) => self.handle_report(SensorKind::Camera, report),
+            report = next_of(&mut self.navigation) => self.handle_report(SensorKind::Navigation, report),
             () = overdue => {}
         }
     }
 
-    fn handle_report(&mut self, report: SourceReport) {
+    fn handle_report(&mut self, of: SensorKind, report: SourceReport) {
         match report {
-            SourceReport::Open => tracing::info!("camera: open"),
+            SourceReport::Open => match of {
+                SensorKind::Camera => tracing::info!("camera: open"),
+                SensorKind::Navigation => tracing::info!("navigation: open"),
+            },
             SourceReport::Reading(Reading::Image(image)) => self.handle_image(image),
             SourceReport::Reading(Reading::Pose(stamp, pose)) => {
                 self.matcher.handle_pose(stamp, self.clock.now(), pose);
@@ -156,20 +170,17 @@ impl LiveCamera {
         self.matcher.handle_image(stamp, image.arrival, image.picture);
     }
 
-    pub(super) fn handle_pose(&mut self, pose: CameraPose) {
-        if self.has_own_poses {
+    pub(super) fn handle_pose(&mut self, measured: MeasuredPose) {
+        // A pose that is not measured again is not that of a later image.
+        if self.has_own_poses || self.measured_at.replace(measured.at) == Some(measured.at) {
             return;
         }
+        let MeasuredPose {
+            pose: CameraPose { x_m, y_m, heading_rad, depth_m }, roll_rad, pitch_rad, altitude_m, ..
+        } = measured;
+        let pose = SensorPose { x_m, y_m, heading_rad, depth_m, roll_rad, pitch_rad, altitude_m };
         let now = self.clock.now();
-        let CameraPose { x_m, y_m, heading_rad, depth_m } = pose;
-        let pose = SensorPose { x_m, y_m, heading_rad, depth_m, ..SensorPose::default() };
-        let is_due = self
-            .matcher
-            .last_pose()
-            .is_none_or(|(at, last)| last != pose || now.seconds_since(at) >= MAX_POSE_INTERVAL_S);
-        if is_due {
-            self.matcher.handle_pose(now, now, pose);
-        }
+        self.matcher.handle_pose(now, now, pose);
     }
 
     pub(super) fn poll_pose(&mut self) -> Option<CameraPose> {
@@ -178,6 +189,10 @@ impl LiveCamera {
 
     pub(super) fn newest_pose(&self) -> Option<CameraPose> {
         self.newest_pose
+    }
+
+    pub(super) fn tally(&self) -> &CameraTally {
+        self.matcher.tally()
     }
 
     pub(super) fn handle_missed(&mut self) {

@@ -10,8 +10,8 @@ pub(crate) use recorded::RecordedCamera;
 use image::RgbImage;
 use scenecast_core::UserError;
 use scenecast_files::{FrameImage, RecordedFrame};
-use scenecast_host::CameraPose;
-use scenecast_sensors::SensorPose;
+use scenecast_host::{CameraPose, MeasuredPose};
+use scenecast_sensors::{CameraTally, SensorPose};
 use scenecast_sources::Picture;
 
 /// An image and where it was taken.
@@ -92,8 +92,8 @@ impl Camera {
         }
     }
 
-    /// Takes the pose that the vehicle has now, for the images of a live camera.
-    pub(crate) fn handle_pose(&mut self, pose: CameraPose) {
+    /// Takes the last pose of the autopilot, new or not, for the images of a live camera.
+    pub(crate) fn handle_pose(&mut self, pose: MeasuredPose) {
         if let Self::Live(camera) = self {
             camera.handle_pose(pose);
         }
@@ -119,6 +119,14 @@ impl Camera {
     pub(crate) fn log_end(&self) {
         if let Self::Live(camera) = self {
             camera.log_end();
+        }
+    }
+
+    /// What became of the images of a live camera.
+    pub(crate) fn tally(&self) -> Option<&CameraTally> {
+        match self {
+            Self::Recorded(_) => None,
+            Self::Live(camera) => Some(camera.tally()),
         }
     }
 

@@ -3,6 +3,7 @@
 use scenecast_config::Config;
 use scenecast_core::UserError;
 use scenecast_host::VehicleHost;
+use scenecast_sensors::CameraTally;
 
 /// ROS 2 on the vehicle, if it is switched on.
 pub(crate) struct VehicleRos2 {
@@ -24,14 +25,14 @@ impl VehicleRos2 {
         })
     }
 
-    /// Hands the state over, a few times a second.
-    pub fn publish(&mut self, host: &VehicleHost) {
+    /// Hands the state over, a few times a second; `camera` is what became of the images of a live camera.
+    pub fn publish(&mut self, host: &VehicleHost, camera: Option<&CameraTally>) {
         #[cfg(feature = "ros2")]
         if let Some(on) = &mut self.on {
-            on.publish(host.vehicle());
+            on.publish(host, camera);
         }
         #[cfg(not(feature = "ros2"))]
-        let _ = host;
+        let _ = (host, camera);
     }
 }
 
@@ -39,39 +40,64 @@ impl VehicleRos2 {
 mod on {
     use scenecast_config::Config;
     use scenecast_core::UserError;
+    use scenecast_drivers::autopilot::{self, Counters};
+    use scenecast_host::VehicleHost;
     use scenecast_messages::diagnostic_msgs::DiagnosticStatus;
     use scenecast_outlets::Health;
     use scenecast_protocol::wire::VehicleMode;
     use scenecast_ros2::{VehicleMap, VehicleOutlet, VehicleView, start_vehicle};
+    use scenecast_sensors::{CameraFault, CameraTally};
     use scenecast_vehicle::Vehicle;
     use std::time::{Duration, Instant};
 
     /// Minimum time between two views.
     const VIEW_INTERVAL: Duration = Duration::from_millis(200);
 
+    /// A fault of a sensor is a warning for this long.
+    const FAULT_LASTS: Duration = Duration::from_secs(10);
+
     pub(super) struct On {
         outlet: VehicleOutlet,
         cell_m: f64,
         last: Option<Instant>,
+        camera: SensorHealth,
+        navigation: SensorHealth,
     }
 
     impl On {
         pub fn start(config: &Config) -> Result<Self, UserError> {
             let outlet = start_vehicle(&config.ros2)?;
-            Ok(Self { outlet, cell_m: scenecast_config::cell_m(config), last: None })
+            let cell_m = scenecast_config::cell_m(config);
+            let [camera, navigation] = [(); 2].map(|()| SensorHealth::default());
+            Ok(Self { outlet, cell_m, last: None, camera, navigation })
         }
 
-        pub fn publish(&mut self, vehicle: &Vehicle) {
+        pub fn publish(&mut self, host: &VehicleHost, tally: Option<&CameraTally>) {
             if self.last.is_some_and(|last| last.elapsed() < VIEW_INTERVAL) {
                 return;
             }
-            self.last = Some(Instant::now());
-            self.outlet.offer(view(vehicle, self.outlet.wants_map().then_some(self.cell_m)));
+            let now = Instant::now();
+            self.last = Some(now);
+            let vehicle = host.vehicle();
+            let mut health = health(vehicle).to_vec();
+            health.extend(host.autopilot().map(|(state, counters)| autopilot_health(state, &counters)));
+            if let Some(tally) = tally {
+                let faults = |of| tally.iter().filter(move |(fault, _)| fault.is_of_navigation() == of);
+                let images = format!("{} images mapped, {} dropped", tally.matched, tally.dropped());
+                health.push(self.camera.part("camera", images, faults(false), now));
+                health.push(self.navigation.part(
+                    "navigation",
+                    "the source of the poses".to_owned(),
+                    faults(true),
+                    now,
+                ));
+            }
+            self.outlet.offer(view(vehicle, health, self.outlet.wants_map().then_some(self.cell_m)));
         }
     }
 
     /// The state, with the map if the edge of its cells is given.
-    fn view(vehicle: &Vehicle, cell_m: Option<f64>) -> VehicleView {
+    fn view(vehicle: &Vehicle, health: Vec<Health>, cell_m: Option<f64>) -> VehicleView {
         let navigator = vehicle.navigator();
         let at = navigator.position();
         let plan = vehicle.waypoint().into_iter().chain(vehicle.path().points.iter().copied());
@@ -87,7 +113,7 @@ mod on {
             heading_rad: navigator.heading_rad(),
             sigma_m: navigator.sigma_m(),
             plan: plan.map(|p| [p.x_m, p.y_m]).collect(),
-            health: health(vehicle).into(),
+            health,
             map_version,
             map,
         }
@@ -96,6 +122,43 @@ mod on {
     /// Grows with each change of the labels or of a layer.
     fn version(vehicle: &Vehicle) -> u64 {
         vehicle.map_version() + vehicle.layers().map(|layer| layer.version()).sum::<u64>()
+    }
+
+    fn autopilot_health(state: autopilot::Health, counters: &Counters) -> Health {
+        let level = match state {
+            autopilot::Health::InCommand => DiagnosticStatus::OK,
+            autopilot::Health::NotInCommand => DiagnosticStatus::WARN,
+            autopilot::Health::Awaited | autopilot::Health::Silent => DiagnosticStatus::ERROR,
+        };
+        let values = counters.iter().map(|(name, n)| (*name, n.to_string())).collect();
+        Health { level, part: "autopilot", message: state.name().to_owned(), values }
+    }
+
+    /// A sensor whose faults are new for a while after each of them.
+    #[derive(Default)]
+    struct SensorHealth {
+        faults: u64,
+        last_fault: Option<Instant>,
+    }
+
+    impl SensorHealth {
+        fn part(
+            &mut self,
+            part: &'static str,
+            message: String,
+            faults: impl Iterator<Item = (CameraFault, u64)>,
+            now: Instant,
+        ) -> Health {
+            let faults: Vec<_> = faults.collect();
+            let count = faults.iter().map(|(_, n)| n).sum();
+            if std::mem::replace(&mut self.faults, count) != count {
+                self.last_fault = Some(now);
+            }
+            let is_new = self.last_fault.is_some_and(|at| now.duration_since(at) < FAULT_LASTS);
+            let level = if is_new { DiagnosticStatus::WARN } else { DiagnosticStatus::OK };
+            let values = faults.into_iter().map(|(fault, n)| (fault.name(), n.to_string())).collect();
+            Health { level, part, message, values }
+        }
     }
 
     fn health(vehicle: &Vehicle) -> [Health; 2] {
