@@ -12,6 +12,7 @@ use scenecast_vehicle::{
     AppliedSlot, ForeignUpdate, MapUpdate, RegisteredFrame, SharedExemplars, Vehicle, VehicleDisk, VehicleOutput,
 };
 use std::collections::VecDeque;
+use std::time::Duration;
 
 /// Maximum age of a fix that is given to the autopilot, seconds.
 const MAX_FIX_AGE_S: f64 = 60.0;
@@ -74,6 +75,8 @@ pub struct VehiclePilot {
     is_rising: bool,
     /// Whether its odometry is the vehicle's.
     measures: bool,
+    /// Whether the source that measures the pose in its place is silent: it then holds its position.
+    is_blind: bool,
     /// The last stretch of way, and when it came in.
     last_step: Option<(Step, Instant)>,
 }
@@ -81,7 +84,15 @@ pub struct VehiclePilot {
 impl VehiclePilot {
     /// An autopilot for a survey at `depth_m` metres.
     pub fn new(autopilot: Box<dyn Autopilot>, plane: Option<TangentPlane>, depth_m: f64, now: Instant) -> Self {
-        Self { pilot: Pilot::new(autopilot, now), plane, depth_m, is_rising: false, measures: true, last_step: None }
+        Self {
+            pilot: Pilot::new(autopilot, now),
+            plane,
+            depth_m,
+            is_rising: false,
+            measures: true,
+            is_blind: false,
+            last_step: None,
+        }
     }
 
     /// Whether the autopilot's odometry counts; otherwise another source gives the vehicle's pose.
@@ -102,11 +113,11 @@ impl VehiclePilot {
             vehicle.handle_unmeasured(step.unseen);
             self.last_step = Some((step, now));
         }
-        vehicle.set_autopilot_silent(autopilot.health(now).is_silent());
+        vehicle.set_autopilot_silent(self.is_blind || autopilot.health(now).is_silent());
         let navigator = vehicle.navigator();
         let (x, y) = navigator.position().xy();
         let (world_x, world_y) = navigator.world().xy();
-        let goal = vehicle.waypoint().map(|to| {
+        let goal = vehicle.waypoint().filter(|_| !self.is_blind).map(|to| {
             let (east_m, north_m) = (to.x_m - x, to.y_m - y);
             let place = self.plane.map(|plane| plane.to_place(world_x + east_m, world_y + north_m));
             Goal { east_m, north_m, depth_m: Some(self.depth_m), place }
@@ -201,6 +212,17 @@ impl VehicleHost {
     /// Takes the odometry of a vehicle without an autopilot.
     pub fn handle_odometry(&mut self, dx_m: f64, dy_m: f64, heading_rad: f64, depth_m: f64, now: Instant) {
         self.link.end_mut().handle_odometry(dx_m, dy_m, heading_rad, depth_m, now);
+    }
+
+    /// No pose came in from the navigation source for `unseen` since the last call; `None` while poses come in. The
+    /// autopilot holds its position meanwhile, since a goal relative to an old pose would lead anywhere.
+    pub fn handle_pose_gap(&mut self, unseen: Option<Duration>) {
+        if let Some(pilot) = &mut self.pilot {
+            pilot.is_blind = unseen.is_some();
+        }
+        if let Some(unseen) = unseen {
+            self.link.end_mut().handle_unmeasured(unseen);
+        }
     }
 
     fn is_measured_by_pilot(&self) -> bool {

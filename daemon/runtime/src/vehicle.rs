@@ -177,6 +177,8 @@ impl VehicleShell {
 
     /// Gives the camera the vehicle's pose, and the camera's frames that are due to the scene model.
     fn poll_camera(&mut self) {
+        let unseen = self.camera.poll_pose_gap();
+        self.host.handle_pose_gap(unseen);
         if let Some(pose) = self.camera.poll_pose() {
             self.host.handle_pose(pose, self.clock.now());
         }

@@ -43,6 +43,10 @@ pub(crate) struct LiveCamera {
     measured_at: Option<Instant>,
     /// The newest pose of the navigation source.
     newest_pose: Option<CameraPose>,
+    /// Arrival of the newest pose, or the start of the run; and the time up to which the vehicle knows of its absence.
+    posed: (Stamp, Stamp),
+    /// Longest time between two poses.
+    max_gap: Duration,
     /// Whether the vehicle does not know the newest pose yet.
     is_pose_new: bool,
     log: FaultLog,
@@ -117,6 +121,8 @@ impl LiveCamera {
             altitude_m: config.survey.altitude_m,
             measured_at: None,
             newest_pose: None,
+            posed: (clock.now(), clock.now()),
+            max_gap,
             is_pose_new: false,
             log: FaultLog::default(),
             said: BTreeMap::new(),
@@ -154,6 +160,7 @@ impl LiveCamera {
                 self.matcher.handle_pose(stamp, self.clock.now(), pose);
                 let SensorPose { x_m, y_m, heading_rad, depth_m, .. } = pose;
                 self.is_pose_new = true;
+                self.posed.0 = self.clock.now();
                 self.newest_pose = Some(CameraPose { x_m, y_m, heading_rad, depth_m });
             }
             SourceReport::Fault(fault, text) => {
@@ -185,6 +192,16 @@ impl LiveCamera {
 
     pub(super) fn poll_pose(&mut self) -> Option<CameraPose> {
         std::mem::take(&mut self.is_pose_new).then_some(self.newest_pose)?
+    }
+
+    /// Time since the last call in which the navigation source gave no pose; `None` while it gives them.
+    pub(super) fn poll_pose_gap(&mut self) -> Option<Duration> {
+        let (now, (last, known)) = (self.clock.now(), self.posed);
+        if self.navigation.is_none() || now <= last.after(self.max_gap) {
+            return None;
+        }
+        self.posed.1 = now;
+        Some(Duration::from_secs_f64(now.seconds_since(last.max(known)).max(0.0)))
     }
 
     pub(super) fn newest_pose(&self) -> Option<CameraPose> {

@@ -13,6 +13,7 @@ use scenecast_files::{FrameImage, RecordedFrame};
 use scenecast_host::{CameraPose, MeasuredPose};
 use scenecast_sensors::{CameraTally, SensorPose};
 use scenecast_sources::Picture;
+use std::time::Duration;
 
 /// An image and where it was taken.
 #[derive(Debug, Clone, PartialEq)]
@@ -104,6 +105,15 @@ impl Camera {
         match self {
             Self::Recorded(_) => None,
             Self::Live(camera) => camera.poll_pose(),
+        }
+    }
+
+    /// Time since the last call in which the navigation source gave no pose; `None` while it gives them, or if the autopilot or
+    /// a recording gives the poses.
+    pub(crate) fn poll_pose_gap(&mut self) -> Option<Duration> {
+        match self {
+            Self::Recorded(_) => None,
+            Self::Live(camera) => camera.poll_pose_gap(),
         }
     }
 
