@@ -250,8 +250,11 @@ mod tests {
         DvlReport::Position(DvlPosition { ts_s, place: [x, y, 2.0], roll_rad: 0.0, pitch_rad: 0.0, yaw_rad })
     }
 
-    /// Poses with whole millimetres, and the faults.
-    fn track(reports: &[(f64, DvlReport)], heading_deg: f64) -> (Vec<(i64, i64, i64, i64)>, Vec<CameraFault>) {
+    /// Milliseconds, millimetres east and north, and degrees.
+    type Milli = (i64, i64, i64, i64);
+
+    /// Poses in whole numbers, and the faults.
+    fn track(reports: &[(f64, DvlReport)], heading_deg: f64) -> (Vec<Milli>, Vec<CameraFault>) {
         let (mut track, mut faults) = (DvlTrack::new(heading_deg.to_radians()), Vec::new());
         let poses = reports.iter().filter_map(|(s, report)| {
             let (stamp, pose) = track.handle(*report, at(*s), &mut |fault, _| faults.push(fault))?;
