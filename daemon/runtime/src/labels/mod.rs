@@ -153,6 +153,10 @@ impl Worker {
                 self.report(FromLabels::Mapped(Box::new(self.map.update()), pose.flatten()));
             }
         }
+        if self.counts.taken > 0 {
+            // Items come in bursts: the last one may be of the moment of the last checkpoint.
+            self.keep.last_s = None;
+        }
         self.keep.keep_now(&self.map);
         tracing::info!("labels: {} items were taken, {} refused", self.counts.taken, self.counts.refused);
     }
