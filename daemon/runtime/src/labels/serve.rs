@@ -8,7 +8,7 @@ use std::net::{TcpListener, TcpStream};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc::sync_channel;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// Connections at a time.
 const MAX_CONNECTIONS: usize = 4;
@@ -101,7 +101,8 @@ fn receive(mut stream: impl Connection, peer: &str, queue: &LabelQueue) {
 /// Gives an item to the map and its answer to the connection; `false` if either is gone.
 fn hand_over(item: Result<Item, Refusal>, peer: &str, queue: &LabelQueue, stream: &mut impl Write) -> bool {
     let (answer, answered) = sync_channel(1);
-    let arrived = Arrived { origin: peer.to_owned(), mark: None, item, answer: Some(answer) };
+    let at = Some(Instant::now());
+    let arrived = Arrived { origin: peer.to_owned(), mark: None, at, item, answer: Some(answer) };
     if !queue.push(arrived) {
         return false;
     }
