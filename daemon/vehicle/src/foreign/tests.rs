@@ -89,8 +89,9 @@ fn labels_and_bands_have_a_limit_on_cells_that_counts_erased_ones() {
         Content::Band { band, ground, levels: raster(values.len() as u32, values) }
     };
     let labels = |values: &[u8]| grid(values.len() as u32, values).content;
-    let kinds: [&dyn Fn(&[u8]) -> Content; 2] = [&labels, &band];
-    for of in kinds {
+    let of = |is_band: bool, values: &[u8]| if is_band { band(values) } else { labels(values) };
+    for is_band in [false, true] {
+        let of = |values: &[u8]| of(is_band, values);
         let mut map = map(&[]);
         map.max_cells = 5;
         let full = Err(Refusal::FullMap(5));
