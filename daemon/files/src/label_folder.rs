@@ -4,6 +4,7 @@ use scenecast_labels::{Item, MAX_HEADER_BYTES, MAX_PICTURE_BYTES, Refusal};
 use std::collections::{BTreeMap, BTreeSet};
 use std::io;
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 /// Seconds for which files that cannot be read must stay as they are before they are refused. Until then they count as
 /// files that are still being written.
@@ -80,6 +81,12 @@ impl LabelFolder {
             self.done.insert(name.to_owned());
             FolderItem { name: name.to_owned(), item }
         })
+    }
+
+    /// How long ago the header of a name was written; `None` if the file system does not tell.
+    pub fn age_of(&self, name: &str) -> Option<Duration> {
+        let written = std::fs::metadata(self.dir.join(format!("{name}.json"))).ok()?.modified().ok()?;
+        Some(written.elapsed().unwrap_or(Duration::ZERO))
     }
 
     /// The mission time in the header of a name, if it has one.

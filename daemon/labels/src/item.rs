@@ -6,7 +6,7 @@ use scenecast_protocol::map::{ClassEntry, Decimal};
 /// An item of labels or of a band.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Item {
-    /// Mission time, seconds; `None` if it holds from its arrival on.
+    /// Mission time of the picture, seconds; `None` if it is that of its arrival.
     pub t_s: Option<f64>,
     /// Names and colours of classes.
     pub classes: Vec<ClassEntry>,
@@ -20,7 +20,7 @@ pub enum Content {
     Classes,
     /// A segmented image of a camera that looks down: pixel value = class, 255 = unknown.
     Image {
-        /// `None`: the vehicle's own pose at the time of the image.
+        /// `None`: the vehicle's own pose at the item's time.
         pose: Option<ImagePose>,
         /// Size of a pixel on the sea floor, metres; `None`: that of the camera.
         metres_per_pixel: Option<f64>,

@@ -51,6 +51,10 @@ pub enum Refusal {
     FullMap(usize),
     #[error("the pose is missing, and the vehicle does not know its own")]
     NoPose,
+    #[error("the pose is missing, and the vehicle does not know its own at {0:.1} s of the mission")]
+    NoPoseAt(f64),
+    #[error("the pose is missing, and the vehicle does not know its own before the start of its program")]
+    NoPoseBefore,
     #[error("it ends after {0} of {1} bytes")]
     CutOff(usize, usize),
 }

@@ -4,7 +4,7 @@ use super::clock::Clock;
 use super::disk_space::DiskWatch;
 use super::durable::{Keeper, StartedRun};
 use super::journal::Folder;
-use super::labels::{Feed, FromLabels, LabelThread};
+use super::labels::{Feed, FromLabels, LabelThread, move_the_vehicle};
 use super::mapping::{FromMapper, Mapped, MapperThread, ToMapper};
 use super::missing_key::warn_without_key;
 use super::modem::{self, ModemPort};
@@ -103,7 +103,8 @@ pub fn run_vehicle(load: Load, simulated: Option<SimulatedAutopilot>) -> Result<
         }
         let disk = DiskWatch::new(dir);
         let ros2 = VehicleRos2::start(&config)?;
-        VehicleShell { host, camera, mapper, labels, ports, ros2, clock, keeper, disk, reload, missed: 0 }
+        let labels_move = move_the_vehicle(&config);
+        VehicleShell { host, camera, mapper, labels, labels_move, ports, ros2, clock, keeper, disk, reload, missed: 0 }
             .run(stop)
             .await
     })
@@ -127,6 +128,8 @@ struct VehicleShell {
     mapper: MapperThread,
     /// Labels of another program, in place of the scene model's.
     labels: Option<LabelThread>,
+    /// Whether the images of another program move the vehicle.
+    labels_move: bool,
     ports: Ports,
     ros2: VehicleRos2,
     clock: Clock,
@@ -142,7 +145,7 @@ impl VehicleShell {
         loop {
             self.pump()?;
             let now = self.clock.now();
-            let wake = self.host.poll_timeout(now).unwrap_or(now + MAX_SLEEP);
+            let wake = self.host.poll_timeout(now).map_or(now + MAX_SLEEP, |due| due.min(now + MAX_SLEEP));
             tokio::select! {
                 () = stop.asked() => {
                     modem::log_audit(self.host.link());
@@ -208,15 +211,18 @@ impl VehicleShell {
         self.host.handle_budget(budget, self.clock.now());
     }
 
-    /// Takes the map of another program. Without an autopilot, the vehicle is where its last image was taken.
+    /// Takes the map of another program. Unless something else measures its place, the vehicle is where the last image was
+    /// taken.
     fn handle_labels(&mut self, update: &ForeignUpdate, pose: Option<ImagePose>) {
-        let now = self.clock.now();
+        let (now, began) = (self.clock.now(), std::time::Instant::now());
+        let pose = pose.filter(|_| self.labels_move && self.camera.newest_pose().is_none());
         if let Some(ImagePose { x_m, y_m, depth_m, heading_rad }) = pose {
             self.host.handle_pose(CameraPose { x_m, y_m, heading_rad, depth_m }, now);
         }
         if let Some(label) = self.host.handle_foreign(update, now) {
             tracing::warn!("labels: class {} has another name already, which it keeps", label - 1);
         }
+        self.labels.iter().for_each(|labels| labels.handle_taken(began));
     }
 
     fn handle_camera(&mut self, mut frame: CameraFrame) {
@@ -265,10 +271,10 @@ impl VehicleShell {
         if let Some(disk) = self.disk.look(std::time::Instant::now()) {
             self.host.handle_disk(disk);
         }
-        if let Some(labels) = &self.labels {
-            let navigator = self.host.vehicle().navigator();
+        let navigator = self.host.vehicle().navigator();
+        if let Some(labels) = self.labels.as_ref().filter(|_| navigator.is_measured()) {
             let ((x_m, y_m), depth_m) = (navigator.dead_reckoned().xy(), navigator.depth_m());
-            labels.set_pose(ImagePose { x_m, y_m, depth_m, heading_rad: navigator.heading_rad() });
+            labels.handle_pose(ImagePose { x_m, y_m, depth_m, heading_rad: navigator.heading_rad() }, now);
         }
         self.host.steer(now);
         self.ros2.publish(&self.host, self.camera.tally());

@@ -54,7 +54,7 @@ pub struct RasterFigures {
     /// Bits on air a second, of vehicle and surface.
     pub up_bps: f64,
     pub down_bps: f64,
-    /// CPU time of the vehicle's and of the surface's end for each second.
+    /// Time of computing of the vehicle's and of the surface's end for each second; on a busy machine more than the CPU time.
     pub vehicle_cpu: f64,
     pub surface_cpu: f64,
 }

@@ -20,6 +20,8 @@ pub(crate) struct Arrived {
     pub(crate) origin: String,
     /// The name by which its source resumes after a restart.
     pub(crate) mark: Option<String>,
+    /// When it came in, or when its file was written; `None` before this program's computer started, or if unknown.
+    pub(crate) at: Option<Instant>,
     pub(crate) item: Result<Item, Refusal>,
     pub(crate) answer: Option<SyncSender<Answer>>,
 }
@@ -95,8 +97,9 @@ impl FolderFeed {
         }
         while let Some(name) = self.names.pop_front() {
             if let Some(found) = self.folder.read(&name, self.began.elapsed().as_secs_f64()) {
+                let at = self.folder.age_of(&name).and_then(|age| Instant::now().checked_sub(age));
                 let (origin, mark) = (format!("{name}.json"), Some(found.name));
-                return Some(Arrived { origin, mark, item: found.item, answer: None });
+                return Some(Arrived { origin, mark, at, item: found.item, answer: None });
             }
         }
         std::thread::sleep(wait.min(LOOK_PAUSE));

@@ -22,24 +22,14 @@ impl BandMap {
         Self { descriptor, levels: LabelGrid::default(), erased: LabelGrid::default() }
     }
 
-    /// Takes the values of a grid; returns how many cells have another level.
-    pub(super) fn take(&mut self, band: &Band, ground: Ground, raster: &Raster, cell_m: f64) -> Result<usize, Refusal> {
-        let mut changed = 0;
-        GroundRaster::new(raster, ground, cell_m)?.for_each(|cell, values| {
-            let known = values.iter().filter(|&&value| value != band.no_data).map(|&value| u32::from(value));
-            let (sum, count) = known.fold((0, 0), |(sum, count), value| (sum + value, count + 1));
-            let level = match count {
-                0 => UNEXPLORED,
-                // The mean, rounded to the nearest value.
-                _ => ((sum + count / 2) / count + 1 - lowest(band)).clamp(1, u32::from(MAX_LABEL)) as u8,
-            };
+    /// Takes the levels of cells, as of [`levels`].
+    pub(super) fn take(&mut self, levels: &[(Cell, u8)]) {
+        for &(cell, level) in levels {
             let before = self.levels.set(cell, level);
-            changed += usize::from(before != level);
             if level == UNEXPLORED && before != UNEXPLORED || self.erased.get(cell) != UNEXPLORED {
                 self.erased.set(cell, u8::from(level == UNEXPLORED));
             }
-        });
-        Ok(changed)
+        }
     }
 
     /// The quantity of every cell: the middle of its level, or not a number where it is no longer known.
@@ -47,6 +37,22 @@ impl BandMap {
         let known = self.levels.iter().filter_map(|(cell, level)| Some((cell, self.descriptor.middle(level)?)));
         known.chain(self.erased.iter().map(|(cell, _)| (cell, f64::NAN))).collect()
     }
+}
+
+/// The level that a grid of a band gives to each cell; [`UNEXPLORED`] where its quantity is not known.
+pub(super) fn levels(band: &Band, ground: Ground, raster: &Raster, cell_m: f64) -> Result<Vec<(Cell, u8)>, Refusal> {
+    let mut levels = Vec::new();
+    GroundRaster::new(raster, ground, cell_m)?.for_each(|cell, values| {
+        let known = values.iter().filter(|&&value| value != band.no_data).map(|&value| u32::from(value));
+        let (sum, count) = known.fold((0, 0), |(sum, count), value| (sum + value, count + 1));
+        let level = match count {
+            0 => UNEXPLORED,
+            // The mean, rounded to the nearest value.
+            _ => ((sum + count / 2) / count + 1 - lowest(band)).clamp(1, u32::from(MAX_LABEL)) as u8,
+        };
+        levels.push((cell, level));
+    });
+    Ok(levels)
 }
 
 /// The lowest value that stands for a quantity.

@@ -36,6 +36,8 @@ pub struct ForeignUpdate {
 pub struct ForeignMap {
     epoch: u8,
     cell_m: f64,
+    /// Most cells of the labels, and of each band; erased ones count.
+    max_cells: usize,
     camera: DownCamera,
     is_newest_only: bool,
     band_share: u8,
@@ -51,14 +53,15 @@ pub struct ForeignMap {
 }
 
 impl ForeignMap {
-    /// Most cells of the map.
-    const MAX_CELLS: usize = 1 << 22;
+    /// Most cells of the labels, and of each band.
+    const MAX_CELLS: usize = 1 << 23;
 
     /// An empty map, whose labels belong to `epoch`.
     pub fn new(config: &Config, epoch: u8) -> Self {
         Self {
             epoch,
             cell_m: cell_m(config),
+            max_cells: Self::MAX_CELLS,
             camera: DownCamera {
                 metres_per_pixel: config.camera.metres_per_pixel,
                 altitude_m: config.survey.altitude_m,
@@ -125,7 +128,7 @@ impl ForeignMap {
             return Err(Refusal::Cells((across * across) as u64, ground::MAX_CELLS));
         }
         let seen = image_votes(image, &camera, pose, self.cell_m);
-        self.check_room(seen.len())?;
+        self.check_room(seen.keys().map(|&(x, y)| Cell::new(x, y)))?;
         for (place, votes) in seen {
             let cell = Cell::new(place.0, place.1);
             let held = self.labels.get(cell).checked_sub(1);
@@ -143,7 +146,7 @@ impl ForeignMap {
             values.iter().filter(|&&class| class != UNKNOWN).for_each(|&class| votes.add(class, 1));
             stated.push((cell, votes.winner(None).unwrap_or(UNKNOWN)));
         });
-        self.check_room(stated.len())?;
+        self.check_room(stated.iter().filter(|(_, class)| *class != UNKNOWN).map(|&(cell, _)| cell))?;
         for (cell, class) in stated {
             self.votes.forget((cell.x, cell.y));
             self.set(cell, class);
@@ -151,9 +154,8 @@ impl ForeignMap {
         Ok(())
     }
 
-    fn check_room(&self, cells: usize) -> Result<(), Refusal> {
-        let is_full = cells + self.labels.explored() > 2 * Self::MAX_CELLS;
-        if is_full { Err(Refusal::FullMap(2 * Self::MAX_CELLS)) } else { Ok(()) }
+    fn check_room(&self, cells: impl Iterator<Item = Cell>) -> Result<(), Refusal> {
+        check_room(&self.labels, &self.erased, cells, self.max_cells)
     }
 
     fn set(&mut self, cell: Cell, class: u8) {
@@ -184,9 +186,14 @@ impl ForeignMap {
         if is_other {
             return Err(Refusal::OtherBand(band.name.clone()));
         }
-        let cell_m = self.cell_m;
-        let map = self.bands.entry(band.name.clone()).or_insert_with(|| BandMap::new(fresh));
-        map.take(band, ground, levels, cell_m).map(drop)
+        let levels = band::levels(band, ground, levels, self.cell_m)?;
+        let more = levels.iter().filter(|(_, level)| *level != UNEXPLORED).map(|&(cell, _)| cell);
+        match self.bands.get(&band.name) {
+            Some(map) => check_room(&map.levels, &map.erased, more, self.max_cells)?,
+            None => check_room(&LabelGrid::default(), &LabelGrid::default(), more, self.max_cells)?,
+        }
+        self.bands.entry(band.name.clone()).or_insert_with(|| BandMap::new(fresh)).take(&levels);
+        Ok(())
     }
 
     /// The map after the last item, with bands and names.
@@ -196,6 +203,11 @@ impl ForeignMap {
             bands: self.bands.values().map(|map| (map.descriptor.clone(), map.quantities())).collect(),
             classes: self.classes.values().cloned().collect(),
         }
+    }
+
+    /// The names of classes.
+    pub fn classes(&self) -> impl Iterator<Item = &ClassEntry> {
+        self.classes.values()
     }
 
     /// The map of labels.
@@ -227,6 +239,21 @@ impl MapProducer for ForeignMap {
 
     fn save(&self, lineage: u64) -> Vec<u8> {
         self.encode(lineage)
+    }
+}
+
+/// Refuses `cells` of which so many are neither in `known` nor in `erased` that the three are more than `most`.
+fn check_room(
+    known: &LabelGrid,
+    erased: &LabelGrid,
+    cells: impl Iterator<Item = Cell>,
+    most: usize,
+) -> Result<(), Refusal> {
+    let is_new = |cell: &Cell| known.get(*cell) == UNEXPLORED && erased.get(*cell) == UNEXPLORED;
+    let more = cells.filter(is_new).count();
+    match more > 0 && more + known.explored() + erased.explored() > most {
+        true => Err(Refusal::FullMap(most)),
+        false => Ok(()),
     }
 }
 

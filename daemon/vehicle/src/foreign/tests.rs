@@ -74,6 +74,39 @@ fn a_grid_states_each_cell_and_can_make_it_unknown() {
 }
 
 #[test]
+fn labels_and_bands_have_a_limit_on_cells_that_counts_erased_ones() {
+    let place = |kind: Content, west_m: f64| match kind {
+        Content::Grid { classes, ground } => item(Content::Grid { ground: Ground { west_m, ..ground }, classes }),
+        Content::Band { band, levels, ground } => {
+            item(Content::Band { band, ground: Ground { west_m, ..ground }, levels })
+        }
+        other => item(other),
+    };
+    let band = |values: &[u8]| {
+        let (scale, offset) = (Decimal::new(1, 0), Decimal::new(0, 0));
+        let band = Band { name: "silt".into(), unit: String::new(), scale, offset, no_data: 255 };
+        let ground = Ground { west_m: 0.0, south_m: 0.0, cell_m: 0.5 };
+        Content::Band { band, ground, levels: raster(values.len() as u32, values) }
+    };
+    let labels = |values: &[u8]| grid(values.len() as u32, values).content;
+    let of = |is_band: bool, values: &[u8]| if is_band { band(values) } else { labels(values) };
+    for is_band in [false, true] {
+        let of = |values: &[u8]| of(is_band, values);
+        let mut map = map(&[]);
+        map.max_cells = 5;
+        let full = Err(Refusal::FullMap(5));
+        assert_eq!(map.handle_item(&place(of(&[1; 6]), 0.0), None, 0.0), full);
+        assert!(map.update().bands.is_empty() && map.update().map.cells.is_empty(), "nothing of it is used");
+        map.handle_item(&place(of(&[1; 4]), 0.0), None, 0.0).unwrap();
+        map.handle_item(&place(of(&[2; 4]), 0.0), None, 1.0).unwrap();
+        map.handle_item(&place(of(&[255; 4]), 0.0), None, 2.0).unwrap();
+        assert_eq!(map.handle_item(&place(of(&[1; 2]), 50.0), None, 3.0), full, "erased cells are cells");
+        map.handle_item(&place(of(&[255; 9]), 0.0), None, 4.0).unwrap();
+        map.handle_item(&place(of(&[3; 5]), 0.0), None, 5.0).unwrap();
+    }
+}
+
+#[test]
 fn a_class_keeps_its_name_and_a_band_its_scale() {
     let mut map = map(&[]);
     let named = |name: &str| Item { classes: vec![ClassEntry::new(4, name, None).unwrap()], ..grid(1, &[3]) };

@@ -109,6 +109,9 @@ impl<R: StateReplica> VehiclePeer<R> {
     /// Takes the pace of answers from the modem.
     pub(super) fn with_modem(mut self, modem: &ModemProfile) -> Self {
         self.is_full_duplex = modem.access == Access::FullDuplex;
+        if self.is_full_duplex {
+            self.contact.expect_prompt_answers();
+        }
         self.answer_wait = modem.answer_wait(USUAL_ANSWER_WAIT);
         self
     }
