@@ -58,12 +58,9 @@ fn outline(polygon: &Polygon) -> Result<Vec<[f64; 2]>, String> {
     Ok(points.iter().map(|point| [f64::from(point.x), f64::from(point.y)]).collect())
 }
 
-/// Hold keeps an abort in force; the end of an abort is an order of its own.
-pub(super) fn hold(vehicle: u8, order: &Hold, is_aborting: bool) -> Result<SurfaceRequest, String> {
-    if is_aborting && !order.hold {
-        return Err("an abort is in force; the order abort with false ends it".to_owned());
-    }
-    Ok(SurfaceRequest::Constraints(vehicle, Constraints { hold: order.hold, abort: is_aborting }))
+/// Hold leaves an abort as it is; the end of an abort is an order of its own.
+pub(super) fn hold(vehicle: u8, order: &Hold) -> Result<SurfaceRequest, String> {
+    Ok(SurfaceRequest::Hold(vehicle, order.hold))
 }
 
 pub(super) fn abort(vehicle: u8, order: &Abort) -> Result<SurfaceRequest, String> {
@@ -100,14 +97,12 @@ mod tests {
     }
 
     #[test]
-    fn a_hold_never_ends_an_abort() {
-        let constraints = |hold, abort| Ok(SurfaceRequest::Constraints(1, Constraints { hold, abort }));
+    fn a_hold_says_nothing_of_an_abort() {
         let order = |hold| Hold { hold, ..Hold::default() };
-        assert_eq!(hold(1, &order(true), false), constraints(true, false));
-        assert_eq!(hold(1, &order(true), true), constraints(true, true));
-        assert_eq!(hold(1, &order(false), false), constraints(false, false));
-        assert!(hold(1, &order(false), true).unwrap_err().contains("abort is in force"));
-        assert_eq!(abort(1, &Abort { abort: true, ..Abort::default() }), constraints(false, true));
+        assert_eq!(hold(1, &order(true)), Ok(SurfaceRequest::Hold(1, true)));
+        assert_eq!(hold(1, &order(false)), Ok(SurfaceRequest::Hold(1, false)));
+        let aborted = SurfaceRequest::Constraints(1, Constraints { hold: false, abort: true });
+        assert_eq!(abort(1, &Abort { abort: true, ..Abort::default() }), Ok(aborted));
     }
 
     #[test]
