@@ -17,6 +17,7 @@
 //! ```
 
 mod inbox;
+mod map_versions;
 mod names;
 mod node;
 mod publisher;

@@ -1,5 +1,6 @@
 //! The vehicle in ROS 2: its own map, pose, path and state.
 
+use crate::map_versions::MapVersions;
 use crate::node::RosNode;
 use crate::publisher::Publisher;
 use crate::qos::Qos;
@@ -12,8 +13,8 @@ use scenecast_messages::geometry_msgs::PoseWithCovarianceStamped;
 use scenecast_messages::grid_map_msgs::GridMap;
 use scenecast_messages::nav_msgs::{OccupancyGrid, Path};
 use scenecast_messages::sensor_msgs::PointCloud2;
-use scenecast_outlets::{Grid, Health, MAP_FRAME, Place, cloud, diagnostics, header, layers, occupancy, path, pose};
-use scenecast_protocol::map::{LabelGrid, LayerDescriptor, Quantity};
+use scenecast_outlets::{Health, MAP_FRAME, Place, cloud, diagnostics, header, layers, occupancy, path, pose};
+use scenecast_protocol::map::{LabelGrid, LayerDescriptor};
 use std::collections::VecDeque;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -130,9 +131,10 @@ impl Worker {
 }
 
 struct VehicleTopics {
-    labels: (Publisher<OccupancyGrid>, Option<u64>),
-    layers: (Publisher<GridMap>, Option<u64>),
-    cloud: (Publisher<PointCloud2>, Option<u64>),
+    labels: Publisher<OccupancyGrid>,
+    layers: Publisher<GridMap>,
+    cloud: Publisher<PointCloud2>,
+    published: MapVersions,
     last_map: Option<Instant>,
     pose: Publisher<PoseWithCovarianceStamped>,
     path: Publisher<Path>,
@@ -146,9 +148,10 @@ impl VehicleTopics {
     fn new(node: &RosNode) -> Result<Self, UserError> {
         let topic = |name: &str| node.own_topic(name);
         Ok(Self {
-            labels: (node.publisher(&topic("map")?, Qos::Latched(1))?, None),
-            layers: (node.publisher(&topic("layers")?, Qos::Latched(1))?, None),
-            cloud: (node.publisher(&topic("cloud")?, Qos::Latched(1))?, None),
+            labels: node.publisher(&topic("map")?, Qos::Latched(1))?,
+            layers: node.publisher(&topic("layers")?, Qos::Latched(1))?,
+            cloud: node.publisher(&topic("cloud")?, Qos::Latched(1))?,
+            published: MapVersions::default(),
             last_map: None,
             pose: node.publisher(&topic("pose")?, Qos::Reliable(10))?,
             path: node.publisher(&topic("path")?, Qos::Reliable(1))?,
@@ -165,12 +168,8 @@ impl VehicleTopics {
     }
 
     fn due(&self, version: u64) -> [bool; 3] {
-        let is_due = |subscribers: usize, published: Option<u64>| subscribers > 0 && published != Some(version);
-        [
-            is_due(self.labels.0.subscribers(), self.labels.1),
-            is_due(self.layers.0.subscribers(), self.layers.1),
-            is_due(self.cloud.0.subscribers(), self.cloud.1),
-        ]
+        let subscribers = [self.labels.subscribers(), self.layers.subscribers(), self.cloud.subscribers()];
+        self.published.due(subscribers, version)
     }
 
     fn publish(&mut self, view: VehicleView, time: SystemTime) {
@@ -211,16 +210,14 @@ impl VehicleTopics {
         let due = self.due(map.version);
         self.last_map = Some(Instant::now());
         let header = || header(stamp.clone(), MAP_FRAME);
-        let Some(grid) = grid(map) else { return };
-        if due[0] && self.labels.0.publish(occupancy(&grid, header())) {
-            self.labels.1 = Some(map.version);
-        }
-        if due[1] && self.layers.0.publish(layers(&grid, header())) {
-            self.layers.1 = Some(map.version);
-        }
-        if due[2] && self.cloud.0.publish(cloud(&grid, header(), palette::colour)) {
-            self.cloud.1 = Some(map.version);
-        }
+        let Some(grid) = self.published.grid(map) else { return };
+        // One that DDS refused is tried again.
+        let done = [
+            due[0] && self.labels.publish(occupancy(&grid, header())),
+            due[1] && self.layers.publish(layers(&grid, header())),
+            due[2] && self.cloud.publish(cloud(&grid, header(), palette::colour)),
+        ];
+        self.published.handle_published(done, map.version);
     }
 
     fn extend_track(&mut self, place: &Place) {
@@ -234,14 +231,4 @@ impl VehicleTopics {
         }
         self.track.push_back(place.clone());
     }
-}
-
-/// `None` while it is empty, or if it is too large for a message.
-fn grid(map: &VehicleMap) -> Option<Grid> {
-    let mut grid = Grid::new(map.labels.bounds()?, map.cell_m, (0.0, 0.0), |cell| map.labels.get(cell))?;
-    for (layer, levels) in &map.layers {
-        let is_depth = layer.quantity == Quantity::Depth;
-        grid.add_layer(&layer.name, is_depth, |cell| layer.middle(levels.get(cell)));
-    }
-    Some(grid)
 }

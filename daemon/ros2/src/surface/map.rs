@@ -66,7 +66,11 @@ impl MapTopics {
         self.last = Some(Instant::now());
         let request = ClientRequest { principal: None, request: SurfaceRequest::Map(vehicle.id) };
         let Some(Reply::Map(cells)) = desk.request(request) else { return };
-        let Some(grid) = grid(&cells, key.shift_m) else { return self.report_size(vehicle) };
+        let Some(grid) = grid(&cells, key.shift_m) else {
+            // It counts as published, so that it is not read again before it changes.
+            (self.labels.1, self.layers.1, self.cloud.1) = (Some(key.clone()), Some(key.clone()), Some(key));
+            return self.report_size(vehicle);
+        };
         self.is_too_large = false;
         let colour = |label| key.colours.iter().find(|c| c.0 == label).map_or(palette::colour(label), |c| c.1);
         // One that DDS refused is tried again.

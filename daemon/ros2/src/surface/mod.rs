@@ -7,12 +7,14 @@ mod health;
 mod map;
 mod order;
 mod orders;
+mod parts;
 mod stamps;
 mod state;
 mod vehicle;
 
 use crate::node::RosNode;
 use crate::stop::{self, Owned, Owner};
+use parts::Parts;
 use scenecast_config::Ros2;
 use scenecast_console::{ClientRequest, PendingRequest, Reply, Snapshot};
 use scenecast_core::{Principal, UserError};
@@ -39,12 +41,17 @@ pub struct SurfaceOutlet {
 }
 
 /// Joins ROS 2, as soon as DDS starts: the surface does not wait for it. Orders are taken in the name of `principal`; without
-/// one, none are.
+/// one, none are. `vehicles` are those of the configuration, by address and name.
 ///
 /// # Errors
 ///
-/// The thread did not start.
-pub fn start_surface(settings: &Ros2, principal: Option<Principal>) -> Result<SurfaceOutlet, UserError> {
+/// Two vehicles whose names give the same topics, or the thread did not start.
+pub fn start_surface(
+    settings: &Ros2,
+    principal: Option<Principal>,
+    vehicles: impl IntoIterator<Item = (u8, String)>,
+) -> Result<SurfaceOutlet, UserError> {
+    let parts = Parts::new(vehicles)?;
     let (sender, requests) = mpsc::channel(MAX_PENDING);
     let (snapshots, receiver) = watch::channel(Arc::new(Snapshot::default()));
     let (owner, owned) = stop::ends();
@@ -52,7 +59,7 @@ pub fn start_surface(settings: &Ros2, principal: Option<Principal>) -> Result<Su
     let settings = settings.clone();
     let run = move || {
         if let Some(node) = RosNode::start_when_possible(&settings, "scenecast_surface", &owned) {
-            Worker { node, desk, snapshots: receiver, vehicles: BTreeMap::new() }.run(&owned);
+            Worker { node, desk, snapshots: receiver, parts, vehicles: BTreeMap::new() }.run(&owned);
         }
     };
     let thread = std::thread::Builder::new().name("ros2-surface".to_owned());
@@ -79,7 +86,8 @@ struct Worker {
     node: RosNode,
     desk: Desk,
     snapshots: watch::Receiver<Arc<Snapshot>>,
-    /// By address; `None` if DDS refused a topic.
+    parts: Parts,
+    /// By address; `None` if DDS refused a topic, or another vehicle has its topics.
     vehicles: BTreeMap<u8, Option<VehicleTopics>>,
 }
 
@@ -99,7 +107,8 @@ impl Worker {
     fn handle(&mut self, snapshot: &Snapshot, stamps: &Stamps) {
         for vehicle in &snapshot.state.vehicles {
             let topics = self.vehicles.entry(vehicle.id).or_insert_with(|| {
-                let topics = VehicleTopics::new(&self.node, vehicle, self.desk.principal.is_some());
+                let part = self.parts.claim(vehicle.id, &vehicle.name);
+                let topics = part.and_then(|part| VehicleTopics::new(&self.node, &part, self.desk.principal.is_some()));
                 topics.inspect_err(|e| tracing::error!("{e}; {} is not published", vehicle.name)).ok()
             });
             if let Some(topics) = topics {

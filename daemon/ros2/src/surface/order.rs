@@ -8,20 +8,24 @@ use scenecast_outlets::WORLD_FRAME;
 use scenecast_protocol::directive::Constraints;
 use scenecast_surface::FenceOrder;
 
-/// Age of a stamp from which an order is refused: it may come from the playback of a recording.
+/// Distance of a stamp to now from which an order is refused: it may come from the playback of a recording, or from a clock
+/// that is wrong.
 const MAX_AGE_NANOS: i64 = 60_000_000_000;
 /// Outlines and vertices at most, as in the surface's own orders, which check the rest.
 const MAX_OUTLINES: usize = 15;
 const MAX_VERTICES: usize = 34;
 
-/// Refuses an order with an old stamp; one without a stamp, as `ros2 topic pub` sends it, is taken for new.
+/// Refuses an order with a stamp of the past or of the future; one without a stamp, as `ros2 topic pub` sends it, is taken
+/// for new.
 pub(super) fn check_age(header: &Header, now_nanos: i64) -> Result<(), String> {
     let stamp = header.stamp.nanos();
     let age = now_nanos.saturating_sub(stamp);
-    if stamp == 0 || age <= MAX_AGE_NANOS {
+    if stamp == 0 || age.unsigned_abs() <= MAX_AGE_NANOS as u64 {
         return Ok(());
     }
-    Err(format!("its stamp is {} s old; an order is taken for 60 s", age / 1_000_000_000))
+    let seconds = age.unsigned_abs() / 1_000_000_000;
+    let of = if age > 0 { "old" } else { "in the future" };
+    Err(format!("its stamp is {seconds} s {of}; allowed: 60 s at most"))
 }
 
 pub(super) fn utility(vehicle: u8, order: &Utility) -> Result<SurfaceRequest, String> {
@@ -58,12 +62,9 @@ fn outline(polygon: &Polygon) -> Result<Vec<[f64; 2]>, String> {
     Ok(points.iter().map(|point| [f64::from(point.x), f64::from(point.y)]).collect())
 }
 
-/// Hold keeps an abort in force; the end of an abort is an order of its own.
-pub(super) fn hold(vehicle: u8, order: &Hold, is_aborting: bool) -> Result<SurfaceRequest, String> {
-    if is_aborting && !order.hold {
-        return Err("an abort is in force; the order abort with false ends it".to_owned());
-    }
-    Ok(SurfaceRequest::Constraints(vehicle, Constraints { hold: order.hold, abort: is_aborting }))
+/// Hold leaves an abort as it is; the end of an abort is an order of its own.
+pub(super) fn hold(vehicle: u8, order: &Hold) -> Result<SurfaceRequest, String> {
+    Ok(SurfaceRequest::Hold(vehicle, order.hold))
 }
 
 pub(super) fn abort(vehicle: u8, order: &Abort) -> Result<SurfaceRequest, String> {
@@ -100,23 +101,24 @@ mod tests {
     }
 
     #[test]
-    fn a_hold_never_ends_an_abort() {
-        let constraints = |hold, abort| Ok(SurfaceRequest::Constraints(1, Constraints { hold, abort }));
+    fn a_hold_says_nothing_of_an_abort() {
         let order = |hold| Hold { hold, ..Hold::default() };
-        assert_eq!(hold(1, &order(true), false), constraints(true, false));
-        assert_eq!(hold(1, &order(true), true), constraints(true, true));
-        assert_eq!(hold(1, &order(false), false), constraints(false, false));
-        assert!(hold(1, &order(false), true).unwrap_err().contains("abort is in force"));
-        assert_eq!(abort(1, &Abort { abort: true, ..Abort::default() }), constraints(false, true));
+        assert_eq!(hold(1, &order(true)), Ok(SurfaceRequest::Hold(1, true)));
+        assert_eq!(hold(1, &order(false)), Ok(SurfaceRequest::Hold(1, false)));
+        let aborted = SurfaceRequest::Constraints(1, Constraints { hold: false, abort: true });
+        assert_eq!(abort(1, &Abort { abort: true, ..Abort::default() }), Ok(aborted));
     }
 
     #[test]
-    fn old_orders_and_other_frames_are_refused() {
+    fn old_and_future_orders_and_other_frames_are_refused() {
         let stamped = |sec| Header { stamp: Time { sec, nanosec: 0 }, ..Header::default() };
         let now = 1_000_000_000_000;
         assert_eq!(check_age(&stamped(940), now), Ok(()));
         assert_eq!(check_age(&stamped(0), now), Ok(()), "without a stamp");
         assert!(check_age(&stamped(900), now).unwrap_err().starts_with("its stamp is 100 s old"));
+        assert_eq!(check_age(&stamped(1060), now), Ok(()), "of a clock that is a little ahead");
+        assert!(check_age(&stamped(1100), now).unwrap_err().starts_with("its stamp is 100 s in the future"));
+        assert!(check_age(&stamped(i32::MIN), now).is_err() && check_age(&stamped(i32::MAX), now).is_err());
         let framed = |frame: &str| Fence {
             header: Header { frame_id: frame.to_owned(), ..Header::default() },
             outline: square(1.0),

@@ -6,7 +6,7 @@ use super::stamps;
 use crate::inbox::Inbox;
 use crate::node::RosNode;
 use crate::qos::Qos;
-use scenecast_console::state::{ReportedMode, VehicleState};
+use scenecast_console::state::VehicleState;
 use scenecast_console::{ClientRequest, Reply, SurfaceRequest};
 use scenecast_core::{Principal, UserError};
 use scenecast_messages::scenecast_msgs::{Abort, Event, Fence, Hold, Utility};
@@ -22,8 +22,6 @@ pub(super) struct OrderTopics {
     fence: Inbox<Fence>,
     hold: Inbox<Hold>,
     abort: Inbox<Abort>,
-    /// Whether an abort of ROS 2 was accepted and not ended; the vehicle may not have reported it yet.
-    is_aborting: bool,
 }
 
 /// What became of an order: the level of [`Event`], and one line for people.
@@ -38,7 +36,6 @@ impl OrderTopics {
             fence: node.subscribe(&topic("fence")?, qos, ORDERS)?,
             hold: node.subscribe(&topic("hold")?, qos, ORDERS)?,
             abort: node.subscribe(&topic("abort")?, qos, ORDERS)?,
-            is_aborting: false,
         })
     }
 
@@ -47,25 +44,16 @@ impl OrderTopics {
         let Some(principal) = &desk.principal else { return Vec::new() };
         let by = |request| ClientRequest { principal: Some(principal.clone()), request };
         let mut outcomes = Vec::new();
-        while let Some(received) = self.abort.take() {
-            let request = fresh(&received.message.header).and_then(|()| order::abort(vehicle.id, &received.message));
-            let reply = request.map(|request| desk.request(by(request)));
-            if matches!(reply, Ok(Some(Reply::Accepted(_)))) {
-                self.is_aborting = received.message.abort;
-            }
-            outcomes.push(outcome("abort", principal, reply));
-        }
-        let is_reported = vehicle.status.as_ref().is_some_and(|status| status.mode == ReportedMode::Abort);
-        while let Some(received) = self.hold.take() {
-            let is_aborting = self.is_aborting || is_reported;
-            let request =
-                fresh(&received.message.header).and_then(|()| order::hold(vehicle.id, &received.message, is_aborting));
-            outcomes.push(outcome("hold", principal, request.map(|request| desk.request(by(request)))));
-        }
         let mut order = |name, header: &Header, request: Result<SurfaceRequest, String>| {
             let reply = fresh(header).and(request).map(|request| desk.request(by(request)));
             outcomes.push(outcome(name, principal, reply));
         };
+        while let Some(received) = self.abort.take() {
+            order("abort", &received.message.header, order::abort(vehicle.id, &received.message));
+        }
+        while let Some(received) = self.hold.take() {
+            order("hold", &received.message.header, order::hold(vehicle.id, &received.message));
+        }
         while let Some(received) = self.fence.take() {
             order("fence", &received.message.header, order::fence(vehicle.id, &received.message));
         }

@@ -43,12 +43,12 @@ pub(super) struct VehicleTopics {
 }
 
 impl VehicleTopics {
-    pub fn new(node: &RosNode, vehicle: &VehicleState, takes_orders: bool) -> Result<Self, UserError> {
-        let part = crate::valid_part(&vehicle.name);
+    /// The topics below this part of their names.
+    pub fn new(node: &RosNode, part: &str, takes_orders: bool) -> Result<Self, UserError> {
         let topic = |name: &str| node.own_topic(&format!("{part}/{name}"));
         Ok(Self {
-            map: MapTopics::new(node, &part)?,
-            state: StateTopics::new(node, &part)?,
+            map: MapTopics::new(node, part)?,
+            state: StateTopics::new(node, part)?,
             exemplars: node.publisher(&topic("exemplars")?, Qos::Latched(EXEMPLARS))?,
             published: (0, BTreeSet::new()),
             diagnostics: node.publisher(&topic("diagnostics")?, Qos::Reliable(10))?,
@@ -56,7 +56,7 @@ impl VehicleTopics {
             order_status: node.publisher(&topic("order_status")?, Qos::Latched(SLOTS))?,
             orders_published: BTreeMap::new(),
             events: node.publisher(&topic("events")?, Qos::Reliable(100))?,
-            orders: takes_orders.then(|| OrderTopics::new(node, &part)).transpose()?,
+            orders: takes_orders.then(|| OrderTopics::new(node, part)).transpose()?,
         })
     }
 

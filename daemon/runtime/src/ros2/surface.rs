@@ -16,7 +16,8 @@ impl SurfaceRos2 {
     ///
     /// # Errors
     ///
-    /// A name of the principal that is not allowed, a thread that does not start, or a build without ROS 2.
+    /// A name of the principal that is not allowed, two vehicles whose names give the same topics, a thread that does not
+    /// start, or a build without ROS 2.
     pub fn start(config: &Config, principals: &mut Vec<Principal>) -> Result<Self, UserError> {
         let is_enabled = super::is_enabled(config)?;
         let principal = principal(&config.ros2.principal, principals)?.filter(|_| is_enabled);
@@ -28,7 +29,7 @@ impl SurfaceRos2 {
         }
         Ok(Self {
             #[cfg(feature = "ros2")]
-            outlet: is_enabled.then(|| scenecast_ros2::start_surface(&config.ros2, principal)).transpose()?,
+            outlet: is_enabled.then(|| start(config, principal)).transpose()?,
         })
     }
 
@@ -59,6 +60,13 @@ impl SurfaceRos2 {
         }
         std::future::pending().await
     }
+}
+
+#[cfg(feature = "ros2")]
+fn start(config: &Config, principal: Option<Principal>) -> Result<scenecast_ros2::SurfaceOutlet, UserError> {
+    let vehicles = scenecast_config::vehicle_names(config)?;
+    let vehicles = vehicles.into_iter().map(|(address, name)| (address.number(), name));
+    scenecast_ros2::start_surface(&config.ros2, principal, vehicles)
 }
 
 /// The principal with this name; `None` without a name.
