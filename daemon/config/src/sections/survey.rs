@@ -95,7 +95,8 @@ section! {
         port: Option<PortAddress> = None, ports(&["serial", "udp", "udp-to", "tcp", "file"]), [Auv Asv];
         /// MAVLink system number of the autopilot (mavlink).
         system: u8 = 1, range(1.0, 255.0, ""), [Auv Asv];
-        /// Whether to arm the autopilot and to switch it to guided mode, once (mavlink). Otherwise a pilot does so.
+        /// Whether to arm the autopilot and to switch it to guided mode, once, and again after a restart of the autopilot under
+        /// water (mavlink). Otherwise a pilot does so.
         arm: bool = false, ANY, [Auv Asv];
         /// Silence after which the autopilot counts as disconnected.
         timeout_s: f64 = 5.0, range(1.0, 600.0, "s"), [Auv Asv];

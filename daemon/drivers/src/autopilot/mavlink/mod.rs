@@ -87,6 +87,8 @@ pub struct Mavlink {
     time_boot_ms: Option<u32>,
     /// When it started again, until it is in command again.
     restarted: Option<Instant>,
+    /// Whether it was under water when it started again.
+    was_under_water: bool,
     due: Due,
     tray: Tray,
     was_silent: bool,
@@ -125,6 +127,8 @@ const STREAMS_PERIOD: Duration = Duration::from_secs(10);
 const CLOCKS_APART_MS: u32 = 1000;
 /// Uncertainty of the time at which it restarted.
 const RESTART_MARGIN: Duration = Duration::from_secs(1);
+/// Depth below which an autopilot that has restarted is armed again, metres.
+const MIN_ARMED_DEPTH_M: f64 = 0.5;
 /// Longest time between two positions that is bridged by the velocity.
 const BRIDGED: Duration = Duration::from_secs(3);
 /// GPS_INPUT goes out so often, as ArduPilot expects of a receiver.
@@ -154,6 +158,7 @@ impl Mavlink {
             left_command: None,
             time_boot_ms: None,
             restarted: None,
+            was_under_water: false,
             due: Due { second: now, gps: now, streams: now },
             tray: Tray::default(),
             was_silent: false,
@@ -267,16 +272,18 @@ impl Mavlink {
         self.tray.count("restarts");
         self.tray.note("the autopilot has restarted");
         self.restarted = Some(now - Duration::from_millis(u64::from(ms)));
+        self.was_under_water = self.pose.is_some_and(|pose| pose.depth_m > MIN_ARMED_DEPTH_M);
         self.echo.forget();
         self.altimeter.forget();
         self.stay = None;
         self.ask_for_streams(now);
     }
 
-    /// Whether nobody but its own restart has taken it out of command.
+    /// Whether nobody but its own restart has taken it out of command, and it was under water: on deck, its thrusters must not
+    /// start by themselves.
     fn is_out_by_restart(&self) -> bool {
         let left = self.left_command.zip(self.restarted);
-        left.is_some_and(|(left, restarted)| left + RESTART_MARGIN >= restarted)
+        self.was_under_water && left.is_some_and(|(left, restarted)| left + RESTART_MARGIN >= restarted)
     }
 
     /// A distance along a beam that is fixed to the vehicle and looks down.

@@ -251,13 +251,13 @@ fn targets_and_distances_in_degrees_are_compared_too() {
 }
 
 #[test]
-fn it_arms_again_after_a_restart_unless_a_pilot_disarmed_it() {
-    for by_pilot in [false, true] {
+fn after_a_restart_it_is_armed_under_water_unless_a_pilot_disarmed_it() {
+    for (by_pilot, depth_m, expected) in [(false, 5.0, 2), (true, 5.0, 0), (false, 0.2, 0)] {
         let mut pilot = pilot(true);
         pilot.set_goal(GOAL, at(0.0));
         let beat = |pilot: &mut Mavlink, s: f64, boot_s: f64, armed| {
             pilot.handle_bytes(&heartbeat(if armed { 4 } else { 19 }, armed), at(s));
-            pilot.handle_bytes(&local(((s - boot_s) * 1000.0) as u32, [0.0; 3], [0.0; 3]), at(s));
+            pilot.handle_bytes(&local(((s - boot_s) * 1000.0) as u32, [0.0, 0.0, depth_m], [0.0; 3]), at(s));
             sent(pilot);
             pilot.handle_timeout(at(s));
             count(&sent(pilot), 76)
@@ -267,7 +267,7 @@ fn it_arms_again_after_a_restart_unless_a_pilot_disarmed_it() {
             assert_eq!(beat(&mut pilot, f64::from(s), -60.0, is_armed), 0);
         }
         let commands = beat(&mut pilot, 13.0, 11.0, false);
-        assert_eq!(commands, if by_pilot { 0 } else { 2 });
+        assert_eq!(commands, expected, "{by_pilot} {depth_m}");
         assert_eq!((pilot.counters()["restarts"], pilot.poll_step().map(|s| s.dx_m)), (1, Some(0.0)));
         assert!(notes(&mut pilot).contains(&"the autopilot has restarted".to_owned()));
         beat(&mut pilot, 14.0, 11.0, true);
