@@ -8,9 +8,11 @@ Speaks MAVLink over UDP to 127.0.0.1:PORT, as BlueOS does. What it keeps of Ardu
 * it acknowledges commands, and refuses to arm in an unknown mode;
 * it takes position targets in GUIDED while armed, and no others;
 * it takes GPS_INPUT as a receiver: after five good ones its local position jumps to where they say;
+* it reports the target that it flies to, if there is one, and the distance to it;
 * without a heartbeat of its companion for five seconds it disarms (FS_GCS).
 
-Each line on stdin is an order of the test: `silent`, `speak`, `pilot MODE`, `quit`. Each 0.1 s a line of JSON on stdout
+Each line on stdin is an order of the test: `silent`, `speak`, `pilot MODE`, `refuse` and `accept` (targets, without a word),
+`lose` and `find` (its position; the frame has jumped by then), `reboot`, `quit`. Each 0.1 s a line of JSON on stdout
 tells what it has seen.
 """
 
@@ -27,6 +29,7 @@ MANUAL, GUIDED, ALT_HOLD = 19, 4, 2
 KNOWN_MODES = {0, 1, 2, 3, 4, 7, 9, 16, 19, 20}
 ORIGIN = (29.5, 34.92)
 METRES_PER_DEGREE = 110_856.0
+FLOOR_M = 20.0
 
 
 class Sub:
@@ -36,6 +39,7 @@ class Sub:
         self.began = time.monotonic()
         self.speed = speed
         self.mode, self.armed, self.silent = MANUAL, False, False
+        self.refuses, self.is_lost, self.off_until = False, False, 0.0
         self.north = self.east = self.down = self.yaw = 0.0
         self.true_north = self.true_east = 0.0
         self.v_north = self.v_east = 0.0
@@ -46,7 +50,7 @@ class Sub:
                      "commands": [], "gps": None, "jumped": False}
 
     def ms(self):
-        return int((time.monotonic() - self.began) * 1000)
+        return max(0, int((time.monotonic() - self.began) * 1000))
 
     def stream(self, message_id, send):
         interval = self.intervals.get(message_id, 0)
@@ -55,8 +59,14 @@ class Sub:
             self.last_sent[message_id] = now
             send()
 
+    def is_off(self):
+        return self.silent or time.monotonic() < self.off_until
+
+    def distance(self):
+        return math.hypot(self.target[0] - self.north, self.target[1] - self.east) if self.target else 0.0
+
     def speak(self):
-        if self.silent:
+        if self.is_off():
             return
         mav = self.link.mav
         now = time.monotonic()
@@ -64,7 +74,16 @@ class Sub:
             self.last_sent["beat"] = now
             mav.heartbeat_send(m.MAV_TYPE_SUBMARINE, m.MAV_AUTOPILOT_ARDUPILOTMEGA, 1 | (128 if self.armed else 0),
                                self.mode, m.MAV_STATE_ACTIVE)
-        self.stream(30, lambda: mav.attitude_send(self.ms(), 0, 0, self.yaw, 0, 0, 0))
+        self.stream(30, lambda: mav.attitude_send(self.ms(), 0.1, -0.05, self.yaw, 0, 0, 0))
+        self.stream(62, lambda: mav.nav_controller_output_send(0, 0, 0, 0, int(self.distance()), 0, 0, 0))
+        self.stream(132, lambda: mav.distance_sensor_send(
+            self.ms(), 20, 5000, int((FLOOR_M - self.down) * 100), m.MAV_DISTANCE_SENSOR_ULTRASOUND, 1,
+            m.MAV_SENSOR_ROTATION_PITCH_270, 255))
+        if self.target and self.mode == GUIDED:
+            self.stream(85, lambda: mav.position_target_local_ned_send(
+                self.ms(), m.MAV_FRAME_LOCAL_NED, 0x0DF8, *self.target, 0, 0, 0, 0, 0, 0, 0, 0))
+        if self.is_lost:
+            return
         self.stream(32, lambda: mav.local_position_ned_send(
             self.ms(), self.north, self.east, self.down, self.v_north, self.v_east, 0))
         self.stream(33, lambda: mav.global_position_int_send(
@@ -79,7 +98,7 @@ class Sub:
             kind = message.get_type()
             if kind == "BAD_DATA":
                 self.seen["bad"] += 1
-            elif self.silent:
+            elif self.is_off():
                 pass
             elif kind == "HEARTBEAT":
                 self.seen["heartbeats"] += 1
@@ -113,7 +132,8 @@ class Sub:
             self.seen["targets_refused"] += 1
             return
         self.seen["targets"] += 1
-        self.target = (t.x, t.y, t.z)
+        if not self.refuses:
+            self.target = (t.x, t.y, t.z)
 
     def gps_input(self, g):
         if g.fix_type < 3 or g.satellites_visible < 6:
@@ -126,11 +146,11 @@ class Sub:
             self.seen["jumped"] = True
 
     def move(self, dt):
-        if self.heard_beat and time.monotonic() - self.heard_beat > 5.0 and self.armed and not self.silent:
+        if self.heard_beat and time.monotonic() - self.heard_beat > 5.0 and self.armed and not self.is_off():
             self.armed = False
             self.seen["failsafes"] += 1
         self.v_north = self.v_east = 0.0
-        if not (self.armed and self.mode == GUIDED and self.target):
+        if not (self.armed and self.mode == GUIDED and self.target) or self.is_lost or self.is_off():
             return
         north, east = self.target[0] - self.north, self.target[1] - self.east
         distance = math.hypot(north, east)
@@ -152,8 +172,23 @@ class Sub:
             self.silent = False
         elif word[:1] == ["pilot"]:
             self.mode = int(word[1])
+        elif word[:1] in (["refuse"], ["accept"]):
+            self.refuses = word[0] == "refuse"
+        elif word[:1] in (["lose"], ["find"]):
+            self.is_lost = word[0] == "lose"
+            if not self.is_lost:
+                self.north += 40.0
+        elif word[:1] == ["reboot"]:
+            self.reboot()
         elif word[:1] == ["quit"]:
             sys.exit(0)
+
+    def reboot(self):
+        self.off_until = time.monotonic() + 2.0
+        self.began = self.off_until
+        self.mode, self.armed, self.target, self.heard_beat = MANUAL, False, None, None
+        self.north = self.east = 0.0
+        self.intervals, self.last_sent = {}, {}
 
     def tell(self):
         state = dict(self.seen, mode=self.mode, armed=self.armed, north=self.true_north, east=self.true_east,

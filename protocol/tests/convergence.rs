@@ -6,7 +6,7 @@ use pair::{CALM, LinkedEnds, LossyChannel, Setup, assert_budget, auv, hold, patc
 use proptest::prelude::*;
 use scenecast_protocol::directive::{OrderStatus, Slot, Utility};
 use scenecast_protocol::mac::Access;
-use scenecast_protocol::map::Cell;
+use scenecast_protocol::map::{Cell, ClassEntry};
 use scenecast_protocol::map_codec::Codec;
 use scenecast_protocol::schedule::Class;
 use std::time::Duration;
@@ -29,6 +29,7 @@ fn setup() -> impl Strategy<Value = Setup> {
         3 => Just(Access::Shared),
         1 => Just(Access::ModemOwned { pool_frames: 8 }),
         1 => Just(Access::Polled),
+        1 => Just(Access::FullDuplex),
     ];
     let frame = prop_oneof![Just(32usize), Just(64), Just(256), Just(1000)];
     let budget = prop_oneof![Just(1000u32), Just(10_000)];
@@ -56,6 +57,8 @@ fn play(pair: &mut LinkedEnds, steps: &[(u8, u8)]) {
         pair.mute = [outage & 5 == 1, outage == 2 || outage == 1];
         pair.vehicle.set_map(map.iter(), pair.now);
         pair.set_layers(24, step as u64);
+        let name = "a habitat with a rather long name that takes frames".split_at(step * 8 + 1).0;
+        pair.vehicle.add_class(&ClassEntry::new(step as u8 + 1, name, Some([1, 2, step as u8])).unwrap());
         pair.surface.issue(auv(), utility(step as i8), pair.now).unwrap();
         pair.run(pair.now + Duration::from_secs(40), false);
         match restarts {
@@ -136,7 +139,7 @@ fn contact_resumes_after_hours_of_silence() {
 
 #[test]
 fn held_changes_are_requested_when_due() {
-    for access in [Access::Shared, Access::ModemOwned { pool_frames: 8 }, Access::Polled] {
+    for access in [Access::Shared, Access::ModemOwned { pool_frames: 8 }, Access::Polled, Access::FullDuplex] {
         let setup = Setup { access, debounce: Duration::from_secs(4), ..Setup::new(256, 10_000, Codec::Context) };
         let mut pair = LinkedEnds::new(5, setup, LossyChannel { loss: 0.0, ..CALM });
         let start = patchy(20, 0);

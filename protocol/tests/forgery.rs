@@ -237,7 +237,7 @@ fn give_forged_order(pair: &mut LinkedEnds, series: Series, order: &[u8]) {
 
 #[test]
 fn an_order_gets_through_after_a_forged_series_ended_its_own() {
-    for access in [Access::Shared, Access::ModemOwned { pool_frames: 8 }, Access::Polled] {
+    for access in [Access::Shared, Access::ModemOwned { pool_frames: 8 }, Access::Polled, Access::FullDuplex] {
         let setup = Setup { access, ..Setup::new(64, 10_000, Codec::Context) };
         let mut pair = LinkedEnds::new(3, setup, CHANNEL);
         pair.surface.issue(auv(), utility(5), pair.now).unwrap();
@@ -257,7 +257,7 @@ fn an_order_gets_through_after_a_forged_series_ended_its_own() {
 
 #[test]
 fn an_order_gets_through_beside_a_forged_one_of_the_same_bits() {
-    for access in [Access::Shared, Access::ModemOwned { pool_frames: 8 }, Access::Polled] {
+    for access in [Access::Shared, Access::ModemOwned { pool_frames: 8 }, Access::Polled, Access::FullDuplex] {
         let setup = Setup { access, ..Setup::new(64, 10_000, Codec::Context) };
         let mut pair = LinkedEnds::new(5, setup, CHANNEL);
         pair.run(pair.now + Duration::from_secs(60), false);

@@ -152,7 +152,7 @@ fn learn(pair: &mut LinkedEnds, seconds: u64) -> Vec<SurfaceEvent> {
 
 #[test]
 fn a_surface_without_memory_learns_what_is_in_force() {
-    for access in [Access::Shared, Access::ModemOwned { pool_frames: 8 }, Access::Polled] {
+    for access in [Access::Shared, Access::ModemOwned { pool_frames: 8 }, Access::Polled, Access::FullDuplex] {
         let setup = Setup { access, ..Setup::new(64, 2000, Codec::Png) };
         let mut pair = LinkedEnds::new(8, setup, CHANNEL);
         assert_eq!(shown(&pair, SlotId::Fence), InForce::NotReported);

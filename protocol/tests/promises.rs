@@ -36,7 +36,7 @@ proptest! {
     #[test]
     fn the_shown_map_never_goes_back(
         seed: u64,
-        access in prop_oneof![Just(Access::Shared), Just(Access::ModemOwned { pool_frames: 8 }), Just(Access::Polled)],
+        access in prop_oneof![Just(Access::Shared), Just(Access::ModemOwned { pool_frames: 8 }), Just(Access::Polled), Just(Access::FullDuplex)],
         restarts in proptest::collection::vec(0u8..8, 40),
     ) {
         let setup = Setup { access, ..Setup::new(64, 10_000, Codec::Context) };
@@ -64,7 +64,7 @@ proptest! {
 
 #[test]
 fn hours_without_an_answer_do_not_make_the_ends_grow() {
-    for access in [Access::Shared, Access::ModemOwned { pool_frames: 8 }, Access::Polled] {
+    for access in [Access::Shared, Access::ModemOwned { pool_frames: 8 }, Access::Polled, Access::FullDuplex] {
         for mute in [[true, false], [false, true], [true, true], [false, false]] {
             let mut pair = LinkedEnds::new(5, Setup { access, ..Setup::new(64, 10_000, Codec::Png) }, ROUGH);
             let mut sizes = Vec::new();

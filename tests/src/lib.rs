@@ -79,6 +79,13 @@ impl Process {
         Self(child.expect("scenecast starts"))
     }
 
+    /// Starts it with its log in a file.
+    pub fn start_logged(arguments: &[&str], log: &Path) -> Self {
+        let log = std::fs::File::create(log).expect("the log can be written");
+        let child = scenecast().args(arguments).stdout(Stdio::null()).stderr(log).spawn();
+        Self(child.expect("scenecast starts"))
+    }
+
     /// Kills it as a power cut would.
     pub fn kill(&mut self) {
         let _ = self.0.kill();
@@ -177,7 +184,7 @@ fn exchange(port: u16, method: &str, path: &str, headers: &str, body: &str) -> O
 /// Without it a test says that it is skipped, which `.ci/run` takes for a failure.
 pub fn python() -> Option<String> {
     let python = std::env::var("SCENECAST_PYTHON").unwrap_or_else(|_| "python3".to_owned());
-    let packages = "import jsonschema, openapi_spec_validator, plyfile, prometheus_client, rasterio, shapely";
+    let packages = "import cyclonedds, jsonschema, openapi_spec_validator, PIL, plyfile, prometheus_client, rasterio, rosbags, shapely";
     let output = Command::new(&python).args(["-c", packages]).output();
     if output.is_ok_and(|o| o.status.success()) {
         return Some(python);

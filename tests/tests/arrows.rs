@@ -4,15 +4,31 @@ use serde_json::Value;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Crates that would give a core a clock, a socket, a disk or a runtime.
-const IO_CRATES: [&str; 8] =
-    ["axum", "hyper", "nix", "serialport", "scenecast-files", "tokio", "tokio-serial", "tracing-subscriber"];
+const IO_CRATES: [&str; 12] = [
+    "axum",
+    "hyper",
+    "nix",
+    "ros2-client",
+    "rustdds",
+    "serialport",
+    "scenecast-files",
+    "scenecast-ros2",
+    "scenecast-sources",
+    "tokio",
+    "tokio-serial",
+    "tracing-subscriber",
+];
 
 /// Crates that do no IO.
-const SANS_IO: [&str; 12] = [
+const SANS_IO: [&str; 16] = [
     "scenecast-core",
     "scenecast-drivers",
     "scenecast-host",
+    "scenecast-labels",
+    "scenecast-messages",
+    "scenecast-sensors",
     "scenecast-motion",
+    "scenecast-outlets",
     "scenecast-protocol",
     "scenecast-registration",
     "scenecast-scoring",

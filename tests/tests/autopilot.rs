@@ -2,7 +2,7 @@
 
 use scenecast_core::LatLon;
 use scenecast_drivers::autopilot::mavlink::MavlinkConfig;
-use scenecast_drivers::autopilot::{Autopilot, Goal, Health, Mavlink};
+use scenecast_drivers::autopilot::{Autopilot, Goal, Health, Mavlink, Step};
 use scenecast_protocol::time::Instant;
 use scenecast_tests::{Process, free_port, http, scratch, wait_until, workspace};
 use serde_json::Value;
@@ -84,6 +84,10 @@ struct Bench {
     peer: Option<std::net::SocketAddr>,
     began: std::time::Instant,
     way: (f64, f64),
+    /// The longest stretch of way in one report, metres.
+    longest_m: f64,
+    notes: Vec<String>,
+    last: Option<Step>,
 }
 
 impl Bench {
@@ -92,7 +96,16 @@ impl Bench {
         socket.set_read_timeout(Some(Duration::from_millis(20))).unwrap();
         let config = MavlinkConfig { system: 1, arms: true, silence: Duration::from_secs(3) };
         let began = std::time::Instant::now();
-        Self { pilot: Mavlink::new(config, Instant::ZERO), socket, peer: None, began, way: (0.0, 0.0) }
+        Self {
+            pilot: Mavlink::new(config, Instant::ZERO),
+            socket,
+            peer: None,
+            began,
+            way: (0.0, 0.0),
+            longest_m: 0.0,
+            notes: Vec::new(),
+            last: None,
+        }
     }
 
     fn now(&self) -> Instant {
@@ -113,7 +126,14 @@ impl Bench {
         }
         while let Some(step) = self.pilot.poll_step() {
             self.way = (self.way.0 + step.dx_m, self.way.1 + step.dy_m);
+            self.longest_m = self.longest_m.max(step.dx_m.hypot(step.dy_m));
+            self.last = Some(step);
         }
+        self.notes.extend(std::iter::from_fn(|| self.pilot.poll_note()));
+    }
+
+    fn is_noted(&self, text: &str) -> bool {
+        self.notes.iter().any(|note| note.contains(text))
     }
 
     fn until(&mut self, what: &str, mut done: impl FnMut(&mut Self) -> bool) {
@@ -158,6 +178,58 @@ fn ardusub_is_armed_guided_and_given_its_position() {
 }
 
 #[test]
+fn ardusub_that_refuses_gets_lost_or_restarts_is_recovered() {
+    let Some(python) = python() else { return };
+    let mut bench = Bench::new();
+    let port = bench.socket.local_addr().unwrap().port();
+    let mut peer = Peer::start(&python, port, 1.0);
+    let goal = |b: &mut Bench, east_m: f64| {
+        let to = Goal { east_m: east_m - b.way.0, north_m: -b.way.1, depth_m: Some(1.0), place: None };
+        b.pilot.set_goal(Some(to), b.now());
+    };
+    goal(&mut bench, 100.0);
+    bench.until("it flies", |b| b.pilot.health(b.now()) == Health::InCommand && b.way.0 > 1.0);
+    let last = bench.last.unwrap();
+    assert_eq!((last.roll_rad as f32, last.pitch_rad as f32), (0.1, -0.05));
+    // 20 m of water, and a beam that leans with the vehicle.
+    assert!((last.altitude_m.unwrap() - (20.0 - last.depth_m)).abs() < 0.6, "{last:?}");
+
+    peer.order("refuse");
+    goal(&mut bench, -100.0);
+    bench.until("the refusal is noticed", |b| b.pilot.health(b.now()) == Health::NotInCommand);
+    assert!(
+        bench.is_noted("the autopilot does not follow the waypoint: it reports a target 200 m away"),
+        "{:?}",
+        bench.notes
+    );
+    peer.order("accept");
+    bench.until("it is in command", |b| b.pilot.health(b.now()) == Health::InCommand);
+    assert!(bench.is_noted("the autopilot follows the waypoint again"), "{:?}", bench.notes);
+
+    peer.order("lose");
+    bench.until("the position is lost", |b| b.is_noted("the autopilot reports no position any more"));
+    let way = bench.way;
+    peer.order("find");
+    bench.until("it has a position", |b| b.is_noted("the autopilot reports its position again"));
+    assert!((bench.way.0 - way.0).hypot(bench.way.1 - way.1) < 1.0, "{way:?} and {:?}", bench.way);
+    bench.until("it flies on", |b| b.way.0 < way.0 - 2.0 && b.pilot.health(b.now()) == Health::InCommand);
+
+    let way = bench.way;
+    peer.order("reboot");
+    bench.until("the restart is noticed", |b| b.is_noted("the autopilot has restarted"));
+    bench.until("it flies on", |b| b.way.0 < way.0 - 2.0 && b.pilot.health(b.now()) == Health::InCommand);
+    // It has moved by no more than a metre a second between two reports at most 3 s apart.
+    assert!(bench.longest_m < 3.5 && bench.way.1.abs() < 1.0, "{} {:?}", bench.longest_m, bench.way);
+    let (east, north) = (peer.number("east"), peer.number("north"));
+    assert!(
+        (bench.way.0 - east).hypot(bench.way.1 - north) < 4.0,
+        "{:?}, and the vehicle is at {east} {north}",
+        bench.way
+    );
+    assert_eq!(peer.seen()["bad"].as_u64(), Some(0));
+}
+
+#[test]
 fn a_vehicle_surveys_on_ardusub_and_reports_its_silence() {
     let Some(python) = python() else { return };
     let dir = scratch("ardusub");
@@ -186,7 +258,8 @@ fn a_vehicle_surveys_on_ardusub_and_reports_its_silence() {
         ),
     );
     let _asv = Process::start(&["asv", "--config", &asv]);
-    let _auv = Process::start(&["auv", "--config", &auv]);
+    let log = dir.join("auv.log");
+    let _auv = Process::start_logged(&["auv", "--config", &auv], &log);
     let mut peer = Peer::start(&python, mavlink, 3.0);
     let status = || {
         let (_, body) = http(page, "GET", "/api/v2/state", "", "")?;
@@ -206,6 +279,13 @@ fn a_vehicle_surveys_on_ardusub_and_reports_its_silence() {
     wait_until("the link goes on", limit, || status().is_some_and(|s| s["at_s"].as_f64() > at));
     peer.order("speak");
     wait_until("it is back", limit, || status().is_some_and(|s| s["autopilot_silent"] == false));
+    let is_logged = |text: &str| std::fs::read_to_string(&log).is_ok_and(|log| log.contains(text));
+    peer.order("refuse");
+    wait_until("a refused waypoint is logged", limit, || {
+        is_logged("the autopilot does not follow the waypoint: it reports") && is_logged("autopilot: not in command;")
+    });
+    peer.order("accept");
+    wait_until("its end is logged", limit, || is_logged("the autopilot follows the waypoint again"));
     // A target that was on its way when the failsafe of the autopilot began may have been refused.
     let seen = peer.seen();
     assert_eq!(seen["bad"].as_u64(), Some(0), "{seen}");

@@ -253,7 +253,7 @@ fn a_tum_sequence_is_projected_and_gaps_are_counted() {
     write(&source, "groundtruth.txt", "100 0 0 nan 0 0 0 1\n");
     refused(&["--source", &argument], &none, &["groundtruth.txt:1", "tz = nan"]);
     refused(&["--source", "tum:nowhere"], &none, &["nowhere/rgb.txt"]);
-    refused(&["--source", "video:x"], &none, &["tum:DIR or frames:DIR"]);
+    refused(&["--source", "video:x"], &none, &["tum:DIR, frames:DIR or bag:FILE"]);
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! Conditions that several keys must satisfy together.
 
 use crate::key::Key;
-use crate::{Authenticate, AutopilotKind, Config, ModemKind};
+use crate::{Authenticate, AutopilotKind, CameraSource, Config, ModemKind, NavigationSource};
 use scenecast_core::{PortAddress, UserError};
 
 /// The longest time on air of a frame, seconds.
@@ -21,6 +21,7 @@ pub(crate) fn check_together(config: &Config) -> Result<(), UserError> {
     }
     crate::modem::check(config)?;
     check_ports(config)?;
+    check_camera(config)?;
     check_frame(config)?;
     check_airtime(config)
 }
@@ -48,6 +49,53 @@ fn check_ports(config: &Config) -> Result<(), UserError> {
     let port = Key::find("autopilot.port").map(|key| key.value(config).to_string()).unwrap_or_default();
     let given = format!("autopilot.port = {port} is not allowed with autopilot.kind = \"{}\"", autopilot.kind);
     Err(UserError::Input(format!("{given}; allowed: {allowed}")))
+}
+
+/// The images of a live camera need poses and the pace of real time.
+fn check_camera(config: &Config) -> Result<(), UserError> {
+    if !config.camera.source.is_live() {
+        return check_navigation(config);
+    }
+    let source = camera(config);
+    let has_autopilot = config.autopilot.kind != AutopilotKind::None;
+    if config.navigation.source == NavigationSource::Autopilot && !has_autopilot {
+        return Err(UserError::Input(format!(
+            "camera.source = {source} is not allowed without poses; set autopilot.kind or navigation.source"
+        )));
+    }
+    if config.runtime.time_scale != 1.0 {
+        let scale = config.runtime.time_scale;
+        return Err(UserError::Input(format!(
+            "runtime.time_scale = {scale} is not allowed with camera.source = {source}; allowed: 1"
+        )));
+    }
+    Ok(())
+}
+
+/// Without a live camera the poses of a navigation source only move the vehicle.
+fn check_navigation(config: &Config) -> Result<(), UserError> {
+    let source = Key::find("navigation.source").map(|key| key.value(config).to_string()).unwrap_or_default();
+    let is_own = match &config.navigation.source {
+        NavigationSource::Ros2(_) => matches!(config.camera.source, CameraSource::Rehearsal | CameraSource::Bag(_)),
+        _ => config.camera.source == CameraSource::Rehearsal,
+    };
+    let (name, given, allowed) = match &config.navigation.source {
+        NavigationSource::Autopilot => return Ok(()),
+        NavigationSource::Tum(_) => ("camera.source", camera(config), "a live camera"),
+        NavigationSource::Dvl(_) | NavigationSource::Ros2(_) if !is_own => {
+            ("camera.source", camera(config), "a live camera or \"\", as recordings have poses of their own")
+        }
+        NavigationSource::Dvl(_) | NavigationSource::Ros2(_) if config.runtime.time_scale != 1.0 => {
+            ("runtime.time_scale", config.runtime.time_scale.to_string(), "1")
+        }
+        NavigationSource::Dvl(_) | NavigationSource::Ros2(_) => return Ok(()),
+    };
+    let text = format!("{name} = {given} is not allowed with navigation.source = {source}; allowed: {allowed}");
+    Err(UserError::Input(text))
+}
+
+fn camera(config: &Config) -> String {
+    Key::find("camera.source").map(|key| key.value(config).to_string()).unwrap_or_default()
 }
 
 fn check_follow(config: &Config) -> Result<(), UserError> {
@@ -107,5 +155,17 @@ mod tests {
         assert!(load(&["autopilot.kind=log", "autopilot.port=file:x"]).is_ok());
         assert!(load(&["autopilot.kind=rehearsal"]).is_ok());
         assert!(refused(&["position.follow=true"]).contains("position.gps"));
+    }
+
+    #[test]
+    fn a_navigation_source_moves_a_live_camera_or_none() {
+        let load = |sets: &[&str]| crate::load(None, &sets.iter().map(|s| (*s).to_owned()).collect::<Vec<_>>());
+        let refused = |sets: &[&str]| load(sets).unwrap_err().to_string();
+        let dvl = "navigation.source=dvl:192.168.2.95";
+        assert!(load(&[dvl]).is_ok() && load(&[dvl, "camera.source=watch:x"]).is_ok());
+        assert!(load(&["navigation.source=ros2:/odometry", "camera.source=bag:x"]).is_ok());
+        assert!(refused(&[dvl, "camera.source=frames:x"]).contains("camera.source = \"frames:x\" is not allowed"));
+        assert!(refused(&[dvl, "runtime.time_scale=5"]).ends_with("allowed: 1"));
+        assert!(refused(&["navigation.source=tum:x"]).ends_with("allowed: a live camera"));
     }
 }

@@ -1,6 +1,6 @@
 //! Values that follow from several keys.
 
-use crate::{Authenticate, Config, load_key};
+use crate::{Authenticate, Config, ModemKind, load_key};
 use scenecast_core::UserError;
 use scenecast_core::tuning_table::TuningTable;
 use scenecast_protocol::link::Authenticity;
@@ -23,8 +23,13 @@ pub fn modem_profile(config: &Config, bit_rate_bps: f64) -> ModemProfile {
         bit_rate_bps,
         overhead_bits: u64::from(config.modem.overhead_bits),
         turn_around: Duration::from_secs_f64(config.link.turn_around_s),
-        access: Access::Shared,
+        access: if is_full_duplex(config) { Access::FullDuplex } else { Access::Shared },
     }
+}
+
+/// Whether the ends transmit without turns.
+fn is_full_duplex(config: &Config) -> bool {
+    config.modem.full_duplex && matches!(config.modem.kind, ModemKind::Tcp | ModemKind::Udp)
 }
 
 /// The energy of a bit on air in joules: the power of the transmitter for the time of a bit. `None` if energy is not

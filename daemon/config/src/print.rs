@@ -16,7 +16,7 @@ struct Shipped {
     sets: &'static [&'static str],
 }
 
-const SHIPPED: [Shipped; 3] = [
+const SHIPPED: [Shipped; 6] = [
     Shipped {
         path: "config/auv.toml",
         role: Role::Auv,
@@ -39,6 +39,60 @@ const SHIPPED: [Shipped; 3] = [
         head: "# A rehearsal with every key at its default.\n\
                # scenecast sim --scenario config/scenarios/default.toml --out run\n",
         sets: &[],
+    },
+    Shipped {
+        path: "config/radio-auv.toml",
+        role: Role::Auv,
+        head: "# A vehicle at the surface with a radio or a network of 200 kbit/s in both directions at once, over UDP, which sends\n\
+               # labels of another program (dir:labels). For another rate, set modem.bit_rate and link.budget_bps alike, from 10 000\n\
+               # to 1 000 000; below 50 000, frames of 500 bytes keep orders and status prompt.\n\
+               # The other end: config/radio-asv.toml.\n",
+        sets: &[
+            "modem.kind=udp",
+            "modem.full_duplex=true",
+            "modem.listen=0.0.0.0:8461",
+            "modem.bit_rate=200000",
+            "modem.tx_watts=0",
+            "link.budget_bps=200000",
+            "link.frame_bytes=1000",
+            "link.status_period_s=1",
+            "labels.source=dir:labels",
+            "survey.area_m=[0, 0, 100, 60]",
+            "runtime.state_dir=state/auv",
+        ],
+    },
+    Shipped {
+        path: "config/radio-asv.toml",
+        role: Role::Asv,
+        head: "# The operator's end of the radio of config/radio-auv.toml. Set modem.connect to the vehicle's address.\n",
+        sets: &[
+            "modem.kind=udp",
+            "modem.full_duplex=true",
+            "modem.connect=127.0.0.1:8461",
+            "modem.bit_rate=200000",
+            "modem.tx_watts=0",
+            "link.budget_bps=200000",
+            "link.frame_bytes=1000",
+            "runtime.state_dir=state/asv",
+        ],
+    },
+    Shipped {
+        path: "config/scenarios/radio.toml",
+        role: Role::Scenario,
+        head: "# A rehearsal of the radio of config/radio-auv.toml, with a fifth of the frames lost.\n\
+               # scenecast sim --scenario config/scenarios/radio.toml --set labels.source=dir:FOLDER --out run\n",
+        sets: &[
+            "modem.kind=udp",
+            "modem.full_duplex=true",
+            "modem.tx_watts=0",
+            "link.budget_bps=200000",
+            "link.frame_bytes=1000",
+            "link.status_period_s=1",
+            "channel.bit_rate=200000",
+            "channel.range_m=10",
+            "channel.loss=0.2",
+            "channel.half_duplex=false",
+        ],
     },
 ];
 

@@ -19,7 +19,7 @@ pub mod state;
 mod tiles;
 mod truth;
 
-pub use export::{MapCells, MapFormat};
+pub use export::{CellLayer, MapCells, MapFormat};
 pub use http::{Console, ConsoleListener, PendingRequest, bind, gzip, page_files, start};
 pub use link_meter::LinkMeter;
 pub use request::{ClientRequest, Reply, SurfaceRequest, archived_cells, former_labels, handle_request};

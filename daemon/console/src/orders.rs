@@ -127,7 +127,7 @@ pub struct LabelOrder {
     /// The number of the label, 1 to 254.
     #[schemars(range(min = 1, max = 254))]
     pub label: u8,
-    /// Its name, at most 40 characters.
+    /// Its name, at most 60 characters.
     #[serde(default)]
     #[schemars(length(min = 1, max = 40))]
     pub name: Option<String>,

@@ -48,6 +48,8 @@ pub enum SurfaceRequest {
     /// Request an image of a label, or cancel the request.
     ExemplarOrder(u8, ExemplarOrder),
     Constraints(u8, Constraints),
+    /// Hold or continue, and leave an abort as it is.
+    Hold(u8, bool),
     Fence(u8, FenceOrder),
     Limits(u8, LimitsOrder),
     Areas(u8, AreasOrder),
@@ -90,9 +92,11 @@ impl SurfaceRequest {
             | Self::RemoveMarker(..)
             | Self::DismissEarlierMap(_) => Some(OrderKind::Record),
             Self::Constraints(_, order) if order.hold || order.abort => Some(OrderKind::Stop),
+            Self::Hold(_, true) => Some(OrderKind::Stop),
             Self::Utility(..)
             | Self::ExemplarOrder(..)
             | Self::Constraints(..)
+            | Self::Hold(..)
             | Self::Fence(..)
             | Self::Limits(..)
             | Self::Areas(..)
@@ -198,6 +202,10 @@ fn handle(surface: &mut Surface, request: SurfaceRequest, cell_m: f64, now: Inst
         SurfaceRequest::Constraints(id, order) => {
             let vehicle = known(surface, id)?;
             accepted(vehicle, SlotId::Constraints, surface.set_order(vehicle, order, now))
+        }
+        SurfaceRequest::Hold(id, hold) => {
+            let vehicle = known(surface, id)?;
+            accepted(vehicle, SlotId::Constraints, surface.change_hold(vehicle, hold, now))
         }
         SurfaceRequest::Fence(id, order) => {
             let vehicle = known(surface, id)?;
@@ -332,4 +340,15 @@ fn map(surface: &Surface, vehicle: Address, cell_m: f64, now: Instant) -> Option
         tiles: surface.map_tiles(vehicle)?,
         layers: layers::layers(&surface.map_layers(vehicle)),
     }))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_hold_needs_no_command_and_its_end_does() {
+        assert_eq!(SurfaceRequest::Hold(1, true).order_kind(), Some(OrderKind::Stop));
+        assert_eq!(SurfaceRequest::Hold(1, false).order_kind(), Some(OrderKind::Order));
+    }
 }

@@ -2,12 +2,20 @@
 //!
 //! Internal to scenecast. The crate reads and writes files; it uses no clock and no network.
 
+mod bag;
+mod configured;
+mod frame_image;
 mod images;
+mod label_folder;
 mod recording;
 mod vocabulary;
 mod whole;
 
+pub use bag::{Bag, BagTiming, BagTopics};
+pub use configured::{configured_mounting, configured_recording, open_bag};
+pub use frame_image::FrameImage;
 pub use images::{read_classes, read_image};
+pub use label_folder::{FolderItem, LabelFolder};
 pub use recording::{RecordedFrame, Recorder, Recording, write_poses};
 pub use vocabulary::{configured_vocabulary, read_vocabulary};
 pub use whole::{sync_folder, write_whole};

@@ -1,5 +1,6 @@
 //! Recorded missions: images with their poses.
 
+use crate::frame_image::FrameImage;
 use image::RgbImage;
 use scenecast_core::Area;
 use scenecast_core::UserError;
@@ -11,7 +12,7 @@ use std::path::{Component, Path, PathBuf};
 #[derive(Debug, Clone, PartialEq)]
 pub struct RecordedFrame {
     pub t_s: f64,
-    pub file: PathBuf,
+    pub image: FrameImage,
     /// Where the camera believed to be: metres east and north.
     pub x_m: f64,
     pub y_m: f64,
@@ -21,12 +22,6 @@ pub struct RecordedFrame {
     pub heading_rad: f64,
     /// Size of the image's pixels on the sea floor, in those of the camera's usual ones.
     pub scale: f64,
-}
-
-impl RecordedFrame {
-    pub fn image(&self) -> Result<RgbImage, UserError> {
-        Ok(crate::read_image(&self.file)?.to_rgb8())
-    }
 }
 
 /// A folder with images and a table of their poses, in order of time: `poses.csv`, or the only `poses*.csv`.
@@ -40,6 +35,8 @@ impl RecordedFrame {
 pub struct Recording {
     /// The frames, in order of time.
     pub frames: Vec<RecordedFrame>,
+    /// What of the recording is not among the frames, for people.
+    pub notes: Vec<String>,
 }
 
 /// Largest table, for about ten million frames, bytes.
@@ -87,7 +84,7 @@ impl Recording {
         // The table gives the time of the day, not the mission's.
         let began_s = if in_pixels { frames[0].t_s } else { 0.0 };
         frames.iter_mut().for_each(|frame| frame.t_s -= began_s);
-        Ok(Self { frames })
+        Ok(Self { frames, notes: Vec::new() })
     }
 
     /// Limits of the places in the recording.
@@ -169,7 +166,7 @@ fn of_metres(dir: &Path, row: PoseRow<'_>) -> Result<RecordedFrame, String> {
     }
     Ok(RecordedFrame {
         t_s,
-        file: row.file(dir)?,
+        image: FrameImage::File(row.file(dir)?),
         x_m: row.number("x_m")?,
         y_m: row.number("y_m")?,
         depth_m: row.depth_m()?,
@@ -190,7 +187,7 @@ fn of_mosaic(dir: &Path, row: PoseRow<'_>, metres_per_pixel: f64) -> Result<Reco
     }
     Ok(RecordedFrame {
         t_s,
-        file: row.file(dir)?,
+        image: FrameImage::File(row.file(dir)?),
         x_m: row.number("x_px")? * metres_per_pixel,
         y_m: -row.number("y_px")? * metres_per_pixel,
         depth_m: 0.0,
@@ -239,7 +236,8 @@ pub fn write_poses(path: &Path, dir: &Path, frames: &[RecordedFrame]) -> Result<
     let failed = |e: csv::Error| UserError::Failed(format!("{}: {e}", path.display()));
     writer.write_record(METRE_COLUMNS.iter().chain(&["scale"])).map_err(failed)?;
     for frame in frames {
-        let file = frame.file.strip_prefix(dir).unwrap_or(&frame.file).to_string_lossy().into_owned();
+        let file = frame.image.file().map(|file| file.strip_prefix(dir).unwrap_or(file));
+        let file = file.map_or(frame.image.to_string(), |file| file.to_string_lossy().into_owned());
         let numbers =
             [frame.x_m, frame.y_m, frame.depth_m, frame.heading_rad.to_degrees().rem_euclid(360.0), frame.scale];
         let row = [frame.t_s.to_string(), file].into_iter().chain(numbers.map(|number| number.to_string()));
@@ -311,12 +309,12 @@ mod tests {
         let text = "t_s,file,x_m,y_m,depth_m,heading_deg\n0,a.png,1,2,3,90\n1.5,\"sub/b, c.png\",-1,2.25,3,350\n";
         let mut recording = open("written", "poses.csv", text).unwrap();
         recording.frames[1].scale = 1.02;
-        let dir = recording.frames[0].file.parent().unwrap().to_owned();
+        let dir = recording.frames[0].image.file().unwrap().parent().unwrap().to_owned();
         let table = dir.join("placed.csv");
         write_poses(&table, &dir, &recording.frames).unwrap();
         let read = Recording::open(&dir, Some(&table), 0.5).unwrap();
         for (read, written) in read.frames.iter().zip(&recording.frames) {
-            assert_eq!((&read.file, read.t_s, read.scale), (&written.file, written.t_s, written.scale));
+            assert_eq!((&read.image, read.t_s, read.scale), (&written.image, written.t_s, written.scale));
             assert!((read.x_m, read.y_m, read.depth_m) == (written.x_m, written.y_m, written.depth_m));
             assert!((read.heading_rad - written.heading_rad).abs() < 1e-12);
         }
@@ -329,7 +327,7 @@ mod tests {
     fn columns_are_found_by_name_and_fields_may_be_quoted() {
         let text = "\u{feff}heading_deg, file ,note,x_m,y_m,depth_m,t_s\r\n90,\"reef, east.png\",\"\",1,2,3,4.5\r\n";
         let frames = open("names", "poses.csv", text).unwrap().frames;
-        assert!(frames[0].file.ends_with("reef, east.png"), "{:?}", frames[0].file);
+        assert!(frames[0].image.file().unwrap().ends_with("reef, east.png"), "{}", frames[0].image);
         assert_eq!((frames[0].t_s, frames[0].x_m, frames[0].y_m, frames[0].depth_m), (4.5, 1.0, 2.0, 3.0));
         let missing = open("missing", "poses.csv", "t_s,file,x_m,y_m\n0,a.png,1,2\n").unwrap_err().to_string();
         assert!(missing.contains("poses.csv:1: no column depth_m"), "{missing}");

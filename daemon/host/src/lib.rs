@@ -30,4 +30,4 @@ pub use link_host::{FrameEvent, FrameOutcome, LinkHost, channel_station, modem_s
 pub use pilot::PilotEvent;
 #[cfg(feature = "surface")]
 pub use surface::{Follower, SurfaceHost, SurfaceHostEvent};
-pub use vehicle::{CameraPose, VehicleHost, VehicleHostEvent, VehiclePilot};
+pub use vehicle::{CameraPose, MeasuredPose, VehicleHost, VehicleHostEvent, VehiclePilot};

@@ -49,6 +49,11 @@ impl Pilot {
         self.collect(now);
     }
 
+    /// As of its last message or timeout.
+    pub(crate) fn health(&self) -> Health {
+        self.health
+    }
+
     pub(crate) fn poll_event(&mut self) -> Option<PilotEvent> {
         self.events.pop_front()
     }

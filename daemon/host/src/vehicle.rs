@@ -3,15 +3,16 @@
 use crate::link_host::{FrameEvent, LinkHost};
 use crate::pilot::{Pilot, PilotEvent};
 use scenecast_core::TangentPlane;
-use scenecast_drivers::autopilot::{Autopilot, Goal};
+use scenecast_drivers::autopilot::{Autopilot, Counters, Goal, Health, Step};
 use scenecast_drivers::modem::Station;
 use scenecast_protocol::coordinates::MapPoint;
 use scenecast_protocol::directive::{Budget, Fix, Settings};
 use scenecast_protocol::time::Instant;
 use scenecast_vehicle::{
-    AppliedSlot, MapUpdate, RegisteredFrame, SharedExemplars, Vehicle, VehicleDisk, VehicleOutput,
+    AppliedSlot, ForeignUpdate, MapUpdate, RegisteredFrame, SharedExemplars, Vehicle, VehicleDisk, VehicleOutput,
 };
 use std::collections::VecDeque;
+use std::time::Duration;
 
 /// Maximum age of a fix that is given to the autopilot, seconds.
 const MAX_FIX_AGE_S: f64 = 60.0;
@@ -49,6 +50,20 @@ pub struct CameraPose {
     pub depth_m: f64,
 }
 
+/// What an autopilot measured last.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MeasuredPose {
+    pub pose: CameraPose,
+    /// Rotation about the forward axis, starboard down, radians.
+    pub roll_rad: f64,
+    /// Rotation about the starboard axis, bow up, radians.
+    pub pitch_rad: f64,
+    /// Height above the sea floor, metres, where it is measured.
+    pub altitude_m: Option<f64>,
+    /// Time of the measurement.
+    pub at: Instant,
+}
+
 /// A vehicle's autopilot with the data for its goals.
 pub struct VehiclePilot {
     pilot: Pilot,
@@ -58,26 +73,51 @@ pub struct VehiclePilot {
     depth_m: f64,
     /// Whether the vehicle is surfacing at its position.
     is_rising: bool,
+    /// Whether its odometry is the vehicle's.
+    measures: bool,
+    /// Whether the source that measures the pose in its place is silent: it then holds its position.
+    is_blind: bool,
+    /// The last stretch of way, and when it came in.
+    last_step: Option<(Step, Instant)>,
 }
 
 impl VehiclePilot {
     /// An autopilot for a survey at `depth_m` metres.
     pub fn new(autopilot: Box<dyn Autopilot>, plane: Option<TangentPlane>, depth_m: f64, now: Instant) -> Self {
-        Self { pilot: Pilot::new(autopilot, now), plane, depth_m, is_rising: false }
+        Self {
+            pilot: Pilot::new(autopilot, now),
+            plane,
+            depth_m,
+            is_rising: false,
+            measures: true,
+            is_blind: false,
+            last_step: None,
+        }
+    }
+
+    /// Whether the autopilot's odometry counts; otherwise another source gives the vehicle's pose.
+    #[must_use]
+    pub fn measuring(mut self, measures: bool) -> Self {
+        self.measures = measures;
+        self
     }
 
     /// Gives the autopilot's odometry to the vehicle, and the vehicle's goal to the autopilot.
     fn fly(&mut self, vehicle: &mut Vehicle, now: Instant) {
         let autopilot = &mut self.pilot.autopilot;
         while let Some(step) = autopilot.poll_step() {
+            if !self.measures {
+                continue;
+            }
             vehicle.handle_odometry(step.dx_m, step.dy_m, step.heading_rad, step.depth_m, now);
             vehicle.handle_unmeasured(step.unseen);
+            self.last_step = Some((step, now));
         }
-        vehicle.set_autopilot_silent(autopilot.health(now).is_silent());
+        vehicle.set_autopilot_silent(self.is_blind || autopilot.health(now).is_silent());
         let navigator = vehicle.navigator();
         let (x, y) = navigator.position().xy();
         let (world_x, world_y) = navigator.world().xy();
-        let goal = vehicle.waypoint().map(|to| {
+        let goal = vehicle.waypoint().filter(|_| !self.is_blind).map(|to| {
             let (east_m, north_m) = (to.x_m - x, to.y_m - y);
             let place = self.plane.map(|plane| plane.to_place(world_x + east_m, world_y + north_m));
             Goal { east_m, north_m, depth_m: Some(self.depth_m), place }
@@ -174,9 +214,24 @@ impl VehicleHost {
         self.link.end_mut().handle_odometry(dx_m, dy_m, heading_rad, depth_m, now);
     }
 
-    /// Takes the pose of a recording, for a vehicle without an autopilot.
+    /// No pose came in from the navigation source for `unseen` since the last call; `None` while poses come in. The
+    /// autopilot holds its position meanwhile, since a goal relative to an old pose would lead anywhere.
+    pub fn handle_pose_gap(&mut self, unseen: Option<Duration>) {
+        if let Some(pilot) = &mut self.pilot {
+            pilot.is_blind = unseen.is_some();
+        }
+        if let Some(unseen) = unseen {
+            self.link.end_mut().handle_unmeasured(unseen);
+        }
+    }
+
+    fn is_measured_by_pilot(&self) -> bool {
+        self.pilot.as_ref().is_some_and(|pilot| pilot.measures)
+    }
+
+    /// Takes the pose of a recording or of a navigation source, unless an autopilot measures it.
     pub fn handle_pose(&mut self, pose: CameraPose, now: Instant) {
-        if self.pilot.is_none() {
+        if !self.is_measured_by_pilot() {
             self.link.end_mut().set_pose(pose.x_m, pose.y_m, pose.heading_rad, pose.depth_m, now);
         }
     }
@@ -189,9 +244,36 @@ impl VehicleHost {
     /// A camera frame is given to the mapper. Returns its pose: that of the autopilot, or else `recorded`.
     pub fn handle_camera(&mut self, recorded: CameraPose) -> CameraPose {
         self.mapper.outstanding += 1;
-        if self.pilot.is_none() {
+        if !self.is_measured_by_pilot() {
             return recorded;
         }
+        self.dead_reckoned_pose()
+    }
+
+    /// A frame of a live camera, whose pose is that of its own time, is given to the mapper.
+    pub fn handle_matched_camera(&mut self) {
+        self.mapper.outstanding += 1;
+    }
+
+    /// Frames that the mapper has not reported on yet.
+    pub fn frames_in_mapper(&self) -> u32 {
+        self.mapper.outstanding
+    }
+
+    /// The vehicle's pose by the last report of its autopilot; `None` if there is none yet, or if another source measures the
+    /// pose.
+    pub fn measured_pose(&self) -> Option<MeasuredPose> {
+        let (Step { roll_rad, pitch_rad, altitude_m, .. }, at) = self.pilot.as_ref()?.last_step?;
+        Some(MeasuredPose { pose: self.dead_reckoned_pose(), roll_rad, pitch_rad, altitude_m, at })
+    }
+
+    /// State and counters of the autopilot, if there is one.
+    pub fn autopilot(&self) -> Option<(Health, Counters)> {
+        let pilot = &self.pilot.as_ref()?.pilot;
+        Some((pilot.health(), pilot.autopilot.counters()))
+    }
+
+    fn dead_reckoned_pose(&self) -> CameraPose {
         let navigator = self.vehicle().navigator();
         let (x_m, y_m) = navigator.dead_reckoned().xy();
         CameraPose { x_m, y_m, heading_rad: navigator.heading_rad(), depth_m: navigator.depth_m() }
@@ -238,6 +320,11 @@ impl VehicleHost {
     /// Takes a new map of the mapper.
     pub fn handle_map(&mut self, update: &MapUpdate, now: Instant) {
         self.link.end_mut().handle_map(update, now);
+    }
+
+    /// Takes a new map of another program. Returns the label whose name is refused, because it has another one already.
+    pub fn handle_foreign(&mut self, update: &ForeignUpdate, now: Instant) -> Option<u8> {
+        self.link.end_mut().handle_foreign(update, now)
     }
 
     /// Takes the mapper's exemplars of each label, the best first.

@@ -78,7 +78,7 @@ fn scene(m: &Mission) -> Value {
     let mi = m.mutual_information(m.vehicle().map());
     let operator = m.mutual_information(&m.operator_map());
     json!({
-        "cells": m.mapper.cells(),
+        "cells": if m.has_foreign_labels() { m.vehicle().map().explored() } else { m.mapper.cells() },
         "words": m.mapper.words(),
         "labels": m.logbook.update.as_ref().map_or(0, |u| u.labels),
         "perplexity": round(m.mapper.perplexity()),

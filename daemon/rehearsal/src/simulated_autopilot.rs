@@ -51,7 +51,7 @@ impl Autopilot for SimulatedAutopilot {
             self.next = self.next + Duration::from_secs_f64(Self::STEP_S);
             let o = self.motion.step_on(Self::STEP_S);
             let (dx_m, dy_m, heading_rad, depth_m) = (o.dx_m, o.dy_m, o.heading_rad, self.depth_m);
-            self.tray.walk(Step { dx_m, dy_m, heading_rad, depth_m, unseen: Duration::ZERO });
+            self.tray.walk(Step { dx_m, dy_m, heading_rad, depth_m, ..Step::default() });
         }
     }
 

@@ -26,6 +26,16 @@ impl Clock {
         self.start + self.began.elapsed().mul_f64(self.scale)
     }
 
+    /// Mission time for each unit of wall time.
+    pub fn scale(&self) -> f64 {
+        self.scale
+    }
+
+    /// The mission time of a moment; `None` before the clock began.
+    pub fn at(&self, moment: std::time::Instant) -> Option<Instant> {
+        Some(self.start + moment.checked_duration_since(self.began)?.mul_f64(self.scale))
+    }
+
     /// The wall time of a mission time.
     pub fn wall(&self, at: Instant) -> tokio::time::Instant {
         tokio::time::Instant::from_std(self.began + at.since(self.start).div_f64(self.scale))

@@ -1,5 +1,6 @@
 //! The tokio shells around the hosts: they move bytes, read the clock and write files.
 
+mod camera;
 mod checkpoint;
 mod clock;
 mod disk_space;
@@ -11,6 +12,7 @@ mod instruments;
 mod journal;
 #[cfg(test)]
 mod kept_label_tests;
+mod labels;
 #[cfg(feature = "surface")]
 mod map_files;
 mod mapping;
@@ -24,6 +26,7 @@ mod power_cut_tests;
 mod refusing_disk_tests;
 mod reload;
 mod restore;
+mod ros2;
 mod stop;
 #[cfg(feature = "surface")]
 mod store;

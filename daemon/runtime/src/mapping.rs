@@ -1,20 +1,19 @@
-//! The scene model's own thread, fed by a recorded camera.
+//! The scene model's own thread, fed by the camera.
 
 use super::checkpoint::CheckpointFile;
-use super::clock::Clock;
 use super::journal::Folder;
+use crate::camera::CameraFrame;
 use scene_model::project::Pose;
 use scenecast_core::UserError;
-use scenecast_files::{RecordedFrame, Recording};
 use scenecast_protocol::directive::Settings;
-use scenecast_vehicle::{MapUpdate, Mapper, RegisteredFrame, SharedExemplars};
+use scenecast_vehicle::{MapProducer, MapUpdate, Mapper, RegisteredFrame, SharedExemplars};
 use std::thread::JoinHandle;
 use tokio::sync::mpsc;
 
 /// A request to the mapper's thread.
 pub(super) enum ToMapper {
     Tune(Settings),
-    Frame(Box<RecordedFrame>),
+    Frame(Box<CameraFrame>),
     Keep,
 }
 
@@ -31,7 +30,7 @@ pub(super) enum FromMapper {
 /// The mapper's results after a camera frame.
 pub(super) struct Mapped {
     /// `None` at the start, when the map is that of a checkpoint.
-    pub(super) frame: Option<RecordedFrame>,
+    pub(super) frame: Option<CameraFrame>,
     /// The place of a frame that was mapped.
     pub(super) registered: Option<RegisteredFrame>,
     pub(super) update: MapUpdate,
@@ -78,7 +77,7 @@ pub(super) struct Keep {
 
 impl Keep {
     /// Keeps a checkpoint if one is due. A failing disk does not end the mission: the previous checkpoint stays.
-    fn keep(&mut self, mapper: &Mapper, is_due: impl Fn(f64) -> bool) {
+    fn keep(&mut self, mapper: &impl MapProducer, is_due: impl Fn(f64) -> bool) {
         let Some(now_s) = mapper.last_s().filter(|_| self.every_s > 0.0) else { return };
         if !is_due(self.last_s.map_or(f64::INFINITY, |last_s| (now_s - last_s).abs())) {
             return;
@@ -98,14 +97,14 @@ impl Keep {
         }
     }
 
-    fn keep_if_due(&mut self, mapper: &Mapper) {
+    pub(super) fn keep_if_due(&mut self, mapper: &impl MapProducer) {
         let every_s = self.every_s;
         // The interval begins at the first frame, whose map is not worth a checkpoint of its own.
         self.last_s = self.last_s.or(mapper.last_s());
         self.keep(mapper, |since_s| since_s >= every_s);
     }
 
-    fn keep_now(&mut self, mapper: &Mapper) {
+    pub(super) fn keep_now(&mut self, mapper: &impl MapProducer) {
         self.keep(mapper, |since_s| since_s > 0.0);
     }
 }
@@ -159,16 +158,17 @@ impl Work {
     }
 
     /// Sends the map as it is, without a new frame in it.
-    fn report_current(&mut self, frame: Option<RecordedFrame>) -> bool {
+    fn report_current(&mut self, frame: Option<CameraFrame>) -> bool {
         let update = self.mapper.current();
         let mapped = self.mapped(frame, None, update);
         self.report(FromMapper::Mapped(Box::new(mapped)))
     }
 
-    fn see(&mut self, frame: RecordedFrame) -> FromMapper {
-        match frame.image() {
+    fn see(&mut self, mut frame: CameraFrame) -> FromMapper {
+        match frame.take_image() {
             Ok(image) => {
-                let pose = Pose { x: frame.x_m, y: frame.y_m, z: -frame.depth_m, yaw_rad: -frame.heading_rad };
+                let at = &frame.pose;
+                let pose = Pose { x: at.x_m, y: at.y_m, z: -at.depth_m, yaw_rad: -at.heading_rad };
                 let placed = self.mapper.register(&image, &pose, frame.scale);
                 let update = self.mapper.handle_frame(&image, &placed.pose, placed.scale, frame.t_s);
                 FromMapper::Mapped(Box::new(self.mapped(Some(frame), Some(placed), update)))
@@ -177,55 +177,8 @@ impl Work {
         }
     }
 
-    fn mapped(
-        &mut self,
-        frame: Option<RecordedFrame>,
-        registered: Option<RegisteredFrame>,
-        update: MapUpdate,
-    ) -> Mapped {
+    fn mapped(&mut self, frame: Option<CameraFrame>, registered: Option<RegisteredFrame>, update: MapUpdate) -> Mapped {
         Mapped { frame, registered, update, exemplars: self.mapper.shared_exemplars() }
-    }
-}
-
-/// The frames of the camera in order, each at its time; no frames without a camera.
-pub(super) struct Camera {
-    frames: std::iter::Peekable<std::vec::IntoIter<RecordedFrame>>,
-    clock: Clock,
-    /// Mission time at which this run's clock began.
-    began_s: f64,
-}
-
-impl Camera {
-    /// A camera that plays a recording, if there is one. Playback resumes after the frame of `seen_s`, the
-    /// last one in the checkpoint.
-    pub(super) fn new(recording: Option<Recording>, clock: Clock, seen_s: Option<f64>) -> Self {
-        let mut frames = recording.map(|r| r.frames).unwrap_or_default();
-        let mapped = seen_s.and_then(|t_s| frames.iter().rposition(|frame| frame.t_s == t_s));
-        let began_s = match mapped {
-            Some(index) => frames.drain(..=index).next_back().map_or(0.0, |frame| frame.t_s),
-            None => 0.0,
-        };
-        Self { frames: frames.into_iter().peekable(), clock, began_s }
-    }
-
-    /// Whether the recording has ended.
-    pub(super) fn is_over(&mut self) -> bool {
-        self.frames.peek().is_none()
-    }
-
-    /// Waits until the next frame is due and returns it; never returns after the last one.
-    pub(super) async fn next(&mut self) -> RecordedFrame {
-        match self.frames.peek() {
-            Some(frame) => {
-                let at = scenecast_protocol::time::Instant::from_secs_f64((frame.t_s - self.began_s).max(0.0));
-                tokio::time::sleep_until(self.clock.wall(at)).await;
-            }
-            None => std::future::pending().await,
-        }
-        match self.frames.next() {
-            Some(frame) => frame,
-            None => std::future::pending().await,
-        }
     }
 }
 
@@ -233,6 +186,7 @@ impl Camera {
 mod tests {
     use super::*;
     use image::{Rgb, RgbImage};
+    use scenecast_files::{FrameImage, RecordedFrame};
 
     #[test]
     fn refused_checkpoints_are_reported_until_one_is_written() {
@@ -248,8 +202,9 @@ mod tests {
         let mut thread = MapperThread::start(mapper, keep).unwrap();
         let mut reports = |t_s: f64| {
             let (x_m, y_m, depth_m, heading_rad, scale) = (0.0, 0.0, 4.0, 0.0, 1.0);
-            let frame = RecordedFrame { t_s, file: image.clone(), x_m, y_m, depth_m, heading_rad, scale };
-            assert!(thread.orders.send(ToMapper::Frame(Box::new(frame))).is_ok());
+            let shot = FrameImage::File(image.clone());
+            let frame = RecordedFrame { t_s, image: shot, x_m, y_m, depth_m, heading_rad, scale };
+            assert!(thread.orders.send(ToMapper::Frame(Box::new(frame.into()))).is_ok());
             let mut reports: Vec<bool> = Vec::new();
             loop {
                 match thread.mapped.blocking_recv().unwrap() {

@@ -3,11 +3,12 @@
 use super::checkpoint::CheckpointFile;
 use super::durable::{Keeper, StartedRun};
 use super::journal::Folder;
+use super::labels;
 use super::mapping::Keep;
-use scenecast_config::Config;
+use scenecast_config::{Config, LabelSource};
 use scenecast_core::UserError;
 use scenecast_files::configured_vocabulary;
-use scenecast_vehicle::{Mapper, RestoreError, Restored};
+use scenecast_vehicle::{ForeignMap, MapProducer, Mapper, RestoreError, Restored};
 use std::path::Path;
 
 /// The state at the start of a run.
@@ -15,6 +16,8 @@ pub(super) struct Start {
     pub(super) run: StartedRun<Folder>,
     pub(super) mapper: Mapper,
     pub(super) keep: Keep,
+    /// The map of another program, in place of the scene model's.
+    pub(super) labels: Option<(ForeignMap, Keep)>,
 }
 
 /// Begins a run in the folder of its state.
@@ -25,6 +28,9 @@ pub(super) fn start(config: &Config, dir: &Path) -> Result<Start, UserError> {
     let refused = |e: std::io::Error| UserError::file(dir, e);
     let folder = Folder::hold_when_there(dir).map_err(refused)?;
     let file = CheckpointFile::new(folder.clone());
+    if config.labels.source != LabelSource::SceneModel {
+        return start_labels(config, folder);
+    }
     let restored = if config.scene.checkpoint_s > 0.0 { restore(config, &file)? } else { None };
     let claim = restored.as_ref().map(|restored| (restored.lineage, restored.mapper.epoch()));
     let run = Keeper::begin_run(folder, super::random_bits(), claim)?;
@@ -53,7 +59,34 @@ pub(super) fn start(config: &Config, dir: &Path) -> Result<Start, UserError> {
     };
     let last_s = mapper.last_s();
     let keep = Keep { file, lineage: durable.lineage, every_s: config.scene.checkpoint_s, last_s, is_refused: false };
-    Ok(Start { run, mapper, keep })
+    Ok(Start { run, mapper, keep, labels: None })
+}
+
+/// Begins a run with the labels of another program. The scene model stays empty.
+fn start_labels(config: &Config, folder: Folder) -> Result<Start, UserError> {
+    let file = CheckpointFile::of_labels(folder.clone());
+    let every_s = config.scene.checkpoint_s;
+    let restored = (every_s > 0.0).then(|| labels::restore(config, &file)).flatten();
+    let claim = restored.as_ref().map(|(map, lineage)| (*lineage, map.epoch()));
+    let run = Keeper::begin_run(folder.clone(), super::random_bits(), claim)?;
+    let (lineage, epoch, seed) = (run.durable.lineage, run.durable.epoch, config.runtime.seed);
+    let map = match restored {
+        Some((mut map, of)) if of == lineage => {
+            map.resume(epoch, run.durable.labels);
+            tracing::info!("the labels resume from their checkpoint: {} cells, epoch {epoch}", map.labels().explored());
+            map
+        }
+        other => {
+            if other.is_some() {
+                tracing::warn!("the checkpoint of the labels is of another mission: they start from scratch");
+            }
+            ForeignMap::new(config, epoch)
+        }
+    };
+    let keep = Keep { file, lineage, every_s, last_s: map.last_s(), is_refused: false };
+    let unused = Keep { file: CheckpointFile::new(folder), lineage, every_s: 0.0, last_s: None, is_refused: false };
+    let mapper = Mapper::new(config, None, epoch, seed)?;
+    Ok(Start { run, mapper, keep: unused, labels: Some((map, keep)) })
 }
 
 fn restore(config: &Config, file: &CheckpointFile<Folder>) -> Result<Option<Restored>, UserError> {

@@ -6,6 +6,7 @@ use super::map_files::{MapFile, MapFiles};
 use super::missing_key::warn_without_key;
 use super::modem::{self, ModemPort};
 use super::pilot::{self, PilotPort, SimulatedAutopilot};
+use super::ros2::SurfaceRos2;
 use super::stop::Stop;
 use super::store::{ArchivedFile, SurfaceFiles};
 use crate::port::FromPort;
@@ -55,6 +56,7 @@ pub fn run_surface(config: Config, simulated: Option<SimulatedAutopilot>) -> Res
         )?;
         // Files that do not end, such as a pipe for a key, are read above: until there a signal ends the program at once.
         let stop = Stop::new()?;
+        let ros2 = SurfaceRos2::start(&config, &mut principals)?;
         surface.set_principals(principals);
         if let Some(relay) = relay(&config) {
             surface.set_relay(relay);
@@ -81,7 +83,7 @@ pub fn run_surface(config: Config, simulated: Option<SimulatedAutopilot>) -> Res
         let host = SurfaceHost::new(surface, modem_station(&config, Address::SURFACE, profile)?, follower);
         let maps = MapFiles::start(config.runtime.state_dir.clone());
         let (is_stale, reading) = (true, Arc::default());
-        SurfaceShell { host, ports, console, clock, files, maps, facts, meter, reading, is_stale }.run(stop).await
+        SurfaceShell { host, ports, console, ros2, clock, files, maps, facts, meter, reading, is_stale }.run(stop).await
     })
 }
 
@@ -96,6 +98,7 @@ struct SurfaceShell {
     host: SurfaceHost,
     ports: Ports,
     console: Option<Console>,
+    ros2: SurfaceRos2,
     clock: Clock,
     files: SurfaceFiles,
     maps: MapFiles,
@@ -141,6 +144,7 @@ impl SurfaceShell {
                 }
                 report = self.ports.pilot.next() => self.handle_pilot(report),
                 (request, reply) = next_request(&mut self.console) => self.handle_request(request, reply),
+                (request, reply) = self.ros2.next_request() => self.handle_request(request, reply),
             }
             self.host.handle_timeout(self.clock.now());
         }
@@ -192,16 +196,20 @@ impl SurfaceShell {
         });
     }
 
-    /// Shows the state on the page, after it was made durable.
+    /// Shows the state on the page and to ROS 2, after it was made durable.
     fn publish(&mut self) {
         let now = self.clock.now();
         self.files.commit(self.host.surface_mut(), None, now);
         self.is_stale = false;
-        if let Some(console) = &self.console {
-            self.meter.handle_budgets(self.host.surface());
-            let snapshot = snapshot(self.host.surface(), &self.facts, &self.meter, now);
-            console.snapshots.send_replace(Arc::new(snapshot));
+        if self.console.is_none() && !self.ros2.is_on() {
+            return;
         }
+        self.meter.handle_budgets(self.host.surface());
+        let snapshot = Arc::new(snapshot(self.host.surface(), &self.facts, &self.meter, now));
+        if let Some(console) = &self.console {
+            console.snapshots.send_replace(snapshot.clone());
+        }
+        self.ros2.publish(snapshot);
     }
 
     /// Acts on every event of the host and writes the bytes for the ports. Returns whether the

@@ -4,24 +4,32 @@ use super::clock::Clock;
 use super::disk_space::DiskWatch;
 use super::durable::{Keeper, StartedRun};
 use super::journal::Folder;
-use super::mapping::{Camera, FromMapper, Mapped, MapperThread, ToMapper};
+use super::labels::{Feed, FromLabels, LabelThread, move_the_vehicle};
+use super::mapping::{FromMapper, Mapped, MapperThread, ToMapper};
 use super::missing_key::warn_without_key;
 use super::modem::{self, ModemPort};
 use super::pilot::{self, PilotPort, SimulatedAutopilot};
 use super::reload::{Load, Reload};
 use super::restore::{Start, start};
+use super::ros2::{RosSensors, VehicleRos2};
 use super::stop::Stop;
+use crate::camera::{Camera, CameraFrame, LiveCamera, RecordedCamera};
 use crate::port::FromPort;
-use scenecast_config::{AutopilotKind, CameraSource, Config, survey_depth_m};
+use scenecast_config::{AutopilotKind, Config, NavigationSource, survey_depth_m};
 use scenecast_core::{Area, TangentPlane, UserError};
-use scenecast_files::{RecordedFrame, Recording};
+use scenecast_files::{Recording, configured_recording};
 use scenecast_host::{CameraPose, VehicleHost, VehicleHostEvent, VehiclePilot, modem_station};
+use scenecast_labels::ImagePose;
 use scenecast_protocol::directive::Budget;
 use scenecast_protocol::map::LayerSet;
+use scenecast_vehicle::ForeignUpdate;
 use std::time::Duration;
 
 /// Maximum time between two calls of the host.
 const MAX_SLEEP: Duration = Duration::from_secs(1);
+
+/// Mission time that is assumed to pass between two runs of a live camera, seconds.
+const RESTART_S: f64 = 2.0;
 
 /// Runs the vehicle until it is interrupted; on SIGHUP it calls `load` for a new budget and new shares.
 pub fn run_vehicle(load: Load, simulated: Option<SimulatedAutopilot>) -> Result<(), UserError> {
@@ -29,15 +37,15 @@ pub fn run_vehicle(load: Load, simulated: Option<SimulatedAutopilot>) -> Result<
         let config = load()?;
         warn_without_key(&config);
         let dir = config.runtime.state_dir.as_path();
-        let Start { run, mut mapper, keep } = start(&config, dir)?;
+        let Start { run, mut mapper, keep, labels } = start(&config, dir)?;
         let StartedRun { keeper, durable, is_again, is_stored } = run;
         let clock = Clock::new(config.runtime.time_scale);
         let address = scenecast_config::vehicle_address(&config)?;
         let profile = scenecast_drivers::modem::modem_of_process(&config, address)?;
-        let recording = match &config.camera.source {
-            CameraSource::Rehearsal => None,
-            CameraSource::Frames(dir) => Some(Recording::open(dir, None, config.camera.metres_per_pixel)?),
-        };
+        let recording = configured_recording(&config)?;
+        for note in recording.iter().flat_map(|recording| &recording.notes) {
+            tracing::warn!("camera.source: {note}");
+        }
         let area = survey_area(&config, recording.as_ref())?;
         let mut vehicle = scenecast_vehicle::assemble(
             &config,
@@ -57,26 +65,48 @@ pub fn run_vehicle(load: Load, simulated: Option<SimulatedAutopilot>) -> Result<
             vehicle.assume_start_refused(clock.now());
         }
         let is_recorded = recording.is_some();
-        let mut camera = Camera::new(recording, clock, mapper.last_s());
+        // Without a camera, poses of a navigation source move the vehicle.
+        let is_live = config.camera.source.is_live()
+            || !is_recorded && matches!(config.navigation.source, NavigationSource::Dvl(_) | NavigationSource::Ros2(_));
+        let camera = match is_live {
+            // The time since the end of the former run is unknown.
+            true => Camera::Live(Box::new(LiveCamera::start(
+                &config,
+                mapper.last_s().map_or(0.0, |s| s + RESTART_S),
+                &RosSensors::new(&config)?,
+            )?)),
+            false => Camera::Recorded(RecordedCamera::new(recording, clock, mapper.last_s())),
+        };
         mapper.tune(vehicle.settings());
         if config.autopilot.kind != AutopilotKind::None {
             // The odometry of an autopilot starts again with each run.
             mapper.handle_gap();
         }
         let mapper = MapperThread::start(mapper, keep)?;
+        let labels = labels.map(|(map, keep)| {
+            let feed = Feed::open(&config, map.mark())?;
+            LabelThread::start(map, feed, keep, clock)
+        });
+        let labels = labels.transpose()?;
         let modem = ModemPort::open(&config, clock.now()).await?;
         let station = modem_station(&config, address, profile)?;
         let reload = Reload::new(load)?;
         let autopilot = pilot::autopilot(&config, simulated, clock.now())?;
         let ports = Ports { modem, pilot: PilotPort::open(&config, autopilot.is_some()) };
         let plane = config.mission.origin_deg.map(TangentPlane::new);
-        let pilot = autopilot.map(|a| VehiclePilot::new(a, plane, survey_depth_m(&config), clock.now()));
+        let measures = config.navigation.source == NavigationSource::Autopilot;
+        let depth_m = survey_depth_m(&config);
+        let pilot = autopilot.map(|a| VehiclePilot::new(a, plane, depth_m, clock.now()).measuring(measures));
         let mut host = VehicleHost::new(vehicle, station, pilot);
         if is_recorded && camera.is_over() {
             host.handle_camera_end();
         }
         let disk = DiskWatch::new(dir);
-        VehicleShell { host, camera, mapper, ports, clock, keeper, disk, reload, missed: 0 }.run(stop).await
+        let ros2 = VehicleRos2::start(&config)?;
+        let labels_move = move_the_vehicle(&config);
+        VehicleShell { host, camera, mapper, labels, labels_move, ports, ros2, clock, keeper, disk, reload, missed: 0 }
+            .run(stop)
+            .await
     })
 }
 
@@ -96,7 +126,12 @@ struct VehicleShell {
     host: VehicleHost,
     camera: Camera,
     mapper: MapperThread,
+    /// Labels of another program, in place of the scene model's.
+    labels: Option<LabelThread>,
+    /// Whether the images of another program move the vehicle.
+    labels_move: bool,
     ports: Ports,
+    ros2: VehicleRos2,
     clock: Clock,
     keeper: Keeper<Folder>,
     disk: DiskWatch,
@@ -110,11 +145,13 @@ impl VehicleShell {
         loop {
             self.pump()?;
             let now = self.clock.now();
-            let wake = self.host.poll_timeout(now).unwrap_or(now + MAX_SLEEP);
+            let wake = self.host.poll_timeout(now).map_or(now + MAX_SLEEP, |due| due.min(now + MAX_SLEEP));
             tokio::select! {
                 () = stop.asked() => {
                     modem::log_audit(self.host.link());
+                    self.camera.log_end();
                     self.mapper.finish();
+                    self.labels.into_iter().for_each(LabelThread::finish);
                     return Ok(());
                 }
                 _ = tokio::time::sleep_until(self.clock.wall(wake)) => {}
@@ -123,7 +160,12 @@ impl VehicleShell {
                 }
                 report = self.ports.pilot.next() => self.handle_pilot(report),
                 config = self.reload.next() => self.follow(&config),
-                frame = self.camera.next() => self.handle_camera(frame),
+                () = self.camera.wait() => {}
+                report = LabelThread::next(&mut self.labels) => match report {
+                    Some(FromLabels::Mapped(update, pose)) => self.handle_labels(&update, pose),
+                    Some(FromLabels::Checkpoint { is_refused }) => self.disk.handle_checkpoint(is_refused),
+                    None => return Err(UserError::Failed("the labels' thread ended".to_owned())),
+                },
                 mapped = self.mapper.mapped.recv() => match mapped {
                     Some(FromMapper::Mapped(mapped)) => self.handle_seen(*mapped),
                     Some(FromMapper::Missed(error)) => self.handle_missed(&error),
@@ -132,6 +174,22 @@ impl VehicleShell {
                 },
             }
             self.host.handle_timeout(self.clock.now());
+            self.poll_camera();
+        }
+    }
+
+    /// Gives the camera the vehicle's pose, and the camera's frames that are due to the scene model.
+    fn poll_camera(&mut self) {
+        let unseen = self.camera.poll_pose_gap();
+        self.host.handle_pose_gap(unseen);
+        if let Some(pose) = self.camera.poll_pose() {
+            self.host.handle_pose(pose, self.clock.now());
+        }
+        if let Some(pose) = self.host.measured_pose() {
+            self.camera.handle_pose(pose);
+        }
+        while let Some(frame) = self.camera.poll_frame(self.host.frames_in_mapper()) {
+            self.handle_camera(frame);
         }
     }
 
@@ -153,10 +211,38 @@ impl VehicleShell {
         self.host.handle_budget(budget, self.clock.now());
     }
 
-    fn handle_camera(&mut self, mut frame: RecordedFrame) {
-        let pose = self.host.handle_camera(pose_of(&frame));
-        (frame.x_m, frame.y_m) = (pose.x_m, pose.y_m);
-        (frame.heading_rad, frame.depth_m) = (pose.heading_rad, pose.depth_m);
+    /// Takes the map of another program. Unless something else measures its place, the vehicle is where the last image was
+    /// taken.
+    fn handle_labels(&mut self, update: &ForeignUpdate, pose: Option<ImagePose>) {
+        let (now, began) = (self.clock.now(), std::time::Instant::now());
+        let pose = pose.filter(|_| self.labels_move && self.camera.newest_pose().is_none());
+        if let Some(ImagePose { x_m, y_m, depth_m, heading_rad }) = pose {
+            self.host.handle_pose(CameraPose { x_m, y_m, heading_rad, depth_m }, now);
+        }
+        if let Some(label) = self.host.handle_foreign(update, now) {
+            tracing::warn!("labels: class {} has another name already, which it keeps", label - 1);
+        }
+        self.labels.iter().for_each(|labels| labels.handle_taken(began));
+    }
+
+    fn handle_camera(&mut self, mut frame: CameraFrame) {
+        if self.labels.is_some() {
+            // The frames still move the vehicle.
+            let pose = self.camera.newest_pose().unwrap_or(frame.camera_pose());
+            self.host.handle_pose(pose, self.clock.now());
+            if self.camera.is_over() {
+                self.host.finish_survey();
+            }
+            return;
+        }
+        match &self.camera {
+            Camera::Recorded(_) => {
+                let pose = self.host.handle_camera(frame.camera_pose());
+                (frame.pose.x_m, frame.pose.y_m) = (pose.x_m, pose.y_m);
+                (frame.pose.heading_rad, frame.pose.depth_m) = (pose.heading_rad, pose.depth_m);
+            }
+            Camera::Live(_) => self.host.handle_matched_camera(),
+        }
         let _ = self.mapper.orders.send(ToMapper::Frame(Box::new(frame)));
         if self.camera.is_over() {
             self.host.handle_camera_end();
@@ -165,13 +251,16 @@ impl VehicleShell {
 
     fn handle_seen(&mut self, mapped: Mapped) {
         let now = self.clock.now();
-        let (pose, registered) = (mapped.frame.as_ref().map(pose_of), mapped.registered.as_ref());
+        // A pose that came in after the frame stays the vehicle's.
+        let pose = mapped.frame.as_ref().map(|frame| self.camera.newest_pose().unwrap_or(frame.camera_pose()));
+        let registered = mapped.registered.as_ref();
         self.host.handle_mapped(pose, registered, &mapped.update, mapped.exemplars, now);
     }
 
     /// Logs an unreadable frame; it does not end the mission.
     fn handle_missed(&mut self, error: &UserError) {
         self.missed += 1;
+        self.camera.handle_missed();
         tracing::error!("a camera frame was skipped, {} so far: {error}", self.missed);
         self.host.handle_missed();
     }
@@ -182,7 +271,13 @@ impl VehicleShell {
         if let Some(disk) = self.disk.look(std::time::Instant::now()) {
             self.host.handle_disk(disk);
         }
+        let navigator = self.host.vehicle().navigator();
+        if let Some(labels) = self.labels.as_ref().filter(|_| navigator.is_measured()) {
+            let ((x_m, y_m), depth_m) = (navigator.dead_reckoned().xy(), navigator.depth_m());
+            labels.handle_pose(ImagePose { x_m, y_m, depth_m, heading_rad: navigator.heading_rad() }, now);
+        }
         self.host.steer(now);
+        self.ros2.publish(&self.host, self.camera.tally());
         self.handle_events()?;
         while let Some(bytes) = self.host.poll_output(now) {
             self.ports.modem.write(bytes);
@@ -231,9 +326,4 @@ impl VehicleShell {
         }
         Ok(())
     }
-}
-
-fn pose_of(frame: &RecordedFrame) -> CameraPose {
-    let RecordedFrame { x_m, y_m, heading_rad, depth_m, .. } = *frame;
-    CameraPose { x_m, y_m, heading_rad, depth_m }
 }

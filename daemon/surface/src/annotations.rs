@@ -3,12 +3,12 @@
 
 use super::record::{MAX_MARKERS, StoredDraft, StoredLabel, StoredMarker, StoredNote};
 use scenecast_protocol::coordinates::{DecimetrePoint, WorldPoint};
-use scenecast_protocol::map::MAX_LABEL;
+use scenecast_protocol::map::{ClassEntry, MAX_LABEL};
 use scenecast_protocol::time::Instant;
 use std::collections::{BTreeMap, VecDeque};
 
 /// Maximum length of a label's name, characters.
-const MAX_NAME: usize = 40;
+const MAX_NAME: usize = 60;
 /// Maximum length of a note, characters.
 const MAX_NOTE: usize = 1000;
 
@@ -50,6 +50,14 @@ impl Annotations {
         }
         self.labels.insert(label, book);
         Ok(())
+    }
+
+    /// Gives a label the name and the colour of its class where the operator has given it none.
+    pub(super) fn label_by_default(&mut self, entry: &ClassEntry) {
+        let book = self.labels.entry(entry.label()).or_default();
+        book.name.get_or_insert_with(|| entry.name().to_owned());
+        let text = |[red, green, blue]: [u8; 3]| format!("#{red:02x}{green:02x}{blue:02x}");
+        book.colour = book.colour.take().or(entry.colour().map(text));
     }
 
     /// Replaces the draft of the weights, -1 to 1. The error is one line for the operator.

@@ -1,5 +1,6 @@
 //! The surface: it holds the operator's map of each vehicle and sends each vehicle its directive. It does no IO.
 
+mod abort;
 mod annotations;
 mod assemble;
 mod command;

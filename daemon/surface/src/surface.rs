@@ -285,6 +285,7 @@ impl Surface {
                 Some(SurfaceOutput::VehicleFound(vehicle))
             }
             SurfaceEvent::MapChanged(vehicle) => Some(SurfaceOutput::MapChanged(vehicle)),
+            SurfaceEvent::LabelNamed(vehicle) => self.follow_names(vehicle),
             SurfaceEvent::VehicleRestarted(vehicle) => {
                 self.records.get_mut(&vehicle).into_iter().for_each(VehicleRecord::begin_run);
                 self.log_fact(vehicle, LogKind::Contact, "another run begins", now);
@@ -312,6 +313,7 @@ impl Surface {
                 self.records.get_mut(&vehicle)?.handle_status(status, at);
                 self.relay.iter_mut().for_each(|relay| relay.handle_depth(vehicle, status.depth_m, now));
                 self.log_mode(vehicle, now);
+                self.follow_names(vehicle);
                 self.follow_in_force(vehicle)
             }
             SurfaceEvent::InForceLearned(vehicle, _) => self.follow_in_force(vehicle),
@@ -333,6 +335,13 @@ impl Surface {
                 is_new.then_some(SurfaceOutput::ExemplarHere(vehicle, exemplar.label))
             }
         }
+    }
+
+    /// Labels of the present epoch have the names that the vehicle gives them, until the operator gives them others.
+    fn follow_names(&mut self, vehicle: Address) -> Option<SurfaceOutput> {
+        let view = self.link.vehicle(vehicle).filter(|view| view.status().is_some())?;
+        self.records.get_mut(&vehicle)?.handle_names(view.classes());
+        Some(SurfaceOutput::Changed(vehicle))
     }
 
     fn follow_in_force(&mut self, vehicle: Address) -> Option<SurfaceOutput> {

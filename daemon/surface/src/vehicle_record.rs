@@ -12,9 +12,10 @@ use scenecast_core::UsblLine;
 use scenecast_protocol::directive::{Areas, Destination, ExemplarRequests, Fence, Limits, SlotId, Utility};
 use scenecast_protocol::exemplar::Exemplar;
 use scenecast_protocol::link::PeerView;
-use scenecast_protocol::map::LabelGrid;
+use scenecast_protocol::map::{ClassEntry, ClassReplica, LabelGrid};
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::VehicleStatus;
+use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -90,6 +91,8 @@ pub struct VehicleRecord {
     /// The last measurement of the surface's modem, and its time.
     pub found: Option<(UsblLine, Instant)>,
     pub annotations: Annotations,
+    /// The names and colours that the vehicle has given its labels in this run.
+    classes: BTreeMap<u8, ClassEntry>,
     restored: RestoredContact,
 }
 
@@ -120,6 +123,7 @@ impl VehicleRecord {
             pauses: Pauses::default(),
             found: None,
             annotations: Annotations::default(),
+            classes: BTreeMap::new(),
             restored: RestoredContact::default(),
         }
     }
@@ -128,6 +132,7 @@ impl VehicleRecord {
     pub fn begin_run(&mut self) {
         self.run += 1;
         self.gains = LabelGains::default();
+        self.classes.clear();
     }
 
     /// The last status and when its pose came in, perhaps before the start of the surface.
@@ -167,12 +172,23 @@ impl VehicleRecord {
         of_earlier.unwrap_or(&self.annotations.labels).get(&label)
     }
 
-    /// Sets name, colour and merging of a label in the current epoch. The error is one line for the operator.
+    /// Takes the names and colours that the vehicle has given its labels.
+    pub fn handle_names(&mut self, classes: &ClassReplica) {
+        for entry in classes.iter().filter(|entry| !self.classes.contains_key(&entry.label())) {
+            self.annotations.label_by_default(entry);
+        }
+        self.classes = classes.iter().map(|entry| (entry.label(), entry.clone())).collect();
+    }
+
+    /// Sets name, colour and merging of a label in the current epoch; without a name or a colour it has those that the
+    /// vehicle gives it. The error is one line for the operator.
     pub fn set_label(&mut self, label: u8, book: StoredLabel) -> Result<(), String> {
         if self.earlier_map().is_some_and(|earlier| earlier.epoch != self.epoch) {
             return Err("the map in view has the labels of an earlier epoch".to_owned());
         }
-        self.annotations.set_label(label, book)
+        self.annotations.set_label(label, book)?;
+        self.classes.get(&label).into_iter().for_each(|entry| self.annotations.label_by_default(entry));
+        Ok(())
     }
 
     /// Takes the earlier map out of view, although the current one has fewer cells. The map stays in the archive.
@@ -198,6 +214,7 @@ impl VehicleRecord {
             self.utility = Utility { epoch: status.epoch, ..Utility::default() };
             self.exemplars = ExemplarCache::default();
             self.annotations.handle_epoch();
+            self.classes.clear();
             self.gains = LabelGains::default();
         }
         self.track.handle_pose(status, at);

@@ -1,7 +1,7 @@
 //! Builds a vehicle from a configuration.
 
 use crate::{Durable, FailsafePolicy, Footprint, MapSelection, Navigator, Steering, Vehicle};
-use scenecast_config::{Config, LayerName, MapCells, MapStream, cell_m, vehicle_address};
+use scenecast_config::{Config, Debounce, LabelSource, LayerName, MapCells, MapStream, cell_m, vehicle_address};
 use scenecast_core::{Area, UserError};
 use scenecast_protocol::link::{Authenticity, VehicleConfig, VehicleLink};
 use scenecast_protocol::mac::ModemProfile;
@@ -50,10 +50,11 @@ pub fn assemble(
     };
     link.set_background(durable.background.and_then(BackgroundOrder::from_code).unwrap_or(config.link.background));
     let mut vehicle = Vehicle::new(link, navigator, steering, policy(config), durable, now);
+    vehicle.set_codec(codec);
     vehicle.configure_map(MapSelection {
         is_coarse: config.map.cells == MapCells::Coarse,
         coarse_after_s: config.map.coarse_after_s,
-        debounce: config.map.debounce_s,
+        debounce: debounce(config),
         layers: selected_layers(config),
     });
     if config.map.stream == MapStream::WholePng {
@@ -68,6 +69,15 @@ fn footprint(config: &Config) -> Footprint {
         across: f64::from(config.camera.width_px) * mpp,
         along: f64::from(config.camera.height_px) * mpp,
         leg_overlap: config.survey.leg_overlap_percent / 100.0,
+    }
+}
+
+/// Labels of another program do not flicker as those of a sampler do: unless the configuration says otherwise, none is held
+/// back.
+fn debounce(config: &Config) -> Debounce {
+    match config.map.debounce_s {
+        Debounce::Automatic if config.labels.source != LabelSource::SceneModel => Debounce::Seconds(0.0),
+        configured => configured,
     }
 }
 
@@ -91,7 +101,7 @@ fn selected_layers(config: &Config) -> LayerMask {
 /// Every layer that the operator can select, with its part of the map's share.
 fn layers(config: &Config, codec: Codec) -> impl Iterator<Item = LayerSource> {
     let map = &config.map;
-    let debounce = map.debounce_s.of_layers();
+    let debounce = debounce(config).of_layers();
     let possible = BUILT_IN_LAYERS.iter().zip(LayerName::all()).filter(|_| map.stream == MapStream::Delta);
     possible.map(move |(layer, name)| {
         let built_in = match layer.id {

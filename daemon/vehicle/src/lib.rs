@@ -1,16 +1,19 @@
 //! The vehicle: it maps the sea floor, sends the map to the surface and carries out orders.
 //!
-//! [`Mapper`] turns camera frames into a label map and may run on a thread of its own. [`Vehicle`] holds the link to
+//! [`Mapper`] turns camera frames into a label map and may run on a thread of its own; [`ForeignMap`] does the same with
+//! labels of another program. [`Vehicle`] holds the link to
 //! the surface, estimates the position and chooses waypoints. Neither does IO.
 
 mod assemble;
 mod checkpoint;
 pub mod exemplar;
 mod failsafe;
+mod foreign;
 mod mapper;
 mod navigator;
 mod picker;
 pub mod planning;
+mod producer;
 mod registration;
 mod registration_monitor;
 mod relief;
@@ -21,8 +24,10 @@ mod vehicle;
 pub use assemble::assemble;
 pub use checkpoint::{RestoreError, Restored};
 pub use failsafe::{Failsafe, FailsafePolicy};
+pub use foreign::{ForeignMap, ForeignRestoreError, ForeignUpdate};
 pub use mapper::{MapUpdate, Mapper, SharedExemplars};
 pub use navigator::{FixVerdict, LastPlace, Navigator};
+pub use producer::MapProducer;
 pub use registration::{FoundFrame, RegisteredFrame};
 pub use steering::{Course, Footprint, Steering};
 pub use vehicle::{AppliedSlot, Durable, LostOrders, MapSelection, Vehicle, VehicleDisk, VehicleOutput};

@@ -174,7 +174,10 @@ impl Mapper {
     ///
     /// `scale` is the size of a pixel on the sea floor, divided by the configured size.
     pub fn handle_frame(&mut self, image: &RgbImage, pose: &Pose, scale: f64, t_s: f64) -> MapUpdate {
-        let camera = DownCamera { metres_per_pixel: scale * self.camera.metres_per_pixel, ..self.camera };
+        let camera = DownCamera {
+            metres_per_pixel: scale * self.camera.metres_per_pixel,
+            altitude_m: scale * self.camera.altitude_m,
+        };
         let cell_px = (self.cell_m / camera.metres_per_pixel) as f32;
         let words = match &mut self.light {
             Some(light) => {

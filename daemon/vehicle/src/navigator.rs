@@ -38,6 +38,8 @@ pub struct Navigator {
     last_fix: Option<Instant>,
     /// Whether the vehicle may have moved while it was off. The first fix then corrects the position on the map.
     is_displaced: bool,
+    /// Whether a pose or a displacement was measured since the start.
+    is_measured: bool,
     /// The number of refused fixes in a row that agreed with each other, and the deviation of the last one in metres.
     refused: (u32, (f64, f64)),
 }
@@ -91,6 +93,7 @@ impl Navigator {
             placement: None,
             last_fix: None,
             is_displaced: false,
+            is_measured: false,
             refused: (0, (0.0, 0.0)),
         }
     }
@@ -118,6 +121,12 @@ impl Navigator {
     /// The position in the map frame.
     pub fn position(&self) -> MapPoint {
         self.at
+    }
+
+    /// Whether a sensor has measured a pose or a displacement since the start; before, the pose is that of the configuration
+    /// or of an earlier run.
+    pub fn is_measured(&self) -> bool {
+        self.is_measured
     }
 
     /// The position by dead reckoning since the start, which registration does not correct.
@@ -176,6 +185,7 @@ impl Navigator {
             return;
         }
         (self.heading_rad, self.depth_m) = (heading_rad, depth_m);
+        self.is_measured = true;
         self.unregistered_m += dx_m.hypot(dy_m);
         let (x, y) = self.filter.handle_travel(dx_m, dy_m);
         self.travel(x, y);
@@ -215,7 +225,7 @@ impl Navigator {
 
     /// Sets the dead-reckoned pose from another source, such as a recorded mission.
     pub fn set_pose(&mut self, x_m: f64, y_m: f64, heading_rad: f64, depth_m: f64, now: Instant) {
-        self.is_displaced = false;
+        (self.is_displaced, self.is_measured) = (false, true);
         let (dx, dy) = (x_m - self.dead_reckoned.x_m, y_m - self.dead_reckoned.y_m);
         (self.heading_rad, self.depth_m) = (heading_rad, depth_m);
         self.unregistered_m += dx.hypot(dy);
@@ -332,6 +342,15 @@ mod tests {
         assert!((x - 60.0).abs() < 0.3 && (y - 3.0).abs() < 0.3, "{x} {y}");
         nav.handle_fix(WorldPoint::new(60.0, 3.0), 0.1, at(60.0), at(60.0));
         assert_eq!(nav.placement().unwrap().version, 1, "a move that is not worth telling");
+    }
+
+    #[test]
+    fn a_start_position_is_not_measured() {
+        let mut nav = Navigator::new(3.0, 4.0, 18.0, 0.02);
+        nav.handle_odometry(f64::NAN, 0.0, 0.0, 18.0, at(1.0));
+        assert!(!nav.is_measured() && under_way().is_measured());
+        nav.set_pose(3.0, 4.0, 0.0, 18.0, at(2.0));
+        assert!(nav.is_measured());
     }
 
     #[test]

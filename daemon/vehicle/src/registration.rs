@@ -38,6 +38,14 @@ impl RegisteredFrame {
     }
 }
 
+/// The pose in steps of 2^-30 metres and radians, so that sources of the same pose in other forms, such as degrees and
+/// quaternions, give the same map.
+fn on_grid(pose: &Pose) -> Pose {
+    const STEPS: f64 = (1 << 30) as f64;
+    let round = |value: f64| (value * STEPS).round() / STEPS;
+    Pose { x: round(pose.x), y: round(pose.y), z: round(pose.z), yaw_rad: round(pose.yaw_rad) }
+}
+
 impl Mapper {
     /// Places a frame that was taken at `pose` by dead reckoning, compass and altitude. A vehicle that never registered
     /// frames places it there; one on which registration was switched off continues from the last frame's place by
@@ -45,6 +53,7 @@ impl Mapper {
     ///
     /// `scale` is the size of a pixel on the sea floor, divided by the configured size.
     pub fn register(&mut self, image: &RgbImage, pose: &Pose, scale: f64) -> RegisteredFrame {
+        let pose = &on_grid(pose);
         let dead_reckoned = MapPoint::new(pose.x, pose.y);
         let unregistered = RegisteredFrame { pose: *pose, scale, dead_reckoned, found: None };
         let metres_per_pixel = scale * self.metres_per_pixel();

@@ -39,8 +39,8 @@ impl Floor {
         match profile.access {
             Access::Shared if self.in_modem > 0 => 0,
             Access::Shared => self.grant.filter(|g| now >= g.begins).map_or(0, |g| g.frames_left(profile, now)),
-            Access::ModemOwned { pool_frames } => pool_frames.saturating_sub(self.in_modem),
             Access::Polled => self.polled,
+            access => access.pool_frames().unwrap_or(0).saturating_sub(self.in_modem),
         }
     }
 

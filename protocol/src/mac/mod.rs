@@ -20,7 +20,7 @@ use std::time::Duration;
 /// How the ends share the medium; the modem's driver selects it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Access {
-    /// The surface grants turns, and a vehicle transmits only in its turn. A full-duplex link works this way too.
+    /// The surface grants turns, and a vehicle transmits only in its turn. This works over any medium.
     #[default]
     Shared,
     /// The modem does half duplex and repetition by itself; each end transmits as long as
@@ -31,6 +31,27 @@ pub enum Access {
     },
     /// The modem requests the frames of a cycle that the surface's modem has begun.
     Polled,
+    /// The medium carries both directions at once, as a radio or a network does: each end transmits one frame after the
+    /// other whenever it has a reason to, without turns. Acknowledgements are prompt, so that lost frames are known soon.
+    FullDuplex,
+}
+
+impl Access {
+    /// Frames in the modem at a time where the ends transmit without turns; `None` where they take turns.
+    #[must_use]
+    pub fn pool_frames(self) -> Option<u32> {
+        match self {
+            Self::ModemOwned { pool_frames } => Some(pool_frames),
+            // The next frame is written when the last one is on its way, so that none becomes outdated in a queue.
+            Self::FullDuplex => Some(1),
+            Self::Shared | Self::Polled => None,
+        }
+    }
+
+    /// Whether the ends transmit without turns.
+    pub(crate) fn is_free(self) -> bool {
+        self.pool_frames().is_some()
+    }
 }
 
 /// The properties of a modem that the link depends on.
@@ -80,6 +101,16 @@ impl ModemProfile {
     /// The airtime of `bits`, at least 1 bit/s assumed.
     pub fn time_of(&self, bits: u64) -> Duration {
         Duration::from_secs_f64(bits as f64 / self.bit_rate_bps.max(1.0))
+    }
+
+    /// Where the ends transmit without turns, how long an acknowledgement may wait for further frames, or for content that
+    /// carries it; `usual` for a modem that does half duplex by itself.
+    pub(crate) fn answer_wait(&self, usual: Duration) -> Duration {
+        const RANGE: (Duration, Duration) = (Duration::from_millis(50), Duration::from_secs(1));
+        match self.access {
+            Access::FullDuplex => (self.frame_airtime() * 2).clamp(RANGE.0, RANGE.1),
+            _ => usual,
+        }
     }
 
     /// The airtime of a full frame.

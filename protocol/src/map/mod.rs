@@ -4,6 +4,7 @@
 //! these two sides ([`StateSource`], [`StateReplica`]).
 
 mod bits;
+mod class;
 mod coarse;
 mod debounce;
 mod digest;
@@ -17,6 +18,7 @@ mod tiles;
 mod value;
 
 pub use crate::grid::{Cell, LabelGrid, MAX_LABEL, Rect, TILE, UNEXPLORED};
+pub use class::{ClassChunk, ClassEntry, ClassReplica, ClassSource, MAX_CLASS};
 pub use debounce::{Hold, MAX_CONFIDENCE};
 pub use digest::MapDigest;
 pub use layer::{

@@ -16,6 +16,8 @@ use std::time::Duration;
 #[derive(Debug)]
 pub struct MapSource {
     codec: Codec,
+    /// Whether chunks are made quickly rather than as small as possible.
+    is_quick: bool,
     interest: Interest,
     debounce: Debounce,
     coarse: Coarse,
@@ -37,6 +39,7 @@ impl MapSource {
     pub fn new(codec: Codec) -> Self {
         Self {
             codec,
+            is_quick: false,
             interest: Interest::default(),
             debounce: Debounce::default(),
             coarse: Coarse::default(),
@@ -154,7 +157,13 @@ impl StateSource for MapSource {
         let stride = self.coarse.stride(&self.dirty.counts());
         let seed = self.dirty.best(stride, &self.acked, &self.target, &self.interest, now)?;
         let (base, waiting) = (&self.acked, self.dirty.waiting());
-        let chunk = map_codec::encode_every(stride, self.codec, base, &self.target, seed, room, &waiting)?;
+        let chunk = match self.is_quick && self.codec != Codec::Png {
+            true => {
+                let per_change = self.spent.0 / self.spent.1.max(1.0);
+                map_codec::encode_quickly(stride, base, &self.target, seed, room, &waiting, per_change)?
+            }
+            false => map_codec::encode_every(stride, self.codec, base, &self.target, seed, room, &waiting)?,
+        };
         drop(waiting);
         if stride == Stride::One {
             let per_cell = chunk.bytes.len() as f64 / chunk.changes.len().max(1) as f64;
@@ -164,6 +173,10 @@ impl StateSource for MapSource {
         }
         chunk.changes.iter().for_each(|&(cell, _)| self.dirty.depart(cell));
         Some((chunk.bytes, chunk.changes))
+    }
+
+    fn set_quick(&mut self, is_quick: bool) {
+        self.is_quick = is_quick;
     }
 
     fn handle_fate(&mut self, carried: Self::Carried, delivered: bool, now: Instant) {

@@ -11,6 +11,9 @@ pub trait StateSource: Debug {
     /// The most useful chunk of at most `room` bytes, if any content waits; it counts as in flight from then on.
     fn next_chunk(&mut self, room: usize, now: Instant) -> Option<(Vec<u8>, Self::Carried)>;
 
+    /// Sets whether chunks are to be made quickly rather than as small as possible, because the channel is fast.
+    fn set_quick(&mut self, _is_quick: bool) {}
+
     /// Takes the fate of a chunk. Fates come in the order of frame numbers.
     fn handle_fate(&mut self, carried: Self::Carried, delivered: bool, now: Instant);
 

@@ -84,6 +84,26 @@ pub fn encode_every(
     Some(chunk)
 }
 
+/// As [`encode_every`] with the context coder, in about a quarter of the time and with slightly fewer changes: the size of the
+/// patch follows from the bytes that each change of recent chunks has taken. For fast channels, where computing takes
+/// longer than sending.
+pub(crate) fn encode_quickly(
+    stride: Stride,
+    base: &LabelGrid,
+    target: &LabelGrid,
+    seed: Cell,
+    room: usize,
+    wanted: &dyn Fn(Cell) -> bool,
+    bytes_per_change: f64,
+) -> Option<MapChunk> {
+    let (base, target) = (Lattice::new(base, stride), Lattice::new(target, stride));
+    let wanted = |cell| wanted(stride.on_map(cell));
+    let growth = Growth::around(base, target, stride.on_lattice(seed)?, room, &wanted)?;
+    let mut chunk = context::quick_chunk(base, &growth, room, bytes_per_change)?;
+    chunk.changes.iter_mut().for_each(|(cell, _)| *cell = stride.on_map(*cell));
+    Some(chunk)
+}
+
 fn best_chunk(codec: Codec, base: Lattice<'_>, growth: &Growth, room: usize) -> Option<MapChunk> {
     match codec {
         Codec::Png => png::best_chunk(base, growth, room),

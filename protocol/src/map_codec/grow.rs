@@ -10,6 +10,8 @@ use crate::map_codec::lattice::Lattice;
 pub(super) struct Growth {
     pub(super) window: GrowthWindow,
     pub(super) areas: Vec<Area>,
+    /// The changes in each area.
+    pub(super) changes: Vec<usize>,
 }
 
 /// The least cost of an isolated change in bits.
@@ -42,41 +44,44 @@ impl Growth {
             if !window.is_wanted(reach, reach) {
                 return None;
             }
-            let (areas, enough) = grow(&window, room * 8);
+            let (areas, changes, enough) = grow(&window, room * 8);
             if enough || reach >= LAST_REACH {
-                return Some(Self { window, areas });
+                return Some(Self { window, areas, changes });
             }
             reach *= 2;
         }
     }
 }
 
-/// The bounds of the changes in ever larger squares, and whether they exceed the room or the largest patch.
-fn grow(window: &GrowthWindow, room_bits: usize) -> (Vec<Area>, bool) {
+/// The bounds of the changes in ever larger squares with their numbers, and whether they exceed the room or the largest
+/// patch.
+fn grow(window: &GrowthWindow, room_bits: usize) -> (Vec<Area>, Vec<usize>, bool) {
     let middle = window.side / 2;
     let mut area = Area { left: middle, right: middle + 1, bottom: middle, top: middle + 1 };
-    let mut areas = vec![area];
-    let (mut radius, mut bits) = (0, 0);
+    let (mut areas, mut changes) = (vec![area], vec![1]);
+    let (mut radius, mut bits, mut count) = (0, 0, 1);
     while radius + 1 < middle {
         let next = (radius + 1 + radius / 16).min(middle - 1);
         let mut larger = area;
         for (column, row) in ring(middle, radius, next).filter(|&(column, row)| window.is_wanted(column, row)) {
             larger.include(column, row);
+            count += 1;
             bits += least_bits(window, column, row);
         }
         if larger.cells() > MAX_PATCH_CELLS || larger.width().max(larger.height()) > MAX_PATCH_SIDE {
-            return (areas, true);
+            return (areas, changes, true);
         }
         if larger != area {
             area = larger;
             areas.push(area);
+            changes.push(count);
         }
         if bits > room_bits {
-            return (areas, true);
+            return (areas, changes, true);
         }
         radius = next;
     }
-    (areas, false)
+    (areas, changes, false)
 }
 
 /// Cells farther than `inner` and at most `outer` from the centre, as (column, row).

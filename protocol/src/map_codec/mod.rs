@@ -26,6 +26,7 @@ mod tests;
 mod window;
 
 pub use best_png::Deflate;
+pub(crate) use chunk::encode_quickly;
 pub use chunk::{DecodeError, MapChunk, decode, encode, encode_every};
 pub use codec::Codec;
 pub use context::training;

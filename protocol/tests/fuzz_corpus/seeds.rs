@@ -86,6 +86,7 @@ fn contents() -> Vec<Seed> {
             let framed = [&[payload.len() as u8], &payload[..]].concat();
             match kind {
                 ChunkKind::Intent => seeds.push(("status", format!("intent-{i}"), payload)),
+                ChunkKind::LabelClass => {}
                 ChunkKind::Registration => seeds.push(("status", format!("registration-{i}"), payload)),
                 ChunkKind::Trail => seeds.push(("status", format!("trail-{i}"), payload)),
                 ChunkKind::Pose => seeds.push(("status", format!("pose-{i}"), payload)),

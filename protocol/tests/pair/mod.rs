@@ -153,7 +153,12 @@ impl LinkedEnds {
     }
 
     pub(crate) fn is_converged(&self) -> bool {
-        self.shown() == self.vehicle.map() && self.layers_agree() && self.vehicle.is_converged()
+        self.shown() == self.vehicle.map() && self.layers_agree() && self.names_agree() && self.vehicle.is_converged()
+    }
+
+    fn names_agree(&self) -> bool {
+        let view = self.surface.vehicle(auv()).unwrap();
+        view.classes().iter().eq(self.vehicle.classes().entries())
     }
 
     fn layers_agree(&self) -> bool {

@@ -9,7 +9,7 @@ use scenecast_protocol::directive::{
     Slot, SlotId, Utility, VersionedSlot, WeightedArea,
 };
 use scenecast_protocol::map::{
-    Cell, DescriptorPart, LabelGrid, LayerChunk, LayerDescriptor, LayerId, LayerMask, LayerSet,
+    Cell, ClassChunk, ClassEntry, DescriptorPart, LabelGrid, LayerChunk, LayerDescriptor, LayerId, LayerMask, LayerSet,
 };
 use scenecast_protocol::map_codec;
 use scenecast_protocol::schedule::{BackgroundOrder, BackgroundStream, Shares};
@@ -111,12 +111,25 @@ fn layer_chunks() -> Rows {
     };
     let whole = |descriptor: &LayerDescriptor| part(descriptor, 0, descriptor.to_bytes().len());
     let digest = 0x27A6 ^ confidence.digest();
+    let named = |label: u8, name: &str, colour: Option<[u8; 3]>, to: Option<usize>| {
+        let entry = ClassEntry::new(label, name, colour).unwrap().to_bytes();
+        let (digest, is_last) = (ClassEntry::digest_of(label, &entry), to.is_none());
+        let bytes =
+            ClassChunk { label, digest, first: 0, is_last, bytes: &entry[..to.unwrap_or(entry.len())] }.encode();
+        assert_eq!(ClassChunk::decode(&bytes).map(|chunk| chunk.encode()), Some(bytes.clone()));
+        bytes
+    };
     vec![
         ("layer chunk: confidence announced, quarters of 0 to 1", whole(confidence)),
         ("layer chunk: depth announced, steps of 0.5 m, level 1 from 12 m on", whole(&depth)),
         ("the same in two chunks, the first", part(&depth, 0, 10)),
         ("the second", part(&depth, 10, 19)),
         ("layer chunk: curiosity announced, whole bits", whole(curiosity)),
+        (
+            "part of the name of a label: label 3 is \"sand\", colour E0C080",
+            named(3, "sand", Some([0xE0, 0xC0, 0x80]), None),
+        ),
+        ("part of the name of a label: label 254 is \"é\", no colour, the first byte", named(254, "é", None, Some(1))),
         ("head of a layer chunk: a patch of confidence", layer(LayerChunk::Patch(LayerId::CONFIDENCE, &[]))),
         (
             "layer chunk: the digest of confidence, of levels with the digest 27A6",

@@ -2,7 +2,9 @@
 
 use crate::key::section;
 use crate::rule::{ANY, range};
-use crate::setting::{BirthRule, CameraSource, Debounce, LayerName, MapCells, MapStream};
+use crate::setting::{
+    BirthRule, CameraSource, CameraStamps, Debounce, LabelSource, LayerName, MapCells, MapStream, Votes,
+};
 use scenecast_protocol::map_codec::Codec;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -38,9 +40,22 @@ section! {
 section! {
     /// The camera.
     camera: Camera {
-        /// Source of the frames. frames:DIR: images with DIR/poses.csv; empty: the image of the rehearsal; a vehicle at
-        /// sea then has no camera frames.
+        /// Source of the frames. frames:DIR: images with DIR/poses.csv. bag:FILE: images and odometry that ROS 2 recorded in
+        /// MCAP, a file or the folder of a bag, with #TOPIC behind it where there are several topics of images. watch:DIR:
+        /// images, as they are written to a folder. command:COMMAND: images that a shell command writes to its standard
+        /// output, MJPEG, PNG or PPM. v4l2:DEVICE: a camera of the system, by ffmpeg. ros2:TOPIC: images of ROS 2, compressed
+        /// if the name of the topic ends in /compressed. Empty: the image of the rehearsal; a vehicle at sea then has no
+        /// camera frames.
         source: CameraSource = CameraSource::Rehearsal, ANY, [Auv Scenario];
+        /// Time of the images of a live camera. own: the time that the image, its file name or its message gives; an image
+        /// that gives none was taken camera.delay_s before its arrival. arrival: so for all images.
+        stamps: CameraStamps = CameraStamps::Own, ANY, [Auv];
+        /// Time between the exposure and the arrival of an image that does not give its time.
+        delay_s: f64 = 0.0, range(0.0, 60.0, "s"), [Auv];
+        /// Added to the times that images give, where the camera's clock differs from that of the poses.
+        clock_offset_s: f64 = 0.0, range(-86_400.0, 86_400.0, "s"), [Auv];
+        /// Time without an image after which a live camera counts as stalled; a command is then started again.
+        timeout_s: f64 = 10.0, range(1.0, 3600.0, "s"), [Auv];
         /// Frames per second.
         rate_hz: f64 = 0.5, range(0.01, 30.0, "1/s"), [Scenario];
         /// Columns of a frame.
@@ -49,6 +64,12 @@ section! {
         height_px: u32 = 480, range(64.0, 4096.0, "pixel"), [Scenario];
         /// Size of a pixel on the sea floor.
         metres_per_pixel: f64 = 0.01, range(0.0001, 10.0, "m"), [Auv Scenario];
+        /// Place of a live camera on the vehicle: metres forward, to starboard and down from the point whose pose is measured.
+        mount_m: [f64; 3] = [0.0, 0.0, 0.0], range(-20.0, 20.0, "m"), [Auv];
+        /// Direction of a live camera: rotation of the image's upper edge from the bow, clockwise from above; then tilt of the
+        /// optical axis from straight down, towards the bow and to starboard. Roll and pitch of the vehicle are added; a frame
+        /// that is tilted by more than 34 degrees in all is not mapped.
+        mount_deg: [f64; 3] = [0.0, 0.0, 0.0], range(-180.0, 180.0, "deg"), [Auv];
         /// Whether frames are corrected for a light that depends on the place in the frame alone: lamps, the lens, the water
         /// between. It is learnt from the first 500 frames. Exemplars show the frame as it is.
         flat_field: bool = true, ANY, [Auv Scenario];
@@ -88,5 +109,21 @@ section! {
         /// File of a table of scenecast tune, from which "fit to budget" takes settings of the scene model. Empty: the
         /// built-in table, measured on procedural sea floors.
         tuning_table: Option<PathBuf> = None, ANY, [Asv];
+    }
+}
+
+section! {
+    /// Labels of another program in place of those of the scene model.
+    labels: Labels {
+        /// Where the labels come from. Empty: the scene model. dir:FOLDER: files NAME.json and NAME.png; socket:HOST:PORT
+        /// and socket:/PATH: programs that connect and send the same; ros2:TOPIC: a topic of ROS 2. A rehearsal takes
+        /// dir: alone.
+        source: LabelSource = LabelSource::SceneModel, ANY, [Auv Scenario];
+        /// Which segmented images decide about the class of a cell: the class that most of their pixels in it have. all:
+        /// every image that has shown the cell; newest: the last one. A grid decides alone.
+        votes: Votes = Votes::All, ANY, [Auv Scenario];
+        /// Minimum share of each band within the map's share of link.shares while labels wait too. The shares of all
+        /// layers add up to 100 % or less; a band beyond that has what is left.
+        band_share: u8 = 8, range(0.0, 100.0, "%"), [Auv Scenario];
     }
 }

@@ -7,12 +7,14 @@ mod link;
 mod map;
 mod modem;
 mod node;
+mod ros2;
 mod survey;
 
 pub use link::Link;
-pub use map::{Camera, Map, Scene};
+pub use map::{Camera, Labels, Map, Scene};
 pub use modem::{Channel, Modem};
 pub use node::{Console, Mission, Operator, Runtime, VehicleSection, WorldSection};
+pub use ros2::Ros2;
 pub use survey::{Autopilot, Navigation, Position, Registration, Survey};
 
 use crate::key::Section;
@@ -28,6 +30,7 @@ pub struct Config {
     pub map: Map,
     pub camera: Camera,
     pub scene: Scene,
+    pub labels: Labels,
     pub survey: Survey,
     pub navigation: Navigation,
     pub registration: Registration,
@@ -36,6 +39,7 @@ pub struct Config {
     pub world: WorldSection,
     pub operator: Operator,
     pub console: Console,
+    pub ros2: Ros2,
     pub runtime: Runtime,
 }
 
@@ -50,6 +54,7 @@ impl Section {
         Map::SECTION,
         Camera::SECTION,
         Scene::SECTION,
+        Labels::SECTION,
         Survey::SECTION,
         Navigation::SECTION,
         Registration::SECTION,
@@ -58,6 +63,7 @@ impl Section {
         WorldSection::SECTION,
         Operator::SECTION,
         Console::SECTION,
+        Ros2::SECTION,
         Runtime::SECTION,
     ];
 }

@@ -24,6 +24,9 @@ section! {
         connect: Option<HostPort> = None, ANY, [Auv Asv];
         /// Bit rate of the modem on air. The rates of S2C instant messages and of Micromodem packets are built in.
         bit_rate: f64 = 10_000.0, range(10.0, 1e7, "bit/s"), [Auv Asv];
+        /// Whether the medium carries both directions at once, as a radio or a network does, the same at both ends (tcp, udp):
+        /// the ends then transmit without turns, and lost frames are known within a second. Acoustic channels do not.
+        full_duplex: bool = false, ANY, [Auv Asv Scenario];
         /// Bits on air that each transmission needs in addition to its bytes. The values for s2c
         /// and micromodem are built in.
         overhead_bits: u32 = 0, range(0.0, 100_000.0, "bit"), [Auv Asv Scenario];

@@ -2,7 +2,7 @@
 
 use crate::key::section;
 use crate::rule::{ANY, ports, range};
-use crate::setting::{AutopilotKind, GpsPort};
+use crate::setting::{AutopilotKind, GpsPort, NavigationSource};
 use scenecast_core::{Area, PortAddress};
 use scenecast_protocol::directive::{AtEnd, PlannerKind, Reaction};
 
@@ -49,6 +49,18 @@ section! {
 section! {
     /// The vehicle's navigation.
     navigation: Navigation {
+        /// Source of the vehicle's pose. Empty: the autopilot, or the recording of the camera. tum:FILE: a file of poses with
+        /// the times of the images. dvl:HOST:PORT: the dead reckoning of a Doppler velocity log of Water Linked (A50, A125),
+        /// which begins at the origin of the map; the port is 16171. ros2:TOPIC: odometry of ROS 2 in a frame of east, north,
+        /// up. The autopilot, if there is one, then only follows waypoints.
+        source: NavigationSource = NavigationSource::Autopilot, ANY, [Auv];
+        /// Heading of the vehicle at the last reset of the velocity log's dead reckoning, clockwise from north.
+        dvl_heading_deg: f64 = 0.0, range(-360.0, 360.0, "degrees"), [Auv];
+        /// Silence of the source after which it counts as stalled; a velocity log is then connected to again.
+        timeout_s: f64 = 5.0, range(0.5, 600.0, "s"), [Auv];
+        /// Longest time between two poses within which the pose of an image is interpolated. Poses that come once a second
+        /// need 1.5 s or more.
+        max_gap_s: f64 = 2.0, range(0.01, 60.0, "s"), [Auv];
         /// Drift of dead reckoning, in percent of the distance travelled.
         drift_percent: f64 = 1.0, range(0.0, 50.0, "%"), [Auv Scenario];
         /// Standard deviation of the vehicle's position at the start of the survey. It limits how far the first
@@ -83,7 +95,8 @@ section! {
         port: Option<PortAddress> = None, ports(&["serial", "udp", "udp-to", "tcp", "file"]), [Auv Asv];
         /// MAVLink system number of the autopilot (mavlink).
         system: u8 = 1, range(1.0, 255.0, ""), [Auv Asv];
-        /// Whether to arm the autopilot and to switch it to guided mode, once (mavlink). Otherwise a pilot does so.
+        /// Whether to arm the autopilot and to switch it to guided mode, once, and again after a restart of the autopilot under
+        /// water (mavlink). Otherwise a pilot does so.
         arm: bool = false, ANY, [Auv Asv];
         /// Silence after which the autopilot counts as disconnected.
         timeout_s: f64 = 5.0, range(1.0, 600.0, "s"), [Auv Asv];

@@ -157,6 +157,14 @@ choices! {
         Patches,
     }
 
+    /// The time of the camera's images.
+    CameraStamps "lowercase" {
+        /// The time that the image itself, its file name or its message gives.
+        Own,
+        /// The time of arrival, less the usual delay.
+        Arrival,
+    }
+
     /// The driver of the autopilot.
     AutopilotKind "lowercase" {
         /// No autopilot.

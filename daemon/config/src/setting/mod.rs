@@ -3,19 +3,25 @@
 mod addresses;
 mod choices;
 mod debounce;
+mod labels;
 mod layers;
 mod numbers;
 mod ports;
+mod ros2;
+mod sources;
 mod tables;
 mod texts;
 
 pub use choices::{
-    Authenticate, AutopilotKind, BirthRule, MapCells, MapStream, ModemKind, OperatorScript, S2cMode, WorldKind,
+    Authenticate, AutopilotKind, BirthRule, CameraStamps, MapCells, MapStream, ModemKind, OperatorScript, S2cMode,
+    WorldKind,
 };
 pub use debounce::Debounce;
+pub use labels::{LabelSource, Votes};
 pub use layers::LayerName;
 pub use ports::{GpsPort, HostPort};
-pub use texts::CameraSource;
+pub use ros2::{Remap, RosName};
+pub use sources::{CameraSource, NavigationSource};
 
 use crate::rule::Rule;
 use serde_json::json;

@@ -1,4 +1,4 @@
-//! Names, files and the source of the camera's frames.
+//! Names and files.
 
 use super::Setting;
 use crate::rule::Rule;
@@ -59,39 +59,5 @@ impl Setting for Option<PathBuf> {
 
     fn schema(_: &Rule) -> serde_json::Value {
         json!({ "type": "string" })
-    }
-}
-
-/// Where the camera's frames come from.
-#[derive(Debug, Clone, PartialEq, Eq, Default)]
-pub enum CameraSource {
-    /// The image of the rehearsal; at sea no camera.
-    #[default]
-    Rehearsal,
-    /// A folder of images with `poses.csv`.
-    Frames(PathBuf),
-}
-
-impl Setting for CameraSource {
-    fn read(value: &Value, _: &Rule) -> Option<Self> {
-        match value.as_str()? {
-            "" => Some(Self::Rehearsal),
-            text => text.strip_prefix("frames:").filter(|dir| !dir.is_empty()).map(|dir| Self::Frames(dir.into())),
-        }
-    }
-
-    fn write(&self) -> Value {
-        Value::String(match self {
-            Self::Rehearsal => String::new(),
-            Self::Frames(dir) => format!("frames:{}", dir.display()),
-        })
-    }
-
-    fn allowed(_: &Rule) -> String {
-        "\"frames:DIR\", or \"\"".to_owned()
-    }
-
-    fn schema(_: &Rule) -> serde_json::Value {
-        json!({ "type": "string", "pattern": "^(frames:.+)?$" })
     }
 }

@@ -82,8 +82,13 @@ fn age_s(at: Instant, now: Instant) -> u16 {
 }
 
 impl CellLayer {
+    /// Its name, unit and colours, and the use of its values.
+    pub fn descriptor(&self) -> &LayerDescriptor {
+        &self.descriptor
+    }
+
     /// The value of a cell: the middle of its level, if that is known.
-    pub(crate) fn value(&self, cell: Cell) -> Option<f64> {
+    pub fn value(&self, cell: Cell) -> Option<f64> {
         self.descriptor.middle(level(&self.tiles, cell))
     }
 
@@ -155,8 +160,13 @@ impl MapCells {
         (x as f64 * self.cell_m + self.moved_m.0, y as f64 * self.cell_m + self.moved_m.1)
     }
 
+    /// The layers beside the labels.
+    pub fn layers(&self) -> &[CellLayer] {
+        &self.layers
+    }
+
     /// The label of a cell, 0 = unexplored.
-    pub(super) fn label(&self, cell: Cell) -> u8 {
+    pub fn label(&self, cell: Cell) -> u8 {
         level(&self.tiles, cell)
     }
 

@@ -7,6 +7,6 @@ mod geotiff;
 mod projection;
 mod regions;
 
-pub use cells::MapCells;
-pub(crate) use cells::{CellLayer, Tiles};
+pub(crate) use cells::Tiles;
+pub use cells::{CellLayer, MapCells};
 pub use format::MapFormat;

@@ -26,8 +26,8 @@ pub(super) fn describe(request: &SurfaceRequest) -> Option<(Option<Address>, Log
             order(*id, format!("{verb}: label {}", wanted.label))
         }
         R::Constraints(id, Constraints { abort: true, .. }) => order(*id, "abort".into()),
-        R::Constraints(id, Constraints { hold: true, .. }) => order(*id, "hold".into()),
-        R::Constraints(id, _) => order(*id, "resume".into()),
+        R::Constraints(id, Constraints { hold: true, .. }) | R::Hold(id, true) => order(*id, "hold".into()),
+        R::Constraints(id, _) | R::Hold(id, false) => order(*id, "resume".into()),
         R::Fence(id, fence) => {
             let outline = fence.fence.as_ref().map_or("no fence".to_owned(), |f| format!("{} corners", f.len()));
             order(*id, format!("fence: {outline}, {} keep-outs", fence.keep_outs.len()))
@@ -102,6 +102,8 @@ mod tests {
         );
         let to = DestinationOrder { place: Some([1.0, -2.5]) };
         assert_eq!(text(SurfaceRequest::Destination(1, to)), Some(("order", "destination: E 1.0 N -2.5 m".into())));
+        assert_eq!(text(SurfaceRequest::Hold(1, true)), Some(("order", "hold".into())));
+        assert_eq!(text(SurfaceRequest::Hold(1, false)), Some(("order", "resume".into())));
         assert_eq!(text(SurfaceRequest::Map(1)), None);
     }
 }

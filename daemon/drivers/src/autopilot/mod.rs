@@ -42,7 +42,7 @@ impl Goal {
 }
 
 /// A stretch of way, as the autopilot measured it.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Step {
     pub dx_m: f64,
     pub dy_m: f64,
@@ -50,6 +50,12 @@ pub struct Step {
     pub heading_rad: f64,
     /// Depth below the surface, metres.
     pub depth_m: f64,
+    /// Rotation about the forward axis, starboard down, radians; 0 if it is not measured.
+    pub roll_rad: f64,
+    /// Rotation about the starboard axis, bow up, radians; 0 if it is not measured.
+    pub pitch_rad: f64,
+    /// Height above the sea floor, metres, where it is measured.
+    pub altitude_m: Option<f64>,
     /// Time without a credible report, in which the motion is unknown; the step covers the rest.
     pub unseen: Duration,
 }
@@ -60,7 +66,7 @@ pub enum Health {
     Awaited,
     /// It answered once, and does not any more.
     Silent,
-    /// It answers but does not follow waypoints: it is disarmed, or in a mode of the pilot's.
+    /// It answers but does not follow waypoints: it is disarmed, in a mode of the pilot's, or reports another target.
     NotInCommand,
     InCommand,
 }

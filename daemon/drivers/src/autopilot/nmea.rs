@@ -87,7 +87,7 @@ impl Nmea {
     }
 
     fn push_step(&mut self, dx_m: f64, dy_m: f64, heading_rad: f64, unseen: Duration) {
-        self.tray.walk(Step { dx_m, dy_m, heading_rad, depth_m: self.depth_m, unseen });
+        self.tray.walk(Step { dx_m, dy_m, heading_rad, depth_m: self.depth_m, unseen, ..Step::default() });
     }
 
     /// DBS: feet, f, metres, M, fathoms, F.

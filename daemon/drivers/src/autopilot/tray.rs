@@ -58,7 +58,7 @@ mod tests {
         let mut tray = Tray::default();
         for i in 0..10_000 {
             let unseen = Duration::from_millis(u64::from(i % 2 == 0));
-            tray.walk(Step { dx_m: 1.0, dy_m: -2.0, heading_rad: f64::from(i), depth_m: 3.0, unseen });
+            tray.walk(Step { dx_m: 1.0, dy_m: -2.0, heading_rad: f64::from(i), unseen, ..Step::default() });
             tray.note("the same");
             tray.write(vec![0]);
         }

@@ -3,9 +3,9 @@
 use super::true_cells::TrueCells;
 use crate::world::World;
 use image::RgbImage;
-use scenecast_config::{CameraSource, Config, cell_m};
+use scenecast_config::{Config, cell_m};
 use scenecast_core::{Area, UserError};
-use scenecast_files::{RecordedFrame, Recorder, Recording};
+use scenecast_files::{RecordedFrame, Recorder, Recording, configured_recording};
 use scenecast_motion::Motion;
 use scenecast_protocol::time::Instant;
 use scenecast_worlds::View;
@@ -37,10 +37,11 @@ pub(crate) struct Camera {
 impl Camera {
     /// Plays the configured recording, or else views `world`.
     pub(super) fn new(config: &Config, world: World, record: Option<&Path>) -> Result<Self, UserError> {
-        let recording = match &config.camera.source {
-            CameraSource::Rehearsal => None,
-            CameraSource::Frames(dir) => Some(Recording::open(dir, None, config.camera.metres_per_pixel)?),
-        };
+        if config.camera.source.is_live() {
+            let what = "camera.source: a live camera cannot be rehearsed; allowed are frames:DIR and bag:FILE";
+            return Err(UserError::Input(what.to_owned()));
+        }
+        let recording = configured_recording(config)?;
         let recorder = record.map(Recorder::new).transpose()?;
         Ok(Self { world, recording, next: 0, recorder, true_cells: OnceLock::new() })
     }

@@ -7,7 +7,7 @@ use super::timetable::STEP_S;
 use crate::modem_rig::{SURFACE, VEHICLE};
 use scene_model::project::Pose;
 use scenecast_core::UserError;
-use scenecast_files::RecordedFrame;
+use scenecast_files::{FrameImage, RecordedFrame};
 use scenecast_host::{CameraPose, FrameEvent, SurfaceHostEvent, VehicleHostEvent};
 use scenecast_protocol::time::Instant;
 use scenecast_surface::SurfaceOutput;
@@ -23,7 +23,7 @@ impl Mission {
         let hosts = [self.vehicle.poll_timeout(now), self.surface.poll_timeout(now)];
         let script = self.script.poll_timeout().filter(|_| self.times.ended.is_none());
         let others = hosts.into_iter().chain([script, self.carrier.poll_timeout()]).flatten();
-        others.chain([self.times.next_event()]).min().unwrap_or(now)
+        others.chain(self.labels_due()).chain([self.times.next_event()]).min().unwrap_or(now)
     }
 
     pub(super) fn handle_timeouts(&mut self) -> Result<(), UserError> {
@@ -35,6 +35,7 @@ impl Mission {
         if now >= self.times.frame {
             self.take_frame()?;
         }
+        self.handle_labels();
         if self.times.takes_fix() {
             self.fix();
         }
@@ -160,7 +161,7 @@ impl Mission {
             NextFrame::Recorded(frame) => {
                 let RecordedFrame { x_m, y_m, heading_rad, depth_m, .. } = frame;
                 self.vehicle.handle_pose(CameraPose { x_m, y_m, heading_rad, depth_m }, now);
-                self.map(&frame.image()?, frame.scale)?;
+                self.map(&frame.image.read()?, frame.scale)?;
             }
             NextFrame::Simulated(image) => {
                 self.times.frame = self.times.frame + interval;
@@ -172,13 +173,16 @@ impl Mission {
 
     /// Records a frame and gives it to the mapper, at the pose that the vehicle estimates.
     fn map(&mut self, image: &image::RgbImage, scale: f64) -> Result<(), UserError> {
+        if self.labels.is_some() {
+            return Ok(());
+        }
         let now = self.times.now;
         let t_s = now.as_secs_f64();
         let navigator = self.vehicle.vehicle().navigator();
         let ((x_m, y_m), depth_m, heading_rad) =
             (navigator.dead_reckoned().xy(), navigator.depth_m(), navigator.heading_rad());
-        let file = Default::default();
-        self.camera.record(image, &RecordedFrame { t_s, file, x_m, y_m, depth_m, heading_rad, scale })?;
+        let shot = FrameImage::File(Default::default());
+        self.camera.record(image, &RecordedFrame { t_s, image: shot, x_m, y_m, depth_m, heading_rad, scale })?;
         if !self.mapper.takes(t_s) {
             return Ok(());
         }

@@ -6,6 +6,9 @@ mod blocks;
 mod camera;
 mod carrier;
 mod events;
+#[cfg(test)]
+mod label_tests;
+mod labels;
 mod logbook;
 mod meters;
 #[cfg(test)]
@@ -26,6 +29,7 @@ pub use accuracy::MapInformation;
 use anchored::Anchored;
 use camera::Camera;
 use carrier::Carrier;
+use labels::LabelReplay;
 pub use logbook::Leg;
 use logbook::Logbook;
 use meters::Meters;
@@ -63,6 +67,8 @@ pub struct Mission {
     pub(crate) mapper: Mapper,
     pub(crate) motion: Motion,
     pub(crate) camera: Camera,
+    /// Labels of another program, in place of those of the mapper.
+    labels: Option<LabelReplay>,
     anchored: Anchored,
     pub(crate) carrier: Carrier,
     script: Script,
@@ -80,6 +86,7 @@ impl Mission {
         let now = Instant::ZERO;
         let (mut carrier, [at_vehicle, at_surface]) = Carrier::new(&config, seed, now)?;
         let camera = Camera::new(&config, world, record.as_deref())?;
+        let labels = LabelReplay::new(&config)?;
         let area = camera.survey_area(&config)?;
         let vehicle = vehicle_host(&config, at_vehicle, area, seed, now)?;
         let mut surface = surface_host(&config, at_surface, seed, now)?;
@@ -110,6 +117,7 @@ impl Mission {
             surface,
             motion,
             camera,
+            labels,
             anchored,
             carrier,
         };

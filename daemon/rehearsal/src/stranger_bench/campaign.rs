@@ -203,6 +203,7 @@ impl Campaign {
                     Access::Shared => "shared",
                     Access::ModemOwned { .. } => "modem-owned",
                     Access::Polled => "polled",
+                    Access::FullDuplex => "full-duplex",
                 };
                 self.late.push(LateRecovery { seconds, dive: number, burst, access, state, kind });
             }

@@ -102,6 +102,9 @@ impl Sim {
         let mut progress = Progress::new("survey");
         mission.run(Duration::from_secs_f64(self.drain), &mut |share| progress.show(share))?;
         drop(progress);
+        for refused in mission.refused_labels() {
+            eprintln!("refused: {refused}");
+        }
         let report = report(&mission, &self.world.scenario_name());
         let seconds = started.elapsed().as_secs_f64();
         let speedup = mission.now().as_secs_f64() / seconds;

@@ -15,6 +15,8 @@ pub(crate) struct Frames {
     cell_m: f64,
     next: usize,
     unreadable: Vec<String>,
+    /// What of the recording is not among its frames.
+    notes: Vec<String>,
 }
 
 impl Frames {
@@ -24,8 +26,13 @@ impl Frames {
         metres_per_pixel: f64,
         cell_m: f64,
     ) -> Result<Self, UserError> {
-        let recording = Recording::open(dir, poses, metres_per_pixel)?;
-        Ok(Self { recording, extractor, metres_per_pixel, cell_m, next: 0, unreadable: Vec::new() })
+        Ok(Self::of(Recording::open(dir, poses, metres_per_pixel)?, extractor, metres_per_pixel, cell_m))
+    }
+
+    /// The frames of a recording that is open.
+    pub(crate) fn of(recording: Recording, extractor: WordExtractor, metres_per_pixel: f64, cell_m: f64) -> Self {
+        let notes = recording.notes.clone();
+        Self { recording, extractor, metres_per_pixel, cell_m, next: 0, unreadable: Vec::new(), notes }
     }
 }
 
@@ -34,7 +41,7 @@ impl WordSource for Frames {
         while let Some(frame) = self.recording.frames.get(self.next) {
             self.next += 1;
             let done = self.next as f64 / self.recording.frames.len() as f64;
-            let image = match frame.image() {
+            let image = match frame.image.read() {
                 Ok(image) => image,
                 Err(error) => {
                     self.unreadable.push(error.to_string());
@@ -46,7 +53,7 @@ impl WordSource for Frames {
             let cell_px = (self.cell_m / camera.metres_per_pixel) as f32;
             if f64::from(image.width().min(image.height())) < f64::from(cell_px) {
                 let (width, height) = image.dimensions();
-                let file = frame.file.display();
+                let file = &frame.image;
                 self.unreadable.push(format!("{file}: {width} x {height} pixels are less than a cell of {cell_px:.1}"));
                 continue;
             }
@@ -59,6 +66,9 @@ impl WordSource for Frames {
 
     fn skipped(&self) -> Option<String> {
         let (count, all) = (self.unreadable.len(), self.recording.frames.len());
-        self.unreadable.first().map(|first| format!("{count} of {all} frames skipped, the first: {first}"))
+        let unreadable =
+            self.unreadable.first().map(|first| format!("{count} of {all} frames skipped, the first: {first}"));
+        let notes: Vec<String> = self.notes.iter().cloned().chain(unreadable).collect();
+        (!notes.is_empty()).then(|| notes.join("; "))
     }
 }

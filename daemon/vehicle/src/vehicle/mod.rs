@@ -3,6 +3,7 @@
 //! [`Vehicle`] joins parts that own their state: the navigator estimates the position, the guidance chooses waypoints, the
 //! publisher selects the parts of the map that are sent, and the gallery sends exemplars.
 
+mod bands;
 mod durable;
 mod gallery;
 mod guidance;
@@ -20,6 +21,7 @@ pub use durable::{Durable, LostOrders};
 pub use storing::VehicleDisk;
 
 use super::failsafe::FailsafePolicy;
+use super::foreign::ForeignUpdate;
 use super::mapper::{MapUpdate, SharedExemplars};
 use super::navigator::Navigator;
 use super::registration::RegisteredFrame;
@@ -33,6 +35,8 @@ pub use publisher::MapSelection;
 use scenecast_protocol::coordinates::MapPoint;
 use scenecast_protocol::directive::{Fix, RefusalReason, Settings, SlotId, SlotState, Utility};
 use scenecast_protocol::link::{Transmit, VehicleEvent, VehicleLink, Wakeup};
+use scenecast_protocol::map::ClassEntry;
+use scenecast_protocol::map_codec::Codec;
 use scenecast_protocol::time::Instant;
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -86,6 +90,8 @@ pub struct Vehicle {
     outputs: VecDeque<VehicleOutput>,
     fixes_applied: u64,
     autopilot_silent: bool,
+    /// The codec of layers that are added.
+    codec: Codec,
 }
 
 impl Vehicle {
@@ -122,6 +128,7 @@ impl Vehicle {
             outputs: VecDeque::new(),
             fixes_applied: 0,
             autopilot_silent: false,
+            codec: Codec::Auto,
         };
         if vehicle.utility.is_none() && vehicle.durable.utility.take().is_some() {
             let other = SlotState::Refused(RefusalReason::OtherEpoch);
@@ -140,6 +147,11 @@ impl Vehicle {
     pub fn configure_map(&mut self, selection: MapSelection) {
         self.publisher.configure(selection);
         self.publisher.select(&mut self.link);
+    }
+
+    /// Sets the codec of the layers of bands.
+    pub fn set_codec(&mut self, codec: Codec) {
+        self.codec = codec;
     }
 
     /// For comparison: sends the whole map as a PNG file whenever it has changed, in place of the changes.
@@ -222,6 +234,15 @@ impl Vehicle {
         if is_more || !self.storing.is_refused() {
             self.outputs.push_back(VehicleOutput::Persist);
         }
+    }
+
+    /// Another program has a new map, with bands and names of its classes. Returns the label whose name is refused, because
+    /// it has another one already.
+    pub fn handle_foreign(&mut self, update: &ForeignUpdate, now: Instant) -> Option<u8> {
+        self.publisher.handle_bands(&update.bands, self.codec, &mut self.link);
+        self.handle_map(&update.map, now);
+        let mut refused = update.classes.iter().filter(|entry| !self.link.add_class(entry)).map(ClassEntry::label);
+        refused.next()
     }
 
     fn publish(&mut self, update: &MapUpdate, now: Instant) {

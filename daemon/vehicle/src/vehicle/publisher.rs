@@ -1,12 +1,13 @@
 //! The vehicle's map, and the choice of the cells and layers of it that are sent.
 
+use super::bands::Bands;
 use super::whole_png::WholePng;
 use crate::MapUpdate;
 use scenecast_config::Debounce;
 use scenecast_protocol::directive::{CellBand, Settings};
 use scenecast_protocol::link::VehicleLink;
-use scenecast_protocol::map::{Cell, LabelGrid, LayerId, LayerMask, UNEXPLORED};
-use scenecast_protocol::map_codec::Stride;
+use scenecast_protocol::map::{Cell, LabelGrid, LayerDescriptor, LayerId, LayerMask, UNEXPLORED};
+use scenecast_protocol::map_codec::{Codec, Stride};
 use scenecast_protocol::object::ObjectId;
 use scenecast_protocol::time::Instant;
 use std::collections::BTreeMap;
@@ -40,6 +41,8 @@ pub(super) struct MapPublisher {
     /// Every cell that the scene model has a label for.
     map: LabelGrid,
     version: u64,
+    /// Whether cells have lost their labels, as those of another program may.
+    has_erased: bool,
     layers: BTreeMap<LayerId, Vec<(Cell, f64)>>,
     labels: u8,
     explored: u32,
@@ -48,6 +51,8 @@ pub(super) struct MapPublisher {
     ordered_layers: Option<LayerMask>,
     /// Takes the place of the link's map, for comparison.
     whole_png: Option<WholePng>,
+    /// The layers of bands, which the vehicle adds when the first of their cells comes.
+    bands: Bands,
 }
 
 impl MapPublisher {
@@ -125,19 +130,40 @@ impl MapPublisher {
         let hold = self.configured.debounce.hold(link.budget_bps());
         link.source_mut().set_hold(hold);
         link.set_coarse_layers(is_coarse.then_some(0));
-        link.select_layers(self.ordered_layers.unwrap_or(self.configured.layers));
+        // An order that was given before a band came does not switch it off.
+        let selected = self.ordered_layers.unwrap_or(self.configured.layers);
+        link.select_layers(self.bands.added_to(selected));
     }
 
     /// Takes the scene model's map and gives the link its part of it.
     pub(super) fn handle_map(&mut self, update: &MapUpdate, link: &mut VehicleLink, now: Instant) {
         self.labels = update.labels;
-        self.explored = update.cells.len() as u32;
+        self.explored = update.cells.iter().filter(|&&(_, label)| label != UNEXPLORED).count() as u32;
         let changed = update.cells.iter().filter(|&&(cell, label)| self.map.set(cell, label) != label).count();
         self.version += u64::from(changed > 0);
-        self.layers.clone_from(&update.layers);
+        self.has_erased |= (self.explored as usize) < update.cells.len();
+        self.layers.retain(|id, _| self.bands.get(*id).is_some());
+        self.layers.extend(update.layers.iter().map(|(&id, cells)| (id, cells.clone())));
         match &mut self.whole_png {
             Some(whole) => whole.set(update.cells.iter().copied()),
             None => self.publish(link, now),
+        }
+    }
+
+    /// Takes the bands of another program, as layers, which [`Self::handle_map`] then gives to the link.
+    pub(super) fn handle_bands(
+        &mut self,
+        bands: &[(LayerDescriptor, Vec<(Cell, f64)>)],
+        codec: Codec,
+        link: &mut VehicleLink,
+    ) {
+        let before = self.bands.len();
+        for (descriptor, cells) in bands {
+            let Some(id) = self.bands.add(descriptor, codec, link) else { continue };
+            self.layers.insert(id, cells.clone());
+        }
+        if self.bands.len() > before {
+            self.select(link);
         }
     }
 
@@ -158,7 +184,11 @@ impl MapPublisher {
         let is_sent = |sent: &LabelGrid, cell: Cell| {
             !is_coarse || Stride::Four.on_lattice(cell).is_some() || sent.get(cell) != UNEXPLORED
         };
-        let cells: Vec<(Cell, u8)> = self.map.iter().filter(|&(cell, _)| is_sent(link.map(), cell)).collect();
+        let mut cells: Vec<(Cell, u8)> = self.map.iter().filter(|&(cell, _)| is_sent(link.map(), cell)).collect();
+        if self.has_erased {
+            let gone = link.map().iter().filter(|&(cell, _)| self.map.get(cell) == UNEXPLORED);
+            cells.extend(gone.map(|(cell, _)| (cell, UNEXPLORED)));
+        }
         link.set_map(cells, now);
         for (&id, cells) in &self.layers {
             let cells: Vec<(Cell, f64)> =

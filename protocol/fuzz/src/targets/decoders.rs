@@ -4,7 +4,9 @@ use super::raw::{self, Script};
 use scenecast_protocol::directive::{InForceDigests, InForcePart, REPORTED_SLOTS, Series, SlotState, VersionedSlot};
 use scenecast_protocol::link::{Admission, Flight, LinkWindow, SlotInbox};
 use scenecast_protocol::mac::ClockMap;
-use scenecast_protocol::map::{Assembly, LayerChunk, LayerDescriptor, LayerReplica, LayerSet};
+use scenecast_protocol::map::{
+    Assembly, ClassChunk, ClassEntry, ClassReplica, LayerChunk, LayerDescriptor, LayerReplica, LayerSet,
+};
 use scenecast_protocol::object::{MAX_OBJECT, ObjectReceiver, Part, Received};
 use scenecast_protocol::seal::{Direction, MissionKey};
 use scenecast_protocol::time::Instant;
@@ -170,8 +172,23 @@ pub fn status(data: &[u8]) {
     }
 }
 
+/// A decoded part of a name can be encoded and reads the same; an entry whose digest fits is sound.
+fn class_chunk(data: &[u8]) {
+    let Some(chunk) = ClassChunk::decode(data) else { return };
+    assert_eq!(chunk.encode(), data);
+    let digest = ClassEntry::digest_of(chunk.label, chunk.bytes);
+    let fitting = ClassChunk { digest, first: 0, is_last: true, ..chunk }.encode();
+    for chunk in [data, &fitting] {
+        let mut replica = ClassReplica::default();
+        let is_complete = replica.handle_chunk(chunk);
+        assert_eq!(is_complete == Some(true), replica.iter().count() == 1);
+        assert!(replica.iter().all(|e| ClassEntry::from_bytes(e.label(), &e.to_bytes()).as_ref() == Some(e)));
+    }
+}
+
 /// A decoded layer chunk can be encoded and reads the same; it is applied or refused, with levels in range.
 pub fn layer_chunk(data: &[u8]) {
+    class_chunk(data);
     let Some(chunk) = LayerChunk::decode(data) else { return };
     assert_eq!(chunk.encode(), data);
     let layers = LayerSet::default();

@@ -160,7 +160,8 @@ impl Setup {
 
     fn modem(self) -> ModemProfile {
         let access = match self.choice >> 2 & 3 {
-            0 | 1 => Access::Shared,
+            0 => Access::Shared,
+            1 => Access::FullDuplex,
             2 => Access::ModemOwned { pool_frames: 4 },
             _ => Access::Polled,
         };
@@ -227,7 +228,7 @@ impl<E: FuzzEnd> FuzzHost<'_, E> {
         let transmit = self.link.poll_transmit(now)?;
         self.in_modem += 1;
         let most = match self.modem.access {
-            Access::Shared => 1,
+            Access::Shared | Access::FullDuplex => 1,
             Access::ModemOwned { pool_frames } => pool_frames,
             Access::Polled => 300,
         };

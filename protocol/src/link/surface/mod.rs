@@ -19,7 +19,6 @@ pub use polled::Cycle;
 
 use crate::directive::{Series, Slot, SlotProgress, VersionedSlot};
 use crate::link::{DropReason, FrameNumber, Transmit};
-use crate::mac::Access;
 use crate::map::{Replica, StateReplica};
 use crate::schedule::{BitBudget, ClassShares, Shares};
 use crate::time::Instant;
@@ -87,6 +86,7 @@ impl<R: StateReplica> SurfaceLink<R> {
         let c = &self.config;
         let introduction = Introduction { cell_edge: c.cell_edge, series: Some(self.series) };
         let peer = VehiclePeer::new(c.mission, vehicle, c.authenticity.clone(), introduction, seed, c.master, now);
+        let peer = peer.with_modem(&c.modem);
         self.fleet.insert(vehicle, peer);
     }
 
@@ -259,7 +259,7 @@ impl<R: StateReplica> SurfaceLink<R> {
 
     /// The transmission that was handed out has left the modem.
     pub fn handle_transmit_outcome(&mut self, now: Instant) {
-        if let Access::ModemOwned { .. } = self.config.modem.access {
+        if self.config.modem.access.is_free() {
             self.budget.handle_delay(self.in_modem.len(), now);
         }
         let Some(sent) = self.in_modem.pop_front() else { return };

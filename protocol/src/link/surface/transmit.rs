@@ -20,8 +20,8 @@ impl<R: StateReplica> SurfaceLink<R> {
     pub fn poll_transmit(&mut self, now: Instant) -> Option<Transmit> {
         match self.config.modem.access {
             Access::Shared => self.poll_shared(now),
-            Access::ModemOwned { pool_frames } => self.poll_pool(pool_frames, now),
             Access::Polled => self.poll_polled(now),
+            access => self.poll_pool(access.pool_frames().unwrap_or(0), now),
         }
     }
 
@@ -29,7 +29,7 @@ impl<R: StateReplica> SurfaceLink<R> {
     #[must_use]
     pub fn poll_timeout(&self, now: Instant) -> Option<(Instant, Wakeup)> {
         let next = match self.config.modem.access {
-            Access::ModemOwned { .. } => self.fleet.next_without_turn(),
+            access if access.is_free() => self.fleet.next_without_turn(),
             _ if !self.in_modem.is_empty() => None,
             Access::Polled if !self.turn.is_empty() => self.cycle_gives_up_at(),
             _ => self.discovery.listens_until(now).or_else(|| self.fleet.next_turn(self.discovery.next_wakeup(now))),

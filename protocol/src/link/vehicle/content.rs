@@ -5,7 +5,7 @@ use super::in_force::{InForceSender, SentPart};
 use super::layers::LayerOut;
 use super::status::StatusSender;
 use crate::directive::{SLOTS, SlotReport};
-use crate::map::{LayerCarried, LayerId, StateSource};
+use crate::map::{ClassSource, LayerCarried, LayerId, StateSource};
 use crate::object::{ObjectId, ObjectSender, SymbolRun};
 use crate::schedule::{BackgroundOrder, BackgroundStream, BitBudget, Class, ClassShares, Shares};
 use crate::time::Instant;
@@ -16,6 +16,8 @@ use std::time::Duration;
 #[derive(Debug)]
 pub(super) enum Part<C> {
     Map(C),
+    /// A label and bytes of its name and colour.
+    LabelClass((u8, usize)),
     Layer(LayerId, LayerCarried),
     LayerDigest(LayerId),
     Object(ObjectId, SymbolRun),
@@ -27,7 +29,7 @@ pub(super) enum Part<C> {
 impl<C> Part<C> {
     pub(super) fn class(&self) -> Class {
         match self {
-            Self::Map(_) => Class::Map,
+            Self::Map(_) | Self::LabelClass(_) => Class::Map,
             Self::Layer(id, _) | Self::LayerDigest(id) => Class::Layer(*id),
             Self::Object(..) => Class::Exemplar,
             Self::Pose | Self::Report | Self::InForce(_) => Class::Status,
@@ -52,6 +54,7 @@ pub(super) struct FillContext<'a> {
 #[derive(Debug)]
 pub(super) struct VehicleContent<S> {
     pub(super) source: S,
+    pub(super) classes: ClassSource,
     pub(super) layers: Vec<LayerOut>,
     pub(super) objects: ObjectSender,
     pub(super) shares: ClassShares,
@@ -69,6 +72,7 @@ impl<S: StateSource> VehicleContent<S> {
     pub(super) fn new(source: S, shares: Shares, status_period: Duration, now: Instant) -> Self {
         Self {
             source,
+            classes: ClassSource::default(),
             layers: Vec::new(),
             objects: ObjectSender::default(),
             shares: ClassShares::new(shares),
@@ -90,6 +94,7 @@ impl<S: StateSource> VehicleContent<S> {
     /// The surface holds none of our state any more.
     pub(super) fn handle_peer_restart(&mut self, now: Instant) {
         self.source.handle_peer_restart(now);
+        self.classes.handle_peer_restart();
         self.layers.iter_mut().for_each(|l| l.source.handle_peer_restart(now));
         self.objects.handle_peer_restart();
         self.in_force.handle_peer_restart();
@@ -99,12 +104,13 @@ impl<S: StateSource> VehicleContent<S> {
 
     /// Whether the surface is known to hold the replicated state, its layers, and every object.
     pub(super) fn is_converged(&self) -> bool {
-        self.source.is_converged() && self.layers().all(StateSource::is_converged) && self.objects.is_empty()
+        let is_map_converged = self.source.is_converged() && self.classes.is_converged();
+        is_map_converged && self.layers().all(StateSource::is_converged) && self.objects.is_empty()
     }
 
     /// Whether no content waits that could be sent now.
     pub(super) fn is_idle(&self, budget: &BitBudget, now: Instant) -> bool {
-        let is_quiet = self.source.is_quiet() && self.background_is_quiet(budget, now);
+        let is_quiet = self.source.is_quiet() && self.classes.is_converged() && self.background_is_quiet(budget, now);
         is_quiet && self.objects.has_only_background() && self.in_force.backlog_bytes() == 0
     }
 
@@ -117,25 +123,30 @@ impl<S: StateSource> VehicleContent<S> {
     /// The expected backlog, for the operator.
     fn backlog(&self, budget: &BitBudget, now: Instant) -> Backlog {
         let bytes = |n: usize| u32::try_from(n).unwrap_or(u32::MAX);
+        let map = self.source.expected_backlog_bytes() + self.classes.backlog_bytes();
         let others = self.shared_layer_backlog() + self.objects.backlog_bytes() + self.background_backlog(budget, now);
-        Backlog { map_bytes: bytes(self.source.expected_backlog_bytes()), other_bytes: bytes(others) }
+        Backlog { map_bytes: bytes(map), other_bytes: bytes(others) }
     }
 
     /// About how many bytes wait and may be sent.
     pub(super) fn backlog_bytes(&self, budget: &BitBudget, now: Instant) -> usize {
-        let own = self.source.backlog_bytes() + self.shared_layer_backlog() + self.objects.backlog_bytes();
+        let own = self.source.backlog_bytes()
+            + self.classes.backlog_bytes()
+            + self.shared_layer_backlog()
+            + self.objects.backlog_bytes();
         own + self.in_force.backlog_bytes() + self.background_backlog(budget, now)
     }
 
     /// Whether changes of the state or of its layers wait.
     pub(super) fn has_news(&self) -> bool {
-        self.source.backlog_bytes() > 0 || self.shared_layer_backlog() > 0
+        self.source.backlog_bytes() > 0 || self.classes.backlog_bytes() > 0 || self.shared_layer_backlog() > 0
     }
 
     /// The fate of a chunk is known; returns the object that is complete with it.
     pub(super) fn handle_fate(&mut self, part: Part<S::Carried>, delivered: bool, now: Instant) -> Option<ObjectId> {
         match part {
             Part::Map(carried) => self.source.handle_fate(carried, delivered, now),
+            Part::LabelClass(carried) => self.classes.handle_fate(carried, delivered),
             Part::Layer(id, carried) => {
                 if let Some(layer) = self.layer_mut(id) {
                     layer.source.handle_fate(carried, delivered, now);
@@ -231,7 +242,7 @@ impl<S: StateSource> VehicleContent<S> {
     fn waiting(&self, now: Instant) -> Vec<Class> {
         [
             (self.status.is_waiting(now) || self.in_force.backlog_bytes() > 0, Class::Status),
-            (self.source.backlog_bytes() > 0 && !self.is_refining(), Class::Map),
+            (self.source.backlog_bytes() > 0 && !self.is_refining() || self.classes.backlog_bytes() > 0, Class::Map),
             (self.objects.backlog_bytes() > 0, Class::Exemplar),
         ]
         .into_iter()
@@ -287,7 +298,24 @@ impl<S: StateSource> VehicleContent<S> {
         }
     }
 
+    /// Puts a part of the name of a label into a frame; returns whether there was one. A frame has one at most, so that
+    /// cells do not wait for all names.
+    fn fill_name(&mut self, builder: &mut FrameBuilder, carried: &mut Carried<S::Carried>) -> bool {
+        // The kind takes a byte of the payload.
+        let room = room_for_payload(builder.room()).saturating_sub(1);
+        let Some((bytes, part)) = self.classes.next_chunk(room) else { return false };
+        let fits = builder.push(ChunkKind::LabelClass, &bytes);
+        match fits {
+            true => carried.push((Part::LabelClass(part), bytes.len())),
+            false => self.classes.handle_fate(part, false),
+        }
+        fits
+    }
+
     fn fill_map(&mut self, builder: &mut FrameBuilder, carried: &mut Carried<S::Carried>, now: Instant) {
+        if !carried.iter().any(|(part, _)| matches!(part, Part::LabelClass(_))) && self.fill_name(builder, carried) {
+            return;
+        }
         let room = room_for_payload(builder.room());
         let Some((bytes, content)) = self.source.next_chunk(room, now) else { return };
         if builder.push(ChunkKind::Map, &bytes) {

@@ -1,5 +1,6 @@
 //! How often the vehicle answers hellos, which may be replays.
 
+use crate::mac::Access;
 use crate::time::Instant;
 use std::time::Duration;
 
@@ -16,6 +17,7 @@ pub(super) struct HelloLimit {
     repeats: u32,
     /// When it is repeated next.
     next_repeat: Option<Instant>,
+    repeat_interval: Duration,
 }
 
 impl HelloLimit {
@@ -25,9 +27,18 @@ impl HelloLimit {
     const COPIES: Duration = Duration::from_millis(1500);
     const REPEATS: u32 = 3;
     const REPEAT_INTERVAL: Duration = Duration::from_secs(10);
+    /// The same over a medium that carries both directions at once, beyond the time of copies.
+    const FULL_DUPLEX_INTERVAL: Duration = Duration::from_secs(2);
 
-    pub(super) fn new(now: Instant) -> Self {
-        Self { left: Self::MAX_ANSWERS, since: now, admitted: None, repeats: 0, next_repeat: None }
+    pub(super) fn new(access: Access, now: Instant) -> Self {
+        let repeat_interval =
+            if access == Access::FullDuplex { Self::FULL_DUPLEX_INTERVAL } else { Self::REPEAT_INTERVAL };
+        Self { left: Self::MAX_ANSWERS, since: now, admitted: None, repeats: 0, next_repeat: None, repeat_interval }
+    }
+
+    /// Time after which an answer is repeated that the surface has not used.
+    pub(super) fn repeat_interval(&self) -> Duration {
+        self.repeat_interval
     }
 
     /// Whether a hello that came in may be answered.
@@ -55,7 +66,7 @@ impl HelloLimit {
 
     /// An admitted hello named the current run: a repeated answer to another run must not displace its answer.
     pub(super) fn handle_known(&mut self, now: Instant) {
-        self.next_repeat = self.next_repeat.map(|at| at.max(now + Self::REPEAT_INTERVAL));
+        self.next_repeat = self.next_repeat.map(|at| at.max(now + self.repeat_interval));
     }
 
     /// The surface uses the current run, so a hello that names another one is not repeated.
@@ -65,7 +76,7 @@ impl HelloLimit {
 
     /// An answer was written.
     pub(super) fn note_answer(&mut self, now: Instant) {
-        self.next_repeat = (self.repeats > 0).then(|| now + Self::REPEAT_INTERVAL);
+        self.next_repeat = (self.repeats > 0).then(|| now + self.repeat_interval);
     }
 
     /// When the last answer is to be repeated, whatever else goes out meanwhile.
@@ -91,7 +102,7 @@ mod tests {
     #[test]
     fn a_storm_of_hellos_is_answered_once_in_three_seconds() {
         let begin = Instant::from_secs_f64(100.0);
-        let mut limit = HelloLimit::new(begin);
+        let mut limit = HelloLimit::new(Access::Shared, begin);
         let at = |ms: u64| begin + Duration::from_millis(ms);
         let admitted = (0..1000).filter(|&i| limit.admit(at(i * 100))).count();
         assert_eq!(admitted, 8 + 33);
@@ -101,7 +112,7 @@ mod tests {
     #[test]
     fn an_answer_is_repeated_three_times_until_a_numbered_frame_comes_in() {
         let begin = Instant::from_secs_f64(100.0);
-        let mut limit = HelloLimit::new(begin);
+        let mut limit = HelloLimit::new(Access::Shared, begin);
         let repeats = |limit: &mut HelloLimit| {
             assert!(limit.admit(begin));
             limit.handle_offer();
@@ -110,7 +121,7 @@ mod tests {
             times.filter(|&now| limit.repeat(now).then(|| limit.note_answer(now)).is_some()).count()
         };
         assert_eq!(repeats(&mut limit), 3);
-        let mut limit = HelloLimit::new(begin);
+        let mut limit = HelloLimit::new(Access::Shared, begin);
         assert!(limit.admit(begin));
         limit.note_answer(begin);
         limit.handle_numbered();
@@ -120,7 +131,7 @@ mod tests {
     #[test]
     fn an_answer_to_another_run_never_displaces_those_to_the_current_run() {
         let begin = Instant::from_secs_f64(100.0);
-        let mut limit = HelloLimit::new(begin);
+        let mut limit = HelloLimit::new(Access::Shared, begin);
         assert!(limit.admit(begin));
         limit.handle_offer();
         limit.note_answer(begin);

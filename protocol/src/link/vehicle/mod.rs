@@ -12,6 +12,7 @@ mod event;
 mod hellos;
 mod in_force;
 mod layers;
+mod probe;
 mod receive;
 mod repeat;
 mod status;
@@ -24,7 +25,7 @@ pub use event::{OversizedChunk, VehicleEvent};
 use super::{LinkPair, LinkStats, SlotInbox, SlotInboxState, Wakeup};
 use crate::directive::{Budget, Slot, SlotId, SlotState};
 use crate::mac::{Access, ClockMap, Floor};
-use crate::map::{Cell, LabelGrid, LayerId, LayerMask, LayerSource, MapSource, StateSource};
+use crate::map::{Cell, ClassEntry, ClassSource, LabelGrid, LayerId, LayerMask, LayerSource, MapSource, StateSource};
 use crate::object::ObjectId;
 use crate::schedule::{BackgroundOrder, BitBudget, Shares};
 use crate::time::Instant;
@@ -32,6 +33,7 @@ use crate::wire::{Address, Introduction, VehicleStatus};
 use content::{Carried, VehicleContent};
 use discovery::CallReply;
 use hellos::HelloLimit;
+use probe::TailProbe;
 use repeat::Repeater;
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -50,6 +52,7 @@ pub struct VehicleLink<S: StateSource = MapSource> {
     timing: SurfaceTiming,
     call_reply: CallReply,
     hello_limit: HelloLimit,
+    probe: TailProbe,
     /// Where the modem decides when to transmit: when an acknowledgement or a hello is due.
     answer_due: Option<Instant>,
     /// When the budget allows the next frame, if it did not allow the last one that was wanted.
@@ -60,7 +63,14 @@ pub struct VehicleLink<S: StateSource = MapSource> {
 impl<S: StateSource> VehicleLink<S> {
     /// An end without contact that replicates `source`. `seed` must be random for each run; `restored` is the state
     /// that survived the last one.
-    pub fn with_source(config: VehicleConfig, source: S, seed: u64, restored: SlotInboxState, now: Instant) -> Self {
+    pub fn with_source(
+        config: VehicleConfig,
+        mut source: S,
+        seed: u64,
+        restored: SlotInboxState,
+        now: Instant,
+    ) -> Self {
+        source.set_quick(config.modem.access == Access::FullDuplex);
         let introduction = Introduction { cell_edge: config.cell_edge, series: None };
         let (mission, authenticity) = (config.mission, config.authenticity.clone());
         let mut link = Self {
@@ -72,7 +82,8 @@ impl<S: StateSource> VehicleLink<S> {
             repeater: Repeater::default(),
             timing: SurfaceTiming::default(),
             call_reply: CallReply::new(seed),
-            hello_limit: HelloLimit::new(now),
+            hello_limit: HelloLimit::new(config.modem.access, now),
+            probe: TailProbe::default(),
             answer_due: None,
             blocked_until: None,
             events: VecDeque::new(),
@@ -94,9 +105,26 @@ impl<S: StateSource> VehicleLink<S> {
     }
 
     /// Replicates a layer beside the state, from now on; returns `false` if a layer with its index exists.
-    pub fn add_layer(&mut self, layer: LayerSource) -> bool {
+    pub fn add_layer(&mut self, mut layer: LayerSource) -> bool {
         self.repeater.forget();
+        layer.set_quick(self.config.modem.access == Access::FullDuplex);
         self.content.add_layer(layer)
+    }
+
+    /// Announces the name and the colour of a label. A label keeps its first name until [`Self::begin_epoch`]: returns whether
+    /// this entry is the one that is announced.
+    pub fn add_class(&mut self, entry: &ClassEntry) -> bool {
+        let waiting = self.content.classes.backlog_bytes();
+        let is_first = self.content.classes.add(entry);
+        if self.content.classes.backlog_bytes() > waiting {
+            self.repeater.forget();
+        }
+        is_first
+    }
+
+    /// The announced names of labels.
+    pub fn classes(&self) -> &ClassSource {
+        &self.content.classes
     }
 
     /// The layers that are sent: those that are selected and have a share or are a background stream.
@@ -275,7 +303,7 @@ impl<S: StateSource> VehicleLink<S> {
 
     /// The transmission that was handed out has left the modem.
     pub fn handle_transmit_outcome(&mut self, now: Instant) {
-        if let Access::ModemOwned { .. } = self.config.modem.access {
+        if self.config.modem.access.is_free() {
             self.budget.handle_delay(self.floor.in_modem() as usize, now);
         }
         self.floor.handle_sent();
@@ -302,6 +330,7 @@ impl<S: StateSource> VehicleLink<S> {
     fn forget_peer(&mut self, now: Instant) {
         self.content.handle_peer_restart(now);
         self.timing.handle_peer_restart();
+        self.probe = TailProbe::default();
         self.repeater.forget();
     }
 
@@ -338,6 +367,7 @@ impl VehicleLink {
     /// Empties the map and begins a new run, so that label ids can be assigned again.
     pub fn begin_epoch(&mut self, now: Instant) {
         self.content.source.clear(now);
+        self.content.classes.clear();
         self.content.layers.iter_mut().for_each(|l| l.source.clear(now));
         self.renew(now);
         self.cancel_objects();

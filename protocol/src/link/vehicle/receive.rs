@@ -5,7 +5,7 @@ use super::discovery::CallReply;
 use super::{VehicleEvent, VehicleLink};
 use crate::directive::{InForceDigests, Slot, VersionedSlot};
 use crate::link::{Admission, DropReason};
-use crate::mac::{Access, Grant};
+use crate::mac::Grant;
 use crate::map::StateSource;
 use crate::time::Instant;
 use crate::wire::{Address, ChunkKind, Envelope, Header};
@@ -126,6 +126,9 @@ impl<S: StateSource> VehicleLink<S> {
     }
 
     fn handle_fates(&mut self, fates: Vec<(Carried<S::Carried>, bool)>, now: Instant) {
+        if !fates.is_empty() {
+            self.probe.handle_fates(self.pair.outstanding());
+        }
         for (carried, delivered) in fates {
             for (part, bytes) in carried {
                 if delivered {
@@ -162,11 +165,10 @@ impl<S: StateSource> VehicleLink<S> {
     /// Where the modem decides when to transmit, an acknowledgement or hello goes out within a second,
     /// by itself if need be. The first frames after a frame of the surface carry it, as those of a turn do.
     fn owe_answer(&mut self, now: Instant) {
-        if matches!(self.config.modem.access, Access::ModemOwned { .. })
-            && (self.pair.unstated() > 0 || self.pair.must_send_hello())
-        {
+        if self.config.modem.access.is_free() && (self.pair.unstated() > 0 || self.pair.must_send_hello()) {
             self.begin_turn();
-            self.answer_due.get_or_insert(now + Duration::from_secs(1));
+            let wait = self.config.modem.answer_wait(Duration::from_secs(1));
+            self.answer_due.get_or_insert(now + wait);
         }
     }
 }

@@ -54,6 +54,11 @@ impl<S: StateSource> VehicleLink<S> {
             self.renew(now);
         }
         let (transmit, last) = self.next_frame(frames, now);
+        if modem.access == Access::FullDuplex {
+            let round_trip = self.timing.one_way().unwrap_or_default() * 2;
+            let wait = modem.answer_wait(Duration::ZERO) * 2 + modem.airtime(transmit.bytes.len()) + round_trip;
+            self.probe.handle_transmit(wait, now);
+        }
         self.floor.spend(last);
         self.budget.spend(modem.bits_on_air(transmit.bytes.len()), now);
         Some(transmit)
@@ -88,22 +93,24 @@ impl<S: StateSource> VehicleLink<S> {
     }
 
     fn has_reason_to_transmit(&self, now: Instant) -> bool {
-        if !matches!(self.config.modem.access, Access::ModemOwned { .. }) {
+        if !self.config.modem.access.is_free() {
             return true;
         }
         let is_repeat_due = self.hello_limit.next_repeat().is_some_and(|at| now >= at);
-        let answer = self.is_answer_due(now) || is_repeat_due || self.call_reply.is_pending();
+        let is_probe_due = self.probe.is_due(now) && self.pair.has_run();
+        let answer = is_probe_due || self.is_answer_due(now) || is_repeat_due || self.call_reply.is_pending();
         let news = self.content.backlog_bytes(&self.budget, now) > 0;
         answer || (self.pair.has_run() && (news || self.content.status.is_waiting(now)))
     }
 
     pub(super) fn next_wakeup(&self) -> Option<Instant> {
-        if !matches!(self.config.modem.access, Access::ModemOwned { .. }) {
+        if !self.config.modem.access.is_free() {
             return self.floor.next_wakeup();
         }
         let status = self.content.status.next_due().filter(|_| self.pair.has_run());
         let held = self.content.next_due().filter(|_| self.pair.has_run());
-        let due = [status, held, self.answer_due, self.hello_limit.next_repeat()].into_iter().flatten().min();
+        let probe = self.probe.due().filter(|_| self.pair.has_run());
+        let due = [status, held, probe, self.answer_due, self.hello_limit.next_repeat()].into_iter().flatten().min();
         match self.blocked_until {
             Some(blocked) => Some(due.map_or(blocked, |at| at.max(blocked))),
             None => due,
@@ -148,7 +155,7 @@ impl<S: StateSource> VehicleLink<S> {
     }
 
     fn plan(&self, frames: u32, now: Instant) -> FramePlan {
-        if matches!(self.config.modem.access, Access::ModemOwned { .. }) {
+        if self.config.modem.access.is_free() {
             return FramePlan { remaining: 0, is_last_new: false };
         }
         let wanted = self.frames_wanted(now);
@@ -163,7 +170,7 @@ impl<S: StateSource> VehicleLink<S> {
         let size = modem.frame_bytes;
         // Where the surface polls or grants turns, content shows that it uses the current run: a late hello alone is no reason
         // to leave it.
-        let may_repeat = matches!(modem.access, Access::ModemOwned { .. }) || self.is_answer_due(now);
+        let may_repeat = modem.access.is_free() || self.is_answer_due(now);
         if may_repeat && self.hello_limit.repeat(now) {
             self.pair.repeat_hello();
         }
@@ -180,7 +187,7 @@ impl<S: StateSource> VehicleLink<S> {
             carried = self.content.fill(&mut builder, &context);
             self.events.extend(self.content.oversized.take().map(VehicleEvent::Oversized));
         }
-        let takes_turns = !matches!(modem.access, Access::ModemOwned { .. });
+        let takes_turns = !modem.access.is_free();
         let is_complete = takes_turns && !sends_hello && self.content.backlog_bytes(&self.budget, now) == 0;
         if is_complete {
             self.repeater.note_complete();
@@ -208,7 +215,7 @@ impl<S: StateSource> VehicleLink<S> {
         if sends_hello {
             self.hello_limit.note_answer(now);
         }
-        self.answer_due = sends_hello.then(|| now + Duration::from_secs(10));
+        self.answer_due = sends_hello.then(|| now + self.hello_limit.repeat_interval());
         (transmit, last && takes_turns)
     }
 

@@ -35,6 +35,24 @@ impl Decimal {
         Self { digits, exponent }
     }
 
+    /// The nearest number to `value` with up to six significant digits, as people write them.
+    pub fn nearest(value: f64) -> Self {
+        const DIGITS: i32 = 6;
+        if value == 0.0 || !value.is_finite() {
+            return Self::ZERO;
+        }
+        let exponent = (value.abs().log10().floor() as i32 + 1 - DIGITS).max(-i32::from(Self::MAX_EXPONENT));
+        let (mut digits, mut exponent) = ((value / 10f64.powi(exponent)).round() as i32, exponent);
+        while digits != 0 && digits % 10 == 0 {
+            (digits, exponent) = (digits / 10, exponent + 1);
+        }
+        // A number without decimals needs no exponent.
+        while (1..=3).contains(&exponent) && digits.abs() <= Self::MAX_DIGITS / 10 {
+            (digits, exponent) = (digits * 10, exponent - 1);
+        }
+        Self::new(digits, exponent as i8)
+    }
+
     /// As a binary number, the nearest one where the exponent is at most 0.
     pub fn value(self) -> f64 {
         let power = 10f64.powi(i32::from(self.exponent.abs()));
@@ -63,6 +81,17 @@ mod tests {
         assert_eq!((Decimal::new(-3, 2).encode(), Decimal::new(-3, 2).value()), ([0xFF, 0xFF, 0xFD, 2], -300.0));
         assert_eq!(Decimal::new(i32::MIN, 100), Decimal::new(-8_388_608, 9));
         assert_eq!(Decimal::decode([0, 0, 1, 10]), None);
+    }
+
+    #[test]
+    fn a_number_of_a_person_becomes_the_decimal_that_was_written() {
+        for (value, digits, exponent) in [(0.5, 5, -1), (-80.0, -80, 0), (0.0, 0, 0), (1e9, 1, 9), (0.001_25, 125, -5)]
+        {
+            assert_eq!(Decimal::nearest(value), Decimal::new(digits, exponent), "{value}");
+        }
+        assert_eq!(Decimal::nearest(1.0 / 3.0), Decimal::new(333_333, -6));
+        assert_eq!([f64::NAN, f64::INFINITY].map(Decimal::nearest), [Decimal::ZERO; 2]);
+        assert!((Decimal::nearest(-1e-9).value() + 1e-9).abs() < 1e-15);
     }
 
     proptest! {

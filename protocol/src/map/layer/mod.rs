@@ -111,6 +111,10 @@ impl StateSource for LayerSource {
         Some((LayerChunk::Patch(self.id, &patch).encode(), LayerCarried::Levels(carried)))
     }
 
+    fn set_quick(&mut self, is_quick: bool) {
+        self.levels.set_quick(is_quick);
+    }
+
     fn handle_fate(&mut self, carried: Self::Carried, delivered: bool, now: Instant) {
         match carried {
             LayerCarried::Descriptor(bytes) => self.announcement.handle_fate(bytes, delivered),

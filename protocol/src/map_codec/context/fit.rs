@@ -45,6 +45,49 @@ pub(in crate::map_codec) fn best_chunk(base: Lattice<'_>, growth: &Growth, room:
     Some(longer.filter(|chunk| holds_seed(chunk) && chunk.changes.len() > best.changes.len()).unwrap_or(best))
 }
 
+/// A chunk of at most `room` bytes along `growth`, with as many changes as fit if each takes `bytes_per_change`; `None` if not
+/// even its seed fits.
+pub(in crate::map_codec) fn quick_chunk(
+    base: Lattice<'_>,
+    growth: &Growth,
+    room: usize,
+    bytes_per_change: f64,
+) -> Option<MapChunk> {
+    let aim = (room as f64 * QUICK_FILL / bytes_per_change.max(1e-3)) as usize;
+    let mut guess = growth.changes.partition_point(|&changes| changes <= aim).max(1) - 1;
+    let mut best: Option<MapChunk> = None;
+    for _ in 0..QUICK_TRIALS {
+        let patch = growth.window.patch(growth.areas[guess]).trimmed()?;
+        let (bytes, reach) = write_whole(base, &patch, room);
+        let cells = growth.areas[guess].cells();
+        if !reach.all {
+            if best.is_some() || guess == 0 {
+                break;
+            }
+            guess = growth.areas.partition_point(|area| area.cells() <= reach.cells * 7 / 8).clamp(1, guess) - 1;
+            continue;
+        }
+        let (length, more) = (bytes.len(), guess + 1 < growth.areas.len());
+        best = Some(chunk(&patch, bytes));
+        if !more || length as f64 >= room as f64 * QUICK_ENOUGH {
+            break;
+        }
+        let goal = (cells as f64 * room as f64 * QUICK_FILL / length as f64) as usize;
+        let larger = growth.areas.partition_point(|area| area.cells() <= goal).saturating_sub(1);
+        if larger <= guess {
+            break;
+        }
+        guess = larger;
+    }
+    best.or_else(|| best_chunk(base, growth, room))
+}
+
+/// The part of the room that a quick chunk is made for, and the part that is enough.
+const QUICK_FILL: f64 = 0.92;
+const QUICK_ENOUGH: f64 = 0.7;
+/// Patches to code for a quick chunk.
+const QUICK_TRIALS: usize = 3;
+
 /// Patches to code before one that fits is accepted.
 const TRIALS: usize = 4;
 /// Percentage of the room that is full enough to stop the search.

@@ -25,7 +25,7 @@ use crate::grid::Rect;
 use crate::map_codec::lattice::Lattice;
 use arith::{Decoder, Encoder};
 use canvas::Canvas;
-pub(super) use fit::{best_chunk, prefix_chunk};
+pub(super) use fit::{best_chunk, prefix_chunk, quick_chunk};
 use model::Model;
 use prior::Prior;
 

@@ -7,7 +7,7 @@ import { store } from "../store.js";
 
 export function editLabel(label) {
   const dialog = $("dialog");
-  const name = h("input", { type: "text", maxLength: 40, value: hasName(label.id) ? nameOf(label.id) : "", placeholder: `Label ${label.id}` });
+  const name = h("input", { type: "text", maxLength: 60, value: hasName(label.id) ? nameOf(label.id) : "", placeholder: `Label ${label.id}` });
   const colour = h("input", { type: "color", value: colourOf(label.id) });
   const others = shownLabels(store.vehicle).filter((l) => l.id !== label.id);
   const into = h("select", {}, h("option", { value: "" }, "not merged"),

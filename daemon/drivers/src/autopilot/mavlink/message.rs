@@ -1,6 +1,6 @@
 //! The MAVLink messages that the driver uses, in the units of MAVLink.
 //!
-//! These are eleven of about three hundred messages. A generated dialect would contain all of them: 1.6 MB of source
+//! These are seventeen of about three hundred messages. A generated dialect would contain all of them: 1.6 MB of source
 //! and a quarter more time for a clean build. It would also reject messages whose enumerations are newer than the
 //! dialect. The layouts are from `common.xml` of MAVLink; the tests compare them with bytes that pymavlink wrote.
 
@@ -16,8 +16,14 @@ pub enum Heard {
         autopilot: u8,
         base_mode: u8,
     },
-    /// ATTITUDE: yaw clockwise from north, radians.
-    Attitude { yaw: f32 },
+    /// ATTITUDE, radians: starboard down, bow up, clockwise from north.
+    Attitude {
+        /// Milliseconds since the autopilot started.
+        time_boot_ms: u32,
+        roll: f32,
+        pitch: f32,
+        yaw: f32,
+    },
     /// LOCAL_POSITION_NED: metres and metres a second; north, east, down.
     Local {
         /// Milliseconds since the autopilot started.
@@ -37,6 +43,20 @@ pub enum Heard {
         /// Hundredths of a degree; 65535 = not known.
         heading: u16,
     },
+    /// NAV_CONTROLLER_OUTPUT: metres to the autopilot's own waypoint.
+    WaypointDistance(u16),
+    /// POSITION_TARGET_LOCAL_NED: north and east in its own frame, metres; `None` if its target is no position.
+    LocalTarget(Option<[f32; 2]>),
+    /// POSITION_TARGET_GLOBAL_INT: degrees times ten million; `None` if its target is no position.
+    GlobalTarget(Option<(i32, i32)>),
+    /// DISTANCE_SENSOR that looks down: metres along its beam; `None` if that is out of its range.
+    DistanceDown(Option<f32>),
+    /// DISTANCE_SENSOR in another direction.
+    DistanceElsewhere,
+    /// RANGEFINDER: metres along the beam of a sensor that looks down.
+    Rangefinder(f32),
+    /// ALTITUDE: metres above the sea floor; `None` if they are not known.
+    Altitude(Option<f32>),
     Ack {
         command: u16,
         /// MAV_RESULT: 0 accepted, 5 in progress; the rest is a refusal.
@@ -77,7 +97,13 @@ pub fn heard_extra(id: u32) -> Option<u8> {
         30 => 39,
         32 => 185,
         33 => 104,
+        62 => 183,
         77 => 143,
+        85 => 140,
+        87 => 150,
+        132 => 85,
+        141 => 47,
+        173 => 83,
         253 => 83,
         _ => return None,
     })
@@ -126,10 +152,7 @@ impl Heard {
         let mut f = Fields(payload);
         let read = match id {
             0 => Self::Heartbeat { custom_mode: f.u32(), kind: f.u8(), autopilot: f.u8(), base_mode: f.u8() },
-            30 => {
-                f.take::<12>();
-                Self::Attitude { yaw: f.f32() }
-            }
+            30 => Self::Attitude { time_boot_ms: f.u32(), roll: f.f32(), pitch: f.f32(), yaw: f.f32() },
             32 => Self::Local {
                 time_boot_ms: f.u32(),
                 place: [f.f32(), f.f32(), f.f32()],
@@ -148,6 +171,41 @@ impl Heard {
                     heading: f.u16(),
                 }
             }
+            62 => {
+                f.take::<24>();
+                Self::WaypointDistance(f.u16())
+            }
+            85 => {
+                f.u32();
+                let place = [f.f32(), f.f32()];
+                f.take::<36>();
+                Self::LocalTarget(is_position(f.u16()).then_some(place))
+            }
+            87 => {
+                f.u32();
+                let place = (f.i32(), f.i32());
+                f.take::<36>();
+                Self::GlobalTarget(is_position(f.u16()).then_some(place))
+            }
+            132 => {
+                f.u32();
+                let (least, most, now) = (f.u16(), f.u16(), f.u16());
+                f.u16();
+                match f.u8() {
+                    LOOKS_DOWN => {
+                        let is_in_range = now > 0 && (least..=most).contains(&now);
+                        Self::DistanceDown(is_in_range.then_some(f32::from(now) / 100.0))
+                    }
+                    _ => Self::DistanceElsewhere,
+                }
+            }
+            141 => {
+                f.take::<24>();
+                let (terrain, clearance) = (f.f32(), f.f32());
+                // Unknown clearances are negative, unknown heights above the terrain are -1000 and less.
+                Self::Altitude([clearance, terrain].into_iter().find(|m| m.is_finite() && *m > 0.0))
+            }
+            173 => Self::Rangefinder(f.f32()),
             77 => Self::Ack { command: f.u16(), result: f.u8() },
             253 => {
                 let severity = f.u8();
@@ -158,12 +216,22 @@ impl Heard {
             _ => return None,
         };
         let is_sound = match &read {
-            Self::Attitude { yaw } => yaw.is_finite(),
+            Self::Attitude { roll, pitch, yaw, .. } => [roll, pitch, yaw].into_iter().all(|v| v.is_finite()),
+            Self::LocalTarget(Some(place)) => place.iter().all(|v| v.is_finite()),
+            Self::Rangefinder(distance) => distance.is_finite(),
             Self::Local { place, velocity, .. } => place.iter().chain(velocity).all(|v| v.is_finite()),
             _ => true,
         };
         is_sound.then_some(read)
     }
+}
+
+/// MAV_SENSOR_ROTATION_PITCH_270.
+const LOOKS_DOWN: u8 = 25;
+
+/// Whether a target with this mask of ignored fields has a position.
+fn is_position(ignored: u16) -> bool {
+    ignored & 0b11 == 0
 }
 
 /// Every field of a position target but the position is to be ignored.
@@ -262,6 +330,60 @@ mod tests {
         let mut nan = vec![0; 28];
         nan[4..8].copy_from_slice(&f32::NAN.to_le_bytes());
         assert_eq!(Heard::read(32, &nan), None);
+    }
+
+    /// Frames as pymavlink 2.4.50 packs them, and what they say.
+    #[test]
+    fn targets_tilts_and_heights_of_pymavlink_are_read() {
+        let zeros = |n| "00".repeat(n);
+        let frames = [
+            (
+                "fd1000000001011e0000e8030000cdcccc3dcdcc4cbe0000c03f61b4".to_owned(),
+                Heard::Attitude { time_boot_ms: 1000, roll: 0.1, pitch: -0.2, yaw: 1.5 },
+            ),
+            (format!("fd1900000001013e0000{}5a002d00110a72", zeros(20)), Heard::WaypointDistance(17)),
+            (
+                format!("fd330000000101550000d0070000000020410000a0c000009041{}f80d01f90b", zeros(32)),
+                Heard::LocalTarget(Some([10.0, -5.0])),
+            ),
+            (
+                format!("fd330000000101570000d0070000c0579511805ed014000090c1{}f80d0656af", zeros(32)),
+                Heard::GlobalTarget(Some((295_000_000, 349_200_000))),
+            ),
+            (
+                format!("fd270000000101840000d0070000140088139c01000119ff{}5a5f27", zeros(24)),
+                Heard::DistanceDown(Some(4.12)),
+            ),
+            ("fd080000000101ad0000000090400000a03fb335".to_owned(), Heard::Rangefinder(4.5)),
+            (
+                "fd2000000001018d000007000000000000000000803f0000004000004040000080400000b0400000d040625c".to_owned(),
+                Heard::Altitude(Some(6.5)),
+            ),
+        ];
+        for (text, expected) in frames {
+            let bytes: Vec<u8> =
+                (0..text.len()).step_by(2).map(|i| u8::from_str_radix(&text[i..i + 2], 16).unwrap()).collect();
+            let mut found = Vec::new();
+            crate::autopilot::mavlink::frame::Deframer::default().push(&bytes, heard_extra, |frame| found.push(frame));
+            assert_eq!(found.iter().map(|f| Heard::read(f.id, &f.payload)).collect::<Vec<_>>(), [Some(expected)]);
+        }
+    }
+
+    #[test]
+    fn distances_out_of_range_and_other_targets_are_none() {
+        let distance = |now: u16, orientation: u8| {
+            let payload =
+                [&[0; 4][..], &20u16.to_le_bytes(), &500u16.to_le_bytes(), &now.to_le_bytes(), &[0, 1, orientation]];
+            Heard::read(132, &payload.concat())
+        };
+        assert_eq!(distance(501, 25), Some(Heard::DistanceDown(None)));
+        assert_eq!(distance(300, 0), Some(Heard::DistanceElsewhere));
+        let mut velocity_only = vec![1; 51];
+        velocity_only[48..50].copy_from_slice(&0x0DC7u16.to_le_bytes());
+        assert_eq!(Heard::read(85, &velocity_only), Some(Heard::LocalTarget(None)));
+        assert_eq!(Heard::read(87, &velocity_only), Some(Heard::GlobalTarget(None)));
+        let unknown = [&[0; 24][..], &(-1000f32).to_le_bytes(), &(-1f32).to_le_bytes()].concat();
+        assert_eq!(Heard::read(141, &unknown), Some(Heard::Altitude(None)));
     }
 
     proptest! {

@@ -1,14 +1,20 @@
 //! ArduSub and ArduRover over MAVLink 2.
 
+mod altimeter;
+mod echo;
 pub mod frame;
 pub mod message;
+mod targets;
 
 use super::{Autopilot, Counters, Goal, Health, Step, Tray};
+use altimeter::{Altimeter, HeightSource};
+use echo::{Echo, Verdict};
 use frame::{Deframer, Frame, encode};
 use message::{Heard, Said, heard_extra};
 use scenecast_core::LatLon;
 use scenecast_protocol::time::Instant;
 use std::time::Duration;
+use targets::Sent;
 
 /// How this end presents itself and what it may do.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -62,23 +68,39 @@ pub struct Mavlink {
     began: Instant,
     peer: Option<Peer>,
     pose: Option<Pose>,
+    /// Starboard down and bow up, radians.
+    tilt: (f64, f64),
     yaw: Option<f64>,
+    altimeter: Altimeter,
     /// Way still to go, east and north, and the depth; `None`: stay.
     goal: Option<Goal>,
     stay: Option<[f32; 3]>,
+    sent: Option<Sent>,
+    echo: Echo,
     /// Where on the Earth it is, moved on by its own way: latitude, longitude, standard deviation.
     place: Option<(LatLon, f32, Instant)>,
     /// Whether it was in command once: from then on whoever takes it out of that is obeyed.
     was_in_command: bool,
+    /// When it was taken out of command last.
+    left_command: Option<Instant>,
+    /// Milliseconds since its start, as it said last.
+    time_boot_ms: Option<u32>,
+    /// When it started again, until it is in command again.
+    restarted: Option<Instant>,
+    /// Whether it was under water when it started again.
+    was_under_water: bool,
     due: Due,
     tray: Tray,
     was_silent: bool,
+    is_position_lost: bool,
 }
 
 #[derive(Debug, Clone, Copy)]
 struct Due {
     second: Instant,
     gps: Instant,
+    /// When the streams may be asked for again because no target is reported.
+    streams: Instant,
 }
 
 const SET_MODE: u16 = 176;
@@ -86,6 +108,27 @@ const ARM: u16 = 400;
 const INTERVAL: u16 = 511;
 /// Component of this end: MAV_COMP_ID_ONBOARD_COMPUTER.
 const OWN_COMPONENT: u8 = 191;
+/// Messages that the autopilot is asked for, and microseconds between two: attitude, local and global position, target in both,
+/// navigation, and three for the height above the sea floor.
+const STREAMS: [(f32, f32); 9] = [
+    (30.0, 200_000.0),
+    (32.0, 200_000.0),
+    (33.0, 500_000.0),
+    (85.0, 1_000_000.0),
+    (87.0, 1_000_000.0),
+    (62.0, 1_000_000.0),
+    (132.0, 200_000.0),
+    (173.0, 500_000.0),
+    (141.0, 500_000.0),
+];
+/// Time between two requests for streams that do not come.
+const STREAMS_PERIOD: Duration = Duration::from_secs(10);
+/// Messages of one run of the autopilot may be this much out of order, milliseconds.
+const CLOCKS_APART_MS: u32 = 1000;
+/// Uncertainty of the time at which it restarted.
+const RESTART_MARGIN: Duration = Duration::from_secs(1);
+/// Depth below which an autopilot that has restarted is armed again, metres.
+const MIN_ARMED_DEPTH_M: f64 = 0.5;
 /// Longest time between two positions that is bridged by the velocity.
 const BRIDGED: Duration = Duration::from_secs(3);
 /// GPS_INPUT goes out so often, as ArduPilot expects of a receiver.
@@ -103,14 +146,23 @@ impl Mavlink {
             began: now,
             peer: None,
             pose: None,
+            tilt: (0.0, 0.0),
             yaw: None,
+            altimeter: Altimeter::default(),
             goal: None,
             stay: None,
+            sent: None,
+            echo: Echo::default(),
             place: None,
             was_in_command: false,
-            due: Due { second: now, gps: now },
+            left_command: None,
+            time_boot_ms: None,
+            restarted: None,
+            was_under_water: false,
+            due: Due { second: now, gps: now, streams: now },
             tray: Tray::default(),
             was_silent: false,
+            is_position_lost: false,
         }
     }
 
@@ -141,8 +193,19 @@ impl Mavlink {
                     self.handle_heartbeat(frame.component, custom_mode, kind, base_mode, now);
                 }
             }
-            Heard::Attitude { yaw } => self.yaw = Some(f64::from(yaw)),
+            Heard::Attitude { time_boot_ms, roll, pitch, yaw } => {
+                self.handle_boot_time(time_boot_ms, now);
+                (self.tilt, self.yaw) = ((f64::from(roll), f64::from(pitch)), Some(f64::from(yaw)));
+            }
+            Heard::DistanceDown(along_m) => self.handle_beam(HeightSource::DistanceSensor, along_m, now),
+            Heard::Rangefinder(along_m) => self.handle_beam(HeightSource::Rangefinder, Some(along_m), now),
+            Heard::Altitude(m) => self.altimeter.handle(HeightSource::Altitude, m.map(f64::from), now),
+            Heard::LocalTarget(told) => self.handle_local_target(told, now),
+            Heard::GlobalTarget(told) => self.handle_global_target(told, now),
+            Heard::WaypointDistance(told_m) => self.handle_distance(told_m, now),
+            Heard::DistanceElsewhere => {}
             Heard::Local { time_boot_ms, place, velocity: [north, east, _] } => {
+                self.handle_boot_time(time_boot_ms, now);
                 let velocity = (f64::from(east), f64::from(north));
                 let was = self.pose.and_then(|p| p.place);
                 let depth_m = f64::from(place[2]);
@@ -150,6 +213,7 @@ impl Mavlink {
                 self.handle_pose(pose, true);
             }
             Heard::Global { time_boot_ms, lat, lon, relative_alt, velocity: [north, east, _], heading } => {
+                self.handle_boot_time(time_boot_ms, now);
                 if heading != u16::MAX && self.yaw.is_none() {
                     self.yaw = Some((f64::from(heading) / 100.0).to_radians());
                 }
@@ -190,14 +254,49 @@ impl Mavlink {
         }
         if was_in_command && !peer.is_in_command() {
             self.tray.note("the autopilot was taken out of guided mode or disarmed: waypoints wait until it is back");
+            self.left_command = Some(now);
         }
-        self.was_in_command |= peer.is_in_command();
+        if peer.is_in_command() {
+            (self.was_in_command, self.restarted) = (true, None);
+        } else {
+            self.echo.forget();
+        }
+    }
+
+    /// A clock that went back is another run of the autopilot.
+    fn handle_boot_time(&mut self, ms: u32, now: Instant) {
+        let before = self.time_boot_ms.replace(ms);
+        if before.is_none_or(|before| before <= ms.saturating_add(CLOCKS_APART_MS)) {
+            return;
+        }
+        self.tray.count("restarts");
+        self.tray.note("the autopilot has restarted");
+        self.restarted = Some(now - Duration::from_millis(u64::from(ms)));
+        self.was_under_water = self.pose.is_some_and(|pose| pose.depth_m > MIN_ARMED_DEPTH_M);
+        self.echo.forget();
+        self.altimeter.forget();
+        self.stay = None;
+        self.ask_for_streams(now);
+    }
+
+    /// Whether nobody but its own restart has taken it out of command, and it was under water: on deck, its thrusters must not
+    /// start by themselves.
+    fn is_out_by_restart(&self) -> bool {
+        let left = self.left_command.zip(self.restarted);
+        self.was_under_water && left.is_some_and(|(left, restarted)| left + RESTART_MARGIN >= restarted)
+    }
+
+    /// A distance along a beam that is fixed to the vehicle and looks down.
+    fn handle_beam(&mut self, source: HeightSource, along_m: Option<f32>, now: Instant) {
+        let (roll, pitch) = self.tilt;
+        let upright = roll.cos() * pitch.cos();
+        self.altimeter.handle(source, along_m.map(|m| f64::from(m) * upright), now);
     }
 
     fn ask_for_streams(&mut self, now: Instant) {
-        // Microseconds between two: attitude, local and global position.
-        for (id, interval) in [(30.0, 200_000.0), (32.0, 200_000.0), (33.0, 500_000.0)] {
-            self.say(&Said::Command { command: INTERVAL, params: [id, interval, 0.0] }, now);
+        self.due.streams = now + STREAMS_PERIOD;
+        for (id, interval_us) in STREAMS {
+            self.say(&Said::Command { command: INTERVAL, params: [id, interval_us, 0.0] }, now);
         }
     }
 
@@ -211,6 +310,9 @@ impl Mavlink {
             return;
         }
         self.pose = Some(pose);
+        if std::mem::take(&mut self.is_position_lost) {
+            self.tray.note("the autopilot reports its position again");
+        }
         let Some(before) = before else { return };
         let passed_ms = pose.time_boot_ms.wrapping_sub(before.time_boot_ms);
         // A clock that went back is another run of the autopilot.
@@ -236,7 +338,10 @@ impl Mavlink {
 
     fn push_step(&mut self, dx_m: f64, dy_m: f64, pose: &Pose, unseen: Duration) {
         let heading_rad = self.yaw.unwrap_or(0.0);
-        self.tray.walk(Step { dx_m, dy_m, heading_rad, depth_m: pose.depth_m, unseen });
+        let (roll_rad, pitch_rad) = self.tilt;
+        let altitude_m = self.altimeter.height_m(pose.heard);
+        let depth_m = pose.depth_m;
+        self.tray.walk(Step { dx_m, dy_m, heading_rad, depth_m, roll_rad, pitch_rad, altitude_m, unseen });
     }
 
     fn handle_second(&mut self, now: Instant) {
@@ -246,43 +351,40 @@ impl Mavlink {
             self.tray.count("silences");
             self.tray.note("the autopilot does not answer any more");
         }
-        let Some(peer) = self.peer.filter(|_| !health.is_silent()) else { return };
+        let Some(peer) = self.peer.filter(|_| !health.is_silent()) else { return self.echo.forget() };
         if self.pose.is_none_or(|p| now.since(p.heard) > BRIDGED) {
             self.ask_for_streams(now);
-        }
-        match health {
-            Health::InCommand => self.send_target(now),
-            _ if self.config.arms && !self.was_in_command && self.goal.is_some() => {
-                // MAV_MODE_FLAG_CUSTOM_MODE_ENABLED.
-                let params = [1.0, peer.guided_mode as f32, 0.0];
-                self.say(&Said::Command { command: SET_MODE, params }, now);
-                self.say(&Said::Command { command: ARM, params: [1.0, 0.0, 0.0] }, now);
+            if self.pose.is_some() && !std::mem::replace(&mut self.is_position_lost, true) {
+                self.tray.count("position_losses");
+                self.tray.note("the autopilot reports no position any more");
             }
-            _ => {}
+            // Without a position no target goes out that it could follow.
+            self.echo.forget();
+        }
+        if peer.is_in_command() {
+            self.send_target(now);
+            self.judge_echo(now);
+        } else if self.config.arms && self.goal.is_some() && (!self.was_in_command || self.is_out_by_restart()) {
+            // MAV_MODE_FLAG_CUSTOM_MODE_ENABLED.
+            let params = [1.0, peer.guided_mode as f32, 0.0];
+            self.say(&Said::Command { command: SET_MODE, params }, now);
+            self.say(&Said::Command { command: ARM, params: [1.0, 0.0, 0.0] }, now);
         }
     }
 
-    fn send_target(&mut self, now: Instant) {
-        let Some(pose) = self.pose.filter(|p| now.since(p.heard) < BRIDGED) else { return };
-        self.tray.count("targets");
-        match (pose.local, self.goal) {
-            (Some(at), Some(goal)) => {
-                let down = goal.depth_m.map_or(at[2], |d| d as f32);
-                self.stay = None;
-                self.say(&Said::Local([at[0] + goal.north_m as f32, at[1] + goal.east_m as f32, down]), now);
+    fn judge_echo(&mut self, now: Instant) {
+        if let Some(note) = self.echo.handle_timeout(now) {
+            self.tray.note(note);
+        }
+        match self.echo.verdict() {
+            Verdict::Refuses => self.tray.count("targets_refused"),
+            Verdict::Mute => {
+                self.tray.count("targets_unconfirmed");
+                if now >= self.due.streams {
+                    self.ask_for_streams(now);
+                }
             }
-            (Some(at), None) => {
-                let stay = *self.stay.get_or_insert(at);
-                self.say(&Said::Local(stay), now);
-            }
-            (None, goal) => {
-                let Some((lat, lon)) = pose.place else { return };
-                let here = LatLon { lat_deg: f64::from(lat) / 1e7, lon_deg: f64::from(lon) / 1e7 };
-                let (east, north) = goal.map_or((0.0, 0.0), |g| (g.east_m, g.north_m));
-                let depth = goal.and_then(|g| g.depth_m).unwrap_or(pose.depth_m);
-                let (lat, lon) = units(moved(here, east, north));
-                self.say(&Said::Global(lat, lon, -depth as f32), now);
-            }
+            Verdict::Open | Verdict::Follows => {}
         }
     }
 }
@@ -299,7 +401,8 @@ fn moved(place: LatLon, east_m: f64, north_m: f64) -> LatLon {
 impl Autopilot for Mavlink {
     fn handle_open(&mut self, now: Instant) {
         self.deframer.clear();
-        self.due = Due { second: now, gps: now };
+        self.echo.forget();
+        self.due = Due { second: now, gps: now, streams: now };
     }
 
     fn handle_bytes(&mut self, bytes: &[u8], now: Instant) {
@@ -344,7 +447,7 @@ impl Autopilot for Mavlink {
         match self.peer {
             None => Health::Awaited,
             Some(peer) if now.since(peer.heard) >= self.config.silence => Health::Silent,
-            Some(peer) if peer.is_in_command() => Health::InCommand,
+            Some(peer) if peer.is_in_command() && self.echo.verdict() != Verdict::Refuses => Health::InCommand,
             Some(_) => Health::NotInCommand,
         }
     }

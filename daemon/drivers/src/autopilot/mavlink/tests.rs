@@ -56,8 +56,9 @@ fn it_beats_asks_for_streams_and_arms_only_where_it_may() {
         let said = sent(&mut pilot);
         let commands: Vec<u16> =
             said.iter().filter(|(id, _)| *id == 76).map(|(_, p)| u16::from_le_bytes([p[28], p[29]])).collect();
-        let expected: &[u16] = if arms { &[511, 511, 511, SET_MODE, ARM] } else { &[511, 511, 511] };
-        assert_eq!(commands, expected);
+        let (streams, rest) = commands.split_at(STREAMS.len());
+        assert!(streams.iter().all(|command| *command == INTERVAL), "{streams:?}");
+        assert_eq!(rest, if arms { &[SET_MODE, ARM][..] } else { &[] });
         assert_eq!((pilot.health(at(1.0)), count(&said, 84)), (Health::NotInCommand, 0));
     }
 }
@@ -186,10 +187,149 @@ fn frames_of_others_and_absurd_numbers_are_counted() {
     assert_eq!((counters["other_systems"], counters["unreadable"], counters["absurd_velocities"]), (1, 1, 1));
 }
 
+/// A target in the autopilot's own frame, as it reports it.
+fn local_target(north: f32, east: f32) -> Vec<u8> {
+    let place = [north, east].into_iter().flat_map(f32::to_le_bytes);
+    let zeros = [0; 36];
+    frame(1, 85, [0; 4].into_iter().chain(place).chain(zeros).chain(0x0DF8u16.to_le_bytes()).chain([1]).collect())
+}
+
+fn notes(pilot: &mut Mavlink) -> Vec<String> {
+    std::iter::from_fn(|| pilot.poll_note()).collect()
+}
+
+#[test]
+fn a_target_that_is_not_taken_takes_it_out_of_command() {
+    let mut pilot = pilot(false);
+    pilot.set_goal(GOAL, at(0.0));
+    let mut healths = Vec::new();
+    for s in 0..20 {
+        let now = at(f64::from(s));
+        pilot.handle_bytes(&heartbeat(4, true), now);
+        pilot.handle_bytes(&local(1000 * s as u32, [0.0, 0.0, 4.0], [0.0; 3]), now);
+        // From 5 s to 14 s it flies to somewhere else.
+        let east = if (5..15).contains(&s) { -30.0 } else { 10.0 };
+        pilot.handle_bytes(&local_target(0.0, east), now);
+        pilot.handle_timeout(now);
+        healths.push(pilot.health(now));
+    }
+    assert_eq!(
+        [healths[8], healths[9], healths[14], healths[15]].map(|h| h == Health::InCommand),
+        [true, false, false, true]
+    );
+    assert_eq!(pilot.counters()["targets"], 20, "targets go out all the same");
+    assert_eq!(pilot.counters()["targets_refused"], 6);
+    let expected = [
+        "the autopilot answers",
+        "the autopilot does not follow the waypoint: it reports a target 40 m away from it",
+        "the autopilot follows the waypoint again",
+    ];
+    assert_eq!(notes(&mut pilot), expected);
+}
+
+#[test]
+fn targets_and_distances_in_degrees_are_compared_too() {
+    for is_refused in [false, true] {
+        let mut pilot = pilot(false);
+        pilot.set_goal(GOAL, at(0.0));
+        for s in 0..10 {
+            let now = at(f64::from(s));
+            pilot.handle_bytes(&heartbeat(4, true), now);
+            pilot.handle_bytes(&local(1000 * s as u32, [500.0, 0.0, 4.0], [0.0; 3]), now);
+            let lon = 349_200_000i32;
+            let global: Vec<u8> =
+                [1000 * s, 295_000_000i32, lon, 0, -4000].iter().flat_map(|v| v.to_le_bytes()).collect();
+            pilot.handle_bytes(&frame(1, 33, [&global[..], &[0, 0, 0, 0, 0, 0, 0xFF, 0xFF]].concat()), now);
+            // 10 m to the east are 10 / 96 995 degrees there.
+            let told_lon = if is_refused { lon } else { lon + 1031 };
+            let told: Vec<u8> = [0, 295_000_000, told_lon].iter().flat_map(|v: &i32| v.to_le_bytes()).collect();
+            pilot.handle_bytes(&frame(1, 87, [&told[..], &[0; 36], &[0xF8, 0x0D, 6]].concat()), now);
+            pilot.handle_timeout(now);
+        }
+        assert_eq!(pilot.health(at(9.0)) == Health::NotInCommand, is_refused, "{:?}", pilot.echo);
+    }
+}
+
+#[test]
+fn after_a_restart_it_is_armed_under_water_unless_a_pilot_disarmed_it() {
+    for (by_pilot, depth_m, expected) in [(false, 5.0, 2), (true, 5.0, 0), (false, 0.2, 0)] {
+        let mut pilot = pilot(true);
+        pilot.set_goal(GOAL, at(0.0));
+        let beat = |pilot: &mut Mavlink, s: f64, boot_s: f64, armed| {
+            pilot.handle_bytes(&heartbeat(if armed { 4 } else { 19 }, armed), at(s));
+            pilot.handle_bytes(&local(((s - boot_s) * 1000.0) as u32, [0.0, 0.0, depth_m], [0.0; 3]), at(s));
+            sent(pilot);
+            pilot.handle_timeout(at(s));
+            count(&sent(pilot), 76)
+        };
+        for s in 0..10 {
+            let is_armed = s < 8 || !by_pilot;
+            assert_eq!(beat(&mut pilot, f64::from(s), -60.0, is_armed), 0);
+        }
+        let commands = beat(&mut pilot, 13.0, 11.0, false);
+        assert_eq!(commands, expected, "{by_pilot} {depth_m}");
+        assert_eq!((pilot.counters()["restarts"], pilot.poll_step().map(|s| s.dx_m)), (1, Some(0.0)));
+        assert!(notes(&mut pilot).contains(&"the autopilot has restarted".to_owned()));
+        beat(&mut pilot, 14.0, 11.0, true);
+        beat(&mut pilot, 15.0, 11.0, false);
+        assert_eq!(beat(&mut pilot, 16.0, 11.0, false), 0, "a pilot takes over after the restart");
+    }
+}
+
+#[test]
+fn tilt_and_height_come_with_each_step() {
+    let mut pilot = pilot(false);
+    let attitude: Vec<u8> = [0.5f32, -0.25, 1.0].into_iter().flat_map(f32::to_le_bytes).collect();
+    pilot.handle_bytes(&heartbeat(4, true), at(0.0));
+    pilot.handle_bytes(&local(0, [0.0; 3], [0.0; 3]), at(0.0));
+    pilot.handle_bytes(&frame(1, 30, [&[1, 0, 0, 0], &attitude[..]].concat()), at(0.5));
+    let rangefinder = [4.0f32, 0.0].into_iter().flat_map(f32::to_le_bytes).collect();
+    pilot.handle_bytes(&frame(1, 173, rangefinder), at(0.5));
+    pilot.handle_bytes(&local(1000, [0.0; 3], [0.0; 3]), at(1.0));
+    let step = pilot.poll_step().unwrap();
+    assert_eq!((step.roll_rad, step.pitch_rad, step.heading_rad), (0.5, -0.25, 1.0));
+    // 4 m along a beam that leans by roll and pitch.
+    assert!((step.altitude_m.unwrap() - 4.0 * 0.5f64.cos() * 0.25f64.cos()).abs() < 1e-6, "{step:?}");
+    pilot.handle_bytes(&local(3000, [0.0; 3], [0.0; 3]), at(3.0));
+    assert_eq!(pilot.poll_step().unwrap().altitude_m, None, "an old height");
+}
+
+#[test]
+fn a_lost_position_is_named_once_and_no_target_goes_out() {
+    let mut pilot = pilot(false);
+    pilot.set_goal(GOAL, at(0.0));
+    let mut targets = Vec::new();
+    for s in 0..20 {
+        let now = at(f64::from(s));
+        pilot.handle_bytes(&heartbeat(4, true), now);
+        if !(3..15).contains(&s) {
+            // It comes back 40 m away, by its own account.
+            let north = if s < 3 { 0.0 } else { 40.0 };
+            pilot.handle_bytes(&local(1000 * s as u32, [north, 0.0, 4.0], [0.0; 3]), now);
+        }
+        pilot.handle_timeout(now);
+        targets.push(count(&sent(&mut pilot), 84));
+    }
+    assert_eq!(targets, [[1; 5].as_slice(), &[0; 10], &[1; 5]].concat());
+    let steps: Vec<Step> = std::iter::from_fn(|| pilot.poll_step()).collect();
+    assert!(steps.iter().all(|s| s.dx_m == 0.0 && s.dy_m == 0.0), "no jump: {steps:?}");
+    assert_eq!(steps.iter().map(|s| s.unseen.as_secs()).sum::<u64>(), 13);
+    let expected = [
+        "the autopilot answers",
+        "the autopilot reports no position any more",
+        "the autopilot reports its position again",
+    ];
+    assert_eq!(
+        (notes(&mut pilot).as_slice(), pilot.counters()["position_losses"]),
+        (expected.map(String::from).as_slice(), 1)
+    );
+}
+
 proptest! {
     #[test]
     fn any_messages_are_taken(
-        messages in proptest::collection::vec((prop_oneof![Just(0u32), Just(30), Just(32), Just(33), Just(77), Just(253)],
+        messages in proptest::collection::vec((prop_oneof![Just(0u32), Just(30), Just(32), Just(33), Just(77), Just(253),
+            Just(62), Just(85), Just(87), Just(132), Just(141), Just(173)],
             proptest::collection::vec(any::<u8>(), 1..60)), 0..40),
     ) {
         let mut pilot = pilot(true);
@@ -198,7 +338,7 @@ proptest! {
             pilot.handle_bytes(&frame(1, id, payload), at(i as f64));
             pilot.handle_timeout(at(i as f64));
             while let Some(step) = pilot.poll_step() {
-                prop_assert!(step.dx_m.is_finite() && step.dy_m.is_finite());
+                prop_assert!(step.dx_m.is_finite() && step.dy_m.is_finite() && step.altitude_m.is_none_or(f64::is_finite));
             }
         }
     }

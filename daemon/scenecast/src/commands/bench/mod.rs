@@ -4,9 +4,12 @@ mod exemplar;
 mod fidelity;
 mod inference;
 mod link;
+#[cfg(feature = "ros2")]
+mod live;
 mod localisation;
 mod modem;
 mod planning;
+mod raster;
 mod registration;
 mod restart;
 mod steering;
@@ -19,9 +22,12 @@ use exemplar::ExemplarBench;
 use fidelity::FidelityBench;
 use inference::InferenceBench;
 use link::LinkBench;
+#[cfg(feature = "ros2")]
+use live::LiveBench;
 use localisation::LocalisationBench;
 use modem::ModemBench;
 use planning::PlanningBench;
+use raster::RasterBench;
 use registration::RegistrationBench;
 use restart::RestartBench;
 use scenecast_core::UserError;
@@ -40,12 +46,17 @@ pub(super) enum BenchCommand {
     Inference(InferenceBench),
     /// The link over range, frame size and loss: efficiency, latency of directives, convergence.
     Link(LinkBench),
+    /// A vehicle with a live camera, by ROS 2: images that reach the scene model, processor time, memory.
+    #[cfg(feature = "ros2")]
+    Live(LiveBench),
     /// The vehicle's position over 3 km: dead reckoning, with the relay, with outliers.
     Localisation(LocalisationBench),
     /// Drivers and emulated modems: throughput, latency of directives, surveys through slow modems.
     Modem(ModemBench),
     /// The planners: utility collected per metre.
     Planning(PlanningBench),
+    /// A grid of which a part changes every second, over a radio that loses frames, against whole grids.
+    Raster(RasterBench),
     /// Registration of camera frames: errors of their places, share of the sea floor that the map shows.
     Registration(RegistrationBench),
     /// Restarts of both ends as processes: what is lost, the time to a full page.
@@ -76,9 +87,12 @@ impl BenchCommand {
             Self::Fidelity(f) => f.run(),
             Self::Inference(i) => i.run(),
             Self::Link(l) => l.run(),
+            #[cfg(feature = "ros2")]
+            Self::Live(l) => l.run(),
             Self::Localisation(l) => l.run(),
             Self::Modem(m) => m.run(),
             Self::Planning(p) => p.run(),
+            Self::Raster(r) => r.run(),
             Self::Registration(r) => r.run(),
             Self::Restart(r) => r.run(),
             Self::Steering(s) => s.run(),

@@ -75,7 +75,7 @@ impl Register {
         let mut progress = Progress::new("frames");
         for (i, frame) in recording.frames.iter().enumerate() {
             progress.show(i as f64 / recording.frames.len() as f64);
-            let image = match frame.image() {
+            let image = match frame.image.read() {
                 Ok(image) => image,
                 Err(error) => {
                     placed.unreadable.push(error.to_string());
@@ -83,7 +83,8 @@ impl Register {
                 }
             };
             let pixels = CameraImage::rgb(image.width() as usize, image.height() as usize, image.as_raw());
-            let wrong_size = || UserError::file(&frame.file, "the image is too small or too large to be registered");
+            let wrong_size =
+                || UserError::Input(format!("{}: the image is too small or too large to be registered", frame.image));
             let found = registrar.handle_frame(&FrameInput {
                 image: pixels.ok_or_else(wrong_size)?,
                 metres_per_pixel: self.metres_per_pixel * frame.scale,

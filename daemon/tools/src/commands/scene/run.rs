@@ -10,7 +10,17 @@ use clap::Args;
 use scene_model::topics::{Birth, SceneConfig, SceneModel};
 use scene_model::words::{WordConfig, WordExtractor};
 use scenecast_core::UserError;
+use scenecast_files::{BagTiming, open_bag};
+use scenecast_sensors::CameraMounting;
 use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+/// A camera at the point whose pose is measured, with poses that are interpolated within a second. Its height is not known, so
+/// that tilt moves nothing.
+fn level_camera() -> BagTiming {
+    let max_gap = Duration::from_secs(1);
+    BagTiming { max_gap, clock_offset_s: 0.0, mounting: CameraMounting::default(), altitude_m: 0.0 }
+}
 
 /// Label words, a mosaic or a sequence of images, and print the measurements: in a pipe or a file as one line of JSON.
 ///
@@ -94,8 +104,8 @@ struct Which {
     #[arg(long, value_name = "IMG")]
     mosaic: Option<PathBuf>,
     /// tum:DIR: an RGB-D sequence with rgb.txt, depth.txt and groundtruth.txt;
-    /// frames:DIR: downward images and poses.csv
-    #[arg(long, value_name = "KIND:DIR")]
+    /// frames:DIR: downward images and poses.csv; bag:FILE or bag:FILE#TOPIC: images and odometry in MCAP
+    #[arg(long, value_name = "KIND:PLACE")]
     source: Option<String>,
 }
 
@@ -224,7 +234,13 @@ impl Run {
                     cell_m,
                 )
             }
-            _ => return Err(UserError::Input("--source: it takes tum:DIR or frames:DIR".to_owned())),
+            "bag" => {
+                let metres_per_pixel = self.metres_per_pixel()?;
+                let cell_m = self.columns(CELL_PX * metres_per_pixel);
+                let recording = open_bag(&dir.to_string_lossy(), None, &level_camera())?;
+                (Box::new(Frames::of(recording, extractor, metres_per_pixel, cell_m[0])), cell_m)
+            }
+            _ => return Err(UserError::Input("--source: it takes tum:DIR, frames:DIR or bag:FILE".to_owned())),
         };
         Ok(Opened { source, vocabulary, cell_m, cell_px: 1.0, annotated })
     }

@@ -4,7 +4,9 @@ use crate::link::FrameNumber;
 use crate::time::Instant;
 use std::time::Duration;
 
-/// Silence after which a vehicle is sent a hello, because it may have restarted.
+/// The silence over a modem that does half duplex by itself, and over a medium that carries both directions at once, where a
+/// hello costs little.
+const FULL_DUPLEX_SILENCE: Duration = Duration::from_secs(5);
 const SILENCE_TIMEOUT: Duration = Duration::from_secs(40);
 /// The number of unanswered hellos after which the interval doubles: by then the vehicle is out of reach rather than unlucky.
 const PROMPT_HELLOS: u32 = 5;
@@ -15,6 +17,8 @@ const UNACKNOWLEDGED_ORDERS: u32 = 2;
 #[derive(Debug)]
 pub(super) struct Contact {
     pub(super) last_received: Option<Instant>,
+    /// Silence after which a vehicle is sent a hello, because it may have restarted.
+    silence: Duration,
     /// Where the modem decides when to transmit: when an order first went out after that.
     pub(super) ordered: Option<Instant>,
     /// Where the modem decides when to transmit: when an acknowledgement or a hello is due.
@@ -47,6 +51,7 @@ impl Contact {
     pub(super) fn new(now: Instant) -> Self {
         Self {
             last_received: None,
+            silence: SILENCE_TIMEOUT,
             ordered: None,
             answer_due: None,
             answers_left: 0,
@@ -60,6 +65,11 @@ impl Contact {
             dropped: 0,
             is_doubtful: false,
         }
+    }
+
+    /// Sends hellos soon where both directions are on the air at once.
+    pub(super) fn expect_prompt_answers(&mut self) {
+        self.silence = FULL_DUPLEX_SILENCE;
     }
 
     /// Whether a hello counts as an answer: the first one of a run of this end, and otherwise one in five seconds,
@@ -83,7 +93,7 @@ impl Contact {
     /// When the vehicle has been silent for so long that it may have restarted; an order that nobody acknowledges
     /// shows it before `SILENCE_TIMEOUT`. `slot_timeout` is the time after which an order goes out again.
     pub(super) fn silent_from(&self, slot_timeout: Duration) -> Option<Instant> {
-        let heard = self.last_received? + SILENCE_TIMEOUT;
+        let heard = self.last_received? + self.silence;
         Some(self.ordered.map_or(heard, |at| heard.min(at + slot_timeout * UNACKNOWLEDGED_ORDERS)))
     }
 
@@ -103,6 +113,6 @@ impl Contact {
     pub(super) fn note_hello(&mut self, timeout: Duration, dropped: u64, now: Instant) {
         let is_silent = std::mem::replace(&mut self.dropped, dropped) == dropped;
         self.hellos = if is_silent { self.hellos.saturating_add(1) } else { 1 };
-        self.hello_due = now + timeout.max(Self::PROOF_TIMEOUT) * if self.hellos < PROMPT_HELLOS { 1 } else { 2 };
+        self.hello_due = now + timeout * if self.hellos < PROMPT_HELLOS { 1 } else { 2 };
     }
 }

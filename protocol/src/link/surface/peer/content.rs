@@ -6,7 +6,7 @@ use super::status::StatusParts;
 use crate::directive::InForcePart;
 use crate::link::surface::layers::{LayerOutcome, Layers};
 use crate::link::{FrameNumber, LinkStats, SurfaceEvent};
-use crate::map::{LayerChunk, StateReplica};
+use crate::map::{ClassChunk, ClassReplica, LayerChunk, StateReplica};
 use crate::object::{ObjectReceiver, Part, Received};
 use crate::schedule::Class;
 use crate::time::Instant;
@@ -39,6 +39,7 @@ impl ChunkOutcome {
 #[derive(Debug)]
 pub(super) struct PeerContent<R> {
     pub(super) replica: R,
+    pub(super) classes: ClassReplica,
     pub(super) layers: Layers,
     pub(super) status: StatusParts,
     pub(super) backlog: Option<ReportedBacklog>,
@@ -51,6 +52,7 @@ impl<R: StateReplica> PeerContent<R> {
     pub(super) fn new() -> Self {
         Self {
             replica: R::default(),
+            classes: ClassReplica::default(),
             layers: Layers::default(),
             status: StatusParts::default(),
             backlog: None,
@@ -76,6 +78,7 @@ impl<R: StateReplica> PeerContent<R> {
             self.ended = Some(EndedRun { replica, layers, epoch, status, ended: now });
         }
         self.objects.clear();
+        self.classes = ClassReplica::default();
         self.status = StatusParts::default();
         self.backlog = None;
         self.generation += 1;
@@ -137,6 +140,13 @@ impl<R: StateReplica> PeerContent<R> {
                 LayerOutcome::Skipped => ChunkOutcome::Malformed,
                 LayerOutcome::OutOfStep => ChunkOutcome::Contradictory,
             },
+            ChunkKind::LabelClass => match self.classes.handle_chunk(chunk.payload) {
+                Some(is_complete) => {
+                    events.extend(is_complete.then_some(SurfaceEvent::LabelNamed(vehicle)));
+                    ChunkOutcome::Accepted
+                }
+                None => ChunkOutcome::Malformed,
+            },
             ChunkKind::InForce => ChunkOutcome::Accepted,
             ChunkKind::Slot | ChunkKind::Introduction | ChunkKind::Inquiry => ChunkOutcome::Malformed,
         }
@@ -171,7 +181,7 @@ impl<R: StateReplica> PeerContent<R> {
 /// The class that the bytes of a chunk count as.
 pub(super) fn class_of(chunk: &Chunk<'_>) -> Class {
     match chunk.kind {
-        ChunkKind::Map => Class::Map,
+        ChunkKind::Map | ChunkKind::LabelClass => Class::Map,
         ChunkKind::Pose | ChunkKind::Trail | ChunkKind::Intent | ChunkKind::Registration => Class::Status,
         ChunkKind::Report | ChunkKind::InForce => Class::Status,
         ChunkKind::Slot | ChunkKind::Inquiry => Class::Directive,
@@ -185,6 +195,7 @@ fn decode<R: StateReplica>(replica: &R, layers: &Layers, base: FrameNumber, mut 
     chunks.all(|chunk| match chunk.kind {
         ChunkKind::Map => replica.decodes(base, chunk.payload),
         ChunkKind::Pose => VehicleStatus::default().read_pose(chunk.payload).is_ok(),
+        ChunkKind::LabelClass => ClassChunk::decode(chunk.payload).is_some(),
         ChunkKind::Intent => Intent::decode(chunk.payload).is_ok(),
         ChunkKind::Registration => RegistrationReport::decode(chunk.payload).is_ok(),
         ChunkKind::Trail => Trail::decode(chunk.payload).is_ok(),

@@ -56,6 +56,9 @@ const STRAYS_TIMEOUT: Duration = Duration::from_secs(20);
 const ANSWER_LOSS_RISK: f64 = 0.5;
 const MAX_ANSWERS: u32 = 6;
 
+/// How long an acknowledgement waits for further frames, over a modem that does half duplex by itself.
+const USUAL_ANSWER_WAIT: Duration = Duration::from_secs(2);
+
 /// A vehicle as the surface knows it.
 #[derive(Debug)]
 pub(super) struct VehiclePeer<R> {
@@ -71,6 +74,10 @@ pub(super) struct VehiclePeer<R> {
     divergence: Divergence,
     /// The two ends were found to differ: a new run must begin.
     is_out_of_step: bool,
+    /// Whether both directions are on the air at once, so that answers are prompt.
+    is_full_duplex: bool,
+    /// How long an acknowledgement waits for further frames, without turns.
+    answer_wait: Duration,
 }
 
 impl<R: StateReplica> VehiclePeer<R> {
@@ -94,7 +101,19 @@ impl<R: StateReplica> VehiclePeer<R> {
             last_turn: LastTurn { began: 0, purpose: FramePurpose::Content },
             divergence: Divergence::default(),
             is_out_of_step: false,
+            is_full_duplex: false,
+            answer_wait: USUAL_ANSWER_WAIT,
         }
+    }
+
+    /// Takes the pace of answers from the modem.
+    pub(super) fn with_modem(mut self, modem: &ModemProfile) -> Self {
+        self.is_full_duplex = modem.access == Access::FullDuplex;
+        if self.is_full_duplex {
+            self.contact.expect_prompt_answers();
+        }
+        self.answer_wait = modem.answer_wait(USUAL_ANSWER_WAIT);
+        self
     }
 
     pub(super) fn address(&self) -> Address {
@@ -184,7 +203,7 @@ impl<R: StateReplica> VehiclePeer<R> {
                     self.is_out_of_step |= self.divergence.note_undecodable(now);
                 }
                 // The vehicle builds on frames that we never acknowledged, or means another run of ours.
-                let unanswered = matches!(modem.access, Access::ModemOwned { .. }) || self.master.unanswered() >= 2;
+                let unanswered = modem.access.is_free() || self.master.unanswered() >= 2;
                 // Over a channel that reorders, several late frames in a row are usual.
                 let silent = unanswered && self.contact.is_silent_for(STRAYS_TIMEOUT, now);
                 // A damaged frame is no sign of another run, so it is no reason to begin a new one.
@@ -333,7 +352,7 @@ impl<R: StateReplica> VehiclePeer<R> {
     /// Makes an acknowledgement due, if one is owed.
     pub(super) fn owe_answer(&mut self, now: Instant) {
         let is_proven = self.pair.is_proven();
-        let wait = if is_proven { Duration::from_secs(2) } else { Duration::ZERO };
+        let wait = if is_proven { self.answer_wait } else { Duration::ZERO };
         if self.pair.unstated() > 0 || (self.pair.has_run() && !is_proven) {
             if self.contact.answer_due.is_none() {
                 self.contact.answers_left = self.pair.stats.loss_out.copies(ANSWER_LOSS_RISK, MAX_ANSWERS);

@@ -4,7 +4,7 @@ use super::{EndedRun, InForce, VehiclePeer};
 use crate::directive::{Series, Slot, SlotId, SlotProgress};
 use crate::link::{LinkStats, Mismatch};
 use crate::mac::ClockMap;
-use crate::map::{LayerId, LayerReplica, LayerSet, Replica, StateReplica};
+use crate::map::{ClassReplica, LayerId, LayerReplica, LayerSet, Replica, StateReplica};
 use crate::time::Instant;
 use crate::wire::{Backlog, VehicleStatus};
 use std::time::Duration;
@@ -55,6 +55,11 @@ impl<'a, R: StateReplica> PeerView<'a, R> {
     /// The operator's copy of a layer of the map; `None` until the vehicle has announced it.
     pub fn layer(&self, id: LayerId) -> Option<&'a LayerReplica> {
         self.0.content.layers.get(id)
+    }
+
+    /// The names and colours of labels that the vehicle has announced in this run.
+    pub fn classes(&self) -> &'a ClassReplica {
+        &self.0.content.classes
     }
 
     /// Counts changes of the replicated state and its layers.

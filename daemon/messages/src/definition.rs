@@ -1,0 +1,141 @@
+//! Definitions of messages as data.
+
+/// A message's package, name, constants and fields.
+#[derive(Debug, PartialEq)]
+pub struct Definition {
+    /// The package, such as `std_msgs`.
+    pub package: &'static str,
+    /// The name within the package, such as `Header`.
+    pub name: &'static str,
+    /// Lines of text for people.
+    pub text: &'static [&'static str],
+    pub constants: &'static [Constant],
+    pub fields: &'static [Field],
+}
+
+/// A constant of a message. It is not part of the bytes, nor of the type hash.
+#[derive(Debug, PartialEq)]
+pub struct Constant {
+    /// Its type in a `.msg` file, such as `uint8`.
+    pub kind: &'static str,
+    pub name: &'static str,
+    pub value: i64,
+}
+
+/// A field of a message.
+#[derive(Debug, PartialEq)]
+pub struct Field {
+    pub name: &'static str,
+    pub kind: Kind,
+    /// Lines of text for people.
+    pub text: &'static [&'static str],
+}
+
+/// The type of a field.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Kind {
+    Primitive(Primitive),
+    Message(&'static Definition),
+    /// A fixed number of elements, without a length in the bytes.
+    Array(&'static Kind, usize),
+    /// Any number of elements, after their number as `uint32`.
+    Sequence(&'static Kind),
+}
+
+/// The types of ROS 2 that are not messages.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Primitive {
+    Int8,
+    Uint8,
+    Int16,
+    Uint16,
+    Int32,
+    Uint32,
+    Int64,
+    Uint64,
+    Float32,
+    Float64,
+    Bool,
+    Byte,
+    String,
+}
+
+impl Primitive {
+    /// Its name in a `.msg` file.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Int8 => "int8",
+            Self::Uint8 => "uint8",
+            Self::Int16 => "int16",
+            Self::Uint16 => "uint16",
+            Self::Int32 => "int32",
+            Self::Uint32 => "uint32",
+            Self::Int64 => "int64",
+            Self::Uint64 => "uint64",
+            Self::Float32 => "float32",
+            Self::Float64 => "float64",
+            Self::Bool => "bool",
+            Self::Byte => "byte",
+            Self::String => "string",
+        }
+    }
+
+    /// Its number in `type_description_interfaces/msg/FieldType`.
+    pub(crate) fn type_id(self) -> u32 {
+        match self {
+            Self::Int8 => 2,
+            Self::Uint8 => 3,
+            Self::Int16 => 4,
+            Self::Uint16 => 5,
+            Self::Int32 => 6,
+            Self::Uint32 => 7,
+            Self::Int64 => 8,
+            Self::Uint64 => 9,
+            Self::Float32 => 10,
+            Self::Float64 => 11,
+            Self::Bool => 15,
+            Self::Byte => 16,
+            Self::String => 17,
+        }
+    }
+}
+
+impl Definition {
+    /// The name in ROS 2, such as `std_msgs/msg/Header`.
+    pub fn full_name(&self) -> String {
+        format!("{}/msg/{}", self.package, self.name)
+    }
+
+    /// The name on DDS, such as `std_msgs::msg::dds_::Header_`.
+    pub fn dds_name(&self) -> String {
+        format!("{}::msg::dds_::{}_", self.package, self.name)
+    }
+
+    /// The definitions that this one refers to, directly and through others, each once, in the order of their first use.
+    pub fn dependencies(&self) -> Vec<&'static Definition> {
+        let mut found = Vec::new();
+        self.collect(&mut found);
+        found
+    }
+
+    fn collect(&self, found: &mut Vec<&'static Definition>) {
+        for field in self.fields {
+            let Some(message) = field.kind.message() else { continue };
+            if !found.contains(&message) {
+                found.push(message);
+                message.collect(found);
+            }
+        }
+    }
+}
+
+impl Kind {
+    /// The definition of the message that it is or consists of.
+    pub(crate) fn message(self) -> Option<&'static Definition> {
+        match self {
+            Self::Primitive(_) => None,
+            Self::Message(message) => Some(message),
+            Self::Array(element, _) | Self::Sequence(element) => element.message(),
+        }
+    }
+}

@@ -1,0 +1,35 @@
+//! Maps, poses and states of scenecast as messages of ROS 2. No IO.
+//!
+//! The conversions stand apart from DDS, so that recordings and viewers write the same messages without it.
+//!
+//! Frames of reference are those of ROS REP 105: the world frame is `map`, the map frame of a vehicle is `odom`. Axes point
+//! east, north and up; headings become angles from east, anticlockwise.
+
+mod cloud;
+mod diagnostics;
+mod exemplar;
+mod grid;
+mod layers;
+mod occupancy;
+mod position;
+
+pub use cloud::cloud;
+pub use diagnostics::{Health, diagnostics};
+pub use exemplar::exemplar_jpeg;
+pub use grid::{Grid, GridLayer, MAX_GRID_CELLS};
+pub use layers::layers;
+pub use occupancy::occupancy;
+pub use position::{Place, fix, path, pose};
+
+use scenecast_messages::builtin_interfaces::Time;
+use scenecast_messages::std_msgs::Header;
+
+/// The world frame in ROS 2.
+pub const WORLD_FRAME: &str = "map";
+/// The map frame of a vehicle in ROS 2.
+pub const MAP_FRAME: &str = "odom";
+
+/// A header with this time and this frame of reference.
+pub fn header(stamp: Time, frame: &str) -> Header {
+    Header { stamp, frame_id: frame.to_owned() }
+}

@@ -1,0 +1,143 @@
+//! For comparison: the whole grid as a PNG, in fragments, of which lost ones are sent again.
+
+use scenecast_core::label_picture;
+use scenecast_protocol::map::{Cell, LabelGrid, StateReplica, StateSource};
+use scenecast_protocol::time::Instant;
+use std::collections::{BTreeMap, BTreeSet};
+
+/// Bytes before those of a fragment: the number of the picture, the place of the first byte, and whether it is the last one.
+const HEAD: usize = 9;
+
+/// Sends the newest grid once the one before has arrived.
+#[derive(Debug, Default)]
+pub(super) struct WholeSource {
+    grid: LabelGrid,
+    is_changed: bool,
+    number: u32,
+    picture: Vec<u8>,
+    /// Fragments that wait, as places and lengths, and those on the air.
+    waiting: Vec<(usize, usize)>,
+    flying: BTreeSet<(usize, usize)>,
+    next: usize,
+}
+
+impl WholeSource {
+    pub(super) fn set(&mut self, cells: &[(Cell, u8)]) {
+        self.grid.extend(cells.iter().copied());
+        self.is_changed = true;
+    }
+
+    fn is_sent(&self) -> bool {
+        self.next == self.picture.len() && self.waiting.is_empty() && self.flying.is_empty()
+    }
+
+    fn begin(&mut self) {
+        if self.is_sent() && std::mem::take(&mut self.is_changed) {
+            self.number += 1;
+            self.picture = label_picture::encode(&self.grid).unwrap_or_default();
+            self.next = 0;
+        }
+    }
+}
+
+impl StateSource for WholeSource {
+    type Carried = (usize, usize);
+
+    fn next_chunk(&mut self, room: usize, _now: Instant) -> Option<(Vec<u8>, Self::Carried)> {
+        self.begin();
+        let room = room.checked_sub(HEAD).filter(|&room| room > 0)?;
+        let again = self.waiting.iter().position(|&(_, length)| length <= room);
+        let (place, length) = match again {
+            Some(at) => self.waiting.remove(at),
+            None => (self.next, room.min(self.picture.len() - self.next)),
+        };
+        if length == 0 {
+            return None;
+        }
+        self.next = self.next.max(place + length);
+        self.flying.insert((place, length));
+        let is_last = place + length == self.picture.len();
+        let head = [&self.number.to_be_bytes()[..], &(place as u32).to_be_bytes(), &[u8::from(is_last)]].concat();
+        Some(([&head, &self.picture[place..place + length]].concat(), (place, length)))
+    }
+
+    fn handle_fate(&mut self, carried: Self::Carried, delivered: bool, _now: Instant) {
+        if self.flying.remove(&carried) && !delivered {
+            self.waiting.push(carried);
+        }
+    }
+
+    fn handle_peer_restart(&mut self, _now: Instant) {
+        (self.picture, self.next, self.is_changed) = (Vec::new(), 0, true);
+        self.waiting.clear();
+        self.flying.clear();
+    }
+
+    fn backlog_bytes(&self) -> usize {
+        let more = if self.is_sent() && self.is_changed { 1000 } else { 0 };
+        self.picture.len() - self.next + self.waiting.iter().map(|(_, length)| length).sum::<usize>() + more
+    }
+
+    fn is_converged(&self) -> bool {
+        self.is_sent() && !self.is_changed
+    }
+
+    fn digest(&self) -> u16 {
+        0
+    }
+}
+
+/// Shows the last grid of which every fragment is here.
+#[derive(Debug, Default)]
+pub(super) struct WholeReplica {
+    shown: LabelGrid,
+    number: u32,
+    fragments: BTreeMap<usize, Vec<u8>>,
+    length: Option<usize>,
+    version: u64,
+}
+
+impl WholeReplica {
+    pub(super) fn shown(&self) -> &LabelGrid {
+        &self.shown
+    }
+}
+
+impl StateReplica for WholeReplica {
+    fn apply(&mut self, _number: u64, chunk: &[u8], _now: Instant) -> bool {
+        let Some((&[a, b, c, d, e, f, g, h, last], bytes)) = chunk.split_first_chunk::<HEAD>() else { return false };
+        let (number, place) = (u32::from_be_bytes([a, b, c, d]), u32::from_be_bytes([e, f, g, h]) as usize);
+        if number != self.number {
+            (self.number, self.length) = (number, None);
+            self.fragments.clear();
+        }
+        self.fragments.insert(place, bytes.to_vec());
+        if last != 0 {
+            self.length = Some(place + bytes.len());
+        }
+        let held: usize = self.fragments.values().map(Vec::len).sum();
+        if self.length == Some(held) {
+            let picture: Vec<u8> = self.fragments.values().flatten().copied().collect();
+            if let Ok(grid) = label_picture::decode(&picture, 0, 0) {
+                self.shown = grid;
+                self.version += 1;
+            }
+        }
+        true
+    }
+
+    fn advance_base(&mut self, _horizon: u64) {}
+
+    fn base_digest(&self) -> u16 {
+        0
+    }
+
+    fn version(&self) -> u64 {
+        self.version
+    }
+
+    fn take(&mut self) -> Self {
+        let version = self.version + 1;
+        std::mem::replace(self, Self { version, ..Self::default() })
+    }
+}

@@ -1,0 +1,65 @@
+//! Log lines about a camera and the source of its poses: each kind of fault at once when it is new, and then seldom.
+
+use scenecast_sensors::{CameraFault, CameraTally};
+use std::collections::BTreeMap;
+use std::time::{Duration, Instant};
+
+/// Shortest time between two lines about the same kind of fault.
+const MIN_INTERVAL: Duration = Duration::from_secs(30);
+
+/// What was last logged of each kind of fault.
+#[derive(Debug, Default)]
+pub(super) struct FaultLog {
+    logged: BTreeMap<CameraFault, Logged>,
+}
+
+#[derive(Debug)]
+struct Logged {
+    at: Instant,
+    count: u64,
+}
+
+impl FaultLog {
+    /// Lines about the kinds of faults that have grown since their last line; `explain` says more about a kind.
+    pub(super) fn lines(
+        &mut self,
+        tally: &CameraTally,
+        now: Instant,
+        explain: impl Fn(CameraFault) -> Option<String>,
+    ) -> Vec<String> {
+        let mut lines = Vec::new();
+        for (fault, count) in tally.iter() {
+            let last = self.logged.get(&fault);
+            if last.is_some_and(|last| count == last.count || now.duration_since(last.at) < MIN_INTERVAL) {
+                continue;
+            }
+            self.logged.insert(fault, Logged { at: now, count });
+            let what = if fault.is_dropped_image() { "dropped, " } else { "" };
+            let why = explain(fault).map(|text| format!(": {text}")).unwrap_or_default();
+            let of = if fault.is_of_navigation() { "navigation" } else { "camera" };
+            lines.push(format!("{of}: {what}{} ({count} so far){why}", fault.name()));
+        }
+        lines
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_fault_is_logged_at_once_and_then_seldom() {
+        let (mut log, mut tally, began) = (FaultLog::default(), CameraTally::default(), Instant::now());
+        let mut lines =
+            |tally: &CameraTally, s| log.lines(tally, began + Duration::from_secs(s), |_| Some("why".to_owned()));
+        assert!(lines(&tally, 0).is_empty());
+        tally.count(CameraFault::NoPose);
+        assert_eq!(lines(&tally, 1), ["camera: dropped, no pose at its time (1 so far): why"]);
+        tally.count(CameraFault::NoPose);
+        assert!(lines(&tally, 2).is_empty());
+        tally.count(CameraFault::Stalled);
+        assert_eq!(lines(&tally, 3), ["camera: camera stalled (1 so far): why"]);
+        assert_eq!(lines(&tally, 31), ["camera: dropped, no pose at its time (2 so far): why"]);
+        assert!(lines(&tally, 90).is_empty());
+    }
+}

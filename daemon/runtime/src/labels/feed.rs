@@ -1,0 +1,108 @@
+//! Where items come from: a folder, or a queue that connections and other sources fill.
+
+use scenecast_files::LabelFolder;
+use scenecast_labels::{Item, Refusal};
+use std::collections::VecDeque;
+use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
+use std::time::{Duration, Instant};
+
+/// Pause between two looks at a folder.
+const LOOK_PAUSE: Duration = Duration::from_millis(200);
+/// Items that wait in a queue; a source waits as long as it is full.
+const QUEUE: usize = 4;
+
+/// The answer to a source: whether its item was taken.
+pub(crate) type Answer = Result<(), String>;
+
+/// An item with its source.
+pub(crate) struct Arrived {
+    /// The item's place for people: a file, or the other end of a connection.
+    pub(crate) origin: String,
+    /// The name by which its source resumes after a restart.
+    pub(crate) mark: Option<String>,
+    /// When it came in, or when its file was written; `None` before this program's computer started, or if unknown.
+    pub(crate) at: Option<Instant>,
+    pub(crate) item: Result<Item, Refusal>,
+    pub(crate) answer: Option<SyncSender<Answer>>,
+}
+
+/// The end of a queue that a source fills. [`LabelQueue::push`] blocks while the queue is full.
+#[derive(Debug, Clone)]
+pub(crate) struct LabelQueue(SyncSender<Arrived>);
+
+impl LabelQueue {
+    /// A queue and its other end.
+    pub(crate) fn new() -> (Self, Feed) {
+        let (sender, receiver) = sync_channel(QUEUE);
+        (Self(sender), Feed::Queue(receiver))
+    }
+
+    /// Gives an item; returns `false` once nobody takes items any more.
+    pub(crate) fn push(&self, arrived: Arrived) -> bool {
+        self.0.send(arrived).is_ok()
+    }
+}
+
+/// A source of items.
+pub(crate) enum Feed {
+    Folder(FolderFeed),
+    Queue(Receiver<Arrived>),
+}
+
+impl Feed {
+    /// The files of a folder.
+    pub(crate) fn folder(folder: LabelFolder) -> Self {
+        let began = Instant::now();
+        Self::Folder(FolderFeed { folder, names: VecDeque::new(), looked: None, began, is_missing: false })
+    }
+
+    /// The next item; `None` if there is none within `wait`.
+    pub(crate) fn next(&mut self, wait: Duration) -> Option<Arrived> {
+        match self {
+            Self::Folder(folder) => folder.next(wait),
+            Self::Queue(queue) if wait.is_zero() => queue.try_recv().ok(),
+            Self::Queue(queue) => match queue.recv_timeout(wait) {
+                Ok(arrived) => Some(arrived),
+                Err(RecvTimeoutError::Timeout) => None,
+                Err(RecvTimeoutError::Disconnected) => {
+                    std::thread::sleep(wait);
+                    None
+                }
+            },
+        }
+    }
+}
+
+/// Looks at a folder now and then.
+pub(crate) struct FolderFeed {
+    folder: LabelFolder,
+    /// The names of the last look that were not read yet.
+    names: VecDeque<String>,
+    looked: Option<Instant>,
+    began: Instant,
+    is_missing: bool,
+}
+
+impl FolderFeed {
+    fn next(&mut self, wait: Duration) -> Option<Arrived> {
+        if self.names.is_empty() && self.looked.is_none_or(|at| at.elapsed() >= LOOK_PAUSE) {
+            self.looked = Some(Instant::now());
+            let found = self.folder.scan();
+            let was_missing = std::mem::replace(&mut self.is_missing, found.is_err());
+            match found {
+                Ok(names) => self.names = names.into(),
+                Err(error) if !was_missing => tracing::error!("labels.source: {error}; the folder is looked at again"),
+                Err(_) => {}
+            }
+        }
+        while let Some(name) = self.names.pop_front() {
+            if let Some(found) = self.folder.read(&name, self.began.elapsed().as_secs_f64()) {
+                let at = self.folder.age_of(&name).and_then(|age| Instant::now().checked_sub(age));
+                let (origin, mark) = (format!("{name}.json"), Some(found.name));
+                return Some(Arrived { origin, mark, at, item: found.item, answer: None });
+            }
+        }
+        std::thread::sleep(wait.min(LOOK_PAUSE));
+        None
+    }
+}

@@ -1,0 +1,56 @@
+//! How often the vehicle gets the map of another program.
+
+use std::time::{Duration, Instant};
+
+/// Shortest time between two maps.
+const SHORTEST: Duration = Duration::from_millis(200);
+/// The vehicle handles maps for at most one part of so many of its time, so that a large map does not delay its modem.
+const PART: u32 = 11;
+
+/// When the next map is due: never before the vehicle has handled the last one, and later the longer that took.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Pace {
+    From(Instant),
+    /// The vehicle handles a map.
+    Handling,
+}
+
+impl Pace {
+    pub(super) fn new(now: Instant) -> Self {
+        Self::From(now)
+    }
+
+    pub(super) fn is_due(self, now: Instant) -> bool {
+        matches!(self, Self::From(at) if now >= at)
+    }
+
+    /// The map is given to the vehicle.
+    pub(super) fn handle_given(&mut self) {
+        *self = Self::Handling;
+    }
+
+    /// The vehicle has handled the map since `began`.
+    pub(super) fn handle_taken(&mut self, began: Instant, now: Instant) {
+        let took = now.saturating_duration_since(began);
+        *self = Self::From(now + SHORTEST.max(took * (PART - 1)));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_map_that_takes_long_comes_seldom() {
+        let start = Instant::now();
+        let at = |ms: u64| start + Duration::from_millis(ms);
+        let mut pace = Pace::new(start);
+        assert!(pace.is_due(start));
+        pace.handle_given();
+        assert!(!pace.is_due(at(60_000)), "the vehicle has not handled it");
+        pace.handle_taken(at(1_000), at(1_001));
+        assert!(!pace.is_due(at(1_200)) && pace.is_due(at(1_201)));
+        pace.handle_taken(at(2_000), at(5_000));
+        assert!(!pace.is_due(at(34_999)) && pace.is_due(at(35_000)));
+    }
+}

@@ -1,0 +1,143 @@
+//! Counters of a live camera: what was mapped, and why the rest was not.
+
+use std::collections::BTreeMap;
+use std::fmt;
+
+/// Why an image was not mapped, or an irregularity of a source.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum CameraFault {
+    /// The image has no time stamp, and its source should give one.
+    NoStamp,
+    /// The image is not later than the one before.
+    NotLater,
+    /// No pose is known at the time of the image.
+    NoPose,
+    /// The camera was tilted too much.
+    Tilted,
+    /// A newer image came before the scene model was ready for this one.
+    Overtaken,
+    /// The bytes are not an image that can be read.
+    Unreadable,
+    /// The file or the stream ended within the image.
+    CutOff,
+    /// The pixels have an encoding that is not supported.
+    Encoding,
+    /// The clock of the camera's stamps went back.
+    CameraClockJump,
+    /// The clock of the poses went back.
+    PoseClockJump,
+    /// Two poses are too far apart in time for an image between them.
+    PoseGap,
+    /// The source ended or was lost, and was opened again.
+    SourceLost,
+    /// The source sent no image for longer than allowed.
+    Stalled,
+    /// A pose cannot be used.
+    UnusablePose,
+    /// The source of the poses was lost, and was opened again.
+    PosesLost,
+    /// No pose came in for longer than allowed.
+    PosesStalled,
+    /// A message of the source of the poses could not be read.
+    PosesUnreadable,
+    /// The source of the poses says that its pose is not valid.
+    PoseRefused,
+    /// The velocity log does not see the sea floor, so that its dead reckoning drifts.
+    NoBottomLock,
+    /// The dead reckoning of the source began anew, and its track continues at the last pose.
+    DeadReckoningReset,
+}
+
+impl CameraFault {
+    /// Name for people and in metrics.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::NoStamp => "without a time stamp",
+            Self::NotLater => "not later than the one before",
+            Self::NoPose => "no pose at its time",
+            Self::Tilted => "tilted too much",
+            Self::Overtaken => "overtaken by a newer one",
+            Self::Unreadable => "unreadable",
+            Self::CutOff => "cut off",
+            Self::Encoding => "unknown encoding",
+            Self::CameraClockJump => "camera clock went back",
+            Self::PoseClockJump => "pose clock went back",
+            Self::PoseGap => "gap between poses",
+            Self::SourceLost => "source lost",
+            Self::Stalled => "camera stalled",
+            Self::UnusablePose => "unusable pose",
+            Self::PosesLost => "poses lost",
+            Self::PosesStalled => "poses stalled",
+            Self::PosesUnreadable => "unreadable message about the pose",
+            Self::PoseRefused => "pose not valid",
+            Self::NoBottomLock => "no bottom lock",
+            Self::DeadReckoningReset => "dead reckoning began anew",
+        }
+    }
+
+    /// Whether it is the source of the poses that has failed, and not the camera.
+    pub fn is_of_navigation(self) -> bool {
+        matches!(
+            self,
+            Self::PoseClockJump
+                | Self::PosesLost
+                | Self::PosesStalled
+                | Self::PosesUnreadable
+                | Self::PoseRefused
+                | Self::NoBottomLock
+                | Self::DeadReckoningReset
+        )
+    }
+
+    /// Whether each count is an image that was not mapped.
+    pub fn is_dropped_image(self) -> bool {
+        matches!(
+            self,
+            Self::NoStamp
+                | Self::NotLater
+                | Self::NoPose
+                | Self::Tilted
+                | Self::Overtaken
+                | Self::Unreadable
+                | Self::CutOff
+                | Self::Encoding
+        )
+    }
+}
+
+/// Images so far.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct CameraTally {
+    /// Images that were given to the scene model.
+    pub matched: u64,
+    faults: BTreeMap<CameraFault, u64>,
+}
+
+impl CameraTally {
+    pub fn count(&mut self, fault: CameraFault) {
+        *self.faults.entry(fault).or_default() += 1;
+    }
+
+    pub fn of(&self, fault: CameraFault) -> u64 {
+        self.faults.get(&fault).copied().unwrap_or(0)
+    }
+
+    /// Images that were not mapped.
+    pub fn dropped(&self) -> u64 {
+        self.faults.iter().filter(|(fault, _)| fault.is_dropped_image()).map(|(_, n)| n).sum()
+    }
+
+    pub fn iter(&self) -> impl Iterator<Item = (CameraFault, u64)> + '_ {
+        self.faults.iter().map(|(&fault, &n)| (fault, n))
+    }
+}
+
+impl fmt::Display for CameraTally {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} images mapped, {} dropped", self.matched, self.dropped())?;
+        for (index, (fault, n)) in self.iter().enumerate() {
+            write!(f, "{}{} {n}", if index == 0 { " (" } else { ", " }, fault.name())?;
+        }
+        if self.faults.is_empty() { Ok(()) } else { f.write_str(")") }
+    }
+}

@@ -1,0 +1,117 @@
+//! Compressed images: JPEG, PNG, PPM and TIFF.
+
+use crate::Stamp;
+use image::{ImageReader, Limits, RgbImage};
+use std::io::Cursor;
+
+/// Pixels of the largest image that is decoded.
+pub const MAX_PIXELS: u32 = 64 << 20;
+
+/// An image that cannot be used, as one line for people.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum DecodeError {
+    #[error("not a JPEG, PNG, PPM or TIFF image")]
+    UnknownFormat,
+    #[error("the JPEG has no end, so a part of it is missing")]
+    CutJpeg,
+    #[error("the image has {width} x {height} pixels; allowed are up to {MAX_PIXELS}")]
+    TooLarge { width: u32, height: u32 },
+    #[error("not an image that can be read: {0}")]
+    Broken(String),
+}
+
+/// Decodes an image to 8 bits a channel. Of 16 bits, the upper 8 are kept; transparency is dropped.
+pub fn decode(bytes: &[u8]) -> Result<RgbImage, DecodeError> {
+    // The decoder fills the missing part of a cut JPEG with grey, which would be mapped as sea floor.
+    let is_cut = bytes.starts_with(&[0xFF, 0xD8]) && !bytes.windows(2).rev().take(4096).any(|w| w == [0xFF, 0xD9]);
+    if is_cut {
+        return Err(DecodeError::CutJpeg);
+    }
+    let broken = |e: image::ImageError| DecodeError::Broken(e.to_string());
+    let reader = || ImageReader::new(Cursor::new(bytes)).with_guessed_format();
+    let mut reader_of_size = reader().map_err(|e| DecodeError::Broken(e.to_string()))?;
+    reader_of_size.format().ok_or(DecodeError::UnknownFormat)?;
+    reader_of_size.limits(limits());
+    let (width, height) = reader_of_size.into_dimensions().map_err(broken)?;
+    if u64::from(width) * u64::from(height) > u64::from(MAX_PIXELS) {
+        return Err(DecodeError::TooLarge { width, height });
+    }
+    let mut reader = reader().map_err(|e| DecodeError::Broken(e.to_string()))?;
+    reader.limits(limits());
+    Ok(reader.decode().map_err(broken)?.into_rgb8())
+}
+
+fn limits() -> Limits {
+    let mut limits = Limits::default();
+    limits.max_alloc = Some(u64::from(MAX_PIXELS) * 8);
+    limits
+}
+
+/// Bytes at the head of an image among which its own time is looked for.
+const HEAD_BYTES: usize = 4096;
+
+/// The time at which an image was taken, if the image itself says so by a text `stamp=SECONDS`: in a comment of a PPM or JPEG, or
+/// in a tEXt chunk with the keyword `stamp` of a PNG. The text stands in the first 4096 bytes.
+pub fn own_stamp(bytes: &[u8]) -> Option<Stamp> {
+    let head = &bytes[..bytes.len().min(HEAD_BYTES)];
+    let find = |key: &[u8]| head.windows(key.len()).position(|w| w == key);
+    let text = if head.starts_with(b"\x89PNG") {
+        const KEY: &[u8] = b"tEXtstamp\0";
+        let at = find(KEY)?;
+        // The length of the chunk's data, which begin behind the type, stands before the type.
+        let length = u32::from_be_bytes(*head.get(at.checked_sub(4)?..at)?.first_chunk()?) as usize;
+        head.get(at + KEY.len()..at + length.checked_add(4)?)?
+    } else if [&b"P6"[..], b"P5", b"\xFF\xD8"].iter().any(|magic| head.starts_with(magic)) {
+        const KEY: &[u8] = b"stamp=";
+        let text = &head[find(KEY)? + KEY.len()..];
+        &text[..text.iter().position(|b| !b.is_ascii_digit() && *b != b'.').unwrap_or(text.len())]
+    } else {
+        return None;
+    };
+    Stamp::parse(std::str::from_utf8(text).ok()?)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use image::{ImageFormat, Rgb};
+
+    fn image() -> RgbImage {
+        RgbImage::from_fn(9, 7, |x, y| Rgb([x as u8 * 20, y as u8 * 30, 7]))
+    }
+
+    fn encoded(format: ImageFormat) -> Vec<u8> {
+        if format == ImageFormat::Pnm {
+            return [b"P6 9 7 255\n".as_slice(), image().as_raw()].concat();
+        }
+        let mut bytes = Cursor::new(Vec::new());
+        image().write_to(&mut bytes, format).unwrap();
+        bytes.into_inner()
+    }
+
+    #[test]
+    fn images_are_decoded_and_others_named() {
+        for format in [ImageFormat::Png, ImageFormat::Pnm, ImageFormat::Tiff] {
+            assert_eq!(decode(&encoded(format)).unwrap(), image(), "{format:?}");
+        }
+        let jpeg = encoded(ImageFormat::Jpeg);
+        assert_eq!(decode(&jpeg).unwrap().dimensions(), (9, 7));
+        assert_eq!(decode(&jpeg[..jpeg.len() - 2]), Err(DecodeError::CutJpeg));
+        assert_eq!(decode(b"no image at all"), Err(DecodeError::UnknownFormat));
+        let huge = b"P6\n100000 100000\n255\n";
+        assert_eq!(decode(huge), Err(DecodeError::TooLarge { width: 100_000, height: 100_000 }));
+        let cut = encoded(ImageFormat::Png);
+        assert!(matches!(decode(&cut[..60]), Err(DecodeError::Broken(_))));
+    }
+
+    #[test]
+    fn an_image_says_when_it_was_taken() {
+        assert_eq!(own_stamp(b"P6\n# stamp=12.5\n1 1\n255\nabc"), Some(Stamp::from_nanos(12_500_000_000)));
+        assert_eq!(own_stamp(b"\xFF\xD8\xFF\xFE\0\x0Cstamp=7.25\xFF"), Some(Stamp::from_nanos(7_250_000_000)));
+        assert_eq!(own_stamp(b"\x89PNG....\0\0\0\x12tEXtstamp\x001305031102.57777"), Stamp::parse("1305031102.5"));
+        assert_eq!(own_stamp(b"P6\n1 1\n255\nabc"), None);
+        assert_eq!(own_stamp(b"stamp=3"), None);
+        assert_eq!(own_stamp(b"\x89PNG\xFF\xFF\xFF\xFFtEXtstamp\x0013"), None);
+        assert_eq!(own_stamp(&encoded(ImageFormat::Png)), None);
+    }
+}

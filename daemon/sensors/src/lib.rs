@@ -1,0 +1,40 @@
+//! Camera images and poses of a live vehicle, from the bytes of a source to the frame that is mapped.
+//!
+//! | step | type |
+//! |---|---|
+//! | images are cut out of a stream of bytes | [`ImageStream`] |
+//! | raw pixels of ROS 2 become RGB | [`RawImage`] |
+//! | compressed images become RGB, and say when they were taken | [`decode`], [`own_stamp`] |
+//! | quaternions become headings and tilts | [`Rotation`] |
+//! | messages of ROS 2 become images and poses | [`rgb_of`], [`pose_of`] |
+//! | lines of a Doppler velocity log become poses | [`DvlReport`], [`DvlTrack`] |
+//! | poses are interpolated at the time of an image | [`PoseTrack`] |
+//! | the pose of a vehicle becomes that of its camera | [`CameraMounting`] |
+//! | images wait for their poses, and are dropped with a reason | [`FrameMatcher`] |
+//!
+//! The crate does no IO: bytes and times of arrival come in as arguments.
+
+mod bayer;
+mod camera_tally;
+mod compressed;
+mod dvl;
+mod frame_matcher;
+mod image_stream;
+mod mounting;
+mod pose_track;
+mod raw_image;
+mod ros_messages;
+mod rotation;
+mod stamp;
+
+pub use camera_tally::{CameraFault, CameraTally};
+pub use compressed::{DecodeError, MAX_PIXELS, decode, own_stamp};
+pub use dvl::{DvlError, DvlPosition, DvlReport, DvlTrack, MAX_DVL_LINE};
+pub use frame_matcher::{FrameMatcher, Limits, MatchedImage};
+pub use image_stream::{ImageStream, MAX_IMAGE_BYTES, complete_length};
+pub use mounting::CameraMounting;
+pub use pose_track::{PoseMatch, PoseTrack, SensorPose};
+pub use raw_image::{RawImage, RawImageError};
+pub use ros_messages::{pose_of, rgb_of, stamp_of, stamp_of_cdr};
+pub use rotation::Rotation;
+pub use stamp::Stamp;

@@ -1,0 +1,199 @@
+//! The poses of the last minutes, and the pose at the time of an image.
+
+use crate::Stamp;
+use std::collections::VecDeque;
+use std::f64::consts::{PI, TAU};
+use std::time::Duration;
+
+/// Pose of the vehicle or of its camera.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct SensorPose {
+    /// Metres east of the origin of the map.
+    pub x_m: f64,
+    /// Metres north of the origin of the map.
+    pub y_m: f64,
+    /// Depth below the surface, metres.
+    pub depth_m: f64,
+    /// Heading clockwise from north, radians.
+    pub heading_rad: f64,
+    /// Rotation about the forward axis, starboard down, radians.
+    pub roll_rad: f64,
+    /// Rotation about the starboard axis, bow up, radians.
+    pub pitch_rad: f64,
+    /// Height above the sea floor, metres, where it is measured.
+    pub altitude_m: Option<f64>,
+}
+
+impl SensorPose {
+    /// Whether every number is finite.
+    pub fn is_finite(&self) -> bool {
+        let all = [self.x_m, self.y_m, self.depth_m, self.heading_rad, self.roll_rad, self.pitch_rad];
+        all.into_iter().chain(self.altitude_m).all(f64::is_finite)
+    }
+
+    /// The pose at `share` of the way in time from this one to `later`; each angle turns the shorter way.
+    fn between(&self, later: &Self, share: f64) -> Self {
+        let line = |a: f64, b: f64| a + (b - a) * share;
+        let angle = |a: f64, b: f64| a + ((b - a + PI).rem_euclid(TAU) - PI) * share;
+        Self {
+            x_m: line(self.x_m, later.x_m),
+            y_m: line(self.y_m, later.y_m),
+            depth_m: line(self.depth_m, later.depth_m),
+            heading_rad: angle(self.heading_rad, later.heading_rad),
+            roll_rad: angle(self.roll_rad, later.roll_rad),
+            pitch_rad: angle(self.pitch_rad, later.pitch_rad),
+            altitude_m: match (self.altitude_m, later.altitude_m) {
+                (Some(a), Some(b)) => Some(line(a, b)),
+                (a, b) => a.or(b),
+            },
+        }
+    }
+}
+
+/// The pose at a time.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum PoseMatch {
+    /// The pose, measured at that time or interpolated.
+    Found(SensorPose),
+    /// A later pose may still come in.
+    NotYet,
+    /// The poses before and after are too far apart.
+    Gap,
+    /// The time is before the first pose that is known.
+    TooEarly,
+}
+
+/// Poses of an end that are earlier than the last one by more than this are of another clock.
+const JUMP: Duration = Duration::from_secs(1);
+
+/// Poses in a row from which a clock that went back is believed.
+const JUMP_POSES: u32 = 3;
+
+/// Poses in order of their stamps.
+#[derive(Debug, Clone)]
+pub struct PoseTrack {
+    poses: VecDeque<(Stamp, SensorPose)>,
+    max_gap: Duration,
+    /// Poses in a row that were from before the last one.
+    earlier: u32,
+}
+
+impl PoseTrack {
+    /// The most poses that are kept: 100 s of a source of 100 Hz.
+    const MAX_POSES: usize = 10_000;
+
+    /// No pose is interpolated between two that are more than `max_gap` apart.
+    pub fn new(max_gap: Duration) -> Self {
+        Self { poses: VecDeque::new(), max_gap, earlier: 0 }
+    }
+
+    /// A track of all these poses, however many; those that are not later than the one before are left out.
+    pub fn of(poses: impl IntoIterator<Item = (Stamp, SensorPose)>, max_gap: Duration) -> Self {
+        let mut track = Self::new(max_gap);
+        for (stamp, pose) in poses {
+            if pose.is_finite() && track.poses.back().is_none_or(|(last, _)| *last < stamp) {
+                track.poses.push_back((stamp, pose));
+            }
+        }
+        track
+    }
+
+    /// Takes a pose. Returns whether the clock of the poses went back, so that earlier poses were forgotten. A pose of the
+    /// time of the last one replaces it, and one that is a little earlier is ignored, as is one that is not finite.
+    pub fn push(&mut self, stamp: Stamp, pose: SensorPose) -> bool {
+        if !pose.is_finite() {
+            return false;
+        }
+        let last = self.poses.back().map(|(last, _)| *last);
+        let is_other_clock = last.is_some_and(|last| stamp.after(JUMP) < last);
+        self.earlier = if is_other_clock { self.earlier + 1 } else { 0 };
+        match last {
+            Some(last) if stamp < last => {
+                if self.earlier < JUMP_POSES {
+                    return false;
+                }
+                self.poses.clear();
+                self.earlier = 0;
+                self.poses.push_back((stamp, pose));
+                return true;
+            }
+            Some(last) if stamp == last => {
+                self.poses.pop_back();
+            }
+            Some(_) | None => {}
+        }
+        self.poses.push_back((stamp, pose));
+        self.poses.drain(..self.poses.len().saturating_sub(Self::MAX_POSES));
+        false
+    }
+
+    /// The pose at `stamp`.
+    pub fn at(&self, stamp: Stamp) -> PoseMatch {
+        let after = self.poses.partition_point(|(at, _)| *at < stamp);
+        match (after.checked_sub(1).map(|i| self.poses[i]), self.poses.get(after)) {
+            (_, Some((at, pose))) if *at == stamp => PoseMatch::Found(*pose),
+            (Some((before, a)), Some((later, b))) => {
+                let apart_s = later.seconds_since(before);
+                if apart_s > self.max_gap.as_secs_f64() {
+                    return PoseMatch::Gap;
+                }
+                PoseMatch::Found(a.between(b, stamp.seconds_since(before) / apart_s))
+            }
+            (None, Some(_)) => PoseMatch::TooEarly,
+            (_, None) => PoseMatch::NotYet,
+        }
+    }
+
+    /// The last pose and its stamp.
+    pub fn last(&self) -> Option<(Stamp, SensorPose)> {
+        self.poses.back().copied()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn at(x_m: f64, heading_deg: f64) -> SensorPose {
+        SensorPose { x_m, heading_rad: heading_deg.to_radians(), ..SensorPose::default() }
+    }
+
+    fn seconds(s: f64) -> Stamp {
+        Stamp::from_nanos((s * 1e9) as i64)
+    }
+
+    #[test]
+    fn poses_are_interpolated_the_short_way_round() {
+        let mut track = PoseTrack::new(Duration::from_secs(1));
+        track.push(seconds(10.0), at(0.0, 350.0));
+        track.push(seconds(11.0), at(2.0, 10.0));
+        let PoseMatch::Found(pose) = track.at(seconds(10.25)) else { panic!() };
+        assert!((pose.x_m - 0.5).abs() < 1e-9 && (pose.heading_rad.to_degrees() - 355.0).abs() < 1e-9, "{pose:?}");
+        assert_eq!(track.at(seconds(11.0)), PoseMatch::Found(at(2.0, 10.0)));
+    }
+
+    #[test]
+    fn no_pose_is_invented_outside_of_the_track_or_in_a_gap() {
+        let mut track = PoseTrack::new(Duration::from_secs(1));
+        assert_eq!(track.at(seconds(1.0)), PoseMatch::NotYet);
+        track.push(seconds(10.0), at(0.0, 0.0));
+        track.push(seconds(11.5), at(2.0, 0.0));
+        assert_eq!(track.at(seconds(9.9)), PoseMatch::TooEarly);
+        assert_eq!(track.at(seconds(10.5)), PoseMatch::Gap);
+        assert_eq!(track.at(seconds(11.6)), PoseMatch::NotYet);
+        track.push(seconds(12.0), at(f64::NAN, 0.0));
+        assert_eq!(track.last().unwrap().0, seconds(11.5));
+    }
+
+    #[test]
+    fn a_clock_that_goes_back_is_believed_after_three_poses() {
+        let mut track = PoseTrack::new(Duration::from_secs(1));
+        track.push(seconds(100.0), at(0.0, 0.0));
+        assert!(!track.push(seconds(99.9), at(9.0, 0.0)));
+        assert_eq!(track.at(seconds(100.0)), PoseMatch::Found(at(0.0, 0.0)));
+        let pushed: Vec<bool> = [1.0, 1.1, 1.2].map(|s| track.push(seconds(s), at(s, 0.0))).to_vec();
+        assert_eq!(pushed, [false, false, true]);
+        assert_eq!(track.at(seconds(1.2)), PoseMatch::Found(at(1.2, 0.0)));
+        assert_eq!(track.at(seconds(100.0)), PoseMatch::NotYet);
+    }
+}

@@ -1,0 +1,213 @@
+//! Raw pixels in the encodings of ROS 2 (`sensor_msgs/image_encodings.hpp`).
+
+use crate::bayer::BayerPattern;
+use crate::compressed::MAX_PIXELS;
+use image::{Rgb, RgbImage};
+
+/// A raw image as it came in.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct RawImage<'a> {
+    pub width: u32,
+    pub height: u32,
+    /// Name of the encoding, as `rgb8` or `bayer_rggb16`.
+    pub encoding: &'a str,
+    pub is_bigendian: bool,
+    /// Bytes from one row to the next.
+    pub step: u32,
+    pub data: &'a [u8],
+}
+
+/// A raw image that cannot be used, as one line for people.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum RawImageError {
+    #[error(
+        "the encoding {0:?} is not supported; allowed are mono8, mono16, rgb8, rgba8, bgr8, bgra8, rgb16, rgba16, bgr16, bgra16, 8UC1, 8UC3, 16UC1, 16UC3, uyvy, yuv422, yuyv, yuv422_yuy2, and bayer_rggb8, bayer_bggr8, bayer_gbrg8, bayer_grbg8 with 8 or 16 bits"
+    )]
+    Encoding(String),
+    #[error("the image has {width} x {height} pixels; allowed are 1 to {MAX_PIXELS}")]
+    Size { width: u32, height: u32 },
+    #[error("{held} bytes are too few for {height} rows of {step} bytes")]
+    Short { held: usize, height: u32, step: u32 },
+    #[error("a row of {step} bytes is too short for {width} pixels of {encoding}")]
+    Step { step: u32, width: u32, encoding: String },
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Layout {
+    /// Grey, or channels of which those at these indices are red, green and blue.
+    Channels {
+        count: usize,
+        rgb: [usize; 3],
+    },
+    Bayer(BayerPattern),
+    /// Two pixels in four bytes; the index of the first luma byte is 0 or 1.
+    Yuv422 {
+        luma: usize,
+    },
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Encoding {
+    layout: Layout,
+    /// Bytes of a sample.
+    depth: usize,
+}
+
+impl Encoding {
+    fn parse(name: &str) -> Option<Self> {
+        let channels = |count, rgb, depth| Some(Self { layout: Layout::Channels { count, rgb }, depth });
+        let (grey, rgb, bgr) = ([0; 3], [0, 1, 2], [2, 1, 0]);
+        match name {
+            "mono8" | "8UC1" => channels(1, grey, 1),
+            "mono16" | "16UC1" => channels(1, grey, 2),
+            "rgb8" => channels(3, rgb, 1),
+            "rgba8" => channels(4, rgb, 1),
+            // OpenCV's order is blue, green, red.
+            "bgr8" | "8UC3" => channels(3, bgr, 1),
+            "bgra8" | "8UC4" => channels(4, bgr, 1),
+            "rgb16" => channels(3, rgb, 2),
+            "rgba16" => channels(4, rgb, 2),
+            "bgr16" | "16UC3" => channels(3, bgr, 2),
+            "bgra16" | "16UC4" => channels(4, bgr, 2),
+            "uyvy" | "yuv422" => Some(Self { layout: Layout::Yuv422 { luma: 1 }, depth: 1 }),
+            "yuyv" | "yuv422_yuy2" => Some(Self { layout: Layout::Yuv422 { luma: 0 }, depth: 1 }),
+            _ => {
+                let rest = name.strip_prefix("bayer_")?;
+                let (pattern, depth) = match rest.strip_suffix("16") {
+                    Some(pattern) => (pattern, 2),
+                    None => (rest.strip_suffix('8')?, 1),
+                };
+                let pattern = match pattern {
+                    "rggb" => BayerPattern::Rggb,
+                    "bggr" => BayerPattern::Bggr,
+                    "gbrg" => BayerPattern::Gbrg,
+                    "grbg" => BayerPattern::Grbg,
+                    _ => return None,
+                };
+                Some(Self { layout: Layout::Bayer(pattern), depth })
+            }
+        }
+    }
+
+    fn row_bytes(self, width: usize) -> usize {
+        match self.layout {
+            Layout::Channels { count, .. } => width * count * self.depth,
+            Layout::Bayer(_) => width * self.depth,
+            Layout::Yuv422 { .. } => width.div_ceil(2) * 4,
+        }
+    }
+}
+
+impl RawImage<'_> {
+    /// The image with 8 bits a channel; of 16 bits, the nearest of 256 levels.
+    pub fn to_rgb(&self) -> Result<RgbImage, RawImageError> {
+        let encoding =
+            Encoding::parse(self.encoding).ok_or_else(|| RawImageError::Encoding(shortened(self.encoding)))?;
+        let (width, height, step) = (self.width as usize, self.height as usize, self.step as usize);
+        let pixels = u64::from(self.width) * u64::from(self.height);
+        if pixels == 0 || pixels > u64::from(MAX_PIXELS) {
+            return Err(RawImageError::Size { width: self.width, height: self.height });
+        }
+        let row_bytes = encoding.row_bytes(width);
+        if step < row_bytes {
+            let encoding = self.encoding.to_owned();
+            return Err(RawImageError::Step { step: self.step, width: self.width, encoding });
+        }
+        // The last row may end with its last pixel.
+        if (self.data.len() as u64) < (height as u64 - 1) * step as u64 + row_bytes as u64 {
+            return Err(RawImageError::Short { held: self.data.len(), height: self.height, step: self.step });
+        }
+        let sample = |y: usize, index: usize| self.sample(y * step + index * encoding.depth, encoding.depth);
+        Ok(match encoding.layout {
+            Layout::Channels { count, rgb } => RgbImage::from_fn(self.width, self.height, |x, y| {
+                Rgb(rgb.map(|channel| sample(y as usize, x as usize * count + channel)))
+            }),
+            Layout::Bayer(pattern) => pattern.colours(width, height, |x, y| sample(y, x)),
+            Layout::Yuv422 { luma } => RgbImage::from_fn(self.width, self.height, |x, y| {
+                let (pair, is_second) = (x as usize / 2 * 4, x as usize % 2);
+                let at = |index: usize| f32::from(sample(y as usize, pair + index));
+                rgb_of_yuv(at(luma + 2 * is_second), at(1 - luma), at(3 - luma))
+            }),
+        })
+    }
+
+    fn sample(&self, at: usize, depth: usize) -> u8 {
+        if depth == 1 {
+            return self.data[at];
+        }
+        let pair = [self.data[at], self.data[at + 1]];
+        let value = if self.is_bigendian { u16::from_be_bytes(pair) } else { u16::from_le_bytes(pair) };
+        ((u32::from(value) + 128) / 257) as u8
+    }
+}
+
+/// The beginning of a text from outside, for a message.
+fn shortened(text: &str) -> String {
+    text.chars().take(40).collect()
+}
+
+/// ITU-R BT.601 with the full range of luma, as JPEG and most USB cameras use it.
+fn rgb_of_yuv(y: f32, u: f32, v: f32) -> Rgb<u8> {
+    let (u, v) = (u - 128.0, v - 128.0);
+    let level = |value: f32| value.round().clamp(0.0, 255.0) as u8;
+    Rgb([level(y + 1.402 * v), level(y - 0.344_136 * u - 0.714_136 * v), level(y + 1.772 * u)])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn image<'a>(encoding: &'a str, (width, height): (u32, u32), step: u32, data: &'a [u8]) -> RawImage<'a> {
+        RawImage { width, height, encoding, is_bigendian: false, step, data }
+    }
+
+    #[test]
+    fn channels_are_put_in_order_and_rows_may_be_padded() {
+        let rgb = image("rgb8", (1, 2), 4, &[1, 2, 3, 0, 4, 5, 6]).to_rgb().unwrap();
+        assert_eq!(rgb.into_raw(), [1, 2, 3, 4, 5, 6]);
+        assert_eq!(image("bgra8", (1, 1), 4, &[1, 2, 3, 9]).to_rgb().unwrap().into_raw(), [3, 2, 1]);
+        assert_eq!(image("mono8", (2, 1), 2, &[7, 8]).to_rgb().unwrap().into_raw(), [7, 7, 7, 8, 8, 8]);
+    }
+
+    #[test]
+    fn sixteen_bits_become_eight_in_either_byte_order() {
+        let mut mono = image("mono16", (2, 1), 4, &[0xFF, 0xFF, 0x00, 0x80]);
+        assert_eq!(mono.to_rgb().unwrap().into_raw(), [255, 255, 255, 128, 128, 128]);
+        mono.is_bigendian = true;
+        assert_eq!(mono.to_rgb().unwrap().into_raw(), [255, 255, 255, 0, 0, 0]);
+    }
+
+    #[test]
+    fn a_grey_yuv_image_stays_grey() {
+        assert_eq!(
+            image("uyvy", (2, 1), 4, &[128, 10, 128, 20]).to_rgb().unwrap().into_raw(),
+            [10, 10, 10, 20, 20, 20]
+        );
+        assert_eq!(
+            image("yuyv", (2, 1), 4, &[10, 128, 20, 128]).to_rgb().unwrap().into_raw(),
+            [10, 10, 10, 20, 20, 20]
+        );
+    }
+
+    #[test]
+    fn what_does_not_fit_is_named() {
+        let text = |image: RawImage<'_>| image.to_rgb().unwrap_err().to_string();
+        assert!(text(image("nv21", (1, 1), 3, &[0; 3])).contains("\"nv21\" is not supported; allowed are mono8"));
+        assert!(text(image("rgb8", (0, 5), 0, &[])).contains("0 x 5 pixels"));
+        assert!(text(image("rgb8", (2, 2), 6, &[0; 11])).contains("11 bytes are too few for 2 rows of 6 bytes"));
+        assert!(text(image("rgb8", (2, 2), 5, &[0; 99])).contains("5 bytes is too short for 2 pixels of rgb8"));
+        assert!(text(image("mono8", (u32::MAX, u32::MAX), u32::MAX, &[])).contains("allowed are 1 to"));
+    }
+
+    proptest! {
+        #[test]
+        fn any_header_gives_an_image_or_an_error(width in 0_u32..40, height in 0_u32..40, step in 0_u32..200,
+            encoding in prop::sample::select(vec!["rgb8", "mono16", "bayer_grbg16", "bayer_rggb8", "uyvy", "bgra16", "x"]),
+            data in prop::collection::vec(any::<u8>(), 0..4000)) {
+            if let Ok(rgb) = image(encoding, (width, height), step, &data).to_rgb() {
+                prop_assert_eq!(rgb.dimensions(), (width, height));
+            }
+        }
+    }
+}

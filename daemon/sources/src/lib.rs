@@ -1,0 +1,25 @@
+//! Live cameras and navigation sensors, each on a thread of its own.
+//!
+//! A [`SensorSource`] waits for the readings of a sensor. [`LiveSource`] opens it, opens it again with back-off when it is lost,
+//! and reports readings and faults to the vehicle. Which image is mapped at which pose is decided by
+//! [`scenecast_sensors::FrameMatcher`].
+
+mod arrival_clock;
+mod command;
+mod dvl;
+mod live;
+mod picture;
+#[cfg(feature = "ros2")]
+mod ros2;
+mod tum_poses;
+mod watch;
+
+pub use arrival_clock::ArrivalClock;
+pub use command::CommandSource;
+pub use dvl::DvlSource;
+pub use live::{LiveSource, Reading, SensorKind, SensorSource, SourceError, SourceImage, SourceReport};
+pub use picture::Picture;
+#[cfg(feature = "ros2")]
+pub use ros2::{RosCamera, RosNavigation, SensorNode};
+pub use tum_poses::read_tum_poses;
+pub use watch::WatchSource;

@@ -1,0 +1,275 @@
+//! A folder into which a camera's program writes its images.
+
+use crate::ArrivalClock;
+use crate::live::{Reading, SensorKind, SensorSource, SourceError, SourceImage};
+use scenecast_sensors::{CameraFault, MAX_IMAGE_BYTES, Stamp, complete_length};
+use std::collections::{BTreeMap, VecDeque};
+use std::fs::DirEntry;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant, SystemTime};
+
+/// Time between two looks into the folder.
+const LOOK: Duration = Duration::from_millis(50);
+
+/// Time between two readings of a folder whose own time of change says nothing new.
+const READ: Duration = Duration::from_millis(500);
+
+/// Most complete files that are taken in one look; of more, the last ones.
+const MAX_FILES: usize = 8;
+
+/// A file that has not grown for this long is not completed any more.
+const ABANDONED: Duration = Duration::from_secs(5);
+
+/// A TIFF, which does not show its own end, is complete when it has not grown for this long.
+const SETTLED: Duration = Duration::from_millis(300);
+
+/// Files that were written this long before the folder is opened are live; older ones are not mapped.
+const LIVE: Duration = Duration::from_secs(2);
+
+/// Images of a folder, each as soon as it is complete. A name that is a number is the time of its image, as in
+/// `1305031102.175304.png` (seconds) and `1403636579763555584.png` (nanoseconds).
+pub struct WatchSource {
+    dir: PathBuf,
+    clock: ArrivalClock,
+    files: BTreeMap<PathBuf, FileState>,
+    /// Time of change of the folder when it was last read.
+    changed: Option<SystemTime>,
+    /// When it was last read.
+    read: Option<Instant>,
+    ready: VecDeque<SourceImage>,
+}
+
+#[derive(Debug, Clone, Copy)]
+enum FileState {
+    Growing {
+        length: u64,
+        since: Instant,
+    },
+    /// Taken, or never to be taken.
+    Done,
+}
+
+impl WatchSource {
+    pub fn new(dir: &Path, clock: ArrivalClock) -> Self {
+        Self { dir: dir.to_owned(), clock, files: BTreeMap::new(), changed: None, read: None, ready: VecDeque::new() }
+    }
+
+    fn entries(&self) -> Result<Vec<DirEntry>, SourceError> {
+        let failed = |e: std::io::Error| SourceError(format!("{}: {e}", self.dir.display()));
+        let entries = std::fs::read_dir(&self.dir).map_err(failed)?;
+        Ok(entries.filter_map(Result::ok).filter(|entry| is_image(&entry.path())).collect())
+    }
+
+    /// Of many new files at once, only the last ones are read: the others would be overtaken.
+    fn skip_all_but_the_newest(&mut self, fault: &mut dyn FnMut(CameraFault, String)) {
+        let is_open = |state: &FileState| matches!(state, FileState::Growing { .. });
+        let mut open: Vec<(Option<Stamp>, PathBuf)> =
+            self.files.iter().filter(|(_, state)| is_open(state)).map(|(p, _)| (stamp_of_name(p), p.clone())).collect();
+        open.sort();
+        open.truncate(open.len().saturating_sub(MAX_FILES));
+        for (_, path) in open {
+            fault(CameraFault::Overtaken, format!("more than {MAX_FILES} images came at once"));
+            self.files.insert(path, FileState::Done);
+        }
+    }
+
+    /// Takes new files in, and every file that is complete now.
+    fn look(&mut self, fault: &mut dyn FnMut(CameraFault, String)) -> Result<(), SourceError> {
+        let changed = std::fs::metadata(&self.dir).and_then(|folder| folder.modified());
+        let changed = changed.map_err(|e| SourceError(format!("{}: {e}", self.dir.display())))?;
+        // A time of change may hide a file that came later, within its resolution or on a network disk.
+        let is_due = self.read.is_none_or(|read| read.elapsed() >= READ);
+        if self.changed != Some(changed) || is_due {
+            (self.changed, self.read) = (Some(changed), Some(Instant::now()));
+            let found = self.entries()?.into_iter().map(|entry| entry.path());
+            let mut before = std::mem::take(&mut self.files);
+            let begun = FileState::Growing { length: 0, since: Instant::now() };
+            self.files = found
+                .map(|path| {
+                    let state = before.remove(&path).unwrap_or(begun);
+                    (path, state)
+                })
+                .collect();
+        }
+        self.skip_all_but_the_newest(fault);
+        let mut complete: Vec<(Option<Stamp>, PathBuf, Vec<u8>)> = Vec::new();
+        for (path, state) in &mut self.files {
+            let FileState::Growing { length, since } = state else { continue };
+            let now_length = std::fs::metadata(path).map_or(0, |file| file.len());
+            let has_grown = std::mem::replace(length, now_length) != now_length;
+            if has_grown {
+                *since = Instant::now();
+            }
+            let still = since.elapsed();
+            let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+            if now_length > MAX_IMAGE_BYTES as u64 {
+                fault(CameraFault::Unreadable, format!("{name}: larger than {MAX_IMAGE_BYTES} bytes"));
+                *state = FileState::Done;
+            } else if has_grown || (is_tiff(path) && still >= SETTLED) {
+                let Ok(bytes) = std::fs::read(path) else { continue };
+                if (is_tiff(path) && !has_grown) || complete_length(&bytes).is_some() {
+                    *state = FileState::Done;
+                    complete.push((stamp_of_name(path), path.clone(), bytes));
+                }
+            } else if still >= ABANDONED {
+                fault(CameraFault::CutOff, format!("{name}: not a complete image after {} s", ABANDONED.as_secs()));
+                *state = FileState::Done;
+            }
+        }
+        complete.sort_by(|a, b| (a.0, &a.1).cmp(&(b.0, &b.1)));
+        let arrival = self.clock.now();
+        self.ready.extend(complete.into_iter().map(|(stamp, _, bytes)| SourceImage::compressed(stamp, arrival, bytes)));
+        Ok(())
+    }
+}
+
+impl SensorSource for WatchSource {
+    fn kind(&self) -> SensorKind {
+        SensorKind::Camera
+    }
+
+    fn open(&mut self) -> Result<(), SourceError> {
+        self.changed = None;
+        let is_old = |entry: &DirEntry| {
+            let modified = entry.metadata().and_then(|file| file.modified());
+            modified.is_ok_and(|modified| modified.elapsed().is_ok_and(|age| age > LIVE))
+        };
+        self.files =
+            self.entries()?.iter().filter(|entry| is_old(entry)).map(|e| (e.path(), FileState::Done)).collect();
+        Ok(())
+    }
+
+    fn next(
+        &mut self,
+        timeout: Duration,
+        fault: &mut dyn FnMut(CameraFault, String),
+    ) -> Result<Option<Reading>, SourceError> {
+        let until = Instant::now() + timeout;
+        loop {
+            if let Some(image) = self.ready.pop_front() {
+                return Ok(Some(Reading::Image(image)));
+            }
+            self.look(fault)?;
+            if self.ready.is_empty() {
+                if Instant::now() >= until {
+                    return Ok(None);
+                }
+                std::thread::sleep(LOOK);
+            }
+        }
+    }
+
+    fn is_reopened_after_stall(&self) -> bool {
+        false
+    }
+}
+
+const EXTENSIONS: [&str; 8] = ["jpeg", "jpg", "pgm", "png", "pnm", "ppm", "tif", "tiff"];
+
+/// Whether a file is named as an image; hidden files are not.
+fn is_image(path: &Path) -> bool {
+    let is_hidden = path.file_name().is_none_or(|name| name.to_string_lossy().starts_with('.'));
+    let extension = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
+    !is_hidden && extension.is_some_and(|extension| EXTENSIONS.contains(&extension.as_str()))
+}
+
+fn is_tiff(path: &Path) -> bool {
+    path.extension().is_some_and(|e| e.to_string_lossy().to_ascii_lowercase().starts_with("tif"))
+}
+
+fn stamp_of_name(path: &Path) -> Option<Stamp> {
+    Stamp::parse(&path.file_stem()?.to_string_lossy())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Picture;
+
+    struct Folder(PathBuf);
+
+    impl Folder {
+        fn new(name: &str) -> Self {
+            let dir = std::env::temp_dir().join(format!("scenecast-{}-watch-{name}", std::process::id()));
+            let _ = std::fs::remove_dir_all(&dir);
+            std::fs::create_dir_all(&dir).unwrap();
+            Self(dir)
+        }
+
+        fn write(&self, name: &str, bytes: &[u8]) {
+            std::fs::write(self.0.join(name), bytes).unwrap();
+        }
+
+        fn source(&self) -> WatchSource {
+            WatchSource::new(&self.0, ArrivalClock::start())
+        }
+    }
+
+    const PPM: &[u8] = b"P6 1 1 255\nabc";
+
+    /// The next image of a source; a fault is none.
+    fn next(source: &mut WatchSource) -> Option<Picture> {
+        let image = source.next(Duration::ZERO, &mut |fault, text| panic!("{fault:?} {text}")).unwrap();
+        image.map(|reading| image_of(reading).picture)
+    }
+
+    fn image_of(reading: Reading) -> SourceImage {
+        match reading {
+            Reading::Image(image) => image,
+            Reading::Pose(..) => panic!("a folder has no poses"),
+        }
+    }
+
+    #[test]
+    fn a_file_is_taken_once_it_is_complete() {
+        let folder = Folder::new("partial");
+        let mut source = folder.source();
+        source.open().unwrap();
+        folder.write("a.ppm", &PPM[..12]);
+        folder.write("notes.txt", PPM);
+        assert_eq!(next(&mut source), None);
+        folder.write("a.ppm", PPM);
+        assert_eq!(next(&mut source), Some(Picture::Compressed(PPM.to_vec())));
+        assert_eq!(next(&mut source), None);
+    }
+
+    #[test]
+    fn files_are_ordered_by_the_time_in_their_names() {
+        let folder = Folder::new("order");
+        let mut source = folder.source();
+        source.open().unwrap();
+        for name in ["10.5.ppm", "9.25.ppm", "100.ppm"] {
+            folder.write(name, PPM);
+        }
+        let mut stamp =
+            || source.next(Duration::ZERO, &mut |_, _| ()).unwrap().and_then(|reading| image_of(reading).stamp);
+        let stamps: Vec<Option<Stamp>> = std::iter::repeat_with(&mut stamp).take(4).collect();
+        assert_eq!(stamps, [Stamp::parse("9.25"), Stamp::parse("10.5"), Stamp::parse("100"), None]);
+    }
+
+    #[test]
+    fn a_missing_folder_is_named_and_may_come_back() {
+        let folder = Folder::new("missing");
+        let mut source = folder.source();
+        std::fs::remove_dir_all(&folder.0).unwrap();
+        let error = source.open().unwrap_err().to_string();
+        assert!(error.starts_with(&folder.0.display().to_string()), "{error}");
+        std::fs::create_dir_all(&folder.0).unwrap();
+        source.open().unwrap();
+        folder.write("a.ppm", PPM);
+        assert!(next(&mut source).is_some());
+    }
+
+    #[test]
+    fn files_of_an_earlier_dive_are_not_mapped() {
+        let folder = Folder::new("old");
+        folder.write("old.ppm", PPM);
+        let file = std::fs::File::options().append(true).open(folder.0.join("old.ppm")).unwrap();
+        file.set_modified(SystemTime::now() - Duration::from_secs(60)).unwrap();
+        let mut source = folder.source();
+        source.open().unwrap();
+        assert_eq!(next(&mut source), None);
+        folder.write("new.ppm", PPM);
+        assert!(next(&mut source).is_some());
+    }
+}

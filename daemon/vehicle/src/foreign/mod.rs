@@ -1,0 +1,290 @@
+//! The map that another program makes: segmented images, whole grids, bands, and names of classes.
+//!
+//! Class n has label n + 1, always; so no label changes its meaning, whatever restarts.
+
+mod band;
+mod checkpoint;
+mod ground;
+mod votes;
+
+use crate::{MapProducer, MapUpdate};
+use band::BandMap;
+pub use checkpoint::ForeignRestoreError;
+use ground::GroundRaster;
+use scene_model::project::{DownCamera, Pose};
+use scene_model::words::Word;
+use scenecast_config::{Config, Votes as VotesKept, cell_m};
+use scenecast_labels::{Band, Content, Ground, ImagePose, Item, Raster, Refusal};
+use scenecast_protocol::map::{Cell, ClassEntry, LabelGrid, LayerDescriptor, LayerId, UNEXPLORED};
+use std::collections::BTreeMap;
+use votes::{CellVotes, Votes};
+
+/// A cell without a class.
+const UNKNOWN: u8 = u8::MAX;
+
+/// The map of another program after an item.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ForeignUpdate {
+    pub map: MapUpdate,
+    /// The layers of bands, with the quantity of every cell.
+    pub bands: Vec<(LayerDescriptor, Vec<(Cell, f64)>)>,
+    pub classes: Vec<ClassEntry>,
+}
+
+/// The map that another program makes.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ForeignMap {
+    epoch: u8,
+    cell_m: f64,
+    /// Most cells of the labels, and of each band; erased ones count.
+    max_cells: usize,
+    camera: DownCamera,
+    is_newest_only: bool,
+    band_share: u8,
+    votes: Votes,
+    labels: LabelGrid,
+    /// Cells that had a label and have none any more.
+    erased: LabelGrid,
+    bands: BTreeMap<String, BandMap>,
+    classes: BTreeMap<u8, ClassEntry>,
+    last_s: Option<f64>,
+    /// The name of the last item that has one.
+    mark: Option<String>,
+}
+
+impl ForeignMap {
+    /// Most cells of the labels, and of each band.
+    const MAX_CELLS: usize = 1 << 23;
+
+    /// An empty map, whose labels belong to `epoch`.
+    pub fn new(config: &Config, epoch: u8) -> Self {
+        Self {
+            epoch,
+            cell_m: cell_m(config),
+            max_cells: Self::MAX_CELLS,
+            camera: DownCamera {
+                metres_per_pixel: config.camera.metres_per_pixel,
+                altitude_m: config.survey.altitude_m,
+            },
+            is_newest_only: config.labels.votes == VotesKept::Newest,
+            band_share: config.labels.band_share,
+            votes: Votes::default(),
+            labels: LabelGrid::default(),
+            erased: LabelGrid::default(),
+            bands: BTreeMap::new(),
+            classes: BTreeMap::new(),
+            last_s: None,
+            mark: None,
+        }
+    }
+
+    /// Takes an item at mission time `t_s`. `own` is the vehicle's pose, for an image without one.
+    ///
+    /// # Errors
+    /// Nothing of a refused item is used.
+    pub fn handle_item(&mut self, item: &Item, own: Option<ImagePose>, t_s: f64) -> Result<(), Refusal> {
+        self.check_names(&item.classes)?;
+        match &item.content {
+            Content::Classes => {}
+            Content::Image { pose, metres_per_pixel, classes } => {
+                let pose = pose.or(own).ok_or(Refusal::NoPose)?;
+                self.see(classes, pose, metres_per_pixel.unwrap_or(self.camera.metres_per_pixel))?;
+            }
+            Content::Grid { ground, classes } => self.state(classes, *ground)?,
+            Content::Band { band, ground, levels } => self.take_band(band, *ground, levels)?,
+        }
+        self.classes.extend(item.classes.iter().map(|entry| (entry.label(), entry.clone())));
+        self.last_s = Some(t_s);
+        Ok(())
+    }
+
+    /// Notes the name of an item that was handled, for its source after a restart.
+    pub fn set_mark(&mut self, name: &str) {
+        self.mark = Some(name.to_owned());
+    }
+
+    /// The name of the last item that was handled, before a restart too.
+    pub fn mark(&self) -> Option<&str> {
+        self.mark.as_deref()
+    }
+
+    /// A class keeps its name and its colour.
+    fn check_names(&self, classes: &[ClassEntry]) -> Result<(), Refusal> {
+        let other = |entry: &&ClassEntry| self.classes.get(&entry.label()).is_some_and(|known| known != *entry);
+        match classes.iter().find(other) {
+            Some(entry) => {
+                let known = self.classes.get(&entry.label()).map(ClassEntry::name).unwrap_or_default();
+                Err(Refusal::OtherName(entry.label() - 1, known.to_owned()))
+            }
+            None => Ok(()),
+        }
+    }
+
+    /// An image votes for the classes of the cells that it shows.
+    fn see(&mut self, image: &Raster, pose: ImagePose, metres_per_pixel: f64) -> Result<(), Refusal> {
+        let camera = DownCamera { metres_per_pixel, ..self.camera };
+        let across = f64::from(image.width).hypot(f64::from(image.height)) * metres_per_pixel / self.cell_m + 2.0;
+        if across * across > ground::MAX_CELLS as f64 {
+            return Err(Refusal::Cells((across * across) as u64, ground::MAX_CELLS));
+        }
+        let seen = image_votes(image, &camera, pose, self.cell_m);
+        self.check_room(seen.keys().map(|&(x, y)| Cell::new(x, y)))?;
+        for (place, votes) in seen {
+            let cell = Cell::new(place.0, place.1);
+            let held = self.labels.get(cell).checked_sub(1);
+            let winner = self.votes.vote(place, &votes, self.is_newest_only).winner(held);
+            self.set(cell, winner.unwrap_or(UNKNOWN));
+        }
+        Ok(())
+    }
+
+    /// A grid states the class of each of its cells.
+    fn state(&mut self, classes: &Raster, ground: Ground) -> Result<(), Refusal> {
+        let mut stated = Vec::new();
+        GroundRaster::new(classes, ground, self.cell_m)?.for_each(|cell, values| {
+            let mut votes = CellVotes::default();
+            values.iter().filter(|&&class| class != UNKNOWN).for_each(|&class| votes.add(class, 1));
+            stated.push((cell, votes.winner(None).unwrap_or(UNKNOWN)));
+        });
+        self.check_room(stated.iter().filter(|(_, class)| *class != UNKNOWN).map(|&(cell, _)| cell))?;
+        for (cell, class) in stated {
+            self.votes.forget((cell.x, cell.y));
+            self.set(cell, class);
+        }
+        Ok(())
+    }
+
+    fn check_room(&self, cells: impl Iterator<Item = Cell>) -> Result<(), Refusal> {
+        check_room(&self.labels, &self.erased, cells, self.max_cells)
+    }
+
+    fn set(&mut self, cell: Cell, class: u8) {
+        let label = ClassEntry::label_of(class).unwrap_or(UNEXPLORED);
+        let before = self.labels.set(cell, label);
+        if label == UNEXPLORED && before != UNEXPLORED {
+            self.erased.set(cell, 1);
+        } else if label != UNEXPLORED && before == UNEXPLORED {
+            self.erased.set(cell, UNEXPLORED);
+        }
+    }
+
+    fn take_band(&mut self, band: &Band, ground: Ground, levels: &Raster) -> Result<(), Refusal> {
+        if !self.bands.contains_key(&band.name) {
+            // The built-in layers have their own indexes.
+            let more = self.bands.keys().filter(|name| !band::is_built_in(name)).count();
+            let is_full = !band::is_built_in(&band.name)
+                && more + scenecast_protocol::map::BUILT_IN_LAYERS.len() >= LayerId::COUNT;
+            if is_full {
+                return Err(Refusal::TooManyBands(band.name.clone()));
+            }
+        }
+        let used: u32 = self.bands.values().map(|map| u32::from(map.descriptor.share)).sum();
+        let share = self.band_share.min(100u32.saturating_sub(used) as u8);
+        let fresh = band::descriptor(band, share);
+        let known = self.bands.get(&band.name).map(|map| &map.descriptor);
+        let is_other = known.is_some_and(|known| LayerDescriptor { share: known.share, ..fresh.clone() } != *known);
+        if is_other {
+            return Err(Refusal::OtherBand(band.name.clone()));
+        }
+        let levels = band::levels(band, ground, levels, self.cell_m)?;
+        let more = levels.iter().filter(|(_, level)| *level != UNEXPLORED).map(|&(cell, _)| cell);
+        match self.bands.get(&band.name) {
+            Some(map) => check_room(&map.levels, &map.erased, more, self.max_cells)?,
+            None => check_room(&LabelGrid::default(), &LabelGrid::default(), more, self.max_cells)?,
+        }
+        self.bands.entry(band.name.clone()).or_insert_with(|| BandMap::new(fresh)).take(&levels);
+        Ok(())
+    }
+
+    /// The map after the last item, with bands and names.
+    pub fn update(&self) -> ForeignUpdate {
+        ForeignUpdate {
+            map: self.current(),
+            bands: self.bands.values().map(|map| (map.descriptor.clone(), map.quantities())).collect(),
+            classes: self.classes.values().cloned().collect(),
+        }
+    }
+
+    /// The names of classes.
+    pub fn classes(&self) -> impl Iterator<Item = &ClassEntry> {
+        self.classes.values()
+    }
+
+    /// The map of labels.
+    pub fn labels(&self) -> &LabelGrid {
+        &self.labels
+    }
+}
+
+impl MapProducer for ForeignMap {
+    fn current(&self) -> MapUpdate {
+        let erased = self.erased.iter().map(|(cell, _)| (cell, UNEXPLORED));
+        let cells: Vec<(Cell, u8)> = self.labels.iter().chain(erased).collect();
+        let labels = cells.iter().map(|&(_, label)| label).max().unwrap_or(0);
+        let t_s = self.last_s.unwrap_or(0.0);
+        MapUpdate { t_s, epoch: self.epoch, cells, layers: BTreeMap::new(), labels, perplexity: Vec::new() }
+    }
+
+    fn epoch(&self) -> u8 {
+        self.epoch
+    }
+
+    fn last_s(&self) -> Option<f64> {
+        self.last_s
+    }
+
+    fn resume(&mut self, epoch: u8, _published: u8) {
+        self.epoch = epoch;
+    }
+
+    fn save(&self, lineage: u64) -> Vec<u8> {
+        self.encode(lineage)
+    }
+}
+
+/// Refuses `cells` of which so many are neither in `known` nor in `erased` that the three are more than `most`.
+fn check_room(
+    known: &LabelGrid,
+    erased: &LabelGrid,
+    cells: impl Iterator<Item = Cell>,
+    most: usize,
+) -> Result<(), Refusal> {
+    let is_new = |cell: &Cell| known.get(*cell) == UNEXPLORED && erased.get(*cell) == UNEXPLORED;
+    let more = cells.filter(is_new).count();
+    match more > 0 && more + known.explored() + erased.explored() > most {
+        true => Err(Refusal::FullMap(most)),
+        false => Ok(()),
+    }
+}
+
+/// The votes of an image for each cell that it shows.
+fn image_votes(image: &Raster, camera: &DownCamera, pose: ImagePose, cell_m: f64) -> BTreeMap<(i32, i32), CellVotes> {
+    let pose = Pose { x: pose.x_m, y: pose.y_m, z: -pose.depth_m, yaw_rad: -pose.heading_rad };
+    let cell = |metres: f64| (metres / cell_m).floor() as i32;
+    let mut seen: BTreeMap<(i32, i32), CellVotes> = BTreeMap::new();
+    for (row, classes) in image.values.chunks(image.width.max(1) as usize).enumerate() {
+        let pixel =
+            |(column, &class): (usize, &u8)| Word { id: u32::from(class), u: column as f32 + 0.5, v: row as f32 + 0.5 };
+        let words: Vec<Word> = classes.iter().enumerate().filter(|(_, class)| **class != UNKNOWN).map(pixel).collect();
+        // Neighbours mostly vote for the same class of the same cell.
+        let mut run: Option<((i32, i32), u8, u32)> = None;
+        for seen_at in camera.project(image.width, image.height, &pose, &words) {
+            let (at, class) = ((cell(seen_at.x), cell(seen_at.y)), seen_at.word as u8);
+            match &mut run {
+                Some((place, voted, pixels)) if *place == at && *voted == class => *pixels += 1,
+                _ => {
+                    if let Some((place, class, pixels)) = run.replace((at, class, 1)) {
+                        seen.entry(place).or_default().add(class, pixels);
+                    }
+                }
+            }
+        }
+        if let Some((place, class, pixels)) = run {
+            seen.entry(place).or_default().add(class, pixels);
+        }
+    }
+    seen
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,112 @@
+//! The surface's side: the names that have arrived.
+
+use super::{ClassChunk, ClassEntry};
+use std::collections::BTreeMap;
+
+/// The parts of an entry that are here, from the first byte on.
+#[derive(Debug, Default)]
+struct Parts {
+    digest: u16,
+    bytes: Vec<u8>,
+}
+
+/// Names and colours of labels. A label keeps its first name.
+#[derive(Debug, Default)]
+pub struct ClassReplica {
+    entries: BTreeMap<u8, ClassEntry>,
+    parts: BTreeMap<u8, Parts>,
+}
+
+impl ClassReplica {
+    /// The entry of a label.
+    pub fn get(&self, label: u8) -> Option<&ClassEntry> {
+        self.entries.get(&label)
+    }
+
+    /// The entries, by label.
+    pub fn iter(&self) -> impl Iterator<Item = &ClassEntry> {
+        self.entries.values()
+    }
+
+    /// Takes a chunk. `None` if it makes no sense, or does not continue the parts that are here; else whether an entry is
+    /// complete with it.
+    pub fn handle_chunk(&mut self, chunk: &[u8]) -> Option<bool> {
+        let part = ClassChunk::decode(chunk)?;
+        if let Some(entry) = self.get(part.label) {
+            let is_same = ClassEntry::digest_of(part.label, &entry.to_bytes()) == part.digest;
+            return is_same.then_some(false);
+        }
+        let parts = self.parts.entry(part.label).or_default();
+        if part.first == 0 {
+            *parts = Parts { digest: part.digest, bytes: Vec::new() };
+        }
+        let fits = usize::from(part.first) == parts.bytes.len() && part.digest == parts.digest;
+        if !fits || parts.bytes.len() + part.bytes.len() > ClassEntry::MAX_BYTES {
+            return None;
+        }
+        parts.bytes.extend_from_slice(part.bytes);
+        if !part.is_last {
+            return Some(false);
+        }
+        let parts = self.parts.remove(&part.label)?;
+        let is_sound = ClassEntry::digest_of(part.label, &parts.bytes) == parts.digest;
+        let entry = ClassEntry::from_bytes(part.label, &parts.bytes).filter(|_| is_sound)?;
+        self.entries.insert(part.label, entry);
+        Some(true)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::ClassSource;
+    use super::*;
+    use proptest::prelude::*;
+
+    fn entry(label: u8, name: &str) -> ClassEntry {
+        ClassEntry::new(label, name, Some([label, 2, 3])).unwrap()
+    }
+
+    proptest! {
+        #[test]
+        fn names_arrive_whatever_is_lost(rooms in proptest::collection::vec((10usize..60, any::<bool>()), 40..80)) {
+            let (mut source, mut replica) = (ClassSource::default(), ClassReplica::default());
+            let entries = [entry(1, "sand"), entry(9, &"x".repeat(60)), entry(254, "Posidonia oceanica")];
+            entries.iter().for_each(|e| assert!(source.add(e)));
+            for (room, is_delivered) in rooms.into_iter().chain([(60, true); 20]) {
+                let Some((chunk, carried)) = source.next_chunk(room) else { continue };
+                prop_assert!(chunk.len() <= room);
+                if is_delivered {
+                    prop_assert!(replica.handle_chunk(&chunk).is_some());
+                }
+                source.handle_fate(carried, is_delivered);
+            }
+            prop_assert!(source.is_converged() && source.backlog_bytes() == 0);
+            prop_assert!(replica.iter().eq(&entries));
+        }
+
+        #[test]
+        fn any_class_chunk_is_taken_or_refused(chunks in proptest::collection::vec(proptest::collection::vec(any::<u8>(), 0..60), 0..9)) {
+            let mut replica = ClassReplica::default();
+            for chunk in &chunks {
+                let _ = replica.handle_chunk(chunk);
+            }
+        }
+    }
+
+    #[test]
+    fn a_label_keeps_its_first_name() {
+        let (mut source, mut replica) = (ClassSource::default(), ClassReplica::default());
+        assert!(source.add(&entry(4, "rock")) && source.add(&entry(4, "rock")) && !source.add(&entry(4, "mud")));
+        let (chunk, carried) = source.next_chunk(60).unwrap();
+        assert!(source.next_chunk(60).is_none(), "one part at a time");
+        assert_eq!((replica.handle_chunk(&chunk), replica.handle_chunk(&chunk)), (Some(true), Some(false)));
+        source.handle_fate(carried, true);
+        let mut other = ClassSource::default();
+        other.add(&entry(4, "mud"));
+        let (chunk, _) = other.next_chunk(60).unwrap();
+        assert_eq!((replica.handle_chunk(&chunk), replica.get(4).map(ClassEntry::name)), (None, Some("rock")));
+        source.handle_peer_restart();
+        assert!(!source.is_converged());
+        assert_eq!(source.next_chunk(60).map(|(_, carried)| carried), Some((4, 8)));
+    }
+}

@@ -1,0 +1,198 @@
+"""Publishes a recorded folder as a robot's camera and odometry would come, by Cyclone DDS without a ROS installation.
+
+Usage: ros2_camera.py FOLDER --domain N [--pace S] [--compressed] [--rest S] [--rows FROM:TO] [--faulty]
+
+The folder has poses.csv with t_s, file, x_m, y_m, depth_m and heading_deg. Each image has the stamp t_s + 1000 s; its
+odometry is published a moment later, as estimators do. With --faulty, wrong images come between the good ones, and some good ones
+have 16 bits a channel.
+"""
+
+import argparse
+import csv
+import math
+import os
+import time
+from dataclasses import dataclass, field
+from pathlib import Path
+
+CONFIG = """<CycloneDDS><Domain><General><Interfaces><NetworkInterface name="lo"/></Interfaces>
+<AllowMulticast>false</AllowMulticast><MaxMessageSize>65000B</MaxMessageSize></General>
+<Discovery><ParticipantIndex>auto</ParticipantIndex><Peers><Peer address="127.0.0.1"/></Peers></Discovery>
+</Domain></CycloneDDS>"""
+os.environ.setdefault("CYCLONEDDS_URI", CONFIG)
+
+from cyclonedds.core import Policy, Qos
+from cyclonedds.domain import DomainParticipant
+from cyclonedds.idl import IdlStruct
+from cyclonedds.idl.types import array, float64, int32, sequence, uint8, uint32
+from cyclonedds.pub import DataWriter
+from cyclonedds.topic import Topic
+from cyclonedds.util import duration
+
+from PIL import Image as Picture
+
+
+@dataclass
+class Time(IdlStruct, typename="builtin_interfaces::msg::dds_::Time_"):
+    sec: int32 = 0
+    nanosec: uint32 = 0
+
+
+@dataclass
+class Header(IdlStruct, typename="std_msgs::msg::dds_::Header_"):
+    stamp: Time = field(default_factory=Time)
+    frame_id: str = ""
+
+
+@dataclass
+class Image(IdlStruct, typename="sensor_msgs::msg::dds_::Image_"):
+    header: Header
+    height: uint32
+    width: uint32
+    encoding: str
+    is_bigendian: uint8
+    step: uint32
+    data: sequence[uint8]
+
+
+@dataclass
+class CompressedImage(IdlStruct, typename="sensor_msgs::msg::dds_::CompressedImage_"):
+    header: Header
+    format: str
+    data: sequence[uint8]
+
+
+@dataclass
+class Point(IdlStruct, typename="geometry_msgs::msg::dds_::Point_"):
+    x: float64 = 0.0
+    y: float64 = 0.0
+    z: float64 = 0.0
+
+
+@dataclass
+class Quaternion(IdlStruct, typename="geometry_msgs::msg::dds_::Quaternion_"):
+    x: float64 = 0.0
+    y: float64 = 0.0
+    z: float64 = 0.0
+    w: float64 = 1.0
+
+
+@dataclass
+class Pose(IdlStruct, typename="geometry_msgs::msg::dds_::Pose_"):
+    position: Point = field(default_factory=Point)
+    orientation: Quaternion = field(default_factory=Quaternion)
+
+
+@dataclass
+class PoseWithCovariance(IdlStruct, typename="geometry_msgs::msg::dds_::PoseWithCovariance_"):
+    pose: Pose = field(default_factory=Pose)
+    covariance: array[float64, 36] = field(default_factory=lambda: [0.0] * 36)
+
+
+@dataclass
+class Vector3(IdlStruct, typename="geometry_msgs::msg::dds_::Vector3_"):
+    x: float64 = 0.0
+    y: float64 = 0.0
+    z: float64 = 0.0
+
+
+@dataclass
+class Twist(IdlStruct, typename="geometry_msgs::msg::dds_::Twist_"):
+    linear: Vector3 = field(default_factory=Vector3)
+    angular: Vector3 = field(default_factory=Vector3)
+
+
+@dataclass
+class TwistWithCovariance(IdlStruct, typename="geometry_msgs::msg::dds_::TwistWithCovariance_"):
+    twist: Twist = field(default_factory=Twist)
+    covariance: array[float64, 36] = field(default_factory=lambda: [0.0] * 36)
+
+
+@dataclass
+class Odometry(IdlStruct, typename="nav_msgs::msg::dds_::Odometry_"):
+    header: Header
+    child_frame_id: str
+    pose: PoseWithCovariance
+    twist: TwistWithCovariance = field(default_factory=TwistWithCovariance)
+
+
+def header(t_s, frame):
+    nanos = round(t_s * 1e9) + 1000 * 10**9
+    return Header(Time(nanos // 10**9, nanos % 10**9), frame)
+
+
+def odometry(row):
+    # Axes of ROS: the heading is clockwise from north, yaw counts counter-clockwise from east.
+    yaw = math.pi / 2 - math.radians(float(row["heading_deg"]))
+    turn = Quaternion(0.0, 0.0, math.sin(yaw / 2), math.cos(yaw / 2))
+    place = Point(float(row["x_m"]), float(row["y_m"]), -float(row["depth_m"]))
+    pose = PoseWithCovariance(Pose(place, turn))
+    return Odometry(header(float(row["t_s"]), "odom"), "base_link", pose)
+
+
+def faulty(number, t_s, picture):
+    """An image that must not be mapped."""
+    grey = bytes(3 * picture.width * picture.height)
+    wrong = Image(header(t_s, "camera"), picture.height, picture.width, "rgb8", 0, 3 * picture.width, grey)
+    match number % 5:
+        case 0:
+            wrong.header = Header(Time(0, 0), "camera")
+        case 1:
+            wrong.encoding = "nv21"
+        case 2:
+            wrong.header = header(t_s + 3600, "camera")
+        case 3:
+            wrong.header = header(t_s - 60, "camera")
+        case 4:
+            wrong.data = grey[:100]
+    return wrong
+
+
+def wait_for_reader(writer):
+    until = time.monotonic() + 60
+    while not writer.get_matched_subscriptions():
+        assert time.monotonic() < until, "no subscriber came"
+        time.sleep(0.05)
+
+
+def main():
+    parser = argparse.ArgumentParser()
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("--domain", type=int, required=True)
+    parser.add_argument("--pace", type=float, default=0.25)
+    parser.add_argument("--compressed", action="store_true")
+    parser.add_argument("--rest", type=float, default=5.0)
+    parser.add_argument("--rows", default=":")
+    parser.add_argument("--faulty", action="store_true")
+    options = parser.parse_args()
+    begin, end = (int(part) if part else None for part in options.rows.split(":"))
+    rows = list(csv.DictReader(open(options.folder / "poses.csv", newline="")))[begin:end]
+    participant = DomainParticipant(options.domain)
+    reliable = Qos(Policy.Reliability.Reliable(duration(seconds=1)), Policy.History.KeepLast(5))
+    kind, name = (CompressedImage, "rt/camera/image_raw/compressed") if options.compressed else (Image, "rt/camera/image_raw")
+    images = DataWriter(participant, Topic(participant, name, kind), qos=reliable)
+    poses = DataWriter(participant, Topic(participant, "rt/odometry", Odometry), qos=reliable)
+    wait_for_reader(images)
+    wait_for_reader(poses)
+    time.sleep(0.5)
+    for number, row in enumerate(rows):
+        path = options.folder / row["file"]
+        head = header(float(row["t_s"]), "camera")
+        if options.compressed:
+            images.write(CompressedImage(head, "png", path.read_bytes()))
+        else:
+            picture = Picture.open(path).convert("RGB")
+            if options.faulty:
+                images.write(faulty(number, float(row["t_s"]), picture))
+            if options.faulty and number % 2 == 1:
+                # The high and the low byte are the same, which is the same level in 16 bits.
+                doubled = bytes(byte for byte in picture.tobytes() for _ in range(2))
+                images.write(Image(head, picture.height, picture.width, "rgb16", 1, 6 * picture.width, doubled))
+            else:
+                images.write(Image(head, picture.height, picture.width, "rgb8", 0, 3 * picture.width, picture.tobytes()))
+        poses.write(odometry(row))
+        time.sleep(options.pace)
+    time.sleep(options.rest)
+
+
+main()

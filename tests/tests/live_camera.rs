@@ -1,0 +1,185 @@
+//! Vehicles with live cameras, as processes: the same images and poses give the same map, whatever brings them.
+
+use image::RgbImage;
+use scenecast_files::{RecordedFrame, Recording};
+use scenecast_rehearsal::{Mission, MissionOptions, World};
+use scenecast_tests::{Process, free_port, python, recorded, run_script, scratch, wait_until};
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+/// A dive whose vehicle and surface run as processes.
+struct Dive {
+    dir: PathBuf,
+    frames: Vec<RecordedFrame>,
+    map: PathBuf,
+    _processes: Vec<Process>,
+}
+
+impl Dive {
+    /// Starts a surface, and a vehicle with the camera `source` and the poses of the recording in a file.
+    fn start(name: &str, source: &dyn Fn(&Path) -> String) -> Self {
+        Self::with_settings(name, &|dir| {
+            vec![
+                format!("camera.source={}", source(dir)),
+                format!("navigation.source=tum:{}", dir.join("poses.txt").display()),
+            ]
+        })
+    }
+
+    /// Starts a surface, and a vehicle with these settings.
+    fn with_settings(name: &str, sets: &dyn Fn(&Path) -> Vec<String>) -> Self {
+        let dir = scratch(name);
+        let frames = Recording::open(&recorded().0, None, 0.01).unwrap().frames;
+        let poses = dir.join("poses.txt");
+        std::fs::write(&poses, tum_lines(&frames)).unwrap();
+        let port = free_port();
+        let state = |who: &str| format!("runtime.state_dir={}", dir.join(who).display());
+        let surface = [state("asv"), format!("modem.listen=127.0.0.1:{port}"), "console.listen=".to_owned()];
+        let mut vehicle = vec![
+            state("auv"),
+            format!("modem.connect=127.0.0.1:{port}"),
+            "survey.area_m=[-10, -10, 60, 60]".to_owned(),
+        ];
+        vehicle.extend(sets(&dir));
+        let empty = dir.join("empty.toml");
+        std::fs::write(&empty, "").unwrap();
+        let start = |command: &str, sets: &[String]| {
+            let config = [command, "--config", empty.to_str().unwrap()];
+            let sets = sets.iter().flat_map(|set| ["--set", set]);
+            Process::start(&config.into_iter().chain(sets).collect::<Vec<_>>())
+        };
+        let processes = vec![start("asv", &surface), start("auv", &vehicle)];
+        Self { map: dir.join("asv/operator-map-1.png"), dir, frames, _processes: processes }
+    }
+
+    fn assert_map_of_the_rehearsal(&self) {
+        wait_until("the map equals the one of the rehearsal", Duration::from_secs(120), || {
+            std::fs::read(&self.map).is_ok_and(|png| png == recorded().1)
+        });
+    }
+}
+
+/// Poses of a camera that looks down, in the format of the TUM benchmark.
+fn tum_lines(frames: &[RecordedFrame]) -> String {
+    frames.iter().fold(String::new(), |mut text, frame| {
+        let half = frame.heading_rad / 2.0;
+        let (x, y) = (half.cos(), -half.sin());
+        let _ = writeln!(text, "{:.9} {} {} {} {x} {y} 0 0", frame.t_s, frame.x_m, frame.y_m, -frame.depth_m);
+        text
+    })
+}
+
+/// A PPM that says when it was taken.
+fn stamped_ppm(image: &RgbImage, t_s: f64) -> Vec<u8> {
+    let (width, height) = image.dimensions();
+    [format!("P6\n# stamp={t_s:.9}\n{width} {height}\n255\n").as_bytes(), image.as_raw()].concat()
+}
+
+/// Time between two images: the scene model of a debug build keeps up.
+const PACE: Duration = Duration::from_millis(250);
+
+#[test]
+fn images_written_to_a_folder_give_the_map_of_the_recording() {
+    let dive = Dive::start("watch", &|dir| {
+        let camera = dir.join("camera");
+        std::fs::create_dir_all(&camera).unwrap();
+        format!("watch:{}", camera.display())
+    });
+    for frame in &dive.frames {
+        let bytes = std::fs::read(frame.image.file().unwrap()).unwrap();
+        let path = dive.dir.join(format!("camera/{:.9}.png", frame.t_s));
+        // A writer that is slow: the file stays half written for a moment.
+        std::fs::write(&path, &bytes[..bytes.len() / 2]).unwrap();
+        std::thread::sleep(PACE / 2);
+        std::fs::write(&path, &bytes).unwrap();
+        std::thread::sleep(PACE / 2);
+    }
+    dive.assert_map_of_the_rehearsal();
+}
+
+#[test]
+fn images_of_a_command_give_the_map_of_the_recording() {
+    let dive = Dive::start("command", &|dir| {
+        let frames = Recording::open(&recorded().0, None, 0.01).unwrap().frames;
+        for (index, frame) in frames.iter().enumerate() {
+            let path = dir.join(format!("{index:03}.ppm"));
+            std::fs::write(path, stamped_ppm(&frame.image.read().unwrap(), frame.t_s)).unwrap();
+        }
+        let pace = PACE.as_secs_f64();
+        // The command ends once and is started again where it was; each image is written once.
+        let script =
+            "cd DIR && for f in *.ppm; do cat $f; rm $f; sleep PACE; case $f in 010*) exit 1;; esac; done; sleep 600";
+        let script = script.replace("DIR", &dir.display().to_string()).replace("PACE", &pace.to_string());
+        format!("command:{script}")
+    });
+    dive.assert_map_of_the_rehearsal();
+}
+
+/// A domain of DDS for one test of this process.
+fn domain(offset: u32) -> u32 {
+    1 + (std::process::id() * 3 + offset) % 200
+}
+
+fn assert_topics_give_the_map(name: &str, domain: u32, topic: &str, publishers: &[&[&str]]) {
+    let Some(python) = python() else { return };
+    let dive = Dive::with_settings(name, &|_| {
+        vec![
+            format!("camera.source=ros2:{topic}"),
+            "navigation.source=ros2:/odometry".to_owned(),
+            format!("ros2.domain={domain}"),
+            "ros2.networks=[\"127.0.0.1\"]".to_owned(),
+        ]
+    });
+    let folder = recorded().0.display().to_string();
+    let domain = domain.to_string();
+    for options in publishers {
+        let arguments = [&[folder.as_str(), "--domain", &domain], *options].concat();
+        run_script(&python, "tests/python/ros2_camera.py", &arguments);
+    }
+    dive.assert_map_of_the_rehearsal();
+}
+
+#[test]
+fn topics_of_cyclone_dds_give_the_map_of_the_recording() {
+    assert_topics_give_the_map("ros2", domain(0), "/camera/image_raw", &[&[]]);
+}
+
+#[test]
+fn wrong_images_and_a_restarted_publisher_leave_the_map_as_it_is() {
+    let runs: [&[&str]; 2] = [&["--faulty", "--rows", ":15", "--rest", "0"], &["--faulty", "--rows", "15:"]];
+    assert_topics_give_the_map("ros2-faults", domain(2), "/camera/image_raw", &runs);
+}
+
+#[test]
+fn compressed_topics_of_cyclone_dds_give_the_map_of_the_recording() {
+    assert_topics_give_the_map("ros2-compressed", domain(1), "/camera/image_raw/compressed", &[&["--compressed"]]);
+}
+
+/// A bag of the recording, which rosbags writes; `None` without Python.
+fn bag(name: &str, options: &[&str]) -> Option<String> {
+    let python = python()?;
+    let bag = scratch(name).join("bag").display().to_string();
+    let folder = recorded().0.display().to_string();
+    run_script(&python, "tests/python/write_bag.py", &[&[folder.as_str(), &bag], options].concat());
+    Some(bag)
+}
+
+#[test]
+fn a_bag_of_ros_gives_the_map_of_the_recording_at_sea() {
+    let Some(bag) = bag("bag", &[]) else { return };
+    let sets = vec![format!("camera.source=bag:{bag}"), "runtime.time_scale=20".to_owned()];
+    Dive::with_settings("bag-dive", &|_| sets.clone()).assert_map_of_the_rehearsal();
+}
+
+#[test]
+fn a_bag_of_compressed_images_gives_the_map_in_rehearsal() {
+    let Some(bag) = bag("bag-compressed", &["--compressed"]) else { return };
+    let sets = ["operator.script=none", "survey.duration_s=90", &format!("camera.source=bag:{bag}")];
+    let config = scenecast_config::load(None, &sets.map(str::to_owned)).unwrap();
+    let options = MissionOptions { world: World::patches(2, 0.01), seed: 1, record: None };
+    let mut mission = Mission::new(config, options).unwrap();
+    mission.run(Duration::from_secs(3600), &mut |_| {}).unwrap();
+    let map = scenecast_core::label_picture::encode(mission.vehicle().map()).unwrap();
+    assert!(map == recorded().1, "the maps differ");
+}
