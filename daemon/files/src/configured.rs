@@ -1,6 +1,6 @@
 //! The recording that the settings name as the camera.
 
-use crate::bag::{BagTiming, BagTopics};
+use crate::bag_recording::{BagTiming, BagTopics};
 use crate::recording::Recording;
 use scenecast_config::{CameraSource, Config, NavigationSource};
 use scenecast_core::UserError;

@@ -3,6 +3,7 @@
 //! Internal to scenecast. The crate reads and writes files; it uses no clock and no network.
 
 mod bag;
+mod bag_recording;
 mod configured;
 mod frame_image;
 mod images;
@@ -11,7 +12,8 @@ mod recording;
 mod vocabulary;
 mod whole;
 
-pub use bag::{Bag, BagTiming, BagTopics};
+pub use bag::Bag;
+pub use bag_recording::{BagTiming, BagTopics};
 pub use configured::{configured_mounting, configured_recording, open_bag};
 pub use frame_image::FrameImage;
 pub use images::{read_classes, read_image};

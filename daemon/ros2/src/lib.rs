@@ -27,6 +27,7 @@ mod subscribe;
 #[cfg(feature = "surface")]
 mod surface;
 mod vehicle;
+mod vehicle_map;
 mod watch;
 
 pub use inbox::{Inbox, Received};
@@ -36,4 +37,5 @@ pub use publisher::Publisher;
 pub use qos::Qos;
 #[cfg(feature = "surface")]
 pub use surface::{SurfaceOutlet, start_surface};
-pub use vehicle::{VehicleMap, VehicleOutlet, VehicleView, start_vehicle};
+pub use vehicle::{VehicleOutlet, VehicleView, start_vehicle};
+pub use vehicle_map::VehicleMap;

@@ -5,6 +5,7 @@ use crate::node::RosNode;
 use crate::publisher::Publisher;
 use crate::qos::Qos;
 use crate::stop::{self, Owned, Owner};
+use crate::vehicle_map::VehicleMap;
 use scenecast_config::Ros2;
 use scenecast_core::{UserError, palette};
 use scenecast_messages::builtin_interfaces::Time;
@@ -14,7 +15,6 @@ use scenecast_messages::grid_map_msgs::GridMap;
 use scenecast_messages::nav_msgs::{OccupancyGrid, Path};
 use scenecast_messages::sensor_msgs::PointCloud2;
 use scenecast_outlets::{Health, MAP_FRAME, Place, cloud, diagnostics, header, layers, occupancy, path, pose};
-use scenecast_protocol::map::{LabelGrid, LayerDescriptor};
 use std::collections::VecDeque;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -44,15 +44,6 @@ pub struct VehicleView {
     pub map_version: u64,
     /// The map; only if [`VehicleOutlet::wants_map`] asked for it.
     pub map: Option<VehicleMap>,
-}
-
-/// The map of a vehicle: labels, and levels of its layers.
-#[derive(Debug, Clone)]
-pub struct VehicleMap {
-    pub version: u64,
-    pub cell_m: f64,
-    pub labels: LabelGrid,
-    pub layers: Vec<(LayerDescriptor, LabelGrid)>,
 }
 
 /// The host's end of ROS 2 on the vehicle. It never waits.

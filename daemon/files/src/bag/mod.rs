@@ -1,25 +1,20 @@
-//! Recordings of ROS 2 in MCAP: images, and the odometry that gives their poses.
+//! The images of a recording of ROS 2 in MCAP.
 
-mod stream;
+pub(crate) mod stream;
 
-use crate::frame_image::FrameImage;
-use crate::recording::{RecordedFrame, Recording};
 use image::RgbImage;
 use scenecast_core::UserError;
 use scenecast_messages::decode as decode_cdr;
-use scenecast_messages::nav_msgs::Odometry;
 use scenecast_messages::sensor_msgs::{CompressedImage, Image};
-use scenecast_sensors::{CameraMounting, PoseMatch, PoseTrack, Stamp, pose_of, rgb_of, stamp_of_cdr};
-use std::collections::BTreeSet;
+use scenecast_sensors::rgb_of;
 use std::fmt;
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex, PoisonError};
-use std::time::Duration;
+use std::sync::{Mutex, PoisonError};
 use stream::{BagMessage, BagStream, BagTopic};
 
-const RAW: &str = "sensor_msgs/msg/Image";
-const COMPRESSED: &str = "sensor_msgs/msg/CompressedImage";
-const ODOMETRY: &str = "nav_msgs/msg/Odometry";
+/// The types of images.
+pub(crate) const RAW: &str = "sensor_msgs/msg/Image";
+pub(crate) const COMPRESSED: &str = "sensor_msgs/msg/CompressedImage";
 
 /// The images of one topic of a bag. They are read in order; going back reads the file again from its beginning.
 pub struct Bag {
@@ -35,6 +30,14 @@ struct Position {
 }
 
 impl Bag {
+    pub(crate) fn new(path: &Path, topic: BagTopic) -> Self {
+        Self { path: path.to_owned(), topic, position: Mutex::new(Position { stream: None, next: 0 }) }
+    }
+
+    pub(crate) fn topic(&self) -> &BagTopic {
+        &self.topic
+    }
+
     /// The image with this number, counted from 0 over all images of the topic.
     pub(crate) fn read(&self, number: u64) -> Result<RgbImage, UserError> {
         let mut position = self.position.lock().unwrap_or_else(PoisonError::into_inner);
@@ -74,132 +77,5 @@ impl fmt::Debug for Bag {
 impl PartialEq for Bag {
     fn eq(&self, other: &Self) -> bool {
         (&self.path, &self.topic) == (&other.path, &other.topic)
-    }
-}
-
-/// A bag's topics and times, before its frames are chosen.
-#[derive(Default)]
-struct Contents {
-    topics: BTreeSet<BagTopic>,
-    /// The topic and time of each image; `None` without a time.
-    images: Vec<(BagTopic, Option<Stamp>)>,
-    poses: Vec<(BagTopic, Stamp, scenecast_sensors::SensorPose)>,
-    /// Where the file breaks off.
-    damage: Option<String>,
-}
-
-impl Contents {
-    fn read(path: &Path) -> Result<Self, UserError> {
-        let mut stream = BagStream::open(path)?;
-        let mut contents = Self::default();
-        let is_wanted = |topic: &BagTopic| [RAW, COMPRESSED, ODOMETRY].contains(&topic.kind.as_str());
-        loop {
-            match stream.next(is_wanted) {
-                Ok(Some(BagMessage { topic, bytes })) => {
-                    contents.topics.insert(topic.clone());
-                    if topic.kind != ODOMETRY {
-                        contents.images.push((topic, stamp_of_cdr(&bytes)));
-                    } else if let Some((stamp, pose)) = decode_cdr::<Odometry>(&bytes).ok().as_ref().and_then(pose_of) {
-                        contents.poses.push((topic, stamp, pose));
-                    }
-                }
-                Ok(None) => return Ok(contents),
-                Err(error) if contents.topics.is_empty() => return Err(UserError::file(path, error)),
-                Err(error) => {
-                    contents.damage = Some(error);
-                    return Ok(contents);
-                }
-            }
-        }
-    }
-
-    /// The topic of that name, or the only one of these types.
-    fn choose(&self, path: &Path, name: Option<&str>, kinds: &[&str], key: &str) -> Result<BagTopic, UserError> {
-        let all: Vec<&BagTopic> = self.topics.iter().filter(|topic| kinds.contains(&topic.kind.as_str())).collect();
-        let names = || all.iter().map(|topic| topic.name.as_str()).collect::<Vec<_>>().join(", ");
-        let kinds = kinds.join(" or ");
-        match (name, all.as_slice()) {
-            (_, []) => Err(UserError::file(path, format!("there are no messages of {kinds}"))),
-            (None, [only]) => Ok((*only).clone()),
-            (None, _) => Err(UserError::file(path, format!("which topic of {kinds}, {}? set it by {key}", names()))),
-            (Some(name), all) => {
-                all.iter().find(|topic| topic.name == name).map(|topic| (*topic).clone()).ok_or_else(|| {
-                    UserError::file(path, format!("there is no topic {name} of {kinds}; there is {}", names()))
-                })
-            }
-        }
-    }
-}
-
-/// Names of topics, where a bag has several of a kind.
-#[derive(Debug, Clone, Copy, Default)]
-pub struct BagTopics<'a> {
-    pub images: Option<&'a str>,
-    pub odometry: Option<&'a str>,
-}
-
-/// How poses and images of a bag belong together.
-#[derive(Debug, Clone, Copy)]
-pub struct BagTiming {
-    /// Longest time between two poses within which the pose of an image is interpolated.
-    pub max_gap: Duration,
-    /// Added to the times of images, seconds.
-    pub clock_offset_s: f64,
-    pub mounting: CameraMounting,
-    /// Height of the camera above the sea floor, metres.
-    pub altitude_m: f64,
-}
-
-impl BagTiming {
-    fn on_the_clock_of_poses(&self, stamp: Stamp) -> Stamp {
-        let by = Duration::from_secs_f64(self.clock_offset_s.abs());
-        if self.clock_offset_s < 0.0 { stamp.before(by) } else { stamp.after(by) }
-    }
-}
-
-impl Recording {
-    /// The images of a bag at the poses of its odometry.
-    ///
-    /// # Errors
-    /// No images or odometry, topics that are not clear, or no image with a pose.
-    pub fn open_bag(path: &Path, topics: BagTopics<'_>, timing: &BagTiming) -> Result<Self, UserError> {
-        let contents = Contents::read(path)?;
-        let images = contents.choose(path, topics.images, &[RAW, COMPRESSED], "bag:FILE#TOPIC")?;
-        let odometry = contents.choose(path, topics.odometry, &[ODOMETRY], "navigation.source = \"ros2:TOPIC\"")?;
-        let mut poses: Vec<_> = contents.poses.iter().filter(|(topic, ..)| *topic == odometry).collect();
-        poses.sort_by_key(|(_, stamp, _)| *stamp);
-        let track = PoseTrack::of(poses.iter().map(|(_, stamp, pose)| (*stamp, *pose)), timing.max_gap);
-        let position = Mutex::new(Position { stream: None, next: 0 });
-        let bag = Arc::new(Bag { path: path.to_owned(), topic: images, position });
-        let mut frames: Vec<(Stamp, RecordedFrame)> = Vec::new();
-        let of_topic = contents.images.iter().filter(|(topic, _)| *topic == bag.topic);
-        let (mut all, mut without_time) = (0, 0);
-        for (number, (_, stamp)) in (0..).zip(of_topic) {
-            all += 1;
-            let Some(stamp) = stamp.filter(|stamp| frames.last().is_none_or(|(last, _)| last < stamp)) else {
-                without_time += 1;
-                continue;
-            };
-            let PoseMatch::Found(pose) = track.at(timing.on_the_clock_of_poses(stamp)) else { continue };
-            let Some(pose) = timing.mounting.camera_pose(&pose, timing.altitude_m) else { continue };
-            let (x_m, y_m, depth_m, heading_rad) = (pose.x_m, pose.y_m, pose.depth_m, pose.heading_rad);
-            let image = FrameImage::Bag(bag.clone(), number);
-            frames.push((stamp, RecordedFrame { t_s: 0.0, image, x_m, y_m, depth_m, heading_rad, scale: 1.0 }));
-        }
-        let Some(&(first, _)) = frames.first() else {
-            let cause = format!("none of its {all} images has a pose at its time; {without_time} have no later time");
-            return Err(UserError::file(path, cause));
-        };
-        let dropped = all - frames.len() as u64;
-        let mut notes = Vec::new();
-        if dropped > 0 {
-            notes.push(format!(
-                "{dropped} of {all} images have no time or no pose at their time, or were tilted too much"
-            ));
-        }
-        notes.extend(contents.damage.map(|damage| format!("the file breaks off: {damage}")));
-        let frames =
-            frames.into_iter().map(|(stamp, frame)| RecordedFrame { t_s: stamp.seconds_since(first), ..frame });
-        Ok(Self { frames: frames.collect(), notes })
     }
 }

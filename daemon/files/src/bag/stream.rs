@@ -13,21 +13,21 @@ const MAX_RECORD_BYTES: usize = 512 << 20;
 
 /// A topic of a bag.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) struct BagTopic {
-    pub(super) name: String,
+pub(crate) struct BagTopic {
+    pub(crate) name: String,
     /// Full name of the message's type, such as `sensor_msgs/msg/Image`.
-    pub(super) kind: String,
+    pub(crate) kind: String,
 }
 
 /// A message with its topic, in CDR.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct BagMessage {
-    pub(super) topic: BagTopic,
-    pub(super) bytes: Vec<u8>,
+pub(crate) struct BagMessage {
+    pub(crate) topic: BagTopic,
+    pub(crate) bytes: Vec<u8>,
 }
 
 /// The files of a bag, which are read from the beginning of the first.
-pub(super) struct BagStream {
+pub(crate) struct BagStream {
     rest: std::vec::IntoIter<PathBuf>,
     open: Option<(File, LinearReader)>,
     schemas: BTreeMap<u16, String>,
@@ -39,7 +39,7 @@ impl BagStream {
     ///
     /// # Errors
     /// There is no such file, or the folder has none.
-    pub(super) fn open(path: &Path) -> Result<Self, UserError> {
+    pub(crate) fn open(path: &Path) -> Result<Self, UserError> {
         let files = if path.is_dir() { files_of(path)? } else { vec![path.to_owned()] };
         for file in &files {
             scenecast_config::open_regular(file, u64::MAX)?;
@@ -48,7 +48,7 @@ impl BagStream {
     }
 
     /// The next message of a topic that is `wanted`; `None` at the end. After an error the next file follows.
-    pub(super) fn next(&mut self, wanted: impl Fn(&BagTopic) -> bool) -> Result<Option<BagMessage>, String> {
+    pub(crate) fn next(&mut self, wanted: impl Fn(&BagTopic) -> bool) -> Result<Option<BagMessage>, String> {
         loop {
             if self.open.is_none() {
                 let Some(path) = self.rest.next() else { return Ok(None) };

@@ -50,8 +50,10 @@ pub(crate) struct LiveCamera {
     /// Whether the vehicle does not know the newest pose yet.
     is_pose_new: bool,
     log: FaultLog,
-    /// What the source said last about a kind of fault.
-    said: BTreeMap<CameraFault, String>,
+    /// The last text about each kind of fault.
+    texts: BTreeMap<CameraFault, String>,
+    /// Whether the camera was lost or has stalled since its last image.
+    is_lost: bool,
     was_matched: bool,
     /// Whether the scene model has frames enough, so that images wait for it.
     is_model_busy: bool,
@@ -125,7 +127,8 @@ impl LiveCamera {
             max_gap,
             is_pose_new: false,
             log: FaultLog::default(),
-            said: BTreeMap::new(),
+            texts: BTreeMap::new(),
+            is_lost: false,
             was_matched: false,
             is_model_busy: false,
         })
@@ -152,7 +155,7 @@ impl LiveCamera {
     fn handle_report(&mut self, of: SensorKind, report: SourceReport) {
         match report {
             SourceReport::Open => match of {
-                SensorKind::Camera => tracing::info!("camera: open"),
+                SensorKind::Camera => tracing::debug!("camera: open"),
                 SensorKind::Navigation => tracing::info!("navigation: open"),
             },
             SourceReport::Reading(Reading::Image(image)) => self.handle_image(image),
@@ -165,13 +168,17 @@ impl LiveCamera {
             }
             SourceReport::Fault(fault, text) => {
                 self.matcher.count(fault);
-                self.said.insert(fault, text);
+                self.is_lost |= matches!(fault, CameraFault::SourceLost | CameraFault::Stalled);
+                self.texts.insert(fault, text);
             }
         }
         self.log_faults();
     }
 
     fn handle_image(&mut self, image: SourceImage) {
+        if std::mem::take(&mut self.is_lost) {
+            tracing::info!("camera: images come in again");
+        }
         let own = image.stamp.filter(|_| self.stamps == CameraStamps::Own);
         let stamp = own.map_or_else(|| image.arrival.before(self.delay), |stamp| self.clock_offset.apply(stamp));
         self.matcher.handle_image(stamp, image.arrival, image.picture);
@@ -249,10 +256,10 @@ impl LiveCamera {
     }
 
     fn log_faults(&mut self) {
-        let (matcher, said) = (&self.matcher, &self.said);
+        let (matcher, texts) = (&self.matcher, &self.texts);
         let explain = |fault| match fault {
             CameraFault::NoPose => Some(matcher.times()),
-            _ => said.get(&fault).cloned(),
+            _ => texts.get(&fault).cloned(),
         };
         for line in self.log.lines(matcher.tally(), std::time::Instant::now(), explain) {
             tracing::warn!("{line}");

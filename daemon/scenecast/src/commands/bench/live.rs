@@ -91,7 +91,7 @@ impl LiveBench {
     }
 
     fn measure(&self, dir: &Path) -> Result<Figures, UserError> {
-        let domain = (1 + std::process::id() % 200) as u8;
+        let domain = (1 + std::process::id() % 95) as u8;
         let settings = Ros2 { domain, networks: vec![[127, 0, 0, 1].into()], ..Ros2::default() };
         let _surface = Ended(start(dir, "asv", domain, &[&format!("modem.listen={}", dir_port(dir)?)])?);
         let mut vehicle = Ended(start(
