@@ -20,7 +20,6 @@ mod inbox;
 mod map_versions;
 mod names;
 mod node;
-mod publisher;
 mod qos;
 mod stop;
 mod subscribe;
@@ -28,12 +27,10 @@ mod subscribe;
 mod surface;
 mod vehicle;
 mod vehicle_map;
-mod watch;
 
 pub use inbox::{Inbox, Received};
 pub use names::{topic, valid_part};
-pub use node::{Peers, RosNode};
-pub use publisher::Publisher;
+pub use node::{Peers, Publisher, RosNode};
 pub use qos::Qos;
 #[cfg(feature = "surface")]
 pub use surface::{SurfaceOutlet, start_surface};

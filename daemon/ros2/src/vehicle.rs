@@ -1,8 +1,7 @@
 //! The vehicle in ROS 2: its own map, pose, path and state.
 
 use crate::map_versions::MapVersions;
-use crate::node::RosNode;
-use crate::publisher::Publisher;
+use crate::node::{Publisher, RosNode};
 use crate::qos::Qos;
 use crate::stop::{self, Owned, Owner};
 use crate::vehicle_map::VehicleMap;

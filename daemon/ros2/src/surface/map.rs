@@ -1,8 +1,7 @@
 //! The operator's map of one vehicle: labels, layers and cloud.
 
 use super::Desk;
-use crate::node::RosNode;
-use crate::publisher::Publisher;
+use crate::node::{Publisher, RosNode};
 use crate::qos::Qos;
 use scenecast_console::state::{MapLabel, VehicleState};
 use scenecast_console::{ClientRequest, MapCells, Reply, SurfaceRequest};

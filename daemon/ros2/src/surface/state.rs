@@ -1,8 +1,7 @@
 //! Pose, path, plan and position of one vehicle.
 
 use super::stamps::Stamps;
-use crate::node::RosNode;
-use crate::publisher::Publisher;
+use crate::node::{Publisher, RosNode};
 use crate::qos::Qos;
 use scenecast_console::state::{MissionState, StatusReport, VehicleState};
 use scenecast_core::{LatLon, TangentPlane, UserError};

@@ -1,6 +1,6 @@
 //! Reports peers, and topics that nobody publishes.
 
-use crate::node::{Peers, Shared, locked};
+use super::{Peers, Shared, locked};
 use ros2_client::Node;
 use std::sync::Weak;
 use std::time::{Duration, Instant};

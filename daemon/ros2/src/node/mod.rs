@@ -1,11 +1,14 @@
 //! The node: its threads, its peers, and the subscriptions and publishers at it.
 
+mod publisher;
+mod watch;
+
+pub use publisher::Publisher;
+
 use crate::inbox::{Filler, Inbox};
 use crate::names::remapped;
-use crate::publisher::Publisher;
 use crate::qos::Qos;
 use crate::stop::Owned;
-use crate::watch::{self, Wanted};
 use futures_util::StreamExt;
 use ros2_client::{Context, MessageTypeName, Name, Node, NodeName, NodeOptions, Subscription};
 use rustdds::{DomainParticipantBuilder, RTPSEntity};
@@ -15,6 +18,7 @@ use scenecast_messages::Message;
 use std::collections::BTreeSet;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
+use watch::Wanted;
 
 /// Time between two tries to start.
 const RETRY_INTERVAL: Duration = Duration::from_secs(5);

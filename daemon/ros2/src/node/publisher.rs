@@ -1,6 +1,6 @@
 //! Publishers that never wait.
 
-use crate::node::Shared;
+use super::Shared;
 use scenecast_messages::Message;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
