@@ -88,13 +88,6 @@ pub struct BagTiming {
     pub altitude_m: f64,
 }
 
-impl BagTiming {
-    fn on_the_clock_of_poses(&self, stamp: Stamp) -> Stamp {
-        let by = Duration::from_secs_f64(self.clock_offset_s.abs());
-        if self.clock_offset_s < 0.0 { stamp.before(by) } else { stamp.after(by) }
-    }
-}
-
 impl Recording {
     /// The images of a bag at the poses of its odometry.
     ///
@@ -117,7 +110,7 @@ impl Recording {
                 without_time += 1;
                 continue;
             };
-            let PoseMatch::Found(pose) = track.at(timing.on_the_clock_of_poses(stamp)) else { continue };
+            let PoseMatch::Found(pose) = track.at(stamp.shifted(timing.clock_offset_s)) else { continue };
             let Some(pose) = timing.mounting.camera_pose(&pose, timing.altitude_m) else { continue };
             let (x_m, y_m, depth_m, heading_rad) = (pose.x_m, pose.y_m, pose.depth_m, pose.heading_rad);
             let image = FrameImage::Bag(bag.clone(), number);

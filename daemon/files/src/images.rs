@@ -11,9 +11,7 @@ const MAX_BYTES: u64 = 4 << 30;
 /// An image in any format that the program knows; a JPEG that is cut off is refused.
 pub fn read_image(path: &Path) -> Result<image::DynamicImage, UserError> {
     let bytes = read_regular(path, MAX_BYTES)?;
-    // The decoder fills the missing part of a cut JPEG with grey, which would be surveyed as sea floor.
-    let cut = bytes.starts_with(&[0xFF, 0xD8]) && !bytes.windows(2).rev().take(4096).any(|w| w == [0xFF, 0xD9]);
-    if cut {
+    if scenecast_sensors::is_cut_jpeg(&bytes) {
         return Err(UserError::file(
             path,
             "not an image that can be read: the JPEG has no end, so a part of it is missing",

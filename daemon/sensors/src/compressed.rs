@@ -20,11 +20,14 @@ pub enum DecodeError {
     Broken(String),
 }
 
+/// Whether the end of a JPEG is missing. The decoder fills the missing part with grey, which would be mapped as sea floor.
+pub fn is_cut_jpeg(bytes: &[u8]) -> bool {
+    bytes.starts_with(&[0xFF, 0xD8]) && !bytes.windows(2).rev().take(4096).any(|w| w == [0xFF, 0xD9])
+}
+
 /// Decodes an image to 8 bits a channel. Of 16 bits, the upper 8 are kept; transparency is dropped.
 pub fn decode(bytes: &[u8]) -> Result<RgbImage, DecodeError> {
-    // The decoder fills the missing part of a cut JPEG with grey, which would be mapped as sea floor.
-    let is_cut = bytes.starts_with(&[0xFF, 0xD8]) && !bytes.windows(2).rev().take(4096).any(|w| w == [0xFF, 0xD9]);
-    if is_cut {
+    if is_cut_jpeg(bytes) {
         return Err(DecodeError::CutJpeg);
     }
     let broken = |e: image::ImageError| DecodeError::Broken(e.to_string());

@@ -28,7 +28,7 @@ mod rotation;
 mod stamp;
 
 pub use camera_tally::{CameraFault, CameraTally};
-pub use compressed::{DecodeError, MAX_PIXELS, decode, own_stamp};
+pub use compressed::{DecodeError, MAX_PIXELS, decode, is_cut_jpeg, own_stamp};
 pub use dvl::{DvlError, DvlPosition, DvlReport, DvlTrack, MAX_DVL_LINE};
 pub use frame_matcher::{FrameMatcher, Limits, MatchedImage};
 pub use image_stream::{ImageStream, MAX_IMAGE_BYTES, complete_length};

@@ -45,6 +45,13 @@ impl Stamp {
         nanos as f64 / NANOS as f64
     }
 
+    /// The stamp moved by seconds, earlier if they are negative.
+    #[must_use]
+    pub fn shifted(self, seconds: f64) -> Self {
+        let by = Duration::from_secs_f64(seconds.abs());
+        if seconds < 0.0 { self.before(by) } else { self.after(by) }
+    }
+
     #[must_use]
     pub fn before(self, by: Duration) -> Self {
         Self(self.0.saturating_sub(i64::try_from(by.as_nanos()).unwrap_or(i64::MAX)))

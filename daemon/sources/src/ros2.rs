@@ -62,22 +62,27 @@ struct Counted {
 }
 
 impl Counted {
-    fn report_poses(&mut self, dropped: u64, malformed: u64, fault: &mut dyn FnMut(CameraFault, String)) {
-        let lost = std::mem::replace(&mut self.dropped, dropped)..dropped;
-        let wrong = std::mem::replace(&mut self.malformed, malformed)..malformed;
-        lost.for_each(|_| fault(CameraFault::UnusablePose, "a pose was dropped: the vehicle was busy".to_owned()));
-        wrong.for_each(|_| fault(CameraFault::UnusablePose, "the message has another type than the topic".to_owned()));
-    }
-
-    fn report(&mut self, dropped: u64, malformed: u64, fault: &mut dyn FnMut(CameraFault, String)) {
-        for _ in std::mem::replace(&mut self.dropped, dropped)..dropped {
-            fault(CameraFault::Overtaken, "a newer message came before it was read".to_owned());
-        }
-        for _ in std::mem::replace(&mut self.malformed, malformed)..malformed {
-            fault(CameraFault::Unreadable, "the message has another type than the topic".to_owned());
-        }
+    /// Reports the messages since the last call that the inbox has dropped, as `lost`, and those of another type, as `wrong`.
+    fn report<M>(
+        &mut self,
+        inbox: &Inbox<M>,
+        lost: (CameraFault, &str),
+        wrong: CameraFault,
+        fault: &mut dyn FnMut(CameraFault, String),
+    ) {
+        let now = Self { dropped: inbox.dropped(), malformed: inbox.malformed() };
+        let before = std::mem::replace(self, now);
+        (before.dropped..self.dropped).for_each(|_| fault(lost.0, lost.1.to_owned()));
+        let text = "the message has another type than the topic";
+        (before.malformed..self.malformed).for_each(|_| fault(wrong, text.to_owned()));
     }
 }
+
+/// An image that a newer one displaced in its inbox.
+const OVERTAKEN: (CameraFault, &str) = (CameraFault::Overtaken, "a newer message came before it was read");
+
+/// A pose that was displaced in its inbox.
+const LOST_POSE: (CameraFault, &str) = (CameraFault::UnusablePose, "a pose was dropped: the vehicle was busy");
 
 impl RosCamera {
     pub fn new(node: Arc<SensorNode>, topic: &str, clock: ArrivalClock, needs_stamps: bool) -> Self {
@@ -131,12 +136,12 @@ impl SensorSource for RosCamera {
         let image = match &self.inbox {
             Some(CameraInbox::Raw(inbox)) => {
                 inbox.wait(timeout);
-                self.counted.report(inbox.dropped(), inbox.malformed(), fault);
+                self.counted.report(inbox, OVERTAKEN, CameraFault::Unreadable, fault);
                 inbox.take().map(|received| self.raw(&received.message))
             }
             Some(CameraInbox::Compressed(inbox)) => {
                 inbox.wait(timeout);
-                self.counted.report(inbox.dropped(), inbox.malformed(), fault);
+                self.counted.report(inbox, OVERTAKEN, CameraFault::Unreadable, fault);
                 inbox.take().map(|received| self.compressed(received.message))
             }
             None => return Err(SourceError("the topic is not open".to_owned())),
@@ -193,7 +198,7 @@ impl SensorSource for RosNavigation {
     ) -> Result<Option<Reading>, SourceError> {
         let Some(inbox) = &self.inbox else { return Err(SourceError("the topic is not open".to_owned())) };
         inbox.wait(timeout);
-        self.counted.report_poses(inbox.dropped(), inbox.malformed(), fault);
+        self.counted.report(inbox, LOST_POSE, CameraFault::UnusablePose, fault);
         let Some(received) = inbox.take() else { return Ok(None) };
         let pose = pose_of(&received.message);
         if pose.is_none() {

@@ -34,7 +34,8 @@ pub(crate) struct LiveCamera {
     clock: ArrivalClock,
     stamps: CameraStamps,
     delay: Duration,
-    clock_offset: ClockOffset,
+    /// Added to the times that images give, seconds.
+    clock_offset_s: f64,
     has_own_poses: bool,
     mounting: CameraMounting,
     /// Height of the camera at which its pixels have the configured size, metres.
@@ -57,17 +58,6 @@ pub(crate) struct LiveCamera {
     was_matched: bool,
     /// Whether the scene model has frames enough, so that images wait for it.
     is_model_busy: bool,
-}
-
-/// Difference between the clocks of the poses and of the camera.
-#[derive(Debug, Clone, Copy)]
-struct ClockOffset(f64);
-
-impl ClockOffset {
-    fn apply(self, stamp: Stamp) -> Stamp {
-        let by = Duration::from_secs_f64(self.0.abs());
-        if self.0 < 0.0 { stamp.before(by) } else { stamp.after(by) }
-    }
 }
 
 /// The next report of a source; without one it never returns.
@@ -117,7 +107,7 @@ impl LiveCamera {
             clock,
             stamps: c.stamps,
             delay: Duration::from_secs_f64(c.delay_s),
-            clock_offset: ClockOffset(c.clock_offset_s),
+            clock_offset_s: c.clock_offset_s,
             has_own_poses: config.navigation.source != NavigationSource::Autopilot,
             mounting: configured_mounting(config),
             altitude_m: config.survey.altitude_m,
@@ -180,7 +170,7 @@ impl LiveCamera {
             tracing::info!("camera: images come in again");
         }
         let own = image.stamp.filter(|_| self.stamps == CameraStamps::Own);
-        let stamp = own.map_or_else(|| image.arrival.before(self.delay), |stamp| self.clock_offset.apply(stamp));
+        let stamp = own.map_or_else(|| image.arrival.before(self.delay), |stamp| stamp.shifted(self.clock_offset_s));
         self.matcher.handle_image(stamp, image.arrival, image.picture);
     }
 
