@@ -135,7 +135,7 @@ fn assert_topics_give_the_map(name: &str, domain: u32, topic: &str, publishers: 
     let domain = domain.to_string();
     for options in publishers {
         let arguments = [&[folder.as_str(), "--domain", &domain], *options].concat();
-        run_script(&python, "tests/python/ros2_camera.py", &arguments);
+        run_script(&python, "tests/ros2_camera.py", &arguments);
     }
     dive.assert_map_of_the_rehearsal();
 }
