@@ -284,7 +284,14 @@ fn a_vehicle_surveys_on_ardusub_and_reports_its_silence() {
     wait_until("a refused waypoint is logged", limit, || {
         is_logged("the autopilot does not follow the waypoint: it reports") && is_logged("autopilot: not in command;")
     });
+    let refuses = |is_expected: bool| {
+        let faults = status().and_then(|s| s["faults"].as_array().cloned()).unwrap_or_default();
+        let is_named = |fault: &Value| fault["text"] == "the autopilot does not follow" && fault["is_grave"] == true;
+        faults.iter().any(is_named) == is_expected
+    };
+    wait_until("the operator sees that the autopilot does not follow", limit, || refuses(true));
     peer.order("accept");
+    wait_until("the operator sees that it follows again", limit, || refuses(false));
     wait_until("its end is logged", limit, || is_logged("the autopilot follows the waypoint again"));
     // A target that was on its way when the failsafe of the autopilot began may have been refused.
     let seen = peer.seen();

@@ -21,8 +21,8 @@ pub use map::{
 pub use storage::{ArchiveList, ArchivedMap, StorageInfo, VehicleMarker, VehicleNote};
 pub use vehicle::{
     AppliedOrder, DirectiveSlots, InForceKnowledge, OrderProgress, OrderStatus, PlannedPath, ReportedDisk,
-    ReportedMode, ReportedPose, ReportedRegistration, ReportedTie, StatusReport, UsblMeasurement, UtilityTerms,
-    VehicleOrders, VehicleSettings, VehicleState, WeightDraft,
+    ReportedFault, ReportedMode, ReportedPose, ReportedRegistration, ReportedTie, StatusReport, UsblMeasurement,
+    UtilityTerms, VehicleOrders, VehicleSettings, VehicleState, WeightDraft,
 };
 
 use schemars::JsonSchema;

@@ -8,6 +8,7 @@ use scenecast_drivers::modem::Station;
 use scenecast_protocol::coordinates::MapPoint;
 use scenecast_protocol::directive::{Budget, Fix, Settings};
 use scenecast_protocol::time::Instant;
+use scenecast_protocol::wire::EquipmentFaults;
 use scenecast_vehicle::{
     AppliedSlot, ForeignUpdate, MapUpdate, RegisteredFrame, SharedExemplars, Vehicle, VehicleDisk, VehicleOutput,
 };
@@ -207,6 +208,12 @@ impl VehicleHost {
     /// Lets the vehicle choose a waypoint if it has none.
     pub fn steer(&mut self, now: Instant) {
         self.link.end_mut().steer(now);
+    }
+
+    /// Takes the faults of the sensors; that of an autopilot which does not follow is added.
+    pub fn handle_faults(&mut self, sensors: EquipmentFaults) {
+        let autopilot_refuses = self.pilot.as_ref().is_some_and(|pilot| pilot.pilot.health() == Health::NotInCommand);
+        self.link.end_mut().set_faults(EquipmentFaults { autopilot_refuses, ..sensors });
     }
 
     /// Takes the odometry of a vehicle without an autopilot.

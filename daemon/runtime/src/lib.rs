@@ -5,6 +5,7 @@ mod checkpoint;
 mod clock;
 mod disk_space;
 mod durable;
+mod equipment;
 #[cfg(test)]
 mod fuzz_corpus_tests;
 #[cfg(feature = "surface")]

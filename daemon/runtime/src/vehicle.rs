@@ -3,6 +3,7 @@
 use super::clock::Clock;
 use super::disk_space::DiskWatch;
 use super::durable::{Keeper, StartedRun};
+use super::equipment::SensorFaults;
 use super::journal::Folder;
 use super::labels::{Feed, FromLabels, LabelThread, move_the_vehicle};
 use super::mapping::{FromMapper, Mapped, MapperThread, ToMapper};
@@ -104,9 +105,23 @@ pub fn run_vehicle(load: Load, simulated: Option<SimulatedAutopilot>) -> Result<
         let disk = DiskWatch::new(dir);
         let ros2 = VehicleRos2::start(&config)?;
         let labels_move = move_the_vehicle(&config);
-        VehicleShell { host, camera, mapper, labels, labels_move, ports, ros2, clock, keeper, disk, reload, missed: 0 }
-            .run(stop)
-            .await
+        let faults = SensorFaults::default();
+        let shell = VehicleShell {
+            host,
+            camera,
+            mapper,
+            labels,
+            labels_move,
+            ports,
+            ros2,
+            clock,
+            keeper,
+            disk,
+            faults,
+            reload,
+            missed: 0,
+        };
+        shell.run(stop).await
     })
 }
 
@@ -135,6 +150,7 @@ struct VehicleShell {
     clock: Clock,
     keeper: Keeper<Folder>,
     disk: DiskWatch,
+    faults: SensorFaults,
     reload: Reload,
     /// Camera frames that could not be read.
     missed: u64,
@@ -182,6 +198,9 @@ impl VehicleShell {
     fn poll_camera(&mut self) {
         let unseen = self.camera.poll_pose_gap();
         self.host.handle_pose_gap(unseen);
+        let refused = self.labels.as_ref().map_or(0, LabelThread::refused);
+        let faults = self.faults.now(&self.camera, unseen, refused, std::time::Instant::now());
+        self.host.handle_faults(faults);
         if let Some(pose) = self.camera.poll_pose() {
             self.host.handle_pose(pose, self.clock.now());
         }

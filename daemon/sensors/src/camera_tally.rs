@@ -80,6 +80,7 @@ impl CameraFault {
         matches!(
             self,
             Self::PoseClockJump
+                | Self::UnusablePose
                 | Self::PosesLost
                 | Self::PosesStalled
                 | Self::PosesUnreadable

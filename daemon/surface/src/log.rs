@@ -28,12 +28,23 @@ pub enum LogKind {
     Record,
     /// Command was requested, taken, handed over or released.
     Command,
+    /// The equipment of a vehicle has failed, or works again.
+    Fault,
 }
 
 impl LogKind {
     /// Every kind, in the order of the numbers in files.
-    pub const ALL: [Self; 8] =
-        [Self::Order, Self::Answer, Self::Contact, Self::Mode, Self::Label, Self::Image, Self::Record, Self::Command];
+    pub const ALL: [Self; 9] = [
+        Self::Order,
+        Self::Answer,
+        Self::Contact,
+        Self::Mode,
+        Self::Label,
+        Self::Image,
+        Self::Record,
+        Self::Command,
+        Self::Fault,
+    ];
 
     /// The name for people and in the API.
     pub fn name(self) -> &'static str {
@@ -46,6 +57,7 @@ impl LogKind {
             Self::Image => "image",
             Self::Record => "record",
             Self::Command => "command",
+            Self::Fault => "fault",
         }
     }
 }

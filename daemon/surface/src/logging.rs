@@ -90,6 +90,14 @@ impl Surface {
         }
     }
 
+    pub(super) fn log_faults(&mut self, vehicle: Address, now: Instant) {
+        let Some((status, _)) = self.link.vehicle(vehicle).and_then(|view| view.status()) else { return };
+        let faults = status.faults;
+        if let Some(text) = self.watches.entry(vehicle).or_default().handle_faults(faults) {
+            self.log_fact(vehicle, LogKind::Fault, &text, now);
+        }
+    }
+
     /// The labels on the map of a vehicle are these.
     pub(super) fn log_labels(&mut self, vehicle: Address, labels: impl Iterator<Item = u8>, now: Instant) {
         let epoch = self.records.get(&vehicle).map_or(0, |record| record.epoch);

@@ -313,6 +313,7 @@ impl Surface {
                 self.records.get_mut(&vehicle)?.handle_status(status, at);
                 self.relay.iter_mut().for_each(|relay| relay.handle_depth(vehicle, status.depth_m, now));
                 self.log_mode(vehicle, now);
+                self.log_faults(vehicle, now);
                 self.follow_names(vehicle);
                 self.follow_in_force(vehicle)
             }

@@ -2,6 +2,7 @@
 
 use super::backlog::Backlog;
 use super::disk::DiskReport;
+use super::faults::EquipmentFaults;
 use super::intent::Intent;
 use super::path::PlannedPath;
 use super::placement::Placement;
@@ -156,6 +157,8 @@ pub struct VehicleStatus {
     pub intent: Option<Intent>,
     /// How the last camera frames were placed on the map; `None` where frames were never registered.
     pub registration: Option<RegistrationReport>,
+    /// The faults of the equipment, a chunk of their own, which is sent while there are any.
+    pub faults: EquipmentFaults,
     /// The corners of the track before the position, the latest first; they are a chunk of their own, see [`super::Trail`].
     pub trail: Vec<TrailCorner>,
     /// Number of explored cells on the map.
@@ -295,7 +298,7 @@ impl VehicleStatus {
         (out, 0)
     }
 
-    /// Decodes a pose into `self`, without a trail, an intent and a registration; the fields of the report stay unchanged.
+    /// Decodes a pose into `self`, without a trail, an intent, a registration and faults; the fields of the report stay unchanged.
     pub fn read_pose(&mut self, bytes: &[u8]) -> Result<(), StatusError> {
         let mut r = Reader::new(bytes);
         let head = r.u8()?;
@@ -309,6 +312,7 @@ impl VehicleStatus {
         read.explored_cells = r.u24()?;
         (read.waypoint, read.path) = (None, PlannedPath::default());
         (read.trail, read.intent, read.registration) = (Vec::new(), None, None);
+        read.faults = EquipmentFaults::default();
         read.autopilot_silent = head & 0b1000 != 0;
         if head & 0b1_0000 != 0 {
             let waypoint = take_point(&mut r)?;

@@ -88,6 +88,7 @@ fn contents() -> Vec<Seed> {
                 ChunkKind::Intent => seeds.push(("status", format!("intent-{i}"), payload)),
                 ChunkKind::LabelClass => {}
                 ChunkKind::Registration => seeds.push(("status", format!("registration-{i}"), payload)),
+                ChunkKind::Faults => seeds.push(("status", format!("faults-{i}"), payload)),
                 ChunkKind::Trail => seeds.push(("status", format!("trail-{i}"), payload)),
                 ChunkKind::Pose => seeds.push(("status", format!("pose-{i}"), payload)),
                 ChunkKind::Report => seeds.push(("status", format!("report-{i}"), payload)),

@@ -14,8 +14,8 @@ use scenecast_protocol::map::{
 use scenecast_protocol::map_codec;
 use scenecast_protocol::schedule::{BackgroundOrder, BackgroundStream, Shares};
 use scenecast_protocol::wire::{
-    AckStatement, Address, ChunkKind, DiskReport, FrameTie, Header, Intent, Placement, PlannedPath, Reader,
-    RegistrationReport, Seal, Stamp, Trail, TrailCorner, VehicleStatus, unwrap_number,
+    AckStatement, Address, ChunkKind, DiskReport, EquipmentFaults, FrameTie, Header, Intent, Placement, PlannedPath,
+    Reader, RegistrationReport, Seal, Stamp, Trail, TrailCorner, VehicleStatus, unwrap_number,
 };
 use std::collections::BTreeMap;
 
@@ -150,6 +150,7 @@ fn status_chunks() -> Rows {
     };
     let (tie, share) = (FrameTie::EarlierTrack, 1.0 / 3.0);
     let registration = RegistrationReport { tie, share, sigma_m: 0.1, closed: 258 };
+    let faults = EquipmentFaults { camera_silent: true, autopilot_refuses: true, ..EquipmentFaults::default() };
     let corner = |ago_s, x_m, y_m| TrailCorner { ago_s, place: MapPoint::new(x_m, y_m) };
     let trail = Trail::new(MapPoint::new(1.0, -2.0), &[corner(9, 2.4, -3.4), corner(12, -0.6, -3.4)], 99).unwrap();
     vec![
@@ -175,6 +176,7 @@ fn status_chunks() -> Rows {
             "registration: by an earlier track, a third of the last 32 frames by images, 10 cm, 258 closed loops",
             registration.encode().to_vec(),
         ),
+        ("faults: no image comes in, the autopilot does not follow", faults.encode().to_vec()),
         ("trail to (1, -2) m: 9 s ago at (2.4, -3.4), 12 s ago at (-0.6, -3.4)", trail.encode()),
         (
             "report: epoch 1, 9 labels, digest BEEF, budget 10 000 bit/s (2500 x 2^2), 3 frames refused, 448 bytes of labels (14 x 2^5) \

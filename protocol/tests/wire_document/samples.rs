@@ -8,8 +8,8 @@ use scenecast_protocol::directive::{
 };
 use scenecast_protocol::seal::{MissionKey, SessionKey};
 use scenecast_protocol::wire::{
-    AckStatement, Address, Backlog, CellEdge, Chunk, ChunkKind, Envelope, FrameBuilder, FrameKind, Header,
-    Introduction, MissionId, ModeReason, PlannedPath, Seal, SessionId, Stamp, VehicleMode, VehicleStatus,
+    AckStatement, Address, Backlog, CellEdge, Chunk, ChunkKind, Envelope, EquipmentFaults, FrameBuilder, FrameKind,
+    Header, Introduction, MissionId, ModeReason, PlannedPath, Seal, SessionId, Stamp, VehicleMode, VehicleStatus,
 };
 use std::time::Duration;
 
@@ -85,6 +85,7 @@ pub(crate) fn status() -> VehicleStatus {
         waypoint: None,
         path: PlannedPath::default(),
         registration: None,
+        faults: EquipmentFaults::default(),
         intent: None,
         trail: Vec::new(),
         explored_cells: 4000,

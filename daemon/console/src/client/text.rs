@@ -54,6 +54,10 @@ fn vehicle(out: &mut String, v: &VehicleState, state: &MissionState) {
         if let Some(path) = path(s) {
             let _ = writeln!(out, "  path       {path}");
         }
+        if !s.faults.is_empty() {
+            let faults: Vec<&str> = s.faults.iter().map(|fault| fault.text.as_str()).collect();
+            let _ = writeln!(out, "  FAULTS     {}", faults.join(", "));
+        }
         if let Some(state) = &s.disk {
             let _ = writeln!(out, "  disk       {}", disk(state));
         }
@@ -272,6 +276,7 @@ mod tests {
             budget_bps: 0,
             refused_frames: 0,
             disk: None,
+            faults: Vec::new(),
         }
     }
 

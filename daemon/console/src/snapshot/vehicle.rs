@@ -4,9 +4,9 @@ use super::facts::{MissionFacts, seconds};
 use super::{exemplar, link, position};
 use crate::state::{
     AppliedOrder, DirectiveSlots, EarlierMap, InForceKnowledge, MapLabel, MapSummary, OrderProgress, OrderStatus,
-    PlannedPath, ReportedDisk, ReportedMode, ReportedPose, ReportedRegistration, ReportedTie, StatusReport,
-    UsblMeasurement, UtilityTerms, VehicleMarker, VehicleNote, VehicleOrders, VehicleSettings, VehicleState,
-    WeightDraft,
+    PlannedPath, ReportedDisk, ReportedFault, ReportedMode, ReportedPose, ReportedRegistration, ReportedTie,
+    StatusReport, UsblMeasurement, UtilityTerms, VehicleMarker, VehicleNote, VehicleOrders, VehicleSettings,
+    VehicleState, WeightDraft,
 };
 use scenecast_protocol::coordinates::MapPoint;
 use scenecast_protocol::directive::{self, PlannerKind, REPORTED_SLOTS, SlotProgress};
@@ -177,6 +177,7 @@ fn status(s: &VehicleStatus, record: &VehicleRecord, at: Instant) -> StatusRepor
         budget_bps: s.budget_bps,
         refused_frames: u32::from(s.refused_frames),
         disk: s.disk.map(disk),
+        faults: s.faults.iter().map(|(text, is_grave)| ReportedFault { text: text.to_owned(), is_grave }).collect(),
     }
 }
 

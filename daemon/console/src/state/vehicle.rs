@@ -179,6 +179,18 @@ pub struct StatusReport {
     /// The disk with its files; null if it has not reported one.
     #[serde(default)]
     pub disk: Option<ReportedDisk>,
+    /// The equipment that fails, the gravest first.
+    #[serde(default)]
+    pub faults: Vec<ReportedFault>,
+}
+
+/// A fault of a vehicle's equipment.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct ReportedFault {
+    /// The fault in a few words, such as "no image comes in".
+    pub text: String,
+    /// Whether the survey does not proceed with it as planned.
+    pub is_grave: bool,
 }
 
 /// How a vehicle's last camera frames were placed on its map.

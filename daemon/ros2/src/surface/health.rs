@@ -50,6 +50,9 @@ fn state(vehicle: &VehicleState) -> Health {
         () if status.autopilot_silent => Some("the autopilot does not answer"),
         () if disk.journal_refused => Some("its journal cannot be written"),
         () if disk.checkpoint_refused => Some("its checkpoint cannot be written"),
+        () if status.faults.iter().any(|fault| fault.is_grave) => {
+            status.faults.first().map(|fault| fault.text.as_str())
+        }
         () => None,
     };
     let is_unusual = matches!(status.mode, ReportedMode::Abort | ReportedMode::Surface | ReportedMode::Return);

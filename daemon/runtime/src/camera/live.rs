@@ -201,6 +201,11 @@ impl LiveCamera {
         Some(Duration::from_secs_f64(now.seconds_since(last.max(known)).max(0.0)))
     }
 
+    /// Whether the camera is lost or has stalled.
+    pub(super) fn is_silent(&self) -> bool {
+        self.is_lost
+    }
+
     pub(super) fn newest_pose(&self) -> Option<CameraPose> {
         self.newest_pose
     }

@@ -117,6 +117,14 @@ impl Camera {
         }
     }
 
+    /// Whether a live camera is lost or has stalled.
+    pub(crate) fn is_silent(&self) -> bool {
+        match self {
+            Self::Recorded(_) => false,
+            Self::Live(camera) => camera.is_silent(),
+        }
+    }
+
     /// The newest pose of a navigation source that is not the autopilot.
     pub(crate) fn newest_pose(&self) -> Option<CameraPose> {
         match self {

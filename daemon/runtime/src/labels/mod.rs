@@ -21,7 +21,7 @@ use scenecast_core::UserError;
 use scenecast_labels::{Content, ImagePose, Item, Refusal};
 use scenecast_protocol::map::ClassEntry;
 use scenecast_vehicle::{ForeignMap, ForeignUpdate, MapProducer};
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
@@ -57,6 +57,8 @@ pub(super) struct LabelThread {
     own: Arc<Mutex<OwnPoses>>,
     pace: Arc<Mutex<Pace>>,
     is_over: Arc<AtomicBool>,
+    /// Items that were refused so far.
+    refused: Arc<AtomicU64>,
     thread: JoinHandle<()>,
 }
 
@@ -66,6 +68,7 @@ impl LabelThread {
         let own = Arc::new(Mutex::new(OwnPoses::new(clock.scale())));
         let pace = Arc::new(Mutex::new(Pace::new(Instant::now())));
         let is_over = Arc::new(AtomicBool::new(false));
+        let refused = Arc::new(AtomicU64::new(0));
         let worker = Worker {
             kept_names: map.classes().cloned().collect(),
             is_refusal_reported: keep.is_refused,
@@ -78,10 +81,16 @@ impl LabelThread {
             is_over: Arc::clone(&is_over),
             outgoing,
             counts: Counts::default(),
+            refused: Arc::clone(&refused),
         };
         let thread = std::thread::Builder::new().name("labels".to_owned()).spawn(move || worker.run());
         let thread = thread.map_err(|e| UserError::Failed(format!("the labels' thread did not start: {e}")))?;
-        Ok(Self { mapped, own, pace, is_over, thread })
+        Ok(Self { mapped, own, pace, is_over, refused, thread })
+    }
+
+    /// Items that were refused so far.
+    pub(super) fn refused(&self) -> u64 {
+        self.refused.load(Ordering::Relaxed)
     }
 
     /// The next report; never without one. Cancel-safe.
@@ -152,6 +161,8 @@ struct Worker {
     is_over: Arc<AtomicBool>,
     outgoing: mpsc::Sender<FromLabels>,
     counts: Counts,
+    /// The refused items of `counts`, for the vehicle.
+    refused: Arc<AtomicU64>,
     is_refusal_reported: bool,
     /// The names of classes in the last checkpoint that was written.
     kept_names: Vec<ClassEntry>,
@@ -216,7 +227,10 @@ impl Worker {
         mark.iter().for_each(|name| self.map.set_mark(name));
         match &result {
             Ok(_) => self.counts.taken += 1,
-            Err(why) => self.counts.refuse(&origin, why),
+            Err(why) => {
+                self.counts.refuse(&origin, why);
+                self.refused.store(self.counts.refused, Ordering::Relaxed);
+            }
         }
         if let Some(answer) = answer {
             let _ = answer.try_send(result.as_ref().map(drop).map_err(ToString::to_string));

@@ -38,6 +38,7 @@ impl VehicleRos2 {
 
 #[cfg(feature = "ros2")]
 mod on {
+    use crate::equipment::RecentFaults;
     use scenecast_config::Config;
     use scenecast_core::UserError;
     use scenecast_drivers::autopilot::{self, Counters};
@@ -52,9 +53,6 @@ mod on {
 
     /// Minimum time between two views.
     const VIEW_INTERVAL: Duration = Duration::from_millis(200);
-
-    /// A fault of a sensor is a warning for this long.
-    const FAULT_LASTS: Duration = Duration::from_secs(10);
 
     pub(super) struct On {
         outlet: VehicleOutlet,
@@ -137,8 +135,7 @@ mod on {
     /// A sensor whose faults are new for a while after each of them.
     #[derive(Default)]
     struct SensorHealth {
-        faults: u64,
-        last_fault: Option<Instant>,
+        recent: RecentFaults,
     }
 
     impl SensorHealth {
@@ -151,11 +148,7 @@ mod on {
         ) -> Health {
             let faults: Vec<_> = faults.collect();
             let count = faults.iter().map(|(_, n)| n).sum();
-            if std::mem::replace(&mut self.faults, count) != count {
-                self.last_fault = Some(now);
-            }
-            let is_new = self.last_fault.is_some_and(|at| now.duration_since(at) < FAULT_LASTS);
-            let level = if is_new { DiagnosticStatus::WARN } else { DiagnosticStatus::OK };
+            let level = if self.recent.handle(count, now) { DiagnosticStatus::WARN } else { DiagnosticStatus::OK };
             let values = faults.into_iter().map(|(fault, n)| (fault.name(), n.to_string())).collect();
             Health { level, part, message, values }
         }

@@ -1,7 +1,7 @@
 //! What the log says about a vehicle without anybody's order: silence, modes, labels.
 
 use scenecast_protocol::time::Instant;
-use scenecast_protocol::wire::{ModeReason, VehicleMode};
+use scenecast_protocol::wire::{EquipmentFaults, ModeReason, VehicleMode};
 use std::collections::BTreeSet;
 use std::time::Duration;
 
@@ -15,6 +15,7 @@ pub(crate) struct Watch {
     last_received: Option<Instant>,
     is_silent: bool,
     mode: Option<(VehicleMode, ModeReason)>,
+    faults: EquipmentFaults,
     /// The labels of an epoch.
     labels: (u8, BTreeSet<u8>),
     /// The next labels are known from an earlier run of the surface.
@@ -44,6 +45,13 @@ impl Watch {
     /// The vehicle reports a mode; returns whether it is another one than before.
     pub(crate) fn handle_mode(&mut self, mode: VehicleMode, reason: ModeReason) -> bool {
         self.mode.replace((mode, reason)).is_some_and(|before| before != (mode, reason))
+    }
+
+    /// The vehicle reports the faults of its equipment. The text is for the log.
+    pub(crate) fn handle_faults(&mut self, faults: EquipmentFaults) -> Option<String> {
+        let before = std::mem::replace(&mut self.faults, faults);
+        let names: Vec<&str> = faults.iter().map(|(text, _)| text).collect();
+        (before != faults).then(|| if names.is_empty() { "no fault any more".to_owned() } else { names.join(", ") })
     }
 
     /// Takes the labels on the map; returns those that are new in this epoch.
@@ -93,6 +101,16 @@ mod tests {
         assert_eq!(watch.handle_frame(at(4700.0)).as_deref(), Some("received again after 1 h 1 min"));
         assert_eq!(watch.handle_frame(at(4710.0)), None);
         assert_eq!(watch.handle_time(None, at(4760.0)), None, "a minute at least");
+    }
+
+    #[test]
+    fn a_fault_is_logged_when_it_comes_and_when_it_goes() {
+        let mut watch = Watch::default();
+        let faults = EquipmentFaults { camera_silent: true, autopilot_refuses: true, ..EquipmentFaults::default() };
+        assert_eq!(watch.handle_faults(EquipmentFaults::default()), None);
+        assert_eq!(watch.handle_faults(faults).as_deref(), Some("the autopilot does not follow, no image comes in"));
+        assert_eq!(watch.handle_faults(faults), None);
+        assert_eq!(watch.handle_faults(EquipmentFaults::default()).as_deref(), Some("no fault any more"));
     }
 
     #[test]

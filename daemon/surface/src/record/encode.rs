@@ -3,8 +3,8 @@
 use super::event::Event;
 
 /// The version of the layout of events. A build reads its own version and earlier ones.
-/// Layouts 2 to 6 append events to the layout before.
-const SCHEMA: u16 = 6;
+/// Layouts 2 to 7 append events to the layout before.
+const SCHEMA: u16 = 7;
 
 /// The reason that bytes are no batch of events.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
@@ -73,8 +73,8 @@ mod tests {
             ]
             .concat()
         };
-        assert!((1..=6).all(|layout| decode(&golden(layout)) == Ok(events())));
-        assert_eq!(encode(&events()), golden(6));
+        assert!((1..=7).all(|layout| decode(&golden(layout)) == Ok(events())));
+        assert_eq!(encode(&events()), golden(7));
     }
 
     #[test]
@@ -90,7 +90,7 @@ mod tests {
         };
         let events = [event(marker, 1), event(VehicleEvent::MarkerGone(300), 2)];
         let golden = [
-            &[0, 6, 2][..],
+            &[0, 7, 2][..],
             &[1, 0xE8, 0x07, 0xD0, 0x0F, 0, 2, 1, 16, 0xAC, 2],
             &1.5f64.to_le_bytes(),
             &(-2.0f64).to_le_bytes(),
@@ -107,7 +107,7 @@ mod tests {
         let kind = EventKind::Vehicle(1, VehicleEvent::Places(places));
         let time = EventTime { mission_us: 1000, unix_ms: 2000 };
         let events = [Event { sequence: 1, time, source: EventSource::Surface, kind }];
-        let golden = [0, 6, 1, 1, 0xE8, 0x07, 0xD0, 0x0F, 0, 2, 1, 18, 0, 1, 0xAC, 2, 2, 7, 8, 0, 0];
+        let golden = [0, 7, 1, 1, 0xE8, 0x07, 0xD0, 0x0F, 0, 2, 1, 18, 0, 1, 0xAC, 2, 2, 7, 8, 0, 0];
         assert_eq!(encode(&events), golden);
         assert_eq!(decode(&golden).as_deref(), Ok(&events[..]));
     }
@@ -126,7 +126,7 @@ mod tests {
         };
         let events = [event(1, VehicleEvent::Former(former)), event(2, VehicleEvent::Draft(draft))];
         let golden = [
-            &[0, 6, 2][..],
+            &[0, 7, 2][..],
             &[1, 0xE8, 0x07, 0xD0, 0x0F, 0, 2, 1, 19, 0, 1, 6, 7, 7, 0xD0, 0x0F],
             &[2, 0xE8, 0x07, 0xD0, 0x0F, 0, 2, 1, 20, 0xAC, 2, 1, 3],
             &0.5f64.to_le_bytes(),
@@ -143,7 +143,7 @@ mod tests {
         let kind = EventKind::Vehicle(1, VehicleEvent::InForce(vec![vec![7, 8], vec![9]]));
         let time = EventTime { mission_us: 1000, unix_ms: 2000 };
         let events = [Event { sequence: 1, time, source: EventSource::Surface, kind }];
-        let golden = [0, 6, 1, 1, 0xE8, 0x07, 0xD0, 0x0F, 0, 2, 1, 21, 2, 2, 7, 8, 1, 9];
+        let golden = [0, 7, 1, 1, 0xE8, 0x07, 0xD0, 0x0F, 0, 2, 1, 21, 2, 2, 7, 8, 1, 9];
         assert_eq!(encode(&events), golden);
         assert_eq!(decode(&golden).as_deref(), Ok(&events[..]));
     }
@@ -155,7 +155,7 @@ mod tests {
         let time = EventTime { mission_us: 1000, unix_ms: 2000 };
         let events = [Event { sequence: 1, time, source: EventSource::Surface, kind }];
         let golden = [
-            &[0, 6, 1, 1, 0xE8, 0x07, 0xD0, 0x0F, 0, 2, 1, 22, 1, 5, 4, 0x95, 5, 1, 2, 0xAC, 2, 1, 0xE8, 0x07][..],
+            &[0, 7, 1, 1, 0xE8, 0x07, 0xD0, 0x0F, 0, 2, 1, 22, 1, 5, 4, 0x95, 5, 1, 2, 0xAC, 2, 1, 0xE8, 0x07][..],
             &1.5f64.to_le_bytes(),
             &(-2.0f64).to_le_bytes(),
         ];
@@ -164,11 +164,21 @@ mod tests {
     }
 
     #[test]
+    fn golden_bytes_of_faults() {
+        let kind = EventKind::Vehicle(1, VehicleEvent::Faults(0x88));
+        let time = EventTime { mission_us: 1000, unix_ms: 2000 };
+        let events = [Event { sequence: 1, time, source: EventSource::Surface, kind }];
+        let golden = [0, 7, 1, 1, 0xE8, 0x07, 0xD0, 0x0F, 0, 2, 1, 23, 0x88];
+        assert_eq!(encode(&events), golden);
+        assert_eq!(decode(&golden).as_deref(), Ok(&events[..]));
+    }
+
+    #[test]
     fn golden_bytes_of_an_entry_of_the_log() {
         let entry = StoredLogEntry { number: 300, at: 5, vehicle: Some(1), kind: 7, by: None, text: "ab".to_owned() };
         let time = EventTime { mission_us: 1000, unix_ms: 2000 };
         let events = [Event { sequence: 1, time, source: EventSource::Surface, kind: EventKind::Logged(entry) }];
-        let golden = [0, 6, 1, 1, 0xE8, 0x07, 0xD0, 0x0F, 0, 3, 0xAC, 2, 5, 1, 1, 7, 0, 2, b'a', b'b'];
+        let golden = [0, 7, 1, 1, 0xE8, 0x07, 0xD0, 0x0F, 0, 3, 0xAC, 2, 5, 1, 1, 7, 0, 2, b'a', b'b'];
         assert_eq!(encode(&events), golden);
         assert_eq!(decode(&golden).as_deref(), Ok(&events[..]));
     }
@@ -184,7 +194,7 @@ mod tests {
         let events = [event(1, EventKind::Command(command)), event(2, EventKind::CommandChanged(change))];
         let head = [0xE8, 0x07, 0xD0, 0x0F, 0];
         let golden = [
-            &[0, 6, 2][..],
+            &[0, 7, 2][..],
             &[1],
             &head,
             &[4, 1, 3, b'a', b'n', b'n', 5, 0xAC, 2, 1, 2, b'b', b'o', 6],
@@ -198,7 +208,7 @@ mod tests {
 
     #[test]
     fn a_later_layout_is_refused_by_its_number() {
-        assert_eq!(decode(&[0, 7, 0]), Err(DecodeError::Later(7)));
+        assert_eq!(decode(&[0, 8, 0]), Err(DecodeError::Later(8)));
         assert_eq!(decode(&[0, 0, 0]), Err(DecodeError::Damaged));
         assert_eq!(decode(&[0]), Err(DecodeError::Damaged));
     }
@@ -206,7 +216,7 @@ mod tests {
     proptest! {
         #[test]
         fn any_bytes_decode_or_are_refused(bytes in proptest::collection::vec(any::<u8>(), 0..200)) {
-            let _ = decode(&[&[0, 6], &bytes[..]].concat());
+            let _ = decode(&[&[0, 7], &bytes[..]].concat());
         }
     }
 }

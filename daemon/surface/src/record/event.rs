@@ -135,6 +135,8 @@ pub enum VehicleEvent {
     /// The last report on the registration of frames as on the wire, with its time; the number of positions at which
     /// frames closed a loop, and the newest ones: time, metres east and north. Since layout 6.
     Registration { report: Option<(u64, Vec<u8>)>, total: u64, closures: Vec<(u64, f64, f64)> },
+    /// The faults of the equipment in the last status, as on the wire. Since layout 7.
+    Faults(u8),
 }
 
 /// A run of a vehicle and the epoch of its labels.

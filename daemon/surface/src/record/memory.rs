@@ -69,6 +69,8 @@ pub struct VehicleMemory {
     pub(crate) track: VecDeque<(u64, f64, f64)>,
     /// The last report on the registration of frames, with its time; the positions of closed loops, and their number.
     pub(crate) registration: Option<(u64, Vec<u8>)>,
+    /// The faults of the equipment in the last status, as on the wire.
+    pub(crate) faults: u8,
     pub(crate) closures_total: u64,
     pub(crate) closures: VecDeque<(u64, f64, f64)>,
     pub(crate) orders: Vec<StoredOrder>,
@@ -237,6 +239,7 @@ impl VehicleMemory {
                 self.closures.extend(closures.iter().copied());
                 self.closures.drain(..self.closures.len().saturating_sub(MAX_TRACK));
             }
+            VehicleEvent::Faults(faults) => self.faults = *faults,
             VehicleEvent::Orders { series, orders } => {
                 self.series = *series;
                 self.orders.clone_from(orders);
@@ -335,6 +338,9 @@ impl VehicleMemory {
         if self.registration.is_some() {
             let (total, closures) = (self.closures_total, self.closures.iter().copied().collect());
             all.push(VehicleEvent::Registration { report: self.registration.clone(), total, closures });
+        }
+        if self.faults != 0 {
+            all.push(VehicleEvent::Faults(self.faults));
         }
         for (&label, images) in &self.exemplars {
             all.extend(images.iter().map(|image| VehicleEvent::Exemplar { label, image: image.clone() }));

@@ -17,7 +17,7 @@ use crate::vehicle_record::VehicleRecord;
 use scenecast_protocol::link::PeerView;
 use scenecast_protocol::map::{LayerId, SharedTiles};
 use scenecast_protocol::time::Instant;
-use scenecast_protocol::wire::Address;
+use scenecast_protocol::wire::{Address, EquipmentFaults};
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
@@ -303,6 +303,10 @@ fn contact_changes(
         let closures = record.registration.closures();
         let (total, closures) = (closures.total(), new_points(closures, memory.closures_total));
         events.push(VehicleEvent::Registration { report, total, closures });
+    }
+    let [faults] = record.status(view).map_or(EquipmentFaults::default(), |(status, _)| status.faults).encode();
+    if memory.faults != faults {
+        events.push(VehicleEvent::Faults(faults));
     }
     exemplar_changes(record, memory, events);
 }

@@ -10,7 +10,7 @@ use crate::vehicle_record::VehicleRecord;
 use scenecast_protocol::directive::Series;
 use scenecast_protocol::schedule::{BackgroundOrder, Shares};
 use scenecast_protocol::time::Instant;
-use scenecast_protocol::wire::{Address, RegistrationReport};
+use scenecast_protocol::wire::{Address, EquipmentFaults, RegistrationReport, VehicleStatus};
 use std::collections::VecDeque;
 
 /// Puts everything back but the maps, which the recorder gives to the surface as earlier maps.
@@ -56,7 +56,9 @@ fn restore_record(record: &mut VehicleRecord, memory: &VehicleMemory) {
         .and_then(|(at, bytes)| Some((RegistrationReport::decode(bytes).ok()?, Instant::from_micros(*at))));
     record.registration = RegistrationRecord::restored(report, track(&memory.closures, memory.closures_total));
     let last_received = memory.contact.last_received.map(Instant::from_micros);
-    record.restore_contact(memory.contact.status(), last_received, memory.contact.pause());
+    let faults = EquipmentFaults::decode(&[memory.faults]).unwrap_or_default();
+    let status = memory.contact.status().map(|(status, at)| (VehicleStatus { faults, ..status }, at));
+    record.restore_contact(status, last_received, memory.contact.pause());
     record.found = memory.contact.range();
     record.earlier.version_base = memory.map_version.saturating_add(1);
     let mut exemplars = ExemplarCache::default();

@@ -38,6 +38,7 @@ use scenecast_protocol::link::{Transmit, VehicleEvent, VehicleLink, Wakeup};
 use scenecast_protocol::map::ClassEntry;
 use scenecast_protocol::map_codec::Codec;
 use scenecast_protocol::time::Instant;
+use scenecast_protocol::wire::EquipmentFaults;
 use std::collections::VecDeque;
 use std::time::Duration;
 use storing::{Storing, WaitingMap};
@@ -90,6 +91,7 @@ pub struct Vehicle {
     outputs: VecDeque<VehicleOutput>,
     fixes_applied: u64,
     autopilot_silent: bool,
+    faults: EquipmentFaults,
     /// The codec of layers that are added.
     codec: Codec,
 }
@@ -128,6 +130,7 @@ impl Vehicle {
             outputs: VecDeque::new(),
             fixes_applied: 0,
             autopilot_silent: false,
+            faults: EquipmentFaults::default(),
             codec: Codec::Auto,
         };
         if vehicle.utility.is_none() && vehicle.durable.utility.take().is_some() {
@@ -173,6 +176,11 @@ impl Vehicle {
     /// Sets whether the autopilot does not answer; the next status reports it.
     pub fn set_autopilot_silent(&mut self, is_silent: bool) {
         self.autopilot_silent = is_silent;
+    }
+
+    /// Sets the faults of the equipment; the next status reports them.
+    pub fn set_faults(&mut self, faults: EquipmentFaults) {
+        self.faults = faults;
     }
 
     /// Sets the state of the disk; the next status reports it.

@@ -111,6 +111,7 @@ impl Vehicle {
             path: self.guidance.path().clone(),
             intent: self.guidance.intent(),
             registration: self.registration.report(),
+            faults: self.faults,
             trail: self.track.corners(self.navigator.position(), now),
             epoch: self.storing.epoch(),
             labels: self.publisher.labels(),

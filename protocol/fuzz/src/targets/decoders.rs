@@ -11,8 +11,8 @@ use scenecast_protocol::object::{MAX_OBJECT, ObjectReceiver, Part, Received};
 use scenecast_protocol::seal::{Direction, MissionKey};
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::{
-    AckStatement, Address, Envelope, Frame, FrameBuilder, FrameKind, Header, Intent, Introduction, MAX_WINDOW,
-    MissionId, Reader, RegistrationReport, Seal, SessionId, Stamp, Trail, VehicleStatus,
+    AckStatement, Address, Envelope, EquipmentFaults, Frame, FrameBuilder, FrameKind, Header, Intent, Introduction,
+    MAX_WINDOW, MissionId, Reader, RegistrationReport, Seal, SessionId, Stamp, Trail, VehicleStatus,
 };
 use std::time::Duration;
 
@@ -156,6 +156,9 @@ pub fn status(data: &[u8]) {
     }
     if let Ok(registration) = RegistrationReport::decode(data) {
         assert_eq!(registration.encode(), data);
+    }
+    if let Ok(faults) = EquipmentFaults::decode(data) {
+        assert_eq!(EquipmentFaults::decode(&faults.encode()), Ok(faults));
     }
     let (mut pose, mut report) = (VehicleStatus::default(), VehicleStatus::default());
     if pose.read_pose(data).is_ok() {

@@ -102,7 +102,9 @@ impl StatusSender {
         // The path, the registration and the trail may take a hundredth of the budget each.
         let share = (period.as_secs_f64() * f64::from(status.budget_bps) / 800.0) as usize;
         let intent = status.intent.map(Intent::encode);
-        let mut length = push_before_pose(builder, ChunkKind::Intent, intent, usize::MAX);
+        let faults = status.faults.is_any().then(|| status.faults.encode());
+        let mut length = push_before_pose(builder, ChunkKind::Faults, faults, usize::MAX);
+        length += push_before_pose(builder, ChunkKind::Intent, intent, usize::MAX);
         let registration = status.registration.map(|report| report.encode());
         length += push_before_pose(builder, ChunkKind::Registration, registration, share);
         let trail = self.trail(status, share.min(room_before_pose(builder.room())), now);

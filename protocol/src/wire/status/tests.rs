@@ -22,6 +22,7 @@ fn golden_bytes_of_a_status() {
         waypoint: None,
         path: PlannedPath::default(),
         registration: None,
+        faults: EquipmentFaults::default(),
         intent: None,
         trail: Vec::new(),
         explored_cells: 4000,

@@ -4,7 +4,7 @@ import { soundAlarm } from "../alarm.js";
 import { dismissEarlierMap, sendCommand } from "../api.js";
 import { hasCommand } from "../command.js";
 import { $, announce, h, keyed, show, text } from "../dom.js";
-import { freeSpace, missionTime, span } from "../format.js";
+import { ago, freeSpace, missionTime, span } from "../format.js";
 import { ageOf, isHeard, isSilent, store } from "../store.js";
 import { retryNow } from "../feed.js";
 
@@ -37,6 +37,7 @@ function current() {
     if (v.link.mismatch) found.push(mismatched(v));
     if (unknownOrders(v).length > 0) found.push(unknownInForce(v));
     if (v.map.earlier) found.push(earlier(v));
+    if (v.status?.faults?.some((fault) => fault.is_grave)) found.push(faulty(v));
     if (v.status?.disk?.journal_refused || v.status?.disk?.checkpoint_refused) found.push(refusingVehicle(v));
   }
   if (store.snapshot?.storage?.failing) found.push(refusing(store.snapshot.storage));
@@ -65,6 +66,12 @@ function silent(v) {
 
 function outdated(v) {
   return { key: `map-${v.id}`, kind: "warn", head: `The map of ${v.name} is not up to date`, body: `${store.mapFaults.get(v.id)}.` };
+}
+
+/** Equipment fails with which the survey does not proceed as planned. */
+function faulty(v) {
+  const grave = v.status.faults.filter((fault) => fault.is_grave).map((fault) => fault.text);
+  return { key: `fault-${v.id}`, kind: "warn", head: `${v.name}: ${grave.join(", ")}`, body: `As reported ${ago(ageOf(v.status.at_s))}.` };
 }
 
 /** A setting differs at both ends, or somebody else transmits under the vehicle's address. */

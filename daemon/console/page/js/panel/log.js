@@ -5,7 +5,7 @@ import { $, fill, h, show, text } from "../dom.js";
 import { missionTime } from "../format.js";
 import { store } from "../store.js";
 
-const KINDS = { order: "Orders", answer: "Answers", contact: "Contact", mode: "Modes", label: "New labels", image: "Images", record: "Names, notes, markers", command: "Command" };
+const KINDS = { order: "Orders", answer: "Answers", contact: "Contact", mode: "Modes", label: "New labels", image: "Images", record: "Names, notes, markers", command: "Command", fault: "Faults" };
 /** As many as the surface keeps. */
 const MAX_ENTRIES = 2000;
 const MAX_SHOWN = 300;

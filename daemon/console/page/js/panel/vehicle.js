@@ -15,7 +15,7 @@ const mode = h("span.mode");
 const age = h("p.age", { title: "The age of the last report, the time since the last frame, and the longest usual pause between two frames" });
 /** Free space in bytes below which the panel warns. */
 const LOW_SPACE = 1e9;
-const WHOLE_LINES = ["registration", "path", "cells", "disk"];
+const WHOLE_LINES = ["faults", "registration", "path", "cells", "disk"];
 const values = {};
 const lines = {};
 const list = h("dl.values");
@@ -24,6 +24,7 @@ const noOrders = h("p.note", {}, "No order sent yet.");
 
 export function startVehicle() {
   for (const [key, name, hint] of [
+    ["faults", "Faults", "Equipment of the vehicle that fails, by its last report: autopilot, camera, navigation, labels of other programs"],
     ["position", "East, north", "The position that the vehicle reported last, metres east and north of the origin"],
     ["depth", "Depth", "The depth of the vehicle below the surface of the water"],
     ["heading", "Heading", "The direction of the vehicle's bow, clockwise from north"],
@@ -58,6 +59,9 @@ function update() {
   mode.dataset.mode = s?.mode ?? "none";
   $("vehicle").classList.toggle("stale", isStale(v));
   text(age, s ? `Status ${span(ageOf(s.at_s))} old \u00b7 received ${ago(ageOf(v.last_received_s))}, due every ${span(v.expected_interval_s)}` : "No status received yet.");
+  values.faults(s?.faults.map((fault) => fault.text).join(", ") ?? "");
+  show(lines.faults, Boolean(s?.faults.length));
+  lines.faults.classList.add("warn");
   values.position(s ? inWorld(v, s.x_m, s.y_m).map((m) => metres(m)).join(", ") : none);
   values.depth(s ? metres(-s.z_m) : none);
   values.heading(s ? degrees(s.heading_deg) : none);

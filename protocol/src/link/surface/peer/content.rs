@@ -10,7 +10,9 @@ use crate::map::{ClassChunk, ClassReplica, LayerChunk, StateReplica};
 use crate::object::{ObjectReceiver, Part, Received};
 use crate::schedule::Class;
 use crate::time::Instant;
-use crate::wire::{Address, Chunk, ChunkKind, Chunks, Intent, RegistrationReport, Trail, VehicleStatus};
+use crate::wire::{
+    Address, Chunk, ChunkKind, Chunks, EquipmentFaults, Intent, RegistrationReport, Trail, VehicleStatus,
+};
 use std::collections::VecDeque;
 
 /// The result of handling a chunk.
@@ -132,6 +134,7 @@ impl<R: StateReplica> PeerContent<R> {
             ChunkKind::Pose => accepted_if(self.status.read_pose(chunk.payload, number, now)),
             ChunkKind::Intent => accepted_if(self.status.read_intent(chunk.payload, number)),
             ChunkKind::Registration => accepted_if(self.status.read_registration(chunk.payload, number)),
+            ChunkKind::Faults => accepted_if(self.status.read_faults(chunk.payload, number)),
             ChunkKind::Trail => accepted_if(self.status.read_trail(chunk.payload, number)),
             ChunkKind::Report => self.handle_report(chunk.payload, stats, now),
             ChunkKind::Object => accepted_if(self.handle_object(vehicle, chunk.payload, events)),
@@ -183,7 +186,7 @@ pub(super) fn class_of(chunk: &Chunk<'_>) -> Class {
     match chunk.kind {
         ChunkKind::Map | ChunkKind::LabelClass => Class::Map,
         ChunkKind::Pose | ChunkKind::Trail | ChunkKind::Intent | ChunkKind::Registration => Class::Status,
-        ChunkKind::Report | ChunkKind::InForce => Class::Status,
+        ChunkKind::Report | ChunkKind::InForce | ChunkKind::Faults => Class::Status,
         ChunkKind::Slot | ChunkKind::Inquiry => Class::Directive,
         ChunkKind::Introduction => Class::Overhead,
         ChunkKind::Object => Class::Exemplar,
@@ -198,6 +201,7 @@ fn decode<R: StateReplica>(replica: &R, layers: &Layers, base: FrameNumber, mut 
         ChunkKind::LabelClass => ClassChunk::decode(chunk.payload).is_some(),
         ChunkKind::Intent => Intent::decode(chunk.payload).is_ok(),
         ChunkKind::Registration => RegistrationReport::decode(chunk.payload).is_ok(),
+        ChunkKind::Faults => EquipmentFaults::decode(chunk.payload).is_ok(),
         ChunkKind::Trail => Trail::decode(chunk.payload).is_ok(),
         ChunkKind::Report => VehicleStatus::default().read_report(chunk.payload).is_ok(),
         ChunkKind::Object => Part::decode(chunk.payload).is_ok(),

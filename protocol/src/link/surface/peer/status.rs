@@ -3,7 +3,7 @@
 use crate::directive::{SlotId, SlotReport, SlotState};
 use crate::link::FrameNumber;
 use crate::time::Instant;
-use crate::wire::{Intent, PlannedPath, RegistrationReport, Trail, VehicleStatus};
+use crate::wire::{EquipmentFaults, Intent, PlannedPath, RegistrationReport, Trail, VehicleStatus};
 
 /// The pose and the report of a vehicle, of which one may come in before the other.
 #[derive(Debug, Default)]
@@ -14,6 +14,7 @@ pub(super) struct StatusParts {
     trail: BeforePose<Trail>,
     intent: BeforePose<Intent>,
     registration: BeforePose<RegistrationReport>,
+    faults: BeforePose<EquipmentFaults>,
     has_report: bool,
     whole: Option<(VehicleStatus, Instant)>,
 }
@@ -66,6 +67,7 @@ impl StatusParts {
                 read.trail = trail.corners(read.position);
             }
             (read.intent, read.registration) = (self.intent.take(number), self.registration.take(number));
+            read.faults = self.faults.take(number).unwrap_or_default();
             (self.latest, self.pose) = (read, Some((now, number)));
         }
         self.join();
@@ -85,6 +87,11 @@ impl StatusParts {
     /// Reads a registration, which waits for the pose of its frame; returns whether it makes sense.
     pub(super) fn read_registration(&mut self, payload: &[u8], number: FrameNumber) -> bool {
         self.registration.put(RegistrationReport::decode(payload).ok(), number)
+    }
+
+    /// Reads faults, which wait for the pose of their frame; returns whether they make sense.
+    pub(super) fn read_faults(&mut self, payload: &[u8], number: FrameNumber) -> bool {
+        self.faults.put(EquipmentFaults::decode(payload).ok(), number)
     }
 
     /// Reads a report; returns whether it makes sense.

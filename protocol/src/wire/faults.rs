@@ -1,0 +1,102 @@
+//! The faults of a vehicle's equipment.
+
+use super::status::StatusError;
+
+/// The equipment of the vehicle that fails at the time of the pose of the same frame.
+///
+/// ```text
+/// bit  field               1 means
+///  0   camera silent       no image comes in: the camera is lost or stalled
+///  1   images dropped      an image was dropped within the last 10 s
+///  2   poses missing       no pose comes in from the navigation source, so the vehicle holds its position
+///  3   poses faulty        within the last 10 s, the navigation source gave a pose that could not be used
+///  4   autopilot refuses   it answers and does not follow: it is disarmed, in a mode of the pilot's, or has another target
+///  5   labels refused      within the last 10 s, an input of labels or bands was refused, or its source was lost
+///  6-7 reserved            0, not read
+/// ```
+///
+/// Source: vehicle, in the frame of a pose and before it, while there is a fault. The first bit is the highest.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct EquipmentFaults {
+    /// No image comes in.
+    pub camera_silent: bool,
+    /// An image was dropped within the last 10 s.
+    pub images_dropped: bool,
+    /// No pose comes in from the navigation source.
+    pub poses_missing: bool,
+    /// Within the last 10 s, the navigation source gave a pose that could not be used.
+    pub poses_faulty: bool,
+    /// The autopilot answers and does not follow the vehicle's waypoints.
+    pub autopilot_refuses: bool,
+    /// Within the last 10 s, an input of labels or bands was refused, or its source was lost.
+    pub labels_refused: bool,
+}
+
+impl EquipmentFaults {
+    /// Bytes on the wire.
+    pub const BYTES: usize = 1;
+
+    /// Whether there is a fault.
+    pub fn is_any(self) -> bool {
+        self != Self::default()
+    }
+
+    /// The faults for people, the gravest first, and whether the survey does not proceed with it as planned.
+    pub fn iter(self) -> impl Iterator<Item = (&'static str, bool)> {
+        [
+            (self.autopilot_refuses, "the autopilot does not follow", true),
+            (self.poses_missing, "no pose comes in", true),
+            (self.camera_silent, "no image comes in", true),
+            (self.poses_faulty, "poses cannot be used", false),
+            (self.images_dropped, "images are dropped", false),
+            (self.labels_refused, "labels of other programs are refused", false),
+        ]
+        .into_iter()
+        .filter_map(|(is_set, text, is_grave)| is_set.then_some((text, is_grave)))
+    }
+
+    /// The byte on the wire.
+    pub fn encode(self) -> [u8; Self::BYTES] {
+        let Self { camera_silent, images_dropped, poses_missing, poses_faulty, autopilot_refuses, labels_refused } =
+            self;
+        let bits = [camera_silent, images_dropped, poses_missing, poses_faulty, autopilot_refuses, labels_refused];
+        [bits.iter().fold(0, |byte, bit| byte << 1 | u8::from(*bit)) << 2]
+    }
+
+    /// Reads the byte of the wire; its reserved bits are not read, so that a later vehicle may set them.
+    pub fn decode(bytes: &[u8]) -> Result<Self, StatusError> {
+        let &[byte] = bytes else { return Err(StatusError::Length) };
+        let bit = |index: u8| byte & 0x80 >> index != 0;
+        Ok(Self {
+            camera_silent: bit(0),
+            images_dropped: bit(1),
+            poses_missing: bit(2),
+            poses_faulty: bit(3),
+            autopilot_refuses: bit(4),
+            labels_refused: bit(5),
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn golden_bytes_of_faults() {
+        let faults = EquipmentFaults { camera_silent: true, autopilot_refuses: true, ..EquipmentFaults::default() };
+        assert_eq!(faults.encode(), [0b1000_1000]);
+        assert_eq!(EquipmentFaults::decode(&[0b1000_1011]), Ok(faults), "reserved bits are not read");
+        assert_eq!(EquipmentFaults::decode(&[]), Err(StatusError::Length));
+        assert_eq!(EquipmentFaults::decode(&[0, 0]), Err(StatusError::Length));
+        assert!(faults.is_any() && !EquipmentFaults::default().is_any());
+    }
+
+    #[test]
+    fn each_byte_of_known_bits_is_read_back() {
+        for byte in (0..=255_u8).step_by(4) {
+            let faults = EquipmentFaults::decode(&[byte]).unwrap();
+            assert_eq!((faults.encode(), faults.iter().count() as u32), ([byte], byte.count_ones()));
+        }
+    }
+}
