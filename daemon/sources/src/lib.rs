@@ -10,7 +10,11 @@ mod dvl;
 mod live;
 mod picture;
 #[cfg(feature = "ros2")]
-mod ros2;
+mod ros_camera;
+#[cfg(feature = "ros2")]
+mod ros_navigation;
+#[cfg(feature = "ros2")]
+mod ros_node;
 mod tum_poses;
 mod watch;
 
@@ -20,6 +24,10 @@ pub use dvl::DvlSource;
 pub use live::{LiveSource, Reading, SensorKind, SensorSource, SourceError, SourceImage, SourceReport};
 pub use picture::Picture;
 #[cfg(feature = "ros2")]
-pub use ros2::{RosCamera, RosNavigation, SensorNode};
+pub use ros_camera::RosCamera;
+#[cfg(feature = "ros2")]
+pub use ros_navigation::RosNavigation;
+#[cfg(feature = "ros2")]
+pub use ros_node::SensorNode;
 pub use tum_poses::read_tum_poses;
 pub use watch::WatchSource;

@@ -2,9 +2,11 @@
 
 mod down;
 mod pinhole;
+mod view;
 
 pub use down::{DownCamera, Pose};
 pub use pinhole::{CameraPose, DepthImage, PinholeCamera, Projected};
+pub use view::{Floor, View};
 
 /// A visual word at a position in the world: metres in a local east-north-up frame.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -83,17 +83,20 @@ impl PinholeCamera {
         words.iter().map(|word| self.place(word, metres, pose)).collect()
     }
 
+    /// The direction of a pixel in the camera's axes, of length 1 along the optical axis.
+    pub(super) fn ray(&self, u: f64, v: f64) -> [f64; 3] {
+        [(u - self.cx) / self.fx, (v - self.cy) / self.fy, 1.0]
+    }
+
     fn place(&self, word: &Word, metres: f64, pose: &CameraPose) -> Observation {
-        let right = (f64::from(word.u) - self.cx) / self.fx * metres;
-        let down = (f64::from(word.v) - self.cy) / self.fy * metres;
-        let [x, y, z] = pose.transform([right, down, metres]);
+        let [x, y, z] = pose.transform(self.ray(word.u.into(), word.v.into()).map(|part| part * metres));
         Observation { word: word.id, x, y, z }
     }
 }
 
 impl CameraPose {
     /// Transforms a point from the camera's axes to the world, metres.
-    fn transform(&self, point: [f64; 3]) -> [f64; 3] {
+    pub(super) fn transform(&self, point: [f64; 3]) -> [f64; 3] {
         let [x, y, z, w] = self.rotation;
         let scale = 2.0 / (x * x + y * y + z * z + w * w);
         let rows = [
@@ -108,6 +111,18 @@ impl CameraPose {
 }
 
 impl DepthImage {
+    /// Returns the median of every seventh reading, metres; `None` without readings.
+    #[must_use]
+    pub fn median_m(&self) -> Option<f64> {
+        let readings = || self.metres.iter().copied().filter(|metres| metres.is_finite() && *metres > 0.0);
+        let mut some: Vec<f32> = readings().step_by(7).collect();
+        if some.is_empty() {
+            return None;
+        }
+        let middle = some.len() / 2;
+        Some(f64::from(*some.select_nth_unstable_by(middle, f32::total_cmp).1))
+    }
+
     /// The reading at a position given as shares of width and height.
     fn at(&self, across: f32, down: f32) -> Option<f64> {
         if !(0.0..1.0).contains(&across) || !(0.0..1.0).contains(&down) {

@@ -1,41 +1,14 @@
-//! Cameras and odometry of ROS 2.
+//! Cameras of ROS 2.
 
 use crate::live::{Reading, SensorKind, SensorSource, SourceError, SourceImage};
+use crate::ros_node::{Counted, SensorNode, parsed};
 use crate::{ArrivalClock, Picture};
-use scenecast_config::{Ros2, RosName};
-use scenecast_messages::nav_msgs::Odometry;
 use scenecast_messages::sensor_msgs::{CompressedImage, Image};
 use scenecast_messages::std_msgs::Header;
-use scenecast_ros2::{Inbox, RosNode, topic};
-use scenecast_sensors::{CameraFault, Stamp, pose_of, rgb_of, stamp_of};
-use std::sync::{Arc, Mutex, PoisonError};
+use scenecast_ros2::Inbox;
+use scenecast_sensors::{CameraFault, Stamp, rgb_of, stamp_of};
+use std::sync::Arc;
 use std::time::Duration;
-
-fn parsed(name: &str) -> Result<RosName, SourceError> {
-    topic(name).map_err(|error| SourceError(error.to_string()))
-}
-
-/// The node of the sensors, which starts when the first of them is opened.
-pub struct SensorNode {
-    settings: Ros2,
-    node: Mutex<Option<Arc<RosNode>>>,
-}
-
-impl SensorNode {
-    pub fn new(settings: &Ros2) -> Self {
-        Self { settings: settings.clone(), node: Mutex::default() }
-    }
-
-    fn get(&self) -> Result<Arc<RosNode>, SourceError> {
-        let mut node = self.node.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(node) = &*node {
-            return Ok(node.clone());
-        }
-        let started = RosNode::start(&self.settings, "scenecast_sensors");
-        let started = Arc::new(started.map_err(|error| SourceError(error.to_string()))?);
-        Ok(node.insert(started).clone())
-    }
-}
 
 /// The topic of a camera: of `sensor_msgs/msg/CompressedImage` if its name ends in `/compressed`, or else of
 /// `sensor_msgs/msg/Image`.
@@ -54,35 +27,8 @@ enum CameraInbox {
     Compressed(Inbox<CompressedImage>),
 }
 
-/// Messages of an inbox that are already reported as faults.
-#[derive(Debug, Default)]
-struct Counted {
-    dropped: u64,
-    malformed: u64,
-}
-
-impl Counted {
-    /// Reports the messages since the last call that the inbox has dropped, as `lost`, and those of another type, as `wrong`.
-    fn report<M>(
-        &mut self,
-        inbox: &Inbox<M>,
-        lost: (CameraFault, &str),
-        wrong: CameraFault,
-        fault: &mut dyn FnMut(CameraFault, String),
-    ) {
-        let now = Self { dropped: inbox.dropped(), malformed: inbox.malformed() };
-        let before = std::mem::replace(self, now);
-        (before.dropped..self.dropped).for_each(|_| fault(lost.0, lost.1.to_owned()));
-        let text = "the message has another type than the topic";
-        (before.malformed..self.malformed).for_each(|_| fault(wrong, text.to_owned()));
-    }
-}
-
 /// An image that a newer one displaced in its inbox.
 const OVERTAKEN: (CameraFault, &str) = (CameraFault::Overtaken, "a newer message came before it was read");
-
-/// A pose that was displaced in its inbox.
-const LOST_POSE: (CameraFault, &str) = (CameraFault::UnusablePose, "a pose was dropped: the vehicle was busy");
 
 impl RosCamera {
     pub fn new(node: Arc<SensorNode>, topic: &str, clock: ArrivalClock, needs_stamps: bool) -> Self {
@@ -158,57 +104,6 @@ impl SensorSource for RosCamera {
 
     fn is_reopened_after_stall(&self) -> bool {
         // The subscription finds a publisher that comes back.
-        false
-    }
-
-    fn close(&mut self) {
-        self.inbox = None;
-    }
-}
-
-/// A topic of `nav_msgs/msg/Odometry` in a frame of east, north, up.
-pub struct RosNavigation {
-    node: Arc<SensorNode>,
-    topic: String,
-    inbox: Option<Inbox<Odometry>>,
-    counted: Counted,
-}
-
-impl RosNavigation {
-    pub fn new(node: Arc<SensorNode>, topic: &str) -> Self {
-        Self { node, topic: topic.to_owned(), inbox: None, counted: Counted::default() }
-    }
-}
-
-impl SensorSource for RosNavigation {
-    fn kind(&self) -> SensorKind {
-        SensorKind::Navigation
-    }
-
-    fn open(&mut self) -> Result<(), SourceError> {
-        let inbox = self.node.get()?.subscribe_odometry(&parsed(&self.topic)?);
-        self.inbox = Some(inbox.map_err(|error| SourceError(error.to_string()))?);
-        Ok(())
-    }
-
-    fn next(
-        &mut self,
-        timeout: Duration,
-        fault: &mut dyn FnMut(CameraFault, String),
-    ) -> Result<Option<Reading>, SourceError> {
-        let Some(inbox) = &self.inbox else { return Err(SourceError("the topic is not open".to_owned())) };
-        inbox.wait(timeout);
-        self.counted.report(inbox, LOST_POSE, CameraFault::UnusablePose, fault);
-        let Some(received) = inbox.take() else { return Ok(None) };
-        let pose = pose_of(&received.message);
-        if pose.is_none() {
-            let text = "odometry without a time, or whose quaternion has not the length 1".to_owned();
-            fault(CameraFault::UnusablePose, text);
-        }
-        Ok(pose.map(|(stamp, pose)| Reading::Pose(stamp, pose)))
-    }
-
-    fn is_reopened_after_stall(&self) -> bool {
         false
     }
 
