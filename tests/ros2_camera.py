@@ -1,10 +1,11 @@
 """Publishes a recorded folder as a robot's camera and odometry would come, by Cyclone DDS without a ROS installation.
 
-Usage: ros2_camera.py FOLDER --domain N [--pace S] [--compressed] [--rest S] [--rows FROM:TO] [--faulty]
+Usage: ros2_camera.py FOLDER --domain N [--pace S] [--compressed] [--rest S] [--rows FROM:TO] [--faulty] [--transforms]
 
 The folder has poses.csv with t_s, file, x_m, y_m, depth_m and heading_deg. Each image has the stamp t_s + 1000 s; its
 odometry is published a moment later, as estimators do. With --faulty, wrong images come between the good ones, and some good ones
-have 16 bits a channel.
+have 16 bits a channel. With --transforms, the poses are transforms from map to odom and from there to base_link; one from
+world to map, which stays, is published before.
 """
 
 import argparse
@@ -22,9 +23,13 @@ from ros2_messages import (  # first: it sets the network of Cyclone DDS
     Pose,
     PoseWithCovariance,
     Quaternion,
+    TFMessage,
     Time,
+    Transform,
+    TransformStamped,
     Twist,
     TwistWithCovariance,
+    Vector3,
 )
 from cyclonedds.core import Policy, Qos
 from cyclonedds.domain import DomainParticipant
@@ -49,6 +54,25 @@ def odometry(row):
     place = Point(float(row["x_m"]), float(row["y_m"]), -float(row["depth_m"]))
     pose = PoseWithCovariance(Pose(place, turn), [0.0] * 36)
     return Odometry(header(float(row["t_s"]), "odom"), "base_link", pose, STILL)
+
+
+def link(head, child, place, turn):
+    return TransformStamped(head, child, Transform(Vector3(place.x, place.y, place.z), turn))
+
+
+def transforms(row):
+    pose = odometry(row).pose.pose
+    t_s, still = float(row["t_s"]), Quaternion(0.0, 0.0, 0.0, 1.0)
+    to_odom = link(header(t_s - 0.1, "map"), "odom", Point(0.0, 0.0, 0.0), still)
+    return TFMessage([to_odom, link(header(t_s, "odom"), "base_link", pose.position, pose.orientation)])
+
+
+def write_static(participant):
+    lasting = Qos(Policy.Reliability.Reliable(duration(seconds=1)), Policy.Durability.TransientLocal, Policy.History.KeepLast(1))
+    writer = DataWriter(participant, Topic(participant, "rt/tf_static", TFMessage), qos=lasting)
+    still = Quaternion(0.0, 0.0, 0.0, 1.0)
+    writer.write(TFMessage([link(Header(Time(0, 0), "world"), "map", Point(0.0, 0.0, 0.0), still)]))
+    return writer
 
 
 def faulty(number, t_s, picture):
@@ -85,6 +109,7 @@ def main():
     parser.add_argument("--rest", type=float, default=5.0)
     parser.add_argument("--rows", default=":")
     parser.add_argument("--faulty", action="store_true")
+    parser.add_argument("--transforms", action="store_true")
     options = parser.parse_args()
     begin, end = (int(part) if part else None for part in options.rows.split(":"))
     rows = list(csv.DictReader(open(options.folder / "poses.csv", newline="")))[begin:end]
@@ -92,7 +117,9 @@ def main():
     reliable = Qos(Policy.Reliability.Reliable(duration(seconds=1)), Policy.History.KeepLast(5))
     kind, name = (CompressedImage, "rt/camera/image_raw/compressed") if options.compressed else (Image, "rt/camera/image_raw")
     images = DataWriter(participant, Topic(participant, name, kind), qos=reliable)
-    poses = DataWriter(participant, Topic(participant, "rt/odometry", Odometry), qos=reliable)
+    kind, name = (TFMessage, "rt/tf") if options.transforms else (Odometry, "rt/odometry")
+    poses = DataWriter(participant, Topic(participant, name, kind), qos=reliable)
+    lasting = write_static(participant) if options.transforms else None
     wait_for_reader(images)
     wait_for_reader(poses)
     time.sleep(0.5)
@@ -111,9 +138,10 @@ def main():
                 images.write(Image(head, picture.height, picture.width, "rgb16", 1, 6 * picture.width, doubled))
             else:
                 images.write(Image(head, picture.height, picture.width, "rgb8", 0, 3 * picture.width, picture.tobytes()))
-        poses.write(odometry(row))
+        poses.write(transforms(row) if options.transforms else odometry(row))
         time.sleep(options.pace)
     time.sleep(options.rest)
+    del lasting
 
 
 main()

@@ -121,12 +121,12 @@ fn domain(offset: u32) -> u32 {
     1 + (std::process::id() * 3 + offset) % 95
 }
 
-fn assert_topics_give_the_map(name: &str, domain: u32, topic: &str, publishers: &[&[&str]]) {
+fn assert_topics_give_the_map(name: &str, domain: u32, (topic, poses): (&str, &str), publishers: &[&[&str]]) {
     let Some(python) = python() else { return };
     let dive = Dive::with_settings(name, &|_| {
         vec![
             format!("camera.source=ros2:{topic}"),
-            "navigation.source=ros2:/odometry".to_owned(),
+            format!("navigation.source={poses}"),
             format!("ros2.domain={domain}"),
             "ros2.networks=[\"127.0.0.1\"]".to_owned(),
         ]
@@ -140,20 +140,34 @@ fn assert_topics_give_the_map(name: &str, domain: u32, topic: &str, publishers: 
     dive.assert_map_of_the_rehearsal();
 }
 
+/// Raw images, and their odometry.
+const TOPICS: (&str, &str) = ("/camera/image_raw", "ros2:/odometry");
+
 #[test]
 fn topics_of_cyclone_dds_give_the_map_of_the_recording() {
-    assert_topics_give_the_map("ros2", domain(0), "/camera/image_raw", &[&[]]);
+    assert_topics_give_the_map("ros2", domain(0), TOPICS, &[&[]]);
+}
+
+#[test]
+fn transforms_of_ros_give_the_map_of_the_recording() {
+    let topics = ("/camera/image_raw", "tf:world#base_link");
+    assert_topics_give_the_map("ros2-transforms", domain(5), topics, &[&["--transforms"]]);
 }
 
 #[test]
 fn wrong_images_and_a_restarted_publisher_leave_the_map_as_it_is() {
     let runs: [&[&str]; 2] = [&["--faulty", "--rows", ":15", "--rest", "0"], &["--faulty", "--rows", "15:"]];
-    assert_topics_give_the_map("ros2-faults", domain(2), "/camera/image_raw", &runs);
+    assert_topics_give_the_map("ros2-faults", domain(2), TOPICS, &runs);
 }
 
 #[test]
 fn compressed_topics_of_cyclone_dds_give_the_map_of_the_recording() {
-    assert_topics_give_the_map("ros2-compressed", domain(1), "/camera/image_raw/compressed", &[&["--compressed"]]);
+    assert_topics_give_the_map(
+        "ros2-compressed",
+        domain(1),
+        ("/camera/image_raw/compressed", TOPICS.1),
+        &[&["--compressed"]],
+    );
 }
 
 /// A bag of the recording, which rosbags writes; `None` without Python.

@@ -53,6 +53,11 @@ fn check_ports(config: &Config) -> Result<(), UserError> {
 
 /// The images of a live camera need poses and the pace of real time.
 fn check_camera(config: &Config) -> Result<(), UserError> {
+    if let (NavigationSource::Tf(given), None) = (&config.navigation.source, config.navigation.source.frames()) {
+        return Err(UserError::Input(format!(
+            "navigation.source = \"tf:{given}\" is not allowed: it takes two frames, as in \"tf:map#base_link\""
+        )));
+    }
     if !config.camera.source.is_live() {
         return check_navigation(config);
     }
@@ -82,13 +87,13 @@ fn check_navigation(config: &Config) -> Result<(), UserError> {
     let (name, given, allowed) = match &config.navigation.source {
         NavigationSource::Autopilot => return Ok(()),
         NavigationSource::Tum(_) => ("camera.source", camera(config), "a live camera"),
-        NavigationSource::Dvl(_) | NavigationSource::Ros2(_) if !is_own => {
+        source if source.is_live() && !is_own => {
             ("camera.source", camera(config), "a live camera or \"\", as recordings have poses of their own")
         }
-        NavigationSource::Dvl(_) | NavigationSource::Ros2(_) if config.runtime.time_scale != 1.0 => {
+        source if source.is_live() && config.runtime.time_scale != 1.0 => {
             ("runtime.time_scale", config.runtime.time_scale.to_string(), "1")
         }
-        NavigationSource::Dvl(_) | NavigationSource::Ros2(_) => return Ok(()),
+        NavigationSource::Dvl(_) | NavigationSource::Ros2(_) | NavigationSource::Tf(_) => return Ok(()),
     };
     let text = format!("{name} = {given} is not allowed with navigation.source = {source}; allowed: {allowed}");
     Err(UserError::Input(text))
@@ -166,6 +171,8 @@ mod tests {
         assert!(load(&["navigation.source=ros2:/odometry", "camera.source=bag:x"]).is_ok());
         assert!(refused(&[dvl, "camera.source=frames:x"]).contains("camera.source = \"frames:x\" is not allowed"));
         assert!(refused(&[dvl, "runtime.time_scale=5"]).ends_with("allowed: 1"));
+        assert!(load(&["navigation.source=tf:map#base_link", "camera.source=watch:x"]).is_ok());
+        assert!(refused(&["navigation.source=tf:map", "camera.source=watch:x"]).contains("two frames"));
         assert!(refused(&["navigation.source=tum:x"]).ends_with("allowed: a live camera"));
     }
 }

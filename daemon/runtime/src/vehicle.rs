@@ -67,8 +67,7 @@ pub fn run_vehicle(load: Load, simulated: Option<SimulatedAutopilot>) -> Result<
         }
         let is_recorded = recording.is_some();
         // Without a camera, poses of a navigation source move the vehicle.
-        let is_live = config.camera.source.is_live()
-            || !is_recorded && matches!(config.navigation.source, NavigationSource::Dvl(_) | NavigationSource::Ros2(_));
+        let is_live = config.camera.source.is_live() || !is_recorded && config.navigation.source.is_live();
         let camera = match is_live {
             // The time since the end of the former run is unknown.
             true => Camera::Live(Box::new(LiveCamera::start(

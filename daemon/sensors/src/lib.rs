@@ -7,6 +7,7 @@
 //! | compressed images become RGB, and say when they were taken | [`decode`], [`own_stamp`] |
 //! | quaternions become headings and tilts | [`Rotation`] |
 //! | messages of ROS 2 become images and poses | [`rgb_of`], [`pose_of`] |
+//! | transforms of ROS 2 become poses | [`TransformTree`] |
 //! | lines of a Doppler velocity log become poses | [`DvlReport`], [`DvlTrack`] |
 //! | poses are interpolated at the time of an image | [`PoseTrack`] |
 //! | the pose of a vehicle becomes that of its camera | [`CameraMounting`] |
@@ -26,6 +27,7 @@ mod raw_image;
 mod ros_messages;
 mod rotation;
 mod stamp;
+mod transforms;
 
 pub use camera_tally::{CameraFault, CameraTally};
 pub use compressed::{DecodeError, MAX_PIXELS, decode, is_cut_jpeg, own_stamp};
@@ -38,3 +40,4 @@ pub use raw_image::{RawImage, RawImageError};
 pub use ros_messages::{pose_of, rgb_of, stamp_of, stamp_of_cdr};
 pub use rotation::Rotation;
 pub use stamp::Stamp;
+pub use transforms::{TransformError, TransformTree};

@@ -9,6 +9,9 @@ pub struct Rotation {
 }
 
 impl Rotation {
+    /// No rotation.
+    pub const IDENTITY: Self = Self { rows: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]] };
+
     /// From a quaternion x, y, z, w; `None` unless its length is about 1.
     pub fn from_quaternion([x, y, z, w]: [f64; 4]) -> Option<Self> {
         let length = x * x + y * y + z * z + w * w;
@@ -28,6 +31,13 @@ impl Rotation {
     /// A vector of the body in east, north, up.
     pub fn apply(&self, vector: [f64; 3]) -> [f64; 3] {
         self.rows.map(|row| row.iter().zip(vector).map(|(a, b)| a * b).sum())
+    }
+
+    /// This rotation after the `first` one.
+    #[must_use]
+    pub fn after(&self, first: Self) -> Self {
+        let columns = [0, 1, 2].map(|column| self.apply(first.rows.map(|row| row[column])));
+        Self { rows: [0, 1, 2].map(|row| columns.map(|column| column[row])) }
     }
 
     /// The pose of a body at `place` (east, north, up), whose bow and starboard side are these vectors of its own axes.

@@ -15,6 +15,8 @@ mod ros_camera;
 mod ros_navigation;
 #[cfg(feature = "ros2")]
 mod ros_node;
+#[cfg(feature = "ros2")]
+mod ros_transforms;
 mod tum_poses;
 mod watch;
 
@@ -29,5 +31,7 @@ pub use ros_camera::RosCamera;
 pub use ros_navigation::RosNavigation;
 #[cfg(feature = "ros2")]
 pub use ros_node::SensorNode;
+#[cfg(feature = "ros2")]
+pub use ros_transforms::RosTransforms;
 pub use tum_poses::read_tum_poses;
 pub use watch::WatchSource;

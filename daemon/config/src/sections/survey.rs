@@ -52,7 +52,8 @@ section! {
         /// Source of the vehicle's pose. Empty: the autopilot, or the recording of the camera. tum:FILE: a file of poses with
         /// the times of the images. dvl:HOST:PORT: the dead reckoning of a Doppler velocity log of Water Linked (A50, A125),
         /// which begins at the origin of the map; the port is 16171. ros2:TOPIC: odometry of ROS 2 in a frame of east, north,
-        /// up. The autopilot, if there is one, then only follows waypoints.
+        /// up. tf:WORLD#VEHICLE: the transforms of ROS 2 on /tf and /tf_static between a frame of east, north, up and that of
+        /// the vehicle, as in tf:map#base_link. The autopilot, if there is one, then only follows waypoints.
         source: NavigationSource = NavigationSource::Autopilot, ANY, [Auv];
         /// Heading of the vehicle at the last reset of the velocity log's dead reckoning, clockwise from north.
         dvl_heading_deg: f64 = 0.0, range(-360.0, 360.0, "degrees"), [Auv];

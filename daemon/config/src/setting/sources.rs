@@ -96,6 +96,22 @@ sources! {
         Dvl(String) = "dvl" "HOST:PORT",
         /// A topic of odometry in ROS 2.
         Ros2(String) = "ros2" "TOPIC",
+        /// The transforms of ROS 2 between two frames.
+        Tf(String) = "tf" "WORLD#VEHICLE",
+    }
+}
+
+impl NavigationSource {
+    /// The frame of east, north, up and that of the vehicle between which transforms give the pose; `None` for other
+    /// sources, and if there are not two names.
+    pub fn frames(&self) -> Option<(&str, &str)> {
+        let Self::Tf(frames) = self else { return None };
+        frames.split_once('#').filter(|(world, vehicle)| !world.is_empty() && !vehicle.is_empty())
+    }
+
+    /// Whether poses come in while the vehicle dives, and not from its autopilot.
+    pub fn is_live(&self) -> bool {
+        matches!(self, Self::Dvl(_) | Self::Ros2(_) | Self::Tf(_))
     }
 }
 
@@ -120,6 +136,9 @@ mod tests {
         for wrong in ["frames", "frames:", "video:x", ":x"] {
             assert_eq!(CameraSource::read(&Value::String(wrong.to_owned()), &ANY), None, "{wrong}");
         }
-        assert_eq!(NavigationSource::allowed(&ANY), "\"tum:FILE\", \"dvl:HOST:PORT\", \"ros2:TOPIC\", or \"\"");
+        assert_eq!(
+            NavigationSource::allowed(&ANY),
+            "\"tum:FILE\", \"dvl:HOST:PORT\", \"ros2:TOPIC\", \"tf:WORLD#VEHICLE\", or \"\""
+        );
     }
 }

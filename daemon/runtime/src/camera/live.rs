@@ -95,6 +95,10 @@ impl LiveCamera {
                 None
             }
             NavigationSource::Ros2(topic) => Some(ros.navigation(topic, nav_stall).map_err(failed)?),
+            source @ NavigationSource::Tf(_) => {
+                let frames = source.frames().unwrap_or_default();
+                Some(ros.transforms(frames, nav_stall).map_err(failed)?)
+            }
             NavigationSource::Dvl(address) => {
                 let dvl = DvlSource::new(address, config.navigation.dvl_heading_deg.to_radians(), clock);
                 Some(LiveSource::start(dvl, nav_stall).map_err(failed)?)

@@ -9,7 +9,7 @@ pub(crate) use without::RosSensors;
 mod with {
     use scenecast_config::Config;
     use scenecast_core::UserError;
-    use scenecast_sources::{ArrivalClock, LiveSource, RosCamera, RosNavigation, SensorNode};
+    use scenecast_sources::{ArrivalClock, LiveSource, RosCamera, RosNavigation, RosTransforms, SensorNode};
     use std::sync::Arc;
     use std::time::Duration;
 
@@ -35,6 +35,10 @@ mod with {
         pub(crate) fn navigation(&self, topic: &str, stall: Duration) -> std::io::Result<LiveSource> {
             LiveSource::start(RosNavigation::new(self.0.clone(), topic), stall)
         }
+
+        pub(crate) fn transforms(&self, frames: (&str, &str), stall: Duration) -> std::io::Result<LiveSource> {
+            LiveSource::start(RosTransforms::new(self.0.clone(), frames), stall)
+        }
     }
 }
 
@@ -52,9 +56,9 @@ mod without {
     impl RosSensors {
         pub(crate) fn new(config: &Config) -> std::result::Result<Self, UserError> {
             let is_topic = matches!(config.camera.source, CameraSource::Ros2(_))
-                || matches!(config.navigation.source, NavigationSource::Ros2(_));
+                || matches!(config.navigation.source, NavigationSource::Ros2(_) | NavigationSource::Tf(_));
             if is_topic {
-                let text = "ros2:TOPIC is not allowed: this build has no ROS 2; build it with the feature ros2";
+                let text = "a source of ROS 2 is not allowed: this build has no ROS 2; build it with the feature ros2";
                 return Err(UserError::Input(text.to_owned()));
             }
             Ok(Self)
@@ -65,6 +69,10 @@ mod without {
         }
 
         pub(crate) fn navigation(&self, _: &str, _: Duration) -> Result<LiveSource> {
+            Err(Error::from(ErrorKind::Unsupported))
+        }
+
+        pub(crate) fn transforms(&self, _: (&str, &str), _: Duration) -> Result<LiveSource> {
             Err(Error::from(ErrorKind::Unsupported))
         }
     }

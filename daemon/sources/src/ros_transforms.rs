@@ -1,0 +1,102 @@
+//! The pose of a vehicle from the transforms of ROS 2.
+
+use crate::live::{Reading, SensorKind, SensorSource, SourceError};
+use crate::ros_node::{Counted, SensorNode, parsed};
+use scenecast_messages::tf2_msgs::TFMessage;
+use scenecast_ros2::Inbox;
+use scenecast_sensors::{CameraFault, TransformTree};
+use std::collections::VecDeque;
+use std::sync::Arc;
+use std::time::Duration;
+
+/// Transforms that were displaced in their inbox.
+const LOST: (CameraFault, &str) = (CameraFault::UnusablePose, "transforms were dropped: the vehicle was busy");
+/// Most poses of one message.
+const MAX_POSES: usize = 100;
+
+/// The topics `/tf` and `/tf_static`, and the two frames between which they give the pose.
+pub struct RosTransforms {
+    node: Arc<SensorNode>,
+    /// The frame of east, north, up, and that of the vehicle.
+    frames: (String, String),
+    tree: TransformTree,
+    inboxes: Option<(Inbox<TFMessage>, Inbox<TFMessage>)>,
+    counted: (Counted, Counted),
+    poses: VecDeque<Reading>,
+}
+
+impl RosTransforms {
+    /// `frames` are the name of the frame of east, north, up, and that of the vehicle.
+    pub fn new(node: Arc<SensorNode>, frames: (&str, &str)) -> Self {
+        Self {
+            node,
+            frames: (frames.0.to_owned(), frames.1.to_owned()),
+            tree: TransformTree::new(frames.0, frames.1),
+            inboxes: None,
+            counted: Default::default(),
+            poses: VecDeque::new(),
+        }
+    }
+
+    fn handle(&mut self, message: &TFMessage, is_static: bool, fault: &mut dyn FnMut(CameraFault, String)) {
+        for transform in &message.transforms {
+            match self.tree.handle(transform, is_static) {
+                Ok(Some((stamp, pose))) if self.poses.len() < MAX_POSES => {
+                    self.poses.push_back(Reading::Pose(stamp, pose));
+                }
+                Ok(_) => {}
+                Err(error) => fault(CameraFault::UnusablePose, error.to_string()),
+            }
+        }
+    }
+}
+
+impl SensorSource for RosTransforms {
+    fn kind(&self) -> SensorKind {
+        SensorKind::Navigation
+    }
+
+    fn open(&mut self) -> Result<(), SourceError> {
+        let node = self.node.get()?;
+        let failed = |error: scenecast_core::UserError| SourceError(error.to_string());
+        let changing = node.subscribe_tf(&parsed("/tf")?).map_err(failed)?;
+        let lasting = node.subscribe_static_tf(&parsed("/tf_static")?).map_err(failed)?;
+        self.inboxes = Some((changing, lasting));
+        self.tree = TransformTree::new(&self.frames.0, &self.frames.1);
+        Ok(())
+    }
+
+    fn next(
+        &mut self,
+        timeout: Duration,
+        fault: &mut dyn FnMut(CameraFault, String),
+    ) -> Result<Option<Reading>, SourceError> {
+        if let Some(pose) = self.poses.pop_front() {
+            return Ok(Some(pose));
+        }
+        let Some((changing, lasting)) = self.inboxes.take() else {
+            return Err(SourceError("the topics of the transforms are not open".to_owned()));
+        };
+        changing.wait(timeout);
+        self.counted.0.report(&changing, LOST, CameraFault::UnusablePose, fault);
+        self.counted.1.report(&lasting, LOST, CameraFault::UnusablePose, fault);
+        while let Some(received) = lasting.take() {
+            self.handle(&received.message, true, fault);
+        }
+        if let Some(received) = changing.take() {
+            self.handle(&received.message, false, fault);
+        }
+        self.inboxes = Some((changing, lasting));
+        Ok(self.poses.pop_front())
+    }
+
+    fn is_reopened_after_stall(&self) -> bool {
+        // The subscription finds a publisher that comes back.
+        false
+    }
+
+    fn close(&mut self) {
+        self.inboxes = None;
+        self.poses.clear();
+    }
+}
