@@ -10,8 +10,8 @@ use crate::names::remapped;
 use crate::qos::Qos;
 use crate::stop::Owned;
 use futures_util::StreamExt;
-use ros2_client::{Context, MessageTypeName, Name, Node, NodeName, NodeOptions, Subscription};
-use rustdds::{DomainParticipantBuilder, RTPSEntity};
+use ros2_client::{Context, MessageTypeName, Node, NodeName, NodeOptions, Subscription};
+use rustdds::{DomainParticipantBuilder, RTPSEntity, TopicKind};
 use scenecast_config::{Remap, Ros2, RosName};
 use scenecast_core::UserError;
 use scenecast_messages::Message;
@@ -173,10 +173,12 @@ impl Shared {
 
     fn topic<M: Message>(&self, name: &RosName, qos: Qos) -> Result<(rustdds::Topic, MutexGuard<'_, Node>), UserError> {
         let definition = M::DEFINITION;
+        let (dds_name, message) =
+            (format!("rt{}", name.as_str()), MessageTypeName::new(definition.package, definition.name));
+        let participant = self.context.domain_participant();
+        let topic = participant.create_topic(dds_name, message.dds_msg_type(), &qos.policies(), TopicKind::NoKey);
+        let topic = topic.map_err(|e| failed(name.as_str(), &e))?;
         let node = self.node();
-        let parsed = Name::parse(name.as_str()).map_err(|e| failed(name.as_str(), &e))?;
-        let message = MessageTypeName::new(definition.package, definition.name);
-        let topic = node.create_topic(&parsed, message, &qos.profile()).map_err(|e| failed(name.as_str(), &e))?;
         Ok((topic, node))
     }
 
