@@ -1,4 +1,5 @@
-//! The two ends as processes in ROS 2, with a peer that nobody here wrote: Cyclone DDS on the loopback network, without multicast.
+//! The two ends as processes in ROS 2, with peers that nobody here wrote: Cyclone DDS and Fast DDS on the loopback network, without
+//! multicast.
 
 use scenecast_config::Ros2;
 use scenecast_ros2::{RosNode, topic};
@@ -7,6 +8,7 @@ use serde_json::Value;
 use std::io::Write;
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
+use std::sync::OnceLock;
 use std::time::{Duration, Instant};
 
 /// A Python with Cyclone DDS; without one the test is skipped, which CI takes for a failure.
@@ -23,14 +25,54 @@ fn python() -> Option<String> {
     None
 }
 
-/// A domain of this process and test: those of other tests on this machine differ. Above 100, ports of DDS may be taken by clients.
-fn domain(test: u32) -> u8 {
-    (10 + (std::process::id() * 4 + test) % 90) as u8
+/// The peer of Fast DDS, compiled; without its library the test is skipped, which CI takes for a failure.
+fn fast_dds() -> Option<String> {
+    static PROGRAM: OnceLock<Option<String>> = OnceLock::new();
+    PROGRAM.get_or_init(compile_fast_dds).clone()
 }
 
-fn start(python: &str, arguments: &[&str]) -> Child {
-    let mut command = Command::new(python);
-    command.arg(workspace().join("tests/ros2_peer.py")).args(arguments);
+fn compile_fast_dds() -> Option<String> {
+    let program = scratch("fast-dds").join("peer").display().to_string();
+    let source = workspace().join("tests/fast_dds_peer.cpp");
+    let options = ["-O1", "-std=c++17", "-lfastrtps", "-lfastcdr", "-o", &program];
+    let compiled = Command::new("g++").arg(source).args(options).output();
+    let error = match &compiled {
+        Ok(output) if output.status.success() => return Some(program),
+        Ok(output) => String::from_utf8_lossy(&output.stderr).into_owned(),
+        Err(error) => error.to_string(),
+    };
+    let line = format!("SKIPPED: no Fast DDS (Debian packages g++ and libfastrtps-dev): {error}\n");
+    assert!(std::env::var_os("CI").is_none_or(|ci| ci != "true"), "{line}");
+    let _ = std::io::stderr().write_all(line.as_bytes());
+    None
+}
+
+/// A domain of this process and test: those of other tests on this machine differ. Above 100, ports of DDS may be taken by clients.
+fn domain(test: u32) -> u8 {
+    (10 + (std::process::id() * 5 + test) % 90) as u8
+}
+
+/// A program that speaks to the ends: a Python, a script, and the arguments before those of the command.
+#[derive(Clone)]
+struct Speaker {
+    python: String,
+    script: &'static str,
+    program: Option<String>,
+}
+
+impl Speaker {
+    fn cyclone() -> Option<Self> {
+        Some(Self { python: python()?, script: "tests/ros2_peer.py", program: None })
+    }
+
+    fn fast_dds() -> Option<Self> {
+        Some(Self { python: python()?, script: "tests/fast_dds_peer.py", program: Some(fast_dds()?) })
+    }
+}
+
+fn start(speaker: &Speaker, arguments: &[&str]) -> Child {
+    let mut command = Command::new(&speaker.python);
+    command.arg(workspace().join(speaker.script)).args(&speaker.program).args(arguments);
     command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("python starts")
 }
 
@@ -40,8 +82,8 @@ fn result(peer: Child) -> Value {
     serde_json::from_slice(&output.stdout).unwrap_or_else(|_| panic!("{}", String::from_utf8_lossy(&output.stdout)))
 }
 
-fn peer(python: &str, arguments: &[&str]) -> Value {
-    result(start(python, arguments))
+fn peer(speaker: &Speaker, arguments: &[&str]) -> Value {
+    result(start(speaker, arguments))
 }
 
 /// Both ends over TCP, with the page on `page`.
@@ -103,8 +145,8 @@ fn explored(page: u16) -> u64 {
 }
 
 #[test]
-fn a_late_cyclone_subscriber_has_both_maps_within_two_seconds() {
-    let Some(python) = python() else { return };
+fn late_subscribers_have_both_maps_within_two_seconds() {
+    let (Some(cyclone), Some(fast)) = (Speaker::cyclone(), Speaker::fast_dds()) else { return };
     let (dir, page, domain) = (scratch("ros2-map"), free_port(), domain(0));
     let _ends = ends(&dir, page, domain);
     wait_until("the survey ends", Duration::from_secs(120), || {
@@ -113,7 +155,13 @@ fn a_late_cyclone_subscriber_has_both_maps_within_two_seconds() {
         mode.is_some_and(|mode| mode == "done" || mode == "hold") && explored(page) > 100
     });
     let domain = domain.to_string();
-    let map = peer(&python, &["map", &domain, "/scenecast/auv_1/map", "20"]);
+    for (name, speaker) in [("Cyclone DDS", cyclone), ("Fast DDS", fast)] {
+        assert_late_maps(name, &speaker, page, &domain);
+    }
+}
+
+fn assert_late_maps(name: &str, speaker: &Speaker, page: u16, domain: &str) {
+    let map = peer(speaker, &["map", domain, "/scenecast/auv_1/map", "20"]);
     let values =
         |map: &Value| -> Vec<i64> { map["data"].as_array().unwrap().iter().filter_map(Value::as_i64).collect() };
     let (width, height, labels) = page_map(page).unwrap();
@@ -121,21 +169,21 @@ fn a_late_cyclone_subscriber_has_both_maps_within_two_seconds() {
     let expected: Vec<i64> = labels.iter().map(|&l| if l == 0 { -1 } else { i64::from(l) }).collect();
     assert_eq!(values(&map), expected, "the map of ROS 2 is that of the page");
     assert_eq!(map["frame"], "map");
-    let own = peer(&python, &["map", &domain, "/scenecast/map", "20"]);
+    let own = peer(speaker, &["map", domain, "/scenecast/map", "20"]);
     assert_eq!(own["frame"], "odom", "the vehicle's own map is in its map frame");
     for (end, map) in [("surface", &map), ("vehicle", &own)] {
         let seconds = map["seconds"].as_f64().unwrap();
-        println!("{end}: the map was there after {seconds} s");
-        assert!(seconds < 2.0, "{end}: {seconds} s");
+        println!("{name}, {end}: the map was there after {seconds} s");
+        assert!(seconds < 2.0, "{name}, {end}: {seconds} s");
     }
 }
 
 #[test]
 fn every_topic_of_the_surface_reaches_cyclone() {
-    let Some(python) = python() else { return };
+    let Some(cyclone) = Speaker::cyclone() else { return };
     let (dir, page, domain) = (scratch("ros2-all"), free_port(), domain(1));
     let _ends = ends(&dir, page, domain);
-    let all = peer(&python, &["all", &domain.to_string(), "/scenecast/auv_1", "120"]);
+    let all = peer(&cyclone, &["all", &domain.to_string(), "/scenecast/auv_1", "120"]);
     println!("{all}");
     let number = |value: &Value| value.as_u64().unwrap();
     let cells = number(&all["map"][0]) * number(&all["map"][1]);
@@ -154,13 +202,13 @@ fn every_topic_of_the_surface_reaches_cyclone() {
 
 #[test]
 fn an_order_of_cyclone_passes_the_surfaces_checks() {
-    let Some(python) = python() else { return };
+    let Some(cyclone) = Speaker::cyclone() else { return };
     let (dir, page, domain) = (scratch("ros2-orders"), free_port(), domain(2));
     let _ends = ends(&dir, page, domain);
     wait_until("the vehicle is met", Duration::from_secs(60), || explored(page) > 0);
     let domain = domain.to_string();
     let hold = |arguments: &[&str]| {
-        let event = peer(&python, &[&["hold", &domain, "/scenecast/auv_1", "30"], arguments].concat());
+        let event = peer(&cyclone, &[&["hold", &domain, "/scenecast/auv_1", "30"], arguments].concat());
         assert_eq!(event["vehicle"], "auv-1");
         (event["level"].as_u64().unwrap(), event["text"].as_str().unwrap().to_owned())
     };
@@ -181,9 +229,16 @@ fn an_order_of_cyclone_passes_the_surfaces_checks() {
 }
 
 #[test]
-fn images_of_cyclone_arrive_whole_and_in_order() {
-    let Some(python) = python() else { return };
-    let domain = domain(3);
+fn images_of_cyclone_dds_arrive_whole_and_in_order() {
+    Speaker::cyclone().iter().for_each(|speaker| assert_images_arrive(speaker, domain(3)));
+}
+
+#[test]
+fn images_of_fast_dds_arrive_whole_and_in_order() {
+    Speaker::fast_dds().iter().for_each(|speaker| assert_images_arrive(speaker, domain(4)));
+}
+
+fn assert_images_arrive(speaker: &Speaker, domain: u8) {
     let networks = vec!["127.0.0.1".parse().unwrap()];
     let node = RosNode::start(&Ros2 { domain, networks, ..Ros2::default() }, "camera_test").unwrap();
     let name = |text: &str| topic(text).unwrap();
@@ -193,7 +248,7 @@ fn images_of_cyclone_arrive_whole_and_in_order() {
     // SCENECAST_ROS2_IMAGES=200 is the long run: 1360 x 1024 pixels at 2 Hz.
     let long = std::env::var("SCENECAST_ROS2_IMAGES").ok();
     let (count, hertz) = (long.as_deref().unwrap_or("6"), if long.is_some() { "2" } else { "4" });
-    let camera = start(&python, &["camera", &domain.to_string(), "/camera/image_raw", count, hertz, "1360", "1024"]);
+    let camera = start(speaker, &["camera", &domain.to_string(), "/camera/image_raw", count, hertz, "1360", "1024"]);
     let count: u64 = count.parse().unwrap();
     let row: Vec<u8> = (0..1360 * 3).map(|i: u32| (i % 251) as u8).collect();
     let limit = Instant::now() + Duration::from_secs(40 + count);
