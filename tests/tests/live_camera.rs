@@ -3,16 +3,18 @@
 use image::RgbImage;
 use scenecast_files::{RecordedFrame, Recording};
 use scenecast_rehearsal::{Mission, MissionOptions, World};
-use scenecast_tests::{Process, free_port, python, recorded, run_script, scratch, wait_until};
+use scenecast_tests::{Process, free_port, python, recorded, run_script, scratch, state, wait_until};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// A dive whose vehicle and surface run as processes.
 struct Dive {
     dir: PathBuf,
     frames: Vec<RecordedFrame>,
     map: PathBuf,
+    /// Port of the surface's page.
+    page: u16,
     _processes: Vec<Process>,
 }
 
@@ -33,9 +35,10 @@ impl Dive {
         let frames = Recording::open(&recorded().0, None, 0.01).unwrap().frames;
         let poses = dir.join("poses.txt");
         std::fs::write(&poses, tum_lines(&frames)).unwrap();
-        let port = free_port();
+        let (port, page) = (free_port(), free_port());
         let state = |who: &str| format!("runtime.state_dir={}", dir.join(who).display());
-        let surface = [state("asv"), format!("modem.listen=127.0.0.1:{port}"), "console.listen=".to_owned()];
+        let console = format!("console.listen=127.0.0.1:{page}");
+        let surface = [state("asv"), format!("modem.listen=127.0.0.1:{port}"), console];
         let mut vehicle = vec![
             state("auv"),
             format!("modem.connect=127.0.0.1:{port}"),
@@ -50,7 +53,24 @@ impl Dive {
             Process::start(&config.into_iter().chain(sets).collect::<Vec<_>>())
         };
         let processes = vec![start("asv", &surface), start("auv", &vehicle)];
-        Self { map: dir.join("asv/operator-map-1.png"), dir, frames, _processes: processes }
+        Self { map: dir.join("asv/operator-map-1.png"), dir, frames, page, _processes: processes }
+    }
+
+    /// Writes an image into the camera's folder as a slow program does: the file stays half written for a moment.
+    fn write_slowly(&self, frame: &RecordedFrame) {
+        let bytes = std::fs::read(frame.image.file().unwrap()).unwrap();
+        let path = self.dir.join(format!("camera/{:.9}.png", frame.t_s));
+        std::fs::write(&path, &bytes[..bytes.len() / 2]).unwrap();
+        std::thread::sleep(PACE / 2);
+        std::fs::write(&path, &bytes).unwrap();
+        std::thread::sleep(PACE / 2);
+    }
+
+    /// The faults of the vehicle that the page shows.
+    fn faults(&self) -> Option<Vec<String>> {
+        let status = state(self.page)?["vehicles"][0]["status"].clone();
+        let texts = status["faults"].as_array()?.iter().filter_map(|fault| fault["text"].as_str());
+        Some(texts.map(str::to_owned).collect())
     }
 
     fn assert_map_of_the_rehearsal(&self) {
@@ -86,15 +106,39 @@ fn images_written_to_a_folder_give_the_map_of_the_recording() {
         std::fs::create_dir_all(&camera).unwrap();
         format!("watch:{}", camera.display())
     });
-    for frame in &dive.frames {
-        let bytes = std::fs::read(frame.image.file().unwrap()).unwrap();
-        let path = dive.dir.join(format!("camera/{:.9}.png", frame.t_s));
-        // A writer that is slow: the file stays half written for a moment.
-        std::fs::write(&path, &bytes[..bytes.len() / 2]).unwrap();
-        std::thread::sleep(PACE / 2);
-        std::fs::write(&path, &bytes).unwrap();
-        std::thread::sleep(PACE / 2);
+    dive.frames.iter().for_each(|frame| dive.write_slowly(frame));
+    dive.assert_map_of_the_rehearsal();
+}
+
+#[test]
+fn a_camera_that_stalls_is_reported_and_the_map_is_the_same() {
+    // SCENECAST_STALL_S=30 is the long run.
+    let stall_s = std::env::var("SCENECAST_STALL_S").map_or(6.0, |text| text.parse().unwrap());
+    let dive = Dive::with_settings("stall", &|dir| {
+        let camera = dir.join("camera");
+        std::fs::create_dir_all(&camera).unwrap();
+        let poses = format!("navigation.source=tum:{}", dir.join("poses.txt").display());
+        vec![format!("camera.source=watch:{}", camera.display()), poses, "camera.timeout_s=2".to_owned()]
+    });
+    let (before, after) = dive.frames.split_at(dive.frames.len() / 2);
+    before.iter().for_each(|frame| dive.write_slowly(frame));
+    let began = Instant::now();
+    let is_silent = || dive.faults().map(|faults| faults.iter().any(|fault| fault == "no image comes in"));
+    wait_until("the page shows that no image comes in", Duration::from_secs(20), || is_silent() == Some(true));
+    std::thread::sleep(Duration::from_secs_f64(stall_s).saturating_sub(began.elapsed()));
+    let resumed = Instant::now();
+    let (mut after, mut is_over) = (after.iter(), false);
+    while !is_over {
+        dive.write_slowly(after.next().expect("the page shows images again before the last one"));
+        let limit = Instant::now() + Duration::from_secs(1);
+        while !is_over && Instant::now() < limit {
+            is_over = is_silent() == Some(false);
+            std::thread::sleep(PACE / 10);
+        }
     }
+    let shown_s = resumed.elapsed().as_secs_f64();
+    println!("a stall of {stall_s} s; the page showed images again after {shown_s:.1} s");
+    after.for_each(|frame| dive.write_slowly(frame));
     dive.assert_map_of_the_rehearsal();
 }
 
