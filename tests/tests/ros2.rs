@@ -49,7 +49,7 @@ fn compile_fast_dds() -> Option<String> {
 
 /// A domain of this process and test: those of other tests on this machine differ. Above 100, ports of DDS may be taken by clients.
 fn domain(test: u32) -> u8 {
-    (10 + (std::process::id() * 5 + test) % 90) as u8
+    (10 + (std::process::id() * 8 + test) % 90) as u8
 }
 
 /// A program that speaks to the ends: a Python, a script, and the arguments before those of the command.
@@ -93,12 +93,16 @@ struct Ends {
 }
 
 fn ends(dir: &Path, page: u16, domain: u8) -> Ends {
+    ends_with(dir, page, domain, true)
+}
+
+fn ends_with(dir: &Path, page: u16, domain: u8, is_in_ros: bool) -> Ends {
     let (recording, link) = (&recorded().0, free_port());
     let common = |who: &str, rest: &str| {
         let state = dir.join(who).display().to_string();
         let text = format!(
             "[mission]\norigin_deg = [29.5, 34.9]\n[runtime]\ntime_scale = 10\nstate_dir = \"{state}\"\n[ros2]\n\
-             enabled = true\ndomain = {domain}\nnetworks = [\"127.0.0.1\"]\n{rest}"
+             enabled = {is_in_ros}\ndomain = {domain}\nnetworks = [\"127.0.0.1\"]\n{rest}"
         );
         let file = dir.join(format!("{who}.toml"));
         std::fs::write(&file, text).unwrap();
@@ -198,6 +202,35 @@ fn every_topic_of_the_surface_reaches_cyclone() {
     assert_eq!(all["no_altitude"], true);
     assert_eq!(all["parts"].as_array().unwrap().len(), 4);
     assert!(all["age_s"].as_f64().unwrap() < 30.0);
+}
+
+/// Bytes that a surface has received of its vehicle, once the survey is over and everything is acknowledged.
+fn bytes_of_the_survey(page: u16) -> u64 {
+    wait_until("everything is received", Duration::from_secs(120), || {
+        let found = state(page).map(|state| state["vehicles"][0].clone()).unwrap_or_default();
+        let is_over = found["status"]["mode"] == "done" || found["status"]["mode"] == "hold";
+        is_over && found["link"]["backlog"]["bits"] == 0 && explored(page) > 100
+    });
+    let classes = state(page).unwrap()["link"]["up"]["bytes_by_class"].clone();
+    println!("{classes}");
+    classes.as_object().unwrap().values().filter_map(Value::as_u64).sum()
+}
+
+#[test]
+fn ros_and_its_subscribers_leave_the_link_as_it_is() {
+    let Some(cyclone) = Speaker::cyclone() else { return };
+    let pairs = [("ros2-off", false), ("ros2-alone", true), ("ros2-read", true)];
+    let pairs = pairs.map(|(name, is_in_ros)| (scratch(name), free_port(), is_in_ros));
+    let started: Vec<_> = (5..)
+        .zip(&pairs)
+        .map(|(test, (dir, page, is_in_ros))| (ends_with(dir, *page, domain(test), *is_in_ros), *page))
+        .collect();
+    let reader = start(&cyclone, &["all", &domain(7).to_string(), "/scenecast/auv_1", "120"]);
+    let bytes: Vec<u64> = started.iter().map(|(_, page)| bytes_of_the_survey(*page)).collect();
+    assert!(result(reader)["points"].as_u64() > Some(0), "the subscriber has read the map");
+    println!("bytes received without ROS 2, without a subscriber, with one: {bytes:?}");
+    let spread = |other: u64| (other as f64 / bytes[0] as f64 - 1.0).abs();
+    assert!(spread(bytes[1]) < 0.1 && spread(bytes[2]) < 0.1, "{bytes:?}");
 }
 
 #[test]
