@@ -1,6 +1,6 @@
 //! Autopilots: state machines between the vehicle's role and the bytes of its flight controller.
 //!
-//! Waypoints go out, steps of way come in, fixes go out. None of them does IO; [`crate::runtime`] moves their bytes.
+//! Waypoints go out, steps of the track come in, fixes go out. None of them does IO; [`crate::runtime`] moves their bytes.
 //!
 //! | kind | is |
 //! |---|---|
@@ -41,7 +41,7 @@ impl Goal {
     }
 }
 
-/// A stretch of way, as the autopilot measured it.
+/// A step of the track, as the autopilot measured it.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Step {
     pub dx_m: f64,
@@ -109,7 +109,7 @@ pub trait Autopilot: Send {
         self.tray().outputs.pop_front()
     }
 
-    /// The next stretch of way.
+    /// The next step of the track.
     fn poll_step(&mut self) -> Option<Step> {
         self.tray().steps.pop_front()
     }

@@ -1,6 +1,7 @@
 //! ArduSub and ArduRover over MAVLink 2.
 
 mod altimeter;
+mod command;
 mod echo;
 pub mod frame;
 pub mod message;
@@ -8,6 +9,7 @@ mod targets;
 
 use super::{Autopilot, Counters, Goal, Health, Step, Tray};
 use altimeter::{Altimeter, HeightSource};
+use command::CommandWatch;
 use echo::{Echo, Verdict};
 use frame::{Deframer, Frame, encode};
 use message::{Heard, Said, heard_extra};
@@ -57,8 +59,8 @@ struct Pose {
 
 /// A state machine toward an autopilot of the ArduPilot family.
 ///
-/// Way is what its velocity adds up to, not the difference of its positions: these jump when it takes a fix in, and a fix
-/// that this vehicle has used already must not count twice. Waypoints are held as way still to go, and sent anew each
+/// Its track is the sum of its velocities, not the difference of its positions: these jump when it uses a fix, and a fix
+/// that this vehicle has used already must not count twice. A waypoint is kept as the distance that remains, and sent each
 /// second in the autopilot's own frame, so that nothing depends on where that has its origin.
 #[derive(Debug)]
 pub struct Mavlink {
@@ -72,23 +74,14 @@ pub struct Mavlink {
     tilt: (f64, f64),
     yaw: Option<f64>,
     altimeter: Altimeter,
-    /// Way still to go, east and north, and the depth; `None`: stay.
+    /// The distance that remains, east and north, and the depth; `None`: stay.
     goal: Option<Goal>,
     stay: Option<[f32; 3]>,
     sent: Option<Sent>,
     echo: Echo,
-    /// Where on the Earth it is, moved on by its own way: latitude, longitude, standard deviation.
+    /// Its place on the Earth, moved by its own track: latitude, longitude, standard deviation.
     place: Option<(LatLon, f32, Instant)>,
-    /// Whether it was in command once: from then on whoever takes it out of that is obeyed.
-    was_in_command: bool,
-    /// When it was taken out of command last.
-    left_command: Option<Instant>,
-    /// Milliseconds since its start, as it said last.
-    time_boot_ms: Option<u32>,
-    /// When it started again, until it is in command again.
-    restarted: Option<Instant>,
-    /// Whether it was under water when it started again.
-    was_under_water: bool,
+    command: CommandWatch,
     due: Due,
     tray: Tray,
     was_silent: bool,
@@ -123,12 +116,6 @@ const STREAMS: [(f32, f32); 9] = [
 ];
 /// Time between two requests for streams that do not come.
 const STREAMS_PERIOD: Duration = Duration::from_secs(10);
-/// Messages of one run of the autopilot may be this much out of order, milliseconds.
-const CLOCKS_APART_MS: u32 = 1000;
-/// Uncertainty of the time at which it restarted.
-const RESTART_MARGIN: Duration = Duration::from_secs(1);
-/// Depth below which an autopilot that has restarted is armed again, metres.
-const MIN_ARMED_DEPTH_M: f64 = 0.5;
 /// Longest time between two positions that is bridged by the velocity.
 const BRIDGED: Duration = Duration::from_secs(3);
 /// GPS_INPUT goes out so often, as ArduPilot expects of a receiver.
@@ -154,11 +141,7 @@ impl Mavlink {
             sent: None,
             echo: Echo::default(),
             place: None,
-            was_in_command: false,
-            left_command: None,
-            time_boot_ms: None,
-            restarted: None,
-            was_under_water: false,
+            command: CommandWatch::default(),
             due: Due { second: now, gps: now, streams: now },
             tray: Tray::default(),
             was_silent: false,
@@ -252,38 +235,25 @@ impl Mavlink {
             self.was_silent = false;
             self.ask_for_streams(now);
         }
-        if was_in_command && !peer.is_in_command() {
+        if self.command.handle_heartbeat(was_in_command, peer.is_in_command(), now) {
             self.tray.note("the autopilot was taken out of guided mode or disarmed: waypoints wait until it is back");
-            self.left_command = Some(now);
         }
-        if peer.is_in_command() {
-            (self.was_in_command, self.restarted) = (true, None);
-        } else {
+        if !peer.is_in_command() {
             self.echo.forget();
         }
     }
 
     /// A clock that went back is another run of the autopilot.
     fn handle_boot_time(&mut self, ms: u32, now: Instant) {
-        let before = self.time_boot_ms.replace(ms);
-        if before.is_none_or(|before| before <= ms.saturating_add(CLOCKS_APART_MS)) {
+        if !self.command.handle_boot_time(ms, self.pose.map(|pose| pose.depth_m), now) {
             return;
         }
         self.tray.count("restarts");
         self.tray.note("the autopilot has restarted");
-        self.restarted = Some(now - Duration::from_millis(u64::from(ms)));
-        self.was_under_water = self.pose.is_some_and(|pose| pose.depth_m > MIN_ARMED_DEPTH_M);
         self.echo.forget();
         self.altimeter.forget();
         self.stay = None;
         self.ask_for_streams(now);
-    }
-
-    /// Whether nobody but its own restart has taken it out of command, and it was under water: on deck, its thrusters must not
-    /// start by themselves.
-    fn is_out_by_restart(&self) -> bool {
-        let left = self.left_command.zip(self.restarted);
-        self.was_under_water && left.is_some_and(|(left, restarted)| left + RESTART_MARGIN >= restarted)
     }
 
     /// A distance along a beam that is fixed to the vehicle and looks down.
@@ -364,7 +334,7 @@ impl Mavlink {
         if peer.is_in_command() {
             self.send_target(now);
             self.judge_echo(now);
-        } else if self.config.arms && self.goal.is_some() && (!self.was_in_command || self.is_out_by_restart()) {
+        } else if self.config.arms && self.goal.is_some() && self.command.may_be_armed() {
             // MAV_MODE_FLAG_CUSTOM_MODE_ENABLED.
             let params = [1.0, peer.guided_mode as f32, 0.0];
             self.say(&Said::Command { command: SET_MODE, params }, now);
