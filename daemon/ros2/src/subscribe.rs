@@ -2,7 +2,7 @@
 
 use crate::inbox::Inbox;
 use crate::node::RosNode;
-use crate::qos::Qos;
+use crate::node::Qos;
 use scenecast_config::RosName;
 use scenecast_core::UserError;
 use scenecast_messages::nav_msgs::{OccupancyGrid, Odometry};

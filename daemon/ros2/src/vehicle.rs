@@ -2,7 +2,7 @@
 
 use crate::map_versions::MapVersions;
 use crate::node::{Publisher, RosNode};
-use crate::qos::Qos;
+use crate::node::Qos;
 use crate::stop::{self, Owned, Owner};
 use crate::vehicle_map::VehicleMap;
 use scenecast_config::Ros2;

@@ -2,7 +2,7 @@
 
 use super::Desk;
 use crate::node::{Publisher, RosNode};
-use crate::qos::Qos;
+use crate::node::Qos;
 use scenecast_console::state::{MapLabel, VehicleState};
 use scenecast_console::{ClientRequest, MapCells, Reply, SurfaceRequest};
 use scenecast_core::{UserError, palette};

@@ -5,7 +5,7 @@ use super::order;
 use super::stamps;
 use crate::inbox::Inbox;
 use crate::node::RosNode;
-use crate::qos::Qos;
+use crate::node::Qos;
 use scenecast_console::state::VehicleState;
 use scenecast_console::{ClientRequest, Reply, SurfaceRequest};
 use scenecast_core::{Principal, UserError};

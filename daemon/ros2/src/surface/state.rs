@@ -2,7 +2,7 @@
 
 use super::stamps::Stamps;
 use crate::node::{Publisher, RosNode};
-use crate::qos::Qos;
+use crate::node::Qos;
 use scenecast_console::state::{MissionState, StatusReport, VehicleState};
 use scenecast_core::{LatLon, TangentPlane, UserError};
 use scenecast_messages::geometry_msgs::PoseWithCovarianceStamped;

@@ -8,7 +8,7 @@ use super::stamps::Stamps;
 use super::state::StateTopics;
 use crate::node::Publisher;
 use crate::node::RosNode;
-use crate::qos::Qos;
+use crate::node::Qos;
 use scenecast_console::state::{MissionState, OrderStatus, VehicleState};
 use scenecast_console::{ClientRequest, Reply, SurfaceRequest};
 use scenecast_core::UserError;
