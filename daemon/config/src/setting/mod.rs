@@ -13,8 +13,8 @@ mod tables;
 mod texts;
 
 pub use choices::{
-    Authenticate, AutopilotKind, BirthRule, CameraStamps, MapCells, MapStream, ModemKind, OperatorScript,
-    RosTransport, S2cMode, WorldKind,
+    Authenticate, AutopilotKind, BirthRule, CameraStamps, MapCells, MapStream, ModemKind, OperatorScript, RosTransport,
+    S2cMode, WorldKind,
 };
 pub use debounce::Debounce;
 pub use labels::{LabelSource, Votes};

@@ -43,6 +43,7 @@ impl Peers {
 
 /// The number of peers for people, such as `2 on DDS, 0 on rmw_zenoh`.
 pub(crate) fn counts(by_transport: &[(Transport, Peers)]) -> String {
-    let counts: Vec<String> = by_transport.iter().map(|(by, peers)| format!("{} on {by}", peers.participants)).collect();
+    let counts: Vec<String> =
+        by_transport.iter().map(|(by, peers)| format!("{} on {by}", peers.participants)).collect();
     counts.join(", ")
 }

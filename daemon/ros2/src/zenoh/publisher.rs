@@ -77,7 +77,8 @@ impl ZenohPublisher {
 
     /// The channel for subscribers of Humble, once there was one.
     fn serve_humble(&self) -> Option<&Channel> {
-        if self.without_hash.get().is_none() && self.graph().count_without_hash(Kind::Subscription, &self.endpoint) == 0 {
+        if self.without_hash.get().is_none() && self.graph().count_without_hash(Kind::Subscription, &self.endpoint) == 0
+        {
             return None;
         }
         let declare = || {

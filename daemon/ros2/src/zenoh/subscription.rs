@@ -35,7 +35,9 @@ pub(super) fn reader<M: Message>(filler: Filler<M>, endpoint: &Endpoint) -> impl
         let theirs = key.rsplit('/').next().unwrap_or_default();
         if theirs == NO_HASH && !is_told.swap(true, Ordering::Relaxed) {
             let message = M::DEFINITION.full_name();
-            tracing::info!("ROS 2: {topic}: a publisher of Humble without type hash; its {message} is taken as this build's");
+            tracing::info!(
+                "ROS 2: {topic}: a publisher of Humble without type hash; its {message} is taken as this build's"
+            );
         }
         let read = match theirs == NO_HASH || theirs == hash {
             true => decode::<M>(&sample.payload().to_bytes()).map_err(Unreadable::from),
