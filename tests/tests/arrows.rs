@@ -4,7 +4,7 @@ use serde_json::Value;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Crates that would give a core a clock, a socket, a disk or a runtime.
-const IO_CRATES: [&str; 12] = [
+const IO_CRATES: [&str; 14] = [
     "axum",
     "hyper",
     "nix",
@@ -17,6 +17,8 @@ const IO_CRATES: [&str; 12] = [
     "tokio",
     "tokio-serial",
     "tracing-subscriber",
+    "zenoh",
+    "zenoh-ext",
 ];
 
 /// Crates that do no IO.

@@ -40,7 +40,7 @@ pub use sections::{
 };
 pub use setting::{
     Authenticate, AutopilotKind, BirthRule, CameraSource, CameraStamps, Debounce, GpsPort, HostPort, LabelSource,
-    LayerName, MapCells, MapStream, ModemKind, NavigationSource, OperatorScript, Remap, RosName, S2cMode, Votes,
-    WorldKind,
+    LayerName, MapCells, MapStream, ModemKind, NavigationSource, OperatorScript, Remap, RosName, RosTransport, S2cMode,
+    Votes, WorldKind, ZenohEndpoint,
 };
 pub use token_file::{TokenGrant, load_tokens, read_token, read_tokens};

@@ -1,6 +1,9 @@
 //! Received messages that wait for their reader.
 
+use scenecast_messages::Message;
+use std::any::Any;
 use std::collections::VecDeque;
+use std::fmt::Display;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant, SystemTime};
 use tokio::sync::Notify;
@@ -19,8 +22,8 @@ pub struct Received<M> {
 #[derive(Debug)]
 pub struct Inbox<M> {
     shared: Arc<Shared<M>>,
-    /// Aborts the task that fills it.
-    pub(crate) filler: Option<tokio::task::AbortHandle>,
+    /// What fills it, and ends when it is dropped.
+    pub(crate) feeds: Vec<Box<dyn Any + Send + Sync>>,
 }
 
 #[derive(Debug)]
@@ -39,8 +42,30 @@ struct State<M> {
     malformed: u64,
 }
 
-/// The end of an inbox that fills it.
+/// The end of an inbox that fills it; its clones fill the same inbox.
 pub(crate) struct Filler<M>(Arc<Shared<M>>);
+
+impl<M> Clone for Filler<M> {
+    fn clone(&self) -> Self {
+        Self(self.0.clone())
+    }
+}
+
+impl<M: Message> Filler<M> {
+    /// Puts a message; counts a sample that is none.
+    pub fn put_read<E: Display>(&self, read: Result<M, E>, topic: &str) {
+        match read {
+            Ok(message) => self.put(message),
+            Err(error) => {
+                let count = self.put_malformed();
+                // 1, 2, 4, 8, ...: a publisher of another type must not fill the log.
+                if count.is_power_of_two() {
+                    tracing::warn!("ROS 2: {topic}: {count} samples are no {}: {error}", M::DEFINITION.full_name());
+                }
+            }
+        }
+    }
+}
 
 impl<M> Shared<M> {
     fn state(&self) -> MutexGuard<'_, State<M>> {
@@ -77,7 +102,7 @@ impl<M> Inbox<M> {
         let capacity = capacity.max(1);
         let shared =
             Arc::new(Shared { state: Mutex::new(state), arrived: Condvar::new(), notify: Notify::new(), capacity });
-        (Self { shared: shared.clone(), filler: None }, Filler(shared))
+        (Self { shared: shared.clone(), feeds: Vec::new() }, Filler(shared))
     }
 
     /// The oldest message that waits.
@@ -124,14 +149,6 @@ impl<M> Inbox<M> {
     /// Samples on the topic that are no messages of its type.
     pub fn malformed(&self) -> u64 {
         self.shared.state().malformed
-    }
-}
-
-impl<M> Drop for Inbox<M> {
-    fn drop(&mut self) {
-        if let Some(filler) = &self.filler {
-            filler.abort();
-        }
     }
 }
 

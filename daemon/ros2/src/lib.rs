@@ -1,7 +1,8 @@
-//! ROS 2 by DDS, without a ROS installation.
+//! ROS 2 by DDS and, in builds with the feature `zenoh`, by rmw_zenoh, without a ROS installation.
 //!
 //! A [`RosNode`] has threads of its own. It hands received messages over in an [`Inbox`], which drops the oldest message when
-//! it is full and counts that, so no reader delays DDS and DDS delays no reader. A [`Publisher`] never waits either.
+//! it is full and counts that, so no reader delays a transport and no transport delays a reader. A [`Publisher`] never waits
+//! for a peer either.
 //!
 //! ```no_run
 //! use scenecast_config::Ros2;
@@ -16,22 +17,26 @@
 //! }
 //! ```
 
+mod dds;
 mod inbox;
 mod map_versions;
 mod names;
 mod node;
-mod qos;
 mod stop;
 mod subscribe;
 #[cfg(feature = "surface")]
 mod surface;
 mod vehicle;
 mod vehicle_map;
+#[cfg(feature = "zenoh")]
+mod zenoh;
+#[cfg(not(feature = "zenoh"))]
+#[path = "zenoh/absent.rs"]
+mod zenoh;
 
 pub use inbox::{Inbox, Received};
 pub use names::{topic, valid_part};
-pub use node::{Peers, Publisher, RosNode};
-pub use qos::Qos;
+pub use node::{Peers, Publisher, Qos, RosNode, Transport};
 #[cfg(feature = "surface")]
 pub use surface::{SurfaceOutlet, start_surface};
 pub use vehicle::{VehicleOutlet, VehicleView, start_vehicle};

@@ -1,8 +1,8 @@
 //! The vehicle in ROS 2: its own map, pose, path and state.
 
 use crate::map_versions::MapVersions;
+use crate::node::Qos;
 use crate::node::{Publisher, RosNode};
-use crate::qos::Qos;
 use crate::stop::{self, Owned, Owner};
 use crate::vehicle_map::VehicleMap;
 use scenecast_config::Ros2;
@@ -77,7 +77,7 @@ impl VehicleOutlet {
     }
 }
 
-/// Joins ROS 2, as soon as DDS starts: the vehicle does not wait for it.
+/// Joins ROS 2, as soon as its transports start: the vehicle does not wait for them.
 ///
 /// # Errors
 ///
@@ -89,7 +89,7 @@ pub fn start_vehicle(settings: &Ros2) -> Result<VehicleOutlet, UserError> {
     let run = move || {
         let Some(node) = RosNode::start_when_possible(&settings, "scenecast_vehicle", &owned) else { return };
         match VehicleTopics::new(&node) {
-            Ok(topics) => Worker { _node: node, topics, desk: shared }.run(&owned),
+            Ok(topics) => Worker { node, topics, desk: shared }.run(&owned),
             Err(error) => tracing::error!("{error}; nothing is published"),
         }
     };
@@ -99,7 +99,7 @@ pub fn start_vehicle(settings: &Ros2) -> Result<VehicleOutlet, UserError> {
 }
 
 struct Worker {
-    _node: RosNode,
+    node: RosNode,
     topics: VehicleTopics,
     desk: Arc<Desk>,
 }
@@ -111,7 +111,7 @@ impl Worker {
             let view = self.desk.view.lock().unwrap_or_else(PoisonError::into_inner).take();
             if let Some((time, view)) = view {
                 version = view.map_version;
-                self.topics.publish(view, time);
+                self.topics.publish(&self.node, view, time);
             }
             if self.topics.needs_map(version) {
                 self.desk.wants_map.store(true, Ordering::Relaxed);
@@ -162,7 +162,7 @@ impl VehicleTopics {
         self.published.due(subscribers, version)
     }
 
-    fn publish(&mut self, view: VehicleView, time: SystemTime) {
+    fn publish(&mut self, node: &RosNode, view: VehicleView, time: SystemTime) {
         let nanos = time.duration_since(SystemTime::UNIX_EPOCH).map_or(0, |since| since.as_nanos() as i64);
         let stamp = Time::from_nanos(nanos);
         let place = Place { stamp: stamp.clone(), position_m: view.position_m, heading_rad: view.heading_rad };
@@ -172,14 +172,14 @@ impl VehicleTopics {
         }
         if self.last_state.is_none_or(|last| last.elapsed() >= MAP_INTERVAL) {
             self.last_state = Some(Instant::now());
-            self.publish_state(&view, &place);
+            self.publish_state(node, &view, &place);
         }
         if let Some(map) = view.map {
             self.publish_map(&map, &stamp);
         }
     }
 
-    fn publish_state(&mut self, view: &VehicleView, place: &Place) {
+    fn publish_state(&mut self, node: &RosNode, view: &VehicleView, place: &Place) {
         let stamp = &place.stamp;
         if self.path.subscribers() > 0 {
             self.path.publish(path(&self.track, header(stamp.clone(), MAP_FRAME)));
@@ -191,7 +191,7 @@ impl VehicleTopics {
             self.plan.publish(path(&ahead, header(stamp.clone(), MAP_FRAME)));
         }
         if self.diagnostics.subscribers() > 0 {
-            let health = view.health.iter().cloned();
+            let health = view.health.iter().cloned().chain([node.health()]);
             self.diagnostics.publish(diagnostics(health, "vehicle", header(stamp.clone(), "")));
         }
     }
@@ -201,7 +201,7 @@ impl VehicleTopics {
         self.last_map = Some(Instant::now());
         let header = || header(stamp.clone(), MAP_FRAME);
         let Some(grid) = self.published.grid(map) else { return };
-        // One that DDS refused is tried again.
+        // One that was refused is tried again.
         let done = [
             due[0] && self.labels.publish(occupancy(&grid, header())),
             due[1] && self.layers.publish(layers(&grid, header())),

@@ -54,9 +54,12 @@ pub fn random_bits() -> u64 {
     RandomState::new().build_hasher().finish()
 }
 
+/// The log without `RUST_LOG`. Zenoh reports each session and each connection.
+const LOG_LEVELS: &str = "info,zenoh=warn";
+
 /// Runs a future to its end, with log lines on the standard error output as `RUST_LOG` asks.
 pub fn block_on<T>(future: impl Future<Output = Result<T, UserError>>) -> Result<T, UserError> {
-    let filter = tracing_subscriber::EnvFilter::try_from_default_env().unwrap_or_else(|_| "info".into());
+    let filter = tracing_subscriber::EnvFilter::try_from_default_env().unwrap_or_else(|_| LOG_LEVELS.into());
     // A second command in the same process (as in tests) keeps the first one's log.
     // A log on a full disk must not end the process: a failed write would be reported on the same stream, and panic.
     let log = tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr);

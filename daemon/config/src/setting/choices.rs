@@ -139,6 +139,16 @@ choices! {
         Coarse,
     }
 
+    /// What carries ROS 2.
+    RosTransport "lowercase" {
+        /// DDS, as `rmw_fastrtps_cpp` and `rmw_cyclonedds_cpp` use it.
+        Dds,
+        /// Zenoh, as `rmw_zenoh_cpp` uses it.
+        Zenoh,
+        /// Both side by side.
+        Both,
+    }
+
     /// How the weight of a new label enters the sampler.
     BirthRule "lowercase" {
         /// As the paper's equation is written.

@@ -13,14 +13,14 @@ mod tables;
 mod texts;
 
 pub use choices::{
-    Authenticate, AutopilotKind, BirthRule, CameraStamps, MapCells, MapStream, ModemKind, OperatorScript, S2cMode,
-    WorldKind,
+    Authenticate, AutopilotKind, BirthRule, CameraStamps, MapCells, MapStream, ModemKind, OperatorScript, RosTransport,
+    S2cMode, WorldKind,
 };
 pub use debounce::Debounce;
 pub use labels::{LabelSource, Votes};
 pub use layers::LayerName;
 pub use ports::{GpsPort, HostPort};
-pub use ros2::{Remap, RosName};
+pub use ros2::{Remap, RosName, ZenohEndpoint};
 pub use sources::{CameraSource, NavigationSource};
 
 use crate::rule::Rule;

@@ -85,6 +85,45 @@ impl Setting for Vec<Remap> {
     }
 }
 
+/// The endpoint of a router of Zenoh, such as `tcp/localhost:7447`.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ZenohEndpoint(String);
+
+impl ZenohEndpoint {
+    pub fn parse(text: &str) -> Option<Self> {
+        let (host, port) = text.strip_prefix("tcp/")?.rsplit_once(':')?;
+        // Other characters have a meaning in endpoints.
+        let is_allowed = |b: u8| b.is_ascii_alphanumeric() || b".-_:[]".contains(&b);
+        let is_host = !host.is_empty() && host.len() <= MAX_NAME && host.bytes().all(is_allowed);
+        let is_port = port.parse::<u16>().is_ok_and(|port| port > 0);
+        (is_host && is_port).then(|| Self(text.to_owned()))
+    }
+}
+
+impl fmt::Display for ZenohEndpoint {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
+impl Setting for ZenohEndpoint {
+    fn read(value: &Value, _: &Rule) -> Option<Self> {
+        Self::parse(value.as_str()?)
+    }
+
+    fn write(&self) -> Value {
+        Value::String(self.0.clone())
+    }
+
+    fn allowed(_: &Rule) -> String {
+        "\"tcp/HOST:PORT\"".to_owned()
+    }
+
+    fn schema(_: &Rule) -> serde_json::Value {
+        json!({ "type": "string", "pattern": r"^tcp/[A-Za-z0-9._:\[\]-]+:[0-9]+$" })
+    }
+}
+
 impl Setting for Vec<IpAddr> {
     fn read(value: &Value, _: &Rule) -> Option<Self> {
         read_different(value, |v| v.as_str()?.parse().ok())
@@ -116,5 +155,13 @@ mod tests {
         let remap = Remap::parse("/scenecast/map:=/map").unwrap();
         assert_eq!((remap.from.as_str(), remap.to.as_str()), ("/scenecast/map", "/map"));
         assert!(Remap::parse("/a=/b").is_none() && Remap::parse("/a:=b").is_none());
+    }
+
+    #[test]
+    fn an_endpoint_of_zenoh_is_a_host_and_a_port() {
+        let is_endpoint = |text: &str| ZenohEndpoint::parse(text).is_some();
+        assert!(is_endpoint("tcp/localhost:7447") && is_endpoint("tcp/192.168.2.2:7447") && is_endpoint("tcp/[::1]:1"));
+        assert!(!is_endpoint("localhost:7447") && !is_endpoint("udp/a:7447") && !is_endpoint("tcp/a"));
+        assert!(!is_endpoint("tcp/:7447") && !is_endpoint("tcp/a:0") && !is_endpoint("tcp/a#iface=b:1"));
     }
 }

@@ -1,21 +1,26 @@
-//! The node: its threads, its peers, and the subscriptions and publishers at it.
+//! The node: its threads, its peers, and the subscriptions and publishers at it, on one transport or on both.
 
+mod health;
+mod peers;
 mod publisher;
+mod qos;
 mod watch;
 
+pub use peers::{Peers, Transport};
 pub use publisher::Publisher;
+pub use qos::Qos;
 
-use crate::inbox::{Filler, Inbox};
+use crate::dds::Dds;
+use crate::inbox::Inbox;
 use crate::names::remapped;
-use crate::qos::Qos;
 use crate::stop::Owned;
-use futures_util::StreamExt;
-use ros2_client::{Context, MessageTypeName, Node, NodeName, NodeOptions, Subscription};
-use rustdds::{DomainParticipantBuilder, RTPSEntity, TopicKind};
-use scenecast_config::{Remap, Ros2, RosName};
+use crate::zenoh::Zenoh;
+use scenecast_config::{Remap, Ros2, RosName, RosTransport};
 use scenecast_core::UserError;
 use scenecast_messages::Message;
-use std::collections::BTreeSet;
+use scenecast_outlets::Health;
+use std::any::Any;
+use std::sync::atomic::AtomicU64;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 use watch::Wanted;
@@ -31,38 +36,38 @@ pub struct RosNode {
 }
 
 /// The node, as its tasks share it.
-pub(crate) struct Shared {
-    node: Mutex<Node>,
-    context: Context,
+struct Shared {
+    dds: Option<Arc<Dds>>,
+    zenoh: Option<Arc<Zenoh>>,
     remaps: Vec<Remap>,
     namespace: RosName,
     /// The subscriptions, to report those without a publisher.
-    pub(crate) wanted: Mutex<Vec<Wanted>>,
+    wanted: Mutex<Vec<Wanted>>,
 }
 
-/// What DDS has found on its networks.
-#[derive(Debug, Clone, PartialEq, Eq, Default)]
-pub struct Peers {
-    /// Processes other than this one.
-    pub participants: usize,
-    /// Topic and type of their publishers, such as `/camera/image_raw` and `sensor_msgs/msg/Image`.
-    pub publishers: BTreeSet<(String, String)>,
+/// A subscription on one transport.
+pub(crate) struct Feed {
+    pub transport: Transport,
+    /// The number of its publishers now; `None` once it has ended.
+    pub publishers: Box<dyn Fn() -> Option<usize> + Send>,
+    /// Ends it when dropped.
+    pub ending: Box<dyn Any + Send + Sync>,
 }
 
 pub(crate) fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-fn failed(action: &str, error: &dyn std::fmt::Display) -> UserError {
+pub(crate) fn failed(action: &str, error: &dyn std::fmt::Display) -> UserError {
     UserError::Failed(format!("ROS 2: {action}: {error}"))
 }
 
 impl RosNode {
-    /// A node with this name in the domain and on the networks of the settings.
+    /// A node with this name in the domain, on the transports and networks of the settings.
     ///
     /// # Errors
     ///
-    /// No socket of the domain could be opened, or a thread did not start.
+    /// No socket of the domain could be opened, a thread did not start, or this build has no rmw_zenoh.
     pub fn start(settings: &Ros2, name: &str) -> Result<Self, UserError> {
         let runtime = tokio::runtime::Builder::new_multi_thread()
             .worker_threads(1)
@@ -70,30 +75,19 @@ impl RosNode {
             .enable_time()
             .build()
             .map_err(|e| failed("the thread did not start", &e))?;
-        let mut builder = DomainParticipantBuilder::new(settings.domain.into());
-        if !settings.networks.is_empty() {
-            builder = builder.with_only_networks(settings.networks.iter().copied());
-        }
-        let participant = builder.build().map_err(|e| failed("DDS did not start", &e))?;
-        let context = Context::from_domain_participant(participant).map_err(|e| failed("DDS did not start", &e))?;
-        let node_name = NodeName::new("/", name).map_err(|e| failed("the name of the node", &e))?;
-        let options = NodeOptions::new().enable_rosout(false);
-        let mut node = context.new_node(node_name, options).map_err(|e| failed("the node did not start", &e))?;
-        let spinner = node.spinner().map_err(|e| failed("the node did not start", &e))?;
-        runtime.spawn(async move {
-            if let Err(error) = spinner.spin().await {
-                tracing::error!("ROS 2: discovery ended: {error}");
-            }
-        });
+        let transport = settings.transport;
+        let dds = (transport != RosTransport::Zenoh).then(|| Dds::start(settings, name, runtime.handle().clone()));
+        let zenoh = (transport != RosTransport::Dds).then(|| Zenoh::start(settings, name));
         let shared = Arc::new(Shared {
-            node: Mutex::new(node),
-            context,
+            dds: dds.transpose()?,
+            zenoh: zenoh.transpose()?,
             remaps: settings.remaps.clone(),
             namespace: settings.namespace.clone(),
             wanted: Mutex::default(),
         });
-        runtime.spawn(watch::run(Arc::downgrade(&shared)));
-        tracing::info!("ROS 2: node {name} in domain {} of DDS", settings.domain);
+        runtime.spawn(watch::run(Arc::downgrade(&shared), settings.zenoh_router.to_string()));
+        let transports: Vec<String> = shared.peers().iter().map(|(transport, _)| transport.to_string()).collect();
+        tracing::info!("ROS 2: node {name} in domain {} of {}", settings.domain, transports.join(" and "));
         Ok(Self { shared, runtime: Some(runtime) })
     }
 
@@ -119,27 +113,38 @@ impl RosNode {
         crate::topic(&format!("{}/{name}", self.shared.namespace))
     }
 
-    /// What DDS has found.
+    /// The peers on all transports.
     pub fn peers(&self) -> Peers {
+        Peers::joined(self.shared.peers())
+    }
+
+    /// The peers on each transport of the node.
+    pub fn peers_by_transport(&self) -> Vec<(Transport, Peers)> {
         self.shared.peers()
+    }
+
+    /// Which transports see peers, as a part of diagnostics.
+    pub fn health(&self) -> Health {
+        health::health(&self.shared.peers(), self.shared.has_router())
     }
 
     /// Subscribes to a topic; its messages wait in the inbox, at most `capacity` of them.
     ///
     /// # Errors
     ///
-    /// DDS refuses the topic, for example since this process uses it with another type.
+    /// A transport refuses the topic, for example since this process uses it with another type.
     pub fn subscribe<M: Message>(&self, topic: &RosName, qos: Qos, capacity: usize) -> Result<Inbox<M>, UserError> {
         let name = remapped(topic, &self.shared.remaps);
-        let subscription = Arc::new(self.shared.subscription::<M>(name, qos)?);
         let (mut inbox, filler) = Inbox::new(capacity);
-        let weak = Arc::downgrade(&subscription);
-        let publishers = move |node: &Node| Some(weak.upgrade()?.get_publisher_count(node));
-        let wanted = Wanted::new(name.as_str().to_owned(), M::DEFINITION.full_name(), Box::new(publishers));
+        let mut counts = Vec::new();
+        let dds = self.shared.dds.as_ref().map(|dds| dds.subscribe(name, qos, filler.clone())).transpose()?;
+        let zenoh = self.shared.zenoh.as_ref().map(|zenoh| zenoh.subscribe(name, qos, filler)).transpose()?;
+        for Feed { transport, publishers, ending } in dds.into_iter().chain(zenoh) {
+            counts.push((transport, publishers));
+            inbox.feeds.push(ending);
+        }
+        let wanted = Wanted::new(name.as_str().to_owned(), M::DEFINITION.full_name(), counts);
         locked(&self.shared.wanted).push(wanted);
-        let task = fill(subscription, filler, name.as_str().to_owned());
-        let runtime = self.runtime.as_ref().ok_or_else(|| UserError::Failed("ROS 2 has ended".to_owned()))?;
-        inbox.filler = Some(runtime.spawn(task).abort_handle());
         Ok(inbox)
     }
 
@@ -147,13 +152,14 @@ impl RosNode {
     ///
     /// # Errors
     ///
-    /// DDS refuses the topic.
+    /// A transport refuses the topic.
     pub fn publisher<M: Message>(&self, topic: &RosName, qos: Qos) -> Result<Publisher<M>, UserError> {
         let name = remapped(topic, &self.shared.remaps);
-        let (dds_topic, mut node) = self.shared.topic::<M>(name, qos)?;
-        let publisher = node.create_publisher(&dds_topic, None).map_err(|e| failed(name.as_str(), &e))?;
-        drop(node);
-        Ok(Publisher::new(publisher, self.shared.clone()))
+        Ok(Publisher {
+            dds: self.shared.dds.as_ref().map(|dds| dds.publisher(name, qos)).transpose()?,
+            zenoh: self.shared.zenoh.as_ref().map(|zenoh| zenoh.publisher::<M>(name, qos)).transpose()?,
+            refused: AtomicU64::new(0),
+        })
     }
 }
 
@@ -167,73 +173,13 @@ impl Drop for RosNode {
 }
 
 impl Shared {
-    pub(crate) fn node(&self) -> MutexGuard<'_, Node> {
-        locked(&self.node)
+    fn peers(&self) -> Vec<(Transport, Peers)> {
+        let dds = self.dds.iter().map(|dds| (Transport::Dds, dds.peers()));
+        dds.chain(self.zenoh.iter().map(|zenoh| (Transport::Zenoh, zenoh.peers()))).collect()
     }
 
-    fn topic<M: Message>(&self, name: &RosName, qos: Qos) -> Result<(rustdds::Topic, MutexGuard<'_, Node>), UserError> {
-        let definition = M::DEFINITION;
-        let (dds_name, message) =
-            (format!("rt{}", name.as_str()), MessageTypeName::new(definition.package, definition.name));
-        let participant = self.context.domain_participant();
-        let topic = participant.create_topic(dds_name, message.dds_msg_type(), &qos.policies(), TopicKind::NoKey);
-        let topic = topic.map_err(|e| failed(name.as_str(), &e))?;
-        let node = self.node();
-        Ok((topic, node))
-    }
-
-    fn subscription<M: Message>(&self, name: &RosName, qos: Qos) -> Result<Subscription<M>, UserError> {
-        let (topic, mut node) = self.topic::<M>(name, qos)?;
-        node.create_subscription(&topic, None).map_err(|e| failed(name.as_str(), &e))
-    }
-
-    pub(crate) fn peers(&self) -> Peers {
-        let participant = self.context.domain_participant();
-        let own = participant.guid_prefix();
-        let (writers, readers) = (participant.discovered_writers(), participant.discovered_readers());
-        let writers = || writers.iter().map(|w| &w.publication_topic_data).filter(|w| w.key.prefix != own);
-        let reading = readers.iter().map(|r| r.subscription_topic_data.key().prefix).filter(|prefix| *prefix != own);
-        let participants: BTreeSet<_> = writers().map(|w| w.key.prefix).chain(reading).collect();
-        let publishers = writers().filter_map(|w| Some((ros_topic(&w.topic_name)?, ros_type(&w.type_name))));
-        Peers { participants: participants.len(), publishers: publishers.collect() }
-    }
-}
-
-/// `rt/map` as `/map`; `None` for what is no topic of messages.
-fn ros_topic(dds_name: &str) -> Option<String> {
-    dds_name.strip_prefix("rt").filter(|name| name.starts_with('/')).map(str::to_owned)
-}
-
-/// `std_msgs::msg::dds_::Header_` as `std_msgs/msg/Header`.
-fn ros_type(dds_name: &str) -> String {
-    dds_name.trim_end_matches('_').replace("::dds_::", "::").replace("::", "/")
-}
-
-async fn fill<M: Message>(subscription: Arc<Subscription<M>>, filler: Filler<M>, topic: String) {
-    let mut samples = std::pin::pin!(subscription.async_stream());
-    while let Some(sample) = samples.next().await {
-        match sample {
-            Ok((message, _)) => filler.put(message),
-            Err(error) => {
-                let count = filler.put_malformed();
-                // 1, 2, 4, 8, ...: a publisher of another type must not fill the log.
-                if count.is_power_of_two() {
-                    tracing::warn!("ROS 2: {topic}: {count} samples are no {}: {error}", M::DEFINITION.full_name());
-                }
-            }
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn names_on_dds_become_names_of_ros() {
-        assert_eq!(ros_topic("rt/camera/image_raw").as_deref(), Some("/camera/image_raw"));
-        assert_eq!(ros_topic("rq/get_parametersRequest"), None);
-        assert_eq!(ros_topic("ros_discovery_info"), None);
-        assert_eq!(ros_type("sensor_msgs::msg::dds_::Image_"), "sensor_msgs/msg/Image");
+    /// Whether rmw_zenoh has its router; `None` if it is not used.
+    fn has_router(&self) -> Option<bool> {
+        self.zenoh.as_ref().map(|zenoh| zenoh.has_router())
     }
 }

@@ -1,37 +1,36 @@
 //! Publishers that never wait.
 
-use super::Shared;
-use scenecast_messages::Message;
-use std::sync::Arc;
+use crate::dds::DdsPublisher;
+use crate::zenoh::ZenohPublisher;
+use scenecast_messages::{Message, encode};
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// A publisher of one topic.
+/// A publisher of one topic, on every transport of the node.
 pub struct Publisher<M: Message> {
-    publisher: ros2_client::Publisher<M>,
-    shared: Arc<Shared>,
-    refused: AtomicU64,
+    pub(super) dds: Option<DdsPublisher<M>>,
+    pub(super) zenoh: Option<ZenohPublisher>,
+    pub(super) refused: AtomicU64,
 }
 
 impl<M: Message> Publisher<M> {
-    pub(crate) fn new(publisher: ros2_client::Publisher<M>, shared: Arc<Shared>) -> Self {
-        Self { publisher, shared, refused: AtomicU64::new(0) }
-    }
-
     /// The number of subscribers now.
     pub fn subscribers(&self) -> usize {
-        self.publisher.get_subscription_count(&self.shared.node())
+        let dds = self.dds.as_ref().map_or(0, DdsPublisher::subscribers);
+        dds + self.zenoh.as_ref().map_or(0, ZenohPublisher::subscribers)
     }
 
-    /// Publishes a message; returns whether DDS took it. It refuses one while its window to a slow subscriber is full.
+    /// Publishes a message; returns whether every transport took it. DDS refuses one while its window to a slow subscriber is
+    /// full.
     pub fn publish(&self, message: M) -> bool {
-        let published = self.publisher.publish(message);
-        if published.is_err() {
+        let by_zenoh = self.zenoh.as_ref().is_none_or(|zenoh| !zenoh.is_wanted() || zenoh.publish(encode(&message)));
+        let is_published = self.dds.as_ref().is_none_or(|dds| dds.publish(message)) && by_zenoh;
+        if !is_published {
             self.refused.fetch_add(1, Ordering::Relaxed);
         }
-        published.is_ok()
+        is_published
     }
 
-    /// Messages that DDS refused.
+    /// Messages that a transport refused.
     pub fn refused(&self) -> u64 {
         self.refused.load(Ordering::Relaxed)
     }

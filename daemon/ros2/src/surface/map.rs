@@ -1,8 +1,8 @@
 //! The operator's map of one vehicle: labels, layers and cloud.
 
 use super::Desk;
+use crate::node::Qos;
 use crate::node::{Publisher, RosNode};
-use crate::qos::Qos;
 use scenecast_console::state::{MapLabel, VehicleState};
 use scenecast_console::{ClientRequest, MapCells, Reply, SurfaceRequest};
 use scenecast_core::{UserError, palette};
@@ -72,7 +72,7 @@ impl MapTopics {
         };
         self.is_too_large = false;
         let colour = |label| key.colours.iter().find(|c| c.0 == label).map_or(palette::colour(label), |c| c.1);
-        // One that DDS refused is tried again.
+        // One that was refused is tried again.
         if due[0] && self.labels.0.publish(occupancy(&grid, header())) {
             self.labels.1 = Some(key.clone());
         }

@@ -40,7 +40,7 @@ pub struct SurfaceOutlet {
     _thread: Owner,
 }
 
-/// Joins ROS 2, as soon as DDS starts: the surface does not wait for it. Orders are taken in the name of `principal`; without
+/// Joins ROS 2, as soon as its transports start: the surface does not wait for them. Orders are taken in the name of `principal`; without
 /// one, none are. `vehicles` are those of the configuration, by address and name.
 ///
 /// # Errors
@@ -87,7 +87,7 @@ struct Worker {
     desk: Desk,
     snapshots: watch::Receiver<Arc<Snapshot>>,
     parts: Parts,
-    /// By address; `None` if DDS refused a topic, or another vehicle has its topics.
+    /// By address; `None` if a topic was refused, or another vehicle has its topics.
     vehicles: BTreeMap<u8, Option<VehicleTopics>>,
 }
 
@@ -113,7 +113,7 @@ impl Worker {
             });
             if let Some(topics) = topics {
                 topics.handle_orders(&self.desk, vehicle, stamps);
-                topics.publish(&self.desk, &snapshot.state, vehicle, stamps);
+                topics.publish(&self.node, &self.desk, &snapshot.state, vehicle, stamps);
             }
         }
     }

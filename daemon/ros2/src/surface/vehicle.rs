@@ -7,8 +7,8 @@ use super::orders::OrderTopics;
 use super::stamps::Stamps;
 use super::state::StateTopics;
 use crate::node::Publisher;
+use crate::node::Qos;
 use crate::node::RosNode;
-use crate::qos::Qos;
 use scenecast_console::state::{MissionState, OrderStatus, VehicleState};
 use scenecast_console::{ClientRequest, Reply, SurfaceRequest};
 use scenecast_core::UserError;
@@ -74,7 +74,14 @@ impl VehicleTopics {
     }
 
     /// Publishes what has changed and has subscribers.
-    pub fn publish(&mut self, desk: &Desk, mission: &MissionState, vehicle: &VehicleState, stamps: &Stamps) {
+    pub fn publish(
+        &mut self,
+        node: &RosNode,
+        desk: &Desk,
+        mission: &MissionState,
+        vehicle: &VehicleState,
+        stamps: &Stamps,
+    ) {
         let confirmed = vehicle.map.updated_s.map_or_else(|| stamps.now(), |at| stamps.at(at));
         self.map.publish(desk, vehicle, || header(confirmed.clone(), WORLD_FRAME));
         self.state.publish(mission, vehicle, stamps);
@@ -83,7 +90,7 @@ impl VehicleTopics {
         let is_due = self.last_diagnostics.is_none_or(|last| last.elapsed() >= DIAGNOSTICS_INTERVAL);
         if is_due && self.diagnostics.subscribers() > 0 {
             self.last_diagnostics = Some(Instant::now());
-            let parts = health(vehicle, stamps.now_s());
+            let parts = health(vehicle, stamps.now_s()).into_iter().chain([node.health()]);
             self.diagnostics.publish(diagnostics(parts, &vehicle.name, header(stamps.now(), "")));
         }
     }
@@ -106,7 +113,7 @@ impl VehicleTopics {
             Some(Reply::File(_, webp)) => {
                 let header = header(stamps.at(image.at_s), &format!("label_{label}"));
                 if exemplar_jpeg(&webp, header).is_some_and(|message| !self.exemplars.publish(message)) {
-                    // DDS refused it: it is tried again.
+                    // It was refused: it is tried again.
                     return;
                 }
             }

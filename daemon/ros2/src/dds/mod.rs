@@ -1,0 +1,139 @@
+//! ROS 2 by DDS, as `rmw_fastrtps_cpp` and `rmw_cyclonedds_cpp` speak it.
+
+mod names;
+mod qos;
+
+use crate::inbox::Filler;
+use crate::node::{Feed, Peers, Qos, Transport, failed, locked};
+use futures_util::StreamExt;
+pub(crate) use names::ros_type;
+use names::{dds_topic, ros_topic};
+use ros2_client::{Context, MessageTypeName, Node, NodeName, NodeOptions, Subscription};
+use rustdds::{DomainParticipantBuilder, RTPSEntity, TopicKind};
+use scenecast_config::{Ros2, RosName};
+use scenecast_core::UserError;
+use scenecast_messages::Message;
+use std::collections::BTreeSet;
+use std::sync::{Arc, Mutex, MutexGuard};
+use tokio::runtime::Handle;
+
+/// A participant of a domain, with one node.
+pub(crate) struct Dds {
+    node: Mutex<Node>,
+    context: Context,
+    /// Runs discovery and the subscriptions.
+    runtime: Handle,
+}
+
+/// A publisher of one topic.
+pub(crate) struct DdsPublisher<M: Message> {
+    publisher: ros2_client::Publisher<M>,
+    dds: Arc<Dds>,
+}
+
+impl Dds {
+    /// # Errors
+    ///
+    /// No socket of the domain could be opened, or the name of the node is not allowed.
+    pub fn start(settings: &Ros2, name: &str, runtime: Handle) -> Result<Arc<Self>, UserError> {
+        let mut builder = DomainParticipantBuilder::new(settings.domain.into());
+        if !settings.networks.is_empty() {
+            builder = builder.with_only_networks(settings.networks.iter().copied());
+        }
+        let participant = builder.build().map_err(|e| failed("DDS did not start", &e))?;
+        let context = Context::from_domain_participant(participant).map_err(|e| failed("DDS did not start", &e))?;
+        let node_name = NodeName::new("/", name).map_err(|e| failed("the name of the node", &e))?;
+        let options = NodeOptions::new().enable_rosout(false);
+        let mut node = context.new_node(node_name, options).map_err(|e| failed("the node did not start", &e))?;
+        let spinner = node.spinner().map_err(|e| failed("the node did not start", &e))?;
+        runtime.spawn(async move {
+            if let Err(error) = spinner.spin().await {
+                tracing::error!("ROS 2: discovery ended: {error}");
+            }
+        });
+        Ok(Arc::new(Self { node: Mutex::new(node), context, runtime }))
+    }
+
+    /// A subscription that fills an inbox.
+    ///
+    /// # Errors
+    ///
+    /// DDS refuses the topic, for example since this process uses it with another type.
+    pub fn subscribe<M: Message>(
+        self: &Arc<Self>,
+        name: &RosName,
+        qos: Qos,
+        filler: Filler<M>,
+    ) -> Result<Feed, UserError> {
+        let (topic, mut node) = self.topic::<M>(name, qos)?;
+        let subscription = node.create_subscription(&topic, None).map_err(|e| failed(name.as_str(), &e))?;
+        drop(node);
+        let subscription = Arc::new(subscription);
+        let (weak, dds) = (Arc::downgrade(&subscription), Arc::downgrade(self));
+        let publishers = move || Some(weak.upgrade()?.get_publisher_count(&dds.upgrade()?.node()));
+        let task = self.runtime.spawn(fill(subscription, filler, name.as_str().to_owned()));
+        let ending = Box::new(AbortOnDrop(task.abort_handle()));
+        Ok(Feed { transport: Transport::Dds, publishers: Box::new(publishers), ending })
+    }
+
+    /// # Errors
+    ///
+    /// DDS refuses the topic.
+    pub fn publisher<M: Message>(self: &Arc<Self>, name: &RosName, qos: Qos) -> Result<DdsPublisher<M>, UserError> {
+        let (topic, mut node) = self.topic::<M>(name, qos)?;
+        let publisher = node.create_publisher(&topic, None).map_err(|e| failed(name.as_str(), &e))?;
+        drop(node);
+        Ok(DdsPublisher { publisher, dds: self.clone() })
+    }
+
+    fn node(&self) -> MutexGuard<'_, Node> {
+        locked(&self.node)
+    }
+
+    fn topic<M: Message>(&self, name: &RosName, qos: Qos) -> Result<(rustdds::Topic, MutexGuard<'_, Node>), UserError> {
+        let definition = M::DEFINITION;
+        let message = MessageTypeName::new(definition.package, definition.name);
+        let (dds_name, dds_type) = (dds_topic(name.as_str()), message.dds_msg_type());
+        let participant = self.context.domain_participant();
+        let topic = participant.create_topic(dds_name, dds_type, &qos::policies(qos), TopicKind::NoKey);
+        Ok((topic.map_err(|e| failed(name.as_str(), &e))?, self.node()))
+    }
+
+    /// What DDS has found on its networks.
+    pub fn peers(&self) -> Peers {
+        let participant = self.context.domain_participant();
+        let own = participant.guid_prefix();
+        let (writers, readers) = (participant.discovered_writers(), participant.discovered_readers());
+        let writers = || writers.iter().map(|w| &w.publication_topic_data).filter(|w| w.key.prefix != own);
+        let reading = readers.iter().map(|r| r.subscription_topic_data.key().prefix).filter(|prefix| *prefix != own);
+        let participants: BTreeSet<_> = writers().map(|w| w.key.prefix).chain(reading).collect();
+        let publishers = writers().filter_map(|w| Some((ros_topic(&w.topic_name)?, ros_type(&w.type_name))));
+        Peers { participants: participants.len(), publishers: publishers.collect() }
+    }
+}
+
+impl<M: Message> DdsPublisher<M> {
+    pub fn subscribers(&self) -> usize {
+        self.publisher.get_subscription_count(&self.dds.node())
+    }
+
+    /// Returns whether DDS took the message. It refuses one while its window to a slow subscriber is full.
+    pub fn publish(&self, message: M) -> bool {
+        self.publisher.publish(message).is_ok()
+    }
+}
+
+struct AbortOnDrop(tokio::task::AbortHandle);
+
+impl Drop for AbortOnDrop {
+    fn drop(&mut self) {
+        self.0.abort();
+    }
+}
+
+async fn fill<M: Message>(subscription: Arc<Subscription<M>>, filler: Filler<M>, topic: String) {
+    let mut samples = std::pin::pin!(subscription.async_stream());
+    while let Some(sample) = samples.next().await {
+        filler.put_read(sample.map(|(message, _)| message), &topic);
+    }
+}

@@ -1,0 +1,49 @@
+//! Peers, by the transport that sees them.
+
+use std::collections::BTreeSet;
+use std::fmt;
+
+/// What carries the messages of ROS 2.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Transport {
+    /// `rmw_fastrtps_cpp`, `rmw_cyclonedds_cpp` and others.
+    Dds,
+    /// `rmw_zenoh_cpp`.
+    Zenoh,
+}
+
+impl fmt::Display for Transport {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Dds => "DDS",
+            Self::Zenoh => "rmw_zenoh",
+        })
+    }
+}
+
+/// Peers that were found.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Peers {
+    /// Processes other than this one.
+    pub participants: usize,
+    /// Topic and type of their publishers, such as `/camera/image_raw` and `sensor_msgs/msg/Image`.
+    pub publishers: BTreeSet<(String, String)>,
+}
+
+impl Peers {
+    /// The peers of all transports together.
+    pub(crate) fn joined(by_transport: Vec<(Transport, Self)>) -> Self {
+        by_transport.into_iter().fold(Self::default(), |mut all, (_, peers)| {
+            all.participants += peers.participants;
+            all.publishers.extend(peers.publishers);
+            all
+        })
+    }
+}
+
+/// The number of peers for people, such as `2 on DDS, 0 on rmw_zenoh`.
+pub(crate) fn counts(by_transport: &[(Transport, Peers)]) -> String {
+    let counts: Vec<String> =
+        by_transport.iter().map(|(by, peers)| format!("{} on {by}", peers.participants)).collect();
+    counts.join(", ")
+}

@@ -1,0 +1,116 @@
+//! The nodes, publishers and subscriptions of other sessions, by their liveliness tokens.
+
+use super::keys::{Endpoint, Kind, NO_HASH, Token};
+use crate::dds::ros_type;
+use crate::node::{Peers, locked};
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Mutex;
+
+/// Tokens that are kept at most; a large robot has some hundred.
+const MAX_TOKENS: usize = 20_000;
+
+/// What the tokens of a domain say, without those of this session.
+#[derive(Debug)]
+pub(super) struct Graph {
+    own_session: String,
+    tokens: Mutex<BTreeMap<String, Token>>,
+}
+
+impl Graph {
+    pub fn new(own_session: String) -> Self {
+        Self { own_session, tokens: Mutex::default() }
+    }
+
+    /// A token appeared.
+    pub fn insert(&self, key: &str) {
+        let Some(token) = Token::parse(key).filter(|token| token.session != self.own_session) else { return };
+        let mut tokens = locked(&self.tokens);
+        if tokens.len() < MAX_TOKENS {
+            tokens.insert(key.to_owned(), token);
+        }
+    }
+
+    /// A token disappeared.
+    pub fn remove(&self, key: &str) {
+        locked(&self.tokens).remove(key);
+    }
+
+    pub fn peers(&self) -> Peers {
+        let tokens = locked(&self.tokens);
+        let sessions: BTreeSet<&str> = tokens.values().map(|token| token.session.as_str()).collect();
+        let publishers = tokens.values().filter(|token| token.kind == Kind::Publisher);
+        let publishers = publishers.filter_map(|token| token.endpoint.as_ref());
+        let publishers = publishers.map(|endpoint| (endpoint.topic.clone(), ros_type(&endpoint.dds_type)));
+        Peers { participants: sessions.len(), publishers: publishers.collect() }
+    }
+
+    /// The peers of this kind at the same topic, with the same type and definition or without a type hash.
+    pub fn count(&self, kind: Kind, at: &Endpoint) -> usize {
+        self.matching(kind, at, &[&at.hash, NO_HASH])
+    }
+
+    /// Those of them that have no type hash.
+    pub fn count_without_hash(&self, kind: Kind, at: &Endpoint) -> usize {
+        self.matching(kind, at, &[NO_HASH])
+    }
+
+    fn matching(&self, kind: Kind, at: &Endpoint, hashes: &[&str]) -> usize {
+        let tokens = locked(&self.tokens);
+        let endpoints = tokens.values().filter(|token| token.kind == kind).filter_map(|token| token.endpoint.as_ref());
+        let same = |other: &&Endpoint| other.topic == at.topic && other.dds_type == at.dds_type;
+        endpoints.filter(same).filter(|other| hashes.contains(&other.hash.as_str())).count()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn token(session: &str, id: u32, kind: &str, topic: &str, hash: &str) -> String {
+        format!("@ros2_lv/0/{session}/0/{id}/{kind}/%/%/node/{topic}/sensor_msgs::msg::dds_::Image_/{hash}/::,5:,:,:,,")
+    }
+
+    fn endpoint(topic: &str) -> Endpoint {
+        let dds_type = "sensor_msgs::msg::dds_::Image_".to_owned();
+        Endpoint { topic: topic.to_owned(), dds_type, hash: "RIHS01_a".to_owned() }
+    }
+
+    #[test]
+    fn the_graph_has_the_publishers_of_other_sessions() {
+        let graph = Graph::new("own".to_owned());
+        let tokens = [
+            token("own", 1, "MP", "%image", "RIHS01_a"),
+            token("b", 1, "MP", "%image", "RIHS01_a"),
+            token("b", 2, "MP", "%front%image", "RIHS01_a"),
+            token("c", 1, "MS", "%image", NO_HASH),
+            "@ros2_lv/0/c/0/0/NN/%/%/node".to_owned(),
+        ];
+        tokens.iter().for_each(|token| graph.insert(token));
+        let peers = graph.peers();
+        assert_eq!(peers.participants, 2);
+        let image = "sensor_msgs/msg/Image";
+        let expected = ["/front/image", "/image"].map(|topic| (topic.to_owned(), image.to_owned()));
+        assert_eq!(peers.publishers.into_iter().collect::<Vec<_>>(), expected);
+        tokens.iter().for_each(|token| graph.remove(token));
+        assert_eq!(graph.peers(), Peers::default());
+    }
+
+    #[test]
+    fn publishers_of_another_definition_do_not_count() {
+        let graph = Graph::new("own".to_owned());
+        for (id, hash) in [(1, "RIHS01_a"), (2, "RIHS01_b"), (3, NO_HASH)] {
+            graph.insert(&token("b", id, "MP", "%image", hash));
+        }
+        assert_eq!(graph.count(Kind::Publisher, &endpoint("/image")), 2);
+        assert_eq!(graph.count_without_hash(Kind::Publisher, &endpoint("/image")), 1);
+        assert_eq!(graph.count(Kind::Publisher, &endpoint("/other")), 0);
+        assert_eq!(graph.count(Kind::Subscription, &endpoint("/image")), 0);
+    }
+
+    #[test]
+    fn the_graph_is_bounded() {
+        let graph = Graph::new("own".to_owned());
+        (0..MAX_TOKENS as u32 + 5).for_each(|id| graph.insert(&token("b", id, "MP", "%image", "RIHS01_a")));
+        assert_eq!(graph.count(Kind::Publisher, &endpoint("/image")), MAX_TOKENS);
+    }
+}
