@@ -26,7 +26,12 @@ impl SensorNode {
         Self { settings: settings.clone(), node: Mutex::default() }
     }
 
-    fn get(&self) -> Result<Arc<RosNode>, SourceError> {
+    /// The node, which starts now if it has not.
+    ///
+    /// # Errors
+    ///
+    /// DDS does not start.
+    pub fn get(&self) -> Result<Arc<RosNode>, SourceError> {
         let mut node = self.node.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(node) = &*node {
             return Ok(node.clone());

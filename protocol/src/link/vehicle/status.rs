@@ -46,10 +46,9 @@ impl StatusSender {
 
     /// Sends each pose and each report in so many frames, as far as the share of the budget allows it. Where the ends take
     /// no turns, the loss of a frame is known late, and several in a row would leave the surface without a status for long.
-    pub(super) fn set_copies(&mut self, wanted: u32) {
-        let Some(status) = &self.status else { return };
+    pub(super) fn set_copies(&mut self, wanted: u32, budget_bps: u32) {
         let (_, report) = self.reported.unwrap_or((Instant::ZERO, VehicleStatus::POSE));
-        let share = time_of_share(status.budget_bps, report.max(VehicleStatus::POSE));
+        let share = time_of_share(budget_bps, report.max(VehicleStatus::POSE));
         let affordable = self.period.as_micros() / share.as_micros().max(1);
         self.copies.each = wanted.min(affordable as u32).max(1);
     }

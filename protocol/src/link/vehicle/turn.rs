@@ -187,7 +187,8 @@ impl<S: StateSource> VehicleLink<S> {
         let mut carried = Carried::new();
         if !sends_hello {
             if modem.access == Access::FullDuplex {
-                self.content.status.set_copies(self.pair.stats.loss_out.copies(STATUS_LOSS_RISK, MAX_STATUS_COPIES));
+                let copies = self.pair.stats.loss_out.copies(STATUS_LOSS_RISK, MAX_STATUS_COPIES);
+                self.content.status.set_copies(copies, self.budget.bits_per_s());
             }
             let (slots, refused_frames) = (self.inbox.reports(), self.pair.stats.refused());
             let context = FillContext { budget: &self.budget, slots, refused_frames, now };
