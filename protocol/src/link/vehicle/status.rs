@@ -11,6 +11,9 @@ const SHARE: f64 = 1.0 / 40.0;
 /// of the map. Reports of other decisions, and poses, are not delayed by it.
 const SMALL_BUDGET_BPS: u32 = 250;
 
+/// Intervals between two copies in a period: copies apart from each other are not lost together.
+const COPY_INTERVALS: u32 = 8;
+
 /// Sends the latest status at most once a period, and with at most a twentieth of the bit budget.
 #[derive(Debug)]
 pub(super) struct StatusSender {
@@ -45,7 +48,7 @@ impl StatusSender {
     }
 
     /// Sends each pose and each report in so many frames, as far as the share of the budget allows it. Where the ends take
-    /// no turns, the loss of a frame is known late, and several in a row would leave the surface without a status for long.
+    /// no turns, the loss of a frame is known late, and two in a row would leave the surface without a status for long.
     pub(super) fn set_copies(&mut self, wanted: u32, budget_bps: u32) {
         let (_, report) = self.reported.unwrap_or((Instant::ZERO, VehicleStatus::POSE));
         let share = time_of_share(budget_bps, report.max(VehicleStatus::POSE));
@@ -124,6 +127,7 @@ impl StatusSender {
         self.reported = Some((now, bytes.len()));
         if is_whole && self.copies.reports > 1 {
             self.copies.reports -= 1;
+            self.report_due = now + self.period / COPY_INTERVALS;
         } else if next == 0 {
             self.report_due = now + self.period.max(time_of_report(status.budget_bps, bytes.len()));
             self.copies.reports = self.copies.each;
@@ -152,6 +156,7 @@ impl StatusSender {
         let pose = bytes.len().min(VehicleStatus::POSE);
         if self.copies.poses > 1 {
             self.copies.poses -= 1;
+            self.pose_due = now + self.period / COPY_INTERVALS;
             return Some(length);
         }
         self.pose_due = now + self.period.max(time_of_share(status.budget_bps, pose));
