@@ -1,7 +1,9 @@
 //! Conditions that several keys must satisfy together.
 
 use crate::key::Key;
-use crate::{Authenticate, AutopilotKind, CameraSource, Config, ModemKind, NavigationSource};
+use crate::{
+    Authenticate, AutopilotKind, CameraSource, Config, LabelMessage, LabelSource, ModemKind, NavigationSource,
+};
 use scenecast_core::{PortAddress, UserError};
 
 /// The longest time on air of a frame, seconds.
@@ -22,6 +24,7 @@ pub(crate) fn check_together(config: &Config) -> Result<(), UserError> {
     crate::modem::check(config)?;
     check_ports(config)?;
     check_camera(config)?;
+    check_labels(config)?;
     check_frame(config)?;
     check_airtime(config)
 }
@@ -97,6 +100,26 @@ fn check_navigation(config: &Config) -> Result<(), UserError> {
     };
     let text = format!("{name} = {given} is not allowed with navigation.source = {source}; allowed: {allowed}");
     Err(UserError::Input(text))
+}
+
+/// Bands have no segmented images, and names of classes belong to labels of another program.
+fn check_labels(config: &Config) -> Result<(), UserError> {
+    let value = |name: &str| Key::find(name).map(|key| key.value(config).to_string()).unwrap_or_default();
+    if matches!(config.bands.source, LabelSource::Ros2(_, Some(LabelMessage::Image))) {
+        let text = format!("bands.source = {} is not allowed: an image has no place", value("bands.source"));
+        return Err(UserError::Input(format!("{text}; allowed: #GridMap and #OccupancyGrid")));
+    }
+    if config.labels.classes.is_some() && config.labels.source == LabelSource::SceneModel {
+        let text = format!("labels.classes = {} is not allowed with an empty labels.source", value("labels.classes"));
+        return Err(UserError::Input(format!("{text}: the operator names the scene model's labels")));
+    }
+    match config.bands.source != LabelSource::SceneModel && config.bands.source == config.labels.source {
+        true => Err(UserError::Input(format!(
+            "bands.source = {} is that of labels.source, which gives bands too; set one of them",
+            value("bands.source")
+        ))),
+        false => Ok(()),
+    }
 }
 
 fn camera(config: &Config) -> String {

@@ -1,6 +1,6 @@
 //! Labels of another program in a folder: `NAME.json` with its picture `NAME.png` or `NAME.bin`.
 
-use scenecast_labels::{Item, MAX_HEADER_BYTES, MAX_PICTURE_BYTES, Refusal};
+use scenecast_labels::{Item, ItemTime, MAX_HEADER_BYTES, MAX_PICTURE_BYTES, Refusal};
 use std::collections::{BTreeMap, BTreeSet};
 use std::io;
 use std::path::{Path, PathBuf};
@@ -89,9 +89,10 @@ impl LabelFolder {
         Some(written.elapsed().unwrap_or(Duration::ZERO))
     }
 
-    /// The mission time in the header of a name, if it has one.
-    pub fn time_of(&self, name: &str) -> Option<f64> {
-        Item::peek(&self.header(name).ok()?).ok()?.0
+    /// The time in the header of a name; that of its arrival if it cannot be read.
+    pub fn time_of(&self, name: &str) -> ItemTime {
+        let header = self.header(name).ok();
+        header.and_then(|header| Item::peek(&header).ok()).map_or(ItemTime::Arrival, |(time, _)| time)
     }
 
     /// The item of a name, and the lengths of its files; the picture's is `Some(0)` while it is missing.

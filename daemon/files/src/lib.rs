@@ -4,6 +4,7 @@
 
 mod bag;
 mod bag_recording;
+mod class_names;
 mod configured;
 mod frame_image;
 mod images;
@@ -14,6 +15,7 @@ mod whole;
 
 pub use bag::Bag;
 pub use bag_recording::{BagTiming, BagTopics};
+pub use class_names::read_class_names;
 pub use configured::{configured_mounting, configured_recording, open_bag};
 pub use frame_image::FrameImage;
 pub use images::{read_classes, read_image};

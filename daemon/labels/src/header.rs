@@ -1,7 +1,7 @@
 //! The header of an item: one JSON object.
 
-use crate::item::{Band, Content, Ground, ImagePose, Item};
-use crate::picture::{MAX_PICTURE_BYTES, Raster};
+use crate::item::{Band, BandScale, Content, Ground, ImagePose, Item, ItemTime, QuantityBand};
+use crate::picture::{MAX_PICTURE_BYTES, Raster, Values};
 use crate::{MAX_HEADER_BYTES, Refusal};
 use scenecast_protocol::map::{ClassEntry, Decimal, LayerDescriptor, MAX_CLASS};
 use serde::Deserialize;
@@ -12,6 +12,8 @@ use serde::Deserialize;
 struct Members {
     kind: Kind,
     t_s: Option<f64>,
+    time: Option<f64>,
+    age_s: Option<f64>,
     /// Length of the picture, for a stream.
     bytes: Option<u64>,
     #[serde(default)]
@@ -31,7 +33,10 @@ struct Members {
     unit: String,
     scale: Option<f64>,
     offset: Option<f64>,
-    no_data: Option<u8>,
+    no_data: Option<u16>,
+    /// The levels of a band of 16 bits or of numbers.
+    low: Option<f64>,
+    step: Option<f64>,
     #[serde(default)]
     classes: Vec<NamedClass>,
 }
@@ -51,6 +56,10 @@ enum Encoding {
     #[default]
     Png,
     Raw,
+    /// Two bytes a pixel, the lower one first.
+    Raw16,
+    /// Numbers of IEEE 754 with four bytes, the lowest one first.
+    Float32,
 }
 
 #[derive(Debug, Deserialize)]
@@ -91,14 +100,14 @@ impl Header {
         }
     }
 
-    pub(crate) fn t_s(&self) -> Option<f64> {
-        self.0.t_s
+    pub(crate) fn time(&self) -> Result<ItemTime, Refusal> {
+        self.0.time()
     }
 
     /// The item with this picture.
     pub(crate) fn into_item(self, picture: &[u8]) -> Result<Item, Refusal> {
         let members = self.0;
-        let t_s = members.t_s.map(|t_s| within("t_s", t_s, 0.0, 1e9, "0 to 1e9 s")).transpose()?;
+        let time = members.time()?;
         let classes = members.classes.iter().map(entry).collect::<Result<Vec<_>, _>>()?;
         let content = match members.kind {
             Kind::Classes => Content::Classes,
@@ -110,27 +119,82 @@ impl Header {
                 Content::Image { pose: members.pose()?, metres_per_pixel, classes: members.classes_of(picture)? }
             }
             Kind::Grid => Content::Grid { ground: members.ground()?, classes: members.classes_of(picture)? },
-            Kind::Band => {
-                Content::Band { band: members.band()?, ground: members.ground()?, levels: members.raster(picture)? }
-            }
+            Kind::Band => members.band_content(picture)?,
         };
-        Ok(Item { t_s, classes, content })
+        Ok(Item { time, classes, content })
     }
 }
 
 impl Members {
-    fn raster(&self, picture: &[u8]) -> Result<Raster, Refusal> {
-        if picture.is_empty() || picture.len() > MAX_PICTURE_BYTES {
-            return Err(Refusal::PictureBytes(picture.len() as u64));
+    fn time(&self) -> Result<ItemTime, Refusal> {
+        Ok(match (self.t_s, self.time, self.age_s) {
+            (None, None, None) => ItemTime::Arrival,
+            (Some(t_s), None, None) => ItemTime::Mission(within("t_s", t_s, 0.0, 1e9, "0 to 1e9 s")?),
+            (None, Some(time), None) => ItemTime::Unix(within("time", time, 0.0, 1e11, "0 to 1e11 s")?),
+            (None, None, Some(age_s)) => ItemTime::Age(within("age_s", age_s, 0.0, 1e6, "0 to 1e6 s")?),
+            _ => return Err(Refusal::Times),
+        })
+    }
+
+    fn check_length(picture: &[u8]) -> Result<(), Refusal> {
+        match (1..=MAX_PICTURE_BYTES).contains(&picture.len()) {
+            true => Ok(()),
+            false => Err(Refusal::PictureBytes(picture.len() as u64)),
         }
+    }
+
+    fn size(&self) -> Result<(u32, u32), Refusal> {
+        let width = self.width.ok_or(Refusal::Missing("width"))?;
+        Ok((width, self.height.ok_or(Refusal::Missing("height"))?))
+    }
+
+    /// A picture of one byte a pixel.
+    fn raster(&self, picture: &[u8]) -> Result<Raster, Refusal> {
+        Self::check_length(picture)?;
         match self.encoding {
             Encoding::Png => Raster::png(picture),
             Encoding::Raw => {
-                let width = self.width.ok_or(Refusal::Missing("width"))?;
-                let height = self.height.ok_or(Refusal::Missing("height"))?;
-                Raster::raw(width, height, picture)
+                let (width, height) = self.size()?;
+                Raster::raw(width, height, picture, |[byte]| byte)
             }
+            Encoding::Raw16 => Err(Refusal::Depth("of 16 bits".to_owned())),
+            Encoding::Float32 => Err(Refusal::Depth("of numbers".to_owned())),
         }
+    }
+
+    fn band_content(&self, picture: &[u8]) -> Result<Content, Refusal> {
+        self.names()?;
+        Self::check_length(picture)?;
+        let ground = self.ground()?;
+        let words = match self.encoding {
+            Encoding::Png => match Values::png(picture)? {
+                Values::Words(words) => words,
+                Values::Bytes(levels) => return self.levels(ground, levels),
+            },
+            Encoding::Raw => return self.levels(ground, self.raster(picture)?),
+            Encoding::Raw16 => {
+                let (width, height) = self.size()?;
+                Raster::raw(width, height, picture, u16::from_le_bytes)?
+            }
+            Encoding::Float32 => {
+                let (width, height) = self.size()?;
+                let numbers = Raster::raw(width, height, picture, f32::from_le_bytes)?;
+                let (scale, offset) = self.scale_and_offset()?;
+                let quantities = numbers.map(|number| (offset + scale * f64::from(number)) as f32);
+                return Ok(Content::Quantities { band: self.quantity_band()?, ground, quantities });
+            }
+        };
+        let (scale, offset) = self.scale_and_offset()?;
+        let no_data = self.no_data.unwrap_or(u16::MAX);
+        let quantity = |word: u16| if word == no_data { f32::NAN } else { (offset + scale * f64::from(word)) as f32 };
+        Ok(Content::Quantities { band: self.quantity_band()?, ground, quantities: words.map(quantity) })
+    }
+
+    fn levels(&self, ground: Ground, levels: Raster) -> Result<Content, Refusal> {
+        if self.step.is_some() || self.low.is_some() {
+            return Err(Refusal::Scale);
+        }
+        Ok(Content::Band { band: self.band()?, ground, levels })
     }
 
     fn classes_of(&self, picture: &[u8]) -> Result<Raster, Refusal> {
@@ -164,19 +228,44 @@ impl Members {
         })
     }
 
+    fn scale_and_offset(&self) -> Result<(f64, f64), Refusal> {
+        let scale = within("scale", self.scale.unwrap_or(1.0), 1e-9, 1e9, "1e-9 to 1e9")?;
+        Ok((scale, within("offset", self.offset.unwrap_or(0.0), -1e9, 1e9, "-1e9 to 1e9")?))
+    }
+
+    fn quantity_band(&self) -> Result<QuantityBand, Refusal> {
+        let scale = match (self.low, self.step) {
+            (None, None) => None,
+            (Some(low), Some(step)) => {
+                let low = within("low", low, -1e9, 1e9, "-1e9 to 1e9")?;
+                let step = Decimal::nearest(within("step", step, 1e-9, 1e9, "1e-9 to 1e9")?);
+                Some(BandScale { low: Decimal::nearest(low).value(), step })
+            }
+            _ => return Err(Refusal::Scale),
+        };
+        let (name, unit) = self.names()?;
+        Ok(QuantityBand { name, unit, scale })
+    }
+
     fn band(&self) -> Result<Band, Refusal> {
+        let (name, unit) = self.names()?;
+        let (scale, offset) = self.scale_and_offset()?;
+        let no_data = self.no_data.unwrap_or(u16::from(u8::MAX));
+        let no_data = u8::try_from(no_data).map_err(|_| Refusal::Range("no_data", f64::from(no_data), "0 to 255"))?;
+        let (scale, offset) = (Decimal::nearest(scale), Decimal::nearest(offset));
+        Ok(Band { name, unit, scale, offset, no_data })
+    }
+
+    /// Name and unit of a band.
+    fn names(&self) -> Result<(String, String), Refusal> {
         let name = self.name.clone().ok_or(Refusal::Missing("name"))?;
-        let (scale, offset) = (self.scale.unwrap_or(1.0), self.offset.unwrap_or(0.0));
-        let scale = within("scale", scale, 1e-9, 1e9, "1e-9 to 1e9")?;
-        let offset = within("offset", offset, -1e9, 1e9, "-1e9 to 1e9")?;
         let is_word = |c: u8| c.is_ascii_lowercase() || c.is_ascii_digit() || c == b'_';
         let is_named = (1..=LayerDescriptor::MAX_NAME).contains(&name.len()) && name.bytes().all(is_word);
         let has_unit = self.unit.len() <= LayerDescriptor::MAX_UNIT && !self.unit.chars().any(char::is_control);
-        if !is_named || !has_unit {
-            return Err(Refusal::Band);
+        match is_named && has_unit {
+            true => Ok((name, self.unit.clone())),
+            false => Err(Refusal::Band),
         }
-        let (scale, offset) = (Decimal::nearest(scale), Decimal::nearest(offset));
-        Ok(Band { name, unit: self.unit.clone(), scale, offset, no_data: self.no_data.unwrap_or(u8::MAX) })
     }
 }
 
@@ -207,10 +296,10 @@ impl Item {
         Header::read(header)?.into_item(picture)
     }
 
-    /// The mission time in a header, and whether a picture belongs to it.
-    pub fn peek(header: &[u8]) -> Result<(Option<f64>, bool), Refusal> {
+    /// The time in a header, and whether a picture belongs to it.
+    pub fn peek(header: &[u8]) -> Result<(ItemTime, bool), Refusal> {
         let header = Header::read(header)?;
-        Ok((header.t_s(), header.has_picture()))
+        Ok((header.time()?, header.has_picture()))
     }
 }
 
@@ -228,7 +317,7 @@ mod tests {
         let image = r##"{"kind": "image", "t_s": 2.5, "x_m": 3, "y_m": -4, "heading_deg": 90, "encoding": "raw",
             "width": 2, "height": 1, "classes": [{"class": 0, "name": "sand", "colour": "#E0c080"}]}"##;
         let item = read(image, &[0, 255]).unwrap();
-        assert_eq!((item.t_s, item.classes.len()), (Some(2.5), 1));
+        assert_eq!((item.time, item.classes.len()), (ItemTime::Mission(2.5), 1));
         assert_eq!(
             (item.classes[0].label(), item.classes[0].name(), item.classes[0].colour()),
             (1, "sand", Some([0xE0, 0xC0, 0x80]))
@@ -251,6 +340,18 @@ mod tests {
             (Decimal::new(5, -1), Decimal::new(-80, 0), 255, 254)
         );
         assert_eq!(read(r#"{"kind":"classes"}"#, &[]).unwrap().content, Content::Classes);
+        let deep = r#"{"kind":"band","name":"depth_16","unit":"m","scale":0.01,"offset":5,"low":0,"step":0.5,"west_m":0,
+            "south_m":0,"cell_m":1,"encoding":"raw16","width":2,"height":1,"time":1.7e9}"#;
+        let item = read(deep, &[0, 1, 255, 255]).unwrap();
+        let Content::Quantities { band, quantities, .. } = item.content else { panic!() };
+        assert_eq!((item.time, band.scale), (ItemTime::Unix(1.7e9), BandScale::between(0.0, 126.5)));
+        assert!((quantities.values[0] - 7.56).abs() < 1e-6 && quantities.values[1].is_nan());
+        let numbers = r#"{"kind":"band","name":"ph","west_m":0,"south_m":0,"cell_m":1,"encoding":"float32","width":1,"height":1}"#;
+        let Content::Quantities { band, quantities, .. } = read(numbers, &8.25f32.to_le_bytes()).unwrap().content
+        else {
+            panic!()
+        };
+        assert_eq!((band.scale, quantities.values[0]), (None, 8.25));
         let own = r#"{"kind":"image","encoding":"raw","width":1,"height":1}"#;
         assert!(matches!(read(own, &[0]).unwrap().content, Content::Image { pose: None, .. }));
     }
@@ -268,7 +369,10 @@ mod tests {
             (&grid(r#","wdth":3"#), &[0], "unknown field `wdth`"),
             (&grid(""), &[254], "class 254: it takes 0 to 253"),
             (&grid(""), &[], "0 bytes: allowed are 1"),
-            (&grid(""), &[1, 2], "2 bytes, and the header names 1 x 1"),
+            (&grid(""), &[1, 2], "2 bytes, which are not those of 1 x 1"),
+            (&grid(r#","t_s":1,"age_s":2"#), &[0], "only one of t_s, time and age_s"),
+            (&grid(r#","age_s":-1"#), &[0], "age_s -1 is not within"),
+            (&grid(r#","encoding":"raw16""#), &[0, 0], "duplicate field"),
             (&grid(r#","t_s":-1"#), &[0], "t_s -1 is not within 0 to 1e9 s"),
             (&grid(r#","classes":[{"class":254,"name":"x"}]"#), &[0], "class 254"),
             (&grid(r#","classes":[{"class":3,"name":""}]"#), &[0], "class 3: the name takes 1 to 60 bytes"),

@@ -6,11 +6,24 @@ use scenecast_protocol::map::{ClassEntry, Decimal};
 /// An item of labels or of a band.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Item {
-    /// Mission time of the picture, seconds; `None` if it is that of its arrival.
-    pub t_s: Option<f64>,
+    pub time: ItemTime,
     /// Names and colours of classes.
     pub classes: Vec<ClassEntry>,
     pub content: Content,
+}
+
+/// When the picture of an item was taken.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub enum ItemTime {
+    /// At its arrival.
+    #[default]
+    Arrival,
+    /// Mission time, seconds.
+    Mission(f64),
+    /// Seconds since 1970, UTC.
+    Unix(f64),
+    /// Seconds before its arrival.
+    Age(f64),
 }
 
 /// The content of an item.
@@ -30,6 +43,8 @@ pub enum Content {
     Grid { ground: Ground, classes: Raster },
     /// A grid of levels of a quantity.
     Band { band: Band, ground: Ground, levels: Raster },
+    /// A grid of a quantity in its unit; not a number where it is not known.
+    Quantities { band: QuantityBand, ground: Ground, quantities: Raster<f32> },
 }
 
 /// The pose of the camera in the map frame.
@@ -63,4 +78,75 @@ pub struct Band {
     pub offset: Decimal,
     /// The value of cells without a quantity.
     pub no_data: u8,
+}
+
+/// A band whose quantities become levels on the vehicle.
+#[derive(Debug, Clone, PartialEq)]
+pub struct QuantityBand {
+    pub name: String,
+    pub unit: String,
+    /// `None`: the scale is chosen from the first quantities.
+    pub scale: Option<BandScale>,
+}
+
+/// The levels of a band: level n stands for `low + (n - 1) * step`, n from 1 to 254.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BandScale {
+    pub low: f64,
+    pub step: Decimal,
+}
+
+impl BandScale {
+    /// Steps between the lowest and the highest level.
+    const STEPS: f64 = 253.0;
+
+    /// Levels from `low` to `high`, or a little above it; `None` unless both are at most 1e9 and differ enough.
+    pub fn between(low: f64, high: f64) -> Option<Self> {
+        let step = (high - low) / Self::STEPS;
+        let is_in_range = low.abs() <= 1e9 && high.abs() <= 1e9 && step >= 1e-9;
+        is_in_range.then(|| Self { low: Decimal::nearest(low).value(), step: Decimal::nearest(step) })
+    }
+
+    /// Levels for quantities like these: half as wide again as their range, in a round step. `None` if none is finite.
+    pub fn around(quantities: &[f32]) -> Option<Self> {
+        let finite = || quantities.iter().filter(|q| q.is_finite() && q.abs() <= 5e8).map(|&q| f64::from(q));
+        let (low, high) = (finite().reduce(f64::min)?, finite().reduce(f64::max)?);
+        let span = (high - low).max(low.abs().max(high.abs()) * 1e-3).max(1e-3);
+        let step = round_up(span * 1.5 / Self::STEPS);
+        let below = (Self::STEPS * step - (high - low)) / 2.0;
+        // A quantity that is never negative does not become so.
+        let first = if low >= 0.0 { (low - below).max(0.0) } else { low - below };
+        Some(Self { low: Decimal::nearest((first / step).floor() * step).value(), step: Decimal::nearest(step) })
+    }
+}
+
+/// The next number of 1, 2 and 5 times a power of ten.
+fn round_up(value: f64) -> f64 {
+    let power = 10f64.powf(value.log10().floor());
+    [1.0, 2.0, 5.0]
+        .into_iter()
+        .map(|digit| digit * power)
+        .find(|round| *round >= value * (1.0 - 1e-9))
+        .unwrap_or(10.0 * power)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_chosen_scale_holds_the_quantities_with_room_on_both_sides() {
+        for quantities in [&[-31.5, f32::NAN, -12.25][..], &[0.0, 100.0], &[7.0], &[f32::NAN, 0.0], &[1e-4, 3e8]] {
+            let BandScale { low, step } = BandScale::around(quantities).unwrap();
+            let high = low + BandScale::STEPS * step.value();
+            let known = quantities.iter().filter(|q| !q.is_nan()).map(|&q| f64::from(q));
+            assert!(known.clone().all(|q| low <= q && q <= high), "{quantities:?}: {low} to {high}");
+            assert!(low >= 0.0 || known.clone().any(|q| q < 0.0));
+        }
+        assert_eq!(BandScale::around(&[f32::NAN, f32::INFINITY]), None);
+        let costs = BandScale::around(&[0.0, 100.0]).unwrap();
+        assert_eq!((costs.low, costs.step.value()), (0.0, 1.0));
+        assert_eq!(BandScale::between(-40.0, 10.6).map(|scale| scale.step), Some(Decimal::new(2, -1)));
+        assert_eq!((BandScale::between(1.0, 1.0), BandScale::between(f64::NAN, 1.0)), (None, None));
+    }
 }

@@ -17,13 +17,17 @@ pub enum Refusal {
     Range(&'static str, f64, &'static str),
     #[error("the header: {0} is missing")]
     Missing(&'static str),
+    #[error("the header: only one of t_s, time and age_s is taken")]
+    Times,
+    #[error("the header: step and low belong together, and to a band of 16 bits or of numbers")]
+    Scale,
     #[error("the picture: {0}")]
     Picture(String),
     #[error("the picture has {0} bytes: allowed are 1 to {MAX_PICTURE_BYTES}")]
     PictureBytes(u64),
     #[error("the picture has {0} x {1} pixels: allowed are 1 to {MAX_PIXELS} in all")]
     Pixels(u32, u32),
-    #[error("the picture has {0} bytes, and the header names {1} x {2} cells")]
+    #[error("the picture has {0} bytes, which are not those of {1} x {2} pixels")]
     RawLength(usize, u32, u32),
     #[error("the picture is {0}: it takes 8-bit grey or indexed pixels, whose value is the class or the level")]
     Depth(String),
@@ -45,6 +49,16 @@ pub enum Refusal {
     OtherBand(String),
     #[error("band {0:?}: the map has no further layer")]
     TooManyBands(String),
+    #[error("band {0:?}: no cell has a number, so that no scale can be chosen")]
+    NoScale(String),
+    #[error("this source gives bands alone, and the item has labels; labels.source gives labels")]
+    BandsAlone,
+    #[error("the frame of reference is {0:?}: {1} is taken")]
+    Frame(String, String),
+    #[error("the grid is turned by {0:.2} degrees: only grids along east and north are taken")]
+    Turned(f64),
+    #[error("the message: {0}")]
+    Message(String),
     #[error("it covers {0} cells of the map: at most {1} are taken")]
     Cells(u64, u64),
     #[error("the map would have more than {0} cells")]

@@ -5,6 +5,7 @@ use crate::node::Qos;
 use crate::node::RosNode;
 use scenecast_config::RosName;
 use scenecast_core::UserError;
+use scenecast_messages::grid_map_msgs::GridMap;
 use scenecast_messages::nav_msgs::{OccupancyGrid, Odometry};
 use scenecast_messages::sensor_msgs::{CameraInfo, CompressedImage, Image};
 use scenecast_messages::tf2_msgs::TFMessage;
@@ -45,8 +46,13 @@ impl RosNode {
         self.subscribe(topic, Qos::Latched(100), POSES)
     }
 
-    /// Whole grids of labels: the last one, and each new one.
+    /// Whole grids of labels: the last one, and each new one of a publisher that keeps its last message.
     pub fn subscribe_label_map(&self, topic: &RosName) -> Result<Inbox<OccupancyGrid>, UserError> {
+        self.subscribe(topic, Qos::Latched(1), 1)
+    }
+
+    /// Grids with several layers: the last one, and each new one of a publisher that keeps its last message.
+    pub fn subscribe_grid_map(&self, topic: &RosName) -> Result<Inbox<GridMap>, UserError> {
         self.subscribe(topic, Qos::Latched(1), 1)
     }
 }

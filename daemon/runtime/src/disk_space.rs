@@ -20,22 +20,30 @@ pub(super) fn free_bytes(_: &Path) -> Option<u64> {
     None
 }
 
+/// The checkpoints of a vehicle.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Checkpoint {
+    SceneModel,
+    Labels,
+}
+
 /// The disk with the vehicle's files.
 pub(super) struct DiskWatch {
     dir: PathBuf,
-    is_checkpoint_refused: bool,
+    /// Whether the last checkpoint of each kind was refused.
+    refused: [bool; 2],
     /// `None` if a look is due at once.
     looked: Option<Instant>,
 }
 
 impl DiskWatch {
     pub(super) fn new(dir: &Path) -> Self {
-        Self { dir: dir.to_owned(), is_checkpoint_refused: false, looked: None }
+        Self { dir: dir.to_owned(), refused: [false; 2], looked: None }
     }
 
-    /// A checkpoint of the scene model was written or refused.
-    pub(super) fn handle_checkpoint(&mut self, is_refused: bool) {
-        (self.is_checkpoint_refused, self.looked) = (is_refused, None);
+    /// A checkpoint was written or refused.
+    pub(super) fn handle_checkpoint(&mut self, which: Checkpoint, is_refused: bool) {
+        (self.refused[which as usize], self.looked) = (is_refused, None);
     }
 
     /// The state of the disk, at its first look, after a change, and every [`LOOK_INTERVAL`].
@@ -44,8 +52,8 @@ impl DiskWatch {
             return None;
         }
         self.looked = Some(now);
-        let Self { ref dir, is_checkpoint_refused, .. } = *self;
-        Some(VehicleDisk { free_bytes: free_bytes(dir), is_checkpoint_refused })
+        let is_checkpoint_refused = self.refused.contains(&true);
+        Some(VehicleDisk { free_bytes: free_bytes(&self.dir), is_checkpoint_refused })
     }
 }
 
@@ -59,7 +67,8 @@ mod tests {
         let first = disk.look(now).unwrap();
         assert!(first.free_bytes.is_some() == cfg!(unix) && !first.is_checkpoint_refused);
         assert_eq!(disk.look(now + LOOK_INTERVAL / 2), None);
-        disk.handle_checkpoint(true);
+        disk.handle_checkpoint(Checkpoint::Labels, true);
+        disk.handle_checkpoint(Checkpoint::SceneModel, false);
         assert!(disk.look(now + LOOK_INTERVAL / 2).unwrap().is_checkpoint_refused);
         assert!(disk.look(now + LOOK_INTERVAL).is_none());
         assert!(disk.look(now + LOOK_INTERVAL * 2).is_some());

@@ -25,21 +25,20 @@ impl RecentFaults {
     }
 }
 
-/// The faults of camera, navigation source and labels of other programs.
+/// The faults of camera and navigation source.
 #[derive(Debug, Default)]
 pub(crate) struct SensorFaults {
     images: RecentFaults,
     poses: RecentFaults,
-    labels: RecentFaults,
 }
 
 impl SensorFaults {
-    /// The faults now, when `refused` labels of other programs were refused so far and no pose has come in for `pose_gap`.
+    /// The faults now, when no pose has come in for `pose_gap`; `labels_refused` is whether labels of other programs fail.
     pub(crate) fn now(
         &mut self,
         camera: &Camera,
         pose_gap: Option<Duration>,
-        refused: u64,
+        labels_refused: bool,
         now: Instant,
     ) -> EquipmentFaults {
         let (dropped, unusable) = camera.tally().map_or((0, 0), |tally| (tally.dropped(), unusable_poses(tally)));
@@ -48,7 +47,7 @@ impl SensorFaults {
             images_dropped: self.images.handle(dropped, now),
             poses_missing: pose_gap.is_some(),
             poses_faulty: self.poses.handle(unusable, now),
-            labels_refused: self.labels.handle(refused, now),
+            labels_refused,
             ..EquipmentFaults::default()
         }
     }

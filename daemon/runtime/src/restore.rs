@@ -8,7 +8,7 @@ use super::mapping::Keep;
 use scenecast_config::{Config, LabelSource};
 use scenecast_core::UserError;
 use scenecast_files::configured_vocabulary;
-use scenecast_vehicle::{ForeignMap, MapProducer, Mapper, RestoreError, Restored};
+use scenecast_vehicle::{Durable, ForeignMap, MapProducer, Mapper, RestoreError, Restored};
 use std::path::Path;
 
 /// The state at the start of a run.
@@ -16,7 +16,7 @@ pub(super) struct Start {
     pub(super) run: StartedRun<Folder>,
     pub(super) mapper: Mapper,
     pub(super) keep: Keep,
-    /// The map of another program, in place of the scene model's.
+    /// The labels of another program, in place of the scene model's, or its bands.
     pub(super) labels: Option<(ForeignMap, Keep)>,
 }
 
@@ -33,7 +33,7 @@ pub(super) fn start(config: &Config, dir: &Path) -> Result<Start, UserError> {
     }
     let restored = if config.scene.checkpoint_s > 0.0 { restore(config, &file)? } else { None };
     let claim = restored.as_ref().map(|restored| (restored.lineage, restored.mapper.epoch()));
-    let run = Keeper::begin_run(folder, super::random_bits(), claim)?;
+    let run = Keeper::begin_run(folder.clone(), super::random_bits(), claim)?;
     let durable = &run.durable;
     let mapper = match restored {
         Some(Restored { mut mapper, lineage }) if lineage == durable.lineage => {
@@ -59,7 +59,12 @@ pub(super) fn start(config: &Config, dir: &Path) -> Result<Start, UserError> {
     };
     let last_s = mapper.last_s();
     let keep = Keep { file, lineage: durable.lineage, every_s: config.scene.checkpoint_s, last_s, is_refused: false };
-    Ok(Start { run, mapper, keep, labels: None })
+    let labels = (config.bands.source != LabelSource::SceneModel).then(|| {
+        let file = CheckpointFile::of_labels(folder);
+        let restored = (config.scene.checkpoint_s > 0.0).then(|| labels::restore(config, &file)).flatten();
+        foreign(config, restored, file, &run.durable)
+    });
+    Ok(Start { run, mapper, keep, labels })
 }
 
 /// Begins a run with the labels of another program. The scene model stays empty.
@@ -70,23 +75,35 @@ fn start_labels(config: &Config, folder: Folder) -> Result<Start, UserError> {
     let claim = restored.as_ref().map(|(map, lineage)| (*lineage, map.epoch()));
     let run = Keeper::begin_run(folder.clone(), super::random_bits(), claim)?;
     let (lineage, epoch, seed) = (run.durable.lineage, run.durable.epoch, config.runtime.seed);
+    let labels = foreign(config, restored, file, &run.durable);
+    let unused = Keep { file: CheckpointFile::new(folder), lineage, every_s: 0.0, last_s: None, is_refused: false };
+    let mapper = Mapper::new(config, None, epoch, seed)?;
+    Ok(Start { run, mapper, keep: unused, labels: Some(labels) })
+}
+
+/// The map of another program, that of the last checkpoint if it is of this mission, and its checkpoints.
+fn foreign(
+    config: &Config,
+    restored: Option<(ForeignMap, u64)>,
+    file: CheckpointFile<Folder>,
+    durable: &Durable,
+) -> (ForeignMap, Keep) {
     let map = match restored {
-        Some((mut map, of)) if of == lineage => {
-            map.resume(epoch, run.durable.labels);
-            tracing::info!("the labels resume from their checkpoint: {} cells, epoch {epoch}", map.labels().explored());
+        Some((mut map, of)) if of == durable.lineage => {
+            map.resume(durable.epoch, durable.labels);
+            let (cells, epoch) = (map.labels().explored(), durable.epoch);
+            tracing::info!("the labels and bands resume from their checkpoint: {cells} labelled cells, epoch {epoch}");
             map
         }
         other => {
             if other.is_some() {
                 tracing::warn!("the checkpoint of the labels is of another mission: they start from scratch");
             }
-            ForeignMap::new(config, epoch)
+            ForeignMap::new(config, durable.epoch)
         }
     };
-    let keep = Keep { file, lineage, every_s, last_s: map.last_s(), is_refused: false };
-    let unused = Keep { file: CheckpointFile::new(folder), lineage, every_s: 0.0, last_s: None, is_refused: false };
-    let mapper = Mapper::new(config, None, epoch, seed)?;
-    Ok(Start { run, mapper, keep: unused, labels: Some((map, keep)) })
+    let (lineage, every_s, last_s) = (durable.lineage, config.scene.checkpoint_s, map.last_s());
+    (map, Keep { file, lineage, every_s, last_s, is_refused: false })
 }
 
 fn restore(config: &Config, file: &CheckpointFile<Folder>) -> Result<Option<Restored>, UserError> {

@@ -1,11 +1,11 @@
 //! `scenecast auv`: ports, disk and clock around the vehicle's host.
 
 use super::clock::Clock;
-use super::disk_space::DiskWatch;
+use super::disk_space::{Checkpoint, DiskWatch};
 use super::durable::{Keeper, StartedRun};
 use super::equipment::SensorFaults;
 use super::journal::Folder;
-use super::labels::{Feed, FromLabels, LabelThread, move_the_vehicle};
+use super::labels::{self, FromLabels, LabelThread, move_the_vehicle};
 use super::mapping::{FromMapper, Mapped, MapperThread, ToMapper};
 use super::missing_key::warn_without_key;
 use super::modem::{self, ModemPort};
@@ -16,9 +16,9 @@ use super::ros2::{RosSensors, VehicleRos2};
 use super::stop::Stop;
 use crate::camera::{Camera, CameraFrame, LiveCamera, RecordedCamera};
 use crate::port::FromPort;
-use scenecast_config::{AutopilotKind, Config, NavigationSource, survey_depth_m};
+use scenecast_config::{AutopilotKind, Config, LabelSource, NavigationSource, survey_depth_m};
 use scenecast_core::{Area, TangentPlane, UserError};
-use scenecast_files::{Recording, configured_recording};
+use scenecast_files::{Recording, configured_recording, read_class_names};
 use scenecast_host::{CameraPose, VehicleHost, VehicleHostEvent, VehiclePilot, modem_station};
 use scenecast_labels::ImagePose;
 use scenecast_protocol::directive::Budget;
@@ -68,12 +68,13 @@ pub fn run_vehicle(load: Load, simulated: Option<SimulatedAutopilot>) -> Result<
         let is_recorded = recording.is_some();
         // Without a camera, poses of a navigation source move the vehicle.
         let is_live = config.camera.source.is_live() || !is_recorded && config.navigation.source.is_live();
+        let sensors = RosSensors::new(&config)?;
         let camera = match is_live {
             // The time since the end of the former run is unknown.
             true => Camera::Live(Box::new(LiveCamera::start(
                 &config,
                 mapper.last_s().map_or(0.0, |s| s + RESTART_S),
-                &RosSensors::new(&config)?,
+                &sensors,
             )?)),
             false => Camera::Recorded(RecordedCamera::new(recording, clock, mapper.last_s())),
         };
@@ -84,8 +85,10 @@ pub fn run_vehicle(load: Load, simulated: Option<SimulatedAutopilot>) -> Result<
         }
         let mapper = MapperThread::start(mapper, keep)?;
         let labels = labels.map(|(map, keep)| {
-            let feed = Feed::open(&config, map.mark())?;
-            LabelThread::start(map, feed, keep, clock)
+            let names = config.labels.classes.as_deref().map(read_class_names).transpose()?;
+            let names = names.map_or(Vec::new(), |item| item.classes);
+            let feeds = labels::open(&config, &map, &sensors)?;
+            LabelThread::start(map, &names, feeds, keep, clock)
         });
         let labels = labels.transpose()?;
         let modem = ModemPort::open(&config, clock.now()).await?;
@@ -103,23 +106,11 @@ pub fn run_vehicle(load: Load, simulated: Option<SimulatedAutopilot>) -> Result<
         }
         let disk = DiskWatch::new(dir);
         let ros2 = VehicleRos2::start(&config)?;
-        let labels_move = move_the_vehicle(&config);
+        let is_foreign = config.labels.source != LabelSource::SceneModel;
+        let labels = Labels { thread: labels, is_foreign, move_vehicle: move_the_vehicle(&config) };
         let faults = SensorFaults::default();
-        let shell = VehicleShell {
-            host,
-            camera,
-            mapper,
-            labels,
-            labels_move,
-            ports,
-            ros2,
-            clock,
-            keeper,
-            disk,
-            faults,
-            reload,
-            missed: 0,
-        };
+        let shell =
+            VehicleShell { host, camera, mapper, labels, ports, ros2, clock, keeper, disk, faults, reload, missed: 0 };
         shell.run(stop).await
     })
 }
@@ -135,15 +126,21 @@ struct Ports {
     pilot: PilotPort,
 }
 
+/// The thread of other programs' labels and bands.
+struct Labels {
+    thread: Option<LabelThread>,
+    /// Whether the labels are not the scene model's, which then sees no frames.
+    is_foreign: bool,
+    /// Whether images of another program move the vehicle.
+    move_vehicle: bool,
+}
+
 /// Moves bytes, reads the clock and syncs files; the host makes all decisions.
 struct VehicleShell {
     host: VehicleHost,
     camera: Camera,
     mapper: MapperThread,
-    /// Labels of another program, in place of the scene model's.
-    labels: Option<LabelThread>,
-    /// Whether the images of another program move the vehicle.
-    labels_move: bool,
+    labels: Labels,
     ports: Ports,
     ros2: VehicleRos2,
     clock: Clock,
@@ -166,7 +163,7 @@ impl VehicleShell {
                     modem::log_audit(self.host.link());
                     self.camera.log_end();
                     self.mapper.finish();
-                    self.labels.into_iter().for_each(LabelThread::finish);
+                    self.labels.thread.into_iter().for_each(LabelThread::finish);
                     return Ok(());
                 }
                 _ = tokio::time::sleep_until(self.clock.wall(wake)) => {}
@@ -176,15 +173,19 @@ impl VehicleShell {
                 report = self.ports.pilot.next() => self.handle_pilot(report),
                 config = self.reload.next() => self.follow(&config),
                 () = self.camera.wait() => {}
-                report = LabelThread::next(&mut self.labels) => match report {
+                report = LabelThread::next(&mut self.labels.thread) => match report {
                     Some(FromLabels::Mapped(update, pose)) => self.handle_labels(&update, pose),
-                    Some(FromLabels::Checkpoint { is_refused }) => self.disk.handle_checkpoint(is_refused),
+                    Some(FromLabels::Checkpoint { is_refused }) => {
+                        self.disk.handle_checkpoint(Checkpoint::Labels, is_refused);
+                    }
                     None => return Err(UserError::Failed("the labels' thread ended".to_owned())),
                 },
                 mapped = self.mapper.mapped.recv() => match mapped {
                     Some(FromMapper::Mapped(mapped)) => self.handle_seen(*mapped),
                     Some(FromMapper::Missed(error)) => self.handle_missed(&error),
-                    Some(FromMapper::Checkpoint { is_refused }) => self.disk.handle_checkpoint(is_refused),
+                    Some(FromMapper::Checkpoint { is_refused }) => {
+                        self.disk.handle_checkpoint(Checkpoint::SceneModel, is_refused);
+                    }
                     None => return Err(UserError::Failed("the scene model's thread ended".to_owned())),
                 },
             }
@@ -197,8 +198,9 @@ impl VehicleShell {
     fn poll_camera(&mut self) {
         let unseen = self.camera.poll_pose_gap();
         self.host.handle_pose_gap(unseen);
-        let refused = self.labels.as_ref().map_or(0, LabelThread::refused);
-        let faults = self.faults.now(&self.camera, unseen, refused, std::time::Instant::now());
+        let labels = self.labels.thread.as_ref().map(LabelThread::health);
+        let is_refusing = labels.is_some_and(|health| health.is_failing);
+        let faults = self.faults.now(&self.camera, unseen, is_refusing, std::time::Instant::now());
         self.host.handle_faults(faults);
         if let Some(pose) = self.camera.poll_pose() {
             self.host.handle_pose(pose, self.clock.now());
@@ -229,22 +231,22 @@ impl VehicleShell {
         self.host.handle_budget(budget, self.clock.now());
     }
 
-    /// Takes the map of another program. Unless something else measures its place, the vehicle is where the last image was
+    /// Takes changes of another program. Unless something else measures its place, the vehicle is where the last image was
     /// taken.
     fn handle_labels(&mut self, update: &ForeignUpdate, pose: Option<ImagePose>) {
         let (now, began) = (self.clock.now(), std::time::Instant::now());
-        let pose = pose.filter(|_| self.labels_move && self.camera.newest_pose().is_none());
+        let pose = pose.filter(|_| self.labels.move_vehicle && self.camera.newest_pose().is_none());
         if let Some(ImagePose { x_m, y_m, depth_m, heading_rad }) = pose {
             self.host.handle_pose(CameraPose { x_m, y_m, heading_rad, depth_m }, now);
         }
         if let Some(label) = self.host.handle_foreign(update, now) {
             tracing::warn!("labels: class {} has another name already, which it keeps", label - 1);
         }
-        self.labels.iter().for_each(|labels| labels.handle_taken(began));
+        self.labels.thread.iter().for_each(|labels| labels.handle_taken(began));
     }
 
     fn handle_camera(&mut self, mut frame: CameraFrame) {
-        if self.labels.is_some() {
+        if self.labels.is_foreign {
             // The frames still move the vehicle.
             let pose = self.camera.newest_pose().unwrap_or(frame.camera_pose());
             self.host.handle_pose(pose, self.clock.now());
@@ -290,12 +292,12 @@ impl VehicleShell {
             self.host.handle_disk(disk);
         }
         let navigator = self.host.vehicle().navigator();
-        if let Some(labels) = self.labels.as_ref().filter(|_| navigator.is_measured()) {
+        if let Some(labels) = self.labels.thread.as_ref().filter(|_| navigator.is_measured()) {
             let ((x_m, y_m), depth_m) = (navigator.dead_reckoned().xy(), navigator.depth_m());
             labels.handle_pose(ImagePose { x_m, y_m, depth_m, heading_rad: navigator.heading_rad() }, now);
         }
         self.host.steer(now);
-        self.ros2.publish(&self.host, self.camera.tally());
+        self.ros2.publish(&self.host, self.camera.tally(), || self.labels.thread.as_ref().map(LabelThread::health));
         self.handle_events()?;
         while let Some(bytes) = self.host.poll_output(now) {
             self.ports.modem.write(bytes);

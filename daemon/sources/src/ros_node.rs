@@ -21,7 +21,7 @@ impl SensorNode {
         Self { settings: settings.clone(), node: Mutex::default() }
     }
 
-    pub(crate) fn get(&self) -> Result<Arc<RosNode>, SourceError> {
+    pub fn get(&self) -> Result<Arc<RosNode>, SourceError> {
         let mut node = self.node.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(node) = &*node {
             return Ok(node.clone());

@@ -24,7 +24,7 @@ mod vehicle;
 pub use assemble::assemble;
 pub use checkpoint::{RestoreError, Restored};
 pub use failsafe::{Failsafe, FailsafePolicy};
-pub use foreign::{ForeignMap, ForeignRestoreError, ForeignUpdate};
+pub use foreign::{ForeignMap, ForeignRestoreError, ForeignSource, ForeignUpdate, LabelChanges};
 pub use mapper::{MapUpdate, Mapper, SharedExemplars};
 pub use navigator::{FixVerdict, LastPlace, Navigator};
 pub use producer::MapProducer;

@@ -3,7 +3,7 @@
 use crate::key::section;
 use crate::rule::{ANY, range};
 use crate::setting::{
-    BirthRule, CameraSource, CameraStamps, Debounce, LabelSource, LayerName, MapCells, MapStream, Votes,
+    BandRange, BirthRule, CameraSource, CameraStamps, Debounce, LabelSource, LayerName, MapCells, MapStream, Votes,
 };
 use scenecast_protocol::map_codec::Codec;
 use std::collections::BTreeMap;
@@ -116,14 +116,33 @@ section! {
     /// Labels of another program in place of those of the scene model.
     labels: Labels {
         /// Where the labels come from. Empty: the scene model. dir:FOLDER: files NAME.json and NAME.png; socket:HOST:PORT
-        /// and socket:/PATH: programs that connect and send the same; ros2:TOPIC: a topic of ROS 2. A rehearsal takes
-        /// dir: alone.
+        /// and socket:/PATH: programs that connect and send the same; ros2:/TOPIC: a topic of ROS 2 with messages
+        /// OccupancyGrid (whole grids), or Image (segmented images) if #Image follows. A rehearsal takes dir: alone.
         source: LabelSource = LabelSource::SceneModel, ANY, [Auv Scenario];
+        /// File with names and colours of classes: the header of an item of the kind "classes". Empty: none.
+        classes: Option<PathBuf> = None, ANY, [Auv Scenario];
         /// Which segmented images decide about the class of a cell: the class that most of their pixels in it have. all:
         /// every image that has shown the cell; newest: the last one. A grid decides alone.
         votes: Votes = Votes::All, ANY, [Auv Scenario];
+        /// Size of a pixel of segmented images on the sea floor, for those that do not state it. 0: that of the camera.
+        metres_per_pixel: f64 = 0.0, range(0.0, 100.0, "m"), [Auv Scenario];
+        /// Frame of reference of grids of ROS 2, the vehicle's map frame of east, north, up; grids in another one are
+        /// refused. Empty: map and odom.
+        frame: String = String::new(), ANY, [Auv];
+    }
+}
+
+section! {
+    /// Bands of another program beside the labels, whichever gives these: depth, backscatter, uncertainty, a costmap.
+    bands: Bands {
+        /// Where the bands come from, as for labels.source. Empty: no source besides labels.source, which may give bands
+        /// too. ros2:/TOPIC: messages GridMap, whose layers are bands, or OccupancyGrid if #OccupancyGrid follows.
+        source: LabelSource = LabelSource::SceneModel, ANY, [Auv Scenario];
+        /// Quantities between which a band has its 254 levels, for bands of numbers or of 16 bits. Others have a round step
+        /// that is chosen from the first quantities and kept.
+        ranges: Vec<BandRange> = Vec::new(), ANY, [Auv Scenario];
         /// Minimum share of each band within the map's share of link.shares while labels wait too. The shares of all
         /// layers add up to 100 % or less; a band beyond that has what is left.
-        band_share: u8 = 8, range(0.0, 100.0, "%"), [Auv Scenario];
+        share: u8 = 8, range(0.0, 100.0, "%"), [Auv Scenario];
     }
 }

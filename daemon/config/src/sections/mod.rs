@@ -11,7 +11,7 @@ mod ros2;
 mod survey;
 
 pub use link::Link;
-pub use map::{Camera, Labels, Map, Scene};
+pub use map::{Bands, Camera, Labels, Map, Scene};
 pub use modem::{Channel, Modem};
 pub use node::{Console, Mission, Operator, Runtime, VehicleSection, WorldSection};
 pub use ros2::Ros2;
@@ -31,6 +31,7 @@ pub struct Config {
     pub camera: Camera,
     pub scene: Scene,
     pub labels: Labels,
+    pub bands: Bands,
     pub survey: Survey,
     pub navigation: Navigation,
     pub registration: Registration,
@@ -55,6 +56,7 @@ impl Section {
         Camera::SECTION,
         Scene::SECTION,
         Labels::SECTION,
+        Bands::SECTION,
         Survey::SECTION,
         Navigation::SECTION,
         Registration::SECTION,

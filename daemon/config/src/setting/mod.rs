@@ -17,7 +17,7 @@ pub use choices::{
     S2cMode, WorldKind,
 };
 pub use debounce::Debounce;
-pub use labels::{LabelSource, Votes};
+pub use labels::{BandRange, LabelMessage, LabelSource, Votes};
 pub use layers::LayerName;
 pub use ports::{GpsPort, HostPort};
 pub use ros2::{Remap, RosName, ZenohEndpoint};

@@ -173,7 +173,7 @@ impl Mission {
 
     /// Records a frame and gives it to the mapper, at the pose that the vehicle estimates.
     fn map(&mut self, image: &image::RgbImage, scale: f64) -> Result<(), UserError> {
-        if self.labels.is_some() {
+        if self.has_foreign_labels() {
             return Ok(());
         }
         let now = self.times.now;

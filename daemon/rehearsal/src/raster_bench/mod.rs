@@ -1,10 +1,12 @@
 //! A grid of which a part changes every second, over a lossy radio: how much of the operator's copy is equal, and how old
 //! the rest is; beside it the same grid sent as a whole.
 
+mod annotated;
 mod grid;
 mod rig;
 mod whole;
 
+pub use annotated::{AnnotatedFigures, annotated};
 use grid::ChangingGrid;
 pub use grid::Pattern;
 use rig::{RadioRig, address};
@@ -250,6 +252,23 @@ impl Watch {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_status_is_at_most_two_seconds_old_on_a_lossy_radio() {
+        let setting = RasterSetting {
+            side: 80,
+            change: 0.02,
+            pattern: Pattern::Patches,
+            bit_rate_bps: 200_000.0,
+            loss: 0.2,
+            frame_bytes: 1000,
+            access: Access::FullDuplex,
+            duration: Duration::from_secs(60),
+        };
+        let ages: Vec<f64> = (1..=10).map(|seed| changes(&setting, seed, &mut |_| {}).unwrap().status_s).collect();
+        println!("oldest status of each seed: {ages:.2?} s");
+        assert!(ages.iter().all(|&age| age <= 2.0), "{ages:.2?}");
+    }
 
     #[test]
     fn changes_of_a_grid_arrive_sooner_than_whole_grids() {

@@ -2,6 +2,7 @@
 
 use scenecast_files::LabelFolder;
 use scenecast_labels::{Item, Refusal};
+use scenecast_vehicle::ForeignSource;
 use std::collections::VecDeque;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
 use std::time::{Duration, Instant};
@@ -56,6 +57,11 @@ impl Feed {
         Self::Folder(FolderFeed { folder, names: VecDeque::new(), looked: None, began, is_missing: false })
     }
 
+    /// Whether its folder is not there.
+    pub(crate) fn is_missing(&self) -> bool {
+        matches!(self, Self::Folder(folder) if folder.is_missing)
+    }
+
     /// The next item; `None` if there is none within `wait`.
     pub(crate) fn next(&mut self, wait: Duration) -> Option<Arrived> {
         match self {
@@ -91,7 +97,7 @@ impl FolderFeed {
             let was_missing = std::mem::replace(&mut self.is_missing, found.is_err());
             match found {
                 Ok(names) => self.names = names.into(),
-                Err(error) if !was_missing => tracing::error!("labels.source: {error}; the folder is looked at again"),
+                Err(error) if !was_missing => tracing::error!("labels: {error}; the folder is looked at again"),
                 Err(_) => {}
             }
         }
@@ -103,6 +109,38 @@ impl FolderFeed {
             }
         }
         std::thread::sleep(wait.min(LOOK_PAUSE));
+        None
+    }
+}
+
+/// The sources of a vehicle, which are read in turn.
+pub(crate) struct Feeds {
+    feeds: Vec<(ForeignSource, Feed)>,
+    turn: usize,
+}
+
+impl Feeds {
+    pub(crate) fn new(feeds: Vec<(ForeignSource, Feed)>) -> Self {
+        Self { feeds, turn: 0 }
+    }
+
+    /// Whether a folder is not there.
+    pub(crate) fn is_missing(&self) -> bool {
+        self.feeds.iter().any(|(_, feed)| feed.is_missing())
+    }
+
+    /// The next item with its source; `None` if there is none within `wait`.
+    pub(crate) fn next(&mut self, wait: Duration) -> Option<(ForeignSource, Arrived)> {
+        let count = self.feeds.len();
+        for _ in 0..count {
+            self.turn = (self.turn + 1) % count;
+            let wait = wait / count as u32;
+            if let Some((source, feed)) = self.feeds.get_mut(self.turn)
+                && let Some(arrived) = feed.next(wait)
+            {
+                return Some((*source, arrived));
+            }
+        }
         None
     }
 }

@@ -17,8 +17,8 @@ impl Connection for UnixStream {
 }
 
 /// Listens at a path. A socket that an earlier run has left there is replaced; any other file is not.
-pub(crate) fn local(path: &Path) -> Result<Feed, UserError> {
-    let failed = |e: io::Error| UserError::Failed(format!("labels.source: {}: {e}", path.display()));
+pub(crate) fn local(path: &Path, key: &str) -> Result<Feed, UserError> {
+    let failed = |e: io::Error| UserError::Failed(format!("{key}: {}: {e}", path.display()));
     let is_left = std::fs::symlink_metadata(path).is_ok_and(|found| found.file_type().is_socket());
     if is_left && UnixStream::connect(path).is_err() {
         std::fs::remove_file(path).map_err(failed)?;

@@ -1,41 +1,53 @@
 //! Labels of other programs: their sources, and the thread that makes them a map.
 
 mod feed;
+mod health;
 #[cfg(unix)]
 mod local;
+mod moment;
 mod own_poses;
 mod pace;
 mod restore;
 mod serve;
+mod topic;
 
 use feed::Arrived;
-pub(super) use feed::Feed;
+pub(super) use feed::{Feed, Feeds};
+pub(super) use health::LabelHealth;
+use health::LabelTally;
 use own_poses::OwnPoses;
 use pace::Pace;
-pub(super) use restore::restore;
+pub(super) use restore::{open, restore};
+pub(super) use topic::TopicFeed;
+#[cfg(feature = "ros2")]
+pub(super) use topic::topic;
 
 use super::clock::Clock;
 use super::mapping::Keep;
-use scenecast_config::{AutopilotKind, Config, NavigationSource};
+use scenecast_config::{AutopilotKind, Config, LabelSource, NavigationSource};
 use scenecast_core::UserError;
-use scenecast_labels::{Content, ImagePose, Item, Refusal};
+use scenecast_labels::{Content, ImagePose, Item, ItemTime, Refusal};
 use scenecast_protocol::map::ClassEntry;
-use scenecast_vehicle::{ForeignMap, ForeignUpdate, MapProducer};
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use scenecast_vehicle::{ForeignMap, ForeignSource, ForeignUpdate, MapProducer};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
-use std::time::{Duration, Instant};
+use std::time::{Duration, Instant, SystemTime};
 use tokio::sync::mpsc;
 
-/// Longest time for which items are collected before the vehicle gets the map with them.
+/// Longest time for which items are collected before the vehicle gets the changes.
 const BATCH: Duration = Duration::from_millis(200);
+/// Wait for items while changes wait for the vehicle.
+const SHORT: Duration = Duration::from_millis(5);
+/// Cells of an update, of the labels and of each band: the vehicle's loop takes a few milliseconds for them.
+const SLICE: usize = 1 << 13;
 /// Most lines of the log about refused items in [`LOG_PAUSE`]; the others are counted.
 const LOG_LINES: u32 = 10;
 const LOG_PAUSE: Duration = Duration::from_secs(1);
 
 /// A report of the thread.
 pub(super) enum FromLabels {
-    /// The map after some items, and the pose of the last image among them.
+    /// Changes of the map, and the pose of the last image among the items that made them.
     Mapped(Box<ForeignUpdate>, Option<ImagePose>),
     /// A checkpoint was refused, or the first one after a refusal was written.
     Checkpoint { is_refused: bool },
@@ -43,6 +55,9 @@ pub(super) enum FromLabels {
 
 /// Whether the vehicle is where the last image with a pose was taken: only if nothing else measures its place.
 pub(super) fn move_the_vehicle(config: &Config) -> bool {
+    if config.labels.source == LabelSource::SceneModel {
+        return false;
+    }
     let is_navigated = config.camera.source.is_live() && config.navigation.source != NavigationSource::Autopilot;
     config.autopilot.kind == AutopilotKind::None && !is_navigated
 }
@@ -56,41 +71,46 @@ pub(super) struct LabelThread {
     mapped: mpsc::Receiver<FromLabels>,
     own: Arc<Mutex<OwnPoses>>,
     pace: Arc<Mutex<Pace>>,
+    tally: Arc<Mutex<LabelTally>>,
     is_over: Arc<AtomicBool>,
-    /// Items that were refused so far.
-    refused: Arc<AtomicU64>,
     thread: JoinHandle<()>,
 }
 
 impl LabelThread {
-    pub(super) fn start(map: ForeignMap, feed: Feed, keep: Keep, clock: Clock) -> Result<Self, UserError> {
+    /// Starts with the map of a checkpoint, and with the names of classes that the configuration has.
+    pub(super) fn start(
+        mut map: ForeignMap,
+        names: &[ClassEntry],
+        feeds: Feeds,
+        keep: Keep,
+        clock: Clock,
+    ) -> Result<Self, UserError> {
+        let kept_names = map.classes().cloned().collect();
+        if !names.is_empty() {
+            map.add_names(names).map_err(|why| UserError::Input(format!("labels.classes: {why}")))?;
+        }
         let (outgoing, mapped) = mpsc::channel(1);
         let own = Arc::new(Mutex::new(OwnPoses::new(clock.scale())));
         let pace = Arc::new(Mutex::new(Pace::new(Instant::now())));
+        let tally = Arc::new(Mutex::new(LabelTally::default()));
         let is_over = Arc::new(AtomicBool::new(false));
-        let refused = Arc::new(AtomicU64::new(0));
         let worker = Worker {
-            kept_names: map.classes().cloned().collect(),
+            kept_names,
             is_refusal_reported: keep.is_refused,
             map,
-            feed,
+            feeds,
             keep,
             clock,
             own: Arc::clone(&own),
             pace: Arc::clone(&pace),
             is_over: Arc::clone(&is_over),
             outgoing,
+            tally: Arc::clone(&tally),
             counts: Counts::default(),
-            refused: Arc::clone(&refused),
         };
         let thread = std::thread::Builder::new().name("labels".to_owned()).spawn(move || worker.run());
         let thread = thread.map_err(|e| UserError::Failed(format!("the labels' thread did not start: {e}")))?;
-        Ok(Self { mapped, own, pace, is_over, refused, thread })
-    }
-
-    /// Items that were refused so far.
-    pub(super) fn refused(&self) -> u64 {
-        self.refused.load(Ordering::Relaxed)
+        Ok(Self { mapped, own, pace, tally, is_over, thread })
     }
 
     /// The next report; never without one. Cancel-safe.
@@ -106,7 +126,12 @@ impl LabelThread {
         lock(&self.own).push(pose, now);
     }
 
-    /// The vehicle has handled a map since `began`; the next one comes accordingly later.
+    /// What became of the items so far.
+    pub(super) fn health(&self) -> LabelHealth {
+        lock(&self.tally).health(Instant::now())
+    }
+
+    /// The vehicle has handled an update since `began`; the next one comes accordingly later.
     pub(super) fn handle_taken(&self, began: Instant) {
         lock(&self.pace).handle_taken(began, Instant::now());
     }
@@ -133,7 +158,7 @@ struct Counts {
 }
 
 impl Counts {
-    fn refuse(&mut self, origin: &str, why: &Refusal) {
+    fn log(&mut self, origin: &str, why: &Refusal) {
         self.refused += 1;
         if self.since.is_none_or(|at| at.elapsed() >= LOG_PAUSE) {
             (self.said, self.since) = (0, Some(Instant::now()));
@@ -153,16 +178,15 @@ impl Counts {
 
 struct Worker {
     map: ForeignMap,
-    feed: Feed,
+    feeds: Feeds,
     keep: Keep,
     clock: Clock,
     own: Arc<Mutex<OwnPoses>>,
     pace: Arc<Mutex<Pace>>,
     is_over: Arc<AtomicBool>,
     outgoing: mpsc::Sender<FromLabels>,
+    tally: Arc<Mutex<LabelTally>>,
     counts: Counts,
-    /// The refused items of `counts`, for the vehicle.
-    refused: Arc<AtomicU64>,
     is_refusal_reported: bool,
     /// The names of classes in the last checkpoint that was written.
     kept_names: Vec<ClassEntry>,
@@ -175,15 +199,17 @@ impl Worker {
         while !self.is_over.load(Ordering::Relaxed) && !self.outgoing.is_closed() {
             if is_changed && lock(&self.pace).is_due(Instant::now()) {
                 self.give(pose.take());
-                is_changed = false;
+                is_changed = self.map.has_changes();
             }
-            let Some(first) = self.feed.next(BATCH) else { continue };
+            let first = self.feeds.next(if is_changed { SHORT } else { BATCH });
+            lock(&self.tally).set_missing(self.feeds.is_missing());
+            let Some(first) = first else { continue };
             let (began, mut next) = (Instant::now(), Some(first));
             while let Some(arrived) = next {
                 let taken = self.take(arrived);
                 is_changed |= taken.is_some();
                 pose = taken.flatten().or(pose);
-                next = if began.elapsed() < BATCH { self.feed.next(Duration::ZERO) } else { None };
+                next = if began.elapsed() < BATCH { self.feeds.next(Duration::ZERO) } else { None };
             }
         }
         if self.counts.taken > 0 {
@@ -194,9 +220,9 @@ impl Worker {
         tracing::info!("labels: {} items were taken, {} refused", self.counts.taken, self.counts.refused);
     }
 
-    /// Gives the map to the vehicle.
+    /// Gives a slice of the changes to the vehicle.
     fn give(&mut self, pose: Option<ImagePose>) {
-        let mut update = self.map.update();
+        let mut update = self.map.take_changes(SLICE);
         // The checkpoint comes first, so that it contains every name that the surface receives: a class keeps its name
         // after a power cut. Names that the disk refuses wait.
         if update.classes == self.kept_names || self.keep.is_refused {
@@ -211,25 +237,28 @@ impl Worker {
             self.kept_names.clone_from(&update.classes);
         }
         self.report_checkpoint();
-        lock(&self.pace).handle_given();
+        lock(&self.pace).handle_given(self.map.has_changes());
         self.report(FromLabels::Mapped(Box::new(update), pose));
     }
 
     /// Takes an item; returns the pose in it. `None` if it is refused.
-    fn take(&mut self, arrived: Arrived) -> Option<Option<ImagePose>> {
+    fn take(&mut self, (source, arrived): (ForeignSource, Arrived)) -> Option<Option<ImagePose>> {
         let Arrived { origin, mark, at, item, answer } = arrived;
         let result = item.and_then(|item| {
             let own = self.own_pose(&item, at)?;
-            self.map.handle_item(&item, own, self.clock.now().as_secs_f64())?;
+            self.map.handle_item(&item, source, own, self.clock.now().as_secs_f64())?;
             Ok(if let Content::Image { pose, .. } = item.content { pose } else { None })
         });
         // A refused file is not read again after a restart either.
-        mark.iter().for_each(|name| self.map.set_mark(name));
+        mark.iter().for_each(|name| self.map.set_mark(source, name));
         match &result {
-            Ok(_) => self.counts.taken += 1,
+            Ok(_) => {
+                self.counts.taken += 1;
+                lock(&self.tally).take();
+            }
             Err(why) => {
-                self.counts.refuse(&origin, why);
-                self.refused.store(self.counts.refused, Ordering::Relaxed);
+                lock(&self.tally).refuse(format!("{origin}: {why}"), Instant::now());
+                self.counts.log(&origin, why);
             }
         }
         if let Some(answer) = answer {
@@ -241,9 +270,11 @@ impl Worker {
     /// The vehicle's pose for an image without one: that of the item's time, or else of its arrival `at`.
     fn own_pose(&self, item: &Item, at: Option<Instant>) -> Result<Option<ImagePose>, Refusal> {
         let Content::Image { pose: None, .. } = item.content else { return Ok(None) };
+        let moment = moment::moment(item.time, at, (Instant::now(), SystemTime::now()));
         // The mission time of an item of an earlier run is that run's.
-        let arrived = at.and_then(|at| self.clock.at(at)).ok_or(Refusal::NoPoseBefore)?;
-        lock(&self.own).at(item.t_s.unwrap_or(arrived.as_secs_f64())).map(Some)
+        let taken = moment.and_then(|moment| self.clock.at(moment)).ok_or(Refusal::NoPoseBefore)?;
+        let t_s = if let ItemTime::Mission(t_s) = item.time { t_s } else { taken.as_secs_f64() };
+        lock(&self.own).at(t_s).map(Some)
     }
 
     fn report(&self, report: FromLabels) {

@@ -2,17 +2,20 @@
 
 use std::time::{Duration, Instant};
 
-/// Shortest time between two maps.
+/// Shortest time between two updates, and between two slices of a large one.
 const SHORTEST: Duration = Duration::from_millis(200);
-/// The vehicle handles maps for at most one part of so many of its time, so that a large map does not delay its modem.
-const PART: u32 = 11;
+const BETWEEN_SLICES: Duration = Duration::from_millis(10);
+/// The vehicle handles updates for at most one part of so many of its time, so that a large map does not delay its modem.
+const PART: u32 = 6;
 
-/// When the next map is due: never before the vehicle has handled the last one, and later the longer that took.
+/// When the next update is due: never before the vehicle has handled the last one, and later the longer that took.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Pace {
     From(Instant),
-    /// The vehicle handles a map.
-    Handling,
+    /// The vehicle handles an update; whether more of the same waits.
+    Handling {
+        has_more: bool,
+    },
 }
 
 impl Pace {
@@ -24,15 +27,16 @@ impl Pace {
         matches!(self, Self::From(at) if now >= at)
     }
 
-    /// The map is given to the vehicle.
-    pub(super) fn handle_given(&mut self) {
-        *self = Self::Handling;
+    /// An update is given to the vehicle; `has_more` if further changes wait.
+    pub(super) fn handle_given(&mut self, has_more: bool) {
+        *self = Self::Handling { has_more };
     }
 
-    /// The vehicle has handled the map since `began`.
+    /// The vehicle has handled the update since `began`.
     pub(super) fn handle_taken(&mut self, began: Instant, now: Instant) {
         let took = now.saturating_duration_since(began);
-        *self = Self::From(now + SHORTEST.max(took * (PART - 1)));
+        let shortest = if *self == (Self::Handling { has_more: true }) { BETWEEN_SLICES } else { SHORTEST };
+        *self = Self::From(now + shortest.max(took * (PART - 1)));
     }
 }
 
@@ -46,11 +50,15 @@ mod tests {
         let at = |ms: u64| start + Duration::from_millis(ms);
         let mut pace = Pace::new(start);
         assert!(pace.is_due(start));
-        pace.handle_given();
+        pace.handle_given(false);
         assert!(!pace.is_due(at(60_000)), "the vehicle has not handled it");
         pace.handle_taken(at(1_000), at(1_001));
         assert!(!pace.is_due(at(1_200)) && pace.is_due(at(1_201)));
+        pace.handle_given(true);
+        pace.handle_taken(at(2_000), at(2_000));
+        assert!(!pace.is_due(at(2_009)) && pace.is_due(at(2_010)), "slices follow each other soon");
+        pace.handle_given(true);
         pace.handle_taken(at(2_000), at(5_000));
-        assert!(!pace.is_due(at(34_999)) && pace.is_due(at(35_000)));
+        assert!(!pace.is_due(at(19_999)) && pace.is_due(at(20_000)));
     }
 }

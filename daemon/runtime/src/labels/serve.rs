@@ -28,13 +28,13 @@ impl Connection for TcpStream {
     }
 }
 
-/// Listens at an address and port.
-pub(crate) fn network(place: &str) -> Result<Feed, UserError> {
-    let failed = |e: io::Error| UserError::Failed(format!("labels.source: {place}: {e}"));
+/// Listens at the address and port of a key.
+pub(crate) fn network(place: &str, key: &str) -> Result<Feed, UserError> {
+    let failed = |e: io::Error| UserError::Failed(format!("{key}: {place}: {e}"));
     let listener = TcpListener::bind(place).map_err(failed)?;
     let local = listener.local_addr().map_err(failed)?;
     if !local.ip().is_loopback() {
-        tracing::warn!("labels.source: every program that reaches {local} can write the map");
+        tracing::warn!("{key}: every program that reaches {local} can write the map");
     }
     tracing::info!("labels are taken at {local}");
     serve(move || listener.accept().map(|(stream, peer)| (stream, peer.to_string())))

@@ -4,6 +4,7 @@ use crate::checkpoint::CheckpointFile;
 use crate::journal::Folder;
 use scenecast_labels::{Ground, Raster};
 use scenecast_protocol::time::Instant as MissionTime;
+use scenecast_vehicle::LabelChanges;
 use std::path::PathBuf;
 use std::sync::mpsc::sync_channel;
 
@@ -11,6 +12,8 @@ fn config(sets: &[&str]) -> Config {
     let sets: Vec<String> = sets.iter().map(|set| (*set).to_owned()).collect();
     scenecast_config::load(None, &sets).unwrap()
 }
+
+const CONFIG: [&str; 2] = ["scene.cell_m=0.5", "labels.source=dir:labels"];
 
 /// The thread with a queue, and its clock at 100 s.
 struct Bench {
@@ -27,9 +30,10 @@ impl Bench {
         let file = CheckpointFile::of_labels(Folder::hold(&dir).unwrap());
         let keep = Keep { file, lineage: 7, every_s: 60.0, last_s: None, is_refused: false };
         let (queue, feed) = LabelQueue::new();
-        let map = ForeignMap::new(&config(&["scene.cell_m=0.5"]), 3);
+        let map = ForeignMap::new(&config(&CONFIG), 3);
+        let feeds = Feeds::new(vec![(ForeignSource::Labels, feed)]);
         let clock = Clock::starting_at(MissionTime::from_secs_f64(100.0), 1.0);
-        Self { dir, queue, thread: LabelThread::start(map, feed, keep, clock).unwrap() }
+        Self { dir, queue, thread: LabelThread::start(map, &[], feeds, keep, clock).unwrap() }
     }
 
     fn give(&self, item: Item, at: Option<Instant>) -> Answer {
@@ -56,7 +60,7 @@ impl Bench {
 
     fn kept(&self) -> ForeignMap {
         let bytes = std::fs::read(self.dir.join("labels.checkpoint")).unwrap();
-        ForeignMap::restore(&config(&["scene.cell_m=0.5"]), &bytes).unwrap().0
+        ForeignMap::restore(&config(&CONFIG), &bytes).unwrap().0
     }
 
     /// Ends the thread and removes its files.
@@ -66,37 +70,40 @@ impl Bench {
     }
 }
 
-fn image(t_s: Option<f64>) -> Item {
+fn image(time: ItemTime) -> Item {
     let classes = Raster { width: 1, height: 1, values: vec![0] };
-    Item { t_s, classes: Vec::new(), content: Content::Image { pose: None, metres_per_pixel: Some(0.1), classes } }
+    Item { time, classes: Vec::new(), content: Content::Image { pose: None, metres_per_pixel: Some(0.1), classes } }
 }
 
 fn named(class: u8, name: &str) -> Item {
     let classes = Raster { width: 1, height: 1, values: vec![class] };
     let ground = Ground { west_m: 0.0, south_m: 0.0, cell_m: 0.5 };
     let entry = ClassEntry::new(class + 1, name, None).unwrap();
-    Item { t_s: None, classes: vec![entry], content: Content::Grid { ground, classes } }
+    Item { time: ItemTime::Arrival, classes: vec![entry], content: Content::Grid { ground, classes } }
 }
 
 #[test]
 fn an_image_without_a_pose_is_mapped_where_it_was_taken() {
     let mut bench = Bench::new("own-pose");
     let now = || Some(Instant::now());
-    let unknown = bench.give(image(None), now()).unwrap_err();
+    let unknown = bench.give(image(ItemTime::Arrival), now()).unwrap_err();
     assert!(unknown.contains("does not know its own"), "{unknown}");
     for (x_m, t_s) in [(0.25, 90.0), (20.25, 94.0), (50.25, 98.0), (60.25, 100.0)] {
         bench.place(x_m, t_s);
     }
     let column = |bench: &mut Bench| {
-        let cells = bench.map().map.cells;
+        let LabelChanges { cells, .. } = bench.map().labels.unwrap();
         bench.thread.handle_taken(Instant::now());
         cells.iter().map(|(cell, _)| cell.x).collect::<Vec<_>>()
     };
-    bench.give(image(Some(92.0)), now()).unwrap();
+    bench.give(image(ItemTime::Mission(92.0)), now()).unwrap();
     assert_eq!(column(&mut bench), [20]);
-    bench.give(image(None), now()).unwrap();
-    assert_eq!(column(&mut bench), [20, 120]);
-    for (late, at) in [(Some(80.0), now()), (Some(3e4), now()), (None, None), (Some(92.0), None)] {
+    bench.give(image(ItemTime::Arrival), now()).unwrap();
+    assert_eq!(column(&mut bench), [120], "the other cell is there already");
+    bench.give(image(ItemTime::Age(0.0)), now()).unwrap();
+    let late = [ItemTime::Mission(80.0), ItemTime::Mission(3e4), ItemTime::Age(50.0), ItemTime::Unix(1e9)];
+    let late = late.into_iter().map(|time| (time, now()));
+    for (late, at) in late.chain([(ItemTime::Arrival, None), (ItemTime::Mission(92.0), None)]) {
         let refused = bench.give(image(late), at).unwrap_err();
         assert!(refused.contains("does not know its own"), "{refused}");
     }
@@ -113,7 +120,7 @@ fn a_name_is_in_the_checkpoint_before_the_surface_has_it() {
         assert!(update.classes.iter().any(|entry| entry.name() == name));
         // The power fails here.
         let mut restored = bench.kept();
-        assert!(restored.handle_item(&named(class, "mud"), None, 0.0).is_err());
+        assert!(restored.handle_item(&named(class, "mud"), ForeignSource::Labels, None, 0.0).is_err());
     }
     bench.cut();
 }
@@ -125,7 +132,7 @@ fn names_that_the_disk_refuses_do_not_go_up() {
     std::fs::create_dir_all(&in_the_way).unwrap();
     bench.give(named(3, "sand"), Some(Instant::now())).unwrap();
     let update = bench.map();
-    assert_eq!((update.map.cells.len(), update.classes), (1, Vec::new()));
+    assert_eq!((update.labels.unwrap().cells.len(), update.classes), (1, Vec::new()));
     std::fs::remove_dir(&in_the_way).unwrap();
     bench.cut();
 }
@@ -147,7 +154,28 @@ fn the_next_map_waits_until_the_last_one_is_handled() {
 #[test]
 fn images_move_the_vehicle_only_if_nothing_else_does() {
     let live = ["camera.source=watch:/tmp", "navigation.source=ros2:/pose"];
-    assert!(move_the_vehicle(&config(&[])));
-    assert!(!move_the_vehicle(&config(&live)));
-    assert!(!move_the_vehicle(&config(&["autopilot.kind=rehearsal"])));
+    let foreign = |sets: &[&str]| config(&[&["labels.source=dir:/tmp"], sets].concat());
+    assert!(move_the_vehicle(&foreign(&[])) && !move_the_vehicle(&config(&[])));
+    assert!(!move_the_vehicle(&foreign(&live)));
+    assert!(!move_the_vehicle(&foreign(&["autopilot.kind=rehearsal"])));
+}
+
+#[test]
+fn a_large_map_comes_in_slices_and_refusals_are_known() {
+    let mut bench = Bench::new("slices");
+    let classes = Raster { width: 300, height: 200, values: vec![4; 60_000] };
+    let ground = Ground { west_m: 0.0, south_m: 0.0, cell_m: 0.5 };
+    let large = Item { time: ItemTime::Arrival, classes: Vec::new(), content: Content::Grid { ground, classes } };
+    bench.give(large, Some(Instant::now())).unwrap();
+    let mut slices = Vec::new();
+    while slices.iter().sum::<usize>() < 60_000 {
+        slices.push(bench.map().labels.unwrap().cells.len());
+        bench.thread.handle_taken(Instant::now());
+    }
+    assert!(slices.len() > 5 && slices.iter().all(|&cells| cells < SLICE + 256), "{slices:?}");
+    bench.give(image(ItemTime::Arrival), Some(Instant::now())).unwrap_err();
+    let health = bench.thread.health();
+    assert_eq!((health.taken, health.refused, health.is_failing, health.is_missing), (1, 1, true, false));
+    assert!(health.last_refusal.unwrap().starts_with("here: the pose is missing"));
+    bench.cut();
 }

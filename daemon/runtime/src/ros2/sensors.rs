@@ -7,6 +7,7 @@ pub(crate) use without::RosSensors;
 
 #[cfg(feature = "ros2")]
 mod with {
+    use crate::labels::{Feed, TopicFeed, topic};
     use scenecast_config::Config;
     use scenecast_core::UserError;
     use scenecast_sources::{ArrivalClock, LiveSource, RosCamera, RosNavigation, RosTransforms, SensorNode};
@@ -32,6 +33,11 @@ mod with {
             LiveSource::start(RosCamera::new(self.0.clone(), topic, clock, needs_stamps), stall)
         }
 
+        /// A feed of labels or bands.
+        pub(crate) fn labels(&self, wanted: TopicFeed) -> Result<Feed, UserError> {
+            topic(self.0.clone(), wanted)
+        }
+
         pub(crate) fn navigation(&self, topic: &str, stall: Duration) -> std::io::Result<LiveSource> {
             LiveSource::start(RosNavigation::new(self.0.clone(), topic), stall)
         }
@@ -44,7 +50,8 @@ mod with {
 
 #[cfg(not(feature = "ros2"))]
 mod without {
-    use scenecast_config::{CameraSource, Config, NavigationSource};
+    use crate::labels::{Feed, TopicFeed};
+    use scenecast_config::{CameraSource, Config, LabelSource, NavigationSource};
     use scenecast_core::UserError;
     use scenecast_sources::{ArrivalClock, LiveSource};
     use std::io::{Error, ErrorKind, Result};
@@ -56,7 +63,8 @@ mod without {
     impl RosSensors {
         pub(crate) fn new(config: &Config) -> std::result::Result<Self, UserError> {
             let is_topic = matches!(config.camera.source, CameraSource::Ros2(_))
-                || matches!(config.navigation.source, NavigationSource::Ros2(_) | NavigationSource::Tf(_));
+                || matches!(config.navigation.source, NavigationSource::Ros2(_) | NavigationSource::Tf(_))
+                || [&config.labels.source, &config.bands.source].iter().any(|s| matches!(s, LabelSource::Ros2(..)));
             if is_topic {
                 let text = "a source of ROS 2 is not allowed: this build has no ROS 2; build it with the feature ros2";
                 return Err(UserError::Input(text.to_owned()));
@@ -66,6 +74,10 @@ mod without {
 
         pub(crate) fn camera(&self, _: &str, _: ArrivalClock, _: bool, _: Duration) -> Result<LiveSource> {
             Err(Error::from(ErrorKind::Unsupported))
+        }
+
+        pub(crate) fn labels(&self, wanted: TopicFeed) -> std::result::Result<Feed, UserError> {
+            Err(UserError::Input(format!("{}: this build has no ROS 2", wanted.topic)))
         }
 
         pub(crate) fn navigation(&self, _: &str, _: Duration) -> Result<LiveSource> {

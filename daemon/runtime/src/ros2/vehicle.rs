@@ -1,5 +1,6 @@
 //! The vehicle's end.
 
+use crate::labels::LabelHealth;
 use scenecast_config::Config;
 use scenecast_core::UserError;
 use scenecast_host::VehicleHost;
@@ -25,20 +26,27 @@ impl VehicleRos2 {
         })
     }
 
-    /// Hands the state over, a few times a second; `camera` is what became of the images of a live camera.
-    pub fn publish(&mut self, host: &VehicleHost, camera: Option<&CameraTally>) {
+    /// Hands the state over, a few times a second; `camera` is what became of the images of a live camera, `labels` what
+    /// became of the items of other programs.
+    pub fn publish(
+        &mut self,
+        host: &VehicleHost,
+        camera: Option<&CameraTally>,
+        labels: impl FnOnce() -> Option<LabelHealth>,
+    ) {
         #[cfg(feature = "ros2")]
         if let Some(on) = &mut self.on {
-            on.publish(host, camera);
+            on.publish(host, camera, labels);
         }
         #[cfg(not(feature = "ros2"))]
-        let _ = (host, camera);
+        let _ = (host, camera, labels);
     }
 }
 
 #[cfg(feature = "ros2")]
 mod on {
     use crate::equipment::RecentFaults;
+    use crate::labels::LabelHealth;
     use scenecast_config::Config;
     use scenecast_core::UserError;
     use scenecast_drivers::autopilot::{self, Counters};
@@ -70,7 +78,12 @@ mod on {
             Ok(Self { outlet, cell_m, last: None, camera, navigation })
         }
 
-        pub fn publish(&mut self, host: &VehicleHost, tally: Option<&CameraTally>) {
+        pub fn publish(
+            &mut self,
+            host: &VehicleHost,
+            tally: Option<&CameraTally>,
+            labels: impl FnOnce() -> Option<LabelHealth>,
+        ) {
             if self.last.is_some_and(|last| last.elapsed() < VIEW_INTERVAL) {
                 return;
             }
@@ -90,6 +103,7 @@ mod on {
                     now,
                 ));
             }
+            health.extend(labels().map(label_health));
             self.outlet.offer(view(vehicle, health, self.outlet.wants_map().then_some(self.cell_m)));
         }
     }
@@ -130,6 +144,19 @@ mod on {
         };
         let values = counters.iter().map(|(name, n)| (*name, n.to_string())).collect();
         Health { level, part: "autopilot", message: state.name().to_owned(), values }
+    }
+
+    fn label_health(labels: LabelHealth) -> Health {
+        let LabelHealth { taken, refused, last_refusal, is_failing, is_missing } = labels;
+        let message = match (is_missing, &last_refusal) {
+            (true, _) => "the folder of the source is missing".to_owned(),
+            (false, Some(refusal)) if is_failing => format!("refused: {refusal}"),
+            _ => format!("{taken} items taken, {refused} refused"),
+        };
+        let level = if is_failing { DiagnosticStatus::WARN } else { DiagnosticStatus::OK };
+        let mut values = vec![("taken", taken.to_string()), ("refused", refused.to_string())];
+        values.extend(last_refusal.map(|refusal| ("last_refusal", refusal)));
+        Health { level, part: "labels", message, values }
     }
 
     /// A sensor whose faults are new for a while after each of them.

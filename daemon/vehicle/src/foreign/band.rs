@@ -1,7 +1,8 @@
 //! Bands: quantities of another program, as layers of the map.
 
+use super::changes::ChangingGrid;
 use super::ground::GroundRaster;
-use scenecast_labels::{Band, Ground, Raster, Refusal};
+use scenecast_labels::{Band, BandScale, Ground, QuantityBand, Raster, Refusal};
 use scenecast_protocol::map::{
     BUILT_IN_LAYERS, Cell, Decimal, LabelGrid, LayerDescriptor, MAX_LABEL, Palette, Quantity, Spread, Steps,
     UNEXPLORED, UpperEnd,
@@ -12,14 +13,14 @@ use scenecast_protocol::map::{
 pub(super) struct BandMap {
     pub(super) descriptor: LayerDescriptor,
     /// Level of each cell: the value of the grid, counted from its lowest.
-    pub(super) levels: LabelGrid,
+    pub(super) levels: ChangingGrid,
     /// Cells whose quantity was known and is not any more.
     pub(super) erased: LabelGrid,
 }
 
 impl BandMap {
     pub(super) fn new(descriptor: LayerDescriptor) -> Self {
-        Self { descriptor, levels: LabelGrid::default(), erased: LabelGrid::default() }
+        Self { descriptor, levels: ChangingGrid::default(), erased: LabelGrid::default() }
     }
 
     /// Takes the levels of cells, as of [`levels`].
@@ -30,12 +31,6 @@ impl BandMap {
                 self.erased.set(cell, u8::from(level == UNEXPLORED));
             }
         }
-    }
-
-    /// The quantity of every cell: the middle of its level, or not a number where it is no longer known.
-    pub(super) fn quantities(&self) -> Vec<(Cell, f64)> {
-        let known = self.levels.iter().filter_map(|(cell, level)| Some((cell, self.descriptor.middle(level)?)));
-        known.chain(self.erased.iter().map(|(cell, _)| (cell, f64::NAN))).collect()
     }
 }
 
@@ -55,6 +50,22 @@ pub(super) fn levels(band: &Band, ground: Ground, raster: &Raster, cell_m: f64) 
     Ok(levels)
 }
 
+/// The level of the mean quantity of each cell; [`UNEXPLORED`] where none is known, or below the lowest level.
+pub(super) fn levels_of(
+    layer: &LayerDescriptor,
+    ground: Ground,
+    quantities: &Raster<f32>,
+    cell_m: f64,
+) -> Result<Vec<(Cell, u8)>, Refusal> {
+    let mut levels = Vec::new();
+    GroundRaster::new(quantities, ground, cell_m)?.for_each(|cell, values| {
+        let known = values.iter().filter(|value| value.is_finite()).map(|&value| f64::from(value));
+        let (sum, count) = known.fold((0.0, 0.0), |(sum, count), value| (sum + value, count + 1.0));
+        levels.push((cell, if count > 0.0 { layer.level(sum / count, UNEXPLORED) } else { UNEXPLORED }));
+    });
+    Ok(levels)
+}
+
 /// The lowest value that stands for a quantity.
 fn lowest(band: &Band) -> u32 {
     u32::from(band.no_data == 0)
@@ -63,14 +74,39 @@ fn lowest(band: &Band) -> u32 {
 /// The layer of a band: each value has a level of its own, whose middle is the quantity. The highest level, 254, also has
 /// the values above it.
 pub(super) fn descriptor(band: &Band, share: u8) -> LayerDescriptor {
-    let scale = band.scale.value();
-    let first = band.offset.value() + scale * (f64::from(lowest(band)) - 0.5);
+    let lowest = band.offset.value() + band.scale.value() * f64::from(lowest(band));
+    layer((&band.name, &band.unit), lowest, band.scale, share)
+}
+
+/// The layer of a band of quantities; `known` is the one that it has already, `configured`
+/// the scale for a band that states none.
+///
+/// # Errors
+/// It has another scale already, or none can be chosen.
+pub(super) fn quantity_layer(
+    band: &QuantityBand,
+    quantities: &Raster<f32>,
+    known: Option<&LayerDescriptor>,
+    configured: Option<BandScale>,
+    share: u8,
+) -> Result<LayerDescriptor, Refusal> {
+    let of = |scale: BandScale| layer((&band.name, &band.unit), scale.low, scale.step, share);
+    match (known, band.scale.or(configured)) {
+        (Some(known), None) if known.unit == band.unit => Ok(known.clone()),
+        (Some(_), None) => Err(Refusal::OtherBand(band.name.clone())),
+        (_, Some(scale)) => Ok(of(scale)),
+        (None, None) => BandScale::around(&quantities.values).map(of).ok_or(Refusal::NoScale(band.name.clone())),
+    }
+}
+
+/// A layer whose level 1 has `lowest` in its middle.
+fn layer((name, unit): (&str, &str), lowest: f64, scale: Decimal, share: u8) -> LayerDescriptor {
     LayerDescriptor {
-        name: band.name.clone().into(),
-        unit: band.unit.clone().into(),
+        name: name.to_owned().into(),
+        unit: unit.to_owned().into(),
         quantity: Quantity::Plain,
-        scale: band.scale,
-        offset: Decimal::nearest(first),
+        scale,
+        offset: Decimal::nearest(lowest - 0.5 * scale.value()),
         steps: Steps::Equal,
         levels: MAX_LABEL,
         upper_end: UpperEnd::Unbounded,

@@ -2,13 +2,14 @@
 
 use super::ForeignMap;
 use super::band::BandMap;
+use super::changes::ChangingGrid;
 use super::votes::Votes;
 use scene_model::envelope::{Envelope, EnvelopeError};
 use scenecast_config::Config;
 use scenecast_protocol::map::{Cell, ClassEntry, LabelGrid, LayerDescriptor};
 use serde::{Deserialize, Serialize};
 
-const ENVELOPE: Envelope = Envelope { magic: *b"SCNLABEL", version: 1 };
+const ENVELOPE: Envelope = Envelope { magic: *b"SCNLABEL", version: 2 };
 
 /// Cells as x, y and value.
 type Cells = Vec<(i32, i32, u8)>;
@@ -19,7 +20,8 @@ struct Content {
     epoch: u8,
     cell_m: f64,
     last_s: Option<f64>,
-    mark: Option<String>,
+    /// The last names of the sources.
+    marks: [Option<String>; 2],
     votes: Votes,
     labels: Cells,
     erased: Cells,
@@ -52,15 +54,15 @@ fn unpack(cells: &Cells) -> LabelGrid {
 
 impl ForeignMap {
     pub(super) fn encode(&self, lineage: u64) -> Vec<u8> {
-        let band = |map: &BandMap| (map.descriptor.to_bytes(), pack(&map.levels), pack(&map.erased));
+        let band = |map: &BandMap| (map.descriptor.to_bytes(), pack(map.levels.grid()), pack(&map.erased));
         let content = Content {
             lineage,
             epoch: self.epoch,
             cell_m: self.cell_m,
             last_s: self.last_s,
-            mark: self.mark.clone(),
+            marks: self.marks.clone(),
             votes: self.votes.clone(),
-            labels: pack(&self.labels),
+            labels: pack(self.labels.grid()),
             erased: pack(&self.erased),
             bands: self.bands.values().map(band).collect(),
             classes: self.classes.values().map(|entry| (entry.label(), entry.to_bytes())).collect(),
@@ -79,14 +81,16 @@ impl ForeignMap {
         for (descriptor, levels, erased) in &content.bands {
             let descriptor = LayerDescriptor::from_bytes(descriptor).ok_or(ForeignRestoreError::Inconsistent)?;
             let name = descriptor.name.clone().into_owned();
-            map.bands.insert(name, BandMap { descriptor, levels: unpack(levels), erased: unpack(erased) });
+            let levels = ChangingGrid::new(unpack(levels));
+            map.bands.insert(name, BandMap { descriptor, levels, erased: unpack(erased) });
         }
         for (label, bytes) in &content.classes {
             let entry = ClassEntry::from_bytes(*label, bytes).ok_or(ForeignRestoreError::Inconsistent)?;
             map.classes.insert(*label, entry);
         }
-        (map.votes, map.last_s, map.mark) = (content.votes, content.last_s, content.mark);
-        (map.labels, map.erased) = (unpack(&content.labels), unpack(&content.erased));
+        (map.votes, map.last_s, map.marks) = (content.votes, content.last_s, content.marks);
+        map.highest = content.labels.iter().map(|&(_, _, label)| label).max().unwrap_or(0);
+        (map.labels, map.erased) = (ChangingGrid::new(unpack(&content.labels)), unpack(&content.erased));
         Ok((map, content.lineage))
     }
 }

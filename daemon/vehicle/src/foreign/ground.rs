@@ -7,16 +7,16 @@ use scenecast_protocol::map::Cell;
 pub(super) const MAX_CELLS: u64 = 1 << 22;
 
 /// A grid on the ground, to be read in cells of the map.
-pub(super) struct GroundRaster<'a> {
-    raster: &'a Raster,
+pub(super) struct GroundRaster<'a, T> {
+    raster: &'a Raster<T>,
     ground: Ground,
     cell_m: f64,
 }
 
-impl<'a> GroundRaster<'a> {
+impl<'a, T: Copy> GroundRaster<'a, T> {
     /// # Errors
     /// The grid covers more than [`MAX_CELLS`] cells of `cell_m` metres.
-    pub(super) fn new(raster: &'a Raster, ground: Ground, cell_m: f64) -> Result<Self, Refusal> {
+    pub(super) fn new(raster: &'a Raster<T>, ground: Ground, cell_m: f64) -> Result<Self, Refusal> {
         let across = |pixels: u32| (f64::from(pixels) * ground.cell_m / cell_m).ceil() as u64 + 1;
         let cells = across(raster.width).saturating_mul(across(raster.height));
         match cells <= MAX_CELLS {
@@ -27,7 +27,7 @@ impl<'a> GroundRaster<'a> {
 
     /// Calls `each` with every cell of the map whose middle the grid covers, and with the grid's values in it: that at its
     /// middle, or, where the grid has smaller cells, those of all grid cells whose middles lie in it.
-    pub(super) fn for_each(&self, mut each: impl FnMut(Cell, &[u8])) {
+    pub(super) fn for_each(&self, mut each: impl FnMut(Cell, &[T])) {
         let Ground { west_m, south_m, cell_m: edge } = self.ground;
         let (columns, rows) = (self.range(west_m, self.raster.width), self.range(south_m, self.raster.height));
         let is_finer = edge < self.cell_m * 0.999;
@@ -61,7 +61,7 @@ impl<'a> GroundRaster<'a> {
     }
 
     /// The value in a column of a row that is counted from the south.
-    fn at(&self, column: u32, north: u32) -> Option<u8> {
+    fn at(&self, column: u32, north: u32) -> Option<T> {
         self.raster.get(column, self.raster.height.checked_sub(1 + north)?)
     }
 }
@@ -97,7 +97,7 @@ mod tests {
         );
         let fine = read(&raster, Ground { west_m: 1.0, south_m: 0.0, cell_m: 0.5 }, 1.0);
         assert_eq!(fine, [(1, 0, vec![3, 4, 1, 2])]);
-        let huge = Raster { width: 4096, height: 4096, values: Vec::new() };
+        let huge: Raster = Raster { width: 4096, height: 4096, values: Vec::new() };
         assert!(GroundRaster::new(&huge, Ground { west_m: 0.0, south_m: 0.0, cell_m: 1e4 }, 0.1).is_err());
     }
 }

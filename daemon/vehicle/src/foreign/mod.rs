@@ -3,32 +3,53 @@
 //! Class n has label n + 1, always; so no label changes its meaning, whatever restarts.
 
 mod band;
+mod changes;
 mod checkpoint;
 mod ground;
 mod votes;
 
 use crate::{MapProducer, MapUpdate};
 use band::BandMap;
+use changes::ChangingGrid;
 pub use checkpoint::ForeignRestoreError;
 use ground::GroundRaster;
 use scene_model::project::{DownCamera, Pose};
 use scene_model::words::Word;
-use scenecast_config::{Config, Votes as VotesKept, cell_m};
-use scenecast_labels::{Band, Content, Ground, ImagePose, Item, Raster, Refusal};
-use scenecast_protocol::map::{Cell, ClassEntry, LabelGrid, LayerDescriptor, LayerId, UNEXPLORED};
+use scenecast_config::{BandRange, Config, LabelSource, Votes as VotesKept, cell_m};
+use scenecast_labels::{Band, BandScale, Content, Ground, ImagePose, Item, QuantityBand, Raster, Refusal};
+use scenecast_protocol::map::{BUILT_IN_LAYERS, Cell, ClassEntry, LabelGrid, LayerDescriptor, LayerId, UNEXPLORED};
 use std::collections::BTreeMap;
 use votes::{CellVotes, Votes};
 
 /// A cell without a class.
 const UNKNOWN: u8 = u8::MAX;
 
-/// The map of another program after an item.
+/// A part of the cells that have changed since the last update, and the names of classes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ForeignUpdate {
-    pub map: MapUpdate,
-    /// The layers of bands, with the quantity of every cell.
-    pub bands: Vec<(LayerDescriptor, Vec<(Cell, f64)>)>,
+    /// `None` if the scene model gives the labels.
+    pub labels: Option<LabelChanges>,
+    /// The layers of bands, with the levels of their changed cells; level 0 is not known.
+    pub bands: Vec<(LayerDescriptor, Vec<(Cell, u8)>)>,
     pub classes: Vec<ClassEntry>,
+}
+
+/// Changed cells of the labels of another program.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct LabelChanges {
+    /// 0 for a cell that has no label any more.
+    pub cells: Vec<(Cell, u8)>,
+    /// The highest label of the map so far, in these cells or elsewhere.
+    pub labels: u8,
+}
+
+/// A source of items.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ForeignSource {
+    /// `labels.source`: labels and bands.
+    Labels,
+    /// `bands.source`: bands alone.
+    Bands,
 }
 
 /// The map that another program makes.
@@ -36,20 +57,26 @@ pub struct ForeignUpdate {
 pub struct ForeignMap {
     epoch: u8,
     cell_m: f64,
+    /// Whether the labels are not the scene model's.
+    has_labels: bool,
     /// Most cells of the labels, and of each band; erased ones count.
     max_cells: usize,
     camera: DownCamera,
     is_newest_only: bool,
     band_share: u8,
+    /// Scales of bands that state none.
+    scales: BTreeMap<String, BandScale>,
     votes: Votes,
-    labels: LabelGrid,
+    labels: ChangingGrid,
+    /// The highest label so far.
+    highest: u8,
     /// Cells that had a label and have none any more.
     erased: LabelGrid,
     bands: BTreeMap<String, BandMap>,
     classes: BTreeMap<u8, ClassEntry>,
     last_s: Option<f64>,
-    /// The name of the last item that has one.
-    mark: Option<String>,
+    /// The name of the last item of each source that has one.
+    marks: [Option<String>; 2],
 }
 
 impl ForeignMap {
@@ -61,20 +88,26 @@ impl ForeignMap {
         Self {
             epoch,
             cell_m: cell_m(config),
+            has_labels: config.labels.source != LabelSource::SceneModel,
             max_cells: Self::MAX_CELLS,
             camera: DownCamera {
-                metres_per_pixel: config.camera.metres_per_pixel,
+                metres_per_pixel: match config.labels.metres_per_pixel {
+                    0.0 => config.camera.metres_per_pixel,
+                    metres => metres,
+                },
                 altitude_m: config.survey.altitude_m,
             },
             is_newest_only: config.labels.votes == VotesKept::Newest,
-            band_share: config.labels.band_share,
+            band_share: config.bands.share,
+            scales: config.bands.ranges.iter().filter_map(scale).collect(),
             votes: Votes::default(),
-            labels: LabelGrid::default(),
+            labels: ChangingGrid::default(),
+            highest: 0,
             erased: LabelGrid::default(),
             bands: BTreeMap::new(),
             classes: BTreeMap::new(),
             last_s: None,
-            mark: None,
+            marks: [None, None],
         }
     }
 
@@ -82,7 +115,17 @@ impl ForeignMap {
     ///
     /// # Errors
     /// Nothing of a refused item is used.
-    pub fn handle_item(&mut self, item: &Item, own: Option<ImagePose>, t_s: f64) -> Result<(), Refusal> {
+    pub fn handle_item(
+        &mut self,
+        item: &Item,
+        source: ForeignSource,
+        own: Option<ImagePose>,
+        t_s: f64,
+    ) -> Result<(), Refusal> {
+        let is_band = matches!(item.content, Content::Band { .. } | Content::Quantities { .. });
+        if source == ForeignSource::Bands && (!is_band || !item.classes.is_empty()) {
+            return Err(Refusal::BandsAlone);
+        }
         self.check_names(&item.classes)?;
         match &item.content {
             Content::Classes => {}
@@ -92,20 +135,33 @@ impl ForeignMap {
             }
             Content::Grid { ground, classes } => self.state(classes, *ground)?,
             Content::Band { band, ground, levels } => self.take_band(band, *ground, levels)?,
+            Content::Quantities { band, ground, quantities } => self.take_quantities(band, *ground, quantities)?,
         }
         self.classes.extend(item.classes.iter().map(|entry| (entry.label(), entry.clone())));
         self.last_s = Some(t_s);
         Ok(())
     }
 
-    /// Notes the name of an item that was handled, for its source after a restart.
-    pub fn set_mark(&mut self, name: &str) {
-        self.mark = Some(name.to_owned());
+    /// Takes names of classes that come with no item.
+    ///
+    /// # Errors
+    /// A class has another name already.
+    pub fn add_names(&mut self, classes: &[ClassEntry]) -> Result<(), Refusal> {
+        self.check_names(classes)?;
+        self.classes.extend(classes.iter().map(|entry| (entry.label(), entry.clone())));
+        // So that they are part of the first checkpoint.
+        self.last_s.get_or_insert(0.0);
+        Ok(())
     }
 
-    /// The name of the last item that was handled, before a restart too.
-    pub fn mark(&self) -> Option<&str> {
-        self.mark.as_deref()
+    /// Notes the name of an item that was handled, for its source after a restart.
+    pub fn set_mark(&mut self, source: ForeignSource, name: &str) {
+        self.marks[source as usize] = Some(name.to_owned());
+    }
+
+    /// The name of the last item of a source that was handled, before a restart too.
+    pub fn mark(&self, source: ForeignSource) -> Option<&str> {
+        self.marks[source as usize].as_deref()
     }
 
     /// A class keeps its name and its colour.
@@ -131,7 +187,7 @@ impl ForeignMap {
         self.check_room(seen.keys().map(|&(x, y)| Cell::new(x, y)))?;
         for (place, votes) in seen {
             let cell = Cell::new(place.0, place.1);
-            let held = self.labels.get(cell).checked_sub(1);
+            let held = self.labels.grid().get(cell).checked_sub(1);
             let winner = self.votes.vote(place, &votes, self.is_newest_only).winner(held);
             self.set(cell, winner.unwrap_or(UNKNOWN));
         }
@@ -155,12 +211,13 @@ impl ForeignMap {
     }
 
     fn check_room(&self, cells: impl Iterator<Item = Cell>) -> Result<(), Refusal> {
-        check_room(&self.labels, &self.erased, cells, self.max_cells)
+        check_room(self.labels.grid(), &self.erased, cells, self.max_cells)
     }
 
     fn set(&mut self, cell: Cell, class: u8) {
         let label = ClassEntry::label_of(class).unwrap_or(UNEXPLORED);
         let before = self.labels.set(cell, label);
+        self.highest = self.highest.max(label);
         if label == UNEXPLORED && before != UNEXPLORED {
             self.erased.set(cell, 1);
         } else if label != UNEXPLORED && before == UNEXPLORED {
@@ -169,38 +226,63 @@ impl ForeignMap {
     }
 
     fn take_band(&mut self, band: &Band, ground: Ground, levels: &Raster) -> Result<(), Refusal> {
-        if !self.bands.contains_key(&band.name) {
+        let layer = band::descriptor(band, self.next_share());
+        self.check_layer(&layer)?;
+        let levels = band::levels(band, ground, levels, self.cell_m)?;
+        self.take_levels(layer, &levels)
+    }
+
+    fn take_quantities(&mut self, band: &QuantityBand, ground: Ground, map: &Raster<f32>) -> Result<(), Refusal> {
+        let known = self.bands.get(&band.name).map(|map| &map.descriptor);
+        let configured = self.scales.get(&band.name).copied();
+        let layer = band::quantity_layer(band, map, known, configured, self.next_share())?;
+        self.check_layer(&layer)?;
+        let levels = band::levels_of(&layer, ground, map, self.cell_m)?;
+        self.take_levels(layer, &levels)
+    }
+
+    /// The share of a new band: the configured one, or what the others have left.
+    fn next_share(&self) -> u8 {
+        let used: u32 = self.bands.values().map(|map| u32::from(map.descriptor.share)).sum();
+        self.band_share.min(100u32.saturating_sub(used) as u8)
+    }
+
+    /// Refuses a layer of another scale than before, and one beyond those of a map.
+    fn check_layer(&self, layer: &LayerDescriptor) -> Result<(), Refusal> {
+        let name = layer.name.to_string();
+        let Some(BandMap { descriptor: known, .. }) = self.bands.get(&name) else {
             // The built-in layers have their own indexes.
             let more = self.bands.keys().filter(|name| !band::is_built_in(name)).count();
-            let is_full = !band::is_built_in(&band.name)
-                && more + scenecast_protocol::map::BUILT_IN_LAYERS.len() >= LayerId::COUNT;
-            if is_full {
-                return Err(Refusal::TooManyBands(band.name.clone()));
-            }
-        }
-        let used: u32 = self.bands.values().map(|map| u32::from(map.descriptor.share)).sum();
-        let share = self.band_share.min(100u32.saturating_sub(used) as u8);
-        let fresh = band::descriptor(band, share);
-        let known = self.bands.get(&band.name).map(|map| &map.descriptor);
-        let is_other = known.is_some_and(|known| LayerDescriptor { share: known.share, ..fresh.clone() } != *known);
-        if is_other {
-            return Err(Refusal::OtherBand(band.name.clone()));
-        }
-        let levels = band::levels(band, ground, levels, self.cell_m)?;
+            let is_full = !band::is_built_in(&name) && more + BUILT_IN_LAYERS.len() >= LayerId::COUNT;
+            return if is_full { Err(Refusal::TooManyBands(name)) } else { Ok(()) };
+        };
+        let is_same = LayerDescriptor { share: known.share, ..layer.clone() } == *known;
+        if is_same { Ok(()) } else { Err(Refusal::OtherBand(name)) }
+    }
+
+    fn take_levels(&mut self, layer: LayerDescriptor, levels: &[(Cell, u8)]) -> Result<(), Refusal> {
+        let name = layer.name.to_string();
         let more = levels.iter().filter(|(_, level)| *level != UNEXPLORED).map(|&(cell, _)| cell);
-        match self.bands.get(&band.name) {
-            Some(map) => check_room(&map.levels, &map.erased, more, self.max_cells)?,
+        match self.bands.get(&name) {
+            Some(map) => check_room(map.levels.grid(), &map.erased, more, self.max_cells)?,
             None => check_room(&LabelGrid::default(), &LabelGrid::default(), more, self.max_cells)?,
         }
-        self.bands.entry(band.name.clone()).or_insert_with(|| BandMap::new(fresh)).take(&levels);
+        self.bands.entry(name).or_insert_with(|| BandMap::new(layer)).take(levels);
         Ok(())
     }
 
-    /// The map after the last item, with bands and names.
-    pub fn update(&self) -> ForeignUpdate {
+    /// Whether cells may have changed since the last update.
+    pub fn has_changes(&self) -> bool {
+        self.labels.has_changes() || self.bands.values().any(|band| band.levels.has_changes())
+    }
+
+    /// Gives away about `most` changed cells of the labels, and as many of each band. A band without any is there too.
+    pub fn take_changes(&mut self, most: usize) -> ForeignUpdate {
+        let labels = LabelChanges { cells: self.labels.take(most), labels: self.highest };
+        let levels = |band: &mut BandMap| (band.descriptor.clone(), band.levels.take(most));
         ForeignUpdate {
-            map: self.current(),
-            bands: self.bands.values().map(|map| (map.descriptor.clone(), map.quantities())).collect(),
+            labels: self.has_labels.then_some(labels),
+            bands: self.bands.values_mut().map(levels).collect(),
             classes: self.classes.values().cloned().collect(),
         }
     }
@@ -212,16 +294,15 @@ impl ForeignMap {
 
     /// The map of labels.
     pub fn labels(&self) -> &LabelGrid {
-        &self.labels
+        self.labels.grid()
     }
 }
 
 impl MapProducer for ForeignMap {
     fn current(&self) -> MapUpdate {
         let erased = self.erased.iter().map(|(cell, _)| (cell, UNEXPLORED));
-        let cells: Vec<(Cell, u8)> = self.labels.iter().chain(erased).collect();
-        let labels = cells.iter().map(|&(_, label)| label).max().unwrap_or(0);
-        let t_s = self.last_s.unwrap_or(0.0);
+        let cells: Vec<(Cell, u8)> = self.labels.grid().iter().chain(erased).collect();
+        let (t_s, labels) = (self.last_s.unwrap_or(0.0), self.highest);
         MapUpdate { t_s, epoch: self.epoch, cells, layers: BTreeMap::new(), labels, perplexity: Vec::new() }
     }
 
@@ -240,6 +321,10 @@ impl MapProducer for ForeignMap {
     fn save(&self, lineage: u64) -> Vec<u8> {
         self.encode(lineage)
     }
+}
+
+fn scale(range: &BandRange) -> Option<(String, BandScale)> {
+    Some((range.band.clone(), BandScale::between(range.low, range.high)?))
 }
 
 /// Refuses `cells` of which so many are neither in `known` nor in `erased` that the three are more than `most`.

@@ -1,4 +1,5 @@
 use super::*;
+use scenecast_labels::{BandScale, ItemTime};
 use scenecast_protocol::map::Decimal;
 
 fn config(sets: &[&str]) -> Config {
@@ -7,7 +8,7 @@ fn config(sets: &[&str]) -> Config {
 }
 
 fn map(sets: &[&str]) -> ForeignMap {
-    ForeignMap::new(&config(&[&["scene.cell_m=0.5"], sets].concat()), 3)
+    ForeignMap::new(&config(&[&["scene.cell_m=0.5", "labels.source=dir:labels"], sets].concat()), 3)
 }
 
 fn raster(width: u32, values: &[u8]) -> Raster {
@@ -15,7 +16,7 @@ fn raster(width: u32, values: &[u8]) -> Raster {
 }
 
 fn item(content: Content) -> Item {
-    Item { t_s: None, classes: Vec::new(), content }
+    Item { time: ItemTime::Arrival, classes: Vec::new(), content }
 }
 
 fn grid(width: u32, values: &[u8]) -> Item {
@@ -34,14 +35,15 @@ fn a_segmented_image_is_projected_like_a_camera_frame() {
         item(Content::Image { pose: Some(pose), metres_per_pixel: Some(0.5), classes: raster(2, values) })
     };
     let mut seen = map(&[]);
-    seen.handle_item(&image(&[0, 1, 255, 7]), None, 4.0).unwrap();
+    seen.handle_item(&image(&[0, 1, 255, 7]), ForeignSource::Labels, None, 4.0).unwrap();
     // Left and right of the top row: north-east and south-east.
     assert_eq!(labels(&seen), [(1, 1, 8), (2, 1, 2), (2, 2, 1)].map(|(x, y, l)| (x, y, l)));
-    assert_eq!((seen.last_s(), seen.update().map.labels), (Some(4.0), 8));
+    let changes = seen.take_changes(100).labels.unwrap();
+    assert_eq!((seen.last_s(), changes.labels, changes.cells.len()), (Some(4.0), 8, 3));
     let own = item(Content::Image { pose: None, metres_per_pixel: Some(0.5), classes: raster(2, &[0, 1, 255, 7]) });
     let mut same = map(&[]);
-    assert_eq!(same.handle_item(&own, None, 4.0), Err(Refusal::NoPose));
-    same.handle_item(&own, Some(pose), 4.0).unwrap();
+    assert_eq!(same.handle_item(&own, ForeignSource::Labels, None, 4.0), Err(Refusal::NoPose));
+    same.handle_item(&own, ForeignSource::Labels, Some(pose), 4.0).unwrap();
     assert_eq!(labels(&same), labels(&seen));
 }
 
@@ -54,7 +56,7 @@ fn images_vote_and_the_newest_wins_if_configured() {
     for (sets, expected) in [(&[][..], 5), (&["labels.votes=newest"][..], 9)] {
         let mut seen = map(sets);
         for class in [4, 4, 8] {
-            seen.handle_item(&image(class), None, 0.0).unwrap();
+            seen.handle_item(&image(class), ForeignSource::Labels, None, 0.0).unwrap();
         }
         assert_eq!(labels(&seen), [(0, 0, expected)]);
     }
@@ -63,14 +65,18 @@ fn images_vote_and_the_newest_wins_if_configured() {
 #[test]
 fn a_grid_states_each_cell_and_can_make_it_unknown() {
     let mut stated = map(&[]);
-    stated.handle_item(&grid(2, &[0, 253, 255, 9]), None, 0.0).unwrap();
+    stated.handle_item(&grid(2, &[0, 253, 255, 9]), ForeignSource::Labels, None, 0.0).unwrap();
     assert_eq!(labels(&stated), [(1, 0, 10), (0, 1, 1), (1, 1, 254)]);
-    stated.handle_item(&grid(2, &[255, 253, 3, 9]), None, 1.0).unwrap();
-    let update = stated.update().map;
-    assert_eq!(update.cells.len(), 4);
-    assert!(update.cells.contains(&(Cell::new(0, 1), 0)) && update.cells.contains(&(Cell::new(0, 0), 4)));
-    stated.handle_item(&grid(2, &[1, 1, 1, 1]), None, 2.0).unwrap();
-    assert!(stated.update().map.cells.iter().all(|&(_, label)| label == 2));
+    stated.handle_item(&grid(2, &[255, 253, 3, 9]), ForeignSource::Labels, None, 1.0).unwrap();
+    let mut changed = stated.take_changes(100).labels.unwrap().cells;
+    assert_eq!(changed.len(), 3, "nobody was given the cell that is unknown again");
+    stated.handle_item(&grid(2, &[0, 253, 255, 255]), ForeignSource::Labels, None, 1.5).unwrap();
+    changed = stated.take_changes(100).labels.unwrap().cells;
+    changed.sort();
+    assert_eq!(changed, [(Cell::new(0, 0), 0), (Cell::new(0, 1), 1), (Cell::new(1, 0), 0)]);
+    assert!(stated.current().cells.contains(&(Cell::new(1, 0), 0)));
+    stated.handle_item(&grid(2, &[1, 1, 1, 1]), ForeignSource::Labels, None, 2.0).unwrap();
+    assert!(stated.current().cells.iter().all(|&(_, label)| label == 2));
 }
 
 #[test]
@@ -95,14 +101,18 @@ fn labels_and_bands_have_a_limit_on_cells_that_counts_erased_ones() {
         let mut map = map(&[]);
         map.max_cells = 5;
         let full = Err(Refusal::FullMap(5));
-        assert_eq!(map.handle_item(&place(of(&[1; 6]), 0.0), None, 0.0), full);
-        assert!(map.update().bands.is_empty() && map.update().map.cells.is_empty(), "nothing of it is used");
-        map.handle_item(&place(of(&[1; 4]), 0.0), None, 0.0).unwrap();
-        map.handle_item(&place(of(&[2; 4]), 0.0), None, 1.0).unwrap();
-        map.handle_item(&place(of(&[255; 4]), 0.0), None, 2.0).unwrap();
-        assert_eq!(map.handle_item(&place(of(&[1; 2]), 50.0), None, 3.0), full, "erased cells are cells");
-        map.handle_item(&place(of(&[255; 9]), 0.0), None, 4.0).unwrap();
-        map.handle_item(&place(of(&[3; 5]), 0.0), None, 5.0).unwrap();
+        assert_eq!(map.handle_item(&place(of(&[1; 6]), 0.0), ForeignSource::Labels, None, 0.0), full);
+        assert!(map.bands.is_empty() && map.current().cells.is_empty(), "nothing of it is used");
+        map.handle_item(&place(of(&[1; 4]), 0.0), ForeignSource::Labels, None, 0.0).unwrap();
+        map.handle_item(&place(of(&[2; 4]), 0.0), ForeignSource::Labels, None, 1.0).unwrap();
+        map.handle_item(&place(of(&[255; 4]), 0.0), ForeignSource::Labels, None, 2.0).unwrap();
+        assert_eq!(
+            map.handle_item(&place(of(&[1; 2]), 50.0), ForeignSource::Labels, None, 3.0),
+            full,
+            "erased cells are cells"
+        );
+        map.handle_item(&place(of(&[255; 9]), 0.0), ForeignSource::Labels, None, 4.0).unwrap();
+        map.handle_item(&place(of(&[3; 5]), 0.0), ForeignSource::Labels, None, 5.0).unwrap();
     }
 }
 
@@ -110,33 +120,38 @@ fn labels_and_bands_have_a_limit_on_cells_that_counts_erased_ones() {
 fn a_class_keeps_its_name_and_a_band_its_scale() {
     let mut map = map(&[]);
     let named = |name: &str| Item { classes: vec![ClassEntry::new(4, name, None).unwrap()], ..grid(1, &[3]) };
-    map.handle_item(&named("rock"), None, 0.0).unwrap();
-    let refused = map.handle_item(&named("mud"), None, 1.0).unwrap_err();
+    map.handle_item(&named("rock"), ForeignSource::Labels, None, 0.0).unwrap();
+    let refused = map.handle_item(&named("mud"), ForeignSource::Labels, None, 1.0).unwrap_err();
     assert_eq!(refused, Refusal::OtherName(3, "rock".to_owned()));
-    assert_eq!((map.last_s(), map.update().classes[0].name()), (Some(0.0), "rock"));
+    assert_eq!((map.last_s(), map.classes().next().unwrap().name()), (Some(0.0), "rock"));
     let band = |scale: i32, name: &str| {
         let ground = Ground { west_m: 0.0, south_m: 0.0, cell_m: 0.5 };
         let (scale, offset) = (Decimal::new(scale, -1), Decimal::new(-80, 0));
         let band = Band { name: name.into(), unit: "dB".into(), scale, offset, no_data: 255 };
         item(Content::Band { band, ground, levels: raster(3, &[0, 100, 255]) })
     };
-    map.handle_item(&band(5, "backscatter"), None, 2.0).unwrap();
-    assert_eq!(map.handle_item(&band(6, "backscatter"), None, 3.0), Err(Refusal::OtherBand("backscatter".into())));
-    let (layer, cells) = map.update().bands.remove(0);
+    map.handle_item(&band(5, "backscatter"), ForeignSource::Labels, None, 2.0).unwrap();
+    assert_eq!(
+        map.handle_item(&band(6, "backscatter"), ForeignSource::Labels, None, 3.0),
+        Err(Refusal::OtherBand("backscatter".into()))
+    );
+    let (layer, levels) = map.take_changes(100).bands.remove(0);
+    let cells: Vec<_> = levels.iter().map(|&(cell, level)| (cell, layer.middle(level).unwrap())).collect();
     assert_eq!((&*layer.name, &*layer.unit, layer.share), ("backscatter", "dB", 8));
     assert_eq!(cells, [(Cell::new(0, 0), -80.0), (Cell::new(1, 0), -30.0)]);
-    let full = (0..20).find_map(|i| map.handle_item(&band(5, &format!("band_{i}")), None, 4.0).err());
+    let full =
+        (0..20).find_map(|i| map.handle_item(&band(5, &format!("band_{i}")), ForeignSource::Labels, None, 4.0).err());
     assert!(matches!(full, Some(Refusal::TooManyBands(_))));
 }
 
 #[test]
 fn a_restored_foreign_map_is_the_saved_one() {
     let mut before = map(&[]);
-    before.handle_item(&grid(2, &[0, 253, 255, 9]), None, 5.0).unwrap();
-    before.handle_item(&grid(1, &[255]), None, 6.0).unwrap();
-    before.set_mark("000017");
+    before.handle_item(&grid(2, &[0, 253, 255, 9]), ForeignSource::Labels, None, 5.0).unwrap();
+    before.handle_item(&grid(1, &[255]), ForeignSource::Labels, None, 6.0).unwrap();
+    before.set_mark(ForeignSource::Labels, "000017");
     before.classes.insert(10, ClassEntry::new(10, "kelp", Some([1, 2, 3])).unwrap());
-    let config = config(&["scene.cell_m=0.5"]);
+    let config = config(&["scene.cell_m=0.5", "labels.source=dir:labels"]);
     let bytes = before.save(77);
     let (after, lineage) = ForeignMap::restore(&config, &bytes).unwrap();
     assert_eq!((after, lineage), (before, 77));
@@ -145,4 +160,48 @@ fn a_restored_foreign_map_is_the_saved_one() {
     for cut in 0..bytes.len() {
         assert!(ForeignMap::restore(&config, &bytes[..cut]).is_err());
     }
+}
+
+#[test]
+fn bands_come_beside_the_labels_of_the_scene_model() {
+    let mut beside = map(&["labels.source=", "bands.source=dir:bands"]);
+    let labels = beside.handle_item(&grid(1, &[3]), ForeignSource::Bands, None, 0.0);
+    assert_eq!(labels, Err(Refusal::BandsAlone));
+    let ground = Ground { west_m: 0.0, south_m: 0.0, cell_m: 0.5 };
+    let band = |numbers: &[f32], scale| {
+        let band = QuantityBand { name: "elevation".into(), unit: "m".into(), scale };
+        let quantities = Raster { width: numbers.len() as u32, height: 1, values: numbers.to_vec() };
+        item(Content::Quantities { band, ground, quantities })
+    };
+    beside.handle_item(&band(&[-20.0, f32::NAN, -10.0], None), ForeignSource::Bands, None, 0.0).unwrap();
+    let update = beside.take_changes(100);
+    let (layer, levels) = &update.bands[0];
+    assert_eq!((update.labels.is_none(), levels.len(), layer.scale), (true, 2, Decimal::new(1, -1)));
+    assert!((layer.middle(levels[0].1).unwrap() + 20.0).abs() < 0.051);
+    // The scale that was chosen stays; a quantity below it is not known.
+    beside.handle_item(&band(&[-1e6, -15.0], None), ForeignSource::Bands, None, 1.0).unwrap();
+    let (again, levels) = beside.take_changes(100).bands.remove(0);
+    assert_eq!((again == *layer, levels[0]), (true, (Cell::new(0, 0), 0)));
+    let other = beside.handle_item(&band(&[0.0], BandScale::between(0.0, 1.0)), ForeignSource::Bands, None, 2.0);
+    assert_eq!(other, Err(Refusal::OtherBand("elevation".into())));
+    let mut configured = map(&["bands.ranges=[\"elevation=-40..-10\"]"]);
+    configured.handle_item(&band(&[-40.0, -10.0], None), ForeignSource::Labels, None, 0.0).unwrap();
+    let (layer, levels) = configured.take_changes(9).bands.remove(0);
+    assert_eq!((levels[0].1, levels[1].1, layer.scale), (1, 254, Decimal::nearest(30.0 / 253.0)));
+    let nothing = configured.handle_item(&band(&[f32::NAN], None), ForeignSource::Labels, None, 1.0);
+    assert_eq!(nothing, Ok(()), "the scale is known");
+    let mut empty = map(&[]);
+    let nothing = empty.handle_item(&band(&[f32::NAN], None), ForeignSource::Labels, None, 1.0);
+    assert_eq!(nothing, Err(Refusal::NoScale("elevation".into())));
+}
+
+#[test]
+fn a_restored_map_is_given_away_whole() {
+    let config = config(&["scene.cell_m=0.5", "labels.source=dir:labels"]);
+    let mut before = ForeignMap::new(&config, 0);
+    before.handle_item(&grid(2, &[0, 253, 255, 9]), ForeignSource::Labels, None, 5.0).unwrap();
+    let given = before.take_changes(100);
+    assert!(!before.has_changes());
+    let (mut after, _) = ForeignMap::restore(&config, &before.save(1)).unwrap();
+    assert_eq!(after.take_changes(100), given);
 }

@@ -1,50 +1,77 @@
-//! The layers that bands of another program have.
+//! The bands of another program, and the layers that they have.
 
 use scenecast_protocol::link::VehicleLink;
-use scenecast_protocol::map::{BUILT_IN_LAYERS, LayerDescriptor, LayerId, LayerMask, LayerSet, LayerSource};
+use scenecast_protocol::map::{
+    BUILT_IN_LAYERS, Cell, LabelGrid, LayerDescriptor, LayerId, LayerMask, LayerSet, LayerSource,
+};
 use scenecast_protocol::map_codec::Codec;
+use std::collections::BTreeMap;
 use std::time::Duration;
 
-/// The built-in layers, and the bands under the indexes above them.
+/// The bands, those of built-in layers included; others have the indexes above the built-in ones.
 #[derive(Debug, Default)]
 pub(super) struct Bands {
     set: LayerSet,
-    /// Every band, those of built-in layers included.
-    ids: LayerMask,
+    bands: BTreeMap<LayerId, Band>,
+}
+
+/// The levels of a band. Those of the layer of the same name may be others, if it is a built-in one.
+#[derive(Debug)]
+struct Band {
+    descriptor: LayerDescriptor,
+    levels: LabelGrid,
+}
+
+impl Band {
+    /// The middle of a level; not a number where the quantity is not known.
+    fn quantity(&self, level: u8) -> f64 {
+        self.descriptor.middle(level).unwrap_or(f64::NAN)
+    }
 }
 
 impl Bands {
-    /// The number of bands.
-    pub(super) fn len(&self) -> usize {
-        self.ids.iter().count()
+    /// Whether a layer is that of a band.
+    pub(super) fn has(&self, id: LayerId) -> bool {
+        self.bands.contains_key(&id)
     }
 
-    /// The layer of a band, if there is one.
-    pub(super) fn get(&self, id: LayerId) -> Option<&LayerDescriptor> {
-        self.set.get(id).filter(|_| self.ids.has(id))
-    }
-
-    /// The layer of a band, which the link has from then on; `None` if it has no further one. A band with the name of a
-    /// built-in layer has that layer's levels.
+    /// The layer of a band, which the link has from then on, and whether it is new; `None` if the map has no further one.
     pub(super) fn add(
         &mut self,
         descriptor: &LayerDescriptor,
         codec: Codec,
         link: &mut VehicleLink,
-    ) -> Option<LayerId> {
-        if let Some(id) = self.set.id(&descriptor.name) {
-            self.ids.0 |= 1 << id.index();
-            return Some(id);
-        }
-        let id = self.set.add(descriptor.clone())?;
-        link.add_layer(LayerSource::new(id, descriptor.clone(), codec, Duration::ZERO));
-        self.ids.0 |= 1 << id.index();
-        Some(id)
+    ) -> (Option<LayerId>, bool) {
+        let id = match self.set.id(&descriptor.name) {
+            Some(id) => id,
+            None => {
+                let Some(id) = self.set.add(descriptor.clone()) else { return (None, false) };
+                link.add_layer(LayerSource::new(id, descriptor.clone(), codec, Duration::ZERO));
+                id
+            }
+        };
+        let is_new = !self.has(id);
+        let band = || Band { descriptor: descriptor.clone(), levels: LabelGrid::default() };
+        self.bands.entry(id).or_insert_with(band);
+        (Some(id), is_new)
+    }
+
+    /// Takes changed levels; returns the quantities of these cells.
+    pub(super) fn take(&mut self, id: LayerId, levels: &[(Cell, u8)]) -> Vec<(Cell, f64)> {
+        let Some(band) = self.bands.get_mut(&id) else { return Vec::new() };
+        band.levels.extend(levels.iter().copied());
+        levels.iter().map(|&(cell, level)| (cell, band.quantity(level))).collect()
+    }
+
+    /// The quantities of every band.
+    pub(super) fn all(&self) -> impl Iterator<Item = (LayerId, Vec<(Cell, f64)>)> + '_ {
+        let quantities = |band: &Band| band.levels.iter().map(|(cell, level)| (cell, band.quantity(level))).collect();
+        self.bands.iter().map(move |(&id, band)| (id, quantities(band)))
     }
 
     /// These layers and the bands above the built-in ones.
     pub(super) fn added_to(&self, layers: LayerMask) -> LayerMask {
-        let more = self.ids.iter().filter(|id| id.index() >= BUILT_IN_LAYERS.len());
+        let more = self.bands.keys().copied().filter(|id| id.index() >= BUILT_IN_LAYERS.len());
         layers.iter().chain(more).collect()
     }
 }

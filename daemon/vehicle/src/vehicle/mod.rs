@@ -16,12 +16,13 @@ mod report;
 mod slots;
 mod storing;
 mod whole_png;
+mod withheld;
 
 pub use durable::{Durable, LostOrders};
 pub use storing::VehicleDisk;
 
 use super::failsafe::FailsafePolicy;
-use super::foreign::ForeignUpdate;
+use super::foreign::{ForeignUpdate, LabelChanges};
 use super::mapper::{MapUpdate, SharedExemplars};
 use super::navigator::Navigator;
 use super::registration::RegisteredFrame;
@@ -244,13 +245,26 @@ impl Vehicle {
         }
     }
 
-    /// Another program has a new map, with bands and names of its classes. Returns the label whose name is refused, because
-    /// it has another one already.
+    /// Another program has changed cells, of labels or bands, and names of its classes. New labels are stored before any of
+    /// them is sent. Returns the label whose name is refused, because it has another one already.
     pub fn handle_foreign(&mut self, update: &ForeignUpdate, now: Instant) -> Option<u8> {
-        self.publisher.handle_bands(&update.bands, self.codec, &mut self.link);
-        self.handle_map(&update.map, now);
+        self.publisher.handle_bands(&update.bands, self.codec, &mut self.link, now);
+        if let Some(changes) = &update.labels {
+            self.handle_changes(changes, now);
+        }
         let mut refused = update.classes.iter().filter(|entry| !self.link.add_class(entry)).map(ClassEntry::label);
         refused.next()
+    }
+
+    fn handle_changes(&mut self, changes: &LabelChanges, now: Instant) {
+        let is_more = changes.labels > self.durable.labels;
+        self.durable.labels = self.durable.labels.max(changes.labels);
+        let is_waiting = self.publisher.handle_changes(changes, self.storing.labels(), &mut self.link, now);
+        self.guidance.handle_view(self.navigator.position().xy(), &[]);
+        // A refused state is given to the disk again at its time, not with each change.
+        if is_more || is_waiting && !self.storing.is_refused() {
+            self.outputs.push_back(VehicleOutput::Persist);
+        }
     }
 
     fn publish(&mut self, update: &MapUpdate, now: Instant) {
@@ -372,6 +386,7 @@ impl Vehicle {
                 self.handle_exemplars(exemplars);
             }
         }
+        self.publisher.handle_stored(self.storing.labels(), &mut self.link);
         self.report_decisions(decisions);
         if !self.decide_waiting() {
             self.link.handle_persisted();

@@ -2,7 +2,8 @@
 
 use super::bands::Bands;
 use super::whole_png::WholePng;
-use crate::MapUpdate;
+use super::withheld::Withheld;
+use crate::{LabelChanges, MapUpdate};
 use scenecast_config::Debounce;
 use scenecast_protocol::directive::{CellBand, Settings};
 use scenecast_protocol::link::VehicleLink;
@@ -35,14 +36,15 @@ impl Default for MapSelection {
     }
 }
 
-/// Gives the link the part of the scene model's map that is to be sent.
+/// Gives the link the part of the map that is to be sent.
 #[derive(Debug, Default)]
 pub(super) struct MapPublisher {
-    /// Every cell that the scene model has a label for.
+    /// Every cell that has a label.
     map: LabelGrid,
     version: u64,
     /// Whether cells have lost their labels, as those of another program may.
     has_erased: bool,
+    /// Layers of the scene model.
     layers: BTreeMap<LayerId, Vec<(Cell, f64)>>,
     labels: u8,
     explored: u32,
@@ -51,8 +53,10 @@ pub(super) struct MapPublisher {
     ordered_layers: Option<LayerMask>,
     /// Takes the place of the link's map, for comparison.
     whole_png: Option<WholePng>,
-    /// The layers of bands, which the vehicle adds when the first of their cells comes.
+    /// Bands of another program and their layers, which the vehicle adds when the first of their cells comes.
     bands: Bands,
+    /// Cells with labels of another program that are not on the disk yet.
+    withheld: Withheld,
 }
 
 impl MapPublisher {
@@ -61,7 +65,7 @@ impl MapPublisher {
         (&self.map, self.version)
     }
 
-    /// The number of labels that the scene model has given.
+    /// The highest label so far.
     pub(super) fn labels(&self) -> u8 {
         self.labels
     }
@@ -142,34 +146,95 @@ impl MapPublisher {
         let changed = update.cells.iter().filter(|&&(cell, label)| self.map.set(cell, label) != label).count();
         self.version += u64::from(changed > 0);
         self.has_erased |= (self.explored as usize) < update.cells.len();
-        self.layers.retain(|id, _| self.bands.get(*id).is_some());
-        self.layers.extend(update.layers.iter().map(|(&id, cells)| (id, cells.clone())));
+        // A band in the place of a built-in layer has its cells to itself.
+        let own = update.layers.iter().filter(|(id, _)| !self.bands.has(**id));
+        self.layers = own.map(|(&id, cells)| (id, cells.clone())).collect();
         match &mut self.whole_png {
             Some(whole) => whole.set(update.cells.iter().copied()),
             None => self.publish(link, now),
         }
     }
 
-    /// Takes the bands of another program, as layers, which [`Self::handle_map`] then gives to the link.
+    /// Takes changed cells of the labels of another program and gives the link those whose labels are on the disk, which are
+    /// labels up to `stored`. Returns whether the others wait for [`Self::handle_stored`].
+    pub(super) fn handle_changes(
+        &mut self,
+        changes: &LabelChanges,
+        stored: u8,
+        link: &mut VehicleLink,
+        now: Instant,
+    ) -> bool {
+        self.labels = changes.labels;
+        self.withheld.begin(stored);
+        let mut has_changed = false;
+        for &(cell, label) in &changes.cells {
+            let before = self.map.set(cell, label);
+            has_changed |= before != label;
+            self.explored = self.explored + u32::from(label != UNEXPLORED) - u32::from(before != UNEXPLORED);
+            self.has_erased |= label == UNEXPLORED;
+        }
+        self.version += u64::from(has_changed);
+        let (now_sent, later): (Vec<_>, Vec<_>) =
+            changes.cells.iter().copied().partition(|&(_, label)| label <= stored);
+        self.withheld.add(&later, now);
+        self.publish_cells(now_sent, link, now);
+        self.withheld.is_waiting()
+    }
+
+    /// Labels up to `stored` are on the disk: gives the link the cells that waited for that.
+    pub(super) fn handle_stored(&mut self, stored: u8, link: &mut VehicleLink) {
+        if !self.withheld.is_waiting() {
+            return;
+        }
+        let now = self.withheld.at();
+        match self.withheld.release(stored) {
+            Some(cells) => {
+                let cells = cells.into_iter().map(|cell| (cell, self.map.get(cell)));
+                let cells = cells.filter(|(_, label)| *label <= stored).collect();
+                self.publish_cells(cells, link, now);
+            }
+            None => self.publish(link, now),
+        }
+    }
+
+    fn publish_cells(&mut self, mut cells: Vec<(Cell, u8)>, link: &mut VehicleLink, now: Instant) {
+        if let Some(whole) = &mut self.whole_png {
+            return whole.set(cells.into_iter());
+        }
+        cells.retain(|&(cell, _)| self.is_sent(link.map(), cell));
+        if !cells.is_empty() {
+            link.set_map(cells, now);
+        }
+    }
+
+    /// Takes changed levels of bands and gives them to the link.
     pub(super) fn handle_bands(
         &mut self,
-        bands: &[(LayerDescriptor, Vec<(Cell, f64)>)],
+        bands: &[(LayerDescriptor, Vec<(Cell, u8)>)],
         codec: Codec,
         link: &mut VehicleLink,
+        now: Instant,
     ) {
-        let before = self.bands.len();
-        for (descriptor, cells) in bands {
-            let Some(id) = self.bands.add(descriptor, codec, link) else { continue };
-            self.layers.insert(id, cells.clone());
-        }
-        if self.bands.len() > before {
-            self.select(link);
+        for (descriptor, levels) in bands {
+            let (Some(id), is_new) = self.bands.add(descriptor, codec, link) else { continue };
+            if is_new {
+                self.select(link);
+            }
+            // The cells that the scene model gave to the layer until now.
+            let others = self.layers.remove(&id).unwrap_or_default().into_iter().map(|(cell, _)| (cell, f64::NAN));
+            let changed = self.bands.take(id, levels);
+            let mut cells: Vec<(Cell, f64)> = others.chain(changed).collect();
+            cells.retain(|&(cell, _)| self.is_sent(link.map(), cell));
+            if self.whole_png.is_none() && !cells.is_empty() {
+                link.set_layer(id, cells, now);
+            }
         }
     }
 
     /// Forgets the map, because labels change their meaning.
     pub(super) fn begin_epoch(&mut self) {
         self.map.clear();
+        self.explored = 0;
         self.layers.clear();
         self.version += 1;
         self.whole_png = self.whole_png.take().map(|_| WholePng::default());
@@ -180,21 +245,23 @@ impl MapPublisher {
     /// Where only coarse cells are selected, finer ones that the link already has stay up to date, so that no cell on the
     /// operator's map is older than it looks.
     pub(super) fn publish(&self, link: &mut VehicleLink, now: Instant) {
-        let is_coarse = self.cells() == CellBand::Coarse;
-        let is_sent = |sent: &LabelGrid, cell: Cell| {
-            !is_coarse || Stride::Four.on_lattice(cell).is_some() || sent.get(cell) != UNEXPLORED
-        };
-        let mut cells: Vec<(Cell, u8)> = self.map.iter().filter(|&(cell, _)| is_sent(link.map(), cell)).collect();
+        let is_ready = |&(cell, label): &(Cell, u8)| self.is_sent(link.map(), cell) && self.withheld.allows(label);
+        let mut cells: Vec<(Cell, u8)> = self.map.iter().filter(is_ready).collect();
         if self.has_erased {
             let gone = link.map().iter().filter(|&(cell, _)| self.map.get(cell) == UNEXPLORED);
             cells.extend(gone.map(|(cell, _)| (cell, UNEXPLORED)));
         }
         link.set_map(cells, now);
-        for (&id, cells) in &self.layers {
-            let cells: Vec<(Cell, f64)> =
-                cells.iter().copied().filter(|&(cell, _)| is_sent(link.map(), cell)).collect();
+        let own = self.layers.iter().map(|(&id, cells)| (id, cells.clone()));
+        for (id, mut cells) in own.chain(self.bands.all()) {
+            cells.retain(|&(cell, _)| self.is_sent(link.map(), cell));
             link.set_layer(id, cells, now);
         }
+    }
+
+    /// Whether a cell is among the selected ones, or known to the link, which has the labels `sent`.
+    fn is_sent(&self, sent: &LabelGrid, cell: Cell) -> bool {
+        self.cells() != CellBand::Coarse || Stride::Four.on_lattice(cell).is_some() || sent.get(cell) != UNEXPLORED
     }
 
     /// Gives the link the whole map as an image if that is due.

@@ -67,6 +67,11 @@ impl Storing {
         self.epoch
     }
 
+    /// The highest label on the disk.
+    pub(super) fn labels(&self) -> u8 {
+        self.labels
+    }
+
     /// The number of times that the disk has refused the state.
     pub(super) fn refusals(&self) -> u64 {
         self.refusals

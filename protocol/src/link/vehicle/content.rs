@@ -154,8 +154,8 @@ impl<S: StateSource> VehicleContent<S> {
             }
             Part::InForce(part) => self.in_force.handle_fate(&part, delivered, now),
             Part::Object(id, run) => return self.objects.handle_fate(id, &run, delivered).then_some(id),
-            Part::Pose if !delivered => self.status.owe_pose(now),
-            Part::Report if !delivered => self.status.owe_report(now),
+            Part::Pose if !delivered => self.status.handle_lost_pose(now),
+            Part::Report if !delivered => self.status.handle_lost_report(now),
             Part::Pose | Part::Report | Part::LayerDigest(_) => {}
         }
         None

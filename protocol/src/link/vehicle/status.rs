@@ -11,6 +11,9 @@ const SHARE: f64 = 1.0 / 40.0;
 /// of the map. Reports of other decisions, and poses, are not delayed by it.
 const SMALL_BUDGET_BPS: u32 = 250;
 
+/// Intervals between two copies in a period: copies apart from each other are not lost together.
+const COPY_INTERVALS: u32 = 8;
+
 /// Sends the latest status at most once a period, and with at most a twentieth of the bit budget.
 #[derive(Debug)]
 pub(super) struct StatusSender {
@@ -25,11 +28,32 @@ pub(super) struct StatusSender {
     reported: Option<(Instant, usize)>,
     /// Slot with which the next report begins: a report that does not fit into a frame continues in the next.
     report_from: usize,
+    copies: Copies,
+}
+
+/// How often a pose and a report that are due are sent, each in a frame of its own.
+#[derive(Debug)]
+struct Copies {
+    each: u32,
+    /// Copies that are still to be sent.
+    poses: u32,
+    reports: u32,
 }
 
 impl StatusSender {
     pub(super) fn new(period: Duration, now: Instant) -> Self {
-        Self { period, status: None, pose_due: now, report_due: now, sent: [None; 3], reported: None, report_from: 0 }
+        let copies = Copies { each: 1, poses: 1, reports: 1 };
+        let sent = [None; 3];
+        Self { period, status: None, pose_due: now, report_due: now, sent, reported: None, report_from: 0, copies }
+    }
+
+    /// Sends each pose and each report in so many frames, as far as the share of the budget allows it. Where the ends take
+    /// no turns, the loss of a frame is known late, and two in a row would leave the surface without a status for long.
+    pub(super) fn set_copies(&mut self, wanted: u32, budget_bps: u32) {
+        let (_, report) = self.reported.unwrap_or((Instant::ZERO, VehicleStatus::POSE));
+        let share = time_of_share(budget_bps, report.max(VehicleStatus::POSE));
+        let affordable = self.period.as_micros() / share.as_micros().max(1);
+        self.copies.each = wanted.min(affordable as u32).max(1);
     }
 
     pub(super) fn set(&mut self, status: VehicleStatus) {
@@ -56,11 +80,21 @@ impl StatusSender {
     }
 
     pub(super) fn owe_pose(&mut self, now: Instant) {
-        self.pose_due = now;
+        (self.pose_due, self.copies.poses) = (now, self.copies.each);
     }
 
     /// Makes a report due at once, from its first slot.
     pub(super) fn owe_report(&mut self, now: Instant) {
+        (self.report_due, self.report_from, self.copies.reports) = (now, 0, self.copies.each);
+    }
+
+    /// A pose is lost. Another copy of it may have arrived, so that one more is enough.
+    pub(super) fn handle_lost_pose(&mut self, now: Instant) {
+        self.pose_due = now;
+    }
+
+    /// A report is lost; see [`Self::handle_lost_pose`].
+    pub(super) fn handle_lost_report(&mut self, now: Instant) {
         (self.report_due, self.report_from) = (now, 0);
     }
 
@@ -87,10 +121,16 @@ impl StatusSender {
         if !builder.push(ChunkKind::Report, &bytes) {
             return None;
         }
+        // A report of several frames has no copies.
+        let is_whole = next == 0 && self.report_from == 0;
         self.report_from = next;
         self.reported = Some((now, bytes.len()));
-        if next == 0 {
+        if is_whole && self.copies.reports > 1 {
+            self.copies.reports -= 1;
+            self.report_due = now + self.period / COPY_INTERVALS;
+        } else if next == 0 {
             self.report_due = now + self.period.max(time_of_report(status.budget_bps, bytes.len()));
+            self.copies.reports = self.copies.each;
         }
         Some(bytes.len())
     }
@@ -116,7 +156,14 @@ impl StatusSender {
         }
         length += bytes.len();
         let pose = bytes.len().min(VehicleStatus::POSE);
+        if self.copies.poses > 1 {
+            self.copies.poses -= 1;
+            self.pose_due = now + self.period / COPY_INTERVALS;
+            return Some(length);
+        }
         self.pose_due = now + self.period.max(time_of_share(status.budget_bps, pose));
+        self.copies.poses = self.copies.each;
+        // The last copy stands for all.
         self.sent = [self.sent[1], self.sent[2], Some(now)];
         Some(length)
     }

@@ -15,6 +15,10 @@ use std::time::Duration;
 /// Frames smaller than this have no room for both a status and a stamp.
 const SMALL_FRAME: usize = 48;
 
+/// Probability that all copies of a status may be lost where both ends transmit at once.
+const STATUS_LOSS_RISK: f64 = 0.01;
+const MAX_STATUS_COPIES: u32 = 4;
+
 /// A frame about to be filled.
 struct FramePlan {
     /// Frames of this turn after this one.
@@ -182,6 +186,10 @@ impl<S: StateSource> VehicleLink<S> {
         let mut builder = self.pair.begin_frame(size, ack_room, wish, stamp, FramePurpose::Content);
         let mut carried = Carried::new();
         if !sends_hello {
+            if modem.access == Access::FullDuplex {
+                let copies = self.pair.stats.loss_out.copies(STATUS_LOSS_RISK, MAX_STATUS_COPIES);
+                self.content.status.set_copies(copies, self.budget.bits_per_s());
+            }
             let (slots, refused_frames) = (self.inbox.reports(), self.pair.stats.refused());
             let context = FillContext { budget: &self.budget, slots, refused_frames, now };
             carried = self.content.fill(&mut builder, &context);

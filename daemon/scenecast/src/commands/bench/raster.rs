@@ -3,9 +3,12 @@
 use clap::Args;
 use scenecast_core::UserError;
 use scenecast_protocol::mac::Access;
-use scenecast_rehearsal::raster_bench::{Pattern, RasterFigures, RasterSetting, changes, whole};
+use scenecast_rehearsal::raster_bench::{
+    AnnotatedFigures, Pattern, RasterFigures, RasterSetting, annotated, changes, whole,
+};
 use scenecast_tools::Progress;
 use serde_json::json;
+use std::path::PathBuf;
 use std::time::Duration;
 
 /// A grid of 8-bit values of which a part changes every second, over a radio that loses frames: how much of the operator's
@@ -43,6 +46,12 @@ pub(crate) struct RasterBench {
     /// Measure the changes too where the ends take turns, as over an acoustic channel
     #[arg(long)]
     turns: bool,
+    /// Send annotated maps instead, each once: grey or indexed PNG, whose pixels are classes and 255 unknown
+    #[arg(long, value_name = "FILE", num_args = 1.., conflicts_with_all = ["side", "change", "seconds", "turns"])]
+    map: Vec<PathBuf>,
+    /// A class of annotated maps that stands for unknown, too
+    #[arg(long, value_name = "CLASS", requires = "map")]
+    unknown: Option<u8>,
 }
 
 fn share(text: &str) -> Result<f64, String> {
@@ -51,7 +60,48 @@ fn share(text: &str) -> Result<f64, String> {
 }
 
 impl RasterBench {
+    /// Sends annotated maps.
+    fn run_maps(&self) -> Result<(), UserError> {
+        let setting = RasterSetting {
+            side: 0,
+            change: 0.0,
+            pattern: Pattern::Patches,
+            bit_rate_bps: f64::from(self.bit_rate),
+            loss: self.loss,
+            frame_bytes: self.frame_bytes as usize,
+            access: Access::FullDuplex,
+            duration: Duration::ZERO,
+        };
+        let (mut rows, mut all) = (serde_json::Map::new(), true);
+        if !self.json {
+            let loss = 100.0 * self.loss;
+            println!("{} bit/s, {loss:.0} % of the frames lost", self.bit_rate);
+            println!(
+                "{:<40} {:>9} {:>7} {:>6} {:>9} {:>12}",
+                "map", "cells", "classes", "equal", "seconds", "bytes on air"
+            );
+        }
+        for path in &self.map {
+            let figures = annotated(&setting, path, self.unknown, self.seed)?;
+            all &= figures.is_equal;
+            let name = path.display().to_string();
+            if !self.json {
+                let equal = if figures.is_equal { "yes" } else { "NO" };
+                let AnnotatedFigures { cells, classes, seconds, bytes, .. } = figures;
+                println!("{name:<40} {cells:>9} {classes:>7} {equal:>6} {seconds:>9.0} {bytes:>12}");
+            }
+            rows.insert(name, json!(figures));
+        }
+        if self.json {
+            println!("{}", serde_json::to_string_pretty(&rows).map_err(|e| UserError::Failed(e.to_string()))?);
+        }
+        if all { Ok(()) } else { Err(UserError::Failed("a map did not arrive within an hour".to_owned())) }
+    }
+
     pub(super) fn run(self) -> Result<(), UserError> {
+        if !self.map.is_empty() {
+            return self.run_maps();
+        }
         let setting = |pattern, access| RasterSetting {
             side: self.side,
             change: self.change,

@@ -1,0 +1,148 @@
+//! Topics of ROS 2 with labels or bands.
+
+use scenecast_config::{LabelMessage, RosName};
+use scenecast_vehicle::ForeignSource;
+
+/// A topic to be read.
+#[derive(Debug, Clone)]
+#[cfg_attr(not(feature = "ros2"), expect(dead_code, reason = "a build without ROS 2 refuses topics"))]
+pub(crate) struct TopicFeed {
+    pub(crate) topic: RosName,
+    pub(crate) message: LabelMessage,
+    pub(crate) source: ForeignSource,
+    /// The frame of reference of grids; empty: the usual ones.
+    pub(crate) frame: String,
+}
+
+#[cfg(feature = "ros2")]
+pub(crate) use with::topic;
+
+#[cfg(feature = "ros2")]
+mod with {
+    use super::{ForeignSource, LabelMessage, TopicFeed};
+    use crate::labels::feed::{Arrived, Feed, LabelQueue};
+    use scenecast_core::UserError;
+    use scenecast_labels::ros::{band_of_occupancy, bands_of_grid_map, item_of_image, item_of_occupancy};
+    use scenecast_labels::{Item, Refusal};
+    use scenecast_messages::builtin_interfaces::Time;
+    use scenecast_ros2::{Inbox, Received, RosNode};
+    use scenecast_sources::SensorNode;
+    use std::sync::Arc;
+    use std::time::Duration;
+
+    /// Time between two tries to open the topic.
+    const RETRY_INTERVAL: Duration = Duration::from_secs(5);
+    /// Longest wait for one of two inboxes.
+    const LOOK: Duration = Duration::from_millis(100);
+
+    type Items = Vec<Result<Item, Refusal>>;
+
+    /// Reads a topic on a thread of its own.
+    pub(crate) fn topic(node: Arc<SensorNode>, wanted: TopicFeed) -> Result<Feed, UserError> {
+        let (queue, feed) = LabelQueue::new();
+        let read = move || {
+            let mut is_logged = false;
+            loop {
+                let opened = node.get().map_err(|e| e.to_string()).and_then(|node| open(&node, &wanted));
+                match opened {
+                    Ok(reader) => return reader(&queue),
+                    Err(error) if !is_logged => tracing::error!("labels: {}: {error}; it is tried again", wanted.topic),
+                    Err(_) => {}
+                }
+                is_logged = true;
+                std::thread::sleep(RETRY_INTERVAL);
+            }
+        };
+        let started = std::thread::Builder::new().name("labels-topic".to_owned()).spawn(read);
+        started.map_err(|e| UserError::Failed(format!("the labels' thread did not start: {e}")))?;
+        Ok(feed)
+    }
+
+    type Reader = Box<dyn FnOnce(&LabelQueue)>;
+
+    fn open(node: &RosNode, wanted: &TopicFeed) -> Result<Reader, String> {
+        let failed = |e: UserError| e.to_string();
+        let TopicFeed { topic, message, source, frame } = wanted.clone();
+        let origin = topic.to_string();
+        Ok(match message {
+            LabelMessage::Image => {
+                let inboxes = vec![node.subscribe_images(&topic).map_err(failed)?];
+                let topic = Topic { origin, inboxes, is_overtaken_lost: true, last: None };
+                Box::new(move |queue| topic.read(queue, |image| (&image.header.stamp, vec![item_of_image(image)])))
+            }
+            LabelMessage::OccupancyGrid => {
+                let inboxes = vec![
+                    node.subscribe_label_map(&topic).map_err(failed)?,
+                    node.subscribe(&topic, scenecast_ros2::Qos::Reliable(1), 1).map_err(failed)?,
+                ];
+                let name = origin.clone();
+                let topic = Topic { origin, inboxes, is_overtaken_lost: false, last: None };
+                Box::new(move |queue| {
+                    topic.read(queue, |grid| {
+                        let item = match source {
+                            ForeignSource::Labels => item_of_occupancy(grid, &frame),
+                            ForeignSource::Bands => band_of_occupancy(grid, &name, &frame),
+                        };
+                        (&grid.header.stamp, vec![item])
+                    });
+                })
+            }
+            LabelMessage::GridMap => {
+                let inboxes = vec![
+                    node.subscribe_grid_map(&topic).map_err(failed)?,
+                    node.subscribe(&topic, scenecast_ros2::Qos::Reliable(1), 1).map_err(failed)?,
+                ];
+                let topic = Topic { origin, inboxes, is_overtaken_lost: false, last: None };
+                Box::new(move |queue| topic.read(queue, |map| (&map.header.stamp, bands_of_grid_map(map, &frame))))
+            }
+        })
+    }
+
+    /// The inboxes of a topic: for grids one that takes the last message of publishers that keep it, and one that matches the
+    /// others. A message that comes to both is used once.
+    struct Topic<M> {
+        origin: String,
+        inboxes: Vec<Inbox<M>>,
+        /// Whether a message that a newer one displaced is a loss: an image is, a whole grid is not.
+        is_overtaken_lost: bool,
+        last: Option<Time>,
+    }
+
+    impl<M> Topic<M> {
+        fn read(mut self, queue: &LabelQueue, items: impl Fn(&M) -> (&Time, Items)) {
+            let mut counted = vec![(0, 0); self.inboxes.len()];
+            let mut turn = 0;
+            loop {
+                turn = (turn + 1) % self.inboxes.len();
+                self.inboxes[turn].wait(LOOK);
+                for (inbox, counted) in self.inboxes.iter().zip(&mut counted) {
+                    let now = (inbox.malformed(), if self.is_overtaken_lost { inbox.dropped() } else { 0 });
+                    let before = std::mem::replace(counted, now);
+                    for (count, text) in [
+                        (now.0 - before.0, "messages have another type than the topic"),
+                        (now.1 - before.1, "messages were dropped: newer ones came before they were read"),
+                    ] {
+                        let refusal = Err(Refusal::Message(format!("{count} {text}")));
+                        if count > 0 && !queue.push(arrived(&self.origin, None, refusal)) {
+                            return;
+                        }
+                    }
+                }
+                let found: Vec<Received<M>> = self.inboxes.iter().filter_map(Inbox::take).collect();
+                for received in found {
+                    let (stamp, items) = items(&received.message);
+                    let is_again = stamp.nanos() > 0 && self.last.as_ref() == Some(stamp);
+                    self.last = Some(stamp.clone());
+                    let items = if is_again { Vec::new() } else { items };
+                    if !items.into_iter().all(|item| queue.push(arrived(&self.origin, Some(received.at), item))) {
+                        return;
+                    }
+                }
+            }
+        }
+    }
+
+    fn arrived(origin: &str, at: Option<std::time::Instant>, item: Result<Item, Refusal>) -> Arrived {
+        Arrived { origin: origin.to_owned(), mark: None, at, item, answer: None }
+    }
+}
