@@ -39,8 +39,8 @@ pub use sections::{
     Ros2, Runtime, Scene, Survey, VehicleSection,
 };
 pub use setting::{
-    Authenticate, AutopilotKind, BirthRule, CameraSource, CameraStamps, Debounce, GpsPort, HostPort, LabelSource,
-    LayerName, MapCells, MapStream, ModemKind, NavigationSource, OperatorScript, Remap, RosName, S2cMode, Votes,
-    WorldKind,
+    Authenticate, AutopilotKind, BirthRule, CalibrationSource, CameraSource, CameraStamps, Debounce, DepthSource,
+    GpsPort, HostPort, LabelSource, LayerName, MapCells, MapStream, ModemKind, NavigationSource, OperatorScript, Remap,
+    RosName, S2cMode, Votes, WorldKind,
 };
 pub use token_file::{TokenGrant, load_tokens, read_token, read_tokens};
