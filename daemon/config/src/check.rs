@@ -2,7 +2,8 @@
 
 use crate::key::Key;
 use crate::{
-    Authenticate, AutopilotKind, CameraSource, Config, LabelMessage, LabelSource, ModemKind, NavigationSource,
+    Authenticate, AutopilotKind, CalibrationSource, CameraSource, Config, DepthSource, LabelMessage, LabelSource,
+    ModemKind, NavigationSource,
 };
 use scenecast_core::{PortAddress, UserError};
 
@@ -54,6 +55,47 @@ fn check_ports(config: &Config) -> Result<(), UserError> {
     Err(UserError::Input(format!("{given}; allowed: {allowed}")))
 }
 
+/// A calibration is given once, and belongs to a camera that has one.
+fn check_optics(config: &Config) -> Result<(), UserError> {
+    let c = &config.camera;
+    let refuse = |name: &str, allowed: &str| {
+        let value = Key::find(name).map(|key| key.value(config).to_string()).unwrap_or_default();
+        let source = camera(config);
+        Err(UserError::Input(format!(
+            "{name} = {value} is not allowed with camera.source = {source}; allowed: {allowed}"
+        )))
+    };
+    let (is_topic, has_matrix) = (matches!(c.source, CameraSource::Ros2(_)), c.matrix != [0.0; 4]);
+    let is_rehearsal = c.source == CameraSource::Rehearsal;
+    match c.calibration {
+        CalibrationSource::Beside => {}
+        _ if has_matrix => {
+            let text = "camera.matrix is not allowed beside camera.calibration; set one of them";
+            return Err(UserError::Input(text.to_owned()));
+        }
+        CalibrationSource::Ros2(_) if !is_topic => {
+            return refuse("camera.calibration", "\"file:FILE\" or \"\"; a topic needs a camera of ROS 2");
+        }
+        _ if is_rehearsal => return refuse("camera.calibration", "\"\""),
+        _ => {}
+    }
+    if has_matrix && is_rehearsal {
+        return refuse("camera.matrix", "[0, 0, 0, 0]");
+    }
+    if c.depth != DepthSource::None {
+        if !c.source.is_live() {
+            return refuse("camera.depth", "\"\"; distances belong to a live camera, or are in the folder of tum:DIR");
+        }
+        if !is_topic && !has_matrix && c.calibration == CalibrationSource::Beside {
+            return refuse("camera.depth", "\"\", unless camera.calibration or camera.matrix is set");
+        }
+    }
+    if c.bits == 0 && !is_topic {
+        return refuse("camera.bits", "1 to 16; only a camera of ROS 2 can find them out");
+    }
+    Ok(())
+}
+
 /// The images of a live camera need poses and the pace of real time.
 fn check_camera(config: &Config) -> Result<(), UserError> {
     if let (NavigationSource::Tf(given), None) = (&config.navigation.source, config.navigation.source.frames()) {
@@ -61,6 +103,7 @@ fn check_camera(config: &Config) -> Result<(), UserError> {
             "navigation.source = \"tf:{given}\" is not allowed: it takes two frames, as in \"tf:map#base_link\""
         )));
     }
+    check_optics(config)?;
     if !config.camera.source.is_live() {
         return check_navigation(config);
     }
@@ -183,6 +226,24 @@ mod tests {
         assert!(load(&["autopilot.kind=log", "autopilot.port=file:x"]).is_ok());
         assert!(load(&["autopilot.kind=rehearsal"]).is_ok());
         assert!(refused(&["position.follow=true"]).contains("position.gps"));
+    }
+
+    #[test]
+    fn distances_and_calibrations_need_a_camera_that_has_them() {
+        let load = |sets: &[&str]| crate::load(None, &sets.iter().map(|set| (*set).to_owned()).collect::<Vec<_>>());
+        let refused = |sets: &[&str]| load(sets).unwrap_err().to_string();
+        let live = ["camera.source=watch:x", "navigation.source=tum:p"];
+        assert!(load(&[&live[..], &["camera.depth=ros2:/depth", "camera.matrix=[9, 9, 9, 9]"]].concat()).is_ok());
+        assert!(refused(&[&live[..], &["camera.depth=ros2:/depth"]].concat()).contains("unless camera.calibration or"));
+        assert!(
+            refused(&["camera.depth=cloud:/points"]).contains("camera.depth = \"cloud:/points\" is not allowed with")
+        );
+        assert!(refused(&["camera.matrix=[9, 9, 9, 9]"]).contains("allowed: [0, 0, 0, 0]"));
+        assert!(refused(&[&live[..], &["camera.calibration=ros2:/info"]].concat()).contains("a topic needs a camera"));
+        let both = ["camera.source=frames:x", "camera.calibration=file:c", "camera.matrix=[9, 9, 9, 9]"];
+        assert!(refused(&both).contains("set one of them"));
+        assert!(refused(&["camera.source=bag:x", "camera.bits=0"]).contains("camera.bits = 0 is not allowed"));
+        assert!(load(&["camera.source=tum:x", "camera.bits=12"]).is_ok());
     }
 
     #[test]

@@ -39,8 +39,8 @@ pub use sections::{
     Position, Ros2, Runtime, Scene, Survey, VehicleSection,
 };
 pub use setting::{
-    Authenticate, AutopilotKind, BandRange, BirthRule, CameraSource, CameraStamps, Debounce, GpsPort, HostPort,
-    LabelMessage, LabelSource, LayerName, MapCells, MapStream, ModemKind, NavigationSource, OperatorScript, Remap,
-    RosName, RosTransport, S2cMode, Votes, WorldKind, ZenohEndpoint,
+    Authenticate, AutopilotKind, BandRange, BirthRule, CalibrationSource, CameraSource, CameraStamps, Debounce,
+    DepthSource, GpsPort, HostPort, LabelMessage, LabelSource, LayerName, MapCells, MapStream, ModemKind,
+    NavigationSource, OperatorScript, Remap, RosName, RosTransport, S2cMode, Votes, WorldKind, ZenohEndpoint,
 };
 pub use token_file::{TokenGrant, load_tokens, read_token, read_tokens};

@@ -7,7 +7,9 @@ use crate::recording::{RecordedFrame, Recording};
 use scenecast_core::UserError;
 use scenecast_messages::decode as decode_cdr;
 use scenecast_messages::nav_msgs::Odometry;
-use scenecast_sensors::{CameraMounting, PoseMatch, PoseTrack, Stamp, pose_of, stamp_of_cdr};
+use scenecast_sensors::{
+    BitDepth, Calibration, CameraMounting, PoseMatch, PoseTrack, SensorPose, Sight, Stamp, pose_of, stamp_of_cdr,
+};
 use std::collections::BTreeSet;
 use std::path::Path;
 use std::sync::Arc;
@@ -77,7 +79,7 @@ pub struct BagTopics<'a> {
 }
 
 /// How poses and images of a bag belong together.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub struct BagTiming {
     /// Longest time between two poses within which the pose of an image is interpolated.
     pub max_gap: Duration,
@@ -86,6 +88,26 @@ pub struct BagTiming {
     pub mounting: CameraMounting,
     /// Height of the camera above the sea floor, metres.
     pub altitude_m: f64,
+    /// The calibration of the camera, if it is known.
+    pub calibration: Option<Arc<Calibration>>,
+    /// The bits of levels in 16-bit images.
+    pub bits: BitDepth,
+}
+
+impl BagTiming {
+    /// The image of a camera on the vehicle at a pose; `None` if it is tilted too much.
+    fn frame(&self, vehicle: &SensorPose, image: FrameImage) -> Option<RecordedFrame> {
+        let (pose, sight) = match &self.calibration {
+            None => (self.mounting.camera_pose(vehicle, self.altitude_m)?, None),
+            Some(calibration) => {
+                let camera = self.mounting.mounted_camera(vehicle, self.altitude_m)?;
+                let sight = Sight { calibration: calibration.clone(), tilt: camera.tilt, height_m: camera.height_m };
+                (camera.pose, Some(sight))
+            }
+        };
+        let SensorPose { x_m, y_m, depth_m, heading_rad, .. } = pose;
+        Some(RecordedFrame { t_s: 0.0, image, x_m, y_m, depth_m, heading_rad, scale: 1.0, sight, depth: None })
+    }
 }
 
 impl Recording {
@@ -100,7 +122,7 @@ impl Recording {
         let mut poses: Vec<_> = contents.poses.iter().filter(|(topic, ..)| *topic == odometry).collect();
         poses.sort_by_key(|(_, stamp, _)| *stamp);
         let track = PoseTrack::of(poses.iter().map(|(_, stamp, pose)| (*stamp, *pose)), timing.max_gap);
-        let bag = Arc::new(Bag::new(path, images));
+        let bag = Arc::new(Bag::new(path, images, timing.bits));
         let mut frames: Vec<(Stamp, RecordedFrame)> = Vec::new();
         let of_topic = contents.images.iter().filter(|(topic, _)| *topic == *bag.topic());
         let (mut all, mut without_time) = (0, 0);
@@ -111,10 +133,8 @@ impl Recording {
                 continue;
             };
             let PoseMatch::Found(pose) = track.at(stamp.shifted(timing.clock_offset_s)) else { continue };
-            let Some(pose) = timing.mounting.camera_pose(&pose, timing.altitude_m) else { continue };
-            let (x_m, y_m, depth_m, heading_rad) = (pose.x_m, pose.y_m, pose.depth_m, pose.heading_rad);
-            let image = FrameImage::Bag(bag.clone(), number);
-            frames.push((stamp, RecordedFrame { t_s: 0.0, image, x_m, y_m, depth_m, heading_rad, scale: 1.0 }));
+            let Some(frame) = timing.frame(&pose, FrameImage::Bag(bag.clone(), number)) else { continue };
+            frames.push((stamp, frame));
         }
         let Some(&(first, _)) = frames.first() else {
             let cause = format!("none of its {all} images has a pose at its time; {without_time} have no later time");

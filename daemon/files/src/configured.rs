@@ -2,16 +2,39 @@
 
 use crate::bag_recording::{BagTiming, BagTopics};
 use crate::recording::Recording;
-use scenecast_config::{CameraSource, Config, NavigationSource};
+use crate::tum_recording::TumOptions;
+use scene_model::project::View;
+use scenecast_config::{CalibrationSource, CameraSource, Config, NavigationSource};
 use scenecast_core::UserError;
-use scenecast_sensors::CameraMounting;
+use scenecast_sensors::{BitDepth, Calibration, CameraMounting, Sight, read_calibration};
 use std::path::Path;
+use std::sync::Arc;
 use std::time::Duration;
+
+/// The largest tilt of frames that are registered, radians.
+const MAX_TILT_RAD: f64 = 0.6;
 
 /// The recording that is the camera; `None` if the camera is live, or the sea floor of a rehearsal.
 pub fn configured_recording(config: &Config) -> Result<Option<Recording>, UserError> {
+    let calibration = configured_calibration(config)?;
+    let altitude_m = config.survey.altitude_m;
     match &config.camera.source {
-        CameraSource::Frames(dir) => Recording::open(dir, None, config.camera.metres_per_pixel).map(Some),
+        CameraSource::Frames(dir) => {
+            let mut recording = Recording::open(dir, None, config.camera.metres_per_pixel)?;
+            if let Some(calibration) = calibration {
+                for frame in &mut recording.frames {
+                    let height_m = altitude_m * frame.scale;
+                    frame.sight = Some(Sight { calibration: calibration.clone(), tilt: View::DOWN, height_m });
+                }
+            }
+            Ok(Some(recording))
+        }
+        CameraSource::Tum(dir) => {
+            let units_per_m = Some(config.camera.depth_units_per_m).filter(|units| *units > 0.0);
+            let max_tilt_rad = config.registration.enabled.then_some(MAX_TILT_RAD);
+            let options = TumOptions { calibration, units_per_m, max_tilt_rad, altitude_m };
+            Recording::open_tum(dir, &options).map(Some)
+        }
         CameraSource::Bag(bag) => {
             let odometry = match &config.navigation.source {
                 NavigationSource::Ros2(topic) => Some(topic.as_str()),
@@ -21,12 +44,40 @@ pub fn configured_recording(config: &Config) -> Result<Option<Recording>, UserEr
                 max_gap: Duration::from_secs_f64(config.navigation.max_gap_s),
                 clock_offset_s: config.camera.clock_offset_s,
                 mounting: configured_mounting(config),
-                altitude_m: config.survey.altitude_m,
+                altitude_m,
+                calibration,
+                bits: BitDepth::of_setting(config.camera.bits),
             };
             open_bag(bag, odometry, &timing).map(Some)
         }
         _ => Ok(None),
     }
+}
+
+/// Size of the largest file of a calibration, bytes.
+const MAX_CALIBRATION_BYTES: u64 = 1 << 20;
+
+/// The calibration by `camera.matrix` or a file; `None` if there is none, or if it comes in by ROS 2.
+///
+/// # Errors
+/// A file that cannot be read, or numbers that are no calibration.
+pub fn configured_calibration(config: &Config) -> Result<Option<Arc<Calibration>>, UserError> {
+    let calibration = match &config.camera.calibration {
+        CalibrationSource::File(path) => {
+            let text = scenecast_config::read_regular(path, MAX_CALIBRATION_BYTES)?;
+            let text = String::from_utf8(text).map_err(|_| UserError::file(path, "it is not text in UTF-8"))?;
+            let info = read_calibration(&text);
+            let info = info.map_err(|error| UserError::Input(format!("{}:{error}", path.display())))?;
+            Calibration::of_info(&info, false).map_err(|error| UserError::file(path, error))?
+        }
+        _ if config.camera.matrix != [0.0; 4] => {
+            let given = config.camera.matrix;
+            Calibration::of_matrix(given)
+                .map_err(|error| UserError::Input(format!("camera.matrix = {given:?}: {error}")))?
+        }
+        _ => return Ok(None),
+    };
+    Ok(Some(Arc::new(calibration)))
 }
 
 /// Place and direction of the configured camera on the vehicle.

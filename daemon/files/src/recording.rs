@@ -1,9 +1,12 @@
 //! Recorded missions: images with their poses.
 
 use crate::frame_image::FrameImage;
+use crate::tum_folder::read_depth;
 use image::RgbImage;
+use scene_model::project::View;
 use scenecast_core::Area;
 use scenecast_core::UserError;
+use scenecast_sensors::Sight;
 use std::fmt::Write as _;
 use std::io::Read as _;
 use std::path::{Component, Path, PathBuf};
@@ -22,6 +25,32 @@ pub struct RecordedFrame {
     pub heading_rad: f64,
     /// Size of the image's pixels on the sea floor, in those of the camera's usual ones.
     pub scale: f64,
+    /// The calibrated camera. With it, the pose is that of the camera itself; otherwise it is above the middle of the frame.
+    pub sight: Option<Sight>,
+    /// The distances that were measured with the image.
+    pub depth: Option<DepthFile>,
+}
+
+/// A file of distances.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DepthFile {
+    pub path: PathBuf,
+    pub units_per_m: f64,
+}
+
+impl RecordedFrame {
+    /// The image, without distortion if the camera is calibrated, and what it then sees.
+    ///
+    /// # Errors
+    /// A file that cannot be read, or is not as its calibration says.
+    pub fn read(&self) -> Result<(RgbImage, Option<View>), UserError> {
+        let image = self.image.read()?;
+        let Some(sight) = &self.sight else { return Ok((image, None)) };
+        let depth = self.depth.as_ref().map(|file| read_depth(&file.path, file.units_per_m)).transpose()?;
+        let viewed = sight.view(image, depth);
+        let (image, view) = viewed.map_err(|error| UserError::Input(format!("{}: {error}", self.image)))?;
+        Ok((image, Some(view)))
+    }
 }
 
 /// A folder with images and a table of their poses, in order of time: `poses.csv`, or the only `poses*.csv`.
@@ -172,6 +201,8 @@ fn of_metres(dir: &Path, row: PoseRow<'_>) -> Result<RecordedFrame, String> {
         depth_m: row.depth_m()?,
         heading_rad: row.number("heading_deg")?.to_radians(),
         scale: row.scale()?,
+        sight: None,
+        depth: None,
     })
 }
 
@@ -193,6 +224,8 @@ fn of_mosaic(dir: &Path, row: PoseRow<'_>, metres_per_pixel: f64) -> Result<Reco
         depth_m: 0.0,
         heading_rad: row.number("yaw_deg")?.to_radians(),
         scale,
+        sight: None,
+        depth: None,
     })
 }
 

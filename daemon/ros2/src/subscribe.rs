@@ -7,7 +7,7 @@ use scenecast_config::RosName;
 use scenecast_core::UserError;
 use scenecast_messages::grid_map_msgs::GridMap;
 use scenecast_messages::nav_msgs::{OccupancyGrid, Odometry};
-use scenecast_messages::sensor_msgs::{CameraInfo, CompressedImage, Image};
+use scenecast_messages::sensor_msgs::{CameraInfo, CompressedImage, Image, PointCloud2};
 use scenecast_messages::tf2_msgs::TFMessage;
 
 /// Images that wait at most.
@@ -23,6 +23,11 @@ impl RosNode {
 
     /// Compressed images: best effort, depth 5.
     pub fn subscribe_compressed_images(&self, topic: &RosName) -> Result<Inbox<CompressedImage>, UserError> {
+        self.subscribe(topic, Qos::Sensor(5), IMAGES)
+    }
+
+    /// Clouds of points: best effort, depth 5.
+    pub fn subscribe_clouds(&self, topic: &RosName) -> Result<Inbox<PointCloud2>, UserError> {
         self.subscribe(topic, Qos::Sensor(5), IMAGES)
     }
 

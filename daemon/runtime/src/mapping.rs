@@ -2,11 +2,12 @@
 
 use super::checkpoint::CheckpointFile;
 use super::journal::Folder;
-use crate::camera::CameraFrame;
+use crate::camera::{CameraFrame, ReadFrame};
 use scene_model::project::Pose;
 use scenecast_core::UserError;
 use scenecast_protocol::directive::Settings;
-use scenecast_vehicle::{MapProducer, MapUpdate, Mapper, RegisteredFrame, SharedExemplars};
+use scenecast_sensors::DepthError;
+use scenecast_vehicle::{Frame, MapProducer, MapUpdate, Mapper, RegisteredFrame, SharedExemplars};
 use std::thread::JoinHandle;
 use tokio::sync::mpsc;
 
@@ -36,6 +37,8 @@ pub(super) struct Mapped {
     pub(super) update: MapUpdate,
     /// The best images of each label so far.
     pub(super) exemplars: SharedExemplars,
+    /// Why distances that came with the frame were not used.
+    pub(super) unusable_depth: Option<DepthError>,
 }
 
 pub(super) struct MapperThread {
@@ -166,19 +169,21 @@ impl Work {
 
     fn see(&mut self, mut frame: CameraFrame) -> FromMapper {
         match frame.take_image() {
-            Ok(image) => {
+            Ok(ReadFrame { image, view, unusable_depth }) => {
                 let at = &frame.pose;
                 let pose = Pose { x: at.x_m, y: at.y_m, z: -at.depth_m, yaw_rad: -at.heading_rad };
-                let placed = self.mapper.register(&image, &pose, frame.scale);
-                let update = self.mapper.handle_frame(&image, &placed.pose, placed.scale, frame.t_s);
-                FromMapper::Mapped(Box::new(self.mapped(Some(frame), Some(placed), update)))
+                let shot = Frame { image: &image, pose, scale: frame.scale, view: view.as_ref() };
+                let placed = self.mapper.register(&shot);
+                let update = self.mapper.handle_frame(&shot.placed(&placed), frame.t_s);
+                let mapped = self.mapped(Some(frame), Some(placed), update);
+                FromMapper::Mapped(Box::new(Mapped { unusable_depth, ..mapped }))
             }
             Err(error) => FromMapper::Missed(error),
         }
     }
 
     fn mapped(&mut self, frame: Option<CameraFrame>, registered: Option<RegisteredFrame>, update: MapUpdate) -> Mapped {
-        Mapped { frame, registered, update, exemplars: self.mapper.shared_exemplars() }
+        Mapped { frame, registered, update, exemplars: self.mapper.shared_exemplars(), unusable_depth: None }
     }
 }
 
@@ -203,7 +208,8 @@ mod tests {
         let mut reports = |t_s: f64| {
             let (x_m, y_m, depth_m, heading_rad, scale) = (0.0, 0.0, 4.0, 0.0, 1.0);
             let shot = FrameImage::File(image.clone());
-            let frame = RecordedFrame { t_s, image: shot, x_m, y_m, depth_m, heading_rad, scale };
+            let frame =
+                RecordedFrame { t_s, image: shot, x_m, y_m, depth_m, heading_rad, scale, sight: None, depth: None };
             assert!(thread.orders.send(ToMapper::Frame(Box::new(frame.into()))).is_ok());
             let mut reports: Vec<bool> = Vec::new();
             loop {

@@ -271,6 +271,7 @@ impl VehicleShell {
 
     fn handle_seen(&mut self, mapped: Mapped) {
         let now = self.clock.now();
+        mapped.unusable_depth.iter().for_each(|error| self.camera.handle_unusable_depth(error));
         // A pose that came in after the frame stays the vehicle's.
         let pose = mapped.frame.as_ref().map(|frame| self.camera.newest_pose().unwrap_or(frame.camera_pose()));
         let registered = mapped.registered.as_ref();

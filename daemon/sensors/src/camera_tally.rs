@@ -22,6 +22,18 @@ pub enum CameraFault {
     CutOff,
     /// The pixels have an encoding that is not supported.
     Encoding,
+    /// There is no calibration, where one is needed, or it is for images of another size.
+    Calibration,
+    /// A message with a calibration cannot be used.
+    BadCalibration,
+    /// No distances were measured at the time of the image, which is mapped on a flat floor.
+    NoDepth,
+    /// A measurement of distances cannot be used.
+    UnusableDepth,
+    /// The source of the distances was lost, and was opened again.
+    DepthLost,
+    /// No distances came in for longer than allowed.
+    DepthStalled,
     /// The clock of the camera's stamps went back.
     CameraClockJump,
     /// The clock of the poses went back.
@@ -60,6 +72,12 @@ impl CameraFault {
             Self::Unreadable => "unreadable",
             Self::CutOff => "cut off",
             Self::Encoding => "unknown encoding",
+            Self::Calibration => "without a calibration that fits",
+            Self::BadCalibration => "unusable calibration",
+            Self::NoDepth => "no depth at its time",
+            Self::UnusableDepth => "unusable depth",
+            Self::DepthLost => "depth lost",
+            Self::DepthStalled => "depth stalled",
             Self::CameraClockJump => "camera clock went back",
             Self::PoseClockJump => "pose clock went back",
             Self::PoseGap => "gap between poses",
@@ -102,6 +120,7 @@ impl CameraFault {
                 | Self::Unreadable
                 | Self::CutOff
                 | Self::Encoding
+                | Self::Calibration
         )
     }
 }

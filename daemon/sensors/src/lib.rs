@@ -8,6 +8,8 @@
 //! | quaternions become headings and tilts | [`Rotation`] |
 //! | messages of ROS 2 become images and poses | [`rgb_of`], [`pose_of`] |
 //! | transforms of ROS 2 become poses | [`TransformTree`] |
+//! | calibrations remove the distortion of the lens | [`Calibration`] |
+//! | depth images and clouds become distances, and wait for their images | [`DepthMessage`], [`DepthTrack`] |
 //! | lines of a Doppler velocity log become poses | [`DvlReport`], [`DvlTrack`] |
 //! | poses are interpolated at the time of an image | [`PoseTrack`] |
 //! | the pose of a vehicle becomes that of its camera | [`CameraMounting`] |
@@ -16,28 +18,45 @@
 //! The crate does no IO: bytes and times of arrival come in as arguments.
 
 mod bayer;
+mod bit_depth;
+mod calibration;
+mod calibration_file;
 mod camera_tally;
 mod compressed;
+mod depth;
+mod depth_track;
 mod dvl;
 mod frame_matcher;
 mod image_stream;
+mod lens;
 mod mounting;
+mod point_cloud;
 mod pose_track;
+mod quaternion;
 mod raw_image;
+mod rectify;
 mod ros_messages;
 mod rotation;
+mod sight;
 mod stamp;
 mod transforms;
 
+pub use bit_depth::BitDepth;
+pub use calibration::{Calibration, CalibrationError};
+pub use calibration_file::{CalibrationFileError, read_calibration};
 pub use camera_tally::{CameraFault, CameraTally};
 pub use compressed::{DecodeError, MAX_PIXELS, decode, is_cut_jpeg, own_stamp};
+pub use depth::{DepthError, DepthMessage};
+pub use depth_track::{DepthMatch, DepthTrack};
 pub use dvl::{DvlError, DvlPosition, DvlReport, DvlTrack, MAX_DVL_LINE};
 pub use frame_matcher::{FrameMatcher, Limits, MatchedImage};
 pub use image_stream::{ImageStream, MAX_IMAGE_BYTES, complete_length};
-pub use mounting::CameraMounting;
+pub use lens::LensError;
+pub use mounting::{CameraMounting, MountedCamera};
 pub use pose_track::{PoseMatch, PoseTrack, SensorPose};
 pub use raw_image::{RawImage, RawImageError};
 pub use ros_messages::{pose_of, rgb_of, stamp_of, stamp_of_cdr};
 pub use rotation::Rotation;
+pub use sight::{Sight, tilt_of};
 pub use stamp::Stamp;
 pub use transforms::{TransformError, TransformTree};

@@ -1,6 +1,7 @@
 //! Where a camera is on its vehicle, and which floor it sees.
 
 use crate::SensorPose;
+use crate::quaternion::{about, product, turned};
 
 /// Place and direction of a camera that looks down, on a vehicle.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -45,6 +46,52 @@ impl CameraMounting {
     }
 }
 
+/// The pose of a calibrated camera.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MountedCamera {
+    /// The place of the camera itself, and the direction of the image's upper edge.
+    pub pose: SensorPose,
+    /// The rotation x, y, z, w from the camera's axes to those of a frame whose top points north.
+    pub tilt: [f64; 4],
+    /// Height above a flat floor, metres.
+    pub height_m: f64,
+}
+
+impl CameraMounting {
+    /// The pose of the camera itself, with the whole attitude of the vehicle. Without a measured altitude the floor is
+    /// `altitude_m` below the camera. `None` if the optical axis is tilted by more than 0.6 radians.
+    #[must_use]
+    pub fn mounted_camera(&self, vehicle: &SensorPose, altitude_m: f64) -> Option<MountedCamera> {
+        let [east, north, up] = [0, 1, 2];
+        let attitude = product(about(east, vehicle.pitch_rad), about(north, vehicle.roll_rad));
+        let body = product(about(up, -vehicle.heading_rad), attitude);
+        let tilts = product(about(east, self.tilt_rad[0]), about(north, -self.tilt_rad[1]));
+        // A camera that looks down is turned over about the axis to the right.
+        let mounted = product(product(tilts, about(up, -self.turn_rad)), [1.0, 0.0, 0.0, 0.0]);
+        let heading_rad = vehicle.heading_rad + self.turn_rad;
+        let tilt = product(about(up, heading_rad), product(body, mounted));
+        let axis = turned(tilt, [0.0, 0.0, 1.0]);
+        if axis[0].hypot(axis[1]).atan2(-axis[2]) > MAX_TILT_RAD {
+            return None;
+        }
+        let [forward, starboard, down] = self.place_m;
+        let [east, north, up] = turned(body, [starboard, forward, -down]);
+        let height_m = vehicle.altitude_m.map_or(altitude_m, |altitude| (altitude + up).max(MIN_HEIGHT_M));
+        let pose = SensorPose {
+            x_m: vehicle.x_m + east,
+            y_m: vehicle.y_m + north,
+            depth_m: vehicle.depth_m - up,
+            heading_rad,
+            altitude_m: vehicle.altitude_m.map(|_| height_m),
+            ..*vehicle
+        };
+        Some(MountedCamera { pose, tilt, height_m })
+    }
+}
+
+/// The least height above the floor, metres: a camera that is on it sees nothing.
+const MIN_HEIGHT_M: f64 = 0.05;
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -79,5 +126,47 @@ mod tests {
         assert_eq!(place(level.camera_pose(&bow_up, 4.0)), (100.0, 50.0), "the mounting compensates the trim");
         let on_its_side = SensorPose { roll_rad: 0.7, ..vehicle(0.0) };
         assert_eq!(straight.camera_pose(&on_its_side, 4.0), None);
+    }
+
+    /// The place on a flat floor that the middle of the image shows.
+    fn middle(camera: &MountedCamera) -> (f64, f64) {
+        let turn = product(about(2, -camera.pose.heading_rad), camera.tilt);
+        let [east, north, up] = turned(turn, [0.0, 0.0, 1.0]);
+        let share = camera.height_m / -up;
+        (camera.pose.x_m + share * east, camera.pose.y_m + share * north)
+    }
+
+    #[test]
+    fn a_calibrated_camera_looks_where_its_flat_frame_has_its_middle() {
+        let mounting = CameraMounting { place_m: [0.0; 3], turn_rad: 0.4, tilt_rad: [0.1, 0.0] };
+        for (roll_rad, pitch_rad, heading) in [(0.0, 0.0, 20.0), (0.2, 0.0, 120.0), (0.0, -0.15, 250.0)] {
+            let vehicle = SensorPose { roll_rad, pitch_rad, ..vehicle(heading) };
+            let flat = mounting.camera_pose(&vehicle, 4.0).unwrap();
+            let camera = mounting.mounted_camera(&vehicle, 4.0).unwrap();
+            let (x, y) = middle(&camera);
+            // A tilt in both directions is not the sum of the two.
+            assert!((x - flat.x_m).abs() < 0.01 && (y - flat.y_m).abs() < 0.01, "{x} {y} {flat:?}");
+            assert_eq!((camera.pose.heading_rad, camera.height_m), (flat.heading_rad, 4.5));
+        }
+        let on_its_side = SensorPose { roll_rad: 0.7, ..vehicle(0.0) };
+        assert_eq!(mounting.mounted_camera(&on_its_side, 4.0), None);
+    }
+
+    #[test]
+    fn the_top_of_the_image_points_along_the_heading() {
+        let mounting = CameraMounting { turn_rad: 0.5, ..CameraMounting::default() };
+        let camera = mounting.mounted_camera(&vehicle(90.0), 4.0).unwrap();
+        assert!(turned(camera.tilt, [0.0, -1.0, 0.0]).iter().zip([0.0, 1.0, 0.0]).all(|(a, b)| (a - b).abs() < 1e-12));
+    }
+
+    #[test]
+    fn an_offset_turns_with_the_whole_attitude() {
+        let mounting = CameraMounting { place_m: [1.0, 0.0, 0.5], ..CameraMounting::default() };
+        let bow_up = SensorPose { pitch_rad: 0.3, ..vehicle(0.0) };
+        let MountedCamera { pose, height_m, .. } = mounting.mounted_camera(&bow_up, 4.0).unwrap();
+        let (sin, cos) = 0.3f64.sin_cos();
+        assert!((pose.y_m - (50.0 + cos + 0.5 * sin)).abs() < 1e-9, "{pose:?}");
+        assert!((pose.depth_m - (10.0 - sin + 0.5 * cos)).abs() < 1e-9);
+        assert!((height_m - (4.5 + sin - 0.5 * cos)).abs() < 1e-9);
     }
 }

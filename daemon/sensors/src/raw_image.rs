@@ -1,5 +1,6 @@
 //! Raw pixels in the encodings of ROS 2 (`sensor_msgs/image_encodings.hpp`).
 
+use crate::BitDepth;
 use crate::bayer::BayerPattern;
 use crate::compressed::MAX_PIXELS;
 use image::{Rgb, RgbImage};
@@ -99,8 +100,8 @@ impl Encoding {
 }
 
 impl RawImage<'_> {
-    /// The image with 8 bits a channel; of 16 bits, the nearest of 256 levels.
-    pub fn to_rgb(&self) -> Result<RgbImage, RawImageError> {
+    /// The image with 8 bits a channel; of 16 bits, the nearest of 256 levels, of which `bits` gives the highest.
+    pub fn to_rgb(&self, bits: &mut BitDepth) -> Result<RgbImage, RawImageError> {
         let encoding =
             Encoding::parse(self.encoding).ok_or_else(|| RawImageError::Encoding(shortened(self.encoding)))?;
         let (width, height, step) = (self.width as usize, self.height as usize, self.step as usize);
@@ -117,7 +118,14 @@ impl RawImage<'_> {
         if (self.data.len() as u64) < (height as u64 - 1) * step as u64 + row_bytes as u64 {
             return Err(RawImageError::Short { held: self.data.len(), height: self.height, step: self.step });
         }
-        let sample = |y: usize, index: usize| self.sample(y * step + index * encoding.depth, encoding.depth);
+        if encoding.depth == 2 {
+            bits.learn((0..height).flat_map(|y| (0..row_bytes / 2).map(move |index| self.level(y * step + 2 * index))));
+        }
+        let bits = *bits;
+        let sample = |y: usize, index: usize| match encoding.depth {
+            1 => self.data[y * step + index],
+            _ => bits.scaled(self.level(y * step + 2 * index)),
+        };
         Ok(match encoding.layout {
             Layout::Channels { count, rgb } => RgbImage::from_fn(self.width, self.height, |x, y| {
                 Rgb(rgb.map(|channel| sample(y as usize, x as usize * count + channel)))
@@ -131,13 +139,10 @@ impl RawImage<'_> {
         })
     }
 
-    fn sample(&self, at: usize, depth: usize) -> u8 {
-        if depth == 1 {
-            return self.data[at];
-        }
+    /// The level of 16 bits at a byte.
+    fn level(&self, at: usize) -> u16 {
         let pair = [self.data[at], self.data[at + 1]];
-        let value = if self.is_bigendian { u16::from_be_bytes(pair) } else { u16::from_le_bytes(pair) };
-        ((u32::from(value) + 128) / 257) as u8
+        if self.is_bigendian { u16::from_be_bytes(pair) } else { u16::from_le_bytes(pair) }
     }
 }
 
@@ -164,35 +169,52 @@ mod tests {
 
     #[test]
     fn channels_are_put_in_order_and_rows_may_be_padded() {
-        let rgb = image("rgb8", (1, 2), 4, &[1, 2, 3, 0, 4, 5, 6]).to_rgb().unwrap();
+        let rgb = image("rgb8", (1, 2), 4, &[1, 2, 3, 0, 4, 5, 6]).to_rgb(&mut BitDepth::default()).unwrap();
         assert_eq!(rgb.into_raw(), [1, 2, 3, 4, 5, 6]);
-        assert_eq!(image("bgra8", (1, 1), 4, &[1, 2, 3, 9]).to_rgb().unwrap().into_raw(), [3, 2, 1]);
-        assert_eq!(image("mono8", (2, 1), 2, &[7, 8]).to_rgb().unwrap().into_raw(), [7, 7, 7, 8, 8, 8]);
+        assert_eq!(
+            image("bgra8", (1, 1), 4, &[1, 2, 3, 9]).to_rgb(&mut BitDepth::default()).unwrap().into_raw(),
+            [3, 2, 1]
+        );
+        assert_eq!(
+            image("mono8", (2, 1), 2, &[7, 8]).to_rgb(&mut BitDepth::default()).unwrap().into_raw(),
+            [7, 7, 7, 8, 8, 8]
+        );
     }
 
     #[test]
     fn sixteen_bits_become_eight_in_either_byte_order() {
         let mut mono = image("mono16", (2, 1), 4, &[0xFF, 0xFF, 0x00, 0x80]);
-        assert_eq!(mono.to_rgb().unwrap().into_raw(), [255, 255, 255, 128, 128, 128]);
+        assert_eq!(mono.to_rgb(&mut BitDepth::default()).unwrap().into_raw(), [255, 255, 255, 128, 128, 128]);
         mono.is_bigendian = true;
-        assert_eq!(mono.to_rgb().unwrap().into_raw(), [255, 255, 255, 0, 0, 0]);
+        assert_eq!(mono.to_rgb(&mut BitDepth::default()).unwrap().into_raw(), [255, 255, 255, 0, 0, 0]);
+    }
+
+    #[test]
+    fn twelve_bits_in_sixteen_fill_the_eight() {
+        let mono = image("mono16", (2, 1), 4, &[0xFF, 0x0F, 0x00, 0x08]);
+        assert_eq!(mono.to_rgb(&mut BitDepth::of_setting(12)).unwrap().into_raw(), [255, 255, 255, 128, 128, 128]);
+        let mut automatic = BitDepth::of_setting(0);
+        assert_eq!(mono.to_rgb(&mut automatic).unwrap().into_raw()[3], 128);
+        let dark = image("mono16", (1, 1), 2, &[0x00, 0x02]);
+        assert_eq!(dark.to_rgb(&mut automatic).unwrap().into_raw()[0], 32, "a dark image stays dark");
+        assert_eq!(image("mono8", (1, 1), 1, &[9]).to_rgb(&mut automatic).unwrap().into_raw()[0], 9);
     }
 
     #[test]
     fn a_grey_yuv_image_stays_grey() {
         assert_eq!(
-            image("uyvy", (2, 1), 4, &[128, 10, 128, 20]).to_rgb().unwrap().into_raw(),
+            image("uyvy", (2, 1), 4, &[128, 10, 128, 20]).to_rgb(&mut BitDepth::default()).unwrap().into_raw(),
             [10, 10, 10, 20, 20, 20]
         );
         assert_eq!(
-            image("yuyv", (2, 1), 4, &[10, 128, 20, 128]).to_rgb().unwrap().into_raw(),
+            image("yuyv", (2, 1), 4, &[10, 128, 20, 128]).to_rgb(&mut BitDepth::default()).unwrap().into_raw(),
             [10, 10, 10, 20, 20, 20]
         );
     }
 
     #[test]
     fn what_does_not_fit_is_named() {
-        let text = |image: RawImage<'_>| image.to_rgb().unwrap_err().to_string();
+        let text = |image: RawImage<'_>| image.to_rgb(&mut BitDepth::default()).unwrap_err().to_string();
         assert!(text(image("nv21", (1, 1), 3, &[0; 3])).contains("\"nv21\" is not supported; allowed are mono8"));
         assert!(text(image("rgb8", (0, 5), 0, &[])).contains("0 x 5 pixels"));
         assert!(text(image("rgb8", (2, 2), 6, &[0; 11])).contains("11 bytes are too few for 2 rows of 6 bytes"));
@@ -205,7 +227,7 @@ mod tests {
         fn any_header_gives_an_image_or_an_error(width in 0_u32..40, height in 0_u32..40, step in 0_u32..200,
             encoding in prop::sample::select(vec!["rgb8", "mono16", "bayer_grbg16", "bayer_rggb8", "uyvy", "bgra16", "x"]),
             data in prop::collection::vec(any::<u8>(), 0..4000)) {
-            if let Ok(rgb) = image(encoding, (width, height), step, &data).to_rgb() {
+            if let Ok(rgb) = image(encoding, (width, height), step, &data).to_rgb(&mut BitDepth::default()) {
                 prop_assert_eq!(rgb.dimensions(), (width, height));
             }
         }

@@ -1,6 +1,6 @@
 //! Images and poses of ROS 2 messages.
 
-use crate::{RawImage, RawImageError, Rotation, SensorPose, Stamp};
+use crate::{BitDepth, RawImage, RawImageError, Rotation, SensorPose, Stamp};
 use image::RgbImage;
 use scenecast_messages::nav_msgs::Odometry;
 use scenecast_messages::sensor_msgs::Image;
@@ -24,10 +24,10 @@ pub fn stamp_of_cdr(bytes: &[u8]) -> Option<Stamp> {
     Stamp::from_ros(sec, nanosec).filter(|stamp| *stamp != Stamp::default())
 }
 
-/// The pixels of a raw image.
-pub fn rgb_of(image: &Image) -> Result<RgbImage, RawImageError> {
+/// The pixels of a raw image; `bits` are those of 16-bit levels.
+pub fn rgb_of(image: &Image, bits: &mut BitDepth) -> Result<RgbImage, RawImageError> {
     let Image { width, height, ref encoding, is_bigendian, step, ref data, .. } = *image;
-    RawImage { width, height, encoding, is_bigendian: is_bigendian != 0, step, data }.to_rgb()
+    RawImage { width, height, encoding, is_bigendian: is_bigendian != 0, step, data }.to_rgb(bits)
 }
 
 /// The pose of odometry in a frame of east, north, up, and its time; `None` unless it is a pose with a time.

@@ -10,7 +10,11 @@ mod dvl;
 mod live;
 mod picture;
 #[cfg(feature = "ros2")]
+mod ros_calibration;
+#[cfg(feature = "ros2")]
 mod ros_camera;
+#[cfg(feature = "ros2")]
+mod ros_depth;
 #[cfg(feature = "ros2")]
 mod ros_navigation;
 #[cfg(feature = "ros2")]
@@ -23,10 +27,14 @@ mod watch;
 pub use arrival_clock::ArrivalClock;
 pub use command::CommandSource;
 pub use dvl::DvlSource;
-pub use live::{LiveSource, Reading, SensorKind, SensorSource, SourceError, SourceImage, SourceReport};
+pub use live::{LiveSource, Reading, SensorKind, SensorSource, SourceDepth, SourceError, SourceImage, SourceReport};
 pub use picture::Picture;
 #[cfg(feature = "ros2")]
-pub use ros_camera::RosCamera;
+pub use ros_calibration::CalibrationTopic;
+#[cfg(feature = "ros2")]
+pub use ros_camera::{RosCamera, RosCameraOptions};
+#[cfg(feature = "ros2")]
+pub use ros_depth::RosDepth;
 #[cfg(feature = "ros2")]
 pub use ros_navigation::RosNavigation;
 #[cfg(feature = "ros2")]

@@ -1,7 +1,7 @@
 //! A source on a thread of its own, which opens it again when it is lost.
 
 use crate::Picture;
-use scenecast_sensors::{CameraFault, SensorPose, Stamp};
+use scenecast_sensors::{Calibration, CameraFault, DepthMessage, SensorPose, Stamp};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -15,13 +15,25 @@ use tokio::sync::mpsc;
 pub struct SourceError(pub String);
 
 /// An image of a source.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct SourceImage {
     /// The time at which the image was taken, if the source knows it.
     pub stamp: Option<Stamp>,
     /// The time at which the image came in.
     pub arrival: Stamp,
     pub picture: Picture,
+    /// The calibration that its source gives.
+    pub calibration: Option<Arc<Calibration>>,
+}
+
+/// Distances of a source.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SourceDepth {
+    /// The time at which they were measured, if the source knows it.
+    pub stamp: Option<Stamp>,
+    /// The time at which they came in.
+    pub arrival: Stamp,
+    pub message: DepthMessage,
 }
 
 /// A measurement of a sensor.
@@ -30,12 +42,15 @@ pub enum Reading {
     Image(SourceImage),
     /// The pose of the vehicle at a time.
     Pose(Stamp, SensorPose),
+    Depth(SourceDepth),
 }
 
 /// The sensor that a source is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum SensorKind {
     Camera,
+    /// It measures the distances of the camera's pixels.
+    Depth,
     /// It measures the pose of the vehicle.
     Navigation,
 }
@@ -44,6 +59,7 @@ impl SensorKind {
     fn lost(self) -> CameraFault {
         match self {
             Self::Camera => CameraFault::SourceLost,
+            Self::Depth => CameraFault::DepthLost,
             Self::Navigation => CameraFault::PosesLost,
         }
     }
@@ -51,7 +67,7 @@ impl SensorKind {
     /// Reports that wait for the vehicle at most: each of a camera may be an image of many megabytes.
     fn max_reports(self) -> usize {
         match self {
-            Self::Camera => 8,
+            Self::Camera | Self::Depth => 8,
             Self::Navigation => 512,
         }
     }
@@ -59,6 +75,7 @@ impl SensorKind {
     fn stalled(self) -> CameraFault {
         match self {
             Self::Camera => CameraFault::Stalled,
+            Self::Depth => CameraFault::DepthStalled,
             Self::Navigation => CameraFault::PosesStalled,
         }
     }
@@ -272,7 +289,7 @@ impl SourceImage {
     /// An image of a stream or a file: without a `stamp`, its own one counts, if it has one.
     pub(crate) fn compressed(stamp: Option<Stamp>, arrival: Stamp, bytes: Vec<u8>) -> Self {
         let stamp = stamp.or_else(|| scenecast_sensors::own_stamp(&bytes));
-        Self { stamp, arrival, picture: Picture::Compressed(bytes) }
+        Self { stamp, arrival, picture: Picture::Compressed(bytes), calibration: None }
     }
 }
 
@@ -324,7 +341,12 @@ mod tests {
                 Some(Step::Lose) => Err(SourceError("unplugged".to_owned())),
                 _ => {
                     let picture = Picture::Compressed(vec![1]);
-                    Ok(Some(Reading::Image(SourceImage { stamp: None, arrival: Stamp::default(), picture })))
+                    Ok(Some(Reading::Image(SourceImage {
+                        stamp: None,
+                        arrival: Stamp::default(),
+                        picture,
+                        calibration: None,
+                    })))
                 }
             }
         }

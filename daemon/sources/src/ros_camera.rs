@@ -1,12 +1,13 @@
 //! Cameras of ROS 2.
 
 use crate::live::{Reading, SensorKind, SensorSource, SourceError, SourceImage};
+use crate::ros_calibration::{CalibrationTopic, RosCalibration};
 use crate::ros_node::{Counted, SensorNode, parsed};
 use crate::{ArrivalClock, Picture};
 use scenecast_messages::sensor_msgs::{CompressedImage, Image};
 use scenecast_messages::std_msgs::Header;
 use scenecast_ros2::Inbox;
-use scenecast_sensors::{CameraFault, Stamp, rgb_of, stamp_of};
+use scenecast_sensors::{BitDepth, CameraFault, Stamp, rgb_of, stamp_of};
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -18,6 +19,8 @@ pub struct RosCamera {
     clock: ArrivalClock,
     /// Whether stamps of the messages are used, so that a message without one is dropped.
     needs_stamps: bool,
+    bits: BitDepth,
+    calibration: RosCalibration,
     inbox: Option<CameraInbox>,
     counted: Counted,
 }
@@ -27,12 +30,37 @@ enum CameraInbox {
     Compressed(Inbox<CompressedImage>),
 }
 
+/// A message of either type.
+enum Either {
+    Raw(Image),
+    Compressed(CompressedImage),
+}
+
+/// How the messages of a camera are read.
+#[derive(Debug, Clone)]
+pub struct RosCameraOptions {
+    /// Whether a message without a stamp is dropped.
+    pub needs_stamps: bool,
+    /// The bits of levels in 16-bit images.
+    pub bits: BitDepth,
+    pub calibration: CalibrationTopic,
+}
+
 /// An image that a newer one displaced in its inbox.
 const OVERTAKEN: (CameraFault, &str) = (CameraFault::Overtaken, "a newer message came before it was read");
 
 impl RosCamera {
-    pub fn new(node: Arc<SensorNode>, topic: &str, clock: ArrivalClock, needs_stamps: bool) -> Self {
-        Self { node, topic: topic.to_owned(), clock, needs_stamps, inbox: None, counted: Counted::default() }
+    pub fn new(node: Arc<SensorNode>, topic: &str, clock: ArrivalClock, options: &RosCameraOptions) -> Self {
+        Self {
+            node,
+            topic: topic.to_owned(),
+            clock,
+            needs_stamps: options.needs_stamps,
+            bits: options.bits,
+            calibration: RosCalibration::new(&options.calibration, topic),
+            inbox: None,
+            counted: Counted::default(),
+        }
     }
 
     /// The time of a header; `Err` if it has none and needs one.
@@ -45,15 +73,21 @@ impl RosCamera {
         Ok(stamp)
     }
 
-    fn raw(&self, image: &Image) -> Result<SourceImage, (CameraFault, String)> {
+    fn raw(&mut self, image: &Image) -> Result<SourceImage, (CameraFault, String)> {
         let stamp = self.stamp(&image.header)?;
-        let rgb = rgb_of(image).map_err(|error| (CameraFault::Encoding, error.to_string()))?;
-        Ok(SourceImage { stamp, arrival: self.clock.now(), picture: Picture::Rgb(rgb) })
+        let rgb = rgb_of(image, &mut self.bits).map_err(|error| (CameraFault::Encoding, error.to_string()))?;
+        self.image(stamp, Picture::Rgb(rgb))
     }
 
-    fn compressed(&self, image: CompressedImage) -> Result<SourceImage, (CameraFault, String)> {
+    fn compressed(&mut self, image: CompressedImage) -> Result<SourceImage, (CameraFault, String)> {
         let stamp = self.stamp(&image.header)?;
-        Ok(SourceImage { stamp, arrival: self.clock.now(), picture: Picture::Compressed(image.data) })
+        self.image(stamp, Picture::Compressed(image.data))
+    }
+
+    fn image(&mut self, stamp: Option<Stamp>, picture: Picture) -> Result<SourceImage, (CameraFault, String)> {
+        let arrival = self.clock.now();
+        let calibration = self.calibration.current().map_err(|text| (CameraFault::Calibration, text))?;
+        Ok(SourceImage { stamp, arrival, picture, calibration })
     }
 }
 
@@ -65,6 +99,7 @@ impl SensorSource for RosCamera {
     fn open(&mut self) -> Result<(), SourceError> {
         let name = parsed(&self.topic)?;
         let node = self.node.get()?;
+        self.calibration.open(&node)?;
         let failed = |error: scenecast_core::UserError| SourceError(error.to_string());
         self.inbox = Some(if self.topic.ends_with("/compressed") {
             CameraInbox::Compressed(node.subscribe_compressed_images(&name).map_err(failed)?)
@@ -79,19 +114,24 @@ impl SensorSource for RosCamera {
         timeout: Duration,
         fault: &mut dyn FnMut(CameraFault, String),
     ) -> Result<Option<Reading>, SourceError> {
-        let image = match &self.inbox {
+        self.calibration.report(fault);
+        let received = match &self.inbox {
             Some(CameraInbox::Raw(inbox)) => {
                 inbox.wait(timeout);
                 self.counted.report(inbox, OVERTAKEN, CameraFault::Unreadable, fault);
-                inbox.take().map(|received| self.raw(&received.message))
+                inbox.take().map(|received| Either::Raw(received.message))
             }
             Some(CameraInbox::Compressed(inbox)) => {
                 inbox.wait(timeout);
                 self.counted.report(inbox, OVERTAKEN, CameraFault::Unreadable, fault);
-                inbox.take().map(|received| self.compressed(received.message))
+                inbox.take().map(|received| Either::Compressed(received.message))
             }
             None => return Err(SourceError("the topic is not open".to_owned())),
         };
+        let image = received.map(|message| match message {
+            Either::Raw(image) => self.raw(&image),
+            Either::Compressed(image) => self.compressed(image),
+        });
         Ok(match image {
             Some(Ok(image)) => Some(Reading::Image(image)),
             Some(Err((kind, text))) => {
@@ -108,6 +148,7 @@ impl SensorSource for RosCamera {
     }
 
     fn close(&mut self) {
+        self.calibration.close();
         self.inbox = None;
     }
 }

@@ -216,7 +216,7 @@ mod tests {
     fn image_of(reading: Reading) -> SourceImage {
         match reading {
             Reading::Image(image) => image,
-            Reading::Pose(..) => panic!("a folder has no poses"),
+            Reading::Pose(..) | Reading::Depth(_) => panic!("a folder has no poses"),
         }
     }
 

@@ -134,6 +134,7 @@ fn continues(kept: &Measures, configured: &Measures) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Frame;
     use crate::MapUpdate;
     use image::{Rgb, RgbImage};
     use scene_model::project::Pose;
@@ -152,7 +153,7 @@ mod tests {
             Rgb([(kind * 90 + x % 7) as u8, (200 - kind * 60 + y % 5) as u8, ((x * y) % 31) as u8])
         });
         let pose = Pose { x: f64::from(at) * 0.4, y: 0.0, z: -4.0, yaw_rad: 0.0 };
-        mapper.handle_frame(&image, &pose, 1.0, f64::from(at) * 2.0)
+        mapper.handle_frame(&Frame::flat(&image, pose, 1.0), f64::from(at) * 2.0)
     }
 
     #[test]
@@ -185,7 +186,8 @@ mod tests {
         let later = frame(&mut mapper, 60);
         assert_eq!((age(&later), later.cells.len()), (2.0, later.layers[&LayerId::LAST_SEEN].len()));
         let image = RgbImage::from_pixel(160, 120, Rgb([90, 120, 60]));
-        let again = mapper.handle_frame(&image, &Pose { x: 0.0, y: 0.0, z: -4.0, yaw_rad: 0.0 }, 1.0, 150.0);
+        let again =
+            mapper.handle_frame(&Frame::flat(&image, Pose { x: 0.0, y: 0.0, z: -4.0, yaw_rad: 0.0 }, 1.0), 150.0);
         assert_eq!(age(&again), 0.0);
     }
 

@@ -1,14 +1,14 @@
 //! The mapper: from camera frames to the label map.
 
+use super::frame::{Frame, Projection};
 use super::picker::{Judge, PATCH_PX};
 use super::relief::Relief;
-use image::RgbImage;
 use scene_model::exemplars::{ExemplarPatch, ExemplarStore};
 use scene_model::online::OnlineInference;
-use scene_model::project::{DownCamera, Pose};
+use scene_model::project::DownCamera;
 use scene_model::publish::{LabelBook, PublishedCell};
 use scene_model::topics::{Birth, FlatCell, SceneConfig, SceneModel};
-use scene_model::words::{FlatField, Measures, WordConfig, WordExtractor};
+use scene_model::words::{FlatField, Measures, Word, WordConfig, WordExtractor};
 use scenecast_config::{BirthRule, Config, cell_m};
 use scenecast_core::UserError;
 use scenecast_protocol::directive::{Change, Registration, Settings, ShortDecimal};
@@ -19,6 +19,9 @@ use std::sync::Arc;
 
 /// Exemplars that are kept of each label.
 const EXEMPLARS_KEPT: usize = 4;
+
+/// Smallest and largest edge of a cell in frames whose view gives the size of their pixels, pixels.
+const CELL_PX: (f32, f32) = (4.0, 400.0);
 
 /// The best exemplars of each label that has any, the best first.
 pub type SharedExemplars = Arc<BTreeMap<u8, Vec<ExemplarPatch>>>;
@@ -169,16 +172,14 @@ impl Mapper {
         [config.alpha, config.beta, config.gamma]
     }
 
-    /// Maps a frame that was taken at `pose` at mission time `t_s`, and refines the model in proportion to the time
-    /// since the last frame.
-    ///
-    /// `scale` is the size of a pixel on the sea floor, divided by the configured size.
-    pub fn handle_frame(&mut self, image: &RgbImage, pose: &Pose, scale: f64, t_s: f64) -> MapUpdate {
-        let camera = DownCamera {
-            metres_per_pixel: scale * self.camera.metres_per_pixel,
-            altitude_m: scale * self.camera.altitude_m,
-        };
-        let cell_px = (self.cell_m / camera.metres_per_pixel) as f32;
+    /// Maps a frame of mission time `t_s`, and refines the model in proportion to the time since the last frame.
+    pub fn handle_frame(&mut self, frame: &Frame<'_>, t_s: f64) -> MapUpdate {
+        let Frame { image, pose, .. } = *frame;
+        let projection = Projection::of(frame, &self.camera);
+        let mut cell_px = (self.cell_m / projection.metres_per_pixel()) as f32;
+        if frame.view.is_some() {
+            cell_px = cell_px.clamp(CELL_PX.0, CELL_PX.1);
+        }
         let words = match &mut self.light {
             Some(light) => {
                 light.learn(image);
@@ -186,7 +187,7 @@ impl Mapper {
             }
             None => self.extractor.extract(image, cell_px),
         };
-        let observations = camera.project(image.width(), image.height(), pose, &words);
+        let observations = projection.project(image.dimensions(), &pose, &words);
         self.online.expect(observations.len(), &mut self.model);
         self.model.insert(t_s, &observations);
         for seen in &observations {
@@ -198,10 +199,14 @@ impl Mapper {
         self.model.refine((self.refine_words_per_s * passed.clamp(0.0, 60.0)) as u64);
         self.flat = self.online.learn(t_s, &self.model);
         let published = self.book.publish(&self.flat);
-        let (cell_m, metres_per_pixel) = (self.cell_m, camera.metres_per_pixel);
+        let (cell_m, metres_per_pixel) = (self.cell_m, projection.metres_per_pixel());
         let judge = Judge { flat: &self.flat, cell_m, metres_per_pixel };
         judge.review(&mut self.exemplars);
-        judge.offer(&mut self.exemplars, image, pose, t_s);
+        let place = |u: f32, v: f32| {
+            let centre = [Word { id: 0, u, v }];
+            projection.project(image.dimensions(), &pose, &centre).first().map(|seen| (seen.x, seen.y))
+        };
+        judge.offer(&mut self.exemplars, image, place, t_s);
         self.update(&published)
     }
 

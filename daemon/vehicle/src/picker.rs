@@ -1,9 +1,7 @@
 //! The choice of the patches of a camera frame that represent the labels best.
 
 use scene_model::exemplars::ExemplarStore;
-use scene_model::project::{DownCamera, Pose};
 use scene_model::topics::{FlatCell, TopicId};
-use scene_model::words::Word;
 use scenecast_protocol::exemplar::edge_px;
 
 /// Edge of a patch in pixels, the largest that is sent.
@@ -49,18 +47,23 @@ impl Judge<'_> {
         });
     }
 
-    /// Offers the patches of a frame. Those in the middle come first, because the camera distorts least there.
-    pub(super) fn offer(&self, store: &mut ExemplarStore, frame: &image::RgbImage, pose: &Pose, t_s: f64) {
+    /// Offers the patches of a frame, whose pixels `place_of` puts on the map. Those in the middle come first, because the
+    /// camera distorts least there.
+    pub(super) fn offer(
+        &self,
+        store: &mut ExemplarStore,
+        frame: &image::RgbImage,
+        place_of: impl Fn(f32, f32) -> Option<(f64, f64)>,
+        t_s: f64,
+    ) {
         let (width, height) = frame.dimensions();
         let edge = PATCH_PX.min(width).min(height);
         if edge < edge_px(0) {
             return;
         }
-        let camera = DownCamera { metres_per_pixel: self.metres_per_pixel, altitude_m: 0.0 };
         for (left, top) in places(width - edge, height - edge) {
             let middle = (left as f32 + edge as f32 / 2.0, top as f32 + edge as f32 / 2.0);
-            let centre = [Word { id: 0, u: middle.0, v: middle.1 }];
-            let Some(place) = camera.project(width, height, pose, &centre).first().map(|o| (o.x, o.y)) else { return };
+            let Some(place) = place_of(middle.0, middle.1) else { continue };
             let Some((topic, score)) = self.score(place).filter(|s| s.1 >= MIN_SCORE) else { continue };
             if store.would_keep(topic, score) {
                 let patch = image::imageops::crop_imm(frame, left, top, edge, edge).to_image();
@@ -89,6 +92,11 @@ mod tests {
     use super::*;
     use image::RgbImage;
 
+    /// The place of a pixel below a camera at the origin.
+    fn below(u: f32, v: f32) -> Option<(f64, f64)> {
+        Some(((f64::from(u) - 320.0) * 0.01, (240.0 - f64::from(v)) * 0.01))
+    }
+
     /// A map of topic 1 west of the middle and of topic 2 east of it.
     fn halves(confidence: f32) -> Vec<FlatCell> {
         let cell = |x: i32, y: i32| FlatCell {
@@ -115,7 +123,7 @@ mod tests {
     fn each_visible_label_gets_a_patch_of_itself_alone() {
         let flat = halves(0.9);
         let mut store = ExemplarStore::new(4, PATCH_PX);
-        judge(&flat).offer(&mut store, &frame(), &Pose::default(), 1.0);
+        judge(&flat).offer(&mut store, &frame(), below, 1.0);
         for (topic, shade) in [(1, 10), (2, 200)] {
             let best = store.best(TopicId(topic)).unwrap();
             assert!(best.score > 0.85, "{}", best.score);
@@ -129,7 +137,7 @@ mod tests {
     fn a_relabelled_patch_is_no_exemplar_of_its_old_label() {
         let flat = halves(0.9);
         let mut store = ExemplarStore::new(4, PATCH_PX);
-        judge(&flat).offer(&mut store, &frame(), &Pose::default(), 1.0);
+        judge(&flat).offer(&mut store, &frame(), below, 1.0);
         let mut changed = halves(0.5);
         changed.iter_mut().for_each(|c| c.topic = TopicId(2));
         judge(&changed).review(&mut store);
@@ -141,7 +149,7 @@ mod tests {
     fn too_small_frames_give_no_patch() {
         let flat = halves(0.9);
         let mut store = ExemplarStore::new(4, PATCH_PX);
-        judge(&flat).offer(&mut store, &RgbImage::new(63, 480), &Pose::default(), 1.0);
+        judge(&flat).offer(&mut store, &RgbImage::new(63, 480), below, 1.0);
         assert!(store.best(TopicId(1)).is_none() && store.best(TopicId(2)).is_none());
         assert_eq!(places(0, 0), [(0, 0)]);
         assert_eq!(places(100, 150)[0], (50, 75));

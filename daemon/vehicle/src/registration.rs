@@ -1,7 +1,7 @@
 //! Places camera frames by their overlap with earlier ones before they are mapped.
 
+use crate::frame::{Frame, Nadir};
 use crate::mapper::Mapper;
-use image::RgbImage;
 use scene_model::project::Pose;
 use scenecast_protocol::coordinates::MapPoint;
 use scenecast_registration::{CameraImage, FrameInput, Placed, Registrar, Tally};
@@ -47,24 +47,35 @@ fn on_grid(pose: &Pose) -> Pose {
 }
 
 impl Mapper {
-    /// Places a frame that was taken at `pose` by dead reckoning, compass and altitude. A vehicle that never registered
-    /// frames places it there; one on which registration was switched off continues from the last frame's place by
-    /// odometry and compass, so that the map does not jump.
+    /// Places a frame that was taken by dead reckoning, compass and altitude. A vehicle that never registered frames places
+    /// it there; one on which registration was switched off continues from the last frame's place by odometry and compass,
+    /// so that the map does not jump.
     ///
-    /// `scale` is the size of a pixel on the sea floor, divided by the configured size.
-    pub fn register(&mut self, image: &RgbImage, pose: &Pose, scale: f64) -> RegisteredFrame {
-        let pose = &on_grid(pose);
+    /// Frames are compared as flat images. Of one with measured distances the median is the altitude, and the place that is
+    /// found moves the camera as a whole. A frame that is tilted by more than 0.6 radians is not compared with others.
+    pub fn register(&mut self, frame: &Frame<'_>) -> RegisteredFrame {
+        let (pose, size) = (on_grid(&frame.pose), frame.image.dimensions());
         let dead_reckoned = MapPoint::new(pose.x, pose.y);
-        let unregistered = RegisteredFrame { pose: *pose, scale, dead_reckoned, found: None };
+        let nadir = frame.view.and_then(|view| Nadir::of(view, size));
+        let scale = nadir.map_or(frame.scale, |nadir| nadir.metres_per_pixel / self.metres_per_pixel());
+        let unregistered = RegisteredFrame { pose, scale, dead_reckoned, found: None };
+        if frame.view.is_some() && nadir.is_none() {
+            let distance_m = frame.view.and_then(|view| Some(view.metres_per_pixel(view.distance_m(size)?)));
+            let scale = distance_m.map_or(1.0, |metres_per_pixel| metres_per_pixel / self.metres_per_pixel());
+            return RegisteredFrame { scale, ..unregistered };
+        }
         let metres_per_pixel = scale * self.metres_per_pixel();
-        let image = CameraImage::rgb(image.width() as usize, image.height() as usize, image.as_raw());
+        let image = CameraImage::rgb(size.0 as usize, size.1 as usize, frame.image.as_raw());
         let (Some(registrar), Some(image)) = (&mut self.registrar, image) else { return unregistered };
-        let input = FrameInput { image, metres_per_pixel, dead_reckoned, compass_rad: -pose.yaw_rad };
+        let above = nadir.map_or(pose, |nadir| nadir.above(&pose));
+        let (place, compass_rad) = (MapPoint::new(above.x, above.y), -pose.yaw_rad);
+        let input = FrameInput { image, metres_per_pixel, dead_reckoned: place, compass_rad };
         let placed =
             if self.registers { registrar.handle_frame(&input) } else { registrar.handle_unmatched_frame(&input) };
         let (x, y) = placed.pose.at().xy();
+        let above = Pose { x, y, z: pose.z, yaw_rad: -placed.pose.heading_rad };
         RegisteredFrame {
-            pose: Pose { x, y, z: pose.z, yaw_rad: -placed.pose.heading_rad },
+            pose: nadir.map_or(above, |nadir| nadir.camera(&above, placed.pose.scale())),
             scale: scale * placed.pose.scale(),
             found: Some(FoundFrame { closed: registrar.tally().looped, is_on: self.registers, placed }),
             ..unregistered
@@ -86,7 +97,7 @@ impl Mapper {
 mod tests {
     use super::*;
     use crate::Restored;
-    use image::Rgb;
+    use image::{Rgb, RgbImage};
     use scenecast_config::Config;
     use scenecast_protocol::directive::{Change, Registration, Settings};
 
@@ -107,7 +118,7 @@ mod tests {
     /// The vehicle moves 0.48 m a frame, and believes that it moves 0.50 m.
     fn step(mapper: &mut Mapper, i: u32) -> RegisteredFrame {
         let pose = Pose { x: 0.0, y: 0.5 * f64::from(i), z: -16.0, yaw_rad: 0.0 };
-        mapper.register(&frame(0.48 * f64::from(i)), &pose, 1.0)
+        mapper.register(&Frame::flat(&frame(0.48 * f64::from(i)), pose, 1.0))
     }
 
     #[test]

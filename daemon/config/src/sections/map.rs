@@ -3,7 +3,8 @@
 use crate::key::section;
 use crate::rule::{ANY, range};
 use crate::setting::{
-    BandRange, BirthRule, CameraSource, CameraStamps, Debounce, LabelSource, LayerName, MapCells, MapStream, Votes,
+    BandRange, BirthRule, CalibrationSource, CameraSource, CameraStamps, Debounce, DepthSource, LabelSource, LayerName,
+    MapCells, MapStream, Votes,
 };
 use scenecast_protocol::map_codec::Codec;
 use std::collections::BTreeMap;
@@ -41,7 +42,8 @@ section! {
     /// The camera.
     camera: Camera {
         /// Source of the frames. frames:DIR: images with DIR/poses.csv. bag:FILE: images and odometry that ROS 2 recorded in
-        /// MCAP, a file or the folder of a bag, with #TOPIC behind it where there are several topics of images. watch:DIR:
+        /// MCAP, a file or the folder of a bag, with #TOPIC behind it where there are several topics of images. tum:DIR: images
+        /// with distances and poses in the layout of the TUM RGB-D benchmark, rgb.txt, depth.txt and groundtruth.txt. watch:DIR:
         /// images, as they are written to a folder. command:COMMAND: images that a shell command writes to its standard
         /// output, MJPEG, PNG or PPM. v4l2:DEVICE: a camera of the system, by ffmpeg. ros2:TOPIC: images of ROS 2, compressed
         /// if the name of the topic ends in /compressed. Empty: the image of the rehearsal; a vehicle at sea then has no
@@ -70,6 +72,22 @@ section! {
         /// optical axis from straight down, towards the bow and to starboard. Roll and pitch of the vehicle are added; a frame
         /// that is tilted by more than 34 degrees in all is not mapped.
         mount_deg: [f64; 3] = [0.0, 0.0, 0.0], range(-180.0, 180.0, "deg"), [Auv];
+        /// Distances of the pixels of a live camera; words are then placed at their points in space. ros2:TOPIC: depth images
+        /// (16UC1 or 32FC1) registered to the rectified images. cloud:TOPIC: point clouds (PointCloud2) in the axes of the
+        /// rectified camera, x to the right, y down, z ahead. They are matched with the images within 20 ms; an image without
+        /// them is mapped on a flat floor. Empty: the floor is flat.
+        depth: DepthSource = DepthSource::None, ANY, [Auv];
+        /// Units of whole-number depth images in a metre. 0: 1000, and 5000 for a tum source.
+        depth_units_per_m: f64 = 0.0, range(0.0, 1_000_000.0, "1/m"), [Auv Scenario];
+        /// Calibration of the camera. Its images are rectified, and the altitude and the focal length give the size of their
+        /// pixels. file:FILE: a YAML file of ROS's camera_calibration. ros2:TOPIC: CameraInfo; images from before the first one
+        /// are not mapped. Empty: of a ros2 source the topic camera_info beside its images, if somebody publishes it.
+        calibration: CalibrationSource = CalibrationSource::Beside, ANY, [Auv Scenario];
+        /// Camera matrix fx, fy, cx, cy of images without distortion, in place of camera.calibration. All 0: not known.
+        matrix: [f64; 4] = [0.0; 4], range(-1_000_000.0, 1_000_000.0, "pixel"), [Auv Scenario];
+        /// Bits of the levels in images of 16 bits a channel, by ROS 2: 10, 12 or 14 for cameras that leave the upper bits at 0.
+        /// 0: the least number of bits that holds the levels of all images so far.
+        bits: u8 = 16, range(0.0, 16.0, ""), [Auv Scenario];
         /// Whether frames are corrected for a light that depends on the place in the frame alone: lamps, the lens, the water
         /// between. It is learnt from the first 500 frames. Exemplars show the frame as it is.
         flat_field: bool = true, ANY, [Auv Scenario];

@@ -21,7 +21,7 @@ pub use labels::{BandRange, LabelMessage, LabelSource, Votes};
 pub use layers::LayerName;
 pub use ports::{GpsPort, HostPort};
 pub use ros2::{Remap, RosName, ZenohEndpoint};
-pub use sources::{CameraSource, NavigationSource};
+pub use sources::{CalibrationSource, CameraSource, DepthSource, NavigationSource};
 
 use crate::rule::Rule;
 use serde_json::json;

@@ -74,6 +74,8 @@ sources! {
         Rehearsal,
         /// A folder of images with `poses.csv`.
         Frames(PathBuf) = "frames" "DIR",
+        /// A folder of an RGB-D sequence in the layout of the TUM benchmark.
+        Tum(PathBuf) = "tum" "DIR",
         /// A folder into which a program writes images.
         Watch(PathBuf) = "watch" "DIR",
         /// A shell command that writes images to its standard output.
@@ -83,6 +85,26 @@ sources! {
         /// A recording of ROS 2 in the format MCAP, with the topic of the images if there are several.
         Bag(String) = "bag" "FILE#TOPIC",
         /// A topic of images in ROS 2.
+        Ros2(String) = "ros2" "TOPIC",
+    }
+
+    /// Where the distances of a live camera's pixels come from.
+    DepthSource {
+        /// Nothing measures them.
+        None,
+        /// A topic of depth images in ROS 2.
+        Ros2(String) = "ros2" "TOPIC",
+        /// A topic of point clouds in ROS 2.
+        Cloud(String) = "cloud" "TOPIC",
+    }
+
+    /// Where the calibration of the camera comes from.
+    CalibrationSource {
+        /// The topic beside that of the images, if there is one.
+        Beside,
+        /// A file that ROS wrote.
+        File(PathBuf) = "file" "FILE",
+        /// A topic of ROS 2.
         Ros2(String) = "ros2" "TOPIC",
     }
 

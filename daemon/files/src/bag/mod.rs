@@ -6,7 +6,7 @@ use image::RgbImage;
 use scenecast_core::UserError;
 use scenecast_messages::decode as decode_cdr;
 use scenecast_messages::sensor_msgs::{CompressedImage, Image};
-use scenecast_sensors::rgb_of;
+use scenecast_sensors::{BitDepth, rgb_of};
 use std::fmt;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
@@ -20,6 +20,7 @@ pub(crate) const COMPRESSED: &str = "sensor_msgs/msg/CompressedImage";
 pub struct Bag {
     path: PathBuf,
     topic: BagTopic,
+    bits: BitDepth,
     position: Mutex<Position>,
 }
 
@@ -30,8 +31,8 @@ struct Position {
 }
 
 impl Bag {
-    pub(crate) fn new(path: &Path, topic: BagTopic) -> Self {
-        Self { path: path.to_owned(), topic, position: Mutex::new(Position { stream: None, next: 0 }) }
+    pub(crate) fn new(path: &Path, topic: BagTopic, bits: BitDepth) -> Self {
+        Self { path: path.to_owned(), topic, bits, position: Mutex::new(Position { stream: None, next: 0 }) }
     }
 
     pub(crate) fn topic(&self) -> &BagTopic {
@@ -63,7 +64,8 @@ impl Bag {
             return scenecast_sensors::decode(&image.data).map_err(|e| e.to_string());
         }
         let image: Image = decode_cdr(&message.bytes).map_err(|e| e.to_string())?;
-        rgb_of(&image).map_err(|e| e.to_string())
+        let mut bits = self.bits;
+        rgb_of(&image, &mut bits).map_err(|e| e.to_string())
     }
 }
 

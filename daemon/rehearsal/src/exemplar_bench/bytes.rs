@@ -9,8 +9,8 @@ use scenecast_config::Config;
 use scenecast_core::UserError;
 use scenecast_protocol::exemplar::edge_px;
 use scenecast_protocol::exemplar::{HEAD, max_bytes};
-use scenecast_vehicle::Mapper;
 use scenecast_vehicle::exemplar::{GOOD_SSIM, compress, compress_to, middle};
+use scenecast_vehicle::{Frame, Mapper};
 use scenecast_worlds::View;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
@@ -93,7 +93,7 @@ pub fn patches(source: &PatchSource, seed: u64) -> Result<Vec<RgbImage>, UserErr
         let view = View { x_m: x, y_m: y, heading_rad: 0.0, altitude_m, width_px, height_px, moment };
         let view = world.view(&view);
         let pose = Pose { x, y, z: -16.0, yaw_rad: 0.0 };
-        mapper.handle_frame(&view, &pose, 1.0, f64::from(i) / camera.rate_hz);
+        mapper.handle_frame(&Frame::flat(&view, pose, 1.0), f64::from(i) / camera.rate_hz);
     }
     let of_label = |images: Vec<ExemplarPatch>| images.into_iter().take(EACH).map(|e| e.patch.as_ref().clone());
     Ok(Arc::unwrap_or_clone(mapper.shared_exemplars()).into_values().flat_map(of_label).collect())

@@ -18,7 +18,7 @@ pub(super) enum NextFrame {
     /// The next recorded frame is due at this moment.
     DueAt(Instant),
     /// A recorded frame that is due now.
-    Recorded(RecordedFrame),
+    Recorded(Box<RecordedFrame>),
     /// The simulated sea floor below the vehicle.
     Simulated(RgbImage),
 }
@@ -38,7 +38,7 @@ impl Camera {
     /// Plays the configured recording, or else views `world`.
     pub(super) fn new(config: &Config, world: World, record: Option<&Path>) -> Result<Self, UserError> {
         if config.camera.source.is_live() {
-            let what = "camera.source: a live camera cannot be rehearsed; allowed are frames:DIR and bag:FILE";
+            let what = "camera.source: a live camera cannot be rehearsed; allowed are frames:DIR, tum:DIR and bag:FILE";
             return Err(UserError::Input(what.to_owned()));
         }
         let recording = configured_recording(config)?;
@@ -89,7 +89,7 @@ impl Camera {
             return NextFrame::DueAt(due);
         }
         self.next += 1;
-        NextFrame::Recorded(frame.clone())
+        NextFrame::Recorded(Box::new(frame.clone()))
     }
 
     /// Records a frame if the mission records frames.

@@ -5,12 +5,13 @@ use super::camera::NextFrame;
 use super::logbook::FramePoses;
 use super::timetable::STEP_S;
 use crate::modem_rig::{SURFACE, VEHICLE};
-use scene_model::project::Pose;
+use scene_model::project::{Pose, View};
 use scenecast_core::UserError;
 use scenecast_files::{FrameImage, RecordedFrame};
 use scenecast_host::{CameraPose, FrameEvent, SurfaceHostEvent, VehicleHostEvent};
 use scenecast_protocol::time::Instant;
 use scenecast_surface::SurfaceOutput;
+use scenecast_vehicle::Frame;
 use sim_channel::NodePosition;
 use std::time::Duration;
 
@@ -159,20 +160,21 @@ impl Mission {
             NextFrame::Over => self.end_survey(),
             NextFrame::DueAt(at) => self.times.frame = at,
             NextFrame::Recorded(frame) => {
-                let RecordedFrame { x_m, y_m, heading_rad, depth_m, .. } = frame;
+                let RecordedFrame { x_m, y_m, heading_rad, depth_m, .. } = *frame;
                 self.vehicle.handle_pose(CameraPose { x_m, y_m, heading_rad, depth_m }, now);
-                self.map(&frame.image.read()?, frame.scale)?;
+                let (image, view) = frame.read()?;
+                self.map(&image, frame.scale, view.as_ref())?;
             }
             NextFrame::Simulated(image) => {
                 self.times.frame = self.times.frame + interval;
-                self.map(&image, 1.0)?;
+                self.map(&image, 1.0, None)?;
             }
         }
         Ok(())
     }
 
     /// Records a frame and gives it to the mapper, at the pose that the vehicle estimates.
-    fn map(&mut self, image: &image::RgbImage, scale: f64) -> Result<(), UserError> {
+    fn map(&mut self, image: &image::RgbImage, scale: f64, view: Option<&View>) -> Result<(), UserError> {
         if self.has_foreign_labels() {
             return Ok(());
         }
@@ -182,12 +184,15 @@ impl Mission {
         let ((x_m, y_m), depth_m, heading_rad) =
             (navigator.dead_reckoned().xy(), navigator.depth_m(), navigator.heading_rad());
         let shot = FrameImage::File(Default::default());
-        self.camera.record(image, &RecordedFrame { t_s, image: shot, x_m, y_m, depth_m, heading_rad, scale })?;
+        let (sight, depth) = (None, None);
+        let recorded = RecordedFrame { t_s, image: shot, x_m, y_m, depth_m, heading_rad, scale, sight, depth };
+        self.camera.record(image, &recorded)?;
         if !self.mapper.takes(t_s) {
             return Ok(());
         }
         let pose = Pose { x: x_m, y: y_m, z: -depth_m, yaw_rad: -heading_rad };
-        let placed = self.mapper.register(image, &pose, scale);
+        let frame = Frame { image, pose, scale, view };
+        let placed = self.mapper.register(&frame);
         self.vehicle.handle_registration(&placed, now);
         if let Some(found) = &placed.found {
             self.logbook.graph.add(&found.placed);
@@ -197,7 +202,7 @@ impl Mission {
             true_at: (self.motion.x_m, self.motion.y_m),
             mapped_at: (placed.pose.x, placed.pose.y),
         });
-        let update = self.mapper.handle_frame(image, &placed.pose, placed.scale, t_s);
+        let update = self.mapper.handle_frame(&frame.placed(&placed), t_s);
         self.vehicle.handle_map(&update, now);
         self.vehicle.handle_exemplars(self.mapper.shared_exemplars());
         self.logbook.note_update(self.vehicle.vehicle(), update);

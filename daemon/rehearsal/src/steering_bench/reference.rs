@@ -4,7 +4,7 @@ use crate::Mission;
 use scene_model::project::Pose;
 use scenecast_core::{Area, UserError};
 use scenecast_protocol::map::{Cell, LabelGrid};
-use scenecast_vehicle::Mapper;
+use scenecast_vehicle::{Frame, Mapper};
 use scenecast_worlds::View;
 
 /// The distance between the views as a share of their edges.
@@ -30,7 +30,7 @@ pub(super) fn labels_of(mission: &Mission, area: &Area) -> Result<LabelGrid, Use
         let image = world.view(&View { x_m, y_m, heading_rad: 0.0, altitude_m, width_px, height_px, moment });
         let depth_m = world.depth_m(survey.depth_m, x_m, y_m) - altitude_m;
         let pose = Pose { x: x_m - east + x, y: y_m - north + y, z: -depth_m, yaw_rad: 0.0 };
-        cells = mapper.handle_frame(&image, &pose, 1.0, t_s).cells;
+        cells = mapper.handle_frame(&Frame::flat(&image, pose, 1.0), t_s).cells;
     }
     let shift = |metres: f64| (metres / mission.cell_m()).round() as i32;
     let (right, up) = (shift(east - x), shift(north - y));

@@ -1,17 +1,21 @@
 //! The camera of a vehicle: a recording, or a live camera whose images are matched with poses.
 
+mod depth_feed;
 mod fault_log;
+mod fault_reports;
 mod live;
+mod pose_feed;
 mod recorded;
 
 pub(crate) use live::LiveCamera;
 pub(crate) use recorded::RecordedCamera;
 
 use image::RgbImage;
+use scene_model::project::View;
 use scenecast_core::UserError;
-use scenecast_files::{FrameImage, RecordedFrame};
+use scenecast_files::RecordedFrame;
 use scenecast_host::{CameraPose, MeasuredPose};
-use scenecast_sensors::{CameraTally, SensorPose};
+use scenecast_sensors::{CameraTally, DepthError, DepthMessage, SensorPose, Sight};
 use scenecast_sources::Picture;
 use std::time::Duration;
 
@@ -21,6 +25,7 @@ pub(crate) struct CameraFrame {
     /// Mission time, seconds.
     pub(crate) t_s: f64,
     pub(crate) picture: FramePicture,
+    /// Of the camera itself if it is calibrated; otherwise above the middle of the frame.
     pub(crate) pose: SensorPose,
     /// Size of the image's pixels on the sea floor, in those of the camera's usual ones.
     pub(crate) scale: f64,
@@ -29,19 +34,41 @@ pub(crate) struct CameraFrame {
 /// The pixels of a frame, which are read where the frame is mapped.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum FramePicture {
-    Recorded(FrameImage),
-    Received(Picture),
+    Recorded(Box<RecordedFrame>),
+    Received(Box<ReceivedImage>),
     /// It was read.
     Taken,
 }
 
+/// An image of a live camera.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct ReceivedImage {
+    pub(crate) picture: Picture,
+    /// The calibrated camera.
+    pub(crate) sight: Option<Sight>,
+    /// The distances that belong to the image, and the units of whole numbers in a metre.
+    pub(crate) depth: Option<(DepthMessage, f64)>,
+}
+
+/// The pixels of a frame that were read.
+pub(crate) struct ReadFrame {
+    pub(crate) image: RgbImage,
+    /// The camera as it is mounted and tilted, if it is known.
+    pub(crate) view: Option<View>,
+    /// Why its distances were not used.
+    pub(crate) unusable_depth: Option<DepthError>,
+}
+
 impl CameraFrame {
     /// The image, and the frame without its pixels.
-    pub(crate) fn take_image(&mut self) -> Result<RgbImage, UserError> {
+    pub(crate) fn take_image(&mut self) -> Result<ReadFrame, UserError> {
         match std::mem::replace(&mut self.picture, FramePicture::Taken) {
-            FramePicture::Recorded(image) => image.read(),
-            FramePicture::Received(picture) => {
-                picture.into_rgb().map_err(|error| UserError::Input(format!("the image at {:.1} s: {error}", self.t_s)))
+            FramePicture::Recorded(frame) => {
+                let (image, view) = frame.read()?;
+                Ok(ReadFrame { image, view, unusable_depth: None })
+            }
+            FramePicture::Received(received) => {
+                received.read().map_err(|error| UserError::Input(format!("the image at {:.1} s: {error}", self.t_s)))
             }
             FramePicture::Taken => Err(UserError::Failed("the image was already read".to_owned())),
         }
@@ -53,11 +80,28 @@ impl CameraFrame {
     }
 }
 
+impl ReceivedImage {
+    /// The image without distortion, and what it sees. Distances that cannot be used leave the floor flat.
+    fn read(self) -> Result<ReadFrame, String> {
+        let image = self.picture.into_rgb().map_err(|error| error.to_string())?;
+        let Some(sight) = self.sight else { return Ok(ReadFrame { image, view: None, unusable_depth: None }) };
+        let camera = sight.calibration.camera();
+        let read = self.depth.map(|(message, units_per_m)| message.read(&camera, image.dimensions(), units_per_m));
+        let (depth, unusable_depth) = match read {
+            Some(Ok(depth)) => (Some(depth), None),
+            Some(Err(error)) => (None, Some(error)),
+            None => (None, None),
+        };
+        let (image, view) = sight.view(image, depth).map_err(|error| error.to_string())?;
+        Ok(ReadFrame { image, view: Some(view), unusable_depth })
+    }
+}
+
 impl From<RecordedFrame> for CameraFrame {
     fn from(frame: RecordedFrame) -> Self {
-        let RecordedFrame { t_s, image, x_m, y_m, depth_m, heading_rad, scale } = frame;
+        let RecordedFrame { t_s, x_m, y_m, depth_m, heading_rad, scale, .. } = frame;
         let pose = SensorPose { x_m, y_m, depth_m, heading_rad, ..SensorPose::default() };
-        Self { t_s, picture: FramePicture::Recorded(image), pose, scale }
+        Self { t_s, picture: FramePicture::Recorded(Box::new(frame)), pose, scale }
     }
 }
 
@@ -145,6 +189,13 @@ impl Camera {
         match self {
             Self::Recorded(_) => None,
             Self::Live(camera) => Some(camera.tally()),
+        }
+    }
+
+    /// Counts distances that could not be used.
+    pub(crate) fn handle_unusable_depth(&mut self, error: &DepthError) {
+        if let Self::Live(camera) = self {
+            camera.handle_unusable_depth(error);
         }
     }
 

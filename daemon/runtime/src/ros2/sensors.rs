@@ -8,9 +8,13 @@ pub(crate) use without::RosSensors;
 #[cfg(feature = "ros2")]
 mod with {
     use crate::labels::{Feed, TopicFeed, topic};
-    use scenecast_config::Config;
+    use scenecast_config::{CalibrationSource, CameraStamps, Config, DepthSource};
     use scenecast_core::UserError;
-    use scenecast_sources::{ArrivalClock, LiveSource, RosCamera, RosNavigation, RosTransforms, SensorNode};
+    use scenecast_sensors::BitDepth;
+    use scenecast_sources::{
+        ArrivalClock, CalibrationTopic, LiveSource, RosCamera, RosCameraOptions, RosDepth, RosNavigation,
+        RosTransforms, SensorNode,
+    };
     use std::sync::Arc;
     use std::time::Duration;
 
@@ -23,14 +27,30 @@ mod with {
             Ok(Self(Arc::new(SensorNode::new(&config.ros2))))
         }
 
-        pub(crate) fn camera(
-            &self,
-            topic: &str,
-            clock: ArrivalClock,
-            needs_stamps: bool,
-            stall: Duration,
-        ) -> std::io::Result<LiveSource> {
-            LiveSource::start(RosCamera::new(self.0.clone(), topic, clock, needs_stamps), stall)
+        /// A camera with its calibration, unless the settings give one.
+        pub(crate) fn camera(&self, topic: &str, clock: ArrivalClock, config: &Config) -> std::io::Result<LiveSource> {
+            let c = &config.camera;
+            let calibration = match &c.calibration {
+                CalibrationSource::Ros2(topic) => CalibrationTopic::Named(topic.clone()),
+                CalibrationSource::Beside if c.matrix == [0.0; 4] => CalibrationTopic::Beside,
+                CalibrationSource::Beside | CalibrationSource::File(_) => CalibrationTopic::None,
+            };
+            let (needs_stamps, bits) = (c.stamps == CameraStamps::Own, BitDepth::of_setting(c.bits));
+            let options = RosCameraOptions { needs_stamps, bits, calibration };
+            let stall = Duration::from_secs_f64(c.timeout_s);
+            LiveSource::start(RosCamera::new(self.0.clone(), topic, clock, &options), stall)
+        }
+
+        /// The distances of the camera's pixels, if something measures them.
+        pub(crate) fn depth(&self, clock: ArrivalClock, config: &Config) -> std::io::Result<Option<LiveSource>> {
+            let c = &config.camera;
+            let (topic, is_cloud) = match &c.depth {
+                DepthSource::None => return Ok(None),
+                DepthSource::Ros2(topic) => (topic, false),
+                DepthSource::Cloud(topic) => (topic, true),
+            };
+            let depth = RosDepth::new(self.0.clone(), topic, is_cloud, clock, c.stamps == CameraStamps::Own);
+            LiveSource::start(depth, Duration::from_secs_f64(c.timeout_s)).map(Some)
         }
 
         /// A feed of labels or bands.
@@ -51,7 +71,7 @@ mod with {
 #[cfg(not(feature = "ros2"))]
 mod without {
     use crate::labels::{Feed, TopicFeed};
-    use scenecast_config::{CameraSource, Config, LabelSource, NavigationSource};
+    use scenecast_config::{CameraSource, Config, DepthSource, LabelSource, NavigationSource};
     use scenecast_core::UserError;
     use scenecast_sources::{ArrivalClock, LiveSource};
     use std::io::{Error, ErrorKind, Result};
@@ -64,7 +84,8 @@ mod without {
         pub(crate) fn new(config: &Config) -> std::result::Result<Self, UserError> {
             let is_topic = matches!(config.camera.source, CameraSource::Ros2(_))
                 || matches!(config.navigation.source, NavigationSource::Ros2(_) | NavigationSource::Tf(_))
-                || [&config.labels.source, &config.bands.source].iter().any(|s| matches!(s, LabelSource::Ros2(..)));
+                || [&config.labels.source, &config.bands.source].iter().any(|s| matches!(s, LabelSource::Ros2(..)))
+                || config.camera.depth != DepthSource::None;
             if is_topic {
                 let text = "a source of ROS 2 is not allowed: this build has no ROS 2; build it with the feature ros2";
                 return Err(UserError::Input(text.to_owned()));
@@ -72,12 +93,17 @@ mod without {
             Ok(Self)
         }
 
-        pub(crate) fn camera(&self, _: &str, _: ArrivalClock, _: bool, _: Duration) -> Result<LiveSource> {
+        pub(crate) fn camera(&self, _: &str, _: ArrivalClock, _: &Config) -> Result<LiveSource> {
             Err(Error::from(ErrorKind::Unsupported))
         }
 
         pub(crate) fn labels(&self, wanted: TopicFeed) -> std::result::Result<Feed, UserError> {
             Err(UserError::Input(format!("{}: this build has no ROS 2", wanted.topic)))
+        }
+
+        #[expect(clippy::unnecessary_wraps, reason = "a build with ROS 2 starts a thread")]
+        pub(crate) fn depth(&self, _: ArrivalClock, _: &Config) -> Result<Option<LiveSource>> {
+            Ok(None)
         }
 
         pub(crate) fn navigation(&self, _: &str, _: Duration) -> Result<LiveSource> {

@@ -11,7 +11,7 @@ use scene_model::topics::{Birth, SceneConfig, SceneModel};
 use scene_model::words::{WordConfig, WordExtractor};
 use scenecast_core::UserError;
 use scenecast_files::{BagTiming, open_bag};
-use scenecast_sensors::CameraMounting;
+use scenecast_sensors::{BitDepth, CameraMounting};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -19,7 +19,14 @@ use std::time::Duration;
 /// that tilt moves nothing.
 fn level_camera() -> BagTiming {
     let max_gap = Duration::from_secs(1);
-    BagTiming { max_gap, clock_offset_s: 0.0, mounting: CameraMounting::default(), altitude_m: 0.0 }
+    BagTiming {
+        max_gap,
+        clock_offset_s: 0.0,
+        mounting: CameraMounting::default(),
+        altitude_m: 0.0,
+        calibration: None,
+        bits: BitDepth::default(),
+    }
 }
 
 /// Label words, a mosaic or a sequence of images, and print the measurements: in a pipe or a file as one line of JSON.

@@ -1,0 +1,84 @@
+//! The poses of a live vehicle: of a source of their own, or of the autopilot.
+
+use super::live::next_of;
+use scenecast_config::{Config, NavigationSource};
+use scenecast_host::{CameraPose, MeasuredPose};
+use scenecast_protocol::time::Instant;
+use scenecast_sensors::{SensorPose, Stamp};
+use scenecast_sources::{ArrivalClock, LiveSource, SourceReport};
+use std::time::Duration;
+
+/// The source of the poses, and the newest one.
+pub(super) struct PoseFeed {
+    /// The source, if it is not the autopilot or a file.
+    source: Option<LiveSource>,
+    has_own_poses: bool,
+    /// Time of the autopilot's last pose.
+    measured_at: Option<Instant>,
+    /// The newest pose of the navigation source.
+    newest: Option<CameraPose>,
+    /// Arrival of the newest pose, or the start of the run; and the time up to which the vehicle knows of its absence.
+    posed: (Stamp, Stamp),
+    /// Longest time between two poses.
+    max_gap: Duration,
+    /// Whether the vehicle does not know the newest pose yet.
+    is_new: bool,
+}
+
+impl PoseFeed {
+    pub(super) fn new(config: &Config, source: Option<LiveSource>, clock: &ArrivalClock) -> Self {
+        Self {
+            source,
+            has_own_poses: config.navigation.source != NavigationSource::Autopilot,
+            measured_at: None,
+            newest: None,
+            posed: (clock.now(), clock.now()),
+            max_gap: Duration::from_secs_f64(config.navigation.max_gap_s),
+            is_new: false,
+        }
+    }
+
+    /// The next report of the source. Cancel-safe.
+    pub(super) async fn next(&mut self) -> SourceReport {
+        next_of(&mut self.source).await
+    }
+
+    /// Takes a pose of the source.
+    pub(super) fn handle_pose(&mut self, pose: SensorPose, now: Stamp) {
+        let SensorPose { x_m, y_m, heading_rad, depth_m, .. } = pose;
+        self.is_new = true;
+        self.posed.0 = now;
+        self.newest = Some(CameraPose { x_m, y_m, heading_rad, depth_m });
+    }
+
+    /// The autopilot's pose, if images are mapped at it and it is a new one: a pose that is not measured again is not that of
+    /// a later image.
+    pub(super) fn of_autopilot(&mut self, measured: MeasuredPose) -> Option<SensorPose> {
+        if self.has_own_poses || self.measured_at.replace(measured.at) == Some(measured.at) {
+            return None;
+        }
+        let MeasuredPose {
+            pose: CameraPose { x_m, y_m, heading_rad, depth_m }, roll_rad, pitch_rad, altitude_m, ..
+        } = measured;
+        Some(SensorPose { x_m, y_m, heading_rad, depth_m, roll_rad, pitch_rad, altitude_m })
+    }
+
+    /// The newest pose of the source, once.
+    pub(super) fn poll_pose(&mut self) -> Option<CameraPose> {
+        std::mem::take(&mut self.is_new).then_some(self.newest)?
+    }
+
+    /// Time since the last call in which the source gave no pose; `None` while it gives them.
+    pub(super) fn poll_gap(&mut self, now: Stamp) -> Option<Duration> {
+        let (last, known) = self.posed;
+        if self.source.is_none() || now <= last.after(self.max_gap) {
+            return None;
+        }
+        self.posed.1 = now;
+        Some(Duration::from_secs_f64(now.seconds_since(last.max(known)).max(0.0)))
+    }
+
+    pub(super) fn newest(&self) -> Option<CameraPose> {
+        self.newest
+    }
+}

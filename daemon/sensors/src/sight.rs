@@ -1,0 +1,52 @@
+//! How a calibrated camera sees the floor: its image without distortion, its tilt, and distances.
+
+use crate::quaternion::{about, product};
+use crate::{Calibration, CalibrationError};
+use image::RgbImage;
+use scene_model::project::{DepthImage, Floor, View};
+use std::sync::Arc;
+
+/// A calibrated camera at the time of a frame.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Sight {
+    pub calibration: Arc<Calibration>,
+    /// The rotation x, y, z, w from the camera's axes to those of a frame whose top points north, as [`View`] has it.
+    pub tilt: [f64; 4],
+    /// Height of the camera above a flat floor, metres.
+    pub height_m: f64,
+}
+
+impl Sight {
+    /// The image without distortion, and what it sees. Without `depth`, or with one that has no reading, the floor is flat.
+    ///
+    /// # Errors
+    /// The calibration is for images of another size.
+    pub fn view(&self, image: RgbImage, depth: Option<DepthImage>) -> Result<(RgbImage, View), CalibrationError> {
+        let image = self.calibration.rectify(image)?;
+        let depth = depth.filter(|depth| depth.median_m().is_some());
+        let floor = depth.map_or(Floor::Flat(self.height_m), Floor::Depth);
+        Ok((image, View { camera: self.calibration.camera(), tilt: self.tilt, floor }))
+    }
+}
+
+/// The tilt of a camera with a heading, from its rotation x, y, z, w to east, north and up.
+pub fn tilt_of(rotation: [f64; 4], heading_rad: f64) -> [f64; 4] {
+    let length = rotation.iter().map(|part| part * part).sum::<f64>().sqrt();
+    product(about(2, heading_rad), rotation.map(|part| part / length))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use scene_model::project::{Pose, View};
+
+    #[test]
+    fn a_tilt_and_a_heading_are_the_rotation() {
+        let rotation = [0.8, 0.2, -0.4, 0.4];
+        let pose = Pose { yaw_rad: -1.1, ..Pose::default() };
+        let camera = Calibration::of_matrix([100.0, 100.0, 50.0, 40.0]).unwrap().camera();
+        let view = View { camera, tilt: tilt_of(rotation, 1.1), floor: Floor::Flat(1.0) };
+        let again = view.camera_pose(&pose).rotation;
+        assert!(again.iter().zip(rotation).all(|(a, b)| (a - b).abs() < 1e-12), "{again:?}");
+    }
+}
