@@ -3,7 +3,9 @@
 use image::RgbImage;
 use scenecast_files::{RecordedFrame, Recording};
 use scenecast_rehearsal::{Mission, MissionOptions, World};
-use scenecast_tests::{Process, free_port, python, recorded, run_script, scratch, wait_until};
+use scenecast_tests::{
+    Process, RELIEF_CAMERA, free_port, python, recorded, run_script, scratch, wait_until, write_relief,
+};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -54,8 +56,12 @@ impl Dive {
     }
 
     fn assert_map_of_the_rehearsal(&self) {
+        self.assert_map(&recorded().1);
+    }
+
+    fn assert_map(&self, expected: &[u8]) {
         wait_until("the map equals the one of the rehearsal", Duration::from_secs(120), || {
-            std::fs::read(&self.map).is_ok_and(|png| png == recorded().1)
+            std::fs::read(&self.map).is_ok_and(|png| png == expected)
         });
     }
 }
@@ -154,6 +160,34 @@ fn wrong_images_and_a_restarted_publisher_leave_the_map_as_it_is() {
 #[test]
 fn compressed_topics_of_cyclone_dds_give_the_map_of_the_recording() {
     assert_topics_give_the_map("ros2-compressed", domain(1), "/camera/image_raw/compressed", &[&["--compressed"]]);
+}
+
+/// Settings of a camera that sees the made-up relief.
+const RELIEF: [&str; 3] = ["registration.enabled=false", "survey.altitude_m=4", "scene.cell_m=0.25"];
+
+#[test]
+fn depth_and_calibration_by_dds_give_the_map_of_the_rehearsal() {
+    let Some(python) = python() else { return };
+    let folder = scratch("rgbd");
+    write_relief(&folder);
+    let matrix = RELIEF_CAMERA.map(|number| number.to_string()).join(",");
+    let tum = [format!("camera.source=tum:{}", folder.display()), format!("camera.matrix=[{matrix}]")];
+    let sets = RELIEF.iter().chain(&["operator.script=none", "survey.duration_s=90"]).map(|set| (*set).to_owned());
+    let config = scenecast_config::load(None, &sets.chain(tum).collect::<Vec<_>>()).unwrap();
+    let options = MissionOptions { world: World::patches(2, 0.01), seed: 1, record: None };
+    let mut mission = Mission::new(config, options).unwrap();
+    mission.run(Duration::from_secs(3600), &mut |_| {}).unwrap();
+    let expected = scenecast_core::label_picture::encode(mission.vehicle().map()).unwrap();
+    let domain = domain(3);
+    let dive = Dive::with_settings("ros2-depth", &|_| {
+        let sets = RELIEF.iter().map(|set| (*set).to_owned());
+        let topics = ["camera.source=ros2:/camera/image_raw", "camera.depth=ros2:/camera/depth"];
+        let topics = topics.iter().chain(&["navigation.source=ros2:/odometry", "ros2.networks=[\"127.0.0.1\"]"]);
+        sets.chain(topics.map(|set| (*set).to_owned())).chain([format!("ros2.domain={domain}")]).collect()
+    });
+    let (folder, domain) = (folder.display().to_string(), domain.to_string());
+    run_script(&python, "tests/ros2_rgbd.py", &[&folder, "--domain", &domain, "--matrix", &matrix]);
+    dive.assert_map(&expected);
 }
 
 /// A bag of the recording, which rosbags writes; `None` without Python.

@@ -25,8 +25,16 @@ impl Sight {
         let image = self.calibration.rectify(image)?;
         let depth = depth.filter(|depth| depth.median_m().is_some());
         let floor = depth.map_or(Floor::Flat(self.height_m), Floor::Depth);
-        Ok((image, View { camera: self.calibration.camera(), tilt: self.tilt, floor }))
+        Ok((image, View { camera: self.calibration.camera(), tilt: on_grid(self.tilt), floor }))
     }
+}
+
+/// The tilt in steps of 2^-30, so that sources of the same attitude in other forms give the same map.
+fn on_grid(tilt: [f64; 4]) -> [f64; 4] {
+    const STEPS: f64 = (1 << 30) as f64;
+    // A rotation is two quaternions; the greatest part in amount is taken to be positive.
+    let greatest = tilt.iter().copied().fold(0.0, |a: f64, b| if b.abs() > a.abs() { b } else { a });
+    tilt.map(|part| (part * greatest.signum() * STEPS).round() / STEPS)
 }
 
 /// The tilt of a camera with a heading, from its rotation x, y, z, w to east, north and up.
