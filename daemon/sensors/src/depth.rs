@@ -93,7 +93,7 @@ fn depth_of(image: &Image, units_per_m: f64) -> Result<DepthImage, DepthError> {
         }
         _ => {
             let real = |four: &[u8; 4]| if is_big { f32::from_be_bytes(*four) } else { f32::from_le_bytes(*four) };
-            rows.as_chunks().0.iter().map(|four| real(four)).collect()
+            rows.as_chunks().0.iter().map(real).collect()
         }
     };
     Ok(DepthImage { width, height, metres })
