@@ -64,14 +64,6 @@ impl ImageTimes {
     }
 }
 
-/// The next report of a source; without one it never returns.
-pub(super) async fn next_of(source: &mut Option<LiveSource>) -> SourceReport {
-    match source {
-        Some(source) => source.next().await,
-        None => std::future::pending().await,
-    }
-}
-
 impl LiveCamera {
     /// Starts the configured live camera, if there is one, and the source of its poses; the first frame has the mission
     /// time `start_s`.
@@ -138,7 +130,7 @@ impl LiveCamera {
             }
         };
         tokio::select! {
-            report = next_of(&mut self.source) => self.handle_report(SensorKind::Camera, report),
+            report = LiveSource::next_of(&mut self.source) => self.handle_report(SensorKind::Camera, report),
             report = self.depth.next() => self.handle_report(SensorKind::Depth, report),
             report = self.poses.next() => self.handle_report(SensorKind::Navigation, report),
             () = overdue => {}
