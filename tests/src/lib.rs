@@ -2,8 +2,10 @@
 
 pub mod pages;
 mod recorded;
+mod relief;
 
 pub use recorded::recorded;
+pub use relief::{RELIEF_CAMERA, is_on_block, relief_depth_m, write_relief};
 
 use std::io::{Read, Write};
 use std::net::TcpStream;

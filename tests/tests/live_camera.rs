@@ -3,7 +3,9 @@
 use image::RgbImage;
 use scenecast_files::{RecordedFrame, Recording};
 use scenecast_rehearsal::{Mission, MissionOptions, World};
-use scenecast_tests::{Process, free_port, python, recorded, run_script, scratch, state, wait_until};
+use scenecast_tests::{
+    Process, RELIEF_CAMERA, free_port, python, recorded, run_script, scratch, state, wait_until, write_relief,
+};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -15,7 +17,7 @@ struct Dive {
     map: PathBuf,
     /// Port of the surface's page.
     page: u16,
-    _processes: Vec<Process>,
+    processes: [Process; 2],
 }
 
 impl Dive {
@@ -50,10 +52,11 @@ impl Dive {
         let start = |command: &str, sets: &[String]| {
             let config = [command, "--config", empty.to_str().unwrap()];
             let sets = sets.iter().flat_map(|set| ["--set", set]);
-            Process::start(&config.into_iter().chain(sets).collect::<Vec<_>>())
+            let log = dir.join(format!("{command}.log"));
+            Process::start_logged(&config.into_iter().chain(sets).collect::<Vec<_>>(), &log)
         };
-        let processes = vec![start("asv", &surface), start("auv", &vehicle)];
-        Self { map: dir.join("asv/operator-map-1.png"), dir, frames, page, _processes: processes }
+        let processes = [start("asv", &surface), start("auv", &vehicle)];
+        Self { map: dir.join("asv/operator-map-1.png"), dir, frames, page, processes }
     }
 
     /// Writes an image into the camera's folder as a slow program does: the file stays half written for a moment.
@@ -74,8 +77,18 @@ impl Dive {
     }
 
     fn assert_map_of_the_rehearsal(&self) {
+        self.assert_map(&recorded().1);
+    }
+
+    /// Ends the vehicle and reads its log.
+    fn log_of_vehicle(&mut self) -> String {
+        assert_eq!(self.processes[1].interrupt(Duration::from_secs(20)), Some(0));
+        std::fs::read_to_string(self.dir.join("auv.log")).unwrap()
+    }
+
+    fn assert_map(&self, expected: &[u8]) {
         wait_until("the map equals the one of the rehearsal", Duration::from_secs(120), || {
-            std::fs::read(&self.map).is_ok_and(|png| png == recorded().1)
+            std::fs::read(&self.map).is_ok_and(|png| png == expected)
         });
     }
 }
@@ -212,6 +225,62 @@ fn compressed_topics_of_cyclone_dds_give_the_map_of_the_recording() {
         ("/camera/image_raw/compressed", TOPICS.1),
         &[&["--compressed"]],
     );
+}
+
+/// Settings of a camera that sees the made-up relief.
+const RELIEF: [&str; 3] = ["registration.enabled=false", "survey.altitude_m=4", "scene.cell_m=0.25"];
+
+/// A vehicle that sees the relief by topics of Cyclone DDS, and the map that `sim` makes of the same sequence; `None` without
+/// Python.
+fn relief_by_dds(name: &str, domain: u32, depth: &str, options: &[&str]) -> Option<(Dive, Vec<u8>)> {
+    let python = python()?;
+    let folder = scratch(&format!("{name}-rgbd"));
+    write_relief(&folder);
+    let matrix = RELIEF_CAMERA.map(|number| number.to_string()).join(",");
+    let tum = [format!("camera.source=tum:{}", folder.display()), format!("camera.matrix=[{matrix}]")];
+    let sets = RELIEF.iter().chain(&["operator.script=none", "survey.duration_s=90"]).map(|set| (*set).to_owned());
+    let config = scenecast_config::load(None, &sets.chain(tum).collect::<Vec<_>>()).unwrap();
+    let mission = MissionOptions { world: World::patches(2, 0.01), seed: 1, record: None };
+    let mut mission = Mission::new(config, mission).unwrap();
+    mission.run(Duration::from_secs(3600), &mut |_| {}).unwrap();
+    let expected = scenecast_core::label_picture::encode(mission.vehicle().map()).unwrap();
+    let dive = Dive::with_settings(name, &|_| {
+        let sets = RELIEF.iter().map(|set| (*set).to_owned());
+        let topics = ["camera.source=ros2:/camera/image_raw", depth, "navigation.source=ros2:/odometry"];
+        let topics = topics.iter().chain(&["ros2.networks=[\"127.0.0.1\"]"]).map(|set| (*set).to_owned());
+        sets.chain(topics).chain([format!("ros2.domain={domain}")]).collect()
+    });
+    let (folder, domain) = (folder.display().to_string(), domain.to_string());
+    let arguments = [&[folder.as_str(), "--domain", &domain, "--matrix", &matrix], options].concat();
+    run_script(&python, "tests/ros2_rgbd.py", &arguments);
+    Some((dive, expected))
+}
+
+#[test]
+fn depth_and_calibration_by_dds_give_the_map_of_the_rehearsal() {
+    let Some((mut dive, expected)) = relief_by_dds("ros2-depth", domain(3), "camera.depth=ros2:/camera/depth", &[])
+    else {
+        return;
+    };
+    dive.assert_map(&expected);
+    let log = dive.log_of_vehicle();
+    assert!(log.contains("18 images mapped, 0 dropped") && !log.contains("no depth"), "{log}");
+}
+
+#[test]
+fn images_without_a_cloud_are_counted_and_mapped_flat() {
+    let options = ["--cloud", "--without", "3,7"];
+    let Some((mut dive, expected)) =
+        relief_by_dds("ros2-cloud", domain(4), "camera.depth=cloud:/camera/points", &options)
+    else {
+        return;
+    };
+    let cells = |png: &[u8]| scenecast_core::label_picture::decode(png, 0, 0).map_or(0, |map| map.explored());
+    wait_until("the map has as many cells as the one of the rehearsal", Duration::from_secs(120), || {
+        std::fs::read(&dive.map).is_ok_and(|png| cells(&png) > cells(&expected) * 19 / 20)
+    });
+    let log = dive.log_of_vehicle();
+    assert!(log.contains("18 images mapped, 0 dropped (no depth at its time 2"), "{log}");
 }
 
 /// A bag of the recording, which rosbags writes; `None` without Python.

@@ -76,7 +76,7 @@ pub fn run_vehicle(load: Load, simulated: Option<SimulatedAutopilot>) -> Result<
                 mapper.last_s().map_or(0.0, |s| s + RESTART_S),
                 &sensors,
             )?)),
-            false => Camera::Recorded(RecordedCamera::new(recording, clock, mapper.last_s())),
+            false => Camera::Recorded(Box::new(RecordedCamera::new(recording, clock, mapper.last_s()))),
         };
         mapper.tune(vehicle.settings());
         if config.autopilot.kind != AutopilotKind::None {

@@ -22,7 +22,7 @@ pub enum CameraFault {
     CutOff,
     /// The pixels have an encoding that is not supported.
     Encoding,
-    /// There is no calibration, where one is needed, or it is for images of another size.
+    /// There is no calibration, where one is needed.
     Calibration,
     /// A message with a calibration cannot be used.
     BadCalibration,
@@ -72,7 +72,7 @@ impl CameraFault {
             Self::Unreadable => "unreadable",
             Self::CutOff => "cut off",
             Self::Encoding => "unknown encoding",
-            Self::Calibration => "without a calibration that fits",
+            Self::Calibration => "without a calibration",
             Self::BadCalibration => "unusable calibration",
             Self::NoDepth => "no depth at its time",
             Self::UnusableDepth => "unusable depth",

@@ -19,6 +19,9 @@ pub enum DepthMatch<D> {
     Missing,
 }
 
+/// Measurements that are earlier than the last one by more than this are of another clock.
+const JUMP: Duration = Duration::from_secs(1);
+
 impl<D> Default for DepthTrack<D> {
     fn default() -> Self {
         Self { waiting: VecDeque::new() }
@@ -31,12 +34,13 @@ impl<D> DepthTrack<D> {
     /// The most measurements that are kept.
     const MAX_WAITING: usize = 12;
 
-    /// Takes a measurement. One from before the last one begins the track anew, as the camera's clock went back.
+    /// Takes a measurement. One from long before the last one begins the track anew, as the camera's clock went back.
     pub fn push(&mut self, stamp: Stamp, depth: D) {
-        if self.waiting.back().is_some_and(|(last, _)| stamp <= *last) {
+        if self.waiting.back().is_some_and(|(last, _)| stamp.after(JUMP) < *last) {
             self.waiting.clear();
         }
-        self.waiting.push_back((stamp, depth));
+        let after = self.waiting.partition_point(|(at, _)| *at < stamp);
+        self.waiting.insert(after, (stamp, depth));
         self.waiting.drain(..self.waiting.len().saturating_sub(Self::MAX_WAITING));
     }
 
@@ -82,7 +86,10 @@ mod tests {
         let mut track = DepthTrack::default();
         (0..50).for_each(|i| track.push(at(100 * i), i));
         assert_eq!(track.take(at(100)), DepthMatch::Missing);
+        track.push(at(4750), 98);
+        assert_eq!(track.take(at(4750)), DepthMatch::Found(98), "it came late");
         track.push(at(10), 99);
         assert_eq!(track.take(at(10)), DepthMatch::Found(99));
+        assert_eq!(track.take(at(4900)), DepthMatch::NotYet);
     }
 }

@@ -1,6 +1,6 @@
 //! The table by which distorted images are sampled.
 
-use image::{Rgb, RgbImage};
+use image::RgbImage;
 
 /// For each pixel of a rectified image, the place in the raw one.
 #[derive(Debug, Clone)]
@@ -28,27 +28,26 @@ impl Remap {
         if image.dimensions() != self.size {
             return image.clone();
         }
-        let raw = image.as_raw();
-        let samples = self.places.iter().flat_map(|[x, y]| {
+        let raw = image.as_raw().as_chunks::<3>().0;
+        let (last_x, last_y) = (width as usize - 1, height as usize - 1);
+        let mut samples = vec![0; raw.len() * 3];
+        for (to, [x, y]) in samples.as_chunks_mut::<3>().0.iter_mut().zip(&self.places) {
             // NaN becomes 0.
-            let (x, y) = (x.max(0.0).min((width - 1) as f32), y.max(0.0).min((height - 1) as f32));
+            let (x, y) = (x.max(0.0).min(last_x as f32), y.max(0.0).min(last_y as f32));
             let (left, top) = (x as usize, y as usize);
-            let (right, below) = ((left + 1).min(width as usize - 1), (top + 1).min(height as usize - 1));
+            let (right, below) = ((left + 1).min(last_x), (top + 1).min(last_y));
             let (part_x, part_y) = (x - left as f32, y - top as f32);
-            let at = |column: usize, row: usize, channel: usize| {
-                f32::from(raw[3 * (row * width as usize + column) + channel])
-            };
-            Rgb(std::array::from_fn::<u8, 3, _>(|channel| {
-                let line = |row: usize| {
-                    let from = at(left, row, channel);
-                    from + (at(right, row, channel) - from) * part_x
+            let row = |row: usize| &raw[row * width as usize..][..width as usize];
+            let (above, under) = (row(top), row(below));
+            for (channel, to) in to.iter_mut().enumerate() {
+                let line = |row: &[[u8; 3]]| {
+                    let (from, beside) = (f32::from(row[left][channel]), f32::from(row[right][channel]));
+                    from + (beside - from) * part_x
                 };
-                let from = line(top);
-                (from + (line(below) - from) * part_y + 0.5) as u8
-            }))
-            .0
-        });
-        let samples: Vec<u8> = samples.collect();
+                let from = line(above);
+                *to = (from + (line(under) - from) * part_y + 0.5) as u8;
+            }
+        }
         RgbImage::from_raw(width, height, samples).unwrap_or_else(|| image.clone())
     }
 }
@@ -56,6 +55,7 @@ impl Remap {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use image::Rgb;
 
     fn image() -> RgbImage {
         RgbImage::from_fn(4, 2, |x, y| Rgb([(10 * x + 100 * y) as u8, 0, 255]))

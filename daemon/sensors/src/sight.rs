@@ -6,6 +6,11 @@ use image::RgbImage;
 use scene_model::project::{DepthImage, Floor, View};
 use std::sync::Arc;
 
+/// Least and greatest distance that counts as one, metres: nothing sees further under water, and a wrong distance must not put
+/// words far off the map.
+const MIN_DISTANCE_M: f32 = 0.02;
+const MAX_DISTANCE_M: f32 = 50.0;
+
 /// A calibrated camera at the time of a frame.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sight {
@@ -17,16 +22,30 @@ pub struct Sight {
 }
 
 impl Sight {
-    /// The image without distortion, and what it sees. Without `depth`, or with one that has no reading, the floor is flat.
+    /// The image without distortion, and what it sees. Distances from 0.02 to 50 m count. Without `depth`, or with one that has
+    /// no reading, the floor is flat.
     ///
     /// # Errors
     /// The calibration is for images of another size.
     pub fn view(&self, image: RgbImage, depth: Option<DepthImage>) -> Result<(RgbImage, View), CalibrationError> {
         let image = self.calibration.rectify(image)?;
+        let depth = depth.map(|mut depth| {
+            let is_far = |metres: &f32| !(MIN_DISTANCE_M..=MAX_DISTANCE_M).contains(metres);
+            depth.metres.iter_mut().filter(|metres| is_far(metres)).for_each(|metres| *metres = 0.0);
+            depth
+        });
         let depth = depth.filter(|depth| depth.median_m().is_some());
         let floor = depth.map_or(Floor::Flat(self.height_m), Floor::Depth);
-        Ok((image, View { camera: self.calibration.camera(), tilt: self.tilt, floor }))
+        Ok((image, View { camera: self.calibration.camera(), tilt: on_grid(self.tilt), floor }))
     }
+}
+
+/// The tilt in steps of 2^-30, so that sources of the same attitude in other forms give the same map.
+fn on_grid(tilt: [f64; 4]) -> [f64; 4] {
+    const STEPS: f64 = (1 << 30) as f64;
+    // A rotation is two quaternions; the greatest part in amount is taken to be positive.
+    let greatest = tilt.iter().copied().fold(0.0, |a: f64, b| if b.abs() > a.abs() { b } else { a });
+    tilt.map(|part| (part * greatest.signum() * STEPS).round() / STEPS)
 }
 
 /// The tilt of a camera with a heading, from its rotation x, y, z, w to east, north and up.
@@ -39,6 +58,19 @@ pub fn tilt_of(rotation: [f64; 4], heading_rad: f64) -> [f64; 4] {
 mod tests {
     use super::*;
     use scene_model::project::{Pose, View};
+
+    #[test]
+    fn distances_that_no_camera_sees_do_not_count() {
+        let calibration = Arc::new(Calibration::of_matrix([100.0, 100.0, 50.0, 40.0]).unwrap());
+        let sight = Sight { calibration, tilt: View::DOWN, height_m: 4.0 };
+        let floor = |metres: Vec<f32>| {
+            let depth = DepthImage { width: metres.len() as u32, height: 1, metres };
+            sight.view(RgbImage::new(100, 80), Some(depth)).unwrap().1.floor
+        };
+        let Floor::Depth(depth) = floor(vec![1e30, 3.0, 0.001, f32::NAN, -2.0, 50.0]) else { panic!() };
+        assert_eq!(depth.metres, [0.0, 3.0, 0.0, 0.0, 0.0, 50.0]);
+        assert_eq!(floor(vec![f32::INFINITY, 0.0]), Floor::Flat(4.0));
+    }
 
     #[test]
     fn a_tilt_and_a_heading_are_the_rotation() {

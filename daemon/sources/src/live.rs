@@ -152,6 +152,16 @@ impl LiveSource {
     }
 }
 
+impl LiveSource {
+    /// The next report of a source; without one it never returns. Cancel-safe.
+    pub async fn next_of(source: &mut Option<Self>) -> SourceReport {
+        match source {
+            Some(source) => source.next().await,
+            None => std::future::pending().await,
+        }
+    }
+}
+
 impl Drop for LiveSource {
     fn drop(&mut self) {
         self.is_stopped.store(true, Ordering::Relaxed);

@@ -1,6 +1,5 @@
 //! The distances of a live camera's pixels: each image waits for a moment for those of its time.
 
-use super::live::next_of;
 use scenecast_sensors::{DepthMatch, DepthMessage, DepthTrack, Stamp};
 use scenecast_sources::{LiveSource, SourceReport};
 use std::time::Duration;
@@ -27,7 +26,7 @@ impl DepthFeed {
 
     /// The next report of the source. Cancel-safe.
     pub(super) async fn next(&mut self) -> SourceReport {
-        next_of(&mut self.source).await
+        LiveSource::next_of(&mut self.source).await
     }
 
     pub(super) fn handle_depth(&mut self, stamp: Stamp, message: DepthMessage) {

@@ -22,7 +22,7 @@ use std::time::Duration;
 /// Frames that may wait for the scene model; further ones stay with the matcher, which drops the oldest.
 const MAX_MAPPING: u32 = 2;
 
-/// Smallest and largest size of pixels that a measured altitude gives, in configured ones.
+/// Smallest and largest size of pixels, and height of a calibrated camera, that a measured altitude gives, in configured ones.
 const SCALES: (f64, f64) = (0.1, 10.0);
 
 /// An image that waits, and its calibration.
@@ -61,14 +61,6 @@ impl ImageTimes {
     fn of(&self, stamp: Option<Stamp>, arrival: Stamp) -> Stamp {
         let own = stamp.filter(|_| self.stamps == CameraStamps::Own);
         own.map_or_else(|| arrival.before(self.delay), |stamp| stamp.shifted(self.clock_offset_s))
-    }
-}
-
-/// The next report of a source; without one it never returns.
-pub(super) async fn next_of(source: &mut Option<LiveSource>) -> SourceReport {
-    match source {
-        Some(source) => source.next().await,
-        None => std::future::pending().await,
     }
 }
 
@@ -142,7 +134,7 @@ impl LiveCamera {
             }
         };
         tokio::select! {
-            report = next_of(&mut self.source) => self.handle_report(SensorKind::Camera, report),
+            report = LiveSource::next_of(&mut self.source) => self.handle_report(SensorKind::Camera, report),
             report = self.depth.next() => self.handle_report(SensorKind::Depth, report),
             report = self.poses.next() => self.handle_report(SensorKind::Navigation, report),
             () = overdue => {}
@@ -270,7 +262,8 @@ impl LiveCamera {
                 None
             }
         };
-        let sight = Some(Sight { calibration, tilt: camera.tilt, height_m: camera.height_m });
+        let height_m = camera.height_m.clamp(SCALES.0 * self.altitude_m, SCALES.1 * self.altitude_m);
+        let sight = Some(Sight { calibration, tilt: camera.tilt, height_m });
         let received = ReceivedImage { picture, sight, depth };
         let picture = FramePicture::Received(Box::new(received));
         Some(CameraFrame { t_s, picture, pose: camera.pose, scale: 1.0 })

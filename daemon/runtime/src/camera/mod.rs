@@ -107,7 +107,7 @@ impl From<RecordedFrame> for CameraFrame {
 
 /// The frames of the camera, each at its time.
 pub(crate) enum Camera {
-    Recorded(RecordedCamera),
+    Recorded(Box<RecordedCamera>),
     Live(Box<LiveCamera>),
 }
 

@@ -1,6 +1,5 @@
 //! The poses of a live vehicle: of a source of their own, or of the autopilot.
 
-use super::live::next_of;
 use scenecast_config::{Config, NavigationSource};
 use scenecast_host::{CameraPose, MeasuredPose};
 use scenecast_protocol::time::Instant;
@@ -40,7 +39,7 @@ impl PoseFeed {
 
     /// The next report of the source. Cancel-safe.
     pub(super) async fn next(&mut self) -> SourceReport {
-        next_of(&mut self.source).await
+        LiveSource::next_of(&mut self.source).await
     }
 
     /// Takes a pose of the source.
