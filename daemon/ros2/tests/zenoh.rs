@@ -93,7 +93,7 @@ fn wait_until(what: &str, is_true: impl Fn() -> bool) {
     let limit = Instant::now() + TIMEOUT;
     while !is_true() {
         assert!(Instant::now() < limit, "{what}: not within {TIMEOUT:?}");
-        std::thread::yield_now();
+        std::thread::park_timeout(Duration::from_millis(10));
     }
 }
 
