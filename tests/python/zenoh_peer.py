@@ -42,6 +42,12 @@ def ready():
     print("ready", flush=True)
 
 
+def fail(text):
+    """Ends at once: the threads of a session would keep the process alive."""
+    print(text, file=sys.stderr, flush=True)
+    os._exit(1)
+
+
 def open_session(port, mode="peer"):
     """As rmw_zenoh's default settings do."""
     config = zenoh.Config()
@@ -101,7 +107,7 @@ class Node:
         deadline = time.monotonic() + seconds
         while not self.tokens_of("MS", topic):
             if time.monotonic() > deadline:
-                sys.exit(f"no subscriber of {topic} within {seconds} s")
+                fail(f"no subscriber of {topic} within {seconds} s")
             time.sleep(0.1)
 
 
@@ -191,7 +197,7 @@ def map_(port, domain, topic, hash_, seconds):
         node.session, key, take, subscriber_detection=True,
         history=HistoryConfig(detect_late_publishers=True, max_samples=1), recovery=RecoveryConfig(heartbeat=True))
     if not arrived.wait(float(seconds)):
-        sys.exit(f"no map on {key} within {seconds} s")
+        fail(f"no map on {key} within {seconds} s")
     after, sample = found[0]
     grid = STORE.deserialize_cdr(sample.payload.to_bytes(), kind)
     attachment = sample.attachment.to_bytes()
@@ -206,7 +212,6 @@ def map_(port, domain, topic, hash_, seconds):
         "age_s": (time.time_ns() - int.from_bytes(attachment[8:16], "little")) / 1e9,
         "gid_is_of_token": attachment[17:] in gids, "tokens": tokens}), flush=True)
     del subscriber
-    # The session has threads that Python does not wait for.
     os._exit(0)
 
 

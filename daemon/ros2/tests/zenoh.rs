@@ -45,6 +45,12 @@ impl Peer {
         peer
     }
 
+    /// Stops it without closing its connections.
+    fn stop(&self) {
+        let status = Command::new("kill").args(["-STOP", &self.0.id().to_string()]).status();
+        assert!(status.is_ok_and(|status| status.success()));
+    }
+
     /// Its next line; empty at its end.
     fn line(&mut self) -> String {
         let mut line = String::new();
@@ -87,7 +93,7 @@ fn wait_until(what: &str, is_true: impl Fn() -> bool) {
     let limit = Instant::now() + TIMEOUT;
     while !is_true() {
         assert!(Instant::now() < limit, "{what}: not within {TIMEOUT:?}");
-        std::thread::yield_now();
+        std::thread::park_timeout(Duration::from_millis(10));
     }
 }
 
@@ -209,4 +215,25 @@ fn samples_flow_again_after_the_router_restarted() {
         drop(router);
         wait_until("the router has left", || !has_router());
     }
+}
+
+#[test]
+fn peers_that_stand_still_delay_no_publisher_for_long() {
+    let Some(python) = python() else { return };
+    let port = free_port();
+    let router = Peer::ready(&python, &["router", &port]);
+    let surface = node(&port, RosTransport::Zenoh);
+    let publisher = surface.publisher::<OccupancyGrid>(&name("/scenecast/map"), Qos::Latched(1)).unwrap();
+    let viewer = Peer::start(&python, &["map", &port, &domain(), "/scenecast/map", "own", "60"]);
+    wait_until("the subscriber is seen", || publisher.subscribers() == 1);
+    viewer.stop();
+    router.stop();
+    let mut longest = Duration::ZERO;
+    for _ in 0..20 {
+        let begin = Instant::now();
+        publisher.publish(grid(100_000, 1));
+        longest = longest.max(begin.elapsed());
+    }
+    println!("the longest call took {:.3} s", longest.as_secs_f64());
+    assert!(longest < Duration::from_secs(2), "{longest:?}");
 }

@@ -54,8 +54,9 @@ pub fn random_bits() -> u64 {
     RandomState::new().build_hasher().finish()
 }
 
-/// The log without `RUST_LOG`. Zenoh reports each session and each connection.
-const LOG_LEVELS: &str = "info,zenoh=warn";
+/// The log without `RUST_LOG`. RustDDS and Zenoh report each socket and each match of theirs, and `ros2-client` as an error that an
+/// endpoint has no peer.
+const LOG_LEVELS: &str = "info,ros2_client=off,rustdds=error,zenoh=warn";
 
 /// Runs a future to its end, with log lines on the standard error output as `RUST_LOG` asks.
 pub fn block_on<T>(future: impl Future<Output = Result<T, UserError>>) -> Result<T, UserError> {

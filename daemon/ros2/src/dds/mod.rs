@@ -4,12 +4,12 @@ mod names;
 mod qos;
 
 use crate::inbox::Filler;
-use crate::node::{Feed, Peers, Qos, Transport, failed, locked};
+use crate::node::{Feed, OwnId, OwnIds, Peers, Qos, Transport, failed, locked};
 use futures_util::StreamExt;
 pub(crate) use names::ros_type;
 use names::{dds_topic, ros_topic};
 use ros2_client::{Context, MessageTypeName, Node, NodeName, NodeOptions, Subscription};
-use rustdds::{DomainParticipantBuilder, RTPSEntity, TopicKind};
+use rustdds::{DomainParticipantBuilder, GUID, RTPSEntity, TopicKind};
 use scenecast_config::{Ros2, RosName};
 use scenecast_core::UserError;
 use scenecast_messages::Message;
@@ -17,12 +17,16 @@ use std::collections::BTreeSet;
 use std::sync::{Arc, Mutex, MutexGuard};
 use tokio::runtime::Handle;
 
+/// The participants of this process.
+static OWN: OwnIds<GUID> = OwnIds::new();
+
 /// A participant of a domain, with one node.
 pub(crate) struct Dds {
     node: Mutex<Node>,
     context: Context,
     /// Runs discovery and the subscriptions.
     runtime: Handle,
+    _own: OwnId<GUID>,
 }
 
 /// A publisher of one topic.
@@ -41,6 +45,7 @@ impl Dds {
             builder = builder.with_only_networks(settings.networks.iter().copied());
         }
         let participant = builder.build().map_err(|e| failed("DDS did not start", &e))?;
+        let own = OWN.add(participant.guid());
         let context = Context::from_domain_participant(participant).map_err(|e| failed("DDS did not start", &e))?;
         let node_name = NodeName::new("/", name).map_err(|e| failed("the name of the node", &e))?;
         let options = NodeOptions::new().enable_rosout(false);
@@ -51,7 +56,7 @@ impl Dds {
                 tracing::error!("ROS 2: discovery ended: {error}");
             }
         });
-        Ok(Arc::new(Self { node: Mutex::new(node), context, runtime }))
+        Ok(Arc::new(Self { node: Mutex::new(node), context, runtime, _own: own }))
     }
 
     /// A subscription that fills an inbox.
@@ -99,14 +104,15 @@ impl Dds {
         Ok((topic.map_err(|e| failed(name.as_str(), &e))?, self.node()))
     }
 
-    /// What DDS has found on its networks.
+    /// What DDS has found on its networks, without this process.
     pub fn peers(&self) -> Peers {
         let participant = self.context.domain_participant();
-        let own = participant.guid_prefix();
+        let own = OWN.all();
+        let is_other = |guid: &GUID| own.iter().all(|own| own.prefix != guid.prefix);
         let (writers, readers) = (participant.discovered_writers(), participant.discovered_readers());
-        let writers = || writers.iter().map(|w| &w.publication_topic_data).filter(|w| w.key.prefix != own);
-        let reading = readers.iter().map(|r| r.subscription_topic_data.key().prefix).filter(|prefix| *prefix != own);
-        let participants: BTreeSet<_> = writers().map(|w| w.key.prefix).chain(reading).collect();
+        let writers = || writers.iter().map(|w| &w.publication_topic_data).filter(|w| is_other(&w.key));
+        let reading = readers.iter().map(|r| r.subscription_topic_data.key()).filter(|key| is_other(key));
+        let participants: BTreeSet<_> = writers().map(|w| w.key.prefix).chain(reading.map(|key| key.prefix)).collect();
         let publishers = writers().filter_map(|w| Some((ros_topic(&w.topic_name)?, ros_type(&w.type_name))));
         Peers { participants: participants.len(), publishers: publishers.collect() }
     }

@@ -1,11 +1,13 @@
 //! The node: its threads, its peers, and the subscriptions and publishers at it, on one transport or on both.
 
 mod health;
+mod own;
 mod peers;
 mod publisher;
 mod qos;
 mod watch;
 
+pub(crate) use own::{OwnId, OwnIds};
 pub use peers::{Peers, Transport};
 pub use publisher::Publisher;
 pub use qos::Qos;
@@ -157,7 +159,7 @@ impl RosNode {
         let name = remapped(topic, &self.shared.remaps);
         Ok(Publisher {
             dds: self.shared.dds.as_ref().map(|dds| dds.publisher(name, qos)).transpose()?,
-            zenoh: self.shared.zenoh.as_ref().map(|zenoh| zenoh.publisher::<M>(name, qos)).transpose()?,
+            zenoh: self.shared.zenoh.as_ref().map(|zenoh| zenoh.publisher(M::DEFINITION, name, qos)).transpose()?,
             refused: AtomicU64::new(0),
         })
     }

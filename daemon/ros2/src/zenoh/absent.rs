@@ -4,7 +4,7 @@ use crate::inbox::Filler;
 use crate::node::{Feed, Peers, Qos};
 use scenecast_config::{Ros2, RosName};
 use scenecast_core::UserError;
-use scenecast_messages::Message;
+use scenecast_messages::{Definition, Message};
 use std::sync::Arc;
 
 pub(crate) enum Zenoh {}
@@ -24,7 +24,7 @@ impl Zenoh {
         match *self {}
     }
 
-    pub fn publisher<M: Message>(&self, _: &RosName, _: Qos) -> Result<ZenohPublisher, UserError> {
+    pub fn publisher(&self, _: &Definition, _: &RosName, _: Qos) -> Result<ZenohPublisher, UserError> {
         match *self {}
     }
 

@@ -2,23 +2,27 @@
 
 use super::keys::{Endpoint, Kind, NO_HASH, Token};
 use crate::dds::ros_type;
-use crate::node::{Peers, locked};
+use crate::node::{OwnId, OwnIds, Peers, locked};
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Mutex;
 
 /// Tokens that are kept at most; a large robot has some hundred.
 const MAX_TOKENS: usize = 20_000;
 
+/// The sessions of this process.
+static OWN: OwnIds<String> = OwnIds::new();
+
 /// What the tokens of a domain say, without those of this session.
-#[derive(Debug)]
 pub(super) struct Graph {
     own_session: String,
     tokens: Mutex<BTreeMap<String, Token>>,
+    _own: OwnId<String>,
 }
 
 impl Graph {
     pub fn new(own_session: String) -> Self {
-        Self { own_session, tokens: Mutex::default() }
+        let own = OWN.add(own_session.clone());
+        Self { own_session, tokens: Mutex::default(), _own: own }
     }
 
     /// A token appeared.
@@ -35,16 +39,18 @@ impl Graph {
         locked(&self.tokens).remove(key);
     }
 
+    /// The sessions of other processes.
     pub fn peers(&self) -> Peers {
-        let tokens = locked(&self.tokens);
-        let sessions: BTreeSet<&str> = tokens.values().map(|token| token.session.as_str()).collect();
-        let publishers = tokens.values().filter(|token| token.kind == Kind::Publisher);
+        let (tokens, own) = (locked(&self.tokens), OWN.all());
+        let others = || tokens.values().filter(|token| !own.contains(&token.session));
+        let sessions: BTreeSet<&str> = others().map(|token| token.session.as_str()).collect();
+        let publishers = others().filter(|token| token.kind == Kind::Publisher);
         let publishers = publishers.filter_map(|token| token.endpoint.as_ref());
         let publishers = publishers.map(|endpoint| (endpoint.topic.clone(), ros_type(&endpoint.dds_type)));
         Peers { participants: sessions.len(), publishers: publishers.collect() }
     }
 
-    /// The peers of this kind at the same topic, with the same type and definition or without a type hash.
+    /// The endpoints of this kind at the same topic, with the same type and definition or without a type hash.
     pub fn count(&self, kind: Kind, at: &Endpoint) -> usize {
         self.matching(kind, at, &[&at.hash, NO_HASH])
     }
@@ -86,8 +92,14 @@ mod tests {
             "@ros2_lv/0/c/0/0/NN/%/%/node".to_owned(),
         ];
         tokens.iter().for_each(|token| graph.insert(token));
+        let second_of_this_process = Graph::new("d".to_owned());
+        graph.insert(&token("d", 1, "MP", "%map", "RIHS01_a"));
         let peers = graph.peers();
         assert_eq!(peers.participants, 2);
+        assert_eq!(graph.count(Kind::Publisher, &endpoint("/map")), 1, "it is no peer, but a publisher");
+        drop(second_of_this_process);
+        assert_eq!(graph.peers().participants, 3);
+        graph.remove(&token("d", 1, "MP", "%map", "RIHS01_a"));
         let image = "sensor_msgs/msg/Image";
         let expected = ["/front/image", "/image"].map(|topic| (topic.to_owned(), image.to_owned()));
         assert_eq!(peers.publishers.into_iter().collect::<Vec<_>>(), expected);

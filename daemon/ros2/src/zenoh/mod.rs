@@ -81,8 +81,13 @@ impl Zenoh {
     /// # Errors
     ///
     /// The session has ended.
-    pub fn publisher<M: Message>(self: &Arc<Self>, name: &RosName, qos: Qos) -> Result<ZenohPublisher, UserError> {
-        let endpoint = endpoint(name, M::DEFINITION);
+    pub fn publisher(
+        self: &Arc<Self>,
+        message: &Definition,
+        name: &RosName,
+        qos: Qos,
+    ) -> Result<ZenohPublisher, UserError> {
+        let endpoint = endpoint(name, message);
         ZenohPublisher::declare(self, endpoint, qos).map_err(|e| failed(name.as_str(), &e))
     }
 
