@@ -26,6 +26,7 @@ mod stop;
 mod subscribe;
 #[cfg(feature = "surface")]
 mod surface;
+mod transport;
 mod vehicle;
 mod vehicle_map;
 #[cfg(feature = "zenoh")]
@@ -36,8 +37,9 @@ mod zenoh;
 
 pub use inbox::{Inbox, Received};
 pub use names::{topic, valid_part};
-pub use node::{Peers, Publisher, Qos, RosNode, Transport};
+pub use node::{Publisher, RosNode};
 #[cfg(feature = "surface")]
 pub use surface::{SurfaceOutlet, start_surface};
+pub use transport::{Peers, Qos, Transport};
 pub use vehicle::{VehicleOutlet, VehicleView, start_vehicle};
 pub use vehicle_map::VehicleMap;

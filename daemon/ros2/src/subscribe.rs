@@ -1,8 +1,8 @@
 //! Subscriptions of what a vehicle sees and how it moves.
 
 use crate::inbox::Inbox;
-use crate::node::Qos;
 use crate::node::RosNode;
+use crate::transport::Qos;
 use scenecast_config::RosName;
 use scenecast_core::UserError;
 use scenecast_messages::grid_map_msgs::GridMap;

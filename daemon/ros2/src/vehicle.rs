@@ -1,9 +1,9 @@
 //! The vehicle in ROS 2: its own map, pose, path and state.
 
 use crate::map_versions::MapVersions;
-use crate::node::Qos;
 use crate::node::{Publisher, RosNode};
 use crate::stop::{self, Owned, Owner};
+use crate::transport::Qos;
 use crate::vehicle_map::VehicleMap;
 use scenecast_config::Ros2;
 use scenecast_core::{UserError, palette};

@@ -4,7 +4,7 @@ mod names;
 mod qos;
 
 use crate::inbox::Filler;
-use crate::node::{Feed, OwnId, OwnIds, Peers, Qos, Transport, failed, locked};
+use crate::transport::{Feed, OwnId, OwnIds, Peers, Qos, Transport, failed, locked};
 use futures_util::StreamExt;
 pub(crate) use names::ros_type;
 use names::{dds_topic, ros_topic};

@@ -1,6 +1,6 @@
 //! Quality of service in the terms of DDS.
 
-use crate::node::Qos;
+use crate::transport::Qos;
 use ros2_client::qos::{Durability, History, QosProfile, Reliability, WhenFull};
 use rustdds::policy::ResourceLimits;
 use rustdds::{QosPolicies, QosPolicyBuilder};

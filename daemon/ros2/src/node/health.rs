@@ -1,7 +1,6 @@
 //! Which transports see peers, as a part of diagnostics.
 
-use super::Transport;
-use super::peers::{Peers, counts};
+use crate::transport::{Peers, Transport, counts};
 use scenecast_messages::diagnostic_msgs::DiagnosticStatus;
 use scenecast_outlets::Health;
 

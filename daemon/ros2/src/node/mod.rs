@@ -1,29 +1,23 @@
 //! The node: its threads, its peers, and the subscriptions and publishers at it, on one transport or on both.
 
 mod health;
-mod own;
-mod peers;
 mod publisher;
-mod qos;
 mod watch;
 
-pub(crate) use own::{OwnId, OwnIds};
-pub use peers::{Peers, Transport};
 pub use publisher::Publisher;
-pub use qos::Qos;
 
 use crate::dds::Dds;
 use crate::inbox::Inbox;
 use crate::names::remapped;
 use crate::stop::Owned;
+use crate::transport::{Feed, Peers, Qos, Transport, failed, locked};
 use crate::zenoh::Zenoh;
 use scenecast_config::{Remap, Ros2, RosName, RosTransport};
 use scenecast_core::UserError;
 use scenecast_messages::Message;
 use scenecast_outlets::Health;
-use std::any::Any;
 use std::sync::atomic::AtomicU64;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex};
 use std::time::Duration;
 use watch::Wanted;
 
@@ -45,23 +39,6 @@ struct Shared {
     namespace: RosName,
     /// The subscriptions, to report those without a publisher.
     wanted: Mutex<Vec<Wanted>>,
-}
-
-/// A subscription on one transport.
-pub(crate) struct Feed {
-    pub transport: Transport,
-    /// The number of its publishers now; `None` once it has ended.
-    pub publishers: Box<dyn Fn() -> Option<usize> + Send>,
-    /// Ends it when dropped.
-    pub ending: Box<dyn Any + Send + Sync>,
-}
-
-pub(crate) fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
-}
-
-pub(crate) fn failed(action: &str, error: &dyn std::fmt::Display) -> UserError {
-    UserError::Failed(format!("ROS 2: {action}: {error}"))
 }
 
 impl RosNode {

@@ -1,7 +1,7 @@
 //! Reports peers, and topics that nobody publishes.
 
-use super::peers::{Peers, counts};
-use super::{Shared, Transport, locked};
+use super::Shared;
+use crate::transport::{Peers, Transport, counts, locked};
 use std::sync::Weak;
 use std::time::{Duration, Instant};
 

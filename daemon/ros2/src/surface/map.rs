@@ -1,8 +1,8 @@
 //! The operator's map of one vehicle: labels, layers and cloud.
 
 use super::Desk;
-use crate::node::Qos;
 use crate::node::{Publisher, RosNode};
+use crate::transport::Qos;
 use scenecast_console::state::{MapLabel, VehicleState};
 use scenecast_console::{ClientRequest, MapCells, Reply, SurfaceRequest};
 use scenecast_core::{UserError, palette};

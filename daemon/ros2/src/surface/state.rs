@@ -1,8 +1,8 @@
 //! Pose, path, plan and position of one vehicle.
 
 use super::stamps::Stamps;
-use crate::node::Qos;
 use crate::node::{Publisher, RosNode};
+use crate::transport::Qos;
 use scenecast_console::state::{MissionState, StatusReport, VehicleState};
 use scenecast_core::{LatLon, TangentPlane, UserError};
 use scenecast_messages::geometry_msgs::PoseWithCovarianceStamped;

@@ -1,7 +1,7 @@
 //! Stands for rmw_zenoh in builds without the feature `zenoh`: nothing of it ever exists.
 
 use crate::inbox::Filler;
-use crate::node::{Feed, Peers, Qos};
+use crate::transport::{Feed, Peers, Qos};
 use scenecast_config::{Ros2, RosName};
 use scenecast_core::UserError;
 use scenecast_messages::{Definition, Message};

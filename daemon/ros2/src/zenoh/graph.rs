@@ -2,7 +2,7 @@
 
 use super::keys::{Endpoint, Kind, NO_HASH, Token};
 use crate::dds::ros_type;
-use crate::node::{OwnId, OwnIds, Peers, locked};
+use crate::transport::{OwnId, OwnIds, Peers, locked};
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Mutex;
 

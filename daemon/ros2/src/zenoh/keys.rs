@@ -8,7 +8,7 @@
 //!
 //! In tokens a `%` stands for each slash of a name, and for an empty one. Source: rmw_zenoh, `docs/design.md`.
 
-use crate::node::Qos;
+use crate::transport::Qos;
 
 /// The first chunk of tokens.
 const SPACE: &str = "@ros2_lv";

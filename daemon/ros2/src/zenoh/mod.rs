@@ -13,7 +13,7 @@ mod subscription;
 pub(crate) use publisher::ZenohPublisher;
 
 use crate::inbox::Filler;
-use crate::node::{Feed, Peers, Qos, Transport, failed};
+use crate::transport::{Feed, Peers, Qos, Transport, failed};
 use graph::Graph;
 use keys::{Endpoint, Kind, TokenMaker};
 use scenecast_config::{Ros2, RosName};

@@ -3,7 +3,7 @@
 use super::attachment::{Gid, attachment, gid};
 use super::keys::{Endpoint, Kind, NO_HASH};
 use super::{Graph, Zenoh};
-use crate::node::{Qos, locked};
+use crate::transport::{Qos, locked};
 use std::collections::VecDeque;
 use std::sync::atomic::{AtomicI64, Ordering};
 use std::sync::{Arc, Mutex, OnceLock};

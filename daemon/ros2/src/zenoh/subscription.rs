@@ -2,7 +2,7 @@
 
 use super::keys::{Endpoint, NO_HASH};
 use crate::inbox::Filler;
-use crate::node::Qos;
+use crate::transport::Qos;
 use scenecast_messages::{CdrError, Message, decode};
 use std::any::Any;
 use std::sync::atomic::{AtomicBool, Ordering};
