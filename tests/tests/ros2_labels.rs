@@ -76,7 +76,8 @@ fn grids_and_layers_of_cyclone_dds_reach_the_operator() {
     let Some(python) = python() else { return };
     let (dir, domain) = (scratch("ros2-grids"), domain(0));
     let names = dir.join("classes.json");
-    std::fs::write(&names, r##"{"kind":"classes","classes":[{"class":77,"name":"kelp","colour":"#104020"}]}"##).unwrap();
+    std::fs::write(&names, r##"{"kind":"classes","classes":[{"class":77,"name":"kelp","colour":"#104020"}]}"##)
+        .unwrap();
     let ends = Ends::start(
         &dir,
         domain,
@@ -90,7 +91,11 @@ fn grids_and_layers_of_cyclone_dds_reach_the_operator() {
     );
     let said = publish(&python, &["grids", &domain.to_string()]);
     assert!(said["message"].as_str().unwrap().contains("turned by 60"), "{said}");
-    assert_eq!((&said["values"]["refused"], &said["values"]["taken"]), (&Value::from("2"), &Value::from("3")), "{said}");
+    assert_eq!(
+        (&said["values"]["refused"], &said["values"]["taken"]),
+        (&Value::from("2"), &Value::from("3")),
+        "{said}"
+    );
     let expected = |x: i32, y: i32| match (x, y) {
         (5, 0) => Some(78),
         _ if x == y => None,

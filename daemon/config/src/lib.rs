@@ -35,12 +35,12 @@ pub use regular_file::{open_regular, read_regular, read_regular_text};
 pub use rule::Rule;
 pub use schema::schema;
 pub use sections::{
-    Autopilot, Bands, Camera, Channel, Config, Console, Labels, Link, Map, Mission, Modem, Navigation, Operator, Position,
-    Ros2, Runtime, Scene, Survey, VehicleSection,
+    Autopilot, Bands, Camera, Channel, Config, Console, Labels, Link, Map, Mission, Modem, Navigation, Operator,
+    Position, Ros2, Runtime, Scene, Survey, VehicleSection,
 };
 pub use setting::{
-    Authenticate, AutopilotKind, BandRange, BirthRule, CameraSource, CameraStamps, Debounce, GpsPort, HostPort, LabelMessage, LabelSource,
-    LayerName, MapCells, MapStream, ModemKind, NavigationSource, OperatorScript, Remap, RosName, S2cMode, Votes,
-    WorldKind,
+    Authenticate, AutopilotKind, BandRange, BirthRule, CameraSource, CameraStamps, Debounce, GpsPort, HostPort,
+    LabelMessage, LabelSource, LayerName, MapCells, MapStream, ModemKind, NavigationSource, OperatorScript, Remap,
+    RosName, S2cMode, Votes, WorldKind,
 };
 pub use token_file::{TokenGrant, load_tokens, read_token, read_tokens};

@@ -347,7 +347,8 @@ mod tests {
         assert_eq!((item.time, band.scale), (ItemTime::Unix(1.7e9), BandScale::between(0.0, 126.5)));
         assert!((quantities.values[0] - 7.56).abs() < 1e-6 && quantities.values[1].is_nan());
         let numbers = r#"{"kind":"band","name":"ph","west_m":0,"south_m":0,"cell_m":1,"encoding":"float32","width":1,"height":1}"#;
-        let Content::Quantities { band, quantities, .. } = read(numbers, &8.25f32.to_le_bytes()).unwrap().content else {
+        let Content::Quantities { band, quantities, .. } = read(numbers, &8.25f32.to_le_bytes()).unwrap().content
+        else {
             panic!()
         };
         assert_eq!((band.scale, quantities.values[0]), (None, 8.25));

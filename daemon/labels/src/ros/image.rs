@@ -44,7 +44,9 @@ mod tests {
         image.data = vec![1, 255, 99, 3, 4];
         let item = item_of_image(&image).unwrap();
         assert_eq!(item.time, ItemTime::Unix(1_700_000_000.5));
-        assert!(matches!(&item.content, Content::Image { classes, pose: None, .. } if classes.values == [1, 255, 3, 4]));
+        assert!(
+            matches!(&item.content, Content::Image { classes, pose: None, .. } if classes.values == [1, 255, 3, 4])
+        );
         let said = |image: &Image| item_of_image(image).unwrap_err().to_string();
         assert!(said(&Image { encoding: "rgb8".to_owned(), ..image.clone() }).contains("\"rgb8\": mono8"));
         assert!(said(&Image { step: 1, ..image.clone() }).contains("not those of 2 x 2"));

@@ -70,9 +70,7 @@ mod tests {
 
     #[test]
     fn frames_that_move_with_the_robot_are_refused() {
-        let of = |frame: &str, wanted| {
-            check_frame(&Header { frame_id: frame.to_owned(), ..Header::default() }, wanted)
-        };
+        let of = |frame: &str, wanted| check_frame(&Header { frame_id: frame.to_owned(), ..Header::default() }, wanted);
         assert!(of("map", "").is_ok() && of("/odom", "").is_ok() && of("", "").is_ok() && of("world", "world").is_ok());
         let refused = of("base_link", "").unwrap_err().to_string();
         assert!(refused.contains("\"base_link\": map or odom"), "{refused}");

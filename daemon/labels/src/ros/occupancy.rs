@@ -43,7 +43,8 @@ fn raster(grid: &OccupancyGrid, frame: &str) -> Result<(Ground, Raster), Refusal
     // The number that a person wrote, of which the message has the nearest binary one.
     let resolution = grid.info.resolution.to_string().parse().unwrap_or(f64::NAN);
     let position = &grid.info.origin.position;
-    let ground = Ground { west_m: metres("x", position.x)?, south_m: metres("y", position.y)?, cell_m: edge(resolution)? };
+    let ground =
+        Ground { west_m: metres("x", position.x)?, south_m: metres("y", position.y)?, cell_m: edge(resolution)? };
     let rows = grid.data.chunks_exact(width as usize).rev();
     let values = rows.flatten().map(|value| value.cast_unsigned()).collect();
     Ok((ground, Raster { width, height, values }))

@@ -124,7 +124,9 @@ impl Mission {
         let own = ImagePose { x_m, y_m, depth_m, heading_rad: navigator.heading_rad() };
         let (is_changed, pose) = labels.take(own, now);
         let is_foreign = labels.is_foreign;
-        if let Some(ImagePose { x_m, y_m, depth_m, heading_rad }) = pose.filter(|_| is_foreign && self.camera.is_recorded()) {
+        if let Some(ImagePose { x_m, y_m, depth_m, heading_rad }) =
+            pose.filter(|_| is_foreign && self.camera.is_recorded())
+        {
             self.vehicle.handle_pose(CameraPose { x_m, y_m, heading_rad, depth_m }, now);
         }
         if is_changed {

@@ -13,7 +13,9 @@ const PART: u32 = 6;
 pub(super) enum Pace {
     From(Instant),
     /// The vehicle handles an update; whether more of the same waits.
-    Handling { has_more: bool },
+    Handling {
+        has_more: bool,
+    },
 }
 
 impl Pace {

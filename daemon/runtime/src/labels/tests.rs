@@ -1,10 +1,10 @@
 use super::feed::{Answer, LabelQueue};
-use scenecast_vehicle::LabelChanges;
 use super::*;
 use crate::checkpoint::CheckpointFile;
 use crate::journal::Folder;
 use scenecast_labels::{Ground, Raster};
 use scenecast_protocol::time::Instant as MissionTime;
+use scenecast_vehicle::LabelChanges;
 use std::path::PathBuf;
 use std::sync::mpsc::sync_channel;
 

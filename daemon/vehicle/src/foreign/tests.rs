@@ -106,7 +106,11 @@ fn labels_and_bands_have_a_limit_on_cells_that_counts_erased_ones() {
         map.handle_item(&place(of(&[1; 4]), 0.0), ForeignSource::Labels, None, 0.0).unwrap();
         map.handle_item(&place(of(&[2; 4]), 0.0), ForeignSource::Labels, None, 1.0).unwrap();
         map.handle_item(&place(of(&[255; 4]), 0.0), ForeignSource::Labels, None, 2.0).unwrap();
-        assert_eq!(map.handle_item(&place(of(&[1; 2]), 50.0), ForeignSource::Labels, None, 3.0), full, "erased cells are cells");
+        assert_eq!(
+            map.handle_item(&place(of(&[1; 2]), 50.0), ForeignSource::Labels, None, 3.0),
+            full,
+            "erased cells are cells"
+        );
         map.handle_item(&place(of(&[255; 9]), 0.0), ForeignSource::Labels, None, 4.0).unwrap();
         map.handle_item(&place(of(&[3; 5]), 0.0), ForeignSource::Labels, None, 5.0).unwrap();
     }
@@ -127,12 +131,16 @@ fn a_class_keeps_its_name_and_a_band_its_scale() {
         item(Content::Band { band, ground, levels: raster(3, &[0, 100, 255]) })
     };
     map.handle_item(&band(5, "backscatter"), ForeignSource::Labels, None, 2.0).unwrap();
-    assert_eq!(map.handle_item(&band(6, "backscatter"), ForeignSource::Labels, None, 3.0), Err(Refusal::OtherBand("backscatter".into())));
+    assert_eq!(
+        map.handle_item(&band(6, "backscatter"), ForeignSource::Labels, None, 3.0),
+        Err(Refusal::OtherBand("backscatter".into()))
+    );
     let (layer, levels) = map.take_changes(100).bands.remove(0);
     let cells: Vec<_> = levels.iter().map(|&(cell, level)| (cell, layer.middle(level).unwrap())).collect();
     assert_eq!((&*layer.name, &*layer.unit, layer.share), ("backscatter", "dB", 8));
     assert_eq!(cells, [(Cell::new(0, 0), -80.0), (Cell::new(1, 0), -30.0)]);
-    let full = (0..20).find_map(|i| map.handle_item(&band(5, &format!("band_{i}")), ForeignSource::Labels, None, 4.0).err());
+    let full =
+        (0..20).find_map(|i| map.handle_item(&band(5, &format!("band_{i}")), ForeignSource::Labels, None, 4.0).err());
     assert!(matches!(full, Some(Refusal::TooManyBands(_))));
 }
 
@@ -206,7 +214,8 @@ fn slices_of_a_large_map_add_up_in_the_vehicle() {
     let config = config(&["scene.cell_m=0.5", "labels.source=dir:labels"]);
     let profile = scenecast_config::modem_profile(&config, config.modem.bit_rate);
     let area = scenecast_core::Area { west: 0.0, south: 0.0, east: 1000.0, north: 1000.0 };
-    let mut vehicle = crate::assemble(&config, None, profile, area, crate::Durable::default(), 1, Instant::ZERO).unwrap();
+    let mut vehicle =
+        crate::assemble(&config, None, profile, area, crate::Durable::default(), 1, Instant::ZERO).unwrap();
     let mut map = ForeignMap::new(&config, 0);
     let values: Vec<u8> = (0..side * side).map(|i| ((i / 300 + i / side / 40) % 20) as u8).collect();
     map.handle_item(&grid(side, &values), ForeignSource::Labels, None, 0.0).unwrap();

@@ -1,8 +1,8 @@
 //! The vehicle's map, and the choice of the cells and layers of it that are sent.
 
 use super::bands::Bands;
-use super::withheld::Withheld;
 use super::whole_png::WholePng;
+use super::withheld::Withheld;
 use crate::{LabelChanges, MapUpdate};
 use scenecast_config::Debounce;
 use scenecast_protocol::directive::{CellBand, Settings};
@@ -174,7 +174,8 @@ impl MapPublisher {
             self.has_erased |= label == UNEXPLORED;
         }
         self.version += u64::from(has_changed);
-        let (now_sent, later): (Vec<_>, Vec<_>) = changes.cells.iter().copied().partition(|&(_, label)| label <= stored);
+        let (now_sent, later): (Vec<_>, Vec<_>) =
+            changes.cells.iter().copied().partition(|&(_, label)| label <= stored);
         self.withheld.add(&later, now);
         self.publish_cells(now_sent, link, now);
         self.withheld.is_waiting()

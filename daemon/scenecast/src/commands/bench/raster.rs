@@ -76,7 +76,10 @@ impl RasterBench {
         if !self.json {
             let loss = 100.0 * self.loss;
             println!("{} bit/s, {loss:.0} % of the frames lost", self.bit_rate);
-            println!("{:<40} {:>9} {:>7} {:>6} {:>9} {:>12}", "map", "cells", "classes", "equal", "seconds", "bytes on air");
+            println!(
+                "{:<40} {:>9} {:>7} {:>6} {:>9} {:>12}",
+                "map", "cells", "classes", "equal", "seconds", "bytes on air"
+            );
         }
         for path in &self.map {
             let figures = annotated(&setting, path, self.unknown, self.seed)?;
