@@ -208,6 +208,7 @@ fn a_restored_map_is_given_away_whole() {
 
 /// `SCENECAST_LARGE_MAP=2000` measures four million cells.
 #[test]
+#[expect(clippy::disallowed_methods, reason = "it measures how long the vehicle's loop takes")]
 fn slices_of_a_large_map_add_up_in_the_vehicle() {
     use scenecast_protocol::time::Instant;
     let side = std::env::var("SCENECAST_LARGE_MAP").ok().and_then(|side| side.parse().ok()).unwrap_or(300u32);
