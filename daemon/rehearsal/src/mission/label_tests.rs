@@ -119,3 +119,47 @@ fn a_real_annotated_map_converges_exactly() {
     assert_eq!(mission.surface().map(mission.address()), Some(mission.vehicle().map()));
     std::fs::remove_dir_all(&dir).unwrap();
 }
+
+#[test]
+fn a_band_arrives_beside_the_labels_of_the_scene_model() {
+    let dir = folder("beside-labels");
+    let band = |file: &str, name: &str, (time, first): (f64, f32)| {
+        let header = format!(
+            r#"{{"kind":"band","name":"{name}","time":{time},"west_m":0,"south_m":0,"cell_m":0.25,"encoding":"float32","width":{WIDTH},"height":{HEIGHT}}}"#
+        );
+        let numbers = (0..WIDTH * HEIGHT).flat_map(|i| (first + 0.5 * (i % WIDTH) as f32).to_le_bytes());
+        write(&dir, file, &header, Some(&numbers.collect::<Vec<u8>>()));
+    };
+    band("a", "elevation", (1.7e9, -30.0));
+    // In the place of the scene model's own layer, 20 s later.
+    band("b", "curiosity", (1.7e9 + 20.0, 0.0));
+    write(&dir, "labels", &header("grid", 1, ""), Some(&picture(|_, _| 3)));
+    let sets = [
+        "labels.source=".to_owned(),
+        format!("bands.source=dir:{}", dir.display()),
+        "map.layer_shares={curiosity=10}".to_owned(),
+        "survey.duration_s=60".to_owned(),
+        "modem.kind=udp".to_owned(),
+        "modem.full_duplex=true".to_owned(),
+        "channel.half_duplex=false".to_owned(),
+        "channel.range_m=10".to_owned(),
+        "bands.ranges=[\"curiosity=0..25.3\"]".to_owned(),
+    ];
+    let mut mission = mission(&dir, &sets.each_ref().map(String::as_str));
+    assert!(!mission.has_foreign_labels());
+    mission.run(std::time::Duration::from_secs(600), &mut |_| {}).unwrap();
+    let (vehicle, address) = (mission.vehicle(), mission.address());
+    assert!(vehicle.is_converged() && vehicle.map().explored() > 100, "{}", vehicle.map().explored());
+    assert_eq!(mission.surface().map(address), Some(vehicle.map()));
+    let view = mission.surface().view(address).unwrap();
+    let layer = view.layer(view.layers().id("elevation").unwrap()).unwrap();
+    let quantity = |x, y| layer.descriptor().middle(layer.levels().shown().get(Cell::new(x, y)));
+    assert!((quantity(10, 3).unwrap() + 25.0).abs() < 0.11 && quantity(WIDTH, 3).is_none());
+    let own = view.layer(view.layers().id("curiosity").unwrap()).unwrap();
+    assert_eq!(own.descriptor().middle(own.levels().shown().get(Cell::new(10, 3))), Some(5.5), "whole bits");
+    let is_inside = |cell: Cell| (0..WIDTH).contains(&cell.x) && (0..HEIGHT).contains(&cell.y);
+    assert!(own.levels().shown().iter().all(|(cell, _)| is_inside(cell)), "those of the scene model are gone");
+    let refused = mission.refused_labels();
+    assert!(refused.len() == 1 && refused[0].contains("bands alone"), "{refused:?}");
+    std::fs::remove_dir_all(&dir).unwrap();
+}

@@ -4,7 +4,6 @@ use super::feed::{Feed, Feeds};
 use super::topic::TopicFeed;
 use crate::checkpoint::CheckpointFile;
 use crate::journal::Folder;
-use crate::ros2::RosSensors;
 use scenecast_config::{Config, LabelMessage, LabelSource};
 use scenecast_core::UserError;
 use scenecast_files::LabelFolder;
@@ -20,11 +19,14 @@ pub(crate) fn restore(config: &Config, file: &CheckpointFile<Folder>) -> Option<
     restored.inspect_err(|why| tracing::error!("{}: {why}; the labels start from scratch", file.path().display())).ok()
 }
 
+/// How a topic of ROS 2 is opened.
+pub(crate) type OpenTopic<'a> = &'a dyn Fn(TopicFeed) -> Result<Feed, UserError>;
+
 /// Opens the configured sources. Folders resume after the last items in `map`.
-pub(crate) fn open(config: &Config, map: &ForeignMap, sensors: &RosSensors) -> Result<Feeds, UserError> {
+pub(crate) fn open(config: &Config, map: &ForeignMap, topic: OpenTopic<'_>) -> Result<Feeds, UserError> {
     let sources = [(ForeignSource::Labels, &config.labels.source), (ForeignSource::Bands, &config.bands.source)];
     let opened = sources.into_iter().filter(|(_, place)| **place != LabelSource::SceneModel);
-    let opened = opened.map(|(source, place)| Ok((source, feed(config, source, place, map.mark(source), sensors)?)));
+    let opened = opened.map(|(source, place)| Ok((source, feed(config, source, place, map.mark(source), topic)?)));
     Ok(Feeds::new(opened.collect::<Result<_, UserError>>()?))
 }
 
@@ -34,7 +36,7 @@ fn feed(
     source: ForeignSource,
     place: &LabelSource,
     mark: Option<&str>,
-    sensors: &RosSensors,
+    open_topic: OpenTopic<'_>,
 ) -> Result<Feed, UserError> {
     let (key, usual) = match source {
         ForeignSource::Labels => ("labels.source", LabelMessage::OccupancyGrid),
@@ -53,7 +55,7 @@ fn feed(
         LabelSource::Local(_) => Err(UserError::Input(format!("{key}: this system has no Unix sockets"))),
         LabelSource::Ros2(topic, message) => {
             let (topic, message) = (topic.clone(), message.unwrap_or(usual));
-            sensors.labels(TopicFeed { topic, message, source, frame: config.labels.frame.clone() })
+            open_topic(TopicFeed { topic, message, source, frame: config.labels.frame.clone() })
         }
     }
 }

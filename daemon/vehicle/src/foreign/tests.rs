@@ -205,3 +205,40 @@ fn a_restored_map_is_given_away_whole() {
     let (mut after, _) = ForeignMap::restore(&config, &before.save(1)).unwrap();
     assert_eq!(after.take_changes(100), given);
 }
+
+/// `SCENECAST_LARGE_MAP=2000` measures four million cells.
+#[test]
+#[expect(clippy::disallowed_methods, reason = "it measures how long the vehicle's loop takes")]
+fn slices_of_a_large_map_add_up_in_the_vehicle() {
+    use scenecast_protocol::time::Instant;
+    let side = std::env::var("SCENECAST_LARGE_MAP").ok().and_then(|side| side.parse().ok()).unwrap_or(300u32);
+    let config = config(&["scene.cell_m=0.5", "labels.source=dir:labels"]);
+    let profile = scenecast_config::modem_profile(&config, config.modem.bit_rate);
+    let area = scenecast_core::Area { west: 0.0, south: 0.0, east: 1000.0, north: 1000.0 };
+    let mut vehicle =
+        crate::assemble(&config, None, profile, area, crate::Durable::default(), 1, Instant::ZERO).unwrap();
+    let mut map = ForeignMap::new(&config, 0);
+    let values: Vec<u8> = (0..side * side).map(|i| ((i / 300 + i / side / 40) % 20) as u8).collect();
+    map.handle_item(&grid(side, &values), ForeignSource::Labels, None, 0.0).unwrap();
+    for round in 0..3u8 {
+        let (mut longest, mut slices, mut persisted) = (0f64, 0, 0);
+        while map.has_changes() {
+            let update = map.take_changes(1 << 13);
+            let began = std::time::Instant::now();
+            vehicle.handle_foreign(&update, Instant::ZERO);
+            while let Some(output) = vehicle.poll_output() {
+                if output == crate::VehicleOutput::Persist {
+                    persisted += 1;
+                    vehicle.handle_persisted();
+                }
+            }
+            longest = longest.max(began.elapsed().as_secs_f64());
+            slices += 1;
+        }
+        println!("round {round}: {slices} slices, the longest takes {:.1} ms", longest * 1e3);
+        assert!(vehicle.map() == map.labels(), "round {round}");
+        assert_eq!(persisted, 1, "the labels are stored once, before the first of them is sent");
+        // A class that was not there before.
+        map.handle_item(&grid(1, &[round + 30]), ForeignSource::Labels, None, 1.0).unwrap();
+    }
+}
