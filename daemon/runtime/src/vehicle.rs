@@ -87,7 +87,7 @@ pub fn run_vehicle(load: Load, simulated: Option<SimulatedAutopilot>) -> Result<
         let labels = labels.map(|(map, keep)| {
             let names = config.labels.classes.as_deref().map(read_class_names).transpose()?;
             let names = names.map_or(Vec::new(), |item| item.classes);
-            let feeds = labels::open(&config, &map, &|topic| sensors.labels(topic))?;
+            let feeds = labels::open(&config, &map, &|topic| labels::topic(&sensors, topic))?;
             LabelThread::start(map, &names, feeds, keep, clock)
         });
         let labels = labels.transpose()?;

@@ -7,7 +7,6 @@ pub(crate) use without::RosSensors;
 
 #[cfg(feature = "ros2")]
 mod with {
-    use crate::labels::{Feed, TopicFeed, topic};
     use scenecast_config::Config;
     use scenecast_core::UserError;
     use scenecast_sources::{ArrivalClock, LiveSource, RosCamera, RosNavigation, SensorNode};
@@ -33,9 +32,9 @@ mod with {
             LiveSource::start(RosCamera::new(self.0.clone(), topic, clock, needs_stamps), stall)
         }
 
-        /// A feed of labels or bands.
-        pub(crate) fn labels(&self, wanted: TopicFeed) -> Result<Feed, UserError> {
-            topic(self.0.clone(), wanted)
+        /// The node, for other topics.
+        pub(crate) fn node(&self) -> Arc<SensorNode> {
+            self.0.clone()
         }
 
         pub(crate) fn navigation(&self, topic: &str, stall: Duration) -> std::io::Result<LiveSource> {
@@ -46,7 +45,6 @@ mod with {
 
 #[cfg(not(feature = "ros2"))]
 mod without {
-    use crate::labels::{Feed, TopicFeed};
     use scenecast_config::{CameraSource, Config, LabelSource, NavigationSource};
     use scenecast_core::UserError;
     use scenecast_sources::{ArrivalClock, LiveSource};
@@ -70,10 +68,6 @@ mod without {
 
         pub(crate) fn camera(&self, _: &str, _: ArrivalClock, _: bool, _: Duration) -> Result<LiveSource> {
             Err(Error::from(ErrorKind::Unsupported))
-        }
-
-        pub(crate) fn labels(&self, wanted: TopicFeed) -> std::result::Result<Feed, UserError> {
-            Err(UserError::Input(format!("{}: this build has no ROS 2", wanted.topic)))
         }
 
         pub(crate) fn navigation(&self, _: &str, _: Duration) -> Result<LiveSource> {
