@@ -1,8 +1,7 @@
 //! The faults of the sensors, as the vehicle reports them.
 
-use crate::camera::Camera;
 use scenecast_protocol::wire::EquipmentFaults;
-use scenecast_sensors::CameraTally;
+use scenecast_sensors::{CameraFault, CameraTally};
 use std::time::{Duration, Instant};
 
 /// A fault is reported for this long after it was counted last.
@@ -33,17 +32,19 @@ pub(crate) struct SensorFaults {
 }
 
 impl SensorFaults {
-    /// The faults now, when no pose has come in for `pose_gap`; `labels_refused` is whether labels of other programs fail.
+    /// The faults now: what became of the images of a live camera, whether none comes in, and that no pose has come in for
+    /// `pose_gap`; `labels_refused` is whether labels of other programs fail.
     pub(crate) fn now(
         &mut self,
-        camera: &Camera,
+        camera: Option<&CameraTally>,
+        camera_silent: bool,
         pose_gap: Option<Duration>,
         labels_refused: bool,
         now: Instant,
     ) -> EquipmentFaults {
-        let (dropped, unusable) = camera.tally().map_or((0, 0), |tally| (tally.dropped(), unusable_poses(tally)));
+        let (dropped, unusable) = camera.map_or((0, 0), |tally| (unusable_images(tally), unusable_poses(tally)));
         EquipmentFaults {
-            camera_silent: camera.is_silent(),
+            camera_silent,
             images_dropped: self.images.handle(dropped, now),
             poses_missing: pose_gap.is_some(),
             poses_faulty: self.poses.handle(unusable, now),
@@ -53,6 +54,11 @@ impl SensorFaults {
     }
 }
 
+/// Images that were dropped, without those of a camera that is faster than the scene model: to drop them is no fault.
+fn unusable_images(tally: &CameraTally) -> u64 {
+    tally.dropped() - tally.of(CameraFault::Overtaken)
+}
+
 fn unusable_poses(tally: &CameraTally) -> u64 {
     tally.iter().filter(|(fault, _)| fault.is_of_navigation()).map(|(_, n)| n).sum()
 }
@@ -60,6 +66,16 @@ fn unusable_poses(tally: &CameraTally) -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_camera_that_is_faster_than_the_scene_model_has_no_fault() {
+        let (mut faults, mut tally, now) = (SensorFaults::default(), CameraTally::default(), Instant::now());
+        let mut images_dropped = |tally: &CameraTally| faults.now(Some(tally), false, None, false, now).images_dropped;
+        tally.count(CameraFault::Overtaken);
+        assert!(!images_dropped(&tally));
+        tally.count(CameraFault::CutOff);
+        assert!(images_dropped(&tally));
+    }
 
     #[test]
     fn a_fault_is_recent_for_ten_seconds_after_the_last_one() {

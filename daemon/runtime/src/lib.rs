@@ -13,6 +13,7 @@ mod instruments;
 mod journal;
 #[cfg(test)]
 mod kept_label_tests;
+mod label_health;
 mod labels;
 #[cfg(feature = "surface")]
 mod map_files;

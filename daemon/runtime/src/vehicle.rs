@@ -87,7 +87,7 @@ pub fn run_vehicle(load: Load, simulated: Option<SimulatedAutopilot>) -> Result<
         let labels = labels.map(|(map, keep)| {
             let names = config.labels.classes.as_deref().map(read_class_names).transpose()?;
             let names = names.map_or(Vec::new(), |item| item.classes);
-            let feeds = labels::open(&config, &map, &|topic| sensors.labels(topic))?;
+            let feeds = labels::open(&config, &map, &|topic| labels::topic(&sensors, topic))?;
             LabelThread::start(map, &names, feeds, keep, clock)
         });
         let labels = labels.transpose()?;
@@ -200,7 +200,13 @@ impl VehicleShell {
         self.host.handle_pose_gap(unseen);
         let labels = self.labels.thread.as_ref().map(LabelThread::health);
         let is_refusing = labels.is_some_and(|health| health.is_failing);
-        let faults = self.faults.now(&self.camera, unseen, is_refusing, std::time::Instant::now());
+        let faults = self.faults.now(
+            self.camera.tally(),
+            self.camera.is_silent(),
+            unseen,
+            is_refusing,
+            std::time::Instant::now(),
+        );
         self.host.handle_faults(faults);
         if let Some(pose) = self.camera.poll_pose() {
             self.host.handle_pose(pose, self.clock.now());

@@ -7,7 +7,7 @@ use super::status::StatusError;
 /// ```text
 /// bit  field               1 means
 ///  0   camera silent       no image comes in: the camera is lost or stalled
-///  1   images dropped      an image was dropped within the last 10 s
+///  1   images dropped      an image that could not be used was dropped within the last 10 s
 ///  2   poses missing       no pose comes in from the navigation source, so the vehicle holds its position
 ///  3   poses faulty        within the last 10 s, the navigation source gave a pose that could not be used
 ///  4   autopilot refuses   it answers and does not follow: it is disarmed, in a mode of the pilot's, or has another target
@@ -20,7 +20,7 @@ use super::status::StatusError;
 pub struct EquipmentFaults {
     /// No image comes in.
     pub camera_silent: bool,
-    /// An image was dropped within the last 10 s.
+    /// An image that could not be used was dropped within the last 10 s.
     pub images_dropped: bool,
     /// No pose comes in from the navigation source.
     pub poses_missing: bool,

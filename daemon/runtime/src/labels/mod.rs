@@ -1,7 +1,6 @@
 //! Labels of other programs: their sources, and the thread that makes them a map.
 
 mod feed;
-mod health;
 #[cfg(unix)]
 mod local;
 mod moment;
@@ -12,17 +11,14 @@ mod serve;
 mod topic;
 
 use feed::Arrived;
-pub(super) use feed::{Feed, Feeds};
-pub(super) use health::LabelHealth;
-use health::LabelTally;
+pub(super) use feed::Feeds;
 use own_poses::OwnPoses;
 use pace::Pace;
 pub(super) use restore::{open, restore};
-pub(super) use topic::TopicFeed;
-#[cfg(feature = "ros2")]
 pub(super) use topic::topic;
 
 use super::clock::Clock;
+use super::label_health::{LabelHealth, LabelTally};
 use super::mapping::Keep;
 use scenecast_config::{AutopilotKind, Config, LabelSource, NavigationSource};
 use scenecast_core::UserError;

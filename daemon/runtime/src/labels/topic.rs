@@ -1,6 +1,9 @@
 //! Topics of ROS 2 with labels or bands.
 
+use super::feed::Feed;
+use crate::ros2::RosSensors;
 use scenecast_config::{LabelMessage, RosName};
+use scenecast_core::UserError;
 use scenecast_vehicle::ForeignSource;
 
 /// A topic to be read.
@@ -14,8 +17,17 @@ pub(crate) struct TopicFeed {
     pub(crate) frame: String,
 }
 
+/// Reads a topic on a thread of its own.
 #[cfg(feature = "ros2")]
-pub(crate) use with::topic;
+pub(crate) fn topic(sensors: &RosSensors, wanted: TopicFeed) -> Result<Feed, UserError> {
+    with::topic(sensors.node(), wanted)
+}
+
+/// This build has no ROS 2, and refuses topics before.
+#[cfg(not(feature = "ros2"))]
+pub(crate) fn topic(_: &RosSensors, wanted: TopicFeed) -> Result<Feed, UserError> {
+    Err(UserError::Input(format!("{}: this build has no ROS 2", wanted.topic)))
+}
 
 #[cfg(feature = "ros2")]
 mod with {
@@ -37,8 +49,7 @@ mod with {
 
     type Items = Vec<Result<Item, Refusal>>;
 
-    /// Reads a topic on a thread of its own.
-    pub(crate) fn topic(node: Arc<SensorNode>, wanted: TopicFeed) -> Result<Feed, UserError> {
+    pub(super) fn topic(node: Arc<SensorNode>, wanted: TopicFeed) -> Result<Feed, UserError> {
         let (queue, feed) = LabelQueue::new();
         let read = move || {
             let mut is_logged = false;

@@ -7,7 +7,6 @@ pub(crate) use without::RosSensors;
 
 #[cfg(feature = "ros2")]
 mod with {
-    use crate::labels::{Feed, TopicFeed, topic};
     use scenecast_config::{CalibrationSource, CameraStamps, Config, DepthSource};
     use scenecast_core::UserError;
     use scenecast_sensors::BitDepth;
@@ -53,9 +52,9 @@ mod with {
             LiveSource::start(depth, Duration::from_secs_f64(c.timeout_s)).map(Some)
         }
 
-        /// A feed of labels or bands.
-        pub(crate) fn labels(&self, wanted: TopicFeed) -> Result<Feed, UserError> {
-            topic(self.0.clone(), wanted)
+        /// The node, for other topics.
+        pub(crate) fn node(&self) -> Arc<SensorNode> {
+            self.0.clone()
         }
 
         pub(crate) fn navigation(&self, topic: &str, stall: Duration) -> std::io::Result<LiveSource> {
@@ -70,7 +69,6 @@ mod with {
 
 #[cfg(not(feature = "ros2"))]
 mod without {
-    use crate::labels::{Feed, TopicFeed};
     use scenecast_config::{CameraSource, Config, DepthSource, LabelSource, NavigationSource};
     use scenecast_core::UserError;
     use scenecast_sources::{ArrivalClock, LiveSource};
@@ -95,10 +93,6 @@ mod without {
 
         pub(crate) fn camera(&self, _: &str, _: ArrivalClock, _: &Config) -> Result<LiveSource> {
             Err(Error::from(ErrorKind::Unsupported))
-        }
-
-        pub(crate) fn labels(&self, wanted: TopicFeed) -> std::result::Result<Feed, UserError> {
-            Err(UserError::Input(format!("{}: this build has no ROS 2", wanted.topic)))
         }
 
         #[expect(clippy::unnecessary_wraps, reason = "a build with ROS 2 starts a thread")]

@@ -19,7 +19,7 @@ pub(crate) struct LabelHealth {
 
 /// Counts items.
 #[derive(Debug, Default)]
-pub(super) struct LabelTally {
+pub(crate) struct LabelTally {
     taken: u64,
     refused: u64,
     last_refusal: Option<(String, Instant)>,
@@ -27,20 +27,20 @@ pub(super) struct LabelTally {
 }
 
 impl LabelTally {
-    pub(super) fn take(&mut self) {
+    pub(crate) fn take(&mut self) {
         self.taken += 1;
     }
 
-    pub(super) fn refuse(&mut self, text: String, now: Instant) {
+    pub(crate) fn refuse(&mut self, text: String, now: Instant) {
         self.refused += 1;
         self.last_refusal = Some((text, now));
     }
 
-    pub(super) fn set_missing(&mut self, is_missing: bool) {
+    pub(crate) fn set_missing(&mut self, is_missing: bool) {
         self.is_missing = is_missing;
     }
 
-    pub(super) fn health(&self, now: Instant) -> LabelHealth {
+    pub(crate) fn health(&self, now: Instant) -> LabelHealth {
         let last = self.last_refusal.as_ref();
         let is_new = last.is_some_and(|(_, at)| now.saturating_duration_since(*at) < FAULT_LASTS);
         LabelHealth {
