@@ -7,14 +7,17 @@
 //! $SCRMB,A,0.00,L,,SC,ddmm.mmmmm,N,dddmm.mmmmm,E,miles,degrees,,V*hh   way to it
 //! $PSCWP,east,north,depth*hh                                           metres still to go, depth or nothing
 //! ```
-//! and `$PSCHD*hh` while the vehicle holds its position. The driver reads positions (GGA, RMC), headings (HDT, THS) and
-//! depths below the surface (DBS).
+//! and `$PSCHD*hh` while the vehicle holds its position. The driver reads positions (GGA, RMC), headings (HDT, THS),
+//! depths below the surface (DBS) and heights of the transducer above the sea floor (DPT, DBT).
 
 use super::{Autopilot, Counters, Goal, Health, Step, Tray};
 use scenecast_core::gps::{Gps, GpsLanguage};
 use scenecast_core::{LatLon, Lines, TangentPlane, nmea};
 use scenecast_protocol::time::Instant;
 use std::time::Duration;
+
+/// A height counts for this long.
+const HEIGHT_LASTS: Duration = Duration::from_secs(2);
 
 /// A state machine of lines.
 #[derive(Debug)]
@@ -26,6 +29,8 @@ pub struct Nmea {
     silence: Duration,
     heard: Option<Instant>,
     depth_m: f64,
+    /// Height of the transducer above the sea floor, metres.
+    height: Option<(f64, Instant)>,
     at: Option<(LatLon, Instant)>,
     goal: Option<Goal>,
     has_order: bool,
@@ -44,6 +49,7 @@ impl Nmea {
             silence,
             heard: None,
             depth_m: 0.0,
+            height: None,
             at: None,
             goal: None,
             has_order: false,
@@ -77,23 +83,33 @@ impl Nmea {
             let passed = now.since(at);
             if dx_m.hypot(dy_m) > 20.0 * passed.as_secs_f64().max(0.1) {
                 self.tray.count("jumps");
-                return self.push_step(0.0, 0.0, heading_rad, passed);
+                return self.push_step(0.0, 0.0, heading_rad, passed, now);
             }
             if let Some(goal) = &mut self.goal {
                 (goal.east_m, goal.north_m) = (goal.east_m - dx_m, goal.north_m - dy_m);
             }
-            self.push_step(dx_m, dy_m, heading_rad, Duration::ZERO);
+            self.push_step(dx_m, dy_m, heading_rad, Duration::ZERO, now);
         }
     }
 
-    fn push_step(&mut self, dx_m: f64, dy_m: f64, heading_rad: f64, unseen: Duration) {
-        self.tray.walk(Step { dx_m, dy_m, heading_rad, depth_m: self.depth_m, unseen, ..Step::default() });
+    fn push_step(&mut self, dx_m: f64, dy_m: f64, heading_rad: f64, unseen: Duration, now: Instant) {
+        let height = self.height.filter(|(_, at)| now.since(*at) < HEIGHT_LASTS);
+        let (depth_m, altitude_m) = (self.depth_m, height.map(|(height_m, _)| height_m));
+        self.tray.walk(Step { dx_m, dy_m, heading_rad, depth_m, altitude_m, unseen, ..Step::default() });
     }
 
-    /// DBS: feet, f, metres, M, fathoms, F.
-    fn handle_depth(&mut self, line: &[u8]) -> Option<f64> {
+    /// DBS and DBT: feet, f, metres, M, fathoms, F. DPT: metres, offset of the transducer.
+    fn handle_sounding(&mut self, line: &[u8], now: Instant) -> Option<()> {
         let fields = nmea::fields(line).ok()?;
-        fields.first()?.ends_with("DBS").then(|| fields.get(3)?.parse().ok()).flatten()
+        let metres = |index: usize| fields.get(index)?.parse::<f64>().ok().filter(|m| (0.0..12_000.0).contains(m));
+        match fields.first()?.get(2..)? {
+            "DBS" => self.depth_m = metres(3)?,
+            // Sounders without a bottom send 0 or nothing.
+            "DBT" => self.height = metres(3).filter(|m| *m > 0.0).map(|m| (m, now)),
+            "DPT" => self.height = metres(1).filter(|m| *m > 0.0).map(|m| (m, now)),
+            _ => {}
+        }
+        Some(())
     }
 }
 
@@ -108,9 +124,7 @@ impl Autopilot for Nmea {
         let mut lines = Vec::new();
         self.lines.push(bytes, |line| lines.push(line.to_vec()));
         for line in lines {
-            if let Some(depth) = self.handle_depth(&line).filter(|d: &f64| (0.0..12_000.0).contains(d)) {
-                self.depth_m = depth;
-            }
+            let _ = self.handle_sounding(&line, now);
             if nmea::fields(&line).is_ok() {
                 if self.heard.is_none() || self.was_silent {
                     self.tray.note("the autopilot answers");
@@ -205,11 +219,12 @@ mod tests {
         for s in 0..3u32 {
             let place = nmea::place_fields(plane.to_place(f64::from(s), 0.0));
             let gga = nmea::line(&format!("GPGGA,0000{s:02},{place},1,9,1,0,M,0,M,,"));
-            let depth = nmea::line("SDDBS,,f,7.5,M,,F");
+            let depth = nmea::line("SDDBS,,f,7.5,M,,F") + &nmea::line(["SDDBT,,f,3.5,M,,F", "SDDPT,4.5,0.2", "SDDPT,,"][s as usize]);
             pilot.handle_bytes((nmea::line("HEHDT,90.0,T") + &depth + &gga).as_bytes(), at(f64::from(s)));
         }
         let steps: Vec<Step> = std::iter::from_fn(|| pilot.poll_step()).collect();
         assert_eq!(steps.len(), 2);
+        assert_eq!([steps[0].altitude_m, steps[1].altitude_m], [Some(4.5), None], "the last sounder has no bottom");
         assert!((steps[0].dx_m - 1.0).abs() < 0.03 && steps[0].depth_m == 7.5, "{steps:?}");
         for s in 3..12 {
             pilot.handle_timeout(at(f64::from(s)));
