@@ -1,7 +1,7 @@
 //! Compressed images: JPEG, PNG, PPM and TIFF.
 
-use crate::Stamp;
-use image::{ImageReader, Limits, RgbImage};
+use crate::{BitDepth, Stamp};
+use image::{DynamicImage, ImageBuffer, ImageReader, Limits, Rgb, RgbImage};
 use std::io::Cursor;
 
 /// Pixels of the largest image that is decoded.
@@ -25,8 +25,9 @@ pub fn is_cut_jpeg(bytes: &[u8]) -> bool {
     bytes.starts_with(&[0xFF, 0xD8]) && !bytes.windows(2).rev().take(4096).any(|w| w == [0xFF, 0xD9])
 }
 
-/// Decodes an image to 8 bits a channel. Of 16 bits, the upper 8 are kept; transparency is dropped.
-pub fn decode(bytes: &[u8]) -> Result<RgbImage, DecodeError> {
+/// Decodes an image to 8 bits a channel; of 16 bits, `bits` gives the highest level, or 16 where it is automatic. Transparency is
+/// dropped.
+pub fn decode(bytes: &[u8], bits: BitDepth) -> Result<RgbImage, DecodeError> {
     if is_cut_jpeg(bytes) {
         return Err(DecodeError::CutJpeg);
     }
@@ -41,7 +42,20 @@ pub fn decode(bytes: &[u8]) -> Result<RgbImage, DecodeError> {
     }
     let mut reader = reader().map_err(|e| DecodeError::Broken(e.to_string()))?;
     reader.limits(limits());
-    Ok(reader.decode().map_err(broken)?.into_rgb8())
+    Ok(match (reader.decode().map_err(broken)?, bits) {
+        (image, BitDepth::Fixed(bits)) if bits < 16 && is_deep(&image) => scaled(&image.into_rgb16(), bits),
+        (image, _) => image.into_rgb8(),
+    })
+}
+
+fn is_deep(image: &DynamicImage) -> bool {
+    use DynamicImage::{ImageLuma16, ImageLumaA16, ImageRgb16, ImageRgba16};
+    matches!(image, ImageLuma16(_) | ImageLumaA16(_) | ImageRgb16(_) | ImageRgba16(_))
+}
+
+fn scaled(image: &ImageBuffer<Rgb<u16>, Vec<u16>>, bits: u8) -> RgbImage {
+    let level = |level| BitDepth::Fixed(bits).scaled(level);
+    RgbImage::from_fn(image.width(), image.height(), |x, y| Rgb(image.get_pixel(x, y).0.map(level)))
 }
 
 fn limits() -> Limits {
@@ -83,6 +97,8 @@ mod tests {
         RgbImage::from_fn(9, 7, |x, y| Rgb([x as u8 * 20, y as u8 * 30, 7]))
     }
 
+    const WHOLE: BitDepth = BitDepth::Fixed(16);
+
     fn encoded(format: ImageFormat) -> Vec<u8> {
         if format == ImageFormat::Pnm {
             return [b"P6 9 7 255\n".as_slice(), image().as_raw()].concat();
@@ -93,18 +109,32 @@ mod tests {
     }
 
     #[test]
+    fn levels_of_twelve_bits_are_scaled_to_their_white() {
+        let levels = [0, 2048, 4095, 60_000];
+        let deep = ImageBuffer::<image::Luma<u16>, _>::from_vec(4, 1, levels.to_vec()).unwrap();
+        for format in [ImageFormat::Png, ImageFormat::Tiff] {
+            let mut bytes = Cursor::new(Vec::new());
+            DynamicImage::ImageLuma16(deep.clone()).write_to(&mut bytes, format).unwrap();
+            let greys = |bits| decode(bytes.get_ref(), bits).unwrap().pixels().map(|p| p.0[0]).collect::<Vec<_>>();
+            assert_eq!(greys(BitDepth::Fixed(12)), [0, 128, 255, 255], "{format:?}");
+            assert_eq!(greys(WHOLE), [0, 8, 16, 233], "{format:?}");
+        }
+        assert_eq!(decode(&encoded(ImageFormat::Png), BitDepth::Fixed(12)).unwrap(), image(), "8 bits stay");
+    }
+
+    #[test]
     fn images_are_decoded_and_others_named() {
         for format in [ImageFormat::Png, ImageFormat::Pnm, ImageFormat::Tiff] {
-            assert_eq!(decode(&encoded(format)).unwrap(), image(), "{format:?}");
+            assert_eq!(decode(&encoded(format), WHOLE).unwrap(), image(), "{format:?}");
         }
         let jpeg = encoded(ImageFormat::Jpeg);
-        assert_eq!(decode(&jpeg).unwrap().dimensions(), (9, 7));
-        assert_eq!(decode(&jpeg[..jpeg.len() - 2]), Err(DecodeError::CutJpeg));
-        assert_eq!(decode(b"no image at all"), Err(DecodeError::UnknownFormat));
+        assert_eq!(decode(&jpeg, WHOLE).unwrap().dimensions(), (9, 7));
+        assert_eq!(decode(&jpeg[..jpeg.len() - 2], WHOLE), Err(DecodeError::CutJpeg));
+        assert_eq!(decode(b"no image at all", WHOLE), Err(DecodeError::UnknownFormat));
         let huge = b"P6\n100000 100000\n255\n";
-        assert_eq!(decode(huge), Err(DecodeError::TooLarge { width: 100_000, height: 100_000 }));
+        assert_eq!(decode(huge, WHOLE), Err(DecodeError::TooLarge { width: 100_000, height: 100_000 }));
         let cut = encoded(ImageFormat::Png);
-        assert!(matches!(decode(&cut[..60]), Err(DecodeError::Broken(_))));
+        assert!(matches!(decode(&cut[..60], WHOLE), Err(DecodeError::Broken(_))));
     }
 
     #[test]

@@ -131,7 +131,7 @@ impl Bench {
                 let (at, size) = (self.pick(3), (6, 4));
                 let bytes = damage(&self.pictures[at].clone(), &mut self.random);
                 let _ = (own_stamp(&bytes), is_cut_jpeg(&bytes));
-                scenecast_sensors::decode(&bytes).is_ok_and(|image| image.dimensions() == size)
+                scenecast_sensors::decode(&bytes, BitDepth::Fixed(12)).is_ok_and(|image| image.dimensions() == size)
             }
             1 => {
                 let at = self.pick(3);

@@ -1,7 +1,7 @@
 //! The pixels of an image, as they came in.
 
 use image::RgbImage;
-use scenecast_sensors::{DecodeError, decode};
+use scenecast_sensors::{BitDepth, DecodeError, decode};
 
 /// An image that is decoded where it is mapped, so that a slow decoder does not hold up its source.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -12,10 +12,10 @@ pub enum Picture {
 }
 
 impl Picture {
-    /// The image with 8 bits a channel.
-    pub fn into_rgb(self) -> Result<RgbImage, DecodeError> {
+    /// The image with 8 bits a channel; `bits` are those of the levels of a compressed image with 16.
+    pub fn into_rgb(self, bits: BitDepth) -> Result<RgbImage, DecodeError> {
         match self {
-            Self::Compressed(bytes) => decode(&bytes),
+            Self::Compressed(bytes) => decode(&bytes, bits),
             Self::Rgb(image) => Ok(image),
         }
     }

@@ -61,7 +61,7 @@ impl Bag {
     fn decode(&self, message: &BagMessage) -> Result<RgbImage, String> {
         if self.topic.kind == COMPRESSED {
             let image: CompressedImage = decode_cdr(&message.bytes).map_err(|e| e.to_string())?;
-            return scenecast_sensors::decode(&image.data).map_err(|e| e.to_string());
+            return scenecast_sensors::decode(&image.data, self.bits).map_err(|e| e.to_string());
         }
         let image: Image = decode_cdr(&message.bytes).map_err(|e| e.to_string())?;
         let mut bits = self.bits;

@@ -10,7 +10,7 @@ use scenecast_core::UserError;
 use scenecast_files::{configured_calibration, configured_mounting};
 use scenecast_host::{CameraPose, MeasuredPose};
 use scenecast_sensors::{
-    Calibration, CameraFault, CameraMounting, CameraTally, DepthError, FrameMatcher, Limits, MatchedImage, Sight, Stamp,
+    BitDepth, Calibration, CameraFault, CameraMounting, CameraTally, DepthError, FrameMatcher, Limits, MatchedImage, Sight, Stamp,
 };
 use scenecast_sources::{
     ArrivalClock, CommandSource, DvlSource, LiveSource, Picture, Reading, SensorKind, SourceImage, SourceReport,
@@ -39,6 +39,8 @@ pub(crate) struct LiveCamera {
     pending: Option<(MatchedImage<LiveImage>, Stamp)>,
     clock: ArrivalClock,
     times: ImageTimes,
+    /// The bits of levels in compressed images with 16.
+    bits: BitDepth,
     /// The calibration by the settings.
     calibration: Option<Arc<Calibration>>,
     mounting: CameraMounting,
@@ -113,6 +115,7 @@ impl LiveCamera {
                 delay: Duration::from_secs_f64(c.delay_s),
                 clock_offset_s: c.clock_offset_s,
             },
+            bits: BitDepth::of_setting(c.bits),
             calibration: configured_calibration(config)?,
             mounting: configured_mounting(config),
             altitude_m: config.survey.altitude_m,
@@ -250,7 +253,7 @@ impl LiveCamera {
             let pose = self.mounting.camera_pose(&pose, self.altitude_m)?;
             // A pixel's size on the floor grows with the height.
             let scale = pose.altitude_m.map_or(1.0, |height| (height / self.altitude_m).clamp(SCALES.0, SCALES.1));
-            let received = ReceivedImage { picture, sight: None, depth: None };
+            let received = ReceivedImage { picture, bits: self.bits, sight: None, depth: None };
             return Some(CameraFrame { t_s, picture: FramePicture::Received(Box::new(received)), pose, scale });
         };
         let camera = self.mounting.mounted_camera(&pose, self.altitude_m)?;
@@ -264,7 +267,7 @@ impl LiveCamera {
         };
         let height_m = camera.height_m.clamp(SCALES.0 * self.altitude_m, SCALES.1 * self.altitude_m);
         let sight = Some(Sight { calibration, tilt: camera.tilt, height_m });
-        let received = ReceivedImage { picture, sight, depth };
+        let received = ReceivedImage { picture, bits: self.bits, sight, depth };
         let picture = FramePicture::Received(Box::new(received));
         Some(CameraFrame { t_s, picture, pose: camera.pose, scale: 1.0 })
     }

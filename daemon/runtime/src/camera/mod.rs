@@ -15,7 +15,7 @@ use scene_model::project::View;
 use scenecast_core::UserError;
 use scenecast_files::RecordedFrame;
 use scenecast_host::{CameraPose, MeasuredPose};
-use scenecast_sensors::{CameraTally, DepthError, DepthMessage, SensorPose, Sight};
+use scenecast_sensors::{BitDepth, CameraTally, DepthError, DepthMessage, SensorPose, Sight};
 use scenecast_sources::Picture;
 use std::time::Duration;
 
@@ -44,6 +44,8 @@ pub(crate) enum FramePicture {
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct ReceivedImage {
     pub(crate) picture: Picture,
+    /// The bits of levels in a compressed image with 16.
+    pub(crate) bits: BitDepth,
     /// The calibrated camera.
     pub(crate) sight: Option<Sight>,
     /// The distances that belong to the image, and the units of whole numbers in a metre.
@@ -83,7 +85,7 @@ impl CameraFrame {
 impl ReceivedImage {
     /// The image without distortion, and what it sees. Distances that cannot be used leave the floor flat.
     fn read(self) -> Result<ReadFrame, String> {
-        let image = self.picture.into_rgb().map_err(|error| error.to_string())?;
+        let image = self.picture.into_rgb(self.bits).map_err(|error| error.to_string())?;
         let Some(sight) = self.sight else { return Ok(ReadFrame { image, view: None, unusable_depth: None }) };
         let camera = sight.calibration.camera();
         let read = self.depth.map(|(message, units_per_m)| message.read(&camera, image.dimensions(), units_per_m));
