@@ -93,7 +93,7 @@ impl Surface {
     pub(super) fn log_faults(&mut self, vehicle: Address, now: Instant) {
         let Some((status, _)) = self.link.vehicle(vehicle).and_then(|view| view.status()) else { return };
         let faults = status.faults;
-        if let Some(text) = self.watches.entry(vehicle).or_default().handle_faults(faults) {
+        if let Some(text) = self.watches.entry(vehicle).or_default().handle_faults(faults, now) {
             self.log_fact(vehicle, LogKind::Fault, &text, now);
         }
     }

@@ -55,6 +55,12 @@ impl EquipmentFaults {
         .filter_map(|(is_set, text, is_grave)| is_set.then_some((text, is_grave)))
     }
 
+    /// The grave faults alone.
+    #[must_use]
+    pub fn grave(self) -> Self {
+        Self { images_dropped: false, poses_faulty: false, labels_refused: false, ..self }
+    }
+
     /// The byte on the wire.
     pub fn encode(self) -> [u8; Self::BYTES] {
         let Self { camera_silent, images_dropped, poses_missing, poses_faulty, autopilot_refuses, labels_refused } =
@@ -89,6 +95,11 @@ mod tests {
         assert_eq!(EquipmentFaults::decode(&[0b1000_1011]), Ok(faults), "reserved bits are not read");
         assert_eq!(EquipmentFaults::decode(&[]), Err(StatusError::Length));
         assert_eq!(EquipmentFaults::decode(&[0, 0]), Err(StatusError::Length));
+        let minor = EquipmentFaults { images_dropped: true, poses_faulty: true, labels_refused: true, ..faults };
+        assert_eq!(minor.grave(), faults);
+        assert!(
+            faults.iter().all(|(_, is_grave)| is_grave) && minor.iter().filter(|(_, is_grave)| !is_grave).count() == 3
+        );
         assert!(faults.is_any() && !EquipmentFaults::default().is_any());
     }
 

@@ -223,6 +223,8 @@ const FIRST_SLOT: u16 = 0x8000;
 impl VehicleStatus {
     /// Length of a report without slots in bytes.
     const REPORT_HEAD: usize = 9 + Backlog::BYTES;
+    /// Length of a pose without a waypoint in bytes.
+    pub(crate) const SHORT_POSE: usize = 15;
     /// Length of a pose with a waypoint, without a path, in bytes.
     pub(crate) const POSE: usize = 21;
 

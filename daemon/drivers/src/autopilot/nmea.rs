@@ -219,7 +219,8 @@ mod tests {
         for s in 0..3u32 {
             let place = nmea::place_fields(plane.to_place(f64::from(s), 0.0));
             let gga = nmea::line(&format!("GPGGA,0000{s:02},{place},1,9,1,0,M,0,M,,"));
-            let depth = nmea::line("SDDBS,,f,7.5,M,,F") + &nmea::line(["SDDBT,,f,3.5,M,,F", "SDDPT,4.5,0.2", "SDDPT,,"][s as usize]);
+            let depth = nmea::line("SDDBS,,f,7.5,M,,F")
+                + &nmea::line(["SDDBT,,f,3.5,M,,F", "SDDPT,4.5,0.2", "SDDPT,,"][s as usize]);
             pilot.handle_bytes((nmea::line("HEHDT,90.0,T") + &depth + &gga).as_bytes(), at(f64::from(s)));
         }
         let steps: Vec<Step> = std::iter::from_fn(|| pilot.poll_step()).collect();

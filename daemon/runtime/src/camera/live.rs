@@ -10,7 +10,8 @@ use scenecast_core::UserError;
 use scenecast_files::{configured_calibration, configured_mounting};
 use scenecast_host::{CameraPose, MeasuredPose};
 use scenecast_sensors::{
-    BitDepth, Calibration, CameraFault, CameraMounting, CameraTally, DepthError, FrameMatcher, Limits, MatchedImage, Sight, Stamp,
+    BitDepth, Calibration, CameraFault, CameraMounting, CameraTally, DepthError, FrameMatcher, Limits, MatchedImage,
+    Sight, Stamp,
 };
 use scenecast_sources::{
     ArrivalClock, CommandSource, DvlSource, LiveSource, Picture, Reading, SensorKind, SourceImage, SourceReport,

@@ -8,6 +8,8 @@ use std::time::Duration;
 /// A vehicle counts as silent after this many times its usual silence, and not before [`LEAST_SILENCE`].
 const SILENCES: u32 = 3;
 const LEAST_SILENCE: Duration = Duration::from_secs(60);
+/// Time between two entries about faults that are not grave.
+const MINOR_PAUSE: Duration = Duration::from_secs(1800);
 
 /// The facts about a vehicle that the log has.
 #[derive(Debug, Default)]
@@ -16,6 +18,8 @@ pub(crate) struct Watch {
     is_silent: bool,
     mode: Option<(VehicleMode, ModeReason)>,
     faults: EquipmentFaults,
+    /// When faults that are not grave were logged last.
+    minor_logged: Option<Instant>,
     /// The labels of an epoch.
     labels: (u8, BTreeSet<u8>),
     /// The next labels are known from an earlier run of the surface.
@@ -47,11 +51,20 @@ impl Watch {
         self.mode.replace((mode, reason)).is_some_and(|before| before != (mode, reason))
     }
 
-    /// The vehicle reports the faults of its equipment. The text is for the log.
-    pub(crate) fn handle_faults(&mut self, faults: EquipmentFaults) -> Option<String> {
+    /// The vehicle reports the faults of its equipment. The text is for the log: at once when a grave fault comes or goes, and
+    /// seldom for the others, which may come and go for hours.
+    pub(crate) fn handle_faults(&mut self, faults: EquipmentFaults, now: Instant) -> Option<String> {
         let before = std::mem::replace(&mut self.faults, faults);
-        let names: Vec<&str> = faults.iter().map(|(text, _)| text).collect();
-        (before != faults).then(|| if names.is_empty() { "no fault any more".to_owned() } else { names.join(", ") })
+        let is_minor_due = self.minor_logged.is_none_or(|at| now.since(at) >= MINOR_PAUSE);
+        let is_minor = faults != faults.grave() && is_minor_due;
+        if before.grave() == faults.grave() && !is_minor {
+            return None;
+        }
+        if faults != faults.grave() {
+            self.minor_logged = Some(now);
+        }
+        let texts: Vec<&str> = faults.iter().map(|(text, _)| text).collect();
+        Some(if texts.is_empty() { "no fault any more".to_owned() } else { texts.join(", ") })
     }
 
     /// Takes the labels on the map; returns those that are new in this epoch.
@@ -104,13 +117,21 @@ mod tests {
     }
 
     #[test]
-    fn a_fault_is_logged_when_it_comes_and_when_it_goes() {
-        let mut watch = Watch::default();
-        let faults = EquipmentFaults { camera_silent: true, autopilot_refuses: true, ..EquipmentFaults::default() };
-        assert_eq!(watch.handle_faults(EquipmentFaults::default()), None);
-        assert_eq!(watch.handle_faults(faults).as_deref(), Some("the autopilot does not follow, no image comes in"));
-        assert_eq!(watch.handle_faults(faults), None);
-        assert_eq!(watch.handle_faults(EquipmentFaults::default()).as_deref(), Some("no fault any more"));
+    fn grave_faults_are_logged_at_once_and_others_seldom() {
+        let (mut watch, none) = (Watch::default(), EquipmentFaults::default());
+        let grave = EquipmentFaults { camera_silent: true, autopilot_refuses: true, ..none };
+        let minor = EquipmentFaults { images_dropped: true, ..none };
+        assert_eq!(watch.handle_faults(none, at(0.0)), None);
+        let text = watch.handle_faults(grave, at(1.0));
+        assert_eq!(text.as_deref(), Some("the autopilot does not follow, no image comes in"));
+        assert_eq!(watch.handle_faults(grave, at(2.0)), None);
+        assert_eq!(watch.handle_faults(none, at(3.0)).as_deref(), Some("no fault any more"));
+        assert_eq!(watch.handle_faults(minor, at(4.0)).as_deref(), Some("images are dropped"));
+        for second in 5..600 {
+            let faults = if second % 2 == 0 { minor } else { none };
+            assert_eq!(watch.handle_faults(faults, at(f64::from(second))), None);
+        }
+        assert_eq!(watch.handle_faults(minor, at(1804.0)).as_deref(), Some("images are dropped"));
     }
 
     #[test]

@@ -1,7 +1,9 @@
 //! The vehicle's status: when its two chunks, pose and report, are due, and how much of a frame they take.
 
 use crate::time::Instant;
-use crate::wire::{ChunkKind, FrameBuilder, Intent, Trail, TrailCorner, VehicleStatus, room_for_payload};
+use crate::wire::{
+    ChunkKind, EquipmentFaults, FrameBuilder, Intent, Trail, TrailCorner, VehicleStatus, room_for_payload,
+};
 use std::time::Duration;
 
 /// Part of the bit budget that each of pose and report may take at most, in a period of its own.
@@ -14,7 +16,11 @@ const SMALL_BUDGET_BPS: u32 = 250;
 /// Intervals between two copies in a period: copies apart from each other are not lost together.
 const COPY_INTERVALS: u32 = 8;
 
-/// Sends the latest status at most once a period, and with at most a twentieth of the bit budget.
+/// Bytes of a frame for faults and the shortest pose, with the headers of both chunks.
+const FAULTS_AND_POSE: usize = EquipmentFaults::BYTES + 2 + VehicleStatus::SHORT_POSE + 1;
+
+/// Sends the latest status once a period, in several frames where [`Self::set_copies`] asks for them. Pose and report take at
+/// most a twentieth of the bit budget.
 #[derive(Debug)]
 pub(super) struct StatusSender {
     period: Duration,
@@ -90,11 +96,17 @@ impl StatusSender {
 
     /// A pose is lost. Another copy of it may have arrived, so that one more is enough.
     pub(super) fn handle_lost_pose(&mut self, now: Instant) {
+        if now < self.pose_due && self.copies.poses == self.copies.each {
+            self.copies.poses = 1;
+        }
         self.pose_due = now;
     }
 
     /// A report is lost; see [`Self::handle_lost_pose`].
     pub(super) fn handle_lost_report(&mut self, now: Instant) {
+        if now < self.report_due && self.copies.reports == self.copies.each {
+            self.copies.reports = 1;
+        }
         (self.report_due, self.report_from) = (now, 0);
     }
 
@@ -139,11 +151,17 @@ impl StatusSender {
     pub(super) fn fill_pose(&mut self, builder: &mut FrameBuilder, now: Instant) -> Option<usize> {
         let status = self.status.as_ref().filter(|_| now >= self.pose_due)?;
         let period = self.period.max(time_of_share(status.budget_bps, VehicleStatus::POSE));
-        // The path, the registration and the trail may take a hundredth of the budget each.
-        let share = (period.as_secs_f64() * f64::from(status.budget_bps) / 800.0) as usize;
+        // The path, the registration and the trail may take a hundredth of the budget each, in all copies together.
+        let share = period.as_secs_f64() * f64::from(status.budget_bps) / 800.0 / f64::from(self.copies.each);
+        let share = share as usize;
         let intent = status.intent.map(Intent::encode);
         let faults = status.faults.is_any().then(|| status.faults.encode());
-        let mut length = push_before_pose(builder, ChunkKind::Faults, faults, usize::MAX);
+        let mut length = 0;
+        if let Some(bytes) = faults {
+            // A pose without faults says that there are none.
+            let fits = builder.room() >= FAULTS_AND_POSE && builder.push(ChunkKind::Faults, &bytes);
+            length += fits.then_some(bytes.len())?;
+        }
         length += push_before_pose(builder, ChunkKind::Intent, intent, usize::MAX);
         let registration = status.registration.map(|report| report.encode());
         length += push_before_pose(builder, ChunkKind::Registration, registration, share);
@@ -209,6 +227,7 @@ fn time_of_share(budget_bps: u32, bytes: usize) -> Duration {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::coordinates::MapPoint;
     use crate::link::vehicle::content::tests::builder;
 
     /// Seconds from a report until one on a fix is due.
@@ -219,6 +238,50 @@ mod tests {
         assert_eq!(sender.fill_report(&mut builder(64), sent), Some(11));
         sender.owe_report_in_share(decided);
         sender.report_due.since(decided).as_secs_f64()
+    }
+
+    #[test]
+    fn a_pose_goes_out_with_its_faults_or_not_at_all() {
+        let faults = EquipmentFaults { camera_silent: true, ..EquipmentFaults::default() };
+        let waypoint = Some(MapPoint::new(1.0, 2.0));
+        for room in 16..80 {
+            let mut sender = StatusSender::new(Duration::from_secs(1), Instant::ZERO);
+            sender.set(VehicleStatus { budget_bps: 10_000, faults, waypoint, ..VehicleStatus::default() });
+            let mut builder = builder(room);
+            let whole = builder.room();
+            let filled = sender.fill_pose(&mut builder, Instant::ZERO);
+            let with_faults =
+                [EquipmentFaults::BYTES + VehicleStatus::SHORT_POSE, EquipmentFaults::BYTES + VehicleStatus::POSE];
+            assert_eq!(filled.is_some(), whole >= FAULTS_AND_POSE, "{whole} bytes");
+            assert!(filled.is_none_or(|bytes| with_faults.contains(&bytes)), "{whole} bytes: {filled:?}");
+        }
+    }
+
+    /// Seconds after which poses are sent in the 5 s after `first`, and the loss of one is known after `lost` seconds.
+    fn poses(copies: u32, lost: f64) -> Vec<f64> {
+        let mut sender = StatusSender::new(Duration::from_secs(4), Instant::ZERO);
+        sender.set(VehicleStatus { budget_bps: 100_000, ..VehicleStatus::default() });
+        sender.set_copies(copies, 100_000);
+        sender.owe_pose(Instant::ZERO);
+        let mut sent = Vec::new();
+        for tenth in 0..39 {
+            let now = Instant::from_secs_f64(f64::from(tenth) / 10.0);
+            if tenth == (lost * 10.0) as u32 {
+                sender.handle_lost_pose(now);
+            }
+            if sender.fill_pose(&mut builder(64), now).is_some() {
+                sent.push(now.as_secs_f64());
+            }
+        }
+        sent
+    }
+
+    #[test]
+    fn one_more_copy_follows_a_loss() {
+        assert_eq!(poses(3, 9.0), [0.0, 0.5, 1.0]);
+        assert_eq!(poses(3, 0.7), [0.0, 0.5, 0.7], "the third copy comes earlier");
+        assert_eq!(poses(3, 2.0), [0.0, 0.5, 1.0, 2.0]);
+        assert_eq!(poses(1, 2.0), [0.0, 2.0]);
     }
 
     #[test]
