@@ -58,7 +58,8 @@ impl TransformTree {
     ///
     /// # Errors
     ///
-    /// The transform, or another one that belongs to the pose, cannot be used.
+    /// The transform belongs to the pose and cannot be used, or another one that does. Transforms of other frames, such as those
+    /// of another robot on the same topic, are nobody's fault.
     pub fn handle(
         &mut self,
         transform: &TransformStamped,
@@ -71,10 +72,12 @@ impl TransformTree {
         let rotation = Rotation::from_quaternion([turn.x, turn.y, turn.z, turn.w]);
         let rotation = rotation.filter(|_| place.iter().all(|m| m.is_finite()) && (is_static || stamp.is_some()));
         let Some(rotation) = rotation else {
-            return Err(TransformError::Unusable { parent: parent.to_owned(), child: child.to_owned() });
+            let error = TransformError::Unusable { parent: parent.to_owned(), child: child.to_owned() };
+            return if self.belongs_to_pose(parent, child) { Err(error) } else { Ok(None) };
         };
         if self.links.len() >= MAX_FRAMES && !self.links.contains_key(child) {
-            return Err(TransformError::TooMany(child.to_owned()));
+            let is_needed = self.belongs_to_pose(parent, child);
+            return if is_needed { Err(TransformError::TooMany(child.to_owned())) } else { Ok(None) };
         }
         let link = Link { parent: parent.to_owned(), place, rotation, stamp: stamp.filter(|_| !is_static) };
         let newest = self.links.insert(child.to_owned(), link).and_then(|before| before.stamp);
@@ -91,6 +94,19 @@ impl TransformTree {
             }),
             _ => Ok(pose),
         }
+    }
+
+    /// Whether a transform is between the vehicle and the world, as far as the links between them are known.
+    fn belongs_to_pose(&self, parent: &str, child: &str) -> bool {
+        let mut frame = self.vehicle.as_str();
+        for _ in 0..MAX_LINKS {
+            if frame == child {
+                return true;
+            }
+            let Some(link) = self.links.get(frame) else { break };
+            frame = &link.parent;
+        }
+        parent == self.world && frame != self.world
     }
 
     /// The pose of the vehicle, if the changing link nearest to it is that of `changed`.
@@ -173,7 +189,8 @@ mod tests {
         assert!(text(tree.handle(&link(["odom", "base"], 7, [0.0; 3], 0.0), false)).contains("6.0 s older"));
         assert_eq!(tree.handle(&link(["map", "odom"], 7, [0.0; 3], 0.0), false), Ok(None));
         assert!(text(tree.handle(&link(["odom", "base"], 5, [0.0; 3], 0.0), false)).contains("7.000 s came before"));
-        assert!(text(tree.handle(&link(["a", "b"], 0, [0.0; 3], 0.0), false)).contains("no time"));
+        assert!(text(tree.handle(&link(["odom", "base"], 0, [0.0; 3], 0.0), false)).contains("no time"));
+        assert_eq!(tree.handle(&link(["a", "b"], 0, [0.0; 3], 0.0), false), Ok(None), "of no part of the pose");
     }
 
     #[test]
