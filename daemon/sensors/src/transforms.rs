@@ -2,7 +2,7 @@
 
 use crate::{Rotation, SensorPose, Stamp, stamp_of};
 use scenecast_messages::geometry_msgs::TransformStamped;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Most frames of reference that are kept; a robot has some dozens.
 const MAX_FRAMES: usize = 1000;
@@ -137,9 +137,14 @@ impl TransformTree {
         Ok(None)
     }
 
-    /// The frames of the tree, for a message about a missing one.
-    pub fn frames(&self) -> impl Iterator<Item = &str> {
-        self.links.iter().flat_map(|(child, link)| [link.parent.as_str(), child.as_str()])
+    /// A line for people about the two frames and those that the transforms have, when they give no pose.
+    #[must_use]
+    pub fn explain(&self) -> String {
+        let all = self.links.iter().flat_map(|(child, link)| [link.parent.as_str(), child.as_str()]);
+        let names: BTreeSet<&str> = all.collect();
+        let (count, shown) = (names.len(), names.iter().take(20).copied().collect::<Vec<_>>().join(", "));
+        let (world, vehicle) = (&self.world, &self.vehicle);
+        format!("no transforms lead from {world:?} to {vehicle:?}; the {count} frames that came in: {shown}")
     }
 }
 
@@ -198,6 +203,7 @@ mod tests {
         let mut tree = TransformTree::new("map", "base");
         assert_eq!(tree.handle(&link(["odom", "base"], 1, [0.0; 3], 0.0), false), Ok(None));
         assert_eq!(tree.handle(&link(["base", "odom"], 1, [0.0; 3], 0.0), false), Ok(None));
+        assert!(tree.explain().ends_with("\"map\" to \"base\"; the 2 frames that came in: base, odom"));
         assert_eq!(tree.handle(&link(["odom", "base"], 2, [0.0; 3], 0.0), false), Ok(None));
     }
 

@@ -7,10 +7,12 @@ use scenecast_ros2::Inbox;
 use scenecast_sensors::{CameraFault, TransformTree};
 use std::collections::VecDeque;
 use std::sync::Arc;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// Transforms that were displaced in their inbox.
 const LOST: (CameraFault, &str) = (CameraFault::UnusablePose, "transforms were dropped: the vehicle was busy");
+/// Time after which transforms without a pose are explained.
+const EXPLAIN_AFTER: Duration = Duration::from_secs(5);
 /// Most poses of one message.
 const MAX_POSES: usize = 100;
 
@@ -23,6 +25,8 @@ pub struct RosTransforms {
     inboxes: Option<(Inbox<TFMessage>, Inbox<TFMessage>)>,
     counted: (Counted, Counted),
     poses: VecDeque<Reading>,
+    /// When the topics were opened, until a pose came in or the lack of one was explained.
+    without_pose: Option<Instant>,
 }
 
 impl RosTransforms {
@@ -35,6 +39,15 @@ impl RosTransforms {
             inboxes: None,
             counted: Default::default(),
             poses: VecDeque::new(),
+            without_pose: None,
+        }
+    }
+
+    /// Says once which frames came in if they give no pose.
+    fn explain(&mut self, fault: &mut dyn FnMut(CameraFault, String)) {
+        if self.without_pose.is_some_and(|since| since.elapsed() >= EXPLAIN_AFTER) {
+            self.without_pose = None;
+            fault(CameraFault::UnusablePose, self.tree.explain());
         }
     }
 
@@ -62,6 +75,7 @@ impl SensorSource for RosTransforms {
         let changing = node.subscribe_tf(&parsed("/tf")?).map_err(failed)?;
         let lasting = node.subscribe_static_tf(&parsed("/tf_static")?).map_err(failed)?;
         self.inboxes = Some((changing, lasting));
+        self.without_pose = Some(Instant::now());
         self.tree = TransformTree::new(&self.frames.0, &self.frames.1);
         Ok(())
     }
@@ -87,7 +101,12 @@ impl SensorSource for RosTransforms {
             self.handle(&received.message, false, fault);
         }
         self.inboxes = Some((changing, lasting));
-        Ok(self.poses.pop_front())
+        let pose = self.poses.pop_front();
+        match pose {
+            Some(_) => self.without_pose = None,
+            None => self.explain(fault),
+        }
+        Ok(pose)
     }
 
     fn is_reopened_after_stall(&self) -> bool {
