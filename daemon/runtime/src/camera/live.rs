@@ -10,7 +10,8 @@ use scenecast_core::UserError;
 use scenecast_files::{configured_calibration, configured_mounting};
 use scenecast_host::{CameraPose, MeasuredPose};
 use scenecast_sensors::{
-    BitDepth, Calibration, CameraFault, CameraMounting, CameraTally, DepthError, FrameMatcher, Limits, MatchedImage, Sight, Stamp,
+    BitDepth, Calibration, CameraFault, CameraMounting, CameraTally, DepthError, FrameMatcher, Limits, MatchedImage,
+    Sight, Stamp,
 };
 use scenecast_sources::{
     ArrivalClock, CommandSource, DvlSource, LiveSource, Picture, Reading, SensorKind, SourceImage, SourceReport,
@@ -156,7 +157,9 @@ impl LiveCamera {
                 self.poses.handle_pose(pose, self.clock.now());
             }
             SourceReport::Reading(Reading::Depth(depth)) => {
-                self.depth.handle_depth(self.times.of(depth.stamp, depth.arrival), depth.message);
+                let pending = self.pending.as_ref().map(|(image, _)| image.stamp);
+                let images = pending.into_iter().chain(self.matcher.waiting());
+                self.depth.handle_depth(self.times.of(depth.stamp, depth.arrival), depth.message, images);
             }
             SourceReport::Fault(fault, text) => {
                 self.matcher.count(fault);
