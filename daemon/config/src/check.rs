@@ -74,7 +74,7 @@ fn check_optics(config: &Config) -> Result<(), UserError> {
             return Err(UserError::Input(text.to_owned()));
         }
         CalibrationSource::Ros2(_) if !is_topic => {
-            return refuse("camera.calibration", "\"file:FILE\" or \"\"; a topic needs a camera of ROS 2");
+            return refuse("camera.calibration", "\"file:FILE\", \"none\" or \"\"; a topic needs a camera of ROS 2");
         }
         _ if is_rehearsal => return refuse("camera.calibration", "\"\""),
         _ => {}
@@ -86,7 +86,12 @@ fn check_optics(config: &Config) -> Result<(), UserError> {
         if !c.source.is_live() {
             return refuse("camera.depth", "\"\"; distances belong to a live camera, or are in the folder of tum:DIR");
         }
-        if !is_topic && !has_matrix && c.calibration == CalibrationSource::Beside {
+        let is_calibrated = match c.calibration {
+            CalibrationSource::Beside => is_topic || has_matrix,
+            CalibrationSource::None => false,
+            CalibrationSource::File(_) | CalibrationSource::Ros2(_) => true,
+        };
+        if !is_calibrated {
             return refuse("camera.depth", "\"\", unless camera.calibration or camera.matrix is set");
         }
     }
@@ -235,6 +240,9 @@ mod tests {
         let live = ["camera.source=watch:x", "navigation.source=tum:p"];
         assert!(load(&[&live[..], &["camera.depth=ros2:/depth", "camera.matrix=[9, 9, 9, 9]"]].concat()).is_ok());
         assert!(refused(&[&live[..], &["camera.depth=ros2:/depth"]].concat()).contains("unless camera.calibration or"));
+        let ros = ["camera.source=ros2:/image", "navigation.source=tum:p", "camera.depth=ros2:/depth"];
+        assert!(load(&ros).is_ok());
+        assert!(refused(&[&ros[..], &["camera.calibration=none"]].concat()).contains("unless camera.calibration or"));
         assert!(
             refused(&["camera.depth=cloud:/points"]).contains("camera.depth = \"cloud:/points\" is not allowed with")
         );
