@@ -95,10 +95,11 @@ fn check_optics(config: &Config) -> Result<(), UserError> {
             return refuse("camera.depth", "\"\", unless camera.calibration or camera.matrix is set");
         }
     }
-    if c.bits == 0 && !is_topic {
-        return refuse("camera.bits", "1 to 16; only a camera of ROS 2 can find them out");
+    match c.bits {
+        0 if !is_topic => refuse("camera.bits", "8 to 16; only a camera of ROS 2 can find them out"),
+        1..=7 => Err(UserError::Input(format!("camera.bits = {} is not allowed; allowed: 0, or 8 to 16", c.bits))),
+        _ => Ok(()),
     }
-    Ok(())
 }
 
 /// The images of a live camera need poses and the pace of real time.
@@ -252,6 +253,25 @@ mod tests {
         assert!(refused(&both).contains("set one of them"));
         assert!(refused(&["camera.source=bag:x", "camera.bits=0"]).contains("camera.bits = 0 is not allowed"));
         assert!(load(&["camera.source=tum:x", "camera.bits=12"]).is_ok());
+    }
+
+    #[test]
+    fn levels_of_fewer_than_eight_bits_are_refused() {
+        let load = |bits: u8| {
+            crate::load(
+                None,
+                &[
+                    format!("camera.bits={bits}"),
+                    "camera.source=ros2:/i".to_owned(),
+                    "navigation.source=tum:p".to_owned(),
+                ],
+            )
+        };
+        for bits in 1..=7 {
+            let text = load(bits).unwrap_err().to_string();
+            assert_eq!(text, format!("camera.bits = {bits} is not allowed; allowed: 0, or 8 to 16"));
+        }
+        assert!([0, 8, 10, 16].into_iter().all(|bits| load(bits).is_ok()));
     }
 
     #[test]
