@@ -82,7 +82,7 @@ section! {
         /// Calibration of the camera. Its images are rectified, and the altitude and the focal length give the size of their
         /// pixels. file:FILE: a YAML file of ROS's camera_calibration. ros2:TOPIC: CameraInfo; images from before the first one
         /// are not mapped. Empty: of a ros2 source the topic camera_info beside its images; until it is found, for at most 3 s,
-        /// images are not mapped. none: images are not rectified.
+        /// images are not mapped; of a bag the first usable message of that topic. none: images are not rectified.
         calibration: CalibrationSource = CalibrationSource::Beside, ANY, [Auv Scenario];
         /// Camera matrix fx, fy, cx, cy of images without distortion, in place of camera.calibration. All 0: not known.
         matrix: [f64; 4] = [0.0; 4], range(-1_000_000.0, 1_000_000.0, "pixel"), [Auv Scenario];
