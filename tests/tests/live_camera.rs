@@ -183,6 +183,7 @@ fn assert_topics_give_the_map(name: &str, domain: u32, (topic, poses): (&str, &s
     let dive = Dive::with_settings(name, &|_| {
         vec![
             format!("camera.source=ros2:{topic}"),
+            "camera.calibration=none".to_owned(),
             format!("navigation.source={poses}"),
             format!("ros2.domain={domain}"),
             "ros2.networks=[\"127.0.0.1\"]".to_owned(),

@@ -74,7 +74,7 @@ fn check_optics(config: &Config) -> Result<(), UserError> {
             return Err(UserError::Input(text.to_owned()));
         }
         CalibrationSource::Ros2(_) if !is_topic => {
-            return refuse("camera.calibration", "\"file:FILE\" or \"\"; a topic needs a camera of ROS 2");
+            return refuse("camera.calibration", "\"file:FILE\", \"none\" or \"\"; a topic needs a camera of ROS 2");
         }
         _ if is_rehearsal => return refuse("camera.calibration", "\"\""),
         _ => {}
@@ -86,14 +86,20 @@ fn check_optics(config: &Config) -> Result<(), UserError> {
         if !c.source.is_live() {
             return refuse("camera.depth", "\"\"; distances belong to a live camera, or are in the folder of tum:DIR");
         }
-        if !is_topic && !has_matrix && c.calibration == CalibrationSource::Beside {
+        let is_calibrated = match c.calibration {
+            CalibrationSource::Beside => is_topic || has_matrix,
+            CalibrationSource::None => false,
+            CalibrationSource::File(_) | CalibrationSource::Ros2(_) => true,
+        };
+        if !is_calibrated {
             return refuse("camera.depth", "\"\", unless camera.calibration or camera.matrix is set");
         }
     }
-    if c.bits == 0 && !is_topic {
-        return refuse("camera.bits", "1 to 16; only a camera of ROS 2 can find them out");
+    match c.bits {
+        0 if !is_topic => refuse("camera.bits", "8 to 16; only a camera of ROS 2 can find them out"),
+        1..=7 => Err(UserError::Input(format!("camera.bits = {} is not allowed; allowed: 0, or 8 to 16", c.bits))),
+        _ => Ok(()),
     }
-    Ok(())
 }
 
 /// The images of a live camera need poses and the pace of real time.
@@ -235,6 +241,9 @@ mod tests {
         let live = ["camera.source=watch:x", "navigation.source=tum:p"];
         assert!(load(&[&live[..], &["camera.depth=ros2:/depth", "camera.matrix=[9, 9, 9, 9]"]].concat()).is_ok());
         assert!(refused(&[&live[..], &["camera.depth=ros2:/depth"]].concat()).contains("unless camera.calibration or"));
+        let ros = ["camera.source=ros2:/image", "navigation.source=tum:p", "camera.depth=ros2:/depth"];
+        assert!(load(&ros).is_ok());
+        assert!(refused(&[&ros[..], &["camera.calibration=none"]].concat()).contains("unless camera.calibration or"));
         assert!(
             refused(&["camera.depth=cloud:/points"]).contains("camera.depth = \"cloud:/points\" is not allowed with")
         );
@@ -244,6 +253,25 @@ mod tests {
         assert!(refused(&both).contains("set one of them"));
         assert!(refused(&["camera.source=bag:x", "camera.bits=0"]).contains("camera.bits = 0 is not allowed"));
         assert!(load(&["camera.source=tum:x", "camera.bits=12"]).is_ok());
+    }
+
+    #[test]
+    fn levels_of_fewer_than_eight_bits_are_refused() {
+        let load = |bits: u8| {
+            crate::load(
+                None,
+                &[
+                    format!("camera.bits={bits}"),
+                    "camera.source=ros2:/i".to_owned(),
+                    "navigation.source=tum:p".to_owned(),
+                ],
+            )
+        };
+        for bits in 1..=7 {
+            let text = load(bits).unwrap_err().to_string();
+            assert_eq!(text, format!("camera.bits = {bits} is not allowed; allowed: 0, or 8 to 16"));
+        }
+        assert!([0, 8, 10, 16].into_iter().all(|bits| load(bits).is_ok()));
     }
 
     #[test]

@@ -7,15 +7,18 @@ use crate::recording::{RecordedFrame, Recording};
 use scenecast_core::UserError;
 use scenecast_messages::decode as decode_cdr;
 use scenecast_messages::nav_msgs::Odometry;
+use scenecast_messages::sensor_msgs::CameraInfo;
 use scenecast_sensors::{
-    BitDepth, Calibration, CameraMounting, PoseMatch, PoseTrack, SensorPose, Sight, Stamp, pose_of, stamp_of_cdr,
+    BitDepth, Calibration, CalibrationError, CameraMounting, PoseMatch, PoseTrack, SensorPose, Sight, Stamp,
+    camera_info_beside, pose_of, stamp_of_cdr,
 };
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
 
 const ODOMETRY: &str = "nav_msgs/msg/Odometry";
+const CAMERA_INFO: &str = "sensor_msgs/msg/CameraInfo";
 
 /// A bag's topics and times, before its frames are chosen.
 #[derive(Default)]
@@ -23,7 +26,9 @@ struct Contents {
     topics: BTreeSet<BagTopic>,
     /// The topic and time of each image; `None` without a time.
     images: Vec<(BagTopic, Option<Stamp>)>,
-    poses: Vec<(BagTopic, Stamp, scenecast_sensors::SensorPose)>,
+    poses: Vec<(BagTopic, Stamp, SensorPose)>,
+    /// The first calibration of each topic that can be used, or why the last one cannot.
+    infos: BTreeMap<String, Result<CameraInfo, CalibrationError>>,
     /// Where the file breaks off.
     damage: Option<String>,
 }
@@ -32,9 +37,12 @@ impl Contents {
     fn read(path: &Path) -> Result<Self, UserError> {
         let mut stream = BagStream::open(path)?;
         let mut contents = Self::default();
-        let is_wanted = |topic: &BagTopic| [RAW, COMPRESSED, ODOMETRY].contains(&topic.kind.as_str());
+        let is_wanted = |topic: &BagTopic| [RAW, COMPRESSED, ODOMETRY, CAMERA_INFO].contains(&topic.kind.as_str());
         loop {
             match stream.next(is_wanted) {
+                Ok(Some(BagMessage { topic, bytes })) if topic.kind == CAMERA_INFO => {
+                    contents.handle_info(topic.name, &bytes);
+                }
                 Ok(Some(BagMessage { topic, bytes })) => {
                     contents.topics.insert(topic.clone());
                     if topic.kind != ODOMETRY {
@@ -50,6 +58,30 @@ impl Contents {
                     return Ok(contents);
                 }
             }
+        }
+    }
+
+    fn handle_info(&mut self, topic: String, bytes: &[u8]) {
+        if matches!(self.infos.get(&topic), Some(Ok(_))) {
+            return;
+        }
+        if let Ok(info) = decode_cdr::<CameraInfo>(bytes) {
+            let checked = Calibration::of_info(&info, false).map(|_| info);
+            self.infos.insert(topic, checked);
+        }
+    }
+
+    /// The calibration beside a topic of images, with a note for people if none of its messages can be used.
+    fn calibration(&self, images: &str) -> (Option<Arc<Calibration>>, Option<String>) {
+        let (beside, is_rectified) = camera_info_beside(images);
+        let checked = self
+            .infos
+            .get(&beside)
+            .map(|info| info.as_ref().map_err(Clone::clone).and_then(|info| Calibration::of_info(info, is_rectified)));
+        match checked {
+            Some(Ok(calibration)) => (Some(Arc::new(calibration)), None),
+            None | Some(Err(CalibrationError::Uncalibrated)) => (None, None),
+            Some(Err(error)) => (None, Some(format!("no message of {beside} can be used: {error}"))),
         }
     }
 
@@ -90,6 +122,8 @@ pub struct BagTiming {
     pub altitude_m: f64,
     /// The calibration of the camera, if it is known.
     pub calibration: Option<Arc<Calibration>>,
+    /// Whether the first usable message of the topic `camera_info` beside the images is the calibration, if it is not known.
+    pub reads_info: bool,
     /// The bits of levels in 16-bit images.
     pub bits: BitDepth,
 }
@@ -118,6 +152,9 @@ impl Recording {
     pub fn open_bag(path: &Path, topics: BagTopics<'_>, timing: &BagTiming) -> Result<Self, UserError> {
         let contents = Contents::read(path)?;
         let images = contents.choose(path, topics.images, &[RAW, COMPRESSED], "bag:FILE#TOPIC")?;
+        let is_info_read = timing.reads_info && timing.calibration.is_none();
+        let (info, note) = if is_info_read { contents.calibration(&images.name) } else { (None, None) };
+        let timing = &BagTiming { calibration: timing.calibration.clone().or(info), ..timing.clone() };
         let odometry = contents.choose(path, topics.odometry, &[ODOMETRY], "navigation.source = \"ros2:TOPIC\"")?;
         let mut poses: Vec<_> = contents.poses.iter().filter(|(topic, ..)| *topic == odometry).collect();
         poses.sort_by_key(|(_, stamp, _)| *stamp);
@@ -141,7 +178,7 @@ impl Recording {
             return Err(UserError::file(path, cause));
         };
         let dropped = all - frames.len() as u64;
-        let mut notes = Vec::new();
+        let mut notes: Vec<String> = note.into_iter().collect();
         if dropped > 0 {
             notes.push(format!(
                 "{dropped} of {all} images have no time or no pose at their time, or were tilted too much"
@@ -151,5 +188,87 @@ impl Recording {
         let frames =
             frames.into_iter().map(|(stamp, frame)| RecordedFrame { t_s: stamp.seconds_since(first), ..frame });
         Ok(Self { frames: frames.collect(), notes })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use scenecast_messages::Message;
+    use scenecast_messages::sensor_msgs::Image;
+    use std::path::PathBuf;
+
+    /// A bag of two images of 4 x 2 pixels at the poses of their times, with these messages of `/camera/camera_info`.
+    fn bag(name: &str, infos: &[CameraInfo]) -> PathBuf {
+        let path = std::env::temp_dir().join(format!("scenecast-{}-{name}.mcap", std::process::id()));
+        let mut writer = mcap::Writer::new(std::fs::File::create(&path).unwrap()).unwrap();
+        let mut sequence = 0;
+        write(&mut writer, "/camera/camera_info", infos, &mut sequence);
+        let (mut images, mut poses) = (Vec::new(), Vec::new());
+        for sec in 1..3 {
+            let mut image = Image { width: 4, height: 2, step: 12, encoding: "rgb8".into(), ..Image::default() };
+            (image.header.stamp.sec, image.data) = (sec, vec![50; 24]);
+            let mut odometry = Odometry::default();
+            (odometry.header.stamp.sec, odometry.pose.pose.orientation.w) = (sec, 1.0);
+            images.push(image);
+            poses.push(odometry);
+        }
+        write(&mut writer, "/camera/image_raw", &images, &mut sequence);
+        write(&mut writer, "/odometry", &poses, &mut sequence);
+        writer.finish().unwrap();
+        path
+    }
+
+    fn write<M: Message>(writer: &mut mcap::Writer<std::fs::File>, topic: &str, messages: &[M], sequence: &mut u32) {
+        let schema = writer.add_schema(&M::DEFINITION.full_name(), "ros2msg", b"").unwrap();
+        let channel = writer.add_channel(schema, topic, "cdr", &BTreeMap::new()).unwrap();
+        for message in messages {
+            *sequence += 1;
+            let header =
+                mcap::records::MessageHeader { channel_id: channel, sequence: *sequence, log_time: 0, publish_time: 0 };
+            writer.write_to_known_channel(&header, &scenecast_messages::encode(message)).unwrap();
+        }
+    }
+
+    fn info(focal: f64) -> CameraInfo {
+        let k = [focal, 0.0, 2.0, 0.0, focal, 1.0, 0.0, 0.0, 1.0];
+        CameraInfo { width: 4, height: 2, k, ..CameraInfo::default() }
+    }
+
+    fn open(path: &Path, change: impl Fn(&mut BagTiming)) -> Recording {
+        let mut timing = BagTiming {
+            max_gap: Duration::from_secs(2),
+            clock_offset_s: 0.0,
+            mounting: CameraMounting::default(),
+            altitude_m: 3.0,
+            calibration: None,
+            reads_info: true,
+            bits: BitDepth::default(),
+        };
+        change(&mut timing);
+        Recording::open_bag(path, BagTopics::default(), &timing).unwrap()
+    }
+
+    #[test]
+    fn the_first_usable_calibration_of_a_bag_is_used() {
+        let path = bag("calibrated", &[info(0.0), info(-1.0), info(300.0), info(400.0)]);
+        let recording = open(&path, |_| {});
+        let focal = |frame: &RecordedFrame| frame.sight.as_ref().map(|sight| sight.calibration.camera().fx);
+        let focals: Vec<_> = recording.frames.iter().map(focal).collect();
+        assert_eq!((focals, recording.notes.len()), (vec![Some(300.0); 2], 0));
+        let of_settings = Arc::new(Calibration::of_matrix([500.0, 500.0, 2.0, 1.0]).unwrap());
+        let recording = open(&path, |timing| timing.calibration = Some(of_settings.clone()));
+        assert_eq!(focal(&recording.frames[0]), Some(500.0));
+        let recording = open(&path, |timing| timing.reads_info = false);
+        assert!(recording.frames[0].sight.is_none());
+    }
+
+    #[test]
+    fn a_bag_without_a_usable_calibration_is_read_without() {
+        let recording = open(&bag("uncalibrated", &[CameraInfo::default()]), |_| {});
+        assert!(recording.frames[0].sight.is_none() && recording.notes.is_empty());
+        let recording = open(&bag("wrong", &[info(-1.0)]), |_| {});
+        assert!(recording.frames[0].sight.is_none());
+        assert!(recording.notes[0].contains("/camera/camera_info can be used: the matrix K"), "{:?}", recording.notes);
     }
 }

@@ -46,6 +46,7 @@ pub fn configured_recording(config: &Config) -> Result<Option<Recording>, UserEr
                 mounting: configured_mounting(config),
                 altitude_m,
                 calibration,
+                reads_info: config.camera.calibration == CalibrationSource::Beside,
                 bits: BitDepth::of_setting(config.camera.bits),
             };
             open_bag(bag, odometry, &timing).map(Some)

@@ -148,7 +148,7 @@ struct VehicleShell {
     disk: DiskWatch,
     faults: SensorFaults,
     reload: Reload,
-    /// Camera frames that could not be read.
+    /// Frames of a recording that could not be read.
     missed: u64,
 }
 
@@ -286,9 +286,13 @@ impl VehicleShell {
 
     /// Logs an unreadable frame; it does not end the mission.
     fn handle_missed(&mut self, error: &UserError) {
-        self.missed += 1;
-        self.camera.handle_missed();
-        tracing::error!("a camera frame was skipped, {} so far: {error}", self.missed);
+        match &mut self.camera {
+            Camera::Live(camera) => camera.handle_missed(error),
+            Camera::Recorded(_) => {
+                self.missed += 1;
+                tracing::error!("a camera frame was skipped, {} so far: {error}", self.missed);
+            }
+        }
         self.host.handle_missed();
     }
 

@@ -23,6 +23,14 @@ impl DepthMessage {
         }
     }
 
+    /// Bytes of the distances.
+    pub fn size(&self) -> usize {
+        match self {
+            Self::Image(image) => image.data.len(),
+            Self::Cloud(cloud) => cloud.data.len(),
+        }
+    }
+
     /// The distances that `camera` sees in images of `size` (width, height). Whole numbers count `units_per_m`.
     ///
     /// # Errors

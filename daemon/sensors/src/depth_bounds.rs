@@ -17,6 +17,8 @@ pub enum DepthError {
     Step { step: u32, width: u32, of: &'static str },
     #[error("the cloud has no field {0} of the type float32 within its points")]
     Field(&'static str),
+    #[error("the fields x, y and z of the cloud overlap")]
+    Overlap,
 }
 
 /// Checks the bounds of `height` rows of `step` bytes, of which the last may end with its last element.

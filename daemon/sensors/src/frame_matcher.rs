@@ -185,6 +185,11 @@ impl<I> FrameMatcher<I> {
         self.waiting.front().map(|first| first.arrival.after(self.limits.max_wait))
     }
 
+    /// The times of the images that wait.
+    pub fn waiting(&self) -> impl Iterator<Item = Stamp> + '_ {
+        self.waiting.iter().map(|waiting| waiting.stamp)
+    }
+
     /// The times of images and poses, for people who look for a wrong clock.
     pub fn times(&self) -> String {
         let newest = self.newest.or(self.last.map(|(last, ..)| last));

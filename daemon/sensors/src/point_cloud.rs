@@ -24,6 +24,10 @@ impl<'a> CloudPoints<'a> {
             };
             *to = cloud.fields.iter().find(is_whole).ok_or(DepthError::Field(name))?.offset as usize;
         }
+        let apart = |a: usize, b: usize| offsets[a].abs_diff(offsets[b]) >= 4;
+        if !(apart(0, 1) && apart(0, 2) && apart(1, 2)) {
+            return Err(DepthError::Overlap);
+        }
         let row_bytes = u64::from(cloud.width) * u64::from(cloud.point_step);
         check_rows((cloud.width, cloud.height), cloud.row_step, row_bytes, cloud.data.len(), "points")?;
         Ok(Self { cloud, offsets })
@@ -49,21 +53,21 @@ impl<'a> CloudPoints<'a> {
     /// The nearest point in each pixel of a depth image, whose pixels are large enough that most have a point.
     pub(crate) fn seen_by(&self, camera: &PinholeCamera, (width, height): (u32, u32)) -> DepthImage {
         let (width, height) = (width.max(1), height.max(1));
-        let shares: Vec<(f64, f64, f32)> = self
-            .points()
-            .filter_map(|point| {
+        // The points are gone through twice, as a list of them would be several times as large as the cloud.
+        let shares = || {
+            self.points().filter_map(|point| {
                 let [x, y, z] = point.map(f64::from);
                 let across = (camera.fx * x / z + camera.cx) / f64::from(width);
                 let down = (camera.fy * y / z + camera.cy) / f64::from(height);
                 ((0.0..1.0).contains(&across) && (0.0..1.0).contains(&down)).then_some((across, down, point[2]))
             })
-            .collect();
+        };
         let all = f64::from(width) * f64::from(height);
-        let edge = (POINTS_PER_PIXEL * all / shares.len().max(1) as f64).sqrt().clamp(1.0, 64.0);
+        let edge = (POINTS_PER_PIXEL * all / shares().count().max(1) as f64).sqrt().clamp(1.0, 64.0);
         let part = |length: u32| (f64::from(length) / edge).ceil().max(1.0) as u32;
         let (columns, rows) = (part(width), part(height));
         let mut metres = vec![0.0; columns as usize * rows as usize];
-        for (across, down, z) in shares {
+        for (across, down, z) in shares() {
             let (column, row) = ((across * f64::from(columns)) as usize, (down * f64::from(rows)) as usize);
             if let Some(nearest) = metres.get_mut(row * columns as usize + column)
                 && (*nearest == 0.0 || z < *nearest)
@@ -135,6 +139,9 @@ mod tests {
             text(&|cloud| cloud.fields[1].datatype = PointField::FLOAT64).contains("no field z of the type float32")
         );
         assert!(text(&|cloud| cloud.fields[2].offset = u32::MAX).contains("no field x"));
+        let overlap =
+            text(&|cloud| (cloud.point_step, cloud.fields) = (4, ["x", "y", "z"].map(|name| field(name, 0)).into()));
+        assert_eq!(overlap, "the fields x, y and z of the cloud overlap");
         assert!(text(&|cloud| cloud.width = 3).contains("32 bytes are too few for 1 rows"));
         assert!(text(&|cloud| cloud.height = 2).contains("32 bytes are too few for 2 rows"));
         assert!(text(&|cloud| (cloud.height, cloud.row_step) = (2, 8)).contains("8 bytes is too short for 2 points"));
@@ -144,7 +151,7 @@ mod tests {
     proptest! {
         #[test]
         fn any_cloud_gives_depth_or_an_error(width in 0_u32..30, height in 0_u32..9, row_step in 0_u32..300, big in any::<bool>(),
-            point_step in 0_u32..24, offsets in any::<[u8; 3]>(), data in prop::collection::vec(any::<u8>(), 0..2000)) {
+            point_step in 0_u32..40, offsets in any::<[u8; 3]>(), data in prop::collection::vec(any::<u8>(), 0..2000)) {
             let fields = ["x", "y", "z"].iter().zip(offsets).map(|(name, at)| field(name, u32::from(at % 24))).collect();
             let cloud = PointCloud2 { width, height, row_step, point_step, fields, data, is_bigendian: big, ..Default::default() };
             if let Ok(points) = CloudPoints::check(&cloud) {

@@ -5,7 +5,7 @@ use crate::ros_node::parsed;
 use scenecast_messages::sensor_msgs::CameraInfo;
 use scenecast_messages::std_msgs::Header;
 use scenecast_ros2::{Inbox, RosNode};
-use scenecast_sensors::{Calibration, CalibrationError, CameraFault};
+use scenecast_sensors::{Calibration, CalibrationError, CameraFault, Stamp, camera_info_beside};
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -23,38 +23,48 @@ pub enum CalibrationTopic {
 /// Longest wait of the first image for the calibration beside it.
 const FIRST_WAIT: Duration = Duration::from_millis(300);
 
-/// The topic of a calibration, and its last message.
+/// Time from the first image within which a publisher of the calibration beside it may still be found. Until then images without
+/// one are dropped.
+const FIND_TIME: Duration = Duration::from_secs(3);
+
+/// The topic of a calibration, and its last usable message.
 pub(crate) struct RosCalibration {
     topic: Option<String>,
     is_needed: bool,
     /// Whether the images of the topic are without distortion, as those of `image_proc`.
     is_rectified: bool,
     inbox: Option<Inbox<CameraInfo>>,
-    has_waited: bool,
-    last: Option<(CameraInfo, Option<Arc<Calibration>>)>,
+    /// When the first image came in.
+    first: Option<Stamp>,
+    /// The last message, usable or not.
+    last: Option<CameraInfo>,
+    /// Once there is one, images are never used without.
+    calibration: Option<Arc<Calibration>>,
     /// Why the last message cannot be used, until it is reported.
     refused: Option<String>,
-}
-
-/// The topic `camera_info` in the namespace of the images, and whether these are rectified by their name.
-fn beside(images: &str) -> (String, bool) {
-    let images = images.strip_suffix("/compressed").unwrap_or(images);
-    let (namespace, name) = images.rsplit_once('/').unwrap_or(("", images));
-    let topic = if namespace.is_empty() && !images.starts_with('/') { String::new() } else { format!("{namespace}/") };
-    (format!("{topic}camera_info"), name.starts_with("image_rect"))
+    is_absence_logged: bool,
 }
 
 impl RosCalibration {
     /// `images` is the topic of the images.
     pub(crate) fn new(source: &CalibrationTopic, images: &str) -> Self {
-        let (beside, is_rectified) = beside(images);
+        let (beside, is_rectified) = camera_info_beside(images);
         let topic = match source {
             CalibrationTopic::None => None,
             CalibrationTopic::Beside => Some(beside),
             CalibrationTopic::Named(topic) => Some(topic.clone()),
         };
-        let is_needed = matches!(source, CalibrationTopic::Named(_));
-        Self { topic, is_needed, is_rectified, inbox: None, has_waited: false, last: None, refused: None }
+        Self {
+            topic,
+            is_needed: matches!(source, CalibrationTopic::Named(_)),
+            is_rectified,
+            inbox: None,
+            first: None,
+            last: None,
+            calibration: None,
+            refused: None,
+            is_absence_logged: false,
+        }
     }
 
     pub(crate) fn open(&mut self, node: &RosNode) -> Result<(), SourceError> {
@@ -76,42 +86,64 @@ impl RosCalibration {
         }
     }
 
-    /// The newest calibration; `None` without one. The first image waits for it for a moment.
+    /// The newest usable calibration for an image that came in at `now`; `None` if the images are used without one.
     ///
     /// # Errors
-    /// There is none, and images cannot be used without it.
-    pub(crate) fn current(&mut self) -> Result<Option<Arc<Calibration>>, String> {
-        let Some(inbox) = &self.inbox else { return Ok(None) };
-        if !std::mem::replace(&mut self.has_waited, true) {
-            inbox.wait(FIRST_WAIT);
-        }
-        if let Some(received) = inbox.take_newest() {
+    /// There is none, and images cannot be used without it, or a publisher of it may still be found.
+    pub(crate) fn current(&mut self, now: Stamp) -> Result<Option<Arc<Calibration>>, String> {
+        let newest = self.inbox.as_ref().and_then(|inbox| {
+            if self.first.is_none() {
+                inbox.wait(FIRST_WAIT);
+            }
+            inbox.take_newest()
+        });
+        if let Some(received) = newest {
             self.handle_info(received.message);
         }
-        let calibration = self.last.as_ref().and_then(|(_, calibration)| calibration.clone());
-        match calibration {
-            None if self.is_needed => {
-                Err(format!("no usable calibration on {}", self.topic.as_deref().unwrap_or_default()))
-            }
-            calibration => Ok(calibration),
+        self.for_image(now)
+    }
+
+    fn for_image(&mut self, now: Stamp) -> Result<Option<Arc<Calibration>>, String> {
+        let Some(topic) = &self.topic else { return Ok(None) };
+        let first = *self.first.get_or_insert(now);
+        if self.calibration.is_some() {
+            return Ok(self.calibration.clone());
         }
+        if self.is_needed {
+            return Err(format!("no usable calibration on {topic}"));
+        }
+        if self.last.is_none() && now < first.after(FIND_TIME) {
+            let most_s = FIND_TIME.as_secs();
+            return Err(format!("{topic} is looked for, up to {most_s} s; camera.calibration = \"none\" does without"));
+        }
+        if !std::mem::replace(&mut self.is_absence_logged, true) {
+            let why = if self.last.is_some() { "has no usable calibration" } else { "was not found" };
+            tracing::warn!("camera: {topic} {why}: images are mapped without one until there is one");
+        }
+        Ok(None)
     }
 
     fn handle_info(&mut self, info: CameraInfo) {
         // Drivers repeat the calibration with each image.
         let info = CameraInfo { header: Header::default(), ..info };
-        if self.last.as_ref().is_some_and(|(last, _)| *last == info) {
+        if self.last.as_ref() == Some(&info) {
             return;
         }
-        let calibration = match Calibration::of_info(&info, self.is_rectified) {
-            Ok(calibration) => Some(Arc::new(calibration)),
-            Err(CalibrationError::Uncalibrated) if !self.is_needed => None,
-            Err(error) => {
-                self.refused = Some(error.to_string());
-                None
+        match Calibration::of_info(&info, self.is_rectified) {
+            Ok(calibration) if self.calibration.as_deref() != Some(&calibration) => {
+                let topic = self.topic.as_deref().unwrap_or_default();
+                let which = if self.calibration.is_some() { "another calibration" } else { "the calibration" };
+                tracing::info!("camera: images are rectified by {which} of {topic}");
+                self.calibration = Some(Arc::new(calibration));
             }
-        };
-        self.last = Some((info, calibration));
+            Ok(_) => {}
+            Err(CalibrationError::Uncalibrated) if !self.is_needed && self.calibration.is_none() => {}
+            Err(error) if self.calibration.is_some() => {
+                self.refused = Some(format!("{error}; the calibration before it is used"));
+            }
+            Err(error) => self.refused = Some(error.to_string()),
+        }
+        self.last = Some(info);
     }
 }
 
@@ -119,32 +151,55 @@ impl RosCalibration {
 mod tests {
     use super::*;
 
+    fn info() -> CameraInfo {
+        let k = [300.0, 0.0, 160.0, 0.0, 300.0, 120.0, 0.0, 0.0, 1.0];
+        CameraInfo { width: 320, height: 240, k, ..CameraInfo::default() }
+    }
+
+    fn beside() -> RosCalibration {
+        RosCalibration::new(&CalibrationTopic::Beside, "/camera/image_raw")
+    }
+
+    fn at(s: f64) -> Stamp {
+        Stamp::default().shifted(s)
+    }
+
     #[test]
-    fn the_calibration_is_beside_the_images() {
-        for (images, info, is_rectified) in [
-            ("/camera/image_raw", "/camera/camera_info", false),
-            ("/stereo/left/image_rect_color/compressed", "/stereo/left/camera_info", true),
-            ("/image", "/camera_info", false),
-            ("image_rect", "camera_info", true),
-        ] {
-            assert_eq!(beside(images), (info.to_owned(), is_rectified), "{images}");
+    fn a_wrong_calibration_is_named_once_and_the_last_good_one_stays() {
+        let mut source = beside();
+        let mut info = info();
+        source.handle_info(info.clone());
+        let first = source.for_image(at(0.0)).unwrap().unwrap();
+        info.header.stamp.sec = 5;
+        source.handle_info(info.clone());
+        assert!(Arc::ptr_eq(&first, &source.for_image(at(1.0)).unwrap().unwrap()));
+        for wrong in [-1.0, 0.0] {
+            info.k = [wrong; 9];
+            source.handle_info(info.clone());
+            let mut texts = Vec::new();
+            (0..2).for_each(|_| source.report(&mut |_, text| texts.push(text)));
+            assert!(texts.len() == 1 && texts[0].ends_with("the calibration before it is used"), "{texts:?}");
+            assert!(Arc::ptr_eq(&first, &source.for_image(at(2.0)).unwrap().unwrap()));
         }
     }
 
     #[test]
-    fn a_calibration_is_read_once_and_a_wrong_one_is_named() {
-        let mut source = RosCalibration::new(&CalibrationTopic::Beside, "/camera/image_raw");
-        let k = [300.0, 0.0, 160.0, 0.0, 300.0, 120.0, 0.0, 0.0, 1.0];
-        let mut info = CameraInfo { width: 320, height: 240, k, ..CameraInfo::default() };
-        source.handle_info(info.clone());
-        let first = source.last.clone().unwrap().1.unwrap();
-        info.header.stamp.sec = 5;
-        source.handle_info(info.clone());
-        assert!(Arc::ptr_eq(&first, &source.last.clone().unwrap().1.unwrap()));
-        info.k[0] = -1.0;
-        source.handle_info(info);
-        let mut texts = Vec::new();
-        (0..2).for_each(|_| source.report(&mut |_, text| texts.push(text)));
-        assert!(source.last.unwrap().1.is_none() && texts.len() == 1 && texts[0].contains("the matrix K"));
+    fn first_images_are_dropped_while_a_calibration_may_be_found() {
+        let mut source = beside();
+        assert!(source.for_image(at(10.0)).unwrap_err().contains("/camera/camera_info is looked for, up to 3 s"));
+        assert!(source.for_image(at(12.9)).is_err());
+        source.handle_info(info());
+        assert!(source.for_image(at(12.95)).unwrap().is_some());
+
+        let mut without = beside();
+        assert!(without.for_image(at(10.0)).is_err());
+        assert_eq!(without.for_image(at(13.0)), Ok(None));
+
+        let mut uncalibrated = beside();
+        uncalibrated.handle_info(CameraInfo::default());
+        assert_eq!(uncalibrated.for_image(at(10.0)), Ok(None), "the driver says that there is none");
+
+        let mut none = RosCalibration::new(&CalibrationTopic::None, "/camera/image_raw");
+        assert_eq!(none.for_image(at(10.0)), Ok(None));
     }
 }

@@ -81,12 +81,13 @@ section! {
         depth_units_per_m: f64 = 0.0, range(0.0, 1_000_000.0, "1/m"), [Auv Scenario];
         /// Calibration of the camera. Its images are rectified, and the altitude and the focal length give the size of their
         /// pixels. file:FILE: a YAML file of ROS's camera_calibration. ros2:TOPIC: CameraInfo; images from before the first one
-        /// are not mapped. Empty: of a ros2 source the topic camera_info beside its images, if somebody publishes it.
+        /// are not mapped. Empty: of a ros2 source the topic camera_info beside its images; until it is found, for at most 3 s,
+        /// images are not mapped; of a bag the first usable message of that topic. none: images are not rectified.
         calibration: CalibrationSource = CalibrationSource::Beside, ANY, [Auv Scenario];
         /// Camera matrix fx, fy, cx, cy of images without distortion, in place of camera.calibration. All 0: not known.
         matrix: [f64; 4] = [0.0; 4], range(-1_000_000.0, 1_000_000.0, "pixel"), [Auv Scenario];
-        /// Bits of the levels in images of 16 bits a channel: 10, 12 or 14 for cameras that leave the upper bits at 0. 0, for raw
-        /// images of ROS 2: the least number of bits that holds the levels of all images so far.
+        /// Bits of the levels in images of 16 bits a channel, 8 to 16: 10, 12 or 14 for cameras that leave the upper bits at 0. 0,
+        /// for raw images of ROS 2: the least number of bits that holds the levels of all images so far.
         bits: u8 = 16, range(0.0, 16.0, ""), [Auv Scenario];
         /// Whether frames are corrected for a light that depends on the place in the frame alone: lamps, the lens, the water
         /// between. It is learnt from the first 500 frames. Exemplars show the frame as it is.

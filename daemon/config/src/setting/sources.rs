@@ -6,15 +6,16 @@ use serde_json::json;
 use std::path::PathBuf;
 use toml::Value;
 
-/// A setting of the form `KIND:REST`, or an empty text for the default.
+/// A setting of the form `KIND:REST`, a word, or an empty text for the default.
 macro_rules! sources {
-    ($($(#[$doc:meta])* $name:ident { $(#[$empty_doc:meta])* $empty:ident, $($(#[$kind_doc:meta])* $kind:ident($rest:ty) = $prefix:literal $place:literal,)* })*) => { $(
+    ($($(#[$doc:meta])* $name:ident { $(#[$empty_doc:meta])* $empty:ident, $([$word:ident = $word_text:literal $word_doc:literal],)* $($(#[$kind_doc:meta])* $kind:ident($rest:ty) = $prefix:literal $place:literal,)* })*) => { $(
         $(#[$doc])*
         #[derive(Debug, Clone, PartialEq, Eq, Default)]
         pub enum $name {
             $(#[$empty_doc])*
             #[default]
             $empty,
+            $(#[doc = $word_doc] $word,)*
             $($(#[$kind_doc])* $kind($rest),)*
         }
 
@@ -24,6 +25,9 @@ macro_rules! sources {
                 if text.is_empty() {
                     return Some(Self::$empty);
                 }
+                $(if text == $word_text {
+                    return Some(Self::$word);
+                })*
                 let (kind, rest) = text.split_once(':').filter(|(_, rest)| !rest.is_empty())?;
                 match kind {
                     $($prefix => Some(Self::$kind(rest.into())),)*
@@ -34,17 +38,18 @@ macro_rules! sources {
             fn write(&self) -> Value {
                 Value::String(match self {
                     Self::$empty => String::new(),
+                    $(Self::$word => $word_text.to_owned(),)*
                     $(Self::$kind(rest) => format!(concat!($prefix, ":{}"), rest.place_text()),)*
                 })
             }
 
             fn allowed(_: &Rule) -> String {
-                [$(concat!("\"", $prefix, ":", $place, "\""),)* "or \"\""].join(", ")
+                [$(concat!("\"", $prefix, ":", $place, "\""),)* $(concat!("\"", $word_text, "\""),)* "or \"\""].join(", ")
             }
 
             fn schema(_: &Rule) -> serde_json::Value {
                 let kinds = [$($prefix),*].join("|");
-                json!({ "type": "string", "pattern": format!("^(({kinds}):.+)?$") })
+                json!({ "type": "string", "pattern": format!(concat!("^(({kinds}):.+", $("|", $word_text,)* ")?$"), kinds = kinds) })
             }
         }
     )* };
@@ -102,6 +107,7 @@ sources! {
     CalibrationSource {
         /// The topic beside that of the images, if there is one.
         Beside,
+        [None = "none" "There is none."],
         /// A file that ROS wrote.
         File(PathBuf) = "file" "FILE",
         /// A topic of ROS 2.
@@ -158,6 +164,11 @@ mod tests {
         for wrong in ["frames", "frames:", "video:x", ":x"] {
             assert_eq!(CameraSource::read(&Value::String(wrong.to_owned()), &ANY), None, "{wrong}");
         }
+        let none = Value::String("none".to_owned());
+        assert_eq!(CalibrationSource::read(&none, &ANY), Some(CalibrationSource::None));
+        assert_eq!(CalibrationSource::None.write(), none);
+        assert_eq!(CalibrationSource::allowed(&ANY), "\"file:FILE\", \"ros2:TOPIC\", \"none\", or \"\"");
+        assert_eq!(CalibrationSource::schema(&ANY)["pattern"], "^((file|ros2):.+|none)?$");
         assert_eq!(
             NavigationSource::allowed(&ANY),
             "\"tum:FILE\", \"dvl:HOST:PORT\", \"ros2:TOPIC\", \"tf:WORLD#VEHICLE\", or \"\""

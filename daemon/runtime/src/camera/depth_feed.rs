@@ -29,8 +29,15 @@ impl DepthFeed {
         LiveSource::next_of(&mut self.source).await
     }
 
-    pub(super) fn handle_depth(&mut self, stamp: Stamp, message: DepthMessage) {
-        self.track.push(stamp, message);
+    /// Takes distances, which are kept for the images that wait, at these times.
+    pub(super) fn handle_depth(
+        &mut self,
+        stamp: Stamp,
+        message: DepthMessage,
+        images: impl IntoIterator<Item = Stamp>,
+    ) {
+        let bytes = message.size();
+        self.track.push(stamp, message, bytes, images);
     }
 
     /// The distances at the time of an image that waits since `since`; `None` as long as it waits for them.

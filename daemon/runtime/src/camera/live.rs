@@ -157,7 +157,9 @@ impl LiveCamera {
                 self.poses.handle_pose(pose, self.clock.now());
             }
             SourceReport::Reading(Reading::Depth(depth)) => {
-                self.depth.handle_depth(self.times.of(depth.stamp, depth.arrival), depth.message);
+                let pending = self.pending.as_ref().map(|(image, _)| image.stamp);
+                let images = pending.into_iter().chain(self.matcher.waiting());
+                self.depth.handle_depth(self.times.of(depth.stamp, depth.arrival), depth.message, images);
             }
             SourceReport::Fault(fault, text) => {
                 self.matcher.count(fault);
@@ -202,8 +204,11 @@ impl LiveCamera {
         self.matcher.tally()
     }
 
-    pub(super) fn handle_missed(&mut self) {
+    /// Counts an image that could not be read, or has another size than its calibration.
+    pub(crate) fn handle_missed(&mut self, error: &UserError) {
         self.matcher.drop_matched(CameraFault::Unreadable);
+        self.faults.handle_fault(CameraFault::Unreadable, error.to_string());
+        self.faults.log(&self.matcher);
     }
 
     pub(super) fn handle_unusable_depth(&mut self, error: &DepthError) {
@@ -281,5 +286,30 @@ impl LiveCamera {
     /// Logs the account of the run.
     pub(super) fn log_end(&self) {
         tracing::info!("camera: {}", self.matcher.tally());
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::sync::Mutex;
+
+    #[test]
+    fn images_that_do_not_fit_their_calibration_are_logged_seldom() {
+        let config = Config::default();
+        let ros = RosSensors::new(&config).unwrap();
+        let mut camera = LiveCamera::start(&config, 0.0, &ros).unwrap();
+        let written = Arc::new(Mutex::new(Vec::new()));
+        let subscriber = tracing_subscriber::fmt().with_writer(written.clone()).finish();
+        tracing::subscriber::with_default(subscriber, || {
+            let error = UserError::Input("the image has 640 x 480 pixels, its calibration 320 x 240".to_owned());
+            (0..100).for_each(|_| camera.handle_missed(&error));
+        });
+        let text = String::from_utf8(written.lock().unwrap().clone()).unwrap();
+        assert_eq!(text.lines().count(), 1, "{text}");
+        assert!(
+            text.contains("dropped, unreadable (1 so far): the image has 640 x 480 pixels, its calibration 320 x 240")
+        );
+        assert_eq!(camera.tally().of(CameraFault::Unreadable), 100);
     }
 }

@@ -200,11 +200,4 @@ impl Camera {
             camera.handle_unusable_depth(error);
         }
     }
-
-    /// Counts an image that could not be decoded.
-    pub(crate) fn handle_missed(&mut self) {
-        if let Self::Live(camera) = self {
-            camera.handle_missed();
-        }
-    }
 }

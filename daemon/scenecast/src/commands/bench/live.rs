@@ -101,6 +101,7 @@ impl LiveBench {
             &[
                 &format!("modem.connect={}", dir_port(dir)?),
                 "camera.source=ros2:/camera/image_raw",
+                "camera.calibration=none",
                 "navigation.source=ros2:/odometry",
                 &format!("camera.metres_per_pixel={METRES_PER_PIXEL}"),
                 "survey.area_m=[0, 0, 120, 80]",

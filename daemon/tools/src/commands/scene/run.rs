@@ -25,6 +25,7 @@ fn level_camera() -> BagTiming {
         mounting: CameraMounting::default(),
         altitude_m: 0.0,
         calibration: None,
+        reads_info: false,
         bits: BitDepth::default(),
     }
 }
