@@ -11,6 +11,7 @@ mod key_file;
 mod load;
 mod migrate;
 mod modem;
+mod move_to_section;
 mod old_keys;
 mod print;
 mod reference;

@@ -2,6 +2,7 @@
 
 use crate::Key;
 use crate::load::{line_of, plain};
+use crate::move_to_section::move_to_section;
 use crate::old_keys::{OldKey, as_table};
 use scenecast_core::UserError;
 use std::ops::Range;
@@ -19,9 +20,9 @@ pub struct Migration {
 }
 
 /// A part of the text, and its replacement.
-struct Edit {
-    at: Range<usize>,
-    by: String,
+pub(crate) struct Edit {
+    pub at: Range<usize>,
+    pub by: String,
 }
 
 /// Gives the keys of a file their present names and forms. `path` is for messages only.
@@ -42,11 +43,19 @@ pub fn migrate(path: &Path, text: &str) -> Result<Migration, UserError> {
             let line = line_of(text, at.start);
             let renamed = OldKey::find(&full);
             if let Some(OldKey { new, .. }) = renamed {
-                let leaf = Key::find(new).map_or(new, Key::leaf);
-                if keys.iter().any(|(other, _)| other.get_ref() == leaf) {
+                let (present, leaf) = new.split_once('.').unwrap_or(("", new));
+                let others = table.get_ref().get(present).and_then(|others| others.get_ref().as_table());
+                if others.is_some_and(|others| others.contains_key(leaf)) {
                     return Err(at_line(at.start, format!("{full} is now called {new}, which the file has too")));
                 }
-                edits.push(Edit { at: at.clone(), by: leaf.to_owned() });
+                if present == section.get_ref() {
+                    edits.push(Edit { at: at.clone(), by: leaf.to_owned() });
+                } else {
+                    let key = at.start..value.span().end;
+                    let moved = move_to_section(text, table.get_ref(), &key, at.len(), (present, leaf));
+                    let by_hand = || at_line(at.start, format!("{full} is now called {new}: move it to [{present}]"));
+                    edits.extend(moved.ok_or_else(by_hand)?);
+                }
                 migration.changes.push(format!("line {line}: {full} -> {new}"));
             }
             let Some(key) = Key::find(renamed.map_or(&full, |key| key.new)) else { continue };
@@ -104,6 +113,25 @@ mod tests {
         assert_eq!(migration.changes[0], "line 3: link.spend -> link.background");
         let again = migrated(new).unwrap();
         assert_eq!((again.text.as_str(), again.changes.len()), (new, 0));
+    }
+
+    #[test]
+    fn a_key_moves_to_its_section_with_its_comments() {
+        let old = "[labels]\nvotes = \"all\"\n# Ours.\n# 8 %.\n band_share = 9 # more\n\n[survey]\nspeed_m_s = 1";
+        let rest = "[labels]\nvotes = \"all\"\n\n[survey]\nspeed_m_s = 1";
+        let new = format!("{rest}\n\n[bands]\n# Ours.\n# 8 %.\n share = 9 # more\n");
+        let migration = migrated(old).unwrap();
+        assert_eq!((migration.text, migration.changes), (new, vec!["line 5: labels.band_share -> bands.share".into()]));
+        let with_section = migrated("[bands] # ours\nranges = []\n[labels]\nband_share = 9").unwrap();
+        assert_eq!(with_section.text, "[bands] # ours\nshare = 9\nranges = []\n[labels]\n");
+        for by_hand in
+            ["labels.band_share = 9\n", "labels = { band_share = 9 }\n", "bands = {}\n[labels]\nband_share = 9\n"]
+        {
+            let refused = migrated(by_hand).unwrap_err();
+            assert!(refused.ends_with("labels.band_share is now called bands.share: move it to [bands]"), "{refused}");
+        }
+        let refused = migrated("[labels]\nband_share = 9\n[bands]\nshare = 9\n").unwrap_err();
+        assert!(refused.starts_with("x.toml:2: ") && refused.ends_with("which the file has too"), "{refused}");
     }
 
     #[test]

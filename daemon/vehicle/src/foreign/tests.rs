@@ -162,6 +162,37 @@ fn a_restored_foreign_map_is_the_saved_one() {
     }
 }
 
+/// A checkpoint of version 1, in hexadecimal digits.
+const VERSION_1: &str = "53434e4c4142454c010000005e000000000000004d03000000000000e03f010000000000001c400106303030\
+    303137010400010404030400050002010202fe01020001011a6000fe08000005ffffe0a7fea26261636b7363\
+    617474657264420100000101020001010a08830102036b656c70ae4f63f9";
+
+#[test]
+fn a_checkpoint_of_version_1_is_restored() {
+    let mut same = map(&[]);
+    same.handle_item(&grid(2, &[0, 253, 255, 9]), ForeignSource::Labels, None, 5.0).unwrap();
+    same.handle_item(&grid(2, &[0, 253, 255, 255]), ForeignSource::Labels, None, 6.0).unwrap();
+    let pose = ImagePose { x_m: 1.25, y_m: 0.25, depth_m: 0.0, heading_rad: 0.0 };
+    let image = Content::Image { pose: Some(pose), metres_per_pixel: Some(0.1), classes: raster(2, &[4; 4]) };
+    same.handle_item(&item(image), ForeignSource::Labels, None, 6.5).unwrap();
+    let (scale, offset) = (Decimal::new(5, -1), Decimal::new(-80, 0));
+    let band = Band { name: "backscatter".into(), unit: "dB".into(), scale, offset, no_data: 255 };
+    let ground = Ground { west_m: 0.0, south_m: 0.0, cell_m: 0.5 };
+    for values in [[0, 100, 255], [0, 255, 255]] {
+        let band = Content::Band { band: band.clone(), ground, levels: raster(3, &values) };
+        same.handle_item(&item(band), ForeignSource::Labels, None, 7.0).unwrap();
+    }
+    same.classes.insert(10, ClassEntry::new(10, "kelp", Some([1, 2, 3])).unwrap());
+    same.set_mark(ForeignSource::Labels, "000017");
+    let digits = |at: usize| u8::from_str_radix(&VERSION_1[at..at + 2], 16).unwrap();
+    let bytes: Vec<u8> = (0..VERSION_1.len()).step_by(2).map(digits).collect();
+    let config = config(&["scene.cell_m=0.5", "labels.source=dir:labels"]);
+    assert_eq!(ForeignMap::restore(&config, &bytes).unwrap(), (same, 77));
+    for cut in 0..bytes.len() {
+        assert!(ForeignMap::restore(&config, &bytes[..cut]).is_err());
+    }
+}
+
 #[test]
 fn bands_come_beside_the_labels_of_the_scene_model() {
     let mut beside = map(&["labels.source=", "bands.source=dir:bands"]);

@@ -3,6 +3,8 @@
 //! [`Vehicle`] joins parts that own their state: the navigator estimates the position, the guidance chooses waypoints, the
 //! publisher selects the parts of the map that are sent, and the gallery sends exemplars.
 
+#[cfg(test)]
+mod band_tests;
 mod bands;
 mod durable;
 mod gallery;
@@ -275,7 +277,7 @@ impl Vehicle {
     /// Labels are numbered again from 1. The surface learns it by a new run of the link, before any of the new labels.
     fn begin_epoch(&mut self, now: Instant) {
         self.link.begin_epoch(now);
-        self.publisher.begin_epoch();
+        self.publisher.begin_epoch(&mut self.link, now);
         self.utility = None;
         self.gallery = Gallery::default();
         self.follow_utility();

@@ -7,7 +7,7 @@ use crate::{LabelChanges, MapUpdate};
 use scenecast_config::Debounce;
 use scenecast_protocol::directive::{CellBand, Settings};
 use scenecast_protocol::link::VehicleLink;
-use scenecast_protocol::map::{Cell, LabelGrid, LayerDescriptor, LayerId, LayerMask, UNEXPLORED};
+use scenecast_protocol::map::{Cell, LabelGrid, LayerDescriptor, LayerId, LayerMask, LayerSource, UNEXPLORED};
 use scenecast_protocol::map_codec::{Codec, Stride};
 use scenecast_protocol::object::ObjectId;
 use scenecast_protocol::time::Instant;
@@ -151,7 +151,7 @@ impl MapPublisher {
         self.layers = own.map(|(&id, cells)| (id, cells.clone())).collect();
         match &mut self.whole_png {
             Some(whole) => whole.set(update.cells.iter().copied()),
-            None => self.publish(link, now),
+            None => self.publish_scene(link, now),
         }
     }
 
@@ -193,7 +193,7 @@ impl MapPublisher {
                 let cells = cells.filter(|(_, label)| *label <= stored).collect();
                 self.publish_cells(cells, link, now);
             }
-            None => self.publish(link, now),
+            None => self.publish_scene(link, now),
         }
     }
 
@@ -201,7 +201,7 @@ impl MapPublisher {
         if let Some(whole) = &mut self.whole_png {
             return whole.set(cells.into_iter());
         }
-        cells.retain(|&(cell, _)| self.is_sent(link.map(), cell));
+        cells.retain(|&(cell, _)| self.is_sent(Some(link.map()), cell));
         if !cells.is_empty() {
             link.set_map(cells, now);
         }
@@ -223,45 +223,70 @@ impl MapPublisher {
             // The cells that the scene model gave to the layer until now.
             let others = self.layers.remove(&id).unwrap_or_default().into_iter().map(|(cell, _)| (cell, f64::NAN));
             let changed = self.bands.take(id, levels);
-            let mut cells: Vec<(Cell, f64)> = others.chain(changed).collect();
-            cells.retain(|&(cell, _)| self.is_sent(link.map(), cell));
-            if self.whole_png.is_none() && !cells.is_empty() {
-                link.set_layer(id, cells, now);
+            if self.whole_png.is_none() {
+                self.set_layer(id, others.chain(changed).collect(), link, now);
             }
         }
     }
 
-    /// Forgets the map, because labels change their meaning.
-    pub(super) fn begin_epoch(&mut self) {
+    /// Forgets the map, because labels change their meaning. The link, which has cleared its layers, receives the bands again.
+    pub(super) fn begin_epoch(&mut self, link: &mut VehicleLink, now: Instant) {
         self.map.clear();
         self.explored = 0;
         self.layers.clear();
         self.version += 1;
         self.whole_png = self.whole_png.take().map(|_| WholePng::default());
+        if self.whole_png.is_none() {
+            self.publish_bands(link, now);
+        }
     }
 
-    /// Gives the link the selected cells of the map.
+    /// Gives the link the selected cells of the map and of every layer, because the selection has changed.
+    pub(super) fn publish(&self, link: &mut VehicleLink, now: Instant) {
+        if self.whole_png.is_none() {
+            self.publish_scene(link, now);
+            self.publish_bands(link, now);
+        }
+    }
+
+    /// Gives the link the selected cells of the map and of the scene model's layers.
     ///
     /// Where only coarse cells are selected, finer ones that the link already has stay up to date, so that no cell on the
     /// operator's map is older than it looks.
-    pub(super) fn publish(&self, link: &mut VehicleLink, now: Instant) {
-        let is_ready = |&(cell, label): &(Cell, u8)| self.is_sent(link.map(), cell) && self.withheld.allows(label);
+    fn publish_scene(&self, link: &mut VehicleLink, now: Instant) {
+        let is_ready =
+            |&(cell, label): &(Cell, u8)| self.is_sent(Some(link.map()), cell) && self.withheld.allows(label);
         let mut cells: Vec<(Cell, u8)> = self.map.iter().filter(is_ready).collect();
         if self.has_erased {
             let gone = link.map().iter().filter(|&(cell, _)| self.map.get(cell) == UNEXPLORED);
             cells.extend(gone.map(|(cell, _)| (cell, UNEXPLORED)));
         }
         link.set_map(cells, now);
-        let own = self.layers.iter().map(|(&id, cells)| (id, cells.clone()));
-        for (id, mut cells) in own.chain(self.bands.all()) {
-            cells.retain(|&(cell, _)| self.is_sent(link.map(), cell));
+        for (&id, cells) in &self.layers {
+            self.set_layer(id, cells.clone(), link, now);
+        }
+    }
+
+    /// Gives the link every band whole, which takes long for a large one: changes alone come by [`Self::handle_bands`].
+    fn publish_bands(&self, link: &mut VehicleLink, now: Instant) {
+        for (id, cells) in self.bands.all() {
+            self.set_layer(id, cells, link, now);
+        }
+    }
+
+    /// Gives the link the selected ones of the cells of a layer, and those that are no longer known.
+    fn set_layer(&self, id: LayerId, mut cells: Vec<(Cell, f64)>, link: &mut VehicleLink, now: Instant) {
+        let sent = link.layers().find(|layer| layer.id() == id).map(LayerSource::target);
+        cells.retain(|&(cell, quantity)| quantity.is_nan() || self.is_sent(sent, cell));
+        if !cells.is_empty() {
             link.set_layer(id, cells, now);
         }
     }
 
-    /// Whether a cell is among the selected ones, or known to the link, which has the labels `sent`.
-    fn is_sent(&self, sent: &LabelGrid, cell: Cell) -> bool {
-        self.cells() != CellBand::Coarse || Stride::Four.on_lattice(cell).is_some() || sent.get(cell) != UNEXPLORED
+    /// Whether a cell is among the selected ones, or one of `sent`: what the link has of the map or of the layer.
+    fn is_sent(&self, sent: Option<&LabelGrid>, cell: Cell) -> bool {
+        let is_selected = self.cells() != CellBand::Coarse || Stride::Four.on_lattice(cell).is_some();
+        is_selected || sent.is_some_and(|sent| sent.get(cell) != UNEXPLORED)
     }
 
     /// Gives the link the whole map as an image if that is due.

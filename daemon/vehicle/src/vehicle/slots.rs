@@ -10,6 +10,8 @@ use scenecast_protocol::directive::{
     Areas, AreasFault, Budget, Constraints, Destination, ExemplarRequests, Fence, Fix, Limits, LimitsFault,
     RefusalReason, Settings, Slot, SlotId, SlotState, Utility,
 };
+use scenecast_protocol::link::VehicleLink;
+use scenecast_protocol::map::{LayerMask, LayerSource};
 use scenecast_protocol::time::Instant;
 use std::time::Duration;
 
@@ -267,7 +269,12 @@ impl Vehicle {
         self.link.set_budget(budget.bits_per_s, now);
         self.publisher.select(&mut self.link);
         self.link.set_shares(budget.shares);
+        let live = |link: &VehicleLink| link.layers().map(LayerSource::id).collect::<LayerMask>();
+        let before = live(&self.link);
         self.link.set_background(budget.background);
+        if live(&self.link) != before {
+            self.publisher.publish(&mut self.link, now);
+        }
         self.serve_exemplars();
         self.durable.budget_bps = Some(budget.bits_per_s);
         self.durable.shares = Some(budget.shares.0);
