@@ -29,6 +29,9 @@ impl RecentFaults {
 pub(crate) struct SensorFaults {
     images: RecentFaults,
     poses: RecentFaults,
+    depth: RecentFaults,
+    /// Images that were mapped so far, and when the last one was.
+    mapped: (u64, Option<Instant>),
 }
 
 impl SensorFaults {
@@ -43,15 +46,34 @@ impl SensorFaults {
         now: Instant,
     ) -> EquipmentFaults {
         let (dropped, unusable) = camera.map_or((0, 0), |tally| (unusable_images(tally), unusable_poses(tally)));
+        let images_dropped = self.images.handle(dropped, now);
         EquipmentFaults {
             camera_silent,
-            images_dropped: self.images.handle(dropped, now),
+            images_dropped,
+            images_unusable: self.is_nothing_mapped(camera, now) && images_dropped && !camera_silent,
+            depth_missing: self.depth.handle(camera.map_or(0, missing_depth), now),
             poses_missing: pose_gap.is_some(),
             poses_faulty: self.poses.handle(unusable, now),
             labels_refused,
             ..EquipmentFaults::default()
         }
     }
+
+    /// Whether no image was mapped for a while.
+    fn is_nothing_mapped(&mut self, camera: Option<&CameraTally>, now: Instant) -> bool {
+        let mapped = camera.map_or(0, |tally| tally.matched);
+        let (before, last) = self.mapped;
+        if before != mapped || last.is_none() {
+            self.mapped = (mapped, Some(now));
+        }
+        self.mapped.1.is_some_and(|at| now.duration_since(at) >= FAULT_LASTS)
+    }
+}
+
+/// Images without distances that could be used.
+fn missing_depth(tally: &CameraTally) -> u64 {
+    use CameraFault::{DepthLost, DepthStalled, NoDepth, UnusableDepth};
+    [NoDepth, UnusableDepth, DepthLost, DepthStalled].map(|fault| tally.of(fault)).iter().sum()
 }
 
 /// Images that were dropped, without those of a camera that is faster than the scene model: to drop them is no fault.
@@ -60,7 +82,9 @@ fn unusable_images(tally: &CameraTally) -> u64 {
 }
 
 fn unusable_poses(tally: &CameraTally) -> u64 {
-    tally.iter().filter(|(fault, _)| fault.is_of_navigation()).map(|(_, n)| n).sum()
+    // That none comes in is a fault of its own.
+    let is_silence = |fault| matches!(fault, CameraFault::PosesLost | CameraFault::PosesStalled);
+    tally.iter().filter(|(fault, _)| fault.is_of_navigation() && !is_silence(*fault)).map(|(_, n)| n).sum()
 }
 
 #[cfg(test)]
@@ -75,6 +99,23 @@ mod tests {
         assert!(!images_dropped(&tally));
         tally.count(CameraFault::CutOff);
         assert!(images_dropped(&tally));
+    }
+
+    #[test]
+    fn a_camera_of_which_no_image_can_be_used_is_a_grave_fault() {
+        let (mut faults, mut tally, began) = (SensorFaults::default(), CameraTally::default(), Instant::now());
+        let mut unusable = |tally: &CameraTally, s| {
+            faults.now(Some(tally), false, None, false, began + Duration::from_secs(s)).images_unusable
+        };
+        tally.matched = 3;
+        assert!(!unusable(&tally, 0));
+        tally.count(CameraFault::Calibration);
+        assert!(!unusable(&tally, 5), "one of some seconds ago was mapped");
+        tally.count(CameraFault::Calibration);
+        assert!(unusable(&tally, 11));
+        assert!(!unusable(&tally, 30), "no further image comes in");
+        tally.matched = 4;
+        assert!(!unusable(&tally, 31));
     }
 
     #[test]

@@ -40,17 +40,18 @@ impl Rotation {
         Self { rows: [0, 1, 2].map(|row| columns.map(|column| column[row])) }
     }
 
-    /// The pose of a body at `place` (east, north, up), whose bow and starboard side are these vectors of its own axes.
-    fn pose_of(&self, place: [f64; 3], bow: [f64; 3], starboard: [f64; 3]) -> SensorPose {
+    /// The pose of a body at `place` (east, north, up), whose bow and starboard side, and its upper side,
+    /// are these vectors of its own axes.
+    fn pose_of(&self, place: [f64; 3], bow: [f64; 3], starboard: [f64; 3], upwards: [f64; 3]) -> SensorPose {
         let ([east, north, up], right) = (self.apply(bow), self.apply(starboard));
         let pitch_rad = up.clamp(-1.0, 1.0).asin();
-        let level = pitch_rad.cos().max(1e-9);
+        let upwards = self.apply(upwards)[2];
         SensorPose {
             x_m: place[0],
             y_m: place[1],
             depth_m: -place[2],
             heading_rad: east.atan2(north),
-            roll_rad: (-right[2] / level).clamp(-1.0, 1.0).asin(),
+            roll_rad: (-right[2]).atan2(upwards),
             pitch_rad,
             altitude_m: None,
         }
@@ -58,13 +59,13 @@ impl Rotation {
 
     /// The pose of a vehicle with the axes of ROS: x to the bow, y to port, z up (REP 103).
     pub fn vehicle_pose(&self, place: [f64; 3]) -> SensorPose {
-        self.pose_of(place, [1.0, 0.0, 0.0], [0.0, -1.0, 0.0])
+        self.pose_of(place, [1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, 1.0])
     }
 
     /// The pose of a vehicle whose camera looks down, the top of its images to the bow. The axes of the camera are x to the right
     /// and y down in the image, z ahead.
     pub fn camera_pose(&self, place: [f64; 3]) -> SensorPose {
-        self.pose_of(place, [0.0, -1.0, 0.0], [1.0, 0.0, 0.0])
+        self.pose_of(place, [0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0])
     }
 }
 
@@ -100,6 +101,10 @@ mod tests {
         assert_eq!(degrees(down.camera_pose([0.0; 3])), [0, 0, 0]);
         let east = Rotation::from_quaternion([0.5_f64.sqrt(), -(0.5_f64.sqrt()), 0.0, 0.0]).unwrap();
         assert_eq!(degrees(east.camera_pose([0.0; 3])), [90, 0, 0]);
+        let up = Rotation::from_quaternion(about(2, 30.0)).unwrap().camera_pose([0.0; 3]);
+        assert_eq!(up.roll_rad.to_degrees().abs().round(), 180.0, "a camera that looks up is no camera that looks down");
+        let capsized = Rotation::from_quaternion(about(0, 180.0)).unwrap().vehicle_pose([0.0; 3]);
+        assert_eq!(capsized.roll_rad.to_degrees().abs().round(), 180.0);
         assert_eq!(Rotation::from_quaternion([0.0; 4]), None);
         assert_eq!(Rotation::from_quaternion([f64::NAN; 4]), None);
     }

@@ -331,7 +331,11 @@ impl Surface {
                 let exemplar = Exemplar::decode(&bytes)?;
                 let is_new = record.handle_exemplar(&exemplar, now);
                 if is_new {
-                    self.log_fact(vehicle, LogKind::Image, &format!("image of label {}", exemplar.label), now);
+                    let text = match exemplar.bytes.is_empty() {
+                        true => format!("no image of label {} yet", exemplar.label),
+                        false => format!("image of label {}", exemplar.label),
+                    };
+                    self.log_fact(vehicle, LogKind::Image, &text, now);
                 }
                 is_new.then_some(SurfaceOutput::ExemplarHere(vehicle, exemplar.label))
             }

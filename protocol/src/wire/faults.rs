@@ -12,7 +12,8 @@ use super::status::StatusError;
 ///  3   poses faulty        within the last 10 s, the navigation source gave a pose that could not be used
 ///  4   autopilot refuses   it answers and does not follow: it is disarmed, in a mode of the pilot's, or has another target
 ///  5   labels refused      within the last 10 s, an input of labels or bands was refused, or its source was lost
-///  6-7 reserved            0, not read
+///  6   images unusable     images come in, and for 10 s or more none of them could be mapped
+///  7   depth missing       within the last 10 s, an image had no distances that could be used, where they are configured
 /// ```
 ///
 /// Source: vehicle, in the frame of a pose and before it, while there is a fault. The first bit is the highest.
@@ -30,6 +31,10 @@ pub struct EquipmentFaults {
     pub autopilot_refuses: bool,
     /// Within the last 10 s, an input of labels or bands was refused, or its source was lost.
     pub labels_refused: bool,
+    /// Images come in, and for 10 s or more none of them could be mapped.
+    pub images_unusable: bool,
+    /// Within the last 10 s, an image had no distances that could be used, where they are configured.
+    pub depth_missing: bool,
 }
 
 impl EquipmentFaults {
@@ -47,9 +52,11 @@ impl EquipmentFaults {
             (self.autopilot_refuses, "the autopilot does not follow", true),
             (self.poses_missing, "no pose comes in", true),
             (self.camera_silent, "no image comes in", true),
+            (self.images_unusable, "no image can be used", true),
             (self.poses_faulty, "poses cannot be used", false),
             (self.images_dropped, "images are dropped", false),
-            (self.labels_refused, "labels of other programs are refused", false),
+            (self.depth_missing, "distances are missing or cannot be used", false),
+            (self.labels_refused, "labels or bands of other programs are refused or lost", false),
         ]
         .into_iter()
         .filter_map(|(is_set, text, is_grave)| is_set.then_some((text, is_grave)))
@@ -58,20 +65,27 @@ impl EquipmentFaults {
     /// The grave faults alone.
     #[must_use]
     pub fn grave(self) -> Self {
-        Self { images_dropped: false, poses_faulty: false, labels_refused: false, ..self }
+        Self { images_dropped: false, poses_faulty: false, labels_refused: false, depth_missing: false, ..self }
     }
 
     /// The byte on the wire.
     pub fn encode(self) -> [u8; Self::BYTES] {
-        let Self { camera_silent, images_dropped, poses_missing, poses_faulty, autopilot_refuses, labels_refused } =
-            self;
-        let bits = [camera_silent, images_dropped, poses_missing, poses_faulty, autopilot_refuses, labels_refused];
-        [bits.iter().fold(0, |byte, bit| byte << 1 | u8::from(*bit)) << 2]
+        let bits = [
+            self.camera_silent,
+            self.images_dropped,
+            self.poses_missing,
+            self.poses_faulty,
+            self.autopilot_refuses,
+            self.labels_refused,
+            self.images_unusable,
+            self.depth_missing,
+        ];
+        [bits.iter().fold(0, |byte, bit| byte << 1 | u8::from(*bit))]
     }
 
-    /// Reads the byte of the wire; its reserved bits are not read, so that a later vehicle may set them.
+    /// Reads the byte of the wire. Bytes after it are not read, so that a later vehicle may send more faults.
     pub fn decode(bytes: &[u8]) -> Result<Self, StatusError> {
-        let &[byte] = bytes else { return Err(StatusError::Length) };
+        let &byte = bytes.first().ok_or(StatusError::Length)?;
         let bit = |index: u8| byte & 0x80 >> index != 0;
         Ok(Self {
             camera_silent: bit(0),
@@ -80,6 +94,8 @@ impl EquipmentFaults {
             poses_faulty: bit(3),
             autopilot_refuses: bit(4),
             labels_refused: bit(5),
+            images_unusable: bit(6),
+            depth_missing: bit(7),
         })
     }
 }
@@ -92,20 +108,25 @@ mod tests {
     fn golden_bytes_of_faults() {
         let faults = EquipmentFaults { camera_silent: true, autopilot_refuses: true, ..EquipmentFaults::default() };
         assert_eq!(faults.encode(), [0b1000_1000]);
-        assert_eq!(EquipmentFaults::decode(&[0b1000_1011]), Ok(faults), "reserved bits are not read");
+        assert_eq!(EquipmentFaults::decode(&[0b1000_1000, 9]), Ok(faults), "further bytes are not read");
         assert_eq!(EquipmentFaults::decode(&[]), Err(StatusError::Length));
-        assert_eq!(EquipmentFaults::decode(&[0, 0]), Err(StatusError::Length));
-        let minor = EquipmentFaults { images_dropped: true, poses_faulty: true, labels_refused: true, ..faults };
+        let minor = EquipmentFaults {
+            images_dropped: true,
+            poses_faulty: true,
+            labels_refused: true,
+            depth_missing: true,
+            ..faults
+        };
         assert_eq!(minor.grave(), faults);
         assert!(
-            faults.iter().all(|(_, is_grave)| is_grave) && minor.iter().filter(|(_, is_grave)| !is_grave).count() == 3
+            faults.iter().all(|(_, is_grave)| is_grave) && minor.iter().filter(|(_, is_grave)| !is_grave).count() == 4
         );
         assert!(faults.is_any() && !EquipmentFaults::default().is_any());
     }
 
     #[test]
-    fn each_byte_of_known_bits_is_read_back() {
-        for byte in (0..=255_u8).step_by(4) {
+    fn each_byte_is_read_back() {
+        for byte in 0..=255_u8 {
             let faults = EquipmentFaults::decode(&[byte]).unwrap();
             assert_eq!((faults.encode(), faults.iter().count() as u32), ([byte], byte.count_ones()));
         }
