@@ -31,9 +31,9 @@ impl RosNode {
         self.subscribe(topic, Qos::Sensor(5), IMAGES)
     }
 
-    /// Calibrations: best effort, depth 5.
+    /// Calibrations, if a camera has one: best effort, depth 5.
     pub fn subscribe_camera_info(&self, topic: &RosName) -> Result<Inbox<CameraInfo>, UserError> {
-        self.subscribe(topic, Qos::Sensor(5), IMAGES)
+        self.subscribe_if_there(topic, Qos::Sensor(5), IMAGES)
     }
 
     /// Estimates of pose and speed: best effort.
@@ -46,9 +46,9 @@ impl RosNode {
         self.subscribe(topic, Qos::Sensor(100), POSES)
     }
 
-    /// Transforms that stay, usually on `/tf_static`, those before the subscription included.
+    /// Transforms that stay, if there are any, usually on `/tf_static`; those before the subscription are included.
     pub fn subscribe_static_tf(&self, topic: &RosName) -> Result<Inbox<TFMessage>, UserError> {
-        self.subscribe(topic, Qos::Latched(100), POSES)
+        self.subscribe_if_there(topic, Qos::Latched(100), POSES)
     }
 
     /// Whole grids of labels: the last one, and each new one of a publisher that keeps its last message.

@@ -63,7 +63,8 @@ impl SensorFaults {
     fn is_nothing_mapped(&mut self, camera: Option<&CameraTally>, now: Instant) -> bool {
         let mapped = camera.map_or(0, |tally| tally.matched);
         let (before, last) = self.mapped;
-        if before != mapped || last.is_none() {
+        // An image counts as mapped until the scene model finds that it cannot be read.
+        if mapped > before || last.is_none() {
             self.mapped = (mapped, Some(now));
         }
         self.mapped.1.is_some_and(|at| now.duration_since(at) >= FAULT_LASTS)

@@ -68,6 +68,10 @@ fn vehicle(out: &mut String, v: &VehicleState, state: &MissionState) {
     let changed = v.map.updated_s.map_or("no cell yet".to_owned(), |at| format!("changed {} ago", span(now - at)));
     let cells = format!("version {}, {} cells, {} labels", v.map.version, v.map.explored_cells, v.labels.len());
     let _ = writeln!(out, "  map        {cells}, {changed}");
+    if let Some(earlier) = &v.map.earlier {
+        let here = earlier.current_cells;
+        let _ = writeln!(out, "             OF AN EARLIER RUN; {here} cells of the current one are here");
+    }
     let trip = v.link.round_trip_s.map_or("not measured".to_owned(), |s| format!("{s:.2} s"));
     let (up, down) = (100.0 * v.link.up.loss, 100.0 * v.link.down.loss);
     let _ = writeln!(out, "  channel    loss up {up:.0} %, down {down:.0} %, round trip {trip}");

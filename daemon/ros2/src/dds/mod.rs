@@ -75,7 +75,12 @@ impl Dds {
         drop(node);
         let subscription = Arc::new(subscription);
         let (weak, dds) = (Arc::downgrade(&subscription), Arc::downgrade(self));
-        let publishers = move || Some(weak.upgrade()?.get_publisher_count(&dds.upgrade()?.node()));
+        let wanted = (name.as_str().to_owned(), M::DEFINITION.full_name());
+        let publishers = move || {
+            let (subscription, dds) = (weak.upgrade()?, dds.upgrade()?);
+            let count = subscription.get_publisher_count(&dds.node());
+            Some(if dds.peers().has_other_type(&wanted) { 0 } else { count })
+        };
         let task = self.runtime.spawn(fill(subscription, filler, name.as_str().to_owned()));
         let ending = Box::new(AbortOnDrop(task.abort_handle()));
         Ok(Feed { transport: Transport::Dds, publishers: Box::new(publishers), ending })

@@ -113,6 +113,31 @@ impl RosNode {
     ///
     /// A transport refuses the topic, for example since this process uses it with another type.
     pub fn subscribe<M: Message>(&self, topic: &RosName, qos: Qos, capacity: usize) -> Result<Inbox<M>, UserError> {
+        let (inbox, wanted) = self.inbox(topic, qos, capacity)?;
+        locked(&self.shared.wanted).push(wanted);
+        Ok(inbox)
+    }
+
+    /// As [`Self::subscribe`], for a topic that need not have a publisher: the lack of one is not reported.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::subscribe`].
+    pub fn subscribe_if_there<M: Message>(
+        &self,
+        topic: &RosName,
+        qos: Qos,
+        capacity: usize,
+    ) -> Result<Inbox<M>, UserError> {
+        Ok(self.inbox(topic, qos, capacity)?.0)
+    }
+
+    fn inbox<M: Message>(
+        &self,
+        topic: &RosName,
+        qos: Qos,
+        capacity: usize,
+    ) -> Result<(Inbox<M>, Wanted), UserError> {
         let name = remapped(topic, &self.shared.remaps);
         let (mut inbox, filler) = Inbox::new(capacity);
         let mut counts = Vec::new();
@@ -123,8 +148,7 @@ impl RosNode {
             inbox.feeds.push(ending);
         }
         let wanted = Wanted::new(name.as_str().to_owned(), M::DEFINITION.full_name(), counts);
-        locked(&self.shared.wanted).push(wanted);
-        Ok(inbox)
+        Ok((inbox, wanted))
     }
 
     /// A publisher of a topic.

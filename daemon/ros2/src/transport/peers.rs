@@ -31,6 +31,12 @@ pub struct Peers {
 }
 
 impl Peers {
+    /// Whether the topic is published, and with another type than the wanted one alone.
+    pub(crate) fn has_other_type(&self, wanted: &(String, String)) -> bool {
+        let has_topic = self.publishers.iter().any(|(topic, _)| *topic == wanted.0);
+        has_topic && !self.publishers.contains(wanted)
+    }
+
     /// The peers of all transports together.
     pub(crate) fn joined(by_transport: Vec<(Transport, Self)>) -> Self {
         by_transport.into_iter().fold(Self::default(), |mut all, (_, peers)| {
@@ -46,4 +52,21 @@ pub(crate) fn counts(by_transport: &[(Transport, Peers)]) -> String {
     let counts: Vec<String> =
         by_transport.iter().map(|(by, peers)| format!("{} on {by}", peers.participants)).collect();
     counts.join(", ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_topic_of_another_type_is_not_the_wanted_one() {
+        let pair = |topic: &str, message: &str| (topic.to_owned(), message.to_owned());
+        let image = pair("/camera", "sensor_msgs/msg/Image");
+        let peers = |pairs: &[(String, String)]| Peers { participants: 1, publishers: pairs.iter().cloned().collect() };
+        assert!(!peers(&[]).has_other_type(&image), "nobody publishes it");
+        assert!(!peers(std::slice::from_ref(&image)).has_other_type(&image));
+        let odometry = pair("/camera", "nav_msgs/msg/Odometry");
+        assert!(peers(std::slice::from_ref(&odometry)).has_other_type(&image));
+        assert!(!peers(&[odometry, image.clone()]).has_other_type(&image));
+    }
 }
