@@ -179,12 +179,13 @@ impl Navigator {
         self.last_fix
     }
 
-    /// The vehicle's own sensors measured a displacement since the last call: metres east and north.
+    /// The vehicle's own sensors measured a displacement since the last call: metres east and north. A negative depth counts as
+    /// the surface, as in the status on the link.
     pub fn handle_odometry(&mut self, dx_m: f64, dy_m: f64, heading_rad: f64, depth_m: f64, now: Instant) {
         if ![dx_m, dy_m, heading_rad, depth_m].into_iter().all(f64::is_finite) {
             return;
         }
-        (self.heading_rad, self.depth_m) = (heading_rad, depth_m);
+        (self.heading_rad, self.depth_m) = (heading_rad, depth_m.max(0.0));
         self.is_measured = true;
         self.unregistered_m += dx_m.hypot(dy_m);
         let (x, y) = self.filter.handle_travel(dx_m, dy_m);
@@ -223,11 +224,11 @@ impl Navigator {
         self.origin.add_uncertainty(metres.max(0.0) / std::f64::consts::SQRT_2);
     }
 
-    /// Sets the dead-reckoned pose from another source, such as a recorded mission.
+    /// Sets the dead-reckoned pose from another source, such as a recorded mission. A negative depth counts as the surface.
     pub fn set_pose(&mut self, x_m: f64, y_m: f64, heading_rad: f64, depth_m: f64, now: Instant) {
         (self.is_displaced, self.is_measured) = (false, true);
         let (dx, dy) = (x_m - self.dead_reckoned.x_m, y_m - self.dead_reckoned.y_m);
-        (self.heading_rad, self.depth_m) = (heading_rad, depth_m);
+        (self.heading_rad, self.depth_m) = (heading_rad, depth_m.max(0.0));
         self.unregistered_m += dx.hypot(dy);
         let off = (self.at.x_m - self.dead_reckoned.x_m, self.at.y_m - self.dead_reckoned.y_m);
         self.dead_reckoned = MapPoint { x_m, y_m };
@@ -310,6 +311,17 @@ mod tests {
             nav.handle_odometry(1.0, 0.0, 0.0, 18.0, at(f64::from(s)));
         }
         nav
+    }
+
+    #[test]
+    fn a_negative_depth_counts_as_the_surface() {
+        let mut nav = under_way();
+        nav.handle_odometry(1.0, 0.0, 0.0, -0.05, at(61.0));
+        assert_eq!(nav.depth_m(), 0.0);
+        nav.set_pose(0.0, 0.0, 0.0, 2.5, at(62.0));
+        assert_eq!(nav.depth_m(), 2.5);
+        nav.set_pose(0.0, 0.0, 0.0, -1.3, at(63.0));
+        assert_eq!(nav.depth_m(), 0.0);
     }
 
     #[test]
