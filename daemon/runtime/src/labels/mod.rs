@@ -1,5 +1,7 @@
 //! Labels of other programs: their sources, and the thread that makes them a map.
 
+#[cfg(any(test, feature = "ros2"))]
+mod echo;
 mod feed;
 #[cfg(unix)]
 mod local;

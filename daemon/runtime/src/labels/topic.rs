@@ -32,6 +32,7 @@ pub(crate) fn topic(_: &RosSensors, wanted: TopicFeed) -> Result<Feed, UserError
 #[cfg(feature = "ros2")]
 mod with {
     use super::{ForeignSource, LabelMessage, TopicFeed};
+    use crate::labels::echo::Echoes;
     use crate::labels::feed::{Arrived, Feed, LabelQueue};
     use scenecast_core::UserError;
     use scenecast_labels::ros::{band_of_occupancy, bands_of_grid_map, item_of_image, item_of_occupancy};
@@ -78,7 +79,7 @@ mod with {
         Ok(match message {
             LabelMessage::Image => {
                 let inboxes = vec![node.subscribe_images(&topic).map_err(failed)?];
-                let topic = Topic { origin, inboxes, is_overtaken_lost: true, last: None };
+                let topic = Topic { origin, inboxes, is_overtaken_lost: true, echoes: Echoes::default() };
                 Box::new(move |queue| topic.read(queue, |image| (&image.header.stamp, vec![item_of_image(image)])))
             }
             LabelMessage::OccupancyGrid => {
@@ -87,7 +88,7 @@ mod with {
                     node.subscribe(&topic, scenecast_ros2::Qos::Reliable(1), 1).map_err(failed)?,
                 ];
                 let name = origin.clone();
-                let topic = Topic { origin, inboxes, is_overtaken_lost: false, last: None };
+                let topic = Topic { origin, inboxes, is_overtaken_lost: false, echoes: Echoes::default() };
                 Box::new(move |queue| {
                     topic.read(queue, |grid| {
                         let item = match source {
@@ -103,7 +104,7 @@ mod with {
                     node.subscribe_grid_map(&topic).map_err(failed)?,
                     node.subscribe(&topic, scenecast_ros2::Qos::Reliable(1), 1).map_err(failed)?,
                 ];
-                let topic = Topic { origin, inboxes, is_overtaken_lost: false, last: None };
+                let topic = Topic { origin, inboxes, is_overtaken_lost: false, echoes: Echoes::default() };
                 Box::new(move |queue| topic.read(queue, |map| (&map.header.stamp, bands_of_grid_map(map, &frame))))
             }
         })
@@ -116,7 +117,7 @@ mod with {
         inboxes: Vec<Inbox<M>>,
         /// Whether a message that a newer one displaced is a loss: an image is, a whole grid is not.
         is_overtaken_lost: bool,
-        last: Option<Time>,
+        echoes: Echoes,
     }
 
     impl<M> Topic<M> {
@@ -139,12 +140,12 @@ mod with {
                         }
                     }
                 }
-                let found: Vec<Received<M>> = self.inboxes.iter().filter_map(Inbox::take).collect();
-                for received in found {
+                let found = self.inboxes.iter().enumerate().filter_map(|(of, inbox)| Some((of, inbox.take()?)));
+                let found: Vec<(usize, Received<M>)> = found.collect();
+                for (inbox, received) in found {
                     let (stamp, items) = items(&received.message);
-                    let is_again = stamp.nanos() > 0 && self.last.as_ref() == Some(stamp);
-                    self.last = Some(stamp.clone());
-                    let items = if is_again { Vec::new() } else { items };
+                    let is_used = self.echoes.is_used(inbox, stamp.nanos(), received.at);
+                    let items = if is_used { items } else { Vec::new() };
                     if !items.into_iter().all(|item| queue.push(arrived(&self.origin, Some(received.at), item))) {
                         return;
                     }
