@@ -34,6 +34,7 @@ mod with {
     use super::{ForeignSource, LabelMessage, TopicFeed};
     use crate::labels::echo::Echoes;
     use crate::labels::feed::{Arrived, Feed, LabelQueue};
+    use scenecast_config::RosName;
     use scenecast_core::UserError;
     use scenecast_labels::ros::{band_of_occupancy, bands_of_grid_map, item_of_image, item_of_occupancy};
     use scenecast_labels::{Item, Refusal};
@@ -53,21 +54,34 @@ mod with {
     pub(super) fn topic(node: Arc<SensorNode>, wanted: TopicFeed) -> Result<Feed, UserError> {
         let (queue, feed) = LabelQueue::new();
         let read = move || {
-            let mut is_logged = false;
-            loop {
-                let opened = node.get().map_err(|e| e.to_string()).and_then(|node| open(&node, &wanted));
-                match opened {
-                    Ok(reader) => return reader(&queue),
-                    Err(error) if !is_logged => tracing::error!("labels: {}: {error}; it is tried again", wanted.topic),
-                    Err(_) => {}
-                }
-                is_logged = true;
-                std::thread::sleep(RETRY_INTERVAL);
-            }
+            let open = || node.get().map_err(|e| e.to_string()).and_then(|node| open(&node, &wanted));
+            let reader = open_at_last(&queue, &wanted.topic, open, std::thread::sleep);
+            reader(&queue);
         };
         let started = std::thread::Builder::new().name("labels-topic".to_owned()).spawn(read);
         started.map_err(|e| UserError::Failed(format!("the labels' thread did not start: {e}")))?;
         Ok(feed)
+    }
+
+    /// Opens the topic, as often as that takes. Meanwhile the source is missing.
+    fn open_at_last<T>(
+        queue: &LabelQueue,
+        topic: &RosName,
+        mut open: impl FnMut() -> Result<T, String>,
+        pause: impl Fn(Duration),
+    ) -> T {
+        let mut is_logged = false;
+        loop {
+            let opened = open();
+            queue.set_missing(opened.is_err());
+            match opened {
+                Ok(opened) => return opened,
+                Err(error) if !is_logged => tracing::error!("labels: {topic}: {error}; it is tried again"),
+                Err(_) => {}
+            }
+            is_logged = true;
+            pause(RETRY_INTERVAL);
+        }
     }
 
     type Reader = Box<dyn FnOnce(&LabelQueue)>;
@@ -156,5 +170,24 @@ mod with {
 
     fn arrived(origin: &str, at: Option<std::time::Instant>, item: Result<Item, Refusal>) -> Arrived {
         Arrived { origin: origin.to_owned(), mark: None, at, item, answer: None }
+    }
+
+    #[cfg(test)]
+    mod tests {
+        use super::*;
+        use std::cell::RefCell;
+
+        #[test]
+        fn a_topic_is_missing_until_it_is_open() {
+            let (queue, feed) = LabelQueue::new();
+            let (mut tries, pauses) = (0, RefCell::new(Vec::new()));
+            let open = || {
+                tries += 1;
+                if tries < 3 { Err("the node does not start".to_owned()) } else { Ok(tries) }
+            };
+            let pause = |time| pauses.borrow_mut().push((time, feed.is_missing()));
+            assert_eq!(open_at_last(&queue, &scenecast_ros2::topic("/labels").unwrap(), open, pause), 3);
+            assert_eq!((pauses.into_inner(), feed.is_missing()), (vec![(RETRY_INTERVAL, true); 2], false));
+        }
     }
 }
