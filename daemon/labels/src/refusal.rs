@@ -49,7 +49,7 @@ pub enum Refusal {
     OtherBand(String),
     #[error("band {0:?}: the map has no further layer")]
     TooManyBands(String),
-    #[error("band {0:?}: no cell has a number, so that no scale can be chosen")]
+    #[error("band {0:?}: no cell has a number of at most 5e8, so that no scale can be chosen")]
     NoScale(String),
     #[error("this source gives bands alone, and the item has labels; labels.source gives labels")]
     BandsAlone,

@@ -12,8 +12,9 @@ pub(crate) struct LabelHealth {
     pub(crate) refused: u64,
     /// The last item that was refused, and why.
     pub(crate) last_refusal: Option<String>,
-    /// Whether an item was refused in the last seconds, or a folder is not there.
+    /// Whether an item was refused in the last seconds, or a source is missing.
     pub(crate) is_failing: bool,
+    /// Whether a folder is not there, a topic cannot be opened, or whoever read a source has ended.
     pub(crate) is_missing: bool,
 }
 

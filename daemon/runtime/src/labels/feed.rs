@@ -4,6 +4,8 @@ use scenecast_files::LabelFolder;
 use scenecast_labels::{Item, Refusal};
 use scenecast_vehicle::ForeignSource;
 use std::collections::VecDeque;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
 use std::time::{Duration, Instant};
 
@@ -29,25 +31,36 @@ pub(crate) struct Arrived {
 
 /// The end of a queue that a source fills. [`LabelQueue::push`] blocks while the queue is full.
 #[derive(Debug, Clone)]
-pub(crate) struct LabelQueue(SyncSender<Arrived>);
+pub(crate) struct LabelQueue {
+    items: SyncSender<Arrived>,
+    is_missing: Arc<AtomicBool>,
+}
 
 impl LabelQueue {
     /// A queue and its other end.
     pub(crate) fn new() -> (Self, Feed) {
         let (sender, receiver) = sync_channel(QUEUE);
-        (Self(sender), Feed::Queue(receiver))
+        let is_missing = Arc::new(AtomicBool::new(false));
+        let feed = QueueFeed { items: receiver, is_missing: Arc::clone(&is_missing) };
+        (Self { items: sender, is_missing }, Feed::Queue(feed))
     }
 
     /// Gives an item; returns `false` once nobody takes items any more.
     pub(crate) fn push(&self, arrived: Arrived) -> bool {
-        self.0.send(arrived).is_ok()
+        self.items.send(arrived).is_ok()
+    }
+
+    /// Sets whether the source cannot be opened.
+    #[cfg_attr(not(any(test, feature = "ros2")), expect(dead_code, reason = "sockets are open from the start"))]
+    pub(crate) fn set_missing(&self, is_missing: bool) {
+        self.is_missing.store(is_missing, Ordering::Relaxed);
     }
 }
 
 /// A source of items.
 pub(crate) enum Feed {
     Folder(FolderFeed),
-    Queue(Receiver<Arrived>),
+    Queue(QueueFeed),
 }
 
 impl Feed {
@@ -57,24 +70,42 @@ impl Feed {
         Self::Folder(FolderFeed { folder, names: VecDeque::new(), looked: None, began, is_missing: false })
     }
 
-    /// Whether its folder is not there.
+    /// Whether its folder is not there, its topic cannot be opened, or whoever filled its queue has ended.
     pub(crate) fn is_missing(&self) -> bool {
-        matches!(self, Self::Folder(folder) if folder.is_missing)
+        match self {
+            Self::Folder(folder) => folder.is_missing,
+            Self::Queue(queue) => queue.is_missing.load(Ordering::Relaxed),
+        }
     }
 
     /// The next item; `None` if there is none within `wait`.
     pub(crate) fn next(&mut self, wait: Duration) -> Option<Arrived> {
         match self {
             Self::Folder(folder) => folder.next(wait),
-            Self::Queue(queue) if wait.is_zero() => queue.try_recv().ok(),
-            Self::Queue(queue) => match queue.recv_timeout(wait) {
-                Ok(arrived) => Some(arrived),
-                Err(RecvTimeoutError::Timeout) => None,
-                Err(RecvTimeoutError::Disconnected) => {
-                    std::thread::sleep(wait);
-                    None
-                }
-            },
+            Self::Queue(queue) => queue.next(wait),
+        }
+    }
+}
+
+/// The end of a queue that gives items.
+pub(crate) struct QueueFeed {
+    items: Receiver<Arrived>,
+    is_missing: Arc<AtomicBool>,
+}
+
+impl QueueFeed {
+    fn next(&mut self, wait: Duration) -> Option<Arrived> {
+        if wait.is_zero() {
+            return self.items.try_recv().ok();
+        }
+        match self.items.recv_timeout(wait) {
+            Ok(arrived) => Some(arrived),
+            Err(RecvTimeoutError::Timeout) => None,
+            Err(RecvTimeoutError::Disconnected) => {
+                self.is_missing.store(true, Ordering::Relaxed);
+                std::thread::sleep(wait);
+                None
+            }
         }
     }
 }
@@ -124,7 +155,7 @@ impl Feeds {
         Self { feeds, turn: 0 }
     }
 
-    /// Whether a folder is not there.
+    /// Whether a source is missing, as of [`Feed::is_missing`].
     pub(crate) fn is_missing(&self) -> bool {
         self.feeds.iter().any(|(_, feed)| feed.is_missing())
     }
@@ -142,5 +173,23 @@ impl Feeds {
             }
         }
         None
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_source_that_cannot_be_opened_or_has_ended_is_missing() {
+        let (queue, feed) = LabelQueue::new();
+        let mut feeds = Feeds::new(vec![(ForeignSource::Bands, feed)]);
+        assert!(!feeds.is_missing());
+        for is_missing in [true, false] {
+            queue.set_missing(is_missing);
+            assert_eq!(feeds.is_missing(), is_missing);
+        }
+        drop(queue);
+        assert!(feeds.next(Duration::from_nanos(1)).is_none() && feeds.is_missing());
     }
 }

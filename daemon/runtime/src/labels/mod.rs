@@ -1,11 +1,14 @@
 //! Labels of other programs: their sources, and the thread that makes them a map.
 
+#[cfg(any(test, feature = "ros2"))]
+mod echo;
 mod feed;
 #[cfg(unix)]
 mod local;
 mod moment;
 mod own_poses;
 mod pace;
+mod refusal_log;
 mod restore;
 mod serve;
 mod topic;
@@ -14,6 +17,7 @@ use feed::Arrived;
 pub(super) use feed::Feeds;
 use own_poses::OwnPoses;
 use pace::Pace;
+use refusal_log::RefusalLog;
 pub(super) use restore::{open, restore};
 pub(super) use topic::topic;
 
@@ -37,9 +41,6 @@ const BATCH: Duration = Duration::from_millis(200);
 const SHORT: Duration = Duration::from_millis(5);
 /// Cells of an update, of the labels and of each band: the vehicle's loop takes a few milliseconds for them.
 const SLICE: usize = 1 << 13;
-/// Most lines of the log about refused items in [`LOG_PAUSE`]; the others are counted.
-const LOG_LINES: u32 = 10;
-const LOG_PAUSE: Duration = Duration::from_secs(1);
 
 /// A report of the thread.
 pub(super) enum FromLabels {
@@ -102,7 +103,8 @@ impl LabelThread {
             is_over: Arc::clone(&is_over),
             outgoing,
             tally: Arc::clone(&tally),
-            counts: Counts::default(),
+            taken: 0,
+            refusals: RefusalLog::default(),
         };
         let thread = std::thread::Builder::new().name("labels".to_owned()).spawn(move || worker.run());
         let thread = thread.map_err(|e| UserError::Failed(format!("the labels' thread did not start: {e}")))?;
@@ -142,36 +144,6 @@ impl LabelThread {
     }
 }
 
-/// Items that were taken and refused so far.
-#[derive(Debug, Default)]
-struct Counts {
-    taken: u64,
-    refused: u64,
-    /// Refused items that were not logged, and the lines of the log since a moment.
-    unsaid: u64,
-    said: u32,
-    since: Option<Instant>,
-}
-
-impl Counts {
-    fn log(&mut self, origin: &str, why: &Refusal) {
-        self.refused += 1;
-        if self.since.is_none_or(|at| at.elapsed() >= LOG_PAUSE) {
-            (self.said, self.since) = (0, Some(Instant::now()));
-        }
-        if self.said >= LOG_LINES {
-            self.unsaid += 1;
-            return;
-        }
-        self.said += 1;
-        let more = match std::mem::take(&mut self.unsaid) {
-            0 => String::new(),
-            others => format!(", {others} of them since the last line"),
-        };
-        tracing::warn!("labels: {origin}: {why}; refused so far: {}{more}", self.refused);
-    }
-}
-
 struct Worker {
     map: ForeignMap,
     feeds: Feeds,
@@ -182,7 +154,9 @@ struct Worker {
     is_over: Arc<AtomicBool>,
     outgoing: mpsc::Sender<FromLabels>,
     tally: Arc<Mutex<LabelTally>>,
-    counts: Counts,
+    /// Items that were taken so far.
+    taken: u64,
+    refusals: RefusalLog,
     is_refusal_reported: bool,
     /// The names of classes in the last checkpoint that was written.
     kept_names: Vec<ClassEntry>,
@@ -208,12 +182,12 @@ impl Worker {
                 next = if began.elapsed() < BATCH { self.feeds.next(Duration::ZERO) } else { None };
             }
         }
-        if self.counts.taken > 0 {
+        if self.taken > 0 {
             // Items come in bursts: the last one may be of the moment of the last checkpoint.
             self.keep.last_s = None;
         }
         self.keep.keep_now(&self.map);
-        tracing::info!("labels: {} items were taken, {} refused", self.counts.taken, self.counts.refused);
+        tracing::info!("labels: {} items were taken, {} refused", self.taken, self.refusals.refused());
     }
 
     /// Gives a slice of the changes to the vehicle.
@@ -249,12 +223,13 @@ impl Worker {
         mark.iter().for_each(|name| self.map.set_mark(source, name));
         match &result {
             Ok(_) => {
-                self.counts.taken += 1;
+                self.taken += 1;
                 lock(&self.tally).take();
             }
             Err(why) => {
-                lock(&self.tally).refuse(format!("{origin}: {why}"), Instant::now());
-                self.counts.log(&origin, why);
+                let (text, now) = (format!("{origin}: {why}"), Instant::now());
+                lock(&self.tally).refuse(text.clone(), now);
+                self.refusals.count(text, now).iter().for_each(|line| tracing::warn!("labels: {line}"));
             }
         }
         if let Some(answer) = answer {

@@ -32,7 +32,9 @@ pub(crate) fn topic(_: &RosSensors, wanted: TopicFeed) -> Result<Feed, UserError
 #[cfg(feature = "ros2")]
 mod with {
     use super::{ForeignSource, LabelMessage, TopicFeed};
+    use crate::labels::echo::Echoes;
     use crate::labels::feed::{Arrived, Feed, LabelQueue};
+    use scenecast_config::RosName;
     use scenecast_core::UserError;
     use scenecast_labels::ros::{band_of_occupancy, bands_of_grid_map, item_of_image, item_of_occupancy};
     use scenecast_labels::{Item, Refusal};
@@ -52,21 +54,34 @@ mod with {
     pub(super) fn topic(node: Arc<SensorNode>, wanted: TopicFeed) -> Result<Feed, UserError> {
         let (queue, feed) = LabelQueue::new();
         let read = move || {
-            let mut is_logged = false;
-            loop {
-                let opened = node.get().map_err(|e| e.to_string()).and_then(|node| open(&node, &wanted));
-                match opened {
-                    Ok(reader) => return reader(&queue),
-                    Err(error) if !is_logged => tracing::error!("labels: {}: {error}; it is tried again", wanted.topic),
-                    Err(_) => {}
-                }
-                is_logged = true;
-                std::thread::sleep(RETRY_INTERVAL);
-            }
+            let open = || node.get().map_err(|e| e.to_string()).and_then(|node| open(&node, &wanted));
+            let reader = open_at_last(&queue, &wanted.topic, open, std::thread::sleep);
+            reader(&queue);
         };
         let started = std::thread::Builder::new().name("labels-topic".to_owned()).spawn(read);
         started.map_err(|e| UserError::Failed(format!("the labels' thread did not start: {e}")))?;
         Ok(feed)
+    }
+
+    /// Opens the topic, as often as that takes. Meanwhile the source is missing.
+    fn open_at_last<T>(
+        queue: &LabelQueue,
+        topic: &RosName,
+        mut open: impl FnMut() -> Result<T, String>,
+        pause: impl Fn(Duration),
+    ) -> T {
+        let mut is_logged = false;
+        loop {
+            let opened = open();
+            queue.set_missing(opened.is_err());
+            match opened {
+                Ok(opened) => return opened,
+                Err(error) if !is_logged => tracing::error!("labels: {topic}: {error}; it is tried again"),
+                Err(_) => {}
+            }
+            is_logged = true;
+            pause(RETRY_INTERVAL);
+        }
     }
 
     type Reader = Box<dyn FnOnce(&LabelQueue)>;
@@ -78,7 +93,7 @@ mod with {
         Ok(match message {
             LabelMessage::Image => {
                 let inboxes = vec![node.subscribe_images(&topic).map_err(failed)?];
-                let topic = Topic { origin, inboxes, is_overtaken_lost: true, last: None };
+                let topic = Topic { origin, inboxes, is_overtaken_lost: true, echoes: Echoes::default() };
                 Box::new(move |queue| topic.read(queue, |image| (&image.header.stamp, vec![item_of_image(image)])))
             }
             LabelMessage::OccupancyGrid => {
@@ -87,7 +102,7 @@ mod with {
                     node.subscribe(&topic, scenecast_ros2::Qos::Reliable(1), 1).map_err(failed)?,
                 ];
                 let name = origin.clone();
-                let topic = Topic { origin, inboxes, is_overtaken_lost: false, last: None };
+                let topic = Topic { origin, inboxes, is_overtaken_lost: false, echoes: Echoes::default() };
                 Box::new(move |queue| {
                     topic.read(queue, |grid| {
                         let item = match source {
@@ -103,7 +118,7 @@ mod with {
                     node.subscribe_grid_map(&topic).map_err(failed)?,
                     node.subscribe(&topic, scenecast_ros2::Qos::Reliable(1), 1).map_err(failed)?,
                 ];
-                let topic = Topic { origin, inboxes, is_overtaken_lost: false, last: None };
+                let topic = Topic { origin, inboxes, is_overtaken_lost: false, echoes: Echoes::default() };
                 Box::new(move |queue| topic.read(queue, |map| (&map.header.stamp, bands_of_grid_map(map, &frame))))
             }
         })
@@ -116,7 +131,7 @@ mod with {
         inboxes: Vec<Inbox<M>>,
         /// Whether a message that a newer one displaced is a loss: an image is, a whole grid is not.
         is_overtaken_lost: bool,
-        last: Option<Time>,
+        echoes: Echoes,
     }
 
     impl<M> Topic<M> {
@@ -139,12 +154,12 @@ mod with {
                         }
                     }
                 }
-                let found: Vec<Received<M>> = self.inboxes.iter().filter_map(Inbox::take).collect();
-                for received in found {
+                let found = self.inboxes.iter().enumerate().filter_map(|(of, inbox)| Some((of, inbox.take()?)));
+                let found: Vec<(usize, Received<M>)> = found.collect();
+                for (inbox, received) in found {
                     let (stamp, items) = items(&received.message);
-                    let is_again = stamp.nanos() > 0 && self.last.as_ref() == Some(stamp);
-                    self.last = Some(stamp.clone());
-                    let items = if is_again { Vec::new() } else { items };
+                    let is_used = self.echoes.is_used(inbox, stamp.nanos(), received.at);
+                    let items = if is_used { items } else { Vec::new() };
                     if !items.into_iter().all(|item| queue.push(arrived(&self.origin, Some(received.at), item))) {
                         return;
                     }
@@ -155,5 +170,24 @@ mod with {
 
     fn arrived(origin: &str, at: Option<std::time::Instant>, item: Result<Item, Refusal>) -> Arrived {
         Arrived { origin: origin.to_owned(), mark: None, at, item, answer: None }
+    }
+
+    #[cfg(test)]
+    mod tests {
+        use super::*;
+        use std::cell::RefCell;
+
+        #[test]
+        fn a_topic_is_missing_until_it_is_open() {
+            let (queue, feed) = LabelQueue::new();
+            let (mut tries, pauses) = (0, RefCell::new(Vec::new()));
+            let open = || {
+                tries += 1;
+                if tries < 3 { Err("the node does not start".to_owned()) } else { Ok(tries) }
+            };
+            let pause = |time| pauses.borrow_mut().push((time, feed.is_missing()));
+            assert_eq!(open_at_last(&queue, &scenecast_ros2::topic("/labels").unwrap(), open, pause), 3);
+            assert_eq!((pauses.into_inner(), feed.is_missing()), (vec![(RETRY_INTERVAL, true); 2], false));
+        }
     }
 }

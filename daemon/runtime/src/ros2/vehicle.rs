@@ -149,7 +149,7 @@ mod on {
     fn label_health(labels: LabelHealth) -> Health {
         let LabelHealth { taken, refused, last_refusal, is_failing, is_missing } = labels;
         let message = match (is_missing, &last_refusal) {
-            (true, _) => "the folder of the source is missing".to_owned(),
+            (true, _) => "a source is missing: the log has the reason".to_owned(),
             (false, Some(refusal)) if is_failing => format!("refused: {refusal}"),
             _ => format!("{taken} items taken, {refused} refused"),
         };

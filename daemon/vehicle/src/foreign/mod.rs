@@ -234,6 +234,10 @@ impl ForeignMap {
 
     fn take_quantities(&mut self, band: &QuantityBand, ground: Ground, map: &Raster<f32>) -> Result<(), Refusal> {
         let known = self.bands.get(&band.name).map(|map| &map.descriptor);
+        // A program may publish a layer before it has measured any of it.
+        if known.is_none() && !map.values.iter().any(|quantity| quantity.is_finite()) {
+            return Ok(());
+        }
         let configured = self.scales.get(&band.name).copied();
         let layer = band::quantity_layer(band, map, known, configured, self.next_share())?;
         self.check_layer(&layer)?;

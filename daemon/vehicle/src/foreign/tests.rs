@@ -222,8 +222,27 @@ fn bands_come_beside_the_labels_of_the_scene_model() {
     let nothing = configured.handle_item(&band(&[f32::NAN], None), ForeignSource::Labels, None, 1.0);
     assert_eq!(nothing, Ok(()), "the scale is known");
     let mut empty = map(&[]);
-    let nothing = empty.handle_item(&band(&[f32::NAN], None), ForeignSource::Labels, None, 1.0);
-    assert_eq!(nothing, Err(Refusal::NoScale("elevation".into())));
+    let huge = empty.handle_item(&band(&[1e9], None), ForeignSource::Labels, None, 1.0);
+    assert_eq!(huge, Err(Refusal::NoScale("elevation".into())));
+}
+
+#[test]
+fn a_layer_without_numbers_is_taken_and_changes_nothing() {
+    let ground = Ground { west_m: 0.0, south_m: 0.0, cell_m: 0.5 };
+    let band = |name: &str, quantity: f32, scale| {
+        let band = QuantityBand { name: name.to_owned(), unit: "m".into(), scale };
+        item(Content::Quantities { band, ground, quantities: Raster { width: 1, height: 1, values: vec![quantity] } })
+    };
+    let mut map = map(&[]);
+    for scale in [None, BandScale::between(0.0, 253.0)] {
+        for i in 0..20 {
+            let empty = band(&format!("band_{i}"), f32::NAN, scale);
+            assert_eq!(map.handle_item(&empty, ForeignSource::Labels, None, 1.0), Ok(()));
+        }
+        assert!(map.take_changes(9).bands.is_empty());
+    }
+    map.handle_item(&band("band_7", -3.0, None), ForeignSource::Labels, None, 2.0).unwrap();
+    assert_eq!(map.take_changes(9).bands[0].1.len(), 1);
 }
 
 #[test]
