@@ -3,6 +3,7 @@
 mod camera;
 mod checkpoint;
 mod clock;
+mod disagreement;
 mod disk_space;
 mod durable;
 mod equipment;

@@ -102,7 +102,11 @@ mod tests {
         let east = Rotation::from_quaternion([0.5_f64.sqrt(), -(0.5_f64.sqrt()), 0.0, 0.0]).unwrap();
         assert_eq!(degrees(east.camera_pose([0.0; 3])), [90, 0, 0]);
         let up = Rotation::from_quaternion(about(2, 30.0)).unwrap().camera_pose([0.0; 3]);
-        assert_eq!(up.roll_rad.to_degrees().abs().round(), 180.0, "a camera that looks up is no camera that looks down");
+        assert_eq!(
+            up.roll_rad.to_degrees().abs().round(),
+            180.0,
+            "a camera that looks up is no camera that looks down"
+        );
         let capsized = Rotation::from_quaternion(about(0, 180.0)).unwrap().vehicle_pose([0.0; 3]);
         assert_eq!(capsized.roll_rad.to_degrees().abs().round(), 180.0);
         assert_eq!(Rotation::from_quaternion([0.0; 4]), None);

@@ -132,12 +132,7 @@ impl RosNode {
         Ok(self.inbox(topic, qos, capacity)?.0)
     }
 
-    fn inbox<M: Message>(
-        &self,
-        topic: &RosName,
-        qos: Qos,
-        capacity: usize,
-    ) -> Result<(Inbox<M>, Wanted), UserError> {
+    fn inbox<M: Message>(&self, topic: &RosName, qos: Qos, capacity: usize) -> Result<(Inbox<M>, Wanted), UserError> {
         let name = remapped(topic, &self.shared.remaps);
         let (mut inbox, filler) = Inbox::new(capacity);
         let mut counts = Vec::new();
