@@ -3,7 +3,7 @@
 use crate::key::Key;
 use crate::{
     Authenticate, AutopilotKind, CalibrationSource, CameraSource, Config, DepthSource, LabelMessage, LabelSource,
-    ModemKind, NavigationSource,
+    ModemKind, NavigationSource, RosName,
 };
 use scenecast_core::{PortAddress, UserError};
 
@@ -102,6 +102,27 @@ fn check_optics(config: &Config) -> Result<(), UserError> {
     }
 }
 
+/// Names of topics begin with a slash.
+fn check_topics(config: &Config) -> Result<(), UserError> {
+    let c = &config.camera;
+    let topic = |is_topic: bool, name: &str| {
+        let key = Key::find(name).filter(|_| is_topic);
+        let value = key.map(|key| key.value(config).to_string()).unwrap_or_default();
+        let text = value.trim_matches('"').split_once(':').map(|(_, topic)| topic.to_owned()).unwrap_or_default();
+        match !is_topic || RosName::parse(&text).is_some() {
+            true => Ok(()),
+            false => Err(UserError::Input(format!(
+                "{name} = {value} is not allowed: a topic is such as /camera/image_raw, parts of letters, digits and underscores \
+                 after slashes"
+            ))),
+        }
+    };
+    topic(matches!(c.source, CameraSource::Ros2(_)), "camera.source")?;
+    topic(matches!(c.calibration, CalibrationSource::Ros2(_)), "camera.calibration")?;
+    topic(c.depth != DepthSource::None, "camera.depth")?;
+    topic(matches!(config.navigation.source, NavigationSource::Ros2(_)), "navigation.source")
+}
+
 /// The images of a live camera need poses and the pace of real time.
 fn check_camera(config: &Config) -> Result<(), UserError> {
     if let (NavigationSource::Tf(given), None) = (&config.navigation.source, config.navigation.source.frames()) {
@@ -109,6 +130,7 @@ fn check_camera(config: &Config) -> Result<(), UserError> {
             "navigation.source = \"tf:{given}\" is not allowed: it takes two frames, as in \"tf:map#base_link\""
         )));
     }
+    check_topics(config)?;
     check_optics(config)?;
     if !config.camera.source.is_live() {
         return check_navigation(config);
@@ -283,6 +305,7 @@ mod tests {
         assert!(load(&["navigation.source=ros2:/odometry", "camera.source=bag:x"]).is_ok());
         assert!(refused(&[dvl, "camera.source=frames:x"]).contains("camera.source = \"frames:x\" is not allowed"));
         assert!(refused(&[dvl, "runtime.time_scale=5"]).ends_with("allowed: 1"));
+        assert!(refused(&["navigation.source=ros2:odometry"]).contains("such as /camera/image_raw"));
         assert!(load(&["navigation.source=tf:map#base_link", "camera.source=watch:x"]).is_ok());
         assert!(refused(&["navigation.source=tf:map", "camera.source=watch:x"]).contains("two frames"));
         assert!(refused(&["navigation.source=tum:x"]).ends_with("allowed: a live camera"));

@@ -1,6 +1,7 @@
 //! `scenecast auv`: ports, disk and clock around the vehicle's host.
 
 use super::clock::Clock;
+use super::disagreement::Disagreement;
 use super::disk_space::{Checkpoint, DiskWatch};
 use super::durable::{Keeper, StartedRun};
 use super::equipment::SensorFaults;
@@ -108,9 +109,22 @@ pub fn run_vehicle(load: Load, simulated: Option<SimulatedAutopilot>) -> Result<
         let ros2 = VehicleRos2::start(&config)?;
         let is_foreign = config.labels.source != LabelSource::SceneModel;
         let labels = Labels { thread: labels, is_foreign, move_vehicle: move_the_vehicle(&config) };
-        let faults = SensorFaults::default();
-        let shell =
-            VehicleShell { host, camera, mapper, labels, ports, ros2, clock, keeper, disk, faults, reload, missed: 0 };
+        let (faults, disagreement) = (SensorFaults::default(), Disagreement::default());
+        let shell = VehicleShell {
+            host,
+            camera,
+            mapper,
+            labels,
+            ports,
+            ros2,
+            clock,
+            keeper,
+            disk,
+            faults,
+            disagreement,
+            reload,
+            missed: 0,
+        };
         shell.run(stop).await
     })
 }
@@ -147,6 +161,7 @@ struct VehicleShell {
     keeper: Keeper<Folder>,
     disk: DiskWatch,
     faults: SensorFaults,
+    disagreement: Disagreement,
     reload: Reload,
     /// Frames of a recording that could not be read.
     missed: u64,
@@ -281,6 +296,12 @@ impl VehicleShell {
         // A pose that came in after the frame stays the vehicle's.
         let pose = mapped.frame.as_ref().map(|frame| self.camera.newest_pose().unwrap_or(frame.camera_pose()));
         let registered = mapped.registered.as_ref();
+        // The dead reckoning of an autopilot drifts from the images; a navigation source gives places.
+        if let (Some(frame), true) = (registered, self.camera.newest_pose().is_some()) {
+            let places = (frame.dead_reckoned.xy(), (frame.pose.x, frame.pose.y));
+            let line = self.disagreement.handle(places.0, places.1, std::time::Instant::now());
+            line.iter().for_each(|line| tracing::warn!("camera: {line}"));
+        }
         self.host.handle_mapped(pose, registered, &mapped.update, mapped.exemplars, now);
     }
 
