@@ -219,6 +219,11 @@ function steer(mock, order, res) {
     vehicle.disk = order.disk;
     if (vehicle.status) vehicle.status.disk = order.disk;
   }
+  if ("faults" in order) {
+    const [vehicle] = mission.vehicles;
+    vehicle.faults = order.faults;
+    if (vehicle.status) vehicle.status.faults = order.faults;
+  }
   if (order.label_at) mission.vehicles[0].setLabel(order.label_at, mission.nowS);
   if ("placement" in order) mission.vehicles[0].placement = order.placement;
   if ("coarse" in order) mission.vehicles[0].coarse = order.coarse;

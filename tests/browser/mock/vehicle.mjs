@@ -36,6 +36,7 @@ export class Vehicle {
     this.silent = false;
     this.receivedS = null;
     this.status = null;
+    this.faults = [];
     this.disk = { journal_refused: false, checkpoint_refused: false, free_bytes: 2 ** 34 };
     this.alongM = 0;
     this.pending = new Map();
@@ -104,6 +105,7 @@ export class Vehicle {
       activity: this.aborted ? "aborted: order" : this.hold ? "holding: order" : "surveying",
       ...this.path(),
       cells: this.own.size, labels: this.published.size, fix_age_s: nowS - this.fixS, disk: this.disk,
+      faults: this.faults,
     };
     this.track.push([nowS, p.x, p.y]);
     this.track = this.track.slice(-500);

@@ -49,6 +49,23 @@ export default [
     },
   },
   {
+    name: "faults of a vehicle's equipment are a row, and a banner if the survey does not proceed with them",
+    scenario: "rich",
+    async run(s) {
+      const row = s.page.locator("#vehicle .values > div", { hasText: "Faults" });
+      assert.equal(await row.isVisible(), false);
+      await s.steer({ faults: [{ text: "images are dropped", is_grave: false }] });
+      await s.shows("#vehicle .values", /Faults\s*images are dropped/);
+      await s.visible("#banners", false);
+      await s.steer({ faults: [{ text: "no image comes in", is_grave: true }, { text: "images are dropped", is_grave: false }] });
+      await s.shows("#banners", /auv-1: no image comes in.*As reported .* ago/s);
+      await s.shows("#vehicle .values", /Faults\s*no image comes in, images are dropped/);
+      await s.steer({ faults: [] });
+      await s.visible("#banners", false);
+      assert.equal(await row.isVisible(), false);
+    },
+  },
+  {
     name: "orders in force that are unknown here are named until they are known",
     scenario: "rich",
     async run(s) {
