@@ -292,20 +292,36 @@ impl LiveCamera {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::io::Write;
     use std::sync::Mutex;
+
+    /// What was logged.
+    #[derive(Clone, Default)]
+    struct Logged(Arc<Mutex<Vec<u8>>>);
+
+    impl Write for Logged {
+        fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+            self.0.lock().unwrap().write(bytes)
+        }
+
+        fn flush(&mut self) -> std::io::Result<()> {
+            Ok(())
+        }
+    }
 
     #[test]
     fn images_that_do_not_fit_their_calibration_are_logged_seldom() {
         let config = Config::default();
         let ros = RosSensors::new(&config).unwrap();
         let mut camera = LiveCamera::start(&config, 0.0, &ros).unwrap();
-        let written = Arc::new(Mutex::new(Vec::new()));
-        let subscriber = tracing_subscriber::fmt().with_writer(written.clone()).finish();
+        let logged = Logged::default();
+        let writer = logged.clone();
+        let subscriber = tracing_subscriber::fmt().with_writer(move || writer.clone()).with_ansi(false).finish();
         tracing::subscriber::with_default(subscriber, || {
             let error = UserError::Input("the image has 640 x 480 pixels, its calibration 320 x 240".to_owned());
             (0..100).for_each(|_| camera.handle_missed(&error));
         });
-        let text = String::from_utf8(written.lock().unwrap().clone()).unwrap();
+        let text = String::from_utf8(logged.0.lock().unwrap().clone()).unwrap();
         assert_eq!(text.lines().count(), 1, "{text}");
         assert!(
             text.contains("dropped, unreadable (1 so far): the image has 640 x 480 pixels, its calibration 320 x 240")
