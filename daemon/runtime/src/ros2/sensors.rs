@@ -32,7 +32,9 @@ mod with {
             let calibration = match &c.calibration {
                 CalibrationSource::Ros2(topic) => CalibrationTopic::Named(topic.clone()),
                 CalibrationSource::Beside if c.matrix == [0.0; 4] => CalibrationTopic::Beside,
-                CalibrationSource::Beside | CalibrationSource::File(_) | CalibrationSource::None => CalibrationTopic::None,
+                CalibrationSource::Beside | CalibrationSource::File(_) | CalibrationSource::None => {
+                    CalibrationTopic::None
+                }
             };
             let (needs_stamps, bits) = (c.stamps == CameraStamps::Own, BitDepth::of_setting(c.bits));
             let options = RosCameraOptions { needs_stamps, bits, calibration };
