@@ -2,7 +2,7 @@
 
 use crate::Key;
 use crate::load::{line_of, plain};
-use crate::move_to_section::move_to_section;
+use crate::move_to_section::{Edit, move_to_section};
 use crate::old_keys::{OldKey, as_table};
 use scenecast_core::UserError;
 use std::ops::Range;
@@ -17,12 +17,6 @@ pub struct Migration {
     pub text: String,
     /// One line for each change, for people; empty if nothing had to change.
     pub changes: Vec<String>,
-}
-
-/// A part of the text, and its replacement.
-pub(crate) struct Edit {
-    pub at: Range<usize>,
-    pub by: String,
 }
 
 /// Gives the keys of a file their present names and forms. `path` is for messages only.

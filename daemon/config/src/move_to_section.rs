@@ -1,14 +1,20 @@
 //! A key of a file that belongs to another section now.
 
-use crate::migrate::Edit;
+use std::ops::Range;
 use toml::de::DeTable;
+
+/// A part of the text, and its replacement.
+pub(crate) struct Edit {
+    pub at: Range<usize>,
+    pub by: String,
+}
 
 /// Moves the key at `at`, whose name takes `name_len` bytes, to a section under a new name, with the comments on its line and
 /// above it. `None` if the key or the section is not written on lines of its own.
 pub(crate) fn move_to_section(
     text: &str,
     table: &DeTable<'_>,
-    at: &std::ops::Range<usize>,
+    at: &Range<usize>,
     name_len: usize,
     (section, name): (&str, &str),
 ) -> Option<[Edit; 2]> {

@@ -11,7 +11,8 @@ use super::status::StatusError;
 ///  2   poses missing       no pose comes in from the navigation source, so the vehicle holds its position
 ///  3   poses faulty        within the last 10 s, the navigation source gave a pose that could not be used
 ///  4   autopilot refuses   it answers and does not follow: it is disarmed, in a mode of the pilot's, or has another target
-///  5   labels refused      within the last 10 s, an input of labels or bands was refused, or its source was lost
+///  5   labels refused      within the last 10 s, an input of labels or bands was refused; or the folder of a source is
+///                          missing, or its topic cannot be opened
 ///  6   images unusable     images come in, and for 10 s or more none of them could be mapped
 ///  7   depth missing       within the last 10 s, an image had no distances that could be used, where they are configured
 /// ```
@@ -29,7 +30,8 @@ pub struct EquipmentFaults {
     pub poses_faulty: bool,
     /// The autopilot answers and does not follow the vehicle's waypoints.
     pub autopilot_refuses: bool,
-    /// Within the last 10 s, an input of labels or bands was refused, or its source was lost.
+    /// Within the last 10 s, an input of labels or bands was refused; or the folder of a source is missing, or its topic
+    /// cannot be opened.
     pub labels_refused: bool,
     /// Images come in, and for 10 s or more none of them could be mapped.
     pub images_unusable: bool,
@@ -56,7 +58,7 @@ impl EquipmentFaults {
             (self.poses_faulty, "poses cannot be used", false),
             (self.images_dropped, "images are dropped", false),
             (self.depth_missing, "distances are missing or cannot be used", false),
-            (self.labels_refused, "labels or bands of other programs are refused or lost", false),
+            (self.labels_refused, "labels or bands of other programs are refused or missing", false),
         ]
         .into_iter()
         .filter_map(|(is_set, text, is_grave)| is_set.then_some((text, is_grave)))
