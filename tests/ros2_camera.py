@@ -20,15 +20,11 @@ from ros2_messages import (  # first: it sets the network of Cyclone DDS
     Image,
     Odometry,
     Point,
-    Pose,
-    PoseWithCovariance,
     Quaternion,
     TFMessage,
     Time,
     Transform,
     TransformStamped,
-    Twist,
-    TwistWithCovariance,
     Vector3,
 )
 from cyclonedds.core import Policy, Qos
@@ -39,21 +35,14 @@ from cyclonedds.util import duration
 
 from PIL import Image as Picture
 
-STILL = TwistWithCovariance(Twist(Point(0.0, 0.0, 0.0), Point(0.0, 0.0, 0.0)), [0.0] * 36)
-
-
-def header(t_s, frame):
-    nanos = round(t_s * 1e9) + 1000 * 10**9
-    return Header(Time(nanos // 10**9, nanos % 10**9), frame)
-
+from ros2_recorded import header, odometry_at, wait_for_reader
 
 def odometry(row):
     # Axes of ROS: the heading is clockwise from north, yaw counts counter-clockwise from east.
     yaw = math.pi / 2 - math.radians(float(row["heading_deg"]))
     turn = Quaternion(0.0, 0.0, math.sin(yaw / 2), math.cos(yaw / 2))
     place = Point(float(row["x_m"]), float(row["y_m"]), -float(row["depth_m"]))
-    pose = PoseWithCovariance(Pose(place, turn), [0.0] * 36)
-    return Odometry(header(float(row["t_s"]), "odom"), "base_link", pose, STILL)
+    return odometry_at(float(row["t_s"]), place, turn)
 
 
 def link(head, child, place, turn):
@@ -91,13 +80,6 @@ def faulty(number, t_s, picture):
         case 4:
             wrong.data = grey[:100]
     return wrong
-
-
-def wait_for_reader(writer):
-    until = time.monotonic() + 60
-    while not writer.get_matched_subscriptions():
-        assert time.monotonic() < until, "no subscriber came"
-        time.sleep(0.05)
 
 
 def main():

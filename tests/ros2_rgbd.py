@@ -15,19 +15,13 @@ import numpy
 
 from ros2_messages import (  # first: it sets the network of Cyclone DDS
     CameraInfo,
-    Header,
     Image,
     Odometry,
     Point,
     PointCloud2,
     PointField,
-    Pose,
-    PoseWithCovariance,
     Quaternion,
     RegionOfInterest,
-    Time,
-    Twist,
-    TwistWithCovariance,
 )
 from cyclonedds.core import Policy, Qos
 from cyclonedds.domain import DomainParticipant
@@ -37,13 +31,7 @@ from cyclonedds.util import duration
 
 from PIL import Image as Picture
 
-STILL = TwistWithCovariance(Twist(Point(0.0, 0.0, 0.0), Point(0.0, 0.0, 0.0)), [0.0] * 36)
-
-
-def header(t_s, frame):
-    nanos = round(t_s * 1e9) + 1000 * 10**9
-    return Header(Time(nanos // 10**9, nanos % 10**9), frame)
-
+from ros2_recorded import header, odometry_at, wait_for_reader
 
 def lines(path):
     return [line.split() for line in path.read_text().splitlines() if line and not line.startswith("#")]
@@ -65,8 +53,7 @@ def odometry(row):
     # The vehicle's axes to the bow, to port and up are -y, -x and -z of the camera.
     half = math.sqrt(0.5)
     turn = product(camera, (half, -half, 0.0, 0.0))
-    pose = PoseWithCovariance(Pose(Point(x, y, z), Quaternion(*turn)), [0.0] * 36)
-    return Odometry(header(t, "odom"), "base_link", pose, STILL)
+    return odometry_at(t, Point(x, y, z), Quaternion(*turn))
 
 
 def cloud(head, metres, matrix):
@@ -78,13 +65,6 @@ def cloud(head, metres, matrix):
     points[metres == 0] = numpy.nan
     fields = [PointField(name, 4 * i, 7, 1) for i, name in enumerate("xyz")]
     return PointCloud2(head, rows, columns, fields, False, 12, 12 * columns, points.tobytes(), False)
-
-
-def wait_for_reader(writer):
-    until = time.monotonic() + 60
-    while not writer.get_matched_subscriptions():
-        assert time.monotonic() < until, "no subscriber came"
-        time.sleep(0.05)
 
 
 def main():
