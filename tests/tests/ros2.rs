@@ -279,11 +279,12 @@ fn assert_images_arrive(speaker: &Speaker, domain: u8) {
     let images = node.subscribe_images(&name("/camera/image_raw")).unwrap();
     let infos = node.subscribe_camera_info(&name("/camera/camera_info")).unwrap();
     let odometry = node.subscribe_odometry(&name("/odometry")).unwrap();
-    // SCENECAST_ROS2_IMAGES=200 is the long run: 1360 x 1024 pixels at 2 Hz.
-    let long = std::env::var("SCENECAST_ROS2_IMAGES").ok();
-    let (count, hertz) = (long.as_deref().unwrap_or("6"), if long.is_some() { "2" } else { "4" });
-    let camera = start(speaker, &["camera", &domain.to_string(), "/camera/image_raw", count, hertz, "1360", "1024"]);
-    let count: u64 = count.parse().unwrap();
+    // SCENECAST_ROS2_IMAGES=200 is the long run: 1360 x 1024 pixels at 2 Hz, of which each must arrive. Best effort may lose
+    // images of 4 MB on a busy machine, so the short run publishes more than it takes.
+    let long: Option<u64> = std::env::var("SCENECAST_ROS2_IMAGES").ok().map(|count| count.parse().unwrap());
+    let (count, published, hertz) = long.map_or((6, 100, "4"), |count| (count, count, "2"));
+    let arguments = ["camera", &domain.to_string(), "/camera/image_raw", &published.to_string(), hertz, "1360", "1024"];
+    let mut camera = start(speaker, &arguments);
     let row: Vec<u8> = (0..1360 * 3).map(|i: u32| (i % 251) as u8).collect();
     let limit = Instant::now() + Duration::from_secs(40 + count);
     let (mut taken, mut last) = (0, 0);
@@ -297,10 +298,13 @@ fn assert_images_arrive(speaker: &Speaker, domain: u8) {
         assert!(stamp > last, "out of order");
         (taken, last) = (taken + 1, stamp);
     }
+    if long.is_none() {
+        camera.kill().unwrap();
+    }
     let output = camera.wait_with_output().unwrap();
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    assert!(output.status.success() == long.is_some(), "{}", String::from_utf8_lossy(&output.stderr));
     println!("{taken} of {count} images, {} calibrations, {} odometry", infos.received(), odometry.received());
     assert_eq!((taken, images.dropped(), images.malformed()), (count, 0, 0));
     assert_eq!(infos.take().unwrap().message.k[0], 800.0);
-    assert!(odometry.received() >= count * 9, "{} of {}", odometry.received(), count * 10);
+    assert!(odometry.received() >= (count - 1) * 9, "{} of {}", odometry.received(), count * 10);
 }
