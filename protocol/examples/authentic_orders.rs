@@ -28,7 +28,8 @@ const MODEM: ModemProfile = ModemProfile {
     access: Access::Shared,
 };
 
-fn main() {
+/// `tests/protocol/examples.rs` runs it too.
+pub fn main() {
     // At sea the key comes from `scenecast key new`, and both ends read it from a file.
     let key = Arc::new(MissionKey::from_bytes(*b"sixteen secret b"));
     println!("fingerprint of the key: {:08x}\n", key.fingerprint());
@@ -165,9 +166,4 @@ fn surface_config(vehicle: Address, authenticity: Option<Authenticity>) -> Surfa
         discovery_period: None,
         authenticity,
     }
-}
-
-#[test]
-fn the_example_runs() {
-    main();
 }

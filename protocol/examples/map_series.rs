@@ -7,7 +7,8 @@ use scenecast_protocol::map_codec::{Codec, decode, encode_all};
 
 const ROOM: usize = 64;
 
-fn main() {
+/// `tests/protocol/examples.rs` runs it too.
+pub fn main() {
     println!("Bytes in chunks of at most {ROOM} bytes, for each hundred cells that change:\n");
     let names = [Codec::Png, Codec::Context, Codec::Auto].map(|codec| format!("{:>13}", codec.to_string()));
     println!("step   changed cells   {}", names.join("   "));
@@ -46,9 +47,4 @@ fn applied<'a>(base: &LabelGrid, chunks: impl Iterator<Item = &'a [u8]>) -> Labe
         }
     }
     map
-}
-
-#[test]
-fn the_example_runs() {
-    main();
 }

@@ -59,7 +59,8 @@ impl Clock {
     }
 }
 
-fn main() {
+/// `tests/protocol/examples.rs` runs it too.
+pub fn main() {
     let vehicle = Address::vehicle(3).expect("1 to 14");
     let ((to_vehicle, from_surface), (to_surface, from_vehicle)) = (channel(), channel());
     let below = thread::spawn(move || run_vehicle(vehicle, &QueueModem { out: to_surface, input: from_surface }));
@@ -153,9 +154,4 @@ fn run_surface(vehicle: Address, modem: &QueueModem) -> usize {
         }
     }
     shown(&link)
-}
-
-#[test]
-fn the_example_runs() {
-    main();
 }

@@ -11,26 +11,19 @@ use std::io::{Read, Write};
 use std::net::TcpStream;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
-use std::sync::OnceLock;
 use std::time::{Duration, Instant};
 
-/// The `scenecast` command, built like the tests themselves.
+/// The `scenecast` command that was built with this test or bench.
+///
+/// # Panics
+///
+/// If there is none beside the test. Cargo builds it for the tests of the package `scenecast`.
 pub fn scenecast() -> Command {
-    static BINARY: OnceLock<PathBuf> = OnceLock::new();
-    Command::new(BINARY.get_or_init(build))
-}
-
-fn build() -> PathBuf {
     let test = std::env::current_exe().expect("a test has a path");
     let profile = test.parent().and_then(Path::parent).expect("target/PROFILE/deps/TEST");
-    let mut cargo = Command::new(env!("CARGO"));
-    cargo.args(["build", "--package", "scenecast", "--bin", "scenecast", "--quiet"]);
-    if profile.ends_with("release") {
-        cargo.arg("--release");
-    }
-    cargo.current_dir(workspace()).env("CARGO_TARGET_DIR", profile.parent().expect("target"));
-    assert!(cargo.status().expect("cargo runs").success(), "scenecast does not build");
-    profile.join("scenecast")
+    let program = profile.join("scenecast");
+    assert!(program.exists(), "{} is missing: cargo build -p scenecast", program.display());
+    Command::new(program)
 }
 
 pub fn workspace() -> PathBuf {

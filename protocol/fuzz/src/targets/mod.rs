@@ -1,4 +1,4 @@
-//! Properties for any bytes: plain functions, run by libFuzzer and by `tests/fuzz_corpus.rs` alike.
+//! Properties for any bytes: plain functions, run by libFuzzer and by `tests/protocol/fuzz_corpus.rs` alike.
 //!
 //! A function panics if a property does not hold.
 

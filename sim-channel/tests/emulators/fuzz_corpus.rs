@@ -1,6 +1,6 @@
 //! The fuzz targets without a fuzzer: every file of the corpora.
 
-#[path = "../fuzz/src/lib.rs"]
+#[path = "../../fuzz/src/lib.rs"]
 mod targets;
 
 use std::fs;

@@ -1,6 +1,6 @@
 //! The headers, the status and the keys that the examples share.
 
-use crate::document::{hex, pairs, rows, section};
+use super::document::{hex, pairs, rows, section};
 use scenecast_protocol::coordinates::{DecimetrePoint, MapPoint};
 use scenecast_protocol::directive::Series;
 use scenecast_protocol::directive::{

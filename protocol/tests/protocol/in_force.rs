@@ -1,8 +1,6 @@
 //! The surface knows which content is in force at the vehicle, whatever either end has forgotten.
 
-mod pair;
-
-use pair::{CALM, LinkedEnds, LossyChannel, Setup, auv, hold, utility};
+use crate::pair::{CALM, LinkedEnds, LossyChannel, Setup, auv, hold, patchy, utility};
 use proptest::prelude::*;
 use scenecast_protocol::coordinates::DecimetrePoint;
 use scenecast_protocol::directive::{
@@ -111,7 +109,7 @@ proptest! {
             }
             run(&mut pair, 10 + u64::from(first % 60));
             match what {
-                0 => pair.restart_vehicle(&pair::patchy(2, 0)),
+                0 => pair.restart_vehicle(&patchy(2, 0)),
                 1 | 2 => pair.restart_surface(),
                 // The surface remembers a content that may be in force no more.
                 3 => {

@@ -1,8 +1,5 @@
 //! Two ends in virtual time with an unreliable channel between them.
 
-// Each test program uses a part of this module.
-#![allow(dead_code, unused_imports)]
-
 mod setup;
 
 pub(crate) use setup::{CALM, LossyChannel, Setup};

@@ -1,8 +1,6 @@
 //! Without a key anybody can write frames that are accepted. The link recovers within a minute after the last one.
 
-mod pair;
-
-use pair::{CALM, LinkedEnds, LossyChannel, Setup, auv, patchy, utility};
+use crate::pair::{CALM, LinkedEnds, LossyChannel, Setup, auv, patchy, utility};
 use scenecast_protocol::directive::{Budget, Constraints, OrderStatus, Series, Slot, SlotId, VersionedSlot};
 use scenecast_protocol::link::InForce;
 use scenecast_protocol::mac::Access;

@@ -1,8 +1,6 @@
 //! The planned path at the surface is the vehicle's, in virtual time.
 
-mod pair;
-
-use pair::{LinkedEnds, LossyChannel, Setup, auv, patchy, utility};
+use crate::pair::{LinkedEnds, LossyChannel, Setup, auv, patchy, utility};
 use proptest::prelude::*;
 use scenecast_protocol::coordinates::MapPoint;
 use scenecast_protocol::map_codec::Codec;

@@ -1,7 +1,7 @@
 //! The parts of a frame: fields of the header, layer chunks, status and slots.
 
-use crate::document::{assert_same, pairs, rows, section};
-use crate::samples::{MISSION, auv, clock, frame, header, hold, place, status, vehicle_stamp};
+use super::document::{assert_same, pairs, rows, section};
+use super::samples::{MISSION, auv, clock, frame, header, hold, place, status, vehicle_stamp};
 use scenecast_protocol::coordinates::{DecimetrePoint, MapPoint, WorldPoint};
 use scenecast_protocol::directive::{
     Areas, AtEnd, Band, Budget, CellBand, Change, Constraints, Destination, ExemplarRequest, ExemplarRequests, Fence,

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-pub(crate) const DOCUMENT: &str = include_str!("../../WIRE.md");
+pub(crate) const DOCUMENT: &str = include_str!("../../../WIRE.md");
 
 pub(crate) fn hex(bytes: &[u8]) -> String {
     bytes.iter().map(|b| format!("{b:02X}")).collect::<Vec<_>>().join(" ")

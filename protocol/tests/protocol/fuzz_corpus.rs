@@ -1,8 +1,7 @@
 //! The fuzz targets without a fuzzer: every file of the corpora, and mutations of them.
 
-#[path = "fuzz_corpus/seeds.rs"]
 mod seeds;
-#[path = "../fuzz/src/targets/mod.rs"]
+#[path = "../../fuzz/src/targets/mod.rs"]
 mod targets;
 
 use std::fs;

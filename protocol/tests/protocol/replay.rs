@@ -1,8 +1,6 @@
 //! With a key and `authenticate = "all"`, a stranger can only replay frames. These cost airtime, and no run of either end.
 
-mod pair;
-
-use pair::{LinkedEnds, LossyChannel, Setup, auv, patchy, utility};
+use crate::pair::{LinkedEnds, LossyChannel, Setup, auv, patchy, utility};
 use scenecast_protocol::mac::Access;
 use scenecast_protocol::map_codec::Codec;
 use scenecast_protocol::wire::Envelope;

@@ -1,5 +1,4 @@
 //! Nodes that speak rmw_zenoh, with peers and a router that nobody here wrote: the Zenoh of PyPI with the messages of rosbags.
-#![cfg(feature = "zenoh")]
 
 use scenecast_config::{Ros2, RosName, RosTransport, ZenohEndpoint};
 use scenecast_messages::nav_msgs::{OccupancyGrid, Odometry};

@@ -1,8 +1,6 @@
 //! Further properties of the link, over seeds, in virtual time.
 
-mod pair;
-
-use pair::{LinkedEnds, LossyChannel, Setup, auv, hold, patchy, utility};
+use crate::pair::{LinkedEnds, LossyChannel, Setup, auv, hold, patchy, utility};
 use proptest::prelude::*;
 use scenecast_protocol::link::{DropReason, Mismatch, VehicleEvent};
 use scenecast_protocol::mac::Access;

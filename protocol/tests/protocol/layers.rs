@@ -1,8 +1,6 @@
 //! Layers and background streams beside the map, in virtual time.
 
-mod pair;
-
-use pair::{CALM, LinkedEnds, LossyChannel, Setup, assert_budget, auv, layer, patchy, speckled};
+use crate::pair::{CALM, LinkedEnds, LossyChannel, Setup, assert_budget, auv, layer, patchy, speckled};
 use scenecast_protocol::map::{Cell, LayerDescriptor, LayerId, LayerSource, Steps};
 use scenecast_protocol::map_codec::Codec;
 use scenecast_protocol::schedule::{BackgroundOrder, BackgroundStream, Class};

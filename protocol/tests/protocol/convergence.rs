@@ -1,8 +1,6 @@
 //! Convergence of the two ends, over seeds, in virtual time.
 
-mod pair;
-
-use pair::{CALM, LinkedEnds, LossyChannel, Setup, assert_budget, auv, hold, patchy, speckled, utility};
+use crate::pair::{CALM, LinkedEnds, LossyChannel, Setup, assert_budget, auv, hold, patchy, speckled, utility};
 use proptest::prelude::*;
 use scenecast_protocol::directive::{OrderStatus, Slot, Utility};
 use scenecast_protocol::mac::Access;

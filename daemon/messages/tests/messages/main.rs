@@ -1,0 +1,4 @@
+//! The messages as bytes and as definitions.
+
+mod bytes;
+mod definitions;

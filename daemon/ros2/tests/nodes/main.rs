@@ -1,0 +1,5 @@
+//! Nodes that find each other, over either transport.
+
+mod loopback;
+#[cfg(feature = "zenoh")]
+mod zenoh;

@@ -1,0 +1,14 @@
+//! The crate through its public interface: two ends over a channel that loses frames, the document of the wire, the fuzz corpora.
+
+mod convergence;
+mod examples;
+mod forgery;
+mod fuzz_corpus;
+mod in_force;
+mod layers;
+mod map_coding;
+mod pair;
+mod path;
+mod promises;
+mod replay;
+mod wire_document;
