@@ -4,6 +4,8 @@
 //   node run.mjs --url http://HOST:PORT   against a running daemon: the stories that need no mock
 //   ... --token-file FILE                 against one with a token: to log in
 //   ... --runs N                          each story N times, to find unstable ones
+//   ... --workers N                       N stories at a time, each with a mock of its own
+//   ... --limits                          the stories that measure time assert its limits, which hold on a quiet machine only
 //   --only A,B   only stories whose name contains A or B      --require   a missing browser is a failure
 
 import { existsSync, readFileSync } from "node:fs";
@@ -37,16 +39,20 @@ async function main() {
     return process.argv.includes("--require") ? 1 : 0;
   }
   const { chromium } = await import("playwright-core");
+  const all = await stories();
   const url = option("url")?.replace(/\/$/, "");
-  const mock = url ? null : await startMock();
+  const token = option("token-file") && readFileSync(option("token-file"), "utf8").trim();
   const browser = await chromium.launch(LAUNCH);
-  const scene = { url: url ?? mock.url, mocked: mock !== null, token: option("token-file") && readFileSync(option("token-file"), "utf8").trim() };
   const counts = { ok: 0, failed: 0, skipped: 0 };
-  for (let i = 0; i < Number(option("runs") ?? 1); i += 1) {
-    for (const story of await stories()) counts[await run(story, browser, scene)] += 1;
-  }
+  const waiting = Array.from({ length: Number(option("runs") ?? 1) }, () => all).flat();
+  const work = async () => {
+    const mock = url ? null : await startMock();
+    const scene = { url: url ?? mock.url, mocked: mock !== null, token, limits: process.argv.includes("--limits") };
+    while (waiting.length > 0) counts[await run(waiting.shift(), browser, scene)] += 1;
+    await mock?.close();
+  };
+  await Promise.all(Array.from({ length: Number(option("workers") ?? 1) }, work));
   await browser.close();
-  await mock?.close();
   console.log(`${counts.ok} passed, ${counts.failed} failed, ${counts.skipped} skipped`);
   return counts.failed > 0 ? 1 : 0;
 }

@@ -42,8 +42,8 @@ export class Stage {
   figures = [];
 
   /** Opens the page in a new context; unless the story is bare, waits for the first state and map. */
-  async open(browser, { url, mocked, token }, story) {
-    Object.assign(this, { url, mocked, token, browser });
+  async open(browser, { url, mocked, token, limits }, story) {
+    Object.assign(this, { url, mocked, token, browser, limits });
     this.errors = [];
     this.texts = [];
     this.posts = [];
@@ -108,6 +108,12 @@ export class Stage {
     const { processInfo } = await this.devtools.send("SystemInfo.getProcessInfo");
     // The main process mostly serves the test.
     return 1000 * processInfo.filter((p) => p.type !== "browser").reduce((sum, p) => sum + p.cpuTime, 0);
+  }
+
+  /** Notes a time that was measured, and asserts its limit if this run asserts limits. */
+  within(limit, ms, text) {
+    this.figures.push(text);
+    assert.ok(!this.limits || ms < limit, `${text}: over ${limit} ms`);
   }
 
   async get(path) {

@@ -30,6 +30,11 @@ pub fn workspace() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("tests/ has a parent").to_owned()
 }
 
+/// Whether `.ci/full` runs the tests: all cases, and the limits of time that hold on a quiet machine only.
+pub fn is_full() -> bool {
+    std::env::var_os("SCENECAST_FULL").is_some()
+}
+
 /// The shared test material, if this machine has it; says in the output if not.
 pub fn shared_data() -> Option<PathBuf> {
     let dir = workspace().join("../shared/data");

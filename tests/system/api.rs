@@ -358,7 +358,8 @@ fn command_passes_from_one_operator_to_another_in_a_shell() {
 fn last_seen_reaches_the_surface_and_its_exports_if_requested() {
     let out = scratch("last-seen");
     let report = |sets: &[&str]| -> Value {
-        let sim = ["sim", "--duration", "300", "--seed", "3", "--out", out.to_str().unwrap()];
+        let small = ["--set", "camera.width_px=320", "--set", "camera.height_px=240"];
+        let sim = [&["sim", "--duration", "200", "--seed", "3", "--out", out.to_str().unwrap()], &small[..]].concat();
         let ran = run(&[&sim[..], sets].concat());
         assert_eq!(ran.status.code(), Some(0), "{}", text(&ran));
         serde_json::from_slice(&std::fs::read(out.join("report.json")).unwrap()).unwrap()

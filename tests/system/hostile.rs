@@ -1,6 +1,6 @@
 //! Clients that are slow or hostile: they cost the surface neither its link nor its memory.
 
-use scenecast_tests::{Process, free_port, http, state, wait_until};
+use scenecast_tests::{Process, free_port, http, is_full, state, wait_until};
 use std::io::{Read, Write};
 use std::net::TcpStream;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -35,8 +35,8 @@ impl Drop for End<'_> {
     }
 }
 
-/// Does `attack` while an operator goes on working; his answers come soon, mission and link run at their pace, and
-/// the surface does not grow.
+/// Does `attack` while an operator goes on working: he has his answers, frames go on to arrive, and the surface does not grow. On a
+/// quiet machine his answers come soon, and the mission runs at its pace.
 fn assert_unmoved(demo: &Process, port: u16, what: &str, attack: impl FnOnce()) {
     let before = state(port).unwrap();
     let (held, _) = demo.cost().unwrap_or_default();
@@ -50,7 +50,8 @@ fn assert_unmoved(demo: &Process, port: u16, what: &str, attack: impl FnOnce()) 
                 let asked = Instant::now();
                 let answer = state(port);
                 assert!(answer.is_some(), "{what}: the operator gets no answer");
-                assert!(asked.elapsed() < Duration::from_secs(3), "{what}: he waited {:?}", asked.elapsed());
+                let waited = asked.elapsed();
+                assert!(!is_full() || waited < Duration::from_secs(3), "{what}: he waited {waited:?}");
                 std::thread::sleep(Duration::from_millis(200));
             }
         });
@@ -60,7 +61,7 @@ fn assert_unmoved(demo: &Process, port: u16, what: &str, attack: impl FnOnce()) 
     let after = state(port).unwrap();
     let passed = after["now_s"].as_f64().unwrap() - before["now_s"].as_f64().unwrap();
     let expected = began.elapsed().as_secs_f64() * SPEED;
-    assert!(passed > 0.7 * expected - 5.0, "{what}: {passed} s of mission instead of {expected}");
+    assert!(!is_full() || passed > 0.7 * expected - 5.0, "{what}: {passed} s of mission instead of {expected}");
     let frames = |s: &serde_json::Value| s["link"]["up"]["frames"].as_u64().unwrap();
     assert!(frames(&after) > frames(&before), "{what}: no frame was heard meanwhile");
     let (holds, _) = demo.cost().unwrap_or_default();

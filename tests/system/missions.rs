@@ -5,6 +5,7 @@ use scenecast_config::Config;
 use scenecast_protocol::map::LayerId;
 use scenecast_protocol::time::Instant;
 use scenecast_rehearsal::{Mission, MissionOptions, World, report};
+use scenecast_tests::is_full;
 use serde_json::Value;
 use std::time::Duration;
 
@@ -40,7 +41,7 @@ fn assert_sound(figures: &Value) {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 18, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: if is_full() { 18 } else { 5 }, ..ProptestConfig::default() })]
 
     #[test]
     fn maps_are_equal_once_the_channel_has_drained(

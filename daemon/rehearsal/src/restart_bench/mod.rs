@@ -18,9 +18,6 @@ use std::time::Duration;
 const RECORDED_S: f64 = 100.0;
 /// Runs at the same time.
 const AT_ONCE: usize = 2;
-/// The limit for the page of a restarted surface, seconds.
-pub const PAGE_LIMIT_S: f64 = 2.0;
-
 /// The settings of the bench.
 #[derive(Debug, Clone)]
 pub struct RestartSetting {
@@ -30,6 +27,8 @@ pub struct RestartSetting {
     pub dir: PathBuf,
     pub runs: u32,
     pub seed: u64,
+    /// The limit for the page of a restarted surface, seconds.
+    pub page_limit_s: f64,
 }
 
 /// The figures of one run.

@@ -2,7 +2,7 @@
 
 use super::ends::{Disk, End, Ends, Stop, failed};
 use super::page::{Page, Shown, is_decided};
-use super::{PAGE_LIMIT_S, RestartRun, RestartSetting};
+use super::{RestartRun, RestartSetting};
 use scenecast_core::UserError;
 use serde_json::json;
 use sim_channel::RandomStream;
@@ -119,7 +119,7 @@ impl Run<'_> {
                 Some(None) => {
                     let page_s = began.elapsed().as_secs_f64();
                     self.figures.page_s.push(page_s);
-                    if page_s > PAGE_LIMIT_S {
+                    if page_s > self.setting.page_limit_s {
                         self.figures.faults.push(format!("the full page came after {page_s:.1} s; before: {gone}"));
                     }
                     return Ok(());

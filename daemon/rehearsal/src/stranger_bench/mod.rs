@@ -42,11 +42,12 @@ mod tests {
 
     #[test]
     fn a_stranger_breaks_no_promise_with_and_without_a_key() {
+        let times = if std::env::var_os("SCENECAST_FULL").is_some() { 5 } else { 1 };
         for protection in Protection::EVERY {
-            let found = measure_stranger(protection, 20_000, 1, &mut |_| ());
+            let found = measure_stranger(protection, 4000 * times, 1, &mut |_| ());
             assert_eq!(found.broken_promises(), Vec::<String>::new(), "{found:#?}");
-            assert!(found.bursts >= 40 && found.kinds.len() == AttackKind::ALL.len(), "{found:#?}");
-            assert!(found.orders_applied > 10 && found.authentic_frames > 1000, "{found:#?}");
+            assert!(found.bursts as u64 >= 8 * times && found.kinds.len() == AttackKind::ALL.len(), "{found:#?}");
+            assert!(found.orders_applied > 2 * times && found.authentic_frames > 200 * times, "{found:#?}");
         }
     }
 
