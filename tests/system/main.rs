@@ -23,7 +23,6 @@ mod navigation;
 mod page;
 mod ports;
 mod position;
-mod renames;
 mod restart;
 mod ros2;
 mod ros2_labels;
