@@ -18,7 +18,6 @@ mod map_tool;
 mod messages;
 mod missions;
 mod modem_sim;
-mod module_circles;
 mod navigation;
 mod page;
 mod ports;
