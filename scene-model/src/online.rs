@@ -43,12 +43,6 @@ pub struct OnlineInference {
 }
 
 impl OnlineInference {
-    /// Returns the inference that continues with a model from a checkpoint that lacks it.
-    #[must_use]
-    pub fn of_model(model: &SceneModel) -> Self {
-        Self { seen_words: model.words(), memory: TopicMemory::default() }
-    }
-
     /// Makes room for the labels of a frame with `words` words, before they are inserted.
     pub fn expect(&mut self, words: usize, model: &mut SceneModel) {
         self.seen_words = self.seen_words.saturating_add(words as u64);

@@ -3,8 +3,7 @@
 //! Measures that were learnt from images of a similar site before the mission give words the same meaning in every
 //! mission. A [`Discriminant`] that was learnt from annotated images adds words of its own.
 //!
-//! The content of a file's envelope, in postcard: version 1 has the number of words and the measures, version 2 also the
-//! discriminant or none. Both are read, version 2 is written.
+//! The content of a file's envelope, in postcard: the number of words, the measures, and the discriminant or none.
 //!
 //! ```
 //! use image::{Rgb, RgbImage};
@@ -25,11 +24,8 @@
 
 use crate::envelope::{Envelope, EnvelopeError};
 use crate::words::{Discriminant, Measures};
-use serde::Deserialize;
 
 const ENVELOPE: Envelope = Envelope { magic: *b"SCNVOCAB", version: 2 };
-/// The version without a discriminant.
-const PLAIN: Envelope = Envelope { version: 1, ..ENVELOPE };
 /// The maximum number of words of one kind in a cell.
 const MAX_WORDS_PER_CELL: u32 = 1024;
 
@@ -54,13 +50,9 @@ pub fn save(measures: &Measures) -> Vec<u8> {
 
 /// Returns the measures of bytes that [`save`] returned. Other content is refused and never panics.
 pub fn load(bytes: &[u8]) -> Result<Measures, VocabularyError> {
-    let (size, measures, discriminant) = match ENVELOPE.open(bytes) {
-        Err(EnvelopeError::Version { found: 1, .. }) => {
-            let (size, measures): (u32, Measures) = parsed(PLAIN.open(bytes)?)?;
-            (size, measures, None)
-        }
-        content => parsed::<(u32, Measures, Option<Discriminant>)>(content?)?,
-    };
+    let (size, measures, discriminant): (u32, Measures, Option<Discriminant>) =
+        postcard::from_bytes(ENVELOPE.open(bytes)?)
+            .map_err(|_| VocabularyError::Inconsistent("fields do not parse"))?;
     let config = measures.config();
     if size != config.vocabulary_size() {
         return Err(VocabularyError::Inconsistent("this program has another number of words"));
@@ -76,10 +68,6 @@ pub fn load(bytes: &[u8]) -> Result<Measures, VocabularyError> {
         ));
     }
     Ok(measures.with_discriminant(discriminant))
-}
-
-fn parsed<'a, T: Deserialize<'a>>(content: &'a [u8]) -> Result<T, VocabularyError> {
-    postcard::from_bytes(content).map_err(|_| VocabularyError::Inconsistent("fields do not parse"))
 }
 
 #[cfg(test)]
@@ -132,12 +120,13 @@ mod tests {
     }
 
     #[test]
-    fn a_vocabulary_of_an_earlier_build_is_read() {
-        let content = postcard::to_allocvec(&(WordConfig::default().vocabulary_size(), trained())).unwrap();
-        let loaded = load(&PLAIN.seal(&content)).unwrap();
-        assert_eq!((loaded.discriminant(), words(loaded.clone())), (None, words(trained())));
-        let newer = Envelope { version: 3, ..ENVELOPE }.seal(&content);
-        assert_eq!(load(&newer).unwrap_err(), EnvelopeError::Version { found: 3, wanted: 2 }.into());
+    fn a_vocabulary_of_another_version_is_refused() {
+        let sealed = save(&trained());
+        let content = ENVELOPE.open(&sealed).unwrap();
+        for found in [1, 3] {
+            let other = Envelope { version: found, ..ENVELOPE }.seal(content);
+            assert_eq!(load(&other).unwrap_err(), EnvelopeError::Version { found, wanted: 2 }.into());
+        }
     }
 
     #[test]

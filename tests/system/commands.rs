@@ -106,7 +106,6 @@ fn every_command_has_help_with_an_example() {
         &["bench", "link"],
         &["bench", "stranger"],
         &["config"],
-        &["config", "migrate"],
         &["key", "new"],
         &["key", "show"],
         &["key", "token"],
@@ -148,31 +147,9 @@ fn a_key_is_made_once_and_shown() {
 }
 
 #[test]
-fn an_old_configuration_is_migrated_and_then_accepted() {
-    let file = scratch("migrate").join("auv.toml");
-    let path = file.to_str().unwrap();
-    let old = "[link]\n# ours\nspend = [\"depth\"]\nshares = [10, 5, 5, 60, 20]\n";
-    std::fs::write(&file, old).unwrap();
-    assert_refused(&["auv", "--config", path], &["auv.toml:3", "link.spend", "link.background", "migrate"]);
-    let migrated = run(&["config", "migrate", path]);
-    assert!(migrated.status.success());
-    assert!(String::from_utf8_lossy(&migrated.stdout).contains("line 3: link.spend -> link.background"));
-    let shares = "shares = { directive = 10, status = 5, fix = 5, map = 60, exemplar = 20 }";
-    let new = format!("[link]\n# ours\nbackground = [\"depth\"]\n{shares}\n");
-    assert_eq!(std::fs::read_to_string(&file).unwrap(), new);
-    scenecast_config::load(Some(&file), &[]).unwrap();
-    assert!(String::from_utf8_lossy(&run(&["config", "migrate", path]).stdout).contains("up to date"));
-    std::fs::write(&file, "[link]\nspend = []\nbackground = []\n").unwrap();
-    assert_refused(&["config", "migrate", path], &["auv.toml:2", "link.spend", "link.background"]);
-    assert_refused(&["config", "migrate", "nowhere.toml"], &["nowhere.toml"]);
-}
-
-#[test]
 fn a_misspelt_option_is_answered_with_the_nearest_one() {
     assert_refused(&["sim", "--sede", "3", "--out", "x"], &["--sede", "--seed"]);
     assert_refused(&["simm"], &["simm", "sim"]);
-    assert_refused(&["ctl", "settings", "--planes", "none"], &["--planes", "--layers"]);
-    assert_refused(&["ctl", "budget", "set", "--spend", "none"], &["--spend", "--background"]);
 }
 
 #[test]

@@ -20,7 +20,6 @@ const MAX_LINES: usize = 150;
 const RUN: &[(&str, &[(&str, &str)])] = &[
     ("scenecast config --role auv > auv.toml", &[]),
     ("scenecast config --role asv > asv.toml", &[]),
-    ("scenecast config migrate auv.toml", &[]),
     ("scenecast key new --out mission.key", &[]),
     ("scenecast key show mission.key", &[]),
     ("scenecast key token --out console.token", &[]),
@@ -180,8 +179,8 @@ fn every_key_in_the_documents_exists() {
     let keys = keys();
     let exists = |key: &str| keys.iter().any(|k| k == key || k.strip_prefix(key).is_some_and(|r| r.starts_with('.')));
     let sections: BTreeSet<&str> = keys.iter().filter_map(|k| k.split('.').next()).collect();
-    // Members of reports and of the API, and old names of keys.
-    let others = |page: &Page| ["reports.md", "http.md", "configuration.md"].iter().any(|n| page.path.ends_with(n));
+    // Members of reports and of the API.
+    let others = |page: &Page| ["reports.md", "http.md"].iter().any(|n| page.path.ends_with(n));
     let endings = [".rs", ".csv", ".png", ".journal", ".checkpoint", ".key", ".copy", ".damaged", ".tif", ".tokens"];
     let is_file = |span: &str| endings.iter().any(|end| span.ends_with(end));
     let is_key = |span: &str| {

@@ -54,19 +54,6 @@ fn wrong_orders_and_other_sites_are_refused() {
 }
 
 #[test]
-fn version_1_of_the_api_is_gone_and_names_version_2() {
-    let port = free_port();
-    let _demo = Process::start(&["demo", "--port", &port.to_string(), "--duration", "600"]);
-    wait_until("the page answers", Duration::from_secs(30), || state(port).is_some());
-    for (method, path) in [("GET", "vehicles/1/map"), ("GET", "state"), ("POST", "vehicles/1/utility")] {
-        let (status, body) = http(port, method, &format!("/api/v1/{path}"), ORDER, "{}").unwrap();
-        let body: Value = serde_json::from_slice(&body).unwrap();
-        assert_eq!(status, 410, "{path}");
-        assert!(body["error"].as_str().unwrap().contains(&format!("/api/v2/{path}")), "{body}");
-    }
-}
-
-#[test]
 fn a_map_is_read_by_region_and_by_changed_tiles() {
     let port = free_port();
     let _demo = Process::start(&["demo", "--port", &port.to_string(), "--speed", "20", "--duration", "600"]);

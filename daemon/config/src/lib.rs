@@ -9,10 +9,7 @@ mod derived;
 mod key;
 mod key_file;
 mod load;
-mod migrate;
 mod modem;
-mod move_to_section;
-mod old_keys;
 mod print;
 mod reference;
 mod regular_file;
@@ -28,7 +25,6 @@ pub use derived::{
 pub use key::{Key, Role};
 pub use key_file::{load_key, read_key};
 pub use load::load;
-pub use migrate::{Migration, migrate};
 pub use modem::{full_frame_bytes, modem_port};
 pub use print::{print, shipped_files};
 pub use reference::reference;

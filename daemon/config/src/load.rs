@@ -2,7 +2,6 @@
 
 use crate::check::check_together;
 use crate::key::Section;
-use crate::old_keys::{OldKey, as_table};
 use crate::{Config, Key};
 use scenecast_core::UserError;
 use std::path::Path;
@@ -69,12 +68,12 @@ fn read_file(path: &Path, text: &str, given: &mut Vec<Given>) -> Result<(), User
 }
 
 /// The number of the line in which byte `at` is.
-pub(crate) fn line_of(text: &str, at: usize) -> usize {
+fn line_of(text: &str, at: usize) -> usize {
     text.get(..at).map_or(1, |before| before.matches('\n').count() + 1)
 }
 
 /// A value without its place in the file; no key takes a date.
-pub(crate) fn plain(value: &Spanned<DeValue<'_>>) -> Option<Value> {
+fn plain(value: &Spanned<DeValue<'_>>) -> Option<Value> {
     Some(match value.get_ref() {
         DeValue::String(s) => Value::String(s.to_string()),
         DeValue::Integer(i) => Value::Integer(i64::from_str_radix(i.as_str(), i.radix()).ok()?),
@@ -117,11 +116,7 @@ fn apply(config: &mut Config, given: &Given) -> Result<(), UserError> {
 
 fn refused(key: &Key, given: &Given) -> UserError {
     let Given { key: name, value, place } = given;
-    let new_form = value.as_array().and_then(|list| as_table(list, key.name));
-    UserError::Input(match new_form {
-        Some(table) => format!("{place}: {name} = {value} is the old form; write {} = {table}", key.leaf()),
-        None => format!("{place}: {name} = {value} is not allowed; allowed: {}", key.allowed()),
-    })
+    UserError::Input(format!("{place}: {name} = {value} is not allowed; allowed: {}", key.allowed()))
 }
 
 /// The key of a name, and the member of its table, if the name ends in one.
@@ -134,10 +129,6 @@ fn find(name: &str) -> Option<(&'static Key, Option<&str>)> {
 }
 
 fn unknown(name: &str, place: &str) -> UserError {
-    if let Some(OldKey { new, .. }) = OldKey::find(name) {
-        let advice = "scenecast config migrate FILE rewrites a file";
-        return UserError::Input(format!("{place}: {name} is now called {new} ({advice})"));
-    }
     let names: Vec<&str> = if name.contains('.') {
         Key::all().map(|key| key.name).collect()
     } else {
@@ -211,16 +202,6 @@ mod tests {
     }
 
     #[test]
-    fn an_old_key_is_refused_with_the_new_one() {
-        let said = message(&["link.spend=[]"]);
-        assert!(said.starts_with("--set link.spend=[]: link.spend is now called link.background"), "{said}");
-        let mut given = Vec::new();
-        read_file(Path::new("x.toml"), "[map]\n# planes\nplanes = []\n", &mut given).unwrap();
-        let said = apply(&mut Config::default(), &given[0]).unwrap_err().to_string();
-        assert!(said.starts_with("x.toml:3: map.planes is now called map.layers"), "{said}");
-    }
-
-    #[test]
     fn sealing_without_a_key_is_refused() {
         let said = message(&["link.encrypt=true"]);
         assert!(said.contains("link.encrypt") && said.contains("link.key_file"), "{said}");
@@ -249,11 +230,8 @@ mod tests {
     }
 
     #[test]
-    fn a_positional_list_is_refused_with_the_new_form() {
+    fn a_list_in_place_of_shares_is_refused_with_the_members() {
         let said = message(&["link.shares=[10, 5, 5, 60, 20]"]);
-        let table = "{ directive = 10, status = 5, fix = 5, map = 60, exemplar = 20 }";
-        assert!(said.contains("old form") && said.ends_with(&format!("write shares = {table}")), "{said}");
-        let said = message(&["link.shares=[10, 5]"]);
         assert!(said.ends_with("for each of directive, status, fix, map, exemplar"), "{said}");
     }
 

@@ -2,9 +2,8 @@
 
 use crate::Config;
 use crate::key::{Key, Role, Section};
-use crate::old_keys::OLD_KEYS;
 
-/// Every section as a heading and a table, and the old names of keys.
+/// Every section as a heading and a table.
 pub fn reference() -> String {
     let defaults = Config::default();
     let mut out = String::from("The column *read by* names `auv`, `asv` and the rehearsals `sim` and `demo`.\n");
@@ -13,9 +12,6 @@ pub fn reference() -> String {
         out.push_str("| key | default | allowed | read by | meaning |\n|---|---|---|---|---|\n");
         section.keys.iter().for_each(|key| out.push_str(&row(key, &defaults)));
     }
-    out.push_str("\n### Old names\n\n`scenecast config migrate FILE` rewrites a file that has them.\n\n");
-    out.push_str("| old | now |\n|---|---|\n");
-    OLD_KEYS.iter().for_each(|key| out.push_str(&format!("| `{}` | `{}` |\n", key.old, key.new)));
     out
 }
 

@@ -67,8 +67,6 @@ fn parse(text: &str) -> Result<Vec<TokenGrant>, String> {
                 is_single = true;
                 check_token(token).map(|token| TokenGrant { principal: Principal::sole_administrator(), token })
             }
-            // Earlier builds read the first line alone.
-            [_] if is_single => continue,
             _ => Err(format!("{LINE_RULE}; a file with a single token has one word; {TOKEN_RULE}")),
         };
         let grant = grant.map_err(|e| format!("line {number}: {e}"))?;
@@ -116,7 +114,7 @@ mod tests {
 
     #[test]
     fn a_single_token_is_that_of_an_administrator() {
-        let text = "# reef\n\n 0123456789abcdef \nnext\n";
+        let text = "# reef\n\n 0123456789abcdef \n";
         assert_eq!(*read("good", text, read_token).unwrap(), "0123456789abcdef");
         let grants = parse(text).unwrap();
         assert_eq!((grants.len(), grants[0].principal.role()), (1, Role::Administrator));
@@ -137,6 +135,7 @@ mod tests {
         for (text, expected) in [
             (format!("{ANNA}\n0123456789abcdee\n"), "line 2: a line is ROLE NAME TOKEN"),
             (format!("0123456789abcdee\n{ANNA}\n"), "line 2: a line is ROLE NAME TOKEN"),
+            ("0123456789abcdef\nnext\n".to_owned(), "line 2: a line is ROLE NAME TOKEN"),
             (format!("{ANNA}\nowner bob fedcba9876543210\n"), "line 2: \"owner\" is not a role"),
             (format!("{ANNA}\nviewer anna fedcba9876543210\n"), "line 2: the name anna"),
             (format!("{ANNA}\nviewer bob 0123456789abcdef\n"), "line 2: it has the token of anna"),

@@ -1,18 +1,11 @@
 //! The vehicle's durable state: read at the start of a run, and kept during it.
 
 use super::checkpoint;
-use super::journal::{BodyLayout, Damage, Found, Journal, JournalNames, Storage};
-use scenecast_core::UserError;
-use scenecast_protocol::directive::Series;
-use scenecast_protocol::link::SlotInboxState;
+use super::journal::{Damage, Found, Journal, JournalNames, Storage};
 use scenecast_vehicle::{Durable, LastPlace, LostOrders};
-use serde::Deserialize;
-use std::collections::VecDeque;
 
 /// The journal's files. Their records hold a [`Durable`] in postcard; another layout needs another version of the files.
 const JOURNAL: JournalNames = JournalNames { journal: "vehicle.journal", copy: "vehicle.journal.copy" };
-/// The state file of builds without a journal.
-const EARLIER_FILE: &str = "vehicle.state";
 
 /// Writes the durable state of a run to the journal.
 pub(super) struct Keeper<S: Storage> {
@@ -37,24 +30,14 @@ impl<S: Storage> Keeper<S> {
     ///
     /// The first run of a mission has the given `lineage`, which is random. The run begins in hold if the journal is
     /// damaged, if it is missing beside a checkpoint, or if the disk does not take the state.
-    ///
-    /// # Errors
-    /// A state file of a build without a journal.
-    pub(super) fn begin_run(
-        storage: S,
-        lineage: u64,
-        checkpoint: Option<(u64, u8)>,
-    ) -> Result<StartedRun<S>, UserError> {
+    pub(super) fn begin_run(storage: S, lineage: u64, checkpoint: Option<(u64, u8)>) -> StartedRun<S> {
         let (journal, found) = Journal::open(storage, JOURNAL);
         let storage = journal.storage();
         let (mut durable, is_again) = match found {
-            Found::Absent if !checkpoint::is_there(storage) => {
-                refuse_earlier_build(storage)?;
-                (Durable { lineage, ..Durable::default() }, false)
-            }
+            Found::Absent if !checkpoint::is_there(storage) => (Durable { lineage, ..Durable::default() }, false),
             Found::Absent => (forgetful(storage, JOURNAL.journal, &Damage::Missing, lineage), true),
             Found::Lost(name, damage) => (forgetful(storage, name, &damage, lineage), true),
-            Found::State { body, layout, damage } => match decode(body, layout) {
+            Found::State { body, damage } => match decode(&body) {
                 Some(last) => {
                     let mut durable = continued(last, checkpoint);
                     if let Some((name, damage)) = damage {
@@ -74,7 +57,7 @@ impl<S: Storage> Keeper<S> {
             tracing::error!("the vehicle holds, because its journal cannot be written");
             durable.hold = true;
         }
-        Ok(StartedRun { keeper, durable, is_again, is_stored })
+        StartedRun { keeper, durable, is_again, is_stored }
     }
 
     /// Makes the state durable and returns whether the disk took it. A power cut before the return leaves either the
@@ -117,49 +100,10 @@ fn forgetful(storage: &impl Storage, name: &str, damage: &Damage, lineage: u64) 
     Durable { lineage, epoch, hold: true, lost: LostOrders::Present, ..Durable::default() }
 }
 
-/// The first member of a state, [`Durable::inbox`], with eight slots.
-#[derive(Deserialize)]
-struct EightSlots {
-    series: Option<Series>,
-    retired: VecDeque<Series>,
-    versions: [Option<u16>; 8],
-    decisions: [u8; 8],
-}
-
-/// A state as this build writes it, from one with eight slots, which ends before [`Durable::destination`].
-fn with_all_slots(state: &[u8]) -> Option<Vec<u8>> {
-    let (EightSlots { series, retired, versions, decisions }, rest) = postcard::take_from_bytes(state).ok()?;
-    let mut inbox = SlotInboxState { series, retired, ..SlotInboxState::default() };
-    inbox.versions.iter_mut().zip(versions).for_each(|(slot, version)| *slot = version);
-    inbox.decisions.iter_mut().zip(decisions).for_each(|(slot, decision)| *slot = decision);
-    let inbox = postcard::to_allocvec(&inbox).ok()?;
-    // Neither a destination nor areas.
-    Some([&inbox, rest, &[0, 0]].concat())
-}
-
-/// Reads a state in this layout.
-fn decode(mut state: Vec<u8>, layout: BodyLayout) -> Option<Durable> {
-    if layout == BodyLayout::WithoutLostOrders {
-        state.push(0);
-    }
-    if layout != BodyLayout::Present {
-        state = with_all_slots(&state)?;
-    }
-    match postcard::take_from_bytes(&state) {
+fn decode(state: &[u8]) -> Option<Durable> {
+    match postcard::take_from_bytes(state) {
         Ok((durable, [])) => Some(durable),
         _ => None,
-    }
-}
-
-fn refuse_earlier_build(storage: &impl Storage) -> Result<(), UserError> {
-    let place = storage.path(EARLIER_FILE);
-    match storage.read(EARLIER_FILE) {
-        Ok(None) => Ok(()),
-        Ok(Some(_)) => Err(UserError::file(
-            &place,
-            "the state of an earlier build, which this one does not read; move it away to begin a new mission",
-        )),
-        Err(e) => Err(UserError::Failed(format!("{}: {e}", place.display()))),
     }
 }
 
@@ -167,41 +111,43 @@ fn refuse_earlier_build(storage: &impl Storage) -> Result<(), UserError> {
 mod tests {
     use super::super::journal::disk::{Disk, DiskRefusal};
     use super::*;
-    use scenecast_protocol::schedule::BackgroundOrder;
+    use scenecast_protocol::directive::Series;
+    use scenecast_protocol::link::SlotInboxState;
 
     const NAMES: [&str; 2] = [JOURNAL.journal, JOURNAL.copy];
 
-    fn begin(disk: &Disk) -> Result<(Keeper<Disk>, Durable), UserError> {
-        Keeper::begin_run(disk.clone(), 9, None).map(|run| (run.keeper, run.durable))
+    fn begin(disk: &Disk) -> (Keeper<Disk>, Durable) {
+        let run = Keeper::begin_run(disk.clone(), 9, None);
+        (run.keeper, run.durable)
     }
 
     #[test]
     fn a_run_has_the_state_of_the_last_one_and_an_epoch_of_its_own() {
         let disk = Disk::default();
-        let (mut keeper, durable) = begin(&disk).unwrap();
+        let (mut keeper, durable) = begin(&disk);
         assert_eq!(durable, Durable { lineage: 9, ..Durable::default() });
         let held = Durable { epoch: 4, labels: 7, hold: true, budget_bps: Some(500), ..durable };
         assert!(keeper.save(&held));
         let later = |epoch| Durable { epoch, labels: 0, ..held.clone() };
-        assert_eq!(begin(&disk).unwrap().1, later(5));
-        assert_eq!(begin(&disk).unwrap().1, later(6));
+        assert_eq!(begin(&disk).1, later(5));
+        assert_eq!(begin(&disk).1, later(6));
     }
 
     #[test]
     fn only_a_checkpoint_of_the_same_mission_continues_the_epoch() {
         let disk = Disk::default();
-        let (mut keeper, durable) = begin(&disk).unwrap();
+        let (mut keeper, durable) = begin(&disk);
         let last = Durable { epoch: 4, labels: 7, ..durable };
         assert!(keeper.save(&last));
         let run = |checkpoint| {
-            let run = Keeper::begin_run(disk.clone(), 1, Some(checkpoint)).unwrap();
+            let run = Keeper::begin_run(disk.clone(), 1, Some(checkpoint));
             assert!(run.is_again);
             run.durable
         };
         assert_eq!(run((9, 4)), last);
         assert_eq!(run((9, 3)), Durable { epoch: 5, labels: 0, ..last.clone() });
         assert_eq!(run((8, 5)).epoch, 6, "another mission");
-        let fresh = Keeper::begin_run(Disk::default(), 2, Some((9, 4))).unwrap();
+        let fresh = Keeper::begin_run(Disk::default(), 2, Some((9, 4)));
         assert_eq!((fresh.durable.lineage, fresh.durable.epoch, fresh.is_again), (2, 0, false));
     }
 
@@ -246,48 +192,17 @@ mod tests {
             &[1, 5, 200, 1, 1, 0],
         ];
         assert_eq!(postcard::to_allocvec(&durable).unwrap(), golden.concat());
-        assert_eq!(decode(golden.concat(), BodyLayout::Present), Some(durable.clone()));
-        let eight_slots = [golden[0], &golden[1][..11], &golden[2][..8], golden[3], golden[4], golden[5]].concat();
-        let mut before = Durable { destination: None, areas: Vec::new(), ..durable };
-        before.inbox.versions[9] = None;
-        before.inbox.decisions[9] = 0;
-        assert_eq!(decode(eight_slots.clone(), BodyLayout::EightSlots), Some(before.clone()));
-        let first = eight_slots[..eight_slots.len() - 3].to_vec();
-        before.lost = LostOrders::None;
-        assert_eq!(decode(first, BodyLayout::WithoutLostOrders), Some(before));
-    }
-
-    #[test]
-    fn a_state_with_two_bytes_of_background_order_reads_as_before() {
-        let stored = |background: &[u8]| [&[0; 26][..], background, &[0; 8]].concat();
-        let zeros = Durable::default();
-        assert_eq!(decode(stored(&[0]), BodyLayout::EightSlots), Some(zeros.clone()));
-        let codes = (0..0x8000u16).filter(|&code| BackgroundOrder::from_code(u128::from(code)).is_some());
-        for code in codes {
-            // Earlier builds held the order as a `u16`, because it had no long form.
-            let bytes = stored(&postcard::to_allocvec(&Some(code)).unwrap());
-            let durable = Durable { background: Some(u128::from(code)), ..zeros.clone() };
-            assert_eq!(decode(bytes, BodyLayout::EightSlots), Some(durable), "{code:04x}");
-        }
-    }
-
-    #[test]
-    fn a_state_from_before_the_journal_is_refused_in_one_line() {
-        let disk = Disk::default();
-        disk.put("vehicle.state", b"scVSTA01");
-        let earlier = "vehicle.state: the state of an earlier build, which this one does not read; move it away to begin a \
-                       new mission";
-        assert_eq!(begin(&disk).err().unwrap(), UserError::Input(earlier.to_owned()));
+        assert_eq!(decode(&golden.concat()), Some(durable));
     }
 
     #[test]
     fn a_vehicle_without_its_journal_holds_and_has_lost_its_orders() {
         let lost = |disk: &Disk| {
-            let run = Keeper::begin_run(disk.clone(), 9 << 56, None).unwrap();
+            let run = Keeper::begin_run(disk.clone(), 9 << 56, None);
             assert!(run.is_again && run.is_stored);
             let expected = Durable { lineage: 9 << 56, epoch: 9, hold: true, ..Durable::default() };
             assert_eq!(run.durable, Durable { lost: LostOrders::Present, ..expected });
-            let again = Keeper::begin_run(disk.clone(), 1, None).unwrap().durable;
+            let again = Keeper::begin_run(disk.clone(), 1, None).durable;
             assert!(again.hold && again.lost == LostOrders::Present, "a restart changes neither");
         };
         for content in [&b""[..], b"scVJRN99", &[7; 5000]] {
@@ -302,7 +217,7 @@ mod tests {
 
     /// The bytes of both files after each of `count` states, the last of which does not hold.
     fn files_after_states(disk: &Disk, count: u32) -> (Vec<[Vec<u8>; 2]>, Durable) {
-        let (mut keeper, durable) = begin(disk).unwrap();
+        let (mut keeper, durable) = begin(disk);
         let state = |number| Durable { budget_bps: Some(number), hold: number % 3 == 1, ..durable.clone() };
         let mut files = Vec::new();
         for number in 0..count {
@@ -328,12 +243,12 @@ mod tests {
             for damaged in [&cut as &dyn Fn(&[u8], usize) -> Vec<u8>, &left, &shifted] {
                 let pair = [damaged(&whole[0], at), damaged(&whole[1], at)];
                 NAMES.iter().zip(&pair).for_each(|(name, bytes)| disk.put(name, bytes));
-                let run = begin(&disk).unwrap().1;
+                let run = begin(&disk).1;
                 assert!(run.hold && run.lost == LostOrders::Present && run.budget_bps.is_none(), "{at}: {run:?}");
                 for number in [0, 1] {
                     disk.put(NAMES[number], &pair[number]);
                     disk.put(NAMES[1 - number], &whole[1 - number]);
-                    let run = begin(&disk).unwrap().1;
+                    let run = begin(&disk).1;
                     assert_eq!((run.budget_bps, run.lost), (last.budget_bps, last.lost), "{at}: an older state");
                 }
             }
@@ -344,12 +259,12 @@ mod tests {
     fn one_damaged_copy_leaves_the_state_and_the_vehicle_holds() {
         for name in ["vehicle.journal", "vehicle.journal.copy"] {
             let disk = Disk::default();
-            let (mut keeper, durable) = begin(&disk).unwrap();
+            let (mut keeper, durable) = begin(&disk);
             let last = Durable { budget_bps: Some(500), breach: 2, ..durable };
             assert!(keeper.save(&last));
             disk.remove(name);
-            assert_eq!(begin(&disk).unwrap().1, Durable { epoch: 1, hold: true, ..last.clone() });
-            assert_eq!(begin(&disk).unwrap().1, Durable { epoch: 2, hold: true, ..last });
+            assert_eq!(begin(&disk).1, Durable { epoch: 1, hold: true, ..last.clone() });
+            assert_eq!(begin(&disk).1, Durable { epoch: 2, hold: true, ..last });
         }
     }
 
@@ -358,14 +273,14 @@ mod tests {
         for refusal in [DiskRefusal::Full, DiskRefusal::ReadOnly] {
             let disk = Disk::default();
             disk.refuse(refusal);
-            let run = Keeper::begin_run(disk.clone(), 9, None).unwrap();
+            let run = Keeper::begin_run(disk.clone(), 9, None);
             assert!(run.durable.hold && !run.is_stored && !run.is_again);
         }
         let disk = Disk::default();
-        let last = begin(&disk).unwrap().1;
+        let last = begin(&disk).1;
         disk.refuse(DiskRefusal::Full);
-        assert_eq!(begin(&disk).unwrap().1, Durable { epoch: 1, ..last.clone() }, "the files have their full length");
+        assert_eq!(begin(&disk).1, Durable { epoch: 1, ..last.clone() }, "the files have their full length");
         disk.refuse(DiskRefusal::ReadOnly);
-        assert_eq!(begin(&disk).unwrap().1, Durable { epoch: 2, hold: true, ..last });
+        assert_eq!(begin(&disk).1, Durable { epoch: 2, hold: true, ..last });
     }
 }

@@ -103,8 +103,10 @@ impl LabelTrial {
         let kept: Option<TopicScene> = file.read().ok()?.and_then(|bytes| postcard::from_bytes(&bytes).ok());
         let claim = kept.as_ref().map(|scene| (scene.lineage, scene.book.epoch()));
         let lineage = self.rng.below(1 << 30) as u64;
-        let run = Keeper::begin_run(self.disk.clone(), lineage, claim).ok().filter(|run| run.is_stored);
-        let StartedRun { mut keeper, durable, .. } = run?;
+        let StartedRun { mut keeper, durable, is_stored, .. } = Keeper::begin_run(self.disk.clone(), lineage, claim);
+        if !is_stored {
+            return None;
+        }
         let mut scene = match kept.filter(|scene| scene.lineage == durable.lineage) {
             Some(mut scene) if scene.book.epoch() == durable.epoch => {
                 scene.book.resume(durable.labels);

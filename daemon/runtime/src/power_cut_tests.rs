@@ -283,8 +283,7 @@ fn start(config: &Config, disk: &Disk, rng: &mut DiskRng, cuts: &mut Vec<usize>,
         if let Some(steps) = cuts.pop() {
             disk.cut_after(steps);
         }
-        let StartedRun { keeper, durable, is_stored, .. } =
-            Keeper::begin_run(disk.clone(), u64::from(starts), None).unwrap();
+        let StartedRun { keeper, durable, is_stored, .. } = Keeper::begin_run(disk.clone(), u64::from(starts), None);
         if disk.is_off() {
             continue;
         }

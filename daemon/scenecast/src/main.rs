@@ -1,11 +1,8 @@
 //! The `scenecast` command.
 
 use clap::Parser;
-use clap::error::{ContextKind, ContextValue, ErrorKind};
+use clap::error::ErrorKind;
 use std::process::ExitCode;
-
-/// Old and new names of renamed options.
-const OLD_OPTIONS: [(&str, &str); 2] = [("--planes", "--layers"), ("--spend", "--background")];
 
 fn main() -> ExitCode {
     let arguments = match scenecast::commands::Arguments::try_parse() {
@@ -13,8 +10,7 @@ fn main() -> ExitCode {
         // Help, version, or the list of commands where none is given.
         Err(e) if !e.use_stderr() || e.kind() == ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand => e.exit(),
         Err(e) => {
-            let renamed = renamed(&e);
-            eprintln!("scenecast: {}", renamed.unwrap_or_else(|| one_line(&e.to_string())));
+            eprintln!("scenecast: {}", one_line(&e.to_string()));
             return ExitCode::from(2);
         }
     };
@@ -25,13 +21,6 @@ fn main() -> ExitCode {
             ExitCode::from(error.exit_code())
         }
     }
-}
-
-/// The error for an old option names the new one.
-fn renamed(error: &clap::Error) -> Option<String> {
-    let Some(ContextValue::String(given)) = error.get(ContextKind::InvalidArg) else { return None };
-    let (old, new) = OLD_OPTIONS.into_iter().find(|(old, _)| old == given)?;
-    Some(format!("the option {old} is now called {new}"))
 }
 
 /// The message and the tips of an error of clap, without its usage, on one line.

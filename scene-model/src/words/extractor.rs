@@ -28,7 +28,7 @@ pub struct Measures {
     context: ContextWords,
     spread: SpreadWords,
     texture: [Moments; 3],
-    /// Stored beside the measures, since files of earlier builds have none.
+    /// Not part of the serialised measures: files have it beside them.
     #[serde(skip)]
     discriminant: Option<Discriminant>,
 }

@@ -57,21 +57,9 @@ function flush() {
   }
 }
 
-/** Sends the entries that an earlier build kept in this browser alone to a surface that has none for these labels. */
-function share() {
-  if (book.isShared || !store.vehicle) return;
-  book.isShared = true;
-  remember(loadedKey, book);
-  const has = (part, id) => (book[part][id] ?? null) !== null;
-  const isMissing = (l) => [l.name, l.colour, l.merged_into].every((value) => value === null);
-  const parts = ["names", "colours", "merged"];
-  store.vehicle.labels.filter((l) => isMissing(l) && parts.some((part) => has(part, l.id))).forEach((l) => send(l.id));
-}
-
 /** Takes the entries of the surface over, which other consoles may have changed. */
 function take() {
   const b = current();
-  share();
   if (unsent.size + onTheWay.size > 0) return;
   let changed = false;
   const put = (part, id, value) => {

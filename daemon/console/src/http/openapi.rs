@@ -14,7 +14,7 @@ needs a `Host` of this machine and, if it has an `Origin`, that of the page; a P
 surface has a `console.token_file`, a request needs a token of it, in `Authorization: Bearer TOKEN` or as the cookie of \
 `/login`; `x-role` is the least role that may use an operation (viewer, operator, administrator). Orders other than hold \
 and abort also need command: see `change_command`. \
-Text is compressed for clients that accept gzip; maps and files carry an `ETag`. `/api/v1` answers 410.";
+Text is compressed for clients that accept gzip; maps and files carry an `ETag`.";
 
 pub(super) fn document() -> Vec<u8> {
     serde_json::to_vec_pretty(&describe()).unwrap_or_default()

@@ -1,15 +1,11 @@
 //! Listens, and joins the parts of the server.
 
 use super::access::{Access, HostNames};
-use super::response::error;
 use super::shared::{PendingRequest, Shared};
 use super::{assets, compress, connections, guard, openapi, operations};
 use crate::snapshot::Snapshot;
 use axum::Router;
 use axum::extract::DefaultBodyLimit;
-use axum::http::{StatusCode, Uri};
-use axum::response::Response;
-use axum::routing::any;
 use scenecast_config::TokenGrant;
 use scenecast_core::UserError;
 use std::sync::Arc;
@@ -87,17 +83,9 @@ fn router(shared: Shared) -> Router {
         )
     });
     routes
-        .route("/api/v1/{*rest}", any(version_1))
         .fallback(assets::page)
         .layer(axum::middleware::from_fn(compress::compress))
         .layer(DefaultBodyLimit::max(MAX_BODY_BYTES))
         .layer(axum::middleware::from_fn_with_state(shared.access.clone(), guard::guard))
         .with_state(shared)
-}
-
-/// The reply to a client of version 1, whose members and paths have other names.
-async fn version_1(uri: Uri) -> Response {
-    let path = uri.path().replacen("/api/v1/", "/api/v2/", 1);
-    let line = format!("version 1 of the API has ended: use {path}, described in /api/openapi.json");
-    error(StatusCode::GONE, &line)
 }

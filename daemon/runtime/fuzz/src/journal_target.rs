@@ -1,13 +1,14 @@
 //! The properties of the journal for any bytes: plain functions, run by libFuzzer and by the ordinary tests alike.
 
 use super::files::{Damaged, Files, Script};
-use super::journal::{BodyLayout, Found, Journal, JournalNames};
+use super::journal::{Found, Journal, JournalNames};
 
 const NAMES: JournalNames = JournalNames { journal: "state", copy: "state.copy" };
-const MAGICS: [&[u8; 8]; 3] = [b"scVJRN03", b"scVJRN02", b"scVJRN04"];
+/// The present version, an earlier one and a later one.
+const MAGICS: [&[u8; 8]; 3] = [b"scVJRN04", b"scVJRN02", b"scVJRN05"];
 static CRC: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISCSI);
 
-/// Writes a file from the script: a whole record of any layout and number, or any bytes.
+/// Writes a file from the script: a whole record of any version and number, or any bytes.
 fn forge(damaged: &Damaged<'_>, script: &mut Script<'_>) {
     let (what, number) = (script.u8(), script.u8());
     let mut record = MAGICS[usize::from(what % 3)].to_vec();
@@ -73,7 +74,7 @@ pub fn journal(data: &[u8]) {
     let (mut again, found) = Journal::open(files.clone(), NAMES);
     judge(&found, last.as_deref().filter(|_| !is_forged));
     again.persist(b"next").expect("a state fits");
-    let whole = Found::State { body: b"next".to_vec(), layout: BodyLayout::Present, damage: None };
+    let whole = Found::State { body: b"next".to_vec(), damage: None };
     assert_eq!(Journal::open(files, NAMES).1, whole);
 }
 

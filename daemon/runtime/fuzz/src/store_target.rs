@@ -14,7 +14,7 @@ use scenecast_surface::recorder::Recorder;
 use scenecast_surface::{Surface, assemble};
 
 /// Version of the layout of events.
-const LAYOUT: [u8; 2] = [0, 1];
+const LAYOUT: [u8; 2] = [0, 7];
 
 thread_local! {
     static CONFIG: Config = scenecast_config::load(None, &["link.discovery_period_s=60".to_owned()]).expect("defaults");

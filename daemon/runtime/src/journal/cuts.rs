@@ -2,7 +2,7 @@
 
 use super::disk::{Disk, DiskRefusal, DiskRng, DiskStep};
 use super::record::FILE_BYTES;
-use super::{BodyLayout, Found, Journal, JournalNames, Storage};
+use super::{Found, Journal, JournalNames, Storage};
 use proptest::prelude::*;
 
 pub(super) const NAMES: JournalNames = JournalNames { journal: "test.journal", copy: "test.journal.copy" };
@@ -11,7 +11,7 @@ pub(super) const NAMES: JournalNames = JournalNames { journal: "test.journal", c
 fn open(disk: &Disk) -> (Journal<Disk>, Option<Vec<u8>>) {
     match Journal::open(disk.clone(), NAMES) {
         (journal, Found::Absent) => (journal, None),
-        (journal, Found::State { body, layout: BodyLayout::Present, damage: None }) => (journal, Some(body)),
+        (journal, Found::State { body, damage: None }) => (journal, Some(body)),
         (_, other) => panic!("a power cut leaves a readable journal: {other:?}"),
     }
 }

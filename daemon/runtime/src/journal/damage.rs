@@ -2,8 +2,8 @@
 
 use super::cuts::{NAMES, state};
 use super::disk::Disk;
-use super::record::{FILE_BYTES, earlier};
-use super::{BodyLayout, Damage, Found, Journal, Storage};
+use super::record::FILE_BYTES;
+use super::{Damage, Found, Journal, Storage};
 use proptest::prelude::*;
 
 /// Disk, both files after five states, and the last state.
@@ -51,21 +51,6 @@ fn a_journal_truncated_at_any_byte_is_recognised_as_damaged() {
 }
 
 #[test]
-fn records_in_a_row_would_read_as_an_older_state_at_each_border() {
-    // The layout of earlier builds, which these tests must be able to reject.
-    let records: Vec<Vec<u8>> = (1..=37).map(|n| earlier::encode(n, &state(n as u32, 300))).collect();
-    for kept in 1..37 {
-        let disk = Disk::default();
-        disk.put(NAMES.journal, &records[..kept].concat());
-        let found = Journal::open(disk, NAMES).1;
-        assert!(!is_recognised(&found, &state(37, 300)), "{kept} records");
-        assert!(
-            matches!(found, Found::State { layout: BodyLayout::WithoutLostOrders, body, .. } if body == state(kept as u32, 300))
-        );
-    }
-}
-
-#[test]
 fn a_journal_shifted_by_any_distance_is_never_an_older_state() {
     let Written { disk, journal, copy, last } = written(300);
     let left = |bytes: &[u8], by: usize| [&bytes[by..], &vec![0; by]].concat();
@@ -80,7 +65,7 @@ fn a_journal_shifted_by_any_distance_is_never_an_older_state() {
                 disk.put(NAMES.journal, one);
                 disk.put(NAMES.copy, other);
                 // A stop while one file was written could leave the same, so it is no damage: no state is lost.
-                let whole = Found::State { body: last.clone(), layout: BodyLayout::Present, damage: None };
+                let whole = Found::State { body: last.clone(), damage: None };
                 assert_eq!(Journal::open(disk.clone(), NAMES).1, whole, "shifted by {by}");
             }
         }
@@ -99,7 +84,7 @@ fn an_old_file_in_the_place_of_the_last_is_recognised() {
         disk.put(NAMES.copy, other);
         let found = Journal::open(disk.clone(), NAMES).1;
         let damage = Some((damaged, Damage::Older));
-        assert_eq!(found, Found::State { body: last.clone(), layout: BodyLayout::Present, damage });
+        assert_eq!(found, Found::State { body: last.clone(), damage });
     }
     disk.put(NAMES.journal, &new_copy);
     disk.put(NAMES.copy, &new);
@@ -113,7 +98,7 @@ fn a_missing_file_is_damage_unless_both_are() {
         disk.remove(name);
         let damage = Some((name, Damage::Missing));
         let found = Journal::open(disk.clone(), NAMES).1;
-        assert_eq!(found, Found::State { body: last, layout: BodyLayout::Present, damage });
+        assert_eq!(found, Found::State { body: last, damage });
         disk.remove(other);
         assert_eq!(Journal::open(disk, NAMES).1, Found::Absent);
     }
@@ -126,21 +111,28 @@ fn a_damaged_file_is_put_aside_and_both_are_whole_again() {
         disk.put(name, cut);
         let mut run = Journal::open(disk.clone(), NAMES).0;
         run.persist(b"next").unwrap();
-        let whole = Found::State { body: b"next".to_vec(), layout: BodyLayout::Present, damage: None };
+        let whole = Found::State { body: b"next".to_vec(), damage: None };
         assert_eq!(Journal::open(disk.clone(), NAMES).1, whole);
         assert_eq!(disk.read(&format!("{name}.damaged")).unwrap().as_deref(), Some(cut));
     }
 }
 
 #[test]
-fn the_journal_of_an_earlier_build_is_continued() {
-    let disk = Disk::default();
-    disk.put(NAMES.journal, &(1..=4).flat_map(|n| earlier::encode(n, &state(n as u32, 50))).collect::<Vec<u8>>());
-    let (mut journal, found) = Journal::open(disk.clone(), NAMES);
-    assert_eq!(found, Found::State { body: state(4, 50), layout: BodyLayout::WithoutLostOrders, damage: None });
-    journal.persist(b"next").unwrap();
-    let whole = Found::State { body: b"next".to_vec(), layout: BodyLayout::Present, damage: None };
-    assert_eq!(Journal::open(disk, NAMES).1, whole);
+fn a_journal_of_another_version_is_lost_and_put_aside() {
+    let Written { disk, journal, copy, .. } = written(100);
+    let other = [journal, copy].map(|mut bytes| {
+        bytes[7] = b'3';
+        bytes
+    });
+    disk.put(NAMES.journal, &other[0]);
+    disk.put(NAMES.copy, &other[1]);
+    let (mut run, found) = Journal::open(disk.clone(), NAMES);
+    assert_eq!(found, Found::Lost(NAMES.journal, Damage::Version));
+    run.persist(b"next").unwrap();
+    assert_eq!(Journal::open(disk.clone(), NAMES).1, Found::State { body: b"next".to_vec(), damage: None });
+    for (name, bytes) in [NAMES.journal, NAMES.copy].into_iter().zip(&other) {
+        assert_eq!(disk.read(&format!("{name}.damaged")).unwrap().as_ref(), Some(bytes));
+    }
 }
 
 proptest! {

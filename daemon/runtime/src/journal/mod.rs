@@ -10,7 +10,7 @@ mod damage;
 #[cfg(test)]
 pub(super) mod disk;
 
-pub(super) use record::{BodyLayout, Damage};
+pub(super) use record::Damage;
 pub(crate) use storage::{Folder, Storage, write_whole};
 
 use record::{FILE_BYTES, Record, RecordContent};
@@ -50,8 +50,6 @@ pub(super) enum Found {
     State {
         /// The last confirmed state, or one that was being written since.
         body: Vec<u8>,
-        /// The layout in which it was written.
-        layout: BodyLayout,
         /// A file that is not as a run or a power cut leaves it; the state is that of the other file.
         damage: Option<(&'static str, Damage)>,
     },
@@ -145,7 +143,7 @@ impl<S: Storage> Journal<S> {
             self.is_journal_uncertain = false;
         }
         let sequence = self.last.as_ref().map_or(1, |last| last.sequence.wrapping_add(1));
-        let next = Record { sequence, layout: BodyLayout::Present, body: state.to_vec() };
+        let next = Record { sequence, body: state.to_vec() };
         self.write(1, &next)?;
         (self.is_journal_uncertain, self.last) = (true, Some(next.clone()));
         self.write(0, &next)?;
@@ -205,7 +203,7 @@ impl<S: Storage> Journal<S> {
 
 /// Judges the two files together. Of two states the one with the higher sequence number is the last one.
 fn find(names: JournalNames, [journal, copy]: [RecordContent; 2]) -> Found {
-    let state = |record: Record, damage| Found::State { body: record.body, layout: record.layout, damage };
+    let state = |record: Record, damage| Found::State { body: record.body, damage };
     match (journal, copy) {
         (RecordContent::Absent, RecordContent::Absent) => Found::Absent,
         (RecordContent::Sound(journal), RecordContent::Sound(copy)) if journal.sequence > copy.sequence => {
@@ -219,19 +217,14 @@ fn find(names: JournalNames, [journal, copy]: [RecordContent; 2]) -> Found {
             tracing::warn!("{}: one of two copies was cut short by a stop", names.journal);
             state(record, None)
         }
-        // A stop between the first record's two files, or between those of the first record after an update.
+        // A stop between the first record's two files.
         (RecordContent::Absent, RecordContent::Sound(record)) if record.sequence == 1 => state(record, None),
-        (RecordContent::Earlier(_), RecordContent::Sound(record)) => state(record, None),
-        (RecordContent::Earlier(record), RecordContent::Absent | RecordContent::Torn) => state(record, None),
         (RecordContent::Sound(record), RecordContent::Absent) => state(record, Some((names.copy, Damage::Missing))),
         (RecordContent::Absent, RecordContent::Sound(record)) => state(record, Some((names.journal, Damage::Missing))),
         (RecordContent::Sound(record), RecordContent::Damaged(damage)) => state(record, Some((names.copy, damage))),
         (RecordContent::Damaged(damage), RecordContent::Sound(record)) => state(record, Some((names.journal, damage))),
-        (RecordContent::Earlier(record), RecordContent::Damaged(damage)) => state(record, Some((names.copy, damage))),
-        // The copy is never of an earlier build.
-        (RecordContent::Sound(record), RecordContent::Earlier(_)) => state(record, Some((names.copy, Damage::Content))),
         (RecordContent::Damaged(damage), _) => Found::Lost(names.journal, damage),
         (RecordContent::Absent, _) => Found::Lost(names.journal, Damage::Missing),
-        (RecordContent::Torn | RecordContent::Earlier(_), _) => Found::Lost(names.journal, Damage::Content),
+        (RecordContent::Torn, _) => Found::Lost(names.journal, Damage::Content),
     }
 }

@@ -212,7 +212,7 @@ impl Storage for Folder {
 #[cfg(test)]
 mod tests {
     use super::super::record::FILE_BYTES;
-    use super::super::{BodyLayout, Found, Journal, JournalNames};
+    use super::super::{Found, Journal, JournalNames};
     use super::*;
 
     const NAMES: JournalNames = JournalNames { journal: "test.journal", copy: "test.journal.copy" };
@@ -228,7 +228,7 @@ mod tests {
     }
 
     fn state(body: &[u8]) -> Found {
-        Found::State { body: body.to_vec(), layout: BodyLayout::Present, damage: None }
+        Found::State { body: body.to_vec(), damage: None }
     }
 
     #[test]

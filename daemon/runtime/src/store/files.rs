@@ -43,7 +43,7 @@ fn event_time(now: Instant) -> EventTime {
 
 impl SurfaceFiles {
     /// Reads the files, and starts a clock that continues the mission time of the last run. The only errors are a folder that
-    /// another process holds and a store of a later build.
+    /// another process holds and a store of another layout.
     pub(crate) fn open(config: &Config) -> Result<(Self, Clock), UserError> {
         let dir = config.runtime.state_dir.clone();
         let folder = match Folder::hold(&dir) {
@@ -56,28 +56,7 @@ impl SurfaceFiles {
         let start = Instant::from_micros(last.mission_us) + Duration::from_millis(off_ms).mul_f64(scale);
         let now = std::time::Instant::now();
         let files = Self { dir, scale, store, tried: now, committed: now, pause: COMMIT_INTERVAL };
-        files.keep_pictures_of_earlier_builds();
         Ok((files, Clock::starting_at(start, scale)))
-    }
-
-    /// A build without a store left pictures of the maps as the only copies.
-    fn keep_pictures_of_earlier_builds(&self) {
-        if self.store.memory().began().is_some() {
-            return;
-        }
-        for number in 1..=14 {
-            for extension in ["png", "pgw"] {
-                let file = self.picture(number, extension);
-                let kept = self.dir.join(format!("operator-map-{number}-before.{extension}"));
-                if file.exists() && !kept.exists() && std::fs::rename(&file, &kept).is_ok() {
-                    tracing::info!("{}: kept as {}", file.display(), kept.display());
-                }
-            }
-        }
-    }
-
-    fn picture(&self, number: u8, extension: &str) -> PathBuf {
-        self.dir.join(format!("operator-map-{number}.{extension}"))
     }
 
     /// Whether an earlier run of the surface may have transmitted.

@@ -89,7 +89,7 @@ enum Command {
     #[cfg(feature = "tools")]
     /// Find the settings of the scene model whose maps agree best with annotations of a similar site.
     Tune(Box<tools::Tune>),
-    /// Print a configuration file with every key explained, or rewrite an old one.
+    /// Print a configuration file with every key explained.
     Config(config::ConfigCommand),
     #[cfg(feature = "tools")]
     /// Print the completions of commands and options for a shell.

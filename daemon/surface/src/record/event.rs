@@ -43,11 +43,11 @@ pub enum EventKind {
     Budget { ordered: StoredBudget, configured: StoredBudget },
     /// A fact about the vehicle with this address.
     Vehicle(u8, VehicleEvent),
-    /// An entry of the mission's log. Since layout 3.
+    /// An entry of the mission's log.
     Logged(StoredLogEntry),
-    /// The holder of command and the requests for it. Since layout 5.
+    /// The holder of command and the requests for it.
     Command(StoredCommand),
-    /// A change of command, for its history. Since layout 5.
+    /// A change of command, for its history.
     CommandChanged(StoredCommandChange),
 }
 
@@ -120,22 +120,22 @@ pub enum VehicleEvent {
     Note(StoredNote),
     /// The end of a run whose map is archived.
     Archived { ended_us: u64, cells: u64 },
-    /// A marker that was set. Since layout 2.
+    /// A marker that was set.
     Marker(StoredMarker),
-    /// The number of a marker that was removed. Since layout 2.
+    /// The number of a marker that was removed.
     MarkerGone(u32),
-    /// Areas and destination as they are shown. Since layout 3.
+    /// Areas and destination as they are shown.
     Places(StoredPlaces),
-    /// Labels that cells had before their present ones; the times are those of their replacement. Since layout 3.
+    /// Labels that cells had before their present ones; the times are those of their replacement.
     Former(StoredCells),
-    /// The weights that are set and not sent. Since layout 3.
+    /// The weights that are set and not sent.
     Draft(StoredDraft),
-    /// The contents that are or may be in force, slots as on the wire: of each slot the last known one first. Since layout 4.
+    /// The contents that are or may be in force, slots as on the wire: of each slot the last known one first.
     InForce(Vec<Vec<u8>>),
     /// The last report on the registration of frames as on the wire, with its time; the number of positions at which
-    /// frames closed a loop, and the newest ones: time, metres east and north. Since layout 6.
+    /// frames closed a loop, and the newest ones: time, metres east and north.
     Registration { report: Option<(u64, Vec<u8>)>, total: u64, closures: Vec<(u64, f64, f64)> },
-    /// The faults of the equipment in the last status, as on the wire. Since layout 7.
+    /// The faults of the equipment in the last status, as on the wire.
     Faults(u8),
 }
 

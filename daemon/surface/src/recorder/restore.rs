@@ -33,10 +33,8 @@ pub(super) fn restore(surface: &mut Surface, memory: &SurfaceMemory, configured:
         if !surface.link.restore_orders(address, series, orders, now) {
             continue;
         }
-        // Stores before layout 4 have only the contents that the page shows.
-        let shown = stored::learned(&vehicle.intent, &vehicle.places).filter(|_| vehicle.in_force.is_empty());
         let known = vehicle.in_force.iter().filter_map(|bytes| stored::slot(bytes));
-        surface.link.restore_in_force(address, known.chain(shown));
+        surface.link.restore_in_force(address, known);
         let record = surface.records.entry(address).or_insert_with(|| VehicleRecord::new(vehicle.name.clone()));
         restore_record(record, vehicle);
     }

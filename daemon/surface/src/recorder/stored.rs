@@ -125,15 +125,6 @@ pub(super) fn restore_places(stored: &StoredPlaces, record: &mut VehicleRecord) 
     record.destination.in_force = stored.destination_in_force.as_ref().and_then(|(v, bytes)| Some((*v, place(bytes)?)));
 }
 
-/// The contents in force of fence, limits, settings, areas and destination, which need not be those of this surface's orders.
-pub(super) fn learned<'a>(stored: &'a StoredIntent, places: &'a StoredPlaces) -> impl Iterator<Item = Slot> + 'a {
-    let settings = (!stored.settings_unsure).then_some(&stored.settings_in_force);
-    let orders =
-        [&stored.fence_in_force, &stored.limits_in_force, &places.areas_in_force, &places.destination_in_force];
-    let orders = orders.into_iter().filter_map(|order| order.as_ref().map(|(_, bytes)| bytes));
-    orders.chain(settings).filter_map(|bytes| slot(bytes))
-}
-
 /// Puts the orders back into the record, as far as this build reads them.
 pub(super) fn restore_intent(stored: &StoredIntent, record: &mut VehicleRecord) {
     let utility = |bytes: &[u8]| match slot(bytes) {

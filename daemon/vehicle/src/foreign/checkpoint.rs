@@ -10,20 +10,18 @@ use scenecast_protocol::map::{Cell, ClassEntry, LabelGrid, LayerDescriptor};
 use serde::{Deserialize, Serialize};
 
 const ENVELOPE: Envelope = Envelope { magic: *b"SCNLABEL", version: 2 };
-/// Earlier builds, whose bands had no source of their own, wrote one mark in the place of two.
-const ONE_MARK: Envelope = Envelope { version: 1, ..ENVELOPE };
 
 /// Cells as x, y and value.
 type Cells = Vec<(i32, i32, u8)>;
 
 #[derive(Serialize, Deserialize)]
-struct Content<M = [Option<String>; 2]> {
+struct Content {
     lineage: u64,
     epoch: u8,
     cell_m: f64,
     last_s: Option<f64>,
     /// The last names of the sources.
-    marks: M,
+    marks: [Option<String>; 2],
     votes: Votes,
     labels: Cells,
     erased: Cells,
@@ -54,21 +52,6 @@ fn unpack(cells: &Cells) -> LabelGrid {
     cells.iter().map(|&(x, y, value)| (Cell::new(x, y), value)).collect()
 }
 
-/// The content of bytes of either version.
-fn open(bytes: &[u8]) -> Result<Content, ForeignRestoreError> {
-    if let Err(EnvelopeError::Version { found: 1, .. }) = ENVELOPE.open(bytes) {
-        let content: Content<Option<String>> = parse(ONE_MARK.open(bytes)?)?;
-        let Content { lineage, epoch, cell_m, last_s, marks, votes, labels, erased, bands, classes } = content;
-        let marks = [marks, None];
-        return Ok(Content { lineage, epoch, cell_m, last_s, marks, votes, labels, erased, bands, classes });
-    }
-    parse(ENVELOPE.open(bytes)?)
-}
-
-fn parse<'a, T: Deserialize<'a>>(content: &'a [u8]) -> Result<T, ForeignRestoreError> {
-    postcard::from_bytes(content).map_err(|_| ForeignRestoreError::Inconsistent)
-}
-
 impl ForeignMap {
     pub(super) fn encode(&self, lineage: u64) -> Vec<u8> {
         let band = |map: &BandMap| (map.descriptor.to_bytes(), pack(map.levels.grid()), pack(&map.erased));
@@ -89,7 +72,8 @@ impl ForeignMap {
 
     /// Restores the bytes of [`crate::MapProducer::save`]; returns the map and the number of the mission that it belongs to.
     pub fn restore(config: &Config, bytes: &[u8]) -> Result<(Self, u64), ForeignRestoreError> {
-        let content = open(bytes)?;
+        let content: Content =
+            postcard::from_bytes(ENVELOPE.open(bytes)?).map_err(|_| ForeignRestoreError::Inconsistent)?;
         let mut map = Self::new(config, content.epoch);
         if content.cell_m != map.cell_m {
             return Err(ForeignRestoreError::OtherCells(content.cell_m));

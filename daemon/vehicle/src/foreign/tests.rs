@@ -162,13 +162,13 @@ fn a_restored_foreign_map_is_the_saved_one() {
     }
 }
 
-/// A checkpoint of version 1, in hexadecimal digits.
-const VERSION_1: &str = "53434e4c4142454c010000005e000000000000004d03000000000000e03f010000000000001c400106303030\
-    303137010400010404030400050002010202fe01020001011a6000fe08000005ffffe0a7fea26261636b7363\
-    617474657264420100000101020001010a08830102036b656c70ae4f63f9";
+/// A checkpoint, in hexadecimal digits.
+const CHECKPOINT: &str = "53434e4c4142454c020000005f000000000000004d03000000000000e03f010000000000001c400106303030\
+    30313700010400010404030400050002010202fe01020001011a6000fe08000005ffffe0a7fea26261636b73\
+    63617474657264420100000101020001010a08830102036b656c70c6243b64";
 
 #[test]
-fn a_checkpoint_of_version_1_is_restored() {
+fn the_bytes_of_a_checkpoint_are_those_of_its_version() {
     let mut same = map(&[]);
     same.handle_item(&grid(2, &[0, 253, 255, 9]), ForeignSource::Labels, None, 5.0).unwrap();
     same.handle_item(&grid(2, &[0, 253, 255, 255]), ForeignSource::Labels, None, 6.0).unwrap();
@@ -184,13 +184,16 @@ fn a_checkpoint_of_version_1_is_restored() {
     }
     same.classes.insert(10, ClassEntry::new(10, "kelp", Some([1, 2, 3])).unwrap());
     same.set_mark(ForeignSource::Labels, "000017");
-    let digits = |at: usize| u8::from_str_radix(&VERSION_1[at..at + 2], 16).unwrap();
-    let bytes: Vec<u8> = (0..VERSION_1.len()).step_by(2).map(digits).collect();
+    let digits = |at: usize| u8::from_str_radix(&CHECKPOINT[at..at + 2], 16).unwrap();
+    let mut bytes: Vec<u8> = (0..CHECKPOINT.len()).step_by(2).map(digits).collect();
     let config = config(&["scene.cell_m=0.5", "labels.source=dir:labels"]);
     assert_eq!(ForeignMap::restore(&config, &bytes).unwrap(), (same, 77));
     for cut in 0..bytes.len() {
         assert!(ForeignMap::restore(&config, &bytes[..cut]).is_err());
     }
+    bytes[8] = 1;
+    let other = ForeignMap::restore(&config, &bytes).unwrap_err();
+    assert_eq!(other.to_string(), "version 1, this program reads version 2");
 }
 
 #[test]
