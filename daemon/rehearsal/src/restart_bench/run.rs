@@ -25,6 +25,7 @@ struct Run<'a> {
     page: Page,
     rng: RandomStream,
     figures: &'a mut RestartRun,
+    page_limit_s: f64,
 }
 
 /// Does one run in `dir`. Broken promises are in the figures; the error is for a machine on which nothing can be run.
@@ -37,7 +38,7 @@ pub(super) fn run(
     let mut figures = RestartRun::default();
     let ends = Ends::new(&setting.program, dir, recording).map_err(failed("preparing a run"))?;
     let page = Page::new(ends.page())?;
-    let mut run = Run { ends, page, rng, figures: &mut figures };
+    let mut run = Run { ends, page, rng, figures: &mut figures, page_limit_s: setting.page_limit_s };
     run.start(End::Surface, Disk::Sound)?;
     run.start(End::Vehicle, Disk::Sound)?;
     if let Err(error) = run.mission() {
@@ -119,7 +120,7 @@ impl Run<'_> {
                 Some(None) => {
                     let page_s = began.elapsed().as_secs_f64();
                     self.figures.page_s.push(page_s);
-                    if page_s > self.setting.page_limit_s {
+                    if page_s > self.page_limit_s {
                         self.figures.faults.push(format!("the full page came after {page_s:.1} s; before: {gone}"));
                     }
                     return Ok(());
