@@ -11,6 +11,7 @@ use std::io::{Read, Write};
 use std::net::TcpStream;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
+use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::{Duration, Instant};
 
 /// The `scenecast` command that was built with this test or bench.
@@ -35,14 +36,22 @@ pub fn is_full() -> bool {
     std::env::var_os("SCENECAST_FULL").is_some()
 }
 
-/// The shared test material, if this machine has it; says in the output if not.
+/// The shared test material, if this machine has it; otherwise the test is skipped.
 pub fn shared_data() -> Option<PathBuf> {
     let dir = workspace().join("../shared/data");
-    if !dir.is_dir() {
-        println!("skipped: ../shared/data is not on this machine");
-        return None;
+    if dir.is_dir() {
+        return Some(dir);
     }
-    Some(dir)
+    skip(&format!("{} is not on this machine", dir.display()));
+    None
+}
+
+/// Says on the terminal that a test is skipped, which `.ci/run` takes for a failure.
+pub fn skip(why: &str) {
+    let line = format!("SKIPPED: {why}\n");
+    assert!(std::env::var_os("CI").is_none_or(|ci| ci != "true"), "{line}");
+    // The harness hides the captured output of a test that passes.
+    let _ = std::io::stderr().write_all(line.as_bytes());
 }
 
 /// Runs a command to its end.
@@ -147,6 +156,13 @@ pub fn wait_until(what: &str, limit: Duration, mut done: impl FnMut() -> bool) {
     }
 }
 
+/// A domain of DDS that no other test of this process has. Domains above 100 have ports that the system gives to clients.
+pub fn dds_domain() -> u8 {
+    static TAKEN: AtomicU32 = AtomicU32::new(0);
+    let number = std::process::id() * 31 + TAKEN.fetch_add(1, Ordering::Relaxed);
+    (1 + number % 99) as u8
+}
+
 /// A port of this machine that nobody listens on.
 pub fn free_port() -> u16 {
     let listener = std::net::TcpListener::bind("127.0.0.1:0").expect("a port is free");
@@ -179,22 +195,15 @@ fn exchange(port: u16, method: &str, path: &str, headers: &str, body: &str) -> O
     Some(answer)
 }
 
-/// A Python with the packages of `tests/python/requirements.txt`: that of `SCENECAST_PYTHON`, or else `python3`.
-///
-/// Without it a test says that it is skipped, which `.ci/run` takes for a failure.
-pub fn python() -> Option<String> {
+/// A Python that can import these modules of `tests/python/requirements.txt`: that of `SCENECAST_PYTHON`, or else `python3`. Without
+/// it the test is skipped.
+pub fn python(modules: &str) -> Option<String> {
     let python = std::env::var("SCENECAST_PYTHON").unwrap_or_else(|_| "python3".to_owned());
-    let packages = "import cyclonedds, jsonschema, openapi_spec_validator, PIL, plyfile, prometheus_client, rasterio, rosbags, shapely";
-    let output = Command::new(&python).args(["-c", packages]).output();
+    let output = Command::new(&python).args(["-c", &format!("import {modules}")]).output();
     if output.is_ok_and(|o| o.status.success()) {
         return Some(python);
     }
-    let said = format!(
-        "SKIPPED: {python} lacks a package of tests/python/requirements.txt (SCENECAST_PYTHON names another)\n"
-    );
-    assert!(std::env::var_os("CI").is_none_or(|ci| ci != "true"), "{said}");
-    // Straight to the terminal: the test's own output is not shown while it passes.
-    let _ = std::io::stderr().write_all(said.as_bytes());
+    skip(&format!("{python} cannot import {modules} (tests/python/requirements.txt; SCENECAST_PYTHON names another)"));
     None
 }
 
@@ -213,19 +222,16 @@ pub fn state(port: u16) -> Option<serde_json::Value> {
     (status == 200).then(|| serde_json::from_slice(&body).ok()).flatten()
 }
 
-/// Whether this machine cannot show the page in a browser; in CI that is a failure.
+/// Whether this machine cannot show the page in a browser; then the test is skipped.
 pub fn lacks_browser() -> bool {
     let chromium = std::env::var("CHROMIUM").unwrap_or_else(|_| "/usr/bin/chromium".to_owned());
     let packages = workspace().join("tests/browser/node_modules/playwright-core");
     let missing = match () {
-        () if !std::path::Path::new(&chromium).exists() => format!("no browser at {chromium}"),
+        () if !Path::new(&chromium).exists() => format!("no browser at {chromium}"),
         () if Command::new("node").arg("--version").output().is_err() => "no node".to_owned(),
         () if !packages.exists() => "no packages: run npm ci in tests/browser".to_owned(),
         () => return false,
     };
-    let line = format!("SKIPPED: the page in a browser: {missing}\n");
-    assert!(std::env::var_os("CI").is_none_or(|ci| ci != "true"), "{line}");
-    // The harness hides the captured output of a test that passes.
-    let _ = std::io::Write::write_all(&mut std::io::stderr(), line.as_bytes());
+    skip(&format!("the page in a browser: {missing}"));
     true
 }

@@ -110,7 +110,7 @@ fn orders_are_followed_until_applied_or_refused() {
         assert!(status.contains(word), "{word} is missing in {status}");
     }
     assert!(text(&ctl(port, &["labels"])).contains("-0.75"));
-    if let Some(python) = python() {
+    if let Some(python) = python("jsonschema, openapi_spec_validator, prometheus_client") {
         run_script(&python, "tests/api/check.py", &[&format!("http://127.0.0.1:{port}")]);
     }
 }
@@ -397,7 +397,7 @@ fn last_seen_reaches_the_surface_and_its_exports_if_requested() {
 
 /// Exports the map of an ended mission in all formats, and opens the files with other programs.
 fn assert_exports_open(name: &str, origin: &[&str]) {
-    let Some(python) = python() else { return };
+    let Some(python) = python("plyfile, rasterio, shapely") else { return };
     let (dir, port) = (scratch(name), free_port());
     let _demo = demo(port, &[&["--duration", "200"], origin].concat());
     let mut last = Value::Null;
@@ -439,6 +439,6 @@ fn exports_of_a_wide_survey_have_each_cell_in_its_place() {
     let out = dir.display().to_string();
     let made = run(&["bench", "wide", "--cells", "12000", "--out", &out, "--json"]);
     assert_eq!(made.status.code(), Some(0), "{}", text(&made));
-    let Some(python) = python() else { return };
+    let Some(python) = python("plyfile, rasterio, shapely") else { return };
     run_script(&python, "tests/exports/wide.py", &[&out, "60.17", "-10.25"]);
 }

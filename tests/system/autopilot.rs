@@ -4,29 +4,13 @@ use scenecast_core::LatLon;
 use scenecast_drivers::autopilot::mavlink::MavlinkConfig;
 use scenecast_drivers::autopilot::{Autopilot, Goal, Health, Mavlink, Step};
 use scenecast_protocol::time::Instant;
-use scenecast_tests::{Process, free_port, http, scratch, wait_until, workspace};
+use scenecast_tests::{Process, free_port, http, python, scratch, wait_until, workspace};
 use serde_json::Value;
 use std::io::{BufRead, BufReader, Write};
 use std::net::UdpSocket;
-use std::path::PathBuf;
 use std::process::{Child, ChildStdin, Command, Stdio};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
-
-/// A Python that has pymavlink: `SCENECAST_PYTHON`, or `python3`. Without one the test is skipped, loudly; where
-/// `CI` is true it fails.
-fn python() -> Option<PathBuf> {
-    let python = std::env::var_os("SCENECAST_PYTHON").map_or_else(|| PathBuf::from("python3"), PathBuf::from);
-    let imports = Command::new(&python).args(["-c", "import pymavlink"]).stderr(Stdio::null()).status();
-    if imports.is_ok_and(|s| s.success()) {
-        return Some(python);
-    }
-    let what = format!("{} has no pymavlink (pip install pymavlink; SCENECAST_PYTHON)", python.display());
-    assert!(std::env::var("CI").as_deref() != Ok("true"), "{what}, and CI is true");
-    // Past the capture of the test harness, which would keep it to itself.
-    let _ = writeln!(std::io::stderr(), "SKIPPED: {what}: nothing was tested against ArduSub");
-    None
-}
 
 /// The peer as a process.
 struct Peer {
@@ -36,7 +20,7 @@ struct Peer {
 }
 
 impl Peer {
-    fn start(python: &PathBuf, port: u16, speed_m_s: f64) -> Self {
+    fn start(python: &str, port: u16, speed_m_s: f64) -> Self {
         let script = workspace().join("tests/ardusub_peer.py");
         let mut child = Command::new(python)
             .arg(script)
@@ -147,7 +131,7 @@ impl Bench {
 
 #[test]
 fn ardusub_is_armed_guided_and_given_its_position() {
-    let Some(python) = python() else { return };
+    let Some(python) = python("pymavlink") else { return };
     let mut bench = Bench::new();
     let port = bench.socket.local_addr().unwrap().port();
     // The way is a sum of reported velocities; on a busy machine, a turn between two reports costs the more the faster it is.
@@ -179,7 +163,7 @@ fn ardusub_is_armed_guided_and_given_its_position() {
 
 #[test]
 fn ardusub_that_refuses_gets_lost_or_restarts_is_recovered() {
-    let Some(python) = python() else { return };
+    let Some(python) = python("pymavlink") else { return };
     let mut bench = Bench::new();
     let port = bench.socket.local_addr().unwrap().port();
     let mut peer = Peer::start(&python, port, 1.0);
@@ -231,7 +215,7 @@ fn ardusub_that_refuses_gets_lost_or_restarts_is_recovered() {
 
 #[test]
 fn a_vehicle_surveys_on_ardusub_and_reports_its_silence() {
-    let Some(python) = python() else { return };
+    let Some(python) = python("pymavlink") else { return };
     let dir = scratch("ardusub");
     let [modem, page, mavlink] = [(); 3].map(|()| free_port());
     let file = |name: &str, text: String| {

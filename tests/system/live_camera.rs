@@ -4,7 +4,8 @@ use image::RgbImage;
 use scenecast_files::{RecordedFrame, Recording};
 use scenecast_rehearsal::{Mission, MissionOptions, World};
 use scenecast_tests::{
-    Process, RELIEF_CAMERA, free_port, python, recorded, run_script, scratch, state, wait_until, write_relief,
+    Process, RELIEF_CAMERA, dds_domain, free_port, python, recorded, run_script, scratch, state, wait_until,
+    write_relief,
 };
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -173,13 +174,8 @@ fn images_of_a_command_give_the_map_of_the_recording() {
     dive.assert_map_of_the_rehearsal();
 }
 
-/// A domain of DDS for one test of this process. Domains below 100 have ports below those that the system gives to others.
-fn domain(offset: u32) -> u32 {
-    1 + (std::process::id() * 3 + offset) % 95
-}
-
-fn assert_topics_give_the_map(name: &str, domain: u32, (topic, poses): (&str, &str), publishers: &[&[&str]]) {
-    let Some(python) = python() else { return };
+fn assert_topics_give_the_map(name: &str, domain: u8, (topic, poses): (&str, &str), publishers: &[&[&str]]) {
+    let Some(python) = python("cyclonedds.domain, PIL") else { return };
     let dive = Dive::with_settings(name, &|_| {
         vec![
             format!("camera.source=ros2:{topic}"),
@@ -203,26 +199,26 @@ const TOPICS: (&str, &str) = ("/camera/image_raw", "ros2:/odometry");
 
 #[test]
 fn topics_of_cyclone_dds_give_the_map_of_the_recording() {
-    assert_topics_give_the_map("ros2", domain(0), TOPICS, &[&[]]);
+    assert_topics_give_the_map("ros2", dds_domain(), TOPICS, &[&[]]);
 }
 
 #[test]
 fn transforms_of_ros_give_the_map_of_the_recording() {
     let topics = ("/camera/image_raw", "tf:world#base_link");
-    assert_topics_give_the_map("ros2-transforms", domain(5), topics, &[&["--transforms"]]);
+    assert_topics_give_the_map("ros2-transforms", dds_domain(), topics, &[&["--transforms"]]);
 }
 
 #[test]
 fn wrong_images_and_a_restarted_publisher_leave_the_map_as_it_is() {
     let runs: [&[&str]; 2] = [&["--faulty", "--rows", ":15", "--rest", "0"], &["--faulty", "--rows", "15:"]];
-    assert_topics_give_the_map("ros2-faults", domain(2), TOPICS, &runs);
+    assert_topics_give_the_map("ros2-faults", dds_domain(), TOPICS, &runs);
 }
 
 #[test]
 fn compressed_topics_of_cyclone_dds_give_the_map_of_the_recording() {
     assert_topics_give_the_map(
         "ros2-compressed",
-        domain(1),
+        dds_domain(),
         ("/camera/image_raw/compressed", TOPICS.1),
         &[&["--compressed"]],
     );
@@ -233,8 +229,8 @@ const RELIEF: [&str; 3] = ["registration.enabled=false", "survey.altitude_m=4", 
 
 /// A vehicle that sees the relief by topics of Cyclone DDS, and the map that `sim` makes of the same sequence; `None` without
 /// Python.
-fn relief_by_dds(name: &str, domain: u32, depth: &str, options: &[&str]) -> Option<(Dive, Vec<u8>)> {
-    let python = python()?;
+fn relief_by_dds(name: &str, domain: u8, depth: &str, options: &[&str]) -> Option<(Dive, Vec<u8>)> {
+    let python = python("cyclonedds.domain, PIL")?;
     let folder = scratch(&format!("{name}-rgbd"));
     write_relief(&folder);
     let matrix = RELIEF_CAMERA.map(|number| number.to_string()).join(",");
@@ -259,7 +255,7 @@ fn relief_by_dds(name: &str, domain: u32, depth: &str, options: &[&str]) -> Opti
 
 #[test]
 fn depth_and_calibration_by_dds_give_the_map_of_the_rehearsal() {
-    let Some((mut dive, expected)) = relief_by_dds("ros2-depth", domain(3), "camera.depth=ros2:/camera/depth", &[])
+    let Some((mut dive, expected)) = relief_by_dds("ros2-depth", dds_domain(), "camera.depth=ros2:/camera/depth", &[])
     else {
         return;
     };
@@ -272,7 +268,7 @@ fn depth_and_calibration_by_dds_give_the_map_of_the_rehearsal() {
 fn images_without_a_cloud_are_counted_and_mapped_flat() {
     let options = ["--cloud", "--without", "3,7"];
     let Some((mut dive, expected)) =
-        relief_by_dds("ros2-cloud", domain(4), "camera.depth=cloud:/camera/points", &options)
+        relief_by_dds("ros2-cloud", dds_domain(), "camera.depth=cloud:/camera/points", &options)
     else {
         return;
     };
@@ -286,7 +282,7 @@ fn images_without_a_cloud_are_counted_and_mapped_flat() {
 
 /// A bag of the recording, which rosbags writes; `None` without Python.
 fn bag(name: &str, options: &[&str]) -> Option<String> {
-    let python = python()?;
+    let python = python("rosbags.rosbag2, PIL")?;
     let bag = scratch(name).join("bag").display().to_string();
     let folder = recorded().0.display().to_string();
     run_script(&python, "tests/python/write_bag.py", &[&[folder.as_str(), &bag], options].concat());

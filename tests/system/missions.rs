@@ -5,8 +5,9 @@ use scenecast_config::Config;
 use scenecast_protocol::map::LayerId;
 use scenecast_protocol::time::Instant;
 use scenecast_rehearsal::{Mission, MissionOptions, World, report};
-use scenecast_tests::is_full;
+use scenecast_tests::{is_full, scratch, shared_data};
 use serde_json::Value;
+use std::path::Path;
 use std::time::Duration;
 
 fn config(sets: &[&str]) -> Config {
@@ -175,18 +176,32 @@ fn registration_keeps_the_position_without_fixes() {
     assert!(registered < 0.4, "{registered} m without fixes");
 }
 
-#[test]
-fn a_real_reef_is_surveyed_into_more_than_one_label() {
-    let Some(data) = scenecast_tests::shared_data() else { return };
-    let image = data.join("eilatmixx/LFT_0109.jpg");
-    let world = World::from_files(&image, Some(&data.join("eilatmixx/LFT_0109_label.png")), 0.01).unwrap();
+/// Surveys an annotated mosaic that is read from files; the labels hold so much information on the classes.
+fn assert_annotated_files_are_surveyed(image: &Path, classes: &Path, at_least_nats: f64) {
+    let world = World::from_files(image, Some(classes), 0.01).unwrap();
     let mut mission =
         Mission::new(config(&["survey.duration_s=300"]), MissionOptions { world, seed: 1, record: None }).unwrap();
     mission.run(Duration::from_secs(7200), &mut |_| {}).unwrap();
     let figures = report(&mission, "test").json;
     assert_sound(&figures);
     assert!(figures["scene"]["labels"].as_u64() > Some(1));
-    assert!(figures["scene"]["mutual_information_nats"].as_f64() > Some(0.02), "{figures}");
+    assert!(figures["scene"]["mutual_information_nats"].as_f64() > Some(at_least_nats), "{figures}");
+}
+
+#[test]
+fn a_drawn_mosaic_in_files_is_surveyed_into_more_than_one_label() {
+    let (dir, drawn) = (scratch("drawn-mosaic"), scenecast_worlds::patches(3, 1200, 900, 180, 5));
+    let (image, classes) = (dir.join("reef.png"), dir.join("reef_label.png"));
+    drawn.image.save(&image).unwrap();
+    image::GrayImage::from_raw(1200, 900, drawn.truth).unwrap().save(&classes).unwrap();
+    assert_annotated_files_are_surveyed(&image, &classes, 0.2);
+}
+
+#[test]
+fn a_real_reef_is_surveyed_into_more_than_one_label() {
+    let Some(data) = shared_data() else { return };
+    let file = |name: &str| data.join("eilatmixx").join(name);
+    assert_annotated_files_are_surveyed(&file("LFT_0109.jpg"), &file("LFT_0109_label.png"), 0.02);
 }
 
 #[test]

@@ -1,6 +1,8 @@
 //! A surface that is killed and started again shows the same page.
 
-use scenecast_tests::{Process, free_port, http, is_full, lacks_browser, recorded, run, scratch, wait_until, workspace};
+use scenecast_tests::{
+    Process, free_port, http, is_full, lacks_browser, recorded, run, scratch, wait_until, workspace,
+};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::process::Command;

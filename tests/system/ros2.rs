@@ -3,27 +3,14 @@
 
 use scenecast_config::Ros2;
 use scenecast_ros2::{RosNode, topic};
-use scenecast_tests::{Process, free_port, http, is_full, recorded, scratch, state, wait_until, workspace};
+use scenecast_tests::{
+    Process, dds_domain, free_port, http, is_full, python, recorded, scratch, skip, state, wait_until, workspace,
+};
 use serde_json::Value;
-use std::io::Write;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::sync::OnceLock;
 use std::time::{Duration, Instant};
-
-/// A Python with Cyclone DDS; without one the test is skipped, which CI takes for a failure.
-fn python() -> Option<String> {
-    let python = std::env::var("SCENECAST_PYTHON").unwrap_or_else(|_| "python3".to_owned());
-    let output = Command::new(&python).args(["-c", "import cyclonedds.domain"]).output();
-    if output.is_ok_and(|output| output.status.success()) {
-        return Some(python);
-    }
-    let line = format!("SKIPPED: {python} has no cyclonedds (tests/python/requirements.txt; SCENECAST_PYTHON)\n");
-    assert!(std::env::var_os("CI").is_none_or(|ci| ci != "true"), "{line}");
-    // The harness hides the captured output of a test that passes.
-    let _ = std::io::stderr().write_all(line.as_bytes());
-    None
-}
 
 /// The peer of Fast DDS, compiled; without its library the test is skipped, which CI takes for a failure.
 fn fast_dds() -> Option<String> {
@@ -41,15 +28,8 @@ fn compile_fast_dds() -> Option<String> {
         Ok(output) => String::from_utf8_lossy(&output.stderr).into_owned(),
         Err(error) => error.to_string(),
     };
-    let line = format!("SKIPPED: no Fast DDS (Debian packages g++ and libfastrtps-dev): {error}\n");
-    assert!(std::env::var_os("CI").is_none_or(|ci| ci != "true"), "{line}");
-    let _ = std::io::stderr().write_all(line.as_bytes());
+    skip(&format!("no Fast DDS (Debian packages g++ and libfastrtps-dev): {error}"));
     None
-}
-
-/// A domain of this process and test: those of other tests on this machine differ. Above 100, ports of DDS may be taken by clients.
-fn domain(test: u32) -> u8 {
-    (10 + (std::process::id() * 8 + test) % 90) as u8
 }
 
 /// A program that speaks to the ends: a Python, a script, and the arguments before those of the command.
@@ -62,11 +42,15 @@ struct Speaker {
 
 impl Speaker {
     fn cyclone() -> Option<Self> {
-        Some(Self { python: python()?, script: "tests/ros2_peer.py", program: None })
+        Some(Self { python: python("cyclonedds.domain")?, script: "tests/ros2_peer.py", program: None })
     }
 
     fn fast_dds() -> Option<Self> {
-        Some(Self { python: python()?, script: "tests/fast_dds_peer.py", program: Some(fast_dds()?) })
+        Some(Self {
+            python: python("cyclonedds.domain")?,
+            script: "tests/fast_dds_peer.py",
+            program: Some(fast_dds()?),
+        })
     }
 }
 
@@ -151,7 +135,7 @@ fn explored(page: u16) -> u64 {
 #[test]
 fn late_subscribers_have_both_maps_within_two_seconds() {
     let (Some(cyclone), Some(fast)) = (Speaker::cyclone(), Speaker::fast_dds()) else { return };
-    let (dir, page, domain) = (scratch("ros2-map"), free_port(), domain(0));
+    let (dir, page, domain) = (scratch("ros2-map"), free_port(), dds_domain());
     let _ends = ends(&dir, page, domain);
     wait_until("the survey ends", Duration::from_secs(120), || {
         let found = state(page);
@@ -185,7 +169,7 @@ fn assert_late_maps(name: &str, speaker: &Speaker, page: u16, domain: &str) {
 #[test]
 fn every_topic_of_the_surface_reaches_cyclone() {
     let Some(cyclone) = Speaker::cyclone() else { return };
-    let (dir, page, domain) = (scratch("ros2-all"), free_port(), domain(1));
+    let (dir, page, domain) = (scratch("ros2-all"), free_port(), dds_domain());
     let _ends = ends(&dir, page, domain);
     let all = peer(&cyclone, &["all", &domain.to_string(), "/scenecast/auv_1", "120"]);
     println!("{all}");
@@ -222,12 +206,12 @@ fn ros_and_its_subscribers_leave_the_link_as_it_is() {
     let Some(cyclone) = Speaker::cyclone() else { return };
     let pairs = [("ros2-off", false), ("ros2-alone", true), ("ros2-read", true)];
     let pairs = pairs.map(|(name, is_in_ros)| (scratch(name), free_port(), is_in_ros));
-    let started: Vec<_> = (5..)
-        .zip(&pairs)
-        .map(|(test, (dir, page, is_in_ros))| (ends_with(dir, *page, domain(test), *is_in_ros), *page))
-        .collect();
-    let reader = start(&cyclone, &["all", &domain(7).to_string(), "/scenecast/auv_1", "120"]);
-    let bytes: Vec<u64> = started.iter().map(|(_, page)| bytes_of_the_survey(*page)).collect();
+    let domains = [dds_domain(), dds_domain(), dds_domain()];
+    let start_ends =
+        |((dir, page, is_in_ros), domain): (&(PathBuf, u16, bool), u8)| ends_with(dir, *page, domain, *is_in_ros);
+    let _ends: Vec<_> = pairs.iter().zip(domains).map(start_ends).collect();
+    let reader = start(&cyclone, &["all", &domains[2].to_string(), "/scenecast/auv_1", "120"]);
+    let bytes: Vec<u64> = pairs.iter().map(|(_, page, _)| bytes_of_the_survey(*page)).collect();
     assert!(result(reader)["points"].as_u64() > Some(0), "the subscriber has read the map");
     println!("bytes received without ROS 2, without a subscriber, with one: {bytes:?}");
     // The ends follow the clock, so that a busy machine shifts images from one frame to another.
@@ -239,7 +223,7 @@ fn ros_and_its_subscribers_leave_the_link_as_it_is() {
 #[test]
 fn an_order_of_cyclone_passes_the_surfaces_checks() {
     let Some(cyclone) = Speaker::cyclone() else { return };
-    let (dir, page, domain) = (scratch("ros2-orders"), free_port(), domain(2));
+    let (dir, page, domain) = (scratch("ros2-orders"), free_port(), dds_domain());
     let _ends = ends(&dir, page, domain);
     wait_until("the vehicle is met", Duration::from_secs(60), || explored(page) > 0);
     let domain = domain.to_string();
@@ -266,12 +250,12 @@ fn an_order_of_cyclone_passes_the_surfaces_checks() {
 
 #[test]
 fn images_of_cyclone_dds_arrive_whole_and_in_order() {
-    Speaker::cyclone().iter().for_each(|speaker| assert_images_arrive(speaker, domain(3)));
+    Speaker::cyclone().iter().for_each(|speaker| assert_images_arrive(speaker, dds_domain()));
 }
 
 #[test]
 fn images_of_fast_dds_arrive_whole_and_in_order() {
-    Speaker::fast_dds().iter().for_each(|speaker| assert_images_arrive(speaker, domain(4)));
+    Speaker::fast_dds().iter().for_each(|speaker| assert_images_arrive(speaker, dds_domain()));
 }
 
 fn assert_images_arrive(speaker: &Speaker, domain: u8) {

@@ -1,15 +1,10 @@
 //! Labels and bands of another program in ROS 2, which Cyclone DDS publishes: the operator has them.
 
-use scenecast_tests::{Process, free_port, http, python, scratch, wait_until, workspace};
+use scenecast_tests::{Process, dds_domain, free_port, http, python, scratch, wait_until, workspace};
 use serde_json::Value;
 use std::path::Path;
 use std::process::Command;
 use std::time::Duration;
-
-/// A domain of DDS for one test of this process. Domains below 100 have ports below those that the system gives to others.
-fn domain(test: u32) -> u32 {
-    5 + (std::process::id() * 3 + test) % 90
-}
 
 /// A surface with its page, and a vehicle with these settings.
 struct Ends {
@@ -18,7 +13,7 @@ struct Ends {
 }
 
 impl Ends {
-    fn start(dir: &Path, domain: u32, sets: &[String]) -> Self {
+    fn start(dir: &Path, domain: u8, sets: &[String]) -> Self {
         let (page, link) = (free_port(), free_port());
         let empty = dir.join("empty.toml");
         std::fs::write(&empty, "").unwrap();
@@ -73,8 +68,8 @@ fn publish(python: &str, arguments: &[&str]) -> Value {
 
 #[test]
 fn grids_and_layers_of_cyclone_dds_reach_the_operator() {
-    let Some(python) = python() else { return };
-    let (dir, domain) = (scratch("ros2-grids"), domain(0));
+    let Some(python) = python("cyclonedds.domain") else { return };
+    let (dir, domain) = (scratch("ros2-grids"), dds_domain());
     let names = dir.join("classes.json");
     std::fs::write(&names, r##"{"kind":"classes","classes":[{"class":77,"name":"kelp","colour":"#104020"}]}"##)
         .unwrap();
@@ -120,8 +115,8 @@ fn grids_and_layers_of_cyclone_dds_reach_the_operator() {
 
 #[test]
 fn a_segmented_image_of_ros_is_mapped_where_it_was_taken() {
-    let Some(python) = python() else { return };
-    let (dir, domain) = (scratch("ros2-segmentation"), domain(1));
+    let Some(python) = python("cyclonedds.domain") else { return };
+    let (dir, domain) = (scratch("ros2-segmentation"), dds_domain());
     let ends = Ends::start(
         &dir,
         domain,

@@ -31,7 +31,13 @@ impl RestartBench {
     pub(super) fn run(self) -> Result<(), UserError> {
         let program = std::env::current_exe().map_err(|e| UserError::Failed(e.to_string()))?;
         let dir = std::env::temp_dir().join(format!("scenecast-restart-{}", std::process::id()));
-        let setting = RestartSetting { program, dir: dir.clone(), runs: self.runs, seed: self.seed, page_limit_s: self.page_limit_s };
+        let setting = RestartSetting {
+            program,
+            dir: dir.clone(),
+            runs: self.runs,
+            seed: self.seed,
+            page_limit_s: self.page_limit_s,
+        };
         if !self.json {
             println!("run  cells applied  full page s  restarts");
         }
