@@ -5,7 +5,7 @@ use serde_json::Value;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
-const KEYS: [&str; 14] = [
+const KEYS: [&str; 17] = [
     "words",
     "cells",
     "resampled",
@@ -17,6 +17,9 @@ const KEYS: [&str; 14] = [
     "perplexity",
     "mutual_information_nats",
     "normalised_mutual_information",
+    "homogeneity",
+    "completeness",
+    "v_measure",
     "null_mutual_information_nats",
     "peak_rss_bytes",
     "kernel",

@@ -8,7 +8,7 @@ use scenecast_protocol::directive::SlotId;
 use scenecast_protocol::directive::SlotState;
 use scenecast_protocol::map::{LabelGrid, LayerSource};
 use scenecast_protocol::schedule::Class;
-use scenecast_scoring::mutual_information_nats;
+use scenecast_scoring::MutualInformation;
 use serde_json::{Value, json};
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -57,35 +57,36 @@ fn summary([median, p95, max]: [f64; 3]) -> Value {
 }
 
 impl Mission {
-    /// Mutual information of a map's labels with the annotations, `None` if there are none.
-    pub fn mutual_information(&self, map: &LabelGrid) -> Option<(f64, f64)> {
-        let cell_m = self.cell_m();
-        if !self.camera.world.is_annotated() {
-            return None;
-        }
-        let class = |cell| self.camera.world.class_of(cell, cell_m);
-        let pairs = map.iter().filter_map(|(cell, label)| Some((u32::from(label), u32::from(class(cell)?))));
-        let mi = mutual_information_nats(pairs);
-        Some((mi.nats, mi.normalised))
-    }
-
     pub fn operator_map(&self) -> LabelGrid {
         self.surface().map(self.address()).cloned().unwrap_or_default()
     }
 }
 
 fn scene(m: &Mission) -> Value {
-    let mi = m.mutual_information(m.vehicle().map());
-    let operator = m.mutual_information(&m.operator_map());
+    let vehicle = m.class_agreement(m.vehicle().map());
+    let of = |value: fn(&MutualInformation) -> f64| vehicle.as_ref().map(|agreement| round(value(agreement)));
+    let (seams, relabelled) = (m.seams(), relabelled(m));
     json!({
         "cells": if m.has_foreign_labels() { m.vehicle().map().explored() } else { m.mapper.cells() },
         "words": m.mapper.words(),
         "labels": m.logbook.update.as_ref().map_or(0, |u| u.labels),
         "perplexity": round(m.mapper.perplexity()),
-        "mutual_information_nats": mi.map(|v| round(v.0)),
-        "normalised_mutual_information": mi.map(|v| round(v.1)),
-        "operator_mutual_information_nats": operator.map(|v| round(v.0)),
+        "mutual_information_nats": of(|a| a.nats),
+        "normalised_mutual_information": of(|a| a.normalised),
+        "homogeneity": of(MutualInformation::homogeneity),
+        "completeness": of(MutualInformation::completeness),
+        "v_measure": of(MutualInformation::v_measure),
+        "equal_neighbours": { "within": seams.within.map(round), "across": seams.across.map(round) },
+        "relabelled": { "mean": relabelled.map(|r| round(r.0)), "max": relabelled.map(|r| round(r.1)) },
+        "operator_mutual_information_nats": m.class_agreement(&m.operator_map()).map(|a| round(a.nats)),
     })
+}
+
+/// Mean and maximum over the samples of the survey of the share of cells that changed their label within five minutes.
+fn relabelled(m: &Mission) -> Option<(f64, f64)> {
+    let shares: Vec<f64> = m.quality_series().iter().filter_map(|sample| sample.relabelled).collect();
+    let most = shares.iter().copied().reduce(f64::max)?;
+    Some((shares.iter().sum::<f64>() / shares.len() as f64, most))
 }
 
 /// The evidence by which frames were placed, and their errors where the truth is known.

@@ -26,6 +26,7 @@ mod label_grid;
 mod mutual_information;
 mod null;
 mod rigid_fit;
+mod seams;
 mod training;
 mod trial;
 
@@ -36,5 +37,6 @@ pub use label_grid::LabelGrid;
 pub use mutual_information::{MutualInformation, mutual_information_nats};
 pub use null::{SceneScore, score};
 pub use rigid_fit::{PointPair, RigidFit, rms_distance};
+pub use seams::{Seams, TimedCell};
 pub use training::train_vocabulary;
 pub use trial::{AnnotatedScene, MeanScore, Method, Trial, TrialError};

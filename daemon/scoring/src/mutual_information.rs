@@ -1,4 +1,5 @@
-//! Mutual information of two labellings of the same cells (Cover and Thomas, Elements of Information Theory).
+//! Mutual information of two labellings of the same cells (Cover and Thomas, Elements of Information Theory), and the V-measure
+//! (Rosenberg and Hirschberg, EMNLP-CoNLL 2007).
 
 use std::collections::BTreeMap;
 
@@ -9,6 +10,8 @@ pub struct MutualInformation {
     pub nats: f64,
     /// `nats` over the geometric mean of both entropies, 0 to 1; 0 if an entropy is 0.
     pub normalised: f64,
+    /// The entropies of the first and the second labelling, nats.
+    pub entropies: [f64; 2],
     /// The number of labelled pairs.
     pub n: u64,
 }
@@ -61,8 +64,48 @@ impl MutualInformation {
         let (own, other) = (entropy(left, n), entropy(right, n));
         let nats = (own + other - entropy(joint, n)).max(0.0);
         let scale = (own * other).sqrt();
-        Self { nats, normalised: if scale > 1e-12 { nats / scale } else { 0.0 }, n }
+        Self { nats, normalised: if scale > 1e-12 { nats / scale } else { 0.0 }, entropies: [own, other], n }
     }
+
+    /// How far no label of the first labelling mixes classes of the second, 0 to 1; 1 if there is one class.
+    #[must_use]
+    pub fn homogeneity(&self) -> f64 {
+        share(self.nats, self.entropies[1])
+    }
+
+    /// How far no class of the second labelling is split among labels of the first, 0 to 1; 1 if there is one label.
+    #[must_use]
+    pub fn completeness(&self) -> f64 {
+        share(self.nats, self.entropies[0])
+    }
+
+    /// The harmonic mean of homogeneity and completeness, 0 to 1. Mutual information alone does not punish a habitat with several
+    /// labels.
+    ///
+    /// ```
+    /// use scenecast_scoring::mutual_information_nats;
+    ///
+    /// // Two labels for each class: every label is pure, every class is split.
+    /// let score = mutual_information_nats((0..80).map(|cell| (cell % 8, cell % 4)));
+    /// assert!((score.homogeneity() - 1.0).abs() < 1e-9 && (score.completeness() - 2.0 / 3.0).abs() < 1e-9);
+    /// assert!((score.v_measure() - 0.8).abs() < 1e-9);
+    /// ```
+    #[must_use]
+    pub fn v_measure(&self) -> f64 {
+        let sum = self.homogeneity() + self.completeness();
+        if sum > 0.0 { 2.0 * self.homogeneity() * self.completeness() / sum } else { 0.0 }
+    }
+
+    /// `nats` over the arithmetic mean of both entropies, 0 to 1: how far two maps of the same cells are one under other names.
+    #[must_use]
+    pub fn agreement(&self) -> f64 {
+        share(2.0 * self.nats, self.entropies[0] + self.entropies[1])
+    }
+}
+
+/// A part of an entropy; the whole of one that is 0.
+fn share(nats: f64, entropy: f64) -> f64 {
+    if entropy > 1e-12 { nats / entropy } else { 1.0 }
 }
 
 fn entropy(counts: impl Iterator<Item = u64>, n: u64) -> f64 {
@@ -79,6 +122,16 @@ mod tests {
         assert!((score.nats - 8f64.ln()).abs() < 1e-9);
         assert!((score.normalised - 1.0).abs() < 1e-9);
         assert_eq!(score.n, 800);
+    }
+
+    #[test]
+    fn v_is_zero_for_chance_and_one_for_one_class_under_one_label() {
+        assert!(mutual_information_nats((0..1600).map(|i| (i % 4, i / 4 % 4))).v_measure() < 1e-9);
+        assert_eq!(mutual_information_nats((0..9).map(|_| (3, 5))).v_measure(), 1.0);
+        let one_label = mutual_information_nats((0..80).map(|i| (1, i % 4)));
+        assert_eq!((one_label.homogeneity(), one_label.completeness(), one_label.v_measure()), (0.0, 1.0, 0.0));
+        let split = mutual_information_nats((0..80).map(|i| (i % 8, i % 4)));
+        assert!((split.agreement() - 0.8).abs() < 1e-9);
     }
 
     #[test]

@@ -71,6 +71,8 @@ pub struct MeanScore {
     pub mutual_information_nats: f64,
     /// Mutual information over the geometric mean of both entropies, 0 to 1.
     pub normalised_mutual_information: f64,
+    /// The harmonic mean of homogeneity and completeness, 0 to 1.
+    pub v_measure: f64,
     /// The mean mutual information of the flipped and shifted maps, nats.
     pub null_mutual_information_nats: f64,
     /// Mutual information minus that of the null model, nats.
@@ -196,6 +198,7 @@ impl MeanScore {
     fn add(&mut self, score: &SceneScore, share: f64) {
         self.mutual_information_nats += share * score.mutual_information.nats;
         self.normalised_mutual_information += share * score.mutual_information.normalised;
+        self.v_measure += share * score.mutual_information.v_measure();
         self.null_mutual_information_nats += share * score.null_nats;
         self.excess_nats += share * score.excess_nats;
         self.labels_used += share * score.labels as f64;
@@ -216,6 +219,7 @@ impl MeanScore {
         Self {
             mutual_information_nats: median(|s| s.mutual_information_nats),
             normalised_mutual_information: median(|s| s.normalised_mutual_information),
+            v_measure: median(|s| s.v_measure),
             null_mutual_information_nats: median(|s| s.null_mutual_information_nats),
             excess_nats: median(|s| s.excess_nats),
             labels_used: median(|s| s.labels_used),

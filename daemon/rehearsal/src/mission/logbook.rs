@@ -42,6 +42,8 @@ pub(crate) struct Logbook {
     map_version: u64,
     /// Changes of the label of a cell that had one on the published map.
     pub(crate) flips: u64,
+    /// Mission time of the first map with the cell, seconds.
+    pub(crate) first_seen_s: BTreeMap<Cell, f64>,
     /// Bits on air of the frames that the surface received.
     pub(crate) received_bits: u64,
 }
@@ -72,18 +74,21 @@ impl Logbook {
             let png = scenecast_core::label_picture::encode(vehicle.map());
             self.png_full_bytes += png.map_or(0, |png| png.len() as u64);
         }
-        self.flips += self.update.as_ref().map_or(0, |last| flips(last, &update));
+        let before = self.update.take().map(|update| update.cells).unwrap_or_default();
+        self.note_cells(&before, &update);
         self.update = Some(update);
     }
-}
 
-/// The number of cells with different labels on two maps, both sorted by y and x.
-fn flips(before: &MapUpdate, after: &MapUpdate) -> u64 {
-    let place = |cell: &Cell| (cell.y, cell.x);
-    let mut before = before.cells.iter().peekable();
-    let is_flipped = |(cell, label): &&(Cell, u8)| {
-        while before.next_if(|(earlier, _)| place(earlier) < place(cell)).is_some() {}
-        before.next_if(|(earlier, _)| earlier == cell).is_some_and(|(_, earlier)| earlier != label)
-    };
-    after.cells.iter().filter(is_flipped).count() as u64
+    /// Compares the cells of two maps, both sorted by y and x.
+    fn note_cells(&mut self, before: &[(Cell, u8)], after: &MapUpdate) {
+        let place = |cell: &Cell| (cell.y, cell.x);
+        let mut before = before.iter().peekable();
+        for (cell, label) in &after.cells {
+            while before.next_if(|(earlier, _)| place(earlier) < place(cell)).is_some() {}
+            match before.next_if(|(earlier, _)| earlier == cell) {
+                Some((_, earlier)) => self.flips += u64::from(earlier != label),
+                None => _ = self.first_seen_s.entry(*cell).or_insert(after.t_s),
+            }
+        }
+    }
 }

@@ -1,11 +1,16 @@
 //! The quality of both maps of a mission over time.
 
 use super::{MapInformation, Mission};
+use scenecast_protocol::map::{Cell, LabelGrid};
 use scenecast_protocol::time::Instant;
+use scenecast_scoring::{MutualInformation, Seams, TimedCell, mutual_information_nats};
 use serde::Serialize;
+use std::collections::VecDeque;
 use std::time::Duration;
 
 const INTERVAL: Duration = Duration::from_secs(30);
+/// Samples between two maps whose labels are compared: five minutes.
+const COMPARED: usize = 10;
 
 /// The quality of both maps at one moment.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -19,6 +24,8 @@ pub struct MapQuality {
     pub agreement: f64,
     /// Seconds for which the operator's label has differed, mean over the vehicle's explored cells.
     pub age_s: f64,
+    /// Share of the cells published five minutes ago whose label differs now; `None` before.
+    pub relabelled: Option<f64>,
     /// Root mean square errors of the frames' places in cells, after the best turn and shift, and as the vehicle places
     /// them; `None` for a recording.
     pub error_rigid_cells: Option<f64>,
@@ -37,6 +44,8 @@ impl MapQuality {
 #[derive(Debug, Default)]
 pub(crate) struct QualitySeries {
     samples: Vec<MapQuality>,
+    /// The published maps of the last five minutes, the oldest first.
+    published: VecDeque<LabelGrid>,
     due: Option<Instant>,
 }
 
@@ -47,6 +56,15 @@ impl QualitySeries {
             self.due = Some(now + INTERVAL);
         }
         is_due
+    }
+
+    /// The share of the cells published five minutes ago whose label differs now.
+    fn relabelled(&self, now: &LabelGrid) -> Option<f64> {
+        let then = self.published.front().filter(|_| self.published.len() == COMPARED)?;
+        let (cells, changed) = then
+            .iter()
+            .fold((0, 0), |(cells, changed), (cell, label)| (cells + 1, changed + u64::from(now.get(cell) != label)));
+        (cells > 0).then(|| changed as f64 / cells as f64)
     }
 }
 
@@ -61,6 +79,7 @@ impl Mission {
             operator: self.operator_information(),
             agreement: self.meters.labels.agreement(),
             age_s: self.meters.labels.age_s(self.now()),
+            relabelled: self.meters.quality.relabelled(self.vehicle().map()),
             error_rigid_cells: errors.map(|e| cells(e.rigid_m)),
             error_placed_cells: errors.map(|e| cells(e.placed_m)),
         }
@@ -73,8 +92,32 @@ impl Mission {
 
     pub(super) fn sample_quality(&mut self) {
         if self.meters.quality.takes_sample(self.now()) {
-            let sample = self.quality();
-            self.meters.quality.samples.push(sample);
+            let (sample, published) = (self.quality(), self.vehicle().map().clone());
+            let series = &mut self.meters.quality;
+            series.samples.push(sample);
+            series.published.push_back(published);
+            if series.published.len() > COMPARED {
+                series.published.pop_front();
+            }
         }
+    }
+
+    /// The agreement of a map's labels with the true classes, cell by cell; `None` without annotation.
+    pub fn class_agreement(&self, map: &LabelGrid) -> Option<MutualInformation> {
+        let world = self.camera.world.is_annotated().then_some(&self.camera.world)?;
+        let class = |cell| world.class_of(cell, self.cell_m());
+        let pairs = map.iter().filter_map(|(cell, label)| Some((u32::from(label), u32::from(class(cell)?))));
+        Some(mutual_information_nats(pairs))
+    }
+
+    /// Whether cells of one class that were first seen far apart in time have one label on the vehicle's map.
+    pub fn seams(&self) -> Seams {
+        let cell_m = self.cell_m();
+        let timed = |(cell, label): (Cell, u8)| {
+            let class = u32::from(self.camera.world.class_of(cell, cell_m)?);
+            let first_seen_s = *self.logbook.first_seen_s.get(&cell)?;
+            Some(((cell.x, cell.y), TimedCell { label: label.into(), class, first_seen_s }))
+        };
+        Seams::of(&self.vehicle().map().iter().filter_map(timed).collect())
     }
 }

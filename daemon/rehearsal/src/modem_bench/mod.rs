@@ -144,11 +144,13 @@ mod tests {
     fn a_survey_through_slow_modems_ends_with_equal_maps() {
         let im = ["modem.kind=s2c", "modem.s2c_mode=im"];
         let rate_1 = ["modem.kind=micromodem", "modem.rate=1"];
-        let duration_s = if std::env::var_os("SCENECAST_FULL").is_some() { 1200.0 } else { 400.0 };
+        // In a short survey the first minutes, in which the map has yet to arrive, weigh more.
+        let is_full = std::env::var_os("SCENECAST_FULL").is_some();
+        let (duration_s, least) = if is_full { (1200.0, 0.9) } else { (400.0, 0.7) };
         for sets in [im, rate_1] {
             let row = survey(&sets.join(" "), &sets, 1, duration_s).unwrap();
             assert_eq!(row.agreement_final, 1.0, "{row:?}");
-            assert!(row.agreement_mean >= 0.9, "{row:?}");
+            assert!(row.agreement_mean >= least, "{row:?}");
         }
     }
 }

@@ -9,7 +9,7 @@ use std::fmt::Write;
 
 /// The columns of [`quality_csv`].
 const COLUMNS: &str = "t_s,vehicle_rigid_nats,vehicle_placed_nats,operator_rigid_nats,operator_placed_nats,agreement,\
-                       age_s,error_rigid_cells,error_placed_cells";
+                       age_s,error_rigid_cells,error_placed_cells,relabelled";
 
 /// A table of samples, comma separated, with one line a sample; a value that is not known is empty.
 pub fn quality_csv(samples: &[MapQuality]) -> String {
@@ -21,8 +21,13 @@ pub fn quality_csv(samples: &[MapQuality]) -> String {
         };
         let (vehicle, operator) = (both(s.vehicle), both(s.operator));
         let (rigid, placed) = (or_empty(s.error_rigid_cells), or_empty(s.error_placed_cells));
+        let relabelled = or_empty(s.relabelled);
         // Writing to a string cannot fail.
-        let _ = writeln!(text, "{:.0},{vehicle},{operator},{:.4},{:.2},{rigid},{placed}", s.t_s, s.agreement, s.age_s);
+        let _ = writeln!(
+            text,
+            "{:.0},{vehicle},{operator},{:.4},{:.2},{rigid},{placed},{relabelled}",
+            s.t_s, s.agreement, s.age_s
+        );
     }
     text
 }
@@ -61,6 +66,7 @@ mod tests {
             operator: map,
             agreement,
             age_s,
+            relabelled: None,
             error_rigid_cells: None,
             error_placed_cells: Some(1.0),
         }
@@ -70,7 +76,7 @@ mod tests {
     fn an_unknown_value_is_an_empty_field() {
         let text = quality_csv(&[sample(0.0, Some(0.5)), sample(30.0, None)]);
         let lines: Vec<&str> = text.lines().skip(1).collect();
-        assert_eq!(lines, ["0,0.5000,0.2500,0.5000,0.2500,0.5000,12.00,,1.0000", "30,,,,,0.5000,12.00,,1.0000"]);
+        assert_eq!(lines, ["0,0.5000,0.2500,0.5000,0.2500,0.5000,12.00,,1.0000,", "30,,,,,0.5000,12.00,,1.0000,"]);
     }
 
     #[test]

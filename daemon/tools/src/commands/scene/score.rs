@@ -161,7 +161,7 @@ fn print_json(report: &impl Serialize) -> Result<(), UserError> {
 impl ScoreReport {
     fn print(&self) {
         println!("K {}, {} sweeps, mean of {} seeds, nats", self.max_labels, self.sweeps, self.seeds);
-        println!("{:<20} {:<20} {:>6} {:>6} {:>6} {:>7}", "scene", "method", "MI", "NMI", "null", "excess");
+        println!("{:<20} {:<20} {:>6} {:>6} {:>6} {:>6} {:>7}", "scene", "method", "MI", "NMI", "V", "null", "excess");
         for scene in &self.scenes {
             print_methods(&scene.scene, &scene.methods);
         }
@@ -178,10 +178,11 @@ impl ScoreReport {
 fn print_methods(scene: &str, methods: &BTreeMap<&'static str, MeanScore>) {
     for (row, (method, score)) in methods.iter().enumerate() {
         println!(
-            "{:<20} {method:<20} {:>6.3} {:>6.3} {:>6.3} {:>7.3}",
+            "{:<20} {method:<20} {:>6.3} {:>6.3} {:>6.3} {:>6.3} {:>7.3}",
             if row == 0 { scene } else { "" },
             score.mutual_information_nats,
             score.normalised_mutual_information,
+            score.v_measure,
             score.null_mutual_information_nats,
             score.excess_nats
         );
