@@ -97,6 +97,8 @@ export default [
       await s.until("the message", () => s.posts.length > 0, { tick: 100 });
       assert.equal(s.posts.length, 1);
       assert.equal(s.posts[0].body.shares.map, was - 3);
+      // Until then the page sends them again beside the next change.
+      await s.until("the server's shares on the page", () => s.inPage(({ store }, map) => store.snapshot.link.shares.map === map, was - 3), { tick: 100 });
       await s.page.getByRole("slider", { name: "Budget, logarithmic" }).focus();
       await s.page.keyboard.press("ArrowLeft");
       await s.until("the budget", () => s.posts.length > 1, { tick: 100 });
