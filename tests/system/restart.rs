@@ -1,6 +1,8 @@
 //! A surface that is killed and started again shows the same page.
 
-use scenecast_tests::{Process, free_port, http, is_full, lacks_browser, recorded, run, scratch, wait_until, workspace};
+use scenecast_tests::{
+    Process, free_port, http, is_full, lacks_browser, recorded, run, scratch, wait_until, workspace,
+};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -209,13 +211,4 @@ fn a_removed_folder_stops_no_surface() {
     surface.kill();
     let _surface = pair.surface();
     wait_until("the note survives", LIMIT, || pair.auv()["notes"][0]["text"] == "written in memory");
-}
-
-#[test]
-fn restarts_of_either_end_lose_nothing_and_repeat_no_order() {
-    let (runs, page_limit_s) = if is_full() { ("20", "2") } else { ("3", "60") };
-    let output = run(&["bench", "restart", "--runs", runs, "--page-limit", page_limit_s]);
-    let figures = String::from_utf8_lossy(&output.stdout).into_owned();
-    assert!(output.status.success(), "{figures}{}", String::from_utf8_lossy(&output.stderr));
-    println!("{figures}");
 }

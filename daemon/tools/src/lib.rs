@@ -7,6 +7,8 @@ pub mod commands;
 mod figures;
 mod progress;
 mod scene;
+mod seed_arguments;
 
 pub use figures::print_figures;
 pub use progress::{Progress, ProgressForm};
+pub use seed_arguments::SeedArguments;
