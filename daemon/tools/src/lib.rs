@@ -8,7 +8,9 @@ mod figures;
 mod progress;
 mod scene;
 mod seed_arguments;
+mod zopfli;
 
 pub use figures::print_figures;
 pub use progress::{Progress, ProgressForm};
 pub use seed_arguments::SeedArguments;
+pub use zopfli::Zopfli;

@@ -7,6 +7,7 @@ use crate::exemplar::ExemplarBench;
 use crate::inference::InferenceBench;
 use crate::live::LiveBench;
 use crate::localisation::LocalisationBench;
+use crate::map_codec::MapCodecBench;
 use crate::raster::RasterBench;
 use crate::registration::RegistrationBench;
 use crate::restart::RestartBench;
@@ -41,6 +42,8 @@ enum Bench {
     Live(LiveBench),
     /// The vehicle's position over 3 km: dead reckoning, with the relay, with outliers.
     Localisation(LocalisationBench),
+    /// Map chunks of survey series, stills and a large map: bytes and CPU time, against the best PNG.
+    MapCodec(MapCodecBench),
     /// A grid of which a part changes every second, over a radio that loses frames, against whole grids.
     Raster(RasterBench),
     /// Registration of camera frames: errors of their places, share of the sea floor that the map shows.
@@ -67,6 +70,7 @@ impl Arguments {
             Bench::Inference(i) => i.run(),
             Bench::Live(l) => l.run(),
             Bench::Localisation(l) => l.run(),
+            Bench::MapCodec(m) => m.run(),
             Bench::Raster(r) => r.run(),
             Bench::Registration(r) => r.run(),
             Bench::Restart(r) => r.run(),

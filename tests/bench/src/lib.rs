@@ -9,6 +9,7 @@ mod exemplar;
 mod inference;
 mod live;
 mod localisation;
+mod map_codec;
 mod process;
 mod program;
 mod raster;

@@ -1,4 +1,4 @@
-//! Procedural label maps, the training of the `context` coder's prior on them, and the PNG compressor of the comparisons.
+//! Procedural label maps, and the training of the `context` coder's prior on them.
 //!
 //! Every map comes from a seed alone; none is of a real place. [`MapScene`] draws a map, [`Survey`] explores it step by
 //! step, [`lessons`] cuts changes out of both, and [`train_prior`] trains on the lessons.
@@ -8,11 +8,9 @@ mod prior;
 mod rng;
 mod scene;
 mod survey;
-mod zopfli;
 
 pub use lesson::{Lesson, lessons};
 pub use prior::{PRIOR_SCENES, train_prior};
 pub use rng::MapRng;
 pub use scene::{MapScene, sampler_noise};
 pub use survey::{Flips, Survey};
-pub use zopfli::Zopfli;

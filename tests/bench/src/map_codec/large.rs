@@ -8,7 +8,7 @@ use scenecast_training::{MapRng, MapScene, sampler_noise};
 const SIDE: usize = 2048;
 
 /// Prints the time to the first chunk of 256 bytes and the process's memory, with 1 % of the cells changed.
-pub(crate) fn measure() {
+pub(super) fn measure() {
     println!("{SIDE} x {SIDE} cells, 1 % changed");
     let mut rng = MapRng::new(5);
     let patch = MapScene::Colonies.draw(&mut rng, 256, 256, 8);

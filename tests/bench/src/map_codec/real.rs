@@ -5,10 +5,10 @@ use std::io::Cursor;
 use std::path::Path;
 
 /// The folder of the shared material.
-const DATA: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/data");
+const DATA: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/data");
 
 /// A map of the shared data, one cell in `step` in each direction; pixel value + `shift` is the label.
-pub(crate) fn map(name: &str, step: usize, shift: u8) -> Option<LabelRaster> {
+pub(super) fn map(name: &str, step: usize, shift: u8) -> Option<LabelRaster> {
     let path = Path::new(DATA).join(name);
     let Ok(file) = std::fs::read(&path) else {
         println!("SKIPPED: {} is absent", path.display());
@@ -30,14 +30,14 @@ fn grey(file: &[u8]) -> LabelRaster {
 }
 
 /// Square crops of `side` cells, side by side, that hold at least `least` different labels.
-pub(crate) fn crops(map: &LabelRaster, side: usize, least: usize) -> Vec<LabelRaster> {
+pub(super) fn crops(map: &LabelRaster, side: usize, least: usize) -> Vec<LabelRaster> {
     let corners = (0..map.height / side).flat_map(|row| (0..map.width / side).map(move |column| (column, row)));
     let crop = |(column, row): (usize, usize)| crop(map, column * side, row * side, side);
     corners.map(crop).filter(|crop| kinds(crop) >= least).collect()
 }
 
 /// The square of `side` cells with its first cell in `column` of `row`.
-pub(crate) fn crop(map: &LabelRaster, column: usize, row: usize, side: usize) -> LabelRaster {
+pub(super) fn crop(map: &LabelRaster, column: usize, row: usize, side: usize) -> LabelRaster {
     let labels = (0..side * side).map(|i| map.get(column + i % side, row + i / side)).collect();
     LabelRaster { width: side, height: side, labels }
 }
