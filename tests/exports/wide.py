@@ -2,7 +2,7 @@
 
     python wide.py DIR LATITUDE LONGITUDE
 
-DIR has map.csv, map.tif, map.utm.tif and map.wgs84.tif of `scenecast bench wide --out DIR`; the place is that of its origin.
+DIR has map.csv, map.tif, map.utm.tif and map.wgs84.tif of `scenecast-bench wide --out DIR`; the place is that of its origin.
 """
 
 import csv

@@ -101,17 +101,12 @@ impl Process {
         let _ = self.0.wait();
     }
 
-    /// Memory that it holds, bytes, and processor time that it has used; `None` where the system does not tell.
-    pub fn cost(&self) -> Option<(u64, Duration)> {
-        let file = |name| std::fs::read_to_string(format!("/proc/{}/{name}", self.0.id())).ok();
-        let status = file("status")?;
+    /// Memory that it holds, bytes; `None` where the system does not tell.
+    pub fn memory_bytes(&self) -> Option<u64> {
+        let status = std::fs::read_to_string(format!("/proc/{}/status", self.0.id())).ok()?;
         let resident = status.lines().find_map(|l| l.strip_prefix("VmRSS:"))?;
         let kilobytes: u64 = resident.trim().trim_end_matches("kB").trim().parse().ok()?;
-        let stat = file("stat")?;
-        let fields: Vec<&str> = stat.rsplit(')').next()?.split_whitespace().collect();
-        // Fields 14 and 15 of proc(5), in hundredths of a second.
-        let ticks: u64 = fields.get(11..13)?.iter().filter_map(|f| f.parse::<u64>().ok()).sum();
-        Some((kilobytes * 1024, Duration::from_millis(ticks * 10)))
+        Some(kilobytes * 1024)
     }
 
     /// Asks it to read its configuration again.

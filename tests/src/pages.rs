@@ -1,6 +1,7 @@
 //! The Markdown pages of the project, read as far as the tests of the documents need.
 
 use crate::workspace;
+use clap::error::ErrorKind;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
@@ -68,16 +69,37 @@ pub fn words(line: &str) -> Vec<String> {
     words.into_iter().take_while(|w| w != ">").collect()
 }
 
-/// The arguments of `scenecast` in a command line, if it is one.
-pub fn arguments(line: &str) -> Option<Vec<String>> {
+/// The arguments of `program` in a command line, if it is one; `cargo run` runs `scenecast` unless `-p` names another.
+pub fn arguments(program: &str, line: &str) -> Option<Vec<String>> {
     let words = words(line);
-    let cargo = ["cargo", "run"];
-    let behind = match words.first()?.as_str() {
-        "scenecast" => 1,
-        "cargo" if words.iter().zip(cargo).all(|(w, c)| w == c) => words.iter().position(|w| w == "--")? + 1,
-        _ => return None,
+    let (named, behind) = match words.first()?.as_str() {
+        "cargo" if words.get(1).is_some_and(|word| word == "run") => {
+            let dashes = words.iter().position(|w| w == "--")?;
+            let package = words.windows(2).find(|pair| pair[0] == "-p").map_or("scenecast", |pair| &pair[1]);
+            (package, dashes + 1)
+        }
+        first => (first, 1),
     };
-    Some(words[behind..].to_vec())
+    (named == program).then(|| words[behind..].to_vec())
+}
+
+/// The faults of the command lines of a program on all pages: one in a block must parse; one in prose may lack what it
+/// needs to run, but has no flag that does not exist.
+pub fn command_faults<P: clap::Parser>(program: &str) -> Vec<String> {
+    let error = |line: &str| {
+        let arguments = arguments(program, line)?;
+        P::try_parse_from(std::iter::once(program.to_owned()).chain(arguments)).err()
+    };
+    let wrong = [ErrorKind::UnknownArgument, ErrorKind::InvalidSubcommand];
+    let mut faults = Vec::new();
+    for page in pages() {
+        let of_blocks = page.command_lines().into_iter().map(|line| (error(&line), line));
+        let of_prose = page.code().into_iter().map(|span| (error(&span).filter(|e| wrong.contains(&e.kind())), span));
+        for (error, line) in of_blocks.chain(of_prose) {
+            faults.extend(error.map(|e| format!("{}: {line}\n{e}", page.path.display())));
+        }
+    }
+    faults
 }
 
 fn files_below(dir: &Path, found: &mut Vec<PathBuf>) {

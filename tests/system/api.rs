@@ -432,13 +432,3 @@ fn exports_with_an_origin_open_in_the_right_place() {
 fn exports_without_an_origin_open_in_metres() {
     assert_exports_open("exports-metres", &[]);
 }
-
-#[test]
-fn exports_of_a_wide_survey_have_each_cell_in_its_place() {
-    let dir = scratch("exports-wide");
-    let out = dir.display().to_string();
-    let made = run(&["bench", "wide", "--cells", "12000", "--out", &out, "--json"]);
-    assert_eq!(made.status.code(), Some(0), "{}", text(&made));
-    let Some(python) = python("plyfile, rasterio, shapely") else { return };
-    run_script(&python, "tests/exports/wide.py", &[&out, "60.17", "-10.25"]);
-}

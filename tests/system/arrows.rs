@@ -42,7 +42,8 @@ const SANS_IO: [&str; 16] = [
 ];
 
 /// Crates that no vehicle carries.
-const ASHORE: [&str; 9] = [
+const ASHORE: [&str; 11] = [
+    "scenecast-bench",
     "scenecast-console",
     "scenecast-modem-sim",
     "scenecast-motion",
@@ -50,6 +51,7 @@ const ASHORE: [&str; 9] = [
     "scenecast-scoring",
     "scenecast-tests",
     "scenecast-tools",
+    "scenecast-training",
     "scenecast-worlds",
     "sim-channel",
 ];

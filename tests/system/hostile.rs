@@ -39,7 +39,7 @@ impl Drop for End<'_> {
 /// quiet machine his answers come soon, and the mission runs at its pace.
 fn assert_unmoved(demo: &Process, port: u16, what: &str, attack: impl FnOnce()) {
     let before = state(port).unwrap();
-    let (held, _) = demo.cost().unwrap_or_default();
+    let held = demo.memory_bytes().unwrap_or_default();
     let began = Instant::now();
     let done = AtomicBool::new(false);
     std::thread::scope(|scope| {
@@ -64,7 +64,7 @@ fn assert_unmoved(demo: &Process, port: u16, what: &str, attack: impl FnOnce()) 
     assert!(!is_full() || passed > 0.7 * expected - 5.0, "{what}: {passed} s of mission instead of {expected}");
     let frames = |s: &serde_json::Value| s["link"]["up"]["frames"].as_u64().unwrap();
     assert!(frames(&after) > frames(&before), "{what}: no frame was heard meanwhile");
-    let (holds, _) = demo.cost().unwrap_or_default();
+    let holds = demo.memory_bytes().unwrap_or_default();
     assert!(holds < held + (64 << 20), "{what}: the surface grew from {held} to {holds} bytes");
 }
 

@@ -212,12 +212,3 @@ fn a_removed_folder_stops_no_surface() {
     let _surface = pair.surface();
     wait_until("the note survives", LIMIT, || pair.auv()["notes"][0]["text"] == "written in memory");
 }
-
-#[test]
-fn restarts_of_either_end_lose_nothing_and_repeat_no_order() {
-    let (runs, page_limit_s) = if is_full() { ("20", "2") } else { ("3", "60") };
-    let output = run(&["bench", "restart", "--runs", runs, "--page-limit", page_limit_s]);
-    let figures = String::from_utf8_lossy(&output.stdout).into_owned();
-    assert!(output.status.success(), "{figures}{}", String::from_utf8_lossy(&output.stderr));
-    println!("{figures}");
-}

@@ -7,19 +7,19 @@ use sim_channel::RandomStream;
 const COMPASS_SIGMA_DEG: f64 = 0.5;
 
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Receiver {
+pub struct Receiver {
     /// Origin of the world frame.
-    pub(super) origin: LatLon,
+    pub origin: LatLon,
     /// Standard deviation of the white noise, and of an error that changes over minutes, metres.
-    pub(super) sigma_m: f64,
+    pub sigma_m: f64,
     /// Reported quality: dilution of precision, and whether the receiver uses corrections.
-    pub(super) hdop: f64,
-    pub(super) is_corrected: bool,
+    pub hdop: f64,
+    pub is_corrected: bool,
 }
 
 /// Writes sentences, with random errors of its own.
 #[derive(Debug)]
-pub(super) struct Instruments {
+pub struct Instruments {
     receiver: Receiver,
     plane: TangentPlane,
     rng: RandomStream,
@@ -27,13 +27,13 @@ pub(super) struct Instruments {
 }
 
 impl Instruments {
-    pub(super) fn new(receiver: Receiver, seed: u64) -> Self {
+    pub fn new(receiver: Receiver, seed: u64) -> Self {
         let plane = TangentPlane::new(receiver.origin);
         Self { receiver, plane, rng: RandomStream::new(seed, &[9]), slow_error: (0.0, 0.0) }
     }
 
     /// Position and heading as NMEA 0183, once a second; `astray` is an additional error of the receiver, metres.
-    pub(super) fn report(&mut self, at: (f64, f64), heading_rad: f64, astray: (f64, f64), second: u32) -> String {
+    pub fn report(&mut self, at: (f64, f64), heading_rad: f64, astray: (f64, f64), second: u32) -> String {
         let [a, b, c, d, e] = [(); 5].map(|()| self.rng.normal());
         let Receiver { sigma_m, hdop, is_corrected, .. } = self.receiver;
         let slow = |error: f64, draw: f64| error * 0.99 + sigma_m * 0.14 * draw;

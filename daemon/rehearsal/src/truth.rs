@@ -47,7 +47,7 @@ fn cells_of(area: &Area, cell_m: f64) -> Rect {
 }
 
 /// The true classes of cells, shifted by one; a cell of unknown class is left out.
-pub(crate) fn true_classes(world: &World, bounds: Rect, cell_m: f64) -> LabelGrid {
+pub fn true_classes(world: &World, bounds: Rect, cell_m: f64) -> LabelGrid {
     let value = |cell: Cell| Some((cell, world.class_of(cell, cell_m)?.saturating_add(1).min(254)));
     bounds.cells().filter_map(value).collect()
 }

@@ -95,7 +95,7 @@ impl World {
     }
 
     /// The name of a class.
-    pub(crate) fn class_name(&self, class: u8) -> String {
+    pub fn class_name(&self, class: u8) -> String {
         let name = match &self.0 {
             Floor::Mosaic(_) => None,
             Floor::Reef(_) => Reef::class_names().get(usize::from(class)),

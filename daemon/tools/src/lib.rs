@@ -7,6 +7,10 @@ pub mod commands;
 mod figures;
 mod progress;
 mod scene;
+mod seed_arguments;
+mod zopfli;
 
 pub use figures::print_figures;
 pub use progress::{Progress, ProgressForm};
+pub use seed_arguments::SeedArguments;
+pub use zopfli::Zopfli;

@@ -10,11 +10,11 @@ use serde::Serialize;
 
 /// Root mean square errors of the places of all frames, metres.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct FrameErrors {
+pub struct FrameErrors {
     /// After the best turn and shift of the whole map.
-    pub(crate) rigid_m: f64,
+    pub rigid_m: f64,
     /// With the vehicle's own placement of the map in the world.
-    pub(crate) placed_m: f64,
+    pub placed_m: f64,
 }
 
 /// Mutual information of a map with the true classes over the survey's area, unexplored being a label of its own, nats.
@@ -28,7 +28,7 @@ pub struct MapInformation {
 
 impl Mission {
     /// The errors of the frames that were mapped; `None` where the truth is not known.
-    pub(crate) fn registration_error_m(&self) -> Option<FrameErrors> {
+    pub fn registration_error_m(&self) -> Option<FrameErrors> {
         let pairs: Vec<_> = self.logbook.poses.iter().map(|poses| (poses.mapped_at, poses.true_at)).collect();
         if self.camera.is_recorded() || pairs.is_empty() {
             return None;
@@ -43,7 +43,7 @@ impl Mission {
 
     /// The root mean square error of the frames' places when the whole graph is solved after the survey, after the best turn
     /// and shift, metres; `None` where the truth is not known, or where not all frames were registered.
-    pub(crate) fn solved_error_m(&self) -> Option<f64> {
+    pub fn solved_error_m(&self) -> Option<f64> {
         let solved = self.logbook.graph.solve();
         if self.camera.is_recorded() || solved.is_empty() || solved.len() != self.logbook.poses.len() {
             return None;
@@ -55,7 +55,7 @@ impl Mission {
 
     /// The mutual information of a map in the map frame with the true classes, placed as the vehicle places it; `None` if
     /// the classes are not known.
-    pub(crate) fn map_information(&self, map: &LabelGrid) -> Option<MapInformation> {
+    pub fn map_information(&self, map: &LabelGrid) -> Option<MapInformation> {
         let navigator = self.vehicle().navigator();
         self.information(map, |at| navigator.to_map(at))
     }

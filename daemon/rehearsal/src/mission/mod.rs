@@ -25,7 +25,7 @@ use crate::frames_log::FramesLog;
 use crate::modem_rig::SURFACE;
 use crate::script::Script;
 use crate::world::World;
-pub use accuracy::MapInformation;
+pub use accuracy::{FrameErrors, MapInformation};
 use anchored::Anchored;
 use camera::Camera;
 use carrier::Carrier;
@@ -141,6 +141,20 @@ impl Mission {
     /// The modem of both ends.
     pub fn modem(&self) -> &ModemProfile {
         self.vehicle.link().profile()
+    }
+
+    pub fn mapper(&self) -> &Mapper {
+        &self.mapper
+    }
+
+    /// The vehicle's true motion.
+    pub fn motion(&self) -> &Motion {
+        &self.motion
+    }
+
+    /// Changes of the label of a cell that had one on the vehicle's published map.
+    pub fn flips(&self) -> u64 {
+        self.logbook.flips
     }
 
     /// Bits on air of the frames that the surface received.

@@ -68,7 +68,7 @@ enum Command {
     /// Emulate modems in one channel, each on a serial device or a TCP port of its own.
     ModemSim(modem_sim::ModemSim),
     #[cfg(feature = "rehearsal")]
-    /// Measure the link, its resistance to strangers, the modems, planners, localisation and exemplars.
+    /// Measure the link, the modems, the planners and the map that the operator sees.
     #[command(subcommand)]
     Bench(bench::BenchCommand),
     /// Make or show a mission key, or make a token for the operator's page.

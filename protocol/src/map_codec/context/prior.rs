@@ -26,7 +26,7 @@ pub(super) struct Prior {
     pub(super) label: StagePrior,
 }
 
-/// Written by `scenecast map train-prior --seed 1 --out prior.bin`. It is part of the wire format:
+/// Written by `scenecast-bench train-prior --seed 1 --out prior.bin`. It is part of the wire format:
 /// another table makes another coder.
 const TABLE: &[u8] = include_bytes!("prior.bin");
 

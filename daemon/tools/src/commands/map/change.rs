@@ -1,9 +1,9 @@
 //! Sizes of the chunks of one change.
 
 use super::Coding;
+use crate::Zopfli;
 use scenecast_core::UserError;
 use scenecast_protocol::map_codec::{ChunkFile, ChunkFileError, LabelRaster};
-use scenecast_training::Zopfli;
 use serde::Serialize;
 
 /// Sizes of one change or of several.

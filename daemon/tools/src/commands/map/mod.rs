@@ -5,7 +5,6 @@ mod change;
 mod decode;
 mod encode;
 mod files;
-mod train;
 
 use clap::{Args, Subcommand};
 use scenecast_core::UserError;
@@ -20,8 +19,6 @@ pub enum Map {
     Decode(decode::Decode),
     /// Measure a folder of numbered maps, each encoded against the one before.
     Bench(bench::MapBench),
-    /// Train the table that the context coder starts from.
-    TrainPrior(train::TrainPrior),
 }
 
 impl Map {
@@ -30,7 +27,6 @@ impl Map {
             Self::Encode(encode) => encode.run(),
             Self::Decode(decode) => decode.run(),
             Self::Bench(bench) => bench.run(),
-            Self::TrainPrior(train) => train.run(),
         }
     }
 }
