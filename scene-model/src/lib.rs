@@ -81,6 +81,7 @@
 //! | [`project`] | from pixels to the world: a camera that looks down, or a pinhole camera with depth |
 //! | [`topics`] | the model: cells, the sampler, the label map, checkpoints |
 //! | [`online`] | inference under way: growth of the labels, memory of the topics of cells |
+//! | [`habitats`] | labels of cells by what they look like, whenever they were seen |
 //! | [`publish`] | labels that keep their meaning within an epoch, restarts included |
 //! | [`exemplars`] | the image patches that best show each topic |
 //! | [`vocabulary`], [`envelope`] | files: measures that were learnt before the mission; magic, version, length, CRC |
@@ -90,6 +91,7 @@
 
 pub mod envelope;
 pub mod exemplars;
+pub mod habitats;
 pub mod online;
 pub mod project;
 pub mod publish;

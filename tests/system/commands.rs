@@ -186,7 +186,7 @@ fn annotated_images_are_scored_and_wrong_ones_named() {
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let report: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
     assert_eq!(report["scenes"][0]["cells"], 20 * 15);
-    for method in ["scene_model", "kmeans_lab", "kmeans_pooled_words"] {
+    for method in ["habitats", "scene_model", "kmeans_lab", "kmeans_pooled_words"] {
         let excess = report["median"][method]["excess_nats"].as_f64().unwrap();
         // The classes themselves have 0.45 on so small a ground: 0.69 less what a shifted copy tells.
         assert!(excess > 0.3, "{method}: {excess} of 0.45");

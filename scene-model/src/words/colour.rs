@@ -24,10 +24,10 @@ impl ColourWords {
     /// Appends one word for each point of the field: the lattice point of its colour.
     pub(crate) fn extract(&mut self, field: &ColourField, learn: bool, first_id: u32, words: &mut Vec<Word>) {
         if learn {
-            Moments::learn(&mut self.lab, &field.lab);
+            Moments::learn(&mut self.lab, &field.colours);
         }
         let scales = self.lab.map(|moments| moments.scale());
-        words.extend(field.lab.iter().zip(field.places()).map(|(colour, (u, v))| {
+        words.extend(field.colours.iter().zip(field.places()).map(|(colour, (u, v))| {
             let mut id = 0;
             for (value, (mean, gain)) in colour.iter().zip(scales) {
                 id = id * LEVELS + level((value - mean) * gain, REACH, LEVELS);
@@ -39,7 +39,7 @@ impl ColourWords {
     /// Appends the positions about `spacing` pixels apart, and the z-scores of the field's colours there, to `kept`.
     pub(crate) fn scores(&self, field: &ColourField, spacing: f32, kept: &mut Vec<(f32, f32, [f32; 3])>) {
         let scales = self.lab.map(|moments| moments.scale());
-        let scored = |(u, v, index): (f32, f32, usize)| (u, v, standardised(&field.lab[index], &scales));
+        let scored = |(u, v, index): (f32, f32, usize)| (u, v, standardised(&field.colours[index], &scales));
         kept.extend(field.sample(spacing).into_iter().map(scored));
     }
 }

@@ -1,4 +1,4 @@
-//! The tone-stretched CIE Lab colours of a frame on a regular grid, and their means and deviations over windows.
+//! The colours of a frame on a regular grid, and their means and deviations over windows.
 
 use image::RgbImage;
 
@@ -13,18 +13,28 @@ pub(crate) struct ColourField {
     /// Width and height of the frame, pixels.
     size: [u32; 2],
     cell_px: f32,
-    pub(crate) lab: Vec<[f32; 3]>,
+    pub(crate) colours: Vec<[f32; 3]>,
 }
 
 impl ColourField {
-    /// The mean colours of boxes of `spacing` pixels; `cell_px` is the edge of a cell, pixels.
-    pub(crate) fn new(frame: &RgbImage, stretch: &Stretch, spacing: f32, cell_px: f32) -> Self {
+    /// The tone-stretched CIE Lab colours of boxes of `spacing` pixels; `cell_px` is the edge of a cell, pixels.
+    pub(crate) fn lab(frame: &RgbImage, stretch: &Stretch, spacing: f32, cell_px: f32) -> Self {
+        Self::new(frame, spacing, cell_px, |colour| lab(stretch.apply(colour)))
+    }
+
+    /// The mean colours of boxes of `spacing` pixels, with channels of 0 to 255, as `colour_of` converts them.
+    pub(crate) fn new(
+        frame: &RgbImage,
+        spacing: f32,
+        cell_px: f32,
+        colour_of: impl FnMut([f32; 3]) -> [f32; 3],
+    ) -> Self {
         Self {
             across: centres(frame.width(), spacing),
             down: centres(frame.height(), spacing),
             size: [frame.width(), frame.height()],
             cell_px,
-            lab: box_means(frame, spacing).into_iter().map(|colour| lab(stretch.apply(colour))).collect(),
+            colours: box_means(frame, spacing).into_iter().map(colour_of).collect(),
         }
     }
 
@@ -50,12 +60,12 @@ impl ColourField {
         sample
     }
 
-    /// The mean and the standard deviation of L, a and b in a window of about `cells` cells around each grid point.
+    /// The mean and the standard deviation of the channels in a window of about `cells` cells around each grid point.
     pub(crate) fn windows(&self, cells: f32) -> (Vec<[f32; 3]>, Vec<[f32; 3]>) {
         let step = self.size[0] as f32 / self.across.len() as f32;
         let radius = (0.5 * cells * self.cell_px / step).round() as usize;
-        let squares: Vec<[f32; 3]> = self.lab.iter().map(|colour| colour.map(|value| value * value)).collect();
-        let means = self.blur(&self.lab, radius);
+        let squares: Vec<[f32; 3]> = self.colours.iter().map(|colour| colour.map(|value| value * value)).collect();
+        let means = self.blur(&self.colours, radius);
         let squares = self.blur(&squares, radius);
         let deviation = |mean: &[f32; 3], square: &[f32; 3]| {
             std::array::from_fn(|i| (square[i] - mean[i] * mean[i]).max(0.0).sqrt())
@@ -159,9 +169,9 @@ mod tests {
     #[test]
     fn windows_have_the_mean_and_deviation_of_their_points() {
         let frame = RgbImage::from_fn(60, 40, |x, _| image::Rgb([if x % 2 == 0 { 20 } else { 220 }; 3]));
-        let field = ColourField::new(&frame, &Stretch::default(), 1.0, 5.0);
+        let field = ColourField::lab(&frame, &Stretch::default(), 1.0, 5.0);
         let (means, spreads) = field.windows(2.0);
-        let (dark, bright) = (field.lab[0][0], field.lab[1][0]);
+        let (dark, bright) = (field.colours[0][0], field.colours[1][0]);
         let middle = 20 * 60 + 30;
         assert!((means[middle][0] - (6.0 * bright + 5.0 * dark) / 11.0).abs() < 6.0);
         assert!((spreads[middle][0] - 0.5 * (bright - dark)).abs() < 1.0);

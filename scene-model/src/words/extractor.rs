@@ -232,7 +232,7 @@ impl WordExtractor {
             return;
         }
         let field =
-            ColourField::new(frame, &self.stretch, spacing(cell_px, if colour > 0 { colour } else { 36 }), cell_px);
+            ColourField::lab(frame, &self.stretch, spacing(cell_px, if colour > 0 { colour } else { 36 }), cell_px);
         if colour > 0 {
             self.colour.extract(&field, learn, first_id(0), words);
         }

@@ -21,6 +21,7 @@ mod texture;
 mod word;
 
 pub(crate) use colour::LEVELS as COLOUR_LEVELS;
+pub(crate) use colour_field::ColourField;
 pub use colour_field::lab as cie_lab;
 pub use config::WordConfig;
 pub use discriminant::{
@@ -28,4 +29,6 @@ pub use discriminant::{
 };
 pub use extractor::{Measures, WordExtractor};
 pub use flat_field::FlatField;
+pub(crate) use grey_plane::GreyPlane;
+pub(crate) use texture::GaborBank;
 pub use word::Word;

@@ -19,16 +19,45 @@ const CUTS: [f32; 5] = [-0.967, -0.431, 0.0, 0.431, 0.967];
 /// The number of texture words: 6 levels at each of 3 scales.
 pub(crate) const SIZE: u32 = 216;
 
+/// Even and odd Gabor filters of six orientations.
+#[derive(Clone, Debug)]
+pub(crate) struct GaborBank(Vec<[[f32; FILTERS]; SIDE]>);
+
+impl GaborBank {
+    pub(crate) fn new() -> Self {
+        Self(bank())
+    }
+
+    /// The sum of the squared responses of all filters at a position of a plane, and the mean grey value around it.
+    pub(crate) fn power(&self, plane: &GreyPlane, x: f32, y: f32) -> (f32, f32) {
+        let patch = plane.patch::<SIDE>(x, y);
+        let sum: f32 = patch.as_flattened().iter().sum();
+        (self.power_of(&patch), sum / (SIDE * SIDE) as f32)
+    }
+
+    fn power_of(&self, patch: &[[f32; SIDE]; SIDE]) -> f32 {
+        let mut response = [0.0f32; FILTERS];
+        for (line, filters) in patch.iter().zip(&self.0) {
+            for (&pixel, taps) in line.iter().zip(filters) {
+                for (sum, tap) in response.iter_mut().zip(taps) {
+                    *sum += pixel * tap;
+                }
+            }
+        }
+        response.iter().map(|value| value * value).sum()
+    }
+}
+
 /// The filter bank, and the moments of the log energy at each scale.
 #[derive(Clone, Debug)]
 pub(crate) struct TextureWords {
-    bank: Vec<[[f32; FILTERS]; SIDE]>,
+    bank: GaborBank,
     energy: [Moments; SCALES],
 }
 
 impl Default for TextureWords {
     fn default() -> Self {
-        Self { bank: bank(), energy: [Moments::default(); SCALES] }
+        Self { bank: GaborBank::new(), energy: [Moments::default(); SCALES] }
     }
 }
 
@@ -82,16 +111,7 @@ impl TextureWords {
     }
 
     fn energy(&self, patch: &[[f32; SIDE]; SIDE]) -> f32 {
-        let mut response = [0.0f32; FILTERS];
-        for (line, filters) in patch.iter().zip(&self.bank) {
-            for (&pixel, taps) in line.iter().zip(filters) {
-                for (sum, tap) in response.iter_mut().zip(taps) {
-                    *sum += pixel * tap;
-                }
-            }
-        }
-        let power: f32 = response.iter().map(|value| value * value).sum();
-        (power + 1e-5).ln()
+        (self.bank.power_of(patch) + 1e-5).ln()
     }
 }
 

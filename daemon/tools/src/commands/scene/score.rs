@@ -11,7 +11,7 @@ use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-/// Score the scene model and two baselines on annotated images of the sea floor.
+/// Score the topics and the habitats of the scene model, and two baselines, on annotated images of the sea floor.
 ///
 /// Each NAME_label.png (grey or indexed, pixel value = class) belongs to the image NAME.jpg, .png or .tif of the same
 /// size. The spatial null value is the mean mutual information of a method's map after 3 flips and 12 torus shifts:

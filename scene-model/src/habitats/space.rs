@@ -1,0 +1,64 @@
+//! The space in which cells are compared: measures in units of the differences between neighbouring cells.
+//!
+//! Neighbouring cells mostly show one habitat, so their differences are noise, and a measure counts for little where it differs much
+//! between them: a discriminant without classes, as in maximum autocorrelation factors (Switzer and Green 1984).
+
+use super::cells::CellMap;
+use super::measures::{MEASURES, MeasuredValues};
+use super::smooth::Coordinates;
+use nalgebra::{SMatrix, SVector};
+
+type Covariance = SMatrix<f64, MEASURES, MEASURES>;
+
+/// Differences that count as none even where neighbours do not differ at all, in the unit of each measure: of brightness, of the colour
+/// ratios, of the deviations and of the energies.
+const TOLERANCE: MeasuredValues = [0.12, 0.04, 0.03, 0.15, 0.15, 0.15, 0.35, 0.35, 0.35, 0.35, 0.35, 0.35, 0.35];
+
+/// The coordinates of all cells, in which the differences of neighbours have the covariance of a unit sphere.
+pub(crate) fn whitened(map: &CellMap, values: &[MeasuredValues]) -> Coordinates {
+    let mut noise = Covariance::from_diagonal(&SVector::from(TOLERANCE.map(|t| t * t)));
+    let (mut sums, mut pairs) = (Covariance::zeros(), 0);
+    for (a, b) in map.pairs() {
+        let difference = SVector::from(values[a]) - SVector::from(values[b]);
+        sums += difference * difference.transpose();
+        pairs += 1;
+    }
+    // The variance of a difference is that of both cells.
+    noise += sums / f64::from(2 * pairs.max(1));
+    let mean =
+        values.iter().map(|value| SVector::from(*value)).sum::<SVector<f64, MEASURES>>() / values.len().max(1) as f64;
+    let mut whitened = Vec::with_capacity(values.len() * MEASURES);
+    if let Some(root) = noise.cholesky() {
+        for value in values {
+            let mut place = SVector::from(*value) - mean;
+            root.l_dirty().solve_lower_triangular_mut(&mut place);
+            whitened.extend(place.iter().map(|&coordinate| coordinate as f32));
+        }
+    }
+    Coordinates { axes: MEASURES, values: whitened }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::smooth::squared_distance;
+    use super::*;
+
+    #[test]
+    fn habitats_are_far_apart_and_noise_is_not() {
+        let places: Vec<(i32, i32)> = (0..400).map(|i| (i / 20, i % 20)).collect();
+        let map = CellMap::new(&places);
+        let noise = |i: usize, key: u64| (crate::random::mix(i as u64 | key << 32) % 1000) as f64 / 1000.0 - 0.5;
+        let values: Vec<MeasuredValues> = (0..400)
+            .map(|i| {
+                let mut values = [0.0; MEASURES];
+                values[2] = f64::from(u8::from(i % 20 >= 10)) + 0.2 * noise(i, 1);
+                values[5] = 10.0 * noise(i, 2);
+                values
+            })
+            .collect();
+        let found = whitened(&map, &values);
+        let apart = |a, b| squared_distance(found.of(a), found.of(b));
+        assert!(apart(42, 55) > 2.0 * apart(42, 43), "{} {}", apart(42, 55), apart(42, 43));
+        assert!(whitened(&CellMap::new(&[]), &[]).values.is_empty());
+    }
+}
