@@ -192,8 +192,8 @@ impl<'a> AnnotatedScene<'a> {
     fn habitats(&self) -> LabelGrid {
         let mut habitats = Habitats::new(self.trial.labels);
         let points = measure(self.image, self.cell_px);
-        habitats.add(0.0, &points, &self.projected(&Habitats::as_words(&points)), 1.0);
-        habitats.learn();
+        habitats.add(self.image.dimensions(), &points, &self.projected(&Habitats::as_words(&points)), 1.0);
+        habitats.learn_whole();
         let (columns, rows) = self.annotations.size();
         let mut grid = LabelGrid::empty(columns, rows);
         for (index, label) in grid.labels.iter_mut().enumerate() {

@@ -1,19 +1,32 @@
-//! Clusters of cells that look alike: k-means (Lloyd 1982) that grows by splits, from a start that is drawn by no random number.
+//! Clusters of cells that look alike, found without random numbers: splits across the main direction, then k-means (Lloyd 1982).
 
 use super::smooth::{Coordinates, squared_distance};
 use nalgebra::{DMatrix, SymmetricEigen};
 
-/// A cluster is split only if its variance along its main direction exceeds this, in units of the noise between neighbours.
-const MIN_VARIANCE: f64 = 1.5;
-/// Least squared distance of the centres of two halves.
-const MIN_GAP: f32 = 5.0;
-/// Fewest cells of a half: this many, and this share of all.
-const MIN_CELLS: usize = 24;
-const MIN_SHARE: f64 = 0.01;
-/// Passes over the cells: within a split, after it, and at the end.
-const PASSES: [usize; 3] = [10, 5, 20];
+/// Passes of k-means over all cells: at the end, after a merge or a birth, and within a split.
+const PASSES: [usize; 3] = [30, 4, 10];
 /// Bound of the search for eigenvectors, which needs about three rotations an axis.
 const MAX_ROTATIONS: usize = 1000;
+
+/// When a cluster is split, and when two become one. Lengths are in units of the noise between neighbours.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Rule {
+    /// Most clusters.
+    pub(crate) most: usize,
+    /// Least variance of a cluster in its main direction.
+    pub(crate) variance: f64,
+    /// Fewest cells of either half: a number, and a share of all.
+    pub(crate) cells: usize,
+    pub(crate) share: f64,
+    /// Least squared distance of two centres.
+    pub(crate) gap: f32,
+}
+
+impl Rule {
+    fn fewest(&self, cells: &Coordinates) -> usize {
+        self.cells.max((self.share * cells.len() as f64).ceil() as usize)
+    }
+}
 
 /// Centres of the clusters, and the cluster of each cell.
 #[derive(Clone, Debug, PartialEq)]
@@ -23,23 +36,45 @@ pub(crate) struct Clusters {
 }
 
 impl Clusters {
-    /// As many clusters as the cells call for, at most `most`.
-    pub(crate) fn grow(cells: &Coordinates, most: usize) -> Self {
-        let all: Vec<usize> = (0..cells.len()).collect();
-        let mut found = Self { centres: vec![mean(cells, &all)], of_cells: vec![0; cells.len()] };
-        while found.centres.len() < most {
-            let Some(centres) = found.with_a_split(cells) else { break };
+    /// The clusters of a map that nothing is known of.
+    pub(crate) fn grow(cells: &Coordinates, rule: &Rule) -> Self {
+        let fewest = rule.fewest(cells);
+        let mut parts = vec![Part::new(cells, (0..cells.len()).collect())];
+        while parts.len() < rule.most {
+            let can = |part: &Part| part.is_open && part.variance > rule.variance && part.cells.len() >= 2 * fewest;
+            let open = (0..parts.len()).filter(|&part| can(&parts[part]));
+            let Some(widest) = open.min_by(|&a, &b| parts[b].scatter().total_cmp(&parts[a].scatter())) else { break };
+            let (high, low): (Vec<usize>, Vec<usize>) = parts[widest].halves(cells);
+            if high.len().min(low.len()) < fewest {
+                parts[widest].is_open = false;
+                continue;
+            }
+            parts[widest] = Part::new(cells, low);
+            parts.push(Part::new(cells, high));
+        }
+        let mut found = Self::refined(cells, parts.into_iter().map(|part| part.mean).collect(), PASSES[0]);
+        found.merge(cells, rule.gap);
+        found
+    }
+
+    /// The clusters of a map that has grown since `centres` were found: those that still hold cells, with merges and births.
+    pub(crate) fn continued(cells: &Coordinates, centres: Vec<Vec<f32>>, rule: &Rule) -> Self {
+        let mut found = Self::refined(cells, centres, PASSES[1]);
+        found.merge(cells, MERGED_GAP * rule.gap);
+        while found.centres.len() < rule.most {
+            let Some(centres) = found.with_a_birth(cells, rule) else { break };
             found = Self::refined(cells, centres, PASSES[1]);
         }
-        Self::refined(cells, found.centres, PASSES[2])
+        found
     }
 
     /// Moves centres to the means of their cells, for at most `passes`. A centre without cells stays.
-    pub(crate) fn refined(cells: &Coordinates, mut centres: Vec<Vec<f32>>, passes: usize) -> Self {
-        let mut of_cells = nearest(cells, 0..cells.len(), &centres);
+    fn refined(cells: &Coordinates, mut centres: Vec<Vec<f32>>, passes: usize) -> Self {
+        let all = 0..cells.len();
+        let mut of_cells = nearest(cells, all.clone(), &centres);
         for _ in 0..passes {
-            move_to_means(cells, 0..cells.len(), &of_cells, &mut centres);
-            let next = nearest(cells, 0..cells.len(), &centres);
+            move_to_means(cells, all.clone(), &of_cells, &mut centres);
+            let next = nearest(cells, all.clone(), &centres);
             if next == of_cells {
                 break;
             }
@@ -48,19 +83,33 @@ impl Clusters {
         Self { centres, of_cells }
     }
 
+    /// Merges centres while the nearest two are within a squared distance.
+    fn merge(&mut self, cells: &Coordinates, gap: f32) {
+        loop {
+            let pairs = (0..self.centres.len()).flat_map(|i| (0..i).map(move |j| (j, i)));
+            let apart = |&(i, j): &(usize, usize)| squared_distance(&self.centres[i], &self.centres[j]);
+            let nearest = pairs.min_by(|a, b| apart(a).total_cmp(&apart(b)));
+            let Some((into, joins)) = nearest.filter(|pair| apart(pair) < gap) else { return };
+            self.of_cells.iter_mut().filter(|cluster| **cluster == joins).for_each(|cluster| *cluster = into);
+            let members: Vec<usize> = (0..cells.len()).filter(|&cell| self.of_cells[cell] == into).collect();
+            self.centres[into] = mean(cells, &members);
+            self.centres.remove(joins);
+            *self = Self::refined(cells, std::mem::take(&mut self.centres), PASSES[1]);
+        }
+    }
+
     /// The centres with those of two halves in place of the first cluster that can be split, the one with most scatter first.
-    fn with_a_split(&self, cells: &Coordinates) -> Option<Vec<Vec<f32>>> {
-        let fewest = MIN_CELLS.max((MIN_SHARE * cells.len() as f64).ceil() as usize);
+    fn with_a_birth(&self, cells: &Coordinates, rule: &Rule) -> Option<Vec<Vec<f32>>> {
+        let fewest = rule.fewest(cells);
         let mut members = vec![Vec::new(); self.centres.len()];
         self.of_cells.iter().enumerate().for_each(|(cell, &cluster)| members[cluster].push(cell));
-        let large = members.iter().enumerate().filter(|(_, members)| members.len() >= 2 * fewest);
-        let mut wide: Vec<_> =
-            large.map(|(cluster, members)| (cluster, members, Scatter::of(cells, members))).collect();
-        wide.retain(|(_, _, scatter)| scatter.variance > MIN_VARIANCE);
-        let spread = |(_, members, scatter): &(usize, &Vec<usize>, Scatter)| members.len() as f64 * scatter.variance;
-        wide.sort_by(|a, b| spread(b).total_cmp(&spread(a)));
-        wide.into_iter().find_map(|(cluster, members, scatter)| {
-            let halves = scatter.halves(cells, members, fewest)?;
+        let large = members.into_iter().enumerate().filter(|(_, members)| members.len() >= 2 * fewest);
+        let mut wide: Vec<(usize, Part)> =
+            large.map(|(cluster, members)| (cluster, Part::new(cells, members))).collect();
+        wide.retain(|(_, part)| part.variance > BIRTH * rule.variance);
+        wide.sort_by(|a, b| b.1.scatter().total_cmp(&a.1.scatter()));
+        wide.into_iter().find_map(|(cluster, part)| {
+            let halves = part.apart(cells, fewest, rule.gap)?;
             let mut centres = self.centres.clone();
             centres.remove(cluster);
             centres.extend(halves);
@@ -68,6 +117,10 @@ impl Clusters {
         })
     }
 }
+
+/// While a map grows, labels are born and merged less readily than in a map that nothing is known of.
+const BIRTH: f64 = 3.0;
+const MERGED_GAP: f32 = 0.6;
 
 /// The cluster of each of some cells whose centre is nearest, the first of equally near ones.
 fn nearest(cells: &Coordinates, some: impl Iterator<Item = usize>, centres: &[Vec<f32>]) -> Vec<usize> {
@@ -96,59 +149,79 @@ pub(crate) fn mean(cells: &Coordinates, some: &[usize]) -> Vec<f32> {
     centre
 }
 
-/// The mean of some cells, and the direction in which they vary most.
-struct Scatter {
+/// Some cells with their mean, and the direction in which they vary most.
+struct Part {
+    cells: Vec<usize>,
     mean: Vec<f32>,
-    /// Largest eigenvalue of the covariance.
+    /// Largest eigenvalue of the covariance, and its direction.
     variance: f64,
     direction: Vec<f64>,
+    /// Whether a split can be tried.
+    is_open: bool,
 }
 
-impl Scatter {
-    fn of(cells: &Coordinates, some: &[usize]) -> Self {
-        let (axes, mean) = (cells.axes, mean(cells, some));
+impl Part {
+    fn new(all: &Coordinates, cells: Vec<usize>) -> Self {
+        let (axes, mean) = (all.axes, mean(all, &cells));
         let mut sums = DMatrix::<f64>::zeros(axes, axes);
-        for &cell in some {
-            let centred: Vec<f64> = cells.of(cell).iter().zip(&mean).map(|(a, b)| f64::from(a - b)).collect();
+        for &cell in &cells {
+            let centred: Vec<f64> = all.of(cell).iter().zip(&mean).map(|(a, b)| f64::from(a - b)).collect();
             for i in 0..axes {
                 for j in 0..=i {
                     sums[(i, j)] += centred[i] * centred[j];
                 }
             }
         }
-        let covariance =
-            DMatrix::from_fn(axes, axes, |i, j| sums[(i.max(j), i.min(j))] / (some.len().max(2) - 1) as f64);
+        let freedom = (cells.len().max(2) - 1) as f64;
+        let covariance = DMatrix::from_fn(axes, axes, |i, j| sums[(i.max(j), i.min(j))] / freedom);
         let Some(eigen) = SymmetricEigen::try_new(covariance, f64::EPSILON, MAX_ROTATIONS) else {
-            return Self { mean, variance: 0.0, direction: vec![0.0; axes] };
+            return Self { cells, mean, variance: 0.0, direction: vec![0.0; axes], is_open: false };
         };
         let (first, variance) = eigen.eigenvalues.argmax();
         let mut direction: Vec<f64> = eigen.eigenvectors.column(first).iter().copied().collect();
         // An eigenvector has no sign of its own.
         let largest = direction.iter().copied().fold(0.0, |most: f64, v| if v.abs() > most.abs() { v } else { most });
         direction.iter_mut().for_each(|value| *value *= largest.signum());
-        Self { mean, variance, direction }
+        Self { cells, mean, variance, direction, is_open: true }
+    }
+
+    /// The sum of squares in the main direction.
+    fn scatter(&self) -> f64 {
+        self.variance * self.cells.len() as f64
+    }
+
+    /// The cells beyond the mean in the main direction, and the others.
+    fn halves(&self, all: &Coordinates) -> (Vec<usize>, Vec<usize>) {
+        let along = |cell: usize| -> f64 {
+            let centred = all.of(cell).iter().zip(&self.mean).map(|(a, b)| f64::from(a - b));
+            centred.zip(&self.direction).map(|(value, direction)| value * direction).sum()
+        };
+        self.cells.iter().partition(|&&cell| along(cell) > 0.0)
     }
 
     /// The centres of two halves with enough cells and far enough apart.
-    fn halves(&self, cells: &Coordinates, some: &[usize], fewest: usize) -> Option<[Vec<f32>; 2]> {
+    fn apart(&self, all: &Coordinates, fewest: usize, gap: f32) -> Option<[Vec<f32>; 2]> {
         let reach = self.variance.sqrt();
         let beside = |sign: f64| -> Vec<f32> {
-            self.mean.iter().zip(&self.direction).map(|(&m, d)| m + (sign * reach * d) as f32).collect()
+            self.mean.iter().zip(&self.direction).map(|(&mean, d)| mean + (sign * reach * d) as f32).collect()
         };
         let mut centres = [beside(1.0), beside(-1.0)];
-        for _ in 0..PASSES[0] {
-            let halves = nearest(cells, some.iter().copied(), &centres);
-            move_to_means(cells, some.iter().copied(), &halves, &mut centres);
+        let mut halves = Vec::new();
+        for _ in 0..PASSES[2] {
+            halves = nearest(all, self.cells.iter().copied(), &centres);
+            move_to_means(all, self.cells.iter().copied(), &halves, &mut centres);
         }
-        let first = nearest(cells, some.iter().copied(), &centres).iter().filter(|&&half| half == 0).count();
-        let is_apart = squared_distance(&centres[0], &centres[1]) >= MIN_GAP;
-        (is_apart && first.min(some.len() - first) >= fewest).then_some(centres)
+        let second: usize = halves.iter().sum();
+        let is_apart = squared_distance(&centres[0], &centres[1]) >= gap;
+        (is_apart && second.min(halves.len() - second) >= fewest).then_some(centres)
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    const RULE: Rule = Rule { most: 16, variance: 1.0, cells: 24, share: 0.0, gap: 5.0 };
 
     fn groups(apart: f32) -> Coordinates {
         let at = [[0.0f32, 0.0], [apart, 1.0], [0.0, 2.0 * apart]];
@@ -159,22 +232,24 @@ mod tests {
 
     #[test]
     fn groups_are_found_and_not_split_further() {
-        let found = Clusters::grow(&groups(9.0), 16);
+        let found = Clusters::grow(&groups(9.0), &RULE);
         assert_eq!(found.centres.len(), 3);
         assert!((0..300).all(|i| found.of_cells[i] == found.of_cells[i % 3]));
-        assert_eq!(Clusters::grow(&groups(9.0), 2).centres.len(), 2);
+        assert_eq!(Clusters::grow(&groups(9.0), &Rule { most: 2, ..RULE }).centres.len(), 2);
     }
 
     #[test]
     fn noise_is_one_cluster() {
-        assert_eq!(Clusters::grow(&groups(0.0), 16).centres.len(), 1);
-        assert_eq!(Clusters::grow(&Coordinates { axes: 2, values: Vec::new() }, 16).of_cells, []);
+        assert_eq!(Clusters::grow(&groups(0.0), &RULE).centres.len(), 1);
+        assert_eq!(Clusters::grow(&Coordinates { axes: 2, values: Vec::new() }, &RULE).of_cells, []);
     }
 
     #[test]
-    fn centres_without_cells_stay() {
-        let kept = Clusters::refined(&groups(9.0), vec![vec![0.0, 0.0], vec![900.0, 0.0]], 5);
-        assert_eq!(kept.centres[1], [900.0, 0.0]);
-        assert!(kept.of_cells.iter().all(|&cluster| cluster == 0));
+    fn a_map_that_has_grown_keeps_its_centres_and_bears_new_ones() {
+        let centres = vec![vec![0.2, 0.1], vec![9.0, 1.0]];
+        let found = Clusters::continued(&groups(9.0), centres, &RULE);
+        assert_eq!(found.centres.len(), 3);
+        let doubled = vec![vec![0.0, 0.3], vec![0.0, -0.3], vec![9.0, 1.0], vec![0.0, 18.0]];
+        assert_eq!(Clusters::continued(&groups(9.0), doubled, &RULE).centres.len(), 3);
     }
 }

@@ -1,7 +1,7 @@
 //! Habitats: labels of cells by what they look like over all their sights.
 //!
 //! The topics of the model follow the words that happened to come first: one habitat has several, depending on when it was seen. A habitat
-//! depends on neither order nor seed. Each frame is measured by itself ([`measure`]); a cell has the mean over its moments; measures are
+//! depends on neither order nor seed. Each frame is measured by itself ([`measure`]); a cell has the mean over its sights; measures are
 //! compared in units of the differences between neighbouring cells, smoothed where neighbours look alike, and clustered without random
 //! numbers. Clusters are split only where the sea floor calls for it, so a uniform floor has few.
 //!
@@ -17,7 +17,7 @@
 //!     // A cell of 0.1 m is 10 pixels wide.
 //!     let points = measure(&image, 10.0);
 //!     let places = camera.project(320, 240, &pose, &Habitats::as_words(&points));
-//!     habitats.add(f64::from(second), &points, &places, 0.1);
+//!     habitats.add((320, 240), &points, &places, 0.1);
 //! }
 //! habitats.learn();
 //! assert!((2..=16).contains(&habitats.labels()));
@@ -37,14 +37,21 @@ pub use tree::LabelTree;
 use crate::project::Observation;
 use crate::words::Word;
 use cells::CellMap;
-use clusters::Clusters;
+use clusters::{Clusters, Rule};
 use serde::{Deserialize, Serialize};
-use sights::Sights;
+use sights::{Sight, Sights};
 use smooth::{Coordinates, smoothed, squared_distance};
+use space::Space;
 use std::collections::BTreeMap;
 
 /// A cell keeps its label unless another centre is nearer by this, squared units of the noise between neighbours.
-const HYSTERESIS: f32 = 2.0;
+const HYSTERESIS: f32 = 1.5;
+/// Fewest points of a cell in a frame.
+const MIN_POINTS: f64 = 4.0;
+/// Least deviation over the cells of a measure that varies.
+const CONSTANT: f64 = 1e-3;
+/// A floor that calls for at most so many labels is uniform: more would be noise.
+const UNIFORM: usize = 3;
 
 /// The habitats of one mission.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -54,8 +61,26 @@ pub struct Habitats {
     /// The label of each cell after the last [`Habitats::learn`], by (y, x): as clustered, and as shown.
     clustered: BTreeMap<(i32, i32), u32>,
     shown: BTreeMap<(i32, i32), u32>,
+    /// Cells seen since, of which some have no label.
+    fresh: Vec<(i32, i32)>,
+    learnt: Option<Learnt>,
     next: u32,
     tree: LabelTree,
+}
+
+/// The space and the centres of the last [`Habitats::learn`].
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+struct Learnt {
+    space: Space,
+    centres: Vec<(u32, Vec<f32>)>,
+}
+
+impl Learnt {
+    fn nearest(&self, values: &MeasuredValues) -> Option<u32> {
+        let place = self.space.place(values);
+        let distances = self.centres.iter().map(|(label, centre)| (squared_distance(&place, centre), *label));
+        distances.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, label)| label)
+    }
 }
 
 impl Habitats {
@@ -67,6 +92,8 @@ impl Habitats {
             sights: Sights::default(),
             clustered: BTreeMap::new(),
             shown: BTreeMap::new(),
+            fresh: Vec::new(),
+            learnt: None,
             next: 0,
             tree: LabelTree::default(),
         }
@@ -78,38 +105,104 @@ impl Habitats {
         (0..).zip(points).map(|(id, point)| Word { id, u: point.u, v: point.v }).collect()
     }
 
-    /// Adds the points of a frame of `t_s` seconds. `places` are their projected [`Habitats::as_words`], metres, in cells with an edge of
-    /// `cell_m` metres. Places that are not finite or out of range are left out.
-    pub fn add(&mut self, t_s: f64, points: &[MeasuredPoint], places: &[Observation], cell_m: f64) {
-        let cell = |metres: f64| (metres / cell_m).floor();
-        let is_in_range = |index: f64| index.abs() < f64::from(i32::MAX / 2);
+    /// Adds the points of a frame of `size` pixels. `places` are their projected [`Habitats::as_words`], metres, in cells with an edge of
+    /// `cell_m` metres. Places that are not finite or out of range are left out, and cells with fewer than four points.
+    pub fn add(&mut self, size: (u32, u32), points: &[MeasuredPoint], places: &[Observation], cell_m: f64) {
+        let cell = |metres: f64| Some((metres / cell_m).floor()).filter(|index| index.abs() < f64::from(i32::MAX / 2));
+        let along = |pixel: f32, length: u32| 2.0 * f64::from(pixel) / f64::from(length.max(1)) - 1.0;
+        let mut sights: BTreeMap<(i32, i32), Sight> = BTreeMap::new();
         for place in places {
-            let (x, y) = (cell(place.x), cell(place.y));
-            let Some(point) = points.get(place.word as usize).filter(|_| is_in_range(x) && is_in_range(y)) else {
-                continue;
-            };
-            self.sights.add((x as i32, y as i32), t_s, &point.values);
+            let (Some(x), Some(y)) = (cell(place.x), cell(place.y)) else { continue };
+            let Some(point) = points.get(place.word as usize) else { continue };
+            let in_frame = [along(point.u, size.0), along(point.v, size.1)];
+            sights.entry((y as i32, x as i32)).or_default().add(in_frame, &point.values);
+        }
+        for (place, sight) in sights.into_iter().filter(|(_, sight)| sight.points() >= MIN_POINTS) {
+            self.sights.add(place, &sight);
+            self.fresh.push(place);
         }
     }
 
-    /// Clusters all cells again. Labels keep their number where their cells overlap those of an earlier one, and a number is never given
-    /// to another habitat.
-    pub fn learn(&mut self) {
-        let (places, values): (Vec<_>, Vec<_>) = self.sights.means().unzip();
-        if places.is_empty() {
-            return;
+    /// Gives cells that have been seen since [`Habitats::learn`] the label whose centre is nearest.
+    pub fn label_new(&mut self) {
+        let Some(learnt) = &self.learnt else { return };
+        for place in std::mem::take(&mut self.fresh) {
+            if self.shown.contains_key(&place) {
+                continue;
+            }
+            if let Some(label) = self.sights.mean(place).and_then(|values| learnt.nearest(&values)) {
+                self.shown.insert(place, label);
+            }
         }
+    }
+
+    /// Clusters a map that has grown: labels follow their cells, are merged where two mean the same, and are born where the floor calls for
+    /// them. A number is never given to another habitat.
+    pub fn learn(&mut self) {
+        let Some((places, space, cells, varying)) = self.coordinates() else { return };
+        let rule = self.natural(varying);
+        let centres = self.centres_of_earlier(&places, &cells);
+        let found = match centres.is_empty() {
+            true => Clusters::grow(&cells, &rule),
+            false => Clusters::continued(&cells, centres, &rule),
+        };
+        self.take(&places, space, &cells, found);
+    }
+
+    /// Clusters the whole map as if nothing were known of it, into as many labels as are allowed, or as few as a uniform floor calls for.
+    /// It depends on the sights alone; labels keep their number where their cells overlap.
+    pub fn learn_whole(&mut self) {
+        let Some((places, space, cells, varying)) = self.coordinates() else { return };
+        let natural = Clusters::grow(&cells, &self.natural(varying));
+        let all = Rule { most: self.most as usize, variance: 0.5, cells: 24, share: 0.0, gap: 0.0 };
+        let found = if natural.centres.len() <= UNIFORM { natural } else { Clusters::grow(&cells, &all) };
+        self.take(&places, space, &cells, found);
+    }
+
+    /// The rule by which a floor has as many labels as it calls for.
+    fn natural(&self, varying: usize) -> Rule {
+        let gap = 5.0 * varying as f32 / MEASURES as f32;
+        Rule { most: self.most as usize, variance: 1.0, cells: 24, share: 0.005, gap }
+    }
+
+    /// The smoothed coordinates of all cells, in the order of their places, and the number of measures that vary.
+    fn coordinates(&self) -> Option<(Vec<(i32, i32)>, Space, Coordinates, usize)> {
+        let (places, values): (Vec<_>, Vec<_>) = self.sights.means().into_iter().unzip();
         let map = CellMap::new(&places);
-        let cells = smoothed(&map, &space::whitened(&map, &values));
-        let found = Clusters::grow(&cells, self.most as usize);
-        let labels = self.numbered(&places, &found);
-        self.show(&places, &cells, &found, &labels);
+        let space = Space::learn(&map, &values).filter(|_| !places.is_empty())?;
+        let varies = |k: &usize| {
+            let count = values.len() as f64;
+            let mean = values.iter().map(|v| v[*k]).sum::<f64>() / count;
+            values.iter().map(|v| (v[*k] - mean).powi(2)).sum::<f64>() / count > CONSTANT * CONSTANT
+        };
+        let varying = (0..MEASURES).filter(varies).count().max(1);
+        let cells = smoothed(&map, &space.places(&values), varying);
+        Some((places, space, cells, varying))
+    }
+
+    /// The centres of the cells of each label that was clustered last.
+    fn centres_of_earlier(&self, places: &[(i32, i32)], cells: &Coordinates) -> Vec<Vec<f32>> {
+        let mut members: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
+        for (cell, place) in places.iter().enumerate() {
+            if let Some(&label) = self.clustered.get(place) {
+                members.entry(label).or_default().push(cell);
+            }
+        }
+        members.into_values().map(|members| clusters::mean(cells, &members)).collect()
+    }
+
+    fn take(&mut self, places: &[(i32, i32)], space: Space, cells: &Coordinates, found: Clusters) {
+        let labels = self.numbered(places, &found);
+        self.show(places, cells, &found, &labels);
         let mut counts = vec![0.0; labels.len()];
         found.of_cells.iter().for_each(|&cluster| counts[cluster] += 1.0);
-        let centres = labels.iter().zip(counts).zip(&found.centres);
-        self.tree = LabelTree::of(centres.map(|((&label, count), centre)| (label, count, centre.clone())).collect());
+        let nodes = labels.iter().zip(counts).zip(&found.centres);
+        self.tree = LabelTree::of(nodes.map(|((&label, count), centre)| (label, count, centre.clone())).collect());
         self.clustered =
             places.iter().zip(&found.of_cells).map(|(&place, &cluster)| (place, labels[cluster])).collect();
+        let centres = labels.into_iter().zip(found.centres).collect();
+        self.learnt = Some(Learnt { space, centres });
+        self.fresh.clear();
     }
 
     /// The label of each cluster: of the earlier labels that share cells with it, the one that shares most and is not taken.
@@ -202,7 +295,7 @@ mod tests {
             let points = measure(&frame(colours, u64::from(k)), 10.0);
             let pose = Pose { x: 0.0, y: 2.0 * f64::from(k), z: 0.0, yaw_rad: 0.0 };
             let places = camera.project(200, 160, &pose, &Habitats::as_words(&points));
-            habitats.add(20.0 * f64::from(k), &points, &places, 0.25);
+            habitats.add((200, 160), &points, &places, 0.25);
         }
         habitats.learn();
         habitats
@@ -235,12 +328,26 @@ mod tests {
 
     #[test]
     fn numbers_stay_when_more_is_seen() {
-        let mut habitats = fly([[160, 150, 120], [60, 90, 50]], &[0, 1, 2]);
-        let before: Vec<_> = (-9..9).map(|x| habitats.label_at(x, 3)).collect();
-        let later = fly([[160, 150, 120], [60, 90, 50]], &[7, 8, 9]);
-        let places: Vec<_> = later.sights.means().collect();
-        places.iter().for_each(|((y, x), values)| habitats.sights.add((*x, *y), 500.0, values));
-        habitats.learn();
-        assert_eq!((-9..9).map(|x| habitats.label_at(x, 3)).collect::<Vec<_>>(), before);
+        let colours = [[160, 150, 120], [60, 90, 50]];
+        let (mut few, many) = (fly(colours, &[0, 1, 2]), fly(colours, &[0, 1, 2, 7, 8, 9]));
+        let shown = |habitats: &Habitats| (-9..9).map(|x| habitats.label_at(x, 3)).collect::<Vec<_>>();
+        let before = shown(&few);
+        few.sights = many.sights.clone();
+        few.learn();
+        assert_eq!(shown(&few), before);
+        assert!(few.label_at(-8, 60).is_some() && few.label_at(-8, 60) == few.label_at(-8, 3));
+    }
+
+    #[test]
+    fn a_new_cell_has_the_label_of_its_like_at_once() {
+        let colours = [[160, 150, 120], [60, 90, 50]];
+        let mut habitats = fly(colours, &[0, 1, 2]);
+        let points = measure(&frame(colours, 77), 10.0);
+        let camera = DownCamera { metres_per_pixel: 0.025, altitude_m: 4.0 };
+        let pose = Pose { x: 0.0, y: 90.0, z: 0.0, yaw_rad: 0.0 };
+        habitats.add((200, 160), &points, &camera.project(200, 160, &pose, &Habitats::as_words(&points)), 0.25);
+        assert_eq!(habitats.label_at(-8, 360), None);
+        habitats.label_new();
+        assert_eq!(habitats.label_at(-8, 360), habitats.label_at(-8, 3));
     }
 }

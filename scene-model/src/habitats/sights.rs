@@ -1,63 +1,100 @@
-//! What the cells look like over all their sights.
+//! What the cells look like over all their sights, and the lamp as seen from places that were seen twice.
 
 use super::measures::{MEASURES, MeasuredValues};
+use nalgebra::{SMatrix, SVector};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// Glances within this time are one sight, seconds: ten frames of one moment do not outvote one of another.
-const MOMENT_S: f64 = 10.0;
+/// Terms of the lamp: a quadratic in both directions of the frame.
+const TERMS: usize = 5;
+/// Weight of a lamp that is even.
+const EVEN: f64 = 500.0;
 
-/// The sights of all cells, by (y, x).
+/// The measures of a cell in one frame: means over its points.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Sight {
+    points: f64,
+    values: SVector<f64, MEASURES>,
+    /// Place in the frame, each direction from -1 to 1.
+    place: [f64; 2],
+}
+
+impl Sight {
+    pub(crate) fn add(&mut self, place: [f64; 2], values: &MeasuredValues) {
+        self.points += 1.0;
+        self.values += (SVector::from(*values) - self.values) / self.points;
+        for (mean, at) in self.place.iter_mut().zip(place) {
+            *mean += (at - *mean) / self.points;
+        }
+    }
+
+    pub(crate) fn points(&self) -> f64 {
+        self.points
+    }
+
+    fn terms(&self) -> SVector<f64, TERMS> {
+        let [x, y] = self.place;
+        SVector::from([x, y, x * y, x * x - 1.0 / 3.0, y * y - 1.0 / 3.0])
+    }
+}
+
+/// The sights of all cells, by (y, x). All are sums: their order does not matter.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Sights {
     cells: BTreeMap<(i32, i32), CellSights>,
+    /// Products of the terms of the lamp with themselves and with the measures, within cells.
+    terms: SMatrix<f64, TERMS, TERMS>,
+    products: SMatrix<f64, TERMS, MEASURES>,
 }
 
-/// The sights of a cell: sums over the moments that have ended, and over the points of the latest one.
+/// Means over the points of a cell.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 struct CellSights {
-    sum: MeasuredValues,
-    moments: u32,
-    latest: i64,
-    latest_sum: MeasuredValues,
-    points: u32,
+    points: f64,
+    values: SVector<f64, MEASURES>,
+    terms: SVector<f64, TERMS>,
 }
 
 impl Sights {
-    /// Adds a point of a cell that was seen at `t_s` seconds.
-    pub(crate) fn add(&mut self, (x, y): (i32, i32), t_s: f64, values: &MeasuredValues) {
-        self.cells.entry((y, x)).or_default().add((t_s / MOMENT_S).floor() as i64, values);
+    /// Adds a sight of the cell at (y, x).
+    pub(crate) fn add(&mut self, place: (i32, i32), sight: &Sight) {
+        let cell = self.cells.entry(place).or_default();
+        let (values, terms) = (sight.values - cell.values, sight.terms() - cell.terms);
+        let both = cell.points + sight.points;
+        if cell.points > 0.0 {
+            let weight = sight.points * cell.points / both;
+            self.terms += terms * terms.transpose() * weight;
+            self.products += terms * values.transpose() * weight;
+        }
+        let share = sight.points / both;
+        (cell.values, cell.terms, cell.points) = (cell.values + values * share, cell.terms + terms * share, both);
     }
 
     pub(crate) fn len(&self) -> usize {
         self.cells.len()
     }
 
-    /// The mean of each cell over its moments, sorted by (y, x).
-    pub(crate) fn means(&self) -> impl Iterator<Item = ((i32, i32), MeasuredValues)> {
-        self.cells.iter().map(|(&place, cell)| (place, cell.mean()))
+    /// The mean of each cell as an even light would show it, sorted by (y, x).
+    pub(crate) fn means(&self) -> Vec<((i32, i32), MeasuredValues)> {
+        let lamp = self.lamp();
+        self.cells.iter().map(|(&place, cell)| (place, cell.mean(&lamp))).collect()
+    }
+
+    /// The mean of the cell at (y, x).
+    pub(crate) fn mean(&self, place: (i32, i32)) -> Option<MeasuredValues> {
+        self.cells.get(&place).map(|cell| cell.mean(&self.lamp()))
+    }
+
+    /// The share of each term in each measure: a regression within cells, which the sea floor does not enter.
+    fn lamp(&self) -> SMatrix<f64, TERMS, MEASURES> {
+        let terms = self.terms + SMatrix::identity() * EVEN;
+        terms.cholesky().map_or_else(SMatrix::zeros, |root| root.solve(&self.products))
     }
 }
 
 impl CellSights {
-    fn add(&mut self, moment: i64, values: &MeasuredValues) {
-        if self.points > 0 && moment != self.latest {
-            self.sum = self.mean_of_latest(|k, latest| self.sum[k] + latest);
-            self.moments += 1;
-            (self.latest_sum, self.points) = ([0.0; MEASURES], 0);
-        }
-        self.latest = moment;
-        self.points += 1;
-        self.latest_sum.iter_mut().zip(values).for_each(|(sum, value)| *sum += value);
-    }
-
-    fn mean_of_latest(&self, with: impl Fn(usize, f64) -> f64) -> MeasuredValues {
-        std::array::from_fn(|k| with(k, self.latest_sum[k] / f64::from(self.points.max(1))))
-    }
-
-    fn mean(&self) -> MeasuredValues {
-        let moments = f64::from(self.moments + 1);
-        self.mean_of_latest(|k, latest| (self.sum[k] + latest) / moments)
+    fn mean(&self, lamp: &SMatrix<f64, TERMS, MEASURES>) -> MeasuredValues {
+        (self.values - lamp.transpose() * self.terms).into()
     }
 }
 
@@ -65,21 +102,37 @@ impl CellSights {
 mod tests {
     use super::*;
 
-    #[test]
-    fn many_glances_of_a_moment_count_as_one_of_another() {
-        let mut sights = Sights::default();
-        (0..50).for_each(|i| sights.add((3, -4), 100.0 + f64::from(i) * 0.1, &[1.0; MEASURES]));
-        sights.add((3, -4), 300.0, &[5.0; MEASURES]);
-        assert_eq!(sights.means().collect::<Vec<_>>(), [((-4, 3), [3.0; MEASURES])]);
+    fn sight(place: [f64; 2], value: f64, points: usize) -> Sight {
+        let mut sight = Sight::default();
+        (0..points).for_each(|_| sight.add(place, &[value; MEASURES]));
+        sight
     }
 
     #[test]
-    fn the_order_of_moments_does_not_matter() {
-        let seen = |times: &[f64]| {
+    fn the_order_of_sights_does_not_matter() {
+        let seen = |order: &[usize]| {
             let mut sights = Sights::default();
-            times.iter().for_each(|&t_s| sights.add((0, 0), t_s, &[t_s; MEASURES]));
-            sights.means().next().unwrap().1[0]
+            for &i in order {
+                sights.add((0, 0), &sight([0.1 * i as f64, 0.0], i as f64, 4 + i));
+            }
+            sights.means()[0].1[0]
         };
-        assert_eq!(seen(&[5.0, 20.0, 64.0]), seen(&[64.0, 20.0, 5.0]));
+        assert!((seen(&[1, 2, 3, 4]) - seen(&[4, 2, 3, 1])).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_lamp_is_taken_out_where_places_were_seen_twice() {
+        let floor = |cell: i32| f64::from(cell % 3);
+        let mut sights = Sights::default();
+        // Each cell first at the left, then at the right of the frame, where the lamp is one unit brighter.
+        for cell in 0..400 {
+            for right in [-0.8, 0.8] {
+                sights.add((0, cell), &sight([right, 0.0], floor(cell) + right / 1.6, 9));
+            }
+        }
+        sights.add((1, 0), &sight([0.8, 0.0], 0.5, 9));
+        let means = sights.means();
+        assert!((means[400].1[0] - means[0].1[0]).abs() < 0.05, "seen at the right alone: {}", means[400].1[0]);
+        assert!((means[2].1[0] - means[0].1[0] - 2.0).abs() < 0.05);
     }
 }

@@ -8,10 +8,9 @@ use super::cells::CellMap;
 const GUIDE_CELLS: f32 = 1.5;
 /// Standard deviation of the mean, cells.
 const REACH_CELLS: f32 = 3.0;
-/// A difference of this many times that of neighbours is one of appearance.
-const ALIKE: f32 = 2.0;
-/// A difference of fewer units of noise on the mean over the axes is none of appearance.
-const MIN_ALIKE: f32 = 0.5;
+const RADIUS_CELLS: i32 = 6;
+/// Root mean square difference over the axes, in units of the noise between neighbours, at which two cells look different.
+const ALIKE: f32 = 0.5;
 
 /// Coordinates of all cells, `axes` of each.
 #[derive(Clone, Debug, PartialEq)]
@@ -34,26 +33,18 @@ pub(crate) fn squared_distance(a: &[f32], b: &[f32]) -> f32 {
     a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum()
 }
 
-/// The coordinates of each cell as the mean over cells around it that look alike.
-pub(crate) fn smoothed(map: &CellMap, own: &Coordinates) -> Coordinates {
+/// The coordinates of each cell as the mean over cells around it that look alike; `varying` is the number of measures that are not the
+/// same everywhere.
+pub(crate) fn smoothed(map: &CellMap, own: &Coordinates, varying: usize) -> Coordinates {
     let guide = weighted_mean(map, own, GUIDE_CELLS, |_, _| 0.0);
-    let (mut sum, mut pairs) = (0.0, 0);
-    for (a, b) in map.pairs() {
-        sum += f64::from(squared_distance(guide.of(a), guide.of(b)));
-        pairs += 1;
-    }
-    // The mean over pairs and axes; without pairs there is nothing to smooth.
-    let axes = own.axes.max(1) as f32;
-    let of_neighbours = (sum / f64::from(pairs.max(1))) as f32 / axes;
-    let alike = (ALIKE * of_neighbours.sqrt()).max(MIN_ALIKE);
-    let scale = 1.0 / (2.0 * alike * alike * axes);
+    let scale = 1.0 / (2.0 * ALIKE * ALIKE * varying as f32);
     weighted_mean(map, own, REACH_CELLS, |a, b| scale * squared_distance(guide.of(a), guide.of(b)))
 }
 
-/// Means with weights exp(-d^2 / 2 sigma^2 - penalty), over distances d up to 2 sigma.
+/// Means with weights exp(-d^2 / 2 sigma^2 - penalty), over distances d up to six cells.
 fn weighted_mean(map: &CellMap, own: &Coordinates, sigma: f32, penalty: impl Fn(usize, usize) -> f32) -> Coordinates {
     let (mut sums, mut weights) = (own.values.clone(), vec![1.0f32; map.len()]);
-    let radius = (2.0 * sigma).ceil() as i32;
+    let radius = RADIUS_CELLS;
     // Each pair of cells once: weights are the same in both directions.
     for (dy, dx) in (0..=radius).flat_map(|dy| (-radius..=radius).map(move |dx| (dy, dx))) {
         let square = dy * dy + dx * dx;
@@ -87,7 +78,7 @@ mod tests {
         let truth = |cell: usize| if cell % 30 < 15 { 0.0 } else { 6.0 };
         let noise = |cell: usize| (crate::random::mix(cell as u64) % 1000) as f32 / 500.0 - 1.0;
         let own = Coordinates { axes: 1, values: (0..900).map(|cell| truth(cell) + noise(cell)).collect() };
-        let even = smoothed(&map, &own);
+        let even = smoothed(&map, &own, 1);
         let error = |from: &Coordinates, columns: std::ops::Range<usize>| {
             let cells = || (0..900).filter(|cell| columns.contains(&(cell % 30)));
             (cells().map(|c| (from.of(c)[0] - truth(c)).powi(2)).sum::<f32>() / cells().count() as f32).sqrt()

@@ -7,6 +7,7 @@ use super::cells::CellMap;
 use super::measures::{MEASURES, MeasuredValues};
 use super::smooth::Coordinates;
 use nalgebra::{SMatrix, SVector};
+use serde::{Deserialize, Serialize};
 
 type Covariance = SMatrix<f64, MEASURES, MEASURES>;
 
@@ -14,28 +15,39 @@ type Covariance = SMatrix<f64, MEASURES, MEASURES>;
 /// ratios, of the deviations and of the energies.
 const TOLERANCE: MeasuredValues = [0.12, 0.04, 0.03, 0.15, 0.15, 0.15, 0.35, 0.35, 0.35, 0.35, 0.35, 0.35, 0.35];
 
-/// The coordinates of all cells, in which the differences of neighbours have the covariance of a unit sphere.
-pub(crate) fn whitened(map: &CellMap, values: &[MeasuredValues]) -> Coordinates {
-    let mut noise = Covariance::from_diagonal(&SVector::from(TOLERANCE.map(|t| t * t)));
-    let (mut sums, mut pairs) = (Covariance::zeros(), 0);
-    for (a, b) in map.pairs() {
-        let difference = SVector::from(values[a]) - SVector::from(values[b]);
-        sums += difference * difference.transpose();
-        pairs += 1;
-    }
-    // The variance of a difference is that of both cells.
-    noise += sums / f64::from(2 * pairs.max(1));
-    let mean =
-        values.iter().map(|value| SVector::from(*value)).sum::<SVector<f64, MEASURES>>() / values.len().max(1) as f64;
-    let mut whitened = Vec::with_capacity(values.len() * MEASURES);
-    if let Some(root) = noise.cholesky() {
-        for value in values {
-            let mut place = SVector::from(*value) - mean;
-            root.l_dirty().solve_lower_triangular_mut(&mut place);
-            whitened.extend(place.iter().map(|&coordinate| coordinate as f32));
+/// Axes in which the differences of neighbours have the covariance of a unit sphere.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Space {
+    mean: SVector<f64, MEASURES>,
+    /// The Cholesky factor of that covariance.
+    root: Covariance,
+}
+
+impl Space {
+    /// Learns the space of a map; `None` if a measure is not finite.
+    pub(crate) fn learn(map: &CellMap, values: &[MeasuredValues]) -> Option<Self> {
+        let mut noise = Covariance::from_diagonal(&SVector::from(TOLERANCE.map(|t| t * t)));
+        let (mut sums, mut pairs) = (Covariance::zeros(), 0);
+        for (a, b) in map.pairs() {
+            let difference = SVector::from(values[a]) - SVector::from(values[b]);
+            sums += difference * difference.transpose();
+            pairs += 1;
         }
+        // The variance of a difference is that of both cells.
+        noise += sums / f64::from(2 * pairs.max(1));
+        let sum: SVector<f64, MEASURES> = values.iter().map(|value| SVector::from(*value)).sum();
+        Some(Self { mean: sum / values.len().max(1) as f64, root: noise.cholesky()?.l() })
     }
-    Coordinates { axes: MEASURES, values: whitened }
+
+    pub(crate) fn place(&self, values: &MeasuredValues) -> Vec<f32> {
+        let mut place = SVector::from(*values) - self.mean;
+        self.root.solve_lower_triangular_mut(&mut place);
+        place.iter().map(|&coordinate| coordinate as f32).collect()
+    }
+
+    pub(crate) fn places(&self, values: &[MeasuredValues]) -> Coordinates {
+        Coordinates { axes: MEASURES, values: values.iter().flat_map(|values| self.place(values)).collect() }
+    }
 }
 
 #[cfg(test)]
@@ -56,9 +68,9 @@ mod tests {
                 values
             })
             .collect();
-        let found = whitened(&map, &values);
+        let found = Space::learn(&map, &values).unwrap().places(&values);
         let apart = |a, b| squared_distance(found.of(a), found.of(b));
         assert!(apart(42, 55) > 2.0 * apart(42, 43), "{} {}", apart(42, 55), apart(42, 43));
-        assert!(whitened(&CellMap::new(&[]), &[]).values.is_empty());
+        assert!(Space::learn(&CellMap::new(&[]), &[]).is_some());
     }
 }
