@@ -38,6 +38,7 @@ pub use sections::{
 pub use setting::{
     Authenticate, AutopilotKind, BandRange, BirthRule, CalibrationSource, CameraSource, CameraStamps, Debounce,
     DepthSource, GpsPort, HostPort, LabelMessage, LabelSource, LayerName, MapCells, MapStream, ModemKind,
-    NavigationSource, OperatorScript, Remap, RosName, RosTransport, S2cMode, Votes, WorldKind, ZenohEndpoint,
+    NavigationSource, OperatorScript, Remap, RosName, RosTransport, S2cMode, SceneLabels, Votes, WorldKind,
+    ZenohEndpoint,
 };
 pub use token_file::{TokenGrant, load_tokens, read_token, read_tokens};

@@ -1,9 +1,10 @@
 //! The checkpoint of a mapper: the scene model, its labels, its vocabulary and its exemplars as bytes.
 
-use super::mapper::Mapper;
+use super::mapper::{Mapper, label_by};
 use super::relief::Relief;
 use scene_model::envelope::{Envelope, EnvelopeError};
 use scene_model::exemplars::ExemplarStore;
+use scene_model::habitats::Habitats;
 use scene_model::online::OnlineInference;
 use scene_model::publish::LabelBook;
 use scene_model::topics::{CheckpointError, SceneConfig, SceneModel};
@@ -45,10 +46,17 @@ struct CheckpointContent<M, B, W, E, R> {
     relief: R,
 }
 
-/// The content after [`CheckpointContent`]: the last sight of each cell, the light, the registration, the discriminant and
-/// the inference under way.
-type AddedContent<'a> =
-    (BTreeMap<(i32, i32), f64>, Option<FlatField>, Option<&'a [u8]>, Option<Discriminant>, OnlineInference);
+/// The content after [`CheckpointContent`]: the last sight of each cell, the light, the registration, the discriminant, the
+/// inference under way, and the habitats with the frames since they were learnt.
+type AddedContent<'a> = (
+    BTreeMap<(i32, i32), f64>,
+    Option<FlatField>,
+    Option<&'a [u8]>,
+    Option<Discriminant>,
+    OnlineInference,
+    Option<Habitats>,
+    u32,
+);
 
 /// A mapper that continues from a checkpoint, and the mission that it belongs to.
 pub struct Restored {
@@ -70,7 +78,15 @@ impl Mapper {
         };
         let registration = self.registrar.as_ref().map(Registrar::save);
         let measures = self.extractor.measures();
-        let added = (&self.last_seen_s, &self.light, registration, measures.discriminant(), &self.online);
+        let added = (
+            &self.last_seen_s,
+            &self.light,
+            registration,
+            measures.discriminant(),
+            &self.online,
+            &self.habitats,
+            self.frames_since,
+        );
         ENVELOPE.seal(&postcard::to_allocvec(&(kept, added)).unwrap_or_default())
     }
 
@@ -80,14 +96,15 @@ impl Mapper {
         let content = ENVELOPE.open(bytes)?;
         let (kept, added): (CheckpointContent<Vec<u8>, LabelBook, Measures, ExemplarStore, Relief>, AddedContent<'_>) =
             postcard::from_bytes(content).map_err(|_| RestoreError::Inconsistent)?;
-        let (last_seen_s, light, registration, discriminant, online) = added;
+        let (last_seen_s, light, registration, discriminant, online, habitats, frames_since) = added;
         let kept_words = kept.words.with_discriminant(discriminant);
         let model = SceneModel::load(&kept.model)?;
         let fresh = Mapper::new(config, vocabulary, kept.book.epoch(), config.runtime.seed)?;
         let &SceneConfig { alpha, beta, gamma, seed, .. } = model.config();
         let configured = SceneConfig { alpha, beta, gamma, seed, ..fresh.model.config().clone() };
         let configured_words = fresh.extractor.measures();
-        if *model.config() != configured || !continues(&kept_words, &configured_words) {
+        let is_same_kind = habitats.is_some() == fresh.habitats.is_some();
+        if *model.config() != configured || !continues(&kept_words, &configured_words) || !is_same_kind {
             return Err(RestoreError::OtherParameters);
         }
         let mut mapper = fresh;
@@ -100,6 +117,10 @@ impl Mapper {
         (mapper.exemplars, mapper.relief, mapper.last_s) = (kept.exemplars, kept.relief, kept.last_s);
         mapper.online = online;
         mapper.flat = mapper.online.map(&mapper.model);
+        (mapper.habitats, mapper.frames_since) = (habitats, frames_since);
+        if let Some(habitats) = &mapper.habitats {
+            label_by(habitats, &mut mapper.flat);
+        }
         Ok(Restored { mapper, lineage: kept.lineage })
     }
 }

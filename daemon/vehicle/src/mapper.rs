@@ -3,13 +3,15 @@
 use super::frame::{Frame, Projection};
 use super::picker::{Judge, PATCH_PX};
 use super::relief::Relief;
+use image::RgbImage;
 use scene_model::exemplars::{ExemplarPatch, ExemplarStore};
+use scene_model::habitats::{Habitats, measure};
 use scene_model::online::OnlineInference;
-use scene_model::project::DownCamera;
+use scene_model::project::{DownCamera, Pose};
 use scene_model::publish::{LabelBook, PublishedCell};
-use scene_model::topics::{Birth, FlatCell, SceneConfig, SceneModel};
+use scene_model::topics::{Birth, FlatCell, SceneConfig, SceneModel, TopicId};
 use scene_model::words::{FlatField, Measures, Word, WordConfig, WordExtractor};
-use scenecast_config::{BirthRule, Config, cell_m};
+use scenecast_config::{BirthRule, Config, SceneLabels, cell_m};
 use scenecast_core::UserError;
 use scenecast_protocol::directive::{Change, Registration, Settings, ShortDecimal};
 use scenecast_protocol::map::{Cell, LayerId};
@@ -22,6 +24,18 @@ const EXEMPLARS_KEPT: usize = 4;
 
 /// Smallest and largest edge of a cell in frames whose view gives the size of their pixels, pixels.
 const CELL_PX: (f32, f32) = (4.0, 400.0);
+
+/// Frames after which the habitats are learnt again, and cells of a map that is learnt at each frame.
+const FRAMES_BETWEEN: u32 = 10;
+const SMALL_MAP: usize = 400;
+
+/// Gives cells the labels of habitats; a cell that no frame has shown well enough is left out.
+pub(super) fn label_by(habitats: &Habitats, cells: &mut Vec<FlatCell>) {
+    cells.retain_mut(|cell| {
+        let label = habitats.label_at(cell.x, cell.y);
+        label.inspect(|&label| cell.topic = TopicId(label)).is_some()
+    });
+}
 
 /// The best exemplars of each label that has any, the best first.
 pub type SharedExemplars = Arc<BTreeMap<u8, Vec<ExemplarPatch>>>;
@@ -50,6 +64,10 @@ pub struct Mapper {
     cell_m: f64,
     pub(super) model: SceneModel,
     pub(super) online: OnlineInference,
+    /// `None` if the labels are topics.
+    pub(super) habitats: Option<Habitats>,
+    /// Frames since the habitats were learnt.
+    pub(super) frames_since: u32,
     pub(super) book: LabelBook,
     pub(super) exemplars: ExemplarStore,
     /// The exemplars of the last [`Mapper::shared_exemplars`].
@@ -119,6 +137,8 @@ impl Mapper {
             cell_m,
             model: SceneModel::new(scene).map_err(|e| UserError::Input(format!("scene.{e}")))?,
             online: OnlineInference::default(),
+            habitats: (config.scene.labels == SceneLabels::Habitats).then(|| Habitats::new(config.scene.max_labels)),
+            frames_since: 0,
             book: LabelBook::new(epoch),
             exemplars: ExemplarStore::new(EXEMPLARS_KEPT, PATCH_PX)
                 .with_distance(f64::from(PATCH_PX) * config.camera.metres_per_pixel),
@@ -198,6 +218,7 @@ impl Mapper {
         let passed = t_s - self.last_s.replace(t_s).unwrap_or(t_s - 2.0);
         self.model.refine((self.refine_words_per_s * passed.clamp(0.0, 60.0)) as u64);
         self.flat = self.online.learn(t_s, &self.model);
+        self.add_habitats(image, &projection, &pose, cell_px);
         let published = self.book.publish(&self.flat);
         let (cell_m, metres_per_pixel) = (self.cell_m, projection.metres_per_pixel());
         let judge = Judge { flat: &self.flat, cell_m, metres_per_pixel };
@@ -208,6 +229,23 @@ impl Mapper {
         };
         judge.offer(&mut self.exemplars, image, place, t_s);
         self.update(&published)
+    }
+
+    /// Adds a frame to the habitats, if the labels are habitats, and labels the map by them.
+    fn add_habitats(&mut self, image: &RgbImage, projection: &Projection, pose: &Pose, cell_px: f32) {
+        let Some(habitats) = &mut self.habitats else { return };
+        let points = measure(image, cell_px);
+        let places = projection.project(image.dimensions(), pose, &Habitats::as_words(&points));
+        habitats.add(image.dimensions(), &points, &places, self.cell_m);
+        self.frames_since += 1;
+        // A small map is learnt again at each frame, since it changes fast and costs little.
+        if self.frames_since >= FRAMES_BETWEEN || habitats.cells() < SMALL_MAP {
+            habitats.learn();
+            self.frames_since = 0;
+        } else {
+            habitats.label_new();
+        }
+        label_by(habitats, &mut self.flat);
     }
 
     /// The map after the last frame.

@@ -83,6 +83,16 @@ impl Learnt {
     }
 }
 
+/// All cells of a map as they are compared.
+struct Compared {
+    places: Vec<(i32, i32)>,
+    space: Space,
+    /// Smoothed, in the order of the places.
+    cells: Coordinates,
+    /// The number of measures that vary over the cells.
+    varying: usize,
+}
+
 impl Habitats {
     /// No habitats yet, and at most `most` at one time, at least one.
     #[must_use]
@@ -139,24 +149,24 @@ impl Habitats {
     /// Clusters a map that has grown: labels follow their cells, are merged where two mean the same, and are born where the floor calls for
     /// them. A number is never given to another habitat.
     pub fn learn(&mut self) {
-        let Some((places, space, cells, varying)) = self.coordinates() else { return };
-        let rule = self.natural(varying);
-        let centres = self.centres_of_earlier(&places, &cells);
+        let Some(map) = self.compared() else { return };
+        let rule = self.natural(map.varying);
+        let centres = self.centres_of_earlier(&map);
         let found = match centres.is_empty() {
-            true => Clusters::grow(&cells, &rule),
-            false => Clusters::continued(&cells, centres, &rule),
+            true => Clusters::grow(&map.cells, &rule),
+            false => Clusters::continued(&map.cells, centres, &rule),
         };
-        self.take(&places, space, &cells, found);
+        self.take(map, found);
     }
 
     /// Clusters the whole map as if nothing were known of it, into as many labels as are allowed, or as few as a uniform floor calls for.
     /// It depends on the sights alone; labels keep their number where their cells overlap.
     pub fn learn_whole(&mut self) {
-        let Some((places, space, cells, varying)) = self.coordinates() else { return };
-        let natural = Clusters::grow(&cells, &self.natural(varying));
+        let Some(map) = self.compared() else { return };
+        let natural = Clusters::grow(&map.cells, &self.natural(map.varying));
         let all = Rule { most: self.most as usize, variance: 0.5, cells: 24, share: 0.0, gap: 0.0 };
-        let found = if natural.centres.len() <= UNIFORM { natural } else { Clusters::grow(&cells, &all) };
-        self.take(&places, space, &cells, found);
+        let found = if natural.centres.len() <= UNIFORM { natural } else { Clusters::grow(&map.cells, &all) };
+        self.take(map, found);
     }
 
     /// The rule by which a floor has as many labels as it calls for.
@@ -165,8 +175,8 @@ impl Habitats {
         Rule { most: self.most as usize, variance: 1.0, cells: 24, share: 0.005, gap }
     }
 
-    /// The smoothed coordinates of all cells, in the order of their places, and the number of measures that vary.
-    fn coordinates(&self) -> Option<(Vec<(i32, i32)>, Space, Coordinates, usize)> {
+    /// `None` without cells.
+    fn compared(&self) -> Option<Compared> {
         let (places, values): (Vec<_>, Vec<_>) = self.sights.means().into_iter().unzip();
         let map = CellMap::new(&places);
         let space = Space::learn(&map, &values).filter(|_| !places.is_empty())?;
@@ -177,31 +187,29 @@ impl Habitats {
         };
         let varying = (0..MEASURES).filter(varies).count().max(1);
         let cells = smoothed(&map, &space.places(&values), varying);
-        Some((places, space, cells, varying))
+        Some(Compared { places, space, cells, varying })
     }
 
     /// The centres of the cells of each label that was clustered last.
-    fn centres_of_earlier(&self, places: &[(i32, i32)], cells: &Coordinates) -> Vec<Vec<f32>> {
+    fn centres_of_earlier(&self, map: &Compared) -> Vec<Vec<f32>> {
         let mut members: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
-        for (cell, place) in places.iter().enumerate() {
+        for (cell, place) in map.places.iter().enumerate() {
             if let Some(&label) = self.clustered.get(place) {
                 members.entry(label).or_default().push(cell);
             }
         }
-        members.into_values().map(|members| clusters::mean(cells, &members)).collect()
+        members.into_values().map(|members| clusters::mean(&map.cells, &members)).collect()
     }
 
-    fn take(&mut self, places: &[(i32, i32)], space: Space, cells: &Coordinates, found: Clusters) {
-        let labels = self.numbered(places, &found);
-        self.show(places, cells, &found, &labels);
+    fn take(&mut self, map: Compared, found: Clusters) {
+        let labels = self.numbered(&map.places, &found);
+        self.show(&map, &found, &labels);
         let mut counts = vec![0.0; labels.len()];
         found.of_cells.iter().for_each(|&cluster| counts[cluster] += 1.0);
         let nodes = labels.iter().zip(counts).zip(&found.centres);
         self.tree = LabelTree::of(nodes.map(|((&label, count), centre)| (label, count, centre.clone())).collect());
-        self.clustered =
-            places.iter().zip(&found.of_cells).map(|(&place, &cluster)| (place, labels[cluster])).collect();
-        let centres = labels.into_iter().zip(found.centres).collect();
-        self.learnt = Some(Learnt { space, centres });
+        self.clustered = map.places.iter().zip(&found.of_cells).map(|(&place, &of)| (place, labels[of])).collect();
+        self.learnt = Some(Learnt { space: map.space, centres: labels.into_iter().zip(found.centres).collect() });
         self.fresh.clear();
     }
 
@@ -234,9 +242,9 @@ impl Habitats {
     }
 
     /// Shows the nearest label of each cell, or still the earlier one where it is nearly as near.
-    fn show(&mut self, places: &[(i32, i32)], cells: &Coordinates, found: &Clusters, labels: &[u32]) {
-        for (cell, &place) in places.iter().enumerate() {
-            let distance = |cluster: usize| squared_distance(cells.of(cell), &found.centres[cluster]);
+    fn show(&mut self, map: &Compared, found: &Clusters, labels: &[u32]) {
+        for (cell, &place) in map.places.iter().enumerate() {
+            let distance = |cluster: usize| squared_distance(map.cells.of(cell), &found.centres[cluster]);
             let nearest = found.of_cells[cell];
             let shown = self.shown.entry(place).or_insert(labels[nearest]);
             let earlier = labels.iter().position(|label| label == shown);

@@ -4,7 +4,7 @@ use crate::key::section;
 use crate::rule::{ANY, range};
 use crate::setting::{
     BandRange, BirthRule, CalibrationSource, CameraSource, CameraStamps, Debounce, DepthSource, LabelSource, LayerName,
-    MapCells, MapStream, Votes,
+    MapCells, MapStream, SceneLabels, Votes,
 };
 use scenecast_protocol::map_codec::Codec;
 use std::collections::BTreeMap;
@@ -109,6 +109,9 @@ section! {
         /// Interpretation of gamma. literal: gamma, as in the paper; collapsed: gamma divided by the size of the
         /// vocabulary; rost: alpha times gamma divided by the size of the vocabulary, as in the program ROST.
         birth: BirthRule = BirthRule::Literal, ANY, [Auv Scenario];
+        /// The labels of the map. topics: the topics of the visual words, as in the paper; habitats: cells that look alike over all
+        /// their sights, in whatever order they were seen. alpha, beta and gamma are those of topics.
+        labels: SceneLabels = SceneLabels::Topics, ANY, [Auv Scenario];
         /// Maximum number of labels at a time. 32 show more of a reef than 16 for a third more bits; choose them where the
         /// budget allows. The number cannot be changed during a mission.
         max_labels: u32 = 16, range(2.0, 254.0, ""), [Auv Scenario];

@@ -159,6 +159,14 @@ choices! {
         Rost,
     }
 
+    /// What the labels of the scene model are.
+    SceneLabels "lowercase" {
+        /// Topics of the visual words.
+        Topics,
+        /// Cells that look alike.
+        Habitats,
+    }
+
     /// The sea floor of a rehearsal without a mosaic.
     WorldKind "lowercase" {
         /// Sand, rubble, meadows, corals and a wreck, seen through water.

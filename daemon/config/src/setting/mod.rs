@@ -14,7 +14,7 @@ mod texts;
 
 pub use choices::{
     Authenticate, AutopilotKind, BirthRule, CameraStamps, MapCells, MapStream, ModemKind, OperatorScript, RosTransport,
-    S2cMode, WorldKind,
+    S2cMode, SceneLabels, WorldKind,
 };
 pub use debounce::Debounce;
 pub use labels::{BandRange, LabelMessage, LabelSource, Votes};
