@@ -64,7 +64,7 @@ fn scores(map: &MapUpdate) -> (f64, f64) {
 fn words_with_depth_lie_at_their_true_places() {
     let dir = scratch("depth-places");
     write_relief(&dir);
-    let config = config(&dir, &["registration.enabled=false"]).unwrap();
+    let config = config(&dir, &["registration.enabled=false", "scene.labels=topics"]).unwrap();
     let (depth, block) = scores(&map(&config, |_| {}));
     let (flat_depth, flat_block) =
         scores(&map(&config, |recording| recording.frames.iter_mut().for_each(|frame| frame.depth = None)));

@@ -166,14 +166,22 @@ mod tests {
 
     #[test]
     fn a_restored_mapper_continues_like_the_saved_one() {
-        let config = config(&[]);
-        let mut whole = Mapper::new(&config, None, 3, 1).unwrap();
+        for labels in ["scene.labels=topics", "scene.labels=habitats"] {
+            assert_continues(&config(&[labels]));
+        }
+        let topics = Mapper::new(&config(&["scene.labels=topics"]), None, 3, 1).unwrap();
+        let other = Mapper::restore(&config(&["scene.labels=habitats"]), None, &topics.save(1));
+        assert!(matches!(other, Err(RestoreError::OtherParameters)));
+    }
+
+    fn assert_continues(config: &Config) {
+        let mut whole = Mapper::new(config, None, 3, 1).unwrap();
         (0..12).for_each(|at| drop(frame(&mut whole, at)));
         let shown = whole.current();
-        let Restored { mapper: mut restored, lineage } = Mapper::restore(&config, None, &whole.save(77)).unwrap();
+        let Restored { mapper: mut restored, lineage } = Mapper::restore(config, None, &whole.save(77)).unwrap();
         assert_eq!((lineage, restored.epoch(), restored.last_s()), (77, 3, Some(22.0)));
         assert_eq!(restored.current(), shown);
-        assert!(shown.cells.len() > 20 && shown.labels > 1);
+        assert!(shown.cells.len() > 20 && shown.labels > 0);
         for label in 1..=shown.labels {
             assert_eq!(restored.exemplars(label), whole.exemplars(label));
         }

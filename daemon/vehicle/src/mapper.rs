@@ -27,7 +27,7 @@ const CELL_PX: (f32, f32) = (4.0, 400.0);
 
 /// Frames after which the habitats are learnt again, and cells of a map that is learnt at each frame.
 const FRAMES_BETWEEN: u32 = 10;
-const SMALL_MAP: usize = 400;
+const SMALL_MAP: usize = 2000;
 
 /// Gives cells the labels of habitats; a cell that no frame has shown well enough is left out.
 pub(super) fn label_by(habitats: &Habitats, cells: &mut Vec<FlatCell>) {

@@ -111,7 +111,7 @@ section! {
         birth: BirthRule = BirthRule::Literal, ANY, [Auv Scenario];
         /// The labels of the map. topics: the topics of the visual words, as in the paper; habitats: cells that look alike over all
         /// their sights, in whatever order they were seen. alpha, beta and gamma are those of topics.
-        labels: SceneLabels = SceneLabels::Topics, ANY, [Auv Scenario];
+        labels: SceneLabels = SceneLabels::Habitats, ANY, [Auv Scenario];
         /// Maximum number of labels at a time. 32 show more of a reef than 16 for a third more bits; choose them where the
         /// budget allows. The number cannot be changed during a mission.
         max_labels: u32 = 16, range(2.0, 254.0, ""), [Auv Scenario];

@@ -60,7 +60,9 @@ impl InferenceBench {
     /// The configurations to compare, each with its name.
     fn settings(&self) -> Result<Vec<(String, Config)>, UserError> {
         let load = |varied: Option<String>| {
-            let config = self.surveys.config(self.sets.iter().chain(&varied))?;
+            // Refinement and batch are those of topics.
+            let topics = "scene.labels=topics".to_owned();
+            let config = self.surveys.config(std::iter::once(&topics).chain(&self.sets).chain(&varied))?;
             Ok((varied.unwrap_or_else(|| "as set".to_owned()), config))
         };
         let Some(curve) = &self.curve else { return Ok(vec![load(None)?]) };

@@ -206,7 +206,13 @@ mod tests {
     #[test]
     fn more_refinement_brings_the_online_map_to_the_batch() {
         let setting = |words_per_s: u32| {
-            let sets = ["survey.duration_s=120", "camera.width_px=320", "camera.height_px=240", "operator.script=none"];
+            let sets = [
+                "survey.duration_s=120",
+                "camera.width_px=320",
+                "camera.height_px=240",
+                "operator.script=none",
+                "scene.labels=topics",
+            ];
             let words = format!("scene.refine_words_per_s={words_per_s}");
             let sets: Vec<String> = sets.into_iter().map(str::to_owned).chain([words.clone()]).collect();
             (words, scenecast_config::load(None, &sets).unwrap())
