@@ -25,10 +25,6 @@ const EXEMPLARS_KEPT: usize = 4;
 /// Smallest and largest edge of a cell in frames whose view gives the size of their pixels, pixels.
 const CELL_PX: (f32, f32) = (4.0, 400.0);
 
-/// Frames after which the habitats are learnt again, and cells of a map that is learnt at each frame.
-const FRAMES_BETWEEN: u32 = 10;
-const SMALL_MAP: usize = 2000;
-
 /// Gives cells the labels of habitats; a cell that no frame has shown well enough is left out.
 pub(super) fn label_by(habitats: &Habitats, cells: &mut Vec<FlatCell>) {
     cells.retain_mut(|cell| {
@@ -66,8 +62,6 @@ pub struct Mapper {
     pub(super) online: OnlineInference,
     /// `None` if the labels are topics.
     pub(super) habitats: Option<Habitats>,
-    /// Frames since the habitats were learnt.
-    pub(super) frames_since: u32,
     pub(super) book: LabelBook,
     pub(super) exemplars: ExemplarStore,
     /// The exemplars of the last [`Mapper::shared_exemplars`].
@@ -138,7 +132,6 @@ impl Mapper {
             model: SceneModel::new(scene).map_err(|e| UserError::Input(format!("scene.{e}")))?,
             online: OnlineInference::default(),
             habitats: (config.scene.labels == SceneLabels::Habitats).then(|| Habitats::new(config.scene.max_labels)),
-            frames_since: 0,
             book: LabelBook::new(epoch),
             exemplars: ExemplarStore::new(EXEMPLARS_KEPT, PATCH_PX)
                 .with_distance(f64::from(PATCH_PX) * config.camera.metres_per_pixel),
@@ -237,14 +230,7 @@ impl Mapper {
         let points = measure(image, cell_px);
         let places = projection.project(image.dimensions(), pose, &Habitats::as_words(&points));
         habitats.add(image.dimensions(), &points, &places, self.cell_m);
-        self.frames_since += 1;
-        // A small map is learnt again at each frame, since it changes fast and costs little.
-        if self.frames_since >= FRAMES_BETWEEN || habitats.cells() < SMALL_MAP {
-            habitats.learn();
-            self.frames_since = 0;
-        } else {
-            habitats.label_new();
-        }
+        habitats.update();
         label_by(habitats, &mut self.flat);
     }
 

@@ -46,6 +46,9 @@ use std::collections::BTreeMap;
 
 /// A cell keeps its label unless another centre is nearer by this, squared units of the noise between neighbours.
 const HYSTERESIS: f32 = 1.5;
+/// Frames after which a map is learnt again, and cells of a map that is learnt at each frame.
+const FRAMES_BETWEEN: u32 = 10;
+const SMALL_MAP: usize = 2000;
 /// Fewest points of a cell in a frame.
 const MIN_POINTS: f64 = 4.0;
 /// Least deviation over the cells of a measure that varies.
@@ -61,8 +64,9 @@ pub struct Habitats {
     /// The label of each cell after the last [`Habitats::learn`], by (y, x): as clustered, and as shown.
     clustered: BTreeMap<(i32, i32), u32>,
     shown: BTreeMap<(i32, i32), u32>,
-    /// Cells seen since, of which some have no label.
+    /// Cells without a label that have been seen since, and the frames since.
     fresh: Vec<(i32, i32)>,
+    frames: u32,
     learnt: Option<Learnt>,
     next: u32,
     tree: LabelTree,
@@ -103,6 +107,7 @@ impl Habitats {
             clustered: BTreeMap::new(),
             shown: BTreeMap::new(),
             fresh: Vec::new(),
+            frames: 0,
             learnt: None,
             next: 0,
             tree: LabelTree::default(),
@@ -129,18 +134,28 @@ impl Habitats {
         }
         for (place, sight) in sights.into_iter().filter(|(_, sight)| sight.points() >= MIN_POINTS) {
             self.sights.add(place, &sight);
-            self.fresh.push(place);
+            if !self.shown.contains_key(&place) {
+                self.fresh.push(place);
+            }
+        }
+        self.frames += 1;
+    }
+
+    /// Labels the cells of the frames that were added: a small map is learnt again, since it changes fast and costs little, and a large
+    /// one every ten frames; until then new cells have the label whose centre is nearest.
+    pub fn update(&mut self) {
+        if self.frames >= FRAMES_BETWEEN || self.cells() < SMALL_MAP {
+            self.learn();
+        } else {
+            self.label_new();
         }
     }
 
-    /// Gives cells that have been seen since [`Habitats::learn`] the label whose centre is nearest.
-    pub fn label_new(&mut self) {
+    fn label_new(&mut self) {
         let Some(learnt) = &self.learnt else { return };
-        for place in std::mem::take(&mut self.fresh) {
-            if self.shown.contains_key(&place) {
-                continue;
-            }
-            if let Some(label) = self.sights.mean(place).and_then(|values| learnt.nearest(&values)) {
+        let fresh = std::mem::take(&mut self.fresh);
+        for (place, values) in self.sights.means_of(&fresh) {
+            if let Some(label) = learnt.nearest(&values) {
                 self.shown.insert(place, label);
             }
         }
@@ -211,6 +226,7 @@ impl Habitats {
         self.clustered = map.places.iter().zip(&found.of_cells).map(|(&place, &of)| (place, labels[of])).collect();
         self.learnt = Some(Learnt { space: map.space, centres: labels.into_iter().zip(found.centres).collect() });
         self.fresh.clear();
+        self.frames = 0;
     }
 
     /// The label of each cluster: of the earlier labels that share cells with it, the one that shares most and is not taken.

@@ -80,9 +80,10 @@ impl Sights {
         self.cells.iter().map(|(&place, cell)| (place, cell.mean(&lamp))).collect()
     }
 
-    /// The mean of the cell at (y, x).
-    pub(crate) fn mean(&self, place: (i32, i32)) -> Option<MeasuredValues> {
-        self.cells.get(&place).map(|cell| cell.mean(&self.lamp()))
+    /// As [`Sights::means`], of some cells.
+    pub(crate) fn means_of(&self, places: &[(i32, i32)]) -> Vec<((i32, i32), MeasuredValues)> {
+        let lamp = self.lamp();
+        places.iter().filter_map(|&place| Some((place, self.cells.get(&place)?.mean(&lamp)))).collect()
     }
 
     /// The share of each term in each measure: a regression within cells, which the sea floor does not enter.
