@@ -12,7 +12,7 @@ pub use command::{
     CommandChangeName, CommandChangeState, CommandHolderState, CommandRequestState, CommandState, PrincipalInfo,
     PrincipalRole,
 };
-pub use labels::{ExemplarImage, ExemplarProgress, ExemplarStage, MapLabel};
+pub use labels::{ExemplarImage, ExemplarProgress, ExemplarStage, MapLabel, MapLabelTree};
 pub use link::{ChannelQuality, LinkDirection, LinkRates, LinkSummary, ReportedBacklog, VehicleChannel};
 pub use log::{LogLine, LogList};
 pub use map::{

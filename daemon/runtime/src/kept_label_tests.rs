@@ -72,6 +72,7 @@ impl TopicScene {
             layers,
             perplexity,
             labels: self.book.labels().count() as u8,
+            tree: None,
         }
     }
 

@@ -3,6 +3,7 @@
 use super::vehicle_record::{SentOrder, VehicleRecord};
 use scenecast_protocol::directive::{OrderStatus, Slot, SlotId};
 use scenecast_protocol::link::{InForce, PeerView};
+use scenecast_protocol::map::MAX_LABEL;
 
 /// The version of an order in force that another surface, or an earlier run of this one, has given.
 const VERSION_OF_OTHERS: u16 = 0;
@@ -29,7 +30,8 @@ pub(super) fn follow(record: &mut VehicleRecord, view: &PeerView<'_>) {
         (view.in_force(SlotId::Utility), status(view, SlotId::Utility))
         && utility.epoch == record.epoch
     {
-        record.utility = utility.clone();
+        // How many labels there were when another surface sent it is not known.
+        (record.utility, record.weighed) = (utility.clone(), MAX_LABEL);
     }
     if let (InForce::Known(Slot::Settings(settings)), None) =
         (view.in_force(SlotId::Settings), status(view, SlotId::Settings))

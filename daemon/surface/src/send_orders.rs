@@ -41,9 +41,11 @@ impl Surface {
                 utility.weights.insert(label, weight);
             }
         }
+        let reported = self.status(vehicle).map_or(0, |(status, _)| status.labels);
         let record = self.records.get_mut(&vehicle).ok_or("no such vehicle")?;
         utility.epoch = record.epoch;
         record.utility = utility.clone();
+        record.weighed = known.keys().last().map_or(reported, |&highest| highest.max(reported));
         self.issue(vehicle, Slot::Utility(utility), now)
     }
 

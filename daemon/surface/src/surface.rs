@@ -285,7 +285,7 @@ impl Surface {
                 Some(SurfaceOutput::VehicleFound(vehicle))
             }
             SurfaceEvent::MapChanged(vehicle) => Some(SurfaceOutput::MapChanged(vehicle)),
-            SurfaceEvent::LabelNamed(vehicle) => self.follow_names(vehicle),
+            SurfaceEvent::LabelNamed(vehicle) | SurfaceEvent::LabelsJoined(vehicle) => self.follow_labels(vehicle),
             SurfaceEvent::VehicleRestarted(vehicle) => {
                 self.records.get_mut(&vehicle).into_iter().for_each(VehicleRecord::begin_run);
                 self.log_fact(vehicle, LogKind::Contact, "another run begins", now);
@@ -314,7 +314,7 @@ impl Surface {
                 self.relay.iter_mut().for_each(|relay| relay.handle_depth(vehicle, status.depth_m, now));
                 self.log_mode(vehicle, now);
                 self.log_faults(vehicle, now);
-                self.follow_names(vehicle);
+                self.follow_labels(vehicle);
                 self.follow_in_force(vehicle)
             }
             SurfaceEvent::InForceLearned(vehicle, _) => self.follow_in_force(vehicle),
@@ -343,9 +343,12 @@ impl Surface {
     }
 
     /// Labels of the present epoch have the names that the vehicle gives them, until the operator gives them others.
-    fn follow_names(&mut self, vehicle: Address) -> Option<SurfaceOutput> {
+    /// Takes names and tree of the labels, once the status has told their epoch.
+    fn follow_labels(&mut self, vehicle: Address) -> Option<SurfaceOutput> {
         let view = self.link.vehicle(vehicle).filter(|view| view.status().is_some())?;
-        self.records.get_mut(&vehicle)?.handle_names(view.classes());
+        let record = self.records.get_mut(&vehicle)?;
+        record.handle_names(view.classes());
+        record.tree = view.tree().cloned().or_else(|| record.tree.take());
         Some(SurfaceOutput::Changed(vehicle))
     }
 

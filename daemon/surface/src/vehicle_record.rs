@@ -12,7 +12,7 @@ use scenecast_core::UsblLine;
 use scenecast_protocol::directive::{Areas, Destination, ExemplarRequests, Fence, Limits, SlotId, Utility};
 use scenecast_protocol::exemplar::Exemplar;
 use scenecast_protocol::link::PeerView;
-use scenecast_protocol::map::{ClassEntry, ClassReplica, LabelGrid};
+use scenecast_protocol::map::{ClassEntry, ClassReplica, LabelGrid, LabelTree, MAX_LABEL};
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::VehicleStatus;
 use std::collections::BTreeMap;
@@ -67,8 +67,9 @@ struct RestoredContact {
 #[derive(Debug)]
 pub struct VehicleRecord {
     pub name: String,
-    /// The last utility that was sent.
+    /// The last utility that was sent, and the highest label at that time.
     pub utility: Utility,
+    pub weighed: u8,
     pub fence: SentOrder<Fence>,
     pub limits: SentOrder<Limits>,
     pub areas: SentOrder<Areas>,
@@ -91,6 +92,8 @@ pub struct VehicleRecord {
     /// The last measurement of the surface's modem, and its time.
     pub found: Option<(UsblLine, Instant)>,
     pub annotations: Annotations,
+    /// The last tree of the labels of this epoch.
+    pub tree: Option<LabelTree>,
     /// The names and colours that the vehicle has given its labels in this run.
     classes: BTreeMap<u8, ClassEntry>,
     restored: RestoredContact,
@@ -107,6 +110,7 @@ impl VehicleRecord {
         Self {
             name,
             utility: Utility::default(),
+            weighed: MAX_LABEL,
             fence: SentOrder::default(),
             limits: SentOrder::default(),
             areas: SentOrder::default(),
@@ -123,6 +127,7 @@ impl VehicleRecord {
             pauses: Pauses::default(),
             found: None,
             annotations: Annotations::default(),
+            tree: None,
             classes: BTreeMap::new(),
             restored: RestoredContact::default(),
         }
@@ -180,6 +185,18 @@ impl VehicleRecord {
         self.classes = classes.iter().map(|entry| (entry.label(), entry.clone())).collect();
     }
 
+    /// The tree of the labels of the map in view, if one is known.
+    pub fn tree_in_view(&self) -> Option<&LabelTree> {
+        self.tree.as_ref().filter(|_| self.earlier_map().is_none_or(|earlier| earlier.epoch == self.epoch))
+    }
+
+    /// The weight of a label: the one that was sent, or that of the nearest relative of a label that the vehicle assigned later.
+    pub fn weight(&self, label: u8) -> f64 {
+        let relative = || self.tree.as_ref()?.nearest(label, |other| other <= self.weighed);
+        let known = if label > self.weighed { relative().unwrap_or(label) } else { label };
+        self.utility.weight(known)
+    }
+
     /// Sets name, colour and merging of a label in the current epoch; without a name or a colour it has those that the
     /// vehicle gives it. The error is one line for the operator.
     pub fn set_label(&mut self, label: u8, book: StoredLabel) -> Result<(), String> {
@@ -211,9 +228,10 @@ impl VehicleRecord {
         self.restored = RestoredContact::default();
         if status.epoch != self.epoch {
             self.epoch = status.epoch;
-            self.utility = Utility { epoch: status.epoch, ..Utility::default() };
+            (self.utility, self.weighed) = (Utility { epoch: status.epoch, ..Utility::default() }, MAX_LABEL);
             self.exemplars = ExemplarCache::default();
             self.annotations.handle_epoch();
+            self.tree = None;
             self.classes.clear();
             self.gains = LabelGains::default();
         }

@@ -5,7 +5,7 @@ use super::picker::{Judge, PATCH_PX};
 use super::relief::Relief;
 use image::RgbImage;
 use scene_model::exemplars::{ExemplarPatch, ExemplarStore};
-use scene_model::habitats::{Habitats, measure};
+use scene_model::habitats::{Habitats, LabelTree as HabitatTree, measure};
 use scene_model::online::OnlineInference;
 use scene_model::project::{DownCamera, Pose};
 use scene_model::publish::{LabelBook, PublishedCell};
@@ -14,7 +14,7 @@ use scene_model::words::{FlatField, Measures, Word, WordConfig, WordExtractor};
 use scenecast_config::{BirthRule, Config, SceneLabels, cell_m};
 use scenecast_core::UserError;
 use scenecast_protocol::directive::{Change, Registration, Settings, ShortDecimal};
-use scenecast_protocol::map::{Cell, LayerId};
+use scenecast_protocol::map::{Cell, LabelTree, LayerId};
 use scenecast_registration::Registrar;
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -28,8 +28,8 @@ const CELL_PX: (f32, f32) = (4.0, 400.0);
 /// Gives cells the labels of habitats; a cell that no frame has shown well enough is left out.
 pub(super) fn label_by(habitats: &Habitats, cells: &mut Vec<FlatCell>) {
     cells.retain_mut(|cell| {
-        let label = habitats.label_at(cell.x, cell.y);
-        label.inspect(|&label| cell.topic = TopicId(label)).is_some()
+        let shown = habitats.cell(cell.x, cell.y);
+        shown.inspect(|shown| (cell.topic, cell.confidence) = (TopicId(shown.label), shown.confidence)).is_some()
     });
 }
 
@@ -49,6 +49,25 @@ pub struct MapUpdate {
     pub labels: u8,
     /// The perplexity of each cell under the model.
     pub perplexity: Vec<(Cell, f32)>,
+    /// Which labels become one at coarser cuts; `None` where that is not known.
+    pub tree: Option<LabelTree>,
+}
+
+/// The tree of the labels that are published.
+fn published_tree(habitats: &HabitatTree, book: &LabelBook) -> Option<LabelTree> {
+    let mut merges = Vec::new();
+    // The label that stands for a habitat and those that have joined it, other than its own.
+    let mut standing: BTreeMap<u32, u8> = BTreeMap::new();
+    for &(into, joins) in habitats.merges() {
+        let label = |habitat: u32| standing.get(&habitat).copied().or_else(|| book.label_of(TopicId(habitat)));
+        match (label(into), label(joins)) {
+            (Some(into), Some(joins)) => merges.push((into, joins)),
+            (None, Some(label)) => _ = standing.insert(into, label),
+            (_, None) => {}
+        }
+    }
+    let clearest = habitats.clearest().filter(|&count| count <= merges.len());
+    LabelTree::new(merges, clearest.map(|count| count as u8))
 }
 
 /// The scene model of one vehicle.
@@ -260,6 +279,7 @@ impl Mapper {
             layers: BTreeMap::from(layers),
             perplexity: published.iter().map(|c| (place(c), c.perplexity)).collect(),
             labels: self.book.labels().count() as u8,
+            tree: self.habitats.as_ref().and_then(|habitats| published_tree(habitats.tree(), &self.book)),
         }
     }
 

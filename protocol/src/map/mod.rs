@@ -11,10 +11,12 @@ mod digest;
 #[allow(clippy::indexing_slicing)] // A place in a tile is less than its size.
 mod dirty;
 mod layer;
+mod parts;
 mod replica;
 mod source;
 mod stream;
 mod tiles;
+mod tree;
 mod value;
 
 pub use crate::grid::{Cell, LabelGrid, MAX_LABEL, Rect, TILE, UNEXPLORED};
@@ -22,10 +24,14 @@ pub use class::{ClassChunk, ClassEntry, ClassReplica, ClassSource, MAX_CLASS};
 pub use debounce::{Hold, MAX_CONFIDENCE};
 pub use digest::MapDigest;
 pub use layer::{
-    Assembly, BUILT_IN_LAYERS, BuiltInLayer, Decimal, DescriptorPart, LayerCarried, LayerChunk, LayerDescriptor,
-    LayerId, LayerMask, LayerReplica, LayerSet, LayerSource, Palette, Quantity, Spread, Steps, UpperEnd,
+    BUILT_IN_LAYERS, BuiltInLayer, Decimal, LayerCarried, LayerChunk, LayerDescriptor, LayerId, LayerMask,
+    LayerReplica, LayerSet, LayerSource, Palette, Quantity, Spread, Steps, UpperEnd,
 };
+pub(crate) use parts::TextAssembly;
+pub use parts::TextPart;
+use parts::TextSender;
 pub use replica::Replica;
 pub use source::MapSource;
 pub use stream::{StateReplica, StateSource};
 pub use tiles::{REPLICA_TILE, ReplicaTile, ReplicaTileKey, SharedTiles};
+pub use tree::{LabelTree, TreeReplica, TreeSource};

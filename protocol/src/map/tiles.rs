@@ -49,6 +49,12 @@ impl ReplicaTile {
         self.received.iter().map(|&index| Some(self.reception(index)?.at))
     }
 
+    /// The tile with other labels, which `label` gives for those of this one.
+    #[must_use]
+    pub fn relabelled(&self, label: impl Fn(u8) -> u8) -> Self {
+        Self { labels: self.labels.map(label), ..self.clone() }
+    }
+
     /// The tiles of a map of which no times are known.
     pub fn tiles_of(grid: &LabelGrid) -> SharedTiles {
         let mut tiles = SharedTiles::new();

@@ -31,13 +31,15 @@ pub enum ChunkKind {
     LabelClass,
     /// The faults of the vehicle's equipment at the time of a pose.
     Faults,
+    /// A part of the tree of labels.
+    LabelTree,
 }
 
 /// The code after which the first byte of the payload names the kind.
 const EXTENDED: u8 = 7;
 
 impl ChunkKind {
-    const ALL: [Self; 14] = [
+    const ALL: [Self; 15] = [
         Self::Map,
         Self::Pose,
         Self::Slot,
@@ -52,6 +54,7 @@ impl ChunkKind {
         Self::Registration,
         Self::LabelClass,
         Self::Faults,
+        Self::LabelTree,
     ];
 
     /// The code in the header of the chunk, and the byte that begins the payload of an extended kind.
@@ -71,6 +74,7 @@ impl ChunkKind {
             Self::Registration => (EXTENDED, Some(5)),
             Self::LabelClass => (EXTENDED, Some(6)),
             Self::Faults => (EXTENDED, Some(7)),
+            Self::LabelTree => (EXTENDED, Some(8)),
         }
     }
 }
@@ -83,7 +87,7 @@ impl ChunkKind {
 /// |kind | length  | [more length]  | payload   |
 /// +-----+---------+----------------+-----------+
 /// kind     0 end of the frame's content, 1 map, 2 pose, 3 slot, 4 object, 5 report, 6 layer;
-///          7 extended: the first byte of the payload is 0 introduction, 1 content in force, 2 inquiry, 3 trail, 4 intent, 5 registration, 6 class, 7 faults;
+///          7 extended: the first byte of the payload is 0 introduction, 1 content in force, 2 inquiry, 3 trail, 4 intent, 5 registration, 6 class, 7 faults, 8 tree;
 ///          any other value, or no payload: skipped
 /// length   0..26 bytes of payload; 27..30: 27 + 256 x (length - 27) + next byte; 31: to the end of the frame
 /// ```

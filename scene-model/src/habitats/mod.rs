@@ -56,6 +56,15 @@ const CONSTANT: f64 = 1e-3;
 /// A floor that calls for at most so many labels is uniform: more would be noise.
 const UNIFORM: usize = 3;
 
+/// The label of a cell.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct HabitatCell {
+    /// The number of the habitat.
+    pub label: u32,
+    /// The probability of this label among all, where each spreads around its centre as neighbours differ, 0 to 1.
+    pub confidence: f32,
+}
+
 /// The habitats of one mission.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Habitats {
@@ -63,7 +72,7 @@ pub struct Habitats {
     sights: Sights,
     /// The label of each cell after the last [`Habitats::learn`], by (y, x): as clustered, and as shown.
     clustered: BTreeMap<(i32, i32), u32>,
-    shown: BTreeMap<(i32, i32), u32>,
+    shown: BTreeMap<(i32, i32), HabitatCell>,
     /// Cells without a label that have been seen since, and the frames since.
     fresh: Vec<(i32, i32)>,
     frames: u32,
@@ -80,11 +89,17 @@ struct Learnt {
 }
 
 impl Learnt {
-    fn nearest(&self, values: &MeasuredValues) -> Option<u32> {
+    fn nearest(&self, values: &MeasuredValues) -> Option<HabitatCell> {
         let place = self.space.place(values);
-        let distances = self.centres.iter().map(|(label, centre)| (squared_distance(&place, centre), *label));
-        distances.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, label)| label)
+        let distances: Vec<f32> = self.centres.iter().map(|(_, centre)| squared_distance(&place, centre)).collect();
+        let (nearest, _) = distances.iter().enumerate().min_by(|a, b| a.1.total_cmp(b.1))?;
+        Some(HabitatCell { label: self.centres[nearest].0, confidence: confidence(&distances, nearest) })
     }
+}
+
+/// The probability of a cluster, where each spreads with unit variance: `distances` are squared.
+fn confidence(distances: &[f32], cluster: usize) -> f32 {
+    1.0 / distances.iter().map(|distance| ((distances[cluster] - distance) / 2.0).exp()).sum::<f32>()
 }
 
 /// All cells of a map as they are compared.
@@ -155,8 +170,8 @@ impl Habitats {
         let Some(learnt) = &self.learnt else { return };
         let fresh = std::mem::take(&mut self.fresh);
         for (place, values) in self.sights.means_of(&fresh) {
-            if let Some(label) = learnt.nearest(&values) {
-                self.shown.insert(place, label);
+            if let Some(cell) = learnt.nearest(&values) {
+                self.shown.insert(place, cell);
             }
         }
     }
@@ -222,7 +237,8 @@ impl Habitats {
         let mut counts = vec![0.0; labels.len()];
         found.of_cells.iter().for_each(|&cluster| counts[cluster] += 1.0);
         let nodes = labels.iter().zip(counts).zip(&found.centres);
-        self.tree = LabelTree::of(nodes.map(|((&label, count), centre)| (label, count, centre.clone())).collect());
+        let nodes = nodes.map(|((&label, count), centre)| (label, count, centre.clone())).collect();
+        self.tree = LabelTree::of(nodes, &self.tree);
         self.clustered = map.places.iter().zip(&found.of_cells).map(|(&place, &of)| (place, labels[of])).collect();
         self.learnt = Some(Learnt { space: map.space, centres: labels.into_iter().zip(found.centres).collect() });
         self.fresh.clear();
@@ -260,26 +276,34 @@ impl Habitats {
     /// Shows the nearest label of each cell, or still the earlier one where it is nearly as near.
     fn show(&mut self, map: &Compared, found: &Clusters, labels: &[u32]) {
         for (cell, &place) in map.places.iter().enumerate() {
-            let distance = |cluster: usize| squared_distance(map.cells.of(cell), &found.centres[cluster]);
+            let distances: Vec<f32> =
+                found.centres.iter().map(|centre| squared_distance(map.cells.of(cell), centre)).collect();
             let nearest = found.of_cells[cell];
-            let shown = self.shown.entry(place).or_insert(labels[nearest]);
-            let earlier = labels.iter().position(|label| label == shown);
-            if earlier.is_none_or(|earlier| distance(earlier) - distance(nearest) >= HYSTERESIS) {
-                *shown = labels[nearest];
-            }
+            let earlier =
+                self.shown.get(&place).and_then(|shown| labels.iter().position(|&label| label == shown.label));
+            let kept = earlier.filter(|&earlier| distances[earlier] - distances[nearest] < HYSTERESIS);
+            let cluster = kept.unwrap_or(nearest);
+            let shown = HabitatCell { label: labels[cluster], confidence: confidence(&distances, cluster) };
+            self.shown.insert(place, shown);
         }
     }
 
-    /// The label of the cell at (x, y); `None` until it has been learnt.
+    /// The cell at (x, y); `None` until it has been labelled.
+    #[must_use]
+    pub fn cell(&self, x: i32, y: i32) -> Option<HabitatCell> {
+        self.shown.get(&(y, x)).copied()
+    }
+
+    /// The label of the cell at (x, y); `None` until it has been labelled.
     #[must_use]
     pub fn label_at(&self, x: i32, y: i32) -> Option<u32> {
-        self.shown.get(&(y, x)).copied()
+        self.cell(x, y).map(|cell| cell.label)
     }
 
     /// The number of labels that cells show.
     #[must_use]
     pub fn labels(&self) -> usize {
-        let mut labels: Vec<u32> = self.shown.values().copied().collect();
+        let mut labels: Vec<u32> = self.shown.values().map(|cell| cell.label).collect();
         labels.sort_unstable();
         labels.dedup();
         labels.len()
@@ -291,7 +315,7 @@ impl Habitats {
         self.sights.len()
     }
 
-    /// Which labels become one at coarser levels.
+    /// Which labels become one at coarser cuts.
     #[must_use]
     pub fn tree(&self) -> &LabelTree {
         &self.tree

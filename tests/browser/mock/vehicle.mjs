@@ -16,6 +16,13 @@ export const LAYERS = [
   { name: "curiosity", unit: "bit", edges: equal(2, 1, 9), palette: "inferno", spread: "common", is_depth: false, at: surprise },
 ];
 
+/** A tree in which the highest label joins the first one, the next the second, and so on. */
+function treeOf(ids) {
+  if (ids.length < 3) return null;
+  const merges = ids.slice(1).reverse().map((joins, k) => [ids[k % Math.max(1, ids.indexOf(joins))], joins]);
+  return { merges, clearest: merges.length };
+}
+
 export class Vehicle {
   constructor(id, { turnS = 12, speed = 0.9, legs = { width: 24, height: 15, x: -9, y: -5 }, cellM = 0.25, footprint = 1.4 } = {}) {
     Object.assign(this, { id, turnS, speed, legs, footprint });
@@ -196,6 +203,7 @@ export class Vehicle {
       labels: counts.map(([id, cells]) => ({
         id, cells, area_m2: cells * area, gained_m2: (id % 2 ? 0.25 : -0.125) * cells * area, weight: this.weights.get(id) ?? 0, exemplar: this.exemplarJson(id),
       })),
+      label_tree: treeOf(counts.map(([id]) => id)),
       draft: this.draft, utility: this.terms, fence: this.fence, limits: this.limits, areas: this.areas, destination: this.destination, planner: this.planner, settings: this.settings.json(),
       in_force: { utility: "known", settings: "none", budget: "known", limits: this.inForce.limits ? "known" : "none", fence: this.inForce.fence ? "known" : "none", areas: this.inForce.areas ? "known" : "none", destination: this.inForce.destination ? "known" : "none", ...this.knownInForce },
       fence_in_force: this.inForce.fence ?? null, limits_in_force: this.inForce.limits ?? null,

@@ -277,6 +277,38 @@ export default [
     },
   },
   {
+    name: "fewer labels are shown by the slider, and a weight of a group is sent for each label in it",
+    scenario: "rich",
+    async run(s) {
+      const rows = () => s.page.locator(".label").count();
+      const { labels, label_tree } = await s.vehicle();
+      const [into, joins] = label_tree.merges[0];
+      const own = labels.find((l) => l.id === joins).weight;
+      await s.until("all labels", async () => (await rows()) === labels.length);
+      await s.shows(".cut .value", new RegExp(`${labels.length} of ${labels.length}`));
+      await s.page.locator("#label-cut").fill(String(labels.length - 1));
+      await s.until("one label fewer", async () => (await rows()) === labels.length - 1);
+      await s.shows(`.label[data-key='${into}'] .name`, /\+1/);
+      const group = labels.filter((l) => [into, joins].includes(l.id)).reduce((sum, l) => sum + l.area_m2, 0);
+      const shown = await s.page.locator(`.label[data-key='${into}'] .area`).innerText();
+      assert.equal(parseFloat(shown.replaceAll("\u202f", "")).toFixed(1), group.toFixed(1));
+      const posts = () => s.posts.filter((p) => p.path.endsWith("/utility"));
+      await s.page.locator("#exploration").fill("0.45");
+      await send(s).click();
+      await s.until("the message", () => posts().length === 1);
+      assert.equal(posts()[0].body.weights[joins], own, "a label keeps its weight until its group is given one");
+      await slider(s, `Label ${into}`).fill("0.35");
+      await send(s).click();
+      await s.until("the second message", () => posts().length === 2);
+      assert.deepEqual([into, joins].map((id) => posts()[1].body.weights[id]), [0.35, 0.35]);
+      await s.page.reload();
+      await s.ready();
+      await s.until("the cut after a reload", async () => (await rows()) === labels.length - 1);
+      await s.page.locator("#label-cut").fill(String(labels.length));
+      await s.until("all labels again", async () => (await rows()) === labels.length);
+    },
+  },
+  {
     name: "weights of unexplored and surprising cells are sent too",
     async run(s) {
       await firstLabels(s);

@@ -80,13 +80,38 @@ function take() {
 }
 store.on("state select", take);
 
-/** The label that `id` is shown as: itself, or the label that it was merged into. */
+/** The number of labels that the vehicle's tree can tell apart; 0 without a tree. */
+export const finestCut = (vehicle) => (vehicle?.label_tree ? vehicle.label_tree.merges.length + 1 : 0);
+
+/** The number of labels at the cut in view. The operator's choice stays in this browser; without one all labels are shown. */
+export function cut(vehicle) {
+  const finest = finestCut(vehicle);
+  return Math.min(finest, recall("label-cut", finest) ?? finest);
+}
+
+/** Cuts the tree at `count` labels; null: all labels, also those to come. */
+export function setCut(count) {
+  remember("label-cut", count);
+  store.emit("book");
+}
+
+/** The label that stands for `id` at the cut in view. */
+function groupOf(id) {
+  const { vehicle } = store;
+  const merges = vehicle?.label_tree?.merges ?? [];
+  return merges.slice(0, finestCut(vehicle) - cut(vehicle)).reduce((at, [into, joins]) => (at === joins ? into : at), id);
+}
+
+/** The label that `id` is shown as: itself, the label that it was merged into, or the one that stands for it at the cut in view. */
 export function shownAs(id) {
   const { merged } = current();
-  let at = id;
-  for (let i = 0; merged[at] && i < 254; i += 1) at = merged[at];
+  let at = groupOf(id);
+  for (let i = 0; merged[at] && i < 254; i += 1) at = groupOf(merged[at]);
   return at;
 }
+
+/** Whether the operator has merged `id`, or the label that stands for it, into another one. */
+export const isMerged = (id) => Boolean(current().merged[id] ?? current().merged[groupOf(id)]);
 
 export const nameOf = (id) => current().names[id] ?? `Label ${id}`;
 export const hasName = (id) => current().names[id] !== undefined;

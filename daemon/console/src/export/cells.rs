@@ -4,10 +4,11 @@ use crate::state::{LayerBody, MapBody, VehicleMarker};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use scenecast_protocol::map::{
-    Cell, LabelGrid, LayerDescriptor, Quantity, REPLICA_TILE, Rect, ReplicaTile, ReplicaTileKey,
+    Cell, LabelGrid, LabelTree, LayerDescriptor, Quantity, REPLICA_TILE, Rect, ReplicaTile, ReplicaTileKey,
 };
 use scenecast_protocol::time::Instant;
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 /// Tiles by row and column. The surface shares them, so a clone costs little and stays as it is.
 pub(crate) use scenecast_protocol::map::SharedTiles as Tiles;
@@ -30,6 +31,8 @@ pub struct MapCells {
     pub moved_m: (f64, f64),
     /// The operator's names of labels.
     pub names: BTreeMap<u8, String>,
+    /// Which labels become one at coarser cuts, if that is known.
+    pub tree: Option<LabelTree>,
     /// The operator's markers.
     pub markers: Vec<VehicleMarker>,
     pub(crate) tiles: Tiles,
@@ -119,10 +122,21 @@ impl MapCells {
             cell_m,
             moved_m: (0.0, 0.0),
             names: BTreeMap::new(),
+            tree: None,
             markers: Vec::new(),
             tiles: ReplicaTile::tiles_of(grid),
             layers: Vec::new(),
         }
+    }
+
+    /// The map with its tree cut at `count` labels, each of which stands for those that have joined it.
+    #[must_use]
+    pub fn cut(mut self, count: usize) -> Self {
+        if let Some(tree) = &self.tree {
+            let group = |label: u8| tree.group_of(label, count);
+            self.tiles.values_mut().for_each(|tile| *tile = Arc::new(tile.relabelled(group)));
+        }
+        self
     }
 
     /// The cells of a region, by default of the bounds. The error is one line for people.

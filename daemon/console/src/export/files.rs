@@ -113,3 +113,20 @@ pub(super) fn csv(cells: &MapCells) -> String {
     out.push('\n');
     out
 }
+
+/// A line for each label of the map: its name, cells and area, and at each cut of the tree the label that stands for it.
+pub(super) fn labels(cells: &MapCells) -> String {
+    let mut counts: BTreeMap<u8, u32> = BTreeMap::new();
+    cells.explored().for_each(|c| *counts.entry(c.label).or_default() += 1);
+    let cuts = || (2..=cells.tree.as_ref().map_or(0, |tree| tree.merges().len())).rev();
+    let mut out = String::from("label,name,cells,area_m2");
+    cuts().for_each(|count| _ = write!(out, ",of_{count}"));
+    for (&label, &count) in &counts {
+        let name = cells.names.get(&label).map_or(String::new(), |name| format!("\"{}\"", name.replace('"', "\"\"")));
+        let _ = write!(out, "\n{label},{name},{count},{:.3}", f64::from(count) * cells.cell_m * cells.cell_m);
+        let groups = cells.tree.iter().flat_map(|tree| cuts().map(|count| tree.group_of(label, count)));
+        groups.for_each(|group| _ = write!(out, ",{group}"));
+    }
+    out.push('\n');
+    out
+}

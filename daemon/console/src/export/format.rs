@@ -1,7 +1,7 @@
 //! The file formats of a map.
 
 use super::cells::MapCells;
-use super::files::{csv, geojson, indexed_png, ply, projection, world_file};
+use super::files::{csv, geojson, indexed_png, labels, ply, projection, world_file};
 use super::geotiff::{Reference, geotiff};
 use crate::state::Origin;
 
@@ -20,6 +20,8 @@ pub enum MapFormat {
     Ply,
     /// A line for each explored cell.
     Csv,
+    /// A line for each label: name, area, and the label that stands for it at each cut of the tree.
+    Labels,
     /// A GeoTIFF in the projection of the mission, a pixel a cell.
     Tiff,
     /// A GeoTIFF in the zone of UTM.
@@ -29,13 +31,14 @@ pub enum MapFormat {
 }
 
 impl MapFormat {
-    pub const ALL: [Self; 9] = [
+    pub const ALL: [Self; 10] = [
         Self::Png,
         Self::WorldFile,
         Self::Projection,
         Self::GeoJson,
         Self::Ply,
         Self::Csv,
+        Self::Labels,
         Self::Tiff,
         Self::UtmTiff,
         Self::Wgs84Tiff,
@@ -50,6 +53,7 @@ impl MapFormat {
             Self::GeoJson => "geojson",
             Self::Ply => "ply",
             Self::Csv => "csv",
+            Self::Labels => "labels.csv",
             Self::Tiff => "tif",
             Self::UtmTiff => "utm.tif",
             Self::Wgs84Tiff => "wgs84.tif",
@@ -63,7 +67,7 @@ impl MapFormat {
             Self::Projection => "application/xml",
             Self::GeoJson => "application/geo+json",
             Self::Ply => "application/ply",
-            Self::Csv => "text/csv",
+            Self::Csv | Self::Labels => "text/csv",
             Self::Tiff | Self::UtmTiff | Self::Wgs84Tiff => "image/tiff",
         }
     }
@@ -83,6 +87,7 @@ impl MapCells {
             MapFormat::GeoJson => Ok(geojson(self, origin).into()),
             MapFormat::Ply => Ok(ply(self).into()),
             MapFormat::Csv => Ok(csv(self).into()),
+            MapFormat::Labels => Ok(labels(self).into()),
             MapFormat::Tiff => geotiff(self, origin, Reference::Mission),
             MapFormat::UtmTiff => geotiff(self, origin, Reference::Utm),
             MapFormat::Wgs84Tiff => geotiff(self, origin, Reference::Wgs84),

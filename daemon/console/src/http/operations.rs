@@ -3,13 +3,14 @@
 mod archive;
 mod directive;
 
-use super::handlers::{command, events, log, login, maps, metrics, orders, readings};
+use super::handlers::maps::{self, MapQuery};
+use super::handlers::{command, events, log, login, metrics, orders, readings};
 use super::shared::{Shared, VehicleId};
 use crate::export::MapFormat;
 use crate::fit::Fit;
 use crate::orders::{CommandOrder, DismissOrder, DraftOrder, LabelOrder, MarkerOrder, NoteOrder, RemoveMarkerOrder};
 use crate::state::{AcceptedOrder, CellHistory, CommandState, LogList, MapBody, MissionState, PrincipalInfo};
-use axum::extract::State;
+use axum::extract::{Query, State};
 use axum::http::{HeaderMap, Method};
 use axum::routing::{MethodRouter, get, post};
 use scenecast_surface::Role;
@@ -92,9 +93,12 @@ macro_rules! map_file {
     ($path:literal, $id:literal, $summary:literal, $format:expr) => {{
         const FORMAT: MapFormat = $format;
         read($path, $id, $summary, Content::File(FORMAT.content_type()), || {
-            get(|State(shared): State<Shared>, VehicleId(id): VehicleId, headers: HeaderMap| {
-                maps::file(shared, id, headers, FORMAT)
-            })
+            get(
+                |State(shared): State<Shared>,
+                 VehicleId(id): VehicleId,
+                 Query(query): Query<MapQuery>,
+                 headers: HeaderMap| { maps::file(shared, id, query, headers, FORMAT) },
+            )
         })
     }};
 }
@@ -226,6 +230,12 @@ fn map_files() -> Vec<Operation> {
             MapFormat::Ply
         ),
         map_file!("/api/v2/vehicles/{id}/map.csv", "map_csv", "One line for each explored cell", MapFormat::Csv),
+        map_file!(
+            "/api/v2/vehicles/{id}/map.labels.csv",
+            "map_labels",
+            "One line for each label: name, cells, area, and the label that stands for it at each cut of the tree",
+            MapFormat::Labels
+        ),
         map_file!(
             "/api/v2/vehicles/{id}/map.tif",
             "map_tiff",

@@ -3,10 +3,10 @@
 use super::facts::{MissionFacts, seconds};
 use super::{exemplar, link, position};
 use crate::state::{
-    AppliedOrder, DirectiveSlots, EarlierMap, InForceKnowledge, MapLabel, MapSummary, OrderProgress, OrderStatus,
-    PlannedPath, ReportedDisk, ReportedFault, ReportedMode, ReportedPose, ReportedRegistration, ReportedTie,
-    StatusReport, UsblMeasurement, UtilityTerms, VehicleMarker, VehicleNote, VehicleOrders, VehicleSettings,
-    VehicleState, WeightDraft,
+    AppliedOrder, DirectiveSlots, EarlierMap, InForceKnowledge, MapLabel, MapLabelTree, MapSummary, OrderProgress,
+    OrderStatus, PlannedPath, ReportedDisk, ReportedFault, ReportedMode, ReportedPose, ReportedRegistration,
+    ReportedTie, StatusReport, UsblMeasurement, UtilityTerms, VehicleMarker, VehicleNote, VehicleOrders,
+    VehicleSettings, VehicleState, WeightDraft,
 };
 use scenecast_protocol::coordinates::MapPoint;
 use scenecast_protocol::directive::{self, PlannerKind, REPORTED_SLOTS, SlotProgress};
@@ -42,6 +42,7 @@ fn vehicle(
         closed_loops: track(record.registration.closures()),
         map: map(surface, address, record, &view, labels.values().sum(), facts),
         labels: labels.iter().map(|(&l, &n)| label(l, n, record, &view, address, facts)).collect(),
+        label_tree: record.tree_in_view().map(MapLabelTree::of),
         link: link::channel(&view, now),
         usbl: record.found.as_ref().map(|(line, at)| UsblMeasurement {
             at_s: seconds(*at) - line.age_s,
@@ -260,7 +261,7 @@ fn label(
         cells,
         area_m2: f64::from(cells) * cell_m * cell_m,
         gained_m2: if is_current { record.gains.gained(id, cells) as f64 * cell_m * cell_m } else { 0.0 },
-        weight: if is_current { record.utility.weight(id) } else { 0.0 },
+        weight: if is_current { record.weight(id) } else { 0.0 },
         exemplar: match is_current {
             true => exemplar::progress(id, record, view, address),
             false => exemplar::none(),

@@ -1,5 +1,6 @@
 //! The labels of a map and their exemplars.
 
+use scenecast_protocol::map::LabelTree;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -30,6 +31,26 @@ pub struct MapLabel {
     /// The label that it is shown as a part of; null without one.
     #[serde(default)]
     pub merged_into: Option<u8>,
+}
+
+/// Which labels become one at coarser cuts.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct MapLabelTree {
+    /// Merges, the closest first: the second label of each pair joins the first, which stands for both from then on. The first
+    /// `merges - k + 1` of them make the cut at k labels.
+    pub merges: Vec<(u8, u8)>,
+    /// The number of labels at the cut at which they differ most clearly; null if that is the finest one.
+    pub clearest: Option<u8>,
+}
+
+impl MapLabelTree {
+    pub(crate) fn of(tree: &LabelTree) -> Self {
+        Self { merges: tree.merges().to_vec(), clearest: tree.clearest() }
+    }
+
+    pub(crate) fn tree(&self) -> Option<LabelTree> {
+        LabelTree::new(self.merges.clone(), self.clearest)
+    }
 }
 
 /// The exemplars of a label, and the request for another one.

@@ -1,6 +1,6 @@
 //! A vehicle as the surface knows it.
 
-use super::labels::MapLabel;
+use super::labels::{MapLabel, MapLabelTree};
 use super::link::VehicleChannel;
 use super::map::MapSummary;
 use super::storage::{VehicleMarker, VehicleNote};
@@ -38,6 +38,9 @@ pub struct VehicleState {
     pub map: MapSummary,
     /// The labels on the map.
     pub labels: Vec<MapLabel>,
+    /// Which of them become one at coarser cuts; null if the vehicle has not sent it.
+    #[serde(default)]
+    pub label_tree: Option<MapLabelTree>,
     /// Measurements of the channel to this vehicle.
     pub link: VehicleChannel,
     /// The last USBL measurement of the vehicle; null before the first.

@@ -137,6 +137,8 @@ pub enum VehicleEvent {
     Registration { report: Option<(u64, Vec<u8>)>, total: u64, closures: Vec<(u64, f64, f64)> },
     /// The faults of the equipment in the last status, as on the wire.
     Faults(u8),
+    /// The last tree of the labels, as on the wire.
+    Tree(Vec<u8>),
 }
 
 /// A run of a vehicle and the epoch of its labels.
@@ -195,6 +197,8 @@ pub struct StoredPlaces {
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct StoredIntent {
     pub utility: Vec<u8>,
+    /// The highest label when it was sent.
+    pub weighed: u8,
     pub fence: Option<Vec<u8>>,
     pub limits: Option<Vec<u8>>,
     pub fence_in_force: Option<(u16, Vec<u8>)>,

@@ -8,7 +8,7 @@ use super::event::{
     VehicleEvent,
 };
 use super::former_labels::FormerLabels;
-use scenecast_protocol::map::Cell;
+use scenecast_protocol::map::{Cell, LabelTree};
 use scenecast_protocol::time::Instant;
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
@@ -85,6 +85,8 @@ pub struct VehicleMemory {
     /// Serial number of requests and the open one, by label.
     pub(crate) requests: BTreeMap<u8, (u8, Option<StoredRequest>)>,
     pub(crate) labels: BTreeMap<u8, StoredLabel>,
+    /// The tree of the labels as on the wire; empty before the first.
+    pub(crate) tree: Vec<u8>,
     pub(crate) notes: VecDeque<StoredNote>,
     pub(crate) markers: BTreeMap<u32, StoredMarker>,
     pub(crate) draft: StoredDraft,
@@ -193,6 +195,11 @@ impl VehicleMemory {
         self.markers.values()
     }
 
+    /// The last tree of the labels of the current epoch.
+    pub fn tree(&self) -> Option<LabelTree> {
+        LabelTree::from_bytes(&self.tree)
+    }
+
     /// The images that have arrived, by label.
     pub fn exemplars(&self) -> &BTreeMap<u8, Vec<StoredImage>> {
         &self.exemplars
@@ -214,8 +221,9 @@ impl VehicleMemory {
             VehicleEvent::Named(name) => self.name.clone_from(name),
             VehicleEvent::Identified(id) => {
                 if id.epoch != self.id.epoch {
-                    // Names and former labels are those of the epoch that has ended.
+                    // Names, tree and former labels are those of the epoch that has ended.
                     self.labels.clear();
+                    self.tree.clear();
                     self.former = FormerLabels::default();
                 }
                 self.id = *id;
@@ -240,6 +248,7 @@ impl VehicleMemory {
                 self.closures.drain(..self.closures.len().saturating_sub(MAX_TRACK));
             }
             VehicleEvent::Faults(faults) => self.faults = *faults,
+            VehicleEvent::Tree(tree) => self.tree.clone_from(tree),
             VehicleEvent::Orders { series, orders } => {
                 self.series = *series;
                 self.orders.clone_from(orders);
@@ -341,6 +350,9 @@ impl VehicleMemory {
         }
         if self.faults != 0 {
             all.push(VehicleEvent::Faults(self.faults));
+        }
+        if !self.tree.is_empty() {
+            all.push(VehicleEvent::Tree(self.tree.clone()));
         }
         for (&label, images) in &self.exemplars {
             all.extend(images.iter().map(|image| VehicleEvent::Exemplar { label, image: image.clone() }));

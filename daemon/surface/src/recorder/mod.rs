@@ -15,7 +15,7 @@ use crate::record::{
 use crate::track::Track;
 use crate::vehicle_record::VehicleRecord;
 use scenecast_protocol::link::PeerView;
-use scenecast_protocol::map::{LayerId, SharedTiles};
+use scenecast_protocol::map::{LabelTree, LayerId, SharedTiles};
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::{Address, EquipmentFaults};
 use std::collections::{BTreeMap, BTreeSet};
@@ -370,6 +370,10 @@ fn order_changes(record: &VehicleRecord, view: &PeerView<'_>, memory: &VehicleMe
         if memory.labels.get(&label).cloned().unwrap_or_default() != book {
             events.push(VehicleEvent::Label { label, book });
         }
+    }
+    let tree = record.tree.as_ref().map(LabelTree::to_bytes).unwrap_or_default();
+    if memory.tree != tree {
+        events.push(VehicleEvent::Tree(tree));
     }
     let known = memory.notes.back();
     let first_new = record.annotations.notes.iter().rposition(|note| Some(note) == known).map_or(0, |at| at + 1);

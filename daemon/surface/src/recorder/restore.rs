@@ -68,6 +68,7 @@ fn restore_record(record: &mut VehicleRecord, memory: &VehicleMemory) {
     }
     record.exemplars = exemplars;
     record.annotations.labels.clone_from(&memory.labels);
+    record.tree = memory.tree();
     record.annotations.notes.clone_from(&memory.notes);
     record.annotations.markers.clone_from(&memory.markers);
     record.annotations.draft.clone_from(&memory.draft);

@@ -88,6 +88,7 @@ pub(super) fn intent(record: &VehicleRecord) -> StoredIntent {
     let (requested, in_force, settings_unsure) = record.settings.parts();
     StoredIntent {
         utility: slot_bytes(&Slot::Utility(record.utility.clone())),
+        weighed: record.weighed,
         fence: record.fence.sent.as_ref().map(fence),
         limits: record.limits.sent.as_ref().map(limits),
         fence_in_force: record.fence.in_force.as_ref().map(|(version, f)| (*version, fence(f))),
@@ -143,7 +144,7 @@ pub(super) fn restore_intent(stored: &StoredIntent, record: &mut VehicleRecord) 
         Some(Slot::Settings(settings)) => settings,
         _ => Settings::default(),
     };
-    record.utility = utility(&stored.utility);
+    (record.utility, record.weighed) = (utility(&stored.utility), stored.weighed);
     record.fence.sent = stored.fence.as_ref().and_then(fence);
     record.limits.sent = stored.limits.as_ref().and_then(limits);
     record.fence.in_force = stored.fence_in_force.as_ref().and_then(|(v, bytes)| Some((*v, fence(bytes)?)));

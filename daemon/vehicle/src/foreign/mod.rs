@@ -307,7 +307,7 @@ impl MapProducer for ForeignMap {
         let erased = self.erased.iter().map(|(cell, _)| (cell, UNEXPLORED));
         let cells: Vec<(Cell, u8)> = self.labels.grid().iter().chain(erased).collect();
         let (t_s, labels) = (self.last_s.unwrap_or(0.0), self.highest);
-        MapUpdate { t_s, epoch: self.epoch, cells, layers: BTreeMap::new(), labels, perplexity: Vec::new() }
+        MapUpdate { t_s, epoch: self.epoch, cells, layers: BTreeMap::new(), labels, perplexity: Vec::new(), tree: None }
     }
 
     fn epoch(&self) -> u8 {

@@ -19,6 +19,8 @@ pub struct Durable {
     pub lineage: u64,
     /// Utility in force: epoch, exploration, curiosity, weights; in hundredths.
     pub utility: Option<(u8, i8, i8, BTreeMap<u8, i8>)>,
+    /// The highest label when that utility was applied.
+    pub weighed: u8,
     /// Whether the operator has ordered the vehicle to hold.
     pub hold: bool,
     /// Whether the operator has ordered the vehicle to abort.

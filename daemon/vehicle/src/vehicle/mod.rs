@@ -17,6 +17,7 @@ mod publisher;
 mod report;
 mod slots;
 mod storing;
+mod weights;
 mod whole_png;
 mod withheld;
 
@@ -45,6 +46,7 @@ use scenecast_protocol::wire::EquipmentFaults;
 use std::collections::VecDeque;
 use std::time::Duration;
 use storing::{Storing, WaitingMap};
+use weights::Weights;
 
 /// Metres and seconds of use of the limits after which they are stored again.
 const RECORD_INTERVAL: (f64, f64) = (50.0, 60.0);
@@ -87,7 +89,7 @@ pub struct Vehicle {
     gallery: Gallery,
     durable: Durable,
     storing: Storing,
-    utility: Option<Utility>,
+    weights: Weights,
     settings: Settings,
     /// Whether an order was applied that may change the path, so that the surface needs a new pose.
     has_new_orders: bool,
@@ -125,7 +127,7 @@ impl Vehicle {
             publisher: MapPublisher::default(),
             gallery: Gallery::default(),
             // The weights are those of labels of their epoch; a new epoch has no labels yet.
-            utility: utility.filter(|u| u.epoch == durable.epoch),
+            weights: Weights::new(utility.filter(|u| u.epoch == durable.epoch), durable.weighed),
             storing: Storing::new(durable.epoch, durable.labels),
             durable,
             settings,
@@ -136,7 +138,7 @@ impl Vehicle {
             faults: EquipmentFaults::default(),
             codec: Codec::Auto,
         };
-        if vehicle.utility.is_none() && vehicle.durable.utility.take().is_some() {
+        if vehicle.weights.ordered().is_none() && vehicle.durable.utility.take().is_some() {
             let other = SlotState::Refused(RefusalReason::OtherEpoch);
             vehicle.link.decide(SlotId::Utility, other, now);
             vehicle.durable.inbox = vehicle.link.persistent_state().clone();
@@ -271,6 +273,10 @@ impl Vehicle {
 
     fn publish(&mut self, update: &MapUpdate, now: Instant) {
         self.publisher.handle_map(update, &mut self.link, now);
+        if update.tree.as_ref().is_some_and(|tree| self.weights.handle_tree(tree, update.labels)) {
+            self.guidance.replan();
+            self.follow_utility();
+        }
         self.guidance.handle_view(self.navigator.position().xy(), &update.perplexity);
     }
 
@@ -278,7 +284,7 @@ impl Vehicle {
     fn begin_epoch(&mut self, now: Instant) {
         self.link.begin_epoch(now);
         self.publisher.begin_epoch(&mut self.link, now);
-        self.utility = None;
+        self.weights = Weights::default();
         self.gallery = Gallery::default();
         self.follow_utility();
         self.report_in_force(now);
@@ -293,9 +299,8 @@ impl Vehicle {
     }
 
     fn serve_exemplars(&mut self) {
-        let Self { utility, gallery, link, storing, .. } = self;
-        let weight = |label| utility.as_ref().map_or(0.0, |u| u.weight(label));
-        gallery.serve(storing.epoch(), weight, link);
+        let Self { weights, gallery, link, storing, .. } = self;
+        gallery.serve(storing.epoch(), |label| weights.weight(label), link);
     }
 
     pub fn handle_frame(&mut self, bytes: &[u8], now: Instant) {
@@ -336,7 +341,7 @@ impl Vehicle {
         if !self.guidance.handle_time(now) {
             return;
         }
-        let (navigator, map, utility) = (&self.navigator, self.publisher.seen(), self.utility.as_ref());
+        let (navigator, map, utility) = (&self.navigator, self.publisher.seen(), self.weights.in_use());
         let request = self.guidance.steer(&Situation { navigator, map, utility });
         self.outputs.extend(request);
         self.follow_destination(now);
@@ -424,6 +429,7 @@ impl Vehicle {
             let status = self.status(now);
             self.link.set_status(status);
         }
+        self.publisher.push_tree(&mut self.link, now);
         self.publisher.push_whole_png(&mut self.link);
         self.link.poll_transmit(now)
     }

@@ -7,15 +7,21 @@ use crate::{LabelChanges, MapUpdate};
 use scenecast_config::Debounce;
 use scenecast_protocol::directive::{CellBand, Settings};
 use scenecast_protocol::link::VehicleLink;
-use scenecast_protocol::map::{Cell, LabelGrid, LayerDescriptor, LayerId, LayerMask, LayerSource, UNEXPLORED};
+use scenecast_protocol::map::{
+    Cell, LabelGrid, LabelTree, LayerDescriptor, LayerId, LayerMask, LayerSource, UNEXPLORED,
+};
 use scenecast_protocol::map_codec::{Codec, Stride};
 use scenecast_protocol::object::ObjectId;
 use scenecast_protocol::time::Instant;
 use std::collections::BTreeMap;
+use std::time::Duration;
 
 /// The limit of the backlog, in seconds of the budget, where the operator orders coarse to fine and the
 /// configuration has no such limit.
 const DEFAULT_COARSE_AFTER_S: f64 = 30.0;
+
+/// Least time between two trees of the labels.
+const TREE_INTERVAL: Duration = Duration::from_secs(60);
 
 /// The part of the map that is sent unless the operator orders another.
 #[derive(Debug, Clone, Copy)]
@@ -51,6 +57,9 @@ pub(super) struct MapPublisher {
     configured: MapSelection,
     ordered_cells: Option<CellBand>,
     ordered_layers: Option<LayerMask>,
+    /// The tree of the labels, if it waits for its time, and when the last one was given to the link.
+    tree: Option<LabelTree>,
+    tree_at: Option<Instant>,
     /// Takes the place of the link's map, for comparison.
     whole_png: Option<WholePng>,
     /// Bands of another program and their layers, which the vehicle adds when the first of their cells comes.
@@ -142,6 +151,7 @@ impl MapPublisher {
     /// Takes the scene model's map and gives the link its part of it.
     pub(super) fn handle_map(&mut self, update: &MapUpdate, link: &mut VehicleLink, now: Instant) {
         self.labels = update.labels;
+        self.tree = update.tree.clone().or_else(|| self.tree.take());
         self.explored = update.cells.iter().filter(|&&(_, label)| label != UNEXPLORED).count() as u32;
         let changed = update.cells.iter().filter(|&&(cell, label)| self.map.set(cell, label) != label).count();
         self.version += u64::from(changed > 0);
@@ -234,6 +244,7 @@ impl MapPublisher {
         self.map.clear();
         self.explored = 0;
         self.layers.clear();
+        (self.tree, self.tree_at) = (None, None);
         self.version += 1;
         self.whole_png = self.whole_png.take().map(|_| WholePng::default());
         if self.whole_png.is_none() {
@@ -287,6 +298,16 @@ impl MapPublisher {
     fn is_sent(&self, sent: Option<&LabelGrid>, cell: Cell) -> bool {
         let is_selected = self.cells() != CellBand::Coarse || Stride::Four.on_lattice(cell).is_some();
         is_selected || sent.is_some_and(|sent| sent.get(cell) != UNEXPLORED)
+    }
+
+    /// Gives the link the tree of the labels if that is due.
+    pub(super) fn push_tree(&mut self, link: &mut VehicleLink, now: Instant) {
+        if self.tree_at.is_none_or(|at| now.since(at) >= TREE_INTERVAL)
+            && let Some(tree) = self.tree.take()
+            && link.set_tree(&tree)
+        {
+            self.tree_at = Some(now);
+        }
     }
 
     /// Gives the link the whole map as an image if that is due.

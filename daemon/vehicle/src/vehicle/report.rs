@@ -60,7 +60,7 @@ impl Vehicle {
     }
 
     pub fn utility(&self) -> Option<&Utility> {
-        self.utility.as_ref()
+        self.weights.ordered()
     }
 
     /// The settings in force; those that have no value are as configured.

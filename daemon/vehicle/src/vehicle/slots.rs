@@ -2,6 +2,7 @@
 
 use super::gallery::Gallery;
 use super::storing::{UnreportedDecision, WaitingOrder};
+use super::weights::Weights;
 use super::{AppliedSlot, Vehicle, VehicleOutput};
 use crate::FixVerdict;
 use crate::LastPlace;
@@ -98,7 +99,7 @@ impl Vehicle {
     pub(super) fn report_in_force(&mut self, now: Instant) {
         let limits = Limits::from_bytes(&self.durable.limits).map(Slot::Limits);
         let fence = Fence::from_bytes(&self.durable.fence).filter(|fence| fence.check().is_ok()).map(Slot::Fence);
-        self.link.set_in_force(SlotId::Utility, self.utility.clone().map(Slot::Utility), now);
+        self.link.set_in_force(SlotId::Utility, self.weights.ordered().cloned().map(Slot::Utility), now);
         self.link.set_in_force(SlotId::Settings, Some(Slot::Settings(self.settings)), now);
         self.link.set_in_force(SlotId::Limits, limits, now);
         self.link.set_in_force(SlotId::Fence, fence, now);
@@ -227,7 +228,8 @@ impl Vehicle {
         }
         let u = &utility;
         self.durable.utility = Some((u.epoch, u.exploration, u.curiosity, u.weights.clone()));
-        self.utility = Some(utility);
+        self.durable.weighed = self.publisher.labels();
+        self.weights = Weights::new(Some(utility), self.durable.weighed);
         self.guidance.replan();
         self.follow_utility();
         Ok(())
@@ -235,8 +237,7 @@ impl Vehicle {
 
     /// Has the link send the labels with the greatest weights first.
     pub(super) fn follow_utility(&mut self) {
-        let utility = self.utility.clone().unwrap_or_default();
-        self.link.source_mut().set_interest(|label| utility.weight(label));
+        self.link.source_mut().set_interest(|label| self.weights.weight(label));
     }
 
     fn apply_settings(&mut self, settings: &Settings, now: Instant) -> Result<(), RefusalReason> {

@@ -130,7 +130,7 @@ impl Storing {
         is_part_known.then(|| {
             let mut part = update.clone();
             part.cells.retain(|&(_, label)| label <= self.labels);
-            part.labels = self.labels;
+            (part.labels, part.tree) = (self.labels, None);
             part
         })
     }

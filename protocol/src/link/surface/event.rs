@@ -32,6 +32,8 @@ pub enum SurfaceEvent {
     },
     /// The name of a label of a vehicle's map came in.
     LabelNamed(Address),
+    /// A new tree of its labels has arrived.
+    LabelsJoined(Address),
     /// A vehicle began a new run; its map starts empty.
     VehicleRestarted(Address),
     /// The copy of a run with this vehicle is kept as [`super::PeerView::ended_run`], because a new run begins.

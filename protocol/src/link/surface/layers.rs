@@ -1,6 +1,6 @@
 //! The layers of a vehicle's map, as the surface holds them.
 
-use crate::map::{Assembly, DescriptorPart, LayerChunk, LayerId, LayerReplica, LayerSet};
+use crate::map::{LayerChunk, LayerDescriptor, LayerId, LayerReplica, LayerSet, TextAssembly, TextPart};
 use crate::time::Instant;
 use std::collections::BTreeMap;
 
@@ -19,7 +19,7 @@ pub(super) enum LayerOutcome {
 pub(super) struct Layers {
     set: LayerSet,
     /// Descriptions of which parts are here.
-    announced: BTreeMap<LayerId, Assembly>,
+    announced: BTreeMap<LayerId, TextAssembly>,
     replicas: BTreeMap<LayerId, LayerReplica>,
     version: u64,
 }
@@ -74,14 +74,17 @@ impl Layers {
     }
 
     /// A repeated part of a layer that is already known has no effect: the vehicle lacks the acknowledgement of the first.
-    fn handle_descriptor(&mut self, id: LayerId, part: &DescriptorPart<'_>) -> LayerOutcome {
+    fn handle_descriptor(&mut self, id: LayerId, part: &TextPart<'_>) -> LayerOutcome {
         if let Some(replica) = self.get(id) {
             let is_same = replica.descriptor().digest() == part.digest;
             return if is_same { LayerOutcome::Accepted } else { LayerOutcome::OutOfStep };
         }
-        let Some(taken) = self.announced.entry(id).or_default().take(part) else { return LayerOutcome::Skipped };
-        if let Some(descriptor) = taken {
+        let parts = self.announced.entry(id).or_default();
+        let taken = parts.take(part, LayerDescriptor::MAX_BYTES, LayerDescriptor::digest_of);
+        let Some(whole) = taken else { return LayerOutcome::Skipped };
+        if let Some(bytes) = whole {
             self.announced.remove(&id);
+            let Some(descriptor) = LayerDescriptor::from_bytes(&bytes) else { return LayerOutcome::Skipped };
             self.set.insert(id, descriptor.clone());
             self.replicas.insert(id, LayerReplica::new(descriptor));
         }

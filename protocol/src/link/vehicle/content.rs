@@ -5,7 +5,7 @@ use super::in_force::{InForceSender, SentPart};
 use super::layers::LayerOut;
 use super::status::StatusSender;
 use crate::directive::{SLOTS, SlotReport};
-use crate::map::{ClassSource, LayerCarried, LayerId, StateSource};
+use crate::map::{ClassSource, LayerCarried, LayerId, StateSource, TreeSource};
 use crate::object::{ObjectId, ObjectSender, SymbolRun};
 use crate::schedule::{BackgroundOrder, BackgroundStream, BitBudget, Class, ClassShares, Shares};
 use crate::time::Instant;
@@ -18,6 +18,8 @@ pub(super) enum Part<C> {
     Map(C),
     /// A label and bytes of its name and colour.
     LabelClass((u8, usize)),
+    /// A version of the tree of labels and bytes of it.
+    LabelTree((u32, usize)),
     Layer(LayerId, LayerCarried),
     LayerDigest(LayerId),
     Object(ObjectId, SymbolRun),
@@ -29,7 +31,7 @@ pub(super) enum Part<C> {
 impl<C> Part<C> {
     pub(super) fn class(&self) -> Class {
         match self {
-            Self::Map(_) | Self::LabelClass(_) => Class::Map,
+            Self::Map(_) | Self::LabelClass(_) | Self::LabelTree(_) => Class::Map,
             Self::Layer(id, _) | Self::LayerDigest(id) => Class::Layer(*id),
             Self::Object(..) => Class::Exemplar,
             Self::Pose | Self::Report | Self::InForce(_) => Class::Status,
@@ -55,6 +57,7 @@ pub(super) struct FillContext<'a> {
 pub(super) struct VehicleContent<S> {
     pub(super) source: S,
     pub(super) classes: ClassSource,
+    pub(super) tree: TreeSource,
     pub(super) layers: Vec<LayerOut>,
     pub(super) objects: ObjectSender,
     pub(super) shares: ClassShares,
@@ -73,6 +76,7 @@ impl<S: StateSource> VehicleContent<S> {
         Self {
             source,
             classes: ClassSource::default(),
+            tree: TreeSource::default(),
             layers: Vec::new(),
             objects: ObjectSender::default(),
             shares: ClassShares::new(shares),
@@ -95,6 +99,7 @@ impl<S: StateSource> VehicleContent<S> {
     pub(super) fn handle_peer_restart(&mut self, now: Instant) {
         self.source.handle_peer_restart(now);
         self.classes.handle_peer_restart();
+        self.tree.handle_peer_restart();
         self.layers.iter_mut().for_each(|l| l.source.handle_peer_restart(now));
         self.objects.handle_peer_restart();
         self.in_force.handle_peer_restart();
@@ -104,14 +109,24 @@ impl<S: StateSource> VehicleContent<S> {
 
     /// Whether the surface is known to hold the replicated state, its layers, and every object.
     pub(super) fn is_converged(&self) -> bool {
-        let is_map_converged = self.source.is_converged() && self.classes.is_converged();
+        let is_map_converged = self.source.is_converged() && self.about_labels_is_converged();
         is_map_converged && self.layers().all(StateSource::is_converged) && self.objects.is_empty()
     }
 
     /// Whether no content waits that could be sent now.
     pub(super) fn is_idle(&self, budget: &BitBudget, now: Instant) -> bool {
-        let is_quiet = self.source.is_quiet() && self.classes.is_converged() && self.background_is_quiet(budget, now);
+        let is_quiet =
+            self.source.is_quiet() && self.about_labels_is_converged() && self.background_is_quiet(budget, now);
         is_quiet && self.objects.has_only_background() && self.in_force.backlog_bytes() == 0
+    }
+
+    /// Bytes of names and tree of the labels that may be sent now.
+    fn about_labels_backlog(&self) -> usize {
+        self.classes.backlog_bytes() + self.tree.backlog_bytes()
+    }
+
+    fn about_labels_is_converged(&self) -> bool {
+        self.classes.is_converged() && self.tree.is_converged()
     }
 
     /// When a change that is held back becomes due.
@@ -123,7 +138,7 @@ impl<S: StateSource> VehicleContent<S> {
     /// The expected backlog, for the operator.
     fn backlog(&self, budget: &BitBudget, now: Instant) -> Backlog {
         let bytes = |n: usize| u32::try_from(n).unwrap_or(u32::MAX);
-        let map = self.source.expected_backlog_bytes() + self.classes.backlog_bytes();
+        let map = self.source.expected_backlog_bytes() + self.about_labels_backlog();
         let others = self.shared_layer_backlog() + self.objects.backlog_bytes() + self.background_backlog(budget, now);
         Backlog { map_bytes: bytes(map), other_bytes: bytes(others) }
     }
@@ -131,7 +146,7 @@ impl<S: StateSource> VehicleContent<S> {
     /// About how many bytes wait and may be sent.
     pub(super) fn backlog_bytes(&self, budget: &BitBudget, now: Instant) -> usize {
         let own = self.source.backlog_bytes()
-            + self.classes.backlog_bytes()
+            + self.about_labels_backlog()
             + self.shared_layer_backlog()
             + self.objects.backlog_bytes();
         own + self.in_force.backlog_bytes() + self.background_backlog(budget, now)
@@ -139,7 +154,7 @@ impl<S: StateSource> VehicleContent<S> {
 
     /// Whether changes of the state or of its layers wait.
     pub(super) fn has_news(&self) -> bool {
-        self.source.backlog_bytes() > 0 || self.classes.backlog_bytes() > 0 || self.shared_layer_backlog() > 0
+        self.source.backlog_bytes() > 0 || self.about_labels_backlog() > 0 || self.shared_layer_backlog() > 0
     }
 
     /// The fate of a chunk is known; returns the object that is complete with it.
@@ -147,6 +162,7 @@ impl<S: StateSource> VehicleContent<S> {
         match part {
             Part::Map(carried) => self.source.handle_fate(carried, delivered, now),
             Part::LabelClass(carried) => self.classes.handle_fate(carried, delivered),
+            Part::LabelTree(carried) => self.tree.handle_fate(carried, delivered),
             Part::Layer(id, carried) => {
                 if let Some(layer) = self.layer_mut(id) {
                     layer.source.handle_fate(carried, delivered, now);
@@ -242,7 +258,7 @@ impl<S: StateSource> VehicleContent<S> {
     fn waiting(&self, now: Instant) -> Vec<Class> {
         [
             (self.status.is_waiting(now) || self.in_force.backlog_bytes() > 0, Class::Status),
-            (self.source.backlog_bytes() > 0 && !self.is_refining() || self.classes.backlog_bytes() > 0, Class::Map),
+            (self.source.backlog_bytes() > 0 && !self.is_refining() || self.about_labels_backlog() > 0, Class::Map),
             (self.objects.backlog_bytes() > 0, Class::Exemplar),
         ]
         .into_iter()
@@ -298,22 +314,34 @@ impl<S: StateSource> VehicleContent<S> {
         }
     }
 
-    /// Puts a part of the name of a label into a frame; returns whether there was one. A frame has one at most, so that
-    /// cells do not wait for all names.
-    fn fill_name(&mut self, builder: &mut FrameBuilder, carried: &mut Carried<S::Carried>) -> bool {
+    /// Puts a part of the name of a label or of the tree into a frame; returns whether there was one. A frame has one at most, so
+    /// that cells do not wait for all of them.
+    fn fill_about_labels(
+        &mut self,
+        builder: &mut FrameBuilder,
+        carried: &mut Carried<S::Carried>,
+        now: Instant,
+    ) -> bool {
+        if carried.iter().any(|(part, _)| matches!(part, Part::LabelClass(_) | Part::LabelTree(_))) {
+            return false;
+        }
         // The kind takes a byte of the payload.
         let room = room_for_payload(builder.room()).saturating_sub(1);
-        let Some((bytes, part)) = self.classes.next_chunk(room) else { return false };
-        let fits = builder.push(ChunkKind::LabelClass, &bytes);
+        let name =
+            self.classes.next_chunk(room).map(|(bytes, part)| (ChunkKind::LabelClass, bytes, Part::LabelClass(part)));
+        let tree =
+            || self.tree.next_chunk(room).map(|(bytes, part)| (ChunkKind::LabelTree, bytes, Part::LabelTree(part)));
+        let Some((kind, bytes, part)) = name.or_else(tree) else { return false };
+        let fits = builder.push(kind, &bytes);
         match fits {
-            true => carried.push((Part::LabelClass(part), bytes.len())),
-            false => self.classes.handle_fate(part, false),
+            true => carried.push((part, bytes.len())),
+            false => _ = self.handle_fate(part, false, now),
         }
         fits
     }
 
     fn fill_map(&mut self, builder: &mut FrameBuilder, carried: &mut Carried<S::Carried>, now: Instant) {
-        if !carried.iter().any(|(part, _)| matches!(part, Part::LabelClass(_))) && self.fill_name(builder, carried) {
+        if self.fill_about_labels(builder, carried, now) {
             return;
         }
         let room = room_for_payload(builder.room());

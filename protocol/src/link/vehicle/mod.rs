@@ -25,7 +25,9 @@ pub use event::{OversizedChunk, VehicleEvent};
 use super::{LinkPair, LinkStats, SlotInbox, SlotInboxState, Wakeup};
 use crate::directive::{Budget, Slot, SlotId, SlotState};
 use crate::mac::{Access, ClockMap, Floor};
-use crate::map::{Cell, ClassEntry, ClassSource, LabelGrid, LayerId, LayerMask, LayerSource, MapSource, StateSource};
+use crate::map::{
+    Cell, ClassEntry, ClassSource, LabelGrid, LabelTree, LayerId, LayerMask, LayerSource, MapSource, StateSource,
+};
 use crate::object::ObjectId;
 use crate::schedule::{BackgroundOrder, BitBudget, Shares};
 use crate::time::Instant;
@@ -120,6 +122,15 @@ impl<S: StateSource> VehicleLink<S> {
             self.repeater.forget();
         }
         is_first
+    }
+
+    /// Sets the tree of the labels, which replaces the one before; returns whether it is another one.
+    pub fn set_tree(&mut self, tree: &LabelTree) -> bool {
+        let is_new = self.content.tree.set(tree);
+        if is_new {
+            self.repeater.forget();
+        }
+        is_new
     }
 
     /// The announced names of labels.
@@ -368,6 +379,7 @@ impl VehicleLink {
     pub fn begin_epoch(&mut self, now: Instant) {
         self.content.source.clear(now);
         self.content.classes.clear();
+        self.content.tree.clear();
         self.content.layers.iter_mut().for_each(|l| l.source.clear(now));
         self.renew(now);
         self.cancel_objects();

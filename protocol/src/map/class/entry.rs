@@ -1,7 +1,6 @@
 //! The name and the colour of a class.
 
-use crate::map::MAX_LABEL;
-use crc::{CRC_16_IBM_3740, Crc};
+use crate::map::{MAX_LABEL, TextPart};
 
 /// The highest number of a class. Its label is one more, because label 0 means "unexplored".
 pub const MAX_CLASS: u8 = MAX_LABEL - 1;
@@ -78,11 +77,7 @@ impl ClassEntry {
 
     /// Fingerprint of the label and its entry: CRC-16/IBM-3740.
     pub fn digest_of(label: u8, bytes: &[u8]) -> u16 {
-        const CRC: Crc<u16> = Crc::<u16>::new(&CRC_16_IBM_3740);
-        let mut digest = CRC.digest();
-        digest.update(&[label]);
-        digest.update(bytes);
-        digest.finalize()
+        TextPart::digest_of(&[label], bytes)
     }
 }
 

@@ -1,20 +1,14 @@
 //! The surface's side: the names that have arrived.
 
 use super::{ClassChunk, ClassEntry};
+use crate::map::TextAssembly;
 use std::collections::BTreeMap;
-
-/// The parts of an entry that are here, from the first byte on.
-#[derive(Debug, Default)]
-struct Parts {
-    digest: u16,
-    bytes: Vec<u8>,
-}
 
 /// Names and colours of labels. A label keeps its first name.
 #[derive(Debug, Default)]
 pub struct ClassReplica {
     entries: BTreeMap<u8, ClassEntry>,
-    parts: BTreeMap<u8, Parts>,
+    parts: BTreeMap<u8, TextAssembly>,
 }
 
 impl ClassReplica {
@@ -31,27 +25,15 @@ impl ClassReplica {
     /// Takes a chunk. `None` if it makes no sense, or does not continue the parts that are here; else whether an entry is
     /// complete with it.
     pub fn handle_chunk(&mut self, chunk: &[u8]) -> Option<bool> {
-        let part = ClassChunk::decode(chunk)?;
-        if let Some(entry) = self.get(part.label) {
-            let is_same = ClassEntry::digest_of(part.label, &entry.to_bytes()) == part.digest;
-            return is_same.then_some(false);
+        let ClassChunk { label, part } = ClassChunk::decode(chunk)?;
+        let digest_of = |bytes: &[u8]| ClassEntry::digest_of(label, bytes);
+        if let Some(entry) = self.get(label) {
+            return (digest_of(&entry.to_bytes()) == part.digest).then_some(false);
         }
-        let parts = self.parts.entry(part.label).or_default();
-        if part.first == 0 {
-            *parts = Parts { digest: part.digest, bytes: Vec::new() };
-        }
-        let fits = usize::from(part.first) == parts.bytes.len() && part.digest == parts.digest;
-        if !fits || parts.bytes.len() + part.bytes.len() > ClassEntry::MAX_BYTES {
-            return None;
-        }
-        parts.bytes.extend_from_slice(part.bytes);
-        if !part.is_last {
-            return Some(false);
-        }
-        let parts = self.parts.remove(&part.label)?;
-        let is_sound = ClassEntry::digest_of(part.label, &parts.bytes) == parts.digest;
-        let entry = ClassEntry::from_bytes(part.label, &parts.bytes).filter(|_| is_sound)?;
-        self.entries.insert(part.label, entry);
+        let whole = self.parts.entry(label).or_default().take(&part, ClassEntry::MAX_BYTES, digest_of)?;
+        let Some(bytes) = whole else { return Some(false) };
+        self.parts.remove(&label);
+        self.entries.insert(label, ClassEntry::from_bytes(label, &bytes)?);
         Some(true)
     }
 }

@@ -1,6 +1,7 @@
 //! Layer chunks: levels of a layer, their digest, and the layer's description.
 
 use super::{LayerDescriptor, LayerId};
+use crate::map::TextPart;
 
 /// A chunk about a layer.
 ///
@@ -18,7 +19,7 @@ use super::{LayerDescriptor, LayerId};
 /// * layer: its index, 0 to 15.
 /// * digest of the levels: the exclusive or of the map digest of the levels that the surface is known to hold and of the
 ///   digest of the descriptor.
-/// * L: the descriptor ends with this part; first: place of the first byte of the part in the descriptor; at least one byte.
+/// * from the digest of the descriptor on: a part of it ([`TextPart`]).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum LayerChunk<'a> {
     /// A patch of the layer.
@@ -26,28 +27,14 @@ pub enum LayerChunk<'a> {
     /// Fingerprint of the layer that the surface is known to hold.
     Digest(LayerId, u16),
     /// A part of the layer's description.
-    Descriptor(LayerId, DescriptorPart<'a>),
-}
-
-/// Consecutive bytes of a descriptor.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct DescriptorPart<'a> {
-    /// The digest of the whole descriptor ([`LayerDescriptor::digest`]).
-    pub digest: u16,
-    /// Place of the first of them, 0 to 63.
-    pub first: u8,
-    /// Whether they are the last ones.
-    pub is_last: bool,
-    /// Bytes of the descriptor from `first` on, at least one.
-    pub bytes: &'a [u8],
+    Descriptor(LayerId, TextPart<'a>),
 }
 
 impl<'a> LayerChunk<'a> {
     /// Bytes of a patch chunk before the map chunk.
     pub const PATCH_HEAD: usize = 1;
-    /// Bytes of a descriptor chunk before those of the descriptor.
-    pub const DESCRIPTOR_HEAD: usize = 4;
-    const LAST: u8 = 0x80;
+    /// Bytes of a descriptor chunk before the part.
+    pub const DESCRIPTOR_HEAD: usize = 1;
 
     /// Reads a chunk; `None` if it makes no sense.
     pub fn decode(bytes: &'a [u8]) -> Option<Self> {
@@ -56,12 +43,7 @@ impl<'a> LayerChunk<'a> {
         match head >> 6 {
             0 => Some(Self::Patch(id, rest)),
             1 => Some(Self::Digest(id, u16::from_be_bytes(rest.try_into().ok()?))),
-            2 => {
-                let (&[high, low, place], bytes) = rest.split_first_chunk()?;
-                let (digest, is_last) = (u16::from_be_bytes([high, low]), place & Self::LAST != 0);
-                let part = DescriptorPart { digest, first: place & !Self::LAST, is_last, bytes };
-                (part.first < 0x40 && !bytes.is_empty()).then_some(Self::Descriptor(id, part))
-            }
+            2 => TextPart::decode(rest).map(|part| Self::Descriptor(id, part)),
             _ => None,
         }
     }
@@ -71,11 +53,7 @@ impl<'a> LayerChunk<'a> {
         match *self {
             Self::Patch(id, patch) => [&[id.index() as u8], patch].concat(),
             Self::Digest(id, digest) => [&[0x40 | id.index() as u8], &digest.to_be_bytes()[..]].concat(),
-            Self::Descriptor(id, part) => {
-                let [high, low] = part.digest.to_be_bytes();
-                let place = part.first | if part.is_last { Self::LAST } else { 0 };
-                [&[0x80 | id.index() as u8, high, low, place], part.bytes].concat()
-            }
+            Self::Descriptor(id, part) => [&[0x80 | id.index() as u8], &part.encode()[..]].concat(),
         }
     }
 
@@ -88,7 +66,7 @@ impl<'a> LayerChunk<'a> {
 }
 
 // A description fits one chunk of at most 48 bytes.
-const _: () = assert!(LayerDescriptor::MAX_BYTES + LayerChunk::DESCRIPTOR_HEAD <= 48);
+const _: () = assert!(LayerDescriptor::MAX_BYTES + LayerChunk::DESCRIPTOR_HEAD + TextPart::HEAD <= 48);
 
 #[cfg(test)]
 mod tests {
@@ -103,7 +81,7 @@ mod tests {
         };
         golden(LayerChunk::Patch(LayerId::CONFIDENCE, &[7]), &[0x01, 7]);
         golden(LayerChunk::Digest(LayerId::CURIOSITY, 0x27A6), &[0x42, 0x27, 0xA6]);
-        let part = DescriptorPart { digest: 0xBEEF, first: 8, is_last: true, bytes: &[1, 2] };
+        let part = TextPart { digest: 0xBEEF, first: 8, is_last: true, bytes: &[1, 2] };
         golden(LayerChunk::Descriptor(LayerId::DEPTH, part), &[0x80, 0xBE, 0xEF, 0x88, 1, 2]);
         for bytes in [&[][..], &[0x10, 7], &[0xC1, 7], &[0x42, 0x27], &[0x80, 0xBE, 0xEF, 0x88], &[0x80, 1, 2, 0x48, 1]]
         {

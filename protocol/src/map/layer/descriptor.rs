@@ -2,8 +2,7 @@
 
 use super::Decimal;
 use super::built_in::DEPTH;
-use crate::map::{MAX_LABEL, UNEXPLORED};
-use crc::{CRC_16_IBM_3740, Crc};
+use crate::map::{MAX_LABEL, TextPart, UNEXPLORED};
 use std::borrow::Cow;
 
 /// A layer of the map: one quantity a cell, in few levels. Level 0 is "not known" in every layer, because the coder of maps
@@ -204,9 +203,8 @@ impl LayerDescriptor {
         Self::digest_of(&self.to_bytes())
     }
 
-    pub(super) fn digest_of(bytes: &[u8]) -> u16 {
-        const CRC: Crc<u16> = Crc::<u16>::new(&CRC_16_IBM_3740);
-        CRC.checksum(bytes)
+    pub(crate) fn digest_of(bytes: &[u8]) -> u16 {
+        TextPart::digest_of(&[], bytes)
     }
 
     /// The bytes of a sound descriptor.

@@ -1,24 +1,21 @@
 //! Layers: one quantity a cell beside the label, in few levels. A descriptor gives them their meaning; each is replicated by
 //! itself, as the labels are.
 
-mod announcement;
 mod built_in;
 mod chunk;
 mod decimal;
 mod descriptor;
 mod set;
 
-pub use announcement::Assembly;
 pub use built_in::{BUILT_IN_LAYERS, BuiltInLayer};
-pub use chunk::{DescriptorPart, LayerChunk};
+pub use chunk::LayerChunk;
 pub use decimal::Decimal;
 pub use descriptor::{LayerDescriptor, Palette, Quantity, Spread, Steps, UpperEnd};
 pub use set::{LayerId, LayerMask, LayerSet};
 
-use super::{Cell, LabelGrid, MapSource, Replica, StateReplica, StateSource};
+use super::{Cell, LabelGrid, MapSource, Replica, StateReplica, StateSource, TextPart, TextSender};
 use crate::map_codec::Codec;
 use crate::time::Instant;
-use announcement::Announcement;
 use std::fmt;
 use std::time::Duration;
 
@@ -27,7 +24,7 @@ use std::time::Duration;
 pub struct LayerSource {
     id: LayerId,
     descriptor: LayerDescriptor,
-    announcement: Announcement,
+    announcement: TextSender,
     levels: MapSource,
 }
 
@@ -45,7 +42,7 @@ impl LayerSource {
     pub fn new(id: LayerId, descriptor: LayerDescriptor, codec: Codec, debounce: Duration) -> Self {
         let mut levels = MapSource::new(codec);
         levels.set_debounce(debounce);
-        Self { id, announcement: Announcement::new(&descriptor), descriptor, levels }
+        Self { id, announcement: TextSender::new(descriptor.to_bytes(), descriptor.digest()), descriptor, levels }
     }
 
     /// Its index on this vehicle.
@@ -104,8 +101,9 @@ impl StateSource for LayerSource {
         if !self.announcement.is_complete() {
             // A layer without levels is not announced.
             let _ = Some(self.levels.backlog_bytes()).filter(|&waiting| waiting > 0)?;
-            let (chunk, bytes) = self.announcement.next_chunk(self.id, room)?;
-            return Some((chunk, LayerCarried::Descriptor(bytes)));
+            let (part, bytes) = self.announcement.next_part(room.checked_sub(LayerChunk::DESCRIPTOR_HEAD)?)?;
+            let part = TextPart::decode(&part)?;
+            return Some((LayerChunk::Descriptor(self.id, part).encode(), LayerCarried::Descriptor(bytes)));
         }
         let (patch, carried) = self.levels.next_chunk(room.checked_sub(LayerChunk::PATCH_HEAD)?, now)?;
         Some((LayerChunk::Patch(self.id, &patch).encode(), LayerCarried::Levels(carried)))
@@ -138,7 +136,10 @@ impl StateSource for LayerSource {
     /// Until the surface is known to hold the description, that alone can be sent.
     fn backlog_bytes(&self) -> usize {
         match self.levels.backlog_bytes() {
-            waiting if waiting > 0 && !self.announcement.is_complete() => self.announcement.backlog_bytes(),
+            waiting if waiting > 0 && !self.announcement.is_complete() => match self.announcement.backlog_bytes() {
+                0 => 0,
+                bytes => bytes + LayerChunk::DESCRIPTOR_HEAD,
+            },
             waiting => waiting,
         }
     }
@@ -244,7 +245,7 @@ mod tests {
         assert_eq!(source.backlog_bytes(), 0, "a layer without levels is not announced");
         source.set([(Cell::new(0, 0), 3.5)], Instant::ZERO);
         let bytes = source.descriptor().to_bytes().len();
-        assert_eq!(source.backlog_bytes(), bytes + LayerChunk::DESCRIPTOR_HEAD);
+        assert_eq!(source.backlog_bytes(), bytes + LayerChunk::DESCRIPTOR_HEAD + TextPart::HEAD);
         let (chunk, carried) = source.next_chunk(100, Instant::ZERO).unwrap();
         assert!(matches!(LayerChunk::decode(&chunk), Some(LayerChunk::Descriptor(..))));
         assert!(source.next_chunk(100, Instant::ZERO).is_none() && source.backlog_bytes() == 0 && !source.is_quiet());

@@ -86,7 +86,7 @@ fn contents() -> Vec<Seed> {
             let framed = [&[payload.len() as u8], &payload[..]].concat();
             match kind {
                 ChunkKind::Intent => seeds.push(("status", format!("intent-{i}"), payload)),
-                ChunkKind::LabelClass => {}
+                ChunkKind::LabelClass | ChunkKind::LabelTree => {}
                 ChunkKind::Registration => seeds.push(("status", format!("registration-{i}"), payload)),
                 ChunkKind::Faults => seeds.push(("status", format!("faults-{i}"), payload)),
                 ChunkKind::Trail => seeds.push(("status", format!("trail-{i}"), payload)),

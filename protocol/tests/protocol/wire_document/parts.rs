@@ -9,7 +9,8 @@ use scenecast_protocol::directive::{
     Slot, SlotId, Utility, VersionedSlot, WeightedArea,
 };
 use scenecast_protocol::map::{
-    Cell, ClassChunk, ClassEntry, DescriptorPart, LabelGrid, LayerChunk, LayerDescriptor, LayerId, LayerMask, LayerSet,
+    Cell, ClassChunk, ClassEntry, LabelGrid, LabelTree, LayerChunk, LayerDescriptor, LayerId, LayerMask, LayerSet,
+    TextPart, TreeSource,
 };
 use scenecast_protocol::map_codec;
 use scenecast_protocol::schedule::{BackgroundOrder, BackgroundStream, Shares};
@@ -101,7 +102,7 @@ fn layer_chunks() -> Rows {
     assert_eq!((depth.bounds(1), confidence.bounds(4)), (Some((12.0, 12.5)), Some((0.75, 1.0))));
     let part = |descriptor: &LayerDescriptor, from: usize, to: usize| {
         let bytes = descriptor.to_bytes();
-        let part = DescriptorPart {
+        let part = TextPart {
             digest: descriptor.digest(),
             first: from as u8,
             is_last: to == bytes.len(),
@@ -114,11 +115,14 @@ fn layer_chunks() -> Rows {
     let named = |label: u8, name: &str, colour: Option<[u8; 3]>, to: Option<usize>| {
         let entry = ClassEntry::new(label, name, colour).unwrap().to_bytes();
         let (digest, is_last) = (ClassEntry::digest_of(label, &entry), to.is_none());
-        let bytes =
-            ClassChunk { label, digest, first: 0, is_last, bytes: &entry[..to.unwrap_or(entry.len())] }.encode();
+        let part = TextPart { digest, first: 0, is_last, bytes: &entry[..to.unwrap_or(entry.len())] };
+        let bytes = ClassChunk { label, part }.encode();
         assert_eq!(ClassChunk::decode(&bytes).map(|chunk| chunk.encode()), Some(bytes.clone()));
         bytes
     };
+    let mut tree = TreeSource::default();
+    tree.set(&LabelTree::new(vec![(1, 4), (2, 3), (1, 2)], Some(2)).unwrap());
+    let (tree, _) = tree.next_chunk(60).unwrap();
     vec![
         ("layer chunk: confidence announced, quarters of 0 to 1", whole(confidence)),
         ("layer chunk: depth announced, steps of 0.5 m, level 1 from 12 m on", whole(&depth)),
@@ -130,6 +134,7 @@ fn layer_chunks() -> Rows {
             named(3, "sand", Some([0xE0, 0xC0, 0x80]), None),
         ),
         ("part of the name of a label: label 254 is \"é\", no colour, the first byte", named(254, "é", None, Some(1))),
+        ("part of the tree of labels: 4 joins 1, 3 joins 2, 2 joins 1; two labels separate best", tree),
         ("head of a layer chunk: a patch of confidence", layer(LayerChunk::Patch(LayerId::CONFIDENCE, &[]))),
         (
             "layer chunk: the digest of confidence, of levels with the digest 27A6",

@@ -204,7 +204,8 @@ impl ExemplarBench {
             (Cell::new(i % EDGE, i / EDGE), label)
         });
         let (cells, layers, perplexity) = (cells.collect(), BTreeMap::new(), Vec::new());
-        let update = MapUpdate { t_s: self.now.as_secs_f64(), epoch: 0, cells, layers, perplexity, labels: LABELS };
+        let update =
+            MapUpdate { t_s: self.now.as_secs_f64(), epoch: 0, cells, layers, perplexity, labels: LABELS, tree: None };
         self.vehicle.handle_map(&update, self.now);
     }
 }

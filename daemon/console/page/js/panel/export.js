@@ -1,6 +1,7 @@
 // The export dialog: the files of the map, made by the server.
 
 import { archivedMaps } from "./archive.js";
+import { cut, finestCut } from "../book.js";
 import { BASE } from "../api.js";
 import { $, h } from "../dom.js";
 import { ago } from "../format.js";
@@ -15,6 +16,7 @@ const FILES = [
   ["GeoTIFF, UTM", "the same in the UTM zone of the origin", "utm.tif"],
   ["GeoTIFF, WGS 84", "the same in longitude and latitude", "wgs84.tif"],
   ["CSV", "one line a cell with label, age and layers", "csv"],
+  ["Labels, CSV", "one line a label with name, area and its group at each cut of the tree", "labels.csv"],
   ["GeoJSON", "regions of equal label", "geojson"],
   ["PLY", "coloured points for 3-D tools", "ply"],
 ];
@@ -41,12 +43,15 @@ export function openExport() {
 function offer(vehicle) {
   const { mission } = store.snapshot;
   const name = `${mission.name}-${vehicle.name}-v${vehicle.map.version}`.replace(/[^\w.-]+/g, "_");
+  const shown = cut(vehicle);
+  const isGrouped = shown < finestCut(vehicle);
+  const query = (extension) => (isGrouped && extension !== "labels.csv" ? `?labels=${shown}` : "");
   const item = ([title, hint, extension]) =>
-    h("li", {}, h("a", { href: `${BASE}/vehicles/${vehicle.id}/map.${extension}`, download: `${name}.${extension}` }, title), h("span.hint", {}, hint));
+    h("li", {}, h("a", { href: `${BASE}/vehicles/${vehicle.id}/map.${extension}${query(extension)}`, download: `${name}.${extension}` }, title), h("span.hint", {}, hint));
   const local = mission.origin ? "" : " The mission has no origin in latitude and longitude: coordinates are metres east and north.";
   return [
     h("p", {}, `Version ${vehicle.map.version} of ${vehicle.name}, changed ${ago(ageOf(vehicle.map.updated_s))}.${local}`),
     h("ul.files", {}, ...FILES.filter(([, , extension]) => isOffered(extension, store.snapshot, vehicle.map)).map(item)),
-    h("p.hint", {}, "Files have label numbers, without names, colours and merges."),
+    h("p.hint", {}, `Files have label numbers, without names, colours and merges${isGrouped ? `, with the ${shown} labels that the page shows` : ""}.`),
   ];
 }

@@ -1,7 +1,7 @@
 // The dialog for the name, colour and merging of one label. They stay at the surface.
 
 import { $, h } from "../dom.js";
-import { colourOf, hasName, merge, nameOf, recolour, rename, shownLabels, split } from "../book.js";
+import { colourOf, hasName, isMerged, merge, nameOf, recolour, rename, shownLabels, split } from "../book.js";
 import { tableColour } from "../palette.js";
 import { store } from "../store.js";
 
@@ -28,7 +28,7 @@ export function editLabel(label) {
       h("label.field", {}, "Colour", colour),
       h("button.link", { type: "button", onclick: () => (colour.value = tableColour(label.id)) }, "Use the standard colour"),
       h("label.field", {}, "Show as part of", into),
-      merged.length > 0 ? h("p", {}, `Includes ${merged.map((m) => `label ${m}`).join(", ")}. `, divide) : null,
+      merged.length > 0 ? h("p", {}, `Stands for ${merged.map((m) => `label ${m}`).join(", ")}. `, merged.some(isMerged) ? divide : null) : null,
       h("p.hint", {}, "These choices stay at the surface. The vehicle and exported files continue to use label numbers. A merged label is sent with the weight of the label that it is part of."),
       h("div.buttons", {},
         h("button", { type: "button", onclick: () => dialog.close() }, "Cancel"),

@@ -7,7 +7,7 @@ import { layer } from "../map/layers.js";
 import { store } from "../store.js";
 import { exemplar, refreshExemplar } from "./exemplar.js";
 import { editLabel } from "./label-dialog.js";
-import { weightsOrder } from "./weights.js";
+import { isMixed, weightsOrder } from "./weights.js";
 
 const latest = new WeakMap();
 
@@ -46,7 +46,7 @@ export function refreshRow(node, label) {
   parts.chip.setAttribute("aria-label", `Show only ${name} on the map`);
   parts.chip.setAttribute("aria-pressed", String(layer.highlight === label.id));
   text(parts.name, name + extra);
-  parts.name.title = `${name}${extra && `, with ${label.members.length - 1} merged into it`}: name, colour, merge`;
+  parts.name.title = `${name}${extra && `, which stands for ${label.members.length - 1} more`}: name, colour, merge`;
   text(parts.size, area(label.area_m2));
   const gained = label.gained_m2 ?? 0;
   show(parts.gain, Math.abs(gained) >= 0.5);
@@ -59,7 +59,9 @@ export function refreshRow(node, label) {
   show(parts.undo, isChanged);
   parts.undo.setAttribute("aria-label", `Undo the weight of ${name}`);
   const isConflicting = weightsOrder.isConflicting(store.vehicle, label.id);
-  show(parts.note, isConflicting);
+  const mixed = isMixed(store.vehicle, label);
+  show(parts.note, isConflicting || mixed);
+  if (mixed) text(parts.note, "Its labels have different weights; a weight set here replaces them.");
   if (isConflicting) text(parts.note, `Another console set it to ${signed(label.weight)} meanwhile; Send replaces that.`);
   refreshExemplar(node.querySelector(".exemplar"), label, name);
 }

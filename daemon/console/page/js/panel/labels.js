@@ -7,6 +7,7 @@ import { ago } from "../format.js";
 import { orderFoot } from "../order/foot.js";
 import { recall, remember } from "../prefs.js";
 import { ageOf, isStale, store } from "../store.js";
+import { cutPart, refreshCut } from "./label-cut.js";
 import { makeRow, refreshRow } from "./label-row.js";
 import { plannerPart, refreshPlanner } from "./planner.js";
 import { TERMS, weightsDraft, weightsOrder } from "./weights.js";
@@ -49,7 +50,7 @@ export function startLabels() {
     remember("label-order", sorting.value);
     update();
   });
-  $("label-list").before(plannerPart, ...terms.map((t) => t.node), empty);
+  $("label-list").before(plannerPart, ...terms.map((t) => t.node), cutPart, empty);
   $("send").append(draftNote, foot.node);
   weightsDraft.start();
   store.on("state select edit book highlight feed theme", update);
@@ -62,6 +63,7 @@ function update() {
   if (shownVehicle !== vehicle.id) $("label-list").replaceChildren();
   shownVehicle = vehicle.id;
   refreshOrders();
+  refreshCut(vehicle);
   const rows = shownLabels(vehicle).sort(SORTINGS[$("label-order").value] ?? SORTINGS.id);
   keyed($("label-list"), rows, (l) => l.id, makeRow, refreshRow);
   show(empty, rows.length === 0);

@@ -2,7 +2,7 @@
 // what is set and not sent.
 
 import { keepDraft, sendUtility } from "../api.js";
-import { shownLabels } from "../book.js";
+import { isMerged, shownLabels } from "../book.js";
 import { Order } from "../order/order.js";
 import { SharedDraft } from "../order/shared-draft.js";
 
@@ -12,12 +12,20 @@ export const TERMS = ["exploration", "curiosity"];
 const read = (vehicle, part) =>
   TERMS.includes(part) ? vehicle.utility[part] : vehicle.labels.find((l) => l.id === part)?.weight ?? 0;
 
-/** The slot is replaced as a whole, so each label's weight is sent; a merged label takes that of the label it is part of. */
+/** The slot is replaced as a whole, so each label's weight is sent. A merged label takes that of the label it is part of; a label of
+ * a group of the tree takes a weight that is set for the group, and keeps its own as long as none is. */
 function post(vehicle, value) {
   const weights = {};
-  for (const label of shownLabels(vehicle)) for (const member of label.members) weights[member] = value(label.id);
+  for (const label of shownLabels(vehicle)) {
+    const isSet = value(label.id) !== read(vehicle, label.id);
+    for (const member of label.members) weights[member] = isSet || isMerged(member) ? value(label.id) : read(vehicle, member);
+  }
   return sendUtility(vehicle.id, { weights, ...Object.fromEntries(TERMS.map((term) => [term, value(term)])) });
 }
+
+/** Whether the labels of a group have different weights, and none was set for the group. */
+export const isMixed = (vehicle, label) =>
+  !weightsOrder.isChanged(vehicle, label.id) && label.members.some((member) => !isMerged(member) && read(vehicle, member) !== read(vehicle, label.id));
 
 export const weightsOrder = new Order("utility", read, post);
 

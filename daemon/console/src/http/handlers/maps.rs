@@ -6,13 +6,14 @@ use crate::http::compress::{accepts_gzip, gzip, tagged};
 use crate::http::response::{error, respond};
 use crate::http::shared::{CachedMap, MapCell, Shared, VehicleId};
 use crate::request::{Reply, SurfaceRequest};
+use crate::state::MapLabelTree;
 use crate::tiles::TiledMap;
 use axum::Json;
 use axum::body::Bytes;
 use axum::extract::{Query, State};
 use axum::http::{HeaderMap, StatusCode, header};
 use axum::response::{IntoResponse, Response};
-use scenecast_protocol::map::Rect;
+use scenecast_protocol::map::{LabelTree, MAX_LABEL, Rect};
 use std::collections::BTreeMap;
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::sync::Arc;
@@ -149,23 +150,52 @@ async fn packed_tiles(cached: Arc<CachedMap>, since: Option<String>, is_packed: 
     Some(bytes)
 }
 
+/// The parameters of a file: `labels`, the number of labels at which the tree is cut.
+pub(in crate::http) type MapQuery = BTreeMap<String, String>;
+
+/// Where the tree is cut; `None` for all labels.
+fn cut(query: &MapQuery) -> Result<Option<usize>, String> {
+    let Some(text) = query.get("labels") else { return Ok(None) };
+    let count = text.parse().ok().filter(|count| (1..=usize::from(MAX_LABEL)).contains(count));
+    count.map(Some).ok_or_else(|| format!("labels: it takes a number of labels, 1 to {MAX_LABEL}"))
+}
+
+fn cut_at(count: Option<usize>, cells: MapCells) -> MapCells {
+    match count {
+        Some(count) => cells.cut(count),
+        None => cells,
+    }
+}
+
 /// The map as a file.
-pub(in crate::http) async fn file(shared: Shared, id: u8, headers: HeaderMap, format: MapFormat) -> Response {
+pub(in crate::http) async fn file(
+    shared: Shared,
+    id: u8,
+    query: MapQuery,
+    headers: HeaderMap,
+    format: MapFormat,
+) -> Response {
+    let count = match cut(&query) {
+        Ok(count) => count,
+        Err(reason) => return error(StatusCode::UNPROCESSABLE_ENTITY, &reason),
+    };
     let cached = match latest(&shared, id).await {
         Ok(cached) => cached,
         Err(response) => return response,
     };
-    let (origin, placement, names, markers) = {
+    let (origin, placement, names, tree, markers) = {
         let snapshot = shared.snapshots.borrow();
         let vehicle = snapshot.vehicle(id);
         let labels = vehicle.iter().flat_map(|v| &v.labels);
         let names: BTreeMap<u8, String> = labels.filter_map(|l| Some((l.id, l.name.clone()?))).collect();
+        let tree = vehicle.and_then(|v| v.label_tree.as_ref()).and_then(MapLabelTree::tree);
         let markers = vehicle.map(|v| v.markers.clone()).unwrap_or_default();
-        (snapshot.state.mission.origin, vehicle.and_then(|v| v.map.placement.clone()), names, markers)
+        (snapshot.state.mission.origin, vehicle.and_then(|v| v.map.placement.clone()), names, tree, markers)
     };
     let moves = placement.as_ref().map_or(0, |p| p.version);
     let mut named = DefaultHasher::new();
     names.hash(&mut named);
+    (count, tree.as_ref().map(LabelTree::to_bytes)).hash(&mut named);
     markers.iter().for_each(|m| (m.number, &m.text, m.at_s.to_bits()).hash(&mut named));
     let tag = format!("{id}-{}-{moves}-{:x}", cached.map.tag(), named.finish());
     if is_held(&headers, &tag) {
@@ -176,7 +206,8 @@ pub(in crate::http) async fn file(shared: Shared, id: u8, headers: HeaderMap, fo
     };
     let made = tokio::task::spawn_blocking(move || {
         let moved_m = placement.map_or((0.0, 0.0), |p| (p.east_m, p.north_m));
-        MapCells { moved_m, names, markers, ..cached.map.cells().clone() }.export(format, origin)
+        let cells = MapCells { moved_m, names, tree, markers, ..cached.map.cells().clone() };
+        cut_at(count, cells).export(format, origin)
     });
     match made.await {
         Ok(Ok(bytes)) => {
@@ -193,7 +224,11 @@ pub(in crate::http) async fn archives(State(shared): State<Shared>) -> Response 
 }
 
 /// An archived map as a file.
-pub(in crate::http) async fn archived(shared: Shared, name: String, format: MapFormat) -> Response {
+pub(in crate::http) async fn archived(shared: Shared, name: String, query: MapQuery, format: MapFormat) -> Response {
+    let count = match cut(&query) {
+        Ok(count) => count,
+        Err(reason) => return error(StatusCode::UNPROCESSABLE_ENTITY, &reason),
+    };
     let cells = match shared.request(SurfaceRequest::ArchivedMap(name)).await {
         Ok(Reply::Map(cells)) => cells,
         Ok(other) => return respond(other),
@@ -203,7 +238,7 @@ pub(in crate::http) async fn archived(shared: Shared, name: String, format: MapF
     let Ok(_maker) = shared.maps.makers.acquire().await else {
         return StatusCode::INTERNAL_SERVER_ERROR.into_response();
     };
-    match tokio::task::spawn_blocking(move || cells.export(format, origin)).await {
+    match tokio::task::spawn_blocking(move || cut_at(count, cells).export(format, origin)).await {
         Ok(Ok(bytes)) => ([(header::CONTENT_TYPE, format.content_type())], bytes).into_response(),
         Ok(Err(reason)) => error(StatusCode::UNPROCESSABLE_ENTITY, &reason),
         Err(_) => error(StatusCode::INTERNAL_SERVER_ERROR, "the file could not be made"),

@@ -2,10 +2,10 @@
 
 use super::{Content, Operation, read, schema};
 use crate::export::MapFormat;
-use crate::http::handlers::maps;
+use crate::http::handlers::maps::{self, MapQuery};
 use crate::http::shared::{ArchiveName, Shared};
 use crate::state::ArchiveList;
-use axum::extract::State;
+use axum::extract::{Query, State};
 use axum::routing::get;
 
 /// A file format of an archived map.
@@ -13,7 +13,9 @@ macro_rules! archive_file {
     ($path:literal, $id:literal, $summary:literal, $format:expr) => {{
         const FORMAT: MapFormat = $format;
         read($path, $id, $summary, Content::File(FORMAT.content_type()), || {
-            get(|State(shared): State<Shared>, ArchiveName(name): ArchiveName| maps::archived(shared, name, FORMAT))
+            get(|State(shared): State<Shared>, ArchiveName(name): ArchiveName, Query(query): Query<MapQuery>| {
+                maps::archived(shared, name, query, FORMAT)
+            })
         })
     }};
 }
@@ -63,6 +65,12 @@ pub(super) fn operations() -> Vec<Operation> {
             "archived_map_csv",
             "One line for each explored cell of an archived map",
             MapFormat::Csv
+        ),
+        archive_file!(
+            "/api/v2/archive/{name}/map.labels.csv",
+            "archived_map_labels",
+            "One line for each label of an archived map, with the label that stands for it at each cut of the tree",
+            MapFormat::Labels
         ),
         archive_file!(
             "/api/v2/archive/{name}/map.tif",

@@ -6,7 +6,7 @@ use super::status::StatusParts;
 use crate::directive::InForcePart;
 use crate::link::surface::layers::{LayerOutcome, Layers};
 use crate::link::{FrameNumber, LinkStats, SurfaceEvent};
-use crate::map::{ClassChunk, ClassReplica, LayerChunk, StateReplica};
+use crate::map::{ClassChunk, ClassReplica, LayerChunk, StateReplica, TextPart, TreeReplica};
 use crate::object::{ObjectReceiver, Part, Received};
 use crate::schedule::Class;
 use crate::time::Instant;
@@ -42,6 +42,7 @@ impl ChunkOutcome {
 pub(super) struct PeerContent<R> {
     pub(super) replica: R,
     pub(super) classes: ClassReplica,
+    pub(super) tree: TreeReplica,
     pub(super) layers: Layers,
     pub(super) status: StatusParts,
     pub(super) backlog: Option<ReportedBacklog>,
@@ -55,6 +56,7 @@ impl<R: StateReplica> PeerContent<R> {
         Self {
             replica: R::default(),
             classes: ClassReplica::default(),
+            tree: TreeReplica::default(),
             layers: Layers::default(),
             status: StatusParts::default(),
             backlog: None,
@@ -81,6 +83,7 @@ impl<R: StateReplica> PeerContent<R> {
         }
         self.objects.clear();
         self.classes = ClassReplica::default();
+        self.tree = TreeReplica::default();
         self.status = StatusParts::default();
         self.backlog = None;
         self.generation += 1;
@@ -150,6 +153,13 @@ impl<R: StateReplica> PeerContent<R> {
                 }
                 None => ChunkOutcome::Malformed,
             },
+            ChunkKind::LabelTree => match self.tree.handle_chunk(number, chunk.payload) {
+                Some(is_complete) => {
+                    events.extend(is_complete.then_some(SurfaceEvent::LabelsJoined(vehicle)));
+                    ChunkOutcome::Accepted
+                }
+                None => ChunkOutcome::Malformed,
+            },
             ChunkKind::InForce => ChunkOutcome::Accepted,
             ChunkKind::Slot | ChunkKind::Introduction | ChunkKind::Inquiry => ChunkOutcome::Malformed,
         }
@@ -184,7 +194,7 @@ impl<R: StateReplica> PeerContent<R> {
 /// The class that the bytes of a chunk count as.
 pub(super) fn class_of(chunk: &Chunk<'_>) -> Class {
     match chunk.kind {
-        ChunkKind::Map | ChunkKind::LabelClass => Class::Map,
+        ChunkKind::Map | ChunkKind::LabelClass | ChunkKind::LabelTree => Class::Map,
         ChunkKind::Pose | ChunkKind::Trail | ChunkKind::Intent | ChunkKind::Registration => Class::Status,
         ChunkKind::Report | ChunkKind::InForce | ChunkKind::Faults => Class::Status,
         ChunkKind::Slot | ChunkKind::Inquiry => Class::Directive,
@@ -199,6 +209,7 @@ fn decode<R: StateReplica>(replica: &R, layers: &Layers, base: FrameNumber, mut 
         ChunkKind::Map => replica.decodes(base, chunk.payload),
         ChunkKind::Pose => VehicleStatus::default().read_pose(chunk.payload).is_ok(),
         ChunkKind::LabelClass => ClassChunk::decode(chunk.payload).is_some(),
+        ChunkKind::LabelTree => TextPart::decode(chunk.payload).is_some(),
         ChunkKind::Intent => Intent::decode(chunk.payload).is_ok(),
         ChunkKind::Registration => RegistrationReport::decode(chunk.payload).is_ok(),
         ChunkKind::Faults => EquipmentFaults::decode(chunk.payload).is_ok(),

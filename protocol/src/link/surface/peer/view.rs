@@ -4,7 +4,7 @@ use super::{EndedRun, InForce, VehiclePeer};
 use crate::directive::{Series, Slot, SlotId, SlotProgress};
 use crate::link::{LinkStats, Mismatch};
 use crate::mac::ClockMap;
-use crate::map::{ClassReplica, LayerId, LayerReplica, LayerSet, Replica, StateReplica};
+use crate::map::{ClassReplica, LabelTree, LayerId, LayerReplica, LayerSet, Replica, StateReplica};
 use crate::time::Instant;
 use crate::wire::{Backlog, VehicleStatus};
 use std::time::Duration;
@@ -60,6 +60,11 @@ impl<'a, R: StateReplica> PeerView<'a, R> {
     /// The names and colours of labels that the vehicle has announced in this run.
     pub fn classes(&self) -> &'a ClassReplica {
         &self.0.content.classes
+    }
+
+    /// The newest tree of its labels; `None` until one has arrived in this run.
+    pub fn tree(&self) -> Option<&'a LabelTree> {
+        self.0.content.tree.tree()
     }
 
     /// Counts changes of the replicated state and its layers.
