@@ -304,6 +304,9 @@ export default [
       await s.page.reload();
       await s.ready();
       await s.until("the cut after a reload", async () => (await rows()) === labels.length - 1);
+      await s.inPage(({ rename }, id) => rename(id, "kelp"), joins);
+      await s.shows(`.label[data-key='${into}'] .name`, /kelp \+1/);
+      await s.inPage(({ rename }, id) => rename(id, ""), joins);
       await s.page.locator("#label-cut").fill(String(labels.length));
       await s.until("all labels again", async () => (await rows()) === labels.length);
     },

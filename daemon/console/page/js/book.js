@@ -113,7 +113,14 @@ export function shownAs(id) {
 /** Whether the operator has merged `id`, or the label that stands for it, into another one. */
 export const isMerged = (id) => Boolean(current().merged[id] ?? current().merged[groupOf(id)]);
 
-export const nameOf = (id) => current().names[id] ?? `Label ${id}`;
+/** The name of the largest label that `id` stands for and that has one. */
+function nameOfMember(id) {
+  const members = (store.vehicle?.labels ?? []).filter((l) => current().names[l.id] !== undefined && groupOf(l.id) === id);
+  return members.sort((a, b) => b.cells - a.cells)[0]?.id;
+}
+
+/** The operator's name of `id`; a label without one that stands for others has the name of the largest of these. */
+export const nameOf = (id) => current().names[id] ?? current().names[nameOfMember(id)] ?? `Label ${id}`;
 export const hasName = (id) => current().names[id] !== undefined;
 export const colourOf = (id) => current().colours[id] ?? tableColour(id);
 
