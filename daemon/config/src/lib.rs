@@ -37,8 +37,7 @@ pub use sections::{
 };
 pub use setting::{
     Authenticate, AutopilotKind, BandRange, BirthRule, CalibrationSource, CameraSource, CameraStamps, Debounce,
-    DepthSource, GpsPort, HostPort, LabelMessage, LabelSource, LayerName, MapCells, MapStream, ModemKind,
-    NavigationSource, OperatorScript, Remap, RosName, RosTransport, S2cMode, SceneLabels, Votes, WorldKind,
-    ZenohEndpoint,
+    DepthSource, GpsPort, HostPort, LabelMessage, LabelSource, LayerName, MapCells, ModemKind, NavigationSource,
+    OperatorScript, Remap, RosName, RosTransport, S2cMode, SceneLabels, Votes, WorldKind, ZenohEndpoint,
 };
 pub use token_file::{TokenGrant, load_tokens, read_token, read_tokens};

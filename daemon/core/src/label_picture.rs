@@ -58,19 +58,6 @@ pub fn encode(grid: &LabelGrid) -> Result<Vec<u8>, PictureError> {
     encode_within(grid, grid.bounds().unwrap_or(Rect { x: 0, y: 0, width: 1, height: 1 }))
 }
 
-/// A whole-map object: the cell of the south-west corner (two 32-bit numbers), then the PNG.
-pub fn with_place(grid: &LabelGrid, png: &[u8]) -> Vec<u8> {
-    let bounds = grid.bounds().unwrap_or(Rect { x: 0, y: 0, width: 1, height: 1 });
-    [&bounds.x.to_be_bytes()[..], &bounds.y.to_be_bytes()[..], png].concat()
-}
-
-/// Reads a whole-map object; `None` if it is none.
-pub fn read_whole(object: &[u8]) -> Option<LabelGrid> {
-    let (x, rest) = object.split_first_chunk::<4>()?;
-    let (y, png) = rest.split_first_chunk::<4>()?;
-    decode(png, i32::from_be_bytes(*x), i32::from_be_bytes(*y)).ok()
-}
-
 /// The raw indices of an image, row by row from the top.
 pub struct Indices {
     pub pixels: Vec<u8>,
@@ -78,8 +65,8 @@ pub struct Indices {
     pub height: u32,
 }
 
-/// Most cells of a whole map that is received.
-const MAX_RECEIVED_CELLS: u64 = 1 << 22;
+/// Most cells of a map that is read.
+const MAX_READ_CELLS: u64 = 1 << 22;
 
 /// Reads the indices of an indexed PNG of at most `most` pixels; `None` if it is another kind of file.
 pub fn read_indices(bytes: &[u8], most: u64) -> Result<Option<Indices>, String> {
@@ -108,7 +95,7 @@ pub fn read_indices(bytes: &[u8], most: u64) -> Result<Option<Indices>, String> 
 
 /// Reads an indexed PNG as a map whose south-west cell is `(x0, y0)`.
 pub fn decode(bytes: &[u8], x0: i32, y0: i32) -> Result<LabelGrid, String> {
-    let image = read_indices(bytes, MAX_RECEIVED_CELLS)?.ok_or("not an indexed PNG")?;
+    let image = read_indices(bytes, MAX_READ_CELLS)?.ok_or("not an indexed PNG")?;
     let mut grid = LabelGrid::default();
     for (row, line) in (0..image.height).rev().zip(image.pixels.chunks(image.width as usize)) {
         for (column, &label) in (0..image.width).zip(line) {
@@ -131,12 +118,11 @@ mod tests {
             let bounds = grid.bounds().unwrap();
             let png = encode(&grid).unwrap();
             assert_eq!(decode(&png, bounds.x, bounds.y).unwrap(), grid, "{labels} labels");
-            assert_eq!(read_whole(&with_place(&grid, &png)).unwrap(), grid);
         }
     }
 
     #[test]
-    fn a_received_map_that_claims_too_much_is_refused() {
+    fn a_picture_that_claims_too_much_is_refused() {
         let grid: LabelGrid = [(Cell::new(0, 0), 1)].into_iter().collect();
         let huge = Rect { x: 0, y: 0, width: 1 << 12, height: (1 << 10) + 1 };
         assert!(decode(&encode_within(&grid, huge).unwrap(), 0, 0).is_err());

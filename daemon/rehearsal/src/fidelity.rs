@@ -1,21 +1,25 @@
 //! The operator's map over time at a given bit budget.
 
-use super::baseline::whole_png;
+use super::baseline::Baseline;
+use super::frames_log::FramesLog;
+use super::meter::Meter;
 use super::mission::{MapQuality, Mission, MissionOptions};
 use super::quality::{Curve, Line, Panel};
-use super::uplink::{Repeats, Uplink};
+use super::uplink::{Repeats, Uplink, per_map_bit};
 use super::world::World;
 use scenecast_config::Config;
 use scenecast_core::UserError;
+use scenecast_protocol::link::LinkStats;
+use scenecast_protocol::schedule::Class;
 use serde::Serialize;
 use std::time::Duration;
 
-/// One mission of the comparison.
+/// One stream of the comparison.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct FidelityRow {
     /// Bit budget of each end, bit/s.
     pub budget_bps: u32,
-    /// The stream that was used: `delta` or `whole-png`.
+    /// The stream that carries the map: `delta` or `whole-png`.
     pub stream: &'static str,
     /// Share of explored cells on which the maps agree, mean over the survey.
     pub agreement_mean: f64,
@@ -31,7 +35,7 @@ pub struct FidelityRow {
     pub operator_share_mean: Option<f64>,
     /// Number of bits that the vehicle put on air.
     pub sent_bits: u64,
-    /// The vehicle's bytes; whole PNG files count as map.
+    /// The vehicle's bytes; parts of PNG files count as map.
     pub uplink_bytes: Uplink,
     /// The part of these bytes that is map, and the part that belongs to frames of mainly map, 0..=1.
     pub map_share: f64,
@@ -45,7 +49,10 @@ pub struct FidelityRow {
     pub series: Vec<MapQuality>,
 }
 
-/// Runs the same mission at each budget, for the delta stream and for whole PNGs.
+/// Time between two looks at the baseline.
+const STEP: Duration = Duration::from_secs(1);
+
+/// Runs the same mission at each budget, and beside it the links that carry its map as whole PNGs.
 pub fn fidelity(
     config: &Config,
     world: &World,
@@ -55,11 +62,13 @@ pub fn fidelity(
 ) -> Result<Vec<FidelityRow>, UserError> {
     let mut rows = Vec::new();
     for &budget_bps in budgets_bps {
-        let mut delta = config.clone();
-        delta.link.budget_bps = budget_bps;
-        let whole = whole_png(&delta);
-        for (stream, config) in [("delta", delta), ("whole-png", whole)] {
-            let row = run(config, world, seed, budget_bps, stream)?;
+        let mut config = config.clone();
+        config.link.budget_bps = budget_bps;
+        let mut baseline = Baseline::new(&config, seed)?;
+        let mut mission = Mission::new(config, MissionOptions { world: world.clone(), seed, record: None })?;
+        mission.run_survey(STEP, &mut |mission| baseline.follow(mission))?;
+        for stream in [delta(&mission), baseline.stream(&mission)] {
+            let row = FidelityRow::new(&mission, stream);
             progress(&row);
             rows.push(row);
         }
@@ -67,39 +76,64 @@ pub fn fidelity(
     Ok(rows)
 }
 
-fn run(
-    config: Config,
-    world: &World,
-    seed: u64,
-    budget_bps: u32,
-    stream: &'static str,
-) -> Result<FidelityRow, UserError> {
-    let mut mission = Mission::new(config, MissionOptions { world: world.clone(), seed, record: None })?;
-    mission.run(Duration::ZERO, &mut |_| {})?;
-    let [median, p95, max] = mission.meters.labels.delays(mission.now()).summary();
-    let (uplink_bytes, by_kind) = (Uplink::of(&mission), &mission.frames().up);
-    let of_map = by_kind.get(mission.map_class().name()).map_or(0, |sum| sum.bytes);
-    let end = mission.quality();
-    let series: Vec<MapQuality> = mission.quality_series().iter().copied().chain([end]).collect();
-    Ok(FidelityRow {
-        budget_bps,
-        stream,
-        agreement_mean: mission.meters.labels.agreement_mean(),
-        age_s_median: median,
-        age_s_p95: p95,
-        age_s_max: max,
-        end,
-        operator_share: end.operator_share(),
-        operator_share_mean: mean_share(&series),
+/// What a row is made of, after the survey.
+pub(crate) struct Stream<'a> {
+    pub(crate) name: &'static str,
+    pub(crate) labels: &'a Meter,
+    /// Both maps every half minute, then at the end.
+    pub(crate) series: &'a [MapQuality],
+    pub(crate) end: MapQuality,
+    /// The counters of the vehicle's end, and the bits that it put on air, repeats of the modem left out and included.
+    pub(crate) stats: &'a LinkStats,
+    pub(crate) sent_bits: u64,
+    pub(crate) bits_on_air: u64,
+    pub(crate) frames: &'a FramesLog,
+    pub(crate) repeats: Repeats,
+}
+
+fn delta(mission: &Mission) -> Stream<'_> {
+    Stream {
+        name: "delta",
+        labels: &mission.meters.labels,
+        series: mission.quality_series(),
+        end: mission.quality(),
+        stats: mission.vehicle().stats(),
         sent_bits: mission.audits()[0].total_bits(),
-        map_share: uplink_bytes.map_share(),
-        map_frames_share: of_map as f64 / by_kind.values().map(|sum| sum.bytes).sum::<u64>().max(1) as f64,
-        repeats: Repeats::of(&mission),
-        energy_j: mission.energy_j().map(|[up, _]| up),
-        energy_per_map_bit_j: mission.energy_per_map_bit_j(),
-        uplink_bytes,
-        series,
-    })
+        bits_on_air: mission.bits_on_air()[0],
+        frames: mission.frames(),
+        repeats: Repeats::of(mission.surface().view(mission.address()), mission.frames()),
+    }
+}
+
+impl FidelityRow {
+    fn new(mission: &Mission, stream: Stream<'_>) -> Self {
+        let Stream { name, labels, end, stats, frames, .. } = stream;
+        let [median, p95, max] = labels.delays(mission.now()).summary();
+        let uplink_bytes = Uplink::of(stats);
+        let of_map = frames.up.get(Class::Map.name()).map_or(0, |sum| sum.bytes);
+        let of_all: u64 = frames.up.values().map(|sum| sum.bytes).sum();
+        let series: Vec<MapQuality> = stream.series.iter().copied().chain([end]).collect();
+        let energy_j = mission.joules(stream.bits_on_air);
+        Self {
+            budget_bps: mission.config().link.budget_bps,
+            stream: name,
+            agreement_mean: labels.agreement_mean(),
+            age_s_median: median,
+            age_s_p95: p95,
+            age_s_max: max,
+            end,
+            operator_share: end.operator_share(),
+            operator_share_mean: mean_share(&series),
+            sent_bits: stream.sent_bits,
+            map_share: uplink_bytes.map_share(),
+            map_frames_share: of_map as f64 / of_all.max(1) as f64,
+            repeats: stream.repeats,
+            energy_j,
+            energy_per_map_bit_j: energy_j.and_then(|joules| per_map_bit(joules, stats)),
+            uplink_bytes,
+            series,
+        }
+    }
 }
 
 /// The operator's information over that of the vehicle, both added up over time.
@@ -129,4 +163,22 @@ pub fn fidelity_panels(rows: &[FidelityRow]) -> Vec<Panel> {
         Panel { title: format!("{budget_bps} bit/s"), unit: "nats", curves }
     };
     rows.chunk_by(|a, b| a.budget_bps == b.budget_bps).map(of_budget).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn at_a_small_budget_the_operator_learns_less_from_whole_pngs() {
+        let sets = ["survey.duration_s=240", "camera.width_px=320", "camera.height_px=240", "channel.loss=0.1"];
+        let config = scenecast_config::load(None, &sets.map(str::to_owned)).unwrap();
+        let rows = fidelity(&config, &World::patches(5, 0.01), 3, &[300], &mut |_| {}).unwrap();
+        let [delta, whole] = rows.try_into().unwrap();
+        assert_eq!((delta.stream, whole.stream), ("delta", "whole-png"));
+        let vehicle = |row: &FidelityRow| row.series.iter().map(|s| (s.t_s, s.vehicle)).collect::<Vec<_>>();
+        assert_eq!(vehicle(&delta), vehicle(&whole), "it is one mission");
+        assert!(whole.operator_share_mean < delta.operator_share_mean && whole.operator_share_mean > Some(0.0));
+        assert!(whole.uplink_bytes.map > 0 && whole.uplink_bytes.other == 0, "{:?}", whole.uplink_bytes);
+    }
 }

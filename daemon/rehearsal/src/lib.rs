@@ -1,6 +1,7 @@
 //! A whole mission in virtual time: the hosts of the sea, with a simulated sea floor, channel and vehicle.
 
 mod baseline;
+mod carrier;
 #[cfg(test)]
 mod conformance_tests;
 #[cfg(test)]
@@ -9,6 +10,7 @@ mod fidelity;
 mod frames_log;
 mod instruments;
 pub mod link_bench;
+mod link_rig;
 mod meter;
 mod mission;
 pub mod modem_bench;
@@ -28,9 +30,11 @@ mod uplink;
 mod virtual_time;
 mod world;
 
+pub use baseline::{WholeReplica, WholeSource};
 pub use fidelity::{FidelityRow, fidelity, fidelity_panels};
 pub use frames_log::FramesLog;
 pub use instruments::{Instruments, Receiver};
+pub use link_rig::LinkRig;
 pub use meter::Delays;
 pub use mission::{FrameErrors, MapInformation, MapQuality, Mission, MissionOptions};
 pub use outputs::write_outputs;

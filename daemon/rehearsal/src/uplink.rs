@@ -1,8 +1,9 @@
 //! The bytes and the energy of the vehicle's transmissions.
 
+use super::frames_log::FramesLog;
 use super::mission::Mission;
-use scenecast_config::MapStream;
-use scenecast_protocol::link::{DropReason, TransmitKind};
+use scenecast_protocol::link::{DropReason, LinkStats, PeerView, TransmitKind};
+use scenecast_protocol::map::StateReplica;
 use scenecast_protocol::schedule::Class;
 use serde::Serialize;
 
@@ -20,10 +21,10 @@ pub struct Uplink {
 }
 
 impl Uplink {
-    pub fn of(mission: &Mission) -> Self {
-        let stats = mission.vehicle().stats();
+    /// The bytes by the counters of the vehicle's end.
+    pub fn of(stats: &LinkStats) -> Self {
         let of = |class| stats.bytes_by_class.get(&class).copied().unwrap_or(0);
-        let [map, status, overhead] = [mission.map_class(), Class::Status, Class::Overhead].map(of);
+        let [map, status, overhead] = [Class::Map, Class::Status, Class::Overhead].map(of);
         let all: u64 = stats.bytes_by_class.values().sum();
         Self { map, status, overhead, repeated: stats.repeated_bytes, other: all - map - status - overhead }
     }
@@ -48,34 +49,35 @@ pub struct Repeats {
 }
 
 impl Repeats {
-    pub fn of(mission: &Mission) -> Self {
-        let view = mission.surface().view(mission.address());
+    /// The copies by the surface's view of the vehicle and by the log of the frames.
+    pub fn of<R: StateReplica>(view: Option<PeerView<'_, R>>, frames: &FramesLog) -> Self {
         let twice = view.and_then(|v| v.stats().dropped.get(&DropReason::Duplicate).copied());
-        let frames = mission.frames().up.get(TransmitKind::Repeat.name()).map_or(0, |sum| sum.frames);
+        let frames = frames.up.get(TransmitKind::Repeat.name()).map_or(0, |sum| sum.frames);
         Self { frames, arrived_twice: twice.unwrap_or(0) }
     }
 }
 
 impl Mission {
-    /// The class that carries the map: a whole PNG file counts as an image.
-    pub(crate) fn map_class(&self) -> Class {
-        match self.config.map.stream {
-            MapStream::Delta => Class::Map,
-            MapStream::WholePng => Class::Exemplar,
-        }
+    /// Energy that the modem of an end transmits so many bits with, joules; `None` if it is not counted.
+    pub(crate) fn joules(&self, bits: u64) -> Option<f64> {
+        Some(bits as f64 * scenecast_config::joules_per_bit(&self.config, self.modem())?)
     }
 
     /// Energy that the modems of vehicle and surface have transmitted with, joules; `None` if it is not counted.
     pub fn energy_j(&self) -> Option<[f64; 2]> {
-        let joules = scenecast_config::joules_per_bit(&self.config, self.modem())?;
-        Some(self.bits_on_air().map(|bits| bits as f64 * joules))
+        let [up, down] = self.bits_on_air().map(|bits| self.joules(bits));
+        Some([up?, down?])
     }
 
     /// The vehicle's energy divided by the bits of the map that the surface has acknowledged, joules; `None` without any, or if
     /// energy is not counted.
     pub fn energy_per_map_bit_j(&self) -> Option<f64> {
-        let delivered =
-            self.vehicle().stats().delivered_by_class.get(&self.map_class()).copied().filter(|&bytes| bytes > 0)?;
-        Some(self.energy_j()?[0] / (delivered * 8) as f64)
+        per_map_bit(self.energy_j()?[0], self.vehicle().stats())
     }
+}
+
+/// The energy divided by the bits of the map that the surface has acknowledged; `None` without any.
+pub(crate) fn per_map_bit(joules: f64, stats: &LinkStats) -> Option<f64> {
+    let delivered = stats.delivered_by_class.get(&Class::Map).copied().filter(|&bytes| bytes > 0)?;
+    Some(joules / (delivered * 8) as f64)
 }

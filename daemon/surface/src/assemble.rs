@@ -19,8 +19,19 @@ pub fn assemble(
     seed: u64,
     now: Instant,
 ) -> Result<Surface, UserError> {
-    let vehicles = vehicle_names(config)?;
-    let link = SurfaceConfig {
+    let link = SurfaceLink::new(link_config(config, authenticity, modem)?, seed, now);
+    let mut surface = Surface::new(link, vehicle_names(config)?).with_tuning_table(table);
+    surface.set_background(config.link.background);
+    Ok(surface)
+}
+
+/// The configured end of the link.
+pub fn link_config(
+    config: &Config,
+    authenticity: Option<Authenticity>,
+    modem: ModemProfile,
+) -> Result<SurfaceConfig, UserError> {
+    Ok(SurfaceConfig {
         mission: MissionId(config.mission.id),
         cell_edge: CellEdge::from_metres(cell_m(config)),
         modem,
@@ -32,13 +43,9 @@ pub fn assemble(
             max_turn: Duration::from_secs_f64(config.link.max_turn_s),
             max_idle: Duration::from_secs_f64(config.link.max_idle_s),
         },
-        vehicles: vehicles.keys().copied().collect(),
+        vehicles: vehicle_names(config)?.into_keys().collect(),
         discovery_period: (config.link.discovery_period_s > 0.0)
             .then(|| Duration::from_secs_f64(config.link.discovery_period_s)),
         authenticity,
-    };
-    let link = SurfaceLink::new(link, seed, now);
-    let mut surface = Surface::new(link, vehicles).with_tuning_table(table);
-    surface.set_background(config.link.background);
-    Ok(surface)
+    })
 }

@@ -25,7 +25,7 @@ mod track;
 mod vehicle_record;
 
 pub use annotations::Annotations;
-pub use assemble::assemble;
+pub use assemble::{assemble, link_config};
 pub use command::{
     COMMAND_SILENCE, Command, CommandAction, CommandChange, CommandChangeKind, CommandHolder, CommandRefusal,
     CommandRequest, OrderKind,
@@ -39,4 +39,4 @@ pub use scenecast_core::{Principal, Role};
 pub use settings::{SettingsOrder, SettingsRecord};
 pub use surface::{Surface, SurfaceOutput};
 pub use track::Track;
-pub use vehicle_record::{EarlierView, SentOrder, VehicleRecord, WholeMaps};
+pub use vehicle_record::{EarlierView, SentOrder, VehicleRecord};

@@ -2,16 +2,13 @@
 
 use super::Surface;
 use scenecast_protocol::link::PeerView;
-use scenecast_protocol::map::{LabelGrid, LayerReplica, Rect, Replica, ReplicaTile, SharedTiles};
+use scenecast_protocol::map::{LabelGrid, LayerReplica, Rect, Replica, SharedTiles};
 use scenecast_protocol::wire::Address;
 use std::collections::BTreeMap;
 
 impl Surface {
     pub fn map(&self, vehicle: Address) -> Option<&LabelGrid> {
-        let record = self.records.get(&vehicle);
-        let earlier = record.and_then(|d| d.earlier_map()).map(|earlier| earlier.map.labels().shown());
-        let in_view = earlier.or_else(|| record.and_then(|d| d.whole.last.as_ref()));
-        in_view.or_else(|| self.link.vehicle(vehicle).map(|v| v.replica().shown()))
+        Some(self.replica(vehicle)?.shown())
     }
 
     /// The labels of the map in view with the time of each cell: those of the earlier map, if it is in view.
@@ -31,27 +28,18 @@ impl Surface {
 
     /// The number of cells with a label that the vehicle has sent in its current run, in view or not.
     pub fn current_cells(&self, vehicle: Address) -> usize {
-        let whole = self.records.get(&vehicle).and_then(|d| d.whole.last.as_ref());
-        let count = |view: PeerView<'_>| view.replica().counts().map(|(_, cells)| cells as usize).sum::<usize>();
-        let live = || self.link.vehicle(vehicle).map_or(0, count);
-        whole.map_or_else(live, LabelGrid::explored)
-    }
-
-    /// The last whole map, if it is in view.
-    fn whole_map(&self, vehicle: Address) -> Option<&LabelGrid> {
-        let record = self.records.get(&vehicle).filter(|record| record.earlier_map().is_none());
-        record.and_then(|record| record.whole.last.as_ref())
+        let count = |view: PeerView<'_>| view.replica().counts().map(|(_, cells)| cells as usize).sum();
+        self.link.vehicle(vehicle).map_or(0, count)
     }
 
     /// The labels of the map in view in tiles. They are shared, so a clone stays as it is and costs little.
     pub fn map_tiles(&self, vehicle: Address) -> Option<SharedTiles> {
-        let whole = self.whole_map(vehicle).map(ReplicaTile::tiles_of);
-        whole.or_else(|| Some(self.replica(vehicle)?.tiles().clone()))
+        Some(self.replica(vehicle)?.tiles().clone())
     }
 
     /// The smallest rectangle around the explored cells of the map in view.
     pub fn map_bounds(&self, vehicle: Address) -> Option<Rect> {
-        self.whole_map(vehicle).map_or_else(|| self.replica(vehicle)?.bounds(), LabelGrid::bounds)
+        self.replica(vehicle)?.bounds()
     }
 
     /// A number that grows whenever the operator's map of a vehicle or one of its layers changes.
@@ -62,14 +50,7 @@ impl Surface {
 
     /// The number of cells of each label on the operator's map.
     pub fn labels(&self, vehicle: Address) -> Option<BTreeMap<u8, u32>> {
-        let Some(whole) = self.whole_map(vehicle) else {
-            return Some(self.replica(vehicle)?.counts().collect());
-        };
-        let mut cells = BTreeMap::new();
-        for (_, label) in whole.iter() {
-            *cells.entry(label).or_default() += 1;
-        }
-        Some(cells)
+        Some(self.replica(vehicle)?.counts().collect())
     }
 
     /// The labels of the map in view that an order may name. The error is one line for the operator.

@@ -4,8 +4,7 @@ use super::command::{Command, CommandAction, CommandChange, CommandRefusal, Orde
 use super::in_force;
 use super::log::{LogKind, MissionLog, Watch};
 use super::position::{Relay, UsblSighting};
-use super::vehicle_record::{VehicleRecord, WholeMaps};
-use scenecast_core::label_picture;
+use super::vehicle_record::VehicleRecord;
 use scenecast_core::tuning_table::{Fit, NoRow, TuningTable};
 use scenecast_core::{Principal, UsblLine};
 use scenecast_protocol::directive::{Budget, OrderStatus, Slot, SlotId};
@@ -323,13 +322,8 @@ impl Surface {
                 Some(SurfaceOutput::Changed(vehicle))
             }
             SurfaceEvent::Object(vehicle, bytes) => {
-                let record = self.records.get_mut(&vehicle)?;
-                if let Some(whole) = label_picture::read_whole(&bytes) {
-                    record.whole = WholeMaps { last: Some(whole), count: record.whole.count + 1, at: now };
-                    return Some(SurfaceOutput::MapChanged(vehicle));
-                }
                 let exemplar = Exemplar::decode(&bytes)?;
-                let is_new = record.handle_exemplar(&exemplar, now);
+                let is_new = self.records.get_mut(&vehicle)?.handle_exemplar(&exemplar, now);
                 if is_new {
                     let text = match exemplar.bytes.is_empty() {
                         true => format!("no image of label {} yet", exemplar.label),

@@ -12,7 +12,7 @@ use scenecast_core::UsblLine;
 use scenecast_protocol::directive::{Areas, Destination, ExemplarRequests, Fence, Limits, SlotId, Utility};
 use scenecast_protocol::exemplar::Exemplar;
 use scenecast_protocol::link::PeerView;
-use scenecast_protocol::map::{ClassEntry, ClassReplica, LabelGrid, LabelTree, MAX_LABEL};
+use scenecast_protocol::map::{ClassEntry, ClassReplica, LabelTree, MAX_LABEL};
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::VehicleStatus;
 use std::collections::BTreeMap;
@@ -32,17 +32,6 @@ impl<T> Default for SentOrder<T> {
     fn default() -> Self {
         Self { sent: None, in_force: None }
     }
-}
-
-/// Whole maps, where the vehicle sends them instead of patches.
-#[derive(Debug, Default)]
-pub struct WholeMaps {
-    /// The last one that has arrived.
-    pub last: Option<LabelGrid>,
-    /// The number of whole maps that have arrived.
-    pub count: u64,
-    /// When the last one arrived.
-    pub at: Instant,
 }
 
 /// The map of an earlier run, or of an earlier run of the surface, which stays in view until the
@@ -84,7 +73,6 @@ pub struct VehicleRecord {
     /// Counts the runs of the vehicle that this surface has met, from 1.
     pub run: u32,
     pub epoch: u8,
-    pub whole: WholeMaps,
     pub gains: LabelGains,
     pub earlier: EarlierView,
     /// The usual length of its silence.
@@ -121,7 +109,6 @@ impl VehicleRecord {
             registration: RegistrationRecord::default(),
             run: 1,
             epoch: 0,
-            whole: WholeMaps::default(),
             gains: LabelGains::default(),
             earlier: EarlierView::default(),
             pauses: Pauses::default(),
@@ -220,7 +207,7 @@ impl VehicleRecord {
 
     /// A number that grows with each change of the map in view.
     pub fn map_version(&self, view: &PeerView<'_>) -> u64 {
-        self.earlier.version_base + self.whole.count + view.map_version()
+        self.earlier.version_base + view.map_version()
     }
 
     /// Takes a status, of which the pose came in at `at`. A new epoch voids everything that refers to labels.

@@ -1,7 +1,7 @@
 //! Builds a vehicle from a configuration.
 
 use crate::{Durable, FailsafePolicy, Footprint, MapSelection, Navigator, Steering, Vehicle};
-use scenecast_config::{Config, Debounce, LabelSource, LayerName, MapCells, MapStream, cell_m, vehicle_address};
+use scenecast_config::{Config, Debounce, LabelSource, LayerName, MapCells, cell_m, vehicle_address};
 use scenecast_core::{Area, UserError};
 use scenecast_protocol::link::{Authenticity, VehicleConfig, VehicleLink};
 use scenecast_protocol::mac::ModemProfile;
@@ -22,17 +22,9 @@ pub fn assemble(
     seed: u64,
     now: Instant,
 ) -> Result<Vehicle, UserError> {
-    let link = VehicleConfig {
-        address: vehicle_address(config)?,
-        mission: MissionId(config.mission.id),
-        cell_edge: CellEdge::from_metres(cell_m(config)),
-        modem,
-        budget_bps: durable.budget_bps.unwrap_or(config.link.budget_bps),
-        budget_window: Duration::from_secs_f64(config.link.budget_window_s),
-        shares: durable.shares.map_or(config.link.shares, Shares),
-        status_period: Duration::from_secs_f64(config.link.status_period_s),
-        authenticity,
-    };
+    let mut link = link_config(config, authenticity, modem)?;
+    link.budget_bps = durable.budget_bps.unwrap_or(link.budget_bps);
+    link.shares = durable.shares.map_or(link.shares, Shares);
     let codec = config.map.codec;
     let mut link = VehicleLink::new(link, codec, seed, durable.inbox.clone(), now);
     for layer in layers(config, codec) {
@@ -57,10 +49,26 @@ pub fn assemble(
         debounce: debounce(config),
         layers: selected_layers(config),
     });
-    if config.map.stream == MapStream::WholePng {
-        vehicle.send_whole_png();
-    }
     Ok(vehicle)
+}
+
+/// The configured end of the link.
+pub fn link_config(
+    config: &Config,
+    authenticity: Option<Authenticity>,
+    modem: ModemProfile,
+) -> Result<VehicleConfig, UserError> {
+    Ok(VehicleConfig {
+        address: vehicle_address(config)?,
+        mission: MissionId(config.mission.id),
+        cell_edge: CellEdge::from_metres(cell_m(config)),
+        modem,
+        budget_bps: config.link.budget_bps,
+        budget_window: Duration::from_secs_f64(config.link.budget_window_s),
+        shares: config.link.shares,
+        status_period: Duration::from_secs_f64(config.link.status_period_s),
+        authenticity,
+    })
 }
 
 fn footprint(config: &Config) -> Footprint {
@@ -102,8 +110,7 @@ fn selected_layers(config: &Config) -> LayerMask {
 fn layers(config: &Config, codec: Codec) -> impl Iterator<Item = LayerSource> {
     let map = &config.map;
     let debounce = debounce(config).of_layers();
-    let possible = BUILT_IN_LAYERS.iter().zip(LayerName::all()).filter(|_| map.stream == MapStream::Delta);
-    possible.map(move |(layer, name)| {
+    BUILT_IN_LAYERS.iter().zip(LayerName::all()).map(move |(layer, name)| {
         let built_in = match layer.id {
             LayerId::DEPTH => LayerDescriptor::depth_around(config.survey.depth_m, map.depth_step_m),
             _ => layer.descriptor.clone(),

@@ -22,7 +22,7 @@ mod steering;
 mod track;
 mod vehicle;
 
-pub use assemble::assemble;
+pub use assemble::{assemble, link_config};
 pub use checkpoint::{RestoreError, Restored};
 pub use failsafe::{Failsafe, FailsafePolicy};
 pub use foreign::{ForeignMap, ForeignRestoreError, ForeignSource, ForeignUpdate, LabelChanges};

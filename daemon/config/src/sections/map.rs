@@ -4,7 +4,7 @@ use crate::key::section;
 use crate::rule::{ANY, range};
 use crate::setting::{
     BandRange, BirthRule, CalibrationSource, CameraSource, CameraStamps, Debounce, DepthSource, LabelSource, LayerName,
-    MapCells, MapStream, SceneLabels, Votes,
+    MapCells, SceneLabels, Votes,
 };
 use scenecast_protocol::map_codec::Codec;
 use std::collections::BTreeMap;
@@ -15,8 +15,6 @@ section! {
     map: Map {
         /// Codec of map chunks. auto takes the smaller result for each chunk.
         codec: Codec = Codec::Auto, ANY, [Auv Scenario];
-        /// delta sends changes. whole-png sends the whole map again whenever it has changed, for comparison only.
-        stream: MapStream = MapStream::Delta, ANY, [Auv Scenario];
         /// Time for which a new value of a cell must be stable before it is sent, if the operator already has a value
         /// of that cell. A cell that changes repeatedly must be stable for up to eight times as long. 0: no delay. auto:
         /// as long as the backlog takes at the budget, at most 60 s, and no longer than something else waits; this holds

@@ -123,14 +123,6 @@ choices! {
         Instant,
     }
 
-    /// How the map is sent.
-    MapStream "kebab-case" {
-        /// Changes since the last acknowledged state.
-        Delta,
-        /// The whole map as a PNG whenever it has changed, for comparison.
-        WholePng,
-    }
-
     /// Which cells of the map are sent.
     MapCells "lowercase" {
         /// Every cell.

@@ -4,7 +4,7 @@ use super::Mission;
 use super::blocks::with_blocks;
 use scenecast_protocol::coordinates::{MapPoint, WorldPoint};
 use scenecast_protocol::map::LabelGrid;
-use scenecast_protocol::wire::Placement;
+use scenecast_protocol::wire::{Placement, VehicleStatus};
 use scenecast_scoring::{PointPair, RigidFit, rms_distance};
 use serde::Serialize;
 
@@ -60,11 +60,11 @@ impl Mission {
         self.information(map, |at| navigator.to_map(at))
     }
 
-    /// The mutual information of the operator's map, as the page shows it, with the true classes, placed by the last report
+    /// The mutual information of an operator's map, as the page shows it, with the true classes, placed by the last report
     /// that came in; `None` if the classes are not known.
-    pub(crate) fn operator_information(&self) -> Option<MapInformation> {
-        let placement = self.surface().status(self.address()).and_then(|(status, _)| status.placement);
-        self.information(&with_blocks(&self.operator_map()), |at| Placement::world_to_map(placement, at))
+    pub(crate) fn shown_information(&self, map: &LabelGrid, report: Option<&VehicleStatus>) -> Option<MapInformation> {
+        let placement = report.and_then(|status| status.placement);
+        self.information(&with_blocks(map), |at| Placement::world_to_map(placement, at))
     }
 
     fn information(&self, map: &LabelGrid, to_map: impl Fn(WorldPoint) -> MapPoint) -> Option<MapInformation> {

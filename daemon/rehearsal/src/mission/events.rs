@@ -29,7 +29,7 @@ impl Mission {
 
     pub(super) fn handle_timeouts(&mut self) -> Result<(), UserError> {
         let now = self.times.now;
-        self.carrier.deliver(&mut self.vehicle, &mut self.surface, now);
+        self.carrier.deliver(self.vehicle.link_mut(), self.surface.link_mut(), now);
         if self.times.takes_step() {
             self.step();
         }
@@ -57,7 +57,9 @@ impl Mission {
         if let Some(view) = self.surface.surface().view(self.address) {
             self.logbook.note_issued(&view);
         }
-        self.carrier.collect(&mut self.vehicle, &mut self.surface, self.times.now);
+        let now = self.times.now;
+        self.carrier.write(VEHICLE, || self.vehicle.poll_output(now), now);
+        self.carrier.write(SURFACE, || self.surface.poll_output(now), now);
         self.handle_host_events();
     }
 
@@ -77,7 +79,7 @@ impl Mission {
                     if let FrameEvent::Received { bytes } = event {
                         self.logbook.received_bits += self.surface.link().profile().bits_on_air(bytes);
                     }
-                    self.log_sent(SURFACE, &event);
+                    self.carrier.log_event(SURFACE, &event, self.times.now);
                 }
                 SurfaceHostEvent::Following(..) | SurfaceHostEvent::Pilot(_) => {}
             }
@@ -95,14 +97,8 @@ impl Mission {
             VehicleHostEvent::Surface => self.motion.come_up(),
             VehicleHostEvent::Tune(settings) => self.mapper.tune(&settings),
             VehicleHostEvent::Applied(applied) => self.logbook.note_applied(applied),
-            VehicleHostEvent::Frame(event) => self.log_sent(VEHICLE, &event),
+            VehicleHostEvent::Frame(event) => self.carrier.log_event(VEHICLE, &event, self.times.now),
             VehicleHostEvent::Fixed(..) | VehicleHostEvent::SurveyEnded | VehicleHostEvent::Pilot(_) => {}
-        }
-    }
-
-    fn log_sent(&mut self, end: usize, event: &FrameEvent) {
-        if let FrameEvent::Sent { bytes, kind } = *event {
-            self.carrier.log_sent(end, bytes, kind.name(), self.times.now);
         }
     }
 

@@ -4,7 +4,6 @@ mod accuracy;
 mod anchored;
 mod blocks;
 mod camera;
-mod carrier;
 mod events;
 #[cfg(test)]
 mod label_tests;
@@ -21,6 +20,7 @@ mod true_cells;
 #[cfg(test)]
 mod tuned_tests;
 
+use crate::carrier::Carrier;
 use crate::frames_log::FramesLog;
 use crate::modem_rig::SURFACE;
 use crate::script::Script;
@@ -28,7 +28,6 @@ use crate::world::World;
 pub use accuracy::{FrameErrors, MapInformation};
 use anchored::Anchored;
 use camera::Camera;
-use carrier::Carrier;
 use labels::LabelReplay;
 pub use logbook::Leg;
 use logbook::Logbook;
@@ -232,17 +231,24 @@ impl Mission {
 
     /// Runs the survey to its end, then lets the link drain for at most `drain`.
     pub fn run(&mut self, drain: Duration, progress: &mut dyn FnMut(f64)) -> Result<(), UserError> {
-        let end = Instant::from_secs_f64(self.config.survey.duration_s);
-        while self.now() < end {
-            self.advance((self.now() + Duration::from_secs(10)).min(end))?;
-            progress(self.now().as_secs_f64() / end.as_secs_f64());
-        }
-        self.end_survey();
-        let give_up = end + drain;
+        let end_s = self.config.survey.duration_s;
+        self.run_survey(Duration::from_secs(10), &mut |mission| progress(mission.now().as_secs_f64() / end_s))?;
+        let give_up = self.now() + drain;
         while !self.is_drained() && self.now() < give_up {
             self.advance(self.now() + Duration::from_secs(1))?;
         }
         self.camera.finish_recording()
+    }
+
+    /// Runs the survey to its end in steps, with a call of `then` after each of them.
+    pub(crate) fn run_survey(&mut self, step: Duration, then: &mut dyn FnMut(&Self)) -> Result<(), UserError> {
+        let end = Instant::from_secs_f64(self.config.survey.duration_s);
+        while self.now() < end {
+            self.advance((self.now() + step).min(end))?;
+            then(self);
+        }
+        self.end_survey();
+        Ok(())
     }
 
     /// Stops camera and sampler; the link continues.

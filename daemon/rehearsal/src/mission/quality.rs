@@ -72,11 +72,12 @@ impl Mission {
     /// The quality of both maps now.
     pub fn quality(&self) -> MapQuality {
         let errors = self.registration_error_m();
+        let report = self.surface().status(self.address()).map(|(status, _)| status);
         let cells = |metres: f64| metres / self.cell_m();
         MapQuality {
             t_s: self.now().as_secs_f64(),
             vehicle: self.map_information(self.vehicle().map()),
-            operator: self.operator_information(),
+            operator: self.shown_information(&self.operator_map(), report),
             agreement: self.meters.labels.agreement(),
             age_s: self.meters.labels.age_s(self.now()),
             relabelled: self.meters.quality.relabelled(self.vehicle().map()),

@@ -186,11 +186,11 @@ impl Recorder {
         let memory = self.memory.vehicles.entry(number).or_default();
         let mut events = Vec::new();
         identity(record, memory, time, &mut events);
-        let updated = map_updated(record, &view);
+        let updated = map_updated(&view);
         let version = record.map_version(&view);
         if (version, updated) != (seen.version, seen.updated) {
             (seen.version, seen.updated) = (version, updated);
-            map_changes(record, &view, memory, &mut seen, &mut events);
+            map_changes(&view, memory, &mut seen, &mut events);
         }
         self.seen.insert(address, seen);
         for event in events {
@@ -257,23 +257,13 @@ fn identity(record: &VehicleRecord, memory: &VehicleMemory, time: EventTime, eve
 }
 
 /// When a chunk last changed or confirmed the map or a layer.
-fn map_updated(record: &VehicleRecord, view: &PeerView<'_>) -> Option<Instant> {
+fn map_updated(view: &PeerView<'_>) -> Option<Instant> {
     let layers = view.layers().iter().filter_map(|(id, _)| view.layer(id)?.levels().updated());
-    let whole = record.whole.last.as_ref().map(|_| record.whole.at);
-    layers.chain(view.replica().updated()).chain(whole).max()
+    layers.chain(view.replica().updated()).max()
 }
 
-fn map_changes(
-    record: &VehicleRecord,
-    view: &PeerView<'_>,
-    memory: &VehicleMemory,
-    seen: &mut SeenMap,
-    events: &mut Vec<VehicleEvent>,
-) {
-    let labels = match &record.whole.last {
-        Some(whole) => memory.map.label_changes(whole.iter().map(|(cell, label)| (cell, label, record.whole.at))),
-        None => memory.map.label_changes(view.replica().cells_apart_from(&seen.labels)),
-    };
+fn map_changes(view: &PeerView<'_>, memory: &VehicleMemory, seen: &mut SeenMap, events: &mut Vec<VehicleEvent>) {
+    let labels = memory.map.label_changes(view.replica().cells_apart_from(&seen.labels));
     events.extend(labels.into_iter().map(VehicleEvent::Cells));
     for (id, _) in view.layers().iter() {
         let Some(live) = view.layer(id) else { continue };

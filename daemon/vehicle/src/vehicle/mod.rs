@@ -18,7 +18,6 @@ mod report;
 mod slots;
 mod storing;
 mod weights;
-mod whole_png;
 mod withheld;
 
 pub use durable::{Durable, LostOrders};
@@ -160,11 +159,6 @@ impl Vehicle {
     /// Sets the codec of the layers of bands.
     pub fn set_codec(&mut self, codec: Codec) {
         self.codec = codec;
-    }
-
-    /// For comparison: sends the whole map as a PNG file whenever it has changed, in place of the changes.
-    pub fn send_whole_png(&mut self) {
-        self.publisher.send_whole_png();
     }
 
     /// Counts the whole budget window as spent, because an earlier run may have transmitted until `now`.
@@ -314,7 +308,6 @@ impl Vehicle {
                 VehicleEvent::ObjectDelivered(id) => {
                     self.gallery.handle_delivered(id);
                     self.serve_exemplars();
-                    self.publisher.handle_delivered(id);
                 }
                 VehicleEvent::SurfaceRestarted => self.handle_surface_restart(),
                 VehicleEvent::Mismatch(mismatch) => {
@@ -329,7 +322,6 @@ impl Vehicle {
     fn handle_surface_restart(&mut self) {
         self.gallery.handle_restart(&mut self.link);
         self.link.cancel_objects();
-        self.publisher.handle_surface_restart();
         self.serve_exemplars();
     }
 
@@ -430,7 +422,6 @@ impl Vehicle {
             self.link.set_status(status);
         }
         self.publisher.push_tree(&mut self.link, now);
-        self.publisher.push_whole_png(&mut self.link);
         self.link.poll_transmit(now)
     }
 

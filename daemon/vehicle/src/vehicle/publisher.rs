@@ -1,7 +1,6 @@
 //! The vehicle's map, and the choice of the cells and layers of it that are sent.
 
 use super::bands::Bands;
-use super::whole_png::WholePng;
 use super::withheld::Withheld;
 use crate::{LabelChanges, MapUpdate};
 use scenecast_config::Debounce;
@@ -11,7 +10,6 @@ use scenecast_protocol::map::{
     Cell, LabelGrid, LabelTree, LayerDescriptor, LayerId, LayerMask, LayerSource, UNEXPLORED,
 };
 use scenecast_protocol::map_codec::{Codec, Stride};
-use scenecast_protocol::object::ObjectId;
 use scenecast_protocol::time::Instant;
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -60,8 +58,6 @@ pub(super) struct MapPublisher {
     /// The tree of the labels, if it waits for its time, and when the last one was given to the link.
     tree: Option<LabelTree>,
     tree_at: Option<Instant>,
-    /// Takes the place of the link's map, for comparison.
-    whole_png: Option<WholePng>,
     /// Bands of another program and their layers, which the vehicle adds when the first of their cells comes.
     bands: Bands,
     /// Cells with labels of another program that are not on the disk yet.
@@ -82,27 +78,6 @@ impl MapPublisher {
     /// The number of cells that have a label.
     pub(super) fn explored(&self) -> u32 {
         self.explored
-    }
-
-    /// The map as it is sent.
-    pub(super) fn sent_map<'a>(&'a self, link: &'a VehicleLink) -> &'a LabelGrid {
-        self.whole_png.as_ref().map_or_else(|| link.map(), WholePng::map)
-    }
-
-    pub(super) fn sent_version(&self, link: &VehicleLink) -> u64 {
-        self.whole_png.as_ref().map_or_else(|| link.map_version(), WholePng::version)
-    }
-
-    pub(super) fn is_converged(&self) -> bool {
-        self.whole_png.as_ref().is_none_or(WholePng::is_converged)
-    }
-
-    pub(super) fn sends_whole_png(&self) -> bool {
-        self.whole_png.is_some()
-    }
-
-    pub(super) fn send_whole_png(&mut self) {
-        self.whole_png = Some(WholePng::default());
     }
 
     /// Sets the configured selection, which orders override.
@@ -159,10 +134,7 @@ impl MapPublisher {
         // A band in the place of a built-in layer has its cells to itself.
         let own = update.layers.iter().filter(|(id, _)| !self.bands.has(**id));
         self.layers = own.map(|(&id, cells)| (id, cells.clone())).collect();
-        match &mut self.whole_png {
-            Some(whole) => whole.set(update.cells.iter().copied()),
-            None => self.publish_scene(link, now),
-        }
+        self.publish_scene(link, now);
     }
 
     /// Takes changed cells of the labels of another program and gives the link those whose labels are on the disk, which are
@@ -208,9 +180,6 @@ impl MapPublisher {
     }
 
     fn publish_cells(&mut self, mut cells: Vec<(Cell, u8)>, link: &mut VehicleLink, now: Instant) {
-        if let Some(whole) = &mut self.whole_png {
-            return whole.set(cells.into_iter());
-        }
         cells.retain(|&(cell, _)| self.is_sent(Some(link.map()), cell));
         if !cells.is_empty() {
             link.set_map(cells, now);
@@ -233,9 +202,7 @@ impl MapPublisher {
             // The cells that the scene model gave to the layer until now.
             let others = self.layers.remove(&id).unwrap_or_default().into_iter().map(|(cell, _)| (cell, f64::NAN));
             let changed = self.bands.take(id, levels);
-            if self.whole_png.is_none() {
-                self.set_layer(id, others.chain(changed).collect(), link, now);
-            }
+            self.set_layer(id, others.chain(changed).collect(), link, now);
         }
     }
 
@@ -246,18 +213,13 @@ impl MapPublisher {
         self.layers.clear();
         (self.tree, self.tree_at) = (None, None);
         self.version += 1;
-        self.whole_png = self.whole_png.take().map(|_| WholePng::default());
-        if self.whole_png.is_none() {
-            self.publish_bands(link, now);
-        }
+        self.publish_bands(link, now);
     }
 
     /// Gives the link the selected cells of the map and of every layer, because the selection has changed.
     pub(super) fn publish(&self, link: &mut VehicleLink, now: Instant) {
-        if self.whole_png.is_none() {
-            self.publish_scene(link, now);
-            self.publish_bands(link, now);
-        }
+        self.publish_scene(link, now);
+        self.publish_bands(link, now);
     }
 
     /// Gives the link the selected cells of the map and of the scene model's layers.
@@ -307,27 +269,6 @@ impl MapPublisher {
             && link.set_tree(&tree)
         {
             self.tree_at = Some(now);
-        }
-    }
-
-    /// Gives the link the whole map as an image if that is due.
-    pub(super) fn push_whole_png(&mut self, link: &mut VehicleLink) {
-        if let Some(whole) = &mut self.whole_png {
-            whole.push(link);
-        }
-    }
-
-    /// The surface has an object completely.
-    pub(super) fn handle_delivered(&mut self, id: ObjectId) {
-        if let Some(whole) = &mut self.whole_png {
-            whole.handle_delivered(id);
-        }
-    }
-
-    /// The surface has lost its map.
-    pub(super) fn handle_surface_restart(&mut self) {
-        if let Some(whole) = &mut self.whole_png {
-            whole.send_again();
         }
     }
 }

@@ -22,12 +22,12 @@ impl Vehicle {
 
     /// The map as it is sent to the surface.
     pub fn map(&self) -> &LabelGrid {
-        self.publisher.sent_map(&self.link)
+        self.link.map()
     }
 
     /// The number of versions of [`Self::map`] so far.
     pub fn map_version(&self) -> u64 {
-        self.publisher.sent_version(&self.link)
+        self.link.map_version()
     }
 
     /// The layers that are selected to be sent.
@@ -47,7 +47,7 @@ impl Vehicle {
 
     /// Whether the surface has acknowledged everything that there is to send.
     pub fn is_converged(&self) -> bool {
-        self.link.is_converged() && self.publisher.is_converged()
+        self.link.is_converged()
     }
 
     pub fn stats(&self) -> &LinkStats {
@@ -96,7 +96,8 @@ impl Vehicle {
         self.guidance.mode()
     }
 
-    pub(super) fn status(&self, now: Instant) -> VehicleStatus {
+    /// The status as it is sent to the surface.
+    pub fn status(&self, now: Instant) -> VehicleStatus {
         let (mode, reason) = self.guidance.mode();
         VehicleStatus {
             mode,

@@ -242,10 +242,6 @@ impl Vehicle {
 
     fn apply_settings(&mut self, settings: &Settings, now: Instant) -> Result<(), RefusalReason> {
         settings.check().map_err(|_| RefusalReason::OutOfRange)?;
-        let selects_parts = settings.cells.value().is_some() || settings.layers.value().is_some();
-        if self.publisher.sends_whole_png() && selects_parts {
-            return Err(RefusalReason::OutOfRange);
-        }
         let before = self.settings;
         self.settings = before.then(settings);
         self.durable.settings = self.settings.to_bytes();

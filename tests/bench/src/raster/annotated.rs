@@ -1,11 +1,11 @@
 //! An annotated map as labels of another program, sent once over the radio.
 
-use super::rig::RadioRig;
-use super::{GIVE_UP, RasterSetting};
+use super::{GIVE_UP, RasterSetting, copy};
 use scenecast_core::UserError;
 use scenecast_labels::{Content, Ground, Item, ItemTime, MAX_PICTURE_BYTES, Raster};
 use scenecast_protocol::map::{MapSource, Replica};
 use scenecast_protocol::map_codec::Codec;
+use scenecast_rehearsal::{LinkRig, VirtualTime};
 use scenecast_vehicle::{ForeignMap, ForeignSource};
 use serde::Serialize;
 use std::path::Path;
@@ -53,20 +53,19 @@ pub fn annotated(
 fn send(setting: &RasterSetting, classes: &Raster, seed: u64) -> Result<AnnotatedFigures, UserError> {
     let sets = ["scene.cell_m=1".to_owned(), "labels.source=dir:.".to_owned()];
     let mut map = ForeignMap::new(&scenecast_config::load(None, &sets)?, 0);
-    let mut rig = RadioRig::<MapSource, Replica>::new(setting.modem(), setting.loss, MapSource::new(Codec::Auto), seed);
+    let mut rig: LinkRig<MapSource, Replica> = setting.rig(MapSource::new(Codec::Auto), seed)?;
     let began = rig.now;
-    rig.begin_account();
     for item in items(classes) {
         let taken = map.handle_item(&item, ForeignSource::Labels, None, 0.0);
         taken.map_err(|why| UserError::Input(why.to_string()))?;
     }
-    let is_equal = |rig: &RadioRig<MapSource, Replica>, map: &ForeignMap| rig.replica().shown() == map.labels();
+    let is_equal = |rig: &LinkRig<MapSource, Replica>, map: &ForeignMap| copy(rig).shown() == map.labels();
     while (map.has_changes() || !is_equal(&rig, &map)) && rig.now.since(began) < GIVE_UP {
         while map.has_changes() {
             let cells = map.take_changes(SLICE).labels.map(|changes| changes.cells).unwrap_or_default();
             rig.vehicle.end_mut().source_mut().set(cells, rig.now);
         }
-        rig.run_for(LOOK);
+        rig.run(LOOK);
     }
     let mut present = [false; 256];
     classes.values.iter().for_each(|&class| present[usize::from(class)] = true);
@@ -75,7 +74,7 @@ fn send(setting: &RasterSetting, classes: &Raster, seed: u64) -> Result<Annotate
         classes: present[..255].iter().filter(|&&is_there| is_there).count(),
         is_equal: is_equal(&rig, &map),
         seconds: rig.now.since(began).as_secs_f64(),
-        bytes: rig.bits[0] / 8,
+        bytes: rig.bits_on_air()[0] / 8,
     })
 }
 

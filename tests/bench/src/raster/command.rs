@@ -113,18 +113,14 @@ impl RasterBench {
         let mut rows: Vec<(String, RasterFigures)> = Vec::new();
         for (name, pattern) in [("scattered", Pattern::Scattered), ("patches", Pattern::Patches)] {
             let free = setting(pattern, Access::FullDuplex);
-            let mut row = |of: &str, figures: Result<_, _>| {
-                let figures = figures.map_err(|e| UserError::Failed(format!("{e}")))?;
-                rows.push((format!("{name}: {of}"), figures));
-                Ok::<_, UserError>(())
-            };
+            let mut row = |of: &str, figures| rows.push((format!("{name}: {of}"), figures));
             let mut progress = Progress::new("seconds");
-            row("changes", changes(&free, self.seed, &mut |share| progress.show(share)))?;
+            row("changes", changes(&free, self.seed, &mut |share| progress.show(share))?);
             if self.turns {
                 let shared = setting(pattern, Access::Shared);
-                row("changes, in turns", changes(&shared, self.seed, &mut |share| progress.show(share)))?;
+                row("changes, in turns", changes(&shared, self.seed, &mut |share| progress.show(share))?);
             }
-            row("whole grid", whole(&free, self.seed, &mut |share| progress.show(share)))?;
+            row("whole grid", whole(&free, self.seed, &mut |share| progress.show(share))?);
         }
         if self.json {
             let all: serde_json::Map<String, _> = rows.iter().map(|(name, f)| (name.clone(), json!(f))).collect();

@@ -4,24 +4,22 @@
 mod annotated;
 mod command;
 mod grid;
-mod rig;
-mod whole;
 
 pub use annotated::{AnnotatedFigures, annotated};
 pub(crate) use command::RasterBench;
 use grid::ChangingGrid;
 pub use grid::Pattern;
-use rig::{RadioRig, address};
+use scenecast_config::{Config, ModemKind};
+use scenecast_core::UserError;
 use scenecast_protocol::directive::{OrderStatus, Slot, Utility};
-use scenecast_protocol::link::IssueError;
-use scenecast_protocol::mac::{Access, ModemProfile};
+use scenecast_protocol::mac::Access;
 use scenecast_protocol::map::{Cell, LabelGrid, MapSource, Replica, StateReplica, StateSource};
 use scenecast_protocol::map_codec::Codec;
 use scenecast_protocol::time::Instant;
+use scenecast_rehearsal::{LinkRig, VirtualTime, WholeReplica, WholeSource};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::time::Duration;
-use whole::{WholeReplica, WholeSource};
 
 /// The grid, the radio, and how long they are watched.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -88,12 +86,12 @@ impl Shows for Replica {
 }
 
 /// Sends the changes of the grid.
-pub fn changes(setting: &RasterSetting, seed: u64, progress: &mut dyn FnMut(f64)) -> Result<RasterFigures, IssueError> {
+pub fn changes(setting: &RasterSetting, seed: u64, progress: &mut dyn FnMut(f64)) -> Result<RasterFigures, UserError> {
     measure(setting, MapSource::new(Codec::Auto), seed, progress)
 }
 
 /// Sends the whole grid as a PNG, again and again.
-pub fn whole(setting: &RasterSetting, seed: u64, progress: &mut dyn FnMut(f64)) -> Result<RasterFigures, IssueError> {
+pub fn whole(setting: &RasterSetting, seed: u64, progress: &mut dyn FnMut(f64)) -> Result<RasterFigures, UserError> {
     measure::<WholeSource>(setting, WholeSource::default(), seed, progress)
 }
 
@@ -112,14 +110,21 @@ impl Sends for WholeSource {
 }
 
 impl RasterSetting {
-    fn modem(&self) -> ModemProfile {
-        ModemProfile {
-            frame_bytes: self.frame_bytes,
-            bit_rate_bps: self.bit_rate_bps,
-            overhead_bits: 0,
-            turn_around: Duration::from_millis(5),
-            access: self.access,
-        }
+    /// Both ends at the radio, with a status each second. 7.5 m take sound as long as a radio takes to process a frame: 5 ms.
+    fn rig<S: StateSource, R: StateReplica>(&self, source: S, seed: u64) -> Result<LinkRig<S, R>, UserError> {
+        let mut config = Config::default();
+        config.modem.kind = ModemKind::Udp;
+        config.modem.full_duplex = self.access == Access::FullDuplex;
+        config.link.frame_bytes = self.frame_bytes as u32;
+        config.link.budget_bps = self.bit_rate_bps as u32;
+        config.link.turn_around_s = 0.005;
+        config.link.status_period_s = 1.0;
+        config.link.discovery_period_s = 0.0;
+        config.channel.bit_rate = self.bit_rate_bps;
+        config.channel.loss = self.loss;
+        config.channel.half_duplex = false;
+        config.channel.range_m = 7.5;
+        LinkRig::new(&config, source, seed)
     }
 }
 
@@ -135,22 +140,22 @@ fn measure<S: Sends>(
     source: S,
     seed: u64,
     progress: &mut dyn FnMut(f64),
-) -> Result<RasterFigures, IssueError> {
+) -> Result<RasterFigures, UserError> {
     let mut grid = ChangingGrid::new(setting.side, seed);
-    let mut rig = RadioRig::<S, S::Copy>::new(setting.modem(), setting.loss, source, seed);
+    let mut rig: LinkRig<S, S::Copy> = setting.rig(source, seed)?;
     let began = rig.now;
     rig.vehicle.end_mut().source_mut().set(&grid.all(), began);
     let mut watch = Watch::new(grid.values());
     loop {
-        rig.run_for(LOOK);
-        watch.look(rig.replica(), rig.now);
+        rig.run(LOOK);
+        watch.look(copy(&rig), rig.now);
         if watch.waiting.is_empty() || rig.now.since(began) > GIVE_UP {
             break;
         }
     }
     let first_s = rig.now.since(began).as_secs_f64();
     watch.begin();
-    rig.begin_account();
+    let (bits, computed) = (rig.bits_on_air(), rig.computed());
     let (from, until) = (rig.now, rig.now + setting.duration);
     let (mut next_change, mut next_order) = (rig.now, rig.now + LOOK);
     let mut order: Option<(u16, Instant)> = None;
@@ -167,10 +172,11 @@ fn measure<S: Sends>(
             next_order = rig.now + ORDER_INTERVAL;
             let slot =
                 Slot::Utility(Utility { exploration: (rig.now.as_secs_f64() as i64 % 90) as i8, ..Utility::default() });
-            order = Some((rig.surface.end_mut().issue(address(), slot, rig.now)?, rig.now));
+            let issued = rig.surface.end_mut().issue(rig.address, slot, rig.now);
+            order = Some((issued.map_err(|e| UserError::Failed(e.to_string()))?, rig.now));
         }
-        rig.run_for(LOOK);
-        watch.look(rig.replica(), rig.now);
+        rig.run(LOOK);
+        watch.look(copy(&rig), rig.now);
         status_s = status_s.max(rig.status_age_s());
         if let Some((version, issued)) = order {
             let at = rig.applied.get(&version).copied();
@@ -180,8 +186,8 @@ fn measure<S: Sends>(
         }
     }
     let seconds = setting.duration.as_secs_f64();
-    let [up_bps, down_bps] = rig.bits.map(|bits| bits as f64 / seconds);
-    let [vehicle_cpu, surface_cpu] = rig.cpu.map(|time| time.as_secs_f64() / seconds);
+    let [up_bps, down_bps] = [0, 1].map(|end| (rig.bits_on_air()[end] - bits[end]) as f64 / seconds);
+    let [vehicle_cpu, surface_cpu] = [0, 1].map(|end| (rig.computed()[end] - computed[end]).as_secs_f64() / seconds);
     let (equal, least_equal) = watch.equal();
     let [age_median_s, age_p95_s] = watch.ages(rig.now);
     Ok(RasterFigures {
@@ -197,6 +203,11 @@ fn measure<S: Sends>(
         vehicle_cpu,
         surface_cpu,
     })
+}
+
+/// The operator's copy; the surface knows the vehicle from the start.
+fn copy<S: StateSource, R: StateReplica>(rig: &LinkRig<S, R>) -> &R {
+    rig.view().map(|view| view.replica()).unwrap_or_else(|| unreachable!())
 }
 
 /// Compares the operator's copy with the grid.

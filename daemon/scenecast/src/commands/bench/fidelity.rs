@@ -7,8 +7,8 @@ use scenecast_files::write_whole;
 use scenecast_rehearsal::{FidelityRow, fidelity, fidelity_panels, quality_plot};
 use std::path::PathBuf;
 
-/// The same mission at each of several bit budgets with 10 % loss, once with our stream and once with a baseline that sends the
-/// whole PNG again after each change. Frames, acknowledgements, repair and turns are the same.
+/// The same mission at each of several bit budgets with 10 % loss, and beside it a baseline that sends the whole PNG of its map
+/// again after each change. Frames, acknowledgements, repair and turns are the same.
 #[derive(Debug, Args)]
 #[command(after_help = "Example: scenecast bench fidelity --seed 3 --out curves")]
 pub(in crate::commands) struct FidelityBench {

@@ -1,7 +1,7 @@
-//! For comparison: the whole grid as a PNG, in fragments, of which lost ones are sent again.
+//! The whole grid as a PNG, in fragments, of which lost ones are sent again.
 
 use scenecast_core::label_picture;
-use scenecast_protocol::map::{Cell, LabelGrid, StateReplica, StateSource};
+use scenecast_protocol::map::{Cell, LabelGrid, Rect, StateReplica, StateSource};
 use scenecast_protocol::time::Instant;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -10,7 +10,7 @@ const HEAD: usize = 9;
 
 /// Sends the newest grid once the one before has arrived.
 #[derive(Debug, Default)]
-pub(super) struct WholeSource {
+pub struct WholeSource {
     grid: LabelGrid,
     is_changed: bool,
     number: u32,
@@ -22,8 +22,15 @@ pub(super) struct WholeSource {
 }
 
 impl WholeSource {
-    pub(super) fn set(&mut self, cells: &[(Cell, u8)]) {
+    /// Sets the labels of cells.
+    pub fn set(&mut self, cells: &[(Cell, u8)]) {
         self.grid.extend(cells.iter().copied());
+        self.is_changed = true;
+    }
+
+    /// Sets all labels; cells that the grid does not have lose theirs.
+    pub fn replace(&mut self, grid: LabelGrid) {
+        self.grid = grid;
         self.is_changed = true;
     }
 
@@ -34,7 +41,7 @@ impl WholeSource {
     fn begin(&mut self) {
         if self.is_sent() && std::mem::take(&mut self.is_changed) {
             self.number += 1;
-            self.picture = label_picture::encode(&self.grid).unwrap_or_default();
+            self.picture = encode(&self.grid).unwrap_or_default();
             self.next = 0;
         }
     }
@@ -46,13 +53,15 @@ impl StateSource for WholeSource {
     fn next_chunk(&mut self, room: usize, _now: Instant) -> Option<(Vec<u8>, Self::Carried)> {
         self.begin();
         let room = room.checked_sub(HEAD).filter(|&room| room > 0)?;
-        let again = self.waiting.iter().position(|&(_, length)| length <= room);
-        let (place, length) = match again {
-            Some(at) => self.waiting.remove(at),
-            None => (self.next, room.min(self.picture.len() - self.next)),
-        };
+        let lost = self.waiting.pop();
+        let (place, whole) = lost.unwrap_or((self.next, self.picture.len() - self.next));
+        let length = whole.min(room);
         if length == 0 {
             return None;
+        }
+        if lost.is_some() && length < whole {
+            // The surface has refused a fragment that counts as lost, or will do so, and may get it in parts.
+            self.waiting.push((place + length, whole - length));
         }
         self.next = self.next.max(place + length);
         self.flying.insert((place, length));
@@ -89,7 +98,7 @@ impl StateSource for WholeSource {
 
 /// Shows the last grid of which every fragment is here.
 #[derive(Debug, Default)]
-pub(super) struct WholeReplica {
+pub struct WholeReplica {
     shown: LabelGrid,
     number: u32,
     fragments: BTreeMap<usize, Vec<u8>>,
@@ -98,7 +107,7 @@ pub(super) struct WholeReplica {
 }
 
 impl WholeReplica {
-    pub(super) fn shown(&self) -> &LabelGrid {
+    pub fn shown(&self) -> &LabelGrid {
         &self.shown
     }
 }
@@ -118,7 +127,7 @@ impl StateReplica for WholeReplica {
         let held: usize = self.fragments.values().map(Vec::len).sum();
         if self.length == Some(held) {
             let picture: Vec<u8> = self.fragments.values().flatten().copied().collect();
-            if let Ok(grid) = label_picture::decode(&picture, 0, 0) {
+            if let Some(grid) = decode(&picture) {
                 self.shown = grid;
                 self.version += 1;
             }
@@ -139,5 +148,44 @@ impl StateReplica for WholeReplica {
     fn take(&mut self) -> Self {
         let version = self.version + 1;
         std::mem::replace(self, Self { version, ..Self::default() })
+    }
+}
+
+/// The south-west cell, two numbers of 32 bits, then the PNG; `None` for a grid that is too large.
+fn encode(grid: &LabelGrid) -> Option<Vec<u8>> {
+    let bounds = grid.bounds().unwrap_or(Rect { x: 0, y: 0, width: 1, height: 1 });
+    let png = label_picture::encode_within(grid, bounds).ok()?;
+    Some([&bounds.x.to_be_bytes()[..], &bounds.y.to_be_bytes(), &png].concat())
+}
+
+fn decode(picture: &[u8]) -> Option<LabelGrid> {
+    let (x, rest) = picture.split_first_chunk()?;
+    let (y, png) = rest.split_first_chunk()?;
+    label_picture::decode(png, i32::from_be_bytes(*x), i32::from_be_bytes(*y)).ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::link_rig::LinkRig;
+    use crate::virtual_time::VirtualTime;
+    use std::time::Duration;
+
+    #[test]
+    fn a_grid_on_both_sides_of_the_origin_arrives_in_spite_of_losses() {
+        let sets = ["channel.loss=0.3", "link.frame_bytes=64"].map(str::to_owned);
+        let config = scenecast_config::load(None, &sets).unwrap();
+        let mut rig = LinkRig::<_, WholeReplica>::new(&config, WholeSource::default(), 5).unwrap();
+        let label = |i: i32| (i * i % 7) as u8 + 1;
+        let grid: LabelGrid = (0..900).map(|i| (Cell::new(i % 30 - 20, i / 30 - 9), label(i))).collect();
+        let shows = |rig: &LinkRig<_, WholeReplica>, grid: &LabelGrid| {
+            rig.view().is_some_and(|view| view.replica().shown() == grid)
+        };
+        let smaller: LabelGrid = grid.iter().filter(|(cell, _)| cell.x < 3).collect();
+        for grid in [grid, smaller] {
+            rig.vehicle.end_mut().source_mut().replace(grid.clone());
+            let until = rig.now + Duration::from_secs(120);
+            assert!(rig.run_until(until, |rig| shows(rig, &grid)), "{} cells have not arrived", grid.explored());
+        }
     }
 }
