@@ -203,7 +203,7 @@ fn tuning_goes_on_where_it_was_and_gives_a_configuration() {
     let dir = scratch("tune");
     let (mosaic, labels) = two_grounds(&dir, "reef");
     let (grid, out) = (dir.join("grid.toml"), dir.join("out"));
-    std::fs::write(&grid, "alpha = [0.1, 0.01]\nbeta = [0.1]\ngamma = [1e-4]\ncell_m = [0.08]\n").unwrap();
+    std::fs::write(&grid, "max_labels = [4, 8]\ncell_m = [0.08]\n").unwrap();
     let tune = |more: &[&str]| {
         let common = ["tune", "--mosaic", &mosaic, "--annotations", &labels, "--metres-per-pixel", "0.01"];
         let rest = ["--grid", grid.to_str().unwrap(), "--sweeps", "5", "--out", out.to_str().unwrap()];
@@ -237,6 +237,14 @@ fn tuning_goes_on_where_it_was_and_gives_a_configuration() {
     }
     assert_eq!(run_with(&["--budget", "0.001"]).status.code(), Some(1));
     assert!(!best.exists(), "what does not fit the budget is not left to pass for the answer");
+
+    std::fs::remove_file(out.join("tuning.csv")).unwrap();
+    std::fs::write(&grid, "alpha = [0.1]\nbeta = [0.1]\ngamma = [1e-4]\ncell_m = [0.08]\n").unwrap();
+    let refused = tune(&[]);
+    assert_refused(&refused.iter().map(String::as_str).collect::<Vec<_>>(), &["grid.toml", "set it to topics"]);
+    let topics = run_with(&["--set", "scene.labels=topics"]);
+    assert!(topics.status.success(), "{}", String::from_utf8_lossy(&topics.stderr));
+    assert!(std::fs::read_to_string(&best).unwrap().contains("alpha = 0.1"));
 }
 
 #[test]

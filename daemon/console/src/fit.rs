@@ -40,14 +40,16 @@ pub struct FittedSettings {
 impl FittedSettings {
     fn new(fit: &tuning_table::Fit, row: &Row) -> Self {
         let (s, m) = (&row.setting, &row.measurement);
+        let of_topics = |value: f64| (!s.is_of_habitats()).then_some(value);
         Self {
             settings: SettingsOrder {
                 cells: Some(s.cells.name().to_owned()),
-                alpha: Some(s.alpha),
-                beta: Some(s.beta),
-                gamma: Some(s.gamma),
+                alpha: of_topics(s.alpha),
+                beta: of_topics(s.beta),
+                gamma: of_topics(s.gamma),
                 // 0 would mean as configured.
-                refine_words_per_s: Some(s.refine_words_per_s.max(1.0)),
+                refine_words_per_s: of_topics(s.refine_words_per_s.max(1.0)),
+                labels: u8::try_from(s.max_labels).ok().filter(|_| s.is_of_habitats()),
                 frames_per_s: Some(s.frames_per_s),
                 ..SettingsOrder::default()
             },

@@ -24,16 +24,19 @@ pub struct SettingsOrder {
     pub cells: Option<String>,
     /// The layers that are sent in addition to the labels: none, or names of layers in any order, separated by commas.
     pub layers: Option<String>,
-    /// Preference for labels that are common elsewhere in the map, 1e-9 to 1e3.
+    /// Preference for topics that are common elsewhere in the map, 1e-9 to 1e3. Alpha, beta and gamma have an effect on the labels only
+    /// where these are topics.
     pub alpha: Option<f64>,
-    /// Prior weight of each word in a label, 1e-9 to 1e3.
+    /// Prior weight of each word in a topic, 1e-9 to 1e3.
     pub beta: Option<f64>,
-    /// Weight of a new label, 1e-12 to 1e3.
+    /// Weight of a new topic, 1e-12 to 1e3.
     pub gamma: Option<f64>,
     /// Words resampled a second of mission time, 1 to 1e8.
     pub refine_words_per_s: Option<f64>,
     /// Maximum number of camera frames a second that are mapped, 0.01 to 30.
     pub frames_per_s: Option<f64>,
+    /// Most labels that the map tells apart at one time, 2 to 32, where labels are habitats.
+    pub labels: Option<u8>,
 }
 
 /// The layers of these names, separated by commas; `None` if one is unknown or named twice.
@@ -62,8 +65,14 @@ impl SettingsOrder {
                 |names| layer_mask(names, layers),
                 &format!("none, or different ones of {}", names.join(", ")),
             )?,
+            labels: match self.labels {
+                None => Change::Keep,
+                Some(0) => Change::Configured,
+                Some(labels) => Change::To(labels),
+            },
             ..Settings::default()
         };
+        settings.check().map_err(|fault| format!("{fault}, or 0 as configured"))?;
         let given = [self.alpha, self.beta, self.gamma, self.refine_words_per_s, self.frames_per_s];
         let mut changes = [Change::Keep; 5];
         for ((change, value), (name, _, range)) in changes.iter_mut().zip(given).zip(settings.numbers()) {
@@ -122,6 +131,7 @@ impl SettingsOrder {
             gamma: figure(settings.gamma),
             refine_words_per_s: figure(settings.refine_words_per_s),
             frames_per_s: figure(settings.frames_per_s),
+            labels: typed(settings.labels, 0, |labels| labels),
         }
     }
 }

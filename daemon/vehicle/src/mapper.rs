@@ -108,6 +108,7 @@ struct Configured {
     registrar: Registrar,
     refine_words_per_s: f64,
     frames_per_s: Option<f64>,
+    labels: u32,
 }
 
 /// A configured frame rate, where 0 stands for every frame.
@@ -167,13 +168,14 @@ impl Mapper {
                 registrar,
                 refine_words_per_s: f64::from(config.scene.refine_words_per_s),
                 frames_per_s: every_frame_or(config.scene.frames_per_s),
+                labels: config.scene.max_labels,
             },
             last_s: None,
             flat: Vec::new(),
         })
     }
 
-    /// Puts settings in force that were checked; those without a value are as configured. Topics and their labels stay.
+    /// Puts settings in force that were checked; those without a value are as configured. Labels keep their meaning.
     pub fn tune(&mut self, settings: &Settings) {
         let or = |change: Change<ShortDecimal>, configured: f64| change.value().map_or(configured, ShortDecimal::value);
         let [alpha, beta, gamma] = self.configured.priors;
@@ -181,6 +183,9 @@ impl Mapper {
         if let Err(e) = self.model.set_priors(priors.0, priors.1, priors.2) {
             // The range of the settings lies within the range of the model.
             tracing::error!("the scene model keeps its priors: {e}");
+        }
+        if let Some(habitats) = &mut self.habitats {
+            habitats.limit(settings.labels.value().map_or(self.configured.labels, u32::from));
         }
         self.refine_words_per_s = or(settings.refine_words_per_s, self.configured.refine_words_per_s);
         let registration = settings.registration.value().map(|choice| choice == Registration::On);

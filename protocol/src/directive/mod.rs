@@ -361,9 +361,10 @@ mod tests {
             gamma: figure,
             refine_words_per_s: figure,
             frames_per_s: figure,
+            labels: Change::To(32),
         };
         let bytes = VersionedSlot::encode(1, &Slot::Settings(settings));
-        assert_eq!(bytes.len(), 18);
+        assert_eq!(bytes.len(), 19);
         let back = VersionedSlot::decode(&bytes).map(|slot| slot.content);
         assert_eq!(back, Ok(Some(Slot::Settings(settings))));
     }

@@ -29,10 +29,11 @@ pub struct SettingsFault {
 ///       +---+---+---+---+---+---+---+---+
 /// then 2 bytes, a mask of layers, if layers is 3
 /// then 2 bytes, a [`ShortDecimal`], for each of a, b, g, r, f that is 1
-/// then 1 byte, unless both stay:
-///       +-----------+-------+-----------+
-///       | 0   0   0 | reg.  | end       |
-///       +-----------+-------+-----------+
+/// then 1 byte, unless all of it is 0:
+///       +---+-------+-------+-----------+
+///       | L | 0   0 | reg.  | end       |
+///       +---+-------+-------+-----------+
+/// then 1 byte, the most labels, if L is 1
 /// ```
 /// * planner: 0 stays, 1 as configured, 2 lawnmower, 3 greedy, 4 horizon.
 /// * cells: 0 stays, 1 as configured, 2 fine, 3 coarse to fine, 4 coarse.
@@ -42,6 +43,7 @@ pub struct SettingsFault {
 ///   second that the scene model sees.
 /// * end of the survey: 0 stays, 1 as configured, 2 repeat, 3 explore, 4 hold ([`AtEnd`]).
 /// * registration: 0 stays, 1 as configured, 2 off, 3 on ([`Registration`]).
+/// * labels: 0 as configured, else 2 to 32.
 ///
 /// ```
 /// use scenecast_protocol::directive::{Change, PlannerKind, Settings, ShortDecimal};
@@ -74,6 +76,8 @@ pub struct Settings {
     pub refine_words_per_s: Change<ShortDecimal>,
     /// Camera frames a second that the scene model sees at most.
     pub frames_per_s: Change<ShortDecimal>,
+    /// Most labels that the map tells apart at one time, within [`Self::LABELS`]; where labels are habitats.
+    pub labels: Change<u8>,
 }
 
 impl Settings {
@@ -85,8 +89,12 @@ impl Settings {
     pub const WORDS_PER_S: RangeInclusive<f64> = 1.0..=1e8;
     /// Frames a second that the scene model may see.
     pub const FRAMES_PER_S: RangeInclusive<f64> = 0.01..=30.0;
+    /// Labels that a map may tell apart at most.
+    pub const LABELS: RangeInclusive<u8> = 2..=32;
     /// Most bytes of the payload.
-    pub const MAX_BYTES: usize = 15;
+    pub const MAX_BYTES: usize = 16;
+    /// Whether the number of labels follows.
+    const HAS_LABELS: u8 = 0x80;
     /// The layers that have a bit in byte 1.
     const SHORT_LAYERS: [(u8, LayerId); 3] =
         [(0x80, LayerId::CONFIDENCE), (0x40, LayerId::DEPTH), (0x20, LayerId::CURIOSITY)];
@@ -105,6 +113,7 @@ impl Settings {
             gamma: self.gamma.then(later.gamma),
             refine_words_per_s: self.refine_words_per_s.then(later.refine_words_per_s),
             frames_per_s: self.frames_per_s.then(later.frames_per_s),
+            labels: self.labels.then(later.labels),
         }
     }
 
@@ -126,6 +135,10 @@ impl Settings {
             if let Some(value) = value.filter(|value| !range.contains(value)) {
                 return Err(SettingsFault { name, value, range });
             }
+        }
+        if let Some(labels) = self.labels.value().filter(|labels| !Self::LABELS.contains(labels)) {
+            let range = f64::from(*Self::LABELS.start())..=f64::from(*Self::LABELS.end());
+            return Err(SettingsFault { name: "labels", value: labels.into(), range });
         }
         Ok(())
     }
@@ -152,8 +165,10 @@ impl Settings {
         }
         out.append(&mut numbers);
         let choices = self.registration.code(|choice| choice as u8) << 3 | self.at_end.code(|choice| choice as u8);
-        if choices != 0 {
-            out.push(choices);
+        match (self.labels, choices) {
+            (Change::Keep, 0) => {}
+            (Change::Keep, _) => out.push(choices),
+            (labels, _) => out.extend([Self::HAS_LABELS | choices, labels.value().unwrap_or(0)]),
         }
         out
     }
@@ -178,20 +193,28 @@ impl Settings {
         let mut figure = |bit: u8| if given & bit != 0 { ShortDecimal::decode(r) } else { Ok(Change::Keep) };
         let (alpha, beta, gamma) = (figure(0x10)?, figure(0x08)?, figure(0x04)?);
         let (refine_words_per_s, frames_per_s) = (figure(0x02)?, figure(0x01)?);
-        // Choices that both stay are left out.
+        // A byte of zeros is left out.
         let more = match r.rest() {
             [] => 0,
             [0, ..] => return Err(Truncated),
             _ => r.u8()?,
         };
+        let labels = match more & Self::HAS_LABELS {
+            0 => Change::Keep,
+            _ => Some(r.u8()?).filter(|&labels| labels > 0).map_or(Change::Configured, Change::To),
+        };
+        if more & 0x60 != 0 {
+            return Err(Truncated);
+        }
         Ok(Self {
             alpha,
             beta,
             gamma,
             refine_words_per_s,
             frames_per_s,
+            labels,
             at_end: Change::from_code(more & 7, |code| AtEnd::ALL.get(usize::from(code)).copied())?,
-            registration: Change::from_code(more >> 3, |code| Registration::ALL.get(usize::from(code)).copied())?,
+            registration: Change::from_code(more >> 3 & 3, |code| Registration::ALL.get(usize::from(code)).copied())?,
             planner: Change::from_code(choices >> 5, |code| PlannerKind::ALL.get(usize::from(code)).copied())?,
             cells: Change::from_code(choices >> 2 & 7, |code| CellBand::ALL.get(usize::from(code)).copied())?,
             layers,
@@ -231,10 +254,11 @@ mod tests {
             change(proptest::sample::select(Registration::ALL.to_vec())),
             change(proptest::sample::select(CellBand::ALL.to_vec())),
             change(prop_oneof![0u16..8, any::<u16>()].prop_map(LayerMask)),
+            change(1u8..=255),
         );
         let figures = (change(figure()), change(figure()), change(figure()), change(figure()), change(figure()));
         (choices, figures).prop_map(
-            |((planner, at_end, registration, cells, layers), (alpha, beta, gamma, refine, frames))| Settings {
+            |((planner, at_end, registration, cells, layers, labels), (alpha, beta, gamma, refine, frames))| Settings {
                 planner,
                 at_end,
                 registration,
@@ -245,6 +269,7 @@ mod tests {
                 gamma,
                 refine_words_per_s: refine,
                 frames_per_s: frames,
+                labels,
             },
         )
     }
@@ -275,6 +300,11 @@ mod tests {
             ..Settings::default()
         };
         assert_eq!(both.to_bytes(), [0, 0, 0x1A]);
+        let of_labels = |labels| Settings { labels, ..Settings::default() }.to_bytes();
+        assert_eq!(
+            (of_labels(Change::Configured), of_labels(Change::To(8))),
+            (vec![0, 0, 0x80, 0], vec![0, 0, 0x80, 8])
+        );
         let of_layers = |mask| Settings { layers: Change::To(LayerMask(mask)), ..Settings::default() }.to_bytes();
         assert_eq!(of_layers(0b100), [2, 0x20]);
         assert_eq!(
@@ -301,6 +331,7 @@ mod tests {
         );
         let fast = Settings { frames_per_s: to(31.0), ..Settings::default() };
         assert_eq!(message(fast), "frames_per_s 31: it takes 0.01 to 30");
+        assert_eq!(message(Settings { labels: Change::To(1), ..Settings::default() }), "labels 1: it takes 2 to 32");
         assert_eq!(Settings { gamma: to(1e-12), beta: to(1e3), ..Settings::default() }.check(), Ok(()));
     }
 
@@ -319,7 +350,7 @@ mod tests {
         ] {
             assert_eq!(Settings::from_bytes(bytes), None, "{bytes:02X?}");
         }
-        for choices in [0, 5, 0x20, 0x25, 255] {
+        for choices in [0, 5, 0x20, 0x25, 0x80, 255] {
             assert_eq!(
                 Settings::from_bytes(&[0, 0, choices]),
                 None,

@@ -53,14 +53,14 @@ impl Clusters {
             parts.push(Part::new(cells, high));
         }
         let mut found = Self::refined(cells, parts.into_iter().map(|part| part.mean).collect(), PASSES[0]);
-        found.merge(cells, rule.gap);
+        found.merge(cells, rule.gap, rule.most);
         found
     }
 
     /// The clusters of a map that has grown since `centres` were found: those that still hold cells, with merges and births.
     pub(crate) fn continued(cells: &Coordinates, centres: Vec<Vec<f32>>, rule: &Rule) -> Self {
         let mut found = Self::refined(cells, centres, PASSES[1]);
-        found.merge(cells, MERGED_GAP * rule.gap);
+        found.merge(cells, MERGED_GAP * rule.gap, rule.most);
         while found.centres.len() < rule.most {
             let Some(centres) = found.with_a_birth(cells, rule) else { break };
             found = Self::refined(cells, centres, PASSES[1]);
@@ -83,13 +83,15 @@ impl Clusters {
         Self { centres, of_cells }
     }
 
-    /// Merges centres while the nearest two are within a squared distance.
-    fn merge(&mut self, cells: &Coordinates, gap: f32) {
+    /// Merges centres while the nearest two are within a squared distance, or while there are more than `most`.
+    fn merge(&mut self, cells: &Coordinates, gap: f32, most: usize) {
         loop {
             let pairs = (0..self.centres.len()).flat_map(|i| (0..i).map(move |j| (j, i)));
             let apart = |&(i, j): &(usize, usize)| squared_distance(&self.centres[i], &self.centres[j]);
             let nearest = pairs.min_by(|a, b| apart(a).total_cmp(&apart(b)));
-            let Some((into, joins)) = nearest.filter(|pair| apart(pair) < gap) else { return };
+            let Some((into, joins)) = nearest.filter(|pair| apart(pair) < gap || self.centres.len() > most) else {
+                return;
+            };
             self.of_cells.iter_mut().filter(|cluster| **cluster == joins).for_each(|cluster| *cluster = into);
             let members: Vec<usize> = (0..cells.len()).filter(|&cell| self.of_cells[cell] == into).collect();
             self.centres[into] = mean(cells, &members);
@@ -250,6 +252,7 @@ mod tests {
         let found = Clusters::continued(&groups(9.0), centres, &RULE);
         assert_eq!(found.centres.len(), 3);
         let doubled = vec![vec![0.0, 0.3], vec![0.0, -0.3], vec![9.0, 1.0], vec![0.0, 18.0]];
-        assert_eq!(Clusters::continued(&groups(9.0), doubled, &RULE).centres.len(), 3);
+        assert_eq!(Clusters::continued(&groups(9.0), doubled.clone(), &RULE).centres.len(), 3);
+        assert_eq!(Clusters::continued(&groups(9.0), doubled, &Rule { most: 2, ..RULE }).centres.len(), 2);
     }
 }

@@ -35,6 +35,7 @@ pub use measures::{MEASURES, MeasuredPoint, MeasuredValues, measure};
 pub use tree::LabelTree;
 
 use crate::project::Observation;
+use crate::topics::{FlatCell, TopicId};
 use crate::words::Word;
 use cells::CellMap;
 use clusters::{Clusters, Rule};
@@ -127,6 +128,11 @@ impl Habitats {
             next: 0,
             tree: LabelTree::default(),
         }
+    }
+
+    /// Allows at most `most` labels at one time, at least one, from the next [`Habitats::learn`] on.
+    pub fn limit(&mut self, most: u32) {
+        self.most = most.max(1);
     }
 
     /// The points as words that a camera can project: the id is the place in the list.
@@ -292,6 +298,16 @@ impl Habitats {
     #[must_use]
     pub fn cell(&self, x: i32, y: i32) -> Option<HabitatCell> {
         self.shown.get(&(y, x)).copied()
+    }
+
+    /// The map, sorted by (y, x): of each labelled cell the number of its habitat as its topic.
+    #[must_use]
+    pub fn map(&self) -> Vec<FlatCell> {
+        let flat = |(&(y, x), cell): (&(i32, i32), &HabitatCell)| {
+            let (topic, confidence) = (TopicId(cell.label), cell.confidence);
+            FlatCell { x, y, z: 0, topic, words: 1, confidence, perplexity: 1.0 }
+        };
+        self.shown.iter().map(flat).collect()
     }
 
     /// The label of the cell at (x, y); `None` until it has been labelled.

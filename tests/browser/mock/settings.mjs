@@ -1,7 +1,7 @@
 // Settings of the scene model: requested, in force, and those that fit a budget.
 
 const NUMBERS = {
-  alpha: [1e-9, 1e3], beta: [1e-9, 1e3], gamma: [1e-12, 1e3], refine_words_per_s: [1, 1e8], frames_per_s: [0.01, 30],
+  labels: [2, 32], alpha: [1e-9, 1e3], beta: [1e-9, 1e3], gamma: [1e-12, 1e3], refine_words_per_s: [1, 1e8], frames_per_s: [0.01, 30],
 };
 const KEYS = ["planner", "at_end", "registration", "cells", "layers", ...Object.keys(NUMBERS)];
 const nothing = () => Object.fromEntries(KEYS.map((k) => [k, null]));
@@ -33,11 +33,11 @@ export function faultOf(order) {
 }
 
 const row = (settings, nats, labels, bps) => ({
-  settings: { ...nothing(), refine_words_per_s: 50000, beta: 0.1, ...settings }, mutual_information_nats: nats, lost_nats: 0.31 - nats, labels, stream_bps: bps,
+  settings: { ...nothing(), ...settings }, mutual_information_nats: nats, lost_nats: 0.31 - nats, labels, stream_bps: bps,
 });
-const BEST = row({ alpha: 0.01, gamma: 1e-4, frames_per_s: 0.5, cells: "fine" }, 0.31, 16, 1900);
-const FEWER = row({ alpha: 1, gamma: 1e-5, frames_per_s: 0.2, cells: "fine" }, 0.29, 9, 800);
-const LOWEST_RATE = row({ alpha: 1, gamma: 1e-5, frames_per_s: 0.2, cells: "coarse" }, 0.2, 9, 90);
+const BEST = row({ labels: 16, frames_per_s: 0.5, cells: "fine" }, 0.31, 16, 1900);
+const FEWER = row({ labels: 9, frames_per_s: 0.2, cells: "fine" }, 0.29, 9, 800);
+const LOWEST_RATE = row({ labels: 9, frames_per_s: 0.2, cells: "coarse" }, 0.2, 9, 90);
 
 export function fit(bitsPerS, mission) {
   const bps = bitsPerS === null ? (mission.budgetBps * mission.shares.map) / 100 : Number(bitsPerS);

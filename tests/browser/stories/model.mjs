@@ -72,13 +72,13 @@ export default [
       await s.page.locator("#fit-bps").fill("1000");
       await s.button("Fit to budget").click();
       await s.shows("#fitted", /a stream of 800 bit\/s\. Fewer labels, fewer camera frames: 0\.02 nats \(6 %\) below the best/);
-      assert.equal(await field(s, "alpha").inputValue(), "1");
+      assert.equal(await field(s, "labels").inputValue(), "9");
       assert.equal(await field(s, "cells").inputValue(), "fine");
       assert.equal(await field(s, "layers").inputValue(), "none");
       assert.equal(sent(s).length, 0);
       await send(s).click();
       await s.until("the message", () => sent(s).length === 1);
-      assert.deepEqual(sent(s)[0], { alpha: 1, beta: 0.1, gamma: 1e-5, refine_words_per_s: 50000, frames_per_s: 0.2, cells: "fine", layers: "none" });
+      assert.deepEqual(sent(s)[0], { labels: 9, frames_per_s: 0.2, cells: "fine", layers: "none" });
       await s.shows("#model .steps [aria-current]", /Applied/, { advance: 2 });
       assert.equal(await s.page.locator("#model .replaced").isVisible(), false);
     },

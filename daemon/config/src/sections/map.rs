@@ -98,11 +98,11 @@ section! {
     scene: Scene {
         /// Edge of a map cell, the same at both ends. 0: 25 pixels of the camera.
         cell_m: f64 = 0.0, range(0.0, 1000.0, "m"), [Auv Asv Scenario];
-        /// Weight of labels that are common elsewhere in the map, against those of the neighbouring cells.
+        /// Weight of topics that are common elsewhere in the map, against those of the neighbouring cells.
         alpha: f64 = 0.01, range(1e-9, 1e3, ""), [Auv Scenario];
-        /// Prior count of each visual word in each label.
+        /// Prior count of each visual word in each topic.
         beta: f64 = 0.1, range(1e-9, 1e3, ""), [Auv Scenario];
-        /// Weight of a new label.
+        /// Weight of a new topic.
         gamma: f64 = 1e-4, range(1e-12, 1e3, ""), [Auv Scenario];
         /// Interpretation of gamma. literal: gamma, as in the paper; collapsed: gamma divided by the size of the
         /// vocabulary; rost: alpha times gamma divided by the size of the vocabulary, as in the program ROST.
@@ -111,7 +111,7 @@ section! {
         /// their sights, in whatever order they were seen. alpha, beta and gamma are those of topics.
         labels: SceneLabels = SceneLabels::Habitats, ANY, [Auv Scenario];
         /// Maximum number of labels at a time. 32 show more of a reef than 16 for a third more bits; choose them where the
-        /// budget allows. The number cannot be changed during a mission.
+        /// budget allows. An order changes it during a mission where labels are habitats (2 to 32).
         max_labels: u32 = 16, range(2.0, 254.0, ""), [Auv Scenario];
         /// Words that are resampled per second of mission time.
         refine_words_per_s: u32 = 250_000, range(0.0, 1e8, "1/s"), [Auv Scenario];

@@ -73,11 +73,12 @@ fn merged(given: SettingsOrder, fitted: SettingsOrder) -> SettingsOrder {
         gamma: given.gamma.or(fitted.gamma),
         refine_words_per_s: given.refine_words_per_s.or(fitted.refine_words_per_s),
         frames_per_s: given.frames_per_s.or(fitted.frames_per_s),
+        labels: given.labels.or(fitted.labels),
     }
 }
 
 /// The name of each setting, and its value if the order has one.
-fn values(order: &SettingsOrder) -> [(&'static str, Option<String>); 10] {
+fn values(order: &SettingsOrder) -> [(&'static str, Option<String>); 11] {
     let text = |value: &Option<String>| value.as_ref().map(|v| if v.is_empty() { configured() } else { v.clone() });
     let number = |value: Option<f64>| value.map(|v| if v == 0.0 { configured() } else { v.to_string() });
     [
@@ -91,6 +92,7 @@ fn values(order: &SettingsOrder) -> [(&'static str, Option<String>); 10] {
         ("gamma", number(order.gamma)),
         ("refine_words_per_s", number(order.refine_words_per_s)),
         ("frames_per_s", number(order.frames_per_s)),
+        ("labels", number(order.labels.map(f64::from))),
     ]
 }
 

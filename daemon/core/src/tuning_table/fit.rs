@@ -126,6 +126,7 @@ pub(super) mod tests {
             alpha,
             beta: 0.1,
             gamma: 1e-5,
+            max_labels: 16,
             refine_words_per_s: 50_000.0,
             frames_per_s: 0.5,
             cells: CellBand::Fine,

@@ -5,8 +5,8 @@ use scenecast_protocol::directive::CellBand;
 use std::fmt;
 
 /// The first line. A change of the columns is another version.
-const TITLE: &str = "# scenecast tuning table 2";
-const HEAD: &str = "inputs,cell_m,alpha,beta,gamma,refine_words_per_s,frames_per_s,cells,mutual_information_nats,\
+const TITLE: &str = "# scenecast tuning table 3";
+const HEAD: &str = "inputs,cell_m,alpha,beta,gamma,max_labels,refine_words_per_s,frames_per_s,cells,mutual_information_nats,\
 normalised_mutual_information,null_mutual_information_nats,mosaic_mutual_information_nats,labels,map_bytes,stream_bps";
 /// Most lines that are read.
 const MAX_ROWS: usize = 100_000;
@@ -15,13 +15,15 @@ const MAX_ROWS: usize = 100_000;
 pub struct Setting {
     /// Edge of a cell of the model, metres.
     pub cell_m: f64,
-    /// Preference for labels that are used elsewhere.
+    /// Preference for topics that are used elsewhere; 0 for this one and those below where labels are habitats.
     pub alpha: f64,
-    /// Prior weight of each word in a label.
+    /// Prior weight of each word in a topic.
     pub beta: f64,
-    /// Weight of a new label.
+    /// Weight of a new topic.
     pub gamma: f64,
-    /// Words resampled a second of mission time.
+    /// Most labels at one time.
+    pub max_labels: u32,
+    /// Words resampled a second of mission time; 0 where labels are habitats.
     pub refine_words_per_s: f64,
     /// Camera frames a second that the scene model sees.
     pub frames_per_s: f64,
@@ -29,11 +31,21 @@ pub struct Setting {
     pub cells: CellBand,
 }
 
+impl Setting {
+    /// Whether labels are habitats, which the priors of the topics do not change.
+    pub fn is_of_habitats(&self) -> bool {
+        self.alpha == 0.0
+    }
+}
+
 impl fmt::Display for Setting {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { cell_m, alpha, beta, gamma, refine_words_per_s, frames_per_s, cells } = self;
-        write!(f, "cell_m {cell_m}, alpha {alpha}, beta {beta}, gamma {gamma}, ")?;
-        write!(f, "{refine_words_per_s} words/s, {frames_per_s} frames/s, {} cells", cells.name())
+        let Self { cell_m, alpha, beta, gamma, max_labels, refine_words_per_s, frames_per_s, cells } = self;
+        write!(f, "cell_m {cell_m}, ")?;
+        if !self.is_of_habitats() {
+            write!(f, "alpha {alpha}, beta {beta}, gamma {gamma}, {refine_words_per_s} words/s, ")?;
+        }
+        write!(f, "at most {max_labels} labels, {frames_per_s} frames/s, {} cells", cells.name())
     }
 }
 
@@ -131,8 +143,9 @@ impl TuningTable {
     /// Takes a row in, unless there is one of this setting.
     pub fn insert(&mut self, inputs: String, row: Row) {
         let key = |row: &Row| {
-            let Setting { cell_m, alpha, beta, gamma, refine_words_per_s, frames_per_s, cells } = row.setting;
-            [cell_m, alpha, beta, gamma, refine_words_per_s, frames_per_s, cells as u8 as f64]
+            let Setting { cell_m, alpha, beta, gamma, max_labels, refine_words_per_s, frames_per_s, cells } =
+                row.setting;
+            [cell_m, alpha, beta, gamma, max_labels.into(), refine_words_per_s, frames_per_s, cells as u8 as f64]
         };
         let place = self.rows.partition_point(|(_, other)| key(other) < key(&row));
         if self.rows.get(place).is_none_or(|(_, other)| other.setting != row.setting) {
@@ -142,9 +155,10 @@ impl TuningTable {
 }
 
 fn line(inputs: &str, Row { setting, measurement: m }: &Row) -> String {
-    let Setting { cell_m, alpha, beta, gamma, refine_words_per_s, frames_per_s, cells } = setting;
+    let Setting { cell_m, alpha, beta, gamma, max_labels, refine_words_per_s, frames_per_s, cells } = setting;
     let cells = cells.name();
-    let of_setting = format!("{cell_m},{alpha},{beta},{gamma},{refine_words_per_s},{frames_per_s},{cells}");
+    let of_setting =
+        format!("{cell_m},{alpha},{beta},{gamma},{max_labels},{refine_words_per_s},{frames_per_s},{cells}");
     let (mi, nmi) = (m.mutual_information_nats, m.normalised_mutual_information);
     let (null, mosaic) = (m.null_mutual_information_nats, m.mosaic_mutual_information_nats);
     let told = format!("{mi:.6},{nmi:.6},{null:.6},{mosaic:.6},{},{},{:.3}", m.labels, m.map_bytes, m.stream_bps);
@@ -161,24 +175,25 @@ fn parse(line: &str) -> Result<(String, Row), String> {
         let value = fields[at].parse::<f64>().ok().filter(|value| (low..=high).contains(value));
         value.ok_or_else(|| format!("{} {:?}: it takes {low} to {high}", names[at], fields[at]))
     };
-    let band = CellBand::from_name(fields[7]).filter(|&band| band != CellBand::CoarseToFine);
+    let band = CellBand::from_name(fields[8]).filter(|&band| band != CellBand::CoarseToFine);
     let setting = Setting {
         cell_m: number(1, 1e-6, 1e3)?,
-        alpha: number(2, 1e-9, 1e3)?,
-        beta: number(3, 1e-9, 1e3)?,
-        gamma: number(4, 1e-12, 1e3)?,
-        refine_words_per_s: number(5, 0.0, 1e8)?,
-        frames_per_s: number(6, 0.01, 30.0)?,
-        cells: band.ok_or_else(|| format!("cells {:?}: it takes fine or coarse", fields[7]))?,
+        alpha: number(2, 0.0, 1e3)?,
+        beta: number(3, 0.0, 1e3)?,
+        gamma: number(4, 0.0, 1e3)?,
+        max_labels: number(5, 2.0, 254.0)? as u32,
+        refine_words_per_s: number(6, 0.0, 1e8)?,
+        frames_per_s: number(7, 0.01, 30.0)?,
+        cells: band.ok_or_else(|| format!("cells {:?}: it takes fine or coarse", fields[8]))?,
     };
     let measurement = Measurement {
-        mutual_information_nats: number(8, 0.0, 1e3)?,
-        normalised_mutual_information: number(9, 0.0, 1.000_001)?,
-        null_mutual_information_nats: number(10, 0.0, 1e3)?,
-        mosaic_mutual_information_nats: number(11, 0.0, 1e3)?,
-        labels: number(12, 0.0, 1e6)? as usize,
-        map_bytes: number(13, 0.0, 1e12)? as usize,
-        stream_bps: number(14, 0.0, 1e12)?,
+        mutual_information_nats: number(9, 0.0, 1e3)?,
+        normalised_mutual_information: number(10, 0.0, 1.000_001)?,
+        null_mutual_information_nats: number(11, 0.0, 1e3)?,
+        mosaic_mutual_information_nats: number(12, 0.0, 1e3)?,
+        labels: number(13, 0.0, 1e6)? as usize,
+        map_bytes: number(14, 0.0, 1e12)? as usize,
+        stream_bps: number(15, 0.0, 1e12)?,
     };
     Ok((fields[0].to_owned(), Row { setting, measurement }))
 }
@@ -210,12 +225,12 @@ mod tests {
     fn a_malformed_row_is_refused_with_its_line_and_the_rule() {
         let text = filled().text();
         let refused = |from: &str, to: &str| TuningTable::read(&text.replacen(from, to, 1)).unwrap_err();
-        assert_eq!(refused("table 2", "table 3").0, 1);
+        assert_eq!(refused("table 3", "table 4").0, 1);
         assert_eq!(refused("cells,", "").0, 2);
-        assert_eq!(refused("0.25,1,", "0.25,one,"), (5, "alpha \"one\": it takes 0.000000001 to 1000".to_owned()));
+        assert_eq!(refused("0.25,1,", "0.25,one,"), (5, "alpha \"one\": it takes 0 to 1000".to_owned()));
         assert_eq!(refused("0.25,1,", "0.25,NaN,").0, 5);
         assert_eq!(refused(",fine", ",huge"), (3, "cells \"huge\": it takes fine or coarse".to_owned()));
-        assert_eq!(refused(",fine", ""), (3, "14 fields; the table has 15".to_owned()));
+        assert_eq!(refused(",fine", ""), (3, "15 fields; the table has 16".to_owned()));
         assert_eq!(TuningTable::read("").unwrap_err().0, 1);
     }
 
@@ -225,9 +240,8 @@ mod tests {
         let table = TuningTable::shipped();
         assert!(table.rows().count() >= 16);
         for Row { setting: s, .. } in table.rows() {
-            for value in [s.alpha, s.beta, s.gamma, s.refine_words_per_s, s.frames_per_s] {
-                assert_eq!(ShortDecimal::new(value).map(ShortDecimal::value), Some(value), "{s}");
-            }
+            assert_eq!(ShortDecimal::new(s.frames_per_s).map(ShortDecimal::value), Some(s.frames_per_s), "{s}");
+            assert!(s.is_of_habitats() && (2..=32).contains(&s.max_labels), "{s}");
         }
         let [fine, coarse] =
             [CellBand::Fine, CellBand::Coarse].map(|band| table.rows().filter(|row| row.setting.cells == band).count());

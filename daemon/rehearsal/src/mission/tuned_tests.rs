@@ -107,6 +107,22 @@ fn maps_agree_after_settings_changed_in_the_mission() {
 }
 
 #[test]
+fn the_map_tells_as_many_labels_apart_as_were_ordered() {
+    let mut mission = mission(&["survey.speed_m_s=1"]);
+    mission.fly_to(150.0);
+    let shown = |mission: &Mission| {
+        let labels: std::collections::BTreeSet<u8> = mission.operators().iter().map(|(_, label)| label).collect();
+        labels.len()
+    };
+    assert!(shown(&mission) > 3, "{} labels", shown(&mission));
+    mission.tune(r#"{"labels": 3}"#);
+    mission.fly_to(mission.now().as_secs_f64() + 60.0);
+    mission.drain();
+    assert_eq!(shown(&mission), 3);
+    assert_eq!(mission.mapper.epoch(), 0, "labels keep their meaning");
+}
+
+#[test]
 fn only_coarse_cells_are_sent_until_all_are_requested_again() {
     let mut mission = mission(&["survey.speed_m_s=1"]);
     mission.fly_to(60.0);

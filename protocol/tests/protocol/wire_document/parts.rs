@@ -311,6 +311,7 @@ fn settings_and_budgets() -> Rows {
         frames_per_s: Change::To(ShortDecimal::new(0.25).unwrap()),
         ..Settings::default()
     };
+    let labels = Settings { labels: Change::To(8), at_end: Change::Configured, ..Settings::default() };
     vec![
         (
             "slot: version 2, settings: planner horizon, coarse cells, depth alone, alpha 0.01, gamma as \
@@ -339,6 +340,10 @@ fn settings_and_budgets() -> Rows {
         (
             "slot: version 2, settings: registration off",
             slot(2, Slot::Settings(Settings { registration: Change::To(Registration::Off), ..Settings::default() })),
+        ),
+        (
+            "slot: version 2, settings: at most 8 labels, the end of the survey as configured",
+            slot(2, Slot::Settings(labels)),
         ),
     ]
 }

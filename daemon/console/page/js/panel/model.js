@@ -9,9 +9,10 @@ import { store } from "../store.js";
 import { order as plannerOrder } from "./planner.js";
 
 const NUMBERS = [
-  ["alpha", "Alpha", "Preference for labels that are used elsewhere", 1e-9, 1e3],
-  ["beta", "Beta", "Prior weight of each word in a label", 1e-9, 1e3],
-  ["gamma", "Gamma", "Weight of a new label", 1e-12, 1e3],
+  ["labels", "Labels, at most", "Most labels that the map tells apart, where labels are habitats; those that look most alike become one", 2, 32],
+  ["alpha", "Alpha", "Preference for topics that are used elsewhere; of effect on the labels only where these are topics", 1e-9, 1e3],
+  ["beta", "Beta", "Prior weight of each word in a topic; of effect on the labels only where these are topics", 1e-9, 1e3],
+  ["gamma", "Gamma", "Weight of a new topic; of effect on the labels only where these are topics", 1e-12, 1e3],
   ["refine_words_per_s", "Refine, words/s", "Words resampled per second of mission time", 1, 1e8],
   ["frames_per_s", "Frames, 1/s", "Maximum rate of camera frames into the scene model", 0.01, 30],
 ];

@@ -192,20 +192,20 @@ enum CtlCommand {
 
 const SETTINGS_EXAMPLES: &str = "\
 Example: scenecast ctl settings
-         scenecast ctl settings --gamma 1e-5 --frames 0.2 --layers none --wait 120
-         scenecast ctl settings --alpha 0 --cells \"\"     both as configured on the vehicle
+         scenecast ctl settings --labels 8 --frames 0.2 --layers none --wait 120
+         scenecast ctl settings --labels 0 --cells \"\"    both as configured on the vehicle
          scenecast ctl settings --fit                    fitted to the map's share of the budget
          scenecast ctl settings --fit 800 --dry-run      show settings that fit 800 bit/s";
 
 #[derive(Debug, Args)]
 struct SettingsArgs {
-    /// Preference for labels that are used elsewhere, 1e-9 to 1e3; 0: as configured
+    /// Preference for topics that are used elsewhere, 1e-9 to 1e3; 0: as configured
     #[arg(long, value_name = "N", allow_negative_numbers = true)]
     alpha: Option<f64>,
-    /// Prior weight of each word in a label, 1e-9 to 1e3; 0: as configured
+    /// Prior weight of each word in a topic, 1e-9 to 1e3; 0: as configured
     #[arg(long, value_name = "N", allow_negative_numbers = true)]
     beta: Option<f64>,
-    /// Weight of a new label, 1e-12 to 1e3; 0: as configured
+    /// Weight of a new topic, 1e-12 to 1e3; 0: as configured
     #[arg(long, value_name = "N", allow_negative_numbers = true)]
     gamma: Option<f64>,
     /// Words resampled a second of mission time, 1 to 1e8; 0: as configured
@@ -214,6 +214,9 @@ struct SettingsArgs {
     /// Camera frames a second that the scene model sees at most, 0.01 to 30; 0: as configured
     #[arg(long, value_name = "1/S", allow_negative_numbers = true)]
     frames: Option<f64>,
+    /// Most labels that the map tells apart, 2 to 32; 0: as configured
+    #[arg(long, value_name = "N")]
+    labels: Option<u8>,
     /// Cells to send: fine, coarse-to-fine, coarse (every fourth in both directions); "": as configured
     #[arg(long, value_name = "BAND")]
     cells: Option<String>,
@@ -252,6 +255,7 @@ impl SettingsArgs {
             gamma: self.gamma,
             refine_words_per_s: self.refine,
             frames_per_s: self.frames,
+            labels: self.labels,
         };
         SettingsChange { order, fit: self.fit, dry_run: self.dry_run }
     }

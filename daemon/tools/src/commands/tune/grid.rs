@@ -1,7 +1,6 @@
 //! The grid of settings to measure.
 
-use scenecast_config::Config;
-use scenecast_config::cell_m;
+use scenecast_config::{Config, SceneLabels, cell_m};
 use scenecast_core::UserError;
 use scenecast_core::tuning_table::Setting;
 use scenecast_protocol::directive::CellBand;
@@ -10,12 +9,15 @@ use serde::{Deserialize, Deserializer};
 use std::path::Path;
 
 /// The values of each parameter.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Default, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Grid {
+    /// Empty: those of the paper (ICRA 2019, section V.A), or none where labels are habitats.
     alpha: Vec<f64>,
     beta: Vec<f64>,
     gamma: Vec<f64>,
+    /// Empty: 4, 6, 8, 11 and 16 where labels are habitats, else the configured number.
+    max_labels: Vec<u32>,
     /// This list and those below: if empty, the configured value.
     cell_m: Vec<f64>,
     refine_words_per_s: Vec<f64>,
@@ -24,26 +26,11 @@ pub struct Grid {
     cells: Vec<CellBand>,
 }
 
-impl Default for Grid {
-    /// The grid of the paper (ICRA 2019, section V.A).
-    fn default() -> Self {
-        Self {
-            alpha: vec![1.0, 0.1, 0.01, 0.001],
-            beta: vec![10.0, 1.0, 0.1],
-            gamma: vec![1e-3, 1e-4, 1e-5],
-            cell_m: Vec::new(),
-            refine_words_per_s: Vec::new(),
-            frames_per_s: Vec::new(),
-            cells: Vec::new(),
-        }
-    }
-}
-
 /// Maximum number of settings of a grid.
 const MAX_SETTINGS: usize = 100_000;
 
 impl Grid {
-    /// The grid in a file, or the paper's; parameters that it does not name have their configured values.
+    /// The grid in a file; parameters that it does not name have their default values.
     pub fn load(path: Option<&Path>, config: &Config) -> Result<Self, UserError> {
         let mut grid = match path {
             None => Self::default(),
@@ -52,6 +39,24 @@ impl Grid {
                 Self::read(&text).map_err(|cause| UserError::Input(format!("{}{cause}", path.display())))?
             }
         };
+        let no_effect = || {
+            let cause = "alpha, beta, gamma and refine_words_per_s have no effect where scene.labels is habitats; set it to topics";
+            UserError::Input(format!("{}: {cause}", path.unwrap_or(Path::new("the grid")).display()))
+        };
+        let is_of_habitats = config.scene.labels == SceneLabels::Habitats;
+        let of_topics = [&mut grid.alpha, &mut grid.beta, &mut grid.gamma, &mut grid.refine_words_per_s];
+        let paper = [&[1.0, 0.1, 0.01, 0.001][..], &[10.0, 1.0, 0.1], &[1e-3, 1e-4, 1e-5], &[]];
+        for (values, paper) in of_topics.into_iter().zip(paper) {
+            match (is_of_habitats, values.is_empty()) {
+                (true, true) => values.push(0.0),
+                (true, false) => return Err(no_effect()),
+                (false, _) if values.is_empty() => values.extend(paper),
+                (false, _) => {}
+            }
+        }
+        if grid.max_labels.is_empty() {
+            grid.max_labels = if is_of_habitats { vec![4, 6, 8, 11, 16] } else { vec![config.scene.max_labels] };
+        }
         let every_frame = config.camera.rate_hz;
         let frames_per_s = if config.scene.frames_per_s > 0.0 { config.scene.frames_per_s } else { every_frame };
         let configured = [
@@ -75,7 +80,7 @@ impl Grid {
             let line =
                 e.span().and_then(|span| text.get(..span.start)).map_or(1, |before| before.matches('\n').count() + 1);
             format!(
-                ":{line}: {} (it takes lists alpha, beta, gamma, cell_m, refine_words_per_s, frames_per_s, cells)",
+                ":{line}: {} (it takes lists alpha, beta, gamma, max_labels, cell_m, refine_words_per_s, frames_per_s, cells)",
                 e.message()
             )
         })?;
@@ -88,14 +93,14 @@ impl Grid {
             ("frames_per_s", &grid.frames_per_s, 0.01, 30.0),
         ];
         for (name, values, low, high) in ranges {
-            if values.is_empty() && ["alpha", "beta", "gamma"].contains(&name) {
-                return Err(format!(": {name} is empty; it takes one number at least"));
-            }
             if let Some(value) = values.iter().find(|value| !(low..=high).contains(*value)) {
                 return Err(format!(": {name} has {value}; it takes numbers from {low} to {high}"));
             }
         }
-        let count = ranges.iter().map(|(_, values, ..)| values.len()).chain([grid.cells.len()]);
+        if let Some(labels) = grid.max_labels.iter().find(|labels| !(2..=254).contains(*labels)) {
+            return Err(format!(": max_labels has {labels}; it takes numbers from 2 to 254"));
+        }
+        let count = ranges.iter().map(|(_, values, ..)| values.len()).chain([grid.cells.len(), grid.max_labels.len()]);
         let count = count.map(|n| n.max(1)).fold(1usize, usize::saturating_mul);
         if count > MAX_SETTINGS {
             return Err(format!(": {count} settings; at most {MAX_SETTINGS} are allowed"));
@@ -115,6 +120,7 @@ impl Grid {
         }
         let numbers = [&mut self.alpha, &mut self.beta, &mut self.gamma, &mut self.cell_m];
         numbers.into_iter().chain([&mut self.refine_words_per_s, &mut self.frames_per_s]).for_each(each_once);
+        each_once(&mut self.max_labels);
         each_once(&mut self.cells);
     }
 
@@ -124,8 +130,10 @@ impl Grid {
         for &cell_m in &self.cell_m {
             for &alpha in &self.alpha {
                 for &beta in &self.beta {
-                    for &gamma in &self.gamma {
-                        let priors = Setting { alpha, beta, gamma, cell_m, ..self.first() };
+                    for (&gamma, &max_labels) in
+                        self.gamma.iter().flat_map(|g| self.max_labels.iter().map(move |l| (g, l)))
+                    {
+                        let priors = Setting { alpha, beta, gamma, max_labels, cell_m, ..self.first() };
                         self.at_each_pace(priors, &mut settings);
                     }
                 }
@@ -142,6 +150,7 @@ impl Grid {
             alpha: 0.0,
             beta: 0.0,
             gamma: 0.0,
+            max_labels: 0,
             refine_words_per_s: of(&self.refine_words_per_s),
             frames_per_s: of(&self.frames_per_s),
             cells: self.cells.first().copied().unwrap_or(CellBand::Fine),
@@ -176,8 +185,19 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_default_grid_is_that_of_the_paper() {
+    fn the_default_grid_of_habitats_has_numbers_of_labels_alone() {
         let settings = Grid::load(None, &Config::default()).unwrap().settings();
+        assert_eq!(settings.iter().map(|s| s.max_labels).collect::<Vec<_>>(), [4, 6, 8, 11, 16]);
+        assert!(settings.iter().all(|s| s.is_of_habitats() && s.frames_per_s == 0.5));
+    }
+
+    fn topics() -> Config {
+        scenecast_config::load(None, &["scene.labels=topics".to_owned()]).unwrap()
+    }
+
+    #[test]
+    fn the_default_grid_of_topics_is_that_of_the_paper() {
+        let settings = Grid::load(None, &topics()).unwrap().settings();
         assert_eq!(settings.len(), 36);
         let first = settings[0];
         assert_eq!((first.cell_m, first.alpha, first.beta, first.gamma), (0.25, 1.0, 10.0, 1e-3));
@@ -190,9 +210,11 @@ mod tests {
         let path = std::env::temp_dir().join(format!("scenecast-{}-grid.toml", std::process::id()));
         let text = "alpha = [1, 0.5, 1]\ncell_m = [0.1, 0.2]\nframes_per_s = [0.5, 0.1]\ncells = ['fine', 'coarse']\n";
         std::fs::write(&path, text).unwrap();
-        let settings = Grid::load(Some(&path), &Config::default()).unwrap().settings();
+        let settings = Grid::load(Some(&path), &topics()).unwrap().settings();
         assert_eq!(settings.len(), 2 * 2 * 3 * 3 * 2 * 2);
         assert!(settings.is_sorted_by_key(|s| s.cell_m));
+        let refused = Grid::load(Some(&path), &Config::default()).unwrap_err().to_string();
+        assert!(refused.contains("have no effect where scene.labels is habitats"), "{refused}");
     }
 
     #[test]
@@ -201,7 +223,7 @@ mod tests {
         assert!(Grid::read("beta = [0]").unwrap_err().contains("beta has 0; it takes numbers from"));
         assert!(Grid::read("cells = ['huge']").unwrap_err().contains("it takes fine and coarse"));
         assert!(Grid::read("frames_per_s = [31]").unwrap_err().contains("it takes numbers from 0.01 to 30"));
-        assert!(Grid::read("gamma = []").unwrap_err().contains("gamma is empty"));
+        assert!(Grid::read("max_labels = [1]").unwrap_err().contains("it takes numbers from 2 to 254"));
         assert!(Grid::read("alpha = [nan]").is_err() && Grid::read("alpha = 3").is_err());
     }
 }

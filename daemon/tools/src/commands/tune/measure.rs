@@ -1,7 +1,9 @@
 //! Measurement of one setting: the quality of its map and the bytes of its stream.
 
-use super::survey::Survey;
+use super::survey::{FrameContent, Survey};
+use scene_model::habitats::Habitats;
 use scene_model::online::OnlineInference;
+use scene_model::project::Observation;
 use scene_model::publish::LabelBook;
 use scene_model::topics::{FlatCell, SceneModel};
 use scenecast_core::UserError;
@@ -12,7 +14,70 @@ use scenecast_protocol::map_codec::{Stride, encode_all};
 use scenecast_scoring::{LabelGrid, score};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Runs the survey with a setting, then sweeps over all words.
+/// What gives the cells of a survey their labels.
+enum Labeller {
+    Topics(Box<(SceneModel, OnlineInference)>),
+    Habitats(Box<Habitats>),
+}
+
+impl Labeller {
+    fn new(survey: &Survey<'_>, setting: &Setting, seed: u64) -> Result<Self, UserError> {
+        if setting.is_of_habitats() {
+            return Ok(Self::Habitats(Box::new(Habitats::new(setting.max_labels))));
+        }
+        let model = SceneModel::new(survey.scene(setting, seed)).map_err(|e| UserError::Input(format!("scene.{e}")))?;
+        Ok(Self::Topics(Box::new((model, OnlineInference::default()))))
+    }
+
+    /// Takes the frame `index`, which lies at these places.
+    fn see(
+        &mut self,
+        survey: &Survey<'_>,
+        setting: &Setting,
+        index: usize,
+        content: &FrameContent,
+        places: &[Observation],
+    ) {
+        match (self, content) {
+            (Self::Topics(topics), FrameContent::Words(_)) => {
+                let (model, online) = &mut **topics;
+                online.expect(places.len(), model);
+                model.insert(index as f64 * survey.step_s, places);
+                let words = |frames: usize| (setting.refine_words_per_s * survey.step_s * frames as f64) as u64;
+                let skipped = (1.0 / (setting.frames_per_s * survey.step_s)).round().max(1.0) as usize;
+                model.refine(words(index + 1) - words((index + 1).saturating_sub(skipped)));
+            }
+            (Self::Habitats(habitats), FrameContent::Points(points)) => {
+                habitats.add(survey.size, points, places, setting.cell_m);
+                habitats.update();
+            }
+            // A survey has the content that its labels are made of.
+            _ => {}
+        }
+    }
+
+    /// The map at mission time `t_s`, seconds.
+    fn map(&mut self, t_s: f64) -> Vec<FlatCell> {
+        match self {
+            Self::Topics(topics) => topics.1.learn(t_s, &topics.0),
+            Self::Habitats(habitats) => habitats.map(),
+        }
+    }
+
+    /// The map after the survey: of topics after sweeps over all words.
+    fn final_map(&mut self, sweeps: u32) -> Vec<FlatCell> {
+        match self {
+            Self::Topics(topics) => {
+                topics.0.limit_labels(usize::MAX);
+                topics.0.sweep(sweeps);
+                topics.0.label_map()
+            }
+            Self::Habitats(habitats) => habitats.map(),
+        }
+    }
+}
+
+/// Runs the survey with a setting; topics then sweep over all words.
 pub fn measure(survey: &Survey<'_>, setting: &Setting, sweeps: u32, seed: u64) -> Result<Measurement, UserError> {
     let config = survey.config;
     let codec = config.map.codec;
@@ -22,30 +87,25 @@ pub fn measure(survey: &Survey<'_>, setting: &Setting, sweeps: u32, seed: u64) -
         let chunks = chunks.ok_or_else(|| UserError::Input(format!("link.frame_bytes = {room} holds no cell")))?;
         Ok::<usize, UserError>(chunks.iter().map(|chunk| chunk.bytes.len()).sum())
     };
-    let mut model = SceneModel::new(survey.scene(setting, seed)).map_err(|e| UserError::Input(format!("scene.{e}")))?;
-    let (mut book, mut online) = (LabelBook::new(0), OnlineInference::default());
+    let mut labeller = Labeller::new(survey, setting, seed)?;
+    let mut book = LabelBook::new(0);
     let (mut sent, mut streamed) = (map::LabelGrid::default(), 0);
     let is_coarse = setting.cells == CellBand::Coarse;
     let interval = |index: usize| (index as f64 * survey.step_s * setting.frames_per_s + 1e-6).floor();
-    let (mut last, mut refined) = (None, 0);
-    // A topic gets a label when it has lasted for two maps, so the last map is published again after the last frame.
+    let mut last = None;
+    // A label is given when it has lasted for two maps, so the last map is published again after the last frame.
     for (index, seen) in survey.frames().map(Some).chain([None]).enumerate() {
-        let t_s = index as f64 * survey.step_s;
-        if let Some(seen) = seen {
+        if let Some((content, places)) = seen {
             // As on the vehicle: of each interval of the frame rate only the first frame is used; its refinement also
             // covers the skipped ones.
             if last.is_some_and(|last| interval(last) == interval(index)) {
                 continue;
             }
             last = Some(index);
-            online.expect(seen.len(), &mut model);
-            model.insert(t_s, &seen);
-            let words = (setting.refine_words_per_s * survey.step_s * (index + 1) as f64) as u64;
-            model.refine(words - refined);
-            refined = words;
+            labeller.see(survey, setting, index, content, &places);
         }
         let epoch = book.epoch();
-        let published = book.publish(&online.learn(t_s, &model));
+        let published = book.publish(&labeller.map(index as f64 * survey.step_s));
         if book.epoch() != epoch {
             sent = map::LabelGrid::default();
         }
@@ -53,9 +113,7 @@ pub fn measure(survey: &Survey<'_>, setting: &Setting, sweeps: u32, seed: u64) -
         streamed += bytes(&sent, &target)?;
         sent = target;
     }
-    model.limit_labels(usize::MAX);
-    model.sweep(sweeps);
-    let map = model.label_map();
+    let map = labeller.final_map(sweeps);
     let cells = if is_coarse { blocks(&map) } else { map.clone() };
     let (columns, rows) = survey.annotations.size();
     let labels = LabelGrid::from_map(&cells, 0, -1, columns, rows);

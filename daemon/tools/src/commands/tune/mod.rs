@@ -45,15 +45,15 @@ pub struct Tune {
     /// Classes that are ignored, separated by commas
     #[arg(long, value_name = "CLASSES", value_delimiter = ',', default_value = "255")]
     ignore: Vec<u8>,
-    /// TOML file with lists alpha, beta, gamma, cell_m (metres), refine_words_per_s, frames_per_s and cells ("fine",
-    /// "coarse"), each optional [default: the paper's grid: alpha 1, .1, .01, .001; beta 10, 1, .1; gamma 1e-3, 1e-4,
-    /// 1e-5; the rest as configured]
+    /// TOML file with lists max_labels, cell_m (metres), frames_per_s and cells ("fine", "coarse"), and with
+    /// scene.labels=topics also alpha, beta, gamma and refine_words_per_s, each optional [default: max_labels 4, 6, 8, 11, 16;
+    /// of topics alpha 1, .1, .01, .001, beta 10, 1, .1, gamma 1e-3, 1e-4, 1e-5; the rest as configured]
     #[arg(long, value_name = "FILE")]
     grid: Option<PathBuf>,
     /// Maximum rate of the stream of the best setting, bit/s [default: link.budget_bps]
     #[arg(long, value_name = "BPS", allow_negative_numbers = true)]
     budget: Option<f64>,
-    /// Sweeps over all words after the survey
+    /// Sweeps over all words after the survey, where labels are topics
     #[arg(long, value_name = "N", default_value_t = 30, value_parser = clap::value_parser!(u32).range(0..=10_000))]
     sweeps: u32,
     /// Seed of the scene model

@@ -1,10 +1,11 @@
 //! The mosaic with its annotations, and a virtual survey over it.
 
 use image::{GrayImage, RgbImage};
+use scene_model::habitats::{Habitats, MeasuredPoint};
 use scene_model::project::{DownCamera, Observation, Pose};
 use scene_model::topics::{Birth, SceneConfig};
 use scene_model::words::{Word, WordConfig, WordExtractor};
-use scenecast_config::{BirthRule, Config, WorldKind};
+use scenecast_config::{BirthRule, Config, SceneLabels, WorldKind};
 use scenecast_core::UserError;
 use scenecast_core::tuning_table::Setting;
 use scenecast_files::{read_classes, read_image};
@@ -77,7 +78,7 @@ impl<'a> Site<'a> {
         let Some(Self { config, ignore, .. }) = sites.first() else { return String::new() };
         let Config { camera, scene, survey, link, map, .. } = config;
         let rest = format!(
-            "2 {options} {:?} {} {} {} {} {} {} {} {} {} {} {:?}",
+            "3 {options} {:?} {} {} {} {} {} {} {} {} {} {} {:?}",
             ignore,
             camera.metres_per_pixel,
             camera.width_px,
@@ -85,7 +86,7 @@ impl<'a> Site<'a> {
             camera.rate_hz,
             survey.speed_m_s,
             scene.birth,
-            scene.max_labels,
+            scene.labels,
             scene.max_words_per_cell,
             link.frame_bytes,
             map.codec,
@@ -96,15 +97,21 @@ impl<'a> Site<'a> {
     }
 }
 
-/// The frames of a survey as words, for one size of cells.
+/// What the scene model takes from a frame: words, or where labels are habitats measured points.
+pub enum FrameContent {
+    Words(Vec<Word>),
+    Points(Vec<MeasuredPoint>),
+}
+
+/// The frames of a survey, for one size of cells.
 pub struct Survey<'a> {
     pub(super) config: &'a Config,
     /// The annotations of the map's cells, and the mosaic's colours as a second set of classes.
     pub(super) annotations: Annotations,
     pub(super) colours: Annotations,
     camera: DownCamera,
-    size: (u32, u32),
-    frames: Vec<(Pose, Vec<Word>)>,
+    pub(super) size: (u32, u32),
+    frames: Vec<(Pose, FrameContent)>,
     /// Time between two frames, seconds.
     pub(super) step_s: f64,
 }
@@ -138,7 +145,11 @@ impl<'a> Survey<'a> {
             let view = image::imageops::crop_imm(&site.image, left, top, size.0, size.1).to_image();
             let middle = |from: u32, length: u32| (f64::from(from) + f64::from(length) / 2.0) * mpp;
             let pose = Pose { x: middle(left, size.0), y: -middle(top, size.1), z: 0.0, yaw_rad: 0.0 };
-            (pose, extractor.extract(&view, cell_px))
+            let content = match config.scene.labels {
+                SceneLabels::Topics => FrameContent::Words(extractor.extract(&view, cell_px)),
+                SceneLabels::Habitats => FrameContent::Points(scene_model::habitats::measure(&view, cell_px)),
+            };
+            (pose, content)
         };
         let frames = corners.into_iter().map(frame).collect();
         let annotations = Annotations::new(&site.classes, site.image.dimensions(), cell_px, site.ignore);
@@ -153,9 +164,16 @@ impl<'a> Survey<'a> {
         })
     }
 
-    /// The observations of the camera, frame by frame; the mosaic's north-west corner is the origin of the world.
-    pub fn frames(&self) -> impl Iterator<Item = Vec<Observation>> {
-        self.frames.iter().map(|(pose, words)| self.camera.project(self.size.0, self.size.1, pose, words))
+    /// The frames of the camera, each with the places of its words or points; the mosaic's north-west corner is the origin of the world.
+    pub fn frames(&self) -> impl Iterator<Item = (&FrameContent, Vec<Observation>)> {
+        self.frames.iter().map(|(pose, content)| {
+            let project = |words: &[Word]| self.camera.project(self.size.0, self.size.1, pose, words);
+            let places = match content {
+                FrameContent::Words(words) => project(words),
+                FrameContent::Points(points) => project(&Habitats::as_words(points)),
+            };
+            (content, places)
+        })
     }
 
     /// Duration of the whole survey, seconds.
@@ -177,7 +195,7 @@ impl<'a> Survey<'a> {
             beta: setting.beta,
             gamma: setting.gamma,
             birth,
-            max_labels: scene.max_labels,
+            max_labels: setting.max_labels,
             max_words_per_cell: scene.max_words_per_cell,
             seed,
             ..SceneConfig::for_images()

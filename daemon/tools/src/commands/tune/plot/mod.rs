@@ -6,7 +6,7 @@ mod raster;
 use plotters::prelude::*;
 use raster::Raster;
 use scenecast_core::UserError;
-use scenecast_core::tuning_table::{Measurement, Row};
+use scenecast_core::tuning_table::{Measurement, Row, Setting};
 use std::ops::Range;
 
 const WIDTH: u32 = 1240;
@@ -20,7 +20,7 @@ const INK: RGBColor = RGBColor(40, 48, 56);
 const FAINT: RGBColor = RGBColor(222, 227, 231);
 const FRONT: RGBColor = RGBColor(120, 128, 136);
 const BEST: RGBColor = RGBColor(200, 30, 40);
-/// Colours of the values of alpha, in order (Okabe and Ito, distinguishable for colour-blind readers).
+/// Colours of the values of alpha, or of the numbers of labels, in order (Okabe and Ito, distinguishable for colour-blind readers).
 const SERIES: [RGBColor; 7] = [
     RGBColor(0, 114, 178),
     RGBColor(230, 159, 0),
@@ -37,15 +37,20 @@ type Area<Db> = DrawingArea<Db, plotters::coord::Shift>;
 pub struct Plot<'a> {
     rows: &'a [Row],
     best: Option<&'a Row>,
-    alphas: Vec<f64>,
+    /// What the colours stand for: alpha, or where labels are habitats their number.
+    series: Vec<f64>,
+}
+
+fn series(setting: &Setting) -> f64 {
+    if setting.is_of_habitats() { setting.max_labels.into() } else { setting.alpha }
 }
 
 impl<'a> Plot<'a> {
     pub fn new(rows: &'a [Row], best: Option<&'a Row>) -> Self {
-        let mut alphas: Vec<f64> = rows.iter().map(|row| row.setting.alpha).collect();
-        alphas.sort_by(|a, b| b.total_cmp(a));
-        alphas.dedup();
-        Self { rows, best, alphas }
+        let mut all: Vec<f64> = rows.iter().map(|row| series(&row.setting)).collect();
+        all.sort_by(|a, b| b.total_cmp(a));
+        all.dedup();
+        Self { rows, best, series: all }
     }
 
     pub fn svg(&self) -> Result<String, UserError> {
@@ -105,25 +110,30 @@ impl<'a> Plot<'a> {
     }
 
     fn legend<Db: DrawingBackend>(&self, area: &Area<Db>) -> Drawn<Db> {
+        let is_of_habitats = self.rows.iter().all(|row| row.setting.is_of_habitats());
         let mut lines: Vec<(Option<(i32, ShapeStyle)>, String)> = self
-            .alphas
+            .series
             .iter()
             .zip(SERIES.iter().cycle())
-            .map(|(alpha, colour)| (Some((5, colour.filled())), format!("alpha {alpha}")))
+            .map(|(value, colour)| {
+                (
+                    Some((5, colour.filled())),
+                    if is_of_habitats { format!("{value} labels") } else { format!("alpha {value}") },
+                )
+            })
             .collect();
         lines.push((Some((8, FRONT.stroke_width(2))), "Pareto front".to_owned()));
         if let Some(Row { setting, measurement, .. }) = self.best {
             lines.push((Some((11, BEST.stroke_width(2))), "best in the budget:".to_owned()));
-            lines.extend(
-                [
-                    format!("alpha {}", setting.alpha),
-                    format!("beta {}", setting.beta),
-                    format!("gamma {}", setting.gamma),
-                    format!("cells {} m", setting.cell_m),
-                    format!("{:.0} bit/s", measurement.stream_bps),
-                ]
-                .map(|text| (None, text)),
-            );
+            let labels = match setting.is_of_habitats() {
+                true => vec![format!("{} labels", setting.max_labels), format!("{} frames/s", setting.frames_per_s)],
+                false => {
+                    let Setting { alpha, beta, gamma, .. } = setting;
+                    vec![format!("alpha {alpha}"), format!("beta {beta}"), format!("gamma {gamma}")]
+                }
+            };
+            let others = [format!("cells {} m", setting.cell_m), format!("{:.0} bit/s", measurement.stream_bps)];
+            lines.extend(labels.into_iter().chain(others).map(|text| (None, text)));
         }
         for (y, (mark, text)) in (60..).step_by(LEGEND_LINE as usize).zip(lines) {
             if let Some((radius, style)) = mark {
@@ -135,7 +145,7 @@ impl<'a> Plot<'a> {
     }
 
     fn colour(&self, row: &Row) -> RGBColor {
-        let index = self.alphas.iter().position(|&alpha| alpha == row.setting.alpha).unwrap_or(0);
+        let index = self.series.iter().position(|&value| value == series(&row.setting)).unwrap_or(0);
         SERIES[index % SERIES.len()]
     }
 }
@@ -176,7 +186,7 @@ mod tests {
     fn rows() -> Vec<Row> {
         let setting = TuningTable::shipped().rows().next().unwrap().setting;
         let row = |(map_bytes, mutual_information_nats)| Row {
-            setting: scenecast_core::tuning_table::Setting { alpha: mutual_information_nats, ..setting },
+            setting: Setting { alpha: mutual_information_nats, ..setting },
             measurement: Measurement {
                 mutual_information_nats,
                 normalised_mutual_information: 0.0,
@@ -206,7 +216,7 @@ mod tests {
         let plot = Plot::new(&rows, rows.first());
         let svg = plot.svg().unwrap();
         assert!(svg.starts_with("<svg") && svg.ends_with("</svg>\n") && svg.contains("bytes of the map"));
-        assert_eq!(svg.matches("r=\"5\"").count(), 2 * rows.len() + plot.alphas.len());
+        assert_eq!(svg.matches("r=\"5\"").count(), 2 * rows.len() + plot.series.len());
         let png = image::load_from_memory(&plot.png().unwrap()).unwrap();
         assert_eq!((png.width(), png.height()), (WIDTH, HEIGHT));
     }
