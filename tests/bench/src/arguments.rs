@@ -5,6 +5,7 @@
 use crate::console::ConsoleBench;
 use crate::exemplar::ExemplarBench;
 use crate::inference::InferenceBench;
+use crate::labels::LabelsBench;
 use crate::live::LiveBench;
 use crate::localisation::LocalisationBench;
 use crate::map_codec::MapCodecBench;
@@ -38,6 +39,8 @@ enum Bench {
     Exemplar(ExemplarBench),
     /// Inference under way: information of the online map against a batch over the same frames, and bytes of the map.
     Inference(InferenceBench),
+    /// Labels: the same in any order and on any path, against the true classes, and of worse sights.
+    Labels(LabelsBench),
     /// A vehicle with a live camera, by ROS 2: images that reach the scene model, processor time, memory.
     Live(LiveBench),
     /// The vehicle's position over 3 km: dead reckoning, with the relay, with outliers.
@@ -68,6 +71,7 @@ impl Arguments {
             Bench::Console(c) => c.run(),
             Bench::Exemplar(e) => e.run(),
             Bench::Inference(i) => i.run(),
+            Bench::Labels(l) => l.run(),
             Bench::Live(l) => l.run(),
             Bench::Localisation(l) => l.run(),
             Bench::MapCodec(m) => m.run(),

@@ -7,6 +7,7 @@ mod console;
 mod cpu_meter;
 mod exemplar;
 mod inference;
+mod labels;
 mod live;
 mod localisation;
 mod map_codec;

@@ -1,0 +1,128 @@
+//! `scenecast-bench labels`
+
+use super::site::Site;
+use super::{LabelRow, measure, picture};
+use crate::surveys::{nats, print_json};
+use clap::Args;
+use scenecast_core::UserError;
+use scenecast_files::write_whole;
+use scenecast_tools::{Progress, SeedArguments};
+use std::io::Cursor;
+use std::path::PathBuf;
+
+/// Flights over a floor, and over each of its other sights.
+const FLIGHTS: f64 = 7.0;
+
+/// Whether one habitat has one label, whenever, in whatever order and on whichever path it was seen.
+///
+/// A virtual camera flies over each floor line by line, over the same frames in reversed order, and column by column; the labels are
+/// those of the vehicle under way. `V` is the V-measure against the true classes, of all labels and with the tree cut at 8; `orders` and
+/// `paths` are the agreement (normalised mutual information) of the maps of two orders and of two paths; `within` and `across` the
+/// shares of neighbours of one class that have one label, first seen together and far apart in time; `changed` the share of cells that
+/// change their label in five minutes, in the second half of the survey; `cpu` the share of a core. Then the mutual information with the
+/// true classes, of the clear floor and of grey, turbid, dark and blurred copies, nats. A mosaic NAME.jpg has its classes in
+/// NAME_label.png. Apart from the time of the processor, the same floors give the same figures.
+#[derive(Debug, Args)]
+#[command(after_help = "Example: scenecast-bench labels --seeds 5 --out labels")]
+pub(crate) struct LabelsBench {
+    /// Print JSON instead of a table
+    #[arg(long)]
+    json: bool,
+    #[command(flatten)]
+    seeds: SeedArguments,
+    /// Images of sea floors, in place of drawn reefs, sand and a featureless floor
+    #[arg(long, value_name = "IMG", num_args = 1..)]
+    mosaics: Vec<PathBuf>,
+    /// Write a picture of the maps of each floor: along, back, across, the true classes, seams
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+}
+
+impl LabelsBench {
+    pub(crate) fn run(self) -> Result<(), UserError> {
+        if let Some(dir) = &self.out {
+            std::fs::create_dir_all(dir).map_err(|e| UserError::file(dir, e))?;
+        }
+        let SeedArguments { first, count } = self.seeds;
+        let reefs = (first..first + count).map(Some).chain([None, None]);
+        let floors = if self.mosaics.is_empty() { count as usize + 2 } else { self.mosaics.len() };
+        let site = |index: usize| match (self.mosaics.get(index), reefs.clone().nth(index).flatten()) {
+            (Some(path), _) => Site::mosaic(path),
+            (None, Some(seed)) => Ok(Site::reef(seed)),
+            (None, None) if index + 1 == floors => Ok(Site::featureless()),
+            (None, None) => Ok(Site::sand()),
+        };
+        if !self.json {
+            print_head();
+        }
+        let (mut progress, mut done, mut rows) = (Progress::new("flights"), 0.0, Vec::new());
+        for index in 0..floors {
+            let site = site(index)?;
+            let (row, flights) = measure(&site, &mut || {
+                done += 1.0;
+                progress.show(done / (FLIGHTS * floors as f64));
+            });
+            if let Some(dir) = &self.out {
+                let mut bytes = Cursor::new(Vec::new());
+                let drawn = picture::of(&site, &flights).write_to(&mut bytes, image::ImageFormat::Png);
+                drawn.map_err(|e| UserError::Failed(e.to_string()))?;
+                write_whole(&dir.join(format!("{}.png", site.name.replace(' ', "-"))), bytes.get_ref())?;
+            }
+            if !self.json {
+                print_row(&row);
+            }
+            rows.push(row);
+        }
+        if self.json {
+            return print_json(&serde_json::json!({ "floors": rows }));
+        }
+        Ok(())
+    }
+}
+
+fn print_head() {
+    println!(
+        "{:<16} {:>6} {:>5} {:>5} {:>6} {:>5} {:>5} {:>5} {:>6} {:>6} {:>7} {:>5} {:>6} {:>6} {:>6} {:>6} {:>7}",
+        "floor",
+        "labels",
+        "V",
+        "at 8",
+        "orders",
+        "at 8",
+        "paths",
+        "at 8",
+        "within",
+        "across",
+        "changed",
+        "cpu",
+        "clear",
+        "grey",
+        "turbid",
+        "dark",
+        "blurred"
+    );
+}
+
+fn print_row(r: &LabelRow) {
+    let sight = |name: &str| nats(r.sights.get(name).copied());
+    println!(
+        "{:<16} {:>6} {:>5.3} {:>5.3} {:>6.3} {:>5.3} {:>5.3} {:>5.3} {:>6} {:>6} {:>7.3} {:>5.3} {:>6} {:>6} {:>6} {:>6} {:>7}",
+        r.site,
+        r.labels,
+        r.v_measure,
+        r.v_measure_at_8,
+        r.orders,
+        r.orders_at_8,
+        r.paths,
+        r.paths_at_8,
+        nats(r.within),
+        nats(r.across),
+        r.relabelled,
+        r.cpu,
+        nats(Some(r.information_nats)),
+        sight("grey"),
+        sight("turbid"),
+        sight("dark"),
+        sight("blurred")
+    );
+}
