@@ -1,7 +1,7 @@
 import assert from "node:assert/strict";
 import { readFile } from "node:fs/promises";
 
-const EXTENSIONS = ["png", "pgw", "png.aux.xml", "tif", "csv", "geojson", "ply"];
+const EXTENSIONS = ["png", "pgw", "png.aux.xml", "tif", "csv", "labels.csv", "geojson", "ply"];
 
 /** Clicks a link of the export dialog; resolves to the name and the bytes of the file. */
 async function take(s, title) {
@@ -28,7 +28,7 @@ export default [
     async run(s) {
       await s.button("Export").click();
       const links = await s.page.locator("#dialog .files a").evaluateAll((all) => all.map((a) => a.getAttribute("href").split("/map.")[1]));
-      assert.deepEqual(links, ["tif", "csv", "geojson", "ply"]);
+      assert.deepEqual(links, ["tif", "csv", "labels.csv", "geojson", "ply"]);
     },
   },
   {

@@ -24,5 +24,5 @@ export function refreshCut(vehicle) {
   text(value, `${shown} of ${finest}`);
   const clearest = vehicle.label_tree.clearest;
   show(hint, clearest !== null && clearest !== shown);
-  text(hint, `clearest: ${clearest}`);
+  text(hint, clearest === null ? "" : `clearest: ${clearest}`);
 }
