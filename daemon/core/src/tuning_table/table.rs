@@ -186,6 +186,11 @@ fn parse(line: &str) -> Result<(String, Row), String> {
         frames_per_s: number(7, 0.01, 30.0)?,
         cells: band.ok_or_else(|| format!("cells {:?}: it takes fine or coarse", fields[8]))?,
     };
+    let Setting { alpha, beta, gamma, .. } = setting;
+    let is_of_topics = alpha >= 1e-9 && beta >= 1e-9 && gamma >= 1e-12;
+    if !is_of_topics && [alpha, beta, gamma] != [0.0; 3] {
+        return Err("alpha, beta and gamma: they take 0 each, or at least 1e-9, 1e-9 and 1e-12".to_owned());
+    }
     let measurement = Measurement {
         mutual_information_nats: number(9, 0.0, 1e3)?,
         normalised_mutual_information: number(10, 0.0, 1.000_001)?,
@@ -229,6 +234,8 @@ mod tests {
         assert_eq!(refused("cells,", "").0, 2);
         assert_eq!(refused("0.25,1,", "0.25,one,"), (5, "alpha \"one\": it takes 0 to 1000".to_owned()));
         assert_eq!(refused("0.25,1,", "0.25,NaN,").0, 5);
+        assert_eq!(refused("0.25,1,", "0.25,0,").0, 5, "priors of topics without alpha");
+        assert_eq!(refused("0.25,1,", "0.25,1e-10,").0, 5);
         assert_eq!(refused(",fine", ",huge"), (3, "cells \"huge\": it takes fine or coarse".to_owned()));
         assert_eq!(refused(",fine", ""), (3, "15 fields; the table has 16".to_owned()));
         assert_eq!(TuningTable::read("").unwrap_err().0, 1);

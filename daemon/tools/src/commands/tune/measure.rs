@@ -16,8 +16,15 @@ use std::collections::{BTreeMap, BTreeSet};
 
 /// What gives the cells of a survey their labels.
 enum Labeller {
-    Topics(Box<(SceneModel, OnlineInference)>),
+    Topics(Box<Topics>),
     Habitats(Box<Habitats>),
+}
+
+struct Topics {
+    model: SceneModel,
+    online: OnlineInference,
+    /// Words that were resampled so far.
+    refined: u64,
 }
 
 impl Labeller {
@@ -26,7 +33,7 @@ impl Labeller {
             return Ok(Self::Habitats(Box::new(Habitats::new(setting.max_labels))));
         }
         let model = SceneModel::new(survey.scene(setting, seed)).map_err(|e| UserError::Input(format!("scene.{e}")))?;
-        Ok(Self::Topics(Box::new((model, OnlineInference::default()))))
+        Ok(Self::Topics(Box::new(Topics { model, online: OnlineInference::default(), refined: 0 })))
     }
 
     /// Takes the frame `index`, which lies at these places.
@@ -40,12 +47,11 @@ impl Labeller {
     ) {
         match (self, content) {
             (Self::Topics(topics), FrameContent::Words(_)) => {
-                let (model, online) = &mut **topics;
+                let Topics { model, online, refined } = &mut **topics;
                 online.expect(places.len(), model);
                 model.insert(index as f64 * survey.step_s, places);
-                let words = |frames: usize| (setting.refine_words_per_s * survey.step_s * frames as f64) as u64;
-                let skipped = (1.0 / (setting.frames_per_s * survey.step_s)).round().max(1.0) as usize;
-                model.refine(words(index + 1) - words((index + 1).saturating_sub(skipped)));
+                let words = (setting.refine_words_per_s * survey.step_s * (index + 1) as f64) as u64;
+                model.refine(words - std::mem::replace(refined, words));
             }
             (Self::Habitats(habitats), FrameContent::Points(points)) => {
                 habitats.add(survey.size, points, places, setting.cell_m);
@@ -59,7 +65,7 @@ impl Labeller {
     /// The map at mission time `t_s`, seconds.
     fn map(&mut self, t_s: f64) -> Vec<FlatCell> {
         match self {
-            Self::Topics(topics) => topics.1.learn(t_s, &topics.0),
+            Self::Topics(topics) => topics.online.learn(t_s, &topics.model),
             Self::Habitats(habitats) => habitats.map(),
         }
     }
@@ -68,9 +74,9 @@ impl Labeller {
     fn final_map(&mut self, sweeps: u32) -> Vec<FlatCell> {
         match self {
             Self::Topics(topics) => {
-                topics.0.limit_labels(usize::MAX);
-                topics.0.sweep(sweeps);
-                topics.0.label_map()
+                topics.model.limit_labels(usize::MAX);
+                topics.model.sweep(sweeps);
+                topics.model.label_map()
             }
             Self::Habitats(habitats) => habitats.map(),
         }
