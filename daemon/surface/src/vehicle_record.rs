@@ -179,9 +179,7 @@ impl VehicleRecord {
 
     /// The weight of a label: the one that was sent, or that of the nearest relative of a label that the vehicle assigned later.
     pub fn weight(&self, label: u8) -> f64 {
-        let relative = || self.tree.as_ref()?.nearest(label, |other| other <= self.weighed);
-        let known = if label > self.weighed { relative().unwrap_or(label) } else { label };
-        self.utility.weight(known)
+        self.utility.weight(self.tree.as_ref().map_or(label, |tree| tree.weighed_as(label, self.weighed)))
     }
 
     /// Sets name, colour and merging of a label in the current epoch; without a name or a colour it has those that the

@@ -67,8 +67,14 @@ impl LabelTree {
         self.merges.iter().take(merged).fold(label, |label, &(into, joins)| if label == joins { into } else { label })
     }
 
-    /// The first label among those that `counts` which `label` joins or is joined by; the lowest of several. `None` without any.
-    pub fn nearest(&self, label: u8, counts: impl Fn(u8) -> bool) -> Option<u8> {
+    /// The label whose weight `label` has under an order that was applied when `highest` was the highest label: itself, or if it was
+    /// assigned later the one of that time which it first becomes one with, the lowest of several.
+    pub fn weighed_as(&self, label: u8, highest: u8) -> u8 {
+        if label <= highest { label } else { self.nearest(label, highest).unwrap_or(label) }
+    }
+
+    /// The first label up to `highest` that `label` joins or is joined by; the lowest of several.
+    fn nearest(&self, label: u8, highest: u8) -> Option<u8> {
         let mut own = vec![label];
         let mut groups: BTreeMap<u8, Vec<u8>> = BTreeMap::new();
         for &(into, joins) in &self.merges {
@@ -76,7 +82,7 @@ impl LabelTree {
             let [into_group, joined_group] = [members(into), members(joins)];
             if into_group.contains(&label) || joined_group.contains(&label) {
                 let others = into_group.iter().chain(&joined_group).filter(|other| !own.contains(other));
-                let found = others.copied().filter(|&other| counts(other)).min();
+                let found = others.copied().filter(|&other| other <= highest).min();
                 if found.is_some() {
                     return found;
                 }
@@ -237,8 +243,9 @@ mod tests {
     #[test]
     fn the_nearest_relative_is_the_one_that_is_joined_first() {
         let tree = tree(&[(1, 4), (5, 6), (2, 5), (1, 3), (1, 2)], None);
-        let nearest = |label| tree.nearest(label, |other| other <= 3);
+        let nearest = |label| tree.nearest(label, 3);
         assert_eq!([4, 5, 6, 1, 9].map(nearest), [Some(1), Some(2), Some(2), Some(3), None]);
+        assert_eq!([4, 5, 6, 1, 9].map(|label| tree.weighed_as(label, 3)), [1, 2, 2, 1, 9]);
     }
 
     #[test]

@@ -46,12 +46,11 @@ pub(super) fn geojson(cells: &MapCells, origin: Option<Origin>) -> String {
         json!([tidy(lon), tidy(lat)])
     };
     let corner = |&(column, row): &(i64, i64)| position(cells.corner_m(column, row));
-    let mut counts: BTreeMap<u8, usize> = BTreeMap::new();
-    cells.explored().for_each(|c| *counts.entry(c.label).or_default() += 1);
+    let counts = counts(cells);
     let feature = |(label, polygons): (u8, Vec<Polygon>)| {
         let count = counts.get(&label).copied().unwrap_or(0);
         let rings = |polygon: &Polygon| polygon.iter().map(|r| r.iter().map(corner).collect()).collect::<Vec<Value>>();
-        let (name, area_m2) = (cells.names.get(&label), count as f64 * cells.cell_m * cells.cell_m);
+        let (name, area_m2) = (cells.names.get(&label), f64::from(count) * cells.cell_m * cells.cell_m);
         json!({
             "type": "Feature",
             "id": label,
@@ -114,14 +113,19 @@ pub(super) fn csv(cells: &MapCells) -> String {
     out
 }
 
+/// The number of cells of each label.
+fn counts(cells: &MapCells) -> BTreeMap<u8, u32> {
+    let mut counts = BTreeMap::new();
+    cells.explored().for_each(|c| *counts.entry(c.label).or_default() += 1);
+    counts
+}
+
 /// A line for each label of the map: its name, cells and area, and at each cut of the tree the label that stands for it.
 pub(super) fn labels(cells: &MapCells) -> String {
-    let mut counts: BTreeMap<u8, u32> = BTreeMap::new();
-    cells.explored().for_each(|c| *counts.entry(c.label).or_default() += 1);
     let cuts = || (2..=cells.tree.as_ref().map_or(0, |tree| tree.merges().len())).rev();
     let mut out = String::from("label,name,cells,area_m2");
     cuts().for_each(|count| _ = write!(out, ",of_{count}"));
-    for (&label, &count) in &counts {
+    for (label, count) in counts(cells) {
         let name = cells.names.get(&label).map_or(String::new(), |name| format!("\"{}\"", name.replace('"', "\"\"")));
         let _ = write!(out, "\n{label},{name},{count},{:.3}", f64::from(count) * cells.cell_m * cells.cell_m);
         let groups = cells.tree.iter().flat_map(|tree| cuts().map(|count| tree.group_of(label, count)));

@@ -39,8 +39,7 @@ impl Weights {
         let Some(ordered) = &self.ordered else { return false };
         let mut in_use = ordered.clone();
         for label in self.labels.saturating_add(1)..=highest {
-            let relative = tree.nearest(label, |other| other <= self.labels);
-            if let Some(&weight) = relative.and_then(|relative| ordered.weights.get(&relative)) {
+            if let Some(&weight) = ordered.weights.get(&tree.weighed_as(label, self.labels)) {
                 in_use.weights.insert(label, weight);
             }
         }

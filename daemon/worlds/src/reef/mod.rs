@@ -121,6 +121,15 @@ impl Reef {
         [f64::from(self.layout.berth.x), f64::from(self.layout.berth.y)]
     }
 
+    /// The surveyed part of the floor ([`Reef::SURVEY_M`]) and its classes, as [`Reef::picture`] and [`Reef::classes`] draw them.
+    #[must_use]
+    pub fn survey(&self, metres_per_pixel: f64) -> (RgbImage, GrayImage) {
+        let [west, south, east, north] = Self::SURVEY_M;
+        let [columns, rows] = [east - west, north - south].map(|metres| (metres / metres_per_pixel).round() as u32);
+        let picture = self.picture(west, south, columns, rows, metres_per_pixel);
+        (picture, self.classes(west, south, columns, rows, metres_per_pixel))
+    }
+
     /// The floor from above, without the effects of water and camera; the first row is the northern one.
     #[must_use]
     pub fn picture(&self, west_m: f64, south_m: f64, columns: u32, rows: u32, metres_per_pixel: f64) -> RgbImage {

@@ -36,12 +36,8 @@ impl Site {
 
     /// The surveyed part of the drawn reef of a seed.
     pub fn reef(seed: u64) -> Self {
-        let (reef, pitch) = (Reef::new(seed), CELL_M / f64::from(CELL_PX));
-        let [west, south, east, north] = Reef::SURVEY_M;
-        let pixels = |metres: f64| (metres / pitch).round() as u32;
-        let (columns, rows) = (pixels(east - west), pixels(north - south));
-        let classes = reef.classes(west, south, columns, rows, pitch);
-        Self::new(format!("reef {seed}"), reef.picture(west, south, columns, rows, pitch), &classes)
+        let (image, classes) = Reef::new(seed).survey(CELL_M / f64::from(CELL_PX));
+        Self::new(format!("reef {seed}"), image, &classes)
     }
 
     /// A mosaic with the classes of NAME_label.png; without this file, the site has no classes.

@@ -55,14 +55,7 @@ impl<'a> Site<'a> {
     /// patches.
     pub fn procedural(seed: u64, config: &'a Config) -> Self {
         let (image, classes) = match config.world.kind {
-            WorldKind::Reef => {
-                let (reef, pitch) = (Reef::new(seed), config.camera.metres_per_pixel);
-                let [west, south, east, north] = Reef::SURVEY_M;
-                let pixels = |metres: f64| (metres / pitch).round() as u32;
-                let (columns, rows) = (pixels(east - west), pixels(north - south));
-                let image = reef.picture(west, south, columns, rows, pitch);
-                (image, reef.classes(west, south, columns, rows, pitch))
-            }
+            WorldKind::Reef => Reef::new(seed).survey(config.camera.metres_per_pixel),
             WorldKind::Patches => {
                 let (columns, rows, patch) = PATCHES_PX;
                 let world = scenecast_worlds::patches(seed, columns, rows, patch, 8);
