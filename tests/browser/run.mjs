@@ -6,6 +6,8 @@
 //   ... --runs N                          each story N times, to find unstable ones
 //   ... --workers N                       N stories at a time, each with a mock of its own
 //   ... --limits                          the stories that measure time assert its limits, which hold on a quiet machine only
+//   ... --brief                           without stories that repeat another in the other themes ("again"); against a running daemon,
+//                                         only those in which page, surface and vehicle take part ("ends")
 //   --only A,B   only stories whose name contains A or B      --require   a missing browser is a failure
 
 import { existsSync, readFileSync } from "node:fs";
@@ -23,7 +25,9 @@ const STORIES = ["entrance", "map", "rehearsal", "natural", "place", "labels", "
 async function stories() {
   const modules = await Promise.all(STORIES.map((s) => import(`./stories/${s}.mjs`)));
   const only = option("only")?.split(",");
-  return modules.flatMap((m) => m.default).filter((s) => !only || only.some((part) => s.name.includes(part)));
+  const stories = modules.flatMap((m) => m.default).filter((s) => !only || only.some((part) => s.name.includes(part)));
+  if (!process.argv.includes("--brief")) return stories;
+  return stories.filter((s) => (option("url") ? s.ends || s.locked : !s.again));
 }
 
 /** The environment that a story requires and this run lacks, or null. */
@@ -73,7 +77,7 @@ async function run(story, browser, scene) {
     if (stage.figures.length > 0) console.log(`      figures: ${stage.figures.join(", ")}`);
     return "ok";
   } catch (error) {
-    console.log(`FAIL  ${story.name}\n      ${String(error.stack ?? error).replaceAll("\n", "\n      ")}`);
+    console.log(`FAIL  ${story.name}\n      ${[error.stack ?? error, ...stage.errors].join("\n").replaceAll("\n", "\n      ")}`);
     return "failed";
   } finally {
     await stage.close();

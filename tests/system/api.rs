@@ -359,7 +359,7 @@ fn last_seen_reaches_the_surface_and_its_exports_if_requested() {
     let out = scratch("last-seen");
     let report = |sets: &[&str]| -> Value {
         let small = ["--set", "camera.width_px=320", "--set", "camera.height_px=240"];
-        let sim = [&["sim", "--duration", "200", "--seed", "3", "--out", out.to_str().unwrap()], &small[..]].concat();
+        let sim = [&["sim", "--duration", "120", "--seed", "3", "--out", out.to_str().unwrap()], &small[..]].concat();
         let ran = run(&[&sim[..], sets].concat());
         assert_eq!(ran.status.code(), Some(0), "{}", text(&ran));
         serde_json::from_slice(&std::fs::read(out.join("report.json")).unwrap()).unwrap()
@@ -399,7 +399,7 @@ fn last_seen_reaches_the_surface_and_its_exports_if_requested() {
 fn assert_exports_open(name: &str, origin: &[&str]) {
     let Some(python) = python("plyfile, rasterio, shapely") else { return };
     let (dir, port) = (scratch(name), free_port());
-    let _demo = demo(port, &[&["--duration", "200"], origin].concat());
+    let _demo = demo(port, &[&["--duration", "90"], origin].concat());
     let mut last = Value::Null;
     wait_until("the last map", LIMIT, || {
         let state = state(port).unwrap_or_default();

@@ -16,9 +16,9 @@ static BROWSER: Mutex<()> = Mutex::new(());
 fn assert_stories_pass(arguments: &[&str]) {
     let _one = is_full().then(|| BROWSER.lock().unwrap_or_else(|e| e.into_inner()));
     let script = workspace().join("tests/browser/run.mjs");
-    let limits = is_full().then_some("--limits");
+    let which = if is_full() { "--limits" } else { "--brief" };
     let mut node = Command::new("node");
-    let output = node.arg(script).arg("--require").args(limits).args(arguments).output().expect("node runs");
+    let output = node.arg(script).args(["--require", which]).args(arguments).output().expect("node runs");
     let log = String::from_utf8_lossy(&output.stdout).into_owned() + &String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success(), "{log}");
     let counts = log.lines().last().unwrap_or_default();

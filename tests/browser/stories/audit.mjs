@@ -9,7 +9,7 @@ const TABS = ["Labels", "Vehicle", "Constraints", "Link", "Model", "Log"];
 
 const tabs = THEMES.map((theme) => ({
   name: `axe finds no fault in any tab: ${theme}, ${MIDDLE.width} px`,
-  theme,
+  theme, again: theme !== "light",
   size: MIDDLE,
   scenario: "rich",
   async run(s) {
@@ -28,7 +28,7 @@ const OPENERS = ["#command", "#bar-hold", "#bar-abort", "#keys-open", "#tools >>
 
 const dialogs = THEMES.flatMap((theme) => [WIDE, PHONE].map((size) => ({
   name: `axe finds no fault in any dialog: ${theme}, ${size.width} px`,
-  theme,
+  theme, again: theme !== "light",
   size,
   scenario: "rich",
   async run(s) {
@@ -51,7 +51,7 @@ const dialogs = THEMES.flatMap((theme) => [WIDE, PHONE].map((size) => ({
 
 const rows = THEMES.flatMap((theme) => [[MIDDLE, 1], [PHONE, 2]].map(([size, most]) => ({
   name: `the bar has at most ${most} ${most === 1 ? "row" : "rows"} and no text in two lines: ${theme}, ${size.width} px`,
-  theme,
+  theme, again: theme !== "light",
   size,
   scenario: "rich",
   async run(s) {

@@ -44,6 +44,7 @@ const share = (s, from, to, tone) => s.inPage(({ view, ink }, [a, b, name]) => {
 export default [
   {
     name: "a fence drawn on the map is sent and its status shown",
+    ends: true,
     async run(s) {
       await s.shows("#vehicle .age", /Status/, { ms: 60000, advance: 5 });
       await clear(s);
@@ -60,6 +61,7 @@ export default [
   },
   {
     name: "a weighted area is drawn, weighed, sent and shown as in force; its corners and those of the fence are edited apart",
+    ends: true,
     async run(s) {
       await s.shows("#vehicle .age", /Status/, { ms: 60000, advance: 5 });
       await clear(s);
@@ -254,6 +256,7 @@ export default [
   },
   {
     name: "limits are checked while typed, and sent as a whole",
+    ends: true,
     async run(s) {
       await s.shows("#vehicle .age", /Status/, { ms: 60000, advance: 5 });
       await open(s);

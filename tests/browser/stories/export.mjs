@@ -33,6 +33,7 @@ export default [
   },
   {
     name: "CSV, GeoJSON and PLY have the cells of the map",
+    ends: true,
     unmocked: true,
     async run(s) {
       await s.button("Export").click();
@@ -59,6 +60,7 @@ export default [
   },
   {
     name: "the PNG comes with a world file that puts it in place",
+    ends: true,
     unmocked: true,
     async run(s) {
       await s.button("Export").click();

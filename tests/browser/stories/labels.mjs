@@ -96,6 +96,7 @@ export default [
   },
   {
     name: "weights are sent as a whole and the shown status is the server's",
+    ends: true,
     async run(s) {
       const labels = await firstLabels(s);
       const before = (await s.vehicle()).directive.slots.find((x) => x.slot === "utility")?.version ?? 0;
@@ -191,6 +192,7 @@ export default [
   },
   {
     name: "an image of a label is requested, received and shown",
+    ends: true,
     async run(s) {
       const image = await firstImage(s);
       await s.until("it to be drawn", () => image.locator("img").evaluate((img) => img.naturalWidth > 0));
@@ -313,6 +315,7 @@ export default [
   },
   {
     name: "weights of unexplored and surprising cells are sent too",
+    ends: true,
     async run(s) {
       await firstLabels(s);
       await s.page.locator("#exploration").fill("0.45");
@@ -354,6 +357,7 @@ export default [
   },
   {
     name: "the end of the survey is chosen and set without another choice of the planner",
+    ends: true,
     async run(s) {
       await s.page.selectOption("#at-end", "hold");
       await s.page.locator("#send-planner").click();

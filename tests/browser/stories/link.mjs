@@ -40,6 +40,7 @@ export default [
   },
   {
     name: "a new budget is sent and its status shown",
+    ends: true,
     async run(s) {
       await s.page.locator("#budget").fill("6000");
       await s.page.locator(".budget").getByRole("button", { name: "Set" }).click();
@@ -107,6 +108,7 @@ export default [
   },
   {
     name: "the operator orders the background streams and removes one",
+    ends: true,
     async run(s) {
       const box = s.page.getByRole("group", { name: "Use of spare capacity" });
       await box.getByRole("button", { name: "Earlier: images of new labels" }).click();
@@ -149,6 +151,7 @@ export default [
   },
   {
     name: "the backlog shows its end, and the map its lag",
+    ends: true,
     async run(s) {
       const { link: { budget_bps } } = await s.get("/state");
       await s.post("/vehicles/1/constraints", { hold: false });

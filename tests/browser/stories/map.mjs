@@ -74,6 +74,7 @@ async function pinch(s, from, to) {
 export default [
   {
     name: "the map shows each label in its colour",
+    ends: true,
     async run(s) {
       if (await s.page.locator("[aria-pressed=true]", { hasText: "Grid" }).count()) await s.button("Grid").click();
       await s.until("the label's colour on the canvas", async () => {

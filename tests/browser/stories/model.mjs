@@ -10,6 +10,7 @@ const force = (s, key) => s.page.locator(".limit", { has: field(s, key) }).locat
 export default [
   {
     name: "settings are checked while typed, sent, and shown in force",
+    ends: true,
     async run(s) {
       await s.shows("#vehicle .age", /Status/, { ms: 60000, advance: 5 });
       await open(s);

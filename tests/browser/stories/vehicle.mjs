@@ -80,6 +80,7 @@ export default [
   },
   {
     name: "the vehicle's status is shown with its age",
+    ends: true,
     async run(s) {
       await s.shows("#vehicle .age", /Status .* old · received .* ago, due every/, { ms: 60000, advance: 5 });
       const [depth, shown] = await s.inPage(({ store }) => [-store.vehicle.status.z_m, document.querySelector("#vehicle .values").innerText]);
@@ -88,6 +89,7 @@ export default [
   },
   {
     name: "hold is confirmed first; cancelling sends nothing",
+    ends: true,
     async run(s) {
       const open = s.page.locator("#hold");
       await open.click();
