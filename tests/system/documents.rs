@@ -23,10 +23,7 @@ const RUN: &[(&str, &[(&str, &str)])] = &[
     ("scenecast key show mission.key", &[]),
     ("scenecast key token --out console.token", &[]),
     ("scenecast sim --duration 300 --record recording --out run2", &[("300", "6")]),
-    (
-        "scenecast scene run --source frames:recording --metres-per-pixel 0.004 --sweeps 60 --out run1",
-        &[("--sweeps 60", "--sweeps 1")],
-    ),
+    ("scenecast scene run --source frames:recording --metres-per-pixel 0.004 --out run1", &[]),
     ("scenecast scene sample --alpha 0.001 --gamma 0.3 --size 64x64 --grid 3x3 --seed 1 --out worlds.png", &[]),
     ("scenecast vocabulary train --images dive7 --out reef.vocabulary", &[("dive7", "recording")]),
     (

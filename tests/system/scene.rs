@@ -200,7 +200,9 @@ fn a_mosaic_is_scored_and_unfit_annotations_are_refused() {
     refused(&["--mosaic", &mosaic, "--annotations", &mosaic], &none, &["reef.png", "grey or indexed"]);
     refused(&["--mosaic", &dot], &none, &["dot.png", "1 x 1"]);
     refused(&["--mosaic", &write(&dir, "text.png", "hello")], &none, &["text.png", "not an image"]);
-    refused(&["--mosaic", &mosaic, "--refine-rate", "10"], &none, &["--refine-rate", "--sweeps"]);
+    refused(&["--mosaic", &mosaic, "--refine-rate", "10"], &none, &["--refine-rate", "--labels topics"]);
+    let online = ["--mosaic", &mosaic, "--labels", "topics", "--refine-rate", "10"];
+    refused(&online, &none, &["--refine-rate", "--sweeps"]);
     refused(&["--mosaic", &mosaic, "--cell-size", "0.001"], &none, &["--cell-size", "pixels"]);
     let ignored = ["--mosaic", &mosaic, "--annotations", &classes, "--ignore", "0,1,2,3,4,5"];
     refused(&ignored, &none, &["classes.png", "nothing is annotated"]);
@@ -272,22 +274,27 @@ fn frames_with_poses_are_labelled_and_bad_ones_are_counted() {
     write(&dir, "poses.csv", &poses);
     let out = dir.join("out");
     let argument = format!("frames:{}", dir.display());
-    let output = run(&["scene", "run", "--source", &argument, "--refine-rate", "20000", "--out", &path(&out)]);
-    let said = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert!(output.status.success(), "{said}");
-    assert!(said.contains("1 of 6 frames skipped") && said.contains("missing.png"), "{said}");
-    assert!(labels(&out).iter().all(|([x, y, _], _)| (-0.9..2.6).contains(x) && (-0.8..0.8).contains(y)));
+    for kind in [&["--labels", "topics", "--refine-rate", "20000"][..], &[]] {
+        let output = run(&[&["scene", "run", "--source", &argument, "--out", &path(&out)], kind].concat());
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(output.status.success(), "{said}");
+        assert!(said.contains("1 of 6 frames skipped") && said.contains("missing.png"), "{said}");
+        let labels = labels(&out);
+        assert!(labels.iter().all(|([x, y, _], _)| (-0.9..2.6).contains(x) && (-0.8..0.8).contains(y)));
+        assert!(labels.len() > 20, "{labels:?}");
+    }
     write(&dir, "poses.csv", "t_s,file,x_m,y_m,depth_m,heading_deg\n0,0.png,0,inf,0,0\n");
     refused(&["--source", &argument], &dir.join("none"), &["poses.csv:2"]);
     write(&dir, "poses.csv", "t_s,file,x_m,y_m,depth_m,heading_deg\n0,gone.png,0,0,0,0\n");
-    refused(&["--source", &argument], &dir.join("none"), &["there are no words", "gone.png"]);
+    refused(&["--source", &argument], &dir.join("none"), &["there are no cells", "gone.png"]);
 }
 
 #[test]
 fn the_shared_sequence_is_read_with_its_poses_in_a_mosaic() {
     let Some(data) = shared_data() else { return };
     let source = format!("frames:{}", data.join("skerki_sequence").display());
-    let figures = scene_run(&["--source", &source, "--sweeps", "2"], &scratch("scene-skerki").join("out"));
+    let figures =
+        scene_run(&["--source", &source, "--labels", "topics", "--sweeps", "2"], &scratch("scene-skerki").join("out"));
     assert!(figures["cells"].as_u64().unwrap() > 2000, "{figures}");
 }
 
@@ -328,12 +335,20 @@ fn a_vocabulary_is_trained_once_and_used() {
     let once = std::fs::read(&file).unwrap();
     assert!(run(&train).status.success());
     assert_eq!(std::fs::read(&file).unwrap(), once);
-    scene_run(&["--mosaic", &mosaic, "--vocabulary", &file], &dir.join("out"));
+    scene_run(&["--mosaic", &mosaic, "--labels", "topics", "--vocabulary", &file], &dir.join("out"));
     let none = dir.join("none");
     let damaged = write(&dir, "damaged.vocabulary", &once[..once.len() - 9]);
-    refused(&["--mosaic", &mosaic, "--vocabulary", &damaged], &none, &["damaged.vocabulary", "cut off or damaged"]);
+    refused(
+        &["--mosaic", &mosaic, "--labels", "topics", "--vocabulary", &damaged],
+        &none,
+        &["damaged.vocabulary", "cut off or damaged"],
+    );
     let text = write(&dir, "text.vocabulary", "hello");
-    refused(&["--mosaic", &mosaic, "--vocabulary", &text], &none, &["text.vocabulary", "of another kind"]);
+    refused(
+        &["--mosaic", &mosaic, "--labels", "topics", "--vocabulary", &text],
+        &none,
+        &["text.vocabulary", "of another kind"],
+    );
     let missing = ["sim", "--set", "scene.vocabulary=nowhere", "--duration", "9", "--out", &path(&none)];
     assert_refused(&missing, &["nowhere"]);
     write(&dir, "empty/readme.txt", "no image");

@@ -1,8 +1,7 @@
 //! Words of a recorded survey: images from above with their poses.
 
-use super::{Sighting, WordSource};
+use super::{Look, Sighting, WordSource};
 use scene_model::project::{DownCamera, Pose};
-use scene_model::words::WordExtractor;
 use scenecast_core::UserError;
 use scenecast_files::Recording;
 use std::path::Path;
@@ -10,7 +9,7 @@ use std::path::Path;
 /// The frames of a recording; unreadable ones are counted and skipped.
 pub(crate) struct Frames {
     recording: Recording,
-    extractor: WordExtractor,
+    look: Look,
     metres_per_pixel: f64,
     cell_m: f64,
     next: usize,
@@ -22,17 +21,17 @@ pub(crate) struct Frames {
 impl Frames {
     pub(crate) fn open(
         (dir, poses): (&Path, Option<&Path>),
-        extractor: WordExtractor,
+        look: Look,
         metres_per_pixel: f64,
         cell_m: f64,
     ) -> Result<Self, UserError> {
-        Ok(Self::of(Recording::open(dir, poses, metres_per_pixel)?, extractor, metres_per_pixel, cell_m))
+        Ok(Self::of(Recording::open(dir, poses, metres_per_pixel)?, look, metres_per_pixel, cell_m))
     }
 
     /// The frames of a recording that is open.
-    pub(crate) fn of(recording: Recording, extractor: WordExtractor, metres_per_pixel: f64, cell_m: f64) -> Self {
+    pub(crate) fn of(recording: Recording, look: Look, metres_per_pixel: f64, cell_m: f64) -> Self {
         let notes = recording.notes.clone();
-        Self { recording, extractor, metres_per_pixel, cell_m, next: 0, unreadable: Vec::new(), notes }
+        Self { recording, look, metres_per_pixel, cell_m, next: 0, unreadable: Vec::new(), notes }
     }
 }
 
@@ -57,9 +56,9 @@ impl WordSource for Frames {
                 self.unreadable.push(format!("{file}: {width} x {height} pixels are less than a cell of {cell_px:.1}"));
                 continue;
             }
-            let words = self.extractor.extract(&image, cell_px);
+            let (words, points) = self.look.at(&image, cell_px);
             let observations = camera.project(image.width(), image.height(), &pose, &words);
-            return Ok(Some(Sighting { t_s: frame.t_s, observations, done }));
+            return Ok(Some(Sighting { t_s: frame.t_s, observations, image: (image.dimensions(), points), done }));
         }
         Ok(None)
     }

@@ -2,6 +2,7 @@
 
 use super::process::cpu_seconds;
 use super::{Sighting, WordSource};
+use scene_model::habitats::Habitats;
 use scene_model::topics::{Inserted, SceneModel};
 use scenecast_core::UserError;
 use std::time::Instant;
@@ -57,7 +58,7 @@ pub(crate) fn learn(
         }
     };
     let reading = if matches!(schedule, Schedule::Online(_)) { 1.0 } else { 0.3 };
-    while let Some(Sighting { t_s, observations, done }) = source.next()? {
+    while let Some(Sighting { t_s, observations, done, .. }) = source.next()? {
         if let (Schedule::Online(rate), Some(last)) = (schedule, last) {
             let gap = f64::clamp(t_s - last, 0.0, MAX_GAP_S);
             gaps = (gaps.0 + gap, gaps.1 + 1);
@@ -82,5 +83,25 @@ pub(crate) fn learn(
             }
         }
     }
+    Ok(effort)
+}
+
+/// Learns habitats from all images of a source, as if seen at once: their order does not matter.
+pub(crate) fn learn_habitats(
+    habitats: &mut Habitats,
+    source: &mut dyn WordSource,
+    cell_m: f64,
+    progress: &mut dyn FnMut(f64),
+) -> Result<LearningEffort, UserError> {
+    let mut effort = LearningEffort::default();
+    while let Some(Sighting { observations, image: (size, points), done, .. }) = source.next()? {
+        habitats.add(size, &points, &observations, cell_m);
+        effort.skipped.accepted += points.len() as u64;
+        progress(0.8 * done);
+    }
+    effort.measure(|| {
+        habitats.learn_whole();
+        0
+    });
     Ok(effort)
 }

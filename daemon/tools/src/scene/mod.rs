@@ -14,7 +14,7 @@ mod words_file;
 
 pub(crate) use annotations::Annotated;
 pub(crate) use frames::Frames;
-pub(crate) use learn::{Schedule, learn};
+pub(crate) use learn::{LearningEffort, Schedule, learn, learn_habitats};
 pub(crate) use mosaic::Mosaic;
 pub(crate) use quality::{Quality, quality};
 pub(crate) use run_report::{RunReport, write};
@@ -22,13 +22,59 @@ pub(crate) use scenecast_files::read_vocabulary;
 pub(crate) use tum::{Intrinsics, Tum};
 pub(crate) use words_file::WordsFile;
 
+use image::RgbImage;
+use scene_model::habitats::{Habitats, MeasuredPoint, measure};
 use scene_model::project::Observation;
+use scene_model::topics::{FlatCell, SceneModel};
+use scene_model::words::{Word, WordExtractor};
 use scenecast_core::UserError;
+
+/// What is taken from an image: words, from which topics are learnt, or the measured points of habitats.
+pub(crate) enum Look {
+    Words(Box<WordExtractor>),
+    Points,
+}
+
+impl Look {
+    /// The words of an image, or its points and their places as words.
+    pub(crate) fn at(&mut self, image: &RgbImage, cell_px: f32) -> (Vec<Word>, Vec<MeasuredPoint>) {
+        match self {
+            Self::Words(extractor) => (extractor.extract(image, cell_px), Vec::new()),
+            Self::Points => {
+                let points = measure(image, cell_px);
+                (Habitats::as_words(&points), points)
+            }
+        }
+    }
+}
+
+/// The labels of a survey.
+pub(crate) struct LabelledMap {
+    /// Seen from above, sorted by (y, x).
+    pub(crate) flat: Vec<FlatCell>,
+    /// All cells; with habitats those of `flat`.
+    pub(crate) volume: Vec<FlatCell>,
+    /// Edges of a cell, metres.
+    pub(crate) cell_m: [f64; 3],
+}
+
+impl LabelledMap {
+    pub(crate) fn of_topics(model: &SceneModel) -> Self {
+        Self { flat: model.label_map(), volume: model.label_volume(), cell_m: model.config().cell_m }
+    }
+
+    pub(crate) fn of_habitats(habitats: &Habitats, cell_m: [f64; 3]) -> Self {
+        let flat = habitats.map();
+        Self { volume: flat.clone(), flat, cell_m }
+    }
+}
 
 /// The observations of one moment.
 pub(crate) struct Sighting {
     pub(crate) t_s: f64,
     pub(crate) observations: Vec<Observation>,
+    /// Where habitats are learnt: the size of the image, pixels, and its points, to which the words of the observations refer.
+    pub(crate) image: ((u32, u32), Vec<MeasuredPoint>),
     /// Share of the source that was read by now, 0..=1.
     pub(crate) done: f64,
 }

@@ -1,8 +1,8 @@
 //! Words of a mosaic: one image of the ground from above.
 
-use super::{Sighting, WordSource};
+use super::{Look, Sighting, WordSource};
+use scene_model::habitats::MeasuredPoint;
 use scene_model::project::Observation;
-use scene_model::words::WordExtractor;
 use scenecast_core::UserError;
 use scenecast_files::read_image;
 use std::path::Path;
@@ -12,20 +12,15 @@ const MIN_CELL_PX: f64 = 4.0;
 
 /// A mosaic, its top left corner at the origin: x grows to the right, y upwards, so y is below 0.
 pub(crate) struct Mosaic {
-    observations: Option<Vec<Observation>>,
+    seen: Option<(Vec<Observation>, Vec<MeasuredPoint>)>,
     pub(crate) size: (u32, u32),
     /// Edge of a cell, pixels.
     pub(crate) cell_px: f32,
 }
 
 impl Mosaic {
-    /// Extracts the words of a mosaic whose pixels are `metres_per_pixel` wide.
-    pub(crate) fn open(
-        path: &Path,
-        extractor: &mut WordExtractor,
-        metres_per_pixel: f64,
-        cell_m: f64,
-    ) -> Result<Self, UserError> {
+    /// Looks at a mosaic whose pixels are `metres_per_pixel` wide.
+    pub(crate) fn open(path: &Path, look: &mut Look, metres_per_pixel: f64, cell_m: f64) -> Result<Self, UserError> {
         let cell_px = cell_m / metres_per_pixel;
         let image = read_image(path)?.to_rgb8();
         let (width, height) = image.dimensions();
@@ -46,14 +41,15 @@ impl Mosaic {
             y: -f64::from(word.v).max(1e-3) * metres_per_pixel,
             z: 0.0,
         };
-        let words = extractor.extract(&image, cell_px as f32);
-        let observations = Some(words.iter().map(place).collect());
-        Ok(Self { observations, size: (width, height), cell_px: cell_px as f32 })
+        let (words, points) = look.at(&image, cell_px as f32);
+        let seen = Some((words.iter().map(place).collect(), points));
+        Ok(Self { seen, size: (width, height), cell_px: cell_px as f32 })
     }
 }
 
 impl WordSource for Mosaic {
     fn next(&mut self) -> Result<Option<Sighting>, UserError> {
-        Ok(self.observations.take().map(|observations| Sighting { t_s: 0.0, observations, done: 1.0 }))
+        let (size, seen) = (self.size, self.seen.take());
+        Ok(seen.map(|(observations, points)| Sighting { t_s: 0.0, observations, image: (size, points), done: 1.0 }))
     }
 }

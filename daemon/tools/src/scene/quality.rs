@@ -1,9 +1,9 @@
 //! Agreement of a model's labels with annotations.
 
-use super::Annotated;
 use super::bounds::around;
+use super::{Annotated, LabelledMap};
 use image::{GrayImage, Luma};
-use scene_model::topics::{FlatCell, SceneModel, coord_of};
+use scene_model::topics::{FlatCell, coord_of};
 use scenecast_core::UserError;
 use scenecast_protocol::map::Rect;
 use scenecast_scoring::{Annotations, LabelGrid, SceneScore, score};
@@ -17,24 +17,23 @@ const MAX_COUNTS: u64 = 1 << 27;
 /// Class value of cells without annotation.
 const NONE: u8 = 255;
 
-/// Scores a model cell by cell. The class of a cell is that of most of its pixels or places; of
+/// Scores a map cell by cell. The class of a cell is that of most of its pixels or places; of
 /// equally frequent ones the lowest.
 ///
 /// `cell_px` is the edge of a cell in pixels of the mosaic, where the annotations are an image.
-pub(crate) fn quality(model: &SceneModel, annotated: &Annotated, cell_px: f32) -> Result<Quality, UserError> {
+pub(crate) fn quality(map: &LabelledMap, annotated: &Annotated, cell_px: f32) -> Result<Quality, UserError> {
     let refused = |e: scenecast_scoring::AnnotationError| UserError::Input(e.to_string());
     match annotated {
         Annotated::Pixels { classes, ignore } => {
             let annotations = Annotations::new(classes, classes.dimensions(), cell_px, ignore).map_err(refused)?;
             let (columns, rows) = annotations.size();
-            Ok(score(&LabelGrid::from_map(&model.label_map(), 0, -1, columns, rows), &annotations))
+            Ok(score(&LabelGrid::from_map(&map.flat, 0, -1, columns, rows), &annotations))
         }
         Annotated::Places(places) => {
-            let volume = model.label_volume();
-            let sheet = LayerSheet::new(&volume, places)?;
-            let classes = sheet.classes(places, model.config().cell_m);
+            let sheet = LayerSheet::new(&map.volume, places)?;
+            let classes = sheet.classes(places, map.cell_m);
             let annotations = Annotations::new(&classes, classes.dimensions(), 1.0, &[NONE]).map_err(refused)?;
-            Ok(score(&sheet.labels(&volume), &annotations))
+            Ok(score(&sheet.labels(&map.volume), &annotations))
         }
     }
 }
@@ -102,7 +101,7 @@ impl LayerSheet {
 mod tests {
     use super::*;
     use scene_model::project::Observation;
-    use scene_model::topics::SceneConfig;
+    use scene_model::topics::{SceneConfig, SceneModel};
 
     #[test]
     fn labels_equal_to_the_classes_have_full_information() {
@@ -118,7 +117,8 @@ mod tests {
         places.push(([500.0, 0.0, 0.0], 9));
         model.insert(0.0, &seen);
         model.sweep(30);
-        let found = quality(&model, &Annotated::Places(places), 1.0).unwrap().mutual_information;
+        let found =
+            quality(&LabelledMap::of_topics(&model), &Annotated::Places(places), 1.0).unwrap().mutual_information;
         assert_eq!(found.n, 400);
         assert!((found.nats - 2f64.ln()).abs() < 0.01, "{found:?}");
     }

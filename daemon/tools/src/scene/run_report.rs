@@ -1,9 +1,9 @@
 //! The report of a run of the scene model, and its labels in files.
 
-use super::Quality;
 use super::bounds::around;
 use super::learn::LearningEffort;
 use super::process::peak_rss_bytes;
+use super::{LabelledMap, Quality};
 use scene_model::topics::{FlatCell, SceneModel, TopicId, centre_of};
 use scenecast_core::UserError;
 use scenecast_core::label_picture::encode_within;
@@ -16,15 +16,15 @@ use std::path::Path;
 /// Measurements of a run, printed as one line of JSON.
 #[derive(Debug, Serialize)]
 pub(crate) struct RunReport {
-    words: u64,
+    words: Option<u64>,
     cells: usize,
-    resampled: u64,
+    resampled: Option<u64>,
     seconds: f64,
     cpu_seconds: f64,
-    words_per_cpu_second: f64,
+    words_per_cpu_second: Option<f64>,
     labels: usize,
     labels_used: usize,
-    perplexity: f64,
+    perplexity: Option<f64>,
     mutual_information_nats: Option<f64>,
     normalised_mutual_information: Option<f64>,
     homogeneity: Option<f64>,
@@ -32,21 +32,29 @@ pub(crate) struct RunReport {
     v_measure: Option<f64>,
     null_mutual_information_nats: Option<f64>,
     peak_rss_bytes: u64,
-    kernel: &'static str,
+    kernel: Option<&'static str>,
 }
 
 impl RunReport {
-    pub(crate) fn new(model: &SceneModel, effort: &LearningEffort, quality: Option<&Quality>) -> Self {
+    /// `topics` is the model of topics; habitats have none.
+    pub(crate) fn new(
+        map: &LabelledMap,
+        topics: Option<&SceneModel>,
+        effort: &LearningEffort,
+        quality: Option<&Quality>,
+    ) -> Self {
+        let used = numbers(&map.volume).len();
+        let speed = effort.resampled as f64 / effort.cpu_seconds.max(1e-6);
         Self {
-            words: model.words(),
-            cells: model.cells(),
-            resampled: effort.resampled,
+            words: topics.map(SceneModel::words),
+            cells: topics.map_or(map.flat.len(), SceneModel::cells),
+            resampled: topics.map(|_| effort.resampled),
             seconds: effort.seconds,
             cpu_seconds: effort.cpu_seconds,
-            words_per_cpu_second: effort.resampled as f64 / effort.cpu_seconds.max(1e-6),
-            labels: model.labels(),
-            labels_used: numbers(&model.label_volume()).len(),
-            perplexity: model.perplexity(),
+            words_per_cpu_second: topics.map(|_| speed),
+            labels: topics.map_or(used, SceneModel::labels),
+            labels_used: used,
+            perplexity: topics.map(SceneModel::perplexity),
             mutual_information_nats: quality.map(|q| q.mutual_information.nats),
             normalised_mutual_information: quality.map(|q| q.mutual_information.normalised),
             homogeneity: quality.map(|q| q.mutual_information.homogeneity()),
@@ -54,7 +62,7 @@ impl RunReport {
             v_measure: quality.map(|q| q.mutual_information.v_measure()),
             null_mutual_information_nats: quality.map(|q| q.null_nats),
             peak_rss_bytes: peak_rss_bytes(),
-            kernel: model.kernel().name(),
+            kernel: topics.map(|model| model.kernel().name()),
         }
     }
 }
@@ -69,20 +77,20 @@ fn numbers(volume: &[FlatCell]) -> Vec<TopicId> {
 
 /// Writes `labels.png`, the flattened map, and `labels.csv`, every cell in three dimensions sorted by y and x. Of
 /// stacked cells, the one in the flattened map comes last.
-pub(crate) fn write(model: &SceneModel, dir: &Path) -> Result<(), UserError> {
-    let (map, mut volume) = (model.label_map(), model.label_volume());
+pub(crate) fn write(labelled: &LabelledMap, dir: &Path) -> Result<(), UserError> {
+    let (map, mut volume) = (&labelled.flat, labelled.volume.clone());
     // Rows painted in this order give the flattened map.
     let shows =
         |cell: &FlatCell| map.binary_search_by_key(&(cell.y, cell.x), |c| (c.y, c.x)).is_ok_and(|i| map[i].z == cell.z);
     volume.sort_by_cached_key(|cell| (cell.y, cell.x, shows(cell)));
     let topics = numbers(&volume);
     let label = |topic| topics.binary_search(&topic).map_or(0, |index| (index + 1).min(254)) as u8;
-    let bounds = around(&map)?;
+    let bounds = around(map)?;
     let grid: LabelGrid = map.iter().map(|cell| (Cell::new(cell.x, cell.y), label(cell.topic))).collect();
     let png = encode_within(&grid, bounds).map_err(|e| UserError::Failed(e.to_string()))?;
     let mut table = "x,y,z,label,confidence,perplexity\n".to_owned();
     for cell in &volume {
-        let [x, y, z] = centre_of([cell.x, cell.y, cell.z], model.config().cell_m);
+        let [x, y, z] = centre_of([cell.x, cell.y, cell.z], labelled.cell_m);
         let (label, FlatCell { confidence, perplexity, .. }) = (label(cell.topic), cell);
         let _ = writeln!(table, "{x:.6},{y:.6},{z:.6},{label},{confidence:.4},{perplexity:.4}");
     }

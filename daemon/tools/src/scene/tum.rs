@@ -91,7 +91,12 @@ impl WordSource for Tum {
             match self.see(&frame) {
                 Ok(observations) => {
                     let done = 1.0 - self.frames.len() as f64 / self.all.max(1) as f64;
-                    return Ok(Some(Sighting { t_s: frame.t_s - self.first_s, observations, done }));
+                    return Ok(Some(Sighting {
+                        t_s: frame.t_s - self.first_s,
+                        observations,
+                        image: Default::default(),
+                        done,
+                    }));
                 }
                 Err(error) => self.unreadable.push(error),
             }

@@ -128,7 +128,7 @@ impl WordSource for WordsFile {
             }
             observations.extend(more);
         }
-        Ok(Some(Sighting { t_s, observations, done: self.done() }))
+        Ok(Some(Sighting { t_s, observations, image: Default::default(), done: self.done() }))
     }
 }
 

@@ -11,8 +11,9 @@ use std::collections::BTreeMap;
 /// Columns and rows of a frame, and the pixels between two frames and between two lines.
 const FRAME: (u32, u32) = (640, 480);
 const STEP: (u32, u32) = (100, 380);
-/// Time between two frames, seconds.
+/// Time between two frames, and for the turn between two lines, seconds.
 const INTERVAL_S: f64 = 2.0;
+const TURN_S: f64 = 60.0;
 /// Frames in five minutes.
 const FIVE_MINUTES: usize = 150;
 const MOST_LABELS: u32 = 16;
@@ -45,7 +46,7 @@ impl Flight {
         let mut first_seen_s = BTreeMap::new();
         let (mut maps, mut relabelled) = (Vec::<BTreeMap<(i32, i32), u32>>::new(), Vec::new());
         let size = (FRAME.0.min(image.width()), FRAME.1.min(image.height()));
-        let corners = corners(image.dimensions(), size, path);
+        let (corners, in_line) = corners(image.dimensions(), size, path);
         let meter = CpuMeter::start();
         for (index, &(left, top)) in corners.iter().enumerate() {
             let frame = image::imageops::crop_imm(image, left, top, size.0, size.1).to_image();
@@ -57,8 +58,9 @@ impl Flight {
             habitats.update();
             let map: BTreeMap<(i32, i32), u32> =
                 habitats.map().iter().map(|cell| ((cell.x, cell.y), cell.topic.0)).collect();
+            let time_s = index as f64 * INTERVAL_S + (index / in_line) as f64 * TURN_S;
             for &place in map.keys() {
-                first_seen_s.entry(place).or_insert(index as f64 * INTERVAL_S);
+                first_seen_s.entry(place).or_insert(time_s);
             }
             if let Some(before) = maps.len().checked_sub(FIVE_MINUTES).and_then(|at| maps.get(at)) {
                 let changed = before.iter().filter(|(place, label)| map.get(place) != Some(label)).count();
@@ -109,8 +111,8 @@ impl Flight {
     }
 }
 
-/// North-west corners of the frames.
-fn corners((width, height): (u32, u32), size: (u32, u32), path: Path) -> Vec<(u32, u32)> {
+/// North-west corners of the frames, and the number of frames of a line.
+fn corners((width, height): (u32, u32), size: (u32, u32), path: Path) -> (Vec<(u32, u32)>, usize) {
     let places = |length: u32, frame: u32, step: u32| -> Vec<u32> {
         let free = length - frame;
         (0..free.div_ceil(step).max(1)).map(|i| i * step).chain((free > 0).then_some(free)).collect()
@@ -131,5 +133,5 @@ fn corners((width, height): (u32, u32), size: (u32, u32), path: Path) -> Vec<(u3
     if path == Path::Back {
         corners.reverse();
     }
-    corners
+    (corners, fast.len())
 }

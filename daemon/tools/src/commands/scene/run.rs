@@ -3,10 +3,11 @@
 use crate::print_figures;
 use crate::progress::Progress;
 use crate::scene::{
-    Annotated, CELL_PX, FLAT_M, Frames, Intrinsics, Mosaic, RunReport, Schedule, Tum, WordSource, WordsFile, learn,
-    quality, read_vocabulary, write,
+    Annotated, CELL_PX, FLAT_M, Frames, Intrinsics, LabelledMap, LearningEffort, Look, Mosaic, RunReport, Schedule,
+    Tum, WordSource, WordsFile, learn, learn_habitats, quality, read_vocabulary, write,
 };
-use clap::Args;
+use clap::{Args, ValueEnum};
+use scene_model::habitats::Habitats;
 use scene_model::topics::{Birth, SceneConfig, SceneModel};
 use scene_model::words::{WordConfig, WordExtractor};
 use scenecast_core::UserError;
@@ -34,15 +35,16 @@ fn level_camera() -> BagTiming {
 ///
 /// Writes labels.png (indexed; pixel = label, 0 = unexplored; x to the right, y up; for stacked cells the label with
 /// most words in the column) and labels.csv (for each cell: its centre in metres, label, confidence and perplexity; of
-/// stacked cells, the one in the image comes last). Labels are numbered from 1 by age. The same seed gives the same
-/// labels with any number of threads.
+/// stacked cells, the one in the image comes last). Labels are numbered from 1 by age. Habitats depend on the images
+/// alone; the same seed gives the same topics with any number of threads.
 ///
-/// "seconds" and "cpu_seconds" are wall and CPU time of resampling, "words_per_cpu_second" is resampled /
-/// cpu_seconds. "labels" counts the labels in use, "labels_used" those in labels.csv. The mutual information of
+/// "seconds" and "cpu_seconds" are wall and CPU time of resampling, or of clustering, "words_per_cpu_second" is
+/// resampled / cpu_seconds. What only topics have is null for habitats. "labels" counts the labels in use, "labels_used" those in labels.csv. The mutual information of
 /// labels and annotated classes is taken cell by cell, and its null value is that of the displaced labels.
 /// Without annotations both are null.
 #[derive(Debug, Args)]
 #[command(after_help = "Example: scenecast scene run --mosaic reef.jpg --annotations classes.png --out run1
+Example: scenecast scene run --source frames:dive7 --labels topics --sweeps 60 --out run4
 Example: scenecast scene run --words words.csv --cell-size 0.5 --refine-rate 100000 --out run2
 Example: scenecast scene run --source tum:rgbd_dataset_freiburg1_desk --cell-size 0.1 --out run3")]
 pub struct Run {
@@ -58,12 +60,15 @@ pub struct Run {
     /// Edge of a cell in metres, or three edges: x,y,z [default: 1 for words, 0.25 for tum, and otherwise 25 pixels]
     #[arg(long, value_name = "M", value_parser = edges, allow_negative_numbers = true)]
     cell_size: Option<Edges>,
+    /// The labels [default: habitats for a mosaic, frames and bags, otherwise topics]
+    #[arg(long, value_name = "KIND")]
+    labels: Option<Labels>,
     #[command(flatten)]
     parameters: Parameters,
-    /// Number of times that each word is resampled after all input has been read
-    #[arg(long, value_name = "N", default_value_t = 30, conflicts_with = "refine_rate")]
-    sweeps: u32,
-    /// Number of words that are resampled per second of the input's time, while the input is read in order of time
+    /// Topics: number of times that each word is resampled after all input has been read [default: 30]
+    #[arg(long, value_name = "N", conflicts_with = "refine_rate")]
+    sweeps: Option<u32>,
+    /// Topics: number of words that are resampled per second of the input's time, while the input is read in order of time
     #[arg(long, value_name = "WORDS_PER_S", allow_negative_numbers = true)]
     refine_rate: Option<f64>,
     /// Number of threads that sample in parallel
@@ -77,6 +82,14 @@ pub struct Run {
     json: bool,
 }
 
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Labels {
+    /// The topics of visual words, as in the paper
+    Topics,
+    /// Cells that look alike over all their images, as on the vehicle
+    Habitats,
+}
+
 /// The input: words, a mosaic or a sequence of images.
 #[derive(Debug, Args)]
 struct Input {
@@ -88,7 +101,7 @@ struct Input {
     /// Size of a pixel on the ground, mosaic and frames [default: 0.01]
     #[arg(long, value_name = "M", allow_negative_numbers = true)]
     metres_per_pixel: Option<f64>,
-    /// Vocabulary of scenecast vocabulary train, for images
+    /// Topics: vocabulary of scenecast vocabulary train, for images
     #[arg(long, value_name = "FILE", conflicts_with = "words")]
     vocabulary: Option<PathBuf>,
     /// Number of different words in a words file [default: largest id + 1]
@@ -117,25 +130,25 @@ struct Which {
     source: Option<String>,
 }
 
-/// Parameters of the scene model.
+/// Parameters of the labels.
 #[derive(Debug, Args)]
 struct Parameters {
-    /// Prior count of each label in each cell
-    #[arg(long, default_value_t = 0.01, allow_negative_numbers = true)]
-    alpha: f64,
-    /// Prior count of each word under each label
-    #[arg(long, default_value_t = 0.1, allow_negative_numbers = true)]
-    beta: f64,
-    /// Weight of a new label
-    #[arg(long, default_value_t = 1e-4, allow_negative_numbers = true)]
-    gamma: f64,
-    /// Interpretation of gamma: literal (gamma), collapsed (gamma / V) or rost (alpha gamma / V)
-    #[arg(long, default_value = "literal", value_parser = ["literal", "collapsed", "rost"])]
-    birth: String,
+    /// Topics: prior count of each label in each cell [default: 0.01]
+    #[arg(long, allow_negative_numbers = true)]
+    alpha: Option<f64>,
+    /// Topics: prior count of each word under each label [default: 0.1]
+    #[arg(long, allow_negative_numbers = true)]
+    beta: Option<f64>,
+    /// Topics: weight of a new label [default: 0.0001]
+    #[arg(long, allow_negative_numbers = true)]
+    gamma: Option<f64>,
+    /// Topics: interpretation of gamma: literal (gamma), collapsed (gamma / V) or rost (alpha gamma / V) [default: literal]
+    #[arg(long, value_parser = ["literal", "collapsed", "rost"])]
+    birth: Option<String>,
     /// Maximum number of labels at a time
     #[arg(long, value_name = "K", default_value_t = 16, value_parser = clap::value_parser!(u32).range(1..=254))]
     max_labels: u32,
-    /// Seed of every random choice
+    /// Topics: seed of every random choice
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
 }
@@ -173,16 +186,22 @@ impl Run {
         if self.out.exists() && !self.out.is_dir() {
             return Err(UserError::file(&self.out, "--out takes a folder, and this is a file"));
         }
+        let kind = self.kind()?;
         let schedule = self.schedule()?;
-        let Opened { mut source, vocabulary, cell_m, cell_px, annotated } = self.open(schedule)?;
-        let mut model = self.model(vocabulary, cell_m)?;
-        let mut progress = Progress::new("labels");
-        let effort = learn(&mut model, source.as_mut(), schedule, &mut |share| progress.show(share))?;
-        drop(progress);
-        let skipped = source.skipped();
-        if model.words() == 0 {
+        let mut opened = self.open(kind, schedule)?;
+        let mut model = None;
+        let (map, effort) = match kind {
+            Labels::Topics => {
+                let model = model.insert(self.model(opened.vocabulary, opened.cell_m)?);
+                topics(model, opened.source.as_mut(), schedule)?
+            }
+            Labels::Habitats => self.habitats(&mut opened)?,
+        };
+        let skipped = opened.source.skipped();
+        if map.flat.is_empty() {
             let cause = skipped.unwrap_or_else(|| "the source gave none".to_owned());
-            return Err(UserError::Input(format!("there are no words to label: {cause}")));
+            let what = if kind == Labels::Topics { "words" } else { "cells with enough pixels" };
+            return Err(UserError::Input(format!("there are no {what} to label: {cause}")));
         }
         if let Some(skipped) = skipped {
             eprintln!("scenecast: {skipped}");
@@ -190,18 +209,62 @@ impl Run {
         if effort.skipped.skipped_full > 0 {
             eprintln!("scenecast: {} words of full cells skipped", effort.skipped.skipped_full);
         }
-        let mut quality = annotated.map(|annotated| quality(&model, &annotated, cell_px)).transpose()?;
+        let (annotated, cell_px) = (opened.annotated, opened.cell_px);
+        let mut quality = annotated.map(|annotated| quality(&map, &annotated, cell_px)).transpose()?;
         if quality.take_if(|quality| quality.mutual_information.n == 0).is_some() {
             eprintln!("scenecast: no cell of the map is annotated, so the labels are not scored");
         }
-        let report = RunReport::new(&model, &effort, quality.as_ref());
-        write(&model, &self.out)?;
+        let report = RunReport::new(&map, model.as_ref(), &effort, quality.as_ref());
+        write(&map, &self.out)?;
         print_figures(&report, self.json)
+    }
+
+    /// The labels that are wanted. Options that have no effect on them are refused.
+    fn kind(&self) -> Result<Labels, UserError> {
+        let Which { mosaic, source, .. } = &self.input.which;
+        let is_from_above = mosaic.is_some() || source.as_ref().is_some_and(|source| !source.starts_with("tum:"));
+        let usual = if is_from_above { Labels::Habitats } else { Labels::Topics };
+        let kind = self.labels.unwrap_or(usual);
+        let Parameters { alpha, beta, gamma, birth, .. } = &self.parameters;
+        let of_topics = [
+            ("--sweeps", self.sweeps.is_some()),
+            ("--refine-rate", self.refine_rate.is_some()),
+            ("--vocabulary", self.input.vocabulary.is_some()),
+            ("--alpha", alpha.is_some()),
+            ("--beta", beta.is_some()),
+            ("--gamma", gamma.is_some()),
+            ("--birth", birth.is_some()),
+        ];
+        match kind {
+            Labels::Habitats if !is_from_above => {
+                Err(UserError::Input("--labels habitats: they are learnt from a mosaic, frames: or bag:".to_owned()))
+            }
+            Labels::Habitats => match of_topics.iter().find(|(_, is_given)| *is_given) {
+                Some((name, _)) => {
+                    let cause = "it has no effect on habitats; add --labels topics";
+                    Err(UserError::Input(format!("{name}: {cause}")))
+                }
+                None => Ok(kind),
+            },
+            Labels::Topics => Ok(kind),
+        }
+    }
+
+    fn habitats(&self, opened: &mut Opened) -> Result<(LabelledMap, LearningEffort), UserError> {
+        let [x, y, _] = opened.cell_m;
+        if x != y {
+            return Err(UserError::Input("--cell-size: cells of habitats are square".to_owned()));
+        }
+        let mut habitats = Habitats::new(self.parameters.max_labels);
+        let mut progress = Progress::new("labels");
+        let source = opened.source.as_mut();
+        let effort = learn_habitats(&mut habitats, source, x, &mut |share| progress.show(share))?;
+        Ok((LabelledMap::of_habitats(&habitats, opened.cell_m), effort))
     }
 
     fn schedule(&self) -> Result<Schedule, UserError> {
         match self.refine_rate {
-            None => Ok(Schedule::Sweeps(self.sweeps)),
+            None => Ok(Schedule::Sweeps(self.sweeps.unwrap_or(30))),
             Some(_) if self.input.which.mosaic.is_some() => {
                 Err(UserError::Input("--refine-rate: a mosaic is seen at one time; use --sweeps".to_owned()))
             }
@@ -210,21 +273,21 @@ impl Run {
         }
     }
 
-    fn open(&self, schedule: Schedule) -> Result<Opened, UserError> {
+    fn open(&self, labels: Labels, schedule: Schedule) -> Result<Opened, UserError> {
         let Which { words, mosaic, source } = &self.input.which;
         if let Some(path) = words {
             return self.open_words(path, schedule);
         }
         if let Some(path) = mosaic {
-            return self.open_mosaic(path);
+            return self.open_mosaic(path, labels);
         }
         let (kind, dir) = source.as_deref().and_then(|text| text.split_once(':')).unwrap_or_default();
-        let extractor = self.extractor()?;
-        let vocabulary = extractor.vocabulary_size();
+        let (look, vocabulary) = self.look(labels)?;
         let dir = Path::new(dir);
         let annotated = self.places()?;
         let (source, cell_m): (Box<dyn WordSource>, _) = match kind {
             "tum" => {
+                let extractor = self.extractor()?;
                 let scale = self.input.depth_scale;
                 if !(1.0..=1e6).contains(&scale) {
                     return Err(UserError::Input(format!(
@@ -237,16 +300,13 @@ impl Run {
             "frames" => {
                 let metres_per_pixel = self.metres_per_pixel()?;
                 let cell_m = self.columns(CELL_PX * metres_per_pixel);
-                (
-                    Box::new(Frames::open((dir, self.input.poses.as_deref()), extractor, metres_per_pixel, cell_m[0])?),
-                    cell_m,
-                )
+                (Box::new(Frames::open((dir, self.input.poses.as_deref()), look, metres_per_pixel, cell_m[0])?), cell_m)
             }
             "bag" => {
                 let metres_per_pixel = self.metres_per_pixel()?;
                 let cell_m = self.columns(CELL_PX * metres_per_pixel);
                 let recording = open_bag(&dir.to_string_lossy(), None, &level_camera())?;
-                (Box::new(Frames::of(recording, extractor, metres_per_pixel, cell_m[0])), cell_m)
+                (Box::new(Frames::of(recording, look, metres_per_pixel, cell_m[0])), cell_m)
             }
             _ => return Err(UserError::Input("--source: it takes tum:DIR, frames:DIR or bag:FILE".to_owned())),
         };
@@ -261,22 +321,32 @@ impl Run {
         Ok(Opened { vocabulary: file.vocabulary, source: Box::new(file), cell_m, cell_px: 1.0, annotated })
     }
 
-    fn open_mosaic(&self, path: &Path) -> Result<Opened, UserError> {
+    fn open_mosaic(&self, path: &Path, labels: Labels) -> Result<Opened, UserError> {
         let metres_per_pixel = self.metres_per_pixel()?;
         let cell_m = self.columns(CELL_PX * metres_per_pixel);
         if cell_m[0] != cell_m[1] {
             return Err(UserError::Input("--cell-size: cells of a mosaic are square".to_owned()));
         }
-        let mut extractor = self.extractor()?;
-        let mosaic = Mosaic::open(path, &mut extractor, metres_per_pixel, cell_m[0])?;
+        let (mut look, vocabulary) = self.look(labels)?;
+        let mosaic = Mosaic::open(path, &mut look, metres_per_pixel, cell_m[0])?;
         let read = |labels: &PathBuf| Annotated::of_mosaic(labels, mosaic.size, &self.ignore);
         let annotated = self.annotations.as_ref().map(read).transpose()?;
-        let (vocabulary, cell_px) = (extractor.vocabulary_size(), mosaic.cell_px);
+        let cell_px = mosaic.cell_px;
         Ok(Opened { source: Box::new(mosaic), vocabulary, cell_m, cell_px, annotated })
     }
 
     fn places(&self) -> Result<Option<Annotated>, UserError> {
         self.annotations.as_ref().map(|path| Annotated::of_places(path, &self.ignore)).transpose()
+    }
+
+    /// What is taken from an image, with the number of different words.
+    fn look(&self, labels: Labels) -> Result<(Look, u32), UserError> {
+        if labels == Labels::Habitats {
+            return Ok((Look::Points, 0));
+        }
+        let extractor = self.extractor()?;
+        let vocabulary = extractor.vocabulary_size();
+        Ok((Look::Words(Box::new(extractor)), vocabulary))
     }
 
     fn extractor(&self) -> Result<WordExtractor, UserError> {
@@ -307,12 +377,13 @@ impl Run {
     }
 
     fn model(&self, vocabulary: u32, cell_m: [f64; 3]) -> Result<SceneModel, UserError> {
-        let birth = match self.parameters.birth.as_str() {
-            "collapsed" => Birth::Collapsed,
-            "rost" => Birth::Rost,
+        let birth = match self.parameters.birth.as_deref() {
+            Some("collapsed") => Birth::Collapsed,
+            Some("rost") => Birth::Rost,
             _ => Birth::Literal,
         };
         let Parameters { alpha, beta, gamma, max_labels, seed, .. } = self.parameters;
+        let (alpha, beta, gamma) = (alpha.unwrap_or(0.01), beta.unwrap_or(0.1), gamma.unwrap_or(1e-4));
         let max_words_per_cell = u32::from(u16::MAX);
         let usual = if self.input.which.words.is_some() { SceneConfig::default() } else { SceneConfig::for_images() };
         let config = SceneConfig {
@@ -334,6 +405,16 @@ impl Run {
         model.use_threads(usize::from(self.threads));
         Ok(model)
     }
+}
+
+fn topics(
+    model: &mut SceneModel,
+    source: &mut dyn WordSource,
+    schedule: Schedule,
+) -> Result<(LabelledMap, LearningEffort), UserError> {
+    let mut progress = Progress::new("labels");
+    let effort = learn(model, source, schedule, &mut |share| progress.show(share))?;
+    Ok((LabelledMap::of_topics(model), effort))
 }
 
 #[cfg(test)]
