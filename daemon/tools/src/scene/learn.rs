@@ -96,7 +96,6 @@ pub(crate) fn learn_habitats(
     let mut effort = LearningEffort::default();
     while let Some(Sighting { observations, image: (size, points), done, .. }) = source.next()? {
         habitats.add(size, &points, &observations, cell_m);
-        effort.skipped.accepted += points.len() as u64;
         progress(0.8 * done);
     }
     effort.measure(|| {

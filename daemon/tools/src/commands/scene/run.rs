@@ -39,9 +39,9 @@ fn level_camera() -> BagTiming {
 /// alone; the same seed gives the same topics with any number of threads.
 ///
 /// "seconds" and "cpu_seconds" are wall and CPU time of resampling, or of clustering, "words_per_cpu_second" is
-/// resampled / cpu_seconds. What only topics have is null for habitats. "labels" counts the labels in use, "labels_used" those in labels.csv. The mutual information of
-/// labels and annotated classes is taken cell by cell, and its null value is that of the displaced labels.
-/// Without annotations both are null.
+/// resampled / cpu_seconds. What only topics have is null for habitats. "labels" counts the labels in use,
+/// "labels_used" those in labels.csv. The mutual information of labels and annotated classes is taken cell by cell, and
+/// its null value is that of the displaced labels. Without annotations both are null.
 #[derive(Debug, Args)]
 #[command(after_help = "Example: scenecast scene run --mosaic reef.jpg --annotations classes.png --out run1
 Example: scenecast scene run --source frames:dive7 --labels topics --sweeps 60 --out run4
@@ -285,9 +285,8 @@ impl Run {
         let (look, vocabulary) = self.look(labels)?;
         let dir = Path::new(dir);
         let annotated = self.places()?;
-        let (source, cell_m): (Box<dyn WordSource>, _) = match kind {
-            "tum" => {
-                let extractor = self.extractor()?;
+        let (source, cell_m): (Box<dyn WordSource>, _) = match (kind, look) {
+            ("tum", Look::Words(extractor)) => {
                 let scale = self.input.depth_scale;
                 if !(1.0..=1e6).contains(&scale) {
                     return Err(UserError::Input(format!(
@@ -295,14 +294,14 @@ impl Run {
                     )));
                 }
                 let cell_m = self.cubes(0.25);
-                (Box::new(Tum::open(dir, extractor, self.input.intrinsics, scale, cell_m[0])?), cell_m)
+                (Box::new(Tum::open(dir, *extractor, self.input.intrinsics, scale, cell_m[0])?), cell_m)
             }
-            "frames" => {
+            ("frames", look) => {
                 let metres_per_pixel = self.metres_per_pixel()?;
                 let cell_m = self.columns(CELL_PX * metres_per_pixel);
                 (Box::new(Frames::open((dir, self.input.poses.as_deref()), look, metres_per_pixel, cell_m[0])?), cell_m)
             }
-            "bag" => {
+            ("bag", look) => {
                 let metres_per_pixel = self.metres_per_pixel()?;
                 let cell_m = self.columns(CELL_PX * metres_per_pixel);
                 let recording = open_bag(&dir.to_string_lossy(), None, &level_camera())?;
