@@ -335,20 +335,13 @@ fn a_vocabulary_is_trained_once_and_used() {
     let once = std::fs::read(&file).unwrap();
     assert!(run(&train).status.success());
     assert_eq!(std::fs::read(&file).unwrap(), once);
-    scene_run(&["--mosaic", &mosaic, "--labels", "topics", "--vocabulary", &file], &dir.join("out"));
+    let with = |file| ["--mosaic", &mosaic, "--labels", "topics", "--vocabulary", file];
+    scene_run(&with(&file), &dir.join("out"));
     let none = dir.join("none");
     let damaged = write(&dir, "damaged.vocabulary", &once[..once.len() - 9]);
-    refused(
-        &["--mosaic", &mosaic, "--labels", "topics", "--vocabulary", &damaged],
-        &none,
-        &["damaged.vocabulary", "cut off or damaged"],
-    );
+    refused(&with(&damaged), &none, &["damaged.vocabulary", "cut off or damaged"]);
     let text = write(&dir, "text.vocabulary", "hello");
-    refused(
-        &["--mosaic", &mosaic, "--labels", "topics", "--vocabulary", &text],
-        &none,
-        &["text.vocabulary", "of another kind"],
-    );
+    refused(&with(&text), &none, &["text.vocabulary", "of another kind"]);
     let missing = ["sim", "--set", "scene.vocabulary=nowhere", "--duration", "9", "--out", &path(&none)];
     assert_refused(&missing, &["nowhere"]);
     write(&dir, "empty/readme.txt", "no image");

@@ -56,9 +56,10 @@ impl WordSource for Frames {
                 self.unreadable.push(format!("{file}: {width} x {height} pixels are less than a cell of {cell_px:.1}"));
                 continue;
             }
-            let (words, points) = self.look.at(&image, cell_px);
-            let observations = camera.project(image.width(), image.height(), &pose, &words);
-            return Ok(Some(Sighting { t_s: frame.t_s, observations, image: (image.dimensions(), points), done }));
+            let content = self.look.at(&image, cell_px);
+            let observations = camera.project(image.width(), image.height(), &pose, &content.as_words());
+            let image = (image.dimensions(), content.into_points());
+            return Ok(Some(Sighting { t_s: frame.t_s, observations, image, done }));
         }
         Ok(None)
     }

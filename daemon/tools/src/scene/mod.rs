@@ -28,6 +28,7 @@ use scene_model::project::Observation;
 use scene_model::topics::{FlatCell, SceneModel};
 use scene_model::words::{Word, WordExtractor};
 use scenecast_core::UserError;
+use std::borrow::Cow;
 
 /// What is taken from an image: words, from which topics are learnt, or the measured points of habitats.
 pub(crate) enum Look {
@@ -36,14 +37,34 @@ pub(crate) enum Look {
 }
 
 impl Look {
-    /// The words of an image, or its points and their places as words.
-    pub(crate) fn at(&mut self, image: &RgbImage, cell_px: f32) -> (Vec<Word>, Vec<MeasuredPoint>) {
+    pub(crate) fn at(&mut self, image: &RgbImage, cell_px: f32) -> FrameContent {
         match self {
-            Self::Words(extractor) => (extractor.extract(image, cell_px), Vec::new()),
-            Self::Points => {
-                let points = measure(image, cell_px);
-                (Habitats::as_words(&points), points)
-            }
+            Self::Words(extractor) => FrameContent::Words(extractor.extract(image, cell_px)),
+            Self::Points => FrameContent::Points(measure(image, cell_px)),
+        }
+    }
+}
+
+/// What was taken from an image.
+pub(crate) enum FrameContent {
+    Words(Vec<Word>),
+    Points(Vec<MeasuredPoint>),
+}
+
+impl FrameContent {
+    /// The words, or the points as words that a camera can project.
+    pub(crate) fn as_words(&self) -> Cow<'_, [Word]> {
+        match self {
+            Self::Words(words) => words.into(),
+            Self::Points(points) => Habitats::as_words(points).into(),
+        }
+    }
+
+    /// The points; none of words.
+    pub(crate) fn into_points(self) -> Vec<MeasuredPoint> {
+        match self {
+            Self::Words(_) => Vec::new(),
+            Self::Points(points) => points,
         }
     }
 }

@@ -41,8 +41,8 @@ impl Mosaic {
             y: -f64::from(word.v).max(1e-3) * metres_per_pixel,
             z: 0.0,
         };
-        let (words, points) = look.at(&image, cell_px as f32);
-        let seen = Some((words.iter().map(place).collect(), points));
+        let content = look.at(&image, cell_px as f32);
+        let seen = Some((content.as_words().iter().map(place).collect(), content.into_points()));
         Ok(Self { seen, size: (width, height), cell_px: cell_px as f32 })
     }
 }

@@ -77,20 +77,20 @@ fn numbers(volume: &[FlatCell]) -> Vec<TopicId> {
 
 /// Writes `labels.png`, the flattened map, and `labels.csv`, every cell in three dimensions sorted by y and x. Of
 /// stacked cells, the one in the flattened map comes last.
-pub(crate) fn write(labelled: &LabelledMap, dir: &Path) -> Result<(), UserError> {
-    let (map, mut volume) = (&labelled.flat, labelled.volume.clone());
+pub(crate) fn write(labelled: LabelledMap, dir: &Path) -> Result<(), UserError> {
+    let LabelledMap { flat: map, mut volume, cell_m } = labelled;
     // Rows painted in this order give the flattened map.
     let shows =
         |cell: &FlatCell| map.binary_search_by_key(&(cell.y, cell.x), |c| (c.y, c.x)).is_ok_and(|i| map[i].z == cell.z);
     volume.sort_by_cached_key(|cell| (cell.y, cell.x, shows(cell)));
     let topics = numbers(&volume);
     let label = |topic| topics.binary_search(&topic).map_or(0, |index| (index + 1).min(254)) as u8;
-    let bounds = around(map)?;
+    let bounds = around(&map)?;
     let grid: LabelGrid = map.iter().map(|cell| (Cell::new(cell.x, cell.y), label(cell.topic))).collect();
     let png = encode_within(&grid, bounds).map_err(|e| UserError::Failed(e.to_string()))?;
     let mut table = "x,y,z,label,confidence,perplexity\n".to_owned();
     for cell in &volume {
-        let [x, y, z] = centre_of([cell.x, cell.y, cell.z], labelled.cell_m);
+        let [x, y, z] = centre_of([cell.x, cell.y, cell.z], cell_m);
         let (label, FlatCell { confidence, perplexity, .. }) = (label(cell.topic), cell);
         let _ = writeln!(table, "{x:.6},{y:.6},{z:.6},{label},{confidence:.4},{perplexity:.4}");
     }

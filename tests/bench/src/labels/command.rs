@@ -44,13 +44,12 @@ impl LabelsBench {
             std::fs::create_dir_all(dir).map_err(|e| UserError::file(dir, e))?;
         }
         let SeedArguments { first, count } = self.seeds;
-        let reefs = (first..first + count).map(Some).chain([None, None]);
         let floors = if self.mosaics.is_empty() { count as usize + 2 } else { self.mosaics.len() };
-        let site = |index: usize| match (self.mosaics.get(index), reefs.clone().nth(index).flatten()) {
+        let site = |index: usize| match (self.mosaics.get(index), index as u64) {
             (Some(path), _) => Site::mosaic(path),
-            (None, Some(seed)) => Ok(Site::reef(seed)),
-            (None, None) if index + 1 == floors => Ok(Site::featureless()),
-            (None, None) => Ok(Site::sand()),
+            (None, reef) if reef < count => Ok(Site::reef(first + reef)),
+            (None, other) if other == count => Ok(Site::sand()),
+            (None, _) => Ok(Site::featureless()),
         };
         if !self.json {
             print_head();

@@ -215,7 +215,7 @@ impl Run {
             eprintln!("scenecast: no cell of the map is annotated, so the labels are not scored");
         }
         let report = RunReport::new(&map, model.as_ref(), &effort, quality.as_ref());
-        write(&map, &self.out)?;
+        write(map, &self.out)?;
         print_figures(&report, self.json)
     }
 

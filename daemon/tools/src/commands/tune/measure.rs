@@ -1,6 +1,7 @@
 //! Measurement of one setting: the quality of its map and the bytes of its stream.
 
-use super::survey::{FrameContent, Survey};
+use super::survey::Survey;
+use crate::scene::FrameContent;
 use scene_model::habitats::Habitats;
 use scene_model::online::OnlineInference;
 use scene_model::project::Observation;

@@ -1,10 +1,10 @@
 //! The mosaic with its annotations, and a virtual survey over it.
 
+use crate::scene::{FrameContent, Look};
 use image::{GrayImage, RgbImage};
-use scene_model::habitats::{Habitats, MeasuredPoint};
 use scene_model::project::{DownCamera, Observation, Pose};
 use scene_model::topics::{Birth, SceneConfig};
-use scene_model::words::{Word, WordConfig, WordExtractor};
+use scene_model::words::{WordConfig, WordExtractor};
 use scenecast_config::{BirthRule, Config, SceneLabels, WorldKind};
 use scenecast_core::UserError;
 use scenecast_core::tuning_table::Setting;
@@ -90,12 +90,6 @@ impl<'a> Site<'a> {
     }
 }
 
-/// What the scene model takes from a frame: words, or where labels are habitats measured points.
-pub enum FrameContent {
-    Words(Vec<Word>),
-    Points(Vec<MeasuredPoint>),
-}
-
 /// The frames of a survey, for one size of cells.
 pub struct Survey<'a> {
     pub(super) config: &'a Config,
@@ -133,16 +127,15 @@ impl<'a> Survey<'a> {
                 "{cause}; raise survey.speed_m_s, lower camera.rate_hz or take larger cells"
             )));
         }
-        let mut extractor = WordExtractor::new(&words);
+        let mut look = match config.scene.labels {
+            SceneLabels::Topics => Look::Words(Box::new(WordExtractor::new(&words))),
+            SceneLabels::Habitats => Look::Points,
+        };
         let frame = |(left, top): (u32, u32)| {
             let view = image::imageops::crop_imm(&site.image, left, top, size.0, size.1).to_image();
             let middle = |from: u32, length: u32| (f64::from(from) + f64::from(length) / 2.0) * mpp;
             let pose = Pose { x: middle(left, size.0), y: -middle(top, size.1), z: 0.0, yaw_rad: 0.0 };
-            let content = match config.scene.labels {
-                SceneLabels::Topics => FrameContent::Words(extractor.extract(&view, cell_px)),
-                SceneLabels::Habitats => FrameContent::Points(scene_model::habitats::measure(&view, cell_px)),
-            };
-            (pose, content)
+            (pose, look.at(&view, cell_px))
         };
         let frames = corners.into_iter().map(frame).collect();
         let annotations = Annotations::new(&site.classes, site.image.dimensions(), cell_px, site.ignore);
@@ -159,14 +152,9 @@ impl<'a> Survey<'a> {
 
     /// The frames of the camera, each with the places of its words or points; the mosaic's north-west corner is the origin of the world.
     pub fn frames(&self) -> impl Iterator<Item = (&FrameContent, Vec<Observation>)> {
-        self.frames.iter().map(|(pose, content)| {
-            let project = |words: &[Word]| self.camera.project(self.size.0, self.size.1, pose, words);
-            let places = match content {
-                FrameContent::Words(words) => project(words),
-                FrameContent::Points(points) => project(&Habitats::as_words(points)),
-            };
-            (content, places)
-        })
+        self.frames
+            .iter()
+            .map(|(pose, content)| (content, self.camera.project(self.size.0, self.size.1, pose, &content.as_words())))
     }
 
     /// Duration of the whole survey, seconds.
