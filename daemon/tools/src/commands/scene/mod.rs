@@ -3,6 +3,7 @@
 mod choices;
 mod register;
 mod run;
+mod run_options;
 mod sample;
 mod scenes;
 mod score;
