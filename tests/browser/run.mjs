@@ -52,7 +52,8 @@ async function main() {
   const work = async () => {
     const mock = url ? null : await startMock();
     const scene = { url: url ?? mock.url, mocked: mock !== null, token, limits: process.argv.includes("--limits") };
-    while (waiting.length > 0) counts[await run(waiting.shift(), browser, scene)] += 1;
+    const kept = { context: null, page: null };
+    while (waiting.length > 0) counts[await run(waiting.shift(), browser, scene, kept)] += 1;
     await mock?.close();
   };
   await Promise.all(Array.from({ length: Number(option("workers") ?? 1) }, work));
@@ -61,7 +62,7 @@ async function main() {
   return counts.failed > 0 ? 1 : 0;
 }
 
-async function run(story, browser, scene) {
+async function run(story, browser, scene, kept) {
   const needed = missing(story, scene);
   if (needed) {
     console.log(`skip  ${story.name} (needs ${needed})`);
@@ -69,18 +70,20 @@ async function run(story, browser, scene) {
   }
   const start = performance.now();
   const stage = new Stage();
+  let passed = false;
   try {
-    await stage.open(browser, scene, story);
+    await stage.open(browser, scene, story, kept);
     await story.run(stage);
     await stage.noErrors(story.tolerates);
     console.log(`ok    ${story.name} (${Math.round(performance.now() - start)} ms)`);
     if (stage.figures.length > 0) console.log(`      figures: ${stage.figures.join(", ")}`);
+    passed = true;
     return "ok";
   } catch (error) {
     console.log(`FAIL  ${story.name}\n      ${[error.stack ?? error, ...stage.errors].join("\n").replaceAll("\n", "\n      ")}`);
     return "failed";
   } finally {
-    await stage.close();
+    await stage.close(kept, passed);
   }
 }
 

@@ -41,21 +41,26 @@ export class Stage {
   /** Measurements of a story, for the log. */
   figures = [];
 
-  /** Opens the page in a new context; unless the story is bare, waits for the first state and map. */
-  async open(browser, { url, mocked, token, limits }, story) {
+  /**
+   * Opens the page; unless the story is bare, waits for the first state and map. A page of an earlier story goes on in `kept`, without its
+   * storage, since a new one takes a second of the processor.
+   */
+  async open(browser, { url, mocked, token, limits }, story, kept) {
     Object.assign(this, { url, mocked, token, browser, limits });
     this.errors = [];
     this.texts = [];
     this.posts = [];
+    this.orders = [];
     if (mocked) await this.steer({ scenario: story.scenario ?? "rich", down: false, stream: true, mute: false });
     const size = story.size ?? WIDE;
-    this.context = await browser.newContext({ viewport: size, hasTouch: size === PHONE, acceptDownloads: true });
-    await this.watch(this.context);
-    this.page = await this.context.newPage();
+    this.isAlone = Boolean(story.stopped || story.bare) || size === PHONE;
+    if (this.isAlone || !kept.page) await this.begin(size);
+    else await this.goOn(kept, size);
     this.page.setDefaultTimeout(TIMEOUT_MS);
     this.page.on("pageerror", (error) => this.errors.push(`page: ${error.stack}`));
-    this.page.on("console", (m) => m.type() === "error" && this.errors.push(`console: ${m.text()} ${m.location().url}`));
-    this.orders = [];
+    // A document without scripts, between two stories, names no icon.
+    const isOurs = (m) => m.type() === "error" && !m.location().url.endsWith("/favicon.ico");
+    this.page.on("console", (m) => isOurs(m) && this.errors.push(`console: ${m.text()} ${m.location().url}`));
     this.page.on("request", (r) => {
       if (r.method() !== "POST") return;
       this.orders.push(r);
@@ -63,16 +68,43 @@ export class Stage {
       if (!r.url().endsWith("/draft")) this.posts.push({ path: new URL(r.url()).pathname, body: r.postDataJSON() });
     });
     const theme = story.theme ?? "light";
-    await this.page.addInitScript((t) => localStorage.getItem("scenecast.theme") ?? localStorage.setItem("scenecast.theme", JSON.stringify(t)), theme);
+    if (this.isNew) await this.page.addInitScript((t) => localStorage.getItem("scenecast.theme") ?? localStorage.setItem("scenecast.theme", JSON.stringify(t)), theme);
+    else await this.page.evaluate((t) => localStorage.setItem("scenecast.theme", JSON.stringify(t)), theme);
     if (story.stopped) await this.stopClock();
     await this.page.goto(url);
     if (!story.bare) await this.ready();
   }
 
+  async begin(size) {
+    this.isNew = true;
+    this.context = await this.browser.newContext({ viewport: size, hasTouch: size === PHONE, acceptDownloads: true });
+    this.watched = await this.watch(this.context);
+    this.page = await this.context.newPage();
+  }
+
+  /** Takes the page of an earlier story, on a document of the site that has no scripts. */
+  async goOn(kept, size) {
+    this.isNew = false;
+    Object.assign(this, kept);
+    this.watched.texts = this.texts;
+    await this.page.setViewportSize(size);
+    await this.page.mouse.move(0, 0);
+    await this.page.goto(`${this.url}/icon.svg`);
+    await this.page.evaluate(() => localStorage.clear());
+  }
+
   /** Collects texts of a context's pages that contain a value of the program. */
   async watch(context) {
-    await context.exposeFunction("reportProgramText", (found) => this.texts.push(found));
+    const watched = { texts: this.texts };
+    await context.exposeFunction("reportProgramText", (found) => watched.texts.push(found));
     await context.addInitScript(watchTexts);
+    return watched;
+  }
+
+  /** The developer tools of the page, which no other story gets afterwards. */
+  devtools() {
+    this.isAlone = true;
+    return this.context.newCDPSession(this.page);
   }
 
   /** From here on the page's clock stands still: its timers and frames run only in `tick`. */
@@ -104,8 +136,8 @@ export class Stage {
   /** Milliseconds of CPU time that the browser has spent on pages, including drawing and the network. Unlike time on a clock, it
    *  does not depend on other programs. The resolution is 10 ms. */
   async cpuMs() {
-    this.devtools ??= await this.browser.newBrowserCDPSession();
-    const { processInfo } = await this.devtools.send("SystemInfo.getProcessInfo");
+    this.processes ??= await this.browser.newBrowserCDPSession();
+    const { processInfo } = await this.processes.send("SystemInfo.getProcessInfo");
     // The main process mostly serves the test.
     return 1000 * processInfo.filter((p) => p.type !== "browser").reduce((sum, p) => sum + p.cpuTime, 0);
   }
@@ -183,9 +215,19 @@ export class Stage {
     assert.deepEqual(bad, [], "no errors in the console");
   }
 
-  /** Closes the page once the mock has answered every order: one under way would reach the mission of the next story. */
-  async close() {
+  /** Ends the story once the mock has answered every order: one under way would reach the mission of the next story. The page stays open for
+   *  the next story if this one passed and changed nothing of the page that would last. */
+  async close(kept, passed) {
     await Promise.allSettled((this.orders ?? []).map((request) => request.response()));
-    await this.context?.close();
+    if (!passed || this.isAlone || this.page.isClosed()) {
+      if (kept.context === this.context) Object.assign(kept, { context: null, page: null });
+      await this.context?.close();
+      return;
+    }
+    for (const page of this.context.pages()) if (page !== this.page) await page.close();
+    await this.page.unrouteAll();
+    this.page.removeAllListeners();
+    await this.context.clearCookies();
+    Object.assign(kept, { context: this.context, page: this.page, watched: this.watched });
   }
 }

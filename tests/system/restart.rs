@@ -112,6 +112,19 @@ fn page_text(pair: &Pair) -> Option<Value> {
     Some(serde_json::from_slice(&output.stdout).expect("the script prints JSON"))
 }
 
+/// Only its user can read what a process keeps.
+fn assert_private(folder: &Path) {
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt;
+        let mode = |path: &Path| std::fs::metadata(path).unwrap().permissions().mode() & 0o777;
+        assert_eq!(mode(folder), 0o700, "{}", folder.display());
+        let files: Vec<PathBuf> = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
+        assert!(!files.is_empty());
+        files.iter().filter(|path| path.is_file()).for_each(|path| assert_eq!(mode(path), 0o600, "{}", path.display()));
+    }
+}
+
 #[test]
 fn a_killed_surface_shows_the_same_page_again() {
     let pair = pair("same-page");
@@ -131,10 +144,14 @@ fn a_killed_surface_shows_the_same_page_again() {
     let is_applied = |vehicle: &Value| !vehicle["fence_in_force"].is_null() && !vehicle["limits_in_force"].is_null();
     wait_until("the orders are applied", LIMIT, || is_applied(&pair.auv()));
     vehicle.kill();
+    // A terminal that closes ends no surface.
+    surface.hang_up();
     pair.post("vehicles/1/utility", &format!(r#"{{"weights": {{"{label}": 0.5}}, "exploration": 0.2}}"#));
     let utility =
         |v: &Value| v["directive"]["slots"].as_array().unwrap().iter().find(|s| s["slot"] == "utility").cloned();
     let (text, before, map) = (page_text(&pair), pair.state().unwrap(), cells(&pair));
+    assert_private(&pair.dir.join("asv"));
+    assert_private(&pair.dir.join("auv"));
     surface.kill();
     let began = Instant::now();
     let _surface = pair.surface();

@@ -233,7 +233,7 @@ fn an_order_of_cyclone_passes_the_surfaces_checks() {
         (event["level"].as_u64().unwrap(), event["text"].as_str().unwrap().to_owned())
     };
     let (level, text) = hold(&["true"]);
-    assert!(level == 20 && text.starts_with("hold of ros: accepted as constraints"), "{text}");
+    assert!(level == 20 && text.starts_with("hold of ros: accepted as hold"), "{text}");
     wait_until("the vehicle applies it", Duration::from_secs(60), || {
         let slots = state(page).map(|state| state["vehicles"][0]["directive"]["slots"].clone());
         let slots = slots.as_ref().and_then(Value::as_array).cloned().unwrap_or_default();

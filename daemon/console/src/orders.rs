@@ -1,5 +1,6 @@
 //! The bodies of orders.
 
+use scenecast_protocol::directive::Constraints;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -70,15 +71,29 @@ pub enum ExemplarAction {
     Cancel,
 }
 
-/// Orders the vehicle to hold or to abort. With both false it resumes its survey, also after a breach.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+/// Orders the vehicle to hold, to resume or to abort.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ConstraintsOrder {
-    /// Whether it holds its position.
-    pub hold: bool,
-    /// Whether it aborts; this has precedence over `hold`.
-    #[serde(default)]
-    pub abort: bool,
+    pub action: ConstraintsAction,
+}
+
+/// Each ends the one before it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum ConstraintsAction {
+    /// It holds its position.
+    Hold,
+    /// It continues its survey, also after a breach.
+    Resume,
+    /// It ends its survey with the reaction of the limits.
+    Abort,
+}
+
+impl From<ConstraintsAction> for Constraints {
+    fn from(action: ConstraintsAction) -> Self {
+        Self { hold: action == ConstraintsAction::Hold, abort: action == ConstraintsAction::Abort }
+    }
 }
 
 /// The budget of the surface, which changes at once, and of each vehicle, which receives it in the directive.

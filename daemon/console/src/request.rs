@@ -5,6 +5,7 @@ mod described;
 use crate::export::MapCells;
 use crate::fit::{self, Fit};
 use crate::layers;
+use crate::order_changes::OrderChanges;
 use crate::orders::{
     BudgetOrder, ExemplarAction, ExemplarOrder, LabelOrder, MarkerOrder, NoteOrder, RemoveMarkerOrder,
 };
@@ -12,7 +13,7 @@ use crate::snapshot::{command_state, seconds};
 use crate::state::{AcceptedOrder, ArchivedMap, CellHistory, CommandState, FormerLabel};
 use described::describe;
 use scenecast_protocol::coordinates::WorldPoint;
-use scenecast_protocol::directive::{Constraints, SlotId};
+use scenecast_protocol::directive::{Constraints, Slot, SlotId};
 use scenecast_protocol::map::Cell;
 use scenecast_protocol::schedule::{BackgroundOrder, Shares};
 use scenecast_protocol::time::Instant;
@@ -20,7 +21,7 @@ use scenecast_protocol::wire::Address;
 use scenecast_surface::record::{StoredLabel, VehicleMemory};
 use scenecast_surface::{
     AreasOrder, CommandAction, CommandRefusal, DestinationOrder, FenceOrder, LimitsOrder, LogEntry, OrderKind,
-    Principal, RequestKind, SettingsOrder, Surface,
+    Principal, RequestKind, SettingsOrder, Surface, order_name,
 };
 use std::collections::BTreeMap;
 
@@ -50,8 +51,8 @@ pub enum SurfaceRequest {
     Constraints(u8, Constraints),
     /// Hold or continue, and leave an abort as it is.
     Hold(u8, bool),
-    Fence(u8, FenceOrder),
-    Limits(u8, LimitsOrder),
+    Fence(u8, OrderChanges<FenceOrder>),
+    Limits(u8, OrderChanges<LimitsOrder>),
     Areas(u8, AreasOrder),
     Destination(u8, DestinationOrder),
     Settings(u8, SettingsOrder),
@@ -81,7 +82,7 @@ pub enum SurfaceRequest {
 
 impl SurfaceRequest {
     /// The kind of an order; `None` for readings, and for changes of command, which have rules of their own.
-    fn order_kind(&self) -> Option<OrderKind> {
+    pub(crate) fn order_kind(&self) -> Option<OrderKind> {
         match self {
             Self::Map(_) | Self::FormerLabels(..) | Self::Exemplar(..) | Self::Fit(..) | Self::Command(_) => None,
             Self::Log | Self::Archives | Self::ArchivedMap(_) => None,
@@ -201,19 +202,22 @@ fn handle(surface: &mut Surface, request: SurfaceRequest, cell_m: f64, now: Inst
         }
         SurfaceRequest::Constraints(id, order) => {
             let vehicle = known(surface, id)?;
-            accepted(vehicle, SlotId::Constraints, surface.set_order(vehicle, order, now))
+            accepted_as(order_name(&Slot::Constraints(order)), vehicle, surface.set_order(vehicle, order, now))
         }
         SurfaceRequest::Hold(id, hold) => {
             let vehicle = known(surface, id)?;
-            accepted(vehicle, SlotId::Constraints, surface.change_hold(vehicle, hold, now))
+            let name = if hold { "hold" } else { "resume" };
+            accepted_as(name, vehicle, surface.change_hold(vehicle, hold, now))
         }
         SurfaceRequest::Fence(id, order) => {
             let vehicle = known(surface, id)?;
-            accepted(vehicle, SlotId::Fence, surface.set_fence(vehicle, &order, now))
+            let fence = order.applied_to(|| surface.present_fence(vehicle));
+            accepted(vehicle, SlotId::Fence, fence.and_then(|fence| surface.set_fence(vehicle, &fence, now)))
         }
         SurfaceRequest::Limits(id, order) => {
             let vehicle = known(surface, id)?;
-            accepted(vehicle, SlotId::Limits, surface.set_limits(vehicle, &order, now))
+            let limits = order.applied_to(|| surface.present_limits(vehicle));
+            accepted(vehicle, SlotId::Limits, limits.and_then(|limits| surface.set_limits(vehicle, &limits, now)))
         }
         SurfaceRequest::Areas(id, order) => {
             let vehicle = known(surface, id)?;
@@ -287,9 +291,19 @@ pub fn archived_cells(map: &VehicleMemory, cell_m: f64) -> MapCells {
 }
 
 fn accepted(vehicle: Address, slot: SlotId, issued: Result<u16, String>) -> Reply {
+    accepted_order(slot, slot.name(), vehicle, issued)
+}
+
+/// The reply to a hold, a resume or an abort.
+fn accepted_as(name: &str, vehicle: Address, issued: Result<u16, String>) -> Reply {
+    accepted_order(SlotId::Constraints, name, vehicle, issued)
+}
+
+fn accepted_order(slot: SlotId, name: &str, vehicle: Address, issued: Result<u16, String>) -> Reply {
     match issued {
         Ok(version) => Reply::Accepted(AcceptedOrder {
             slot: slot.name().to_owned(),
+            name: name.to_owned(),
             version: Some(version),
             versions: BTreeMap::from([(vehicle.number(), version)]),
         }),
@@ -316,7 +330,8 @@ fn budget(surface: &mut Surface, order: BudgetOrder, now: Instant) -> Reply {
     }
     let issued = |a: Address| surface.view(a)?.slots().find(|s| s.id == SlotId::Budget).map(|s| s.version);
     let versions = surface.vehicles().filter_map(|(a, _)| Some((a.number(), issued(a)?))).collect();
-    Reply::Accepted(AcceptedOrder { slot: SlotId::Budget.name().to_owned(), version: None, versions })
+    let slot = SlotId::Budget.name();
+    Reply::Accepted(AcceptedOrder { slot: slot.to_owned(), name: slot.to_owned(), version: None, versions })
 }
 
 /// The settings that fit a budget, for the cells of the vehicle.

@@ -158,6 +158,8 @@ pub struct Origin {
 pub struct AcceptedOrder {
     /// The slot of the directive that carries it.
     pub slot: String,
+    /// What is ordered: hold, resume or abort in the slot constraints, which they share; else as the slot.
+    pub name: String,
     /// Its version, if it goes to one vehicle.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub version: Option<u16>,

@@ -25,6 +25,7 @@ mod pilot;
 mod port;
 #[cfg(all(test, feature = "surface"))]
 mod power_cut_tests;
+mod private;
 #[cfg(all(test, feature = "surface"))]
 mod refusing_disk_tests;
 mod reload;

@@ -6,6 +6,8 @@ use super::map_files::{MapFile, MapFiles};
 use super::missing_key::warn_without_key;
 use super::modem::{self, ModemPort};
 use super::pilot::{self, PilotPort, SimulatedAutopilot};
+use super::private::keep_private;
+use super::reload::{Load, Reload};
 use super::ros2::SurfaceRos2;
 use super::stop::Stop;
 use super::store::{ArchivedFile, SurfaceFiles};
@@ -18,6 +20,7 @@ use scenecast_console::{
 use scenecast_core::UserError;
 use scenecast_core::world_file;
 use scenecast_host::{Follower, FrameEvent, SurfaceHost, SurfaceHostEvent, modem_station};
+use scenecast_protocol::directive::Budget;
 use scenecast_protocol::wire::Address;
 use scenecast_surface::position::Follow;
 use scenecast_surface::{CommandChange, SurfaceOutput};
@@ -30,9 +33,11 @@ const PUBLISH_INTERVAL: Duration = Duration::from_secs(1);
 /// Time after which changes that were not committed yet are looked at again.
 const CATCH_UP_INTERVAL: Duration = Duration::from_millis(100);
 
-/// Runs the surface until it is interrupted.
-pub fn run_surface(config: Config, simulated: Option<SimulatedAutopilot>) -> Result<(), UserError> {
+/// Runs the surface until it is interrupted; on SIGHUP it calls `load` for a new budget and new shares.
+pub fn run_surface(load: Load, simulated: Option<SimulatedAutopilot>) -> Result<(), UserError> {
     super::block_on(async move {
+        let config = load()?;
+        keep_private(&config);
         let mut principals = Vec::new();
         let listener = match &config.console.listen {
             None => None,
@@ -55,7 +60,7 @@ pub fn run_surface(config: Config, simulated: Option<SimulatedAutopilot>) -> Res
             clock.now(),
         )?;
         // Files that do not end, such as a pipe for a key, are read above: until there a signal ends the program at once.
-        let stop = Stop::new()?;
+        let (stop, reload) = (Stop::new()?, Reload::new(load)?);
         let ros2 = SurfaceRos2::start(&config, &mut principals)?;
         surface.set_principals(principals);
         if let Some(relay) = relay(&config) {
@@ -83,8 +88,29 @@ pub fn run_surface(config: Config, simulated: Option<SimulatedAutopilot>) -> Res
         let host = SurfaceHost::new(surface, modem_station(&config, Address::SURFACE, profile)?, follower);
         let maps = MapFiles::start(config.runtime.state_dir.clone());
         let (is_stale, reading) = (true, Arc::default());
-        SurfaceShell { host, ports, console, ros2, clock, files, maps, facts, meter, reading, is_stale }.run(stop).await
+        let budget = configured_budget(&config);
+        let shell = SurfaceShell {
+            host,
+            ports,
+            console,
+            ros2,
+            clock,
+            files,
+            maps,
+            facts,
+            meter,
+            reading,
+            reload,
+            budget,
+            is_stale,
+        };
+        shell.run(stop).await
     })
+}
+
+fn configured_budget(config: &Config) -> Budget {
+    let link = &config.link;
+    Budget { bits_per_s: link.budget_bps, shares: link.shares, background: link.background }
 }
 
 struct Ports {
@@ -106,6 +132,9 @@ struct SurfaceShell {
     meter: LinkMeter,
     /// Held while an archived map is read.
     reading: Arc<Mutex<()>>,
+    reload: Reload,
+    /// The budget of the configuration, as it was read last.
+    budget: Budget,
     /// The page lacks changes that are still to be committed.
     is_stale: bool,
 }
@@ -143,11 +172,26 @@ impl SurfaceShell {
                     self.ports.instruments.handle(report, &mut self.host, self.clock.now());
                 }
                 report = self.ports.pilot.next() => self.handle_pilot(report),
+                config = self.reload.next() => self.follow(&config),
                 (request, reply) = next_request(&mut self.console) => self.handle_request(request, reply),
                 (request, reply) = self.ros2.next_request() => self.handle_request(request, reply),
             }
             self.host.handle_timeout(self.clock.now());
         }
+    }
+
+    /// Takes budget and shares of the configuration if they are others than before: a terminal that closes sends a SIGHUP too.
+    fn follow(&mut self, config: &Config) {
+        let budget = configured_budget(config);
+        if std::mem::replace(&mut self.budget, budget) == budget {
+            return tracing::info!("SIGHUP: budget and shares are as before");
+        }
+        let Budget { bits_per_s, shares, background } = budget;
+        match self.host.surface_mut().set_budget(bits_per_s, Some(shares), Some(background), self.clock.now()) {
+            Ok(()) => tracing::info!("SIGHUP: budget {bits_per_s} bit/s, shares {:?} %", shares.0),
+            Err(reason) => tracing::error!("SIGHUP: {reason}; no setting is changed"),
+        }
+        self.is_stale = true;
     }
 
     fn handle_pilot(&mut self, report: FromPort) {

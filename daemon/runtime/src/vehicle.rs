@@ -11,6 +11,7 @@ use super::mapping::{FromMapper, Mapped, MapperThread, ToMapper};
 use super::missing_key::warn_without_key;
 use super::modem::{self, ModemPort};
 use super::pilot::{self, PilotPort, SimulatedAutopilot};
+use super::private::keep_private;
 use super::reload::{Load, Reload};
 use super::restore::{Start, start};
 use super::ros2::{RosSensors, VehicleRos2};
@@ -37,6 +38,7 @@ const RESTART_S: f64 = 2.0;
 pub fn run_vehicle(load: Load, simulated: Option<SimulatedAutopilot>) -> Result<(), UserError> {
     super::block_on(async move {
         let config = load()?;
+        keep_private(&config);
         warn_without_key(&config);
         let dir = config.runtime.state_dir.as_path();
         let Start { run, mut mapper, keep, labels } = start(&config, dir)?;

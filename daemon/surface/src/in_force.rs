@@ -1,9 +1,12 @@
 //! The orders in force by the vehicle's reports, also those that this surface has not given.
 
+use super::Surface;
+use super::orders::{FenceOrder, LimitsOrder};
 use super::vehicle_record::{SentOrder, VehicleRecord};
 use scenecast_protocol::directive::{OrderStatus, Slot, SlotId};
 use scenecast_protocol::link::{InForce, PeerView};
 use scenecast_protocol::map::MAX_LABEL;
+use scenecast_protocol::wire::Address;
 
 /// The version of an order in force that another surface, or an earlier run of this one, has given.
 const VERSION_OF_OTHERS: u16 = 0;
@@ -61,6 +64,44 @@ fn follow_order<T: Clone + Default + PartialEq>(
                 order.sent = Some(content);
             }
         }
+    }
+}
+
+/// The order that a change of a part of it begins with: the one that is on its way to the vehicle, or else the one in force.
+///
+/// # Errors
+/// The vehicle may obey an order that this surface does not know, so that the rest of it would be removed.
+fn present<T: Clone + Default>(order: &SentOrder<T>, id: SlotId, view: &PeerView<'_>) -> Result<T, String> {
+    if status(view, id).is_some_and(|status| !matches!(status, OrderStatus::Applied | OrderStatus::Refused(_))) {
+        return Ok(order.sent.clone().unwrap_or_default());
+    }
+    let in_force = order.in_force.as_ref().map(|(_, content)| content.clone());
+    let known = match view.in_force(id) {
+        InForce::None => Some(T::default()),
+        InForce::Known(_) => in_force,
+        InForce::NotReported => in_force.or_else(|| order.sent.clone()),
+        InForce::Unknown => None,
+    };
+    known.ok_or_else(|| {
+        let name = id.name();
+        format!(
+            "the surface does not know yet which {name} the vehicle obeys, so a part cannot be changed: wait for the \
+             vehicle's report, or name the whole {name}"
+        )
+    })
+}
+
+impl Surface {
+    /// The fence that a change of a part of it begins with. The error is one line for the operator.
+    pub fn present_fence(&self, vehicle: Address) -> Result<FenceOrder, String> {
+        let (record, view) = self.records.get(&vehicle).zip(self.view(vehicle)).ok_or("no such vehicle")?;
+        present(&record.fence, SlotId::Fence, &view).map(|fence| FenceOrder::from(&fence))
+    }
+
+    /// The limits that a change of a part of them begins with. The error is one line for the operator.
+    pub fn present_limits(&self, vehicle: Address) -> Result<LimitsOrder, String> {
+        let (record, view) = self.records.get(&vehicle).zip(self.view(vehicle)).ok_or("no such vehicle")?;
+        present(&record.limits, SlotId::Limits, &view).map(|limits| LimitsOrder::from(&limits))
     }
 }
 

@@ -85,7 +85,7 @@ pub struct MissionLog {
 }
 
 impl MissionLog {
-    /// The most entries that are kept; the oldest go first.
+    /// The most entries that are kept. Edits go first, so that many of them do not push an order out.
     pub const MAX: usize = MAX_LOG;
     /// The most characters of a text.
     const MAX_TEXT: usize = 240;
@@ -109,12 +109,21 @@ impl MissionLog {
     fn push(&mut self, entry: LogEntry) {
         self.last = entry.number;
         self.entries.push_back(entry);
-        self.entries.drain(..self.entries.len().saturating_sub(Self::MAX));
+        make_room(&mut self.entries, |entry| entry.kind == LogKind::Record);
     }
 
     /// Puts the entries of an earlier run of the surface back, before any other entry.
     pub(super) fn restore(&mut self, stored: impl IntoIterator<Item = LogEntry>) {
         stored.into_iter().for_each(|entry| self.push(entry));
+    }
+}
+
+/// Removes the oldest edit while there are too many entries and edits are more than a quarter of them, or else the oldest entry.
+pub(super) fn make_room<T>(entries: &mut VecDeque<T>, is_edit: impl Fn(&T) -> bool) {
+    while entries.len() > MAX_LOG {
+        let edits = entries.iter().filter(|entry| is_edit(entry)).count();
+        let oldest_edit = entries.iter().position(&is_edit).filter(|_| edits > MAX_LOG / 4);
+        entries.remove(oldest_edit.unwrap_or(0));
     }
 }
 
@@ -132,6 +141,10 @@ impl From<&LogEntry> for StoredLogEntry {
 }
 
 impl StoredLogEntry {
+    pub(super) fn is_edit(&self) -> bool {
+        self.kind == LogKind::Record as u8
+    }
+
     /// `None` if this build does not know the kind.
     pub(super) fn entry(&self) -> Option<LogEntry> {
         Some(LogEntry {
@@ -148,6 +161,23 @@ impl StoredLogEntry {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn many_edits_push_no_order_out_of_the_log_or_the_file() {
+        let mut log = MissionLog::default();
+        let mut stored = VecDeque::new();
+        let mut add = |kind, text: &str| {
+            log.add(Address::vehicle(1), kind, Some("ann"), text, Instant::ZERO);
+            stored.push_back(StoredLogEntry::from(log.entries().next_back().unwrap()));
+            make_room(&mut stored, StoredLogEntry::is_edit);
+        };
+        add(LogKind::Order, "hold");
+        (0..9000).for_each(|number| add(LogKind::Record, &format!("label 3: name {number}")));
+        add(LogKind::Answer, "hold version 1 applied");
+        let texts: Vec<&str> = log.entries().map(|entry| entry.text.as_str()).collect();
+        assert_eq!((texts.len(), texts[0], texts[1]), (MissionLog::MAX, "hold", "label 3: name 7002"));
+        assert!(log.entries().map(StoredLogEntry::from).eq(stored));
+    }
 
     #[test]
     fn the_log_keeps_its_last_entries_and_their_numbers_across_a_restart() {

@@ -2,6 +2,7 @@
 
 use super::command::{CommandChange, CommandChangeKind};
 use super::log::{LogKind, MissionLog};
+use super::orders::order_name;
 use super::record::StoredLogEntry;
 use super::{Surface, VehicleRecord};
 use scenecast_protocol::directive::{OrderStatus, SlotId};
@@ -46,12 +47,11 @@ impl Surface {
     pub(super) fn log_decision(&mut self, vehicle: Address, slot: SlotId, now: Instant) {
         // Fixes are measured and sent by the program, several a minute.
         let Some(decided) = self.link.vehicle(vehicle).and_then(|v| v.slots().find(|s| s.id == slot)) else { return };
+        let (name, version) = (order_name(&decided.slot), decided.version);
         let text = match decided.status {
             OrderStatus::Applied if slot == SlotId::Fix => return,
-            OrderStatus::Applied => format!("{} version {} applied", slot.name(), decided.version),
-            OrderStatus::Refused(reason) => {
-                format!("{} version {} refused: {}", slot.name(), decided.version, reason.explain())
-            }
+            OrderStatus::Applied => format!("{name} version {version} applied"),
+            OrderStatus::Refused(reason) => format!("{name} version {version} refused: {}", reason.explain()),
             _ => return,
         };
         self.log_fact(vehicle, LogKind::Answer, &text, now);

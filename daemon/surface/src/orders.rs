@@ -1,9 +1,11 @@
 //! Fences, limits, weighted areas and destinations as the operator types them. Every error is one line that names the allowed values.
 
 use scenecast_protocol::coordinates::{DecimetrePoint, WorldPoint};
-use scenecast_protocol::directive::{Areas, Band, Destination, Fence, Limits, Polygon, Reaction, WeightedArea};
+use scenecast_protocol::directive::{
+    Areas, Band, Constraints, Destination, Fence, Limits, Polygon, Reaction, Slot, WeightedArea,
+};
 use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize};
 
 /// Maximum distance of a place in an order from the mission's origin, metres; a farther one is a typing error.
 pub const MAX_DISTANCE_M: f64 = 100_000.0;
@@ -15,12 +17,16 @@ pub struct FenceOrder {
     /// The vehicle stays inside; `None`: no fence.
     #[schemars(length(min = 3, max = 34))]
     pub fence: Option<Vec<[f64; 2]>>,
-    /// The vehicle stays outside each of these outlines.
-    #[serde(default)]
-    #[schemars(length(max = 15), inner(length(min = 3, max = 34)))]
+    /// The vehicle stays outside each of these outlines; null: of none.
+    #[serde(default, deserialize_with = "listed")]
+    #[schemars(with = "Option<Vec<Vec<[f64; 2]>>>", length(max = 15), inner(length(min = 3, max = 34)))]
     pub keep_outs: Vec<Vec<[f64; 2]>>,
     /// The end of the return path; `None`: the start of the vehicle's run.
     pub return_point: Option<[f64; 2]>,
+}
+
+fn listed<'de, D: Deserializer<'de>, T: Deserialize<'de>>(deserializer: D) -> Result<Vec<T>, D::Error> {
+    Option::deserialize(deserializer).map(Option::unwrap_or_default)
 }
 
 /// Limits as they are typed. A value that is left out is not limited, or as configured on the vehicle.
@@ -184,6 +190,16 @@ impl LimitsOrder {
         };
         limits.check().map_err(|fault| fault.to_string())?;
         Ok(limits)
+    }
+}
+
+/// The name of an order for people: hold, resume and abort share a slot.
+pub fn order_name(order: &Slot) -> &'static str {
+    match order {
+        Slot::Constraints(Constraints { abort: true, .. }) => "abort",
+        Slot::Constraints(Constraints { hold: true, .. }) => "hold",
+        Slot::Constraints(_) => "resume",
+        other => other.id().name(),
     }
 }
 

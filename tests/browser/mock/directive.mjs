@@ -18,11 +18,11 @@ export class Directive {
     this.refuseNext = new Set();
   }
 
-  issue(slot, nowS, onApplied) {
+  issue(slot, nowS, onApplied, name = slot) {
     const version = (this.slots.get(slot)?.version ?? 0) + 1;
-    const made = { slot, version, state: "queued", reason: null, issued_s: nowS, changed_s: nowS, onApplied };
+    const made = { slot, name, version, state: "queued", reason: null, issued_s: nowS, changed_s: nowS, onApplied };
     this.slots.set(slot, made);
-    return { slot, version };
+    return { slot, name, version };
   }
 
   /** The surface's turn: whatever is queued goes on air. */

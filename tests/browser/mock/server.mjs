@@ -127,7 +127,7 @@ async function post(mock, req, res, path) {
     return emit(mock, "state", mission.json());
   }
   const isRecord = /\/(labels|draft|notes|dismiss|markers|markers\/remove)$/.test(path);
-  const kind = path.endsWith("/settings") ? "settings" : given.hold || given.abort ? "stop" : "order";
+  const kind = path.endsWith("/settings") ? "settings" : ["hold", "abort"].includes(given.action) ? "stop" : "order";
   const refused = isRecord ? null : mission.command.refusal(by, kind);
   if (refused) return reply(res, refused[0], { error: refused[1] });
   if (!isRecord) mission.command.order(by, kind, mission.nowS);
@@ -141,7 +141,7 @@ async function post(mock, req, res, path) {
     Object.assign(mission, { budgetBps: bps, shares: given.shares ?? mission.shares, background: given.background ?? mission.background });
     mission.handleBudget();
     const versions = mission.vehicles.map((v) => [v.id, v.directive.issue("budget", mission.nowS).version]);
-    return accepted(mock, res, { slot: "budget", versions: Object.fromEntries(versions) });
+    return accepted(mock, res, { slot: "budget", name: "budget", versions: Object.fromEntries(versions) });
   }
   const [, id, resource] = path.match(/^vehicles\/(\d+)\/([\w-]+)(?:\/(?:dismiss|remove))?$/) ?? [];
   const v = mission.vehicles.find((x) => x.id === Number(id));
@@ -168,8 +168,8 @@ async function post(mock, req, res, path) {
   if (resource === "exemplars") return accepted(mock, res, v.request(given, mission.nowS));
   if (resource === "constraints") {
     return accepted(mock, res, v.directive.issue("constraints", mission.nowS, (s) => {
-      if (s === "applied") Object.assign(v, { hold: given.hold, aborted: given.abort === true });
-    }));
+      if (s === "applied") Object.assign(v, { hold: given.action === "hold", aborted: given.action === "abort" });
+    }, given.action));
   }
   if (resource === "settings") {
     const wrong = faultOf(given);
@@ -179,7 +179,7 @@ async function post(mock, req, res, path) {
     if ("planner" in given) v.planner = given.planner || null;
     return accepted(mock, res, v.directive.issue("settings", mission.nowS, (s) => v.settings.finish(s)));
   }
-  const orders = { fence: () => fence(given), limits: () => limits(given), areas: () => given, destination: () => given };
+  const orders = { fence: () => fence({ ...v.fence, ...given }), limits: () => limits({ ...v.limits, ...given }), areas: () => given, destination: () => given };
   if (resource in orders) {
     const order = orders[resource]();
     v[resource] = order;

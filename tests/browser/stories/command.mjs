@@ -32,7 +32,7 @@ export default [
       await s.page.locator("#command").click();
       await s.shows("#dialog", /You are victor, viewer/);
       assert.equal(await s.button("Take command").count(), 0);
-      const answer = await s.page.evaluate(() => fetch("/api/v2/vehicles/1/constraints", { method: "POST", headers: { "x-scenecast": "1" }, body: '{"hold": true}' }).then((r) => r.status));
+      const answer = await s.page.evaluate(() => fetch("/api/v2/vehicles/1/constraints", { method: "POST", headers: { "x-scenecast": "1" }, body: '{"action": "hold"}' }).then((r) => r.status));
       assert.equal(answer, 403);
     },
     tolerates: /403/,
@@ -49,11 +49,11 @@ export default [
       assert.ok(await s.page.locator("#send-weights").isDisabled());
       await s.page.locator("#hold").click();
       await s.button("Hold").click();
-      await s.until("the order", () => s.posts.some((p) => p.path.endsWith("/constraints") && p.body.hold === true));
+      await s.until("the order", () => s.posts.some((p) => p.path.endsWith("/constraints") && p.body.action === "hold"));
       await s.page.locator("#abort").click();
       await s.page.locator(".sure input").check();
       await s.button("Abort").click();
-      await s.until("the abort", () => s.posts.some((p) => p.path.endsWith("/constraints") && p.body.abort === true));
+      await s.until("the abort", () => s.posts.some((p) => p.path.endsWith("/constraints") && p.body.action === "abort"));
       await s.shows("#command", /anna has command/);
       assert.equal(await s.page.locator("#vehicle .error").first().innerText(), "");
     },

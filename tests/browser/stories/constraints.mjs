@@ -94,6 +94,27 @@ export default [
     },
   },
   {
+    name: "a fence is sent once it is closed, and says before what it would cut off",
+    scenario: "rich",
+    async run(s) {
+      await click(s, [0.5, 0.5]);
+      await s.visible("#place");
+      await open(s);
+      await s.button("Draw fence").click();
+      await s.visible("#place", false);
+      for (const at of [[0.3, 0.3], [0.7, 0.3], [0.7, 0.7], [0.3, 0.7]]) await click(s, at);
+      assert.ok(await sendFence(s).isDisabled());
+      assert.equal(await s.page.locator("#fence-preview").isVisible(), false);
+      await s.button("Done drawing").click();
+      await s.shows("#fence-preview", /^Area [\d\s]+ m\u00b2\. [\d\s]+ of [\d\s]+ explored cells lie outside .* from the nearest edge/);
+      assert.equal(await sendFence(s).isDisabled(), false);
+      await sendFence(s).click();
+      await s.until("the message", () => s.posts.some((p) => p.path.endsWith("/fence")));
+      const { fence, ...others } = s.posts.at(-1).body;
+      assert.deepEqual([fence.length, others], [4, { keep_outs: [], return_point: null }]);
+    },
+  },
+  {
     name: "a fence under way is dashed, one in force solid",
     scenario: "rich",
     async run(s) {
@@ -293,7 +314,7 @@ export default [
       await s.page.getByLabel("Yes, abort").check();
       await go.click();
       await s.until("the message", () => s.posts.length > 0);
-      assert.deepEqual(s.posts.at(-1).body, { hold: false, abort: true });
+      assert.deepEqual(s.posts.at(-1).body, { action: "abort" });
       await s.shows("#vehicle .mode", /abort/, { advance: 4 });
       assert.ok(await s.page.locator("#resume").isVisible());
     },
@@ -330,7 +351,7 @@ export default [
       await s.shows("[aria-labelledby=fence-title] .replaced", /Changed by another console \(version 2\) after your order/);
       await s.page.getByRole("button", { name: "Fence: 3 corners, as numbers" }).waitFor();
       await draw(s, "Add keep-out", [0.1, 0.1], [0.2, 0.1], [0.2, 0.2]);
-      await s.post("/vehicles/1/fence", {});
+      await s.post("/vehicles/1/fence", { fence: null });
       await s.shows("[aria-labelledby=fence-title] .replaced", /meanwhile: Send replaces that change/);
       await s.button("Discard fence edits").click();
       await s.until("theirs", async () => (await s.page.locator(".outlines > li").count()) === 0);

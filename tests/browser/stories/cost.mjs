@@ -10,7 +10,7 @@ export default [
     name: "the page is usable within a second and under 400 kB",
     bare: true,
     async run(s) {
-      const cdp = await s.context.newCDPSession(s.page);
+      const cdp = await s.devtools();
       await cdp.send("Network.enable");
       await cdp.send("Network.setCacheDisabled", { cacheDisabled: true });
       const kinds = new Map();
@@ -83,7 +83,7 @@ export default [
     name: "a map update is painted within 200 ms of its arrival at the surface",
     unmocked: true,
     async run(s) {
-      await s.post("/vehicles/1/constraints", { hold: false });
+      await s.post("/vehicles/1/constraints", { action: "resume" });
       const [ms, machine] = await latency(s);
       s.within(PAINTED_MS, ms - machine, `median ${Math.round(ms)} ms from arrival to paint, of which other programs take ${Math.round(machine)} ms`);
     },
@@ -92,7 +92,7 @@ export default [
     name: "a session of hours and thousands of events neither leaks nor slows",
     scenario: "rich",
     async run(s) {
-      const cdp = await s.context.newCDPSession(s.page);
+      const cdp = await s.devtools();
       let events = 0;
       const run = async (batches) => {
         for (let i = 0; i < batches; i += 1) {

@@ -154,7 +154,7 @@ export default [
     ends: true,
     async run(s) {
       const { link: { budget_bps } } = await s.get("/state");
-      await s.post("/vehicles/1/constraints", { hold: false });
+      await s.post("/vehicles/1/constraints", { action: "resume" });
       await s.post("/budget", { budget_bps: 400 });
       await s.until("a backlog", async () => (await s.vehicle()).link.backlog?.bits > 0, { ms: 120000, advance: 2 });
       const shown = async () => bits(await s.page.locator("#link .values").innerText());

@@ -61,7 +61,7 @@ const onLeg = (s, tone) =>
   }, tone);
 
 async function pinch(s, from, to) {
-  const cdp = await s.context.newCDPSession(s.page);
+  const cdp = await s.devtools();
   const box = await s.page.locator("#chart").boundingBox();
   const fingers = (gap) => [-1, 1].map((side, id) => ({ x: box.x + box.width / 2 + (side * gap) / 2, y: box.y + box.height / 2, id }));
   await cdp.send("Input.dispatchTouchEvent", { type: "touchStart", touchPoints: fingers(from) });
@@ -185,10 +185,10 @@ export default [
       await s.steer({ placement: null, advance: 40 });
       await s.until("the next plan", () => plan(s, (c, before) => c.drawn && c.at !== before.at, first));
       await s.until("dashes on a leg", async () => (await onLeg(s, "text")) > 0.3);
-      await s.post("/vehicles/1/constraints", { hold: true, abort: false });
+      await s.post("/vehicles/1/constraints", { action: "hold" });
       await s.until("no path", () => s.inPage(({ store }) => store.vehicle.status.path.length === 0), { advance: 15 });
       await s.shows("#vehicle", /Path\s*–/s);
-      await s.post("/vehicles/1/constraints", { hold: false, abort: false });
+      await s.post("/vehicles/1/constraints", { action: "resume" });
       await s.until("a path again", () => plan(s, (c) => c.drawn), { advance: 15 });
     },
   },

@@ -98,15 +98,16 @@ export default [
       await open.click();
       await s.button("Hold").click();
       await s.shows("#vehicle .steps", /Queued/);
-      assert.deepEqual(s.posts.at(-1).body, { hold: true });
+      assert.deepEqual(s.posts.at(-1).body, { action: "hold" });
     },
   },
   {
     name: "a held vehicle shows its mode and can resume",
     scenario: "rich",
     async run(s) {
-      await s.post("/vehicles/1/constraints", { hold: true });
+      await s.post("/vehicles/1/constraints", { action: "hold" });
       await s.shows("#vehicle .mode", /hold/, { advance: 4 });
+      await s.shows("#banners", /does not survey.*holding: order/s);
       await s.page.locator("#hold").click();
       await s.button("Resume").click();
       await s.shows("#vehicle .mode", /survey/, { advance: 4 });
@@ -117,10 +118,10 @@ export default [
     scenario: "rich",
     async run(s) {
       await s.post("/vehicles/1/utility", { weights: { 1: 0.5 }, exploration: 0.2 });
-      await s.post("/vehicles/1/constraints", { hold: true });
+      await s.post("/vehicles/1/constraints", { action: "hold" });
       const late = await s.context.newPage();
       await late.goto(s.url);
-      await late.locator(".slots", { hasText: "Hold, abort" }).waitFor();
+      await late.locator(".slots", { hasText: "Hold" }).waitFor();
       await s.until("the weight", async () => (await late.getByRole("slider", { name: "Weight of Label 1", exact: true }).inputValue()) === "0.5");
     },
   },

@@ -7,7 +7,7 @@ const FRAME_MS = 20;
 
 /** Counts the bytes of responses on the wire, and lists the tiles that were requested. */
 async function network(s) {
-  const cdp = await s.context.newCDPSession(s.page);
+  const cdp = await s.devtools();
   await cdp.send("Network.enable");
   await cdp.send("Network.setCacheDisabled", { cacheDisabled: true });
   const found = { bytes: 0, mapBytes: 0, tiles: [] };

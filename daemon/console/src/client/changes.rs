@@ -85,7 +85,7 @@ fn of_vehicle(
     for s in &new.orders.directive.slots {
         let before = old.orders.directive.slots.iter().find(|o| o.slot == s.slot);
         if before.is_none_or(|o| (o.version, o.state) != (s.version, s.state)) {
-            add("directive", format!("{} {}", s.slot, text::order(s)));
+            add("directive", format!("{} {}", s.name, text::order(s)));
         }
     }
 }

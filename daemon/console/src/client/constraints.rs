@@ -5,11 +5,12 @@ use super::geojson::{self, CoordinateFrame};
 use super::session::Session;
 use super::text;
 use crate::orders::ConstraintsOrder;
-use crate::state::{AppliedOrder, InForceKnowledge, MissionState, OrderProgress, OrderStatus, VehicleState};
+use crate::state::{AppliedOrder, MissionState, OrderProgress, OrderStatus, VehicleState};
 use scenecast_core::UserError;
 use scenecast_core::{LatLon, TangentPlane};
 use scenecast_surface::{FenceOrder, LimitsOrder};
 use serde::Serialize;
+use serde_json::json;
 use std::fmt::Write;
 use std::path::Path;
 
@@ -60,13 +61,9 @@ pub async fn clear_fence(session: &Session) -> Result<(), UserError> {
 
 /// Moves the return point, in metres in the world frame, or removes it. Fence and keep-outs stay.
 pub async fn set_return_point(session: &Session, at: Option<[f64; 2]>) -> Result<(), UserError> {
+    FenceOrder { return_point: at, ..FenceOrder::default() }.read().map_err(UserError::Input)?;
     let state = session.state().await?;
-    let v = session.choose(&state)?;
-    let advice = "scenecast ctl fence set FILE replaces fence, keep-outs and return point as a whole";
-    let present = present_order(v, "fence", &v.orders.fence, &v.orders.fence_in_force, advice)?;
-    let order = FenceOrder { return_point: at, ..present };
-    order.read().map_err(UserError::Input)?;
-    send(session, v, "fence", &order).await
+    send(session, session.choose(&state)?, "fence", &json!({ "return_point": at })).await
 }
 
 /// Prints the last limits sent and those in force.
@@ -77,56 +74,15 @@ pub async fn show_limits(session: &Session) -> Result<(), UserError> {
     session.print(&view, || view.text(state.now_s, limits_text))
 }
 
-/// The order that a change of a part of it begins with: the one that is on its way to the vehicle, or else the one in force.
-///
-/// # Errors
-/// The vehicle may obey an order that this surface does not know, and the change would remove the rest of it.
-fn present_order<T: Clone + Default>(
-    vehicle: &VehicleState,
-    resource: &str,
-    sent: &Option<T>,
-    in_force: &Option<AppliedOrder<T>>,
-    advice: &str,
-) -> Result<T, UserError> {
-    let is_pending = |order: &OrderProgress| !matches!(order.state, OrderStatus::Applied | OrderStatus::Refused);
-    if slot(vehicle, resource).is_some_and(is_pending) {
-        return Ok(sent.clone().unwrap_or_default());
-    }
-    let reported = in_force.as_ref().map(|applied| applied.order.clone());
-    let known = match vehicle.orders.in_force.get(resource) {
-        Some(InForceKnowledge::None) => Some(T::default()),
-        Some(InForceKnowledge::Known) => reported,
-        Some(InForceKnowledge::NotReported) | None => reported.or_else(|| sent.clone()),
-        Some(InForceKnowledge::Unknown) => None,
-    };
-    known.ok_or_else(|| {
-        UserError::Input(format!(
-            "{}: this surface does not know yet which {resource} the vehicle obeys, so it cannot change a part: wait for \
-             the vehicle's report; {advice}",
-            vehicle.name
-        ))
-    })
-}
-
 /// Sends limits. Limits that are not given stay if `keep`, else they are removed.
-pub async fn set_limits(session: &Session, given: LimitsOrder, keep: bool) -> Result<(), UserError> {
+pub async fn set_limits(session: &Session, given: &LimitsOrder, keep: bool) -> Result<(), UserError> {
+    given.read().map_err(UserError::Input)?;
+    let mut order = json!(given);
+    if let Some(members) = order.as_object_mut().filter(|_| keep) {
+        members.retain(|_, value| !value.is_null());
+    }
     let state = session.state().await?;
-    let v = session.choose(&state)?;
-    let advice = "without --keep the limits that are not given are removed";
-    let present = || present_order(v, "limits", &v.orders.limits, &v.orders.limits_in_force, advice);
-    let last = if keep { present()? } else { LimitsOrder::default() };
-    let order = LimitsOrder {
-        depth_m: given.depth_m.or(last.depth_m),
-        altitude_m: given.altitude_m.or(last.altitude_m),
-        distance_m: given.distance_m.or(last.distance_m),
-        time_s: given.time_s.or(last.time_s),
-        silence_s: given.silence_s.or(last.silence_s),
-        on_silence: given.on_silence.or(last.on_silence),
-        on_breach: given.on_breach.or(last.on_breach),
-        on_abort: given.on_abort.or(last.on_abort),
-    };
-    order.read().map_err(UserError::Input)?;
-    send(session, v, "limits", &order).await
+    send(session, session.choose(&state)?, "limits", &order).await
 }
 
 /// Orders the vehicle to hold, to abort, or to resume its survey.

@@ -12,6 +12,7 @@ use std::time::Duration;
 struct OrderOutcome {
     vehicle: u8,
     slot: String,
+    name: String,
     version: u16,
     state: Option<OrderStatus>,
     reason: Option<String>,
@@ -23,13 +24,14 @@ pub(super) async fn follow(session: &Session, accepted: AcceptedOrder) -> Result
     let outcome = |(&vehicle, &version)| OrderOutcome {
         vehicle,
         slot: accepted.slot.clone(),
+        name: accepted.name.clone(),
         version,
         state: None,
         reason: None,
     };
     let mut outcomes: Vec<OrderOutcome> = accepted.versions.iter().map(outcome).collect();
     if wait.is_zero() {
-        let line = |o: &OrderOutcome| format!("vehicle {}: {} version {} is queued\n", o.vehicle, o.slot, o.version);
+        let line = |o: &OrderOutcome| format!("vehicle {}: {} version {} is queued\n", o.vehicle, o.name, o.version);
         return session.print(&outcomes, || outcomes.iter().map(line).collect());
     }
     if let Ok(Err(error)) = tokio::time::timeout(wait, wait_for_all(session, &mut outcomes)).await {
@@ -81,6 +83,6 @@ impl OrderOutcome {
     fn line(&self) -> String {
         let reason = self.reason.as_ref().map_or(String::new(), |reason| format!(": {reason}"));
         let state = self.state.map_or("not reported yet", text::order_status);
-        format!("vehicle {}: {} version {} {state}{reason}", self.vehicle, self.slot, self.version)
+        format!("vehicle {}: {} version {} {state}{reason}", self.vehicle, self.name, self.version)
     }
 }

@@ -79,7 +79,7 @@ fn vehicle(out: &mut String, v: &VehicleState, state: &MissionState) {
         let _ = writeln!(out, "  backlog    {}", backlog(b, now));
     }
     for s in &v.orders.directive.slots {
-        let _ = writeln!(out, "  {:<10} {}, {} ago", s.slot, order(s), span(now - s.changed_s));
+        let _ = writeln!(out, "  {:<10} {}, {} ago", s.name, order(s), span(now - s.changed_s));
     }
 }
 

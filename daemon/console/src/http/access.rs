@@ -7,8 +7,8 @@ use std::collections::VecDeque;
 use std::sync::{Mutex, PoisonError};
 use subtle::ConstantTimeEq;
 
-/// A further login ends the oldest session.
-const MAX_SESSIONS: usize = 64;
+/// Sessions of a principal; a further login ends the oldest of them, and never that of another principal.
+const MAX_SESSIONS: usize = 16;
 pub(super) const COOKIE: &str = "scenecast-session";
 /// Paths that the login form needs.
 const OPEN: [&str; 3] = ["/login", "/style.css", "/icon.svg"];
@@ -77,10 +77,13 @@ impl Access {
         getrandom::fill(&mut bytes).ok()?;
         let session = format!("{:032x}", u128::from_be_bytes(bytes));
         let mut sessions = self.sessions.lock().unwrap_or_else(PoisonError::into_inner);
-        sessions.push_back((session.clone(), principal));
-        if sessions.len() > MAX_SESSIONS {
-            sessions.pop_front();
+        let is_of_principal = |(_, of): &(String, Principal)| *of == principal;
+        if sessions.iter().filter(|held| is_of_principal(held)).count() >= MAX_SESSIONS
+            && let Some(oldest) = sessions.iter().position(is_of_principal)
+        {
+            sessions.remove(oldest);
         }
+        sessions.push_back((session.clone(), principal));
         Some(session)
     }
 
@@ -143,7 +146,7 @@ mod tests {
     }
 
     #[test]
-    fn a_session_ends_at_the_logout_and_after_many_others() {
+    fn a_session_ends_at_the_logout_and_after_many_of_its_principal() {
         let access = access();
         let begin = |token| access.begin_session(access.principal_of_token(token).unwrap()).unwrap();
         let cookie = |session: &str| with(header::COOKIE, &format!("theme=dark; {COOKIE}={session}"));
@@ -152,6 +155,8 @@ mod tests {
         assert_eq!(name(&access, &cookie("")), None);
         access.end_session(&first);
         assert_eq!((name(&access, &first), name(&access, &second).as_deref()), (None, Some("anna")));
+        (0..9 * MAX_SESSIONS).for_each(|_| drop(begin("fedcba9876543210")));
+        assert_eq!(name(&access, &second).as_deref(), Some("anna"), "logins of others");
         (0..MAX_SESSIONS).for_each(|_| drop(begin("0123456789abcdef")));
         assert_eq!(name(&access, &second), None);
     }

@@ -5,7 +5,7 @@ use super::response::error;
 use axum::Extension;
 use axum::extract::{Request, State};
 use axum::http::uri::Authority;
-use axum::http::{HeaderMap, HeaderName, HeaderValue, Method, StatusCode, header};
+use axum::http::{HeaderMap, HeaderName, HeaderValue, Method, StatusCode, Uri, header};
 use axum::middleware::Next;
 use axum::response::{IntoResponse, Redirect, Response};
 use scenecast_surface::{Principal, Role};
@@ -26,7 +26,7 @@ pub(super) async fn guard(State(access): State<Arc<Access>>, mut request: Reques
     if let Some(principal) = principal {
         request.extensions_mut().insert(principal);
     }
-    let mut response = match check(request.method(), request.uri().path(), request.headers(), &access.names) {
+    let mut response = match check(request.method(), request.uri(), request.headers(), &access.names) {
         _ if !is_known(request.method()) => unknown_method(),
         Err(reason) => error(StatusCode::FORBIDDEN, reason),
         Ok(()) if !is_admitted => unauthorized(request.uri().path()),
@@ -84,9 +84,16 @@ fn unauthorized(path: &str) -> Response {
 }
 
 /// Refuses a host name that the DNS of another site points here, and requests of pages from another origin.
-fn check(method: &Method, path: &str, headers: &HeaderMap, names: &HostNames) -> Result<(), &'static str> {
+fn check(method: &Method, uri: &Uri, headers: &HeaderMap, names: &HostNames) -> Result<(), &'static str> {
     let text = |name| headers.get(name).and_then(|v: &HeaderValue| v.to_str().ok());
     let host = text(header::HOST).ok_or("the request has no Host")?;
+    // A program between may read another one of two names than this one.
+    if headers.get_all(header::HOST).iter().count() > 1 {
+        return Err("the request has several Hosts");
+    }
+    if uri.authority().is_some_and(|named| !named.as_str().eq_ignore_ascii_case(host)) {
+        return Err("the request names one host in its address and another one in Host");
+    }
     if !is_ours(host, names) {
         return Err(match names {
             HostNames::Loopback => "this page is served to this machine only",
@@ -100,7 +107,7 @@ fn check(method: &Method, path: &str, headers: &HeaderMap, names: &HostNames) ->
     }
     // A form cannot send the header; our login form has the token instead.
     let is_read = matches!(*method, Method::GET | Method::HEAD);
-    if !is_read && path != "/login" && text(HeaderName::from_static("x-scenecast")) != Some("1") {
+    if !is_read && uri.path() != "/login" && text(HeaderName::from_static("x-scenecast")) != Some("1") {
         return Err("a POST needs the header X-Scenecast: 1");
     }
     Ok(())
@@ -138,7 +145,20 @@ mod tests {
         pairs: &[(&'static str, &'static str)],
     ) -> Result<(), &'static str> {
         let headers = pairs.iter().map(|(k, v)| (HeaderName::from_static(k), HeaderValue::from_static(v)));
-        check(&method, "/api/v2/budget", &headers.collect(), names)
+        check(&method, &Uri::from_static("/api/v2/budget"), &headers.collect(), names)
+    }
+
+    #[test]
+    fn a_request_names_one_host() {
+        let named = |uri: &'static str, hosts: &[&'static str]| {
+            let mut headers = HeaderMap::new();
+            headers.extend(hosts.iter().map(|host| (header::HOST, HeaderValue::from_static(host))));
+            check(&Method::GET, &Uri::from_static(uri), &headers, &HostNames::Loopback)
+        };
+        assert!(named("http://localhost:1/", &["localhost:1"]).is_ok());
+        assert!(named("/", &["localhost:1", "evil.example"]).unwrap_err().contains("several Hosts"));
+        assert!(named("/", &["localhost:1", "localhost:1"]).is_err());
+        assert!(named("http://evil.example/", &["localhost:1"]).unwrap_err().contains("in its address"));
     }
 
     fn checked(method: Method, pairs: &[(&'static str, &'static str)]) -> Result<(), &'static str> {

@@ -12,7 +12,7 @@ use axum::http::StatusCode;
 use axum::http::request::Parts;
 use axum::response::Response;
 use scenecast_protocol::map::Cell;
-use scenecast_surface::Principal;
+use scenecast_surface::{OrderKind, Principal};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use tokio::sync::{Mutex, Semaphore, mpsc, oneshot, watch};
@@ -81,6 +81,15 @@ impl Shared {
 
     async fn send(&self, request: ClientRequest) -> Result<Reply, Response> {
         let busy = || error(StatusCode::SERVICE_UNAVAILABLE, "too many requests at once");
+        // Many readings leave room for orders, and many orders for a hold.
+        let kept_free = match request.request.order_kind() {
+            None => self.requests.max_capacity() / 2,
+            Some(OrderKind::Stop) => 0,
+            Some(_) => self.requests.max_capacity() / 4,
+        };
+        if self.requests.capacity() <= kept_free {
+            return Err(busy());
+        }
         let (sender, reply) = oneshot::channel();
         self.requests.try_send((request, sender)).map_err(|_| busy())?;
         reply.await.map_err(|_| busy())

@@ -1,10 +1,12 @@
 //! Requests in words, for the log of the mission.
 
 use super::SurfaceRequest;
+use crate::order_changes::OrderChanges;
 use crate::orders::{ExemplarAction, LabelOrder};
 use scenecast_protocol::directive::Constraints;
 use scenecast_protocol::wire::Address;
-use scenecast_surface::LogKind;
+use scenecast_surface::{LimitsOrder, LogKind};
+use serde_json::Value;
 use std::collections::BTreeMap;
 
 /// The vehicle, the kind and the text of the entry for a request; `None` if it changes nothing that the log has.
@@ -29,10 +31,17 @@ pub(super) fn describe(request: &SurfaceRequest) -> Option<(Option<Address>, Log
         R::Constraints(id, Constraints { hold: true, .. }) | R::Hold(id, true) => order(*id, "hold".into()),
         R::Constraints(id, _) | R::Hold(id, false) => order(*id, "resume".into()),
         R::Fence(id, fence) => {
-            let outline = fence.fence.as_ref().map_or("no fence".to_owned(), |f| format!("{} corners", f.len()));
-            order(*id, format!("fence: {outline}, {} keep-outs", fence.keep_outs.len()))
+            let count = |value: &Value| value.as_array().map_or(0, Vec::len);
+            let part = |(name, value): (&String, &Value)| match name.as_str() {
+                "fence" if value.is_null() => "no fence".to_owned(),
+                "fence" => format!("{} corners", count(value)),
+                "keep_outs" => format!("{} keep-outs", count(value)),
+                _ if value.is_null() => "no return point".to_owned(),
+                _ => format!("return point {value}"),
+            };
+            order(*id, format!("fence: {}", fence.named().iter().map(part).collect::<Vec<_>>().join(", ")))
         }
-        R::Limits(id, limits) => order(*id, format!("limits: {}", members(limits))),
+        R::Limits(id, limits) => order(*id, format!("limits: {}", limits_named(limits))),
         R::Areas(id, areas) => {
             let weights: Vec<String> = areas.areas.iter().map(|area| place(&area.outline, area.weight)).collect();
             order(*id, if weights.is_empty() { "no areas".into() } else { format!("areas: {}", weights.join(", ")) })
@@ -77,6 +86,17 @@ fn utility(weights: &BTreeMap<u8, f64>, (exploration, curiosity): (f64, f64)) ->
     if all.is_empty() { "weights: all 0".to_owned() } else { format!("weights: {}", all.join(", ")) }
 }
 
+/// The limits that an order names, those that it removes last.
+fn limits_named(order: &OrderChanges<LimitsOrder>) -> String {
+    if order.is_whole() {
+        return format!("{}; no others", members(order.named()));
+    }
+    let removed: Vec<String> =
+        order.named().iter().filter(|(_, v)| v.is_null()).map(|(name, _)| name.replace('_', " ")).collect();
+    let stated = members(order.named());
+    if removed.is_empty() { stated } else { format!("{stated}; removed: {}", removed.join(", ")) }
+}
+
 /// The members of an order that it states.
 fn members(order: &impl serde::Serialize) -> String {
     let value = serde_json::to_value(order).unwrap_or_default();
@@ -97,8 +117,13 @@ mod tests {
         assert_eq!(text(weights), Some(("order", "weights: label 3 +0.80, unexplored +0.10".into())));
         let limits = LimitsOrder { time_s: Some(600.0), on_silence: Some("hold".into()), ..LimitsOrder::default() };
         assert_eq!(
-            text(SurfaceRequest::Limits(1, limits)),
-            Some(("order", "limits: on silence hold, time s 600.0".into()))
+            text(SurfaceRequest::Limits(1, OrderChanges::whole(&limits))),
+            Some(("order", "limits: on silence hold, time s 600.0; no others".into()))
+        );
+        let changes = serde_json::from_str(r#"{"depth_m": null, "time_s": 60}"#).unwrap();
+        assert_eq!(
+            text(SurfaceRequest::Limits(1, changes)),
+            Some(("order", "limits: time s 60; removed: depth m".into()))
         );
         let to = DestinationOrder { place: Some([1.0, -2.5]) };
         assert_eq!(text(SurfaceRequest::Destination(1, to)), Some(("order", "destination: E 1.0 N -2.5 m".into())));

@@ -14,7 +14,7 @@ use scenecast_protocol::link::{InForce, PeerView};
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::{Address, DiskReport, FrameTie, Intent, RegistrationReport, VehicleMode, VehicleStatus};
 use scenecast_surface::record::{StoredDraft, StoredMarker, StoredNote};
-use scenecast_surface::{SettingsOrder, Surface, Track, VehicleRecord};
+use scenecast_surface::{SettingsOrder, Surface, Track, VehicleRecord, order_name};
 
 pub(super) fn vehicles(surface: &Surface, facts: &MissionFacts, now: Instant) -> Vec<VehicleState> {
     let all = surface.vehicles();
@@ -282,6 +282,7 @@ fn order_progress(s: &SlotProgress) -> OrderProgress {
     };
     OrderProgress {
         slot: s.id.name().to_owned(),
+        name: order_name(&s.slot).to_owned(),
         version: s.version,
         state,
         reason,

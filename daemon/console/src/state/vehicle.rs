@@ -313,6 +313,8 @@ pub struct AppliedOrder<T> {
 pub struct OrderProgress {
     /// The slot: utility, requests, constraints, fix, budget and others.
     pub slot: String,
+    /// What is ordered: hold, resume or abort in the slot constraints, which they share; else as the slot.
+    pub name: String,
     /// A number that grows with each order.
     pub version: u16,
     /// The status of the order.

@@ -1,6 +1,6 @@
 //! Orders of ROS 2 as requests of the surface. Nothing here does IO.
 
-use scenecast_console::SurfaceRequest;
+use scenecast_console::{OrderChanges, SurfaceRequest};
 use scenecast_messages::geometry_msgs::Polygon;
 use scenecast_messages::scenecast_msgs::{Abort, Fence, Hold, Utility};
 use scenecast_messages::std_msgs::Header;
@@ -44,14 +44,12 @@ pub(super) fn fence(vehicle: u8, order: &Fence) -> Result<SurfaceRequest, String
         return Err(format!("{} keep-outs: it takes {MAX_OUTLINES} or fewer", order.keep_outs.len()));
     }
     let point = &order.return_point;
-    Ok(SurfaceRequest::Fence(
-        vehicle,
-        FenceOrder {
-            fence: (!order.outline.points.is_empty()).then(|| outline(&order.outline)).transpose()?,
-            keep_outs: order.keep_outs.iter().map(outline).collect::<Result<_, _>>()?,
-            return_point: order.has_return_point.then_some([point.x, point.y]),
-        },
-    ))
+    let whole = FenceOrder {
+        fence: (!order.outline.points.is_empty()).then(|| outline(&order.outline)).transpose()?,
+        keep_outs: order.keep_outs.iter().map(outline).collect::<Result<_, _>>()?,
+        return_point: order.has_return_point.then_some([point.x, point.y]),
+    };
+    Ok(SurfaceRequest::Fence(vehicle, OrderChanges::whole(&whole)))
 }
 
 fn outline(polygon: &Polygon) -> Result<Vec<[f64; 2]>, String> {
@@ -96,6 +94,7 @@ mod tests {
             ..Fence::default()
         };
         let Ok(SurfaceRequest::Fence(2, order)) = fence(2, &kept) else { panic!("no fence") };
+        let order = order.applied_to(|| panic!("it names every member")).unwrap();
         assert_eq!(order.fence.unwrap()[2], [9.0, 9.0]);
         assert_eq!((order.keep_outs.len(), order.return_point), (0, Some([1.0, 2.0])));
     }

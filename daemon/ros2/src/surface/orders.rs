@@ -73,7 +73,7 @@ fn outcome(name: &str, by: &Principal, reply: Result<Option<Reply>, String>) -> 
     match reply {
         Ok(Some(Reply::Accepted(order))) => {
             let version = order.version.map(|version| format!(" {version}")).unwrap_or_default();
-            (Event::INFO, format!("{name} of {}: accepted as {}{version}", by.name(), order.slot))
+            (Event::INFO, format!("{name} of {}: accepted as {}{version}", by.name(), order.name))
         }
         Ok(Some(Reply::Forbidden(reason) | Reply::NotInCommand(reason) | Reply::Refused(reason))) => refused(&reason),
         Ok(Some(Reply::NotFound)) => refused("no such vehicle or label"),

@@ -28,7 +28,10 @@ impl Node {
 
     #[cfg(feature = "surface")]
     pub(super) fn run_surface(self) -> Result<(), UserError> {
-        scenecast_runtime::run_surface(scenecast_config::load(Some(&self.config), &self.sets)?, simulator())
+        scenecast_runtime::run_surface(
+            Box::new(move || scenecast_config::load(Some(&self.config), &self.sets)),
+            simulator(),
+        )
     }
 }
 

@@ -8,6 +8,7 @@ use super::event::{
     VehicleEvent,
 };
 use super::former_labels::FormerLabels;
+use crate::log::make_room;
 use scenecast_protocol::map::{Cell, LabelTree};
 use scenecast_protocol::time::Instant;
 use std::collections::{BTreeMap, VecDeque};
@@ -110,7 +111,7 @@ impl SurfaceMemory {
             EventKind::Vehicle(address, event) => self.vehicles.entry(*address).or_default().apply(event),
             EventKind::Logged(entry) => {
                 self.log.push_back(entry.clone());
-                self.log.drain(..self.log.len().saturating_sub(MAX_LOG));
+                make_room(&mut self.log, StoredLogEntry::is_edit);
             }
             EventKind::Command(command) => self.command = command.clone(),
             EventKind::CommandChanged(change) => {

@@ -4,7 +4,7 @@
 //   { outlines: [{ kind: "fence" | "keep_out" | "area", points: [[x, y], ..], weight }], returnPoint: [x, y] | null }
 //   metres in the world; only an area has a weight, and only the first plan a return point
 
-import { covers, holds, MAX_DISTANCE_M, MAX_KEEP_OUTS, outlineFault } from "./polygon.js";
+import { areaOf, covers, distanceTo, holds, MAX_DISTANCE_M, MAX_KEEP_OUTS, outlineFault } from "./polygon.js";
 
 export function fromServer(fence) {
   const outlines = (fence?.keep_outs ?? []).map((points) => ({ kind: "keep_out", points }));
@@ -12,12 +12,29 @@ export function fromServer(fence) {
   return { outlines, returnPoint: fence?.return_point ?? null };
 }
 
-export function toOrder({ outlines, returnPoint }) {
-  const order = { keep_outs: outlines.filter((o) => o.kind === "keep_out").map((o) => o.points) };
-  const fence = outlines.find((o) => o.kind === "fence");
-  if (fence) order.fence = fence.points;
-  if (returnPoint) order.return_point = returnPoint;
-  return order;
+/** The whole order: a member that is null removes what is in force. */
+export const toOrder = ({ outlines, returnPoint }) => ({
+  fence: fenceOf({ outlines })?.points ?? null,
+  keep_outs: outlines.filter((o) => o.kind === "keep_out").map((o) => o.points),
+  return_point: returnPoint,
+});
+
+const fenceOf = ({ outlines }) => outlines.find((o) => o.kind === "fence") ?? null;
+
+/**
+ * What a sound plan with a fence means for a vehicle at `at`: the area inside in square metres, the number of the `cells` (centres in the
+ * world) that it cuts off, whether the vehicle is inside, and the distance from the vehicle to the nearest edge. Null without a fence.
+ */
+export function consequences(plan, cells, at) {
+  const fence = fenceOf(plan);
+  if (!fence) return null;
+  const allows = (place) => plan.outlines.every((o) => o.kind === "area" || holds(o.points, place) === (o.kind === "fence"));
+  return {
+    area: areaOf(fence.points),
+    cut: cells.filter((cell) => !allows(cell)).length,
+    isInside: at === null || allows(at),
+    distance: at && Math.min(...plan.outlines.map((o) => distanceTo(o.points, at))),
+  };
 }
 
 /** The plan of weighted areas. */
@@ -36,7 +53,7 @@ export function nameOutline({ outlines }, i) {
 
 /** The fault of each outline and of the return point: one line, or null. */
 export function faults({ outlines, returnPoint }) {
-  const fence = outlines.find((o) => o.kind === "fence");
+  const fence = fenceOf({ outlines });
   const own = outlines.map((o) => outlineFault(o.points));
   const sound = outlines.filter((_, i) => own[i] === null);
   const of = outlines.map((o, i) => {

@@ -69,5 +69,15 @@ export function covers(points, fence) {
   return apart && field.every((p) => contains(keepOut, p));
 }
 
+/** The area of an outline in metres, square metres. */
+export const areaOf = (points) => Math.abs(edges(points).reduce((sum, [a, b]) => sum + a[0] * b[1] - b[0] * a[1], 0)) / 2;
+
+/** The distance of a place from the nearest edge of an outline, metres. */
+export const distanceTo = (points, [x, y]) => Math.min(...edges(points).map(([[ax, ay], [bx, by]]) => {
+  const [dx, dy] = [bx - ax, by - ay];
+  const along = Math.max(0, Math.min(1, ((x - ax) * dx + (y - ay) * dy) / (dx * dx + dy * dy || 1)));
+  return Math.hypot(ax + along * dx - x, ay + along * dy - y);
+}));
+
 /** Whether (x, y) metres lies inside or on the edge of an outline in metres. */
 export const holds = (points, place) => contains(points.map(dm), dm(place));

@@ -1,6 +1,7 @@
 // The place that the operator has chosen on the map, and the markers around it. Places are in the world frame, metres.
 
 import { FONT, haloText } from "../canvas.js";
+import { pen } from "../fence/edit.js";
 import { store } from "../store.js";
 import { destinationOf, isSamePlace } from "./destination.js";
 
@@ -11,6 +12,8 @@ const MAX_TEXT = 24;
 export const chosen = { at: null, marker: null };
 
 store.on("select", clearPlace);
+// The plate of a place would cover corners of an outline.
+store.on("edit", () => pen.tool !== null && clearPlace());
 
 export const markers = () => store.vehicle?.markers ?? [];
 

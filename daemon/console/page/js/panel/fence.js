@@ -2,8 +2,9 @@
 
 import { h, show, text } from "../dom.js";
 import { begin, fenceOrder, finish, pen, pickTool, planOf, setReturnPoint } from "../fence/edit.js";
-import { faults, fromServer, isSound } from "../fence/plan.js";
-import { metres } from "../format.js";
+import { consequences, faults, fromServer, isSound } from "../fence/plan.js";
+import { count, metres, percent } from "../format.js";
+import { inWorld } from "../map/frames.js";
 import { orderFoot } from "../order/foot.js";
 import { slotOf } from "../order/status.js";
 import { store } from "../store.js";
@@ -12,6 +13,7 @@ import { onMap, outlineList, place } from "./outline-list.js";
 const list = outlineList(fenceOrder);
 const hint = h("p.hint", { role: "status" });
 const state = h("p.note");
+const preview = h("p.note", { id: "fence-preview" });
 const frame = h("p.note");
 const tools = {
   fence: h("button", { type: "button", onclick: () => onMap(() => begin(fenceOrder, "fence")) }, "Draw fence"),
@@ -29,7 +31,7 @@ const foot = orderFoot(fenceOrder, "Fence", "send-fence");
 
 export const fencePart = h("section.part", { "aria-labelledby": "fence-title" },
   h("h3", { id: "fence-title" }, "Fence, keep-outs, return point"), state, editInForce, frame,
-  h("div.buttons", {}, tools.fence, tools.keepOut, tools.returnPoint, tools.done), hint, list.node, returnBox, foot.node);
+  h("div.buttons", {}, tools.fence, tools.keepOut, tools.returnPoint, tools.done), hint, list.node, returnBox, preview, foot.node);
 
 const HINTS = {
   corner: "Click the map for each corner; click the first corner again, or Done, to close the outline. Keys: Enter sets a corner at the cross, Escape ends.",
@@ -43,7 +45,11 @@ export function update() {
   const { outlines, returnPoint } = plan;
   const isDrawing = pen.order === fenceOrder && pen.tool === "corner";
   if (isDrawing && !outlines[pen.outline]) pickTool(fenceOrder, null);
-  foot.update(vehicle, !isSound(plan) || wouldLiftUnknown(vehicle, plan));
+  const sound = isSound(plan);
+  foot.update(vehicle, !sound || isDrawing || wouldLiftUnknown(vehicle, plan));
+  const found = sound && !isDrawing && fenceOrder.isChanged(vehicle) ? describePlan(vehicle, plan) : null;
+  show(preview, found !== null);
+  text(preview, found ?? "");
   text(tools.fence, outlines[0]?.kind === "fence" ? "Extend fence" : "Draw fence");
   tools.returnPoint.setAttribute("aria-pressed", String(pen.tool === "return_point"));
   for (const [name, node] of Object.entries(tools)) show(node, (name === "done") === isDrawing);
@@ -57,6 +63,32 @@ export function update() {
   show(frame, Boolean(by));
   if (by) text(frame, `In metres of the world frame. Fixes have moved the map by ${metres(by.east_m)} east and ${metres(by.north_m)} north; outlines stay.`);
   show(editInForce, slotOf(vehicle, "fence")?.state === "refused" && Boolean(vehicle.fence_in_force));
+}
+
+/** What the plan would mean for the vehicle, before it is sent. */
+function describePlan(vehicle, plan) {
+  const s = vehicle.status;
+  const found = consequences(plan, cellsOf(vehicle), s && inWorld(vehicle, s.x_m, s.y_m));
+  if (!found) return fenceOrder.read(vehicle).outlines.some((o) => o.kind === "fence") ? "Without a fence: the order removes the one that was sent." : null;
+  const { cells } = cellsKept;
+  const cut = cells.length === 0 ? "" : ` ${count(found.cut)} of ${count(cells.length)} explored cells lie outside (${percent(found.cut / cells.length)}).`;
+  const where = found.distance === null ? "" : found.isInside
+    ? ` By its last report ${vehicle.name} is inside, ${metres(found.distance)} from the nearest edge.`
+    : ` By its last report ${vehicle.name} is where it must not be, ${metres(found.distance)} from the nearest edge: it will refuse this order.`;
+  return `Area ${count(found.area)} m\u00b2.${cut}${where}`;
+}
+
+/** The centres of the explored cells in the world, for the version of the map that was looked at last. */
+let cellsKept = { key: "", cells: [] };
+
+function cellsOf(vehicle) {
+  const { map } = store;
+  const key = `${vehicle.id} ${map?.tag} ${JSON.stringify(vehicle.map.placement)}`;
+  if (cellsKept.key !== key) {
+    const centre = ({ x, y }) => inWorld(vehicle, (x + 0.5) * map.cell_m, (y + 0.5) * map.cell_m);
+    cellsKept = { key, cells: map ? [...map.cells()].map(centre) : [] };
+  }
+  return cellsKept.cells;
 }
 
 function refreshReturnPoint(at, fault) {

@@ -28,7 +28,7 @@ const NAMES = Object.fromEntries([...BANDS, ...AMOUNTS, ...REACTIONS].map(([key,
 const KEYS = [...BANDS, ...AMOUNTS, ...REACTIONS].map(([key]) => key);
 const read = (v) => Object.fromEntries(KEYS.map((k) => [k, v.limits?.[k] ?? null]));
 const stated = (limits) => Object.fromEntries(Object.entries(limits).filter(([, value]) => value !== null));
-export const limitsOrder = new Order("limits", read, (v, value) => sendLimits(v.id, stated(value())));
+export const limitsOrder = new Order("limits", read, (v, value) => sendLimits(v.id, value()));
 
 /** The fault of a band [low, high], or null. */
 export function bandFault(band) {

@@ -9,15 +9,15 @@ import { store } from "../store.js";
 import { contact } from "./banners.js";
 
 const ORDERS = {
-  hold: { button: "Hold", question: (v) => `Hold ${v.name} where it is?`, body: { hold: true } },
-  resume: { button: "Resume", question: (v) => `Let ${v.name} resume its survey?`, body: { hold: false } },
-  abort: { button: "Abort", question: (v) => `Abort the mission of ${v.name}?`, body: { hold: false, abort: true }, grave: true },
+  hold: { button: "Hold", question: (v) => `Hold ${v.name} where it is?`, action: "hold" },
+  resume: { button: "Resume", question: (v) => `Let ${v.name} resume its survey?`, action: "resume" },
+  abort: { button: "Abort", question: (v) => `Abort the mission of ${v.name}?`, action: "abort", grave: true },
 };
 const STOPPED = ["return", "surface", "abort"];
 
 const sentVersions = new SentVersions("constraints");
 const replaced = replacedNote(sentVersions, "Hold");
-const status = orderStatus("Hold and abort");
+const status = orderStatus("Hold, resume or abort");
 const deniedLine = h("p.note.denied");
 const errorLine = h("p.error", { role: "alert" });
 const hold = h("button", { type: "button", id: "hold", onclick: () => confirm(holding(store.vehicle) ? ORDERS.resume : ORDERS.hold) });
@@ -85,7 +85,7 @@ function confirm(order) {
 async function send(v, order) {
   text(errorLine, "");
   try {
-    sentVersions.add(v, (await sendConstraints(v.id, order.body)).version);
+    sentVersions.add(v, (await sendConstraints(v.id, { action: order.action })).version);
   } catch (error) {
     text(errorLine, error.message);
   }

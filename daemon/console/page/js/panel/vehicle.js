@@ -9,7 +9,7 @@ import { describe, nameOfStatus } from "../order/status.js";
 import { ageOf, isHeard, isStale, store } from "../store.js";
 import { refreshStop, stopParts } from "./stop.js";
 
-const NAMES = { utility: "Weights", constraints: "Hold, abort", limits: "Limits", fence: "Fence", areas: "Areas", destination: "Destination", settings: "Settings", budget: "Budget", requests: "Images", fix: "Position fix" };
+const NAMES = { utility: "Weights", hold: "Hold", resume: "Resume", abort: "Abort", limits: "Limits", fence: "Fence", areas: "Areas", destination: "Destination", settings: "Settings", budget: "Budget", requests: "Images", fix: "Position fix" };
 const title = h("h2", { id: "vehicle-title" });
 const mode = h("span.mode");
 const age = h("p.age", { title: "The age of the last report, the time since the last frame, and the longest usual pause between two frames" });
@@ -129,7 +129,7 @@ const makeSlot = () => h("li.slot", {}, h("span.name"), h("span.version"), h("sp
 
 function refreshSlot(node, slot) {
   const [name, version, state, since] = node.children;
-  text(name, NAMES[slot.slot] ?? slot.slot);
+  text(name, NAMES[slot.name] ?? slot.name);
   text(version, `v${slot.version}`);
   text(state, nameOfStatus(slot.state));
   text(since, span(ageOf(slot.changed_s)));

@@ -6,10 +6,12 @@ use crate::http::seats::{MAX_STREAMS, Seat};
 use crate::http::shared::Shared;
 use crate::snapshot::Snapshot;
 use crate::state::MapEvent;
+use axum::Extension;
 use axum::body::{Body, Bytes};
 use axum::extract::State;
 use axum::http::{StatusCode, header};
 use axum::response::{IntoResponse, Response};
+use scenecast_surface::Principal;
 use std::collections::{BTreeMap, VecDeque};
 use std::convert::Infallible;
 use std::sync::Arc;
@@ -27,8 +29,11 @@ struct Feed {
 }
 
 /// The latest state after each change, and the maps that have changed. A slow reader misses states, but never the last one.
-pub(in crate::http) async fn events(State(shared): State<Shared>) -> Response {
-    let Some(seat) = shared.seats.take(Instant::now()) else {
+pub(in crate::http) async fn events(
+    State(shared): State<Shared>,
+    Extension(principal): Extension<Principal>,
+) -> Response {
+    let Some(seat) = shared.seats.take(principal.name(), Instant::now()) else {
         let line = format!("{MAX_STREAMS} streams of events are open, which is the maximum");
         return error(StatusCode::SERVICE_UNAVAILABLE, &line);
     };

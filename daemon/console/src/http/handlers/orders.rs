@@ -3,6 +3,7 @@
 use crate::http::body::JsonOrder;
 use crate::http::response::error;
 use crate::http::shared::{Shared, VehicleId};
+use crate::order_changes::OrderChanges;
 use crate::orders::{
     BudgetOrder, ConstraintsOrder, DismissOrder, DraftOrder, ExemplarOrder, LabelOrder, MarkerOrder, NoteOrder,
     RemoveMarkerOrder, UtilityOrder,
@@ -12,7 +13,6 @@ use axum::Extension;
 use axum::extract::State;
 use axum::http::StatusCode;
 use axum::response::Response;
-use scenecast_protocol::directive::Constraints;
 use scenecast_surface::{AreasOrder, DestinationOrder, FenceOrder, LimitsOrder, Principal, SettingsOrder};
 use std::collections::BTreeMap;
 
@@ -68,14 +68,14 @@ pub(in crate::http) async fn constraints(
     VehicleId(id): VehicleId,
     JsonOrder(order): JsonOrder<ConstraintsOrder>,
 ) -> Response {
-    shared.order(principal, SurfaceRequest::Constraints(id, Constraints { hold: order.hold, abort: order.abort })).await
+    shared.order(principal, SurfaceRequest::Constraints(id, order.action.into())).await
 }
 
 pub(in crate::http) async fn fence(
     State(shared): State<Shared>,
     Extension(principal): Extension<Principal>,
     VehicleId(id): VehicleId,
-    JsonOrder(order): JsonOrder<FenceOrder>,
+    JsonOrder(order): JsonOrder<OrderChanges<FenceOrder>>,
 ) -> Response {
     shared.order(principal, SurfaceRequest::Fence(id, order)).await
 }
@@ -84,7 +84,7 @@ pub(in crate::http) async fn limits(
     State(shared): State<Shared>,
     Extension(principal): Extension<Principal>,
     VehicleId(id): VehicleId,
-    JsonOrder(order): JsonOrder<LimitsOrder>,
+    JsonOrder(order): JsonOrder<OrderChanges<LimitsOrder>>,
 ) -> Response {
     shared.order(principal, SurfaceRequest::Limits(id, order)).await
 }

@@ -27,14 +27,16 @@ pub(super) fn operations() -> Vec<Operation> {
         order(
             "/api/v2/vehicles/{id}/constraints",
             "set_constraints",
-            "Orders the vehicle to hold, to abort, or to resume its survey. A hold and an abort do not need command.",
+            "Orders the vehicle to hold, to abort, or to resume its survey; each ends the one before it. A hold and an abort do \
+             not need command.",
             schema::<ConstraintsOrder>,
             || post(handlers::constraints),
         ),
         order(
             "/api/v2/vehicles/{id}/fence",
             "set_fence",
-            "Replaces the fence. Vertices are in metres east and north in the world frame and stay there when a fix moves the \
+            "Changes fence, keep-outs and return point. A member that is absent stays as it is, and null removes it; without \
+             knowledge of the present fence, all must be named. Vertices are in metres east and north in the world frame and stay there when a fix moves the \
              vehicle's map; 3 to 34 for each outline, at most 15 keep-outs. Refused: edges that cross or touch, no area, a \
              keep-out around the whole fence, a return point where the vehicle must not be, more than fits a frame. The \
              vehicle refuses a fence that it is outside of.",
@@ -44,7 +46,8 @@ pub(super) fn operations() -> Vec<Operation> {
         order(
             "/api/v2/vehicles/{id}/limits",
             "set_limits",
-            "Replaces the limits. Reactions are hold, return or surface. The vehicle refuses a band that it is outside of.",
+            "Changes limits. A member that is absent stays as it is, and null removes it; without knowledge of the present \
+             limits, all must be named. Reactions are hold, return or surface. The vehicle refuses a band that it is outside of.",
             schema::<LimitsOrder>,
             || post(handlers::limits),
         ),

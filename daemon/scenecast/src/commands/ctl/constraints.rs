@@ -2,7 +2,7 @@
 
 use clap::{Args, Subcommand};
 use scenecast_console::client::{self, FenceFile, Session};
-use scenecast_console::orders::ConstraintsOrder;
+use scenecast_console::orders::{ConstraintsAction, ConstraintsOrder};
 use scenecast_core::UserError;
 use scenecast_surface::LimitsOrder;
 use std::path::PathBuf;
@@ -126,17 +126,18 @@ pub(super) async fn limits(session: &Session, change: Option<LimitsCommand>) -> 
         on_breach: l.on_breach,
         on_abort: l.on_abort,
     };
-    client::set_limits(session, order, l.keep).await
+    client::set_limits(session, &order, l.keep).await
 }
 
 /// Orders the vehicle to hold or to resume.
 pub(super) async fn hold(session: &Session, hold: bool) -> Result<(), UserError> {
-    client::send_constraints(session, ConstraintsOrder { hold, abort: false }).await
+    let action = if hold { ConstraintsAction::Hold } else { ConstraintsAction::Resume };
+    client::send_constraints(session, ConstraintsOrder { action }).await
 }
 
 pub(super) async fn abort(session: &Session, yes: bool) -> Result<(), UserError> {
     if !yes {
         return Err(UserError::Input("an abort ends the survey of the vehicle: --yes confirms it".to_owned()));
     }
-    client::send_constraints(session, ConstraintsOrder { hold: false, abort: true }).await
+    client::send_constraints(session, ConstraintsOrder { action: ConstraintsAction::Abort }).await
 }
