@@ -81,6 +81,11 @@ pub enum SurfaceRequest {
 }
 
 impl SurfaceRequest {
+    /// Whether it changes nothing, so that it needs no principal.
+    pub(crate) fn is_reading(&self) -> bool {
+        self.order_kind().is_none() && !matches!(self, Self::Command(_))
+    }
+
     /// The kind of an order; `None` for readings, and for changes of command, which have rules of their own.
     pub(crate) fn order_kind(&self) -> Option<OrderKind> {
         match self {
@@ -142,9 +147,8 @@ pub enum Reply {
 pub fn handle_request(surface: &mut Surface, request: ClientRequest, cell_m: f64, now: Instant) -> Reply {
     let ClientRequest { principal, request } = request;
     let Some(by) = principal else {
-        let is_reading = request.order_kind().is_none() && !matches!(request, SurfaceRequest::Command(_));
         let anonymous = || Reply::Forbidden("an order needs a principal".to_owned());
-        return if is_reading { reply(surface, request, cell_m, now) } else { anonymous() };
+        return if request.is_reading() { reply(surface, request, cell_m, now) } else { anonymous() };
     };
     if let SurfaceRequest::Command(action) = &request {
         return match surface.change_command(&by, action, now) {
@@ -202,12 +206,13 @@ fn handle(surface: &mut Surface, request: SurfaceRequest, cell_m: f64, now: Inst
         }
         SurfaceRequest::Constraints(id, order) => {
             let vehicle = known(surface, id)?;
-            accepted_as(order_name(&Slot::Constraints(order)), vehicle, surface.set_order(vehicle, order, now))
+            let name = order_name(&Slot::Constraints(order));
+            accepted_as(SlotId::Constraints, name, vehicle, surface.set_order(vehicle, order, now))
         }
         SurfaceRequest::Hold(id, hold) => {
             let vehicle = known(surface, id)?;
             let name = if hold { "hold" } else { "resume" };
-            accepted_as(name, vehicle, surface.change_hold(vehicle, hold, now))
+            accepted_as(SlotId::Constraints, name, vehicle, surface.change_hold(vehicle, hold, now))
         }
         SurfaceRequest::Fence(id, order) => {
             let vehicle = known(surface, id)?;
@@ -291,15 +296,10 @@ pub fn archived_cells(map: &VehicleMemory, cell_m: f64) -> MapCells {
 }
 
 fn accepted(vehicle: Address, slot: SlotId, issued: Result<u16, String>) -> Reply {
-    accepted_order(slot, slot.name(), vehicle, issued)
+    accepted_as(slot, slot.name(), vehicle, issued)
 }
 
-/// The reply to a hold, a resume or an abort.
-fn accepted_as(name: &str, vehicle: Address, issued: Result<u16, String>) -> Reply {
-    accepted_order(SlotId::Constraints, name, vehicle, issued)
-}
-
-fn accepted_order(slot: SlotId, name: &str, vehicle: Address, issued: Result<u16, String>) -> Reply {
+fn accepted_as(slot: SlotId, name: &str, vehicle: Address, issued: Result<u16, String>) -> Reply {
     match issued {
         Ok(version) => Reply::Accepted(AcceptedOrder {
             slot: slot.name().to_owned(),

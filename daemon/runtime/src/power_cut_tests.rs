@@ -8,7 +8,7 @@ use scenecast_core::Area;
 use scenecast_core::tuning_table::TuningTable;
 use scenecast_host::{SurfaceHost, VehicleHost, VehicleHostEvent, channel_station};
 use scenecast_protocol::coordinates::WorldPoint;
-use scenecast_protocol::directive::{Fix, OrderStatus, SlotId};
+use scenecast_protocol::directive::{Fix, SlotId};
 use scenecast_protocol::mac::ModemProfile;
 use scenecast_protocol::map::Cell;
 use scenecast_protocol::time::Instant;
@@ -124,7 +124,7 @@ impl PowerCutTrial {
 
     fn is_converged(&self) -> bool {
         let mut slots = self.surface.surface().view(self.auv()).unwrap().slots();
-        slots.all(|s| matches!(s.status, OrderStatus::Applied | OrderStatus::Refused(_)))
+        slots.all(|s| !s.status.is_pending())
     }
 
     pub(super) fn tick(&mut self) {

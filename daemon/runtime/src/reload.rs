@@ -2,11 +2,18 @@
 
 use scenecast_config::Config;
 use scenecast_core::UserError;
+use scenecast_protocol::directive::Budget;
 #[cfg(unix)]
 use tokio::signal::unix::{Signal, SignalKind, signal};
 
 /// Reads a configuration, the same file and options each time.
 pub type Load = Box<dyn Fn() -> Result<Config, UserError>>;
+
+/// The budget, the shares and the background streams of a configuration: what a SIGHUP changes.
+pub(super) fn configured_budget(config: &Config) -> Budget {
+    let link = &config.link;
+    Budget { bits_per_s: link.budget_bps, shares: link.shares, background: link.background }
+}
 
 /// Reads the configuration again after each SIGHUP.
 pub(super) struct Reload {

@@ -7,7 +7,7 @@ use super::missing_key::warn_without_key;
 use super::modem::{self, ModemPort};
 use super::pilot::{self, PilotPort, SimulatedAutopilot};
 use super::private::keep_private;
-use super::reload::{Load, Reload};
+use super::reload::{Load, Reload, configured_budget};
 use super::ros2::SurfaceRos2;
 use super::stop::Stop;
 use super::store::{ArchivedFile, SurfaceFiles};
@@ -106,11 +106,6 @@ pub fn run_surface(load: Load, simulated: Option<SimulatedAutopilot>) -> Result<
         };
         shell.run(stop).await
     })
-}
-
-fn configured_budget(config: &Config) -> Budget {
-    let link = &config.link;
-    Budget { bits_per_s: link.budget_bps, shares: link.shares, background: link.background }
 }
 
 struct Ports {

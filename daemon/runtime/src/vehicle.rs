@@ -12,7 +12,7 @@ use super::missing_key::warn_without_key;
 use super::modem::{self, ModemPort};
 use super::pilot::{self, PilotPort, SimulatedAutopilot};
 use super::private::keep_private;
-use super::reload::{Load, Reload};
+use super::reload::{Load, Reload, configured_budget};
 use super::restore::{Start, start};
 use super::ros2::{RosSensors, VehicleRos2};
 use super::stop::Stop;
@@ -23,7 +23,6 @@ use scenecast_core::{Area, TangentPlane, UserError};
 use scenecast_files::{Recording, configured_recording, read_class_names};
 use scenecast_host::{CameraPose, VehicleHost, VehicleHostEvent, VehiclePilot, modem_station};
 use scenecast_labels::ImagePose;
-use scenecast_protocol::directive::Budget;
 use scenecast_protocol::map::LayerSet;
 use scenecast_vehicle::ForeignUpdate;
 use std::time::Duration;
@@ -247,8 +246,7 @@ impl VehicleShell {
 
     /// Replaces the budget and the shares that the surface ordered by those of the configuration.
     fn follow(&mut self, config: &Config) {
-        let link = &config.link;
-        let budget = Budget { bits_per_s: link.budget_bps, shares: link.shares, background: link.background };
+        let budget = configured_budget(config);
         let streams = budget.background.names(&LayerSet::default()).join(", ");
         tracing::info!("SIGHUP: budget {} bit/s, shares {:?} %, then {streams}", budget.bits_per_s, budget.shares.0);
         self.host.handle_budget(budget, self.clock.now());

@@ -72,7 +72,7 @@ fn follow_order<T: Clone + Default + PartialEq>(
 /// # Errors
 /// The vehicle may obey an order that this surface does not know, so that the rest of it would be removed.
 fn present<T: Clone + Default>(order: &SentOrder<T>, id: SlotId, view: &PeerView<'_>) -> Result<T, String> {
-    if status(view, id).is_some_and(|status| !matches!(status, OrderStatus::Applied | OrderStatus::Refused(_))) {
+    if status(view, id).is_some_and(OrderStatus::is_pending) {
         return Ok(order.sent.clone().unwrap_or_default());
     }
     let in_force = order.in_force.as_ref().map(|(_, content)| content.clone());

@@ -70,7 +70,7 @@ fn held(pair: &LinkedEnds) -> Vec<String> {
 fn assert_none_is_true(pair: &LinkedEnds) {
     let view = pair.surface.vehicle(auv()).unwrap();
     for id in REPORTED_SLOTS.into_iter().filter(|&id| view.in_force(id) == InForce::None) {
-        let waits = |s: OrderStatus| !matches!(s, OrderStatus::Applied | OrderStatus::Refused(_));
+        let waits = OrderStatus::is_pending;
         let is_ordered = view.slots().any(|s| s.id == id && waits(s.status));
         assert!(pair.vehicle.in_force(id).is_none() || is_ordered, "{id:?}: {:?}", pair.vehicle.in_force(id));
     }

@@ -77,7 +77,7 @@ impl OrderOutcome {
     }
 
     fn is_final(&self) -> bool {
-        matches!(self.state, Some(OrderStatus::Applied | OrderStatus::Refused))
+        self.state.is_some_and(|state| !state.is_pending())
     }
 
     fn line(&self) -> String {

@@ -77,11 +77,9 @@ impl Access {
         getrandom::fill(&mut bytes).ok()?;
         let session = format!("{:032x}", u128::from_be_bytes(bytes));
         let mut sessions = self.sessions.lock().unwrap_or_else(PoisonError::into_inner);
-        let is_of_principal = |(_, of): &(String, Principal)| *of == principal;
-        if sessions.iter().filter(|held| is_of_principal(held)).count() >= MAX_SESSIONS
-            && let Some(oldest) = sessions.iter().position(is_of_principal)
-        {
-            sessions.remove(oldest);
+        let held: Vec<usize> = (0..sessions.len()).filter(|&index| sessions[index].1 == principal).collect();
+        if held.len() >= MAX_SESSIONS {
+            sessions.remove(held[0]);
         }
         sessions.push_back((session.clone(), principal));
         Some(session)

@@ -48,8 +48,8 @@ impl Seats {
     pub(super) fn take(&self, principal: &str, now: Instant) -> Option<Seat> {
         let mut taken = self.lock();
         if taken.seats.len() >= MAX_STREAMS {
-            let mut counts: BTreeMap<String, usize> = BTreeMap::new();
-            taken.seats.values().for_each(|holder| *counts.entry(holder.principal.clone()).or_default() += 1);
+            let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
+            taken.seats.values().for_each(|holder| *counts.entry(&holder.principal).or_default() += 1);
             let held = counts.get(principal).copied().unwrap_or(0);
             let (greediest, most) = counts.into_iter().max_by_key(|(_, seats)| *seats)?;
             let (&oldest, holder) = taken.seats.iter().find(|(_, holder)| holder.principal == greediest)?;

@@ -83,9 +83,9 @@ impl Shared {
         let busy = || error(StatusCode::SERVICE_UNAVAILABLE, "too many requests at once");
         // Many readings leave room for orders, and many orders for a hold.
         let kept_free = match request.request.order_kind() {
-            None => self.requests.max_capacity() / 2,
             Some(OrderKind::Stop) => 0,
-            Some(_) => self.requests.max_capacity() / 4,
+            _ if request.request.is_reading() => self.requests.max_capacity() / 2,
+            _ => self.requests.max_capacity() / 4,
         };
         if self.requests.capacity() <= kept_free {
             return Err(busy());

@@ -342,3 +342,10 @@ pub enum OrderStatus {
     /// The vehicle refused the order; `reason` is why.
     Refused,
 }
+
+impl OrderStatus {
+    /// Whether the vehicle's decision is not known yet.
+    pub fn is_pending(self) -> bool {
+        matches!(self, Self::Queued | Self::OnAir | Self::Received)
+    }
+}

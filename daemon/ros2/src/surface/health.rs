@@ -76,8 +76,7 @@ fn state(vehicle: &VehicleState) -> Health {
 fn orders(vehicle: &VehicleState) -> Health {
     let slots = &vehicle.orders.directive.slots;
     let refused = slots.iter().find(|slot| slot.state == OrderStatus::Refused);
-    let is_done = |state: OrderStatus| matches!(state, OrderStatus::Applied | OrderStatus::Refused);
-    let pending = slots.iter().filter(|slot| !is_done(slot.state)).count();
+    let pending = slots.iter().filter(|slot| slot.state.is_pending()).count();
     let (level, message) = match refused {
         Some(slot) => {
             let reason = slot.reason.as_deref().unwrap_or("no reason given");

@@ -123,8 +123,7 @@ impl Trial {
     }
 
     fn is_converged(&self) -> bool {
-        let is_decided = |status| matches!(status, OrderStatus::Applied | OrderStatus::Refused(_));
-        self.orders().iter().all(|&(_, _, status)| is_decided(status))
+        self.orders().iter().all(|&(_, _, status)| !status.is_pending())
             && self.surface.surface().record(self.auv()).unwrap().earlier_map().is_none()
     }
 

@@ -20,18 +20,16 @@ pub(super) struct Node {
 
 impl Node {
     pub(super) fn run_vehicle(self) -> Result<(), UserError> {
-        scenecast_runtime::run_vehicle(
-            Box::new(move || scenecast_config::load(Some(&self.config), &self.sets)),
-            simulator(),
-        )
+        scenecast_runtime::run_vehicle(self.load(), simulator())
     }
 
     #[cfg(feature = "surface")]
     pub(super) fn run_surface(self) -> Result<(), UserError> {
-        scenecast_runtime::run_surface(
-            Box::new(move || scenecast_config::load(Some(&self.config), &self.sets)),
-            simulator(),
-        )
+        scenecast_runtime::run_surface(self.load(), simulator())
+    }
+
+    fn load(self) -> scenecast_runtime::Load {
+        Box::new(move || scenecast_config::load(Some(&self.config), &self.sets))
     }
 }
 

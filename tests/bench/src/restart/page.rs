@@ -95,8 +95,7 @@ impl Shown {
 
 /// An order that the vehicle has received is sent again after a restart of the vehicle.
 fn is_not_before(now: OrderStatus, then: OrderStatus) -> bool {
-    let is_final = |status| matches!(status, OrderStatus::Applied | OrderStatus::Refused);
-    is_final(now) || !is_final(then)
+    !now.is_pending() || then.is_pending()
 }
 
 impl Page {
@@ -185,7 +184,7 @@ impl Page {
 /// Whether the vehicle has decided about every order.
 pub(super) fn is_decided(vehicle: &VehicleState) -> bool {
     let slots = &vehicle.orders.directive.slots;
-    slots.iter().all(|s| matches!(s.state, OrderStatus::Applied | OrderStatus::Refused))
+    slots.iter().all(|s| !s.state.is_pending())
 }
 
 #[cfg(test)]

@@ -8,8 +8,6 @@ import { ago, freeSpace, missionTime, span } from "../format.js";
 import { ageOf, isHeard, isSilent, store } from "../store.js";
 import { retryNow } from "../feed.js";
 
-const STOPPED = ["hold", "return", "surface", "abort"];
-
 let announced = "";
 /** Keys of the alarms that have sounded and are not over. */
 let sounded = new Set();
@@ -39,7 +37,7 @@ function current() {
     if (v.link.mismatch) found.push(mismatched(v));
     if (unknownOrders(v).length > 0) found.push(unknownInForce(v));
     if (v.map.earlier) found.push(earlier(v));
-    if (v.status && STOPPED.includes(v.status.mode)) found.push(stopped(v));
+    if (isHolding(v) || isStopped(v)) found.push(stopped(v));
     if (v.status?.faults?.some((fault) => fault.is_grave)) found.push(faulty(v));
     if (v.status?.disk?.journal_refused || v.status?.disk?.checkpoint_refused) found.push(refusingVehicle(v));
   }
@@ -70,6 +68,10 @@ function silent(v) {
 function outdated(v) {
   return { key: `map-${v.id}`, kind: "warn", head: `The map of ${v.name} is not up to date`, body: `${store.mapFaults.get(v.id)}.` };
 }
+
+export const isHolding = (v) => v.status?.mode === "hold";
+/** Whether the survey has ended before its time. */
+export const isStopped = (v) => ["return", "surface", "abort"].includes(v.status?.mode);
 
 /** A hold, an abort or a return is in force, whoever has ordered it. */
 function stopped(v) {

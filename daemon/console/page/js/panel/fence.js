@@ -68,9 +68,9 @@ export function update() {
 /** What the plan would mean for the vehicle, before it is sent. */
 function describePlan(vehicle, plan) {
   const s = vehicle.status;
-  const found = consequences(plan, cellsOf(vehicle), s && inWorld(vehicle, s.x_m, s.y_m));
+  const cells = cellsOf(vehicle);
+  const found = consequences(plan, cells, s && inWorld(vehicle, s.x_m, s.y_m));
   if (!found) return fenceOrder.read(vehicle).outlines.some((o) => o.kind === "fence") ? "Without a fence: the order removes the one that was sent." : null;
-  const { cells } = cellsKept;
   const cut = cells.length === 0 ? "" : ` ${count(found.cut)} of ${count(cells.length)} explored cells lie outside (${percent(found.cut / cells.length)}).`;
   const where = found.distance === null ? "" : found.isInside
     ? ` By its last report ${vehicle.name} is inside, ${metres(found.distance)} from the nearest edge.`

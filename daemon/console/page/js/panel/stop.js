@@ -6,21 +6,20 @@ import { $, fill, h, show, text } from "../dom.js";
 import { SentVersions, replacedNote } from "../order/sent-versions.js";
 import { orderStatus, slotOf } from "../order/status.js";
 import { store } from "../store.js";
-import { contact } from "./banners.js";
+import { contact, isHolding, isStopped } from "./banners.js";
 
 const ORDERS = {
   hold: { button: "Hold", question: (v) => `Hold ${v.name} where it is?`, action: "hold" },
   resume: { button: "Resume", question: (v) => `Let ${v.name} resume its survey?`, action: "resume" },
   abort: { button: "Abort", question: (v) => `Abort the mission of ${v.name}?`, action: "abort", grave: true },
 };
-const STOPPED = ["return", "surface", "abort"];
 
 const sentVersions = new SentVersions("constraints");
 const replaced = replacedNote(sentVersions, "Hold");
 const status = orderStatus("Hold, resume or abort");
 const deniedLine = h("p.note.denied");
 const errorLine = h("p.error", { role: "alert" });
-const hold = h("button", { type: "button", id: "hold", onclick: () => confirm(holding(store.vehicle) ? ORDERS.resume : ORDERS.hold) });
+const hold = h("button", { type: "button", id: "hold", onclick: () => confirm(isHolding(store.vehicle) ? ORDERS.resume : ORDERS.hold) });
 const resume = h("button", { type: "button", id: "resume", onclick: () => confirm(ORDERS.resume) }, "Resume survey");
 const abort = h("button.grave", { type: "button", id: "abort", onclick: () => confirm(ORDERS.abort) }, "Abort mission");
 
@@ -43,21 +42,19 @@ export function startStop() {
 
 export const stopParts = [h("div.buttons", {}, hold, resume, abort), deniedLine, errorLine, replaced.node, status.node];
 
-const holding = (v) => v.status?.mode === "hold";
-
 export function refreshStop(v) {
-  text(hold, holding(v) ? "Resume survey" : "Hold position");
-  show(resume, STOPPED.includes(v.status?.mode));
+  text(hold, isHolding(v) ? "Resume survey" : "Hold position");
+  show(resume, isStopped(v));
   const [stop, order] = [denial("stop"), denial("order")];
-  text(barHold, holding(v) ? "Resume" : "Hold");
+  text(barHold, isHolding(v) ? "Resume" : "Hold");
   barHold.setAttribute("aria-label", `${barHold.textContent} ${v.name}`);
   barAbort.setAttribute("aria-label", `Abort ${v.name}`);
-  const held = holding(v) ? order : stop;
+  const held = isHolding(v) ? order : stop;
   for (const [b, denied] of [[hold, held], [barHold, held], [resume, order], [abort, stop], [barAbort, stop]]) {
     b.disabled = !store.connected || denied !== null;
     b.title = denied ?? HELP.get(b) ?? "";
   }
-  const reason = stop ?? (holding(v) || STOPPED.includes(v.status?.mode) ? order : null);
+  const reason = stop ?? (isHolding(v) || isStopped(v) ? order : null);
   show(deniedLine, reason !== null);
   text(deniedLine, reason ?? "");
   const slot = slotOf(v, "constraints");
