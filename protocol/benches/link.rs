@@ -120,6 +120,8 @@ impl Wire {
             authenticity: None,
         };
         let surface = SurfaceConfig {
+            name: Default::default(),
+            abort_lifetime: None,
             mission,
             cell_edge: CellEdge::default(),
             modem,

@@ -155,6 +155,8 @@ fn decision(slot: Option<&Slot>) -> SlotState {
 
 fn surface_config(vehicle: Address, authenticity: Option<Authenticity>) -> SurfaceConfig {
     SurfaceConfig {
+        name: Default::default(),
+        abort_lifetime: None,
         mission: MissionId(77),
         cell_edge: CellEdge::default(),
         modem: MODEM,

@@ -121,6 +121,8 @@ fn vehicle_config(address: Address) -> VehicleConfig {
 
 fn surface_config(address: Address) -> SurfaceConfig {
     SurfaceConfig {
+        name: Default::default(),
+        abort_lifetime: None,
         mission: MissionId(0x5CE7),
         cell_edge: CellEdge::default(),
         modem: MODEM,

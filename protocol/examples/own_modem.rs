@@ -114,6 +114,8 @@ fn run_vehicle(address: Address, modem: &QueueModem) -> u64 {
 fn run_surface(vehicle: Address, modem: &QueueModem) -> usize {
     let clock = Clock(std::time::Instant::now());
     let config = SurfaceConfig {
+        name: Default::default(),
+        abort_lifetime: None,
         mission: MISSION,
         cell_edge: CellEdge::default(),
         modem: MODEM,

@@ -76,6 +76,8 @@
 //! let mut now = Instant::ZERO;
 //! let mut vehicle = VehicleLink::new(config, Codec::Auto, 1, SlotInboxState::default(), now);
 //! let config = SurfaceConfig {
+//!     name: Default::default(),
+//!     abort_lifetime: None,
 //!     mission,
 //!     cell_edge: CellEdge::default(),
 //!     modem,

@@ -33,11 +33,12 @@ pub use rule::Rule;
 pub use schema::schema;
 pub use sections::{
     Autopilot, Bands, Camera, Channel, Config, Console, Labels, Link, Map, Mission, Modem, Navigation, Operator,
-    Position, Ros2, Runtime, Scene, Survey, VehicleSection,
+    Position, Ros2, Runtime, Scene, SurfaceSection, Survey, VehicleSection,
 };
 pub use setting::{
     Authenticate, AutopilotKind, BandRange, BirthRule, CalibrationSource, CameraSource, CameraStamps, Debounce,
     DepthSource, GpsPort, HostPort, LabelMessage, LabelSource, LayerName, MapCells, ModemKind, NavigationSource,
-    OperatorScript, Remap, RosName, RosTransport, S2cMode, SceneLabels, Votes, WorldKind, ZenohEndpoint,
+    OperatorScript, Remap, RestoreOrders, RosName, RosTransport, S2cMode, SceneLabels, StartMode, Votes, WorldKind,
+    ZenohEndpoint,
 };
 pub use token_file::{TokenGrant, load_tokens, read_token, read_tokens};

@@ -191,6 +191,24 @@ pub struct RemoveMarkerOrder {
 #[serde(deny_unknown_fields)]
 pub struct DismissOrder {}
 
+/// Gives a withdrawn order again, as a new one.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct AgainOrder {
+    /// The slot of the order: utility, constraints, settings, budget, limits, fence, destination or areas.
+    pub slot: String,
+}
+
+/// Sends the orders that the vehicle has lost again.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RestoreOrder {}
+
+/// Takes the vehicle over from another surface.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct TakeOverOrder {}
+
 /// Requests command, hands it over, takes it or gives it up.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]

@@ -21,7 +21,7 @@ use scenecast_protocol::wire::Address;
 use scenecast_surface::record::{StoredLabel, VehicleMemory};
 use scenecast_surface::{
     AreasOrder, CommandAction, CommandRefusal, DestinationOrder, FenceOrder, LimitsOrder, LogEntry, OrderKind,
-    Principal, RequestKind, SettingsOrder, Surface, order_name,
+    Principal, RequestKind, Role, SettingsOrder, Surface, order_name,
 };
 use std::collections::BTreeMap;
 
@@ -56,6 +56,12 @@ pub enum SurfaceRequest {
     Areas(u8, AreasOrder),
     Destination(u8, DestinationOrder),
     Settings(u8, SettingsOrder),
+    /// Give a withdrawn order again.
+    Again(u8, SlotId),
+    /// Send the orders again that the vehicle has lost.
+    Restore(u8),
+    /// Take the vehicle over from another surface.
+    TakeOver(u8),
     /// Change the bit budget, the shares and the background streams.
     Budget(BudgetOrder),
     /// Set name, colour and merging of a label.
@@ -107,6 +113,9 @@ impl SurfaceRequest {
             | Self::Limits(..)
             | Self::Areas(..)
             | Self::Destination(..)
+            | Self::Again(..)
+            | Self::Restore(_)
+            | Self::TakeOver(_)
             | Self::Budget(_) => Some(OrderKind::Order),
             Self::Settings(..) => Some(OrderKind::Settings),
         }
@@ -160,6 +169,11 @@ pub fn handle_request(surface: &mut Surface, request: ClientRequest, cell_m: f64
     if let Err(refusal) = surface.command().check(&by, kind, now) {
         return refused(&refusal);
     }
+    if let SurfaceRequest::TakeOver(id) = request
+        && let Some(reason) = why_not_taken_over(surface, id, &by, now)
+    {
+        return Reply::Forbidden(reason);
+    }
     let entry = describe(&request);
     let reply = reply(surface, request, cell_m, now);
     if matches!(reply, Reply::Accepted(_)) {
@@ -169,6 +183,20 @@ pub fn handle_request(surface: &mut Surface, request: ClientRequest, cell_m: f64
         surface.log_action(vehicle, kind, by.name(), &text, now);
     }
     reply
+}
+
+/// Why a principal may not take a vehicle over, one line.
+fn why_not_taken_over(surface: &Surface, id: u8, by: &Principal, now: Instant) -> Option<String> {
+    let holder = surface.view(Address::vehicle(id)?)?.holder()?;
+    let is_allowed = holder.is_silent(now) || by.role() == Role::Administrator;
+    (!is_allowed).then(|| {
+        let (name, idle) = (holder.name, now.since(holder.heard).as_secs());
+        format!(
+            "the surface {:?} holds the vehicle and was heard {idle} s ago: an administrator may take it over, or an operator \
+             after 120 s without a sign of that surface",
+            name.as_str()
+        )
+    })
 }
 
 fn refused(refusal: &CommandRefusal) -> Reply {
@@ -236,6 +264,12 @@ fn handle(surface: &mut Surface, request: SurfaceRequest, cell_m: f64, now: Inst
             let vehicle = known(surface, id)?;
             accepted(vehicle, SlotId::Settings, surface.set_settings(vehicle, &order, now))
         }
+        SurfaceRequest::Again(id, slot) => {
+            let vehicle = known(surface, id)?;
+            accepted(vehicle, slot, surface.give_again(vehicle, slot, now))
+        }
+        SurfaceRequest::Restore(id) => done(surface.restore_lost(known(surface, id)?, now).map(drop)),
+        SurfaceRequest::TakeOver(id) => done(surface.take_over(known(surface, id)?, now)),
         SurfaceRequest::Budget(order) => budget(surface, order, now),
         SurfaceRequest::Label(id, LabelOrder { label, name, colour, merged_into }) => {
             let book = StoredLabel { name, colour, merged_into };

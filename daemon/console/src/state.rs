@@ -20,9 +20,9 @@ pub use map::{
 };
 pub use storage::{ArchiveList, ArchivedMap, StorageInfo, VehicleMarker, VehicleNote};
 pub use vehicle::{
-    AppliedOrder, DirectiveSlots, InForceKnowledge, OrderProgress, OrderStatus, PlannedPath, ReportedDisk,
-    ReportedFault, ReportedMode, ReportedPose, ReportedRegistration, ReportedTie, StatusReport, UsblMeasurement,
-    UtilityTerms, VehicleOrders, VehicleSettings, VehicleState, WeightDraft,
+    AppliedOrder, DirectiveSlots, InForceKnowledge, OrderProgress, OrderStatus, OtherSurface, PlannedPath,
+    ReportedDisk, ReportedFault, ReportedMode, ReportedPose, ReportedRegistration, ReportedTie, StatusReport,
+    UsblMeasurement, UtilityTerms, VehicleOrders, VehicleSettings, VehicleState, WeightDraft,
 };
 
 use schemars::JsonSchema;

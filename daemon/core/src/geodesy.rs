@@ -9,6 +9,9 @@ pub struct LatLon {
     pub lon_deg: f64,
 }
 
+/// Maximum distance of a place in an order from the mission's origin, metres; a farther one is a typing error.
+pub const MAX_DISTANCE_M: f64 = 100_000.0;
+
 impl LatLon {
     /// A place; `None` if there is none of these coordinates.
     pub fn new(lat_deg: f64, lon_deg: f64) -> Option<Self> {

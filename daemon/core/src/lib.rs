@@ -23,7 +23,7 @@ mod world_file;
 pub use area::Area;
 pub use body::BodyOffset;
 pub use error::UserError;
-pub use geodesy::{LatLon, TangentPlane, wrap_rad};
+pub use geodesy::{LatLon, MAX_DISTANCE_M, TangentPlane, wrap_rad};
 pub use lines::Lines;
 pub use micromodem_rate::{CYCLE_INIT, MicromodemRate, OVERHEAD_BITS};
 pub use modem_units::{S2C_BURST_FRAME_BYTES, S2C_INSTANT_BYTES};

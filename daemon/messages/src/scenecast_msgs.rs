@@ -74,7 +74,7 @@ messages! {
         slot: String,
         version: u32,
         status: u8,
-        /// The reason of a refusal; empty otherwise.
+        /// The reason of a refusal or a withdrawal; empty otherwise.
         reason: String,
         /// The time at which the order was given.
         given: Time,
@@ -85,6 +85,7 @@ messages! {
         uint8 RECEIVED: u8 = 2;
         uint8 APPLIED: u8 = 3;
         uint8 REFUSED: u8 = 4;
+        uint8 WITHDRAWN: u8 = 5;
     }
 
     /// An image that shows one label.

@@ -2,7 +2,13 @@
 
 use super::checkpoint;
 use super::journal::{Damage, Found, Journal, JournalNames, Storage};
+use scenecast_config::{Config, StartMode};
+use scenecast_core::{TangentPlane, UserError};
+use scenecast_files::{CoordinateFrame, FenceShapes, read_fence};
+use scenecast_protocol::coordinates::{DecimetrePoint, WorldPoint};
+use scenecast_protocol::directive::{Fence, Polygon};
 use scenecast_vehicle::{Durable, LastPlace, LostOrders};
+use std::path::Path;
 
 /// The journal's files. Their records hold a [`Durable`] in postcard; another layout needs another version of the files.
 const JOURNAL: JournalNames = JournalNames { journal: "vehicle.journal", copy: "vehicle.journal.copy" };
@@ -12,6 +18,55 @@ pub(super) struct Keeper<S: Storage> {
     journal: Journal<S>,
     /// Whether the last state was refused.
     is_refused: bool,
+}
+
+/// How a vehicle begins that has no orders from before its start.
+#[derive(Debug, Clone, Default)]
+pub(super) struct FirstStart {
+    /// Whether it surveys without any order.
+    pub(super) is_free: bool,
+    /// The fence of its configuration.
+    pub(super) fence: Option<Fence>,
+}
+
+impl FirstStart {
+    /// What the configuration says.
+    pub(super) fn of(config: &Config) -> Result<Self, UserError> {
+        let fence = config.survey.fence_file.as_deref().map(|file| configured_fence(file, config)).transpose()?;
+        Ok(Self { is_free: config.survey.start == StartMode::Free || fence.is_some(), fence })
+    }
+
+    fn durable(&self, lineage: u64) -> Durable {
+        let fence = self.fence.as_ref().map_or_else(Vec::new, Fence::to_bytes);
+        if !self.is_free {
+            tracing::warn!("no order from before this start is known: the vehicle holds until it is ordered to resume");
+        }
+        Durable { lineage, hold: !self.is_free, fence, ..Durable::default() }
+    }
+}
+
+/// Reads `survey.fence_file`: in degrees where the origin is known, else in metres.
+fn configured_fence(file: &Path, config: &Config) -> Result<Fence, UserError> {
+    let frame = match config.mission.origin_deg {
+        Some(origin) => CoordinateFrame::Wgs84(TangentPlane::new(origin)),
+        None => CoordinateFrame::Metres,
+    };
+    let error = |line: String| UserError::Input(format!("survey.fence_file = {}: {line}", file.display()));
+    let FenceShapes { fence, keep_outs, return_point } = read_fence(file, frame)?;
+    let place = |at: [f64; 2]| {
+        DecimetrePoint::nearest(WorldPoint::new(at[0], at[1])).ok_or_else(|| error(format!("{at:?} is out of range")))
+    };
+    let outline = |corners: Vec<[f64; 2]>| corners.into_iter().map(place).collect::<Result<_, _>>().map(Polygon);
+    let fence = Fence {
+        fence: fence.map(outline).transpose()?,
+        keep_outs: keep_outs.into_iter().map(outline).collect::<Result<_, _>>()?,
+        return_point: return_point.map(place).transpose()?,
+    };
+    fence.check().map_err(|fault| error(fault.to_string()))?;
+    match fence.fence {
+        Some(_) => Ok(fence),
+        None => Err(error("it has no fence".to_owned())),
+    }
 }
 
 /// A run at its start.
@@ -28,15 +83,21 @@ impl<S: Storage> Keeper<S> {
     /// Begins a run with the state that survived the last one. `checkpoint` has the lineage and the epoch of a restored
     /// scene model: if the last run had the same, its epoch continues; otherwise a new epoch begins.
     ///
-    /// The first run of a mission has the given `lineage`, which is random. The run begins in hold if the journal is
+    /// The first run of a mission has the given `lineage`, which is random. A vehicle cannot tell it from a run whose
+    /// folder is lost, so that it begins as `first` says. The run begins in hold if the journal is
     /// damaged, if it is missing beside a checkpoint, or if the disk does not take the state.
-    pub(super) fn begin_run(storage: S, lineage: u64, checkpoint: Option<(u64, u8)>) -> StartedRun<S> {
+    pub(super) fn begin_run(
+        storage: S,
+        lineage: u64,
+        checkpoint: Option<(u64, u8)>,
+        first: &FirstStart,
+    ) -> StartedRun<S> {
         let (journal, found) = Journal::open(storage, JOURNAL);
         let storage = journal.storage();
         let (mut durable, is_again) = match found {
-            Found::Absent if !checkpoint::is_there(storage) => (Durable { lineage, ..Durable::default() }, false),
-            Found::Absent => (forgetful(storage, JOURNAL.journal, &Damage::Missing, lineage), true),
-            Found::Lost(name, damage) => (forgetful(storage, name, &damage, lineage), true),
+            Found::Absent if !checkpoint::is_there(storage) => (first.durable(lineage), false),
+            Found::Absent => (forgetful(storage, JOURNAL.journal, &Damage::Missing, lineage, first), true),
+            Found::Lost(name, damage) => (forgetful(storage, name, &damage, lineage, first), true),
             Found::State { body, damage } => match decode(&body) {
                 Some(last) => {
                     let mut durable = continued(last, checkpoint);
@@ -47,7 +108,7 @@ impl<S: Storage> Keeper<S> {
                     }
                     (durable, true)
                 }
-                None => (forgetful(storage, JOURNAL.journal, &Damage::Version, lineage), true),
+                None => (forgetful(storage, JOURNAL.journal, &Damage::Version, lineage, first), true),
             },
         };
         let mut keeper = Self { journal, is_refused: false };
@@ -93,11 +154,11 @@ fn continued(last: Durable, checkpoint: Option<(u64, u8)>) -> Durable {
 
 /// The state of a run after the loss of the last one's: it holds, and applies no order that may have been applied before.
 /// The epoch is random, because the last one is not known.
-fn forgetful(storage: &impl Storage, name: &str, damage: &Damage, lineage: u64) -> Durable {
+fn forgetful(storage: &impl Storage, name: &str, damage: &Damage, lineage: u64, first: &FirstStart) -> Durable {
     let place = storage.path(name);
     tracing::error!("{}: {damage}; the vehicle's orders are lost, and it holds", place.display());
     let epoch = lineage.to_be_bytes()[0];
-    Durable { lineage, epoch, hold: true, lost: LostOrders::Present, ..Durable::default() }
+    Durable { epoch, hold: true, lost: LostOrders::Present, ..first.durable(lineage) }
 }
 
 fn decode(state: &[u8]) -> Option<Durable> {
@@ -112,12 +173,16 @@ mod tests {
     use super::super::journal::disk::{Disk, DiskRefusal};
     use super::*;
     use scenecast_protocol::directive::Series;
-    use scenecast_protocol::link::SlotInboxState;
+    use scenecast_protocol::link::{SeriesRecord, SlotInboxState};
 
     const NAMES: [&str; 2] = [JOURNAL.journal, JOURNAL.copy];
 
+    fn free() -> FirstStart {
+        FirstStart { is_free: true, fence: None }
+    }
+
     fn begin(disk: &Disk) -> (Keeper<Disk>, Durable) {
-        let run = Keeper::begin_run(disk.clone(), 9, None);
+        let run = Keeper::begin_run(disk.clone(), 9, None, &free());
         (run.keeper, run.durable)
     }
 
@@ -140,26 +205,26 @@ mod tests {
         let last = Durable { epoch: 4, labels: 7, ..durable };
         assert!(keeper.save(&last));
         let run = |checkpoint| {
-            let run = Keeper::begin_run(disk.clone(), 1, Some(checkpoint));
+            let run = Keeper::begin_run(disk.clone(), 1, Some(checkpoint), &free());
             assert!(run.is_again);
             run.durable
         };
         assert_eq!(run((9, 4)), last);
         assert_eq!(run((9, 3)), Durable { epoch: 5, labels: 0, ..last.clone() });
         assert_eq!(run((8, 5)).epoch, 6, "another mission");
-        let fresh = Keeper::begin_run(Disk::default(), 2, Some((9, 4)));
+        let fresh = Keeper::begin_run(Disk::default(), 2, Some((9, 4)), &free());
         assert_eq!((fresh.durable.lineage, fresh.durable.epoch, fresh.is_again), (2, 0, false));
     }
 
     #[test]
     fn the_bytes_of_a_state_are_those_of_this_version_of_the_file() {
         let versions = [None, Some(300), None, None, None, Some(1), None, None, None, Some(2)];
-        let inbox = SlotInboxState {
-            series: Some(Series::from_random(7)),
-            retired: [5, 6].map(Series::from_random).into(),
+        let record = |series| SeriesRecord {
+            series: Series::from_random(series),
             versions,
             decisions: [0, 1, 0, 0, 0, 2, 0, 0, 0, 1],
         };
+        let inbox = SlotInboxState { records: [5, 7].map(record).into() };
         let utility = Some((3, 50, -1, [(2, -3)].into()));
         let durable = Durable {
             inbox,
@@ -184,8 +249,9 @@ mod tests {
             areas: vec![0],
         };
         let golden = [
-            &[1, 7, 2, 5, 6][..],
-            &[0, 1, 172, 2, 0, 0, 0, 1, 1, 0, 0, 0, 1, 2],
+            &[2, 5, 0, 1, 172, 2, 0, 0, 0, 1, 1, 0, 0, 0, 1, 2][..],
+            &[0, 1, 0, 0, 0, 2, 0, 0, 0, 1],
+            &[7, 0, 1, 172, 2, 0, 0, 0, 1, 1, 0, 0, 0, 1, 2],
             &[0, 1, 0, 0, 0, 2, 0, 0, 0, 1],
             &[3, 12, 172, 2],
             &[1, 3, 50, 255, 1, 2, 253, 12, 1, 0, 1, 244, 3, 1, 10, 5, 5, 50, 20, 1, 128, 100],
@@ -199,11 +265,11 @@ mod tests {
     #[test]
     fn a_vehicle_without_its_journal_holds_and_has_lost_its_orders() {
         let lost = |disk: &Disk| {
-            let run = Keeper::begin_run(disk.clone(), 9 << 56, None);
+            let run = Keeper::begin_run(disk.clone(), 9 << 56, None, &free());
             assert!(run.is_again && run.is_stored);
             let expected = Durable { lineage: 9 << 56, epoch: 9, hold: true, ..Durable::default() };
             assert_eq!(run.durable, Durable { lost: LostOrders::Present, ..expected });
-            let again = Keeper::begin_run(disk.clone(), 1, None).durable;
+            let again = Keeper::begin_run(disk.clone(), 1, None, &free()).durable;
             assert!(again.hold && again.lost == LostOrders::Present, "a restart changes neither");
         };
         for content in [&b""[..], b"scVJRN99", &[7; 5000]] {
@@ -274,7 +340,7 @@ mod tests {
         for refusal in [DiskRefusal::Full, DiskRefusal::ReadOnly] {
             let disk = Disk::default();
             disk.refuse(refusal);
-            let run = Keeper::begin_run(disk.clone(), 9, None);
+            let run = Keeper::begin_run(disk.clone(), 9, None, &free());
             assert!(run.durable.hold && !run.is_stored && !run.is_again);
         }
         let disk = Disk::default();
@@ -283,5 +349,21 @@ mod tests {
         assert_eq!(begin(&disk).1, Durable { epoch: 1, ..last.clone() }, "the files have their full length");
         disk.refuse(DiskRefusal::ReadOnly);
         assert_eq!(begin(&disk).1, Durable { epoch: 2, hold: true, ..last });
+    }
+
+    #[test]
+    fn a_vehicle_without_memory_holds_unless_it_has_a_fence_or_is_free() {
+        let corner = |x, y| DecimetrePoint::new(x, y);
+        let outline = Polygon(vec![corner(0, 0), corner(90, 0), corner(90, 90)]);
+        let fence = Fence { fence: Some(outline), ..Fence::default() };
+        let begun = |first: &FirstStart| Keeper::begin_run(Disk::default(), 9, None, first).durable;
+        assert!(begun(&FirstStart::default()).hold);
+        assert!(!begun(&free()).hold);
+        let fenced = FirstStart { is_free: true, fence: Some(fence.clone()) };
+        assert_eq!(begun(&fenced), Durable { lineage: 9, fence: fence.to_bytes(), ..Durable::default() });
+        let disk = Disk::default();
+        disk.put("vehicle.journal", b"damaged");
+        let damaged = Keeper::begin_run(disk, 9, None, &fenced).durable;
+        assert!(damaged.hold && damaged.fence == fence.to_bytes(), "what else it was ordered is not known");
     }
 }

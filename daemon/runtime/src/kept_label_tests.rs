@@ -1,7 +1,7 @@
 //! The meaning of a label, through power cuts at any step of the disk and of the host.
 
 use super::checkpoint::CheckpointFile;
-use super::durable::{Keeper, StartedRun};
+use super::durable::{FirstStart, Keeper, StartedRun};
 use super::journal::disk::{Disk, DiskRng, DiskStep};
 use scene_model::publish::LabelBook;
 use scene_model::topics::{FlatCell, TopicId};
@@ -104,7 +104,8 @@ impl LabelTrial {
         let kept: Option<TopicScene> = file.read().ok()?.and_then(|bytes| postcard::from_bytes(&bytes).ok());
         let claim = kept.as_ref().map(|scene| (scene.lineage, scene.book.epoch()));
         let lineage = self.rng.below(1 << 30) as u64;
-        let StartedRun { mut keeper, durable, is_stored, .. } = Keeper::begin_run(self.disk.clone(), lineage, claim);
+        let StartedRun { mut keeper, durable, is_stored, .. } =
+            Keeper::begin_run(self.disk.clone(), lineage, claim, &FirstStart::default());
         if !is_stored {
             return None;
         }

@@ -1,6 +1,6 @@
 //! A vehicle whose power is cut at any step, and a surface that sends orders to it.
 
-use super::durable::{Keeper, StartedRun};
+use super::durable::{FirstStart, Keeper, StartedRun};
 use super::journal::disk::{Disk, DiskRng, DiskStep};
 use proptest::prelude::*;
 use scenecast_config::Config;
@@ -284,7 +284,8 @@ fn start(config: &Config, disk: &Disk, rng: &mut DiskRng, cuts: &mut Vec<usize>,
         if let Some(steps) = cuts.pop() {
             disk.cut_after(steps);
         }
-        let StartedRun { keeper, durable, is_stored, .. } = Keeper::begin_run(disk.clone(), u64::from(starts), None);
+        let StartedRun { keeper, durable, is_stored, .. } =
+            Keeper::begin_run(disk.clone(), u64::from(starts), None, &FirstStart { is_free: true, fence: None });
         if disk.is_off() {
             continue;
         }

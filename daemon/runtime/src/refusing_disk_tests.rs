@@ -5,7 +5,7 @@ use super::journal::disk::{DiskRefusal, DiskStep};
 use super::power_cut_tests::PowerCutTrial;
 use proptest::prelude::*;
 use scenecast_host::CameraPose;
-use scenecast_protocol::directive::{Constraints, OrderStatus, RefusalReason, SlotId};
+use scenecast_protocol::directive::{Constraints, OrderStatus, RefusalReason, SlotId, Withdrawal};
 use scenecast_protocol::wire::{ModeReason, VehicleMode};
 use scenecast_surface::FenceOrder;
 use scenecast_vehicle::{Durable, LostOrders};
@@ -98,13 +98,17 @@ fn a_vehicle_that_lost_its_journal_holds_until_a_new_series() {
     assert!(durable(&trial).hold, "the old order does not lift the hold");
     trial.restart();
     assert!(durable(&trial).hold && durable(&trial).lost != LostOrders::None, "a restart changes neither");
-    // The first order is refused, unless the surface has learned of the loss before.
-    for _ in 0..2 {
-        order(&mut trial, false, false);
-        run(&mut trial, 400);
+    for id in [SlotId::Constraints, SlotId::Budget] {
+        assert_eq!(status(&trial, id), OrderStatus::Withdrawn(Withdrawal::Lost));
     }
-    assert_eq!(status(&trial, SlotId::Constraints), OrderStatus::Applied, "a new order begins a new series");
+    let (auv, now) = (trial.auv(), trial.now());
+    assert_eq!(trial.surface.surface_mut().restore_lost(auv, now), Ok(vec![SlotId::Budget]));
+    run(&mut trial, 400);
     assert_eq!(status(&trial, SlotId::Budget), OrderStatus::Applied);
+    assert!(durable(&trial).hold, "an order to resume is given by the operator alone");
+    order(&mut trial, false, false);
+    run(&mut trial, 400);
+    assert_eq!(status(&trial, SlotId::Constraints), OrderStatus::Applied);
     assert!(!durable(&trial).hold);
 }
 

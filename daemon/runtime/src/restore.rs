@@ -1,7 +1,7 @@
 //! The scene model at the start of a run: restored from the last checkpoint, or new.
 
 use super::checkpoint::CheckpointFile;
-use super::durable::{Keeper, StartedRun};
+use super::durable::{FirstStart, Keeper, StartedRun};
 use super::journal::Folder;
 use super::labels;
 use super::mapping::Keep;
@@ -33,7 +33,7 @@ pub(super) fn start(config: &Config, dir: &Path) -> Result<Start, UserError> {
     }
     let restored = if config.scene.checkpoint_s > 0.0 { restore(config, &file)? } else { None };
     let claim = restored.as_ref().map(|restored| (restored.lineage, restored.mapper.epoch()));
-    let run = Keeper::begin_run(folder.clone(), super::random_bits(), claim);
+    let run = Keeper::begin_run(folder.clone(), super::random_bits(), claim, &FirstStart::of(config)?);
     let durable = &run.durable;
     let mapper = match restored {
         Some(Restored { mut mapper, lineage }) if lineage == durable.lineage => {
@@ -73,7 +73,7 @@ fn start_labels(config: &Config, folder: Folder) -> Result<Start, UserError> {
     let every_s = config.scene.checkpoint_s;
     let restored = (every_s > 0.0).then(|| labels::restore(config, &file)).flatten();
     let claim = restored.as_ref().map(|(map, lineage)| (*lineage, map.epoch()));
-    let run = Keeper::begin_run(folder.clone(), super::random_bits(), claim);
+    let run = Keeper::begin_run(folder.clone(), super::random_bits(), claim, &FirstStart::of(config)?);
     let (lineage, epoch, seed) = (run.durable.lineage, run.durable.epoch, config.runtime.seed);
     let labels = foreign(config, restored, file, &run.durable);
     let unused = Keep { file: CheckpointFile::new(folder), lineage, every_s: 0.0, last_s: None, is_refused: false };

@@ -33,10 +33,19 @@ const PUBLISH_INTERVAL: Duration = Duration::from_secs(1);
 /// Time after which changes that were not committed yet are looked at again.
 const CATCH_UP_INTERVAL: Duration = Duration::from_millis(100);
 
+/// A surface without a configured name has that of the computer.
+fn name_surface(config: &mut Config) {
+    if config.surface.name.is_empty() {
+        config.surface.name =
+            nix::unistd::gethostname().ok().and_then(|name| name.into_string().ok()).unwrap_or_default();
+    }
+}
+
 /// Runs the surface until it is interrupted; on SIGHUP it calls `load` for a new budget and new shares.
 pub fn run_surface(load: Load, simulated: Option<SimulatedAutopilot>) -> Result<(), UserError> {
     super::block_on(async move {
-        let config = load()?;
+        let mut config = load()?;
+        name_surface(&mut config);
         keep_private(&config);
         let mut principals = Vec::new();
         let listener = match &config.console.listen {

@@ -7,7 +7,7 @@ use scenecast_core::tuning_table::TuningTable;
 use scenecast_protocol::link::{Authenticity, SurfaceConfig, SurfaceLink};
 use scenecast_protocol::mac::{MasterConfig, ModemProfile};
 use scenecast_protocol::time::Instant;
-use scenecast_protocol::wire::{CellEdge, MissionId};
+use scenecast_protocol::wire::{CellEdge, MissionId, SurfaceName};
 use std::time::Duration;
 
 /// Builds a surface for the configured vehicles. `seed` is random for each run.
@@ -22,6 +22,7 @@ pub fn assemble(
     let link = SurfaceLink::new(link_config(config, authenticity, modem)?, seed, now);
     let mut surface = Surface::new(link, vehicle_names(config)?).with_tuning_table(table);
     surface.set_background(config.link.background);
+    surface.set_restore(config.surface.restore);
     Ok(surface)
 }
 
@@ -31,7 +32,10 @@ pub fn link_config(
     authenticity: Option<Authenticity>,
     modem: ModemProfile,
 ) -> Result<SurfaceConfig, UserError> {
+    let abort_lifetime_s = config.surface.abort_lifetime_s;
     Ok(SurfaceConfig {
+        name: SurfaceName::from_text(&config.surface.name),
+        abort_lifetime: (abort_lifetime_s > 0.0).then(|| Duration::from_secs_f64(abort_lifetime_s)),
         mission: MissionId(config.mission.id),
         cell_edge: CellEdge::from_metres(cell_m(config)),
         modem,

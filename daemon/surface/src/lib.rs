@@ -33,7 +33,7 @@ pub use command::{
 pub use exemplar_cache::{ExemplarCache, LabelExemplars, OpenRequest, RequestKind, RequestState, StoredExemplar};
 pub use label_gains::LabelGains;
 pub use log::{LogEntry, LogKind, MissionLog};
-pub use orders::{AreaOrder, AreasOrder, DestinationOrder, FenceOrder, LimitsOrder, MAX_DISTANCE_M, order_name};
+pub use orders::{AreaOrder, AreasOrder, DestinationOrder, FenceOrder, LimitsOrder, order_name};
 pub use registration_record::RegistrationRecord;
 pub use scenecast_core::{Principal, Role};
 pub use settings::{SettingsOrder, SettingsRecord};

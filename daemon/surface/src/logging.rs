@@ -7,7 +7,7 @@ use super::record::StoredLogEntry;
 use super::{Surface, VehicleRecord};
 use scenecast_protocol::directive::{OrderStatus, SlotId};
 use scenecast_protocol::time::Instant;
-use scenecast_protocol::wire::{Address, VehicleMode};
+use scenecast_protocol::wire::{Address, SurfaceName, VehicleMode};
 
 impl Surface {
     /// The log of the mission.
@@ -51,7 +51,9 @@ impl Surface {
         let text = match decided.status {
             OrderStatus::Applied if slot == SlotId::Fix => return,
             OrderStatus::Applied => format!("{name} version {version} applied"),
+            OrderStatus::Withdrawn(_) if matches!(slot, SlotId::Fix | SlotId::Requests) => return,
             OrderStatus::Refused(reason) => format!("{name} version {version} refused: {}", reason.explain()),
+            OrderStatus::Withdrawn(why) => format!("{name} version {version} withdrawn: {}", why.explain()),
             _ => return,
         };
         self.log_fact(vehicle, LogKind::Answer, &text, now);
@@ -74,6 +76,17 @@ impl Surface {
                 self.log_fact(vehicle, LogKind::Contact, &text, now);
             }
         }
+    }
+
+    /// Another surface holds a vehicle, calls it, or holds it no more.
+    pub(super) fn log_rivalry(&mut self, vehicle: Address, now: Instant) {
+        let Some(view) = self.link.vehicle(vehicle) else { return };
+        let text = match (view.holder(), view.caller(now)) {
+            (Some(holder), _) => format!("{} holds the vehicle", surface_name(holder.name)),
+            (None, Some(caller)) => format!("{} calls the vehicle", surface_name(caller.name)),
+            (None, None) => "no other surface holds the vehicle any more".to_owned(),
+        };
+        self.log_fact(vehicle, LogKind::Contact, &text, now);
     }
 
     pub(super) fn log_mode(&mut self, vehicle: Address, now: Instant) {
@@ -106,6 +119,14 @@ impl Surface {
             let name = name.map_or(String::new(), |name| format!(" ({name})"));
             self.log_fact(vehicle, LogKind::Label, &format!("label {label}{name} is on the map"), now);
         }
+    }
+}
+
+/// Another surface for people.
+pub(super) fn surface_name(name: SurfaceName) -> String {
+    match name.as_str() {
+        "" => "another surface".to_owned(),
+        name => format!("the surface {name}"),
     }
 }
 

@@ -1,14 +1,12 @@
 //! Fences, limits, weighted areas and destinations as the operator types them. Every error is one line that names the allowed values.
 
+use scenecast_core::MAX_DISTANCE_M;
 use scenecast_protocol::coordinates::{DecimetrePoint, WorldPoint};
 use scenecast_protocol::directive::{
     Areas, Band, Constraints, Destination, Fence, Limits, Polygon, Reaction, Slot, WeightedArea,
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Deserializer, Serialize};
-
-/// Maximum distance of a place in an order from the mission's origin, metres; a farther one is a typing error.
-pub const MAX_DISTANCE_M: f64 = 100_000.0;
 
 /// A fence as it is typed: vertices in metres east and north of the origin.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]

@@ -1,6 +1,7 @@
 //! The surface sends its vehicles orders and requests for exemplars.
 
 use super::exemplar_cache::{ExemplarCache, RequestKind};
+use super::log::LogKind;
 use super::orders::{AreasOrder, DestinationOrder, FenceOrder, LimitsOrder};
 use super::settings::SettingsOrder;
 use super::{Surface, SurfaceOutput, VehicleRecord};
@@ -115,6 +116,33 @@ impl Surface {
         let version = self.link.issue(vehicle, slot, now).map_err(|e| e.to_string())?;
         self.outputs.push_back(SurfaceOutput::Changed(vehicle));
         Ok(version)
+    }
+
+    /// Gives a withdrawn order again, as a new one. The error is one line for the operator.
+    pub fn give_again(&mut self, vehicle: Address, slot: SlotId, now: Instant) -> Result<u16, String> {
+        let version = self.link.give_again(vehicle, slot, now).map_err(|e| e.to_string())?;
+        self.outputs.push_back(SurfaceOutput::Changed(vehicle));
+        version.ok_or_else(|| format!("no order of the kind {} is withdrawn", slot.name()))
+    }
+
+    /// Sends the orders that a vehicle has lost again, except one to resume; returns their slots. The error is one line for
+    /// the operator.
+    pub fn restore_lost(&mut self, vehicle: Address, now: Instant) -> Result<Vec<SlotId>, String> {
+        let restored = self.link.restore_lost(vehicle, now).map_err(|e| e.to_string())?;
+        let names: Vec<&str> = restored.iter().map(|id| id.name()).collect();
+        if names.is_empty() {
+            return Err("no order of the vehicle is lost".to_owned());
+        }
+        self.log_fact(vehicle, LogKind::Answer, &format!("sent again: {}", names.join(", ")), now);
+        self.outputs.push_back(SurfaceOutput::Changed(vehicle));
+        Ok(restored)
+    }
+
+    /// Takes a vehicle over from another surface. The error is one line for the operator.
+    pub fn take_over(&mut self, vehicle: Address, now: Instant) -> Result<(), String> {
+        self.link.take_over(vehicle, now).map_err(|e| e.to_string())?;
+        self.outputs.push_back(SurfaceOutput::Changed(vehicle));
+        Ok(())
     }
 
     /// Requests an exemplar of a label. The error is one line for the operator.

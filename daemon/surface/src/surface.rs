@@ -5,6 +5,7 @@ use super::in_force;
 use super::log::{LogKind, MissionLog, Watch};
 use super::position::{Relay, UsblSighting};
 use super::vehicle_record::VehicleRecord;
+use scenecast_config::RestoreOrders;
 use scenecast_core::tuning_table::{Fit, NoRow, TuningTable};
 use scenecast_core::{Principal, UsblLine};
 use scenecast_protocol::directive::{Budget, OrderStatus, Slot, SlotId};
@@ -49,6 +50,7 @@ pub struct Surface {
     pub(super) log: MissionLog,
     /// What the log has about each vehicle.
     pub(super) watches: BTreeMap<Address, Watch>,
+    restore: RestoreOrders,
 }
 
 impl Surface {
@@ -57,13 +59,19 @@ impl Surface {
         let records = vehicles.into_iter().map(|(address, name)| (address, VehicleRecord::new(name))).collect();
         let (tuning, background) = (TuningTable::default(), BackgroundOrder::default());
         let (command, log, watches) = (Command::default(), MissionLog::default(), BTreeMap::new());
-        Self { link, records, outputs: VecDeque::new(), background, relay: None, tuning, command, log, watches }
+        let (outputs, relay, restore) = (VecDeque::new(), None, RestoreOrders::Ask);
+        Self { link, records, outputs, background, relay, tuning, command, log, watches, restore }
     }
 
     /// Sets the tuning table, which predicts the bit rate of settings of the scene model.
     #[must_use]
     pub fn with_tuning_table(self, tuning: TuningTable) -> Self {
         Self { tuning, ..self }
+    }
+
+    /// Sets what happens when a vehicle has lost its orders.
+    pub fn set_restore(&mut self, restore: RestoreOrders) {
+        self.restore = restore;
     }
 
     /// Sets the principals that command can be handed over to. Nobody has it.
@@ -290,6 +298,17 @@ impl Surface {
                 self.log_fact(vehicle, LogKind::Contact, "another run begins", now);
                 self.request_again(vehicle, now);
                 Some(SurfaceOutput::MapChanged(vehicle))
+            }
+            SurfaceEvent::Rivalry(vehicle) => {
+                self.log_rivalry(vehicle, now);
+                Some(SurfaceOutput::Changed(vehicle))
+            }
+            SurfaceEvent::OrdersLost(vehicle) => {
+                self.log_fact(vehicle, LogKind::Answer, "the vehicle has no record of its orders any more", now);
+                if self.restore == RestoreOrders::Auto {
+                    let _ = self.restore_lost(vehicle, now);
+                }
+                Some(SurfaceOutput::Changed(vehicle))
             }
             SurfaceEvent::RunEnded(vehicle) => Some(SurfaceOutput::RunEnded(vehicle)),
             SurfaceEvent::Mismatch(vehicle, mismatch) => Some(SurfaceOutput::Mismatch(vehicle, mismatch)),

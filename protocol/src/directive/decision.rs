@@ -12,20 +12,17 @@ pub enum SlotState {
     Applied,
     /// Refused; the previous version stays in force.
     Refused(RefusalReason),
-    /// Received in a series that has ended, so that the vehicle does not decide about it.
-    SeriesEnded,
     /// Received, and waits for the decision: an order that the vehicle obeys while its disk does not keep it.
     Pending,
 }
 
 impl SlotState {
-    /// The number on the wire: 0 unknown, 1 applied, 2..=11 a reason of refusal, 12 of an ended series, 15 pending.
+    /// The number on the wire: 0 unknown, 1 applied, 2..=12 a reason of refusal, 15 pending.
     pub(crate) fn code(self) -> u8 {
         match self {
             Self::Unknown => 0,
             Self::Applied => 1,
             Self::Refused(reason) => reason.code(),
-            Self::SeriesEnded => 12,
             Self::Pending => 15,
         }
     }
@@ -34,7 +31,6 @@ impl SlotState {
         match code {
             0 => Some(Self::Unknown),
             1 => Some(Self::Applied),
-            12 => Some(Self::SeriesEnded),
             15 => Some(Self::Pending),
             code => RefusalReason::from_code(code).map(Self::Refused),
         }

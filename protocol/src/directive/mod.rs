@@ -30,7 +30,7 @@ pub use fix::Fix;
 pub(crate) use in_force::InForceAssembly;
 pub use in_force::{InForceDigests, InForcePart, InForceSummary, PerSlot, REPORTED_SLOTS};
 pub use limits::{Band, Limits, LimitsFault, Reaction};
-pub use outbox::{OrderStatus, SlotProgress};
+pub use outbox::{OrderStatus, SlotProgress, Withdrawal};
 pub(crate) use outbox::{PendingSlot, SlotOutbox};
 pub use polygon::{Polygon, PolygonFault};
 pub use requests::{ExemplarRequest, ExemplarRequests};
@@ -149,10 +149,12 @@ pub enum RefusalReason {
     Disk,
     /// The vehicle has lost its record of the orders that it applied, and this series may contain one of them.
     Forgotten,
+    /// Another surface has given a newer order of this kind.
+    Overtaken,
 }
 
 impl RefusalReason {
-    const ALL: [Self; 10] = [
+    const ALL: [Self; 11] = [
         Self::Malformed,
         Self::OtherEpoch,
         Self::UnknownLabel,
@@ -163,9 +165,10 @@ impl RefusalReason {
         Self::Unable,
         Self::Disk,
         Self::Forgotten,
+        Self::Overtaken,
     ];
 
-    /// The number on the wire, 2 to 9.
+    /// The number on the wire, 2 to 12.
     pub fn code(self) -> u8 {
         self as u8 + 2
     }
@@ -188,6 +191,7 @@ impl RefusalReason {
             Self::Unable => "the vehicle flies at an altitude or depth that it does not allow",
             Self::Disk => "the vehicle's disk does not keep it: until it does, the vehicle obeys only hold and abort",
             Self::Forgotten => "the vehicle has lost its journal and may have applied it before: give the order again",
+            Self::Overtaken => "another surface has given a newer order of this kind",
         }
     }
 }

@@ -17,6 +17,43 @@ pub enum OrderStatus {
     Applied,
     /// The vehicle refused it, and the previous version stays in force.
     Refused(RefusalReason),
+    /// The surface sends it no more.
+    Withdrawn(Withdrawal),
+}
+
+/// Why the surface sends an order no more.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Withdrawal {
+    /// It was in force until another surface gave a newer one of its kind.
+    Superseded,
+    /// It had not arrived when another surface gave a newer one of its kind.
+    Overtaken,
+    /// It is an abort that has not arrived within the time that is set.
+    Late,
+    /// The vehicle has lost its record of it.
+    Lost,
+}
+
+impl Withdrawal {
+    /// Every reason.
+    pub const ALL: [Self; 4] = [Self::Superseded, Self::Overtaken, Self::Late, Self::Lost];
+
+    /// Whether the operator has to decide if the order is given again.
+    pub fn asks(self) -> bool {
+        self != Self::Superseded
+    }
+
+    /// An explanation for the operator, one clause.
+    pub fn explain(self) -> &'static str {
+        match self {
+            Self::Superseded => "another surface has given a newer order of this kind",
+            Self::Overtaken => {
+                "another surface gave a newer order of this kind before it arrived: is it still to be sent?"
+            }
+            Self::Late => "it has not arrived in time: is it still to be sent?",
+            Self::Lost => "the vehicle has no record of it any more: is it to be sent again?",
+        }
+    }
 }
 
 impl OrderStatus {
@@ -61,8 +98,20 @@ pub struct PendingSlot {
 pub struct SlotOutbox {
     series: Series,
     slots: [Option<SlotProgress>; SLOTS],
-    /// Whether the vehicle refused an order because it has lost its record of this series.
+    /// Whether orders are authenticated, so that those of another surface are not forged.
+    is_keyed: bool,
+    /// Whether the vehicle has lost its record of this series.
     is_forgotten: bool,
+    /// Whether the vehicle has acknowledged an order of this series or of an earlier one.
+    has_acknowledged: bool,
+    /// Whether each slot that is queued was on air in an earlier run.
+    was_on_air: [bool; SLOTS],
+    /// Whether a report has come in since the run began.
+    has_report: bool,
+    /// Whether a report of this run has said that another surface's order of the slot is newer.
+    is_overtaken: [bool; SLOTS],
+    /// Age after which an abort that has not arrived is withdrawn.
+    abort_lifetime: Option<Duration>,
     /// The frame that acknowledged each slot that is received.
     received_in: [u64; SLOTS],
     /// Versions to leave out before the next one of each slot.
@@ -77,16 +126,30 @@ impl SlotOutbox {
     /// Versions that are left out after a restart: an order whose record was lost may have used one of them.
     const RESTART_GAP: u16 = 64;
 
+    /// Age up to which a hold or an abort goes out before the vehicle has reported which orders of others it has.
+    const PROMPT: Duration = Duration::from_secs(20);
+
     /// An empty directive; `series` must be drawn at random by a surface that does not know its last orders.
-    pub fn new(series: Series) -> Self {
+    pub fn new(series: Series, is_keyed: bool) -> Self {
         Self {
             series,
             slots: Default::default(),
+            is_keyed,
             is_forgotten: false,
+            has_acknowledged: false,
+            was_on_air: [false; SLOTS],
+            has_report: false,
+            is_overtaken: [false; SLOTS],
+            abort_lifetime: None,
             received_in: [0; SLOTS],
             skipped: [0; SLOTS],
             displaced: [None; SLOTS],
         }
+    }
+
+    /// Sets the age after which an abort that has not arrived is withdrawn; `None`: it never is.
+    pub fn set_abort_lifetime(&mut self, lifetime: Option<Duration>) {
+        self.abort_lifetime = lifetime;
     }
 
     /// The series that the versions belong to.
@@ -99,7 +162,11 @@ impl SlotOutbox {
     pub fn restore(&mut self, series: Series, orders: impl IntoIterator<Item = SlotProgress>) {
         (self.series, self.skipped) = (series, [Self::RESTART_GAP; SLOTS]);
         for order in orders {
-            self.is_forgotten |= order.status == OrderStatus::Refused(RefusalReason::Forgotten);
+            self.is_forgotten |= is_forgotten(order.status);
+            self.has_acknowledged |= !matches!(order.status, OrderStatus::Queued | OrderStatus::OnAir);
+            if let Some(was_on_air) = self.was_on_air.get_mut(order.id.index()) {
+                *was_on_air = matches!(order.status, OrderStatus::OnAir | OrderStatus::Received);
+            }
             if let Some(entry) = self.slots.get_mut(order.id.index()) {
                 *entry = Some(SlotProgress { sent: None, ..order });
             }
@@ -114,6 +181,9 @@ impl SlotOutbox {
             self.begin_series(now);
         }
         let id = slot.id();
+        if let Some(was_on_air) = self.was_on_air.get_mut(id.index()) {
+            *was_on_air = false;
+        }
         let Some(entry) = self.slots.get_mut(id.index()) else { return 0 };
         let gap = self.skipped.get_mut(id.index()).map(std::mem::take).unwrap_or_default();
         let version = entry.as_ref().map_or(1, |s| s.version.wrapping_add(1)).wrapping_add(gap);
@@ -143,7 +213,7 @@ impl SlotOutbox {
     /// without those sent after `again_before`.
     pub fn pending(&self, now: Instant, again_before: Instant) -> Vec<PendingSlot> {
         self.progress()
-            .filter(|s| is_pending(s))
+            .filter(|s| is_pending(s) && self.may_go(s, now))
             .filter(|s| s.sent.is_none_or(|at| at <= again_before))
             .map(|s| PendingSlot {
                 id: s.id,
@@ -172,6 +242,7 @@ impl SlotOutbox {
 
     /// Notes that frame `number` of the vehicle acknowledged a frame with this version.
     pub fn mark_received(&mut self, id: SlotId, version: u16, number: u64, now: Instant) {
+        self.has_acknowledged = true;
         let is_new = self.advance(id, version, OrderStatus::Received, now, |status| {
             matches!(status, OrderStatus::Queued | OrderStatus::OnAir)
         });
@@ -184,6 +255,10 @@ impl SlotOutbox {
     pub fn handle_report(&mut self, reports: &[SlotReport; SLOTS], now: Instant) -> Vec<SlotId> {
         let mut decided = Vec::new();
         for (id, report) in SlotId::ALL.into_iter().zip(reports) {
+            if report.state == SlotState::Refused(RefusalReason::Overtaken) {
+                decided.extend(self.handle_overtaken(id, now).then_some(id));
+                continue;
+            }
             let Some(Some(slot)) = self.slots.get(id.index()) else { continue };
             let status = match report.state {
                 SlotState::Unknown => {
@@ -191,44 +266,126 @@ impl SlotOutbox {
                     self.advance(id, slot.version, OrderStatus::Queued, now, forgotten);
                     continue;
                 }
-                SlotState::Pending | SlotState::SeriesEnded => continue,
+                SlotState::Pending => continue,
                 _ if slot.version as u8 != report.version_low => continue,
                 SlotState::Applied => OrderStatus::Applied,
                 SlotState::Refused(reason) => OrderStatus::Refused(reason),
             };
             if self.advance(id, slot.version, status, now, |s| s == OrderStatus::Received) {
-                self.is_forgotten |= status == OrderStatus::Refused(RefusalReason::Forgotten);
+                self.is_forgotten |= is_forgotten(status);
                 decided.push(id);
             }
         }
+        self.has_report = true;
         decided
     }
 
+    /// The vehicle has no record of this series: if it has acknowledged any order before, every one that it may have received
+    /// is withdrawn. Fixes and requests grow old soon, and are given anew anyway. Returns the withdrawn slots.
+    pub fn handle_lost_memory(&mut self, now: Instant) -> Vec<SlotId> {
+        let mut lost = Vec::new();
+        if !std::mem::take(&mut self.has_acknowledged) {
+            return lost;
+        }
+        for (order, was_on_air) in self.slots.iter_mut().zip(&mut self.was_on_air) {
+            let is_given_anew = |order: &&mut SlotProgress| matches!(order.id, SlotId::Fix | SlotId::Requests);
+            let Some(order) = order.as_mut().filter(|order| !is_given_anew(order)) else { continue };
+            let was_known = matches!(order.status, OrderStatus::OnAir | OrderStatus::Received | OrderStatus::Applied);
+            let was_sent = order.status == OrderStatus::Queued && std::mem::take(was_on_air);
+            if was_known || was_sent {
+                (order.status, order.changed) = (OrderStatus::Withdrawn(Withdrawal::Lost), now);
+                lost.push(order.id);
+            }
+        }
+        self.is_forgotten |= !lost.is_empty();
+        lost
+    }
+
+    /// Sends the orders that the vehicle has lost again, in a new series, except one that only lifts a hold or an abort:
+    /// the operator lifts it by a new order. Returns them.
+    pub fn restore_lost(&mut self, now: Instant) -> Vec<SlotId> {
+        let is_lost = |order: &&mut SlotProgress| order.status == OrderStatus::Withdrawn(Withdrawal::Lost);
+        let mut restored = Vec::new();
+        for order in self.slots.iter_mut().flatten().filter(is_lost).filter(|order| !lifts(&order.slot)) {
+            (order.status, order.changed, order.sent) = (OrderStatus::Queued, now, None);
+            restored.push(order.id);
+        }
+        if !restored.is_empty() {
+            self.begin_series(now);
+        }
+        restored
+    }
+
+    /// Withdraws an abort that has not arrived in time; returns whether there was one.
+    pub fn withdraw_late_abort(&mut self, now: Instant) -> bool {
+        let Some(lifetime) = self.abort_lifetime else { return false };
+        let is_late = |order: &&mut SlotProgress| {
+            let is_abort = matches!(order.slot, Slot::Constraints(constraints) if constraints.abort);
+            is_abort && order.status.is_pending() && now.since(order.issued) >= lifetime
+        };
+        let late = self.slots.iter_mut().flatten().find(is_late);
+        late.map(|order| (order.status, order.changed) = (OrderStatus::Withdrawn(Withdrawal::Late), now)).is_some()
+    }
+
+    /// Gives a withdrawn order again, as a new one; `None` if there is none of this kind.
+    pub fn give_again(&mut self, id: SlotId, now: Instant) -> Option<u16> {
+        let order = self.progress().find(|order| order.id == id)?;
+        let slot = matches!(order.status, OrderStatus::Withdrawn(_)).then(|| order.slot.clone())?;
+        Some(self.issue(slot, now))
+    }
+
+    /// The newest order of a slot in force is another surface's. One of ours that the vehicle has not decided about was given
+    /// before this surface knew that. Returns whether it is withdrawn.
+    fn handle_overtaken(&mut self, id: SlotId, now: Instant) -> bool {
+        let Some(is_known) = self.is_overtaken.get_mut(id.index()) else { return false };
+        let is_known = std::mem::replace(is_known, true);
+        let Some(order) = self.slots.get_mut(id.index()).and_then(Option::as_mut).filter(|_| self.is_keyed) else {
+            return false;
+        };
+        let withdrawal = match order.status {
+            OrderStatus::Applied => Withdrawal::Superseded,
+            status if status.is_pending() && !is_known => Withdrawal::Overtaken,
+            _ => return false,
+        };
+        (order.status, order.changed) = (OrderStatus::Withdrawn(withdrawal), now);
+        true
+    }
+
+    /// Whether an order may go out. A hold or an abort that another surface's order may have overtaken waits for the first
+    /// report of a run; the vehicle itself sorts out the other orders, and obeys these at once.
+    fn may_go(&self, order: &SlotProgress, now: Instant) -> bool {
+        let stops = matches!(order.slot, Slot::Constraints(constraints) if constraints.hold || constraints.abort);
+        let is_prompt = now.since(order.issued) < Self::PROMPT;
+        !self.is_keyed || !stops || self.has_report || is_prompt
+    }
+
     /// Begins a new series if the report in frame `number` alone, without earlier ones, shows that the vehicle ignores a
-    /// received version: the series has ended there, or the vehicle knows a newer version that was not issued here, either
-    /// of which takes a forged frame. A vehicle decides before it acknowledges, so the reports after the acknowledgement
+    /// received version, because it knows a newer one that was not issued here, which takes a forged frame. An order that it
+    /// left out for another surface's, although this surface knows that, is only sent again. A vehicle decides before it acknowledges, so the reports after the acknowledgement
     /// have the decision. As the number of the acknowledgement may be forged, a report long after it has the decision too.
     pub fn leave_overtaken_series(&mut self, report: &[SlotReport; SLOTS], number: u64, now: Instant) {
-        let is_overtaken = self.progress().any(|slot| {
+        let ignored = |slot: &&SlotProgress| {
             let (report, received_in) = (report.get(slot.id.index()), self.received_in.get(slot.id.index()));
-            let is_other = |r: &SlotReport| match r.state {
-                SlotState::Unknown => false,
-                SlotState::SeriesEnded => true,
-                _ => r.version_low != slot.version as u8,
-            };
+            let is_other = |r: &SlotReport| r.state != SlotState::Unknown && r.version_low != slot.version as u8;
             let is_later = received_in.is_some_and(|&n| n < number) || now.since(slot.changed) >= Self::MAX_DECISION;
             slot.status == OrderStatus::Received && report.is_some_and(is_other) && is_later
-        });
-        if is_overtaken {
-            self.begin_series(now);
+        };
+        let Some((id, version)) = self.progress().find(ignored).map(|slot| (slot.id, slot.version)) else { return };
+        let overtaken = SlotState::Refused(RefusalReason::Overtaken);
+        match self.is_keyed && report.get(id.index()).is_some_and(|r| r.state == overtaken) {
+            true => drop(self.advance(id, version, OrderStatus::Queued, now, |_| true)),
+            false => self.begin_series(now),
         }
     }
 
     /// Queues again each order that a restarted vehicle is not known to have in force.
     pub fn handle_peer_restart(&mut self, now: Instant) {
-        for slot in self.slots.iter_mut().flatten() {
+        (self.has_report, self.is_overtaken) = (false, [false; SLOTS]);
+        for (slot, was_on_air) in self.slots.iter_mut().zip(&mut self.was_on_air) {
+            let Some(slot) = slot else { continue };
             if matches!(slot.status, OrderStatus::OnAir | OrderStatus::Received) {
                 (slot.status, slot.changed, slot.sent) = (OrderStatus::Queued, now, None);
+                *was_on_air = true;
             }
         }
     }
@@ -246,14 +403,17 @@ impl SlotOutbox {
     /// Sends every order again in a new series, except one that only lifts a hold or an abort: the vehicle holds since it
     /// has lost its record, and the operator lifts that by a new order.
     fn begin_series(&mut self, now: Instant) {
-        self.series = Series::from_random(self.series.get().wrapping_add(1));
-        self.is_forgotten = false;
+        self.series = self.series.next();
+        (self.is_forgotten, self.was_on_air) = (false, [false; SLOTS]);
         for progress in self.slots.iter_mut().flatten() {
-            let lifts = matches!(progress.slot, Slot::Constraints(order) if !order.hold && !order.abort);
-            let is_refused = matches!(progress.status, OrderStatus::Refused(r) if r != RefusalReason::Forgotten);
-            if lifts {
+            let is_final = match progress.status {
+                OrderStatus::Refused(reason) => reason != RefusalReason::Forgotten,
+                OrderStatus::Withdrawn(_) => true,
+                _ => false,
+            };
+            if lifts(&progress.slot) && !is_final {
                 progress.status = OrderStatus::Refused(RefusalReason::Forgotten);
-            } else if !is_refused {
+            } else if !is_final {
                 (progress.status, progress.changed, progress.sent) = (OrderStatus::Queued, now, None);
             }
         }
@@ -283,8 +443,18 @@ fn is_pending(order: &SlotProgress) -> bool {
     match order.status {
         OrderStatus::Queued | OrderStatus::OnAir => true,
         OrderStatus::Received => order.sent.is_none(),
-        OrderStatus::Applied | OrderStatus::Refused(_) => false,
+        OrderStatus::Applied | OrderStatus::Refused(_) | OrderStatus::Withdrawn(_) => false,
     }
+}
+
+/// Whether an order only lifts a hold or an abort.
+fn lifts(slot: &Slot) -> bool {
+    matches!(slot, Slot::Constraints(order) if !order.hold && !order.abort)
+}
+
+/// Whether a status shows that the vehicle has lost its record of the series.
+fn is_forgotten(status: OrderStatus) -> bool {
+    matches!(status, OrderStatus::Refused(RefusalReason::Forgotten) | OrderStatus::Withdrawn(Withdrawal::Lost))
 }
 
 /// Brings the age of a fix up to date.
@@ -314,11 +484,11 @@ mod tests {
             (OrderStatus::Applied, false),
             (OrderStatus::Refused(RefusalReason::Unable), false),
         ] {
-            let mut before = SlotOutbox::new(Series::from_random(9));
+            let mut before = SlotOutbox::new(Series::from_random(9), false);
             (0..3).for_each(|i| assert_eq!(before.issue(hold(i % 2 == 0), now), i + 1));
             let mut order = before.progress().next().unwrap().clone();
             (order.status, order.sent) = (status, Some(now));
-            let mut after = SlotOutbox::new(Series::from_random(1));
+            let mut after = SlotOutbox::new(Series::from_random(1), false);
             after.restore(Series::from_random(9), [order]);
             let pending = after.pending(now, Instant::ZERO);
             let bytes = VersionedSlot::encode(3, &hold(true));

@@ -15,6 +15,19 @@ impl Series {
         Self(bits & 0xFFFF_FFFF_FFFF)
     }
 
+    /// The series after this one of the same surface.
+    #[must_use]
+    pub fn next(self) -> Self {
+        Self::from_random(self.0.wrapping_add(1))
+    }
+
+    /// Whether two series are of one surface, which counts them up; those of two surfaces are far apart.
+    pub fn is_of_same_surface(self, other: Self) -> bool {
+        const NEAR: u64 = 1 << 12;
+        let apart = Self::from_random(self.0.wrapping_sub(other.0)).0;
+        apart < NEAR || Self::from_random(apart.wrapping_neg()).0 < NEAR
+    }
+
     /// The number on the wire.
     pub fn get(self) -> u64 {
         self.0

@@ -272,9 +272,16 @@ impl<T> Handshake<T> {
         self.retired.iter().any(|r| r.identity == peer)
     }
 
-    /// Whether a run of the peer that has ended sent this frame to a run of ours, and it came in for the first time.
-    pub(super) fn is_new_of_ended(&mut self, envelope: &Envelope<'_>, direction: Direction) -> bool {
-        self.retired.iter_mut().any(|r| r.accept(envelope, direction))
+    /// The ended run of the peer that sent this frame to a run of ours, if the frame came in for the first time.
+    pub(super) fn ended_sender(&mut self, envelope: &Envelope<'_>, direction: Direction) -> Option<&EndedPeer> {
+        self.retired.iter_mut().find_map(|r| r.accept(envelope, direction).then_some(&*r))
+    }
+
+    /// At the vehicle: the introduction of the surface that holds it, if that is another one than this.
+    pub(super) fn other_holder(&self, caller: &Introduction) -> Option<&Introduction> {
+        let (holder, calling) = (self.run.as_ref()?.introduction, caller.series?);
+        let is_other = holder.series.is_some_and(|series| !series.is_of_same_surface(calling));
+        self.run.as_ref().map(|run| &run.introduction).filter(|_| is_other)
     }
 
     fn retire(&mut self, run: LinkRun<T>) {

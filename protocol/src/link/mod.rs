@@ -18,11 +18,14 @@ mod window;
 pub use estimate::{Goodput, Loss};
 pub use flight::Flight;
 pub use mismatch::Mismatch;
+pub use pair::HOLDER_SILENCE;
 use pair::{Inbound, LinkPair};
 pub use run::{Authenticity, Identity};
-pub use slots::{Admission, SlotInbox, SlotInboxState};
+pub use slots::{Admission, SeriesRecord, SlotInbox, SlotInboxState};
 pub use stats::{DropReason, LinkStats};
-pub use surface::{Cycle, EndedRun, InForce, IssueError, PeerView, SurfaceConfig, SurfaceEvent, SurfaceLink};
+pub use surface::{
+    Cycle, EndedRun, InForce, IssueError, OtherSurface, PeerView, SurfaceConfig, SurfaceEvent, SurfaceLink,
+};
 pub use vehicle::{OversizedChunk, VehicleConfig, VehicleEvent, VehicleLink};
 pub use window::{LinkWindow, WindowRefusal};
 

@@ -10,7 +10,13 @@ use super::run::{Authenticity, Identity};
 use super::{FrameNumber, LinkStats, LinkWindow};
 use crate::directive::Series;
 use crate::seal::{Direction, SessionKey, TAG_BYTES};
-use crate::wire::{Address, ChunkKind, FrameBuilder, FrameKind, Header, Introduction, MissionId, Seal, Stamp};
+use crate::wire::{
+    Address, ChunkKind, FrameBuilder, FrameKind, Header, Introduction, MissionId, Seal, Stamp, room_for_payload,
+};
+use std::time::Duration;
+
+/// A surface keeps a vehicle against others until it was silent for this long.
+pub const HOLDER_SILENCE: Duration = Duration::from_secs(120);
 
 /// Refused frames since the last accepted one that are a sign of other runs.
 #[derive(Debug, Default)]
@@ -36,6 +42,10 @@ pub struct LinkPair<T> {
     strays: Strays,
     /// At the vehicle: hellos of ended runs of the surface since the last frame that was accepted.
     ended_hellos: u32,
+    /// At the vehicle: how long the surface that holds it was silent; `None` if it was never heard.
+    silence: Option<Duration>,
+    /// At the vehicle: the run of a surface that the next hello refuses.
+    refused: Option<Identity>,
     /// Counters and estimates of this link.
     pub stats: LinkStats,
 }
@@ -67,6 +77,8 @@ impl<T> LinkPair<T> {
             owes_hello: false,
             strays: Strays::default(),
             ended_hellos: 0,
+            silence: None,
+            refused: None,
             stats,
         }
     }
@@ -79,6 +91,41 @@ impl<T> LinkPair<T> {
     /// Names another series in the hellos of this end; returns whether it is another one.
     pub fn set_series(&mut self, series: Series) -> bool {
         self.introduction.series.replace(series) != Some(series)
+    }
+
+    /// At the vehicle: sets how long the surface that holds it was silent.
+    pub fn set_silence(&mut self, silence: Option<Duration>) {
+        self.silence = silence;
+    }
+
+    /// At the vehicle: whether the next hello refuses a surface.
+    pub fn owes_refusal(&self) -> bool {
+        self.refused.is_some()
+    }
+
+    /// At the vehicle: the introduction of later hellos says that it has no memory of orders, or that it has.
+    pub fn set_memory(&mut self, has_memory: bool) {
+        self.introduction.has_no_memory = !has_memory;
+    }
+
+    /// At the vehicle: the series of the surface that the next hello answers.
+    pub fn called_series(&self) -> Option<Series> {
+        self.handshake.offered().or(self.handshake.run())?.introduction.series
+    }
+
+    /// At the surface: the introduction of later hellos has the vehicle leave another surface, or not.
+    pub fn set_takes_over(&mut self, takes_over: bool) {
+        self.introduction.takes_over = takes_over;
+    }
+
+    /// At the surface: whether hellos have the vehicle leave another surface.
+    pub fn takes_over(&self) -> bool {
+        self.introduction.takes_over
+    }
+
+    /// Whether orders are authenticated.
+    pub fn is_authentic(&self) -> bool {
+        self.authenticity.is_some()
     }
 
     /// A setting in which the peer differs, until a frame of it is accepted.
@@ -196,7 +243,7 @@ impl<T> LinkPair<T> {
         const HEADER_AND_TURN: usize = 9;
         const CHUNK_HEAD: usize = 2;
         let seal = if self.authenticity.is_some() { 8 + TAG_BYTES } else { Seal::bytes(false, 0) };
-        HEADER_AND_TURN + CHUNK_HEAD + self.introduction.encode().len() + seal
+        HEADER_AND_TURN + CHUNK_HEAD + self.introduction.encode(Introduction::MAX_BYTES).len() + seal
     }
 
     /// Bytes of the seal of a full frame of ours.
@@ -229,6 +276,19 @@ impl<T> LinkPair<T> {
     /// At the vehicle: leaves the last hello of the surface without an answer.
     pub fn withhold_hello(&mut self) {
         self.owes_hello = self.handshake.is_leaving();
+        self.refused = None;
+    }
+
+    /// The introduction in the next hello: at a vehicle that refuses a surface, it names the one that holds it.
+    fn next_introduction(&self) -> Introduction {
+        let holder = self.handshake.run().map(|run| run.introduction).filter(|_| self.refused.is_some());
+        match holder {
+            Some(Introduction { series, name, .. }) => {
+                let silence_s = self.silence.map_or(248, |silence| silence.as_secs().min(248) as u8);
+                Introduction { series, name, refuses: true, silence_s, ..self.introduction }
+            }
+            None => self.introduction,
+        }
     }
 
     /// Starts the next frame, with at most `ack_room` bytes of acknowledgement. It becomes a hello if `purpose` demands it
@@ -242,7 +302,8 @@ impl<T> LinkPair<T> {
         purpose: FramePurpose,
     ) -> FrameBuilder {
         let hello = purpose.is_hello() || self.must_send_hello();
-        let own = self.handshake.offered().filter(|_| hello).map_or(self.handshake.own(), |r| r.own);
+        let offered = self.handshake.offered().filter(|_| hello && self.refused.is_none());
+        let own = offered.map_or(self.handshake.own(), |r| r.own);
         let direction = self.direction_out();
         let keyed = if hello { self.authenticity.is_some() } else { self.is_keyed(direction) };
         let run = self.handshake.run_for(purpose).filter(|_| !hello);
@@ -263,7 +324,9 @@ impl<T> LinkPair<T> {
         };
         let mut builder = FrameBuilder::new(&header, size);
         if hello {
-            builder.push(ChunkKind::Introduction, &self.introduction.encode());
+            const EXTENDED: usize = 1;
+            let room = room_for_payload(builder.room()).saturating_sub(EXTENDED);
+            builder.push(ChunkKind::Introduction, &self.next_introduction().encode(room));
         }
         builder
     }
@@ -276,6 +339,7 @@ impl<T> LinkPair<T> {
             // The current run may be in use still: the hello of the surface may be a replay.
             self.owes_hello &= self.handshake.is_leaving();
             let to = self.handshake.offered().filter(|_| self.us != Address::SURFACE).map(|r| r.peer);
+            let to = self.refused.take().or(to);
             let (session, nonce) = to.map_or((0, 0), |p| (p.session.get(), p.nonce));
             return match &self.authenticity {
                 Some(a) => builder.finish(&Seal::Hello(&a.key, self.mission, session, nonce), short),

@@ -31,6 +31,7 @@ pub(super) struct EndedPeer {
     /// Our run that it communicated with.
     pub(super) own: Identity,
     pub(super) identity: Identity,
+    pub(super) introduction: Introduction,
     /// The key of its frames to a run of ours, if there is one.
     key: Option<SessionKey>,
     highest: FrameNumber,
@@ -90,7 +91,8 @@ impl<T> LinkRun<T> {
     }
 
     pub(super) fn end(self) -> EndedPeer {
-        EndedPeer { own: self.own, identity: self.peer, key: self.key, highest: self.window.highest() }
+        let (own, identity, introduction) = (self.own, self.peer, self.introduction);
+        EndedPeer { own, identity, introduction, key: self.key, highest: self.window.highest() }
     }
 
     /// The frame, if the peer's run sealed it to ours. If `keyed`, it must have a tag.

@@ -21,41 +21,113 @@ impl CellEdge {
     }
 }
 
+/// The name of a surface for people: letters, digits, and ` `, `-`, `_`, `.` between them; at most 12 bytes of UTF-8.
+#[derive(Clone, Copy, PartialEq, Eq, Default)]
+pub struct SurfaceName {
+    bytes: [u8; Self::MAX_BYTES],
+    length: u8,
+}
+
+impl SurfaceName {
+    /// Bytes of the longest name.
+    pub const MAX_BYTES: usize = 12;
+
+    /// The beginning of a text, as far as it fits, without the characters that no name has.
+    pub fn from_text(text: &str) -> Self {
+        let mut name = Self::default();
+        for character in text.chars().filter(|c| c.is_alphanumeric() || " -_.".contains(*c)) {
+            let end = usize::from(name.length) + character.len_utf8();
+            let Some(place) = name.bytes.get_mut(usize::from(name.length)..end) else { break };
+            character.encode_utf8(place);
+            name.length = end as u8;
+        }
+        name
+    }
+
+    /// The name; empty if the surface has none.
+    pub fn as_str(&self) -> &str {
+        let bytes = self.bytes.get(..usize::from(self.length)).unwrap_or_default();
+        std::str::from_utf8(bytes).unwrap_or_default()
+    }
+}
+
+impl std::fmt::Debug for SurfaceName {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        std::fmt::Debug::fmt(self.as_str(), f)
+    }
+}
+
 /// The payload of an introduction, a chunk of every hello between two ends.
 ///
 /// ```text
 /// byte  bits  field          unit, range
 ///  0-2  24    edge of a cell tenths of a millimetre; 0: the sender has no map
-///  3-8  48    series         of the sender's orders; only from the surface
-///  9..        reserved for later versions; skipped
+///  3-8  48    series         from a surface: of its orders; from a vehicle that refuses: of those of the surface that holds it
+///  9    1     takes over     from a surface: the vehicle shall leave another surface that holds it
+///  9    1     refuses        from a vehicle: another surface holds it, and the run of the called surface has ended
+///  9    1     no memory      from a vehicle: it knows no order from before its start
+///  9    5     silence        from a vehicle that refuses: time since it has heard that surface, 8 s; 31: 248 s or more
+/// 10    8     name's length  bytes, 0..12
+/// 11..        name           of the surface that the series belongs to, UTF-8
+///  ..         reserved for later versions; skipped
 /// ```
+///
+/// A vehicle ends after byte 2 if it has nothing more to say. Without byte 9, a surface takes over; without byte 10, it has no
+/// name.
 ///
 /// ```
 /// use scenecast_protocol::directive::Series;
-/// use scenecast_protocol::wire::{CellEdge, Introduction};
+/// use scenecast_protocol::wire::{CellEdge, Introduction, SurfaceName};
 ///
-/// let surface = Introduction { cell_edge: CellEdge::from_metres(0.25), series: Some(Series::from_random(0xABCD)) };
-/// assert_eq!(surface.encode(), [0x00, 0x09, 0xC4, 0, 0, 0, 0, 0xAB, 0xCD]);
-/// assert_eq!(Introduction::decode(&surface.encode()), Ok(surface));
+/// let (series, name) = (Some(Series::from_random(0xABCD)), SurfaceName::from_text("tug"));
+/// let surface = Introduction { cell_edge: CellEdge::from_metres(0.25), series, name, ..Introduction::default() };
+/// assert_eq!(surface.encode(23), [0x00, 0x09, 0xC4, 0, 0, 0, 0, 0xAB, 0xCD, 0, 3, b't', b'u', b'g']);
+/// assert_eq!(Introduction::decode(&surface.encode(23)), Ok(surface));
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Introduction {
     /// The edge of a cell on the sender's map.
     pub cell_edge: CellEdge,
-    /// The series of the sender's orders; `None` from a vehicle.
+    /// The series of the surface's orders. From a vehicle: only if it refuses, and then of the surface that holds it.
     pub series: Option<Series>,
+    /// From a surface: the vehicle shall leave another surface that holds it.
+    pub takes_over: bool,
+    /// From a vehicle: another surface holds it.
+    pub refuses: bool,
+    /// From a vehicle: it knows no order from before its start.
+    pub has_no_memory: bool,
+    /// From a vehicle that refuses: seconds since it has heard the surface that holds it, rounded down to multiples of 8.
+    pub silence_s: u8,
+    /// The name of the surface that the series belongs to.
+    pub name: SurfaceName,
 }
 
 impl Introduction {
     /// Bytes of the longest introduction.
-    pub const MAX_BYTES: usize = 9;
+    pub const MAX_BYTES: usize = Self::HEAD + 1 + SurfaceName::MAX_BYTES;
+    /// Bytes before the name's length.
+    const HEAD: usize = 10;
 
-    /// The bytes of the payload.
+    /// The bytes of the payload, at most `room` of them. A name that does not fit is cut, or left out.
     #[must_use]
-    pub fn encode(&self) -> Vec<u8> {
+    pub fn encode(&self, room: usize) -> Vec<u8> {
         let mut out = self.cell_edge.0.to_be_bytes().get(1..).unwrap_or_default().to_vec();
-        if let Some(series) = self.series {
-            out.extend_from_slice(series.get().to_be_bytes().get(2..).unwrap_or_default());
+        let flags = [(self.takes_over, 0x80), (self.refuses, 0x40), (self.has_no_memory, 0x20)];
+        let flags = flags.iter().filter(|(is_set, _)| *is_set).fold(0, |all, (_, bit)| all | bit);
+        if self.series.is_none() && flags == 0 {
+            return out;
+        }
+        let series = self.series.map_or(0, Series::get);
+        out.extend_from_slice(series.to_be_bytes().get(2..).unwrap_or_default());
+        out.push(flags | (self.silence_s / 8));
+        let name = self.name.as_str();
+        let mut length = name.len().min(room.saturating_sub(Self::HEAD + 1));
+        while !name.is_char_boundary(length) {
+            length -= 1;
+        }
+        if length > 0 {
+            out.push(length as u8);
+            out.extend_from_slice(name.as_bytes().get(..length).unwrap_or_default());
         }
         out
     }
@@ -64,13 +136,21 @@ impl Introduction {
     pub fn decode(bytes: &[u8]) -> Result<Self, Truncated> {
         let mut r = Reader::new(bytes);
         let cell_edge = CellEdge(u32::from(r.u8()?) << 16 | u32::from(r.u16()?));
-        let series = match r.rest().is_empty() {
-            true => None,
-            false => {
-                Some(Series::from_random(u64::from(r.u16()?) << 32 | u64::from(r.u16()?) << 16 | u64::from(r.u16()?)))
-            }
-        };
-        Ok(Self { cell_edge, series })
+        let mut read = Self { cell_edge, ..Self::default() };
+        if r.rest().is_empty() {
+            return Ok(read);
+        }
+        let series = u64::from(r.u16()?) << 32 | u64::from(r.u16()?) << 16 | u64::from(r.u16()?);
+        read.series = (series != 0).then(|| Series::from_random(series));
+        let Ok(flags) = r.u8() else { return Ok(Self { takes_over: true, ..read }) };
+        (read.takes_over, read.refuses) = (flags & 0x80 != 0, flags & 0x40 != 0);
+        read.has_no_memory = flags & 0x20 != 0;
+        read.silence_s = if read.refuses { (flags & 0x1F) * 8 } else { 0 };
+        if let Some(length) = r.u8().ok().filter(|_| read.series.is_some()) {
+            let name = r.take(usize::from(length).min(SurfaceName::MAX_BYTES))?;
+            read.name = SurfaceName::from_text(&String::from_utf8_lossy(name));
+        }
+        Ok(read)
     }
 }
 
@@ -81,22 +161,47 @@ mod tests {
 
     proptest! {
         #[test]
-        fn an_introduction_reads_back(edge in 0u32..=CellEdge::MAX, bits: u64, has_series: bool, tail: Vec<u8>) {
-            let series = has_series.then(|| Series::from_random(bits));
-            let sent = Introduction { cell_edge: CellEdge(edge), series };
-            let mut bytes = sent.encode();
+        fn an_introduction_reads_back(
+            edge in 0u32..=CellEdge::MAX,
+            bits in 1u64..,
+            [is_surface, takes_over, refuses, has_no_memory]: [bool; 4],
+            silence in 0u8..32,
+            name: String,
+            tail: Vec<u8>,
+        ) {
+            let series = is_surface.then(|| Series::from_random(bits | 1));
+            let silence_s = if refuses { silence * 8 } else { 0 };
+            let name = if is_surface { SurfaceName::from_text(&name) } else { SurfaceName::default() };
+            let cell_edge = CellEdge(edge);
+            let sent = Introduction { cell_edge, series, takes_over, refuses, has_no_memory, silence_s, name };
+            let mut bytes = sent.encode(Introduction::MAX_BYTES);
             prop_assert!(bytes.len() <= Introduction::MAX_BYTES);
             prop_assert_eq!(Introduction::decode(&bytes), Ok(sent));
-            if has_series {
+            if !name.as_str().is_empty() {
                 bytes.extend(tail);
                 prop_assert_eq!(Introduction::decode(&bytes), Ok(sent), "of a later version");
+            }
+            for room in 10..Introduction::MAX_BYTES {
+                let cut = sent.encode(room);
+                prop_assert!(cut.len() <= room);
+                let read = Introduction::decode(&cut).unwrap();
+                prop_assert!(name.as_str().starts_with(read.name.as_str()));
+                prop_assert_eq!(Introduction { name, ..read }, sent);
             }
         }
 
         #[test]
-        fn any_bytes_decode_or_are_refused(bytes in proptest::collection::vec(any::<u8>(), 0..20)) {
-            let _ = Introduction::decode(&bytes);
+        fn any_bytes_decode_or_are_refused(bytes in proptest::collection::vec(any::<u8>(), 0..40)) {
+            if let Ok(read) = Introduction::decode(&bytes) {
+                prop_assert!(read.name.as_str().chars().all(|c| c.is_alphanumeric() || " -_.".contains(c)));
+            }
         }
+    }
+
+    #[test]
+    fn a_surface_of_before_takes_over() {
+        let read = Introduction::decode(&[0, 9, 0xC4, 0, 0, 0, 0, 0xAB, 0xCD]).unwrap();
+        assert!(read.takes_over && read.series == Some(Series::from_random(0xABCD)));
     }
 
     #[test]

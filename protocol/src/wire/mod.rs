@@ -29,7 +29,7 @@ pub use faults::EquipmentFaults;
 pub use frame::{Envelope, Frame, FrameBuilder, FrameError, Seal};
 pub use header::{Address, FrameKind, Header, MissionId, SessionId};
 pub use intent::Intent;
-pub use introduction::{CellEdge, Introduction};
+pub use introduction::{CellEdge, Introduction, SurfaceName};
 pub use number::unwrap_number;
 pub use path::PlannedPath;
 pub use placement::Placement;

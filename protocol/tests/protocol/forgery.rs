@@ -76,7 +76,10 @@ impl Stranger<'_> {
         let series = (from == Address::SURFACE).then(|| Series::from_random(self.draw(1 << 31)));
         let header = Header { session, number: 0, kind: FrameKind::Hello, ..self.header(from, to, session) };
         let mut builder = FrameBuilder::new(&header, 64);
-        builder.push(ChunkKind::Introduction, &Introduction { series, ..Introduction::default() }.encode());
+        builder.push(
+            ChunkKind::Introduction,
+            &Introduction { series, ..Introduction::default() }.encode(Introduction::MAX_BYTES),
+        );
         let sealed_to = if from == Address::SURFACE { 0 } else { receiver.get() };
         Some(builder.finish(&Seal::Crc(MISSION, sealed_to), true))
     }
@@ -216,7 +219,7 @@ fn give_forged_order(pair: &mut LinkedEnds, series: Series, order: &[u8]) {
     let header = Stranger { pair, random: 1 }.header(Address::SURFACE, auv(), forged);
     let mut hello = FrameBuilder::new(&Header { number: 0, base: 1, kind: FrameKind::Hello, ..header.clone() }, 64);
     let introduction = Introduction { series: Some(series), ..Introduction::default() };
-    hello.push(ChunkKind::Introduction, &introduction.encode());
+    hello.push(ChunkKind::Introduction, &introduction.encode(Introduction::MAX_BYTES));
     let hello = hello.finish(&Seal::Crc(MISSION, 0), true);
     pair.overheard.clear();
     let give_up = pair.now + Duration::from_secs(1000);
@@ -244,7 +247,7 @@ fn an_order_gets_through_after_a_forged_series_ended_its_own() {
 
         let forged = Series::from_random(1);
         give_forged_order(&mut pair, forged, &VersionedSlot::encode(1, &Slot::Constraints(Constraints::default())));
-        assert_eq!(pair.vehicle.persistent_state().series, Some(forged), "the forged series is in force");
+        assert_eq!(pair.vehicle.persistent_state().series(), Some(forged), "the forged series is in force");
 
         pair.surface.issue(auv(), utility(77), pair.now).unwrap();
         let until = pair.now + USUAL_RECOVERY;

@@ -163,7 +163,8 @@ fn no_forged_replayed_or_flipped_directive_is_applied() {
             _ => pair.restart_surface(),
         }
     }
-    pair.run(pair.now + Duration::from_secs(120), false);
+    // The vehicle stays with the surface of before until that was silent for two minutes.
+    pair.run(pair.now + Duration::from_secs(300), false);
     let applied = pair.applied.len();
     assert!(applied >= 100 && recorded.len() > 200, "{applied} applied, {} recorded", recorded.len());
     let mut rng = TestRng(3);

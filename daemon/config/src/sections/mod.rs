@@ -13,7 +13,7 @@ mod survey;
 pub use link::Link;
 pub use map::{Bands, Camera, Labels, Map, Scene};
 pub use modem::{Channel, Modem};
-pub use node::{Console, Mission, Operator, Runtime, VehicleSection, WorldSection};
+pub use node::{Console, Mission, Operator, Runtime, SurfaceSection, VehicleSection, WorldSection};
 pub use ros2::Ros2;
 pub use survey::{Autopilot, Navigation, Position, Registration, Survey};
 
@@ -24,6 +24,7 @@ use crate::key::Section;
 pub struct Config {
     pub mission: Mission,
     pub vehicle: VehicleSection,
+    pub surface: SurfaceSection,
     pub link: Link,
     pub modem: Modem,
     pub channel: Channel,
@@ -49,6 +50,7 @@ impl Section {
     pub const ALL: &'static [Self] = &[
         Mission::SECTION,
         VehicleSection::SECTION,
+        SurfaceSection::SECTION,
         Link::SECTION,
         Modem::SECTION,
         Channel::SECTION,

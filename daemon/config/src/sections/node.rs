@@ -2,7 +2,7 @@
 
 use crate::key::section;
 use crate::rule::{ANY, range};
-use crate::setting::{HostPort, OperatorScript, WorldKind};
+use crate::setting::{HostPort, OperatorScript, RestoreOrders, WorldKind};
 use scenecast_core::LatLon;
 use std::path::PathBuf;
 
@@ -26,6 +26,21 @@ section! {
         address: u8 = 1, range(1.0, 14.0, ""), [Auv Asv Scenario];
         /// Name of the vehicle, for people.
         name: String = "auv-1".into(), ANY, [Auv Asv Scenario];
+    }
+}
+
+section! {
+    /// The surface and its orders.
+    surface: SurfaceSection {
+        /// Name of the surface, at most 12 letters and digits, by which a vehicle names it to another surface with the same
+        /// key. Empty: the name of the computer.
+        name: String = String::new(), ANY, [Asv Scenario];
+        /// What the surface does when a vehicle has lost the orders that it had received. ask: it shows them, and sends them
+        /// again when an operator confirms it; auto: it sends them again by itself. An order to resume is never sent again.
+        restore: RestoreOrders = RestoreOrders::Ask, ANY, [Asv Scenario];
+        /// Age after which an abort that has not arrived is sent no more, until an operator confirms it. 0: it is sent until
+        /// it arrives.
+        abort_lifetime_s: f64 = 120.0, range(0.0, 1e6, "s"), [Asv Scenario];
     }
 }
 

@@ -2,9 +2,10 @@
 
 use crate::key::section;
 use crate::rule::{ANY, ports, range};
-use crate::setting::{AutopilotKind, GpsPort, NavigationSource};
+use crate::setting::{AutopilotKind, GpsPort, NavigationSource, StartMode};
 use scenecast_core::{Area, PortAddress};
 use scenecast_protocol::directive::{AtEnd, PlannerKind, Reaction};
+use std::path::PathBuf;
 
 section! {
     /// The survey.
@@ -24,6 +25,12 @@ section! {
         /// needs 10 % of overlap to close loops between legs. Legs are never further apart than nine tenths of a frame's
         /// shorter side, so that 30 % changes nothing for a frame of 4:3, and brings the legs of a square one closer.
         leg_overlap_percent: f64 = 30.0, range(0.0, 90.0, "%"), [Auv Scenario];
+        /// File of a fence for a vehicle that has no orders from before its start: GeoJSON, as scenecast ctl fence set takes
+        /// it. Empty: none.
+        fence_file: Option<PathBuf> = None, ANY, [Auv];
+        /// What a vehicle does that has no orders from before its start, and no survey.fence_file. hold: it holds until the
+        /// operator orders it to resume; free: it surveys.
+        start: StartMode = StartMode::Hold, ANY, [Auv];
         /// Planner of the vehicle's path once the operator has sent a utility. The operator may choose another.
         planner: PlannerKind = PlannerKind::Horizon, ANY, [Auv Scenario];
         /// What an adaptive survey does once no look pays any more. repeat: it explores the rest of the area, then looks at

@@ -189,6 +189,22 @@ choices! {
         Log,
     }
 
+    /// How orders that a vehicle has lost are sent again.
+    RestoreOrders "lowercase" {
+        /// After an operator has confirmed it.
+        Ask,
+        /// By itself.
+        Auto,
+    }
+
+    /// What a vehicle does that has no orders from before its start.
+    StartMode "lowercase" {
+        /// It holds until the operator orders it to resume.
+        Hold,
+        /// It surveys.
+        Free,
+    }
+
     /// What the operator of a rehearsal does.
     OperatorScript "lowercase" {
         /// Orders at fixed times.

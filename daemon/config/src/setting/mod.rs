@@ -13,8 +13,8 @@ mod tables;
 mod texts;
 
 pub use choices::{
-    Authenticate, AutopilotKind, BirthRule, CameraStamps, MapCells, ModemKind, OperatorScript, RosTransport, S2cMode,
-    SceneLabels, WorldKind,
+    Authenticate, AutopilotKind, BirthRule, CameraStamps, MapCells, ModemKind, OperatorScript, RestoreOrders,
+    RosTransport, S2cMode, SceneLabels, StartMode, WorldKind,
 };
 pub use debounce::Debounce;
 pub use labels::{BandRange, LabelMessage, LabelSource, Votes};

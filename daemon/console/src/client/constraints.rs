@@ -1,13 +1,13 @@
 //! Fence, limits, hold and abort.
 
 use super::follow::follow;
-use super::geojson::{self, CoordinateFrame};
 use super::session::Session;
 use super::text;
 use crate::orders::ConstraintsOrder;
 use crate::state::{AppliedOrder, MissionState, OrderProgress, OrderStatus, VehicleState};
 use scenecast_core::UserError;
 use scenecast_core::{LatLon, TangentPlane};
+use scenecast_files::{CoordinateFrame, FenceShapes, read_fence};
 use scenecast_surface::{FenceOrder, LimitsOrder};
 use serde::Serialize;
 use serde_json::json;
@@ -45,7 +45,9 @@ pub async fn set_fence(session: &Session, file: FenceFile<'_>) -> Result<(), Use
     let state = session.state().await?;
     let v = session.choose(&state)?;
     let frame = if file.in_metres { CoordinateFrame::Metres } else { degrees(&state)? };
-    let order = geojson::read_fence(file.path, frame)?;
+    let FenceShapes { fence, keep_outs, return_point } = read_fence(file.path, frame)?;
+    let order = FenceOrder { fence, keep_outs, return_point };
+    order.read().map_err(|line| UserError::file(file.path, line))?;
     if order.fence.is_none() && !file.without_fence {
         let line = "it has no fence, and an order replaces the present one; --without-fence removes it on purpose";
         return Err(UserError::file(file.path, line));

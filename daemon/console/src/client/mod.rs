@@ -5,7 +5,6 @@ mod command;
 mod constraints;
 mod download;
 mod follow;
-mod geojson;
 mod http;
 mod log;
 mod orders;

@@ -1,10 +1,10 @@
 //! Weighted areas, and the destination.
 
 use super::constraints::{OrderView, degrees, send, slot};
-use super::geojson::{self, CoordinateFrame};
 use super::session::Session;
 use scenecast_core::UserError;
-use scenecast_surface::{AreasOrder, DestinationOrder};
+use scenecast_files::{AreaShape, CoordinateFrame, read_areas};
+use scenecast_surface::{AreaOrder, AreasOrder, DestinationOrder};
 use std::fmt::Write;
 use std::path::Path;
 
@@ -31,7 +31,10 @@ pub async fn set_areas(session: &Session, file: Option<AreasFile<'_>>) -> Result
     let order = match file {
         Some(file) => {
             let frame = if file.in_metres { CoordinateFrame::Metres } else { degrees(&state)? };
-            geojson::read_areas(file.path, frame)?
+            let area = |AreaShape { outline, weight }| AreaOrder { outline, weight };
+            let order = AreasOrder { areas: read_areas(file.path, frame)?.into_iter().map(area).collect() };
+            order.read().map_err(|line| UserError::file(file.path, line))?;
+            order
         }
         None => AreasOrder::default(),
     };

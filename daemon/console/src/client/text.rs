@@ -225,6 +225,7 @@ pub(super) fn order_status(state: OrderStatus) -> &'static str {
         OrderStatus::Received => "received",
         OrderStatus::Applied => "applied",
         OrderStatus::Refused => "refused",
+        OrderStatus::Withdrawn => "withdrawn",
     }
 }
 

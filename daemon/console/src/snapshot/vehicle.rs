@@ -4,12 +4,12 @@ use super::facts::{MissionFacts, seconds};
 use super::{exemplar, link, position};
 use crate::state::{
     AppliedOrder, DirectiveSlots, EarlierMap, InForceKnowledge, MapLabel, MapLabelTree, MapSummary, OrderProgress,
-    OrderStatus, PlannedPath, ReportedDisk, ReportedFault, ReportedMode, ReportedPose, ReportedRegistration,
-    ReportedTie, StatusReport, UsblMeasurement, UtilityTerms, VehicleMarker, VehicleNote, VehicleOrders,
-    VehicleSettings, VehicleState, WeightDraft,
+    OrderStatus, OtherSurface, PlannedPath, ReportedDisk, ReportedFault, ReportedMode, ReportedPose,
+    ReportedRegistration, ReportedTie, StatusReport, UsblMeasurement, UtilityTerms, VehicleMarker, VehicleNote,
+    VehicleOrders, VehicleSettings, VehicleState, WeightDraft,
 };
 use scenecast_protocol::coordinates::MapPoint;
-use scenecast_protocol::directive::{self, PlannerKind, REPORTED_SLOTS, SlotProgress};
+use scenecast_protocol::directive::{self, PlannerKind, REPORTED_SLOTS, SlotId, SlotProgress};
 use scenecast_protocol::link::{InForce, PeerView};
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::{Address, DiskReport, FrameTie, Intent, RegistrationReport, VehicleMode, VehicleStatus};
@@ -36,6 +36,7 @@ fn vehicle(
         last_received_s: record.last_received(&view).map(seconds),
         expected_interval_s: expected_interval_s(surface, &view, record, facts),
         next_contact_s: view.next_contact(now).map(seconds),
+        other_surface: other_surface(&view, now),
         status: record.status(&view).map(|(s, at)| status(s, record, *at)),
         track: track(&record.track),
         registration: record.registration.latest().map(registration),
@@ -55,6 +56,18 @@ fn vehicle(
         markers: record.annotations.markers.values().map(marker).collect(),
         draft: draft(&record.annotations.draft),
         orders: orders(record, &view),
+    })
+}
+
+fn other_surface(view: &PeerView<'_>, now: Instant) -> Option<OtherSurface> {
+    let holder = view.holder();
+    let other = holder.or_else(|| view.caller(now))?;
+    Some(OtherSurface {
+        name: other.name.as_str().to_owned(),
+        holds: holder.is_some(),
+        heard_s: seconds(other.heard),
+        is_silent: other.is_silent(now),
+        is_taken_over: view.takes_over(),
     })
 }
 
@@ -279,13 +292,16 @@ fn order_progress(s: &SlotProgress) -> OrderProgress {
         directive::OrderStatus::Received => (OrderStatus::Received, None),
         directive::OrderStatus::Applied => (OrderStatus::Applied, None),
         directive::OrderStatus::Refused(reason) => (OrderStatus::Refused, Some(reason.explain().to_owned())),
+        directive::OrderStatus::Withdrawn(why) => (OrderStatus::Withdrawn, Some(why.explain().to_owned())),
     };
+    let asks = matches!(s.status, directive::OrderStatus::Withdrawn(why) if why.asks());
     OrderProgress {
         slot: s.id.name().to_owned(),
         name: order_name(&s.slot).to_owned(),
         version: s.version,
         state,
         reason,
+        asks: asks && !matches!(s.id, SlotId::Fix | SlotId::Requests),
         issued_s: seconds(s.issued),
         changed_s: seconds(s.changed),
     }

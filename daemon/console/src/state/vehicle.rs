@@ -23,6 +23,9 @@ pub struct VehicleState {
     pub expected_interval_s: f64,
     /// When the surface grants the next turn at the latest.
     pub next_contact_s: Option<f64>,
+    /// Another surface with the same key that holds the vehicle, or has called it in the last minutes; null if there is none.
+    #[serde(default)]
+    pub other_surface: Option<OtherSurface>,
     /// The last report of the vehicle; null before the first.
     pub status: Option<StatusReport>,
     /// Mission time, metres east and metres north on the vehicle's map of the last 500 reports.
@@ -57,6 +60,21 @@ pub struct VehicleState {
     /// The orders to the vehicle.
     #[serde(flatten)]
     pub orders: VehicleOrders,
+}
+
+/// Another surface with the same key.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct OtherSurface {
+    /// Its name; empty if it has none.
+    pub name: String,
+    /// Whether the vehicle obeys it, and refuses this surface. Otherwise it has called the vehicle that this surface holds.
+    pub holds: bool,
+    /// When the vehicle last heard it, as far as this surface knows.
+    pub heard_s: f64,
+    /// Whether the vehicle has not heard it for so long that every operator may take the vehicle over.
+    pub is_silent: bool,
+    /// Whether this surface takes the vehicle over, and the vehicle has not followed yet.
+    pub is_taken_over: bool,
 }
 
 /// Weights that an operator has set and not sent. Those that are not listed are as last sent.
@@ -319,8 +337,11 @@ pub struct OrderProgress {
     pub version: u16,
     /// The status of the order.
     pub state: OrderStatus,
-    /// Why the vehicle refused it.
+    /// Why the vehicle refused it, or why it was withdrawn.
     pub reason: Option<String>,
+    /// Whether the operator has to decide if a withdrawn order is given again.
+    #[serde(default)]
+    pub asks: bool,
     /// Mission time of the order, seconds.
     pub issued_s: f64,
     /// Mission time of the last change of `state`, seconds.
@@ -341,6 +362,8 @@ pub enum OrderStatus {
     Applied,
     /// The vehicle refused the order; `reason` is why.
     Refused,
+    /// The surface sends it no more; `reason` is why.
+    Withdrawn,
 }
 
 impl OrderStatus {

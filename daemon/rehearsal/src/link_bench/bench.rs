@@ -283,6 +283,8 @@ pub(super) fn surface(setting: &LinkSetting, seed: u64, now: Instant) -> LinkHos
 fn surface_config(setting: &LinkSetting) -> SurfaceConfig {
     let known = if setting.discovery_period.is_none() { setting.vehicles } else { 0 };
     SurfaceConfig {
+        name: Default::default(),
+        abort_lifetime: None,
         mission: MissionId(7),
         cell_edge: CellEdge::default(),
         modem: setting.modem(),

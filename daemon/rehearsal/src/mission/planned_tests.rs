@@ -61,9 +61,10 @@ fn the_shown_plan_is_the_vehicles_and_soon_the_current_one() {
         let current = places(plan(m.vehicle().waypoint(), m.vehicle().path()));
         !current.is_empty() && m.shown_plan().is_some_and(|shown| places(shown).ends_with(&current))
     };
-    let give_up = mission.now() + Duration::from_secs(10);
+    // One frame in ten is lost, so that the order or the pose after it may go out twice.
+    let give_up = mission.now() + Duration::from_secs(20);
     while !in_force(&mission) {
-        assert!(mission.now() < give_up, "{:?} after ten seconds", mission.shown_plan());
+        assert!(mission.now() < give_up, "{:?} after 20 seconds", mission.shown_plan());
         mission.advance(mission.now() + Duration::from_millis(200)).unwrap();
     }
 }

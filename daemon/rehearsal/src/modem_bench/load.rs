@@ -103,6 +103,8 @@ impl ModemBench {
             authenticity: None,
         };
         let surface = SurfaceConfig {
+            name: Default::default(),
+            abort_lifetime: None,
             mission,
             cell_edge: CellEdge::default(),
             modem: *at_surface.profile(),

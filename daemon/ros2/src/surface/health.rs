@@ -20,7 +20,12 @@ fn link(vehicle: &VehicleState, now_s: f64) -> Health {
     let channel = &vehicle.link;
     let age_s = vehicle.last_received_s.map(|at| now_s - at);
     let is_silent = age_s.is_none_or(|age| age > SILENT_PAUSES * vehicle.expected_interval_s);
+    let holder = vehicle.other_surface.as_ref().filter(|other| other.holds);
     let (level, message) = match (&channel.mismatch, age_s) {
+        (None, _) if holder.is_some() => {
+            let name = holder.map_or("", |holder| holder.name.as_str());
+            (DiagnosticStatus::WARN, format!("another surface holds the vehicle: {name}"))
+        }
         (Some(mismatch), _) => (DiagnosticStatus::ERROR, format!("frames are refused: {mismatch}")),
         (None, None) => (DiagnosticStatus::STALE, "no frame yet".to_owned()),
         (None, Some(age)) if is_silent => (DiagnosticStatus::STALE, format!("silent for {age:.0} s")),
@@ -75,12 +80,13 @@ fn state(vehicle: &VehicleState) -> Health {
 
 fn orders(vehicle: &VehicleState) -> Health {
     let slots = &vehicle.orders.directive.slots;
-    let refused = slots.iter().find(|slot| slot.state == OrderStatus::Refused);
+    let refused = slots.iter().find(|slot| slot.state == OrderStatus::Refused || slot.asks);
     let pending = slots.iter().filter(|slot| slot.state.is_pending()).count();
     let (level, message) = match refused {
         Some(slot) => {
             let reason = slot.reason.as_deref().unwrap_or("no reason given");
-            (DiagnosticStatus::WARN, format!("{} {} refused: {reason}", slot.slot, slot.version))
+            let state = if slot.asks { "withdrawn" } else { "refused" };
+            (DiagnosticStatus::WARN, format!("{} {} {state}: {reason}", slot.slot, slot.version))
         }
         None if pending > 0 => (DiagnosticStatus::OK, format!("{pending} pending")),
         None => (DiagnosticStatus::OK, "none pending".to_owned()),

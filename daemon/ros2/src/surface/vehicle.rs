@@ -156,5 +156,6 @@ fn status(state: OrderStatus) -> u8 {
         OrderStatus::Received => scenecast_msgs::OrderStatus::RECEIVED,
         OrderStatus::Applied => scenecast_msgs::OrderStatus::APPLIED,
         OrderStatus::Refused => scenecast_msgs::OrderStatus::REFUSED,
+        OrderStatus::Withdrawn => scenecast_msgs::OrderStatus::WITHDRAWN,
     }
 }

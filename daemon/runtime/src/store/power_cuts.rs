@@ -54,11 +54,10 @@ fn profile(config: &Config) -> ModemProfile {
     scenecast_config::modem_profile(config, config.modem.bit_rate)
 }
 
-fn vehicle(config: &Config, epoch: u8, now: Instant) -> VehicleHost {
+fn vehicle(config: &Config, durable: Durable, now: Instant) -> VehicleHost {
     let area = Area { west: 0.0, south: 0.0, east: 20.0, north: 20.0 };
-    let durable = Durable { epoch, ..Durable::default() };
-    let vehicle =
-        scenecast_vehicle::assemble(config, None, profile(config), area, durable, u64::from(epoch) + 3, now).unwrap();
+    let seed = u64::from(durable.epoch) + 3;
+    let vehicle = scenecast_vehicle::assemble(config, None, profile(config), area, durable, seed, now).unwrap();
     VehicleHost::new(vehicle, channel_station(profile(config), WINDOW, now), None)
 }
 
@@ -77,7 +76,7 @@ impl Trial {
         let mut trial = Self {
             surface: surface(&config, seed, Instant::ZERO),
             store: SurfaceStore::load(Ok(disk.clone()), MISSION).unwrap(),
-            vehicle: vehicle(&config, 1, Instant::ZERO),
+            vehicle: vehicle(&config, Durable { epoch: 1, ..Durable::default() }, Instant::ZERO),
             epoch: 1,
             config,
             disk,
@@ -155,9 +154,10 @@ impl Trial {
             self.wishes.push_back(self.ticks);
         }
         if self.ticks == VEHICLE_RESTART {
-            // Its labels have new meanings, and it knows no version.
+            // Its labels have new meanings.
             self.epoch += 1;
-            self.vehicle = vehicle(&self.config, self.epoch, self.now());
+            let durable = self.vehicle.vehicle().durable().clone();
+            self.vehicle = vehicle(&self.config, Durable { epoch: self.epoch, labels: 0, ..durable }, self.now());
             self.acted.clear();
         }
         if let Some(&wish) = self.wishes.front() {

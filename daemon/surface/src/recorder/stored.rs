@@ -6,7 +6,7 @@ use crate::settings::SettingsRecord;
 use crate::vehicle_record::VehicleRecord;
 use scenecast_protocol::directive::{
     Areas, Destination, ExemplarRequest, Fence, Limits, OrderStatus, RefusalReason, Settings, Slot, SlotProgress,
-    Utility, VersionedSlot,
+    Utility, VersionedSlot, Withdrawal,
 };
 use scenecast_protocol::link::PeerView;
 use scenecast_protocol::time::Instant;
@@ -15,6 +15,8 @@ use scenecast_protocol::time::Instant;
 const STATUS_ROOM: usize = 1024;
 /// Added to the code of a reason of refusal.
 const REFUSED: u8 = 16;
+/// Added to the place of a reason to withdraw an order among all of them.
+const WITHDRAWN: u8 = 64;
 
 pub(super) fn slot_bytes(slot: &Slot) -> Vec<u8> {
     VersionedSlot::encode(0, slot)
@@ -51,6 +53,9 @@ pub(super) fn order(progress: &SlotProgress) -> StoredOrder {
         OrderStatus::Received => 2,
         OrderStatus::Applied => 3,
         OrderStatus::Refused(reason) => REFUSED + reason.code(),
+        OrderStatus::Withdrawn(withdrawal) => {
+            WITHDRAWN + Withdrawal::ALL.iter().position(|&w| w == withdrawal).unwrap_or_default() as u8
+        }
     };
     StoredOrder {
         version: progress.version.into(),
@@ -69,6 +74,7 @@ pub(super) fn progress(order: &StoredOrder) -> Option<SlotProgress> {
         1 => OrderStatus::OnAir,
         2 => OrderStatus::Received,
         3 => OrderStatus::Applied,
+        code @ WITHDRAWN.. => OrderStatus::Withdrawn(*Withdrawal::ALL.get(usize::from(code - WITHDRAWN))?),
         code => OrderStatus::Refused(RefusalReason::from_code(code.checked_sub(REFUSED)?)?),
     };
     Some(SlotProgress {

@@ -309,6 +309,7 @@ impl Vehicle {
                     self.gallery.handle_delivered(id);
                     self.serve_exemplars();
                 }
+                VehicleEvent::SurfaceMet => self.handle_meeting(),
                 VehicleEvent::SurfaceRestarted => self.handle_surface_restart(),
                 VehicleEvent::Mismatch(mismatch) => {
                     tracing::warn!("frames of the surface are refused: {mismatch}");
@@ -316,6 +317,15 @@ impl Vehicle {
                 VehicleEvent::Oversized(fault) => tracing::error!("{fault}: it is left out of this frame"),
             }
         }
+    }
+
+    /// A surface is heard for the first time. If orders were lost, those in its present series may be among them.
+    fn handle_meeting(&mut self) {
+        if self.durable.lost == LostOrders::Present {
+            self.durable.lost.may_contain(self.link.persistent_state().series());
+        }
+        self.durable.inbox = self.storing.with_decisions(self.link.persistent_state().clone());
+        self.outputs.push_back(VehicleOutput::Persist);
     }
 
     /// Everything that was in flight is lost.

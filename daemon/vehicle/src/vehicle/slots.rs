@@ -73,7 +73,7 @@ impl Vehicle {
 
     /// Refuses an order that may have been applied before its record was lost. A hold or an abort is obeyed again.
     fn decide_known(&mut self, slot: Slot, at: Instant) -> SlotState {
-        let series = self.link.persistent_state().series;
+        let series = self.link.persistent_state().series();
         match self.durable.lost.may_contain(series) && !self.is_obeyed_from_memory(&slot) {
             true => SlotState::Refused(RefusalReason::Forgotten),
             false => self.decide(slot, at),
@@ -141,7 +141,7 @@ impl Vehicle {
         if requests.wanted.len() > Gallery::MAX_REQUESTS {
             return Err(RefusalReason::OutOfRange);
         }
-        let series = self.link.persistent_state().series;
+        let series = self.link.persistent_state().series();
         self.gallery.replace_requests(requests, series, &mut self.link);
         self.serve_exemplars();
         Ok(())

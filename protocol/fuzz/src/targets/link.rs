@@ -195,6 +195,8 @@ impl Setup {
 
     pub fn surface<R: StateReplica>(self, now: Instant) -> Surface<R> {
         let config = SurfaceConfig {
+            name: Default::default(),
+            abort_lifetime: None,
             mission: MISSION,
             cell_edge: CellEdge::default(),
             modem: self.modem(),

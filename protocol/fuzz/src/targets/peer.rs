@@ -126,7 +126,8 @@ impl FuzzPeer {
     fn introduction(&self) -> Vec<u8> {
         const EXTENDED: u8 = 7 << 5;
         let series = (self.us == Address::SURFACE).then(|| Series::from_random(self.own.1 + 1));
-        let payload = Introduction { cell_edge: CellEdge::from_metres(0.25), series }.encode();
+        let payload = Introduction { cell_edge: CellEdge::from_metres(0.25), series, ..Introduction::default() }
+            .encode(Introduction::MAX_BYTES);
         [&[EXTENDED | (payload.len() as u8 + 1), 0], &payload[..]].concat()
     }
 

@@ -1,10 +1,11 @@
 //! Received frames of one peer: hellos, numbered frames, and the reason for which a frame is dropped.
 
-use super::{LinkPair, Strays, session_key};
+use super::{HOLDER_SILENCE, LinkPair, Strays, session_key};
 use crate::link::handshake::HandshakeOutcome;
 use crate::link::mismatch::Mismatch;
 use crate::link::run::Identity;
 use crate::link::{DropReason, FrameNumber, WindowRefusal};
+use crate::seal::Direction;
 use crate::wire::{Address, ChunkKind, Chunks, Envelope, Frame, FrameKind, Header, Introduction, Seal, WIRE_VERSION};
 
 /// The content of a verified frame.
@@ -22,13 +23,17 @@ pub struct Inbound<'a, T> {
     pub base: FrameNumber,
     /// Whether it was rejected because it builds on frames that we never acknowledged.
     pub lacks_base: bool,
+    /// The introduction of a hello that offers no run: at the vehicle that of a surface which it refuses, at the surface that
+    /// of a vehicle which refuses us.
+    pub refusal: Option<Introduction>,
     frame: Frame<'a>,
 }
 
 impl<'a, T> Inbound<'a, T> {
     /// A frame of which only the header counts.
     fn empty(restarted: bool, frame: Frame<'a>) -> Self {
-        Self { restarted, fates: Vec::new(), number: None, is_latest: true, base: 0, lacks_base: false, frame }
+        let (fates, base, lacks_base, refusal) = (Vec::new(), 0, false, None);
+        Self { restarted, fates, number: None, is_latest: true, base, lacks_base, refusal, frame }
     }
 
     /// The header of the frame.
@@ -81,6 +86,16 @@ impl<T> LinkPair<T> {
             None
         };
         let peer = Identity { session: header.session, nonce: header.nonce.unwrap_or_default() };
+        let refusal = introduction.filter(|caller| match own {
+            Some(_) => caller.refuses,
+            None => self.refuses(caller),
+        });
+        if refusal.is_some() {
+            if own.is_none() {
+                (self.refused, self.owes_hello) = (Some(peer), true);
+            }
+            return Ok(Inbound { refusal, ..Inbound::empty(false, frame) });
+        }
         let key = session_key(self.authenticity.clone(), self.mission, self.us, self.peer);
         let outcome = match own {
             Some(_) => self.handshake.handle_answer(peer, introduction.unwrap_or_default(), key),
@@ -93,6 +108,12 @@ impl<T> LinkPair<T> {
         };
         if outcome == HandshakeOutcome::Retired {
             self.ended_hellos += 1;
+            let is_other = introduction.is_some_and(|caller| self.handshake.other_holder(&caller).is_some());
+            if own.is_none() && is_other && self.authenticity.is_some() {
+                // It takes over, in a run that has ended here: it learns that, and begins another one.
+                (self.refused, self.owes_hello) = (Some(peer), true);
+                return Ok(Inbound { refusal: introduction, ..Inbound::empty(false, frame) });
+            }
             // Where frames of the vehicle have no tag, a forged one may have proven a false run.
             self.strays.count += u32::from(own.is_some() && !self.is_keyed(self.direction_in()));
             return Err(DropReason::OldSession);
@@ -123,8 +144,8 @@ impl<T> LinkPair<T> {
             let stray = self.handshake.run().is_none_or(|r| r.peer.session != envelope.header.session);
             // Without a valid CRC the session may be noise; without a valid tag it may be a forgery. A frame of a run that a
             // late hello has ended here has a valid tag.
-            let is_sign = stray
-                && (reason == DropReason::OldSession || (keyed && self.handshake.is_new_of_ended(envelope, direction)));
+            let is_sign =
+                stray && (reason == DropReason::OldSession || (keyed && self.is_of_ended_run(envelope, direction)));
             self.strays.count += u32::from(is_sign);
             self.strays.of_unknown_run |= is_sign;
             return Err(reason);
@@ -142,8 +163,11 @@ impl<T> LinkPair<T> {
             self.handshake.accept_offered(index);
             self.stats.peer_restarts += 1;
         }
-        self.owes_hello = self.handshake.is_leaving();
-        if self.owes_hello {
+        // Another surface waits for the hello that it is owed, whatever the one that holds the vehicle sends meanwhile.
+        let calling = self.handshake.offered().is_some_and(|r| self.handshake.other_holder(&r.introduction).is_some());
+        self.owes_hello &= self.us != Address::SURFACE && (self.refused.is_some() || calling);
+        self.owes_hello |= self.handshake.is_leaving();
+        if self.handshake.is_leaving() {
             self.strays = Strays::default();
             return Ok(Inbound::empty(restarted, frame));
         }
@@ -160,6 +184,25 @@ impl<T> LinkPair<T> {
             self.handshake.handle_current();
         }
         Ok(inbound)
+    }
+
+    /// At the vehicle: whether another surface holds it against this caller. Without a key, everybody could.
+    fn refuses(&self, caller: &Introduction) -> bool {
+        let is_held = self.silence.is_some_and(|silence| silence < HOLDER_SILENCE);
+        is_held && !caller.takes_over && self.is_authentic() && self.handshake.other_holder(caller).is_some()
+    }
+
+    /// Whether a run of the peer that has ended sent this frame, by a valid tag. A surface that has lost the vehicle to
+    /// another one learns it from the next hello.
+    fn is_of_ended_run(&mut self, envelope: &Envelope<'_>, direction: Direction) -> bool {
+        let sender = self.handshake.ended_sender(envelope, direction).map(|ended| (ended.identity, ended.introduction));
+        if let Some((identity, introduction)) = sender
+            && self.us != Address::SURFACE
+            && self.handshake.other_holder(&introduction).is_some()
+        {
+            (self.refused, self.owes_hello) = (Some(identity), true);
+        }
+        sender.is_some()
     }
 
     /// Whether the chunks of a frame decode, if the window would accept it.
@@ -194,7 +237,8 @@ impl<T> LinkPair<T> {
             }
         };
         let is_latest = number.is_some_and(|n| n > before);
-        Ok(Inbound { restarted, fates, number, is_latest, base: run.window.base(), lacks_base, frame })
+        let base = run.window.base();
+        Ok(Inbound { restarted, fates, number, is_latest, base, lacks_base, refusal: None, frame })
     }
 
     /// The most likely reason why a frame does not open.

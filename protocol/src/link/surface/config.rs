@@ -3,7 +3,7 @@
 use crate::link::Authenticity;
 use crate::mac::{MasterConfig, ModemProfile};
 use crate::schedule::Shares;
-use crate::wire::{Address, CellEdge, MissionId};
+use crate::wire::{Address, CellEdge, MissionId, SurfaceName};
 use std::time::Duration;
 
 /// Settings of the surface's end.
@@ -23,6 +23,10 @@ pub struct SurfaceConfig {
     pub master: MasterConfig,
     /// The edge of a cell on the operator's map, until a vehicle has stated its own.
     pub cell_edge: CellEdge,
+    /// The name by which the vehicle shows this surface to others.
+    pub name: SurfaceName,
+    /// Age after which an abort that has not arrived is withdrawn, so that the operator is asked; `None`: it never is.
+    pub abort_lifetime: Option<Duration>,
     /// The vehicles that are contacted from the beginning.
     pub vehicles: Vec<Address>,
     /// Longest time between two discovery calls; `None` disables them.

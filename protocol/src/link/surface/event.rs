@@ -13,7 +13,7 @@ pub enum SurfaceEvent {
     MapChanged(Address),
     /// A pose or a report came in, and both are known.
     Status(Address),
-    /// A vehicle has applied or refused a slot.
+    /// A vehicle has applied or refused a slot, or the order in it was withdrawn.
     SlotDecided(Address, SlotId),
     /// A content in force at a vehicle came in that the surface did not know.
     InForceLearned(Address, SlotId),
@@ -36,6 +36,11 @@ pub enum SurfaceEvent {
     LabelsJoined(Address),
     /// A vehicle began a new run; its map starts empty.
     VehicleRestarted(Address),
+    /// Another surface holds a vehicle, has called it, or holds it no more; see [`super::PeerView::holder`] and
+    /// [`super::PeerView::caller`].
+    Rivalry(Address),
+    /// A vehicle has no record of the orders that it had received: they are withdrawn.
+    OrdersLost(Address),
     /// The copy of a run with this vehicle is kept as [`super::PeerView::ended_run`], because a new run begins.
     RunEnded(Address),
     /// Frames of a vehicle are refused because a setting differs; each is reported once.

@@ -74,6 +74,11 @@ impl<R: StateReplica> Fleet<R> {
         self.peers.values().filter(|p| p.master.unanswered() < 3).count()
     }
 
+    /// Withdraws aborts that have not arrived in time; returns their vehicles.
+    pub(super) fn withdraw_late_aborts(&mut self, now: Instant) -> impl Iterator<Item = Address> {
+        self.peers.iter_mut().filter_map(move |(&vehicle, peer)| peer.withdraw_late_abort(now).then_some(vehicle))
+    }
+
     /// The vehicle to grant a turn to at `now`: of those that are due, the one that waited longest.
     pub(super) fn choose(&self, now: Instant) -> Option<Address> {
         if self.is_medium_taken(now) {
@@ -81,7 +86,8 @@ impl<R: StateReplica> Fleet<R> {
         }
         let is_alone = self.peers.len() == 1;
         self.longest_waiting(|p| {
-            p.master.may_speak(p.has_slots_to_send(), now) && (is_alone || now >= p.master.retry_at())
+            let is_quiet = p.quiet_until().is_some_and(|until| now < until);
+            !is_quiet && p.master.may_speak(p.has_slots_to_send(), now) && (is_alone || now >= p.master.retry_at())
         })
     }
 
@@ -105,7 +111,7 @@ impl<R: StateReplica> Fleet<R> {
         }
         let is_alone = self.peers.len() == 1;
         let due = |p: &VehiclePeer<R>| {
-            let at = p.master.next_wakeup(p.has_slots_to_send())?;
+            let at = p.master.next_wakeup(p.has_slots_to_send())?.max(p.quiet_until().unwrap_or(Instant::ZERO));
             Some(if is_alone { at } else { at.max(p.master.retry_at()) })
         };
         self.peers.values().filter_map(due).chain(discovery).min()

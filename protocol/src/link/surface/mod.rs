@@ -14,10 +14,10 @@ mod transmit;
 
 pub use config::SurfaceConfig;
 pub use event::{IssueError, SurfaceEvent};
-pub use peer::{EndedRun, InForce, PeerView};
+pub use peer::{EndedRun, InForce, OtherSurface, PeerView};
 pub use polled::Cycle;
 
-use crate::directive::{Series, Slot, SlotProgress, VersionedSlot};
+use crate::directive::{Series, Slot, SlotId, SlotProgress, VersionedSlot};
 use crate::link::{DropReason, FrameNumber, Transmit};
 use crate::map::{Replica, StateReplica};
 use crate::schedule::{BitBudget, ClassShares, Shares};
@@ -84,9 +84,10 @@ impl<R: StateReplica> SurfaceLink<R> {
     fn add(&mut self, vehicle: Address, now: Instant) {
         let seed = crate::random::next(&mut self.random);
         let c = &self.config;
-        let introduction = Introduction { cell_edge: c.cell_edge, series: Some(self.series) };
+        let (cell_edge, series, name) = (c.cell_edge, Some(self.series), c.name);
+        let introduction = Introduction { cell_edge, series, name, ..Introduction::default() };
         let peer = VehiclePeer::new(c.mission, vehicle, c.authenticity.clone(), introduction, seed, c.master, now);
-        let peer = peer.with_modem(&c.modem);
+        let peer = peer.with_modem(&c.modem).with_abort_lifetime(c.abort_lifetime);
         self.fleet.insert(vehicle, peer);
     }
 
@@ -172,6 +173,25 @@ impl<R: StateReplica> SurfaceLink<R> {
             }
         }
         self.events.push_back(SurfaceEvent::MapChanged(vehicle));
+    }
+
+    /// Has a vehicle leave another surface that holds it.
+    pub fn take_over(&mut self, vehicle: Address, now: Instant) -> Result<(), IssueError> {
+        self.fleet.get_mut(vehicle).map(|peer| peer.take_over(now)).ok_or(IssueError::NoVehicle)
+    }
+
+    /// Gives a withdrawn order again, as a new one; returns its version, `None` if no order of this kind was withdrawn.
+    pub fn give_again(&mut self, vehicle: Address, id: SlotId, now: Instant) -> Result<Option<u16>, IssueError> {
+        let version = self.fleet.get_mut(vehicle).map(|p| p.give_again(id, now)).ok_or(IssueError::NoVehicle)?;
+        self.resync_if_out_of_step(vehicle, now);
+        Ok(version)
+    }
+
+    /// Sends the orders that a vehicle has lost again, except one that only lifts a hold or an abort; returns their slots.
+    pub fn restore_lost(&mut self, vehicle: Address, now: Instant) -> Result<Vec<SlotId>, IssueError> {
+        let restored = self.fleet.get_mut(vehicle).map(|p| p.restore_lost(now)).ok_or(IssueError::NoVehicle)?;
+        self.resync_if_out_of_step(vehicle, now);
+        Ok(restored)
     }
 
     /// Issues a new version of a slot to several vehicles; each acknowledges and decides by itself.

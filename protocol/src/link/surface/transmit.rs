@@ -1,8 +1,9 @@
 //! When the surface transmits, and to whom.
 
-use super::SurfaceLink;
 use super::discovery::Discovery;
 use super::peer::Ready;
+use super::{SurfaceEvent, SurfaceLink};
+use crate::directive::SlotId;
 use crate::link::handshake::FramePurpose;
 use crate::link::{Transmit, Wakeup};
 use crate::mac::{Access, ModemProfile};
@@ -18,6 +19,9 @@ impl<R: StateReplica> SurfaceLink<R> {
     /// [`Self::poll_timeout`] until it returns `None`.
     #[must_use]
     pub fn poll_transmit(&mut self, now: Instant) -> Option<Transmit> {
+        self.events.extend(
+            self.fleet.withdraw_late_aborts(now).map(|vehicle| SurfaceEvent::SlotDecided(vehicle, SlotId::Constraints)),
+        );
         match self.config.modem.access {
             Access::Shared => self.poll_shared(now),
             Access::Polled => self.poll_polled(now),

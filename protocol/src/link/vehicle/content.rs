@@ -10,6 +10,7 @@ use crate::object::{ObjectId, ObjectSender, SymbolRun};
 use crate::schedule::{BackgroundOrder, BackgroundStream, BitBudget, Class, ClassShares, Shares};
 use crate::time::Instant;
 use crate::wire::{Backlog, ChunkKind, FrameBuilder, room_for_payload};
+use std::ops::Range;
 use std::time::Duration;
 
 /// A chunk of a frame, with the data that the sender needs once its fate is known.
@@ -24,8 +25,10 @@ pub(super) enum Part<C> {
     LayerDigest(LayerId),
     Object(ObjectId, SymbolRun),
     Pose,
-    Report,
+    /// A report that tells of these slots.
+    Report(Range<usize>),
     InForce(SentPart),
+    Caller,
 }
 
 impl<C> Part<C> {
@@ -34,7 +37,7 @@ impl<C> Part<C> {
             Self::Map(_) | Self::LabelClass(_) | Self::LabelTree(_) => Class::Map,
             Self::Layer(id, _) | Self::LayerDigest(id) => Class::Layer(*id),
             Self::Object(..) => Class::Exemplar,
-            Self::Pose | Self::Report | Self::InForce(_) => Class::Status,
+            Self::Pose | Self::Report(_) | Self::InForce(_) | Self::Caller => Class::Status,
         }
     }
 }
@@ -64,6 +67,10 @@ pub(super) struct VehicleContent<S> {
     pub(super) background: BackgroundOrder,
     pub(super) status: StatusSender,
     pub(super) in_force: InForceSender,
+    /// The slots of which the surface has acknowledged a report in this run.
+    pub(super) is_told: [bool; SLOTS],
+    /// The introduction of another surface that calls, until the surface that holds the vehicle is known to have it.
+    pub(super) caller: Option<Vec<u8>>,
     /// Whether the status comes last in the next frame, because it took room from other content in the last one. On a lossy
     /// link with small frames, a status that is due again after each loss would leave no room to the map and its layers.
     is_status_last: bool,
@@ -83,6 +90,8 @@ impl<S: StateSource> VehicleContent<S> {
             background: BackgroundOrder::default(),
             status: StatusSender::new(status_period, now),
             in_force: InForceSender::default(),
+            is_told: [false; SLOTS],
+            caller: None,
             is_status_last: false,
             oversized: None,
         }
@@ -103,6 +112,7 @@ impl<S: StateSource> VehicleContent<S> {
         self.layers.iter_mut().for_each(|l| l.source.handle_peer_restart(now));
         self.objects.handle_peer_restart();
         self.in_force.handle_peer_restart();
+        (self.is_told, self.caller) = ([false; SLOTS], None);
         self.status.owe_pose(now);
         self.status.owe_report(now);
     }
@@ -171,8 +181,12 @@ impl<S: StateSource> VehicleContent<S> {
             Part::InForce(part) => self.in_force.handle_fate(&part, delivered, now),
             Part::Object(id, run) => return self.objects.handle_fate(id, &run, delivered).then_some(id),
             Part::Pose if !delivered => self.status.handle_lost_pose(now),
-            Part::Report if !delivered => self.status.handle_lost_report(now),
-            Part::Pose | Part::Report | Part::LayerDigest(_) => {}
+            Part::Report(_) if !delivered => self.status.handle_lost_report(now),
+            Part::Report(slots) => {
+                self.is_told.iter_mut().take(slots.end).skip(slots.start).for_each(|told| *told = true)
+            }
+            Part::Caller if delivered => self.caller = None,
+            Part::Pose | Part::LayerDigest(_) | Part::Caller => {}
         }
         None
     }
@@ -284,8 +298,12 @@ impl<S: StateSource> VehicleContent<S> {
         status.slots = context.slots;
         status.budget_bps = context.budget.bits_per_s();
         status.refused_frames = context.refused_frames.min(255) as u8;
-        if let Some(bytes) = self.status.fill_report(builder, context.now) {
-            carried.push((Part::Report, bytes));
+        if let Some((bytes, slots)) = self.status.fill_report(builder, context.now) {
+            carried.push((Part::Report(slots), bytes));
+            // It goes with reports: it is news for people, and is sent until one of them arrives.
+            if let Some(caller) = self.caller.as_ref().filter(|caller| builder.push(ChunkKind::Caller, caller)) {
+                carried.push((Part::Caller, caller.len()));
+            }
             self.layers.iter_mut().for_each(|l| l.owes_digest = l.source.is_begun());
         }
         if let Some(bytes) = self.status.fill_pose(builder, context.now) {

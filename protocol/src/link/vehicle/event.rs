@@ -19,6 +19,9 @@ pub enum VehicleEvent {
     },
     /// The surface has acknowledged every part of an object.
     ObjectDelivered(ObjectId),
+    /// A surface is heard for the first time. The host makes [`super::VehicleLink::persistent_state`] durable: after a restart,
+    /// a vehicle without a record of a surface asks it for its orders anew.
+    SurfaceMet,
     /// The surface began a new run; everything is sent to it again.
     SurfaceRestarted,
     /// Frames of the surface are refused because a setting differs; each is reported once.

@@ -2,6 +2,7 @@
 
 use crate::mac::Access;
 use crate::time::Instant;
+use crate::wire::SessionId;
 use std::time::Duration;
 
 /// A few answers at once, and one every three seconds in the long run.
@@ -11,8 +12,8 @@ pub(super) struct HelloLimit {
     left: u32,
     /// When the last one was added.
     since: Instant,
-    /// When the last hello was admitted.
-    admitted: Option<Instant>,
+    /// When the last hello was admitted, and its sender's session.
+    admitted: Option<(Instant, SessionId)>,
     /// How often a hello is still repeated while the surface does not use the offered run.
     repeats: u32,
     /// When it is repeated next.
@@ -23,7 +24,7 @@ pub(super) struct HelloLimit {
 impl HelloLimit {
     const MAX_ANSWERS: u32 = 8;
     const INTERVAL: Duration = Duration::from_secs(3);
-    /// Hellos within this time are copies of one.
+    /// Hellos of one session within this time are copies of one.
     const COPIES: Duration = Duration::from_millis(1500);
     const REPEATS: u32 = 3;
     const REPEAT_INTERVAL: Duration = Duration::from_secs(10);
@@ -41,9 +42,9 @@ impl HelloLimit {
         self.repeat_interval
     }
 
-    /// Whether a hello that came in may be answered.
-    pub(super) fn admit(&mut self, now: Instant) -> bool {
-        if self.admitted.is_some_and(|at| now.since(at) < Self::COPIES) {
+    /// Whether a hello of a session that came in may be answered.
+    pub(super) fn admit(&mut self, session: SessionId, now: Instant) -> bool {
+        if self.admitted.is_some_and(|(at, of)| of == session && now.since(at) < Self::COPIES) {
             return false;
         }
         let added = now.since(self.since).as_secs() / Self::INTERVAL.as_secs();
@@ -54,7 +55,7 @@ impl HelloLimit {
         let is_admitted = self.left > 0;
         if is_admitted {
             self.left -= 1;
-            self.admitted = Some(now);
+            self.admitted = Some((now, session));
         }
         is_admitted
     }
@@ -104,9 +105,9 @@ mod tests {
         let begin = Instant::from_secs_f64(100.0);
         let mut limit = HelloLimit::new(Access::Shared, begin);
         let at = |ms: u64| begin + Duration::from_millis(ms);
-        let admitted = (0..1000).filter(|&i| limit.admit(at(i * 100))).count();
+        let admitted = (0..1000).filter(|&i| limit.admit(SessionId::from_random(1), at(i * 100))).count();
         assert_eq!(admitted, 8 + 33);
-        assert!(limit.admit(at(1_000_000)), "after a pause");
+        assert!(limit.admit(SessionId::from_random(1), at(1_000_000)), "after a pause");
     }
 
     #[test]
@@ -114,7 +115,7 @@ mod tests {
         let begin = Instant::from_secs_f64(100.0);
         let mut limit = HelloLimit::new(Access::Shared, begin);
         let repeats = |limit: &mut HelloLimit| {
-            assert!(limit.admit(begin));
+            assert!(limit.admit(SessionId::from_random(1), begin));
             limit.handle_offer();
             limit.note_answer(begin);
             let times = (1..100).map(|s| begin + Duration::from_secs(s));
@@ -122,7 +123,7 @@ mod tests {
         };
         assert_eq!(repeats(&mut limit), 3);
         let mut limit = HelloLimit::new(Access::Shared, begin);
-        assert!(limit.admit(begin));
+        assert!(limit.admit(SessionId::from_random(1), begin));
         limit.note_answer(begin);
         limit.handle_numbered();
         assert_eq!(limit.next_repeat(), None);
@@ -132,12 +133,12 @@ mod tests {
     fn an_answer_to_another_run_never_displaces_those_to_the_current_run() {
         let begin = Instant::from_secs_f64(100.0);
         let mut limit = HelloLimit::new(Access::Shared, begin);
-        assert!(limit.admit(begin));
+        assert!(limit.admit(SessionId::from_random(1), begin));
         limit.handle_offer();
         limit.note_answer(begin);
         for seconds in [9, 12, 24, 36, 48, 60] {
             let now = begin + Duration::from_secs(seconds);
-            assert!(limit.admit(now));
+            assert!(limit.admit(SessionId::from_random(1), now));
             limit.handle_known(now);
             assert!(!limit.repeat(now), "after {seconds} s");
         }

@@ -73,7 +73,7 @@ impl<S: StateSource> VehicleLink<S> {
         now: Instant,
     ) -> Self {
         source.set_quick(config.modem.access == Access::FullDuplex);
-        let introduction = Introduction { cell_edge: config.cell_edge, series: None };
+        let introduction = Introduction { cell_edge: config.cell_edge, ..Introduction::default() };
         let (mission, authenticity) = (config.mission, config.authenticity.clone());
         let mut link = Self {
             pair: LinkPair::new(mission, config.address, Address::SURFACE, authenticity, introduction, seed),

@@ -8,7 +8,7 @@ use crate::link::{Admission, DropReason};
 use crate::mac::Grant;
 use crate::map::StateSource;
 use crate::time::Instant;
-use crate::wire::{Address, ChunkKind, Envelope, Header};
+use crate::wire::{Address, ChunkKind, Envelope, Header, Introduction};
 use std::time::Duration;
 
 /// Time without an accepted frame after which late frames are taken for a sign of a forged one.
@@ -27,6 +27,7 @@ impl<S: StateSource> VehicleLink<S> {
             return self.handle_call(&envelope, now);
         }
         let owed_hello = self.pair.must_send_hello();
+        self.pair.set_silence(self.last_received().map(|at| now.since(at)));
         let inbound = self.pair.handle_frame(&envelope, |_, _| true);
         self.events.extend(self.pair.poll_mismatch().map(VehicleEvent::Mismatch));
         let inbound = match inbound {
@@ -42,13 +43,26 @@ impl<S: StateSource> VehicleLink<S> {
             Err(DropReason::Unauthenticated) => {
                 return self.content.status.owe_report_by(now + Duration::from_secs(60));
             }
-            Err(_) => return,
+            Err(_) => {
+                // A frame of an ended run shows that another surface does not know that it has lost the vehicle.
+                let session = envelope.header.session;
+                if !owed_hello && self.pair.owes_refusal() && !self.hello_limit.admit(session, now) {
+                    self.pair.withhold_hello();
+                }
+                return self.owe_answer(now);
+            }
         };
+        if let Some(caller) = &inbound.refusal {
+            self.content.caller = Some(caller.encode(Introduction::MAX_BYTES));
+            self.content.status.owe_report_by(now + Duration::from_secs(5));
+        }
         match inbound.header().kind.is_hello() {
-            true if self.hello_limit.admit(now) => match self.pair.must_send_hello() {
-                true => self.hello_limit.handle_offer(),
-                false => self.hello_limit.handle_known(now),
-            },
+            true if self.hello_limit.admit(envelope.header.session, now) => {
+                match self.pair.must_send_hello() && inbound.refusal.is_none() {
+                    true => self.hello_limit.handle_offer(),
+                    false => self.hello_limit.handle_known(now),
+                }
+            }
             true if owed_hello => return,
             true => return self.pair.withhold_hello(),
             false => self.hello_limit.handle_numbered(),
@@ -56,6 +70,10 @@ impl<S: StateSource> VehicleLink<S> {
         if inbound.restarted {
             self.forget_peer(now);
             self.events.push_back(VehicleEvent::SurfaceRestarted);
+        }
+        if let (Some(_), Some(series)) = (inbound.number, self.pair.peer_introduction().and_then(|i| i.series)) {
+            let is_new = self.inbox.meet(series);
+            self.events.extend(is_new.then_some(VehicleEvent::SurfaceMet));
         }
         let header = inbound.header().clone();
         let slots: Vec<Vec<u8>> =
@@ -105,7 +123,7 @@ impl<S: StateSource> VehicleLink<S> {
         if self.pair.has_run() && self.last_received().is_some_and(|at| now.since(at) < CONTACT_TIMEOUT) {
             return;
         }
-        if !self.hello_limit.admit(now) {
+        if !self.hello_limit.admit(envelope.header.session, now) {
             return;
         }
         let grant = self.call_reply.handle_call(&self.config, &envelope.header, now);
@@ -145,11 +163,13 @@ impl<S: StateSource> VehicleLink<S> {
         let (Some(series), Ok(mut slot)) = (series, VersionedSlot::decode(payload)) else {
             return self.pair.stats.drop(DropReason::Malformed);
         };
-        match self.inbox.admit(series, &slot) {
+        let stops = matches!(slot.content, Some(Slot::Constraints(order)) if order.hold || order.abort);
+        // Without a key, the order of another surface may be forged.
+        let is_told = self.content.is_told.get(slot.id.index()) == Some(&true) || !self.pair.is_authentic();
+        match self.inbox.admit(series, &slot, is_told || stops) {
             Admission::New => {}
             Admission::Known => return,
-            // A forged hello may have ended the surface's series, which begins another one when it knows.
-            Admission::SeriesEnded => return self.content.status.owe_report_by(now + Duration::from_secs(5)),
+            Admission::Overtaken => return self.content.status.owe_report_by(now + Duration::from_secs(1)),
         }
         if let Some(window) = self.pair.window_mut() {
             window.hold_back(number);

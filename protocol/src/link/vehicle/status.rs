@@ -1,9 +1,11 @@
 //! The vehicle's status: when its two chunks, pose and report, are due, and how much of a frame they take.
 
+use crate::directive::SLOTS;
 use crate::time::Instant;
 use crate::wire::{
     ChunkKind, EquipmentFaults, FrameBuilder, Intent, Trail, TrailCorner, VehicleStatus, room_for_payload,
 };
+use std::ops::Range;
 use std::time::Duration;
 
 /// Part of the bit budget that each of pose and report may take at most, in a period of its own.
@@ -126,8 +128,9 @@ impl StatusSender {
         self.owe_report_by(at);
     }
 
-    /// Puts a report into a frame if one is due; returns its bytes.
-    pub(super) fn fill_report(&mut self, builder: &mut FrameBuilder, now: Instant) -> Option<usize> {
+    /// Puts a report into a frame if one is due; returns its bytes, and the slots that it tells of.
+    pub(super) fn fill_report(&mut self, builder: &mut FrameBuilder, now: Instant) -> Option<(usize, Range<usize>)> {
+        let first = self.report_from.min(SLOTS);
         let status = self.status.as_ref().filter(|_| now >= self.report_due)?;
         let (bytes, next) = status.encode_report(room_for_payload(builder.room()), self.report_from)?;
         if !builder.push(ChunkKind::Report, &bytes) {
@@ -144,7 +147,8 @@ impl StatusSender {
             self.report_due = now + self.period.max(time_of_report(status.budget_bps, bytes.len()));
             self.copies.reports = self.copies.each;
         }
-        Some(bytes.len())
+        let until = if next == 0 { SLOTS } else { next.min(SLOTS) };
+        Some((bytes.len(), first..until))
     }
 
     /// Puts a pose into a frame if one is due; returns its bytes.
@@ -235,7 +239,7 @@ mod tests {
         let (sent, decided) = (Instant::from_secs_f64(100.0), Instant::from_secs_f64(105.0));
         let mut sender = StatusSender::new(Duration::from_secs(3600), Instant::ZERO);
         sender.set(VehicleStatus { budget_bps, ..VehicleStatus::default() });
-        assert_eq!(sender.fill_report(&mut builder(64), sent), Some(11));
+        assert_eq!(sender.fill_report(&mut builder(64), sent), Some((11, 0..SLOTS)));
         sender.owe_report_in_share(decided);
         sender.report_due.since(decided).as_secs_f64()
     }

@@ -184,6 +184,10 @@ impl<S: StateSource> VehicleLink<S> {
         let wish = (plan.is_last_new && !sends_hello).then(|| self.wish(now));
         let stamp = self.stamp(plan.is_last_new, now);
         let ack_room = self.ack_room(plan.is_last_new);
+        if sends_hello {
+            let series = self.pair.called_series();
+            self.pair.set_memory(series.is_none_or(|series| self.inbox.knows(series)));
+        }
         let mut builder = self.pair.begin_frame(size, ack_room, wish, stamp, FramePurpose::Content);
         let mut carried = Carried::new();
         if !sends_hello {

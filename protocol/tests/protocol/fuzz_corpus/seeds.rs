@@ -95,7 +95,7 @@ fn contents() -> Vec<Seed> {
                 ChunkKind::Slot => seeds.push(("slot", format!("slot-{i}"), framed)),
                 ChunkKind::Layer => seeds.push(("layer_chunk", format!("talk-{i}"), payload)),
                 ChunkKind::InForce | ChunkKind::Inquiry => seeds.push(("in_force", format!("{way}-{i}"), framed)),
-                ChunkKind::Map | ChunkKind::Object | ChunkKind::Introduction => {}
+                ChunkKind::Map | ChunkKind::Object | ChunkKind::Introduction | ChunkKind::Caller => {}
             }
         }
         seeds.push(("chunks", format!("{way}-{i}"), body));

@@ -63,8 +63,8 @@ impl LinkedEnds {
         Self {
             now,
             mute: [false; 2],
-            vehicle: vehicle(&setup, seed ^ 0xA5A5, SlotInboxState::default(), now),
-            surface: surface(&setup, seed, now),
+            vehicle: vehicle_of(&setup, seed ^ 0xA5A5, SlotInboxState::default(), now),
+            surface: surface_of(&setup, seed, now),
             channel,
             audits: [Audit::new(window), Audit::new(window)],
             applied: Vec::new(),
@@ -89,7 +89,7 @@ impl LinkedEnds {
 
     pub(crate) fn restart_vehicle(&mut self, map: &LabelGrid) {
         let seed = (self.draw() * 1e15) as u64;
-        self.vehicle = vehicle(&self.setup, seed, self.durable.clone(), self.now);
+        self.vehicle = vehicle_of(&self.setup, seed, self.durable.clone(), self.now);
         self.vehicle.assume_budget_spent(self.now);
         let in_force: Vec<Slot> = self.in_force.values().cloned().collect();
         in_force.into_iter().for_each(|slot| self.put_in_force(slot));
@@ -120,7 +120,7 @@ impl LinkedEnds {
 
     pub(crate) fn restart_surface(&mut self) {
         let seed = (self.draw() * 1e15) as u64;
-        self.surface = surface(&self.setup, seed, self.now);
+        self.surface = surface_of(&self.setup, seed, self.now);
         self.surface.assume_budget_spent(self.now);
         self.forget_modem(false);
     }
@@ -213,6 +213,9 @@ impl LinkedEnds {
 
     fn pump(&mut self) {
         while let Some(event) = self.vehicle.poll_event() {
+            if event == VehicleEvent::SurfaceMet {
+                self.durable = self.vehicle.persistent_state().clone();
+            }
             if let VehicleEvent::Slot { id, content: Some(slot), .. } = event {
                 self.applied.push(slot.clone());
                 self.put_in_force(slot);
@@ -315,7 +318,7 @@ impl LinkedEnds {
     }
 }
 
-fn vehicle(setup: &Setup, seed: u64, durable: SlotInboxState, now: Instant) -> VehicleLink {
+pub(crate) fn vehicle_of(setup: &Setup, seed: u64, durable: SlotInboxState, now: Instant) -> VehicleLink {
     let config = VehicleConfig {
         address: auv(),
         mission: setup.mission,
@@ -344,8 +347,10 @@ pub(crate) fn layer(id: LayerId, share: u8, codec: Codec, debounce: Duration) ->
     LayerSource::new(id, LayerDescriptor { share, ..descriptor }, codec, debounce)
 }
 
-fn surface(setup: &Setup, seed: u64, now: Instant) -> SurfaceLink {
+pub(crate) fn surface_of(setup: &Setup, seed: u64, now: Instant) -> SurfaceLink {
     let config = SurfaceConfig {
+        name: Default::default(),
+        abort_lifetime: None,
         mission: setup.mission,
         cell_edge: CellEdge::default(),
         modem: setup.modem(),

@@ -64,7 +64,7 @@ impl Setup {
         Self { authenticity: Some(Authenticity { key, all, encrypt }), ..self }
     }
 
-    pub(super) fn modem(&self) -> ModemProfile {
+    pub(crate) fn modem(&self) -> ModemProfile {
         ModemProfile {
             frame_bytes: self.frame_bytes,
             bit_rate_bps: 10_000.0,

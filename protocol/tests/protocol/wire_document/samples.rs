@@ -61,8 +61,8 @@ pub(crate) fn all_up_to(horizon_low: u16, lost: Vec<u16>) -> Option<AckStatement
 /// The introduction in the hello of the surface, or of the vehicle.
 pub(crate) fn introduction(of_surface: bool) -> [(ChunkKind, Vec<u8>); 1] {
     let series = of_surface.then(|| Series::from_random(0x0A0B_0C0D_0E0F));
-    let introduction = Introduction { cell_edge: CellEdge::from_metres(0.25), series };
-    [(ChunkKind::Introduction, introduction.encode())]
+    let introduction = Introduction { cell_edge: CellEdge::from_metres(0.25), series, ..Introduction::default() };
+    [(ChunkKind::Introduction, introduction.encode(Introduction::MAX_BYTES))]
 }
 
 pub(crate) fn hold() -> Vec<u8> {

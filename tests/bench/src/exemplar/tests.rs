@@ -74,7 +74,8 @@ fn a_cancelled_image_costs_no_more_bits() {
     let until = bench.now + std::time::Duration::from_secs(120);
     assert!(bench.run_until(until, |w| matches!(state(w, 4), Some(RequestState::Arriving(..)))));
     let version = bench.surface.surface_mut().cancel_exemplar(bench.address, 4, bench.now).unwrap();
-    let received = |w: &ExemplarBench| w.vehicle.vehicle().durable().inbox.versions[4] == Some(version);
+    let received =
+        |w: &ExemplarBench| w.vehicle.vehicle().durable().inbox.records.iter().any(|r| r.versions[4] == Some(version));
     assert!(bench.run_until(until, received), "the vehicle receives the order");
     let then = exemplar_bytes(&bench);
     wait(&mut bench, 120.0);

@@ -115,10 +115,15 @@ impl AttackedEnds {
         self.empty_modem(true);
     }
 
-    /// The surface's process starts again, with nothing.
+    /// The surface's process starts again, with its orders and without its map.
     pub(super) fn restart_surface(&mut self) {
         let seed = seed(&mut self.rng);
+        let kept = self.surface.vehicle(auv()).map(|view| (view.series(), view.slots().cloned().collect::<Vec<_>>()));
         self.surface = self.setup().surface(seed, self.now);
+        if let Some((series, orders)) = kept {
+            self.surface.restore_series(series);
+            self.surface.restore_orders(auv(), series, orders, self.now);
+        }
         self.surface.assume_budget_spent(self.now);
         self.ended = None;
         self.empty_modem(false);
@@ -372,6 +377,8 @@ impl EndsSetup {
 
     fn surface(self, seed: u64, now: Instant) -> SurfaceLink {
         let config = SurfaceConfig {
+            name: Default::default(),
+            abort_lifetime: None,
             mission: MISSION,
             cell_edge: CellEdge::default(),
             modem: self.modem(),

@@ -200,7 +200,10 @@ impl Forger {
         let series = to_vehicle.then(|| Series::from_random(self.below(1 << 31) as u64));
         let header = Header { session, number: 0, base: 1, kind: FrameKind::Hello, ..self.header(route) };
         let mut builder = FrameBuilder::new(&header, FRAME_BYTES);
-        builder.push(ChunkKind::Introduction, &Introduction { series, ..Introduction::default() }.encode());
+        builder.push(
+            ChunkKind::Introduction,
+            &Introduction { series, ..Introduction::default() }.encode(Introduction::MAX_BYTES),
+        );
         let sealed_to = if to_vehicle { 0 } else { route.sealed_to };
         Some(builder.finish(&Seal::Crc(MISSION, sealed_to), true))
     }

@@ -167,12 +167,13 @@ fn maps(out: &mut String, state: &MissionState) {
 
 /// The status of the latest order in each slot, one sample for each status.
 fn directives(out: &mut String, state: &MissionState) {
-    const STATES: [(OrderStatus, &str); 5] = [
+    const STATES: [(OrderStatus, &str); 6] = [
         (OrderStatus::Queued, "queued"),
         (OrderStatus::OnAir, "on_air"),
         (OrderStatus::Received, "received"),
         (OrderStatus::Applied, "applied"),
         (OrderStatus::Refused, "refused"),
+        (OrderStatus::Withdrawn, "withdrawn"),
     ];
     let mut metric =
         metric(out, "scenecast_directive_state", "gauge", "Status of the latest order: 1 for the present one.");

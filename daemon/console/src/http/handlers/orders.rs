@@ -5,14 +5,15 @@ use crate::http::response::error;
 use crate::http::shared::{Shared, VehicleId};
 use crate::order_changes::OrderChanges;
 use crate::orders::{
-    BudgetOrder, ConstraintsOrder, DismissOrder, DraftOrder, ExemplarOrder, LabelOrder, MarkerOrder, NoteOrder,
-    RemoveMarkerOrder, UtilityOrder,
+    AgainOrder, BudgetOrder, ConstraintsOrder, DismissOrder, DraftOrder, ExemplarOrder, LabelOrder, MarkerOrder,
+    NoteOrder, RemoveMarkerOrder, RestoreOrder, TakeOverOrder, UtilityOrder,
 };
 use crate::request::SurfaceRequest;
 use axum::Extension;
 use axum::extract::State;
 use axum::http::StatusCode;
 use axum::response::Response;
+use scenecast_protocol::directive::SlotId;
 use scenecast_surface::{AreasOrder, DestinationOrder, FenceOrder, LimitsOrder, Principal, SettingsOrder};
 use std::collections::BTreeMap;
 
@@ -122,6 +123,37 @@ pub(in crate::http) async fn budget(
     JsonOrder(order): JsonOrder<BudgetOrder>,
 ) -> Response {
     shared.order(principal, SurfaceRequest::Budget(order)).await
+}
+
+pub(in crate::http) async fn again(
+    State(shared): State<Shared>,
+    Extension(principal): Extension<Principal>,
+    VehicleId(id): VehicleId,
+    JsonOrder(AgainOrder { slot }): JsonOrder<AgainOrder>,
+) -> Response {
+    let Some(slot) = SlotId::ALL.into_iter().find(|id| id.name() == slot) else {
+        let names = SlotId::ALL.map(SlotId::name).join(", ");
+        return error(StatusCode::UNPROCESSABLE_ENTITY, &format!("slot {slot:?}: it takes {names}"));
+    };
+    shared.order(principal, SurfaceRequest::Again(id, slot)).await
+}
+
+pub(in crate::http) async fn restore(
+    State(shared): State<Shared>,
+    Extension(principal): Extension<Principal>,
+    VehicleId(id): VehicleId,
+    JsonOrder(RestoreOrder {}): JsonOrder<RestoreOrder>,
+) -> Response {
+    shared.order(principal, SurfaceRequest::Restore(id)).await
+}
+
+pub(in crate::http) async fn take_over(
+    State(shared): State<Shared>,
+    Extension(principal): Extension<Principal>,
+    VehicleId(id): VehicleId,
+    JsonOrder(TakeOverOrder {}): JsonOrder<TakeOverOrder>,
+) -> Response {
+    shared.order(principal, SurfaceRequest::TakeOver(id)).await
 }
 
 pub(in crate::http) async fn label(

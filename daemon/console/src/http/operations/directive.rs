@@ -1,8 +1,10 @@
 //! The operations that give orders.
 
-use super::{Operation, order, schema};
+use super::{Operation, change, order, schema};
 use crate::http::handlers::orders as handlers;
-use crate::orders::{BudgetOrder, ConstraintsOrder, ExemplarOrder, UtilityOrder};
+use crate::orders::{
+    AgainOrder, BudgetOrder, ConstraintsOrder, ExemplarOrder, RestoreOrder, TakeOverOrder, UtilityOrder,
+};
 use axum::routing::post;
 use scenecast_surface::{AreasOrder, DestinationOrder, FenceOrder, LimitsOrder, Role, SettingsOrder};
 
@@ -67,6 +69,28 @@ pub(super) fn operations() -> Vec<Operation> {
              vehicle refuses a place that the fence does not allow, or to which no allowed path leads.",
             schema::<DestinationOrder>,
             || post(handlers::destination),
+        ),
+        order(
+            "/api/v2/vehicles/{id}/orders/again",
+            "give_order_again",
+            "Gives an order again, as a new one, that the surface has withdrawn: its state is `withdrawn`",
+            schema::<AgainOrder>,
+            || post(handlers::again),
+        ),
+        change(
+            "/api/v2/vehicles/{id}/orders/restore",
+            "restore_orders",
+            "Sends every order that the vehicle has lost again, as new ones, except one to resume",
+            schema::<RestoreOrder>,
+            || post(handlers::restore),
+        ),
+        change(
+            "/api/v2/vehicles/{id}/take-over",
+            "take_over_vehicle",
+            "Takes the vehicle over from another surface with the same key: an administrator at any time, an operator after \
+             that surface was silent for 120 s",
+            schema::<TakeOverOrder>,
+            || post(handlers::take_over),
         ),
         Operation {
             role: Some(Role::Administrator),

@@ -11,7 +11,7 @@ use crate::object::{ObjectReceiver, Part, Received};
 use crate::schedule::Class;
 use crate::time::Instant;
 use crate::wire::{
-    Address, Chunk, ChunkKind, Chunks, EquipmentFaults, Intent, RegistrationReport, Trail, VehicleStatus,
+    Address, Chunk, ChunkKind, Chunks, EquipmentFaults, Intent, Introduction, RegistrationReport, Trail, VehicleStatus,
 };
 use std::collections::VecDeque;
 
@@ -160,7 +160,7 @@ impl<R: StateReplica> PeerContent<R> {
                 }
                 None => ChunkOutcome::Malformed,
             },
-            ChunkKind::InForce => ChunkOutcome::Accepted,
+            ChunkKind::InForce | ChunkKind::Caller => ChunkOutcome::Accepted,
             ChunkKind::Slot | ChunkKind::Introduction | ChunkKind::Inquiry => ChunkOutcome::Malformed,
         }
     }
@@ -196,7 +196,7 @@ pub(super) fn class_of(chunk: &Chunk<'_>) -> Class {
     match chunk.kind {
         ChunkKind::Map | ChunkKind::LabelClass | ChunkKind::LabelTree => Class::Map,
         ChunkKind::Pose | ChunkKind::Trail | ChunkKind::Intent | ChunkKind::Registration => Class::Status,
-        ChunkKind::Report | ChunkKind::InForce | ChunkKind::Faults => Class::Status,
+        ChunkKind::Report | ChunkKind::InForce | ChunkKind::Faults | ChunkKind::Caller => Class::Status,
         ChunkKind::Slot | ChunkKind::Inquiry => Class::Directive,
         ChunkKind::Introduction => Class::Overhead,
         ChunkKind::Object => Class::Exemplar,
@@ -218,6 +218,7 @@ fn decode<R: StateReplica>(replica: &R, layers: &Layers, base: FrameNumber, mut 
         ChunkKind::Object => Part::decode(chunk.payload).is_ok(),
         ChunkKind::Layer => layers.decodes(base, chunk.payload),
         ChunkKind::InForce => InForcePart::decode(chunk.payload).is_ok(),
+        ChunkKind::Caller => Introduction::decode(chunk.payload).is_ok_and(|caller| caller.series.is_some()),
         ChunkKind::Slot | ChunkKind::Introduction | ChunkKind::Inquiry => true,
     })
 }

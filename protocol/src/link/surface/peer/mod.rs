@@ -10,6 +10,7 @@ mod divergence;
 mod ended;
 mod in_force;
 mod pool;
+mod rival;
 mod status;
 mod timing;
 mod turn;
@@ -17,6 +18,7 @@ mod view;
 
 pub use ended::EndedRun;
 pub use in_force::InForce;
+pub use rival::OtherSurface;
 pub(super) use turn::{Ready, room_for_slot};
 pub use view::PeerView;
 
@@ -32,6 +34,7 @@ use contact::Contact;
 use content::{ChunkOutcome, PeerContent, class_of};
 use divergence::Divergence;
 use in_force::InForceCopy;
+use rival::Rivals;
 use std::collections::VecDeque;
 use std::time::Duration;
 use timing::VehicleTiming;
@@ -66,6 +69,7 @@ pub(super) struct VehiclePeer<R> {
     pub(super) master: Master,
     pair: LinkPair<Carried>,
     outbox: SlotOutbox,
+    rivals: Rivals,
     content: PeerContent<R>,
     in_force: InForceCopy,
     timing: VehicleTiming,
@@ -92,8 +96,9 @@ impl<R: StateReplica> VehiclePeer<R> {
     ) -> Self {
         Self {
             master: Master::new(config, now),
+            outbox: SlotOutbox::new(introduction.series.unwrap_or(Series::from_random(seed)), authenticity.is_some()),
             pair: LinkPair::new(mission, Address::SURFACE, vehicle, authenticity, introduction, seed),
-            outbox: SlotOutbox::new(introduction.series.unwrap_or(Series::from_random(seed))),
+            rivals: Rivals::default(),
             content: PeerContent::new(),
             in_force: InForceCopy::default(),
             timing: VehicleTiming::default(),
@@ -113,6 +118,12 @@ impl<R: StateReplica> VehiclePeer<R> {
             self.contact.expect_prompt_answers();
         }
         self.answer_wait = modem.answer_wait(USUAL_ANSWER_WAIT);
+        self
+    }
+
+    /// Sets the age after which an abort that has not arrived is withdrawn.
+    pub(super) fn with_abort_lifetime(mut self, lifetime: Option<Duration>) -> Self {
+        self.outbox.set_abort_lifetime(lifetime);
         self
     }
 
@@ -151,11 +162,59 @@ impl<R: StateReplica> VehiclePeer<R> {
 
     /// Issues a new version of a slot; returns the version.
     pub(super) fn issue(&mut self, slot: Slot, now: Instant) -> u16 {
+        let stops = matches!(slot, Slot::Constraints(order) if order.hold || order.abort);
+        if stops && self.rivals.holder().is_some() {
+            // A hold or an abort of any surface is obeyed at once.
+            self.take_over(now);
+        }
         let replaced = self.outbox.progress().find(|order| order.id == slot.id() && order.status.is_pending());
         replaced.into_iter().for_each(|order| self.in_force.note_replaced(&order.slot));
         let version = self.outbox.issue(slot, now);
         self.follow_series();
         version
+    }
+
+    /// Has the vehicle leave another surface that holds it.
+    pub(super) fn take_over(&mut self, now: Instant) {
+        self.pair.set_takes_over(true);
+        self.rivals.hurry();
+        self.contact.hello_due = now;
+        self.master.hurry(now);
+    }
+
+    /// Until when the vehicle is left alone, because another surface holds it.
+    pub(super) fn quiet_until(&self) -> Option<Instant> {
+        self.rivals.quiet_until()
+    }
+
+    /// Gives a withdrawn order again; returns its version.
+    pub(super) fn give_again(&mut self, id: SlotId, now: Instant) -> Option<u16> {
+        let version = self.outbox.give_again(id, now);
+        self.follow_series();
+        version
+    }
+
+    /// Sends the orders that the vehicle has lost again; returns them.
+    pub(super) fn restore_lost(&mut self, now: Instant) -> Vec<SlotId> {
+        let restored = self.outbox.restore_lost(now);
+        self.follow_series();
+        restored
+    }
+
+    /// Withdraws an abort that has not arrived in time; returns whether there was one.
+    pub(super) fn withdraw_late_abort(&mut self, now: Instant) -> bool {
+        self.outbox.withdraw_late_abort(now)
+    }
+
+    /// The vehicle has refused a hello of this surface, because another one holds it.
+    fn handle_refusal(&mut self, refusal: &Introduction, now: Instant, events: &mut VecDeque<SurfaceEvent>) {
+        if self.rivals.handle_refusal(refusal, now) {
+            events.push_back(SurfaceEvent::Rivalry(self.address()));
+        }
+        self.contact.hello_due = self.rivals.quiet_until().unwrap_or(now);
+        self.contact.hellos = 0;
+        // A refusal ends this run, so that a copy of it has no effect on a later one.
+        self.is_out_of_step = true;
     }
 
     /// Begins a new series of orders if one of the present series was never in force, although the vehicle reports so.
@@ -216,8 +275,17 @@ impl<R: StateReplica> VehiclePeer<R> {
                 return;
             }
         };
+        if let Some(refusal) = inbound.refusal {
+            let header = inbound.header().clone();
+            self.handle_turn(&header, bytes, modem, now);
+            return self.handle_refusal(&refusal, now, events);
+        }
         if inbound.restarted {
             self.forget_peer(now, events);
+            if self.pair.peer_introduction().is_some_and(|i| i.has_no_memory) {
+                let lost = self.outbox.handle_lost_memory(now);
+                events.extend((!lost.is_empty()).then(|| SurfaceEvent::OrdersLost(self.address())));
+            }
             self.contact.hello_due = now + self.slot_timeout().max(Contact::PROOF_TIMEOUT);
             events.push_back(SurfaceEvent::VehicleRestarted(self.address()));
         }
@@ -237,6 +305,10 @@ impl<R: StateReplica> VehiclePeer<R> {
             return;
         }
         let Some(number) = inbound.number else { return };
+        self.pair.set_takes_over(false);
+        if self.rivals.handle_contact() {
+            events.push_back(SurfaceEvent::Rivalry(self.address()));
+        }
         (self.contact.last_received, self.contact.ordered) = (Some(now), None);
         self.contact.hellos = 0;
         self.contact.is_doubtful = false;
@@ -294,6 +366,11 @@ impl<R: StateReplica> VehiclePeer<R> {
         }
         if !outcome.is_accepted() {
             return self.pair.stats.drop(DropReason::Malformed);
+        }
+        if chunk.kind == ChunkKind::Caller
+            && Introduction::decode(chunk.payload).is_ok_and(|caller| self.rivals.handle_caller(&caller, now))
+        {
+            events.push_back(SurfaceEvent::Rivalry(vehicle));
         }
         if chunk.kind == ChunkKind::Report {
             let settled = self.outbox.handle_report(&self.content.status.latest().slots, now);
@@ -383,10 +460,13 @@ impl<R: StateReplica> VehiclePeer<R> {
         }
         self.divergence.clear();
         self.in_force.handle_peer_restart();
+        if self.pair.takes_over() {
+            self.rivals.hurry();
+        }
         self.timing = VehicleTiming::default();
         self.last_turn.began = 0;
         self.contact.acknowledged = 0;
         self.outbox.handle_peer_restart(now);
-        self.contact.hello_due = now;
+        self.contact.hello_due = self.rivals.quiet_until().unwrap_or(now);
     }
 }

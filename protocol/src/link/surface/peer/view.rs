@@ -1,6 +1,6 @@
 //! The surface's view of a vehicle, for its host.
 
-use super::{EndedRun, InForce, VehiclePeer};
+use super::{EndedRun, InForce, OtherSurface, VehiclePeer};
 use crate::directive::{Series, Slot, SlotId, SlotProgress};
 use crate::link::{LinkStats, Mismatch};
 use crate::mac::ClockMap;
@@ -40,6 +40,21 @@ impl<'a, R: StateReplica> PeerView<'a, R> {
     /// A setting in which the vehicle differs, so that its frames are refused; `None` once one is accepted.
     pub fn mismatch(&self) -> Option<Mismatch> {
         self.0.pair.mismatch()
+    }
+
+    /// The other surface that holds the vehicle.
+    pub fn holder(&self) -> Option<OtherSurface> {
+        self.0.rivals.holder()
+    }
+
+    /// Another surface that has called the vehicle in the last minutes, while this one holds it.
+    pub fn caller(&self, now: Instant) -> Option<OtherSurface> {
+        self.0.rivals.caller(now)
+    }
+
+    /// Whether this surface takes the vehicle over, and the vehicle has not followed yet.
+    pub fn takes_over(&self) -> bool {
+        self.0.pair.takes_over()
     }
 
     /// The series that the versions of its orders belong to.

@@ -1,16 +1,29 @@
 //! Reads a fence, or weighted areas, from a GeoJSON file (RFC 7946).
 
-use scenecast_core::UserError;
-use scenecast_core::{LatLon, TangentPlane};
-use scenecast_surface::{AreaOrder, AreasOrder, FenceOrder, MAX_DISTANCE_M};
+use scenecast_core::{LatLon, MAX_DISTANCE_M, TangentPlane, UserError};
 use serde_json::Value;
 use std::path::Path;
 
 const MAX_BYTES: u64 = 1 << 20;
 
+/// Fence, keep-outs and return point of a file, in metres east and north of the mission's origin.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct FenceShapes {
+    pub fence: Option<Vec<[f64; 2]>>,
+    pub keep_outs: Vec<Vec<[f64; 2]>>,
+    pub return_point: Option<[f64; 2]>,
+}
+
+/// A weighted area of a file, in metres east and north of the mission's origin.
+#[derive(Debug, Clone, PartialEq)]
+pub struct AreaShape {
+    pub outline: Vec<[f64; 2]>,
+    pub weight: f64,
+}
+
 /// The coordinates of a file.
 #[derive(Debug, Clone, Copy)]
-pub(super) enum CoordinateFrame {
+pub enum CoordinateFrame {
     /// Metres east and north of the mission's origin.
     Metres,
     /// Longitude and latitude, WGS 84, converted around that origin.
@@ -26,22 +39,16 @@ enum FeatureRole {
 }
 
 /// Reads fence, keep-outs and return point.
-pub(super) fn read_fence(file: &Path, frame: CoordinateFrame) -> Result<FenceOrder, UserError> {
-    let error = |line: String| UserError::file(file, line);
-    let order = fence_of(&read_json(file)?, frame).map_err(error)?;
-    order.read().map_err(error)?;
-    Ok(order)
+pub fn read_fence(file: &Path, frame: CoordinateFrame) -> Result<FenceShapes, UserError> {
+    fence_of(&read_json(file)?, frame).map_err(|line| UserError::file(file, line))
 }
 
 /// Reads weighted areas: polygons with the property `weight`.
-pub(super) fn read_areas(file: &Path, frame: CoordinateFrame) -> Result<AreasOrder, UserError> {
-    let error = |line: String| UserError::file(file, line);
-    let order = areas_of(&read_json(file)?, frame).map_err(error)?;
-    order.read().map_err(error)?;
-    Ok(order)
+pub fn read_areas(file: &Path, frame: CoordinateFrame) -> Result<Vec<AreaShape>, UserError> {
+    areas_of(&read_json(file)?, frame).map_err(|line| UserError::file(file, line))
 }
 
-fn areas_of(whole: &Value, frame: CoordinateFrame) -> Result<AreasOrder, String> {
+fn areas_of(whole: &Value, frame: CoordinateFrame) -> Result<Vec<AreaShape>, String> {
     let features = match whole["type"].as_str() {
         Some("FeatureCollection") => whole["features"].as_array().ok_or("the collection has no list of features")?,
         Some("Feature") => std::slice::from_ref(whole),
@@ -56,13 +63,13 @@ fn areas_of(whole: &Value, frame: CoordinateFrame) -> Result<AreasOrder, String>
             Some("Polygon") => outline(&geometry["coordinates"], frame),
             other => Err(format!("geometry {}: expected a Polygon", other.unwrap_or("null"))),
         };
-        let area = outline.and_then(|outline| Ok(AreaOrder { outline, weight: weight? }));
+        let area = outline.and_then(|outline| Ok(AreaShape { outline, weight: weight? }));
         area.map_err(|line| format!("features[{i}]: {line}"))
     };
     if features.is_empty() {
         return Err("it has no area; scenecast ctl areas clear removes all areas".to_owned());
     }
-    Ok(AreasOrder { areas: features.iter().enumerate().map(area).collect::<Result<_, _>>()? })
+    features.iter().enumerate().map(area).collect()
 }
 
 fn read_json(file: &Path) -> Result<Value, UserError> {
@@ -70,8 +77,8 @@ fn read_json(file: &Path) -> Result<Value, UserError> {
     serde_json::from_slice(&text).map_err(|e| UserError::file(file, format!("it is not JSON: {e}")))
 }
 
-fn fence_of(whole: &Value, frame: CoordinateFrame) -> Result<FenceOrder, String> {
-    let mut order = FenceOrder::default();
+fn fence_of(whole: &Value, frame: CoordinateFrame) -> Result<FenceShapes, String> {
+    let mut order = FenceShapes::default();
     match whole["type"].as_str() {
         Some("FeatureCollection") => {
             let features = whole["features"].as_array().ok_or("the collection has no list of features")?;
@@ -88,14 +95,14 @@ fn fence_of(whole: &Value, frame: CoordinateFrame) -> Result<FenceOrder, String>
             return Err(format!("type {}: {expected}", other.unwrap_or("is missing")));
         }
     }
-    if order == FenceOrder::default() {
+    if order == FenceShapes::default() {
         return Err("it contains neither polygon nor point".to_owned());
     }
     Ok(order)
 }
 
 /// Adds a feature to the order.
-fn add(order: &mut FenceOrder, feature: &Value, frame: CoordinateFrame) -> Result<(), String> {
+fn add(order: &mut FenceShapes, feature: &Value, frame: CoordinateFrame) -> Result<(), String> {
     let (geometry, role) = (&feature["geometry"], role(feature)?);
     let coordinates = &geometry["coordinates"];
     let rings: Vec<&Value> = match geometry["type"].as_str() {
@@ -184,7 +191,7 @@ fn place(at: &Value, frame: CoordinateFrame) -> Result<[f64; 2], String> {
 mod tests {
     use super::*;
 
-    fn read(json: &str, frame: CoordinateFrame) -> Result<FenceOrder, String> {
+    fn read(json: &str, frame: CoordinateFrame) -> Result<FenceShapes, String> {
         fence_of(&serde_json::from_str(json).unwrap(), frame)
     }
 
@@ -211,7 +218,7 @@ mod tests {
         let areas = |json: &str| areas_of(&serde_json::from_str(json).unwrap(), CoordinateFrame::Metres);
         let feature = format!(r#"{{"type": "Feature", "properties": {{"weight": -0.5}}, "geometry": {SQUARE}}}"#);
         let outline = vec![[0.0, 0.0], [90.0, 0.0], [90.0, 60.0], [0.0, 60.0]];
-        let order = AreasOrder { areas: vec![AreaOrder { outline, weight: -0.5 }] };
+        let order = vec![AreaShape { outline, weight: -0.5 }];
         assert_eq!(areas(&feature), Ok(order.clone()));
         let list = format!(r#"{{"type": "FeatureCollection", "features": [{feature}]}}"#);
         assert_eq!(areas(&list), Ok(order));
