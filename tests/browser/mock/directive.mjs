@@ -1,4 +1,4 @@
-// The order status of the directive slots: queued -> on_air -> received -> applied | refused.
+// The order status of the directive slots: queued -> on_air -> received -> applied | refused, or withdrawn.
 
 const SLOTS = ["utility", "constraints", "settings", "budget", "requests", "fix", "limits", "fence", "destination", "areas"];
 const REASONS = {
@@ -54,6 +54,19 @@ export class Directive {
       this.move(s, "applied", nowS);
     }
     s.onApplied?.(s.state);
+  }
+
+  /** The surface sends an order no more, unless an operator wishes it. */
+  withdraw(slot, reason, nowS) {
+    const s = this.slots.get(slot);
+    Object.assign(s, { reason, asks: true });
+    this.move(s, "withdrawn", nowS);
+  }
+
+  /** The withdrawn order of a slot goes out again, as a new one. */
+  again(slot, nowS) {
+    const { name, onApplied } = this.slots.get(slot);
+    return this.issue(slot, nowS, onApplied, name);
   }
 
   move(s, state, nowS) {

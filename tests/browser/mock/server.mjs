@@ -143,7 +143,7 @@ async function post(mock, req, res, path) {
     const versions = mission.vehicles.map((v) => [v.id, v.directive.issue("budget", mission.nowS).version]);
     return accepted(mock, res, { slot: "budget", name: "budget", versions: Object.fromEntries(versions) });
   }
-  const [, id, resource] = path.match(/^vehicles\/(\d+)\/([\w-]+)(?:\/(?:dismiss|remove))?$/) ?? [];
+  const [, id, resource] = path.match(/^vehicles\/(\d+)\/([\w-]+)(?:\/(?:dismiss|remove|again|restore))?$/) ?? [];
   const v = mission.vehicles.find((x) => x.id === Number(id));
   if (!v) return reply(res, 404, { error: "no such vehicle" });
   if (resource === "utility") {
@@ -166,6 +166,15 @@ async function post(mock, req, res, path) {
     return accepted(mock, res, {});
   }
   if (resource === "exemplars") return accepted(mock, res, v.request(given, mission.nowS));
+  if (resource === "orders" && path.endsWith("/again")) return accepted(mock, res, v.directive.again(given.slot, mission.nowS));
+  if (resource === "orders") {
+    for (const slot of v.directive.json().slots) if (slot.asks && slot.name !== "resume") v.directive.again(slot.slot, mission.nowS);
+    return accepted(mock, res, {});
+  }
+  if (resource === "take-over") {
+    v.otherSurface.is_taken_over = true;
+    return accepted(mock, res, {});
+  }
   if (resource === "constraints") {
     return accepted(mock, res, v.directive.issue("constraints", mission.nowS, (s) => {
       if (s === "applied") Object.assign(v, { hold: given.action === "hold", aborted: given.action === "abort" });
@@ -211,6 +220,8 @@ function steer(mock, order, res) {
   if ("registration" in order) mission.vehicles[0].registration = order.registration;
   if ("closed_loops" in order) mission.vehicles[0].closedLoops = order.closed_loops;
   if ("mismatch" in order) mission.vehicles[0].mismatch = order.mismatch;
+  if ("other_surface" in order) mission.vehicles[0].otherSurface = order.other_surface;
+  for (const [slot, reason] of Object.entries(order.withdraw ?? {})) mission.vehicles[0].directive.withdraw(slot, reason, mission.nowS);
   if ("earlier" in order) mission.vehicles[0].earlier = order.earlier;
   for (const entry of order.log ?? []) mission.log.push({ number: mission.log.length + 1, at_s: mission.nowS, utc: "2026-11-23T10:00:00Z", by: null, vehicle: null, ...entry });
   for (const key of ["archive", "storage", "loss", "layers", "ended", "speed", "position", "truth"]) if (key in order) mission[key] = order[key];

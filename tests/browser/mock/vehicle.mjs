@@ -194,7 +194,7 @@ export class Vehicle {
     const counts = [...this.replica.counts()].sort((a, b) => a[0] - b[0]);
     return {
       id: this.id, name: this.name, last_received_s: this.receivedS, expected_interval_s: this.turnS,
-      next_contact_s: this.receivedS === null ? null : this.nextTurnS, status: this.status, track: this.track,
+      next_contact_s: this.receivedS === null ? null : this.nextTurnS, other_surface: this.otherSurface ?? null, status: this.status, track: this.track,
       registration: this.registration ?? null, closed_loops: this.closedLoops ?? [],
       map: {
         version: this.replica.version, cell_m: this.replica.cellM, ...bounds,

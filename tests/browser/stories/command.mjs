@@ -111,4 +111,42 @@ export default [
       await s.shows("ol.changes", /bob took command from anna, who was silent/);
     },
   },
+  {
+    name: "another surface that holds the vehicle is named and can be taken over",
+    scenario: "rich",
+    async run(s) {
+      await s.steer({ principals: CREW });
+      await as(s, "bob");
+      const other = { name: "tender", holds: false, heard_s: 0, is_silent: false, is_taken_over: false };
+      await s.steer({ other_surface: other });
+      await s.shows("#banners", /The surface tender calls auv-1/);
+      await s.steer({ other_surface: { ...other, holds: true } });
+      await s.shows("#banners", /The surface tender holds auv-1.*An administrator may take the vehicle over, or an operator after 120 s/s);
+      assert.equal(await s.button("Take over").count(), 0);
+      await s.steer({ other_surface: { ...other, holds: true, is_silent: true } });
+      await s.button("Take over").click();
+      await s.shows("#banners", /This surface takes it over/);
+      await s.steer({ other_surface: null });
+      await s.visible("#banners", false);
+    },
+  },
+  {
+    name: "a withdrawn order is sent again only if an operator wishes it",
+    scenario: "rich",
+    async run(s) {
+      const post = (path, body) => s.page.evaluate(([path, body]) => fetch(`/api/v2/vehicles/1/${path}`, { method: "POST", headers: { "x-scenecast": "1" }, body: JSON.stringify(body) }).then((r) => r.status), [path, body]);
+      await post("limits", { time_s: 600 });
+      await post("constraints", { action: "abort" });
+      await s.steer({ withdraw: { constraints: "it has not arrived in time: is it still to be sent?" } });
+      await s.shows("#banners", /auv-1: abort is withdrawn.*has not arrived in time/s);
+      await s.button("Send abort again").click();
+      await s.until("the order", () => s.posts.some((p) => p.path.endsWith("/orders/again") && p.body.slot === "constraints"));
+      await s.visible("#banners", false);
+      await s.steer({ withdraw: { limits: "the vehicle has no record of it any more: is it to be sent again?" } });
+      await s.shows("#banners", /auv-1 has lost its orders.*no record any more of: limits/s);
+      await s.button("Send them again").click();
+      await s.until("the orders", () => s.posts.some((p) => p.path.endsWith("/orders/restore")));
+      await s.visible("#banners", false);
+    },
+  },
 ];

@@ -55,6 +55,12 @@ export const sendUtility = (id, utility) => write(`/vehicles/${id}/utility`, uti
 /** `action`: another, larger or cancel; `image`: the number of the image to enlarge. */
 export const requestExemplar = (id, label, action, image = null) =>
   write(`/vehicles/${id}/exemplars`, { label, action, ...(image && { image }) });
+/** Gives a withdrawn order again, as a new one. */
+export const giveAgain = (id, slot) => write(`/vehicles/${id}/orders/again`, { slot });
+/** Sends the orders again that the vehicle has lost. */
+export const restoreOrders = (id) => write(`/vehicles/${id}/orders/restore`, {});
+/** Takes the vehicle over from another surface. */
+export const takeOver = (id) => write(`/vehicles/${id}/take-over`, {});
 export const sendConstraints = (id, order) => write(`/vehicles/${id}/constraints`, order);
 export const sendFence = (id, fence) => write(`/vehicles/${id}/fence`, fence);
 /** `areas`: [{ outline: [[x, y], ..], weight }]. */

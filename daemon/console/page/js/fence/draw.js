@@ -3,12 +3,12 @@
 
 import { FONT, haloText } from "../canvas.js";
 import { signed } from "../format.js";
-import { slotOf } from "../order/status.js";
+import { isVoid, slotOf } from "../order/status.js";
 import { store } from "../store.js";
 import { areasOrder, fenceOrder, middle, pen } from "./edit.js";
 import { faults, fromAreas, fromServer, nameOutline } from "./plan.js";
 
-const DASH = { applied: [], queued: [9, 6], on_air: [9, 6], received: [9, 6], refused: [2, 5] };
+const DASH = { applied: [], queued: [9, 6], on_air: [9, 6], received: [9, 6], refused: [2, 5], withdrawn: [2, 5] };
 
 export function drawOutlines(c, view, ink, vehicle, chosen) {
   const { areas, areas_in_force, fence, fence_in_force } = vehicle;
@@ -21,7 +21,7 @@ function drawOrder(c, view, ink, vehicle, chosen, { order, read, sent, inForce }
   c.globalAlpha = chosen ? 1 : 0.55;
   if (inForce) drawPlan(c, view, ink, read(inForce.order), [], "");
   if (slot && slot.state !== "applied" && sent) {
-    drawPlan(c, view, ink, read(sent), DASH[slot.state] ?? [9, 6], slot.state === "refused" ? "refused" : "not in force yet");
+    drawPlan(c, view, ink, read(sent), DASH[slot.state] ?? [9, 6], isVoid(slot) ? slot.state : "not in force yet");
   }
   c.globalAlpha = 1;
   if (!chosen || !pen.shown) return;

@@ -4,7 +4,7 @@ import { denial } from "../command.js";
 import { h, show, text } from "../dom.js";
 import { store } from "../store.js";
 import { replacedNote } from "./sent-versions.js";
-import { orderStatus, slotOf } from "./status.js";
+import { isVoid, orderStatus, slotOf } from "./status.js";
 
 const CONFLICT = "Changed by another console meanwhile: Send replaces that change, Discard accepts it.";
 
@@ -23,7 +23,7 @@ export function orderFoot(order, name, id, caption = () => `Send ${name.toLowerC
     const { busy, error, waiting } = order.progress(vehicle);
     const slot = slotOf(vehicle, order.slot);
     const unsent = order.unsent(vehicle).length;
-    const again = slot?.state === "refused" && unsent === 0;
+    const again = isVoid(slot) && unsent === 0;
     const denied = denial(order.slot === "settings" ? "settings" : "order");
     send.disabled = busy || denied !== null || isFaulty || !store.connected || (unsent === 0 && !again);
     text(send, again ? `Send ${name.toLowerCase()} again` : caption(unsent));

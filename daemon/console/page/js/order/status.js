@@ -1,13 +1,15 @@
-// The status of an order to the vehicle: queued, on air, received, applied or refused.
+// The status of an order to the vehicle: queued, on air, received, applied, refused or withdrawn.
 
 import { announce, h, show, text } from "../dom.js";
 import { span } from "../format.js";
 import { ageOf } from "../store.js";
 
 const STEPS = ["queued", "on_air", "received", "applied"];
-const NAMES = { queued: "Queued", on_air: "On air", received: "Received", applied: "Applied", refused: "Refused" };
+const NAMES = { queued: "Queued", on_air: "On air", received: "Received", applied: "Applied", refused: "Refused", withdrawn: "Withdrawn" };
 
 export const nameOfStatus = (state) => NAMES[state] ?? state;
+/** Whether the vehicle will not obey it, so that it can be sent again. */
+export const isVoid = (slot) => ["refused", "withdrawn"].includes(slot?.state);
 
 /** A row of steps. `update(slot, waiting)` takes a slot of the server's directive or null, and a text that replaces its description. */
 export function orderStatus(name) {
@@ -30,14 +32,14 @@ export function orderStatus(name) {
 }
 
 function mark(steps, slot) {
-  const refused = slot.state === "refused";
+  const refused = isVoid(slot);
   const reached = refused ? STEPS.length - 1 : STEPS.indexOf(slot.state);
   steps.forEach((step, i) => {
     const last = i === STEPS.length - 1;
     step.className = i < reached ? "done" : i > reached ? "" : refused ? "refused" : last ? "done now" : "now";
     if (i === reached) step.setAttribute("aria-current", "step");
     else step.removeAttribute("aria-current");
-    if (last) text(step, refused ? NAMES.refused : NAMES.applied);
+    if (last) text(step, refused ? NAMES[slot.state] : NAMES.applied);
   });
 }
 
@@ -52,6 +54,7 @@ export function describe(slot) {
     case "received": return `${version} reached the vehicle ${since} ago; it is not applied yet.`;
     case "applied": return `${version} was applied ${since} ago, ${took} after it was issued.`;
     case "refused": return `${version} was refused ${since} ago: ${slot.reason ?? "no reason given"}.`;
+    case "withdrawn": return `${version} was withdrawn ${since} ago: ${slot.reason}${slot.reason?.endsWith("?") ? "" : "."}`;
     default: return `${version}: ${slot.state}.`;
   }
 }

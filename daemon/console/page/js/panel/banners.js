@@ -1,8 +1,8 @@
 // Alarms and requests: no connection, a request for command, a silent vehicle, a map that is not up to date, the end of the mission.
 
 import { soundAlarm } from "../alarm.js";
-import { dismissEarlierMap, sendCommand } from "../api.js";
-import { hasCommand } from "../command.js";
+import { dismissEarlierMap, giveAgain, restoreOrders, sendCommand, takeOver } from "../api.js";
+import { denial, hasCommand } from "../command.js";
 import { $, announce, h, keyed, show, text } from "../dom.js";
 import { ago, freeSpace, missionTime, span } from "../format.js";
 import { ageOf, isHeard, isSilent, store } from "../store.js";
@@ -32,6 +32,8 @@ function current() {
   const found = [];
   if (store.feed.state === "lost") found.push(lost());
   for (const v of store.snapshot?.vehicles ?? []) {
+    if (v.other_surface) found.push(rival(v));
+    found.push(...withdrawn(v));
     if (isSilent(v)) found.push(silent(v));
     if (store.connected && store.mapFaults.has(v.id)) found.push(outdated(v));
     if (v.link.mismatch) found.push(mismatched(v));
@@ -68,6 +70,53 @@ function silent(v) {
 function outdated(v) {
   return { key: `map-${v.id}`, kind: "warn", head: `The map of ${v.name} is not up to date`, body: `${store.mapFaults.get(v.id)}.` };
 }
+
+/** Another surface with the same key holds the vehicle, or calls it. */
+function rival(v) {
+  const { name, holds, heard_s: heard, is_silent: isGone, is_taken_over: takesOver } = v.other_surface;
+  const other = name ? `The surface ${name}` : "Another surface";
+  const last = `The vehicle last heard it ${span(ageOf(heard))} ago`;
+  if (!holds) {
+    const body = `${last}. This surface holds the vehicle, which refuses the other one.`;
+    return { key: `calls-${v.id}`, kind: "info", head: `${other} calls ${v.name}`, body };
+  }
+  const mayTake = isGone || denial("settings") === null;
+  const how = mayTake ? "" : " An administrator may take the vehicle over, or an operator after 120 s without a sign of that surface.";
+  const then = takesOver ? "This surface takes it over." : `A hold and an abort are obeyed at once.${how}`;
+  return {
+    key: `held-${v.id}-${mayTake && !takesOver}`, kind: "bad", head: `${other} holds ${v.name}`,
+    body: `${last}, and obeys it and not this one. ${then}`,
+    action: mayTake && !takesOver ? ["Take over", () => act(takeOver(v.id))] : undefined,
+  };
+}
+
+/** Orders that are sent no more unless an operator wishes it. */
+function withdrawn(v) {
+  const asking = v.directive.slots.filter((slot) => slot.asks);
+  const lost = asking.filter((slot) => slot.reason?.startsWith(LOST));
+  const single = asking.filter((slot) => !lost.includes(slot)).map((slot) => ({
+    key: `withdrawn-${v.id}-${slot.slot}-${slot.version}`, kind: "warn", head: `${v.name}: ${slot.name} is withdrawn`,
+    body: `Version ${slot.version}, given ${span(ageOf(slot.issued_s))} ago: ${slot.reason}`,
+    action: [`Send ${slot.name} again`, () => act(giveAgain(v.id, slot.slot))],
+  }));
+  return lost.length > 0 ? [lostOrders(v, lost), ...single] : single;
+}
+
+/** How the reason of an order begins that the vehicle has lost. */
+const LOST = "the vehicle has no record";
+
+function lostOrders(v, lost) {
+  const restored = lost.filter((slot) => slot.name !== "resume");
+  const names = lost.map((slot) => slot.name).join(", ");
+  return {
+    key: `lost-${v.id}-${restored.length}`, kind: "bad", head: `${v.name} has lost its orders`,
+    body: `It has no record any more of: ${names}. An order to resume is not sent again.`,
+    action: restored.length > 0 ? ["Send them again", () => act(restoreOrders(v.id))] : undefined,
+  };
+}
+
+/** An order from a banner, whose error is said. */
+const act = (sent) => sent.catch((error) => announce(error.message));
 
 export const isHolding = (v) => v.status?.mode === "hold";
 /** Whether the survey has ended before its time. */

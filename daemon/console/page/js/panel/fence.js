@@ -6,7 +6,7 @@ import { consequences, faults, fromServer, isSound } from "../fence/plan.js";
 import { count, metres, percent } from "../format.js";
 import { inWorld } from "../map/frames.js";
 import { orderFoot } from "../order/foot.js";
-import { slotOf } from "../order/status.js";
+import { isVoid, slotOf } from "../order/status.js";
 import { store } from "../store.js";
 import { onMap, outlineList, place } from "./outline-list.js";
 
@@ -62,7 +62,7 @@ export function update() {
   const by = vehicle.map.placement;
   show(frame, Boolean(by));
   if (by) text(frame, `In metres of the world frame. Fixes have moved the map by ${metres(by.east_m)} east and ${metres(by.north_m)} north; outlines stay.`);
-  show(editInForce, slotOf(vehicle, "fence")?.state === "refused" && Boolean(vehicle.fence_in_force));
+  show(editInForce, isVoid(slotOf(vehicle, "fence")) && Boolean(vehicle.fence_in_force));
 }
 
 /** What the plan would mean for the vehicle, before it is sent. */
@@ -114,6 +114,6 @@ function describeInForce(vehicle) {
     if (vehicle.in_force.fence === "not_reported") return "In force by the last report, before a restart: the solid lines on the map.";
     return before.version === 0 ? "In force: the solid lines on the map, sent by another surface or before its files were lost." : "In force: the solid lines on the map.";
   }
-  if (before && slot.state === "refused") return `Version ${before.version} stays in force (solid lines).`;
+  if (before && isVoid(slot)) return `Version ${before.version} stays in force (solid lines).`;
   return before ? `Version ${before.version} stays in force meanwhile (solid lines).` : "This surface does not know which fence is in force meanwhile.";
 }

@@ -5,7 +5,7 @@ import { denial } from "../command.js";
 import { h, show, text } from "../dom.js";
 import { Order } from "../order/order.js";
 import { replacedNote } from "../order/sent-versions.js";
-import { describe, slotOf } from "../order/status.js";
+import { describe, isVoid, slotOf } from "../order/status.js";
 import { store } from "../store.js";
 
 const DEFAULT = ["", "vehicle's default"];
@@ -46,7 +46,7 @@ export const plannerPart = h("div.planner", {}, planner.label, planner.pick, set
 export function refreshPlanner(vehicle) {
   const { busy, error, waiting } = order.progress(vehicle);
   const slot = slotOf(vehicle, "settings");
-  const again = slot?.state === "refused" && !order.isChanged(vehicle);
+  const again = isVoid(slot) && !order.isChanged(vehicle);
   const denied = denial("settings");
   for (const { key, hint, pick } of rows) {
     pick.value = order.value(vehicle, key);
