@@ -30,8 +30,13 @@ ORDERS = {
     "add_marker": {"x_m": 12.5, "y_m": -3, "text": "a wreck"},
     "remove_marker": {"number": 1},
     "dismiss_earlier_map": {},
+    "take_over_vehicle": {},
     "set_budget": {"budget_bps": 9000, "shares": {"directive": 10, "status": 5, "fix": 5, "map": 50, "exemplar": 20}},
 }
+
+
+# Those that are refused here: no order of the vehicle is withdrawn or lost.
+REFUSED = {"give_order_again": {"slot": "fence"}, "restore_orders": {}}
 
 
 class NoRedirect(urllib.request.HTTPRedirectHandler):
@@ -131,6 +136,10 @@ def check(document, path, method, operation, state):
     content = operation["responses"][good].get("content", {})
     if name == "events":
         return events(document, content["text/event-stream"], not vehicle["labels"])
+    if name in REFUSED:
+        status, _, why = ask(method, requested, json.dumps(REFUSED[name]).encode())
+        expect(status == 422, f"{name}: {status} instead of 422: {why[:200]}")
+        return validate(document, {"$ref": "#/components/schemas/ErrorBody"}, json.loads(why), f"the refusal of {name}")
     body, headers = None, None
     if name == "login":
         body, headers = b"token=any", {"content-type": "application/x-www-form-urlencoded"}

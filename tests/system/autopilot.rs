@@ -227,7 +227,7 @@ fn a_vehicle_surveys_on_ardusub_and_reports_its_silence() {
     let auv = file(
         "auv.toml",
         format!(
-            "[modem]\nconnect = \"127.0.0.1:{modem}\"\n[survey]\narea_m = [0, 0, 30, 20]\n[link]\nstatus_period_s = 1\n\
+            "[modem]\nconnect = \"127.0.0.1:{modem}\"\n[survey]\nstart = \"free\"\narea_m = [0, 0, 30, 20]\n[link]\nstatus_period_s = 1\n\
              [autopilot]\nkind = \"mavlink\"\nport = \"udp:127.0.0.1:{mavlink}\"\narm = true\ntimeout_s = 2\n\
              [runtime]\nstate_dir = \"{}\"\n",
             state("auv")

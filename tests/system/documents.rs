@@ -162,7 +162,8 @@ fn every_key_in_the_documents_exists() {
     let sections: BTreeSet<&str> = keys.iter().filter_map(|k| k.split('.').next()).collect();
     // Members of reports and of the API.
     let others = |page: &Page| ["reports.md", "http.md"].iter().any(|n| page.path.ends_with(n));
-    let endings = [".rs", ".csv", ".png", ".journal", ".checkpoint", ".key", ".copy", ".damaged", ".tif", ".tokens"];
+    let endings =
+        [".rs", ".csv", ".png", ".store", ".journal", ".checkpoint", ".key", ".copy", ".damaged", ".tif", ".tokens"];
     let is_file = |span: &str| endings.iter().any(|end| span.ends_with(end));
     let is_key = |span: &str| {
         let words = span.split('.').all(|w| !w.is_empty() && w.bytes().all(|b| b.is_ascii_lowercase() || b == b'_'));

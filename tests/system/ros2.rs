@@ -100,7 +100,10 @@ fn ends_with(dir: &Path, page: u16, domain: u8, is_in_ros: bool) -> Ends {
     );
     let vehicle = common(
         "auv",
-        &format!("[modem]\nconnect = \"127.0.0.1:{link}\"\n[camera]\nsource = \"frames:{}\"\n", recording.display()),
+        &format!(
+            "[survey]\nstart = \"free\"\n[modem]\nconnect = \"127.0.0.1:{link}\"\n[camera]\nsource = \"frames:{}\"\n",
+            recording.display()
+        ),
     );
     Ends {
         _surface: Process::start(&["asv", "--config", &surface]),

@@ -3,7 +3,7 @@
 use super::follow::follow;
 use super::session::Session;
 use super::text;
-use crate::orders::ConstraintsOrder;
+use crate::orders::{AgainOrder, ConstraintsOrder, RestoreOrder, TakeOverOrder};
 use crate::state::{AppliedOrder, MissionState, OrderProgress, OrderStatus, VehicleState};
 use scenecast_core::UserError;
 use scenecast_core::{LatLon, TangentPlane};
@@ -91,6 +91,26 @@ pub async fn set_limits(session: &Session, given: &LimitsOrder, keep: bool) -> R
 pub async fn send_constraints(session: &Session, order: ConstraintsOrder) -> Result<(), UserError> {
     let state = session.state().await?;
     send(session, session.choose(&state)?, "constraints", &order).await
+}
+
+/// Gives a withdrawn order again.
+pub async fn give_again(session: &Session, slot: String) -> Result<(), UserError> {
+    let state = session.state().await?;
+    send(session, session.choose(&state)?, "orders/again", &AgainOrder { slot }).await
+}
+
+/// Sends the orders again that the vehicle has lost.
+pub async fn restore_orders(session: &Session) -> Result<(), UserError> {
+    let state = session.state().await?;
+    let path = format!("/api/v2/vehicles/{}/orders/restore", session.choose(&state)?.id);
+    session.client.send_order(&path, &RestoreOrder {}).await
+}
+
+/// Takes the vehicle over from another surface.
+pub async fn take_over(session: &Session) -> Result<(), UserError> {
+    let state = session.state().await?;
+    let path = format!("/api/v2/vehicles/{}/take-over", session.choose(&state)?.id);
+    session.client.send_order(&path, &TakeOverOrder {}).await
 }
 
 pub(super) async fn send(

@@ -16,7 +16,8 @@ mod watch;
 
 pub use command::{change_command, show_command};
 pub use constraints::{
-    FenceFile, clear_fence, send_constraints, set_fence, set_limits, set_return_point, show_fence, show_limits,
+    FenceFile, clear_fence, give_again, restore_orders, send_constraints, set_fence, set_limits, set_return_point,
+    show_fence, show_limits, take_over,
 };
 pub use download::{cancel_exemplar, save_exemplar, save_map};
 pub use http::Client;

@@ -43,6 +43,11 @@ fn vehicle(out: &mut String, v: &VehicleState, state: &MissionState) {
     let received = v.last_received_s.map_or("no frame yet".to_owned(), |at| format!("received {} ago", span(now - at)));
     let expected = format!("a frame is expected within {}", span(v.expected_interval_s));
     let _ = writeln!(out, "\nvehicle {} {}  {received}, {expected}{silent}", v.id, v.name);
+    if let Some(other) = &v.other_surface {
+        let name = if other.name.is_empty() { "another surface".to_owned() } else { format!("surface {}", other.name) };
+        let does = if other.holds { "HOLDS THE VEHICLE" } else { "calls the vehicle" };
+        let _ = writeln!(out, "  surface    {name} {does}, heard {} ago", span(now - other.heard_s));
+    }
     if let Some(s) = &v.status {
         let p = &s.pose;
         let place = format!("E {:.1} m  N {:.1} m  up {:.1} m  heading {:03.0}", p.x_m, p.y_m, p.z_m, p.heading_deg);

@@ -161,6 +161,19 @@ enum CtlCommand {
         #[arg(long)]
         yes: bool,
     },
+    /// Give an order again that the surface has withdrawn: another surface has given a newer one, or it is late.
+    #[command(after_help = "Example: scenecast ctl again limits --wait 60")]
+    Again {
+        /// The slot of the order: utility, constraints (hold, abort), settings, budget, limits, fence,
+        /// destination or areas
+        slot: String,
+    },
+    /// Send the orders again that the vehicle has lost, except one to resume.
+    #[command(after_help = "Example: scenecast ctl restore")]
+    Restore,
+    /// Take the vehicle over from another surface with the same key.
+    #[command(after_help = "Example: scenecast ctl take-over")]
+    TakeOver,
     /// Print who has command, the right to give orders other than hold and abort; or request it, hand
     /// it over, take it, give it up.
     #[command(
@@ -363,6 +376,9 @@ impl CtlCommand {
             Self::Hold => constraints::hold(session, true).await,
             Self::Resume => constraints::hold(session, false).await,
             Self::Abort { yes } => constraints::abort(session, yes).await,
+            Self::Again { slot } => client::give_again(session, slot).await,
+            Self::Restore => client::restore_orders(session).await,
+            Self::TakeOver => client::take_over(session).await,
             Self::Authority { change } => command::command(session, change).await,
             Self::Log { kind, since, out } => {
                 let selection = LogSelection { kind, since };
