@@ -78,7 +78,11 @@ impl Rivals {
     /// The vehicle uses a run of this surface; returns whether another one held it before.
     pub(super) fn handle_contact(&mut self) -> bool {
         self.next_call = None;
-        self.holder.take().is_some()
+        let was_held = self.holder.take().is_some();
+        if was_held {
+            self.caller = None;
+        }
+        was_held
     }
 
     /// Calls the vehicle at once.
