@@ -1,5 +1,6 @@
 //! The error that ends a command.
 
+use crate::printable;
 use std::fmt;
 use std::path::Path;
 
@@ -31,7 +32,7 @@ impl fmt::Display for UserError {
         match self {
             // One line, whatever a library has put into its message.
             Self::Input(what) | Self::Failed(what) => {
-                f.write_str(&what.split_whitespace().collect::<Vec<_>>().join(" "))
+                f.write_str(&printable(&what.split_whitespace().collect::<Vec<_>>().join(" ")))
             }
         }
     }

@@ -1,11 +1,14 @@
 //! Mission time of a process.
 
 use scenecast_protocol::time::Instant;
+use std::time::Duration;
 
-/// A monotonic clock that may run faster than wall time, for rehearsals.
+/// A monotonic clock that may run faster than wall time, for rehearsals. It goes on while the computer sleeps, so that ages include
+/// the sleep; timers that passed meanwhile are due once.
 #[derive(Debug, Clone, Copy)]
 pub struct Clock {
-    began: std::time::Instant,
+    /// Time since the computer was switched on.
+    began: Duration,
     /// The mission time at `began`.
     start: Instant,
     scale: f64,
@@ -19,11 +22,15 @@ impl Clock {
 
     /// A clock that now shows `start`.
     pub fn starting_at(start: Instant, scale: f64) -> Self {
-        Self { began: std::time::Instant::now(), start, scale }
+        Self { began: since_boot(), start, scale }
     }
 
     pub fn now(&self) -> Instant {
-        self.start + self.began.elapsed().mul_f64(self.scale)
+        self.start + self.elapsed().mul_f64(self.scale)
+    }
+
+    fn elapsed(&self) -> Duration {
+        since_boot().saturating_sub(self.began)
     }
 
     /// Mission time for each unit of wall time.
@@ -31,13 +38,47 @@ impl Clock {
         self.scale
     }
 
-    /// The mission time of a moment; `None` before the clock began.
+    /// The mission time of a moment since the computer last slept; `None` before the clock began.
     pub fn at(&self, moment: std::time::Instant) -> Option<Instant> {
-        Some(self.start + moment.checked_duration_since(self.began)?.mul_f64(self.scale))
+        Some(self.start + self.elapsed().checked_sub(moment.elapsed())?.mul_f64(self.scale))
     }
 
-    /// The wall time of a mission time.
+    /// The wall time of a mission time; now for one that has passed.
     pub fn wall(&self, at: Instant) -> tokio::time::Instant {
-        tokio::time::Instant::from_std(self.began + at.since(self.start).div_f64(self.scale))
+        tokio::time::Instant::now() + at.since(self.now()).div_f64(self.scale)
+    }
+}
+
+/// Time since the computer was switched on, sleep included.
+#[cfg(target_os = "linux")]
+fn since_boot() -> Duration {
+    let time = nix::time::clock_gettime(nix::time::ClockId::CLOCK_BOOTTIME);
+    time.map_or_else(|_| since_start(), Duration::from)
+}
+
+#[cfg(not(target_os = "linux"))]
+fn since_boot() -> Duration {
+    since_start()
+}
+
+/// Time since the first call, without sleep: for a system that has no other clock.
+fn since_start() -> Duration {
+    static START: std::sync::LazyLock<std::time::Instant> = std::sync::LazyLock::new(std::time::Instant::now);
+    START.elapsed()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_moment_has_the_time_that_the_clock_showed() {
+        let before = std::time::Instant::now();
+        let clock = Clock::starting_at(Instant::from_secs_f64(100.0), 1.0);
+        let (moment, shown) = (std::time::Instant::now(), clock.now());
+        let at = clock.at(moment).unwrap();
+        assert!(shown.since(at).max(at.since(shown)) < Duration::from_secs(5), "{at:?} and {shown:?}");
+        assert!(clock.at(before - Duration::from_secs(1)).is_none(), "before it began");
+        assert!(clock.wall(Instant::ZERO) <= tokio::time::Instant::now(), "a time that has passed");
     }
 }

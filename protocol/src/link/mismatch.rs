@@ -1,9 +1,10 @@
 //! Settings in which the other end differs, so that its frames are refused.
 
-use crate::wire::WIRE_VERSION;
+use crate::wire::{SessionId, WIRE_VERSION};
 use std::collections::BTreeSet;
 
-/// A setting in which the other end differs. It is found in a frame with a valid CRC or tag, apart from [`Self::Tag`].
+/// A setting in which the other end differs. It is found in a frame with a valid CRC or tag, apart from [`Self::Tag`] and
+/// [`Self::Key`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, thiserror::Error)]
 pub enum Mismatch {
     /// The other end has this wire version.
@@ -17,6 +18,11 @@ pub enum Mismatch {
         "its frames have a tag and none is expected: set the same link.key_file and link.authenticate at both ends"
     )]
     Tag,
+    /// Its hellos do not verify.
+    #[error(
+        "its hellos fit neither the key nor the mission number here: set the same link.key_file and mission.id at both ends"
+    )]
+    Key,
 }
 
 /// Reports each mismatch once, so that no stranger can fill a log with them.
@@ -28,11 +34,15 @@ pub(super) struct MismatchReport {
     reported: BTreeSet<Mismatch>,
     /// Frames with an unexpected tag, which may also be damaged frames, since the last accepted one.
     tagged: u32,
+    /// Hellos of one session that do not verify, which may also be damaged ones, since the last one that does.
+    untrue: Option<(SessionId, u32)>,
 }
 
 impl MismatchReport {
     /// Frames with an unexpected tag after which the other end is taken to write tags.
     const MIN_TAGGED: u32 = 3;
+    /// Hellos of one session after which the other end is taken to have another key or mission number.
+    const MIN_UNTRUE: u32 = 3;
 
     pub(super) fn note(&mut self, mismatch: Mismatch) {
         self.tagged += u32::from(mismatch == Mismatch::Tag);
@@ -45,8 +55,23 @@ impl MismatchReport {
         }
     }
 
+    /// A hello of a session does not verify. Noise seldom leaves the session as it was in several hellos.
+    pub(super) fn note_untrue_hello(&mut self, session: SessionId) {
+        let before = self.untrue.filter(|(of, _)| *of == session).map_or(0, |(_, count)| count);
+        self.untrue = Some((session, before + 1));
+        if before + 1 >= Self::MIN_UNTRUE {
+            self.note(Mismatch::Key);
+        }
+    }
+
+    /// A hello has verified.
+    pub(super) fn handle_true_hello(&mut self) {
+        self.untrue = None;
+        self.current.take_if(|mismatch| *mismatch == Mismatch::Key);
+    }
+
     pub(super) fn handle_accepted(&mut self) {
-        (self.tagged, self.current) = (0, None);
+        (self.tagged, self.current, self.untrue) = (0, None, None);
     }
 
     pub(super) fn current(&self) -> Option<Mismatch> {

@@ -1,13 +1,15 @@
 //! Further properties of the link, over seeds, in virtual time.
 
-use crate::pair::{LinkedEnds, LossyChannel, Setup, auv, hold, patchy, utility};
+use crate::pair::{LinkedEnds, LossyChannel, Setup, auv, hold, patchy, surface_of, utility};
 use proptest::prelude::*;
-use scenecast_protocol::link::{DropReason, Mismatch, VehicleEvent};
+use scenecast_protocol::link::{Authenticity, DropReason, Mismatch, VehicleEvent};
 use scenecast_protocol::mac::Access;
 use scenecast_protocol::map::{Cell, LabelGrid, StateSource};
 use scenecast_protocol::map_codec::Codec;
+use scenecast_protocol::seal::MissionKey;
 use scenecast_protocol::wire::{Address, Envelope, FrameBuilder, Header, MissionId, Seal, SessionId};
 use std::collections::BTreeMap;
+use std::sync::Arc;
 use std::time::Duration;
 
 const ROUGH: LossyChannel = LossyChannel {
@@ -82,6 +84,22 @@ fn hours_without_an_answer_do_not_make_the_ends_grow() {
             assert!(late * 2 < early * 3, "{access:?}, mute {mute:?}: {sizes:?}");
             let most = sizes.iter().max().unwrap();
             assert!(*most < 600_000, "{access:?}, mute {mute:?}: {most} bytes");
+        }
+    }
+}
+
+#[test]
+fn a_vehicle_names_another_key_or_mission_within_30_seconds() {
+    let common = || Setup::new(64, 10_000, Codec::Png);
+    let key = Arc::new(MissionKey::from_bytes([43; 16]));
+    let other_key = Setup { authenticity: Some(Authenticity { key, all: true, encrypt: false }), ..common() };
+    let other_mission = Setup { mission: MissionId(8), ..common() };
+    for (vehicle, surface) in [(common().keyed(true, false), other_key), (common(), other_mission)] {
+        for access in [Access::Shared, Access::ModemOwned { pool_frames: 8 }, Access::Polled, Access::FullDuplex] {
+            let mut pair = LinkedEnds::new(3, Setup { access, ..vehicle.clone() }, STILL);
+            pair.surface = surface_of(&Setup { access, ..surface.clone() }, 4, pair.now);
+            pair.run(pair.now + Duration::from_secs(30), false);
+            assert_eq!(pair.vehicle_events, [VehicleEvent::Mismatch(Mismatch::Key)], "{access:?}");
         }
     }
 }

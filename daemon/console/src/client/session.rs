@@ -2,7 +2,7 @@
 
 use super::http::Client;
 use crate::state::{MissionState, VehicleState};
-use scenecast_core::UserError;
+use scenecast_core::{UserError, printable};
 use serde::Serialize;
 use std::io::{ErrorKind, Write};
 use std::time::Duration;
@@ -49,7 +49,7 @@ impl Session {
     pub(super) fn note(&self, last: &mut String, now: String) {
         if *last != now {
             if !self.json {
-                eprintln!("{now}");
+                eprintln!("{}", printable(&now));
             }
             *last = now;
         }
@@ -60,10 +60,10 @@ pub(super) fn json(value: &impl Serialize) -> Result<String, UserError> {
     serde_json::to_string(value).map_err(|e| UserError::Failed(e.to_string()))
 }
 
-/// Writes to standard output; false if the reader has closed it.
+/// Writes a text or JSON to standard output; false if the reader has closed it.
 pub(super) fn write(text: &str) -> Result<bool, UserError> {
     let mut out = std::io::stdout().lock();
-    match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
+    match out.write_all(printable(text).as_bytes()).and_then(|()| out.flush()) {
         Ok(()) => Ok(true),
         Err(e) if e.kind() == ErrorKind::BrokenPipe => Ok(false),
         Err(e) => Err(UserError::Failed(format!("standard output: {e}"))),

@@ -74,6 +74,7 @@ impl<T> LinkPair<T> {
             None => envelope.open(&Seal::Crc(self.mission, session)),
         };
         let Some(frame) = frame else { return Err(self.refuse(envelope, session)) };
+        self.mismatch.handle_true_hello();
         let introduction = if envelope.version == WIRE_VERSION {
             let introduction = introduction_of(&frame).filter(|i| own.is_some() || i.series.is_some());
             Some(introduction.ok_or(DropReason::Malformed)?)
@@ -256,7 +257,13 @@ impl<T> LinkPair<T> {
                 DropReason::Unauthenticated
             }
             (false, false) if !kind.is_hello() && plain() => DropReason::OldSession,
-            _ => DropReason::Checksum,
+            _ => {
+                // At the surface, hellos of the vehicle to another surface do not verify.
+                if kind.is_hello() && self.us != Address::SURFACE {
+                    self.mismatch.note_untrue_hello(envelope.header.session);
+                }
+                DropReason::Checksum
+            }
         }
     }
 }

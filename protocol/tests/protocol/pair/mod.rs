@@ -27,6 +27,8 @@ pub(crate) struct LinkedEnds {
     pub(crate) audits: [Audit; 2],
     /// Slots applied at the vehicle. A run of the surface has one series, so versions must not repeat.
     pub(crate) applied: Vec<Slot>,
+    /// The settings in which the vehicle found the surface to differ.
+    pub(crate) vehicle_events: Vec<VehicleEvent>,
     /// The first events of the surface since they were last taken.
     pub(crate) surface_events: Vec<SurfaceEvent>,
     /// The status of the vehicle.
@@ -68,6 +70,7 @@ impl LinkedEnds {
             channel,
             audits: [Audit::new(window), Audit::new(window)],
             applied: Vec::new(),
+            vehicle_events: Vec::new(),
             surface_events: Vec::new(),
             status: VehicleStatus { labels: 3, ..VehicleStatus::default() },
             setup,
@@ -213,6 +216,9 @@ impl LinkedEnds {
 
     fn pump(&mut self) {
         while let Some(event) = self.vehicle.poll_event() {
+            if matches!(event, VehicleEvent::Mismatch(_)) {
+                self.vehicle_events.push(event.clone());
+            }
             if event == VehicleEvent::SurfaceMet {
                 self.durable = self.vehicle.persistent_state().clone();
             }

@@ -62,7 +62,7 @@ function lost() {
 function silent(v) {
   const every = `a frame is expected every ${span(v.expected_interval_s)}`;
   const last = v.last_received_s === null
-    ? `no frame received since the start; ${every}.`
+    ? `no frame received since the start; ${every}. If the vehicle is in range, its log says which setting differs: a key or the number of the mission.`
     : `last frame received ${span(ageOf(v.last_received_s))} ago at ${missionTime(v.last_received_s)}; ${every}.`;
   return { key: `silent-${v.id}`, kind: "warn", head: `${v.name} is silent`, body: `${last} ${contact(v)}` };
 }
