@@ -34,7 +34,8 @@ impl Surface {
     }
 }
 
-/// The last order counts until the vehicle refuses it, or it is withdrawn; then, and before the first order, the reports after that count. An
+/// The last order counts until the vehicle refuses it, or it is withdrawn; then, and before the first order, the reports
+/// after that count. An
 /// order in force and a later report that contradict each other show that somebody else has given an order.
 fn has_abort(order: Option<LastOrder>, mode: Option<LastMode>) -> Option<bool> {
     let reported_after = |time: Instant| mode.filter(|&(.., at)| at > time).and_then(|m| reported_abort(m.0, m.1));

@@ -188,7 +188,8 @@ impl Surface {
     }
 
     pub(super) fn handle_decision(&mut self, vehicle: Address, slot: SlotId, now: Instant) {
-        let refused = |s: &SlotProgress| s.id == slot && matches!(s.status, OrderStatus::Refused(_));
+        let is_void = |status| matches!(status, OrderStatus::Refused(_) | OrderStatus::Withdrawn(_));
+        let refused = |s: &SlotProgress| s.id == slot && is_void(s.status);
         let is_refused = self.link.vehicle(vehicle).is_some_and(|v| v.slots().any(refused));
         if let Some(record) = self.records.get_mut(&vehicle).filter(|_| slot == SlotId::Requests && is_refused) {
             record.exemplars.handle_refusal(now);
