@@ -9,6 +9,7 @@ use super::shared::{Shared, VehicleId};
 use crate::export::MapFormat;
 use crate::fit::Fit;
 use crate::orders::{CommandOrder, DismissOrder, DraftOrder, LabelOrder, MarkerOrder, NoteOrder, RemoveMarkerOrder};
+use crate::request::SurfaceRequest;
 use crate::state::{AcceptedOrder, CellHistory, CommandState, LogList, MapBody, MissionState, PrincipalInfo};
 use axum::extract::{Query, State};
 use axum::http::{HeaderMap, Method};
@@ -264,7 +265,7 @@ fn changes() -> Vec<Operation> {
             "set_label",
             "Sets name, colour and merging of a label in the current epoch; they stay at the surface",
             schema::<LabelOrder>,
-            || post(orders::label),
+            || orders::to_vehicle(SurfaceRequest::Label),
         ),
         change(
             "/api/v2/vehicles/{id}/draft",
@@ -292,14 +293,14 @@ fn changes() -> Vec<Operation> {
             "remove_marker",
             "Removes a marker from the map",
             schema::<RemoveMarkerOrder>,
-            || post(orders::remove_marker),
+            || orders::to_vehicle(SurfaceRequest::RemoveMarker),
         ),
         change(
             "/api/v2/vehicles/{id}/earlier-map/dismiss",
             "dismiss_earlier_map",
             "Shows the current map in place of that of an earlier run, although it has fewer cells",
             schema::<DismissOrder>,
-            || post(orders::dismiss),
+            || orders::to_vehicle(|id, DismissOrder {}| SurfaceRequest::DismissEarlierMap(id)),
         ),
     ]
 }

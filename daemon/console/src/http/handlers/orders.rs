@@ -3,19 +3,30 @@
 use crate::http::body::JsonOrder;
 use crate::http::response::error;
 use crate::http::shared::{Shared, VehicleId};
-use crate::order_changes::OrderChanges;
-use crate::orders::{
-    AgainOrder, BudgetOrder, ConstraintsOrder, DismissOrder, DraftOrder, ExemplarOrder, LabelOrder, MarkerOrder,
-    NoteOrder, RemoveMarkerOrder, RestoreOrder, TakeOverOrder, UtilityOrder,
-};
+use crate::orders::{AgainOrder, BudgetOrder, DraftOrder, MarkerOrder, NoteOrder, UtilityOrder};
 use crate::request::SurfaceRequest;
 use axum::Extension;
 use axum::extract::State;
 use axum::http::StatusCode;
 use axum::response::Response;
+use axum::routing::{MethodRouter, post};
 use scenecast_protocol::directive::SlotId;
-use scenecast_surface::{AreasOrder, DestinationOrder, FenceOrder, LimitsOrder, Principal, SettingsOrder};
+use scenecast_surface::Principal;
+use serde::de::DeserializeOwned;
 use std::collections::BTreeMap;
+
+/// A route that hands the surface the request that an order to a vehicle makes.
+pub(in crate::http) fn to_vehicle<T>(request: fn(u8, T) -> SurfaceRequest) -> MethodRouter<Shared>
+where
+    T: DeserializeOwned + Send + 'static,
+{
+    post(
+        move |State(shared): State<Shared>,
+              Extension(principal): Extension<Principal>,
+              VehicleId(id): VehicleId,
+              JsonOrder(order): JsonOrder<T>| async move { shared.order(principal, request(id, order)).await },
+    )
+}
 
 pub(in crate::http) async fn utility(
     State(shared): State<Shared>,
@@ -54,69 +65,6 @@ fn by_label(weights: BTreeMap<String, f64>) -> Result<BTreeMap<u8, f64>, String>
     weights.into_iter().map(number).collect()
 }
 
-pub(in crate::http) async fn exemplar(
-    State(shared): State<Shared>,
-    Extension(principal): Extension<Principal>,
-    VehicleId(id): VehicleId,
-    JsonOrder(order): JsonOrder<ExemplarOrder>,
-) -> Response {
-    shared.order(principal, SurfaceRequest::ExemplarOrder(id, order)).await
-}
-
-pub(in crate::http) async fn constraints(
-    State(shared): State<Shared>,
-    Extension(principal): Extension<Principal>,
-    VehicleId(id): VehicleId,
-    JsonOrder(order): JsonOrder<ConstraintsOrder>,
-) -> Response {
-    shared.order(principal, SurfaceRequest::Constraints(id, order.action.into())).await
-}
-
-pub(in crate::http) async fn fence(
-    State(shared): State<Shared>,
-    Extension(principal): Extension<Principal>,
-    VehicleId(id): VehicleId,
-    JsonOrder(order): JsonOrder<OrderChanges<FenceOrder>>,
-) -> Response {
-    shared.order(principal, SurfaceRequest::Fence(id, order)).await
-}
-
-pub(in crate::http) async fn limits(
-    State(shared): State<Shared>,
-    Extension(principal): Extension<Principal>,
-    VehicleId(id): VehicleId,
-    JsonOrder(order): JsonOrder<OrderChanges<LimitsOrder>>,
-) -> Response {
-    shared.order(principal, SurfaceRequest::Limits(id, order)).await
-}
-
-pub(in crate::http) async fn areas(
-    State(shared): State<Shared>,
-    Extension(principal): Extension<Principal>,
-    VehicleId(id): VehicleId,
-    JsonOrder(order): JsonOrder<AreasOrder>,
-) -> Response {
-    shared.order(principal, SurfaceRequest::Areas(id, order)).await
-}
-
-pub(in crate::http) async fn destination(
-    State(shared): State<Shared>,
-    Extension(principal): Extension<Principal>,
-    VehicleId(id): VehicleId,
-    JsonOrder(order): JsonOrder<DestinationOrder>,
-) -> Response {
-    shared.order(principal, SurfaceRequest::Destination(id, order)).await
-}
-
-pub(in crate::http) async fn settings(
-    State(shared): State<Shared>,
-    Extension(principal): Extension<Principal>,
-    VehicleId(id): VehicleId,
-    JsonOrder(order): JsonOrder<SettingsOrder>,
-) -> Response {
-    shared.order(principal, SurfaceRequest::Settings(id, order)).await
-}
-
 pub(in crate::http) async fn budget(
     State(shared): State<Shared>,
     Extension(principal): Extension<Principal>,
@@ -138,33 +86,6 @@ pub(in crate::http) async fn again(
     shared.order(principal, SurfaceRequest::Again(id, slot)).await
 }
 
-pub(in crate::http) async fn restore(
-    State(shared): State<Shared>,
-    Extension(principal): Extension<Principal>,
-    VehicleId(id): VehicleId,
-    JsonOrder(RestoreOrder {}): JsonOrder<RestoreOrder>,
-) -> Response {
-    shared.order(principal, SurfaceRequest::Restore(id)).await
-}
-
-pub(in crate::http) async fn take_over(
-    State(shared): State<Shared>,
-    Extension(principal): Extension<Principal>,
-    VehicleId(id): VehicleId,
-    JsonOrder(TakeOverOrder {}): JsonOrder<TakeOverOrder>,
-) -> Response {
-    shared.order(principal, SurfaceRequest::TakeOver(id)).await
-}
-
-pub(in crate::http) async fn label(
-    State(shared): State<Shared>,
-    Extension(principal): Extension<Principal>,
-    VehicleId(id): VehicleId,
-    JsonOrder(order): JsonOrder<LabelOrder>,
-) -> Response {
-    shared.order(principal, SurfaceRequest::Label(id, order)).await
-}
-
 pub(in crate::http) async fn note(
     State(shared): State<Shared>,
     Extension(principal): Extension<Principal>,
@@ -183,22 +104,4 @@ pub(in crate::http) async fn marker(
 ) -> Response {
     let author = principal.name().to_owned();
     shared.order(principal, SurfaceRequest::Marker(id, author, order)).await
-}
-
-pub(in crate::http) async fn remove_marker(
-    State(shared): State<Shared>,
-    Extension(principal): Extension<Principal>,
-    VehicleId(id): VehicleId,
-    JsonOrder(order): JsonOrder<RemoveMarkerOrder>,
-) -> Response {
-    shared.order(principal, SurfaceRequest::RemoveMarker(id, order)).await
-}
-
-pub(in crate::http) async fn dismiss(
-    State(shared): State<Shared>,
-    Extension(principal): Extension<Principal>,
-    VehicleId(id): VehicleId,
-    JsonOrder(DismissOrder {}): JsonOrder<DismissOrder>,
-) -> Response {
-    shared.order(principal, SurfaceRequest::DismissEarlierMap(id)).await
 }

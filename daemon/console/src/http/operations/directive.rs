@@ -5,6 +5,7 @@ use crate::http::handlers::orders as handlers;
 use crate::orders::{
     AgainOrder, BudgetOrder, ConstraintsOrder, ExemplarOrder, RestoreOrder, TakeOverOrder, UtilityOrder,
 };
+use crate::request::SurfaceRequest;
 use axum::routing::post;
 use scenecast_surface::{AreasOrder, DestinationOrder, FenceOrder, LimitsOrder, Role, SettingsOrder};
 
@@ -24,7 +25,7 @@ pub(super) fn operations() -> Vec<Operation> {
             "Requests an image of a label: first the best, then another or a larger one; or cancels the request. At most 8 \
              requests are pending at a time.",
             schema::<ExemplarOrder>,
-            || post(handlers::exemplar),
+            || handlers::to_vehicle(SurfaceRequest::ExemplarOrder),
         ),
         order(
             "/api/v2/vehicles/{id}/constraints",
@@ -32,7 +33,7 @@ pub(super) fn operations() -> Vec<Operation> {
             "Orders the vehicle to hold, to abort, or to resume its survey; each ends the one before it. A hold and an abort do \
              not need command.",
             schema::<ConstraintsOrder>,
-            || post(handlers::constraints),
+            || handlers::to_vehicle(|id, order: ConstraintsOrder| SurfaceRequest::Constraints(id, order.action.into())),
         ),
         order(
             "/api/v2/vehicles/{id}/fence",
@@ -43,7 +44,7 @@ pub(super) fn operations() -> Vec<Operation> {
              keep-out around the whole fence, a return point where the vehicle must not be, more than fits a frame. The \
              vehicle refuses a fence that it is outside of.",
             schema::<FenceOrder>,
-            || post(handlers::fence),
+            || handlers::to_vehicle(SurfaceRequest::Fence),
         ),
         order(
             "/api/v2/vehicles/{id}/limits",
@@ -51,7 +52,7 @@ pub(super) fn operations() -> Vec<Operation> {
             "Changes limits. A member that is absent stays as it is, and null removes it; without knowledge of the present \
              limits, all must be named. Reactions are hold, return or surface. The vehicle refuses a band that it is outside of.",
             schema::<LimitsOrder>,
-            || post(handlers::limits),
+            || handlers::to_vehicle(SurfaceRequest::Limits),
         ),
         order(
             "/api/v2/vehicles/{id}/areas",
@@ -60,7 +61,7 @@ pub(super) fn operations() -> Vec<Operation> {
              to 1 that its cells have in addition to that of their label. Refused: edges that cross or touch, no area, more \
              than fits a frame.",
             schema::<AreasOrder>,
-            || post(handlers::areas),
+            || handlers::to_vehicle(SurfaceRequest::Areas),
         ),
         order(
             "/api/v2/vehicles/{id}/destination",
@@ -68,7 +69,7 @@ pub(super) fn operations() -> Vec<Operation> {
             "Sends the vehicle to a place in the world frame at once; there it resumes its survey. Null withdraws the order. The \
              vehicle refuses a place that the fence does not allow, or to which no allowed path leads.",
             schema::<DestinationOrder>,
-            || post(handlers::destination),
+            || handlers::to_vehicle(SurfaceRequest::Destination),
         ),
         order(
             "/api/v2/vehicles/{id}/orders/again",
@@ -82,7 +83,7 @@ pub(super) fn operations() -> Vec<Operation> {
             "restore_orders",
             "Sends every order that the vehicle has lost again, as new ones, except one to resume",
             schema::<RestoreOrder>,
-            || post(handlers::restore),
+            || handlers::to_vehicle(|id, RestoreOrder {}| SurfaceRequest::Restore(id)),
         ),
         change(
             "/api/v2/vehicles/{id}/take-over",
@@ -90,7 +91,7 @@ pub(super) fn operations() -> Vec<Operation> {
             "Takes the vehicle over from another surface with the same key: an administrator at any time, an operator after \
              that surface was silent for 120 s",
             schema::<TakeOverOrder>,
-            || post(handlers::take_over),
+            || handlers::to_vehicle(|id, TakeOverOrder {}| SurfaceRequest::TakeOver(id)),
         ),
         Operation {
             role: Some(Role::Administrator),
@@ -101,7 +102,7 @@ pub(super) fn operations() -> Vec<Operation> {
              missing or null leaves the setting unchanged; 0 or an empty text sets it as configured on the vehicle. Labels \
              keep their meaning.",
                 schema::<SettingsOrder>,
-                || post(handlers::settings),
+                || handlers::to_vehicle(SurfaceRequest::Settings),
             )
         },
         order(
