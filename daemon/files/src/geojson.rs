@@ -1,6 +1,7 @@
 //! Reads a fence, or weighted areas, from a GeoJSON file (RFC 7946).
 
-use scenecast_core::{LatLon, MAX_DISTANCE_M, TangentPlane, UserError};
+use scenecast_core::{LatLon, MAX_DISTANCE_M, TangentPlane, UserError, fence_of};
+use scenecast_protocol::directive::Fence;
 use serde_json::Value;
 use std::path::Path;
 
@@ -12,6 +13,13 @@ pub struct FenceShapes {
     pub fence: Option<Vec<[f64; 2]>>,
     pub keep_outs: Vec<Vec<[f64; 2]>>,
     pub return_point: Option<[f64; 2]>,
+}
+
+impl FenceShapes {
+    /// The fence as an order has it. The error is one line that names the allowed values.
+    pub fn to_fence(&self) -> Result<Fence, String> {
+        fence_of(self.fence.as_deref(), &self.keep_outs, self.return_point)
+    }
 }
 
 /// A weighted area of a file, in metres east and north of the mission's origin.
@@ -40,7 +48,8 @@ enum FeatureRole {
 
 /// Reads fence, keep-outs and return point.
 pub fn read_fence(file: &Path, frame: CoordinateFrame) -> Result<FenceShapes, UserError> {
-    fence_of(&read_json(file)?, frame).map_err(|line| UserError::file(file, line))
+    let shapes = shapes_of(&read_json(file)?, frame);
+    shapes.and_then(|shapes| shapes.to_fence().map(|_| shapes)).map_err(|line| UserError::file(file, line))
 }
 
 /// Reads weighted areas: polygons with the property `weight`.
@@ -77,7 +86,7 @@ fn read_json(file: &Path) -> Result<Value, UserError> {
     serde_json::from_slice(&text).map_err(|e| UserError::file(file, format!("it is not JSON: {e}")))
 }
 
-fn fence_of(whole: &Value, frame: CoordinateFrame) -> Result<FenceShapes, String> {
+fn shapes_of(whole: &Value, frame: CoordinateFrame) -> Result<FenceShapes, String> {
     let mut order = FenceShapes::default();
     match whole["type"].as_str() {
         Some("FeatureCollection") => {
@@ -192,7 +201,7 @@ mod tests {
     use super::*;
 
     fn read(json: &str, frame: CoordinateFrame) -> Result<FenceShapes, String> {
-        fence_of(&serde_json::from_str(json).unwrap(), frame)
+        shapes_of(&serde_json::from_str(json).unwrap(), frame)
     }
 
     const SQUARE: &str = r#"{"type": "Polygon", "coordinates": [[[0, 0], [90, 0], [90, 60], [0, 60], [0, 0]]]}"#;

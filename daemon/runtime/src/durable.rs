@@ -4,9 +4,8 @@ use super::checkpoint;
 use super::journal::{Damage, Found, Journal, JournalNames, Storage};
 use scenecast_config::{Config, StartMode};
 use scenecast_core::{TangentPlane, UserError};
-use scenecast_files::{CoordinateFrame, FenceShapes, read_fence};
-use scenecast_protocol::coordinates::{DecimetrePoint, WorldPoint};
-use scenecast_protocol::directive::{Fence, Polygon};
+use scenecast_files::{CoordinateFrame, read_fence};
+use scenecast_protocol::directive::Fence;
 use scenecast_vehicle::{Durable, LastPlace, LostOrders};
 use std::path::Path;
 
@@ -52,17 +51,7 @@ fn configured_fence(file: &Path, config: &Config) -> Result<Fence, UserError> {
         None => CoordinateFrame::Metres,
     };
     let error = |line: String| UserError::Input(format!("survey.fence_file = {}: {line}", file.display()));
-    let FenceShapes { fence, keep_outs, return_point } = read_fence(file, frame)?;
-    let place = |at: [f64; 2]| {
-        DecimetrePoint::nearest(WorldPoint::new(at[0], at[1])).ok_or_else(|| error(format!("{at:?} is out of range")))
-    };
-    let outline = |corners: Vec<[f64; 2]>| corners.into_iter().map(place).collect::<Result<_, _>>().map(Polygon);
-    let fence = Fence {
-        fence: fence.map(outline).transpose()?,
-        keep_outs: keep_outs.into_iter().map(outline).collect::<Result<_, _>>()?,
-        return_point: return_point.map(place).transpose()?,
-    };
-    fence.check().map_err(|fault| error(fault.to_string()))?;
+    let fence = read_fence(file, frame)?.to_fence().map_err(error)?;
     match fence.fence {
         Some(_) => Ok(fence),
         None => Err(error("it has no fence".to_owned())),
@@ -172,7 +161,8 @@ fn decode(state: &[u8]) -> Option<Durable> {
 mod tests {
     use super::super::journal::disk::{Disk, DiskRefusal};
     use super::*;
-    use scenecast_protocol::directive::Series;
+    use scenecast_protocol::coordinates::DecimetrePoint;
+    use scenecast_protocol::directive::{Polygon, Series};
     use scenecast_protocol::link::{SeriesRecord, SlotInboxState};
 
     const NAMES: [&str; 2] = [JOURNAL.journal, JOURNAL.copy];

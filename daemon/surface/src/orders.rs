@@ -1,7 +1,7 @@
 //! Fences, limits, weighted areas and destinations as the operator types them. Every error is one line that names the allowed values.
 
-use scenecast_core::MAX_DISTANCE_M;
-use scenecast_protocol::coordinates::{DecimetrePoint, WorldPoint};
+use scenecast_core::{fence_of, outline_of, place_of};
+use scenecast_protocol::coordinates::DecimetrePoint;
 use scenecast_protocol::directive::{
     Areas, Band, Constraints, Destination, Fence, Limits, Polygon, Reaction, Slot, WeightedArea,
 };
@@ -140,13 +140,7 @@ impl From<&Limits> for LimitsOrder {
 impl FenceOrder {
     /// Converts the order into the content of the slot. The error is one line for the operator.
     pub fn read(&self) -> Result<Fence, String> {
-        let fence = Fence {
-            fence: self.fence.as_deref().map(|v| outline("fence", v)).transpose()?,
-            keep_outs: self.keep_outs.iter().map(|v| outline("keep_outs", v)).collect::<Result<_, _>>()?,
-            return_point: self.return_point.map(|p| place("return_point", p)).transpose()?,
-        };
-        fence.check().map_err(|fault| fault.to_string())?;
-        Ok(fence)
+        fence_of(self.fence.as_deref(), &self.keep_outs, self.return_point)
     }
 }
 
@@ -157,7 +151,7 @@ impl AreasOrder {
             let is_allowed = (-1.0..=1.0).contains(&order.weight);
             let weight = is_allowed.then_some((order.weight * 100.0).round() as i8);
             let refusal = || format!("area {number}: weight {} is not within -1 to 1", order.weight);
-            let outline = outline(&format!("area {number}"), &order.outline)?;
+            let outline = outline_of(&format!("area {number}"), &order.outline)?;
             Ok(WeightedArea { outline, weight: weight.ok_or_else(refusal)? })
         };
         let areas = Areas((1..).zip(&self.areas).map(area).collect::<Result<_, String>>()?);
@@ -169,7 +163,7 @@ impl AreasOrder {
 impl DestinationOrder {
     /// Converts the order into the content of the slot. The error is one line for the operator.
     pub fn read(&self) -> Result<Destination, String> {
-        Ok(Destination { place: self.place.map(|p| place("place", p)).transpose()? })
+        Ok(Destination { place: self.place.map(|p| place_of("place", p)).transpose()? })
     }
 }
 
@@ -199,16 +193,6 @@ pub fn order_name(order: &Slot) -> &'static str {
         Slot::Constraints(_) => "resume",
         other => other.id().name(),
     }
-}
-
-fn outline(what: &str, vertices: &[[f64; 2]]) -> Result<Polygon, String> {
-    vertices.iter().map(|&v| place(what, v)).collect::<Result<_, _>>().map(Polygon)
-}
-
-fn place(what: &str, [x, y]: [f64; 2]) -> Result<DecimetrePoint, String> {
-    let far = || format!("{what}: [{x}, {y}] is no place within 100 km of the mission's origin");
-    let near = Some(WorldPoint::new(x, y)).filter(|_| x.hypot(y) <= MAX_DISTANCE_M);
-    near.and_then(DecimetrePoint::nearest).ok_or_else(far)
 }
 
 fn band(what: &str, [low, high]: [f64; 2]) -> Result<Band, String> {

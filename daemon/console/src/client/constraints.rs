@@ -47,7 +47,6 @@ pub async fn set_fence(session: &Session, file: FenceFile<'_>) -> Result<(), Use
     let frame = if file.in_metres { CoordinateFrame::Metres } else { degrees(&state)? };
     let FenceShapes { fence, keep_outs, return_point } = read_fence(file.path, frame)?;
     let order = FenceOrder { fence, keep_outs, return_point };
-    order.read().map_err(|line| UserError::file(file.path, line))?;
     if order.fence.is_none() && !file.without_fence {
         let line = "it has no fence, and an order replaces the present one; --without-fence removes it on purpose";
         return Err(UserError::file(file.path, line));
@@ -101,16 +100,19 @@ pub async fn give_again(session: &Session, slot: String) -> Result<(), UserError
 
 /// Sends the orders again that the vehicle has lost.
 pub async fn restore_orders(session: &Session) -> Result<(), UserError> {
-    let state = session.state().await?;
-    let path = format!("/api/v2/vehicles/{}/orders/restore", session.choose(&state)?.id);
-    session.client.send_order(&path, &RestoreOrder {}).await
+    ask_surface(session, "orders/restore", &RestoreOrder {}).await
 }
 
 /// Takes the vehicle over from another surface.
 pub async fn take_over(session: &Session) -> Result<(), UserError> {
+    ask_surface(session, "take-over", &TakeOverOrder {}).await
+}
+
+/// Has the surface do something with the vehicle at once, which no version follows.
+async fn ask_surface(session: &Session, resource: &str, order: &impl Serialize) -> Result<(), UserError> {
     let state = session.state().await?;
-    let path = format!("/api/v2/vehicles/{}/take-over", session.choose(&state)?.id);
-    session.client.send_order(&path, &TakeOverOrder {}).await
+    let path = format!("/api/v2/vehicles/{}/{resource}", session.choose(&state)?.id);
+    session.client.send_order(&path, order).await
 }
 
 pub(super) async fn send(
