@@ -103,7 +103,7 @@ impl SurfaceRequest {
             | Self::Marker(..)
             | Self::RemoveMarker(..)
             | Self::DismissEarlierMap(_) => Some(OrderKind::Record),
-            Self::Constraints(_, order) if order.hold || order.abort => Some(OrderKind::Stop),
+            Self::Constraints(_, order) if order.stops() => Some(OrderKind::Stop),
             Self::Hold(_, true) => Some(OrderKind::Stop),
             Self::Utility(..)
             | Self::ExemplarOrder(..)

@@ -16,6 +16,11 @@ pub struct Constraints {
 }
 
 impl Constraints {
+    /// Whether it stops the vehicle: a hold or an abort. Otherwise it only lifts one.
+    pub fn stops(self) -> bool {
+        self.hold || self.abort
+    }
+
     pub(super) fn encode(&self, out: &mut Vec<u8>) {
         out.push(u8::from(self.hold) << 7 | u8::from(self.abort) << 6);
     }

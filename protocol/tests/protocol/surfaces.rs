@@ -99,6 +99,14 @@ impl Waters {
         waters
     }
 
+    /// The first surface holds the vehicle, and no other one is in reach.
+    fn held_by_first(seed: u64, access: Access) -> Self {
+        let mut waters = Self::new(seed, access);
+        waters.is_away = [false, true, true];
+        waters.run(Duration::from_secs(60));
+        waters
+    }
+
     fn draw(&mut self) -> u64 {
         self.random = self.random.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
         self.random >> 16
@@ -258,7 +266,7 @@ impl Waters {
         let order = Applied { given, slot };
         let of_kind = self.applied.iter().filter(|before| before.slot.id() == order.slot.id());
         if let Some(newer) = of_kind.filter(|before| before.given > given).max_by_key(|before| before.given) {
-            let stops = matches!(order.slot, Slot::Constraints(c) if c.hold || c.abort);
+            let stops = matches!(order.slot, Slot::Constraints(c) if c.stops());
             if !stops || self.now.since(given) > PROMPT + Duration::from_secs(10) {
                 self.regressions.push((newer.clone(), order.clone()));
             }
@@ -284,9 +292,7 @@ const ACCESSES: [Access; 3] = [Access::Shared, Access::ModemOwned { pool_frames:
 #[test]
 fn a_second_surface_is_refused_by_name_and_takes_the_vehicle_over() {
     for access in ACCESSES {
-        let mut waters = Waters::new(1, access);
-        waters.is_away = [false, true, true];
-        waters.run(Duration::from_secs(60));
+        let mut waters = Waters::held_by_first(1, access);
         waters.is_away = [false, false, true];
         waters.run(Duration::from_secs(90));
         assert_eq!(waters.holder_name(1), Some(first_series(0)), "{access:?}");
@@ -317,9 +323,7 @@ fn a_second_surface_is_refused_by_name_and_takes_the_vehicle_over() {
 fn a_hold_of_any_surface_is_applied_within_seconds() {
     for access in ACCESSES {
         for seed in 0..20 {
-            let mut waters = Waters::new(seed, access);
-            waters.is_away = [false, true, true];
-            waters.run(Duration::from_secs(60));
+            let mut waters = Waters::held_by_first(seed, access);
             waters.is_away = [false, false, true];
             waters.run(Duration::from_secs(60 + seed));
             assert_eq!(waters.holder_name(1), Some(first_series(0)), "{access:?}");
@@ -337,9 +341,7 @@ fn a_hold_of_any_surface_is_applied_within_seconds() {
 #[test]
 fn an_order_that_another_surface_has_overtaken_is_withdrawn() {
     for access in ACCESSES {
-        let mut waters = Waters::new(3, access);
-        waters.is_away = [false, true, true];
-        waters.run(Duration::from_secs(60));
+        let mut waters = Waters::held_by_first(3, access);
         waters.is_away = [true; 3];
         waters.give(0, limits(1));
         waters.run(Duration::from_secs(130));

@@ -163,7 +163,7 @@ impl<S: StateSource> VehicleLink<S> {
         let (Some(series), Ok(mut slot)) = (series, VersionedSlot::decode(payload)) else {
             return self.pair.stats.drop(DropReason::Malformed);
         };
-        let stops = matches!(slot.content, Some(Slot::Constraints(order)) if order.hold || order.abort);
+        let stops = matches!(slot.content, Some(Slot::Constraints(order)) if order.stops());
         // Without a key, the order of another surface may be forged.
         let is_told = self.content.is_told.get(slot.id.index()) == Some(&true) || !self.pair.is_authentic();
         match self.inbox.admit(series, &slot, is_told || stops) {

@@ -162,7 +162,7 @@ impl<R: StateReplica> VehiclePeer<R> {
 
     /// Issues a new version of a slot; returns the version.
     pub(super) fn issue(&mut self, slot: Slot, now: Instant) -> u16 {
-        let stops = matches!(slot, Slot::Constraints(order) if order.hold || order.abort);
+        let stops = matches!(slot, Slot::Constraints(order) if order.stops());
         if stops && self.rivals.holder().is_some() {
             // A hold or an abort of any surface is obeyed at once.
             self.take_over(now);
