@@ -219,7 +219,7 @@ pub fn state(port: u16) -> Option<serde_json::Value> {
 
 /// Whether this machine cannot show the page in a browser; then the test is skipped.
 pub fn lacks_browser() -> bool {
-    let chromium = std::env::var("CHROMIUM").unwrap_or_else(|_| "/usr/bin/chromium".to_owned());
+    let chromium = std::env::var("CHROMIUM").unwrap_or_else(|_| "/usr/bin/chromium-headless-shell".to_owned());
     let packages = workspace().join("tests/browser/node_modules/playwright-core");
     let missing = match () {
         () if !Path::new(&chromium).exists() => format!("no browser at {chromium}"),

@@ -22,9 +22,10 @@ const IO_CRATES: [&str; 14] = [
 ];
 
 /// Crates that do no IO.
-const SANS_IO: [&str; 16] = [
+const SANS_IO: [&str; 17] = [
     "scenecast-core",
     "scenecast-drivers",
+    "scenecast-fourier",
     "scenecast-host",
     "scenecast-labels",
     "scenecast-messages",

@@ -10,7 +10,6 @@ mod compass;
 mod consensus;
 mod correlate;
 mod evidence;
-mod fft;
 mod flat_field;
 mod graph;
 #[cfg(test)]

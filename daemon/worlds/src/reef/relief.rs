@@ -23,13 +23,17 @@ impl TiledNoise {
     }
 
     /// The value at a place given in shares of the period.
+    #[inline]
     pub(super) fn at(&self, x: f32, y: f32) -> f32 {
         let (x, y) = (x * self.cells as f32, y * self.cells as f32);
         let (left, low) = (floor(x), floor(y));
         let (fx, fy) = (x - left as f32, y - low as f32);
-        let corner = |i: i32, j: i32| {
-            let wrap = |c: i32| c.rem_euclid(self.cells as i32) as usize;
-            let g = self.gradients[wrap(low + j) * self.cells + wrap(left + i)];
+        let wrapped = |c: i32| c.rem_euclid(self.cells as i32) as usize;
+        let next = |c: usize| if c + 1 == self.cells { 0 } else { c + 1 };
+        let (column, row) = (wrapped(left), wrapped(low));
+        let (columns, rows) = ([column, next(column)], [row, next(row)]);
+        let corner = |i: usize, j: usize| {
+            let g = self.gradients[rows[j] * self.cells + columns[i]];
             g[0] * (fx - i as f32) + g[1] * (fy - j as f32)
         };
         let (sx, sy) = (ramp(0.0, 1.0, fx), ramp(0.0, 1.0, fy));

@@ -244,20 +244,32 @@ pub(super) fn maze(side: usize, texel_m: f32, key: u64) -> Texture {
 /// The mean over periodic squares of a radius, taken twice so that it is nearly round.
 pub(super) fn blurred(field: &[f32], side: usize, radius: usize) -> Vec<f32> {
     let share = 1.0 / (2 * radius + 1) as f32;
-    let mut result = field.to_vec();
-    let mut line = vec![0.0; side];
-    for pass in 0..4 {
-        let (step, next) = if pass % 2 == 0 { (1, side) } else { (side, 1) };
-        for number in 0..side {
-            let place = |i: usize| number * next + (i & (side - 1)) * step;
-            (0..side).for_each(|i| line[i] = result[place(i)]);
-            let get = |i: usize| line[i & (side - 1)];
+    let mask = side - 1;
+    let (mut from, mut to) = (field.to_vec(), vec![0.0; field.len()]);
+    for _ in 0..2 {
+        for (line, out) in from.chunks_exact(side).zip(to.chunks_exact_mut(side)) {
+            let get = |i: usize| line[i & mask];
             let mut sum: f32 = (0..=2 * radius).map(|i| get(i + side - radius)).sum();
-            for i in 0..side {
-                result[place(i)] = sum * share;
+            for (i, out) in out.iter_mut().enumerate() {
+                *out = sum * share;
                 sum += get(i + radius + 1) - get(i + side - radius);
             }
         }
+        std::mem::swap(&mut from, &mut to);
+        // All columns at once, since their values lie far apart.
+        let line = |j: usize| &from[(j & mask) * side..][..side];
+        let mut sums = vec![0.0f32; side];
+        for j in 0..=2 * radius {
+            sums.iter_mut().zip(line(j + side - radius)).for_each(|(sum, value)| *sum += value);
+        }
+        for (j, out) in to.chunks_exact_mut(side).enumerate() {
+            let (enters, leaves) = (line(j + radius + 1), line(j + side - radius));
+            for (((out, sum), enters), leaves) in out.iter_mut().zip(&mut sums).zip(enters).zip(leaves) {
+                *out = *sum * share;
+                *sum += enters - leaves;
+            }
+        }
+        std::mem::swap(&mut from, &mut to);
     }
-    result
+    from
 }

@@ -1,11 +1,13 @@
 //! Fourier transforms of planes.
+//!
+//! A crate of its own: the transforms are generic code that takes a minute of the processor to compile, once in each crate that names them.
 
-use rustfft::num_complex::Complex32;
+pub use rustfft::num_complex::Complex32;
 use rustfft::{Fft, FftPlanner};
 use std::sync::Arc;
 
 /// Transforms of planes of one size. Spectra have columns as rows, which saves two transpositions.
-pub(crate) struct PlaneFft {
+pub struct PlaneFft {
     columns: usize,
     rows: usize,
     /// Along rows and along columns.
@@ -16,7 +18,9 @@ pub(crate) struct PlaneFft {
 }
 
 impl PlaneFft {
-    pub(crate) fn new(columns: usize, rows: usize) -> Self {
+    /// Transforms of planes of `columns` x `rows`, at least one each.
+    #[must_use]
+    pub fn new(columns: usize, rows: usize) -> Self {
         let mut planner = FftPlanner::new();
         let forward = [planner.plan_fft_forward(columns), planner.plan_fft_forward(rows)];
         let inverse = [planner.plan_fft_inverse(columns), planner.plan_fft_inverse(rows)];
@@ -25,16 +29,18 @@ impl PlaneFft {
         Self { columns, rows, forward, inverse, scratch: vec![zero; scratch], turned: vec![zero; columns * rows] }
     }
 
-    pub(crate) fn columns(&self) -> usize {
+    #[must_use]
+    pub fn columns(&self) -> usize {
         self.columns
     }
 
-    pub(crate) fn rows(&self) -> usize {
+    #[must_use]
+    pub fn rows(&self) -> usize {
         self.rows
     }
 
     /// Replaces a plane by its spectrum.
-    pub(crate) fn transform(&mut self, plane: &mut [Complex32]) {
+    pub fn transform(&mut self, plane: &mut [Complex32]) {
         self.forward[0].process_with_scratch(plane, &mut self.scratch);
         transpose(plane, &mut self.turned, self.columns);
         self.forward[1].process_with_scratch(&mut self.turned, &mut self.scratch);
@@ -42,7 +48,7 @@ impl PlaneFft {
     }
 
     /// Replaces a spectrum by its plane, times the number of pixels.
-    pub(crate) fn restore(&mut self, spectrum: &mut [Complex32]) {
+    pub fn restore(&mut self, spectrum: &mut [Complex32]) {
         self.inverse[1].process_with_scratch(spectrum, &mut self.scratch);
         transpose(spectrum, &mut self.turned, self.rows);
         self.inverse[0].process_with_scratch(&mut self.turned, &mut self.scratch);
@@ -50,7 +56,8 @@ impl PlaneFft {
     }
 
     /// The spectra of the real and the imaginary part of a plane, from the spectrum of the plane.
-    pub(crate) fn separated(&self, spectrum: &[Complex32]) -> [Vec<Complex32>; 2] {
+    #[must_use]
+    pub fn separated(&self, spectrum: &[Complex32]) -> [Vec<Complex32>; 2] {
         let (columns, rows) = (self.columns, self.rows);
         let mut parts = [Vec::with_capacity(spectrum.len()), Vec::with_capacity(spectrum.len())];
         for u in 0..columns {
@@ -75,29 +82,6 @@ fn transpose(from: &[Complex32], to: &mut [Complex32], columns: usize) {
                 for column in left..(left + 16).min(columns) {
                     to[column * rows + row] = from[row * columns + column];
                 }
-            }
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn two_real_planes_share_a_transform() {
-        let mut fft = PlaneFft::new(48, 32);
-        let value = |i: usize, k: usize| ((i * k + i / 5) % 17) as f32 - 8.0;
-        let both: Vec<Complex32> = (0..48 * 32).map(|i| Complex32::new(value(i, 7), value(i, 3))).collect();
-        let mut spectrum = both.clone();
-        fft.transform(&mut spectrum);
-        for (part, k) in fft.separated(&spectrum).iter_mut().zip([7, 3]) {
-            fft.restore(part);
-            for (i, number) in part.iter().enumerate() {
-                assert!(
-                    (number.re / (48.0 * 32.0) - value(i, k)).abs() < 1e-3 && number.im.abs() < 1.0,
-                    "{i}: {number}"
-                );
             }
         }
     }
