@@ -3,8 +3,8 @@
 use super::smooth::{Coordinates, squared_distance};
 use nalgebra::{DMatrix, SymmetricEigen};
 
-/// Passes of k-means over all cells: at the end, after a merge or a birth, and within a split.
-const PASSES: [usize; 3] = [30, 4, 10];
+/// Passes of k-means over all cells: at the end, after a merge or a birth, within a split, and over a map that has grown.
+const PASSES: [usize; 4] = [30, 4, 10, 1];
 /// Bound of the search for eigenvectors, which needs about three rotations an axis.
 const MAX_ROTATIONS: usize = 1000;
 
@@ -59,7 +59,7 @@ impl Clusters {
 
     /// The clusters of a map that has grown since `centres` were found: those that still hold cells, with merges and births.
     pub(crate) fn continued(cells: &Coordinates, centres: Vec<Vec<f32>>, rule: &Rule) -> Self {
-        let mut found = Self::refined(cells, centres, PASSES[1]);
+        let mut found = Self::refined(cells, centres, PASSES[3]);
         found.merge(cells, MERGED_GAP * rule.gap, rule.most);
         while found.centres.len() < rule.most {
             let Some(centres) = found.with_a_birth(cells, rule) else { break };

@@ -3,7 +3,8 @@
 //! The topics of the model follow the words that happened to come first: one habitat has several, depending on when it was seen. A habitat
 //! depends on neither order nor seed. Each frame is measured by itself ([`measure`]); a cell has the mean over its sights; measures are
 //! compared in units of the differences between neighbouring cells, smoothed where neighbours look alike, and clustered without random
-//! numbers. Clusters are split only where the sea floor calls for it, so a uniform floor has few.
+//! numbers. Clusters are split only where the sea floor calls for it, so a uniform floor has few. While the map grows, labels follow their
+//! cells; once it rests, it is corrected as if all had been seen at once, and then depends on no order at all.
 //!
 //! ```
 //! use scene_model::habitats::{Habitats, measure};
@@ -50,6 +51,10 @@ const HYSTERESIS: f32 = 1.5;
 /// Frames after which a map is learnt again, and cells of a map that is learnt at each frame.
 const FRAMES_BETWEEN: u32 = 10;
 const SMALL_MAP: usize = 2000;
+/// A map rests when so many frames in a row have shown fewer new cells than their number, and is then corrected if it has grown by more
+/// than a share since the last correction.
+const REST_FRAMES: u32 = 60;
+const GROWN: f64 = 0.05;
 /// Fewest points of a cell in a frame.
 const MIN_POINTS: f64 = 4.0;
 /// Least deviation over the cells of a measure that varies.
@@ -77,9 +82,35 @@ pub struct Habitats {
     /// Cells without a label that have been seen since, and the frames since.
     fresh: Vec<(i32, i32)>,
     frames: u32,
+    rest: Rest,
     learnt: Option<Learnt>,
     next: u32,
     tree: LabelTree,
+}
+
+/// Whether the map rests: cells at the last correction, cells where the count of frames began, and these frames.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+struct Rest {
+    corrected: usize,
+    began: usize,
+    frames: u32,
+}
+
+impl Rest {
+    /// Counts a frame after which the map has so many cells, and tells whether the map is to be corrected.
+    fn is_due(&mut self, cells: usize) -> bool {
+        self.frames += 1;
+        if self.frames < REST_FRAMES {
+            return false;
+        }
+        let is_resting = cells - self.began < REST_FRAMES as usize;
+        (self.began, self.frames) = (cells, 0);
+        let is_due = is_resting && (cells - self.corrected) as f64 > GROWN * cells as f64;
+        if is_due {
+            self.corrected = cells;
+        }
+        is_due
+    }
 }
 
 /// The space and the centres of the last [`Habitats::learn`].
@@ -124,6 +155,7 @@ impl Habitats {
             shown: BTreeMap::new(),
             fresh: Vec::new(),
             frames: 0,
+            rest: Rest::default(),
             learnt: None,
             next: 0,
             tree: LabelTree::default(),
@@ -163,9 +195,11 @@ impl Habitats {
     }
 
     /// Labels the cells of the frames that were added: a small map is learnt again, since it changes fast and costs little, and a large
-    /// one every ten frames; until then new cells have the label whose centre is nearest.
+    /// one every ten frames; until then new cells have the label whose centre is nearest. A map that rests is corrected once.
     pub fn update(&mut self) {
-        if self.frames >= FRAMES_BETWEEN || self.cells() < SMALL_MAP {
+        if self.rest.is_due(self.cells()) {
+            self.correct();
+        } else if self.frames >= FRAMES_BETWEEN || self.cells() < SMALL_MAP {
             self.learn();
         } else {
             self.label_new();
@@ -195,8 +229,16 @@ impl Habitats {
         self.take(map, found);
     }
 
-    /// Clusters the whole map as if nothing were known of it, into as many labels as are allowed, or as few as a uniform floor calls for.
-    /// It depends on the sights alone; labels keep their number where their cells overlap.
+    /// Clusters the whole map as if nothing were known of it. It depends on the sights alone; labels keep their number where their cells
+    /// overlap.
+    pub fn correct(&mut self) {
+        let Some(map) = self.compared() else { return };
+        let found = Clusters::grow(&map.cells, &self.natural(map.varying));
+        (self.shown, self.tree) = Default::default();
+        self.take(map, found);
+    }
+
+    /// As [`Habitats::correct`], into as many labels as are allowed, or as few as a uniform floor calls for.
     pub fn learn_whole(&mut self) {
         let Some(map) = self.compared() else { return };
         let natural = Clusters::grow(&map.cells, &self.natural(map.varying));
@@ -251,7 +293,8 @@ impl Habitats {
         self.frames = 0;
     }
 
-    /// The label of each cluster: of the earlier labels that share cells with it, the one that shares most and is not taken.
+    /// The label of each cluster: of the earlier labels that share cells with it, the one that shares most and is not taken. A label means
+    /// the same only if most cells of the one or of the other are shared.
     fn numbered(&mut self, places: &[(i32, i32)], found: &Clusters) -> Vec<u32> {
         let mut shared: BTreeMap<(usize, u32), u32> = BTreeMap::new();
         for (place, &cluster) in places.iter().zip(&found.of_cells) {
@@ -259,7 +302,14 @@ impl Habitats {
                 *shared.entry((cluster, label)).or_default() += 1;
             }
         }
-        let mut pairs: Vec<_> = shared.into_iter().collect();
+        let (mut of_cluster, mut of_label) = (vec![0; found.centres.len()], BTreeMap::<u32, u32>::new());
+        for (&(cluster, label), cells) in &shared {
+            of_cluster[cluster] += cells;
+            *of_label.entry(label).or_default() += cells;
+        }
+        let is_most =
+            |&((cluster, label), cells): &((usize, u32), u32)| 2 * cells >= of_cluster[cluster].min(of_label[&label]);
+        let mut pairs: Vec<_> = shared.into_iter().filter(is_most).collect();
         pairs.sort_by_key(|&((cluster, label), cells)| (std::cmp::Reverse(cells), label, cluster));
         let (mut labels, mut taken) = (vec![None; found.centres.len()], Vec::new());
         for ((cluster, label), _) in pairs {
@@ -383,6 +433,61 @@ mod tests {
         }
         let same = |x| forward.label_at(x, 20) == forward.label_at(x - 1, 20);
         assert!((-9..10).all(|x| same(x) == (reversed.label_at(x, 20) == reversed.label_at(x - 1, 20))));
+    }
+
+    /// The labels of the cells of a floor whose frames are seen in an order, the last one for a while.
+    fn rested(order: impl Iterator<Item = u32>, last: u32) -> Vec<((i32, i32), u32)> {
+        let floor = scenecast_worlds::patches(3, 320, 2400, 70, 7).image;
+        let camera = DownCamera { metres_per_pixel: 0.025, altitude_m: 4.0 };
+        let mut habitats = Habitats::new(16);
+        let mut see = |k: u32, times: u32| {
+            let image = image::imageops::crop_imm(&floor, 0, 80 * k, 320, 240).to_image();
+            let points = measure(&image, 10.0);
+            let pose = Pose { x: 0.0, y: -2.0 * f64::from(k), z: 0.0, yaw_rad: 0.0 };
+            let places = camera.project(320, 240, &pose, &Habitats::as_words(&points));
+            for _ in 0..times {
+                habitats.add((320, 240), &points, &places, 0.25);
+                habitats.update();
+            }
+        };
+        order.for_each(|k| see(k, 1));
+        see(last, 2 * REST_FRAMES);
+        habitats.map().iter().map(|cell| ((cell.x, cell.y), cell.topic.0)).collect()
+    }
+
+    #[test]
+    fn a_map_that_rests_is_the_same_in_any_order() {
+        let (forward, back) = (rested(0..27, 13), rested((0..27).rev(), 13));
+        let mut names = BTreeMap::new();
+        for ((place, label), (_, other)) in forward.iter().zip(&back) {
+            assert_eq!(names.entry(label).or_insert(other), &other, "{place:?}");
+        }
+        assert!(names.len() > 3 && forward.len() == back.len());
+    }
+
+    #[test]
+    fn a_label_is_not_given_to_what_shares_few_of_its_cells() {
+        let mut habitats = Habitats::new(16);
+        let places: Vec<(i32, i32)> = (0..100).map(|x| (0, x)).collect();
+        habitats.clustered = places.iter().map(|&place| (place, u32::from(place.1 >= 40))).collect();
+        habitats.next = 2;
+        // The first holds nearly all of label 1, the second a third of label 0, and the third the rest of it.
+        let of_cells = (0..100)
+            .map(|x| {
+                if x >= 45 {
+                    0
+                } else if x < 13 {
+                    1
+                } else {
+                    2
+                }
+            })
+            .collect();
+        let found = Clusters { centres: vec![Vec::new(); 3], of_cells };
+        assert_eq!(habitats.numbered(&places, &found), [1, 2, 0]);
+        // What holds cells of two labels keeps the number of which it holds more.
+        let found = Clusters { centres: vec![Vec::new(); 1], of_cells: vec![0; 60] };
+        assert_eq!(habitats.numbered(&places[20..80], &found), [1]);
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! `scenecast-bench labels`
 
 use super::site::Site;
-use super::{LabelRow, measure, picture};
+use super::{LabelRow, MapFigures, measure, picture};
 use crate::surveys::{nats, print_json};
 use clap::Args;
 use scenecast_core::UserError;
@@ -16,10 +16,11 @@ const FLIGHTS: f64 = 7.0;
 /// Whether one habitat has one label, whenever, in whatever order and on whichever path it was seen.
 ///
 /// A virtual camera flies over each floor line by line, over the same frames in reversed order, and column by column; the labels are
-/// those of the vehicle under way. `V` is the V-measure against the true classes, of all labels and with the tree cut at 8; `orders` and
+/// those of the vehicle under way, and below those after five minutes in which the vehicle sees nothing new. `V` is the V-measure against the true classes, of all labels and with the tree cut at 8; `orders` and
 /// `paths` are the agreement (normalised mutual information) of the maps of two orders and of two paths; `within` and `across` the
 /// shares of neighbours of one class that have one label, first seen together and far apart in time; `changed` the share of cells that
-/// change their label in five minutes, in the second half of the survey; `cpu` the share of a core. Then the mutual information with the
+/// change their label in five minutes, in the second half of the survey, and below the share that the rest corrects; `cpu` the share of a
+/// core. Then the mutual information with the
 /// true classes, of the clear floor and of grey, turbid, dark and blurred copies, nats. A mosaic NAME.jpg has its classes in
 /// NAME_label.png. Apart from the time of the processor, the same floors give the same figures.
 #[derive(Debug, Args)]
@@ -104,24 +105,31 @@ fn print_head() {
 
 fn print_row(r: &LabelRow) {
     let sight = |name: &str| nats(r.sights.get(name).copied());
+    print_map(&r.site, &r.under_way, r.relabelled);
     println!(
-        "{:<16} {:>6} {:>5.3} {:>5.3} {:>6.3} {:>5.3} {:>5.3} {:>5.3} {:>6} {:>6} {:>7.3} {:>5.3} {:>6} {:>6} {:>6} {:>6} {:>7}",
-        r.site,
-        r.labels,
-        r.v_measure,
-        r.v_measure_at_8,
-        r.orders,
-        r.orders_at_8,
-        r.paths,
-        r.paths_at_8,
-        nats(r.within),
-        nats(r.across),
-        r.relabelled,
+        " {:>5.3} {:>6} {:>6} {:>6} {:>6} {:>7}",
         r.cpu,
-        nats(Some(r.information_nats)),
+        sight("clear"),
         sight("grey"),
         sight("turbid"),
         sight("dark"),
         sight("blurred")
+    );
+    print_map("  at rest", &r.rested, r.corrected);
+    println!();
+}
+
+fn print_map(name: &str, m: &MapFigures, changed: f64) {
+    print!(
+        "{name:<16} {:>6} {:>5.3} {:>5.3} {:>6.3} {:>5.3} {:>5.3} {:>5.3} {:>6} {:>6} {changed:>7.3}",
+        m.labels,
+        m.v_measure,
+        m.v_measure_at_8,
+        m.orders,
+        m.orders_at_8,
+        m.paths,
+        m.paths_at_8,
+        nats(m.within),
+        nats(m.across),
     );
 }

@@ -16,6 +16,8 @@ const INTERVAL_S: f64 = 2.0;
 const TURN_S: f64 = 60.0;
 /// Frames in five minutes.
 const FIVE_MINUTES: usize = 150;
+/// Frames at the end of a flight that show nothing new, so that the map is corrected.
+const REST: u32 = 150;
 const MOST_LABELS: u32 = 16;
 
 /// The order in which a floor is seen.
@@ -29,11 +31,17 @@ pub(super) enum Path {
     Across,
 }
 
-/// The map of a flight.
-pub struct Flight {
+/// The map at one time.
+pub(super) struct Labelled {
     cells: BTreeMap<(i32, i32), u32>,
-    first_seen_s: BTreeMap<(i32, i32), f64>,
     tree: LabelTree,
+}
+
+/// The map of a flight: when all has been seen, and after a rest.
+pub struct Flight {
+    pub(super) under_way: Labelled,
+    pub(super) rested: Labelled,
+    first_seen_s: BTreeMap<(i32, i32), f64>,
     pub(super) relabelled: f64,
     pub(super) cpu: f64,
 }
@@ -56,8 +64,7 @@ impl Flight {
             let places = camera.project(size.0, size.1, &pose, &Habitats::as_words(&points));
             habitats.add(size, &points, &places, CELL_M);
             habitats.update();
-            let map: BTreeMap<(i32, i32), u32> =
-                habitats.map().iter().map(|cell| ((cell.x, cell.y), cell.topic.0)).collect();
+            let map = cells(&habitats);
             let time_s = index as f64 * INTERVAL_S + (index / in_line) as f64 * TURN_S;
             for &place in map.keys() {
                 first_seen_s.entry(place).or_insert(time_s);
@@ -68,23 +75,50 @@ impl Flight {
             }
             maps.push(map);
         }
-        let late = &relabelled[relabelled.len() / 2..];
-        Self {
-            cells: maps.pop().unwrap_or_default(),
-            first_seen_s,
-            tree: habitats.tree().clone(),
-            relabelled: late.iter().fold(0.0, |sum, share| sum + share) / late.len().max(1) as f64,
-            cpu: meter.ms() / 1000.0 / (corners.len() as f64 * INTERVAL_S),
+        let cpu = meter.ms() / 1000.0 / (corners.len() as f64 * INTERVAL_S);
+        let under_way = Labelled::of(&habitats, site);
+        for _ in 0..REST {
+            habitats.add(size, &[], &[], CELL_M);
+            habitats.update();
         }
-        .within(site)
+        let late = &relabelled[relabelled.len() / 2..];
+        let relabelled = late.iter().fold(0.0, |sum, share| sum + share) / late.len().max(1) as f64;
+        Self { under_way, rested: Labelled::of(&habitats, site), first_seen_s, relabelled, cpu }
     }
 
-    /// Without cells that reach beyond the image.
-    fn within(mut self, site: &Site) -> Self {
+    /// The share of cells whose label the rest has corrected.
+    pub(super) fn corrected(&self) -> f64 {
+        let (before, after) = (&self.under_way.cells, &self.rested.cells);
+        after.iter().filter(|(place, label)| before.get(place) != Some(label)).count() as f64
+            / after.len().max(1) as f64
+    }
+
+    /// The cells of a map that are of a known class.
+    pub(super) fn timed(
+        &self,
+        map: &Labelled,
+        class: impl Fn((i32, i32)) -> Option<u32>,
+    ) -> BTreeMap<(i32, i32), TimedCell> {
+        let timed = |(&place, &label): (&(i32, i32), &u32)| {
+            let first_seen_s = *self.first_seen_s.get(&place)?;
+            Some((place, TimedCell { label, class: class(place)?, first_seen_s }))
+        };
+        map.cells.iter().filter_map(timed).collect()
+    }
+}
+
+fn cells(habitats: &Habitats) -> BTreeMap<(i32, i32), u32> {
+    habitats.map().iter().map(|cell| ((cell.x, cell.y), cell.topic.0)).collect()
+}
+
+impl Labelled {
+    /// The map without cells that reach beyond the image.
+    fn of(habitats: &Habitats, site: &Site) -> Self {
         let (columns, rows) = site.size();
         let is_inside = |&(x, y): &(i32, i32)| (0..columns as i32).contains(&x) && (-(rows as i32)..0).contains(&y);
-        self.cells.retain(|place, _| is_inside(place));
-        self
+        let mut cells = cells(habitats);
+        cells.retain(|place, _| is_inside(place));
+        Self { cells, tree: habitats.tree().clone() }
     }
 
     /// The cells with their labels, of which at most `count` are told apart.
@@ -99,15 +133,6 @@ impl Flight {
     /// The number of labels.
     pub(super) fn count(&self) -> usize {
         self.cells.values().collect::<std::collections::BTreeSet<_>>().len()
-    }
-
-    /// The cells of a known class.
-    pub(super) fn timed(&self, class: impl Fn((i32, i32)) -> Option<u32>) -> BTreeMap<(i32, i32), TimedCell> {
-        let timed = |(&place, &label): (&(i32, i32), &u32)| {
-            let first_seen_s = *self.first_seen_s.get(&place)?;
-            Some((place, TimedCell { label, class: class(place)?, first_seen_s }))
-        };
-        self.cells.iter().filter_map(timed).collect()
     }
 }
 
