@@ -254,7 +254,9 @@ impl Mapper {
         let points = measure(image, cell_px);
         let places = projection.project(image.dimensions(), pose, &Habitats::as_words(&points));
         habitats.add(image.dimensions(), &points, &places, self.cell_m);
-        habitats.update();
+        if habitats.update() {
+            tracing::info!("the map has hardly grown for a while: its labels are corrected");
+        }
         label_by(habitats, &mut self.flat);
     }
 

@@ -195,15 +195,17 @@ impl Habitats {
     }
 
     /// Labels the cells of the frames that were added: a small map is learnt again, since it changes fast and costs little, and a large
-    /// one every ten frames; until then new cells have the label whose centre is nearest. A map that rests is corrected once.
-    pub fn update(&mut self) {
-        if self.rest.is_due(self.cells()) {
+    /// one every ten frames; until then new cells have the label whose centre is nearest. A map that rests is corrected once; then this is true.
+    pub fn update(&mut self) -> bool {
+        let is_due = self.rest.is_due(self.cells());
+        if is_due {
             self.correct();
         } else if self.frames >= FRAMES_BETWEEN || self.cells() < SMALL_MAP {
             self.learn();
         } else {
             self.label_new();
         }
+        is_due
     }
 
     fn label_new(&mut self) {

@@ -99,7 +99,7 @@ pub(crate) fn learn_habitats(
         progress(0.8 * done);
     }
     effort.measure(|| {
-        habitats.learn_whole();
+        habitats.correct();
         0
     });
     Ok(effort)
