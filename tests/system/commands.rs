@@ -232,8 +232,9 @@ fn tuning_goes_on_where_it_was_and_gives_a_configuration() {
         dir.join("s").to_str().unwrap(),
     ]);
     assert!(sim.status.success(), "{}", String::from_utf8_lossy(&sim.stderr));
-    for picture in ["tuning.svg", "tuning.png"] {
-        assert!(out.join(picture).is_file());
+    let map = |labels: u32| format!("maps/cell_m-0.08_at-most-{labels}-labels_0.5-frames-s_fine-cells.png");
+    for picture in ["tuning.svg", "tuning.png", &map(4), &map(8)] {
+        assert!(out.join(picture).is_file(), "{picture}");
     }
     assert_eq!(run_with(&["--budget", "0.001"]).status.code(), Some(1));
     assert!(!best.exists(), "what does not fit the budget is not left to pass for the answer");

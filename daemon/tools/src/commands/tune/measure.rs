@@ -84,8 +84,13 @@ impl Labeller {
     }
 }
 
-/// Runs the survey with a setting; topics then sweep over all words.
-pub fn measure(survey: &Survey<'_>, setting: &Setting, sweeps: u32, seed: u64) -> Result<Measurement, UserError> {
+/// Runs the survey with a setting; topics then sweep over all words. Gives the figures, and the map at the end as it is sent.
+pub fn measure(
+    survey: &Survey<'_>,
+    setting: &Setting,
+    sweeps: u32,
+    seed: u64,
+) -> Result<(Measurement, map::LabelGrid), UserError> {
     let config = survey.config;
     let codec = config.map.codec;
     let room = config.link.frame_bytes as usize;
@@ -125,15 +130,17 @@ pub fn measure(survey: &Survey<'_>, setting: &Setting, sweeps: u32, seed: u64) -
     let (columns, rows) = survey.annotations.size();
     let labels = LabelGrid::from_map(&cells, 0, -1, columns, rows);
     let scored = score(&labels, &survey.annotations);
-    Ok(Measurement {
+    let whole = sent_cells(numbered(&map), is_coarse);
+    let measurement = Measurement {
         mutual_information_nats: scored.mutual_information.nats,
         normalised_mutual_information: scored.mutual_information.normalised,
         null_mutual_information_nats: scored.null_nats,
         mosaic_mutual_information_nats: score(&labels, &survey.colours).mutual_information.nats,
         labels: scored.labels,
-        map_bytes: bytes(&map::LabelGrid::default(), &sent_cells(numbered(&map), is_coarse))?,
+        map_bytes: bytes(&map::LabelGrid::default(), &whole)?,
         stream_bps: streamed as f64 * 8.0 / survey.duration_s(),
-    })
+    };
+    Ok((measurement, whole))
 }
 
 /// The cells that are sent. Coarse cells are sent as a map of their own, so that their chunks have no finer neighbours.

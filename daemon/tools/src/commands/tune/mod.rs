@@ -11,9 +11,10 @@ use clap::Args;
 use grid::Grid;
 use measure::{mean, measure};
 use scenecast_config::Config;
-use scenecast_core::UserError;
 use scenecast_core::tuning_table::{Measurement, Row, Setting, TuningTable, least, most};
+use scenecast_core::{UserError, label_picture};
 use scenecast_files::write_whole;
+use scenecast_protocol::map::LabelGrid;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
@@ -68,7 +69,7 @@ pub struct Tune {
     /// Set a key of the configuration, as in scene.max_labels=32 (scenecast config lists them)
     #[arg(long = "set", value_name = "KEY=VALUE")]
     sets: Vec<String>,
-    /// Folder for tuning.csv, tuning.svg, tuning.png and best.toml
+    /// Folder for tuning.csv, tuning.svg, tuning.png, best.toml, and a map of each setting in maps/
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
 }
@@ -82,7 +83,8 @@ impl Tune {
         }
         let grid = Grid::load(self.grid.as_deref(), &config)?;
         let sites = self.sites(&config)?;
-        std::fs::create_dir_all(&self.out).map_err(|e| UserError::file(&self.out, e))?;
+        let maps = self.out.join("maps");
+        std::fs::create_dir_all(&maps).map_err(|e| UserError::file(&maps, e))?;
         let inputs = Site::fingerprint(&sites, &format!("{} sweeps, seed {}", self.sweeps, self.seed));
         let path = self.out.join("tuning.csv");
         let mut table = GrowingTable { table: open(&path, &inputs)?, path, inputs };
@@ -120,7 +122,10 @@ impl Tune {
             let work = || -> Result<(), UserError> {
                 while let Some(setting) = same_cells.get(next.fetch_add(1, Ordering::Relaxed)) {
                     let measured = surveys.iter().map(|survey| measure(survey, setting, self.sweeps, self.seed));
-                    let measurement = mean(&measured.collect::<Result<Vec<_>, _>>()?);
+                    let (measurements, maps): (Vec<_>, Vec<_>) =
+                        measured.collect::<Result<Vec<_>, _>>()?.into_iter().unzip();
+                    self.draw(setting, &maps)?;
+                    let measurement = mean(&measurements);
                     table.lock().unwrap_or_else(PoisonError::into_inner).add(*setting, measurement)?;
                     let mut progress = progress.lock().unwrap_or_else(PoisonError::into_inner);
                     progress.1 += 1;
@@ -138,6 +143,15 @@ impl Tune {
             })?;
         }
         Ok(())
+    }
+
+    /// Writes the map of the first sea floor.
+    fn draw(&self, setting: &Setting, maps: &[LabelGrid]) -> Result<(), UserError> {
+        let name = setting.to_string().replace(", ", "_").replace([' ', '/'], "-");
+        let path = self.out.join("maps").join(format!("{name}.png"));
+        let Some(map) = maps.first() else { return Ok(()) };
+        let picture = label_picture::encode(map).map_err(|e| UserError::Failed(format!("{}: {e}", path.display())))?;
+        write_whole(&path, &picture)
     }
 
     fn conclude(&self, config: &Config, rows: &[Row], budget_bps: f64) -> Result<(), UserError> {
