@@ -1,4 +1,4 @@
-// How every script here starts the browser: Debian's chromium without windows, which takes a third less of the processor, quiet on the
+// How every script here starts the browser: Debian's chromium without windows, which takes a sixth less of the processor, quiet on the
 // network, WebGL in software.
 
 export const LAUNCH = {

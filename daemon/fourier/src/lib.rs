@@ -1,6 +1,7 @@
 //! Fourier transforms of planes.
 //!
-//! A crate of its own: the transforms are generic code that takes a minute of the processor to compile, once in each crate that names them.
+//! A crate of its own: the transforms are generic code, which would be compiled again, for half a minute of the processor, in each crate
+//! and test that names them.
 
 pub use rustfft::num_complex::Complex32;
 use rustfft::{Fft, FftPlanner};
@@ -39,7 +40,7 @@ impl PlaneFft {
         self.rows
     }
 
-    /// Replaces a plane by its spectrum.
+    /// Replaces a plane, row by row, by its spectrum. Panics if it has another size.
     pub fn transform(&mut self, plane: &mut [Complex32]) {
         self.forward[0].process_with_scratch(plane, &mut self.scratch);
         transpose(plane, &mut self.turned, self.columns);
@@ -47,7 +48,7 @@ impl PlaneFft {
         plane.copy_from_slice(&self.turned);
     }
 
-    /// Replaces a spectrum by its plane, times the number of pixels.
+    /// Replaces a spectrum by its plane, times the number of pixels. Panics if it has another size.
     pub fn restore(&mut self, spectrum: &mut [Complex32]) {
         self.inverse[1].process_with_scratch(spectrum, &mut self.scratch);
         transpose(spectrum, &mut self.turned, self.rows);

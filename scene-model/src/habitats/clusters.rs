@@ -3,8 +3,11 @@
 use super::smooth::{Coordinates, squared_distance};
 use nalgebra::{DMatrix, SymmetricEigen};
 
-/// Passes of k-means over all cells: at the end, after a merge or a birth, within a split, and over a map that has grown.
-const PASSES: [usize; 4] = [30, 4, 10, 1];
+/// Passes of k-means: over a map that nothing is known of, over one that has grown, after a merge or a birth, and within a split.
+const WHOLE_PASSES: usize = 30;
+const GROWN_PASSES: usize = 1;
+const CHANGE_PASSES: usize = 4;
+const SPLIT_PASSES: usize = 10;
 /// Bound of the search for eigenvectors, which needs about three rotations an axis.
 const MAX_ROTATIONS: usize = 1000;
 
@@ -52,18 +55,18 @@ impl Clusters {
             parts[widest] = Part::new(cells, low);
             parts.push(Part::new(cells, high));
         }
-        let mut found = Self::refined(cells, parts.into_iter().map(|part| part.mean).collect(), PASSES[0]);
+        let mut found = Self::refined(cells, parts.into_iter().map(|part| part.mean).collect(), WHOLE_PASSES);
         found.merge(cells, rule.gap, rule.most);
         found
     }
 
     /// The clusters of a map that has grown since `centres` were found: those that still hold cells, with merges and births.
     pub(crate) fn continued(cells: &Coordinates, centres: Vec<Vec<f32>>, rule: &Rule) -> Self {
-        let mut found = Self::refined(cells, centres, PASSES[3]);
+        let mut found = Self::refined(cells, centres, GROWN_PASSES);
         found.merge(cells, MERGED_GAP * rule.gap, rule.most);
         while found.centres.len() < rule.most {
             let Some(centres) = found.with_a_birth(cells, rule) else { break };
-            found = Self::refined(cells, centres, PASSES[1]);
+            found = Self::refined(cells, centres, CHANGE_PASSES);
         }
         found
     }
@@ -96,7 +99,7 @@ impl Clusters {
             let members: Vec<usize> = (0..cells.len()).filter(|&cell| self.of_cells[cell] == into).collect();
             self.centres[into] = mean(cells, &members);
             self.centres.remove(joins);
-            *self = Self::refined(cells, std::mem::take(&mut self.centres), PASSES[1]);
+            *self = Self::refined(cells, std::mem::take(&mut self.centres), CHANGE_PASSES);
         }
     }
 
@@ -209,7 +212,7 @@ impl Part {
         };
         let mut centres = [beside(1.0), beside(-1.0)];
         let mut halves = Vec::new();
-        for _ in 0..PASSES[2] {
+        for _ in 0..SPLIT_PASSES {
             halves = nearest(all, self.cells.iter().copied(), &centres);
             move_to_means(all, self.cells.iter().copied(), &halves, &mut centres);
         }

@@ -27,6 +27,7 @@
 mod cells;
 mod clusters;
 mod measures;
+mod rest;
 mod sights;
 mod smooth;
 mod space;
@@ -40,6 +41,7 @@ use crate::topics::{FlatCell, TopicId};
 use crate::words::Word;
 use cells::CellMap;
 use clusters::{Clusters, Rule};
+use rest::Rest;
 use serde::{Deserialize, Serialize};
 use sights::{Sight, Sights};
 use smooth::{Coordinates, smoothed, squared_distance};
@@ -51,10 +53,6 @@ const HYSTERESIS: f32 = 1.5;
 /// Frames after which a map is learnt again, and cells of a map that is learnt at each frame.
 const FRAMES_BETWEEN: u32 = 10;
 const SMALL_MAP: usize = 2000;
-/// A map rests when so many frames in a row have shown fewer new cells than their number, and is then corrected if it has grown by more
-/// than a share since the last correction.
-const REST_FRAMES: u32 = 60;
-const GROWN: f64 = 0.05;
 /// Fewest points of a cell in a frame.
 const MIN_POINTS: f64 = 4.0;
 /// Least deviation over the cells of a measure that varies.
@@ -86,31 +84,6 @@ pub struct Habitats {
     learnt: Option<Learnt>,
     next: u32,
     tree: LabelTree,
-}
-
-/// Whether the map rests: cells at the last correction, cells where the count of frames began, and these frames.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-struct Rest {
-    corrected: usize,
-    began: usize,
-    frames: u32,
-}
-
-impl Rest {
-    /// Counts a frame after which the map has so many cells, and tells whether the map is to be corrected.
-    fn is_due(&mut self, cells: usize) -> bool {
-        self.frames += 1;
-        if self.frames < REST_FRAMES {
-            return false;
-        }
-        let is_resting = cells - self.began < REST_FRAMES as usize;
-        (self.began, self.frames) = (cells, 0);
-        let is_due = is_resting && (cells - self.corrected) as f64 > GROWN * cells as f64;
-        if is_due {
-            self.corrected = cells;
-        }
-        is_due
-    }
 }
 
 /// The space and the centres of the last [`Habitats::learn`].
@@ -195,7 +168,8 @@ impl Habitats {
     }
 
     /// Labels the cells of the frames that were added: a small map is learnt again, since it changes fast and costs little, and a large
-    /// one every ten frames; until then new cells have the label whose centre is nearest. A map that rests is corrected once; then this is true.
+    /// one every ten frames; until then new cells have the label whose centre is nearest. A map that rests is corrected once; then this is
+    /// true.
     pub fn update(&mut self) -> bool {
         let is_due = self.rest.is_due(self.cells());
         if is_due {
@@ -234,18 +208,23 @@ impl Habitats {
     /// Clusters the whole map as if nothing were known of it. It depends on the sights alone; labels keep their number where their cells
     /// overlap.
     pub fn correct(&mut self) {
-        let Some(map) = self.compared() else { return };
-        let found = Clusters::grow(&map.cells, &self.natural(map.varying));
-        (self.shown, self.tree) = Default::default();
-        self.take(map, found);
+        self.learn_as_new(|natural, _| natural);
     }
 
     /// As [`Habitats::correct`], into as many labels as are allowed, or as few as a uniform floor calls for.
     pub fn learn_whole(&mut self) {
+        let most = self.most as usize;
+        self.learn_as_new(|natural, cells| match natural.centres.len() {
+            ..=UNIFORM => natural,
+            _ => Clusters::grow(cells, &Rule { most, variance: 0.5, cells: 24, share: 0.0, gap: 0.0 }),
+        });
+    }
+
+    /// Takes clusters that are made from those that the floor calls for, without regard to what was shown.
+    fn learn_as_new(&mut self, clusters: impl FnOnce(Clusters, &Coordinates) -> Clusters) {
         let Some(map) = self.compared() else { return };
-        let natural = Clusters::grow(&map.cells, &self.natural(map.varying));
-        let all = Rule { most: self.most as usize, variance: 0.5, cells: 24, share: 0.0, gap: 0.0 };
-        let found = if natural.centres.len() <= UNIFORM { natural } else { Clusters::grow(&map.cells, &all) };
+        let found = clusters(Clusters::grow(&map.cells, &self.natural(map.varying)), &map.cells);
+        (self.shown, self.tree) = Default::default();
         self.take(map, found);
     }
 
@@ -296,7 +275,7 @@ impl Habitats {
     }
 
     /// The label of each cluster: of the earlier labels that share cells with it, the one that shares most and is not taken. A label means
-    /// the same only if most cells of the one or of the other are shared.
+    /// the same only if at least half of the cells of the one or of the other are shared.
     fn numbered(&mut self, places: &[(i32, i32)], found: &Clusters) -> Vec<u32> {
         let mut shared: BTreeMap<(usize, u32), u32> = BTreeMap::new();
         for (place, &cluster) in places.iter().zip(&found.of_cells) {
@@ -309,9 +288,9 @@ impl Habitats {
             of_cluster[cluster] += cells;
             *of_label.entry(label).or_default() += cells;
         }
-        let is_most =
+        let is_half =
             |&((cluster, label), cells): &((usize, u32), u32)| 2 * cells >= of_cluster[cluster].min(of_label[&label]);
-        let mut pairs: Vec<_> = shared.into_iter().filter(is_most).collect();
+        let mut pairs: Vec<_> = shared.into_iter().filter(is_half).collect();
         pairs.sort_by_key(|&((cluster, label), cells)| (std::cmp::Reverse(cells), label, cluster));
         let (mut labels, mut taken) = (vec![None; found.centres.len()], Vec::new());
         for ((cluster, label), _) in pairs {
@@ -404,14 +383,20 @@ mod tests {
         })
     }
 
-    fn fly(colours: [[u8; 3]; 2], order: &[u32]) -> Habitats {
+    /// Adds a frame whose middle lies `y_m` north.
+    fn see(habitats: &mut Habitats, image: &RgbImage, y_m: f64) {
+        let (columns, rows) = image.dimensions();
+        let points = measure(image, 10.0);
         let camera = DownCamera { metres_per_pixel: 0.025, altitude_m: 4.0 };
+        let pose = Pose { x: 0.0, y: y_m, z: 0.0, yaw_rad: 0.0 };
+        let places = camera.project(columns, rows, &pose, &Habitats::as_words(&points));
+        habitats.add((columns, rows), &points, &places, 0.25);
+    }
+
+    fn fly(colours: [[u8; 3]; 2], order: &[u32]) -> Habitats {
         let mut habitats = Habitats::new(16);
         for &k in order {
-            let points = measure(&frame(colours, u64::from(k)), 10.0);
-            let pose = Pose { x: 0.0, y: 2.0 * f64::from(k), z: 0.0, yaw_rad: 0.0 };
-            let places = camera.project(200, 160, &pose, &Habitats::as_words(&points));
-            habitats.add((200, 160), &points, &places, 0.25);
+            see(&mut habitats, &frame(colours, u64::from(k)), 2.0 * f64::from(k));
         }
         habitats.learn();
         habitats
@@ -437,29 +422,25 @@ mod tests {
         assert!((-9..10).all(|x| same(x) == (reversed.label_at(x, 20) == reversed.label_at(x - 1, 20))));
     }
 
-    /// The labels of the cells of a floor whose frames are seen in an order, the last one for a while.
-    fn rested(order: impl Iterator<Item = u32>, last: u32) -> Vec<((i32, i32), u32)> {
+    /// The labels of the cells of a floor whose frames are seen in an order, after a rest.
+    fn rested(order: impl Iterator<Item = u32>) -> Vec<((i32, i32), u32)> {
         let floor = scenecast_worlds::patches(3, 320, 2400, 70, 7).image;
-        let camera = DownCamera { metres_per_pixel: 0.025, altitude_m: 4.0 };
         let mut habitats = Habitats::new(16);
-        let mut see = |k: u32, times: u32| {
+        for k in order {
             let image = image::imageops::crop_imm(&floor, 0, 80 * k, 320, 240).to_image();
-            let points = measure(&image, 10.0);
-            let pose = Pose { x: 0.0, y: -2.0 * f64::from(k), z: 0.0, yaw_rad: 0.0 };
-            let places = camera.project(320, 240, &pose, &Habitats::as_words(&points));
-            for _ in 0..times {
-                habitats.add((320, 240), &points, &places, 0.25);
-                habitats.update();
-            }
-        };
-        order.for_each(|k| see(k, 1));
-        see(last, 2 * REST_FRAMES);
+            see(&mut habitats, &image, -2.0 * f64::from(k));
+            habitats.update();
+        }
+        for _ in 0..2 * rest::REST_FRAMES {
+            habitats.add((320, 240), &[], &[], 0.25);
+            habitats.update();
+        }
         habitats.map().iter().map(|cell| ((cell.x, cell.y), cell.topic.0)).collect()
     }
 
     #[test]
     fn a_map_that_rests_is_the_same_in_any_order() {
-        let (forward, back) = (rested(0..27, 13), rested((0..27).rev(), 13));
+        let (forward, back) = (rested(0..27), rested((0..27).rev()));
         let mut names = BTreeMap::new();
         for ((place, label), (_, other)) in forward.iter().zip(&back) {
             assert_eq!(names.entry(label).or_insert(other), &other, "{place:?}");
@@ -474,17 +455,7 @@ mod tests {
         habitats.clustered = places.iter().map(|&place| (place, u32::from(place.1 >= 40))).collect();
         habitats.next = 2;
         // The first holds nearly all of label 1, the second a third of label 0, and the third the rest of it.
-        let of_cells = (0..100)
-            .map(|x| {
-                if x >= 45 {
-                    0
-                } else if x < 13 {
-                    1
-                } else {
-                    2
-                }
-            })
-            .collect();
+        let of_cells = [vec![1; 13], vec![2; 32], vec![0; 55]].concat();
         let found = Clusters { centres: vec![Vec::new(); 3], of_cells };
         assert_eq!(habitats.numbered(&places, &found), [1, 2, 0]);
         // What holds cells of two labels keeps the number of which it holds more.
@@ -513,10 +484,7 @@ mod tests {
     fn a_new_cell_has_the_label_of_its_like_at_once() {
         let colours = [[160, 150, 120], [60, 90, 50]];
         let mut habitats = fly(colours, &[0, 1, 2]);
-        let points = measure(&frame(colours, 77), 10.0);
-        let camera = DownCamera { metres_per_pixel: 0.025, altitude_m: 4.0 };
-        let pose = Pose { x: 0.0, y: 90.0, z: 0.0, yaw_rad: 0.0 };
-        habitats.add((200, 160), &points, &camera.project(200, 160, &pose, &Habitats::as_words(&points)), 0.25);
+        see(&mut habitats, &frame(colours, 77), 90.0);
         assert_eq!(habitats.label_at(-8, 360), None);
         habitats.label_new();
         assert_eq!(habitats.label_at(-8, 360), habitats.label_at(-8, 3));

@@ -15,14 +15,14 @@ const FLIGHTS: f64 = 7.0;
 
 /// Whether one habitat has one label, whenever, in whatever order and on whichever path it was seen.
 ///
-/// A virtual camera flies over each floor line by line, over the same frames in reversed order, and column by column; the labels are
-/// those of the vehicle under way, and below those after five minutes in which the vehicle sees nothing new. `V` is the V-measure against the true classes, of all labels and with the tree cut at 8; `orders` and
-/// `paths` are the agreement (normalised mutual information) of the maps of two orders and of two paths; `within` and `across` the
-/// shares of neighbours of one class that have one label, first seen together and far apart in time; `changed` the share of cells that
-/// change their label in five minutes, in the second half of the survey, and below the share that the rest corrects; `cpu` the share of a
-/// core. Then the mutual information with the
-/// true classes, of the clear floor and of grey, turbid, dark and blurred copies, nats. A mosaic NAME.jpg has its classes in
-/// NAME_label.png. Apart from the time of the processor, the same floors give the same figures.
+/// A virtual camera flies over each floor line by line, over the same frames in reversed order, and column by column; the labels are those
+/// of the vehicle under way, and below those after five minutes in which the vehicle sees nothing new. `V` is the V-measure against the
+/// true classes, of all labels and with the tree cut at 8; `orders` and `paths` are the agreement (normalised mutual information) of the
+/// maps of two orders and of two paths; `within` and `across` the shares of neighbours of one class that have one label, first seen
+/// together and far apart in time; `changed` the share of cells that change their label in five minutes, in the second half of the survey,
+/// and below the share that the rest corrects; `cpu` the share of a core. Then the mutual information with the true classes, of the clear
+/// floor and of grey, turbid, dark and blurred copies, nats. A mosaic NAME.jpg has its classes in NAME_label.png. Apart from the time of
+/// the processor, the same floors give the same figures.
 #[derive(Debug, Args)]
 #[command(after_help = "Example: scenecast-bench labels --seeds 5 --out labels")]
 pub(crate) struct LabelsBench {
