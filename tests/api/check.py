@@ -181,6 +181,13 @@ def main():
     openapi_spec_validator.validate(document)
     document["components"]["schemas"] = strict(document["components"]["schemas"])
     state = json.loads(ask("GET", "/api/v2/state")[2])
+    # The one who ran before, a terminal, has command: without a name we are another client.
+    body = json.dumps({"weights": {}, "exploration": 0}).encode()
+    status, _, why = ask("POST", f"/api/v2/vehicles/{state['vehicles'][0]['id']}/utility", body)
+    expect(status == 409 and b"take command to move it here" in why, f"an order of another client: {status}: {why[:200]}")
+    expect(ask("POST", "/api/v2/command", b'{"action": "take"}')[0] == 200, "command is not moved")
+    wrong = ask("GET", "/api/v2/state", headers={"x-scenecast-client": "a b"})
+    expect(wrong[0] == 400 and b"1 to 32 letters" in wrong[2], f"a wrong name of a client: {wrong[0]}")
     every = [(method, path, o) for path, methods in document["paths"].items() for method, o in methods.items()]
     # A request for a further image changes the state of the exemplar, so readings come first.
     for method, path, operation in sorted(every, key=lambda one: one[0]):

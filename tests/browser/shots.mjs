@@ -111,7 +111,7 @@ async function cloud(page, steer) {
 
 /** Gives the first vehicle of a demo the orders of an operator, and waits until the images have arrived. */
 async function operate(url) {
-  const post = (path, body) => fetch(`${url}/api/v2${path}`, { method: "POST", headers: { "content-type": "application/json", "x-scenecast": "1" }, body: JSON.stringify(body) });
+  const post = (path, body) => fetch(`${url}/api/v2${path}`, { method: "POST", headers: { "content-type": "application/json", "x-scenecast": "1", "x-scenecast-client": "shots" }, body: JSON.stringify(body) });
   const first = async () => (await (await fetch(`${url}/api/v2/state`)).json()).vehicles[0];
   const v = await first();
   const m = v.map;
@@ -136,7 +136,10 @@ const settled = (page) => page.evaluate(async () => {
 async function shoot(browser, url, { name, size, theme, steps, steer }) {
   const context = await browser.newContext({ viewport: SIZES[size], hasTouch: size === "phone" });
   const page = await context.newPage();
-  await page.addInitScript((t) => localStorage.setItem("scenecast.theme", JSON.stringify(t)), theme);
+  await page.addInitScript((t) => {
+    localStorage.setItem("scenecast.theme", JSON.stringify(t));
+    localStorage.setItem("scenecast.client", '"shots"');
+  }, theme);
   await page.goto(url);
   await page.locator("body[data-feed=open]").waitFor();
   await page.waitForFunction(() => import("/js/store.js").then(({ store }) => !store.vehicle || store.maps.has(store.selectedId)));

@@ -68,8 +68,10 @@ export class Stage {
       if (!r.url().endsWith("/draft")) this.posts.push({ path: new URL(r.url()).pathname, body: r.postDataJSON() });
     });
     const theme = story.theme ?? "light";
-    if (this.isNew) await this.page.addInitScript((t) => localStorage.getItem("scenecast.theme") ?? localStorage.setItem("scenecast.theme", JSON.stringify(t)), theme);
-    else await this.page.evaluate((t) => localStorage.setItem("scenecast.theme", JSON.stringify(t)), theme);
+    // Command of a demo passes from story to story, which are one client.
+    const stored = Object.entries({ "scenecast.theme": JSON.stringify(theme), "scenecast.client": '"story"' });
+    const keep = (all) => all.forEach(([key, value]) => localStorage.getItem(key) ?? localStorage.setItem(key, value));
+    await (this.isNew ? this.page.addInitScript(keep, stored) : this.page.evaluate(keep, stored));
     if (story.stopped) await this.stopClock();
     await this.page.goto(url);
     if (!story.bare) await this.ready();
@@ -156,7 +158,7 @@ export class Stage {
 
   post(path, body) {
     return fetch(`${this.url}${API}${path}`, {
-      method: "POST", body: JSON.stringify(body), headers: { "x-scenecast": "1", "content-type": "application/json" },
+      method: "POST", body: JSON.stringify(body), headers: { "x-scenecast": "1", "x-scenecast-client": "story", "content-type": "application/json" },
     });
   }
 

@@ -54,6 +54,13 @@ pub fn skip(why: &str) {
     let _ = std::io::stderr().write_all(line.as_bytes());
 }
 
+/// A demo at a speed, with more arguments. Its sea floor and its images cost a machine a quarter of the usual ones.
+pub fn demo(port: u16, speed: u32, more: &[&str]) -> Process {
+    let (port, speed) = (port.to_string(), speed.to_string());
+    let light = ["--set", "world.kind=patches", "--set", "camera.width_px=320", "--set", "camera.height_px=240"];
+    Process::start(&[&["demo", "--port", &port, "--speed", &speed][..], &light, more].concat())
+}
+
 /// Runs a command to its end.
 pub fn run(arguments: &[&str]) -> Output {
     scenecast().args(arguments).output().expect("scenecast runs")

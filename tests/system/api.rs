@@ -14,8 +14,7 @@ fn text(output: &Output) -> String {
 
 /// A mission whose map has labels.
 fn demo(port: u16, more: &[&str]) -> Process {
-    let port_text = port.to_string();
-    let demo = Process::start(&[&["demo", "--port", &port_text, "--speed", "20"][..], more].concat());
+    let demo = scenecast_tests::demo(port, 20, more);
     wait_until("labels on the map", LIMIT, || labels(port).len() > 1);
     demo
 }
@@ -136,7 +135,7 @@ fn wrong_usage_differs_from_a_surface_without_an_answer() {
 #[test]
 fn a_shell_sets_fence_and_limits_and_holds_and_resumes() {
     let (port, dir) = (free_port(), scratch("ctl-constraints"));
-    let _demo = Process::start(&["demo", "--port", &port.to_string(), "--speed", "8", "--duration", "3000"]);
+    let _demo = scenecast_tests::demo(port, 8, &["--duration", "3000"]);
     wait_until("the first status", LIMIT, || state(port).is_some_and(|s| !s["vehicles"][0]["status"].is_null()));
     let file = |name: &str, text: &str| {
         std::fs::write(dir.join(name), text).unwrap();
@@ -340,7 +339,7 @@ fn command_passes_from_one_operator_to_another_in_a_shell() {
     wait_until("the first state", LIMIT, || as_one("anna", &["status"]).status.success());
     assert!(ok("bob", &["command"]).contains("nobody has it"));
     ok("anna", &["budget", "set", "900"]);
-    assert!(ok("bob", &["command"]).contains("anna for"), "the first order took command");
+    assert!(ok("bob", &["command"]).contains("anna (ctl-"), "the first order took command");
     refused("bob", &["budget", "set", "800"], &["anna has command for", "request it", "take it after"]);
     refused("bob", &["command", "take"], &["anna has command for"]);
     refused("victor", &["command", "request"], &["needs the role operator", "the role of victor is viewer"]);

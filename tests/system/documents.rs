@@ -116,7 +116,7 @@ fn commands_of_the_documents_run() {
 /// A demo that serves `path`.
 fn demo(path: &str) -> (Process, u16) {
     let port = free_port();
-    let demo = Process::start(&["demo", "--port", &port.to_string(), "--speed", "4", "--duration", "600"]);
+    let demo = scenecast_tests::demo(port, 4, &["--duration", "600"]);
     wait_until(path, Duration::from_secs(300), || {
         http(port, "GET", path, "", "").is_some_and(|(status, _)| status == 200)
     });

@@ -71,11 +71,8 @@ fn assert_unmoved(demo: &Process, port: u16, what: &str, attack: impl FnOnce()) 
 #[test]
 fn no_client_stalls_the_link_or_fills_the_memory() {
     let port = free_port();
-    // A drawn reef keeps the floor that it has drawn, so that its memory grows by itself.
-    let world = ["--set", "world.kind=patches"];
-    let port_text = port.to_string();
-    let demo =
-        Process::start(&[&["demo", "--port", &port_text, "--speed", "5", "--duration", "30000"], &world[..]].concat());
+    // Its world is patches: a drawn reef keeps the floor that it has drawn, so that its memory grows by itself.
+    let demo = scenecast_tests::demo(port, SPEED as u32, &["--duration", "30000"]);
     wait_until("a map", Duration::from_secs(90), || {
         state(port).is_some_and(|s| s["vehicles"][0]["map"]["explored_cells"].as_u64() > Some(50))
     });

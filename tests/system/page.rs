@@ -1,6 +1,6 @@
 //! The operator's page and API of a running demo.
 
-use scenecast_tests::{Process, free_port, http, http_whole, state, wait_until};
+use scenecast_tests::{Process, demo, free_port, http, http_whole, state, wait_until};
 use serde_json::Value;
 use std::time::Duration;
 
@@ -14,7 +14,7 @@ const ORDER: &str = "Content-Type: application/json\r\nX-Scenecast: 1\r\n";
 #[test]
 fn an_operator_sends_weights_and_receives_an_image() {
     let port = free_port();
-    let _demo = Process::start(&["demo", "--port", &port.to_string(), "--speed", "20", "--duration", "600"]);
+    let _demo = demo(port, 20, &["--duration", "600"]);
     let limit = Duration::from_secs(60);
     wait_until("labels on the map", limit, || {
         state(port).is_some_and(|s| s["vehicles"][0]["labels"].as_array().is_some_and(|l| l.len() > 1))
@@ -39,7 +39,7 @@ fn an_operator_sends_weights_and_receives_an_image() {
 #[test]
 fn wrong_orders_and_other_sites_are_refused() {
     let port = free_port();
-    let _demo = Process::start(&["demo", "--port", &port.to_string(), "--duration", "600"]);
+    let _demo = demo(port, 1, &["--duration", "600"]);
     wait_until("the page answers", Duration::from_secs(30), || state(port).is_some());
     let refused = |path: &str, headers: &str, body: &str| http(port, "POST", path, headers, body).unwrap();
     let (status, body) = refused("/api/v2/vehicles/1/utility", ORDER, "{\"weights\": {\"9\": 0.5}}");
@@ -56,7 +56,7 @@ fn wrong_orders_and_other_sites_are_refused() {
 #[test]
 fn a_map_is_read_by_region_and_by_changed_tiles() {
     let port = free_port();
-    let _demo = Process::start(&["demo", "--port", &port.to_string(), "--speed", "20", "--duration", "600"]);
+    let _demo = demo(port, 20, &["--duration", "600"]);
     wait_until("a map", Duration::from_secs(60), || {
         state(port).is_some_and(|s| s["vehicles"][0]["map"]["explored_cells"].as_u64() > Some(0))
     });
@@ -87,7 +87,7 @@ fn a_map_is_read_by_region_and_by_changed_tiles() {
 #[test]
 fn the_page_is_small_and_cached() {
     let port = free_port();
-    let _demo = Process::start(&["demo", "--port", &port.to_string(), "--speed", "20", "--duration", "600"]);
+    let _demo = demo(port, 20, &["--duration", "600"]);
     wait_until("the page answers", Duration::from_secs(60), || state(port).is_some());
     let (_, index) = http(port, "GET", "/", "", "").unwrap();
     let index = String::from_utf8(index).unwrap();

@@ -228,7 +228,7 @@ pub enum CommandOrderAction {
     Request,
     /// Withdraws the own request for command.
     Withdraw,
-    /// Takes command if nobody has it, or its holder was silent for 120 s.
+    /// Takes command if nobody has it, if its holder was silent for 120 s, or from another client of the same principal.
     Take,
     /// Hands command over to `to`.
     HandOver,

@@ -20,16 +20,16 @@ use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::Address;
 use scenecast_surface::record::{StoredLabel, VehicleMemory};
 use scenecast_surface::{
-    AreasOrder, CommandAction, CommandRefusal, DestinationOrder, FenceOrder, LimitsOrder, LogEntry, OrderKind,
-    Principal, RequestKind, Role, SettingsOrder, Surface, order_name,
+    AreasOrder, CommandAction, CommandRefusal, DestinationOrder, FenceOrder, Giver, LimitsOrder, LogEntry, OrderKind,
+    RequestKind, Role, SettingsOrder, Surface, order_name,
 };
 use std::collections::BTreeMap;
 
-/// A request and the principal who makes it.
+/// A request and who makes it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ClientRequest {
     /// `None` is enough for a reading only.
-    pub principal: Option<Principal>,
+    pub by: Option<Giver>,
     pub request: SurfaceRequest,
 }
 
@@ -154,8 +154,8 @@ pub enum Reply {
 
 /// Handles a request between two steps of the surface.
 pub fn handle_request(surface: &mut Surface, request: ClientRequest, cell_m: f64, now: Instant) -> Reply {
-    let ClientRequest { principal, request } = request;
-    let Some(by) = principal else {
+    let ClientRequest { by, request } = request;
+    let Some(by) = by else {
         let anonymous = || Reply::Forbidden("an order needs a principal".to_owned());
         return if request.is_reading() { reply(surface, request, cell_m, now) } else { anonymous() };
     };
@@ -186,7 +186,7 @@ pub fn handle_request(surface: &mut Surface, request: ClientRequest, cell_m: f64
 }
 
 /// Why a principal may not take a vehicle over, one line.
-fn why_not_taken_over(surface: &Surface, id: u8, by: &Principal, now: Instant) -> Option<String> {
+fn why_not_taken_over(surface: &Surface, id: u8, by: &Giver, now: Instant) -> Option<String> {
     let holder = surface.view(Address::vehicle(id)?)?.holder()?;
     let is_allowed = holder.is_silent(now) || by.role() == Role::Administrator;
     (!is_allowed).then(|| {
@@ -203,7 +203,7 @@ fn refused(refusal: &CommandRefusal) -> Reply {
     let line = refusal.to_string();
     match refusal {
         CommandRefusal::Role { .. } => Reply::Forbidden(line),
-        CommandRefusal::Held { .. } => Reply::NotInCommand(line),
+        CommandRefusal::Held { .. } | CommandRefusal::Elsewhere { .. } => Reply::NotInCommand(line),
         _ => Reply::Refused(line),
     }
 }

@@ -1,8 +1,8 @@
-//! Who uses the surface, and the role that decides which actions are allowed.
+//! Who uses the surface, from which client, and the role that decides which actions are allowed.
 
 use std::fmt;
 
-/// Characters in the name of a principal at most.
+/// Characters in the name of a principal or of a client at most.
 const MAX_NAME: usize = 32;
 
 /// A role. Each one may do everything that the roles before it may do.
@@ -48,9 +48,7 @@ pub struct Principal {
 impl Principal {
     /// A principal; `None` unless the name has 1 to 32 letters, digits, dots, hyphens or underscores of ASCII.
     pub fn new(name: &str, role: Role) -> Option<Self> {
-        let is_allowed = |c: char| c.is_ascii_alphanumeric() || matches!(c, '.' | '-' | '_');
-        let is_name = (1..=MAX_NAME).contains(&name.len()) && name.chars().all(is_allowed);
-        is_name.then(|| Self { name: name.to_owned(), role })
+        is_name(name).then(|| Self { name: name.to_owned(), role })
     }
 
     /// Every client of a surface without tokens, which only this machine can reach.
@@ -72,9 +70,71 @@ impl Principal {
     }
 }
 
+fn is_allowed(c: char) -> bool {
+    c.is_ascii_alphanumeric() || matches!(c, '.' | '-' | '_')
+}
+
+fn is_name(name: &str) -> bool {
+    (1..=MAX_NAME).contains(&name.len()) && name.chars().all(is_allowed)
+}
+
+/// The name that a browser, a terminal or a program gives itself, so that the clients of one principal are told apart. It is empty for
+/// a client that gives none.
+#[derive(Debug, Clone, Default, PartialEq, Eq, PartialOrd, Ord)]
+pub struct ClientName(String);
+
+impl ClientName {
+    /// A name; `None` unless it has 1 to 32 letters, digits, dots, hyphens or underscores of ASCII.
+    pub fn new(name: &str) -> Option<Self> {
+        is_name(name).then(|| Self(name.to_owned()))
+    }
+
+    /// The name of a program, without the characters that no name has.
+    pub fn of_program(name: &str) -> Self {
+        Self(name.chars().filter(|&c| is_allowed(c)).take(MAX_NAME).collect())
+    }
+
+    pub fn as_str(&self) -> &str {
+        &self.0
+    }
+}
+
+/// Who gives an order: a principal at one of his clients.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Giver {
+    pub principal: Principal,
+    pub client: ClientName,
+}
+
+impl Giver {
+    pub fn name(&self) -> &str {
+        self.principal.name()
+    }
+
+    pub fn role(&self) -> Role {
+        self.principal.role()
+    }
+}
+
+/// A principal at a client that gives no name.
+impl From<Principal> for Giver {
+    fn from(principal: Principal) -> Self {
+        Self { principal, client: ClientName::default() }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_program_names_itself_by_what_a_name_may_have() {
+        assert_eq!(ClientName::of_program("ctl-R/V Wave").as_str(), "ctl-RVWave");
+        assert_eq!(ClientName::of_program(&"x".repeat(64)).as_str().len(), MAX_NAME);
+        assert!(
+            ClientName::new("page-3f").is_some() && ClientName::new("").is_none() && ClientName::new("a b").is_none()
+        );
+    }
 
     #[test]
     fn names_have_few_characters_and_roles_are_ordered() {

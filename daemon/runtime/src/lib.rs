@@ -43,7 +43,7 @@ pub use pilot::SimulatedAutopilot;
 pub use reload::Load;
 pub use stop::Stop;
 #[cfg(feature = "surface")]
-pub use surface::run_surface;
+pub use surface::{host_name, run_surface};
 pub use vehicle::run_vehicle;
 
 use scenecast_core::UserError;

@@ -36,9 +36,13 @@ const CATCH_UP_INTERVAL: Duration = Duration::from_millis(100);
 /// A surface without a configured name has that of the computer.
 fn name_surface(config: &mut Config) {
     if config.surface.name.is_empty() {
-        config.surface.name =
-            nix::unistd::gethostname().ok().and_then(|name| name.into_string().ok()).unwrap_or_default();
+        config.surface.name = host_name();
     }
+}
+
+/// The name of this computer; empty if it has none.
+pub fn host_name() -> String {
+    nix::unistd::gethostname().ok().and_then(|name| name.into_string().ok()).unwrap_or_default()
 }
 
 /// Runs the surface until it is interrupted; on SIGHUP it calls `load` for a new budget and new shares.
@@ -214,7 +218,7 @@ impl SurfaceShell {
         }
         let now = self.clock.now();
         self.files.commit(self.host.surface_mut(), None, now);
-        let by = request.principal.as_ref().map(|principal| principal.name().to_owned());
+        let by = request.by.as_ref().map(|by| by.name().to_owned());
         let answer = match &request.request {
             &SurfaceRequest::FormerLabels(vehicle, cell) => {
                 former_labels(self.files.store.memory().vehicle(vehicle), cell)
@@ -328,7 +332,7 @@ impl SurfaceShell {
         let now = self.clock.now();
         let stated = self.host.surface().view(vehicle).and_then(|view| view.cell_m());
         let cell_m = stated.unwrap_or(self.facts.cell_m);
-        let request = ClientRequest { principal: None, request: SurfaceRequest::Map(vehicle.number()) };
+        let request = ClientRequest { by: None, request: SurfaceRequest::Map(vehicle.number()) };
         let Reply::Map(mut cells) = handle_request(self.host.surface_mut(), request, cell_m, now) else { return };
         let surface = self.host.surface();
         let earlier = surface.record(vehicle).and_then(|record| record.earlier_map());

@@ -1,10 +1,10 @@
-//! Command: the right to give orders, which one principal has at a time.
+//! Command: the right to give orders, which one principal has at a time, at one client: a browser, a terminal or a program.
 //!
 //! Every way in (page, `scenecast ctl`, API, later other peers) passes [`Command::check`] before an order and
 //! [`Command::handle_order`] after it was accepted.
 
 use crate::record::MAX_COMMAND_CHANGES;
-use scenecast_core::{Principal, Role};
+use scenecast_core::{ClientName, Giver, Principal, Role};
 use scenecast_protocol::time::Instant;
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -50,7 +50,7 @@ pub enum CommandAction {
     /// Asks the holder for command; takes it if nobody has it.
     Request,
     Withdraw,
-    /// Takes command after the holder's silence, or if nobody has it.
+    /// Takes command after the holder's silence, or if nobody has it, or from another client of the same principal.
     Take,
     /// Gives command to this principal, or to the one whose request is the oldest.
     HandOver(Option<String>),
@@ -66,6 +66,8 @@ pub enum CommandRefusal {
     Role { name: String, role: Role, needed: Role },
     #[error("{holder} has command for {} and was last active {} ago: {}", span(*.held), span(*.idle), remedy(*.idle))]
     Held { holder: String, held: Duration, idle: Duration },
+    #[error("{name} has command at another client{}: take command to move it here", named(client))]
+    Elsewhere { name: String, client: ClientName },
     #[error("nobody has command: the first order takes it")]
     Vacant,
     #[error("nobody requests command: name a principal to hand it over to")]
@@ -83,6 +85,10 @@ fn remedy(idle: Duration) -> String {
     }
 }
 
+fn named(client: &ClientName) -> String {
+    if client.as_str().is_empty() { String::new() } else { format!(" ({})", client.as_str()) }
+}
+
 fn span(duration: Duration) -> String {
     match duration.as_secs() {
         seconds @ 0..60 => format!("{seconds} s"),
@@ -95,9 +101,26 @@ fn span(duration: Duration) -> String {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct CommandHolder {
     pub principal: Principal,
+    /// The client that has command. `None` after it was handed over: the first one that gives an order or a sign has it.
+    pub client: Option<ClientName>,
     pub since: Instant,
     /// The last order of the holder or sign of presence.
     pub last_active: Instant,
+}
+
+impl CommandHolder {
+    fn is(&self, by: &Giver) -> bool {
+        self.principal.name() == by.name() && self.client.as_ref().is_none_or(|client| *client == by.client)
+    }
+
+    /// The reason why another one is refused what needs command.
+    fn refusal(&self, by: &Giver, now: Instant) -> CommandRefusal {
+        let name = self.principal.name().to_owned();
+        match &self.client {
+            Some(client) if name == by.name() => CommandRefusal::Elsewhere { name, client: client.clone() },
+            _ => CommandRefusal::Held { holder: name, held: now.since(self.since), idle: now.since(self.last_active) },
+        }
+    }
 }
 
 /// A pending request for command.
@@ -114,11 +137,14 @@ pub enum CommandChangeKind {
     Released,
     Requested,
     Withdrawn,
+    /// To another client of the same principal.
+    Moved,
 }
 
 impl CommandChangeKind {
     /// Every kind, in the order of the numbers in files.
-    pub(super) const ALL: [Self; 5] = [Self::Taken, Self::HandedOver, Self::Released, Self::Requested, Self::Withdrawn];
+    pub(super) const ALL: [Self; 6] =
+        [Self::Taken, Self::HandedOver, Self::Released, Self::Requested, Self::Withdrawn, Self::Moved];
 }
 
 /// A change of command, for the page's history.
@@ -153,13 +179,14 @@ impl Command {
     /// request.
     pub(super) fn restore(
         &mut self,
-        holder: Option<(&str, Instant, Instant)>,
+        holder: Option<(&str, Option<ClientName>, Instant, Instant)>,
         requests: impl IntoIterator<Item = (String, Instant)>,
         changes: impl IntoIterator<Item = CommandChange>,
     ) {
         let holds = |name: &str| self.known(name).filter(|principal| principal.role() >= Role::Operator);
-        let holder = holder
-            .and_then(|(name, since, last_active)| Some(CommandHolder { principal: holds(name)?, since, last_active }));
+        let holder = holder.and_then(|(name, client, since, last_active)| {
+            Some(CommandHolder { principal: holds(name)?, client, since, last_active })
+        });
         let requests =
             requests.into_iter().filter_map(|(name, at)| Some(CommandRequest { principal: holds(&name)?, at }));
         let requests = requests.take(MAX_REQUESTS).collect();
@@ -190,23 +217,23 @@ impl Command {
         self.changes.iter()
     }
 
-    /// Whether the principal may give an order of this kind now.
-    pub fn check(&self, by: &Principal, kind: OrderKind, now: Instant) -> Result<(), CommandRefusal> {
+    /// Whether an order of this kind may be given now.
+    pub fn check(&self, by: &Giver, kind: OrderKind, now: Instant) -> Result<(), CommandRefusal> {
         require_role(by, kind.role())?;
         match &self.holder {
-            Some(holder) if kind.needs_command() && holder.principal.name() != by.name() => Err(held(holder, now)),
+            Some(holder) if kind.needs_command() && !holder.is(by) => Err(holder.refusal(by, now)),
             _ => Ok(()),
         }
     }
 
     /// An order that passed [`Command::check`] was accepted. If nobody has command and the order needs
     /// it, its giver takes it. Returns the change.
-    pub fn handle_order(&mut self, by: &Principal, kind: OrderKind, now: Instant) -> Option<CommandChange> {
+    pub fn handle_order(&mut self, by: &Giver, kind: OrderKind, now: Instant) -> Option<CommandChange> {
         if self.check(by, kind, now).is_err() {
             return None;
         }
         match self.holder {
-            None if kind.needs_command() => Some(self.give(CommandChangeKind::Taken, by, Some(by.clone()), now)),
+            None if kind.needs_command() => Some(self.give_to(CommandChangeKind::Taken, by, now)),
             _ => {
                 self.keep(by, now);
                 None
@@ -217,7 +244,7 @@ impl Command {
     /// Carries out an action; returns the change, if there is one.
     pub fn handle_action(
         &mut self,
-        by: &Principal,
+        by: &Giver,
         action: &CommandAction,
         now: Instant,
     ) -> Result<Option<CommandChange>, CommandRefusal> {
@@ -237,12 +264,9 @@ impl Command {
         })
     }
 
-    fn request(&mut self, by: &Principal, now: Instant) -> Option<CommandChange> {
-        let Some(holder) = &self.holder else {
-            return Some(self.give(CommandChangeKind::Taken, by, Some(by.clone()), now));
-        };
-        if holder.principal.name() == by.name() {
-            return None;
+    fn request(&mut self, by: &Giver, now: Instant) -> Option<CommandChange> {
+        if self.holder.as_ref().is_none_or(|holder| holder.principal.name() == by.name()) {
+            return self.take(by, now).ok().flatten();
         }
         if let Some(own) = self.requests.iter_mut().find(|r| r.principal.name() == by.name()) {
             own.at = now;
@@ -251,28 +275,30 @@ impl Command {
         if self.requests.len() >= MAX_REQUESTS {
             self.requests.remove(0);
         }
-        self.requests.push(CommandRequest { principal: by.clone(), at: now });
+        self.requests.push(CommandRequest { principal: by.principal.clone(), at: now });
         Some(self.record(CommandChangeKind::Requested, by, self.holder_name(), now))
     }
 
-    fn withdraw(&mut self, by: &Principal, now: Instant) -> Option<CommandChange> {
+    fn withdraw(&mut self, by: &Giver, now: Instant) -> Option<CommandChange> {
         let before = self.requests.len();
         self.requests.retain(|r| r.principal.name() != by.name());
         let is_withdrawn = self.requests.len() < before;
         is_withdrawn.then(|| self.record(CommandChangeKind::Withdrawn, by, self.holder_name(), now))
     }
 
-    fn take(&mut self, by: &Principal, now: Instant) -> Result<Option<CommandChange>, CommandRefusal> {
-        match &self.holder {
-            Some(holder) if holder.principal.name() == by.name() => Ok(None),
-            Some(holder) if now.since(holder.last_active) < COMMAND_SILENCE => Err(held(holder, now)),
-            _ => Ok(Some(self.give(CommandChangeKind::Taken, by, Some(by.clone()), now))),
-        }
+    fn take(&mut self, by: &Giver, now: Instant) -> Result<Option<CommandChange>, CommandRefusal> {
+        let kind = match &self.holder {
+            Some(holder) if holder.is(by) => return Ok(None),
+            Some(holder) if holder.principal.name() == by.name() => CommandChangeKind::Moved,
+            Some(holder) if now.since(holder.last_active) < COMMAND_SILENCE => return Err(holder.refusal(by, now)),
+            _ => CommandChangeKind::Taken,
+        };
+        Ok(Some(self.give_to(kind, by, now)))
     }
 
     fn hand_over(
         &mut self,
-        by: &Principal,
+        by: &Giver,
         to: Option<&str>,
         now: Instant,
     ) -> Result<Option<CommandChange>, CommandRefusal> {
@@ -281,7 +307,7 @@ impl Command {
         let to = match to {
             None => requested.clone().next().ok_or(CommandRefusal::NoRequest)?,
             Some(name) => {
-                let found = self.principals.iter().chain(requested).chain([by]).find(|p| p.name() == name);
+                let found = self.principals.iter().chain(requested).chain([&by.principal]).find(|p| p.name() == name);
                 found.ok_or_else(|| CommandRefusal::Unknown(name.to_owned()))?
             }
         };
@@ -289,17 +315,20 @@ impl Command {
             return Err(CommandRefusal::CannotHold { name: to.name().to_owned(), role: to.role() });
         }
         let to = to.clone();
-        Ok((to.name() != by.name()).then(|| self.give(CommandChangeKind::HandedOver, by, Some(to), now)))
+        let holder = CommandHolder { principal: to, client: None, since: now, last_active: now };
+        let is_other = holder.principal.name() != by.name();
+        Ok(is_other.then(|| self.give(CommandChangeKind::HandedOver, by, Some(holder), now)))
     }
 
-    fn require_command(&self, by: &Principal, now: Instant) -> Result<(), CommandRefusal> {
+    fn require_command(&self, by: &Giver, now: Instant) -> Result<(), CommandRefusal> {
         let holder = self.holder.as_ref().ok_or(CommandRefusal::Vacant)?;
-        if holder.principal.name() == by.name() { Ok(()) } else { Err(held(holder, now)) }
+        if holder.is(by) { Ok(()) } else { Err(holder.refusal(by, now)) }
     }
 
     /// Notes a sign of the holder.
-    fn keep(&mut self, by: &Principal, now: Instant) {
-        if let Some(holder) = self.holder.as_mut().filter(|h| h.principal.name() == by.name()) {
+    fn keep(&mut self, by: &Giver, now: Instant) {
+        if let Some(holder) = self.holder.as_mut().filter(|holder| holder.is(by)) {
+            holder.client = Some(by.client.clone());
             holder.last_active = now;
         }
     }
@@ -308,15 +337,21 @@ impl Command {
         self.holder.as_ref().map(|h| h.principal.name().to_owned())
     }
 
+    fn give_to(&mut self, kind: CommandChangeKind, by: &Giver, now: Instant) -> CommandChange {
+        let Giver { principal, client } = by.clone();
+        let holder = CommandHolder { principal, client: Some(client), since: now, last_active: now };
+        self.give(kind, by, Some(holder), now)
+    }
+
     /// Makes `to` the holder. A request of the new holder is granted by that; others remain.
-    fn give(&mut self, kind: CommandChangeKind, by: &Principal, to: Option<Principal>, now: Instant) -> CommandChange {
+    fn give(&mut self, kind: CommandChangeKind, by: &Giver, to: Option<CommandHolder>, now: Instant) -> CommandChange {
         let from = self.holder_name();
-        self.requests.retain(|r| to.as_ref().is_none_or(|to| r.principal.name() != to.name()));
-        self.holder = to.map(|principal| CommandHolder { principal, since: now, last_active: now });
+        self.requests.retain(|r| to.as_ref().is_none_or(|to| r.principal.name() != to.principal.name()));
+        self.holder = to;
         self.record(kind, by, from, now)
     }
 
-    fn record(&mut self, kind: CommandChangeKind, by: &Principal, from: Option<String>, now: Instant) -> CommandChange {
+    fn record(&mut self, kind: CommandChangeKind, by: &Giver, from: Option<String>, now: Instant) -> CommandChange {
         let change = CommandChange { at: now, kind, by: by.name().to_owned(), from, to: self.holder_name() };
         if self.changes.len() >= MAX_COMMAND_CHANGES {
             self.changes.pop_front();
@@ -326,15 +361,7 @@ impl Command {
     }
 }
 
-fn require_role(by: &Principal, needed: Role) -> Result<(), CommandRefusal> {
+fn require_role(by: &Giver, needed: Role) -> Result<(), CommandRefusal> {
     let refusal = || CommandRefusal::Role { name: by.name().to_owned(), role: by.role(), needed };
     if by.role() >= needed { Ok(()) } else { Err(refusal()) }
-}
-
-fn held(holder: &CommandHolder, now: Instant) -> CommandRefusal {
-    CommandRefusal::Held {
-        holder: holder.principal.name().to_owned(),
-        held: now.since(holder.since),
-        idle: now.since(holder.last_active),
-    }
 }

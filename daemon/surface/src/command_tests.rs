@@ -1,16 +1,25 @@
 use crate::command::*;
 use proptest::prelude::*;
-use scenecast_core::{Principal, Role};
+use scenecast_core::{ClientName, Giver, Principal, Role};
 use scenecast_protocol::time::Instant;
 
-fn crew() -> [Principal; 4] {
-    let of = |name, role| Principal::new(name, role).unwrap();
+fn crew() -> [Giver; 4] {
+    let of = |name, role| Giver::from(Principal::new(name, role).unwrap());
     [
         of("victor", Role::Viewer),
         of("anna", Role::Operator),
         of("bob", Role::Operator),
         of("carla", Role::Administrator),
     ]
+}
+
+fn principals() -> [Principal; 4] {
+    crew().map(|giver| giver.principal)
+}
+
+/// The same principal at another client.
+fn elsewhere(by: &Giver, client: &str) -> Giver {
+    Giver { client: ClientName::new(client).unwrap(), ..by.clone() }
 }
 
 fn at(seconds: u64) -> Instant {
@@ -20,7 +29,7 @@ fn at(seconds: u64) -> Instant {
 #[test]
 fn the_first_order_takes_command_and_others_are_refused() {
     let [victor, anna, bob, _] = crew();
-    let mut command = Command::new(crew());
+    let mut command = Command::new(principals());
     assert!(matches!(command.check(&victor, OrderKind::Stop, at(0)), Err(CommandRefusal::Role { .. })));
     assert_eq!(command.handle_order(&bob, OrderKind::Stop, at(0)), None, "a stop takes no command");
     assert!(command.holder().is_none());
@@ -37,7 +46,7 @@ fn the_first_order_takes_command_and_others_are_refused() {
 #[test]
 fn command_is_taken_after_silence_only() {
     let [_, anna, bob, _] = crew();
-    let mut command = Command::new(crew());
+    let mut command = Command::new(principals());
     command.handle_action(&anna, &CommandAction::Take, at(0)).unwrap();
     command.handle_action(&anna, &CommandAction::Keep, at(100)).unwrap();
     let refusal = command.handle_action(&bob, &CommandAction::Take, at(219)).unwrap_err();
@@ -49,8 +58,8 @@ fn command_is_taken_after_silence_only() {
 #[test]
 fn command_is_handed_over_to_an_operator_on_request() {
     let [_, anna, bob, carla] = crew();
-    let mut command = Command::new(crew());
-    let act = |command: &mut Command, by: &Principal, action, s| command.handle_action(by, &action, at(s));
+    let mut command = Command::new(principals());
+    let act = |command: &mut Command, by: &Giver, action, s| command.handle_action(by, &action, at(s));
     act(&mut command, &anna, CommandAction::Request, 0).unwrap();
     assert_eq!(act(&mut command, &anna, CommandAction::HandOver(None), 1), Err(CommandRefusal::NoRequest));
     act(&mut command, &bob, CommandAction::Request, 2).unwrap();
@@ -65,6 +74,37 @@ fn command_is_handed_over_to_an_operator_on_request() {
     let pending: Vec<_> = command.requests(at(6)).map(|r| r.principal.name()).collect();
     assert_eq!(pending, ["carla"]);
     assert_eq!(command.requests(at(200)).count(), 0, "requests lapse");
+}
+
+#[test]
+fn command_belongs_to_the_client_that_took_it() {
+    let [_, anna, bob, _] = crew();
+    let [bridge, cabin] = ["bridge", "cabin"].map(|client| elsewhere(&anna, client));
+    let mut command = Command::new(principals());
+    command.handle_order(&bridge, OrderKind::Order, at(0)).unwrap();
+    let refusal = command.check(&cabin, OrderKind::Order, at(1)).unwrap_err().to_string();
+    assert_eq!(refusal, "anna has command at another client (bridge): take command to move it here");
+    assert!(command.check(&cabin, OrderKind::Stop, at(1)).is_ok());
+    command.handle_action(&cabin, &CommandAction::Keep, at(60)).unwrap();
+    assert_eq!(command.holder().unwrap().last_active, at(0), "a sign of another client is none of the holder");
+    assert!(command.handle_action(&cabin, &CommandAction::Release, at(61)).is_err());
+    let moved = command.handle_action(&cabin, &CommandAction::Take, at(62)).unwrap().unwrap();
+    assert_eq!((moved.kind, moved.to.as_deref()), (CommandChangeKind::Moved, Some("anna")));
+    assert!(command.check(&cabin, OrderKind::Order, at(63)).is_ok());
+    assert!(command.check(&bridge, OrderKind::Order, at(63)).is_err());
+    assert!(matches!(command.check(&bob, OrderKind::Order, at(63)), Err(CommandRefusal::Held { .. })));
+}
+
+#[test]
+fn command_that_was_handed_over_belongs_to_the_first_client_that_uses_it() {
+    let [_, anna, bob, _] = crew();
+    let [bridge, cabin] = ["bridge", "cabin"].map(|client| elsewhere(&bob, client));
+    let mut command = Command::new(principals());
+    command.handle_action(&anna, &CommandAction::Take, at(0)).unwrap();
+    command.handle_action(&anna, &CommandAction::HandOver(Some("bob".to_owned())), at(1)).unwrap();
+    assert!([&bridge, &cabin].iter().all(|by| command.check(by, OrderKind::Order, at(2)).is_ok()));
+    assert_eq!(command.handle_order(&cabin, OrderKind::Order, at(2)), None);
+    assert!(command.check(&bridge, OrderKind::Order, at(3)).is_err());
 }
 
 #[derive(Debug, Clone)]
@@ -96,7 +136,7 @@ proptest! {
     #[test]
     fn command_changes_hands_by_the_rules_only(steps in prop::collection::vec((0usize..4, 0u64..150, step()), 1..80)) {
         let crew = crew();
-        let mut command = Command::new(crew.clone());
+        let mut command = Command::new(principals());
         let (mut seconds, mut last_sign, mut recorded) = (0, 0, None);
         for (who, pause, step) in steps {
             seconds += pause;

@@ -35,7 +35,7 @@ pub use label_gains::LabelGains;
 pub use log::{LogEntry, LogKind, MissionLog};
 pub use orders::{AreaOrder, AreasOrder, DestinationOrder, FenceOrder, LimitsOrder, order_name};
 pub use registration_record::RegistrationRecord;
-pub use scenecast_core::{Principal, Role};
+pub use scenecast_core::{ClientName, Giver, Principal, Role};
 pub use settings::{SettingsOrder, SettingsRecord};
 pub use surface::{Surface, SurfaceOutput};
 pub use track::Track;

@@ -35,6 +35,7 @@ impl Surface {
     pub(super) fn log_command(&mut self, change: &CommandChange) {
         let text = match (change.kind, &change.to) {
             (CommandChangeKind::Taken, _) => "takes command".to_owned(),
+            (CommandChangeKind::Moved, _) => "moves command to another client".to_owned(),
             (CommandChangeKind::HandedOver, Some(to)) => format!("hands command over to {to}"),
             (CommandChangeKind::HandedOver, None) => "hands command over".to_owned(),
             (CommandChangeKind::Released, _) => "releases command".to_owned(),

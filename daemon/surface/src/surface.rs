@@ -7,7 +7,7 @@ use super::position::{Relay, UsblSighting};
 use super::vehicle_record::VehicleRecord;
 use scenecast_config::RestoreOrders;
 use scenecast_core::tuning_table::{Fit, NoRow, TuningTable};
-use scenecast_core::{Principal, UsblLine};
+use scenecast_core::{Giver, Principal, UsblLine};
 use scenecast_protocol::directive::{Budget, OrderStatus, Slot, SlotId};
 use scenecast_protocol::exemplar::Exemplar;
 use scenecast_protocol::link::{Cycle, Mismatch, PeerView, SurfaceEvent, SurfaceLink, Transmit, Wakeup};
@@ -83,20 +83,15 @@ impl Surface {
         &self.command
     }
 
-    /// An order that the principal was allowed to give was accepted.
-    pub fn handle_accepted(&mut self, by: &Principal, kind: OrderKind, now: Instant) {
+    /// An order that its giver was allowed to give was accepted.
+    pub fn handle_accepted(&mut self, by: &Giver, kind: OrderKind, now: Instant) {
         let change = self.command.handle_order(by, kind, now);
         change.iter().for_each(|change| self.log_command(change));
         self.outputs.extend(change.map(SurfaceOutput::CommandChanged));
     }
 
     /// Requests command, hands it over, takes it or gives it up.
-    pub fn change_command(
-        &mut self,
-        by: &Principal,
-        action: &CommandAction,
-        now: Instant,
-    ) -> Result<(), CommandRefusal> {
+    pub fn change_command(&mut self, by: &Giver, action: &CommandAction, now: Instant) -> Result<(), CommandRefusal> {
         let change = self.command.handle_action(by, action, now)?;
         change.iter().for_each(|change| self.log_command(change));
         self.outputs.extend(change.map(SurfaceOutput::CommandChanged));

@@ -1,4 +1,4 @@
-// Who has command at the mock. A page is the principal in its cookie `principal`, or `local`.
+// Who has command at the mock. A page is the principal in its cookie `principal`, or `local`, at the client that it names.
 
 const SILENCE_S = 120;
 const ROLES = ["viewer", "operator", "administrator"];
@@ -14,24 +14,35 @@ export class Command {
     return this.principals.find((p) => p.name === name) ?? { name: "local", role: "administrator" };
   }
 
+  giver(headers) {
+    return { ...this.principal(headers.cookie), client: headers["x-scenecast-client"] ?? "" };
+  }
+
+  #isHolder(by) {
+    return this.holder?.name === by.name && (this.holder.client ?? by.client) === by.client;
+  }
+
+  #keep(by, nowS) {
+    if (this.#isHolder(by)) Object.assign(this.holder, { client: by.client, last_active_s: nowS });
+  }
+
   /** The status and the error of an order of a kind (stop, order, settings), or null. */
   refusal(by, kind) {
     const needed = kind === "settings" ? "administrator" : "operator";
     if (ROLES.indexOf(by.role) < ROLES.indexOf(needed)) return [403, `this needs the role ${needed}; the role of ${by.name} is ${by.role}`];
-    if (kind === "stop" || !this.holder || this.holder.name === by.name) return null;
-    return [409, `${this.holder.name} has command`];
+    return kind === "stop" || !this.holder || this.#isHolder(by) ? null : [409, `${this.holder.name} has command`];
   }
 
   order(by, kind, nowS) {
     if (!this.holder && kind !== "stop") this.#give("taken", by, by, nowS);
-    if (this.holder?.name === by.name) this.holder.last_active_s = nowS;
+    this.#keep(by, nowS);
   }
 
   /** Changes command; returns the status and the error, or null. */
   act(by, { action, to }, nowS) {
     const refused = this.refusal(by, "stop");
     if (refused) return refused;
-    if (this.holder?.name === by.name) this.holder.last_active_s = nowS;
+    this.#keep(by, nowS);
     const others = () => this.requests.filter((r) => r.name !== by.name);
     if (action === "request" && this.holder) {
       this.requests = [...others(), { name: by.name, at_s: nowS }];
@@ -42,11 +53,12 @@ export class Command {
       this.#record("withdrawn", by, this.holder?.name ?? null, nowS);
     }
     if (action === "take" || (action === "request" && !this.holder)) {
-      if (this.holder && nowS < this.holder.last_active_s + SILENCE_S) return [409, `${this.holder.name} has command`];
-      this.#give("taken", by, by, nowS);
+      const isOwn = this.holder?.name === by.name;
+      if (this.holder && !isOwn && nowS < this.holder.last_active_s + SILENCE_S) return [409, `${this.holder.name} has command`];
+      if (!this.#isHolder(by)) this.#give(isOwn ? "moved" : "taken", by, by, nowS);
     }
     if (action === "hand_over" || action === "release") {
-      if (this.holder?.name !== by.name) return [409, `${this.holder?.name} has command`];
+      if (!this.#isHolder(by)) return [409, `${this.holder?.name} has command`];
       this.#give(action === "release" ? "released" : "handed_over", by, this.principals.find((p) => p.name === to) ?? null, nowS);
     }
     return null;
@@ -54,7 +66,7 @@ export class Command {
 
   #give(kind, by, to, nowS) {
     const from = this.holder?.name ?? null;
-    this.holder = to && { ...to, since_s: nowS, last_active_s: nowS };
+    this.holder = to && { client: null, ...to, since_s: nowS, last_active_s: nowS };
     this.requests = this.requests.filter((r) => r.name !== to?.name);
     this.#record(kind, by, from, nowS);
   }

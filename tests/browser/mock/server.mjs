@@ -120,7 +120,7 @@ async function post(mock, req, res, path) {
   if (req.headers["x-scenecast"] !== "1") return reply(res, 403, { error: "header X-Scenecast is missing" });
   const { mission } = mock;
   const given = await body(req);
-  const by = mission.command.principal(req.headers.cookie);
+  const by = mission.command.giver(req.headers);
   if (path === "command") {
     const refused = mission.command.act(by, given, mission.nowS);
     reply(res, refused?.[0] ?? 200, refused ? { error: refused[1] } : mission.command.json());

@@ -97,6 +97,35 @@ export default [
     },
   },
   {
+    name: "of two browsers without tokens only one has command, and the other one moves it",
+    scenario: "rich",
+    async run(s) {
+      await s.page.locator("#command").click();
+      await s.button("Close").click();
+      await s.shows("#command", /Nobody has command/);
+      await weigh(s);
+      await s.page.locator("#send-weights").click();
+      await s.shows("#command", /You have command/);
+      const context = await s.browser.newContext();
+      await s.watch(context);
+      const page = await context.newPage();
+      try {
+        await page.goto(s.url);
+        const caption = page.locator("#command");
+        await s.until("the other browser to say so", async () => /local at another client has command/.test(await caption.innerText()));
+        await page.locator("#exploration").fill("0.2");
+        await s.until("the weights to be refused", () => page.locator("#send-weights").isDisabled());
+        await caption.click();
+        await page.getByRole("button", { name: "Take command", exact: true }).click();
+        await s.until("the other browser to have command", async () => /You have command/.test(await caption.innerText()));
+        await s.shows("#command", /local at another client has command/);
+        assert.match(await page.locator("ol.changes").innerText(), /local moved command to another client/);
+      } finally {
+        await context.close();
+      }
+    },
+  },
+  {
     name: "command is taken after two minutes of silence",
     scenario: "rich",
     async run(s) {
@@ -134,7 +163,7 @@ export default [
     name: "a withdrawn order is sent again only if an operator wishes it",
     scenario: "rich",
     async run(s) {
-      const post = (path, body) => s.page.evaluate(([path, body]) => fetch(`/api/v2/vehicles/1/${path}`, { method: "POST", headers: { "x-scenecast": "1" }, body: JSON.stringify(body) }).then((r) => r.status), [path, body]);
+      const post = (path, body) => s.page.evaluate(([path, body]) => fetch(`/api/v2/vehicles/1/${path}`, { method: "POST", headers: { "x-scenecast": "1", "x-scenecast-client": "story" }, body: JSON.stringify(body) }).then((r) => r.status), [path, body]);
       await post("limits", { time_s: 600 });
       await post("constraints", { action: "abort" });
       await s.steer({ withdraw: { constraints: "it has not arrived in time: is it still to be sent?" } });

@@ -1,11 +1,16 @@
 // The HTTP API of the daemon: reads, and orders with the header that the server requires.
 
+import { recall, remember } from "./prefs.js";
 import { parseTiles } from "./tiles.js";
 
 export const BASE = "/api/v2";
 const TIMEOUT_MS = 10000;
 /** A whole map may have some megabytes. */
 const MAP_TIMEOUT_MS = 60000;
+
+/** The name of this browser: command belongs to the client that took it. */
+export const client = recall("client", null) ?? `page-${crypto.getRandomValues(new Uint32Array(1))[0].toString(16).padStart(8, "0")}`;
+remember("client", client);
 
 /** The message is one line for people. */
 export class ApiError extends Error {}
@@ -22,7 +27,7 @@ async function write(path, order) {
   try {
     response = await fetch(BASE + path, {
       method: "POST",
-      headers: { "content-type": "application/json", "x-scenecast": "1" },
+      headers: { "content-type": "application/json", "x-scenecast": "1", "x-scenecast-client": client },
       body: JSON.stringify(order),
       // An order is sent even if the page is closed or loaded again at once.
       keepalive: true,

@@ -1,6 +1,6 @@
 // The principal of this page, who has command, and the actions that both allow.
 
-import { readPrincipal, sendCommand } from "./api.js";
+import { client, readPrincipal, sendCommand } from "./api.js";
 import { store } from "./store.js";
 
 const ROLES = ["viewer", "operator", "administrator"];
@@ -12,8 +12,13 @@ let keptMs = -KEEP_MS;
 
 export const principal = () => me;
 export const holder = () => store.snapshot?.command?.holder ?? null;
-export const hasCommand = () => me !== null && holder()?.name === me.name;
+/** Whether our principal has command, here or at another client. */
+export const isHolder = () => me !== null && holder()?.name === me.name;
+export const hasCommand = () => isHolder() && (holder().client ?? client) === client;
 export const rank = (role) => ROLES.indexOf(role);
+
+/** The holder for people. */
+export const holderName = () => (isHolder() && !hasCommand() ? `${holder().name} at another client` : holder()?.name ?? "Nobody");
 
 /** Reads the principal now, and after each interruption; signs of presence follow the keyboard and the pointer. */
 export function startPrincipal() {
@@ -50,5 +55,5 @@ export function denial(kind) {
   const least = kind === "settings" ? "administrator" : "operator";
   if (rank(me.role) < rank(least)) return `This needs the role ${least}; yours is ${me.role}.`;
   if (["stop", "record"].includes(kind) || holder() === null || hasCommand()) return null;
-  return `${holder().name} has command: request it in the bar at the top.`;
+  return `${holderName()} has command: ${isHolder() ? "take" : "request"} it in the bar at the top.`;
 }

@@ -6,7 +6,7 @@ use http_body_util::{BodyExt, Full, Limited};
 use hyper::body::Incoming;
 use hyper::{Method, Request, Response, StatusCode, Uri, header};
 use hyper_util::rt::TokioIo;
-use scenecast_core::UserError;
+use scenecast_core::{ClientName, UserError};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use std::time::Duration;
@@ -25,11 +25,13 @@ pub struct Client {
     /// `HOST:PORT`.
     authority: String,
     token: Option<Zeroizing<String>>,
+    /// The name that we give ourselves.
+    name: ClientName,
 }
 
 impl Client {
-    /// A client of `http://HOST:PORT`, with a token if the surface requires one.
-    pub fn new(url: &str, token: Option<Zeroizing<String>>) -> Result<Self, UserError> {
+    /// A client of `http://HOST:PORT` with a name, and a token if the surface requires one.
+    pub fn new(url: &str, token: Option<Zeroizing<String>>, name: ClientName) -> Result<Self, UserError> {
         let error = || UserError::Input(format!("--url {url}: expected http://HOST:PORT"));
         let parsed: Uri = url.parse().map_err(|_| error())?;
         let is_plain =
@@ -41,7 +43,11 @@ impl Client {
             None => return Err(error()),
         };
         let authority = format!("{}:{port}", authority.host());
-        Ok(Self { url: format!("http://{authority}"), authority, token })
+        Ok(Self { url: format!("http://{authority}"), authority, token, name })
+    }
+
+    pub(super) fn name(&self) -> &str {
+        self.name.as_str()
     }
 
     /// The body and the `ETag` of a resource.
@@ -110,6 +116,9 @@ impl Client {
         tokio::spawn(connection);
         let mut request = Request::builder().method(method).uri(path).header(header::HOST, &self.authority);
         request = request.header("x-scenecast", "1").header(header::CONTENT_TYPE, "application/json");
+        if !self.name.as_str().is_empty() {
+            request = request.header("x-scenecast-client", self.name.as_str());
+        }
         if let Some(token) = &self.token {
             request = request.header(header::AUTHORIZATION, format!("Bearer {}", **token));
         }
@@ -170,7 +179,8 @@ mod tests {
 
     #[test]
     fn an_address_is_a_host_with_an_optional_port() {
-        let authority = |url| Client::new(url, None).map(|c| c.authority).map_err(|e| e.exit_code());
+        let authority =
+            |url| Client::new(url, None, ClientName::default()).map(|c| c.authority).map_err(|e| e.exit_code());
         assert_eq!(authority("http://127.0.0.1:8460").unwrap(), "127.0.0.1:8460");
         assert_eq!(authority("http://surface.ship/").unwrap(), "surface.ship:80");
         assert_eq!(authority("http://[::1]:8460").unwrap(), "[::1]:8460");

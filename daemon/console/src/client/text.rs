@@ -182,7 +182,9 @@ pub(super) fn command(command: &CommandState, now_s: f64) -> String {
     let left = holder.takeable_s - now_s;
     let take = if left > 0.0 { format!("free to take in {}", span(left)) } else { "free to take".to_owned() };
     let (held, idle) = (span(now_s - holder.since_s), span(now_s - holder.last_active_s));
-    format!("{} for {held}, last active {idle} ago; {take}", holder.name)
+    let client = holder.client.as_ref().filter(|client| !client.is_empty());
+    let at = client.map(|client| format!(" ({client})")).unwrap_or_default();
+    format!("{}{at} for {held}, last active {idle} ago; {take}", holder.name)
 }
 
 /// One line for a change of command.
@@ -196,6 +198,7 @@ pub(super) fn command_change(change: &CommandChangeState) -> String {
         CommandChangeName::Released => format!("{by} gave command up"),
         CommandChangeName::Requested => format!("{by} requested command from {from}"),
         CommandChangeName::Withdrawn => format!("{by} withdrew the request for command"),
+        CommandChangeName::Moved => format!("{by} moved command to another client"),
     }
 }
 

@@ -8,7 +8,7 @@ use axum::http::uri::Authority;
 use axum::http::{HeaderMap, HeaderName, HeaderValue, Method, StatusCode, Uri, header};
 use axum::middleware::Next;
 use axum::response::{IntoResponse, Redirect, Response};
-use scenecast_surface::{Principal, Role};
+use scenecast_surface::{ClientName, Giver, Role};
 use std::net::IpAddr;
 use std::sync::Arc;
 use std::time::Duration;
@@ -23,11 +23,16 @@ const RESPONSE_TIMEOUT: Duration = Duration::from_secs(15);
 pub(super) async fn guard(State(access): State<Arc<Access>>, mut request: Request, next: Next) -> Response {
     let principal = access.identify(request.headers());
     let is_admitted = principal.is_some() || access::is_open(request.uri().path());
-    if let Some(principal) = principal {
-        request.extensions_mut().insert(principal);
+    let client = client_name(request.headers());
+    if let (Some(principal), Some(client)) = (principal, client.clone()) {
+        request.extensions_mut().insert(Giver { principal, client });
     }
     let mut response = match check(request.method(), request.uri(), request.headers(), &access.names) {
         _ if !is_known(request.method()) => unknown_method(),
+        _ if client.is_none() => error(
+            StatusCode::BAD_REQUEST,
+            "X-Scenecast-Client takes 1 to 32 letters, digits, dots, hyphens or underscores of ASCII",
+        ),
         Err(reason) => error(StatusCode::FORBIDDEN, reason),
         Ok(()) if !is_admitted => unauthorized(request.uri().path()),
         Ok(()) => match tokio::time::timeout(RESPONSE_TIMEOUT, next.run(request)).await {
@@ -47,19 +52,25 @@ pub(super) async fn guard(State(access): State<Arc<Access>>, mut request: Reques
 /// Refuses principals below a role, before the body of the request is read.
 pub(super) async fn require_role(
     State(needed): State<Role>,
-    principal: Option<Extension<Principal>>,
+    by: Option<Extension<Giver>>,
     request: Request,
     next: Next,
 ) -> Response {
-    match principal {
-        Some(Extension(principal)) if principal.role() >= needed => next.run(request).await,
-        Some(Extension(principal)) => {
-            let (name, role) = (principal.name(), principal.role());
+    match by {
+        Some(Extension(by)) if by.role() >= needed => next.run(request).await,
+        Some(Extension(by)) => {
+            let (name, role) = (by.name(), by.role());
             let line = format!("this needs the role {needed}; the role of {name} is {role}");
             error(StatusCode::FORBIDDEN, &line)
         }
         None => unauthorized(request.uri().path()),
     }
+}
+
+/// The name that a client gives itself; `None` if it is not allowed.
+fn client_name(headers: &HeaderMap) -> Option<ClientName> {
+    let Some(name) = headers.get("x-scenecast-client") else { return Some(ClientName::default()) };
+    name.to_str().ok().and_then(ClientName::new)
 }
 
 /// Whether the interface has operations with this method. TRACE would return the token of a request to its sender.

@@ -13,7 +13,8 @@ time in seconds, `now_s` being the present, unless it is called a duration. Metr
 needs a `Host` of this machine and, if it has an `Origin`, that of the page; a POST needs the header `X-Scenecast: 1`. If the \
 surface has a `console.token_file`, a request needs a token of it, in `Authorization: Bearer TOKEN` or as the cookie of \
 `/login`; `x-role` is the least role that may use an operation (viewer, operator, administrator). Orders other than hold \
-and abort also need command: see `change_command`. \
+and abort also need command, which belongs to one client of a principal: see `change_command`. A client names itself in the header \
+`X-Scenecast-Client`. \
 Text is compressed for clients that accept gzip; maps and files carry an `ETag`.";
 
 pub(super) fn document() -> Vec<u8> {
@@ -185,6 +186,9 @@ fn parameters(operation: &Operation) -> Vec<Value> {
         parameters.push(
             json!({ "name": "X-Scenecast", "in": "header", "required": true, "description": text, "schema": schema }),
         );
+        let schema = json!({ "type": "string", "pattern": "^[A-Za-z0-9._-]{1,32}$" });
+        let text = "The name that the client gives itself: command belongs to the client that took it";
+        parameters.push(json!({ "name": "X-Scenecast-Client", "in": "header", "description": text, "schema": schema }));
     }
     parameters
 }

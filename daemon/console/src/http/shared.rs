@@ -12,7 +12,7 @@ use axum::http::StatusCode;
 use axum::http::request::Parts;
 use axum::response::Response;
 use scenecast_protocol::map::Cell;
-use scenecast_surface::{OrderKind, Principal};
+use scenecast_surface::{Giver, OrderKind};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use tokio::sync::{Mutex, Semaphore, mpsc, oneshot, watch};
@@ -76,7 +76,7 @@ impl Shared {
 
     /// The reply of the surface to a reading; the error is a response with status 503.
     pub(super) async fn request(&self, request: SurfaceRequest) -> Result<Reply, Response> {
-        self.send(ClientRequest { principal: None, request }).await
+        self.send(ClientRequest { by: None, request }).await
     }
 
     async fn send(&self, request: ClientRequest) -> Result<Reply, Response> {
@@ -101,8 +101,8 @@ impl Shared {
     }
 
     /// The reply of the surface to an order of a principal, as a response.
-    pub(super) async fn order(&self, by: Principal, request: SurfaceRequest) -> Response {
-        self.send(ClientRequest { principal: Some(by), request }).await.map_or_else(|busy| busy, respond)
+    pub(super) async fn order(&self, by: Giver, request: SurfaceRequest) -> Response {
+        self.send(ClientRequest { by: Some(by), request }).await.map_or_else(|busy| busy, respond)
     }
 }
 

@@ -13,6 +13,7 @@ pub(crate) fn command_state(command: &Command, now: Instant) -> CommandState {
         holder: command.holder().map(|h| CommandHolderState {
             name: h.principal.name().to_owned(),
             role: role(h.principal.role()),
+            client: h.client.as_ref().map(|client| client.as_str().to_owned()),
             since_s: seconds(h.since),
             last_active_s: seconds(h.last_active),
             takeable_s: seconds(h.last_active + COMMAND_SILENCE),
@@ -46,6 +47,7 @@ fn change(change: &CommandChange) -> CommandChangeState {
         CommandChangeKind::Released => CommandChangeName::Released,
         CommandChangeKind::Requested => CommandChangeName::Requested,
         CommandChangeKind::Withdrawn => CommandChangeName::Withdrawn,
+        CommandChangeKind::Moved => CommandChangeName::Moved,
     };
     let CommandChange { at, by, from, to, .. } = change.clone();
     CommandChangeState { at_s: seconds(at), kind, by, from, to }

@@ -24,7 +24,8 @@ pub struct PrincipalInfo {
     pub role: PrincipalRole,
 }
 
-/// Who has command: the right to give orders other than hold and abort.
+/// Who has command: the right to give orders other than hold and abort. It belongs to one client of a principal: a browser, a
+/// terminal or a program.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 pub struct CommandState {
     /// The principal who has command; null if nobody has it. Then the first order takes it.
@@ -44,6 +45,9 @@ pub struct CommandHolderState {
     pub name: String,
     /// The role that its token gives.
     pub role: PrincipalRole,
+    /// The client that has command, by the name that it gives itself; empty if it gives none. Null after command was handed over: the
+    /// first client of the principal that gives an order or a sign of presence has it then.
+    pub client: Option<String>,
     /// Mission time since which it has command.
     pub since_s: f64,
     /// Mission time of its last order or sign of presence.
@@ -90,4 +94,6 @@ pub enum CommandChangeName {
     Requested,
     /// The request for command was withdrawn.
     Withdrawn,
+    /// Moved to another client of the same principal.
+    Moved,
 }

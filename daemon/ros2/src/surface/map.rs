@@ -63,7 +63,7 @@ impl MapTopics {
             return;
         }
         self.last = Some(Instant::now());
-        let request = ClientRequest { principal: None, request: SurfaceRequest::Map(vehicle.id) };
+        let request = ClientRequest { by: None, request: SurfaceRequest::Map(vehicle.id) };
         let Some(Reply::Map(cells)) = desk.request(request) else { return };
         let Some(grid) = grid(&cells, key.shift_m) else {
             // It counts as published, so that it is not read again before it changes.

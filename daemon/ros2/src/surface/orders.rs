@@ -8,7 +8,7 @@ use crate::node::RosNode;
 use crate::transport::Qos;
 use scenecast_console::state::VehicleState;
 use scenecast_console::{ClientRequest, Reply, SurfaceRequest};
-use scenecast_core::{Principal, UserError};
+use scenecast_core::{ClientName, Giver, Principal, UserError};
 use scenecast_messages::scenecast_msgs::{Abort, Event, Fence, Hold, Utility};
 use scenecast_messages::std_msgs::Header;
 use std::time::SystemTime;
@@ -42,7 +42,9 @@ impl OrderTopics {
     /// Requests what was ordered: stops first.
     pub fn handle(&mut self, desk: &Desk, vehicle: &VehicleState) -> Vec<Outcome> {
         let Some(principal) = &desk.principal else { return Vec::new() };
-        let by = |request| ClientRequest { principal: Some(principal.clone()), request };
+        let client = ClientName::of_program("ros2");
+        let giver = Giver { principal: principal.clone(), client };
+        let by = |request| ClientRequest { by: Some(giver.clone()), request };
         let mut outcomes = Vec::new();
         let mut order = |name, header: &Header, request: Result<SurfaceRequest, String>| {
             let reply = fresh(header).and(request).map(|request| desk.request(by(request)));

@@ -109,7 +109,7 @@ impl VehicleTopics {
             return;
         };
         let request = SurfaceRequest::Exemplar(vehicle.id, label, Some(image.number));
-        match desk.request(ClientRequest { principal: None, request }) {
+        match desk.request(ClientRequest { by: None, request }) {
             Some(Reply::File(_, webp)) => {
                 let header = header(stamps.at(image.at_s), &format!("label_{label}"));
                 if exemplar_jpeg(&webp, header).is_some_and(|message| !self.exemplars.publish(message)) {

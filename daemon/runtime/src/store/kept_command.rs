@@ -2,12 +2,16 @@
 
 use super::refusing::{at, start};
 use crate::journal::disk::Disk;
-use scenecast_core::{Principal, Role};
+use scenecast_core::{ClientName, Giver, Principal, Role};
 use scenecast_protocol::time::Instant;
 use scenecast_surface::{CommandAction, OrderKind, Surface};
 
-fn principal(name: &str) -> Principal {
-    Principal::new(name, Role::Operator).unwrap()
+fn operator(name: &str) -> Giver {
+    Principal::new(name, Role::Operator).unwrap().into()
+}
+
+fn local(client: &str) -> Giver {
+    Giver { principal: Principal::local(), client: ClientName::new(client).unwrap() }
 }
 
 /// Holder, requests and the number of changes.
@@ -22,17 +26,19 @@ fn shown(surface: &Surface, now: Instant) -> (Option<String>, Vec<String>, usize
 fn command_its_requests_and_its_history_survive_a_restart() {
     let (disk, now) = (Disk::default(), Instant::from_secs_f64(1.0));
     let (mut store, mut surface) = start(&disk, 0);
-    surface.handle_accepted(&Principal::local(), OrderKind::Order, now);
+    surface.handle_accepted(&local("page-1"), OrderKind::Order, now);
     store.commit(&mut surface, Some("local"), at(1));
-    surface.change_command(&principal("bo"), &CommandAction::Request, now).unwrap();
+    surface.change_command(&operator("bo"), &CommandAction::Request, now).unwrap();
     store.commit(&mut surface, Some("bo"), at(2));
     assert_eq!(shown(&surface, now), (Some("local".to_owned()), vec!["bo".to_owned()], 2));
     drop(store);
     let (store, mut surface) = start(&disk, 3);
-    let is_held = surface.command().check(&principal("bo"), OrderKind::Order, now).is_err();
+    let is_held = surface.command().check(&operator("bo"), OrderKind::Order, now).is_err();
     // Without tokens there is no principal "bo" any more.
     assert_eq!((is_held, shown(&surface, now)), (true, (Some("local".to_owned()), vec![], 2)));
-    surface.change_command(&Principal::local(), &CommandAction::Release, now).unwrap();
+    let release = |surface: &mut Surface, client| surface.change_command(&local(client), &CommandAction::Release, now);
+    assert!(release(&mut surface, "page-2").is_err(), "it belongs to the client that took it");
+    release(&mut surface, "page-1").unwrap();
     let mut store = store;
     store.commit(&mut surface, Some("local"), at(4));
     drop(store);

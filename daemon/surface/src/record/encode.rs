@@ -181,7 +181,7 @@ mod tests {
 
     #[test]
     fn golden_bytes_of_command() {
-        let holder = Some(("ann".to_owned(), 5, 300));
+        let holder = Some(("ann".to_owned(), Some("pc".to_owned()), 5, 300));
         let command = StoredCommand { holder, requests: vec![("bo".to_owned(), 6)] };
         let to = Some("ann".to_owned());
         let change = StoredCommandChange { at: 5, kind: 1, by: "bo".to_owned(), from: None, to };
@@ -193,7 +193,7 @@ mod tests {
             &[0, 7, 2][..],
             &[1],
             &head,
-            &[4, 1, 3, b'a', b'n', b'n', 5, 0xAC, 2, 1, 2, b'b', b'o', 6],
+            &[4, 1, 3, b'a', b'n', b'n', 1, 2, b'p', b'c', 5, 0xAC, 2, 1, 2, b'b', b'o', 6],
             &[2],
             &head,
             &[5, 5, 1, 2, b'b', b'o', 0, 1, 3, b'a', b'n', b'n'],

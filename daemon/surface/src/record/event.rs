@@ -54,8 +54,8 @@ pub enum EventKind {
 /// Who has command and who requests it, by name. Times are mission times in microseconds.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct StoredCommand {
-    /// The holder, the time since when, and that of the last sign of presence.
-    pub holder: Option<(String, u64, u64)>,
+    /// The holder, his client, the time since when, and that of the last sign of presence.
+    pub holder: Option<(String, Option<String>, u64, u64)>,
     /// Requests with their times, the oldest first.
     pub requests: Vec<(String, u64)>,
 }
@@ -64,7 +64,7 @@ pub struct StoredCommand {
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct StoredCommandChange {
     pub at: u64,
-    /// 0 taken, 1 handed over, 2 released, 3 requested, 4 withdrawn.
+    /// 0 taken, 1 handed over, 2 released, 3 requested, 4 withdrawn, 5 moved to another client.
     pub kind: u8,
     pub by: String,
     pub from: Option<String>,

@@ -3,13 +3,15 @@
 use crate::Surface;
 use crate::command::{Command, CommandChange, CommandChangeKind};
 use crate::record::{StoredCommand, StoredCommandChange, SurfaceMemory};
+use scenecast_core::ClientName;
 use scenecast_protocol::time::Instant;
 
 /// The holder and the requests as they are stored.
 pub(super) fn stored(command: &Command, now: Instant) -> StoredCommand {
     let holder = command.holder().map(|holder| {
         let name = holder.principal.name().to_owned();
-        (name, holder.since.as_micros(), holder.last_active.as_micros())
+        let client = holder.client.as_ref().map(|client| client.as_str().to_owned());
+        (name, client, holder.since.as_micros(), holder.last_active.as_micros())
     });
     let requests = command.requests(now).map(|r| (r.principal.name().to_owned(), r.at.as_micros()));
     StoredCommand { holder, requests: requests.collect() }
@@ -32,7 +34,10 @@ fn stored_change(change: &CommandChange) -> StoredCommandChange {
 /// Puts command back as it was stored.
 pub(super) fn restore(surface: &mut Surface, memory: &SurfaceMemory) {
     let at = Instant::from_micros;
-    let holder = memory.command.holder.as_ref().map(|(name, since, last)| (name.as_str(), at(*since), at(*last)));
+    let holder = memory.command.holder.as_ref().map(|(name, client, since, last)| {
+        let client = client.as_ref().map(|name| ClientName::new(name).unwrap_or_default());
+        (name.as_str(), client, at(*since), at(*last))
+    });
     let requests = memory.command.requests.iter().map(|(name, asked)| (name.clone(), at(*asked)));
     let changes = memory.command_changes.iter().filter_map(|change| {
         let StoredCommandChange { at: changed, kind, by, from, to } = change.clone();

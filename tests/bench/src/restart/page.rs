@@ -2,7 +2,7 @@
 
 use scenecast_console::client::{Client, block_on};
 use scenecast_console::state::{MissionState, OrderStatus, VehicleState};
-use scenecast_core::UserError;
+use scenecast_core::{ClientName, UserError};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::thread::sleep;
@@ -100,7 +100,7 @@ fn is_not_before(now: OrderStatus, then: OrderStatus) -> bool {
 
 impl Page {
     pub(super) fn new(port: u16) -> Result<Self, UserError> {
-        Client::new(&format!("http://127.0.0.1:{port}"), None).map(Self)
+        Client::new(&format!("http://127.0.0.1:{port}"), None, ClientName::default()).map(Self)
     }
 
     /// The state of the only vehicle; `None` while nobody answers.

@@ -163,7 +163,7 @@ fn packed(map: &TiledMap, since: Option<&str>) -> usize {
 }
 
 fn cells(survey: &mut WideSurvey, cell_m: f64) -> Result<MapCells, UserError> {
-    let request = ClientRequest { principal: None, request: SurfaceRequest::Map(survey.vehicle.number()) };
+    let request = ClientRequest { by: None, request: SurfaceRequest::Map(survey.vehicle.number()) };
     match handle_request(&mut survey.surface, request, cell_m, survey.now) {
         Reply::Map(cells) => Ok(cells),
         _ => Err(UserError::Failed("the surface has no map".to_owned())),

@@ -1,7 +1,7 @@
 // Who has command: in the bar, and a dialog that requests it, takes it, hands it over or gives it up.
 
 import { logOut, sendCommand } from "../api.js";
-import { hasCommand, holder, principal, rank } from "../command.js";
+import { hasCommand, holder, holderName, isHolder, principal, rank } from "../command.js";
 import { $, announce, h, text } from "../dom.js";
 import { missionTime, span } from "../format.js";
 import { ageOf, store } from "../store.js";
@@ -18,7 +18,7 @@ export function startCommand() {
   store.on("state edit tick feed", update);
 }
 
-const caption = () => (hasCommand() ? "You have command" : `${holder()?.name ?? "Nobody"} has command`);
+const caption = () => (hasCommand() ? "You have command" : `${holderName()} has command`);
 
 function update() {
   if (!store.snapshot?.command) return;
@@ -43,7 +43,7 @@ const isPending = () => store.snapshot.command.requests.some((r) => r.name === p
 function refresh() {
   text(ages, describe());
   const { command } = store.snapshot;
-  const key = JSON.stringify([principal(), holder()?.name, command.requests, command.history, canTake()]);
+  const key = JSON.stringify([principal(), holder()?.name, holder()?.client, command.requests, command.history, canTake()]);
   if (key === shown) return;
   shown = key;
   const mayCommand = principal() && rank(principal().role) >= rank("operator");
@@ -63,6 +63,7 @@ function describe() {
   const now = holder();
   if (!now) return "Nobody has command. The first order takes it.";
   const left = now.takeable_s - store.nowS;
+  if (isHolder() && !hasCommand()) return `${now.name} has command at another client${now.client ? ` (${now.client})` : ""}. Take it to move it here.`;
   const take = hasCommand() ? "" : left > 0 ? ` It can be taken in ${span(left)} without a sign of ${now.name}.` : " It can be taken.";
   return `${now.name} has had command for ${span(ageOf(now.since_s))}, last active ${span(ageOf(now.last_active_s))} ago.${take}`;
 }
@@ -70,6 +71,7 @@ function describe() {
 function actions() {
   const button = (name, action, to = null, disabled = false) => h("button", { type: "button", disabled, onclick: () => act(action, to) }, name);
   if (!holder()) return [button("Take command", "take")];
+  if (isHolder() && !hasCommand()) return [button("Take command", "take")];
   if (!hasCommand()) {
     return [isPending() ? button("Withdraw request", "withdraw") : button("Request command", "request"), button("Take command", "take", null, !canTake())];
   }
@@ -89,6 +91,7 @@ function sentence({ kind, by, from, to }) {
     case "taken": return from === null ? `${by} took command` : `${by} took command from ${from}, who was silent`;
     case "handed_over": return `${by} handed command over to ${to}`;
     case "released": return `${by} gave command up`;
+    case "moved": return `${by} moved command to another client`;
     case "requested": return `${by} requested command from ${from}`;
     default: return `${by} withdrew the request`;
   }

@@ -9,16 +9,16 @@ use crate::snapshot::principal_info;
 use axum::extract::State;
 use axum::response::{IntoResponse, Response};
 use axum::{Extension, Json};
-use scenecast_surface::{CommandAction, Principal};
+use scenecast_surface::{CommandAction, Giver};
 
 /// Name and role of the client's principal.
-pub(in crate::http) async fn principal(principal: Option<Extension<Principal>>) -> Response {
-    principal.map_or_else(not_found, |Extension(principal)| Json(principal_info(&principal)).into_response())
+pub(in crate::http) async fn principal(by: Option<Extension<Giver>>) -> Response {
+    by.map_or_else(not_found, |Extension(by)| Json(principal_info(&by.principal)).into_response())
 }
 
 pub(in crate::http) async fn command(
     State(shared): State<Shared>,
-    Extension(principal): Extension<Principal>,
+    Extension(by): Extension<Giver>,
     JsonOrder(order): JsonOrder<CommandOrder>,
 ) -> Response {
     let action = match order.action {
@@ -29,5 +29,5 @@ pub(in crate::http) async fn command(
         CommandOrderAction::Release => CommandAction::Release,
         CommandOrderAction::Keep => CommandAction::Keep,
     };
-    shared.order(principal, SurfaceRequest::Command(action)).await
+    shared.order(by, SurfaceRequest::Command(action)).await
 }

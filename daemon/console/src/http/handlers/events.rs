@@ -11,7 +11,7 @@ use axum::body::{Body, Bytes};
 use axum::extract::State;
 use axum::http::{StatusCode, header};
 use axum::response::{IntoResponse, Response};
-use scenecast_surface::Principal;
+use scenecast_surface::Giver;
 use std::collections::{BTreeMap, VecDeque};
 use std::convert::Infallible;
 use std::sync::Arc;
@@ -29,11 +29,8 @@ struct Feed {
 }
 
 /// The latest state after each change, and the maps that have changed. A slow reader misses states, but never the last one.
-pub(in crate::http) async fn events(
-    State(shared): State<Shared>,
-    Extension(principal): Extension<Principal>,
-) -> Response {
-    let Some(seat) = shared.seats.take(principal.name(), Instant::now()) else {
+pub(in crate::http) async fn events(State(shared): State<Shared>, Extension(by): Extension<Giver>) -> Response {
+    let Some(seat) = shared.seats.take(by.name(), Instant::now()) else {
         let line = format!("{MAX_STREAMS} streams of events are open, which is the maximum");
         return error(StatusCode::SERVICE_UNAVAILABLE, &line);
     };

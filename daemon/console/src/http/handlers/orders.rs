@@ -11,7 +11,7 @@ use axum::http::StatusCode;
 use axum::response::Response;
 use axum::routing::{MethodRouter, post};
 use scenecast_protocol::directive::SlotId;
-use scenecast_surface::Principal;
+use scenecast_surface::Giver;
 use serde::de::DeserializeOwned;
 use std::collections::BTreeMap;
 
@@ -22,21 +22,21 @@ where
 {
     post(
         move |State(shared): State<Shared>,
-              Extension(principal): Extension<Principal>,
+              Extension(by): Extension<Giver>,
               VehicleId(id): VehicleId,
-              JsonOrder(order): JsonOrder<T>| async move { shared.order(principal, request(id, order)).await },
+              JsonOrder(order): JsonOrder<T>| async move { shared.order(by, request(id, order)).await },
     )
 }
 
 pub(in crate::http) async fn utility(
     State(shared): State<Shared>,
-    Extension(principal): Extension<Principal>,
+    Extension(by): Extension<Giver>,
     VehicleId(id): VehicleId,
     JsonOrder(order): JsonOrder<UtilityOrder>,
 ) -> Response {
     match by_label(order.weights) {
         Ok(weights) => {
-            shared.order(principal, SurfaceRequest::Utility(id, weights, (order.exploration, order.curiosity))).await
+            shared.order(by, SurfaceRequest::Utility(id, weights, (order.exploration, order.curiosity))).await
         }
         Err(line) => error(StatusCode::UNPROCESSABLE_ENTITY, &line),
     }
@@ -44,15 +44,15 @@ pub(in crate::http) async fn utility(
 
 pub(in crate::http) async fn draft(
     State(shared): State<Shared>,
-    Extension(principal): Extension<Principal>,
+    Extension(by): Extension<Giver>,
     VehicleId(id): VehicleId,
     JsonOrder(order): JsonOrder<DraftOrder>,
 ) -> Response {
-    let author = principal.name().to_owned();
+    let author = by.name().to_owned();
     match by_label(order.weights) {
         Ok(weights) => {
             let terms = (order.exploration, order.curiosity);
-            shared.order(principal, SurfaceRequest::Draft(id, author, weights, terms)).await
+            shared.order(by, SurfaceRequest::Draft(id, author, weights, terms)).await
         }
         Err(line) => error(StatusCode::UNPROCESSABLE_ENTITY, &line),
     }
@@ -67,15 +67,15 @@ fn by_label(weights: BTreeMap<String, f64>) -> Result<BTreeMap<u8, f64>, String>
 
 pub(in crate::http) async fn budget(
     State(shared): State<Shared>,
-    Extension(principal): Extension<Principal>,
+    Extension(by): Extension<Giver>,
     JsonOrder(order): JsonOrder<BudgetOrder>,
 ) -> Response {
-    shared.order(principal, SurfaceRequest::Budget(order)).await
+    shared.order(by, SurfaceRequest::Budget(order)).await
 }
 
 pub(in crate::http) async fn again(
     State(shared): State<Shared>,
-    Extension(principal): Extension<Principal>,
+    Extension(by): Extension<Giver>,
     VehicleId(id): VehicleId,
     JsonOrder(AgainOrder { slot }): JsonOrder<AgainOrder>,
 ) -> Response {
@@ -83,25 +83,25 @@ pub(in crate::http) async fn again(
         let names = SlotId::ALL.map(SlotId::name).join(", ");
         return error(StatusCode::UNPROCESSABLE_ENTITY, &format!("slot {slot:?}: it takes {names}"));
     };
-    shared.order(principal, SurfaceRequest::Again(id, slot)).await
+    shared.order(by, SurfaceRequest::Again(id, slot)).await
 }
 
 pub(in crate::http) async fn note(
     State(shared): State<Shared>,
-    Extension(principal): Extension<Principal>,
+    Extension(by): Extension<Giver>,
     VehicleId(id): VehicleId,
     JsonOrder(order): JsonOrder<NoteOrder>,
 ) -> Response {
-    let author = principal.name().to_owned();
-    shared.order(principal, SurfaceRequest::Note(id, author, order)).await
+    let author = by.name().to_owned();
+    shared.order(by, SurfaceRequest::Note(id, author, order)).await
 }
 
 pub(in crate::http) async fn marker(
     State(shared): State<Shared>,
-    Extension(principal): Extension<Principal>,
+    Extension(by): Extension<Giver>,
     VehicleId(id): VehicleId,
     JsonOrder(order): JsonOrder<MarkerOrder>,
 ) -> Response {
-    let author = principal.name().to_owned();
-    shared.order(principal, SurfaceRequest::Marker(id, author, order)).await
+    let author = by.name().to_owned();
+    shared.order(by, SurfaceRequest::Marker(id, author, order)).await
 }

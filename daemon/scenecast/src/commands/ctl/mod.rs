@@ -11,7 +11,7 @@ use constraints::{FenceCommand, LimitsCommand, ReturnPointCommand};
 use places::{AreasCommand, Go};
 use scenecast_console::client::{self, BudgetChange, Client, LogSelection, Session, SettingsChange};
 use scenecast_console::orders::ExemplarAction;
-use scenecast_core::UserError;
+use scenecast_core::{ClientName, UserError};
 use scenecast_surface::{LogKind, SettingsOrder};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -340,7 +340,8 @@ impl Ctl {
             wait => wait.map(Duration::from_secs_f64),
         };
         let token = self.token_file.as_deref().map(scenecast_config::read_token).transpose()?;
-        let client = Client::new(&self.url, token)?;
+        let name = ClientName::of_program(&format!("ctl-{}", scenecast_runtime::host_name()));
+        let client = Client::new(&self.url, token, name)?;
         let session = Session { client, json: self.json, vehicle: self.vehicle, wait };
         client::block_on(self.command.run(&session))
     }
