@@ -13,13 +13,13 @@ fn state(port: u16) -> Option<Value> {
     (status == 200).then(|| serde_json::from_slice(&body).ok()).flatten()
 }
 
-/// Starts both ends; the vehicle's file has `link`.
-fn start(dir: &Path, vehicle_key: &str, surface_key: &str, link: &str) -> (u16, Process, Process) {
+/// Starts both ends; the section `link` of the surface's and of the vehicle's file has these lines.
+fn start(dir: &Path, vehicle_key: &str, surface_key: &str, surface_link: &str, link: &str) -> (u16, Process, Process) {
     let (modem, page) = (free_port(), free_port());
     let seal = |key: &str| format!("key_file = \"{key}\"\nauthenticate = \"all\"\nencrypt = true\n");
     let runtime = |who: &str| format!("[runtime]\ntime_scale = 20\nstate_dir = \"{}\"\n", dir.join(who).display());
     let surface = format!(
-        "{}[link]\n{}[modem]\nlisten = \"127.0.0.1:{modem}\"\n[console]\nlisten = \"127.0.0.1:{page}\"\n",
+        "{}[link]\n{}{surface_link}[modem]\nlisten = \"127.0.0.1:{modem}\"\n[console]\nlisten = \"127.0.0.1:{page}\"\n",
         runtime("asv"),
         seal(surface_key)
     );
@@ -45,7 +45,7 @@ fn key(dir: &Path, name: &str) -> String {
 fn budget_and_shares_change_from_either_end_under_a_key() {
     let dir = scratch("either-end");
     let key = key(&dir, "mission.key");
-    let (page, _surface, vehicle) = start(&dir, &key, &key, "budget_bps = 4000\n");
+    let (page, _surface, vehicle) = start(&dir, &key, &key, "", "budget_bps = 4000\n");
     let budget = || state(page)?["vehicles"][0]["status"]["budget_bps"].as_u64();
     wait_until("the vehicle's budget is told", LIMIT, || budget() == Some(4000));
     let order = |map: u32| {
@@ -81,9 +81,22 @@ fn budget_and_shares_change_from_either_end_under_a_key() {
 #[test]
 fn an_end_with_another_key_is_not_heard() {
     let dir = scratch("another-key");
-    let (page, _surface, _vehicle) = start(&dir, &key(&dir, "one.key"), &key(&dir, "other.key"), "");
+    let (page, _surface, _vehicle) = start(&dir, &key(&dir, "one.key"), &key(&dir, "other.key"), "", "");
     wait_until("two minutes of the mission pass", LIMIT, || {
         state(page).is_some_and(|s| s["now_s"].as_f64() > Some(120.0))
     });
     assert!(state(page).unwrap()["vehicles"][0]["last_received_s"].is_null());
+}
+
+#[test]
+fn another_length_of_frames_is_named_and_the_link_works_all_the_same() {
+    let dir = scratch("another-length");
+    let key = key(&dir, "mission.key");
+    let (page, _surface, _vehicle) = start(&dir, &key, &key, "frame_bytes = 48\n", "frame_bytes = 512\n");
+    let vehicle = || state(page).map(|s| s["vehicles"][0].clone());
+    wait_until("a status", LIMIT, || vehicle().is_some_and(|v| v["status"].is_object()));
+    wait_until("the difference", LIMIT, || {
+        let said = vehicle().and_then(|v| v["link"]["mismatch"].as_str().map(str::to_owned)).unwrap_or_default();
+        said.contains("longer than those of this end (48 bytes)") && said.contains("link.frame_bytes at both ends")
+    });
 }

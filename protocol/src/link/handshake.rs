@@ -2,9 +2,9 @@
 //! a numbered frame proves it.
 
 use super::FrameNumber;
-use super::run::{EndedPeer, Identity, LinkRun};
+use super::run::{EndedPeer, Identities, Identity, LinkRun};
 use crate::seal::{Direction, SessionKey};
-use crate::wire::{Envelope, Frame, Introduction, MissionId, SessionId};
+use crate::wire::{Envelope, Frame, Introduction, MissionId};
 use std::collections::VecDeque;
 
 /// The result of a hello.
@@ -62,7 +62,7 @@ pub(super) struct Handshake<T> {
     /// At the vehicle: `run` serves only to receive grants, because this end has begun a new one.
     leaving: bool,
     retired: VecDeque<EndedPeer>,
-    random: u64,
+    identities: Identities,
 }
 
 impl<T> Handshake<T> {
@@ -73,19 +73,17 @@ impl<T> Handshake<T> {
     /// Frames without any acknowledgement after which a vehicle doubts that the surface knows its run.
     const DOUBTFUL: u64 = 128;
 
-    /// A handshake that has not begun; `seed` must be random for each start of the program.
-    pub(super) fn new(seed: u64) -> Self {
-        let mut random = seed;
-        let own = fresh(&mut random);
+    /// A handshake that has not begun.
+    pub(super) fn new(mut identities: Identities) -> Self {
         Self {
-            own,
+            own: identities.draw(),
             run: None,
             offered: Vec::new(),
             unproved: None,
             doubted_from: 0,
             leaving: false,
             retired: VecDeque::new(),
-            random,
+            identities,
         }
     }
 
@@ -171,7 +169,7 @@ impl<T> Handshake<T> {
         match self.offered.last_mut().filter(|r| r.peer == peer) {
             Some(run) => run.introduce(introduction),
             None => {
-                let own = fresh(&mut self.random);
+                let own = self.identities.draw();
                 self.offered = vec![LinkRun::of_any_version(own, peer, introduction, key(own, peer))];
             }
         }
@@ -245,14 +243,14 @@ impl<T> Handshake<T> {
     /// At the vehicle: begins a new run toward the surface's current one.
     pub(super) fn renew_vehicle(&mut self, key: impl Fn(Identity, Identity) -> Option<SessionKey>) {
         let Some((peer, introduction)) = self.run.as_ref().map(|r| (r.peer, r.introduction)) else { return };
-        let own = fresh(&mut self.random);
+        let own = self.identities.draw();
         self.offered = vec![LinkRun::new(own, peer, introduction, key(own, peer))];
         self.leaving = true;
     }
 
     /// At the surface: begins a new run, which a new handshake must introduce to the vehicle.
     pub(super) fn renew_surface(&mut self) {
-        self.own = fresh(&mut self.random);
+        self.own = self.identities.draw();
         self.offered.clear();
         if let Some(old) = self.run.take() {
             self.retire(old);
@@ -290,9 +288,4 @@ impl<T> Handshake<T> {
             self.retired.pop_front();
         }
     }
-}
-
-fn fresh(random: &mut u64) -> Identity {
-    let session = SessionId::from_random(crate::random::next(random) as u16);
-    Identity { session, nonce: crate::random::next(random) }
 }

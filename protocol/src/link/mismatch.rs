@@ -1,10 +1,10 @@
-//! Settings in which the other end differs, so that its frames are refused.
+//! Settings in which the other end differs.
 
 use crate::wire::{SessionId, WIRE_VERSION};
 use std::collections::BTreeSet;
 
-/// A setting in which the other end differs. It is found in a frame with a valid CRC or tag, apart from [`Self::Tag`] and
-/// [`Self::Key`].
+/// A setting in which the other end differs, so that its frames are refused or wasteful. It is found in a frame with a valid CRC or
+/// tag, apart from [`Self::Tag`] and [`Self::Key`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, thiserror::Error)]
 pub enum Mismatch {
     /// The other end has this wire version.
@@ -23,6 +23,9 @@ pub enum Mismatch {
         "its hellos fit neither the key nor the mission number here: set the same link.key_file and mission.id at both ends"
     )]
     Key,
+    /// Its frames are longer than those of this end, which have so many bytes. They are read all the same.
+    #[error("its frames are longer than those of this end ({0} bytes): set the same link.frame_bytes at both ends")]
+    Longer(usize),
 }
 
 /// Reports each mismatch once, so that no stranger can fill a log with them.
@@ -31,6 +34,8 @@ pub(super) struct MismatchReport {
     found: Option<Mismatch>,
     /// The last one since a frame was accepted.
     current: Option<Mismatch>,
+    /// Frames that are accepted, but longer than ours.
+    longer: Option<Mismatch>,
     reported: BTreeSet<Mismatch>,
     /// Frames with an unexpected tag, which may also be damaged frames, since the last accepted one.
     tagged: u32,
@@ -64,6 +69,14 @@ impl MismatchReport {
         }
     }
 
+    /// A frame of so many bytes was accepted; those of this end have `own`.
+    pub(super) fn note_length(&mut self, bytes: usize, own: usize) {
+        if bytes > own && self.longer.is_none() {
+            self.longer = Some(Mismatch::Longer(own));
+            self.found = self.longer;
+        }
+    }
+
     /// A hello has verified.
     pub(super) fn handle_true_hello(&mut self) {
         self.untrue = None;
@@ -75,7 +88,7 @@ impl MismatchReport {
     }
 
     pub(super) fn current(&self) -> Option<Mismatch> {
-        self.current
+        self.current.or(self.longer)
     }
 
     pub(super) fn poll(&mut self) -> Option<Mismatch> {

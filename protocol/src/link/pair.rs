@@ -6,7 +6,7 @@ pub use receive::Inbound;
 
 use super::handshake::{FramePurpose, Handshake};
 use super::mismatch::{Mismatch, MismatchReport};
-use super::run::{Authenticity, Identity};
+use super::run::{Authenticity, Identities, Identity};
 use super::{FrameNumber, LinkStats, LinkWindow};
 use crate::directive::Series;
 use crate::seal::{Direction, SessionKey, TAG_BYTES};
@@ -65,7 +65,8 @@ impl<T> LinkPair<T> {
         introduction: Introduction,
         seed: u64,
     ) -> Self {
-        let (handshake, mismatch, stats) = (Handshake::new(seed), MismatchReport::default(), LinkStats::default());
+        let handshake = Handshake::new(Identities::new(seed, authenticity.as_ref()));
+        let (mismatch, stats) = (MismatchReport::default(), LinkStats::default());
         Self {
             mission,
             us,
@@ -128,9 +129,14 @@ impl<T> LinkPair<T> {
         self.authenticity.is_some()
     }
 
-    /// A setting in which the peer differs, until a frame of it is accepted.
+    /// A setting in which the peer differs: until a frame of it is accepted, or with accepted frames that are longer than ours.
     pub fn mismatch(&self) -> Option<Mismatch> {
         self.mismatch.current()
+    }
+
+    /// A frame of the peer of so many bytes was accepted; those of this end have `own`.
+    pub fn note_length(&mut self, bytes: usize, own: usize) {
+        self.mismatch.note_length(bytes, own);
     }
 
     /// A setting in which the peer differs, once after it was found.

@@ -25,6 +25,27 @@ pub struct Identity {
     pub nonce: u64,
 }
 
+/// Draws the identities of the runs of this end.
+#[derive(Debug)]
+pub(super) struct Identities {
+    random: u64,
+    /// The nonces are drawn under it, so that a listener foresees none. Without a key there is nothing to foresee.
+    key: Option<Arc<MissionKey>>,
+}
+
+impl Identities {
+    /// `seed` must be random for each start of the program.
+    pub(super) fn new(seed: u64, authenticity: Option<&Authenticity>) -> Self {
+        Self { random: seed, key: authenticity.map(|a| a.key.clone()) }
+    }
+
+    pub(super) fn draw(&mut self) -> Identity {
+        let session = SessionId::from_random(crate::random::next(&mut self.random) as u16);
+        let drawn = crate::random::next(&mut self.random);
+        Identity { session, nonce: self.key.as_ref().map_or(drawn, |key| key.nonce(drawn)) }
+    }
+}
+
 /// A run of the peer that has ended.
 #[derive(Debug)]
 pub(super) struct EndedPeer {

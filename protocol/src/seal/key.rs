@@ -10,6 +10,7 @@ use zeroize::Zeroizing;
 const FINGERPRINT: &[u8; 16] = b"scenecast-print1";
 const HELLO: &[u8; 16] = b"scenecast-hello1";
 const SESSION: &[u8; 16] = b"scenecast-sessn1";
+const NONCE: &[u8; 16] = b"scenecast-nonce1";
 
 /// The nonce of every hello tag. The hello key encrypts no data; see `prf`.
 const HELLO_NONCE: &[u8; 16] = &[0; 16];
@@ -63,6 +64,13 @@ impl MissionKey {
 
     fn hello_cipher(&self) -> ShortTagged {
         ShortTagged::new(&(*prf(&self.bytes, HELLO, &[])).into())
+    }
+
+    /// The nonce of a run, from a number that no other run of this key draws. Who does not hold the key foresees none from others.
+    pub fn nonce(&self, drawn: u64) -> u64 {
+        let root = prf(&self.bytes, NONCE, &[]);
+        let [a, b, c, d, e, f, g, h, ..] = *prf(&root, &u128::from(drawn).to_be_bytes(), &[]);
+        u64::from_be_bytes([a, b, c, d, e, f, g, h])
     }
 
     /// The key of a session: of the surface's run that drew `surface_nonce`, and the run of `vehicle` that drew

@@ -25,6 +25,14 @@ fn flip(bytes: &mut [u8], bit: usize) {
     bytes[bit / 8] ^= 1 << (bit % 8);
 }
 
+#[test]
+fn nonces_are_those_of_their_key_and_reveal_no_other() {
+    let drawn: BTreeSet<u64> = (0..1000).map(|number| key().nonce(number)).collect();
+    assert_eq!(drawn.len(), 1000);
+    assert!((0..1000).all(|number| MissionKey::from_bytes([9; 16]).nonce(number) != key().nonce(number)));
+    assert_eq!(key().nonce(1), 5_071_469_089_387_775_030);
+}
+
 /// Values for another implementation to check itself; one in Python, written from the standard, confirms them.
 #[test]
 fn golden_bytes() {

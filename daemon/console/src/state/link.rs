@@ -85,7 +85,8 @@ pub struct VehicleChannel {
     /// duplicate, late, base_missing, unknown_sender, unauthenticated (without a proof of the key), key_missing (under a key
     /// that the surface does not have).
     pub dropped: BTreeMap<String, u64>,
-    /// Why the frames of the vehicle are refused: a setting in which it differs. Null once a frame is accepted.
+    /// A setting in which the vehicle and the surface differ, so that its frames are refused or longer than those of the surface. Null
+    /// if none is known.
     pub mismatch: Option<String>,
     /// The backlog of the vehicle; null before its first report.
     pub backlog: Option<ReportedBacklog>,

@@ -10,6 +10,10 @@ use scenecast_protocol::time::Instant;
 use std::collections::VecDeque;
 use std::time::Duration;
 
+/// The longest frame that another end may be set to. Frames longer than ours are handed up all the same: the link names the
+/// difference, which would otherwise look like a channel that loses half of the frames.
+const MAX_FRAME_BYTES: usize = 1024;
+
 #[derive(Debug)]
 enum Shape {
     Stream(Deframer),
@@ -33,7 +37,7 @@ pub struct Paced {
 impl Paced {
     /// Frames in a stream of bytes, no faster than `pace_bps`.
     pub fn stream(profile: ModemProfile, pace_bps: f64) -> Self {
-        Self::new(profile, pace_bps, Shape::Stream(Deframer::new(profile.frame_bytes)))
+        Self::new(profile, pace_bps, Shape::Stream(Deframer::new(MAX_FRAME_BYTES)))
     }
 
     /// A frame a datagram, no faster than `pace_bps`.
@@ -55,7 +59,7 @@ impl Paced {
     }
 
     fn hear(&mut self, bytes: Vec<u8>) {
-        if (1..=self.profile.frame_bytes).contains(&bytes.len()) {
+        if (1..=MAX_FRAME_BYTES).contains(&bytes.len()) {
             let reception = Reception { src: None, bytes: bytes.into(), quality: None, range_m: None };
             self.events.push_back(Event::Received(reception));
         }
@@ -98,7 +102,7 @@ impl Driver for Paced {
     fn handle_open(&mut self, _now: Instant) {
         self.forget();
         if let Shape::Stream(deframer) = &mut self.shape {
-            *deframer = Deframer::new(self.profile.frame_bytes);
+            *deframer = Deframer::new(MAX_FRAME_BYTES);
         }
         self.open = true;
         self.events.push_back(Event::Ready);

@@ -1,10 +1,10 @@
 //! Discovery calls, by which the surface looks for unknown vehicles.
 
-use crate::link::run::{Authenticity, Identity};
+use crate::link::run::{Authenticity, Identities, Identity};
 use crate::link::{Transmit, TransmitKind};
 use crate::mac::{ModemProfile, quarter_seconds};
 use crate::time::Instant;
-use crate::wire::{Address, Envelope, FrameBuilder, FrameKind, Header, MissionId, Seal, SessionId};
+use crate::wire::{Address, Envelope, FrameBuilder, FrameKind, Header, MissionId, Seal};
 use std::time::Duration;
 
 /// Transmits a discovery call from time to time. Each vehicle that is not in contact answers at a random time.
@@ -17,6 +17,7 @@ pub(super) struct Discovery {
     open: Option<(Identity, Instant)>,
     /// The longest one-way propagation time.
     reach: Duration,
+    identities: Identities,
 }
 
 impl Discovery {
@@ -25,10 +26,16 @@ impl Discovery {
     /// The time from which called vehicles choose when to answer.
     const ANSWERS: Duration = Duration::from_secs(2);
 
-    pub(super) fn new(every: Option<Duration>, anybody_known: bool, reach: Duration, now: Instant) -> Self {
+    pub(super) fn new(
+        every: Option<Duration>,
+        anybody_known: bool,
+        reach: Duration,
+        identities: Identities,
+        now: Instant,
+    ) -> Self {
         let pause = if anybody_known { every.unwrap_or_default() } else { Self::FIRST_PAUSE };
         let next = if anybody_known { now + pause } else { now };
-        Self { every, pause, next, open: None, reach }
+        Self { every, pause, next, open: None, reach, identities }
     }
 
     /// When the next call is due, or when the time for answers ends.
@@ -57,15 +64,13 @@ impl Discovery {
         mission: MissionId,
         modem: &ModemProfile,
         authenticity: Option<&Authenticity>,
-        random: &mut u64,
         now: Instant,
     ) -> Transmit {
-        let session = SessionId::from_random(crate::random::next(random) as u16);
-        let own = Identity { session, nonce: crate::random::next(random) };
+        let own = self.identities.draw();
         let header = Header {
             from: Address::SURFACE,
             to: Address::EVERYBODY,
-            session,
+            session: own.session,
             number: 0,
             base: 1,
             remaining: 0,

@@ -18,6 +18,7 @@ pub use peer::{EndedRun, InForce, OtherSurface, PeerView};
 pub use polled::Cycle;
 
 use crate::directive::{Series, Slot, SlotId, SlotProgress, VersionedSlot};
+use crate::link::run::Identities;
 use crate::link::{DropReason, FrameNumber, Transmit};
 use crate::map::{Replica, StateReplica};
 use crate::schedule::{BitBudget, ClassShares, Shares};
@@ -61,13 +62,14 @@ impl<R: StateReplica> SurfaceLink<R> {
         let mut random = seed;
         let series = Series::from_random(crate::random::next(&mut random));
         let is_any_known = !config.vehicles.is_empty();
+        let calls = Identities::new(seed ^ 0xCA11, config.authenticity.as_ref());
         let mut link = Self {
             fleet: Fleet::new(),
             budget: BitBudget::new(config.budget_bps, config.budget_window, now),
             shares: ClassShares::new(config.shares),
             turn: VecDeque::new(),
             in_modem: VecDeque::new(),
-            discovery: Discovery::new(config.discovery_period, is_any_known, config.master.max_propagation, now),
+            discovery: Discovery::new(config.discovery_period, is_any_known, config.master.max_propagation, calls, now),
             cycle: polled::Cycles::default(),
             series,
             random,

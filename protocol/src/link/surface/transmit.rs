@@ -99,7 +99,7 @@ impl<R: StateReplica> SurfaceLink<R> {
             self.discovery.postpone(allowed);
             return false;
         }
-        let transmit = self.discovery.write(self.config.mission, &modem, authenticity, &mut self.random, now);
+        let transmit = self.discovery.write(self.config.mission, &modem, authenticity, now);
         self.turn.push_back(Ready { transmit, number: None });
         true
     }

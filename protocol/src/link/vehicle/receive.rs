@@ -29,6 +29,9 @@ impl<S: StateSource> VehicleLink<S> {
         let owed_hello = self.pair.must_send_hello();
         self.pair.set_silence(self.last_received().map(|at| now.since(at)));
         let inbound = self.pair.handle_frame(&envelope, |_, _| true);
+        if inbound.is_ok() {
+            self.pair.note_length(bytes.len(), self.config.modem.frame_bytes);
+        }
         self.events.extend(self.pair.poll_mismatch().map(VehicleEvent::Mismatch));
         let inbound = match inbound {
             Ok(inbound) => inbound,

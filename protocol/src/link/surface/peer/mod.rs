@@ -254,10 +254,14 @@ impl<R: StateReplica> VehiclePeer<R> {
     ) {
         let content = &self.content;
         let strays_before = self.pair.strays();
-        let inbound = match self.pair.handle_frame(envelope, |base, chunks| content.decodes(base, chunks)) {
+        let inbound = self.pair.handle_frame(envelope, |base, chunks| content.decodes(base, chunks));
+        if inbound.is_ok() {
+            self.pair.note_length(bytes, modem.frame_bytes);
+        }
+        events.extend(self.pair.poll_mismatch().map(|m| SurfaceEvent::Mismatch(self.pair.peer(), m)));
+        let inbound = match inbound {
             Ok(inbound) => inbound,
             Err(reason) => {
-                events.extend(self.pair.poll_mismatch().map(|m| SurfaceEvent::Mismatch(self.pair.peer(), m)));
                 if reason == DropReason::Undecodable {
                     self.is_out_of_step |= self.divergence.note_undecodable(now);
                 }
