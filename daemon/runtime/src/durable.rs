@@ -74,7 +74,8 @@ impl<S: Storage> Keeper<S> {
     ///
     /// The first run of a mission has the given `lineage`, which is random. A vehicle cannot tell it from a run whose
     /// folder is lost, so that it begins as `first` says. The run begins in hold if the journal is
-    /// damaged, if it is missing beside a checkpoint, or if the disk does not take the state.
+    /// damaged, if it is missing beside a checkpoint, or if the disk does not take the state. A damaged journal costs the orders, and
+    /// not the map: the run takes the lineage of the checkpoint over.
     pub(super) fn begin_run(
         storage: S,
         lineage: u64,
@@ -83,10 +84,15 @@ impl<S: Storage> Keeper<S> {
     ) -> StartedRun<S> {
         let (journal, found) = Journal::open(storage, JOURNAL);
         let storage = journal.storage();
+        let forgotten = |name, damage: &Damage| {
+            // Beside no journal at all, the checkpoint may be another mission's.
+            let checkpoint = checkpoint.filter(|_| *damage != Damage::Missing);
+            forgetful(&storage.path(name), damage, lineage, checkpoint, first)
+        };
         let (mut durable, is_again) = match found {
             Found::Absent if !checkpoint::is_there(storage) => (first.durable(lineage), false),
-            Found::Absent => (forgetful(storage, JOURNAL.journal, &Damage::Missing, lineage, first), true),
-            Found::Lost(name, damage) => (forgetful(storage, name, &damage, lineage, first), true),
+            Found::Absent => (forgotten(JOURNAL.journal, &Damage::Missing), true),
+            Found::Lost(name, damage) => (forgotten(name, &damage), true),
             Found::State { body, damage } => match decode(&body) {
                 Some(last) => {
                     let mut durable = continued(last, checkpoint);
@@ -97,7 +103,7 @@ impl<S: Storage> Keeper<S> {
                     }
                     (durable, true)
                 }
-                None => (forgetful(storage, JOURNAL.journal, &Damage::Version, lineage, first), true),
+                None => (forgotten(JOURNAL.journal, &Damage::Version), true),
             },
         };
         let mut keeper = Self { journal, is_refused: false };
@@ -142,11 +148,21 @@ fn continued(last: Durable, checkpoint: Option<(u64, u8)>) -> Durable {
 }
 
 /// The state of a run after the loss of the last one's: it holds, and applies no order that may have been applied before.
-/// The epoch is random, because the last one is not known.
-fn forgetful(storage: &impl Storage, name: &str, damage: &Damage, lineage: u64, first: &FirstStart) -> Durable {
-    let place = storage.path(name);
+/// The map that was learnt goes on from its checkpoint. The last epoch is not known: the new one is random, and far from that of the
+/// checkpoint, which the last run began at or soon after.
+fn forgetful(
+    place: &Path,
+    damage: &Damage,
+    lineage: u64,
+    checkpoint: Option<(u64, u8)>,
+    first: &FirstStart,
+) -> Durable {
     tracing::error!("{}: {damage}; the vehicle's orders are lost, and it holds", place.display());
-    let epoch = lineage.to_be_bytes()[0];
+    let random = lineage.to_be_bytes()[0];
+    let (lineage, epoch) = match checkpoint {
+        Some((lineage, epoch)) => (lineage, epoch.wrapping_add(64 + random % 128)),
+        None => (lineage, random),
+    };
     Durable { epoch, hold: true, lost: LostOrders::Present, ..first.durable(lineage) }
 }
 
@@ -270,6 +286,21 @@ mod tests {
         let disk = Disk::default();
         disk.put("scene.checkpoint", b"any");
         lost(&disk);
+    }
+
+    #[test]
+    fn a_lost_journal_costs_the_orders_and_not_the_learnt_map() {
+        let disk = Disk::default();
+        let (mut keeper, durable) = begin(&disk);
+        assert!(keeper.save(&Durable { epoch: 250, lineage: 77, budget_bps: Some(500), ..durable }));
+        for name in NAMES {
+            let mut bytes = disk.read(name).unwrap().unwrap();
+            bytes[40] ^= 1;
+            disk.put(name, &bytes);
+        }
+        let run = Keeper::begin_run(disk, 9 << 56, Some((77, 250)), &free()).durable;
+        let expected = Durable { lineage: 77, epoch: 67, hold: true, lost: LostOrders::Present, ..Durable::default() };
+        assert_eq!(run, expected, "the mapper of this lineage resumes, in an epoch of its own");
     }
 
     /// The bytes of both files after each of `count` states, the last of which does not hold.
