@@ -311,7 +311,7 @@ impl SurfaceShell {
                 tracing::info!("an image of label {label} of vehicle {} is here", vehicle.number());
             }
             SurfaceOutput::Mismatch(vehicle, mismatch) => {
-                tracing::warn!("vehicle {} and this surface differ: {mismatch}", vehicle.number());
+                tracing::warn!("the settings of vehicle {} do not fit: {mismatch}", vehicle.number());
             }
             SurfaceOutput::CommandChanged(change) => log_command(&change),
             SurfaceOutput::RunEnded(_) | SurfaceOutput::SlotDecided(..) | SurfaceOutput::Changed(_) => {}

@@ -30,7 +30,7 @@ pub enum SurfaceOutput {
     SlotDecided(Address, SlotId),
     /// The copy of a vehicle's last run is kept apart ([`PeerView::ended_run`]), because a new run begins.
     RunEnded(Address),
-    /// A setting of a vehicle differs, so that its frames are refused or longer than ours.
+    /// A setting of a vehicle does not fit.
     Mismatch(Address, Mismatch),
     /// Command was requested, handed over, taken or released.
     CommandChanged(CommandChange),

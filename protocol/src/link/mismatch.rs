@@ -1,9 +1,9 @@
-//! Settings in which the other end differs.
+//! Settings of the other end that do not fit.
 
 use crate::wire::{SessionId, WIRE_VERSION};
 use std::collections::BTreeSet;
 
-/// A setting in which the other end differs, so that its frames are refused or wasteful. It is found in a frame with a valid CRC or
+/// A setting of the other end that does not fit, so that its frames are refused, wasteful or those of two. It is found in a frame with a valid CRC or
 /// tag, apart from [`Self::Tag`] and [`Self::Key`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, thiserror::Error)]
 pub enum Mismatch {
@@ -26,6 +26,11 @@ pub enum Mismatch {
     /// Its frames are longer than those of this end, which have so many bytes. They are read all the same.
     #[error("its frames are longer than those of this end ({0} bytes): set the same link.frame_bytes at both ends")]
     Longer(usize),
+    /// Two vehicles have its address.
+    #[error(
+        "another vehicle answers at its address, and only one obeys: set a vehicle.address of its own at each vehicle"
+    )]
+    Twin,
 }
 
 /// Reports each mismatch once, so that no stranger can fill a log with them.

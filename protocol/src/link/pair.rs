@@ -149,6 +149,11 @@ impl<T> LinkPair<T> {
         self.peer
     }
 
+    /// Whether a frame names the peer's current run as its own.
+    pub(super) fn is_of_current_run(&self, header: &Header) -> bool {
+        self.handshake.run().is_some_and(|run| run.peer.session == header.session)
+    }
+
     /// Whether there is a current run of the peer.
     pub fn has_run(&self) -> bool {
         self.handshake.run().is_some() && !self.handshake.is_leaving()

@@ -4,7 +4,7 @@ use crate::pair::{Setup, auv, surface_of, vehicle_of};
 use scenecast_protocol::directive::{
     Constraints, Limits, OrderStatus, Series, Slot, SlotId, SlotProgress, SlotState, Utility, Withdrawal,
 };
-use scenecast_protocol::link::{SlotInboxState, SurfaceEvent, SurfaceLink, VehicleEvent, VehicleLink};
+use scenecast_protocol::link::{Mismatch, SlotInboxState, SurfaceEvent, SurfaceLink, VehicleEvent, VehicleLink};
 use scenecast_protocol::mac::Access;
 use scenecast_protocol::map_codec::Codec;
 use scenecast_protocol::time::Instant;
@@ -21,6 +21,8 @@ const PROMPT: Duration = Duration::from_secs(20);
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum End {
     Vehicle,
+    /// A second vehicle with the address of the first.
+    Twin,
     Surface(usize),
 }
 
@@ -47,6 +49,7 @@ struct Waters {
     now: Instant,
     setup: Setup,
     vehicle: VehicleLink,
+    twin: Option<VehicleLink>,
     durable: SlotInboxState,
     surfaces: Vec<SurfaceLink>,
     /// Whether each surface is out of reach.
@@ -62,6 +65,8 @@ struct Waters {
     /// Orders that replaced newer ones.
     regressions: Vec<(Applied, Applied)>,
     lost: [bool; SURFACES],
+    /// Whether a surface has found two vehicles with one address.
+    twin_found: bool,
 }
 
 /// The first series of each surface, far apart from those of others.
@@ -76,6 +81,7 @@ impl Waters {
         let mut waters = Self {
             now,
             vehicle: vehicle_of(&setup, seed ^ 0xA5A5, SlotInboxState::default(), now),
+            twin: None,
             durable: SlotInboxState::default(),
             surfaces: Vec::new(),
             is_away: [false; SURFACES],
@@ -88,6 +94,7 @@ impl Waters {
             applied: Vec::new(),
             regressions: Vec::new(),
             lost: [false; SURFACES],
+            twin_found: false,
             setup,
         };
         for number in 0..SURFACES {
@@ -175,7 +182,10 @@ impl Waters {
         loop {
             self.pump();
             let timers = self.surfaces.iter().map(|surface| surface.poll_timeout(self.now));
-            let timers = timers.chain([self.vehicle.poll_timeout()]).flatten().map(|(at, _)| at);
+            let timers = timers
+                .chain([self.vehicle.poll_timeout(), self.twin.as_ref().and_then(VehicleLink::poll_timeout)])
+                .flatten()
+                .map(|(at, _)| at);
             let timer = timers.filter(|&at| at > self.now).min();
             let event = self.on_air.first_key_value().map(|((at, _), _)| *at);
             let next = timer.into_iter().chain(event).min().unwrap_or(self.now + Duration::from_millis(200));
@@ -196,10 +206,12 @@ impl Waters {
                 self.modems.entry(end).or_default().is_sending = false;
                 match end {
                     End::Vehicle => self.vehicle.handle_transmit_outcome(self.now),
+                    End::Twin => self.twin.as_mut().unwrap().handle_transmit_outcome(self.now),
                     End::Surface(number) => self.surfaces[number].handle_transmit_outcome(self.now),
                 }
             }
             WaterEvent::Arrives(End::Vehicle, bytes) => self.vehicle.handle_frame(&bytes, self.now),
+            WaterEvent::Arrives(End::Twin, bytes) => self.twin.as_mut().unwrap().handle_frame(&bytes, self.now),
             WaterEvent::Arrives(End::Surface(number), bytes) => self.surfaces[number].handle_frame(&bytes, self.now),
         }
     }
@@ -216,11 +228,20 @@ impl Waters {
         for (number, surface) in self.surfaces.iter_mut().enumerate() {
             while let Some(event) = surface.poll_event() {
                 self.lost[number] |= matches!(event, SurfaceEvent::OrdersLost(_));
+                self.twin_found |= matches!(event, SurfaceEvent::Mismatch(_, Mismatch::Twin));
             }
         }
         self.vehicle.set_status(VehicleStatus { labels: 3, budget_bps: 10_000, ..VehicleStatus::default() });
         while let Some(sent) = self.vehicle.poll_transmit(self.now) {
             self.modems.entry(End::Vehicle).or_default().frames.push_back(sent.bytes);
+        }
+        if let Some(twin) = &mut self.twin {
+            while twin.poll_event().is_some() {}
+            twin.handle_persisted();
+            twin.set_status(VehicleStatus { labels: 3, budget_bps: 10_000, ..VehicleStatus::default() });
+            while let Some(sent) = twin.poll_transmit(self.now) {
+                self.modems.entry(End::Twin).or_default().frames.push_back(sent.bytes);
+            }
         }
         for number in 0..SURFACES {
             while let Some(sent) = self.surfaces[number].poll_transmit(self.now) {
@@ -244,8 +265,11 @@ impl Waters {
         self.schedule(end, WaterEvent::Sent(from));
         let is_heard = |number: usize| !self.is_away[number];
         let receivers: Vec<End> = match from {
-            End::Vehicle => (0..SURFACES).filter(|&number| is_heard(number)).map(End::Surface).collect(),
-            End::Surface(number) => is_heard(number).then_some(End::Vehicle).into_iter().collect(),
+            End::Vehicle | End::Twin => (0..SURFACES).filter(|&number| is_heard(number)).map(End::Surface).collect(),
+            End::Surface(number) => {
+                let vehicles = [Some(End::Vehicle), self.twin.as_ref().map(|_| End::Twin)];
+                vehicles.into_iter().flatten().filter(|_| is_heard(number)).collect()
+            }
         };
         for receiver in receivers {
             if !self.chance(self.loss) {
@@ -428,5 +452,55 @@ fn no_order_replaces_a_newer_one_and_each_has_an_end_in_any_schedule_of_three_su
                 waters.orders(surface).into_iter().filter(|order| order.status.is_pending()).collect();
             assert!(open.is_empty(), "seed {seed}, surface {surface}: {open:?}");
         }
+    }
+}
+
+/// Seconds from the arrival of a second vehicle with the same address, `late` after the first, until the surface names it.
+fn seconds_until_a_twin_is_named(setup: &Setup, late: Duration) -> Option<u64> {
+    let mut waters = Waters::new(1, setup.access);
+    waters.setup = setup.clone();
+    waters.vehicle = vehicle_of(setup, 77, SlotInboxState::default(), waters.now);
+    waters.surfaces[0] = surface_of(setup, 78, waters.now);
+    waters.is_away = [false, true, true];
+    if !late.is_zero() {
+        waters.run(late);
+    }
+    waters.twin = Some(vehicle_of(setup, 1234, SlotInboxState::default(), waters.now));
+    (0..400).find(|_| {
+        waters.run(Duration::from_secs(1));
+        waters.twin_found && waters.surfaces[0].vehicle(auv()).unwrap().mismatch(waters.now) == Some(Mismatch::Twin)
+    })
+}
+
+#[test]
+fn two_vehicles_with_one_address_are_named() {
+    for access in ACCESSES {
+        for keyed in [true, false] {
+            let setup =
+                Setup { access, discovery: Some(Duration::from_secs(60)), ..Setup::new(64, 10_000, Codec::Context) };
+            let setup = if keyed { setup.keyed(true, true) } else { setup };
+            let named = seconds_until_a_twin_is_named(&setup, Duration::ZERO);
+            assert!(named.is_some_and(|seconds| seconds <= 30), "{access:?}, keyed {keyed}: {named:?}");
+            // The first one is in contact, and the second one silent until a call. Calls need turns.
+            if access == Access::Shared {
+                let named = seconds_until_a_twin_is_named(&setup, Duration::from_secs(120));
+                assert!(named.is_some_and(|seconds| seconds <= 90), "keyed {keyed}, late: {named:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_vehicle_that_restarts_again_and_again_is_not_taken_for_two() {
+    for access in ACCESSES {
+        let mut waters = Waters::held_by_first(3, access);
+        waters.loss = 0.2;
+        for pause in [1, 3, 40, 12, 7, 90, 2, 25] {
+            waters.restart_vehicle(pause % 2 == 1);
+            waters.run(Duration::from_secs(pause));
+            waters.restart_surface(0);
+            waters.run(Duration::from_secs(40 - pause.min(30)));
+        }
+        assert!(!waters.twin_found, "{access:?}");
     }
 }

@@ -81,7 +81,7 @@ export default [
     async run(s) {
       const mismatch = "it has wire version 2, this end has 3: install the same release at both ends";
       await s.steer({ mismatch });
-      await s.shows("#banners", /auv-1 and this surface differ.*wire version 2, this end has 3/s);
+      await s.shows("#banners", /The settings of auv-1 do not fit.*wire version 2, this end has 3/s);
       await s.steer({ mismatch: null });
       await s.visible("#banners", false);
     },

@@ -80,7 +80,7 @@ pub(super) fn channel(view: &PeerView<'_>, now: Instant) -> VehicleChannel {
         round_trip_s: view.round_trip().map(|d| d.as_secs_f64()),
         one_way_s: view.round_trip().map(|d| d.as_secs_f64() / 2.0),
         clock_offset_s: view.clock().map(|c| clock_offset_s(c, now)),
-        mismatch: view.mismatch().map(|mismatch| mismatch.to_string()),
+        mismatch: view.mismatch(now).map(|mismatch| mismatch.to_string()),
         dropped: dropped(stats).into_iter().map(|(reason, n)| (reason.to_owned(), n)).collect(),
         backlog: view.backlog().map(|(b, at)| backlog(b, at, stats.goodput_in.bits_per_s(now), now)),
     }

@@ -85,8 +85,7 @@ pub struct VehicleChannel {
     /// duplicate, late, base_missing, unknown_sender, unauthenticated (without a proof of the key), key_missing (under a key
     /// that the surface does not have).
     pub dropped: BTreeMap<String, u64>,
-    /// A setting in which the vehicle and the surface differ, so that its frames are refused or longer than those of the surface. Null
-    /// if none is known.
+    /// A setting of the vehicle that does not fit that of the surface, or the address of two vehicles. Null if none is known.
     pub mismatch: Option<String>,
     /// The backlog of the vehicle; null before its first report.
     pub backlog: Option<ReportedBacklog>,

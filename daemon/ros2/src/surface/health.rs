@@ -26,7 +26,7 @@ fn link(vehicle: &VehicleState, now_s: f64) -> Health {
             let name = holder.map_or("", |holder| holder.name.as_str());
             (DiagnosticStatus::WARN, format!("another surface holds the vehicle: {name}"))
         }
-        (Some(mismatch), _) => (DiagnosticStatus::ERROR, format!("the vehicle and the surface differ: {mismatch}")),
+        (Some(mismatch), _) => (DiagnosticStatus::ERROR, format!("the settings of the vehicle do not fit: {mismatch}")),
         (None, None) => (DiagnosticStatus::STALE, "no frame yet".to_owned()),
         (None, Some(age)) if is_silent => (DiagnosticStatus::STALE, format!("silent for {age:.0} s")),
         (None, Some(age)) => (DiagnosticStatus::OK, format!("last frame {age:.0} s ago")),

@@ -312,7 +312,7 @@ impl Vehicle {
                 VehicleEvent::SurfaceMet => self.handle_meeting(),
                 VehicleEvent::SurfaceRestarted => self.handle_surface_restart(),
                 VehicleEvent::Mismatch(mismatch) => {
-                    tracing::warn!("the surface and this vehicle differ: {mismatch}");
+                    tracing::warn!("the settings of the surface do not fit: {mismatch}");
                 }
                 VehicleEvent::Oversized(fault) => tracing::error!("{fault}: it is left out of this frame"),
             }

@@ -43,7 +43,7 @@ pub enum SurfaceEvent {
     OrdersLost(Address),
     /// The copy of a run with this vehicle is kept as [`super::PeerView::ended_run`], because a new run begins.
     RunEnded(Address),
-    /// Frames of a vehicle are refused because a setting differs; each is reported once.
+    /// A setting of a vehicle does not fit; each is reported once, and a second vehicle with its address again after a while.
     Mismatch(Address, Mismatch),
 }
 

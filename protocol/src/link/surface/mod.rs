@@ -264,7 +264,7 @@ impl<R: StateReplica> SurfaceLink<R> {
 
     fn handle_call_answer(&mut self, from: Address, now: Instant) {
         match self.fleet.get_mut(from) {
-            Some(peer) => peer.master.hurry(now),
+            Some(peer) => peer.handle_call_answer(now),
             None => {
                 self.add(from, now);
                 self.events.push_back(SurfaceEvent::VehicleFound(from));

@@ -365,7 +365,7 @@ pub(crate) fn surface_of(setup: &Setup, seed: u64, now: Instant) -> SurfaceLink 
         shares: Shares::default(),
         master: MasterConfig::default(),
         vehicles: vec![auv()],
-        discovery_period: None,
+        discovery_period: setup.discovery,
         authenticity: setup.authenticity.clone(),
     };
     SurfaceLink::new(config, seed, now)

@@ -39,6 +39,8 @@ pub(crate) struct Setup {
     pub(crate) codec: Codec,
     pub(crate) access: Access,
     pub(crate) authenticity: Option<Authenticity>,
+    /// The longest time between two discovery calls; `None`: there are none.
+    pub(crate) discovery: Option<Duration>,
     /// How long a new label must be stable.
     pub(crate) debounce: Duration,
     /// The share of each layer in percent of the map's; `None`: no layers are sent.
@@ -54,6 +56,7 @@ impl Setup {
             codec,
             access: Access::Shared,
             authenticity: None,
+            discovery: None,
             debounce: Duration::ZERO,
             layers: None,
         }

@@ -135,7 +135,7 @@ function faulty(v) {
 
 /** A setting differs at both ends, or somebody else transmits under the vehicle's address. */
 function mismatched(v) {
-  return { key: `mismatch-${v.id}`, kind: "bad", head: `${v.name} and this surface differ`, body: `${v.link.mismatch}.` };
+  return { key: `mismatch-${v.id}`, kind: "bad", head: `The settings of ${v.name} do not fit`, body: `${v.link.mismatch}.` };
 }
 
 const unknownOrders = (v) => Object.keys(v.in_force).filter((slot) => v.in_force[slot] === "unknown");

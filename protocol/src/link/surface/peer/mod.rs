@@ -14,6 +14,7 @@ mod rival;
 mod status;
 mod timing;
 mod turn;
+mod twin;
 mod view;
 
 pub use ended::EndedRun;
@@ -24,7 +25,7 @@ pub use view::PeerView;
 
 use crate::directive::{InForcePart, Series, Slot, SlotId, SlotOutbox, SlotProgress};
 use crate::link::handshake::FramePurpose;
-use crate::link::{Authenticity, DropReason, FrameNumber, Inbound, LinkPair, LinkStats, SurfaceEvent};
+use crate::link::{Authenticity, DropReason, FrameNumber, Inbound, LinkPair, LinkStats, Mismatch, SurfaceEvent};
 use crate::mac::{Access, Master, MasterConfig, ModemProfile};
 use crate::map::StateReplica;
 use crate::schedule::Class;
@@ -38,6 +39,7 @@ use rival::Rivals;
 use std::collections::VecDeque;
 use std::time::Duration;
 use timing::VehicleTiming;
+use twin::TwinWatch;
 
 /// The slots that a frame to a vehicle carried: versions, each with its bytes.
 type Carried = Vec<(SlotId, u16, usize)>;
@@ -76,6 +78,7 @@ pub(super) struct VehiclePeer<R> {
     contact: Contact,
     last_turn: LastTurn,
     divergence: Divergence,
+    twins: TwinWatch,
     /// The two ends were found to differ: a new run must begin.
     is_out_of_step: bool,
     /// Whether both directions are on the air at once, so that answers are prompt.
@@ -105,6 +108,7 @@ impl<R: StateReplica> VehiclePeer<R> {
             contact: Contact::new(now),
             last_turn: LastTurn { began: 0, purpose: FramePurpose::Content },
             divergence: Divergence::default(),
+            twins: TwinWatch::default(),
             is_out_of_step: false,
             is_full_duplex: false,
             answer_wait: USUAL_ANSWER_WAIT,
@@ -125,6 +129,14 @@ impl<R: StateReplica> VehiclePeer<R> {
     pub(super) fn with_abort_lifetime(mut self, lifetime: Option<Duration>) -> Self {
         self.outbox.set_abort_lifetime(lifetime);
         self
+    }
+
+    /// The vehicle has answered a call, to which only those without a run reply.
+    pub(super) fn handle_call_answer(&mut self, now: Instant) {
+        self.master.hurry(now);
+        if self.pair.has_run() {
+            self.twins.handle_stranger(now);
+        }
     }
 
     pub(super) fn address(&self) -> Address {
@@ -285,6 +297,7 @@ impl<R: StateReplica> VehiclePeer<R> {
             return self.handle_refusal(&refusal, now, events);
         }
         if inbound.restarted {
+            self.twins.handle_new_run();
             self.forget_peer(now, events);
             if self.pair.peer_introduction().is_some_and(|i| i.has_no_memory) {
                 let lost = self.outbox.handle_lost_memory(now);
@@ -298,6 +311,9 @@ impl<R: StateReplica> VehiclePeer<R> {
         self.is_out_of_step |= inbound.lacks_base;
         let header = inbound.header().clone();
         if header.kind.is_hello() {
+            if !self.pair.is_of_current_run(&header) {
+                self.twins.handle_stranger(now);
+            }
             // A hello of the current run may be a replay, so it is no sign of life.
             if inbound.restarted {
                 (self.contact.last_received, self.contact.ordered) = (Some(now), None);
@@ -317,6 +333,9 @@ impl<R: StateReplica> VehiclePeer<R> {
         self.contact.hellos = 0;
         self.contact.is_doubtful = false;
         if inbound.is_latest {
+            if self.twins.handle_frame(now) {
+                events.push_back(SurfaceEvent::Mismatch(self.address(), Mismatch::Twin));
+            }
             self.handle_stamp(&header, modem.airtime(bytes), now);
             self.handle_turn(&header, bytes, modem, now);
         }

@@ -37,9 +37,10 @@ impl<'a, R: StateReplica> PeerView<'a, R> {
         self.0.pair.peer_introduction()?.cell_edge.metres()
     }
 
-    /// A setting in which the vehicle differs, so that its frames are refused; `None` once one is accepted.
-    pub fn mismatch(&self) -> Option<Mismatch> {
-        self.0.pair.mismatch()
+    /// A setting of the vehicle that does not fit, as far as is known.
+    pub fn mismatch(&self, now: Instant) -> Option<Mismatch> {
+        let twin = self.0.twins.is_found(now).then_some(Mismatch::Twin);
+        twin.or(self.0.pair.mismatch())
     }
 
     /// The other surface that holds the vehicle.
