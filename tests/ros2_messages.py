@@ -277,6 +277,16 @@ class Hold(IdlStruct, typename="scenecast_msgs::msg::dds_::Hold_"):
 
 
 @dataclass
+class LabelTree(IdlStruct, typename="scenecast_msgs::msg::dds_::LabelTree_"):
+    header: Header
+    vehicle: str
+    epoch: uint32
+    into: sequence[uint8]
+    joins: sequence[uint8]
+    clearest: uint8
+
+
+@dataclass
 class Event(IdlStruct, typename="scenecast_msgs::msg::dds_::Event_"):
     header: Header
     vehicle: str

@@ -25,6 +25,7 @@ from ros2_messages import (  # first: it sets the network of Cyclone DDS
     Header,
     Hold,
     Image,
+    LabelTree,
     NavSatFix,
     OccupancyGrid,
     Odometry,
@@ -136,7 +137,7 @@ def hold(domain, prefix, seconds, is_held, age="0"):
 def all_(domain, prefix, seconds):
     participant = DomainParticipant(int(domain))
     kinds = {"map": (OccupancyGrid, LATCHED), "layers": (GridMap, LATCHED), "cloud": (PointCloud2, LATCHED),
-             "exemplars": (CompressedImage, LATCHED), "pose": (PoseWithCovarianceStamped, STATE), "path": (Path, STATE),
+             "label_tree": (LabelTree, LATCHED), "exemplars": (CompressedImage, LATCHED), "pose": (PoseWithCovarianceStamped, STATE), "path": (Path, STATE),
              "fix": (NavSatFix, STATE), "diagnostics": (DiagnosticArray, STATE)}
     readers = {name: reader(participant, f"{prefix}/{name}", *kind) for name, kind in kinds.items()}
     found = {}
@@ -158,7 +159,7 @@ def all_(domain, prefix, seconds):
         "matrices": [len(m.data) for m in layers.data], "points": cloud.width, "point_bytes": len(cloud.data),
         "jpeg": bytes(found["exemplars"].data[:3]).hex(), "format": found["exemplars"].format,
         "exemplar": found["exemplars"].header.frame_id, "frame": found["pose"].header.frame_id,
-        "path": len(found["path"].poses), "fix": [fix.latitude, fix.longitude], "no_altitude": math.isnan(fix.altitude),
+        "path": len(found["path"].poses), "tree": [list(found["label_tree"].into), list(found["label_tree"].joins)], "fix": [fix.latitude, fix.longitude], "no_altitude": math.isnan(fix.altitude),
         "parts": [s.name for s in found["diagnostics"].status],
         "age_s": time.time() - found["pose"].header.stamp.sec}))
 

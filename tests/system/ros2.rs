@@ -187,6 +187,8 @@ fn every_topic_of_the_surface_reaches_cyclone() {
     let fix = [0, 1].map(|i| all["fix"][i].as_f64().unwrap());
     assert!((fix[0] - 29.5).abs() < 0.01 && (fix[1] - 34.9).abs() < 0.01, "{fix:?}");
     assert_eq!(all["no_altitude"], true);
+    let [into, joins] = [0, 1].map(|part| all["tree"][part].as_array().unwrap());
+    assert!(!joins.is_empty() && into.len() == joins.len() && into.iter().all(|label| number(label) > 0), "{all}");
     let parts: Vec<&str> = all["parts"].as_array().unwrap().iter().filter_map(Value::as_str).collect();
     assert!(parts.len() == 5 && parts[4].ends_with("ros2"), "{parts:?}");
     assert!(all["age_s"].as_f64().unwrap() < 30.0);

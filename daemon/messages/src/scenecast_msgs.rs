@@ -54,6 +54,20 @@ messages! {
         digest: u16,
     }
 
+    /// Which labels of a map become one at coarser cuts.
+    message LabelTree {
+        header: Header,
+        vehicle: String,
+        /// The epoch, in which no label number changes its meaning.
+        epoch: u32,
+        /// Merges, the closest first: the label `joins[i]` becomes one with `into[i]`, which stands for both from then on. The
+        /// first n - k + 1 of n merges make the cut at k labels.
+        into: Vec<u8>,
+        joins: Vec<u8>,
+        /// The number of labels at the cut at which they differ most clearly; 0 if that is the finest one.
+        clearest: u8,
+    }
+
     /// An order as a principal gave it.
     message Order {
         header: Header,

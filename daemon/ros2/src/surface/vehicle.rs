@@ -9,12 +9,13 @@ use super::state::StateTopics;
 use crate::node::Publisher;
 use crate::node::RosNode;
 use crate::transport::Qos;
-use scenecast_console::state::{MissionState, OrderStatus, VehicleState};
+use scenecast_console::state::{MapLabelTree, MissionState, OrderStatus, VehicleState};
 use scenecast_console::{ClientRequest, Reply, SurfaceRequest};
 use scenecast_core::UserError;
 use scenecast_messages::diagnostic_msgs::DiagnosticArray;
 use scenecast_messages::scenecast_msgs::{self, Event};
 use scenecast_messages::sensor_msgs::CompressedImage;
+use scenecast_messages::std_msgs::Header;
 use scenecast_outlets::{WORLD_FRAME, diagnostics, exemplar_jpeg, header};
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::{Duration, Instant};
@@ -29,6 +30,9 @@ const SLOTS: usize = 10;
 /// The topics of one vehicle.
 pub(super) struct VehicleTopics {
     map: MapTopics,
+    tree: Publisher<scenecast_msgs::LabelTree>,
+    /// Epoch and tree that were published.
+    tree_published: Option<(u8, MapLabelTree)>,
     state: StateTopics,
     exemplars: Publisher<CompressedImage>,
     /// Label and number of the exemplars that were published, of this epoch.
@@ -48,6 +52,8 @@ impl VehicleTopics {
         let topic = |name: &str| node.own_topic(&format!("{part}/{name}"));
         Ok(Self {
             map: MapTopics::new(node, part)?,
+            tree: node.publisher(&topic("label_tree")?, Qos::Latched(1))?,
+            tree_published: None,
             state: StateTopics::new(node, part)?,
             exemplars: node.publisher(&topic("exemplars")?, Qos::Latched(EXEMPLARS))?,
             published: (0, BTreeSet::new()),
@@ -84,6 +90,7 @@ impl VehicleTopics {
     ) {
         let confirmed = vehicle.map.updated_s.map_or_else(|| stamps.now(), |at| stamps.at(at));
         self.map.publish(desk, vehicle, || header(confirmed.clone(), WORLD_FRAME));
+        self.publish_tree(vehicle, || header(confirmed.clone(), WORLD_FRAME));
         self.state.publish(mission, vehicle, stamps);
         self.publish_exemplars(desk, vehicle, stamps);
         self.publish_orders(vehicle, stamps);
@@ -92,6 +99,28 @@ impl VehicleTopics {
             self.last_diagnostics = Some(Instant::now());
             let parts = health(vehicle, stamps.now_s()).into_iter().chain([node.health()]);
             self.diagnostics.publish(diagnostics(parts, &vehicle.name, header(stamps.now(), "")));
+        }
+    }
+
+    /// Publishes the tree of the labels when it has changed.
+    fn publish_tree(&mut self, vehicle: &VehicleState, header: impl Fn() -> Header) {
+        let Some(tree) = vehicle.label_tree.as_ref().filter(|_| self.tree.subscribers() > 0) else { return };
+        let found = (vehicle.map.epoch, tree.clone());
+        if self.tree_published.as_ref() == Some(&found) {
+            return;
+        }
+        let (into, joins) = tree.merges.iter().copied().unzip();
+        let message = scenecast_msgs::LabelTree {
+            header: header(),
+            vehicle: vehicle.name.clone(),
+            epoch: vehicle.map.epoch.into(),
+            into,
+            joins,
+            clearest: tree.clearest.unwrap_or(0),
+        };
+        // One that was refused is tried again.
+        if self.tree.publish(message) {
+            self.tree_published = Some(found);
         }
     }
 
