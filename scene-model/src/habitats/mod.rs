@@ -449,6 +449,70 @@ mod tests {
     }
 
     #[test]
+    fn hovering_over_one_place_changes_no_label_elsewhere() {
+        let floor = scenecast_worlds::patches(3, 320, 2400, 70, 7).image;
+        let image = |k: u32| image::imageops::crop_imm(&floor, 0, 80 * k, 320, 240).to_image();
+        let mut habitats = Habitats::new(16);
+        let stay = |habitats: &mut Habitats, k: u32, frames: usize| {
+            for _ in 0..frames {
+                see(habitats, &image(k), -2.0 * f64::from(k));
+                habitats.update();
+            }
+        };
+        (0..27).for_each(|k| stay(&mut habitats, k, 1));
+        // The correction at rest comes first.
+        stay(&mut habitats, 26, 2 * rest::REST_FRAMES as usize);
+        let labels = |habitats: &Habitats| -> BTreeMap<(i32, i32), u32> {
+            habitats.map().iter().map(|cell| ((cell.x, cell.y), cell.topic.0)).collect()
+        };
+        let before = labels(&habitats);
+        stay(&mut habitats, 12, 300);
+        let after = labels(&habitats);
+        let changed = before.iter().filter(|(place, label)| after[place] != **label).count();
+        assert!(changed * 100 <= before.len(), "{changed} of {}", before.len());
+    }
+
+    /// The share of a floor's cells that have the same label where a copy of the floor is seen from `scale` times the altitude.
+    fn equal_from(scale: f64) -> f64 {
+        let near = scenecast_worlds::patches(3, 640, 2400, 70, 7).image;
+        let size = |pixels: u32| (f64::from(pixels) / scale).round() as u32;
+        let far = image::imageops::thumbnail(&near, size(640), size(2400));
+        let mut habitats = Habitats::new(16);
+        let mut over = |floor: &RgbImage, scale: f64, east_m: f64| {
+            let metres_per_pixel = 0.025 * scale;
+            let camera = DownCamera { metres_per_pixel, altitude_m: 4.0 * scale };
+            let (columns, rows) = (320.min(floor.width()), 240.min(floor.height()));
+            for k in 0..200 {
+                let top_m = 2.0 * f64::from(k);
+                let top = (top_m / metres_per_pixel).round() as u32;
+                if top + rows > floor.height() {
+                    return;
+                }
+                let left = (floor.width() - columns) / 2;
+                let image = image::imageops::crop_imm(floor, left, top, columns, rows).to_image();
+                let points = measure(&image, (0.25 / metres_per_pixel) as f32);
+                let y = -f64::from(top) * metres_per_pixel - f64::from(rows) * metres_per_pixel / 2.0;
+                let pose = Pose { x: east_m, y, z: 0.0, yaw_rad: 0.0 };
+                let places = camera.project(columns, rows, &pose, &Habitats::as_words(&points));
+                habitats.add((columns, rows), &points, &places, 0.25);
+            }
+        };
+        over(&near, 1.0, 0.0);
+        over(&far, scale, 50.0);
+        habitats.learn();
+        let cells = (-15..15).flat_map(|x| (-200..-10).map(move |y| (x, y)));
+        let pairs = cells.filter_map(|(x, y)| Some((habitats.label_at(x, y)?, habitats.label_at(x + 200, y)?)));
+        let pairs: Vec<(u32, u32)> = pairs.collect();
+        pairs.iter().filter(|(a, b)| a == b).count() as f64 / pairs.len() as f64
+    }
+
+    #[test]
+    fn a_floor_keeps_its_labels_from_a_quarter_above() {
+        let equal = [1.0, 1.1, 1.25].map(equal_from);
+        assert!(equal[0] > 0.99 && equal[1] > 0.94 && equal[2] > 0.88, "{equal:?}");
+    }
+
+    #[test]
     fn a_label_is_not_given_to_what_shares_few_of_its_cells() {
         let mut habitats = Habitats::new(16);
         let places: Vec<(i32, i32)> = (0..100).map(|x| (0, x)).collect();
