@@ -159,8 +159,12 @@ def check(document, path, method, operation, state):
         refused, _, why = ask(method, path.replace("{id}", "13").replace("{file}", "1.webp").replace("{x}", "0").replace("{y}", "0"), body, headers)
         expect(refused == 404, f"{method} {path} of no vehicle: {refused}")
         validate(document, {"$ref": "#/components/schemas/ErrorBody"}, json.loads(why), f"the refusal of {path}")
-    other = "POST" if "post" not in document["paths"][path] else "DELETE"
-    expect(ask(other, requested, b"{}")[0] == 405, f"{other} {requested} is not documented but accepted")
+    allowed = {m for one in document["paths"][path] for m in ({"GET", "HEAD"} if one == "get" else {one.upper()})}
+    for other in {"GET", "POST", "DELETE", "OPTIONS", "TRACE"} - allowed:
+        status, got, why = ask(other, requested, b"{}")
+        expect(status == 405, f"{other} {requested} is not documented but accepted: {status}")
+        expect(set(got["allow"].split(",")) == allowed, f"{other} {requested}: Allow: {got['allow']} instead of {allowed}")
+        validate(document, {"$ref": "#/components/schemas/ErrorBody"}, json.loads(why), f"the refusal of {other}")
 
 
 def check_metrics():

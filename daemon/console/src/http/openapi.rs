@@ -157,12 +157,16 @@ fn parameters(operation: &Operation) -> Vec<Value> {
     }
     if operation.id == "map_tiles" {
         let text = "The tag of the tiles that the client holds; without it, or with one that is out of date, all tiles";
-        let schema = json!({ "type": "string", "pattern": "^[0-9a-f]{8}-[0-9]+$" });
+        let schema = json!({ "type": "string", "example": "0badcafe-12" });
         parameters.push(json!({ "name": "since", "in": "query", "description": text, "schema": schema }));
     }
     if matches!(operation.id, "log" | "log_csv") {
         for (name, text, schema) in [
-            ("vehicle", "Only the entries of the vehicle with this address", json!({ "type": "integer" })),
+            (
+                "vehicle",
+                "Only the entries of the vehicle with this address",
+                json!({ "type": "integer", "minimum": 0, "maximum": 255 }),
+            ),
             ("kind", "Only the entries of this kind", json!({ "enum": LogKind::ALL.map(LogKind::name) })),
             ("since", "Only the entries with a higher number", json!({ "type": "integer", "minimum": 0 })),
         ] {
