@@ -255,7 +255,7 @@ fn other_machines_need_a_token() {
 }
 
 /// A surface whose tokens are `ROLE NAME` each, with the headers of each principal in the same order.
-fn surface_with_tokens(dir: &Path, principals: &[&str]) -> (Process, u16, Vec<String>) {
+pub(super) fn surface_with_tokens(dir: &Path, principals: &[&str]) -> (Process, u16, Vec<String>) {
     let tokens: Vec<String> = (0..principals.len()).map(|i| format!("{i:032}")).collect();
     let lines: String = principals.iter().zip(&tokens).map(|(p, token)| format!("{p} {token}\n")).collect();
     std::fs::write(dir.join("console.tokens"), lines).unwrap();

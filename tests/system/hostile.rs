@@ -1,9 +1,11 @@
 //! Clients that are slow or hostile: they cost the surface neither its link nor its memory.
 
-use scenecast_tests::{Process, free_port, http, is_full, state, wait_until};
+use super::api::surface_with_tokens;
+use scenecast_tests::{Process, free_port, http, http_whole, is_full, scratch, state, wait_until};
+use serde_json::Value;
 use std::io::{Read, Write};
 use std::net::TcpStream;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::time::{Duration, Instant};
 
 const SPEED: f64 = 5.0;
@@ -134,4 +136,58 @@ fn no_client_stalls_the_link_or_fills_the_memory() {
         });
     });
     wait_until("a reader is served again", Duration::from_secs(30), || is_served(port));
+}
+
+/// Three kinds of clients of a viewer ask without a pause: edits, logins, and streams that they leave. The operator, who logged in
+/// before, holds and resumes meanwhile.
+#[test]
+fn the_load_of_a_viewer_delays_no_hold_and_ends_no_session() {
+    let dir = scratch("viewer-load");
+    let (_surface, port, headers) = surface_with_tokens(&dir, &["viewer victor", "operator anna"]);
+    let login = |who: usize| {
+        let form = "Content-Type: application/x-www-form-urlencoded\r\n";
+        let token = format!("token={who:032}");
+        http_whole(port, "POST", "/login", form, &token).unwrap_or_default()
+    };
+    let cookie = login(1).lines().find_map(|l| l.strip_prefix("set-cookie: ")).expect("a cookie").to_owned();
+    let session = cookie.split(';').next().unwrap();
+    let operator = format!("Cookie: {session}\r\nX-Scenecast: 1\r\nContent-Type: application/json\r\n");
+    let order = |action: &str| {
+        let began = Instant::now();
+        let body = format!("{{\"action\": \"{action}\"}}");
+        let answer = http(port, "POST", "/api/v2/vehicles/1/constraints", &operator, &body);
+        assert_eq!(answer.map(|(status, _)| status), Some(202), "{action}");
+        assert!(!is_full() || began.elapsed() < Duration::from_secs(3), "{action} took {:?}", began.elapsed());
+    };
+    let edit = || {
+        let refused = http(port, "POST", "/api/v2/vehicles/1/labels", &headers[0], r#"{"label": 1, "name": "x"}"#);
+        assert!(refused.is_none_or(|(status, _)| status == 403));
+    };
+    let stream_head = format!("GET /api/v2/events HTTP/1.1\r\nHost: localhost\r\n{}\r\n", headers[0]);
+    let stream = || drop(connect(port, &stream_head));
+    let log_in = || drop(login(0));
+    let clients: [&(dyn Fn() + Sync); 3] = [&edit, &stream, &log_in];
+    let until = Instant::now() + Duration::from_secs(if is_full() { 60 } else { 3 });
+    let (requests, mut holds) = (AtomicU32::new(0), 0);
+    std::thread::scope(|scope| {
+        for ask in clients.iter().chain(&clients) {
+            scope.spawn(|| {
+                while Instant::now() < until {
+                    ask();
+                    requests.fetch_add(1, Ordering::Relaxed);
+                }
+            });
+        }
+        while Instant::now() < until {
+            order("hold");
+            order("resume");
+            holds += 1;
+            std::thread::sleep(Duration::from_millis(100));
+        }
+    });
+    let (_, log) = http(port, "GET", "/api/v2/log?kind=order", &headers[1], "").unwrap();
+    let log: Value = serde_json::from_slice(&log).unwrap();
+    let logged = log["entries"].as_array().unwrap().iter().filter(|entry| entry["text"] == "hold").count();
+    assert_eq!(logged, holds, "{log}");
+    assert!(requests.into_inner() > 300, "the load is none");
 }
