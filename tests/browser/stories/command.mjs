@@ -112,13 +112,14 @@ export default [
       try {
         await page.goto(s.url);
         const caption = page.locator("#command");
-        await s.until("the other browser to say so", async () => /local at another client has command/.test(await caption.innerText()));
+        await s.until("the other browser to say so", async () => /Command is elsewhere/.test(await caption.innerText()));
         await page.locator("#exploration").fill("0.2");
         await s.until("the weights to be refused", () => page.locator("#send-weights").isDisabled());
+        assert.match(await page.locator("#send .denied").innerText(), /local has command at another client: take it/);
         await caption.click();
         await page.getByRole("button", { name: "Take command", exact: true }).click();
         await s.until("the other browser to have command", async () => /You have command/.test(await caption.innerText()));
-        await s.shows("#command", /local at another client has command/);
+        await s.shows("#command", /Command is elsewhere/);
         assert.match(await page.locator("ol.changes").innerText(), /local moved command to another client/);
       } finally {
         await context.close();

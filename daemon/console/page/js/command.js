@@ -17,9 +17,6 @@ export const isHolder = () => me !== null && holder()?.name === me.name;
 export const hasCommand = () => isHolder() && (holder().client ?? client) === client;
 export const rank = (role) => ROLES.indexOf(role);
 
-/** The holder for people. */
-export const holderName = () => (isHolder() && !hasCommand() ? `${holder().name} at another client` : holder()?.name ?? "Nobody");
-
 /** Reads the principal now, and after each interruption; signs of presence follow the keyboard and the pointer. */
 export function startPrincipal() {
   let connected = false;
@@ -55,5 +52,6 @@ export function denial(kind) {
   const least = kind === "settings" ? "administrator" : "operator";
   if (rank(me.role) < rank(least)) return `This needs the role ${least}; yours is ${me.role}.`;
   if (["stop", "record"].includes(kind) || holder() === null || hasCommand()) return null;
-  return `${holderName()} has command: ${isHolder() ? "take" : "request"} it in the bar at the top.`;
+  const { name } = holder();
+  return isHolder() ? `${name} has command at another client: take it in the bar at the top.` : `${name} has command: request it in the bar at the top.`;
 }

@@ -1,7 +1,7 @@
 // Who has command: in the bar, and a dialog that requests it, takes it, hands it over or gives it up.
 
 import { logOut, sendCommand } from "../api.js";
-import { hasCommand, holder, holderName, isHolder, principal, rank } from "../command.js";
+import { hasCommand, holder, isHolder, principal, rank } from "../command.js";
 import { $, announce, h, text } from "../dom.js";
 import { missionTime, span } from "../format.js";
 import { ageOf, store } from "../store.js";
@@ -18,7 +18,11 @@ export function startCommand() {
   store.on("state edit tick feed", update);
 }
 
-const caption = () => (hasCommand() ? "You have command" : `${holderName()} has command`);
+/** The bar has room for a short line. */
+function caption() {
+  if (hasCommand()) return "You have command";
+  return isHolder() ? "Command is elsewhere" : `${holder()?.name ?? "Nobody"} has command`;
+}
 
 function update() {
   if (!store.snapshot?.command) return;
