@@ -3,8 +3,8 @@
 use crate::wire::{SessionId, WIRE_VERSION};
 use std::collections::BTreeSet;
 
-/// A setting of the other end that does not fit, so that its frames are refused, wasteful or those of two. It is found in a frame with a valid CRC or
-/// tag, apart from [`Self::Tag`] and [`Self::Key`].
+/// A setting of the other end that does not fit, so that its frames are refused, wasteful or those of two. It is found in a frame
+/// with a valid CRC or tag, apart from [`Self::Tag`] and [`Self::Key`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, thiserror::Error)]
 pub enum Mismatch {
     /// The other end has this wire version.

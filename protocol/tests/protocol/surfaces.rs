@@ -491,6 +491,20 @@ fn two_vehicles_with_one_address_are_named() {
 }
 
 #[test]
+fn a_vehicle_that_answers_a_call_after_a_silence_is_not_taken_for_two() {
+    let mut waters = Waters::new(5, Access::Shared);
+    waters.setup = Setup { discovery: Some(Duration::from_secs(20)), ..waters.setup.clone() };
+    waters.surfaces[0] = surface_of(&waters.setup, 78, waters.now);
+    for silence in 60..160 {
+        waters.is_away = [false, true, true];
+        waters.run(Duration::from_secs(silence));
+        waters.is_away = [true; SURFACES];
+        waters.run(Duration::from_secs(silence));
+    }
+    assert!(!waters.twin_found);
+}
+
+#[test]
 fn a_vehicle_that_restarts_again_and_again_is_not_taken_for_two() {
     for access in ACCESSES {
         let mut waters = Waters::held_by_first(3, access);

@@ -131,12 +131,9 @@ impl<R: StateReplica> VehiclePeer<R> {
         self
     }
 
-    /// The vehicle has answered a call, to which only those without a run reply.
     pub(super) fn handle_call_answer(&mut self, now: Instant) {
         self.master.hurry(now);
-        if self.pair.has_run() {
-            self.twins.handle_stranger(now);
-        }
+        self.twins.handle_call_answer(now);
     }
 
     pub(super) fn address(&self) -> Address {

@@ -7,6 +7,8 @@ use std::time::Duration;
 /// another run sends nothing more in the one before.
 #[derive(Debug, Default)]
 pub(super) struct TwinWatch {
+    /// The contact with the current run: since when without a gap, and its last new frame.
+    contact: Option<(Instant, Instant)>,
     /// When another run said hello, or answered a call.
     stranger: Option<Instant>,
     /// When both were last heard.
@@ -16,6 +18,10 @@ pub(super) struct TwinWatch {
 impl TwinWatch {
     /// Longer than a frame of the run before may take.
     const LATE: Duration = Duration::from_secs(10);
+    /// A vehicle answers a call once it has had no frame of its run for a minute, as after a silence. One that has taken turns for
+    /// longer without a gap does not.
+    const CALLABLE: Duration = Duration::from_secs(90);
+    const GAP: Duration = Duration::from_secs(30);
     /// A sign of a second vehicle counts for this time: it may have got another address since.
     const LIFETIME: Duration = Duration::from_secs(600);
 
@@ -24,8 +30,19 @@ impl TwinWatch {
         self.stranger.get_or_insert(now);
     }
 
+    /// A call was answered.
+    pub(super) fn handle_call_answer(&mut self, now: Instant) {
+        let is_in_contact =
+            |(since, last): (Instant, Instant)| now.since(last) < Self::GAP && now.since(since) >= Self::CALLABLE;
+        if self.contact.is_some_and(is_in_contact) {
+            self.handle_stranger(now);
+        }
+    }
+
     /// A new frame of the current run came in; returns whether a second vehicle is found by it.
     pub(super) fn handle_frame(&mut self, now: Instant) -> bool {
+        let since = self.contact.filter(|(_, last)| now.since(*last) < Self::GAP).map_or(now, |(since, _)| since);
+        self.contact = Some((since, now));
         if self.stranger.take_if(|at| now.since(*at) >= Self::LATE).is_none() {
             return false;
         }
@@ -36,7 +53,7 @@ impl TwinWatch {
 
     /// Another run has become the current one, perhaps the one that was heard.
     pub(super) fn handle_new_run(&mut self) {
-        self.stranger = None;
+        (self.contact, self.stranger) = (None, None);
     }
 
     /// Whether two vehicles have this address, as far as is known.
