@@ -137,7 +137,8 @@ def hold(domain, prefix, seconds, is_held, age="0"):
 def all_(domain, prefix, seconds):
     participant = DomainParticipant(int(domain))
     kinds = {"map": (OccupancyGrid, LATCHED), "layers": (GridMap, LATCHED), "cloud": (PointCloud2, LATCHED),
-             "label_tree": (LabelTree, LATCHED), "exemplars": (CompressedImage, LATCHED), "pose": (PoseWithCovarianceStamped, STATE), "path": (Path, STATE),
+             "label_tree": (LabelTree, LATCHED), "exemplars": (CompressedImage, LATCHED),
+             "pose": (PoseWithCovarianceStamped, STATE), "path": (Path, STATE),
              "fix": (NavSatFix, STATE), "diagnostics": (DiagnosticArray, STATE)}
     readers = {name: reader(participant, f"{prefix}/{name}", *kind) for name, kind in kinds.items()}
     found = {}
@@ -153,13 +154,14 @@ def all_(domain, prefix, seconds):
         wait(look, float(seconds), prefix)
     except SystemExit as missing:
         sys.exit(f"{missing}: only {sorted(found)}")
-    fix, cloud, layers = found["fix"], found["cloud"], found["layers"]
+    fix, cloud, layers, tree = found["fix"], found["cloud"], found["layers"], found["label_tree"]
     print(json.dumps({
         "map": [found["map"].info.width, found["map"].info.height], "layers": list(layers.layers),
         "matrices": [len(m.data) for m in layers.data], "points": cloud.width, "point_bytes": len(cloud.data),
         "jpeg": bytes(found["exemplars"].data[:3]).hex(), "format": found["exemplars"].format,
         "exemplar": found["exemplars"].header.frame_id, "frame": found["pose"].header.frame_id,
-        "path": len(found["path"].poses), "tree": [list(found["label_tree"].into), list(found["label_tree"].joins)], "fix": [fix.latitude, fix.longitude], "no_altitude": math.isnan(fix.altitude),
+        "path": len(found["path"].poses), "tree": [list(tree.into), list(tree.joins)],
+        "fix": [fix.latitude, fix.longitude], "no_altitude": math.isnan(fix.altitude),
         "parts": [s.name for s in found["diagnostics"].status],
         "age_s": time.time() - found["pose"].header.stamp.sec}))
 

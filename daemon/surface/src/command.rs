@@ -47,7 +47,7 @@ impl OrderKind {
 /// An action on command itself.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum CommandAction {
-    /// Asks the holder for command; takes it if nobody has it.
+    /// Asks the holder for command; takes it if nobody has it, or from another client of the same principal.
     Request,
     Withdraw,
     /// Takes command after the holder's silence, or if nobody has it, or from another client of the same principal.

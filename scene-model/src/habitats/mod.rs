@@ -383,12 +383,20 @@ mod tests {
         })
     }
 
+    /// Metres a pixel from the usual altitude.
+    const PITCH: f64 = 0.025;
+
     /// Adds a frame whose middle lies `y_m` north.
     fn see(habitats: &mut Habitats, image: &RgbImage, y_m: f64) {
+        see_from(habitats, image, 1.0, (0.0, y_m));
+    }
+
+    /// Adds a frame from `scale` times the usual altitude, with the place of its middle.
+    fn see_from(habitats: &mut Habitats, image: &RgbImage, scale: f64, (x, y): (f64, f64)) {
         let (columns, rows) = image.dimensions();
-        let points = measure(image, 10.0);
-        let camera = DownCamera { metres_per_pixel: 0.025, altitude_m: 4.0 };
-        let pose = Pose { x: 0.0, y: y_m, z: 0.0, yaw_rad: 0.0 };
+        let camera = DownCamera { metres_per_pixel: PITCH * scale, altitude_m: 4.0 * scale };
+        let points = measure(image, (0.25 / camera.metres_per_pixel) as f32);
+        let pose = Pose { x, y, z: 0.0, yaw_rad: 0.0 };
         let places = camera.project(columns, rows, &pose, &Habitats::as_words(&points));
         habitats.add((columns, rows), &points, &places, 0.25);
     }
@@ -479,8 +487,7 @@ mod tests {
         let far = image::imageops::thumbnail(&near, size(640), size(2400));
         let mut habitats = Habitats::new(16);
         let mut over = |floor: &RgbImage, scale: f64, east_m: f64| {
-            let metres_per_pixel = 0.025 * scale;
-            let camera = DownCamera { metres_per_pixel, altitude_m: 4.0 * scale };
+            let metres_per_pixel = PITCH * scale;
             let (columns, rows) = (320.min(floor.width()), 240.min(floor.height()));
             for k in 0..200 {
                 let top_m = 2.0 * f64::from(k);
@@ -490,11 +497,8 @@ mod tests {
                 }
                 let left = (floor.width() - columns) / 2;
                 let image = image::imageops::crop_imm(floor, left, top, columns, rows).to_image();
-                let points = measure(&image, (0.25 / metres_per_pixel) as f32);
                 let y = -f64::from(top) * metres_per_pixel - f64::from(rows) * metres_per_pixel / 2.0;
-                let pose = Pose { x: east_m, y, z: 0.0, yaw_rad: 0.0 };
-                let places = camera.project(columns, rows, &pose, &Habitats::as_words(&points));
-                habitats.add((columns, rows), &points, &places, 0.25);
+                see_from(&mut habitats, &image, scale, (east_m, y));
             }
         };
         over(&near, 1.0, 0.0);

@@ -13,6 +13,17 @@ async function as(s, name, context = s.context, page = s.page) {
   await s.until("the principal", () => page.evaluate(async () => (await import("/js/command.js")).principal()?.name), {});
 }
 
+/** Runs a part of a story with the page of a second browser. */
+async function inSecondBrowser(s, run) {
+  const context = await s.browser.newContext();
+  try {
+    await s.watch(context);
+    await run(await context.newPage(), context);
+  } finally {
+    await context.close();
+  }
+}
+
 const crewWithAnna = (s) => s.steer({ principals: CREW, commander: "anna" });
 const weigh = (s) => s.page.locator("#exploration").fill("0.5");
 
@@ -76,10 +87,7 @@ export default [
     async run(s) {
       await crewWithAnna(s);
       await as(s, "anna");
-      const context = await s.browser.newContext();
-      await s.watch(context);
-      const page = await context.newPage();
-      try {
+      await inSecondBrowser(s, async (page, context) => {
         await as(s, "bob", context, page);
         await page.locator("#command").click();
         await page.getByRole("button", { name: "Request command", exact: true }).click();
@@ -91,9 +99,7 @@ export default [
         assert.match(history, /anna handed command over to bob[\s\S]*bob requested command from anna/);
         await weigh(s);
         await s.until("the weights to be refused", () => s.page.locator("#send-weights").isDisabled());
-      } finally {
-        await context.close();
-      }
+      });
     },
   },
   {
@@ -106,10 +112,7 @@ export default [
       await weigh(s);
       await s.page.locator("#send-weights").click();
       await s.shows("#command", /You have command/);
-      const context = await s.browser.newContext();
-      await s.watch(context);
-      const page = await context.newPage();
-      try {
+      await inSecondBrowser(s, async (page) => {
         await page.goto(s.url);
         const caption = page.locator("#command");
         await s.until("the other browser to say so", async () => /Command is elsewhere/.test(await caption.innerText()));
@@ -121,9 +124,7 @@ export default [
         await s.until("the other browser to have command", async () => /You have command/.test(await caption.innerText()));
         await s.shows("#command", /Command is elsewhere/);
         assert.match(await page.locator("ol.changes").innerText(), /local moved command to another client/);
-      } finally {
-        await context.close();
-      }
+      });
     },
   },
   {

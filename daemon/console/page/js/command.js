@@ -12,9 +12,11 @@ let keptMs = -KEEP_MS;
 
 export const principal = () => me;
 export const holder = () => store.snapshot?.command?.holder ?? null;
-/** Whether our principal has command, here or at another client. */
-export const isHolder = () => me !== null && holder()?.name === me.name;
-export const hasCommand = () => isHolder() && (holder().client ?? client) === client;
+const isHolder = () => me !== null && holder()?.name === me.name;
+const isHere = () => (holder().client ?? client) === client;
+export const hasCommand = () => isHolder() && isHere();
+/** Whether our principal has command at another client. */
+export const isElsewhere = () => isHolder() && !isHere();
 export const rank = (role) => ROLES.indexOf(role);
 
 /** Reads the principal now, and after each interruption; signs of presence follow the keyboard and the pointer. */
@@ -53,5 +55,5 @@ export function denial(kind) {
   if (rank(me.role) < rank(least)) return `This needs the role ${least}; yours is ${me.role}.`;
   if (["stop", "record"].includes(kind) || holder() === null || hasCommand()) return null;
   const { name } = holder();
-  return isHolder() ? `${name} has command at another client: take it in the bar at the top.` : `${name} has command: request it in the bar at the top.`;
+  return isElsewhere() ? `${name} has command at another client: take it in the bar at the top.` : `${name} has command: request it in the bar at the top.`;
 }

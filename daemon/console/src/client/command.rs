@@ -44,10 +44,10 @@ fn view_text(state: &MissionState, you: &PrincipalInfo, client: &str) -> String 
     }
     let remedy = match &command.holder {
         None => "the first order takes it",
-        Some(holder) if holder.name == you.name && holder.client.as_deref().is_none_or(|name| name == client) => {
-            "hand it over with hand-over NAME, or give it up with release"
-        }
-        Some(holder) if holder.name == you.name => "move it here with: scenecast ctl command take",
+        Some(holder) if holder.name == you.name => match &holder.client {
+            Some(name) if name != client => "move it here with: scenecast ctl command take",
+            _ => "hand it over with hand-over NAME, or give it up with release",
+        },
         Some(holder) if state.now_s >= holder.takeable_s => "take it with: scenecast ctl command take",
         Some(_) => "request it with: scenecast ctl command request",
     };

@@ -17,7 +17,7 @@ use crate::stop::{self, Owned, Owner};
 use parts::Parts;
 use scenecast_config::Ros2;
 use scenecast_console::{ClientRequest, PendingRequest, Reply, Snapshot};
-use scenecast_core::{Principal, UserError};
+use scenecast_core::{ClientName, Giver, Principal, UserError};
 use stamps::Stamps;
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -55,7 +55,8 @@ pub fn start_surface(
     let (sender, requests) = mpsc::channel(MAX_PENDING);
     let (snapshots, receiver) = watch::channel(Arc::new(Snapshot::default()));
     let (owner, owned) = stop::ends();
-    let desk = Desk { requests: sender, principal };
+    let giver = principal.map(|principal| Giver { principal, client: ClientName::of_program("ros2") });
+    let desk = Desk { requests: sender, giver };
     let settings = settings.clone();
     let run = move || {
         if let Some(node) = RosNode::start_when_possible(&settings, "scenecast_surface", &owned) {
@@ -70,7 +71,7 @@ pub fn start_surface(
 /// Makes requests of the surface.
 struct Desk {
     requests: mpsc::Sender<PendingRequest>,
-    principal: Option<Principal>,
+    giver: Option<Giver>,
 }
 
 impl Desk {
@@ -108,7 +109,7 @@ impl Worker {
         for vehicle in &snapshot.state.vehicles {
             let topics = self.vehicles.entry(vehicle.id).or_insert_with(|| {
                 let part = self.parts.claim(vehicle.id, &vehicle.name);
-                let topics = part.and_then(|part| VehicleTopics::new(&self.node, &part, self.desk.principal.is_some()));
+                let topics = part.and_then(|part| VehicleTopics::new(&self.node, &part, self.desk.giver.is_some()));
                 topics.inspect_err(|e| tracing::error!("{e}; {} is not published", vehicle.name)).ok()
             });
             if let Some(topics) = topics {

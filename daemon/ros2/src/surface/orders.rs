@@ -8,7 +8,7 @@ use crate::node::RosNode;
 use crate::transport::Qos;
 use scenecast_console::state::VehicleState;
 use scenecast_console::{ClientRequest, Reply, SurfaceRequest};
-use scenecast_core::{ClientName, Giver, Principal, UserError};
+use scenecast_core::{Giver, UserError};
 use scenecast_messages::scenecast_msgs::{Abort, Event, Fence, Hold, Utility};
 use scenecast_messages::std_msgs::Header;
 use std::time::SystemTime;
@@ -41,14 +41,12 @@ impl OrderTopics {
 
     /// Requests what was ordered: stops first.
     pub fn handle(&mut self, desk: &Desk, vehicle: &VehicleState) -> Vec<Outcome> {
-        let Some(principal) = &desk.principal else { return Vec::new() };
-        let client = ClientName::of_program("ros2");
-        let giver = Giver { principal: principal.clone(), client };
+        let Some(giver) = &desk.giver else { return Vec::new() };
         let by = |request| ClientRequest { by: Some(giver.clone()), request };
         let mut outcomes = Vec::new();
         let mut order = |name, header: &Header, request: Result<SurfaceRequest, String>| {
             let reply = fresh(header).and(request).map(|request| desk.request(by(request)));
-            outcomes.push(outcome(name, principal, reply));
+            outcomes.push(outcome(name, giver, reply));
         };
         while let Some(received) = self.abort.take() {
             order("abort", &received.message.header, order::abort(vehicle.id, &received.message));
@@ -70,7 +68,7 @@ fn fresh(header: &Header) -> Result<(), String> {
     order::check_age(header, stamps::nanos(SystemTime::now()))
 }
 
-fn outcome(name: &str, by: &Principal, reply: Result<Option<Reply>, String>) -> Outcome {
+fn outcome(name: &str, by: &Giver, reply: Result<Option<Reply>, String>) -> Outcome {
     let refused = |reason: &str| (Event::WARN, format!("{name} of {}: refused: {reason}", by.name()));
     match reply {
         Ok(Some(Reply::Accepted(order))) => {

@@ -1,7 +1,7 @@
 // Who has command: in the bar, and a dialog that requests it, takes it, hands it over or gives it up.
 
 import { logOut, sendCommand } from "../api.js";
-import { hasCommand, holder, isHolder, principal, rank } from "../command.js";
+import { hasCommand, holder, isElsewhere, principal, rank } from "../command.js";
 import { $, announce, h, text } from "../dom.js";
 import { missionTime, span } from "../format.js";
 import { ageOf, store } from "../store.js";
@@ -21,7 +21,7 @@ export function startCommand() {
 /** The bar has room for a short line. */
 function caption() {
   if (hasCommand()) return "You have command";
-  return isHolder() ? "Command is elsewhere" : `${holder()?.name ?? "Nobody"} has command`;
+  return isElsewhere() ? "Command is elsewhere" : `${holder()?.name ?? "Nobody"} has command`;
 }
 
 function update() {
@@ -66,16 +66,15 @@ function refresh() {
 function describe() {
   const now = holder();
   if (!now) return "Nobody has command. The first order takes it.";
+  if (isElsewhere()) return `${now.name} has command at another client${now.client ? ` (${now.client})` : ""}. Take it to move it here.`;
   const left = now.takeable_s - store.nowS;
-  if (isHolder() && !hasCommand()) return `${now.name} has command at another client${now.client ? ` (${now.client})` : ""}. Take it to move it here.`;
   const take = hasCommand() ? "" : left > 0 ? ` It can be taken in ${span(left)} without a sign of ${now.name}.` : " It can be taken.";
   return `${now.name} has had command for ${span(ageOf(now.since_s))}, last active ${span(ageOf(now.last_active_s))} ago.${take}`;
 }
 
 function actions() {
   const button = (name, action, to = null, disabled = false) => h("button", { type: "button", disabled, onclick: () => act(action, to) }, name);
-  if (!holder()) return [button("Take command", "take")];
-  if (isHolder() && !hasCommand()) return [button("Take command", "take")];
+  if (!holder() || isElsewhere()) return [button("Take command", "take")];
   if (!hasCommand()) {
     return [isPending() ? button("Withdraw request", "withdraw") : button("Request command", "request"), button("Take command", "take", null, !canTake())];
   }
