@@ -11,5 +11,4 @@ mod pair;
 mod path;
 mod promises;
 mod replay;
-mod surfaces;
 mod wire_document;

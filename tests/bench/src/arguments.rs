@@ -14,6 +14,7 @@ use crate::registration::RegistrationBench;
 use crate::restart::RestartBench;
 use crate::steering::SteeringBench;
 use crate::stranger::StrangerBench;
+use crate::surfaces::SurfacesBench;
 use crate::train_prior::TrainPrior;
 use crate::wide::WideBench;
 use clap::{Parser, Subcommand};
@@ -57,6 +58,8 @@ enum Bench {
     Steering(SteeringBench),
     /// A stranger at the link: forged, replayed and damaged frames, with and without a key.
     Stranger(StrangerBench),
+    /// Three surfaces with one key and one vehicle: random schedules of orders, take-overs, crashes and losses.
+    Surfaces(SurfacesBench),
     /// Train the table that the context coder starts from.
     TrainPrior(TrainPrior),
     /// A wide survey: CPU time and bytes of updates, of loading the page, and of exports.
@@ -80,6 +83,7 @@ impl Arguments {
             Bench::Restart(r) => r.run(),
             Bench::Steering(s) => s.run(),
             Bench::Stranger(s) => s.run(),
+            Bench::Surfaces(s) => s.run(),
             Bench::TrainPrior(t) => t.run(),
             Bench::Wide(w) => w.run(),
         }

@@ -3,37 +3,24 @@
 use super::Protection;
 use super::account::{Judged, LinkCounters, LinkJudgement};
 use super::orders::OrderBook;
+use crate::link_ends::{EndsSetup, auv, draw_seed};
 use scenecast_protocol::directive::{OrderStatus, RefusalReason, SlotId, SlotState};
-use scenecast_protocol::link::{
-    Authenticity, SlotInboxState, SurfaceConfig, SurfaceLink, VehicleConfig, VehicleEvent, VehicleLink,
-};
-use scenecast_protocol::mac::{Access, MasterConfig, ModemProfile};
+use scenecast_protocol::link::{SlotInboxState, SurfaceLink, VehicleEvent, VehicleLink};
+use scenecast_protocol::mac::Access;
 use scenecast_protocol::map::{Cell, LabelGrid, StateReplica};
-use scenecast_protocol::map_codec::Codec;
-use scenecast_protocol::schedule::Shares;
-use scenecast_protocol::seal::MissionKey;
 use scenecast_protocol::time::Instant;
-use scenecast_protocol::wire::{Address, CellEdge, Envelope, MissionId, VehicleStatus};
+use scenecast_protocol::wire::{Envelope, VehicleStatus};
 use scenecast_rehearsal::VirtualTime;
 use sim_channel::RandomStream;
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
-use std::sync::Arc;
 use std::time::Duration;
 
-pub(super) const MISSION: MissionId = MissionId(7);
-pub(super) const FRAME_BYTES: usize = 64;
 /// Share of authentic frames that the channel loses, and of those that it damages.
 const LOSS: f64 = 0.05;
 const CORRUPTION: f64 = 0.02;
 const PROPAGATION: Duration = Duration::from_millis(300);
-const BUDGET_BPS: u32 = 10_000;
-const WINDOW: Duration = Duration::from_secs(10);
 /// Side of the surveyed area, cells.
 const SIDE: i32 = 48;
-
-pub(super) fn auv() -> Address {
-    Address::vehicle(1).unwrap_or(Address::EVERYBODY)
-}
 
 enum ChannelEvent {
     Sent { by_vehicle: bool },
@@ -73,8 +60,8 @@ pub(super) struct AttackedEnds {
 impl AttackedEnds {
     pub(super) fn new(protection: Protection, access: Access, mut rng: RandomStream) -> Self {
         let now = Instant::from_secs_f64(1000.0);
-        let setup = EndsSetup { protection, access };
-        let (vehicle_seed, surface_seed) = (seed(&mut rng), seed(&mut rng));
+        let setup = protection.setup(access);
+        let (vehicle_seed, surface_seed) = (draw_seed(&mut rng), draw_seed(&mut rng));
         Self {
             now,
             vehicle: setup.vehicle(vehicle_seed, SlotInboxState::default(), now),
@@ -98,14 +85,14 @@ impl AttackedEnds {
     }
 
     fn setup(&self) -> EndsSetup {
-        EndsSetup { protection: self.protection, access: self.access }
+        self.protection.setup(self.access)
     }
 
     /// The vehicle's process starts again, with its journal.
     pub(super) fn restart_vehicle(&mut self) {
         let map: Vec<(Cell, u8)> = self.vehicle.map().iter().collect();
         let in_force = SlotId::ALL.map(|id| (id, self.vehicle.in_force(id).cloned()));
-        let seed = seed(&mut self.rng);
+        let seed = draw_seed(&mut self.rng);
         self.vehicle = self.setup().vehicle(seed, self.durable.clone(), self.now);
         self.vehicle.assume_budget_spent(self.now);
         for (id, content) in in_force {
@@ -117,7 +104,7 @@ impl AttackedEnds {
 
     /// The surface's process starts again, with its orders and without its map.
     pub(super) fn restart_surface(&mut self) {
-        let seed = seed(&mut self.rng);
+        let seed = draw_seed(&mut self.rng);
         let kept = self.surface.vehicle(auv()).map(|view| (view.series(), view.slots().cloned().collect::<Vec<_>>()));
         self.surface = self.setup().surface(seed, self.now);
         if let Some((series, orders)) = kept {
@@ -334,66 +321,4 @@ impl VirtualTime for AttackedEnds {
             }
         }
     }
-}
-
-/// The settings of both ends.
-#[derive(Debug, Clone, Copy)]
-struct EndsSetup {
-    protection: Protection,
-    access: Access,
-}
-
-impl EndsSetup {
-    fn modem(self) -> ModemProfile {
-        ModemProfile {
-            frame_bytes: FRAME_BYTES,
-            bit_rate_bps: 10_000.0,
-            overhead_bits: 0,
-            turn_around: Duration::from_millis(200),
-            access: self.access,
-        }
-    }
-
-    fn authenticity(self) -> Option<Authenticity> {
-        let key = Arc::new(MissionKey::from_bytes([42; 16]));
-        let all = self.protection == Protection::All;
-        (self.protection != Protection::None).then_some(Authenticity { key, all, encrypt: false })
-    }
-
-    fn vehicle(self, seed: u64, durable: SlotInboxState, now: Instant) -> VehicleLink {
-        let config = VehicleConfig {
-            address: auv(),
-            mission: MISSION,
-            cell_edge: CellEdge::default(),
-            modem: self.modem(),
-            budget_bps: BUDGET_BPS,
-            budget_window: WINDOW,
-            shares: Shares::default(),
-            status_period: Duration::from_secs(10),
-            authenticity: self.authenticity(),
-        };
-        VehicleLink::new(config, Codec::Context, seed, durable, now)
-    }
-
-    fn surface(self, seed: u64, now: Instant) -> SurfaceLink {
-        let config = SurfaceConfig {
-            name: Default::default(),
-            abort_lifetime: None,
-            mission: MISSION,
-            cell_edge: CellEdge::default(),
-            modem: self.modem(),
-            budget_bps: BUDGET_BPS,
-            budget_window: WINDOW,
-            shares: Shares::default(),
-            master: MasterConfig::default(),
-            vehicles: vec![auv()],
-            discovery_period: None,
-            authenticity: self.authenticity(),
-        };
-        SurfaceLink::new(config, seed, now)
-    }
-}
-
-fn seed(rng: &mut RandomStream) -> u64 {
-    (rng.uniform() * 2f64.powi(53)) as u64
 }

@@ -1,7 +1,7 @@
 //! The frames of the stranger, made from those that he overheard.
 
 use super::account::AttackKind;
-use super::ends::{FRAME_BYTES, MISSION, auv};
+use crate::link_ends::{FRAME_BYTES, MISSION, auv};
 use scenecast_protocol::directive::{Constraints, SLOTS, Series, Slot, SlotReport, SlotState, Utility, VersionedSlot};
 use scenecast_protocol::map::{Cell, LabelGrid};
 use scenecast_protocol::map_codec::{Codec, encode};

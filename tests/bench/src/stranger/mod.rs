@@ -12,6 +12,8 @@ pub use account::AttackKind;
 pub use campaign::{KindFigures, StrangerFigures, measure_stranger};
 pub(crate) use command::StrangerBench;
 
+use crate::link_ends::EndsSetup;
+use scenecast_protocol::mac::Access;
 use serde::Serialize;
 
 /// The key and the scope of authentication of a row.
@@ -35,6 +37,11 @@ impl Protection {
             Self::Down => "key, authenticate = \"down\"",
             Self::All => "key, authenticate = \"all\"",
         }
+    }
+
+    fn setup(self, access: Access) -> EndsSetup {
+        let setup = EndsSetup::new(access);
+        if self == Self::None { setup } else { setup.keyed(self == Self::All, false) }
     }
 }
 

@@ -1,6 +1,6 @@
 //! The state of both ends as far as a person or the other end notices it.
 
-use super::ends::auv;
+use crate::link_ends::auv;
 use scenecast_protocol::directive::{OrderStatus, Series, SlotId};
 use scenecast_protocol::link::{EndedRun, LinkStats, SlotInboxState, SurfaceLink, VehicleLink};
 use scenecast_protocol::time::Instant;

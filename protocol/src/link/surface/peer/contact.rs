@@ -10,6 +10,8 @@ const FULL_DUPLEX_SILENCE: Duration = Duration::from_secs(5);
 const SILENCE_TIMEOUT: Duration = Duration::from_secs(40);
 /// The number of unanswered hellos after which the interval doubles: by then the vehicle is out of reach rather than unlucky.
 const PROMPT_HELLOS: u32 = 5;
+/// The time from one hello to the next while a vehicle is in contact: a second vehicle with its address speaks only after a hello.
+const ROLL_CALL: Duration = Duration::from_secs(300);
 /// Transmissions of an order without any frame of the vehicle after which it is sent a hello.
 const UNACKNOWLEDGED_ORDERS: u32 = 2;
 
@@ -30,6 +32,8 @@ pub(super) struct Contact {
     /// The vehicle's highest frame number when a frame with an acknowledgement was last written.
     pub(super) acknowledged: FrameNumber,
     pub(super) hello_due: Instant,
+    /// When a hello goes out even to a vehicle that is in contact.
+    roll_call: Instant,
     /// When the last proof was written.
     pub(super) proved: Option<Instant>,
     /// When a hello last counted as an answer.
@@ -58,6 +62,7 @@ impl Contact {
             repeat_due: None,
             acknowledged: 0,
             hello_due: now,
+            roll_call: now + ROLL_CALL,
             proved: None,
             hello_admitted: None,
             proof_allowed: now,
@@ -90,11 +95,12 @@ impl Contact {
         self.last_received.is_none_or(|at| now.since(at) >= time)
     }
 
-    /// When the vehicle has been silent for so long that it may have restarted; an order that nobody acknowledges
-    /// shows it before `SILENCE_TIMEOUT`. `slot_timeout` is the time after which an order goes out again.
-    pub(super) fn silent_from(&self, slot_timeout: Duration) -> Option<Instant> {
-        let heard = self.last_received? + self.silence;
-        Some(self.ordered.map_or(heard, |at| heard.min(at + slot_timeout * UNACKNOWLEDGED_ORDERS)))
+    /// When a vehicle that was heard is sent a hello: it has been silent for so long that it may have restarted, an order that
+    /// nobody acknowledges shows so before, or the roll is called. `slot_timeout` is the time after which an order goes out again.
+    pub(super) fn doubtful_from(&self, slot_timeout: Duration) -> Option<Instant> {
+        let silent = self.last_received? + self.silence;
+        let unacknowledged = self.ordered.map(|at| at + slot_timeout * UNACKNOWLEDGED_ORDERS);
+        unacknowledged.into_iter().chain([silent, self.roll_call]).min()
     }
 
     pub(super) fn is_answer_due(&self, now: Instant) -> bool {
@@ -104,8 +110,8 @@ impl Contact {
     /// When a hello becomes due if no frame comes in. Silence matters only in a run that is usable: the vehicle has
     /// proven it, and there are numbers left.
     pub(super) fn next_hello(&self, is_usable: bool, slot_timeout: Duration) -> Instant {
-        let silent = self.silent_from(slot_timeout).filter(|_| is_usable);
-        silent.map_or(self.hello_due, |at| at.max(self.hello_due))
+        let doubtful = self.doubtful_from(slot_timeout).filter(|_| is_usable);
+        doubtful.map_or(self.hello_due, |at| at.max(self.hello_due))
     }
 
     /// A hello went out after `dropped` frames in all; the interval to the next one doubles once the vehicle has left
@@ -113,6 +119,7 @@ impl Contact {
     pub(super) fn note_hello(&mut self, timeout: Duration, dropped: u64, now: Instant) {
         let is_silent = std::mem::replace(&mut self.dropped, dropped) == dropped;
         self.hellos = if is_silent { self.hellos.saturating_add(1) } else { 1 };
+        self.roll_call = now + ROLL_CALL;
         self.hello_due = now + timeout * if self.hellos < PROMPT_HELLOS { 1 } else { 2 };
     }
 }

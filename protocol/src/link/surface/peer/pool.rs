@@ -19,8 +19,8 @@ const FULL_DUPLEX_PROOF: Duration = Duration::from_millis(1600);
 
 impl<R: StateReplica> VehiclePeer<R> {
     fn must_send_hello(&self, now: Instant) -> bool {
-        let is_silent = self.contact.silent_from(self.slot_timeout()).is_none_or(|at| now >= at);
-        (!self.pair.is_proven() || is_silent || self.pair.is_full()) && now >= self.contact.hello_due
+        let is_doubtful = self.contact.doubtful_from(self.slot_timeout()).is_none_or(|at| now >= at);
+        (!self.pair.is_proven() || is_doubtful || self.pair.is_full()) && now >= self.contact.hello_due
     }
 
     /// When a run that the vehicle has offered is to be proven, unless a frame of the current run comes in before.
