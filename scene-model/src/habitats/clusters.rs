@@ -154,6 +154,11 @@ pub(crate) fn mean(cells: &Coordinates, some: &[usize]) -> Vec<f32> {
     centre
 }
 
+/// The variance of all cells in the direction in which they vary most.
+pub(crate) fn main_variance(cells: &Coordinates) -> f64 {
+    Part::new(cells, (0..cells.len()).collect()).variance
+}
+
 /// Some cells with their mean, and the direction in which they vary most.
 struct Part {
     cells: Vec<usize>,

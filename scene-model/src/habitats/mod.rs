@@ -48,8 +48,13 @@ use smooth::{Coordinates, smoothed, squared_distance};
 use space::Space;
 use std::collections::BTreeMap;
 
-/// A cell keeps its label unless another centre is nearer by this, squared units of the noise between neighbours.
+/// A cell keeps its label unless another centre is nearer by this, squared units of the noise between neighbours, where the floor varies
+/// as in `Compared::contrast`.
 const HYSTERESIS: f32 = 1.5;
+/// The variance of a whole floor in its main direction, in units of the noise between neighbours, from which on its habitats stand out; and
+/// the share of it from which on a floor is not uniform.
+const STANDS_OUT: f64 = 5.0;
+const NOT_UNIFORM: f64 = 0.2;
 /// Frames after which a map is learnt again, and cells of a map that is learnt at each frame.
 const FRAMES_BETWEEN: u32 = 10;
 const SMALL_MAP: usize = 2000;
@@ -115,6 +120,9 @@ struct Compared {
     cells: Coordinates,
     /// The number of measures that vary over the cells.
     varying: usize,
+    /// 1 where habitats stand out from the differences of neighbours, and less, down to .2, where habitats differ as little as neighbours:
+    /// the finer the mosaic of a floor, the nearer its habitats.
+    contrast: f64,
 }
 
 impl Habitats {
@@ -196,7 +204,7 @@ impl Habitats {
     /// them. A number is never given to another habitat.
     pub fn learn(&mut self) {
         let Some(map) = self.compared() else { return };
-        let rule = self.natural(map.varying);
+        let rule = self.natural(&map);
         let centres = self.centres_of_earlier(&map);
         let found = match centres.is_empty() {
             true => Clusters::grow(&map.cells, &rule),
@@ -223,15 +231,15 @@ impl Habitats {
     /// Takes clusters that are made from those that the floor calls for, without regard to what was shown.
     fn learn_as_new(&mut self, clusters: impl FnOnce(Clusters, &Coordinates) -> Clusters) {
         let Some(map) = self.compared() else { return };
-        let found = clusters(Clusters::grow(&map.cells, &self.natural(map.varying)), &map.cells);
+        let found = clusters(Clusters::grow(&map.cells, &self.natural(&map)), &map.cells);
         (self.shown, self.tree) = Default::default();
         self.take(map, found);
     }
 
     /// The rule by which a floor has as many labels as it calls for.
-    fn natural(&self, varying: usize) -> Rule {
-        let gap = 5.0 * varying as f32 / MEASURES as f32;
-        Rule { most: self.most as usize, variance: 1.0, cells: 24, share: 0.005, gap }
+    fn natural(&self, map: &Compared) -> Rule {
+        let gap = 5.0 * (map.contrast * map.varying as f64 / MEASURES as f64) as f32;
+        Rule { most: self.most as usize, variance: map.contrast, cells: 24, share: 0.005, gap }
     }
 
     /// `None` without cells.
@@ -246,7 +254,8 @@ impl Habitats {
         };
         let varying = (0..MEASURES).filter(varies).count().max(1);
         let cells = smoothed(&map, &space.places(&values), varying);
-        Some(Compared { places, space, cells, varying })
+        let contrast = (clusters::main_variance(&cells) / STANDS_OUT).clamp(NOT_UNIFORM, 1.0);
+        Some(Compared { places, space, cells, varying, contrast })
     }
 
     /// The centres of the cells of each label that was clustered last.
@@ -312,13 +321,14 @@ impl Habitats {
 
     /// Shows the nearest label of each cell, or still the earlier one where it is nearly as near.
     fn show(&mut self, map: &Compared, found: &Clusters, labels: &[u32]) {
+        let hysteresis = HYSTERESIS * map.contrast as f32;
         for (cell, &place) in map.places.iter().enumerate() {
             let distances: Vec<f32> =
                 found.centres.iter().map(|centre| squared_distance(map.cells.of(cell), centre)).collect();
             let nearest = found.of_cells[cell];
             let earlier =
                 self.shown.get(&place).and_then(|shown| labels.iter().position(|&label| label == shown.label));
-            let kept = earlier.filter(|&earlier| distances[earlier] - distances[nearest] < HYSTERESIS);
+            let kept = earlier.filter(|&earlier| distances[earlier] - distances[nearest] < hysteresis);
             let cluster = kept.unwrap_or(nearest);
             let shown = HabitatCell { label: labels[cluster], confidence: confidence(&distances, cluster) };
             self.shown.insert(place, shown);
@@ -534,6 +544,35 @@ mod tests {
     #[test]
     fn a_uniform_floor_has_one_label() {
         assert_eq!(fly([[150, 140, 110]; 2], &[0, 1, 2, 3]).labels(), 1);
+    }
+
+    /// The most frequent label of the west and of the east of a floor of stones as large as cells, which are redder in the east by `tint`.
+    fn stones(tint: i32) -> ([u32; 2], usize) {
+        let mut habitats = Habitats::new(16);
+        for k in 0..20u32 {
+            let image = RgbImage::from_fn(320, 240, |x, y| {
+                let grey =
+                    (crate::random::mix(u64::from(x / 9) | u64::from((y + 80 * (99 - k)) / 9) << 32) % 80) as i32;
+                let red = 100 + grey + if x < 160 { 0 } else { tint };
+                image::Rgb([red as u8, (90 + grey) as u8, (80 + grey) as u8])
+            });
+            see(&mut habitats, &image, 2.0 * f64::from(k));
+        }
+        habitats.correct();
+        let most = |columns: std::ops::Range<i32>| {
+            let mut counts = BTreeMap::<u32, usize>::new();
+            let cells = columns.flat_map(|x| (0..150).map(move |y| (x, y)));
+            cells.filter_map(|(x, y)| habitats.label_at(x, y)).for_each(|label| *counts.entry(label).or_default() += 1);
+            counts.into_iter().max_by_key(|&(_, count)| count).map_or(u32::MAX, |(label, _)| label)
+        };
+        ([most(-14..-2), most(2..14)], habitats.labels())
+    }
+
+    #[test]
+    fn habitats_of_a_floor_whose_neighbours_differ_as_much_are_told_apart() {
+        let ([west, east], _) = stones(7);
+        assert_ne!(west, east);
+        assert_eq!(stones(0).1, 1);
     }
 
     #[test]

@@ -11,7 +11,7 @@ use crate::localisation::LocalisationBench;
 use crate::map_codec::MapCodecBench;
 use crate::raster::RasterBench;
 use crate::registration::RegistrationBench;
-use crate::restart::RestartBench;
+use crate::restart::{ForgetBench, RestartBench};
 use crate::steering::SteeringBench;
 use crate::stranger::StrangerBench;
 use crate::surfaces::SurfacesBench;
@@ -38,6 +38,8 @@ enum Bench {
     Console(ConsoleBench),
     /// Exemplars: seconds from the order to the image under full load, bytes for a similarity of 0.9.
     Exemplar(ExemplarBench),
+    /// Vehicles that lose the folder with their orders: what they do, and when they have them again.
+    Forget(ForgetBench),
     /// Inference under way: information of the online map against a batch over the same frames, and bytes of the map.
     Inference(InferenceBench),
     /// Labels: the same in any order and on any path, against the true classes, and of worse sights.
@@ -73,6 +75,7 @@ impl Arguments {
         match self.bench {
             Bench::Console(c) => c.run(),
             Bench::Exemplar(e) => e.run(),
+            Bench::Forget(f) => f.run(),
             Bench::Inference(i) => i.run(),
             Bench::Labels(l) => l.run(),
             Bench::Live(l) => l.run(),

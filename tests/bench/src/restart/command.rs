@@ -1,6 +1,6 @@
 //! `scenecast-bench restart`
 
-use super::{RestartRun, RestartSetting, restarts};
+use super::{RestartRun, RestartSetting, forget, record, restarts};
 use crate::program::ProgramArgument;
 use clap::Args;
 use scenecast_core::UserError;
@@ -69,4 +69,38 @@ fn print_run(number: u32, run: &RestartRun) {
     let slowest = run.page_s.iter().copied().fold(0.0, f64::max);
     println!("{number:>3} {:>6} {:>7} {slowest:>12.2}  {}", run.cells, run.applied, run.steps.join("; "));
     run.faults.iter().for_each(|fault| println!("    BROKEN: {fault}"));
+}
+
+/// Vehicles that lose the folder with their orders, as processes of this machine: each holds or keeps to a fence of its own, the page
+/// names the loss, and the surface gives fence and limits again, after a confirmation or by itself.
+///
+/// Exit code 1 if a promise was broken; the files of that run are kept.
+#[derive(Debug, Args)]
+#[command(after_help = "Example: scenecast-bench forget --runs 3")]
+pub(crate) struct ForgetBench {
+    /// Number of missions, a third of them with each setting
+    #[arg(long, default_value_t = 100, value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    runs: u32,
+    #[command(flatten)]
+    program: ProgramArgument,
+}
+
+impl ForgetBench {
+    pub(crate) fn run(self) -> Result<(), UserError> {
+        let program = self.program.path()?;
+        let dir = std::env::temp_dir().join(format!("scenecast-forget-{}", std::process::id()));
+        let recording = dir.join("recording");
+        record(&recording)?;
+        println!("run  safe after s  orders again after s");
+        for number in 1..=self.runs {
+            let run = forget::run(&program, &dir.join(format!("run-{number}")), &recording, number)
+                .map_err(|e| UserError::Failed(format!("run {number} in {}: {e}", dir.display())))?;
+            println!("{number:>3} {:>13.1} {:>21.1}  {}", run.safe_s, run.restored_s, run.setting);
+        }
+        println!(
+            "{0} of {0} vehicles without their folder were safe, and {0} of {0} surfaces gave their orders again",
+            self.runs
+        );
+        std::fs::remove_dir_all(&dir).map_err(|e| UserError::file(&dir, e))
+    }
 }

@@ -49,6 +49,13 @@ impl Disk {
     }
 }
 
+/// Further sections of the configurations, TOML.
+#[derive(Debug, Clone, Default)]
+pub(super) struct MoreSettings {
+    pub(super) vehicle: String,
+    pub(super) surface: String,
+}
+
 /// The folder, the ports and the processes of a run.
 pub(super) struct Ends {
     program: PathBuf,
@@ -61,7 +68,13 @@ pub(super) struct Ends {
 impl Ends {
     /// Prepares both ends in an empty folder, with free ports for the link and the page; the vehicle plays the frames of
     /// `recording`.
-    pub(super) fn new(program: &Path, dir: &Path, recording: &Path, ports: [u16; 2]) -> io::Result<Self> {
+    pub(super) fn new(
+        program: &Path,
+        dir: &Path,
+        recording: &Path,
+        ports: [u16; 2],
+        more: &MoreSettings,
+    ) -> io::Result<Self> {
         if dir.exists() {
             fs::remove_dir_all(dir)?;
         }
@@ -79,8 +92,8 @@ impl Ends {
             runtime("vehicle"),
             toml_text(Path::new(&frames))
         );
-        fs::write(dir.join("surface.toml"), surface)?;
-        fs::write(dir.join("vehicle.toml"), vehicle)?;
+        fs::write(dir.join("surface.toml"), surface + &more.surface)?;
+        fs::write(dir.join("vehicle.toml"), vehicle + &more.vehicle)?;
         Ok(Self { program: program.to_owned(), dir: dir.to_owned(), page, vehicle: None, surface: None })
     }
 

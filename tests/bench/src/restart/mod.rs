@@ -2,10 +2,11 @@
 
 mod command;
 mod ends;
+mod forget;
 mod page;
 mod run;
 
-pub(crate) use command::RestartBench;
+pub(crate) use command::{ForgetBench, RestartBench};
 
 use ends::failed;
 use scenecast_core::UserError;

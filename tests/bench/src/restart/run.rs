@@ -1,6 +1,6 @@
 //! One run: a mission with random restarts, and the check of its promises.
 
-use super::ends::{Disk, End, Ends, Stop, failed};
+use super::ends::{Disk, End, Ends, MoreSettings, Stop, failed};
 use super::page::{Page, Shown, is_decided};
 use super::{RestartRun, RestartSetting};
 use crate::process::free_port;
@@ -38,7 +38,8 @@ pub(super) fn run(
 ) -> Result<RestartRun, UserError> {
     let mut figures = RestartRun::default();
     let ports = [free_port()?, free_port()?];
-    let ends = Ends::new(&setting.program, dir, recording, ports).map_err(failed("preparing a run"))?;
+    let more = MoreSettings::default();
+    let ends = Ends::new(&setting.program, dir, recording, ports, &more).map_err(failed("preparing a run"))?;
     let page = Page::new(ends.page())?;
     let mut run = Run { ends, page, rng, figures: &mut figures, page_limit_s: setting.page_limit_s };
     run.start(End::Surface, Disk::Sound)?;

@@ -2,9 +2,7 @@
 
 use super::orders::Orders;
 use crate::link_ends::{BUDGET_BPS, EndsSetup, auv, draw_seed};
-use scenecast_protocol::directive::{
-    Constraints, OrderStatus, Series, Slot, SlotId, SlotProgress, SlotState, Withdrawal,
-};
+use scenecast_protocol::directive::{Constraints, OrderStatus, Series, Slot, SlotProgress, SlotState, Withdrawal};
 use scenecast_protocol::link::{
     Mismatch, PeerView, SlotInboxState, SurfaceEvent, SurfaceLink, VehicleEvent, VehicleLink,
 };
@@ -106,15 +104,6 @@ impl Waters {
         self.view(surface).slots().cloned().collect()
     }
 
-    pub(super) fn status(&self, surface: usize, id: SlotId) -> Option<OrderStatus> {
-        self.view(surface).slots().find(|order| order.id == id).map(|order| order.status)
-    }
-
-    /// The surface that holds the vehicle, where it is not this one.
-    pub(super) fn holder(&self, surface: usize) -> Option<Series> {
-        self.view(surface).holder().map(|holder| holder.series)
-    }
-
     pub(super) fn give(&mut self, surface: usize, slot: Slot) {
         let id = slot.id();
         let version = self.surfaces[surface].issue(auv(), slot, self.now).expect("the order fits into a frame");
@@ -164,12 +153,6 @@ impl Waters {
         self.vehicles[0] = self.setup.vehicle(draw_seed(&mut self.rng), self.durable.clone(), self.now);
         self.vehicles[0].assume_budget_spent(self.now);
         self.forget_modem(End::Vehicle(0));
-    }
-
-    /// A second vehicle with the same address appears.
-    pub(super) fn add_twin(&mut self) {
-        let twin = self.setup.vehicle(draw_seed(&mut self.rng), SlotInboxState::default(), self.now);
-        self.vehicles.push(twin);
     }
 
     fn forget_modem(&mut self, end: End) {
@@ -275,5 +258,23 @@ impl Waters {
     fn schedule(&mut self, at: Instant, event: WaterEvent) {
         self.serial += 1;
         self.on_air.insert((at, self.serial), event);
+    }
+}
+
+#[cfg(test)]
+impl Waters {
+    pub(super) fn status(&self, surface: usize, id: scenecast_protocol::directive::SlotId) -> Option<OrderStatus> {
+        self.view(surface).slots().find(|order| order.id == id).map(|order| order.status)
+    }
+
+    /// The surface that holds the vehicle, where it is not this one.
+    pub(super) fn holder(&self, surface: usize) -> Option<Series> {
+        self.view(surface).holder().map(|holder| holder.series)
+    }
+
+    /// A second vehicle with the same address appears.
+    pub(super) fn add_twin(&mut self) {
+        let twin = self.setup.vehicle(draw_seed(&mut self.rng), SlotInboxState::default(), self.now);
+        self.vehicles.push(twin);
     }
 }
