@@ -167,6 +167,45 @@ def check(document, path, method, operation, state):
         validate(document, {"$ref": "#/components/schemas/ErrorBody"}, json.loads(why), f"the refusal of {other}")
 
 
+def safety_orders(vehicle):
+    """Fence, keep-outs, return point and each limit as last ordered, and the version of the last hold, resume or abort."""
+    orders = next(v for v in json.loads(ask("GET", "/api/v2/state")[2])["vehicles"] if v["id"] == vehicle)
+    versions = {s["slot"]: s["version"] for s in orders["directive"]["slots"]}
+    parts = {**(orders["fence"] or {}), **(orders["limits"] or {})}
+    return {**{k: v for k, v in parts.items() if v not in (None, [])}, "action": versions.get("constraints")}
+
+
+def fuzz(document, path, operation, vehicle):
+    """Leaves out, nulls and empties each member of a body: no safety order changes that the body does not name."""
+    name = operation["operationId"]
+    schema = operation.get("requestBody", {}).get("content", {}).get("application/json", {}).get("schema")
+    if schema is None or name in ("take_over_vehicle", "change_command"):
+        return 0
+    if "$ref" in schema:
+        schema = document["components"]["schemas"][schema["$ref"].rsplit("/", 1)[1]]
+    order = {**ORDERS, **REFUSED}.get(name) or {"label": largest_label(vehicle)}
+    requested, bodies = path.replace("{id}", str(vehicle)), [{}]
+    for member in schema.get("properties", {}):
+        bodies.append({k: v for k, v in order.items() if k != member})
+        for value in (None, "", [], {}):
+            bodies += [{**order, member: value}, {member: value}]
+    for body in bodies:
+        before = safety_orders(vehicle)
+        status, _, why = ask("POST", requested, json.dumps(body).encode())
+        expect(status < 500, f"{name} with {body}: {status}: {why[:200]}")
+        after = safety_orders(vehicle)
+        changed = {k for k in before.keys() | after.keys() if before.get(k) != after.get(k)}
+        expect(status < 300 or not changed, f"{name} with {body} was refused and changed {changed}")
+        allowed = set(body) if name in ("set_fence", "set_limits", "set_constraints") else set()
+        expect(changed <= allowed, f"{name} with {body} changed {changed - allowed}")
+        if changed:
+            # The next body must have something to remove.
+            for again in ("set_fence", "set_limits"):
+                kind = again.removeprefix("set_")
+                ask("POST", f"/api/v2/vehicles/{vehicle}/{kind}", json.dumps(ORDERS[again]).encode())
+    return len(bodies)
+
+
 def check_metrics():
     figures = {f.name: f for f in prometheus_client.parser.text_string_to_metric_families(ask("GET", "/metrics")[2].decode())}
     expect(len(figures) > 20, f"only {len(figures)} figures")
@@ -197,7 +236,12 @@ def main():
     for method, path, operation in sorted(every, key=lambda one: one[0]):
         check(document, path, method.upper(), operation, state)
     check_metrics()
-    print(f"{len(every)} operations are as documented")
+    vehicle = state["vehicles"][0]["id"]
+    for again in ("set_fence", "set_limits"):
+        status, _, why = ask("POST", f"/api/v2/vehicles/{vehicle}/{again[4:]}", json.dumps(ORDERS[again]).encode())
+        expect(status == 202, f"{again}: {why[:200]}")
+    bodies = sum(fuzz(document, path, o, vehicle) for method, path, o in every if method == "post")
+    print(f"{len(every)} operations are as documented; {bodies} changed bodies changed no safety order that they do not name")
 
 
 main()

@@ -6,6 +6,7 @@ mod assets;
 mod body;
 mod compress;
 mod connections;
+mod edit_rate;
 mod guard;
 mod handlers;
 mod openapi;

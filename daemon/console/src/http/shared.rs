@@ -1,6 +1,7 @@
 //! The state that all handlers share.
 
 use super::access::Access;
+use super::edit_rate::EditRate;
 use super::response::{error, not_found, respond};
 use super::seats::Seats;
 use crate::request::{ClientRequest, Reply, SurfaceRequest};
@@ -8,13 +9,14 @@ use crate::snapshot::Snapshot;
 use crate::tiles::TiledMap;
 use axum::body::Bytes;
 use axum::extract::{FromRequestParts, Path};
-use axum::http::StatusCode;
 use axum::http::request::Parts;
-use axum::response::Response;
+use axum::http::{StatusCode, header};
+use axum::response::{IntoResponse, Response};
 use scenecast_protocol::map::Cell;
 use scenecast_surface::{Giver, OrderKind};
 use std::collections::BTreeMap;
 use std::sync::Arc;
+use std::time::Instant;
 use tokio::sync::{Mutex, Semaphore, mpsc, oneshot, watch};
 
 /// A request that waits for the reply of the surface.
@@ -27,6 +29,7 @@ pub(super) struct Shared {
     pub(super) maps: Arc<MapCache>,
     pub(super) access: Arc<Access>,
     pub(super) seats: Seats,
+    edit_rate: EditRate,
     pub(super) document: Bytes,
 }
 
@@ -70,6 +73,7 @@ impl Shared {
             }),
             access: Arc::new(access),
             seats: Seats::default(),
+            edit_rate: EditRate::default(),
             document,
         }
     }
@@ -102,6 +106,14 @@ impl Shared {
 
     /// The reply of the surface to an order of a principal, as a response.
     pub(super) async fn order(&self, by: Giver, request: SurfaceRequest) -> Response {
+        let is_edit = request.order_kind() == Some(OrderKind::Record);
+        if is_edit && !self.edit_rate.take(by.name(), Instant::now()) {
+            let refusal = error(
+                StatusCode::TOO_MANY_REQUESTS,
+                "too many edits by you: ten a second are possible, so try again soon",
+            );
+            return ([(header::RETRY_AFTER, "1")], refusal).into_response();
+        }
         self.send(ClientRequest { by: Some(by), request }).await.map_or_else(|busy| busy, respond)
     }
 }
