@@ -48,13 +48,12 @@ use smooth::{Coordinates, smoothed, squared_distance};
 use space::Space;
 use std::collections::BTreeMap;
 
-/// A cell keeps its label unless another centre is nearer by this, squared units of the noise between neighbours, where the floor varies
-/// as in `Compared::contrast`.
+/// A cell keeps its label unless another centre is nearer by this times the contrast, squared units of the noise between neighbours.
 const HYSTERESIS: f32 = 1.5;
 /// The variance of a whole floor in its main direction, in units of the noise between neighbours, from which on its habitats stand out; and
-/// the share of it from which on a floor is not uniform.
+/// the contrast below which a floor is uniform.
 const STANDS_OUT: f64 = 5.0;
-const NOT_UNIFORM: f64 = 0.2;
+const NOT_UNIFORM: f64 = 0.45;
 /// Frames after which a map is learnt again, and cells of a map that is learnt at each frame.
 const FRAMES_BETWEEN: u32 = 10;
 const SMALL_MAP: usize = 2000;
@@ -120,8 +119,8 @@ struct Compared {
     cells: Coordinates,
     /// The number of measures that vary over the cells.
     varying: usize,
-    /// 1 where habitats stand out from the differences of neighbours, and less, down to .2, where habitats differ as little as neighbours:
-    /// the finer the mosaic of a floor, the nearer its habitats.
+    /// 1 where habitats stand out from the differences of neighbours, and less, down to .45, where habitats differ as little as
+    /// neighbours: the finer the mosaic of a floor, the nearer its habitats.
     contrast: f64,
 }
 
@@ -245,16 +244,19 @@ impl Habitats {
     /// `None` without cells.
     fn compared(&self) -> Option<Compared> {
         let (places, values): (Vec<_>, Vec<_>) = self.sights.means().into_iter().unzip();
+        if places.is_empty() {
+            return None;
+        }
         let map = CellMap::new(&places);
-        let space = Space::learn(&map, &values).filter(|_| !places.is_empty())?;
         let varies = |k: &usize| {
             let count = values.len() as f64;
             let mean = values.iter().map(|v| v[*k]).sum::<f64>() / count;
             values.iter().map(|v| (v[*k] - mean).powi(2)).sum::<f64>() / count > CONSTANT * CONSTANT
         };
         let varying = (0..MEASURES).filter(varies).count().max(1);
+        let space = Space::learn(&map, &values)?;
         let cells = smoothed(&map, &space.places(&values), varying);
-        let contrast = (clusters::main_variance(&cells) / STANDS_OUT).clamp(NOT_UNIFORM, 1.0);
+        let contrast = (clusters::main_variance(&cells) / STANDS_OUT).sqrt().clamp(NOT_UNIFORM, 1.0);
         Some(Compared { places, space, cells, varying, contrast })
     }
 
