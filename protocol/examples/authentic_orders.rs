@@ -14,7 +14,7 @@ use scenecast_protocol::link::{
 use scenecast_protocol::mac::{Access, MasterConfig, ModemProfile};
 use scenecast_protocol::map_codec::Codec;
 use scenecast_protocol::schedule::Shares;
-use scenecast_protocol::seal::MissionKey;
+use scenecast_protocol::seal::{HeldKey, MissionKey};
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::{Address, CellEdge, MissionId, VehicleStatus};
 use std::sync::Arc;
@@ -31,7 +31,7 @@ const MODEM: ModemProfile = ModemProfile {
 /// `tests/protocol/examples.rs` runs it too.
 pub fn main() {
     // At sea the key comes from `scenecast key new`, and both ends read it from a file.
-    let key = Arc::new(MissionKey::from_bytes(*b"sixteen secret b"));
+    let key = Arc::new(HeldKey::Mission(MissionKey::from_bytes(*b"sixteen secret b")));
     println!("fingerprint of the key: {:08x}\n", key.fingerprint());
     let mut sea = Sea::new(Some(Authenticity { key, all: true, encrypt: true }));
     let vehicle = sea.address;

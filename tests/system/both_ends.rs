@@ -45,7 +45,9 @@ fn key(dir: &Path, name: &str) -> String {
 fn budget_and_shares_change_from_either_end_under_a_key() {
     let dir = scratch("either-end");
     let key = key(&dir, "mission.key");
-    let (page, _surface, vehicle) = start(&dir, &key, &key, "", "budget_bps = 4000\n");
+    let own = dir.join("auv-1.key").display().to_string();
+    assert!(run(&["key", "derive", &key, "--vehicle", "1", "--out", &own]).status.success());
+    let (page, _surface, vehicle) = start(&dir, &own, &key, "", "budget_bps = 4000\n");
     let budget = || state(page)?["vehicles"][0]["status"]["budget_bps"].as_u64();
     wait_until("the vehicle's budget is told", LIMIT, || budget() == Some(4000));
     let order = |map: u32| {

@@ -138,10 +138,24 @@ fn a_key_is_made_once_and_shown() {
     let file = file.to_str().unwrap();
     let said = |output: std::process::Output| String::from_utf8_lossy(&output.stdout).into_owned();
     let made = said(run(&["key", "new", "--out", file]));
-    assert!(made.starts_with(&format!("{file}: fingerprint ")) && made.contains("link.key_file"), "{made}");
+    assert!(made.starts_with(&format!("{file}: mission, fingerprint ")) && made.contains("link.key_file"), "{made}");
     assert_refused(&["key", "new", "--out", file], &[file, "not overwritten"]);
     assert_eq!(said(run(&["key", "show", file])).trim(), made.lines().next().unwrap());
     assert_refused(&["key", "show", "nowhere.key"], &["nowhere.key"]);
+
+    let own = scratch("key-derived").join("auv-3.key");
+    let own = own.to_str().unwrap();
+    let derived = said(run(&["key", "derive", file, "--vehicle", "3", "--out", own]));
+    let fingerprint = made.lines().next().unwrap().rsplit(' ').next().unwrap();
+    assert!(derived.starts_with(&format!("{own}: vehicle 3, fingerprint {fingerprint}\n")), "{derived}");
+    assert_eq!(said(run(&["key", "show", own])).trim(), derived.lines().next().unwrap());
+    assert_refused(&["key", "derive", own, "--vehicle", "3", "--out", "x"], &[own, "key of a vehicle"]);
+    assert_refused(&["key", "derive", file, "--vehicle", "15"], &["15", "1..=14"]);
+    let set = format!("link.key_file={own}");
+    for (end, why) in [("asv", "the mission key"), ("auv", "this is vehicle 1")] {
+        let config = scenecast_tests::workspace().join("config").join(end).with_extension("toml");
+        assert_refused(&[end, "--config", config.to_str().unwrap(), "--set", &set], &[own, why]);
+    }
 }
 
 #[test]

@@ -20,7 +20,7 @@ const RUN: &[(&str, &[(&str, &str)])] = &[
     ("scenecast config --role auv > auv.toml", &[]),
     ("scenecast config --role asv > asv.toml", &[]),
     ("scenecast key new --out mission.key", &[]),
-    ("scenecast key show mission.key", &[]),
+    ("scenecast key derive mission.key --vehicle 1 --out auv-1.key", &[]),
     ("scenecast key token --out console.token", &[]),
     ("scenecast sim --duration 300 --record recording --out run2", &[("300", "6")]),
     ("scenecast scene run --source frames:recording --metres-per-pixel 0.004 --out run1", &[]),

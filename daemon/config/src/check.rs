@@ -213,7 +213,7 @@ fn check_frame(config: &Config) -> Result<(), UserError> {
         (Some(_), Authenticate::All) => {
             (48, "a link.key_file", "the vehicle's report", ", or link.authenticate = \"down\"")
         }
-        (Some(_), Authenticate::Down) => (37, "a link.key_file", "a hello", ""),
+        (Some(_), Authenticate::Down) => (41, "a link.key_file", "a hello", ""),
     };
     let frame_bytes = crate::full_frame_bytes(config);
     if frame_bytes >= least {

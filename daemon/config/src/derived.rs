@@ -49,10 +49,14 @@ pub fn cell_m(config: &Config) -> f64 {
     if config.scene.cell_m > 0.0 { config.scene.cell_m } else { 25.0 * config.camera.metres_per_pixel }
 }
 
-/// The key and the use of it, the same at both ends; `None` without a key.
-pub fn authenticity(config: &Config) -> Result<Option<Authenticity>, UserError> {
+/// The key of an end and the use of it, the same at both ends; `None` without a key.
+///
+/// # Errors
+///
+/// The file cannot be read, or has the key of another end.
+pub fn authenticity(config: &Config, end: Address) -> Result<Option<Authenticity>, UserError> {
     let (all, encrypt) = (config.link.authenticate == Authenticate::All, config.link.encrypt);
-    Ok(load_key(config)?.map(|key| Authenticity { key: Arc::new(key), all, encrypt }))
+    Ok(load_key(config, end)?.map(|key| Authenticity { key: Arc::new(key), all, encrypt }))
 }
 
 /// The vehicles that the surface works with from the start, by address and name.

@@ -1,8 +1,9 @@
-//! The file of the mission key.
+//! The file of the mission key, or of the keys of a vehicle.
 
 use super::Config;
 use scenecast_core::UserError;
-use scenecast_protocol::seal::MissionKey;
+use scenecast_protocol::seal::HeldKey;
+use scenecast_protocol::wire::Address;
 use std::fs::File;
 use std::io::Read;
 use std::path::Path;
@@ -11,27 +12,46 @@ use zeroize::Zeroizing;
 /// A bound for the file: a key with comments is shorter.
 const MAX_BYTES: u64 = 64 * 1024;
 
-/// The key of `link.key_file`; `None` if it is empty, so that frames are not authenticated.
+/// The key of an end in `link.key_file`; `None` if it is empty, so that frames are not authenticated.
 ///
 /// Logs a warning if other users of this machine may read the file.
-pub fn load_key(config: &Config) -> Result<Option<MissionKey>, UserError> {
+///
+/// # Errors
+///
+/// The file cannot be read, or has the keys of a vehicle other than this end.
+pub fn load_key(config: &Config, end: Address) -> Result<Option<HeldKey>, UserError> {
     let Some(path) = &config.link.key_file else { return Ok(None) };
     let (key, warning) = read_key(path)?;
     if let Some(warning) = warning {
         tracing::warn!("{warning}");
     }
+    if let HeldKey::Vehicle(key) = &key
+        && key.address != end.number()
+    {
+        let (of, mission) = (key.address, key.mission);
+        let line = match end {
+            Address::SURFACE => {
+                format!("this is the key of vehicle {of}; the surface needs the mission key, fingerprint {mission:08x}")
+            }
+            _ => format!(
+                "this is the key of vehicle {of}, and this is vehicle {}; scenecast key derive writes its key",
+                end.number()
+            ),
+        };
+        return Err(UserError::file(path, line));
+    }
     Ok(Some(key))
 }
 
 /// The key in a file, and a warning if other users of this machine may read it.
-pub fn read_key(path: &Path) -> Result<(MissionKey, Option<String>), UserError> {
+pub fn read_key(path: &Path) -> Result<(HeldKey, Option<String>), UserError> {
     let problem = |e: std::io::Error| UserError::file(path, format!("{e}; scenecast key new writes a key file"));
     let file = File::open(path).map_err(problem)?;
     let warning = others_may_read(&file)
         .then(|| format!("{}: other users may read this key; chmod 600 FILE prevents that", path.display()));
     let mut text = Zeroizing::new(String::with_capacity(1024));
     file.take(MAX_BYTES).read_to_string(&mut text).map_err(problem)?;
-    let key = MissionKey::parse(&text).map_err(|e| UserError::file(path, e))?;
+    let key = HeldKey::parse(&text).map_err(|e| UserError::file(path, e))?;
     Ok((key, warning))
 }
 
@@ -49,6 +69,7 @@ pub(super) fn others_may_read(_: &File) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use scenecast_protocol::seal::{MissionKey, VehicleKey};
 
     fn file_of(name: &str, text: &str) -> (std::path::PathBuf, Config) {
         let path = std::env::temp_dir().join(format!("scenecast-key-file-{}-{name}", std::process::id()));
@@ -60,28 +81,40 @@ mod tests {
 
     #[test]
     fn no_file_is_no_key() {
-        assert!(load_key(&Config::default()).unwrap().is_none());
+        assert!(load_key(&Config::default(), Address::SURFACE).unwrap().is_none());
     }
 
     #[test]
     fn a_key_is_read_from_its_file() {
         let key = MissionKey::from_bytes([3; 16]);
         let (path, config) = file_of("good", &format!("# reef\n{}", *key.to_text()));
-        let read = load_key(&config).unwrap().unwrap();
+        let read = load_key(&config, Address::SURFACE).unwrap().unwrap();
         std::fs::remove_file(path).unwrap();
         assert_eq!(read.fingerprint(), key.fingerprint());
     }
 
     #[test]
+    fn the_key_of_a_vehicle_serves_no_other_end() {
+        let key = VehicleKey::derive(&MissionKey::from_bytes([3; 16]), 2);
+        let (path, config) = file_of("vehicle", &key.to_text());
+        let load = |number| load_key(&config, Address::vehicle(number).unwrap_or(Address::SURFACE));
+        let [own, other, surface] = [2, 3, 0].map(load);
+        std::fs::remove_file(path).unwrap();
+        assert_eq!(own.unwrap().unwrap().fingerprint(), MissionKey::from_bytes([3; 16]).fingerprint());
+        assert!(other.unwrap_err().to_string().contains("vehicle 2, and this is vehicle 3"));
+        assert!(surface.unwrap_err().to_string().contains("needs the mission key"));
+    }
+
+    #[test]
     fn a_broken_file_is_named_with_the_line_and_what_is_allowed() {
         let (path, config) = file_of("broken", "# reef\nhello\n");
-        let said = load_key(&config).unwrap_err();
+        let said = load_key(&config, Address::SURFACE).unwrap_err();
         std::fs::remove_file(&path).unwrap();
         assert_eq!(said.exit_code(), 2);
         let said = said.to_string();
         assert!(said.starts_with(&format!("{}: line 2: ", path.display())), "{said}");
-        assert!(said.contains("scenecast-key 1 KEY CHECK"), "{said}");
-        let missing = load_key(&config).unwrap_err().to_string();
+        assert!(said.contains("scenecast-key 2 KEY CHECK"), "{said}");
+        let missing = load_key(&config, Address::SURFACE).unwrap_err().to_string();
         assert!(missing.contains(&path.display().to_string()) && missing.contains("scenecast key new"), "{missing}");
     }
 

@@ -255,8 +255,8 @@ mod tests {
         assert!(said.starts_with("link.frame_bytes = 40") && said.contains("48 to 1024"), "{said}");
         assert!(said.contains("or link.authenticate = \"down\""), "{said}");
         let said = message(&["link.authenticate=down", "link.key_file=k", "link.frame_bytes=32"]);
-        assert!(said.contains("a hello") && said.contains("37 to 1024"), "{said}");
-        loaded(&["link.authenticate=down", "link.key_file=k", "link.frame_bytes=40"]);
+        assert!(said.contains("a hello") && said.contains("41 to 1024"), "{said}");
+        loaded(&["link.authenticate=down", "link.key_file=k", "link.frame_bytes=41"]);
         loaded(&["link.frame_bytes=40"]);
     }
 

@@ -247,13 +247,17 @@ mod tests {
     use scenecast_core::Area;
     use scenecast_core::tuning_table::TuningTable;
     use scenecast_protocol::link::Authenticity;
-    use scenecast_protocol::seal::MissionKey;
+    use scenecast_protocol::seal::{HeldKey, MissionKey};
     use scenecast_surface::Surface;
     use scenecast_vehicle::{Durable, Vehicle};
     use std::sync::Arc;
 
     fn key() -> Option<Authenticity> {
-        Some(Authenticity { key: Arc::new(MissionKey::from_bytes([7; 16])), all: true, encrypt: false })
+        Some(Authenticity {
+            key: Arc::new(HeldKey::Mission(MissionKey::from_bytes([7; 16]))),
+            all: true,
+            encrypt: false,
+        })
     }
 
     fn surface(authenticity: Option<Authenticity>, seed: u64) -> LinkHost<Surface> {

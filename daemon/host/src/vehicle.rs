@@ -8,7 +8,7 @@ use scenecast_drivers::modem::Station;
 use scenecast_protocol::coordinates::MapPoint;
 use scenecast_protocol::directive::{Budget, Fix, Settings};
 use scenecast_protocol::time::Instant;
-use scenecast_protocol::wire::EquipmentFaults;
+use scenecast_protocol::wire::{EquipmentFaults, UtcHours};
 use scenecast_vehicle::{
     AppliedSlot, ForeignUpdate, MapUpdate, RegisteredFrame, SharedExemplars, Vehicle, VehicleDisk, VehicleOutput,
 };
@@ -292,6 +292,11 @@ impl VehicleHost {
     pub fn handle_persist_failed(&mut self, now: Instant) {
         self.is_persisting = false;
         self.link.end_mut().handle_persist_failed(now);
+    }
+
+    /// Sets the clock of this computer, with which that of the surface is compared.
+    pub fn set_clock(&mut self, clock: UtcHours) {
+        self.link.end_mut().set_clock(clock);
     }
 
     /// Sets the state of the disk; the next status reports it.

@@ -39,7 +39,7 @@ impl<S: StateSource, R: StateReplica> LinkRig<S, R> {
         let (mut carrier, [at_vehicle, at_surface]) = Carrier::new(config, seed, now)?;
         carrier.place(VEHICLE, NodePosition::default());
         carrier.place(SURFACE, NodePosition::new(config.channel.range_m, 0.0, 0.0));
-        let authenticity = scenecast_config::authenticity(config)?;
+        let authenticity = scenecast_config::authenticity(config, Address::SURFACE)?;
         let vehicle = scenecast_vehicle::link_config(config, authenticity.clone(), *at_vehicle.profile())?;
         let surface = scenecast_surface::link_config(config, authenticity, *at_surface.profile())?;
         let address = vehicle.address;

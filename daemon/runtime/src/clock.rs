@@ -1,7 +1,13 @@
 //! Mission time of a process.
 
 use scenecast_protocol::time::Instant;
-use std::time::Duration;
+use scenecast_protocol::wire::UtcHours;
+use std::time::{Duration, SystemTime};
+
+/// The hour of the computer's clock; `None` where it is not set.
+pub(crate) fn utc_hours() -> Option<UtcHours> {
+    SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).ok().and_then(UtcHours::from_unix)
+}
 
 /// A monotonic clock that may run faster than wall time, for rehearsals. It goes on while the computer sleeps, so that ages include
 /// the sleep; timers that passed meanwhile are due once.

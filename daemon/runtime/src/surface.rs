@@ -1,6 +1,6 @@
 //! `scenecast asv`: ports, page, files and clock around the surface's host.
 
-use super::clock::Clock;
+use super::clock::{Clock, utc_hours};
 use super::instruments::{Instruments, relay};
 use super::map_files::{MapFile, MapFiles};
 use super::missing_key::warn_without_key;
@@ -60,13 +60,14 @@ pub fn run_surface(load: Load, simulated: Option<SimulatedAutopilot>) -> Result<
                 Some(bind(address.as_str(), "console.listen", tokens, &config.console.host).await?)
             }
         };
+        warn_without_key(&config);
+        let authenticity = scenecast_config::authenticity(&config, Address::SURFACE)?;
         let was_there = config.runtime.state_dir.exists();
         let (mut files, clock) = SurfaceFiles::open(&config)?;
         let profile = scenecast_drivers::modem::modem_of_process(&config, Address::SURFACE)?;
-        warn_without_key(&config);
         let mut surface = scenecast_surface::assemble(
             &config,
-            scenecast_config::authenticity(&config)?,
+            authenticity,
             scenecast_config::tuning_table(&config)?,
             profile,
             super::random_bits(),
@@ -268,6 +269,9 @@ impl SurfaceShell {
     /// page needs a new snapshot.
     fn pump(&mut self) -> Result<bool, UserError> {
         let now = self.clock.now();
+        if let Some(clock) = utc_hours() {
+            self.host.surface_mut().set_clock(clock);
+        }
         let mut is_changed = self.handle_events()?;
         while let Some(bytes) = self.host.poll_output(now) {
             self.ports.modem.write(bytes);

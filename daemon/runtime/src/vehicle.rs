@@ -1,6 +1,6 @@
 //! `scenecast auv`: ports, disk and clock around the vehicle's host.
 
-use super::clock::Clock;
+use super::clock::{Clock, utc_hours};
 use super::disagreement::Disagreement;
 use super::disk_space::{Checkpoint, DiskWatch};
 use super::durable::{Keeper, StartedRun};
@@ -39,11 +39,12 @@ pub fn run_vehicle(load: Load, simulated: Option<SimulatedAutopilot>) -> Result<
         let config = load()?;
         keep_private(&config);
         warn_without_key(&config);
+        let address = scenecast_config::vehicle_address(&config)?;
+        let authenticity = scenecast_config::authenticity(&config, address)?;
         let dir = config.runtime.state_dir.as_path();
         let Start { run, mut mapper, keep, labels } = start(&config, dir)?;
         let StartedRun { keeper, durable, is_again, is_stored } = run;
         let clock = Clock::new(config.runtime.time_scale);
-        let address = scenecast_config::vehicle_address(&config)?;
         let profile = scenecast_drivers::modem::modem_of_process(&config, address)?;
         let recording = configured_recording(&config)?;
         for note in recording.iter().flat_map(|recording| &recording.notes) {
@@ -52,7 +53,7 @@ pub fn run_vehicle(load: Load, simulated: Option<SimulatedAutopilot>) -> Result<
         let area = survey_area(&config, recording.as_ref())?;
         let mut vehicle = scenecast_vehicle::assemble(
             &config,
-            scenecast_config::authenticity(&config)?,
+            authenticity,
             profile,
             area,
             durable,
@@ -320,6 +321,9 @@ impl VehicleShell {
     /// Acts on every event of the host, then writes the bytes for the ports.
     fn pump(&mut self) -> Result<(), UserError> {
         let now = self.clock.now();
+        if let Some(clock) = utc_hours() {
+            self.host.set_clock(clock);
+        }
         if let Some(disk) = self.disk.look(std::time::Instant::now()) {
             self.host.handle_disk(disk);
         }

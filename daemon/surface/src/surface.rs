@@ -14,7 +14,7 @@ use scenecast_protocol::link::{Cycle, Mismatch, PeerView, SurfaceEvent, SurfaceL
 use scenecast_protocol::map::LayerSet;
 use scenecast_protocol::schedule::{BackgroundOrder, Shares};
 use scenecast_protocol::time::Instant;
-use scenecast_protocol::wire::{Address, Placement, VehicleStatus};
+use scenecast_protocol::wire::{Address, Placement, UtcHours, VehicleStatus};
 use std::collections::{BTreeMap, VecDeque};
 
 /// News of the surface for its host.
@@ -137,6 +137,11 @@ impl Surface {
     /// Frames of unknown vehicles, and frames that could not be read.
     pub fn unknown_senders(&self) -> u64 {
         self.link.unknown_senders()
+    }
+
+    /// Sets the clock of this computer, with which those of the vehicles are compared.
+    pub fn set_clock(&mut self, clock: UtcHours) {
+        self.link.set_clock(clock);
     }
 
     /// Counts the whole budget window as spent, because an earlier run may have transmitted until `now`.

@@ -1,6 +1,6 @@
 //! Settings of the other end that do not fit.
 
-use crate::wire::{SessionId, WIRE_VERSION};
+use crate::wire::{SessionId, UtcHours, WIRE_VERSION};
 use std::collections::BTreeSet;
 
 /// A setting of the other end that does not fit, so that its frames are refused, wasteful or those of two. It is found in a frame
@@ -26,6 +26,11 @@ pub enum Mismatch {
     /// Its frames are longer than those of this end, which have so many bytes. They are read all the same.
     #[error("its frames are longer than those of this end ({0} bytes): set the same link.frame_bytes at both ends")]
     Longer(usize),
+    /// Its clock and that of this end are apart by so many days, rounded down. Its frames are read all the same.
+    #[error(
+        "its clock and the clock of this end are {0} days apart: set both to UTC, or the times of files and logs do not fit"
+    )]
+    Clock(u32),
     /// Two vehicles have its address.
     #[error(
         "another vehicle answers at its address, and only one obeys: set a vehicle.address of its own at each vehicle"
@@ -41,6 +46,8 @@ pub(super) struct MismatchReport {
     current: Option<Mismatch>,
     /// Frames that are accepted, but longer than ours.
     longer: Option<Mismatch>,
+    /// The clock in the last hello that verified.
+    clock: Option<Mismatch>,
     reported: BTreeSet<Mismatch>,
     /// Frames with an unexpected tag, which may also be damaged frames, since the last accepted one.
     tagged: u32,
@@ -88,12 +95,22 @@ impl MismatchReport {
         self.current.take_if(|mismatch| *mismatch == Mismatch::Key);
     }
 
+    /// A hello that has verified has this clock, and this end has `own`.
+    pub(super) fn note_clock(&mut self, clock: Option<UtcHours>, own: Option<UtcHours>) {
+        let hours = clock.zip(own).map_or(0, |(clock, own)| clock.apart(own));
+        let found = (hours > 24).then_some(Mismatch::Clock(hours / 24));
+        if found.is_some() && self.clock.is_none() {
+            self.found = found;
+        }
+        self.clock = found;
+    }
+
     pub(super) fn handle_accepted(&mut self) {
         (self.tagged, self.current, self.untrue) = (0, None, None);
     }
 
     pub(super) fn current(&self) -> Option<Mismatch> {
-        self.current.or(self.longer)
+        self.current.or(self.longer).or(self.clock)
     }
 
     pub(super) fn poll(&mut self) -> Option<Mismatch> {

@@ -6,12 +6,13 @@ pub use receive::Inbound;
 
 use super::handshake::{FramePurpose, Handshake};
 use super::mismatch::{Mismatch, MismatchReport};
-use super::run::{Authenticity, Identities, Identity};
+use super::run::{Authenticity, Identities, Identity, LinkAuthenticity};
 use super::{FrameNumber, LinkStats, LinkWindow};
 use crate::directive::Series;
 use crate::seal::{Direction, SessionKey, TAG_BYTES};
 use crate::wire::{
-    Address, ChunkKind, FrameBuilder, FrameKind, Header, Introduction, MissionId, Seal, Stamp, room_for_payload,
+    Address, ChunkKind, FrameBuilder, FrameKind, Header, Introduction, MissionId, Seal, Stamp, UtcHours,
+    room_for_payload,
 };
 use std::time::Duration;
 
@@ -32,7 +33,7 @@ pub struct LinkPair<T> {
     mission: MissionId,
     us: Address,
     peer: Address,
-    authenticity: Option<Authenticity>,
+    authenticity: Option<LinkAuthenticity>,
     /// The introduction in the hellos of this end.
     introduction: Introduction,
     handshake: Handshake<T>,
@@ -65,7 +66,8 @@ impl<T> LinkPair<T> {
         introduction: Introduction,
         seed: u64,
     ) -> Self {
-        let handshake = Handshake::new(Identities::new(seed, authenticity.as_ref()));
+        let authenticity = authenticity.map(|a| a.link(if us == Address::SURFACE { peer } else { us }));
+        let handshake = Handshake::new(Identities::new(seed, authenticity.as_ref().map(|a| a.key.clone())));
         let (mismatch, stats) = (MismatchReport::default(), LinkStats::default());
         Self {
             mission,
@@ -92,6 +94,11 @@ impl<T> LinkPair<T> {
     /// Names another series in the hellos of this end; returns whether it is another one.
     pub fn set_series(&mut self, series: Series) -> bool {
         self.introduction.series.replace(series) != Some(series)
+    }
+
+    /// Sets the clock in later hellos of this end, with which those of the peer are compared.
+    pub fn set_clock(&mut self, clock: UtcHours) {
+        self.introduction.clock = Some(clock);
     }
 
     /// At the vehicle: sets how long the surface that holds it was silent.
@@ -387,7 +394,7 @@ impl<T> LinkPair<T> {
 
 /// Derives the key of a run of ours with a run of the peer.
 fn session_key(
-    authenticity: Option<Authenticity>,
+    authenticity: Option<LinkAuthenticity>,
     mission: MissionId,
     us: Address,
     peer: Address,
@@ -404,7 +411,7 @@ fn session_key(
 mod tests {
     use super::*;
     use crate::link::DropReason;
-    use crate::seal::MissionKey;
+    use crate::seal::{HeldKey, MissionKey};
     use crate::wire::Envelope;
     use std::sync::Arc;
 
@@ -413,7 +420,7 @@ mod tests {
     }
 
     fn keyed(encrypt: bool) -> Option<Authenticity> {
-        Some(Authenticity { key: Arc::new(MissionKey::from_bytes([9; 16])), all: true, encrypt })
+        Some(Authenticity { key: Arc::new(HeldKey::Mission(MissionKey::from_bytes([9; 16]))), all: true, encrypt })
     }
 
     fn end_of_surface(authenticity: Option<Authenticity>, seed: u64) -> LinkPair<u64> {

@@ -1,19 +1,34 @@
 //! A run of this end with a run of the peer.
 
 use super::{Flight, FrameNumber, LinkWindow};
-use crate::seal::{Direction, MissionKey, SessionKey};
-use crate::wire::{Envelope, Frame, Introduction, MissionId, Seal, SessionId, unwrap_number};
+use crate::seal::{Direction, HeldKey, LinkKey, SessionKey};
+use crate::wire::{Address, Envelope, Frame, Introduction, MissionId, Seal, SessionId, unwrap_number};
 use std::sync::Arc;
 
 /// The key and the scope of authentication.
 #[derive(Debug, Clone)]
 pub struct Authenticity {
-    /// The mission key, which both ends share.
-    pub key: Arc<MissionKey>,
+    /// The mission key, or the keys of one vehicle that are derived from it.
+    pub key: Arc<HeldKey>,
     /// Whether frames of the vehicle are authenticated too, and not only those of the surface.
     pub all: bool,
     /// Whether the content of authenticated frames is encrypted.
     pub encrypt: bool,
+}
+
+impl Authenticity {
+    /// That of the link with a vehicle.
+    pub(super) fn link(&self, vehicle: Address) -> LinkAuthenticity {
+        LinkAuthenticity { key: self.key.link(vehicle.number()), all: self.all, encrypt: self.encrypt }
+    }
+}
+
+/// The key of a link, and the scope of authentication.
+#[derive(Debug, Clone)]
+pub(super) struct LinkAuthenticity {
+    pub(super) key: LinkKey,
+    pub(super) all: bool,
+    pub(super) encrypt: bool,
 }
 
 /// The identity of a run of one end: the session on the wire, and a nonce that no other run has.
@@ -30,13 +45,13 @@ pub struct Identity {
 pub(super) struct Identities {
     random: u64,
     /// The nonces are drawn under it, so that a listener foresees none. Without a key there is nothing to foresee.
-    key: Option<Arc<MissionKey>>,
+    key: Option<LinkKey>,
 }
 
 impl Identities {
     /// `seed` must be random for each start of the program.
-    pub(super) fn new(seed: u64, authenticity: Option<&Authenticity>) -> Self {
-        Self { random: seed, key: authenticity.map(|a| a.key.clone()) }
+    pub(super) fn new(seed: u64, key: Option<LinkKey>) -> Self {
+        Self { random: seed, key }
     }
 
     pub(super) fn draw(&mut self) -> Identity {

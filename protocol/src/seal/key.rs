@@ -1,4 +1,4 @@
-//! The mission key and the keys derived from it.
+//! The mission key, the keys of vehicles that are derived from it, and those derived from these.
 
 use super::prf::{Secret, ShortTagged, join, mac, prf};
 use super::{SessionKey, Tag};
@@ -6,8 +6,12 @@ use ascon_aead::aead::{AeadInOut, KeyInit};
 use std::fmt;
 use zeroize::Zeroizing;
 
-/// Nonces under the mission key. Each is used once, with no associated data, so that the results are independent.
+/// Nonces under the mission key. Each is used once with the same data, so that the results are independent.
 const FINGERPRINT: &[u8; 16] = b"scenecast-print1";
+const VEHICLE: &[u8; 16] = b"scenecast-vehic1";
+const CALL: &[u8; 16] = b"scenecast-calls1";
+
+/// Nonces under the key of a vehicle or of the calls, likewise.
 const HELLO: &[u8; 16] = b"scenecast-hello1";
 const SESSION: &[u8; 16] = b"scenecast-sessn1";
 const NONCE: &[u8; 16] = b"scenecast-nonce1";
@@ -15,14 +19,14 @@ const NONCE: &[u8; 16] = b"scenecast-nonce1";
 /// The nonce of every hello tag. The hello key encrypts no data; see `prf`.
 const HELLO_NONCE: &[u8; 16] = &[0; 16];
 
-/// The secret of a mission, 16 bytes that both ends hold; wiped from memory when dropped.
+/// The secret of a mission, 16 bytes that the surface holds; wiped from memory when dropped.
 ///
 /// ```
 /// use scenecast_protocol::seal::MissionKey;
 ///
 /// let key = MissionKey::from_bytes(*b"0123456789abcdef");
 /// let file = key.to_text();
-/// assert!(file.starts_with("scenecast-key 1 30313233"));
+/// assert!(file.starts_with("scenecast-key 2 30313233"));
 /// let read = MissionKey::parse(&file)?;
 /// assert_eq!(read.fingerprint(), key.fingerprint());
 /// # Ok::<(), scenecast_protocol::seal::KeyError>(())
@@ -46,6 +50,32 @@ impl MissionKey {
     pub fn fingerprint(&self) -> u32 {
         let [a, b, c, d, ..] = *prf(&self.bytes, FINGERPRINT, &[]);
         u32::from_be_bytes([a, b, c, d])
+    }
+
+    /// The key of a vehicle, by its address. It reveals neither the mission key nor the key of another vehicle.
+    pub fn vehicle(&self, address: u8) -> LinkKey {
+        LinkKey { bytes: prf(&self.bytes, VEHICLE, &[address]) }
+    }
+
+    /// The key of discovery calls, which all vehicles hold.
+    pub fn calls(&self) -> LinkKey {
+        LinkKey { bytes: prf(&self.bytes, CALL, &[]) }
+    }
+}
+
+/// The secret of the link between the surface and one vehicle, or of the calls to all; wiped from memory when dropped.
+#[derive(Clone)]
+pub struct LinkKey {
+    bytes: Secret,
+}
+
+impl LinkKey {
+    pub(super) fn from_bytes(bytes: [u8; 16]) -> Self {
+        Self { bytes: Zeroizing::new(bytes) }
+    }
+
+    pub(super) fn bytes(&self) -> &[u8; 16] {
+        &self.bytes
     }
 
     /// The tag of a hello frame, over `parts` and their lengths.
@@ -96,5 +126,65 @@ impl MissionKey {
 impl fmt::Debug for MissionKey {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "MissionKey({:08x})", self.fingerprint())
+    }
+}
+
+impl fmt::Debug for LinkKey {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("LinkKey")
+    }
+}
+
+/// The keys of one vehicle, as its key file has them.
+#[derive(Debug, Clone)]
+pub struct VehicleKey {
+    /// The address of the vehicle that they are for.
+    pub address: u8,
+    /// The fingerprint of the mission key that they are derived from.
+    pub mission: u32,
+    pub(super) link: LinkKey,
+    pub(super) calls: LinkKey,
+}
+
+impl VehicleKey {
+    /// The keys of the vehicle at an address.
+    pub fn derive(mission: &MissionKey, address: u8) -> Self {
+        let (link, calls) = (mission.vehicle(address), mission.calls());
+        Self { address, mission: mission.fingerprint(), link, calls }
+    }
+}
+
+/// What an end holds: the mission key, or the keys of one vehicle alone.
+#[derive(Debug, Clone)]
+pub enum HeldKey {
+    /// It opens the link of every vehicle. A surface needs it.
+    Mission(MissionKey),
+    /// It opens the link of one vehicle alone.
+    Vehicle(VehicleKey),
+}
+
+impl HeldKey {
+    /// The key of the link with a vehicle. An end that holds the key of another vehicle has no better one, and no frame verifies.
+    pub fn link(&self, vehicle: u8) -> LinkKey {
+        match self {
+            Self::Mission(key) => key.vehicle(vehicle),
+            Self::Vehicle(key) => key.link.clone(),
+        }
+    }
+
+    /// The key of discovery calls.
+    pub fn calls(&self) -> LinkKey {
+        match self {
+            Self::Mission(key) => key.calls(),
+            Self::Vehicle(key) => key.calls.clone(),
+        }
+    }
+
+    /// The fingerprint of the mission key.
+    pub fn fingerprint(&self) -> u32 {
+        match self {
+            Self::Mission(key) => key.fingerprint(),
+            Self::Vehicle(key) => key.mission,
+        }
     }
 }

@@ -4,12 +4,14 @@
 //! and tags as `prf.rs` explains.
 //!
 //! ```text
-//! mission key (16 secret bytes, the key file)
+//! mission key (16 secret bytes, the surface's key file)
 //!   |-- fingerprint     32 bits for people
-//!   |-- hello key       tags of frames that are sent before both ends know each other's run
-//!   +-- session root
-//!         +-- session key     one pair of runs of one surface and one vehicle, encrypted or not
-//!               +-- tags and encryption of frames, by direction and frame number
+//!   |-- key of calls    tags of the calls to all vehicles
+//!   +-- key of a vehicle, by its address (with that of calls: the vehicle's key file)
+//!         |-- hello key       tags of frames that are sent before both ends know each other's run
+//!         +-- session root
+//!               +-- session key     one pair of runs of one surface and one vehicle, encrypted or not
+//!                     +-- tags and encryption of frames, by direction and frame number
 //! ```
 
 mod key;
@@ -20,7 +22,7 @@ mod text;
 #[cfg(test)]
 mod tests;
 
-pub use key::MissionKey;
+pub use key::{HeldKey, LinkKey, MissionKey, VehicleKey};
 pub use session::{Direction, SessionKey};
 pub use text::KeyError;
 

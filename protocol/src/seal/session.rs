@@ -22,7 +22,7 @@ pub enum Direction {
 /// ```
 /// use scenecast_protocol::seal::{Direction, MissionKey};
 ///
-/// let key = MissionKey::from_bytes([9; 16]).session(7, 1, 0xAAAA, 0xBBBB, true);
+/// let key = MissionKey::from_bytes([9; 16]).vehicle(1).session(7, 1, 0xAAAA, 0xBBBB, true);
 /// let mut body = *b"hold";
 /// let tag = key.seal(Direction::Down, 1, b"head", &mut body);
 /// assert_ne!(&body, b"hold", "the session encrypts");

@@ -9,8 +9,12 @@ const KEY: [u8; 16] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15];
 const MISSION: u32 = 0x5CE7_0001;
 const NONCES: [u64; 2] = [0x0102_0304_0506_0708, 0x1112_1314_1516_1718];
 
-fn key() -> MissionKey {
+fn mission() -> MissionKey {
     MissionKey::from_bytes(KEY)
+}
+
+fn key() -> LinkKey {
+    mission().vehicle(1)
 }
 
 fn session(encrypt: bool) -> SessionKey {
@@ -29,8 +33,8 @@ fn flip(bytes: &mut [u8], bit: usize) {
 fn nonces_are_those_of_their_key_and_reveal_no_other() {
     let drawn: BTreeSet<u64> = (0..1000).map(|number| key().nonce(number)).collect();
     assert_eq!(drawn.len(), 1000);
-    assert!((0..1000).all(|number| MissionKey::from_bytes([9; 16]).nonce(number) != key().nonce(number)));
-    assert_eq!(key().nonce(1), 5_071_469_089_387_775_030);
+    assert!((0..1000).all(|number| MissionKey::from_bytes([9; 16]).vehicle(1).nonce(number) != key().nonce(number)));
+    assert_eq!(key().nonce(1), 809_121_194_474_746_411);
 }
 
 /// Values for another implementation to check itself; one in Python, written from the standard, confirms them.
@@ -41,26 +45,26 @@ fn golden_bytes() {
         let tag = session(encrypt).seal(direction, 5, b"head", &mut body);
         (u64::from_be_bytes(tag), body)
     };
-    assert_eq!(key().fingerprint(), 0x95fb_836d);
-    assert_eq!(&**key().to_text(), "scenecast-key 1 000102030405060708090a0b0c0d0e0f 95fb836d\n");
-    assert_eq!(u64::from_be_bytes(key().hello_tag(&[b"hello", b"", b"\x01\x02"])), 0xbd38_a0f5_cb3e_715a);
-    assert_eq!(seal(false, Direction::Down), (0x6723_702d_8326_ad59, *b"body of a frame"));
-    assert_eq!(seal(false, Direction::Up), (0x607f_e254_1886_85c5, *b"body of a frame"));
-    let hidden = [0x7c, 0x23, 0xf1, 0xb7, 0x1e, 0xd5, 0x11, 0x4c, 0x3a, 0xb1, 0x87, 0xde, 0x54, 0x4a, 0x6c];
-    assert_eq!(seal(true, Direction::Down), (0xaa87_305a_93f3_863a, hidden));
+    assert_eq!(mission().fingerprint(), 0x95fb_836d);
+    assert_eq!(&**mission().to_text(), "scenecast-key 2 000102030405060708090a0b0c0d0e0f 95fb836d\n");
+    assert_eq!(u64::from_be_bytes(key().hello_tag(&[b"hello", b"", b"\x01\x02"])), 0x2e61_b3cc_25e3_228a);
+    assert_eq!(seal(false, Direction::Down), (0x578f_056c_0ae3_b9d6, *b"body of a frame"));
+    assert_eq!(seal(false, Direction::Up), (0xdcab_318e_f936_3a6c, *b"body of a frame"));
+    let hidden = [0x88, 0x75, 0xd6, 0x14, 0x9b, 0x5f, 0x3b, 0xb7, 0x92, 0xb9, 0x49, 0xa5, 0xf7, 0xd4, 0x85];
+    assert_eq!(seal(true, Direction::Down), (0x6fbc_42cb_ebdd_8b79, hidden));
 }
 
 #[test]
 fn debug_output_hides_the_secret() {
-    let said = format!("{:?} {:?}", key(), session(true));
-    assert_eq!(said, format!("MissionKey({:08x}) SessionKey {{ encrypt: true, .. }}", key().fingerprint()));
+    let said = format!("{:?} {:?} {:?}", mission(), key(), session(true));
+    assert_eq!(said, format!("MissionKey({:08x}) LinkKey SessionKey {{ encrypt: true, .. }}", mission().fingerprint()));
 }
 
 #[test]
 fn every_input_of_a_session_changes_its_key() {
     let [s, v] = NONCES;
     let mut tags = BTreeSet::new();
-    let other = MissionKey::from_bytes([7; 16]);
+    let other = MissionKey::from_bytes([7; 16]).vehicle(1);
     for key in [key(), other] {
         for (mission, vehicle, s, v) in
             [(MISSION, 1, s, v), (MISSION + 1, 1, s, v), (MISSION, 2, s, v), (MISSION, 1, v, s), (MISSION, 1, s, v + 1)]

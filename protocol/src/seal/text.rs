@@ -1,33 +1,39 @@
 //! The text of a key file.
 
-use super::MissionKey;
+use super::key::{HeldKey, LinkKey, MissionKey, VehicleKey};
 use zeroize::Zeroizing;
 
-const VERSION: &str = "1";
+const VERSION: &str = "2";
+const OF_MISSION: &str = "scenecast-key";
+const OF_VEHICLE: &str = "scenecast-vehicle-key";
 
 /// Why a text is not a key file.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum KeyError {
     /// There are only comments and empty lines.
-    #[error("there is no key in it: one line is expected, scenecast-key 1 KEY CHECK")]
+    #[error("there is no key in it: one line is expected, {OF_MISSION} {VERSION} ... or {OF_VEHICLE} {VERSION} ...")]
     Missing,
     /// A line is neither a key nor a comment.
-    #[error("line {line}: this is no key: expected is scenecast-key 1 KEY CHECK, or a comment after #")]
+    #[error(
+        "line {line}: this is no key: expected is {OF_MISSION} {VERSION} KEY CHECK, or \
+         {OF_VEHICLE} {VERSION} ADDRESS KEY CALLS MISSION CHECK, or a comment after #"
+    )]
     NotAKey {
         /// Number of the line, from 1.
         line: usize,
     },
     /// A key has another version of the format.
-    #[error(
-        "line {line}: this is a key of another version; this is version {VERSION}, written scenecast-key {VERSION}"
-    )]
+    #[error("line {line}: this is a key of another version; this is version {VERSION}; scenecast key new makes one")]
     Version {
         /// Number of the line, from 1.
         line: usize,
     },
-    /// A key or its check has another length or other characters than hexadecimal digits.
-    #[error("line {line}: expected are 32 hexadecimal digits of key and 8 of check")]
+    /// A key, its check or an address has another length or other characters than expected.
+    #[error(
+        "line {line}: a word is wrong: expected are 32 hexadecimal digits of each key, 8 of each check, and an address \
+         from 1 to 14"
+    )]
     Digits {
         /// Number of the line, from 1.
         line: usize,
@@ -44,12 +50,21 @@ pub enum KeyError {
         /// Number of the line, from 1.
         line: usize,
     },
+    /// The file has the key of a vehicle where that of the mission is needed.
+    #[error("this is the key of a vehicle; the key of the mission is needed here")]
+    OfVehicle,
 }
 
-impl MissionKey {
-    /// Parses a key file: one line `scenecast-key 1 KEY CHECK`, empty lines, and comments after `#`.
+impl HeldKey {
+    /// Parses a key file: one line, empty lines, and comments after `#`. The line is
     ///
-    /// KEY has 32 hexadecimal digits. CHECK has 8, the key's fingerprint.
+    /// ```text
+    /// scenecast-key 2 KEY CHECK
+    /// scenecast-vehicle-key 2 ADDRESS KEY CALLS MISSION CHECK
+    /// ```
+    ///
+    /// KEY and CALLS have 32 hexadecimal digits, CHECK and MISSION 8: MISSION is the fingerprint of the mission key, CHECK that of
+    /// the line's own keys. ADDRESS is decimal, 1 to 14.
     pub fn parse(text: &str) -> Result<Self, KeyError> {
         let mut key = None;
         for (line, content) in text.trim_start_matches('\u{FEFF}').lines().enumerate() {
@@ -64,33 +79,78 @@ impl MissionKey {
         }
         key.ok_or(KeyError::Missing)
     }
+}
+
+impl MissionKey {
+    /// Parses the key file of a mission, see [`HeldKey::parse`].
+    pub fn parse(text: &str) -> Result<Self, KeyError> {
+        match HeldKey::parse(text)? {
+            HeldKey::Mission(key) => Ok(key),
+            HeldKey::Vehicle(_) => Err(KeyError::OfVehicle),
+        }
+    }
 
     /// The text of a key file, one line. It holds the secret and is wiped from memory when dropped.
     pub fn to_text(&self) -> Zeroizing<String> {
         let key = u128::from_be_bytes(*self.bytes());
-        Zeroizing::new(format!("scenecast-key {VERSION} {key:032x} {:08x}\n", self.fingerprint()))
+        Zeroizing::new(format!("{OF_MISSION} {VERSION} {key:032x} {:08x}\n", self.fingerprint()))
     }
 }
 
-fn parse_line(content: &str, line: usize) -> Result<MissionKey, KeyError> {
-    let mut words = content.split_whitespace();
-    if words.next() != Some("scenecast-key") {
-        return Err(KeyError::NotAKey { line });
+impl VehicleKey {
+    /// The text of a key file, one line. It holds the secrets and is wiped from memory when dropped.
+    pub fn to_text(&self) -> Zeroizing<String> {
+        let [link, calls] = [&self.link, &self.calls].map(|key| u128::from_be_bytes(*key.bytes()));
+        let (address, mission, check) = (self.address, self.mission, self.check());
+        Zeroizing::new(format!("{OF_VEHICLE} {VERSION} {address} {link:032x} {calls:032x} {mission:08x} {check:08x}\n"))
     }
+
+    /// A check of the whole line: the fingerprint of both keys together.
+    fn check(&self) -> u32 {
+        let mut both = Zeroizing::new([0; 16]);
+        both.iter_mut()
+            .zip(self.link.bytes().iter().zip(self.calls.bytes()))
+            .for_each(|(to, (a, b))| *to = a ^ b.rotate_left(1));
+        MissionKey::from_bytes(*both).fingerprint() ^ self.mission.rotate_left(u32::from(self.address))
+    }
+}
+
+fn parse_line(content: &str, line: usize) -> Result<HeldKey, KeyError> {
+    let mut words = content.split_whitespace();
+    let kind = words.next().filter(|kind| [OF_MISSION, OF_VEHICLE].contains(kind)).ok_or(KeyError::NotAKey { line })?;
     let version = words.next().ok_or(KeyError::NotAKey { line })?;
     if version != VERSION {
         return Err(KeyError::Version { line });
     }
-    let (Some(key), Some(check), None) = (words.next(), words.next(), words.next()) else {
-        return Err(KeyError::Digits { line });
+    let words: Vec<&str> = words.take(6).collect();
+    let (key, check, found) = match (kind, &words[..]) {
+        (OF_MISSION, [key, check]) => {
+            let key = MissionKey::from_bytes(secret(key, line)?);
+            let found = key.fingerprint();
+            (HeldKey::Mission(key), check, found)
+        }
+        (OF_VEHICLE, [address, link, calls, mission, check]) => {
+            let address = address.parse().ok().filter(|address| (1..=14).contains(address));
+            let key = VehicleKey {
+                address: address.ok_or(KeyError::Digits { line })?,
+                mission: fingerprint(mission, line)?,
+                link: LinkKey::from_bytes(secret(link, line)?),
+                calls: LinkKey::from_bytes(secret(calls, line)?),
+            };
+            let found = key.check();
+            (HeldKey::Vehicle(key), check, found)
+        }
+        _ => return Err(KeyError::Digits { line }),
     };
-    let key = hex(key, 32).ok_or(KeyError::Digits { line })?;
-    let check = hex(check, 8).ok_or(KeyError::Digits { line })?;
-    let key = MissionKey::from_bytes(key.to_be_bytes());
-    if u128::from(key.fingerprint()) != check {
-        return Err(KeyError::Check { line });
-    }
-    Ok(key)
+    if fingerprint(check, line)? != found { Err(KeyError::Check { line }) } else { Ok(key) }
+}
+
+fn secret(text: &str, line: usize) -> Result<[u8; 16], KeyError> {
+    hex(text, 32).map(u128::to_be_bytes).ok_or(KeyError::Digits { line })
+}
+
+fn fingerprint(text: &str, line: usize) -> Result<u32, KeyError> {
+    hex(text, 8).map(|value| value as u32).ok_or(KeyError::Digits { line })
 }
 
 /// The value of exactly `digits` hexadecimal digits.
@@ -125,13 +185,13 @@ mod tests {
         assert_eq!(error("# a\n#b"), Some(KeyError::Missing));
         assert_eq!(error("\nhello"), Some(KeyError::NotAKey { line: 2 }));
         assert_eq!(error("scenecast-key"), Some(KeyError::NotAKey { line: 1 }));
-        assert_eq!(error("scenecast-key 2 00 00"), Some(KeyError::Version { line: 1 }));
-        assert_eq!(error("scenecast-key 1 00 00"), Some(KeyError::Digits { line: 1 }));
-        assert_eq!(error("scenecast-key 1"), Some(KeyError::Digits { line: 1 }));
+        assert_eq!(error("scenecast-key 1 00 00"), Some(KeyError::Version { line: 1 }));
+        assert_eq!(error("scenecast-key 2 00 00"), Some(KeyError::Digits { line: 1 }));
+        assert_eq!(error("scenecast-key 2"), Some(KeyError::Digits { line: 1 }));
         assert_eq!(error(&format!("{} 00", line())), Some(KeyError::Digits { line: 1 }));
-        assert_eq!(error(&line().replace("key 1 3", "key 1 +")), Some(KeyError::Digits { line: 1 }));
+        assert_eq!(error(&line().replace("key 2 3", "key 2 +")), Some(KeyError::Digits { line: 1 }));
         assert_eq!(error(&format!("{}\n{}", line(), line())), Some(KeyError::Second { line: 2 }));
-        let said = error(&line().replace("key 1 3", "key 1 4")).unwrap();
+        let said = error(&line().replace("key 2 3", "key 2 4")).unwrap();
         assert_eq!(said.to_string(), "line 1: the check does not fit the key: a digit is wrong; copy the file again");
     }
 
@@ -146,7 +206,8 @@ mod tests {
         #[test]
         fn any_text_is_read_or_refused(text in any::<String>(), tail in "[ 0-9a-f]{0,60}") {
             let _ = MissionKey::parse(&text);
-            let _ = MissionKey::parse(&format!("scenecast-key 1 {tail}"));
+            let _ = HeldKey::parse(&format!("scenecast-key 2 {tail}"));
+            let _ = HeldKey::parse(&format!("scenecast-vehicle-key 2 {tail}"));
         }
 
         #[test]
@@ -157,6 +218,23 @@ mod tests {
             wrong.replace_range(at..=at, &digit);
             let line = 1;
             prop_assert_eq!(MissionKey::parse(&wrong).err(), Some(KeyError::Check { line }));
+        }
+
+        #[test]
+        fn the_keys_of_a_vehicle_come_back_from_their_text_and_a_wrong_digit_is_noticed(
+            bytes: [u8; 16], address in 1u8..=14, at in 22usize..108, digit in "[0-9a-f]",
+        ) {
+            let key = VehicleKey::derive(&MissionKey::from_bytes(bytes), address);
+            let text = key.to_text();
+            let HeldKey::Vehicle(read) = HeldKey::parse(&text).unwrap() else { panic!("{text:?}") };
+            prop_assert_eq!((read.address, read.mission, read.link.bytes()), (address, key.mission, key.link.bytes()));
+            prop_assert_eq!(read.calls.bytes(), key.calls.bytes());
+            prop_assert_eq!(MissionKey::parse(&text).err(), Some(KeyError::OfVehicle));
+            let mut wrong = text.to_string();
+            let at = at.min(wrong.len() - 2);
+            prop_assume!(&text[at..=at] != " " && text[at..=at] != digit);
+            wrong.replace_range(at..=at, &digit);
+            prop_assert!(HeldKey::parse(&wrong).is_err(), "{}", wrong);
         }
     }
 }

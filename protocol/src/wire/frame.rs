@@ -4,7 +4,7 @@ use super::WIRE_VERSION;
 use super::chunk::{ChunkKind, Chunks, push_chunk};
 use super::header::{Address, Header, MissionId};
 use crate::bytes::{Reader, Truncated};
-use crate::seal::{Direction, MissionKey, SessionKey, TAG_BYTES, Tag};
+use crate::seal::{Direction, LinkKey, SessionKey, TAG_BYTES, Tag};
 use crc::{CRC_24_OPENPGP, CRC_32_ISCSI, Crc};
 use std::borrow::Cow;
 
@@ -47,7 +47,7 @@ pub enum Seal<'a> {
     /// A CRC over the mission, the receiver's session (0 if it is not known) and the frame.
     Crc(MissionId, u16),
     /// The tag of a hello: mission, the receiver's session and nonce (0 if they are not known) and the frame.
-    Hello(&'a MissionKey, MissionId, u16, u64),
+    Hello(&'a LinkKey, MissionId, u16, u64),
     /// The tag of a numbered frame; the number does not wrap.
     Session(&'a SessionKey, Direction, u64),
 }
@@ -266,6 +266,7 @@ impl FrameBuilder {
 mod tests {
     use super::super::{AckStatement, FrameKind, SessionId, Stamp, room_for_payload};
     use super::*;
+    use crate::seal::MissionKey;
     use proptest::prelude::*;
     use std::time::Duration;
 
@@ -296,8 +297,8 @@ mod tests {
         envelope(bytes).is_ok_and(|e| e.open(seal).is_some())
     }
 
-    fn key() -> MissionKey {
-        MissionKey::from_bytes([7; 16])
+    fn key() -> LinkKey {
+        MissionKey::from_bytes([7; 16]).vehicle(1)
     }
 
     #[test]
@@ -305,8 +306,8 @@ mod tests {
         let mut b = FrameBuilder::new(&header(), 64);
         assert!(b.push(ChunkKind::Map, &[0xAA, 0xBB]));
         let bytes = b.finish(&Seal::Crc(MISSION, 0x4321), true);
-        assert_eq!(bytes[..13], [0x70, 0x10, 0x12, 0x34, 0x00, 0xFF, 3, 2, 0x00, 0x50, 0x22, 0xAA, 0xBB]);
-        assert_eq!(bytes[13..], [0xAE, 0x0B, 0x05]);
+        assert_eq!(bytes[..13], [0x90, 0x10, 0x12, 0x34, 0x00, 0xFF, 3, 2, 0x00, 0x50, 0x22, 0xAA, 0xBB]);
+        assert_eq!(bytes[13..], [0xEA, 0x61, 0x5B]);
         let frame = envelope(&bytes).unwrap().open(&Seal::Crc(MISSION, 0x4321)).unwrap();
         assert_eq!(frame.header, header());
     }
@@ -339,7 +340,7 @@ mod tests {
             ..header()
         };
         let bytes = FrameBuilder::new(&hello, 64).finish(&Seal::Hello(&key(), MISSION, 0, 0), true);
-        let expected = [0x6F, 0x02, 0x12, 0x34, 0, 0, 1, 0, 9, 0, 0, 5, 0, 7, 1, 2, 3, 4, 5, 6, 7, 8];
+        let expected = [0x8F, 0x02, 0x12, 0x34, 0, 0, 1, 0, 9, 0, 0, 5, 0, 7, 1, 2, 3, 4, 5, 6, 7, 8];
         assert_eq!(bytes[..22], expected);
         assert_eq!(bytes.len(), 30);
         let read = Envelope::decode(&bytes, |to| to.number() == 2).unwrap();

@@ -2,6 +2,7 @@
 
 use crate::bytes::{Reader, Truncated};
 use crate::directive::Series;
+use std::time::Duration;
 
 /// The edge of a map cell in tenths of a millimetre, up to 1677 m; 0 if the sender has no map.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -57,23 +58,38 @@ impl std::fmt::Debug for SurfaceName {
     }
 }
 
+/// The time of a computer's clock in whole hours since 1970, UTC.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct UtcHours(u32);
+
+impl UtcHours {
+    /// The hour of a time since the beginning of 1970, UTC. `None` before its second hour, and after the year 3883.
+    pub fn from_unix(since: Duration) -> Option<Self> {
+        u32::try_from(since.as_secs() / 3600).ok().filter(|hours| (1..1 << 24).contains(hours)).map(Self)
+    }
+
+    /// Hours from one to the other.
+    pub fn apart(self, other: Self) -> u32 {
+        self.0.abs_diff(other.0)
+    }
+}
+
 /// The payload of an introduction, a chunk of every hello between two ends.
 ///
 /// ```text
 /// byte  bits  field          unit, range
 ///  0-2  24    edge of a cell tenths of a millimetre; 0: the sender has no map
-///  3-8  48    series         from a surface: of its orders; from a vehicle that refuses: of those of the surface that holds it
+///  3-8  48    series         from a surface: of its orders; from a vehicle that refuses: of those of the surface that holds it;
+///                            else 0
 ///  9    1     takes over     from a surface: the vehicle shall leave another surface that holds it
 ///  9    1     refuses        from a vehicle: another surface holds it, and the run of the called surface has ended
 ///  9    1     no memory      from a vehicle: it knows no order from before its start
 ///  9    5     silence        from a vehicle that refuses: time since it has heard that surface, 8 s; 31: 248 s or more
-/// 10    8     name's length  bytes, 0..12
-/// 11..        name           of the surface that the series belongs to, UTF-8
+/// 10-12 24    clock          hours since 1970, UTC; 0: not known
+/// 13    8     name's length  bytes, 0..12
+/// 14..        name           of the surface that the series belongs to, UTF-8
 ///  ..         reserved for later versions; skipped
 /// ```
-///
-/// A vehicle ends after byte 2 if it has nothing more to say. Without byte 9, a surface takes over; without byte 10, it has no
-/// name.
 ///
 /// ```
 /// use scenecast_protocol::directive::Series;
@@ -81,8 +97,8 @@ impl std::fmt::Debug for SurfaceName {
 ///
 /// let (series, name) = (Some(Series::from_random(0xABCD)), SurfaceName::from_text("tug"));
 /// let surface = Introduction { cell_edge: CellEdge::from_metres(0.25), series, name, ..Introduction::default() };
-/// assert_eq!(surface.encode(23), [0x00, 0x09, 0xC4, 0, 0, 0, 0, 0xAB, 0xCD, 0, 3, b't', b'u', b'g']);
-/// assert_eq!(Introduction::decode(&surface.encode(23)), Ok(surface));
+/// assert_eq!(surface.encode(26), [0x00, 0x09, 0xC4, 0, 0, 0, 0, 0xAB, 0xCD, 0, 0, 0, 0, 3, b't', b'u', b'g']);
+/// assert_eq!(Introduction::decode(&surface.encode(26)), Ok(surface));
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Introduction {
@@ -98,59 +114,58 @@ pub struct Introduction {
     pub has_no_memory: bool,
     /// From a vehicle that refuses: seconds since it has heard the surface that holds it, rounded down to multiples of 8.
     pub silence_s: u8,
+    /// The clock of the sender's computer.
+    pub clock: Option<UtcHours>,
     /// The name of the surface that the series belongs to.
     pub name: SurfaceName,
 }
 
 impl Introduction {
     /// Bytes of the longest introduction.
-    pub const MAX_BYTES: usize = Self::HEAD + 1 + SurfaceName::MAX_BYTES;
-    /// Bytes before the name's length.
-    const HEAD: usize = 10;
+    pub const MAX_BYTES: usize = Self::HEAD + SurfaceName::MAX_BYTES;
+    /// Bytes before the name.
+    const HEAD: usize = 14;
 
-    /// The bytes of the payload, at most `room` of them. A name that does not fit is cut, or left out.
+    /// The bytes of the payload: 14, and the name as far as it fits into `room`.
     #[must_use]
     pub fn encode(&self, room: usize) -> Vec<u8> {
         let mut out = self.cell_edge.0.to_be_bytes().get(1..).unwrap_or_default().to_vec();
         let flags = [(self.takes_over, 0x80), (self.refuses, 0x40), (self.has_no_memory, 0x20)];
         let flags = flags.iter().filter(|(is_set, _)| *is_set).fold(0, |all, (_, bit)| all | bit);
-        if self.series.is_none() && flags == 0 {
-            return out;
-        }
         let series = self.series.map_or(0, Series::get);
         out.extend_from_slice(series.to_be_bytes().get(2..).unwrap_or_default());
         out.push(flags | (self.silence_s / 8));
+        out.extend_from_slice(self.clock.map_or(0, |clock| clock.0).to_be_bytes().get(1..).unwrap_or_default());
         let name = self.name.as_str();
-        let mut length = name.len().min(room.saturating_sub(Self::HEAD + 1));
+        let mut length = name.len().min(room.saturating_sub(Self::HEAD));
         while !name.is_char_boundary(length) {
             length -= 1;
         }
-        if length > 0 {
-            out.push(length as u8);
-            out.extend_from_slice(name.as_bytes().get(..length).unwrap_or_default());
-        }
+        out.push(length as u8);
+        out.extend_from_slice(name.as_bytes().get(..length).unwrap_or_default());
         out
     }
 
     /// Reads a payload; bytes after the known fields are skipped.
     pub fn decode(bytes: &[u8]) -> Result<Self, Truncated> {
         let mut r = Reader::new(bytes);
-        let cell_edge = CellEdge(u32::from(r.u8()?) << 16 | u32::from(r.u16()?));
-        let mut read = Self { cell_edge, ..Self::default() };
-        if r.rest().is_empty() {
-            return Ok(read);
-        }
-        let series = u64::from(r.u16()?) << 32 | u64::from(r.u16()?) << 16 | u64::from(r.u16()?);
-        read.series = (series != 0).then(|| Series::from_random(series));
-        let Ok(flags) = r.u8() else { return Ok(Self { takes_over: true, ..read }) };
-        (read.takes_over, read.refuses) = (flags & 0x80 != 0, flags & 0x40 != 0);
-        read.has_no_memory = flags & 0x20 != 0;
-        read.silence_s = if read.refuses { (flags & 0x1F) * 8 } else { 0 };
-        if let Some(length) = r.u8().ok().filter(|_| read.series.is_some()) {
-            let name = r.take(usize::from(length).min(SurfaceName::MAX_BYTES))?;
-            read.name = SurfaceName::from_text(&String::from_utf8_lossy(name));
-        }
-        Ok(read)
+        let mut u24 = || -> Result<u32, Truncated> { Ok(u32::from(r.u8()?) << 16 | u32::from(r.u16()?)) };
+        let (edge, high, low) = (u24()?, u24()?, u24()?);
+        let series = u64::from(high) << 24 | u64::from(low);
+        let flags = r.u8()?;
+        let refuses = flags & 0x40 != 0;
+        let hours = u32::from(r.u8()?) << 16 | u32::from(r.u16()?);
+        let length = usize::from(r.u8()?).min(SurfaceName::MAX_BYTES);
+        Ok(Self {
+            cell_edge: CellEdge(edge),
+            series: (series != 0).then(|| Series::from_random(series)),
+            takes_over: flags & 0x80 != 0,
+            refuses,
+            has_no_memory: flags & 0x20 != 0,
+            silence_s: if refuses { (flags & 0x1F) * 8 } else { 0 },
+            clock: (hours != 0).then_some(UtcHours(hours)),
+            name: SurfaceName::from_text(&String::from_utf8_lossy(r.take(length)?)),
+        })
     }
 }
 
@@ -166,6 +181,7 @@ mod tests {
             bits in 1u64..,
             [is_surface, takes_over, refuses, has_no_memory]: [bool; 4],
             silence in 0u8..32,
+            hours in 0u32..1 << 24,
             name: String,
             tail: Vec<u8>,
         ) {
@@ -173,15 +189,14 @@ mod tests {
             let silence_s = if refuses { silence * 8 } else { 0 };
             let name = if is_surface { SurfaceName::from_text(&name) } else { SurfaceName::default() };
             let cell_edge = CellEdge(edge);
-            let sent = Introduction { cell_edge, series, takes_over, refuses, has_no_memory, silence_s, name };
+            let clock = UtcHours::from_unix(Duration::from_secs(3600 * u64::from(hours)));
+            let sent = Introduction { cell_edge, series, takes_over, refuses, has_no_memory, silence_s, clock, name };
             let mut bytes = sent.encode(Introduction::MAX_BYTES);
             prop_assert!(bytes.len() <= Introduction::MAX_BYTES);
             prop_assert_eq!(Introduction::decode(&bytes), Ok(sent));
-            if !name.as_str().is_empty() {
-                bytes.extend(tail);
-                prop_assert_eq!(Introduction::decode(&bytes), Ok(sent), "of a later version");
-            }
-            for room in 10..Introduction::MAX_BYTES {
+            bytes.extend(tail);
+            prop_assert_eq!(Introduction::decode(&bytes), Ok(sent), "of a later version");
+            for room in 14..Introduction::MAX_BYTES {
                 let cut = sent.encode(room);
                 prop_assert!(cut.len() <= room);
                 let read = Introduction::decode(&cut).unwrap();
@@ -196,12 +211,6 @@ mod tests {
                 prop_assert!(read.name.as_str().chars().all(|c| c.is_alphanumeric() || " -_.".contains(c)));
             }
         }
-    }
-
-    #[test]
-    fn a_surface_of_before_takes_over() {
-        let read = Introduction::decode(&[0, 9, 0xC4, 0, 0, 0, 0, 0xAB, 0xCD]).unwrap();
-        assert!(read.takes_over && read.series == Some(Series::from_random(0xABCD)));
     }
 
     #[test]

@@ -29,7 +29,7 @@ pub use faults::EquipmentFaults;
 pub use frame::{Envelope, Frame, FrameBuilder, FrameError, Seal};
 pub use header::{Address, FrameKind, Header, MissionId, SessionId};
 pub use intent::Intent;
-pub use introduction::{CellEdge, Introduction, SurfaceName};
+pub use introduction::{CellEdge, Introduction, SurfaceName, UtcHours};
 pub use number::unwrap_number;
 pub use path::PlannedPath;
 pub use placement::Placement;
@@ -39,4 +39,4 @@ pub use status::{ModeReason, StatusError, VehicleMode, VehicleStatus};
 pub use trail::{Trail, TrailCorner};
 
 /// The version of the wire format. Of another version only hellos are read, so that both ends can name the difference.
-pub const WIRE_VERSION: u8 = 3;
+pub const WIRE_VERSION: u8 = 4;

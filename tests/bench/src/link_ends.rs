@@ -4,7 +4,7 @@ use scenecast_protocol::link::{Authenticity, SlotInboxState, SurfaceConfig, Surf
 use scenecast_protocol::mac::{Access, MasterConfig, ModemProfile};
 use scenecast_protocol::map_codec::Codec;
 use scenecast_protocol::schedule::Shares;
-use scenecast_protocol::seal::MissionKey;
+use scenecast_protocol::seal::{HeldKey, MissionKey};
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::{Address, CellEdge, MissionId};
 use sim_channel::RandomStream;
@@ -37,7 +37,7 @@ impl EndsSetup {
 
     /// Both ends with a key.
     pub(crate) fn keyed(self, all: bool, encrypt: bool) -> Self {
-        let key = Arc::new(MissionKey::from_bytes([42; 16]));
+        let key = Arc::new(HeldKey::Mission(MissionKey::from_bytes([42; 16])));
         Self { authenticity: Some(Authenticity { key, all, encrypt }), ..self }
     }
 

@@ -38,9 +38,10 @@ section! {
         max_range_m: f64 = 3000.0, range(10.0, 20_000.0, "m"), [Asv Scenario];
         /// Time that a modem needs between receiving and transmitting.
         turn_around_s: f64 = 0.2, range(0.0, 10.0, "s"), [Auv Asv Scenario];
-        /// File of the mission key (scenecast key new), the same at both ends. Empty: frames are not authenticated.
+        /// File of the key of the mission (scenecast key new); on a vehicle, that of its own key (scenecast key derive).
+        /// Empty: frames are not authenticated.
         key_file: Option<PathBuf> = None, ANY, [Auv Asv Scenario];
-        /// Frames that the mission key authenticates, the same at both ends. all: both directions;
+        /// Frames that the key authenticates, the same at both ends. all: both directions;
         /// down: from the surface to the vehicle only, so that anybody can forge the map.
         authenticate: Authenticate = Authenticate::All, ANY, [Auv Asv Scenario];
         /// Whether authenticated frames are encrypted too, the same at both ends.

@@ -292,7 +292,7 @@ fn vehicle_host(
     seed: u64,
     now: Instant,
 ) -> Result<VehicleHost, UserError> {
-    let authenticity = scenecast_config::authenticity(config)?;
+    let authenticity = scenecast_config::authenticity(config, scenecast_config::vehicle_address(config)?)?;
     let profile = *station.profile();
     let vehicle =
         scenecast_vehicle::assemble(config, authenticity, profile, area, Durable::default(), seed ^ 0x0A0B, now)?;
@@ -300,7 +300,7 @@ fn vehicle_host(
 }
 
 fn surface_host(config: &Config, station: Station, seed: u64, now: Instant) -> Result<SurfaceHost, UserError> {
-    let authenticity = scenecast_config::authenticity(config)?;
+    let authenticity = scenecast_config::authenticity(config, Address::SURFACE)?;
     let (table, profile) = (scenecast_config::tuning_table(config)?, *station.profile());
     let surface = scenecast_surface::assemble(config, authenticity, table, profile, seed ^ 0x5EA, now)?;
     Ok(SurfaceHost::new(surface, station, None))

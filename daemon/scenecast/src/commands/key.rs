@@ -2,30 +2,49 @@
 
 use clap::{Args, Subcommand};
 use scenecast_core::{Principal, Role, UserError};
-use scenecast_protocol::seal::MissionKey;
+use scenecast_protocol::seal::{HeldKey, MissionKey, VehicleKey};
 use std::fs::OpenOptions;
 use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
 use zeroize::Zeroizing;
 
-/// The mission key, and the token of the operator's page.
+/// The key of the mission, those of its vehicles, and the token of the operator's page.
 #[derive(Debug, Subcommand)]
 pub(super) enum Key {
-    /// Write a new random key to a new file.
+    /// Write a new random key of a mission to a new file.
     New(New),
-    /// Print the fingerprint of a key. Equal keys have equal fingerprints.
+    /// Write the key of one vehicle, derived from the key of the mission, to a new file.
+    Derive(Derive),
+    /// Print whose key a file has, and the fingerprint of the mission key.
     Show(Show),
     /// Write a new random token for the operator's page to a new file.
     Token(Token),
 }
 
-/// Write a new random key to a new file that only its owner may read.
+/// Write a new random key of a mission to a new file that only its owner may read.
 #[derive(Debug, Args)]
 #[command(after_help = "Example: scenecast key new --out reef-3.key")]
 pub(super) struct New {
     /// File to write; it must not exist
     #[arg(long, value_name = "FILE", default_value = "mission.key")]
     out: PathBuf,
+}
+
+/// Write the key of one vehicle to a new file that only its owner may read.
+///
+/// It opens the link of this vehicle alone: who takes the vehicle can imitate no other, nor the surface to another.
+#[derive(Debug, Args)]
+#[command(after_help = "Example: scenecast key derive mission.key --vehicle 3 --out auv-3.key")]
+pub(super) struct Derive {
+    /// Key file of the mission
+    #[arg(value_name = "FILE")]
+    mission: PathBuf,
+    /// Address of the vehicle
+    #[arg(long, value_name = "ADDRESS", value_parser = clap::value_parser!(u8).range(1..=14))]
+    vehicle: u8,
+    /// File to write; it must not exist [default: auv-ADDRESS.key]
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
 }
 
 /// Write a new random token to a new file that only its owner may read. Without a role its holders are administrators.
@@ -53,11 +72,11 @@ fn role(text: &str) -> Result<Role, String> {
     Role::from_name(text).ok_or_else(|| "expected viewer, operator or administrator".to_owned())
 }
 
-/// Print the fingerprint of a key. Equal keys have equal fingerprints.
+/// Print whose key a file has, and the fingerprint of the mission key, which is equal at all ends of a mission.
 #[derive(Debug, Args)]
 #[command(after_help = "Example: scenecast key show mission.key")]
 pub(super) struct Show {
-    /// Key file of the mission
+    /// Key file of a mission or of a vehicle
     #[arg(value_name = "FILE")]
     file: PathBuf,
 }
@@ -68,8 +87,9 @@ impl Key {
             Self::New(new) => {
                 let key = random_key()?;
                 write_new(&new.out, &key.to_text())?;
-                println!("{}: fingerprint {:08x}", new.out.display(), key.fingerprint());
-                println!("Copy the file to the vehicle and to the surface, and set link.key_file to its path at both.");
+                println!("{}: mission, fingerprint {:08x}", new.out.display(), key.fingerprint());
+                println!("Set link.key_file of the surface to its path. For each vehicle, write a key of its own:");
+                println!("scenecast key derive {} --vehicle 1", new.out.display());
             }
             Self::Token(token) => {
                 let line = token_line(token.role.zip(token.name.as_deref()), &random_token()?)?;
@@ -84,9 +104,27 @@ impl Key {
                     ),
                 }
             }
+            Self::Derive(derive) => {
+                let path = &derive.mission;
+                let (HeldKey::Mission(mission), _) = scenecast_config::read_key(path)? else {
+                    return Err(UserError::file(
+                        path,
+                        "this is the key of a vehicle; name the key file of the mission",
+                    ));
+                };
+                let key = VehicleKey::derive(&mission, derive.vehicle);
+                let out = derive.out.unwrap_or_else(|| format!("auv-{}.key", derive.vehicle).into());
+                write_new(&out, &key.to_text())?;
+                println!("{}: vehicle {}, fingerprint {:08x}", out.display(), key.address, key.mission);
+                println!("Copy the file to the vehicle, and set its link.key_file to the path.");
+            }
             Self::Show(show) => {
                 let (key, warning) = scenecast_config::read_key(&show.file)?;
-                println!("{}: fingerprint {:08x}", show.file.display(), key.fingerprint());
+                let of = match &key {
+                    HeldKey::Mission(_) => "mission".to_owned(),
+                    HeldKey::Vehicle(key) => format!("vehicle {}", key.address),
+                };
+                println!("{}: {of}, fingerprint {:08x}", show.file.display(), key.fingerprint());
                 if let Some(warning) = warning {
                     eprintln!("scenecast: {warning}");
                 }

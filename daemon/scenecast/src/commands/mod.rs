@@ -71,7 +71,7 @@ enum Command {
     /// Measure the link, the modems, the planners and the map that the operator sees.
     #[command(subcommand)]
     Bench(bench::BenchCommand),
-    /// Make or show a mission key, or make a token for the operator's page.
+    /// Make the key of a mission or of a vehicle, show a key, or make a token for the operator's page.
     #[command(subcommand)]
     Key(key::Key),
     #[cfg(feature = "tools")]

@@ -41,7 +41,7 @@ use scenecast_protocol::link::{Transmit, VehicleEvent, VehicleLink, Wakeup};
 use scenecast_protocol::map::ClassEntry;
 use scenecast_protocol::map_codec::Codec;
 use scenecast_protocol::time::Instant;
-use scenecast_protocol::wire::EquipmentFaults;
+use scenecast_protocol::wire::{EquipmentFaults, UtcHours};
 use std::collections::VecDeque;
 use std::time::Duration;
 use storing::{Storing, WaitingMap};
@@ -159,6 +159,11 @@ impl Vehicle {
     /// Sets the codec of the layers of bands.
     pub fn set_codec(&mut self, codec: Codec) {
         self.codec = codec;
+    }
+
+    /// Sets the clock of this computer, with which that of the surface is compared.
+    pub fn set_clock(&mut self, clock: UtcHours) {
+        self.link.set_clock(clock);
     }
 
     /// Counts the whole budget window as spent, because an earlier run may have transmitted until `now`.

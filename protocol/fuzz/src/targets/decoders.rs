@@ -9,7 +9,7 @@ use scenecast_protocol::map::{
     TreeReplica,
 };
 use scenecast_protocol::object::{MAX_OBJECT, ObjectReceiver, Part, Received};
-use scenecast_protocol::seal::{Direction, MissionKey};
+use scenecast_protocol::seal::{Direction, HeldKey, MissionKey};
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::{
     AckStatement, Address, Envelope, EquipmentFaults, Frame, FrameBuilder, FrameKind, Header, Intent, Introduction,
@@ -21,7 +21,7 @@ const MISSION: MissionId = MissionId(7);
 
 /// A decoded header can be encoded and reads the same; bytes that verify under one seal verify under no other.
 pub fn frame(data: &[u8]) {
-    let key = MissionKey::from_bytes([9; 16]);
+    let key = MissionKey::from_bytes([9; 16]).vehicle(1);
     let session = key.session(MISSION.0, 1, 2, 3, data.len().is_multiple_of(2));
     let Ok(envelope) = Envelope::decode(data, |_| true) else { return };
     let header = &envelope.header;
@@ -294,9 +294,13 @@ pub fn object(data: &[u8]) {
 /// A parsed key can be written and reads the same; an error names an existing line.
 pub fn key_text(data: &[u8]) {
     let text = String::from_utf8_lossy(data);
-    match MissionKey::parse(&text) {
+    match HeldKey::parse(&text) {
         Ok(key) => {
-            let again = MissionKey::parse(&key.to_text()).expect("a key that was written");
+            let written = match &key {
+                HeldKey::Mission(key) => key.to_text(),
+                HeldKey::Vehicle(key) => key.to_text(),
+            };
+            let again = HeldKey::parse(&written).expect("a key that was written");
             assert_eq!(again.fingerprint(), key.fingerprint());
         }
         Err(e) => assert!(e.to_string().len() < 200),

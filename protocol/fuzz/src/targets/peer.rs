@@ -3,7 +3,7 @@
 use super::raw::{self, Script};
 use scenecast_protocol::directive::Series;
 use scenecast_protocol::link::{Authenticity, Flight};
-use scenecast_protocol::seal::{Direction, MissionKey};
+use scenecast_protocol::seal::{Direction, HeldKey, MissionKey};
 use scenecast_protocol::wire::{
     AckStatement, Address, CellEdge, Envelope, FrameKind, Header, Introduction, MissionId, Reader, SessionId, Stamp,
     unwrap_number,
@@ -16,7 +16,7 @@ pub const MISSION: MissionId = MissionId(7);
 
 /// The four ways of sealing frames, by two bits.
 pub fn authenticity(choice: u8) -> Option<Authenticity> {
-    let key = Arc::new(MissionKey::from_bytes([9; 16]));
+    let key = Arc::new(HeldKey::Mission(MissionKey::from_bytes([9; 16])));
     (choice & 3 != 0).then(|| Authenticity { key, all: choice & 3 > 1, encrypt: choice & 3 == 3 })
 }
 
@@ -199,7 +199,7 @@ impl FuzzPeer {
             None => raw::close_with_crc(&mut bytes, MISSION, self.theirs.0.get()),
             Some(a) if header.kind.is_hello() => {
                 let (m, s, n) = (MISSION.0.to_be_bytes(), session.to_be_bytes(), nonce.to_be_bytes());
-                let tag = a.key.hello_tag(&[&m, &s, &n, &bytes]);
+                let tag = a.key.link(self::vehicle().number()).hello_tag(&[&m, &s, &n, &bytes]);
                 bytes.extend_from_slice(&tag);
             }
             Some(a) => {
@@ -207,7 +207,8 @@ impl FuzzPeer {
                 let (surface, vehicle) =
                     if is_surface { (self.own.1, self.theirs.1) } else { (self.theirs.1, self.own.1) };
                 let direction = if is_surface { Direction::Down } else { Direction::Up };
-                let key = a.key.session(MISSION.0, self::vehicle().number(), surface, vehicle, a.encrypt);
+                let address = self::vehicle().number();
+                let key = a.key.link(address).session(MISSION.0, address, surface, vehicle, a.encrypt);
                 let (head, body) = bytes.split_at_mut(body_at);
                 let tag = key.seal(direction, number, head, body);
                 bytes.extend_from_slice(&tag);

@@ -86,6 +86,9 @@ impl<T> LinkPair<T> {
             // The answer to it names our version.
             None
         };
+        if let Some(introduction) = &introduction {
+            self.mismatch.note_clock(introduction.clock, self.introduction.clock);
+        }
         let peer = Identity { session: header.session, nonce: header.nonce.unwrap_or_default() };
         let refusal = introduction.filter(|caller| match own {
             Some(_) => caller.refuses,

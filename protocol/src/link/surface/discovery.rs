@@ -83,7 +83,7 @@ impl Discovery {
         };
         let builder = FrameBuilder::new(&header, modem.frame_bytes);
         let bytes = match authenticity {
-            Some(a) => builder.finish(&Seal::Hello(&a.key, mission, 0, 0), true),
+            Some(a) => builder.finish(&Seal::Hello(&a.key.calls(), mission, 0, 0), true),
             None => builder.finish(&Seal::Crc(mission, 0), true),
         };
         let answers = (self.reach + modem.turn_around) * 2 + Self::ANSWERS + modem.airtime(bytes.len()) * 2;
@@ -105,7 +105,10 @@ impl Discovery {
         let Some((call, until)) = self.open.filter(|_| envelope.header.kind.is_hello()) else { return false };
         let session = call.session.get();
         let sound = match authenticity {
-            Some(a) => envelope.open(&Seal::Hello(&a.key, mission, session, call.nonce)).is_some(),
+            Some(a) => {
+                let link = a.link(envelope.header.from);
+                envelope.open(&Seal::Hello(&link.key, mission, session, call.nonce)).is_some()
+            }
             None => envelope.open(&Seal::Crc(mission, session)).is_some(),
         };
         sound && now < until + Duration::from_secs(10)

@@ -3,7 +3,7 @@
 use super::peer::VehiclePeer;
 use crate::map::StateReplica;
 use crate::time::Instant;
-use crate::wire::Address;
+use crate::wire::{Address, UtcHours};
 use std::collections::BTreeMap;
 
 /// The known vehicles; the surface exchanges turns with one of them at a time.
@@ -36,6 +36,10 @@ impl<R: StateReplica> Fleet<R> {
 
     pub(super) fn first_mut(&mut self) -> Option<&mut VehiclePeer<R>> {
         self.peers.values_mut().next()
+    }
+
+    pub(super) fn set_clock(&mut self, clock: UtcHours) {
+        self.peers.values_mut().for_each(|peer| peer.set_clock(clock));
     }
 
     pub(super) fn addresses(&self) -> impl Iterator<Item = Address> + '_ {

@@ -23,7 +23,7 @@ use crate::link::{DropReason, FrameNumber, Transmit};
 use crate::map::{Replica, StateReplica};
 use crate::schedule::{BitBudget, ClassShares, Shares};
 use crate::time::Instant;
-use crate::wire::{Address, Envelope, Introduction, Seal};
+use crate::wire::{Address, Envelope, Introduction, Seal, UtcHours};
 use discovery::Discovery;
 use fleet::Fleet;
 use peer::{Ready, VehiclePeer, room_for_slot};
@@ -51,6 +51,7 @@ pub struct SurfaceLink<R: StateReplica = Replica> {
     discovery: Discovery,
     cycle: polled::Cycles,
     series: Series,
+    clock: Option<UtcHours>,
     random: u64,
     events: VecDeque<SurfaceEvent>,
     unknown_senders: u64,
@@ -62,7 +63,7 @@ impl<R: StateReplica> SurfaceLink<R> {
         let mut random = seed;
         let series = Series::from_random(crate::random::next(&mut random));
         let is_any_known = !config.vehicles.is_empty();
-        let calls = Identities::new(seed ^ 0xCA11, config.authenticity.as_ref());
+        let calls = Identities::new(seed ^ 0xCA11, config.authenticity.as_ref().map(|a| a.key.calls()));
         let mut link = Self {
             fleet: Fleet::new(),
             budget: BitBudget::new(config.budget_bps, config.budget_window, now),
@@ -72,6 +73,7 @@ impl<R: StateReplica> SurfaceLink<R> {
             discovery: Discovery::new(config.discovery_period, is_any_known, config.master.max_propagation, calls, now),
             cycle: polled::Cycles::default(),
             series,
+            clock: None,
             random,
             events: VecDeque::new(),
             unknown_senders: 0,
@@ -87,7 +89,7 @@ impl<R: StateReplica> SurfaceLink<R> {
         let seed = crate::random::next(&mut self.random);
         let c = &self.config;
         let (cell_edge, series, name) = (c.cell_edge, Some(self.series), c.name);
-        let introduction = Introduction { cell_edge, series, name, ..Introduction::default() };
+        let introduction = Introduction { cell_edge, series, name, clock: self.clock, ..Introduction::default() };
         let peer = VehiclePeer::new(c.mission, vehicle, c.authenticity.clone(), introduction, seed, c.master, now);
         let peer = peer.with_modem(&c.modem).with_abort_lifetime(c.abort_lifetime);
         self.fleet.insert(vehicle, peer);
@@ -202,6 +204,12 @@ impl<R: StateReplica> SurfaceLink<R> {
             return Err(IssueError::NoVehicle);
         }
         vehicles.iter().map(|&v| self.issue(v, slot.clone(), now)).collect()
+    }
+
+    /// Sets the clock of this computer, with which those of the vehicles are compared. Without it, none is.
+    pub fn set_clock(&mut self, clock: UtcHours) {
+        self.clock = Some(clock);
+        self.fleet.set_clock(clock);
     }
 
     /// Counts the budget as spent, because an earlier run of this end may have transmitted until `now`.

@@ -23,7 +23,7 @@ impl CallReply {
     /// Whether a frame to everybody is a discovery call of this mission.
     pub(super) fn is_call(config: &VehicleConfig, envelope: &Envelope<'_>) -> bool {
         let is_sound = match &config.authenticity {
-            Some(a) => envelope.open(&Seal::Hello(&a.key, config.mission, 0, 0)).is_some(),
+            Some(a) => envelope.open(&Seal::Hello(&a.key.calls(), config.mission, 0, 0)).is_some(),
             None => envelope.open(&Seal::Crc(config.mission, 0)).is_some(),
         };
         is_sound && envelope.header.kind.is_hello()
@@ -66,7 +66,7 @@ impl CallReply {
         let builder = FrameBuilder::new(&header, config.modem.frame_bytes);
         let mission = config.mission;
         Some(match &config.authenticity {
-            Some(a) => builder.finish(&Seal::Hello(&a.key, mission, session.get(), nonce), true),
+            Some(a) => builder.finish(&Seal::Hello(&a.link(config.address).key, mission, session.get(), nonce), true),
             None => builder.finish(&Seal::Crc(mission, session.get()), true),
         })
     }

@@ -31,7 +31,7 @@ use crate::map::{
 use crate::object::ObjectId;
 use crate::schedule::{BackgroundOrder, BitBudget, Shares};
 use crate::time::Instant;
-use crate::wire::{Address, Introduction, VehicleStatus};
+use crate::wire::{Address, Introduction, UtcHours, VehicleStatus};
 use content::{Carried, VehicleContent};
 use discovery::CallReply;
 use hellos::HelloLimit;
@@ -164,6 +164,11 @@ impl<S: StateSource> VehicleLink<S> {
     /// Whether the surface is known to hold the replicated state, its layers, and every object.
     pub fn is_converged(&self) -> bool {
         self.content.is_converged()
+    }
+
+    /// Sets the clock of this computer, with which that of the surface is compared. Without it, none is.
+    pub fn set_clock(&mut self, clock: UtcHours) {
+        self.pair.set_clock(clock);
     }
 
     /// Sets the status to send next; its position and time are those at the moment of the call.

@@ -3,7 +3,7 @@
 use scenecast_protocol::link::Authenticity;
 use scenecast_protocol::mac::{Access, ModemProfile};
 use scenecast_protocol::map_codec::Codec;
-use scenecast_protocol::seal::MissionKey;
+use scenecast_protocol::seal::{HeldKey, MissionKey};
 use scenecast_protocol::wire::MissionId;
 use std::sync::Arc;
 use std::time::Duration;
@@ -63,7 +63,7 @@ impl Setup {
     }
 
     pub(crate) fn keyed(self, all: bool, encrypt: bool) -> Self {
-        let key = Arc::new(MissionKey::from_bytes([42; 16]));
+        let key = Arc::new(HeldKey::Mission(MissionKey::from_bytes([42; 16])));
         Self { authenticity: Some(Authenticity { key, all, encrypt }), ..self }
     }
 

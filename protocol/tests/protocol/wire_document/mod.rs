@@ -7,10 +7,10 @@ mod samples;
 use document::{DOCUMENT, assert_same, frames, hex, rows, section};
 use samples::{
     CALL_NONCE, CALL_SESSION, MISSION, SURFACE_NONCE, SURFACE_SESSION, VEHICLE_SESSION, all_up_to, answer_of_vehicle,
-    answered, auv, call, clock, first_of_surface, frame, header, here, hold, introduction, key, map_payload, session,
-    surface_hello, vehicle_hello,
+    answered, auv, call, clock, first_of_surface, frame, header, here, hold, introduction, key, map_payload,
+    mission_key, session, surface_hello, vehicle_hello,
 };
-use scenecast_protocol::seal::Direction;
+use scenecast_protocol::seal::{Direction, VehicleKey};
 use scenecast_protocol::wire::{Address, ChunkKind, Header, Seal, WIRE_VERSION};
 
 #[test]
@@ -61,7 +61,7 @@ fn frames_with_a_tag_are_those_of_the_document() {
         ("keyed numbered frame of the vehicle", up(&plain)),
         ("encrypted numbered frame of the surface", down(&secret)),
         ("encrypted numbered frame of the vehicle", up(&secret)),
-        ("keyed call", frame(call(true), 64, true, hello(0, 0), &[])),
+        ("keyed call", frame(call(true), 64, true, Seal::Hello(&mission_key().calls(), MISSION, 0, 0), &[])),
         ("keyed here", frame(here(true), 64, true, hello(CALL_SESSION, CALL_NONCE), &[])),
     ];
     assert_same(frames(section("### 11.3", "## 12")), expected);
@@ -77,8 +77,9 @@ fn golden_values_of_the_keys_are_those_of_the_document() {
         (compact(&tag), compact(&body))
     };
     let expected = [
-        ("fingerprint", format!("{:08x}", key().fingerprint())),
-        ("key file", key().to_text().trim().to_owned()),
+        ("fingerprint", format!("{:08x}", mission_key().fingerprint())),
+        ("key file", mission_key().to_text().trim().to_owned()),
+        ("key file of vehicle 1", VehicleKey::derive(&mission_key(), 1).to_text().trim().to_owned()),
         ("hello tag of these three parts", compact(&key().hello_tag(&[b"hello", b"", &[1, 2]]))),
         ("tag, e = 0, down", sealed(false, Direction::Down).0),
         ("tag, e = 0, up", sealed(false, Direction::Up).0),

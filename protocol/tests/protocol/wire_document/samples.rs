@@ -6,10 +6,11 @@ use scenecast_protocol::directive::Series;
 use scenecast_protocol::directive::{
     Constraints, RefusalReason, SLOTS, Slot, SlotId, SlotReport, SlotState, VersionedSlot,
 };
-use scenecast_protocol::seal::{MissionKey, SessionKey};
+use scenecast_protocol::seal::{LinkKey, MissionKey, SessionKey};
 use scenecast_protocol::wire::{
     AckStatement, Address, Backlog, CellEdge, Chunk, ChunkKind, Envelope, EquipmentFaults, FrameBuilder, FrameKind,
-    Header, Introduction, MissionId, ModeReason, PlannedPath, Seal, SessionId, Stamp, VehicleMode, VehicleStatus,
+    Header, Introduction, MissionId, ModeReason, PlannedPath, Seal, SessionId, Stamp, UtcHours, VehicleMode,
+    VehicleStatus,
 };
 use std::time::Duration;
 
@@ -61,7 +62,9 @@ pub(crate) fn all_up_to(horizon_low: u16, lost: Vec<u16>) -> Option<AckStatement
 /// The introduction in the hello of the surface, or of the vehicle.
 pub(crate) fn introduction(of_surface: bool) -> [(ChunkKind, Vec<u8>); 1] {
     let series = of_surface.then(|| Series::from_random(0x0A0B_0C0D_0E0F));
-    let introduction = Introduction { cell_edge: CellEdge::from_metres(0.25), series, ..Introduction::default() };
+    let clock = UtcHours::from_unix(Duration::from_secs(3600 * 498_000));
+    let introduction =
+        Introduction { cell_edge: CellEdge::from_metres(0.25), series, clock, ..Introduction::default() };
     [(ChunkKind::Introduction, introduction.encode(Introduction::MAX_BYTES))]
 }
 
@@ -121,8 +124,13 @@ pub(crate) fn map_payload() -> Vec<u8> {
     pairs(row.1).expect("digits")
 }
 
-pub(crate) fn key() -> MissionKey {
+pub(crate) fn mission_key() -> MissionKey {
     MissionKey::from_bytes(std::array::from_fn(|i| i as u8))
+}
+
+/// The key of vehicle 1.
+pub(crate) fn key() -> LinkKey {
+    mission_key().vehicle(1)
 }
 
 pub(crate) fn session(encrypt: bool) -> SessionKey {

@@ -132,7 +132,7 @@ impl ExemplarBench {
         channel.place(VEHICLE, NodePosition::new(config.channel.range_m, 0.0, -16.0));
         let vehicle = scenecast_vehicle::assemble(
             &config,
-            scenecast_config::authenticity(&config)?,
+            scenecast_config::authenticity(&config, Address::SURFACE)?,
             modem,
             area,
             Durable::default(),
@@ -141,7 +141,7 @@ impl ExemplarBench {
         )?;
         let surface = scenecast_surface::assemble(
             &config,
-            scenecast_config::authenticity(&config)?,
+            scenecast_config::authenticity(&config, Address::SURFACE)?,
             scenecast_config::tuning_table(&config)?,
             modem,
             seed ^ 0x5EA,

@@ -30,7 +30,9 @@ use crate::mac::{Access, Master, MasterConfig, ModemProfile};
 use crate::map::StateReplica;
 use crate::schedule::Class;
 use crate::time::Instant;
-use crate::wire::{Address, Chunk, ChunkKind, Envelope, Header, Introduction, MissionId, Stamp, VehicleStatus};
+use crate::wire::{
+    Address, Chunk, ChunkKind, Envelope, Header, Introduction, MissionId, Stamp, UtcHours, VehicleStatus,
+};
 use contact::Contact;
 use content::{ChunkOutcome, PeerContent, class_of};
 use divergence::Divergence;
@@ -235,6 +237,10 @@ impl<R: StateReplica> VehiclePeer<R> {
     }
 
     /// The hello names the series, so a new one begins with a new run.
+    pub(super) fn set_clock(&mut self, clock: UtcHours) {
+        self.pair.set_clock(clock);
+    }
+
     fn follow_series(&mut self) {
         self.is_out_of_step |= self.pair.set_series(self.outbox.series());
     }

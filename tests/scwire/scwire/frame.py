@@ -1,0 +1,170 @@
+"""Sections 2, 3.3 and 5: header, seal, ack statement, chunks; and the writers that a surface needs."""
+from .bits import Short
+from .crc import crc24, crc32c
+from . import keys
+
+
+class Frame:
+    pass
+
+
+def seal_size(length, keyed):
+    return 8 if keyed else 3 if length < 128 else 4
+
+
+def crc_of(mission, session, body, length):
+    d = mission.to_bytes(4, 'big') + session.to_bytes(2, 'big') + body
+    return crc24(d).to_bytes(3, 'big') if length < 128 else crc32c(d).to_bytes(4, 'big')
+
+
+def parse(raw):
+    """Fields of a frame (checks 1, 2 and 4 of 2.5). The seal is not verified."""
+    f = Frame()
+    f.raw = raw
+    if len(raw) < 9:
+        raise Short('truncated')
+    b0 = raw[0]
+    f.ver, f.A, f.T, f.H, f.S, f.K = b0 >> 5, b0 >> 4 & 1, b0 >> 3 & 1, b0 >> 2 & 1, b0 >> 1 & 1, b0 & 1
+    n = seal_size(len(raw), f.K)
+    if len(raw) < n + 1:
+        raise Short('truncated')
+    f.unsealed, f.seal = raw[:-n], raw[-n:]
+    if not (f.ver == 4 or f.H and f.ver >= 2):
+        raise Short('version')
+    d, p = f.unsealed, 1
+
+    def take(k):
+        nonlocal p
+        if p + k > len(d):
+            raise Short('truncated')
+        p += k
+        return d[p - k:p]
+    a = take(1)[0]
+    f.src, f.dst = a >> 4, a & 15
+    f.session = int.from_bytes(take(2), 'big')
+    f.number16 = int.from_bytes(take(2), 'big')
+    f.base = take(1)[0]
+    if f.base & 0x80:
+        f.base = (f.base & 0x7F) << 8 | take(1)[0]
+    f.remaining = take(1)[0]
+    f.turn = take(1)[0] if f.T else None
+    f.stamp = take(5 if f.src == 0 else 6) if f.S else None
+    f.nonce = take(8) if f.H and f.K else bytes(8)
+    f.ack = None
+    if f.A:
+        h = int.from_bytes(take(2), 'big')
+        n = h & 15
+        if n == 15:
+            n = take(1)[0]
+        f.ack = (h >> 4, losses(take(n)))
+    if f.session == 0 or not 1 <= f.base <= 2048:
+        raise Short('malformed')
+    f.head, f.body = d[:p], d[p:]
+    return f
+
+
+def losses(code):
+    """Distances from the horizon of the lost frames."""
+    if not code:
+        return []
+    bits = ''.join(f'{b:08b}' for b in code)
+    k = int(bits[:2], 2)
+    if k == 0:
+        return [i for i, b in enumerate(bits[2:]) if b == '1']
+    out, p, at = [], 2, 0
+    while True:
+        z = bits.find('0', p)
+        if z < 0 or z + k >= len(bits) + 0 and k:
+            return out
+        v = (z - p) << k | (int(bits[z + 1:z + 1 + k], 2) if k else 0)
+        p = z + 1 + k
+        at += v
+        if at >= 4096:
+            return out
+        out.append(at)
+        at += 1
+
+
+def loss_code(lost):
+    """The shortest code of distances (ascending)."""
+    if not lost:
+        return b''
+    best = '00' + ''.join('1' if i in set(lost) else '0' for i in range(lost[-1] + 1))
+    best += '0' * (-len(best) % 8)
+    for k in (1, 2, 3):
+        s, at = f'{k:02b}', 0
+        for x in lost:
+            v = x - at
+            s += '1' * (v >> k) + '0' + f'{v & ((1 << k) - 1):0{k}b}'
+            at = x + 1
+        s += '1' * (-len(s) % 8)
+        if len(s) < len(best):
+            best = s
+    return int(best, 2).to_bytes(len(best) // 8, 'big')
+
+
+def statement(horizon, lost):
+    """lost: distances."""
+    c = loss_code(sorted(lost))
+    n = len(c)
+    return ((horizon & 4095) << 4 | min(n, 15)).to_bytes(2, 'big') + (bytes([n]) if n >= 15 else b'') + c
+
+
+def chunks(body):
+    out, p = [], 0
+    while p < len(body):
+        kind, n = body[p] >> 5, body[p] & 31
+        if kind == 0:
+            break
+        p += 1
+        if n == 31:
+            n = len(body) - p
+        elif n >= 27:
+            if p >= len(body):
+                raise Short('malformed')
+            n = 27 + 256 * (n - 27) + body[p]
+            p += 1
+        if p + n > len(body):
+            raise Short('malformed')
+        out.append((kind, body[p:p + n]))
+        p += n
+    return out
+
+
+def chunk(kind, payload):
+    n = len(payload)
+    if n <= 26:
+        return bytes([kind << 5 | n]) + payload
+    return bytes([kind << 5 | 27 + (n - 27 >> 8), n - 27 & 255]) + payload
+
+
+def write_base(b):
+    return bytes([b]) if b < 128 else bytes([0x80 | b >> 8, b & 255])
+
+
+def nearest(low, high, bits=16):
+    """The number with these low bits that is nearest to `high`; the low bits themselves if that is below 0."""
+    m = 1 << bits
+    n = high - m // 2 + (low - (high - m // 2)) % m
+    return n if n >= 0 else low
+
+
+def write(src, dst, session, number, base, remaining, *, turn=None, stamp=None, ack=None, body=b'', hello=False,
+          mission, peer, peer_nonce=bytes(8), key=None, nonce=None, ver=4):
+    """key: a keys.Hello or keys.Session, or None."""
+    b0 = ver << 5 | (ack is not None) << 4 | (turn is not None) << 3 | hello << 2 | (stamp is not None) << 1 | (key is not None)
+    h = bytes([b0, src << 4 | dst]) + session.to_bytes(2, 'big') + (0 if hello else number & 0xFFFF).to_bytes(2, 'big')
+    h += write_base(base) + bytes([remaining])
+    if turn is not None:
+        h += bytes([turn])
+    h += stamp or b''
+    if hello and key is not None:
+        h += nonce
+    h += ack or b''
+    if key is None:
+        d = h + body
+        n = len(d) + 3
+        return d + crc_of(mission, peer, d, n if n < 128 else n + 1)
+    if hello:
+        return h + body + keys.hello_tag(key, mission, peer, peer_nonce, h + body)
+    return key.seal(0 if src == 0 else 1, number, h, body)
