@@ -171,9 +171,9 @@ impl Demo {
     fn serve(&mut self, console: &mut Console, mut changed: bool) {
         let now = self.mission.now();
         self.take_truth();
+        let mut answers = Vec::new();
         while let Ok((request, reply)) = console.requests.try_recv() {
-            // A browser that closed its connection needs no reply.
-            let _ = reply.send(self.answer(request));
+            answers.push((reply, self.answer(request)));
             changed = true;
         }
         let due = self.published.is_none_or(|at| at.elapsed() >= PUBLISH_INTERVAL);
@@ -184,6 +184,11 @@ impl Demo {
             self.record();
             let snapshot = snapshot(self.mission.surface(), &self.facts, &self.meter, now);
             console.snapshots.send_replace(Arc::new(snapshot));
+        }
+        // Who reads the state after the reply finds the order in it.
+        for (reply, answer) in answers {
+            // A browser that closed its connection needs no reply.
+            let _ = reply.send(answer);
         }
     }
 
