@@ -11,8 +11,9 @@ use serde::{Deserialize, Serialize};
 
 type Covariance = SMatrix<f64, MEASURES, MEASURES>;
 
-/// Differences that count as none even where neighbours do not differ at all, in the unit of each measure: of brightness, of the colour
-/// ratios, of the deviations and of the energies.
+/// The largest differences that may count as none, in the unit of each measure: of brightness, of the colour ratios, of the deviations and
+/// of the energies. What counts as none is as much as neighbours differ, at most this and at least a quarter of it: in turbid water all
+/// differences are small.
 const TOLERANCE: MeasuredValues = [0.12, 0.04, 0.03, 0.15, 0.15, 0.15, 0.35, 0.35, 0.35, 0.35, 0.35, 0.35, 0.35];
 
 /// Axes in which the differences of neighbours have the covariance of a unit sphere.
@@ -26,7 +27,6 @@ pub(crate) struct Space {
 impl Space {
     /// Learns the space of a map; `None` if a measure is not finite.
     pub(crate) fn learn(map: &CellMap, values: &[MeasuredValues]) -> Option<Self> {
-        let mut noise = Covariance::from_diagonal(&SVector::from(TOLERANCE.map(|t| t * t)));
         let (mut sums, mut pairs) = (Covariance::zeros(), 0);
         for (a, b) in map.pairs() {
             let difference = SVector::from(values[a]) - SVector::from(values[b]);
@@ -34,7 +34,11 @@ impl Space {
             pairs += 1;
         }
         // The variance of a difference is that of both cells.
-        noise += sums / f64::from(2 * pairs.max(1));
+        let mut noise = sums / f64::from(2 * pairs.max(1));
+        for (k, tolerance) in TOLERANCE.into_iter().enumerate() {
+            let most = tolerance * tolerance;
+            noise[(k, k)] += noise[(k, k)].clamp(most / 16.0, most);
+        }
         let sum: SVector<f64, MEASURES> = values.iter().map(|value| SVector::from(*value)).sum();
         Some(Self { mean: sum / values.len().max(1) as f64, root: noise.cholesky()?.l() })
     }
