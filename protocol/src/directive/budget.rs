@@ -1,6 +1,6 @@
 //! The bit budget of the vehicle, and how its classes share it.
 
-use crate::bytes::{Reader, Truncated};
+use crate::bytes::{Reader, Truncated, put24};
 use crate::schedule::{BackgroundOrder, Shares};
 
 /// The bits that the vehicle may put on air, and their distribution over the classes.
@@ -22,7 +22,7 @@ pub struct Budget {
 
 impl Budget {
     pub(super) fn encode(&self, out: &mut Vec<u8>) {
-        out.extend_from_slice(self.bits_per_s.min(0xFF_FFFF).to_be_bytes().get(1..).unwrap_or_default());
+        put24(out, self.bits_per_s.min(0xFF_FFFF));
         out.extend_from_slice(&self.shares.0);
         out.extend(self.background.to_bytes());
     }

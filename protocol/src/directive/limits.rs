@@ -1,6 +1,6 @@
 //! Limits of depth, altitude, distance and time, and the reactions to a breach.
 
-use crate::bytes::{Reader, Truncated};
+use crate::bytes::{Reader, Truncated, put24};
 
 /// A reaction of the vehicle's failsafe.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -143,7 +143,7 @@ impl Limits {
             out.extend_from_slice(&edge.to_be_bytes());
         }
         for limit in [self.distance_m, self.time_s].into_iter().flatten() {
-            out.extend_from_slice(limit.min(Self::MAX).to_be_bytes().get(1..).unwrap_or_default());
+            put24(&mut out, limit.min(Self::MAX));
         }
         out.extend(self.silence_s.into_iter().flat_map(u16::to_be_bytes));
         out

@@ -1,6 +1,6 @@
 //! The content of a hello: the facts about its sender that the other end cannot measure.
 
-use crate::bytes::{Reader, Truncated};
+use crate::bytes::{Reader, Truncated, put24};
 use crate::directive::Series;
 use std::time::Duration;
 
@@ -129,13 +129,14 @@ impl Introduction {
     /// The bytes of the payload: 14, and the name as far as it fits into `room`.
     #[must_use]
     pub fn encode(&self, room: usize) -> Vec<u8> {
-        let mut out = self.cell_edge.0.to_be_bytes().get(1..).unwrap_or_default().to_vec();
+        let mut out = Vec::new();
+        put24(&mut out, self.cell_edge.0);
         let flags = [(self.takes_over, 0x80), (self.refuses, 0x40), (self.has_no_memory, 0x20)];
         let flags = flags.iter().filter(|(is_set, _)| *is_set).fold(0, |all, (_, bit)| all | bit);
         let series = self.series.map_or(0, Series::get);
         out.extend_from_slice(series.to_be_bytes().get(2..).unwrap_or_default());
         out.push(flags | (self.silence_s / 8));
-        out.extend_from_slice(self.clock.map_or(0, |clock| clock.0).to_be_bytes().get(1..).unwrap_or_default());
+        put24(&mut out, self.clock.map_or(0, |clock| clock.0));
         let name = self.name.as_str();
         let mut length = name.len().min(room.saturating_sub(Self::HEAD));
         while !name.is_char_boundary(length) {
@@ -149,12 +150,11 @@ impl Introduction {
     /// Reads a payload; bytes after the known fields are skipped.
     pub fn decode(bytes: &[u8]) -> Result<Self, Truncated> {
         let mut r = Reader::new(bytes);
-        let mut u24 = || -> Result<u32, Truncated> { Ok(u32::from(r.u8()?) << 16 | u32::from(r.u16()?)) };
-        let (edge, high, low) = (u24()?, u24()?, u24()?);
-        let series = u64::from(high) << 24 | u64::from(low);
+        let edge = r.u24()?;
+        let series = u64::from(r.u24()?) << 24 | u64::from(r.u24()?);
         let flags = r.u8()?;
         let refuses = flags & 0x40 != 0;
-        let hours = u32::from(r.u8()?) << 16 | u32::from(r.u16()?);
+        let hours = r.u24()?;
         let length = usize::from(r.u8()?).min(SurfaceName::MAX_BYTES);
         Ok(Self {
             cell_edge: CellEdge(edge),

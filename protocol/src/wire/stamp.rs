@@ -1,7 +1,7 @@
 //! Time stamps, from which each end estimates the propagation time and the other end's clock.
 
 use super::header::Address;
-use crate::bytes::{Reader, Truncated};
+use crate::bytes::{Reader, Truncated, put24};
 use crate::time::Instant;
 use std::time::Duration;
 
@@ -79,7 +79,7 @@ impl Stamp {
     }
 
     pub(super) fn encode(&self, out: &mut Vec<u8>) {
-        out.extend_from_slice(self.clock_ms().to_be_bytes().get(1..).unwrap_or_default());
+        put24(out, self.clock_ms());
         let millis = |d: Duration, most: u16| (d.as_millis().min(u128::from(most)) as u16).to_be_bytes();
         match *self {
             Self::Surface { one_way, .. } => {

@@ -61,9 +61,7 @@ pub(super) fn run(program: &Path, dir: &Path, recording: &Path, number: u32) -> 
     }
     page.wait("a status", LIMIT, |v| v.status.is_some())?;
     page.order("constraints", &json!({"action": "resume"}))?;
-    let fence = [[-500, -500], [500, -500], [500, 500], [-500, 500]];
-    page.order("fence", &json!({"fence": fence, "keep_outs": null, "return_point": null}))?;
-    page.order("limits", &json!({"silence_s": 3600, "on_silence": "hold"}))?;
+    page.begin()?;
     page.wait("the orders", LIMIT, |v| {
         is_decided(v) && v.orders.directive.slots.len() >= 3 && mode(v) != Some(ReportedMode::Hold)
     })?;

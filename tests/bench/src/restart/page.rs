@@ -151,7 +151,9 @@ impl Page {
     /// The orders and records of an operator at the beginning of a mission.
     pub(super) fn begin(&self) -> Result<(), UserError> {
         let label = self.vehicle().and_then(|v| v.labels.first().map(|l| l.id));
-        self.order("fence", &json!({"fence": [[-500, -500], [500, -500], [500, 500], [-500, 500]]}))?;
+        // The whole fence, since a vehicle may have one of its own that the surface does not know yet.
+        let fence = [[-500, -500], [500, -500], [500, 500], [-500, 500]];
+        self.order("fence", &json!({"fence": fence, "keep_outs": null, "return_point": null}))?;
         self.order("limits", &json!({"silence_s": 3600, "on_silence": "hold"}))?;
         self.order("notes", &json!({"text": "a wreck"}))?;
         match label {

@@ -1,6 +1,5 @@
 //! The orders that were given and applied, and the promise that nothing older replaces something newer.
 
-use super::waters::SURFACES;
 use scenecast_protocol::directive::{Slot, SlotId};
 use scenecast_protocol::time::Instant;
 use std::collections::BTreeMap;
@@ -29,7 +28,6 @@ pub(super) struct Orders {
 
 impl Orders {
     pub(super) fn given(&mut self, surface: usize, id: SlotId, version: u16, now: Instant) {
-        debug_assert!(surface < SURFACES);
         self.given.insert((surface, id, version), now);
         self.counts[0] += 1;
     }

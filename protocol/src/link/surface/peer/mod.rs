@@ -236,11 +236,11 @@ impl<R: StateReplica> VehiclePeer<R> {
         }
     }
 
-    /// The hello names the series, so a new one begins with a new run.
     pub(super) fn set_clock(&mut self, clock: UtcHours) {
         self.pair.set_clock(clock);
     }
 
+    /// The hello names the series, so a new one begins with a new run.
     fn follow_series(&mut self) {
         self.is_out_of_step |= self.pair.set_series(self.outbox.series());
     }
