@@ -5,11 +5,10 @@
 use divan::Bencher;
 use divan::counter::ItemsCount;
 use scenecast_protocol::link::{SlotInboxState, SurfaceConfig, SurfaceLink, VehicleConfig, VehicleLink};
-use scenecast_protocol::mac::{Access, MasterConfig, ModemProfile};
+use scenecast_protocol::mac::{Access, ModemProfile};
 use scenecast_protocol::map::{StateReplica, StateSource};
-use scenecast_protocol::schedule::Shares;
 use scenecast_protocol::time::Instant;
-use scenecast_protocol::wire::{Address, CellEdge, MissionId, VehicleStatus};
+use scenecast_protocol::wire::{Address, MissionId, VehicleStatus};
 use std::collections::BTreeMap;
 use std::time::Duration;
 
@@ -106,33 +105,9 @@ impl Wire {
             access: Access::Shared,
         };
         let address = Address::vehicle(1).expect("a vehicle's number");
-        let (mission, shares, budget_bps, budget_window) =
-            (MissionId(7), Shares::default(), 10_000, Duration::from_secs(10));
-        let vehicle = VehicleConfig {
-            address,
-            mission,
-            cell_edge: CellEdge::default(),
-            modem,
-            budget_bps,
-            budget_window,
-            shares,
-            status_period: Duration::from_secs(10),
-            authenticity: None,
-        };
-        let surface = SurfaceConfig {
-            name: Default::default(),
-            abort_lifetime: None,
-            mission,
-            cell_edge: CellEdge::default(),
-            modem,
-            budget_bps,
-            budget_window,
-            shares,
-            master: MasterConfig::default(),
-            vehicles: vec![address],
-            discovery_period: None,
-            authenticity: None,
-        };
+        let (mission, budget_bps) = (MissionId(7), 10_000);
+        let vehicle = VehicleConfig::new(address, mission, modem, budget_bps);
+        let surface = SurfaceConfig { vehicles: vec![address], ..SurfaceConfig::new(mission, modem, budget_bps) };
         let mut vehicle = VehicleLink::with_source(vehicle, Endless, 1, SlotInboxState::default(), now);
         vehicle.set_status(VehicleStatus::default());
         let surface = SurfaceLink::new(surface, 2, now);

@@ -1,12 +1,11 @@
 //! The settings of both ends of a link in virtual time.
 
 use scenecast_protocol::link::{Authenticity, SlotInboxState, SurfaceConfig, SurfaceLink, VehicleConfig, VehicleLink};
-use scenecast_protocol::mac::{Access, MasterConfig, ModemProfile};
+use scenecast_protocol::mac::{Access, ModemProfile};
 use scenecast_protocol::map_codec::Codec;
-use scenecast_protocol::schedule::Shares;
 use scenecast_protocol::seal::{HeldKey, MissionKey};
 use scenecast_protocol::time::Instant;
-use scenecast_protocol::wire::{Address, CellEdge, MissionId};
+use scenecast_protocol::wire::{Address, MissionId};
 use sim_channel::RandomStream;
 use std::sync::Arc;
 use std::time::Duration;
@@ -14,7 +13,6 @@ use std::time::Duration;
 pub(crate) const MISSION: MissionId = MissionId(7);
 pub(crate) const FRAME_BYTES: usize = 64;
 pub(crate) const BUDGET_BPS: u32 = 10_000;
-const WINDOW: Duration = Duration::from_secs(10);
 
 /// The vehicle of every link.
 pub(crate) fn auv() -> Address {
@@ -53,33 +51,18 @@ impl EndsSetup {
 
     pub(crate) fn vehicle(&self, seed: u64, durable: SlotInboxState, now: Instant) -> VehicleLink {
         let config = VehicleConfig {
-            address: auv(),
-            mission: MISSION,
-            cell_edge: CellEdge::default(),
-            modem: self.modem(),
-            budget_bps: BUDGET_BPS,
-            budget_window: WINDOW,
-            shares: Shares::default(),
-            status_period: Duration::from_secs(10),
             authenticity: self.authenticity.clone(),
+            ..VehicleConfig::new(auv(), MISSION, self.modem(), BUDGET_BPS)
         };
         VehicleLink::new(config, Codec::Context, seed, durable, now)
     }
 
     pub(crate) fn surface(&self, seed: u64, now: Instant) -> SurfaceLink {
         let config = SurfaceConfig {
-            name: Default::default(),
-            abort_lifetime: None,
-            mission: MISSION,
-            cell_edge: CellEdge::default(),
-            modem: self.modem(),
-            budget_bps: BUDGET_BPS,
-            budget_window: WINDOW,
-            shares: Shares::default(),
-            master: MasterConfig::default(),
             vehicles: vec![auv()],
             discovery_period: self.discovery,
             authenticity: self.authenticity.clone(),
+            ..SurfaceConfig::new(MISSION, self.modem(), BUDGET_BPS)
         };
         SurfaceLink::new(config, seed, now)
     }

@@ -9,10 +9,9 @@ use scenecast_protocol::directive::SlotState;
 use scenecast_protocol::link::{
     PeerView, SlotInboxState, SurfaceConfig, SurfaceEvent, SurfaceLink, VehicleConfig, VehicleEvent, VehicleLink,
 };
-use scenecast_protocol::mac::{Access, MasterConfig, ModemProfile};
-use scenecast_protocol::schedule::Shares;
+use scenecast_protocol::mac::{Access, ModemProfile};
 use scenecast_protocol::time::Instant;
-use scenecast_protocol::wire::{Address, CellEdge, Envelope, MissionId, VehicleStatus};
+use scenecast_protocol::wire::{Address, Envelope, MissionId, VehicleStatus};
 use sim_channel::{Channel, ChannelConfig, LossModel, NodeId, NodePosition, RandomStream, ReceptionOutcome};
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -242,15 +241,8 @@ impl BenchVehicle {
     /// A vehicle before its handshake.
     pub(super) fn new(setting: &LinkSetting, address: Address, seed: u64, now: Instant) -> Self {
         let config = VehicleConfig {
-            address,
-            mission: MissionId(7),
-            cell_edge: CellEdge::default(),
-            modem: setting.modem(),
-            budget_bps: setting.budget_bps,
             budget_window: WINDOW,
-            shares: Shares::default(),
-            status_period: Duration::from_secs(10),
-            authenticity: None,
+            ..VehicleConfig::new(address, MissionId(7), setting.modem(), setting.budget_bps)
         };
         let link = VehicleLink::with_source(config, OpaqueSource::default(), seed, SlotInboxState::default(), now);
         let host = LinkHost::new(link, channel_station(setting.modem(), WINDOW, now));
@@ -283,17 +275,9 @@ pub(super) fn surface(setting: &LinkSetting, seed: u64, now: Instant) -> LinkHos
 fn surface_config(setting: &LinkSetting) -> SurfaceConfig {
     let known = if setting.discovery_period.is_none() { setting.vehicles } else { 0 };
     SurfaceConfig {
-        name: Default::default(),
-        abort_lifetime: None,
-        mission: MissionId(7),
-        cell_edge: CellEdge::default(),
-        modem: setting.modem(),
-        budget_bps: setting.budget_bps,
         budget_window: WINDOW,
-        shares: Shares::default(),
-        master: MasterConfig::default(),
         vehicles: (1..=known).map(address).collect(),
         discovery_period: setting.discovery_period,
-        authenticity: None,
+        ..SurfaceConfig::new(MissionId(7), setting.modem(), setting.budget_bps)
     }
 }

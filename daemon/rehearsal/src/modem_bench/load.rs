@@ -12,10 +12,8 @@ use scenecast_protocol::directive::{Slot, SlotId, Utility};
 use scenecast_protocol::link::{
     PeerView, SlotInboxState, SurfaceConfig, SurfaceLink, VehicleConfig, VehicleEvent, VehicleLink,
 };
-use scenecast_protocol::mac::MasterConfig;
-use scenecast_protocol::schedule::Shares;
 use scenecast_protocol::time::Instant;
-use scenecast_protocol::wire::{Address, CellEdge, MissionId, VehicleStatus};
+use scenecast_protocol::wire::{Address, MissionId, VehicleStatus};
 use sim_channel::modem::{Emulator, Fault};
 use sim_channel::{Channel, ChannelConfig, LossModel, NodePosition, RandomStream};
 use std::collections::BTreeMap;
@@ -92,29 +90,13 @@ impl ModemBench {
         let address = scenecast_config::vehicle_address(config)?;
         let (mission, window) = (MissionId(7), Duration::from_secs_f64(config.link.budget_window_s));
         let vehicle = VehicleConfig {
-            address,
-            mission,
-            cell_edge: CellEdge::default(),
-            modem: *at_vehicle.profile(),
-            budget_bps: config.link.budget_bps,
             budget_window: window,
-            shares: Shares::default(),
-            status_period: Duration::from_secs(10),
-            authenticity: None,
+            ..VehicleConfig::new(address, mission, *at_vehicle.profile(), config.link.budget_bps)
         };
         let surface = SurfaceConfig {
-            name: Default::default(),
-            abort_lifetime: None,
-            mission,
-            cell_edge: CellEdge::default(),
-            modem: *at_surface.profile(),
-            budget_bps: config.link.budget_bps,
             budget_window: window,
-            shares: Shares::default(),
-            master: MasterConfig::default(),
             vehicles: vec![address],
-            discovery_period: None,
-            authenticity: None,
+            ..SurfaceConfig::new(mission, *at_surface.profile(), config.link.budget_bps)
         };
         let source = OpaqueSource::default();
         Ok(Self {

@@ -3,14 +3,14 @@
 use super::peer::{FuzzPeer, MISSION, authenticity, vehicle};
 use super::raw::Script;
 use scenecast_protocol::link::{SlotInboxState, SurfaceConfig, SurfaceLink, Transmit, VehicleConfig, VehicleLink};
-use scenecast_protocol::mac::{Access, MasterConfig, ModemProfile};
+use scenecast_protocol::mac::{Access, ModemProfile};
 use scenecast_protocol::map::{
     Cell, LayerDescriptor, LayerId, LayerSet, LayerSource, MapSource, Replica, StateReplica, StateSource,
 };
 use scenecast_protocol::map_codec::Codec;
-use scenecast_protocol::schedule::{Audit, Shares};
+use scenecast_protocol::schedule::Audit;
 use scenecast_protocol::time::Instant;
-use scenecast_protocol::wire::{Address, CellEdge};
+use scenecast_protocol::wire::Address;
 use std::fmt;
 use std::time::Duration;
 
@@ -180,33 +180,18 @@ impl Setup {
 
     pub fn vehicle<S: Grow>(self, source: S, now: Instant) -> Vehicle<S> {
         let config = VehicleConfig {
-            address: vehicle(),
-            mission: MISSION,
-            cell_edge: CellEdge::default(),
-            modem: self.modem(),
-            budget_bps: BUDGET_BPS,
-            budget_window: WINDOW,
-            shares: Shares::default(),
-            status_period: Duration::from_secs(10),
             authenticity: authenticity(self.choice),
+            ..VehicleConfig::new(vehicle(), MISSION, self.modem(), BUDGET_BPS)
         };
         VehicleLink::with_source(config, source, 11, SlotInboxState::default(), now)
     }
 
     pub fn surface<R: StateReplica>(self, now: Instant) -> Surface<R> {
         let config = SurfaceConfig {
-            name: Default::default(),
-            abort_lifetime: None,
-            mission: MISSION,
-            cell_edge: CellEdge::default(),
-            modem: self.modem(),
-            budget_bps: BUDGET_BPS,
-            budget_window: WINDOW,
-            shares: Shares::default(),
-            master: MasterConfig::default(),
             vehicles: vec![vehicle()],
             discovery_period: (self.choice & 0x20 != 0).then_some(Duration::from_secs(60)),
             authenticity: authenticity(self.choice),
+            ..SurfaceConfig::new(MISSION, self.modem(), BUDGET_BPS)
         };
         let mut link = SurfaceLink::new(config, 12, now);
         (0..3).for_each(|what| link.act(what, 3, now));

@@ -34,3 +34,24 @@ pub struct SurfaceConfig {
     /// Key and scope of authentication; `None` sends frames with a CRC only.
     pub authenticity: Option<Authenticity>,
 }
+
+impl SurfaceConfig {
+    /// Settings of a surface that knows no vehicle and calls none, without a name and without a key, with a window of 10 s.
+    #[must_use]
+    pub fn new(mission: MissionId, modem: ModemProfile, budget_bps: u32) -> Self {
+        Self {
+            mission,
+            modem,
+            budget_bps,
+            budget_window: Duration::from_secs(10),
+            shares: Shares::default(),
+            master: MasterConfig::default(),
+            cell_edge: CellEdge::default(),
+            name: SurfaceName::default(),
+            abort_lifetime: None,
+            vehicles: Vec::new(),
+            discovery_period: None,
+            authenticity: None,
+        }
+    }
+}

@@ -28,3 +28,21 @@ pub struct VehicleConfig {
     /// Key and scope of authentication; `None` sends frames with a CRC only.
     pub authenticity: Option<Authenticity>,
 }
+
+impl VehicleConfig {
+    /// Settings of a vehicle without a key, with a window of 10 s and a status every 10 s.
+    #[must_use]
+    pub fn new(address: Address, mission: MissionId, modem: ModemProfile, budget_bps: u32) -> Self {
+        Self {
+            address,
+            mission,
+            cell_edge: CellEdge::default(),
+            modem,
+            budget_bps,
+            budget_window: Duration::from_secs(10),
+            shares: Shares::default(),
+            status_period: Duration::from_secs(10),
+            authenticity: None,
+        }
+    }
+}

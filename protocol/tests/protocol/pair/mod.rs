@@ -8,12 +8,12 @@ use scenecast_protocol::directive::{Constraints, Slot, SlotId, SlotState, Utilit
 use scenecast_protocol::link::{
     SlotInboxState, SurfaceConfig, SurfaceEvent, SurfaceLink, VehicleConfig, VehicleEvent, VehicleLink,
 };
-use scenecast_protocol::mac::{Access, MasterConfig};
+use scenecast_protocol::mac::Access;
 use scenecast_protocol::map::{Cell, LabelGrid, LayerDescriptor, LayerId, LayerSet, LayerSource};
 use scenecast_protocol::map_codec::Codec;
-use scenecast_protocol::schedule::{Audit, Shares};
+use scenecast_protocol::schedule::Audit;
 use scenecast_protocol::time::Instant;
-use scenecast_protocol::wire::{Address, CellEdge, VehicleStatus};
+use scenecast_protocol::wire::{Address, VehicleStatus};
 use std::collections::{BTreeMap, VecDeque};
 use std::time::Duration;
 
@@ -326,15 +326,8 @@ impl LinkedEnds {
 
 pub(crate) fn vehicle_of(setup: &Setup, seed: u64, durable: SlotInboxState, now: Instant) -> VehicleLink {
     let config = VehicleConfig {
-        address: auv(),
-        mission: setup.mission,
-        cell_edge: CellEdge::default(),
-        modem: setup.modem(),
-        budget_bps: setup.budget_bps,
-        budget_window: Duration::from_secs(10),
-        shares: Shares::default(),
-        status_period: Duration::from_secs(10),
         authenticity: setup.authenticity.clone(),
+        ..VehicleConfig::new(auv(), setup.mission, setup.modem(), setup.budget_bps)
     };
     let mut link = VehicleLink::new(config, setup.codec, seed, durable, now);
     link.source_mut().set_debounce(setup.debounce);
@@ -355,18 +348,10 @@ pub(crate) fn layer(id: LayerId, share: u8, codec: Codec, debounce: Duration) ->
 
 pub(crate) fn surface_of(setup: &Setup, seed: u64, now: Instant) -> SurfaceLink {
     let config = SurfaceConfig {
-        name: Default::default(),
-        abort_lifetime: None,
-        mission: setup.mission,
-        cell_edge: CellEdge::default(),
-        modem: setup.modem(),
-        budget_bps: setup.budget_bps,
-        budget_window: Duration::from_secs(10),
-        shares: Shares::default(),
-        master: MasterConfig::default(),
         vehicles: vec![auv()],
         discovery_period: setup.discovery,
         authenticity: setup.authenticity.clone(),
+        ..SurfaceConfig::new(setup.mission, setup.modem(), setup.budget_bps)
     };
     SurfaceLink::new(config, seed, now)
 }

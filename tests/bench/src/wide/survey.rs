@@ -9,9 +9,9 @@ use scenecast_protocol::link::{SlotInboxState, VehicleConfig, VehicleEvent, Vehi
 use scenecast_protocol::mac::{Access, ModemProfile};
 use scenecast_protocol::map::{Cell, LayerDescriptor, LayerId, LayerSource};
 use scenecast_protocol::map_codec::Codec;
-use scenecast_protocol::schedule::{BackgroundOrder, Shares};
+use scenecast_protocol::schedule::BackgroundOrder;
 use scenecast_protocol::time::Instant;
-use scenecast_protocol::wire::{Address, CellEdge, MissionId, VehicleStatus};
+use scenecast_protocol::wire::{Address, MissionId, VehicleStatus};
 use scenecast_surface::Surface;
 use sim_channel::RandomStream;
 use std::collections::VecDeque;
@@ -52,15 +52,9 @@ impl WideSurvey {
             access: Access::Shared,
         };
         let end = VehicleConfig {
-            address: vehicle,
-            mission: MissionId(config.mission.id),
-            cell_edge: CellEdge::default(),
-            modem,
-            budget_bps: BIT_RATE_BPS,
             budget_window: Duration::from_secs_f64(config.link.budget_window_s),
-            shares: Shares::default(),
             status_period: Duration::from_secs(30),
-            authenticity: None,
+            ..VehicleConfig::new(vehicle, MissionId(config.mission.id), modem, BIT_RATE_BPS)
         };
         let mut link = VehicleLink::new(end, Codec::Auto, seed, SlotInboxState::default(), now);
         let mut surface = scenecast_surface::assemble(config, None, TuningTable::shipped(), modem, seed + 1, now)?;
