@@ -11,9 +11,9 @@ Speaks MAVLink over UDP to 127.0.0.1:PORT, as BlueOS does. What it keeps of Ardu
 * it reports the target that it flies to, if there is one, and the distance to it;
 * without a heartbeat of its companion for five seconds it disarms (FS_GCS).
 
-Each line on stdin is an order of the test: `silent`, `speak`, `pilot MODE`, `refuse` and `accept` (targets, without a word),
-`lose` and `find` (its position; the frame has jumped by then), `reboot`, `quit`. Each 0.1 s a line of JSON on stdout
-tells what it has seen.
+Each line on stdin is an order of the test: `silent` (heartbeats still reach it, so that it does not disarm, however long
+that is), `speak`, `pilot MODE`, `refuse` and `accept` (targets, without a word), `lose` and `find` (its position; the frame
+has jumped by then), `reboot`, `quit`. Each 0.1 s a line of JSON on stdout tells what it has seen.
 """
 
 import json
@@ -59,8 +59,11 @@ class Sub:
             self.last_sent[message_id] = now
             send()
 
+    def is_rebooting(self):
+        return time.monotonic() < self.off_until
+
     def is_off(self):
-        return self.silent or time.monotonic() < self.off_until
+        return self.silent or self.is_rebooting()
 
     def distance(self):
         return math.hypot(self.target[0] - self.north, self.target[1] - self.east) if self.target else 0.0
@@ -98,11 +101,11 @@ class Sub:
             kind = message.get_type()
             if kind == "BAD_DATA":
                 self.seen["bad"] += 1
-            elif self.is_off():
-                pass
-            elif kind == "HEARTBEAT":
+            elif kind == "HEARTBEAT" and not self.is_rebooting():
                 self.seen["heartbeats"] += 1
                 self.heard_beat = time.monotonic()
+            elif self.is_off():
+                pass
             elif kind == "COMMAND_LONG" and message.target_system == 1:
                 self.command(message)
             elif kind == "SET_POSITION_TARGET_LOCAL_NED" and message.target_system == 1:

@@ -6,8 +6,9 @@
 //   ... --runs N                          each story N times, to find unstable ones
 //   ... --workers N                       N stories at a time, each with a mock of its own
 //   ... --limits                          the stories that measure time assert its limits, which hold on a quiet machine only
-//   ... --brief                           without stories that repeat another in the other themes ("again"); against a running daemon,
-//                                         only those in which page, surface and vehicle take part ("ends")
+//   ... --brief                           without stories that repeat another in the other themes ("again") or take seconds for what no
+//                                         order depends on ("long"); against a running daemon, only those in which page, surface and
+//                                         vehicle take part ("ends")
 //   --only A,B   only stories whose name contains A or B      --require   a missing browser is a failure
 
 import { existsSync, readFileSync } from "node:fs";
@@ -27,7 +28,7 @@ async function stories() {
   const only = option("only")?.split(",");
   const stories = modules.flatMap((m) => m.default).filter((s) => !only || only.some((part) => s.name.includes(part)));
   if (!process.argv.includes("--brief")) return stories;
-  return stories.filter((s) => (option("url") ? s.ends || s.locked : !s.again));
+  return stories.filter((s) => (option("url") ? s.ends || s.locked : !s.again && !s.long));
 }
 
 /** The environment that a story requires and this run lacks, or null. */

@@ -6,8 +6,6 @@ use std::path::Path;
 use std::process::Output;
 use std::time::Duration;
 
-const LIMIT: Duration = Duration::from_secs(90);
-
 fn text(output: &Output) -> String {
     String::from_utf8_lossy(&output.stdout).into_owned() + &String::from_utf8_lossy(&output.stderr)
 }
@@ -15,7 +13,7 @@ fn text(output: &Output) -> String {
 /// A mission whose map has labels.
 fn demo(port: u16, more: &[&str]) -> Process {
     let demo = scenecast_tests::demo(port, 20, more);
-    wait_until("labels on the map", LIMIT, || labels(port).len() > 1);
+    wait_until("labels on the map", || labels(port).len() > 1);
     demo
 }
 
@@ -136,7 +134,7 @@ fn wrong_usage_differs_from_a_surface_without_an_answer() {
 fn a_shell_sets_fence_and_limits_and_holds_and_resumes() {
     let (port, dir) = (free_port(), scratch("ctl-constraints"));
     let _demo = scenecast_tests::demo(port, 8, &["--duration", "3000"]);
-    wait_until("the first status", LIMIT, || state(port).is_some_and(|s| !s["vehicles"][0]["status"].is_null()));
+    wait_until("the first status", || state(port).is_some_and(|s| !s["vehicles"][0]["status"].is_null()));
     let file = |name: &str, text: &str| {
         std::fs::write(dir.join(name), text).unwrap();
         dir.join(name).display().to_string()
@@ -163,9 +161,9 @@ fn a_shell_sets_fence_and_limits_and_holds_and_resumes() {
     assert!(limits.contains("0.0 to 60.0 m") && limits.contains("15 min"), "{limits}");
 
     applied(&["hold"]);
-    wait_until("it holds", LIMIT, || vehicle()["status"]["mode"] == "hold");
+    wait_until("it holds", || vehicle()["status"]["mode"] == "hold");
     applied(&["resume"]);
-    wait_until("it surveys", LIMIT, || vehicle()["status"]["mode"] == "survey");
+    wait_until("it surveys", || vehicle()["status"]["mode"] == "survey");
 
     // A fence that the vehicle refuses, fences that the surface refuses, and files that are not a fence.
     let elsewhere = fence.replace("-80", "300").replace("80", "400");
@@ -192,7 +190,7 @@ fn a_shell_sets_fence_and_limits_and_holds_and_resumes() {
         text(&outside)
     );
     applied(&["abort", "--yes"]);
-    wait_until("it has aborted", LIMIT, || vehicle()["status"]["mode"] != "survey");
+    wait_until("it has aborted", || vehicle()["status"]["mode"] != "survey");
     let orders = ctl(port, &["log", "--kind", "order"]);
     assert!(
         text(&orders).contains("hold (by") && text(&orders).trim().ends_with("abort (by local)"),
@@ -225,7 +223,7 @@ fn other_machines_need_a_token() {
     let with = format!("console.token_file={file}");
     arguments.extend(["--set", &with]);
     let _surface = Process::start(&arguments);
-    wait_until("the form is served", LIMIT, || http(port, "GET", "/login", "", "").is_some_and(|(s, _)| s == 200));
+    wait_until("the form is served", || http(port, "GET", "/login", "", "").is_some_and(|(s, _)| s == 200));
     let status = |path: &str, headers: &str| http(port, "GET", path, headers, "").unwrap().0;
     for path in ["/api/v2/state", "/api/v2/events", "/metrics", "/api/openapi.json", "/js/main.js", "/index.html"] {
         assert_eq!(status(path, ""), 401, "{path}");
@@ -274,7 +272,7 @@ pub(super) fn surface_with_tokens(dir: &Path, principals: &[&str]) -> (Process, 
     let mut arguments = vec!["asv", "--config", config.to_str().unwrap()];
     arguments.extend(sets.iter().flat_map(|s| ["--set", s]));
     let surface = Process::start(&arguments);
-    wait_until("the form is served", LIMIT, || http(port, "GET", "/login", "", "").is_some_and(|(s, _)| s == 200));
+    wait_until("the form is served", || http(port, "GET", "/login", "", "").is_some_and(|(s, _)| s == 200));
     let headers = tokens
         .iter()
         .map(|t| format!("Authorization: Bearer {t}\r\nX-Scenecast: 1\r\nContent-Type: application/json\r\n"));
@@ -336,7 +334,7 @@ fn command_passes_from_one_operator_to_another_in_a_shell() {
         let line = text(&output);
         assert!(output.status.code() == Some(1) && words.iter().all(|w| line.contains(w)), "{name}: {line}");
     };
-    wait_until("the first state", LIMIT, || as_one("anna", &["status"]).status.success());
+    wait_until("the first state", || as_one("anna", &["status"]).status.success());
     assert!(ok("bob", &["command"]).contains("nobody has it"));
     ok("anna", &["budget", "set", "900"]);
     assert!(ok("bob", &["command"]).contains("anna (ctl-"), "the first order took command");
@@ -391,7 +389,7 @@ fn last_seen_reaches_the_surface_and_its_exports_if_requested() {
     assert_eq!(minutes(), None);
     let order = ctl(port, &["budget", "set", "--background", "last_seen", "--wait", "80"]);
     assert_eq!(order.status.code(), Some(0), "{}", text(&order));
-    wait_until("cells that were seen within 2, and within 4 minutes", LIMIT, || {
+    wait_until("cells that were seen within 2, and within 4 minutes", || {
         minutes().is_some_and(|minutes| minutes.contains(&1.0) && minutes.contains(&3.0))
     });
     let (_, map) = http(port, "GET", "/api/v2/vehicles/1/map", "", "").unwrap();
@@ -406,7 +404,7 @@ fn assert_exports_open(name: &str, origin: &[&str]) {
     let (dir, port) = (scratch(name), free_port());
     let _demo = demo(port, &[&["--duration", "90"], origin].concat());
     let mut last = Value::Null;
-    wait_until("the last map", LIMIT, || {
+    wait_until("the last map", || {
         let state = state(port).unwrap_or_default();
         let version = state["vehicles"][0]["map"]["version"].clone();
         std::thread::sleep(Duration::from_secs(1));
@@ -415,7 +413,7 @@ fn assert_exports_open(name: &str, origin: &[&str]) {
     let path = |file: &str| dir.join(file).display().to_string();
     let placement = || state(port).unwrap()["vehicles"][0]["map"]["placement"].clone();
     // A late fix may move the map between two files.
-    wait_until("all files with the map in one place", LIMIT, || {
+    wait_until("all files with the map in one place", || {
         let before = placement();
         let projected: &[&str] = if origin.is_empty() { &[] } else { &["map.utm.tif", "map.wgs84.tif"] };
         for file in ["map.json", "map.png", "map.geojson", "map.ply", "map.csv", "map.tif"].iter().chain(projected) {

@@ -3,10 +3,8 @@
 use scenecast_tests::{Process, free_port, http, run, scratch, wait_until};
 use serde_json::Value;
 use std::path::Path;
-use std::time::Duration;
 
 const ORDER: &str = "Content-Type: application/json\r\nX-Scenecast: 1\r\n";
-const LIMIT: Duration = Duration::from_secs(60);
 
 fn state(port: u16) -> Option<Value> {
     let (status, body) = http(port, "GET", "/api/v2/state", "", "")?;
@@ -49,7 +47,7 @@ fn budget_and_shares_change_from_either_end_under_a_key() {
     assert!(run(&["key", "derive", &key, "--vehicle", "1", "--out", &own]).status.success());
     let (page, _surface, vehicle) = start(&dir, &own, &key, "", "budget_bps = 4000\n");
     let budget = || state(page)?["vehicles"][0]["status"]["budget_bps"].as_u64();
-    wait_until("the vehicle's budget is told", LIMIT, || budget() == Some(4000));
+    wait_until("the vehicle's budget is told", || budget() == Some(4000));
     let order = |map: u32| {
         format!(
             "{{\"budget_bps\": 6000, \"shares\": {{\"directive\": 10, \"status\": 5, \"fix\": 5, \"map\": {map}, \
@@ -59,19 +57,19 @@ fn budget_and_shares_change_from_either_end_under_a_key() {
     let (status, said) = http(page, "POST", "/api/v2/budget", ORDER, &order(60)).unwrap();
     assert_eq!((status, String::from_utf8_lossy(&said).contains("110 percent")), (422, true));
     assert_eq!(http(page, "POST", "/api/v2/budget", ORDER, &order(40)).unwrap().0, 202);
-    wait_until("the surface's word is in force", LIMIT, || budget() == Some(6000));
+    wait_until("the surface's word is in force", || budget() == Some(6000));
     let now = state(page).unwrap();
     assert_eq!((now["link"]["budget_bps"].as_u64(), now["link"]["shares"]["map"].as_u64()), (Some(6000), Some(40)));
     let file = dir.join("auv.toml");
     let text = std::fs::read_to_string(&file).unwrap();
     std::fs::write(&file, text.replace("budget_bps = 4000", "budget_bps = 2000")).unwrap();
     vehicle.hang_up();
-    wait_until("the vehicle's own word is in force", LIMIT, || budget() == Some(2000));
+    wait_until("the vehicle's own word is in force", || budget() == Some(2000));
     std::fs::write(&file, "[link]\nbudget_bps = 1\n").unwrap();
     vehicle.hang_up();
     let heard = || state(page)?["vehicles"][0]["last_received_s"].as_f64();
     let before = heard().unwrap();
-    wait_until("the vehicle goes on with what it had", LIMIT, || heard().is_some_and(|at| at > before + 30.0));
+    wait_until("the vehicle goes on with what it had", || heard().is_some_and(|at| at > before + 30.0));
     assert_eq!(budget(), Some(2000));
     let vehicle = &state(page).unwrap()["vehicles"][0];
     assert_eq!(vehicle["status"]["refused_frames"], 0);
@@ -84,9 +82,7 @@ fn budget_and_shares_change_from_either_end_under_a_key() {
 fn an_end_with_another_key_is_not_heard() {
     let dir = scratch("another-key");
     let (page, _surface, _vehicle) = start(&dir, &key(&dir, "one.key"), &key(&dir, "other.key"), "", "");
-    wait_until("two minutes of the mission pass", LIMIT, || {
-        state(page).is_some_and(|s| s["now_s"].as_f64() > Some(120.0))
-    });
+    wait_until("two minutes of the mission pass", || state(page).is_some_and(|s| s["now_s"].as_f64() > Some(120.0)));
     assert!(state(page).unwrap()["vehicles"][0]["last_received_s"].is_null());
 }
 
@@ -96,8 +92,8 @@ fn another_length_of_frames_is_named_and_the_link_works_all_the_same() {
     let key = key(&dir, "mission.key");
     let (page, _surface, _vehicle) = start(&dir, &key, &key, "frame_bytes = 48\n", "frame_bytes = 512\n");
     let vehicle = || state(page).map(|s| s["vehicles"][0].clone());
-    wait_until("a status", LIMIT, || vehicle().is_some_and(|v| v["status"].is_object()));
-    wait_until("the difference", LIMIT, || {
+    wait_until("a status", || vehicle().is_some_and(|v| v["status"].is_object()));
+    wait_until("the difference", || {
         let said = vehicle().and_then(|v| v["link"]["mismatch"].as_str().map(str::to_owned)).unwrap_or_default();
         said.contains("longer than those of this end (48 bytes)") && said.contains("link.frame_bytes at both ends")
     });

@@ -6,9 +6,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::Mutex;
-use std::time::Duration;
 
-const LIMIT: Duration = Duration::from_secs(120);
 /// One browser at a time where the stories assert limits of time.
 static BROWSER: Mutex<()> = Mutex::new(());
 
@@ -41,7 +39,7 @@ fn every_story_without_mock_passes_against_a_demo() {
     }
     let port = free_port();
     let _demo = Process::start(&["demo", "--port", &port.to_string(), "--speed", "5", "--duration", "100000"]);
-    wait_until("labels on the map", LIMIT, || {
+    wait_until("labels on the map", || {
         state(port).is_some_and(|s| s["vehicles"][0]["labels"].as_array().is_some_and(|l| l.len() > 3))
     });
     assert_stories_pass(&["--url", &format!("http://127.0.0.1:{port}")]);
@@ -66,7 +64,7 @@ fn a_surface_with_a_token_shows_the_login() {
     let mut arguments = vec!["asv", "--config", &config];
     arguments.extend(sets.iter().flat_map(|s| ["--set", s]));
     let _surface = Process::start(&arguments);
-    wait_until("the form is served", LIMIT, || http(port, "GET", "/login", "", "").is_some_and(|(s, _)| s == 200));
+    wait_until("the form is served", || http(port, "GET", "/login", "", "").is_some_and(|(s, _)| s == 200));
     assert_stories_pass(&["--url", &format!("http://127.0.0.1:{port}"), "--token-file", &token]);
 }
 

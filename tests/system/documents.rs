@@ -10,7 +10,6 @@ use serde_json::Value;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
-use std::time::Duration;
 
 /// Longest README and ARCHITECTURE, in lines.
 const MAX_LINES: usize = 150;
@@ -117,9 +116,7 @@ fn commands_of_the_documents_run() {
 fn demo(path: &str) -> (Process, u16) {
     let port = free_port();
     let demo = scenecast_tests::demo(port, 4, &["--duration", "600"]);
-    wait_until(path, Duration::from_secs(300), || {
-        http(port, "GET", path, "", "").is_some_and(|(status, _)| status == 200)
-    });
+    wait_until(path, || http(port, "GET", path, "", "").is_some_and(|(status, _)| status == 200));
     (demo, port)
 }
 

@@ -5,11 +5,9 @@ use serde_json::Value;
 use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Stdio};
-use std::time::Duration;
 
 /// Seconds of the rehearsal a second.
 const TIME_SCALE: &str = "20";
-const MAX_WAIT: Duration = Duration::from_secs(60);
 
 /// A command whose standard error goes to a file.
 struct Logged {
@@ -26,7 +24,7 @@ impl Logged {
 
     /// Interrupts it as a person would; what it had to say.
     fn finish(mut self) -> String {
-        let code = scenecast_tests::end(&mut self.child, "INT", MAX_WAIT);
+        let code = scenecast_tests::end(&mut self.child, "INT");
         assert_eq!(code, Some(0), "{}", self.said());
         self.said()
     }
@@ -40,6 +38,9 @@ impl Drop for Logged {
     fn drop(&mut self) {
         let _ = self.child.kill();
         let _ = self.child.wait();
+        if std::thread::panicking() {
+            eprintln!("{}:\n{}", self.log.display(), self.said());
+        }
     }
 }
 
@@ -57,9 +58,7 @@ fn moor(dir: &Path, modem: &str) -> Logged {
     let (file, links) = (file.display().to_string(), dir.join("modems").display().to_string());
     let arguments = ["modem-sim", "--scenario", &file, "--link-dir", &links, "--time-scale", TIME_SCALE];
     let sea = Logged::start(&arguments.map(str::to_owned), dir.join("modem-sim.log"));
-    wait_until("the modems are there", MAX_WAIT, || {
-        ["ship", "auv"].iter().all(|n| dir.join("modems").join(n).exists())
-    });
+    wait_until("the modems are there", || ["ship", "auv"].iter().all(|n| dir.join("modems").join(n).exists()));
     sea
 }
 
@@ -106,14 +105,14 @@ fn assert_survey_arrives(name: &str, modem: &str, sets: &[&str]) {
     let camera = format!("[camera]\nsource = \"frames:{}\"\n", recording.display());
     let surface = end(&dir, "asv", "ship", &page, sets);
     let vehicle = end(&dir, "auv", "auv", &camera, sets);
-    wait_until("the vehicle is heard", MAX_WAIT, || vehicle_of(port).is_some_and(|v| v["last_received_s"].is_number()));
+    wait_until("the vehicle is heard", || vehicle_of(port).is_some_and(|v| v["last_received_s"].is_number()));
     let order = ("/api/v2/vehicles/1/utility", r#"{"weights": {}, "exploration": 0.5, "curiosity": 0.1}"#);
     let (status, _) =
         http(port, "POST", order.0, "X-Scenecast: 1\r\nContent-Type: application/json\r\n", order.1).unwrap();
     assert_eq!(status, 202);
-    wait_until("the order is known to be applied", MAX_WAIT, || is_applied(port, "utility"));
+    wait_until("the order is known to be applied", || is_applied(port, "utility"));
     let map = dir.join("asv/operator-map-1.png");
-    wait_until("the operator's map equals the one of the rehearsal", MAX_WAIT, || {
+    wait_until("the operator's map equals the one of the rehearsal", || {
         std::fs::read(&map).is_ok_and(|png| png == *expected)
     });
     let said = vehicle.finish();

@@ -121,10 +121,8 @@ fn hosts_at_a_device_and_at_a_tcp_port_hear_each_other() {
     // A reboot closes the TCP connections, and the port is there again.
     asker.write_all(b"ATZ0\n").unwrap();
     let closed = |stream: &mut TcpStream| matches!(stream.read(&mut [0; 64]), Ok(0));
-    wait_until("both clients lose their connection", Duration::from_secs(5), || {
-        closed(&mut asker) && closed(&mut watcher)
-    });
-    wait_until("the modem is back", Duration::from_secs(10), || {
+    wait_until("both clients lose their connection", || closed(&mut asker) && closed(&mut watcher));
+    wait_until("the modem is back", || {
         let mut again = client(&ship[1]);
         again.write_all(b"AT?AL\n").is_ok() && again.read(&mut [0; 8]).is_ok_and(|count| count > 0)
     });
@@ -139,12 +137,12 @@ fn an_unplugged_device_returns_and_links_end_with_the_run() {
     ask(&mut vehicle, "AT?AL\r", "2\r\n");
     let link = emulation.links.join("auv");
     emulation.order("fault auv unplug 20");
-    wait_until("the link is gone", Duration::from_secs(5), || link.symlink_metadata().is_err());
+    wait_until("the link is gone", || link.symlink_metadata().is_err());
     assert!(vehicle.write_all(b"AT?AL\r").and_then(|()| vehicle.read_exact(&mut [0; 3])).is_err());
     assert_eq!(emulation.line()[0], "auv");
     drop(vehicle);
     ask(&mut emulation.open("auv"), "AT?AL\r", "2\r\n");
-    assert_eq!(end(&mut emulation.child, "TERM", Duration::from_secs(10)), Some(0));
+    assert_eq!(end(&mut emulation.child, "TERM"), Some(0));
     assert!(link.symlink_metadata().is_err());
 }
 

@@ -2,7 +2,6 @@
 
 use scenecast_tests::{Process, demo, free_port, http, http_whole, state, wait_until};
 use serde_json::Value;
-use std::time::Duration;
 
 fn slot(state: &Value, name: &str) -> Option<String> {
     let slots = state["vehicles"][0]["directive"]["slots"].as_array()?;
@@ -15,19 +14,16 @@ const ORDER: &str = "Content-Type: application/json\r\nX-Scenecast: 1\r\n";
 fn an_operator_sends_weights_and_receives_an_image() {
     let port = free_port();
     let _demo = demo(port, 20, &["--duration", "600"]);
-    let limit = Duration::from_secs(60);
-    wait_until("labels on the map", limit, || {
+    wait_until("labels on the map", || {
         state(port).is_some_and(|s| s["vehicles"][0]["labels"].as_array().is_some_and(|l| l.len() > 1))
     });
     let label = state(port).unwrap()["vehicles"][0]["labels"][0]["id"].as_u64().unwrap();
     let weights = format!("{{\"weights\": {{\"{label}\": 0.8}}, \"exploration\": 0.2}}");
     assert_eq!(http(port, "POST", "/api/v2/vehicles/1/utility", ORDER, &weights).unwrap().0, 202);
-    wait_until("the weights are applied", limit, || {
-        slot(&state(port).unwrap(), "utility").as_deref() == Some("applied")
-    });
+    wait_until("the weights are applied", || slot(&state(port).unwrap(), "utility").as_deref() == Some("applied"));
     let order = format!("{{\"label\": {label}}}");
     assert_eq!(http(port, "POST", "/api/v2/vehicles/1/exemplars", ORDER, &order).unwrap().0, 202);
-    wait_until("the image has arrived", limit, || {
+    wait_until("the image has arrived", || {
         state(port).unwrap()["vehicles"][0]["labels"][0]["exemplar"]["state"] == "received"
     });
     let (status, webp) = http(port, "GET", &format!("/api/v2/vehicles/1/exemplars/{label}.webp"), "", "").unwrap();
@@ -40,7 +36,7 @@ fn an_operator_sends_weights_and_receives_an_image() {
 fn wrong_orders_and_other_sites_are_refused() {
     let port = free_port();
     let _demo = demo(port, 1, &["--duration", "600"]);
-    wait_until("the page answers", Duration::from_secs(30), || state(port).is_some());
+    wait_until("the page answers", || state(port).is_some());
     let refused = |path: &str, headers: &str, body: &str| http(port, "POST", path, headers, body).unwrap();
     let (status, body) = refused("/api/v2/vehicles/1/utility", ORDER, "{\"weights\": {\"9\": 0.5}}");
     assert_eq!(status, 422);
@@ -57,9 +53,7 @@ fn wrong_orders_and_other_sites_are_refused() {
 fn a_map_is_read_by_region_and_by_changed_tiles() {
     let port = free_port();
     let _demo = demo(port, 20, &["--duration", "600"]);
-    wait_until("a map", Duration::from_secs(60), || {
-        state(port).is_some_and(|s| s["vehicles"][0]["map"]["explored_cells"].as_u64() > Some(0))
-    });
+    wait_until("a map", || state(port).is_some_and(|s| s["vehicles"][0]["map"]["explored_cells"].as_u64() > Some(0)));
     let get = |path: &str| http(port, "GET", &format!("/api/v2/vehicles/1/{path}"), "", "").unwrap();
     let region = "map?x0=-2&y0=-3&width=4&height=5";
     let (status, body) = get(region);
@@ -88,7 +82,7 @@ fn a_map_is_read_by_region_and_by_changed_tiles() {
 fn the_page_is_small_and_cached() {
     let port = free_port();
     let _demo = demo(port, 20, &["--duration", "600"]);
-    wait_until("the page answers", Duration::from_secs(60), || state(port).is_some());
+    wait_until("the page answers", || state(port).is_some());
     let (_, index) = http(port, "GET", "/", "", "").unwrap();
     let index = String::from_utf8(index).unwrap();
     let files =
@@ -112,12 +106,12 @@ fn the_page_is_small_and_cached() {
 fn a_demo_too_fast_for_the_machine_still_answers() {
     let port = free_port();
     let mut demo = Process::start(&["demo", "--port", &port.to_string(), "--speed", "1000", "--duration", "1000000"]);
-    wait_until("labels on the map", Duration::from_secs(60), || {
+    wait_until("labels on the map", || {
         state(port).is_some_and(|s| s["vehicles"][0]["labels"].as_array().is_some_and(|l| l.len() > 1))
     });
     for exploration in [0.1, 0.2, 0.3] {
         let weights = format!("{{\"weights\": {{}}, \"exploration\": {exploration}}}");
         assert_eq!(http(port, "POST", "/api/v2/vehicles/1/utility", ORDER, &weights).expect("an answer").0, 202);
     }
-    assert_eq!(demo.interrupt(Duration::from_secs(10)), Some(0));
+    assert_eq!(demo.interrupt(), Some(0));
 }

@@ -5,9 +5,6 @@ use scenecast_tests::{Process, assert_refused, free_port, http, scratch, wait_un
 use serde_json::Value;
 use std::io::{Read, Write};
 use std::net::{TcpListener, TcpStream};
-use std::time::Duration;
-
-const LIMIT: Duration = Duration::from_secs(60);
 
 /// A surface with a GPS at `gps`, its page, and what the page says of the position.
 fn surface(name: &str, gps: &str) -> (Process, impl Fn() -> Value + use<>) {
@@ -60,16 +57,16 @@ fn gpsd_is_reconnected_and_old_positions_are_not_good() {
         second += 1;
         let _ = stream.write_all(report(second % 60).as_bytes());
     };
-    wait_until("a good position", LIMIT, || {
+    wait_until("a good position", || {
         feed(&mut stream);
         state()["position"]["is_valid"] == true
     });
     let now = state();
     assert!((now["mission"]["origin"]["lat_deg"].as_f64().unwrap() - 29.5).abs() < 1e-9, "{now}");
     drop(stream);
-    wait_until("the position is old", LIMIT, || state()["position"]["is_valid"] == false);
+    wait_until("the position is old", || state()["position"]["is_valid"] == false);
     let mut again = watched(&listener);
-    wait_until("it is good again", LIMIT, || {
+    wait_until("it is good again", || {
         feed(&mut again);
         state()["position"]["is_valid"] == true
     });
@@ -87,7 +84,7 @@ fn nonsense_of_a_receiver_is_counted() {
     stream.write_all(nmea::line("GPGGA,120000.00,nan,N,inf,E,1,09,1.0,0.0,M,0.0,M,,").as_bytes()).unwrap();
     stream.write_all(nmea::line("GPGGA,120000.00,,,,,0,00,99.9,,,,,,").as_bytes()).unwrap();
     stream.write_all(good.as_bytes()).unwrap();
-    wait_until("a good position after the nonsense", LIMIT, || state()["position"]["is_valid"] == true);
+    wait_until("a good position after the nonsense", || state()["position"]["is_valid"] == true);
     let refused = state()["position"]["rejected"].clone();
     let expected = serde_json::json!({ "checksum": 1, "too_long": 1, "malformed": 2, "no_position": 1 });
     assert_eq!(refused, expected);

@@ -8,8 +8,6 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::{Duration, Instant};
 
-const LIMIT: Duration = Duration::from_secs(60);
-
 struct Pair {
     dir: PathBuf,
     console: u16,
@@ -130,7 +128,7 @@ fn a_killed_surface_shows_the_same_page_again() {
     let pair = pair("same-page");
     let mut surface = pair.surface();
     let mut vehicle = pair.vehicle();
-    wait_until("a map", LIMIT, || pair.auv()["map"]["explored_cells"].as_u64() > Some(20));
+    wait_until("a map", || pair.auv()["map"]["explored_cells"].as_u64() > Some(20));
     let label = pair.auv()["labels"][0]["id"].as_u64().unwrap();
     pair.post("vehicles/1/fence", r#"{"fence": [[-500,-500],[500,-500],[500,500],[-500,500]]}"#);
     pair.post("vehicles/1/limits", r#"{"silence_s": 900, "on_silence": "hold"}"#);
@@ -142,7 +140,7 @@ fn a_killed_surface_shows_the_same_page_again() {
     }
     pair.post("vehicles/1/markers/remove", r#"{"number": 2}"#);
     let is_applied = |vehicle: &Value| !vehicle["fence_in_force"].is_null() && !vehicle["limits_in_force"].is_null();
-    wait_until("the orders are applied", LIMIT, || is_applied(&pair.auv()));
+    wait_until("the orders are applied", || is_applied(&pair.auv()));
     vehicle.kill();
     // A terminal that closes ends no surface.
     surface.hang_up();
@@ -155,7 +153,7 @@ fn a_killed_surface_shows_the_same_page_again() {
     surface.kill();
     let began = Instant::now();
     let _surface = pair.surface();
-    wait_until("the page is back", LIMIT, || pair.state().is_some());
+    wait_until("the page is back", || pair.state().is_some());
     let back = began.elapsed();
     assert!(!is_full() || back < Duration::from_secs(2), "{back:?}");
     let after = pair.state().unwrap();
@@ -184,11 +182,11 @@ fn a_killed_surface_shows_the_same_page_again() {
     let _vehicle = pair.vehicle();
     let version = |state: &Value| utility(&state["vehicles"][0]).unwrap()["version"].clone();
     assert_eq!(version(&after), version(&before));
-    wait_until("the order is decided", LIMIT, || {
+    wait_until("the order is decided", || {
         let order = utility(&pair.auv()).unwrap();
         (order["state"] == "applied" || order["state"] == "refused") && order["version"] == version(&before)
     });
-    wait_until("the current map is in view", LIMIT * 2, || pair.auv()["map"]["earlier"].is_null());
+    wait_until("the current map is in view", || pair.auv()["map"]["earlier"].is_null());
     let (_, list) = http(pair.console, "GET", "/api/v2/archive", "", "").unwrap();
     let list: Value = serde_json::from_slice(&list).unwrap();
     let name = list["maps"][0]["name"].as_str().expect("the map before the restart is archived").to_owned();
@@ -212,20 +210,20 @@ fn a_removed_folder_stops_no_surface() {
     let pair = pair("removed-folder");
     let mut surface = pair.surface();
     let _vehicle = pair.vehicle();
-    wait_until("a map", LIMIT, || pair.auv()["map"]["explored_cells"].as_u64() > Some(20));
+    wait_until("a map", || pair.auv()["map"]["explored_cells"].as_u64() > Some(20));
     let folder = pair.dir.join("asv");
     // The surface writes meanwhile, and makes the folder again.
-    wait_until("a file is in the way of the folder", LIMIT, || {
+    wait_until("a file is in the way of the folder", || {
         let _ = std::fs::remove_dir_all(&folder);
         std::fs::write(&folder, "in the way of the folder").is_ok()
     });
     let storage = || pair.state().map_or(Value::Null, |state| state["storage"].clone());
-    wait_until("the page reports the disk", LIMIT, || !storage()["failing"].is_null());
+    wait_until("the page reports the disk", || !storage()["failing"].is_null());
     assert!(storage()["write_errors"].as_u64() > Some(0));
     pair.post("vehicles/1/notes", r#"{"text": "written in memory"}"#);
     std::fs::remove_file(folder).unwrap();
-    wait_until("the files are written again", LIMIT, || storage()["failing"].is_null());
+    wait_until("the files are written again", || storage()["failing"].is_null());
     surface.kill();
     let _surface = pair.surface();
-    wait_until("the note survives", LIMIT, || pair.auv()["notes"][0]["text"] == "written in memory");
+    wait_until("the note survives", || pair.auv()["notes"][0]["text"] == "written in memory");
 }

@@ -10,7 +10,7 @@ use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::sync::OnceLock;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 /// The peer of Fast DDS, compiled; without its library the test is skipped, which CI takes for a failure.
 fn fast_dds() -> Option<String> {
@@ -140,7 +140,7 @@ fn late_subscribers_have_both_maps() {
     let (Some(cyclone), Some(fast)) = (Speaker::cyclone(), Speaker::fast_dds()) else { return };
     let (dir, page, domain) = (scratch("ros2-map"), free_port(), dds_domain());
     let _ends = ends(&dir, page, domain);
-    wait_until("the survey ends", Duration::from_secs(120), || {
+    wait_until("the survey ends", || {
         let found = state(page);
         let mode = found.as_ref().map(|state| &state["vehicles"][0]["status"]["mode"]);
         mode.is_some_and(|mode| mode == "done" || mode == "hold") && explored(page) > 100
@@ -196,7 +196,7 @@ fn every_topic_of_the_surface_reaches_cyclone() {
 
 /// Bytes that a surface has received of its vehicle, once the survey is over and everything is acknowledged.
 fn bytes_of_the_survey(page: u16) -> u64 {
-    wait_until("everything is received", Duration::from_secs(120), || {
+    wait_until("everything is received", || {
         let found = state(page).map(|state| state["vehicles"][0].clone()).unwrap_or_default();
         let is_over = found["status"]["mode"] == "done" || found["status"]["mode"] == "hold";
         is_over && found["link"]["backlog"]["bits"] == 0 && explored(page) > 100
@@ -230,7 +230,7 @@ fn an_order_of_cyclone_passes_the_surfaces_checks() {
     let Some(cyclone) = Speaker::cyclone() else { return };
     let (dir, page, domain) = (scratch("ros2-orders"), free_port(), dds_domain());
     let _ends = ends(&dir, page, domain);
-    wait_until("the vehicle is met", Duration::from_secs(60), || explored(page) > 0);
+    wait_until("the vehicle is met", || explored(page) > 0);
     let domain = domain.to_string();
     let hold = |arguments: &[&str]| {
         let event = peer(&cyclone, &[&["hold", &domain, "/scenecast/auv_1", "30"], arguments].concat());
@@ -239,7 +239,7 @@ fn an_order_of_cyclone_passes_the_surfaces_checks() {
     };
     let (level, text) = hold(&["true"]);
     assert!(level == 20 && text.starts_with("hold of ros: accepted as hold"), "{text}");
-    wait_until("the vehicle applies it", Duration::from_secs(60), || {
+    wait_until("the vehicle applies it", || {
         let slots = state(page).map(|state| state["vehicles"][0]["directive"]["slots"].clone());
         let slots = slots.as_ref().and_then(Value::as_array).cloned().unwrap_or_default();
         slots.iter().any(|slot| slot["slot"] == "constraints" && slot["state"] == "applied")
@@ -277,7 +277,7 @@ fn assert_images_arrive(speaker: &Speaker, domain: u8) {
     let arguments = ["camera", &domain.to_string(), "/camera/image_raw", &published.to_string(), hertz, "1360", "1024"];
     let mut camera = start(speaker, &arguments);
     let row: Vec<u8> = (0..1360 * 3).map(|i: u32| (i % 251) as u8).collect();
-    let limit = Instant::now() + Duration::from_secs(40 + count);
+    let limit = Instant::now() + scenecast_tests::GIVEN_UP;
     let (mut taken, mut last) = (0, 0);
     assert!(images.wait(limit.saturating_duration_since(Instant::now())), "no image");
     assert!(node.peers().publishers.contains(&("/odometry".to_owned(), "nav_msgs/msg/Odometry".to_owned())));

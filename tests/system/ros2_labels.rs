@@ -4,7 +4,6 @@ use scenecast_tests::{Process, dds_domain, free_port, http, python, scratch, wai
 use serde_json::Value;
 use std::path::Path;
 use std::process::Command;
-use std::time::Duration;
 
 /// A surface with its page, and a vehicle with these settings.
 struct Ends {
@@ -99,7 +98,7 @@ fn grids_and_layers_of_cyclone_dds_reach_the_operator() {
     let all = (0..30).flat_map(|y| (0..40).map(move |x| (x, y)));
     let mut wanted: Vec<(i32, i32, u8)> = all.filter_map(|(x, y)| Some((x, y, expected(x, y)?))).collect();
     wanted.sort_unstable();
-    wait_until("the operator has the grid and the layer", Duration::from_secs(60), || {
+    wait_until("the operator has the grid and the layer", || {
         let cells = ends.cells("elevation");
         let place = |metres: f64, corner: f64| ((metres - corner) / 0.5).floor() as i32;
         let mut found: Vec<_> = cells.iter().map(|c| (place(c.0, -2.0), place(c.1, 4.0), c.2)).collect();
@@ -128,7 +127,7 @@ fn a_segmented_image_of_ros_is_mapped_where_it_was_taken() {
     );
     let taken = publish(&python, &["images", &domain.to_string()]);
     let east_m = taken["east_m"].as_f64().unwrap();
-    wait_until("the operator has the image", Duration::from_secs(60), || ends.cells("none").len() >= 16);
+    wait_until("the operator has the image", || ends.cells("none").len() >= 16);
     let cells = ends.cells("none");
     let (x_m, y_m) = cells.iter().fold((0.0, 0.0), |(x_m, y_m), cell| (x_m + cell.0, y_m + cell.1));
     let (x_m, y_m) = (x_m / cells.len() as f64, y_m / cells.len() as f64);

@@ -8,6 +8,7 @@ const median = (values) => values.toSorted((a, b) => a - b)[Math.floor(values.le
 export default [
   {
     name: "the page is usable within a second and under 400 kB",
+    long: true,
     bare: true,
     async run(s) {
       const cdp = await s.devtools();
@@ -35,6 +36,7 @@ export default [
   },
   {
     name: "a map of more than 512 by 512 cells pans smoothly",
+    long: true,
     scenario: "big",
     async run(s) {
       const before = await s.cpuMs();
@@ -54,6 +56,7 @@ export default [
   },
   {
     name: "an update of a map of more than 100 000 cells is fetched and painted within 200 ms",
+    long: true,
     scenario: "big",
     async run(s) {
       assert.ok((await s.vehicle()).map.explored_cells > 100000);
@@ -90,6 +93,7 @@ export default [
   },
   {
     name: "a session of hours and thousands of events neither leaks nor slows",
+    long: true,
     scenario: "rich",
     async run(s) {
       const cdp = await s.devtools();

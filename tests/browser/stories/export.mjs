@@ -24,6 +24,7 @@ export default [
   },
   {
     name: "a wide map is offered in formats that can hold it",
+    long: true,
     scenario: "wide",
     async run(s) {
       await s.button("Export").click();

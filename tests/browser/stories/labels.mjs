@@ -38,6 +38,7 @@ async function firstImage(s) {
 export default [
   {
     name: "the first mission follows the state, and stays closed once it is closed",
+    long: true,
     scenario: "rich",
     async run(s) {
       const card = ".first-mission summary";
@@ -59,6 +60,7 @@ export default [
   },
   {
     name: "the first mission names the label without an image, and another label can be requested",
+    long: true,
     scenario: "rich",
     async run(s) {
       const picture = ".first-mission li:has(b:text-is('Picture'))";
@@ -202,6 +204,7 @@ export default [
   },
   {
     name: "a row keeps its height while its image is requested and received",
+    long: true,
     scenario: "rich",
     async run(s) {
       const row = s.page.locator(".label", { hasText: "Label 3" });
@@ -226,6 +229,7 @@ export default [
   },
   {
     name: "larger and further images arrive, and a request is cancelled",
+    long: true,
     // In a rehearsal the vehicle may have no second image of the label.
     scenario: "rich",
     async run(s) {
@@ -357,6 +361,7 @@ export default [
   },
   {
     name: "the end of the survey is chosen and set without another choice of the planner",
+    long: true,
     ends: true,
     async run(s) {
       await s.page.selectOption("#at-end", "hold");

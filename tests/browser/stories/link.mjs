@@ -62,6 +62,7 @@ export default [
   },
   {
     name: "a dragged share is sent on release, and the sum stays within 100",
+    long: true,
     async run(s) {
       const { link: { shares } } = await s.get("/state");
       const handle = s.page.locator(".handle[title$='exemplar']");
@@ -127,6 +128,7 @@ export default [
   },
   {
     name: "refused shares return to those in force, with the reason",
+    long: true,
     scenario: "rich",
     async run(s) {
       await s.page.route("**/budget", (route) => route.fulfill({ status: 422, contentType: "application/json", body: '{"error":"shares add up to 130 percent: allowed is 100 or less"}' }));
@@ -139,6 +141,7 @@ export default [
   },
   {
     name: "a budget changed by another console is shown as such",
+    long: true,
     scenario: "rich",
     async run(s) {
       await s.page.getByRole("slider", { name: "Minimum share of fix, percent" }).fill("2");

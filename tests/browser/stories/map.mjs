@@ -173,6 +173,7 @@ export default [
   },
   {
     name: "the planned path follows the plan and disappears with a hold",
+    long: true,
     scenario: "rich",
     async run(s) {
       await s.button("Fit").click();
@@ -284,6 +285,7 @@ export default [
   },
   {
     name: "every layer of the server is painted on a scale in its unit",
+    long: true,
     scenario: "start",
     async run(s) {
       await s.steer({ layers: true, advance: 30 });
@@ -310,6 +312,7 @@ export default [
   },
   {
     name: "curiosity has its own colours, and ages when the vehicle is silent",
+    long: true,
     scenario: "start",
     async run(s) {
       const names = () => s.page.locator("#layer option").allInnerTexts();
@@ -405,6 +408,7 @@ export default [
   },
   {
     name: "grid and rings are remembered",
+    long: true,
     async run(s) {
       const rings = () => s.button("Rings").getAttribute("aria-pressed");
       assert.equal(await rings(), "false");

@@ -36,6 +36,7 @@ export default [
   },
   {
     name: "a cleared field means the default, an empty one unchanged",
+    long: true,
     scenario: "rich",
     async run(s) {
       await open(s);
@@ -54,6 +55,7 @@ export default [
   },
   {
     name: "registration is switched off and returns to the vehicle's default",
+    long: true,
     async run(s) {
       await open(s);
       for (const choice of ["off", ""]) {
@@ -66,6 +68,7 @@ export default [
   },
   {
     name: "fit to budget fills the fields, names the trade-off, and sends no order",
+    long: true,
     scenario: "rich",
     async run(s) {
       await open(s);

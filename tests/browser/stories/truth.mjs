@@ -79,6 +79,7 @@ export default [
   },
   {
     name: "the pause between attempts grows, and the operator can try at once",
+    long: true,
     scenario: "rich",
     stopped: true,
     async run(s) {

@@ -16,6 +16,7 @@ const countTones = (s) =>
 export default [
   {
     name: "a new alarm sounds once where the operator has switched the sound on",
+    long: true,
     scenario: "rich",
     async run(s) {
       await countTones(s);
@@ -115,6 +116,7 @@ export default [
   },
   {
     name: "a late joiner sees the orders of others",
+    long: true,
     scenario: "rich",
     async run(s) {
       await s.post("/vehicles/1/utility", { weights: { 1: 0.5 }, exploration: 0.2 });

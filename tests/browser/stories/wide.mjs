@@ -43,6 +43,7 @@ async function update(s) {
 export default [
   {
     name: "a million cells in 20 km load in under 3 MB",
+    long: true,
     scenario: "wide",
     async run(s) {
       const seen = await network(s);
@@ -64,6 +65,7 @@ export default [
   },
   {
     name: "an update of a wide map brings only its own tiles",
+    long: true,
     scenario: "wide",
     async run(s) {
       const seen = await network(s);
