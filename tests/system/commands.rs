@@ -75,7 +75,7 @@ fn the_same_arguments_give_the_same_report() {
         let output = run(&[
             "sim",
             "--duration",
-            "40",
+            "15",
             "--seed",
             "5",
             "--set",
@@ -241,7 +241,7 @@ fn tuning_goes_on_where_it_was_and_gives_a_configuration() {
         "--scenario",
         best.to_str().unwrap(),
         "--duration",
-        "20",
+        "5",
         "--out",
         dir.join("s").to_str().unwrap(),
     ]);
@@ -321,7 +321,7 @@ fn every_command_has_a_manual_page() {
 fn progress_comes_as_lines_of_json_with_a_growing_share() {
     let dir = scratch("progress");
     let out = dir.join("out");
-    let settings = ["--duration", "120", "--set", "world.kind=patches", "--progress", "json"];
+    let settings = ["--duration", "40", "--set", "world.kind=patches", "--progress", "json"];
     let output = run(&[&["sim", "--out", out.to_str().unwrap()], &settings[..]].concat());
     let text = String::from_utf8_lossy(&output.stderr).into_owned();
     assert!(output.status.success(), "{text}");
