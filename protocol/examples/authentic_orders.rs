@@ -17,7 +17,6 @@ use scenecast_protocol::schedule::Shares;
 use scenecast_protocol::seal::{HeldKey, MissionKey};
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::{Address, CellEdge, MissionId, VehicleStatus};
-use std::sync::Arc;
 use std::time::Duration;
 
 const MODEM: ModemProfile = ModemProfile {
@@ -31,9 +30,9 @@ const MODEM: ModemProfile = ModemProfile {
 /// `tests/protocol/examples.rs` runs it too.
 pub fn main() {
     // At sea the key comes from `scenecast key new`, and both ends read it from a file.
-    let key = Arc::new(HeldKey::Mission(MissionKey::from_bytes(*b"sixteen secret b")));
+    let key = HeldKey::Mission(MissionKey::from_bytes(*b"sixteen secret b"));
     println!("fingerprint of the key: {:08x}\n", key.fingerprint());
-    let mut sea = Sea::new(Some(Authenticity { key, all: true, encrypt: true }));
+    let mut sea = Sea::new(Some(Authenticity::new(key, true, true)));
     let vehicle = sea.address;
 
     sea.issue(Slot::Constraints(Constraints { hold: true, abort: false }));

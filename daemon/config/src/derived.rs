@@ -5,6 +5,7 @@ use scenecast_core::UserError;
 use scenecast_core::tuning_table::TuningTable;
 use scenecast_protocol::link::Authenticity;
 use scenecast_protocol::mac::{Access, ModemProfile};
+use scenecast_protocol::seal::KeyFile;
 use scenecast_protocol::wire::Address;
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -56,7 +57,9 @@ pub fn cell_m(config: &Config) -> f64 {
 /// The file cannot be read, or has the key of another end.
 pub fn authenticity(config: &Config, end: Address) -> Result<Option<Authenticity>, UserError> {
     let (all, encrypt) = (config.link.authenticate == Authenticate::All, config.link.encrypt);
-    Ok(load_key(config, end)?.map(|key| Authenticity { key: Arc::new(key), all, encrypt }))
+    let held = load_key(config, end)?;
+    Ok(held
+        .map(|KeyFile { key, next }| Authenticity { next: next.map(Arc::new), ..Authenticity::new(key, all, encrypt) }))
 }
 
 /// The vehicles that the surface works with from the start, by address and name.

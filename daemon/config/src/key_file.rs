@@ -2,7 +2,7 @@
 
 use super::Config;
 use scenecast_core::UserError;
-use scenecast_protocol::seal::HeldKey;
+use scenecast_protocol::seal::{HeldKey, KeyFile};
 use scenecast_protocol::wire::Address;
 use std::fs::File;
 use std::io::Read;
@@ -19,13 +19,13 @@ const MAX_BYTES: u64 = 64 * 1024;
 /// # Errors
 ///
 /// The file cannot be read, or has the keys of a vehicle other than this end.
-pub fn load_key(config: &Config, end: Address) -> Result<Option<HeldKey>, UserError> {
+pub fn load_key(config: &Config, end: Address) -> Result<Option<KeyFile>, UserError> {
     let Some(path) = &config.link.key_file else { return Ok(None) };
     let (key, warning) = read_key(path)?;
     if let Some(warning) = warning {
         tracing::warn!("{warning}");
     }
-    if let HeldKey::Vehicle(key) = &key
+    if let HeldKey::Vehicle(key) = &key.key
         && key.address != end.number()
     {
         let (of, mission) = (key.address, key.mission);
@@ -43,15 +43,15 @@ pub fn load_key(config: &Config, end: Address) -> Result<Option<HeldKey>, UserEr
     Ok(Some(key))
 }
 
-/// The key in a file, and a warning if other users of this machine may read it.
-pub fn read_key(path: &Path) -> Result<(HeldKey, Option<String>), UserError> {
+/// The keys in a file, and a warning if other users of this machine may read it.
+pub fn read_key(path: &Path) -> Result<(KeyFile, Option<String>), UserError> {
     let problem = |e: std::io::Error| UserError::file(path, format!("{e}; scenecast key new writes a key file"));
     let file = File::open(path).map_err(problem)?;
     let warning = others_may_read(&file)
         .then(|| format!("{}: other users may read this key; chmod 600 FILE prevents that", path.display()));
     let mut text = Zeroizing::new(String::with_capacity(1024));
     file.take(MAX_BYTES).read_to_string(&mut text).map_err(problem)?;
-    let key = HeldKey::parse(&text).map_err(|e| UserError::file(path, e))?;
+    let key = KeyFile::parse(&text).map_err(|e| UserError::file(path, e))?;
     Ok((key, warning))
 }
 
@@ -90,7 +90,7 @@ mod tests {
         let (path, config) = file_of("good", &format!("# reef\n{}", *key.to_text()));
         let read = load_key(&config, Address::SURFACE).unwrap().unwrap();
         std::fs::remove_file(path).unwrap();
-        assert_eq!(read.fingerprint(), key.fingerprint());
+        assert_eq!(read.key.fingerprint(), key.fingerprint());
     }
 
     #[test]
@@ -100,7 +100,7 @@ mod tests {
         let load = |number| load_key(&config, Address::vehicle(number).unwrap_or(Address::SURFACE));
         let [own, other, surface] = [2, 3, 0].map(load);
         std::fs::remove_file(path).unwrap();
-        assert_eq!(own.unwrap().unwrap().fingerprint(), MissionKey::from_bytes([3; 16]).fingerprint());
+        assert_eq!(own.unwrap().unwrap().key.fingerprint(), MissionKey::from_bytes([3; 16]).fingerprint());
         assert!(other.unwrap_err().to_string().contains("vehicle 2, and this is vehicle 3"));
         assert!(surface.unwrap_err().to_string().contains("needs the mission key"));
     }

@@ -250,14 +250,9 @@ mod tests {
     use scenecast_protocol::seal::{HeldKey, MissionKey};
     use scenecast_surface::Surface;
     use scenecast_vehicle::{Durable, Vehicle};
-    use std::sync::Arc;
 
     fn key() -> Option<Authenticity> {
-        Some(Authenticity {
-            key: Arc::new(HeldKey::Mission(MissionKey::from_bytes([7; 16]))),
-            all: true,
-            encrypt: false,
-        })
+        Some(Authenticity::new(HeldKey::Mission(MissionKey::from_bytes([7; 16])), true, false))
     }
 
     fn surface(authenticity: Option<Authenticity>, seed: u64) -> LinkHost<Surface> {

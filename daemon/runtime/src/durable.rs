@@ -180,6 +180,7 @@ mod tests {
     use scenecast_protocol::coordinates::DecimetrePoint;
     use scenecast_protocol::directive::{Polygon, Series};
     use scenecast_protocol::link::{SeriesRecord, SlotInboxState};
+    use scenecast_vehicle::KeptKeys;
 
     const NAMES: [&str; 2] = [JOURNAL.journal, JOURNAL.copy];
 
@@ -253,6 +254,7 @@ mod tests {
             lost: LostOrders::Of(Series::from_random(300)),
             destination: Some((-3, 100)),
             areas: vec![0],
+            keys: KeptKeys::default(),
         };
         let golden = [
             &[2, 5, 0, 1, 172, 2, 0, 0, 0, 1, 1, 0, 0, 0, 1, 2][..],
@@ -263,6 +265,7 @@ mod tests {
             &[1, 3, 50, 255, 1, 2, 253, 12, 1, 0, 1, 244, 3, 1, 10, 5, 5, 50, 20, 1, 128, 100],
             &[2, 0x40, 0, 2, 0, 4, 130, 1, 2, 2, 1, 0, 0, 2, 172, 2],
             &[1, 5, 200, 1, 1, 0],
+            &[0, 0, 0],
         ];
         assert_eq!(postcard::to_allocvec(&durable).unwrap(), golden.concat());
         assert_eq!(decode(&golden.concat()), Some(durable));

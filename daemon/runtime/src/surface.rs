@@ -317,6 +317,9 @@ impl SurfaceShell {
             SurfaceOutput::Mismatch(vehicle, mismatch) => {
                 tracing::warn!("the settings of vehicle {} do not fit: {mismatch}", vehicle.number());
             }
+            SurfaceOutput::KeyChanged(vehicle) => {
+                tracing::info!("vehicle {} uses the next key of link.key_file", vehicle.number());
+            }
             SurfaceOutput::CommandChanged(change) => log_command(&change),
             SurfaceOutput::RunEnded(_) | SurfaceOutput::SlotDecided(..) | SurfaceOutput::Changed(_) => {}
         }

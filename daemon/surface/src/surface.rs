@@ -30,6 +30,8 @@ pub enum SurfaceOutput {
     SlotDecided(Address, SlotId),
     /// The copy of a vehicle's last run is kept apart ([`PeerView::ended_run`]), because a new run begins.
     RunEnded(Address),
+    /// A vehicle uses the next key from now on.
+    KeyChanged(Address),
     /// A setting of a vehicle does not fit.
     Mismatch(Address, Mismatch),
     /// Command was requested, handed over, taken or released.
@@ -309,6 +311,10 @@ impl Surface {
                     let _ = self.restore_lost(vehicle, now);
                 }
                 Some(SurfaceOutput::Changed(vehicle))
+            }
+            SurfaceEvent::KeyChanged(vehicle) => {
+                self.log_fact(vehicle, LogKind::Contact, "the vehicle uses the next key from now on", now);
+                Some(SurfaceOutput::KeyChanged(vehicle))
             }
             SurfaceEvent::RunEnded(vehicle) => Some(SurfaceOutput::RunEnded(vehicle)),
             SurfaceEvent::Mismatch(vehicle, mismatch) => Some(SurfaceOutput::Mismatch(vehicle, mismatch)),

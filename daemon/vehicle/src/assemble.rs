@@ -18,10 +18,11 @@ pub fn assemble(
     authenticity: Option<Authenticity>,
     modem: ModemProfile,
     area: Area,
-    durable: Durable,
+    mut durable: Durable,
     seed: u64,
     now: Instant,
 ) -> Result<Vehicle, UserError> {
+    let authenticity = authenticity.map(|of_file| durable.keys.begin(of_file));
     let mut link = link_config(config, authenticity, modem)?;
     link.budget_bps = durable.budget_bps.unwrap_or(link.budget_bps);
     link.shares = durable.shares.map_or(link.shares, Shares);

@@ -32,4 +32,4 @@ pub use navigator::{FixVerdict, LastPlace, Navigator};
 pub use producer::MapProducer;
 pub use registration::{FoundFrame, RegisteredFrame};
 pub use steering::{Course, Footprint, Steering};
-pub use vehicle::{AppliedSlot, Durable, LostOrders, MapSelection, Vehicle, VehicleDisk, VehicleOutput};
+pub use vehicle::{AppliedSlot, Durable, KeptKeys, LostOrders, MapSelection, Vehicle, VehicleDisk, VehicleOutput};

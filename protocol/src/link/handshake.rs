@@ -2,8 +2,8 @@
 //! a numbered frame proves it.
 
 use super::FrameNumber;
-use super::run::{EndedPeer, Identities, Identity, LinkRun};
-use crate::seal::{Direction, SessionKey};
+use super::run::{EndedPeer, Identities, Identity, LinkRun, RunKey};
+use crate::seal::Direction;
 use crate::wire::{Envelope, Frame, Introduction, MissionId};
 use std::collections::VecDeque;
 
@@ -157,7 +157,7 @@ impl<T> Handshake<T> {
         peer: Identity,
         introduction: Option<Introduction>,
         accepts_ended: bool,
-        key: impl Fn(Identity, Identity) -> Option<SessionKey>,
+        key: impl Fn(Identity, Identity) -> RunKey,
     ) -> HandshakeOutcome {
         let is_doubtful = |r: &LinkRun<T>| r.flight.horizon() == 0 && r.flight.next_number() > Self::DOUBTFUL;
         if self.run.as_ref().is_some_and(|r| r.peer == peer && !is_doubtful(r)) && !self.leaving {
@@ -214,7 +214,7 @@ impl<T> Handshake<T> {
         &mut self,
         peer: Identity,
         introduction: Introduction,
-        key: impl Fn(Identity, Identity) -> Option<SessionKey>,
+        key: impl Fn(Identity, Identity) -> RunKey,
     ) -> HandshakeOutcome {
         if self.run.as_ref().is_some_and(|r| r.peer == peer) {
             return HandshakeOutcome::Known;
@@ -241,7 +241,7 @@ impl<T> Handshake<T> {
     }
 
     /// At the vehicle: begins a new run toward the surface's current one.
-    pub(super) fn renew_vehicle(&mut self, key: impl Fn(Identity, Identity) -> Option<SessionKey>) {
+    pub(super) fn renew_vehicle(&mut self, key: impl Fn(Identity, Identity) -> RunKey) {
         let Some((peer, introduction)) = self.run.as_ref().map(|r| (r.peer, r.introduction)) else { return };
         let own = self.identities.draw();
         self.offered = vec![LinkRun::new(own, peer, introduction, key(own, peer))];

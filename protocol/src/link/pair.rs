@@ -1,15 +1,16 @@
 //! The state of one end toward one peer.
 
 mod receive;
+mod rotation;
 
 pub use receive::Inbound;
 
 use super::handshake::{FramePurpose, Handshake};
 use super::mismatch::{Mismatch, MismatchReport};
-use super::run::{Authenticity, Identities, Identity, LinkAuthenticity};
+use super::run::{Authenticity, Generation, Identities, Identity, LinkAuthenticity, RunKey};
 use super::{FrameNumber, LinkStats, LinkWindow};
 use crate::directive::Series;
-use crate::seal::{Direction, SessionKey, TAG_BYTES};
+use crate::seal::{Direction, KeyOffer, TAG_BYTES};
 use crate::wire::{
     Address, ChunkKind, FrameBuilder, FrameKind, Header, Introduction, MissionId, Seal, Stamp, UtcHours,
     room_for_payload,
@@ -45,8 +46,18 @@ pub struct LinkPair<T> {
     ended_hellos: u32,
     /// At the vehicle: how long the surface that holds it was silent; `None` if it was never heard.
     silence: Option<Duration>,
-    /// At the vehicle: the run of a surface that the next hello refuses.
-    refused: Option<Identity>,
+    /// At the vehicle: the run of a surface that the next hello refuses, and the generation of the key by which it called.
+    refused: Option<(Identity, Generation)>,
+    /// At the surface: the generation of the key of the next hello.
+    speaks: Generation,
+    /// At the surface: the generation of the key of the last hello of the vehicle.
+    answered_by: Option<Generation>,
+    /// At the surface: hellos since the last accepted frame.
+    unheard: u32,
+    /// At the vehicle: the parts of the next key that were received.
+    key_offer: KeyOffer,
+    /// The ends have changed over to the next key, and that was not polled yet.
+    has_changed_key: bool,
     /// Counters and estimates of this link.
     pub stats: LinkStats,
 }
@@ -82,6 +93,11 @@ impl<T> LinkPair<T> {
             ended_hellos: 0,
             silence: None,
             refused: None,
+            speaks: Generation::Present,
+            answered_by: None,
+            unheard: 0,
+            key_offer: KeyOffer::default(),
+            has_changed_key: false,
             stats,
         }
     }
@@ -356,11 +372,13 @@ impl<T> LinkPair<T> {
         if purpose.is_hello() || self.must_send_hello() {
             // The current run may be in use still: the hello of the surface may be a replay.
             self.owes_hello &= self.handshake.is_leaving();
-            let to = self.handshake.offered().filter(|_| self.us != Address::SURFACE).map(|r| r.peer);
+            let is_surface = self.us == Address::SURFACE;
+            let to = self.handshake.offered().filter(|_| !is_surface).map(|r| (r.peer, r.key.generation));
             let to = self.refused.take().or(to);
-            let (session, nonce) = to.map_or((0, 0), |p| (p.session.get(), p.nonce));
+            let (session, nonce) = to.map_or((0, 0), |(p, _)| (p.session.get(), p.nonce));
+            let generation = if is_surface { self.next_voice() } else { to.map_or(self.speaks, |(_, used)| used) };
             return match &self.authenticity {
-                Some(a) => builder.finish(&Seal::Hello(&a.key, self.mission, session, nonce), short),
+                Some(a) => builder.finish(&Seal::Hello(a.key(generation), self.mission, session, nonce), short),
                 None => builder.finish(&Seal::Crc(self.mission, session), short),
             };
         }
@@ -368,7 +386,7 @@ impl<T> LinkPair<T> {
         let Some(run) = self.handshake.run_for(purpose) else { return Vec::new() };
         let number = run.flight.next_number();
         run.flight.push(carried);
-        let bytes = match run.key.as_ref().filter(|_| keyed) {
+        let bytes = match run.key.session.as_ref().filter(|_| keyed) {
             Some(key) => builder.finish(&Seal::Session(key, direction, number), short),
             None => builder.finish(&Seal::Crc(mission, run.peer.session.get()), short),
         };
@@ -385,25 +403,29 @@ impl<T> LinkPair<T> {
         if self.us == Address::SURFACE {
             self.handshake.renew_surface();
         } else {
-            let key = session_key(self.authenticity.clone(), self.mission, self.us, self.peer);
-            self.handshake.renew_vehicle(key);
-            self.owes_hello = self.handshake.is_leaving();
+            let generation = self.handshake.run().map_or(Generation::Present, |run| run.key.generation);
+            self.offer_run(generation);
         }
     }
-}
 
-/// Derives the key of a run of ours with a run of the peer.
-fn session_key(
-    authenticity: Option<LinkAuthenticity>,
-    mission: MissionId,
-    us: Address,
-    peer: Address,
-) -> impl Fn(Identity, Identity) -> Option<SessionKey> {
-    move |own, other| {
-        let a = authenticity.as_ref()?;
-        let (surface, vehicle) = if us == Address::SURFACE { (own, other) } else { (other, own) };
-        let number = if us == Address::SURFACE { peer.number() } else { us.number() };
-        Some(a.key.session(mission.0, number, surface.nonce, vehicle.nonce, a.encrypt))
+    /// At the vehicle: offers the surface a new run under this key.
+    fn offer_run(&mut self, generation: Generation) {
+        let key = self.run_key(generation);
+        self.handshake.renew_vehicle(key);
+        self.owes_hello = self.handshake.is_leaving();
+    }
+
+    /// Derives the key of a run of ours with a run of the peer.
+    fn run_key(&self, generation: Generation) -> impl Fn(Identity, Identity) -> RunKey + use<T> {
+        let (authenticity, mission, us, peer) = (self.authenticity.clone(), self.mission, self.us, self.peer);
+        move |own, other| {
+            let (surface, vehicle) = if us == Address::SURFACE { (own, other) } else { (other, own) };
+            let number = if us == Address::SURFACE { peer.number() } else { us.number() };
+            let session = authenticity
+                .as_ref()
+                .map(|a| a.key(generation).session(mission.0, number, surface.nonce, vehicle.nonce, a.encrypt));
+            RunKey { session, generation }
+        }
     }
 }
 
@@ -413,14 +435,13 @@ mod tests {
     use crate::link::DropReason;
     use crate::seal::{HeldKey, MissionKey};
     use crate::wire::Envelope;
-    use std::sync::Arc;
 
     fn introduction() -> Introduction {
         Introduction { series: Some(Series::from_random(1)), ..Introduction::default() }
     }
 
     fn keyed(encrypt: bool) -> Option<Authenticity> {
-        Some(Authenticity { key: Arc::new(HeldKey::Mission(MissionKey::from_bytes([9; 16]))), all: true, encrypt })
+        Some(Authenticity::new(HeldKey::Mission(MissionKey::from_bytes([9; 16])), true, encrypt))
     }
 
     fn end_of_surface(authenticity: Option<Authenticity>, seed: u64) -> LinkPair<u64> {

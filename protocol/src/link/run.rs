@@ -1,7 +1,7 @@
 //! A run of this end with a run of the peer.
 
 use super::{Flight, FrameNumber, LinkWindow};
-use crate::seal::{Direction, HeldKey, LinkKey, SessionKey};
+use crate::seal::{Direction, HeldKey, LinkKey, SessionKey, VehicleKey};
 use crate::wire::{Address, Envelope, Frame, Introduction, MissionId, Seal, SessionId, unwrap_number};
 use std::sync::Arc;
 
@@ -10,6 +10,8 @@ use std::sync::Arc;
 pub struct Authenticity {
     /// The mission key, or the keys of one vehicle that are derived from it.
     pub key: Arc<HeldKey>,
+    /// The next one, while the ends change over to it: this end accepts both.
+    pub next: Option<Arc<HeldKey>>,
     /// Whether frames of the vehicle are authenticated too, and not only those of the surface.
     pub all: bool,
     /// Whether the content of authenticated frames is encrypted.
@@ -17,18 +19,94 @@ pub struct Authenticity {
 }
 
 impl Authenticity {
+    /// Authentication by one key.
+    #[must_use]
+    pub fn new(key: HeldKey, all: bool, encrypt: bool) -> Self {
+        Self { key: Arc::new(key), next: None, all, encrypt }
+    }
+
     /// That of the link with a vehicle.
     pub(super) fn link(&self, vehicle: Address) -> LinkAuthenticity {
-        LinkAuthenticity { key: self.key.link(vehicle.number()), all: self.all, encrypt: self.encrypt }
+        let number = vehicle.number();
+        LinkAuthenticity {
+            key: self.key.link(number),
+            next: self.next.as_ref().map(|next| next.link(number)),
+            offer: self.next.as_ref().and_then(|next| next.vehicle(number)),
+            all: self.all,
+            encrypt: self.encrypt,
+        }
+    }
+
+    /// The key of calls of this generation, if it is held.
+    pub(super) fn calls(&self, generation: Generation) -> Option<LinkKey> {
+        self.held(generation).map(HeldKey::calls)
+    }
+
+    fn held(&self, generation: Generation) -> Option<&HeldKey> {
+        match generation {
+            Generation::Present => Some(&self.key),
+            Generation::Next => self.next.as_deref(),
+        }
     }
 }
 
-/// The key of a link, and the scope of authentication.
+/// Which of the two keys of a link: both are in use while the ends change over.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(super) enum Generation {
+    #[default]
+    Present,
+    Next,
+}
+
+impl Generation {
+    pub(super) const ALL: [Self; 2] = [Self::Present, Self::Next];
+
+    pub(super) fn other(self) -> Self {
+        if self == Self::Present { Self::Next } else { Self::Present }
+    }
+}
+
+/// The keys of a link, and the scope of authentication.
 #[derive(Debug, Clone)]
 pub(super) struct LinkAuthenticity {
     pub(super) key: LinkKey,
+    pub(super) next: Option<LinkKey>,
+    /// What a surface offers to the vehicle.
+    pub(super) offer: Option<VehicleKey>,
     pub(super) all: bool,
     pub(super) encrypt: bool,
+}
+
+impl LinkAuthenticity {
+    /// The key of this generation, or the present one if there is no next one.
+    pub(super) fn key(&self, generation: Generation) -> &LinkKey {
+        match generation {
+            Generation::Present => &self.key,
+            Generation::Next => self.next.as_ref().unwrap_or(&self.key),
+        }
+    }
+
+    /// The hello in a frame, and the generation of the key that it is sealed with.
+    pub(super) fn open_hello<'a>(
+        &self,
+        envelope: &Envelope<'a>,
+        mission: MissionId,
+        session: u16,
+        nonce: u64,
+    ) -> Option<(Generation, Frame<'a>)> {
+        let held = Generation::ALL.into_iter().take(1 + usize::from(self.next.is_some()));
+        held.into_iter().find_map(|generation| {
+            let seal = Seal::Hello(self.key(generation), mission, session, nonce);
+            Some((generation, envelope.open(&seal)?))
+        })
+    }
+}
+
+/// The key of a pair of runs, `None` without authentication, and the generation that it is derived from.
+#[derive(Debug)]
+pub(super) struct RunKey {
+    pub(super) session: Option<SessionKey>,
+    pub(super) generation: Generation,
 }
 
 /// The identity of a run of one end: the session on the wire, and a nonce that no other run has.
@@ -97,13 +175,13 @@ pub(super) struct LinkRun<T> {
     pub(super) introduction: Introduction,
     /// Whether the hello had this version of the wire. Without, no frame of the run is read.
     is_readable: bool,
-    pub(super) key: Option<SessionKey>,
+    pub(super) key: RunKey,
     pub(super) flight: Flight<T>,
     pub(super) window: LinkWindow,
 }
 
 impl<T> LinkRun<T> {
-    pub(super) fn new(own: Identity, peer: Identity, introduction: Introduction, key: Option<SessionKey>) -> Self {
+    pub(super) fn new(own: Identity, peer: Identity, introduction: Introduction, key: RunKey) -> Self {
         let (flight, window) = (Flight::default(), LinkWindow::default());
         Self { own, peer, introduction, is_readable: true, key, flight, window }
     }
@@ -113,7 +191,7 @@ impl<T> LinkRun<T> {
         own: Identity,
         peer: Identity,
         introduction: Option<Introduction>,
-        key: Option<SessionKey>,
+        key: RunKey,
     ) -> Self {
         let is_readable = introduction.is_some();
         Self { is_readable, ..Self::new(own, peer, introduction.unwrap_or_default(), key) }
@@ -128,7 +206,7 @@ impl<T> LinkRun<T> {
 
     pub(super) fn end(self) -> EndedPeer {
         let (own, identity, introduction) = (self.own, self.peer, self.introduction);
-        EndedPeer { own, identity, introduction, key: self.key, highest: self.window.highest() }
+        EndedPeer { own, identity, introduction, key: self.key.session, highest: self.window.highest() }
     }
 
     /// The frame, if the peer's run sealed it to ours. If `keyed`, it must have a tag.
@@ -142,7 +220,7 @@ impl<T> LinkRun<T> {
         if envelope.header.session != self.peer.session || !self.is_readable {
             return None;
         }
-        match self.key.as_ref().filter(|_| keyed) {
+        match self.key.session.as_ref().filter(|_| keyed) {
             Some(key) => {
                 let number = unwrap_number(envelope.header.number, self.window.highest());
                 envelope.open(&Seal::Session(key, direction, number))

@@ -64,7 +64,7 @@ impl MissionKey {
 }
 
 /// The secret of the link between the surface and one vehicle, or of the calls to all; wiped from memory when dropped.
-#[derive(Clone)]
+#[derive(Clone, PartialEq, Eq)]
 pub struct LinkKey {
     bytes: Secret,
 }
@@ -75,6 +75,10 @@ impl LinkKey {
     }
 
     pub(super) fn bytes(&self) -> &[u8; 16] {
+        &self.bytes
+    }
+
+    pub(super) fn secret(&self) -> &Secret {
         &self.bytes
     }
 
@@ -136,7 +140,7 @@ impl fmt::Debug for LinkKey {
 }
 
 /// The keys of one vehicle, as its key file has them.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub struct VehicleKey {
     /// The address of the vehicle that they are for.
     pub address: u8,
@@ -151,6 +155,16 @@ impl VehicleKey {
     pub fn derive(mission: &MissionKey, address: u8) -> Self {
         let (link, calls) = (mission.vehicle(address), mission.calls());
         Self { address, mission: mission.fingerprint(), link, calls }
+    }
+
+    /// The key of the vehicle's link.
+    pub fn link(&self) -> &LinkKey {
+        &self.link
+    }
+
+    /// The key of the calls to all vehicles.
+    pub fn calls(&self) -> &LinkKey {
+        &self.calls
     }
 }
 
@@ -177,6 +191,14 @@ impl HeldKey {
         match self {
             Self::Mission(key) => key.calls(),
             Self::Vehicle(key) => key.calls.clone(),
+        }
+    }
+
+    /// The keys of a vehicle alone; `None` if this is the key of another one.
+    pub fn vehicle(&self, address: u8) -> Option<VehicleKey> {
+        match self {
+            Self::Mission(key) => Some(VehicleKey::derive(key, address)),
+            Self::Vehicle(key) => (key.address == address).then(|| key.clone()),
         }
     }
 

@@ -8,6 +8,7 @@
 //!   |-- fingerprint     32 bits for people
 //!   |-- key of calls    tags of the calls to all vehicles
 //!   +-- key of a vehicle, by its address (with that of calls: the vehicle's key file)
+//!         |-- key stream      hides the next key of the vehicle, while it is offered
 //!         |-- hello key       tags of frames that are sent before both ends know each other's run
 //!         +-- session root
 //!               +-- session key     one pair of runs of one surface and one vehicle, encrypted or not
@@ -15,6 +16,7 @@
 //! ```
 
 mod key;
+mod offer;
 mod prf;
 mod session;
 mod text;
@@ -23,8 +25,9 @@ mod text;
 mod tests;
 
 pub use key::{HeldKey, LinkKey, MissionKey, VehicleKey};
+pub use offer::KeyOffer;
 pub use session::{Direction, SessionKey};
-pub use text::KeyError;
+pub use text::{KeyError, KeyFile};
 
 /// The proof that a frame comes from a holder of the key: the first 8 of the 16 tag bytes of Ascon-AEAD128.
 ///

@@ -1,11 +1,15 @@
 //! The text of a key file.
 
 use super::key::{HeldKey, LinkKey, MissionKey, VehicleKey};
+use super::prf::{join, prf};
 use zeroize::Zeroizing;
 
 const VERSION: &str = "2";
+/// The nonce of the check of a vehicle's line, under the key of its link.
+const CHECK: &[u8; 16] = b"scenecast-check1";
 const OF_MISSION: &str = "scenecast-key";
 const OF_VEHICLE: &str = "scenecast-vehicle-key";
+const NEXT: &str = "scenecast-next-key";
 
 /// Why a text is not a key file.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -44,7 +48,7 @@ pub enum KeyError {
         /// Number of the line, from 1.
         line: usize,
     },
-    /// The file has a second key.
+    /// The file has a second key, or a second next one.
     #[error("line {line}: this is a second key; one is allowed")]
     Second {
         /// Number of the line, from 1.
@@ -55,34 +59,62 @@ pub enum KeyError {
     OfVehicle,
 }
 
-impl HeldKey {
-    /// Parses a key file: one line, empty lines, and comments after `#`. The line is
+/// What a key file holds.
+#[derive(Debug, Clone)]
+pub struct KeyFile {
+    /// The present key.
+    pub key: HeldKey,
+    /// The next key of the mission, which the surface offers to its vehicles.
+    pub next: Option<HeldKey>,
+}
+
+impl KeyFile {
+    /// Parses a key file: one line of a key, at a surface one of the next key after it, empty lines, and comments after `#`. The
+    /// lines are
     ///
     /// ```text
     /// scenecast-key 2 KEY CHECK
+    /// scenecast-next-key 2 KEY CHECK
     /// scenecast-vehicle-key 2 ADDRESS KEY CALLS MISSION CHECK
     /// ```
     ///
     /// KEY and CALLS have 32 hexadecimal digits, CHECK and MISSION 8: MISSION is the fingerprint of the mission key, CHECK that of
     /// the line's own keys. ADDRESS is decimal, 1 to 14.
     pub fn parse(text: &str) -> Result<Self, KeyError> {
-        let mut key = None;
+        let (mut key, mut next) = (None, None);
         for (line, content) in text.trim_start_matches('\u{FEFF}').lines().enumerate() {
             let (line, content) = (line + 1, content.trim());
             if content.is_empty() || content.starts_with('#') {
                 continue;
             }
-            if key.is_some() {
+            let is_next = content.split_whitespace().next() == Some(NEXT);
+            let slot = match key {
+                Some(HeldKey::Mission(_)) if is_next => &mut next,
+                _ if is_next => return Err(KeyError::NotAKey { line }),
+                _ => &mut key,
+            };
+            if slot.is_some() {
                 return Err(KeyError::Second { line });
             }
-            key = Some(parse_line(content, line)?);
+            *slot = Some(parse_line(content, line)?);
         }
-        key.ok_or(KeyError::Missing)
+        Ok(Self { key: key.ok_or(KeyError::Missing)?, next })
+    }
+}
+
+impl HeldKey {
+    /// Parses a key file that has one key, see [`KeyFile::parse`].
+    pub fn parse(text: &str) -> Result<Self, KeyError> {
+        let file = KeyFile::parse(text)?;
+        if file.next.is_some() {
+            return Err(KeyError::Second { line: text.lines().count() });
+        }
+        Ok(file.key)
     }
 }
 
 impl MissionKey {
-    /// Parses the key file of a mission, see [`HeldKey::parse`].
+    /// Parses the key file of a mission, see [`KeyFile::parse`].
     pub fn parse(text: &str) -> Result<Self, KeyError> {
         match HeldKey::parse(text)? {
             HeldKey::Mission(key) => Ok(key),
@@ -92,8 +124,17 @@ impl MissionKey {
 
     /// The text of a key file, one line. It holds the secret and is wiped from memory when dropped.
     pub fn to_text(&self) -> Zeroizing<String> {
+        self.to_line(OF_MISSION)
+    }
+
+    /// The line of a key file that has this key as the next one.
+    pub fn to_next_text(&self) -> Zeroizing<String> {
+        self.to_line(NEXT)
+    }
+
+    fn to_line(&self, kind: &str) -> Zeroizing<String> {
         let key = u128::from_be_bytes(*self.bytes());
-        Zeroizing::new(format!("{OF_MISSION} {VERSION} {key:032x} {:08x}\n", self.fingerprint()))
+        Zeroizing::new(format!("{kind} {VERSION} {key:032x} {:08x}\n", self.fingerprint()))
     }
 }
 
@@ -105,26 +146,25 @@ impl VehicleKey {
         Zeroizing::new(format!("{OF_VEHICLE} {VERSION} {address} {link:032x} {calls:032x} {mission:08x} {check:08x}\n"))
     }
 
-    /// A check of the whole line: the fingerprint of both keys together.
+    /// A check of the whole line.
     fn check(&self) -> u32 {
-        let mut both = Zeroizing::new([0; 16]);
-        both.iter_mut()
-            .zip(self.link.bytes().iter().zip(self.calls.bytes()))
-            .for_each(|(to, (a, b))| *to = a ^ b.rotate_left(1));
-        MissionKey::from_bytes(*both).fingerprint() ^ self.mission.rotate_left(u32::from(self.address))
+        let line = join(&[&[self.address], self.calls.bytes(), &self.mission.to_be_bytes()]);
+        let [a, b, c, d, ..] = *prf(self.link.secret(), CHECK, &line);
+        u32::from_be_bytes([a, b, c, d])
     }
 }
 
 fn parse_line(content: &str, line: usize) -> Result<HeldKey, KeyError> {
     let mut words = content.split_whitespace();
-    let kind = words.next().filter(|kind| [OF_MISSION, OF_VEHICLE].contains(kind)).ok_or(KeyError::NotAKey { line })?;
+    let kind =
+        words.next().filter(|kind| [OF_MISSION, OF_VEHICLE, NEXT].contains(kind)).ok_or(KeyError::NotAKey { line })?;
     let version = words.next().ok_or(KeyError::NotAKey { line })?;
     if version != VERSION {
         return Err(KeyError::Version { line });
     }
     let words: Vec<&str> = words.take(6).collect();
     let (key, check, found) = match (kind, &words[..]) {
-        (OF_MISSION, [key, check]) => {
+        (OF_MISSION | NEXT, [key, check]) => {
             let key = MissionKey::from_bytes(secret(key, line)?);
             let found = key.fingerprint();
             (HeldKey::Mission(key), check, found)
@@ -193,6 +233,19 @@ mod tests {
         assert_eq!(error(&format!("{}\n{}", line(), line())), Some(KeyError::Second { line: 2 }));
         let said = error(&line().replace("key 2 3", "key 2 4")).unwrap();
         assert_eq!(said.to_string(), "line 1: the check does not fit the key: a digit is wrong; copy the file again");
+    }
+
+    #[test]
+    fn the_next_key_of_a_mission_follows_its_present_one() {
+        let next = MissionKey::from_bytes([2; 16]);
+        let both = format!("{}\n# since Monday\n{}", line(), *next.to_next_text());
+        let file = KeyFile::parse(&both).unwrap();
+        assert_eq!(file.next.map(|next| next.fingerprint()), Some(next.fingerprint()));
+        let refused = |text: &str| KeyFile::parse(text).err();
+        assert_eq!(refused(&next.to_next_text()), Some(KeyError::NotAKey { line: 1 }));
+        assert_eq!(refused(&format!("{both}{}", *next.to_next_text())), Some(KeyError::Second { line: 4 }));
+        let of_vehicle = VehicleKey::derive(&next, 1).to_text();
+        assert_eq!(refused(&format!("{}{}", *of_vehicle, *next.to_next_text())), Some(KeyError::NotAKey { line: 2 }));
     }
 
     proptest! {

@@ -35,13 +35,15 @@ pub enum ChunkKind {
     LabelTree,
     /// The introduction of another surface that calls the vehicle.
     Caller,
+    /// A part of the next key of the vehicle.
+    NextKey,
 }
 
 /// The code after which the first byte of the payload names the kind.
 const EXTENDED: u8 = 7;
 
 impl ChunkKind {
-    const ALL: [Self; 16] = [
+    const ALL: [Self; 17] = [
         Self::Map,
         Self::Pose,
         Self::Slot,
@@ -58,6 +60,7 @@ impl ChunkKind {
         Self::Faults,
         Self::LabelTree,
         Self::Caller,
+        Self::NextKey,
     ];
 
     /// The code in the header of the chunk, and the byte that begins the payload of an extended kind.
@@ -79,6 +82,7 @@ impl ChunkKind {
             Self::Faults => (EXTENDED, Some(7)),
             Self::LabelTree => (EXTENDED, Some(8)),
             Self::Caller => (EXTENDED, Some(9)),
+            Self::NextKey => (EXTENDED, Some(10)),
         }
     }
 }
@@ -91,7 +95,7 @@ impl ChunkKind {
 /// |kind | length  | [more length]  | payload   |
 /// +-----+---------+----------------+-----------+
 /// kind     0 end of the frame's content, 1 map, 2 pose, 3 slot, 4 object, 5 report, 6 layer;
-///          7 extended: the first byte of the payload is 0 introduction, 1 content in force, 2 inquiry, 3 trail, 4 intent, 5 registration, 6 class, 7 faults, 8 tree, 9 caller;
+///          7 extended: the first byte of the payload is 0 introduction, 1 content in force, 2 inquiry, 3 trail, 4 intent, 5 registration, 6 class, 7 faults, 8 tree, 9 caller, 10 next key;
 ///          any other value, or no payload: skipped
 /// length   0..26 bytes of payload; 27..30: 27 + 256 x (length - 27) + next byte; 31: to the end of the frame
 /// ```

@@ -11,4 +11,5 @@ mod pair;
 mod path;
 mod promises;
 mod replay;
+mod rotation;
 mod wire_document;

@@ -9,7 +9,6 @@ use scenecast_protocol::map_codec::Codec;
 use scenecast_protocol::seal::{HeldKey, MissionKey};
 use scenecast_protocol::wire::{Address, Envelope, FrameBuilder, Header, MissionId, Seal, SessionId, UtcHours};
 use std::collections::BTreeMap;
-use std::sync::Arc;
 use std::time::Duration;
 
 const ROUGH: LossyChannel = LossyChannel {
@@ -112,8 +111,8 @@ fn clocks_that_are_more_than_a_day_apart_are_named_at_both_ends() {
 #[test]
 fn a_vehicle_names_another_key_or_mission_within_30_seconds() {
     let common = || Setup::new(64, 10_000, Codec::Png);
-    let key = Arc::new(HeldKey::Mission(MissionKey::from_bytes([43; 16])));
-    let other_key = Setup { authenticity: Some(Authenticity { key, all: true, encrypt: false }), ..common() };
+    let key = HeldKey::Mission(MissionKey::from_bytes([43; 16]));
+    let other_key = Setup { authenticity: Some(Authenticity::new(key, true, false)), ..common() };
     let other_mission = Setup { mission: MissionId(8), ..common() };
     for (vehicle, surface) in [(common().keyed(true, false), other_key), (common(), other_mission)] {
         for access in [Access::Shared, Access::ModemOwned { pool_frames: 8 }, Access::Polled, Access::FullDuplex] {

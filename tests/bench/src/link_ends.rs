@@ -7,7 +7,6 @@ use scenecast_protocol::seal::{HeldKey, MissionKey};
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::{Address, MissionId};
 use sim_channel::RandomStream;
-use std::sync::Arc;
 use std::time::Duration;
 
 pub(crate) const MISSION: MissionId = MissionId(7);
@@ -35,8 +34,8 @@ impl EndsSetup {
 
     /// Both ends with a key.
     pub(crate) fn keyed(self, all: bool, encrypt: bool) -> Self {
-        let key = Arc::new(HeldKey::Mission(MissionKey::from_bytes([42; 16])));
-        Self { authenticity: Some(Authenticity { key, all, encrypt }), ..self }
+        let key = HeldKey::Mission(MissionKey::from_bytes([42; 16]));
+        Self { authenticity: Some(Authenticity::new(key, all, encrypt)), ..self }
     }
 
     pub(crate) fn modem(&self) -> ModemProfile {

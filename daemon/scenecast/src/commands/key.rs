@@ -2,7 +2,7 @@
 
 use clap::{Args, Subcommand};
 use scenecast_core::{Principal, Role, UserError};
-use scenecast_protocol::seal::{HeldKey, MissionKey, VehicleKey};
+use scenecast_protocol::seal::{HeldKey, KeyFile, MissionKey, VehicleKey};
 use std::fs::OpenOptions;
 use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
@@ -15,6 +15,8 @@ pub(super) enum Key {
     New(New),
     /// Write the key of one vehicle, derived from the key of the mission, to a new file.
     Derive(Derive),
+    /// Add the next key to the file of the mission, or let it take the place of the present one.
+    Rotate(Rotate),
     /// Print whose key a file has, and the fingerprint of the mission key.
     Show(Show),
     /// Write a new random token for the operator's page to a new file.
@@ -45,6 +47,21 @@ pub(super) struct Derive {
     /// File to write; it must not exist [default: auv-ADDRESS.key]
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
+}
+
+/// Add the next key of the mission to its file. The surface offers each vehicle its own under the present one.
+///
+/// Restart the surface then. Its log names each vehicle that uses the next key. When all do, --finish makes it the present one;
+/// until then the surface accepts both.
+#[derive(Debug, Args)]
+#[command(after_help = "Example: scenecast key rotate mission.key\n         scenecast key rotate mission.key --finish")]
+pub(super) struct Rotate {
+    /// Key file of the mission
+    #[arg(value_name = "FILE")]
+    file: PathBuf,
+    /// Remove the present key: the next one takes its place
+    #[arg(long)]
+    finish: bool,
 }
 
 /// Write a new random token to a new file that only its owner may read. Without a role its holders are administrators.
@@ -105,26 +122,28 @@ impl Key {
                 }
             }
             Self::Derive(derive) => {
-                let path = &derive.mission;
-                let (HeldKey::Mission(mission), _) = scenecast_config::read_key(path)? else {
-                    return Err(UserError::file(
-                        path,
-                        "this is the key of a vehicle; name the key file of the mission",
-                    ));
-                };
+                let (mission, _) = mission_keys(&derive.mission)?;
                 let key = VehicleKey::derive(&mission, derive.vehicle);
                 let out = derive.out.unwrap_or_else(|| format!("auv-{}.key", derive.vehicle).into());
                 write_new(&out, &key.to_text())?;
                 println!("{}: vehicle {}, fingerprint {:08x}", out.display(), key.address, key.mission);
                 println!("Copy the file to the vehicle, and set its link.key_file to the path.");
             }
+            Self::Rotate(rotate) => rotate.run()?,
             Self::Show(show) => {
-                let (key, warning) = scenecast_config::read_key(&show.file)?;
+                let (KeyFile { key, next }, warning) = scenecast_config::read_key(&show.file)?;
                 let of = match &key {
                     HeldKey::Mission(_) => "mission".to_owned(),
                     HeldKey::Vehicle(key) => format!("vehicle {}", key.address),
                 };
                 println!("{}: {of}, fingerprint {:08x}", show.file.display(), key.fingerprint());
+                if let Some(next) = next {
+                    println!(
+                        "{}: next key of the mission, fingerprint {:08x}",
+                        show.file.display(),
+                        next.fingerprint()
+                    );
+                }
                 if let Some(warning) = warning {
                     eprintln!("scenecast: {warning}");
                 }
@@ -132,6 +151,66 @@ impl Key {
         }
         Ok(())
     }
+}
+
+impl Rotate {
+    fn run(self) -> Result<(), UserError> {
+        let path = &self.file;
+        let (present, next) = mission_keys(path)?;
+        match (next, self.finish) {
+            (None, false) => {
+                let next = random_key()?;
+                replace(path, &Zeroizing::new([present.to_text().as_str(), next.to_next_text().as_str()].concat()))?;
+                println!("{}: next key, fingerprint {:08x}", path.display(), next.fingerprint());
+                println!(
+                    "Restart the surface: it gives each vehicle that it hears its own. When its log names every vehicle:"
+                );
+                println!("scenecast key rotate {} --finish", path.display());
+            }
+            (Some(next), true) => {
+                replace(path, &next.to_text())?;
+                println!("{}: mission, fingerprint {:08x}", path.display(), next.fingerprint());
+                println!(
+                    "Restart the surface. A vehicle that loses its state folder falls back to its key file: write it a new one in time:"
+                );
+                println!("scenecast key derive {} --vehicle 1", path.display());
+            }
+            (Some(next), false) => {
+                let fingerprint = next.fingerprint();
+                let line = format!(
+                    "it has a next key already, fingerprint {fingerprint:08x}; --finish lets it take the place of the present one"
+                );
+                return Err(UserError::file(path, line));
+            }
+            (None, true) => {
+                return Err(UserError::file(
+                    path,
+                    "it has no next key; scenecast key rotate without --finish adds one",
+                ));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// The present key of a mission and the next one, if there is one.
+fn mission_keys(path: &Path) -> Result<(MissionKey, Option<MissionKey>), UserError> {
+    match scenecast_config::read_key(path)?.0 {
+        KeyFile { key: HeldKey::Mission(key), next } => {
+            let next = next.and_then(|next| if let HeldKey::Mission(next) = next { Some(next) } else { None });
+            Ok((key, next))
+        }
+        _ => Err(UserError::file(path, "this is the key of a vehicle; name the key file of the mission")),
+    }
+}
+
+/// Puts a new secret in the place of a file, whole or not at all.
+fn replace(path: &Path, text: &str) -> Result<(), UserError> {
+    let mut name = path.as_os_str().to_owned();
+    name.push(".new");
+    let new = PathBuf::from(name);
+    write_new(&new, text)?;
+    std::fs::rename(&new, path).map_err(|e| UserError::Failed(format!("{}: {e}", path.display())))
 }
 
 /// A key from the operating system's random source.
@@ -190,7 +269,31 @@ mod tests {
         let (path, key) = (fresh("new"), random_key().unwrap());
         write_new(&path, &key.to_text()).unwrap();
         let (read, warning) = scenecast_config::read_key(&path).unwrap();
-        assert_eq!((read.fingerprint(), warning), (key.fingerprint(), None));
+        assert_eq!((read.key.fingerprint(), warning), (key.fingerprint(), None));
+        #[cfg(unix)]
+        {
+            use std::os::unix::fs::PermissionsExt;
+            assert_eq!(std::fs::metadata(&path).unwrap().permissions().mode() & 0o777, 0o600);
+        }
+        std::fs::remove_file(path).unwrap();
+    }
+
+    #[test]
+    fn a_next_key_is_added_once_and_takes_the_place_of_the_present_one() {
+        let (path, key) = (fresh("rotate"), random_key().unwrap());
+        write_new(&path, &key.to_text()).unwrap();
+        let rotate = |finish: bool| Rotate { file: path.clone(), finish }.run();
+        let prints = || {
+            let (present, next) = mission_keys(&path).unwrap();
+            (present.fingerprint(), next.map(|next| next.fingerprint()))
+        };
+        assert!(rotate(true).unwrap_err().to_string().contains("no next key"));
+        rotate(false).unwrap();
+        let (present, next) = prints();
+        assert_eq!(present, key.fingerprint());
+        assert!(rotate(false).unwrap_err().to_string().contains(&format!("{:08x}", next.unwrap())));
+        rotate(true).unwrap();
+        assert_eq!(prints(), (next.unwrap(), None));
         #[cfg(unix)]
         {
             use std::os::unix::fs::PermissionsExt;

@@ -1,5 +1,6 @@
 //! The part of the vehicle's state that its host stores.
 
+use super::kept_keys::KeptKeys;
 use crate::LastPlace;
 use scenecast_protocol::coordinates::DecimetrePoint;
 use scenecast_protocol::directive::Series;
@@ -49,6 +50,8 @@ pub struct Durable {
     pub destination: Option<(i32, i32)>,
     /// Weighted areas in force as on the wire. Empty: none.
     pub areas: Vec<u8>,
+    /// The keys that the surface has given.
+    pub keys: KeptKeys,
 }
 
 impl Durable {

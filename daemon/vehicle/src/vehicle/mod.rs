@@ -11,6 +11,7 @@ mod gallery;
 mod guidance;
 #[cfg(test)]
 mod in_force_tests;
+mod kept_keys;
 #[cfg(test)]
 mod orders_tests;
 mod publisher;
@@ -21,6 +22,7 @@ mod weights;
 mod withheld;
 
 pub use durable::{Durable, LostOrders};
+pub use kept_keys::KeptKeys;
 pub use storing::VehicleDisk;
 
 use super::failsafe::FailsafePolicy;
@@ -316,6 +318,19 @@ impl Vehicle {
                 }
                 VehicleEvent::SurfaceMet => self.handle_meeting(),
                 VehicleEvent::SurfaceRestarted => self.handle_surface_restart(),
+                VehicleEvent::NextKey(key) => {
+                    tracing::info!(
+                        "the surface gives the next key, of the mission key with fingerprint {:08x}",
+                        key.mission
+                    );
+                    self.durable.keys.keep(&key);
+                    self.outputs.push_back(VehicleOutput::Persist);
+                }
+                VehicleEvent::KeyChanged => {
+                    tracing::info!("the surface uses the next key: the one before opens nothing more");
+                    self.durable.keys.change();
+                    self.outputs.push_back(VehicleOutput::Persist);
+                }
                 VehicleEvent::Mismatch(mismatch) => {
                     tracing::warn!("the settings of the surface do not fit: {mismatch}");
                 }
@@ -402,6 +417,9 @@ impl Vehicle {
         }
         self.publisher.handle_stored(self.storing.labels(), &mut self.link);
         self.report_decisions(decisions);
+        if let Some(next) = self.durable.keys.next() {
+            self.link.keep_next_key(&next);
+        }
         if !self.decide_waiting() {
             self.link.handle_persisted();
         }

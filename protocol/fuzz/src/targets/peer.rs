@@ -9,15 +9,14 @@ use scenecast_protocol::wire::{
     unwrap_number,
 };
 use std::collections::BTreeSet;
-use std::sync::Arc;
 use std::time::Duration;
 
 pub const MISSION: MissionId = MissionId(7);
 
 /// The four ways of sealing frames, by two bits.
 pub fn authenticity(choice: u8) -> Option<Authenticity> {
-    let key = Arc::new(HeldKey::Mission(MissionKey::from_bytes([9; 16])));
-    (choice & 3 != 0).then(|| Authenticity { key, all: choice & 3 > 1, encrypt: choice & 3 == 3 })
+    let key = HeldKey::Mission(MissionKey::from_bytes([9; 16]));
+    (choice & 3 != 0).then(|| Authenticity::new(key, choice & 3 > 1, choice & 3 == 3))
 }
 
 pub fn vehicle() -> Address {

@@ -1,9 +1,9 @@
 //! Received frames of one peer: hellos, numbered frames, and the reason for which a frame is dropped.
 
-use super::{HOLDER_SILENCE, LinkPair, Strays, session_key};
+use super::{HOLDER_SILENCE, LinkPair, Strays};
 use crate::link::handshake::HandshakeOutcome;
 use crate::link::mismatch::Mismatch;
-use crate::link::run::Identity;
+use crate::link::run::{Generation, Identity};
 use crate::link::{DropReason, FrameNumber, WindowRefusal};
 use crate::seal::Direction;
 use crate::wire::{Address, ChunkKind, Chunks, Envelope, Frame, FrameKind, Header, Introduction, Seal, WIRE_VERSION};
@@ -59,6 +59,9 @@ impl<T> LinkPair<T> {
             FrameKind::Hello => self.read_hello(envelope),
             FrameKind::Numbered => self.read_numbered(envelope, decodes),
         };
+        if result.is_ok() {
+            self.unheard = 0;
+        }
         if let Err(reason) = &result {
             self.stats.drop(*reason);
         }
@@ -69,11 +72,11 @@ impl<T> LinkPair<T> {
         let header = &envelope.header;
         let own = if self.us == Address::SURFACE { Some(self.handshake.own()) } else { None };
         let (session, nonce) = own.map_or((0, 0), |o| (o.session.get(), o.nonce));
-        let frame = match &self.authenticity {
-            Some(a) => envelope.open(&Seal::Hello(&a.key, self.mission, session, nonce)),
-            None => envelope.open(&Seal::Crc(self.mission, session)),
+        let opened = match &self.authenticity {
+            Some(a) => a.open_hello(envelope, self.mission, session, nonce),
+            None => envelope.open(&Seal::Crc(self.mission, session)).map(|frame| (Generation::Present, frame)),
         };
-        let Some(frame) = frame else { return Err(self.refuse(envelope, session)) };
+        let Some((generation, frame)) = opened else { return Err(self.refuse(envelope, session)) };
         self.mismatch.handle_true_hello();
         let introduction = if envelope.version == WIRE_VERSION {
             let introduction = introduction_of(&frame).filter(|i| own.is_some() || i.series.is_some());
@@ -89,6 +92,9 @@ impl<T> LinkPair<T> {
         if let Some(introduction) = &introduction {
             self.mismatch.note_clock(introduction.clock, self.introduction.clock);
         }
+        if own.is_some() {
+            self.handle_voice(generation);
+        }
         let peer = Identity { session: header.session, nonce: header.nonce.unwrap_or_default() };
         let refusal = introduction.filter(|caller| match own {
             Some(_) => caller.refuses,
@@ -96,11 +102,11 @@ impl<T> LinkPair<T> {
         });
         if refusal.is_some() {
             if own.is_none() {
-                (self.refused, self.owes_hello) = (Some(peer), true);
+                (self.refused, self.owes_hello) = (Some((peer, generation)), true);
             }
             return Ok(Inbound { refusal, ..Inbound::empty(false, frame) });
         }
-        let key = session_key(self.authenticity.clone(), self.mission, self.us, self.peer);
+        let key = self.run_key(generation);
         let outcome = match own {
             Some(_) => self.handshake.handle_answer(peer, introduction.unwrap_or_default(), key),
             None => {
@@ -115,7 +121,7 @@ impl<T> LinkPair<T> {
             let is_other = introduction.is_some_and(|caller| self.handshake.other_holder(&caller).is_some());
             if own.is_none() && is_other && self.authenticity.is_some() {
                 // It takes over, in a run that has ended here: it learns that, and begins another one.
-                (self.refused, self.owes_hello) = (Some(peer), true);
+                (self.refused, self.owes_hello) = (Some((peer, generation)), true);
                 return Ok(Inbound { refusal: introduction, ..Inbound::empty(false, frame) });
             }
             // Where frames of the vehicle have no tag, a forged one may have proven a false run.
@@ -165,6 +171,9 @@ impl<T> LinkPair<T> {
         self.ended_hellos = 0;
         if let Some(index) = offer {
             self.handshake.accept_offered(index);
+            if self.us != Address::SURFACE {
+                self.handle_proven_key();
+            }
             self.stats.peer_restarts += 1;
         }
         // Another surface waits for the hello that it is owed, whatever the one that holds the vehicle sends meanwhile.
@@ -204,7 +213,8 @@ impl<T> LinkPair<T> {
             && self.us != Address::SURFACE
             && self.handshake.other_holder(&introduction).is_some()
         {
-            (self.refused, self.owes_hello) = (Some(identity), true);
+            let generation = self.handshake.run().map_or(Generation::Present, |run| run.key.generation);
+            (self.refused, self.owes_hello) = (Some((identity, generation)), true);
         }
         sender.is_some()
     }

@@ -1,6 +1,6 @@
 //! Discovery calls, by which the surface looks for unknown vehicles.
 
-use crate::link::run::{Authenticity, Identities, Identity};
+use crate::link::run::{Authenticity, Generation, Identities, Identity};
 use crate::link::{Transmit, TransmitKind};
 use crate::mac::{ModemProfile, quarter_seconds};
 use crate::time::Instant;
@@ -18,6 +18,8 @@ pub(super) struct Discovery {
     /// The longest one-way propagation time.
     reach: Duration,
     identities: Identities,
+    /// The generation of the key of the next call.
+    generation: Generation,
 }
 
 impl Discovery {
@@ -35,7 +37,7 @@ impl Discovery {
     ) -> Self {
         let pause = if anybody_known { every.unwrap_or_default() } else { Self::FIRST_PAUSE };
         let next = if anybody_known { now + pause } else { now };
-        Self { every, pause, next, open: None, reach, identities }
+        Self { every, pause, next, open: None, reach, identities, generation: Generation::Present }
     }
 
     /// When the next call is due, or when the time for answers ends.
@@ -82,8 +84,11 @@ impl Discovery {
             keyed: authenticity.is_some(),
         };
         let builder = FrameBuilder::new(&header, modem.frame_bytes);
-        let bytes = match authenticity {
-            Some(a) => builder.finish(&Seal::Hello(&a.key.calls(), mission, 0, 0), true),
+        let calls = authenticity.and_then(|a| a.calls(self.generation).or_else(|| a.calls(Generation::Present)));
+        // Each vehicle holds one of the two keys, or both.
+        self.generation = self.generation.other();
+        let bytes = match calls {
+            Some(key) => builder.finish(&Seal::Hello(&key, mission, 0, 0), true),
             None => builder.finish(&Seal::Crc(mission, 0), true),
         };
         let answers = (self.reach + modem.turn_around) * 2 + Self::ANSWERS + modem.airtime(bytes.len()) * 2;
@@ -105,10 +110,7 @@ impl Discovery {
         let Some((call, until)) = self.open.filter(|_| envelope.header.kind.is_hello()) else { return false };
         let session = call.session.get();
         let sound = match authenticity {
-            Some(a) => {
-                let link = a.link(envelope.header.from);
-                envelope.open(&Seal::Hello(&link.key, mission, session, call.nonce)).is_some()
-            }
+            Some(a) => a.link(envelope.header.from).open_hello(envelope, mission, session, call.nonce).is_some(),
             None => envelope.open(&Seal::Crc(mission, session)).is_some(),
         };
         sound && now < until + Duration::from_secs(10)

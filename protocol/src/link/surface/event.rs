@@ -43,6 +43,8 @@ pub enum SurfaceEvent {
     OrdersLost(Address),
     /// The copy of a run with this vehicle is kept as [`super::PeerView::ended_run`], because a new run begins.
     RunEnded(Address),
+    /// A vehicle uses the next key from now on.
+    KeyChanged(Address),
     /// A setting of a vehicle does not fit; each is reported once, and a second vehicle with its address again after a while.
     Mismatch(Address, Mismatch),
 }

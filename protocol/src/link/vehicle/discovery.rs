@@ -1,6 +1,7 @@
 //! The answer to a discovery call: a surface that looks for vehicles invites all to answer, each at a random time.
 
 use super::VehicleConfig;
+use crate::link::run::Generation;
 use crate::mac::Grant;
 use crate::time::Instant;
 use crate::wire::{Address, Envelope, FrameBuilder, FrameKind, Header, Seal, SessionId};
@@ -9,8 +10,8 @@ use std::time::Duration;
 /// The answer that is owed to a discovery call.
 #[derive(Debug)]
 pub(super) struct CallReply {
-    /// Session and nonce of the call.
-    pending: Option<(SessionId, u64)>,
+    /// Session and nonce of the call, and the generation of its key.
+    pending: Option<(SessionId, u64, Generation)>,
     /// State of the generator that draws the time of the answer.
     random: u64,
 }
@@ -20,18 +21,27 @@ impl CallReply {
         Self { pending: None, random: seed ^ 0x0CA1_15EA }
     }
 
-    /// Whether a frame to everybody is a discovery call of this mission.
-    pub(super) fn is_call(config: &VehicleConfig, envelope: &Envelope<'_>) -> bool {
-        let is_sound = match &config.authenticity {
-            Some(a) => envelope.open(&Seal::Hello(&a.key.calls(), config.mission, 0, 0)).is_some(),
-            None => envelope.open(&Seal::Crc(config.mission, 0)).is_some(),
+    /// The generation of the key of a frame to everybody, if it is a discovery call of this mission.
+    pub(super) fn called_by(config: &VehicleConfig, envelope: &Envelope<'_>) -> Option<Generation> {
+        let generation = match &config.authenticity {
+            Some(a) => Generation::ALL.into_iter().find(|&generation| {
+                let opens = |key| envelope.open(&Seal::Hello(&key, config.mission, 0, 0)).is_some();
+                a.calls(generation).is_some_and(opens)
+            }),
+            None => envelope.open(&Seal::Crc(config.mission, 0)).map(|_| Generation::Present),
         };
-        is_sound && envelope.header.kind.is_hello()
+        generation.filter(|_| envelope.header.kind.is_hello())
     }
 
     /// Takes a call; returns the turn in which it is answered, at a random time in the window that the call names.
-    pub(super) fn handle_call(&mut self, config: &VehicleConfig, call: &Header, now: Instant) -> Grant {
-        self.pending = Some((call.session, call.nonce.unwrap_or_default()));
+    pub(super) fn handle_call(
+        &mut self,
+        config: &VehicleConfig,
+        call: &Header,
+        generation: Generation,
+        now: Instant,
+    ) -> Grant {
+        self.pending = Some((call.session, call.nonce.unwrap_or_default(), generation));
         let window = Duration::from_millis(250) * u32::from(call.turn.unwrap_or_default());
         let share = (crate::random::next(&mut self.random) >> 40) as f64 / (1u64 << 24) as f64;
         let begins = now + config.modem.turn_around + window.mul_f64(share);
@@ -48,7 +58,7 @@ impl CallReply {
 
     /// The frame that answers the pending call, if there is one.
     pub(super) fn take(&mut self, config: &VehicleConfig) -> Option<Vec<u8>> {
-        let (session, nonce) = self.pending.take()?;
+        let (session, nonce, generation) = self.pending.take()?;
         let header = Header {
             from: config.address,
             to: Address::SURFACE,
@@ -66,7 +76,10 @@ impl CallReply {
         let builder = FrameBuilder::new(&header, config.modem.frame_bytes);
         let mission = config.mission;
         Some(match &config.authenticity {
-            Some(a) => builder.finish(&Seal::Hello(&a.link(config.address).key, mission, session.get(), nonce), true),
+            Some(a) => {
+                let link = a.link(config.address);
+                builder.finish(&Seal::Hello(link.key(generation), mission, session.get(), nonce), true)
+            }
             None => builder.finish(&Seal::Crc(mission, session.get()), true),
         })
     }

@@ -3,6 +3,7 @@
 use crate::directive::{Slot, SlotId};
 use crate::link::Mismatch;
 use crate::object::ObjectId;
+use crate::seal::VehicleKey;
 
 /// An event of [`super::VehicleLink`] for its host.
 #[derive(Debug, Clone, PartialEq)]
@@ -24,6 +25,10 @@ pub enum VehicleEvent {
     SurfaceMet,
     /// The surface began a new run; everything is sent to it again.
     SurfaceRestarted,
+    /// The surface has offered the next key. The host makes it durable and calls [`super::VehicleLink::keep_next_key`].
+    NextKey(VehicleKey),
+    /// The surface has proven that it uses the next key, which is the present one from now on; the one before opens nothing more.
+    KeyChanged,
     /// Frames of the surface are refused because a setting differs; each is reported once.
     Mismatch(Mismatch),
     /// A chunk was left out of a frame, and its content waits again.

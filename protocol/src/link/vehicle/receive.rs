@@ -3,12 +3,15 @@
 use super::content::Carried;
 use super::discovery::CallReply;
 use super::{VehicleEvent, VehicleLink};
+use crate::bytes::Truncated;
 use crate::directive::{InForceDigests, Slot, VersionedSlot};
 use crate::link::{Admission, DropReason};
 use crate::mac::Grant;
 use crate::map::StateSource;
+use crate::seal::{HeldKey, VehicleKey};
 use crate::time::Instant;
 use crate::wire::{Address, ChunkKind, Envelope, Header, Introduction};
+use std::sync::Arc;
 use std::time::Duration;
 
 /// Time without an accepted frame after which late frames are taken for a sign of a forged one.
@@ -81,7 +84,10 @@ impl<S: StateSource> VehicleLink<S> {
         let header = inbound.header().clone();
         let slots: Vec<Vec<u8>> =
             inbound.chunks().filter(|c| c.kind == ChunkKind::Slot).map(|c| c.payload.to_vec()).collect();
-        let foreign = inbound.chunks().any(|c| !matches!(c.kind, ChunkKind::Slot | ChunkKind::Inquiry));
+        let foreign =
+            inbound.chunks().any(|c| !matches!(c.kind, ChunkKind::Slot | ChunkKind::Inquiry | ChunkKind::NextKey));
+        let key_parts: Vec<Vec<u8>> =
+            inbound.chunks().filter(|c| c.kind == ChunkKind::NextKey).map(|c| c.payload.to_vec()).collect();
         let inquiry = inbound.chunks().find(|c| c.kind == ChunkKind::Inquiry);
         let inquiry = inquiry.and_then(|chunk| InForceDigests::decode(chunk.payload).ok());
         let (number, is_latest, lacks_base, fates) =
@@ -110,7 +116,36 @@ impl<S: StateSource> VehicleLink<S> {
         if lacks_base {
             self.renew(now);
         }
+        self.handle_key_parts(&key_parts);
         self.owe_answer(now);
+    }
+
+    /// Takes parts of the next key, and notes that the surface has proven a run under it.
+    fn handle_key_parts(&mut self, parts: &[Vec<u8>]) {
+        if self.pair.poll_key_change() {
+            if let Some(authenticity) = self.config.authenticity.as_mut()
+                && let Some(next) = authenticity.next.take()
+            {
+                authenticity.key = next;
+            }
+            self.events.push_back(VehicleEvent::KeyChanged);
+        }
+        for part in parts {
+            match self.pair.handle_key_part(part) {
+                Ok(key) => self.events.extend(key.map(VehicleEvent::NextKey)),
+                Err(Truncated) => self.pair.stats.drop(DropReason::Malformed),
+            }
+        }
+    }
+
+    /// The host keeps the next key, so that this end accepts it from now on.
+    pub fn keep_next_key(&mut self, key: &VehicleKey) {
+        let is_held = |next: &Arc<HeldKey>| matches!(&**next, HeldKey::Vehicle(held) if held == key);
+        let Some(authenticity) = self.config.authenticity.as_mut() else { return };
+        if !authenticity.next.as_ref().is_some_and(is_held) {
+            authenticity.next = Some(Arc::new(HeldKey::Vehicle(key.clone())));
+            self.pair.use_next_key(key);
+        }
     }
 
     fn is_silent_for(&self, time: Duration, now: Instant) -> bool {
@@ -120,16 +155,16 @@ impl<S: StateSource> VehicleLink<S> {
     /// Answers a discovery call, unless the surface is in contact with us.
     fn handle_call(&mut self, envelope: &Envelope<'_>, now: Instant) {
         const CONTACT_TIMEOUT: Duration = Duration::from_secs(60);
-        if !CallReply::is_call(&self.config, envelope) {
+        let Some(generation) = CallReply::called_by(&self.config, envelope) else {
             return self.pair.stats.drop(DropReason::Checksum);
-        }
+        };
         if self.pair.has_run() && self.last_received().is_some_and(|at| now.since(at) < CONTACT_TIMEOUT) {
             return;
         }
         if !self.hello_limit.admit(envelope.header.session, now) {
             return;
         }
-        let grant = self.call_reply.handle_call(&self.config, &envelope.header, now);
+        let grant = self.call_reply.handle_call(&self.config, &envelope.header, generation, now);
         self.begin_turn();
         self.floor.handle_grant(Some(grant));
     }

@@ -95,7 +95,11 @@ fn contents() -> Vec<Seed> {
                 ChunkKind::Slot => seeds.push(("slot", format!("slot-{i}"), framed)),
                 ChunkKind::Layer => seeds.push(("layer_chunk", format!("talk-{i}"), payload)),
                 ChunkKind::InForce | ChunkKind::Inquiry => seeds.push(("in_force", format!("{way}-{i}"), framed)),
-                ChunkKind::Map | ChunkKind::Object | ChunkKind::Introduction | ChunkKind::Caller => {}
+                ChunkKind::Map
+                | ChunkKind::Object
+                | ChunkKind::Introduction
+                | ChunkKind::Caller
+                | ChunkKind::NextKey => {}
             }
         }
         seeds.push(("chunks", format!("{way}-{i}"), body));

@@ -6,15 +6,17 @@ pub(crate) use setup::{CALM, LossyChannel, Setup};
 
 use scenecast_protocol::directive::{Constraints, Slot, SlotId, SlotState, Utility};
 use scenecast_protocol::link::{
-    SlotInboxState, SurfaceConfig, SurfaceEvent, SurfaceLink, VehicleConfig, VehicleEvent, VehicleLink,
+    Authenticity, SlotInboxState, SurfaceConfig, SurfaceEvent, SurfaceLink, VehicleConfig, VehicleEvent, VehicleLink,
 };
 use scenecast_protocol::mac::Access;
 use scenecast_protocol::map::{Cell, LabelGrid, LayerDescriptor, LayerId, LayerSet, LayerSource};
 use scenecast_protocol::map_codec::Codec;
 use scenecast_protocol::schedule::Audit;
+use scenecast_protocol::seal::HeldKey;
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::{Address, VehicleStatus};
 use std::collections::{BTreeMap, VecDeque};
+use std::sync::Arc;
 use std::time::Duration;
 
 pub(crate) struct LinkedEnds {
@@ -40,6 +42,8 @@ pub(crate) struct LinkedEnds {
     modems: [(VecDeque<Vec<u8>>, bool); 2],
     /// The last transmissions of both ends.
     pub(crate) overheard: VecDeque<Vec<u8>>,
+    /// What the vehicle authenticates by, also after a restart.
+    pub(crate) vehicle_keys: Option<Authenticity>,
     serial: u64,
     durable: SlotInboxState,
     /// The content in force that survives a restart of the vehicle.
@@ -73,15 +77,16 @@ impl LinkedEnds {
             vehicle_events: Vec::new(),
             surface_events: Vec::new(),
             status: VehicleStatus { labels: 3, ..VehicleStatus::default() },
-            setup,
             random: seed ^ 0xABCD,
             on_air: BTreeMap::new(),
             modems: Default::default(),
             overheard: VecDeque::new(),
+            vehicle_keys: setup.authenticity.clone(),
             serial: 0,
             durable: SlotInboxState::default(),
             in_force: BTreeMap::new(),
             quantities: Vec::new(),
+            setup,
         }
     }
 
@@ -92,7 +97,8 @@ impl LinkedEnds {
 
     pub(crate) fn restart_vehicle(&mut self, map: &LabelGrid) {
         let seed = (self.draw() * 1e15) as u64;
-        self.vehicle = vehicle_of(&self.setup, seed, self.durable.clone(), self.now);
+        let setup = Setup { authenticity: self.vehicle_keys.clone(), ..self.setup.clone() };
+        self.vehicle = vehicle_of(&setup, seed, self.durable.clone(), self.now);
         self.vehicle.assume_budget_spent(self.now);
         let in_force: Vec<Slot> = self.in_force.values().cloned().collect();
         in_force.into_iter().for_each(|slot| self.put_in_force(slot));
@@ -119,6 +125,11 @@ impl LinkedEnds {
         for (id, cells) in &self.quantities {
             self.vehicle.set_layer(*id, cells.iter().copied(), self.now);
         }
+    }
+
+    /// What the surface authenticates by from its next restart on.
+    pub(crate) fn set_surface_keys(&mut self, keys: Option<Authenticity>) {
+        self.setup.authenticity = keys;
     }
 
     pub(crate) fn restart_surface(&mut self) {
@@ -219,8 +230,14 @@ impl LinkedEnds {
             if matches!(event, VehicleEvent::Mismatch(_)) {
                 self.vehicle_events.push(event.clone());
             }
-            if event == VehicleEvent::SurfaceMet {
-                self.durable = self.vehicle.persistent_state().clone();
+            match (&event, self.vehicle_keys.as_mut()) {
+                (VehicleEvent::SurfaceMet, _) => self.durable = self.vehicle.persistent_state().clone(),
+                (VehicleEvent::NextKey(key), Some(keys)) => {
+                    keys.next = Some(Arc::new(HeldKey::Vehicle(key.clone())));
+                    self.vehicle.keep_next_key(key);
+                }
+                (VehicleEvent::KeyChanged, Some(keys)) => keys.key = keys.next.take().expect("the next key was kept"),
+                _ => {}
             }
             if let VehicleEvent::Slot { id, content: Some(slot), .. } = event {
                 self.applied.push(slot.clone());

@@ -5,7 +5,6 @@ use scenecast_protocol::mac::{Access, ModemProfile};
 use scenecast_protocol::map_codec::Codec;
 use scenecast_protocol::seal::{HeldKey, MissionKey};
 use scenecast_protocol::wire::MissionId;
-use std::sync::Arc;
 use std::time::Duration;
 
 /// How the channel treats frames.
@@ -63,8 +62,8 @@ impl Setup {
     }
 
     pub(crate) fn keyed(self, all: bool, encrypt: bool) -> Self {
-        let key = Arc::new(HeldKey::Mission(MissionKey::from_bytes([42; 16])));
-        Self { authenticity: Some(Authenticity { key, all, encrypt }), ..self }
+        let key = HeldKey::Mission(MissionKey::from_bytes([42; 16]));
+        Self { authenticity: Some(Authenticity::new(key, all, encrypt)), ..self }
     }
 
     pub(crate) fn modem(&self) -> ModemProfile {

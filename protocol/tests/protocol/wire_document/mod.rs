@@ -10,7 +10,7 @@ use samples::{
     answered, auv, call, clock, first_of_surface, frame, header, here, hold, introduction, key, map_payload,
     mission_key, session, surface_hello, vehicle_hello,
 };
-use scenecast_protocol::seal::{Direction, VehicleKey};
+use scenecast_protocol::seal::{Direction, MissionKey, VehicleKey};
 use scenecast_protocol::wire::{Address, ChunkKind, Header, Seal, WIRE_VERSION};
 
 #[test]
@@ -76,7 +76,11 @@ fn golden_values_of_the_keys_are_those_of_the_document() {
         let tag = session(encrypt).seal(direction, 5, b"head", &mut body);
         (compact(&tag), compact(&body))
     };
+    let next = VehicleKey::derive(&MissionKey::from_bytes([0x5A; 16]), 1);
+    let [link, calls] = next.offer(&key());
     let expected = [
+        ("part 0 of the offer of a next key, M = sixteen bytes 5A", compact(&link)),
+        ("part 1 of it", compact(&calls)),
         ("fingerprint", format!("{:08x}", mission_key().fingerprint())),
         ("key file", mission_key().to_text().trim().to_owned()),
         ("key file of vehicle 1", VehicleKey::derive(&mission_key(), 1).to_text().trim().to_owned()),

@@ -161,7 +161,9 @@ impl<R: StateReplica> PeerContent<R> {
                 None => ChunkOutcome::Malformed,
             },
             ChunkKind::InForce | ChunkKind::Caller => ChunkOutcome::Accepted,
-            ChunkKind::Slot | ChunkKind::Introduction | ChunkKind::Inquiry => ChunkOutcome::Malformed,
+            ChunkKind::Slot | ChunkKind::Introduction | ChunkKind::Inquiry | ChunkKind::NextKey => {
+                ChunkOutcome::Malformed
+            }
         }
     }
 
@@ -197,7 +199,7 @@ pub(super) fn class_of(chunk: &Chunk<'_>) -> Class {
         ChunkKind::Map | ChunkKind::LabelClass | ChunkKind::LabelTree => Class::Map,
         ChunkKind::Pose | ChunkKind::Trail | ChunkKind::Intent | ChunkKind::Registration => Class::Status,
         ChunkKind::Report | ChunkKind::InForce | ChunkKind::Faults | ChunkKind::Caller => Class::Status,
-        ChunkKind::Slot | ChunkKind::Inquiry => Class::Directive,
+        ChunkKind::Slot | ChunkKind::Inquiry | ChunkKind::NextKey => Class::Directive,
         ChunkKind::Introduction => Class::Overhead,
         ChunkKind::Object => Class::Exemplar,
         ChunkKind::Layer => LayerChunk::decode(chunk.payload).map_or(Class::Overhead, |c| Class::Layer(c.id())),
@@ -219,6 +221,6 @@ fn decode<R: StateReplica>(replica: &R, layers: &Layers, base: FrameNumber, mut 
         ChunkKind::Layer => layers.decodes(base, chunk.payload),
         ChunkKind::InForce => InForcePart::decode(chunk.payload).is_ok(),
         ChunkKind::Caller => Introduction::decode(chunk.payload).is_ok_and(|caller| caller.series.is_some()),
-        ChunkKind::Slot | ChunkKind::Introduction | ChunkKind::Inquiry => true,
+        ChunkKind::Slot | ChunkKind::Introduction | ChunkKind::Inquiry | ChunkKind::NextKey => true,
     })
 }

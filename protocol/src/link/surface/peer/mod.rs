@@ -11,6 +11,7 @@ mod ended;
 mod in_force;
 mod pool;
 mod rival;
+mod rotation;
 mod status;
 mod timing;
 mod turn;
@@ -38,6 +39,7 @@ use content::{ChunkOutcome, PeerContent, class_of};
 use divergence::Divergence;
 use in_force::InForceCopy;
 use rival::Rivals;
+use rotation::KeyOffers;
 use std::collections::VecDeque;
 use std::time::Duration;
 use timing::VehicleTiming;
@@ -81,6 +83,7 @@ pub(super) struct VehiclePeer<R> {
     last_turn: LastTurn,
     divergence: Divergence,
     twins: TwinWatch,
+    key_offers: KeyOffers,
     /// The two ends were found to differ: a new run must begin.
     is_out_of_step: bool,
     /// Whether both directions are on the air at once, so that answers are prompt.
@@ -111,6 +114,7 @@ impl<R: StateReplica> VehiclePeer<R> {
             last_turn: LastTurn { began: 0, purpose: FramePurpose::Content },
             divergence: Divergence::default(),
             twins: TwinWatch::default(),
+            key_offers: KeyOffers::new(now),
             is_out_of_step: false,
             is_full_duplex: false,
             answer_wait: USUAL_ANSWER_WAIT,
@@ -273,6 +277,8 @@ impl<R: StateReplica> VehiclePeer<R> {
         if inbound.is_ok() {
             self.pair.note_length(bytes, modem.frame_bytes);
         }
+        let has_changed_key = self.pair.poll_key_change();
+        events.extend(has_changed_key.then(|| SurfaceEvent::KeyChanged(self.address())));
         events.extend(self.pair.poll_mismatch().map(|m| SurfaceEvent::Mismatch(self.pair.peer(), m)));
         let inbound = match inbound {
             Ok(inbound) => inbound,

@@ -44,7 +44,14 @@ impl<R: StateReplica> VehiclePeer<R> {
         let owes =
             (!self.pair.is_proven() && answer) || (self.pair.unstated() > 0 && (is_late || answer)) || is_repeat_due;
         let inquires = self.in_force.next_inquiry().is_some_and(|at| now >= at);
-        self.has_numbers() && (owes || inquires || !self.outbox.pending(now, now - self.slot_timeout()).is_empty())
+        let offers = self.next_offer().is_some_and(|at| now >= at);
+        self.has_numbers()
+            && (owes || inquires || offers || !self.outbox.pending(now, now - self.slot_timeout()).is_empty())
+    }
+
+    /// When the next part of the next key is due, if the vehicle is offered one.
+    fn next_offer(&self) -> Option<Instant> {
+        self.pair.offers_key().then(|| self.key_offers.next())
     }
 
     /// When the last acknowledgement goes out again, if no frame confirms it.
@@ -62,11 +69,12 @@ impl<R: StateReplica> VehiclePeer<R> {
         let again = self.outbox.progress().filter_map(|s| s.sent).min().map(|at| at + self.slot_timeout());
         let again = again.filter(|_| self.outbox.has_backlog());
         let hello = self.contact.next_hello(self.pair.is_proven() && !self.pair.is_full(), self.slot_timeout());
-        let numbered = [self.contact.answer_due, self.next_repeat(), again, self.in_force.next_inquiry()]
-            .into_iter()
-            .flatten()
-            .filter(|_| self.has_numbers())
-            .min();
+        let numbered =
+            [self.contact.answer_due, self.next_repeat(), again, self.in_force.next_inquiry(), self.next_offer()]
+                .into_iter()
+                .flatten()
+                .filter(|_| self.has_numbers())
+                .min();
         [Some(hello), self.proof_due(), numbered].into_iter().flatten().min()
     }
 

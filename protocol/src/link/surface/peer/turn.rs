@@ -7,6 +7,7 @@ use crate::link::{FrameNumber, Transmit, TransmitKind};
 use crate::mac::{Grant, ModemProfile};
 use crate::map::StateReplica;
 use crate::schedule::{Class, ClassShares};
+use crate::seal::VehicleKey;
 use crate::time::Instant;
 use crate::wire::{ChunkKind, Stamp, room_for_payload};
 
@@ -14,6 +15,8 @@ use crate::wire::{ChunkKind, Stamp, room_for_payload};
 const SHORT_ACK: usize = 2;
 /// Bytes of a frame that no slot can use: header, turn, a short acknowledgement, chunk header.
 const SLOT_OVERHEAD: usize = 9 + 1 + SHORT_ACK + 1;
+/// Bytes that a part of the next key takes in a frame.
+const KEY_PART_BYTES: usize = 2 + VehicleKey::PART_BYTES;
 /// Frames smaller than this have no room for a stamp beside a slot.
 const SMALL_FRAME: usize = 48;
 
@@ -34,9 +37,12 @@ pub(in crate::link::surface) struct Ready {
 #[derive(Debug, Clone, Copy)]
 struct FrameContent<'a> {
     slots: &'a [PendingSlot],
-    /// The payload of an inquiry for the content in force.
-    inquiry: Option<&'a [u8]>,
+    /// What goes where there are no slots.
+    beside: Option<&'a Beside>,
 }
+
+/// An inquiry for the content in force, or a part of the next key.
+type Beside = (ChunkKind, Vec<u8>);
 
 /// The slots of each frame of a turn.
 pub(super) type TurnPlan = Vec<Vec<PendingSlot>>;
@@ -86,19 +92,26 @@ impl<R: StateReplica> VehiclePeer<R> {
         let mut at = now;
         let mut turn = Vec::with_capacity(plan.len());
         let has_room = purpose == FramePurpose::Content && plan.iter().any(Vec::is_empty);
-        let inquiry = self.in_force.inquiry(now).filter(|_| has_room);
-        if inquiry.is_some() {
-            self.in_force.note_inquiry(now);
-        }
+        let beside = if has_room { self.take_beside(now) } else { None };
         for slots in plan {
             bits_left -= self.bits(slots, modem, purpose);
             let remaining = Grant::code_remaining(bits_left);
-            let content = FrameContent { slots, inquiry: inquiry.as_deref().filter(|_| slots.is_empty()) };
+            let content = FrameContent { slots, beside: beside.as_ref().filter(|_| slots.is_empty()) };
             let ready = self.write_frame(content, modem, grant, remaining, purpose, at);
             at = at + modem.airtime(ready.transmit.bytes.len());
             turn.push(ready);
         }
         turn
+    }
+
+    /// What goes at `now` into frames without slots.
+    fn take_beside(&mut self, now: Instant) -> Option<Beside> {
+        if let Some(bytes) = self.in_force.inquiry(now) {
+            self.in_force.note_inquiry(now);
+            return Some((ChunkKind::Inquiry, bytes));
+        }
+        let parts = self.pair.next_key_parts()?;
+        Some((ChunkKind::NextKey, self.key_offers.take(parts, now)?))
     }
 
     /// The most bits on air that a frame with these slots takes.
@@ -109,8 +122,10 @@ impl<R: StateReplica> VehiclePeer<R> {
         purpose: FramePurpose,
     ) -> u64 {
         const HEAD: usize = 9 + 1 + Stamp::SURFACE_BYTES;
-        let inquiry = if slots.is_empty() && self.in_force.lacks_any() { InForceCopy::INQUIRY_BYTES } else { 0 };
-        let chunks = inquiry + slots.iter().map(|s| s.bytes.len() + 2).sum::<usize>();
+        let inquiry = if self.in_force.lacks_any() { InForceCopy::INQUIRY_BYTES } else { 0 };
+        let key_part = if self.pair.offers_key() { KEY_PART_BYTES } else { 0 };
+        let beside = if slots.is_empty() { inquiry.max(key_part) } else { 0 };
+        let chunks = beside + slots.iter().map(|s| s.bytes.len() + 2).sum::<usize>();
         let bytes = match purpose.is_hello() || !self.pair.has_run() {
             true => self.pair.hello_bytes(),
             false => HEAD + chunks + self.pair.statement_bytes() + self.pair.seal_bytes(),
@@ -120,15 +135,15 @@ impl<R: StateReplica> VehiclePeer<R> {
 
     fn write_frame(
         &mut self,
-        FrameContent { slots, inquiry }: FrameContent<'_>,
+        FrameContent { slots, beside }: FrameContent<'_>,
         modem: &ModemProfile,
         grant: Option<u8>,
         remaining: u8,
         purpose: FramePurpose,
         at: Instant,
     ) -> Ready {
-        let inquired = inquiry.map_or(0, |_| InForceCopy::INQUIRY_BYTES);
-        let chunks = inquired + slots.iter().map(|s| s.bytes.len() + 2).sum::<usize>();
+        let chunks =
+            beside.map_or(0, |(_, bytes)| bytes.len() + 2) + slots.iter().map(|s| s.bytes.len() + 2).sum::<usize>();
         let has_room = modem.frame_bytes >= SMALL_FRAME + chunks;
         let one_way = self.master.round_trip().map(|both| both / 2);
         let stamp = Stamp::Surface { clock_ms: Stamp::clock(at), one_way };
@@ -140,8 +155,8 @@ impl<R: StateReplica> VehiclePeer<R> {
         builder.set_remaining(remaining);
         let mut carried = Carried::new();
         let mut payload = 0;
-        if let Some(bytes) = inquiry
-            && builder.push(ChunkKind::Inquiry, bytes)
+        if let Some((kind, bytes)) = beside
+            && builder.push(*kind, bytes)
         {
             self.pair.stats.count(Class::Directive, bytes.len());
             payload += bytes.len();
