@@ -59,9 +59,13 @@ pub(super) struct Handshake<T> {
     unproved: Option<Identity>,
     /// At the surface: the number in the current run of the next frame when an offer last came in or a proof went out.
     doubted_from: FrameNumber,
+    /// At the vehicle: hellos of the current run before it has acknowledged any frame.
+    doubts: u32,
     /// At the vehicle: `run` serves only to receive grants, because this end has begun a new one.
     leaving: bool,
     retired: VecDeque<EndedPeer>,
+    /// At the surface: offers that were dropped, although the vehicle may use one of them.
+    dropped: VecDeque<EndedPeer>,
     identities: Identities,
 }
 
@@ -72,6 +76,8 @@ impl<T> Handshake<T> {
     const OFFERS: usize = 4;
     /// Frames without any acknowledgement after which a vehicle doubts that the surface knows its run.
     const DOUBTFUL: u64 = 128;
+    /// Hellos without any acknowledgement after which it does where a forged frame may have proven the run.
+    const DOUBTS: u32 = 3;
 
     /// A handshake that has not begun.
     pub(super) fn new(mut identities: Identities) -> Self {
@@ -81,8 +87,10 @@ impl<T> Handshake<T> {
             offered: Vec::new(),
             unproved: None,
             doubted_from: 0,
+            doubts: 0,
             leaving: false,
             retired: VecDeque::new(),
+            dropped: VecDeque::new(),
             identities,
         }
     }
@@ -151,15 +159,22 @@ impl<T> Handshake<T> {
 
     /// At the vehicle: handles a hello of the surface. A new run of the surface is offered a new run of ours, and so is one
     /// that has ended here if `accepts_ended`, and the current one if it has acknowledged none of many frames of ours: it
-    /// may have taken us for another run. A hello of another version has no introduction that can be read.
+    /// may have taken us for another run, or, where a frame `may_be_forged`, never have proven this one. A hello of another
+    /// version has no introduction that can be read.
     pub(super) fn handle_call(
         &mut self,
         peer: Identity,
         introduction: Option<Introduction>,
         accepts_ended: bool,
+        may_be_forged: bool,
         key: impl Fn(Identity, Identity) -> RunKey,
     ) -> HandshakeOutcome {
-        let is_doubtful = |r: &LinkRun<T>| r.flight.horizon() == 0 && r.flight.next_number() > Self::DOUBTFUL;
+        let is_repeated = self.run.as_ref().is_some_and(|r| r.peer == peer && r.flight.horizon() == 0);
+        self.doubts += u32::from(may_be_forged && is_repeated);
+        let doubts = self.doubts;
+        let is_doubtful = |r: &LinkRun<T>| {
+            r.flight.horizon() == 0 && (r.flight.next_number() > Self::DOUBTFUL || doubts >= Self::DOUBTS)
+        };
         if self.run.as_ref().is_some_and(|r| r.peer == peer && !is_doubtful(r)) && !self.leaving {
             return HandshakeOutcome::Known;
         }
@@ -192,7 +207,9 @@ impl<T> Handshake<T> {
     /// out after the last offer and the last proof; any other frame may be a late one, of before the vehicle took a proof.
     pub(super) fn handle_current(&mut self) {
         if self.run.as_ref().is_some_and(|r| r.flight.horizon() >= self.doubted_from) {
-            self.offered.clear();
+            while !self.offered.is_empty() {
+                self.drop_oldest_offer();
+            }
         }
     }
 
@@ -204,6 +221,7 @@ impl<T> Handshake<T> {
             self.offered = runs.collect();
             self.own = run.own;
             self.leaving = false;
+            self.doubts = 0;
             self.replace(run);
             self.doubt();
         }
@@ -232,7 +250,7 @@ impl<T> Handshake<T> {
         let known = self.offered.iter().position(|r| r.peer == peer).map(|index| self.offered.remove(index));
         let offer = known.filter(|r| !r.flight.is_full()).unwrap_or_else(new);
         if self.offered.len() == Self::OFFERS {
-            self.offered.remove(0);
+            self.drop_oldest_offer();
         }
         self.offered.push(offer);
         self.unproved = Some(peer);
@@ -257,6 +275,13 @@ impl<T> Handshake<T> {
         }
     }
 
+    fn drop_oldest_offer(&mut self) {
+        self.dropped.push_back(self.offered.remove(0).end());
+        if self.dropped.len() > Self::OFFERS {
+            self.dropped.pop_front();
+        }
+    }
+
     fn replace(&mut self, run: LinkRun<T>) {
         let peer = run.peer;
         if let Some(old) = self.run.replace(run)
@@ -270,9 +295,17 @@ impl<T> Handshake<T> {
         self.retired.iter().any(|r| r.identity == peer)
     }
 
-    /// The ended run of the peer that sent this frame to a run of ours, if the frame came in for the first time.
-    pub(super) fn ended_sender(&mut self, envelope: &Envelope<'_>, direction: Direction) -> Option<&EndedPeer> {
-        self.retired.iter_mut().find_map(|r| r.accept(envelope, direction).then_some(&*r))
+    /// The ended run of the peer, or the dropped offer, that sent this frame to a run of ours, if the frame came in for the first
+    /// time.
+    pub(super) fn ended_sender(
+        &mut self,
+        envelope: &Envelope<'_>,
+        mission: MissionId,
+        direction: Direction,
+        keyed: bool,
+    ) -> Option<&EndedPeer> {
+        let ended = self.retired.iter_mut().chain(&mut self.dropped);
+        ended.into_iter().find_map(|r| r.accept(envelope, mission, direction, keyed).then_some(&*r))
     }
 
     /// At the vehicle: the introduction of the surface that holds it, if that is another one than this.

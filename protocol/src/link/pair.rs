@@ -12,7 +12,7 @@ use super::{FrameNumber, LinkStats, LinkWindow};
 use crate::directive::Series;
 use crate::seal::{Direction, KeyOffer, TAG_BYTES};
 use crate::wire::{
-    Address, ChunkKind, FrameBuilder, FrameKind, Header, Introduction, MissionId, Seal, Stamp, UtcHours,
+    Address, ChunkKind, FrameBuilder, FrameKind, Header, Introduction, MissionId, Seal, SessionId, Stamp, UtcHours,
     room_for_payload,
 };
 use std::time::Duration;
@@ -24,8 +24,8 @@ pub const HOLDER_SILENCE: Duration = Duration::from_secs(120);
 #[derive(Debug, Default)]
 struct Strays {
     count: u32,
-    /// Whether one of them was sent in a run that is unknown here.
-    of_unknown_run: bool,
+    /// Whether one of them was sent in a run that has ended here.
+    of_ended_run: bool,
 }
 
 /// Handshake, flight, window and counters toward one peer. `T` is the content of a sent frame.
@@ -122,9 +122,9 @@ impl<T> LinkPair<T> {
         self.silence = silence;
     }
 
-    /// At the vehicle: whether the next hello refuses a surface.
-    pub fn owes_refusal(&self) -> bool {
-        self.refused.is_some()
+    /// At the vehicle: the session of the surface that the next hello refuses.
+    pub fn refused_session(&self) -> Option<SessionId> {
+        self.refused.map(|(run, _)| run.session)
     }
 
     /// At the vehicle: the introduction of later hellos says that it has no memory of orders, or that it has.
@@ -174,7 +174,7 @@ impl<T> LinkPair<T> {
 
     /// Whether a frame names the peer's current run as its own.
     pub(super) fn is_of_current_run(&self, header: &Header) -> bool {
-        self.handshake.run().is_some_and(|run| run.peer.session == header.session)
+        self.handshake.run().is_some_and(|run| header.session == Some(run.peer.session))
     }
 
     /// Whether there is a current run of the peer.
@@ -239,7 +239,7 @@ impl<T> LinkPair<T> {
 
     /// Whether a frame has come in since the last accepted one that the peer seems to have sent in a run that is unknown here.
     pub(super) fn hears_unknown_run(&self) -> bool {
-        self.strays.of_unknown_run
+        self.strays.of_ended_run
     }
 
     /// The number of frames since the last accepted one that are a sign of other runs.
@@ -267,22 +267,17 @@ impl<T> LinkPair<T> {
         self.handshake.run().map_or(0, |r| r.window.statement_bytes())
     }
 
-    /// The most bytes of the seal of our numbered frames.
+    /// The bytes of the seal of our numbered frames.
     pub fn seal_bytes(&self) -> usize {
-        if self.is_keyed(self.direction_out()) { TAG_BYTES } else { 4 }
+        Seal::bytes(self.is_keyed(self.direction_out()), FrameKind::Numbered)
     }
 
     /// The most bytes of a hello of ours.
     pub fn hello_bytes(&self) -> usize {
         const HEADER_AND_TURN: usize = 9;
         const CHUNK_HEAD: usize = 2;
-        let seal = if self.authenticity.is_some() { 8 + TAG_BYTES } else { Seal::bytes(false, 0) };
+        let seal = if self.authenticity.is_some() { 8 + TAG_BYTES } else { Seal::bytes(false, FrameKind::Hello) };
         HEADER_AND_TURN + CHUNK_HEAD + self.introduction.encode(Introduction::MAX_BYTES).len() + seal
-    }
-
-    /// Bytes of the seal of a full frame of ours.
-    pub fn full_seal_bytes(&self, frame_bytes: usize) -> usize {
-        Seal::bytes(self.is_keyed(self.direction_out()), frame_bytes)
     }
 
     fn direction_out(&self) -> Direction {
@@ -345,7 +340,7 @@ impl<T> LinkPair<T> {
         let header = Header {
             from: self.us,
             to: self.peer,
-            session: own.session,
+            session: hello.then_some(own.session),
             number,
             base,
             remaining: 0,
@@ -373,7 +368,7 @@ impl<T> LinkPair<T> {
             // The current run may be in use still: the hello of the surface may be a replay.
             self.owes_hello &= self.handshake.is_leaving();
             let is_surface = self.us == Address::SURFACE;
-            let to = self.handshake.offered().filter(|_| !is_surface).map(|r| (r.peer, r.key.generation));
+            let to = self.handshake.offered().filter(|_| !is_surface).map(|r| (r.peer, r.generation));
             let to = self.refused.take().or(to);
             let (session, nonce) = to.map_or((0, 0), |(p, _)| (p.session.get(), p.nonce));
             let generation = if is_surface { self.next_voice() } else { to.map_or(self.speaks, |(_, used)| used) };
@@ -386,10 +381,7 @@ impl<T> LinkPair<T> {
         let Some(run) = self.handshake.run_for(purpose) else { return Vec::new() };
         let number = run.flight.next_number();
         run.flight.push(carried);
-        let bytes = match run.key.session.as_ref().filter(|_| keyed) {
-            Some(key) => builder.finish(&Seal::Session(key, direction, number), short),
-            None => builder.finish(&Seal::Crc(mission, run.peer.session.get()), short),
-        };
+        let bytes = builder.finish(&run.seal(mission, direction, keyed, number), short);
         if purpose == FramePurpose::Proof {
             self.handshake.note_proof();
         }
@@ -403,7 +395,7 @@ impl<T> LinkPair<T> {
         if self.us == Address::SURFACE {
             self.handshake.renew_surface();
         } else {
-            let generation = self.handshake.run().map_or(Generation::Present, |run| run.key.generation);
+            let generation = self.handshake.run().map_or(Generation::Present, |run| run.generation);
             self.offer_run(generation);
         }
     }

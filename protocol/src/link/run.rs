@@ -2,7 +2,7 @@
 
 use super::{Flight, FrameNumber, LinkWindow};
 use crate::seal::{Direction, HeldKey, LinkKey, SessionKey, VehicleKey};
-use crate::wire::{Address, Envelope, Frame, Introduction, MissionId, Seal, SessionId, unwrap_number};
+use crate::wire::{Address, Envelope, Frame, Introduction, MissionId, Seal, SessionId};
 use std::sync::Arc;
 
 /// The key and the scope of authentication.
@@ -146,22 +146,53 @@ pub(super) struct EndedPeer {
     pub(super) own: Identity,
     pub(super) identity: Identity,
     pub(super) introduction: Introduction,
-    /// The key of its frames to a run of ours, if there is one.
-    key: Option<SessionKey>,
+    seals: RunSeals,
     highest: FrameNumber,
 }
 
+/// What seals the frames of a pair of runs.
+#[derive(Debug)]
+struct RunSeals {
+    /// The sessions of our run and of the peer's.
+    own: SessionId,
+    peer: SessionId,
+    key: Option<SessionKey>,
+}
+
+impl RunSeals {
+    /// The frame, if the peer's run sealed it to ours. Its number is the one nearest to `highest`; if `keyed`, it must have a tag.
+    fn open<'a>(
+        &self,
+        envelope: &Envelope<'a>,
+        mission: MissionId,
+        direction: Direction,
+        keyed: bool,
+        highest: FrameNumber,
+    ) -> Option<Frame<'a>> {
+        let near = envelope.header.number_near(highest);
+        let Some(key) = self.key.as_ref().filter(|_| keyed) else {
+            // A forged frame may have raised the highest number: the true ones are recognised, and come late.
+            let all = std::iter::once(near).chain(envelope.header.numbers(highest));
+            let crc = |number| Seal::Run { mission, to: self.own, from: self.peer, number };
+            return all.into_iter().find_map(|number| envelope.open(&crc(number)));
+        };
+        envelope.open(&Seal::Session(key, direction, near))
+    }
+}
+
 impl EndedPeer {
-    /// Whether it sent this frame, by a valid tag, after all of its frames that came in before.
-    pub(super) fn accept(&mut self, envelope: &Envelope<'_>, direction: Direction) -> bool {
-        let number = unwrap_number(envelope.header.number, self.highest);
-        let is_open = |key| envelope.open(&Seal::Session(key, direction, number)).is_some();
-        let is_new = envelope.header.session == self.identity.session
-            && number > self.highest
-            && self.key.as_ref().is_some_and(is_open);
-        if is_new {
-            self.highest = number;
-        }
+    /// Whether it sent this frame, by a valid seal, after all of its frames that came in before.
+    pub(super) fn accept(
+        &mut self,
+        envelope: &Envelope<'_>,
+        mission: MissionId,
+        direction: Direction,
+        keyed: bool,
+    ) -> bool {
+        let opened = self.seals.open(envelope, mission, direction, keyed, self.highest);
+        // Without a tag, a forged frame may have raised the highest number.
+        let is_new = opened.as_ref().is_some_and(|frame| frame.number > self.highest || !keyed);
+        self.highest = self.highest.max(opened.map_or(0, |frame| frame.number));
         is_new
     }
 }
@@ -175,7 +206,9 @@ pub(super) struct LinkRun<T> {
     pub(super) introduction: Introduction,
     /// Whether the hello had this version of the wire. Without, no frame of the run is read.
     is_readable: bool,
-    pub(super) key: RunKey,
+    seals: RunSeals,
+    /// The generation of the key.
+    pub(super) generation: Generation,
     pub(super) flight: Flight<T>,
     pub(super) window: LinkWindow,
 }
@@ -183,7 +216,8 @@ pub(super) struct LinkRun<T> {
 impl<T> LinkRun<T> {
     pub(super) fn new(own: Identity, peer: Identity, introduction: Introduction, key: RunKey) -> Self {
         let (flight, window) = (Flight::default(), LinkWindow::default());
-        Self { own, peer, introduction, is_readable: true, key, flight, window }
+        let seals = RunSeals { own: own.session, peer: peer.session, key: key.session };
+        Self { own, peer, introduction, is_readable: true, seals, generation: key.generation, flight, window }
     }
 
     /// A run of which the hello may have another version of the wire, so that its introduction is not known.
@@ -206,7 +240,15 @@ impl<T> LinkRun<T> {
 
     pub(super) fn end(self) -> EndedPeer {
         let (own, identity, introduction) = (self.own, self.peer, self.introduction);
-        EndedPeer { own, identity, introduction, key: self.key.session, highest: self.window.highest() }
+        EndedPeer { own, identity, introduction, seals: self.seals, highest: self.window.highest() }
+    }
+
+    /// The seal of a frame of ours with this number. If `keyed`, it is a tag.
+    pub(super) fn seal(&self, mission: MissionId, direction: Direction, keyed: bool, number: FrameNumber) -> Seal<'_> {
+        match self.seals.key.as_ref().filter(|_| keyed) {
+            Some(key) => Seal::Session(key, direction, number),
+            None => Seal::Run { mission, to: self.peer.session, from: self.own.session, number },
+        }
     }
 
     /// The frame, if the peer's run sealed it to ours. If `keyed`, it must have a tag.
@@ -217,15 +259,9 @@ impl<T> LinkRun<T> {
         direction: Direction,
         keyed: bool,
     ) -> Option<Frame<'a>> {
-        if envelope.header.session != self.peer.session || !self.is_readable {
+        if !self.is_readable || envelope.header.kind.is_hello() {
             return None;
         }
-        match self.key.session.as_ref().filter(|_| keyed) {
-            Some(key) => {
-                let number = unwrap_number(envelope.header.number, self.window.highest());
-                envelope.open(&Seal::Session(key, direction, number))
-            }
-            None => envelope.open(&Seal::Crc(mission, self.own.session.get())),
-        }
+        self.seals.open(envelope, mission, direction, keyed, self.window.highest())
     }
 }

@@ -1,7 +1,7 @@
 //! The window of received frames.
 
 use super::FrameNumber;
-use crate::wire::{AckStatement, MAX_WINDOW, unwrap_number};
+use crate::wire::{AckStatement, MAX_WINDOW};
 use std::collections::BTreeSet;
 
 /// Why the window rejects a verified frame.
@@ -48,9 +48,8 @@ impl LinkWindow {
         self.closed > self.base
     }
 
-    /// Number and base of a frame that [`Self::accept`] would accept, or the reason for which it would reject it.
-    pub fn preview(&self, number_low: u16, base_distance: u16) -> Result<(FrameNumber, FrameNumber), WindowRefusal> {
-        let number = unwrap_number(number_low, self.highest);
+    /// The base of a frame that [`Self::accept`] would accept, or the reason for which it would reject it.
+    pub fn preview(&self, number: FrameNumber, base_distance: u16) -> Result<FrameNumber, WindowRefusal> {
         let base = number.checked_sub(u64::from(base_distance)).ok_or(WindowRefusal::Late)?;
         if self.held.contains(&number) {
             return Err(WindowRefusal::Duplicate);
@@ -61,17 +60,17 @@ impl LinkWindow {
         if base > self.closed || number - self.base > 2 * MAX_WINDOW {
             return Err(WindowRefusal::NoBase);
         }
-        Ok((number, base))
+        Ok(base)
     }
 
-    /// Accepts a frame and returns its number, or the reason for which it is rejected.
-    pub fn accept(&mut self, number_low: u16, base_distance: u16) -> Result<FrameNumber, WindowRefusal> {
-        let (number, base) = self.preview(number_low, base_distance)?;
-        self.base = base;
+    /// Accepts a frame, or returns the reason for which it is rejected.
+    pub fn accept(&mut self, number: FrameNumber, base_distance: u16) -> Result<(), WindowRefusal> {
+        self.base = self.preview(number, base_distance)?;
+        let base = self.base;
         self.held = self.held.split_off(&(base + 1));
         self.held.insert(number);
         self.highest = self.highest.max(number);
-        Ok(number)
+        Ok(())
     }
 
     /// Bars frame `number` from acknowledgement until the host has made its content durable.
@@ -126,6 +125,7 @@ impl LinkWindow {
 mod tests {
     use super::super::Flight;
     use super::*;
+    use crate::wire::{Address, FrameKind, Header};
     use proptest::prelude::*;
 
     proptest! {
@@ -147,7 +147,7 @@ mod tests {
                     }
                     5..8 if !channel.is_empty() => {
                         let (number, distance) = channel.remove(pick % channel.len());
-                        if window.accept(number as u16, distance).is_ok() {
+                        if window.accept(number, distance).is_ok() {
                             prop_assert!(taken.insert(number), "frame {} taken twice", number);
                         }
                     }
@@ -165,6 +165,25 @@ mod tests {
         }
     }
 
+    /// The header of a frame, with as much of its number as is sent.
+    fn header(number: u64, base: u16) -> Header {
+        let vehicle = Address::vehicle(1).unwrap();
+        Header {
+            from: vehicle,
+            to: Address::SURFACE,
+            session: None,
+            number: if base < 128 { number & 0xFF } else { number & 0xFFFF } as u16,
+            base,
+            remaining: 0,
+            turn: None,
+            stamp: None,
+            nonce: None,
+            ack: None,
+            kind: FrameKind::Numbered,
+            keyed: false,
+        }
+    }
+
     #[test]
     fn both_ends_agree_across_every_wrap_of_the_counters() {
         let (mut flight, mut window) = (Flight::<u64>::default(), LinkWindow::default());
@@ -174,7 +193,8 @@ mod tests {
             flight.push(number);
             let arrives = |number: u64| !number.is_multiple_of(7);
             if arrives(number) {
-                assert_eq!(window.accept(number as u16, distance), Ok(number));
+                assert_eq!(header(number, distance).number_near(window.highest()), number);
+                assert_eq!(window.accept(number, distance), Ok(()));
             }
             if i % 300 == 0
                 && let Some(statement) = window.statement(200)
@@ -191,8 +211,8 @@ mod tests {
     #[test]
     fn undurable_frames_are_not_acknowledged() {
         let mut w = LinkWindow::default();
-        let first = w.accept(1, 1).unwrap();
-        w.hold_back(first);
+        w.accept(1, 1).unwrap();
+        w.hold_back(1);
         assert_eq!(w.statement(10), None);
         w.handle_persisted();
         assert!(w.statement(10).is_some());

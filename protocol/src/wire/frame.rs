@@ -2,16 +2,15 @@
 
 use super::WIRE_VERSION;
 use super::chunk::{ChunkKind, Chunks, push_chunk};
-use super::header::{Address, Header, MissionId};
+use super::header::{Address, FrameKind, Header, MissionId, SessionId};
 use crate::bytes::{Reader, Truncated};
 use crate::seal::{Direction, LinkKey, SessionKey, TAG_BYTES, Tag};
 use crc::{CRC_24_OPENPGP, CRC_32_ISCSI, Crc};
 use std::borrow::Cow;
 
-/// Frames shorter than this end in a 24-bit CRC, longer ones in a 32-bit one.
-const LONG_FRAME: usize = 128;
-
+/// The check of a hello, the same in every version from 2 on.
 static CRC24: Crc<u32> = Crc::<u32>::new(&CRC_24_OPENPGP);
+/// The check of a numbered frame.
 static CRC32: Crc<u32> = Crc::<u32>::new(&CRC_32_ISCSI);
 
 /// Why received bytes are not a frame for this end.
@@ -44,8 +43,20 @@ impl From<Truncated> for FrameError {
 /// The end of a frame, which proves its integrity or its authenticity.
 #[derive(Debug, Clone, Copy)]
 pub enum Seal<'a> {
-    /// A CRC over the mission, the receiver's session (0 if it is not known) and the frame.
+    /// The CRC of a hello, over the mission, the receiver's session (0 if it is not known) and the frame.
     Crc(MissionId, u16),
+    /// The CRC of a numbered frame, over the mission, the runs of the receiver and of the sender, the low 16 bits of the number, and
+    /// the frame.
+    Run {
+        /// The mission of both ends.
+        mission: MissionId,
+        /// The session of the receiver's run.
+        to: SessionId,
+        /// The session of the sender's run.
+        from: SessionId,
+        /// The number, which does not wrap.
+        number: u64,
+    },
     /// The tag of a hello: mission, the receiver's session and nonce (0 if they are not known) and the frame.
     Hello(&'a LinkKey, MissionId, u16, u64),
     /// The tag of a numbered frame; the number does not wrap.
@@ -53,13 +64,34 @@ pub enum Seal<'a> {
 }
 
 impl Seal<'_> {
-    /// Length of the seal of a frame of `len` bytes.
-    pub fn bytes(keyed: bool, len: usize) -> usize {
-        match (keyed, len < LONG_FRAME) {
+    /// The length of the seal in bytes.
+    pub const fn bytes(keyed: bool, kind: FrameKind) -> usize {
+        match (keyed, kind) {
             (true, _) => TAG_BYTES,
-            (false, true) => 3,
-            (false, false) => 4,
+            (false, FrameKind::Hello) => 3,
+            (false, FrameKind::Numbered) => 4,
         }
+    }
+
+    /// The CRC of a frame whose bytes before it are these, as the frame ends in it; `None` of a tag.
+    pub fn crc(&self, bytes: &[u8]) -> Option<Vec<u8>> {
+        self.crc_of(&[bytes])
+    }
+
+    fn crc_of(&self, parts: &[&[u8]]) -> Option<Vec<u8>> {
+        let (crc, before) = match *self {
+            Self::Crc(mission, session) => (&CRC24, [&mission.0.to_be_bytes()[..], &session.to_be_bytes()].concat()),
+            Self::Run { mission, to, from, number } => {
+                let [to, from] = [to, from].map(|session| session.get().to_be_bytes());
+                (&CRC32, [&mission.0.to_be_bytes()[..], &to, &from, &(number as u16).to_be_bytes()].concat())
+            }
+            _ => return None,
+        };
+        let mut digest = crc.digest();
+        digest.update(&before);
+        parts.iter().for_each(|part| digest.update(part));
+        let unused = usize::from(matches!(self, Self::Crc(..)));
+        Some(digest.finalize().to_be_bytes().into_iter().skip(unused).collect())
     }
 
     fn hello_parts<'p>(
@@ -71,12 +103,11 @@ impl Seal<'_> {
         [mission, session, nonce, frame]
     }
 
-    /// Appends the seal of a frame of `len` bytes in all, whose chunks begin at `body_at`.
-    fn close(&self, bytes: &mut Vec<u8>, body_at: usize, len: usize) {
+    /// Appends the seal of a frame whose chunks begin at `body_at`.
+    fn close(&self, bytes: &mut Vec<u8>, body_at: usize) {
         match *self {
-            Self::Crc(mission, session) => {
-                let crc = checksum(&[bytes], len, mission, session).to_be_bytes();
-                bytes.extend_from_slice(crc.get(4 - Self::bytes(false, len)..).unwrap_or_default());
+            Self::Crc(..) | Self::Run { .. } => {
+                bytes.extend(self.crc(bytes).unwrap_or_default());
             }
             Self::Hello(key, mission, session, nonce) => {
                 let (m, s, n) = (mission.0.to_be_bytes(), session.to_be_bytes(), nonce.to_be_bytes());
@@ -90,16 +121,6 @@ impl Seal<'_> {
             }
         }
     }
-}
-
-/// The CRC of a frame of `len` bytes that consists of `parts`.
-fn checksum(parts: &[&[u8]], len: usize, mission: MissionId, to_session: u16) -> u32 {
-    let crc = if len < LONG_FRAME { &CRC24 } else { &CRC32 };
-    let mut digest = crc.digest();
-    digest.update(&mission.0.to_be_bytes());
-    digest.update(&to_session.to_be_bytes());
-    parts.iter().for_each(|part| digest.update(part));
-    digest.finalize()
 }
 
 /// A frame whose header was read and which is not verified yet.
@@ -119,14 +140,16 @@ pub struct Envelope<'a> {
 pub struct Frame<'a> {
     /// The header, verified together with the chunks.
     pub header: Header,
+    /// The whole number of a numbered frame, 0 of a hello.
+    pub number: u64,
     body: Cow<'a, [u8]>,
 }
 
 impl<'a> Envelope<'a> {
     /// Reads the header of a frame; `to_us` selects our addresses.
     pub fn decode(bytes: &'a [u8], to_us: impl Fn(Address) -> bool) -> Result<Self, FrameError> {
-        let keyed = bytes.first().is_some_and(|flags| flags & 1 != 0);
-        let end = bytes.len().checked_sub(Seal::bytes(keyed, bytes.len())).ok_or(FrameError::Truncated)?;
+        let (keyed, kind) = bytes.first().map_or((false, FrameKind::Hello), |&flags| Header::kind_of(flags));
+        let end = bytes.len().checked_sub(Seal::bytes(keyed, kind)).ok_or(FrameError::Truncated)?;
         let (covered, end) = bytes.split_at_checked(end).ok_or(FrameError::Truncated)?;
         let mut reader = Reader::new(covered);
         let header = Header::decode(&mut reader, to_us)?;
@@ -140,7 +163,8 @@ impl<'a> Envelope<'a> {
     pub fn open(&self, seal: &Seal<'_>) -> Option<Frame<'a>> {
         let mut body = Cow::Borrowed(self.body);
         let sound = match *seal {
-            Seal::Crc(mission, session) => !self.header.keyed && self.crc_matches(mission, session),
+            Seal::Crc(..) => !self.header.keyed && self.header.kind.is_hello() && self.crc_matches(seal),
+            Seal::Run { .. } => !self.header.keyed && !self.header.kind.is_hello() && self.crc_matches(seal),
             Seal::Hello(key, mission, session, nonce) => {
                 let (m, s, n) = (mission.0.to_be_bytes(), session.to_be_bytes(), nonce.to_be_bytes());
                 let frame = [self.head, self.body].concat();
@@ -151,13 +175,15 @@ impl<'a> Envelope<'a> {
                 self.header.keyed && key.open(direction, number, self.head, body.to_mut(), self.end)
             }
         };
-        sound.then(|| Frame { header: self.header.clone(), body })
+        let number = match *seal {
+            Seal::Run { number, .. } | Seal::Session(_, _, number) => number,
+            Seal::Crc(..) | Seal::Hello(..) => 0,
+        };
+        sound.then(|| Frame { header: self.header.clone(), number, body })
     }
 
-    fn crc_matches(&self, mission: MissionId, session: u16) -> bool {
-        let len = self.head.len() + self.body.len() + self.end.len();
-        let received = self.end.iter().fold(0u32, |acc, &b| acc << 8 | u32::from(b));
-        checksum(&[self.head, self.body], len, mission, session) == received
+    fn crc_matches(&self, seal: &Seal<'_>) -> bool {
+        seal.crc_of(&[self.head, self.body]).is_some_and(|crc| crc == self.end)
     }
 }
 
@@ -178,7 +204,7 @@ impl Frame<'_> {
 /// let header = Header {
 ///     from: Address::vehicle(1).unwrap(),
 ///     to: Address::SURFACE,
-///     session: SessionId::from_random(0x1234),
+///     session: None,
 ///     number: 1,
 ///     base: 1,
 ///     remaining: 0,
@@ -189,7 +215,8 @@ impl Frame<'_> {
 ///     kind: FrameKind::Numbered,
 ///     keyed: false,
 /// };
-/// let seal = Seal::Crc(MissionId(7), 0xBEEF);
+/// let [to, from] = [0xBEEF, 0x1234].map(SessionId::from_random);
+/// let seal = Seal::Run { mission: MissionId(7), to, from, number: 1 };
 /// let mut builder = FrameBuilder::new(&header, 64);
 /// assert!(builder.push(ChunkKind::Map, &[1, 2, 3]));
 /// let bytes = builder.finish(&seal, true);
@@ -201,8 +228,12 @@ impl Frame<'_> {
 pub struct FrameBuilder {
     bytes: Vec<u8>,
     size: usize,
-    keyed: bool,
+    kind: FrameKind,
+    seal_bytes: usize,
+    remaining: u8,
     remaining_at: usize,
+    /// Whether there is room for the byte `remaining`.
+    has_turn: bool,
     body_at: usize,
 }
 
@@ -211,7 +242,10 @@ impl FrameBuilder {
     pub fn new(header: &Header, size: usize) -> Self {
         let mut bytes = Vec::with_capacity(size);
         let remaining_at = header.encode(&mut bytes);
-        let mut builder = Self { bytes, size, keyed: header.keyed, remaining_at, body_at: 0 };
+        let (kind, remaining) = (header.kind, header.remaining);
+        let seal_bytes = Seal::bytes(header.keyed, kind);
+        let mut builder =
+            Self { bytes, size, kind, seal_bytes, remaining, remaining_at, has_turn: remaining > 0, body_at: 0 };
         let room = builder.room();
         if let Some(ack) = &header.ack
             && ack.encode(room, &mut builder.bytes)
@@ -223,16 +257,22 @@ impl FrameBuilder {
         builder
     }
 
+    /// Keeps room for the header's `remaining` byte, so that [`Self::set_remaining`] may follow the chunks.
+    #[must_use]
+    pub fn in_turn(mut self) -> Self {
+        self.has_turn = true;
+        self
+    }
+
     /// Sets the header's `remaining` byte.
     pub fn set_remaining(&mut self, remaining: u8) {
-        if let Some(byte) = self.bytes.get_mut(self.remaining_at) {
-            *byte = remaining;
-        }
+        self.has_turn |= remaining > 0;
+        self.remaining = remaining;
     }
 
     /// Bytes that chunks can still take, their headers included.
     pub fn room(&self) -> usize {
-        self.size.saturating_sub(self.bytes.len() + Seal::bytes(self.keyed, self.size))
+        self.size.saturating_sub(self.bytes.len() + self.inserted(self.has_turn) + self.seal_bytes)
     }
 
     /// Adds a chunk; returns whether it fitted.
@@ -242,29 +282,33 @@ impl FrameBuilder {
 
     /// The length of the finished frame in bytes.
     pub fn len(&self, short: bool) -> usize {
-        if !short {
-            return self.size;
-        }
-        let content = self.bytes.len();
-        match (self.keyed, content + 3 < LONG_FRAME) {
-            (true, _) => content + TAG_BYTES,
-            (false, true) => content + 3,
-            (false, false) => content + 4,
-        }
+        if short { self.bytes.len() + self.inserted(self.remaining > 0) + self.seal_bytes } else { self.size }
+    }
+
+    /// The length of the byte `remaining` where it is optional; a hello always has it.
+    fn inserted(&self, is_present: bool) -> usize {
+        usize::from(is_present && !self.kind.is_hello())
     }
 
     /// Seals the frame. A `short` frame ends where its content ends; any other is padded to its size.
     pub fn finish(mut self, seal: &Seal<'_>, short: bool) -> Vec<u8> {
-        let len = self.len(short);
-        self.bytes.resize(len - Seal::bytes(self.keyed, len), 0);
-        seal.close(&mut self.bytes, self.body_at, len);
+        let content = self.len(short) - self.seal_bytes;
+        if self.inserted(self.remaining > 0) > 0 {
+            self.bytes.insert(self.remaining_at, self.remaining);
+            self.body_at += 1;
+            self.bytes.get_mut(1).into_iter().for_each(|route| *route |= Header::REMAINING_FLAG);
+        } else if let Some(byte) = self.bytes.get_mut(self.remaining_at - 1).filter(|_| self.kind.is_hello()) {
+            *byte = self.remaining;
+        }
+        self.bytes.resize(content, 0);
+        seal.close(&mut self.bytes, self.body_at);
         self.bytes
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::{AckStatement, FrameKind, SessionId, Stamp, room_for_payload};
+    use super::super::{AckStatement, FrameKind, Stamp, room_for_payload};
     use super::*;
     use crate::seal::MissionKey;
     use proptest::prelude::*;
@@ -276,7 +320,7 @@ mod tests {
         Header {
             from: Address::vehicle(1).unwrap(),
             to: Address::SURFACE,
-            session: SessionId::from_random(0x1234),
+            session: None,
             number: 0x00FF,
             base: 3,
             remaining: 2,
@@ -287,6 +331,12 @@ mod tests {
             kind: FrameKind::Numbered,
             keyed: false,
         }
+    }
+
+    /// The seal of a frame to the run `to`, from the run 1234.
+    fn run(to: u16, number: u64) -> Seal<'static> {
+        let [to, from] = [to, 0x1234].map(SessionId::from_random);
+        Seal::Run { mission: MISSION, to, from, number }
     }
 
     fn envelope(bytes: &[u8]) -> Result<Envelope<'_>, FrameError> {
@@ -305,11 +355,35 @@ mod tests {
     fn golden_bytes_of_a_small_map_frame() {
         let mut b = FrameBuilder::new(&header(), 64);
         assert!(b.push(ChunkKind::Map, &[0xAA, 0xBB]));
-        let bytes = b.finish(&Seal::Crc(MISSION, 0x4321), true);
-        assert_eq!(bytes[..13], [0x90, 0x10, 0x12, 0x34, 0x00, 0xFF, 3, 2, 0x00, 0x50, 0x22, 0xAA, 0xBB]);
-        assert_eq!(bytes[13..], [0xEA, 0x61, 0x5B]);
-        let frame = envelope(&bytes).unwrap().open(&Seal::Crc(MISSION, 0x4321)).unwrap();
-        assert_eq!(frame.header, header());
+        let bytes = b.finish(&run(0x4321, 0x1FF), true);
+        assert_eq!(bytes[..10], [0x90, 0xC1, 3, 0xFF, 2, 0x00, 0x50, 0x22, 0xAA, 0xBB]);
+        assert_eq!(bytes[10..], [0x3E, 0xEC, 0x68, 0x79]);
+        let read = envelope(&bytes).unwrap();
+        assert_eq!(read.header.number_near(0x190), 0x1FF);
+        let frame = read.open(&run(0x4321, 0x1FF)).unwrap();
+        assert_eq!((frame.header, frame.number), (header(), 0x1FF));
+    }
+
+    #[test]
+    fn a_far_base_has_two_bytes_and_so_has_the_number() {
+        let far = Header { number: 0x1234, base: 0x7FF, remaining: 0, ack: None, ..header() };
+        let bytes = FrameBuilder::new(&far, 64).finish(&run(7, 0x51234), true);
+        assert_eq!(bytes[..6], [0x80, 0x81, 0x87, 0xFF, 0x12, 0x34]);
+        let read = envelope(&bytes).unwrap();
+        assert_eq!(read.header.number_near(0x50FFF), 0x51234);
+        assert_eq!(read.open(&run(7, 0x51234)).unwrap().header, far);
+    }
+
+    #[test]
+    fn nothing_that_follows_takes_no_byte() {
+        let frame = |remaining: u8| {
+            let mut builder = FrameBuilder::new(&Header { remaining: 0, ..header() }, 64).in_turn();
+            assert!(builder.push(ChunkKind::Map, &[1, 2]));
+            builder.set_remaining(remaining);
+            let bytes = builder.finish(&run(7, 255), true);
+            (envelope(&bytes).unwrap().open(&run(7, 255)).unwrap().header.remaining, bytes.len())
+        };
+        assert_eq!((frame(0), frame(9)), ((0, 13), (9, 14)));
     }
 
     #[test]
@@ -318,7 +392,7 @@ mod tests {
         assert_eq!(envelope(&map).unwrap_err(), FrameError::Version(2));
         let hello = [0x44, 0x10, 0x12, 0x34, 0, 0, 1, 0, 0x4A, 0xC0, 0x2B];
         let read = envelope(&hello).unwrap();
-        assert_eq!((read.version, read.header.session.get()), (2, 0x1234));
+        assert_eq!((read.version, read.header.session.map(SessionId::get)), (2, Some(0x1234)));
         assert!(read.open(&Seal::Crc(MISSION, 0xBEEF)).is_some_and(|frame| frame.chunks().next().is_none()));
     }
 
@@ -326,6 +400,7 @@ mod tests {
     fn golden_bytes_of_a_keyed_hello() {
         let stamp = Stamp::Surface { clock_ms: 5, one_way: Some(Duration::from_millis(7)) };
         let hello = Header {
+            session: Some(SessionId::from_random(0x1234)),
             from: Address::SURFACE,
             to: Address::vehicle(2).unwrap(),
             number: 0,
@@ -337,7 +412,6 @@ mod tests {
             ack: None,
             kind: FrameKind::Hello,
             keyed: true,
-            ..header()
         };
         let bytes = FrameBuilder::new(&hello, 64).finish(&Seal::Hello(&key(), MISSION, 0, 0), true);
         let expected = [0x8F, 0x02, 0x12, 0x34, 0, 0, 1, 0, 9, 0, 0, 5, 0, 7, 1, 2, 3, 4, 5, 6, 7, 8];
@@ -354,21 +428,28 @@ mod tests {
         let payload = vec![1; room_for_payload(b.room())];
         assert!(b.push(ChunkKind::Map, &payload));
         assert!(payload.len() >= 50, "{} bytes of payload", payload.len());
-        assert_eq!(b.finish(&Seal::Crc(MISSION, 0), false).len(), 64);
+        assert_eq!(b.finish(&run(1, 255), false).len(), 64);
     }
 
     #[test]
     fn frames_of_another_mission_or_session_do_not_verify() {
-        let bytes = FrameBuilder::new(&header(), 64).finish(&Seal::Crc(MISSION, 7), false);
-        assert!(verifies(&bytes, &Seal::Crc(MISSION, 7)));
-        assert!(!verifies(&bytes, &Seal::Crc(MISSION, 8)));
-        assert!(!verifies(&bytes, &Seal::Crc(MissionId(9), 7)));
+        let bytes = FrameBuilder::new(&header(), 64).finish(&run(7, 255), false);
+        assert!(verifies(&bytes, &run(7, 255)));
+        assert!(!verifies(&bytes, &run(8, 255)), "another run of the receiver");
+        assert!(!verifies(&bytes, &run(7, 511)), "another number with these low bits");
+        let Seal::Run { to, number, .. } = run(7, 255) else { return };
+        let from = SessionId::from_random(0x1235);
+        assert!(!verifies(&bytes, &Seal::Run { mission: MISSION, to, from, number }), "another run of the sender");
+        let from = SessionId::from_random(0x1234);
+        assert!(!verifies(&bytes, &Seal::Run { mission: MissionId(9), to, from, number }));
+        assert!(!verifies(&bytes, &Seal::Crc(MISSION, 7)));
     }
 
     proptest! {
         #[test]
         fn any_bytes_decode_or_are_refused(bytes in proptest::collection::vec(any::<u8>(), 0..200)) {
             verifies(&bytes, &Seal::Crc(MISSION, 1));
+            verifies(&bytes, &run(1, 4));
             verifies(&bytes, &Seal::Hello(&key(), MISSION, 1, 1));
             verifies(&bytes, &Seal::Session(&key().session(1, 1, 2, 3, true), Direction::Up, 4));
         }
@@ -376,7 +457,7 @@ mod tests {
         #[test]
         fn a_flipped_bit_is_noticed(size in 32usize..300, fill in 0usize..300, bit: usize, short: bool, keyed: bool) {
             let session = key().session(1, 1, 2, 3, fill % 2 == 0);
-            let seal = if keyed { Seal::Session(&session, Direction::Up, 255) } else { Seal::Crc(MISSION, 7) };
+            let seal = if keyed { Seal::Session(&session, Direction::Up, 255) } else { run(7, 255) };
             let mut b = FrameBuilder::new(&Header { keyed, ..header() }, size);
             let payload = vec![5; fill.min(room_for_payload(b.room()))];
             prop_assert!(b.push(ChunkKind::Map, &payload));

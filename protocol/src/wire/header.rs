@@ -2,6 +2,7 @@
 
 use super::ack::AckStatement;
 use super::frame::FrameError;
+use super::number::unwrap_number;
 use super::stamp::Stamp;
 use super::{MAX_WINDOW, WIRE_VERSION};
 use crate::bytes::Reader;
@@ -75,43 +76,59 @@ impl FrameKind {
 
 /// The header of a frame.
 ///
+/// That of a numbered frame:
+///
 /// ```text
 ///  0                   1                   2                   3
 ///  0 1 2 3 4 5 6 7 8 9 0 1 2 3 4 5 6 7 8 9 0 1 2 3 4 5 6 7 8 9 0 1
-/// +-----+-+-+-+-+-+-------+-------+-------------------------------+
-/// |ver=3|A|T|H|S|K| from  |  to   | session of the sender         |
-/// +-----+-+-+-+-+-+-------+-------+-------+-------+---------------+
-/// | number                        | base (1-2)    | remaining     |
-/// +-------------------------------+---------------+---------------+
-/// | [turn]        | [stamp, 5 or 6 bytes] | [nonce, 8 bytes]      |
-/// +---------------+-----------------------+-----------------------+
+/// +-----+-+-+-+-+-+-+-+---+-------+---------------+---------------+
+/// |ver=4|A|T|0|S|K|U|R| 0 |vehicle| base (1-2)    | number (1-2)  |
+/// +-----+-+-+-+-+-+-+-+---+-------+---------------+---------------+
+/// | [remaining]   | [turn]        | [stamp, 5 or 6 bytes]         |
+/// +---------------+---------------+-------------------------------+
 /// | [ack statement ...]           | chunks ...    | CRC or tag    |
 /// +-------------------------------+---------------+---------------+
+/// ```
+///
+/// That of a hello, which is the same in every version from 2 on:
+///
+/// ```text
+/// +-----+-+-+-+-+-+-------+-------+-------------------------------+
+/// |ver=4|0|T|1|S|K| from  |  to   | session of the sender         |
+/// +-----+-+-+-+-+-+-------+-------+---------------+---------------+
+/// | 0                             | 1             | remaining     |
+/// +---------------+---------------+---------------+---------------+
+/// | [turn]        | [stamp, 5 or 6 bytes] | [nonce, 8 bytes]      |
+/// +---------------+-----------------------+-----------------------+
 /// A          an ack statement is present
 /// T          a turn byte is present
-/// H          hello: the sender names its session; such a frame has no ack statement and no chunks
 /// S          a time stamp is present
 /// K          keyed: the frame ends in a tag of 8 bytes under the mission's key instead of a CRC; a hello then has a nonce
-/// number     of this frame in the pair of sessions, wraps; the first is 1. In a hello: 0
+/// U          up: from the vehicle to the surface; otherwise from the surface to the vehicle
+/// R          the byte `remaining` is present; without it nothing follows in this turn
+/// vehicle    1 to 14
 /// base       number minus the last frame whose fate the sender knows, 1..=2048; 0..127 in one byte, else two with the
-///            first one's top bit set (7 high bits, then 8 low bits). In a hello: 1
+///            first one's top bit set (7 high bits, then 8 low bits)
+/// number     of this frame in the pair of runs, the first is 1: its low 8 bits if `base` has one byte, else its low 16
 /// remaining  from the surface: bits on air that follow in this turn, divided by 32, rounded up, 255 = that or more;
 ///            from a vehicle: frames that follow in this turn, 255 = 255 or more
 /// turn       from the surface: airtime granted, in quarter seconds (0 = none), in a call: time to answer in;
 ///            from a vehicle: when it would use another turn, in quarter seconds from now (0 = at once, 255 = not known)
 /// nonce      random number of the sender's run, for the key of the pair of runs
 /// ```
+///
+/// The seal of a numbered frame covers the runs of both ends and the number, which are not sent.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Header {
     /// The address of the sending end.
     pub from: Address,
     /// The receiving end, or everybody.
     pub to: Address,
-    /// The session of the sender's run.
-    pub session: SessionId,
-    /// Low 16 bits of the frame's number; 0 in a hello.
+    /// The session of the sender's run, in a hello.
+    pub session: Option<SessionId>,
+    /// The frame's number: as many low bits of it as [`Self::base`] needs; 0 in a hello.
     pub number: u16,
-    /// `number` minus the sender's horizon, 1..=2048.
+    /// The number minus the sender's horizon, 1..=2048; 1 in a hello.
     pub base: u16,
     /// Bits or frames that follow in this turn, as above.
     pub remaining: u8,
@@ -132,6 +149,13 @@ pub struct Header {
 /// Header and seal of a hello have the same layout in every version from this one on.
 const FIRST_COMMON_HELLO: u8 = 2;
 
+/// The second byte of a numbered frame.
+const UP: u8 = 0b1000_0000;
+const REMAINING: u8 = 0b100_0000;
+const RESERVED: u8 = 0b11_0000;
+/// From here on `base` has two bytes, and so has the number.
+const LONG_BASE: u8 = 128;
+
 const ACK: u8 = 0b1_0000;
 const TURN: u8 = 0b1000;
 const HELLO: u8 = 0b100;
@@ -146,28 +170,75 @@ impl Header {
         if version != WIRE_VERSION && !(is_hello && version >= FIRST_COMMON_HELLO) {
             return Err(FrameError::Version(version));
         }
-        let addresses = r.u8()?;
-        let (from, to) = (Address(addresses >> 4), Address(addresses & 15));
-        if !to_us(to) || from == to || from == Address::EVERYBODY {
+        let has = |bit: u8| flags & bit != 0;
+        let header = if is_hello { Self::decode_hello(r)? } else { Self::decode_numbered(r)? };
+        if !to_us(header.to) || header.from == header.to || header.from == Address::EVERYBODY {
             return Err(FrameError::NotForUs);
         }
+        let turn = has(TURN).then(|| r.u8()).transpose()?;
+        let stamp = has(STAMP).then(|| Stamp::decode(header.from, r)).transpose()?;
+        let nonce = (is_hello && has(KEYED)).then(|| r.u64()).transpose()?;
+        let ack = has(ACK).then(|| AckStatement::decode(r)).transpose()?;
+        Ok(Self { turn, stamp, nonce, ack, keyed: has(KEYED), ..header })
+    }
+
+    fn plain(from: Address, to: Address, kind: FrameKind) -> Self {
+        Self {
+            from,
+            to,
+            session: None,
+            number: 0,
+            base: 1,
+            remaining: 0,
+            turn: None,
+            stamp: None,
+            nonce: None,
+            ack: None,
+            kind,
+            keyed: false,
+        }
+    }
+
+    fn decode_hello(r: &mut Reader<'_>) -> Result<Self, FrameError> {
+        let addresses = r.u8()?;
         let session = SessionId(NonZeroU16::new(r.u16()?).ok_or(FrameError::BadField)?);
-        let number = r.u16()?;
-        let base = match r.u8()? {
-            b if b < 128 => u16::from(b),
-            b => u16::from(b & 127) << 8 | u16::from(r.u8()?),
+        let _number_and_base = r.take(3)?;
+        let remaining = r.u8()?;
+        let header = Self::plain(Address(addresses >> 4), Address(addresses & 15), FrameKind::Hello);
+        Ok(Self { session: Some(session), remaining, ..header })
+    }
+
+    fn decode_numbered(r: &mut Reader<'_>) -> Result<Self, FrameError> {
+        let route = r.u8()?;
+        let vehicle = Address::vehicle(route & 15).filter(|_| route & RESERVED == 0).ok_or(FrameError::BadField)?;
+        let (from, to) = if route & UP != 0 { (vehicle, Address::SURFACE) } else { (Address::SURFACE, vehicle) };
+        let (base, number) = match r.u8()? {
+            b if b < LONG_BASE => (u16::from(b), u16::from(r.u8()?)),
+            b => (u16::from(b - LONG_BASE) << 8 | u16::from(r.u8()?), r.u16()?),
         };
         if base == 0 || u64::from(base) > MAX_WINDOW {
             return Err(FrameError::BadField);
         }
-        let remaining = r.u8()?;
-        let has = |bit: u8| flags & bit != 0;
-        let (kind, keyed) = (FrameKind::hello_if(has(HELLO)), has(KEYED));
-        let turn = has(TURN).then(|| r.u8()).transpose()?;
-        let stamp = has(STAMP).then(|| Stamp::decode(from, r)).transpose()?;
-        let nonce = (kind.is_hello() && keyed).then(|| r.u64()).transpose()?;
-        let ack = has(ACK).then(|| AckStatement::decode(r)).transpose()?;
-        Ok(Self { from, to, session, number, base, remaining, turn, stamp, nonce, ack, kind, keyed })
+        let remaining = if route & REMAINING != 0 { r.u8()? } else { 0 };
+        Ok(Self { number, base, remaining, ..Self::plain(from, to, FrameKind::Numbered) })
+    }
+
+    /// The whole number of a numbered frame: the one nearest to `highest`, the highest number of the run so far.
+    pub fn number_near(&self, highest: u64) -> u64 {
+        let bits = if self.base < u16::from(LONG_BASE) { 8 } else { 16 };
+        unwrap_number(self.number, bits, highest)
+    }
+
+    /// Every number with the low bits that were sent, each the one nearest to `highest` with its low 16 bits.
+    pub(crate) fn numbers(&self, highest: u64) -> impl Iterator<Item = u64> + use<> {
+        let low = self.number;
+        let is_short = self.base < u16::from(LONG_BASE);
+        (0..if is_short { 256 } else { 0 }).map(move |high: u16| unwrap_number(high << 8 | low & 0xFF, 16, highest))
+    }
+
+    /// Whether a frame with this first byte is keyed, and its kind.
+    pub(super) fn kind_of(flags: u8) -> (bool, FrameKind) {
+        (flags & KEYED != 0, FrameKind::hello_if(flags & HELLO != 0))
     }
 
     /// The first byte without the bit of the acknowledgement statement.
@@ -180,18 +251,17 @@ impl Header {
             | bit(self.keyed, KEYED)
     }
 
-    /// Appends everything up to the acknowledgement statement; returns the index of the `remaining` byte.
+    /// Appends everything up to the acknowledgement statement, but for the byte `remaining`; returns the index of its place.
     pub(super) fn encode(&self, out: &mut Vec<u8>) -> usize {
-        out.extend_from_slice(&[self.flags(), self.from.0 << 4 | self.to.0]);
-        out.extend_from_slice(&self.session.get().to_be_bytes());
-        out.extend_from_slice(&self.number.to_be_bytes());
-        if self.base < 128 {
-            out.push(self.base as u8);
-        } else {
-            out.extend_from_slice(&(self.base | 0x8000).to_be_bytes());
+        out.push(self.flags());
+        match self.kind {
+            FrameKind::Hello => {
+                let session = self.session.map_or(0, SessionId::get).to_be_bytes();
+                out.extend_from_slice(&[self.from.0 << 4 | self.to.0, session[0], session[1], 0, 0, 1, 0]);
+            }
+            FrameKind::Numbered => self.encode_numbered(out),
         }
         let remaining_at = out.len();
-        out.push(self.remaining);
         out.extend(self.turn);
         if let Some(stamp) = &self.stamp {
             stamp.encode(out);
@@ -202,6 +272,18 @@ impl Header {
         remaining_at
     }
 
-    /// The bit that marks an acknowledgement statement.
+    fn encode_numbered(&self, out: &mut Vec<u8>) {
+        out.push(if self.from.is_vehicle() { UP | self.from.0 } else { self.to.0 });
+        if self.base < u16::from(LONG_BASE) {
+            out.extend_from_slice(&[self.base as u8, self.number as u8]);
+        } else {
+            out.extend_from_slice(&(self.base | u16::from(LONG_BASE) << 8).to_be_bytes());
+            out.extend_from_slice(&self.number.to_be_bytes());
+        }
+    }
+
+    /// The bit of the first byte that marks an acknowledgement statement.
     pub(super) const ACK_FLAG: u8 = ACK;
+    /// The bit of the second byte of a numbered frame that marks the byte `remaining`.
+    pub(super) const REMAINING_FLAG: u8 = REMAINING;
 }

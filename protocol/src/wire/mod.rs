@@ -30,7 +30,6 @@ pub use frame::{Envelope, Frame, FrameBuilder, FrameError, Seal};
 pub use header::{Address, FrameKind, Header, MissionId, SessionId};
 pub use intent::Intent;
 pub use introduction::{CellEdge, Introduction, SurfaceName, UtcHours};
-pub use number::unwrap_number;
 pub use path::PlannedPath;
 pub use placement::Placement;
 pub use registration::{FrameTie, RegistrationReport};

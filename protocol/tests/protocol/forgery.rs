@@ -33,16 +33,20 @@ impl Stranger<'_> {
         (self.random >> 33) % below
     }
 
-    /// The session of the last frame of an end.
+    /// The session of the last run of an end.
     fn session(&self, of: Address) -> Option<SessionId> {
-        let to_any = |bytes: &Vec<u8>| Envelope::decode(bytes, |_| true).ok().map(|e| e.header);
-        self.pair.overheard.iter().filter_map(to_any).find(|h| h.from == of).map(|h| h.session)
+        self.pair.wiretap.session(of)
+    }
+
+    /// Closes a numbered frame with the CRC of the runs that the ends are in.
+    fn close(&self, builder: FrameBuilder, from: Address, number: u64) -> Option<Vec<u8>> {
+        Some(builder.finish(&self.pair.wiretap.crc(MISSION, from, number)?, true))
     }
 
     /// The session in the last hello of the vehicle, if it is among these frames.
     fn hello_of_vehicle(overheard: &VecDeque<Vec<u8>>) -> Option<SessionId> {
         let headers = overheard.iter().filter_map(|bytes| Envelope::decode(bytes, |_| true).ok()).map(|e| e.header);
-        headers.filter(|h| h.from == auv() && h.kind.is_hello()).map(|h| h.session).next()
+        headers.filter(|h| h.from == auv()).find_map(|h| h.session)
     }
 
     /// Writes one frame to one of the ends.
@@ -51,11 +55,11 @@ impl Stranger<'_> {
         let (from, to) = if to_vehicle { (Address::SURFACE, auv()) } else { (auv(), Address::SURFACE) };
         let (Some(sender), Some(receiver)) = (self.session(from), self.session(to)) else { return };
         let bytes = match self.draw(7) {
-            3 if to_vehicle => self.order(from, to, sender, receiver),
+            3 if to_vehicle => self.order(from, to),
             0 => self.replay(),
             1 => self.hello(from, to, sender, receiver),
-            2 => self.invented(from, to, sender, receiver),
-            _ => self.changed(from, to, receiver),
+            2 => self.invented(from, to),
+            _ => self.changed(from, to),
         };
         let now = self.pair.now;
         let Some(bytes) = bytes else { return };
@@ -74,7 +78,7 @@ impl Stranger<'_> {
     fn hello(&mut self, from: Address, to: Address, sender: SessionId, receiver: SessionId) -> Option<Vec<u8>> {
         let session = if self.draw(2) == 0 { sender } else { SessionId::from_random(self.draw(1 << 16) as u16) };
         let series = (from == Address::SURFACE).then(|| Series::from_random(self.draw(1 << 31)));
-        let header = Header { session, number: 0, kind: FrameKind::Hello, ..self.header(from, to, session) };
+        let header = Header { session: Some(session), kind: FrameKind::Hello, ..self.header(from, to).0 };
         let mut builder = FrameBuilder::new(&header, 64);
         builder.push(
             ChunkKind::Introduction,
@@ -85,17 +89,17 @@ impl Stranger<'_> {
     }
 
     /// An order under any version.
-    fn order(&mut self, from: Address, to: Address, sender: SessionId, receiver: SessionId) -> Option<Vec<u8>> {
-        let header = self.header(from, to, sender);
+    fn order(&mut self, from: Address, to: Address) -> Option<Vec<u8>> {
+        let (header, number) = self.header(from, to);
         let slot = VersionedSlot::encode(self.draw(1 << 16) as u16, &utility(self.draw(50) as i8));
         let mut builder = FrameBuilder::new(&header, 64);
         builder.push(ChunkKind::Slot, &slot);
-        Some(builder.finish(&Seal::Crc(MISSION, receiver.get()), true))
+        self.close(builder, from, number)
     }
 
     /// A frame with arbitrary chunks.
-    fn invented(&mut self, from: Address, to: Address, sender: SessionId, receiver: SessionId) -> Option<Vec<u8>> {
-        let header = self.header(from, to, sender);
+    fn invented(&mut self, from: Address, to: Address) -> Option<Vec<u8>> {
+        let (header, number) = self.header(from, to);
         let mut builder = FrameBuilder::new(&header, 64);
         for _ in 0..self.draw(3) {
             let kinds = [ChunkKind::Map, ChunkKind::Pose, ChunkKind::Slot, ChunkKind::Object, ChunkKind::Report];
@@ -103,18 +107,21 @@ impl Stranger<'_> {
             let bytes: Vec<u8> = (0..self.draw(24)).map(|_| self.draw(256) as u8).collect();
             builder.push(kind, &bytes);
         }
-        Some(builder.finish(&Seal::Crc(MISSION, receiver.get()), true))
+        self.close(builder, from, number)
     }
 
     /// An overheard frame with another number, base, statement or content.
-    fn changed(&mut self, from: Address, to: Address, receiver: SessionId) -> Option<Vec<u8>> {
+    fn changed(&mut self, from: Address, to: Address) -> Option<Vec<u8>> {
         let heard: Vec<Vec<u8>> = self.pair.overheard.iter().take(60).cloned().collect();
         let pick = self.draw(heard.len().max(1) as u64) as usize;
         let envelope = Envelope::decode(heard.get(pick)?, |_| true).ok().filter(|e| e.header.from == from)?;
-        let frame = envelope.open(&Seal::Crc(MISSION, receiver.get()))?;
-        let mut header = Header { to, ..frame.header.clone() };
+        let frame = envelope.open(&self.pair.wiretap.crc_of(MISSION, &envelope.header)?)?;
+        let (mut header, mut number) = (Header { to, ..frame.header.clone() }, frame.number);
         match self.draw(5) {
-            0 => header.number = header.number.wrapping_add(self.draw(64) as u16),
+            0 => {
+                number += self.draw(64);
+                header.number = number as u16;
+            }
             1 => header.base = 1 + self.draw(100) as u16,
             2 => {
                 let horizon_low = (self.draw(4096)) as u16;
@@ -133,17 +140,17 @@ impl Stranger<'_> {
             builder.push(chunk.kind, &payload);
         }
         builder.set_remaining(header.remaining);
-        Some(builder.finish(&Seal::Crc(MISSION, receiver.get()), true))
+        self.close(builder, from, number)
     }
 
-    fn header(&mut self, from: Address, to: Address, session: SessionId) -> Header {
-        let last = self.pair.overheard.iter().filter_map(|b| Envelope::decode(b, |_| true).ok()).map(|e| e.header);
-        let number = last.filter(|h| h.from == from).map(|h| h.number).next().unwrap_or(0);
-        Header {
+    /// The header of a frame that may be the next one of an end, and its number.
+    fn header(&mut self, from: Address, to: Address) -> (Header, u64) {
+        let number = self.pair.wiretap.number(from) + self.draw(4);
+        let header = Header {
             from,
             to,
-            session,
-            number: number.wrapping_add(self.draw(4) as u16),
+            session: None,
+            number: number as u16,
             base: 1 + self.draw(4) as u16,
             remaining: 0,
             turn: (self.draw(2) == 0).then(|| self.draw(256) as u8),
@@ -152,7 +159,8 @@ impl Stranger<'_> {
             ack: None,
             kind: FrameKind::Numbered,
             keyed: false,
-        }
+        };
+        (header, number)
     }
 }
 
@@ -216,8 +224,8 @@ fn a_link_recovers_from_forgeries_that_it_accepted() {
 /// Begins a run of the surface at the vehicle by a forged hello, and gives it an order of a series.
 fn give_forged_order(pair: &mut LinkedEnds, series: Series, order: &[u8]) {
     let forged = SessionId::from_random(0x5A5A);
-    let header = Stranger { pair, random: 1 }.header(Address::SURFACE, auv(), forged);
-    let mut hello = FrameBuilder::new(&Header { number: 0, base: 1, kind: FrameKind::Hello, ..header.clone() }, 64);
+    let (header, _) = Stranger { pair, random: 1 }.header(Address::SURFACE, auv());
+    let mut hello = FrameBuilder::new(&Header { session: Some(forged), kind: FrameKind::Hello, ..header.clone() }, 64);
     let introduction = Introduction { series: Some(series), ..Introduction::default() };
     hello.push(ChunkKind::Introduction, &introduction.encode(Introduction::MAX_BYTES));
     let hello = hello.finish(&Seal::Crc(MISSION, 0), true);
@@ -233,7 +241,8 @@ fn give_forged_order(pair: &mut LinkedEnds, series: Series, order: &[u8]) {
     };
     let mut frame = FrameBuilder::new(&Header { number: 1, base: 1, ..header }, 64);
     assert!(frame.push(ChunkKind::Slot, order));
-    pair.vehicle.handle_frame(&frame.finish(&Seal::Crc(MISSION, answer.get()), true), pair.now);
+    let seal = Seal::Run { mission: MISSION, to: answer, from: forged, number: 1 };
+    pair.vehicle.handle_frame(&frame.finish(&seal, true), pair.now);
 }
 
 #[test]

@@ -118,7 +118,8 @@ fn a_stream_named_before_finer_cells_is_sent_before_them() {
     };
     assert!(after_a_minute([BackgroundStream::Exemplars, BackgroundStream::Finer]) >= 5_000);
     let at_ends_of_frames = after_a_minute([BackgroundStream::Finer, BackgroundStream::Exemplars]);
-    assert!(at_ends_of_frames < 1_500, "{at_ends_of_frames}");
+    // 117 frames go out in a minute; a cell in them takes a few bytes, which are left at the end of a frame.
+    assert!(at_ends_of_frames < 117 * 20, "{at_ends_of_frames}");
 }
 
 #[test]

@@ -7,7 +7,7 @@ use scenecast_protocol::mac::Access;
 use scenecast_protocol::map::{Cell, LabelGrid, StateSource};
 use scenecast_protocol::map_codec::Codec;
 use scenecast_protocol::seal::{HeldKey, MissionKey};
-use scenecast_protocol::wire::{Address, Envelope, FrameBuilder, Header, MissionId, Seal, SessionId, UtcHours};
+use scenecast_protocol::wire::{Address, Envelope, MissionId, Seal, UtcHours};
 use std::collections::BTreeMap;
 use std::time::Duration;
 
@@ -247,23 +247,37 @@ fn a_frame_with_a_bad_crc_never_begins_a_new_run() {
     let mut pair = LinkedEnds::new(3, Setup::new(64, 10_000, Codec::Png), STILL);
     pair.vehicle.set_map(flat(9, 1).iter(), pair.now);
     pair.run(pair.now + Duration::from_secs(30), false);
-    let header = |bytes: &Vec<u8>| Envelope::decode(bytes, |_| true).ok().map(|e| e.header);
-    let of_vehicle = pair.overheard.iter().filter_map(header).find(|h| h.from == auv()).unwrap();
-    let ours = pair.overheard.iter().filter_map(header).find(|h| h.from == Address::SURFACE).unwrap().session;
-    let session = SessionId::from_random(of_vehicle.session.get() ^ 1);
-    let stray = FrameBuilder::new(&Header { session, ack: None, ..of_vehicle }, 64)
-        .finish(&Seal::Crc(MissionId(7), ours.get()), true);
+    // These frames of the vehicle's first run come in late.
+    pair.mute = [false, true];
+    pair.overheard.clear();
+    pair.vehicle.set_map(flat(9, 2).iter(), pair.now);
+    pair.run(pair.now + Duration::from_secs(60), false);
+    let is_late = |bytes: &&Vec<u8>| {
+        Envelope::decode(bytes, |_| true).is_ok_and(|e| e.header.from == auv() && !e.header.kind.is_hello())
+    };
+    let mut late: Vec<Vec<u8>> = pair.overheard.iter().rev().filter(is_late).cloned().collect();
+    let mut seen = std::collections::BTreeSet::new();
+    late.retain(|bytes| seen.insert(bytes.clone()));
+    assert!(late.len() >= 4, "{} frames", late.len());
+    pair.mute = [false; 2];
+    pair.restart_vehicle(&flat(9, 2));
+    pair.run(pair.now + Duration::from_secs(60), false);
     let resyncs = |pair: &LinkedEnds| pair.surface.vehicle(auv()).unwrap().stats().resyncs;
-    (0..3).for_each(|_| pair.surface.handle_frame(&stray, pair.now));
+    let before = resyncs(&pair);
     pair.mute = [true; 2];
     pair.run(pair.now + Duration::from_secs(120), false);
-    assert_eq!(resyncs(&pair), 0, "the vehicle has answered until then");
-    let mut damaged = stray.clone();
-    damaged[3] ^= 0x10;
+    late[..2].iter().for_each(|bytes| pair.surface.handle_frame(bytes, pair.now));
+    let mut damaged = late[2].clone();
+    damaged[5] ^= 0x10;
     pair.surface.handle_frame(&damaged, pair.now);
-    assert_eq!(resyncs(&pair), 0, "by a damaged frame");
-    pair.surface.handle_frame(&stray, pair.now);
-    assert_eq!(resyncs(&pair), 1, "by a whole one");
+    assert_eq!(resyncs(&pair), before, "by a damaged frame");
+    pair.surface.handle_frame(&late[2], pair.now);
+    assert_eq!(
+        resyncs(&pair),
+        before + 1,
+        "by a whole one: {:?}",
+        pair.surface.vehicle(auv()).unwrap().stats().dropped
+    );
 }
 
 fn keyed_hello() -> Vec<u8> {

@@ -8,25 +8,38 @@ class Frame:
     pass
 
 
-def seal_size(length, keyed):
-    return 8 if keyed else 3 if length < 128 else 4
+def hello_crc(mission, receiver, unsealed):
+    return crc24(mission.to_bytes(4, 'big') + receiver.to_bytes(2, 'big') + unsealed).to_bytes(3, 'big')
 
 
-def crc_of(mission, session, body, length):
-    d = mission.to_bytes(4, 'big') + session.to_bytes(2, 'big') + body
-    return crc24(d).to_bytes(3, 'big') if length < 128 else crc32c(d).to_bytes(4, 'big')
+def numbered_crc(mission, receiver, sender, number, unsealed):
+    d = mission.to_bytes(4, 'big') + b''.join((v & 0xFFFF).to_bytes(2, 'big') for v in (receiver, sender, number))
+    return crc32c(d + unsealed).to_bytes(4, 'big')
+
+
+def number_in(f, mission, receiver, sender, highest, crypt=None):
+    """2.2: the number of a numbered frame between these runs, or None if it does not verify. With a tag, the body is plain then."""
+    if f.K != (crypt is not None):
+        return None
+    n = nearest(f.low, highest, f.bits)
+    if crypt:
+        body = crypt.open(f.src != 0, n, f.head, f.body, f.seal)
+        if body is None:
+            return None
+        f.body = body
+        return n
+    more = (nearest(high << 8 | f.low, highest) for high in range(256 if f.bits == 8 else 0))
+    return next((n for n in (n, *more) if numbered_crc(mission, receiver, sender, n, f.unsealed) == f.seal), None)
 
 
 def parse(raw):
     """Fields of a frame (checks 1, 2 and 4 of 2.5). The seal is not verified."""
     f = Frame()
     f.raw = raw
-    if len(raw) < 9:
-        raise Short('truncated')
     b0 = raw[0]
     f.ver, f.A, f.T, f.H, f.S, f.K = b0 >> 5, b0 >> 4 & 1, b0 >> 3 & 1, b0 >> 2 & 1, b0 >> 1 & 1, b0 & 1
-    n = seal_size(len(raw), f.K)
-    if len(raw) < n + 1:
+    n = 8 if f.K else 3 if f.H else 4
+    if len(raw) <= n:
         raise Short('truncated')
     f.unsealed, f.seal = raw[:-n], raw[-n:]
     if not (f.ver == 4 or f.H and f.ver >= 2):
@@ -40,13 +53,22 @@ def parse(raw):
         p += k
         return d[p - k:p]
     a = take(1)[0]
-    f.src, f.dst = a >> 4, a & 15
-    f.session = int.from_bytes(take(2), 'big')
-    f.number16 = int.from_bytes(take(2), 'big')
-    f.base = take(1)[0]
-    if f.base & 0x80:
-        f.base = (f.base & 0x7F) << 8 | take(1)[0]
-    f.remaining = take(1)[0]
+    if f.H:
+        f.src, f.dst = a >> 4, a & 15
+        f.session = int.from_bytes(take(2), 'big')
+        f.number = f.base = 0
+        take(3)     # not read
+        bad = f.session == 0
+        f.remaining = take(1)[0]
+    else:
+        vehicle, f.bits = a & 15, 8
+        f.src, f.dst = (vehicle, 0) if a & 0x80 else (0, vehicle)
+        f.base = take(1)[0]
+        if f.base & 0x80:
+            f.base, f.bits = (f.base & 0x7F) << 8 | take(1)[0], 16
+        f.low = int.from_bytes(take(f.bits // 8), 'big')
+        bad = a & 0x30 or not 1 <= vehicle <= 14 or not 1 <= f.base <= 2048
+        f.remaining = take(1)[0] if a & 0x40 else 0
     f.turn = take(1)[0] if f.T else None
     f.stamp = take(5 if f.src == 0 else 6) if f.S else None
     f.nonce = take(8) if f.H and f.K else bytes(8)
@@ -57,7 +79,7 @@ def parse(raw):
         if n == 15:
             n = take(1)[0]
         f.ack = (h >> 4, losses(take(n)))
-    if f.session == 0 or not 1 <= f.base <= 2048:
+    if bad:
         raise Short('malformed')
     f.head, f.body = d[:p], d[p:]
     return f
@@ -151,10 +173,14 @@ def nearest(low, high, bits=16):
 
 def write(src, dst, session, number, base, remaining, *, turn=None, stamp=None, ack=None, body=b'', hello=False,
           mission, peer, peer_nonce=bytes(8), key=None, nonce=None, ver=4):
-    """key: a keys.Hello or keys.Session, or None."""
+    """key: a hello key or a keys.Session, or None. number and base are of a numbered frame."""
     b0 = ver << 5 | (ack is not None) << 4 | (turn is not None) << 3 | hello << 2 | (stamp is not None) << 1 | (key is not None)
-    h = bytes([b0, src << 4 | dst]) + session.to_bytes(2, 'big') + (0 if hello else number & 0xFFFF).to_bytes(2, 'big')
-    h += write_base(base) + bytes([remaining])
+    if hello:
+        h = bytes([b0, src << 4 | dst]) + session.to_bytes(2, 'big') + bytes([0, 0, 1, remaining])
+    else:
+        b = write_base(base)
+        h = bytes([b0, (src != 0) << 7 | (remaining != 0) << 6 | src | dst]) + b
+        h += (number & (1 << 8 * len(b)) - 1).to_bytes(len(b), 'big') + (bytes([remaining]) if remaining else b'')
     if turn is not None:
         h += bytes([turn])
     h += stamp or b''
@@ -163,8 +189,7 @@ def write(src, dst, session, number, base, remaining, *, turn=None, stamp=None, 
     h += ack or b''
     if key is None:
         d = h + body
-        n = len(d) + 3
-        return d + crc_of(mission, peer, d, n if n < 128 else n + 1)
+        return d + (hello_crc(mission, peer, d) if hello else numbered_crc(mission, peer, session, number, d))
     if hello:
         return h + body + keys.hello_tag(key, mission, peer, peer_nonce, h + body)
     return key.seal(0 if src == 0 else 1, number, h, body)

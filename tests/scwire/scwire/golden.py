@@ -1,7 +1,7 @@
-"""The examples of sections 11 and 12.6 against this package."""
+"""The examples of sections 11 and 12.6 and of appendix A against this package."""
 import os
 import re
-from . import frame, keys, cobs
+from . import context, frame, keys, cobs, mapchunk
 hx = lambda s: bytes.fromhex(s.replace('\n', ' '))
 
 
@@ -14,6 +14,7 @@ def main():
     assert frame.statement(0xABC, []) == hx('ABC0')
     assert frame.statement(7, [1, 4]) == hx('007112') and frame.losses(hx('12')) == [1, 4]
     assert frame.statement(30, [20, 25]) == hx('01E2BE23') and frame.losses(hx('BE23')) == [20, 25]
+    assert frame.nearest(3, 250, 8) == 259 and frame.nearest(250, 259, 8) == 250
     assert frame.nearest(3, 65530) == 65539 and frame.nearest(65530, 65540) == 65530
     # Ascon, 12.1 and 12.6
     doc = open(os.environ['WIRE_MD']).read()
@@ -25,6 +26,8 @@ def main():
     table = dict(re.findall(r'^\| ([^|]+) \| `([^`]+)` \|$', doc.split('### 12.6')[1].split('## 13')[0], re.M))
     assert table['K of vehicle 1'] == k.hex() and table['C'] == C.hex() and table['H'] == H.hex() and table['R'] == keys.root(k).hex()
     assert table['key file of vehicle 1'] == keys.vehicle_line(M, 1), keys.vehicle_line(M, 1)
+    assert table['part 0 of the offer of a next key, M = sixteen bytes 5A'] == keys.offer(k, b'Z' * 16, 1, 0).hex()
+    assert table['part 1 of it'] == keys.offer(k, b'Z' * 16, 1, 1).hex()
     assert keys.prf(H, bytes(16), keys.join(b'hello', b'', hx('0102')))[:8].hex() == table['hello tag of these three parts']
     m, s, v = 0x5CE70001, hx('0102030405060708'), hx('1112131415161718')
     s0, s1 = keys.Session(k, m, 1, s, v, False), keys.Session(k, m, 1, s, v, True)
@@ -45,23 +48,66 @@ def main():
             name, 0 if f.H and f.src == 0 else 0x1234 if f.src == 0 else 0xBEEF)
         pn = {0: bytes(8), 0xC0DE: hx('2122232425262728'), 0xBEEF: s, 0x1234: v}[peer]
         ss = s1 if 'encrypted' in name else s0
-        if f.K:
-            if f.H:
-                assert keys.hello_tag(HC if name == 'keyed call' else H, m, peer, pn, f.unsealed) == f.seal, name
-            else:
-                body = ss.open(f.src != 0, f.number16, f.head, f.body, f.seal)
-                assert body is not None, name
-                f.body = body
+        if not f.H:
+            f.session = 0xBEEF if f.src == 0 else 0x1234
+            f.number = frame.number_in(f, m, peer, f.session, 0, ss if f.K else None)
+            assert f.number is not None, name
+        elif f.K:
+            assert keys.hello_tag(HC if name == 'keyed call' else H, m, peer, pn, f.unsealed) == f.seal, name
         else:
-            assert frame.crc_of(m, peer, f.unsealed, len(raw)) == f.seal, name
+            assert frame.hello_crc(m, peer, f.unsealed) == f.seal, name
         cs = frame.chunks(f.body)
-        w = frame.write(f.src, f.dst, f.session, f.number16, f.base, f.remaining, turn=f.turn, stamp=f.stamp, hello=bool(f.H),
+        w = frame.write(f.src, f.dst, f.session, f.number, f.base, f.remaining, turn=f.turn, stamp=f.stamp, hello=bool(f.H),
                         ack=frame.statement(*f.ack) if f.ack else None, body=f.body, mission=m, peer=peer, peer_nonce=pn,
                         key=(HC if name == 'keyed call' else H if f.H else ss) if f.K else None, nonce=f.nonce)
         assert w == raw, (name, w.hex(), raw.hex())
         ok += 1
         print(f'{name:40} {len(raw):3} bytes, chunks {[(k, len(p)) for k, p in cs]}')
     print(ok, 'frames of 11.2 and 11.3 verified and written again')
+    long_numbers(m)
+    appendix(doc.split('### A.6')[1])
 
 
-main()
+def long_numbers(m):
+    """2.1, 2.2: both lengths of a number; a highest number that is too high."""
+    for number, base, highest in (300, 127, 173), (300, 127, 2300), (300, 128, 2300), (70000, 2048, 68000):
+        raw = frame.write(1, 0, 7, number, base, 3, mission=m, peer=9)
+        f = frame.parse(raw)
+        assert (f.base, f.src, f.dst, f.remaining, len(raw)) == (base, 1, 0, 3, 9 if base < 128 else 11)
+        assert frame.number_in(f, m, 9, 7, highest) == number
+
+
+def appendix(doc):
+    """A.6, each decision, and a chunk in which a hash is FFFFFFFF."""
+    cells = lambda rows: {(x, y): int(v) for y, r in enumerate(rows.split('/')) for x, v in enumerate(r.split()) if v != '0'}
+    trace, coders, hashes = [], [], []
+    decide, decision, end = context.Stage.decide, context.Coder.decision, context.Coder.end
+
+    def stage(self, coder, direct, keyed, sets, curve):
+        trace.append([*direct, *(f'{k}:{s}' for k, s in keyed), *sets, curve])
+        hashes.extend(k for k, _ in keyed)
+        return decide(self, coder, direct, keyed, sets, curve)
+
+    def plain(self, one):
+        if not trace or trace[-1][-1] in ('yes', 'no'):
+            trace.append([])
+        yes = decision(self, one)
+        trace[-1] += [one, 'yes' if yes else 'no']
+        return yes
+    context.Stage.decide, context.Coder.decision, context.Coder.end = stage, plain, lambda c: (coders.append(c), end(c))
+    got = mapchunk.decode(hx(re.search(r'\| chunk \| `(.*?)`', doc)[1]), {(x, y): 1 for x in range(6) for y in range(6)})
+    assert got[3] == {(4, 2): 3, (6, 2): 1, (2, 3): 0, (4, 3): 3, (6, 3): 9}, got
+    lines = doc.split('curve    one  is\n')[1].split('```')[0].rstrip('\n').split('\n')
+    head = r'(\d,\d)?\s*(calm|flip|unseen|label \d|cleared|group \d|bit \d)\s'
+    assert [re.sub(head, '', l).split() for l in lines] == [[str(v) for v in t] for t in trace]
+    c, = coders
+    end_of_string = re.search(r'low = (\w+), range = (\w+), above = (\w+), and (\d+) bits', doc).groups()
+    assert end_of_string == (*(f'{v:08X}' for v in (c.low, c.range, c.above)), str(c.shifted))
+    print(len(trace), 'decisions of A.6')
+    old, new = cells('105 65 168 0 0 0 / 52 0 0 0 0 0 / 0 0 0 0 0 0'), cells('105 65 168 0 0 0 / 52 52 0 0 0 7 / 9 8 0 0 3 1')
+    got = mapchunk.decode(hx('80 00 22 88 40 00 79 6A 3F 05 3C 2D D0'), old)
+    assert {**old, **got[3]} == new and 0xFFFFFFFF in hashes, got
+
+
+if __name__ == '__main__':
+    main()

@@ -68,10 +68,15 @@ def root(k): return prf(k, b'scenecast-sessn1', b'')
 def vehicle_line(m, address):
     """The key file of a vehicle, 12.2."""
     k, c, f = vehicle_key(m, address), call_key(m), fingerprint(m)
-    mixed = bytes(a ^ (b << 1 | b >> 7) & 255 for a, b in zip(k, c))
-    n = int.from_bytes(f, 'big')
-    check = int.from_bytes(fingerprint(mixed), 'big') ^ (n << address | n >> 32 - address) & 0xFFFFFFFF
-    return f'scenecast-vehicle-key 2 {address} {k.hex()} {c.hex()} {f.hex()} {check:08x}'
+    check = prf(k, b'scenecast-check1', join(bytes([address]), c, f))[:4]
+    return f'scenecast-vehicle-key 2 {address} {k.hex()} {c.hex()} {f.hex()} {check.hex()}'
+
+
+def offer(k, m, address, part):
+    """A part of the next keys (of the mission key m) for a vehicle whose present key is k, 4.4."""
+    head = bytes([part]) + fingerprint(m)
+    mask = prf(k, b'scenecast-offer1', head)
+    return head + bytes(a ^ b for a, b in zip(call_key(m) if part else vehicle_key(m, address), mask))
 
 
 def read(path, address):

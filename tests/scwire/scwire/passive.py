@@ -22,32 +22,27 @@ class Follower:
         self.key, self.encrypt, self.address = key, encrypt, address
         self.hello_key = keys.hello_key(key) if key else None
         self.nonces, self.crypts, self.top = {0: bytes(8)}, {}, Counter()
-        self.surface, self.vehicles, self.calls = [], [], []   # sessions, newest last
+        self.surface, self.calls, self.pairs = [], [], []   # sessions of the surface; (surface's, vehicle's); newest last
         self.pair, self.replica = None, None
-        self.dead = []
+        self.dead = {}                                      # earlier pairs
 
-    def verifies(self, f, direction, peer):
-        if not f.K:
-            return not self.key and frame.crc_of(self.mission, peer, f.unsealed, len(f.raw)) == f.seal
-        if not self.key:
-            return False
-        if f.H:
-            return keys.hello_tag(self.hello_key, self.mission, peer, self.nonces[peer], f.unsealed) == f.seal
-        if f.session not in self.nonces:
-            return False
-        pair = (peer, f.session) if direction else (f.session, peer)
-        if pair not in self.crypts:
+    def hello_for(self, f, peer):
+        if self.key:
+            return f.K and keys.hello_tag(self.hello_key, self.mission, peer, self.nonces[peer], f.unsealed) == f.seal
+        return not f.K and frame.hello_crc(self.mission, peer, f.unsealed) == f.seal
+
+    def numbered_in(self, f, direction, pair):
+        if self.key and pair not in self.crypts:
             self.crypts[pair] = keys.Session(self.key, self.mission, self.address, self.nonces[pair[0]], self.nonces[pair[1]], self.encrypt)
-        n = frame.nearest(f.number16, self.top[pair, direction])
-        body = self.crypts[pair].open(direction, n, f.head, f.body, f.seal)
-        if body is None:
+        sender, receiver = pair[direction], pair[1 - direction]
+        f.number = frame.number_in(f, self.mission, receiver, sender, self.top[pair, direction], self.crypts.get(pair))
+        if f.number is None:
             return False
-        self.top[pair, direction] = max(n, self.top[pair, direction])
-        f.body = body
+        self.top[pair, direction] = max(f.number, self.top[pair, direction])
         return True
 
     def sent(self, f):
-        if f.ack and self.pair and self.pair[0] == f.session:
+        if f.ack and self.pair == f.peer:
             h = frame.nearest(f.ack[0], self.replica.window.highest, 12)
             self.replica.window.closed = max(self.replica.window.closed, h)
 
@@ -57,14 +52,14 @@ class Follower:
         except Short as e:
             self.count[f'refused: {e}'] += 1
             return None
-        peers = ([0] if f.H else self.vehicles) if direction == 0 else self.surface + self.calls
-        for peer in reversed(peers):
-            if self.verifies(f, direction, peer):
-                break
+        if f.H:
+            peers = [s for s in reversed(self.surface + self.calls if direction else [0]) if self.hello_for(f, s)]
         else:
+            peers = (p for p in reversed(self.pairs) if self.numbered_in(f, direction, p))
+        f.peer = peer = next(iter(peers), None)     # a session of the receiver, or a pair
+        if peer is None:
             self.count['up' * direction + 'down' * (1 - direction) + ' does not verify'] += 1
             return None
-        f.peer = peer
         if f.H:
             self.nonces[f.session] = f.nonce
         self.count[('up' if direction else 'down') + (' hello' if f.H else ' numbered')] += 1
@@ -83,13 +78,16 @@ class Follower:
                 self.count[f'down {e}'] += 1
             return f
         if f.H:
-            if peer in self.surface and f.session not in self.vehicles:
-                self.vehicles.append(f.session)
+            if peer in self.surface and (peer, f.session) not in self.pairs:
+                self.pairs.append((peer, f.session))
             return f
-        if self.pair != (peer, f.session):
+        if peer in self.dead:
+            self.count['up old session'] += 1
+            return None
+        if self.pair != peer:
             if self.replica:
-                self.dead.append(self.replica)
-            self.pair, self.replica = (peer, f.session), Replica()
+                self.dead[self.pair] = self.replica
+            self.pair, self.replica = peer, Replica()
         f.result = self.replica.take(f)
         return f
 
@@ -103,15 +101,14 @@ def run(path, mission=1, verbose=False, key=None, encrypt=False):
         raw = cobs.decode(content)
         if lost:
             fo.count['lost by the proxy'] += 1
-            if direction == 0 and raw:
-                fo.sent(frame.parse(raw))     # a statement that the surface sent counts for its window, lost or not
-            continue
+            if direction:     # what the surface sent counts, lost or not
+                continue
         if raw is None:
             fo.count['cobs'] += 1
             continue
         f = fo.take(direction, raw)
         if verbose and f:
-            print(f'{t - t0:8.3f} {"up  " if direction else "down"} {len(raw):4} #{getattr(f, "number", f.number16)} base {f.base}'
+            print(f'{t - t0:8.3f} {"up  " if direction else "down"} {len(raw):4} #{f.number} base {f.base}'
                   f' rem {f.remaining} turn {f.turn} ack {f.ack} {getattr(f, "result", "")}'
                   f' {[c[0] for c in getattr(f, "content", [])] if direction else [(k, p.hex()) for k, p in getattr(f, "chunks", [])]}')
     fo.seconds = time.time() - cost

@@ -65,7 +65,7 @@ class Surface:
 
     def begin_run(self, why):
         self.session, self.nonce = random.randrange(1, 65536), secrets.token_bytes(8)
-        self.pair, self.offered, self.ended = None, {}, []
+        self.pair, self.offered, self.ended = None, {}, {}
         self.log('new run', hex(self.session), why)
         self.new_vehicle()
 
@@ -119,6 +119,22 @@ class Surface:
     def refuse(self, why):
         self.count['refused: ' + why] += 1
 
+    def number_in(self, p, f, keyed):
+        return frame.number_in(f, self.mission, self.session, p.session, p.replica.window.highest, p.crypt if keyed else None)
+
+    def refusal(self, f, keyed):
+        """2.5: why a numbered frame does not verify in an offered pair or the present one."""
+        if f.K and not keyed:
+            return 'keyed'
+        if keyed and not f.K:
+            fits = any(self.number_in(p, f, False) is not None for p in [self.pair, *[*self.offered.values()][-1:]] if p)
+            return 'unauthenticated' if fits else 'checksum'
+        for p in self.ended.values():
+            n = self.number_in(p, f, keyed)
+            if n is not None and (not keyed or n > p.replica.window.highest):
+                return 'old session'
+        return 'checksum'
+
     def receive(self, raw):
         try:
             f = frame.parse(raw)
@@ -128,8 +144,8 @@ class Surface:
                 return self.refuse('unknown sender')
         except Short as e:
             return self.refuse(str(e))
-        crc_ok = not f.K and frame.crc_of(self.mission, self.session, f.unsealed, len(raw)) == f.seal
         if f.H:
+            crc_ok = not f.K and frame.hello_crc(self.mission, self.session, f.unsealed) == f.seal
             if self.key:
                 if not f.K or keys.hello_tag(self.hello_key, self.mission, self.session, self.nonce, f.unsealed) != f.seal:
                     return self.refuse('unauthenticated' if crc_ok else 'checksum')
@@ -137,22 +153,14 @@ class Surface:
                 return self.refuse('keyed' if f.K else 'checksum')
             return self.hello(f)
         keyed = bool(self.key) and self.a.authenticate == 'all'
-        for p in [self.pair, *self.offered.values()]:
-            if p is None or p.session != f.session:
-                continue
-            if keyed and f.K:
-                n = frame.nearest(f.number16, p.replica.window.highest)
-                body = p.crypt.open(1, n, f.head, f.body, f.seal)
-                if body is None:
-                    continue
-                f.body = body
-            elif keyed or not crc_ok:
-                continue
-            break
+        for p in [*self.offered.values(), self.pair]:
+            f.number = self.number_in(p, f, keyed) if p else None
+            if f.number is not None:
+                break
         else:
-            return self.refuse('old session' if crc_ok and not keyed else 'checksum')
+            return self.refuse(self.refusal(f, keyed))
         if p is not self.pair:
-            self.ended.append(self.pair.session)
+            self.ended[self.pair.session] = self.pair
             self.pair = p
             self.offered = {}
             self.log('the vehicle has taken run', hex(p.session))
@@ -253,7 +261,7 @@ class Surface:
                     p.number += 1
                     body = b''.join(s.chunk() for s in want)
                     ack = p.replica.window.statement(self.full // 3)
-                    size = 24 + len(body) + len(ack or b'')
+                    size = 21 + len(body) + len(ack or b'')
                     raw = frame.write(0, self.address, self.session, p.number, p.number - p.horizon, min(255, (k - 1) * (8 * size // 32 + 1)),
                                       turn=grant, stamp=self.stamp() if self.full >= 48 else None, ack=ack, body=body, mission=self.mission,
                                       peer=p.session, key=p.crypt)

@@ -1,6 +1,6 @@
 //! Arbitrary bytes as every format of the wire and the key file, except the map.
 
-use super::raw::{self, Script};
+use super::raw::{self, Covered, Script};
 use scenecast_protocol::directive::{InForceDigests, InForcePart, REPORTED_SLOTS, Series, SlotState, VersionedSlot};
 use scenecast_protocol::link::{Admission, Flight, LinkWindow, SlotInbox};
 use scenecast_protocol::mac::ClockMap;
@@ -26,7 +26,7 @@ pub fn frame(data: &[u8]) {
     let Ok(envelope) = Envelope::decode(data, |_| true) else { return };
     let header = &envelope.header;
     assert!((1..=MAX_WINDOW).contains(&u64::from(header.base)) && header.from != header.to);
-    let plain = envelope.open(&Seal::Crc(MISSION, 0)).is_some();
+    let plain = [Seal::Crc(MISSION, 0), run(u64::from(header.number))].iter().any(|seal| envelope.open(seal).is_some());
     let hello = envelope.open(&Seal::Hello(&key, MISSION, 0, 0)).is_some();
     let tagged = envelope.open(&Seal::Session(&session, Direction::Up, u64::from(header.number))).is_some();
     assert!(u8::from(plain) + u8::from(hello) + u8::from(tagged) <= 1);
@@ -36,7 +36,7 @@ pub fn frame(data: &[u8]) {
 
 fn reads_back(header: &Header) {
     let mut bytes = raw::head(header);
-    raw::close_with_crc(&mut bytes, MISSION, 0);
+    raw::close_with_crc(&mut bytes, MISSION, Covered::Hello(0));
     bytes.resize(bytes.len() + 8, 0);
     let again = Envelope::decode(&bytes, |_| true).expect("a header that was written");
     assert_eq!(&again.header, header);
@@ -62,10 +62,8 @@ fn hear(mut script: Script<'_>) {
     let mut window = LinkWindow::default();
     while !script.is_over() {
         let (number, base, what) = (script.u16(), script.u16() % 2048 + 1, script.u8());
-        if let Ok(number) = window.accept(number, base)
-            && what & 1 != 0
-        {
-            window.hold_back(number);
+        if window.accept(number.into(), base).is_ok() && what & 1 != 0 {
+            window.hold_back(number.into());
         }
         if what & 2 != 0 {
             window.handle_persisted();
@@ -79,11 +77,17 @@ fn hear(mut script: Script<'_>) {
     }
 }
 
+/// The CRC of a frame from the run 5 to the run 6.
+fn run(number: u64) -> Seal<'static> {
+    let [to, from] = [6, 5].map(SessionId::from_random);
+    Seal::Run { mission: MISSION, to, from, number }
+}
+
 fn header() -> Header {
     Header {
         from: Address::vehicle(1).expect("a vehicle"),
         to: Address::SURFACE,
-        session: SessionId::from_random(5),
+        session: None,
         number: 1,
         base: 1,
         remaining: 0,
@@ -100,9 +104,10 @@ fn header() -> Header {
 pub fn chunks(data: &[u8]) {
     let mut bytes = raw::head(&header());
     bytes.extend_from_slice(data);
-    raw::close_with_crc(&mut bytes, MISSION, 0);
+    let Seal::Run { to, from, number, .. } = run(1) else { return };
+    raw::close_with_crc(&mut bytes, MISSION, Covered::Run(to, from, number));
     let envelope = Envelope::decode(&bytes, |_| true).expect("a sound header");
-    let frame = envelope.open(&Seal::Crc(MISSION, 0)).expect("a right CRC");
+    let frame = envelope.open(&run(1)).expect("a right CRC");
     let payload: usize = frame.chunks().map(|c| c.payload.len() + 1).sum();
     assert!(payload <= data.len());
     if frame.chunks().are_sound() {
@@ -114,9 +119,9 @@ fn write_again(frame: &Frame<'_>) {
     let mut builder = FrameBuilder::new(&header(), 1 << 17);
     let short: Vec<_> = frame.chunks().filter(|c| c.payload.len() <= 1000).collect();
     assert!(short.iter().all(|c| builder.push(c.kind, c.payload)));
-    let bytes = builder.finish(&Seal::Crc(MISSION, 0), true);
+    let bytes = builder.finish(&run(1), true);
     let envelope = Envelope::decode(&bytes, |_| true).expect("a header that was written");
-    let again = envelope.open(&Seal::Crc(MISSION, 0)).expect("a frame that was written");
+    let again = envelope.open(&run(1)).expect("a frame that was written");
     assert!(again.chunks().are_sound() && again.chunks().eq(short));
 }
 

@@ -1,12 +1,11 @@
 //! The knowledge of an end's true peer, with which any frame can be sealed.
 
-use super::raw::{self, Script};
+use super::raw::{self, Covered, Script};
 use scenecast_protocol::directive::Series;
 use scenecast_protocol::link::{Authenticity, Flight};
 use scenecast_protocol::seal::{Direction, HeldKey, MissionKey};
 use scenecast_protocol::wire::{
     AckStatement, Address, CellEdge, Envelope, FrameKind, Header, Introduction, MissionId, Reader, SessionId, Stamp,
-    unwrap_number,
 };
 use std::collections::BTreeSet;
 use std::time::Duration;
@@ -56,10 +55,9 @@ impl FuzzPeer {
         if envelope.header.to == Address::EVERYBODY {
             return;
         }
-        if envelope.header.kind.is_hello() {
-            self.begin_run((envelope.header.session, envelope.header.nonce.unwrap_or_default()));
-        } else {
-            self.flight.push(());
+        match envelope.header.session {
+            Some(session) => self.begin_run((session, envelope.header.nonce.unwrap_or_default())),
+            None => self.flight.push(()),
         }
     }
 
@@ -68,14 +66,15 @@ impl FuzzPeer {
         let ours = |to| to == self.us || to == Address::EVERYBODY;
         let envelope = Envelope::decode(bytes, ours).expect("a frame for its peer");
         let header = &envelope.header;
-        let run = (header.session, header.nonce.unwrap_or_default());
+        let Some(session) = header.session else {
+            self.heard = self.heard.max(header.number_near(self.heard));
+            return header.ack.iter().for_each(|ack| drop(self.flight.handle_statement(ack)));
+        };
+        let run = (session, header.nonce.unwrap_or_default());
         if header.to == Address::EVERYBODY {
             self.call = Some(run);
-        } else if header.kind.is_hello() && run != self.theirs && header.session != self.own.0 {
+        } else if run != self.theirs && session != self.own.0 {
             (self.theirs, self.flight, self.heard) = (run, Flight::default(), 0);
-        } else if !header.kind.is_hello() {
-            self.heard = self.heard.max(unwrap_number(header.number, self.heard));
-            header.ack.iter().for_each(|ack| drop(self.flight.handle_statement(ack)));
         }
     }
 
@@ -105,7 +104,7 @@ impl FuzzPeer {
         let (session, nonce) = self.own;
         let header = Header {
             to,
-            session,
+            session: Some(session),
             number: 0,
             base: 1,
             nonce: keyed.then_some(nonce),
@@ -149,8 +148,8 @@ impl FuzzPeer {
         let header = Header { keyed: false, ..self.header(flags, script) };
         let mut bytes = raw::head(&header);
         bytes.extend_from_slice(script.bytes());
-        let session = if flags & 0x10 != 0 { self.theirs.0.get() } else { 0 };
-        raw::close_with_crc(&mut bytes, MISSION, session);
+        let theirs = if flags & 0x10 != 0 { self.theirs.0 } else { SessionId::from_random(0) };
+        raw::close_with_crc(&mut bytes, MISSION, Covered::Run(theirs, self.own.0, self.flight.next_number()));
         bytes
     }
 
@@ -175,7 +174,7 @@ impl FuzzPeer {
         Header {
             from,
             to: self.end,
-            session: self.own.0,
+            session: None,
             number: self.flight.next_number() as u16,
             base: self.flight.base_distance(),
             remaining,
@@ -194,8 +193,8 @@ impl FuzzPeer {
         bytes.extend_from_slice(body);
         let (session, nonce) = if self.us == Address::SURFACE { (0, 0) } else { (self.theirs.0.get(), self.theirs.1) };
         match self.authenticity.as_ref().filter(|_| header.keyed) {
-            None if header.kind.is_hello() => raw::close_with_crc(&mut bytes, MISSION, session),
-            None => raw::close_with_crc(&mut bytes, MISSION, self.theirs.0.get()),
+            None if header.kind.is_hello() => raw::close_with_crc(&mut bytes, MISSION, Covered::Hello(session)),
+            None => raw::close_with_crc(&mut bytes, MISSION, Covered::Run(self.theirs.0, self.own.0, number)),
             Some(a) if header.kind.is_hello() => {
                 let (m, s, n) = (MISSION.0.to_be_bytes(), session.to_be_bytes(), nonce.to_be_bytes());
                 let tag = a.key.link(self::vehicle().number()).hello_tag(&[&m, &s, &n, &bytes]);

@@ -1,26 +1,40 @@
 //! Frames with any body, sealed as a true sender seals sound ones.
 
 use crc::{CRC_24_OPENPGP, CRC_32_ISCSI, Crc};
-use scenecast_protocol::wire::{FrameBuilder, Header, MissionId, Seal};
+use scenecast_protocol::wire::{FrameBuilder, Header, MissionId, Seal, SessionId};
 
 /// The bytes of a header with its acknowledgement statement.
 pub fn head(header: &Header) -> Vec<u8> {
     let builder = FrameBuilder::new(header, 4096);
     let len = builder.len(true);
     let mut bytes = builder.finish(&Seal::Crc(MissionId(0), 0), true);
-    bytes.truncate(len - Seal::bytes(header.keyed, len));
+    bytes.truncate(len - Seal::bytes(header.keyed, header.kind));
     bytes
 }
 
-/// Closes a frame with the CRC for a mission and the receiver's session.
-pub fn close_with_crc(frame: &mut Vec<u8>, mission: MissionId, session: u16) {
-    let short = frame.len() + 3 < 128;
-    let crc = Crc::<u32>::new(if short { &CRC_24_OPENPGP } else { &CRC_32_ISCSI });
+/// What the CRC of a frame covers beside its bytes and the mission.
+#[derive(Debug, Clone, Copy)]
+pub enum Covered {
+    /// Of a hello: the receiver's session.
+    Hello(u16),
+    /// Of a numbered frame: the sessions of the receiver and of the sender, and the number.
+    Run(SessionId, SessionId, u64),
+}
+
+/// Closes a frame with its CRC.
+pub fn close_with_crc(frame: &mut Vec<u8>, mission: MissionId, covered: Covered) {
+    let mission = mission.0.to_be_bytes();
+    let (crc, unused, before) = match covered {
+        Covered::Hello(to) => (&CRC_24_OPENPGP, 1, to.to_be_bytes().to_vec()),
+        Covered::Run(to, from, number) => {
+            let sessions = [to.get().to_be_bytes(), from.get().to_be_bytes()].concat();
+            (&CRC_32_ISCSI, 0, [&sessions[..], &(number as u16).to_be_bytes()].concat())
+        }
+    };
+    let crc = Crc::<u32>::new(crc);
     let mut digest = crc.digest();
-    digest.update(&mission.0.to_be_bytes());
-    digest.update(&session.to_be_bytes());
-    digest.update(frame);
-    frame.extend_from_slice(&digest.finalize().to_be_bytes()[usize::from(short)..]);
+    [&mission[..], &before, frame].into_iter().for_each(|bytes| digest.update(bytes));
+    frame.extend_from_slice(&digest.finalize().to_be_bytes()[unused..]);
 }
 
 /// A reader of instructions that yields zeros past the end.

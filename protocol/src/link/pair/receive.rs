@@ -3,7 +3,7 @@
 use super::{HOLDER_SILENCE, LinkPair, Strays};
 use crate::link::handshake::HandshakeOutcome;
 use crate::link::mismatch::Mismatch;
-use crate::link::run::{Generation, Identity};
+use crate::link::run::{Generation, Identity, LinkRun};
 use crate::link::{DropReason, FrameNumber, WindowRefusal};
 use crate::seal::Direction;
 use crate::wire::{Address, ChunkKind, Chunks, Envelope, Frame, FrameKind, Header, Introduction, Seal, WIRE_VERSION};
@@ -95,7 +95,8 @@ impl<T> LinkPair<T> {
         if own.is_some() {
             self.handle_voice(generation);
         }
-        let peer = Identity { session: header.session, nonce: header.nonce.unwrap_or_default() };
+        let session = header.session.ok_or(DropReason::Malformed)?;
+        let peer = Identity { session, nonce: header.nonce.unwrap_or_default() };
         let refusal = introduction.filter(|caller| match own {
             Some(_) => caller.refuses,
             None => self.refuses(caller),
@@ -112,8 +113,9 @@ impl<T> LinkPair<T> {
             None => {
                 // Without a key, a forged frame may have ended the run. If the hello is old indeed, it has no effect: no frame
                 // of that run is sealed to the run that it is offered.
-                let accepts_ended = self.authenticity.is_none() && self.ended_hellos + 1 >= Self::ENDED_HELLOS;
-                self.handshake.handle_call(peer, introduction, accepts_ended, key)
+                let may_be_forged = self.authenticity.is_none();
+                let accepts_ended = may_be_forged && self.ended_hellos + 1 >= Self::ENDED_HELLOS;
+                self.handshake.handle_call(peer, introduction, accepts_ended, may_be_forged, key)
             }
         };
         if outcome == HandshakeOutcome::Retired {
@@ -150,15 +152,11 @@ impl<T> LinkPair<T> {
         let restarted = offered.is_some();
         let known = || self.handshake.run().and_then(|r| r.open(envelope, mission, direction, keyed));
         let Some(frame) = offered.or_else(known) else {
-            let reason = self.refuse(envelope, self.handshake.own().session.get());
-            let stray = self.handshake.run().is_none_or(|r| r.peer.session != envelope.header.session);
-            // Without a valid CRC the session may be noise; without a valid tag it may be a forgery. A frame of a run that a
-            // late hello has ended here has a valid tag.
-            let is_sign =
-                stray && (reason == DropReason::OldSession || (keyed && self.is_of_ended_run(envelope, direction)));
+            // A frame of a run that a late hello has ended here has a valid seal.
+            let is_sign = keyed == envelope.header.keyed && self.is_of_ended_run(envelope, direction, keyed);
             self.strays.count += u32::from(is_sign);
-            self.strays.of_unknown_run |= is_sign;
-            return Err(reason);
+            self.strays.of_ended_run |= is_sign;
+            return Err(if is_sign { DropReason::OldSession } else { self.refuse(envelope, 0) });
         };
         if !frame.chunks().are_sound() {
             return Err(DropReason::Malformed);
@@ -205,15 +203,19 @@ impl<T> LinkPair<T> {
         is_held && !caller.takes_over && self.is_authentic() && self.handshake.other_holder(caller).is_some()
     }
 
-    /// Whether a run of the peer that has ended sent this frame, by a valid tag. A surface that has lost the vehicle to
+    /// Whether a run of the peer that has ended sent this frame, by a valid seal. A surface that has lost the vehicle to
     /// another one learns it from the next hello.
-    fn is_of_ended_run(&mut self, envelope: &Envelope<'_>, direction: Direction) -> bool {
-        let sender = self.handshake.ended_sender(envelope, direction).map(|ended| (ended.identity, ended.introduction));
+    fn is_of_ended_run(&mut self, envelope: &Envelope<'_>, direction: Direction, keyed: bool) -> bool {
+        let own = self.handshake.own();
+        let ended = self.handshake.ended_sender(envelope, self.mission, direction, keyed);
+        // Without a key, a frame to an earlier run of ours may be of before.
+        let ended = ended.filter(|ended| keyed || ended.own == own);
+        let sender = ended.map(|ended| (ended.identity, ended.introduction));
         if let Some((identity, introduction)) = sender
             && self.us != Address::SURFACE
             && self.handshake.other_holder(&introduction).is_some()
         {
-            let generation = self.handshake.run().map_or(Generation::Present, |run| run.key.generation);
+            let generation = self.handshake.run().map_or(Generation::Present, |run| run.generation);
             (self.refused, self.owes_hello) = (Some((identity, generation)), true);
         }
         sender.is_some()
@@ -222,8 +224,8 @@ impl<T> LinkPair<T> {
     /// Whether the chunks of a frame decode, if the window would accept it.
     fn decodes(&self, frame: &Frame<'_>, decodes: impl Fn(Option<FrameNumber>, Chunks<'_>) -> bool) -> bool {
         let Some(run) = self.handshake.run() else { return true };
-        match run.window.preview(frame.header.number, frame.header.base) {
-            Ok((_, base)) => decodes(Some(base), frame.chunks()),
+        match run.window.preview(frame.number, frame.header.base) {
+            Ok(base) => decodes(Some(base), frame.chunks()),
             Err(_) => true,
         }
     }
@@ -238,10 +240,10 @@ impl<T> LinkPair<T> {
         // A rejected frame has still reported fates of ours, so these are returned with it.
         let before = run.window.highest();
         let mut lacks_base = false;
-        let number = match run.window.accept(header.number, header.base) {
-            Ok(number) => {
-                self.stats.take(before, number);
-                Some(number)
+        let number = match run.window.accept(frame.number, header.base) {
+            Ok(()) => {
+                self.stats.take(before, frame.number);
+                Some(frame.number)
             }
             Err(refusal) if fates.is_empty() && !restarted => return Err(refusal.into()),
             Err(refusal) => {
@@ -255,28 +257,35 @@ impl<T> LinkPair<T> {
         Ok(Inbound { restarted, fates, number, is_latest, base, lacks_base, refusal: None, frame })
     }
 
-    /// The most likely reason why a frame does not open.
+    /// The most likely reason why a frame does not open; `session` is ours in a hello.
     fn refuse(&mut self, envelope: &Envelope<'_>, session: u16) -> DropReason {
-        let kind = envelope.header.kind;
-        let expected = if kind.is_hello() { self.authenticity.is_some() } else { self.is_keyed(self.direction_in()) };
-        let plain = || envelope.open(&Seal::Crc(self.mission, session)).is_some();
+        let is_hello = envelope.header.kind.is_hello();
+        let expected = if is_hello { self.authenticity.is_some() } else { self.is_keyed(self.direction_in()) };
         match (expected, envelope.header.keyed) {
             (false, true) => {
                 self.mismatch.note(Mismatch::Tag);
                 DropReason::Keyed
             }
-            (true, false) if plain() => {
+            (true, false) if self.is_plain(envelope, session) => {
                 self.mismatch.note(Mismatch::NoTag);
                 DropReason::Unauthenticated
             }
-            (false, false) if !kind.is_hello() && plain() => DropReason::OldSession,
             _ => {
                 // At the surface, hellos of the vehicle to another surface do not verify.
-                if kind.is_hello() && self.us != Address::SURFACE {
-                    self.mismatch.note_untrue_hello(envelope.header.session);
+                if let Some(session) = envelope.header.session.filter(|_| self.us != Address::SURFACE) {
+                    self.mismatch.note_untrue_hello(session);
                 }
                 DropReason::Checksum
             }
+        }
+    }
+
+    /// Whether a frame has a CRC that is right, where a tag is expected.
+    fn is_plain(&self, envelope: &Envelope<'_>, session: u16) -> bool {
+        let opens = |run: &LinkRun<T>| run.open(envelope, self.mission, self.direction_in(), false).is_some();
+        match envelope.header.kind {
+            FrameKind::Hello => envelope.open(&Seal::Crc(self.mission, session)).is_some(),
+            FrameKind::Numbered => self.handshake.run().into_iter().chain(self.handshake.offered()).any(opens),
         }
     }
 }

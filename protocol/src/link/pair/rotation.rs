@@ -16,7 +16,7 @@ impl<T> LinkPair<T> {
 
     /// At the surface: whether there is a next key, and the vehicle uses the present one.
     pub fn offers_key(&self) -> bool {
-        let is_present = || self.handshake.run().is_some_and(|run| run.key.generation == Generation::Present);
+        let is_present = || self.handshake.run().is_some_and(|run| run.generation == Generation::Present);
         self.authenticity.as_ref().is_some_and(|a| a.offer.is_some()) && self.is_proven() && is_present()
     }
 
@@ -46,7 +46,7 @@ impl<T> LinkPair<T> {
         let Some(authenticity) = self.authenticity.as_mut() else { return };
         let is_new = authenticity.next.as_ref() != Some(key.link());
         authenticity.next = Some(key.link().clone());
-        if is_new || self.handshake.offered().is_none_or(|run| run.key.generation == Generation::Present) {
+        if is_new || self.handshake.offered().is_none_or(|run| run.generation == Generation::Present) {
             self.offer_run(Generation::Next);
         }
         self.repeat_hello();
@@ -59,12 +59,12 @@ impl<T> LinkPair<T> {
 
     /// At the vehicle: the surface has proven a run under the next key, which is the present one from now on.
     pub(super) fn handle_proven_key(&mut self) {
-        let is_next = self.handshake.run().is_some_and(|run| run.key.generation == Generation::Next);
+        let is_next = self.handshake.run().is_some_and(|run| run.generation == Generation::Next);
         let Some(authenticity) = self.authenticity.as_mut() else { return };
         if let Some(next) = authenticity.next.take_if(|_| is_next) {
             authenticity.key = next;
             self.has_changed_key = true;
-            self.handshake.run_mut().into_iter().for_each(|run| run.key.generation = Generation::Present);
+            self.handshake.run_mut().into_iter().for_each(|run| run.generation = Generation::Present);
         }
     }
 

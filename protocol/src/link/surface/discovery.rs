@@ -72,7 +72,7 @@ impl Discovery {
         let header = Header {
             from: Address::SURFACE,
             to: Address::EVERYBODY,
-            session: own.session,
+            session: Some(own.session),
             number: 0,
             base: 1,
             remaining: 0,

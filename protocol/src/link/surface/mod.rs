@@ -23,7 +23,7 @@ use crate::link::{DropReason, FrameNumber, Transmit};
 use crate::map::{Replica, StateReplica};
 use crate::schedule::{BitBudget, ClassShares, Shares};
 use crate::time::Instant;
-use crate::wire::{Address, Envelope, Introduction, Seal, UtcHours};
+use crate::wire::{Address, Envelope, FrameKind, Introduction, Seal, UtcHours};
 use discovery::Discovery;
 use fleet::Fleet;
 use peer::{Ready, VehiclePeer, room_for_slot};
@@ -150,7 +150,7 @@ impl<R: StateReplica> SurfaceLink<R> {
 
     /// Issues a new version of a slot to a vehicle; returns the version.
     pub fn issue(&mut self, vehicle: Address, slot: Slot, now: Instant) -> Result<u16, IssueError> {
-        let seal = Seal::bytes(self.config.authenticity.is_some(), self.config.modem.frame_bytes);
+        let seal = Seal::bytes(self.config.authenticity.is_some(), FrameKind::Numbered);
         let room = room_for_slot(self.config.modem.frame_bytes, seal);
         let bytes = VersionedSlot::encode(0, &slot).len();
         if bytes > room {

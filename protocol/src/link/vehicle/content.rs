@@ -376,7 +376,7 @@ impl<S: StateSource> VehicleContent<S> {
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
-    use crate::wire::{AckStatement, Address, FrameKind, Header, SessionId};
+    use crate::wire::{AckStatement, Address, FrameKind, Header};
 
     /// A source whose chunks are one byte longer than the room it is given.
     #[derive(Debug, Default)]
@@ -414,7 +414,7 @@ pub(super) mod tests {
         let header = Header {
             from: Address::vehicle(1).unwrap(),
             to: Address::SURFACE,
-            session: SessionId::from_random(1),
+            session: None,
             number: 1,
             base: 0,
             remaining: 0,

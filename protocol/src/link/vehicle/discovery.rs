@@ -38,10 +38,10 @@ impl CallReply {
         &mut self,
         config: &VehicleConfig,
         call: &Header,
-        generation: Generation,
+        (session, generation): (SessionId, Generation),
         now: Instant,
     ) -> Grant {
-        self.pending = Some((call.session, call.nonce.unwrap_or_default(), generation));
+        self.pending = Some((session, call.nonce.unwrap_or_default(), generation));
         let window = Duration::from_millis(250) * u32::from(call.turn.unwrap_or_default());
         let share = (crate::random::next(&mut self.random) >> 40) as f64 / (1u64 << 24) as f64;
         let begins = now + config.modem.turn_around + window.mul_f64(share);
@@ -62,7 +62,7 @@ impl CallReply {
         let header = Header {
             from: config.address,
             to: Address::SURFACE,
-            session,
+            session: Some(session),
             number: 0,
             base: 1,
             remaining: 0,

@@ -51,8 +51,9 @@ impl<S: StateSource> VehicleLink<S> {
             }
             Err(_) => {
                 // A frame of an ended run shows that another surface does not know that it has lost the vehicle.
-                let session = envelope.header.session;
-                if !owed_hello && self.pair.owes_refusal() && !self.hello_limit.admit(session, now) {
+                if let Some(session) = self.pair.refused_session().filter(|_| !owed_hello)
+                    && !self.hello_limit.admit(session, now)
+                {
                     self.pair.withhold_hello();
                 }
                 return self.owe_answer(now);
@@ -63,7 +64,7 @@ impl<S: StateSource> VehicleLink<S> {
             self.content.status.owe_report_by(now + Duration::from_secs(5));
         }
         match inbound.header().kind.is_hello() {
-            true if self.hello_limit.admit(envelope.header.session, now) => {
+            true if envelope.header.session.is_some_and(|session| self.hello_limit.admit(session, now)) => {
                 match self.pair.must_send_hello() && inbound.refusal.is_none() {
                     true => self.hello_limit.handle_offer(),
                     false => self.hello_limit.handle_known(now),
@@ -161,10 +162,10 @@ impl<S: StateSource> VehicleLink<S> {
         if self.pair.has_run() && self.last_received().is_some_and(|at| now.since(at) < CONTACT_TIMEOUT) {
             return;
         }
-        if !self.hello_limit.admit(envelope.header.session, now) {
+        let Some(session) = envelope.header.session.filter(|&session| self.hello_limit.admit(session, now)) else {
             return;
-        }
-        let grant = self.call_reply.handle_call(&self.config, &envelope.header, generation, now);
+        };
+        let grant = self.call_reply.handle_call(&self.config, &envelope.header, (session, generation), now);
         self.begin_turn();
         self.floor.handle_grant(Some(grant));
     }

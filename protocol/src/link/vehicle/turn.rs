@@ -188,7 +188,9 @@ impl<S: StateSource> VehicleLink<S> {
             let series = self.pair.called_series();
             self.pair.set_memory(series.is_none_or(|series| self.inbox.knows(series)));
         }
+        let takes_turns = !modem.access.is_free();
         let mut builder = self.pair.begin_frame(size, ack_room, wish, stamp, FramePurpose::Content);
+        builder = if takes_turns { builder.in_turn() } else { builder };
         let mut carried = Carried::new();
         if !sends_hello {
             if modem.access == Access::FullDuplex {
@@ -200,7 +202,6 @@ impl<S: StateSource> VehicleLink<S> {
             carried = self.content.fill(&mut builder, &context);
             self.events.extend(self.content.oversized.take().map(VehicleEvent::Oversized));
         }
-        let takes_turns = !modem.access.is_free();
         let is_complete = takes_turns && !sends_hello && self.content.backlog_bytes(&self.budget, now) == 0;
         if is_complete {
             self.repeater.note_complete();

@@ -9,7 +9,7 @@ use scenecast_protocol::map_codec::{Codec, encode};
 use scenecast_protocol::object::ObjectSender;
 use scenecast_protocol::seal::MissionKey;
 use scenecast_protocol::time::Instant;
-use scenecast_protocol::wire::{AckStatement, ChunkKind, Envelope, MissionId, Seal};
+use scenecast_protocol::wire::{AckStatement, ChunkKind, Envelope, MissionId, Seal, SessionId, WIRE_VERSION};
 use std::time::Duration;
 
 /// Corpus, name of the file, content.
@@ -80,7 +80,7 @@ fn contents() -> Vec<Seed> {
             ack.encode(100, &mut statement);
             seeds.push(("ack", format!("{way}-{i}"), statement));
         }
-        let end = Seal::bytes(false, bytes.len());
+        let end = Seal::bytes(false, envelope.header.kind);
         let body = bytes[raw::head(&envelope.header).len()..bytes.len() - end].to_vec();
         for (kind, payload) in chunks(&body) {
             let framed = [&[payload.len() as u8], &payload[..]].concat();
@@ -163,11 +163,13 @@ fn few(mut seeds: Vec<Seed>) -> Vec<Seed> {
 }
 
 fn chunks(body: &[u8]) -> Vec<(ChunkKind, Vec<u8>)> {
-    let mut bytes = vec![0x60, 0x10, 0, 5, 0, 1, 1, 0];
+    const UP: u8 = 0x80;
+    let mut bytes = vec![WIRE_VERSION << 5, UP | 1, 1, 1];
     bytes.extend_from_slice(body);
-    raw::close_with_crc(&mut bytes, MissionId(7), 0);
+    let [to, from] = [6, 5].map(SessionId::from_random);
+    raw::close_with_crc(&mut bytes, MissionId(7), raw::Covered::Run(to, from, 1));
     let envelope = Envelope::decode(&bytes, |_| true).expect("a sound header");
-    let frame = envelope.open(&Seal::Crc(MissionId(7), 0)).expect("a right CRC");
+    let frame = envelope.open(&Seal::Run { mission: MissionId(7), to, from, number: 1 }).expect("a right CRC");
     frame.chunks().map(|c| (c.kind, c.payload.to_vec())).collect()
 }
 
@@ -210,7 +212,7 @@ fn forged(body: &[u8]) -> Vec<u8> {
 
 fn body_of(bytes: &[u8]) -> Vec<u8> {
     let envelope = Envelope::decode(bytes, |_| true).expect("a frame");
-    bytes[raw::head(&envelope.header).len()..bytes.len() - Seal::bytes(false, bytes.len())].to_vec()
+    bytes[raw::head(&envelope.header).len()..bytes.len() - Seal::bytes(false, envelope.header.kind)].to_vec()
 }
 
 /// Bytes in the unit tests and in the description of the wire.

@@ -1,8 +1,10 @@
 //! Two ends in virtual time with an unreliable channel between them.
 
 mod setup;
+mod wiretap;
 
 pub(crate) use setup::{CALM, LossyChannel, Setup};
+pub(crate) use wiretap::Wiretap;
 
 use scenecast_protocol::directive::{Constraints, Slot, SlotId, SlotState, Utility};
 use scenecast_protocol::link::{
@@ -42,6 +44,7 @@ pub(crate) struct LinkedEnds {
     modems: [(VecDeque<Vec<u8>>, bool); 2],
     /// The last transmissions of both ends.
     pub(crate) overheard: VecDeque<Vec<u8>>,
+    pub(crate) wiretap: Wiretap,
     /// What the vehicle authenticates by, also after a restart.
     pub(crate) vehicle_keys: Option<Authenticity>,
     serial: u64,
@@ -81,6 +84,7 @@ impl LinkedEnds {
             on_air: BTreeMap::new(),
             modems: Default::default(),
             overheard: VecDeque::new(),
+            wiretap: Wiretap::default(),
             vehicle_keys: setup.authenticity.clone(),
             serial: 0,
             durable: SlotInboxState::default(),
@@ -304,6 +308,7 @@ impl LinkedEnds {
             let at = end + self.channel.propagation + Duration::from_secs_f64(late);
             self.schedule(at, PairEvent::Arrives { at_vehicle: !by_vehicle, bytes });
         }
+        self.wiretap.hear(&bytes);
         self.overheard.push_front(bytes);
         self.overheard.truncate(400);
         if self.draw() < self.channel.talker {

@@ -1,7 +1,7 @@
 //! The parts of a frame: fields of the header, layer chunks, status and slots.
 
 use super::document::{assert_same, pairs, rows, section};
-use super::samples::{MISSION, auv, clock, frame, header, hold, place, status, vehicle_stamp};
+use super::samples::{auv, clock, crc, frame, header, hold, place, status, vehicle_stamp};
 use scenecast_protocol::coordinates::{DecimetrePoint, MapPoint, WorldPoint};
 use scenecast_protocol::directive::{
     Areas, AtEnd, Band, Budget, CellBand, Change, Constraints, Destination, ExemplarRequest, ExemplarRequests, Fence,
@@ -16,7 +16,7 @@ use scenecast_protocol::map_codec;
 use scenecast_protocol::schedule::{BackgroundOrder, BackgroundStream, Shares};
 use scenecast_protocol::wire::{
     AckStatement, Address, ChunkKind, DiskReport, EquipmentFaults, FrameTie, Header, Intent, Placement, PlannedPath,
-    Reader, RegistrationReport, Seal, Stamp, Trail, TrailCorner, VehicleStatus, unwrap_number,
+    Reader, RegistrationReport, Stamp, Trail, TrailCorner, VehicleStatus,
 };
 use std::collections::BTreeMap;
 
@@ -39,16 +39,18 @@ fn parts_of_a_frame_are_those_of_the_document() {
 
     let expected = [header_fields(), layer_chunks(), status_chunks(), orders(), settings_and_budgets()].concat();
     assert_same(found, expected);
-    assert_eq!((unwrap_number(3, 65_530), unwrap_number(65_530, 65_540)), (65_539, 65_530));
+    let near = |base: u16, number: u16, highest: u64| Header { base, ..header(auv(), number) }.number_near(highest);
+    assert_eq!((near(9, 3, 250), near(9, 250, 259)), (259, 250));
+    assert_eq!((near(128, 3, 65_530), near(128, 65_530, 65_540)), (65_539, 65_530));
 }
 
 fn header_fields() -> Rows {
     let in_frame = |header: Header, from: usize, to: usize| {
-        frame(header, 2000, true, Seal::Crc(MISSION, 0), &[])[from..to].to_vec()
+        frame(header.clone(), 2000, true, crc(header.from, 9), &[])[from..to].to_vec()
     };
-    let base = |base: u16, bytes: usize| in_frame(Header { base, ..header(auv(), 9) }, 6, 6 + bytes);
+    let base = |base: u16, bytes: usize| in_frame(Header { base, ..header(auv(), 9) }, 2, 2 + bytes);
     let stamp = |from: Address, stamp: Stamp, bytes: usize| {
-        in_frame(Header { stamp: Some(stamp), ..header(from, 9) }, 8, 8 + bytes)
+        in_frame(Header { stamp: Some(stamp), ..header(from, 9) }, 4, 4 + bytes)
     };
     let statement = |horizon_low: u16, lost: Vec<u16>| {
         let (statement, mut bytes) = (AckStatement { horizon_low, lost }, Vec::new());
@@ -57,9 +59,9 @@ fn header_fields() -> Rows {
         bytes
     };
     let head = |payload: usize, head: usize, is_full: bool| {
-        let size = if is_full { 8 + head + payload + 4 } else { 1024 };
+        let size = if is_full { 4 + head + payload + 4 } else { 1024 };
         let chunk = [(ChunkKind::Map, vec![9; payload])];
-        frame(header(auv(), 9), size, true, Seal::Crc(MISSION, 0), &chunk)[8..8 + head].to_vec()
+        frame(header(auv(), 9), size, true, crc(auv(), 9), &chunk)[4..4 + head].to_vec()
     };
     vec![
         ("base 127", base(127, 1)),

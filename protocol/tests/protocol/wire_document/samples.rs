@@ -27,14 +27,11 @@ pub(crate) fn auv() -> Address {
 }
 
 pub(crate) fn header(from: Address, number: u16) -> Header {
-    let (to, session) = match from {
-        Address::SURFACE => (auv(), SURFACE_SESSION),
-        _ => (Address::SURFACE, VEHICLE_SESSION),
-    };
+    let to = if from == Address::SURFACE { auv() } else { Address::SURFACE };
     Header {
         from,
         to,
-        session: SessionId::from_random(session),
+        session: None,
         number,
         base: 1,
         remaining: 0,
@@ -57,6 +54,13 @@ pub(crate) fn vehicle_stamp(clock_ms: u32, last_received: u8, held_ms: u64) -> S
 
 pub(crate) fn all_up_to(horizon_low: u16, lost: Vec<u16>) -> Option<AckStatement> {
     Some(AckStatement { horizon_low, lost })
+}
+
+/// The CRC of a numbered frame of an end.
+pub(crate) fn crc(of: Address, number: u64) -> Seal<'static> {
+    let [surface, vehicle] = [SURFACE_SESSION, VEHICLE_SESSION].map(SessionId::from_random);
+    let (from, to) = if of == Address::SURFACE { (surface, vehicle) } else { (vehicle, surface) };
+    Seal::Run { mission: MISSION, to, from, number }
 }
 
 /// The introduction in the hello of the surface, or of the vehicle.
@@ -171,30 +175,33 @@ pub(crate) fn surface_hello(keyed: bool) -> Header {
         turn: Some(48),
         stamp: clock(50_000, None),
         nonce: keyed.then_some(SURFACE_NONCE),
-        kind: FrameKind::Hello,
-        keyed,
-        ..header(Address::SURFACE, 0)
+        ..hello(Address::SURFACE, SURFACE_SESSION, keyed)
     }
 }
 
+fn hello(from: Address, session: u16, keyed: bool) -> Header {
+    Header { session: Some(SessionId::from_random(session)), kind: FrameKind::Hello, keyed, ..header(from, 0) }
+}
+
 pub(crate) fn vehicle_hello(keyed: bool) -> Header {
-    Header { nonce: keyed.then_some(VEHICLE_NONCE), kind: FrameKind::Hello, keyed, ..header(auv(), 0) }
+    Header { nonce: keyed.then_some(VEHICLE_NONCE), ..hello(auv(), VEHICLE_SESSION, keyed) }
 }
 
 pub(crate) fn call(keyed: bool) -> Header {
     Header {
         to: Address::EVERYBODY,
-        session: SessionId::from_random(CALL_SESSION),
         turn: Some(8),
         nonce: keyed.then_some(CALL_NONCE),
-        kind: FrameKind::Hello,
-        keyed,
-        ..header(Address::SURFACE, 0)
+        ..hello(Address::SURFACE, CALL_SESSION, keyed)
     }
 }
 
 pub(crate) fn here(keyed: bool) -> Header {
-    Header { session: SessionId::from_random(CALL_SESSION), nonce: keyed.then_some(CALL_NONCE), ..vehicle_hello(keyed) }
+    Header {
+        session: Some(SessionId::from_random(CALL_SESSION)),
+        nonce: keyed.then_some(CALL_NONCE),
+        ..vehicle_hello(keyed)
+    }
 }
 
 pub(crate) fn first_of_surface(keyed: bool) -> Header {

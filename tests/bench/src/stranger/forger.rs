@@ -1,6 +1,7 @@
 //! The frames of the stranger, made from those that he overheard.
 
 use super::account::AttackKind;
+use super::wiretap::Wiretap;
 use crate::link_ends::{FRAME_BYTES, MISSION, auv};
 use scenecast_protocol::directive::{Constraints, SLOTS, Series, Slot, SlotReport, SlotState, Utility, VersionedSlot};
 use scenecast_protocol::map::{Cell, LabelGrid};
@@ -20,8 +21,7 @@ pub(super) struct Forger {
     rng: RandomStream,
     present: VecDeque<Vec<u8>>,
     earlier: VecDeque<Vec<u8>>,
-    /// The last header of the surface and of the vehicle.
-    last: [Option<Header>; 2],
+    wiretap: Wiretap,
 }
 
 /// A frame of the stranger.
@@ -31,15 +31,18 @@ pub(super) struct ForgedFrame {
     pub(super) bytes: Vec<u8>,
 }
 
-/// The ends of a forged frame: both addresses, and the session that it is sealed to.
+/// The ends of a forged frame.
 #[derive(Clone, Copy)]
 struct Route {
     from: Address,
     to: Address,
-    /// The session of the pretended sender.
-    session: SessionId,
-    /// The session of the receiver, 0 if the stranger has not heard it.
-    sealed_to: u16,
+}
+
+impl Route {
+    fn to_vehicle(is_to_vehicle: bool) -> Self {
+        let (from, to) = if is_to_vehicle { (Address::SURFACE, auv()) } else { (auv(), Address::SURFACE) };
+        Self { from, to }
+    }
 }
 
 impl Forger {
@@ -47,16 +50,13 @@ impl Forger {
     const EARLIER: usize = 3000;
 
     pub(super) fn new(rng: RandomStream) -> Self {
-        Self { rng, present: VecDeque::new(), earlier: VecDeque::new(), last: [None, None] }
+        Self { rng, present: VecDeque::new(), earlier: VecDeque::new(), wiretap: Wiretap::default() }
     }
 
     /// Listens to the transmissions of both ends.
     pub(super) fn overhear(&mut self, frames: impl IntoIterator<Item = Vec<u8>>) {
         for bytes in frames {
-            if let Ok(envelope) = Envelope::decode(&bytes, |_| true) {
-                let by_vehicle = envelope.header.from.is_vehicle();
-                self.last[usize::from(by_vehicle)] = Some(envelope.header);
-            }
+            self.wiretap.hear(&bytes);
             self.present.push_back(bytes);
             if self.present.len() > Self::PRESENT {
                 self.present.pop_front();
@@ -114,8 +114,8 @@ impl Forger {
 
     /// An overheard frame to this end.
     fn overheard(&mut self, to_vehicle: bool) -> Option<Vec<u8>> {
-        // The second byte has both addresses: the sender's in its high half.
-        let is_to = |bytes: &&Vec<u8>| bytes.get(1).is_some_and(|at| (at >> 4 == 0) == to_vehicle);
+        let is_to =
+            |bytes: &&Vec<u8>| Envelope::decode(bytes, |_| true).is_ok_and(|e| e.header.to.is_vehicle() == to_vehicle);
         let frames: Vec<&Vec<u8>> = self.present.iter().filter(is_to).collect();
         (!frames.is_empty()).then(|| frames[self.rng.below(frames.len())].clone())
     }
@@ -132,8 +132,9 @@ impl Forger {
     /// An overheard frame, cut or changed anywhere, its header included, that ends in the CRC of the present runs.
     fn malformed(&mut self, to_vehicle: bool) -> Option<Vec<u8>> {
         let mut bytes = self.overheard(to_vehicle)?;
-        let is_keyed = bytes.first()? & 1 != 0;
-        bytes.truncate(bytes.len().saturating_sub(Seal::bytes(is_keyed, bytes.len())));
+        let envelope = Envelope::decode(&bytes, |_| true).ok()?;
+        let seal = Seal::bytes(envelope.header.keyed, envelope.header.kind);
+        bytes.truncate(bytes.len() - seal);
         // Without the bit for a tag the end expects a CRC.
         bytes[0] &= !1;
         let at = self.below(bytes.len());
@@ -143,15 +144,29 @@ impl Forger {
             2 => bytes[0] ^= 1 << (5 + self.rng.below(3)),
             _ => bytes.extend((0..self.rng.below(8)).map(|_| self.rng.below(256) as u8).collect::<Vec<_>>()),
         }
-        bytes.truncate(FRAME_BYTES - 3);
-        let is_hello = self.below(3) == 0;
-        let sealed_to = match self.route(to_vehicle) {
-            Some(route) if !is_hello => route.sealed_to,
-            _ => 0,
-        };
-        let crc = crc24(&[&MISSION.0.to_be_bytes(), &sealed_to.to_be_bytes(), &bytes]);
-        bytes.extend_from_slice(&crc.to_be_bytes()[1..]);
+        bytes.truncate(FRAME_BYTES - 4);
+        let crc = self.crc_of(&bytes, to_vehicle)?;
+        bytes.extend(crc);
         Some(bytes)
+    }
+
+    /// The CRC of any bytes as a frame of the present runs.
+    fn crc_of(&mut self, bytes: &[u8], to_vehicle: bool) -> Option<Vec<u8>> {
+        let padded = [bytes, &[0; 8]].concat();
+        let Route { from, .. } = Route::to_vehicle(to_vehicle);
+        let number = self.wiretap.number(from);
+        let header = Envelope::decode(&padded, |_| true).ok().map(|e| e.header);
+        let seal = match header {
+            Some(header) if header.kind.is_hello() => self.hello_seal(to_vehicle),
+            Some(header) => self.wiretap.crc_of(MISSION, &header)?,
+            None => self.wiretap.crc(MISSION, from, number)?,
+        };
+        seal.crc(bytes)
+    }
+
+    fn hello_seal(&self, to_vehicle: bool) -> Seal<'static> {
+        let surface = self.wiretap.session(Address::SURFACE).map_or(0, SessionId::get);
+        Seal::Crc(MISSION, if to_vehicle { 0 } else { surface })
     }
 
     fn tagged(&mut self, to_vehicle: bool) -> Option<Vec<u8>> {
@@ -164,24 +179,24 @@ impl Forger {
         Some(bytes)
     }
 
-    fn route(&self, to_vehicle: bool) -> Option<Route> {
-        let [surface, vehicle] = [&self.last[0], &self.last[1]];
-        let (from, to) = if to_vehicle { (Address::SURFACE, auv()) } else { (auv(), Address::SURFACE) };
-        let (sender, receiver) = if to_vehicle { (surface, vehicle) } else { (vehicle, surface) };
-        let sealed_to = receiver.as_ref().map_or(0, |header| header.session.get());
-        Some(Route { from, to, session: sender.as_ref()?.session, sealed_to })
+    /// A numbered frame with the CRC of the present runs.
+    fn numbered(&self, (header, number): (Header, u64), chunks: &[(ChunkKind, Vec<u8>)]) -> Option<Vec<u8>> {
+        let mut builder = FrameBuilder::new(&header, FRAME_BYTES);
+        for (kind, payload) in chunks {
+            builder.push(*kind, payload);
+        }
+        Some(builder.finish(&self.wiretap.crc(MISSION, header.from, number)?, true))
     }
 
-    /// The header of a numbered frame that may be the sender's next one.
-    fn header(&mut self, route: Route) -> Header {
-        let last = self.last[usize::from(route.from.is_vehicle())].as_ref().map_or(0, |header| header.number);
-        let number = last.wrapping_add(self.below(4) as u16);
+    /// The header of a numbered frame that may be the sender's next one, and its number.
+    fn header(&mut self, route: Route) -> (Header, u64) {
+        let number = self.wiretap.number(route.from) + self.below(4) as u64;
         let turn = (self.below(2) == 0).then(|| self.below(256) as u8);
-        Header {
+        let header = Header {
             from: route.from,
             to: route.to,
-            session: route.session,
-            number,
+            session: None,
+            number: number as u16,
             base: 1 + self.below(4) as u16,
             remaining: 0,
             turn,
@@ -190,33 +205,34 @@ impl Forger {
             ack: None,
             kind: FrameKind::Numbered,
             keyed: false,
-        }
+        };
+        (header, number)
     }
 
     fn hello(&mut self, to_vehicle: bool) -> Option<Vec<u8>> {
-        let route = self.route(to_vehicle)?;
-        let session =
-            if self.below(2) == 0 { route.session } else { SessionId::from_random(self.below(1 << 16) as u16) };
+        let route = Route::to_vehicle(to_vehicle);
+        let known = self.wiretap.session(route.from)?;
+        let session = if self.below(2) == 0 { known } else { SessionId::from_random(self.below(1 << 16) as u16) };
         let series = to_vehicle.then(|| Series::from_random(self.below(1 << 31) as u64));
-        let header = Header { session, number: 0, base: 1, kind: FrameKind::Hello, ..self.header(route) };
+        let header = Header { session: Some(session), kind: FrameKind::Hello, ..self.header(route).0 };
         let mut builder = FrameBuilder::new(&header, FRAME_BYTES);
         builder.push(
             ChunkKind::Introduction,
             &Introduction { series, ..Introduction::default() }.encode(Introduction::MAX_BYTES),
         );
-        let sealed_to = if to_vehicle { 0 } else { route.sealed_to };
-        Some(builder.finish(&Seal::Crc(MISSION, sealed_to), true))
+        Some(builder.finish(&self.hello_seal(to_vehicle), true))
     }
 
     fn call(&mut self) -> Vec<u8> {
         let session = SessionId::from_random(self.below(1 << 16) as u16);
-        let route = Route { from: Address::SURFACE, to: Address::EVERYBODY, session, sealed_to: 0 };
-        let header = Header { number: 0, base: 1, turn: Some(8), kind: FrameKind::Hello, ..self.header(route) };
+        let route = Route { from: Address::SURFACE, to: Address::EVERYBODY };
+        let (header, _) = self.header(route);
+        let header = Header { session: Some(session), turn: Some(8), kind: FrameKind::Hello, ..header };
         FrameBuilder::new(&header, FRAME_BYTES).finish(&Seal::Crc(MISSION, 0), true)
     }
 
     fn order(&mut self) -> Option<Vec<u8>> {
-        let route = self.route(true)?;
+        let route = Route::to_vehicle(true);
         let slot = match self.below(3) {
             0 => Slot::Constraints(Constraints { hold: self.below(2) == 0, abort: self.below(4) == 0 }),
             _ => {
@@ -226,7 +242,7 @@ impl Forger {
         };
         let payload = VersionedSlot::encode(self.below(1 << 16) as u16, &slot);
         let header = self.header(route);
-        Some(numbered(header, route, &[(ChunkKind::Slot, payload)]))
+        self.numbered(header, &[(ChunkKind::Slot, payload)])
     }
 
     fn undecodable(&mut self, to_vehicle: bool) -> Option<Vec<u8>> {
@@ -239,31 +255,31 @@ impl Forger {
             ChunkKind::Layer,
             ChunkKind::Introduction,
         ];
-        let route = self.route(to_vehicle)?;
+        let route = Route::to_vehicle(to_vehicle);
         let mut chunks = Vec::new();
         for _ in 0..=self.below(3) {
             let length = self.below(20);
             chunks.push((KINDS[self.below(KINDS.len())], (0..length).map(|_| self.below(256) as u8).collect()));
         }
         let header = self.header(route);
-        Some(numbered(header, route, &chunks))
+        self.numbered(header, &chunks)
     }
 
     /// A patch of forged cells, coded against the operator's map, which the stranger may have followed.
     fn map(&mut self, shown: &LabelGrid) -> Option<Vec<u8>> {
-        let route = self.route(false)?;
+        let route = Route::to_vehicle(false);
         let corner = Cell::new(self.below(60) as i32 - 30, self.below(60) as i32 - 10);
         let mut target = shown.clone();
         for i in 0..12 {
             target.set(Cell::new(corner.x + i % 4, corner.y + i / 4), FORGED_LABEL);
         }
         let chunk = encode(Codec::Context, shown, &target, corner, 30, &|_| true)?;
-        let header = Header { base: 1, ..self.header(route) };
-        Some(numbered(header, route, &[(ChunkKind::Map, chunk.bytes)]))
+        let (header, number) = self.header(route);
+        self.numbered((Header { base: 1, ..header }, number), &[(ChunkKind::Map, chunk.bytes)])
     }
 
     fn report(&mut self) -> Option<Vec<u8>> {
-        let route = self.route(false)?;
+        let route = Route::to_vehicle(false);
         let random = SlotReport { version_low: self.below(256) as u8, state: SlotState::Applied };
         let status = VehicleStatus {
             base_digest: self.below(1 << 16) as u16,
@@ -276,53 +292,22 @@ impl Forger {
             _ => (ChunkKind::Report, status.encode_report(40, 0)?.0),
         };
         let header = self.header(route);
-        Some(numbered(header, route, &[chunk]))
+        self.numbered(header, &[chunk])
     }
 
     fn acknowledgement(&mut self, to_vehicle: bool) -> Option<Vec<u8>> {
-        let route = self.route(to_vehicle)?;
-        let mut header = self.header(route);
+        let route = Route::to_vehicle(to_vehicle);
+        let (mut header, number) = self.header(route);
         if self.below(3) == 0 {
             header.base = 1 + self.below(2000) as u16;
         } else {
             let horizon_low = self.below(4096) as u16;
             header.ack = Some(AckStatement { horizon_low, lost: vec![self.below(8) as u16] });
         }
-        Some(numbered(header, route, &[]))
+        self.numbered((header, number), &[])
     }
 }
 
 fn pick<'a>(rng: &mut RandomStream, frames: &'a VecDeque<Vec<u8>>) -> Option<&'a Vec<u8>> {
     if frames.is_empty() { None } else { frames.get(rng.below(frames.len())) }
-}
-
-fn numbered(header: Header, route: Route, chunks: &[(ChunkKind, Vec<u8>)]) -> Vec<u8> {
-    let mut builder = FrameBuilder::new(&header, FRAME_BYTES);
-    for (kind, payload) in chunks {
-        builder.push(*kind, payload);
-    }
-    builder.finish(&Seal::Crc(MISSION, route.sealed_to), true)
-}
-
-/// CRC-24/OPENPGP (RFC 9580), which ends short frames.
-fn crc24(parts: &[&[u8]]) -> u32 {
-    let mut crc = 0x00B7_04CE;
-    for &byte in parts.iter().copied().flatten() {
-        crc ^= u32::from(byte) << 16;
-        for _ in 0..8 {
-            crc = if crc & 0x80_0000 == 0 { crc << 1 } else { crc << 1 ^ 0x0086_4CFB };
-        }
-        crc &= 0x00FF_FFFF;
-    }
-    crc
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_stranger_writes_a_valid_crc() {
-        assert_eq!(crc24(&[b"123456789"]), 0x21_CF02);
-    }
 }

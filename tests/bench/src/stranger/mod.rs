@@ -7,6 +7,8 @@ mod ends;
 mod forger;
 mod orders;
 mod state;
+#[path = "../../../../protocol/tests/protocol/pair/wiretap.rs"]
+mod wiretap;
 
 pub use account::AttackKind;
 pub use campaign::{KindFigures, StrangerFigures, measure_stranger};
