@@ -12,10 +12,13 @@ use std::time::Duration;
 /// that is within the bound 19 times of 20 comes out below 0.95 at about every second seed.
 const STOPS: LinkEffort = LinkEffort { saturated: Duration::from_secs(60), directives: 1, stops: 200 };
 
+/// At least 95 % of the stops are to be within the bound. One sample of 200 in twenty comes out below this by chance.
+const LEAST_WITHIN: f64 = 0.95 - 1.65 * 0.0154;
+
 /// Rows that miss the bound of convergence, as range, bytes, loss; this list may only get shorter.
 ///
 /// At 3 km a grant and its answer are 4 s on the way: what was lost twice is past a bound that allows 10 s or 20 s.
-const LATE: &[(f64, usize, f64)] = &[(3.0, 64, 0.1), (3.0, 64, 0.3), (3.0, 1000, 0.1), (3.0, 1000, 0.3)];
+const LATE: &[(f64, usize, f64)] = &[(3.0, 64, 0.1), (3.0, 64, 0.3), (3.0, 1000, 0.1)];
 
 /// Rows of the golden table by their place in it: every one in `.ci/full`, otherwise one in five, over all settings.
 fn measured() -> &'static [(usize, LinkRow)] {
@@ -97,7 +100,8 @@ fn directives_are_applied_soon_under_load() {
 fn the_replica_is_equal_soon_after_the_last_change() {
     let rows: Vec<_> = sample().map(|(_, case)| row(case, &STOPS)).collect();
     let place = |r: &LinkRow| (r.range_km, r.frame_bytes, r.loss);
-    let late: Vec<_> = rows.iter().filter(|r| r.pattern == Pattern::Independent && r.converge_within < 0.95).collect();
+    let late: Vec<_> =
+        rows.iter().filter(|r| r.pattern == Pattern::Independent && r.converge_within < LEAST_WITHIN).collect();
     let places: Vec<_> = late.iter().map(|r| place(r)).collect();
     let expected: Vec<_> = LATE.iter().copied().filter(|late| rows.iter().any(|r| place(r) == *late)).collect();
     assert_eq!(places, expected, "fewer than 95 % of the stops within {{10, 20, 60}} s + 1.5 x rest: {late:#?}");
