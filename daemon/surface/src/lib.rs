@@ -6,6 +6,7 @@ mod assemble;
 mod command;
 #[cfg(test)]
 mod command_tests;
+mod corrections;
 mod exemplar_cache;
 mod in_force;
 mod label_gains;

@@ -20,7 +20,7 @@ pub enum LogKind {
     Contact,
     /// The mode of a vehicle has changed.
     Mode,
-    /// A label is on the map for the first time.
+    /// A label is on the map for the first time, or many cells of the map have got another label.
     Label,
     /// An image of a label has arrived.
     Image,

@@ -6,6 +6,7 @@ use super::orders::order_name;
 use super::record::StoredLogEntry;
 use super::{Surface, VehicleRecord};
 use scenecast_protocol::directive::{OrderStatus, SlotId};
+use scenecast_protocol::map::Relabelled;
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::{Address, SurfaceName, VehicleMode};
 
@@ -30,6 +31,19 @@ impl Surface {
 
     pub(super) fn log_fact(&mut self, vehicle: Address, kind: LogKind, text: &str, now: Instant) {
         self.log.add(Some(vehicle), kind, None, text, now);
+    }
+
+    /// Logs that a vehicle has given many cells of its map another label, once it is done.
+    pub(super) fn log_correction(&mut self, vehicle: Address, now: Instant) {
+        let Some(view) = self.link.vehicle(vehicle) else { return };
+        let (map, cells) = (view.replica(), view.replica().received_cells());
+        let Some(record) = self.records.get_mut(&vehicle) else { return };
+        if let Some(Relabelled { cells: changed, bytes }) = record.corrections.handle_sample(map.relabelled(), cells) {
+            let kbit = bytes as f64 * 8.0 / 1000.0;
+            let text =
+                format!("the map is corrected: {changed} of {cells} cells have another label, in {kbit:.1} kbit");
+            self.log_fact(vehicle, LogKind::Label, &text, now);
+        }
     }
 
     pub(super) fn log_command(&mut self, change: &CommandChange) {

@@ -281,6 +281,7 @@ impl Surface {
             if self.records.get(&vehicle).is_none_or(|record| record.earlier_map().is_none()) {
                 self.log_labels(vehicle, cells.keys().copied(), now);
             }
+            self.log_correction(vehicle, now);
             if let Some(record) = self.records.get_mut(&vehicle).filter(|_| !cells.is_empty()) {
                 record.gains.handle_cells(cells, now);
             }

@@ -1,6 +1,7 @@
 //! The operator's data about one vehicle.
 
 use super::annotations::Annotations;
+use super::corrections::Corrections;
 use super::exemplar_cache::ExemplarCache;
 use super::label_gains::LabelGains;
 use super::pauses::Pauses;
@@ -74,6 +75,7 @@ pub struct VehicleRecord {
     pub run: u32,
     pub epoch: u8,
     pub gains: LabelGains,
+    pub(crate) corrections: Corrections,
     pub earlier: EarlierView,
     /// The usual length of its silence.
     pub pauses: Pauses,
@@ -110,6 +112,7 @@ impl VehicleRecord {
             run: 1,
             epoch: 0,
             gains: LabelGains::default(),
+            corrections: Corrections::default(),
             earlier: EarlierView::default(),
             pauses: Pauses::default(),
             found: None,
@@ -124,6 +127,7 @@ impl VehicleRecord {
     pub fn begin_run(&mut self) {
         self.run += 1;
         self.gains = LabelGains::default();
+        self.corrections = Corrections::default();
         self.classes.clear();
     }
 

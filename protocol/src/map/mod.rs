@@ -30,7 +30,7 @@ pub use layer::{
 pub(crate) use parts::TextAssembly;
 pub use parts::TextPart;
 use parts::TextSender;
-pub use replica::Replica;
+pub use replica::{Relabelled, Replica};
 pub use source::MapSource;
 pub use stream::{StateReplica, StateSource};
 pub use tiles::{REPLICA_TILE, ReplicaTile, ReplicaTileKey, SharedTiles};

@@ -23,9 +23,32 @@ pub struct Replica {
     received: ReplicaTiles,
     version: u64,
     updated: Option<Instant>,
+    relabelled: Relabelled,
+}
+
+/// Cells that were given another label than they had, and the bytes of their chunks.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Relabelled {
+    /// Cells, each as often as it changed.
+    pub cells: u64,
+    /// Bytes of the chunks on air; of one that brought new cells too, the share of the others.
+    pub bytes: u64,
+}
+
+impl Relabelled {
+    /// What was added since an earlier sum.
+    #[must_use]
+    pub fn since(self, before: Self) -> Self {
+        Self { cells: self.cells - before.cells, bytes: self.bytes - before.bytes }
+    }
 }
 
 impl Replica {
+    /// The cells that were given another label, since the map began.
+    pub fn relabelled(&self) -> Relabelled {
+        self.relabelled
+    }
+
     /// The map to show; it holds exactly the cells that were sent.
     pub fn shown(&self) -> &LabelGrid {
         &self.shown
@@ -123,13 +146,17 @@ impl Replica {
             return false;
         }
         self.updated = Some(now);
-        let mut changed = false;
+        let (mut changed, mut relabelled) = (0, 0);
         for &(cell, label) in &changes {
             if self.received.receive(cell, label, number, now).is_some() {
-                changed |= self.shown.set(cell, label) != label;
+                let before = self.shown.set(cell, label);
+                changed += u64::from(before != label);
+                relabelled += u64::from(before != label && before != UNEXPLORED);
             }
         }
-        self.version += u64::from(changed);
+        self.version += u64::from(changed > 0);
+        self.relabelled.cells += relabelled;
+        self.relabelled.bytes += (chunk.len() as u64 * relabelled).checked_div(changed).unwrap_or(0);
         self.logged += changes.len();
         self.log.entry(number).or_default().extend(changes);
         true

@@ -16,6 +16,8 @@ use std::time::Duration;
 #[derive(Debug)]
 pub struct MapSource {
     codec: Codec,
+    /// Whether the peer reads bodies of the kind `png` alone.
+    is_plain: bool,
     /// Whether chunks are made quickly rather than as small as possible.
     is_quick: bool,
     interest: Interest,
@@ -39,6 +41,7 @@ impl MapSource {
     pub fn new(codec: Codec) -> Self {
         Self {
             codec,
+            is_plain: false,
             is_quick: false,
             interest: Interest::default(),
             debounce: Debounce::default(),
@@ -157,12 +160,13 @@ impl StateSource for MapSource {
         let stride = self.coarse.stride(&self.dirty.counts());
         let seed = self.dirty.best(stride, &self.acked, &self.target, &self.interest, now)?;
         let (base, waiting) = (&self.acked, self.dirty.waiting());
-        let chunk = match self.is_quick && self.codec != Codec::Png {
+        let codec = if self.is_plain { Codec::Png } else { self.codec };
+        let chunk = match self.is_quick && codec != Codec::Png {
             true => {
                 let per_change = self.spent.0 / self.spent.1.max(1.0);
                 map_codec::encode_quickly(stride, base, &self.target, seed, room, &waiting, per_change)?
             }
-            false => map_codec::encode_every(stride, self.codec, base, &self.target, seed, room, &waiting)?,
+            false => map_codec::encode_every(stride, codec, base, &self.target, seed, room, &waiting)?,
         };
         drop(waiting);
         if stride == Stride::One {
@@ -177,6 +181,10 @@ impl StateSource for MapSource {
 
     fn set_quick(&mut self, is_quick: bool) {
         self.is_quick = is_quick;
+    }
+
+    fn set_plain(&mut self, is_plain: bool) {
+        self.is_plain = is_plain;
     }
 
     fn handle_fate(&mut self, carried: Self::Carried, delivered: bool, now: Instant) {

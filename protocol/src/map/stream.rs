@@ -14,6 +14,9 @@ pub trait StateSource: Debug {
     /// Sets whether chunks are to be made quickly rather than as small as possible, because the channel is fast.
     fn set_quick(&mut self, _is_quick: bool) {}
 
+    /// Sets whether the peer reads the plainest form of chunks alone.
+    fn set_plain(&mut self, _is_plain: bool) {}
+
     /// Takes the fate of a chunk. Fates come in the order of frame numbers.
     fn handle_fate(&mut self, carried: Self::Carried, delivered: bool, now: Instant);
 

@@ -86,7 +86,9 @@ impl UtcHours {
 ///  9    1     no memory      from a vehicle: it knows no order from before its start
 ///  9    5     silence        from a vehicle that refuses: time since it has heard that surface, 8 s; 31: 248 s or more
 /// 10-12 24    clock          hours since 1970, UTC; 0: not known
-/// 13    8     name's length  bytes, 0..12
+/// 13    1     plain          from a surface: it reads map chunks with the body `png` alone
+/// 13    3     -              0, not read
+/// 13    4     name's length  bytes, 0..12
 /// 14..        name           of the surface that the series belongs to, UTF-8
 ///  ..         reserved for later versions; skipped
 /// ```
@@ -114,6 +116,8 @@ pub struct Introduction {
     pub has_no_memory: bool,
     /// From a vehicle that refuses: seconds since it has heard the surface that holds it, rounded down to multiples of 8.
     pub silence_s: u8,
+    /// From a surface: it reads map and layer chunks with the body `png` alone.
+    pub is_plain: bool,
     /// The clock of the sender's computer.
     pub clock: Option<UtcHours>,
     /// The name of the surface that the series belongs to.
@@ -125,6 +129,7 @@ impl Introduction {
     pub const MAX_BYTES: usize = Self::HEAD + SurfaceName::MAX_BYTES;
     /// Bytes before the name.
     const HEAD: usize = 14;
+    const PLAIN: u8 = 0x80;
 
     /// The bytes of the payload: 14, and the name as far as it fits into `room`.
     #[must_use]
@@ -142,7 +147,7 @@ impl Introduction {
         while !name.is_char_boundary(length) {
             length -= 1;
         }
-        out.push(length as u8);
+        out.push(length as u8 | if self.is_plain { Self::PLAIN } else { 0 });
         out.extend_from_slice(name.as_bytes().get(..length).unwrap_or_default());
         out
     }
@@ -155,7 +160,8 @@ impl Introduction {
         let flags = r.u8()?;
         let refuses = flags & 0x40 != 0;
         let hours = r.u24()?;
-        let length = usize::from(r.u8()?).min(SurfaceName::MAX_BYTES);
+        let name = r.u8()?;
+        let length = usize::from(name & 0x0F).min(SurfaceName::MAX_BYTES);
         Ok(Self {
             cell_edge: CellEdge(edge),
             series: (series != 0).then(|| Series::from_random(series)),
@@ -163,6 +169,7 @@ impl Introduction {
             refuses,
             has_no_memory: flags & 0x20 != 0,
             silence_s: if refuses { (flags & 0x1F) * 8 } else { 0 },
+            is_plain: name & Self::PLAIN != 0,
             clock: (hours != 0).then_some(UtcHours(hours)),
             name: SurfaceName::from_text(&String::from_utf8_lossy(r.take(length)?)),
         })
@@ -179,7 +186,7 @@ mod tests {
         fn an_introduction_reads_back(
             edge in 0u32..=CellEdge::MAX,
             bits in 1u64..,
-            [is_surface, takes_over, refuses, has_no_memory]: [bool; 4],
+            [is_surface, takes_over, refuses, has_no_memory, is_plain]: [bool; 5],
             silence in 0u8..32,
             hours in 0u32..1 << 24,
             name: String,
@@ -190,7 +197,8 @@ mod tests {
             let name = if is_surface { SurfaceName::from_text(&name) } else { SurfaceName::default() };
             let cell_edge = CellEdge(edge);
             let clock = UtcHours::from_unix(Duration::from_secs(3600 * u64::from(hours)));
-            let sent = Introduction { cell_edge, series, takes_over, refuses, has_no_memory, silence_s, clock, name };
+            let sent =
+                Introduction { cell_edge, series, takes_over, refuses, has_no_memory, silence_s, is_plain, clock, name };
             let mut bytes = sent.encode(Introduction::MAX_BYTES);
             prop_assert!(bytes.len() <= Introduction::MAX_BYTES);
             prop_assert_eq!(Introduction::decode(&bytes), Ok(sent));

@@ -224,25 +224,56 @@ fn a_link_recovers_from_forgeries_that_it_accepted() {
 /// Begins a run of the surface at the vehicle by a forged hello, and gives it an order of a series.
 fn give_forged_order(pair: &mut LinkedEnds, series: Series, order: &[u8]) {
     let forged = SessionId::from_random(0x5A5A);
+    let answer = greet(pair, forged, &Introduction { series: Some(series), ..Introduction::default() });
     let (header, _) = Stranger { pair, random: 1 }.header(Address::SURFACE, auv());
-    let mut hello = FrameBuilder::new(&Header { session: Some(forged), kind: FrameKind::Hello, ..header.clone() }, 64);
-    let introduction = Introduction { series: Some(series), ..Introduction::default() };
-    hello.push(ChunkKind::Introduction, &introduction.encode(Introduction::MAX_BYTES));
-    let hello = hello.finish(&Seal::Crc(MISSION, 0), true);
-    pair.overheard.clear();
-    let give_up = pair.now + Duration::from_secs(1000);
-    let answer = loop {
-        if let Some(session) = Stranger::hello_of_vehicle(&pair.overheard) {
-            break session;
-        }
-        assert!(pair.now < give_up, "no answer to the forged hello");
-        pair.vehicle.handle_frame(&hello, pair.now);
-        pair.run(pair.now + Duration::from_millis(100), false);
-    };
     let mut frame = FrameBuilder::new(&Header { number: 1, base: 1, ..header }, 64);
     assert!(frame.push(ChunkKind::Slot, order));
     let seal = Seal::Run { mission: MISSION, to: answer, from: forged, number: 1 };
     pair.vehicle.handle_frame(&frame.finish(&seal, true), pair.now);
+}
+
+/// Sends the vehicle the hello of another surface until it answers, which gives its run.
+fn greet(pair: &mut LinkedEnds, session: SessionId, introduction: &Introduction) -> SessionId {
+    let (header, _) = Stranger { pair, random: 1 }.header(Address::SURFACE, auv());
+    let mut hello = FrameBuilder::new(&Header { session: Some(session), kind: FrameKind::Hello, ..header }, 64);
+    hello.push(ChunkKind::Introduction, &introduction.encode(Introduction::MAX_BYTES));
+    let hello = hello.finish(&Seal::Crc(MISSION, 0), true);
+    pair.overheard.clear();
+    let give_up = pair.now + Duration::from_secs(1000);
+    loop {
+        if let Some(session) = Stranger::hello_of_vehicle(&pair.overheard) {
+            return session;
+        }
+        assert!(pair.now < give_up, "no answer to the hello");
+        pair.vehicle.handle_frame(&hello, pair.now);
+        pair.run(pair.now + Duration::from_millis(100), false);
+    }
+}
+
+#[test]
+fn a_surface_that_reads_png_bodies_alone_is_sent_no_others() {
+    for is_plain in [false, true] {
+        let mut pair = LinkedEnds::new(4, Setup::new(64, 10_000, Codec::Context), CHANNEL);
+        pair.vehicle.set_map(patchy(12, 1).iter(), pair.now);
+        pair.mute = [true, false];
+        let session = SessionId::from_random(0x5A5A);
+        let series = Some(Series::from_random(1));
+        let answer = greet(&mut pair, session, &Introduction { series, is_plain, ..Introduction::default() });
+        let (header, _) = Stranger { pair: &mut pair, random: 1 }.header(Address::SURFACE, auv());
+        let grant = Header { number: 1, base: 1, turn: Some(60), ..header };
+        let seal = Seal::Run { mission: MISSION, to: answer, from: session, number: 1 };
+        pair.vehicle.handle_frame(&FrameBuilder::new(&grant, 64).finish(&seal, true), pair.now);
+        pair.run(pair.now + Duration::from_secs(15), false);
+        let mut bodies = BTreeSet::new();
+        for bytes in &pair.overheard {
+            let Ok(envelope) = Envelope::decode(bytes, |to| to == Address::SURFACE) else { continue };
+            let number = envelope.header.number_near(0);
+            let seal = Seal::Run { mission: MISSION, to: session, from: answer, number };
+            let Some(frame) = envelope.open(&seal) else { continue };
+            bodies.extend(frame.chunks().filter(|c| c.kind == ChunkKind::Map).map(|c| c.payload[0] >> 7));
+        }
+        assert_eq!(bodies, BTreeSet::from([u8::from(!is_plain)]), "body 1 is context");
+    }
 }
 
 #[test]

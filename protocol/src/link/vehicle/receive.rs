@@ -75,6 +75,7 @@ impl<S: StateSource> VehicleLink<S> {
             false => self.hello_limit.handle_numbered(),
         }
         if inbound.restarted {
+            self.content.set_plain(self.pair.peer_introduction().is_some_and(|surface| surface.is_plain));
             self.forget_peer(now);
             self.events.push_back(VehicleEvent::SurfaceRestarted);
         }

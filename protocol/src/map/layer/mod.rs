@@ -113,6 +113,10 @@ impl StateSource for LayerSource {
         self.levels.set_quick(is_quick);
     }
 
+    fn set_plain(&mut self, is_plain: bool) {
+        self.levels.set_plain(is_plain);
+    }
+
     fn handle_fate(&mut self, carried: Self::Carried, delivered: bool, now: Instant) {
         match carried {
             LayerCarried::Descriptor(bytes) => self.announcement.handle_fate(bytes, delivered),

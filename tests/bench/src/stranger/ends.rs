@@ -4,7 +4,7 @@ use super::Protection;
 use super::account::{Judged, LinkCounters, LinkJudgement};
 use super::orders::OrderBook;
 use crate::link_ends::{EndsSetup, auv, draw_seed};
-use scenecast_protocol::directive::{OrderStatus, RefusalReason, SlotId, SlotState};
+use scenecast_protocol::directive::{OrderStatus, RefusalReason, SlotId, SlotProgress, SlotState, Withdrawal};
 use scenecast_protocol::link::{SlotInboxState, SurfaceLink, VehicleEvent, VehicleLink};
 use scenecast_protocol::mac::Access;
 use scenecast_protocol::map::{Cell, LabelGrid, StateReplica};
@@ -148,6 +148,16 @@ impl AttackedEnds {
     }
 
     /// Whether the maps agree, and the last order is in force and known to be.
+    /// Without a key, a forged hello may say that the vehicle has lost its orders. The operator is asked, and sends his order again.
+    pub(super) fn answer_question(&mut self) {
+        let slots = self.surface.vehicle(auv()).into_iter().flat_map(|view| view.slots());
+        let is_lost =
+            |s: &SlotProgress| s.id == SlotId::Utility && s.status == OrderStatus::Withdrawn(Withdrawal::Lost);
+        if slots.into_iter().any(is_lost) {
+            let _ = self.surface.give_again(auv(), SlotId::Utility, self.now);
+        }
+    }
+
     pub(super) fn is_recovered(&self) -> bool {
         let Some(view) = self.surface.vehicle(auv()) else { return false };
         let is_known = view.slots().any(|s| s.id == SlotId::Utility && s.status == OrderStatus::Applied);
