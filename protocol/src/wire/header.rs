@@ -212,11 +212,12 @@ impl Header {
         let route = r.u8()?;
         let vehicle = Address::vehicle(route & 15).filter(|_| route & RESERVED == 0).ok_or(FrameError::BadField)?;
         let (from, to) = if route & UP != 0 { (vehicle, Address::SURFACE) } else { (Address::SURFACE, vehicle) };
-        let (base, number) = match r.u8()? {
-            b if b < LONG_BASE => (u16::from(b), u16::from(r.u8()?)),
-            b => (u16::from(b - LONG_BASE) << 8 | u16::from(r.u8()?), r.u16()?),
+        // A small base has one form alone, by which the bits of the number are known.
+        let (least, base, number) = match r.u8()? {
+            b if b < LONG_BASE => (1, u16::from(b), u16::from(r.u8()?)),
+            b => (u16::from(LONG_BASE), u16::from(b - LONG_BASE) << 8 | u16::from(r.u8()?), r.u16()?),
         };
-        if base == 0 || u64::from(base) > MAX_WINDOW {
+        if base < least || u64::from(base) > MAX_WINDOW {
             return Err(FrameError::BadField);
         }
         let remaining = if route & REMAINING != 0 { r.u8()? } else { 0 };
