@@ -67,7 +67,8 @@ def parse(raw):
         if f.base & 0x80:
             f.base, f.bits = (f.base & 0x7F) << 8 | take(1)[0], 16
         f.low = int.from_bytes(take(f.bits // 8), 'big')
-        bad = a & 0x30 or not 1 <= vehicle <= 14 or not 1 <= f.base <= 2048
+        least = 1 if f.bits == 8 else 128
+        bad = a & 0x30 or not 1 <= vehicle <= 14 or not least <= f.base <= 2048
         f.remaining = take(1)[0] if a & 0x40 else 0
     f.turn = take(1)[0] if f.T else None
     f.stamp = take(5 if f.src == 0 else 6) if f.S else None
