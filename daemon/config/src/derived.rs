@@ -5,7 +5,7 @@ use scenecast_core::UserError;
 use scenecast_core::tuning_table::TuningTable;
 use scenecast_protocol::link::Authenticity;
 use scenecast_protocol::mac::{Access, ModemProfile};
-use scenecast_protocol::seal::KeyFile;
+use scenecast_protocol::seal::{HeldKey, KeyFile};
 use scenecast_protocol::wire::Address;
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -58,8 +58,10 @@ pub fn cell_m(config: &Config) -> f64 {
 pub fn authenticity(config: &Config, end: Address) -> Result<Option<Authenticity>, UserError> {
     let (all, encrypt) = (config.link.authenticate == Authenticate::All, config.link.encrypt);
     let held = load_key(config, end)?;
-    Ok(held
-        .map(|KeyFile { key, next }| Authenticity { next: next.map(Arc::new), ..Authenticity::new(key, all, encrypt) }))
+    Ok(held.map(|KeyFile { key, next }| {
+        let next = next.map(|key| Arc::new(HeldKey::Mission(key)));
+        Authenticity { next, ..Authenticity::new(key, all, encrypt) }
+    }))
 }
 
 /// The vehicles that the surface works with from the start, by address and name.

@@ -127,7 +127,6 @@ impl VehicleRecord {
     pub fn begin_run(&mut self) {
         self.run += 1;
         self.gains = LabelGains::default();
-        self.corrections = Corrections::default();
         self.classes.clear();
     }
 

@@ -169,13 +169,12 @@ impl<T> Handshake<T> {
         may_be_forged: bool,
         key: impl Fn(Identity, Identity) -> RunKey,
     ) -> HandshakeOutcome {
-        let is_repeated = self.run.as_ref().is_some_and(|r| r.peer == peer && r.flight.horizon() == 0);
-        self.doubts += u32::from(may_be_forged && is_repeated);
-        let doubts = self.doubts;
-        let is_doubtful = |r: &LinkRun<T>| {
-            r.flight.horizon() == 0 && (r.flight.next_number() > Self::DOUBTFUL || doubts >= Self::DOUBTS)
-        };
-        if self.run.as_ref().is_some_and(|r| r.peer == peer && !is_doubtful(r)) && !self.leaving {
+        let current = self.run.as_ref().filter(|r| r.peer == peer);
+        let is_unacknowledged = current.is_some_and(|r| r.flight.horizon() == 0);
+        self.doubts += u32::from(may_be_forged && is_unacknowledged);
+        let is_long = current.is_some_and(|r| r.flight.next_number() > Self::DOUBTFUL);
+        let is_doubtful = is_unacknowledged && (is_long || self.doubts >= Self::DOUBTS);
+        if current.is_some() && !is_doubtful && !self.leaving {
             return HandshakeOutcome::Known;
         }
         if self.is_retired(peer) && !accepts_ended {

@@ -4,13 +4,14 @@ mod receive;
 mod rotation;
 
 pub use receive::Inbound;
+use rotation::KeyRotation;
 
 use super::handshake::{FramePurpose, Handshake};
 use super::mismatch::{Mismatch, MismatchReport};
 use super::run::{Authenticity, Generation, Identities, Identity, LinkAuthenticity, RunKey};
 use super::{FrameNumber, LinkStats, LinkWindow};
 use crate::directive::Series;
-use crate::seal::{Direction, KeyOffer, TAG_BYTES};
+use crate::seal::{Direction, TAG_BYTES};
 use crate::wire::{
     Address, ChunkKind, FrameBuilder, FrameKind, Header, Introduction, MissionId, Seal, SessionId, Stamp, UtcHours,
     room_for_payload,
@@ -48,16 +49,7 @@ pub struct LinkPair<T> {
     silence: Option<Duration>,
     /// At the vehicle: the run of a surface that the next hello refuses, and the generation of the key by which it called.
     refused: Option<(Identity, Generation)>,
-    /// At the surface: the generation of the key of the next hello.
-    speaks: Generation,
-    /// At the surface: the generation of the key of the last hello of the vehicle.
-    answered_by: Option<Generation>,
-    /// At the surface: hellos since the last accepted frame.
-    unheard: u32,
-    /// At the vehicle: the parts of the next key that were received.
-    key_offer: KeyOffer,
-    /// The ends have changed over to the next key, and that was not polled yet.
-    has_changed_key: bool,
+    rotation: KeyRotation,
     /// Counters and estimates of this link.
     pub stats: LinkStats,
 }
@@ -78,7 +70,7 @@ impl<T> LinkPair<T> {
         seed: u64,
     ) -> Self {
         let authenticity = authenticity.map(|a| a.link(if us == Address::SURFACE { peer } else { us }));
-        let handshake = Handshake::new(Identities::new(seed, authenticity.as_ref().map(|a| a.key.clone())));
+        let handshake = Handshake::new(Identities::new(seed, authenticity.as_ref().map(|a| a.key.link().clone())));
         let (mismatch, stats) = (MismatchReport::default(), LinkStats::default());
         Self {
             mission,
@@ -93,11 +85,7 @@ impl<T> LinkPair<T> {
             ended_hellos: 0,
             silence: None,
             refused: None,
-            speaks: Generation::Present,
-            answered_by: None,
-            unheard: 0,
-            key_offer: KeyOffer::default(),
-            has_changed_key: false,
+            rotation: KeyRotation::default(),
             stats,
         }
     }
@@ -145,6 +133,11 @@ impl<T> LinkPair<T> {
     /// At the surface: whether hellos have the vehicle leave another surface.
     pub fn takes_over(&self) -> bool {
         self.introduction.takes_over
+    }
+
+    /// The keys of the link.
+    pub(super) fn authenticity(&self) -> Option<&LinkAuthenticity> {
+        self.authenticity.as_ref()
     }
 
     /// Whether orders are authenticated.
@@ -237,8 +230,8 @@ impl<T> LinkPair<T> {
         self.strays.count >= Self::STRAYS
     }
 
-    /// Whether a frame has come in since the last accepted one that the peer seems to have sent in a run that is unknown here.
-    pub(super) fn hears_unknown_run(&self) -> bool {
+    /// Whether a frame has come in since the last accepted one that the peer has sent in a run that has ended here.
+    pub(super) fn hears_ended_run(&self) -> bool {
         self.strays.of_ended_run
     }
 
@@ -336,20 +329,15 @@ impl<T> LinkPair<T> {
         let direction = self.direction_out();
         let keyed = if hello { self.authenticity.is_some() } else { self.is_keyed(direction) };
         let run = self.handshake.run_for(purpose).filter(|_| !hello);
-        let (number, base) = run.as_ref().map_or((0, 1), |r| (r.flight.next_number() as u16, r.flight.base_distance()));
+        let (number, base) = run.as_ref().map_or((0, 1), |r| (r.flight.next_number(), r.flight.base_distance()));
         let header = Header {
-            from: self.us,
-            to: self.peer,
             session: hello.then_some(own.session),
-            number,
-            base,
-            remaining: 0,
             turn,
             stamp,
             nonce: (hello && keyed).then_some(own.nonce),
             ack: run.and_then(|r| r.window.statement(ack_room)),
-            kind: FrameKind::hello_if(hello),
             keyed,
+            ..Header::numbered(self.us, self.peer, number, base)
         };
         let mut builder = FrameBuilder::new(&header, size);
         if hello {
@@ -371,7 +359,7 @@ impl<T> LinkPair<T> {
             let to = self.handshake.offered().filter(|_| !is_surface).map(|r| (r.peer, r.generation));
             let to = self.refused.take().or(to);
             let (session, nonce) = to.map_or((0, 0), |(p, _)| (p.session.get(), p.nonce));
-            let generation = if is_surface { self.next_voice() } else { to.map_or(self.speaks, |(_, used)| used) };
+            let generation = if is_surface { self.next_voice() } else { to.map(|(_, used)| used).unwrap_or_default() };
             return match &self.authenticity {
                 Some(a) => builder.finish(&Seal::Hello(a.key(generation), self.mission, session, nonce), short),
                 None => builder.finish(&Seal::Crc(self.mission, session), short),

@@ -29,9 +29,8 @@ impl Authenticity {
     pub(super) fn link(&self, vehicle: Address) -> LinkAuthenticity {
         let number = vehicle.number();
         LinkAuthenticity {
-            key: self.key.link(number),
-            next: self.next.as_ref().map(|next| next.link(number)),
-            offer: self.next.as_ref().and_then(|next| next.vehicle(number)),
+            key: self.key.vehicle(number),
+            next: self.next.as_ref().map(|next| next.vehicle(number)),
             all: self.all,
             encrypt: self.encrypt,
         }
@@ -69,20 +68,23 @@ impl Generation {
 /// The keys of a link, and the scope of authentication.
 #[derive(Debug, Clone)]
 pub(super) struct LinkAuthenticity {
-    pub(super) key: LinkKey,
-    pub(super) next: Option<LinkKey>,
-    /// What a surface offers to the vehicle.
-    pub(super) offer: Option<VehicleKey>,
+    pub(super) key: VehicleKey,
+    /// The next one: a surface offers it to the vehicle.
+    pub(super) next: Option<VehicleKey>,
     pub(super) all: bool,
     pub(super) encrypt: bool,
 }
 
 impl LinkAuthenticity {
-    /// The key of this generation, or the present one if there is no next one.
+    /// The key of the link of this generation, or the present one if there is no next one.
     pub(super) fn key(&self, generation: Generation) -> &LinkKey {
+        self.held(generation).unwrap_or(&self.key).link()
+    }
+
+    fn held(&self, generation: Generation) -> Option<&VehicleKey> {
         match generation {
-            Generation::Present => &self.key,
-            Generation::Next => self.next.as_ref().unwrap_or(&self.key),
+            Generation::Present => Some(&self.key),
+            Generation::Next => self.next.as_ref(),
         }
     }
 
@@ -94,9 +96,24 @@ impl LinkAuthenticity {
         session: u16,
         nonce: u64,
     ) -> Option<(Generation, Frame<'a>)> {
-        let held = Generation::ALL.into_iter().take(1 + usize::from(self.next.is_some()));
-        held.into_iter().find_map(|generation| {
-            let seal = Seal::Hello(self.key(generation), mission, session, nonce);
+        self.open(envelope, VehicleKey::link, mission, session, nonce)
+    }
+
+    /// The generation of the key that a call to all vehicles is sealed with.
+    pub(super) fn open_call(&self, envelope: &Envelope<'_>, mission: MissionId) -> Option<Generation> {
+        self.open(envelope, VehicleKey::calls, mission, 0, 0).map(|(generation, _)| generation)
+    }
+
+    fn open<'a>(
+        &self,
+        envelope: &Envelope<'a>,
+        part: fn(&VehicleKey) -> &LinkKey,
+        mission: MissionId,
+        session: u16,
+        nonce: u64,
+    ) -> Option<(Generation, Frame<'a>)> {
+        Generation::ALL.into_iter().find_map(|generation| {
+            let seal = Seal::Hello(part(self.held(generation)?), mission, session, nonce);
             Some((generation, envelope.open(&seal)?))
         })
     }
@@ -259,7 +276,7 @@ impl<T> LinkRun<T> {
         direction: Direction,
         keyed: bool,
     ) -> Option<Frame<'a>> {
-        if !self.is_readable || envelope.header.kind.is_hello() {
+        if !self.is_readable || envelope.header.kind().is_hello() {
             return None;
         }
         self.seals.open(envelope, mission, direction, keyed, self.window.highest())

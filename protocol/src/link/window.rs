@@ -125,7 +125,7 @@ impl LinkWindow {
 mod tests {
     use super::super::Flight;
     use super::*;
-    use crate::wire::{Address, FrameKind, Header};
+    use crate::wire::{Address, Header};
     use proptest::prelude::*;
 
     proptest! {
@@ -167,21 +167,7 @@ mod tests {
 
     /// The header of a frame, with as much of its number as is sent.
     fn header(number: u64, base: u16) -> Header {
-        let vehicle = Address::vehicle(1).unwrap();
-        Header {
-            from: vehicle,
-            to: Address::SURFACE,
-            session: None,
-            number: if base < 128 { number & 0xFF } else { number & 0xFFFF } as u16,
-            base,
-            remaining: 0,
-            turn: None,
-            stamp: None,
-            nonce: None,
-            ack: None,
-            kind: FrameKind::Numbered,
-            keyed: false,
-        }
+        Header::numbered(Address::vehicle(1).unwrap(), Address::SURFACE, number, base)
     }
 
     #[test]

@@ -78,10 +78,6 @@ impl LinkKey {
         &self.bytes
     }
 
-    pub(super) fn secret(&self) -> &Secret {
-        &self.bytes
-    }
-
     /// The tag of a hello frame, over `parts` and their lengths.
     ///
     /// It proves that a holder of the key wrote them, at any time: replayed parts verify again.
@@ -178,11 +174,11 @@ pub enum HeldKey {
 }
 
 impl HeldKey {
-    /// The key of the link with a vehicle. An end that holds the key of another vehicle has no better one, and no frame verifies.
-    pub fn link(&self, vehicle: u8) -> LinkKey {
+    /// The keys of a vehicle. An end that holds those of another one has no better ones, and no frame verifies.
+    pub fn vehicle(&self, address: u8) -> VehicleKey {
         match self {
-            Self::Mission(key) => key.vehicle(vehicle),
-            Self::Vehicle(key) => key.link.clone(),
+            Self::Mission(key) => VehicleKey::derive(key, address),
+            Self::Vehicle(key) => key.clone(),
         }
     }
 
@@ -191,14 +187,6 @@ impl HeldKey {
         match self {
             Self::Mission(key) => key.calls(),
             Self::Vehicle(key) => key.calls.clone(),
-        }
-    }
-
-    /// The keys of a vehicle alone; `None` if this is the key of another one.
-    pub fn vehicle(&self, address: u8) -> Option<VehicleKey> {
-        match self {
-            Self::Mission(key) => Some(VehicleKey::derive(key, address)),
-            Self::Vehicle(key) => (key.address == address).then(|| key.clone()),
         }
     }
 

@@ -11,34 +11,37 @@ const OFFER: &[u8; 16] = b"scenecast-offer1";
 const LINK: u8 = 0;
 const CALLS: u8 = 1;
 
-/// A part of the offer of the next key: a chunk of the surface.
-///
-/// ```text
-///  0               1               5                              21
-/// +---------------+---------------+------------------------------+
-/// | part          | mission       | secret                       |
-/// +---------------+---------------+------------------------------+
-/// part     0: the next key of the vehicle, 1: the next key of the calls
-/// mission  fingerprint of the next mission key
-/// secret   the 16 bytes of the key, each added without carry to one of PRF(present key of the vehicle, "scenecast-offer1", part, mission)
-/// ```
-///
-/// The tag of the frame protects it from change; the secret is hidden also where frames are not encrypted. Two next keys with one
-/// fingerprint would use a key stream twice, by chance once in 2^32.
 impl VehicleKey {
     /// The length of a part in bytes.
     pub const PART_BYTES: usize = 21;
 
-    /// The two parts in which this key, the next one, is offered to a vehicle that holds `present`.
+    /// The two parts in which this key, the next one, is offered to a vehicle that holds `present`; each is a chunk of the surface.
+    ///
+    /// ```text
+    ///  0               1               5                              21
+    /// +---------------+---------------+------------------------------+
+    /// | part          | mission       | secret                       |
+    /// +---------------+---------------+------------------------------+
+    /// part     0: the next key of the vehicle, 1: the next key of the calls
+    /// mission  fingerprint of the next mission key
+    /// secret   the 16 bytes of the key, xor PRF(present key of the vehicle, "scenecast-offer1", part, mission)
+    /// ```
+    ///
+    /// The tag of the frame protects it from change; the secret is hidden also where frames are not encrypted. Two next keys with one
+    /// fingerprint would use a key stream twice, by chance once in 2^32.
     pub fn offer(&self, present: &LinkKey) -> [Vec<u8>; 2] {
         [(LINK, &self.link), (CALLS, &self.calls)].map(|(part, key)| {
-            let mut bytes = vec![part];
-            bytes.extend(self.mission.to_be_bytes());
-            let stream = prf(present.secret(), OFFER, &bytes);
-            bytes.extend(key.bytes().iter().zip(stream.iter()).map(|(a, b)| a ^ b));
-            bytes
+            let head = [&[part][..], &self.mission.to_be_bytes()].concat();
+            let hidden = hide(present, &head, *key.bytes());
+            [head, hidden.to_vec()].concat()
         })
     }
+}
+
+/// Hides a secret in a part with this head, or shows it again.
+fn hide(present: &LinkKey, head: &[u8], mut secret: [u8; 16]) -> [u8; 16] {
+    secret.iter_mut().zip(prf(present.bytes(), OFFER, head).iter()).for_each(|(a, b)| *a ^= b);
+    secret
 }
 
 /// The parts of an offer that a vehicle has received.
@@ -66,10 +69,7 @@ impl KeyOffer {
         if mission != self.mission {
             *self = Self { mission, ..Self::default() };
         }
-        let stream = prf(present.secret(), OFFER, part.get(..5).unwrap_or_default());
-        let mut secret = hidden;
-        secret.iter_mut().zip(stream.iter()).for_each(|(a, b)| *a ^= b);
-        let key = LinkKey::from_bytes(secret);
+        let key = LinkKey::from_bytes(hide(present, part.get(..5).unwrap_or_default(), hidden));
         match number {
             LINK => self.link = Some(key),
             _ => self.calls = Some(key),

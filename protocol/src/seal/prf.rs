@@ -20,8 +20,8 @@ pub(super) type Secret = Zeroizing<[u8; 16]>;
 /// revealed: a pseudorandom function up to about 2^96 calls and 2^128 guesses of the key. Proofs with repeated nonces:
 /// Lefevre and Mennink, "Generic Security of the Ascon Mode: On the Power of Key Blinding", SAC 2024 (eprint 2023/796)
 /// and "SoK: Security of the Ascon Modes" (eprint 2024/1969).
-pub(super) fn prf(key: &Secret, nonce: &[u8; 16], data: &[u8]) -> Secret {
-    Zeroizing::new(mac::<U16>(&TruncatedAsconAead128::new(&(**key).into()), nonce, data).into())
+pub(super) fn prf(key: &[u8; 16], nonce: &[u8; 16], data: &[u8]) -> Secret {
+    Zeroizing::new(mac::<U16>(&TruncatedAsconAead128::new(&(*key).into()), nonce, data).into())
 }
 
 /// The tag of `data` with an empty plaintext.

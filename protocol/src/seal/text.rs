@@ -65,7 +65,7 @@ pub struct KeyFile {
     /// The present key.
     pub key: HeldKey,
     /// The next key of the mission, which the surface offers to its vehicles.
-    pub next: Option<HeldKey>,
+    pub next: Option<MissionKey>,
 }
 
 impl KeyFile {
@@ -88,15 +88,16 @@ impl KeyFile {
                 continue;
             }
             let is_next = content.split_whitespace().next() == Some(NEXT);
-            let slot = match key {
-                Some(HeldKey::Mission(_)) if is_next => &mut next,
-                _ if is_next => return Err(KeyError::NotAKey { line }),
-                _ => &mut key,
-            };
-            if slot.is_some() {
+            if is_next && !matches!(key, Some(HeldKey::Mission(_))) {
+                return Err(KeyError::NotAKey { line });
+            }
+            if if is_next { next.is_some() } else { key.is_some() } {
                 return Err(KeyError::Second { line });
             }
-            *slot = Some(parse_line(content, line)?);
+            match parse_line(content, line)? {
+                HeldKey::Mission(parsed) if is_next => next = Some(parsed),
+                parsed => key = Some(parsed),
+            }
         }
         Ok(Self { key: key.ok_or(KeyError::Missing)?, next })
     }
@@ -149,7 +150,7 @@ impl VehicleKey {
     /// A check of the whole line.
     fn check(&self) -> u32 {
         let line = join(&[&[self.address], self.calls.bytes(), &self.mission.to_be_bytes()]);
-        let [a, b, c, d, ..] = *prf(self.link.secret(), CHECK, &line);
+        let [a, b, c, d, ..] = *prf(self.link.bytes(), CHECK, &line);
         u32::from_be_bytes([a, b, c, d])
     }
 }

@@ -5,7 +5,7 @@ use super::chunk::{ChunkKind, Chunks, push_chunk};
 use super::header::{Address, FrameKind, Header, MissionId, SessionId};
 use crate::bytes::{Reader, Truncated};
 use crate::seal::{Direction, LinkKey, SessionKey, TAG_BYTES, Tag};
-use crc::{CRC_24_OPENPGP, CRC_32_ISCSI, Crc};
+use crc::{CRC_24_OPENPGP, CRC_32_ISCSI, Crc, Digest};
 use std::borrow::Cow;
 
 /// The check of a hello, the same in every version from 2 on.
@@ -73,25 +73,17 @@ impl Seal<'_> {
         }
     }
 
-    /// The CRC of a frame whose bytes before it are these, as the frame ends in it; `None` of a tag.
-    pub fn crc(&self, bytes: &[u8]) -> Option<Vec<u8>> {
-        self.crc_of(&[bytes])
-    }
-
-    fn crc_of(&self, parts: &[&[u8]]) -> Option<Vec<u8>> {
-        let (crc, before) = match *self {
-            Self::Crc(mission, session) => (&CRC24, [&mission.0.to_be_bytes()[..], &session.to_be_bytes()].concat()),
+    /// The CRC of a frame whose bytes before it are `parts`, as the frame ends in it; `None` of a tag.
+    pub fn crc(&self, parts: &[&[u8]]) -> Option<impl Iterator<Item = u8> + use<>> {
+        let (mut digest, unused) = match *self {
+            Self::Crc(mission, session) => (begin(&CRC24, mission, &[session]), 1),
             Self::Run { mission, to, from, number } => {
-                let [to, from] = [to, from].map(|session| session.get().to_be_bytes());
-                (&CRC32, [&mission.0.to_be_bytes()[..], &to, &from, &(number as u16).to_be_bytes()].concat())
+                (begin(&CRC32, mission, &[to.get(), from.get(), number as u16]), 0)
             }
-            _ => return None,
+            Self::Hello(..) | Self::Session(..) => return None,
         };
-        let mut digest = crc.digest();
-        digest.update(&before);
         parts.iter().for_each(|part| digest.update(part));
-        let unused = usize::from(matches!(self, Self::Crc(..)));
-        Some(digest.finalize().to_be_bytes().into_iter().skip(unused).collect())
+        Some(digest.finalize().to_be_bytes().into_iter().skip(unused))
     }
 
     fn hello_parts<'p>(
@@ -107,7 +99,8 @@ impl Seal<'_> {
     fn close(&self, bytes: &mut Vec<u8>, body_at: usize) {
         match *self {
             Self::Crc(..) | Self::Run { .. } => {
-                bytes.extend(self.crc(bytes).unwrap_or_default());
+                let crc = self.crc(&[bytes]);
+                bytes.extend(crc.into_iter().flatten());
             }
             Self::Hello(key, mission, session, nonce) => {
                 let (m, s, n) = (mission.0.to_be_bytes(), session.to_be_bytes(), nonce.to_be_bytes());
@@ -121,6 +114,14 @@ impl Seal<'_> {
             }
         }
     }
+}
+
+/// Begins a CRC with what is not sent: the mission, and words of 16 bits.
+fn begin(crc: &'static Crc<u32>, mission: MissionId, words: &[u16]) -> Digest<'static, u32> {
+    let mut digest = crc.digest();
+    digest.update(&mission.0.to_be_bytes());
+    words.iter().for_each(|word| digest.update(&word.to_be_bytes()));
+    digest
 }
 
 /// A frame whose header was read and which is not verified yet.
@@ -163,8 +164,8 @@ impl<'a> Envelope<'a> {
     pub fn open(&self, seal: &Seal<'_>) -> Option<Frame<'a>> {
         let mut body = Cow::Borrowed(self.body);
         let sound = match *seal {
-            Seal::Crc(..) => !self.header.keyed && self.header.kind.is_hello() && self.crc_matches(seal),
-            Seal::Run { .. } => !self.header.keyed && !self.header.kind.is_hello() && self.crc_matches(seal),
+            Seal::Crc(..) => !self.header.keyed && self.header.kind().is_hello() && self.crc_matches(seal),
+            Seal::Run { .. } => !self.header.keyed && !self.header.kind().is_hello() && self.crc_matches(seal),
             Seal::Hello(key, mission, session, nonce) => {
                 let (m, s, n) = (mission.0.to_be_bytes(), session.to_be_bytes(), nonce.to_be_bytes());
                 let frame = [self.head, self.body].concat();
@@ -183,7 +184,7 @@ impl<'a> Envelope<'a> {
     }
 
     fn crc_matches(&self, seal: &Seal<'_>) -> bool {
-        seal.crc_of(&[self.head, self.body]).is_some_and(|crc| crc == self.end)
+        seal.crc(&[self.head, self.body]).is_some_and(|crc| crc.eq(self.end.iter().copied()))
     }
 }
 
@@ -198,23 +199,10 @@ impl Frame<'_> {
 ///
 /// ```
 /// use scenecast_protocol::wire::{
-///     Address, ChunkKind, Envelope, FrameBuilder, FrameKind, Header, MissionId, Seal, SessionId,
+///     Address, ChunkKind, Envelope, FrameBuilder, Header, MissionId, Seal, SessionId,
 /// };
 ///
-/// let header = Header {
-///     from: Address::vehicle(1).unwrap(),
-///     to: Address::SURFACE,
-///     session: None,
-///     number: 1,
-///     base: 1,
-///     remaining: 0,
-///     turn: None,
-///     stamp: None,
-///     nonce: None,
-///     ack: None,
-///     kind: FrameKind::Numbered,
-///     keyed: false,
-/// };
+/// let header = Header::numbered(Address::vehicle(1).unwrap(), Address::SURFACE, 1, 1);
 /// let [to, from] = [0xBEEF, 0x1234].map(SessionId::from_random);
 /// let seal = Seal::Run { mission: MissionId(7), to, from, number: 1 };
 /// let mut builder = FrameBuilder::new(&header, 64);
@@ -242,7 +230,7 @@ impl FrameBuilder {
     pub fn new(header: &Header, size: usize) -> Self {
         let mut bytes = Vec::with_capacity(size);
         let remaining_at = header.encode(&mut bytes);
-        let (kind, remaining) = (header.kind, header.remaining);
+        let (kind, remaining) = (header.kind(), header.remaining);
         let seal_bytes = Seal::bytes(header.keyed, kind);
         let mut builder =
             Self { bytes, size, kind, seal_bytes, remaining, remaining_at, has_turn: remaining > 0, body_at: 0 };
@@ -272,7 +260,8 @@ impl FrameBuilder {
 
     /// Bytes that chunks can still take, their headers included.
     pub fn room(&self) -> usize {
-        self.size.saturating_sub(self.bytes.len() + self.inserted(self.has_turn) + self.seal_bytes)
+        let remaining = usize::from(self.has_turn || self.kind.is_hello());
+        self.size.saturating_sub(self.bytes.len() + remaining + self.seal_bytes)
     }
 
     /// Adds a chunk; returns whether it fitted.
@@ -282,23 +271,23 @@ impl FrameBuilder {
 
     /// The length of the finished frame in bytes.
     pub fn len(&self, short: bool) -> usize {
-        if short { self.bytes.len() + self.inserted(self.remaining > 0) + self.seal_bytes } else { self.size }
+        if short { self.bytes.len() + usize::from(self.has_remaining()) + self.seal_bytes } else { self.size }
     }
 
-    /// The length of the byte `remaining` where it is optional; a hello always has it.
-    fn inserted(&self, is_present: bool) -> usize {
-        usize::from(is_present && !self.kind.is_hello())
+    /// Whether the frame has the byte `remaining`: a hello always has it.
+    fn has_remaining(&self) -> bool {
+        self.remaining > 0 || self.kind.is_hello()
     }
 
     /// Seals the frame. A `short` frame ends where its content ends; any other is padded to its size.
     pub fn finish(mut self, seal: &Seal<'_>, short: bool) -> Vec<u8> {
         let content = self.len(short) - self.seal_bytes;
-        if self.inserted(self.remaining > 0) > 0 {
+        if self.has_remaining() {
             self.bytes.insert(self.remaining_at, self.remaining);
             self.body_at += 1;
-            self.bytes.get_mut(1).into_iter().for_each(|route| *route |= Header::REMAINING_FLAG);
-        } else if let Some(byte) = self.bytes.get_mut(self.remaining_at - 1).filter(|_| self.kind.is_hello()) {
-            *byte = self.remaining;
+        }
+        if let Some(route) = self.bytes.get_mut(1).filter(|_| self.remaining > 0 && !self.kind.is_hello()) {
+            *route |= Header::REMAINING_FLAG;
         }
         self.bytes.resize(content, 0);
         seal.close(&mut self.bytes, self.body_at);
@@ -308,7 +297,7 @@ impl FrameBuilder {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{AckStatement, FrameKind, Stamp, room_for_payload};
+    use super::super::{AckStatement, Stamp, room_for_payload};
     use super::*;
     use crate::seal::MissionKey;
     use proptest::prelude::*;
@@ -317,20 +306,8 @@ mod tests {
     const MISSION: MissionId = MissionId(0x5CE7_0001);
 
     fn header() -> Header {
-        Header {
-            from: Address::vehicle(1).unwrap(),
-            to: Address::SURFACE,
-            session: None,
-            number: 0x00FF,
-            base: 3,
-            remaining: 2,
-            turn: None,
-            stamp: None,
-            nonce: None,
-            ack: Some(AckStatement { horizon_low: 5, lost: vec![] }),
-            kind: FrameKind::Numbered,
-            keyed: false,
-        }
+        let ack = Some(AckStatement { horizon_low: 5, lost: vec![] });
+        Header { remaining: 2, ack, ..Header::numbered(Address::vehicle(1).unwrap(), Address::SURFACE, 0xFF, 3) }
     }
 
     /// The seal of a frame to the run `to`, from the run 1234.
@@ -399,19 +376,13 @@ mod tests {
     #[test]
     fn golden_bytes_of_a_keyed_hello() {
         let stamp = Stamp::Surface { clock_ms: 5, one_way: Some(Duration::from_millis(7)) };
+        let session = SessionId::from_random(0x1234);
         let hello = Header {
-            session: Some(SessionId::from_random(0x1234)),
-            from: Address::SURFACE,
-            to: Address::vehicle(2).unwrap(),
-            number: 0,
-            base: 1,
-            remaining: 0,
             turn: Some(9),
             stamp: Some(stamp),
             nonce: Some(0x0102_0304_0506_0708),
-            ack: None,
-            kind: FrameKind::Hello,
             keyed: true,
+            ..Header::hello(Address::SURFACE, Address::vehicle(2).unwrap(), session)
         };
         let bytes = FrameBuilder::new(&hello, 64).finish(&Seal::Hello(&key(), MISSION, 0, 0), true);
         let expected = [0x8F, 0x02, 0x12, 0x34, 0, 0, 1, 0, 9, 0, 0, 5, 0, 7, 1, 2, 3, 4, 5, 6, 7, 8];

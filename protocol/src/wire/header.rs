@@ -124,7 +124,7 @@ pub struct Header {
     pub from: Address,
     /// The receiving end, or everybody.
     pub to: Address,
-    /// The session of the sender's run, in a hello.
+    /// The session of the sender's run, in a hello; `None` in a numbered frame.
     pub session: Option<SessionId>,
     /// The frame's number: as many low bits of it as [`Self::base`] needs; 0 in a hello.
     pub number: u16,
@@ -140,8 +140,6 @@ pub struct Header {
     pub nonce: Option<u64>,
     /// The verdict on the receiver's frames.
     pub ack: Option<AckStatement>,
-    /// Whether the frame opens a session or belongs to one.
-    pub kind: FrameKind,
     /// Whether the frame ends in a tag instead of a CRC.
     pub keyed: bool,
 }
@@ -156,6 +154,10 @@ const RESERVED: u8 = 0b11_0000;
 /// From here on `base` has two bytes, and so has the number.
 const LONG_BASE: u8 = 128;
 
+fn is_long(base: u16) -> bool {
+    base >= u16::from(LONG_BASE)
+}
+
 const ACK: u8 = 0b1_0000;
 const TURN: u8 = 0b1000;
 const HELLO: u8 = 0b100;
@@ -163,6 +165,25 @@ const STAMP: u8 = 0b10;
 const KEYED: u8 = 0b1;
 
 impl Header {
+    /// The plain header of a numbered frame, of which nothing follows in its turn.
+    #[must_use]
+    pub fn numbered(from: Address, to: Address, number: u64, base: u16) -> Self {
+        let low = if is_long(base) { number & 0xFFFF } else { number & 0xFF } as u16;
+        let (turn, stamp, nonce, ack) = (None, None, None, None);
+        Self { from, to, session: None, number: low, base, remaining: 0, turn, stamp, nonce, ack, keyed: false }
+    }
+
+    /// The plain header of a hello, after which nothing follows in its turn.
+    #[must_use]
+    pub fn hello(from: Address, to: Address, session: SessionId) -> Self {
+        Self { session: Some(session), ..Self::numbered(from, to, 0, 1) }
+    }
+
+    /// Whether the frame opens a session or belongs to one.
+    pub fn kind(&self) -> FrameKind {
+        FrameKind::hello_if(self.session.is_some())
+    }
+
     /// Reads the header of a frame if `to_us` selects its receiver; the frame is not verified yet.
     pub(super) fn decode(r: &mut Reader<'_>, to_us: impl Fn(Address) -> bool) -> Result<Self, FrameError> {
         let flags = r.u8()?;
@@ -182,30 +203,12 @@ impl Header {
         Ok(Self { turn, stamp, nonce, ack, keyed: has(KEYED), ..header })
     }
 
-    fn plain(from: Address, to: Address, kind: FrameKind) -> Self {
-        Self {
-            from,
-            to,
-            session: None,
-            number: 0,
-            base: 1,
-            remaining: 0,
-            turn: None,
-            stamp: None,
-            nonce: None,
-            ack: None,
-            kind,
-            keyed: false,
-        }
-    }
-
     fn decode_hello(r: &mut Reader<'_>) -> Result<Self, FrameError> {
         let addresses = r.u8()?;
         let session = SessionId(NonZeroU16::new(r.u16()?).ok_or(FrameError::BadField)?);
         let _number_and_base = r.take(3)?;
         let remaining = r.u8()?;
-        let header = Self::plain(Address(addresses >> 4), Address(addresses & 15), FrameKind::Hello);
-        Ok(Self { session: Some(session), remaining, ..header })
+        Ok(Self { remaining, ..Self::hello(Address(addresses >> 4), Address(addresses & 15), session) })
     }
 
     fn decode_numbered(r: &mut Reader<'_>) -> Result<Self, FrameError> {
@@ -214,27 +217,25 @@ impl Header {
         let (from, to) = if route & UP != 0 { (vehicle, Address::SURFACE) } else { (Address::SURFACE, vehicle) };
         // A small base has one form alone, by which the bits of the number are known.
         let (least, base, number) = match r.u8()? {
-            b if b < LONG_BASE => (1, u16::from(b), u16::from(r.u8()?)),
-            b => (u16::from(LONG_BASE), u16::from(b - LONG_BASE) << 8 | u16::from(r.u8()?), r.u16()?),
+            b if b < LONG_BASE => (1, u16::from(b), u64::from(r.u8()?)),
+            b => (u16::from(LONG_BASE), u16::from(b - LONG_BASE) << 8 | u16::from(r.u8()?), u64::from(r.u16()?)),
         };
         if base < least || u64::from(base) > MAX_WINDOW {
             return Err(FrameError::BadField);
         }
         let remaining = if route & REMAINING != 0 { r.u8()? } else { 0 };
-        Ok(Self { number, base, remaining, ..Self::plain(from, to, FrameKind::Numbered) })
+        Ok(Self { remaining, ..Self::numbered(from, to, number, base) })
     }
 
     /// The whole number of a numbered frame: the one nearest to `highest`, the highest number of the run so far.
     pub fn number_near(&self, highest: u64) -> u64 {
-        let bits = if self.base < u16::from(LONG_BASE) { 8 } else { 16 };
-        unwrap_number(self.number, bits, highest)
+        unwrap_number(self.number, if is_long(self.base) { 16 } else { 8 }, highest)
     }
 
     /// Every number with the low bits that were sent, each the one nearest to `highest` with its low 16 bits.
     pub(crate) fn numbers(&self, highest: u64) -> impl Iterator<Item = u64> + use<> {
-        let low = self.number;
-        let is_short = self.base < u16::from(LONG_BASE);
-        (0..if is_short { 256 } else { 0 }).map(move |high: u16| unwrap_number(high << 8 | low & 0xFF, 16, highest))
+        let low = self.number & 0xFF;
+        (0..if is_long(self.base) { 0 } else { 256 }).map(move |high: u16| unwrap_number(high << 8 | low, 16, highest))
     }
 
     /// Whether a frame with this first byte is keyed, and its kind.
@@ -247,7 +248,7 @@ impl Header {
         let bit = |on: bool, bit: u8| if on { bit } else { 0 };
         WIRE_VERSION << 5
             | bit(self.turn.is_some(), TURN)
-            | bit(self.kind.is_hello(), HELLO)
+            | bit(self.session.is_some(), HELLO)
             | bit(self.stamp.is_some(), STAMP)
             | bit(self.keyed, KEYED)
     }
@@ -255,12 +256,12 @@ impl Header {
     /// Appends everything up to the acknowledgement statement, but for the byte `remaining`; returns the index of its place.
     pub(super) fn encode(&self, out: &mut Vec<u8>) -> usize {
         out.push(self.flags());
-        match self.kind {
-            FrameKind::Hello => {
-                let session = self.session.map_or(0, SessionId::get).to_be_bytes();
-                out.extend_from_slice(&[self.from.0 << 4 | self.to.0, session[0], session[1], 0, 0, 1, 0]);
+        match self.session {
+            Some(session) => {
+                let [high, low] = session.get().to_be_bytes();
+                out.extend_from_slice(&[self.from.0 << 4 | self.to.0, high, low, 0, 0, 1]);
             }
-            FrameKind::Numbered => self.encode_numbered(out),
+            None => self.encode_numbered(out),
         }
         let remaining_at = out.len();
         out.extend(self.turn);
@@ -275,11 +276,11 @@ impl Header {
 
     fn encode_numbered(&self, out: &mut Vec<u8>) {
         out.push(if self.from.is_vehicle() { UP | self.from.0 } else { self.to.0 });
-        if self.base < u16::from(LONG_BASE) {
-            out.extend_from_slice(&[self.base as u8, self.number as u8]);
-        } else {
+        if is_long(self.base) {
             out.extend_from_slice(&(self.base | u16::from(LONG_BASE) << 8).to_be_bytes());
             out.extend_from_slice(&self.number.to_be_bytes());
+        } else {
+            out.extend_from_slice(&[self.base as u8, self.number as u8]);
         }
     }
 

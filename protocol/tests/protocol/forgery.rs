@@ -8,8 +8,7 @@ use scenecast_protocol::map_codec::Codec;
 use scenecast_protocol::schedule::{BackgroundOrder, Shares};
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::{
-    AckStatement, Address, ChunkKind, Envelope, FrameBuilder, FrameKind, Header, Introduction, MissionId, Seal,
-    SessionId,
+    AckStatement, Address, ChunkKind, Envelope, FrameBuilder, Header, Introduction, MissionId, Seal, SessionId,
 };
 use std::collections::{BTreeSet, VecDeque};
 use std::time::Duration;
@@ -78,7 +77,7 @@ impl Stranger<'_> {
     fn hello(&mut self, from: Address, to: Address, sender: SessionId, receiver: SessionId) -> Option<Vec<u8>> {
         let session = if self.draw(2) == 0 { sender } else { SessionId::from_random(self.draw(1 << 16) as u16) };
         let series = (from == Address::SURFACE).then(|| Series::from_random(self.draw(1 << 31)));
-        let header = Header { session: Some(session), kind: FrameKind::Hello, ..self.header(from, to).0 };
+        let header = Header { session: Some(session), ..self.header(from, to).0 };
         let mut builder = FrameBuilder::new(&header, 64);
         builder.push(
             ChunkKind::Introduction,
@@ -146,20 +145,9 @@ impl Stranger<'_> {
     /// The header of a frame that may be the next one of an end, and its number.
     fn header(&mut self, from: Address, to: Address) -> (Header, u64) {
         let number = self.pair.wiretap.number(from) + self.draw(4);
-        let header = Header {
-            from,
-            to,
-            session: None,
-            number: number as u16,
-            base: 1 + self.draw(4) as u16,
-            remaining: 0,
-            turn: (self.draw(2) == 0).then(|| self.draw(256) as u8),
-            stamp: None,
-            nonce: None,
-            ack: None,
-            kind: FrameKind::Numbered,
-            keyed: false,
-        };
+        let base = 1 + self.draw(4) as u16;
+        let turn = (self.draw(2) == 0).then(|| self.draw(256) as u8);
+        let header = Header { turn, ..Header::numbered(from, to, number, base) };
         (header, number)
     }
 }
@@ -235,7 +223,7 @@ fn give_forged_order(pair: &mut LinkedEnds, series: Series, order: &[u8]) {
 /// Sends the vehicle the hello of another surface until it answers, which gives its run.
 fn greet(pair: &mut LinkedEnds, session: SessionId, introduction: &Introduction) -> SessionId {
     let (header, _) = Stranger { pair, random: 1 }.header(Address::SURFACE, auv());
-    let mut hello = FrameBuilder::new(&Header { session: Some(session), kind: FrameKind::Hello, ..header }, 64);
+    let mut hello = FrameBuilder::new(&Header { session: Some(session), ..header }, 64);
     hello.push(ChunkKind::Introduction, &introduction.encode(Introduction::MAX_BYTES));
     let hello = hello.finish(&Seal::Crc(MISSION, 0), true);
     pair.overheard.clear();

@@ -253,7 +253,7 @@ fn a_frame_with_a_bad_crc_never_begins_a_new_run() {
     pair.vehicle.set_map(flat(9, 2).iter(), pair.now);
     pair.run(pair.now + Duration::from_secs(60), false);
     let is_late = |bytes: &&Vec<u8>| {
-        Envelope::decode(bytes, |_| true).is_ok_and(|e| e.header.from == auv() && !e.header.kind.is_hello())
+        Envelope::decode(bytes, |_| true).is_ok_and(|e| e.header.from == auv() && !e.header.kind().is_hello())
     };
     let mut late: Vec<Vec<u8>> = pair.overheard.iter().rev().filter(is_late).cloned().collect();
     let mut seen = std::collections::BTreeSet::new();

@@ -28,7 +28,7 @@ fn with_unmet_hellos(access: Access) -> (LinkedEnds, Vec<Vec<u8>>) {
         pair.restart_vehicle(&map);
     }
     let is_hello = |bytes: &&Vec<u8>| {
-        Envelope::decode(bytes, |_| true).is_ok_and(|e| e.header.from == auv() && e.header.kind.is_hello())
+        Envelope::decode(bytes, |_| true).is_ok_and(|e| e.header.from == auv() && e.header.kind().is_hello())
     };
     let hellos: Vec<Vec<u8>> = pair.overheard.iter().filter(is_hello).cloned().collect();
     pair.mute = [false; 2];
@@ -61,7 +61,7 @@ fn a_replayed_hello_does_not_make_a_silent_vehicle_look_alive() {
         let (mut pair, unmet) = with_unmet_hellos(access);
         let met = pair.overheard.iter().find(|bytes| {
             let header = |b: &Vec<u8>| Envelope::decode(b, |_| true).unwrap().header;
-            header(bytes).from == auv() && header(bytes).kind.is_hello() && !unmet.contains(bytes)
+            header(bytes).from == auv() && header(bytes).kind().is_hello() && !unmet.contains(bytes)
         });
         let hellos: Vec<Vec<u8>> = met.into_iter().chain(&unmet).cloned().collect();
         pair.mute = [true; 2];

@@ -25,7 +25,7 @@ fn keys(present: u8, next: Option<u8>) -> Option<Authenticity> {
 fn ends(seed: u64, access: Access, channel: LossyChannel) -> LinkedEnds {
     let setup = Setup { authenticity: keys(1, None), access, ..Setup::new(64, 10_000, Codec::Auto) };
     let mut ends = LinkedEnds::new(seed, setup, channel);
-    let own = HeldKey::Vehicle(key(1).vehicle(auv().number()).unwrap());
+    let own = HeldKey::Vehicle(key(1).vehicle(auv().number()));
     ends.vehicle_keys = Some(Authenticity::new(own, true, false));
     ends.restart_vehicle(&patchy(12, 1));
     ends
@@ -94,7 +94,7 @@ fn a_surface_that_still_has_both_keys_finds_vehicles_of_either() {
         run(&mut ends, 120);
         assert!(ends.is_converged(), "{access:?}: a vehicle that has changed");
         // The vehicle's folder is lost, and its key file has the key before.
-        ends.vehicle_keys = Some(Authenticity::new(HeldKey::Vehicle(key(1).vehicle(1).unwrap()), true, false));
+        ends.vehicle_keys = Some(Authenticity::new(HeldKey::Vehicle(key(1).vehicle(1)), true, false));
         ends.restart_vehicle(&patchy(12, 1));
         run(&mut ends, 240);
         assert!(ends.is_converged(), "{access:?}: a vehicle that has lost it");

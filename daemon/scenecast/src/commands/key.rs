@@ -196,10 +196,7 @@ impl Rotate {
 /// The present key of a mission and the next one, if there is one.
 fn mission_keys(path: &Path) -> Result<(MissionKey, Option<MissionKey>), UserError> {
     match scenecast_config::read_key(path)?.0 {
-        KeyFile { key: HeldKey::Mission(key), next } => {
-            let next = next.and_then(|next| if let HeldKey::Mission(next) = next { Some(next) } else { None });
-            Ok((key, next))
-        }
+        KeyFile { key: HeldKey::Mission(key), next } => Ok((key, next)),
         _ => Err(UserError::file(path, "this is the key of a vehicle; name the key file of the mission")),
     }
 }

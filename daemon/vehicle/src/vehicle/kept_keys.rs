@@ -42,9 +42,7 @@ impl KeptKeys {
 
     /// The next key is the present one from now on.
     pub(super) fn change(&mut self) {
-        if let Some(next) = self.next.take() {
-            self.present = Some(next);
-        }
+        self.present = self.next.take().or(self.present.take());
     }
 }
 

@@ -12,8 +12,8 @@ use scenecast_protocol::object::{MAX_OBJECT, ObjectReceiver, Part, Received};
 use scenecast_protocol::seal::{Direction, HeldKey, MissionKey};
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::{
-    AckStatement, Address, Envelope, EquipmentFaults, Frame, FrameBuilder, FrameKind, Header, Intent, Introduction,
-    MAX_WINDOW, MissionId, Reader, RegistrationReport, Seal, SessionId, Stamp, Trail, VehicleStatus,
+    AckStatement, Address, Envelope, EquipmentFaults, Frame, FrameBuilder, Header, Intent, Introduction, MAX_WINDOW,
+    MissionId, Reader, RegistrationReport, Seal, SessionId, Stamp, Trail, VehicleStatus,
 };
 use std::time::Duration;
 
@@ -84,20 +84,7 @@ fn run(number: u64) -> Seal<'static> {
 }
 
 fn header() -> Header {
-    Header {
-        from: Address::vehicle(1).expect("a vehicle"),
-        to: Address::SURFACE,
-        session: None,
-        number: 1,
-        base: 1,
-        remaining: 0,
-        turn: None,
-        stamp: None,
-        nonce: None,
-        ack: None,
-        kind: FrameKind::Numbered,
-        keyed: false,
-    }
+    Header::numbered(Address::vehicle(1).expect("a vehicle"), Address::SURFACE, 1, 1)
 }
 
 /// A body has at most as many chunks as bytes, and sound chunks can be written into a frame again.

@@ -5,7 +5,7 @@ use scenecast_protocol::directive::Series;
 use scenecast_protocol::link::{Authenticity, Flight};
 use scenecast_protocol::seal::{Direction, HeldKey, MissionKey};
 use scenecast_protocol::wire::{
-    AckStatement, Address, CellEdge, Envelope, FrameKind, Header, Introduction, MissionId, Reader, SessionId, Stamp,
+    AckStatement, Address, CellEdge, Envelope, Header, Introduction, MissionId, Reader, SessionId, Stamp,
 };
 use std::collections::BTreeSet;
 use std::time::Duration;
@@ -105,11 +105,8 @@ impl FuzzPeer {
         let header = Header {
             to,
             session: Some(session),
-            number: 0,
-            base: 1,
             nonce: keyed.then_some(nonce),
             ack: None,
-            kind: FrameKind::Hello,
             keyed,
             ..self.header(flags, script)
         };
@@ -172,18 +169,12 @@ impl FuzzPeer {
             _ => None,
         };
         Header {
-            from,
-            to: self.end,
-            session: None,
-            number: self.flight.next_number() as u16,
-            base: self.flight.base_distance(),
             remaining,
             turn,
             stamp,
-            nonce: None,
             ack,
-            kind: FrameKind::Numbered,
             keyed: self.is_keyed(false),
+            ..Header::numbered(from, self.end, self.flight.next_number(), self.flight.base_distance())
         }
     }
 
@@ -193,11 +184,11 @@ impl FuzzPeer {
         bytes.extend_from_slice(body);
         let (session, nonce) = if self.us == Address::SURFACE { (0, 0) } else { (self.theirs.0.get(), self.theirs.1) };
         match self.authenticity.as_ref().filter(|_| header.keyed) {
-            None if header.kind.is_hello() => raw::close_with_crc(&mut bytes, MISSION, Covered::Hello(session)),
+            None if header.kind().is_hello() => raw::close_with_crc(&mut bytes, MISSION, Covered::Hello(session)),
             None => raw::close_with_crc(&mut bytes, MISSION, Covered::Run(self.theirs.0, self.own.0, number)),
-            Some(a) if header.kind.is_hello() => {
+            Some(a) if header.kind().is_hello() => {
                 let (m, s, n) = (MISSION.0.to_be_bytes(), session.to_be_bytes(), nonce.to_be_bytes());
-                let tag = a.key.link(self::vehicle().number()).hello_tag(&[&m, &s, &n, &bytes]);
+                let tag = a.key.vehicle(self::vehicle().number()).link().hello_tag(&[&m, &s, &n, &bytes]);
                 bytes.extend_from_slice(&tag);
             }
             Some(a) => {
@@ -206,7 +197,7 @@ impl FuzzPeer {
                     if is_surface { (self.own.1, self.theirs.1) } else { (self.theirs.1, self.own.1) };
                 let direction = if is_surface { Direction::Down } else { Direction::Up };
                 let address = self::vehicle().number();
-                let key = a.key.link(address).session(MISSION.0, address, surface, vehicle, a.encrypt);
+                let key = a.key.vehicle(address).link().session(MISSION.0, address, surface, vehicle, a.encrypt);
                 let (head, body) = bytes.split_at_mut(body_at);
                 let tag = key.seal(direction, number, head, body);
                 bytes.extend_from_slice(&tag);

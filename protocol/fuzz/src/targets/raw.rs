@@ -8,7 +8,7 @@ pub fn head(header: &Header) -> Vec<u8> {
     let builder = FrameBuilder::new(header, 4096);
     let len = builder.len(true);
     let mut bytes = builder.finish(&Seal::Crc(MissionId(0), 0), true);
-    bytes.truncate(len - Seal::bytes(header.keyed, header.kind));
+    bytes.truncate(len - Seal::bytes(header.keyed, header.kind()));
     bytes
 }
 

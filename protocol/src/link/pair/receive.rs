@@ -55,12 +55,12 @@ impl<T> LinkPair<T> {
         envelope: &Envelope<'a>,
         decodes: impl Fn(Option<FrameNumber>, Chunks<'_>) -> bool,
     ) -> Result<Inbound<'a, T>, DropReason> {
-        let result = match envelope.header.kind {
+        let result = match envelope.header.kind() {
             FrameKind::Hello => self.read_hello(envelope),
             FrameKind::Numbered => self.read_numbered(envelope, decodes),
         };
         if result.is_ok() {
-            self.unheard = 0;
+            self.rotation.handle_heard();
         }
         if let Err(reason) = &result {
             self.stats.drop(*reason);
@@ -93,7 +93,7 @@ impl<T> LinkPair<T> {
             self.mismatch.note_clock(introduction.clock, self.introduction.clock);
         }
         if own.is_some() {
-            self.handle_voice(generation);
+            self.rotation.handle_voice(generation);
         }
         let session = header.session.ok_or(DropReason::Malformed)?;
         let peer = Identity { session, nonce: header.nonce.unwrap_or_default() };
@@ -259,7 +259,7 @@ impl<T> LinkPair<T> {
 
     /// The most likely reason why a frame does not open; `session` is ours in a hello.
     fn refuse(&mut self, envelope: &Envelope<'_>, session: u16) -> DropReason {
-        let is_hello = envelope.header.kind.is_hello();
+        let is_hello = envelope.header.kind().is_hello();
         let expected = if is_hello { self.authenticity.is_some() } else { self.is_keyed(self.direction_in()) };
         match (expected, envelope.header.keyed) {
             (false, true) => {
@@ -283,7 +283,7 @@ impl<T> LinkPair<T> {
     /// Whether a frame has a CRC that is right, where a tag is expected.
     fn is_plain(&self, envelope: &Envelope<'_>, session: u16) -> bool {
         let opens = |run: &LinkRun<T>| run.open(envelope, self.mission, self.direction_in(), false).is_some();
-        match envelope.header.kind {
+        match envelope.header.kind() {
             FrameKind::Hello => envelope.open(&Seal::Crc(self.mission, session)).is_some(),
             FrameKind::Numbered => self.handshake.run().into_iter().chain(self.handshake.offered()).any(opens),
         }

@@ -4,7 +4,7 @@ use crate::link::run::{Authenticity, Generation, Identities, Identity};
 use crate::link::{Transmit, TransmitKind};
 use crate::mac::{ModemProfile, quarter_seconds};
 use crate::time::Instant;
-use crate::wire::{Address, Envelope, FrameBuilder, FrameKind, Header, MissionId, Seal};
+use crate::wire::{Address, Envelope, FrameBuilder, Header, MissionId, Seal};
 use std::time::Duration;
 
 /// Transmits a discovery call from time to time. Each vehicle that is not in contact answers at a random time.
@@ -70,18 +70,10 @@ impl Discovery {
     ) -> Transmit {
         let own = self.identities.draw();
         let header = Header {
-            from: Address::SURFACE,
-            to: Address::EVERYBODY,
-            session: Some(own.session),
-            number: 0,
-            base: 1,
-            remaining: 0,
             turn: Some(quarter_seconds(Self::ANSWERS, 255)),
-            stamp: None,
             nonce: authenticity.map(|_| own.nonce),
-            ack: None,
-            kind: FrameKind::Hello,
             keyed: authenticity.is_some(),
+            ..Header::hello(Address::SURFACE, Address::EVERYBODY, own.session)
         };
         let builder = FrameBuilder::new(&header, modem.frame_bytes);
         let calls = authenticity.and_then(|a| a.calls(self.generation).or_else(|| a.calls(Generation::Present)));
@@ -107,7 +99,7 @@ impl Discovery {
         authenticity: Option<&Authenticity>,
         now: Instant,
     ) -> bool {
-        let Some((call, until)) = self.open.filter(|_| envelope.header.kind.is_hello()) else { return false };
+        let Some((call, until)) = self.open.filter(|_| envelope.header.kind().is_hello()) else { return false };
         let session = call.session.get();
         let sound = match authenticity {
             Some(a) => a.link(envelope.header.from).open_hello(envelope, mission, session, call.nonce).is_some(),

@@ -382,7 +382,7 @@ impl<S: StateSource> VehicleContent<S> {
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
-    use crate::wire::{AckStatement, Address, FrameKind, Header};
+    use crate::wire::{AckStatement, Address, Header};
 
     /// A source whose chunks are one byte longer than the room it is given.
     #[derive(Debug, Default)]
@@ -417,20 +417,8 @@ pub(super) mod tests {
     }
 
     pub(in crate::link::vehicle) fn builder(size: usize) -> FrameBuilder {
-        let header = Header {
-            from: Address::vehicle(1).unwrap(),
-            to: Address::SURFACE,
-            session: None,
-            number: 1,
-            base: 0,
-            remaining: 0,
-            turn: None,
-            stamp: None,
-            nonce: None,
-            ack: Some(AckStatement { horizon_low: 0, lost: vec![] }),
-            kind: FrameKind::Numbered,
-            keyed: false,
-        };
+        let ack = Some(AckStatement { horizon_low: 0, lost: vec![] });
+        let header = Header { ack, ..Header::numbered(Address::vehicle(1).unwrap(), Address::SURFACE, 1, 0) };
         FrameBuilder::new(&header, size)
     }
 

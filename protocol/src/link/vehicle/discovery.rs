@@ -1,10 +1,10 @@
 //! The answer to a discovery call: a surface that looks for vehicles invites all to answer, each at a random time.
 
 use super::VehicleConfig;
-use crate::link::run::Generation;
+use crate::link::run::{Generation, LinkAuthenticity};
 use crate::mac::Grant;
 use crate::time::Instant;
-use crate::wire::{Address, Envelope, FrameBuilder, FrameKind, Header, Seal, SessionId};
+use crate::wire::{Address, Envelope, FrameBuilder, Header, MissionId, Seal, SessionId};
 use std::time::Duration;
 
 /// The answer that is owed to a discovery call.
@@ -22,15 +22,16 @@ impl CallReply {
     }
 
     /// The generation of the key of a frame to everybody, if it is a discovery call of this mission.
-    pub(super) fn called_by(config: &VehicleConfig, envelope: &Envelope<'_>) -> Option<Generation> {
-        let generation = match &config.authenticity {
-            Some(a) => Generation::ALL.into_iter().find(|&generation| {
-                let opens = |key| envelope.open(&Seal::Hello(&key, config.mission, 0, 0)).is_some();
-                a.calls(generation).is_some_and(opens)
-            }),
-            None => envelope.open(&Seal::Crc(config.mission, 0)).map(|_| Generation::Present),
+    pub(super) fn called_by(
+        authenticity: Option<&LinkAuthenticity>,
+        mission: MissionId,
+        envelope: &Envelope<'_>,
+    ) -> Option<Generation> {
+        let generation = match authenticity {
+            Some(a) => a.open_call(envelope, mission),
+            None => envelope.open(&Seal::Crc(mission, 0)).map(|_| Generation::Present),
         };
-        generation.filter(|_| envelope.header.kind.is_hello())
+        generation.filter(|_| envelope.header.kind().is_hello())
     }
 
     /// Takes a call; returns the turn in which it is answered, at a random time in the window that the call names.
@@ -57,30 +58,18 @@ impl CallReply {
     }
 
     /// The frame that answers the pending call, if there is one.
-    pub(super) fn take(&mut self, config: &VehicleConfig) -> Option<Vec<u8>> {
+    pub(super) fn take(&mut self, config: &VehicleConfig, authenticity: Option<&LinkAuthenticity>) -> Option<Vec<u8>> {
         let (session, nonce, generation) = self.pending.take()?;
         let header = Header {
-            from: config.address,
-            to: Address::SURFACE,
-            session: Some(session),
-            number: 0,
-            base: 1,
-            remaining: 0,
-            turn: None,
-            stamp: None,
-            nonce: config.authenticity.as_ref().map(|_| nonce),
-            ack: None,
-            kind: FrameKind::Hello,
-            keyed: config.authenticity.is_some(),
+            nonce: authenticity.map(|_| nonce),
+            keyed: authenticity.is_some(),
+            ..Header::hello(config.address, Address::SURFACE, session)
         };
         let builder = FrameBuilder::new(&header, config.modem.frame_bytes);
-        let mission = config.mission;
-        Some(match &config.authenticity {
-            Some(a) => {
-                let link = a.link(config.address);
-                builder.finish(&Seal::Hello(link.key(generation), mission, session.get(), nonce), true)
-            }
-            None => builder.finish(&Seal::Crc(mission, session.get()), true),
-        })
+        let seal = match authenticity {
+            Some(a) => Seal::Hello(a.key(generation), config.mission, session.get(), nonce),
+            None => Seal::Crc(config.mission, session.get()),
+        };
+        Some(builder.finish(&seal, true))
     }
 }

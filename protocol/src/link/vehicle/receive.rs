@@ -8,10 +8,9 @@ use crate::directive::{InForceDigests, Slot, VersionedSlot};
 use crate::link::{Admission, DropReason};
 use crate::mac::Grant;
 use crate::map::StateSource;
-use crate::seal::{HeldKey, VehicleKey};
+use crate::seal::VehicleKey;
 use crate::time::Instant;
 use crate::wire::{Address, ChunkKind, Envelope, Header, Introduction};
-use std::sync::Arc;
 use std::time::Duration;
 
 /// Time without an accepted frame after which late frames are taken for a sign of a forged one.
@@ -63,7 +62,7 @@ impl<S: StateSource> VehicleLink<S> {
             self.content.caller = Some(caller.encode(Introduction::MAX_BYTES));
             self.content.status.owe_report_by(now + Duration::from_secs(5));
         }
-        match inbound.header().kind.is_hello() {
+        match inbound.header().kind().is_hello() {
             true if envelope.header.session.is_some_and(|session| self.hello_limit.admit(session, now)) => {
                 match self.pair.must_send_hello() && inbound.refusal.is_none() {
                     true => self.hello_limit.handle_offer(),
@@ -124,14 +123,7 @@ impl<S: StateSource> VehicleLink<S> {
 
     /// Takes parts of the next key, and notes that the surface has proven a run under it.
     fn handle_key_parts(&mut self, parts: &[Vec<u8>]) {
-        if self.pair.poll_key_change() {
-            if let Some(authenticity) = self.config.authenticity.as_mut()
-                && let Some(next) = authenticity.next.take()
-            {
-                authenticity.key = next;
-            }
-            self.events.push_back(VehicleEvent::KeyChanged);
-        }
+        self.events.extend(self.pair.poll_key_change().then_some(VehicleEvent::KeyChanged));
         for part in parts {
             match self.pair.handle_key_part(part) {
                 Ok(key) => self.events.extend(key.map(VehicleEvent::NextKey)),
@@ -142,12 +134,7 @@ impl<S: StateSource> VehicleLink<S> {
 
     /// The host keeps the next key, so that this end accepts it from now on.
     pub fn keep_next_key(&mut self, key: &VehicleKey) {
-        let is_held = |next: &Arc<HeldKey>| matches!(&**next, HeldKey::Vehicle(held) if held == key);
-        let Some(authenticity) = self.config.authenticity.as_mut() else { return };
-        if !authenticity.next.as_ref().is_some_and(is_held) {
-            authenticity.next = Some(Arc::new(HeldKey::Vehicle(key.clone())));
-            self.pair.use_next_key(key);
-        }
+        self.pair.keep_next_key(key);
     }
 
     fn is_silent_for(&self, time: Duration, now: Instant) -> bool {
@@ -157,7 +144,7 @@ impl<S: StateSource> VehicleLink<S> {
     /// Answers a discovery call, unless the surface is in contact with us.
     fn handle_call(&mut self, envelope: &Envelope<'_>, now: Instant) {
         const CONTACT_TIMEOUT: Duration = Duration::from_secs(60);
-        let Some(generation) = CallReply::called_by(&self.config, envelope) else {
+        let Some(generation) = CallReply::called_by(self.pair.authenticity(), self.config.mission, envelope) else {
             return self.pair.stats.drop(DropReason::Checksum);
         };
         if self.pair.has_run() && self.last_received().is_some_and(|at| now.since(at) < CONTACT_TIMEOUT) {
@@ -175,7 +162,7 @@ impl<S: StateSource> VehicleLink<S> {
         let Some(quarters) = header.turn else { return };
         self.call_reply.cancel();
         self.begin_turn();
-        if header.kind.is_hello() {
+        if header.kind().is_hello() {
             // A hello does not acknowledge our frames, so it is not known which of them to repeat.
             self.repeater.forget();
         }

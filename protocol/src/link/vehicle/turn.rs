@@ -71,7 +71,7 @@ impl<S: StateSource> VehicleLink<S> {
 
     /// The frame to send now, of at most `frames` in this turn, and whether the turn ends with it.
     fn next_frame(&mut self, frames: u32, now: Instant) -> (Transmit, bool) {
-        if let Some(bytes) = self.call_reply.take(&self.config) {
+        if let Some(bytes) = self.call_reply.take(&self.config, self.pair.authenticity()) {
             self.pair.stats.count(Class::Overhead, bytes.len());
             return (Transmit { to: Address::SURFACE, bytes, kind: TransmitKind::Hello }, true);
         }

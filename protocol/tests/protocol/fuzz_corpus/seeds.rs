@@ -80,7 +80,7 @@ fn contents() -> Vec<Seed> {
             ack.encode(100, &mut statement);
             seeds.push(("ack", format!("{way}-{i}"), statement));
         }
-        let end = Seal::bytes(false, envelope.header.kind);
+        let end = Seal::bytes(false, envelope.header.kind());
         let body = bytes[raw::head(&envelope.header).len()..bytes.len() - end].to_vec();
         for (kind, payload) in chunks(&body) {
             let framed = [&[payload.len() as u8], &payload[..]].concat();
@@ -212,7 +212,7 @@ fn forged(body: &[u8]) -> Vec<u8> {
 
 fn body_of(bytes: &[u8]) -> Vec<u8> {
     let envelope = Envelope::decode(bytes, |_| true).expect("a frame");
-    bytes[raw::head(&envelope.header).len()..bytes.len() - Seal::bytes(false, envelope.header.kind)].to_vec()
+    bytes[raw::head(&envelope.header).len()..bytes.len() - Seal::bytes(false, envelope.header.kind())].to_vec()
 }
 
 /// Bytes in the unit tests and in the description of the wire.

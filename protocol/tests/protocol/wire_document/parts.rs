@@ -39,7 +39,9 @@ fn parts_of_a_frame_are_those_of_the_document() {
 
     let expected = [header_fields(), layer_chunks(), status_chunks(), orders(), settings_and_budgets()].concat();
     assert_same(found, expected);
-    let near = |base: u16, number: u16, highest: u64| Header { base, ..header(auv(), number) }.number_near(highest);
+    let near = |base: u16, number: u64, highest: u64| {
+        Header::numbered(auv(), Address::SURFACE, number, base).number_near(highest)
+    };
     assert_eq!((near(9, 3, 250), near(9, 250, 259)), (259, 250));
     assert_eq!((near(128, 3, 65_530), near(128, 65_530, 65_540)), (65_539, 65_530));
 }

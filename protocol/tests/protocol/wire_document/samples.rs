@@ -8,9 +8,8 @@ use scenecast_protocol::directive::{
 };
 use scenecast_protocol::seal::{LinkKey, MissionKey, SessionKey};
 use scenecast_protocol::wire::{
-    AckStatement, Address, Backlog, CellEdge, Chunk, ChunkKind, Envelope, EquipmentFaults, FrameBuilder, FrameKind,
-    Header, Introduction, MissionId, ModeReason, PlannedPath, Seal, SessionId, Stamp, UtcHours, VehicleMode,
-    VehicleStatus,
+    AckStatement, Address, Backlog, CellEdge, Chunk, ChunkKind, Envelope, EquipmentFaults, FrameBuilder, Header,
+    Introduction, MissionId, ModeReason, PlannedPath, Seal, SessionId, Stamp, UtcHours, VehicleMode, VehicleStatus,
 };
 use std::time::Duration;
 
@@ -26,22 +25,9 @@ pub(crate) fn auv() -> Address {
     Address::vehicle(1).expect("an address")
 }
 
-pub(crate) fn header(from: Address, number: u16) -> Header {
+pub(crate) fn header(from: Address, number: u64) -> Header {
     let to = if from == Address::SURFACE { auv() } else { Address::SURFACE };
-    Header {
-        from,
-        to,
-        session: None,
-        number,
-        base: 1,
-        remaining: 0,
-        turn: None,
-        stamp: None,
-        nonce: None,
-        ack: None,
-        kind: FrameKind::Numbered,
-        keyed: false,
-    }
+    Header::numbered(from, to, number, 1)
 }
 
 pub(crate) fn clock(clock_ms: u32, one_way_ms: Option<u64>) -> Option<Stamp> {
@@ -180,7 +166,7 @@ pub(crate) fn surface_hello(keyed: bool) -> Header {
 }
 
 fn hello(from: Address, session: u16, keyed: bool) -> Header {
-    Header { session: Some(SessionId::from_random(session)), kind: FrameKind::Hello, keyed, ..header(from, 0) }
+    Header { session: Some(SessionId::from_random(session)), keyed, ..header(from, 0) }
 }
 
 pub(crate) fn vehicle_hello(keyed: bool) -> Header {

@@ -147,7 +147,6 @@ impl AttackedEnds {
         self.surface.vehicle(auv()).map(|view| view.replica().shown())
     }
 
-    /// Whether the maps agree, and the last order is in force and known to be.
     /// Without a key, a forged hello may say that the vehicle has lost its orders. The operator is asked, and sends his order again.
     pub(super) fn answer_question(&mut self) {
         let slots = self.surface.vehicle(auv()).into_iter().flat_map(|view| view.slots());
@@ -158,6 +157,7 @@ impl AttackedEnds {
         }
     }
 
+    /// Whether the maps agree, and the last order is in force and known to be.
     pub(super) fn is_recovered(&self) -> bool {
         let Some(view) = self.surface.vehicle(auv()) else { return false };
         let is_known = view.slots().any(|s| s.id == SlotId::Utility && s.status == OrderStatus::Applied);
@@ -192,7 +192,7 @@ impl AttackedEnds {
             ChannelEvent::Arrives { at_vehicle, bytes, is_whole } => {
                 let judgement = self.deliver(at_vehicle, &bytes);
                 if is_whole {
-                    let is_hello = Envelope::decode(&bytes, |_| true).is_ok_and(|e| e.header.kind.is_hello());
+                    let is_hello = Envelope::decode(&bytes, |_| true).is_ok_and(|e| e.header.kind().is_hello());
                     *self.authentic[usize::from(is_hello)].entry(judgement).or_default() += 1;
                 }
             }

@@ -7,8 +7,7 @@ use scenecast_protocol::directive::{Constraints, SLOTS, Series, Slot, SlotReport
 use scenecast_protocol::map::{Cell, LabelGrid};
 use scenecast_protocol::map_codec::{Codec, encode};
 use scenecast_protocol::wire::{
-    AckStatement, Address, ChunkKind, Envelope, FrameBuilder, FrameKind, Header, Introduction, Seal, SessionId,
-    VehicleStatus,
+    AckStatement, Address, ChunkKind, Envelope, FrameBuilder, Header, Introduction, Seal, SessionId, VehicleStatus,
 };
 use sim_channel::RandomStream;
 use std::collections::VecDeque;
@@ -133,7 +132,7 @@ impl Forger {
     fn malformed(&mut self, to_vehicle: bool) -> Option<Vec<u8>> {
         let mut bytes = self.overheard(to_vehicle)?;
         let envelope = Envelope::decode(&bytes, |_| true).ok()?;
-        let seal = Seal::bytes(envelope.header.keyed, envelope.header.kind);
+        let seal = Seal::bytes(envelope.header.keyed, envelope.header.kind());
         bytes.truncate(bytes.len() - seal);
         // Without the bit for a tag the end expects a CRC.
         bytes[0] &= !1;
@@ -157,11 +156,11 @@ impl Forger {
         let number = self.wiretap.number(from);
         let header = Envelope::decode(&padded, |_| true).ok().map(|e| e.header);
         let seal = match header {
-            Some(header) if header.kind.is_hello() => self.hello_seal(to_vehicle),
+            Some(header) if header.kind().is_hello() => self.hello_seal(to_vehicle),
             Some(header) => self.wiretap.crc_of(MISSION, &header)?,
             None => self.wiretap.crc(MISSION, from, number)?,
         };
-        seal.crc(bytes)
+        seal.crc(&[bytes]).map(Iterator::collect)
     }
 
     fn hello_seal(&self, to_vehicle: bool) -> Seal<'static> {
@@ -192,20 +191,8 @@ impl Forger {
     fn header(&mut self, route: Route) -> (Header, u64) {
         let number = self.wiretap.number(route.from) + self.below(4) as u64;
         let turn = (self.below(2) == 0).then(|| self.below(256) as u8);
-        let header = Header {
-            from: route.from,
-            to: route.to,
-            session: None,
-            number: number as u16,
-            base: 1 + self.below(4) as u16,
-            remaining: 0,
-            turn,
-            stamp: None,
-            nonce: None,
-            ack: None,
-            kind: FrameKind::Numbered,
-            keyed: false,
-        };
+        let base = 1 + self.below(4) as u16;
+        let header = Header { turn, ..Header::numbered(route.from, route.to, number, base) };
         (header, number)
     }
 
@@ -214,7 +201,7 @@ impl Forger {
         let known = self.wiretap.session(route.from)?;
         let session = if self.below(2) == 0 { known } else { SessionId::from_random(self.below(1 << 16) as u16) };
         let series = to_vehicle.then(|| Series::from_random(self.below(1 << 31) as u64));
-        let header = Header { session: Some(session), kind: FrameKind::Hello, ..self.header(route).0 };
+        let header = Header { session: Some(session), ..self.header(route).0 };
         let mut builder = FrameBuilder::new(&header, FRAME_BYTES);
         builder.push(
             ChunkKind::Introduction,
@@ -227,7 +214,7 @@ impl Forger {
         let session = SessionId::from_random(self.below(1 << 16) as u16);
         let route = Route { from: Address::SURFACE, to: Address::EVERYBODY };
         let (header, _) = self.header(route);
-        let header = Header { session: Some(session), turn: Some(8), kind: FrameKind::Hello, ..header };
+        let header = Header { session: Some(session), turn: Some(8), ..header };
         FrameBuilder::new(&header, FRAME_BYTES).finish(&Seal::Crc(MISSION, 0), true)
     }
 

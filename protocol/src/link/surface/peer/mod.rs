@@ -156,9 +156,9 @@ impl<R: StateReplica> VehiclePeer<R> {
         self.pair.has_offer() && self.contact.is_doubtful && self.last_turn.purpose != FramePurpose::Proof
     }
 
-    /// Whether the vehicle seems to use a run that the surface does not know, so that it receives no numbered frame.
+    /// Whether the vehicle seems to use a run that has ended at the surface, so that it receives no numbered frame.
     pub(super) fn seems_elsewhere(&self) -> bool {
-        self.pair.hears_unknown_run() && self.master.unanswered() > 0 && !self.pair.has_offer()
+        self.pair.hears_ended_run() && self.master.unanswered() > 0 && !self.pair.has_offer()
     }
 
     /// Counts a frame that was dropped.
@@ -319,7 +319,7 @@ impl<R: StateReplica> VehiclePeer<R> {
         self.handle_fates(&inbound.fates, inbound.number.unwrap_or(self.pair.highest()), now);
         self.is_out_of_step |= inbound.lacks_base;
         let header = inbound.header().clone();
-        if header.kind.is_hello() {
+        if header.kind().is_hello() {
             if !self.pair.is_of_current_run(&header) {
                 self.twins.handle_stranger(now);
             }
