@@ -243,7 +243,7 @@ mod tests {
             hold: true,
             budget_bps: Some(500),
             shares: Some([10, 5, 5, 50, 20]),
-            background: Some(0x3200),
+            background: Some(vec![0x14, 0x40]),
             abort: false,
             settings: vec![0x40, 0],
             limits: vec![0, 4],

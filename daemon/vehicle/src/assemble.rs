@@ -41,7 +41,9 @@ pub fn assemble(
         Some(last) => Navigator::resume(last, depth, drift),
         None => Navigator::new(x, y, depth, drift).with_start_sigma(config.navigation.start_sigma_m),
     };
-    link.set_background(durable.background.and_then(BackgroundOrder::from_code).unwrap_or(config.link.background));
+    link.set_background(
+        durable.background.as_deref().and_then(BackgroundOrder::from_bytes).unwrap_or(config.link.background),
+    );
     let mut vehicle = Vehicle::new(link, navigator, steering, policy(config), durable, now);
     vehicle.set_codec(codec);
     vehicle.configure_map(MapSelection {

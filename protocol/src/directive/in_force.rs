@@ -2,10 +2,8 @@
 
 use super::{Slot, SlotId};
 use crate::bytes::{Reader, Truncated};
-use crc::{CRC_16_IBM_3740, Crc};
+use crate::map::TextPart;
 use std::collections::BTreeMap;
-
-const CRC: Crc<u16> = Crc::<u16>::new(&CRC_16_IBM_3740);
 
 /// The slots of which a vehicle reports the content in force.
 pub const REPORTED_SLOTS: [SlotId; 7] = [
@@ -79,14 +77,6 @@ impl Slot {
     }
 }
 
-/// The digest of a payload in force: CRC-16/IBM-3740 over the number of the slot and the payload; 1 where that is 0.
-fn digest_of(id: SlotId, payload: &[u8]) -> u16 {
-    let mut crc = CRC.digest();
-    crc.update(&[id.index() as u8]);
-    crc.update(payload);
-    crc.finalize().max(1)
-}
-
 /// The digest of the content in force of each slot; 0 where there is none.
 pub type InForceDigests = PerSlot<u16>;
 
@@ -94,14 +84,14 @@ impl InForceDigests {
     /// The digests of these contents.
     pub fn of(contents: &PerSlot<Option<Slot>>) -> Self {
         Self::from_fn(|id| {
-            contents.get(id).and_then(Option::as_ref).map_or(0, |slot| digest_of(slot.id(), &slot.payload()))
+            contents.get(id).and_then(Option::as_ref).map_or(0, |slot| TextPart::digest_of(&slot.payload()))
         })
     }
 
     /// The summary that a report carries.
     pub fn summary(&self) -> InForceSummary {
         let slots = (0..).zip(&self.0).fold(0, |bits, (place, digest)| bits | u8::from(*digest != 0) << (7 - place));
-        InForceSummary { slots, digest: CRC.checksum(&self.encode()) }
+        InForceSummary { slots, digest: TextPart::digest_of(&self.encode()) }
     }
 
     /// The payload of an inquiry.
@@ -133,7 +123,7 @@ impl InForceDigests {
 /// byte  bits  field
 ///  0    7     slots with content in force, a bit each: utility, settings, budget, limits, fence, destination, areas
 ///  0    1     reserved, 0
-///  1-2  16    CRC-16/IBM-3740 over the digests of these seven slots in this order, 2 bytes each, 0 for no content
+///  1-2  16    [`TextPart::digest_of`] the digests of these seven slots in this order, 2 bytes each, 0 for no content
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct InForceSummary {
@@ -142,9 +132,6 @@ pub struct InForceSummary {
 }
 
 impl InForceSummary {
-    /// Length on the wire in bytes.
-    pub(crate) const BYTES: usize = 3;
-
     /// Whether a slot has content in force.
     pub fn has(self, id: SlotId) -> bool {
         place_of(id).is_some_and(|place| self.slots & 0x80 >> place != 0)
@@ -165,55 +152,35 @@ impl InForceSummary {
 /// A part of the content in force of a slot, in answer to an inquiry. It is no order.
 ///
 /// ```text
-/// byte  bits  field
-///  0    3     slot: 0 utility, 1 settings, 2 budget, 3 limits, 4 fence, 5 destination, 6 areas
-///  0    1     whether this part is the last
-///  0    4     reserved, 0
-///  1-2  16    digest of the whole content
-///  3-4  16    offset of the part in the content, which has at most 2048 bytes
-///  5..        the part of the content; the content is the payload of the slot
+/// byte 0   number of the slot, one of utility, settings, budget, limits, fence, destination, areas
+/// then     a part of the content ([`TextPart`]), which has at most 2048 bytes and is the payload of the slot
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct InForcePart<'a> {
     /// The slot of the content.
     pub id: SlotId,
-    /// The digest of the whole content.
-    pub digest: u16,
-    /// Offset of the part in the content.
-    pub first: u16,
-    /// Whether the content ends with it.
-    pub is_last: bool,
-    /// The bytes of the part.
-    pub bytes: &'a [u8],
+    /// The part.
+    pub part: TextPart<'a>,
 }
 
 impl<'a> InForcePart<'a> {
-    /// Bytes before the part of the content.
-    pub(crate) const HEAD: usize = 5;
+    /// Most bytes before the part of the content.
+    pub(crate) const HEAD: usize = 1 + TextPart::LONG_HEAD;
     /// The longest content in bytes.
     pub(crate) const MAX_CONTENT: usize = 2048;
 
     /// The bytes of the payload.
     #[must_use]
     pub fn encode(&self) -> Vec<u8> {
-        let mut out = vec![place_of(self.id).unwrap_or_default() << 5 | u8::from(self.is_last) << 4];
-        out.extend_from_slice(&self.digest.to_be_bytes());
-        out.extend_from_slice(&self.first.to_be_bytes());
-        out.extend_from_slice(self.bytes);
-        out
+        [&[self.id.index() as u8], &self.part.encode()[..]].concat()
     }
 
-    /// Reads the payload of a chunk.
-    pub fn decode(bytes: &'a [u8]) -> Result<Self, Truncated> {
-        let mut r = Reader::new(bytes);
-        let head = r.u8()?;
-        let id = REPORTED_SLOTS.get(usize::from(head >> 5)).copied().filter(|_| head & 15 == 0).ok_or(Truncated)?;
-        let (digest, first) = (r.u16()?, r.u16()?);
-        let bytes = r.take(r.rest().len())?;
-        let is_short = usize::from(first) + bytes.len() <= Self::MAX_CONTENT;
-        (is_short && !bytes.is_empty())
-            .then_some(Self { id, digest, first, is_last: head & 16 != 0, bytes })
-            .ok_or(Truncated)
+    /// Reads the payload of a chunk; `None` if it makes no sense.
+    pub fn decode(bytes: &'a [u8]) -> Option<Self> {
+        let (&slot, part) = bytes.split_first()?;
+        let id = REPORTED_SLOTS.into_iter().find(|id| id.index() == usize::from(slot))?;
+        let part = TextPart::decode(part)?;
+        (usize::from(part.first) + part.bytes.len() <= Self::MAX_CONTENT).then_some(Self { id, part })
     }
 }
 
@@ -230,7 +197,7 @@ impl InForceAssembly {
     const MAX_HELD: usize = 2 * InForcePart::MAX_CONTENT;
 
     /// Takes a part; returns the content once it is whole and has its digest.
-    pub(crate) fn take(&mut self, part: &InForcePart<'_>) -> Option<Slot> {
+    pub(crate) fn take(&mut self, &InForcePart { id, part }: &InForcePart<'_>) -> Option<Slot> {
         let held: usize = self.parts.values().map(Vec::len).sum();
         if self.digest != part.digest || held > Self::MAX_HELD {
             *self = Self { digest: part.digest, ..Self::default() };
@@ -248,7 +215,7 @@ impl InForceAssembly {
             return None;
         }
         *self = Self::default();
-        (digest_of(part.id, &content) == part.digest).then(|| Slot::from_payload(part.id, &content)).flatten()
+        (TextPart::digest_of(&content) == part.digest).then(|| Slot::from_payload(id, &content)).flatten()
     }
 }
 
@@ -273,9 +240,13 @@ mod tests {
         let (mut summary, bytes) = (Vec::new(), digests.encode());
         digests.summary().encode(&mut summary);
         assert_eq!((summary[0], InForceDigests::decode(&bytes)), (0b1001_0000, Ok(digests)));
-        let part = InForcePart { id: SlotId::Fence, digest: 0xBEEF, first: 300, is_last: true, bytes: &[7, 8] };
-        assert_eq!(part.encode(), [0x90, 0xBE, 0xEF, 1, 44, 7, 8]);
-        assert_eq!(InForcePart::decode(&part.encode()), Ok(part));
+        let part = TextPart { digest: 0xBEEF, first: 300, is_last: true, bytes: &[7, 8] };
+        let part = InForcePart { id: SlotId::Fence, part };
+        assert_eq!(part.encode(), [7, 0xBE, 0xEF, 0xC1, 44, 7, 8]);
+        assert_eq!(InForcePart::decode(&part.encode()), Some(part));
+        for bytes in [&[][..], &[1, 0, 1, 0, 7], &[10, 0, 1, 0, 7], &[7, 0, 1, 0], &[7, 0, 1, 0x48, 0, 7]] {
+            assert_eq!(InForcePart::decode(bytes), None, "{bytes:02X?}");
+        }
     }
 
     #[test]
@@ -303,12 +274,13 @@ mod tests {
             }
             let turns = labels as usize % 3 % parts.len();
             parts.rotate_left(turns);
-            let digest = digest_of(SlotId::Utility, &content);
+            let digest = TextPart::digest_of(&content);
             let mut assembly = InForceAssembly::default();
             let mut whole = Vec::new();
             for (first, end) in parts {
                 let (is_last, bytes) = (end == content.len(), &content[first..end]);
-                let part = InForcePart { id: SlotId::Utility, digest, first: first as u16, is_last, bytes };
+                let part = TextPart { digest, first: first as u16, is_last, bytes };
+                let part = InForcePart { id: SlotId::Utility, part };
                 whole.extend(assembly.take(&InForcePart::decode(&part.encode()).unwrap()));
             }
             prop_assert_eq!(whole, [slot]);
@@ -316,7 +288,7 @@ mod tests {
 
         #[test]
         fn any_bytes_decode_or_are_refused(bytes in proptest::collection::vec(any::<u8>(), 0..40)) {
-            if let Ok(part) = InForcePart::decode(&bytes) {
+            if let Some(part) = InForcePart::decode(&bytes) {
                 prop_assert_eq!(part.encode(), bytes.clone());
                 let _ = InForceAssembly::default().take(&part);
             }

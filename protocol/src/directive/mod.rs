@@ -369,7 +369,7 @@ mod tests {
             labels: Change::To(32),
         };
         let bytes = VersionedSlot::encode(1, &Slot::Settings(settings));
-        assert_eq!(bytes.len(), 19);
+        assert_eq!(bytes.len(), 18);
         let back = VersionedSlot::decode(&bytes).map(|slot| slot.content);
         assert_eq!(back, Ok(Some(Slot::Settings(settings))));
     }

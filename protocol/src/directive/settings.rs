@@ -3,7 +3,7 @@
 
 use super::{AtEnd, CellBand, Change, PlannerKind, Registration, ShortDecimal};
 use crate::bytes::{Reader, Truncated};
-use crate::map::{LayerId, LayerMask};
+use crate::map::LayerMask;
 use std::ops::RangeInclusive;
 
 /// A setting that no vehicle could obey.
@@ -24,26 +24,24 @@ pub struct SettingsFault {
 ///         7   6   5   4   3   2   1   0
 ///       +-----------+-----------+-------+
 /// byte 0| planner   | cells     | layers|
-///       +---+---+---+---+---+---+---+---+
-/// byte 1| C | D | Q | a | b | g | r | f |
-///       +---+---+---+---+---+---+---+---+
-/// then 2 bytes, a mask of layers, if layers is 3
+///       +-----------+---+---+---+---+---+
+/// byte 1| end       | a | b | g | r | f |
+///       +-----------+---+---+---+---+---+
+/// then 2 bytes, a mask of layers, if layers is 2
 /// then 2 bytes, a [`ShortDecimal`], for each of a, b, g, r, f that is 1
 /// then 1 byte, unless all of it is 0:
-///       +---+-------+-------+-----------+
-///       | L | 0   0 | reg.  | end       |
-///       +---+-------+-------+-----------+
-/// then 1 byte, the most labels, if L is 1
+///       +-------+-----------------------+
+///       | reg.  | labels                |
+///       +-------+-----------------------+
 /// ```
 /// * planner: 0 stays, 1 as configured, 2 lawnmower, 3 greedy, 4 horizon.
 /// * cells: 0 stays, 1 as configured, 2 fine, 3 coarse to fine, 4 coarse.
-/// * layers: 0 stay, 1 as configured, 2 those of C (layer 1), D (layer 0) and Q (layer 2), 3 those of the mask, whose bit 0
-///   is layer 0; 3 only if the mask has other layers than these three.
+/// * layers: 0 stay, 1 as configured, 2 those of the mask, whose bit 0 is layer 0.
 /// * a, b, g: alpha, beta, gamma of the scene model; r: words resampled a second of mission time; f: camera frames a
 ///   second that the scene model sees.
 /// * end of the survey: 0 stays, 1 as configured, 2 repeat, 3 explore, 4 hold ([`AtEnd`]).
 /// * registration: 0 stays, 1 as configured, 2 off, 3 on ([`Registration`]).
-/// * labels: 0 as configured, else 2 to 32.
+/// * labels: 0 stay, 1 as configured, 2 to 32.
 ///
 /// ```
 /// use scenecast_protocol::directive::{Change, PlannerKind, Settings, ShortDecimal};
@@ -92,12 +90,9 @@ impl Settings {
     /// Labels that a map may tell apart at most.
     pub const LABELS: RangeInclusive<u8> = 2..=32;
     /// Most bytes of the payload.
-    pub const MAX_BYTES: usize = 16;
-    /// Whether the number of labels follows.
-    const HAS_LABELS: u8 = 0x80;
-    /// The layers that have a bit in byte 1.
-    const SHORT_LAYERS: [(u8, LayerId); 3] =
-        [(0x80, LayerId::CONFIDENCE), (0x40, LayerId::DEPTH), (0x20, LayerId::CURIOSITY)];
+    pub const MAX_BYTES: usize = 15;
+    /// The bits of the number of labels.
+    const LABEL_BITS: u8 = 0x3F;
 
     /// The combination of these settings with later ones; where both name a setting, the later one counts.
     #[must_use]
@@ -145,13 +140,7 @@ impl Settings {
 
     /// Encodes the payload, which is also the form in the journal.
     pub fn to_bytes(&self) -> Vec<u8> {
-        let planner = self.planner.code(|p| p as u8);
-        let cells = self.cells.code(|c| c as u8);
-        let mask = self.layers.value().unwrap_or_default();
-        let is_short = Self::is_short(mask);
-        let layers = self.layers.code(|_| u8::from(!is_short));
-        let bits = Self::SHORT_LAYERS.into_iter().filter(|&(_, id)| is_short && mask.has(id));
-        let mut given = bits.fold(0, |given, (bit, _)| given | bit);
+        let mut given = self.at_end.code(|choice| choice as u8) << 5;
         let mut numbers = Vec::new();
         for (index, (_, change, _)) in self.numbers().into_iter().enumerate() {
             if !matches!(change, Change::Keep) {
@@ -159,37 +148,22 @@ impl Settings {
             }
             ShortDecimal::encode(change, &mut numbers);
         }
-        let mut out = vec![planner << 5 | cells << 2 | layers, given];
-        if !is_short {
-            out.extend_from_slice(&mask.0.to_be_bytes());
-        }
+        let choices = self.planner.code(|p| p as u8) << 5 | self.cells.code(|c| c as u8) << 2 | self.layers.code(|_| 0);
+        let mut out = vec![choices, given];
+        out.extend(self.layers.value().into_iter().flat_map(|mask| mask.0.to_be_bytes()));
         out.append(&mut numbers);
-        let choices = self.registration.code(|choice| choice as u8) << 3 | self.at_end.code(|choice| choice as u8);
-        match (self.labels, choices) {
-            (Change::Keep, 0) => {}
-            (Change::Keep, _) => out.push(choices),
-            (labels, _) => out.extend([Self::HAS_LABELS | choices, labels.value().unwrap_or(0)]),
-        }
+        let labels = self.labels.code(|labels| labels.saturating_sub(2));
+        let more = self.registration.code(|choice| choice as u8) << 6 | labels & Self::LABEL_BITS;
+        out.extend((more != 0).then_some(more));
         out
-    }
-
-    fn is_short(mask: LayerMask) -> bool {
-        mask.iter().all(|layer| Self::SHORT_LAYERS.iter().any(|&(_, id)| id == layer))
-    }
-
-    fn decode_layers(code: u8, given: u8, r: &mut Reader<'_>) -> Result<Change<LayerMask>, Truncated> {
-        let short = Self::SHORT_LAYERS.into_iter().filter(|&(bit, _)| given & bit != 0).map(|(_, id)| id).collect();
-        match code {
-            2 => Ok(Change::To(short)),
-            _ if short != LayerMask::default() => Err(Truncated),
-            3 => Some(LayerMask(r.u16()?)).filter(|&mask| !Self::is_short(mask)).map(Change::To).ok_or(Truncated),
-            _ => Change::from_code(code, |_| None),
-        }
     }
 
     pub(super) fn decode(r: &mut Reader<'_>) -> Result<Self, Truncated> {
         let (choices, given) = (r.u8()?, r.u8()?);
-        let layers = Self::decode_layers(choices & 3, given, r)?;
+        let layers = match choices & 3 {
+            2 => Change::To(LayerMask(r.u16()?)),
+            code => Change::from_code(code, |_| None)?,
+        };
         let mut figure = |bit: u8| if given & bit != 0 { ShortDecimal::decode(r) } else { Ok(Change::Keep) };
         let (alpha, beta, gamma) = (figure(0x10)?, figure(0x08)?, figure(0x04)?);
         let (refine_words_per_s, frames_per_s) = (figure(0x02)?, figure(0x01)?);
@@ -199,22 +173,15 @@ impl Settings {
             [0, ..] => return Err(Truncated),
             _ => r.u8()?,
         };
-        let labels = match more & Self::HAS_LABELS {
-            0 => Change::Keep,
-            _ => Some(r.u8()?).filter(|&labels| labels > 0).map_or(Change::Configured, Change::To),
-        };
-        if more & 0x60 != 0 {
-            return Err(Truncated);
-        }
         Ok(Self {
             alpha,
             beta,
             gamma,
             refine_words_per_s,
             frames_per_s,
-            labels,
-            at_end: Change::from_code(more & 7, |code| AtEnd::ALL.get(usize::from(code)).copied())?,
-            registration: Change::from_code(more >> 3 & 3, |code| Registration::ALL.get(usize::from(code)).copied())?,
+            labels: Change::from_code(more & Self::LABEL_BITS, |code| Some(code + 2))?,
+            at_end: Change::from_code(given >> 5, |code| AtEnd::ALL.get(usize::from(code)).copied())?,
+            registration: Change::from_code(more >> 6, |code| Registration::ALL.get(usize::from(code)).copied())?,
             planner: Change::from_code(choices >> 5, |code| PlannerKind::ALL.get(usize::from(code)).copied())?,
             cells: Change::from_code(choices >> 2 & 7, |code| CellBand::ALL.get(usize::from(code)).copied())?,
             layers,
@@ -231,6 +198,7 @@ impl Settings {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::map::LayerId;
     use proptest::prelude::*;
     use std::fmt;
 
@@ -254,7 +222,7 @@ mod tests {
             change(proptest::sample::select(Registration::ALL.to_vec())),
             change(proptest::sample::select(CellBand::ALL.to_vec())),
             change(prop_oneof![0u16..8, any::<u16>()].prop_map(LayerMask)),
-            change(1u8..=255),
+            change(2u8..=63),
         );
         let figures = (change(figure()), change(figure()), change(figure()), change(figure()), change(figure()));
         (choices, figures).prop_map(
@@ -285,32 +253,22 @@ mod tests {
             frames_per_s: to(0.25),
             ..Settings::default()
         };
-        let bytes = [0x92, 0x55, 0x28, 0x64, 0, 0, 0x2C, 0xFA];
+        let bytes = [0x92, 0x15, 0, 1, 0x28, 0x64, 0, 0, 0x2C, 0xFA];
         assert_eq!(settings.to_bytes(), bytes);
         assert_eq!(Settings::from_bytes(&bytes), Some(settings));
         assert_eq!(Settings::default().to_bytes(), [0, 0]);
         let of_end = |at_end| Settings { at_end, ..Settings::default() }.to_bytes();
-        assert_eq!((of_end(Change::Configured), of_end(Change::To(AtEnd::Hold))), (vec![0, 0, 1], vec![0, 0, 4]));
+        assert_eq!((of_end(Change::Configured), of_end(Change::To(AtEnd::Hold))), (vec![0, 0x20], vec![0, 0x80]));
         let of_registration = |registration| Settings { registration, ..Settings::default() }.to_bytes();
-        assert_eq!(of_registration(Change::Configured), [0, 0, 8]);
-        assert_eq!(of_registration(Change::To(Registration::Off)), [0, 0, 0x10]);
-        let both = Settings {
-            at_end: Change::To(AtEnd::Repeat),
-            registration: Change::To(Registration::On),
-            ..Settings::default()
-        };
-        assert_eq!(both.to_bytes(), [0, 0, 0x1A]);
+        assert_eq!(of_registration(Change::Configured), [0, 0, 0x40]);
+        assert_eq!(of_registration(Change::To(Registration::Off)), [0, 0, 0x80]);
         let of_labels = |labels| Settings { labels, ..Settings::default() }.to_bytes();
         assert_eq!(
-            (of_labels(Change::Configured), of_labels(Change::To(8))),
-            (vec![0, 0, 0x80, 0], vec![0, 0, 0x80, 8])
+            [Change::Configured, Change::To(2), Change::To(32)].map(of_labels),
+            [vec![0, 0, 1], vec![0, 0, 2], vec![0, 0, 32]]
         );
         let of_layers = |mask| Settings { layers: Change::To(LayerMask(mask)), ..Settings::default() }.to_bytes();
-        assert_eq!(of_layers(0b100), [2, 0x20]);
-        assert_eq!(
-            (of_layers(0b010), of_layers(0), of_layers(0x8004)),
-            (vec![2, 0x80], vec![2, 0], vec![3, 0, 0x80, 4])
-        );
+        assert_eq!((of_layers(0), of_layers(0x8004)), (vec![2, 0, 0, 0], vec![2, 0, 0x80, 4]));
     }
 
     #[test]
@@ -341,23 +299,15 @@ mod tests {
             &[0xA0, 0][..],
             &[0x14, 0],
             &[3, 0],
-            &[0, 0x20],
-            &[0, 0x80],
-            &[3, 0, 0, 7],
-            &[3, 0x20, 0x80, 0],
+            &[2, 0, 0],
+            &[0, 0xA0],
             &[0, 0x10, 0, 99],
             &[0, 0x10, 0x80, 100],
+            &[0, 0, 0],
+            &[0, 0, 2, 2],
         ] {
             assert_eq!(Settings::from_bytes(bytes), None, "{bytes:02X?}");
         }
-        for choices in [0, 5, 0x20, 0x25, 0x80, 255] {
-            assert_eq!(
-                Settings::from_bytes(&[0, 0, choices]),
-                None,
-                "the end of the survey and registration {choices}"
-            );
-        }
-        assert_eq!(Settings::from_bytes(&[0, 0, 2, 2]), None);
     }
 
     proptest! {

@@ -1,23 +1,26 @@
-//! Short texts of bytes that reach the surface in parts: descriptions of layers, names of labels, the tree of labels.
+//! Texts of bytes that reach the surface in parts: descriptions of layers, names of labels, the tree of labels, content in force.
 
+use crate::bytes::Reader;
 use crc::{CRC_16_IBM_3740, Crc};
 
 /// Consecutive bytes of a text.
 ///
 /// ```text
-///  0                   1                   2
-///  0 1 2 3 4 5 6 7 8 9 0 1 2 3 4 5 6 7 8 9 0 1 2 3
-/// +-------------------------------+-+-+-----------+
-/// | digest of the text            |L|0| first     | bytes ...
-/// +-------------------------------+-+-+-----------+
+///  0                   1                   2                   3
+///  0 1 2 3 4 5 6 7 8 9 0 1 2 3 4 5 6 7 8 9 0 1 2 3 4 5 6 7 8 9 0 1
+/// +-------------------------------+-+-+-----------+---------------+
+/// | digest of the text            |L|W| first (6 bits, or 14)     | bytes ...
+/// +-------------------------------+-+-+-----------+---------------+
 /// ```
-/// * L: the text ends with this part; first: place of the first byte of the part in the text, 0 to 63; at least one byte.
+/// * L: the text ends with this part.
+/// * first: place of the first byte of the part in the text; 6 bits if W is 0, 14 if it is 1, and then above 63.
+/// * at least one byte.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct TextPart<'a> {
     /// The digest of the whole text.
     pub digest: u16,
-    /// Place of the first of the bytes, 0 to 63.
-    pub first: u8,
+    /// Place of the first of the bytes, at most [`Self::MAX_FIRST`].
+    pub first: u16,
     /// Whether the bytes are the last ones.
     pub is_last: bool,
     /// Bytes of the text from `first` on, at least one.
@@ -25,34 +28,48 @@ pub struct TextPart<'a> {
 }
 
 impl<'a> TextPart<'a> {
-    /// Bytes before those of the text.
+    /// Bytes before those of a text of at most [`Self::SHORT_TEXT`] bytes.
     pub const HEAD: usize = 3;
-    /// Most bytes of a text.
-    pub const MAX_TEXT: usize = 64;
-    const LAST: u8 = 0x80;
+    /// Most bytes before those of any text.
+    pub const LONG_HEAD: usize = Self::HEAD + 1;
+    /// Most bytes of a text whose parts all have the shorter head.
+    pub const SHORT_TEXT: usize = 64;
+    /// The highest place of a part.
+    pub const MAX_FIRST: u16 = (1 << 14) - 1;
+    const LAST: u16 = 0x8000;
+    const WIDE: u16 = 0x4000;
 
     /// Reads a part; `None` if it makes no sense.
     pub fn decode(bytes: &'a [u8]) -> Option<Self> {
-        let (&[high, low, place], bytes) = bytes.split_first_chunk()?;
-        let (digest, is_last) = (u16::from_be_bytes([high, low]), place & Self::LAST != 0);
-        let part = Self { digest, first: place & !Self::LAST, is_last, bytes };
-        (part.first < 0x40 && !bytes.is_empty()).then_some(part)
+        let mut r = Reader::new(bytes);
+        let (digest, high) = (r.u16().ok()?, u16::from(r.u8().ok()?) << 8);
+        let is_last = high & Self::LAST != 0;
+        let first = match high & Self::WIDE {
+            0 => high >> 8 & 0x3F,
+            _ => (high & Self::MAX_FIRST) | u16::from(r.u8().ok()?),
+        };
+        let is_shortest = (high & Self::WIDE != 0) == (usize::from(first) >= Self::SHORT_TEXT);
+        let part = Self { digest, first, is_last, bytes: r.rest() };
+        (is_shortest && !part.bytes.is_empty()).then_some(part)
     }
 
     /// The bytes of the part.
     pub fn encode(&self) -> Vec<u8> {
-        let [high, low] = self.digest.to_be_bytes();
-        let place = self.first | if self.is_last { Self::LAST } else { 0 };
-        [&[high, low, place], self.bytes].concat()
+        let last = if self.is_last { Self::LAST } else { 0 };
+        let [high, low] = (self.first & Self::MAX_FIRST | last | Self::WIDE).to_be_bytes();
+        let mut out = self.digest.to_be_bytes().to_vec();
+        match usize::from(self.first) < Self::SHORT_TEXT {
+            true => out.push(self.first as u8 | (last >> 8) as u8),
+            false => out.extend([high, low]),
+        }
+        out.extend_from_slice(self.bytes);
+        out
     }
 
-    /// Fingerprint of a text and the bytes that say what it is about: CRC-16/IBM-3740.
-    pub(super) fn digest_of(about: &[u8], text: &[u8]) -> u16 {
+    /// Fingerprint of a text: CRC-16/IBM-3740, or 1 where that is 0.
+    pub fn digest_of(text: &[u8]) -> u16 {
         const CRC: Crc<u16> = Crc::<u16>::new(&CRC_16_IBM_3740);
-        let mut digest = CRC.digest();
-        digest.update(about);
-        digest.update(text);
-        digest.finalize()
+        CRC.checksum(text).max(1)
     }
 }
 
@@ -70,9 +87,9 @@ impl TextSender {
     /// Fewer bytes of a text are not worth the head of a chunk, unless they are the last ones.
     const MIN_PART: usize = 8;
 
-    /// A text of at most [`TextPart::MAX_TEXT`] bytes.
-    pub(super) fn new(text: Vec<u8>, digest: u16) -> Self {
-        Self { text, digest, held: 0, is_on_air: false }
+    /// A text of at most [`TextPart::SHORT_TEXT`] bytes.
+    pub(super) fn new(text: Vec<u8>) -> Self {
+        Self { digest: TextPart::digest_of(&text), text, held: 0, is_on_air: false }
     }
 
     pub(super) fn digest(&self) -> u16 {
@@ -97,7 +114,7 @@ impl TextSender {
         let rest = self.text.get(self.held..).filter(|rest| !rest.is_empty() && !self.is_on_air)?;
         let n = room.checked_sub(TextPart::HEAD)?.min(rest.len());
         let bytes = rest.get(..n).filter(|_| n >= Self::MIN_PART.min(rest.len()))?;
-        let part = TextPart { digest: self.digest, first: self.held as u8, is_last: n == rest.len(), bytes };
+        let part = TextPart { digest: self.digest, first: self.held as u16, is_last: n == rest.len(), bytes };
         self.is_on_air = true;
         Some((part.encode(), n))
     }
@@ -123,13 +140,8 @@ pub(crate) struct TextAssembly {
 
 impl TextAssembly {
     /// Takes a part of a text of at most `most` bytes. `None` if it does not continue the others, or if all of them together do not
-    /// have the digest that `digest_of` gives; else the text, once it is whole.
-    pub(crate) fn take(
-        &mut self,
-        part: &TextPart<'_>,
-        most: usize,
-        digest_of: impl Fn(&[u8]) -> u16,
-    ) -> Option<Option<Vec<u8>>> {
+    /// have its digest; else the text, once it is whole.
+    pub(crate) fn take(&mut self, part: &TextPart<'_>, most: usize) -> Option<Option<Vec<u8>>> {
         if part.first == 0 {
             (self.digest, self.text) = (part.digest, Vec::new());
         }
@@ -142,7 +154,7 @@ impl TextAssembly {
             return Some(None);
         }
         let text = std::mem::take(&mut self.text);
-        (digest_of(&text) == self.digest).then_some(Some(text))
+        (TextPart::digest_of(&text) == self.digest).then_some(Some(text))
     }
 }
 
@@ -151,16 +163,12 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    fn digest_of(text: &[u8]) -> u16 {
-        TextPart::digest_of(&[], text)
-    }
-
     fn sender(text: &[u8]) -> TextSender {
-        TextSender::new(text.to_vec(), digest_of(text))
+        TextSender::new(text.to_vec())
     }
 
     fn take(assembly: &mut TextAssembly, part: &[u8]) -> Option<Option<Vec<u8>>> {
-        assembly.take(&TextPart::decode(part).expect("a part"), TextPart::MAX_TEXT, digest_of)
+        assembly.take(&TextPart::decode(part).expect("a part"), TextPart::SHORT_TEXT)
     }
 
     #[test]
@@ -168,7 +176,11 @@ mod tests {
         let part = TextPart { digest: 0xBEEF, first: 8, is_last: true, bytes: &[1, 2] };
         assert_eq!(part.encode(), [0xBE, 0xEF, 0x88, 1, 2]);
         assert_eq!(TextPart::decode(&part.encode()), Some(part));
-        for bytes in [&[][..], &[0xBE, 0xEF, 0x88], &[0, 0, 0x40, 1]] {
+        let far = TextPart { first: 300, is_last: false, ..part };
+        assert_eq!(far.encode(), [0xBE, 0xEF, 0x41, 0x2C, 1, 2]);
+        assert_eq!(TextPart::decode(&far.encode()), Some(far));
+        assert_eq!((TextPart::digest_of(b"123456789"), TextPart::digest_of(&[])), (0x29B1, 0xFFFF));
+        for bytes in [&[][..], &[0xBE, 0xEF, 0x88], &[0, 0, 0x40, 1], &[0, 0, 0x40, 63, 1], &[0, 0, 0x41, 1]] {
             assert_eq!(TextPart::decode(bytes), None, "{bytes:02X?}");
         }
     }
@@ -219,7 +231,7 @@ mod tests {
             for bytes in &parts {
                 let Some(part) = TextPart::decode(bytes) else { continue };
                 prop_assert_eq!(&part.encode(), bytes);
-                let _ = assembly.take(&part, TextPart::MAX_TEXT, digest_of);
+                let _ = assembly.take(&part, TextPart::SHORT_TEXT);
             }
         }
     }

@@ -122,10 +122,6 @@ impl LabelTree {
     }
 }
 
-fn digest_of(bytes: &[u8]) -> u16 {
-    TextPart::digest_of(&[], bytes)
-}
-
 /// The vehicle's side: the newest tree, sent until it is known to have arrived.
 #[derive(Debug, Default)]
 pub struct TreeSource {
@@ -139,8 +135,7 @@ impl TreeSource {
         let is_new = self.tree.as_ref().is_none_or(|(last, _)| last != tree);
         if is_new {
             let bytes = tree.to_bytes();
-            let digest = digest_of(&bytes);
-            (self.tree, self.version) = (Some((tree.clone(), TextSender::new(bytes, digest))), self.version + 1);
+            (self.tree, self.version) = (Some((tree.clone(), TextSender::new(bytes))), self.version + 1);
         }
         is_new
     }
@@ -205,14 +200,14 @@ impl TreeReplica {
             return Some(false);
         }
         self.number = number;
-        let Some(bytes) = self.parts.take(&part, TextPart::MAX_TEXT, digest_of)? else { return Some(false) };
+        let Some(bytes) = self.parts.take(&part, TextPart::SHORT_TEXT)? else { return Some(false) };
         self.tree = Some(LabelTree::from_bytes(&bytes)?);
         Some(true)
     }
 }
 
 // The largest tree is a text that can be sent.
-const _: () = assert!((5 + 3 + 5 + 16 * LabelTree::MAX_MERGES).div_ceil(8) <= TextPart::MAX_TEXT);
+const _: () = assert!((5 + 3 + 5 + 16 * LabelTree::MAX_MERGES).div_ceil(8) <= TextPart::SHORT_TEXT);
 
 #[cfg(test)]
 mod tests {
@@ -295,7 +290,7 @@ mod tests {
             }
             let tree = LabelTree::new(merges, None).unwrap();
             let bytes = tree.to_bytes();
-            prop_assert!(bytes.len() <= TextPart::MAX_TEXT);
+            prop_assert!(bytes.len() <= TextPart::SHORT_TEXT);
             prop_assert_eq!(LabelTree::from_bytes(&bytes), Some(tree));
         }
     }

@@ -1,6 +1,7 @@
 //! Background streams: content that is sent with spare capacity only.
 
 use super::Class;
+use crate::bytes::{BitReader, BitWriter};
 use crate::map::{LayerId, LayerSet};
 
 /// Content that is sent with spare capacity only.
@@ -50,15 +51,15 @@ impl BackgroundStream {
         }
     }
 
-    fn number(self) -> u128 {
+    fn number(self) -> u64 {
         match self {
-            Self::Layer(id) => id.index() as u128,
+            Self::Layer(id) => id.index() as u64,
             Self::Finer => 16,
             Self::Exemplars => 17,
         }
     }
 
-    fn from_number(number: u128) -> Option<Self> {
+    fn from_number(number: u64) -> Option<Self> {
         match number {
             16 => Some(Self::Finer),
             17 => Some(Self::Exemplars),
@@ -71,10 +72,10 @@ impl BackgroundStream {
 /// then are cells like all others.
 ///
 /// ```text
-/// short form, two bytes: a bit 0, then five times three bits, the first stream highest:
-///     1 finer cells, 2 layer 0, 3 exemplars, 4 layer 1, 5 layer 2, 0 no further one
-/// long form, if there is any other stream, as many bytes as it takes:
-///     a bit 1, five bits: number of streams, five bits for each: 0 to 15 that layer, 16 finer cells, 17 exemplars, zeros
+///   5 bits              5 bits for each, the first one first              0 to 7
+/// +-------------------+-------------------------------------------------+-------
+/// | number of streams | 0 to 15: that layer, 16 finer cells, 17 exemplars | zeros
+/// +-------------------+-------------------------------------------------+-------
 /// ```
 ///
 /// ```
@@ -93,23 +94,15 @@ pub struct BackgroundOrder([Option<BackgroundStream>; BackgroundOrder::MAX_STREA
 impl Default for BackgroundOrder {
     /// Finer cells, depths, exemplars, confidences.
     fn default() -> Self {
-        let mut streams = Self::SHORT.into_iter().take(4);
+        let [depth, confidence] = [LayerId::DEPTH, LayerId::CONFIDENCE].map(BackgroundStream::Layer);
+        let mut streams = [BackgroundStream::Finer, depth, BackgroundStream::Exemplars, confidence].into_iter();
         Self(std::array::from_fn(|_| streams.next()))
     }
 }
 
 impl BackgroundOrder {
-    /// Most streams, and most bytes of the long form.
+    /// Most streams.
     const MAX_STREAMS: usize = LayerId::COUNT + 2;
-    const MAX_BYTES: usize = (6 + 5 * Self::MAX_STREAMS).div_ceil(8);
-    /// The streams that the short form can name, from 1 on.
-    const SHORT: [BackgroundStream; 5] = [
-        BackgroundStream::Finer,
-        BackgroundStream::Layer(LayerId::DEPTH),
-        BackgroundStream::Exemplars,
-        BackgroundStream::Layer(LayerId::CONFIDENCE),
-        BackgroundStream::Layer(LayerId::CURIOSITY),
-    ];
 
     /// These streams in this order; `None` if one is named twice.
     pub fn new(streams: &[BackgroundStream]) -> Option<Self> {
@@ -143,50 +136,20 @@ impl BackgroundOrder {
         self.iter().any(|s| s == stream)
     }
 
-    /// The bytes of either form as one number, which a journal keeps.
-    pub fn code(self) -> u128 {
-        let short = self.iter().map(|stream| Self::SHORT.iter().position(|&s| s == stream).map(|i| i as u128 + 1));
-        if let Some(numbers) = short.collect::<Option<Vec<u128>>>() {
-            return (0..5).fold(0, |code, place| code << 3 | numbers.get(place).copied().unwrap_or(0));
-        }
-        let count = self.iter().count();
-        let code = self.iter().fold(32 | count as u128, |code, stream| code << 5 | stream.number());
-        let bits = 6 + 5 * count;
-        code << (bits.next_multiple_of(8) - bits)
-    }
-
-    /// The order of a code; `None` if it has an unknown stream, or one twice, or is not as [`Self::code`] writes it.
-    pub fn from_code(code: u128) -> Option<Self> {
-        let numbers = |first: u32, bits: u32, count: u32| {
-            (0..count).map(move |place| code >> (first - bits * place).min(127) & ((1 << bits) - 1))
-        };
-        let streams: Option<Vec<BackgroundStream>> = if code >> 15 == 0 {
-            let named = numbers(12, 3, 5).take_while(|&n| n > 0);
-            named.map(|n| Self::SHORT.get(n as usize - 1).copied()).collect()
-        } else {
-            let length = (u128::BITS - code.leading_zeros()).next_multiple_of(8);
-            let count = (code >> (length - 6) & 31) as u32;
-            let fits = 6 + 5 * count <= length;
-            let named = fits.then(|| numbers(length - 11, 5, count)).into_iter().flatten();
-            named.map(BackgroundStream::from_number).collect()
-        };
-        Self::new(&streams?).filter(|order| order.code() == code)
-    }
-
-    /// The bytes of the short form, or of the long form if the short one has no number for a stream.
+    /// The bytes on the wire.
     pub fn to_bytes(self) -> Vec<u8> {
-        let bytes = self.code().to_be_bytes();
-        let zeros = bytes.iter().take_while(|&&b| b == 0).count().min(bytes.len() - 2);
-        bytes.into_iter().skip(zeros).collect()
+        let mut bits = BitWriter::default();
+        bits.put(self.iter().count() as u64, 5);
+        self.iter().for_each(|stream| bits.put(stream.number(), 5));
+        bits.into_bytes()
     }
 
-    /// Decodes the bytes of [`Self::to_bytes`]; `None` if they are not in that form.
+    /// Reads [`Self::to_bytes`]; `None` if they have an unknown stream, or one twice, or another length or filling.
     pub fn from_bytes(bytes: &[u8]) -> Option<Self> {
-        if bytes.len() > Self::MAX_BYTES {
-            return None;
-        }
-        let order = Self::from_code(bytes.iter().fold(0, |code, &b| code << 8 | u128::from(b)));
-        order.filter(|order| order.to_bytes() == bytes)
+        let mut bits = BitReader::new(bytes);
+        let count = bits.take(5)?;
+        let streams: Option<Vec<_>> = (0..count).map(|_| BackgroundStream::from_number(bits.take(5)?)).collect();
+        Self::new(&streams?).filter(|order| order.to_bytes() == bytes)
     }
 }
 
@@ -203,40 +166,21 @@ mod tests {
     const EXEMPLARS: BackgroundStream = BackgroundStream::Exemplars;
 
     #[test]
-    fn golden_codes_of_orders() {
-        assert_eq!(BackgroundOrder::default().code(), 0x14E0);
-        let two = BackgroundOrder::new(&[EXEMPLARS, CONFIDENCE]).unwrap();
-        assert_eq!((two.code(), BackgroundOrder::from_code(0x3800)), (0x3800, Some(two)));
-        assert_eq!(BackgroundOrder::from_code(0), BackgroundOrder::new(&[]));
-        let all = BackgroundOrder::new(&[CURIOSITY, FINER, DEPTH, EXEMPLARS, CONFIDENCE]);
-        assert_eq!((all.unwrap().code(), BackgroundOrder::from_code(0x529C)), (0x529C, all));
-        for wrong in [0x3600, 0x6000, 0x0600, 0x1403, 0x94E0] {
-            assert_eq!(BackgroundOrder::from_code(wrong), None, "{wrong:04x}");
-        }
-        let sound = (0..0x8000).filter_map(BackgroundOrder::from_code).collect::<Vec<_>>();
-        assert_eq!(sound.len(), 1 + 5 + 20 + 60 + 120 + 120);
-        assert!(sound.iter().all(|order| BackgroundOrder::from_code(order.code()) == Some(*order)));
-    }
-
-    #[test]
-    fn golden_bytes_of_orders_with_other_layers() {
-        let last = BackgroundStream::Layer(LayerId::new(15).unwrap());
+    fn golden_bytes_of_orders() {
         let golden = |streams: &[BackgroundStream], bytes: &[u8]| {
             let order = BackgroundOrder::new(streams).unwrap();
             assert_eq!((order.to_bytes(), BackgroundOrder::from_bytes(bytes)), (bytes.to_vec(), Some(order)));
         };
-        golden(&[FINER, DEPTH], &[0x14, 0]);
-        golden(&[], &[0, 0]);
-        golden(&[last], &[0x85, 0xE0]);
-        golden(&[FINER, DEPTH, last], &[0x8E, 0, 0x78]);
-        // Another filling, too many streams, layer 18, the same stream twice, or an order that has a short form.
-        for wrong in [&[0x85, 0xE1][..], &[0x8D, 0xE0], &[0x86, 0x40], &[0x89, 0xEF], &[0x86, 0], &[0, 0x14, 0], &[0]] {
+        golden(&[], &[0]);
+        golden(&[FINER, DEPTH, EXEMPLARS, CONFIDENCE], &[0x24, 0x01, 0x10, 0x80]);
+        golden(&[BackgroundStream::Layer(LayerId::new(15).unwrap()), CURIOSITY], &[0x13, 0xC4]);
+        // Another filling, too few or too many bytes, a stream without a number, the same one twice.
+        for wrong in [&[][..], &[1], &[0x13], &[0x13, 0xC5], &[0, 0], &[0x0C, 0x80], &[0x10, 0x00], &[0x9A, 0]] {
             assert_eq!(BackgroundOrder::from_bytes(wrong), None, "{wrong:02X?}");
         }
         let everything: Vec<_> = (0..18).rev().filter_map(BackgroundStream::from_number).collect();
         let order = BackgroundOrder::new(&everything).unwrap();
-        assert_eq!(order.to_bytes().len(), BackgroundOrder::MAX_BYTES);
-        assert_eq!(BackgroundOrder::from_bytes(&order.to_bytes()), Some(order));
+        assert_eq!((order.to_bytes().len(), BackgroundOrder::from_bytes(&order.to_bytes())), (12, Some(order)));
     }
 
     #[test]
@@ -263,10 +207,9 @@ mod tests {
         }
 
         #[test]
-        fn orders_round_trip(numbers in proptest::sample::subsequence((0u128..18).collect::<Vec<_>>(), 0..=18).prop_shuffle()) {
+        fn orders_round_trip(numbers in proptest::sample::subsequence((0u64..18).collect::<Vec<_>>(), 0..=18).prop_shuffle()) {
             let streams: Vec<_> = numbers.into_iter().filter_map(BackgroundStream::from_number).collect();
             let order = BackgroundOrder::new(&streams).unwrap();
-            prop_assert_eq!(BackgroundOrder::from_code(order.code()), Some(order));
             prop_assert_eq!(BackgroundOrder::from_bytes(&order.to_bytes()), Some(order));
         }
     }

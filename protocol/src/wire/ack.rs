@@ -19,10 +19,10 @@ pub const MAX_WINDOW: u64 = 2048;
 /// +-----------------------+-------+-----------------+--------------------+
 /// len      0..14: bytes of loss code; 15: len2 has the number (15..255)
 /// loss code, most significant bit first:
-///   k  2 bits   0: bitmap; 1..3: Rice code with parameter k
+///   1 bit       0: bitmap; 1: Rice code
 ///   bitmap      bit i (from 0): 1 = frame horizon-i is lost; frames past the end are held
 ///   Rice        for each lost frame downward from the horizon: frames held since the previous lost one, as quotient
-///               (value >> k) in ones, a zero, then k bits; ones to the end of the bytes are padding
+///               (value / 8) in ones, a zero, then the remainder in 3 bits; ones to the end of the bytes are padding
 /// ```
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct AckStatement {
@@ -63,28 +63,30 @@ impl AckStatement {
 fn encode_losses(lost: &[u16]) -> Vec<u8> {
     let Some(&last) = lost.last() else { return Vec::new() };
     let mut bitmap = BitWriter::default();
-    bitmap.push(0, 2);
+    bitmap.push(0, 1);
     let mut next = lost.iter().peekable();
     for i in 0..=last {
         let hit = next.next_if(|&&l| l == i).is_some();
         bitmap.push(u32::from(hit), 1);
     }
-    let rice = (1..=3).map(|k| rice(lost, k)).min_by_key(Vec::len).unwrap_or_default();
-    let bitmap = bitmap.finish(false);
+    let (rice, bitmap) = (rice(lost), bitmap.finish(false));
     if rice.len() < bitmap.len() { rice } else { bitmap }
 }
 
-fn rice(lost: &[u16], k: u32) -> Vec<u8> {
+/// Bits of the remainder in a Rice code.
+const RICE_BITS: u32 = 3;
+
+fn rice(lost: &[u16]) -> Vec<u8> {
     let mut bits = BitWriter::default();
-    bits.push(k, 2);
+    bits.push(1, 1);
     let mut from = 0u32;
     for &l in lost {
         let gap = u32::from(l) - from;
-        for _ in 0..gap >> k {
+        for _ in 0..gap >> RICE_BITS {
             bits.push(1, 1);
         }
         bits.push(0, 1);
-        bits.push(gap & ((1 << k) - 1), k);
+        bits.push(gap & ((1 << RICE_BITS) - 1), RICE_BITS);
         from = u32::from(l) + 1;
     }
     bits.finish(true)
@@ -94,7 +96,7 @@ fn decode_losses(code: &[u8]) -> Vec<u16> {
     let mut bits = code.iter().flat_map(|b| (0..8).rev().map(move |i| u32::from(b >> i & 1)));
     let mut pull = |n: u32| (0..n).try_fold(0u32, |acc, _| bits.next().map(|b| acc << 1 | b));
     let mut lost = Vec::new();
-    match pull(2) {
+    match pull(1) {
         None => {}
         Some(0) => {
             let mut at = 0u16;
@@ -105,7 +107,7 @@ fn decode_losses(code: &[u8]) -> Vec<u16> {
                 at += 1;
             }
         }
-        Some(k) => {
+        Some(_) => {
             let mut at = 0u32;
             loop {
                 let mut quotient = 0;
@@ -116,8 +118,8 @@ fn decode_losses(code: &[u8]) -> Vec<u16> {
                         None => break true,
                     }
                 };
-                let Some(low) = (!ended).then(|| pull(k)).flatten() else { break };
-                at += (quotient << k) + low;
+                let Some(low) = (!ended).then(|| pull(RICE_BITS)).flatten() else { break };
+                at += (quotient << RICE_BITS) + low;
                 if u64::from(at) >= 2 * MAX_WINDOW {
                     break;
                 }
@@ -181,7 +183,7 @@ mod tests {
     fn golden_bytes_of_two_losses() {
         let mut bytes = Vec::new();
         assert!(AckStatement { horizon_low: 7, lost: vec![1, 4] }.encode(20, &mut bytes));
-        assert_eq!(bytes, [0x00, 0x71, 0b0001_0010]);
+        assert_eq!(bytes, [0x00, 0x71, 0b0010_0100]);
     }
 
     #[test]

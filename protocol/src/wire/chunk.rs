@@ -21,16 +21,10 @@ pub enum ChunkKind {
     InForce,
     /// The digests of the content in force that the surface holds, as a request for the rest.
     Inquiry,
-    /// The corners of the track before a pose.
-    Trail,
-    /// The purpose of the plan of a pose.
-    Intent,
-    /// How the camera frames before a pose were placed on the map.
-    Registration,
+    /// Faults, intent, registration and trail of a pose.
+    Details,
     /// A part of the name and the colour of a label.
     LabelClass,
-    /// The faults of the vehicle's equipment at the time of a pose.
-    Faults,
     /// A part of the tree of labels.
     LabelTree,
     /// The introduction of another surface that calls the vehicle.
@@ -43,7 +37,7 @@ pub enum ChunkKind {
 const EXTENDED: u8 = 7;
 
 impl ChunkKind {
-    const ALL: [Self; 17] = [
+    const ALL: [Self; 14] = [
         Self::Map,
         Self::Pose,
         Self::Slot,
@@ -53,11 +47,8 @@ impl ChunkKind {
         Self::Introduction,
         Self::InForce,
         Self::Inquiry,
-        Self::Trail,
-        Self::Intent,
-        Self::Registration,
+        Self::Details,
         Self::LabelClass,
-        Self::Faults,
         Self::LabelTree,
         Self::Caller,
         Self::NextKey,
@@ -75,14 +66,11 @@ impl ChunkKind {
             Self::Introduction => (EXTENDED, Some(0)),
             Self::InForce => (EXTENDED, Some(1)),
             Self::Inquiry => (EXTENDED, Some(2)),
-            Self::Trail => (EXTENDED, Some(3)),
-            Self::Intent => (EXTENDED, Some(4)),
-            Self::Registration => (EXTENDED, Some(5)),
-            Self::LabelClass => (EXTENDED, Some(6)),
-            Self::Faults => (EXTENDED, Some(7)),
-            Self::LabelTree => (EXTENDED, Some(8)),
-            Self::Caller => (EXTENDED, Some(9)),
-            Self::NextKey => (EXTENDED, Some(10)),
+            Self::Details => (EXTENDED, Some(3)),
+            Self::LabelClass => (EXTENDED, Some(4)),
+            Self::LabelTree => (EXTENDED, Some(5)),
+            Self::Caller => (EXTENDED, Some(6)),
+            Self::NextKey => (EXTENDED, Some(7)),
         }
     }
 }
@@ -95,7 +83,8 @@ impl ChunkKind {
 /// |kind | length  | [more length]  | payload   |
 /// +-----+---------+----------------+-----------+
 /// kind     0 end of the frame's content, 1 map, 2 pose, 3 slot, 4 object, 5 report, 6 layer;
-///          7 extended: the first byte of the payload is 0 introduction, 1 content in force, 2 inquiry, 3 trail, 4 intent, 5 registration, 6 class, 7 faults, 8 tree, 9 caller, 10 next key;
+///          7 extended: the first byte of the payload is 0 introduction, 1 content in force, 2 inquiry, 3 details of a pose, 4 class, 5 tree, 6 caller,
+///          7 next key;
 ///          any other value, or no payload: skipped
 /// length   0..26 bytes of payload; 27..30: 27 + 256 x (length - 27) + next byte; 31: to the end of the frame
 /// ```

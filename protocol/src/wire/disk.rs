@@ -25,8 +25,6 @@ pub struct DiskReport {
 }
 
 impl DiskReport {
-    /// Length on the wire in bytes.
-    pub(crate) const BYTES: usize = 1;
     const RESERVED: u8 = 0x80;
     const JOURNAL: u8 = 0x40;
     const CHECKPOINT: u8 = 0x20;

@@ -1,7 +1,5 @@
 //! The faults of a vehicle's equipment.
 
-use super::status::StatusError;
-
 /// The equipment of the vehicle that fails at the time of the pose of the same frame.
 ///
 /// ```text
@@ -17,7 +15,7 @@ use super::status::StatusError;
 ///  7   depth missing       within the last 10 s, an image had no distances that could be used, where they are configured
 /// ```
 ///
-/// Source: vehicle, in the frame of a pose and before it, while there is a fault. The first bit is the highest.
+/// Source: vehicle, among the [`super::PoseDetails`], while there is a fault. The first bit is the highest.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct EquipmentFaults {
     /// No image comes in.
@@ -85,11 +83,10 @@ impl EquipmentFaults {
         [bits.iter().fold(0, |byte, bit| byte << 1 | u8::from(*bit))]
     }
 
-    /// Reads the byte of the wire. Bytes after it are not read, so that a later vehicle may send more faults.
-    pub fn decode(bytes: &[u8]) -> Result<Self, StatusError> {
-        let &byte = bytes.first().ok_or(StatusError::Length)?;
+    /// Reads the byte of the wire.
+    pub fn decode(byte: u8) -> Self {
         let bit = |index: u8| byte & 0x80 >> index != 0;
-        Ok(Self {
+        Self {
             camera_silent: bit(0),
             images_dropped: bit(1),
             poses_missing: bit(2),
@@ -98,7 +95,7 @@ impl EquipmentFaults {
             labels_refused: bit(5),
             images_unusable: bit(6),
             depth_missing: bit(7),
-        })
+        }
     }
 }
 
@@ -110,8 +107,7 @@ mod tests {
     fn golden_bytes_of_faults() {
         let faults = EquipmentFaults { camera_silent: true, autopilot_refuses: true, ..EquipmentFaults::default() };
         assert_eq!(faults.encode(), [0b1000_1000]);
-        assert_eq!(EquipmentFaults::decode(&[0b1000_1000, 9]), Ok(faults), "further bytes are not read");
-        assert_eq!(EquipmentFaults::decode(&[]), Err(StatusError::Length));
+        assert_eq!(EquipmentFaults::decode(0b1000_1000), faults);
         let minor = EquipmentFaults {
             images_dropped: true,
             poses_faulty: true,
@@ -129,7 +125,7 @@ mod tests {
     #[test]
     fn each_byte_is_read_back() {
         for byte in 0..=255_u8 {
-            let faults = EquipmentFaults::decode(&[byte]).unwrap();
+            let faults = EquipmentFaults::decode(byte);
             assert_eq!((faults.encode(), faults.iter().count() as u32), ([byte], byte.count_ones()));
         }
     }

@@ -1,6 +1,8 @@
 //! The purpose of an adaptive survey's plan.
 
 use super::status::StatusError;
+use crate::bytes::Reader;
+use crate::map::MAX_LABEL;
 
 /// The purpose of the plan that a pose has.
 ///
@@ -11,7 +13,7 @@ use super::status::StatusError;
 ///  1    8     number  of the label, 1..254, after kinds 2 and 5; of the area, 1..4, after kind 4
 /// ```
 ///
-/// Source: vehicle, in the frame of a pose and before it, while it surveys by an adaptive planner or goes to a destination.
+/// Source: vehicle, among the [`super::PoseDetails`], while it surveys by an adaptive planner or goes to a destination.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Intent {
     /// Floor that the camera has not seen yet.
@@ -41,17 +43,18 @@ impl Intent {
         }
     }
 
-    /// Reads an intent; each has exactly one encoding.
-    pub fn decode(bytes: &[u8]) -> Result<Self, StatusError> {
-        match *bytes {
-            [0] => Ok(Self::Unseen),
-            [1] => Ok(Self::Curiosity),
-            [2, label @ 1..=254] => Ok(Self::Label(label)),
-            [3] => Ok(Self::Destination),
-            [4, number @ 1..=4] => Ok(Self::Area(number)),
-            [5, label @ 1..=254] => Ok(Self::LabelAgain(label)),
-            [0..=5] | [] | [_, _, ..] => Err(StatusError::Length),
-            [_] => Err(StatusError::BadField),
+    /// Reads an intent; the rest stays in `r`.
+    pub(super) fn read(r: &mut Reader<'_>) -> Result<Self, StatusError> {
+        let kind = r.u8()?;
+        let mut number = |most: u8| Some(r.u8()?).filter(|n| (1..=most).contains(n)).ok_or(StatusError::BadField);
+        match kind {
+            0 => Ok(Self::Unseen),
+            1 => Ok(Self::Curiosity),
+            2 => number(MAX_LABEL).map(Self::Label),
+            3 => Ok(Self::Destination),
+            4 => number(4).map(Self::Area),
+            5 => number(MAX_LABEL).map(Self::LabelAgain),
+            _ => Err(StatusError::BadField),
         }
     }
 }
@@ -72,25 +75,11 @@ mod tests {
             (Intent::LabelAgain(7), &[5, 7]),
         ] {
             assert_eq!(intent.encode(), bytes);
-            assert_eq!(Intent::decode(bytes), Ok(intent));
+            let mut r = Reader::new(bytes);
+            assert_eq!((Intent::read(&mut r), r.rest()), (Ok(intent), &[][..]));
         }
-        for bytes in [
-            &[][..],
-            &[2],
-            &[4],
-            &[5],
-            &[6],
-            &[5, 0],
-            &[5, 255],
-            &[0, 0],
-            &[3, 0],
-            &[4, 0],
-            &[4, 5],
-            &[2, 0],
-            &[2, 255],
-            &[2, 1, 0],
-        ] {
-            assert!(Intent::decode(bytes).is_err(), "{bytes:?}");
+        for bytes in [&[][..], &[2], &[4], &[5], &[6], &[5, 0], &[5, 255], &[4, 0], &[4, 5], &[2, 0], &[2, 255]] {
+            assert!(Intent::read(&mut Reader::new(bytes)).is_err(), "{bytes:?}");
         }
     }
 }

@@ -5,6 +5,7 @@
 mod ack;
 mod backlog;
 mod chunk;
+mod details;
 mod disk;
 mod faults;
 mod frame;
@@ -24,6 +25,7 @@ pub use ack::{AckStatement, MAX_WINDOW};
 pub use backlog::Backlog;
 pub(crate) use chunk::room_for_payload;
 pub use chunk::{Chunk, ChunkKind, Chunks};
+pub use details::PoseDetails;
 pub use disk::DiskReport;
 pub use faults::EquipmentFaults;
 pub use frame::{Envelope, Frame, FrameBuilder, FrameError, Seal};

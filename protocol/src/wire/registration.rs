@@ -1,6 +1,6 @@
 //! How the vehicle's last camera frames were placed on the map.
 
-use super::status::StatusError;
+use crate::bytes::{Reader, Truncated};
 
 /// What places the last camera frame on the map.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -20,7 +20,7 @@ impl FrameTie {
     const ALL: [Self; 4] = [Self::Odometry, Self::FrameBefore, Self::EarlierTrack, Self::Off];
 }
 
-/// How the last camera frames were placed on the map, for the pose of the same frame.
+/// How the last camera frames were placed on the map.
 ///
 /// ```text
 /// byte  bits  field                        unit, range
@@ -34,7 +34,7 @@ impl FrameTie {
 ///             since the mission's start
 /// ```
 ///
-/// Source: vehicle, in the frame of a pose and before it, where frames are or were registered.
+/// Source: vehicle, among the [`super::PoseDetails`], where frames are or were registered.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct RegistrationReport {
     /// What places the last frame.
@@ -66,14 +66,19 @@ impl RegistrationReport {
     }
 
     /// Reads a report; each has exactly one encoding.
-    pub fn decode(bytes: &[u8]) -> Result<Self, StatusError> {
-        let &[head, sigma, high, low] = bytes else { return Err(StatusError::Length) };
-        Ok(Self {
+    pub fn decode(bytes: [u8; Self::BYTES]) -> Self {
+        let [head, sigma, high, low] = bytes;
+        Self {
             tie: FrameTie::ALL.get(usize::from(head >> 6)).copied().unwrap_or_default(),
             share: f64::from(head & 63) / WHOLE,
             sigma_m: f64::from(sigma) * SIGMA_UNIT_M,
             closed: u16::from_be_bytes([high, low]),
-        })
+        }
+    }
+
+    /// Reads a report; the rest stays in `r`.
+    pub(super) fn read(r: &mut Reader<'_>) -> Result<Self, Truncated> {
+        Ok(Self::decode([r.u8()?, r.u8()?, r.u8()?, r.u8()?]))
     }
 }
 
@@ -91,10 +96,9 @@ mod tests {
             (report(FrameTie::Off, 0.0, 5.1, u16::MAX), [0xc0, 255, 255, 255]),
         ] {
             assert_eq!(report.encode(), bytes);
-            assert_eq!(RegistrationReport::decode(&bytes).unwrap().encode(), bytes);
+            assert_eq!(RegistrationReport::decode(bytes).encode(), bytes);
         }
         let beyond = report(FrameTie::Odometry, 2.0, 80.0, 0);
         assert_eq!(beyond.encode(), [0x3f, 255, 0, 0]);
-        assert!(RegistrationReport::decode(&[0; 3]).is_err() && RegistrationReport::decode(&[0; 5]).is_err());
     }
 }

@@ -112,13 +112,14 @@ impl ModeReason {
 ///  6    8     frames refused for want of authenticity, 255 = that or more
 ///  7-8  16    backlog, see `Backlog`
 ///  9-10 10    slots in this report, a bit each, the first slot in the highest bit
-/// 10    6     reserved, 0
+/// 10    3     reserved, 0
+/// 10    3     a summary follows, a placement, the state of a disk
 /// 11..  8     version of each of them, low 8 bits
 /// then  4     decision about each of them: 1 applied, 2..11 refusal reason, 15 pending; any other value is refused; after an odd number,
 ///             4 bits 0
-/// 3 more      [summary of the content in force, see `InForceSummary`]
-/// 7 more      [placement of the map, see `Placement`]; left out while it has not moved
-/// 1 more      [state of the disk, see `DiskReport`]; left out by a vehicle without files
+/// 3 bytes     [summary of the content in force, see `InForceSummary`]
+/// 7 bytes     [placement of the map, see `Placement`]; left out while it has not moved
+/// 1 byte      [state of the disk, see `DiskReport`]; left out by a vehicle without files
 /// ```
 ///
 /// ```
@@ -219,6 +220,13 @@ fn decode_rate(code: u16) -> u32 {
 
 /// The bit of the first slot in a report.
 const FIRST_SLOT: u16 = 0x8000;
+/// The bits of all slots.
+const SLOT_BITS: u16 = !0 << (u16::BITS as usize - SLOTS);
+/// The bits of the parts that follow the slots.
+const HAS_SUMMARY: u16 = 4;
+const HAS_PLACEMENT: u16 = 2;
+const HAS_DISK: u16 = 1;
+const RESERVED: u16 = !(SLOT_BITS | HAS_SUMMARY | HAS_PLACEMENT | HAS_DISK);
 
 impl VehicleStatus {
     /// Length of a report without slots in bytes.
@@ -266,38 +274,43 @@ impl VehicleStatus {
         if told.is_empty() && !left.is_empty() {
             return None;
         }
+        let bytes = Self::REPORT_HEAD + told.len() + told.len().div_ceil(2);
+        let (parts, tail, next) = match left.first() {
+            Some(&(slot, _)) => (0, Vec::new(), slot),
+            None => self.encode_tail(room.saturating_sub(bytes), first, told.is_empty()),
+        };
         let mut out = vec![self.epoch, self.labels];
         out.extend_from_slice(&self.base_digest.to_be_bytes());
         out.extend_from_slice(&code_rate(self.budget_bps).to_be_bytes());
         out.push(self.refused_frames);
         out.extend(self.backlog.encode());
-        out.extend(told.iter().fold(0u16, |bits, (slot, _)| bits | FIRST_SLOT >> slot).to_be_bytes());
+        out.extend(told.iter().fold(parts, |bits, (slot, _)| bits | FIRST_SLOT >> slot).to_be_bytes());
         out.extend(told.iter().map(|(_, s)| s.version_low));
         let code = |of: Option<&(usize, &SlotReport)>| of.map_or(0, |(_, s)| s.state.code());
         out.extend(told.chunks(2).map(|pair| code(pair.first()) << 4 | code(pair.get(1))));
-        if let Some(&(slot, _)) = left.first() {
-            return Some((out, slot));
-        }
-        Some(self.encode_tail(out, room, first, told.is_empty()))
+        out.extend(tail);
+        Some((out, next))
     }
 
-    /// Appends the items after the slots to a report, from `first` on. An item that does not fit waits for the next report,
-    /// unless `is_alone`: it would not fit there either.
-    fn encode_tail(&self, mut out: Vec<u8>, room: usize, first: usize, mut is_alone: bool) -> (Vec<u8>, usize) {
-        let mut items = [Vec::new(), Vec::new(), Vec::new()];
-        let [in_force, placement, disk] = &mut items;
+    /// The parts after the slots of a report, from item `first` on, that take at most `room` bytes: their bits, their bytes, and the
+    /// item with which the next report must begin. An item that does not fit waits for the next report, unless `is_alone`: it would not
+    /// fit there either.
+    fn encode_tail(&self, room: usize, first: usize, mut is_alone: bool) -> (u16, Vec<u8>, usize) {
+        let mut items = [(HAS_SUMMARY, Vec::new()), (HAS_PLACEMENT, Vec::new()), (HAS_DISK, Vec::new())];
+        let [(_, in_force), (_, placement), (_, disk)] = &mut items;
         self.in_force.iter().for_each(|summary| summary.encode(in_force));
         self.placement.iter().for_each(|moved| moved.encode(placement));
         self.disk.iter().for_each(|state| state.encode(disk));
-        for (item, bytes) in (SLOTS..).zip(items).filter(|(item, bytes)| *item >= first && !bytes.is_empty()) {
-            if out.len() + bytes.len() <= room {
-                out.extend(bytes);
-                is_alone = false;
+        let (mut bits, mut tail) = (0, Vec::new());
+        for (item, (bit, bytes)) in (SLOTS..).zip(items).filter(|(item, (_, b))| *item >= first && !b.is_empty()) {
+            if tail.len() + bytes.len() <= room {
+                (bits, is_alone) = (bits | bit, false);
+                tail.extend(bytes);
             } else if !is_alone {
-                return (out, item);
+                return (bits, tail, item);
             }
         }
-        (out, 0)
+        (bits, tail, 0)
     }
 
     /// Decodes a pose into `self`, without a trail, an intent, a registration and faults; the fields of the report stay unchanged.
@@ -331,28 +344,6 @@ impl VehicleStatus {
         Ok(())
     }
 
-    /// Decodes the items after the slots. No two selections of them have the same length, so the length shows which are
-    /// there.
-    fn read_tail(&mut self, r: &mut Reader<'_>) -> Result<(), StatusError> {
-        const IN_FORCE: usize = InForceSummary::BYTES;
-        const PLACEMENT: usize = Placement::BYTES;
-        const BOTH: usize = IN_FORCE + PLACEMENT;
-        let length = r.rest().len();
-        let without_disk = length.checked_sub(DiskReport::BYTES);
-        let has_disk = matches!(without_disk, Some(0 | IN_FORCE | PLACEMENT | BOTH));
-        let before = without_disk.filter(|_| has_disk).unwrap_or(length);
-        if matches!(before, IN_FORCE | BOTH) {
-            self.in_force = Some(InForceSummary::decode(r)?.ok_or(StatusError::BadField)?);
-        }
-        if matches!(before, PLACEMENT | BOTH) {
-            self.placement = Some(Placement::decode(r)?.ok_or(StatusError::BadField)?);
-        }
-        if has_disk {
-            self.disk = Some(DiskReport::decode(r)?.ok_or(StatusError::BadField)?);
-        }
-        if r.rest().is_empty() { Ok(()) } else { Err(StatusError::Length) }
-    }
-
     /// Decodes a report into `self`; other fields, and slots, placement and disk that it does not have, stay unchanged.
     pub fn read_report(&mut self, bytes: &[u8]) -> Result<(), StatusError> {
         let mut r = Reader::new(bytes);
@@ -361,10 +352,10 @@ impl VehicleStatus {
         read.refused_frames = r.u8()?;
         read.backlog = Backlog::decode(&mut r)?;
         let told = r.u16()?;
-        if told & ((FIRST_SLOT >> (SLOTS - 1)) - 1) != 0 {
+        if told & RESERVED != 0 {
             return Err(StatusError::BadField);
         }
-        let count = told.count_ones() as usize;
+        let count = (told & SLOT_BITS).count_ones() as usize;
         let versions = r.take(count)?;
         let mut codes = r.take(count.div_ceil(2))?.iter().flat_map(|b| [b >> 4, b & 15]);
         let slots = read.slots.iter_mut().enumerate().filter(|(slot, _)| told & FIRST_SLOT >> slot != 0);
@@ -375,7 +366,18 @@ impl VehicleStatus {
         if codes.next().is_some_and(|padding| padding != 0) {
             return Err(StatusError::BadField);
         }
-        read.read_tail(&mut r)?;
+        if told & HAS_SUMMARY != 0 {
+            read.in_force = Some(InForceSummary::decode(&mut r)?.ok_or(StatusError::BadField)?);
+        }
+        if told & HAS_PLACEMENT != 0 {
+            read.placement = Some(Placement::decode(&mut r)?.ok_or(StatusError::BadField)?);
+        }
+        if told & HAS_DISK != 0 {
+            read.disk = Some(DiskReport::decode(&mut r)?.ok_or(StatusError::BadField)?);
+        }
+        if !r.rest().is_empty() {
+            return Err(StatusError::Length);
+        }
         *self = read;
         Ok(())
     }

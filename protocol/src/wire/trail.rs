@@ -1,7 +1,7 @@
 //! The corners of the track that the vehicle travelled before a pose.
 
 use super::status::StatusError;
-use crate::bytes::{BitReader, BitWriter, DecimetreStep, decimetres, width_of};
+use crate::bytes::{BitReader, BitWriter, DecimetreStep, Reader, decimetres, width_of};
 use crate::coordinates::MapPoint;
 
 /// A corner of the track.
@@ -26,7 +26,7 @@ pub struct TrailCorner {
 /// * age: seconds before the pose, 0 to 255, not less than that of the later corner.
 /// * dx, dy: from the later corner, the first from the position of the pose; never both 0.
 ///
-/// Source: vehicle, in the frame of a pose and before it. Between two corners the vehicle went straight, within
+/// Source: vehicle, among the [`super::PoseDetails`]. Between two corners the vehicle went straight, within
 /// some decimetres.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Trail(Vec<(u8, DecimetreStep)>);
@@ -76,22 +76,19 @@ impl Trail {
         bits.into_bytes()
     }
 
-    /// Reads a trail; each has exactly one encoding.
-    pub fn decode(bytes: &[u8]) -> Result<Self, StatusError> {
-        let read = Self::read(bytes).ok_or(StatusError::Length)?;
-        let is_ordered = read.0.is_sorted_by_key(|&(ago_s, _)| ago_s);
-        let moves = read.0.iter().all(|&(_, step)| step != DecimetreStep::default());
-        if read.0.is_empty() || !is_ordered || !moves || read.encode() != bytes {
-            return Err(StatusError::BadField);
-        }
-        Ok(read)
-    }
-
-    fn read(bytes: &[u8]) -> Option<Self> {
-        let mut bits = BitReader::new(bytes);
-        let (n, width) = (bits.take(4)?, bits.take(4)? as u32 + 1);
+    /// Reads a trail, of which each has exactly one encoding; the rest stays in `r`.
+    pub(super) fn read(r: &mut Reader<'_>) -> Result<Self, StatusError> {
+        let &head = r.rest().first().ok_or(StatusError::Length)?;
+        let (n, width) = (usize::from(head >> 4), u32::from(head & 15) + 1);
+        let bytes = r.take((8 + n * (8 + 2 * width as usize)).div_ceil(8))?;
+        let mut bits = BitReader::new(bytes.get(1..).unwrap_or_default());
         let mut corner = || Some((bits.take(8)? as u8, DecimetreStep::take(&mut bits, width)?));
-        (0..n).map(|_| corner()).collect::<Option<Vec<_>>>().map(Self)
+        let corners = (0..n).map(|_| corner()).collect::<Option<Vec<_>>>().ok_or(StatusError::Length)?;
+        let is_ordered = corners.is_sorted_by_key(|&(ago_s, _)| ago_s);
+        let moves = corners.iter().all(|&(_, step)| step != DecimetreStep::default());
+        let read = Self(corners);
+        let is_sound = n > 0 && is_ordered && moves && read.encode() == bytes;
+        is_sound.then_some(read).ok_or(StatusError::BadField)
     }
 
     /// The corners of the trail to `position`, the latest first.
@@ -116,6 +113,11 @@ mod tests {
 
     const HERE: MapPoint = MapPoint::new(1.0, -2.0);
 
+    fn decode(bytes: &[u8]) -> Result<Trail, StatusError> {
+        let mut r = Reader::new(bytes);
+        Trail::read(&mut r).and_then(|trail| r.rest().is_empty().then_some(trail).ok_or(StatusError::Length))
+    }
+
     fn corner(ago_s: u8, x_m: f64, y_m: f64) -> TrailCorner {
         TrailCorner { ago_s, place: MapPoint::new(x_m, y_m) }
     }
@@ -127,7 +129,7 @@ mod tests {
         let trail = Trail::new(HERE, &corners, 99).unwrap();
         let bytes = [0x25, 0x09, 0x3B, 0x20, 0xC8, 0x80];
         assert_eq!(trail.encode()[..], bytes[..], "{:02X?}", trail.encode());
-        assert_eq!(Trail::decode(&bytes).unwrap().corners(HERE), corners);
+        assert_eq!(decode(&bytes).unwrap().corners(HERE), corners);
         assert_eq!(Trail::new(HERE, &corners, 5).unwrap().corners(HERE), corners[..1], "room for one");
         assert_eq!(Trail::new(HERE, &corners, 2), None);
         assert_eq!(Trail::new(HERE, &[corner(3, 1.0, -2.0)], 99), None, "the vehicle has not moved");
@@ -136,14 +138,14 @@ mod tests {
     #[test]
     fn unusual_encodings_of_a_trail_are_refused() {
         for bytes in [&[][..], &[0x05], &[0x25, 0x09], &[0x25, 0x0C, 0x3B, 0x20, 0x98, 0x80], &[0x12, 0x09, 0x00]] {
-            assert!(Trail::decode(bytes).is_err(), "{bytes:02X?}");
+            assert!(decode(bytes).is_err(), "{bytes:02X?}");
         }
     }
 
     proptest! {
         #[test]
         fn any_bytes_are_read_or_refused(bytes in proptest::collection::vec(any::<u8>(), 0..60)) {
-            if let Ok(trail) = Trail::decode(&bytes) {
+            if let Ok(trail) = decode(&bytes) {
                 prop_assert_eq!(trail.encode(), bytes);
                 prop_assert!(trail.corners(HERE).len() <= Trail::MAX_CORNERS);
             }
@@ -165,7 +167,7 @@ mod tests {
             };
             let bytes = trail.encode();
             prop_assert!(bytes.len() <= room);
-            let read = Trail::decode(&bytes).unwrap().corners(HERE);
+            let read = decode(&bytes).unwrap().corners(HERE);
             for (read, sent) in read.iter().zip(&corners) {
                 prop_assert_eq!(read.ago_s, sent.ago_s);
                 prop_assert!((read.place.x_m - sent.place.x_m).hypot(read.place.y_m - sent.place.y_m) < 0.01);

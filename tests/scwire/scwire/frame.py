@@ -91,16 +91,15 @@ def losses(code):
     if not code:
         return []
     bits = ''.join(f'{b:08b}' for b in code)
-    k = int(bits[:2], 2)
-    if k == 0:
-        return [i for i, b in enumerate(bits[2:]) if b == '1']
-    out, p, at = [], 2, 0
+    if bits[0] == '0':
+        return [i for i, b in enumerate(bits[1:]) if b == '1']
+    out, p, at = [], 1, 0
     while True:
         z = bits.find('0', p)
-        if z < 0 or z + k >= len(bits) + 0 and k:
+        if z < 0 or z + 3 >= len(bits):
             return out
-        v = (z - p) << k | (int(bits[z + 1:z + 1 + k], 2) if k else 0)
-        p = z + 1 + k
+        v = (z - p) << 3 | int(bits[z + 1:z + 4], 2)
+        p = z + 4
         at += v
         if at >= 4096:
             return out
@@ -109,20 +108,19 @@ def losses(code):
 
 
 def loss_code(lost):
-    """The shortest code of distances (ascending)."""
+    """The shorter code of distances (ascending)."""
     if not lost:
         return b''
-    best = '00' + ''.join('1' if i in set(lost) else '0' for i in range(lost[-1] + 1))
+    best = '0' + ''.join('1' if i in set(lost) else '0' for i in range(lost[-1] + 1))
     best += '0' * (-len(best) % 8)
-    for k in (1, 2, 3):
-        s, at = f'{k:02b}', 0
-        for x in lost:
-            v = x - at
-            s += '1' * (v >> k) + '0' + f'{v & ((1 << k) - 1):0{k}b}'
-            at = x + 1
-        s += '1' * (-len(s) % 8)
-        if len(s) < len(best):
-            best = s
+    s, at = '1', 0
+    for x in lost:
+        v = x - at
+        s += '1' * (v >> 3) + '0' + f'{v & 7:03b}'
+        at = x + 1
+    s += '1' * (-len(s) % 8)
+    if len(s) < len(best):
+        best = s
     return int(best, 2).to_bytes(len(best) // 8, 'big')
 
 

@@ -1,7 +1,7 @@
 """The examples of sections 11 and 12.6 and of appendix A against this package."""
 import os
 import re
-from . import context, frame, keys, cobs, mapchunk
+from . import context, frame, keys, cobs, mapchunk, status
 hx = lambda s: bytes.fromhex(s.replace('\n', ' '))
 
 
@@ -12,8 +12,8 @@ def main():
             assert cobs.decode(cobs.encode(f)[1:-1], 5000) == f
     assert [frame.write_base(b) for b in (127, 128, 2048)] == [hx('7f'), hx('8080'), hx('8800')]
     assert frame.statement(0xABC, []) == hx('ABC0')
-    assert frame.statement(7, [1, 4]) == hx('007112') and frame.losses(hx('12')) == [1, 4]
-    assert frame.statement(30, [20, 25]) == hx('01E2BE23') and frame.losses(hx('BE23')) == [20, 25]
+    assert frame.statement(7, [1, 4]) == hx('007124') and frame.losses(hx('24')) == [1, 4]
+    assert frame.losses(frame.loss_code([20, 25])) == [20, 25]
     assert frame.nearest(3, 250, 8) == 259 and frame.nearest(250, 259, 8) == 250
     assert frame.nearest(3, 65530) == 65539 and frame.nearest(65530, 65540) == 65530
     # Ascon, 12.1 and 12.6
@@ -64,8 +64,29 @@ def main():
         ok += 1
         print(f'{name:40} {len(raw):3} bytes, chunks {[(k, len(p)) for k, p in cs]}')
     print(ok, 'frames of 11.2 and 11.3 verified and written again')
+    parts(doc.split('### 11.1')[1].split('### 11.2')[0])
     long_numbers(m)
     appendix(doc.split('### A.6')[1])
+
+
+def parts(doc):
+    """11.1: reports, details and parts of texts."""
+    rows = {name: hx(bytes_) for name, bytes_ in re.findall(r'^\| (.+?) \| `([0-9A-F ]+)` \|$', doc, re.M)}
+    reports = [status.report(raw) for raw in rows.values() if raw[:4] == hx('0109BEEF')]
+    assert [('summary' in r, 'placement' in r, 'disk' in r) for r in reports] == [
+        (False, False, False), (True, False, False), (False, True, False), (False, False, True)]
+    details = {name: status.details(raw) for name, raw in rows.items() if name.startswith('details: ')}
+    assert all(details.values()) and details['details: more of label 5'] == {'intent': (2, 5)}, details
+    assert details['details: a trail to (1, -2) m: 9 s ago at (2.4, -3.4), 12 s ago at (-0.6, -3.4)']['trail'] == [
+        (9, 1.4, -1.4), (12, -1.6, -1.4)]
+    assert set(details['details: these faults, more of label 5, this registration and this trail']) == {
+        'faults', 'intent', 'registration', 'trail'}
+    texts = [(name, raw[1:]) for name, raw in rows.items() if name.startswith(('part of the name', 'part of a content', 'layer chunk: ')) and raw[0] >> 6 != 1]
+    texts += [(name, raw) for name, raw in rows.items() if name.startswith('part of the tree')]
+    for name, raw in texts:
+        digest, last, first, text = status.part(raw)
+        assert not last or first or digest == status.text_digest(text) or 'BEEF' in name, name
+    print(len(reports), 'reports,', len(details), 'details and', len(texts), 'parts of texts of 11.1')
 
 
 def long_numbers(m):

@@ -52,6 +52,22 @@ def width(v):
     return (v if v >= 0 else ~v).bit_length() + 1
 
 
+def part(d):
+    """5.2: (digest, whether it is the last, place, bytes)."""
+    if len(d) < 4:
+        raise Short('part')
+    digest, last, wide, first, p = int.from_bytes(d[:2], 'big'), d[2] >> 7, d[2] >> 6 & 1, d[2] & 63, d[3:]
+    if wide:
+        first, p = first << 8 | p[0], p[1:]
+    if not p or wide != (first > 63):
+        raise Short('part')
+    return digest, last, first, p
+
+
+def text_digest(d):
+    return crc16(d) or 1
+
+
 def trail(d):
     b = Bits(d)
     n, w = b.u(4), b.u(4) + 1
@@ -84,29 +100,56 @@ def report(d):
     v, s = b.u(4), b.u(4)
     o['backlog_other'] = v << s
     has = [i for i in range(10) if b.u(1)]
-    if b.u(6):
+    if b.u(3):
         raise Short('report reserved')
+    summary, placement, disk = b.u(1), b.u(1), b.u(1)
     versions = [b.u(8) for _ in has]
     o['slots'] = {SLOTS[i]: (ver, CODES.get(b.u(4), 'bad')) for i, ver in zip(has, versions)}
     if len(has) % 2 and b.u(4) or any(c == 'bad' for _, c in o['slots'].values()):
         raise Short('report code')
-    rest = (b.n - b.p) // 8
-    if rest not in (0, 1, 3, 4, 7, 8, 10, 11):
+    if (b.n - b.p) // 8 != 3 * summary + 7 * placement + disk:
         raise Short('report length')
-    if rest in (3, 4, 10, 11):
+    if summary:
         o['in_force'] = [n for n in ('utility', 'settings', 'budget', 'limits', 'fence', 'destination', 'areas') if b.u(1)]
         if b.u(1):
             raise Short('report reserved')
         o['summary'] = b.u(16)
-    if rest in (7, 8, 10, 11):
+    if placement:
         o['placement'] = (b.u(8), b.s(24) / 10, b.s(24) / 10)
         if o['placement'][0] == 0:
             raise Short('placement')
-    if rest in (1, 4, 8, 11):
+    if disk:
         if b.u(1):
             raise Short('report reserved')
         o['disk'] = (b.u(1), b.u(1), b.u(5))
     return o
+
+
+def details(d):
+    """7: faults, intent, registration, trail; None if they make no sense."""
+    if not d or not d[0]:
+        return None
+    o, p = {}, d[1:]
+    try:
+        if d[0] & 0x80:
+            o['faults'], p = p[0], p[1:]
+        if d[0] & 0x40:
+            n = 2 if p[0] in (2, 4, 5) else 1
+            o['intent'], p = tuple(p[:n]), p[n:]
+            if len(o['intent']) != n or o['intent'][0] > 5 or n == 2 and not 1 <= o['intent'][1] <= (4 if o['intent'][0] == 4 else 254):
+                return None
+        if d[0] & 0x20:
+            if len(p) < 4:
+                return None
+            o['registration'], p = (p[0] >> 6, p[0] & 63, p[1] * 2, int.from_bytes(p[2:4], 'big')), p[4:]
+        if d[0] & 0x10:
+            n = (8 + (p[0] >> 4) * (8 + 2 * ((p[0] & 15) + 1)) + 7) // 8
+            if len(p) < n:
+                return None
+            o['trail'], p = trail(p[:n]), p[n:]
+    except (IndexError, Short):
+        return None
+    return None if o.get('faults') == 0 or p and not d[0] & 15 else o
 
 
 def extended(d):
@@ -119,25 +162,17 @@ def extended(d):
             raise Short('introduction')
         return 'introduction', {'edge': int.from_bytes(p[:3], 'big') / 10000, 'series': p[3:9].hex(), 'hours': int.from_bytes(p[10:13], 'big')}
     if k == 1:
-        if len(p) < 6 or p[0] & 15 or p[0] >> 5 == 7:
+        if not p or p[0] not in (0, 2, 3, 6, 7, 8, 9):
             raise Short('content')
-        return 'content', (p[0] >> 5, p[0] >> 4 & 1, p[1:3].hex(), int.from_bytes(p[3:5], 'big'), p[5:].hex())
+        return 'content', (p[0], *part(p[1:]))
     if k == 3:
-        return 'trail', trail(p)
+        return 'details', details(p)
     if k == 4:
-        if not p or p[0] > 5 or len(p) != (2 if p[0] in (2, 4, 5) else 1) or len(p) == 2 and not 1 <= p[1] <= (4 if p[0] == 4 else 254):
-            raise Short('intent')
-        return 'intent', tuple(p)
+        if not p or not 1 <= p[0] <= 254:
+            raise Short('name')
+        return 'name', (p[0], *part(p[1:]))
     if k == 5:
-        if len(p) != 4:
-            raise Short('registration')
-        return 'registration', (p[0] >> 6, p[0] & 63, p[1] * 2, int.from_bytes(p[2:], 'big'))
-    if k == 6:
-        return 'name', p.hex()
-    if k == 7:
-        if not p:
-            raise Short('faults')
-        return 'faults', p[0]
+        return 'tree', part(p)
     return f'unknown {k}', p.hex()
 
 
@@ -151,4 +186,4 @@ def descriptor(d):
         raise Short('descriptor')
     return {'spread': d[0] >> 6, 'end': d[0] >> 4 & 3, 'quantity': d[0] >> 2 & 3, 'doubling': d[0] >> 1 & 1, 'palette': d[1],
             'levels': d[2], 'share': d[3], 'scale': s(d[4:7]) * 10.0 ** s(d[7:8]), 'offset': s(d[8:11]) * 10.0 ** s(d[11:12]),
-            'name': d[13:13 + n].decode(), 'unit': d[13 + n:].decode(), 'digest': crc16(d)}
+            'name': d[13:13 + n].decode(), 'unit': d[13 + n:].decode(), 'digest': text_digest(d)}

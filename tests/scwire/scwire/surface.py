@@ -199,7 +199,7 @@ class Surface:
                         s.state = 'queued'
                     if got:
                         s.told = True
-            if name in ('report', 'pose', 'intent', 'introduction', 'content') and self.a.verbose:
+            if name in ('report', 'pose', 'details', 'introduction', 'content') and self.a.verbose:
                 self.log(name, v)
         if p.replica.diverged:
             self.log('digest differs')

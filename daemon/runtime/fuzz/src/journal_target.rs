@@ -5,7 +5,7 @@ use super::journal::{Found, Journal, JournalNames};
 
 const NAMES: JournalNames = JournalNames { journal: "state", copy: "state.copy" };
 /// The present version, an earlier one and a later one.
-const MAGICS: [&[u8; 8]; 3] = [b"scVJRN05", b"scVJRN02", b"scVJRN06"];
+const MAGICS: [&[u8; 8]; 3] = [b"scVJRN06", b"scVJRN02", b"scVJRN07"];
 static CRC: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISCSI);
 
 /// Writes a file from the script: a whole record of any version and number, or any bytes.

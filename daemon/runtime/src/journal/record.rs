@@ -3,7 +3,7 @@
 /// Kind of file, without its version.
 const KIND: &[u8; 6] = b"scVJRN";
 /// Magic bytes and version of a record.
-const MAGIC: &[u8; 8] = b"scVJRN05";
+const MAGIC: &[u8; 8] = b"scVJRN06";
 const HEAD: usize = 21;
 const TAIL: usize = 4;
 
@@ -63,7 +63,7 @@ pub(super) struct Record {
 /// The bytes of a file: one record, and zeros up to the length of the file. `None` if the state is too long.
 ///
 /// ```text
-/// bytes 0-7     "scVJRN05"
+/// bytes 0-7     "scVJRN06"
 /// byte  8       number of the file: 0 for vehicle.journal, 1 for its copy
 /// bytes 9-16    sequence number, big-endian
 /// bytes 17-20   n, length of the body, big-endian
@@ -126,7 +126,7 @@ mod tests {
     fn the_layout_is_as_documented() {
         let bytes = encode(1, &record(0x0102, b"abc")).unwrap();
         assert_eq!(bytes.len(), FILE_BYTES);
-        assert_eq!(bytes[..24], *b"scVJRN05\x01\0\0\0\0\0\0\x01\x02\0\0\0\x03abc");
+        assert_eq!(bytes[..24], *b"scVJRN06\x01\0\0\0\0\0\0\x01\x02\0\0\0\x03abc");
         assert_eq!(bytes[24..28], CRC.checksum(&bytes[..24]).to_be_bytes());
         assert!(bytes[28..].iter().all(|&b| b == 0));
         assert_eq!(read(1, &bytes), RecordContent::Sound(record(0x0102, b"abc")));

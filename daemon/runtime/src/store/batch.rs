@@ -1,7 +1,7 @@
 //! Batches of events in the store's file, and their remains after a power cut.
 
 /// Magic bytes and version of a batch's head.
-const MAGIC: &[u8; 8] = b"scSURF01";
+const MAGIC: &[u8; 8] = b"scSURF02";
 const HEAD: usize = 28;
 const TAIL: usize = 4;
 
@@ -30,7 +30,7 @@ struct Batch<'a> {
 /// The bytes of a batch, in whole blocks.
 ///
 /// ```text
-/// bytes 0-7     "scSURF01"
+/// bytes 0-7     "scSURF02"
 /// bytes 8-15    sequence number of its last event, big-endian
 /// bytes 16-23   this number of the batch before it, big-endian; in the first batch of a file 0
 /// bytes 24-27   n, length of the body, big-endian
@@ -82,7 +82,7 @@ mod tests {
     fn the_layout_is_as_documented() {
         let bytes = encode(0x0102, 0x0100, b"abc");
         assert_eq!(bytes.len(), BLOCK);
-        assert_eq!(bytes[..31], *b"scSURF01\0\0\0\0\0\0\x01\x02\0\0\0\0\0\0\x01\0\0\0\0\x03abc");
+        assert_eq!(bytes[..31], *b"scSURF02\0\0\0\0\0\0\x01\x02\0\0\0\0\0\0\x01\0\0\0\0\x03abc");
         assert_eq!(bytes[31..35], CRC.checksum(&bytes[..31]).to_be_bytes());
         assert!(bytes[35..].iter().all(|&b| b == 0));
     }

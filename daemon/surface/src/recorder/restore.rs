@@ -48,13 +48,12 @@ fn restore_record(record: &mut VehicleRecord, memory: &VehicleMemory) {
         Track::restored(points.iter().map(|&(at, x, y)| (Instant::from_micros(at), x, y)), total)
     };
     record.track = track(&memory.track, memory.track_total);
-    let report = memory
-        .registration
-        .as_ref()
-        .and_then(|(at, bytes)| Some((RegistrationReport::decode(bytes).ok()?, Instant::from_micros(*at))));
+    let report = memory.registration.as_ref().and_then(|(at, bytes)| {
+        Some((RegistrationReport::decode((**bytes).try_into().ok()?), Instant::from_micros(*at)))
+    });
     record.registration = RegistrationRecord::restored(report, track(&memory.closures, memory.closures_total));
     let last_received = memory.contact.last_received.map(Instant::from_micros);
-    let faults = EquipmentFaults::decode(&[memory.faults]).unwrap_or_default();
+    let faults = EquipmentFaults::decode(memory.faults);
     let status = memory.contact.status().map(|(status, at)| (VehicleStatus { faults, ..status }, at));
     record.restore_contact(status, last_received, memory.contact.pause());
     record.found = memory.contact.range();

@@ -31,7 +31,7 @@ pub struct Durable {
     /// Least shares in force in percent, if they differ from the configuration.
     pub shares: Option<[u8; 5]>,
     /// Order of the background streams as on the wire, if it differs from the configuration.
-    pub background: Option<u128>,
+    pub background: Option<Vec<u8>>,
     /// Settings in force as on the wire. Empty: all as configured.
     pub settings: Vec<u8>,
     /// Limits in force as on the wire. Empty: none.

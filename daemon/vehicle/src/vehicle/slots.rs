@@ -275,7 +275,7 @@ impl Vehicle {
         self.serve_exemplars();
         self.durable.budget_bps = Some(budget.bits_per_s);
         self.durable.shares = Some(budget.shares.0);
-        self.durable.background = Some(budget.background.code());
+        self.durable.background = Some(budget.background.to_bytes());
     }
 }
 

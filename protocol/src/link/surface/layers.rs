@@ -80,7 +80,7 @@ impl Layers {
             return if is_same { LayerOutcome::Accepted } else { LayerOutcome::OutOfStep };
         }
         let parts = self.announced.entry(id).or_default();
-        let taken = parts.take(part, LayerDescriptor::MAX_BYTES, LayerDescriptor::digest_of);
+        let taken = parts.take(part, LayerDescriptor::MAX_BYTES);
         let Some(whole) = taken else { return LayerOutcome::Skipped };
         if let Some(bytes) = whole {
             self.announced.remove(&id);

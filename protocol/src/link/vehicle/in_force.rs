@@ -1,6 +1,7 @@
 //! The content in force at the vehicle: reported by digest, and sent to a surface that does not hold it.
 
 use crate::directive::{InForceDigests, InForcePart, PerSlot, Slot, SlotId};
+use crate::map::TextPart;
 use crate::time::Instant;
 use std::collections::VecDeque;
 use std::ops::Range;
@@ -96,7 +97,7 @@ impl InForceSender {
         let range = whole.start..whole.end.min(whole.start + room);
         let bytes = answer.content.get(range.clone())?;
         let (first, is_last) = (u16::try_from(range.start).ok()?, range.end == answer.content.len());
-        let payload = InForcePart { id, digest: answer.digest, first, is_last, bytes }.encode();
+        let payload = InForcePart { id, part: TextPart { digest: answer.digest, first, is_last, bytes } }.encode();
         Some((SentPart { id, digest: answer.digest, range }, payload))
     }
 

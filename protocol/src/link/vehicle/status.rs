@@ -3,7 +3,7 @@
 use crate::directive::SLOTS;
 use crate::time::Instant;
 use crate::wire::{
-    ChunkKind, EquipmentFaults, FrameBuilder, Intent, Trail, TrailCorner, VehicleStatus, room_for_payload,
+    ChunkKind, FrameBuilder, PoseDetails, RegistrationReport, Trail, TrailCorner, VehicleStatus, room_for_payload,
 };
 use std::ops::Range;
 use std::time::Duration;
@@ -19,7 +19,7 @@ const SMALL_BUDGET_BPS: u32 = 250;
 const COPY_INTERVALS: u32 = 8;
 
 /// Bytes of a frame for faults and the shortest pose, with the headers of both chunks.
-const FAULTS_AND_POSE: usize = EquipmentFaults::BYTES + 2 + VehicleStatus::SHORT_POSE + 1;
+const FAULTS_AND_POSE: usize = PoseDetails::FAULTS_ALONE + 2 + VehicleStatus::SHORT_POSE + 1;
 
 /// Sends the latest status once a period, in several frames where [`Self::set_copies`] asks for them. Pose and report take at
 /// most a twentieth of the bit budget.
@@ -158,19 +158,11 @@ impl StatusSender {
         // The path, the registration and the trail may take a hundredth of the budget each, in all copies together.
         let share = period.as_secs_f64() * f64::from(status.budget_bps) / 800.0 / f64::from(self.copies.each);
         let share = share as usize;
-        let intent = status.intent.map(Intent::encode);
-        let faults = status.faults.is_any().then(|| status.faults.encode());
+        let details = self.details(status, share, builder.room(), now)?.encode();
         let mut length = 0;
-        if let Some(bytes) = faults {
-            // A pose without faults says that there are none.
-            let fits = builder.room() >= FAULTS_AND_POSE && builder.push(ChunkKind::Faults, &bytes);
-            length += fits.then_some(bytes.len())?;
+        if !details.is_empty() {
+            length += builder.push(ChunkKind::Details, &details).then_some(details.len())?;
         }
-        length += push_before_pose(builder, ChunkKind::Intent, intent, usize::MAX);
-        let registration = status.registration.map(|report| report.encode());
-        length += push_before_pose(builder, ChunkKind::Registration, registration, share);
-        let trail = self.trail(status, share.min(room_before_pose(builder.room())), now);
-        length += push_before_pose(builder, ChunkKind::Trail, trail, share);
         let room = room_for_payload(builder.room()).min(VehicleStatus::POSE.saturating_add(share));
         let bytes = status.encode_pose(room);
         if !builder.push(ChunkKind::Pose, &bytes) {
@@ -190,32 +182,39 @@ impl StatusSender {
         Some(length)
     }
 
+    /// The details of a pose, which leave room for it. Registration and trail may take `share` bytes each. `None` if there is no room for
+    /// the faults: a pose without them says that there are none.
+    fn details(&self, status: &VehicleStatus, share: usize, room: usize, now: Instant) -> Option<PoseDetails> {
+        let faults = status.faults;
+        if faults.is_any() && room < FAULTS_AND_POSE {
+            return None;
+        }
+        let mut details = PoseDetails { faults, ..PoseDetails::default() };
+        // The headers of details and pose take up to five bytes.
+        let most = room.saturating_sub(VehicleStatus::POSE + 5);
+        let fits = |details: &PoseDetails| details.encode().len() <= most;
+        details.intent = status.intent;
+        if !fits(&details) {
+            details.intent = None;
+        }
+        details.registration = status.registration.filter(|_| RegistrationReport::BYTES <= share);
+        if !fits(&details) {
+            details.registration = None;
+        }
+        // The first byte of the details is there in any case, or is part of the trail's room.
+        let left = most.saturating_sub(details.encode().len().max(1));
+        details.trail = self.trail(status, share.min(left), now);
+        Some(details)
+    }
+
     /// The trail before a pose, in at most `room` bytes.
-    fn trail(&self, status: &VehicleStatus, room: usize, now: Instant) -> Option<Vec<u8>> {
+    fn trail(&self, status: &VehicleStatus, room: usize, now: Instant) -> Option<Trail> {
         let is_new = |corner: &&TrailCorner| {
             self.sent[0].is_none_or(|since| f64::from(corner.ago_s) <= now.since(since).as_secs_f64())
         };
         let corners: Vec<TrailCorner> = status.trail.iter().take_while(is_new).copied().collect();
-        Trail::new(status.position, &corners, room).map(|trail| trail.encode())
+        Trail::new(status.position, &corners, room)
     }
-}
-
-/// Puts a chunk of at most `most` bytes before the pose, if it leaves room for that; returns its bytes.
-fn push_before_pose(
-    builder: &mut FrameBuilder,
-    kind: ChunkKind,
-    payload: Option<impl AsRef<[u8]>>,
-    most: usize,
-) -> usize {
-    let Some(payload) = payload else { return 0 };
-    let bytes = payload.as_ref();
-    let is_pushed = bytes.len() <= most.min(room_before_pose(builder.room())) && builder.push(kind, bytes);
-    if is_pushed { bytes.len() } else { 0 }
-}
-
-/// The longest payload of a chunk before a pose that leaves room for the pose. The headers of both take up to five bytes.
-fn room_before_pose(room: usize) -> usize {
-    room.saturating_sub(VehicleStatus::POSE + 5)
 }
 
 /// The time between two reports of `bytes` that no order has made urgent.
@@ -233,6 +232,7 @@ mod tests {
     use super::*;
     use crate::coordinates::MapPoint;
     use crate::link::vehicle::content::tests::builder;
+    use crate::wire::EquipmentFaults;
 
     /// Seconds from a report until one on a fix is due.
     fn wait_for_fix_report(budget_bps: u32) -> f64 {
@@ -255,7 +255,7 @@ mod tests {
             let whole = builder.room();
             let filled = sender.fill_pose(&mut builder, Instant::ZERO);
             let with_faults =
-                [EquipmentFaults::BYTES + VehicleStatus::SHORT_POSE, EquipmentFaults::BYTES + VehicleStatus::POSE];
+                [VehicleStatus::SHORT_POSE, VehicleStatus::POSE].map(|pose| PoseDetails::FAULTS_ALONE + pose);
             assert_eq!(filled.is_some(), whole >= FAULTS_AND_POSE, "{whole} bytes");
             assert!(filled.is_none_or(|bytes| with_faults.contains(&bytes)), "{whole} bytes: {filled:?}");
         }

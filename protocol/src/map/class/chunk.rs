@@ -8,7 +8,7 @@ use crate::map::{MAX_LABEL, TextPart};
 ///  0                   1                   2                   3
 ///  0 1 2 3 4 5 6 7 8 9 0 1 2 3 4 5 6 7 8 9 0 1 2 3 4 5 6 7 8 9 0 1
 /// +---------------+-------------------------------+-+-+-----------+
-/// | label         | digest of the entry           |L|0| first     | bytes ...
+/// | label         | digest of the entry           |L|W| first     | bytes ...
 /// +---------------+-------------------------------+-+-+-----------+
 /// ```
 /// * label: 1 to 254.
@@ -19,7 +19,7 @@ use crate::map::{MAX_LABEL, TextPart};
 pub struct ClassChunk<'a> {
     /// The label of the entry.
     pub label: u8,
-    /// A part of the entry, whose digest is [`super::ClassEntry::digest_of`].
+    /// A part of the entry, whose digest is [`TextPart::digest_of`].
     pub part: TextPart<'a>,
 }
 

@@ -1,6 +1,6 @@
 //! The name and the colour of a class.
 
-use crate::map::{MAX_LABEL, TextPart};
+use crate::map::MAX_LABEL;
 
 /// The highest number of a class. Its label is one more, because label 0 means "unexplored".
 pub const MAX_CLASS: u8 = MAX_LABEL - 1;
@@ -74,11 +74,6 @@ impl ClassEntry {
         let is_whole = head & 0x40 == 0 && name.len() == usize::from(head & 0x3F) + 1;
         Self::new(label, std::str::from_utf8(name).ok().filter(|_| is_whole)?, colour)
     }
-
-    /// Fingerprint of the label and its entry: CRC-16/IBM-3740.
-    pub fn digest_of(label: u8, bytes: &[u8]) -> u16 {
-        TextPart::digest_of(&[label], bytes)
-    }
 }
 
 #[cfg(test)]
@@ -98,7 +93,6 @@ mod tests {
             assert_eq!(entry.to_bytes(), bytes);
             assert_eq!(ClassEntry::from_bytes(entry.label(), bytes), Some(entry));
         }
-        assert_eq!(ClassEntry::digest_of(3, &[0x83, 0xE0, 0xC0, 0x80, b's', b'a', b'n', b'd']), 0xF534);
         assert!(ClassEntry::new(0, "x", None).is_none() && ClassEntry::new(255, "x", None).is_none());
         assert!(ClassEntry::new(1, "", None).is_none() && ClassEntry::new(1, "a\nb", None).is_none());
         assert!(

@@ -1,7 +1,7 @@
 //! The surface's side: the names that have arrived.
 
 use super::{ClassChunk, ClassEntry};
-use crate::map::TextAssembly;
+use crate::map::{TextAssembly, TextPart};
 use std::collections::BTreeMap;
 
 /// Names and colours of labels. A label keeps its first name.
@@ -26,11 +26,10 @@ impl ClassReplica {
     /// complete with it.
     pub fn handle_chunk(&mut self, chunk: &[u8]) -> Option<bool> {
         let ClassChunk { label, part } = ClassChunk::decode(chunk)?;
-        let digest_of = |bytes: &[u8]| ClassEntry::digest_of(label, bytes);
         if let Some(entry) = self.get(label) {
-            return (digest_of(&entry.to_bytes()) == part.digest).then_some(false);
+            return (TextPart::digest_of(&entry.to_bytes()) == part.digest).then_some(false);
         }
-        let whole = self.parts.entry(label).or_default().take(&part, ClassEntry::MAX_BYTES, digest_of)?;
+        let whole = self.parts.entry(label).or_default().take(&part, ClassEntry::MAX_BYTES)?;
         let Some(bytes) = whole else { return Some(false) };
         self.parts.remove(&label);
         self.entries.insert(label, ClassEntry::from_bytes(label, &bytes)?);

@@ -13,11 +13,7 @@ impl ClassSource {
     /// one that is sent.
     pub fn add(&mut self, entry: &ClassEntry) -> bool {
         let label = entry.label();
-        let (first, _) = self.0.entry(label).or_insert_with(|| {
-            let bytes = entry.to_bytes();
-            let digest = ClassEntry::digest_of(label, &bytes);
-            (entry.clone(), TextSender::new(bytes, digest))
-        });
+        let (first, _) = self.0.entry(label).or_insert_with(|| (entry.clone(), TextSender::new(entry.to_bytes())));
         first == entry
     }
 

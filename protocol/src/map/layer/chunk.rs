@@ -13,7 +13,7 @@ use crate::map::TextPart;
 /// +---+---+-------+-------------------------------+
 /// | 1 |0 0| layer | digest of the levels          |
 /// +---+---+-------+-------------------------------+-+-+-----------+
-/// | 2 |0 0| layer | digest of the descriptor      |L|0| first     | bytes ...
+/// | 2 |0 0| layer | digest of the descriptor      |L|W| first     | bytes ...
 /// +---+---+-------+-------------------------------+-+-+-----------+
 /// ```
 /// * layer: its index, 0 to 15.

@@ -198,13 +198,9 @@ impl LayerDescriptor {
         (low - margin..high + margin).contains(&quantity)
     }
 
-    /// Fingerprint of all of it: CRC-16/IBM-3740 over its bytes.
+    /// Fingerprint of all of it ([`TextPart::digest_of`]).
     pub fn digest(&self) -> u16 {
-        Self::digest_of(&self.to_bytes())
-    }
-
-    pub(crate) fn digest_of(bytes: &[u8]) -> u16 {
-        TextPart::digest_of(&[], bytes)
+        TextPart::digest_of(&self.to_bytes())
     }
 
     /// The bytes of a sound descriptor.
@@ -337,8 +333,7 @@ mod tests {
         let bytes = b"\x44\x00\xFE\x00\x00\x00\x05\xFF\x00\x00\x78\xFF\x41depthm";
         assert_eq!(depth().to_bytes(), bytes);
         assert_eq!(LayerDescriptor::from_bytes(bytes), Some(depth()));
-        assert_eq!(depth().digest(), LayerDescriptor::digest_of(bytes));
-        assert_eq!(LayerDescriptor::digest_of(b"123456789"), 0x29B1);
+        assert_eq!(depth().digest(), TextPart::digest_of(bytes));
     }
 
     #[test]

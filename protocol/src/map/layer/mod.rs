@@ -42,7 +42,7 @@ impl LayerSource {
     pub fn new(id: LayerId, descriptor: LayerDescriptor, codec: Codec, debounce: Duration) -> Self {
         let mut levels = MapSource::new(codec);
         levels.set_debounce(debounce);
-        Self { id, announcement: TextSender::new(descriptor.to_bytes(), descriptor.digest()), descriptor, levels }
+        Self { id, announcement: TextSender::new(descriptor.to_bytes()), descriptor, levels }
     }
 
     /// Its index on this vehicle.

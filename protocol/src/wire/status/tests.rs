@@ -62,10 +62,13 @@ fn golden_bytes_of_a_status() {
     assert_eq!(back.read_pose(&[&way[..], &[0]].concat()), Err(StatusError::BadField));
     back.read_pose(&pose).unwrap();
     assert_eq!(back, status, "it is not kept without its waypoint");
+    // The report with these bits of its parts and the parts.
+    let with = |bits: u8, tail: &[u8]| [&report[..10], &[report[10] | bits], &report[11..], tail].concat();
+    let moved = [2, 0, 0, 125, 0xFF, 0xFF, 0xFF];
     let placement = Some(Placement { version: 2, origin: WorldPoint::new(12.5, -0.1) });
     let placed = VehicleStatus { placement, ..status.clone() };
     let (long, _) = placed.encode_report(99, 0).unwrap();
-    assert_eq!(long, [&report[..], &[2, 0, 0, 125, 0xFF, 0xFF, 0xFF]].concat());
+    assert_eq!(long, with(2, &moved));
     back.read_report(&long).unwrap();
     assert_eq!(back, placed);
     assert_eq!(placed.encode_report(long.len() - 1, 0).unwrap(), (report.clone(), SLOTS + 1), "no room for it");
@@ -76,15 +79,16 @@ fn golden_bytes_of_a_status() {
     let in_force = Some(InForceDigests::default().summary());
     let summed = VehicleStatus { in_force, ..placed.clone() };
     let (longest, _) = summed.encode_report(99, 0).unwrap();
-    assert_eq!(longest, [&report[..], &[0, 0xA9, 0x6A], &long[report.len()..]].concat());
+    assert_eq!(longest, with(6, &[&[0, 0xA9, 0x6A], &moved[..]].concat()));
     back.read_report(&longest).unwrap();
     assert_eq!(back, summed);
     let (part, next) = summed.encode_report(report.len() + 9, 0).unwrap();
-    assert_eq!((part, next), ([&report[..], &[0, 0xA9, 0x6A]].concat(), SLOTS + 1), "the placement waits");
+    assert_eq!((part, next), (with(4, &[0, 0xA9, 0x6A]), SLOTS + 1), "the placement waits");
     let disk = Some(DiskReport { journal_refused: true, checkpoint_refused: false, free_bytes: Some(1 << 30) });
     let full = VehicleStatus { disk, ..summed.clone() };
-    assert_eq!(full.encode_report(99, 0).unwrap(), ([&longest[..], &[0x4C]].concat(), 0));
-    back.read_report(&[&longest[..], &[0x4C]].concat()).unwrap();
+    let whole = with(7, &[&longest[report.len()..], &[0x4C]].concat());
+    assert_eq!(full.encode_report(99, 0).unwrap(), (whole.clone(), 0));
+    back.read_report(&whole).unwrap();
     assert_eq!(back, full);
     assert_eq!(full.encode_report(longest.len(), 0).unwrap(), (longest.clone(), SLOTS + 2), "the disk waits");
     back.read_report(&full.encode_report(12, SLOTS + 2).unwrap().0).unwrap();
@@ -92,11 +96,11 @@ fn golden_bytes_of_a_status() {
     back.read_report(&report).unwrap();
     assert_eq!(back.disk, disk, "a report without it changes it not");
     let refusal = |back: &mut VehicleStatus, bytes: &[u8]| back.read_report(bytes).unwrap_err();
-    let other = [&report[..], &[0x01, 0, 0]].concat();
-    assert_eq!(refusal(&mut back, &other), StatusError::BadField, "a reserved bit of the summary");
-    assert_eq!(refusal(&mut back, &[&report[..], &[0x80]].concat()), StatusError::BadField, "that of the disk");
-    let eleventh = [&report[..10], &[0x20], &report[11..]].concat();
-    assert_eq!(refusal(&mut back, &eleventh), StatusError::BadField, "an eleventh slot");
+    assert_eq!(refusal(&mut back, &with(4, &[0x01, 0, 0])), StatusError::BadField, "a reserved bit of the summary");
+    assert_eq!(refusal(&mut back, &with(1, &[0x80])), StatusError::BadField, "that of the disk");
+    assert_eq!(refusal(&mut back, &with(0x20, &[])), StatusError::BadField, "an eleventh slot");
+    assert_eq!(refusal(&mut back, &with(1, &[])), StatusError::Length);
+    assert_eq!(refusal(&mut back, &with(0, &[0])), StatusError::Length);
 }
 
 #[test]

@@ -4,7 +4,7 @@ use super::targets::base;
 use super::targets::link::{FuzzEnd, Setup, Surface, layers};
 use super::targets::raw;
 use scenecast_protocol::directive::{InForceDigests, InForcePart, PerSlot, Slot, SlotId, Utility, VersionedSlot};
-use scenecast_protocol::map::{Cell, LabelGrid, MapSource};
+use scenecast_protocol::map::{Cell, LabelGrid, MapSource, TextPart};
 use scenecast_protocol::map_codec::{Codec, encode};
 use scenecast_protocol::object::ObjectSender;
 use scenecast_protocol::seal::MissionKey;
@@ -85,11 +85,8 @@ fn contents() -> Vec<Seed> {
         for (kind, payload) in chunks(&body) {
             let framed = [&[payload.len() as u8], &payload[..]].concat();
             match kind {
-                ChunkKind::Intent => seeds.push(("status", format!("intent-{i}"), payload)),
                 ChunkKind::LabelClass | ChunkKind::LabelTree => {}
-                ChunkKind::Registration => seeds.push(("status", format!("registration-{i}"), payload)),
-                ChunkKind::Faults => seeds.push(("status", format!("faults-{i}"), payload)),
-                ChunkKind::Trail => seeds.push(("status", format!("trail-{i}"), payload)),
+                ChunkKind::Details => seeds.push(("status", format!("details-{i}"), payload)),
                 ChunkKind::Pose => seeds.push(("status", format!("pose-{i}"), payload)),
                 ChunkKind::Report => seeds.push(("status", format!("report-{i}"), payload)),
                 ChunkKind::Slot => seeds.push(("slot", format!("slot-{i}"), framed)),
@@ -144,7 +141,8 @@ fn in_force() -> Vec<Seed> {
             let first = index * room;
             let (digest, is_last) =
                 (digests.get(SlotId::Utility).copied().unwrap_or(0), first + bytes.len() == content.len());
-            framed(InForcePart { id: SlotId::Utility, digest, first: first as u16, is_last, bytes }.encode())
+            let part = TextPart { digest, first: first as u16, is_last, bytes };
+            framed(InForcePart { id: SlotId::Utility, part }.encode())
         };
         seeds.push(("in_force", format!("parts-of-{room}"), content.chunks(room).enumerate().flat_map(part).collect()));
     }

@@ -16,7 +16,7 @@ use scenecast_protocol::map_codec;
 use scenecast_protocol::schedule::{BackgroundOrder, BackgroundStream, Shares};
 use scenecast_protocol::wire::{
     AckStatement, Address, ChunkKind, DiskReport, EquipmentFaults, FrameTie, Header, Intent, Placement, PlannedPath,
-    Reader, RegistrationReport, Stamp, Trail, TrailCorner, VehicleStatus,
+    PoseDetails, Reader, RegistrationReport, Stamp, Trail, TrailCorner, VehicleStatus,
 };
 use std::collections::BTreeMap;
 
@@ -83,10 +83,7 @@ fn header_fields() -> Rows {
         ),
         ("statement: horizon low ABC, no loss", statement(0xABC, vec![])),
         ("statement: horizon 7, lost 6 and 3 (distances 1 and 4), a bitmap", statement(7, vec![1, 4])),
-        (
-            "statement: horizon 30, lost 10 and 5 (distances 20 and 25), a Rice code with k = 2",
-            statement(30, vec![20, 25]),
-        ),
+        ("statement: horizon 30, lost 10 and 5 (distances 20 and 25), a Rice code", statement(30, vec![20, 25])),
         ("head of a map chunk that fills the rest of a full frame", head(200, 1, true)),
         ("head of a map chunk of 26 bytes", head(26, 1, false)),
         ("head of a map chunk of 27 bytes", head(27, 2, false)),
@@ -108,7 +105,7 @@ fn layer_chunks() -> Rows {
         let bytes = descriptor.to_bytes();
         let part = TextPart {
             digest: descriptor.digest(),
-            first: from as u8,
+            first: from as u16,
             is_last: to == bytes.len(),
             bytes: &bytes[from..to],
         };
@@ -118,7 +115,7 @@ fn layer_chunks() -> Rows {
     let digest = 0x27A6 ^ confidence.digest();
     let named = |label: u8, name: &str, colour: Option<[u8; 3]>, to: Option<usize>| {
         let entry = ClassEntry::new(label, name, colour).unwrap().to_bytes();
-        let (digest, is_last) = (ClassEntry::digest_of(label, &entry), to.is_none());
+        let (digest, is_last) = (TextPart::digest_of(&entry), to.is_none());
         let part = TextPart { digest, first: 0, is_last, bytes: &entry[..to.unwrap_or(entry.len())] };
         let bytes = ClassChunk { label, part }.encode();
         assert_eq!(ClassChunk::decode(&bytes).map(|chunk| chunk.encode()), Some(bytes.clone()));
@@ -161,7 +158,13 @@ fn status_chunks() -> Rows {
     let registration = RegistrationReport { tie, share, sigma_m: 0.1, closed: 258 };
     let faults = EquipmentFaults { camera_silent: true, autopilot_refuses: true, ..EquipmentFaults::default() };
     let corner = |ago_s, x_m, y_m| TrailCorner { ago_s, place: MapPoint::new(x_m, y_m) };
-    let trail = Trail::new(MapPoint::new(1.0, -2.0), &[corner(9, 2.4, -3.4), corner(12, -0.6, -3.4)], 99).unwrap();
+    let trail = Trail::new(MapPoint::new(1.0, -2.0), &[corner(9, 2.4, -3.4), corner(12, -0.6, -3.4)], 99);
+    let intent = |intent| PoseDetails { intent: Some(intent), ..PoseDetails::default() };
+    let details = |details: PoseDetails| {
+        let bytes = details.encode();
+        assert_eq!(PoseDetails::decode(&bytes), Ok(details));
+        bytes
+    };
     vec![
         (
             "pose: hold by order, x 1.5 m, y -0.1 m, depth 18 m, heading 90 degrees, sigma 1.25 m, fix 8 s ago, 4000 cells",
@@ -177,16 +180,26 @@ fn status_chunks() -> Rows {
             "the first pose with an autopilot that does not answer",
             VehicleStatus { autopilot_silent: true, ..status() }.encode_pose(99),
         ),
-        ("intent: more of label 5", Intent::Label(5).encode()),
-        ("intent: another look at label 7", Intent::LabelAgain(7).encode()),
-        ("intent: the destination", Intent::Destination.encode()),
-        ("intent: the second weighted area", Intent::Area(2).encode()),
+        ("details: more of label 5", details(intent(Intent::Label(5)))),
+        ("details: another look at label 7", details(intent(Intent::LabelAgain(7)))),
+        ("details: the destination", details(intent(Intent::Destination))),
+        ("details: the second weighted area", details(intent(Intent::Area(2)))),
         (
-            "registration: by an earlier track, a third of the last 32 frames by images, 10 cm, 258 closed loops",
-            registration.encode().to_vec(),
+            "details: the last frame placed by an earlier track, a third of the last 32 frames by images, 10 cm, 258 closed loops",
+            details(PoseDetails { registration: Some(registration), ..PoseDetails::default() }),
         ),
-        ("faults: no image comes in, the autopilot does not follow", faults.encode().to_vec()),
-        ("trail to (1, -2) m: 9 s ago at (2.4, -3.4), 12 s ago at (-0.6, -3.4)", trail.encode()),
+        (
+            "details: no image comes in, the autopilot does not follow",
+            details(PoseDetails { faults, ..PoseDetails::default() }),
+        ),
+        (
+            "details: a trail to (1, -2) m: 9 s ago at (2.4, -3.4), 12 s ago at (-0.6, -3.4)",
+            details(PoseDetails { trail: trail.clone(), ..PoseDetails::default() }),
+        ),
+        (
+            "details: these faults, more of label 5, this registration and this trail",
+            details(PoseDetails { faults, intent: Some(Intent::Label(5)), registration: Some(registration), trail }),
+        ),
         (
             "report: epoch 1, 9 labels, digest BEEF, budget 10 000 bit/s (2500 x 2^2), 3 frames refused, 448 bytes of labels (14 x 2^5) \
              and 15 of all else wait, utility version 7 applied, fix version 2 refused (2)",
@@ -202,7 +215,11 @@ fn status_chunks() -> Rows {
         ("inquiry of a surface that holds a utility with the digest ABCD", inquiry),
         (
             "part of a content in force: fence, digest BEEF, the last bytes 07 08 at offset 300",
-            InForcePart { id: SlotId::Fence, digest: 0xBEEF, first: 300, is_last: true, bytes: &[7, 8] }.encode(),
+            InForcePart {
+                id: SlotId::Fence,
+                part: TextPart { digest: 0xBEEF, first: 300, is_last: true, bytes: &[7, 8] },
+            }
+            .encode(),
         ),
         (
             "the same report with a placement: version 2, 12.5 m east, -0.1 m north",

@@ -10,9 +10,7 @@ use crate::map::{ClassChunk, ClassReplica, LayerChunk, StateReplica, TextPart, T
 use crate::object::{ObjectReceiver, Part, Received};
 use crate::schedule::Class;
 use crate::time::Instant;
-use crate::wire::{
-    Address, Chunk, ChunkKind, Chunks, EquipmentFaults, Intent, Introduction, RegistrationReport, Trail, VehicleStatus,
-};
+use crate::wire::{Address, Chunk, ChunkKind, Chunks, Introduction, VehicleStatus};
 use std::collections::VecDeque;
 
 /// The result of handling a chunk.
@@ -135,10 +133,7 @@ impl<R: StateReplica> PeerContent<R> {
             ChunkKind::Map if self.replica.apply(number, chunk.payload, now) => ChunkOutcome::Accepted,
             ChunkKind::Map => ChunkOutcome::Contradictory,
             ChunkKind::Pose => accepted_if(self.status.read_pose(chunk.payload, number, now)),
-            ChunkKind::Intent => accepted_if(self.status.read_intent(chunk.payload, number)),
-            ChunkKind::Registration => accepted_if(self.status.read_registration(chunk.payload, number)),
-            ChunkKind::Faults => accepted_if(self.status.read_faults(chunk.payload, number)),
-            ChunkKind::Trail => accepted_if(self.status.read_trail(chunk.payload, number)),
+            ChunkKind::Details => accepted_if(self.status.read_details(chunk.payload, number)),
             ChunkKind::Report => self.handle_report(chunk.payload, stats, now),
             ChunkKind::Object => accepted_if(self.handle_object(vehicle, chunk.payload, events)),
             ChunkKind::Layer => match self.layers.handle_chunk(number, chunk.payload, now) {
@@ -197,8 +192,9 @@ impl<R: StateReplica> PeerContent<R> {
 pub(super) fn class_of(chunk: &Chunk<'_>) -> Class {
     match chunk.kind {
         ChunkKind::Map | ChunkKind::LabelClass | ChunkKind::LabelTree => Class::Map,
-        ChunkKind::Pose | ChunkKind::Trail | ChunkKind::Intent | ChunkKind::Registration => Class::Status,
-        ChunkKind::Report | ChunkKind::InForce | ChunkKind::Faults | ChunkKind::Caller => Class::Status,
+        ChunkKind::Pose | ChunkKind::Details | ChunkKind::Report | ChunkKind::InForce | ChunkKind::Caller => {
+            Class::Status
+        }
         ChunkKind::Slot | ChunkKind::Inquiry | ChunkKind::NextKey => Class::Directive,
         ChunkKind::Introduction => Class::Overhead,
         ChunkKind::Object => Class::Exemplar,
@@ -212,15 +208,13 @@ fn decode<R: StateReplica>(replica: &R, layers: &Layers, base: FrameNumber, mut 
         ChunkKind::Pose => VehicleStatus::default().read_pose(chunk.payload).is_ok(),
         ChunkKind::LabelClass => ClassChunk::decode(chunk.payload).is_some(),
         ChunkKind::LabelTree => TextPart::decode(chunk.payload).is_some(),
-        ChunkKind::Intent => Intent::decode(chunk.payload).is_ok(),
-        ChunkKind::Registration => RegistrationReport::decode(chunk.payload).is_ok(),
-        ChunkKind::Faults => EquipmentFaults::decode(chunk.payload).is_ok(),
-        ChunkKind::Trail => Trail::decode(chunk.payload).is_ok(),
         ChunkKind::Report => VehicleStatus::default().read_report(chunk.payload).is_ok(),
         ChunkKind::Object => Part::decode(chunk.payload).is_ok(),
         ChunkKind::Layer => layers.decodes(base, chunk.payload),
-        ChunkKind::InForce => InForcePart::decode(chunk.payload).is_ok(),
+        ChunkKind::InForce => InForcePart::decode(chunk.payload).is_some(),
         ChunkKind::Caller => Introduction::decode(chunk.payload).is_ok_and(|caller| caller.series.is_some()),
+        // A frame counts without the details that are not understood.
+        ChunkKind::Details => true,
         ChunkKind::Slot | ChunkKind::Introduction | ChunkKind::Inquiry | ChunkKind::NextKey => true,
     })
 }

@@ -423,8 +423,7 @@ impl<R: StateReplica> VehiclePeer<R> {
             }
             self.follow_series();
         }
-        if let Some(part) =
-            (chunk.kind == ChunkKind::InForce).then(|| InForcePart::decode(chunk.payload).ok()).flatten()
+        if let Some(part) = (chunk.kind == ChunkKind::InForce).then(|| InForcePart::decode(chunk.payload)).flatten()
             && self.in_force.handle_part(&part, number, now)
         {
             events.push_back(SurfaceEvent::InForceLearned(vehicle, part.id));

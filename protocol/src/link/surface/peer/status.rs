@@ -3,7 +3,7 @@
 use crate::directive::{SlotId, SlotReport, SlotState};
 use crate::link::FrameNumber;
 use crate::time::Instant;
-use crate::wire::{EquipmentFaults, Intent, PlannedPath, RegistrationReport, Trail, VehicleStatus};
+use crate::wire::{PlannedPath, PoseDetails, VehicleStatus};
 
 /// The pose and the report of a vehicle, of which one may come in before the other.
 #[derive(Debug, Default)]
@@ -11,35 +11,10 @@ pub(super) struct StatusParts {
     latest: VehicleStatus,
     /// When the pose came in, and in which frame.
     pose: Option<(Instant, FrameNumber)>,
-    trail: BeforePose<Trail>,
-    intent: BeforePose<Intent>,
-    registration: BeforePose<RegistrationReport>,
-    faults: BeforePose<EquipmentFaults>,
+    /// The details of the pose that is to follow in the same frame.
+    details: Option<(PoseDetails, FrameNumber)>,
     has_report: bool,
     whole: Option<(VehicleStatus, Instant)>,
-}
-
-/// The content of a chunk that waits for the pose of its frame.
-#[derive(Debug)]
-struct BeforePose<T>(Option<(T, FrameNumber)>);
-
-impl<T> Default for BeforePose<T> {
-    fn default() -> Self {
-        Self(None)
-    }
-}
-
-impl<T> BeforePose<T> {
-    /// Keeps what was read of the frame `number`, in place of that of an earlier one; returns whether it makes sense.
-    fn put(&mut self, read: Option<T>, number: FrameNumber) -> bool {
-        self.0 = read.map(|content| (content, number));
-        self.0.is_some()
-    }
-
-    /// The content, if it is of the frame `number`.
-    fn take(&mut self, number: FrameNumber) -> Option<T> {
-        self.0.take_if(|(_, of)| *of == number).map(|(content, _)| content)
-    }
 }
 
 impl StatusParts {
@@ -63,35 +38,20 @@ impl StatusParts {
         let mut read = self.latest.clone();
         let is_read = read.read_pose(payload).is_ok();
         if is_read && self.pose.is_none_or(|(_, before)| before < number) {
-            if let Some(trail) = self.trail.take(number) {
-                read.trail = trail.corners(read.position);
-            }
-            (read.intent, read.registration) = (self.intent.take(number), self.registration.take(number));
-            read.faults = self.faults.take(number).unwrap_or_default();
+            let details =
+                self.details.take().filter(|(_, of)| *of == number).map(|(details, _)| details).unwrap_or_default();
+            read.trail = details.trail.map(|trail| trail.corners(read.position)).unwrap_or_default();
+            (read.intent, read.registration, read.faults) = (details.intent, details.registration, details.faults);
             (self.latest, self.pose) = (read, Some((now, number)));
         }
         self.join();
         is_read
     }
 
-    /// Reads a trail, which waits for the pose of its frame; returns whether it makes sense.
-    pub(super) fn read_trail(&mut self, payload: &[u8], number: FrameNumber) -> bool {
-        self.trail.put(Trail::decode(payload).ok(), number)
-    }
-
-    /// Reads an intent, which waits for the pose of its frame; returns whether it makes sense.
-    pub(super) fn read_intent(&mut self, payload: &[u8], number: FrameNumber) -> bool {
-        self.intent.put(Intent::decode(payload).ok(), number)
-    }
-
-    /// Reads a registration, which waits for the pose of its frame; returns whether it makes sense.
-    pub(super) fn read_registration(&mut self, payload: &[u8], number: FrameNumber) -> bool {
-        self.registration.put(RegistrationReport::decode(payload).ok(), number)
-    }
-
-    /// Reads faults, which wait for the pose of their frame; returns whether they make sense.
-    pub(super) fn read_faults(&mut self, payload: &[u8], number: FrameNumber) -> bool {
-        self.faults.put(EquipmentFaults::decode(payload).ok(), number)
+    /// Reads the details of a pose, which wait for the pose of their frame; returns whether they make sense.
+    pub(super) fn read_details(&mut self, payload: &[u8], number: FrameNumber) -> bool {
+        self.details = PoseDetails::decode(payload).ok().map(|details| (details, number));
+        self.details.is_some()
     }
 
     /// Reads a report; returns whether it makes sense.
