@@ -123,7 +123,7 @@ impl InForceDigests {
 /// byte  bits  field
 ///  0    7     slots with content in force, a bit each: utility, settings, budget, limits, fence, destination, areas
 ///  0    1     reserved, 0
-///  1-2  16    [`TextPart::digest_of`] the digests of these seven slots in this order, 2 bytes each, 0 for no content
+///  1-2  16    [`TextPart::digest_of`] of the digests of these seven slots in this order, 2 bytes each, 0 for no content
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct InForceSummary {

@@ -152,8 +152,9 @@ impl Settings {
         let mut out = vec![choices, given];
         out.extend(self.layers.value().into_iter().flat_map(|mask| mask.0.to_be_bytes()));
         out.append(&mut numbers);
-        let labels = self.labels.code(|labels| labels.saturating_sub(2));
-        let more = self.registration.code(|choice| choice as u8) << 6 | labels & Self::LABEL_BITS;
+        // More than the bits hold is out of range, and must stay so.
+        let labels = self.labels.code(|labels| labels.clamp(2, Self::LABEL_BITS) - 2);
+        let more = self.registration.code(|choice| choice as u8) << 6 | labels;
         out.extend((more != 0).then_some(more));
         out
     }
@@ -267,6 +268,7 @@ mod tests {
             [Change::Configured, Change::To(2), Change::To(32)].map(of_labels),
             [vec![0, 0, 1], vec![0, 0, 2], vec![0, 0, 32]]
         );
+        assert_eq!(of_labels(Change::To(66)), [0, 0, 63], "it stays out of range");
         let of_layers = |mask| Settings { layers: Change::To(LayerMask(mask)), ..Settings::default() }.to_bytes();
         assert_eq!((of_layers(0), of_layers(0x8004)), (vec![2, 0, 0, 0], vec![2, 0, 0x80, 4]));
     }

@@ -36,19 +36,19 @@ impl<'a> TextPart<'a> {
     pub const SHORT_TEXT: usize = 64;
     /// The highest place of a part.
     pub const MAX_FIRST: u16 = (1 << 14) - 1;
-    const LAST: u16 = 0x8000;
-    const WIDE: u16 = 0x4000;
+    const LAST: u8 = 0x80;
+    const WIDE: u8 = 0x40;
 
     /// Reads a part; `None` if it makes no sense.
     pub fn decode(bytes: &'a [u8]) -> Option<Self> {
         let mut r = Reader::new(bytes);
-        let (digest, high) = (r.u16().ok()?, u16::from(r.u8().ok()?) << 8);
-        let is_last = high & Self::LAST != 0;
-        let first = match high & Self::WIDE {
-            0 => high >> 8 & 0x3F,
-            _ => (high & Self::MAX_FIRST) | u16::from(r.u8().ok()?),
-        };
-        let is_shortest = (high & Self::WIDE != 0) == (usize::from(first) >= Self::SHORT_TEXT);
+        let (digest, head) = (r.u16().ok()?, r.u8().ok()?);
+        let (is_last, is_wide) = (head & Self::LAST != 0, head & Self::WIDE != 0);
+        let mut first = u16::from(head & !(Self::LAST | Self::WIDE));
+        if is_wide {
+            first = first << 8 | u16::from(r.u8().ok()?);
+        }
+        let is_shortest = is_wide == (usize::from(first) >= Self::SHORT_TEXT);
         let part = Self { digest, first, is_last, bytes: r.rest() };
         (is_shortest && !part.bytes.is_empty()).then_some(part)
     }
@@ -56,11 +56,11 @@ impl<'a> TextPart<'a> {
     /// The bytes of the part.
     pub fn encode(&self) -> Vec<u8> {
         let last = if self.is_last { Self::LAST } else { 0 };
-        let [high, low] = (self.first & Self::MAX_FIRST | last | Self::WIDE).to_be_bytes();
+        let [high, low] = (self.first & Self::MAX_FIRST).to_be_bytes();
         let mut out = self.digest.to_be_bytes().to_vec();
         match usize::from(self.first) < Self::SHORT_TEXT {
-            true => out.push(self.first as u8 | (last >> 8) as u8),
-            false => out.extend([high, low]),
+            true => out.push(last | low),
+            false => out.extend([last | Self::WIDE | high, low]),
         }
         out.extend_from_slice(self.bytes);
         out

@@ -1,6 +1,6 @@
 //! Acknowledgement statements: a receiver's verdict on the peer's frames.
 
-use crate::bytes::{Reader, Truncated};
+use crate::bytes::{BitReader, BitWriter, Reader, Truncated};
 
 /// The most frames that a sender may have outstanding, so that a 12-bit horizon is unambiguous.
 pub const MAX_WINDOW: u64 = 2048;
@@ -60,102 +60,65 @@ impl AckStatement {
     }
 }
 
-fn encode_losses(lost: &[u16]) -> Vec<u8> {
-    let Some(&last) = lost.last() else { return Vec::new() };
-    let mut bitmap = BitWriter::default();
-    bitmap.push(0, 1);
-    let mut next = lost.iter().peekable();
-    for i in 0..=last {
-        let hit = next.next_if(|&&l| l == i).is_some();
-        bitmap.push(u32::from(hit), 1);
-    }
-    let (rice, bitmap) = (rice(lost), bitmap.finish(false));
-    if rice.len() < bitmap.len() { rice } else { bitmap }
-}
-
 /// Bits of the remainder in a Rice code.
 const RICE_BITS: u32 = 3;
 
+fn encode_losses(lost: &[u16]) -> Vec<u8> {
+    let Some(&last) = lost.last() else { return Vec::new() };
+    let mut bitmap = BitWriter::default();
+    bitmap.bit(false);
+    let mut next = lost.iter().peekable();
+    for i in 0..=last {
+        bitmap.bit(next.next_if(|&&l| l == i).is_some());
+    }
+    let (rice, bitmap) = (rice(lost), bitmap.into_bytes());
+    if rice.len() < bitmap.len() { rice } else { bitmap }
+}
+
 fn rice(lost: &[u16]) -> Vec<u8> {
     let mut bits = BitWriter::default();
-    bits.push(1, 1);
-    let mut from = 0u32;
+    bits.bit(true);
+    let mut from = 0;
     for &l in lost {
-        let gap = u32::from(l) - from;
-        for _ in 0..gap >> RICE_BITS {
-            bits.push(1, 1);
-        }
-        bits.push(0, 1);
-        bits.push(gap & ((1 << RICE_BITS) - 1), RICE_BITS);
-        from = u32::from(l) + 1;
+        let gap = u64::from(l) - from;
+        (0..gap >> RICE_BITS).for_each(|_| bits.bit(true));
+        bits.bit(false);
+        bits.put(gap, RICE_BITS);
+        from = u64::from(l) + 1;
     }
-    bits.finish(true)
+    while !bits.len().is_multiple_of(8) {
+        bits.bit(true);
+    }
+    bits.into_bytes()
 }
 
 fn decode_losses(code: &[u8]) -> Vec<u16> {
-    let mut bits = code.iter().flat_map(|b| (0..8).rev().map(move |i| u32::from(b >> i & 1)));
-    let mut pull = |n: u32| (0..n).try_fold(0u32, |acc, _| bits.next().map(|b| acc << 1 | b));
-    let mut lost = Vec::new();
-    match pull(1) {
-        None => {}
-        Some(0) => {
-            let mut at = 0u16;
-            while let Some(bit) = pull(1) {
-                if bit == 1 {
-                    lost.push(at);
-                }
-                at += 1;
-            }
+    let mut bits = BitReader::new(code);
+    match bits.bit() {
+        None => Vec::new(),
+        Some(false) => {
+            let each = (0..).map_while(|at| Some((at, bits.bit()?)));
+            each.filter_map(|(at, is_lost)| is_lost.then_some(at)).collect()
         }
-        Some(_) => {
-            let mut at = 0u32;
-            loop {
-                let mut quotient = 0;
-                let ended = loop {
-                    match pull(1) {
-                        Some(1) => quotient += 1,
-                        Some(_) => break false,
-                        None => break true,
-                    }
-                };
-                let Some(low) = (!ended).then(|| pull(RICE_BITS)).flatten() else { break };
-                at += (quotient << RICE_BITS) + low;
-                if u64::from(at) >= 2 * MAX_WINDOW {
-                    break;
-                }
+        Some(true) => {
+            let (mut at, mut lost) = (0, Vec::new());
+            while let Some(gap) = take_gap(&mut bits).filter(|gap| at + gap < 2 * MAX_WINDOW) {
+                at += gap;
                 lost.push(at as u16);
                 at += 1;
             }
+            lost
         }
     }
-    lost
 }
 
-#[derive(Default)]
-struct BitWriter {
-    bytes: Vec<u8>,
-    used: u32,
-}
-
-impl BitWriter {
-    fn push(&mut self, value: u32, bits: u32) {
-        for i in (0..bits).rev() {
-            if self.used.is_multiple_of(8) {
-                self.bytes.push(0);
-            }
-            if let Some(last) = self.bytes.last_mut() {
-                *last |= ((value >> i & 1) as u8) << (7 - self.used % 8);
-            }
-            self.used += 1;
-        }
+/// The next number of a Rice code; `None` at its end.
+fn take_gap(bits: &mut BitReader<'_>) -> Option<u64> {
+    let mut quotient = 0;
+    while bits.bit()? {
+        quotient += 1;
     }
-
-    fn finish(mut self, pad: bool) -> Vec<u8> {
-        while pad && !self.used.is_multiple_of(8) {
-            self.push(1, 1);
-        }
-        self.bytes
-    }
+    Some(quotient << RICE_BITS | bits.take(RICE_BITS)?)
 }
 
 #[cfg(test)]

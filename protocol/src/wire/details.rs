@@ -35,6 +35,7 @@ impl PoseDetails {
     const INTENT: u8 = 0x40;
     const REGISTRATION: u8 = 0x20;
     const TRAIL: u8 = 0x10;
+    const LATER: u8 = 0x0F;
 
     /// The bytes on the wire; none if there are no details.
     pub fn encode(&self) -> Vec<u8> {
@@ -44,15 +45,12 @@ impl PoseDetails {
         let trail = self.trail.as_ref().map(Trail::encode);
         let parts =
             [(Self::FAULTS, faults), (Self::INTENT, intent), (Self::REGISTRATION, registration), (Self::TRAIL, trail)];
-        let mut out = vec![0];
-        for (bit, bytes) in parts.into_iter().filter_map(|(bit, part)| Some((bit, part?))) {
-            out.iter_mut().take(1).for_each(|head| *head |= bit);
-            out.extend(bytes);
-        }
-        if out.len() == 1 { Vec::new() } else { out }
+        let parts: Vec<(u8, Vec<u8>)> = parts.into_iter().filter_map(|(bit, part)| Some((bit, part?))).collect();
+        let head = (!parts.is_empty()).then(|| parts.iter().fold(0, |head, (bit, _)| head | bit));
+        head.into_iter().chain(parts.into_iter().flat_map(|(_, bytes)| bytes)).collect()
     }
 
-    /// Reads details. What follows the known parts is of a later version if a bit of such a one is set, and is skipped then.
+    /// Reads details; bytes after the known parts are skipped if a bit of a later version is set.
     pub fn decode(bytes: &[u8]) -> Result<Self, StatusError> {
         let mut r = Reader::new(bytes);
         let head = r.u8()?;
@@ -73,10 +71,8 @@ impl PoseDetails {
         if has(Self::TRAIL) {
             read.trail = Some(Trail::read(&mut r)?);
         }
-        let is_of_later_version = head & 0x0F != 0;
-        let is_whole = is_of_later_version || r.rest().is_empty();
-        let is_empty = head & 0xF0 == 0 && !is_of_later_version;
-        if is_whole && !is_empty { Ok(read) } else { Err(StatusError::Length) }
+        let is_whole = has(Self::LATER) || r.rest().is_empty();
+        if head != 0 && is_whole { Ok(read) } else { Err(StatusError::Length) }
     }
 }
 

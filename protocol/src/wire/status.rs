@@ -154,13 +154,13 @@ pub struct VehicleStatus {
     pub waypoint: Option<MapPoint>,
     /// The planned path after the waypoint; it is sent only with a waypoint.
     pub path: PlannedPath,
-    /// The purpose of the plan, a chunk of its own; `None` if no adaptive planner steers.
+    /// The purpose of the plan, among the [`super::PoseDetails`]; `None` if no adaptive planner steers.
     pub intent: Option<Intent>,
     /// How the last camera frames were placed on the map; `None` where frames were never registered.
     pub registration: Option<RegistrationReport>,
-    /// The faults of the equipment, a chunk of their own, which is sent while there are any.
+    /// The faults of the equipment, among the [`super::PoseDetails`] while there are any.
     pub faults: EquipmentFaults,
-    /// The corners of the track before the position, the latest first; they are a chunk of their own, see [`super::Trail`].
+    /// The corners of the track before the position, the latest first, among the [`super::PoseDetails`].
     pub trail: Vec<TrailCorner>,
     /// Number of explored cells on the map.
     pub explored_cells: u32,

@@ -201,7 +201,7 @@ impl StatusSender {
         if !fits(&details) {
             details.registration = None;
         }
-        // The first byte of the details is there in any case, or is part of the trail's room.
+        // A trail alone needs the first byte of the details too.
         let left = most.saturating_sub(details.encode().len().max(1));
         details.trail = self.trail(status, share.min(left), now);
         Some(details)
