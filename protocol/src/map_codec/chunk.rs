@@ -1,5 +1,6 @@
 //! Encoding of the best chunk for a given room, and decoding of any chunk.
 
+use super::context::Decision;
 use super::grow::Growth;
 use super::header::{Body, ChunkHeader, base_check};
 use super::lattice::{Lattice, Stride};
@@ -119,6 +120,26 @@ fn best_chunk(codec: Codec, base: Lattice<'_>, growth: &Growth, room: usize) -> 
 ///
 /// Never panics, whatever the bytes; allocates for at most [`MAX_PATCH_CELLS`](super::MAX_PATCH_CELLS) cells.
 pub fn decode(base: &LabelGrid, bytes: &[u8]) -> Result<Vec<(Cell, u8)>, DecodeError> {
+    let (header, bits, base) = open(base, bytes)?;
+    let patch = header.patch;
+    match header.body {
+        Body::Png => png::read(bits, base, patch),
+        Body::Context => context::read(bits, base, patch),
+    }
+    .map(|patch| patch.changes().into_iter().map(|(cell, label)| (header.stride.on_map(cell), label)).collect())
+}
+
+/// The decisions of a chunk with the body `context`, in order; none of one with the body `png`.
+pub fn trace(base: &LabelGrid, bytes: &[u8]) -> Result<Vec<Decision>, DecodeError> {
+    let (header, bits, base) = open(base, bytes)?;
+    match header.body {
+        Body::Png => Ok(Vec::new()),
+        Body::Context => context::trace(bits, base, header.patch),
+    }
+}
+
+/// The header of a sound chunk, the bits of its body, and the base that it changes.
+fn open<'a>(base: &'a LabelGrid, bytes: &'a [u8]) -> Result<(ChunkHeader, BitReader<'a>, Lattice<'a>), DecodeError> {
     let mut bits = BitReader::new(bytes);
     let header = ChunkHeader::read(&mut bits).ok_or(DecodeError::Truncated)?;
     if !header.geometry_is_sound() {
@@ -128,12 +149,7 @@ pub fn decode(base: &LabelGrid, bytes: &[u8]) -> Result<Vec<(Cell, u8)>, DecodeE
     if header.check != base_check(base, header.patch) ^ bytes.len() as u8 {
         return Err(DecodeError::BaseMismatch);
     }
-    let patch = header.patch;
-    match header.body {
-        Body::Png => png::read(bits, base, patch),
-        Body::Context => context::read(bits, base, patch),
-    }
-    .map(|patch| patch.changes().into_iter().map(|(cell, label)| (header.stride.on_map(cell), label)).collect())
+    Ok((header, bits, base))
 }
 
 /// The header of a chunk for `rect`.

@@ -27,9 +27,9 @@ mod window;
 
 pub use best_png::Deflate;
 pub(crate) use chunk::encode_quickly;
-pub use chunk::{DecodeError, MapChunk, decode, encode, encode_every};
+pub use chunk::{DecodeError, MapChunk, decode, encode, encode_every, trace};
 pub use codec::Codec;
-pub use context::training;
+pub use context::{Decision, training};
 pub use file::{ChunkFile, ChunkFileError};
 pub use lattice::Stride;
 pub use png::restored_png;

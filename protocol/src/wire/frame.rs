@@ -183,6 +183,11 @@ impl<'a> Envelope<'a> {
         sound.then(|| Frame { header: self.header.clone(), number, body })
     }
 
+    /// The chunks before they are verified: they may be damaged, forged or encrypted.
+    pub fn unverified_chunks(&self) -> Chunks<'_> {
+        Chunks::new(self.body)
+    }
+
     fn crc_matches(&self, seal: &Seal<'_>) -> bool {
         seal.crc(&[self.head, self.body]).is_some_and(|crc| crc.eq(self.end.iter().copied()))
     }

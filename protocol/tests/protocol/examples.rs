@@ -8,6 +8,8 @@ mod lossy_pair;
 mod map_series;
 #[path = "../../examples/own_modem.rs"]
 mod own_modem;
+#[path = "../../examples/vectors.rs"]
+pub(crate) mod vectors;
 
 #[test]
 fn orders_are_authentic() {
@@ -27,4 +29,9 @@ fn a_series_of_maps_is_coded() {
 #[test]
 fn a_modem_of_ones_own_is_driven() {
     own_modem::main();
+}
+
+#[test]
+fn test_vectors_read_as_they_say() {
+    vectors::main();
 }

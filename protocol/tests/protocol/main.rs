@@ -12,4 +12,4 @@ mod path;
 mod promises;
 mod replay;
 mod rotation;
-mod wire_document;
+mod vectors;

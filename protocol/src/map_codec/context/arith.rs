@@ -1,11 +1,18 @@
 //! Binary arithmetic coding with 16-bit probabilities; not a bit is wasted at the end.
 
+use super::stage::{Contexts, StageLayout};
 use crate::bytes::{BitReader, BitWriter};
 
 /// Codes one decision at a time. An encoder writes `bit`, a decoder ignores it, and both return the decision.
 pub(super) trait BitCoder {
     /// `one` is the probability of `true` in 1/65536, from 1 to 65535.
     fn code(&mut self, bit: bool, one: u32) -> bool;
+
+    /// The next decisions are those of the cell at this column and row of the patch.
+    fn begin_cell(&mut self, _: (usize, usize)) {}
+
+    /// The next decision is of this kind; one with a fixed probability has no contexts.
+    fn begin(&mut self, _kind: &'static str, _: Option<(&StageLayout, &Contexts)>) {}
 }
 
 /// Width of the window on the code value in bits.

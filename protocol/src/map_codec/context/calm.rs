@@ -5,6 +5,7 @@ use super::stage::{Contexts, StageLayout};
 use super::view::View;
 
 pub(super) const LAYOUT: StageLayout = StageLayout {
+    name: "calm",
     direct: &[6 * Recent::RATES, 5 * Recent::GAPS, 500],
     keyed: &[10],
     sets: [6, Recent::RATES, 10],

@@ -6,6 +6,7 @@ use super::stage::{Contexts, StageLayout};
 use super::view::View;
 
 pub(super) const LAYOUT: StageLayout = StageLayout {
+    name: "flip",
     direct: &[108, 512, 320, 1024, 180, 162, 5 * Recent::GAPS, 256, 30 * Recent::RATES, 900],
     keyed: &[5, 5],
     sets: [9, 12, Recent::RATES],

@@ -6,6 +6,7 @@ use super::view::{View, magnitude};
 use crate::grid::MAX_LABEL;
 
 pub(super) const LAYOUT: StageLayout = StageLayout {
+    name: "label",
     direct: &[512, 512, 2048, 512, 256, 704, 128, 128],
     keyed: &[8, 8, 8, 128, 128],
     sets: [8, 18, 32],

@@ -13,6 +13,7 @@ mod model;
 mod prior;
 mod recent;
 mod stage;
+mod trace;
 pub mod training;
 mod unseen;
 mod view;
@@ -23,11 +24,13 @@ use super::window::Patch;
 use crate::bytes::{BitReader, BitWriter};
 use crate::grid::Rect;
 use crate::map_codec::lattice::Lattice;
-use arith::{Decoder, Encoder};
+use arith::{BitCoder, Decoder, Encoder};
 use canvas::Canvas;
 pub(super) use fit::{best_chunk, prefix_chunk, quick_chunk};
 use model::Model;
 use prior::Prior;
+pub use trace::Decision;
+pub(super) use trace::trace;
 
 /// The length of the last row.
 ///
@@ -102,15 +105,19 @@ fn write(base: Lattice<'_>, head: &ChunkHeader, patch: &Patch, last: LastRow, ro
 
 /// Reads the body of a chunk for `rect`.
 pub(super) fn read(mut bits: BitReader<'_>, base: Lattice<'_>, rect: Rect) -> Result<Patch, DecodeError> {
-    let (width, height) = (rect.width as usize, rect.height as usize);
-    let last = LastRow::read(width, &mut bits)?;
+    let last = LastRow::read(rect.width as usize, &mut bits)?;
     let mut decoder = Decoder::new(bits);
+    let canvas = read_cells(&mut decoder, base, rect, last)?;
+    if decoder.ended_well() { Ok(canvas.into_patch(rect)) } else { Err(DecodeError::Corrupt) }
+}
+
+fn read_cells(coder: &mut impl BitCoder, base: Lattice<'_>, rect: Rect, last: LastRow) -> Result<Canvas, DecodeError> {
     let mut canvas = Canvas::new(base, rect);
     let mut model = Model::new(Prior::shipped());
-    for place in order(width, height, last) {
-        model.code_cell(&mut decoder, &mut canvas, place, 0).ok_or(DecodeError::Corrupt)?;
+    for place in order(rect.width as usize, rect.height as usize, last) {
+        model.code_cell(coder, &mut canvas, place, 0).ok_or(DecodeError::Corrupt)?;
     }
-    if decoder.ended_well() { Ok(canvas.into_patch(rect)) } else { Err(DecodeError::Corrupt) }
+    Ok(canvas)
 }
 
 /// The header of a `context` chunk for `rect`.

@@ -47,6 +47,7 @@ impl Model {
         (column, row): (usize, usize),
         wanted: u8,
     ) -> Option<()> {
+        coder.begin_cell((column, row));
         let at = canvas.at(column, row);
         let view = View::of(canvas, at);
         let kept = if view.held == UNEXPLORED {
@@ -97,7 +98,7 @@ impl Model {
                 return Some(candidate);
             }
         }
-        if view.held != UNEXPLORED && coder.code(wanted == UNEXPLORED, CLEARED) {
+        if view.held != UNEXPLORED && decide_plainly("cleared", coder, CLEARED, wanted == UNEXPLORED) {
             return Some(UNEXPLORED);
         }
         new_label(coder, canvas, view.held, wanted)
@@ -106,9 +107,16 @@ impl Model {
 
 fn decide(stage: &mut Stage, coder: &mut impl BitCoder, contexts: &Contexts, bit: bool) -> bool {
     let one = stage.predict(contexts);
+    coder.begin(stage.layout.name, Some((stage.layout, contexts)));
     let bit = coder.code(bit, one);
     stage.update(bit);
     bit
+}
+
+/// A decision with a fixed probability.
+fn decide_plainly(kind: &'static str, coder: &mut impl BitCoder, one: u32, bit: bool) -> bool {
+    coder.begin(kind, None);
+    coder.code(bit, one)
 }
 
 /// A label that is not in use around, by its index among those; low ones are more likely.
@@ -117,10 +125,10 @@ fn new_label(coder: &mut impl BitCoder, canvas: &Canvas, held: u8, wanted: u8) -
     let place = free().take_while(|&label| label < wanted).count();
     let mut first = 0;
     for (bits, one) in NEW_LABELS {
-        if coder.code(place < first + (1 << bits), one) {
+        if decide_plainly("group", coder, one, place < first + (1 << bits)) {
             let within = place.saturating_sub(first);
-            let offset =
-                (0..bits).rev().fold(0, |n, i| n << 1 | usize::from(coder.code(within >> i & 1 == 1, 1 << 15)));
+            let mut bit = |i: u32| decide_plainly("bit", coder, 1 << 15, within >> i & 1 == 1);
+            let offset = (0..bits).rev().fold(0, |n, i| n << 1 | usize::from(bit(i)));
             return free().nth(first + offset);
         }
         first += 1 << bits;

@@ -22,6 +22,8 @@ const ONE: i32 = 1 << 16;
 /// The number of values of each context of a kind of decision.
 #[derive(Debug)]
 pub(super) struct StageLayout {
+    /// The name in a trace.
+    pub(super) name: &'static str,
     /// For each direct context, the number of its values.
     pub(super) direct: &'static [usize],
     /// For each keyed context, the number of its start values.
@@ -77,7 +79,7 @@ pub(super) struct Contexts {
 /// The adaptive state of one kind of decision; prediction and update alternate.
 #[derive(Debug, Clone)]
 pub(super) struct Stage {
-    layout: &'static StageLayout,
+    pub(super) layout: &'static StageLayout,
     prior: &'static StagePrior,
     slots: Vec<BitEstimate>,
     keyed: Vec<Vec<(u32, BitEstimate)>>,

@@ -4,8 +4,13 @@ use super::canvas::Canvas;
 use super::stage::{Contexts, MAX_KEYED, StageLayout};
 use super::view::{View, magnitude};
 
-pub(super) const LAYOUT: StageLayout =
-    StageLayout { direct: &[256, 256, 512, 64, 81, 256, 1024, 144], keyed: &[], sets: [9, 16, 16], apms: 9 };
+pub(super) const LAYOUT: StageLayout = StageLayout {
+    name: "unseen",
+    direct: &[256, 256, 512, 64, 81, 256, 1024, 144],
+    keyed: &[],
+    sets: [9, 16, 16],
+    apms: 9,
+};
 
 /// The length of the current run of explored or unexplored cells along the row.
 #[derive(Debug, Clone, Copy, Default)]

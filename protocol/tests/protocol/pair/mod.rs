@@ -44,6 +44,8 @@ pub(crate) struct LinkedEnds {
     modems: [(VecDeque<Vec<u8>>, bool); 2],
     /// The last transmissions of both ends.
     pub(crate) overheard: VecDeque<Vec<u8>>,
+    /// The first frames that were sent by either end, and whether each was lost.
+    pub(crate) sent: Vec<(Vec<u8>, bool)>,
     pub(crate) wiretap: Wiretap,
     /// What the vehicle authenticates by, also after a restart.
     pub(crate) vehicle_keys: Option<Authenticity>,
@@ -84,6 +86,7 @@ impl LinkedEnds {
             on_air: BTreeMap::new(),
             modems: Default::default(),
             overheard: VecDeque::new(),
+            sent: Vec::new(),
             wiretap: Wiretap::default(),
             vehicle_keys: setup.authenticity.clone(),
             serial: 0,
@@ -300,7 +303,11 @@ impl LinkedEnds {
         self.schedule(end, PairEvent::Sent { by_vehicle });
         let copies = 1 + u32::from(self.draw() < self.channel.duplication);
         for _ in 0..copies {
-            if self.draw() < self.channel.loss || self.mute[usize::from(by_vehicle)] {
+            let lost = self.draw() < self.channel.loss || self.mute[usize::from(by_vehicle)];
+            if self.sent.len() < 1000 {
+                self.sent.push((bytes.clone(), lost));
+            }
+            if lost {
                 continue;
             }
             let bytes = self.damaged(bytes.clone());
