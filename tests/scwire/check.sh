@@ -4,7 +4,7 @@
 set -u
 here=$(cd "$(dirname "$0")" && pwd); cd "$here"
 : "${SCENECAST:?path of the program}" "${PROJECT:?checkout of the project}"
-export SCENECAST_PRIOR="${SCENECAST_PRIOR:-$PROJECT/protocol/src/map_codec/context/prior.bin}" WIRE_MD="$PROJECT/protocol/WIRE.md"
+export SCENECAST_PRIOR="${SCENECAST_PRIOR:-$PROJECT/protocol/src/map_codec/context/prior.bin}" WIRE_MD="$PROJECT/protocol/WIRE.md" VECTORS="$PROJECT/protocol/vectors"
 out=$(mktemp -d); port=${PORT:-9470}; bad=0
 trap 'kill $(jobs -p) 2>/dev/null; rm -rf "$out"' EXIT
 python3 -m scwire.golden || bad=1

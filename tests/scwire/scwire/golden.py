@@ -1,133 +1,239 @@
-"""The examples of sections 11 and 12.6 and of appendix A against this package."""
+"""protocol/vectors, and the examples that WIRE.md itself has, against this package."""
+import json
 import os
+import pathlib
 import re
-from . import context, frame, keys, cobs, mapchunk, status
-hx = lambda s: bytes.fromhex(s.replace('\n', ' '))
+from . import cobs, context, frame, keys, mapchunk, objects, status
+from .bits import Short
+from .passive import Follower
+from .replica import fold, term
+
+VECTORS = pathlib.Path(os.environ.get('VECTORS') or pathlib.Path(__file__).parents[3] / 'protocol' / 'vectors')
+hx = bytes.fromhex
+KINDS = {1: 'Map', 2: 'Pose', 3: 'Slot', 4: 'Object', 5: 'Report', 6: 'Layer'}
+EXTENDED = {0: 'Introduction', 1: 'InForce', 2: 'Inquiry', 3: 'Details', 4: 'LabelClass', 5: 'LabelTree', 6: 'Caller', 7: 'NextKey'}
+
+
+def read(name):
+    return json.loads((VECTORS / name).read_text())
 
 
 def main():
-    assert cobs.encode(hx('11 00 22')) == hx('2B 29 3A 29 09 2B')
+    doc = open(os.environ['WIRE_MD']).read()
+    assert cobs.encode(hx('110022')) == hx('2B293A29092B')
     for n in (0, 1, 253, 254, 255, 508, 509, 700):
         for f in (bytes(n) + b'\1', b'\1' * n + b'\2', os.urandom(n + 1)):
             assert cobs.decode(cobs.encode(f)[1:-1], 5000) == f
-    assert [frame.write_base(b) for b in (127, 128, 2048)] == [hx('7f'), hx('8080'), hx('8800')]
-    assert frame.statement(0xABC, []) == hx('ABC0')
-    assert frame.statement(7, [1, 4]) == hx('007124') and frame.losses(hx('24')) == [1, 4]
-    assert frame.losses(frame.loss_code([20, 25])) == [20, 25]
+    numbers()
+    parts({row['name']: hx(row['bytes']) for row in read('parts.json')})
+    golden_keys(doc)
+    frames(read('frames.json'))
+    maps('context.json', doc)
+    maps('png.json', doc)
+    sequence(read('sequence.json'))
+    for o in read('objects.json')['objects']:
+        finish(o)
+
+
+def numbers():
+    """The end of 11; 2.1 and 2.2: both lengths of a number, a highest number that is too high."""
     assert frame.nearest(3, 250, 8) == 259 and frame.nearest(250, 259, 8) == 250
     assert frame.nearest(3, 65530) == 65539 and frame.nearest(65530, 65540) == 65530
-    # Ascon, 12.1 and 12.6
-    doc = open(os.environ['WIRE_MD']).read()
-    k = bytes(range(16))
-    assert keys.prf(k, k, b'').hex() == '4427d64b8e1e1451fc445960f0839bb0'
-    assert keys.fingerprint(k).hex() == '95fb836d'
-    M, C, k = k, keys.call_key(k), keys.vehicle_key(k, 1)
-    H, HC = keys.hello_key(k), keys.hello_key(C)
-    table = dict(re.findall(r'^\| ([^|]+) \| `([^`]+)` \|$', doc.split('### 12.6')[1].split('## 13')[0], re.M))
-    assert table['K of vehicle 1'] == k.hex() and table['C'] == C.hex() and table['H'] == H.hex() and table['R'] == keys.root(k).hex()
-    assert table['key file of vehicle 1'] == keys.vehicle_line(M, 1), keys.vehicle_line(M, 1)
-    assert table['part 0 of the offer of a next key, M = sixteen bytes 5A'] == keys.offer(k, b'Z' * 16, 1, 0).hex()
-    assert table['part 1 of it'] == keys.offer(k, b'Z' * 16, 1, 1).hex()
-    assert keys.prf(H, bytes(16), keys.join(b'hello', b'', hx('0102')))[:8].hex() == table['hello tag of these three parts']
-    m, s, v = 0x5CE70001, hx('0102030405060708'), hx('1112131415161718')
-    s0, s1 = keys.Session(k, m, 1, s, v, False), keys.Session(k, m, 1, s, v, True)
-    assert s0.key.hex() == table['session key, e = 0'] and s1.key.hex() == table['session key, e = 1']
-    h, b = b'head', b'body of a frame'
-    assert s0.seal(0, 5, h, b)[-8:].hex() == table['tag, e = 0, down'] and s0.seal(1, 5, h, b)[-8:].hex() == table['tag, e = 0, up']
-    assert s1.seal(0, 5, h, b).hex() == h.hex() + table['ciphertext, e = 1, down'] + table['tag, e = 1, down']
-    # 11.2: parse, check, write again
-    ex = {}
-    for part in re.split(r'\n\*\*', doc.split('### 11.2')[1].split('## 12 Keys')[0])[1:]:
-        name = part.split('**')[0]
-        code = part.split('```text\n')[1].split('```')[0]
-        ex[name] = hx(' '.join(l for l in code.split('\n') if re.fullmatch(r'([0-9A-F]{2} ?)+', l.strip())))
-    ok = 0
-    for name, raw in ex.items():
+    for number, base, highest in (300, 127, 173), (300, 127, 2300), (300, 128, 2300), (70000, 2048, 68000):
+        raw = frame.write(1, 0, 7, number, base, 3, mission=5, peer=9)
         f = frame.parse(raw)
-        peer = {'call': 0, 'here': 0xC0DE, 'keyed call': 0, 'keyed here': 0xC0DE}.get(
-            name, 0 if f.H and f.src == 0 else 0x1234 if f.src == 0 else 0xBEEF)
-        pn = {0: bytes(8), 0xC0DE: hx('2122232425262728'), 0xBEEF: s, 0x1234: v}[peer]
-        ss = s1 if 'encrypted' in name else s0
-        if not f.H:
-            f.session = 0xBEEF if f.src == 0 else 0x1234
-            f.number = frame.number_in(f, m, peer, f.session, 0, ss if f.K else None)
-            assert f.number is not None, name
-        elif f.K:
-            assert keys.hello_tag(HC if name == 'keyed call' else H, m, peer, pn, f.unsealed) == f.seal, name
-        else:
-            assert frame.hello_crc(m, peer, f.unsealed) == f.seal, name
-        cs = frame.chunks(f.body)
-        w = frame.write(f.src, f.dst, f.session, f.number, f.base, f.remaining, turn=f.turn, stamp=f.stamp, hello=bool(f.H),
-                        ack=frame.statement(*f.ack) if f.ack else None, body=f.body, mission=m, peer=peer, peer_nonce=pn,
-                        key=(HC if name == 'keyed call' else H if f.H else ss) if f.K else None, nonce=f.nonce)
-        assert w == raw, (name, w.hex(), raw.hex())
-        ok += 1
-        print(f'{name:40} {len(raw):3} bytes, chunks {[(k, len(p)) for k, p in cs]}')
-    print(ok, 'frames of 11.2 and 11.3 verified and written again')
-    parts(doc.split('### 11.1')[1].split('### 11.2')[0])
-    long_numbers(m)
-    appendix(doc.split('### A.6')[1])
+        assert (f.base, f.src, f.dst, f.remaining, len(raw)) == (base, 1, 0, 3, 9 if base < 128 else 11)
+        assert frame.number_in(f, 5, 9, 7, highest) == number
 
 
-def parts(doc):
-    """11.1: reports, details and parts of texts."""
-    rows = {name: hx(bytes_) for name, bytes_ in re.findall(r'^\| (.+?) \| `([0-9A-F ]+)` \|$', doc, re.M)}
+def parts(rows):
+    """Bases, stamps, statements, heads of chunks, reports, details and parts of texts."""
+    named = lambda begin: {name: raw for name, raw in rows.items() if name.startswith(begin)}
+    assert named('base ') == {f'base {b}': frame.write_base(b) for b in (127, 128, 2048)}
+    assert [stamp(raw) for raw in named('stamp ').values()] == [
+        {'clock_ms': 66051, 'one_way_ms': 667}, {'clock_ms': 1, 'one_way_ms': None},
+        {'clock_ms': 16777215, 'last_received': 9, 'held_ms': 258}]
+    lost = [(0xABC, []), (7, [1, 4]), (30, [20, 25])]
+    assert list(named('statement: ').values()) == [frame.statement(*each) for each in lost]
+    assert [frame.losses(raw[2:]) for raw in named('statement: ').values()] == [distances for _, distances in lost]
+    heads = named('head of a map chunk')
+    assert frame.chunks(heads.pop('head of a map chunk that fills the rest of a full frame') + bytes(99)) == [(1, bytes(99))]
+    assert heads == {f'head of a map chunk of {n} bytes': frame.chunk(1, bytes(n))[:-n] for n in (26, 27, 300)}
+    poses = [status.pose(raw).get('path') for name, raw in rows.items() if ' pose' in name or 'pose: ' in name or 'with a path' in name]
+    assert poses == [None, [(2.4, -3.4), (-0.6, -3.4)], None], poses
     reports = [status.report(raw) for raw in rows.values() if raw[:4] == hx('0109BEEF')]
     assert [('summary' in r, 'placement' in r, 'disk' in r) for r in reports] == [
         (False, False, False), (True, False, False), (False, True, False), (False, False, True)]
-    details = {name: status.details(raw) for name, raw in rows.items() if name.startswith('details: ')}
+    details = {name: status.details(raw) for name, raw in named('details: ').items()}
     assert all(details.values()) and details['details: more of label 5'] == {'intent': (2, 5)}, details
     assert details['details: a trail to (1, -2) m: 9 s ago at (2.4, -3.4), 12 s ago at (-0.6, -3.4)']['trail'] == [
         (9, 1.4, -1.4), (12, -1.6, -1.4)]
     assert set(details['details: these faults, more of label 5, this registration and this trail']) == {
         'faults', 'intent', 'registration', 'trail'}
-    texts = [(name, raw[1:]) for name, raw in rows.items() if name.startswith(('part of the name', 'part of a content', 'layer chunk: ')) and raw[0] >> 6 != 1]
-    texts += [(name, raw) for name, raw in rows.items() if name.startswith('part of the tree')]
+    texts = [(name, raw[0 if 'tree' in name else 1:]) for name, raw in named(('part of the ', 'part of a ', 'layer chunk: ')).items()
+             if 'digest of confidence' not in name]
     for name, raw in texts:
         digest, last, first, text = status.part(raw)
-        assert not last or first or digest == status.text_digest(text) or 'BEEF' in name, name
-    print(len(reports), 'reports,', len(details), 'details and', len(texts), 'parts of texts of 11.1')
+        assert not last or first or digest == status.text_digest(text), name
+    first, second = (status.part(rows[name][1:])[3] for name in ('the same in two chunks, the first', 'the second'))
+    assert status.descriptor(first + second)['name'] == 'depth'
+    print(len(reports), 'reports,', len(details), 'details and', len(texts), 'parts of texts of', len(rows), 'parts')
 
 
-def long_numbers(m):
-    """2.1, 2.2: both lengths of a number; a highest number that is too high."""
-    for number, base, highest in (300, 127, 173), (300, 127, 2300), (300, 128, 2300), (70000, 2048, 68000):
-        raw = frame.write(1, 0, 7, number, base, 3, mission=m, peer=9)
-        f = frame.parse(raw)
-        assert (f.base, f.src, f.dst, f.remaining, len(raw)) == (base, 1, 0, 3, 9 if base < 128 else 11)
-        assert frame.number_in(f, m, 9, 7, highest) == number
+def stamp(raw):
+    """2.4"""
+    clock, rest = int.from_bytes(raw[:3], 'big'), int.from_bytes(raw[-2:], 'big')
+    if len(raw) == 5:
+        return {'clock_ms': clock, 'one_way_ms': None if rest == 0xFFFF else rest}
+    return {'clock_ms': clock, 'last_received': raw[3], 'held_ms': rest}
 
 
-def appendix(doc):
-    """A.6, each decision, and a chunk in which a hash is FFFFFFFF."""
-    cells = lambda rows: {(x, y): int(v) for y, r in enumerate(rows.split('/')) for x, v in enumerate(r.split()) if v != '0'}
-    trace, coders, hashes = [], [], []
-    decide, decision, end = context.Stage.decide, context.Coder.decision, context.Coder.end
+def golden_keys(doc):
+    """12.1, keys.json and the rows of 12.6."""
+    M = bytes(range(16))
+    assert keys.prf(M, M, b'').hex() == '4427d64b8e1e1451fc445960f0839bb0'
+    k = keys.vehicle_key(M, 1)
+    H, s, v = keys.hello_key(k), hx('0102030405060708'), hx('1112131415161718')
+    plain, secret = (keys.Session(k, 0x5CE70001, 1, s, v, e) for e in (False, True))
+    h, b = b'head', b'body of a frame'
+    sealed = secret.seal(0, 5, h, b)
+    values = {
+        'fingerprint': keys.fingerprint(M),
+        'line of the key file, as ASCII': f'scenecast-key 2 {M.hex()} {keys.fingerprint(M).hex()}'.encode(),
+        'line of the key file of vehicle 1, as ASCII': keys.vehicle_line(M, 1).encode(),
+        'hello tag of the parts "hello", "" and 0102': keys.prf(H, bytes(16), keys.join(b'hello', b'', hx('0102')))[:8],
+        'tag, e = 0, down': plain.seal(0, 5, h, b)[-8:],
+        'tag, e = 0, up': plain.seal(1, 5, h, b)[-8:],
+        'ciphertext, e = 1, down': sealed[len(h):-8],
+        'tag, e = 1, down': sealed[-8:],
+        'part 0 of the offer of a next key, M = sixteen bytes 5A': keys.offer(k, b'Z' * 16, 1, 0),
+        'part 1 of it': keys.offer(k, b'Z' * 16, 1, 1),
+        'H': H, 'JOIN("hello", "", `0102`)': keys.join(b'hello', b'', hx('0102')), 'R': keys.root(k),
+        'session key, e = 0': plain.key, 'session key, e = 1': secret.key,
+        'frame nonce, down': keys.frame_nonce(0, 5), 'frame nonce, up': keys.frame_nonce(1, 5),
+        'JOIN(head, body)': keys.join(h, b)}
+    table = re.findall(r'^\| ([^|]+) \| `([0-9a-f]+)` \|$', doc.split('### 12.6')[1].split('## 13')[0], re.M)
+    wanted = {row['name']: row['bytes'] for row in read('keys.json')} | dict(table)
+    assert wanted == {name: value.hex() for name, value in values.items()}
+    print(len(wanted), 'keys and tags')
+
+
+def upward(raw):
+    """Whether a frame is from a vehicle."""
+    return raw[1] >> 4 != 0 if raw[0] & 4 else raw[1] >> 7 == 1
+
+
+def frames(vectors):
+    """Each frame verified by a follower without a key, with one, or with one and encryption; read; and written again."""
+    mission, M = int(vectors['mission'], 16), hx(vectors['key'])
+    k, calls = keys.vehicle_key(M, 1), keys.call_key(M)
+    followers = [Follower(mission), *(Follower(mission, k, e, calls=calls) for e in (False, True))]
+    for vector in vectors['frames']:
+        name, raw = vector['name'], hx(vector['bytes'])
+        heard = [(fo, f) for fo in followers if (f := fo.take(upward(raw), raw))]
+        assert bool(heard) == (vector['says'] is not None) != name.startswith('refused: '), name
+        for fo, f in heard:
+            assert content(f) == vector['says'], (name, content(f))
+            up = f.src != 0
+            seal = {'session': f.session, 'peer': f.peer, 'peer_nonce': fo.nonces[f.peer], 'key': fo.hello_key(f)} if f.H else {
+                'session': f.peer[up], 'peer': f.peer[not up], 'key': fo.crypts.get(f.peer)}
+            chunks = b''.join(frame.chunk(*each) for each in frame.chunks(f.body))
+            again = frame.write(f.src, f.dst, number=f.number, base=f.base, remaining=f.remaining, turn=f.turn, stamp=f.stamp, hello=bool(f.H),
+                                ack=frame.statement(*f.ack) if f.ack else None, body=chunks.ljust(len(f.body), b'\0'), nonce=f.nonce,
+                                mission=mission, **seal)
+            assert again == raw, (name, again.hex())
+    print(len(vectors['frames']), 'frames,', sum(v['says'] is None for v in vectors['frames']), 'of them refused')
+
+
+def content(f):
+    """What the vectors say about a frame: of a hello number 0 and base 1, of an extended chunk the bytes after its kind."""
+    says = {'from': f.src, 'to': f.dst, 'number': f.number, 'base': 1 if f.H else f.base, 'remaining': f.remaining,
+            'session': f'{f.session:04x}' if f.H else None, 'turn': f.turn, 'stamp': stamp(f.stamp) if f.stamp else None,
+            'nonce': f.nonce.hex() if f.H and f.K else None, 'ack': {'horizon_low': f.ack[0], 'lost': f.ack[1]} if f.ack else None,
+            'chunks': [{'kind': EXTENDED[p[0]] if k == 7 else KINDS[k], 'payload': p[k == 7:].hex()} for k, p in frame.chunks(f.body)]}
+    return {name: value for name, value in says.items() if value is not None}
+
+
+def grid(vector):
+    """The cells with a label."""
+    return {(vector['x'] + i, vector['y'] + j): int(label)
+            for j, row in enumerate(vector['rows']) for i, label in enumerate(row.split()) if label != '0'}
+
+
+def maps(name, doc):
+    """Each chunk; each decision of the first one, and the end of its code string (A.6)."""
+    vectors, keyed_with = read(name), set()
+    for i, vector in enumerate(vectors['chunks']):
+        base, (trace, coders) = grid(vector['base']), watch()
+        got = mapchunk.decode(hx(vector['chunk']), base)
+        assert {c: v for c, v in {**base, **got[3]}.items() if v} == grid(vector['result']), vector['name']
+        keyed_with |= {key for d in trace for key, _ in d['keyed']}
+        if i == 0 and vectors['trace']:
+            at, (x, y, w, _) = -1, got[2]
+            for d in trace:
+                at += d['kind'] in ('calm', 'flip', 'unseen')
+                d['cell'] = [x + at % w, y + at // w]
+            assert trace == vectors['trace']
+            c, = coders
+            end = re.search(r'low = (\w+), range = (\w+), above =\s+(\w+), and (\d+) bits', doc).groups()
+            assert end == (*(f'{v:08X}' for v in (c.low, c.range, c.above)), str(c.shifted))
+    assert name != 'context.json' or 0xFFFFFFFF in keyed_with
+    print(len(vectors['chunks']), 'chunks and', len(vectors['trace']), 'decisions of', name)
+
+
+decide, decision, end = context.Stage.decide, context.Coder.decision, context.Coder.end
+
+
+def watch():
+    """The decisions of the next chunk, and its coder."""
+    trace, coders = [], []
 
     def stage(self, coder, direct, keyed, sets, curve):
-        trace.append([*direct, *(f'{k}:{s}' for k, s in keyed), *sets, curve])
-        hashes.extend(k for k, _ in keyed)
+        trace.append({'kind': self.name, 'direct': list(direct), 'keyed': [list(k) for k in keyed], 'sets': list(sets), 'curve': curve})
         return decide(self, coder, direct, keyed, sets, curve)
 
     def plain(self, one):
-        if not trace or trace[-1][-1] in ('yes', 'no'):
-            trace.append([])
+        if not trace or 'yes' in trace[-1]:
+            kind = {4096: 'cleared', 32768: 'bit'}.get(one, 'group')
+            trace.append({'kind': kind, 'direct': [], 'keyed': [], 'sets': [], 'curve': 0})
         yes = decision(self, one)
-        trace[-1] += [one, 'yes' if yes else 'no']
+        trace[-1] |= {'one': one, 'yes': yes}
         return yes
     context.Stage.decide, context.Coder.decision, context.Coder.end = stage, plain, lambda c: (coders.append(c), end(c))
-    got = mapchunk.decode(hx(re.search(r'\| chunk \| `(.*?)`', doc)[1]), {(x, y): 1 for x in range(6) for y in range(6)})
-    assert got[3] == {(4, 2): 3, (6, 2): 1, (2, 3): 0, (4, 3): 3, (6, 3): 9}, got
-    lines = doc.split('curve    one  is\n')[1].split('```')[0].rstrip('\n').split('\n')
-    head = r'(\d,\d)?\s*(calm|flip|unseen|label \d|cleared|group \d|bit \d)\s'
-    assert [re.sub(head, '', l).split() for l in lines] == [[str(v) for v in t] for t in trace]
-    c, = coders
-    end_of_string = re.search(r'low = (\w+), range = (\w+), above = (\w+), and (\d+) bits', doc).groups()
-    assert end_of_string == (*(f'{v:08X}' for v in (c.low, c.range, c.above)), str(c.shifted))
-    print(len(trace), 'decisions of A.6')
-    old, new = cells('105 65 168 0 0 0 / 52 0 0 0 0 0 / 0 0 0 0 0 0'), cells('105 65 168 0 0 0 / 52 52 0 0 0 7 / 9 8 0 0 3 1')
-    got = mapchunk.decode(hx('80 00 22 88 40 00 79 6A 3F 05 3C 2D D0'), old)
-    assert {**old, **got[3]} == new and 0xFFFFFFFF in hashes, got
+    return trace, coders
+
+
+def sequence(vectors):
+    """The map of a passive receiver after each frame that arrives."""
+    fo, digests = Follower(int(vectors['mission'], 16)), 0
+    for i, vector in enumerate(vectors['frames']):
+        raw = hx(vector['bytes'])
+        if vector['lost']:
+            continue
+        f = fo.take(upward(raw), raw)
+        assert f, i
+        got = None
+        if f.src and not f.H:
+            m, shown = fo.replica.map, 0
+            for cell, label in m.shown.items():
+                shown ^= term(cell, label)
+            got = [fold(m.hash), fold(shown)]
+            digests += 1
+        assert got == vector.get('digests'), (i, f.result, got)
+    assert fo.replica.map.shown == grid(vectors['map']) and not fo.replica.diverged
+    print(len(vectors['frames']), 'frames of a sequence,', digests, 'digests')
+
+
+def finish(vector):
+    """An object is whole with the parts that say so, not earlier."""
+    got = objects.Objects()
+    for part in vector['parts']:
+        before = len(got.finished)
+        if not part['lost']:
+            got.part(hx(part['payload']))
+        assert (len(got.finished) > before) == part['whole'], vector['name']
+    assert [raw for _, raw in got.finished] == [hx(vector['bytes'])], vector['name']
+    print('object', vector['name'] + ':', len(vector['parts']), 'parts,', 'repaired' if got.repaired else 'as it was sent')
 
 
 if __name__ == '__main__':

@@ -89,13 +89,17 @@ def hello_tag(h, mission, session, nonce, frame):
     return prf(h, bytes(16), join(mission.to_bytes(4, 'big'), session.to_bytes(2, 'big'), nonce, frame))[:8]
 
 
+def frame_nonce(direction, number):
+    return bytes([direction]) + bytes(7) + number.to_bytes(8, 'big')
+
+
 class Session:
     def __init__(self, k, mission, address, s, v, encrypt):
         self.e = encrypt
         self.key = prf(root(k), s + v, mission.to_bytes(4, 'big') + bytes([address, int(encrypt)]))
 
     def seal(self, direction, number, head, body):
-        n = bytes([direction]) + bytes(7) + number.to_bytes(8, 'big')
+        n = frame_nonce(direction, number)
         if self.e:
             c, t = _aead(self.key, n, head, body)
             return head + c + t[:8]
@@ -103,7 +107,7 @@ class Session:
 
     def open(self, direction, number, head, body, tag):
         """The body, or None."""
-        n = bytes([direction]) + bytes(7) + number.to_bytes(8, 'big')
+        n = frame_nonce(direction, number)
         if self.e:
             p, t = _aead(self.key, n, head, body, True)
             return p if t[:8] == tag else None

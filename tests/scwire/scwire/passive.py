@@ -15,20 +15,24 @@ def records(path):
 
 
 class Follower:
-    """Both directions of one pair of ends; with a key, `authenticate` = all."""
+    """Both directions of one pair of ends; with a key, `authenticate` = all. Calls need the key `calls`."""
 
-    def __init__(self, mission, key=None, encrypt=False, address=1):
+    def __init__(self, mission, key=None, encrypt=False, address=1, calls=None):
         self.mission, self.count = mission, Counter()
-        self.key, self.encrypt, self.address = key, encrypt, address
-        self.hello_key = keys.hello_key(key) if key else None
+        self.key, self.encrypt, self.address, self.calls_key = key, encrypt, address, calls
         self.nonces, self.crypts, self.top = {0: bytes(8)}, {}, Counter()
         self.surface, self.calls, self.pairs = [], [], []   # sessions of the surface; (surface's, vehicle's); newest last
         self.pair, self.replica = None, None
         self.dead = {}                                      # earlier pairs
 
+    def hello_key(self, f):
+        key = self.calls_key if f.dst == 15 else self.key
+        return key and keys.hello_key(key)
+
     def hello_for(self, f, peer):
         if self.key:
-            return f.K and keys.hello_tag(self.hello_key, self.mission, peer, self.nonces[peer], f.unsealed) == f.seal
+            h = self.hello_key(f)
+            return f.K and h and keys.hello_tag(h, self.mission, peer, self.nonces[peer], f.unsealed) == f.seal
         return not f.K and frame.hello_crc(self.mission, peer, f.unsealed) == f.seal
 
     def numbered_in(self, f, direction, pair):
