@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Checks docs/wireshark/scenecast.lua with tshark against the frames of protocol/WIRE.md 11.2 and 11.3, then with random bytes.
+"""Checks docs/wireshark/scenecast.lua with tshark against the frames and parts of protocol/vectors, then with random bytes.
 
 Needs Python 3 and tshark. Exits 0 if everything is as expected, else 1.
 """
@@ -14,10 +14,10 @@ import tempfile
 
 ROOT = os.path.join(os.path.dirname(os.path.abspath(__file__)), '..', '..')
 DISSECTOR = os.path.join(ROOT, 'docs', 'wireshark', 'scenecast.lua')
-DOCUMENT = os.path.join(ROOT, 'protocol', 'WIRE.md')
+VECTORS = os.path.join(ROOT, 'protocol', 'vectors')
 SEED, RANDOM_FRAMES = 1, 2000
 
-# What the document says beside each frame; a field without a value must be absent.
+# What each sound frame says; a field without a value must be absent.
 SURFACE_HELLO = {'from': '0', 'to': '1', 'session': '0xbeef', 'flag.hello': '1', 'remaining': '0', 'turn': '48',
                  'unread': ['000001', '00c350ffff'], 'chunk.extended': '0', 'intro.edge': '2500',
                  'intro.series': '0a0b0c0d0e0f', 'intro.clock': '498000'}
@@ -44,7 +44,9 @@ EXPECTED = {
     'map frame in the middle of a turn': RIGHT | {
         'flag.up': '1', 'base': '2', 'number': '2', 'remaining': '1', 'turn': None, 'chunk.kind': '1', 'map.codec': '0',
         'map.stride': '0', 'map.x': '-1', 'map.y': '2', 'map.width': '2', 'map.height': '1', 'padding': '00' * 29},
-    'frame without content': RIGHT | {'flag.up': '1', 'base': '1', 'number': '2', 'turn': '40', 'chunk.kind': None},
+    'frame without content': RIGHT | {'flag.up': '1', 'base': '1', 'number': '3', 'turn': '40', 'chunk.kind': None},
+    'frame with a base of two bytes': RIGHT | {
+        'flag.up': '1', 'base': '200', 'number': '300', 'number.full': '300', 'turn': None, 'chunk.kind': None},
     'call': CALL | RIGHT,
     'here': HERE | RIGHT,
     'keyed hello of the surface': SURFACE_HELLO | TAG | {'nonce': '0102030405060708'},
@@ -58,44 +60,48 @@ EXPECTED = {
 }
 
 
-def examples():
-    """Name and bytes of each frame of 11.2 and 11.3, in the order of the document."""
-    section = open(DOCUMENT, encoding='utf-8').read().split('### 11.2')[1].split('## 12 Keys')[0]
-    frames = {}
-    for part in re.split(r'\n\*\*', section)[1:]:
-        lines = part.split('```text\n')[1].split('```')[0].split('\n')
-        code = ' '.join(line for line in lines if re.fullmatch(r'([0-9A-F]{2} ?)+', line.strip()))
-        frames[part.split('**')[0]] = bytes.fromhex(code)
-    return frames
+def vectors(name):
+    with open(os.path.join(VECTORS, name), encoding='utf-8') as file:
+        return json.load(file)
 
 
-def tshark(folder, frames, *options):
-    """What tshark prints about these frames, as the link type User 0."""
+def frames():
+    """Name and bytes of each frame, in the order of frames.json."""
+    return {vector['name']: bytes.fromhex(vector['bytes']) for vector in vectors('frames.json')['frames']}
+
+
+def capture_of(folder, chosen):
+    """A capture of these frames, of the link type User 0."""
     capture = os.path.join(folder, 'frames.pcap')
     # Not by text2pcap, which writes no packet without bytes.
     with open(capture, 'wb') as out:
         out.write(struct.pack('<IHHiIII', 0xA1B2C3D4, 2, 4, 0, 0, 65535, 147))
-        for second, raw in enumerate(frames):
+        for second, raw in enumerate(chosen):
             out.write(struct.pack('<IIII', second, 0, len(raw), len(raw)) + raw)
+    return capture
+
+
+def tshark(folder, capture, *options):
+    """What tshark prints about a capture."""
     # An empty home: preferences and plugins of the user must not decide.
     done = subprocess.run(['tshark', '-X', 'lua_script:' + DISSECTOR, '-o', 'scenecast.mission:0x5CE70001', '-r', capture, *options],
                           env=dict(os.environ, HOME=folder), stdout=subprocess.PIPE, stderr=subprocess.STDOUT, check=True)
     return done.stdout.decode('utf-8', 'replace')
 
 
-def fields(folder, frames, encrypted):
+def fields(folder, capture, *options):
     """Of each frame the fields of scenecast: name and list of the values."""
     names = sorted({name for expected in EXPECTED.values() for name in expected} | {row[4] for row in ROWS})
-    options = ['-T', 'json', '-o', 'scenecast.encrypted:' + encrypted, '-e', '_ws.expert.message']
+    options = ['-T', 'json', *options, '-e', '_ws.expert.message']
     for name in names:
         options += ['-e', 'scenecast.' + name]
-    printed = tshark(folder, frames, *options)
+    printed = tshark(folder, capture, *options)
     layers = [packet['_source']['layers'] for packet in json.loads(printed[printed.index('[\n'):])]
     return [{name.replace('scenecast.', '', 1): values for name, values in one.items()} for one in layers]
 
 
 def differences(name, found):
-    """Lines about each field that is not as the document says."""
+    """Lines about each field that is not as expected."""
     wanted = EXPECTED[name] | {'_ws.expert.message': None}
     for key, value in wanted.items():
         value = [] if value is None else value if isinstance(value, list) else [value]
@@ -105,20 +111,37 @@ def differences(name, found):
             yield f'{name}: {key} is {have}, not {value}'
 
 
-def check_examples(folder):
-    frames = examples()
-    problems = [f'no expectation for the example: {name}' for name in frames.keys() - EXPECTED.keys()]
-    problems += [f'no example in the document: {name}' for name in EXPECTED.keys() - frames.keys()]
-    names = [name for name in frames if name in EXPECTED]
+def check_frames(folder):
+    named = frames()
+    sound = [name for name in named if not name.startswith('refused: ')]
+    problems = [f'no expectation for the frame: {name}' for name in sound if name not in EXPECTED]
+    problems += [f'no frame in frames.json: {name}' for name in EXPECTED.keys() - named.keys()]
     for encrypted in 'FALSE', 'TRUE':
-        chosen = [name for name in names if name.startswith('encrypted') == (encrypted == 'TRUE')]
-        found = fields(folder, [frames[name] for name in chosen], encrypted)
-        problems += [line for name, one in zip(chosen, found) for line in differences(name, one)]
-    return len(names), problems
+        found = fields(folder, os.path.join(VECTORS, 'frames.pcap'), '-o', 'scenecast.encrypted:' + encrypted)
+        if len(found) != len(named):
+            problems.append(f'frames.pcap has {len(found)} of {len(named)} frames')
+        for (name, raw), one in zip(named.items(), found):
+            if name in EXPECTED and name.startswith('encrypted') == (encrypted == 'TRUE'):
+                problems += differences(name, one)
+            # The dissector has no key: it cannot refuse a frame for its tag.
+            if name not in sound and not one.get('_ws.expert.message') and not raw[0] & 1:
+                problems.append(f'{name}: nothing shows it')
+    return problems
 
 
-# The rows of 11.1 that are the payload of a chunk: how the name begins, whether the vehicle sends it, the bytes before the
-# payload, a field, and its values over these rows.
+def check_sequence(folder):
+    arrived = [vector for vector in vectors('sequence.json')['frames'] if not vector['lost']]
+    mission = 'scenecast.mission:0x' + vectors('sequence.json')['mission']
+    found = fields(folder, os.path.join(VECTORS, 'sequence.pcap'), '-o', mission)
+    if len(found) != len(arrived):
+        yield f'sequence.pcap has {len(found)} of {len(arrived)} frames'
+    for number, one in enumerate(found, 1):
+        if one.get('seal.status') != ['CRC right'] or one.get('_ws.expert.message'):
+            yield f'sequence.pcap, frame {number}: {one.get("seal.status")}, {one.get("_ws.expert.message")}'
+
+
+# The rows of parts.json that are the payload of a chunk, then the map chunks: how the name begins, whether the vehicle sends it,
+# the bytes before the payload, a field, and its values over these rows.
 ROWS = [
     (('pose: ', 'the same with a waypoint', 'the same with a path', 'the same with an empty', 'the first pose'), True, 0x40, '',
      'path.count', [None, None, '2', '0', None]),
@@ -129,26 +152,27 @@ ROWS = [
     (('part of the tree',), True, 0xE0, '05', 'part.first', ['0']),
     (('part of a content',), True, 0xE0, '01', 'part.first', ['300']),
     (('inquiry',), False, 0xE0, '02', 'inquiry.digest', ['0xabcd']),
-    (('slot: ',), False, 0x60, '', 'slot.number', list('01123332222') + list('4568') + ['9', '7']),
-    (('head of a map chunk\'s payload',), True, 0x20, '', 'map.x', ['200']),
+    (('slot: ',), False, 0x60, '', 'slot.number', list('01168974523332222')),
+    (('map: ',), True, 0x20, '', 'map.x', ['2', '0', '0', '0', '4', '0', '0', '0', '-40000', '9', '-1', '2', '0', '0']),
 ]
 
 
 def rows():
     """Name, bytes in a numbered frame, field and its value for each row of ROWS; the CRC of the frame is 0."""
-    section = open(DOCUMENT, encoding='utf-8').read().split('### 11.1')[1].split('### 11.2')[0]
-    table = re.findall(r'^\| (.+?) \| `([0-9A-F ]+)` \|$', section, re.M)
+    table = [(row['name'], row['bytes']) for row in vectors('parts.json')]
+    table += [('map: ' + row['name'], row['chunk']) for name in ('context.json', 'png.json') for row in vectors(name)['chunks']]
     for begins, up, kind, before, field, values in ROWS:
         found = [(name, bytes.fromhex(before + code)) for name, code in table if name.startswith(begins)]
         assert len(found) == len(values), (begins, len(found))
         for (name, payload), value in zip(found, values):
-            length = bytes([kind | len(payload)]) if len(payload) < 27 else bytes([kind | 27, len(payload) - 27])
+            more = len(payload) - 27
+            length = bytes([kind | len(payload)]) if more < 0 else bytes([kind | 27 + (more >> 8), more & 255])
             yield name, bytes([0x80, 0x81 if up else 1, 1, 1]) + length + payload + bytes(4), field, value
 
 
 def check_rows(folder):
     found = list(rows())
-    got = fields(folder, [raw for _, raw, _, _ in found], 'FALSE')
+    got = fields(folder, capture_of(folder, [raw for _, raw, _, _ in found]))
     for (name, _, field, value), one in zip(found, got):
         have = one.get(field, [None])[0]
         if have != value or one.get('_ws.expert.message'):
@@ -156,21 +180,21 @@ def check_rows(folder):
 
 
 def check_seals(folder):
-    """What is no example: a number far ahead, a damaged frame, a run that was not heard, `down` with a key."""
-    frames = examples()
-    grant = frames['grant with an ack statement']
+    """What is no vector: a number far ahead, a damaged frame, a run that was not heard, `down` with a key."""
+    named = frames()
+    grant = named['grant with an ack statement']
     broken = grant[:5] + bytes([grant[5] ^ 1]) + grant[6:]
     far = bytes.fromhex('80 01 7F 2C')
     far += (crc32c(bytes.fromhex('5CE70001 1234 BEEF 012C') + far)).to_bytes(4, 'big')
-    hellos, keyed = [[frames[key + 'hello of the ' + end] for end in ('surface', 'vehicle')] for key in ('', 'keyed ')]
-    answer = frames['answer of the vehicle']
+    hellos, keyed = [[named[key + 'hello of the ' + end] for end in ('surface', 'vehicle')] for key in ('', 'keyed ')]
+    answer = named['answer of the vehicle']
     for what, sequence, wanted in (
             ('a frame without hellos', [grant], 'CRC cannot be checked'),
             ('a frame without a hello of the surface', [hellos[1], grant], 'CRC cannot be checked'),
             ('a damaged frame', [*hellos, broken], 'CRC wrong'),
             ('a number far ahead', [*hellos, far], 'CRC right'),
             ('a frame of `down`', [*keyed, answer], 'CRC right')):
-        have = fields(folder, sequence, 'FALSE')[-1].get('seal.status', ['no seal'])[0]
+        have = fields(folder, capture_of(folder, sequence))[-1].get('seal.status', ['no seal'])[0]
         if have != wanted:
             yield f'{what}: {have}, not {wanted}'
 
@@ -184,9 +208,9 @@ def crc32c(data):
     return crc ^ 0xFFFFFFFF
 
 
-def damaged(rng, frames):
+def damaged(rng, shipped):
     """Random bytes, a true head with random bytes after it, a true frame with a cut end or with changed bytes."""
-    raw = bytearray(rng.choice(frames))
+    raw = bytearray(rng.choice(shipped))
     noise = rng.randbytes(rng.randrange(201))
     way = rng.randrange(4)
     if way == 0:
@@ -201,9 +225,9 @@ def damaged(rng, frames):
 
 
 def check_random(folder):
-    rng, frames = random.Random(SEED), list(examples().values())
-    noise = frames + [damaged(rng, frames) for _ in range(RANDOM_FRAMES)]
-    printed = tshark(folder, noise, '-V', '-2')
+    rng, shipped = random.Random(SEED), list(frames().values())
+    noise = shipped + [damaged(rng, shipped) for _ in range(RANDOM_FRAMES)]
+    printed = tshark(folder, capture_of(folder, noise), '-V', '-2')
     count = len(re.findall(r'^Frame \d+: ', printed, re.M))
     problems = sorted({line.strip() for line in printed.split('\n') if 'lua error' in line.lower() or 'lua:' in line.lower()})
     if count != len(noise):
@@ -215,11 +239,10 @@ def check_random(folder):
 
 def main():
     with tempfile.TemporaryDirectory() as folder:
-        count, problems = check_examples(folder)
-        problems += [*check_rows(folder), *check_seals(folder), *check_random(folder)]
+        problems = [*check_frames(folder), *check_sequence(folder), *check_rows(folder), *check_seals(folder), *check_random(folder)]
     for line in problems:
         print(line, file=sys.stderr)
-    print(f'wireshark: {count} frames and {len(list(rows()))} parts of the document, {RANDOM_FRAMES} random frames, {len(problems)} problems')
+    print(f'wireshark: {len(frames())} frames, a sequence, {len(list(rows()))} parts, {RANDOM_FRAMES} random frames, {len(problems)} problems')
     return 1 if problems else 0
 
 
