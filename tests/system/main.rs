@@ -26,3 +26,4 @@ mod restart;
 mod ros2;
 mod ros2_labels;
 mod scene;
+mod wire_tool;

@@ -129,6 +129,27 @@ pub fn decode(base: &LabelGrid, bytes: &[u8]) -> Result<Vec<(Cell, u8)>, DecodeE
     .map(|patch| patch.changes().into_iter().map(|(cell, label)| (header.stride.on_map(cell), label)).collect())
 }
 
+/// Where a chunk changes the map, and how it is coded.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ChunkPatch {
+    /// The coder of its body: `png` or `context`.
+    pub codec: Codec,
+    /// The distance of its cells.
+    pub stride: Stride,
+    /// The patch, in steps of the stride.
+    pub rect: Rect,
+}
+
+/// The patch of a chunk, without the base; `None` if the bytes have no sound head.
+pub fn patch(bytes: &[u8]) -> Option<ChunkPatch> {
+    let header = ChunkHeader::read(&mut BitReader::new(bytes)).filter(ChunkHeader::geometry_is_sound)?;
+    let codec = match header.body {
+        Body::Png => Codec::Png,
+        Body::Context => Codec::Context,
+    };
+    Some(ChunkPatch { codec, stride: header.stride, rect: header.patch })
+}
+
 /// The decisions of a chunk with the body `context`, in order; none of one with the body `png`.
 pub fn trace(base: &LabelGrid, bytes: &[u8]) -> Result<Vec<Decision>, DecodeError> {
     let (header, bits, base) = open(base, bytes)?;

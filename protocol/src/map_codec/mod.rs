@@ -27,7 +27,7 @@ mod window;
 
 pub use best_png::Deflate;
 pub(crate) use chunk::encode_quickly;
-pub use chunk::{DecodeError, MapChunk, decode, encode, encode_every, trace};
+pub use chunk::{ChunkPatch, DecodeError, MapChunk, decode, encode, encode_every, patch, trace};
 pub use codec::Codec;
 pub use context::{Decision, training};
 pub use file::{ChunkFile, ChunkFileError};

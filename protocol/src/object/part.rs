@@ -15,6 +15,11 @@ impl ObjectId {
         Self((serial % Self::COUNT) as u16)
     }
 
+    /// The number on the wire.
+    pub fn number(self) -> u16 {
+        self.0
+    }
+
     /// The serial number nearest to `near` that has this name.
     pub(super) fn serial(self, near: u64) -> u64 {
         let half = Self::COUNT / 2;

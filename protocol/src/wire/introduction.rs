@@ -68,6 +68,11 @@ impl UtcHours {
         u32::try_from(since.as_secs() / 3600).ok().filter(|hours| (1..1 << 24).contains(hours)).map(Self)
     }
 
+    /// Hours since the beginning of 1970.
+    pub fn hours(self) -> u32 {
+        self.0
+    }
+
     /// Hours from one to the other.
     pub fn apart(self, other: Self) -> u32 {
         self.0.abs_diff(other.0)

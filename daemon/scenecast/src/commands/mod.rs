@@ -89,6 +89,10 @@ enum Command {
     #[cfg(feature = "tools")]
     /// Find the settings of the scene model whose maps agree best with annotations of a similar site.
     Tune(Box<tools::Tune>),
+    #[cfg(feature = "tools")]
+    /// Show what frames on the wire say.
+    #[command(subcommand)]
+    Wire(tools::Wire),
     /// Print a configuration file with every key explained.
     Config(config::ConfigCommand),
     #[cfg(feature = "tools")]
@@ -126,6 +130,8 @@ pub fn run(arguments: Arguments) -> Result<(), UserError> {
         Command::Vocabulary(vocabulary) => vocabulary.run(),
         #[cfg(feature = "tools")]
         Command::Tune(tune) => tune.run(),
+        #[cfg(feature = "tools")]
+        Command::Wire(wire) => wire.run(),
         Command::Config(config) => config.run(),
         #[cfg(feature = "tools")]
         Command::Completions(completions) => completions.run(),

@@ -4,8 +4,10 @@ mod map;
 mod scene;
 mod tune;
 mod vocabulary;
+mod wire;
 
 pub use map::Map;
 pub use scene::Scene;
 pub use tune::Tune;
 pub use vocabulary::Vocabulary;
+pub use wire::Wire;

@@ -96,16 +96,23 @@ fn with_a_tag() -> Rows {
 /// Frames that no receiver of the runs above accepts.
 fn refused() -> Rows {
     let order = frame(first_of_surface(false), 64, true, crc(Address::SURFACE, 1), &[(ChunkKind::Slot, hold())]);
+    let mut damaged = order.clone();
+    damaged[15] ^= 1;
+    // Sealed again: the CRC is right.
     let changed = |at: usize, bits: u8| {
-        let mut bytes = order.clone();
+        let mut bytes = order[..order.len() - 4].to_vec();
         bytes[at] ^= bits;
-        bytes
+        let check = crc(Address::SURFACE, 1).crc(&[&bytes]).expect("a CRC");
+        bytes.into_iter().chain(check).collect::<Vec<u8>>()
     };
     let [to, from] = [SURFACE_SESSION, VEHICLE_SESSION ^ 1].map(SessionId::from_random);
     let of_another_run = Seal::Run { mission: MISSION, to, from, number: 1 };
     let forged = Seal::Session(&session(false), Direction::Up, 1);
     let mut no_session = frame(surface_hello(false), 64, true, Seal::Crc(MISSION, 0), &introduction(true));
+    no_session.truncate(no_session.len() - 3);
     no_session[2..4].fill(0);
+    let check = Seal::Crc(MISSION, 0).crc(&[&no_session]).expect("a CRC");
+    no_session.extend(check);
     vec![
         (
             "refused: hello of another mission",
@@ -113,7 +120,7 @@ fn refused() -> Rows {
         ),
         ("refused: hello of run 0", no_session),
         ("refused: numbered frame of version 3", changed(0, 0b1110_0000)),
-        ("refused: a bit of the slot differs", changed(15, 1)),
+        ("refused: a bit of the slot differs", damaged),
         ("refused: base 0", changed(2, 1)),
         ("refused: a reserved bit is set", changed(1, 0b1_0000)),
         ("refused: cut short", order[..10].to_vec()),

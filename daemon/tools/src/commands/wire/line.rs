@@ -1,0 +1,165 @@
+//! One frame as a line of text, or as JSON.
+
+use super::fields::{self, Fields, text_of};
+use scenecast_protocol::wire::{Address, Chunk, Envelope, FrameError, Header, Listener, Stamp};
+use serde_json::{Value, json};
+use std::fmt;
+
+/// What a frame says, in fields.
+#[derive(Debug)]
+pub(super) struct FrameLine {
+    number: usize,
+    time_s: Option<f64>,
+    bytes: Vec<u8>,
+    content: Result<Content, FrameError>,
+}
+
+#[derive(Debug)]
+struct Content {
+    from: Address,
+    to: Address,
+    header: Fields,
+    chunks: Vec<(&'static str, Fields, Vec<u8>)>,
+    check: Check,
+}
+
+/// Whether the CRC or tag of a frame is right.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Check {
+    Right,
+    Wrong,
+    /// The mission, the key or the runs of both ends are not known.
+    Unknown,
+}
+
+impl FrameLine {
+    pub(super) fn of(number: usize, time_s: Option<f64>, bytes: &[u8], listener: Option<&mut Listener>) -> Self {
+        let content = match listener {
+            None => Envelope::decode(bytes, |_| true).map(|envelope| Content::unverified(&envelope, Check::Unknown)),
+            Some(listener) => listener.hear(bytes).map(|heard| match &heard.frame {
+                Some(frame) => Content::of(&frame.header, Some(frame.number), frame.chunks(), Check::Right),
+                None if heard.could_verify => Content::unverified(&heard.envelope, Check::Wrong),
+                None => Content::unverified(&heard.envelope, Check::Unknown),
+            }),
+        };
+        Self { number, time_s, bytes: bytes.to_vec(), content }
+    }
+
+    pub(super) fn to_json(&self) -> Value {
+        let mut line = json!({ "frame": self.number, "time_s": self.time_s, "bytes": fields::hex(&self.bytes) });
+        match &self.content {
+            Err(error) => line["error"] = error.to_string().into(),
+            Ok(content) => {
+                line["from"] = content.from.number().into();
+                line["to"] = content.to.number().into();
+                line["check"] = content.check.name().into();
+                content.header.iter().for_each(|(name, value)| line[*name] = value.clone());
+                let chunk = |(kind, fields, payload): &(&'static str, Fields, Vec<u8>)| {
+                    let mut chunk = json!({ "kind": kind, "payload": fields::hex(payload) });
+                    fields.iter().for_each(|(name, value)| chunk[*name] = value.clone());
+                    chunk
+                };
+                line["chunks"] = content.chunks.iter().map(chunk).collect();
+            }
+        }
+        line
+    }
+}
+
+impl fmt::Display for FrameLine {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{:5}", self.number)?;
+        if let Some(time_s) = self.time_s {
+            write!(f, " {time_s:10.3} s")?;
+        }
+        write!(f, " {:4} B  ", self.bytes.len())?;
+        let content = match &self.content {
+            Ok(content) => content,
+            Err(error) => return write!(f, "{error}"),
+        };
+        write!(f, "{} > {}, {}", named(content.from), named(content.to), content.check.name())?;
+        for (name, value) in &content.header {
+            write!(f, ", {name} {}", text_of(value))?;
+        }
+        for (kind, fields, _) in &content.chunks {
+            let fields: Vec<String> = fields.iter().map(|(name, value)| format!("{name} {}", text_of(value))).collect();
+            write!(f, "; {kind}{}{}", if fields.is_empty() { "" } else { ": " }, fields.join(", "))?;
+        }
+        Ok(())
+    }
+}
+
+fn named(address: Address) -> String {
+    match address {
+        Address::SURFACE => "surface".to_owned(),
+        Address::EVERYBODY => "everybody".to_owned(),
+        vehicle => format!("vehicle {}", vehicle.number()),
+    }
+}
+
+impl Check {
+    fn name(self) -> &'static str {
+        match self {
+            Self::Right => "right",
+            Self::Wrong => "wrong",
+            Self::Unknown => "unchecked",
+        }
+    }
+}
+
+impl Content {
+    /// The chunks of a numbered frame with a tag may be encrypted, so they are left out.
+    fn unverified(envelope: &Envelope<'_>, check: Check) -> Self {
+        let header = &envelope.header;
+        let may_be_encrypted = header.keyed && header.session.is_none();
+        Self::of(header, None, envelope.unverified_chunks().filter(|_| !may_be_encrypted), check)
+    }
+
+    /// `number` is the whole number of a verified frame.
+    fn of<'a>(header: &Header, number: Option<u64>, chunks: impl Iterator<Item = Chunk<'a>>, check: Check) -> Self {
+        let chunks =
+            chunks.map(|chunk| (fields::kind(chunk.kind), fields::of(&chunk), chunk.payload.to_vec())).collect();
+        Self { from: header.from, to: header.to, header: header_fields(header, number), chunks, check }
+    }
+}
+
+fn header_fields(header: &Header, number: Option<u64>) -> Fields {
+    let mut fields = Fields::new();
+    match header.session {
+        Some(session) => fields.push(("hello", format!("{:04x}", session.get()).into())),
+        None => {
+            fields.push(("number", number.unwrap_or(header.number.into()).into()));
+            fields.push(("base", header.base.into()));
+        }
+    }
+    if header.keyed {
+        fields.push(("keyed", true.into()));
+    }
+    fields.extend(header.nonce.map(|nonce| ("nonce", format!("{nonce:016x}").into())));
+    if header.remaining > 0 {
+        fields.push(("remaining", header.remaining.into()));
+    }
+    fields.extend(header.turn.map(|turn| match (header.from.is_vehicle(), turn) {
+        (true, 255) => ("turn_s", Value::Null),
+        (_, turn) => ("turn_s", (f64::from(turn) / 4.0).into()),
+    }));
+    match header.stamp {
+        None => {}
+        Some(Stamp::Surface { clock_ms, one_way }) => {
+            let one_way_s = one_way.map_or(Value::Null, |time| time.as_secs_f64().into());
+            fields.extend([("clock_ms", clock_ms.into()), ("one_way_s", one_way_s)]);
+        }
+        Some(Stamp::Vehicle { clock_ms, last_received, held }) => fields.extend([
+            ("clock_ms", clock_ms.into()),
+            ("last_received", last_received.into()),
+            ("held_s", held.as_secs_f64().into()),
+        ]),
+    }
+    if let Some(ack) = &header.ack {
+        fields.push(("ack", ack.horizon_low.into()));
+        if !ack.lost.is_empty() {
+            fields.push(("lost_before", ack.lost.clone().into()));
+        }
+    }
+    fields
+}
