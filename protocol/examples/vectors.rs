@@ -204,7 +204,7 @@ fn mission_id(digits: &str) -> MissionId {
 
 /// What a frame says, if it is sound.
 pub fn content(listener: &mut Listener, bytes: &[u8]) -> Option<Content> {
-    let frame = listener.hear(bytes).ok()?.frame?;
+    let frame = listener.hear(bytes).ok()?.frame.filter(|frame| frame.chunks().are_sound())?;
     let header = &frame.header;
     let stamp = header.stamp.map(|stamp| match stamp {
         Stamp::Surface { clock_ms, one_way } => {
@@ -332,7 +332,8 @@ impl Serialize for Hex {
 impl<'de> Deserialize<'de> for Hex {
     fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
         let text = String::deserialize(from)?;
-        let byte = |at: usize| u8::from_str_radix(text.get(at..at + 2)?, 16).ok();
+        let digit = |at: usize| text.get(at..=at)?.chars().next()?.to_digit(16);
+        let byte = |at: usize| Some((digit(at)? << 4 | digit(at + 1)?) as u8);
         let bytes: Option<_> = (0..text.len()).step_by(2).map(byte).collect();
         bytes.map(Self).ok_or_else(|| D::Error::custom("an even number of hexadecimal digits is expected"))
     }

@@ -1,6 +1,6 @@
 #!/bin/bash
 # An independent receiver and surface, written from WIRE.md alone, against the program: 0 when every map is equal cell for cell.
-# Usage: SCENECAST=program PROJECT=checkout ./check.sh    (loopback ports from PORT, default 9470; about two minutes)
+# Usage: SCENECAST=program PROJECT=checkout ./check.sh    (loopback ports from PORT, default 9470; about four minutes)
 set -u
 here=$(cd "$(dirname "$0")" && pwd); cd "$here"
 : "${SCENECAST:?path of the program}" "${PROJECT:?checkout of the project}"
@@ -31,5 +31,7 @@ P
 "$SCENECAST" key derive "$out/mission.key" --vehicle 1 --out "$out/auv-1.key" >/dev/null
 run clean 0 ""
 run lossy .2 "--key $out/auv-1.key --encrypt" --set link.key_file="$out/mission.key" --set link.encrypt=true
+run png 0 "" --set map.codec=png
+run small .2 "" --set link.frame_bytes=64
 [ $bad = 0 ] && echo "the second implementation agrees" || echo "the second implementation differs"
 exit $bad

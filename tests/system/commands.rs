@@ -80,6 +80,8 @@ fn the_same_arguments_give_the_same_report() {
             "5",
             "--set",
             "channel.loss=0.2",
+            "--set",
+            "world.kind=patches",
             "--out",
             out.to_str().unwrap(),
         ]);
@@ -321,7 +323,7 @@ fn every_command_has_a_manual_page() {
 fn progress_comes_as_lines_of_json_with_a_growing_share() {
     let dir = scratch("progress");
     let out = dir.join("out");
-    let settings = ["--duration", "40", "--set", "world.kind=patches", "--progress", "json"];
+    let settings = ["--duration", "20", "--set", "world.kind=patches", "--progress", "json"];
     let output = run(&[&["sim", "--out", out.to_str().unwrap()], &settings[..]].concat());
     let text = String::from_utf8_lossy(&output.stderr).into_owned();
     assert!(output.status.success(), "{text}");

@@ -132,6 +132,11 @@ pub struct InForceSummary {
 }
 
 impl InForceSummary {
+    /// The digest of the content in force of all slots.
+    pub fn digest(self) -> u16 {
+        self.digest
+    }
+
     /// Whether a slot has content in force.
     pub fn has(self, id: SlotId) -> bool {
         place_of(id).is_some_and(|place| self.slots & 0x80 >> place != 0)

@@ -150,7 +150,8 @@ pub fn patch(bytes: &[u8]) -> Option<ChunkPatch> {
     Some(ChunkPatch { codec, stride: header.stride, rect: header.patch })
 }
 
-/// The decisions of a chunk with the body `context`, in order; none of one with the body `png`.
+/// The decisions of a chunk with the body `context`, in order; none of one with the body `png`. They take a kilobyte a cell, and a
+/// wrong end of the body is no error: for chunks that [`decode`] accepts.
 pub fn trace(base: &LabelGrid, bytes: &[u8]) -> Result<Vec<Decision>, DecodeError> {
     let (header, bits, base) = open(base, bytes)?;
     match header.body {

@@ -1,11 +1,14 @@
 //! A third party that hears both ends: it learns their runs and the numbers of their frames, and so verifies and reads each frame.
 
+use super::WIRE_VERSION;
+use super::chunk::ChunkKind;
 use super::frame::{Envelope, Frame, FrameError, Seal};
-use super::header::{Address, MissionId, SessionId};
+use super::header::{Address, Header, MissionId, SessionId};
+use super::introduction::Introduction;
 use crate::seal::{Direction, HeldKey, LinkKey, SessionKey};
 use std::collections::{BTreeMap, VecDeque};
 
-/// The runs of surfaces that are remembered, and the pairs of runs of each vehicle.
+/// The most runs that are remembered of surfaces for each receiver of their hellos, and of pairs of each vehicle.
 const MAX_RUNS: usize = 16;
 
 /// Hears the frames of a surface and of its vehicles; it sends nothing.
@@ -13,8 +16,8 @@ const MAX_RUNS: usize = 16;
 pub struct Listener {
     mission: MissionId,
     keys: Vec<HeldKey>,
-    /// The runs and the calls of surfaces, the latest last.
-    surfaces: VecDeque<Run>,
+    /// By receiver, the runs in the hellos and calls of surfaces, the latest first.
+    surfaces: BTreeMap<Address, VecDeque<Run>>,
     /// The pairs of runs of each vehicle, that of its last frame first.
     pairs: BTreeMap<Address, VecDeque<Pair>>,
 }
@@ -24,14 +27,14 @@ pub struct Listener {
 pub struct Heard<'a> {
     /// The frame before it was verified.
     pub envelope: Envelope<'a>,
-    /// The frame, if it is authentic, or sound where it has no tag.
+    /// The frame, if its tag or CRC is right.
     pub frame: Option<Frame<'a>>,
     /// Whether what verifies it was known: the runs of both ends, and the key of a frame with a tag. If so, a frame that is not
     /// verified is damaged, forged, or of a run whose hellos were not heard.
     pub could_verify: bool,
 }
 
-/// A run, or none (0).
+/// A run; the default is that of an end whose run is not known.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 struct Run {
     session: u16,
@@ -51,92 +54,109 @@ struct Pair {
 impl Listener {
     /// Hears a mission. Frames with a tag need the key of the mission or of the vehicle.
     pub fn new(mission: MissionId, keys: Vec<HeldKey>) -> Self {
-        Self { mission, keys, surfaces: VecDeque::new(), pairs: BTreeMap::new() }
+        Self { mission, keys, surfaces: BTreeMap::new(), pairs: BTreeMap::new() }
     }
 
     /// Reads the next frame on air. Fails on bytes that are no frame.
     pub fn hear<'a>(&mut self, bytes: &'a [u8]) -> Result<Heard<'a>, FrameError> {
         let envelope = Envelope::decode(bytes, |_| true)?;
-        let (frame, could_verify) =
-            if envelope.header.kind().is_hello() { self.hello(&envelope) } else { self.numbered(&envelope) };
+        let (frame, could_verify) = match (envelope.header.session, envelope.header.from.is_vehicle()) {
+            (Some(session), true) => self.hello_of_vehicle(&envelope, session),
+            (Some(session), false) => self.hello_of_surface(&envelope, session),
+            (None, _) => self.numbered(&envelope),
+        };
         Ok(Heard { envelope, frame, could_verify })
     }
 
-    fn hello<'a>(&mut self, envelope: &Envelope<'a>) -> (Option<Frame<'a>>, bool) {
+    /// A hello or a call, sealed to nobody.
+    fn hello_of_surface<'a>(&mut self, envelope: &Envelope<'a>, session: SessionId) -> (Option<Frame<'a>>, bool) {
         let header = &envelope.header;
-        let vehicle = if header.from.is_vehicle() { header.from } else { header.to };
-        let keys = self.link_keys(header.keyed, vehicle);
-        let known: Vec<Run> = match header.from.is_vehicle() {
-            true => self.surfaces.iter().copied().collect(),
-            false => self.pairs.get(&vehicle).into_iter().flatten().map(|pair| pair.vehicle).collect(),
-        };
-        let could_verify = !(keys.is_empty() || header.from.is_vehicle() && known.is_empty());
-        for to in known.into_iter().chain([Run::default()]) {
-            let seals = keys.iter().map(|key| match key {
-                Some(key) => Seal::Hello(key, self.mission, to.session, to.nonce),
-                None => Seal::Crc(self.mission, to.session),
-            });
-            if let Some(frame) = seals.into_iter().find_map(|seal| envelope.open(&seal)) {
-                self.learn(&frame, to);
-                return (Some(frame), true);
-            }
+        let keys = self.link_keys(header, header.to);
+        let frame = self.open_hello(envelope, &keys, Run::default());
+        if frame.is_some() {
+            let run = Run::of(header, session);
+            let runs = self.surfaces.entry(header.to).or_default();
+            runs.retain(|&known| known != run);
+            runs.push_front(run);
+            runs.truncate(MAX_RUNS);
         }
-        (None, could_verify)
+        (frame, !keys.is_empty())
+    }
+
+    /// A hello that is sealed to a surface's run, or an answer to a call.
+    fn hello_of_vehicle<'a>(&mut self, envelope: &Envelope<'a>, session: SessionId) -> (Option<Frame<'a>>, bool) {
+        let header = &envelope.header;
+        let keys = self.link_keys(header, header.from);
+        let called = [header.from, Address::EVERYBODY].into_iter().filter_map(|to| self.surfaces.get(&to)).flatten();
+        let known: Vec<Run> = called.copied().collect();
+        let could_verify = !keys.is_empty() && !known.is_empty();
+        // One that was not called by the surface is sealed to no run.
+        let mut sealed_to = known.into_iter().chain([Run::default()]);
+        let opened = sealed_to.find_map(|to| Some((to, self.open_hello(envelope, &keys, to)?)));
+        let Some((surface, frame)) = opened else { return (None, could_verify) };
+        let vehicle = Run::of(header, session);
+        // The answer to a call has the run of the call, and a refusal offers none.
+        let is_offer = vehicle != surface && surface != Run::default() && !refuses(&frame);
+        if is_offer && envelope.version == WIRE_VERSION {
+            self.add_pair(header, surface, vehicle);
+        }
+        (Some(frame), true)
+    }
+
+    fn open_hello<'a>(&self, envelope: &Envelope<'a>, keys: &[Option<LinkKey>], to: Run) -> Option<Frame<'a>> {
+        keys.iter().find_map(|key| match key {
+            Some(key) => envelope.open(&Seal::Hello(key, self.mission, to.session, to.nonce)),
+            None => envelope.open(&Seal::Crc(self.mission, to.session)),
+        })
     }
 
     /// The keys of a hello or call; one `None` where a CRC is checked.
-    fn link_keys(&self, keyed: bool, vehicle: Address) -> Vec<Option<LinkKey>> {
-        let of = |key: &HeldKey| match vehicle.is_vehicle() {
-            true => key.vehicle(vehicle.number()).link().clone(),
+    fn link_keys(&self, header: &Header, other_end: Address) -> Vec<Option<LinkKey>> {
+        let of = |key: &HeldKey| match other_end.is_vehicle() {
+            true => key.vehicle(other_end.number()).link().clone(),
             false => key.calls(),
         };
-        if keyed { self.keys.iter().map(|key| Some(of(key))).collect() } else { vec![None] }
+        if header.keyed { self.keys.iter().map(|key| Some(of(key))).collect() } else { vec![None] }
     }
 
-    /// Takes over the run of a hello that was sealed to `to`.
-    fn learn(&mut self, frame: &Frame<'_>, to: Run) {
-        let header = &frame.header;
-        let run = Run { session: header.session.map_or(0, SessionId::get), nonce: header.nonce.unwrap_or(0) };
-        if !header.from.is_vehicle() {
-            self.surfaces.retain(|&known| known != run);
-            self.surfaces.push_back(run);
-            if self.surfaces.len() > MAX_RUNS {
-                self.surfaces.pop_front();
-            }
-        } else if to.session != run.session {
-            // The answer to a call has the session of the call and offers no run.
-            self.add_pair(header.from, to, run, header.keyed);
+    fn add_pair(&mut self, header: &Header, surface: Run, vehicle: Run) {
+        let pairs = self.pairs.entry(header.from).or_default();
+        if pairs.iter().any(|pair| (pair.surface, pair.vehicle) == (surface, vehicle)) {
+            return;
         }
-    }
-
-    fn add_pair(&mut self, of: Address, surface: Run, vehicle: Run, keyed: bool) {
+        let (mission, number) = (self.mission.0, header.from.number());
         let session = |key: &HeldKey, encrypt: bool| {
-            let link = key.vehicle(of.number());
-            link.link().session(self.mission.0, of.number(), surface.nonce, vehicle.nonce, encrypt)
+            key.vehicle(number).link().session(mission, number, surface.nonce, vehicle.nonce, encrypt)
         };
-        let keys = self.keys.iter().filter(|_| keyed);
+        let keys = self.keys.iter().filter(|_| header.keyed);
         let sessions = keys.flat_map(|key| [false, true].map(|encrypt| session(key, encrypt))).collect();
-        let pairs = self.pairs.entry(of).or_default();
-        if !pairs.iter().any(|pair| (pair.surface, pair.vehicle) == (surface, vehicle)) {
-            pairs.push_front(Pair { surface, vehicle, highest: [0; 2], sessions });
-            pairs.truncate(MAX_RUNS);
-        }
+        pairs.push_front(Pair { surface, vehicle, highest: [0; 2], sessions });
+        pairs.truncate(MAX_RUNS);
     }
 
     fn numbered<'a>(&mut self, envelope: &Envelope<'a>) -> (Option<Frame<'a>>, bool) {
         let header = &envelope.header;
         let vehicle = if header.from.is_vehicle() { header.from } else { header.to };
         let Some(pairs) = self.pairs.get_mut(&vehicle) else { return (None, false) };
+        let could_verify = pairs.iter().any(|pair| !header.keyed || !pair.sessions.is_empty());
         let opened = pairs.iter_mut().enumerate().find_map(|(i, pair)| Some((i, pair.open(self.mission, envelope)?)));
-        let could_verify = !header.keyed || pairs.iter().any(|pair| !pair.sessions.is_empty());
-        if let Some((i, frame)) = opened {
-            // A frame shows which pair is in use.
-            let pair = pairs.remove(i);
-            pairs.extend(pair);
-            pairs.rotate_right(1);
-            return (Some(frame), true);
+        let Some((i, frame)) = opened else { return (None, could_verify) };
+        if let Some(pair) = pairs.remove(i) {
+            pairs.push_front(pair);
         }
-        (None, could_verify)
+        (Some(frame), true)
+    }
+}
+
+/// Whether a vehicle's hello refuses the surface, because another one holds it.
+fn refuses(frame: &Frame<'_>) -> bool {
+    let introduction = frame.chunks().find(|chunk| chunk.kind == ChunkKind::Introduction);
+    introduction.is_some_and(|chunk| Introduction::decode(chunk.payload).is_ok_and(|said| said.refuses))
+}
+
+impl Run {
+    fn of(hello: &Header, session: SessionId) -> Self {
+        Self { session: session.get(), nonce: hello.nonce.unwrap_or(0) }
     }
 }
 
@@ -150,13 +170,79 @@ impl Pair {
         let highest = self.highest.get_mut(usize::from(is_up))?;
         let frame = [header.number_near(*highest)].into_iter().chain(header.numbers(*highest)).find_map(|number| {
             if header.keyed {
-                let seal = |key| Seal::Session(key, direction, number);
-                self.sessions.iter().find_map(|key| envelope.open(&seal(key)))
+                self.sessions.iter().find_map(|key| envelope.open(&Seal::Session(key, direction, number)))
             } else {
                 envelope.open(&Seal::Run { mission, to, from, number })
             }
         })?;
         *highest = (*highest).max(frame.number);
         Some(frame)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::frame::FrameBuilder;
+    use super::*;
+
+    const MISSION: MissionId = MissionId(7);
+
+    fn auv() -> Address {
+        Address::vehicle(1).unwrap()
+    }
+
+    /// A hello of a run, sealed to a run.
+    fn hello(from: Address, to: Address, session: u16, sealed_to: u16, refuses: bool) -> Vec<u8> {
+        let header = Header::hello(from, to, SessionId::from_random(session));
+        let mut builder = FrameBuilder::new(&header, 64);
+        let introduction = Introduction { refuses, ..Introduction::default() };
+        assert!(builder.push(ChunkKind::Introduction, &introduction.encode(26)));
+        builder.finish(&Seal::Crc(MISSION, sealed_to), true)
+    }
+
+    /// The first frame of the vehicle's run in a pair with the surface's run.
+    fn first(surface: u16, vehicle: u16) -> Vec<u8> {
+        let [to, from] = [surface, vehicle].map(SessionId::from_random);
+        let header = Header::numbered(auv(), Address::SURFACE, 1, 1);
+        FrameBuilder::new(&header, 64).finish(&Seal::Run { mission: MISSION, to, from, number: 1 }, true)
+    }
+
+    /// Whether each frame is verified, in turn.
+    fn heard(frames: &[Vec<u8>]) -> Vec<bool> {
+        let mut listener = Listener::new(MISSION, Vec::new());
+        frames.iter().map(|bytes| listener.hear(bytes).unwrap().frame.is_some()).collect()
+    }
+
+    #[test]
+    fn a_run_is_still_known_after_many_calls_and_hellos_to_other_vehicles() {
+        let other = Address::vehicle(2).unwrap();
+        let calls = (100..140).map(|call| hello(Address::SURFACE, Address::EVERYBODY, call, 0, false));
+        let others = (200..240).map(|run| hello(Address::SURFACE, other, run, 0, false));
+        let mut frames = vec![hello(Address::SURFACE, auv(), 5, 0, false)];
+        frames.extend(calls.chain(others));
+        frames.extend([hello(auv(), Address::SURFACE, 9, 5, false), first(5, 9)]);
+        assert!(heard(&frames).into_iter().all(|sound| sound));
+    }
+
+    #[test]
+    fn a_refusal_offers_no_run() {
+        let of = |refuses| {
+            [hello(Address::SURFACE, auv(), 5, 0, false), hello(auv(), Address::SURFACE, 9, 5, refuses), first(5, 9)]
+        };
+        assert_eq!(heard(&of(false)), [true, true, true]);
+        assert_eq!(heard(&of(true)), [true, true, false]);
+    }
+
+    #[test]
+    fn a_frame_whose_hellos_were_not_heard_cannot_be_verified() {
+        let mut listener = Listener::new(MISSION, Vec::new());
+        let mut could_verify = |bytes: Vec<u8>| {
+            let heard = listener.hear(&bytes).unwrap();
+            (heard.frame.is_some(), heard.could_verify)
+        };
+        assert_eq!(could_verify(first(5, 9)), (false, false));
+        assert_eq!(could_verify(hello(Address::SURFACE, auv(), 5, 0, false)), (true, true));
+        assert_eq!(could_verify(hello(auv(), Address::SURFACE, 9, 5, false)), (true, true));
+        assert_eq!(could_verify(first(5, 8)), (false, true));
     }
 }

@@ -23,7 +23,8 @@ impl ProgramArgument {
             Some(file) => file.clone(),
             None => std::env::current_exe().map_err(|e| UserError::Failed(e.to_string()))?.with_file_name("scenecast"),
         };
-        let build = if cfg!(debug_assertions) { "" } else { " --release" };
+        let is_release = path.parent().is_some_and(|folder| folder.ends_with("release"));
+        let build = if is_release { " --release" } else { "" };
         let missing =
             || UserError::Input(format!("{} is missing; cargo build{build} -p scenecast makes it", path.display()));
         path.is_file().then(|| path.clone()).ok_or_else(missing)

@@ -108,7 +108,7 @@ def golden_keys(doc):
         'tag, e = 1, down': sealed[-8:],
         'part 0 of the offer of a next key, M = sixteen bytes 5A': keys.offer(k, b'Z' * 16, 1, 0),
         'part 1 of it': keys.offer(k, b'Z' * 16, 1, 1),
-        'H': H, 'JOIN("hello", "", `0102`)': keys.join(b'hello', b'', hx('0102')), 'R': keys.root(k),
+        'K of vehicle 1': k, 'C': keys.call_key(M), 'H': H, 'JOIN("hello", "", `0102`)': keys.join(b'hello', b'', hx('0102')), 'R': keys.root(k),
         'session key, e = 0': plain.key, 'session key, e = 1': secret.key,
         'frame nonce, down': keys.frame_nonce(0, 5), 'frame nonce, up': keys.frame_nonce(1, 5),
         'JOIN(head, body)': keys.join(h, b)}
@@ -123,6 +123,14 @@ def upward(raw):
     return raw[1] >> 4 != 0 if raw[0] & 4 else raw[1] >> 7 == 1
 
 
+def well_formed(f):
+    """2.5, 11: whether no chunk ends after the frame."""
+    try:
+        return frame.chunks(f.body) is not None
+    except Short:
+        return False
+
+
 def frames(vectors):
     """Each frame verified by a follower without a key, with one, or with one and encryption; read; and written again."""
     mission, M = int(vectors['mission'], 16), hx(vectors['key'])
@@ -130,7 +138,7 @@ def frames(vectors):
     followers = [Follower(mission), *(Follower(mission, k, e, calls=calls) for e in (False, True))]
     for vector in vectors['frames']:
         name, raw = vector['name'], hx(vector['bytes'])
-        heard = [(fo, f) for fo in followers if (f := fo.take(upward(raw), raw))]
+        heard = [(fo, f) for fo in followers if (f := fo.take(upward(raw), raw)) and well_formed(f)]
         assert bool(heard) == (vector['says'] is not None) != name.startswith('refused: '), name
         for fo, f in heard:
             assert content(f) == vector['says'], (name, content(f))

@@ -124,6 +124,7 @@ fn refused() -> Rows {
         ("refused: base 0", changed(2, 1)),
         ("refused: a reserved bit is set", changed(1, 0b1_0000)),
         ("refused: cut short", order[..10].to_vec()),
+        ("refused: a chunk ends after the frame", changed(11, 1)),
         (
             "refused: sealed by a run that is not known",
             frame(answer_of_vehicle(false), 64, true, of_another_run, &answered()),
@@ -169,7 +170,7 @@ fn frames_of_the_document_are_vectors() {
     let section =
         DOCUMENT.split("## 11 Examples").nth(1).and_then(|rest| rest.split("## 12").next()).expect("section 11");
     let blocks: Vec<Vec<u8>> = section.split("```").skip(1).step_by(2).map(bytes_of).collect();
-    assert!(blocks.len() >= 3 && blocks.iter().all(|block| vectors.contains(block)), "{blocks:02X?}");
+    assert!(blocks.len() == 4 && blocks.iter().all(|block| vectors.contains(block)), "{blocks:02X?}");
 }
 
 /// The lines of a block that are digits alone.

@@ -150,7 +150,7 @@ mod tests {
     #[test]
     fn a_registered_survey_is_truer_than_a_drifting_one() {
         let sets =
-            ["survey.duration_s=240", "camera.width_px=480", "camera.height_px=360", "scene.refine_words_per_s=2000"];
+            ["survey.duration_s=180", "camera.width_px=480", "camera.height_px=360", "scene.refine_words_per_s=2000"];
         let ours = ["navigation.drift_percent=4", "operator.script=none", "survey.area_m=[40.0, 30.0, 52.0, 42.0]"];
         let sets: Vec<String> = sets.into_iter().chain(ours).map(str::to_owned).collect();
         let config = scenecast_config::load(None, &sets).unwrap();

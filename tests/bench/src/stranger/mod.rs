@@ -64,7 +64,7 @@ mod tests {
 
     #[test]
     fn the_same_seed_gives_the_same_attack() {
-        let run = |seed| measure_stranger(Protection::None, 800, seed, &mut |_| ());
+        let run = |seed| measure_stranger(Protection::None, 300, seed, &mut |_| ());
         assert_eq!(run(4), run(4));
         assert_ne!(run(4), run(5));
     }

@@ -1,11 +1,13 @@
 //! The fields of the chunks of a frame.
 
 use scenecast_protocol::coordinates::MapPoint;
-use scenecast_protocol::directive::{InForceDigests, InForcePart, SlotId, SlotState, VersionedSlot};
+use scenecast_protocol::directive::{InForceDigests, InForcePart, Slot, SlotId, SlotState, VersionedSlot};
 use scenecast_protocol::map::{ClassChunk, LayerChunk, TextPart};
 use scenecast_protocol::map_codec::{Codec, Stride, patch};
 use scenecast_protocol::object::Part;
-use scenecast_protocol::wire::{Chunk, ChunkKind, Intent, Introduction, PoseDetails, VehicleStatus};
+use scenecast_protocol::wire::{
+    Chunk, ChunkKind, FrameTie, Intent, Introduction, PoseDetails, VehicleMode, VehicleStatus,
+};
 use serde_json::{Value, json};
 
 /// Names and values in the order in which they are shown.
@@ -68,7 +70,9 @@ pub(super) fn of(chunk: &Chunk<'_>) -> Fields {
         ChunkKind::LabelClass => ClassChunk::decode(payload)
             .map(|class| [vec![("label", class.label.into())], text_part(&class.part)].concat()),
         ChunkKind::LabelTree => TextPart::decode(payload).map(|part| text_part(&part)),
-        ChunkKind::NextKey => payload.first().map(|part| vec![("part", (*part).into())]),
+        ChunkKind::NextKey => payload.split_first_chunk().map(|([part, fingerprint @ ..], _): (&[u8; 5], _)| {
+            vec![("part", (*part).into()), ("fingerprint", hex(fingerprint).into())]
+        }),
     };
     fields.unwrap_or_else(|| vec![("error", "it cannot be read".into())])
 }
@@ -96,7 +100,15 @@ fn point(at: MapPoint) -> Value {
 fn pose(payload: &[u8]) -> Option<Fields> {
     let mut status = VehicleStatus::default();
     status.read_pose(payload).ok()?;
-    let mut fields: Fields = vec![("mode", format!("{:?}", status.mode).to_lowercase().into())];
+    let mode = match status.mode {
+        VehicleMode::Survey => "survey",
+        VehicleMode::Hold => "hold",
+        VehicleMode::Return => "return",
+        VehicleMode::Surface => "surface",
+        VehicleMode::Abort => "abort",
+        VehicleMode::Done => "done",
+    };
+    let mut fields: Fields = vec![("mode", mode.into())];
     fields.extend(status.reason.name().map(|name| ("reason", name.into())));
     if status.autopilot_silent {
         fields.push(("autopilot_silent", true.into()));
@@ -113,6 +125,9 @@ fn pose(payload: &[u8]) -> Option<Fields> {
     fields.extend(status.waypoint.map(|waypoint| ("waypoint_m", point(waypoint))));
     if !status.path.points.is_empty() {
         fields.push(("path_m", status.path.points.iter().copied().map(point).collect()));
+    }
+    if status.path.continues {
+        fields.push(("path_continues", true.into()));
     }
     Some(fields)
 }
@@ -136,15 +151,21 @@ fn details(payload: &[u8]) -> Option<Fields> {
         ("intent", text.into())
     }));
     if let Some(registration) = &details.registration {
+        let placed_by = match registration.tie {
+            FrameTie::Odometry => "odometry",
+            FrameTie::FrameBefore => "the frame before",
+            FrameTie::EarlierTrack => "an earlier track",
+            FrameTie::Off => "odometry, as the registration is off",
+        };
         fields.extend([
-            ("placed_by", format!("{:?}", registration.tie).into()),
+            ("placed_by", placed_by.into()),
             ("placed_share", registration.share.into()),
             ("placed_sigma_m", registration.sigma_m.into()),
             ("loops", registration.closed.into()),
         ]);
     }
     if let Some(trail) = &details.trail {
-        // Places are told from the position in the pose, which another chunk has: here they are from there.
+        // The position is in the pose, another chunk: places count from it here.
         let corners = trail.corners(MapPoint::default());
         let corner = |ago_s: f64, at: MapPoint| json!([ago_s, at.x_m, at.y_m]);
         fields.push(("trail_s_m", corners.iter().map(|c| corner(c.ago_s.into(), c.place)).collect()));
@@ -171,7 +192,7 @@ fn report(payload: &[u8]) -> Option<Fields> {
     if let Some(summary) = &status.in_force {
         let names: Vec<Value> =
             SlotId::ALL.into_iter().filter(|&id| summary.has(id)).map(|id| id.name().into()).collect();
-        fields.push(("in_force", names.into()));
+        fields.extend([("in_force", names.into()), ("in_force_digest", format!("{:04x}", summary.digest()).into())]);
     }
     if let Some(placement) = &status.placement {
         fields.push(("placement", placement.version.into()));
@@ -198,8 +219,30 @@ fn decision(status: &VehicleStatus, id: SlotId) -> Option<Value> {
 
 fn slot(payload: &[u8]) -> Option<Fields> {
     let slot = VersionedSlot::decode(payload).ok()?;
-    let content = slot.content.map_or(Value::Null, |content| format!("{content:?}").into());
-    Some(vec![("slot", slot.id.name().into()), ("version", slot.version.into()), ("content", content)])
+    let mut fields: Fields = vec![("slot", slot.id.name().into()), ("version", slot.version.into())];
+    match slot.content {
+        None => fields.push(("error", "it cannot be read".into())),
+        Some(Slot::Constraints(order)) => fields.extend([("hold", order.hold.into()), ("abort", order.abort.into())]),
+        Some(Slot::Utility(order)) => {
+            let weights: Vec<Value> = order.weights.iter().map(|(label, weight)| json!([label, weight])).collect();
+            fields.extend([
+                ("epoch", order.epoch.into()),
+                ("unseen", order.exploration.into()),
+                ("curiosity", order.curiosity.into()),
+                ("weights", weights.into()),
+            ]);
+        }
+        Some(Slot::Fix(fix)) => fields.extend([
+            ("x_m", fix.position.east_m.into()),
+            ("y_m", fix.position.north_m.into()),
+            ("sigma_m", fix.sigma_m.into()),
+            ("age_s", fix.age_s.into()),
+        ]),
+        Some(Slot::Budget(budget)) => fields.push(("bits_per_s", budget.bits_per_s.into())),
+        // The others are outlines and settings; JSON has their bytes.
+        Some(_) => fields.push(("bytes", payload.len().into())),
+    }
+    Some(fields)
 }
 
 fn object(payload: &[u8]) -> Option<Fields> {

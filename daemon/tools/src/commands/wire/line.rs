@@ -1,7 +1,8 @@
 //! One frame as a line of text, or as JSON.
 
+use super::capture::Captured;
 use super::fields::{self, Fields, text_of};
-use scenecast_protocol::wire::{Address, Chunk, Envelope, FrameError, Header, Listener, Stamp};
+use scenecast_protocol::wire::{Address, Chunk, Chunks, Envelope, FrameError, Header, Listener, Stamp, WIRE_VERSION};
 use serde_json::{Value, json};
 use std::fmt;
 
@@ -11,7 +12,8 @@ pub(super) struct FrameLine {
     number: usize,
     time_s: Option<f64>,
     bytes: Vec<u8>,
-    content: Result<Content, FrameError>,
+    /// Or why there is none.
+    content: Result<Content, String>,
 }
 
 #[derive(Debug)]
@@ -20,6 +22,7 @@ struct Content {
     to: Address,
     header: Fields,
     chunks: Vec<(&'static str, Fields, Vec<u8>)>,
+    keyed: bool,
     check: Check,
 }
 
@@ -33,26 +36,24 @@ enum Check {
 }
 
 impl FrameLine {
-    pub(super) fn of(number: usize, time_s: Option<f64>, bytes: &[u8], listener: Option<&mut Listener>) -> Self {
-        let content = match listener {
-            None => Envelope::decode(bytes, |_| true).map(|envelope| Content::unverified(&envelope, Check::Unknown)),
-            Some(listener) => listener.hear(bytes).map(|heard| match &heard.frame {
-                Some(frame) => Content::of(&frame.header, Some(frame.number), frame.chunks(), Check::Right),
-                None if heard.could_verify => Content::unverified(&heard.envelope, Check::Wrong),
-                None => Content::unverified(&heard.envelope, Check::Unknown),
-            }),
+    /// `time_s` counts from the first frame.
+    pub(super) fn of(number: usize, time_s: Option<f64>, frame: &Captured, listener: Option<&mut Listener>) -> Self {
+        let bytes = &frame.bytes;
+        let content = match frame.is_cut {
+            true => Err("the capture has only the beginning of it".to_owned()),
+            false => Content::read(bytes, listener).map_err(|error| error.to_string()),
         };
-        Self { number, time_s, bytes: bytes.to_vec(), content }
+        Self { number, time_s, bytes: bytes.clone(), content }
     }
 
     pub(super) fn to_json(&self) -> Value {
         let mut line = json!({ "frame": self.number, "time_s": self.time_s, "bytes": fields::hex(&self.bytes) });
         match &self.content {
-            Err(error) => line["error"] = error.to_string().into(),
+            Err(error) => line["error"] = error.as_str().into(),
             Ok(content) => {
                 line["from"] = content.from.number().into();
                 line["to"] = content.to.number().into();
-                line["check"] = content.check.name().into();
+                line["check"] = content.check_name().into();
                 content.header.iter().for_each(|(name, value)| line[*name] = value.clone());
                 let chunk = |(kind, fields, payload): &(&'static str, Fields, Vec<u8>)| {
                     let mut chunk = json!({ "kind": kind, "payload": fields::hex(payload) });
@@ -77,7 +78,7 @@ impl fmt::Display for FrameLine {
             Ok(content) => content,
             Err(error) => return write!(f, "{error}"),
         };
-        write!(f, "{} > {}, {}", named(content.from), named(content.to), content.check.name())?;
+        write!(f, "{} > {}, {}", named(content.from), named(content.to), content.check_name())?;
         for (name, value) in &content.header {
             write!(f, ", {name} {}", text_of(value))?;
         }
@@ -97,29 +98,48 @@ fn named(address: Address) -> String {
     }
 }
 
-impl Check {
-    fn name(self) -> &'static str {
-        match self {
-            Self::Right => "right",
-            Self::Wrong => "wrong",
-            Self::Unknown => "unchecked",
+impl Content {
+    fn read(bytes: &[u8], listener: Option<&mut Listener>) -> Result<Self, FrameError> {
+        let Some(listener) = listener else {
+            return Envelope::decode(bytes, |_| true).map(|envelope| Self::unverified(&envelope, Check::Unknown));
+        };
+        let heard = listener.hear(bytes)?;
+        Ok(match &heard.frame {
+            Some(frame) => Self::of(&heard.envelope, Some(frame.number), frame.chunks(), Check::Right),
+            None if heard.could_verify => Self::unverified(&heard.envelope, Check::Wrong),
+            None => Self::unverified(&heard.envelope, Check::Unknown),
+        })
+    }
+
+    fn check_name(&self) -> &'static str {
+        match (self.check, self.keyed) {
+            (Check::Right, false) => "CRC right",
+            (Check::Right, true) => "tag right",
+            (Check::Wrong, false) => "CRC wrong",
+            (Check::Wrong, true) => "tag wrong",
+            (Check::Unknown, _) => "unchecked",
         }
     }
-}
 
-impl Content {
     /// The chunks of a numbered frame with a tag may be encrypted, so they are left out.
     fn unverified(envelope: &Envelope<'_>, check: Check) -> Self {
-        let header = &envelope.header;
-        let may_be_encrypted = header.keyed && header.session.is_none();
-        Self::of(header, None, envelope.unverified_chunks().filter(|_| !may_be_encrypted), check)
+        let may_be_encrypted = envelope.header.keyed && envelope.header.session.is_none();
+        let chunks = if may_be_encrypted { Chunks::default() } else { envelope.unverified_chunks() };
+        Self::of(envelope, None, chunks, check)
     }
 
     /// `number` is the whole number of a verified frame.
-    fn of<'a>(header: &Header, number: Option<u64>, chunks: impl Iterator<Item = Chunk<'a>>, check: Check) -> Self {
-        let chunks =
-            chunks.map(|chunk| (fields::kind(chunk.kind), fields::of(&chunk), chunk.payload.to_vec())).collect();
-        Self { from: header.from, to: header.to, header: header_fields(header, number), chunks, check }
+    fn of(envelope: &Envelope<'_>, number: Option<u64>, chunks: Chunks<'_>, check: Check) -> Self {
+        let Header { from, to, keyed, .. } = envelope.header;
+        let mut header = header_fields(&envelope.header, number);
+        if envelope.version != WIRE_VERSION {
+            header.push(("version", envelope.version.into()));
+        }
+        if !chunks.are_sound() {
+            header.push(("error", "a chunk ends after the frame".into()));
+        }
+        let read = |chunk: Chunk<'_>| (fields::kind(chunk.kind), fields::of(&chunk), chunk.payload.to_vec());
+        Self { from, to, header, chunks: chunks.map(read).collect(), keyed, check }
     }
 }
 

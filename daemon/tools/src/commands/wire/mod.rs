@@ -4,6 +4,7 @@ mod capture;
 mod fields;
 mod line;
 
+use capture::Capture;
 use clap::{Args, Subcommand};
 use line::FrameLine;
 use scenecast_config::read_regular;
@@ -15,20 +16,20 @@ use std::io::{self, ErrorKind, Read, Write};
 use std::path::{Path, PathBuf};
 
 /// The largest input: an hour of a fast modem has about a megabyte.
-const MAX_INPUT_BYTES: u64 = 1 << 28;
+const MAX_INPUT_BYTES: u64 = 1 << 26;
 const MAX_KEY_BYTES: u64 = 1 << 16;
 
 /// Show what frames on the wire say.
 #[derive(Debug, Subcommand)]
 pub enum Wire {
-    /// Print the frames of a capture or of a text, a line each.
     Decode(Decode),
 }
 
-/// Print the frames of a capture (pcap, pcapng) or of a text with the hexadecimal digits of a frame in each line.
+/// Print the frames of a capture or of a text, a line each.
 ///
-/// With --mission each frame is verified; frames with a tag need --key, too. Frames without their hellos cannot be verified. Fields
-/// have the names and units of the protocol; --json has the bytes, too.
+/// A capture (pcap, pcapng) has them in UDP datagrams, or as packets of the link type User 0; a text has the hexadecimal digits of a
+/// frame in each line. With --mission the CRC of each frame is checked, with --key its tag; a CRC proves no sender. The hellos of both
+/// ends must be among the frames. --json has all bytes, too.
 #[derive(Debug, Args)]
 #[command(after_help = EXAMPLES)]
 pub struct Decode {
@@ -41,7 +42,7 @@ pub struct Decode {
     /// Key file of the mission or of the vehicle
     #[arg(long, value_name = "FILE", requires = "mission")]
     key: Option<PathBuf>,
-    /// Take datagrams of this UDP port alone [default: of all ports]
+    /// Take datagrams from or to this UDP port alone [default: of all ports]
     #[arg(long, value_name = "PORT", value_parser = clap::value_parser!(u16).range(1..))]
     port: Option<u16>,
     /// Print a JSON object for each frame
@@ -71,7 +72,7 @@ impl Wire {
 impl Decode {
     fn run(self) -> Result<(), UserError> {
         let bytes = read_input(&self.input)?;
-        let frames = capture::frames(&bytes, self.port).map_err(|e| UserError::file(&self.input, e))?;
+        let Capture { frames, fault } = capture::frames(&bytes, self.port);
         let mut listener = match self.mission {
             Some(mission) => Some(Listener::new(mission, self.keys()?)),
             None => None,
@@ -80,7 +81,7 @@ impl Decode {
         let mut out = io::stdout().lock();
         for (number, frame) in (1..).zip(&frames) {
             let time_s = frame.time_s.map(|time_s| time_s - began_s);
-            let line = FrameLine::of(number, time_s, &frame.bytes, listener.as_mut());
+            let line = FrameLine::of(number, time_s, frame, listener.as_mut());
             let written = if self.json { writeln!(out, "{}", line.to_json()) } else { writeln!(out, "{line}") };
             match written {
                 Ok(()) => {}
@@ -89,7 +90,7 @@ impl Decode {
                 Err(error) => return Err(UserError::Failed(format!("standard output: {error}"))),
             }
         }
-        Ok(())
+        fault.map_or(Ok(()), |fault| Err(UserError::file(&self.input, fault)))
     }
 
     fn keys(&self) -> Result<Vec<HeldKey>, UserError> {
