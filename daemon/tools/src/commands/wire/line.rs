@@ -8,10 +8,10 @@ use std::fmt;
 
 /// What a frame says, in fields.
 #[derive(Debug)]
-pub(super) struct FrameLine {
+pub(super) struct FrameLine<'a> {
     number: usize,
     time_s: Option<f64>,
-    bytes: Vec<u8>,
+    bytes: &'a [u8],
     /// Or why there is none.
     content: Result<Content, String>,
 }
@@ -35,19 +35,19 @@ enum Check {
     Unknown,
 }
 
-impl FrameLine {
+impl<'a> FrameLine<'a> {
     /// `time_s` counts from the first frame.
-    pub(super) fn of(number: usize, time_s: Option<f64>, frame: &Captured, listener: Option<&mut Listener>) -> Self {
-        let bytes = &frame.bytes;
+    pub(super) fn of(number: usize, time_s: Option<f64>, frame: &'a Captured, listener: Option<&mut Listener>) -> Self {
+        let bytes = &frame.bytes[..];
         let content = match frame.is_cut {
             true => Err("the capture has only the beginning of it".to_owned()),
             false => Content::read(bytes, listener).map_err(|error| error.to_string()),
         };
-        Self { number, time_s, bytes: bytes.clone(), content }
+        Self { number, time_s, bytes, content }
     }
 
     pub(super) fn to_json(&self) -> Value {
-        let mut line = json!({ "frame": self.number, "time_s": self.time_s, "bytes": fields::hex(&self.bytes) });
+        let mut line = json!({ "frame": self.number, "time_s": self.time_s, "bytes": fields::hex(self.bytes) });
         match &self.content {
             Err(error) => line["error"] = error.as_str().into(),
             Ok(content) => {
@@ -67,7 +67,7 @@ impl FrameLine {
     }
 }
 
-impl fmt::Display for FrameLine {
+impl fmt::Display for FrameLine<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{:5}", self.number)?;
         if let Some(time_s) = self.time_s {

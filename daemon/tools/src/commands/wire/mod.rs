@@ -7,17 +7,16 @@ mod line;
 use capture::Capture;
 use clap::{Args, Subcommand};
 use line::FrameLine;
-use scenecast_config::read_regular;
+use scenecast_config::{read_key, read_regular};
 use scenecast_core::UserError;
 use scenecast_protocol::MissionId;
-use scenecast_protocol::seal::{HeldKey, KeyFile};
+use scenecast_protocol::seal::HeldKey;
 use scenecast_protocol::wire::Listener;
 use std::io::{self, ErrorKind, Read, Write};
 use std::path::{Path, PathBuf};
 
 /// The largest input: an hour of a fast modem has about a megabyte.
 const MAX_INPUT_BYTES: u64 = 1 << 26;
-const MAX_KEY_BYTES: u64 = 1 << 16;
 
 /// Show what frames on the wire say.
 #[derive(Debug, Subcommand)]
@@ -95,9 +94,10 @@ impl Decode {
 
     fn keys(&self) -> Result<Vec<HeldKey>, UserError> {
         let Some(path) = &self.key else { return Ok(Vec::new()) };
-        let text = String::from_utf8(read_regular(path, MAX_KEY_BYTES)?)
-            .map_err(|_| UserError::file(path, "the file is no text"))?;
-        let file = KeyFile::parse(&text).map_err(|e| UserError::file(path, e))?;
+        let (file, warning) = read_key(path)?;
+        if let Some(warning) = warning {
+            eprintln!("{warning}");
+        }
         Ok([file.key].into_iter().chain(file.next.map(HeldKey::Mission)).collect())
     }
 }
