@@ -110,9 +110,9 @@ impl Surface {
         let Some(end) = self.records.get(&vehicle).map(VehicleRecord::end_of_survey) else { return };
         if self.watches.entry(vehicle).or_default().handle_mode(mode, reason) {
             let text = match (mode, reason.name()) {
-                (_, Some(reason)) => format!("{}: {reason}", name_of_mode(mode)),
+                (_, Some(reason)) => format!("{}: {reason}", mode.name()),
                 (VehicleMode::Hold, None) => format!("holding: {end}"),
-                (_, None) => name_of_mode(mode).to_owned(),
+                (_, None) => mode.name().to_owned(),
             };
             self.log_fact(vehicle, LogKind::Mode, &text, now);
         }
@@ -142,17 +142,5 @@ pub(super) fn surface_name(name: SurfaceName) -> String {
     match name.as_str() {
         "" => "another surface".to_owned(),
         name => format!("the surface {name}"),
-    }
-}
-
-/// The mode for people.
-fn name_of_mode(mode: VehicleMode) -> &'static str {
-    match mode {
-        VehicleMode::Survey => "surveying",
-        VehicleMode::Hold => "holding",
-        VehicleMode::Return => "returning",
-        VehicleMode::Surface => "surfacing",
-        VehicleMode::Abort => "aborted",
-        VehicleMode::Done => "done",
     }
 }

@@ -33,6 +33,18 @@ pub enum VehicleMode {
 impl VehicleMode {
     const ALL: [Self; 6] = [Self::Survey, Self::Hold, Self::Return, Self::Surface, Self::Abort, Self::Done];
 
+    /// The name for people.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Survey => "surveying",
+            Self::Hold => "holding",
+            Self::Return => "returning",
+            Self::Surface => "surfacing",
+            Self::Abort => "aborted",
+            Self::Done => "done",
+        }
+    }
+
     fn code(self) -> u8 {
         Self::ALL.iter().position(|&m| m == self).unwrap_or_default() as u8
     }

@@ -228,14 +228,7 @@ fn mode(mode: VehicleMode) -> ReportedMode {
 
 /// Mode with its reason or purpose as a text.
 fn activity(s: &VehicleStatus, record: &VehicleRecord) -> String {
-    let mode = match s.mode {
-        VehicleMode::Survey => "surveying",
-        VehicleMode::Hold => "holding",
-        VehicleMode::Return => "returning",
-        VehicleMode::Surface => "surfacing",
-        VehicleMode::Abort => "aborted",
-        VehicleMode::Done => "done",
-    };
+    let mode = s.mode.name();
     if s.has_arrived() {
         return format!("{mode}: {}", record.end_of_survey());
     }

@@ -5,9 +5,7 @@ use scenecast_protocol::directive::{InForceDigests, InForcePart, Slot, SlotId, S
 use scenecast_protocol::map::{ClassChunk, LayerChunk, TextPart};
 use scenecast_protocol::map_codec::{Codec, Stride, patch};
 use scenecast_protocol::object::Part;
-use scenecast_protocol::wire::{
-    Chunk, ChunkKind, FrameTie, Intent, Introduction, PoseDetails, VehicleMode, VehicleStatus,
-};
+use scenecast_protocol::wire::{Chunk, ChunkKind, FrameTie, Intent, Introduction, PoseDetails, VehicleStatus};
 use serde_json::{Value, json};
 
 /// Names and values in the order in which they are shown.
@@ -100,15 +98,7 @@ fn point(at: MapPoint) -> Value {
 fn pose(payload: &[u8]) -> Option<Fields> {
     let mut status = VehicleStatus::default();
     status.read_pose(payload).ok()?;
-    let mode = match status.mode {
-        VehicleMode::Survey => "survey",
-        VehicleMode::Hold => "hold",
-        VehicleMode::Return => "return",
-        VehicleMode::Surface => "surface",
-        VehicleMode::Abort => "abort",
-        VehicleMode::Done => "done",
-    };
-    let mut fields: Fields = vec![("mode", mode.into())];
+    let mut fields: Fields = vec![("mode", status.mode.name().into())];
     fields.extend(status.reason.name().map(|name| ("reason", name.into())));
     if status.autopilot_silent {
         fields.push(("autopilot_silent", true.into()));
