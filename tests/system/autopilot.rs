@@ -78,7 +78,7 @@ impl Bench {
     fn new() -> Self {
         let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
         socket.set_read_timeout(Some(Duration::from_millis(20))).unwrap();
-        let config = MavlinkConfig { system: 1, arms: true, silence: Duration::from_secs(3) };
+        let config = MavlinkConfig { system: 1, component: None, arms: true, silence: Duration::from_secs(3) };
         let began = std::time::Instant::now();
         Self {
             pilot: Mavlink::new(config, Instant::ZERO),

@@ -77,14 +77,20 @@ fn nonsense_of_a_receiver_is_counted() {
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     let (_process, state) = surface("nmea", &format!("tcp:{}", listener.local_addr().unwrap()));
     let (mut stream, _) = listener.accept().unwrap();
-    let good = nmea::line("GPGGA,120000.00,2930.00000,N,03455.20000,E,1,09,1.0,0.0,M,0.0,M,,");
-    stream.write_all(good.replace("2930", "2931").as_bytes()).unwrap();
+    let good = |second: u32| {
+        nmea::line(&format!("GPGGA,1200{:02}.00,2930.00000,N,03455.20000,E,1,09,1.0,0.0,M,0.0,M,,", second % 60))
+    };
+    stream.write_all(good(0).replace("2930", "2931").as_bytes()).unwrap();
     stream.write_all(&[b'$'; 5000]).unwrap();
     stream.write_all(b"\r\n\xFF\xFE\r\n").unwrap();
     stream.write_all(nmea::line("GPGGA,120000.00,nan,N,inf,E,1,09,1.0,0.0,M,0.0,M,,").as_bytes()).unwrap();
     stream.write_all(nmea::line("GPGGA,120000.00,,,,,0,00,99.9,,,,,,").as_bytes()).unwrap();
-    stream.write_all(good.as_bytes()).unwrap();
-    wait_until("a good position after the nonsense", || state()["position"]["is_valid"] == true);
+    let mut second = 0;
+    wait_until("a good position after the nonsense", || {
+        second += 1;
+        let _ = stream.write_all(good(second).as_bytes());
+        state()["position"]["is_valid"] == true
+    });
     let refused = state()["position"]["rejected"].clone();
     let expected = serde_json::json!({ "checksum": 1, "too_long": 1, "malformed": 2, "no_position": 1 });
     assert_eq!(refused, expected);

@@ -3,6 +3,7 @@
 //! ```text
 //! $ talker(2) formatter(3) , field , field ... * checksum(2 hex digits: XOR of all between $ and *)
 //! ```
+//! A tag block of NMEA 4 (`\\s:GP0001,c:1790000000*25\\`) or a byte order mark may stand before it; sentences of the AIS begin with `!`.
 //! Source: the field lists of the u-blox M8 protocol specification (UBX-13003221) and of gpsd's "NMEA Revealed".
 
 use crate::geodesy::LatLon;
@@ -10,8 +11,9 @@ use crate::geodesy::LatLon;
 /// The content of a sentence, in the units of this program.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Sentence {
-    /// GGA, and RMC where there is no GGA: a position.
+    /// GGA, GNS, RMC, GLL: a position.
     Position {
+        kind: PositionKind,
         place: LatLon,
         /// Time of day of the measurement, seconds of UTC.
         utc_s: Option<f64>,
@@ -33,6 +35,15 @@ pub enum Sentence {
     Time(f64),
 }
 
+/// The sentences with a position, from the one that says least about its quality to the one that says most.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum PositionKind {
+    Gll,
+    Rmc,
+    Gns,
+    Gga,
+}
+
 /// Why a line is no sentence.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, thiserror::Error)]
 pub enum NmeaError {
@@ -46,8 +57,9 @@ pub enum NmeaError {
     Field,
 }
 
-/// Longest line that is taken: the standard allows 82 with its ends, receivers of many digits go beyond.
-pub const MAX_LINE: usize = 120;
+/// Longest line that is taken: the standard allows 82 with its ends, receivers of many digits go beyond, and a line may have a tag
+/// block, or several sentences where a line's end was lost.
+pub const MAX_LINE: usize = 512;
 
 const KNOT_M_S: f64 = 1852.0 / 3600.0;
 
@@ -60,9 +72,28 @@ pub fn line(body: &str) -> String {
     format!("${body}*{:02X}\r\n", checksum(body.as_bytes()))
 }
 
-/// The fields of a line whose checksum is right: talker with formatter first.
-pub fn fields(line: &[u8]) -> Result<Vec<&str>, NmeaError> {
-    let text = std::str::from_utf8(line).map_err(|_| NmeaError::NoSentence)?;
+/// The sentences of a line, each without its tag block and without a byte order mark before it. What has no beginning of a sentence,
+/// such as the rest of a line that was cut, is returned as it is.
+pub fn sentences(line: &[u8]) -> impl Iterator<Item = &[u8]> {
+    const BYTE_ORDER_MARK: &[u8] = b"\xEF\xBB\xBF";
+    let mut rest = line.strip_prefix(BYTE_ORDER_MARK).unwrap_or(line);
+    std::iter::from_fn(move || {
+        while let Some(tagged) = rest.strip_prefix(b"\\")
+            && let Some(end) = tagged.iter().position(|byte| *byte == b'\\')
+        {
+            rest = tagged.get(end + 1..)?;
+        }
+        let next =
+            rest.iter().skip(1).position(|byte| matches!(byte, b'$' | b'!' | b'\\')).map_or(rest.len(), |at| at + 1);
+        let (sentence, more) = rest.split_at_checked(next)?;
+        rest = more;
+        (!sentence.is_empty()).then_some(sentence)
+    })
+}
+
+/// The fields of a sentence whose checksum is right: talker with formatter first.
+pub fn fields(sentence: &[u8]) -> Result<Vec<&str>, NmeaError> {
+    let text = std::str::from_utf8(sentence).map_err(|_| NmeaError::NoSentence)?;
     let (body, sum) = text.trim().strip_prefix('$').and_then(|t| t.split_once('*')).ok_or(NmeaError::NoSentence)?;
     let sum = (sum.len() == 2).then(|| u8::from_str_radix(sum, 16).ok()).flatten().ok_or(NmeaError::Checksum)?;
     if sum != checksum(body.as_bytes()) {
@@ -71,14 +102,16 @@ pub fn fields(line: &[u8]) -> Result<Vec<&str>, NmeaError> {
     Ok(body.split(',').collect())
 }
 
-/// Parses a line; `None` for a sentence that is not used here.
-pub fn parse(line: &[u8]) -> Result<Vec<Sentence>, NmeaError> {
-    let all = fields(line)?;
+/// Parses a sentence; empty for one that is not used here.
+pub fn parse(sentence: &[u8]) -> Result<Vec<Sentence>, NmeaError> {
+    let all = fields(sentence)?;
     let f = |i: usize| all.get(i).copied().unwrap_or("");
     let formatter = f(0).get(2..).unwrap_or("");
     Ok(match formatter {
         "GGA" => vec![gga(&f)?],
+        "GNS" => vec![gns(&f)?],
         "RMC" => rmc(&f)?,
+        "GLL" => vec![gll(&f)?],
         "VTG" => motion(number(f(5))?.map(|knots| knots * KNOT_M_S), number(f(1))?)?.into_iter().collect(),
         "HDT" => degrees(f(1))?.map(Sentence::Heading).into_iter().collect(),
         // The second field of THS says how good it is; V is no heading.
@@ -89,27 +122,61 @@ pub fn parse(line: &[u8]) -> Result<Vec<Sentence>, NmeaError> {
 }
 
 fn gga<'a>(f: &impl Fn(usize) -> &'a str) -> Result<Sentence, NmeaError> {
-    // Quality 0 is none, 6 estimated, 7 typed in, 8 simulated: nothing that a vehicle should be sent to.
+    // Quality 0 is none, 6 estimated, 7 typed in, 8 simulated: nothing that a vehicle should be sent to. 9 is that of NovAtel's receivers
+    // with corrections of a satellite.
     let quality = f(6);
-    let is_corrected = matches!(quality, "2" | "4" | "5");
+    let is_corrected = matches!(quality, "2" | "4" | "5" | "9");
     if !is_corrected && !matches!(quality, "1" | "3") {
         return Ok(Sentence::NoPosition);
     }
-    let place = place(f(2), f(3), f(4), f(5))?.ok_or(NmeaError::Field)?;
     let hdop = number(f(8))?.filter(|h| *h > 0.0);
-    Ok(Sentence::Position { place, utc_s: time(f(1))?, hdop, is_corrected })
+    position(PositionKind::Gga, [f(2), f(3), f(4), f(5)], f(1), hdop, is_corrected)
+}
+
+/// GNS has a letter of its mode for each system of satellites.
+fn gns<'a>(f: &impl Fn(usize) -> &'a str) -> Result<Sentence, NmeaError> {
+    let is_corrected = f(6).contains(['D', 'R', 'F', 'P']);
+    if !is_corrected && !f(6).contains('A') {
+        return Ok(Sentence::NoPosition);
+    }
+    let hdop = number(f(8))?.filter(|h| *h > 0.0);
+    position(PositionKind::Gns, [f(2), f(3), f(4), f(5)], f(1), hdop, is_corrected)
+}
+
+/// Whether a position of RMC or GLL is measured, by its status and its mode: E is estimated, M typed in, S simulated, N none.
+fn is_measured(status: &str, mode: &str) -> bool {
+    status == "A" && !matches!(mode, "E" | "M" | "S" | "N")
+}
+
+fn is_mode_corrected(mode: &str) -> bool {
+    matches!(mode, "D" | "R" | "F" | "P")
 }
 
 fn rmc<'a>(f: &impl Fn(usize) -> &'a str) -> Result<Vec<Sentence>, NmeaError> {
-    // Mode E is estimated, M typed in, S simulated, N none.
-    if f(2) != "A" || matches!(f(12), "E" | "M" | "S" | "N") {
+    if !is_measured(f(2), f(12)) {
         return Ok(vec![Sentence::NoPosition]);
     }
-    let place = place(f(3), f(4), f(5), f(6))?.ok_or(NmeaError::Field)?;
-    let at =
-        Sentence::Position { place, utc_s: time(f(1))?, hdop: None, is_corrected: matches!(f(12), "D" | "R" | "F") };
+    let at = position(PositionKind::Rmc, [f(3), f(4), f(5), f(6)], f(1), None, is_mode_corrected(f(12)))?;
     let motion = motion(number(f(7))?.map(|knots| knots * KNOT_M_S), number(f(8))?)?;
     Ok(std::iter::once(at).chain(motion).collect())
+}
+
+fn gll<'a>(f: &impl Fn(usize) -> &'a str) -> Result<Sentence, NmeaError> {
+    if !is_measured(f(6), f(7)) {
+        return Ok(Sentence::NoPosition);
+    }
+    position(PositionKind::Gll, [f(1), f(2), f(3), f(4)], f(5), None, is_mode_corrected(f(7)))
+}
+
+fn position(
+    kind: PositionKind,
+    [lat, ns, lon, ew]: [&str; 4],
+    utc: &str,
+    hdop: Option<f64>,
+    is_corrected: bool,
+) -> Result<Sentence, NmeaError> {
+    let place = place(lat, ns, lon, ew)?.ok_or(NmeaError::Field)?;
+    Ok(Sentence::Position { kind, place, utc_s: time(utc)?, hdop, is_corrected })
 }
 
 fn motion(speed_m_s: Option<f64>, course_deg: Option<f64>) -> Result<Option<Sentence>, NmeaError> {
@@ -185,7 +252,7 @@ mod tests {
     fn sentences_of_receivers_are_read() {
         // From the u-blox M8 protocol specification.
         let gga = b"$GPGGA,092725.00,4717.11399,N,00833.91590,E,1,08,1.01,499.6,M,48.0,M,,*5B";
-        let [Sentence::Position { place, utc_s, hdop, is_corrected }] = parse(gga).unwrap()[..] else { panic!() };
+        let [Sentence::Position { place, utc_s, hdop, is_corrected, .. }] = parse(gga).unwrap()[..] else { panic!() };
         assert!((place.lat_deg - 47.285_233).abs() < 1e-6 && (place.lon_deg - 8.565_265).abs() < 1e-6);
         assert_eq!((utc_s, hdop, is_corrected), (Some(34_045.0), Some(1.01), false));
         let rmc = b"$GPRMC,083559.00,A,4717.11437,N,00833.91522,E,0.004,77.52,091202,,,A*57";
@@ -220,7 +287,57 @@ mod tests {
         assert_eq!(parse(line("HEHDT,,T").as_bytes()), Ok(vec![]));
     }
 
+    #[test]
+    fn positions_of_other_sentences_and_talkers_are_read() {
+        let place = "4717.11399,N,00833.91590,E";
+        let said = [
+            format!("GNGNS,092725.00,{place},AAN,12,0.9,499.6,48.0,,,S"),
+            format!("GLGNS,092725.00,{place},NRN,12,0.9,499.6,48.0,,,S"),
+            format!("GBGLL,{place},092725.00,A,A"),
+            format!("GQGLL,{place},092725.00,A,D"),
+            format!("GAGGA,092725.00,{place},9,08,1.01,499.6,M,48.0,M,,"),
+        ]
+        .map(|body| match parse(line(&body).as_bytes()).unwrap()[..] {
+            [Sentence::Position { kind, utc_s: Some(34_045.0), is_corrected, .. }] => (kind, is_corrected),
+            ref other => panic!("{body}: {other:?}"),
+        });
+        use PositionKind::*;
+        assert_eq!(said, [(Gns, false), (Gns, true), (Gll, false), (Gll, true), (Gga, true)]);
+        for none in [format!("GNGNS,,{place},NN,,,,,,,"), format!("GPGLL,{place},,V,N"), format!("GPGLL,{place},,A,E")]
+        {
+            assert_eq!(parse(line(&none).as_bytes()), Ok(vec![Sentence::NoPosition]), "{none}");
+        }
+    }
+
+    #[test]
+    fn a_line_is_split_into_its_sentences_without_what_stands_before_them() {
+        let split =
+            |text: &str| sentences(text.as_bytes()).map(|s| String::from_utf8(s.to_vec()).unwrap()).collect::<Vec<_>>();
+        assert_eq!(split(r"\s:GP0001,c:1790000000*25\$GPGGA,1*00"), ["$GPGGA,1*00"]);
+        assert_eq!(split("\u{FEFF}$GPGGA,1*00"), ["$GPGGA,1*00"]);
+        assert_eq!(split("$GPGGA,1*00$GPRMC,2*00!AIVDM,3*00"), ["$GPGGA,1*00", "$GPRMC,2*00", "!AIVDM,3*00"]);
+        assert_eq!(split("$GPGGA,10$GPRMC,2*00"), ["$GPGGA,10", "$GPRMC,2*00"], "the first one is cut");
+        assert_eq!(split("9,M,,*5B$GPRMC,2*00"), ["9,M,,*5B", "$GPRMC,2*00"]);
+        assert_eq!(
+            (split(""), split("garbage"), split(r"\half")),
+            (vec![], vec!["garbage".to_owned()], vec![r"\half".to_owned()])
+        );
+        let lower = line("GPRMC,083559.00,A,4717.11437,N,00833.91522,E,0.004,77.52,091202,,,A").to_lowercase();
+        let lower = format!(
+            "$GPRMC,083559.00,A,4717.11437,N,00833.91522,E,0.004,77.52,091202,,,A{}",
+            &lower[lower.find('*').unwrap()..]
+        );
+        assert!(parse(lower.as_bytes()).is_ok(), "{lower}");
+    }
+
     proptest! {
+        #[test]
+        fn any_line_is_split(
+            bytes in proptest::collection::vec(prop_oneof![Just(b'$'), Just(b'!'), Just(b'\\'), any::<u8>()], 0..130),
+        ) {
+            prop_assert!(sentences(&bytes).map(<[u8]>::len).sum::<usize>() <= bytes.len());
+        }
+
         #[test]
         fn any_bytes_are_read_or_refused(bytes in proptest::collection::vec(any::<u8>(), 0..130)) {
             let _ = parse(&bytes);

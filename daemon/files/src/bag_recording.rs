@@ -51,13 +51,14 @@ impl Contents {
                         contents.poses.push((topic, stamp, pose));
                     }
                 }
-                Ok(None) => return Ok(contents),
-                Err(error) if contents.topics.is_empty() => return Err(UserError::file(path, error)),
-                Err(error) => {
-                    contents.damage = Some(error);
-                    return Ok(contents);
-                }
+                Ok(None) => break,
+                // The next file of a split bag follows.
+                Err(error) => contents.damage = contents.damage.or(Some(error)),
             }
+        }
+        match contents.damage {
+            Some(error) if contents.topics.is_empty() => Err(UserError::file(path, error)),
+            _ => Ok(contents),
         }
     }
 

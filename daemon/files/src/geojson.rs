@@ -1,4 +1,4 @@
-//! Reads a fence, or weighted areas, from a GeoJSON file (RFC 7946).
+//! Reads a fence, or weighted areas, from a GeoJSON file (RFC 7946). Features without a geometry are passed over.
 
 use scenecast_core::{LatLon, MAX_DISTANCE_M, TangentPlane, UserError, fence_of};
 use scenecast_protocol::directive::Fence;
@@ -6,6 +6,9 @@ use serde_json::Value;
 use std::path::Path;
 
 const MAX_BYTES: u64 = 1 << 20;
+
+/// Corners so close to each other are the same, metres.
+const SAME_M: f64 = 0.001;
 
 /// Fence, keep-outs and return point of a file, in metres east and north of the mission's origin.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -58,6 +61,7 @@ pub fn read_areas(file: &Path, frame: CoordinateFrame) -> Result<Vec<AreaShape>,
 }
 
 fn areas_of(whole: &Value, frame: CoordinateFrame) -> Result<Vec<AreaShape>, String> {
+    check_crs(whole, frame)?;
     let features = match whole["type"].as_str() {
         Some("FeatureCollection") => whole["features"].as_array().ok_or("the collection has no list of features")?,
         Some("Feature") => std::slice::from_ref(whole),
@@ -75,18 +79,46 @@ fn areas_of(whole: &Value, frame: CoordinateFrame) -> Result<Vec<AreaShape>, Str
         let area = outline.and_then(|outline| Ok(AreaShape { outline, weight: weight? }));
         area.map_err(|line| format!("features[{i}]: {line}"))
     };
+    let features: Vec<_> = features.iter().enumerate().filter(|(_, feature)| !is_empty(&feature["geometry"])).collect();
     if features.is_empty() {
         return Err("it has no area; scenecast ctl areas clear removes all areas".to_owned());
     }
-    features.iter().enumerate().map(area).collect()
+    features.into_iter().map(area).collect()
+}
+
+/// Whether a feature has no place: its geometry is null or has no coordinates.
+fn is_empty(geometry: &Value) -> bool {
+    geometry.is_null() || geometry["coordinates"].as_array().is_some_and(Vec::is_empty)
+}
+
+/// Refuses degrees of another datum: the same numbers lie a hundred metres off. The member `crs` is of GeoJSON before RFC 7946.
+fn check_crs(whole: &Value, frame: CoordinateFrame) -> Result<(), String> {
+    let crs = &whole["crs"];
+    if crs.is_null() || matches!(frame, CoordinateFrame::Metres) {
+        return Ok(());
+    }
+    let name = crs["properties"]["name"].as_str().map_or_else(|| crs.to_string(), str::to_owned);
+    let code = name.rsplit([':', '/']).next().unwrap_or_default();
+    let is_wgs84 = matches!(code, "CRS84" | "WGS84") || code == "4326" && name.to_ascii_uppercase().contains("EPSG");
+    if is_wgs84 {
+        return Ok(());
+    }
+    let convert = "ogr2ogr -t_srs EPSG:4326 NEW.geojson OLD.geojson converts it";
+    Err(format!("crs {name}: only longitude and latitude of WGS 84 are read, as RFC 7946 has it; {convert}"))
 }
 
 fn read_json(file: &Path) -> Result<Value, UserError> {
     let text = scenecast_config::read_regular(file, MAX_BYTES)?;
-    serde_json::from_slice(&text).map_err(|e| UserError::file(file, format!("it is not JSON: {e}")))
+    if text.starts_with(b"\xFF\xFE") || text.starts_with(b"\xFE\xFF") {
+        return Err(UserError::file(file, "it is UTF-16; GeoJSON is UTF-8"));
+    }
+    const BYTE_ORDER_MARK: &[u8] = b"\xEF\xBB\xBF";
+    let text = text.strip_prefix(BYTE_ORDER_MARK).unwrap_or(&text);
+    serde_json::from_slice(text).map_err(|e| UserError::file(file, format!("it is not JSON: {e}")))
 }
 
 fn shapes_of(whole: &Value, frame: CoordinateFrame) -> Result<FenceShapes, String> {
+    check_crs(whole, frame)?;
     let mut order = FenceShapes::default();
     match whole["type"].as_str() {
         Some("FeatureCollection") => {
@@ -113,6 +145,9 @@ fn shapes_of(whole: &Value, frame: CoordinateFrame) -> Result<FenceShapes, Strin
 /// Adds a feature to the order.
 fn add(order: &mut FenceShapes, feature: &Value, frame: CoordinateFrame) -> Result<(), String> {
     let (geometry, role) = (&feature["geometry"], role(feature)?);
+    if is_empty(geometry) {
+        return Ok(());
+    }
     let coordinates = &geometry["coordinates"];
     let rings: Vec<&Value> = match geometry["type"].as_str() {
         Some("Point") if matches!(role, None | Some(FeatureRole::ReturnPoint)) => {
@@ -136,7 +171,11 @@ fn add(order: &mut FenceShapes, feature: &Value, frame: CoordinateFrame) -> Resu
             Some(FeatureRole::ReturnPoint) => return Err("the return point is a Point".to_owned()),
             Some(FeatureRole::Fence) | None if order.fence.is_none() => order.fence = Some(outline),
             Some(FeatureRole::Fence) | None => {
-                return Err("a second fence: an area to stay out of has the property role = keep_out".to_owned());
+                return Err(
+                    "a second fence: an area to stay out of has the property role = keep_out; a fence that is cut at 180 degrees is to \
+                     be drawn whole, with longitudes beyond 180"
+                        .to_owned(),
+                );
             }
         }
     }
@@ -160,11 +199,14 @@ fn outline(polygon: &Value, frame: CoordinateFrame) -> Result<Vec<[f64; 2]>, Str
         return Err(format!("{} holes: draw each as a polygon with role = keep_out", rings.len().saturating_sub(1)));
     };
     let corners = ring.as_array().ok_or("the outline is not a list of corners")?;
-    let mut corners: Vec<&Value> = corners.iter().collect();
-    if corners.len() > 1 && corners.first() == corners.last() {
+    let mut corners: Vec<[f64; 2]> = corners.iter().map(|corner| place(corner, frame)).collect::<Result<_, _>>()?;
+    // Programs that project the corners may close the outline with a small error.
+    if let [[x, y], .., [last_x, last_y]] = corners[..]
+        && (last_x - x).hypot(last_y - y) < SAME_M
+    {
         corners.pop();
     }
-    corners.into_iter().map(|corner| place(corner, frame)).collect()
+    Ok(corners)
 }
 
 fn place(at: &Value, frame: CoordinateFrame) -> Result<[f64; 2], String> {
@@ -175,7 +217,9 @@ fn place(at: &Value, frame: CoordinateFrame) -> Result<[f64; 2], String> {
             Err(format!("[{x}, {y}] m is more than {} km from the mission's origin", MAX_DISTANCE_M / 1000.0))
         }
         CoordinateFrame::Wgs84(plane) => {
-            let place = LatLon::new(y, x).ok_or(format!(
+            // A shape across 180 degrees may have longitudes beyond.
+            let turned = if (180.0..=360.0).contains(&x.abs()) { x - 360.0 * x.signum() } else { x };
+            let place = LatLon::new(y, turned).ok_or(format!(
                 "[{x}, {y}] is not a longitude and latitude; --metres reads metres east and north of the origin"
             ))?;
             let far_m = plane.distance_m(place);
@@ -252,6 +296,63 @@ mod tests {
         assert!(
             read(SQUARE.replace("60", "600").as_str(), CoordinateFrame::Wgs84(plane)).unwrap_err().contains("--metres")
         );
+    }
+
+    #[test]
+    fn only_degrees_of_wgs_84_are_read() {
+        let frame = CoordinateFrame::Wgs84(TangentPlane::new(LatLon::new(0.0, 0.0).unwrap()));
+        let near = SQUARE.replace("90", "0.2").replace("60", "0.1");
+        let with_crs = |crs: &str| read(&near.replacen('{', &format!("{{\"crs\": {crs}, "), 1), frame);
+        let named = |name: &str| with_crs(&format!(r#"{{"type": "name", "properties": {{"name": "{name}"}}}}"#));
+        for name in [
+            "urn:ogc:def:crs:OGC:1.3:CRS84",
+            "EPSG:4326",
+            "urn:ogc:def:crs:EPSG::4326",
+            "http://www.opengis.net/def/crs/OGC/1.3/CRS84",
+        ] {
+            assert!(named(name).is_ok(), "{name}");
+        }
+        assert!(with_crs("null").is_ok());
+        for name in ["urn:ogc:def:crs:EPSG::4230", "EPSG:32632", "EPSG:14326", "ESRI:4326"] {
+            let error = named(name).unwrap_err();
+            assert!(error.contains(name) && error.contains("ogr2ogr -t_srs EPSG:4326"), "{error}");
+        }
+        assert!(with_crs(r#"{"type": "link", "properties": {"href": "x.prj"}}"#).unwrap_err().contains("x.prj"));
+        let areas = near.replacen('{', r#"{"crs": {"properties": {"name": "EPSG:4230"}}, "#, 1);
+        assert!(areas_of(&serde_json::from_str(&areas).unwrap(), frame).unwrap_err().contains("EPSG:4230"));
+    }
+
+    #[test]
+    fn what_editors_write_around_a_fence_does_not_refuse_it() {
+        let plain = format!(r#"{{"geometry": {SQUARE}}}"#);
+        let null = r#"{"type": "Feature", "properties": {}, "geometry": null}"#;
+        let empty = r#"{"geometry": {"type": "Polygon", "coordinates": []}}"#;
+        let json = format!(r#"{{"type": "FeatureCollection", "features": [{null}, {plain}, {empty}]}}"#);
+        let fence = read(&json, CoordinateFrame::Metres).unwrap().fence;
+        assert_eq!(fence.unwrap().len(), 4);
+        let nearly = SQUARE.replace("[0, 60], [0, 0]", "[0, 60], [1e-9, 0]");
+        assert_eq!(read(&nearly, CoordinateFrame::Metres).unwrap().fence.unwrap().len(), 4);
+        let file = std::env::temp_dir().join(format!("scenecast-{}-bom.geojson", std::process::id()));
+        std::fs::write(&file, format!("\u{FEFF}{SQUARE}")).unwrap();
+        assert!(read_fence(&file, CoordinateFrame::Metres).is_ok());
+        std::fs::write(&file, b"\xFF\xFE{\0").unwrap();
+        assert!(read_fence(&file, CoordinateFrame::Metres).unwrap_err().to_string().contains("UTF-16"));
+        std::fs::remove_file(file).unwrap();
+    }
+
+    #[test]
+    fn a_fence_may_cross_the_meridian_of_180_degrees() {
+        let frame = CoordinateFrame::Wgs84(TangentPlane::new(LatLon::new(-16.85, 179.9995).unwrap()));
+        let fence = |east: f64| {
+            let json = format!(
+                r#"{{"type": "Polygon", "coordinates": [[[179.999, -16.86], [{east}, -16.86], [{east}, -16.85], [179.999, -16.86]]]}}"#
+            );
+            read(&json, frame).unwrap().fence.unwrap()
+        };
+        let (signed, beyond) = (fence(-179.999), fence(180.001));
+        for (a, b) in signed.iter().zip(&beyond) {
+            assert!((a[0] - b[0]).hypot(a[1] - b[1]) < 1e-6 && a[0].abs() < 200.0, "{a:?} {b:?}");
+        }
     }
 
     #[test]

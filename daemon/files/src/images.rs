@@ -3,6 +3,7 @@
 use scenecast_config::read_regular;
 use scenecast_core::UserError;
 use scenecast_core::label_picture::{Indices, read_indices};
+use scenecast_sensors::DecodeError;
 use std::path::Path;
 
 /// Size of the largest image file that is read, bytes.
@@ -11,15 +12,11 @@ const MAX_BYTES: u64 = 4 << 30;
 /// An image in any format that the program knows; a JPEG that is cut off is refused.
 pub fn read_image(path: &Path) -> Result<image::DynamicImage, UserError> {
     let bytes = read_regular(path, MAX_BYTES)?;
-    if scenecast_sensors::is_cut_jpeg(&bytes) {
-        return Err(UserError::file(
-            path,
-            "not an image that can be read: the JPEG has no end, so a part of it is missing",
-        ));
-    }
-    let reader = image::ImageReader::new(std::io::Cursor::new(bytes));
-    let reader = reader.with_guessed_format().map_err(|e| UserError::file(path, e))?;
-    reader.decode().map_err(|e| UserError::file(path, format!("not an image that can be read: {e}")))
+    let refused = |e: DecodeError| match e {
+        DecodeError::Broken(_) => UserError::file(path, e),
+        e => UserError::file(path, format!("not an image that can be read: {e}")),
+    };
+    scenecast_sensors::decode_upright(&bytes, image::Limits::default()).map_err(refused)
 }
 
 /// Classes from a grey or indexed image of `size` pixels: the pixel value is the class.

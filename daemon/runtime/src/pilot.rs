@@ -21,7 +21,10 @@ pub(super) fn autopilot(
     let a = &config.autopilot;
     let silence = Duration::from_secs_f64(a.timeout_s);
     Ok(Some(match a.kind {
-        AutopilotKind::Mavlink => Box::new(Mavlink::new(MavlinkConfig { system: a.system, arms: a.arm, silence }, now)),
+        AutopilotKind::Mavlink => {
+            let component = Some(a.component).filter(|component| *component > 0);
+            Box::new(Mavlink::new(MavlinkConfig { system: a.system, component, arms: a.arm, silence }, now))
+        }
         AutopilotKind::Nmea => Box::new(Nmea::new(true, silence, now)),
         AutopilotKind::Log => Box::new(Nmea::new(false, silence, now)),
         AutopilotKind::Rehearsal => match simulated {

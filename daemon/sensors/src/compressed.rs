@@ -1,7 +1,7 @@
 //! Compressed images: JPEG, PNG, PPM and TIFF.
 
-use crate::{BitDepth, Stamp};
-use image::{DynamicImage, ImageBuffer, ImageReader, Limits, Rgb, RgbImage};
+use crate::{BitDepth, Stamp, complete_length};
+use image::{DynamicImage, ImageBuffer, ImageDecoder, ImageFormat, ImageReader, Limits, Rgb, RgbImage};
 use std::io::Cursor;
 
 /// Pixels of the largest image that is decoded.
@@ -20,32 +20,57 @@ pub enum DecodeError {
     Broken(String),
 }
 
-/// Whether the end of a JPEG is missing. The decoder fills the missing part with grey, which would be mapped as sea floor.
-pub fn is_cut_jpeg(bytes: &[u8]) -> bool {
-    bytes.starts_with(&[0xFF, 0xD8]) && !bytes.windows(2).rev().take(4096).any(|w| w == [0xFF, 0xD9])
+/// Whether the end of a JPEG is missing. The decoder fills the missing part with grey, which would be mapped as sea floor. What
+/// follows the end, as of cameras that write blocks, does not count.
+fn is_cut_jpeg(bytes: &[u8]) -> bool {
+    bytes.starts_with(&[0xFF, 0xD8]) && complete_length(bytes).is_none()
+}
+
+/// BigTIFF, with offsets of 64 bits; the library reads it but does not recognise it.
+fn is_big_tiff(bytes: &[u8]) -> bool {
+    bytes.starts_with(b"II+\0") || bytes.starts_with(b"MM\0+")
+}
+
+/// Decodes an image of a file and turns it upright as its EXIF data say. `limits` bounds its size and the memory for it.
+///
+/// # Errors
+/// The format is not known, a part of the image is missing, or it is larger than `limits`.
+pub fn decode_upright(bytes: &[u8], limits: Limits) -> Result<DynamicImage, DecodeError> {
+    if is_cut_jpeg(bytes) {
+        return Err(DecodeError::CutJpeg);
+    }
+    let broken = |e: image::ImageError| DecodeError::Broken(e.to_string());
+    let reader = ImageReader::new(Cursor::new(bytes));
+    let guessed = reader.with_guessed_format().map_err(|e| DecodeError::Broken(e.to_string()))?;
+    let format = if is_big_tiff(bytes) { Some(ImageFormat::Tiff) } else { guessed.format() };
+    let mut reader = ImageReader::with_format(Cursor::new(bytes), format.ok_or(DecodeError::UnknownFormat)?);
+    reader.limits(limits);
+    let mut decoder = reader.into_decoder().map_err(broken)?;
+    let orientation = decoder.orientation().map_err(broken)?;
+    let mut image = DynamicImage::from_decoder(decoder).map_err(broken)?;
+    image.apply_orientation(orientation);
+    Ok(image)
 }
 
 /// Decodes an image to 8 bits a channel; of 16 bits, `bits` gives the highest level, or 16 where it is automatic. Transparency is
 /// dropped.
 pub fn decode(bytes: &[u8], bits: BitDepth) -> Result<RgbImage, DecodeError> {
-    if is_cut_jpeg(bytes) {
-        return Err(DecodeError::CutJpeg);
-    }
-    let broken = |e: image::ImageError| DecodeError::Broken(e.to_string());
-    let reader = || ImageReader::new(Cursor::new(bytes)).with_guessed_format();
-    let mut reader_of_size = reader().map_err(|e| DecodeError::Broken(e.to_string()))?;
-    reader_of_size.format().ok_or(DecodeError::UnknownFormat)?;
-    reader_of_size.limits(limits());
-    let (width, height) = reader_of_size.into_dimensions().map_err(broken)?;
-    if u64::from(width) * u64::from(height) > u64::from(MAX_PIXELS) {
+    if let Some((width, height)) = size_of(bytes)
+        && u64::from(width) * u64::from(height) > u64::from(MAX_PIXELS)
+    {
         return Err(DecodeError::TooLarge { width, height });
     }
-    let mut reader = reader().map_err(|e| DecodeError::Broken(e.to_string()))?;
-    reader.limits(limits());
-    Ok(match (reader.decode().map_err(broken)?, bits) {
+    Ok(match (decode_upright(bytes, limits())?, bits) {
         (image, BitDepth::Fixed(bits)) if bits < 16 && is_deep(&image) => scaled(&image.into_rgb16(), bits),
         (image, _) => image.into_rgb8(),
     })
+}
+
+/// Columns and rows by the head of an image.
+fn size_of(bytes: &[u8]) -> Option<(u32, u32)> {
+    let mut reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format().ok()?;
+    reader.limits(limits());
+    reader.into_dimensions().ok()
 }
 
 fn is_deep(image: &DynamicImage) -> bool {
@@ -135,6 +160,35 @@ mod tests {
         assert_eq!(decode(huge, WHOLE), Err(DecodeError::TooLarge { width: 100_000, height: 100_000 }));
         let cut = encoded(ImageFormat::Png);
         assert!(matches!(decode(&cut[..60], WHOLE), Err(DecodeError::Broken(_))));
+    }
+
+    #[test]
+    fn what_follows_the_end_of_a_jpeg_does_not_count() {
+        let jpeg = encoded(ImageFormat::Jpeg);
+        let whole = decode(&jpeg, WHOLE).unwrap();
+        for padding in [vec![0; 3], vec![0; 6000], vec![0xFF; 9000], jpeg.clone()] {
+            assert_eq!(decode(&[&jpeg[..], &padding].concat(), WHOLE).as_ref(), Ok(&whole));
+            assert_eq!(decode(&[&jpeg[..jpeg.len() - 2], &vec![0; 10][..]].concat(), WHOLE), Err(DecodeError::CutJpeg));
+        }
+    }
+
+    #[test]
+    fn an_image_is_turned_upright_as_its_exif_data_say() {
+        let png = encoded(ImageFormat::Png);
+        let upright = image();
+        for (orientation, turned) in [
+            (3u8, image::imageops::rotate180(&upright)),
+            (6, image::imageops::rotate90(&upright)),
+            (2, image::imageops::flip_horizontal(&upright)),
+        ] {
+            // A TIFF header with one tag, the orientation (0x0112), as a chunk of a PNG behind its head.
+            let exif = [&b"MM\0*\0\0\0\x08\0\x01\x01\x12\0\x03\0\0\0\x01\0"[..], &[orientation], &[0; 6]].concat();
+            let body = [&b"eXIf"[..], &exif].concat();
+            let crc = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC).checksum(&body);
+            let chunk = [&(exif.len() as u32).to_be_bytes()[..], &body, &crc.to_be_bytes()].concat();
+            let with_exif = [&png[..33], &chunk, &png[33..]].concat();
+            assert_eq!(decode(&with_exif, WHOLE).unwrap(), turned, "orientation {orientation}");
+        }
     }
 
     #[test]

@@ -9,6 +9,56 @@ pub struct Stamp(i64);
 
 const NANOS: i64 = 1_000_000_000;
 
+/// Times in seconds since the Unix epoch by which the unit of a whole number is told: the years 2000 to 2099.
+const EPOCHS_S: std::ops::Range<i64> = 946_684_800..4_102_444_800;
+
+/// The form of a time in a text.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum StampForm {
+    Seconds,
+    Milliseconds,
+    Microseconds,
+    Nanoseconds,
+    /// Date and time of UTC.
+    Date,
+}
+
+impl StampForm {
+    /// Name for people.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Seconds => "seconds since 1970",
+            Self::Milliseconds => "milliseconds since 1970",
+            Self::Microseconds => "microseconds since 1970",
+            Self::Nanoseconds => "nanoseconds since 1970",
+            Self::Date => "date and time of UTC",
+        }
+    }
+}
+
+/// Seconds since the Unix epoch of a date `yyyymmddThhmmss`, also with `_`, `-`, a space or nothing between day and hour, and with `Z`
+/// at its end; `None` if it is no date of the years 2000 to 2099.
+fn seconds_of_date(text: &str) -> Option<i64> {
+    let text = text.strip_suffix('Z').unwrap_or(text);
+    let (day, time) = (text.get(..8)?, text.get(8..)?);
+    let time = time.strip_prefix(['T', 't', '_', '-', ' ']).unwrap_or(time);
+    if time.len() != 6 || !day.bytes().chain(time.bytes()).all(|b| b.is_ascii_digit()) {
+        return None;
+    }
+    let number = |text: &str| text.parse::<i64>().ok();
+    let (year, month, of_month) = (number(day.get(..4)?)?, number(day.get(4..6)?)?, number(day.get(6..)?)?);
+    let (hour, minute, second) = (number(time.get(..2)?)?, number(time.get(2..4)?)?, number(time.get(4..)?)?);
+    let is_date = (2000..2100).contains(&year) && (1..=12).contains(&month) && (1..=31).contains(&of_month);
+    if !is_date || hour > 23 || minute > 59 || second > 60 {
+        return None;
+    }
+    // Days since the epoch, with years that begin in March (H. Hinnant, "chrono-compatible low-level date algorithms").
+    let (y, m) = if month > 2 { (year, month - 3) } else { (year - 1, month + 9) };
+    let days = 365 * y + y / 4 - y / 100 + y / 400 + (153 * m + 2) / 5 + of_month - 1 - 719_468;
+    Some(days * 86_400 + hour * 3600 + minute * 60 + second)
+}
+
 impl Stamp {
     pub const fn from_nanos(nanos: i64) -> Self {
         Self(nanos)
@@ -23,20 +73,37 @@ impl Stamp {
         (i64::from(nanosec) < NANOS).then(|| Self(i64::from(sec) * NANOS + i64::from(nanosec)))
     }
 
-    /// Reads decimal seconds, as in `1305031102.175304`, or nanoseconds, as in `1403636579763555584`: whole numbers of
-    /// more than 11 digits are nanoseconds. Digits behind the ninth decimal are dropped.
+    /// Reads decimal seconds, as in `1305031102.175304`, a whole number in the unit that its size tells, or date and time of UTC, as in
+    /// `20261126T185000.250`. Digits behind the ninth decimal are dropped.
     pub fn parse(text: &str) -> Option<Self> {
+        Self::parse_with_form(text).map(|(stamp, _)| stamp)
+    }
+
+    /// The same, with the form that the text has.
+    pub fn parse_with_form(text: &str) -> Option<(Self, StampForm)> {
         let is_digits = |digits: &str| digits.bytes().all(|b| b.is_ascii_digit());
         let (whole, decimals) = text.split_once('.').unwrap_or((text, ""));
-        if whole.is_empty() || whole.len() > 19 || !is_digits(whole) || !is_digits(decimals) {
+        if !is_digits(decimals) {
             return None;
         }
-        let whole_number: i64 = whole.parse().ok()?;
-        if decimals.is_empty() && whole.len() > 11 {
-            return Some(Self(whole_number));
-        }
         let nanos: i64 = format!("{:0<9}", decimals.get(..9).unwrap_or(decimals)).parse().ok()?;
-        whole_number.checked_mul(NANOS)?.checked_add(nanos).map(Self)
+        let of_seconds = |seconds: i64| seconds.checked_mul(NANOS)?.checked_add(nanos).map(Self);
+        if let Some(seconds) = seconds_of_date(whole) {
+            return Some((of_seconds(seconds)?, StampForm::Date));
+        }
+        if whole.is_empty() || whole.len() > 19 || !is_digits(whole) {
+            return None;
+        }
+        let number: i64 = whole.parse().ok()?;
+        if !decimals.is_empty() || whole.len() <= 11 {
+            return Some((of_seconds(number)?, StampForm::Seconds));
+        }
+        let is_of = |in_a_second: i64| EPOCHS_S.contains(&(number / in_a_second));
+        Some(match () {
+            () if is_of(1_000) => (Self(number * 1_000_000), StampForm::Milliseconds),
+            () if is_of(1_000_000) => (Self(number * 1_000), StampForm::Microseconds),
+            () => (Self(number), StampForm::Nanoseconds),
+        })
     }
 
     /// Seconds from `earlier` to this stamp; negative if it is later.
@@ -88,6 +155,31 @@ mod tests {
             assert_eq!(Stamp::parse(wrong), None, "{wrong}");
         }
         assert_eq!(Stamp::from_ros(2, NANOS as u32), None);
+    }
+
+    #[test]
+    fn the_unit_of_a_whole_number_is_told_by_its_size_and_dates_are_read() {
+        use StampForm::*;
+        // `date -u -d 2026-11-26T18:50:00 +%s`.
+        const SECONDS: i64 = 1_795_719_000;
+        for (text, nanos, form) in [
+            ("1795719000", SECONDS * NANOS, Seconds),
+            ("1795719000567", SECONDS * NANOS + 567_000_000, Milliseconds),
+            ("1795719000567001", SECONDS * NANOS + 567_001_000, Microseconds),
+            ("1795719000567001002", SECONDS * NANOS + 567_001_002, Nanoseconds),
+            ("20261126T185000", SECONDS * NANOS, Date),
+            ("20261126185000", SECONDS * NANOS, Date),
+            ("20261126_185000.250", SECONDS * NANOS + 250_000_000, Date),
+            ("20261126-185000Z", SECONDS * NANOS, Date),
+            ("20240229T000000", 1_709_164_800 * NANOS, Date),
+            // A clock that began at 0, as of a simulator.
+            ("123000000000", 123 * NANOS, Nanoseconds),
+        ] {
+            assert_eq!(Stamp::parse_with_form(text), Some((Stamp::from_nanos(nanos), form)), "{text}");
+        }
+        for wrong in ["20261326T185000", "20261126T256000", "20261126T18500", "2026-11-26", "IMG_0001"] {
+            assert_eq!(Stamp::parse(wrong), None, "{wrong}");
+        }
         assert_eq!(Stamp::from_ros(-1, 5).unwrap().to_string(), "-1.000000005");
     }
 }

@@ -26,8 +26,8 @@ const SETTLED: Duration = Duration::from_millis(300);
 /// Files that were written this long before the folder is opened are live; older ones are not mapped.
 const LIVE: Duration = Duration::from_secs(2);
 
-/// Images of a folder, each as soon as it is complete. A name that is a number is the time of its image, as in
-/// `1305031102.175304.png` (seconds) and `1403636579763555584.png` (nanoseconds).
+/// Images of a folder, each as soon as it is complete. A name that is a number or a date is the time of its image, as in
+/// `1305031102.175304.png` (seconds), `1403636579763555584.png` (nanoseconds) and `20261126T185000.250.png` (UTC).
 pub struct WatchSource {
     dir: PathBuf,
     clock: ArrivalClock,
@@ -132,7 +132,9 @@ impl SensorSource for WatchSource {
         self.changed = None;
         let is_old = |entry: &DirEntry| {
             let modified = entry.metadata().and_then(|file| file.modified());
-            modified.is_ok_and(|modified| modified.elapsed().is_ok_and(|age| age > LIVE))
+            // A time in the future is that of another clock: it does not say that the file is new.
+            let age = |modified: SystemTime| modified.elapsed().unwrap_or_else(|future| future.duration());
+            modified.is_ok_and(|modified| age(modified) > LIVE)
         };
         self.files =
             self.entries()?.iter().filter(|entry| is_old(entry)).map(|e| (e.path(), FileState::Done)).collect();
@@ -266,6 +268,9 @@ mod tests {
         folder.write("old.ppm", PPM);
         let file = std::fs::File::options().append(true).open(folder.0.join("old.ppm")).unwrap();
         file.set_modified(SystemTime::now() - Duration::from_secs(60)).unwrap();
+        folder.write("ahead.ppm", PPM);
+        let file = std::fs::File::options().append(true).open(folder.0.join("ahead.ppm")).unwrap();
+        file.set_modified(SystemTime::now() + Duration::from_secs(86_400)).unwrap();
         let mut source = folder.source();
         source.open().unwrap();
         assert_eq!(next(&mut source), None);

@@ -103,6 +103,8 @@ section! {
         port: Option<PortAddress> = None, ports(&["serial", "udp", "udp-to", "tcp", "file"]), [Auv Asv];
         /// MAVLink system number of the autopilot (mavlink).
         system: u8 = 1, range(1.0, 255.0, ""), [Auv Asv];
+        /// MAVLink component number of the autopilot (mavlink); 0: the component whose heartbeat says that it is an ArduPilot.
+        component: u8 = 0, range(0.0, 255.0, ""), [Auv Asv];
         /// Whether to arm the autopilot and to switch it to guided mode, once, and again after a restart of the autopilot under
         /// water (mavlink). Otherwise a pilot does so.
         arm: bool = false, ANY, [Auv Asv];

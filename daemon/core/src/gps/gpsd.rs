@@ -4,7 +4,7 @@
 //! reader uses `TPV` (time, position, velocity) and the heading of `ATT`. Source: gpsd_json(5).
 
 use crate::geodesy::LatLon;
-use crate::nmea::Sentence;
+use crate::nmea::{PositionKind, Sentence};
 use serde::Deserialize;
 
 /// The request that makes gpsd send reports.
@@ -38,7 +38,8 @@ pub struct Said {
     pub sigma_m: Option<f64>,
 }
 
-/// gpsd gives errors with 95 % confidence: 1.96 standard deviations.
+/// The errors of gpsd are taken for bounds at 95 %: 1.96 standard deviations. Releases before 3.20 say so, later ones that the certainty
+/// is unknown.
 const CONFIDENCE: f64 = 1.96;
 
 /// Parses a line; `None` if it is no report or has impossible values.
@@ -57,14 +58,14 @@ fn heading(degrees: Option<f64>) -> Option<Vec<Sentence>> {
 }
 
 fn position(r: &Report) -> Option<Said> {
-    // Status 6 is dead reckoning, 8 simulated.
-    if r.mode.unwrap_or(0) < 2 || matches!(r.status, Some(6 | 8)) {
+    // Status 5 is dead reckoning, 8 simulated; 6 is dead reckoning with satellites.
+    if r.mode.unwrap_or(0) < 2 || matches!(r.status, Some(5 | 8)) {
         return Some(Said { sentences: vec![Sentence::NoPosition], sigma_m: None });
     }
     let place = LatLon::new(r.lat?, r.lon?)?;
     let utc_s = r.time.as_deref().and_then(time_of_day);
-    let mut sentences =
-        vec![Sentence::Position { place, utc_s, hdop: None, is_corrected: matches!(r.status, Some(2..=4)) }];
+    let is_corrected = matches!(r.status, Some(2..=4));
+    let mut sentences = vec![Sentence::Position { kind: PositionKind::Gga, place, utc_s, hdop: None, is_corrected }];
     if let Some(speed_m_s) = r.speed {
         let course_rad = r.track.filter(|t| (0.0..=360.0).contains(t)).map(f64::to_radians);
         (0.0..200.0).contains(&speed_m_s).then(|| sentences.push(Sentence::Motion { speed_m_s, course_rad }))?;
@@ -101,6 +102,12 @@ mod tests {
         assert_eq!(parse(br#"{"class":"VERSION","release":"3.25","proto_major":3}"#), Some(Said::default()));
         let none = parse(br#"{"class":"TPV","mode":1}"#).unwrap();
         assert_eq!(none.sentences, [Sentence::NoPosition]);
+        let with_status = |status: u8| {
+            let text = format!(r#"{{"class":"TPV","mode":3,"status":{status},"lat":1.5,"lon":2.5}}"#);
+            matches!(parse(text.as_bytes()).unwrap().sentences[..], [Sentence::Position { .. }])
+        };
+        let used: Vec<u8> = (0..10).filter(|&status| with_status(status)).collect();
+        assert_eq!(used, [0, 1, 2, 3, 4, 6, 7, 9], "5 is dead reckoning alone, 8 is simulated");
         assert_eq!(
             parse(br#"{"class":"ATT","heading":90.0}"#).unwrap().sentences,
             [Sentence::Heading(90f64.to_radians())]

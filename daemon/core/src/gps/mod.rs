@@ -1,7 +1,7 @@
 //! Positions from a receiver, checked for plausibility.
 
-use crate::geodesy::LatLon;
-use crate::nmea::Sentence;
+use crate::geodesy::{LatLon, TangentPlane};
+use crate::nmea::{PositionKind, Sentence};
 mod gpsd;
 
 use crate::{Lines, nmea};
@@ -27,6 +27,10 @@ pub enum GpsFault {
     Overlong,
     /// The receiver reports that it has no position.
     NoPosition,
+    /// A position where another kind of sentence, which says more about its quality, has just given one.
+    Repeated,
+    /// Latitude 0 and longitude 0: what receivers report that have none.
+    NullIsland,
     /// The same time of measurement, or the same place to the last digit while under way, again and again.
     Frozen,
     /// The position is too far from the last one for the speed of a vessel.
@@ -40,6 +44,8 @@ impl GpsFault {
             Self::Unreadable => "malformed",
             Self::Overlong => "too_long",
             Self::NoPosition => "no_position",
+            Self::Repeated => "repeated",
+            Self::NullIsland => "null_island",
             Self::Frozen => "frozen",
             Self::Jump => "jump",
         }
@@ -55,6 +61,30 @@ pub struct GpsFix {
     pub at: Instant,
 }
 
+impl GpsFix {
+    /// Faster is no vessel, m/s.
+    const FASTEST_M_S: f64 = 30.0;
+
+    /// Whether a vessel can come from here to a later position.
+    #[must_use]
+    pub fn leads_to(&self, later: &Self) -> bool {
+        let (x, y) = TangentPlane::new(self.place).to_plane(later.place);
+        let passed_s = later.at.since(self.at).as_secs_f64();
+        x.hypot(y) <= Self::FASTEST_M_S * passed_s + 5.0 * self.sigma_m.hypot(later.sigma_m)
+    }
+}
+
+/// What one kind of sentence has said.
+#[derive(Debug, Clone, Copy, Default)]
+struct KindHealth {
+    /// The last place, and since when it is the same.
+    told: Option<(LatLon, Instant)>,
+    /// The last time of day, and since when it is the same.
+    utc: Option<(f64, Instant)>,
+    /// When a position of it was used last.
+    used: Option<Instant>,
+}
+
 /// A receiver as its bytes come in.
 #[derive(Debug)]
 pub struct Gps {
@@ -62,24 +92,21 @@ pub struct Gps {
     lines: Lines,
     faults: BTreeMap<GpsFault, u64>,
     fix: Option<GpsFix>,
-    /// The last position, its time of day, and the time since which neither has changed.
-    told: Option<(LatLon, Option<f64>, Instant)>,
-    utc_changed: Option<(f64, Instant)>,
+    kinds: BTreeMap<PositionKind, KindHealth>,
     /// Places in a row that were too far from the last good one, and the last of them.
     jumps: (u32, Option<GpsFix>),
     /// Way over ground: speed in m/s, course, when.
     motion: Option<(f64, Option<f64>, Instant)>,
     heading: Option<(f64, Instant)>,
-    has_gga: bool,
 }
 
 impl Gps {
     /// Error of a position without corrections at a dilution of 1, metres (GPS SPS performance standard 2020: 8 m at 95 %).
     const PLAIN_SIGMA_M: f64 = 3.0;
-    /// Faster is no vessel, m/s.
-    const FASTEST_M_S: f64 = 30.0;
     /// A position that keeps its last digit for this long is frozen if the receiver reports motion.
     const FROZEN: Duration = Duration::from_secs(5);
+    /// A position of a better kind counts for this time.
+    const BETTER_LASTS: Duration = Duration::from_secs(2);
     /// So many places in a row, near each other, are believed however far they are from the last good one.
     const JUMPS_BELIEVED: u32 = 10;
     /// Slower than this the course over ground is noise, m/s.
@@ -96,12 +123,10 @@ impl Gps {
             lines: Lines::new(longest),
             faults: BTreeMap::new(),
             fix: None,
-            told: None,
-            utc_changed: None,
+            kinds: BTreeMap::new(),
             jumps: (0, None),
             motion: None,
             heading: None,
-            has_gga: false,
         }
     }
 
@@ -142,24 +167,26 @@ impl Gps {
         fixes
     }
 
-    fn handle_line(&mut self, line: &[u8], now: Instant) -> Option<GpsFix> {
-        let (sentences, sigma_m) = match self.language {
-            GpsLanguage::Gpsd => {
-                let said = gpsd::parse(line).or_else(|| self.refuse(GpsFault::Unreadable))?;
-                (said.sentences, said.sigma_m)
-            }
-            GpsLanguage::Nmea => match nmea::parse(line) {
-                Ok(sentences) => {
-                    let is_gga = line.get(3..6) == Some(b"GGA");
-                    self.has_gga |= is_gga;
-                    // RMC repeats the position of GGA without its quality.
-                    let repeats = |s: &Sentence| self.has_gga && !is_gga && matches!(s, Sentence::Position { .. });
-                    (sentences.into_iter().filter(|s| !repeats(s)).collect(), None)
-                }
-                Err(nmea::NmeaError::Checksum) => return self.refuse(GpsFault::Checksum),
-                Err(_) => return self.refuse(GpsFault::Unreadable),
-            },
-        };
+    fn handle_line(&mut self, line: &[u8], now: Instant) -> Vec<GpsFix> {
+        if self.language == GpsLanguage::Gpsd {
+            return match gpsd::parse(line) {
+                Some(said) => self.handle_sentences(said.sentences, said.sigma_m, now).into_iter().collect(),
+                None => self.refuse(GpsFault::Unreadable).into_iter().collect(),
+            };
+        }
+        let mut fixes = Vec::new();
+        // Other vessels, by AIS, begin with another sign.
+        for sentence in nmea::sentences(line).filter(|sentence| !sentence.starts_with(b"!")) {
+            fixes.extend(match nmea::parse(sentence) {
+                Ok(said) => self.handle_sentences(said, None, now),
+                Err(nmea::NmeaError::Checksum) => self.refuse(GpsFault::Checksum),
+                Err(_) => self.refuse(GpsFault::Unreadable),
+            });
+        }
+        fixes
+    }
+
+    fn handle_sentences(&mut self, sentences: Vec<Sentence>, sigma_m: Option<f64>, now: Instant) -> Option<GpsFix> {
         // The motion first: it says whether a place that stays the same is frozen.
         for sentence in &sentences {
             match *sentence {
@@ -169,23 +196,30 @@ impl Gps {
             }
         }
         sentences.into_iter().find_map(|sentence| match sentence {
-            Sentence::Position { place, utc_s, hdop, is_corrected } => {
+            Sentence::Position { kind, place, utc_s, hdop, is_corrected } => {
                 let plain = Self::PLAIN_SIGMA_M * hdop.unwrap_or(1.5).clamp(0.5, 50.0);
                 let sigma_m = sigma_m.unwrap_or(if is_corrected { plain / 3.0 } else { plain }).clamp(0.02, 200.0);
-                self.handle_position(GpsFix { place, sigma_m, at: now }, utc_s)
+                self.handle_position(kind, GpsFix { place, sigma_m, at: now }, utc_s)
             }
             Sentence::NoPosition => self.refuse(GpsFault::NoPosition),
             _ => None,
         })
     }
 
-    fn handle_position(&mut self, fix: GpsFix, utc_s: Option<f64>) -> Option<GpsFix> {
-        if self.is_frozen(fix.place, utc_s, fix.at) {
+    fn handle_position(&mut self, kind: PositionKind, fix: GpsFix, utc_s: Option<f64>) -> Option<GpsFix> {
+        if (fix.place.lat_deg, fix.place.lon_deg) == (0.0, 0.0) {
+            return self.refuse(GpsFault::NullIsland);
+        }
+        if self.is_frozen(kind, fix.place, utc_s, fix.at) {
             return self.refuse(GpsFault::Frozen);
         }
-        if self.fix.is_some_and(|last| !Self::is_way(&last, &fix)) {
+        let is_fresh = |health: &KindHealth| health.used.is_some_and(|at| fix.at.since(at) < Self::BETTER_LASTS);
+        if self.kinds.iter().any(|(&other, health)| other > kind && is_fresh(health)) {
+            return self.refuse(GpsFault::Repeated);
+        }
+        if self.fix.is_some_and(|last| !last.leads_to(&fix)) {
             let (row, before) = self.jumps;
-            let goes_on = before.is_some_and(|b| Self::is_way(&b, &fix));
+            let goes_on = before.is_some_and(|b| b.leads_to(&fix));
             self.jumps = (if goes_on { row + 1 } else { 1 }, Some(fix));
             if self.jumps.0 < Self::JUMPS_BELIEVED {
                 return self.refuse(GpsFault::Jump);
@@ -193,30 +227,22 @@ impl Gps {
         }
         self.jumps = (0, None);
         self.fix = Some(fix);
+        self.kinds.entry(kind).or_default().used = Some(fix.at);
         Some(fix)
     }
 
-    /// Whether a vessel can come from one position to the other.
-    fn is_way(from: &GpsFix, to: &GpsFix) -> bool {
-        let (x, y) = super::geodesy::TangentPlane::new(from.place).to_plane(to.place);
-        let passed_s = to.at.since(from.at).as_secs_f64();
-        x.hypot(y) <= Self::FASTEST_M_S * passed_s + 5.0 * from.sigma_m.hypot(to.sigma_m)
-    }
-
-    fn is_frozen(&mut self, place: LatLon, utc_s: Option<f64>, now: Instant) -> bool {
-        let since = match self.told {
-            Some((last, _, since)) if last == place => since,
-            _ => now,
-        };
-        self.told = Some((place, utc_s, since));
+    fn is_frozen(&mut self, kind: PositionKind, place: LatLon, utc_s: Option<f64>, now: Instant) -> bool {
+        let health = self.kinds.entry(kind).or_default();
+        let same_place = health.told.filter(|(last, _)| *last == place).map_or(now, |(_, since)| since);
+        health.told = Some((place, same_place));
         if let Some(utc) = utc_s
-            && self.utc_changed.is_none_or(|(last, _)| last != utc)
+            && health.utc.is_none_or(|(last, _)| last != utc)
         {
-            self.utc_changed = Some((utc, now));
+            health.utc = Some((utc, now));
         }
         let moves = self.motion.is_some_and(|(v, _, at)| v > Self::COURSE_SPEED_M_S && now.since(at) < Self::FROZEN);
-        let is_place_frozen = moves && now.since(since) > Self::FROZEN;
-        let is_time_frozen = utc_s.is_some() && self.utc_changed.is_some_and(|(_, at)| now.since(at) > Self::FROZEN);
+        let is_place_frozen = moves && now.since(same_place) > Self::FROZEN;
+        let is_time_frozen = utc_s.is_some() && health.utc.is_some_and(|(_, at)| now.since(at) > Self::FROZEN);
         is_place_frozen || is_time_frozen
     }
 
@@ -293,6 +319,64 @@ mod tests {
         assert_eq!(gps.handle_bytes(gga(29.50001, 2).as_bytes(), at(2.0)).len(), 1);
         let believed = (3..30).find(|&s| !gps.handle_bytes(gga(29.6, s).as_bytes(), at(f64::from(s))).is_empty());
         assert_eq!(believed, Some(12), "the receiver was wrong at first");
+    }
+
+    fn rmc(lat_deg: f64, second: u32) -> String {
+        let place = nmea::place_fields(LatLon::new(lat_deg, 34.92).unwrap());
+        nmea::line(&format!("GPRMC,1200{second:02}.00,A,{place},3.2,0.0,261126,,,A"))
+    }
+
+    #[test]
+    fn the_best_kind_of_the_last_two_seconds_is_used() {
+        let mut gps = Gps::new(GpsLanguage::Nmea);
+        let used: Vec<usize> = (0..20u32)
+            .map(|s| {
+                let lat_deg = 29.5 + 1e-5 * f64::from(s);
+                // GGA stops after 5 s, and has no position from 10 s on; its time stands still from 15 s on.
+                let gga = match s {
+                    0..5 => gga(lat_deg, s),
+                    5..10 => String::new(),
+                    10..15 => nmea::line("GPGGA,120010.00,,,,,0,00,99.9,,M,,M,,"),
+                    _ => gga(29.50004, 4),
+                };
+                gps.handle_bytes((rmc(lat_deg, s) + &gga).as_bytes(), at(f64::from(s))).len()
+            })
+            .collect();
+        // RMC comes first at 0 s, and GGA was used within the last two seconds until 5 s.
+        assert_eq!(used, [2, 1, 1, 1, 1, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1]);
+        assert_eq!(faults(&gps), [("no_position", 5), ("repeated", 5), ("frozen", 5)]);
+    }
+
+    #[test]
+    fn what_stands_between_and_before_sentences_costs_none_of_them() {
+        let mut gps = Gps::new(GpsLanguage::Nmea);
+        let trim = |line: String| line.trim().to_owned();
+        let stream = [
+            format!("\u{FEFF}\\s:GP0001,c:1790000000*25\\{}\r\n", trim(gga(29.5, 0))),
+            "!AIVDM,1,1,,A,13u?etPv2;0n:dDPwUM1U1Cb069D,0*24\r\n".to_owned(),
+            format!("$GPGGA,12000{}{}\r\n", trim(gga(29.50001, 1)), trim(gga(29.50002, 2))),
+            format!(
+                "{}\n",
+                trim(gga(29.50003, 3))
+                    .to_lowercase()
+                    .replace("$gpgga", "$GPGGA")
+                    .replace(",n,", ",N,")
+                    .replace(",e,", ",E,")
+                    .replace(",m,", ",M,")
+            ),
+        ]
+        .concat();
+        assert_eq!(gps.handle_bytes(stream.as_bytes(), at(0.0)).len(), 4);
+        assert_eq!(faults(&gps), [("malformed", 1)], "the half sentence");
+    }
+
+    #[test]
+    fn latitude_and_longitude_zero_are_no_place() {
+        let mut gps = Gps::new(GpsLanguage::Nmea);
+        let null = nmea::line("GPRMC,120000.00,A,0000.0000,N,00000.0000,E,0.0,,261126,,,A");
+        assert!(gps.handle_bytes(null.as_bytes(), at(0.0)).is_empty());
+        assert_eq!(gps.handle_bytes(gga(29.5, 1).as_bytes(), at(1.0)).len(), 1);
+        assert_eq!(faults(&gps), [("null_island", 1)]);
     }
 
     #[test]

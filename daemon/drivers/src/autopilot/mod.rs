@@ -10,6 +10,7 @@
 
 pub mod mavlink;
 mod nmea;
+mod plausible;
 mod tray;
 
 pub use mavlink::Mavlink;

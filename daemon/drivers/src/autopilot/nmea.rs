@@ -7,8 +7,9 @@
 //! $SCRMB,A,0.00,L,,SC,ddmm.mmmmm,N,dddmm.mmmmm,E,miles,degrees,,V*hh   way to it
 //! $PSCWP,east,north,depth*hh                                           metres still to go, depth or nothing
 //! ```
-//! and `$PSCHD*hh` while the vehicle holds its position. The driver reads positions (GGA, RMC), headings (HDT, THS),
-//! depths below the surface (DBS) and heights of the transducer above the sea floor (DPT, DBT).
+//! and `$PSCHD*hh` while the vehicle holds its position. The driver reads positions (GGA, GNS, RMC, GLL), headings (HDT, THS),
+//! depths of the water (DBS) and heights of the transducer above the sea floor (DPT, DBT); the vehicle's depth is the difference of
+//! the two, and 0 until both were heard.
 
 use super::{Autopilot, Counters, Goal, Health, Step, Tray};
 use scenecast_core::gps::{Gps, GpsLanguage};
@@ -16,7 +17,7 @@ use scenecast_core::{LatLon, Lines, TangentPlane, nmea};
 use scenecast_protocol::time::Instant;
 use std::time::Duration;
 
-/// A height counts for this long.
+/// A height, or a depth of the water, counts for this long.
 const HEIGHT_LASTS: Duration = Duration::from_secs(2);
 
 /// A state machine of lines.
@@ -29,6 +30,8 @@ pub struct Nmea {
     silence: Duration,
     heard: Option<Instant>,
     depth_m: f64,
+    /// Depth of the water, metres.
+    water_depth: Option<(f64, Instant)>,
     /// Height of the transducer above the sea floor, metres.
     height: Option<(f64, Instant)>,
     at: Option<(LatLon, Instant)>,
@@ -49,6 +52,7 @@ impl Nmea {
             silence,
             heard: None,
             depth_m: 0.0,
+            water_depth: None,
             height: None,
             at: None,
             goal: None,
@@ -83,6 +87,8 @@ impl Nmea {
             let passed = now.since(at);
             if dx_m.hypot(dy_m) > 20.0 * passed.as_secs_f64().max(0.1) {
                 self.tray.count("jumps");
+                self.tray
+                    .note(format!("the position jumps by {:.0} m: this is no way of the vehicle", dx_m.hypot(dy_m)));
                 return self.push_step(0.0, 0.0, heading_rad, passed, now);
             }
             if let Some(goal) = &mut self.goal {
@@ -94,16 +100,20 @@ impl Nmea {
 
     fn push_step(&mut self, dx_m: f64, dy_m: f64, heading_rad: f64, unseen: Duration, now: Instant) {
         let height = self.height.filter(|(_, at)| now.since(*at) < HEIGHT_LASTS);
+        let water = self.water_depth.filter(|(_, at)| now.since(*at) < HEIGHT_LASTS);
+        if let (Some((water_m, _)), Some((height_m, _))) = (water, height) {
+            self.depth_m = (water_m - height_m).max(0.0);
+        }
         let (depth_m, altitude_m) = (self.depth_m, height.map(|(height_m, _)| height_m));
-        self.tray.walk(Step { dx_m, dy_m, heading_rad, depth_m, altitude_m, unseen, ..Step::default() });
+        self.tray.walk_measured(Step { dx_m, dy_m, heading_rad, depth_m, altitude_m, unseen, ..Step::default() }, now);
     }
 
-    /// DBS and DBT: feet, f, metres, M, fathoms, F. DPT: metres, offset of the transducer.
+    /// DBS, from the surface to the sea floor, and DBT: feet, f, metres, M, fathoms, F. DPT: metres, offset of the transducer.
     fn handle_sounding(&mut self, line: &[u8], now: Instant) -> Option<()> {
         let fields = nmea::fields(line).ok()?;
         let metres = |index: usize| fields.get(index)?.parse::<f64>().ok().filter(|m| (0.0..12_000.0).contains(m));
         match fields.first()?.get(2..)? {
-            "DBS" => self.depth_m = metres(3)?,
+            "DBS" => self.water_depth = metres(3).filter(|m| *m > 0.0).map(|m| (m, now)),
             // Sounders without a bottom send 0 or nothing.
             "DBT" => self.height = metres(3).filter(|m| *m > 0.0).map(|m| (m, now)),
             "DPT" => self.height = metres(1).filter(|m| *m > 0.0).map(|m| (m, now)),
@@ -124,12 +134,14 @@ impl Autopilot for Nmea {
         let mut lines = Vec::new();
         self.lines.push(bytes, |line| lines.push(line.to_vec()));
         for line in lines {
-            let _ = self.handle_sounding(&line, now);
-            if nmea::fields(&line).is_ok() {
-                if self.heard.is_none() || self.was_silent {
-                    self.tray.note("the autopilot answers");
+            for sentence in nmea::sentences(&line) {
+                let _ = self.handle_sounding(sentence, now);
+                if nmea::fields(sentence).is_ok() {
+                    if self.heard.is_none() || self.was_silent {
+                        self.tray.note("the autopilot answers");
+                    }
+                    (self.heard, self.was_silent) = (Some(now), false);
                 }
-                (self.heard, self.was_silent) = (Some(now), false);
             }
             for fix in self.gps.handle_bytes(&[&line[..], b"\n"].concat(), now) {
                 self.handle_place_of_vehicle(fix.place, now);
@@ -219,7 +231,7 @@ mod tests {
         for s in 0..3u32 {
             let place = nmea::place_fields(plane.to_place(f64::from(s), 0.0));
             let gga = nmea::line(&format!("GPGGA,0000{s:02},{place},1,9,1,0,M,0,M,,"));
-            let depth = nmea::line("SDDBS,,f,7.5,M,,F")
+            let depth = nmea::line("SDDBS,,f,12.0,M,,F")
                 + &nmea::line(["SDDBT,,f,3.5,M,,F", "SDDPT,4.5,0.2", "SDDPT,,"][s as usize]);
             pilot.handle_bytes((nmea::line("HEHDT,90.0,T") + &depth + &gga).as_bytes(), at(f64::from(s)));
         }

@@ -1,6 +1,8 @@
 //! The outbox of an autopilot: bytes, steps and notes for its host.
 
+use super::plausible::Plausible;
 use super::{Counters, Step};
+use scenecast_protocol::time::Instant;
 use std::collections::VecDeque;
 
 /// Bytes, way and notes that wait to be fetched, at most [`Tray::MAX`] of each, and counters.
@@ -10,6 +12,7 @@ pub struct Tray {
     pub(super) steps: VecDeque<Step>,
     pub(super) notes: VecDeque<String>,
     pub(super) counters: Counters,
+    plausible: Plausible,
 }
 
 impl Tray {
@@ -33,6 +36,22 @@ impl Tray {
             }
             _ => self.steps.push_back(step),
         }
+    }
+
+    /// A stretch of way as sensors measured it: depth, heading and height above the sea floor that cannot be are replaced by the last
+    /// ones that can, and named.
+    pub(super) fn walk_measured(&mut self, step: Step, now: Instant) {
+        let (step, jumps) = self.plausible.check(step, now);
+        for jump in jumps {
+            self.count(jump.counter);
+            jump.note.into_iter().for_each(|note| self.note(note));
+        }
+        self.walk(step);
+    }
+
+    /// Sensors measure from another zero from now on: the next values are taken as they are.
+    pub(super) fn forget_measured(&mut self) {
+        self.plausible = Plausible::default();
     }
 
     /// Something that a person should read.

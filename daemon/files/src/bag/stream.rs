@@ -1,4 +1,4 @@
-//! The messages of an MCAP file, one after the other, with bounded memory.
+//! The messages of an MCAP file, one after the other, with bounded memory. Chunks and single messages may be compressed.
 
 use mcap::records::{Channel, Record, SchemaHeader};
 use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
@@ -42,7 +42,12 @@ impl BagStream {
     pub(crate) fn open(path: &Path) -> Result<Self, UserError> {
         let files = if path.is_dir() { files_of(path)? } else { vec![path.to_owned()] };
         for file in &files {
-            scenecast_config::open_regular(file, u64::MAX)?;
+            let mut head = Vec::new();
+            let mut opened = scenecast_config::open_regular(file, u64::MAX)?.take(16);
+            opened.read_to_end(&mut head).map_err(|e| UserError::file(file, e))?;
+            if let Some(other) = OtherFormat::of(&head) {
+                return Err(UserError::file(file, other.advice()));
+            }
         }
         Ok(Self { rest: files.into_iter(), open: None, schemas: BTreeMap::new(), channels: BTreeMap::new() })
     }
@@ -89,7 +94,7 @@ impl BagStream {
                     Ok(Record::Message { header, data }) => {
                         let topic = self.channels.get(&header.channel_id).filter(|topic| wanted(topic));
                         if let Some(topic) = topic {
-                            return Ok(Some(BagMessage { topic: topic.clone(), bytes: data.into_owned() }));
+                            return Ok(Some(BagMessage { topic: topic.clone(), bytes: unpacked(data.into_owned())? }));
                         }
                     }
                     Ok(_) => {}
@@ -97,6 +102,57 @@ impl BagStream {
             }
         }
         Ok(None)
+    }
+}
+
+/// A message as it was published: rosbag2 compresses each by itself with `compression_mode: message`. A message in CDR begins with a
+/// zero.
+fn unpacked(bytes: Vec<u8>) -> Result<Vec<u8>, String> {
+    if !bytes.starts_with(ZSTD) {
+        return Ok(bytes);
+    }
+    zstd::bulk::decompress(&bytes, MAX_MESSAGE_BYTES).map_err(|e| format!("a message that is compressed by zstd: {e}"))
+}
+
+/// Size of the largest message, bytes.
+const MAX_MESSAGE_BYTES: usize = 256 << 20;
+const ZSTD: &[u8] = b"\x28\xB5\x2F\xFD";
+
+/// Recordings that are no MCAP file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum OtherFormat {
+    Sqlite,
+    Ros1,
+    Zstd,
+}
+
+impl OtherFormat {
+    /// The format of a file by its first bytes.
+    fn of(head: &[u8]) -> Option<Self> {
+        let magics = [(&b"SQLite format 3"[..], Self::Sqlite), (b"#ROSBAG V2", Self::Ros1), (ZSTD, Self::Zstd)];
+        magics.into_iter().find(|(magic, _)| head.starts_with(magic)).map(|(_, format)| format)
+    }
+
+    /// The format of a file by its name.
+    fn named(path: &Path) -> Option<Self> {
+        match path.extension()?.to_str()? {
+            "db3" => Some(Self::Sqlite),
+            "bag" => Some(Self::Ros1),
+            "zstd" | "zst" => Some(Self::Zstd),
+            _ => None,
+        }
+    }
+
+    /// What it is, and the command that converts it.
+    fn advice(self) -> &'static str {
+        match self {
+            Self::Sqlite => {
+                "it is a bag in SQLite (.db3), and MCAP is read: ros2 bag convert -i BAG -o OPTIONS.yaml converts it, where OPTIONS.yaml is \
+                 output_bags: [{uri: NEW, storage_id: mcap, all_topics: true}]"
+            }
+            Self::Ros1 => "it is a bag of ROS 1, and MCAP is read: mcap convert OLD.bag NEW.mcap converts it",
+            Self::Zstd => "it is compressed as a whole: zstd -d *.zstd unpacks it",
+        }
     }
 }
 
@@ -111,12 +167,47 @@ fn reader() -> LinearReader {
 
 fn files_of(dir: &Path) -> Result<Vec<PathBuf>, UserError> {
     let entries = std::fs::read_dir(dir).map_err(|e| UserError::file(dir, e))?;
-    let paths = entries.filter_map(|entry| Some(entry.ok()?.path()));
-    let mut files: Vec<PathBuf> = paths.filter(|path| path.extension().is_some_and(|e| e == "mcap")).collect();
+    let paths: Vec<PathBuf> = entries.filter_map(|entry| Some(entry.ok()?.path())).collect();
+    let other = paths.iter().find_map(|path| OtherFormat::named(path));
+    let mut files: Vec<PathBuf> =
+        paths.into_iter().filter(|path| path.extension().is_some_and(|e| e == "mcap")).collect();
     if files.is_empty() {
-        return Err(UserError::file(dir, "the folder has no file *.mcap"));
+        return Err(UserError::file(dir, other.map_or("the folder has no file *.mcap", OtherFormat::advice)));
     }
     // The files of a split bag end in _0, _1, ..., _10.
     files.sort_by_key(|path| (path.as_os_str().len(), path.clone()));
     Ok(files)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn other_recordings_are_refused_with_the_command_that_converts_them() {
+        let dir = std::env::temp_dir().join(format!("scenecast-{}-other-bags", std::process::id()));
+        let _ = std::fs::remove_dir_all(&dir);
+        std::fs::create_dir_all(&dir).unwrap();
+        let refused = |path: &Path| BagStream::open(path).err().unwrap().to_string();
+        assert!(refused(&dir).contains("no file *.mcap"));
+        for (name, head, command) in [
+            ("a.db3", &b"SQLite format 3\0"[..], "ros2 bag convert"),
+            ("a.bag", b"#ROSBAG V2.0\n", "mcap convert"),
+            ("a.mcap.zstd", b"\x28\xB5\x2F\xFD", "zstd -d"),
+        ] {
+            let file = dir.join(name);
+            std::fs::write(&file, head).unwrap();
+            assert!(refused(&file).contains(command) && refused(&dir).contains(command), "{name}: {}", refused(&file));
+            std::fs::remove_file(file).unwrap();
+        }
+        std::fs::remove_dir_all(dir).unwrap();
+    }
+
+    #[test]
+    fn a_message_that_is_compressed_by_itself_is_unpacked() {
+        let message = [&[0, 1, 0, 0][..], &[7; 1000]].concat();
+        let packed = zstd::bulk::compress(&message, 3).unwrap();
+        assert_eq!((unpacked(message.clone()), unpacked(packed.clone())), (Ok(message.clone()), Ok(message)));
+        assert!(unpacked(packed[..packed.len() / 2].to_vec()).is_err());
+    }
 }

@@ -2,7 +2,7 @@
 
 use super::filter::{Estimate, MeasurementVerdict, PlaneFilter};
 use super::usbl::{Mounting, UsblFault, UsblSighting, offset};
-use scenecast_core::gps::{Gps, GpsLanguage};
+use scenecast_core::gps::{Gps, GpsFix, GpsLanguage};
 use scenecast_core::{LatLon, TangentPlane};
 use scenecast_protocol::coordinates::WorldPoint;
 use scenecast_protocol::directive::Fix;
@@ -63,6 +63,8 @@ struct TrackedVehicle {
 pub struct Relay {
     config: RelayConfig,
     plane: Option<TangentPlane>,
+    /// The position since which all agree with it, while there is no origin.
+    first: Option<GpsFix>,
     gps: Gps,
     compass: Gps,
     own: PlaneFilter,
@@ -78,6 +80,8 @@ impl Relay {
     const GPS_TIMEOUT: Duration = Duration::from_secs(10);
     /// Maximum age of a measurement. The vehicle refuses fixes older than 120 s, and the link needs time too.
     const MAX_AGE: Duration = Duration::from_secs(60);
+    /// Positions must agree for this time before one of them is the origin: the first ones of a receiver may be anywhere.
+    const ORIGIN_AFTER: Duration = Duration::from_secs(5);
     /// Maximum age of a reported depth.
     const DEPTH_TIMEOUT: Duration = Duration::from_secs(60);
 
@@ -85,6 +89,7 @@ impl Relay {
         Self {
             config,
             plane: config.origin.map(TangentPlane::new),
+            first: None,
             gps: Gps::new(config.language),
             compass: Gps::new(GpsLanguage::Nmea),
             own: PlaneFilter::new(0.3),
@@ -148,13 +153,26 @@ impl Relay {
 
     pub fn handle_gps(&mut self, bytes: &[u8], now: Instant) {
         for fix in self.gps.handle_bytes(bytes, now) {
-            let plane = self.plane.get_or_insert_with(|| TangentPlane::new(fix.place));
+            let Some(plane) = self.plane_at(&fix) else { continue };
             let (x, y) = plane.to_plane(fix.place);
             match self.own.update(&Estimate::round(x, y, fix.sigma_m), now.as_secs_f64()) {
                 MeasurementVerdict::Outlier => self.gps_outliers += 1,
                 MeasurementVerdict::Used | MeasurementVerdict::Restarted => self.own_at = Some(now),
             }
         }
+    }
+
+    /// The world frame; a position of the surface becomes its origin once it agrees with those before.
+    fn plane_at(&mut self, fix: &GpsFix) -> Option<TangentPlane> {
+        if self.plane.is_none() {
+            let first = *self.first.get_or_insert(*fix);
+            if !first.leads_to(fix) {
+                self.first = Some(*fix);
+            } else if fix.at.since(first.at) >= Self::ORIGIN_AFTER {
+                self.plane = Some(TangentPlane::new(fix.place));
+            }
+        }
+        self.plane
     }
 
     /// Takes bytes of a separate compass.
@@ -302,6 +320,21 @@ mod tests {
         assert_eq!(relay.handle_usbl(vehicle(), &sighting(30.0, 40.0, 20.0), at(60.0)), Err(RelayFault::NoGps));
         let counted: Vec<_> = relay.faults().map(|(f, n)| (f.name(), n)).collect();
         assert_eq!(counted, [("depth", 1), ("no_gps", 1), ("outlier", 1), ("too_old", 1)]);
+    }
+
+    #[test]
+    fn the_origin_is_where_positions_agree_and_not_where_the_first_one_is() {
+        let mut relay = Relay::new(RelayConfig { origin: None, ..relay().config });
+        let report = |relay: &mut Relay, lat_deg: f64, s: u32| {
+            let place = nmea::place_fields(LatLon { lat_deg, lon_deg: 34.92 });
+            let body = format!("GPGGA,1200{s:02}.00,{place},1,08,1.0,0,M,0,M,,");
+            relay.handle_gps(nmea::line(&body).as_bytes(), at(f64::from(s)));
+            relay.plane().map(|plane| (plane.origin().lat_deg * 10.0).round())
+        };
+        // The first two positions are those of the last harbour.
+        let origins: Vec<_> = (0..30).map(|s| report(&mut relay, if s < 2 { 30.0 } else { 29.5 }, s)).collect();
+        let first = origins.iter().position(Option::is_some).unwrap();
+        assert!((10..20).contains(&first) && origins[first..].iter().all(|lat| *lat == Some(295.0)), "{origins:?}");
     }
 
     proptest! {

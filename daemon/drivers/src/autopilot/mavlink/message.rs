@@ -12,7 +12,7 @@ pub enum Heard {
         custom_mode: u32,
         /// MAV_TYPE: 10 rover, 11 boat, 12 submarine.
         kind: u8,
-        /// MAV_AUTOPILOT: 8 is none, as of a ground station.
+        /// MAV_AUTOPILOT: 3 is ArduPilot, 8 none, as of a ground station.
         autopilot: u8,
         base_mode: u8,
     },

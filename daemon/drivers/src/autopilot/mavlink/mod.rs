@@ -5,7 +5,9 @@ mod command;
 mod echo;
 pub mod frame;
 pub mod message;
+mod sources;
 mod targets;
+mod texts;
 
 use super::{Autopilot, Counters, Goal, Health, Step, Tray};
 use altimeter::{Altimeter, HeightSource};
@@ -15,14 +17,18 @@ use frame::{Deframer, Frame, encode};
 use message::{Heard, Said, heard_extra};
 use scenecast_core::LatLon;
 use scenecast_protocol::time::Instant;
+use sources::{Claim, Sources};
 use std::time::Duration;
 use targets::Sent;
+use texts::Texts;
 
 /// How this end presents itself and what it may do.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MavlinkConfig {
     /// System number of the autopilot; frames of others are passed over.
     pub system: u8,
+    /// Component number of the autopilot; `None`: the component whose heartbeat says that it is one.
+    pub component: Option<u8>,
     /// Whether to arm it and to switch it to guided mode, once.
     pub arms: bool,
     /// Silence after which it counts as gone.
@@ -66,6 +72,8 @@ struct Pose {
 pub struct Mavlink {
     config: MavlinkConfig,
     deframer: Deframer,
+    sources: Sources,
+    texts: Texts,
     seq: u8,
     began: Instant,
     peer: Option<Peer>,
@@ -129,6 +137,8 @@ impl Mavlink {
         Self {
             config,
             deframer: Deframer::default(),
+            sources: Sources::default(),
+            texts: Texts::default(),
             seq: 0,
             began: now,
             peer: None,
@@ -160,22 +170,26 @@ impl Mavlink {
     }
 
     fn handle_frame(&mut self, frame: &Frame, now: Instant) {
-        if frame.system != self.config.system {
-            self.tray.count("other_systems");
-            return;
-        }
         let Some(heard) = Heard::read(frame.id, &frame.payload) else {
             self.tray.count("unreadable");
             return;
         };
+        if let Heard::Heartbeat { custom_mode, kind, autopilot, base_mode } = heard {
+            return match self.claim(frame, kind, autopilot, now) {
+                Claim::Autopilot => self.handle_heartbeat(frame.component, custom_mode, kind, base_mode, now),
+                Claim::Passed(reason) => self.tray.count(reason),
+            };
+        }
+        if frame.system != self.config.system {
+            return self.tray.count(sources::OTHER_SYSTEMS);
+        }
+        // Cameras, gimbals and companion computers have clocks, attitudes and positions of their own.
+        if self.peer.is_none_or(|peer| peer.component != frame.component) {
+            return self.tray.count(sources::OTHER_COMPONENTS);
+        }
         self.tray.count("messages");
         match heard {
-            Heard::Heartbeat { custom_mode, kind, autopilot, base_mode } => {
-                // Cameras and ground stations of the same system have no autopilot.
-                if autopilot != 8 {
-                    self.handle_heartbeat(frame.component, custom_mode, kind, base_mode, now);
-                }
-            }
+            Heard::Heartbeat { .. } | Heard::DistanceElsewhere => {}
             Heard::Attitude { time_boot_ms, roll, pitch, yaw } => {
                 self.handle_boot_time(time_boot_ms, now);
                 (self.tilt, self.yaw) = ((f64::from(roll), f64::from(pitch)), Some(f64::from(yaw)));
@@ -186,7 +200,6 @@ impl Mavlink {
             Heard::LocalTarget(told) => self.handle_local_target(told, now),
             Heard::GlobalTarget(told) => self.handle_global_target(told, now),
             Heard::WaypointDistance(told_m) => self.handle_distance(told_m, now),
-            Heard::DistanceElsewhere => {}
             Heard::Local { time_boot_ms, place, velocity: [north, east, _] } => {
                 self.handle_boot_time(time_boot_ms, now);
                 let velocity = (f64::from(east), f64::from(north));
@@ -216,17 +229,37 @@ impl Mavlink {
                 }
             }
             Heard::Text { severity, text } => {
-                if severity <= 4 {
+                if severity <= 4 && self.texts.is_news(&text, now) {
                     self.tray.note(format!("the autopilot says: {text}"));
+                } else if severity <= 4 {
+                    self.tray.count("texts_repeated");
                 }
             }
         }
+    }
+
+    /// Whether a heartbeat is that of the autopilot, and a note where people should know that it is not.
+    fn claim(&mut self, frame: &Frame, kind: u8, autopilot: u8, now: Instant) -> Claim {
+        let current = self.peer.filter(|peer| now.since(peer.heard) < self.config.silence).map(|peer| peer.component);
+        let (claim, note) =
+            self.sources.judge(&self.config, (frame.system, frame.component), (kind, autopilot), current);
+        if let Some(note) = note {
+            self.tray.note(note);
+        }
+        claim
     }
 
     fn handle_heartbeat(&mut self, component: u8, custom_mode: u32, kind: u8, base_mode: u8, now: Instant) {
         // GUIDED is 4 of ArduSub and ArduCopter, 15 of ArduRover, which drives boats too.
         let guided_mode = if matches!(kind, 10 | 11) { 15 } else { 4 };
         let peer = Peer { component, guided_mode, custom_mode, is_armed: base_mode & 128 != 0, heard: now };
+        if self.peer.is_some_and(|before| before.component != component) {
+            // Another autopilot, with a clock and a frame of its own.
+            (self.peer, self.pose, self.stay, self.command) = (None, None, None, CommandWatch::default());
+            self.echo.forget();
+            self.altimeter.forget();
+            self.tray.forget_measured();
+        }
         let is_new = self.peer.is_none_or(|p| now.since(p.heard) >= self.config.silence);
         let was_in_command = self.peer.is_some_and(|p| p.is_in_command());
         self.peer = Some(peer);
@@ -252,6 +285,7 @@ impl Mavlink {
         self.tray.note("the autopilot has restarted");
         self.echo.forget();
         self.altimeter.forget();
+        self.tray.forget_measured();
         self.stay = None;
         self.ask_for_streams(now);
     }
@@ -311,7 +345,8 @@ impl Mavlink {
         let (roll_rad, pitch_rad) = self.tilt;
         let altitude_m = self.altimeter.height_m(pose.heard);
         let depth_m = pose.depth_m;
-        self.tray.walk(Step { dx_m, dy_m, heading_rad, depth_m, roll_rad, pitch_rad, altitude_m, unseen });
+        let step = Step { dx_m, dy_m, heading_rad, depth_m, roll_rad, pitch_rad, altitude_m, unseen };
+        self.tray.walk_measured(step, pose.heard);
     }
 
     fn handle_second(&mut self, now: Instant) {

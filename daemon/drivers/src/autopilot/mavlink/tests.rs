@@ -8,7 +8,7 @@ fn at(s: f64) -> Instant {
 }
 
 fn pilot(arms: bool) -> Mavlink {
-    Mavlink::new(MavlinkConfig { system: 1, arms, silence: Duration::from_secs(5) }, at(0.0))
+    Mavlink::new(MavlinkConfig { system: 1, component: None, arms, silence: Duration::from_secs(5) }, at(0.0))
 }
 
 fn frame(system: u8, id: u32, payload: Vec<u8>) -> Vec<u8> {
@@ -173,6 +173,7 @@ fn frames_of_others_and_absurd_numbers_are_counted() {
     let mut pilot = pilot(false);
     pilot.handle_bytes(&frame(7, 0, vec![4, 0, 0, 0, 12, 3, 0x81, 4, 3]), at(0.0));
     assert_eq!(pilot.health(at(0.0)), Health::Awaited);
+    pilot.handle_bytes(&heartbeat(4, true), at(0.0));
     pilot.handle_bytes(&local(0, [f32::NAN; 3], [0.0; 3]), at(0.0));
     pilot.handle_bytes(&local(0, [0.0; 3], [1e9, 0.0, 0.0]), at(0.0));
     pilot.handle_bytes(&local(1000, [0.0; 3], [1e9, 0.0, 0.0]), at(1.0));
@@ -196,6 +197,63 @@ fn local_target(north: f32, east: f32) -> Vec<u8> {
 
 fn notes(pilot: &mut Mavlink) -> Vec<String> {
     std::iter::from_fn(|| pilot.poll_note()).collect()
+}
+
+/// A message of another component of the autopilot's system.
+fn of_component(component: u8, id: u32, payload: Vec<u8>) -> Vec<u8> {
+    encode(&Frame { system: 1, component, id, payload }, 0, heard_extra(id).unwrap())
+}
+
+#[test]
+fn companions_gimbals_and_cameras_beside_the_autopilot_change_nothing() {
+    let survey = |is_alone: bool| {
+        let mut pilot = pilot(true);
+        pilot.set_goal(GOAL, at(0.0));
+        let (mut messages, mut steps) = (Vec::new(), Vec::new());
+        for tenth in 0..150u32 {
+            let now = at(f64::from(tenth) / 10.0);
+            if tenth % 10 == 0 {
+                pilot.handle_bytes(&heartbeat(4, true), now);
+            }
+            pilot.handle_bytes(&local(100 * tenth, [0.0, 0.0, 5.0], [0.0, 1.0, 0.0]), now);
+            if !is_alone {
+                // A companion computer, a gimbal with a clock and an attitude of its own, and a camera that measures distances.
+                pilot.handle_bytes(&of_component(191, 0, vec![0, 0, 0, 0, 18, 0, 0, 4, 3]), now);
+                let tilt = [1.0f32, 1.5, 3.0].into_iter().flat_map(f32::to_le_bytes);
+                let attitude = (9_000_000 + tenth).to_le_bytes().into_iter().chain(tilt).collect();
+                pilot.handle_bytes(&of_component(154, 30, attitude), now);
+                pilot.handle_bytes(&of_component(154, 32, local(7, [0.0; 3], [9.0; 3])[10..38].to_vec()), now);
+                pilot.handle_bytes(&of_component(100, 173, 1.5f32.to_le_bytes().to_vec()), now);
+            }
+            pilot.handle_timeout(now);
+            messages.extend(sent(&mut pilot));
+            steps.extend(std::iter::from_fn(|| pilot.poll_step()));
+        }
+        let counters = pilot.counters();
+        (messages, steps, notes(&mut pilot), counters.get("restarts").copied(), counters["targets"])
+    };
+    let alone = survey(true);
+    assert_eq!(alone, survey(false));
+    assert_eq!((alone.3, alone.4), (None, 15));
+}
+
+#[test]
+fn a_depth_that_jumps_does_not_reach_the_vehicle() {
+    let mut pilot = pilot(false);
+    let global = |ms: i32, depth_mm: i32| {
+        let fields: Vec<u8> =
+            [ms, 295_000_000, 349_200_000, 0, -depth_mm].iter().flat_map(|v| v.to_le_bytes()).collect();
+        frame(1, 33, [&fields[..], &[0, 0, 0, 0, 0, 0, 0xFF, 0xFF]].concat())
+    };
+    for tenth in 0..40 {
+        let now = at(f64::from(tenth) / 10.0);
+        pilot.handle_bytes(&heartbeat(4, true), now);
+        pilot.handle_bytes(&global(100 * tenth, if tenth == 20 { 42_000 } else { 5000 }), now);
+    }
+    assert!(std::iter::from_fn(|| pilot.poll_step()).all(|step| step.depth_m == 5.0));
+    assert_eq!(pilot.counters()["depth_jumps"], 1);
+    let expected = "the depth jumps from 5.0 to 42.0 m, which is not used unless it stays";
+    assert_eq!(notes(&mut pilot).last().map(String::as_str), Some(expected));
 }
 
 #[test]

@@ -1,0 +1,129 @@
+//! Which of the components on a MAVLink network is the autopilot.
+//!
+//! A vehicle has many: companion computers, cameras and gimbals share the autopilot's system number, and a ground station and other
+//! vehicles share its network. Only the autopilot's heartbeat says ArduPilot. Source: <https://mavlink.io/en/services/heartbeat.html>.
+
+use super::MavlinkConfig;
+use std::collections::BTreeSet;
+
+/// Counter of frames of other systems.
+pub(super) const OTHER_SYSTEMS: &str = "other_systems";
+/// Counter of frames of other components of the autopilot's system.
+pub(super) const OTHER_COMPONENTS: &str = "other_components";
+
+/// MAV_AUTOPILOT_ARDUPILOTMEGA.
+const ARDUPILOT: u8 = 3;
+/// MAV_AUTOPILOT_INVALID: what all but autopilots should say.
+const NO_AUTOPILOT: u8 = 8;
+/// MAV_COMP_ID_AUTOPILOT1.
+const FIRST_AUTOPILOT: u8 = 1;
+/// Ground station, onboard computer, gimbal, camera: kinds (MAV_TYPE) that are no vehicle whatever autopilot they name.
+const EQUIPMENT: [u8; 4] = [6, 18, 26, 30];
+
+/// Whose heartbeat it is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Claim {
+    Autopilot,
+    /// Of something else, with the name of its counter.
+    Passed(&'static str),
+}
+
+/// The heartbeats that were heard.
+#[derive(Debug, Default)]
+pub(super) struct Sources {
+    /// Systems and components that people were told of.
+    named: BTreeSet<(u8, u8)>,
+}
+
+impl Sources {
+    /// Most sources that are named.
+    const MAX_NAMED: usize = 16;
+
+    /// Whose heartbeat of a system and component it is, by its kind and autopilot, and what people should know of it, once.
+    /// `current` is the component that is the autopilot and not silent.
+    pub(super) fn judge(
+        &mut self,
+        config: &MavlinkConfig,
+        (system, component): (u8, u8),
+        (kind, autopilot): (u8, u8),
+        current: Option<u8>,
+    ) -> (Claim, Option<String>) {
+        let says_ardupilot = autopilot == ARDUPILOT && !EQUIPMENT.contains(&kind);
+        if system != config.system {
+            let note = || {
+                let own = config.system;
+                format!("system {system} is an ArduPilot too, and passed over: autopilot.system is {own}")
+            };
+            return (Claim::Passed(OTHER_SYSTEMS), self.once((system, component), says_ardupilot, note));
+        }
+        let is_autopilot = match config.component {
+            Some(configured) => component == configured,
+            None => {
+                says_ardupilot && current.is_none_or(|current| component == current || component == FIRST_AUTOPILOT)
+            }
+        };
+        if is_autopilot {
+            return (Claim::Autopilot, None);
+        }
+        let is_of_other_make = !matches!(autopilot, ARDUPILOT | NO_AUTOPILOT) && component == FIRST_AUTOPILOT;
+        let note = || match current.or(config.component) {
+            _ if is_of_other_make => format!(
+                "component {component} of system {system} has autopilot number {autopilot}, which is not ArduPilot (3): it is passed over"
+            ),
+            Some(used) => format!(
+                "two autopilots answer as system {system}: component {used} is used, and component {component} passed over; autopilot.component chooses another one"
+            ),
+            None => format!("component {component} of system {system} is passed over"),
+        };
+        let is_named = says_ardupilot || is_of_other_make;
+        (Claim::Passed(OTHER_COMPONENTS), self.once((system, component), is_named, note))
+    }
+
+    fn once(&mut self, source: (u8, u8), is_named: bool, note: impl FnOnce() -> String) -> Option<String> {
+        let is_new = is_named && self.named.len() < Self::MAX_NAMED && self.named.insert(source);
+        is_new.then(note)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::time::Duration;
+
+    const SUB: u8 = 12;
+
+    fn config(component: Option<u8>) -> MavlinkConfig {
+        MavlinkConfig { system: 1, component, arms: false, silence: Duration::from_secs(5) }
+    }
+
+    /// Whether it is taken for the autopilot, and whether it is named.
+    fn judged(sources: &mut Sources, of: (u8, u8), says: (u8, u8), current: Option<u8>) -> (bool, bool) {
+        let (claim, note) = sources.judge(&config(None), of, says, current);
+        (claim == Claim::Autopilot, note.is_some())
+    }
+
+    #[test]
+    fn only_what_says_ardupilot_is_the_autopilot() {
+        let mut sources = Sources::default();
+        assert_eq!(judged(&mut sources, (1, 1), (SUB, 3), None), (true, false));
+        // Companion computer, camera, gimbal, ground station.
+        for (component, kind, autopilot) in [(191, 18, 0), (191, SUB, 0), (100, 30, 8), (154, 26, 3), (190, 6, 8)] {
+            assert_eq!(judged(&mut sources, (1, component), (kind, autopilot), None), (false, false), "{component}");
+        }
+        assert_eq!(judged(&mut sources, (1, 1), (2, 12), None), (false, true), "a PX4");
+        assert_eq!(judged(&mut sources, (1, 1), (2, 12), None), (false, false), "it was named");
+    }
+
+    #[test]
+    fn a_second_autopilot_is_named_once_and_takes_over_only_from_a_silent_one() {
+        let mut sources = Sources::default();
+        assert_eq!(judged(&mut sources, (1, 2), (SUB, 3), Some(1)), (false, true));
+        assert_eq!(judged(&mut sources, (1, 2), (SUB, 3), Some(1)), (false, false));
+        assert_eq!(judged(&mut sources, (1, 2), (SUB, 3), None), (true, false));
+        assert_eq!(judged(&mut sources, (1, 1), (SUB, 3), Some(2)), (true, false), "the first autopilot by its number");
+        assert_eq!(judged(&mut sources, (7, 1), (SUB, 3), Some(1)), (false, true), "another vehicle");
+        let (claim, note) = sources.judge(&config(Some(2)), (1, 1), (SUB, 3), Some(2));
+        assert_eq!((claim, note.is_some()), (Claim::Passed(OTHER_COMPONENTS), true));
+        assert_eq!(sources.judge(&config(Some(9)), (1, 9), (18, 0), None).0, Claim::Autopilot, "as configured");
+    }
+}

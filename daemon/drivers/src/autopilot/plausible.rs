@@ -1,0 +1,216 @@
+//! Depths, headings and heights above the sea floor that no vehicle can reach so fast.
+//!
+//! One false value must not end a mission or bend a map, nor must an autopilot that moves its home and so the zero of its depths. A
+//! value that jumps is not used until it has stayed for long; until then only its changes count.
+
+use super::Step;
+use scenecast_protocol::time::Instant;
+use std::time::Duration;
+
+/// Bounds of one measured quantity.
+struct Bounds {
+    name: &'static str,
+    counter: &'static str,
+    unit: &'static str,
+    /// Change in a second that a vehicle can make.
+    rate: f64,
+    /// Change at once that is no jump: noise, and steps of the sea floor.
+    margin: f64,
+    /// A value that stays for this time is right.
+    persists: Duration,
+    /// The size of a whole turn, for angles.
+    turn: Option<f64>,
+}
+
+const DEPTH: Bounds = Bounds {
+    name: "depth",
+    counter: "depth_jumps",
+    unit: "m",
+    rate: 3.0,
+    margin: 2.0,
+    persists: Duration::from_secs(60),
+    turn: None,
+};
+
+const HEIGHT: Bounds = Bounds {
+    name: "height above the sea floor",
+    counter: "height_jumps",
+    unit: "m",
+    rate: 5.0,
+    margin: 3.0,
+    persists: Duration::from_secs(1),
+    turn: None,
+};
+
+const HEADING: Bounds = Bounds {
+    name: "heading",
+    counter: "heading_jumps",
+    unit: "degrees",
+    rate: 180.0,
+    margin: 45.0,
+    persists: Duration::from_secs(1),
+    turn: Some(360.0),
+};
+
+/// A value that was not used.
+#[derive(Debug, PartialEq)]
+pub(super) struct Jump {
+    pub counter: &'static str,
+    /// What people should read, at most once a minute.
+    pub note: Option<String>,
+}
+
+/// One quantity as it was measured.
+#[derive(Debug, Default)]
+struct Series {
+    /// The last value that was used.
+    used: Option<(f64, Instant)>,
+    /// The first and the last of the values that agree with each other, and not with the used one.
+    other: Option<[(f64, Instant); 2]>,
+    /// Jumps since the last note, and when that was.
+    untold: u32,
+    told: Option<Instant>,
+}
+
+impl Series {
+    /// Notes are this far apart.
+    const NOTE_PERIOD: Duration = Duration::from_secs(60);
+
+    /// The value to use in place of a measured one, and the jump if it is another one.
+    fn check(&mut self, value: f64, bounds: &Bounds, now: Instant) -> (f64, Option<Jump>) {
+        let Some((used, _)) = self.used.filter(|used| !bounds.can_follow(*used, (value, now))) else {
+            (self.used, self.other) = (Some((value, now)), None);
+            return (value, None);
+        };
+        let before = self.other.filter(|[_, last]| bounds.can_follow(*last, (value, now)));
+        let [first, last] = before.unwrap_or([(value, now); 2]);
+        if now.since(first.1) >= bounds.persists {
+            (self.used, self.other) = (Some((value, now)), None);
+            let note = format!("the {} has stayed near {value:.1} {} and is used", bounds.name, bounds.unit);
+            return (value, Some(Jump { counter: bounds.counter, note: Some(note) }));
+        }
+        self.other = Some([first, (value, now)]);
+        let moved = used + value - last.0;
+        let tracked = if bounds.turn.is_some() { moved } else { moved.max(0.0) };
+        self.used = Some((tracked, now));
+        let note = if before.is_none() { self.note((used, value), bounds, now) } else { None };
+        (tracked, Some(Jump { counter: bounds.counter, note }))
+    }
+
+    fn note(&mut self, (used, value): (f64, f64), bounds: &Bounds, now: Instant) -> Option<String> {
+        self.untold += 1;
+        if self.told.is_some_and(|at| now.since(at) < Self::NOTE_PERIOD) {
+            return None;
+        }
+        let Bounds { name, unit, .. } = bounds;
+        let more = match self.untold {
+            0 | 1 => String::new(),
+            n => format!("; it has jumped {n} times: check this sensor"),
+        };
+        (self.told, self.untold) = (Some(now), 0);
+        Some(format!("the {name} jumps from {used:.1} to {value:.1} {unit}, which is not used unless it stays{more}"))
+    }
+}
+
+impl Bounds {
+    /// Whether a later value can follow an earlier one.
+    fn can_follow(&self, (before, at): (f64, Instant), (value, now): (f64, Instant)) -> bool {
+        let change = match self.turn {
+            Some(turn) => (value - before + turn / 2.0).rem_euclid(turn) - turn / 2.0,
+            None => value - before,
+        };
+        change.abs() <= self.margin + self.rate * now.since(at).as_secs_f64()
+    }
+}
+
+/// The measured quantities of a track.
+#[derive(Debug, Default)]
+pub(super) struct Plausible {
+    depth: Series,
+    height: Series,
+    heading: Series,
+}
+
+impl Plausible {
+    /// The step with values that can be, and the jumps that were found.
+    pub(super) fn check(&mut self, step: Step, now: Instant) -> (Step, Vec<Jump>) {
+        let (depth_m, depth_jump) = self.depth.check(step.depth_m, &DEPTH, now);
+        let (heading_deg, heading_jump) = self.heading.check(step.heading_rad.to_degrees(), &HEADING, now);
+        let heading_rad = if heading_jump.is_some() { heading_deg.to_radians() } else { step.heading_rad };
+        let (altitude_m, height_jump) =
+            step.altitude_m.map(|height_m| self.height.check(height_m, &HEIGHT, now)).unzip();
+        let jumps = [depth_jump, heading_jump, height_jump.flatten()].into_iter().flatten().collect();
+        (Step { depth_m, heading_rad, altitude_m, ..step }, jumps)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn at(tenths: u32) -> Instant {
+        Instant::from_secs_f64(f64::from(tenths) / 10.0)
+    }
+
+    /// The depths that are used of measured ones, ten a second, and the notes.
+    fn used(depths: impl IntoIterator<Item = f64>) -> (Vec<f64>, Vec<String>) {
+        let mut plausible = Plausible::default();
+        let mut notes = Vec::new();
+        let steps = (0..).zip(depths).map(|(i, depth_m)| {
+            let (step, jumps) = plausible.check(Step { depth_m, ..Step::default() }, at(i));
+            notes.extend(jumps.into_iter().filter_map(|jump| jump.note));
+            step.depth_m
+        });
+        (steps.collect(), notes)
+    }
+
+    #[test]
+    fn one_false_depth_is_not_used_and_named_with_both_values() {
+        let (depths, notes) = used((0..40).map(|i| if i == 20 { 42.0 } else { 5.0 }));
+        assert_eq!(depths, [5.0; 40]);
+        assert_eq!(notes, ["the depth jumps from 5.0 to 42.0 m, which is not used unless it stays"]);
+    }
+
+    #[test]
+    fn of_a_depth_that_jumps_and_stays_only_the_changes_count_for_a_minute() {
+        let sunk = |i: i32| 0.02 * f64::from(i - 20);
+        let (depths, notes) = used((0..700).map(|i| if i < 20 { 5.0 } else { 42.0 + sunk(i) }));
+        let adopted = depths.iter().position(|depth| *depth > 40.0).unwrap();
+        assert_eq!(adopted, 620);
+        assert!((depths[619] - 5.0 - sunk(619)).abs() < 1e-9, "{}", depths[619]);
+        assert_eq!(notes[1..], ["the depth has stayed near 54.0 m and is used"]);
+    }
+
+    #[test]
+    fn a_dive_as_fast_as_a_vehicle_can_is_no_jump_even_after_a_silence() {
+        let depths: Vec<f64> = (0..200).map(|i| 0.25 * f64::from(i)).collect();
+        assert_eq!(used(depths.clone()), (depths, vec![]));
+        let mut plausible = Plausible::default();
+        for (tenths, depth_m) in [(0, 5.0), (200, 60.0)] {
+            let (step, jumps) = plausible.check(Step { depth_m, ..Step::default() }, at(tenths));
+            assert_eq!((step.depth_m, jumps), (depth_m, vec![]));
+        }
+    }
+
+    #[test]
+    fn a_sensor_that_jumps_often_is_named_once_a_minute() {
+        let (depths, notes) = used((0..1300).map(|i| if i % 10 == 5 { 42.0 } else { 5.0 }));
+        assert!(depths.iter().all(|depth| *depth == 5.0));
+        assert_eq!(notes.len(), 3);
+        assert!(notes[1].ends_with("it has jumped 60 times: check this sensor"), "{}", notes[1]);
+    }
+
+    #[test]
+    fn headings_are_compared_across_north_and_heights_by_themselves() {
+        let mut plausible = Plausible::default();
+        let mut check = |tenths, heading_deg: f64, altitude_m| {
+            let step = Step { heading_rad: heading_deg.to_radians(), altitude_m, ..Step::default() };
+            let (step, jumps) = plausible.check(step, at(tenths));
+            (step.heading_rad.to_degrees().round(), step.altitude_m, jumps.len())
+        };
+        assert_eq!(check(0, 350.0, Some(4.0)), (350.0, Some(4.0), 0));
+        assert_eq!(check(1, 10.0, None), (10.0, None, 0));
+        assert_eq!(check(2, 170.0, Some(30.0)), (10.0, Some(4.0), 2));
+        assert_eq!(check(3, 12.0, Some(4.5)), (12.0, Some(4.5), 0));
+    }
+}
