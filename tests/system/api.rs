@@ -362,7 +362,8 @@ fn last_seen_reaches_the_surface_and_its_exports_if_requested() {
     let out = scratch("last-seen");
     let report = |sets: &[&str]| -> Value {
         let small = ["--set", "world.kind=patches", "--set", "camera.width_px=320", "--set", "camera.height_px=240"];
-        let sim = [&["sim", "--duration", "120", "--seed", "3", "--out", out.to_str().unwrap()], &small[..]].concat();
+        let sim = [&["sim", "--duration", "120", "--seed", "3", "--force", "--out", out.to_str().unwrap()], &small[..]]
+            .concat();
         let ran = run(&[&sim[..], sets].concat());
         assert_eq!(ran.status.code(), Some(0), "{}", text(&ran));
         serde_json::from_slice(&std::fs::read(out.join("report.json")).unwrap()).unwrap()

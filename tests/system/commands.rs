@@ -35,6 +35,7 @@ fn wrong_input_gets_one_line_with_the_rule() {
         &["survey.area_m", "120 m east"],
     );
     assert_refused(&["sim", "--duration", "-5", "--out", out], &["survey.duration_s", "from 0"]);
+    assert_refused(&["sim", "--duration", "5cm", "--out", out], &["--duration", "a number without a unit"]);
     assert_refused(&["sim"], &["--out"]);
     assert_refused(&["auv", "--config", "nowhere.toml"], &["nowhere.toml"]);
     assert!(!dir.join("out").exists(), "nothing was written");

@@ -49,10 +49,19 @@ pub fn read_key(path: &Path) -> Result<(KeyFile, Option<String>), UserError> {
     let file = File::open(path).map_err(problem)?;
     let warning = others_may_read(&file)
         .then(|| format!("{}: other users may read this key; chmod 600 FILE prevents that", path.display()));
+    hide_memory();
     let mut text = Zeroizing::new(String::with_capacity(1024));
     file.take(MAX_BYTES).read_to_string(&mut text).map_err(problem)?;
     let key = KeyFile::parse(&text).map_err(|e| UserError::file(path, e))?;
     Ok((key, warning))
+}
+
+/// Keeps the memory of this process, which is to hold a key or tokens, out of core dumps and from debuggers of the same user.
+pub(super) fn hide_memory() {
+    #[cfg(target_os = "linux")]
+    if let Err(error) = nix::sys::prctl::set_dumpable(false) {
+        tracing::warn!("the memory of this process cannot be kept out of core dumps: {error}");
+    }
 }
 
 #[cfg(unix)]

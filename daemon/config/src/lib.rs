@@ -38,7 +38,7 @@ pub use sections::{
 pub use setting::{
     Authenticate, AutopilotKind, BandRange, BirthRule, CalibrationSource, CameraSource, CameraStamps, Debounce,
     DepthSource, GpsPort, HostPort, LabelMessage, LabelSource, LayerName, MapCells, ModemKind, NavigationSource,
-    OperatorScript, Remap, RestoreOrders, RosName, RosTransport, S2cMode, SceneLabels, StartMode, Votes, WorldKind,
-    ZenohEndpoint,
+    OperatorScript, PageOrigin, Remap, RestoreOrders, RosName, RosTransport, S2cMode, SceneLabels, StartMode, Votes,
+    WorldKind, ZenohEndpoint,
 };
 pub use token_file::{TokenGrant, load_tokens, read_token, read_tokens};

@@ -1,7 +1,7 @@
 //! The file of the tokens that the operator's page and scripts present.
 
 use super::Config;
-use super::key_file::others_may_read;
+use super::key_file::{hide_memory, others_may_read};
 use scenecast_core::{Principal, Role, UserError};
 use std::fs::File;
 use std::io::Read;
@@ -40,6 +40,7 @@ pub fn load_tokens(config: &Config) -> Result<Vec<TokenGrant>, UserError> {
 /// are empty or begin with `#` are ignored.
 pub fn read_tokens(path: &Path) -> Result<Vec<TokenGrant>, UserError> {
     let problem = |e: std::io::Error| UserError::file(path, format!("{e}; scenecast key token writes a token file"));
+    hide_memory();
     let mut text = Zeroizing::new(String::with_capacity(MAX_BYTES as usize + 1));
     File::open(path).map_err(problem)?.take(MAX_BYTES + 1).read_to_string(&mut text).map_err(problem)?;
     if text.len() as u64 > MAX_BYTES {

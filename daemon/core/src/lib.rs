@@ -1,6 +1,6 @@
 //! Shared types of the daemon's crates: coordinates, sensor sentences, pictures of label maps, the error for people.
 //!
-//! Internal to scenecast. No IO: bytes and time come in as arguments.
+//! Internal to scenecast. No IO but standard output ([`out!`]): bytes and time come in as arguments.
 
 mod area;
 mod body;
@@ -14,6 +14,7 @@ mod micromodem_rate;
 mod modem_units;
 pub mod nmea;
 mod outlines;
+mod output;
 pub mod palette;
 mod port_address;
 mod principal;
@@ -30,8 +31,9 @@ pub use lines::Lines;
 pub use micromodem_rate::{CYCLE_INIT, MicromodemRate, OVERHEAD_BITS};
 pub use modem_units::{S2C_BURST_FRAME_BYTES, S2C_INSTANT_BYTES};
 pub use outlines::{fence_of, outline_of, place_of};
+pub use output::write_or_exit;
 pub use port_address::PortAddress;
 pub use principal::{ClientName, Giver, Principal, Role};
 pub use printable::printable;
 pub use usbl_line::{ModemAddress, UsblLine};
-pub use world_file::world_file;
+pub use world_file::{WGS84_AUX_XML, world_file};

@@ -3,7 +3,7 @@
 use crate::link_host::{FrameEvent, LinkHost};
 use crate::pilot::PilotEvent;
 use crate::vehicle_pilot::VehiclePilot;
-use scenecast_drivers::autopilot::{Counters, Health, Step};
+use scenecast_drivers::autopilot::{Counters, Health, Plausible, Step};
 use scenecast_drivers::modem::Station;
 use scenecast_protocol::coordinates::MapPoint;
 use scenecast_protocol::directive::{Budget, Fix, Settings};
@@ -37,6 +37,8 @@ pub enum VehicleHostEvent {
     /// An event of frames or modem.
     Frame(FrameEvent),
     Pilot(PilotEvent),
+    /// A line on the navigation source that a person should read.
+    Note(String),
 }
 
 /// The pose of a camera frame, in the map frame.
@@ -78,6 +80,8 @@ pub struct VehicleHost {
     mapper: MapperQueue,
     /// Whether the owner still has to make the state durable.
     is_persisting: bool,
+    /// Depth and heading of the navigation source.
+    plausible: Plausible,
     events: VecDeque<VehicleHostEvent>,
 }
 
@@ -86,7 +90,14 @@ impl VehicleHost {
     /// waypoints and reports the odometry.
     pub fn new(vehicle: Vehicle, station: Station, pilot: Option<VehiclePilot>) -> Self {
         let link = LinkHost::new(vehicle, station);
-        Self { link, pilot, mapper: MapperQueue::default(), is_persisting: false, events: VecDeque::new() }
+        Self {
+            link,
+            pilot,
+            mapper: MapperQueue::default(),
+            is_persisting: false,
+            plausible: Plausible::default(),
+            events: VecDeque::new(),
+        }
     }
 
     pub fn vehicle(&self) -> &Vehicle {
@@ -168,9 +179,13 @@ impl VehicleHost {
 
     /// Takes the pose of a recording or of a navigation source, unless an autopilot measures it.
     pub fn handle_pose(&mut self, pose: CameraPose, now: Instant) {
-        if !self.is_measured_by_pilot() {
-            self.link.end_mut().set_pose(pose.x_m, pose.y_m, pose.heading_rad, pose.depth_m, now);
+        if self.is_measured_by_pilot() {
+            return;
         }
+        let step = Step { heading_rad: pose.heading_rad, depth_m: pose.depth_m, ..Step::default() };
+        let (step, jumps) = self.plausible.check(step, now);
+        self.events.extend(jumps.into_iter().filter_map(|jump| jump.note).map(VehicleHostEvent::Note));
+        self.link.end_mut().set_pose(pose.x_m, pose.y_m, step.heading_rad, step.depth_m, now);
     }
 
     /// Replaces the budget and the shares that the surface ordered by those of the configuration.

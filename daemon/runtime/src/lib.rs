@@ -40,6 +40,7 @@ mod vehicle;
 
 pub use clock::Clock;
 pub use pilot::SimulatedAutopilot;
+pub use private::keep_private;
 pub use reload::Load;
 pub use stop::Stop;
 #[cfg(feature = "surface")]
@@ -47,14 +48,21 @@ pub use surface::{host_name, run_surface};
 pub use vehicle::run_vehicle;
 
 use scenecast_core::UserError;
-use std::hash::{BuildHasher, Hasher, RandomState};
+use std::pin::Pin;
 
 /// Maximum wait for other threads at the end.
 const SHUTDOWN_TIMEOUT: std::time::Duration = std::time::Duration::from_secs(1);
 
-/// Random bits for session numbers: not secret, but different in each run.
+/// Random bits of the operating system, from which session numbers and nonces are drawn.
+///
+/// # Panics
+///
+/// The system has no random numbers: without them an old run could be replayed.
+#[must_use]
 pub fn random_bits() -> u64 {
-    RandomState::new().build_hasher().finish()
+    let mut bits = [0; 8];
+    getrandom::fill(&mut bits).expect("the operating system gives random numbers");
+    u64::from_le_bytes(bits)
 }
 
 /// The log without `RUST_LOG`. RustDDS and Zenoh report each socket and each match of theirs, and `ros2-client` as an error that an
@@ -70,6 +78,8 @@ pub fn block_on<T>(future: impl Future<Output = Result<T, UserError>>) -> Result
     let _ = log.log_internal_errors(false).try_init();
     let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build();
     let runtime = runtime.map_err(|e| UserError::Failed(e.to_string()))?;
+    // Of a boxed future the runtime has one copy of the code, of another one several.
+    let future: Pin<Box<dyn Future<Output = _>>> = Box::pin(future);
     let result = runtime.block_on(future);
     // A pending name lookup would delay the end for the whole timeout of the resolver.
     runtime.shutdown_timeout(SHUTDOWN_TIMEOUT);

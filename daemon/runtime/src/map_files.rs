@@ -2,6 +2,7 @@
 
 use scenecast_console::state::Origin;
 use scenecast_console::{MapCells, MapFormat};
+use scenecast_core::WGS84_AUX_XML;
 use scenecast_core::label_picture::MAX_CELLS;
 use scenecast_files::write_whole;
 use std::collections::BTreeMap;
@@ -106,10 +107,12 @@ fn write(dir: &Path, vehicle: u8, map: &MapFile) -> Result<(), String> {
     if map.cells.bounds.is_some_and(|b| b.area() > MAX_CELLS) {
         put("tif", &map.cells.export(MapFormat::Tiff, map.origin)?)?;
         remove("pgw")?;
+        remove("png.aux.xml")?;
         return remove("png");
     }
     if let Some(text) = &map.world_file {
         put("pgw", text.as_bytes())?;
+        put("png.aux.xml", WGS84_AUX_XML.as_bytes())?;
     }
     put("png", &map.cells.export(MapFormat::Png, map.origin)?)?;
     remove("tif")
@@ -132,7 +135,7 @@ mod tests {
         let names = || {
             let mut names: Vec<_> = std::fs::read_dir(&dir).unwrap().map(|e| e.unwrap().file_name()).collect();
             names.sort();
-            names
+            names.into_iter().map(|name: std::ffi::OsString| name.into_string().unwrap()).collect::<Vec<_>>()
         };
         let runtime = tokio::runtime::Builder::new_current_thread().enable_time().build().unwrap();
         let run = |maps: &[(u8, MapFile)]| {
@@ -143,11 +146,12 @@ mod tests {
             });
         };
         run(&[(2, file(&[(0, 0), (80_000, 80_000)])), (1, file(&[(0, 0)])), (2, file(&[(0, 0), (1, 1)]))]);
-        assert_eq!(names(), ["operator-map-1.pgw", "operator-map-1.png", "operator-map-2.pgw", "operator-map-2.png"]);
+        let files = |vehicle: u8| ["pgw", "png", "png.aux.xml"].map(|kind| format!("operator-map-{vehicle}.{kind}"));
+        assert_eq!(names(), [files(1), files(2)].concat());
         run(&[(1, file(&[(0, 0), (80_000, 80_000)]))]);
-        assert_eq!(names(), ["operator-map-1.tif", "operator-map-2.pgw", "operator-map-2.png"]);
+        assert_eq!(names(), [&["operator-map-1.tif".to_owned()][..], &files(2)].concat());
         run(&[(1, file(&[(5, 5)]))]);
-        assert_eq!(names()[..2], ["operator-map-1.pgw", "operator-map-1.png"]);
+        assert_eq!(names()[..3], files(1));
         std::fs::remove_dir_all(&dir).unwrap();
     }
 }

@@ -17,13 +17,13 @@ use scenecast_console::{
     ClientRequest, Console, LinkMeter, MissionFacts, PendingRequest, Reply, SurfaceRequest, archived_cells, bind,
     former_labels, handle_request, measured_origin, snapshot, start,
 };
-use scenecast_core::UserError;
-use scenecast_core::world_file;
+use scenecast_core::{LatLon, TangentPlane, UserError, world_file};
 use scenecast_host::{Follower, FrameEvent, SurfaceHost, SurfaceHostEvent, modem_station};
 use scenecast_protocol::directive::Budget;
 use scenecast_protocol::wire::Address;
 use scenecast_surface::position::Follow;
 use scenecast_surface::{CommandChange, SurfaceOutput};
+use std::io::Write;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 use tokio::sync::oneshot;
@@ -50,14 +50,16 @@ pub fn run_surface(load: Load, simulated: Option<SimulatedAutopilot>) -> Result<
     super::block_on(async move {
         let mut config = load()?;
         name_surface(&mut config);
-        keep_private(&config);
+        keep_private();
         let mut principals = Vec::new();
         let listener = match &config.console.listen {
             None => None,
             Some(address) => {
                 let tokens = scenecast_config::load_tokens(&config)?;
                 principals.extend(tokens.iter().map(|t| t.principal.clone()));
-                Some(bind(address.as_str(), "console.listen", tokens, &config.console.host).await?)
+                let listener = bind(address.as_str(), "console.listen", tokens, &config.console.host).await?;
+                let origins = config.console.origins.iter().map(|origin| origin.as_str().to_owned()).collect();
+                Some(listener.with_origins(origins))
             }
         };
         warn_without_key(&config);
@@ -84,7 +86,8 @@ pub fn run_surface(load: Load, simulated: Option<SimulatedAutopilot>) -> Result<
             surface.assume_budget_spent(clock.now());
         }
         let console = listener.zip(config.console.listen.as_ref()).map(|(listener, address)| {
-            println!("the operator's page is at http://{address} (end with Ctrl-C)");
+            // Without a terminal the surface goes on.
+            let _ = writeln!(std::io::stdout(), "the operator's page is at http://{address} (end with Ctrl-C)");
             start(listener)
         });
         files.begin(&mut surface, super::random_bits() as u32, config.mission.id, clock.now());
@@ -345,9 +348,10 @@ impl SurfaceShell {
         let earlier = surface.record(vehicle).and_then(|record| record.earlier_map());
         let live = || surface.status(vehicle).and_then(|(status, _)| status.placement);
         let placement = earlier.map_or_else(live, |earlier| earlier.placement());
-        let place = surface.relay().and_then(|r| r.plane()).zip(cells.bounds);
         let origin = measured_origin(surface).or(self.facts.origin);
-        let world_file = place.map(|(plane, bounds)| world_file(plane, placement, bounds, cell_m));
+        let plane = origin.and_then(|origin| LatLon::new(origin.lat_deg, origin.lon_deg)).map(TangentPlane::new);
+        let place = plane.zip(cells.bounds);
+        let world_file = place.map(|(plane, bounds)| world_file(&plane, placement, bounds, cell_m));
         cells.moved_m = placement.map_or((0.0, 0.0), |p| (p.origin.east_m, p.origin.north_m));
         self.maps.write(vehicle.number(), MapFile { cells, world_file, origin });
     }

@@ -37,7 +37,7 @@ const RESTART_S: f64 = 2.0;
 pub fn run_vehicle(load: Load, simulated: Option<SimulatedAutopilot>) -> Result<(), UserError> {
     super::block_on(async move {
         let config = load()?;
-        keep_private(&config);
+        keep_private();
         warn_without_key(&config);
         let address = scenecast_config::vehicle_address(&config)?;
         let authenticity = scenecast_config::authenticity(&config, address)?;
@@ -378,6 +378,7 @@ impl VehicleShell {
                 }
                 VehicleHostEvent::Frame(event) => modem::log(&event)?,
                 VehicleHostEvent::Pilot(event) => pilot::log(event),
+                VehicleHostEvent::Note(note) => tracing::warn!("navigation: {note}"),
             }
         }
         Ok(())

@@ -33,7 +33,7 @@ pub fn run_demo(mission: Mission, speed: f64, port: Option<u16>) -> Result<(), U
         let console = match port {
             Some(port) => {
                 let listener = bind(&format!("127.0.0.1:{port}"), "--port", Vec::new(), "").await?;
-                println!("the operator's page is at http://127.0.0.1:{port} (end with Ctrl-C)");
+                scenecast_core::outln!("the operator's page is at http://127.0.0.1:{port} (end with Ctrl-C)");
                 Some(start(listener))
             }
             None => None,

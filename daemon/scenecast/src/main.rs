@@ -8,7 +8,11 @@ fn main() -> ExitCode {
     let arguments = match scenecast::commands::Arguments::try_parse() {
         Ok(arguments) => arguments,
         // Help, version, or the list of commands where none is given.
-        Err(e) if !e.use_stderr() || e.kind() == ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand => e.exit(),
+        Err(e) if !e.use_stderr() => {
+            scenecast_core::out!("{}", e.render());
+            return ExitCode::SUCCESS;
+        }
+        Err(e) if e.kind() == ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand => e.exit(),
         Err(e) => {
             eprintln!("scenecast: {}", one_line(&e.to_string()));
             return ExitCode::from(2);
@@ -30,5 +34,8 @@ fn one_line(text: &str) -> String {
     let tips = paragraphs.filter_map(|paragraph| paragraph.strip_prefix("tip: "));
     let parts: Vec<&str> = [message].into_iter().chain(tips).collect();
     let line = parts.join("; ").replace("\n  tip:", ";");
+    // The words of the standard library for what is no number.
+    let line = line.replace("invalid float literal", "expected a number without a unit, as in 0.5");
+    let line = line.replace("invalid digit found in string", "expected a whole number without a unit");
     format!("{} (scenecast COMMAND --help lists all options)", line.split_whitespace().collect::<Vec<_>>().join(" "))
 }

@@ -46,6 +46,11 @@ impl LogKind {
         Self::Fault,
     ];
 
+    /// Whether entries give room first to orders, answers, modes and faults: anybody can cause many of them.
+    fn is_minor(self) -> bool {
+        !matches!(self, Self::Order | Self::Answer | Self::Mode | Self::Fault)
+    }
+
     /// The name for people and in the API.
     pub fn name(self) -> &'static str {
         match self {
@@ -85,7 +90,7 @@ pub struct MissionLog {
 }
 
 impl MissionLog {
-    /// The most entries that are kept. Edits go first, so that many of them do not push an order out.
+    /// The most entries that are kept. Those that concern nobody's safety go first, so that many of them do not push an order out.
     pub const MAX: usize = MAX_LOG;
     /// The most characters of a text.
     const MAX_TEXT: usize = 240;
@@ -109,7 +114,7 @@ impl MissionLog {
     fn push(&mut self, entry: LogEntry) {
         self.last = entry.number;
         self.entries.push_back(entry);
-        make_room(&mut self.entries, |entry| entry.kind == LogKind::Record);
+        make_room(&mut self.entries, |entry| entry.kind.is_minor());
     }
 
     /// Puts the entries of an earlier run of the surface back, before any other entry.
@@ -118,12 +123,13 @@ impl MissionLog {
     }
 }
 
-/// Removes the oldest edit while there are too many entries and edits are more than a quarter of them, or else the oldest entry.
-pub(super) fn make_room<T>(entries: &mut VecDeque<T>, is_edit: impl Fn(&T) -> bool) {
+/// Removes the oldest minor entry while there are too many entries and minor ones are more than a quarter of them, or else the oldest
+/// entry.
+pub(super) fn make_room<T>(entries: &mut VecDeque<T>, is_minor: impl Fn(&T) -> bool) {
     while entries.len() > MAX_LOG {
-        let edits = entries.iter().filter(|entry| is_edit(entry)).count();
-        let oldest_edit = entries.iter().position(&is_edit).filter(|_| edits > MAX_LOG / 4);
-        entries.remove(oldest_edit.unwrap_or(0));
+        let minor = entries.iter().filter(|entry| is_minor(entry)).count();
+        let oldest_minor = entries.iter().position(&is_minor).filter(|_| minor > MAX_LOG / 4);
+        entries.remove(oldest_minor.unwrap_or(0));
     }
 }
 
@@ -141,8 +147,9 @@ impl From<&LogEntry> for StoredLogEntry {
 }
 
 impl StoredLogEntry {
-    pub(super) fn is_edit(&self) -> bool {
-        self.kind == LogKind::Record as u8
+    /// A kind that this build does not know is kept.
+    pub(super) fn is_minor(&self) -> bool {
+        LogKind::ALL.into_iter().any(|kind| kind as u8 == self.kind && kind.is_minor())
     }
 
     /// `None` if this build does not know the kind.
@@ -169,7 +176,7 @@ mod tests {
         let mut add = |kind, text: &str| {
             log.add(Address::vehicle(1), kind, Some("ann"), text, Instant::ZERO);
             stored.push_back(StoredLogEntry::from(log.entries().next_back().unwrap()));
-            make_room(&mut stored, StoredLogEntry::is_edit);
+            make_room(&mut stored, StoredLogEntry::is_minor);
         };
         add(LogKind::Order, "hold");
         (0..9000).for_each(|number| add(LogKind::Record, &format!("label 3: name {number}")));

@@ -11,9 +11,9 @@ pub fn print_figures(figures: &impl Serialize, json: bool) -> Result<(), UserErr
     let failed = |e: serde_json::Error| UserError::Failed(e.to_string());
     if as_json {
         // A struct keeps the order of its members only if it is written at once.
-        println!("{}", serde_json::to_string(figures).map_err(failed)?);
+        scenecast_core::outln!("{}", serde_json::to_string(figures).map_err(failed)?);
     } else {
-        print!("{}", lines(&serde_json::to_value(figures).map_err(failed)?));
+        scenecast_core::out!("{}", lines(&serde_json::to_value(figures).map_err(failed)?));
     }
     Ok(())
 }

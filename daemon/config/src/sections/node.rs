@@ -2,7 +2,7 @@
 
 use crate::key::section;
 use crate::rule::{ANY, range};
-use crate::setting::{HostPort, OperatorScript, RestoreOrders, WorldKind};
+use crate::setting::{HostPort, OperatorScript, PageOrigin, RestoreOrders, WorldKind};
 use scenecast_core::LatLon;
 use std::path::PathBuf;
 
@@ -73,6 +73,9 @@ section! {
         token_file: Option<PathBuf> = None, ANY, [Asv];
         /// Host name under which other machines open the page. Empty: they use the address.
         host: String = String::new(), ANY, [Asv];
+        /// Origins of the page behind a proxy that encrypts, as in "https://survey.example.org". The page under its own address
+        /// needs none.
+        origins: Vec<PageOrigin> = Vec::new(), ANY, [Asv];
     }
 }
 

@@ -19,7 +19,7 @@ pub use choices::{
 pub use debounce::Debounce;
 pub use labels::{BandRange, LabelMessage, LabelSource, Votes};
 pub use layers::LayerName;
-pub use ports::{GpsPort, HostPort};
+pub use ports::{GpsPort, HostPort, PageOrigin};
 pub use ros2::{Remap, RosName, ZenohEndpoint};
 pub use sources::{CalibrationSource, CameraSource, DepthSource, NavigationSource};
 

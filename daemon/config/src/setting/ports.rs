@@ -1,6 +1,6 @@
 //! Ports of instruments, as in `serial:DEVICE:BAUD`, and network addresses.
 
-use super::Setting;
+use super::{Setting, different, read_different};
 use crate::rule::Rule;
 use scenecast_core::PortAddress;
 use scenecast_core::gps::GpsLanguage;
@@ -37,6 +37,42 @@ impl HostPort {
 impl fmt::Display for HostPort {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(&self.0)
+    }
+}
+
+/// The origin of a page (RFC 6454), as in `https://survey.example.org:8443`.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+pub struct PageOrigin(String);
+
+impl PageOrigin {
+    /// Scheme and host, with a port where it is not the usual one, and no path.
+    pub fn parse(text: &str) -> Option<Self> {
+        let host = text.strip_prefix("https://").or_else(|| text.strip_prefix("http://"))?;
+        let is_allowed = |b: u8| b.is_ascii_alphanumeric() || b".-:[]".contains(&b);
+        (!host.is_empty() && host.len() <= 255 && host.bytes().all(is_allowed)).then(|| Self(text.to_owned()))
+    }
+
+    /// The text, as browsers send it.
+    pub fn as_str(&self) -> &str {
+        &self.0
+    }
+}
+
+impl Setting for Vec<PageOrigin> {
+    fn read(value: &Value, _: &Rule) -> Option<Self> {
+        read_different(value, |v| PageOrigin::parse(v.as_str()?))
+    }
+
+    fn write(&self) -> Value {
+        Value::Array(self.iter().map(|origin| Value::String(origin.0.clone())).collect())
+    }
+
+    fn allowed(_: &Rule) -> String {
+        "a list of \"https://HOST\" or \"https://HOST:PORT\"".to_owned()
+    }
+
+    fn schema(_: &Rule) -> serde_json::Value {
+        different(json!({ "type": "string", "pattern": r"^https?://[A-Za-z0-9.:\[\]-]+$" }))
     }
 }
 

@@ -29,9 +29,12 @@ pub use settings::{SettingsChange, change_settings};
 pub use watch::{show_labels, show_status, watch};
 
 use scenecast_core::UserError;
+use std::pin::Pin;
 
 /// Runs a command of the client to its end.
 pub fn block_on(command: impl Future<Output = Result<(), UserError>>) -> Result<(), UserError> {
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build();
+    // Of a boxed future the runtime has one copy of the code, of another one several.
+    let command: Pin<Box<dyn Future<Output = _>>> = Box::pin(command);
     runtime.map_err(|e| UserError::Failed(e.to_string()))?.block_on(command)
 }

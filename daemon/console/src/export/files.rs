@@ -5,7 +5,7 @@ use super::projection::{TransverseMercator, well_known_text};
 use super::regions::{Polygon, regions};
 use crate::state::{Origin, VehicleMarker};
 use scenecast_core::label_picture;
-use scenecast_protocol::map::{LabelGrid, Quantity, Rect};
+use scenecast_protocol::map::{Cell, LabelGrid, Quantity, Rect};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::fmt::Write;
@@ -40,16 +40,22 @@ pub(super) fn projection(origin: Option<Origin>) -> String {
 /// Regions of equal label, and markers: WGS 84 if the mission has an origin, else metres east and north of it.
 pub(super) fn geojson(cells: &MapCells, origin: Option<Origin>) -> String {
     let projection = origin.map(TransverseMercator::about);
-    let position = |(x, y): (f64, f64)| {
+    // A place on the given side of 180 degrees of longitude, where RFC 7946 cuts what lies across it.
+    let position = |(x, y): (f64, f64), side: i64| {
         let Some(projection) = &projection else { return json!([x, y]) };
         let (lon, lat) = projection.lon_lat(x, y);
-        json!([tidy(lon), tidy(lat)])
+        json!([tidy((lon - 360.0 * side as f64).clamp(-180.0, 180.0)), tidy(lat)])
     };
-    let corner = |&(column, row): &(i64, i64)| position(cells.corner_m(column, row));
+    let side_of = |(x, y): (f64, f64)| {
+        projection.as_ref().map_or(0, |projection| ((projection.lon_lat(x, y).0 + 180.0) / 360.0).floor() as i64)
+    };
     let counts = counts(cells);
-    let feature = |(label, polygons): (u8, Vec<Polygon>)| {
+    let feature = |(label, polygons): (u8, Vec<(i64, Polygon)>)| {
         let count = counts.get(&label).copied().unwrap_or(0);
-        let rings = |polygon: &Polygon| polygon.iter().map(|r| r.iter().map(corner).collect()).collect::<Vec<Value>>();
+        let rings = |(side, polygon): &(i64, Polygon)| {
+            let corner = |&(column, row): &(i64, i64)| position(cells.corner_m(column, row), *side);
+            polygon.iter().map(|r| r.iter().map(corner).collect()).collect::<Vec<Value>>()
+        };
         let (name, area_m2) = (cells.names.get(&label), f64::from(count) * cells.cell_m * cells.cell_m);
         json!({
             "type": "Feature",
@@ -58,7 +64,16 @@ pub(super) fn geojson(cells: &MapCells, origin: Option<Origin>) -> String {
             "geometry": { "type": "MultiPolygon", "coordinates": polygons.iter().map(rings).collect::<Vec<_>>() },
         })
     };
-    let all = regions(cells.explored().map(|c| (c.cell, c.label)));
+    let mut sides: BTreeMap<i64, Vec<(Cell, u8)>> = BTreeMap::new();
+    for cell in cells.explored() {
+        sides.entry(side_of((cell.x, cell.y))).or_default().push((cell.cell, cell.label));
+    }
+    let mut all: BTreeMap<u8, Vec<(i64, Polygon)>> = BTreeMap::new();
+    for (side, found) in sides {
+        for (label, polygons) in regions(found.into_iter()) {
+            all.entry(label).or_default().extend(polygons.into_iter().map(|polygon| (side, polygon)));
+        }
+    }
     let mut facts = json!({ "map_version": cells.version, "mission_time_s": crate::snapshot::seconds(cells.at) });
     if origin.is_none() {
         facts["coordinates"] = json!("metres east and north of the mission's origin");
@@ -68,7 +83,7 @@ pub(super) fn geojson(cells: &MapCells, origin: Option<Origin>) -> String {
             "type": "Feature",
             "id": format!("marker-{}", m.number),
             "properties": { "marker": m.text, "author": m.author, "mission_time_s": m.at_s },
-            "geometry": { "type": "Point", "coordinates": position((m.x_m, m.y_m)) },
+            "geometry": { "type": "Point", "coordinates": position((m.x_m, m.y_m), side_of((m.x_m, m.y_m))) },
         })
     };
     let features: Vec<Value> = all.into_iter().map(feature).chain(cells.markers.iter().map(marker)).collect();

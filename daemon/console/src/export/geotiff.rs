@@ -82,7 +82,8 @@ pub(super) fn geotiff(cells: &MapCells, origin: Option<Origin>, reference: Refer
         (_, None) => return Err(no_origin.to_owned()),
         (Reference::Utm, Some(origin)) => {
             let zone = TransverseMercator::utm(origin);
-            let (utm, epsg) = zone.ok_or("UTM ends at 84 degrees of latitude: take map.wgs84.tif or map.tif")?;
+            let (utm, epsg) =
+                zone.ok_or("UTM reaches from 80 degrees south to 84 degrees north: take map.wgs84.tif or map.tif")?;
             (Places::Projected(TransverseMercator::about(origin), utm), utm_keys(epsg))
         }
         (Reference::Wgs84, Some(origin)) => (Places::Degrees(TransverseMercator::about(origin)), wgs84_keys()),
@@ -127,6 +128,17 @@ fn raster(cells: &MapCells, origin: Option<Origin>, reference: Reference, places
         return Err(too_large());
     }
     let (west, north) = (west - pixel.0, north + pixel.1);
+    let west = match reference {
+        Reference::Wgs84 if west < -180.0 || west + columns * pixel.0 > 180.0 => {
+            // All of it beyond 180 degrees is on the other side; a file across it is none that others read.
+            let turned = west - 360.0 * west.signum();
+            if turned.abs() > 180.0 || (turned + columns * pixel.0).abs() > 180.0 {
+                return Err("the map lies across 180 degrees of longitude: take map.utm.tif or map.tif".to_owned());
+            }
+            turned
+        }
+        _ => west,
+    };
     Ok(Raster { west, north, pixel, width: columns as u32, height: rows as u32 })
 }
 

@@ -43,8 +43,8 @@ const DELTA: [f64; 4] = [
 ];
 /// The radius of the sphere with the same meridian, metres.
 const MERIDIAN_M: f64 = A / (1.0 + N) * (1.0 + N2 / 4.0 + N4 / 64.0);
-/// The northernmost and southernmost latitude of UTM, degrees.
-const MAX_UTM_LAT_DEG: f64 = 84.0;
+/// The latitudes of UTM, degrees.
+const UTM_LAT_DEG: std::ops::RangeInclusive<f64> = -80.0..=84.0;
 
 impl TransverseMercator {
     /// The projection of the mission: metres east and north of its origin.
@@ -60,7 +60,7 @@ impl TransverseMercator {
         let is_south = at.lat_deg < 0.0;
         let lon0_deg = f64::from(zone) * 6.0 - 183.0;
         let found = Self { lon0_deg, scale: 0.9996, false_m: (500_000.0, if is_south { 1e7 } else { 0.0 }) };
-        (at.lat_deg.abs() <= MAX_UTM_LAT_DEG).then_some((found, if is_south { 32_700 } else { 32_600 } + zone))
+        UTM_LAT_DEG.contains(&at.lat_deg).then_some((found, if is_south { 32_700 } else { 32_600 } + zone))
     }
 
     /// The projected place of a longitude and latitude in degrees.
@@ -78,7 +78,7 @@ impl TransverseMercator {
         (self.false_m.0 + radius * east, self.false_m.1 + radius * north)
     }
 
-    /// Longitude and latitude in degrees of a projected place.
+    /// Longitude and latitude in degrees of a projected place. Near 180 degrees the longitude goes on beyond.
     pub(super) fn lon_lat(&self, x: f64, y: f64) -> (f64, f64) {
         let radius = self.scale * MERIDIAN_M;
         let (xi, eta) = ((y - self.false_m.1) / radius, (x - self.false_m.0) / radius);
@@ -141,7 +141,7 @@ mod tests {
             (zone(60.17, -10.25), zone(-45.0, 179.9), zone(0.0, -180.0)),
             (Some(32_629), Some(32_760), Some(32_601))
         );
-        assert_eq!((zone(84.1, 0.0), zone(-90.0, 0.0)), (None, None));
+        assert_eq!([zone(84.1, 0.0), zone(-80.1, 0.0), zone(-90.0, 0.0)], [None; 3]);
         let (utm, _) = TransverseMercator::utm(Origin { lat_deg: 60.17, lon_deg: -10.25 }).unwrap();
         // On the central meridian of zone 29, 1 degree of latitude from the equator: 0.9996 of the meridian's length.
         let (east, north) = utm.metres(-9.0, 1.0);

@@ -27,6 +27,8 @@ pub(super) enum HostNames {
 #[derive(Debug)]
 pub(super) struct Access {
     pub(super) names: HostNames,
+    /// Further origins of the page, as of a proxy that encrypts.
+    pub(super) origins: Vec<String>,
     grants: Vec<TokenGrant>,
     sessions: Mutex<VecDeque<(String, Principal)>>,
 }
@@ -39,7 +41,7 @@ pub(super) fn is_open(path: &str) -> bool {
 impl Access {
     /// Without tokens, all who reach the listener are administrators.
     pub(super) fn new(names: HostNames, grants: Vec<TokenGrant>) -> Self {
-        Self { names, grants, sessions: Mutex::default() }
+        Self { names, origins: Vec::new(), grants, sessions: Mutex::default() }
     }
 
     /// The principal that the headers of a request identify.

@@ -27,7 +27,7 @@ pub(super) async fn guard(State(access): State<Arc<Access>>, mut request: Reques
     if let (Some(principal), Some(client)) = (principal, client.clone()) {
         request.extensions_mut().insert(Giver { principal, client });
     }
-    let mut response = match check(request.method(), request.uri(), request.headers(), &access.names) {
+    let mut response = match check(request.method(), request.uri(), request.headers(), &access) {
         // It names no resource.
         _ if *request.method() == Method::CONNECT => no_method(),
         _ if client.is_none() => error(
@@ -94,7 +94,8 @@ fn unauthorized(path: &str) -> Response {
 }
 
 /// Refuses a host name that the DNS of another site points here, and requests of pages from another origin.
-fn check(method: &Method, uri: &Uri, headers: &HeaderMap, names: &HostNames) -> Result<(), &'static str> {
+fn check(method: &Method, uri: &Uri, headers: &HeaderMap, access: &Access) -> Result<(), &'static str> {
+    let names = &access.names;
     let text = |name| headers.get(name).and_then(|v: &HeaderValue| v.to_str().ok());
     let host = text(header::HOST).ok_or("the request has no Host")?;
     // A program between may read another one of two names than this one.
@@ -111,9 +112,12 @@ fn check(method: &Method, uri: &Uri, headers: &HeaderMap, names: &HostNames) -> 
         });
     }
     if let Some(origin) = text(header::ORIGIN)
-        && !origin.strip_prefix("http://").is_some_and(|o| o.eq_ignore_ascii_case(host))
+        && !["http://", "https://"]
+            .iter()
+            .any(|scheme| origin.strip_prefix(scheme).is_some_and(|o| o.eq_ignore_ascii_case(host)))
+        && !access.origins.iter().any(|own| own.eq_ignore_ascii_case(origin))
     {
-        return Err("the request comes from the page of another site");
+        return Err("the request comes from the page of another site; console.origins has those of a proxy");
     }
     // A form cannot send the header; our login form has the token instead.
     if *method == Method::POST && uri.path() != "/login" && text(HeaderName::from_static("x-scenecast")) != Some("1") {
@@ -154,7 +158,7 @@ mod tests {
         pairs: &[(&'static str, &'static str)],
     ) -> Result<(), &'static str> {
         let headers = pairs.iter().map(|(k, v)| (HeaderName::from_static(k), HeaderValue::from_static(v)));
-        check(&method, &Uri::from_static("/api/v2/budget"), &headers.collect(), names)
+        check(&method, &Uri::from_static("/api/v2/budget"), &headers.collect(), &Access::new(names.clone(), Vec::new()))
     }
 
     #[test]
@@ -162,7 +166,7 @@ mod tests {
         let named = |uri: &'static str, hosts: &[&'static str]| {
             let mut headers = HeaderMap::new();
             headers.extend(hosts.iter().map(|host| (header::HOST, HeaderValue::from_static(host))));
-            check(&Method::GET, &Uri::from_static(uri), &headers, &HostNames::Loopback)
+            check(&Method::GET, &Uri::from_static(uri), &headers, &Access::new(HostNames::Loopback, Vec::new()))
         };
         assert!(named("http://localhost:1/", &["localhost:1"]).is_ok());
         assert!(named("/", &["localhost:1", "evil.example"]).unwrap_err().contains("several Hosts"));
@@ -192,6 +196,23 @@ mod tests {
             checked(Method::POST, &[("host", "localhost:1"), ("x-scenecast", "1"), ("origin", "http://localhost:1")])
                 .is_ok()
         );
+    }
+
+    #[test]
+    fn a_page_behind_a_proxy_that_encrypts_gives_orders() {
+        let post = |origin: &'static str, origins: &[&str]| {
+            let mut access = Access::new(HostNames::Network("surface.ship".to_owned()), Vec::new());
+            access.origins = origins.iter().map(|origin| (*origin).to_owned()).collect();
+            let pairs = [("host", "surface.ship"), ("x-scenecast", "1"), ("origin", origin)];
+            let headers = pairs.map(|(k, v)| (HeaderName::from_static(k), HeaderValue::from_static(v)));
+            check(&Method::POST, &Uri::from_static("/api/v2/budget"), &HeaderMap::from_iter(headers), &access)
+        };
+        assert!(post("https://surface.ship", &[]).is_ok());
+        assert!(post("https://page.example", &[]).unwrap_err().contains("console.origins"));
+        assert!(post("https://page.example", &["https://page.example"]).is_ok());
+        for wrong in ["https://evil.example", "http://page.example", "https://page.example:444", "null"] {
+            assert!(post(wrong, &["https://page.example"]).is_err(), "{wrong}");
+        }
     }
 
     #[test]

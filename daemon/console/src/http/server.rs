@@ -62,6 +62,15 @@ pub async fn bind(
     Ok(ConsoleListener { listener, access: Access::new(names, tokens) })
 }
 
+impl ConsoleListener {
+    /// The page is also reached under these origins, as through a proxy that encrypts.
+    #[must_use]
+    pub fn with_origins(mut self, origins: Vec<String>) -> Self {
+        self.access.origins = origins;
+        self
+    }
+}
+
 /// Serves the page until the runtime ends.
 pub fn start(listener: ConsoleListener) -> Console {
     let (sender, requests) = mpsc::channel(MAX_PENDING);

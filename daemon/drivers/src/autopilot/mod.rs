@@ -15,6 +15,7 @@ mod tray;
 
 pub use mavlink::Mavlink;
 pub use nmea::Nmea;
+pub use plausible::{Jump, Plausible};
 pub use tray::Tray;
 
 use scenecast_core::LatLon;

@@ -54,7 +54,8 @@ const HEADING: Bounds = Bounds {
 
 /// A value that was not used.
 #[derive(Debug, PartialEq)]
-pub(super) struct Jump {
+pub struct Jump {
+    /// The name of its counter.
     pub counter: &'static str,
     /// What people should read, at most once a minute.
     pub note: Option<String>,
@@ -125,7 +126,7 @@ impl Bounds {
 
 /// The measured quantities of a track.
 #[derive(Debug, Default)]
-pub(super) struct Plausible {
+pub struct Plausible {
     depth: Series,
     height: Series,
     heading: Series,
@@ -133,7 +134,7 @@ pub(super) struct Plausible {
 
 impl Plausible {
     /// The step with values that can be, and the jumps that were found.
-    pub(super) fn check(&mut self, step: Step, now: Instant) -> (Step, Vec<Jump>) {
+    pub fn check(&mut self, step: Step, now: Instant) -> (Step, Vec<Jump>) {
         let (depth_m, depth_jump) = self.depth.check(step.depth_m, &DEPTH, now);
         let (heading_deg, heading_jump) = self.heading.check(step.heading_rad.to_degrees(), &HEADING, now);
         let heading_rad = if heading_jump.is_some() { heading_deg.to_radians() } else { step.heading_rad };

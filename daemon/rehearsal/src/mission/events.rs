@@ -98,7 +98,10 @@ impl Mission {
             VehicleHostEvent::Tune(settings) => self.mapper.tune(&settings),
             VehicleHostEvent::Applied(applied) => self.logbook.note_applied(applied),
             VehicleHostEvent::Frame(event) => self.carrier.log_event(VEHICLE, &event, self.times.now),
-            VehicleHostEvent::Fixed(..) | VehicleHostEvent::SurveyEnded | VehicleHostEvent::Pilot(_) => {}
+            VehicleHostEvent::Fixed(..)
+            | VehicleHostEvent::SurveyEnded
+            | VehicleHostEvent::Pilot(_)
+            | VehicleHostEvent::Note(_) => {}
         }
     }
 

@@ -33,11 +33,11 @@ pub(super) struct ConfigCommand {
 impl ConfigCommand {
     pub(super) fn run(self) -> Result<(), UserError> {
         if self.reference {
-            print!("{}", scenecast_config::reference());
+            scenecast_core::out!("{}", scenecast_config::reference());
         } else if self.schema {
-            print!("{}", scenecast_config::schema());
+            scenecast_core::out!("{}", scenecast_config::schema());
         } else {
-            print!("{}", scenecast_config::print(self.role.into()));
+            scenecast_core::out!("{}", scenecast_config::print(self.role.into()));
         }
         Ok(())
     }

@@ -13,7 +13,7 @@ pub(super) struct Demo {
     #[arg(long, default_value_t = 8460)]
     port: u16,
     /// Mission seconds per second of wall time
-    #[arg(long, default_value_t = 1.0)]
+    #[arg(long, default_value_t = 1.0, allow_negative_numbers = true)]
     speed: f64,
     /// Do not serve the page
     #[arg(long)]

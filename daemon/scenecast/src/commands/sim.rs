@@ -84,6 +84,9 @@ pub(super) struct Sim {
     /// Folder for report.json, maps, images and frames.log
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
+    /// Replace the results that the folder has
+    #[arg(long)]
+    force: bool,
     /// Print the report as JSON instead of a line of figures
     #[arg(long)]
     json: bool,
@@ -94,6 +97,10 @@ impl Sim {
         let started = Instant::now();
         if !self.drain.is_finite() || self.drain < 0.0 {
             return Err(UserError::Input(format!("--drain {} is not allowed; allowed: 0 s or more", self.drain)));
+        }
+        if !self.force && self.out.join("report.json").exists() {
+            let what = "it has the results of another run: give a new folder, or replace them by --force";
+            return Err(UserError::file(&self.out, what));
         }
         let config = self.world.config()?;
         let world = self.world.world(&config)?;
@@ -110,7 +117,7 @@ impl Sim {
         let speedup = mission.now().as_secs_f64() / seconds;
         write_outputs(&mission, &report, json!({ "seconds": seconds, "speedup": speedup }), &self.out)?;
         if self.json {
-            println!("{}", report.json);
+            scenecast_core::outln!("{}", report.json);
             return Ok(());
         }
         let map = &report.json["map"];
@@ -120,7 +127,7 @@ impl Sim {
             (Some(joules), None) => format!("{joules:.1} J up, "),
             _ => String::new(),
         };
-        println!(
+        scenecast_core::outln!(
             "{}: {} cells, {} labels, agreement {} at the end, {} on the mean, {energy}{seconds:.1} s",
             self.out.join("report.json").display(),
             report.json["scene"]["cells"],

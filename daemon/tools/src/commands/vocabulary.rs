@@ -85,7 +85,12 @@ impl Train {
             sources.push(format!("{images} annotated images with {} classes", statistics.usable_classes()));
         }
         write_whole(&self.out, &scene_model::vocabulary::save(&measures))?;
-        println!("{}: {} words from {}", self.out.display(), measures.vocabulary_size(), sources.join(" and "));
+        scenecast_core::outln!(
+            "{}: {} words from {}",
+            self.out.display(),
+            measures.vocabulary_size(),
+            sources.join(" and ")
+        );
         Ok(())
     }
 

@@ -22,7 +22,7 @@ const STEPS: u32 = 60;
 /// How long each surface has the vehicle for itself at the end of a schedule.
 const ALONE: Duration = Duration::from_secs(500);
 /// After this long, a hold that is not applied counts as late.
-const HOLD_LIMIT: Duration = Duration::from_secs(60);
+const HOLD_LIMIT: Duration = Duration::from_secs(8);
 
 /// What came of one schedule.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]

@@ -9,7 +9,7 @@ use crate::state::MapEvent;
 use axum::Extension;
 use axum::body::{Body, Bytes};
 use axum::extract::State;
-use axum::http::{StatusCode, header};
+use axum::http::{HeaderName, HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use scenecast_surface::Giver;
 use std::collections::{BTreeMap, VecDeque};
@@ -42,7 +42,10 @@ pub(in crate::http) async fn events(State(shared): State<Shared>, Extension(by):
         }
         feed.queue.pop_front().map(|bytes| (Ok::<_, Infallible>(bytes), feed))
     });
-    ([(header::CONTENT_TYPE, EVENT_STREAM)], Body::from_stream(stream)).into_response()
+    // A proxy must not collect events.
+    let unbuffered = (HeaderName::from_static("x-accel-buffering"), HeaderValue::from_static("no"));
+    let head = [(header::CONTENT_TYPE, HeaderValue::from_static(EVENT_STREAM)), unbuffered];
+    (head, Body::from_stream(stream)).into_response()
 }
 
 impl Feed {

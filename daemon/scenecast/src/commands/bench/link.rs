@@ -24,7 +24,7 @@ impl LinkBench {
         let table = link_table(self.seed, &mut |share| progress.show(share)).map_err(failed)?;
         drop(progress);
         if self.json {
-            println!("{}", serde_json::to_string_pretty(&table).map_err(failed)?);
+            scenecast_core::outln!("{}", serde_json::to_string_pretty(&table).map_err(failed)?);
             return Ok(());
         }
         print_table(&table);
@@ -38,31 +38,33 @@ fn failed(error: impl std::fmt::Display) -> UserError {
 }
 
 fn print_table(table: &LinkTable) {
-    println!(
+    scenecast_core::outln!(
         "Seed {}. efficiency: useful payload / (bit rate x (1 - loss)); directive: issue to applied; known: issue to",
         table.seed
     );
-    println!("known at the surface; converge: last change to equal maps, within: share of stops that kept the bound.");
-    println!();
-    println!("range frame pattern     loss  effi-     directive  known converge          budget    re-");
-    println!("   km bytes                % ciency med. s  p95 s  p95 s    p95 s  within    used  syncs");
+    scenecast_core::outln!(
+        "known at the surface; converge: last change to equal maps, within: share of stops that kept the bound."
+    );
+    scenecast_core::outln!();
+    scenecast_core::outln!("range frame pattern     loss  effi-     directive  known converge          budget    re-");
+    scenecast_core::outln!("   km bytes                % ciency med. s  p95 s  p95 s    p95 s  within    used  syncs");
     table.rows.iter().for_each(print_row);
-    println!();
-    println!("A budget that binds: efficiency against the vehicle's budget.");
-    println!("range frame loss  budget  effi-   budget");
-    println!("   km bytes    %   bit/s  ciency    used");
+    scenecast_core::outln!();
+    scenecast_core::outln!("A budget that binds: efficiency against the vehicle's budget.");
+    scenecast_core::outln!("range frame loss  budget  effi-   budget");
+    scenecast_core::outln!("   km bytes    %   bit/s  ciency    used");
     table.budgets.iter().for_each(print_budget);
-    println!();
-    println!("A fix each 10 s.");
-    println!("range frame loss  efficiency         cost  error round trip  one way");
-    println!("   km bytes    %  without    with       %                ms       ms");
+    scenecast_core::outln!();
+    scenecast_core::outln!("A fix each 10 s.");
+    scenecast_core::outln!("range frame loss  efficiency         cost  error round trip  one way");
+    scenecast_core::outln!("   km bytes    %  without    with       %                ms       ms");
     table.ranging.iter().for_each(print_ranging);
-    println!();
+    scenecast_core::outln!();
     print_fleet(&table.fleet);
 }
 
 fn print_row(r: &LinkRow) {
-    println!(
+    scenecast_core::outln!(
         "{:>5} {:>5} {:<11} {:>4.0} {:>6.3} {:>6.1} {:>6.1} {:>6.1} {:>8.1} {:>7.2} {:>7.2} {:>6}",
         r.range_km,
         r.frame_bytes,
@@ -81,14 +83,18 @@ fn print_row(r: &LinkRow) {
 
 fn print_budget(r: &BudgetRow) {
     let percent = r.loss * 100.0;
-    println!(
+    scenecast_core::outln!(
         "{:>5} {:>5} {percent:>4.0} {:>7} {:>7.3} {:>7.2}",
-        r.range_km, r.frame_bytes, r.budget_bps, r.efficiency, r.budget_use
+        r.range_km,
+        r.frame_bytes,
+        r.budget_bps,
+        r.efficiency,
+        r.budget_use
     );
 }
 
 fn print_ranging(r: &RangingRow) {
-    println!(
+    scenecast_core::outln!(
         "{:>5} {:>5} {:>4.0} {:>8.3} {:>7.3} {:>7.1} {:>17.1} {:>8.1}",
         r.range_km,
         r.frame_bytes,
@@ -102,7 +108,7 @@ fn print_ranging(r: &RangingRow) {
 }
 
 fn print_fleet(f: &FleetRow) {
-    println!(
+    scenecast_core::outln!(
         "{} vehicles at {} km, {} bytes, {:.0} % loss: all known after {:.0} s; oldest map {:.0} s = {:.2} fair shares of",
         f.vehicles,
         f.range_km,
@@ -112,15 +118,17 @@ fn print_fleet(f: &FleetRow) {
         f.max_age_s,
         f.max_age_shares
     );
-    println!("{:.0} s; efficiency {:.3}, budget used {:.2}.", f.fair_share_s, f.efficiency, f.budget_use);
+    scenecast_core::outln!("{:.0} s; efficiency {:.3}, budget used {:.2}.", f.fair_share_s, f.efficiency, f.budget_use);
 }
 
 fn print_speed() {
     let speed = measure_speed();
-    println!();
-    println!(
+    scenecast_core::outln!();
+    scenecast_core::outln!(
         "This machine, one core: {:.0} frames/s of 64 bytes and {:.0} of 256, both ends; a saturated hour of 64-byte frames, \
          channel included, in {:.2} s.",
-        speed.small_frames_per_s, speed.frames_per_s, speed.hour_s
+        speed.small_frames_per_s,
+        speed.frames_per_s,
+        speed.hour_s
     );
 }

@@ -48,7 +48,7 @@ impl PlanningBench {
             std::fs::create_dir_all(dir).map_err(|e| UserError::file(dir, e))?;
         }
         if !self.json {
-            println!("{:<22} {HEAD}", "scene");
+            scenecast_core::outln!("{:<22} {HEAD}", "scene");
         }
         let mut progress = Progress::new("planning");
         let files = PlanningFiles { images, labels: self.labels.clone() };
@@ -61,7 +61,7 @@ impl PlanningBench {
         })?;
         drop(progress);
         if self.json {
-            println!("{}", serde_json::to_string(&table).map_err(|e| UserError::Failed(e.to_string()))?);
+            scenecast_core::outln!("{}", serde_json::to_string(&table).map_err(|e| UserError::Failed(e.to_string()))?);
             return Ok(());
         }
         print_means(&table);
@@ -80,7 +80,7 @@ const HEAD: &str =
 
 fn print_trial(t: &Trial) {
     let [lawnmower, greedy, horizon] = t.utility_per_m;
-    println!(
+    scenecast_core::outln!(
         "{:<22} {lawnmower:>12.3} {greedy:>13.3} {horizon:>13.3} {:>13.3} {:>18.2} {:>15.2} {:>11}",
         t.name,
         t.map_known_per_m,
@@ -103,7 +103,7 @@ fn print_means(table: &PlanningTable) {
         horizon_by_greedy,
     } in &table.sources
     {
-        println!(
+        scenecast_core::outln!(
             "{:<22} {:>12} {:>13} {:>13} {:>13} {:>18} {:>15}",
             format!("mean of {trials}, {}", source.name()),
             text(*lawnmower),
@@ -114,5 +114,5 @@ fn print_means(table: &PlanningTable) {
             text(*horizon_by_greedy)
         );
     }
-    println!("{} violations; {} seeds", table.violations, table.seeds);
+    scenecast_core::outln!("{} violations; {} seeds", table.violations, table.seeds);
 }

@@ -333,6 +333,7 @@ fn class_percent(text: &str) -> Result<(String, u8), String> {
 
 impl Ctl {
     pub(super) fn run(self) -> Result<(), UserError> {
+        scenecast_runtime::keep_private();
         let wait = match self.wait {
             Some(s) if !(0.0..=1e6).contains(&s) => {
                 return Err(UserError::Input(format!("--wait {s}: the range is 0 to 1000000 seconds")));

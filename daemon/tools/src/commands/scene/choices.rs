@@ -166,15 +166,18 @@ impl ChoiceReport {
 impl ChoicesReport {
     pub fn print(&self) {
         let Self { sweeps, seeds, scenes, .. } = self;
-        println!("{} scenes, {sweeps} sweeps, {seeds} seeds, nats: median / mean over the scenes", scenes.len());
+        scenecast_core::outln!(
+            "{} scenes, {sweeps} sweeps, {seeds} seeds, nats: median / mean over the scenes",
+            scenes.len()
+        );
         let header = ["K", "vocabulary", "MI", "excess", "one seed +-", "bits of a map"];
         let [k, words, information, excess, deviation, bits] = header;
-        println!("{k:>3}  {words:<10}  {information:>13}  {excess:>13}  {deviation:>11}  {bits:>13}");
+        scenecast_core::outln!("{k:>3}  {words:<10}  {information:>13}  {excess:>13}  {deviation:>11}  {bits:>13}");
         for choice in &self.choices {
             let information = pair(choice.mutual_information_median_nats, choice.mutual_information_mean_nats);
             let excess = pair(choice.excess_median_nats, choice.excess_mean_nats);
             let ChoiceReport { max_labels, vocabulary, excess_seed_deviation_nats: deviation, map_bits, .. } = choice;
-            println!(
+            scenecast_core::outln!(
                 "{max_labels:>3}  {vocabulary:<10}  {information:>13}  {excess:>13}  {deviation:>11.3}  {map_bits:>13.0}"
             );
         }

@@ -110,13 +110,13 @@ impl Register {
                 "frames": frames, "chained": chained, "looped": looped, "loops": loops, "contradicted": contradicted,
                 "unseen": unseen, "unreadable": placed.unreadable.len(), "moved_rms_m": moved_m, "out": out,
             });
-            return println!("{all}");
+            return scenecast_core::outln!("{all}");
         }
-        println!(
+        scenecast_core::outln!(
             "{frames} frames: {chained} matched with the frame before, {looped} with earlier tracks ({loops} matches, \
              {contradicted} not used), {unseen} by odometry alone"
         );
-        println!(
+        scenecast_core::outln!(
             "{}: the frames lie {moved_m:.3} m (root mean square) from where each was placed when it came in",
             self.out.display()
         );

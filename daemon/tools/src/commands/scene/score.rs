@@ -154,21 +154,30 @@ fn scene(trial: Trial, pair: &Pair, ignore: &[u8], step: &dyn Fn()) -> Result<Sc
 }
 
 fn print_json(report: &impl Serialize) -> Result<(), UserError> {
-    println!("{}", serde_json::to_string_pretty(report).map_err(|e| UserError::Failed(e.to_string()))?);
+    scenecast_core::outln!("{}", serde_json::to_string_pretty(report).map_err(|e| UserError::Failed(e.to_string()))?);
     Ok(())
 }
 
 impl ScoreReport {
     fn print(&self) {
-        println!("K {}, {} sweeps, mean of {} seeds, nats", self.max_labels, self.sweeps, self.seeds);
-        println!("{:<20} {:<20} {:>6} {:>6} {:>6} {:>6} {:>7}", "scene", "method", "MI", "NMI", "V", "null", "excess");
+        scenecast_core::outln!("K {}, {} sweeps, mean of {} seeds, nats", self.max_labels, self.sweeps, self.seeds);
+        scenecast_core::outln!(
+            "{:<20} {:<20} {:>6} {:>6} {:>6} {:>6} {:>7}",
+            "scene",
+            "method",
+            "MI",
+            "NMI",
+            "V",
+            "null",
+            "excess"
+        );
         for scene in &self.scenes {
             print_methods(&scene.scene, &scene.methods);
         }
         print_methods("median", &self.median);
         for (baseline, gain) in &self.mean_gain {
             let Gain { mutual_information_nats, excess_nats } = gain;
-            println!(
+            scenecast_core::outln!(
                 "mean gain of scene_model over {baseline}: MI {mutual_information_nats:+.3}, excess {excess_nats:+.3}"
             );
         }
@@ -177,7 +186,7 @@ impl ScoreReport {
 
 fn print_methods(scene: &str, methods: &BTreeMap<&'static str, MeanScore>) {
     for (row, (method, score)) in methods.iter().enumerate() {
-        println!(
+        scenecast_core::outln!(
             "{:<20} {method:<20} {:>6.3} {:>6.3} {:>6.3} {:>6.3} {:>7.3}",
             if row == 0 { scene } else { "" },
             score.mutual_information_nats,

@@ -172,7 +172,7 @@ impl Tune {
         };
         write_whole(&path, best::toml(best, config, budget_bps).as_bytes())?;
         let Measurement { mutual_information_nats, map_bytes, stream_bps, .. } = best.measurement;
-        println!(
+        scenecast_core::outln!(
             "{}: {}; MI {mutual_information_nats:.3} nats, map {map_bytes} bytes, stream {stream_bps:.0} bit/s",
             path.display(),
             best.setting
