@@ -65,7 +65,8 @@ impl CameraGeometry {
         if self.is_mirrored {
             parts.push("the images are mirrored: mirror them in the camera or its driver".to_owned());
         }
-        (!parts.is_empty()).then(|| format!("by its images and odometry the camera is not as configured: {}", parts.join("; ")))
+        (!parts.is_empty())
+            .then(|| format!("by its images and odometry the camera is not as configured: {}", parts.join("; ")))
     }
 }
 
@@ -108,7 +109,8 @@ impl GeometryCheck {
             return;
         };
         let (east, north) = input.dead_reckoned.xy();
-        let now = Earlier { plane: scales.coarse, at: Complex::new(east, north), heading_rad: input.compass_rad, age: 0 };
+        let now =
+            Earlier { plane: scales.coarse, at: Complex::new(east, north), heading_rad: input.compass_rad, age: 0 };
         let Some(mut earlier) = self.earlier.take() else {
             self.earlier = Some(now);
             return;
@@ -207,7 +209,8 @@ mod tests {
         let lattice = |cell_m: f64, key: u32| {
             let (x, y) = (x_m / cell_m, y_m / cell_m);
             let node = |i: f64, j: f64| {
-                let mut bits = (i as i32 as u32).wrapping_mul(0x9E37_79B1) ^ (j as i32 as u32).wrapping_mul(0x85EB_CA77) ^ key;
+                let mut bits =
+                    (i as i32 as u32).wrapping_mul(0x9E37_79B1) ^ (j as i32 as u32).wrapping_mul(0x85EB_CA77) ^ key;
                 bits = (bits ^ (bits >> 15)).wrapping_mul(0x2C1B_3C6D);
                 f64::from((bits ^ (bits >> 12)) & 255)
             };
@@ -283,7 +286,11 @@ mod tests {
             let off = wrap_rad(geometry.turn_rad - degrees.to_radians()).abs();
             assert!(geometry.is_mirrored == is_mirrored && off < 0.1, "{degrees} {is_mirrored}: {geometry:?}");
             let advice = geometry.advice(PIXEL_M).unwrap();
-            assert_eq!((advice.contains("clockwise"), advice.contains("mirrored")), (degrees != 0.0, is_mirrored), "{advice}");
+            assert_eq!(
+                (advice.contains("clockwise"), advice.contains("mirrored")),
+                (degrees != 0.0, is_mirrored),
+                "{advice}"
+            );
         }
     }
 

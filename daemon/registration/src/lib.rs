@@ -1,7 +1,8 @@
 //! Places camera frames on the map by their overlap with earlier frames. No IO.
 //!
 //! [`Registrar::handle_frame`] takes a frame with its pose by dead reckoning, compass and altitude, and returns its pose
-//! on the map. It matches the frame with the one before and with up to three older ones.
+//! on the map. It matches the frame with the one before and with up to three older ones. [`GeometryCheck`] tells whether the camera is as
+//! configured.
 
 mod altitude;
 mod camera_image;
@@ -11,6 +12,7 @@ mod consensus;
 mod correlate;
 mod evidence;
 mod flat_field;
+mod geometry;
 mod graph;
 #[cfg(test)]
 mod graph_tests;
@@ -35,6 +37,7 @@ mod tiles;
 pub use camera_image::CameraImage;
 pub use checkpoint::RestoreError;
 pub use evidence::Evidence;
+pub use geometry::{CameraGeometry, GeometryCheck};
 pub use graph::FrameGraph;
 pub use pose::FramePose;
 pub use registrar::{FrameInput, Placed, Registrar};

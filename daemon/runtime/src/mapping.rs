@@ -174,6 +174,9 @@ impl Work {
                 let pose = Pose { x: at.x_m, y: at.y_m, z: -at.depth_m, yaw_rad: -at.heading_rad };
                 let shot = Frame { image: &image, pose, scale: frame.scale, view: view.as_ref() };
                 let placed = self.mapper.register(&shot);
+                if let Some(advice) = self.mapper.poll_camera_advice() {
+                    tracing::warn!("camera: {advice}");
+                }
                 let update = self.mapper.handle_frame(&shot.placed(&placed), frame.t_s);
                 let mapped = self.mapped(Some(frame), Some(placed), update);
                 FromMapper::Mapped(Box::new(Mapped { unusable_depth, ..mapped }))

@@ -170,7 +170,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn many_edits_push_no_order_out_of_the_log_or_the_file() {
+    fn what_concerns_no_safety_pushes_no_order_out_of_the_log_or_the_file() {
         let mut log = MissionLog::default();
         let mut stored = VecDeque::new();
         let mut add = |kind, text: &str| {
@@ -179,10 +179,14 @@ mod tests {
             make_room(&mut stored, StoredLogEntry::is_minor);
         };
         add(LogKind::Order, "hold");
-        (0..9000).for_each(|number| add(LogKind::Record, &format!("label 3: name {number}")));
+        (0..9000).for_each(|number| {
+            let kind =
+                [LogKind::Record, LogKind::Command, LogKind::Label, LogKind::Image, LogKind::Contact][number % 5];
+            add(kind, &format!("entry {number}"));
+        });
         add(LogKind::Answer, "hold version 1 applied");
         let texts: Vec<&str> = log.entries().map(|entry| entry.text.as_str()).collect();
-        assert_eq!((texts.len(), texts[0], texts[1]), (MissionLog::MAX, "hold", "label 3: name 7002"));
+        assert_eq!((texts.len(), texts[0], texts[1]), (MissionLog::MAX, "hold", "entry 7002"));
         assert!(log.entries().map(StoredLogEntry::from).eq(stored));
     }
 

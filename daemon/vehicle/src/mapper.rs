@@ -15,7 +15,7 @@ use scenecast_config::{BirthRule, Config, SceneLabels, cell_m};
 use scenecast_core::UserError;
 use scenecast_protocol::directive::{Change, Registration, Settings, ShortDecimal};
 use scenecast_protocol::map::{Cell, LabelTree, LayerId};
-use scenecast_registration::Registrar;
+use scenecast_registration::{GeometryCheck, Registrar};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -90,6 +90,8 @@ pub struct Mapper {
     pub(super) registrar: Option<Registrar>,
     /// Whether images place the frames; otherwise odometry and compass do.
     pub(super) registers: bool,
+    /// Whether the camera is as configured, by the first frames of this run; `None` once that was told.
+    pub(super) geometry: Option<GeometryCheck>,
     /// Mission time of the last frame that had a word in the cell, by the cell's x and y, seconds.
     pub(super) last_seen_s: BTreeMap<(i32, i32), f64>,
     refine_words_per_s: f64,
@@ -159,6 +161,7 @@ impl Mapper {
             relief: Relief::default(),
             registrar: registers.then(|| registrar.clone()),
             registers,
+            geometry: Some(GeometryCheck::default()),
             last_seen_s: BTreeMap::new(),
             refine_words_per_s: f64::from(config.scene.refine_words_per_s),
             frames_per_s: every_frame_or(config.scene.frames_per_s),

@@ -70,6 +70,9 @@ impl Mapper {
         let above = nadir.map_or(pose, |nadir| nadir.above(&pose));
         let (place, compass_rad) = (MapPoint::new(above.x, above.y), -pose.yaw_rad);
         let input = FrameInput { image, metres_per_pixel, dead_reckoned: place, compass_rad };
+        if let Some(geometry) = &mut self.geometry {
+            geometry.handle_frame(&input);
+        }
         let placed =
             if self.registers { registrar.handle_frame(&input) } else { registrar.handle_unmatched_frame(&input) };
         let (x, y) = placed.pose.at().xy();
@@ -85,6 +88,12 @@ impl Mapper {
     /// The vehicle may have moved unmeasured, so that dead reckoning continues at another place.
     pub fn handle_gap(&mut self) {
         self.registrar.iter_mut().for_each(|registrar| registrar.handle_gap(GAP_SIGMA_M));
+    }
+
+    /// What people should change at the camera, once its first frames and odometry have shown it. It is returned once.
+    pub fn poll_camera_advice(&mut self) -> Option<String> {
+        let geometry = self.geometry.take_if(|geometry| geometry.is_complete())?.geometry();
+        geometry.and_then(|geometry| geometry.advice(self.metres_per_pixel()))
     }
 
     /// The evidence of the registration so far; `None` without registration.

@@ -46,6 +46,8 @@ pub(crate) struct Logbook {
     pub(crate) first_seen_s: BTreeMap<Cell, f64>,
     /// Bits on air of the frames that the surface received.
     pub(crate) received_bits: u64,
+    /// What people should change at the camera.
+    pub(crate) camera_advice: Option<String>,
 }
 
 impl Logbook {

@@ -161,6 +161,12 @@ impl Mission {
         self.logbook.received_bits
     }
 
+    /// What people should change at the camera of a recording, if its images and odometry disagree.
+    pub fn camera_advice(&self) -> Option<&str> {
+        self.logbook.camera_advice.as_deref()
+    }
+
+    /// The surface's role.
     pub fn surface(&self) -> &Surface {
         self.surface.surface()
     }

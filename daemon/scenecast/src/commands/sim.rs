@@ -112,6 +112,9 @@ impl Sim {
         for refused in mission.refused_labels() {
             eprintln!("refused: {refused}");
         }
+        if let Some(advice) = mission.camera_advice() {
+            eprintln!("{advice}");
+        }
         let report = report(&mission, &self.world.scenario_name());
         let seconds = started.elapsed().as_secs_f64();
         let speedup = mission.now().as_secs_f64() / seconds;

@@ -5,7 +5,9 @@ use clap::Args;
 use scenecast_core::UserError;
 use scenecast_files::{RecordedFrame, Recording, write_poses};
 use scenecast_protocol::coordinates::MapPoint;
-use scenecast_registration::{CameraImage, FrameGraph, FrameInput, FramePose, Registrar, Tally};
+use scenecast_registration::{
+    CameraGeometry, CameraImage, FrameGraph, FrameInput, FramePose, GeometryCheck, Registrar, Tally,
+};
 use std::path::PathBuf;
 
 /// Place the frames of a recorded dive by their overlap, all at once.
@@ -40,6 +42,7 @@ struct PlacedFrames<'a> {
     poses: Vec<FramePose>,
     graph: FrameGraph,
     tally: Tally,
+    geometry: Option<CameraGeometry>,
     unreadable: Vec<String>,
 }
 
@@ -57,6 +60,9 @@ impl Register {
         if let [first, ..] = placed.unreadable.as_slice() {
             eprintln!("{} frames that cannot be read are left out; the first: {first}", placed.unreadable.len());
         }
+        if let Some(advice) = placed.geometry.and_then(|geometry| geometry.advice(self.metres_per_pixel)) {
+            eprintln!("{advice}");
+        }
         let solved = placed.graph.solve();
         let frames = placed.frames.iter().zip(&solved).map(|(frame, pose)| {
             let (x_m, y_m) = pose.at().xy();
@@ -71,7 +77,7 @@ impl Register {
     /// Places the frames one after the other, as the vehicle does.
     fn place<'a>(&self, recording: &'a Recording) -> Result<PlacedFrames<'a>, UserError> {
         let mut registrar = Registrar::new(self.drift / 100.0);
-        let mut placed = PlacedFrames::default();
+        let (mut placed, mut geometry) = (PlacedFrames::default(), GeometryCheck::default());
         let mut progress = Progress::new("frames");
         for (i, frame) in recording.frames.iter().enumerate() {
             progress.show(i as f64 / recording.frames.len() as f64);
@@ -85,12 +91,14 @@ impl Register {
             let pixels = CameraImage::rgb(image.width() as usize, image.height() as usize, image.as_raw());
             let wrong_size =
                 || UserError::Input(format!("{}: the image is too small or too large to be registered", frame.image));
-            let found = registrar.handle_frame(&FrameInput {
+            let input = FrameInput {
                 image: pixels.ok_or_else(wrong_size)?,
                 metres_per_pixel: self.metres_per_pixel * frame.scale,
                 dead_reckoned: MapPoint::new(frame.x_m, frame.y_m),
                 compass_rad: frame.heading_rad,
-            });
+            };
+            geometry.handle_frame(&input);
+            let found = registrar.handle_frame(&input);
             placed.graph.add(&found);
             placed.poses.push(found.pose);
             placed.frames.push(frame);
@@ -99,6 +107,7 @@ impl Register {
             return Err(UserError::file(&self.frames, "no frame can be read"));
         }
         placed.tally = registrar.tally();
+        placed.geometry = geometry.geometry();
         Ok(placed)
     }
 
@@ -108,6 +117,7 @@ impl Register {
             let out = self.out.display().to_string();
             let all = serde_json::json!({
                 "frames": frames, "chained": chained, "looped": looped, "loops": loops, "contradicted": contradicted,
+                "metres_per_pixel_by_images": placed.geometry.map(|geometry| self.metres_per_pixel / geometry.size_ratio),
                 "unseen": unseen, "unreadable": placed.unreadable.len(), "moved_rms_m": moved_m, "out": out,
             });
             return scenecast_core::outln!("{all}");
