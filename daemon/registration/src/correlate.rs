@@ -13,6 +13,8 @@ const PEAK_RADIUS_PX: f32 = 4.0;
 pub(crate) struct Peak {
     /// Whole pixels to the right and down.
     pub(crate) shift_px: [i32; 2],
+    /// The place of the peak between pixels, from the whole ones, by the parabolas through its neighbours.
+    pub(crate) offset_px: [f32; 2],
     /// Normalised correlation, -1 to 1.
     pub(crate) correlation: f32,
     /// The correlation times the root of the overlapping pixels, less that of the second peak.
@@ -127,7 +129,18 @@ impl Correlator {
         };
         let second = (0..surface.len()).filter(is_other).map(|i| surface[i]).fold(0.0, f32::max);
         let correlation = strength / count.sqrt();
-        Some(Peak { shift_px: best, correlation, confidence: strength - second, overlap: count / all })
+        let place = (best[1] + top) as usize * side + (best[0] + left) as usize;
+        let between = |step: usize| {
+            let beside =
+                |at: Option<usize>| at.and_then(|at| surface.get(at)).copied().filter(|value| value.is_finite());
+            let Some((before, after)) = beside(place.checked_sub(step)).zip(beside(Some(place + step))) else {
+                return 0.0;
+            };
+            let bend = 2.0 * strength - before - after;
+            if bend > 0.0 { ((after - before) / (2.0 * bend)).clamp(-0.5, 0.5) } else { 0.0 }
+        };
+        let offset_px = [between(1), between(side)];
+        Some(Peak { offset_px, shift_px: best, correlation, confidence: strength - second, overlap: count / all })
     }
 
     /// For each shift: the sum of products and the energy of the plane; the energy of the canvas and the overlap.
@@ -169,6 +182,7 @@ mod tests {
             let canvas = correlator.canvas(|x, y| (x > 55).then(|| noise(x - dx, y - dy)));
             let peak = correlator.peak(canvas, 25.0, 0.05).unwrap();
             assert_eq!(peak.shift_px, [dx, dy]);
+            assert!(peak.offset_px.iter().all(|offset| offset.abs() < 0.1), "{peak:?}");
             assert!(peak.correlation > 0.99 && peak.confidence > 15.0 && peak.overlap < 0.45, "{peak:?}");
         }
     }

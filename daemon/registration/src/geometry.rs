@@ -138,7 +138,7 @@ impl GeometryCheck {
         }
         self.tried += 1;
         let Some(peak) = matched(earlier, now, 0.0) else { return false };
-        let [right, down] = peak.shift_px.map(f64::from);
+        let [right, down] = [0, 1].map(|axis| f64::from(peak.shift_px[axis]) + f64::from(peak.offset_px[axis]));
         if right.hypot(down) < MIN_SHIFT_PX {
             return true;
         }
