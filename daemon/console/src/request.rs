@@ -324,6 +324,7 @@ pub fn archived_cells(map: &VehicleMemory, cell_m: f64) -> MapCells {
         names: map.labels().iter().filter_map(|(&label, book)| Some((label, book.name.clone()?))).collect(),
         tree: map.tree(),
         markers: map.markers().map(crate::snapshot::marker).collect(),
+        caption: None,
         tiles: labels.tiles().clone(),
         layers: layers::layers(&layers),
     }
@@ -388,6 +389,7 @@ fn map(surface: &Surface, vehicle: Address, cell_m: f64, now: Instant) -> Option
         names: BTreeMap::new(),
         tree: None,
         markers: Vec::new(),
+        caption: None,
         tiles: surface.map_tiles(vehicle)?,
         layers: layers::layers(&surface.map_layers(vehicle)),
     }))

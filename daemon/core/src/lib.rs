@@ -31,7 +31,7 @@ pub use lines::Lines;
 pub use micromodem_rate::{CYCLE_INIT, MicromodemRate, OVERHEAD_BITS};
 pub use modem_units::{S2C_BURST_FRAME_BYTES, S2C_INSTANT_BYTES};
 pub use outlines::{fence_of, outline_of, place_of};
-pub use output::write_or_exit;
+pub use output::{write_error, write_or_exit};
 pub use port_address::PortAddress;
 pub use principal::{ClientName, Giver, Principal, Role};
 pub use printable::printable;

@@ -76,7 +76,7 @@ pub fn line(body: &str) -> String {
 /// such as the rest of a line that was cut, is returned as it is.
 pub fn sentences(line: &[u8]) -> impl Iterator<Item = &[u8]> {
     const BYTE_ORDER_MARK: &[u8] = b"\xEF\xBB\xBF";
-    let mut rest = line.strip_prefix(BYTE_ORDER_MARK).unwrap_or(line);
+    let mut rest = line.strip_prefix(BYTE_ORDER_MARK).unwrap_or(line).trim_ascii_start();
     std::iter::from_fn(move || {
         while let Some(tagged) = rest.strip_prefix(b"\\")
             && let Some(end) = tagged.iter().position(|byte| *byte == b'\\')

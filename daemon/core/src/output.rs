@@ -1,4 +1,4 @@
-//! Standard output of commands.
+//! Standard output and standard error output of commands.
 
 use std::fmt;
 use std::io::{ErrorKind, Write};
@@ -10,9 +10,21 @@ pub fn write_or_exit(text: fmt::Arguments<'_>) {
     let mut out = std::io::stdout().lock();
     let Err(error) = out.write_fmt(text).and_then(|()| out.flush()) else { return };
     if error.kind() != ErrorKind::BrokenPipe {
-        eprintln!("scenecast: standard output: {error}");
+        write_error(format_args!("scenecast: standard output: {error}\n"));
     }
     std::process::exit(i32::from(error.kind() != ErrorKind::BrokenPipe));
+}
+
+/// Writes to the standard error output. Where that fails nobody reads it, and the program goes on.
+#[doc(hidden)]
+pub fn write_error(text: fmt::Arguments<'_>) {
+    let _ = std::io::stderr().lock().write_fmt(text);
+}
+
+/// `eprintln!` for commands, without a panic where the standard error output fails.
+#[macro_export]
+macro_rules! errln {
+    ($($text:tt)*) => { $crate::write_error(format_args!("{}\n", format_args!($($text)*))) };
 }
 
 /// `print!` for commands, without a panic where standard output fails.

@@ -163,7 +163,7 @@ impl Demo {
         let Some(made) = self.truth.take_if(|thread| thread.is_finished()) else { return };
         match made.join() {
             Ok(Ok(truth)) => self.facts.truth = truth.map(|truth| Arc::new(shown(truth))),
-            Ok(Err(error)) => eprintln!("scenecast: the page cannot show the true classes: {error}"),
+            Ok(Err(error)) => scenecast_core::errln!("scenecast: the page cannot show the true classes: {error}"),
             Err(panic) => std::panic::resume_unwind(panic),
         }
     }

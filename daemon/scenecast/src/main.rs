@@ -14,14 +14,14 @@ fn main() -> ExitCode {
         }
         Err(e) if e.kind() == ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand => e.exit(),
         Err(e) => {
-            eprintln!("scenecast: {}", one_line(&e.to_string()));
+            scenecast_core::errln!("scenecast: {}", one_line(&e.to_string()));
             return ExitCode::from(2);
         }
     };
     match scenecast::commands::run(arguments) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("scenecast: {error}");
+            scenecast_core::errln!("scenecast: {error}");
             ExitCode::from(error.exit_code())
         }
     }

@@ -2,7 +2,7 @@
 
 use crate::ArrivalClock;
 use crate::live::{Reading, SensorKind, SensorSource, SourceError, SourceImage};
-use scenecast_sensors::{CameraFault, MAX_IMAGE_BYTES, Stamp, complete_length};
+use scenecast_sensors::{CameraFault, MAX_IMAGE_BYTES, Stamp, StampForm, complete_length};
 use std::collections::{BTreeMap, VecDeque};
 use std::fs::DirEntry;
 use std::path::{Path, PathBuf};
@@ -26,6 +26,9 @@ const SETTLED: Duration = Duration::from_millis(300);
 /// Files that were written this long before the folder is opened are live; older ones are not mapped.
 const LIVE: Duration = Duration::from_secs(2);
 
+/// A time in a name that is later than this computer's by more is named.
+const AHEAD: Duration = Duration::from_secs(600);
+
 /// Images of a folder, each as soon as it is complete. A name that is a number or a date is the time of its image, as in
 /// `1305031102.175304.png` (seconds), `1403636579763555584.png` (nanoseconds) and `20261126T185000.250.png` (UTC).
 pub struct WatchSource {
@@ -37,6 +40,30 @@ pub struct WatchSource {
     /// When it was last read.
     read: Option<Instant>,
     ready: VecDeque<SourceImage>,
+    told: ToldNames,
+}
+
+/// What people were told of the times in names.
+#[derive(Debug, Clone, Copy, Default)]
+struct ToldNames {
+    form: Option<StampForm>,
+    is_ahead_told: bool,
+}
+
+impl ToldNames {
+    /// A new name; returns what people should know of its time, once.
+    fn handle(&mut self, name: &str, now: SystemTime) -> Option<String> {
+        let (stamp, form) = Stamp::parse_with_form(Path::new(name).file_stem()?.to_str()?)?;
+        let now = now.duration_since(SystemTime::UNIX_EPOCH).ok()?;
+        let now = Stamp::from_nanos(i64::try_from(now.as_nanos()).ok()?);
+        let ahead_s = stamp.seconds_since(now);
+        if ahead_s > AHEAD.as_secs_f64() && !std::mem::replace(&mut self.is_ahead_told, true) {
+            let hours = ahead_s / 3600.0;
+            return Some(format!("{name}: its time is {hours:.1} hours ahead of the clock of this computer"));
+        }
+        let is_new = self.form.replace(form) != Some(form);
+        is_new.then(|| format!("{name}: names are read as {}", form.name()))
+    }
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -51,7 +78,15 @@ enum FileState {
 
 impl WatchSource {
     pub fn new(dir: &Path, clock: ArrivalClock) -> Self {
-        Self { dir: dir.to_owned(), clock, files: BTreeMap::new(), changed: None, read: None, ready: VecDeque::new() }
+        Self {
+            dir: dir.to_owned(),
+            clock,
+            files: BTreeMap::new(),
+            changed: None,
+            read: None,
+            ready: VecDeque::new(),
+            told: ToldNames::default(),
+        }
     }
 
     fn entries(&self) -> Result<Vec<DirEntry>, SourceError> {
@@ -109,6 +144,9 @@ impl WatchSource {
                 let Ok(bytes) = std::fs::read(path) else { continue };
                 if (is_tiff(path) && !has_grown) || complete_length(&bytes).is_some() {
                     *state = FileState::Done;
+                    if let Some(line) = self.told.handle(&name, SystemTime::now()) {
+                        tracing::info!("camera: {line}");
+                    }
                     complete.push((stamp_of_name(path), path.clone(), bytes));
                 }
             } else if still >= ABANDONED {
@@ -247,6 +285,18 @@ mod tests {
             || source.next(Duration::ZERO, &mut |_, _| ()).unwrap().and_then(|reading| image_of(reading).stamp);
         let stamps: Vec<Option<Stamp>> = std::iter::repeat_with(&mut stamp).take(4).collect();
         assert_eq!(stamps, [Stamp::parse("9.25"), Stamp::parse("10.5"), Stamp::parse("100"), None]);
+    }
+
+    #[test]
+    fn the_form_of_names_and_times_ahead_are_told_once() {
+        let now = SystemTime::UNIX_EPOCH + Duration::from_secs(1_795_719_000);
+        let mut told = ToldNames::default();
+        let first = told.handle("1795719000567.jpg", now).unwrap();
+        assert_eq!(first, "1795719000567.jpg: names are read as milliseconds since 1970");
+        assert_eq!((told.handle("1795719001567.jpg", now), told.handle("IMG_0001.jpg", now)), (None, None));
+        let ahead = told.handle("20261127T185000.jpg", now).unwrap();
+        assert!(ahead.contains("24.0 hours ahead"), "{ahead}");
+        assert!(told.handle("20261126T185000.jpg", now).unwrap().contains("date and time of UTC"));
     }
 
     #[test]

@@ -102,7 +102,7 @@ impl Lines {
             loop {
                 let is_over = ended.recv_timeout(Duration::from_secs(1)) != Err(RecvTimeoutError::Timeout);
                 let share = *shared.lock().unwrap_or_else(PoisonError::into_inner);
-                eprintln!("{}", line(task, share, began.elapsed()));
+                scenecast_core::errln!("{}", line(task, share, began.elapsed()));
                 if is_over {
                     return;
                 }

@@ -35,8 +35,19 @@ pub struct MapCells {
     pub tree: Option<LabelTree>,
     /// The operator's markers.
     pub markers: Vec<VehicleMarker>,
+    /// Whose map it is, and of when; `None` where that is not known.
+    pub caption: Option<MapCaption>,
     pub(crate) tiles: Tiles,
     pub(crate) layers: Vec<CellLayer>,
+}
+
+/// What a file of a map says of itself.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct MapCaption {
+    /// The address of the vehicle.
+    pub vehicle: u8,
+    /// The moment of the map in UTC, as in RFC 3339.
+    pub utc: String,
 }
 
 /// A quantity of each cell.
@@ -124,6 +135,7 @@ impl MapCells {
             names: BTreeMap::new(),
             tree: None,
             markers: Vec::new(),
+            caption: None,
             tiles: ReplicaTile::tiles_of(grid),
             layers: Vec::new(),
         }

@@ -1,6 +1,6 @@
 //! File formats: indexed PNG with world file and projection, GeoJSON, PLY, CSV.
 
-use super::cells::{ExploredCell, MapCells};
+use super::cells::{ExploredCell, MapCaption, MapCells};
 use super::projection::{TransverseMercator, well_known_text};
 use super::regions::{Polygon, regions};
 use crate::state::{Origin, VehicleMarker};
@@ -75,6 +75,9 @@ pub(super) fn geojson(cells: &MapCells, origin: Option<Origin>) -> String {
         }
     }
     let mut facts = json!({ "map_version": cells.version, "mission_time_s": crate::snapshot::seconds(cells.at) });
+    if let Some(caption) = &cells.caption {
+        (facts["vehicle"], facts["utc"]) = (caption.vehicle.into(), caption.utc.as_str().into());
+    }
     if origin.is_none() {
         facts["coordinates"] = json!("metres east and north of the mission's origin");
     }
@@ -96,10 +99,17 @@ fn tidy(degrees: f64) -> f64 {
 }
 
 /// ASCII PLY: the centre of each explored cell in metres east, north and up (0 where the depth is unknown), colour, label.
-pub(super) fn ply(cells: &MapCells) -> String {
+pub(super) fn ply(cells: &MapCells, origin: Option<Origin>) -> String {
+    let of = cells
+        .caption
+        .as_ref()
+        .map_or(String::new(), |MapCaption { vehicle, utc }| format!(" of vehicle {vehicle} at {utc}"));
+    let from = origin.map_or(String::new(), |Origin { lat_deg, lon_deg }| {
+        format!(" from latitude {lat_deg}, longitude {lon_deg} (WGS 84)")
+    });
     let count = cells.explored().count();
     let mut out = format!(
-        "ply\nformat ascii 1.0\ncomment scenecast map, metres east, north, up\nelement vertex {count}\n\
+        "ply\nformat ascii 1.0\ncomment scenecast map{of}, metres east, north, up{from}\nelement vertex {count}\n\
          property double x\nproperty double y\nproperty double z\nproperty uchar red\nproperty uchar green\n\
          property uchar blue\nproperty uchar label\nend_header\n"
     );

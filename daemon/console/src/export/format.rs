@@ -85,7 +85,7 @@ impl MapCells {
             MapFormat::WorldFile => Ok(world_file(self).into()),
             MapFormat::Projection => Ok(projection(origin).into()),
             MapFormat::GeoJson => Ok(geojson(self, origin).into()),
-            MapFormat::Ply => Ok(ply(self).into()),
+            MapFormat::Ply => Ok(ply(self, origin).into()),
             MapFormat::Csv => Ok(csv(self).into()),
             MapFormat::Labels => Ok(labels(self).into()),
             MapFormat::Tiff => geotiff(self, origin, Reference::Mission),

@@ -3,7 +3,7 @@
 //! Tags follow TIFF 6.0 and OGC GeoTIFF 1.1 (19-008r4). Tiles without an explored cell share the data of one empty tile, so
 //! that the size of the file grows with the cells and not with their extent.
 
-use super::cells::MapCells;
+use super::cells::{MapCaption, MapCells};
 use super::projection::TransverseMercator;
 use crate::state::Origin;
 use flate2::Compression;
@@ -91,7 +91,8 @@ pub(super) fn geotiff(cells: &MapCells, origin: Option<Origin>, reference: Refer
     let raster = raster(cells, origin, reference, &places)?;
     let tiles = touched_tiles(cells, &raster, &places);
     let pixels = |&tile: &(u32, u32)| tile_pixels(cells, &raster, &places, tile);
-    write(&raster, &keys, tiles.iter().map(|tile| (*tile, pixels(tile)))).map_err(|e| e.to_string())
+    write((&raster, cells.caption.as_ref()), &keys, tiles.iter().map(|tile| (*tile, pixels(tile))))
+        .map_err(|e| e.to_string())
 }
 
 fn raster(cells: &MapCells, origin: Option<Origin>, reference: Reference, places: &Places) -> Result<Raster, String> {
@@ -259,7 +260,7 @@ impl GeoKeys {
 }
 
 fn write(
-    raster: &Raster,
+    (raster, caption): (&Raster, Option<&MapCaption>),
     keys: &GeoKeys,
     tiles: impl Iterator<Item = ((u32, u32), Vec<u8>)>,
 ) -> Result<Vec<u8>, tiff::TiffError> {
@@ -287,6 +288,10 @@ fn write(
     directory.write_tag(Tag::SamplesPerPixel, 1u16)?;
     directory.write_tag(Tag::Compression, 8u16)?; // Adobe deflate
     directory.write_tag(Tag::PhotometricInterpretation, 3u16)?; // palette
+    if let Some(MapCaption { vehicle, utc }) = caption {
+        let text = format!("scenecast map of vehicle {vehicle} at {utc}, pixel value = label");
+        directory.write_tag(Tag::ImageDescription, text.as_str())?;
+    }
     directory.write_tag(Tag::PlanarConfiguration, 1u16)?;
     directory.write_tag(Tag::ColorMap, &colour_map()[..])?;
     directory.write_tag(Tag::TileWidth, TILE)?;

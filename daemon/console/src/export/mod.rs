@@ -8,5 +8,5 @@ mod projection;
 mod regions;
 
 pub(crate) use cells::Tiles;
-pub use cells::{CellLayer, MapCells};
+pub use cells::{CellLayer, MapCaption, MapCells};
 pub use format::MapFormat;

@@ -107,7 +107,9 @@ fn check(method: &Method, uri: &Uri, headers: &HeaderMap, access: &Access) -> Re
     }
     if !is_ours(host, names) {
         return Err(match names {
-            HostNames::Loopback => "this page is served to this machine only",
+            HostNames::Loopback(_) => {
+                "this page is served to this machine only; console.host is the name that a proxy on it passes on"
+            }
             HostNames::Network(_) => "the request must name this page by an address, or by the name in console.host",
         });
     }
@@ -132,7 +134,7 @@ fn is_ours(host: &str, names: &HostNames) -> bool {
     let is_loopback = name.eq_ignore_ascii_case("localhost") || address.is_some_and(|ip| ip.is_loopback());
     is_loopback
         || match names {
-            HostNames::Loopback => false,
+            HostNames::Loopback(own) => !own.is_empty() && name.eq_ignore_ascii_case(own),
             HostNames::Network(own) => address.is_some() || (!own.is_empty() && name.eq_ignore_ascii_case(own)),
         }
 }
@@ -166,7 +168,12 @@ mod tests {
         let named = |uri: &'static str, hosts: &[&'static str]| {
             let mut headers = HeaderMap::new();
             headers.extend(hosts.iter().map(|host| (header::HOST, HeaderValue::from_static(host))));
-            check(&Method::GET, &Uri::from_static(uri), &headers, &Access::new(HostNames::Loopback, Vec::new()))
+            check(
+                &Method::GET,
+                &Uri::from_static(uri),
+                &headers,
+                &Access::new(HostNames::Loopback(String::new()), Vec::new()),
+            )
         };
         assert!(named("http://localhost:1/", &["localhost:1"]).is_ok());
         assert!(named("/", &["localhost:1", "evil.example"]).unwrap_err().contains("several Hosts"));
@@ -175,7 +182,7 @@ mod tests {
     }
 
     fn checked(method: Method, pairs: &[(&'static str, &'static str)]) -> Result<(), &'static str> {
-        checked_with(&HostNames::Loopback, method, pairs)
+        checked_with(&HostNames::Loopback(String::new()), method, pairs)
     }
 
     #[test]
@@ -221,6 +228,9 @@ mod tests {
             |own: &str, host| checked_with(&HostNames::Network(own.to_owned()), Method::GET, &[("host", host)]).is_ok();
         assert!(admits("", "192.168.1.7:8460") && admits("", "[fe80::1]:8460") && admits("", "localhost"));
         assert!(!admits("", "evil.example") && !admits("", ":8460"));
+        let behind_proxy = HostNames::Loopback("surface.ship".to_owned());
+        assert!(checked_with(&behind_proxy, Method::GET, &[("host", "surface.ship")]).is_ok());
+        assert!(checked_with(&behind_proxy, Method::GET, &[("host", "192.168.1.7:8460")]).is_err());
         assert!(admits("surface.ship", "Surface.Ship:8460") && !admits("surface.ship", "evil.example"));
     }
 }

@@ -371,6 +371,42 @@ mod tests {
     }
 
     #[test]
+    fn an_hour_of_a_real_receiver_has_a_position_all_the_time() {
+        let mut gps = Gps::new(GpsLanguage::Nmea);
+        let (mut lines, mut last, mut seconds_with) = (0u32, None, 0);
+        for s in 0..3600u32 {
+            let place = nmea::place_fields(LatLon::new(29.5 + 1e-5 * f64::from(s), 34.92).unwrap());
+            // GGA has no position for a minute in each ten; a multiplexer puts other vessels, tag blocks and satellites in between.
+            let quality = if s % 600 < 60 { "0,00,99.9" } else { "1,09,0.9" };
+            let time = format!("{:02}{:02}{:02}.00", 12 + s / 3600, s / 60 % 60, s % 60);
+            let sentences = [
+                nmea::line(&format!("GNGGA,{time},{place},{quality},2.0,M,40.0,M,,")),
+                nmea::line("GPGSV,3,1,11,03,03,111,00,04,15,270,00,06,01,010,00,13,06,292,00"),
+                format!("\\s:ais,c:17{s:08}*7D\\!AIVDM,1,1,,A,13u?etPv2;0n:dDPwUM1U1Cb069D,0*24\r\n"),
+                format!("\\s:gps*4E\\{}", nmea::line(&format!("GNRMC,{time},A,{place},3.2,0.0,261126,,,A"))),
+            ];
+            for sentence in sentences {
+                let mut bytes = sentence.into_bytes();
+                lines += 1;
+                if lines % 100 == 7 {
+                    // One line in a hundred is damaged, each time in another way.
+                    let damaged = lines as usize % bytes.len();
+                    match lines / 100 % 3 {
+                        0 => bytes[damaged] ^= 0x55,
+                        1 => bytes.truncate(damaged),
+                        _ => bytes.retain(|byte| !b"\r\n".contains(byte)),
+                    }
+                }
+                if !gps.handle_bytes(&bytes, at(f64::from(s))).is_empty() {
+                    last = Some(s);
+                }
+            }
+            seconds_with += u32::from(last.is_some_and(|last| s - last <= 1));
+        }
+        assert!(seconds_with >= 3590, "{seconds_with} of 3600 s with a position: {:?}", faults(&gps));
+    }
+
+    #[test]
     fn latitude_and_longitude_zero_are_no_place() {
         let mut gps = Gps::new(GpsLanguage::Nmea);
         let null = nmea::line("GPRMC,120000.00,A,0000.0000,N,00000.0000,E,0.0,,261126,,,A");

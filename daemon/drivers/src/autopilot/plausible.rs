@@ -1,7 +1,8 @@
 //! Depths, headings and heights above the sea floor that no vehicle can reach so fast.
 //!
 //! One false value must not end a mission or bend a map, nor must an autopilot that moves its home and so the zero of its depths. A
-//! value that jumps is not used until it has stayed for long; until then only its changes count.
+//! value that jumps is not used until it has stayed for a while; until then only its changes count. Of a depth that was right before, only
+//! the changes count from then on.
 
 use super::Step;
 use scenecast_protocol::time::Instant;
@@ -20,6 +21,8 @@ struct Bounds {
     persists: Duration,
     /// The size of a whole turn, for angles.
     turn: Option<f64>,
+    /// Whether a value that jumps and stays, after others that agreed, has another zero.
+    has_zero: bool,
 }
 
 const DEPTH: Bounds = Bounds {
@@ -28,8 +31,9 @@ const DEPTH: Bounds = Bounds {
     unit: "m",
     rate: 3.0,
     margin: 2.0,
-    persists: Duration::from_secs(60),
+    persists: Duration::from_secs(3),
     turn: None,
+    has_zero: true,
 };
 
 const HEIGHT: Bounds = Bounds {
@@ -40,6 +44,7 @@ const HEIGHT: Bounds = Bounds {
     margin: 3.0,
     persists: Duration::from_secs(1),
     turn: None,
+    has_zero: false,
 };
 
 const HEADING: Bounds = Bounds {
@@ -50,6 +55,7 @@ const HEADING: Bounds = Bounds {
     margin: 45.0,
     persists: Duration::from_secs(1),
     turn: Some(360.0),
+    has_zero: false,
 };
 
 /// A value that was not used.
@@ -66,6 +72,10 @@ pub struct Jump {
 struct Series {
     /// The last value that was used.
     used: Option<(f64, Instant)>,
+    /// Since when the used values follow each other.
+    since: Option<Instant>,
+    /// What is subtracted from measured values.
+    zero: f64,
     /// The first and the last of the values that agree with each other, and not with the used one.
     other: Option<[(f64, Instant); 2]>,
     /// Jumps since the last note, and when that was.
@@ -76,26 +86,36 @@ struct Series {
 impl Series {
     /// Notes are this far apart.
     const NOTE_PERIOD: Duration = Duration::from_secs(60);
+    /// Values that have followed each other for this time were right.
+    const PROVEN: Duration = Duration::from_secs(10);
 
     /// The value to use in place of a measured one, and the jump if it is another one.
-    fn check(&mut self, value: f64, bounds: &Bounds, now: Instant) -> (f64, Option<Jump>) {
+    fn check(&mut self, measured: f64, bounds: &Bounds, now: Instant) -> (f64, Option<Jump>) {
+        let value = measured - self.zero;
         let Some((used, _)) = self.used.filter(|used| !bounds.can_follow(*used, (value, now))) else {
             (self.used, self.other) = (Some((value, now)), None);
+            self.since.get_or_insert(now);
             return (value, None);
         };
         let before = self.other.filter(|[_, last]| bounds.can_follow(*last, (value, now)));
         let [first, last] = before.unwrap_or([(value, now); 2]);
-        if now.since(first.1) >= bounds.persists {
-            (self.used, self.other) = (Some((value, now)), None);
-            let note = format!("the {} has stayed near {value:.1} {} and is used", bounds.name, bounds.unit);
-            return (value, Some(Jump { counter: bounds.counter, note: Some(note) }));
-        }
-        self.other = Some([first, (value, now)]);
         let moved = used + value - last.0;
         let tracked = if bounds.turn.is_some() { moved } else { moved.max(0.0) };
-        self.used = Some((tracked, now));
-        let note = if before.is_none() { self.note((used, value), bounds, now) } else { None };
-        (tracked, Some(Jump { counter: bounds.counter, note }))
+        let (value, other, note) = if now.since(first.1) < bounds.persists {
+            let note = if before.is_none() { self.note((used, value), bounds, now) } else { None };
+            (tracked, Some([first, (value, now)]), note)
+        } else if bounds.has_zero && self.since.is_some_and(|since| first.1.since(since) >= Self::PROVEN) {
+            self.zero += value - tracked;
+            let Bounds { name, unit, .. } = bounds;
+            let note = format!("the zero of the {name} has moved by {:.1} {unit}: only its changes count", self.zero);
+            (tracked, None, Some(note))
+        } else {
+            self.since = Some(now);
+            let note = format!("the {} has stayed near {value:.1} {} and is used", bounds.name, bounds.unit);
+            (value, None, Some(note))
+        };
+        (self.used, self.other) = (Some((value, now)), other);
+        (value, Some(Jump { counter: bounds.counter, note }))
     }
 
     fn note(&mut self, (used, value): (f64, f64), bounds: &Bounds, now: Instant) -> Option<String> {
@@ -133,6 +153,12 @@ pub struct Plausible {
 }
 
 impl Plausible {
+    /// The depth that the sensor measures at the surface, metres; `None` while its last values are in doubt.
+    #[must_use]
+    pub fn depth_zero_m(&self) -> Option<f64> {
+        self.depth.other.is_none().then_some(self.depth.zero)
+    }
+
     /// The step with values that can be, and the jumps that were found.
     pub fn check(&mut self, step: Step, now: Instant) -> (Step, Vec<Jump>) {
         let (depth_m, depth_jump) = self.depth.check(step.depth_m, &DEPTH, now);
@@ -173,13 +199,36 @@ mod tests {
     }
 
     #[test]
-    fn of_a_depth_that_jumps_and_stays_only_the_changes_count_for_a_minute() {
-        let sunk = |i: i32| 0.02 * f64::from(i - 20);
-        let (depths, notes) = used((0..700).map(|i| if i < 20 { 5.0 } else { 42.0 + sunk(i) }));
-        let adopted = depths.iter().position(|depth| *depth > 40.0).unwrap();
-        assert_eq!(adopted, 620);
-        assert!((depths[619] - 5.0 - sunk(619)).abs() < 1e-9, "{}", depths[619]);
-        assert_eq!(notes[1..], ["the depth has stayed near 54.0 m and is used"]);
+    fn of_a_depth_that_jumps_and_stays_only_the_changes_count() {
+        let sunk = |i: i32| 0.02 * f64::from(i - 200);
+        let (depths, notes) = used((0..2000).map(|i| if i < 200 { 5.0 } else { 42.0 + sunk(i) }));
+        for (i, depth) in (200..).zip(&depths[200..]) {
+            assert!((depth - 5.0 - sunk(i)).abs() < 1e-9, "{i}: {depth}");
+        }
+        assert_eq!(notes[1..], ["the zero of the depth has moved by 37.0 m: only its changes count"]);
+    }
+
+    #[test]
+    fn a_zero_that_moves_back_is_followed() {
+        let mut plausible = Plausible::default();
+        let mut zeros = Vec::new();
+        for i in 0..600 {
+            let depth_m = if (200..400).contains(&i) { 42.0 } else { 5.0 };
+            let (step, _) = plausible.check(Step { depth_m, ..Step::default() }, at(i));
+            assert_eq!(step.depth_m, 5.0);
+            zeros.push(plausible.depth_zero_m());
+        }
+        assert_eq!(
+            [zeros[199], zeros[201], zeros[399], zeros[401], zeros[599]],
+            [Some(0.0), None, Some(37.0), None, Some(0.0)]
+        );
+    }
+
+    #[test]
+    fn a_first_depth_that_was_wrong_is_replaced_after_three_seconds() {
+        let (depths, notes) = used((0..100).map(|i| if i < 20 { 0.0 } else { 12.0 }));
+        assert_eq!(depths.iter().position(|depth| *depth == 12.0), Some(50));
+        assert_eq!(notes[1..], ["the depth has stayed near 12.0 m and is used"]);
     }
 
     #[test]

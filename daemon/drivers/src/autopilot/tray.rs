@@ -49,6 +49,11 @@ impl Tray {
         self.walk(step);
     }
 
+    /// The depth that the autopilot reports at the surface, metres; `None` while its depth is in doubt.
+    pub(super) fn depth_zero_m(&self) -> Option<f64> {
+        self.plausible.depth_zero_m()
+    }
+
     /// Sensors measure from another zero from now on: the next values are taken as they are.
     pub(super) fn forget_measured(&mut self) {
         self.plausible = Plausible::default();

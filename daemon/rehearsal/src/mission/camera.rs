@@ -46,6 +46,11 @@ impl Camera {
         Ok(Self { world, recording, next: 0, recorder, true_cells: OnceLock::new() })
     }
 
+    /// What could not be read of the recording.
+    pub(super) fn recording_notes(&self) -> &[String] {
+        self.recording.as_ref().map_or(&[], |recording| &recording.notes)
+    }
+
     /// Whether the frames, and so the vehicle's path, come from a recording.
     pub(super) fn is_recorded(&self) -> bool {
         self.recording.is_some()

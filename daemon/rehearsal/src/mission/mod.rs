@@ -161,9 +161,10 @@ impl Mission {
         self.logbook.received_bits
     }
 
-    /// What people should change at the camera of a recording, if its images and odometry disagree.
-    pub fn camera_advice(&self) -> Option<&str> {
-        self.logbook.camera_advice.as_deref()
+    /// What people should know of a recording: what could not be read, and what is wrong with the camera.
+    pub fn notes(&self) -> impl Iterator<Item = &str> {
+        let notes = self.camera.recording_notes().iter().map(String::as_str);
+        notes.chain(self.logbook.camera_advice.as_deref())
     }
 
     /// The surface's role.

@@ -147,7 +147,7 @@ impl Key {
                     );
                 }
                 if let Some(warning) = warning {
-                    eprintln!("scenecast: {warning}");
+                    scenecast_core::errln!("scenecast: {warning}");
                 }
             }
         }

@@ -110,11 +110,9 @@ impl Sim {
         mission.run(Duration::from_secs_f64(self.drain), &mut |share| progress.show(share))?;
         drop(progress);
         for refused in mission.refused_labels() {
-            eprintln!("refused: {refused}");
+            scenecast_core::errln!("refused: {refused}");
         }
-        if let Some(advice) = mission.camera_advice() {
-            eprintln!("{advice}");
-        }
+        mission.notes().for_each(|note| scenecast_core::errln!("{note}"));
         let report = report(&mission, &self.world.scenario_name());
         let seconds = started.elapsed().as_secs_f64();
         let speedup = mission.now().as_secs_f64() / seconds;

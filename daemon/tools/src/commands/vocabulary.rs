@@ -76,7 +76,7 @@ impl Train {
         if let Some(dir) = &self.annotations {
             let (statistics, images) = self.statistics(dir)?;
             for (class, cells) in statistics.rare_classes() {
-                eprintln!(
+                scenecast_core::errln!(
                     "scenecast: class {class} is left out: {cells} annotated cells, at least {MIN_CLASS_CELLS} are needed"
                 );
             }

@@ -4,7 +4,7 @@ use crate::http::response::{error, respond};
 use crate::http::shared::Shared;
 use crate::request::{Reply, SurfaceRequest};
 use crate::snapshot::seconds;
-use crate::state::{LogLine, LogList};
+use crate::state::{LogLine, LogList, MissionState};
 use axum::Json;
 use axum::extract::{Query, State};
 use axum::http::{StatusCode, header};
@@ -53,11 +53,7 @@ async fn lines(shared: &Shared, filter: LogQuery) -> Result<Vec<LogLine>, Respon
         Reply::Log(entries) => entries,
         other => return Err(respond(other)),
     };
-    let (now_s, speed) = {
-        let snapshot = shared.snapshots.borrow();
-        (snapshot.state.now_s, snapshot.state.mission.speed.max(1e-3))
-    };
-    let unix_s = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_secs_f64();
+    let utc_of = |at_s: f64| utc_of(&shared.snapshots.borrow().state, at_s);
     let is_wanted = |entry: &&LogEntry| {
         filter.vehicle.is_none_or(|vehicle| entry.vehicle.is_some_and(|v| v.number() == vehicle))
             && filter.kind.as_ref().is_none_or(|kind| entry.kind.name() == kind)
@@ -68,7 +64,7 @@ async fn lines(shared: &Shared, filter: LogQuery) -> Result<Vec<LogLine>, Respon
         LogLine {
             number: entry.number,
             at_s,
-            utc: utc(unix_s - (now_s - at_s) / speed),
+            utc: utc_of(at_s),
             vehicle: entry.vehicle.map(|v| v.number()),
             kind: entry.kind.name().to_owned(),
             by: entry.by.clone(),
@@ -92,6 +88,12 @@ fn to_csv(entries: &[LogLine]) -> Result<Vec<u8>, csv::Error> {
 /// A text that no spreadsheet takes for a formula.
 fn harmless(text: &str) -> String {
     if text.starts_with(['=', '+', '-', '@']) { format!("'{text}") } else { text.to_owned() }
+}
+
+/// A moment of the mission in UTC, as in RFC 3339, by the clock of this computer.
+pub(in crate::http) fn utc_of(state: &MissionState, at_s: f64) -> String {
+    let unix_s = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_secs_f64();
+    utc(unix_s - (state.now_s - at_s) / state.mission.speed.max(1e-3))
 }
 
 /// Seconds since 1970 as in RFC 3339, in whole seconds. The date: H. Hinnant, "chrono-compatible low-level date

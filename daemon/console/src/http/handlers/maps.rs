@@ -1,11 +1,13 @@
 //! Maps. Each version is requested from the surface once, however many clients read it, and everything is made of it beside the
 //! link.
 
-use crate::export::{MapCells, MapFormat};
+use super::log::utc_of;
+use crate::export::{MapCaption, MapCells, MapFormat};
 use crate::http::compress::{accepts_gzip, gzip, tagged};
 use crate::http::response::{error, respond};
 use crate::http::shared::{CachedMap, MapCell, Shared, VehicleId};
 use crate::request::{Reply, SurfaceRequest};
+use crate::snapshot::seconds;
 use crate::state::MapLabelTree;
 use crate::tiles::TiledMap;
 use axum::Json;
@@ -183,14 +185,17 @@ pub(in crate::http) async fn file(
         Ok(cached) => cached,
         Err(response) => return response,
     };
-    let (origin, placement, names, tree, markers) = {
+    let at = cached.map.cells().at;
+    let (origin, placement, names, tree, markers, caption) = {
         let snapshot = shared.snapshots.borrow();
         let vehicle = snapshot.vehicle(id);
         let labels = vehicle.iter().flat_map(|v| &v.labels);
         let names: BTreeMap<u8, String> = labels.filter_map(|l| Some((l.id, l.name.clone()?))).collect();
         let tree = vehicle.and_then(|v| v.label_tree.as_ref()).and_then(MapLabelTree::tree);
         let markers = vehicle.map(|v| v.markers.clone()).unwrap_or_default();
-        (snapshot.state.mission.origin, vehicle.and_then(|v| v.map.placement.clone()), names, tree, markers)
+        let caption = MapCaption { vehicle: id, utc: utc_of(&snapshot.state, seconds(at)) };
+        let placement = vehicle.and_then(|v| v.map.placement.clone());
+        (snapshot.state.mission.origin, placement, names, tree, markers, Some(caption))
     };
     let moves = placement.as_ref().map_or(0, |p| p.version);
     let mut named = DefaultHasher::new();
@@ -206,7 +211,7 @@ pub(in crate::http) async fn file(
     };
     let made = tokio::task::spawn_blocking(move || {
         let moved_m = placement.map_or((0.0, 0.0), |p| (p.east_m, p.north_m));
-        let cells = MapCells { moved_m, names, tree, markers, ..cached.map.cells().clone() };
+        let cells = MapCells { moved_m, names, tree, markers, caption, ..cached.map.cells().clone() };
         cut_at(count, cells).export(format, origin)
     });
     match made.await {

@@ -33,9 +33,11 @@ impl Sent {
 impl Mavlink {
     pub(super) fn send_target(&mut self, now: Instant) {
         let Some(pose) = self.pose.filter(|p| now.since(p.heard) < BRIDGED) else { return };
+        // Depths of targets count from the autopilot's own zero. While that is in doubt, the last target stays.
+        let Some(zero_m) = self.tray.depth_zero_m() else { return };
         match (pose.local, self.goal) {
             (Some(at), Some(goal)) => {
-                let down = goal.depth_m.map_or(at[2], |d| d as f32);
+                let down = goal.depth_m.map_or(at[2], |d| (d + zero_m) as f32);
                 self.stay = None;
                 self.send_local([at[0] + goal.north_m as f32, at[1] + goal.east_m as f32, down], now);
             }
@@ -46,7 +48,7 @@ impl Mavlink {
             (None, goal) => {
                 let Some(at) = pose.place else { return };
                 let (east, north) = goal.map_or((0.0, 0.0), |g| (g.east_m, g.north_m));
-                let depth = goal.and_then(|g| g.depth_m).unwrap_or(pose.depth_m);
+                let depth = goal.and_then(|g| g.depth_m).map_or(pose.depth_m, |d| d + zero_m);
                 let place = moved(degrees(at), east, north);
                 self.sent = Some(Sent::Global(place));
                 let (lat, lon) = units(place);

@@ -238,6 +238,46 @@ fn companions_gimbals_and_cameras_beside_the_autopilot_change_nothing() {
 }
 
 #[test]
+fn an_hour_of_a_real_robot_is_followed_with_few_lines_for_people() {
+    let mut pilot = pilot(true);
+    pilot.set_goal(GOAL, at(0.0));
+    let (mut frames, mut notes, mut unseen, mut in_command) = (0u32, 0, Duration::ZERO, 0);
+    let mut hear = |pilot: &mut Mavlink, mut bytes: Vec<u8>, now| {
+        frames += 1;
+        if frames % 100 == 7 {
+            let damaged = frames as usize % bytes.len();
+            bytes[damaged] ^= 0x55;
+        }
+        pilot.handle_bytes(&bytes, now);
+    };
+    let text = |words: &str| frame(1, 253, std::iter::once(4).chain(words.bytes()).collect());
+    for tenth in 0..36_000u32 {
+        let now = at(f64::from(tenth) / 10.0);
+        if tenth % 10 == 0 {
+            hear(&mut pilot, heartbeat(4, true), now);
+            hear(&mut pilot, of_component(191, 0, vec![0, 0, 0, 0, 18, 0, 0, 4, 3]), now);
+            hear(&mut pilot, frame(255, 0, vec![0, 0, 0, 0, 6, 8, 0, 4, 3]), now);
+            hear(&mut pilot, text(["EKF variance", "Leak detected"][(tenth / 10 % 2) as usize]), now);
+        }
+        // The depth jumps for one message in each five minutes.
+        let depth_m = if tenth % 3000 == 1501 { 42.0 } else { 5.0 };
+        hear(&mut pilot, local(100 * tenth, [0.0, 0.0, depth_m], [0.0, 0.1, 0.0]), now);
+        let attitude = tenth.to_le_bytes().into_iter().chain([0; 12]).collect();
+        hear(&mut pilot, of_component(154, 30, attitude), now);
+        pilot.handle_timeout(now);
+        while let Some(step) = pilot.poll_step() {
+            assert_eq!(step.depth_m, 5.0);
+            unseen += step.unseen;
+        }
+        notes += std::iter::from_fn(|| pilot.poll_note()).count();
+        in_command += u32::from(pilot.health(now) == Health::InCommand);
+        while pilot.poll_output().is_some() {}
+    }
+    assert!(in_command >= 35_900 && unseen < Duration::from_secs(36), "{in_command} {unseen:?} {:?}", pilot.counters());
+    assert!(notes < 60 && !pilot.counters().contains_key("restarts"), "{notes} lines: {:?}", pilot.counters());
+}
+
+#[test]
 fn a_depth_that_jumps_does_not_reach_the_vehicle() {
     let mut pilot = pilot(false);
     let global = |ms: i32, depth_mm: i32| {
@@ -254,6 +294,28 @@ fn a_depth_that_jumps_does_not_reach_the_vehicle() {
     assert_eq!(pilot.counters()["depth_jumps"], 1);
     let expected = "the depth jumps from 5.0 to 42.0 m, which is not used unless it stays";
     assert_eq!(notes(&mut pilot).last().map(String::as_str), Some(expected));
+}
+
+#[test]
+fn targets_follow_a_zero_of_depths_that_has_moved() {
+    let mut pilot = pilot(false);
+    pilot.set_goal(GOAL, at(0.0));
+    let global = |ms: i32, depth_mm: i32| {
+        let fields: Vec<u8> =
+            [ms, 295_000_000, 349_200_000, 0, -depth_mm].iter().flat_map(|v| v.to_le_bytes()).collect();
+        frame(1, 33, [&fields[..], &[0, 0, 0, 0, 0, 0, 0xFF, 0xFF]].concat())
+    };
+    let mut depths = Vec::new();
+    for tenth in 0..300 {
+        let now = at(f64::from(tenth) / 10.0);
+        pilot.handle_bytes(&heartbeat(4, true), now);
+        pilot.handle_bytes(&global(100 * tenth, if tenth < 150 { 5000 } else { 42_000 }), now);
+        pilot.handle_timeout(now);
+        let targets = sent(&mut pilot).into_iter().filter(|(id, _)| *id == 86);
+        depths.extend(targets.map(|(_, p)| -f32::from_le_bytes(p[12..16].try_into().unwrap())));
+    }
+    // For three seconds nobody knows from where depths count.
+    assert_eq!(depths, [[5.0; 15].as_slice(), &[42.0; 12]].concat());
 }
 
 #[test]

@@ -42,7 +42,7 @@ impl PlanningBench {
     pub(super) fn run(self) -> Result<(), UserError> {
         let images = annotated_images(&self.scenes);
         if images.is_empty() && self.labels.is_empty() {
-            eprintln!("skipped: no annotated images in {}; drawn scenes only", self.scenes.display());
+            scenecast_core::errln!("skipped: no annotated images in {}; drawn scenes only", self.scenes.display());
         }
         if let Some(dir) = &self.out {
             std::fs::create_dir_all(dir).map_err(|e| UserError::file(dir, e))?;

@@ -58,10 +58,13 @@ impl Register {
         let recording = Recording::open(&self.frames, None, self.metres_per_pixel)?;
         let placed = self.place(&recording)?;
         if let [first, ..] = placed.unreadable.as_slice() {
-            eprintln!("{} frames that cannot be read are left out; the first: {first}", placed.unreadable.len());
+            scenecast_core::errln!(
+                "{} frames that cannot be read are left out; the first: {first}",
+                placed.unreadable.len()
+            );
         }
         if let Some(advice) = placed.geometry.and_then(|geometry| geometry.advice(self.metres_per_pixel)) {
-            eprintln!("{advice}");
+            scenecast_core::errln!("{advice}");
         }
         let solved = placed.graph.solve();
         let frames = placed.frames.iter().zip(&solved).map(|(frame, pose)| {

@@ -91,7 +91,11 @@ impl Tune {
         let settings = grid.settings();
         let left: Vec<Setting> = settings.iter().copied().filter(|setting| !table.table.has(setting)).collect();
         if left.len() < settings.len() {
-            eprintln!("tune: {} of {} settings are in tuning.csv already", settings.len() - left.len(), settings.len());
+            scenecast_core::errln!(
+                "tune: {} of {} settings are in tuning.csv already",
+                settings.len() - left.len(),
+                settings.len()
+            );
         }
         self.search(&sites, &left, &mut table)?;
         let rows: Vec<Row> = table.table.rows().copied().collect();

@@ -96,7 +96,7 @@ impl Decode {
         let Some(path) = &self.key else { return Ok(Vec::new()) };
         let (file, warning) = read_key(path)?;
         if let Some(warning) = warning {
-            eprintln!("scenecast: {warning}");
+            scenecast_core::errln!("scenecast: {warning}");
         }
         Ok([file.key].into_iter().chain(file.next.map(HeldKey::Mission)).collect())
     }
