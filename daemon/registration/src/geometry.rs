@@ -15,6 +15,8 @@ use scenecast_core::wrap_rad;
 const PAIRS: usize = 24;
 const MIN_PAIRS: usize = 12;
 const MAX_TRIED: usize = 120;
+/// Frames that are looked at.
+const MAX_FRAMES: u32 = 1500;
 /// Of a straight pair the heading changes by less, radians; of one in a turn by so much.
 const STRAIGHT_RAD: f64 = 0.1;
 const TURN_RAD: std::ops::Range<f64> = 0.15..0.7;
@@ -89,13 +91,14 @@ pub struct GeometryCheck {
     /// The confidence of turns as of a camera that is not mirrored, less that as of a mirrored one.
     turns: f32,
     tried: usize,
+    frames: u32,
 }
 
 impl GeometryCheck {
     /// Whether it needs no more frames.
     #[must_use]
     pub fn is_complete(&self) -> bool {
-        self.pairs.len() >= PAIRS || self.tried >= MAX_TRIED
+        self.pairs.len() >= PAIRS || self.tried >= MAX_TRIED || self.frames >= MAX_FRAMES
     }
 
     /// Takes the next frame of the track.
@@ -103,6 +106,7 @@ impl GeometryCheck {
         if self.is_complete() {
             return;
         }
+        self.frames += 1;
         let thumbnail = Thumbnail::new(&input.image, input.metres_per_pixel, &mut self.flat);
         let Some(scales) = thumbnail.and_then(|thumbnail| thumbnail.unpacked()) else {
             self.earlier = None;

@@ -31,46 +31,53 @@ fn is_big_tiff(bytes: &[u8]) -> bool {
     bytes.starts_with(b"II+\0") || bytes.starts_with(b"MM\0+")
 }
 
-/// Decodes an image of a file and turns it upright as its EXIF data say. `limits` bounds its size and the memory for it.
-///
-/// # Errors
-/// The format is not known, a part of the image is missing, or it is larger than `limits`.
-pub fn decode_upright(bytes: &[u8], limits: Limits) -> Result<DynamicImage, DecodeError> {
+/// The decoder of an image, in whatever format it has.
+fn decoder_of(bytes: &[u8], limits: Limits) -> Result<impl ImageDecoder, DecodeError> {
     if is_cut_jpeg(bytes) {
         return Err(DecodeError::CutJpeg);
     }
-    let broken = |e: image::ImageError| DecodeError::Broken(e.to_string());
     let reader = ImageReader::new(Cursor::new(bytes));
     let guessed = reader.with_guessed_format().map_err(|e| DecodeError::Broken(e.to_string()))?;
     let format = if is_big_tiff(bytes) { Some(ImageFormat::Tiff) } else { guessed.format() };
     let mut reader = ImageReader::with_format(Cursor::new(bytes), format.ok_or(DecodeError::UnknownFormat)?);
     reader.limits(limits);
-    let mut decoder = reader.into_decoder().map_err(broken)?;
+    reader.into_decoder().map_err(broken)
+}
+
+fn broken(error: image::ImageError) -> DecodeError {
+    DecodeError::Broken(error.to_string())
+}
+
+/// The image of a decoder, turned as its EXIF data say.
+fn upright(mut decoder: impl ImageDecoder, mut limits: Limits) -> Result<DynamicImage, DecodeError> {
+    // The decoder counts its own memory only.
+    limits.reserve(decoder.total_bytes()).map_err(broken)?;
     let orientation = decoder.orientation().map_err(broken)?;
     let mut image = DynamicImage::from_decoder(decoder).map_err(broken)?;
     image.apply_orientation(orientation);
     Ok(image)
 }
 
+/// Decodes an image of a file and turns it upright as its EXIF data say. `limits` bounds its size and the memory for it.
+///
+/// # Errors
+/// The format is not known, a part of the image is missing, or it is larger than `limits`.
+pub fn decode_upright(bytes: &[u8], limits: Limits) -> Result<DynamicImage, DecodeError> {
+    upright(decoder_of(bytes, limits.clone())?, limits)
+}
+
 /// Decodes an image to 8 bits a channel; of 16 bits, `bits` gives the highest level, or 16 where it is automatic. Transparency is
 /// dropped.
 pub fn decode(bytes: &[u8], bits: BitDepth) -> Result<RgbImage, DecodeError> {
-    if let Some((width, height)) = size_of(bytes)
-        && u64::from(width) * u64::from(height) > u64::from(MAX_PIXELS)
-    {
+    let decoder = decoder_of(bytes, limits())?;
+    let (width, height) = decoder.dimensions();
+    if u64::from(width) * u64::from(height) > u64::from(MAX_PIXELS) {
         return Err(DecodeError::TooLarge { width, height });
     }
-    Ok(match (decode_upright(bytes, limits())?, bits) {
+    Ok(match (upright(decoder, limits())?, bits) {
         (image, BitDepth::Fixed(bits)) if bits < 16 && is_deep(&image) => scaled(&image.into_rgb16(), bits),
         (image, _) => image.into_rgb8(),
     })
-}
-
-/// Columns and rows by the head of an image.
-fn size_of(bytes: &[u8]) -> Option<(u32, u32)> {
-    let mut reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format().ok()?;
-    reader.limits(limits());
-    reader.into_dimensions().ok()
 }
 
 fn is_deep(image: &DynamicImage) -> bool {
@@ -160,6 +167,35 @@ mod tests {
         assert_eq!(decode(huge, WHOLE), Err(DecodeError::TooLarge { width: 100_000, height: 100_000 }));
         let cut = encoded(ImageFormat::Png);
         assert!(matches!(decode(&cut[..60], WHOLE), Err(DecodeError::Broken(_))));
+    }
+
+    #[test]
+    fn a_head_that_names_a_huge_image_takes_no_memory() {
+        let classic = b"II*\0\x08\0\0\0";
+        // One strip of an image of 100 000 x 100 000 pixels, in TIFF and in BigTIFF.
+        let tags = [
+            (256u16, 100_000u32),
+            (257, 100_000),
+            (258, 8),
+            (259, 1),
+            (262, 1),
+            (273, 8),
+            (277, 1),
+            (278, 100_000),
+            (279, 1),
+        ];
+        let entry =
+            |(tag, value): &(u16, u32)| [&tag.to_le_bytes()[..], &[4, 0], &[1, 0, 0, 0], &value.to_le_bytes()].concat();
+        let small =
+            [&classic[..], &[tags.len() as u8, 0], &tags.iter().flat_map(entry).collect::<Vec<_>>(), &[0; 4]].concat();
+        let long = |(tag, value): &(u16, u32)| {
+            [&tag.to_le_bytes()[..], &[4, 0], &1u64.to_le_bytes(), &u64::from(*value).to_le_bytes()].concat()
+        };
+        let head = [&b"II+\0\x08\0\0\0"[..], &16u64.to_le_bytes(), &(tags.len() as u64).to_le_bytes()].concat();
+        let big = [head, tags.iter().flat_map(long).collect(), vec![0; 8]].concat();
+        for bytes in [small, big] {
+            assert!(decode(&bytes, WHOLE).is_err() && decode_upright(&bytes, Limits::default()).is_err());
+        }
     }
 
     #[test]
