@@ -48,7 +48,8 @@ pub(super) struct MapperThread {
 }
 
 impl MapperThread {
-    pub(super) fn start(mapper: Mapper, keep: Keep) -> Result<Self, UserError> {
+    pub(super) fn start(mut mapper: Mapper, keep: Keep) -> Result<Self, UserError> {
+        mapper.check_camera();
         let (orders, incoming) = mpsc::unbounded_channel();
         let (outgoing, mapped) = mpsc::channel(4);
         let work = move || Work { mapper, keep, outgoing, is_refusal_reported: false }.run(incoming);

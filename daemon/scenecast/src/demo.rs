@@ -6,7 +6,7 @@ use scenecast_console::{
     snapshot, start,
 };
 use scenecast_core::palette::colour;
-use scenecast_core::{Area, UserError};
+use scenecast_core::{Area, UserError, errln, outln};
 use scenecast_protocol::time::Instant;
 use scenecast_rehearsal::{Mission, Truth};
 use scenecast_runtime::{Stop, block_on, random_bits};
@@ -33,7 +33,7 @@ pub fn run_demo(mission: Mission, speed: f64, port: Option<u16>) -> Result<(), U
         let console = match port {
             Some(port) => {
                 let listener = bind(&format!("127.0.0.1:{port}"), "--port", Vec::new(), "").await?;
-                scenecast_core::outln!("the operator's page is at http://127.0.0.1:{port} (end with Ctrl-C)");
+                outln!("the operator's page is at http://127.0.0.1:{port} (end with Ctrl-C)");
                 Some(start(listener))
             }
             None => None,
@@ -163,7 +163,7 @@ impl Demo {
         let Some(made) = self.truth.take_if(|thread| thread.is_finished()) else { return };
         match made.join() {
             Ok(Ok(truth)) => self.facts.truth = truth.map(|truth| Arc::new(shown(truth))),
-            Ok(Err(error)) => scenecast_core::errln!("scenecast: the page cannot show the true classes: {error}"),
+            Ok(Err(error)) => errln!("scenecast: the page cannot show the true classes: {error}"),
             Err(panic) => std::panic::resume_unwind(panic),
         }
     }

@@ -2,6 +2,7 @@
 
 use clap::Parser;
 use clap::error::ErrorKind;
+use scenecast_core::{errln, out};
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
@@ -9,19 +10,19 @@ fn main() -> ExitCode {
         Ok(arguments) => arguments,
         // Help, version, or the list of commands where none is given.
         Err(e) if !e.use_stderr() => {
-            scenecast_core::out!("{}", e.render());
+            out!("{}", e.render());
             return ExitCode::SUCCESS;
         }
         Err(e) if e.kind() == ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand => e.exit(),
         Err(e) => {
-            scenecast_core::errln!("scenecast: {}", one_line(&e.to_string()));
+            errln!("scenecast: {}", one_line(&e.to_string()));
             return ExitCode::from(2);
         }
     };
     match scenecast::commands::run(arguments) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            scenecast_core::errln!("scenecast: {error}");
+            errln!("scenecast: {error}");
             ExitCode::from(error.exit_code())
         }
     }

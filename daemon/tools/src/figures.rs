@@ -1,6 +1,6 @@
 //! Figures on standard output: lines for people, or JSON for programs.
 
-use scenecast_core::UserError;
+use scenecast_core::{UserError, out, outln};
 use serde::Serialize;
 use serde_json::Value;
 use std::io::IsTerminal;
@@ -11,9 +11,9 @@ pub fn print_figures(figures: &impl Serialize, json: bool) -> Result<(), UserErr
     let failed = |e: serde_json::Error| UserError::Failed(e.to_string());
     if as_json {
         // A struct keeps the order of its members only if it is written at once.
-        scenecast_core::outln!("{}", serde_json::to_string(figures).map_err(failed)?);
+        outln!("{}", serde_json::to_string(figures).map_err(failed)?);
     } else {
-        scenecast_core::out!("{}", lines(&serde_json::to_value(figures).map_err(failed)?));
+        out!("{}", lines(&serde_json::to_value(figures).map_err(failed)?));
     }
     Ok(())
 }

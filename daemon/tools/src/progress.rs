@@ -2,6 +2,7 @@
 
 use clap::ValueEnum;
 use indicatif::{FormattedDuration, ProgressBar, ProgressState, ProgressStyle};
+use scenecast_core::errln;
 use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use std::thread::JoinHandle;
@@ -102,7 +103,7 @@ impl Lines {
             loop {
                 let is_over = ended.recv_timeout(Duration::from_secs(1)) != Err(RecvTimeoutError::Timeout);
                 let share = *shared.lock().unwrap_or_else(PoisonError::into_inner);
-                scenecast_core::errln!("{}", line(task, share, began.elapsed()));
+                errln!("{}", line(task, share, began.elapsed()));
                 if is_over {
                     return;
                 }

@@ -90,7 +90,7 @@ pub struct Mapper {
     pub(super) registrar: Option<Registrar>,
     /// Whether images place the frames; otherwise odometry and compass do.
     pub(super) registers: bool,
-    /// Whether the camera is as configured, by the first frames of this run; `None` once that was told.
+    /// Whether the camera is as configured, by the next frames; `None` unless that is asked, and once it was told.
     pub(super) geometry: Option<GeometryCheck>,
     /// Mission time of the last frame that had a word in the cell, by the cell's x and y, seconds.
     pub(super) last_seen_s: BTreeMap<(i32, i32), f64>,
@@ -161,7 +161,7 @@ impl Mapper {
             relief: Relief::default(),
             registrar: registers.then(|| registrar.clone()),
             registers,
-            geometry: Some(GeometryCheck::default()),
+            geometry: None,
             last_seen_s: BTreeMap::new(),
             refine_words_per_s: f64::from(config.scene.refine_words_per_s),
             frames_per_s: every_frame_or(config.scene.frames_per_s),

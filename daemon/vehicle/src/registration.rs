@@ -4,7 +4,7 @@ use crate::frame::{Frame, Nadir};
 use crate::mapper::Mapper;
 use scene_model::project::Pose;
 use scenecast_protocol::coordinates::MapPoint;
-use scenecast_registration::{CameraImage, FrameInput, Placed, Registrar, Tally};
+use scenecast_registration::{CameraImage, FrameInput, GeometryCheck, Placed, Registrar, Tally};
 
 /// Standard deviation of the position after a gap in dead reckoning, metres.
 const GAP_SIGMA_M: f64 = 3.0;
@@ -88,6 +88,11 @@ impl Mapper {
     /// The vehicle may have moved unmeasured, so that dead reckoning continues at another place.
     pub fn handle_gap(&mut self) {
         self.registrar.iter_mut().for_each(|registrar| registrar.handle_gap(GAP_SIGMA_M));
+    }
+
+    /// The next frames are to show whether the camera is as configured. A simulated one is.
+    pub fn check_camera(&mut self) {
+        self.geometry = Some(GeometryCheck::default());
     }
 
     /// What people should change at the camera, once its first frames and odometry have shown it. It is returned once.

@@ -64,9 +64,16 @@ pub(super) fn geojson(cells: &MapCells, origin: Option<Origin>) -> String {
             "geometry": { "type": "MultiPolygon", "coordinates": polygons.iter().map(rings).collect::<Vec<_>>() },
         })
     };
+    let Rect { x, y, width, height } = cells.rectangle();
+    let (west, south) = (i64::from(x), i64::from(y));
+    let (east, north) = (west + i64::from(width), south + i64::from(height));
+    let corners = [(west, south), (east, south), (west, north), (east, north)];
+    let corners = corners.map(|(column, row)| side_of(cells.corner_m(column, row)));
+    let is_across = corners.iter().any(|side| *side != corners[0]);
     let mut sides: BTreeMap<i64, Vec<(Cell, u8)>> = BTreeMap::new();
     for cell in cells.explored() {
-        sides.entry(side_of((cell.x, cell.y))).or_default().push((cell.cell, cell.label));
+        let side = if is_across { side_of((cell.x, cell.y)) } else { corners[0] };
+        sides.entry(side).or_default().push((cell.cell, cell.label));
     }
     let mut all: BTreeMap<u8, Vec<(i64, Polygon)>> = BTreeMap::new();
     for (side, found) in sides {

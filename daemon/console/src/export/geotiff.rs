@@ -91,8 +91,8 @@ pub(super) fn geotiff(cells: &MapCells, origin: Option<Origin>, reference: Refer
     let raster = raster(cells, origin, reference, &places)?;
     let tiles = touched_tiles(cells, &raster, &places);
     let pixels = |&tile: &(u32, u32)| tile_pixels(cells, &raster, &places, tile);
-    write((&raster, cells.caption.as_ref()), &keys, tiles.iter().map(|tile| (*tile, pixels(tile))))
-        .map_err(|e| e.to_string())
+    let tiles = tiles.iter().map(|tile| (*tile, pixels(tile)));
+    write(&raster, &keys, cells.caption.as_ref(), tiles).map_err(|e| e.to_string())
 }
 
 fn raster(cells: &MapCells, origin: Option<Origin>, reference: Reference, places: &Places) -> Result<Raster, String> {
@@ -260,8 +260,9 @@ impl GeoKeys {
 }
 
 fn write(
-    (raster, caption): (&Raster, Option<&MapCaption>),
+    raster: &Raster,
     keys: &GeoKeys,
+    caption: Option<&MapCaption>,
     tiles: impl Iterator<Item = ((u32, u32), Vec<u8>)>,
 ) -> Result<Vec<u8>, tiff::TiffError> {
     let (columns, rows) = (raster.width.div_ceil(TILE), raster.height.div_ceil(TILE));

@@ -14,13 +14,14 @@ pub(super) const COOKIE: &str = "scenecast-session";
 const OPEN: [&str; 3] = ["/login", "/style.css", "/icon.svg"];
 
 /// The names under which requests may address this machine.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) enum HostNames {
-    /// Names of the loopback addresses, and the configured name if it is not empty, as a proxy on this machine passes it on.
-    Loopback(String),
-    /// Any address, and the configured name if it is not empty. Another name could belong to an attacker, whose DNS
-    /// points it here; an address cannot.
-    Network(String),
+///
+/// Another name could belong to an attacker, whose DNS points it here; an address cannot.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub(super) struct HostNames {
+    /// The configured name, beside those of the loopback addresses; empty without one.
+    pub(super) own: String,
+    /// Whether other machines reach the listener, under any of its addresses.
+    pub(super) is_on_network: bool,
 }
 
 /// Who may use the API.
@@ -116,7 +117,7 @@ mod tests {
         };
         let grants =
             vec![grant("anna", Role::Operator, "0123456789abcdef"), grant("victor", Role::Viewer, "fedcba9876543210")];
-        Access::new(HostNames::Loopback(String::new()), grants)
+        Access::new(HostNames::default(), grants)
     }
 
     fn with(name: header::HeaderName, value: &str) -> HeaderMap {
@@ -141,7 +142,7 @@ mod tests {
 
     #[test]
     fn clients_without_tokens_are_administrators() {
-        let open = Access::new(HostNames::Loopback(String::new()), Vec::new());
+        let open = Access::new(HostNames::default(), Vec::new());
         assert_eq!(open.identify(&HeaderMap::new()).map(|p| p.role()), Some(Role::Administrator));
     }
 

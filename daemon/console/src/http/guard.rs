@@ -106,11 +106,9 @@ fn check(method: &Method, uri: &Uri, headers: &HeaderMap, access: &Access) -> Re
         return Err("the request names one host in its address and another one in Host");
     }
     if !is_ours(host, names) {
-        return Err(match names {
-            HostNames::Loopback(_) => {
-                "this page is served to this machine only; console.host is the name that a proxy on it passes on"
-            }
-            HostNames::Network(_) => "the request must name this page by an address, or by the name in console.host",
+        return Err(match names.is_on_network {
+            true => "the request must name this page by an address, or by the name in console.host",
+            false => "this page is served to this machine only; console.host is the name that a proxy on it passes on",
         });
     }
     if let Some(origin) = text(header::ORIGIN)
@@ -132,11 +130,8 @@ fn is_ours(host: &str, names: &HostNames) -> bool {
     let Some(name) = host_name(host) else { return false };
     let address: Option<IpAddr> = name.parse().ok();
     let is_loopback = name.eq_ignore_ascii_case("localhost") || address.is_some_and(|ip| ip.is_loopback());
-    is_loopback
-        || match names {
-            HostNames::Loopback(own) => !own.is_empty() && name.eq_ignore_ascii_case(own),
-            HostNames::Network(own) => address.is_some() || (!own.is_empty() && name.eq_ignore_ascii_case(own)),
-        }
+    let is_own = !names.own.is_empty() && name.eq_ignore_ascii_case(&names.own);
+    is_loopback || is_own || names.is_on_network && address.is_some()
 }
 
 /// The name or the address in `HOST[:PORT]` (RFC 9110, section 7.2), without the brackets of IPv6.
@@ -168,12 +163,7 @@ mod tests {
         let named = |uri: &'static str, hosts: &[&'static str]| {
             let mut headers = HeaderMap::new();
             headers.extend(hosts.iter().map(|host| (header::HOST, HeaderValue::from_static(host))));
-            check(
-                &Method::GET,
-                &Uri::from_static(uri),
-                &headers,
-                &Access::new(HostNames::Loopback(String::new()), Vec::new()),
-            )
+            check(&Method::GET, &Uri::from_static(uri), &headers, &Access::new(HostNames::default(), Vec::new()))
         };
         assert!(named("http://localhost:1/", &["localhost:1"]).is_ok());
         assert!(named("/", &["localhost:1", "evil.example"]).unwrap_err().contains("several Hosts"));
@@ -182,7 +172,7 @@ mod tests {
     }
 
     fn checked(method: Method, pairs: &[(&'static str, &'static str)]) -> Result<(), &'static str> {
-        checked_with(&HostNames::Loopback(String::new()), method, pairs)
+        checked_with(&HostNames::default(), method, pairs)
     }
 
     #[test]
@@ -205,10 +195,14 @@ mod tests {
         );
     }
 
+    fn on_network(own: &str) -> HostNames {
+        HostNames { own: own.to_owned(), is_on_network: true }
+    }
+
     #[test]
     fn a_page_behind_a_proxy_that_encrypts_gives_orders() {
         let post = |origin: &'static str, origins: &[&str]| {
-            let mut access = Access::new(HostNames::Network("surface.ship".to_owned()), Vec::new());
+            let mut access = Access::new(on_network("surface.ship"), Vec::new());
             access.origins = origins.iter().map(|origin| (*origin).to_owned()).collect();
             let pairs = [("host", "surface.ship"), ("x-scenecast", "1"), ("origin", origin)];
             let headers = pairs.map(|(k, v)| (HeaderName::from_static(k), HeaderValue::from_static(v)));
@@ -224,11 +218,10 @@ mod tests {
 
     #[test]
     fn on_a_network_a_request_names_an_address_or_our_name() {
-        let admits =
-            |own: &str, host| checked_with(&HostNames::Network(own.to_owned()), Method::GET, &[("host", host)]).is_ok();
+        let admits = |own: &str, host| checked_with(&on_network(own), Method::GET, &[("host", host)]).is_ok();
         assert!(admits("", "192.168.1.7:8460") && admits("", "[fe80::1]:8460") && admits("", "localhost"));
         assert!(!admits("", "evil.example") && !admits("", ":8460"));
-        let behind_proxy = HostNames::Loopback("surface.ship".to_owned());
+        let behind_proxy = HostNames { own: "surface.ship".to_owned(), is_on_network: false };
         assert!(checked_with(&behind_proxy, Method::GET, &[("host", "surface.ship")]).is_ok());
         assert!(checked_with(&behind_proxy, Method::GET, &[("host", "192.168.1.7:8460")]).is_err());
         assert!(admits("surface.ship", "Surface.Ship:8460") && !admits("surface.ship", "evil.example"));

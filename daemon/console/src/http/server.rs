@@ -55,7 +55,7 @@ pub async fn bind(
              written by scenecast key token, or listen on a loopback address such as 127.0.0.1:8460"
         )));
     }
-    let names = if is_loopback { HostNames::Loopback(name.to_owned()) } else { HostNames::Network(name.to_owned()) };
+    let names = HostNames { own: name.to_owned(), is_on_network: !is_loopback };
     let listener = TcpListener::bind(address)
         .await
         .map_err(|e| UserError::Input(format!("cannot listen on {address}: {e}; choose another port with {option}")))?;

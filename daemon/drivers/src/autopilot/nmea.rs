@@ -109,17 +109,15 @@ impl Nmea {
     }
 
     /// DBS, from the surface to the sea floor, and DBT: feet, f, metres, M, fathoms, F. DPT: metres, offset of the transducer.
-    fn handle_sounding(&mut self, line: &[u8], now: Instant) -> Option<()> {
-        let fields = nmea::fields(line).ok()?;
+    fn handle_sounding(&mut self, fields: &[&str], now: Instant) {
         let metres = |index: usize| fields.get(index)?.parse::<f64>().ok().filter(|m| (0.0..12_000.0).contains(m));
-        match fields.first()?.get(2..)? {
+        match fields.first().and_then(|field| field.get(2..)).unwrap_or_default() {
             "DBS" => self.water_depth = metres(3).filter(|m| *m > 0.0).map(|m| (m, now)),
             // Sounders without a bottom send 0 or nothing.
             "DBT" => self.height = metres(3).filter(|m| *m > 0.0).map(|m| (m, now)),
             "DPT" => self.height = metres(1).filter(|m| *m > 0.0).map(|m| (m, now)),
             _ => {}
         }
-        Some(())
     }
 }
 
@@ -134,14 +132,12 @@ impl Autopilot for Nmea {
         let mut lines = Vec::new();
         self.lines.push(bytes, |line| lines.push(line.to_vec()));
         for line in lines {
-            for sentence in nmea::sentences(&line) {
-                let _ = self.handle_sounding(sentence, now);
-                if nmea::fields(sentence).is_ok() {
-                    if self.heard.is_none() || self.was_silent {
-                        self.tray.note("the autopilot answers");
-                    }
-                    (self.heard, self.was_silent) = (Some(now), false);
+            for fields in nmea::sentences(&line).filter_map(|sentence| nmea::fields(sentence).ok()) {
+                self.handle_sounding(&fields, now);
+                if self.heard.is_none() || self.was_silent {
+                    self.tray.note("the autopilot answers");
                 }
+                (self.heard, self.was_silent) = (Some(now), false);
             }
             for fix in self.gps.handle_bytes(&[&line[..], b"\n"].concat(), now) {
                 self.handle_place_of_vehicle(fix.place, now);

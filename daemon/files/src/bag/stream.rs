@@ -45,8 +45,8 @@ impl BagStream {
             let mut head = Vec::new();
             let mut opened = scenecast_config::open_regular(file, u64::MAX)?.take(16);
             opened.read_to_end(&mut head).map_err(|e| UserError::file(file, e))?;
-            if let Some(other) = OtherFormat::of(&head) {
-                return Err(UserError::file(file, other.advice()));
+            if let Some(other) = OTHER_FORMATS.iter().find(|other| head.starts_with(other.magic)) {
+                return Err(UserError::file(file, other.advice));
             }
         }
         Ok(Self { rest: files.into_iter(), open: None, schemas: BTreeMap::new(), channels: BTreeMap::new() })
@@ -118,43 +118,32 @@ fn unpacked(bytes: Vec<u8>) -> Result<Vec<u8>, String> {
 const MAX_MESSAGE_BYTES: usize = 256 << 20;
 const ZSTD: &[u8] = b"\x28\xB5\x2F\xFD";
 
-/// Recordings that are no MCAP file.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum OtherFormat {
-    Sqlite,
-    Ros1,
-    Zstd,
-}
-
-impl OtherFormat {
-    /// The format of a file by its first bytes.
-    fn of(head: &[u8]) -> Option<Self> {
-        let magics = [(&b"SQLite format 3"[..], Self::Sqlite), (b"#ROSBAG V2", Self::Ros1), (ZSTD, Self::Zstd)];
-        magics.into_iter().find(|(magic, _)| head.starts_with(magic)).map(|(_, format)| format)
-    }
-
-    /// The format of a file by its name.
-    fn named(path: &Path) -> Option<Self> {
-        match path.extension()?.to_str()? {
-            "db3" => Some(Self::Sqlite),
-            "bag" => Some(Self::Ros1),
-            "zstd" | "zst" => Some(Self::Zstd),
-            _ => None,
-        }
-    }
-
+/// A kind of recordings that are no MCAP file.
+struct OtherFormat {
+    magic: &'static [u8],
+    extensions: &'static [&'static str],
     /// What it is, and the command that converts it.
-    fn advice(self) -> &'static str {
-        match self {
-            Self::Sqlite => {
-                "it is a bag in SQLite (.db3), and MCAP is read: ros2 bag convert -i BAG -o OPTIONS.yaml converts it, where OPTIONS.yaml is \
-                 output_bags: [{uri: NEW, storage_id: mcap, all_topics: true}]"
-            }
-            Self::Ros1 => "it is a bag of ROS 1, and MCAP is read: mcap convert OLD.bag NEW.mcap converts it",
-            Self::Zstd => "it is compressed as a whole: zstd -d *.zstd unpacks it",
-        }
-    }
+    advice: &'static str,
 }
+
+const OTHER_FORMATS: [OtherFormat; 3] = [
+    OtherFormat {
+        magic: b"SQLite format 3",
+        extensions: &["db3"],
+        advice: "it is a bag in SQLite (.db3), and MCAP is read: ros2 bag convert -i BAG -o OPTIONS.yaml converts it, where OPTIONS.yaml is \
+                 output_bags: [{uri: NEW, storage_id: mcap, all_topics: true}]",
+    },
+    OtherFormat {
+        magic: b"#ROSBAG V2",
+        extensions: &["bag"],
+        advice: "it is a bag of ROS 1, and MCAP is read: mcap convert OLD.bag NEW.mcap converts it",
+    },
+    OtherFormat {
+        magic: ZSTD,
+        extensions: &["zstd", "zst"],
+        advice: "it is compressed as a whole: zstd -d *.zstd unpacks it",
+    },
+];
 
 fn reader() -> LinearReader {
     // A recorder without power leaves a file without its end; chunks that are whole are read.
@@ -168,11 +157,12 @@ fn reader() -> LinearReader {
 fn files_of(dir: &Path) -> Result<Vec<PathBuf>, UserError> {
     let entries = std::fs::read_dir(dir).map_err(|e| UserError::file(dir, e))?;
     let paths: Vec<PathBuf> = entries.filter_map(|entry| Some(entry.ok()?.path())).collect();
-    let other = paths.iter().find_map(|path| OtherFormat::named(path));
-    let mut files: Vec<PathBuf> =
-        paths.into_iter().filter(|path| path.extension().is_some_and(|e| e == "mcap")).collect();
+    let ends_in = |path: &PathBuf, extension: &str| path.extension().is_some_and(|e| e == extension);
+    let mut files: Vec<PathBuf> = paths.iter().filter(|path| ends_in(path, "mcap")).cloned().collect();
     if files.is_empty() {
-        return Err(UserError::file(dir, other.map_or("the folder has no file *.mcap", OtherFormat::advice)));
+        let is_there = |extension: &&str| paths.iter().any(|path| ends_in(path, extension));
+        let other = OTHER_FORMATS.iter().find(|other| other.extensions.iter().any(is_there));
+        return Err(UserError::file(dir, other.map_or("the folder has no file *.mcap", |other| other.advice)));
     }
     // The files of a split bag end in _0, _1, ..., _10.
     files.sort_by_key(|path| (path.as_os_str().len(), path.clone()));

@@ -120,6 +120,9 @@ impl Mission {
             anchored,
             carrier,
         };
+        if mission.camera.is_recorded() {
+            mission.mapper.check_camera();
+        }
         mission.place_vehicle();
         mission.pump();
         Ok(mission)

@@ -1,7 +1,7 @@
 //! `scenecast config`
 
 use clap::{Args, ValueEnum};
-use scenecast_core::UserError;
+use scenecast_core::{UserError, out};
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
 enum ReaderRole {
@@ -33,11 +33,11 @@ pub(super) struct ConfigCommand {
 impl ConfigCommand {
     pub(super) fn run(self) -> Result<(), UserError> {
         if self.reference {
-            scenecast_core::out!("{}", scenecast_config::reference());
+            out!("{}", scenecast_config::reference());
         } else if self.schema {
-            scenecast_core::out!("{}", scenecast_config::schema());
+            out!("{}", scenecast_config::schema());
         } else {
-            scenecast_core::out!("{}", scenecast_config::print(self.role.into()));
+            out!("{}", scenecast_config::print(self.role.into()));
         }
         Ok(())
     }

@@ -1,7 +1,7 @@
 //! `scenecast key`
 
 use clap::{Args, Subcommand};
-use scenecast_core::{Principal, Role, UserError};
+use scenecast_core::{Principal, Role, UserError, errln, outln};
 use scenecast_protocol::seal::{HeldKey, KeyFile, MissionKey, VehicleKey};
 use std::fs::OpenOptions;
 use std::io::{ErrorKind, Write};
@@ -104,21 +104,19 @@ impl Key {
             Self::New(new) => {
                 let key = random_key()?;
                 write_new(&new.out, &key.to_text())?;
-                scenecast_core::outln!("{}: mission, fingerprint {:08x}", new.out.display(), key.fingerprint());
-                scenecast_core::outln!(
-                    "Set link.key_file of the surface to its path. For each vehicle, write a key of its own:"
-                );
-                scenecast_core::outln!("scenecast key derive {} --vehicle 1", new.out.display());
+                outln!("{}: mission, fingerprint {:08x}", new.out.display(), key.fingerprint());
+                outln!("Set link.key_file of the surface to its path. For each vehicle, write a key of its own:");
+                outln!("scenecast key derive {} --vehicle 1", new.out.display());
             }
             Self::Token(token) => {
                 let line = token_line(token.role.zip(token.name.as_deref()), &random_token()?)?;
                 write_new(&token.out, &line)?;
-                scenecast_core::outln!("{}: a new token", token.out.display());
+                outln!("{}: a new token", token.out.display());
                 match token.name {
-                    None => scenecast_core::outln!(
+                    None => outln!(
                         "Set console.token_file of the surface to its path, and give a copy to those who may give orders."
                     ),
-                    Some(name) => scenecast_core::outln!(
+                    Some(name) => outln!(
                         "Append its line to the file in console.token_file of the surface, and give the file to {name}."
                     ),
                 }
@@ -128,8 +126,8 @@ impl Key {
                 let key = VehicleKey::derive(&mission, derive.vehicle);
                 let out = derive.out.unwrap_or_else(|| format!("auv-{}.key", derive.vehicle).into());
                 write_new(&out, &key.to_text())?;
-                scenecast_core::outln!("{}: vehicle {}, fingerprint {:08x}", out.display(), key.address, key.mission);
-                scenecast_core::outln!("Copy the file to the vehicle, and set its link.key_file to the path.");
+                outln!("{}: vehicle {}, fingerprint {:08x}", out.display(), key.address, key.mission);
+                outln!("Copy the file to the vehicle, and set its link.key_file to the path.");
             }
             Self::Rotate(rotate) => rotate.run()?,
             Self::Show(show) => {
@@ -138,16 +136,12 @@ impl Key {
                     HeldKey::Mission(_) => "mission".to_owned(),
                     HeldKey::Vehicle(key) => format!("vehicle {}", key.address),
                 };
-                scenecast_core::outln!("{}: {of}, fingerprint {:08x}", show.file.display(), key.fingerprint());
+                outln!("{}: {of}, fingerprint {:08x}", show.file.display(), key.fingerprint());
                 if let Some(next) = next {
-                    scenecast_core::outln!(
-                        "{}: next key of the mission, fingerprint {:08x}",
-                        show.file.display(),
-                        next.fingerprint()
-                    );
+                    outln!("{}: next key of the mission, fingerprint {:08x}", show.file.display(), next.fingerprint());
                 }
                 if let Some(warning) = warning {
-                    scenecast_core::errln!("scenecast: {warning}");
+                    errln!("scenecast: {warning}");
                 }
             }
         }
@@ -163,19 +157,19 @@ impl Rotate {
             (None, false) => {
                 let next = random_key()?;
                 replace(path, &Zeroizing::new([present.to_text().as_str(), next.to_next_text().as_str()].concat()))?;
-                scenecast_core::outln!("{}: next key, fingerprint {:08x}", path.display(), next.fingerprint());
-                scenecast_core::outln!(
+                outln!("{}: next key, fingerprint {:08x}", path.display(), next.fingerprint());
+                outln!(
                     "Restart the surface: it gives each vehicle that it hears its own. When its log names every vehicle:"
                 );
-                scenecast_core::outln!("scenecast key rotate {} --finish", path.display());
+                outln!("scenecast key rotate {} --finish", path.display());
             }
             (Some(next), true) => {
                 replace(path, &next.to_text())?;
-                scenecast_core::outln!("{}: mission, fingerprint {:08x}", path.display(), next.fingerprint());
-                scenecast_core::outln!(
+                outln!("{}: mission, fingerprint {:08x}", path.display(), next.fingerprint());
+                outln!(
                     "Restart the surface. A vehicle that loses its state folder falls back to its key file: write it a new one in time:"
                 );
-                scenecast_core::outln!("scenecast key derive {} --vehicle 1", path.display());
+                outln!("scenecast key derive {} --vehicle 1", path.display());
             }
             (Some(next), false) => {
                 let fingerprint = next.fingerprint();

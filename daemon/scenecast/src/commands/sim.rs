@@ -2,7 +2,7 @@
 
 use clap::Args;
 use scenecast_config::Config;
-use scenecast_core::UserError;
+use scenecast_core::{UserError, errln, outln};
 use scenecast_rehearsal::{Mission, MissionOptions, World, report, write_outputs};
 use scenecast_tools::Progress;
 use serde_json::json;
@@ -110,15 +110,15 @@ impl Sim {
         mission.run(Duration::from_secs_f64(self.drain), &mut |share| progress.show(share))?;
         drop(progress);
         for refused in mission.refused_labels() {
-            scenecast_core::errln!("refused: {refused}");
+            errln!("refused: {refused}");
         }
-        mission.notes().for_each(|note| scenecast_core::errln!("{note}"));
+        mission.notes().for_each(|note| errln!("{note}"));
         let report = report(&mission, &self.world.scenario_name());
         let seconds = started.elapsed().as_secs_f64();
         let speedup = mission.now().as_secs_f64() / seconds;
         write_outputs(&mission, &report, json!({ "seconds": seconds, "speedup": speedup }), &self.out)?;
         if self.json {
-            scenecast_core::outln!("{}", report.json);
+            outln!("{}", report.json);
             return Ok(());
         }
         let map = &report.json["map"];
@@ -128,7 +128,7 @@ impl Sim {
             (Some(joules), None) => format!("{joules:.1} J up, "),
             _ => String::new(),
         };
-        scenecast_core::outln!(
+        outln!(
             "{}: {} cells, {} labels, agreement {} at the end, {} on the mean, {energy}{seconds:.1} s",
             self.out.join("report.json").display(),
             report.json["scene"]["cells"],

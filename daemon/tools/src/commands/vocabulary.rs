@@ -5,7 +5,7 @@ use crate::progress::Progress;
 use clap::{Args, Subcommand};
 use image::RgbImage;
 use scene_model::words::{Measures, WordConfig, WordExtractor};
-use scenecast_core::UserError;
+use scenecast_core::{UserError, errln, outln};
 use scenecast_files::read_image;
 use scenecast_files::write_whole;
 use scenecast_scoring::{ClassStatistics, MIN_CLASS_CELLS, train_vocabulary};
@@ -76,7 +76,7 @@ impl Train {
         if let Some(dir) = &self.annotations {
             let (statistics, images) = self.statistics(dir)?;
             for (class, cells) in statistics.rare_classes() {
-                scenecast_core::errln!(
+                errln!(
                     "scenecast: class {class} is left out: {cells} annotated cells, at least {MIN_CLASS_CELLS} are needed"
                 );
             }
@@ -85,12 +85,7 @@ impl Train {
             sources.push(format!("{images} annotated images with {} classes", statistics.usable_classes()));
         }
         write_whole(&self.out, &scene_model::vocabulary::save(&measures))?;
-        scenecast_core::outln!(
-            "{}: {} words from {}",
-            self.out.display(),
-            measures.vocabulary_size(),
-            sources.join(" and ")
-        );
+        outln!("{}: {} words from {}", self.out.display(), measures.vocabulary_size(), sources.join(" and "));
         Ok(())
     }
 

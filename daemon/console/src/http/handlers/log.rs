@@ -53,7 +53,7 @@ async fn lines(shared: &Shared, filter: LogQuery) -> Result<Vec<LogLine>, Respon
         Reply::Log(entries) => entries,
         other => return Err(respond(other)),
     };
-    let utc_of = |at_s: f64| utc_of(&shared.snapshots.borrow().state, at_s);
+    let utc = MissionUtc::now(&shared.snapshots.borrow().state);
     let is_wanted = |entry: &&LogEntry| {
         filter.vehicle.is_none_or(|vehicle| entry.vehicle.is_some_and(|v| v.number() == vehicle))
             && filter.kind.as_ref().is_none_or(|kind| entry.kind.name() == kind)
@@ -64,7 +64,7 @@ async fn lines(shared: &Shared, filter: LogQuery) -> Result<Vec<LogLine>, Respon
         LogLine {
             number: entry.number,
             at_s,
-            utc: utc_of(at_s),
+            utc: utc.at(at_s),
             vehicle: entry.vehicle.map(|v| v.number()),
             kind: entry.kind.name().to_owned(),
             by: entry.by.clone(),
@@ -90,10 +90,24 @@ fn harmless(text: &str) -> String {
     if text.starts_with(['=', '+', '-', '@']) { format!("'{text}") } else { text.to_owned() }
 }
 
-/// A moment of the mission in UTC, as in RFC 3339, by the clock of this computer.
-pub(in crate::http) fn utc_of(state: &MissionState, at_s: f64) -> String {
-    let unix_s = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_secs_f64();
-    utc(unix_s - (state.now_s - at_s) / state.mission.speed.max(1e-3))
+/// Moments of the mission in UTC, by the clock of this computer.
+pub(in crate::http) struct MissionUtc {
+    unix_s: f64,
+    /// Mission time, seconds, and seconds of it for each second of the clock.
+    now_s: f64,
+    speed: f64,
+}
+
+impl MissionUtc {
+    pub(in crate::http) fn now(state: &MissionState) -> Self {
+        let unix_s = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_secs_f64();
+        Self { unix_s, now_s: state.now_s, speed: state.mission.speed.max(1e-3) }
+    }
+
+    /// A mission time in seconds, as in RFC 3339.
+    pub(in crate::http) fn at(&self, at_s: f64) -> String {
+        utc(self.unix_s - (self.now_s - at_s) / self.speed)
+    }
 }
 
 /// Seconds since 1970 as in RFC 3339, in whole seconds. The date: H. Hinnant, "chrono-compatible low-level date

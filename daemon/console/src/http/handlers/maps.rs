@@ -1,7 +1,7 @@
 //! Maps. Each version is requested from the surface once, however many clients read it, and everything is made of it beside the
 //! link.
 
-use super::log::utc_of;
+use super::log::MissionUtc;
 use crate::export::{MapCaption, MapCells, MapFormat};
 use crate::http::compress::{accepts_gzip, gzip, tagged};
 use crate::http::response::{error, respond};
@@ -193,7 +193,7 @@ pub(in crate::http) async fn file(
         let names: BTreeMap<u8, String> = labels.filter_map(|l| Some((l.id, l.name.clone()?))).collect();
         let tree = vehicle.and_then(|v| v.label_tree.as_ref()).and_then(MapLabelTree::tree);
         let markers = vehicle.map(|v| v.markers.clone()).unwrap_or_default();
-        let caption = MapCaption { vehicle: id, utc: utc_of(&snapshot.state, seconds(at)) };
+        let caption = MapCaption { vehicle: id, utc: MissionUtc::now(&snapshot.state).at(seconds(at)) };
         let placement = vehicle.and_then(|v| v.map.placement.clone());
         (snapshot.state.mission.origin, placement, names, tree, markers, Some(caption))
     };

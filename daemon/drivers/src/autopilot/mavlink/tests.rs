@@ -11,8 +11,12 @@ fn pilot(arms: bool) -> Mavlink {
     Mavlink::new(MavlinkConfig { system: 1, component: None, arms, silence: Duration::from_secs(5) }, at(0.0))
 }
 
+fn frame_of(system: u8, component: u8, id: u32, payload: Vec<u8>) -> Vec<u8> {
+    encode(&Frame { system, component, id, payload }, 0, heard_extra(id).unwrap())
+}
+
 fn frame(system: u8, id: u32, payload: Vec<u8>) -> Vec<u8> {
-    encode(&Frame { system, component: 1, id, payload }, 0, heard_extra(id).unwrap())
+    frame_of(system, 1, id, payload)
 }
 
 fn heartbeat(mode: u32, armed: bool) -> Vec<u8> {
@@ -23,6 +27,12 @@ fn heartbeat(mode: u32, armed: bool) -> Vec<u8> {
 fn local(ms: u32, place: [f32; 3], velocity: [f32; 3]) -> Vec<u8> {
     let floats = place.into_iter().chain(velocity).flat_map(f32::to_le_bytes);
     frame(1, 32, ms.to_le_bytes().into_iter().chain(floats).collect())
+}
+
+/// A position on the Earth without velocity and heading.
+fn global(ms: i32, depth_mm: i32) -> Vec<u8> {
+    let fields: Vec<u8> = [ms, 295_000_000, 349_200_000, 0, -depth_mm].iter().flat_map(|v| v.to_le_bytes()).collect();
+    frame(1, 33, [&fields[..], &[0, 0, 0, 0, 0, 0, 0xFF, 0xFF]].concat())
 }
 
 /// Everything that was sent, as message number and payload.
@@ -158,8 +168,7 @@ fn an_autopilot_with_global_positions_only_is_steered() {
     let mut pilot = pilot(false);
     pilot.set_goal(Some(Goal { east_m: 0.0, north_m: 100.0, depth_m: None, place: None }), at(0.0));
     pilot.handle_bytes(&heartbeat(4, true), at(0.0));
-    let global: Vec<u8> = [1000i32, 295_000_000, 349_200_000, 0, -3000].iter().flat_map(|v| v.to_le_bytes()).collect();
-    pilot.handle_bytes(&frame(1, 33, [&global[..], &[0, 0, 0, 0, 0, 0, 0xFF, 0xFF]].concat()), at(0.0));
+    pilot.handle_bytes(&global(1000, 3000), at(0.0));
     pilot.handle_timeout(at(0.0));
     let said = sent(&mut pilot);
     let (_, target) = said.iter().find(|(id, _)| *id == 86).unwrap();
@@ -201,7 +210,7 @@ fn notes(pilot: &mut Mavlink) -> Vec<String> {
 
 /// A message of another component of the autopilot's system.
 fn of_component(component: u8, id: u32, payload: Vec<u8>) -> Vec<u8> {
-    encode(&Frame { system: 1, component, id, payload }, 0, heard_extra(id).unwrap())
+    frame_of(1, component, id, payload)
 }
 
 #[test]
@@ -280,11 +289,6 @@ fn an_hour_of_a_real_robot_is_followed_with_few_lines_for_people() {
 #[test]
 fn a_depth_that_jumps_does_not_reach_the_vehicle() {
     let mut pilot = pilot(false);
-    let global = |ms: i32, depth_mm: i32| {
-        let fields: Vec<u8> =
-            [ms, 295_000_000, 349_200_000, 0, -depth_mm].iter().flat_map(|v| v.to_le_bytes()).collect();
-        frame(1, 33, [&fields[..], &[0, 0, 0, 0, 0, 0, 0xFF, 0xFF]].concat())
-    };
     for tenth in 0..40 {
         let now = at(f64::from(tenth) / 10.0);
         pilot.handle_bytes(&heartbeat(4, true), now);
@@ -300,11 +304,6 @@ fn a_depth_that_jumps_does_not_reach_the_vehicle() {
 fn targets_follow_a_zero_of_depths_that_has_moved() {
     let mut pilot = pilot(false);
     pilot.set_goal(GOAL, at(0.0));
-    let global = |ms: i32, depth_mm: i32| {
-        let fields: Vec<u8> =
-            [ms, 295_000_000, 349_200_000, 0, -depth_mm].iter().flat_map(|v| v.to_le_bytes()).collect();
-        frame(1, 33, [&fields[..], &[0, 0, 0, 0, 0, 0, 0xFF, 0xFF]].concat())
-    };
     let mut depths = Vec::new();
     for tenth in 0..300 {
         let now = at(f64::from(tenth) / 10.0);
@@ -357,9 +356,7 @@ fn targets_and_distances_in_degrees_are_compared_too() {
             pilot.handle_bytes(&heartbeat(4, true), now);
             pilot.handle_bytes(&local(1000 * s as u32, [500.0, 0.0, 4.0], [0.0; 3]), now);
             let lon = 349_200_000i32;
-            let global: Vec<u8> =
-                [1000 * s, 295_000_000i32, lon, 0, -4000].iter().flat_map(|v| v.to_le_bytes()).collect();
-            pilot.handle_bytes(&frame(1, 33, [&global[..], &[0, 0, 0, 0, 0, 0, 0xFF, 0xFF]].concat()), now);
+            pilot.handle_bytes(&global(1000 * s, 4000), now);
             // 10 m to the east are 10 / 96 995 degrees there.
             let told_lon = if is_refused { lon } else { lon + 1031 };
             let told: Vec<u8> = [0, 295_000_000, told_lon].iter().flat_map(|v: &i32| v.to_le_bytes()).collect();

@@ -2,7 +2,7 @@
 
 use crate::commands::sim::WorldArguments;
 use clap::Args;
-use scenecast_core::UserError;
+use scenecast_core::{UserError, outln};
 use scenecast_files::write_whole;
 use scenecast_rehearsal::{FidelityRow, fidelity, fidelity_panels, quality_plot};
 use std::path::PathBuf;
@@ -43,7 +43,7 @@ impl FidelityBench {
         })?;
         if self.json {
             let text = serde_json::to_string_pretty(&rows).map_err(|e| UserError::Failed(e.to_string()))?;
-            scenecast_core::outln!("{text}");
+            outln!("{text}");
         }
         if let Some(dir) = &self.out {
             std::fs::create_dir_all(dir).map_err(|e| UserError::file(dir, e))?;
@@ -56,20 +56,20 @@ impl FidelityBench {
 }
 
 fn print_head() {
-    scenecast_core::outln!(
+    outln!(
         "Mutual information over the survey's area at its end, nats: rigid and placed. Share: operator's by vehicle's."
     );
-    scenecast_core::outln!(
+    outln!(
         "Bytes up: all, of the map, and the shares of the map and of its frames. Error: of registration, cells rms."
     );
-    scenecast_core::outln!(
+    outln!(
         "Copies: of the vehicle's frames, and how many frames arrived twice. Energy: of its modem, J and mJ a map bit."
     );
-    scenecast_core::outln!();
-    scenecast_core::outln!(
+    outln!();
+    outln!(
         "                      vehicle         operator       share            age s         bytes up                          copies        energy"
     );
-    scenecast_core::outln!(
+    outln!(
         "budget stream      rigid placed   rigid placed    end  mean  agree   p50   p95    all    map   map frames  error   sent twice      J    mJ"
     );
 }
@@ -77,7 +77,7 @@ fn print_head() {
 fn print_row(r: &FidelityRow) {
     let number = |value: Option<f64>| value.map_or("-".to_owned(), |v| format!("{v:.3}"));
     let (vehicle, operator) = (r.end.vehicle, r.end.operator);
-    scenecast_core::outln!(
+    outln!(
         "{:>6} {:<10} {:>6} {:>6} {:>7} {:>6} {:>6} {:>5} {:>6.3} {:>5.0} {:>5.0} {:>6} {:>6} {:>5.3} {:>6.3} {:>6} {:>6} {:>5} {:>6} {:>5}",
         r.budget_bps,
         r.stream,

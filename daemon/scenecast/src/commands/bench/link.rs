@@ -1,7 +1,7 @@
 //! `scenecast bench link`
 
 use clap::Args;
-use scenecast_core::UserError;
+use scenecast_core::{UserError, outln};
 use scenecast_rehearsal::link_bench::{BudgetRow, FleetRow, LinkRow, LinkTable, RangingRow, link_table, measure_speed};
 use scenecast_tools::Progress;
 
@@ -24,7 +24,7 @@ impl LinkBench {
         let table = link_table(self.seed, &mut |share| progress.show(share)).map_err(failed)?;
         drop(progress);
         if self.json {
-            scenecast_core::outln!("{}", serde_json::to_string_pretty(&table).map_err(failed)?);
+            outln!("{}", serde_json::to_string_pretty(&table).map_err(failed)?);
             return Ok(());
         }
         print_table(&table);
@@ -38,33 +38,31 @@ fn failed(error: impl std::fmt::Display) -> UserError {
 }
 
 fn print_table(table: &LinkTable) {
-    scenecast_core::outln!(
+    outln!(
         "Seed {}. efficiency: useful payload / (bit rate x (1 - loss)); directive: issue to applied; known: issue to",
         table.seed
     );
-    scenecast_core::outln!(
-        "known at the surface; converge: last change to equal maps, within: share of stops that kept the bound."
-    );
-    scenecast_core::outln!();
-    scenecast_core::outln!("range frame pattern     loss  effi-     directive  known converge          budget    re-");
-    scenecast_core::outln!("   km bytes                % ciency med. s  p95 s  p95 s    p95 s  within    used  syncs");
+    outln!("known at the surface; converge: last change to equal maps, within: share of stops that kept the bound.");
+    outln!();
+    outln!("range frame pattern     loss  effi-     directive  known converge          budget    re-");
+    outln!("   km bytes                % ciency med. s  p95 s  p95 s    p95 s  within    used  syncs");
     table.rows.iter().for_each(print_row);
-    scenecast_core::outln!();
-    scenecast_core::outln!("A budget that binds: efficiency against the vehicle's budget.");
-    scenecast_core::outln!("range frame loss  budget  effi-   budget");
-    scenecast_core::outln!("   km bytes    %   bit/s  ciency    used");
+    outln!();
+    outln!("A budget that binds: efficiency against the vehicle's budget.");
+    outln!("range frame loss  budget  effi-   budget");
+    outln!("   km bytes    %   bit/s  ciency    used");
     table.budgets.iter().for_each(print_budget);
-    scenecast_core::outln!();
-    scenecast_core::outln!("A fix each 10 s.");
-    scenecast_core::outln!("range frame loss  efficiency         cost  error round trip  one way");
-    scenecast_core::outln!("   km bytes    %  without    with       %                ms       ms");
+    outln!();
+    outln!("A fix each 10 s.");
+    outln!("range frame loss  efficiency         cost  error round trip  one way");
+    outln!("   km bytes    %  without    with       %                ms       ms");
     table.ranging.iter().for_each(print_ranging);
-    scenecast_core::outln!();
+    outln!();
     print_fleet(&table.fleet);
 }
 
 fn print_row(r: &LinkRow) {
-    scenecast_core::outln!(
+    outln!(
         "{:>5} {:>5} {:<11} {:>4.0} {:>6.3} {:>6.1} {:>6.1} {:>6.1} {:>8.1} {:>7.2} {:>7.2} {:>6}",
         r.range_km,
         r.frame_bytes,
@@ -83,7 +81,7 @@ fn print_row(r: &LinkRow) {
 
 fn print_budget(r: &BudgetRow) {
     let percent = r.loss * 100.0;
-    scenecast_core::outln!(
+    outln!(
         "{:>5} {:>5} {percent:>4.0} {:>7} {:>7.3} {:>7.2}",
         r.range_km,
         r.frame_bytes,
@@ -94,7 +92,7 @@ fn print_budget(r: &BudgetRow) {
 }
 
 fn print_ranging(r: &RangingRow) {
-    scenecast_core::outln!(
+    outln!(
         "{:>5} {:>5} {:>4.0} {:>8.3} {:>7.3} {:>7.1} {:>17.1} {:>8.1}",
         r.range_km,
         r.frame_bytes,
@@ -108,7 +106,7 @@ fn print_ranging(r: &RangingRow) {
 }
 
 fn print_fleet(f: &FleetRow) {
-    scenecast_core::outln!(
+    outln!(
         "{} vehicles at {} km, {} bytes, {:.0} % loss: all known after {:.0} s; oldest map {:.0} s = {:.2} fair shares of",
         f.vehicles,
         f.range_km,
@@ -118,13 +116,13 @@ fn print_fleet(f: &FleetRow) {
         f.max_age_s,
         f.max_age_shares
     );
-    scenecast_core::outln!("{:.0} s; efficiency {:.3}, budget used {:.2}.", f.fair_share_s, f.efficiency, f.budget_use);
+    outln!("{:.0} s; efficiency {:.3}, budget used {:.2}.", f.fair_share_s, f.efficiency, f.budget_use);
 }
 
 fn print_speed() {
     let speed = measure_speed();
-    scenecast_core::outln!();
-    scenecast_core::outln!(
+    outln!();
+    outln!(
         "This machine, one core: {:.0} frames/s of 64 bytes and {:.0} of 256, both ends; a saturated hour of 64-byte frames, \
          channel included, in {:.2} s.",
         speed.small_frames_per_s,

@@ -1,7 +1,7 @@
 //! `scenecast bench modem`
 
 use clap::Args;
-use scenecast_core::UserError;
+use scenecast_core::{UserError, outln};
 use scenecast_rehearsal::modem_bench::{ModemTable, modem_table};
 use scenecast_tools::Progress;
 
@@ -26,7 +26,7 @@ impl ModemBench {
         drop(progress);
         if self.json {
             let text = serde_json::to_string_pretty(&table).map_err(|e| UserError::Failed(e.to_string()))?;
-            scenecast_core::outln!("{text}");
+            outln!("{text}");
         } else {
             print_table(&table);
         }
@@ -36,24 +36,18 @@ impl ModemBench {
 
 fn print_table(table: &ModemTable) {
     let b = &table.burst;
-    scenecast_core::outln!("S2C in burst mode, {:.0} m, {:.0} % loss, seed {}:", b.range_m, b.loss * 100.0, table.seed);
-    scenecast_core::outln!("  raw pusher      {:>7.0} bit/s", b.raw_bps);
-    scenecast_core::outln!("  useful at map   {:>7.0} bit/s, {:.3} of it", b.useful_bps, b.share);
-    scenecast_core::outln!(
+    outln!("S2C in burst mode, {:.0} m, {:.0} % loss, seed {}:", b.range_m, b.loss * 100.0, table.seed);
+    outln!("  raw pusher      {:>7.0} bit/s", b.raw_bps);
+    outln!("  useful at map   {:>7.0} bit/s, {:.3} of it", b.useful_bps, b.share);
+    outln!(
         "  directive       {:>7.1} s median, {:.1} s p95, issue to applied, bulk queue full",
         b.directive_median_s,
         b.directive_p95_s
     );
-    scenecast_core::outln!("  budget used     {:>7.3} in the fullest window", b.budget_use);
-    scenecast_core::outln!();
-    scenecast_core::outln!("survey through                 agreement mean   final  drain s");
+    outln!("  budget used     {:>7.3} in the fullest window", b.budget_use);
+    outln!();
+    outln!("survey through                 agreement mean   final  drain s");
     for row in &table.surveys {
-        scenecast_core::outln!(
-            "{:<30} {:>14.4} {:>7.4} {:>8.0}",
-            row.modem,
-            row.agreement_mean,
-            row.agreement_final,
-            row.drain_s
-        );
+        outln!("{:<30} {:>14.4} {:>7.4} {:>8.0}", row.modem, row.agreement_mean, row.agreement_final, row.drain_s);
     }
 }

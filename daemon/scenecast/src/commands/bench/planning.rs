@@ -1,7 +1,7 @@
 //! `scenecast bench planning`
 
 use clap::Args;
-use scenecast_core::UserError;
+use scenecast_core::{UserError, errln, outln};
 use scenecast_files::write_whole;
 use scenecast_rehearsal::planning_bench::{
     Estimate, PlanningFiles, PlanningTable, SourceTable, Trial, annotated_images, plot, run_all,
@@ -42,13 +42,13 @@ impl PlanningBench {
     pub(super) fn run(self) -> Result<(), UserError> {
         let images = annotated_images(&self.scenes);
         if images.is_empty() && self.labels.is_empty() {
-            scenecast_core::errln!("skipped: no annotated images in {}; drawn scenes only", self.scenes.display());
+            errln!("skipped: no annotated images in {}; drawn scenes only", self.scenes.display());
         }
         if let Some(dir) = &self.out {
             std::fs::create_dir_all(dir).map_err(|e| UserError::file(dir, e))?;
         }
         if !self.json {
-            scenecast_core::outln!("{:<22} {HEAD}", "scene");
+            outln!("{:<22} {HEAD}", "scene");
         }
         let mut progress = Progress::new("planning");
         let files = PlanningFiles { images, labels: self.labels.clone() };
@@ -61,7 +61,7 @@ impl PlanningBench {
         })?;
         drop(progress);
         if self.json {
-            scenecast_core::outln!("{}", serde_json::to_string(&table).map_err(|e| UserError::Failed(e.to_string()))?);
+            outln!("{}", serde_json::to_string(&table).map_err(|e| UserError::Failed(e.to_string()))?);
             return Ok(());
         }
         print_means(&table);
@@ -80,7 +80,7 @@ const HEAD: &str =
 
 fn print_trial(t: &Trial) {
     let [lawnmower, greedy, horizon] = t.utility_per_m;
-    scenecast_core::outln!(
+    outln!(
         "{:<22} {lawnmower:>12.3} {greedy:>13.3} {horizon:>13.3} {:>13.3} {:>18.2} {:>15.2} {:>11}",
         t.name,
         t.map_known_per_m,
@@ -103,7 +103,7 @@ fn print_means(table: &PlanningTable) {
         horizon_by_greedy,
     } in &table.sources
     {
-        scenecast_core::outln!(
+        outln!(
             "{:<22} {:>12} {:>13} {:>13} {:>13} {:>18} {:>15}",
             format!("mean of {trials}, {}", source.name()),
             text(*lawnmower),
@@ -114,5 +114,5 @@ fn print_means(table: &PlanningTable) {
             text(*horizon_by_greedy)
         );
     }
-    scenecast_core::outln!("{} violations; {} seeds", table.violations, table.seeds);
+    outln!("{} violations; {} seeds", table.violations, table.seeds);
 }

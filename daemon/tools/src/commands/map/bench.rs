@@ -5,7 +5,7 @@ use super::change::{PngSizes, Sizes, encode, refused, sizes};
 use super::files::{numbered, read_map, same_size};
 use crate::progress::Progress;
 use clap::Args;
-use scenecast_core::UserError;
+use scenecast_core::{UserError, outln};
 use scenecast_protocol::map_codec::LabelRaster;
 use serde::Serialize;
 use std::path::PathBuf;
@@ -66,7 +66,7 @@ impl MapBench {
         drop(progress);
         totals.finish();
         if self.json {
-            scenecast_core::outln!("{}", serde_json::to_string(&totals).map_err(|e| UserError::Failed(e.to_string()))?);
+            outln!("{}", serde_json::to_string(&totals).map_err(|e| UserError::Failed(e.to_string()))?);
         } else {
             totals.print();
         }
@@ -102,19 +102,11 @@ impl Totals {
         let Sizes { bytes, frames, cells_changed, codec, png } = &self.sizes;
         let PngSizes { png_full_bytes, png_delta_bytes } = png.unwrap_or_default();
         let shown = |ratio: Option<f64>| ratio.map_or("-".to_owned(), |r| format!("{r:.3}"));
-        scenecast_core::outln!(
-            "{} steps, {cells_changed} cells changed, frames of {} bytes",
-            self.steps,
-            self.frame_bytes
-        );
-        scenecast_core::outln!("{:<16} {:>10} {:>12}", "", "bytes", "ours to it");
-        scenecast_core::outln!("{:<16} {bytes:>10}  {frames} frames", format!("ours ({codec})"));
-        scenecast_core::outln!("{:<16} {png_full_bytes:>10} {:>12}", "best PNG, whole", shown(self.ratio_full));
-        scenecast_core::outln!("{:<16} {png_delta_bytes:>10} {:>12}", "best PNG, delta", shown(self.ratio_delta));
-        scenecast_core::outln!(
-            "a step is coded and read in {:.1} ms, at most {:.1} ms",
-            self.step_ms_mean,
-            self.step_ms_max
-        );
+        outln!("{} steps, {cells_changed} cells changed, frames of {} bytes", self.steps, self.frame_bytes);
+        outln!("{:<16} {:>10} {:>12}", "", "bytes", "ours to it");
+        outln!("{:<16} {bytes:>10}  {frames} frames", format!("ours ({codec})"));
+        outln!("{:<16} {png_full_bytes:>10} {:>12}", "best PNG, whole", shown(self.ratio_full));
+        outln!("{:<16} {png_delta_bytes:>10} {:>12}", "best PNG, delta", shown(self.ratio_delta));
+        outln!("a step is coded and read in {:.1} ms, at most {:.1} ms", self.step_ms_mean, self.step_ms_max);
     }
 }

@@ -4,7 +4,7 @@ use super::scenes::Scenes;
 use crate::annotated_images::{AnnotatedCells, AnnotatedImage, Pair};
 use scene_model::words::{Discriminant, WordConfig, WordExtractor};
 use scenecast_config::Config;
-use scenecast_core::UserError;
+use scenecast_core::{UserError, outln};
 use scenecast_protocol::map::{Cell, LabelGrid as CodedGrid};
 use scenecast_protocol::map_codec::encode_all;
 use scenecast_scoring::{AnnotatedScene, ClassStatistics, LabelGrid, Method, Trial, score};
@@ -166,18 +166,15 @@ impl ChoiceReport {
 impl ChoicesReport {
     pub fn print(&self) {
         let Self { sweeps, seeds, scenes, .. } = self;
-        scenecast_core::outln!(
-            "{} scenes, {sweeps} sweeps, {seeds} seeds, nats: median / mean over the scenes",
-            scenes.len()
-        );
+        outln!("{} scenes, {sweeps} sweeps, {seeds} seeds, nats: median / mean over the scenes", scenes.len());
         let header = ["K", "vocabulary", "MI", "excess", "one seed +-", "bits of a map"];
         let [k, words, information, excess, deviation, bits] = header;
-        scenecast_core::outln!("{k:>3}  {words:<10}  {information:>13}  {excess:>13}  {deviation:>11}  {bits:>13}");
+        outln!("{k:>3}  {words:<10}  {information:>13}  {excess:>13}  {deviation:>11}  {bits:>13}");
         for choice in &self.choices {
             let information = pair(choice.mutual_information_median_nats, choice.mutual_information_mean_nats);
             let excess = pair(choice.excess_median_nats, choice.excess_mean_nats);
             let ChoiceReport { max_labels, vocabulary, excess_seed_deviation_nats: deviation, map_bits, .. } = choice;
-            scenecast_core::outln!(
+            outln!(
                 "{max_labels:>3}  {vocabulary:<10}  {information:>13}  {excess:>13}  {deviation:>11.3}  {map_bits:>13.0}"
             );
         }

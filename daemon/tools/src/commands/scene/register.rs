@@ -2,7 +2,7 @@
 
 use crate::progress::Progress;
 use clap::Args;
-use scenecast_core::UserError;
+use scenecast_core::{UserError, errln, outln};
 use scenecast_files::{RecordedFrame, Recording, write_poses};
 use scenecast_protocol::coordinates::MapPoint;
 use scenecast_registration::{
@@ -58,13 +58,10 @@ impl Register {
         let recording = Recording::open(&self.frames, None, self.metres_per_pixel)?;
         let placed = self.place(&recording)?;
         if let [first, ..] = placed.unreadable.as_slice() {
-            scenecast_core::errln!(
-                "{} frames that cannot be read are left out; the first: {first}",
-                placed.unreadable.len()
-            );
+            errln!("{} frames that cannot be read are left out; the first: {first}", placed.unreadable.len());
         }
         if let Some(advice) = placed.geometry.and_then(|geometry| geometry.advice(self.metres_per_pixel)) {
-            scenecast_core::errln!("{advice}");
+            errln!("{advice}");
         }
         let solved = placed.graph.solve();
         let frames = placed.frames.iter().zip(&solved).map(|(frame, pose)| {
@@ -123,13 +120,13 @@ impl Register {
                 "metres_per_pixel_by_images": placed.geometry.map(|geometry| self.metres_per_pixel / geometry.size_ratio),
                 "unseen": unseen, "unreadable": placed.unreadable.len(), "moved_rms_m": moved_m, "out": out,
             });
-            return scenecast_core::outln!("{all}");
+            return outln!("{all}");
         }
-        scenecast_core::outln!(
+        outln!(
             "{frames} frames: {chained} matched with the frame before, {looped} with earlier tracks ({loops} matches, \
              {contradicted} not used), {unseen} by odometry alone"
         );
-        scenecast_core::outln!(
+        outln!(
             "{}: the frames lie {moved_m:.3} m (root mean square) from where each was placed when it came in",
             self.out.display()
         );

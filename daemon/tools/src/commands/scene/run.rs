@@ -11,7 +11,7 @@ use clap::Args;
 use scene_model::habitats::Habitats;
 use scene_model::topics::{Birth, SceneConfig, SceneModel};
 use scene_model::words::{WordConfig, WordExtractor};
-use scenecast_core::UserError;
+use scenecast_core::{UserError, errln};
 use scenecast_files::{BagTiming, open_bag};
 use scenecast_sensors::{BitDepth, CameraMounting};
 use std::path::{Path, PathBuf};
@@ -116,15 +116,15 @@ impl Run {
             return Err(UserError::Input(format!("there are no {what} to label: {cause}")));
         }
         if let Some(skipped) = skipped {
-            scenecast_core::errln!("scenecast: {skipped}");
+            errln!("scenecast: {skipped}");
         }
         if effort.skipped.skipped_full > 0 {
-            scenecast_core::errln!("scenecast: {} words of full cells skipped", effort.skipped.skipped_full);
+            errln!("scenecast: {} words of full cells skipped", effort.skipped.skipped_full);
         }
         let (annotated, cell_px) = (opened.annotated, opened.cell_px);
         let mut quality = annotated.map(|annotated| quality(&map, &annotated, cell_px)).transpose()?;
         if quality.take_if(|quality| quality.mutual_information.n == 0).is_some() {
-            scenecast_core::errln!("scenecast: no cell of the map is annotated, so the labels are not scored");
+            errln!("scenecast: no cell of the map is annotated, so the labels are not scored");
         }
         let report = RunReport::new(&map, model.as_ref(), &effort, quality.as_ref());
         write(map, &self.out)?;

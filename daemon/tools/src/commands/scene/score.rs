@@ -5,7 +5,7 @@ use super::scenes::Scenes;
 use crate::annotated_images::{AnnotatedImage, Pair, pairs};
 use clap::Args;
 use scene_model::topics::Kernel;
-use scenecast_core::UserError;
+use scenecast_core::{UserError, outln};
 use scenecast_scoring::{AnnotatedScene, MeanScore, Method, Trial};
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -154,30 +154,21 @@ fn scene(trial: Trial, pair: &Pair, ignore: &[u8], step: &dyn Fn()) -> Result<Sc
 }
 
 fn print_json(report: &impl Serialize) -> Result<(), UserError> {
-    scenecast_core::outln!("{}", serde_json::to_string_pretty(report).map_err(|e| UserError::Failed(e.to_string()))?);
+    outln!("{}", serde_json::to_string_pretty(report).map_err(|e| UserError::Failed(e.to_string()))?);
     Ok(())
 }
 
 impl ScoreReport {
     fn print(&self) {
-        scenecast_core::outln!("K {}, {} sweeps, mean of {} seeds, nats", self.max_labels, self.sweeps, self.seeds);
-        scenecast_core::outln!(
-            "{:<20} {:<20} {:>6} {:>6} {:>6} {:>6} {:>7}",
-            "scene",
-            "method",
-            "MI",
-            "NMI",
-            "V",
-            "null",
-            "excess"
-        );
+        outln!("K {}, {} sweeps, mean of {} seeds, nats", self.max_labels, self.sweeps, self.seeds);
+        outln!("{:<20} {:<20} {:>6} {:>6} {:>6} {:>6} {:>7}", "scene", "method", "MI", "NMI", "V", "null", "excess");
         for scene in &self.scenes {
             print_methods(&scene.scene, &scene.methods);
         }
         print_methods("median", &self.median);
         for (baseline, gain) in &self.mean_gain {
             let Gain { mutual_information_nats, excess_nats } = gain;
-            scenecast_core::outln!(
+            outln!(
                 "mean gain of scene_model over {baseline}: MI {mutual_information_nats:+.3}, excess {excess_nats:+.3}"
             );
         }
@@ -186,7 +177,7 @@ impl ScoreReport {
 
 fn print_methods(scene: &str, methods: &BTreeMap<&'static str, MeanScore>) {
     for (row, (method, score)) in methods.iter().enumerate() {
-        scenecast_core::outln!(
+        outln!(
             "{:<20} {method:<20} {:>6.3} {:>6.3} {:>6.3} {:>6.3} {:>7.3}",
             if row == 0 { scene } else { "" },
             score.mutual_information_nats,

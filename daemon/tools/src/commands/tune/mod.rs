@@ -12,7 +12,7 @@ use grid::Grid;
 use measure::{mean, measure};
 use scenecast_config::Config;
 use scenecast_core::tuning_table::{Measurement, Row, Setting, TuningTable, least, most};
-use scenecast_core::{UserError, label_picture};
+use scenecast_core::{UserError, errln, label_picture, outln};
 use scenecast_files::write_whole;
 use scenecast_protocol::map::LabelGrid;
 use std::path::{Path, PathBuf};
@@ -91,11 +91,7 @@ impl Tune {
         let settings = grid.settings();
         let left: Vec<Setting> = settings.iter().copied().filter(|setting| !table.table.has(setting)).collect();
         if left.len() < settings.len() {
-            scenecast_core::errln!(
-                "tune: {} of {} settings are in tuning.csv already",
-                settings.len() - left.len(),
-                settings.len()
-            );
+            errln!("tune: {} of {} settings are in tuning.csv already", settings.len() - left.len(), settings.len());
         }
         self.search(&sites, &left, &mut table)?;
         let rows: Vec<Row> = table.table.rows().copied().collect();
@@ -176,7 +172,7 @@ impl Tune {
         };
         write_whole(&path, best::toml(best, config, budget_bps).as_bytes())?;
         let Measurement { mutual_information_nats, map_bytes, stream_bps, .. } = best.measurement;
-        scenecast_core::outln!(
+        outln!(
             "{}: {}; MI {mutual_information_nats:.3} nats, map {map_bytes} bytes, stream {stream_bps:.0} bit/s",
             path.display(),
             best.setting

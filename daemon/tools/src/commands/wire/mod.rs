@@ -8,7 +8,7 @@ use capture::Capture;
 use clap::{Args, Subcommand};
 use line::FrameLine;
 use scenecast_config::{read_key, read_regular};
-use scenecast_core::UserError;
+use scenecast_core::{UserError, errln};
 use scenecast_protocol::MissionId;
 use scenecast_protocol::seal::HeldKey;
 use scenecast_protocol::wire::Listener;
@@ -96,7 +96,7 @@ impl Decode {
         let Some(path) = &self.key else { return Ok(Vec::new()) };
         let (file, warning) = read_key(path)?;
         if let Some(warning) = warning {
-            scenecast_core::errln!("scenecast: {warning}");
+            errln!("scenecast: {warning}");
         }
         Ok([file.key].into_iter().chain(file.next.map(HeldKey::Mission)).collect())
     }
