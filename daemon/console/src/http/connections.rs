@@ -13,9 +13,10 @@ use std::pin::Pin;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::task::{Context, Poll, ready};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
 use tokio::net::{TcpListener, TcpStream};
+use tokio::sync::Notify;
 use tokio::task::AbortHandle;
 use tokio::time::Sleep;
 use tower_service::Service;
@@ -23,6 +24,9 @@ use tower_service::Service;
 /// Connections at a time. A further one replaces the oldest connection that waits for its client, or else the oldest
 /// that is not a stream of events; the number of streams has a lower bound.
 const MAX_CONNECTIONS: usize = 256;
+/// No connection is replaced before: without it, a flood of others ends a request before its head is read. Further
+/// connections wait meanwhile, in the queue of the system.
+const MIN_TIME: Duration = Duration::from_millis(250);
 /// For the head of a request, also for the next one on a connection.
 const HEAD_TIMEOUT: Duration = Duration::from_secs(10);
 const MAX_HEAD_BYTES: usize = 16 * 1024;
@@ -51,7 +55,7 @@ pub(super) async fn serve(listener: TcpListener, router: Router) {
                 continue;
             }
         };
-        let activity = connections.make_room(number);
+        let activity = connections.room(number).await;
         let (all, router) = (connections.clone(), router.clone());
         let task = tokio::spawn(async move {
             // An error here is the fault of the client.
@@ -164,10 +168,14 @@ impl HttpBody for RequestBody {
 
 /// All connections by their number.
 #[derive(Clone, Default)]
-struct Connections(Arc<Mutex<BTreeMap<u64, Connection>>>);
+struct Connections {
+    all: Arc<Mutex<BTreeMap<u64, Connection>>>,
+    one_ended: Arc<Notify>,
+}
 
 struct Connection {
     activity: Arc<Activity>,
+    since: Instant,
     /// Ends the connection; `None` until its task has started.
     end: Option<AbortHandle>,
 }
@@ -182,21 +190,37 @@ impl Connection {
 
 impl Connections {
     fn lock(&self) -> MutexGuard<'_, BTreeMap<u64, Connection>> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+        self.all.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Registers a connection, and ends another one if there are too many.
-    fn make_room(&self, number: u64) -> Arc<Activity> {
+    /// Registers a connection as soon as there is room for it.
+    async fn room(&self, number: u64) -> Arc<Activity> {
+        loop {
+            match self.take_room(number, Instant::now()) {
+                Ok(activity) => return activity,
+                Err(wait) => drop(tokio::time::timeout(wait, self.one_ended.notified()).await),
+            }
+        }
+    }
+
+    /// Registers a connection, and ends another one if there are too many; or the time until one may be ended.
+    fn take_room(&self, number: u64, now: Instant) -> Result<Arc<Activity>, Duration> {
         let mut all = self.lock();
         if all.len() >= MAX_CONNECTIONS {
-            let replaced = all.iter().filter_map(|(&n, c)| Some((c.active_requests()?, n))).min();
-            if let Some(end) = replaced.and_then(|(_, n)| all.remove(&n)).and_then(|c| c.end) {
-                end.abort();
+            let replaced = all.iter().filter_map(|(&n, c)| Some((c.active_requests()?, n, c.since))).min();
+            if let Some((_, replaced, since)) = replaced {
+                let wait = MIN_TIME.saturating_sub(now.saturating_duration_since(since));
+                if !wait.is_zero() {
+                    return Err(wait);
+                }
+                if let Some(end) = all.remove(&replaced).and_then(|c| c.end) {
+                    end.abort();
+                }
             }
         }
         let activity = Arc::<Activity>::default();
-        all.insert(number, Connection { activity: activity.clone(), end: None });
-        activity
+        all.insert(number, Connection { activity: activity.clone(), since: now, end: None });
+        Ok(activity)
     }
 
     fn add(&self, number: u64, end: AbortHandle) {
@@ -208,6 +232,7 @@ impl Connections {
 
     fn remove(&self, number: u64) {
         self.lock().remove(&number);
+        self.one_ended.notify_one();
     }
 }
 
@@ -303,23 +328,40 @@ mod tests {
     use super::*;
 
     #[tokio::test]
-    async fn a_new_connection_replaces_the_oldest_that_only_waits() {
-        let connections = Connections::default();
-        let mut open = |number: u64| {
-            let activity = connections.make_room(number);
+    async fn a_new_connection_replaces_the_oldest_that_had_time_and_only_waits() {
+        let (connections, begin) = (Connections::default(), Instant::now());
+        let open = |number: u64, now| {
+            let activity = connections.take_room(number, now)?;
             connections.add(number, tokio::spawn(std::future::pending::<()>()).abort_handle());
-            activity
+            Ok::<_, Duration>(activity)
         };
-        let activities: Vec<_> = (0..MAX_CONNECTIONS as u64).map(&mut open).collect();
+        let activities: Vec<_> = (0..MAX_CONNECTIONS as u64).map(|n| open(n, begin).unwrap()).collect();
         let served = ActiveRequest::new(&activities[0]);
         served.handle_whole();
         let _without_body = ActiveRequest::new(&activities[1]);
-        open(1000);
-        open(1001);
+        let tenth = MIN_TIME / 10;
+        assert_eq!(open(1000, begin + tenth).unwrap_err(), 9 * tenth);
+        let later = begin + MIN_TIME;
+        open(1000, later).unwrap();
+        open(1001, later).unwrap();
         let all: Vec<u64> = connections.lock().keys().copied().collect();
         assert_eq!((&all[..2], &all[all.len() - 2..]), (&[0, 3][..], &[1000, 1001][..]));
         drop(served);
-        open(1002);
+        open(1002, later).unwrap();
         assert!(!connections.lock().contains_key(&0), "its request has ended");
+    }
+
+    #[tokio::test]
+    async fn the_end_of_one_connection_makes_room_at_once() {
+        let connections = Connections::default();
+        for number in 0..MAX_CONNECTIONS as u64 {
+            connections.room(number).await;
+            connections.add(number, tokio::spawn(std::future::pending::<()>()).abort_handle());
+        }
+        let room = connections.room(1000);
+        tokio::pin!(room);
+        assert!(std::future::poll_fn(|cx| Poll::Ready(room.as_mut().poll(cx).is_pending())).await);
+        connections.remove(5);
+        assert!(std::future::poll_fn(|cx| Poll::Ready(room.as_mut().poll(cx).is_ready())).await);
     }
 }
