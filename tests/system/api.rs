@@ -254,6 +254,11 @@ fn other_machines_need_a_token() {
 
 /// A surface whose tokens are `ROLE NAME` each, with the headers of each principal in the same order.
 pub(super) fn surface_with_tokens(dir: &Path, principals: &[&str]) -> (Process, u16, Vec<String>) {
+    surface_at(dir, principals, free_port())
+}
+
+/// As [`surface_with_tokens`], with a modem at this port.
+pub(super) fn surface_at(dir: &Path, principals: &[&str], modem: u16) -> (Process, u16, Vec<String>) {
     let tokens: Vec<String> = (0..principals.len()).map(|i| format!("{i:032}")).collect();
     let lines: String = principals.iter().zip(&tokens).map(|(p, token)| format!("{p} {token}\n")).collect();
     std::fs::write(dir.join("console.tokens"), lines).unwrap();
@@ -262,7 +267,7 @@ pub(super) fn surface_with_tokens(dir: &Path, principals: &[&str]) -> (Process, 
         std::fs::write(dir.join(format!("{name}.token")), format!("{principal} {token}\n")).unwrap();
     }
     let config = scenecast_tests::workspace().join("config/asv.toml");
-    let (port, modem) = (free_port(), free_port());
+    let port = free_port();
     let sets = [
         format!("console.listen=127.0.0.1:{port}"),
         format!("console.token_file={}", dir.join("console.tokens").display()),

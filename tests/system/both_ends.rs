@@ -28,8 +28,10 @@ fn start(dir: &Path, vehicle_key: &str, surface_key: &str, surface_link: &str, l
         seal(vehicle_key)
     );
     std::fs::write(dir.join("auv.toml"), format!("{vehicle}{link}")).unwrap();
-    let process =
-        |role: &str| Process::start(&[role, "--config", dir.join(role).with_extension("toml").to_str().unwrap()]);
+    let process = |role: &str| {
+        let file = |kind| dir.join(role).with_extension(kind);
+        Process::start_logged(&[role, "--config", file("toml").to_str().unwrap()], &file("log"))
+    };
     (page, process("asv"), process("auv"))
 }
 
@@ -84,10 +86,12 @@ fn an_end_with_another_key_is_not_heard() {
     let (page, _surface, _vehicle) = start(&dir, &key(&dir, "one.key"), &key(&dir, "other.key"), "", "");
     wait_until("two minutes of the mission pass", || state(page).is_some_and(|s| s["now_s"].as_f64() > Some(120.0)));
     assert!(state(page).unwrap()["vehicles"][0]["last_received_s"].is_null());
+    let log = std::fs::read_to_string(dir.join("auv.log")).unwrap();
+    assert!(log.contains("its hellos fit neither the key nor the mission number here"), "{log}");
 }
 
 #[test]
-fn another_length_of_frames_is_named_and_the_link_works_all_the_same() {
+fn another_frame_length_is_named_and_the_link_still_works() {
     let dir = scratch("another-length");
     let key = key(&dir, "mission.key");
     let (page, _surface, _vehicle) = start(&dir, &key, &key, "frame_bytes = 48\n", "frame_bytes = 512\n");

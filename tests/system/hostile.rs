@@ -1,10 +1,11 @@
 //! Clients that are slow or hostile: they cost the surface neither its link nor its memory.
 
-use super::api::surface_with_tokens;
+use super::api::surface_at;
 use scenecast_tests::{Process, free_port, http, http_whole, is_full, scratch, state, wait_until};
 use serde_json::Value;
 use std::io::{Read, Write};
 use std::net::TcpStream;
+use std::path::Path;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::time::{Duration, Instant};
 
@@ -136,12 +137,34 @@ fn no_client_stalls_the_link_or_fills_the_memory() {
     wait_until("a reader is served again", || is_served(port));
 }
 
+/// A vehicle whose modem is at this port of the surface.
+fn vehicle_at(modem: u16, dir: &Path) -> Process {
+    let config = scenecast_tests::workspace().join("config/auv.toml");
+    let sets = [
+        format!("modem.connect=127.0.0.1:{modem}"),
+        format!("runtime.state_dir=\"{}\"", dir.display()),
+        "world.kind=patches".to_owned(),
+        "camera.width_px=320".to_owned(),
+        "camera.height_px=240".to_owned(),
+    ];
+    let mut arguments = vec!["auv", "--config", config.to_str().unwrap()];
+    arguments.extend(sets.iter().flat_map(|s| ["--set", s]));
+    Process::start(&arguments)
+}
+
 /// Three kinds of clients of a viewer ask without a pause: edits, logins, and streams that they leave. The operator, who logged in
-/// before, holds and resumes meanwhile.
+/// before, holds and resumes the vehicle meanwhile.
 #[test]
 fn the_load_of_a_viewer_delays_no_hold_and_ends_no_session() {
-    let dir = scratch("viewer-load");
-    let (_surface, port, headers) = surface_with_tokens(&dir, &["viewer victor", "operator anna"]);
+    let (dir, modem) = (scratch("viewer-load"), free_port());
+    let (_surface, port, headers) = surface_at(&dir, &["viewer victor", "operator anna"], modem);
+    let _vehicle = vehicle_at(modem, &dir.join("auv"));
+    let mode = || {
+        let (_, body) = http(port, "GET", "/api/v2/state", &headers[1], "")?;
+        let state: Value = serde_json::from_slice(&body).ok()?;
+        state["vehicles"][0]["status"]["mode"].as_str().map(str::to_owned)
+    };
+    wait_until("the vehicle, which knows no orders, holds", || mode().as_deref() == Some("hold"));
     let login = |who: usize| {
         let form = "Content-Type: application/x-www-form-urlencoded\r\n";
         let token = format!("token={who:032}");
@@ -155,8 +178,11 @@ fn the_load_of_a_viewer_delays_no_hold_and_ends_no_session() {
         let body = format!("{{\"action\": \"{action}\"}}");
         let answer = http(port, "POST", "/api/v2/vehicles/1/constraints", &operator, &body);
         assert_eq!(answer.map(|(status, _)| status), Some(202), "{action}");
+        let wanted = if action == "hold" { "hold" } else { "survey" };
+        wait_until("the vehicle obeys", || mode().as_deref() == Some(wanted));
         assert!(!is_full() || began.elapsed() < Duration::from_secs(3), "{action} took {:?}", began.elapsed());
     };
+    order("resume");
     let edit = || {
         let refused = http(port, "POST", "/api/v2/vehicles/1/labels", &headers[0], r#"{"label": 1, "name": "x"}"#);
         assert!(refused.is_none_or(|(status, _)| status == 403));
@@ -180,7 +206,6 @@ fn the_load_of_a_viewer_delays_no_hold_and_ends_no_session() {
             order("hold");
             order("resume");
             holds += 1;
-            std::thread::sleep(Duration::from_millis(100));
         }
     });
     let (_, log) = http(port, "GET", "/api/v2/log?kind=order", &headers[1], "").unwrap();

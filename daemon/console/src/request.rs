@@ -14,6 +14,7 @@ use crate::state::{AcceptedOrder, ArchivedMap, CellHistory, CommandState, Former
 use described::describe;
 use scenecast_protocol::coordinates::WorldPoint;
 use scenecast_protocol::directive::{Constraints, Slot, SlotId};
+use scenecast_protocol::link::OtherSurface;
 use scenecast_protocol::map::Cell;
 use scenecast_protocol::schedule::{BackgroundOrder, Shares};
 use scenecast_protocol::time::Instant;
@@ -170,7 +171,8 @@ pub fn handle_request(surface: &mut Surface, request: ClientRequest, cell_m: f64
         return refused(&refusal);
     }
     if let SurfaceRequest::TakeOver(id) = request
-        && let Some(reason) = why_not_taken_over(surface, id, &by, now)
+        && let Some(holder) = Address::vehicle(id).and_then(|vehicle| surface.view(vehicle)?.holder())
+        && let Some(reason) = why_not_taken_over(&holder, by.role(), now)
     {
         return Reply::Forbidden(reason);
     }
@@ -185,10 +187,9 @@ pub fn handle_request(surface: &mut Surface, request: ClientRequest, cell_m: f64
     reply
 }
 
-/// Why a principal may not take a vehicle over, one line.
-fn why_not_taken_over(surface: &Surface, id: u8, by: &Giver, now: Instant) -> Option<String> {
-    let holder = surface.view(Address::vehicle(id)?)?.holder()?;
-    let is_allowed = holder.is_silent(now) || by.role() == Role::Administrator;
+/// Why a principal of a role may not take a vehicle over from its holder, one line.
+fn why_not_taken_over(holder: &OtherSurface, role: Role, now: Instant) -> Option<String> {
+    let is_allowed = holder.is_silent(now) || role == Role::Administrator;
     (!is_allowed).then(|| {
         let (name, idle) = (holder.name, now.since(holder.heard).as_secs());
         format!(
@@ -398,10 +399,27 @@ fn map(surface: &Surface, vehicle: Address, cell_m: f64, now: Instant) -> Option
 #[cfg(test)]
 mod tests {
     use super::*;
+    use scenecast_protocol::directive::Series;
+    use scenecast_protocol::wire::SurfaceName;
+    use std::time::Duration;
 
     #[test]
     fn a_hold_needs_no_command_and_its_end_does() {
         assert_eq!(SurfaceRequest::Hold(1, true).order_kind(), Some(OrderKind::Stop));
         assert_eq!(SurfaceRequest::Hold(1, false).order_kind(), Some(OrderKind::Order));
+    }
+
+    #[test]
+    fn only_an_administrator_takes_over_from_a_surface_still_heard() {
+        let now = Instant::from_secs_f64(1000.0);
+        let refused = |role, idle_s| {
+            let heard = now - Duration::from_secs(idle_s);
+            let holder = OtherSurface { series: Series::from_random(1), name: SurfaceName::from_text("ship"), heard };
+            why_not_taken_over(&holder, role, now)
+        };
+        let reason = refused(Role::Operator, 119).unwrap();
+        assert!(reason.contains("\"ship\"") && reason.contains("119 s ago"), "{reason}");
+        assert_eq!(refused(Role::Operator, 120), None);
+        assert_eq!(refused(Role::Administrator, 0), None);
     }
 }

@@ -36,6 +36,12 @@ pub enum Mismatch {
         "another vehicle answers at its address, and only one obeys: set a vehicle.address of its own at each vehicle"
     )]
     Twin,
+    /// Only at a vehicle: another vehicle that sends from its address is heard, while this one has no run.
+    #[error(
+        "frames from the address of this vehicle are heard, and another one sent them: set a vehicle.address of its own at \
+         each vehicle"
+    )]
+    OwnAddress,
 }
 
 /// Reports each mismatch once, so that no stranger can fill a log with them.
@@ -51,6 +57,8 @@ pub(super) struct MismatchReport {
     reported: BTreeSet<Mismatch>,
     /// Frames with an unexpected tag, which may also be damaged frames, since the last accepted one.
     tagged: u32,
+    /// Frames from the address of this end that it has not sent, or that noise has made.
+    from_own_address: u32,
     /// Hellos of one session that do not verify, which may also be damaged ones, since the last one that does.
     untrue: Option<(SessionId, u32)>,
 }
@@ -60,6 +68,8 @@ impl MismatchReport {
     const MIN_TAGGED: u32 = 3;
     /// Hellos of one session after which the other end is taken to have another key or mission number.
     const MIN_UNTRUE: u32 = 3;
+    /// Frames from the address of this end after which they are taken for those of another vehicle. None of them is verified.
+    const MIN_FROM_OWN_ADDRESS: u32 = 3;
 
     pub(super) fn note(&mut self, mismatch: Mismatch) {
         self.tagged += u32::from(mismatch == Mismatch::Tag);
@@ -81,6 +91,14 @@ impl MismatchReport {
         }
     }
 
+    /// A frame from the address of this end is heard, while it sends none.
+    pub(super) fn note_own_address(&mut self) {
+        self.from_own_address += 1;
+        if self.from_own_address >= Self::MIN_FROM_OWN_ADDRESS {
+            self.note(Mismatch::OwnAddress);
+        }
+    }
+
     /// A frame of so many bytes was accepted; those of this end have `own`.
     pub(super) fn note_length(&mut self, bytes: usize, own: usize) {
         if bytes > own && self.longer.is_none() {
@@ -89,7 +107,7 @@ impl MismatchReport {
         }
     }
 
-    /// A hello has verified.
+    /// A hello has verified, so both ends have the same key.
     pub(super) fn handle_true_hello(&mut self) {
         self.untrue = None;
         self.current.take_if(|mismatch| *mismatch == Mismatch::Key);

@@ -140,7 +140,7 @@ impl<T> LinkPair<T> {
         self.authenticity.as_ref()
     }
 
-    /// Whether orders are authenticated.
+    /// Whether orders are authenticated: this end has a key.
     pub fn is_authentic(&self) -> bool {
         self.authenticity.is_some()
     }
@@ -153,6 +153,11 @@ impl<T> LinkPair<T> {
     /// A frame of the peer of so many bytes was accepted; those of this end have `own`.
     pub fn note_length(&mut self, bytes: usize, own: usize) {
         self.mismatch.note_length(bytes, own);
+    }
+
+    /// A frame from our own address is heard, while we send none.
+    pub fn note_own_address(&mut self) {
+        self.mismatch.note_own_address();
     }
 
     /// A setting in which the peer differs, once after it was found.
@@ -509,7 +514,7 @@ mod tests {
     }
 
     #[test]
-    fn a_late_frame_of_the_former_run_does_not_cost_the_run_that_the_vehicle_took() {
+    fn a_late_frame_of_the_former_run_does_not_end_the_taken_run() {
         let (mut surface, mut before) = (end_of_surface(keyed(false), 1), end_of_vehicle(keyed(false), 2));
         let hello = meet(&mut surface, &mut before);
         let late = sent(&mut before, FramePurpose::Content);
@@ -526,7 +531,7 @@ mod tests {
     }
 
     #[test]
-    fn a_late_frame_of_an_offered_run_does_not_cost_the_run_that_was_offered_after_it() {
+    fn a_late_frame_of_an_offered_run_does_not_end_a_later_offer() {
         let mut surface = end_of_surface(keyed(false), 1);
         let hello = sent(&mut surface, FramePurpose::Hello);
         let mut late = Vec::new();
@@ -548,7 +553,7 @@ mod tests {
     }
 
     #[test]
-    fn an_acknowledgement_in_the_current_run_ends_the_offers_of_before() {
+    fn an_acknowledgement_in_the_current_run_ends_earlier_offers() {
         let (mut surface, mut vehicle) = (end_of_surface(None, 1), end_of_vehicle(None, 2));
         let hello = sent(&mut surface, FramePurpose::Hello);
         received(&mut vehicle, &hello).unwrap();

@@ -79,6 +79,7 @@ impl Folder {
     /// Opens the folder and creates it if necessary; an error if another process holds it.
     pub(crate) fn hold(path: &Path) -> io::Result<Self> {
         let handle = Arc::new(Mutex::new(Some(lock(path)?)));
+        warn_if_open(path);
         Ok(Self { path: path.to_owned(), handle })
     }
 
@@ -102,6 +103,22 @@ impl Folder {
         Ok(())
     }
 }
+
+/// A folder that was there before may admit others. Its mode stays: it may be a common folder, or that of a group on purpose.
+#[cfg(unix)]
+fn warn_if_open(path: &Path) {
+    use std::os::unix::fs::MetadataExt;
+    let mode = fs::metadata(path).map_or(0, |folder| folder.mode() & 0o777);
+    if mode & 0o077 != 0 {
+        let path = path.display();
+        tracing::warn!(
+            "other users of this computer can list {path} (mode {mode:03o}): chmod 700 {path} keeps them out"
+        );
+    }
+}
+
+#[cfg(not(unix))]
+fn warn_if_open(_path: &Path) {}
 
 fn lock(path: &Path) -> io::Result<File> {
     create_folder(path)?;

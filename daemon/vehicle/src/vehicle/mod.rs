@@ -332,7 +332,7 @@ impl Vehicle {
                     self.outputs.push_back(VehicleOutput::Persist);
                 }
                 VehicleEvent::Mismatch(mismatch) => {
-                    tracing::warn!("the settings of the surface do not fit: {mismatch}");
+                    tracing::warn!("the settings of the ends do not fit: {mismatch}");
                 }
                 VehicleEvent::Oversized(fault) => tracing::error!("{fault}: it is left out of this frame"),
             }

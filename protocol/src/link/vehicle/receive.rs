@@ -10,7 +10,7 @@ use crate::mac::Grant;
 use crate::map::StateSource;
 use crate::seal::VehicleKey;
 use crate::time::Instant;
-use crate::wire::{Address, ChunkKind, Envelope, Header, Introduction};
+use crate::wire::{Address, ChunkKind, Envelope, FrameError, Header, Introduction};
 use std::time::Duration;
 
 /// Time without an accepted frame after which late frames are taken for a sign of a forged one.
@@ -23,7 +23,12 @@ impl<S: StateSource> VehicleLink<S> {
         let envelope = match Envelope::decode(bytes, |to| to == us || to == Address::EVERYBODY) {
             Ok(envelope) if envelope.header.from == Address::SURFACE => envelope,
             Ok(_) => return self.pair.stats.drop(DropReason::UnknownSender),
-            Err(e) => return self.pair.stats.drop(e.into()),
+            Err(e) => {
+                if e == FrameError::NotForUs {
+                    self.watch_own_address(bytes);
+                }
+                return self.pair.stats.drop(e.into());
+            }
         };
         if envelope.header.to == Address::EVERYBODY {
             return self.handle_call(&envelope, now);
@@ -119,6 +124,15 @@ impl<S: StateSource> VehicleLink<S> {
         }
         self.handle_key_parts(&key_parts);
         self.owe_answer(now);
+    }
+
+    /// A vehicle without a run sends at most answers to calls, so that frames of its address are those of another vehicle.
+    fn watch_own_address(&mut self, bytes: &[u8]) {
+        let is_ours = |envelope: Envelope<'_>| envelope.header.from == self.config.address;
+        if !self.pair.has_run() && Envelope::decode(bytes, |to| to == Address::SURFACE).is_ok_and(is_ours) {
+            self.pair.note_own_address();
+            self.events.extend(self.pair.poll_mismatch().map(VehicleEvent::Mismatch));
+        }
     }
 
     /// Takes parts of the next key, and notes that the surface has proven a run under it.

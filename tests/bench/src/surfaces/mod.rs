@@ -17,7 +17,7 @@ use std::time::Duration;
 use waters::{SURFACES, Waters};
 
 pub const ACCESSES: [Access; 3] = [Access::Shared, Access::ModemOwned { pool_frames: 8 }, Access::FullDuplex];
-/// Steps of a schedule.
+/// Steps of a schedule, with a pause after each.
 const STEPS: u32 = 60;
 /// How long each surface has the vehicle for itself at the end of a schedule.
 const ALONE: Duration = Duration::from_secs(500);
@@ -31,7 +31,7 @@ pub struct ScheduleFigures {
     pub applied: usize,
     /// Orders that were applied after newer ones of their kind.
     pub regressions: Vec<String>,
-    /// Orders without an end.
+    /// Orders that had no end when the schedule was over.
     pub open: Vec<String>,
 }
 

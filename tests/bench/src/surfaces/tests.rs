@@ -19,7 +19,7 @@ fn run_s(waters: &mut Waters, seconds: u64) {
 }
 
 #[test]
-fn a_second_surface_is_refused_by_name_and_takes_the_vehicle_over() {
+fn a_second_surface_is_refused_by_name_and_can_take_over() {
     for access in ACCESSES {
         let mut waters = Waters::held_by_first(1, keyed(access));
         waters.is_away = [false, false, true];
@@ -78,7 +78,7 @@ fn an_order_that_another_surface_has_overtaken_is_withdrawn() {
 }
 
 #[test]
-fn orders_that_a_vehicle_has_lost_are_sent_again_after_a_confirmation() {
+fn orders_that_a_vehicle_lost_are_sent_again_once_confirmed() {
     let resume = || Slot::Constraints(Constraints { hold: false, abort: false });
     for access in ACCESSES {
         let mut waters = Waters::new(4, keyed(access));
@@ -104,7 +104,7 @@ fn orders_that_a_vehicle_has_lost_are_sent_again_after_a_confirmation() {
 }
 
 #[test]
-fn no_order_replaces_a_newer_one_and_each_has_an_end_in_any_schedule_of_three_surfaces() {
+fn orders_of_three_surfaces_all_end_and_replace_no_newer_one() {
     for seed in 0..if std::env::var_os("SCENECAST_FULL").is_some() { 400 } else { 200 } {
         let figures = run_schedule(seed);
         assert!(figures.regressions.is_empty() && figures.open.is_empty(), "seed {seed}: {figures:?}");
@@ -151,7 +151,36 @@ fn two_vehicles_with_one_address_are_named() {
 }
 
 #[test]
-fn a_vehicle_that_answers_a_call_after_a_silence_is_not_taken_for_two() {
+fn a_late_vehicle_learns_that_its_address_is_taken() {
+    for access in ACCESSES {
+        let mut waters = Waters::held_by_first(2, keyed(access));
+        assert!(!waters.twin_found_itself, "{access:?}: it is alone");
+        waters.add_twin();
+        run_s(&mut waters, 30);
+        assert!(waters.twin_found_itself, "{access:?}");
+    }
+}
+
+#[test]
+fn a_surface_that_slept_continues_within_ten_seconds() {
+    for access in ACCESSES {
+        for asleep_s in [20, 3600, 100_000] {
+            let mut waters = Waters::held_by_first(asleep_s, keyed(access));
+            let frames = waters.view(0).stats().frames_received;
+            waters.is_asleep[0] = true;
+            run_s(&mut waters, asleep_s);
+            waters.is_asleep[0] = false;
+            waters.give(0, limits(1));
+            run_s(&mut waters, 10);
+            assert_eq!(waters.status(0, LIMITS), APPLIED, "{access:?}, {asleep_s} s: the orders go on");
+            let heard = waters.view(0).stats().frames_received - frames;
+            assert!((1..100).contains(&heard), "{access:?}, {asleep_s} s: {heard} frames in 10 s");
+        }
+    }
+}
+
+#[test]
+fn a_vehicle_that_answers_after_a_silence_is_not_taken_for_two() {
     let setup = EndsSetup { discovery: Some(Duration::from_secs(20)), ..keyed(Access::Shared) };
     let mut waters = Waters::new(5, setup);
     for silence_s in 60..160 {

@@ -40,9 +40,13 @@ pub(super) struct Waters {
     pub(super) orders: Orders,
     /// Whether each surface is out of reach.
     pub(super) is_away: [bool; SURFACES],
+    /// Whether the computer of each surface is suspended.
+    pub(super) is_asleep: [bool; SURFACES],
     pub(super) loss: f64,
-    /// Whether a surface has found two vehicles with one address, and whether each has found that its orders were lost.
+    /// Whether a surface, and whether a second vehicle itself, has found two vehicles with one address.
     pub(super) twin_found: bool,
+    pub(super) twin_found_itself: bool,
+    /// Whether each surface has found that its orders were lost.
     pub(super) lost: [bool; SURFACES],
     pub(super) rng: RandomStream,
     /// The vehicle, then others with its address.
@@ -75,8 +79,10 @@ impl Waters {
             setup,
             orders: Orders::default(),
             is_away: [false; SURFACES],
+            is_asleep: [false; SURFACES],
             loss: 0.0,
             twin_found: false,
+            twin_found_itself: false,
             lost: [false; SURFACES],
             rng,
             vehicles: vec![vehicle],
@@ -164,7 +170,8 @@ impl Waters {
         let until = self.now + time;
         loop {
             self.pump();
-            let of_surfaces = self.surfaces.iter().filter_map(|surface| surface.poll_timeout(self.now));
+            let awake = self.surfaces.iter().zip(self.is_asleep).filter(|(_, is_asleep)| !is_asleep);
+            let of_surfaces = awake.filter_map(|(surface, _)| surface.poll_timeout(self.now));
             let of_vehicles = self.vehicles.iter().filter_map(VehicleLink::poll_timeout);
             let timer = of_surfaces.chain(of_vehicles).map(|(at, _)| at).filter(|&at| at > self.now).min();
             let event = self.on_air.first_key_value().map(|((at, _), _)| *at);
@@ -191,6 +198,7 @@ impl Waters {
                 }
             }
             WaterEvent::Arrives(End::Vehicle(number), bytes) => self.vehicles[number].handle_frame(&bytes, self.now),
+            WaterEvent::Arrives(End::Surface(number), _) if self.is_asleep[number] => {}
             WaterEvent::Arrives(End::Surface(number), bytes) => self.surfaces[number].handle_frame(&bytes, self.now),
         }
     }
@@ -203,7 +211,7 @@ impl Waters {
                 self.modems.entry(End::Vehicle(number)).or_default().frames.push_back(sent.bytes);
             }
         }
-        for (number, surface) in self.surfaces.iter_mut().enumerate() {
+        for (number, surface) in self.surfaces.iter_mut().enumerate().filter(|(number, _)| !self.is_asleep[*number]) {
             while let Some(event) = surface.poll_event() {
                 self.lost[number] |= matches!(event, SurfaceEvent::OrdersLost(_));
                 self.twin_found |= matches!(event, SurfaceEvent::Mismatch(_, Mismatch::Twin));
@@ -235,7 +243,9 @@ impl Waters {
         }
         self.durable = vehicle.persistent_state().clone();
         for vehicle in &mut self.vehicles {
-            while vehicle.poll_event().is_some() {}
+            while let Some(event) = vehicle.poll_event() {
+                self.twin_found_itself |= matches!(event, VehicleEvent::Mismatch(Mismatch::OwnAddress));
+            }
             vehicle.handle_persisted();
         }
     }
@@ -244,7 +254,10 @@ impl Waters {
         let end = self.now + self.setup.modem().airtime(bytes.len());
         self.schedule(end, WaterEvent::Sent(from));
         let receivers: Vec<End> = match from {
-            End::Vehicle(_) => (0..SURFACES).filter(|&number| !self.is_away[number]).map(End::Surface).collect(),
+            End::Vehicle(sender) => {
+                let others = (0..self.vehicles.len()).filter(|&number| number != sender).map(End::Vehicle);
+                (0..SURFACES).filter(|&number| !self.is_away[number]).map(End::Surface).chain(others).collect()
+            }
             End::Surface(number) if self.is_away[number] => Vec::new(),
             End::Surface(_) => (0..self.vehicles.len()).map(End::Vehicle).collect(),
         };
