@@ -27,7 +27,7 @@ const MODEM: ModemProfile = ModemProfile {
     access: Access::Shared,
 };
 
-/// `tests/protocol/examples.rs` runs it too.
+/// Public because `tests/protocol/examples.rs` includes this file and runs it as a test.
 pub fn main() {
     // At sea the key comes from `scenecast key new`, and both ends read it from a file.
     let key = HeldKey::Mission(MissionKey::from_bytes(*b"sixteen secret b"));

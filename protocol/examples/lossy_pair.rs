@@ -22,7 +22,7 @@ const MODEM: ModemProfile = ModemProfile {
     access: Access::Shared,
 };
 
-/// `tests/protocol/examples.rs` runs it too.
+/// Public because `tests/protocol/examples.rs` includes this file and runs it as a test.
 pub fn main() {
     let address = Address::vehicle(1).expect("1 to 14");
     let mut channel = Channel { on_air: Vec::new(), random: 2026, sent: 0, lost: 0 };

@@ -7,7 +7,7 @@ use scenecast_protocol::map_codec::{Codec, decode, encode_all};
 
 const ROOM: usize = 64;
 
-/// `tests/protocol/examples.rs` runs it too.
+/// Public because `tests/protocol/examples.rs` includes this file and runs it as a test.
 pub fn main() {
     println!("Bytes in chunks of at most {ROOM} bytes, for each hundred cells that change:\n");
     let names = [Codec::Png, Codec::Context, Codec::Auto].map(|codec| format!("{:>13}", codec.to_string()));

@@ -59,7 +59,7 @@ impl Clock {
     }
 }
 
-/// `tests/protocol/examples.rs` runs it too.
+/// Public because `tests/protocol/examples.rs` includes this file and runs it as a test.
 pub fn main() {
     let vehicle = Address::vehicle(3).expect("1 to 14");
     let ((to_vehicle, from_surface), (to_surface, from_vehicle)) = (channel(), channel());

@@ -13,7 +13,7 @@ use serde::de::{DeserializeOwned, Error};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use std::path::PathBuf;
 
-/// Bytes, as hexadecimal digits.
+/// Bytes, which the JSON files hold as hexadecimal digits.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Hex(pub Vec<u8>);
 
@@ -70,7 +70,7 @@ pub enum StampVector {
 #[derive(Debug, PartialEq, Serialize, Deserialize)]
 pub struct AckVector {
     pub horizon_low: u16,
-    /// Distances from the horizon.
+    /// Distances of the lost frames below the horizon, ascending.
     pub lost: Vec<u16>,
 }
 
@@ -80,7 +80,7 @@ pub struct ChunkVector {
     pub payload: Hex,
 }
 
-/// Chunks of the map.
+/// Chunks of the map, each with the map before and after it.
 #[derive(Debug, Serialize, Deserialize)]
 pub struct MapChunks {
     pub chunks: Vec<MapVector>,
@@ -156,7 +156,7 @@ pub struct PartVector {
     pub whole: bool,
 }
 
-/// `tests/protocol/examples.rs` runs it too.
+/// Public because `tests/protocol/examples.rs` includes this file and runs it as a test.
 pub fn main() {
     let frames: Frames = read("frames.json");
     check_frames(&frames);

@@ -13,7 +13,7 @@ const FLOOR_Z: f64 = -14.0;
 const TOP_Z: f64 = -12.5;
 /// West, south, east and north of the block, metres.
 const BLOCK: [f64; 4] = [2.5, 2.0, 5.5, 4.0];
-/// Depth units per metre.
+/// Depth units per metre, as in the TUM benchmark.
 const UNITS_PER_M: f64 = 5000.0;
 
 /// Whether a place is on the block; `None` near its edge.

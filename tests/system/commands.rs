@@ -216,7 +216,7 @@ fn annotated_images_are_scored_and_wrong_ones_named() {
 }
 
 #[test]
-fn tuning_goes_on_where_it_was_and_gives_a_configuration() {
+fn tuning_continues_where_it_was_and_gives_a_configuration() {
     let dir = scratch("tune");
     let (mosaic, labels) = two_grounds(&dir, "reef");
     let (grid, out) = (dir.join("grid.toml"), dir.join("out"));

@@ -98,7 +98,7 @@ fn a_sequence_with_depth_is_rehearsed() {
 }
 
 #[test]
-fn an_oblique_sequence_is_refused_by_name_unless_frames_stay_unregistered() {
+fn an_oblique_sequence_is_refused_unless_registration_is_off() {
     let dir = scratch("depth-oblique");
     write_relief(&dir);
     let half = 0.5f64.sqrt();

@@ -13,7 +13,7 @@ use std::time::Duration;
 const STOPS: LinkEffort = LinkEffort { saturated: Duration::from_secs(60), directives: 1, stops: 200 };
 
 /// At least 95 % of the stops are to be within the bound. One sample of 200 in twenty comes out below this by chance.
-const LEAST_WITHIN: f64 = 0.95 - 1.65 * 0.0154;
+const MIN_WITHIN: f64 = 0.95 - 1.65 * 0.0154;
 
 /// Rows that miss the bound of convergence, as range, bytes, loss; this list may only get shorter.
 ///
@@ -53,7 +53,7 @@ fn golden() -> String {
 }
 
 #[test]
-fn the_rows_of_the_link_are_as_they_were() {
+fn the_rows_of_the_link_are_unchanged() {
     let golden: Value = serde_json::from_str(&golden()).unwrap();
     for (i, row) in measured() {
         assert_eq!(golden["rows"][i], serde_json::to_value(row).unwrap(), "row {i}; see the test of the whole table");
@@ -61,7 +61,7 @@ fn the_rows_of_the_link_are_as_they_were() {
 }
 
 #[test]
-fn the_table_of_the_link_is_as_it_was() {
+fn the_table_of_the_link_is_unchanged() {
     if !is_full() {
         return;
     }
@@ -102,7 +102,7 @@ fn the_replica_is_equal_soon_after_the_last_change() {
     let rows: Vec<_> = sample().map(|(_, case)| row(case, &STOPS)).collect();
     let place = |r: &LinkRow| (r.range_km, r.frame_bytes, r.loss);
     let late: Vec<_> =
-        rows.iter().filter(|r| r.pattern == Pattern::Independent && r.converge_within < LEAST_WITHIN).collect();
+        rows.iter().filter(|r| r.pattern == Pattern::Independent && r.converge_within < MIN_WITHIN).collect();
     let places: Vec<_> = late.iter().map(|r| place(r)).collect();
     let expected: Vec<_> = LATE.iter().copied().filter(|late| rows.iter().any(|r| place(r) == *late)).collect();
     assert_eq!(places, expected, "fewer than 95 % of the stops within {{10, 20, 60}} s + 1.5 x rest: {late:#?}");

@@ -209,13 +209,13 @@ fn transforms_of_ros_give_the_map_of_the_recording() {
 }
 
 #[test]
-fn wrong_images_and_a_restarted_publisher_leave_the_map_as_it_is() {
+fn wrong_images_and_publisher_restarts_do_not_change_the_map() {
     let runs: [&[&str]; 2] = [&["--faulty", "--rows", ":15", "--rest", "0"], &["--faulty", "--rows", "15:"]];
     assert_topics_give_the_map("ros2-faults", dds_domain(), TOPICS, &runs);
 }
 
 #[test]
-fn compressed_topics_of_cyclone_dds_give_the_map_of_the_recording() {
+fn compressed_cyclone_dds_topics_give_the_map_of_the_recording() {
     assert_topics_give_the_map(
         "ros2-compressed",
         dds_domain(),

@@ -202,7 +202,7 @@ fn a_real_reef_is_surveyed_into_more_than_one_label() {
 }
 
 #[test]
-fn a_fenced_vehicle_stays_inside_keeps_to_its_limit_and_says_so() {
+fn a_fenced_vehicle_stays_inside_keeps_its_limit_and_reports_it() {
     for planner in ["lawnmower", "greedy", "horizon"] {
         let planner = format!("survey.planner={planner}");
         let sets = ["operator.script=fenced", "survey.duration_s=200", "channel.loss=0.2", &planner];

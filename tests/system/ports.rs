@@ -81,7 +81,7 @@ fn a_map_over_serial_devices_equals_the_rehearsals() {
 }
 
 #[test]
-fn a_vehicle_that_is_killed_and_comes_back_is_heard_again() {
+fn a_vehicle_that_is_killed_and_restarted_is_received_again() {
     let (recording, expected) = recorded();
     let dir = scratch("killed");
     let port = free_port();

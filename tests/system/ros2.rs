@@ -207,7 +207,7 @@ fn bytes_of_the_survey(page: u16) -> u64 {
 }
 
 #[test]
-fn ros_and_its_subscribers_leave_the_link_as_it_is() {
+fn ros_and_its_subscribers_do_not_change_the_link() {
     let Some(cyclone) = Speaker::cyclone() else { return };
     let pairs = [("ros2-off", false), ("ros2-alone", true), ("ros2-read", true)];
     let pairs = pairs.map(|(name, is_in_ros)| (scratch(name), free_port(), is_in_ros));

@@ -58,7 +58,7 @@ fn a_text_without_a_mission_is_shown_unchecked() {
 }
 
 #[test]
-fn what_is_no_capture_is_refused_with_its_place() {
+fn a_wrong_capture_is_refused_with_its_line() {
     let text = scratch("wire-refused").join("frames.txt");
     std::fs::write(&text, "8c0f\n\n8c0\n").unwrap();
     let name = text.to_str().unwrap();

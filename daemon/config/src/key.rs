@@ -8,9 +8,9 @@ use toml::Value;
 /// Which process reads a key.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Role {
-    /// `scenecast auv`: the vehicle.
+    /// `scenecast auv`, the program on the vehicle.
     Auv,
-    /// `scenecast asv`: the surface.
+    /// `scenecast asv`, the program at the surface.
     Asv,
     /// `scenecast sim` and `scenecast demo`: the rehearsal.
     Scenario,

@@ -89,7 +89,7 @@ mod tests {
     }
 
     #[test]
-    fn no_file_is_no_key() {
+    fn without_a_file_there_is_no_key() {
         assert!(load_key(&Config::default(), Address::SURFACE).unwrap().is_none());
     }
 

@@ -4,7 +4,7 @@ use crate::key::{Key, Role, Section};
 use crate::{Config, load};
 use scenecast_core::UserError;
 
-/// Columns of a comment.
+/// Columns after which comments are wrapped.
 const WIDTH: usize = 100;
 
 /// A file that ships with the program.

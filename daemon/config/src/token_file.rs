@@ -150,7 +150,7 @@ mod tests {
     }
 
     #[test]
-    fn what_could_be_guessed_or_not_be_sent_is_refused() {
+    fn tokens_that_are_guessable_or_cannot_be_sent_are_refused() {
         for (name, text) in [
             ("empty", ""),
             ("short", "hunter2\n"),

@@ -14,7 +14,7 @@ pub struct OrderChanges<T> {
 }
 
 impl<T: Serialize + DeserializeOwned + Default> OrderChanges<T> {
-    /// Names every member.
+    /// Names every member, so the present order does not matter.
     pub fn whole(order: &T) -> Self {
         Self { named: members(order), order: PhantomData }
     }
@@ -94,7 +94,7 @@ mod tests {
     }
 
     #[test]
-    fn an_unknown_present_order_matters_only_where_a_member_is_absent() {
+    fn an_unknown_order_matters_only_where_a_member_is_absent() {
         let unknown = || Err("it is not known".to_owned());
         let one = read::<LimitsOrder>(r#"{"time_s": 60}"#).unwrap();
         assert_eq!(one.applied_to(unknown), Err("it is not known".to_owned()));

@@ -271,7 +271,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_is_refused_by_what_is_wrong() {
+    fn a_wrong_sentence_is_refused_with_the_reason() {
         let wrong = b"$GPGGA,092725.00,4717.11399,N,00833.91590,E,1,08,1.01,499.6,M,48.0,M,,*5C";
         assert_eq!(parse(wrong), Err(NmeaError::Checksum));
         assert_eq!(parse(b"GPGGA,1*00"), Err(NmeaError::NoSentence));
@@ -310,7 +310,7 @@ mod tests {
     }
 
     #[test]
-    fn a_line_is_split_into_its_sentences_without_what_stands_before_them() {
+    fn a_line_is_split_into_sentences_without_their_prefixes() {
         let split =
             |text: &str| sentences(text.as_bytes()).map(|s| String::from_utf8(s.to_vec()).unwrap()).collect::<Vec<_>>();
         assert_eq!(split(r"\s:GP0001,c:1790000000*25\$GPGGA,1*00"), ["$GPGGA,1*00"]);
@@ -344,7 +344,7 @@ mod tests {
         }
 
         #[test]
-        fn mutated_lines_with_a_right_checksum_say_only_what_can_be(
+        fn mutated_lines_with_a_right_checksum_give_only_valid_values(
             kind in 0usize..6, at in 0usize..80, with in "[ -~]{0,4}",
         ) {
             let bodies = [

@@ -128,7 +128,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_program_names_itself_by_what_a_name_may_have() {
+    fn a_program_name_is_reduced_to_allowed_characters() {
         assert_eq!(ClientName::of_program("ctl-R/V Wave").as_str(), "ctl-RVWave");
         assert_eq!(ClientName::of_program(&"x".repeat(64)).as_str().len(), MAX_NAME);
         assert!(

@@ -323,7 +323,7 @@ mod tests {
     }
 
     #[test]
-    fn what_editors_write_around_a_fence_does_not_refuse_it() {
+    fn a_fence_is_read_despite_peculiarities_of_editors() {
         let plain = format!(r#"{{"geometry": {SQUARE}}}"#);
         let null = r#"{"type": "Feature", "properties": {}, "geometry": null}"#;
         let empty = r#"{"geometry": {"type": "Polygon", "coordinates": []}}"#;

@@ -31,7 +31,7 @@ pub struct RecordedFrame {
     pub depth: Option<DepthFile>,
 }
 
-/// A file of distances.
+/// A file of distances, and the units of its whole numbers in a metre.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DepthFile {
     pub path: PathBuf,

@@ -24,7 +24,7 @@ pub const TUM_UNITS_PER_M: f64 = 5000.0;
 /// The frames of a sequence that have depth and pose.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TumFolder {
-    /// In order of time.
+    /// The frames, in the order of their time.
     pub frames: Vec<TumFrame>,
     /// Images of the sequence, with those that are not among the frames.
     pub images: usize,

@@ -163,7 +163,7 @@ impl VehicleHost {
     }
 
     /// No pose came in from the navigation source for `unseen` since the last call; `None` while poses come in. The
-    /// autopilot holds its position meanwhile, since a goal relative to an old pose would lead anywhere.
+    /// autopilot holds its position meanwhile, since a goal relative to an old pose would lead astray.
     pub fn handle_pose_gap(&mut self, unseen: Option<Duration>) {
         if let Some(pilot) = &mut self.pilot {
             pilot.is_blind = unseen.is_some();

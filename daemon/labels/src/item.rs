@@ -15,21 +15,21 @@ pub struct Item {
 /// When the picture of an item was taken.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum ItemTime {
-    /// At its arrival.
+    /// At the time of its arrival.
     #[default]
     Arrival,
-    /// Mission time, seconds.
+    /// At this mission time, in seconds.
     Mission(f64),
-    /// Seconds since 1970, UTC.
+    /// At this time, in seconds since 1970 (UTC).
     Unix(f64),
-    /// Seconds before its arrival.
+    /// This many seconds before its arrival.
     Age(f64),
 }
 
 /// The content of an item.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Content {
-    /// Names of classes alone.
+    /// Names and colours of classes, and no map.
     Classes,
     /// A segmented image of a camera that looks down: pixel value = class, 255 = unknown.
     Image {

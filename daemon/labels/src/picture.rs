@@ -13,14 +13,14 @@ pub const MAX_PIXELS: u64 = 1 << 24;
 pub struct Raster<T = u8> {
     pub width: u32,
     pub height: u32,
-    /// `width` x `height` values.
+    /// `width` x `height` values, row by row from the top.
     pub values: Vec<T>,
 }
 
 /// The values of a picture of a band.
 pub(crate) enum Values {
     Bytes(Raster),
-    /// Two bytes a pixel.
+    /// Pixels of 16 bits, two bytes each.
     Words(Raster<u16>),
 }
 

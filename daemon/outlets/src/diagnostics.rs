@@ -11,7 +11,7 @@ pub struct Health {
     pub level: u8,
     /// The part, such as `link`.
     pub part: &'static str,
-    /// One line for people.
+    /// The state of the part, in one line for people.
     pub message: String,
     pub values: Vec<(&'static str, String)>,
 }

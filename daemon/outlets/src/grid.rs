@@ -13,7 +13,7 @@ pub struct Grid {
     pub cell_m: f64,
     /// From the cells' own frame to that of the message, metres east and north.
     pub shift_m: (f64, f64),
-    /// 0 = unexplored.
+    /// The label of each cell; 0 is unexplored.
     pub labels: Vec<u8>,
     pub layers: Vec<GridLayer>,
 }
@@ -24,7 +24,7 @@ pub struct GridLayer {
     pub name: String,
     /// Whether it is the depth of the sea floor, metres.
     pub is_depth: bool,
-    /// NaN = not known.
+    /// The quantity of each cell; NaN where it is not known.
     pub values: Vec<f32>,
 }
 
@@ -35,7 +35,7 @@ impl Grid {
         is_small.then(|| Self { area, cell_m, shift_m, labels: area.cells().map(label).collect(), layers: Vec::new() })
     }
 
-    /// Adds a layer.
+    /// Adds a layer, with the `value` of each cell of the area.
     pub fn add_layer(&mut self, name: &str, is_depth: bool, value: impl Fn(Cell) -> Option<f64>) {
         let values = self.area.cells().map(|cell| value(cell).map_or(f32::NAN, |value| value as f32)).collect();
         self.layers.push(GridLayer { name: name.to_owned(), is_depth, values });

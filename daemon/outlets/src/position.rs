@@ -16,7 +16,7 @@ pub struct Place {
     pub stamp: Time,
     /// Metres east, north and up; up is negative below the surface.
     pub position_m: [f64; 3],
-    /// Radians clockwise from north.
+    /// Heading in radians, clockwise from north.
     pub heading_rad: f64,
 }
 

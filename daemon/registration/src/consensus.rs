@@ -52,12 +52,12 @@ pub(crate) struct ExpectedRelief {
 }
 
 impl ExpectedRelief {
-    /// As earlier matches showed.
+    /// The relief that earlier matches showed; it counts for `TILES_ALIKE` tiles.
     pub(crate) fn known(variance: f64) -> Self {
         Self { variance, tiles: TILES_ALIKE }
     }
 
-    /// Before any match.
+    /// The relief before any match, which counts for a fifth of a tile.
     pub(crate) fn guessed(variance: f64) -> Self {
         Self { variance, tiles: 0.2 }
     }

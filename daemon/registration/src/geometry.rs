@@ -299,7 +299,7 @@ mod tests {
     }
 
     #[test]
-    fn a_floor_without_texture_says_nothing() {
+    fn a_floor_without_texture_gives_no_advice() {
         let mut check = GeometryCheck::default();
         let even = vec![90u8; SIZE[0] * SIZE[1]];
         for step in 0..60 {

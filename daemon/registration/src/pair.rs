@@ -91,7 +91,7 @@ impl<'a> Attempts<'a> {
         Self { new, fine, coarse, correlator: Correlator::new(&new.coarse, margin), gates }
     }
 
-    /// Tries one earlier frame.
+    /// Tries to match one earlier frame; `None` if the evidence is too weak.
     pub(crate) fn attempt(&mut self, old: &Scales, expected: &Expected) -> Option<Match> {
         let (start, peak) = self.search(old, expected)?;
         if peak.confidence < self.gates.confidence || peak.correlation < self.gates.correlation {

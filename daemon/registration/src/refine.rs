@@ -24,7 +24,7 @@ pub(crate) struct Fit {
     pub(crate) similarity: Similarity,
     /// Normalised correlation over the overlap.
     pub(crate) correlation: f64,
-    /// Pixels of the overlap.
+    /// Number of pixels in the overlap.
     pub(crate) pixels: f64,
     /// The middle of the overlap in the reference, weighted by its texture. The errors of turn and shift are nearly
     /// independent there.
@@ -34,7 +34,7 @@ pub(crate) struct Fit {
     pub(crate) shift_sigma: f64,
 }
 
-/// Sums over the overlap.
+/// Sums over the pixels of the overlap of two planes.
 #[derive(Default)]
 struct Sums {
     h: [f64; 10],

@@ -57,7 +57,7 @@ pub struct Placed {
     pub pose: FramePose,
     /// Whether the frame was matched with the one before.
     pub is_chained: bool,
-    /// Matches with earlier frames.
+    /// Number of earlier frames that it was matched with.
     pub loops: u8,
     /// Standard deviation of the place against earlier parts of the map, metres.
     pub sigma_m: f64,
@@ -76,7 +76,7 @@ pub struct Registrar {
     pub(crate) kept: KeptFrames,
     /// Variance of the heights of the floor, in squares of the altitude.
     pub(crate) relief: f64,
-    /// Links in it.
+    /// Links that the variance is a mean of, up to a bound.
     relief_links: f64,
     /// Earlier frames that each frame is compared with.
     loops: u8,

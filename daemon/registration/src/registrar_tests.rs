@@ -120,7 +120,7 @@ fn a_restored_registrar_places_frames_as_the_saved_one() {
 }
 
 #[test]
-fn a_frame_of_another_size_or_a_broken_one_changes_no_more_than_its_own_pose() {
+fn an_odd_or_broken_frame_affects_no_pose_but_its_own() {
     let mut registrar = Registrar::new(0.03);
     step(&mut registrar, noise, (0.0, 0.0), 0.0);
     for (columns, rows) in [(0, 0), (1, 1), (40, 30), (700, 11), (64, 64)] {

@@ -44,7 +44,7 @@ impl Similarity {
         Self { turned, shift: -turn_by(turned, self.shift) }
     }
 
-    /// This one after `first`.
+    /// The similarity that applies `first`, then this one.
     pub(crate) fn after(&self, first: &Self) -> Self {
         Self { turned: turn_by(self.turned, first.turned), shift: self.apply(first.shift) }
     }

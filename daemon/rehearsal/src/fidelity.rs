@@ -45,7 +45,7 @@ pub struct FidelityRow {
     /// Energy that the vehicle's modem has transmitted with, joules, in all and for each bit of the map that arrived.
     pub energy_j: Option<f64>,
     pub energy_per_map_bit_j: Option<f64>,
-    /// Both maps over time.
+    /// The quality of the vehicle's and of the operator's map, a sample each 30 s.
     pub series: Vec<MapQuality>,
 }
 

@@ -36,7 +36,7 @@ pub struct FramesLog {
     pub up: BTreeMap<&'static str, FrameSum>,
 }
 
-/// Frames of one kind.
+/// The number of the frames of one kind, and the sum of their bytes.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct FrameSum {
     pub frames: u64,

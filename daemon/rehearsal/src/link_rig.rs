@@ -19,7 +19,7 @@ use std::time::Duration;
 /// The configured ends, modems and channel, which replicate any state. The vehicle applies every order.
 pub struct LinkRig<S: StateSource, R: StateReplica> {
     pub now: Instant,
-    /// The vehicle's.
+    /// The acoustic address of the vehicle.
     pub address: Address,
     pub vehicle: LinkHost<VehicleLink<S>>,
     pub surface: LinkHost<SurfaceLink<R>>,

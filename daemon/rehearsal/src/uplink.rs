@@ -14,9 +14,9 @@ pub struct Uplink {
     pub status: u64,
     /// Headers, acknowledgement statements and integrity checks.
     pub overhead: u64,
-    /// Copies of earlier frames.
+    /// Copies of frames that were sent before.
     pub repeated: u64,
-    /// Layers and images.
+    /// Everything else: layers of the map and exemplars.
     pub other: u64,
 }
 

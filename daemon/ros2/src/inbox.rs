@@ -136,7 +136,7 @@ impl<M> Inbox<M> {
         }
     }
 
-    /// Messages that arrived.
+    /// Messages that arrived, with those that were dropped later.
     pub fn received(&self) -> u64 {
         self.shared.state().received
     }

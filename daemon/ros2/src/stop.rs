@@ -13,7 +13,7 @@ pub(crate) struct Owner {
     ended: Receiver<()>,
 }
 
-/// The thread's end.
+/// The thread's own end, by which it learns that it is to stop.
 pub(crate) struct Owned {
     stop: Receiver<()>,
     /// Closed when the thread ends.

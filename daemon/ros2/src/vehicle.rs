@@ -33,7 +33,7 @@ const MAX_PATH: usize = 2000;
 pub struct VehicleView {
     /// Metres east, north and up.
     pub position_m: [f64; 3],
-    /// Radians clockwise from north.
+    /// Heading in radians, clockwise from north.
     pub heading_rad: f64,
     pub sigma_m: f64,
     /// The waypoints ahead, metres east and north.

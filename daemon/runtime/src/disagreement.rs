@@ -41,7 +41,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_wrong_mounting_is_said_once_a_minute() {
+    fn a_wrong_mounting_is_logged_once_a_minute() {
         let (mut disagreement, began) = (Disagreement::default(), Instant::now());
         let mut at = |s: u64, turn: f64| {
             let north = s as f64;

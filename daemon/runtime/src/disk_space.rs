@@ -62,7 +62,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_disk_is_looked_at_now_and_then_and_after_a_checkpoint() {
+    fn a_disk_is_checked_at_intervals_and_after_a_checkpoint() {
         let (mut disk, now) = (DiskWatch::new(&std::env::temp_dir()), Instant::now());
         let first = disk.look(now).unwrap();
         assert!(first.free_bytes.is_some() == cfg!(unix) && !first.is_checkpoint_refused);

@@ -29,7 +29,7 @@ pub(super) struct FirstStart {
 }
 
 impl FirstStart {
-    /// What the configuration says.
+    /// Reads `survey.start` and the file of `survey.fence_file`.
     pub(super) fn of(config: &Config) -> Result<Self, UserError> {
         let fence = config.survey.fence_file.as_deref().map(|file| configured_fence(file, config)).transpose()?;
         Ok(Self { is_free: config.survey.start == StartMode::Free || fence.is_some(), fence })
@@ -376,7 +376,7 @@ mod tests {
     }
 
     #[test]
-    fn a_vehicle_without_memory_holds_unless_it_has_a_fence_or_is_free() {
+    fn a_vehicle_without_state_holds_unless_fenced_or_free() {
         let corner = |x, y| DecimetrePoint::new(x, y);
         let outline = Polygon(vec![corner(0, 0), corner(90, 0), corner(90, 90)]);
         let fence = Fence { fence: Some(outline), ..Fence::default() };

@@ -18,7 +18,7 @@ pub(crate) struct LabelHealth {
     pub(crate) is_missing: bool,
 }
 
-/// Counts items.
+/// Counts items that were taken or refused.
 #[derive(Debug, Default)]
 pub(crate) struct LabelTally {
     taken: u64,

@@ -126,7 +126,7 @@ mod tests {
             new
         }
 
-        /// Reads the next datagram.
+        /// Reads the next datagram, and drops the events that it causes.
         async fn read(&mut self, now: Instant) {
             let report = self.port.next().await;
             self.port.handle(report, &mut self.link, now);

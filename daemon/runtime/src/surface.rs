@@ -312,7 +312,7 @@ impl SurfaceShell {
         match output {
             SurfaceOutput::MapChanged(vehicle) => self.write_map(vehicle),
             SurfaceOutput::VehicleFound(vehicle) => {
-                tracing::info!("vehicle {} answered a call: it is spoken with from now on", vehicle.number());
+                tracing::info!("vehicle {} answered a call: the link with it is open now", vehicle.number());
             }
             SurfaceOutput::ExemplarHere(vehicle, label) => {
                 tracing::info!("an image of label {label} of vehicle {} is here", vehicle.number());

@@ -57,7 +57,7 @@ pub enum DiscriminantTrainingError {
     /// The classes do not differ in any measure, or the measures are not finite.
     #[error("the classes do not differ in any measure")]
     Alike,
-    /// The directions are unusable.
+    /// The scene model refuses the directions that were found.
     #[error(transparent)]
     Directions(#[from] DiscriminantError),
 }

@@ -29,7 +29,7 @@ impl RigidFit {
         Self { cos, sin, from: (ax, ay), to: (bx, by) }
     }
 
-    /// The point, moved.
+    /// The point, turned and shifted by the fit.
     pub fn apply(&self, (x, y): (f64, f64)) -> (f64, f64) {
         let (x, y) = (x - self.from.0, y - self.from.1);
         (self.cos * x - self.sin * y + self.to.0, self.sin * x + self.cos * y + self.to.1)

@@ -10,9 +10,9 @@ const FAR_S: f64 = 90.0;
 /// A cell of a map with its label, its true class, and the time at which it was first seen.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TimedCell {
-    /// Label on the map.
+    /// Label of the cell on the map that is scored.
     pub label: u32,
-    /// True class.
+    /// True class of the cell, with which the label is compared.
     pub class: u32,
     /// Time of the first sight, seconds.
     pub first_seen_s: f64,

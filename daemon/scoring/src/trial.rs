@@ -19,7 +19,7 @@ pub enum Method {
     MeanLab,
     /// k-means on the word shares of each cell and its eight neighbours.
     PooledWords,
-    /// The scene model's habitats.
+    /// The habitats of the scene model, in place of its topics.
     Habitats,
     /// The topics of the scene model with [`SceneConfig::for_images`].
     SceneModel,

@@ -125,7 +125,7 @@ impl CameraFault {
     }
 }
 
-/// Images so far.
+/// The number of images that were mapped, and of each fault.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct CameraTally {
     /// Images that were given to the scene model.

@@ -199,7 +199,7 @@ mod tests {
     }
 
     #[test]
-    fn what_follows_the_end_of_a_jpeg_does_not_count() {
+    fn bytes_after_the_end_of_a_jpeg_are_ignored() {
         let jpeg = encoded(ImageFormat::Jpeg);
         let whole = decode(&jpeg, WHOLE).unwrap();
         for padding in [vec![0; 3], vec![0; 6000], vec![0xFF; 9000], jpeg.clone()] {

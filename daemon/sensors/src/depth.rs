@@ -23,7 +23,7 @@ impl DepthMessage {
         }
     }
 
-    /// Bytes of the distances.
+    /// Length of the data in bytes, as received.
     pub fn size(&self) -> usize {
         match self {
             Self::Image(image) => image.data.len(),

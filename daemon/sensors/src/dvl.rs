@@ -34,9 +34,9 @@ pub struct DvlPosition {
     pub ts_s: f64,
     /// Ahead, to starboard and down at the reset, metres.
     pub place: [f64; 3],
-    /// Radians.
+    /// Rotation about the axis ahead, in radians.
     pub roll_rad: f64,
-    /// Radians.
+    /// Rotation about the axis to starboard, in radians.
     pub pitch_rad: f64,
     /// Clockwise from the heading at the reset, radians.
     pub yaw_rad: f64,
@@ -290,7 +290,7 @@ mod tests {
     }
 
     #[test]
-    fn a_log_that_begins_anew_continues_at_the_last_pose() {
+    fn a_log_that_restarts_continues_at_the_last_pose() {
         let reports = [
             (100.0, position(500.0, 20.0, 0.0, 90.0)),
             (100.2, position(500.2, 20.0, 0.2, 90.0)),

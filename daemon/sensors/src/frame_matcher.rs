@@ -4,7 +4,7 @@ use crate::{CameraFault, CameraTally, PoseMatch, PoseTrack, SensorPose, Stamp};
 use std::collections::VecDeque;
 use std::time::Duration;
 
-/// Bounds of the matching.
+/// How long images wait for poses, and how many wait at most.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Limits {
     /// Longest time between two poses within which poses are interpolated.

@@ -22,7 +22,7 @@ enum Extent {
     Whole(usize),
     /// More bytes are needed; the image does not end within this many.
     Needs(usize),
-    /// No image begins here.
+    /// No image begins with these bytes.
     Nothing,
 }
 

@@ -137,7 +137,7 @@ mod tests {
     }
 
     #[test]
-    fn a_calibrated_camera_looks_where_its_flat_frame_has_its_middle() {
+    fn a_calibrated_camera_looks_at_the_middle_of_its_flat_frame() {
         let mounting = CameraMounting { place_m: [0.0; 3], turn_rad: 0.4, tilt_rad: [0.1, 0.0] };
         for (roll_rad, pitch_rad, heading) in [(0.0, 0.0, 20.0), (0.2, 0.0, 120.0), (0.0, -0.15, 250.0)] {
             let vehicle = SensorPose { roll_rad, pitch_rad, ..vehicle(heading) };

@@ -127,7 +127,7 @@ impl PoseTrack {
         false
     }
 
-    /// The pose at `stamp`.
+    /// The pose at `stamp`, interpolated between the poses before and after it.
     pub fn at(&self, stamp: Stamp) -> PoseMatch {
         let after = self.poses.partition_point(|(at, _)| *at < stamp);
         match (after.checked_sub(1).map(|i| self.poses[i]), self.poses.get(after)) {

@@ -50,7 +50,7 @@ enum Layout {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Encoding {
     layout: Layout,
-    /// Bytes of a sample.
+    /// Bytes of one sample of one channel.
     depth: usize,
 }
 
@@ -213,7 +213,7 @@ mod tests {
     }
 
     #[test]
-    fn what_does_not_fit_is_named() {
+    fn images_that_do_not_fit_their_header_are_named() {
         let text = |image: RawImage<'_>| image.to_rgb(&mut BitDepth::default()).unwrap_err().to_string();
         assert!(text(image("nv21", (1, 1), 3, &[0; 3])).contains("\"nv21\" is not supported; allowed are mono8"));
         assert!(text(image("rgb8", (0, 5), 0, &[])).contains("0 x 5 pixels"));

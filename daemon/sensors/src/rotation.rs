@@ -9,7 +9,7 @@ pub struct Rotation {
 }
 
 impl Rotation {
-    /// No rotation.
+    /// No rotation: the axes of the body point east, north and up.
     pub const IDENTITY: Self = Self { rows: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]] };
 
     /// From a quaternion x, y, z, w; `None` unless its length is about 1.

@@ -24,7 +24,7 @@ pub enum StampForm {
 }
 
 impl StampForm {
-    /// Name for people.
+    /// The form in words for people, such as "seconds since 1970".
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -158,7 +158,7 @@ mod tests {
     }
 
     #[test]
-    fn the_unit_of_a_whole_number_is_told_by_its_size_and_dates_are_read() {
+    fn the_size_of_a_number_gives_its_unit_and_dates_are_read() {
         use StampForm::*;
         // `date -u -d 2026-11-26T18:50:00 +%s`.
         const SECONDS: i64 = 1_795_719_000;

@@ -12,7 +12,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-/// Bytes of one read.
+/// Size of the buffer of one read, bytes.
 const PIECE: usize = 256 << 10;
 
 /// Pieces that wait to be cut into images.

@@ -26,7 +26,7 @@ pub struct SourceImage {
     pub calibration: Option<Arc<Calibration>>,
 }
 
-/// Distances of a source.
+/// The distances that a source has measured at one time.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SourceDepth {
     /// The time at which they were measured, if the source knows it.
@@ -81,7 +81,7 @@ impl SensorKind {
     }
 }
 
-/// A live sensor.
+/// A live sensor, which is opened again when it is lost.
 pub trait SensorSource: Send + 'static {
     fn kind(&self) -> SensorKind;
 
@@ -122,7 +122,7 @@ const BACK_OFF: (Duration, Duration) = (Duration::from_millis(250), Duration::fr
 /// A source that stayed open for this long is opened again at once when it is lost.
 const HEALTHY: Duration = Duration::from_secs(10);
 
-/// A running source.
+/// A source that runs on a thread of its own.
 pub struct LiveSource {
     reports: mpsc::Receiver<SourceReport>,
     is_stopped: Arc<AtomicBool>,
@@ -182,7 +182,7 @@ struct Supervisor<S> {
 struct Outlet {
     reports: mpsc::Sender<SourceReport>,
     is_stopped: Arc<AtomicBool>,
-    /// Faults that found no room, with their numbers and their last texts.
+    /// Faults for which the channel had no room yet, with their numbers and their last texts.
     waiting: BTreeMap<CameraFault, (u64, String)>,
 }
 
@@ -379,7 +379,7 @@ mod tests {
     }
 
     #[test]
-    fn a_lost_camera_is_opened_again_and_a_missing_one_is_named_once() {
+    fn a_lost_camera_is_reopened_and_a_missing_one_named_once() {
         let steps = vec![Step::Open, Step::Image, Step::Lose, Step::Refuse, Step::Refuse, Step::Open, Step::Image];
         let names = ["open", "image", "source lost", "source lost", "open", "image"];
         assert_eq!(reports(steps, Duration::from_secs(60), 6), names);

@@ -165,7 +165,7 @@ mod tests {
     }
 
     #[test]
-    fn a_wrong_calibration_is_named_once_and_the_last_good_one_stays() {
+    fn a_wrong_calibration_is_named_once_and_the_last_good_kept() {
         let mut source = beside();
         let mut info = info();
         source.handle_info(info.clone());

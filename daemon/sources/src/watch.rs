@@ -288,7 +288,7 @@ mod tests {
     }
 
     #[test]
-    fn the_form_of_names_and_times_ahead_are_told_once() {
+    fn the_form_of_names_and_future_times_are_logged_once() {
         let now = SystemTime::UNIX_EPOCH + Duration::from_secs(1_795_719_000);
         let mut told = ToldNames::default();
         let first = told.handle("1795719000567.jpg", now).unwrap();

@@ -96,7 +96,7 @@ fn command_belongs_to_the_client_that_took_it() {
 }
 
 #[test]
-fn command_that_was_handed_over_belongs_to_the_first_client_that_uses_it() {
+fn command_handed_over_belongs_to_the_first_client_to_use_it() {
     let [_, anna, bob, _] = crew();
     let [bridge, cabin] = ["bridge", "cabin"].map(|client| elsewhere(&bob, client));
     let mut command = Command::new(principals());

@@ -60,13 +60,13 @@ mod tests {
     }
 
     #[test]
-    fn cells_that_change_now_and_then_are_no_correction() {
+    fn occasional_changes_of_cells_are_no_correction() {
         assert_eq!(corrections(&[10; 60]), []);
         assert_eq!(corrections(&[35, 0, 0, 0, 0]), [], "too few");
     }
 
     #[test]
-    fn the_map_of_another_run_begins_anew() {
+    fn the_map_of_another_run_starts_without_corrections() {
         let mut watch = Corrections::default();
         assert_eq!(watch.handle_sample(Relabelled { cells: 500, bytes: 9 }, 600), None);
         for _ in 0..9 {

@@ -113,7 +113,7 @@ impl ExemplarCache {
             if picture.size >= Self::MAX_SIZE {
                 let edge = edge_px(picture.size);
                 return Err(format!(
-                    "picture {} of label {label} is as large as they come: {edge} pixels",
+                    "picture {} of label {label} has its full size already: {edge} pixels",
                     picture.number
                 ));
             }
@@ -242,7 +242,7 @@ mod tests {
         let sizes: Vec<(u8, u8)> = cache.label(5).unwrap().stored.iter().map(|p| (p.number, p.size)).collect();
         assert_eq!(sizes, [(9, 1)]);
         let said = cache.request(5, RequestKind::Larger(Some(9)), NOW).unwrap_err();
-        assert_eq!(said, "picture 9 of label 5 is as large as they come: 128 pixels");
+        assert_eq!(said, "picture 9 of label 5 has its full size already: 128 pixels");
         assert_eq!(
             cache.request(5, RequestKind::Larger(Some(4)), NOW).unwrap_err(),
             "picture 4 of label 5 is not here"

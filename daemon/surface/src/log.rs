@@ -12,7 +12,7 @@ use std::collections::VecDeque;
 /// The kind of an entry.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum LogKind {
-    /// An order was given.
+    /// An order was given, whether or not it arrives.
     Order,
     /// A vehicle has applied or refused an order.
     Answer,
@@ -78,7 +78,7 @@ pub struct LogEntry {
     pub kind: LogKind,
     /// The principal who caused it; `None`: the surface or the vehicle.
     pub by: Option<String>,
-    /// One line for people.
+    /// One line for people, of at most 240 characters.
     pub text: String,
 }
 
@@ -170,7 +170,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_concerns_no_safety_pushes_no_order_out_of_the_log_or_the_file() {
+    fn minor_entries_push_no_order_out_of_the_log_or_the_file() {
         let mut log = MissionLog::default();
         let mut stored = VecDeque::new();
         let mut add = |kind, text: &str| {
@@ -191,7 +191,7 @@ mod tests {
     }
 
     #[test]
-    fn the_log_keeps_its_last_entries_and_their_numbers_across_a_restart() {
+    fn the_log_keeps_its_last_entries_and_numbers_over_a_restart() {
         let mut log = MissionLog::default();
         let long = "x".repeat(1000);
         for second in 0..2500 {

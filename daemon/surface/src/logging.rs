@@ -137,7 +137,7 @@ impl Surface {
     }
 }
 
-/// Another surface for people.
+/// How texts for people name another surface.
 pub(super) fn surface_name(name: SurfaceName) -> String {
     match name.as_str() {
         "" => "another surface".to_owned(),

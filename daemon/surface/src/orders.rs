@@ -254,7 +254,7 @@ mod tests {
     }
 
     #[test]
-    fn areas_and_destinations_are_read_or_refused_with_the_allowed_values() {
+    fn areas_and_destinations_are_read_or_refused_with_the_limits() {
         let areas = |json: &str| serde_json::from_str::<AreasOrder>(json).map_err(|e| e.to_string())?.read();
         let sent = areas(r#"{"areas": [{"outline": [[0,0],[9.04,0],[9,9]], "weight": -0.255}]}"#).unwrap();
         assert_eq!((sent.0[0].outline.0[1], sent.0[0].weight), (DecimetrePoint::new(90, 0), -26));

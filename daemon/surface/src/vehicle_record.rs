@@ -93,7 +93,8 @@ impl VehicleRecord {
     /// Why a vehicle holds that has nothing left to do, as a text.
     pub fn end_of_survey(&self) -> &'static str {
         let has_areas = self.areas.sent.as_ref().is_some_and(|areas| !areas.0.is_empty());
-        if self.utility.weights.is_empty() && !has_areas { "the survey is complete" } else { "nothing left that pays" }
+        let has_interests = has_areas || !self.utility.weights.is_empty();
+        if has_interests { "nothing of interest is left" } else { "the survey is complete" }
     }
 
     pub fn new(name: String) -> Self {

@@ -38,13 +38,13 @@ enum Shown {
     Hidden,
 }
 
-/// Steps of a bar.
+/// Steps of a bar from empty to full.
 const STEPS: u64 = 1000;
 /// The task, the bar, the share of the work, the time since the start and the time that is left.
 const TEMPLATE: &str = "{prefix} {wide_bar} {percent:>3} %  {elapsed_precise} gone{left}";
 
 impl Progress {
-    /// Shows that `task` begins.
+    /// Shows that `task` begins, in the form that this process chose.
     pub fn new(task: &'static str) -> Self {
         Self(match FORM.get().copied().unwrap_or_default() {
             ProgressForm::Auto => Shown::Bar(bar(task)),

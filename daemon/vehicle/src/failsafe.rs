@@ -189,7 +189,7 @@ mod tests {
     }
 
     #[test]
-    fn an_abort_goes_before_a_breach_and_a_breach_before_a_hold() {
+    fn an_abort_precedes_a_breach_and_a_breach_precedes_a_hold() {
         let mut failsafe = Failsafe::new(FailsafePolicy::default(), at(0.0));
         failsafe.order = Constraints { hold: true, abort: false };
         assert_eq!(failsafe.stop(0.0), Some((Reaction::Hold, ModeReason::Order)));

@@ -4,7 +4,7 @@ use image::RgbImage;
 use scene_model::project::{DownCamera, Floor, Observation, Pose, View};
 use scene_model::words::Word;
 
-/// A camera frame.
+/// A camera frame with its place on the sea floor.
 #[derive(Debug, Clone, Copy)]
 pub struct Frame<'a> {
     /// The image, without distortion if it has a view.
@@ -131,7 +131,7 @@ mod tests {
     }
 
     #[test]
-    fn a_frame_goes_above_its_middle_and_back() {
+    fn a_pose_converts_to_above_the_middle_and_back() {
         let camera = Pose { x: 3.0, y: -2.0, z: -10.0, yaw_rad: 0.8 };
         for floor in [Floor::Flat(4.0), Floor::Depth(DepthImage { width: 1, height: 1, metres: vec![4.0] })] {
             let nadir = Nadir::of(&ahead(20.0, floor), (320, 240)).unwrap();
@@ -144,7 +144,7 @@ mod tests {
     }
 
     #[test]
-    fn the_registered_size_of_pixels_corrects_an_assumed_height_alone() {
+    fn a_registered_pixel_size_corrects_only_an_assumed_height() {
         let usual = DownCamera { metres_per_pixel: 0.01, altitude_m: 3.0 };
         let (image, word) = (RgbImage::new(320, 240), [Word { id: 0, u: 160.0, v: 120.0 }]);
         let height = |floor: Floor| {

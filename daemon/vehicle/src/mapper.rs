@@ -348,7 +348,7 @@ impl Mapper {
         self.model.words()
     }
 
-    /// The scene model.
+    /// The scene model that labels the frames.
     pub fn model(&self) -> &SceneModel {
         &self.model
     }

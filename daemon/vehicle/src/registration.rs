@@ -156,7 +156,7 @@ mod tests {
     }
 
     #[test]
-    fn an_order_switches_registration_off_without_a_jump_and_on_again() {
+    fn an_order_switches_registration_off_and_on_without_a_jump() {
         let mut mapper = Mapper::new(&config(&["navigation.drift_percent=5"]), None, 0, 1).unwrap();
         let set = |mapper: &mut Mapper, registration| mapper.tune(&Settings { registration, ..Settings::default() });
         let on = (0..6).map(|i| step(&mut mapper, i)).last().unwrap();
@@ -183,7 +183,7 @@ mod tests {
     }
 
     #[test]
-    fn without_registration_frames_stay_where_dead_reckoning_places_them() {
+    fn without_registration_dead_reckoning_places_the_frames() {
         let mut mapper = Mapper::new(&config(&["registration.enabled=false"]), None, 0, 1).unwrap();
         let last = (0..4).map(|i| step(&mut mapper, i)).last().unwrap();
         assert_eq!((last.pose.y, last.scale, last.is_seen()), (1.5, 1.0, false));

@@ -9,7 +9,7 @@ use crate::bytes::{BitReader, BitWriter, DecimetreStep};
 pub struct WeightedArea {
     /// The outline; cells with their centre inside or on it have the weight.
     pub outline: Polygon,
-    /// Hundredths, -100 to 100.
+    /// In hundredths, -100 (avoid) to 100 (seek).
     pub weight: i8,
 }
 
@@ -58,7 +58,7 @@ pub enum AreasFault {
 }
 
 impl Areas {
-    /// The most areas.
+    /// The most areas that one order has.
     pub const MAX: usize = 4;
 
     /// Checks whether a vehicle could obey these areas.

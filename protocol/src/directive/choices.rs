@@ -82,7 +82,7 @@ pub enum AtEnd {
     Repeat,
     /// It explores the rest of the area, then holds.
     Explore,
-    /// It holds.
+    /// It holds, and does not explore the rest of the area first.
     Hold,
 }
 

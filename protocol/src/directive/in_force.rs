@@ -164,7 +164,7 @@ impl InForceSummary {
 pub struct InForcePart<'a> {
     /// The slot of the content.
     pub id: SlotId,
-    /// The part.
+    /// A piece of the encoded content, with its place in it.
     pub part: TextPart<'a>,
 }
 

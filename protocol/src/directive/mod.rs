@@ -67,7 +67,7 @@ pub enum SlotId {
     Fence,
     /// The place to which the vehicle goes at once.
     Destination,
-    /// Weighted areas.
+    /// Outlines in which cells have a weight in addition to that of their label.
     Areas,
 }
 
@@ -218,7 +218,7 @@ pub enum Slot {
     Fence(Fence),
     /// A place to go to at once.
     Destination(Destination),
-    /// Weighted areas.
+    /// Outlines in which cells have a weight in addition to that of their label.
     Areas(Areas),
 }
 

@@ -34,7 +34,7 @@ pub enum Withdrawal {
 }
 
 impl Withdrawal {
-    /// Every reason.
+    /// Every reason for which an order is withdrawn.
     pub const ALL: [Self; 4] = [Self::Superseded, Self::Overtaken, Self::Late, Self::Lost];
 
     /// Whether the operator has to decide if the order is given again.

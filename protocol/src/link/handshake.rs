@@ -125,7 +125,7 @@ impl<T> Handshake<T> {
         self.unproved.is_some() && self.provable().is_some_and(|r| self.unproved == Some(r.peer))
     }
 
-    /// A proof was written.
+    /// A proof was written: none is owed until the hello of an offered run comes in again.
     pub(super) fn note_proof(&mut self) {
         self.unproved = None;
         self.doubt();

@@ -19,7 +19,7 @@ pub struct Authenticity {
 }
 
 impl Authenticity {
-    /// Authentication by one key.
+    /// Authentication by one key, without a next one to change over to.
     #[must_use]
     pub fn new(key: HeldKey, all: bool, encrypt: bool) -> Self {
         Self { key: Arc::new(key), next: None, all, encrypt }

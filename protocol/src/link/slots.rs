@@ -8,7 +8,7 @@ use std::collections::VecDeque;
 /// The orders of one series that a vehicle has received.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SeriesRecord {
-    /// The series.
+    /// The series that the versions and decisions belong to.
     pub series: Series,
     /// The latest version received, by slot.
     pub versions: [Option<u16>; SLOTS],
@@ -24,7 +24,7 @@ pub struct SlotInboxState {
 }
 
 impl SlotInboxState {
-    /// Series that are remembered.
+    /// Series that are remembered, the one met or heard last among them.
     const MEMORY: usize = 16;
 
     /// The series of the surface that was met or heard last.
@@ -218,7 +218,7 @@ mod tests {
     }
 
     #[test]
-    fn an_order_of_a_surface_that_does_not_know_a_newer_one_is_left_out() {
+    fn an_order_from_a_surface_unaware_of_a_newer_one_is_overtaken() {
         let (mut inbox, [first, second, third]) = (SlotInbox::default(), [1, 2, 3].map(series));
         assert_eq!(inbox.admit(first, &slot(3), false), Admission::New);
         inbox.decide(SlotId::Utility, SlotState::Applied);

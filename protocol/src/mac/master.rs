@@ -261,7 +261,7 @@ mod tests {
     };
 
     #[test]
-    fn the_surface_waits_for_the_end_of_a_turn_in_another_run_but_no_longer_than_it_granted() {
+    fn the_surface_waits_for_a_turn_in_another_run_as_granted() {
         let now = Instant::from_secs_f64(100.0);
         let mut master = Master::new(MasterConfig::default(), now);
         master.handle_round_trip(Duration::from_secs(1));

@@ -254,7 +254,7 @@ mod tests {
     }
 
     #[test]
-    fn a_later_tree_replaces_an_earlier_one_and_never_the_other_way_round() {
+    fn a_later_tree_replaces_an_earlier_one_but_never_the_reverse() {
         let (mut source, mut replica) = (TreeSource::default(), TreeReplica::default());
         let [first, second] = [tree(&[(1, 2)], None), tree(&[(1, 3), (1, 2)], None)];
         assert!(source.set(&first) && !source.set(&first));

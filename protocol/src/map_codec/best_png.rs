@@ -97,7 +97,7 @@ fn scanlines(map: &LabelRaster, depth: usize) -> Vec<u8> {
 mod tests {
     use super::*;
 
-    /// Stores without compression.
+    /// A compressor that only stores, so each length is that of the data.
     struct Stored;
 
     impl Deflate for Stored {

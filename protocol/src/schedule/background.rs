@@ -101,7 +101,7 @@ impl Default for BackgroundOrder {
 }
 
 impl BackgroundOrder {
-    /// Most streams.
+    /// Each layer once, finer cells, and exemplars.
     const MAX_STREAMS: usize = LayerId::COUNT + 2;
 
     /// These streams in this order; `None` if one is named twice.

@@ -86,7 +86,7 @@ mod tests {
     use proptest::prelude::*;
 
     #[test]
-    fn an_offer_gives_the_next_key_to_the_vehicle_alone_that_holds_the_present_one() {
+    fn an_offer_gives_the_next_key_only_to_holders_of_the_present() {
         let (present, next) = (MissionKey::from_bytes([1; 16]), MissionKey::from_bytes([2; 16]));
         let key = VehicleKey::derive(&next, 3);
         let [link, calls] = key.offer(&present.vehicle(3));

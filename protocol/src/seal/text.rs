@@ -62,7 +62,7 @@ pub enum KeyError {
 /// What a key file holds.
 #[derive(Debug, Clone)]
 pub struct KeyFile {
-    /// The present key.
+    /// The key in use, of the mission or of one vehicle.
     pub key: HeldKey,
     /// The next key of the mission, which the surface offers to its vehicles.
     pub next: Option<MissionKey>,
@@ -275,7 +275,7 @@ mod tests {
         }
 
         #[test]
-        fn the_keys_of_a_vehicle_come_back_from_their_text_and_a_wrong_digit_is_noticed(
+        fn keys_of_a_vehicle_read_back_and_a_wrong_digit_is_noticed(
             bytes: [u8; 16], address in 1u8..=14, at in 22usize..108, digit in "[0-9a-f]",
         ) {
             let key = VehicleKey::derive(&MissionKey::from_bytes(bytes), address);

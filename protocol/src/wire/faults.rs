@@ -18,7 +18,7 @@
 /// Source: vehicle, among the [`super::PoseDetails`], while there is a fault. The first bit is the highest.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct EquipmentFaults {
-    /// No image comes in.
+    /// No image comes in: the camera is lost or stalled.
     pub camera_silent: bool,
     /// An image that could not be used was dropped within the last 10 s.
     pub images_dropped: bool,
@@ -38,7 +38,7 @@ pub struct EquipmentFaults {
 }
 
 impl EquipmentFaults {
-    /// Bytes on the wire.
+    /// Bytes on the wire: one bit for each fault.
     pub const BYTES: usize = 1;
 
     /// Whether there is a fault.
@@ -62,7 +62,7 @@ impl EquipmentFaults {
         .filter_map(|(is_set, text, is_grave)| is_set.then_some((text, is_grave)))
     }
 
-    /// The grave faults alone.
+    /// Only the faults with which the survey does not proceed as planned.
     #[must_use]
     pub fn grave(self) -> Self {
         Self { images_dropped: false, poses_faulty: false, labels_refused: false, depth_missing: false, ..self }

@@ -357,7 +357,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_that_follows_takes_no_byte() {
+    fn a_remaining_count_of_zero_takes_no_byte() {
         let frame = |remaining: u8| {
             let mut builder = FrameBuilder::new(&Header { remaining: 0, ..header() }, 64).in_turn();
             assert!(builder.push(ChunkKind::Map, &[1, 2]));
@@ -369,7 +369,7 @@ mod tests {
     }
 
     #[test]
-    fn of_version_2_only_hellos_are_read() {
+    fn only_hellos_are_read_of_version_2() {
         let map = [0x50, 0x10, 0x12, 0x34, 0x00, 0xFF, 3, 2, 0x00, 0x50, 0x22, 0xAA, 0xBB, 0x00, 0xF6, 0x3D];
         assert_eq!(envelope(&map).unwrap_err(), FrameError::Version(2));
         let hello = [0x44, 0x10, 0x12, 0x34, 0, 0, 1, 0, 0x4A, 0xC0, 0x2B];

@@ -132,7 +132,7 @@ pub struct Introduction {
 impl Introduction {
     /// Bytes of the longest introduction.
     pub const MAX_BYTES: usize = Self::HEAD + SurfaceName::MAX_BYTES;
-    /// Bytes before the name.
+    /// Bytes of the fixed fields, which are before the name.
     const HEAD: usize = 14;
     const PLAIN: u8 = 0x80;
 

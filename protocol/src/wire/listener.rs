@@ -214,7 +214,7 @@ mod tests {
     }
 
     #[test]
-    fn a_run_is_still_known_after_many_calls_and_hellos_to_other_vehicles() {
+    fn a_run_is_known_after_many_calls_and_hellos_to_others() {
         let other = Address::vehicle(2).unwrap();
         let calls = (100..140).map(|call| hello(Address::SURFACE, Address::EVERYBODY, call, 0, false));
         let others = (200..240).map(|run| hello(Address::SURFACE, other, run, 0, false));

@@ -53,7 +53,7 @@ const SIGMA_UNIT_M: f64 = 0.02;
 const WHOLE: f64 = 63.0;
 
 impl RegistrationReport {
-    /// Bytes on the wire.
+    /// Bytes on the wire, of which the last two are the closed loops.
     pub const BYTES: usize = 4;
 
     /// The bytes on the wire.

@@ -33,7 +33,7 @@ pub enum VehicleMode {
 impl VehicleMode {
     const ALL: [Self; 6] = [Self::Survey, Self::Hold, Self::Return, Self::Surface, Self::Abort, Self::Done];
 
-    /// The name for people.
+    /// The mode as a word for people, such as "surveying".
     pub fn name(self) -> &'static str {
         match self {
             Self::Survey => "surveying",

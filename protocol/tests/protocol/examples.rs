@@ -27,11 +27,11 @@ fn a_series_of_maps_is_coded() {
 }
 
 #[test]
-fn a_modem_of_ones_own_is_driven() {
+fn a_custom_modem_is_driven() {
     own_modem::main();
 }
 
 #[test]
-fn test_vectors_read_as_they_say() {
+fn test_vectors_read_as_they_state() {
     vectors::main();
 }

@@ -169,7 +169,7 @@ fn a_surface_without_memory_learns_what_is_in_force() {
 }
 
 #[test]
-fn a_remembered_content_is_confirmed_by_the_report_alone_and_a_wrong_one_is_not_shown() {
+fn a_report_confirms_remembered_content_and_hides_a_wrong_one() {
     for (remembered, is_right) in [(fence(300), true), (fence(200), false)] {
         let mut pair = LinkedEnds::new(9, Setup::new(64, 2000, Codec::Png), CHANNEL);
         pair.put_in_force(fence(300));

@@ -49,7 +49,7 @@ fn held(ends: &LinkedEnds) -> (u32, Option<u32>) {
 }
 
 #[test]
-fn the_vehicle_changes_to_the_next_key_and_the_one_before_opens_nothing() {
+fn the_vehicle_changes_to_the_next_key_and_drops_the_old_one() {
     for access in ACCESSES {
         let mut ends = ends(5, access, CALM);
         run(&mut ends, 60);

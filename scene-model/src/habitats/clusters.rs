@@ -14,7 +14,7 @@ const MAX_ROTATIONS: usize = 1000;
 /// When a cluster is split, and when two become one. Lengths are in units of the noise between neighbours.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Rule {
-    /// Most clusters.
+    /// The largest number of clusters.
     pub(crate) most: usize,
     /// Least variance of a cluster in its main direction.
     pub(crate) variance: f64,
@@ -255,7 +255,7 @@ mod tests {
     }
 
     #[test]
-    fn a_map_that_has_grown_keeps_its_centres_and_bears_new_ones() {
+    fn a_map_that_has_grown_keeps_its_centres_and_gets_new_ones() {
         let centres = vec![vec![0.2, 0.1], vec![9.0, 1.0]];
         let found = Clusters::continued(&groups(9.0), centres, &RULE);
         assert_eq!(found.centres.len(), 3);

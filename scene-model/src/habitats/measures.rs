@@ -35,7 +35,7 @@ pub struct MeasuredPoint {
     pub u: f32,
     /// Position in the frame, pixels.
     pub v: f32,
-    /// The measures there.
+    /// Mean colour, logarithm of its deviation, and texture around the position.
     pub values: MeasuredValues,
 }
 

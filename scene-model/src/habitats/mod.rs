@@ -241,7 +241,7 @@ impl Habitats {
         Rule { most: self.most as usize, variance: map.contrast, cells: 24, share: 0.005, gap }
     }
 
-    /// `None` without cells.
+    /// The cells as points whose distances are compared; `None` without cells.
     fn compared(&self) -> Option<Compared> {
         let (places, values): (Vec<_>, Vec<_>) = self.sights.means().into_iter().unzip();
         if places.is_empty() {
@@ -459,7 +459,7 @@ mod tests {
     }
 
     #[test]
-    fn a_map_that_rests_is_the_same_in_any_order() {
+    fn a_corrected_map_is_the_same_in_any_order() {
         let (forward, back) = (rested(0..27), rested((0..27).rev()));
         let mut names = BTreeMap::new();
         for ((place, label), (_, other)) in forward.iter().zip(&back) {
@@ -529,7 +529,7 @@ mod tests {
     }
 
     #[test]
-    fn a_label_is_not_given_to_what_shares_few_of_its_cells() {
+    fn a_cluster_with_few_cells_of_a_label_does_not_take_it() {
         let mut habitats = Habitats::new(16);
         let places: Vec<(i32, i32)> = (0..100).map(|x| (0, x)).collect();
         habitats.clustered = places.iter().map(|&place| (place, u32::from(place.1 >= 40))).collect();
@@ -571,7 +571,7 @@ mod tests {
     }
 
     #[test]
-    fn habitats_of_a_floor_whose_neighbours_differ_as_much_are_told_apart() {
+    fn habitats_are_separated_although_their_neighbours_differ_too() {
         let ([west, east], _) = stones(7);
         assert_ne!(west, east);
         assert_eq!(stones(0).1, 1);

@@ -122,7 +122,7 @@ mod tests {
     }
 
     #[test]
-    fn a_lamp_is_taken_out_where_places_were_seen_twice() {
+    fn a_lamp_is_removed_where_places_were_seen_twice() {
         let floor = |cell: i32| f64::from(cell % 3);
         let mut sights = Sights::default();
         // Each cell first at the left, then at the right of the frame, where the lamp is one unit brighter.

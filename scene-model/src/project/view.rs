@@ -29,12 +29,12 @@ pub enum Floor {
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct View {
-    /// The intrinsics.
+    /// The intrinsics of the camera, in pixels.
     pub camera: PinholeCamera,
     /// The rotation x, y, z, w from the camera's axes to those of a frame whose top points north: to the right, ahead and
     /// up.
     pub tilt: [f64; 4],
-    /// The floor.
+    /// The floor that it sees: flat, or with measured distances.
     pub floor: Floor,
 }
 

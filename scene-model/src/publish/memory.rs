@@ -39,7 +39,7 @@ const MAX_TOPICS: usize = 8;
 /// ```
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct TopicMemory {
-    /// By (y, x).
+    /// The cells by (y, x), that is row by row.
     cells: BTreeMap<(i32, i32), CellMemory>,
     last_s: Option<f64>,
 }

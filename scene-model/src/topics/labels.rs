@@ -105,7 +105,7 @@ impl Labels {
         self.assign_topics();
     }
 
-    /// As [`SceneModel::limit_labels`](super::SceneModel::limit_labels).
+    /// Sets the limit, as [`SceneModel::limit_labels`](super::SceneModel::limit_labels) does.
     pub(crate) fn set_limit(&mut self, limit: usize) {
         if self.limit != limit {
             self.limit = limit;

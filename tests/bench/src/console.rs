@@ -15,7 +15,7 @@ const CONSOLES: usize = 10;
 /// Time for which the surface is measured without and with the consoles.
 const WINDOW: Duration = Duration::from_secs(28);
 /// Longest wait for a first map.
-const PATIENCE: Duration = Duration::from_secs(120);
+const MAP_TIMEOUT: Duration = Duration::from_secs(120);
 /// Limits: the consoles' part of a core, and the median time to the whole map in seconds.
 const LIMITS: (f64, f64) = (0.1, 0.2);
 
@@ -141,11 +141,11 @@ fn share_of_a_core(process: &Process) -> f64 {
 }
 
 fn wait_for_map(page: u16) -> Result<(), UserError> {
-    let until = Instant::now() + PATIENCE;
+    let until = Instant::now() + MAP_TIMEOUT;
     let explored = || state(page).and_then(|state| state["vehicles"][0]["map"]["explored_cells"].as_u64());
     while explored().is_none_or(|cells| cells == 0) {
         if Instant::now() > until {
-            return Err(UserError::Failed(format!("no map within {PATIENCE:?}")));
+            return Err(UserError::Failed(format!("no map within {MAP_TIMEOUT:?}")));
         }
         std::thread::sleep(Duration::from_millis(100));
     }

@@ -30,7 +30,7 @@ const SPEED_M_S: f64 = 0.5;
 const LEGS_M: (f64, f64) = (20.0, 2.5);
 
 /// Longest wait for a peer or a map.
-const PATIENCE: Duration = Duration::from_secs(60);
+const TIMEOUT: Duration = Duration::from_secs(60);
 
 /// A vehicle and a surface as processes, with images and odometry by ROS 2 over the loopback network without multicast.
 ///
@@ -128,7 +128,7 @@ impl LiveBench {
     fn publish(&self, node: &RosNode) -> Result<(), UserError> {
         let images: Publisher<Image> = node.publisher(&topic("/camera/image_raw")?, Qos::Sensor(5))?;
         let poses: Publisher<Odometry> = node.publisher(&topic("/odometry")?, Qos::Sensor(50))?;
-        let until = Instant::now() + PATIENCE;
+        let until = Instant::now() + TIMEOUT;
         while images.subscribers() == 0 || poses.subscribers() == 0 {
             if Instant::now() > until {
                 return Err(UserError::Failed("the vehicle does not subscribe".to_owned()));
@@ -229,7 +229,7 @@ fn late_map(settings: &Ros2) -> Result<Option<f64>, UserError> {
     let began = Instant::now();
     let node = RosNode::start(settings, "scenecast_viewer")?;
     let inbox = node.subscribe_label_map(&topic("/scenecast/auv_1/map")?)?;
-    Ok(inbox.wait(PATIENCE).then(|| began.elapsed().as_secs_f64()))
+    Ok(inbox.wait(TIMEOUT).then(|| began.elapsed().as_secs_f64()))
 }
 
 /// The numbers of mapped and of dropped images in the vehicle's last line about its camera.

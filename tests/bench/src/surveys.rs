@@ -87,7 +87,6 @@ pub(crate) fn fly_all<R>(
     Ok(rows)
 }
 
-/// Prints figures as JSON.
 pub(crate) fn print_json(all: &serde_json::Value) -> Result<(), UserError> {
     println!("{}", serde_json::to_string_pretty(all).map_err(|e| UserError::Failed(e.to_string()))?);
     Ok(())

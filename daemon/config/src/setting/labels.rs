@@ -25,18 +25,18 @@ pub enum LabelSource {
 /// A type of messages of ROS 2 with labels or bands.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum LabelMessage {
-    /// `nav_msgs/msg/OccupancyGrid`
+    /// `nav_msgs/msg/OccupancyGrid`: a grid of bytes.
     OccupancyGrid,
-    /// `sensor_msgs/msg/Image`
+    /// `sensor_msgs/msg/Image`: a segmented image of a camera.
     Image,
-    /// `grid_map_msgs/msg/GridMap`
+    /// `grid_map_msgs/msg/GridMap`: a grid with named layers.
     GridMap,
 }
 
 impl LabelMessage {
     const ALL: [Self; 3] = [Self::OccupancyGrid, Self::Image, Self::GridMap];
 
-    /// The name behind `#`.
+    /// The name of the type behind `#` in the setting of a source.
     pub fn name(self) -> &'static str {
         match self {
             Self::OccupancyGrid => "OccupancyGrid",

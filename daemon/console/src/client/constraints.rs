@@ -126,11 +126,11 @@ pub(super) async fn send(
 }
 
 /// Longitude and latitude if the mission has an origin, as in the files of `ctl map`.
-/// Degrees have a place only around the mission's origin.
+/// Degrees can be read only around the mission's origin.
 pub(super) fn degrees(state: &MissionState) -> Result<CoordinateFrame, UserError> {
     let origin = state.mission.origin.and_then(|o| LatLon::new(o.lat_deg, o.lon_deg));
     let origin = origin.ok_or(UserError::Input(
-        "the mission has no origin (mission.origin_deg), so degrees have no place; --metres reads metres east and north"
+        "the mission has no origin (mission.origin_deg), so degrees cannot be read; --metres reads metres east and north"
             .to_owned(),
     ))?;
     Ok(CoordinateFrame::Wgs84(TangentPlane::new(origin)))

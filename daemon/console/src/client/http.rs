@@ -22,7 +22,7 @@ const MAX_BYTES: usize = 1 << 28;
 #[derive(Debug)]
 pub struct Client {
     url: String,
-    /// `HOST:PORT`.
+    /// The part `HOST:PORT` of the URL.
     authority: String,
     token: Option<Zeroizing<String>>,
     /// The name that we give ourselves.

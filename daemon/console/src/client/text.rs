@@ -32,7 +32,6 @@ pub(super) fn status(state: &MissionState, only: Option<u8>) -> String {
     out
 }
 
-/// Joules as text.
 fn energy(joules: f64) -> String {
     if joules < 10_000.0 { format!("{joules:.1} J") } else { format!("{:.1} kJ", joules / 1e3) }
 }

@@ -33,7 +33,7 @@ pub struct MapCells {
     pub names: BTreeMap<u8, String>,
     /// Which labels become one at coarser cuts, if that is known.
     pub tree: Option<LabelTree>,
-    /// The operator's markers.
+    /// The markers that the operator has put on the map.
     pub markers: Vec<VehicleMarker>,
     /// Whose map it is, and of when; `None` where that is not known.
     pub caption: Option<MapCaption>,

@@ -8,7 +8,7 @@ pub(super) type Ring = Vec<(i64, i64)>;
 /// An outer ring, anticlockwise, then the holes, clockwise.
 pub(super) type Polygon = Vec<Ring>;
 
-/// East, north, west, south.
+/// One cell to the east, north, west and south.
 const STEPS: [(i64, i64); 4] = [(1, 0), (0, 1), (-1, 0), (0, -1)];
 const NONE: u32 = u32::MAX;
 const TILE: i64 = REPLICA_TILE as i64;

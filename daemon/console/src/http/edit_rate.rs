@@ -37,7 +37,7 @@ mod tests {
     use std::time::Duration;
 
     #[test]
-    fn a_principal_that_edits_too_fast_waits_and_no_other_does() {
+    fn only_a_principal_that_edits_too_fast_waits() {
         let (rate, now) = (EditRate::default(), Instant::now());
         let taken = |at| (0..1000).filter(|_| rate.take("ann", at)).count();
         assert_eq!(taken(now), 100);

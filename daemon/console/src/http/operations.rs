@@ -29,7 +29,7 @@ pub(super) enum Content {
     Json(SchemaOf),
     /// A file or a text with this content type.
     File(&'static str),
-    /// Server-sent events.
+    /// A stream of server-sent events, which stays open.
     Events,
     /// Changed tiles of a map, binary.
     Tiles,

@@ -184,7 +184,7 @@ pub struct StatusReport {
     /// The reason for the mode, unless it is the survey: order, fence, distance, time, silence, depth or altitude, no path.
     pub reason: Option<String>,
     /// Mode with its reason or purpose as a text, such as "holding: fence", "surveying: looking for label 5" or, at the end of the
-    /// plan, "holding: nothing left that pays".
+    /// plan, "holding: nothing of interest is left".
     pub activity: String,
     /// The planned path of the vehicle, where reported.
     #[serde(flatten)]

@@ -115,7 +115,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_is_refused() {
+    fn impossible_values_are_refused() {
         assert_eq!(parse(b"{\"class\":\"TPV\",\"mode\":3,\"lat\":95,\"lon\":0}"), None);
         assert_eq!(parse(b"{\"class\":\"TPV\",\"mode\":3,\"lat\":1}"), None);
         assert_eq!(parse(b"{\"class\":\"TPV\",\"mode\":3,\"lat\":NaN,\"lon\":0}"), None);

@@ -348,7 +348,7 @@ mod tests {
     }
 
     #[test]
-    fn what_stands_between_and_before_sentences_costs_none_of_them() {
+    fn bytes_before_and_between_sentences_lose_none_of_them() {
         let mut gps = Gps::new(GpsLanguage::Nmea);
         let trim = |line: String| line.trim().to_owned();
         let stream = [
@@ -407,7 +407,7 @@ mod tests {
     }
 
     #[test]
-    fn latitude_and_longitude_zero_are_no_place() {
+    fn latitude_and_longitude_zero_are_no_position() {
         let mut gps = Gps::new(GpsLanguage::Nmea);
         let null = nmea::line("GPRMC,120000.00,A,0000.0000,N,00000.0000,E,0.0,,261126,,,A");
         assert!(gps.handle_bytes(null.as_bytes(), at(0.0)).is_empty());
@@ -416,7 +416,7 @@ mod tests {
     }
 
     #[test]
-    fn a_compass_goes_before_the_course() {
+    fn a_compass_is_preferred_to_the_course() {
         let mut gps = Gps::new(GpsLanguage::Nmea);
         gps.handle_bytes(nmea::line("GPVTG,90.0,T,,M,4.0,N,,K,A").as_bytes(), at(0.0));
         assert!((gps.heading_rad(at(1.0)).unwrap() - 90f64.to_radians()).abs() < 1e-9);
@@ -440,7 +440,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn any_stream_is_taken(
+        fn any_stream_is_accepted(
             pieces in proptest::collection::vec(proptest::collection::vec(any::<u8>(), 0..300), 0..20), is_gpsd: bool,
         ) {
             let mut gps = Gps::new(if is_gpsd { GpsLanguage::Gpsd } else { GpsLanguage::Nmea });

@@ -194,14 +194,14 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn of_equals_the_smaller_stream_is_chosen() {
+    fn of_equal_settings_the_smaller_stream_is_chosen() {
         let fit = table([row(1.0, 0.3, 900.0), row(0.1, 0.3, 700.0), row(0.01, 0.3, 800.0)]).fit(0.25, 1e4).unwrap();
         assert_eq!(fit.chosen.map(|row| row.setting.alpha), Some(0.1));
     }
 
     proptest! {
         #[test]
-        fn no_setting_that_fits_tells_more(
+        fn no_setting_that_fits_has_more_information(
             rows in proptest::collection::vec((0.0f64..1.0, 1.0f64..1e4), 1..20), bits_per_s in 0.0f64..1.2e4,
         ) {
             let rows = rows.iter().enumerate().map(|(i, &(mi, stream))| row(1.0 + i as f64, mi, stream));

@@ -203,7 +203,7 @@ mod tests {
     }
 
     #[test]
-    fn a_waypoint_is_said_each_second_with_right_checksums() {
+    fn a_waypoint_is_sent_each_second_with_right_checksums() {
         let mut pilot = Nmea::new(false, Duration::from_secs(5), at(0.0));
         pilot.handle_timeout(at(0.0));
         assert!(said(&mut pilot).is_empty(), "nothing is ordered yet");

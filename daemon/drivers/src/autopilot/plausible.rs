@@ -199,7 +199,7 @@ mod tests {
     }
 
     #[test]
-    fn of_a_depth_that_jumps_and_stays_only_the_changes_count() {
+    fn after_a_lasting_jump_of_the_depth_only_changes_count() {
         let sunk = |i: i32| 0.02 * f64::from(i - 200);
         let (depths, notes) = used((0..2000).map(|i| if i < 200 { 5.0 } else { 42.0 + sunk(i) }));
         for (i, depth) in (200..).zip(&depths[200..]) {
@@ -232,7 +232,7 @@ mod tests {
     }
 
     #[test]
-    fn a_dive_as_fast_as_a_vehicle_can_is_no_jump_even_after_a_silence() {
+    fn the_fastest_dive_is_no_jump_even_after_a_silence() {
         let depths: Vec<f64> = (0..200).map(|i| 0.25 * f64::from(i)).collect();
         assert_eq!(used(depths.clone()), (depths, vec![]));
         let mut plausible = Plausible::default();

@@ -78,7 +78,7 @@ mod tests {
     use std::time::Duration;
 
     #[test]
-    fn way_that_nobody_fetches_is_kept_in_sum_and_nothing_grows() {
+    fn unread_steps_are_summed_up_in_bounded_memory() {
         let mut tray = Tray::default();
         for i in 0..10_000 {
             let unseen = Duration::from_millis(u64::from(i % 2 == 0));

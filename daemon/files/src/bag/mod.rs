@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 use stream::{BagMessage, BagStream, BagTopic};
 
-/// The types of images.
+/// The ROS types of the images that are read.
 pub(crate) const RAW: &str = "sensor_msgs/msg/Image";
 pub(crate) const COMPRESSED: &str = "sensor_msgs/msg/CompressedImage";
 

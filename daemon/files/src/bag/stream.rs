@@ -174,7 +174,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn other_recordings_are_refused_with_the_command_that_converts_them() {
+    fn other_recordings_are_refused_with_a_command_to_convert_them() {
         let dir = std::env::temp_dir().join(format!("scenecast-{}-other-bags", std::process::id()));
         let _ = std::fs::remove_dir_all(&dir);
         std::fs::create_dir_all(&dir).unwrap();

@@ -20,7 +20,7 @@ fn type_hashes_are_those_of_ros() {
 }
 
 #[test]
-fn a_schema_has_each_dependency_once_after_a_line_of_equal_signs() {
+fn a_schema_lists_each_dependency_once_after_a_separator() {
     let schema = nav_msgs::Odometry::DEFINITION.ros2msg();
     let separator = "=".repeat(80);
     let parts: Vec<&str> = schema.split(&format!("{separator}\nMSG: ")).collect();

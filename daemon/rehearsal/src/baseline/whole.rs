@@ -172,7 +172,7 @@ mod tests {
     use std::time::Duration;
 
     #[test]
-    fn a_grid_on_both_sides_of_the_origin_arrives_in_spite_of_losses() {
+    fn a_grid_around_the_origin_arrives_in_spite_of_losses() {
         let sets = ["channel.loss=0.3", "link.frame_bytes=64"].map(str::to_owned);
         let config = scenecast_config::load(None, &sets).unwrap();
         let mut rig = LinkRig::<_, WholeReplica>::new(&config, WholeSource::default(), 5).unwrap();

@@ -149,7 +149,7 @@ impl Mission {
         &self.mapper
     }
 
-    /// The vehicle's true motion.
+    /// The vehicle's true motion, without the errors of its navigation.
     pub fn motion(&self) -> &Motion {
         &self.motion
     }
@@ -170,7 +170,7 @@ impl Mission {
         notes.chain(self.logbook.camera_advice.as_deref())
     }
 
-    /// The surface's role.
+    /// The surface's role, which has what the operator sees.
     pub fn surface(&self) -> &Surface {
         self.surface.surface()
     }
@@ -278,7 +278,7 @@ impl Mission {
         (x - self.motion.x_m).hypot(y - self.motion.y_m)
     }
 
-    /// The simulated sea floor.
+    /// The simulated sea floor that the camera sees.
     pub fn world(&self) -> &World {
         &self.camera.world
     }

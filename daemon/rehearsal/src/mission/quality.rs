@@ -15,7 +15,7 @@ const COMPARED: usize = 10;
 /// The quality of both maps at one moment.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct MapQuality {
-    /// Mission time, seconds.
+    /// Mission time of the sample, in seconds.
     pub t_s: f64,
     /// `None` without annotation, as for the operator's map.
     pub vehicle: Option<MapInformation>,
@@ -40,7 +40,6 @@ impl MapQuality {
     }
 }
 
-/// The samples so far.
 #[derive(Debug, Default)]
 pub(crate) struct QualitySeries {
     samples: Vec<MapQuality>,

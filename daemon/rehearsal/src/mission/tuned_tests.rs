@@ -107,7 +107,7 @@ fn maps_agree_after_settings_changed_in_the_mission() {
 }
 
 #[test]
-fn the_map_tells_as_many_labels_apart_as_were_ordered() {
+fn the_map_has_as_many_labels_as_were_ordered() {
     let mut mission = mission(&["survey.speed_m_s=1"]);
     mission.fly_to(150.0);
     let shown = |mission: &Mission| {

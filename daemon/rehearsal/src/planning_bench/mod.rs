@@ -26,12 +26,12 @@ pub enum Source {
     Reef,
     /// Annotated images, labelled by the scene model.
     Images,
-    /// Label maps from files.
+    /// Label maps from indexed PNG files.
     Files,
 }
 
 impl Source {
-    /// The name for people.
+    /// The name for people, in lower case.
     pub fn name(self) -> &'static str {
         match self {
             Self::Patches => "patches",
@@ -45,7 +45,7 @@ impl Source {
 /// The scenes of a comparison that are read from files.
 #[derive(Debug, Default)]
 pub struct PlanningFiles {
-    /// Images with their annotations.
+    /// Paths of images, each with the path of its annotation.
     pub images: Vec<(PathBuf, PathBuf)>,
     /// Indexed PNG files: pixel value = label. If there are any, no other scene is used.
     pub labels: Vec<PathBuf>,

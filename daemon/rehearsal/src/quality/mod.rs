@@ -7,7 +7,6 @@ pub use plot::{Curve, Line, Panel, quality_plot};
 use crate::mission::{MapInformation, MapQuality};
 use std::fmt::Write;
 
-/// The columns of [`quality_csv`].
 const COLUMNS: &str = "t_s,vehicle_rigid_nats,vehicle_placed_nats,operator_rigid_nats,operator_placed_nats,agreement,\
                        age_s,error_rigid_cells,error_placed_cells,relabelled";
 

@@ -6,7 +6,7 @@ use plotters::prelude::*;
 
 /// Size of a panel, pixels.
 const PANEL: (u32, u32) = (560, 400);
-/// Panels in a row.
+/// Panels beside each other in one row.
 const ACROSS: usize = 2;
 const TITLE: u32 = 34;
 const FONT: (&str, u32) = ("sans-serif", 16);

@@ -1,6 +1,6 @@
 //! Names of topics and types on DDS.
 
-/// `/map` as `rt/map`.
+/// The name of a topic on DDS: `/map` becomes `rt/map`.
 pub(super) fn dds_topic(name: &str) -> String {
     format!("rt{name}")
 }
@@ -10,7 +10,7 @@ pub(super) fn ros_topic(dds_name: &str) -> Option<String> {
     dds_name.strip_prefix("rt").filter(|name| name.starts_with('/')).map(str::to_owned)
 }
 
-/// `std_msgs::msg::dds_::Header_` as `std_msgs/msg/Header`.
+/// The name of a type in ROS 2: `std_msgs::msg::dds_::Header_` becomes `std_msgs/msg/Header`.
 pub(crate) fn ros_type(dds_name: &str) -> String {
     dds_name.trim_end_matches('_').replace("::dds_::", "::").replace("::", "/")
 }

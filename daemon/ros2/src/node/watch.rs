@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 /// Time between two looks at the peers.
 const INTERVAL: Duration = Duration::from_secs(1);
 /// Time without a publisher, or without a router, after which it is logged.
-const PATIENCE_TIMEOUT: Duration = Duration::from_secs(10);
+const PEER_TIMEOUT: Duration = Duration::from_secs(10);
 
 /// Counts the publishers of a subscription; `None` once that has ended.
 type Count = Box<dyn Fn() -> Option<usize> + Send>;
@@ -43,7 +43,7 @@ impl Wanted {
                 (self.since, self.is_reported) = (now, false);
                 None
             }
-            0 if !is_reported && now.duration_since(self.since) >= PATIENCE_TIMEOUT => {
+            0 if !is_reported && now.duration_since(self.since) >= PEER_TIMEOUT => {
                 self.is_reported = true;
                 Some(self.outage(peers))
             }
@@ -59,7 +59,7 @@ impl Wanted {
     /// Why there may be no publisher.
     fn outage(&self, by_transport: &[(Transport, Peers)]) -> String {
         let Self { topic, message, .. } = self;
-        let begin = format!("{topic}: no publisher of {message} for {} s", PATIENCE_TIMEOUT.as_secs());
+        let begin = format!("{topic}: no publisher of {message} for {} s", PEER_TIMEOUT.as_secs());
         for (transport, peers) in by_transport {
             let other = peers.publishers.iter().find(|(name, other)| name == topic && other != message);
             if let Some((_, other)) = other {
@@ -141,7 +141,7 @@ impl Router {
             self.reported = Some(true);
             return Some(format!("connected to the router of Zenoh at {}", self.endpoint));
         }
-        if now.duration_since(self.since) < PATIENCE_TIMEOUT {
+        if now.duration_since(self.since) < PEER_TIMEOUT {
             return None;
         }
         self.reported = Some(false);

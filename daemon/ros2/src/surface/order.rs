@@ -100,7 +100,7 @@ mod tests {
     }
 
     #[test]
-    fn a_hold_says_nothing_of_an_abort() {
+    fn a_hold_does_not_change_an_abort() {
         let order = |hold| Hold { hold, ..Hold::default() };
         assert_eq!(hold(1, &order(true)), Ok(SurfaceRequest::Hold(1, true)));
         assert_eq!(hold(1, &order(false)), Ok(SurfaceRequest::Hold(1, false)));

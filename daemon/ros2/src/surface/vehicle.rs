@@ -20,7 +20,6 @@ use scenecast_outlets::{WORLD_FRAME, diagnostics, exemplar_jpeg, header};
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::{Duration, Instant};
 
-/// Time between two diagnostics.
 const DIAGNOSTICS_INTERVAL: Duration = Duration::from_secs(1);
 /// Exemplars that are kept for later subscribers: one for each label.
 const EXEMPLARS: usize = 254;

@@ -18,7 +18,7 @@ pub(crate) struct Feed {
     pub transport: Transport,
     /// The number of its publishers now; `None` once it has ended.
     pub publishers: Box<dyn Fn() -> Option<usize> + Send>,
-    /// Ends it when dropped.
+    /// Ends the subscription when it is dropped.
     pub ending: Box<dyn Any + Send + Sync>,
 }
 

@@ -6,9 +6,9 @@ use std::fmt;
 /// What carries the messages of ROS 2.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Transport {
-    /// `rmw_fastrtps_cpp`, `rmw_cyclonedds_cpp` and others.
+    /// DDS, by which `rmw_fastrtps_cpp`, `rmw_cyclonedds_cpp` and others are reached.
     Dds,
-    /// `rmw_zenoh_cpp`.
+    /// Zenoh in the form of `rmw_zenoh_cpp`.
     Zenoh,
 }
 
@@ -21,7 +21,7 @@ impl fmt::Display for Transport {
     }
 }
 
-/// Peers that were found.
+/// The other processes that were found, and what they publish.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Peers {
     /// Processes other than this one.

@@ -11,7 +11,6 @@
 //!
 //! Numbers are little-endian. Source: rmw_zenoh, `docs/design.md` and `attachment_helpers.cpp`.
 
-/// Bytes of an attachment.
 const BYTES: usize = 33;
 
 /// By which peers tell the publishers of a topic apart.

@@ -25,7 +25,7 @@ impl Graph {
         Self { own_session, tokens: Mutex::default(), _own: own }
     }
 
-    /// A token appeared.
+    /// A token appeared; those of this session are left out.
     pub fn insert(&self, key: &str) {
         let Some(token) = Token::parse(key).filter(|token| token.session != self.own_session) else { return };
         let mut tokens = locked(&self.tokens);
@@ -34,7 +34,7 @@ impl Graph {
         }
     }
 
-    /// A token disappeared.
+    /// A token disappeared, and what it stands for is forgotten.
     pub fn remove(&self, key: &str) {
         locked(&self.tokens).remove(key);
     }

@@ -38,9 +38,9 @@ impl Kind {
 /// The topic of a publisher or a subscription.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Endpoint {
-    /// Such as `/camera/image_raw`.
+    /// Name in ROS 2, such as `/camera/image_raw`.
     pub topic: String,
-    /// Such as `sensor_msgs::msg::dds_::Image_`.
+    /// Name of the type on DDS, such as `sensor_msgs::msg::dds_::Image_`.
     pub dds_type: String,
     /// Such as `RIHS01_d31d...`, or [`NO_HASH`].
     pub hash: String,
@@ -102,7 +102,7 @@ fn qos_chunk(qos: Qos) -> String {
 pub(super) struct Token {
     pub session: String,
     pub kind: Kind,
-    /// `None` for a node.
+    /// Topic and type; `None` for a node.
     pub endpoint: Option<Endpoint>,
 }
 

@@ -63,8 +63,8 @@ impl DepthFeed {
 pub(super) enum DepthAnswer {
     /// They were measured, whole numbers in so many units a metre.
     Measured(DepthMessage, f64),
-    /// There should be some.
+    /// A source is configured, and has none for this image.
     Missing,
-    /// Nothing measures them.
+    /// No source of distances is configured.
     Unmeasured,
 }

@@ -48,7 +48,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_fault_is_logged_at_once_and_then_seldom() {
+    fn a_fault_is_logged_at_once_and_then_rarely() {
         let (mut log, mut tally, began) = (FaultLog::default(), CameraTally::default(), Instant::now());
         let mut lines =
             |tally: &CameraTally, s| log.lines(tally, began + Duration::from_secs(s), |_| Some("why".to_owned()));

@@ -295,7 +295,6 @@ mod tests {
     use std::io::Write;
     use std::sync::Mutex;
 
-    /// What was logged.
     #[derive(Clone, Default)]
     struct Logged(Arc<Mutex<Vec<u8>>>);
 
@@ -310,7 +309,7 @@ mod tests {
     }
 
     #[test]
-    fn images_that_do_not_fit_their_calibration_are_logged_seldom() {
+    fn images_that_do_not_fit_their_calibration_are_logged_rarely() {
         let config = Config::default();
         let ros = RosSensors::new(&config).unwrap();
         let mut camera = LiveCamera::start(&config, 0.0, &ros).unwrap();

@@ -22,7 +22,7 @@ use std::time::Duration;
 /// An image and where it was taken.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct CameraFrame {
-    /// Mission time, seconds.
+    /// Mission time of the image, in seconds.
     pub(crate) t_s: f64,
     pub(crate) picture: FramePicture,
     /// Of the camera itself if it is calibrated; otherwise above the middle of the frame.
@@ -36,7 +36,7 @@ pub(crate) struct CameraFrame {
 pub(crate) enum FramePicture {
     Recorded(Box<RecordedFrame>),
     Received(Box<ReceivedImage>),
-    /// It was read.
+    /// It was read by [`CameraFrame::take_image`].
     Taken,
 }
 
@@ -46,7 +46,7 @@ pub(crate) struct ReceivedImage {
     pub(crate) picture: Picture,
     /// The bits of levels in a compressed image with 16.
     pub(crate) bits: BitDepth,
-    /// The calibrated camera.
+    /// The calibrated camera, if there is a calibration.
     pub(crate) sight: Option<Sight>,
     /// The distances that belong to the image, and the units of whole numbers in a metre.
     pub(crate) depth: Option<(DepthMessage, f64)>,
@@ -179,7 +179,7 @@ impl Camera {
         }
     }
 
-    /// The run ends.
+    /// Logs the account of a live camera at the end of the run.
     pub(crate) fn log_end(&self) {
         if let Self::Live(camera) = self {
             camera.log_end();

@@ -3,7 +3,7 @@
 use std::time::{Duration, Instant};
 
 /// Longest time between the two arrivals of a message. After it, an inbox alone has what the other one lacks.
-const LONGEST: Duration = Duration::from_secs(1);
+const MAX_DELAY: Duration = Duration::from_secs(1);
 
 /// The message that was used last.
 #[derive(Debug, Clone, Copy)]
@@ -24,7 +24,7 @@ impl Echoes {
     /// Whether a message that came to an inbox at a moment is used.
     pub(super) fn is_used(&mut self, inbox: usize, stamp_ns: i64, at: Instant) -> bool {
         let is_echo = self.last.is_some_and(|last| {
-            let is_soon = at.saturating_duration_since(last.at) < LONGEST;
+            let is_soon = at.saturating_duration_since(last.at) < MAX_DELAY;
             inbox != last.inbox && stamp_ns <= last.stamp_ns && is_soon
         });
         if !is_echo {

@@ -57,7 +57,7 @@ impl LabelQueue {
     }
 }
 
-/// A source of items.
+/// A source of items: the files of a folder, or a queue that others fill.
 pub(crate) enum Feed {
     Folder(FolderFeed),
     Queue(QueueFeed),

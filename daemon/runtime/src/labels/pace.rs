@@ -3,7 +3,7 @@
 use std::time::{Duration, Instant};
 
 /// Shortest time between two updates, and between two slices of a large one.
-const SHORTEST: Duration = Duration::from_millis(200);
+const MIN_INTERVAL: Duration = Duration::from_millis(200);
 const BETWEEN_SLICES: Duration = Duration::from_millis(10);
 /// The vehicle handles updates for at most one part of so many of its time, so that a large map does not delay its modem.
 const PART: u32 = 6;
@@ -35,7 +35,7 @@ impl Pace {
     /// The vehicle has handled the update since `began`.
     pub(super) fn handle_taken(&mut self, began: Instant, now: Instant) {
         let took = now.saturating_duration_since(began);
-        let shortest = if *self == (Self::Handling { has_more: true }) { BETWEEN_SLICES } else { SHORTEST };
+        let shortest = if *self == (Self::Handling { has_more: true }) { BETWEEN_SLICES } else { MIN_INTERVAL };
         *self = Self::From(now + shortest.max(took * (PART - 1)));
     }
 }
@@ -45,7 +45,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_map_that_takes_long_comes_seldom() {
+    fn a_map_that_takes_long_is_updated_less_often() {
         let start = Instant::now();
         let at = |ms: u64| start + Duration::from_millis(ms);
         let mut pace = Pace::new(start);

@@ -53,7 +53,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_refusal_that_repeats_is_logged_seldom() {
+    fn a_repeated_refusal_is_logged_rarely() {
         let (mut log, start) = (RefusalLog::default(), Instant::now());
         let mut lines = Vec::new();
         for tenth in 0..=300 {
@@ -72,7 +72,7 @@ mod tests {
     }
 
     #[test]
-    fn ever_new_refusals_are_bounded_in_lines_and_memory() {
+    fn distinct_refusals_are_bounded_in_lines_and_memory() {
         let (mut log, start) = (RefusalLog::default(), Instant::now());
         let at = |ms| start + Duration::from_millis(ms);
         let lines = (0..100_000).filter_map(|i| log.count(format!("{i}.json: class 255"), at(i))).count();

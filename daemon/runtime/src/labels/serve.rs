@@ -10,7 +10,6 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc::sync_channel;
 use std::time::{Duration, Instant};
 
-/// Connections at a time.
 const MAX_CONNECTIONS: usize = 4;
 /// A connection that sends no byte for so long is closed, so that it does not keep others out.
 const IDLE: Duration = Duration::from_secs(60);
@@ -184,7 +183,7 @@ mod tests {
     }
 
     #[test]
-    fn a_connection_that_is_idle_or_unanswered_tells_why() {
+    fn an_idle_or_unanswered_connection_ends_with_the_reason() {
         let answered = run(|mut feed| {
             let arrived = feed.next(IDLE).unwrap();
             assert!(arrived.at.is_some() && arrived.item.is_ok());

@@ -36,7 +36,7 @@ pub(super) async fn open(own: &str, remote: &str) -> io::Result<(UdpSocket, Opti
 /// Who becomes the peer of a socket without a configured address.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum PeerRule {
-    /// The first sender.
+    /// The sender of the first datagram, whatever it contains.
     First,
     /// The sender of the first datagram that the host accepts.
     Judged,

@@ -272,7 +272,7 @@ mod tests {
     }
 
     #[test]
-    fn a_next_key_is_added_once_and_takes_the_place_of_the_present_one() {
+    fn a_next_key_is_added_once_and_replaces_the_present_one() {
         let (path, key) = (fresh("rotate"), random_key().unwrap());
         write_new(&path, &key.to_text()).unwrap();
         let rotate = |finish: bool| Rotate { file: path.clone(), finish }.run();

@@ -5,9 +5,9 @@ use scenecast_protocol::wire::{EquipmentFaults, ModeReason, VehicleMode};
 use std::collections::BTreeSet;
 use std::time::Duration;
 
-/// A vehicle counts as silent after this many times its usual silence, and not before [`LEAST_SILENCE`].
+/// A vehicle counts as silent after this many times its usual silence, and not before [`MIN_SILENCE`].
 const SILENCES: u32 = 3;
-const LEAST_SILENCE: Duration = Duration::from_secs(60);
+const MIN_SILENCE: Duration = Duration::from_secs(60);
 /// Time between two entries about faults that are not grave.
 const MINOR_PAUSE: Duration = Duration::from_secs(1800);
 
@@ -40,7 +40,7 @@ impl Watch {
     /// Time passes; `usual` is the usual pause between two frames. The text is for the log.
     pub(crate) fn handle_time(&mut self, usual: Option<Duration>, now: Instant) -> Option<String> {
         let last = self.last_received?;
-        let allowed = (usual.unwrap_or_default() * SILENCES).max(LEAST_SILENCE);
+        let allowed = (usual.unwrap_or_default() * SILENCES).max(MIN_SILENCE);
         let is_new = !self.is_silent && now.since(last) > allowed;
         self.is_silent |= is_new;
         is_new.then(|| format!("silent for {}", span(now.since(last))))
@@ -117,7 +117,7 @@ mod tests {
     }
 
     #[test]
-    fn grave_faults_are_logged_at_once_and_others_seldom() {
+    fn grave_faults_are_logged_at_once_and_others_rarely() {
         let (mut watch, none) = (Watch::default(), EquipmentFaults::default());
         let grave = EquipmentFaults { camera_silent: true, autopilot_refuses: true, ..none };
         let minor = EquipmentFaults { images_dropped: true, ..none };

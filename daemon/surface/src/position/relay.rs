@@ -323,7 +323,7 @@ mod tests {
     }
 
     #[test]
-    fn the_origin_is_where_positions_agree_and_not_where_the_first_one_is() {
+    fn the_origin_is_where_positions_agree_not_the_first_position() {
         let mut relay = Relay::new(RelayConfig { origin: None, ..relay().config });
         let report = |relay: &mut Relay, lat_deg: f64, s: u32| {
             let place = nmea::place_fields(LatLon { lat_deg, lon_deg: 34.92 });

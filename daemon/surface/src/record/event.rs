@@ -60,7 +60,7 @@ pub struct StoredCommand {
     pub requests: Vec<(String, u64)>,
 }
 
-/// A change of command.
+/// A change of command, as the store keeps it.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct StoredCommandChange {
     pub at: u64,

@@ -29,7 +29,7 @@ impl FormerLabels {
         }
     }
 
-    /// Puts stored changes back.
+    /// Adds the changes that the store has kept.
     pub(crate) fn restore(&mut self, stored: &StoredCells) {
         unpack(&stored.cells).for_each(|change| self.push(change));
     }

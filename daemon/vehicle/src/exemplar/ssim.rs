@@ -94,7 +94,7 @@ mod tests {
     }
 
     #[test]
-    fn images_of_other_sizes_are_not_alike() {
+    fn images_of_other_sizes_are_not_similar() {
         let small = Luma { width: 10, values: vec![1.0; 100] };
         assert_eq!((small.ssim(&small), grey(|_, _| 1.0).ssim(&small)), (0.0, 0.0));
     }

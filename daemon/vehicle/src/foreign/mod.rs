@@ -43,12 +43,12 @@ pub struct LabelChanges {
     pub labels: u8,
 }
 
-/// A source of items.
+/// The setting that an item of another program came in by.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ForeignSource {
-    /// `labels.source`: labels and bands.
+    /// `labels.source`, which gives labels and bands.
     Labels,
-    /// `bands.source`: bands alone.
+    /// `bands.source`, which gives bands and no labels.
     Bands,
 }
 
@@ -291,12 +291,12 @@ impl ForeignMap {
         }
     }
 
-    /// The names of classes.
+    /// The names and colours of classes that were given so far.
     pub fn classes(&self) -> impl Iterator<Item = &ClassEntry> {
         self.classes.values()
     }
 
-    /// The map of labels.
+    /// The map of labels; an erased cell has none.
     pub fn labels(&self) -> &LabelGrid {
         self.labels.grid()
     }

@@ -80,7 +80,7 @@ fn a_grid_states_each_cell_and_can_make_it_unknown() {
 }
 
 #[test]
-fn labels_and_bands_have_a_limit_on_cells_that_counts_erased_ones() {
+fn the_limit_on_cells_of_labels_and_bands_counts_erased_ones() {
     let place = |kind: Content, west_m: f64| match kind {
         Content::Grid { classes, ground } => item(Content::Grid { ground: Ground { west_m, ..ground }, classes }),
         Content::Band { band, levels, ground } => {

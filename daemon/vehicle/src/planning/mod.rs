@@ -127,7 +127,7 @@ mod tests {
     }
 
     #[test]
-    fn with_metres_left_every_planner_goes() {
+    fn every_planner_moves_while_distance_is_left() {
         for kind in PlannerKind::ALL {
             assert!(!ask(kind, (8, 4), 200, 80.0, (100, 0)).0.is_empty(), "{kind:?}");
         }

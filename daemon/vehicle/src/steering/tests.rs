@@ -67,7 +67,7 @@ fn a_fence_that_leaves_a_leg_as_it_is_keeps_the_progress() {
 }
 
 #[test]
-fn an_adaptive_plan_has_a_purpose_until_nothing_pays() {
+fn an_adaptive_plan_has_a_purpose_while_anything_is_of_interest() {
     let mut map = LabelGrid::default();
     (0..48).for_each(|y| {
         (0..40).for_each(|x| {
@@ -107,7 +107,7 @@ fn a_favoured_label_draws_the_vehicle_to_it() {
 }
 
 #[test]
-fn a_weighted_area_draws_the_vehicle_without_a_utility_and_an_unwanted_one_repels_it() {
+fn a_weighted_area_attracts_or_repels_without_a_utility() {
     let map: LabelGrid = (0..48 * 80).map(|i| (Cell::new(i % 80, i / 80), 1)).collect();
     let corners = [(140, 70), (195, 70), (195, 115), (140, 115)].map(|(x, y)| DecimetrePoint::new(x, y));
     let area = |weight| Areas(vec![WeightedArea { outline: Polygon(corners.into()), weight }]);

@@ -118,7 +118,7 @@ mod tests {
     }
 
     #[test]
-    fn a_destination_is_reached_in_a_straight_line_where_that_is_allowed() {
+    fn a_destination_is_reached_in_a_straight_line_if_allowed() {
         for place in [point(15, 10), point(-60, 40)] {
             let mut steering = steering(Vec::new());
             assert!(steering.can_reach(steering.start(), place, f64::INFINITY));

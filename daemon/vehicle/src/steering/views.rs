@@ -59,7 +59,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn going_to_and_fro_is_a_turn_on_the_spot_and_a_long_leg_is_not() {
+    fn back_and_forth_is_a_turn_on_the_spot_and_a_long_leg_is_not() {
         let turns = |to_m: f64| {
             let mut views = Views::default();
             let place = |i: u32| (to_m / 2.0 * (1.0 - (f64::from(i) * 0.5 / to_m * std::f64::consts::PI).cos()), 0.0);

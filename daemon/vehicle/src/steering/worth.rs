@@ -32,7 +32,7 @@ pub(super) fn pays(q: &PlanRequest<'_>, path: &[Node], interest: Interest<'_>, c
     values.fold(0.0, f64::max) > PAYS * interest.largest_weight() * cells_in_block
 }
 
-/// What a path gains.
+/// What a path gains: the values of the blocks that it shows.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Gain {
     pub whole: f64,

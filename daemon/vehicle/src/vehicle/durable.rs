@@ -55,7 +55,7 @@ pub struct Durable {
 }
 
 impl Durable {
-    /// The destination in force.
+    /// The destination in force, in the world frame.
     pub fn destination(&self) -> Option<DecimetrePoint> {
         self.destination.map(|(east_dm, north_dm)| DecimetrePoint::new(east_dm, north_dm))
     }

@@ -74,7 +74,7 @@ mod tests {
     }
 
     #[test]
-    fn a_key_that_was_given_counts_until_the_key_file_is_another_one() {
+    fn a_given_key_counts_until_the_key_file_changes() {
         let mut kept = KeptKeys::default();
         assert_eq!(kept.begin(of_file(1)).key.fingerprint(), key(1).mission);
         kept.keep(&key(2));
@@ -91,7 +91,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_printed_reveals_no_key() {
+    fn debug_output_reveals_no_key() {
         let mut kept = KeptKeys::default();
         kept.keep(&key(2));
         let said = format!("{kept:?}");

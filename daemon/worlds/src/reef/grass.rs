@@ -10,7 +10,6 @@ use scene_model::random::{CounterRng, derive};
 const SPACING_M: f32 = 0.064;
 /// Shoots along the edge of a block.
 const BLOCK: i32 = 4;
-/// The longest blade.
 const MAX_BLADE_M: f32 = 0.36;
 
 const YOUNG: Colour = [0.085, 0.112, 0.050];

@@ -25,7 +25,7 @@ pub(super) struct JitteredLattice {
 
 /// A place of a lattice.
 pub(super) struct Place {
-    /// Metres.
+    /// Metres east, and `y` metres north.
     pub x: f32,
     pub y: f32,
     pub habitat: Habitat,

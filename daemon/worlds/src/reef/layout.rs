@@ -42,7 +42,7 @@ impl Habitat {
     }
 }
 
-/// Where the wreck lies.
+/// The place of the wreck and the direction of its keel.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Berth {
     pub x: f32,

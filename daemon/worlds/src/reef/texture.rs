@@ -78,9 +78,8 @@ pub(super) struct Pieces {
     pub radius_m: [f32; 2],
     /// The largest ratio of length and width.
     pub aspect: f32,
-    /// Height in radii.
+    /// Height of a piece in its radii.
     pub rise: f32,
-    /// Contrast between pieces.
     pub contrast: f32,
     /// Mean number of pieces over a place.
     pub cover: f32,

@@ -49,7 +49,8 @@ impl<'a, T> Inbound<'a, T> {
 
 impl<T> LinkPair<T> {
     /// Opens a frame of this peer. `decodes` tells whether the chunks of a frame with this base decode, or, without a base,
-    /// those of the first frame of a run; a frame of which one does not changes nothing. The error is the reason for which the frame was dropped and counted.
+    /// those of the first frame of a run. A frame with a chunk that does not decode changes nothing. The error is the reason for
+    /// which the frame was dropped and counted.
     pub fn handle_frame<'a>(
         &mut self,
         envelope: &Envelope<'a>,

@@ -36,7 +36,7 @@ impl KeyRotation {
         self.speaks = generation;
     }
 
-    /// A frame was accepted.
+    /// A frame of the vehicle was accepted, so hellos keep their key.
     pub(super) fn handle_heard(&mut self) {
         self.unheard = 0;
     }

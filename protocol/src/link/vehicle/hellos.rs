@@ -75,7 +75,7 @@ impl HelloLimit {
         (self.repeats, self.next_repeat) = (0, None);
     }
 
-    /// An answer was written.
+    /// An answer was written; it is due again after the interval, if repetitions are left.
     pub(super) fn note_answer(&mut self, now: Instant) {
         self.next_repeat = (self.repeats > 0).then(|| now + self.repeat_interval);
     }
@@ -111,7 +111,7 @@ mod tests {
     }
 
     #[test]
-    fn an_answer_is_repeated_three_times_until_a_numbered_frame_comes_in() {
+    fn an_answer_is_repeated_three_times_until_a_numbered_frame() {
         let begin = Instant::from_secs_f64(100.0);
         let mut limit = HelloLimit::new(Access::Shared, begin);
         let repeats = |limit: &mut HelloLimit| {
@@ -130,7 +130,7 @@ mod tests {
     }
 
     #[test]
-    fn an_answer_to_another_run_never_displaces_those_to_the_current_run() {
+    fn an_answer_to_another_run_never_displaces_a_current_answer() {
         let begin = Instant::from_secs_f64(100.0);
         let mut limit = HelloLimit::new(Access::Shared, begin);
         assert!(limit.admit(SessionId::from_random(1), begin));

@@ -24,7 +24,7 @@ pub struct ClassChunk<'a> {
 }
 
 impl<'a> ClassChunk<'a> {
-    /// Bytes before the part.
+    /// Bytes before the part: the label of the entry.
     pub const HEAD: usize = 1;
 
     /// Reads a chunk; `None` if it makes no sense.

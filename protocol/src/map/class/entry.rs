@@ -46,7 +46,7 @@ impl ClassEntry {
         self.label
     }
 
-    /// Its name for people.
+    /// Its name for people: 1 to 60 bytes of UTF-8 without control characters.
     pub fn name(&self) -> &str {
         &self.name
     }

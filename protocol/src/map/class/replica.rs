@@ -17,7 +17,7 @@ impl ClassReplica {
         self.entries.get(&label)
     }
 
-    /// The entries, by label.
+    /// The entries that are complete, in the order of their labels.
     pub fn iter(&self) -> impl Iterator<Item = &ClassEntry> {
         self.entries.values()
     }

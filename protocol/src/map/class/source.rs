@@ -17,7 +17,7 @@ impl ClassSource {
         first == entry
     }
 
-    /// The entries, by label.
+    /// The entries, sent or not, in the order of their labels.
     pub fn entries(&self) -> impl Iterator<Item = &ClassEntry> {
         self.0.values().map(|(entry, _)| entry)
     }

@@ -84,7 +84,7 @@ mod tests {
     }
 
     #[test]
-    fn a_number_of_a_person_becomes_the_decimal_that_was_written() {
+    fn a_typed_number_becomes_the_decimal_that_was_written() {
         for (value, digits, exponent) in [(0.5, 5, -1), (-80.0, -80, 0), (0.0, 0, 0), (1e9, 1, 9), (0.001_25, 125, -5)]
         {
             assert_eq!(Decimal::nearest(value), Decimal::new(digits, exponent), "{value}");

@@ -162,7 +162,7 @@ fn choosing_a_chunk_inspects_changed_tiles_only() {
 }
 
 #[test]
-fn labels_held_back_by_the_backlog_go_out_once_nothing_else_waits() {
+fn labels_held_back_are_sent_once_nothing_else_waits() {
     let mut ends = TestEnds::new(0.0);
     ends.source.set_hold(Hold::Backlog(10));
     ends.source.set(square(20, |_| 3), at(0.0));

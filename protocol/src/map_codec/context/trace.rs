@@ -19,9 +19,9 @@ pub struct Decision {
     pub direct: Vec<usize>,
     /// The keys and start values of the keyed contexts.
     pub keyed: Vec<(u32, usize)>,
-    /// The sets of weights.
+    /// For each mixer, the number of its set of weights; empty without contexts.
     pub sets: Vec<usize>,
-    /// The curve.
+    /// The number of the adaptive probability map; 0 without contexts.
     pub curve: usize,
     /// The probability of yes in 1/65536.
     pub one: u32,

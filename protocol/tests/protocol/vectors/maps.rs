@@ -76,7 +76,7 @@ fn vector(name: &str, base: &LabelGrid, chunk: Vec<u8>) -> MapVector {
     MapVector { name: name.to_owned(), chunk: Hex(chunk), base: GridVector::of(base), result: GridVector::of(&result) }
 }
 
-/// Bands of labels.
+/// Steps of four columns and three rows with the labels 1 to 3; `phase` shifts them by rows.
 fn striped(width: i32, height: i32, phase: i32) -> LabelGrid {
     let label = |x: i32, y: i32| ((x / 4 + (y + phase) / 3) % 3 + 1) as u8;
     (0..height).flat_map(|y| (0..width).map(move |x| (Cell::new(x, y), label(x, y)))).collect()

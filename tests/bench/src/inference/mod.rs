@@ -35,7 +35,7 @@ pub struct InferenceRow {
     pub operator_nats: Option<f64>,
     /// Information of a fresh model with the same seed and the same words, swept until it has converged.
     pub batch_nats: Option<f64>,
-    /// Sweeps of the batch.
+    /// Sweeps until the batch had converged.
     pub sweeps: u32,
     /// Bytes of the map that the vehicle put on air.
     pub map_bytes: u64,

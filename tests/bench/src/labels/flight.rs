@@ -14,11 +14,11 @@ const STEP: (u32, u32) = (100, 380);
 /// Time between two frames, and for the turn between two lines, seconds.
 const INTERVAL_S: f64 = 2.0;
 const TURN_S: f64 = 60.0;
-/// Frames in five minutes.
+/// Frames that are taken in five minutes.
 const FIVE_MINUTES: usize = 150;
 /// Frames at the end of a flight that show nothing new, so that the map is corrected.
 const REST: u32 = 150;
-const MOST_LABELS: u32 = 16;
+const MAX_LABELS: u32 = 16;
 
 /// The order in which a floor is seen.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -27,7 +27,7 @@ pub(super) enum Path {
     Along,
     /// The same frames, the last one first.
     Back,
-    /// Column by column.
+    /// Column by column instead of line by line.
     Across,
 }
 
@@ -50,7 +50,7 @@ impl Flight {
     pub(super) fn over(site: &Site, image: &RgbImage, path: Path) -> Self {
         let pitch = CELL_M / f64::from(CELL_PX);
         let camera = DownCamera { metres_per_pixel: pitch, altitude_m: 4.0 };
-        let mut habitats = Habitats::new(MOST_LABELS);
+        let mut habitats = Habitats::new(MAX_LABELS);
         let mut first_seen_s = BTreeMap::new();
         let (mut maps, mut relabelled) = (Vec::<BTreeMap<(i32, i32), u32>>::new(), Vec::new());
         let size = (FRAME.0.min(image.width()), FRAME.1.min(image.height()));
@@ -130,7 +130,7 @@ impl Labelled {
         self.cells.get(&place).map(|&label| self.tree.at(label, count))
     }
 
-    /// The number of labels.
+    /// The number of different labels on the map.
     pub(super) fn count(&self) -> usize {
         self.cells.values().collect::<std::collections::BTreeSet<_>>().len()
     }

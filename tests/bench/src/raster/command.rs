@@ -58,7 +58,7 @@ fn share(text: &str) -> Result<f64, String> {
 }
 
 impl RasterBench {
-    /// Sends annotated maps.
+    /// Sends annotated maps over the same radio, and prints the measurements.
     fn run_maps(&self) -> Result<(), UserError> {
         let setting = RasterSetting {
             side: 0,

@@ -6,9 +6,9 @@ use sim_channel::RandomStream;
 /// Where the changed cells of a second lie.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Pattern {
-    /// Anywhere, each by itself.
+    /// Anywhere, each cell by itself.
     Scattered,
-    /// In discs.
+    /// In discs with a radius of 12 cells.
     Patches,
 }
 

@@ -24,7 +24,7 @@ use std::time::Duration;
 /// The grid, the radio, and how long they are watched.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RasterSetting {
-    /// Cells on each side.
+    /// Number of cells along each side of the grid.
     pub side: u32,
     /// Share of the cells that change every second.
     pub change: f64,
@@ -130,7 +130,6 @@ impl RasterSetting {
 
 /// Time between two looks at the operator's copy.
 const LOOK: Duration = Duration::from_millis(100);
-/// Time between two orders.
 const ORDER_INTERVAL: Duration = Duration::from_secs(7);
 /// Longest wait for the first grid.
 const GIVE_UP: Duration = Duration::from_secs(3600);

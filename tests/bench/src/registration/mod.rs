@@ -16,7 +16,7 @@ use std::time::Duration;
 pub enum Navigation {
     /// Odometry without drift, no fixes, no registration.
     Perfect,
-    /// Drifting odometry and fixes.
+    /// Drifting odometry and fixes, without registration.
     DeadReckoned,
     /// Drifting odometry, fixes and registration.
     Registered,

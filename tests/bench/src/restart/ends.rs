@@ -29,7 +29,7 @@ pub(super) enum Stop {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Disk {
     Sound,
-    /// It takes no bytes.
+    /// It takes no bytes, though files can be made.
     Full,
     /// No file can be written, made or removed.
     ReadOnly,

@@ -10,7 +10,7 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 const LIMIT: Duration = Duration::from_secs(60);
-/// The vehicle's own fence.
+/// The content of the vehicle's fence file, in metres.
 const OWN_FENCE: &str =
     r#"{"type":"Polygon","coordinates":[[[-400,-400],[400,-400],[400,400],[-400,400],[-400,-400]]]}"#;
 

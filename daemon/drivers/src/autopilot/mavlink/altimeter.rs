@@ -14,7 +14,7 @@ pub(super) enum HeightSource {
     Altitude,
 }
 
-/// The last height.
+/// The last height of the best source that is not old.
 #[derive(Debug, Default)]
 pub(super) struct Altimeter {
     last: Option<(HeightSource, f64, Instant)>,

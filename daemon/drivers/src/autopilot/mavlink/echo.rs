@@ -10,7 +10,7 @@ use std::time::Duration;
 const SAME_M: f64 = 3.0;
 
 /// Time with reports of other targets only, after which the targets count as refused.
-const PATIENCE: Duration = Duration::from_secs(5);
+const TIMEOUT: Duration = Duration::from_secs(5);
 
 /// Time without any report after which people are told. The streams must be asked for first.
 const MUTE: Duration = Duration::from_secs(15);
@@ -30,13 +30,13 @@ pub(super) enum Verdict {
     #[default]
     Open,
     Follows,
-    /// It reports another target.
+    /// It reports another target than the one that was given.
     Refuses,
-    /// It reports none.
+    /// It has reported no target for a while.
     Mute,
 }
 
-/// Compares targets with reports.
+/// Compares the targets that were given with the autopilot's reports.
 #[derive(Debug, Default)]
 pub(super) struct Echo {
     /// The first target, or the last one that was confirmed.
@@ -60,7 +60,7 @@ impl Echo {
         *self = Self::default();
     }
 
-    /// A target goes out.
+    /// A target goes out; from the first one on, reports are awaited.
     pub(super) fn handle_target(&mut self, now: Instant) {
         self.since.get_or_insert(now);
     }
@@ -74,7 +74,7 @@ impl Echo {
                 off_m.is_some_and(|off_m| off_m <= SAME_M)
             }
             // A distance is a weak witness beside a target.
-            Report::Distance { .. } if self.heard_target.is_some_and(|at| now.since(at) < PATIENCE) => return None,
+            Report::Distance { .. } if self.heard_target.is_some_and(|at| now.since(at) < TIMEOUT) => return None,
             Report::Distance { told_m, given_m } => (told_m - given_m).abs() <= SAME_M,
         };
         self.heard = Some(now);
@@ -93,9 +93,9 @@ impl Echo {
     /// Lets time pass. Returns a note for people when the verdict gets worse.
     pub(super) fn handle_timeout(&mut self, now: Instant) -> Option<String> {
         let since = self.since?;
-        let is_heard = self.heard.is_some_and(|at| now.since(at) < PATIENCE);
+        let is_heard = self.heard.is_some_and(|at| now.since(at) < TIMEOUT);
         let verdict = match self.other {
-            Some(_) if is_heard && now.since(since) >= PATIENCE => Verdict::Refuses,
+            Some(_) if is_heard && now.since(since) >= TIMEOUT => Verdict::Refuses,
             _ if !is_heard && now.since(self.heard.unwrap_or(since).max(since)) >= MUTE => Verdict::Mute,
             _ => return None,
         };

@@ -193,7 +193,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn any_stream_is_taken_and_holds_no_more_than_a_frame(
+        fn any_stream_is_accepted_and_at_most_a_frame_is_held(
             pieces in proptest::collection::vec(proptest::collection::vec(prop_oneof![Just(V2), Just(V1), any::<u8>()], 0..400), 0..10),
         ) {
             let mut deframer = Deframer::default();

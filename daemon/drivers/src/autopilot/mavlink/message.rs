@@ -51,7 +51,7 @@ pub enum Heard {
     GlobalTarget(Option<(i32, i32)>),
     /// DISTANCE_SENSOR that looks down: metres along its beam; `None` if that is out of its range.
     DistanceDown(Option<f32>),
-    /// DISTANCE_SENSOR in another direction.
+    /// DISTANCE_SENSOR of a sensor that does not look down.
     DistanceElsewhere,
     /// RANGEFINDER: metres along the beam of a sensor that looks down.
     Rangefinder(f32),
@@ -226,7 +226,7 @@ impl Heard {
     }
 }
 
-/// MAV_SENSOR_ROTATION_PITCH_270.
+/// MAV_SENSOR_ROTATION_PITCH_270: the sensor looks down.
 const LOOKS_DOWN: u8 = 25;
 
 /// Whether a target with this mask of ignored fields has a position.

@@ -11,16 +11,16 @@ pub(super) const OTHER_SYSTEMS: &str = "other_systems";
 /// Counter of frames of other components of the autopilot's system.
 pub(super) const OTHER_COMPONENTS: &str = "other_components";
 
-/// MAV_AUTOPILOT_ARDUPILOTMEGA.
+/// MAV_AUTOPILOT_ARDUPILOTMEGA, in the field `autopilot` of HEARTBEAT.
 const ARDUPILOT: u8 = 3;
 /// MAV_AUTOPILOT_INVALID: what all but autopilots should say.
 const NO_AUTOPILOT: u8 = 8;
-/// MAV_COMP_ID_AUTOPILOT1.
+/// MAV_COMP_ID_AUTOPILOT1: the usual component of an autopilot.
 const FIRST_AUTOPILOT: u8 = 1;
 /// Ground station, onboard computer, gimbal, camera: kinds (MAV_TYPE) that are no vehicle whatever autopilot they name.
 const EQUIPMENT: [u8; 4] = [6, 18, 26, 30];
 
-/// Whose heartbeat it is.
+/// Whether a heartbeat is the autopilot's.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Claim {
     Autopilot,
@@ -103,7 +103,7 @@ mod tests {
     }
 
     #[test]
-    fn only_what_says_ardupilot_is_the_autopilot() {
+    fn only_a_heartbeat_of_ardupilot_is_the_autopilot() {
         let mut sources = Sources::default();
         assert_eq!(judged(&mut sources, (1, 1), (SUB, 3), None), (true, false));
         // Companion computer, camera, gimbal, ground station.
@@ -115,7 +115,7 @@ mod tests {
     }
 
     #[test]
-    fn a_second_autopilot_is_named_once_and_takes_over_only_from_a_silent_one() {
+    fn a_second_autopilot_takes_over_only_from_a_silent_one() {
         let mut sources = Sources::default();
         assert_eq!(judged(&mut sources, (1, 2), (SUB, 3), Some(1)), (false, true));
         assert_eq!(judged(&mut sources, (1, 2), (SUB, 3), Some(1)), (false, false));

@@ -54,7 +54,7 @@ fn count(sent: &[(u32, Vec<u8>)], id: u32) -> usize {
 const GOAL: Option<Goal> = Some(Goal { east_m: 10.0, north_m: 0.0, depth_m: Some(5.0), place: None });
 
 #[test]
-fn it_beats_asks_for_streams_and_arms_only_where_it_may() {
+fn it_sends_heartbeats_requests_streams_and_arms_if_allowed() {
     for arms in [false, true] {
         let mut pilot = pilot(arms);
         pilot.handle_timeout(at(0.0));
@@ -74,7 +74,7 @@ fn it_beats_asks_for_streams_and_arms_only_where_it_may() {
 }
 
 #[test]
-fn a_target_is_said_anew_each_second_as_way_from_where_it_is() {
+fn a_target_is_repeated_each_second_in_the_autopilots_frame() {
     let mut pilot = pilot(true);
     pilot.set_goal(GOAL, at(0.0));
     pilot.handle_bytes(&heartbeat(4, true), at(0.0));
@@ -99,7 +99,7 @@ fn a_target_is_said_anew_each_second_as_way_from_where_it_is() {
 }
 
 #[test]
-fn what_nobody_measured_is_told_as_unseen() {
+fn time_without_measurements_is_reported_as_unseen() {
     let mut pilot = pilot(false);
     let east = |ms: u32, s: f64, pilot: &mut Mavlink| {
         pilot.handle_bytes(&local(ms, [0.0; 3], [0.0, 1.0, 0.0]), at(s));
@@ -146,7 +146,7 @@ fn silence_is_reported_once_and_ends_when_the_autopilot_returns() {
 }
 
 #[test]
-fn places_go_out_as_gps_input_and_move_on_with_the_vehicle() {
+fn positions_are_sent_as_gps_input_and_follow_the_vehicle() {
     let mut pilot = pilot(false);
     pilot.handle_bytes(&heartbeat(4, true), at(0.0));
     pilot.handle_bytes(&local(0, [0.0; 3], [10.0, 0.0, 0.0]), at(0.0));
@@ -214,7 +214,7 @@ fn of_component(component: u8, id: u32, payload: Vec<u8>) -> Vec<u8> {
 }
 
 #[test]
-fn companions_gimbals_and_cameras_beside_the_autopilot_change_nothing() {
+fn companions_gimbals_and_cameras_do_not_affect_the_autopilot() {
     let survey = |is_alone: bool| {
         let mut pilot = pilot(true);
         pilot.set_goal(GOAL, at(0.0));
@@ -247,7 +247,7 @@ fn companions_gimbals_and_cameras_beside_the_autopilot_change_nothing() {
 }
 
 #[test]
-fn an_hour_of_a_real_robot_is_followed_with_few_lines_for_people() {
+fn an_hour_of_a_real_robot_is_followed_with_few_log_lines() {
     let mut pilot = pilot(true);
     pilot.set_goal(GOAL, at(0.0));
     let (mut frames, mut notes, mut unseen, mut in_command) = (0u32, 0, Duration::ZERO, 0);
@@ -368,7 +368,7 @@ fn targets_and_distances_in_degrees_are_compared_too() {
 }
 
 #[test]
-fn after_a_restart_it_is_armed_under_water_unless_a_pilot_disarmed_it() {
+fn a_restart_under_water_arms_unless_a_pilot_disarmed() {
     for (by_pilot, depth_m, expected) in [(false, 5.0, 2), (true, 5.0, 0), (false, 0.2, 0)] {
         let mut pilot = pilot(true);
         pilot.set_goal(GOAL, at(0.0));
@@ -444,7 +444,7 @@ fn a_lost_position_is_named_once_and_no_target_goes_out() {
 
 proptest! {
     #[test]
-    fn any_messages_are_taken(
+    fn any_messages_are_accepted(
         messages in proptest::collection::vec((prop_oneof![Just(0u32), Just(30), Just(32), Just(33), Just(77), Just(253),
             Just(62), Just(85), Just(87), Just(132), Just(141), Just(173)],
             proptest::collection::vec(any::<u8>(), 1..60)), 0..40),

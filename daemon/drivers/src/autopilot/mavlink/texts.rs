@@ -30,7 +30,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn an_hour_of_warnings_is_told_in_few_lines() {
+    fn an_hour_of_warnings_is_logged_in_few_lines() {
         let mut texts = Texts::default();
         let told = |s: &u32| {
             texts.is_news(["PreArm: no GPS", "EKF variance"][(s % 2) as usize], Instant::from_secs_f64(f64::from(*s)))

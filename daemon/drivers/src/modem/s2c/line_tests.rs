@@ -52,7 +52,7 @@ fn a_real_fix_is_read() {
 }
 
 #[test]
-fn notices_are_told_from_replies() {
+fn notices_are_distinguished_from_replies() {
     let other = Line::Notice(Notice::Other);
     assert_eq!(lines(false, b"FAILED\r\n"), [reply("FAILED")]);
     assert_eq!(

@@ -17,7 +17,7 @@ struct Choice {
     annotated: bool,
 }
 
-/// The table of choices.
+/// The scores of all choices on all scenes, with the settings.
 #[derive(Debug, Serialize)]
 pub struct ChoicesReport {
     cells_across: u32,

@@ -268,7 +268,7 @@ mod tests {
     }
 
     #[test]
-    fn a_long_packet_is_cut_and_a_capture_that_ends_early_keeps_what_it_has() {
+    fn a_long_packet_is_cut_and_a_truncated_capture_is_read() {
         let long = pcap(147, &[1, 2, 3], 400);
         assert!(frames(&long, None).frames[0].is_cut);
         let two = [pcap(147, &[1, 2, 3], 0), words(&[8, 0, 3, 3]), vec![4]].concat();

@@ -321,7 +321,7 @@ mod tests {
     }
 
     #[test]
-    fn a_decision_that_comes_before_the_content_is_in_force_makes_nothing_unknown() {
+    fn an_early_decision_makes_no_content_in_force_unknown() {
         let (utility, now) = (Slot::Utility(Default::default()), Instant::ZERO);
         let mut copy = InForceCopy::default();
         copy.restore([utility.clone(), limits(60)]);

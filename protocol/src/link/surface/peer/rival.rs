@@ -43,8 +43,8 @@ pub(super) struct Rivals {
 
 impl Rivals {
     /// The time between two calls to a vehicle that another surface holds: the holder may be gone by then.
-    const SHORTEST: Duration = Duration::from_secs(10);
-    const LONGEST: Duration = Duration::from_secs(60);
+    const MIN_INTERVAL: Duration = Duration::from_secs(10);
+    const MAX_INTERVAL: Duration = Duration::from_secs(60);
     /// A caller is forgotten after this time.
     const CALLER_LIFETIME: Duration = Duration::from_secs(300);
 
@@ -63,7 +63,7 @@ impl Rivals {
         let silence = Duration::from_secs(refusal.silence_s.into());
         let holder = OtherSurface::of(refusal, silence, now);
         let wait = (HOLDER_SILENCE + Duration::from_secs(2)).saturating_sub(silence);
-        self.next_call = Some(now + wait.clamp(Self::SHORTEST, Self::LONGEST));
+        self.next_call = Some(now + wait.clamp(Self::MIN_INTERVAL, Self::MAX_INTERVAL));
         let before = std::mem::replace(&mut self.holder, holder).map(|before| before.series);
         before != holder.map(|holder| holder.series)
     }

@@ -14,9 +14,9 @@ use crate::wire::{ChunkKind, Stamp, room_for_payload};
 /// Bytes of acknowledgement that every frame of the surface has room for.
 const SHORT_ACK: usize = 2;
 /// Bytes of the longest header of a numbered frame, without turn and stamp.
-const LONGEST_HEADER: usize = 7;
+const MAX_HEADER: usize = 7;
 /// Bytes of a frame that no slot can use: header, turn, a short acknowledgement, chunk header.
-const SLOT_OVERHEAD: usize = LONGEST_HEADER + 1 + SHORT_ACK + 1;
+const SLOT_OVERHEAD: usize = MAX_HEADER + 1 + SHORT_ACK + 1;
 /// Bytes that a part of the next key takes in a frame.
 const KEY_PART_BYTES: usize = 2 + VehicleKey::PART_BYTES;
 /// Frames smaller than this have no room for a stamp beside a slot.
@@ -123,7 +123,7 @@ impl<R: StateReplica> VehiclePeer<R> {
         modem: &ModemProfile,
         purpose: FramePurpose,
     ) -> u64 {
-        const HEAD: usize = LONGEST_HEADER + 1 + Stamp::SURFACE_BYTES;
+        const HEAD: usize = MAX_HEADER + 1 + Stamp::SURFACE_BYTES;
         let inquiry = if self.in_force.lacks_any() { InForceCopy::INQUIRY_BYTES } else { 0 };
         let key_part = if self.pair.offers_key() { KEY_PART_BYTES } else { 0 };
         let beside = if slots.is_empty() { inquiry.max(key_part) } else { 0 };
@@ -149,7 +149,7 @@ impl<R: StateReplica> VehiclePeer<R> {
         let has_room = modem.frame_bytes >= SMALL_FRAME + chunks;
         let one_way = self.master.round_trip().map(|both| both / 2);
         let stamp = Stamp::Surface { clock_ms: Stamp::clock(at), one_way };
-        let fixed = LONGEST_HEADER + 1 + Stamp::SURFACE_BYTES + self.pair.seal_bytes();
+        let fixed = MAX_HEADER + 1 + Stamp::SURFACE_BYTES + self.pair.seal_bytes();
         let ack_room = modem.frame_bytes.saturating_sub(chunks + fixed).max(SHORT_ACK);
         let number = (purpose == FramePurpose::Content && self.pair.has_run()).then(|| self.pair.next_number());
         let has_room = has_room && number.is_some();

@@ -30,7 +30,7 @@ impl TwinWatch {
         self.stranger.get_or_insert(now);
     }
 
-    /// A call was answered.
+    /// A call was answered: by a second vehicle, if the first one was in contact all the time.
     pub(super) fn handle_call_answer(&mut self, now: Instant) {
         let is_in_contact =
             |(since, last): (Instant, Instant)| now.since(last) < Self::GAP && now.since(since) >= Self::CALLABLE;

@@ -4,7 +4,7 @@ use crate::modem::s2c::base::{Interpreter, ReceivedSignal, S2cBase, S2cFrame, VE
 use crate::modem::s2c::input::InstantFlag;
 use std::time::Duration;
 
-/// `RECVIM`: an instant message.
+/// `RECVIM`: an instant message, with its flag and its duration on air.
 pub(crate) fn instant(base: &mut S2cBase, frame: &S2cFrame, signal: &ReceivedSignal, now: Duration) {
     let flag = InstantFlag::ALL.get(usize::from(frame.tag)).map_or("noack", |flag| flag.name());
     let between = format!("{flag},{}", signal.airtime.as_micros());
