@@ -7,30 +7,22 @@
 mod check;
 mod derived;
 mod key;
-mod key_file;
 mod load;
-mod modem;
 mod print;
-mod reference;
-mod regular_file;
-mod rule;
-mod schema;
+mod secret_files;
 mod sections;
 mod setting;
-mod token_file;
 
+pub use check::{full_frame_bytes, modem_port};
 pub use derived::{
     authenticity, cell_m, joules_per_bit, modem_profile, survey_depth_m, tuning_table, vehicle_address, vehicle_names,
 };
-pub use key::{Key, Role};
-pub use key_file::{load_key, read_key};
+pub use key::{Key, Role, Rule};
 pub use load::load;
-pub use modem::{full_frame_bytes, modem_port};
-pub use print::{print, shipped_files};
-pub use reference::reference;
-pub use regular_file::{open_regular, read_regular, read_regular_text};
-pub use rule::Rule;
-pub use schema::schema;
+pub use print::{print, reference, schema, shipped_files};
+pub use secret_files::{
+    TokenGrant, load_key, load_tokens, open_regular, read_key, read_regular, read_regular_text, read_token, read_tokens,
+};
 pub use sections::{
     Autopilot, Bands, Camera, Channel, Config, Console, Labels, Link, Map, Mission, Modem, Navigation, Operator,
     Position, Ros2, Runtime, Scene, SurfaceSection, Survey, VehicleSection,
@@ -41,4 +33,3 @@ pub use setting::{
     OperatorScript, PageOrigin, Remap, RestoreOrders, RosName, RosTransport, S2cMode, SceneLabels, StartMode, Votes,
     WorldKind, ZenohEndpoint,
 };
-pub use token_file::{TokenGrant, load_tokens, read_token, read_tokens};

@@ -1,8 +1,10 @@
-//! Configuration files with every key explained.
+//! Configuration files with every key explained, the reference of every key as Markdown, and the JSON Schema of configuration
+//! files.
 
 use crate::key::{Key, Role, Section};
 use crate::{Config, load};
 use scenecast_core::UserError;
+use serde_json::{Map, Value, json};
 
 /// Columns after which comments are wrapped.
 const WIDTH: usize = 100;
@@ -144,4 +146,70 @@ fn comment(text: &str) -> String {
         }
     }
     lines.iter().map(|line| format!("{line}\n")).collect()
+}
+
+/// Every section as a heading and a table.
+pub fn reference() -> String {
+    let defaults = Config::default();
+    let mut out = String::from("The column *read by* names `auv`, `asv` and the rehearsals `sim` and `demo`.\n");
+    for section in Section::ALL {
+        out.push_str(&format!("\n### {}\n\n{}\n\n", section.name, section.doc.trim_start()));
+        out.push_str("| key | default | allowed | read by | meaning |\n|---|---|---|---|---|\n");
+        section.keys.iter().for_each(|key| out.push_str(&row(key, &defaults)));
+    }
+    out
+}
+
+fn row(key: &Key, defaults: &Config) -> String {
+    let roles: Vec<&str> = key.roles.iter().map(|role| reader(*role)).collect();
+    let cell = |text: &str| text.replace('|', "\\|");
+    format!(
+        "| `{}` | `{}` | {} | {} | {} |\n",
+        key.name,
+        key.value(defaults),
+        cell(&key.allowed()),
+        roles.join(", "),
+        cell(key.doc())
+    )
+}
+
+fn reader(role: Role) -> &'static str {
+    match role {
+        Role::Auv => "auv",
+        Role::Asv => "asv",
+        Role::Scenario => "sim",
+    }
+}
+
+/// JSON Schema, draft 2020-12. It does not express the conditions that several keys must satisfy together.
+pub fn schema() -> String {
+    let defaults = Config::default();
+    let sections: Map<String, Value> =
+        Section::ALL.iter().map(|section| (section.name.to_owned(), section_schema(section, &defaults))).collect();
+    let schema = json!({
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "title": "scenecast configuration",
+        "type": "object",
+        "additionalProperties": false,
+        "properties": sections,
+    });
+    format!("{schema:#}\n")
+}
+
+fn section_schema(section: &Section, defaults: &Config) -> Value {
+    let keys: Map<String, Value> =
+        section.keys.iter().map(|key| (key.leaf().to_owned(), key_schema(key, defaults))).collect();
+    json!({
+        "type": "object",
+        "description": section.doc.trim_start(),
+        "additionalProperties": false,
+        "properties": keys,
+    })
+}
+
+fn key_schema(key: &Key, defaults: &Config) -> Value {
+    let mut schema = (key.operations.schema)(&key.rule);
+    schema["description"] = json!(format!("{} Allowed: {}.", key.doc(), key.allowed()));
+    schema["default"] = json!(key.value(defaults));
+    schema
 }

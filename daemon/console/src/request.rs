@@ -5,9 +5,8 @@ mod described;
 use crate::export::MapCells;
 use crate::fit::{self, Fit};
 use crate::layers;
-use crate::order_changes::OrderChanges;
 use crate::orders::{
-    BudgetOrder, ExemplarAction, ExemplarOrder, LabelOrder, MarkerOrder, NoteOrder, RemoveMarkerOrder,
+    BudgetOrder, ExemplarAction, ExemplarOrder, LabelOrder, MarkerOrder, NoteOrder, OrderChanges, RemoveMarkerOrder,
 };
 use crate::snapshot::{command_state, seconds};
 use crate::state::{AcceptedOrder, ArchivedMap, CellHistory, CommandState, FormerLabel};

@@ -3,7 +3,6 @@
 mod command;
 mod labels;
 mod link;
-mod log;
 mod map;
 mod storage;
 mod vehicle;
@@ -14,11 +13,10 @@ pub use command::{
 };
 pub use labels::{ExemplarImage, ExemplarProgress, ExemplarStage, MapLabel, MapLabelTree};
 pub use link::{ChannelQuality, LinkDirection, LinkRates, LinkSummary, ReportedBacklog, VehicleChannel};
-pub use log::{LogLine, LogList};
 pub use map::{
     CellHistory, EarlierMap, FormerLabel, LayerBody, MapBody, MapEvent, MapIndex, MapPlacement, MapSummary, TileLayer,
 };
-pub use storage::{ArchiveList, ArchivedMap, StorageInfo, VehicleMarker, VehicleNote};
+pub use storage::{ArchiveList, ArchivedMap, LogLine, LogList, StorageInfo, VehicleMarker, VehicleNote};
 pub use vehicle::{
     AppliedOrder, DirectiveSlots, InForceKnowledge, OrderProgress, OrderStatus, OtherSurface, PlannedPath,
     ReportedDisk, ReportedFault, ReportedMode, ReportedPose, ReportedRegistration, ReportedTie, StatusReport,

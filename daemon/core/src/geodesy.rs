@@ -1,5 +1,8 @@
-//! Positions on the Earth, and the tangent plane at the mission's origin.
+//! Places: positions on the Earth, the tangent plane at the mission's origin, rectangles and outlines in it, and the frame of a
+//! vessel's body.
 
+use scenecast_protocol::coordinates::{DecimetrePoint, WorldPoint};
+use scenecast_protocol::directive::{Fence, Polygon};
 use std::f64::consts::PI;
 
 /// Latitude and longitude on the WGS-84 ellipsoid, at its surface.
@@ -98,6 +101,85 @@ fn radii(lat_deg: f64) -> (f64, f64) {
 /// The angle in -pi..=pi that is the same direction.
 pub fn wrap_rad(angle: f64) -> f64 {
     (angle + PI).rem_euclid(2.0 * PI) - PI
+}
+
+/// An offset in the frame of a vessel's body, metres.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct BodyOffset {
+    /// The part towards the bow.
+    pub forward_m: f64,
+    /// To the right of an observer who looks forward.
+    pub starboard_m: f64,
+    pub down_m: f64,
+}
+
+impl From<[f64; 3]> for BodyOffset {
+    fn from([forward_m, starboard_m, down_m]: [f64; 3]) -> Self {
+        Self { forward_m, starboard_m, down_m }
+    }
+}
+
+/// Limits of the survey, metres from the origin.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Area {
+    pub west: f64,
+    pub south: f64,
+    pub east: f64,
+    pub north: f64,
+}
+
+impl Area {
+    /// The area without a border of `margin` metres, at least its middle.
+    pub fn shrunk(&self, margin: f64) -> Self {
+        let (cx, cy) = ((self.west + self.east) / 2.0, (self.south + self.north) / 2.0);
+        Self {
+            west: (self.west + margin).min(cx),
+            south: (self.south + margin).min(cy),
+            east: (self.east - margin).max(cx),
+            north: (self.north - margin).max(cy),
+        }
+    }
+
+    pub fn moved(&self, east_m: f64, north_m: f64) -> Self {
+        Self {
+            west: self.west + east_m,
+            south: self.south + north_m,
+            east: self.east + east_m,
+            north: self.north + north_m,
+        }
+    }
+
+    /// Whether a place lies inside or on the edge.
+    pub fn contains(&self, (x, y): (f64, f64)) -> bool {
+        (self.west..=self.east).contains(&x) && (self.south..=self.north).contains(&y)
+    }
+}
+
+/// The fence with these parts.
+pub fn fence_of(
+    fence: Option<&[[f64; 2]]>,
+    keep_outs: &[Vec<[f64; 2]>],
+    return_point: Option<[f64; 2]>,
+) -> Result<Fence, String> {
+    let fence = Fence {
+        fence: fence.map(|corners| outline_of("fence", corners)).transpose()?,
+        keep_outs: keep_outs.iter().map(|corners| outline_of("keep_outs", corners)).collect::<Result<_, _>>()?,
+        return_point: return_point.map(|at| place_of("return_point", at)).transpose()?,
+    };
+    fence.check().map_err(|fault| fault.to_string())?;
+    Ok(fence)
+}
+
+/// The outline with these corners, which is not checked yet.
+pub fn outline_of(what: &str, corners: &[[f64; 2]]) -> Result<Polygon, String> {
+    corners.iter().map(|&corner| place_of(what, corner)).collect::<Result<_, _>>().map(Polygon)
+}
+
+/// The place, if it is near the origin.
+pub fn place_of(what: &str, [x, y]: [f64; 2]) -> Result<DecimetrePoint, String> {
+    let far = || format!("{what}: [{x}, {y}] is no place within 100 km of the mission's origin");
+    let near = Some(WorldPoint::new(x, y)).filter(|_| x.hypot(y) <= MAX_DISTANCE_M);
+    near.and_then(DecimetrePoint::nearest).ok_or_else(far)
 }
 
 #[cfg(test)]

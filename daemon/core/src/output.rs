@@ -1,7 +1,10 @@
-//! Standard output and standard error output of commands.
+//! Standard output and standard error output of commands: texts from outside made safe for a terminal, and the error that ends a
+//! command.
 
+use std::borrow::Cow;
 use std::fmt;
 use std::io::{ErrorKind, Write};
+use std::path::Path;
 
 /// Writes to standard output. Where that fails, as on a full disk, the program ends with one line and exit code 1; where the reader has
 /// gone, as with `| head`, it ends with exit code 0.
@@ -38,4 +41,75 @@ macro_rules! out {
 macro_rules! outln {
     () => { $crate::write_or_exit(format_args!("\n")) };
     ($($text:tt)*) => { $crate::write_or_exit(format_args!("{}\n", format_args!($($text)*))) };
+}
+
+/// An error that ends a command; its kind gives the exit code.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum UserError {
+    /// Wrong usage or input, exit code 2: one line with the cause, the place and the allowed values.
+    Input(String),
+    /// Right usage, but it could not be done. Exit code 1.
+    Failed(String),
+}
+
+impl UserError {
+    /// An error of a file, as `FILE: cause`.
+    pub fn file(path: &Path, what: impl fmt::Display) -> Self {
+        Self::Input(format!("{}: {what}", path.display()))
+    }
+
+    pub fn exit_code(&self) -> u8 {
+        match self {
+            Self::Input(_) => 2,
+            Self::Failed(_) => 1,
+        }
+    }
+}
+
+impl fmt::Display for UserError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            // One line, whatever a library has put into its message.
+            Self::Input(what) | Self::Failed(what) => {
+                f.write_str(&printable(&what.split_whitespace().collect::<Vec<_>>().join(" ")))
+            }
+        }
+    }
+}
+
+impl std::error::Error for UserError {}
+
+/// The text with each control character but line feed and tab, and each character that changes the direction of writing, as
+/// `\uXXXX`. A name could otherwise move the cursor, or show one word in place of another. In JSON the text stays the same value.
+pub fn printable(text: &str) -> Cow<'_, str> {
+    if !text.chars().any(is_unsafe) {
+        return Cow::Borrowed(text);
+    }
+    let mut out = String::with_capacity(text.len());
+    for character in text.chars() {
+        match is_unsafe(character) {
+            // All of them have four digits.
+            true => drop(std::fmt::Write::write_fmt(&mut out, format_args!("\\u{:04x}", u32::from(character)))),
+            false => out.push(character),
+        }
+    }
+    Cow::Owned(out)
+}
+
+fn is_unsafe(character: char) -> bool {
+    let turns =
+        matches!(character, '\u{61C}' | '\u{200E}' | '\u{200F}' | '\u{202A}'..='\u{202E}' | '\u{2066}'..='\u{2069}');
+    turns || character.is_control() && !matches!(character, '\n' | '\t')
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_text_moves_no_cursor_and_turns_no_line_around() {
+        assert_eq!(printable("Plattfisch\n\tπλάτος"), "Plattfisch\n\tπλάτος");
+        assert_eq!(printable("a\u{1b}[2Jb\u{9b}31m\r\u{7f}"), "a\\u001b[2Jb\\u009b31m\\u000d\\u007f");
+        assert_eq!(printable("hold\u{202e}emuser\u{2069}"), "hold\\u202eemuser\\u2069");
+    }
 }

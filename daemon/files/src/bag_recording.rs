@@ -2,7 +2,7 @@
 
 use crate::bag::stream::{BagMessage, BagStream, BagTopic};
 use crate::bag::{Bag, COMPRESSED, RAW};
-use crate::frame_image::FrameImage;
+use crate::images::FrameImage;
 use crate::recording::{RecordedFrame, Recording};
 use scenecast_core::UserError;
 use scenecast_messages::decode as decode_cdr;

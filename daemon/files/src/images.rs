@@ -1,10 +1,14 @@
-//! Images of the sea floor and their annotations, from files.
+//! Images of the sea floor and their annotations, from files, and where their pixels are.
 
+use crate::bag::Bag;
+use image::RgbImage;
 use scenecast_config::read_regular;
 use scenecast_core::UserError;
 use scenecast_core::label_picture::{Indices, read_indices};
 use scenecast_sensors::DecodeError;
-use std::path::Path;
+use std::fmt;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// Size of the largest image file that is read, bytes.
 const MAX_BYTES: u64 = 4 << 30;
@@ -42,4 +46,38 @@ pub fn read_classes(path: &Path, size: (u32, u32)) -> Result<Vec<u8>, UserError>
         return Err(UserError::file(path, what));
     }
     Ok(classes)
+}
+
+/// Where the pixels of a recorded frame are.
+#[derive(Debug, Clone, PartialEq)]
+pub enum FrameImage {
+    File(PathBuf),
+    /// The image with this number in a bag.
+    Bag(Arc<Bag>, u64),
+}
+
+impl FrameImage {
+    pub fn read(&self) -> Result<RgbImage, UserError> {
+        match self {
+            Self::File(path) => Ok(crate::read_image(path)?.to_rgb8()),
+            Self::Bag(bag, number) => bag.read(*number),
+        }
+    }
+
+    /// The file of the image; `None` within a bag.
+    pub fn file(&self) -> Option<&Path> {
+        match self {
+            Self::File(path) => Some(path),
+            Self::Bag(..) => None,
+        }
+    }
+}
+
+impl fmt::Display for FrameImage {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::File(path) => write!(f, "{}", path.display()),
+            Self::Bag(bag, number) => write!(f, "{bag:?}, image {number}"),
+        }
+    }
 }

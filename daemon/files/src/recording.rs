@@ -1,11 +1,10 @@
 //! Recorded missions: images with their poses.
 
-use crate::frame_image::FrameImage;
-use crate::tum_folder::read_depth;
+use crate::images::FrameImage;
+use crate::tum_recording::read_depth;
 use image::RgbImage;
 use scene_model::project::View;
-use scenecast_core::Area;
-use scenecast_core::UserError;
+use scenecast_core::{Area, UserError};
 use scenecast_sensors::Sight;
 use std::fmt::Write as _;
 use std::io::Read as _;

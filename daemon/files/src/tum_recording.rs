@@ -1,12 +1,16 @@
-//! RGB-D sequences as recordings: each image with its distances at the pose of the camera.
+//! RGB-D sequences in the layout of the TUM benchmark (Sturm et al. 2012), as recordings: each image with its distances at the
+//! pose of the camera.
+//!
+//! `rgb.txt` and `depth.txt` are lines `time file`, `groundtruth.txt` lines `time tx ty tz qx qy qz qw`: camera to
+//! world. Depth is a 16-bit PNG in units of 1/5000 m, 0 where there is no reading.
 
-use crate::frame_image::FrameImage;
-use crate::images::read_image;
+use crate::images::{FrameImage, read_image};
 use crate::recording::{DepthFile, RecordedFrame, Recording};
-use crate::tum_folder::{TUM_UNITS_PER_M, TumFolder, TumFrame, tum_camera};
+use image::DynamicImage;
+use scene_model::project::{CameraPose, DepthImage};
 use scenecast_core::UserError;
 use scenecast_sensors::{Calibration, Rotation, Sight, tilt_of};
-use std::path::Path;
+use std::path::{Component, Path, PathBuf};
 use std::sync::Arc;
 
 /// How an RGB-D sequence is read.
@@ -83,4 +87,173 @@ fn recorded(
         sight: Some(Sight { calibration: calibration.clone(), tilt, height_m: options.altitude_m }),
         depth: Some(DepthFile { path: frame.depth.clone(), units_per_m }),
     })
+}
+
+/// Maximum time between an image and the depth image or the pose that is matched with it, seconds.
+const MAX_APART_S: f64 = 0.02;
+/// Size of the largest list, bytes.
+const MAX_LIST_BYTES: u64 = 256 << 20;
+/// Image width of the benchmark's own camera, pixels.
+const BENCHMARK_WIDTH_PX: f64 = 640.0;
+/// fx, fy, cx and cy of the benchmark's own camera, pixels.
+const BENCHMARK_CAMERA: [f64; 4] = [525.0, 525.0, 319.5, 239.5];
+
+/// Depth units per metre of the benchmark.
+pub const TUM_UNITS_PER_M: f64 = 5000.0;
+
+/// The frames of a sequence that have depth and pose.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TumFolder {
+    /// The frames, in the order of their time.
+    pub frames: Vec<TumFrame>,
+    /// Images of the sequence, with those that are not among the frames.
+    pub images: usize,
+}
+
+/// An image with its depth image and its pose.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TumFrame {
+    /// Time of the image in the list, seconds.
+    pub t_s: f64,
+    pub image: PathBuf,
+    pub depth: PathBuf,
+    pub pose: CameraPose,
+}
+
+impl TumFolder {
+    /// Reads the lists of a folder.
+    ///
+    /// # Errors
+    /// A list that cannot be read, by its line, or no image with depth and pose.
+    pub fn open(dir: &Path) -> Result<Self, UserError> {
+        let images = read_list(&dir.join("rgb.txt"), file)?;
+        let depths = read_list(&dir.join("depth.txt"), file)?;
+        let poses = read_list(&dir.join("groundtruth.txt"), pose)?;
+        let mut frames = Vec::new();
+        for (t_s, image) in &images {
+            if let (Some(depth), Some(pose)) = (nearest(&depths, *t_s), nearest(&poses, *t_s)) {
+                frames.push(TumFrame { t_s: *t_s, image: dir.join(image), depth: dir.join(depth), pose: *pose });
+            }
+        }
+        if frames.is_empty() {
+            let cause =
+                format!("none of its {} images has a depth image and a pose within {MAX_APART_S} s", images.len());
+            return Err(UserError::file(&dir.join("rgb.txt"), cause));
+        }
+        Ok(Self { images: images.len(), frames })
+    }
+
+    /// A line about images without a depth image or a pose; `None` if all have both.
+    pub fn note(&self) -> Option<String> {
+        let few = self.images - self.frames.len();
+        let all = self.images;
+        (few > 0).then(|| format!("{few} of {all} images have no depth image or no pose within {MAX_APART_S} s"))
+    }
+}
+
+/// fx, fy, cx and cy of the benchmark's own camera in images of a width, pixels.
+pub fn tum_camera(width_px: u32) -> [f64; 4] {
+    BENCHMARK_CAMERA.map(|pixels| pixels * f64::from(width_px) / BENCHMARK_WIDTH_PX)
+}
+
+/// Reads a depth image: a grey PNG of 16 bits with so many units a metre.
+///
+/// # Errors
+/// The file cannot be read, or is another image.
+pub fn read_depth(path: &Path, units_per_m: f64) -> Result<DepthImage, UserError> {
+    match read_image(path)? {
+        DynamicImage::ImageLuma16(depth) => {
+            let (width, height) = depth.dimensions();
+            let metres = depth.into_raw().into_iter().map(|units| (f64::from(units) / units_per_m) as f32).collect();
+            Ok(DepthImage { width, height, metres })
+        }
+        _ => Err(UserError::file(path, "a depth image is a grey PNG of 16 bits")),
+    }
+}
+
+/// Reads lines `time value` and sorts them by time; errors name the line.
+fn read_list<T>(path: &Path, read: impl Fn(&str) -> Result<T, String>) -> Result<Vec<(f64, T)>, UserError> {
+    let text = scenecast_config::read_regular(path, MAX_LIST_BYTES)?;
+    let text = String::from_utf8(text).map_err(|_| UserError::file(path, "it is not text in UTF-8"))?;
+    let mut list = Vec::new();
+    for (index, line) in text.lines().enumerate() {
+        let line = line.trim_start_matches('\u{feff}').trim();
+        if line.is_empty() || line.starts_with('#') {
+            continue;
+        }
+        let (time, rest) = line.split_once([' ', '\t', ',']).unwrap_or((line, ""));
+        let entry = number(Some(time), "the time").and_then(|t_s| Ok((t_s, read(rest.trim())?)));
+        let place = || format!("{}:{}", path.display(), index + 1);
+        list.push(entry.map_err(|error| UserError::Input(format!("{}: {error}", place())))?);
+    }
+    if list.is_empty() {
+        return Err(UserError::file(path, "there are no lines"));
+    }
+    list.sort_by(|a, b| a.0.total_cmp(&b.0));
+    Ok(list)
+}
+
+fn file(text: &str) -> Result<PathBuf, String> {
+    let is_inside = Path::new(text).components().all(|part| matches!(part, Component::Normal(_) | Component::CurDir));
+    match text {
+        "" => Err("expected a time and a file".to_owned()),
+        _ if !is_inside => Err(format!("the file is {text:?}; expected a file below the folder")),
+        _ => Ok(text.into()),
+    }
+}
+
+fn pose(text: &str) -> Result<CameraPose, String> {
+    let mut fields = text.split([' ', '\t', ',']).filter(|field| !field.is_empty());
+    let mut next = |name| number(fields.next(), name);
+    let position = [next("tx")?, next("ty")?, next("tz")?];
+    let rotation = [next("qx")?, next("qy")?, next("qz")?, next("qw")?];
+    let length: f64 = rotation.iter().map(|q| q * q).sum();
+    if !(0.9..1.1).contains(&length) {
+        return Err("the quaternion qx qy qz qw has not the length 1".to_owned());
+    }
+    Ok(CameraPose { position, rotation })
+}
+
+fn number(field: Option<&str>, name: &str) -> Result<f64, String> {
+    let text = field.map(str::trim).ok_or_else(|| format!("{name} is missing"))?;
+    match text.parse::<f64>() {
+        Ok(value) if value.is_finite() => Ok(value),
+        Ok(_) => Err(format!("{name} = {text}: it takes a finite number")),
+        Err(_) => Err(format!("{name} = {text:?} is no number")),
+    }
+}
+
+fn nearest<T>(list: &[(f64, T)], t_s: f64) -> Option<&T> {
+    let after = list.partition_point(|entry| entry.0 < t_s);
+    let near = list[after.saturating_sub(1)..(after + 1).min(list.len())].iter();
+    let best = near.min_by(|a, b| (a.0 - t_s).abs().total_cmp(&(b.0 - t_s).abs()))?;
+    // Times have microseconds; as floating-point numbers they may differ a little more than the limit.
+    ((best.0 - t_s).abs() <= MAX_APART_S + 1e-6).then_some(&best.1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_nearest_in_time_is_matched_within_the_limit() {
+        let list = [(1.0, 'a'), (1.03, 'b'), (2.0, 'c')];
+        let found: Vec<Option<&char>> = [0.99, 1.014, 1.016, 1.06, 2.02, 9.0].map(|t| nearest(&list, t)).to_vec();
+        assert_eq!(found, [Some(&'a'), Some(&'a'), Some(&'b'), None, Some(&'c'), None]);
+    }
+
+    #[test]
+    fn a_pose_is_seven_numbers_with_a_rotation() {
+        assert_eq!(pose("1 2 3 0 0 0 1").unwrap().position, [1.0, 2.0, 3.0]);
+        assert!(pose("1 2 3 0 0 0 0").unwrap_err().contains("length 1"));
+        assert!(pose("1 2 nan 0 0 0 1").unwrap_err().contains("tz"));
+        assert!(pose("1 2 3 0 0 1").unwrap_err().contains("qw is missing"));
+    }
+
+    #[test]
+    fn a_file_outside_of_the_folder_is_refused() {
+        assert!(file("rgb/1.png").is_ok());
+        assert!(file("../1.png").unwrap_err().contains("below the folder"));
+        assert!(file("").is_err());
+    }
 }

@@ -24,12 +24,10 @@ mod pilot;
 #[cfg(feature = "surface")]
 mod surface;
 mod vehicle;
-mod vehicle_pilot;
 
 pub use link_end::{FrameCounts, LinkEnd};
 pub use link_host::{FrameEvent, FrameOutcome, LinkHost, channel_station, modem_station};
-pub use pilot::PilotEvent;
+pub use pilot::{PilotEvent, VehiclePilot};
 #[cfg(feature = "surface")]
 pub use surface::{Follower, SurfaceHost, SurfaceHostEvent};
 pub use vehicle::{CameraPose, MeasuredPose, VehicleHost, VehicleHostEvent};
-pub use vehicle_pilot::VehiclePilot;

@@ -1,8 +1,7 @@
 //! The host of the vehicle: role, modem, autopilot, persistent state and mapper.
 
 use crate::link_host::{FrameEvent, LinkHost};
-use crate::pilot::PilotEvent;
-use crate::vehicle_pilot::VehiclePilot;
+use crate::pilot::{PilotEvent, VehiclePilot};
 use scenecast_drivers::autopilot::{Counters, Health, Plausible, Step};
 use scenecast_drivers::modem::Station;
 use scenecast_protocol::coordinates::MapPoint;

@@ -1,7 +1,7 @@
 //! The header of an item: one JSON object.
 
 use crate::item::{Band, BandScale, Content, Ground, ImagePose, Item, ItemTime, QuantityBand};
-use crate::picture::{MAX_PICTURE_BYTES, Raster, Values};
+use crate::stream::{MAX_PICTURE_BYTES, Raster, Values};
 use crate::{MAX_HEADER_BYTES, Refusal};
 use scenecast_protocol::map::{ClassEntry, Decimal, LayerDescriptor, MAX_CLASS};
 use serde::Deserialize;

@@ -6,12 +6,8 @@
 
 mod header;
 mod item;
-mod picture;
-mod refusal;
 pub mod ros;
 mod stream;
 
-pub use item::{Band, BandScale, Content, Ground, ImagePose, Item, ItemTime, QuantityBand};
-pub use picture::{MAX_PICTURE_BYTES, MAX_PIXELS, Raster};
-pub use refusal::Refusal;
-pub use stream::{MAX_HEADER_BYTES, Stream};
+pub use item::{Band, BandScale, Content, Ground, ImagePose, Item, ItemTime, QuantityBand, Refusal};
+pub use stream::{MAX_HEADER_BYTES, MAX_PICTURE_BYTES, MAX_PIXELS, Raster, Stream};

@@ -2,7 +2,6 @@
 //!
 //! A sequence of octets is one block of bytes, and an array is a tuple of any length (serde's own ends at 32).
 
-use crate::byte::Byte;
 use crate::definition::{Kind, Primitive};
 use serde::de::{DeserializeOwned, Error, SeqAccess, Visitor};
 use serde::ser::SerializeTuple;
@@ -176,3 +175,8 @@ elements! {
     Byte: Byte,
     String: String,
 }
+
+/// One octet of the type `byte`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(transparent)]
+pub struct Byte(pub u8);

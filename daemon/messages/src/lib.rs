@@ -14,13 +14,11 @@
 //! assert_eq!(Header::DEFINITION.dds_name(), "std_msgs::msg::dds_::Header_");
 //! ```
 
-mod byte;
 mod catalogue;
 mod cdr;
 mod definition;
 mod field;
 mod message;
-mod schema;
 mod type_hash;
 
 pub mod builtin_interfaces;
@@ -35,8 +33,8 @@ pub mod sensor_msgs;
 pub mod std_msgs;
 pub mod tf2_msgs;
 
-pub use byte::Byte;
 pub use catalogue::{CATALOGUE, Entry};
 pub use cdr::{CdrError, decode, encode};
 pub use definition::{Constant, Definition, Field, Kind, Primitive};
+pub use field::Byte;
 pub use message::Message;

@@ -6,8 +6,6 @@
 
 mod commands;
 mod emulation;
-mod host;
-mod links;
 #[cfg(unix)]
 mod pty;
 mod scenario;
@@ -16,9 +14,8 @@ mod tcp;
 pub use scenario::Scenario;
 
 use commands::EmulatorCommand;
-use emulation::Emulation;
-use host::FromHost;
-use links::Links;
+use emulation::{Emulation, FromHost};
+use pty::Links;
 use scenecast_core::UserError;
 use scenecast_runtime::Stop;
 use std::path::PathBuf;

@@ -5,21 +5,11 @@
 //! Frames of reference are those of ROS REP 105: the world frame is `map`, the map frame of a vehicle is `odom`. Axes point
 //! east, north and up; headings become angles from east, anticlockwise.
 
-mod cloud;
-mod diagnostics;
-mod exemplar;
-mod grid;
-mod layers;
-mod occupancy;
-mod position;
+mod map;
+mod vehicle;
 
-pub use cloud::cloud;
-pub use diagnostics::{Health, diagnostics};
-pub use exemplar::exemplar_jpeg;
-pub use grid::{Grid, GridLayer, MAX_GRID_CELLS};
-pub use layers::layers;
-pub use occupancy::occupancy;
-pub use position::{Place, fix, path, pose};
+pub use map::{Grid, GridLayer, MAX_GRID_CELLS, cloud, layers, occupancy};
+pub use vehicle::{Health, Place, diagnostics, exemplar_jpeg, fix, path, pose};
 
 use scenecast_messages::builtin_interfaces::Time;
 use scenecast_messages::std_msgs::Header;

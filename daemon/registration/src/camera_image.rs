@@ -1,6 +1,8 @@
-//! A camera frame as a grey image, and its reduction to a small plane.
+//! A camera frame as a grey image, as the small high-passed one that is compared with others, and the mean brightness at each
+//! place of frames.
 
 use crate::plane::Plane;
+use serde::{Deserialize, Serialize};
 
 /// Pixels of a reduced frame, about: 160 x 120 for a frame of 4 : 3.
 const REDUCED_PX: f64 = 19_200.0;
@@ -104,6 +106,111 @@ fn reduce_row(sums: &[u32], across: &[f64], line: &mut [f32]) {
     }
 }
 
+/// Reach of the high-pass, pixels: three means over 2 x 7 + 1 pixels are about a Gaussian of 7.5 pixels.
+const HIGH_PASS_PX: usize = 7;
+/// A frame whose high-passed logarithm has a smaller root mean square has no texture.
+const MIN_CONTRAST: f32 = 0.004;
+/// Values beyond so many times the contrast are cut: snow and glints.
+const MAX_VALUE: f32 = 3.0;
+/// Steps of a stored value in a unit of contrast.
+const STEPS: f32 = 40.0;
+
+/// A reduced frame as bytes.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Thumbnail {
+    columns: u16,
+    /// Edge of a pixel on the sea floor by the altitude, metres.
+    pitch_m: f64,
+    values: Vec<i8>,
+}
+
+impl Thumbnail {
+    /// The largest number of pixels.
+    const MAX_PX: usize = 20_000;
+
+    /// Reduces a frame whose pixels measure `metres_per_pixel`, and learns its light. `None` without texture.
+    pub(crate) fn new(image: &CameraImage, metres_per_pixel: f64, flat: &mut FlatField) -> Option<Self> {
+        let mut logs = image.reduced()?;
+        logs.values_mut().iter_mut().for_each(|value| *value = (*value + 1.0).ln());
+        let mut level = flat.level(&logs);
+        let blurred = level.blurred(HIGH_PASS_PX);
+        level.values_mut().iter_mut().zip(blurred.values()).for_each(|(value, mean)| *value -= mean);
+        let contrast = level.rms();
+        if contrast.is_nan() || contrast < MIN_CONTRAST {
+            return None;
+        }
+        let step = |value: &f32| ((value / contrast).clamp(-MAX_VALUE, MAX_VALUE) * STEPS).round() as i8;
+        Some(Self {
+            columns: level.columns() as u16,
+            pitch_m: metres_per_pixel * image.reduction(),
+            values: level.values().iter().map(step).collect(),
+        })
+    }
+
+    /// Columns and rows of the finer plane, metres to the right and ahead.
+    pub(crate) fn extent_m(&self) -> [f64; 2] {
+        let columns = usize::from(self.columns);
+        [columns as f64 * self.pitch_m, (self.values.len() / columns) as f64 * self.pitch_m]
+    }
+
+    pub(crate) fn unpacked(&self) -> Option<Scales> {
+        let values = self.values.iter().map(|&value| f32::from(value) / STEPS).collect();
+        let fine = Plane::from_values(usize::from(self.columns), values)?;
+        Some(Scales { coarse: fine.halved(), fine, pitch_m: self.pitch_m })
+    }
+
+    pub(crate) fn is_sound(&self) -> bool {
+        let columns = usize::from(self.columns);
+        let is_whole = columns >= 32 && self.values.len() >= 32 * columns && self.values.len().is_multiple_of(columns);
+        is_whole && self.values.len() <= Self::MAX_PX && self.pitch_m > 1e-7 && self.pitch_m < 1e3
+    }
+}
+
+/// A thumbnail at two scales: pixels of the coarse one are twice as large.
+#[derive(Debug, Clone)]
+pub(crate) struct Scales {
+    pub(crate) fine: Plane,
+    pub(crate) coarse: Plane,
+    /// Edge of a fine pixel on the sea floor by the altitude, metres.
+    pub(crate) pitch_m: f64,
+}
+
+/// Frames that the running mean remembers. Without it, dirt on the lens is matched where the floor has no texture.
+const FRAMES: u16 = 40;
+/// Frames after which half of the mean is removed: before, it is the sea floor's own.
+const HALF_FRAMES: f32 = 6.0;
+
+/// A running mean of the logarithm of the brightness.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub(crate) struct FlatField {
+    frames: u16,
+    columns: u16,
+    mean: Vec<f32>,
+}
+
+impl FlatField {
+    /// Learns from a frame and returns it as an even light would show it. A frame of another size starts again.
+    pub(crate) fn level(&mut self, logs: &Plane) -> Plane {
+        if usize::from(self.columns) != logs.columns() || self.mean.len() != logs.values().len() {
+            *self = Self { frames: 0, columns: logs.columns() as u16, mean: vec![0.0; logs.values().len()] };
+        }
+        self.frames = (self.frames + 1).min(FRAMES);
+        let step = 1.0 / f32::from(self.frames);
+        let share = f32::from(self.frames) / (f32::from(self.frames) + HALF_FRAMES);
+        let mut level = logs.clone();
+        for (value, mean) in level.values_mut().iter_mut().zip(&mut self.mean) {
+            *mean += step * (*value - *mean);
+            *value -= share * *mean;
+        }
+        level
+    }
+
+    /// Whether the numbers can be those of frames.
+    pub(crate) fn is_sound(&self) -> bool {
+        self.frames <= FRAMES && self.mean.len() <= 65_536 && self.mean.iter().all(|mean| mean.abs() < 100.0)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -137,5 +244,47 @@ mod tests {
         assert!(CameraImage::rgb(usize::MAX, 2, &[0; 6]).is_none());
         assert!(CameraImage::grey(0, 0, &[]).unwrap().reduced().is_none());
         assert!(CameraImage::grey(4000, 20, &[7; 80_000]).unwrap().reduced().is_none());
+    }
+
+    #[test]
+    fn an_even_frame_has_no_texture() {
+        let mut flat = FlatField::default();
+        let even = vec![90u8; 640 * 480];
+        let image = CameraImage::grey(640, 480, &even).unwrap();
+        assert!(Thumbnail::new(&image, 0.01, &mut flat).is_none());
+    }
+
+    #[test]
+    fn contrast_and_brightness_do_not_change_a_thumbnail() {
+        let of = |gain: f64| {
+            let value = |i: usize| {
+                (gain * (60.0 + 30.0 * ((i % 640) as f64 / 9.0).sin() + 20.0 * ((i / 640) as f64 / 14.0).cos())) as u8
+            };
+            let samples: Vec<u8> = (0..640 * 480).map(value).collect();
+            let image = CameraImage::grey(640, 480, &samples).unwrap();
+            Thumbnail::new(&image, 0.01, &mut FlatField::default()).unwrap()
+        };
+        let (bright, dark) = (of(1.5), of(0.7));
+        let off: i32 = bright.values.iter().zip(&dark.values).map(|(a, b)| (i32::from(*a) - i32::from(*b)).abs()).sum();
+        assert!(off < 2 * bright.values.len() as i32, "{off} steps");
+        assert!(bright.is_sound());
+        assert_eq!((bright.extent_m(), bright.unpacked().unwrap().coarse.columns()), ([6.4, 4.8], 80));
+    }
+
+    #[test]
+    fn dirt_on_the_lens_fades_from_the_frames() {
+        let mut flat = FlatField::default();
+        let dirty = |moment: usize| {
+            let value =
+                |i: usize| if i.is_multiple_of(7) { -1.0 } else { 0.0 } + ((i * 31 + moment * 17) % 13) as f32 * 0.02;
+            Plane::from_values(40, (0..1200).map(value).collect()).unwrap()
+        };
+        let contrast = |plane: &Plane| (plane.row(3)[1] - plane.row(3)[13]).abs();
+        let first = flat.level(&dirty(0));
+        let last = (1..100).map(|moment| flat.level(&dirty(moment))).last().unwrap();
+        assert!(contrast(&first) < 1.1 && last.rms() < 0.35 * first.rms(), "{} {}", first.rms(), last.rms());
+        let other = Plane::new(50, 40);
+        assert_eq!(flat.level(&other).values().len(), 2000, "another camera");
+        assert!(flat.is_sound());
     }
 }

@@ -3,11 +3,10 @@
 //! The registration searches for overlaps near where odometry expects them, so that a wrong size of pixels only makes it find fewer. Here
 //! frames are compared over all shifts, and their displacements by the images with those by odometry.
 
+use crate::camera_image::{FlatField, Thumbnail};
 use crate::correlate::{Correlator, Peak};
-use crate::flat_field::FlatField;
 use crate::plane::Plane;
 use crate::registrar::FrameInput;
-use crate::thumbnail::Thumbnail;
 use nalgebra::Complex;
 use scenecast_core::wrap_rad;
 

@@ -1,7 +1,7 @@
 //! Earlier frames, for closing loops: a bounded store.
 
+use crate::camera_image::Thumbnail;
 use crate::pose::FramePose;
-use crate::thumbnail::Thumbnail;
 use nalgebra::Vector2;
 use serde::{Deserialize, Serialize};
 
@@ -110,7 +110,7 @@ impl KeptFrames {
 mod tests {
     use super::*;
     use crate::camera_image::CameraImage;
-    use crate::flat_field::FlatField;
+    use crate::camera_image::FlatField;
     use scenecast_protocol::coordinates::MapPoint;
 
     fn frame(number: u32, x_m: f64, y_m: f64) -> KeptFrame {

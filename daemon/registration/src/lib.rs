@@ -6,18 +6,14 @@
 
 mod altitude;
 mod camera_image;
-mod checkpoint;
 mod compass;
 mod consensus;
 mod correlate;
-mod evidence;
-mod flat_field;
 mod geometry;
 mod graph;
 #[cfg(test)]
 mod graph_tests;
 mod kept_frames;
-mod link;
 mod odometry;
 mod pair;
 mod plane;
@@ -26,19 +22,12 @@ mod refine;
 mod registrar;
 #[cfg(test)]
 mod registrar_tests;
-mod similarity;
 #[cfg(test)]
 mod skerki_tests;
-mod sparse;
-mod tally;
-mod thumbnail;
 mod tiles;
 
 pub use camera_image::CameraImage;
-pub use checkpoint::RestoreError;
-pub use evidence::Evidence;
 pub use geometry::{CameraGeometry, GeometryCheck};
 pub use graph::FrameGraph;
-pub use pose::FramePose;
+pub use pose::{Evidence, FramePose, RestoreError, Tally};
 pub use registrar::{FrameInput, Placed, Registrar};
-pub use tally::Tally;

@@ -1,18 +1,13 @@
 //! Places each frame once, by its overlap with earlier frames.
 
 use crate::altitude::ScaleFilter;
-use crate::camera_image::CameraImage;
+use crate::camera_image::{CameraImage, FlatField, Thumbnail};
 use crate::compass::HeadingFilter;
 use crate::consensus::ExpectedRelief;
-use crate::evidence::{Evidence, Loop, Step};
-use crate::flat_field::FlatField;
 use crate::kept_frames::{KeptFrame, KeptFrames};
-use crate::link::{Link, PLACED_SPREAD};
 use crate::odometry::{OdometryFilter, Seen};
-use crate::pair::{Attempts, Expected, Gates};
-use crate::pose::FramePose;
-use crate::tally::Tally;
-use crate::thumbnail::Thumbnail;
+use crate::pair::{Attempts, Expected, Gates, Link, PLACED_SPREAD};
+use crate::pose::{Evidence, FramePose, Loop, Step, Tally};
 use nalgebra::{Matrix2, Rotation2, Vector2};
 use scenecast_core::wrap_rad;
 use scenecast_protocol::coordinates::MapPoint;

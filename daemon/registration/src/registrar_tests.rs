@@ -1,7 +1,7 @@
 //! Flights over a floor of noise.
 
 use crate::camera_image::CameraImage;
-use crate::checkpoint::RestoreError;
+use crate::pose::RestoreError;
 use crate::registrar::{FrameInput, Placed, Registrar};
 use proptest::prelude::*;
 use scenecast_protocol::coordinates::MapPoint;

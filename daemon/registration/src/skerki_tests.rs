@@ -2,12 +2,10 @@
 
 #![allow(clippy::disallowed_methods, reason = "the test reads recorded frames")]
 
-use crate::camera_image::CameraImage;
+use crate::camera_image::{CameraImage, FlatField, Thumbnail};
 use crate::consensus::ExpectedRelief;
-use crate::flat_field::FlatField;
 use crate::pair::{Attempts, Expected, Gates, Match};
 use crate::pose::FramePose;
-use crate::thumbnail::Thumbnail;
 use nalgebra::Vector2;
 use scenecast_protocol::coordinates::MapPoint;
 use std::path::PathBuf;

@@ -1,11 +1,10 @@
 //! The report of a mission.
 
 use super::fidelity::mean_share;
+use super::frames_log::{Repeats, Uplink};
 use super::mission::{MapInformation, MapQuality, Mission};
-use super::uplink::{Repeats, Uplink};
 use scenecast_core::drop_counts::dropped;
-use scenecast_protocol::directive::SlotId;
-use scenecast_protocol::directive::SlotState;
+use scenecast_protocol::directive::{SlotId, SlotState};
 use scenecast_protocol::map::{LabelGrid, LayerSource};
 use scenecast_protocol::schedule::Class;
 use scenecast_scoring::MutualInformation;

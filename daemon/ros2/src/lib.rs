@@ -23,12 +23,10 @@ mod map_versions;
 mod names;
 mod node;
 mod stop;
-mod subscribe;
 #[cfg(feature = "surface")]
 mod surface;
 mod transport;
 mod vehicle;
-mod vehicle_map;
 #[cfg(feature = "zenoh")]
 mod zenoh;
 #[cfg(not(feature = "zenoh"))]
@@ -41,5 +39,4 @@ pub use node::{Publisher, RosNode};
 #[cfg(feature = "surface")]
 pub use surface::{SurfaceOutlet, start_surface};
 pub use transport::{Peers, Qos, Transport};
-pub use vehicle::{VehicleOutlet, VehicleView, start_vehicle};
-pub use vehicle_map::VehicleMap;
+pub use vehicle::{VehicleMap, VehicleOutlet, VehicleView, start_vehicle};

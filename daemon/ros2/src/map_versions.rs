@@ -1,6 +1,6 @@
 //! Which version of a vehicle's map each of its topics has.
 
-use crate::vehicle_map::VehicleMap;
+use crate::vehicle::VehicleMap;
 use scenecast_outlets::{Grid, MAX_GRID_CELLS};
 use scenecast_protocol::map::Quantity;
 

@@ -1,13 +1,14 @@
-//! The vehicle's durable state: read at the start of a run, and kept during it.
+//! The vehicle's durable state, read at the start of a run and kept during it, and the free space of its disk.
 
-use super::checkpoint;
 use super::journal::{Damage, Found, Journal, JournalNames, Storage};
+use super::restore;
 use scenecast_config::{Config, StartMode};
 use scenecast_core::{TangentPlane, UserError};
 use scenecast_files::{CoordinateFrame, read_fence};
 use scenecast_protocol::directive::Fence;
-use scenecast_vehicle::{Durable, LastPlace, LostOrders};
-use std::path::Path;
+use scenecast_vehicle::{Durable, LastPlace, LostOrders, VehicleDisk};
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
 
 /// The journal's files. Their records hold a [`Durable`] in postcard; another layout needs another version of the files.
 const JOURNAL: JournalNames = JournalNames { journal: "vehicle.journal", copy: "vehicle.journal.copy" };
@@ -90,7 +91,7 @@ impl<S: Storage> Keeper<S> {
             forgetful(&storage.path(name), damage, lineage, checkpoint, first)
         };
         let (mut durable, is_again) = match found {
-            Found::Absent if !checkpoint::is_there(storage) => (first.durable(lineage), false),
+            Found::Absent if !restore::is_there(storage) => (first.durable(lineage), false),
             Found::Absent => (forgotten(JOURNAL.journal, &Damage::Missing), true),
             Found::Lost(name, damage) => (forgotten(name, &damage), true),
             Found::State { body, damage } => match decode(&body) {
@@ -170,6 +171,59 @@ fn decode(state: &[u8]) -> Option<Durable> {
     match postcard::take_from_bytes(state) {
         Ok((durable, [])) => Some(durable),
         _ => None,
+    }
+}
+
+/// Time between two looks at the free space.
+const LOOK_INTERVAL: Duration = Duration::from_secs(10);
+
+/// Bytes that this user may still write to the disk of a folder; `None` if that is unknown.
+#[cfg(unix)]
+pub(super) fn free_bytes(dir: &Path) -> Option<u64> {
+    let stats = nix::sys::statvfs::statvfs(dir).ok()?;
+    #[allow(clippy::useless_conversion, reason = "the types differ between systems")]
+    Some(u64::from(stats.blocks_available()).saturating_mul(u64::from(stats.fragment_size())))
+}
+
+#[cfg(not(unix))]
+pub(super) fn free_bytes(_: &Path) -> Option<u64> {
+    None
+}
+
+/// The checkpoints of a vehicle.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Checkpoint {
+    SceneModel,
+    Labels,
+}
+
+/// The disk with the vehicle's files.
+pub(super) struct DiskWatch {
+    dir: PathBuf,
+    /// Whether the last checkpoint of each kind was refused.
+    refused: [bool; 2],
+    /// `None` if a look is due at once.
+    looked: Option<Instant>,
+}
+
+impl DiskWatch {
+    pub(super) fn new(dir: &Path) -> Self {
+        Self { dir: dir.to_owned(), refused: [false; 2], looked: None }
+    }
+
+    /// A checkpoint was written or refused.
+    pub(super) fn handle_checkpoint(&mut self, which: Checkpoint, is_refused: bool) {
+        (self.refused[which as usize], self.looked) = (is_refused, None);
+    }
+
+    /// The state of the disk, at its first look, after a change, and every [`LOOK_INTERVAL`].
+    pub(super) fn look(&mut self, now: Instant) -> Option<VehicleDisk> {
+        if self.looked.is_some_and(|at| now < at + LOOK_INTERVAL) {
+            return None;
+        }
+        self.looked = Some(now);
+        let is_checkpoint_refused = self.refused.contains(&true);
+        Some(VehicleDisk { free_bytes: free_bytes(&self.dir), is_checkpoint_refused })
     }
 }
 
@@ -389,5 +443,20 @@ mod tests {
         disk.put("vehicle.journal", b"damaged");
         let damaged = Keeper::begin_run(disk, 9, None, &fenced).durable;
         assert!(damaged.hold && damaged.fence == fence.to_bytes(), "what else it was ordered is not known");
+    }
+
+    #[test]
+    fn a_disk_is_checked_at_intervals_and_after_a_checkpoint() {
+        let (mut disk, now) = (DiskWatch::new(&std::env::temp_dir()), Instant::now());
+        let first = disk.look(now).unwrap();
+        assert!(first.free_bytes.is_some() == cfg!(unix) && !first.is_checkpoint_refused);
+        assert_eq!(disk.look(now + LOOK_INTERVAL / 2), None);
+        disk.handle_checkpoint(Checkpoint::Labels, true);
+        disk.handle_checkpoint(Checkpoint::SceneModel, false);
+        assert!(disk.look(now + LOOK_INTERVAL / 2).unwrap().is_checkpoint_refused);
+        assert!(disk.look(now + LOOK_INTERVAL).is_none());
+        assert!(disk.look(now + LOOK_INTERVAL * 2).is_some());
+        let missing = DiskWatch::new(Path::new("/no such folder")).look(now).unwrap();
+        assert_eq!(missing.free_bytes, None);
     }
 }

@@ -1,34 +1,25 @@
 //! The tokio shells around the hosts: they move bytes, read the clock and write files.
 
 mod camera;
-mod checkpoint;
 mod clock;
-mod disagreement;
-mod disk_space;
 mod durable;
 mod equipment;
 #[cfg(test)]
 mod fuzz_corpus_tests;
-#[cfg(feature = "surface")]
-mod instruments;
 mod journal;
 #[cfg(test)]
 mod kept_label_tests;
-mod label_health;
 mod labels;
 #[cfg(feature = "surface")]
 mod map_files;
 mod mapping;
-mod missing_key;
 mod modem;
 mod pilot;
 mod port;
 #[cfg(all(test, feature = "surface"))]
 mod power_cut_tests;
-mod private;
 #[cfg(all(test, feature = "surface"))]
 mod refusing_disk_tests;
-mod reload;
 mod restore;
 mod ros2;
 mod stop;
@@ -40,9 +31,7 @@ mod vehicle;
 
 pub use clock::Clock;
 pub use pilot::SimulatedAutopilot;
-pub use private::keep_private;
-pub use reload::Load;
-pub use stop::Stop;
+pub use stop::{Load, Stop, keep_private};
 #[cfg(feature = "surface")]
 pub use surface::{host_name, run_surface};
 pub use vehicle::run_vehicle;

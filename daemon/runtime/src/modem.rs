@@ -1,4 +1,4 @@
-//! The port of a process's modem, and the log of its events.
+//! The port of a process's modem, the log of its events, and the warning of a missing key.
 
 use crate::port::{FromPort, Port};
 use scenecast_config::Config;
@@ -189,5 +189,15 @@ mod tests {
         exchange(&mut surface, &mut vehicle, start + Duration::from_secs(100), 6).await;
         assert!(surface.accepted() >= 6 && vehicle.accepted() >= 6);
         assert_eq!(vehicle.link.end().frame_counts().dropped, 1, "only the first datagram of the stranger was read");
+    }
+}
+
+/// Warns of the risk of running without a key.
+pub(super) fn warn_without_key(config: &Config) {
+    if config.link.key_file.is_none() {
+        tracing::warn!(
+            "link.key_file is empty: whoever can transmit to the vehicle can give it orders and forge its map; \
+             scenecast key new makes a key, and both ends need the same file"
+        );
     }
 }

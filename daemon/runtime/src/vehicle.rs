@@ -1,21 +1,16 @@
 //! `scenecast auv`: ports, disk and clock around the vehicle's host.
 
 use super::clock::{Clock, utc_hours};
-use super::disagreement::Disagreement;
-use super::disk_space::{Checkpoint, DiskWatch};
-use super::durable::{Keeper, StartedRun};
+use super::durable::{Checkpoint, DiskWatch, Keeper, StartedRun};
 use super::equipment::SensorFaults;
 use super::journal::Folder;
 use super::labels::{self, FromLabels, LabelThread, move_the_vehicle};
-use super::mapping::{FromMapper, Mapped, MapperThread, ToMapper};
-use super::missing_key::warn_without_key;
-use super::modem::{self, ModemPort};
+use super::mapping::{Disagreement, FromMapper, Mapped, MapperThread, ToMapper};
+use super::modem::{self, ModemPort, warn_without_key};
 use super::pilot::{self, PilotPort, SimulatedAutopilot};
-use super::private::keep_private;
-use super::reload::{Load, Reload, configured_budget};
 use super::restore::{Start, start};
 use super::ros2::{RosSensors, VehicleRos2};
-use super::stop::Stop;
+use super::stop::{Load, Reload, Stop, configured_budget, keep_private};
 use crate::camera::{Camera, CameraFrame, LiveCamera, RecordedCamera};
 use crate::port::FromPort;
 use scenecast_config::{AutopilotKind, Config, LabelSource, NavigationSource, survey_depth_m};

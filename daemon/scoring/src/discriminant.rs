@@ -8,7 +8,7 @@ use scene_model::words::{
 use std::collections::BTreeMap;
 
 use crate::annotations::Annotations;
-use crate::k_means::cluster_centres;
+use crate::baselines::cluster_centres;
 
 /// The minimum number of annotated cells of a class that directions are learnt from.
 pub const MIN_CLASS_CELLS: u64 = 20;

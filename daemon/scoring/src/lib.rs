@@ -21,22 +21,15 @@
 mod annotations;
 mod baselines;
 mod discriminant;
-mod k_means;
-mod label_grid;
 mod mutual_information;
-mod null;
 mod rigid_fit;
 mod seams;
-mod training;
 mod trial;
 
-pub use annotations::{AnnotationError, Annotations};
+pub use annotations::{AnnotationError, Annotations, LabelGrid};
 pub use baselines::mosaic_classes;
 pub use discriminant::{ClassStatistics, DiscriminantTrainingError, MIN_CLASS_CELLS};
-pub use label_grid::LabelGrid;
-pub use mutual_information::{MutualInformation, mutual_information_nats};
-pub use null::{SceneScore, score};
+pub use mutual_information::{MutualInformation, SceneScore, mutual_information_nats, score};
 pub use rigid_fit::{PointPair, RigidFit, rms_distance};
 pub use seams::{Seams, TimedCell};
-pub use training::train_vocabulary;
-pub use trial::{AnnotatedScene, MeanScore, Method, Trial, TrialError};
+pub use trial::{AnnotatedScene, MeanScore, Method, Trial, TrialError, train_vocabulary};

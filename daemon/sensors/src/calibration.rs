@@ -1,8 +1,7 @@
 //! The calibration of a camera: its distorted and its rectified pinhole, checked.
 
 use crate::MAX_PIXELS;
-use crate::lens::{Lens, LensError};
-use crate::rectify::Remap;
+use crate::lens::{Lens, LensError, Remap};
 use image::RgbImage;
 use scene_model::project::PinholeCamera;
 use scenecast_messages::sensor_msgs::CameraInfo;

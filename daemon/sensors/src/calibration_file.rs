@@ -1,4 +1,4 @@
-//! Calibrations in the YAML that ROS writes (`camera_calibration`, `camera_calibration_parsers`).
+//! Calibrations in the YAML that ROS writes (`camera_calibration`, `camera_info`), and the topic where it publishes them.
 
 use crate::MAX_PIXELS;
 use scenecast_messages::sensor_msgs::CameraInfo;
@@ -121,6 +121,15 @@ fn pixels(name: &str, text: &str) -> Result<u32, String> {
     number.ok_or_else(|| format!("{name} is {text:?}; expected a number of pixels"))
 }
 
+/// The topic `camera_info` in the namespace of a topic of images, and whether these are rectified by their name, as those of
+/// `image_proc`.
+pub fn camera_info_beside(images: &str) -> (String, bool) {
+    let images = images.strip_suffix("/compressed").unwrap_or(images);
+    let (namespace, name) = images.rsplit_once('/').unwrap_or(("", images));
+    let topic = if namespace.is_empty() && !images.starts_with('/') { String::new() } else { format!("{namespace}/") };
+    (format!("{topic}camera_info"), name.starts_with("image_rect"))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -182,6 +191,18 @@ projection_matrix:
         #[test]
         fn any_text_is_a_calibration_or_an_error(text in "(camera_matrix:\n|  data: \\[|[0-9., \\]\n-]{0,9}|- 1\n|.{0,9}\n){0,30}") {
             let _ = read_calibration(&text);
+        }
+    }
+
+    #[test]
+    fn the_calibration_is_beside_the_images() {
+        for (images, info, is_rectified) in [
+            ("/camera/image_raw", "/camera/camera_info", false),
+            ("/stereo/left/image_rect_color/compressed", "/stereo/left/camera_info", true),
+            ("/image", "/camera_info", false),
+            ("image_rect", "camera_info", true),
+        ] {
+            assert_eq!(camera_info_beside(images), (info.to_owned(), is_rectified), "{images}");
         }
     }
 }

@@ -17,50 +17,37 @@
 //!
 //! The crate does no IO: bytes and times of arrival come in as arguments.
 
-mod bayer;
-mod bit_depth;
 mod calibration;
 mod calibration_file;
-mod calibration_topic;
 mod camera_tally;
 mod compressed;
 mod depth;
-mod depth_bounds;
 mod depth_track;
 mod dvl;
 mod frame_matcher;
 mod image_stream;
 mod lens;
-mod mounting;
 mod point_cloud;
 mod pose_track;
-mod quaternion;
 mod raw_image;
-mod rectify;
-mod ros_messages;
 mod rotation;
 mod sight;
 mod stamp;
 mod transforms;
 
-pub use bit_depth::BitDepth;
 pub use calibration::{Calibration, CalibrationError};
-pub use calibration_file::{CalibrationFileError, read_calibration};
-pub use calibration_topic::camera_info_beside;
+pub use calibration_file::{CalibrationFileError, camera_info_beside, read_calibration};
 pub use camera_tally::{CameraFault, CameraTally};
 pub use compressed::{DecodeError, MAX_PIXELS, decode, decode_upright, own_stamp};
-pub use depth::DepthMessage;
-pub use depth_bounds::DepthError;
+pub use depth::{DepthError, DepthMessage};
 pub use depth_track::{DepthMatch, DepthTrack};
 pub use dvl::{DvlError, DvlPosition, DvlReport, DvlTrack, MAX_DVL_LINE};
 pub use frame_matcher::{FrameMatcher, Limits, MatchedImage};
 pub use image_stream::{ImageStream, MAX_IMAGE_BYTES, complete_length};
 pub use lens::LensError;
-pub use mounting::{CameraMounting, MountedCamera};
 pub use pose_track::{PoseMatch, PoseTrack, SensorPose};
-pub use raw_image::{RawImage, RawImageError};
-pub use ros_messages::{pose_of, rgb_of, stamp_of, stamp_of_cdr};
+pub use raw_image::{BitDepth, RawImage, RawImageError};
 pub use rotation::Rotation;
-pub use sight::{Sight, tilt_of};
+pub use sight::{CameraMounting, MountedCamera, Sight, tilt_of};
 pub use stamp::{Stamp, StampForm};
-pub use transforms::{TransformError, TransformTree};
+pub use transforms::{TransformError, TransformTree, pose_of, rgb_of, stamp_of, stamp_of_cdr};

@@ -1,7 +1,5 @@
-//! Raw pixels in the encodings of ROS 2 (`sensor_msgs/image_encodings.hpp`).
+//! Raw pixels in the encodings of ROS 2 (`sensor_msgs/image_encodings.hpp`): Bayer mosaics, and levels of 10, 12 or 14 bits.
 
-use crate::BitDepth;
-use crate::bayer::BayerPattern;
 use crate::compressed::MAX_PIXELS;
 use image::{Rgb, RgbImage};
 
@@ -158,6 +156,89 @@ fn rgb_of_yuv(y: f32, u: f32, v: f32) -> Rgb<u8> {
     Rgb([level(y + 1.402 * v), level(y - 0.344_136 * u - 0.714_136 * v), level(y + 1.772 * u)])
 }
 
+/// The colours of the first two rows and columns.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum BayerPattern {
+    Rggb,
+    Bggr,
+    Gbrg,
+    Grbg,
+}
+
+impl BayerPattern {
+    /// The colour of the filter over a pixel: 0 red, 1 green, 2 blue.
+    fn colour(self, x: usize, y: usize) -> usize {
+        let square = match self {
+            Self::Rggb => [0, 1, 1, 2],
+            Self::Bggr => [2, 1, 1, 0],
+            Self::Gbrg => [1, 2, 0, 1],
+            Self::Grbg => [1, 0, 2, 1],
+        };
+        square[(y % 2) * 2 + x % 2]
+    }
+
+    /// Each colour of a pixel is the mean of the pixels of that colour among itself and its eight neighbours, where its own
+    /// colour counts alone.
+    pub(crate) fn colours(self, width: usize, height: usize, grey: impl Fn(usize, usize) -> u8) -> RgbImage {
+        let mut image = RgbImage::new(width as u32, height as u32);
+        for y in 0..height {
+            for x in 0..width {
+                let (mut sums, mut counts) = ([0_u32; 3], [0_u32; 3]);
+                for v in y.saturating_sub(1)..(y + 2).min(height) {
+                    for u in x.saturating_sub(1)..(x + 2).min(width) {
+                        let colour = self.colour(u, v);
+                        sums[colour] += u32::from(grey(u, v));
+                        counts[colour] += 1;
+                    }
+                }
+                let own = self.colour(x, y);
+                (sums[own], counts[own]) = (u32::from(grey(x, y)), 1);
+                let mean = |i: usize| ((sums[i] + counts[i] / 2) / counts[i].max(1)) as u8;
+                image.put_pixel(x as u32, y as u32, Rgb([mean(0), mean(1), mean(2)]));
+            }
+        }
+        image
+    }
+}
+
+/// The bits that the levels of 16-bit images have.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum BitDepth {
+    /// White is 2^n - 1.
+    Fixed(u8),
+    /// The least number of bits, from 8, that holds the levels of all images so far. It never shrinks, so that the images of a
+    /// mission are alike once the brightest was seen.
+    Auto(u8),
+}
+
+impl Default for BitDepth {
+    fn default() -> Self {
+        Self::Fixed(16)
+    }
+}
+
+impl BitDepth {
+    /// The bits of the setting `camera.bits`, where 0 stands for the automatic choice.
+    pub fn of_setting(bits: u8) -> Self {
+        if bits == 0 { Self::Auto(8) } else { Self::Fixed(bits.clamp(8, 16)) }
+    }
+
+    /// Looks at the levels of an image before they are scaled.
+    pub(crate) fn learn(&mut self, levels: impl Iterator<Item = u16>) {
+        if let Self::Auto(bits) = self {
+            let highest = levels.max().unwrap_or_default();
+            *bits = (*bits).max((16 - highest.leading_zeros()) as u8);
+        }
+    }
+
+    /// A level in 8 bits, the nearest of 256; levels above white are white.
+    pub(crate) fn scaled(self, level: u16) -> u8 {
+        let (Self::Fixed(bits) | Self::Auto(bits)) = self;
+        let white = (1_u32 << bits) - 1;
+        ((u32::from(level).min(white) * 255 + white / 2) / white) as u8
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -231,5 +312,35 @@ mod tests {
                 prop_assert_eq!(rgb.dimensions(), (width, height));
             }
         }
+    }
+
+    #[test]
+    fn an_even_colour_is_recovered_from_each_pattern() {
+        for pattern in [BayerPattern::Rggb, BayerPattern::Bggr, BayerPattern::Gbrg, BayerPattern::Grbg] {
+            let image = pattern.colours(6, 5, |x, y| [200, 100, 50][pattern.colour(x, y)]);
+            assert!(image.pixels().all(|pixel| pixel.0 == [200, 100, 50]), "{pattern:?}");
+        }
+    }
+
+    #[test]
+    fn levels_are_scaled_to_their_white() {
+        let fixed = |bits, level| BitDepth::of_setting(bits).scaled(level);
+        assert_eq!(
+            [fixed(12, 4095), fixed(12, 2048), fixed(12, 9999), fixed(10, 512), fixed(8, 77)],
+            [255, 128, 255, 128, 77]
+        );
+        for level in 0..=u16::MAX {
+            assert_eq!(u32::from(fixed(16, level)), (u32::from(level) + 128) / 257, "{level}");
+        }
+    }
+
+    #[test]
+    fn the_automatic_choice_only_grows() {
+        let mut bits = BitDepth::of_setting(0);
+        let mut after = |highest: u16| {
+            bits.learn([3, highest].into_iter());
+            bits
+        };
+        assert_eq!([after(0), after(700), after(90), after(4000)], [8, 10, 10, 12].map(BitDepth::Auto));
     }
 }

@@ -69,9 +69,35 @@ impl Rotation {
     }
 }
 
+/// A rotation about one of the axes, radians.
+pub(crate) fn about(axis: usize, angle_rad: f64) -> [f64; 4] {
+    let (sin, cos) = (angle_rad / 2.0).sin_cos();
+    let mut quaternion = [0.0, 0.0, 0.0, cos];
+    quaternion[axis] = sin;
+    quaternion
+}
+
+/// The rotation `b`, and `a` after it.
+pub(crate) fn product([ax, ay, az, aw]: [f64; 4], [bx, by, bz, bw]: [f64; 4]) -> [f64; 4] {
+    [
+        aw * bx + ax * bw + ay * bz - az * by,
+        aw * by - ax * bz + ay * bw + az * bx,
+        aw * bz + ax * by - ay * bx + az * bw,
+        aw * bw - ax * bx - ay * by - az * bz,
+    ]
+}
+
+/// A vector after a rotation.
+pub(crate) fn turned(quaternion: [f64; 4], [x, y, z]: [f64; 3]) -> [f64; 3] {
+    let [qx, qy, qz, qw] = quaternion;
+    let [x, y, z, _] = product(product(quaternion, [x, y, z, 0.0]), [-qx, -qy, -qz, qw]);
+    [x, y, z]
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::f64::consts::FRAC_PI_2;
 
     /// A rotation by an angle about one of the axes east, north, up.
     fn about(axis: usize, degrees: f64) -> [f64; 4] {
@@ -111,5 +137,13 @@ mod tests {
         assert_eq!(capsized.roll_rad.to_degrees().abs().round(), 180.0);
         assert_eq!(Rotation::from_quaternion([0.0; 4]), None);
         assert_eq!(Rotation::from_quaternion([f64::NAN; 4]), None);
+    }
+
+    #[test]
+    fn rotations_follow_each_other() {
+        let near = |a: [f64; 3], b: [f64; 3]| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-12);
+        assert!(near(turned(super::about(2, FRAC_PI_2), [1.0, 0.0, 5.0]), [0.0, 1.0, 5.0]));
+        let both = product(super::about(0, FRAC_PI_2), super::about(2, FRAC_PI_2));
+        assert!(near(turned(both, [1.0, 0.0, 0.0]), [0.0, 0.0, 1.0]));
     }
 }

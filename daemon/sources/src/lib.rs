@@ -4,19 +4,13 @@
 //! and reports readings and faults to the vehicle. Which image is mapped at which pose is decided by
 //! [`scenecast_sensors::FrameMatcher`].
 
-mod arrival_clock;
 mod command;
 mod dvl;
 mod live;
-mod picture;
 #[cfg(feature = "ros2")]
 mod ros_calibration;
 #[cfg(feature = "ros2")]
 mod ros_camera;
-#[cfg(feature = "ros2")]
-mod ros_depth;
-#[cfg(feature = "ros2")]
-mod ros_navigation;
 #[cfg(feature = "ros2")]
 mod ros_node;
 #[cfg(feature = "ros2")]
@@ -24,21 +18,22 @@ mod ros_transforms;
 mod tum_poses;
 mod watch;
 
-pub use arrival_clock::ArrivalClock;
 pub use command::CommandSource;
 pub use dvl::DvlSource;
-pub use live::{LiveSource, Reading, SensorKind, SensorSource, SourceDepth, SourceError, SourceImage, SourceReport};
-pub use picture::Picture;
+pub use live::{
+    ArrivalClock, LiveSource, Picture, Reading, SensorKind, SensorSource, SourceDepth, SourceError, SourceImage,
+    SourceReport,
+};
 #[cfg(feature = "ros2")]
 pub use ros_calibration::CalibrationTopic;
 #[cfg(feature = "ros2")]
+pub use ros_camera::RosDepth;
+#[cfg(feature = "ros2")]
 pub use ros_camera::{RosCamera, RosCameraOptions};
 #[cfg(feature = "ros2")]
-pub use ros_depth::RosDepth;
-#[cfg(feature = "ros2")]
-pub use ros_navigation::RosNavigation;
-#[cfg(feature = "ros2")]
 pub use ros_node::SensorNode;
+#[cfg(feature = "ros2")]
+pub use ros_transforms::RosNavigation;
 #[cfg(feature = "ros2")]
 pub use ros_transforms::RosTransforms;
 pub use tum_poses::read_tum_poses;

@@ -1,12 +1,13 @@
-//! A source on a thread of its own, which opens it again when it is lost.
+//! A source on a thread of its own, which opens it again when it is lost; the pixels of an image and the time at which it came
+//! in.
 
-use crate::Picture;
-use scenecast_sensors::{Calibration, CameraFault, DepthMessage, SensorPose, Stamp};
+use image::RgbImage;
+use scenecast_sensors::{BitDepth, Calibration, CameraFault, DecodeError, DepthMessage, SensorPose, Stamp, decode};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
-use std::time::{Duration, Instant};
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 use tokio::sync::mpsc;
 
 /// A camera that is lost or cannot be opened, as one line for people.
@@ -300,6 +301,48 @@ impl SourceImage {
     pub(crate) fn compressed(stamp: Option<Stamp>, arrival: Stamp, bytes: Vec<u8>) -> Self {
         let stamp = stamp.or_else(|| scenecast_sensors::own_stamp(&bytes));
         Self { stamp, arrival, picture: Picture::Compressed(bytes), calibration: None }
+    }
+}
+
+/// Wall time at the start of the process plus the time since then, so that it never goes back.
+#[derive(Debug, Clone, Copy)]
+pub struct ArrivalClock {
+    start: Stamp,
+    began: Instant,
+}
+
+impl ArrivalClock {
+    /// A clock that shows the wall time now.
+    pub fn start() -> Self {
+        let since_epoch = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+        Self { start: Stamp::from_nanos(0).after(since_epoch), began: Instant::now() }
+    }
+
+    pub fn now(&self) -> Stamp {
+        self.start.after(self.began.elapsed())
+    }
+
+    /// The moment at which the clock shows `stamp`.
+    pub fn instant(&self, stamp: Stamp) -> Instant {
+        self.began + std::time::Duration::from_secs_f64(stamp.seconds_since(self.start).clamp(0.0, 1e9))
+    }
+}
+
+/// An image that is decoded where it is mapped, so that a slow decoder does not hold up its source.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Picture {
+    /// A JPEG, PNG, PPM or TIFF.
+    Compressed(Vec<u8>),
+    Rgb(RgbImage),
+}
+
+impl Picture {
+    /// The image with 8 bits a channel; `bits` are those of the levels of a compressed image with 16.
+    pub fn into_rgb(self, bits: BitDepth) -> Result<RgbImage, DecodeError> {
+        match self {
+            Self::Compressed(bytes) => decode(&bytes, bits),
+            Self::Rgb(image) => Ok(image),
+        }
     }
 }
 

@@ -1,12 +1,13 @@
-//! The orders in force by the vehicle's reports, also those that this surface has not given.
+//! The orders in force by the vehicle's reports, also those that this surface has not given, and hold beside an abort.
 
 use super::Surface;
 use super::orders::{FenceOrder, LimitsOrder};
 use super::vehicle_record::{SentOrder, VehicleRecord};
-use scenecast_protocol::directive::{OrderStatus, Slot, SlotId};
+use scenecast_protocol::directive::{Constraints, OrderStatus, Slot, SlotId};
 use scenecast_protocol::link::{InForce, PeerView};
 use scenecast_protocol::map::MAX_LABEL;
-use scenecast_protocol::wire::Address;
+use scenecast_protocol::time::Instant;
+use scenecast_protocol::wire::{Address, ModeReason, VehicleMode};
 
 /// The version of an order in force that another surface, or an earlier run of this one, has given.
 const VERSION_OF_OTHERS: u16 = 0;
@@ -108,4 +109,178 @@ impl Surface {
 /// The status of this surface's last order of a kind.
 fn status(view: &PeerView<'_>, id: SlotId) -> Option<OrderStatus> {
     view.slots().find(|slot| slot.id == id).map(|slot| slot.status)
+}
+
+/// The last order of hold and abort: its content, its status and when the status last changed.
+type LastOrder = (Constraints, OrderStatus, Instant);
+/// The mode of the last report with its reason, and when it came in.
+type LastMode = (VehicleMode, ModeReason, Instant);
+
+impl Surface {
+    /// Orders a vehicle to hold, or to continue, and leaves an abort as it is. The error is one line for the operator: an
+    /// abort is in force and `hold` is false, or it is not known whether one is.
+    pub fn change_hold(&mut self, vehicle: Address, hold: bool, now: Instant) -> Result<u16, String> {
+        match self.has_abort(vehicle) {
+            None => {
+                Err("it is not known whether an abort is in force; an order of abort, true or false, settles it".into())
+            }
+            Some(true) if !hold => Err("an abort is in force; the order abort with false ends it".into()),
+            Some(abort) => self.set_order(vehicle, Constraints { hold, abort }, now),
+        }
+    }
+
+    /// Whether an abort is in force or on its way; `None` while that is not known.
+    pub fn has_abort(&self, vehicle: Address) -> Option<bool> {
+        let view = self.link.vehicle(vehicle)?;
+        let order = view.slots().find(|slot| slot.id == SlotId::Constraints).and_then(|slot| match slot.slot {
+            Slot::Constraints(constraints) => Some((constraints, slot.status, slot.changed)),
+            _ => None,
+        });
+        has_abort(order, view.status().map(|(status, at)| (status.mode, status.reason, *at)))
+    }
+}
+
+/// The last order counts until the vehicle refuses it, or it is withdrawn; then, and before the first order, the reports
+/// after that count. An
+/// order in force and a later report that contradict each other show that somebody else has given an order.
+fn has_abort(order: Option<LastOrder>, mode: Option<LastMode>) -> Option<bool> {
+    let reported_after = |time: Instant| mode.filter(|&(.., at)| at > time).and_then(|m| reported_abort(m.0, m.1));
+    match order {
+        None => mode.and_then(|m| reported_abort(m.0, m.1)),
+        Some((_, OrderStatus::Refused(_) | OrderStatus::Withdrawn(_), changed)) => reported_after(changed),
+        Some((order, OrderStatus::Applied, changed)) => {
+            Some(order.abort).filter(|&abort| reported_after(changed).is_none_or(|reported| reported == abort))
+        }
+        Some((order, ..)) => Some(order.abort),
+    }
+}
+
+/// Whether a mode shows an abort. While it surfaces or returns on an abort, a vehicle reports these modes, by order; no other
+/// order causes them.
+fn reported_abort(mode: VehicleMode, reason: ModeReason) -> Option<bool> {
+    match mode {
+        VehicleMode::Abort => Some(true),
+        VehicleMode::Survey | VehicleMode::Hold => Some(false),
+        VehicleMode::Return | VehicleMode::Surface => match reason {
+            ModeReason::Order => Some(true),
+            ModeReason::Survey => None,
+            _ => Some(false),
+        },
+        // The survey has ended for good, with an abort or without.
+        VehicleMode::Done => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::record::{EventTime, SurfaceMemory};
+    use crate::recorder::Recorder;
+    use scenecast_core::tuning_table::TuningTable;
+    use scenecast_protocol::directive::RefusalReason;
+    use scenecast_protocol::mac::{Access, ModemProfile};
+    use std::time::Duration;
+
+    fn at(seconds: u64) -> Instant {
+        Instant::from_micros(seconds * 1_000_000)
+    }
+
+    fn auv() -> Address {
+        Address::vehicle(1).unwrap()
+    }
+
+    fn surface(seed: u64) -> Surface {
+        let modem = ModemProfile {
+            bit_rate_bps: 1000.0,
+            frame_bytes: 64,
+            overhead_bits: 0,
+            turn_around: Duration::from_millis(200),
+            access: Access::Shared,
+        };
+        let config = scenecast_config::Config::default();
+        crate::assemble(&config, None, TuningTable::default(), modem, seed, Instant::ZERO).unwrap()
+    }
+
+    /// The last order of hold and abort.
+    fn last(surface: &Surface) -> Constraints {
+        let view = surface.view(auv()).unwrap();
+        let Slot::Constraints(order) = view.slots().find(|slot| slot.id == SlotId::Constraints).unwrap().slot else {
+            panic!("another slot")
+        };
+        order
+    }
+
+    #[test]
+    fn a_hold_keeps_an_abort_that_is_not_reported_yet() {
+        let mut surface = surface(1);
+        surface.set_order(auv(), Constraints { hold: false, abort: true }, at(1)).unwrap();
+        assert!(surface.change_hold(auv(), false, at(2)).unwrap_err().starts_with("an abort is in force"));
+        surface.change_hold(auv(), true, at(3)).unwrap();
+        assert_eq!(last(&surface), Constraints { hold: true, abort: true });
+        surface.set_order(auv(), Constraints::default(), at(4)).unwrap();
+        surface.change_hold(auv(), true, at(5)).unwrap();
+        assert_eq!(
+            last(&surface),
+            Constraints { hold: true, abort: false },
+            "an abort that has ended is not ordered again"
+        );
+    }
+
+    #[test]
+    fn a_hold_keeps_an_abort_across_a_restart() {
+        let (mut before, mut recorder) = (surface(1), Recorder::default());
+        let mut events = recorder.begin(&mut before, 7, 1, EventTime::default()).events;
+        before.set_order(auv(), Constraints { hold: false, abort: true }, at(1)).unwrap();
+        let time = EventTime { mission_us: 2_000_000, unix_ms: 0 };
+        events.extend(recorder.observe(&mut before, None, time).events);
+        let mut after = surface(2);
+        assert_eq!(after.has_abort(auv()), None);
+        Recorder::new(SurfaceMemory::fold(events)).begin(&mut after, 8, 1, time);
+        assert!(after.change_hold(auv(), false, at(3)).is_err());
+        after.change_hold(auv(), true, at(4)).unwrap();
+        assert_eq!(last(&after), Constraints { hold: true, abort: true });
+    }
+
+    #[test]
+    fn without_order_and_report_a_hold_is_refused() {
+        let mut surface = surface(1);
+        for hold in [false, true] {
+            assert!(surface.change_hold(auv(), hold, at(1)).unwrap_err().starts_with("it is not known"));
+        }
+    }
+
+    #[test]
+    fn a_report_counts_without_an_order_and_after_a_refusal() {
+        use VehicleMode::{Abort, Done, Hold, Return, Surface, Survey};
+        let mode = |mode, reason| Some((mode, reason, at(9)));
+        let expected = [
+            (Survey, ModeReason::Survey, Some(false)),
+            (Hold, ModeReason::Order, Some(false)),
+            (Return, ModeReason::Distance, Some(false)),
+            (Return, ModeReason::Order, Some(true)),
+            (Surface, ModeReason::Order, Some(true)),
+            (Abort, ModeReason::Order, Some(true)),
+            (Done, ModeReason::Survey, None),
+        ];
+        let refused = OrderStatus::Refused(RefusalReason::Unable);
+        for (name, reason, abort) in expected {
+            assert_eq!(has_abort(None, mode(name, reason)), abort, "{name:?} {reason:?}");
+            let order = |changed| Some((Constraints::default(), refused, at(changed)));
+            assert_eq!(has_abort(order(8), mode(name, reason)), abort, "{name:?} {reason:?}");
+            assert_eq!(has_abort(order(9), mode(name, reason)), None, "a report from before the refusal");
+        }
+    }
+
+    #[test]
+    fn a_later_report_casts_doubt_on_an_order_in_force() {
+        let order = |abort, status| Some((Constraints { hold: false, abort }, status, at(8)));
+        let surfaced = |s| Some((VehicleMode::Surface, ModeReason::Order, at(s)));
+        let survey = Some((VehicleMode::Survey, ModeReason::Survey, at(9)));
+        let applied = OrderStatus::Applied;
+        assert_eq!(has_abort(order(true, applied), surfaced(9)), Some(true));
+        assert_eq!(has_abort(order(false, applied), surfaced(8)), Some(false), "a report of the time before");
+        assert_eq!(has_abort(order(false, applied), surfaced(9)), None, "somebody else's abort");
+        assert_eq!(has_abort(order(true, applied), survey), None, "somebody else ended it");
+        assert_eq!(has_abort(order(false, OrderStatus::Received), surfaced(9)), Some(false), "its end is on the way");
+    }
 }

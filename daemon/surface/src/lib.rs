@@ -1,24 +1,19 @@
 //! The surface: it holds the operator's map of each vehicle and sends each vehicle its directive. It does no IO.
 
-mod abort;
 mod annotations;
 mod assemble;
 mod command;
 #[cfg(test)]
 mod command_tests;
-mod corrections;
 mod exemplar_cache;
 mod in_force;
-mod label_gains;
 mod log;
 mod logging;
 mod map_in_view;
 mod orders;
-mod pauses;
 pub mod position;
 pub mod record;
 pub mod recorder;
-mod registration_record;
 mod send_orders;
 mod settings;
 mod surface;
@@ -32,12 +27,11 @@ pub use command::{
     CommandRequest, OrderKind,
 };
 pub use exemplar_cache::{ExemplarCache, LabelExemplars, OpenRequest, RequestKind, RequestState, StoredExemplar};
-pub use label_gains::LabelGains;
 pub use log::{LogEntry, LogKind, MissionLog};
+pub use map_in_view::LabelGains;
 pub use orders::{AreaOrder, AreasOrder, DestinationOrder, FenceOrder, LimitsOrder, order_name};
-pub use registration_record::RegistrationRecord;
 pub use scenecast_core::{ClientName, Giver, Principal, Role};
 pub use settings::{SettingsOrder, SettingsRecord};
 pub use surface::{Surface, SurfaceOutput};
-pub use track::Track;
+pub use track::{RegistrationRecord, Track};
 pub use vehicle_record::{EarlierView, SentOrder, VehicleRecord};

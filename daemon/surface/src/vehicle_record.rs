@@ -1,14 +1,11 @@
 //! The operator's data about one vehicle.
 
 use super::annotations::Annotations;
-use super::corrections::Corrections;
 use super::exemplar_cache::ExemplarCache;
-use super::label_gains::LabelGains;
-use super::pauses::Pauses;
+use super::map_in_view::{Corrections, LabelGains};
 use super::record::{EarlierMap, StoredLabel};
-use super::registration_record::RegistrationRecord;
 use super::settings::SettingsRecord;
-use super::track::Track;
+use super::track::{Pauses, RegistrationRecord, Track};
 use scenecast_core::UsblLine;
 use scenecast_protocol::directive::{Areas, Destination, ExemplarRequests, Fence, Limits, SlotId, Utility};
 use scenecast_protocol::exemplar::Exemplar;

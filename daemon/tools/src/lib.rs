@@ -4,13 +4,9 @@
 
 mod annotated_images;
 pub mod commands;
-mod figures;
 mod progress;
 mod scene;
-mod seed_arguments;
 mod zopfli;
 
-pub use figures::print_figures;
-pub use progress::{Progress, ProgressForm};
-pub use seed_arguments::SeedArguments;
+pub use progress::{Progress, ProgressForm, SeedArguments, print_figures};
 pub use zopfli::Zopfli;

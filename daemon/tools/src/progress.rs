@@ -1,8 +1,11 @@
-//! Progress of long work, on the standard error output.
+//! What commands print: progress of long work on the standard error output, figures as lines or JSON; and their seeds.
 
-use clap::ValueEnum;
+use clap::{Args, ValueEnum};
 use indicatif::{FormattedDuration, ProgressBar, ProgressState, ProgressStyle};
-use scenecast_core::errln;
+use scenecast_core::{UserError, errln, out, outln};
+use serde::Serialize;
+use serde_json::Value;
+use std::io::IsTerminal;
 use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use std::thread::JoinHandle;
@@ -137,6 +140,49 @@ fn tenths(seconds: f64) -> f64 {
     (seconds * 10.0).round() / 10.0
 }
 
+/// Prints figures: lines at a terminal, one line of JSON in a pipe or a file, or with `json` anywhere.
+pub fn print_figures(figures: &impl Serialize, json: bool) -> Result<(), UserError> {
+    let as_json = json || !std::io::stdout().is_terminal();
+    let failed = |e: serde_json::Error| UserError::Failed(e.to_string());
+    if as_json {
+        // A struct keeps the order of its members only if it is written at once.
+        outln!("{}", serde_json::to_string(figures).map_err(failed)?);
+    } else {
+        out!("{}", lines(&serde_json::to_value(figures).map_err(failed)?));
+    }
+    Ok(())
+}
+
+/// One line for each member with its name in words.
+fn lines(figures: &Value) -> String {
+    let members: Vec<(String, String)> = match figures.as_object() {
+        Some(object) => object.iter().map(|(name, value)| (name.replace('_', " "), text(value))).collect(),
+        None => vec![(String::new(), text(figures))],
+    };
+    let width = members.iter().map(|(name, _)| name.len()).max().unwrap_or(0);
+    members.iter().map(|(name, value)| format!("{name:<width$}  {value}\n")).collect()
+}
+
+fn text(value: &Value) -> String {
+    match value {
+        Value::Null => "not known".to_owned(),
+        Value::String(text) => text.clone(),
+        Value::Number(number) if number.is_f64() => format!("{:.4}", number.as_f64().unwrap_or_default()),
+        other => other.to_string(),
+    }
+}
+
+/// The seeds of a measurement that is repeated.
+#[derive(Debug, Clone, Copy, Args)]
+pub struct SeedArguments {
+    /// First seed
+    #[arg(long = "seed", value_name = "SEED", default_value_t = 1)]
+    pub first: u64,
+    /// Number of seeds, from --seed on; each draws all that is random
+    #[arg(long = "seeds", value_name = "N", default_value_t = 10, value_parser = clap::value_parser!(u64).range(1..=1000))]
+    pub count: u64,
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -147,5 +193,13 @@ mod tests {
         assert_eq!(value, serde_json::json!({ "task": "frames", "share": 0.25, "gone_s": 10.0, "left_s": 30.0 }));
         let value: serde_json::Value = serde_json::from_str(&line("frames", 0.0, Duration::from_secs(2))).unwrap();
         assert_eq!(value["left_s"], serde_json::Value::Null);
+    }
+
+    #[test]
+    fn people_read_one_line_for_each_figure() {
+        let figures =
+            serde_json::json!({ "bytes": 70, "png_full_bytes": 1200, "nats": 0.5, "codec": "ours", "score": null });
+        let expected = "bytes           70\ncodec           ours\nnats            0.5000\npng full bytes  1200\nscore           not known\n";
+        assert_eq!(lines(&figures), expected);
     }
 }

@@ -1,15 +1,12 @@
 //! The estimate of the vehicle's position.
 
 mod filter;
-mod last_place;
 mod odometer;
-mod origin;
 
-pub use last_place::LastPlace;
+pub use odometer::LastPlace;
 
 use filter::Filter;
-use odometer::Odometer;
-use origin::Origin;
+use odometer::{Odometer, Origin};
 use scenecast_protocol::coordinates::{MapPoint, WorldPoint};
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::Placement;

@@ -1,22 +1,17 @@
 //! The choice of waypoints.
 
 mod ahead;
-mod choice;
 mod grounds;
-mod purpose;
 #[cfg(test)]
 mod settling_tests;
 #[cfg(test)]
 mod tests;
 mod to_place;
-mod views;
-mod worth;
 
 pub use ahead::PathAhead;
 
-use choice::PlannerChoice;
-use grounds::Grounds;
-use views::Views;
+use grounds::{Grounds, PlannerChoice};
+use to_place::Views;
 
 use super::planning::{BlockValues, Bounds, CellWindow, Interest, Knowledge, Node, PlanRequest, Point, distance};
 use scenecast_core::Area;
@@ -315,10 +310,10 @@ impl Steering {
             if !adapts {
                 return (plan, None);
             }
-            let margin = worth::margin(&plan, self.track.before, self.known.repeats());
-            let plan = if worth::keeps(&request, present, &plan, margin) { present.to_vec() } else { plan };
-            if worth::pays(&request, &plan, interest, (lattice.step_m() / self.window.cell_m).powi(2)) {
-                let intent = purpose::purpose(interest, |part| worth::gain(&value(part), &plan));
+            let margin = ahead::margin(&plan, self.track.before, self.known.repeats());
+            let plan = if ahead::keeps(&request, present, &plan, margin) { present.to_vec() } else { plan };
+            if ahead::pays(&request, &plan, interest, (lattice.step_m() / self.window.cell_m).powi(2)) {
+                let intent = ahead::purpose(interest, |part| ahead::gain(&value(part), &plan));
                 return (plan, intent);
             }
         }

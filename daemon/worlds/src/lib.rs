@@ -13,11 +13,9 @@
 //! ```
 
 mod noise;
-mod patch_labels;
 mod patches;
 mod reef;
 mod sample;
-mod skin;
 
 pub use patches::{Patches, patches};
 pub use reef::{Reef, ReefCamera, View};

@@ -1,7 +1,6 @@
 //! Weighted areas: places that matter to the operator whatever lies there.
 
-use super::outline::{put_outline, step_to, take_outline};
-use super::polygon::{Polygon, PolygonFault};
+use super::polygon::{Polygon, PolygonFault, put_outline, step_to, take_outline};
 use crate::bytes::{BitReader, BitWriter, DecimetreStep};
 
 /// An outline in the world frame, and the weight that each cell inside has in addition to that of its label.

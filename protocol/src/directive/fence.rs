@@ -1,7 +1,6 @@
 //! The fence: where the vehicle may be.
 
-use super::outline::{point_at, put_outline, step_to, take_outline};
-use super::polygon::{Polygon, PolygonFault};
+use super::polygon::{Polygon, PolygonFault, point_at, put_outline, step_to, take_outline};
 use crate::bytes::{BitReader, BitWriter, DecimetreStep, take_width, width_of};
 use crate::coordinates::DecimetrePoint;
 

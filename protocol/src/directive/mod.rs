@@ -1,44 +1,27 @@
 //! The directive: the operator's orders to a vehicle, as independent versioned slots.
 
 mod areas;
-mod budget;
 mod choices;
-mod constraints;
-mod decision;
-mod destination;
 mod fence;
-mod fix;
 mod in_force;
 mod limits;
+mod orders;
 mod outbox;
-mod outline;
 mod polygon;
 mod progress;
-mod requests;
-mod series;
 mod settings;
-mod short_decimal;
-mod utility;
 
 pub use areas::{Areas, AreasFault, WeightedArea};
-pub use budget::Budget;
-pub use choices::{AtEnd, CellBand, Change, PlannerKind, Registration};
-pub use constraints::Constraints;
-pub use decision::{SlotReport, SlotState};
-pub use destination::Destination;
+pub use choices::{AtEnd, CellBand, Change, PlannerKind, Registration, ShortDecimal};
 pub use fence::{Fence, FenceFault};
-pub use fix::Fix;
 pub(crate) use in_force::InForceAssembly;
 pub use in_force::{InForceDigests, InForcePart, InForceSummary, PerSlot, REPORTED_SLOTS};
 pub use limits::{Band, Limits, LimitsFault, Reaction};
+pub use orders::{Budget, Constraints, Destination, ExemplarRequest, ExemplarRequests, Fix, Utility};
 pub(crate) use outbox::{PendingSlot, SlotOutbox};
 pub use polygon::{Polygon, PolygonFault};
-pub use progress::{OrderStatus, SlotProgress, Withdrawal};
-pub use requests::{ExemplarRequest, ExemplarRequests};
-pub use series::Series;
+pub use progress::{OrderStatus, Series, SlotProgress, SlotReport, SlotState, Withdrawal};
 pub use settings::{Settings, SettingsFault};
-pub use short_decimal::ShortDecimal;
-pub use utility::Utility;
 
 use crate::bytes::{Reader, Truncated};
 use crate::schedule::Class;

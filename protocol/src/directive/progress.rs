@@ -1,7 +1,8 @@
-//! How far an order has come, as the surface knows it.
+//! How far an order has come: the series that its version counts in, the vehicle's decision, and what the surface knows of it.
 
 use super::{RefusalReason, Slot, SlotId};
 use crate::time::Instant;
+use serde::{Deserialize, Serialize};
 
 /// How far an order has come.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -79,4 +80,80 @@ pub struct SlotProgress {
     pub changed: Instant,
     /// When it was last put into a frame.
     pub sent: Option<Instant>,
+}
+
+/// The vehicle's decision about a slot of the directive.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum SlotState {
+    /// No version was received in this session of the surface.
+    #[default]
+    Unknown,
+    /// The vehicle has put it in force.
+    Applied,
+    /// Refused; the previous version stays in force.
+    Refused(RefusalReason),
+    /// Received, and waits for the decision: an order that the vehicle obeys while its disk does not keep it.
+    Pending,
+}
+
+impl SlotState {
+    /// The number on the wire: 0 unknown, 1 applied, 2..=12 a reason of refusal, 15 pending.
+    pub(crate) fn code(self) -> u8 {
+        match self {
+            Self::Unknown => 0,
+            Self::Applied => 1,
+            Self::Refused(reason) => reason.code(),
+            Self::Pending => 15,
+        }
+    }
+
+    pub(crate) fn from_code(code: u8) -> Option<Self> {
+        match code {
+            0 => Some(Self::Unknown),
+            1 => Some(Self::Applied),
+            15 => Some(Self::Pending),
+            code => RefusalReason::from_code(code).map(Self::Refused),
+        }
+    }
+}
+
+/// The latest version of a slot that the vehicle decided about, and the decision.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct SlotReport {
+    /// Low 8 bits of the version.
+    pub version_low: u8,
+    /// The decision about that version.
+    pub state: SlotState,
+}
+
+/// The series of a surface: a random number of 48 bits, under which it counts the versions of its orders.
+///
+/// A surface that has forgotten its orders begins a new series. Among a thousand series of one mission, two are equal
+/// with a probability of 2 in 10^9.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+pub struct Series(u64);
+
+impl Series {
+    /// The series with the low 48 of these random bits.
+    pub fn from_random(bits: u64) -> Self {
+        Self(bits & 0xFFFF_FFFF_FFFF)
+    }
+
+    /// The series after this one of the same surface.
+    #[must_use]
+    pub fn next(self) -> Self {
+        Self::from_random(self.0.wrapping_add(1))
+    }
+
+    /// Whether two series are of one surface, which counts them up; those of two surfaces are far apart.
+    pub fn is_of_same_surface(self, other: Self) -> bool {
+        const NEAR: u64 = 1 << 12;
+        let apart = Self::from_random(self.0.wrapping_sub(other.0)).0;
+        apart < NEAR || Self::from_random(apart.wrapping_neg()).0 < NEAR
+    }
+
+    /// The number on the wire.
+    pub fn get(self) -> u64 {
+        self.0
+    }
 }

@@ -3,8 +3,6 @@
 //! [`VehicleLink`] and [`SurfaceLink`] are the ends. Toward each peer, an end keeps a handshake, its run, the [`Flight`]
 //! of sent frames whose fate is unknown, and the [`LinkWindow`] of received frames.
 
-mod estimate;
-mod flight;
 mod handshake;
 mod mismatch;
 mod pair;
@@ -15,19 +13,17 @@ mod surface;
 mod vehicle;
 mod window;
 
-pub use estimate::{Goodput, Loss};
-pub use flight::Flight;
 pub use mismatch::Mismatch;
 pub use pair::HOLDER_SILENCE;
 use pair::{Inbound, LinkPair};
 pub use run::{Authenticity, Identity};
 pub use slots::{Admission, SeriesRecord, SlotInbox, SlotInboxState};
-pub use stats::{DropReason, LinkStats};
+pub use stats::{DropReason, Goodput, LinkStats, Loss};
 pub use surface::{
     Cycle, EndedRun, InForce, IssueError, OtherSurface, PeerView, SurfaceConfig, SurfaceEvent, SurfaceLink,
 };
 pub use vehicle::{OversizedChunk, VehicleConfig, VehicleEvent, VehicleLink};
-pub use window::{LinkWindow, WindowRefusal};
+pub use window::{Flight, LinkWindow, WindowRefusal};
 
 use crate::schedule::Class;
 

@@ -5,13 +5,11 @@
 
 mod clock_map;
 mod floor;
-mod grant;
 mod master;
 
 pub use clock_map::ClockMap;
-pub(crate) use floor::Floor;
-pub use grant::Grant;
-pub(crate) use grant::quarter_seconds;
+pub use floor::Grant;
+pub(crate) use floor::{Floor, quarter_seconds};
 pub(crate) use master::Master;
 pub use master::MasterConfig;
 

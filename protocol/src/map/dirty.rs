@@ -1,6 +1,6 @@
 //! The index of cells that differ from the state that the surface is known to hold.
 
-use super::bits::TileSet;
+use super::tiles::TileSet;
 use super::value::{Interest, Value, cost};
 use super::{Cell, LabelGrid, UNEXPLORED};
 use crate::grid::{TILE_CELLS, TileKey, TileLabels};

@@ -3,11 +3,7 @@
 //! [`MapSource`] is the vehicle's side and [`Replica`] the surface's. The link replicates any state that has
 //! these two sides ([`StateSource`], [`StateReplica`]).
 
-mod bits;
 mod class;
-mod coarse;
-mod debounce;
-mod digest;
 #[allow(clippy::indexing_slicing)] // A place in a tile is less than its size.
 mod dirty;
 mod layer;
@@ -21,8 +17,6 @@ mod value;
 
 pub use crate::grid::{Cell, LabelGrid, MAX_LABEL, Rect, TILE, UNEXPLORED};
 pub use class::{ClassChunk, ClassEntry, ClassReplica, ClassSource, MAX_CLASS};
-pub use debounce::{Hold, MAX_CONFIDENCE};
-pub use digest::MapDigest;
 pub use layer::{
     BUILT_IN_LAYERS, BuiltInLayer, Decimal, LayerCarried, LayerChunk, LayerDescriptor, LayerId, LayerMask,
     LayerReplica, LayerSet, LayerSource, Palette, Quantity, Spread, Steps, UpperEnd,
@@ -30,8 +24,9 @@ pub use layer::{
 pub(crate) use parts::TextAssembly;
 pub use parts::TextPart;
 use parts::TextSender;
-pub use replica::{Relabelled, Replica};
+pub use replica::{MapDigest, Relabelled, Replica};
 pub use source::MapSource;
 pub use stream::{StateReplica, StateSource};
 pub use tiles::{REPLICA_TILE, ReplicaTile, ReplicaTileKey, SharedTiles};
 pub use tree::{LabelTree, TreeReplica, TreeSource};
+pub use value::{Hold, MAX_CONFIDENCE};

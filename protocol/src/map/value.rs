@@ -1,6 +1,11 @@
-//! The value of a change to the operator, and its cost in bits.
+//! Which changes go out: how long a new label must be stable, the value of a change to the operator, its cost in bits, and the
+//! cells that go first when the backlog is large.
 
-use super::UNEXPLORED;
+use super::dirty::Counts;
+use super::{Cell, LabelGrid, UNEXPLORED};
+use crate::map_codec::Stride;
+use crate::time::Instant;
+use std::time::Duration;
 
 /// The value of a change between labels without interest. It is positive so that age, which multiplies
 /// it, lets no cell starve.
@@ -66,6 +71,143 @@ impl Value {
     }
 }
 
+/// The expected cost of a cell of a large backlog in bits; nearly all of these cells are new.
+const BITS_PER_CELL: usize = 2;
+
+/// Decides between an overview of the whole map and a detailed part of it.
+#[derive(Debug, Default)]
+pub(super) struct Coarse {
+    /// A larger backlog in bytes goes out coarse to fine; 0 means always, `None` never.
+    after_bytes: Option<usize>,
+}
+
+impl Coarse {
+    pub(super) fn set_limit(&mut self, after_bytes: Option<usize>) {
+        self.after_bytes = after_bytes;
+    }
+
+    /// Whether the backlog is large while every cell of the coarse lattice is sent or in flight.
+    pub(super) fn is_refining(&self, counts: &Counts) -> bool {
+        self.is_too_much(counts) && counts.waiting_coarse == 0
+    }
+
+    fn is_too_much(&self, counts: &Counts) -> bool {
+        self.after_bytes.is_some_and(|most| counts.waiting * BITS_PER_CELL > most.saturating_mul(8))
+    }
+
+    /// The lattice of the next chunk: the coarse one while the backlog is large and one of its cells waits.
+    pub(super) fn stride(&self, counts: &Counts) -> Stride {
+        if self.is_too_much(counts) && counts.waiting_coarse > 0 { Stride::Four } else { Stride::One }
+    }
+}
+
+/// The highest confidence of the model in a label; the lowest is 0.
+pub const MAX_CONFIDENCE: u8 = 3;
+const MAX_FLIPS: u8 = 7;
+/// A flip is forgotten after this many times the wait of a stable cell.
+const MEMORY: u64 = 16;
+/// A difference is sent at the latest after this many times the wait of a stable cell.
+const MAX_WAITS: u32 = 16;
+
+/// How long a new label must be stable in a cell that has not flipped recently.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Hold {
+    /// Always so long; zero sends everything at once.
+    For(Duration),
+    /// As long as the backlog takes at this many bits a second, at most a minute: a label that does not last that long is not
+    /// worth sending. While nothing else waits, the labels that are held back are sent.
+    Backlog(u32),
+}
+
+impl Hold {
+    const MAX_AUTOMATIC: Duration = Duration::from_secs(60);
+    /// The wait from which the memory of flips follows where the wait itself varies.
+    const TYPICAL: Duration = Duration::from_secs(20);
+
+    /// The wait of a cell that has not flipped recently, while so many bytes wait.
+    pub(super) fn calm(self, backlog_bytes: usize) -> Duration {
+        match self {
+            Self::For(wait) => wait,
+            Self::Backlog(bits_per_s) => {
+                let seconds = backlog_bytes as f64 * 8.0 / f64::from(bits_per_s.max(1));
+                Self::MAX_AUTOMATIC.min(Duration::from_secs_f64(seconds))
+            }
+        }
+    }
+
+    fn typical(self) -> Duration {
+        match self {
+            Self::For(wait) => wait,
+            Self::Backlog(_) => Self::TYPICAL,
+        }
+    }
+}
+
+impl Default for Hold {
+    fn default() -> Self {
+        Self::For(Duration::ZERO)
+    }
+}
+
+/// Remembers which cells have flipped recently, in eight bits for each cell that ever did.
+///
+/// ```text
+///  bits   5            3
+///      +------------+-------+
+///      | epoch % 31 | flips |
+///      +------------+-------+
+/// ```
+#[derive(Debug, Default)]
+pub(super) struct Debounce {
+    hold: Hold,
+    flips: LabelGrid,
+}
+
+impl Debounce {
+    /// Sets the wait of a cell that has not flipped recently. Another memory forgets all flips.
+    pub(super) fn set_hold(&mut self, hold: Hold) {
+        if hold.typical() != self.hold.typical() {
+            self.flips.clear();
+        }
+        self.hold = hold;
+    }
+
+    pub(super) fn hold(&self) -> Hold {
+        self.hold
+    }
+
+    /// Whether labels are held back only while others wait.
+    pub(super) fn is_automatic(&self) -> bool {
+        matches!(self.hold, Hold::Backlog(_))
+    }
+
+    /// Notes a flip of `cell`; returns how long its new label must be stable if that of a calm cell must for `calm`.
+    pub(super) fn flip(&mut self, cell: Cell, confidence: u8, calm: Duration, now: Instant) -> Duration {
+        if self.hold.typical().is_zero() {
+            return Duration::ZERO;
+        }
+        let epoch = now.as_micros() / (self.hold.typical().as_micros() as u64 * MEMORY).max(1);
+        let (present, flips) = self.recall(cell, epoch);
+        self.flips.set(cell, present << 3 | (flips + 1).min(MAX_FLIPS));
+        let doubt = u32::from(MAX_CONFIDENCE.saturating_sub(confidence));
+        calm * (1 + u32::from(flips)) * doubt / u32::from(MAX_CONFIDENCE)
+    }
+
+    /// The longest time for which a difference is held back.
+    pub(super) fn longest(calm: Duration) -> Duration {
+        calm * MAX_WAITS
+    }
+
+    /// The current epoch as it is stored, and the flips still remembered; one is forgotten each epoch.
+    fn recall(&self, cell: Cell, epoch: u64) -> (u8, u8) {
+        let stored = self.flips.get(cell);
+        // The last epoch of the cycle is skipped, so that no byte is 255.
+        let present = (epoch % 31) as u8;
+        let passed = (present + 31 - (stored >> 3)) % 31;
+        (present, (stored & 7).saturating_sub(passed))
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -81,5 +223,25 @@ mod tests {
         assert!(value(0, 1, 90.0) > 3.0 * value(2, 1, 90.0));
         assert!(value(2, 7, 90.0) > 4.0 * value(2, 1, 90.0));
         assert!(value(2, 1, 1.0) > value(0, 1, 90.0));
+    }
+
+    #[test]
+    fn a_cell_that_flips_often_waits_longer_and_is_forgiven() {
+        let mut settling = Debounce::default();
+        let calm = Duration::from_secs(4);
+        settling.set_hold(Hold::For(calm));
+        let cell = Cell::new(3, -9);
+        let at = |s: u64| Instant::from_micros(s * 1_000_000);
+        let waits: Vec<u64> = (0..10).map(|i| settling.flip(cell, 0, calm, at(i)).as_secs()).collect();
+        assert_eq!(waits, [4, 8, 12, 16, 20, 24, 28, 32, 32, 32]);
+        assert_eq!(settling.flip(cell, MAX_CONFIDENCE, calm, at(10)), Duration::ZERO);
+        assert_eq!(settling.flip(cell, 0, calm, at(64 * 8)).as_secs(), 4);
+        assert_eq!(settling.flip(Cell::new(0, 0), 2, calm, at(0)).as_millis(), 1333);
+    }
+
+    #[test]
+    fn a_long_backlog_holds_labels_back_longer() {
+        let wait = |bytes, bits_per_s| Hold::Backlog(bits_per_s).calm(bytes).as_secs_f64();
+        assert_eq!([wait(0, 100), wait(250, 100), wait(250, 10_000), wait(9999, 100)], [0.0, 20.0, 0.2, 60.0]);
     }
 }

@@ -1,13 +1,14 @@
-//! Encoding of the best chunk for a given room, and decoding of any chunk.
+//! The choice of the coder, encoding of the best chunk for a given room, and decoding of any chunk.
 
 use super::context::Decision;
-use super::grow::Growth;
+use super::grow::{Growth, Lattice, Stride};
 use super::header::{Body, ChunkHeader, base_check};
-use super::lattice::{Lattice, Stride};
-use super::window::Patch;
-use super::{Codec, context, png};
+use super::series::Patch;
+use super::{context, png};
 use crate::bytes::BitReader;
 use crate::grid::{Cell, LabelGrid, Rect};
+use std::fmt;
+use std::str::FromStr;
 
 /// An encoded change of the map.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -182,4 +183,57 @@ pub(super) fn header_for(base: Lattice<'_>, body: Body, rect: Rect) -> ChunkHead
 /// The chunk with the content `patch` and these bytes.
 pub(super) fn chunk(patch: &Patch, bytes: Vec<u8>) -> MapChunk {
     MapChunk { bytes, changes: patch.changes() }
+}
+
+/// How chunks are encoded; every decoder reads all of them.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub enum Codec {
+    /// For each chunk, the smaller result of the two.
+    #[default]
+    Auto,
+    /// An indexed PNG of the changed part without its constant bytes.
+    Png,
+    /// Binary decisions with mixed contexts and a shipped prior.
+    Context,
+}
+
+/// A codec name that is not one of `auto`, `png`, `context`.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
+#[error("unknown map codec; expected auto, png or context")]
+pub struct UnknownCodecName;
+
+impl FromStr for Codec {
+    type Err = UnknownCodecName;
+
+    fn from_str(name: &str) -> Result<Self, UnknownCodecName> {
+        match name {
+            "auto" => Ok(Self::Auto),
+            "png" => Ok(Self::Png),
+            "context" => Ok(Self::Context),
+            _ => Err(UnknownCodecName),
+        }
+    }
+}
+
+impl fmt::Display for Codec {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Auto => "auto",
+            Self::Png => "png",
+            Self::Context => "context",
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_read_back_as_the_codec_they_name() {
+        for codec in [Codec::Auto, Codec::Png, Codec::Context] {
+            assert_eq!(codec.to_string().parse(), Ok(codec));
+        }
+        assert!("zip".parse::<Codec>().is_err());
+    }
 }

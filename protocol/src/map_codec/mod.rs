@@ -3,38 +3,26 @@
 //! A chunk covers one compact patch. It has the new labels of the cells that change, and leaves every other cell of the
 //! patch as it is. It decodes alone, given the base. See [`encode`] and [`decode`].
 
-mod best_png;
 mod chunk;
-mod codec;
 #[allow(clippy::indexing_slicing)] // Tables whose sizes the layouts of its contexts give.
 mod context;
 mod file;
-#[cfg(test)]
-mod golden;
 mod grow;
 mod header;
-mod lattice;
 mod png;
 #[allow(clippy::indexing_slicing)]
 mod raster;
-mod raster_png;
 #[allow(clippy::indexing_slicing)]
 mod series;
 #[cfg(test)]
 mod tests;
-#[allow(clippy::indexing_slicing)] // Columns and rows of its own square.
-mod window;
-
-pub use best_png::Deflate;
 pub(crate) use chunk::encode_quickly;
-pub use chunk::{ChunkPatch, DecodeError, MapChunk, decode, encode, encode_every, patch, trace};
-pub use codec::Codec;
+pub use chunk::{ChunkPatch, Codec, DecodeError, MapChunk, decode, encode, encode_every, patch, trace};
 pub use context::{Decision, training};
 pub use file::{ChunkFile, ChunkFileError};
-pub use lattice::Stride;
+pub use grow::Stride;
 pub use png::restored_png;
-pub use raster::LabelRaster;
-pub use raster_png::RasterPngError;
+pub use raster::{Deflate, LabelRaster, RasterPngError};
 pub use series::encode_all;
 
 /// The most cells of a patch; bounds the allocation in decoding a chunk.

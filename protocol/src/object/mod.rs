@@ -24,20 +24,16 @@ mod gf256;
 
 mod code;
 mod layout;
-mod outgoing;
 mod part;
-mod reassembly;
 mod receiver;
 mod sender;
-mod supply;
 #[cfg(test)]
 mod tests;
 
 pub use layout::Layout;
-pub use outgoing::SymbolRun;
 pub use part::{ObjectId, Part, PartError};
 pub use receiver::{ObjectReceiver, Received};
-pub use sender::ObjectSender;
+pub use sender::{ObjectSender, SymbolRun};
 
 /// The largest object in bytes.
 pub const MAX_OBJECT: usize = 16 * 1024;

@@ -3,43 +3,32 @@
 //! Multi-byte integers are big-endian. Diagrams count bits from the most significant one of the first byte.
 
 mod ack;
-mod backlog;
 mod chunk;
 mod details;
-mod disk;
-mod faults;
 mod frame;
 mod header;
-mod intent;
 mod introduction;
 mod listener;
-mod number;
 mod path;
 mod placement;
-mod registration;
 mod stamp;
 mod status;
 mod trail;
 
 pub use crate::bytes::{Reader, Truncated};
 pub use ack::{AckStatement, MAX_WINDOW};
-pub use backlog::Backlog;
 pub(crate) use chunk::room_for_payload;
 pub use chunk::{Chunk, ChunkKind, Chunks};
-pub use details::PoseDetails;
-pub use disk::DiskReport;
-pub use faults::EquipmentFaults;
+pub use details::{Backlog, DiskReport, EquipmentFaults, PoseDetails};
 pub use frame::{Envelope, Frame, FrameBuilder, FrameError, Seal};
 pub use header::{Address, FrameKind, Header, MissionId, SessionId};
-pub use intent::Intent;
 pub use introduction::{CellEdge, Introduction, SurfaceName, UtcHours};
 pub use listener::{Heard, Listener};
 pub use path::PlannedPath;
 pub use placement::Placement;
-pub use registration::{FrameTie, RegistrationReport};
 pub use stamp::Stamp;
 pub use status::{ModeReason, StatusError, VehicleMode, VehicleStatus};
-pub use trail::{Trail, TrailCorner};
+pub use trail::{FrameTie, Intent, RegistrationReport, Trail, TrailCorner};
 
 /// The version of the wire format. Of another version only hellos are read, so that both ends can name the difference.
 pub const WIRE_VERSION: u8 = 4;

@@ -1,13 +1,9 @@
 //! The vehicle's status.
 
-use super::backlog::Backlog;
-use super::disk::DiskReport;
-use super::faults::EquipmentFaults;
-use super::intent::Intent;
+use super::details::{Backlog, DiskReport, EquipmentFaults};
 use super::path::PlannedPath;
 use super::placement::Placement;
-use super::registration::RegistrationReport;
-use super::trail::TrailCorner;
+use super::trail::{Intent, RegistrationReport, TrailCorner};
 use crate::bytes::{Reader, Truncated, decimetres, put24};
 use crate::coordinates::MapPoint;
 use crate::directive::{InForceSummary, SLOTS, SlotId, SlotReport, SlotState};

@@ -1,8 +1,9 @@
-//! The corners of the track that the vehicle travelled before a pose.
+//! What a vehicle reports with a pose: the track before it, how its last camera frames were placed, the purpose of its plan.
 
 use super::status::StatusError;
-use crate::bytes::{BitReader, BitWriter, DecimetreStep, Reader, decimetres, width_of};
+use crate::bytes::{BitReader, BitWriter, DecimetreStep, Reader, Truncated, decimetres, width_of};
 use crate::coordinates::MapPoint;
+use crate::map::MAX_LABEL;
 
 /// A corner of the track.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -106,6 +107,141 @@ fn step_to(point: MapPoint) -> DecimetreStep {
     DecimetreStep { x_dm: decimetres(point.x_m), y_dm: decimetres(point.y_m) }
 }
 
+/// The purpose of the plan that a pose has.
+///
+/// ```text
+/// byte  bits  field   range
+///  0    8     kind    0 unseen floor, 1 curiosity, 2 label, 3 destination, 4 weighted area,
+///                     5 label that was seen before
+///  1    8     number  of the label, 1..254, after kinds 2 and 5; of the area, 1..4, after kind 4
+/// ```
+///
+/// Source: vehicle, among the [`super::PoseDetails`], while it surveys by an adaptive planner or goes to a destination.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Intent {
+    /// Floor that the camera has not seen yet.
+    Unseen,
+    /// Cells that the scene model finds unusual.
+    Curiosity,
+    /// More of a label, where it is seen or expected.
+    Label(u8),
+    /// Another look at a label, where it was seen before.
+    LabelAgain(u8),
+    /// The place to which the operator has ordered the vehicle.
+    Destination,
+    /// The weighted area with this number, from 1.
+    Area(u8),
+}
+
+impl Intent {
+    /// The bytes on the wire.
+    pub fn encode(self) -> Vec<u8> {
+        match self {
+            Self::Unseen => vec![0],
+            Self::Curiosity => vec![1],
+            Self::Label(label) => vec![2, label],
+            Self::Destination => vec![3],
+            Self::Area(number) => vec![4, number],
+            Self::LabelAgain(label) => vec![5, label],
+        }
+    }
+
+    /// Reads an intent; the rest stays in `r`.
+    pub(super) fn read(r: &mut Reader<'_>) -> Result<Self, StatusError> {
+        let kind = r.u8()?;
+        let mut number = |most: u8| Some(r.u8()?).filter(|n| (1..=most).contains(n)).ok_or(StatusError::BadField);
+        match kind {
+            0 => Ok(Self::Unseen),
+            1 => Ok(Self::Curiosity),
+            2 => number(MAX_LABEL).map(Self::Label),
+            3 => Ok(Self::Destination),
+            4 => number(4).map(Self::Area),
+            5 => number(MAX_LABEL).map(Self::LabelAgain),
+            _ => Err(StatusError::BadField),
+        }
+    }
+}
+
+/// What places the last camera frame on the map.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum FrameTie {
+    /// Odometry and compass alone: its image shows no overlap with an earlier one.
+    #[default]
+    Odometry,
+    /// Its overlap with the frame before.
+    FrameBefore,
+    /// Its overlap with a frame of an earlier track, which closes a loop.
+    EarlierTrack,
+    /// Odometry and compass alone: the registration of frames is off.
+    Off,
+}
+
+impl FrameTie {
+    const ALL: [Self; 4] = [Self::Odometry, Self::FrameBefore, Self::EarlierTrack, Self::Off];
+}
+
+/// How the last camera frames were placed on the map.
+///
+/// ```text
+/// byte  bits  field                        unit, range
+///  0    2     tie of the last frame        0 odometry, 1 frame before, 2 earlier track, 3 registration is off
+///  0    6     recent frames that images    1/63 of the last 32 frames, rounded down
+///             placed
+///  1    8     standard deviation of the    2 cm, rounded up; 255 = 5.1 m or more
+///             last frame's place against
+///             earlier parts of the map
+///  2-3  16    frames that closed a loop    65535 = that or more
+///             since the mission's start
+/// ```
+///
+/// Source: vehicle, among the [`super::PoseDetails`], where frames are or were registered.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct RegistrationReport {
+    /// What places the last frame.
+    pub tie: FrameTie,
+    /// The part of the last 32 frames that images placed, 0..=1.
+    pub share: f64,
+    /// Standard deviation of the last frame's place against earlier parts of the map, metres, at most 5.1.
+    pub sigma_m: f64,
+    /// Frames that closed a loop since the mission's start.
+    pub closed: u16,
+}
+
+/// Metres for each unit of the standard deviation.
+const SIGMA_UNIT_M: f64 = 0.02;
+/// Units of a whole share.
+const WHOLE: f64 = 63.0;
+
+impl RegistrationReport {
+    /// Bytes on the wire, of which the last two are the closed loops.
+    pub const BYTES: usize = 4;
+
+    /// The bytes on the wire.
+    pub fn encode(&self) -> [u8; Self::BYTES] {
+        let tie = FrameTie::ALL.iter().position(|tie| *tie == self.tie).unwrap_or_default() as u8;
+        let share = (self.share * WHOLE + 1e-9).clamp(0.0, WHOLE) as u8;
+        let sigma = (self.sigma_m / SIGMA_UNIT_M - 1e-9).ceil().clamp(0.0, 255.0) as u8;
+        let [high, low] = self.closed.to_be_bytes();
+        [tie << 6 | share, sigma, high, low]
+    }
+
+    /// Reads a report; each has exactly one encoding.
+    pub fn decode(bytes: [u8; Self::BYTES]) -> Self {
+        let [head, sigma, high, low] = bytes;
+        Self {
+            tie: FrameTie::ALL.get(usize::from(head >> 6)).copied().unwrap_or_default(),
+            share: f64::from(head & 63) / WHOLE,
+            sigma_m: f64::from(sigma) * SIGMA_UNIT_M,
+            closed: u16::from_be_bytes([high, low]),
+        }
+    }
+
+    /// Reads a report; the rest stays in `r`.
+    pub(super) fn read(r: &mut Reader<'_>) -> Result<Self, Truncated> {
+        Ok(Self::decode([r.u8()?, r.u8()?, r.u8()?, r.u8()?]))
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -173,5 +309,41 @@ mod tests {
                 prop_assert!((read.place.x_m - sent.place.x_m).hypot(read.place.y_m - sent.place.y_m) < 0.01);
             }
         }
+    }
+
+    #[test]
+    fn golden_bytes_of_an_intent() {
+        for (intent, bytes) in [
+            (Intent::Unseen, &[0][..]),
+            (Intent::Curiosity, &[1]),
+            (Intent::Label(1), &[2, 1]),
+            (Intent::Label(254), &[2, 254]),
+            (Intent::Destination, &[3]),
+            (Intent::Area(4), &[4, 4]),
+            (Intent::LabelAgain(7), &[5, 7]),
+        ] {
+            assert_eq!(intent.encode(), bytes);
+            let mut r = Reader::new(bytes);
+            assert_eq!((Intent::read(&mut r), r.rest()), (Ok(intent), &[][..]));
+        }
+        for bytes in [&[][..], &[2], &[4], &[5], &[6], &[5, 0], &[5, 255], &[4, 0], &[4, 5], &[2, 0], &[2, 255]] {
+            assert!(Intent::read(&mut Reader::new(bytes)).is_err(), "{bytes:?}");
+        }
+    }
+
+    #[test]
+    fn golden_bytes_of_a_registration_report() {
+        let report = |tie, share, sigma_m, closed| RegistrationReport { tie, share, sigma_m, closed };
+        for (report, bytes) in [
+            (RegistrationReport::default(), [0x00, 0, 0, 0]),
+            (report(FrameTie::FrameBefore, 1.0, 0.02, 1), [0x7f, 1, 0, 1]),
+            (report(FrameTie::EarlierTrack, 21.0 / 63.0, 0.1, 258), [0x95, 5, 1, 2]),
+            (report(FrameTie::Off, 0.0, 5.1, u16::MAX), [0xc0, 255, 255, 255]),
+        ] {
+            assert_eq!(report.encode(), bytes);
+            assert_eq!(RegistrationReport::decode(bytes).encode(), bytes);
+        }
+        let beyond = report(FrameTie::Odometry, 2.0, 80.0, 0);
+        assert_eq!(beyond.encode(), [0x3f, 255, 0, 0]);
     }
 }

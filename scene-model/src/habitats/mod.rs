@@ -27,25 +27,18 @@
 mod cells;
 mod clusters;
 mod measures;
-mod rest;
 mod sights;
-mod smooth;
-mod space;
-mod tree;
 
+pub use clusters::LabelTree;
 pub use measures::{MEASURES, MeasuredPoint, MeasuredValues, measure};
-pub use tree::LabelTree;
 
 use crate::project::Observation;
 use crate::topics::{FlatCell, TopicId};
 use crate::words::Word;
-use cells::CellMap;
+use cells::{CellMap, Coordinates, Space, smoothed, squared_distance};
 use clusters::{Clusters, Rule};
-use rest::Rest;
 use serde::{Deserialize, Serialize};
-use sights::{Sight, Sights};
-use smooth::{Coordinates, smoothed, squared_distance};
-use space::Space;
+use sights::{Rest, Sight, Sights};
 use std::collections::BTreeMap;
 
 /// A cell keeps its label unless another centre is nearer by this times the contrast, squared units of the noise between neighbours.
@@ -451,7 +444,7 @@ mod tests {
             see(&mut habitats, &image, -2.0 * f64::from(k));
             habitats.update();
         }
-        for _ in 0..2 * rest::REST_FRAMES {
+        for _ in 0..2 * sights::REST_FRAMES {
             habitats.add((320, 240), &[], &[], 0.25);
             habitats.update();
         }
@@ -481,7 +474,7 @@ mod tests {
         };
         (0..27).for_each(|k| stay(&mut habitats, k, 1));
         // The correction at rest comes first.
-        stay(&mut habitats, 26, 2 * rest::REST_FRAMES as usize);
+        stay(&mut habitats, 26, 2 * sights::REST_FRAMES as usize);
         let labels = |habitats: &Habitats| -> BTreeMap<(i32, i32), u32> {
             habitats.map().iter().map(|cell| ((cell.x, cell.y), cell.topic.0)).collect()
         };

@@ -5,7 +5,7 @@
 //! paper, but label borders move to where the colour changes. It is the contrast term of image segmentation
 //! (Boykov and Jolly, ICCV 2001).
 
-use super::grid::NONE;
+use super::cells::NONE;
 
 /// Classes of squared distances: eight for each factor of two from 2^-16 on. Class 0 stands for an unknown distance.
 const CLASSES: usize = 256;

@@ -16,20 +16,15 @@ mod checkpoint;
 mod config;
 #[cfg(test)]
 mod consistency_tests;
-mod evaluate;
-mod grid;
 mod kernel;
-mod label_changes;
 mod label_map;
 mod labels;
 mod model;
 mod sampler;
-mod schedule;
-mod snapshot;
 
+pub use cells::{centre_of, coord_of};
 pub use checkpoint::CheckpointError;
 pub use config::{Birth, ConfigError, SceneConfig};
-pub use grid::{centre_of, coord_of};
 pub use kernel::Kernel;
 pub use label_map::FlatCell;
 pub use labels::TopicId;

@@ -1,9 +1,8 @@
 //! Binary words: an oriented pattern of brightness comparisons, as in ORB (Rublee et al., ICCV 2011), quantised to
 //! the nearest of random prototypes.
 
+use super::config::{Word, centres};
 use super::grey_plane::GreyPlane;
-use super::grid::centres;
-use super::word::Word;
 use crate::random::CounterRng;
 
 const BITS: usize = 128;

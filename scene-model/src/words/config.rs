@@ -1,8 +1,7 @@
-//! The number of words of each kind, and their ids.
-
-use serde::{Deserialize, Serialize};
+//! The visual word, the number of words of each kind, and where in a frame they are sampled.
 
 use super::{binary, colour, context, texture};
+use serde::{Deserialize, Serialize};
 
 /// The number of words of each kind in a cell, and the length of the warm-up.
 ///
@@ -43,4 +42,45 @@ impl WordConfig {
 pub(super) fn first_id(kind: usize) -> u32 {
     let sizes = [colour::SIZE, context::SIZE, context::SPREAD_SIZE, texture::SIZE, binary::SIZE];
     sizes.iter().take(kind).sum()
+}
+
+/// A visual word and its position in the frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Word {
+    /// The word's number, below [`WordExtractor::vocabulary_size`](super::WordExtractor::vocabulary_size).
+    pub id: u32,
+    /// Distance from the left edge of the frame, pixels.
+    pub u: f32,
+    /// Distance from the top edge of the frame, pixels.
+    pub v: f32,
+}
+
+/// The centres of equal parts of about `spacing` pixels along an axis of `length` pixels.
+pub(crate) fn centres(length: u32, spacing: f32) -> Vec<f32> {
+    let count = parts(length, spacing);
+    let step = length as f32 / count as f32;
+    (0..count).map(|i| (i as f32 + 0.5) * step).collect()
+}
+
+/// The bounds of the same parts, from 0 to `length`: one more than there are parts.
+pub(crate) fn bounds(length: u32, spacing: f32) -> Vec<u32> {
+    let count = parts(length, spacing);
+    (0..=count).map(|i| (u64::from(i) * u64::from(length) / u64::from(count)) as u32).collect()
+}
+
+fn parts(length: u32, spacing: f32) -> u32 {
+    ((length as f32 / spacing.max(1.0)).round() as u32).clamp(1, length.max(1))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn parts_cover_the_axis_without_gaps() {
+        let bounds = bounds(640, 4.2);
+        assert_eq!((bounds[0], bounds[bounds.len() - 1]), (0, 640));
+        assert!(bounds.windows(2).all(|pair| (4..=5).contains(&(pair[1] - pair[0]))));
+        assert_eq!(centres(640, 4.2).len() + 1, bounds.len());
+    }
 }

@@ -5,11 +5,10 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::colour::level;
-use super::colour_field::ColourField;
-use super::moments::{Moments, standardised};
+use super::colour::{ColourField, level};
+use super::config::Word;
+use super::flat_field::{Moments, standardised};
 use super::texture::sextiles;
-use super::word::Word;
 
 const COLOUR_LEVELS: u32 = 6;
 const CONTRAST_LEVELS: u32 = 4;

@@ -6,7 +6,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::word::Word;
+use super::config::Word;
 
 /// The number of measures of a place: L, a, b; mean L, a, b and contrast of its context; deviations of L, a and b;
 /// Gabor energy at three scales.

@@ -4,16 +4,13 @@ use image::RgbImage;
 use serde::{Deserialize, Serialize};
 
 use super::binary::BinaryWords;
-use super::colour::ColourWords;
-use super::colour_field::ColourField;
-use super::config::{WordConfig, first_id};
+use super::colour::{ColourField, ColourWords};
+use super::config::{Word, WordConfig, first_id};
 use super::context::{ContextWords, SpreadWords};
 use super::discriminant::{Discriminant, MEASURES, MeasuredPlace};
+use super::flat_field::{Moments, Stretch};
 use super::grey_plane::GreyPlane;
-use super::moments::Moments;
-use super::stretch::Stretch;
 use super::texture::TextureWords;
-use super::word::Word;
 
 /// The tone stretch, means and deviations that features are compared with to become words.
 ///

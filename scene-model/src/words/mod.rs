@@ -7,23 +7,17 @@
 
 mod binary;
 mod colour;
-mod colour_field;
 mod config;
 mod context;
 mod discriminant;
 mod extractor;
 mod flat_field;
 mod grey_plane;
-mod grid;
-mod moments;
-mod stretch;
 mod texture;
-mod word;
 
-pub(crate) use colour::LEVELS as COLOUR_LEVELS;
-pub(crate) use colour_field::ColourField;
-pub use colour_field::lab as cie_lab;
-pub use config::WordConfig;
+pub use colour::lab as cie_lab;
+pub(crate) use colour::{ColourField, LEVELS as COLOUR_LEVELS};
+pub use config::{Word, WordConfig};
 pub use discriminant::{
     Discriminant, DiscriminantError, FEATURES, MAX_DIRECTIONS, MAX_PROTOTYPES, MEASURES, MeasuredPlace,
 };
@@ -31,4 +25,3 @@ pub use extractor::{Measures, WordExtractor};
 pub use flat_field::FlatField;
 pub(crate) use grey_plane::GreyPlane;
 pub(crate) use texture::GaborBank;
-pub use word::Word;

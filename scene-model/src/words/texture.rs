@@ -1,9 +1,8 @@
 //! Texture words: Gabor energy at three scales, each quantised into six levels of equal probability.
 
+use super::config::{Word, centres};
+use super::flat_field::{Moments, standardised};
 use super::grey_plane::GreyPlane;
-use super::grid::centres;
-use super::moments::{Moments, standardised};
-use super::word::Word;
 
 const SCALES: usize = 3;
 const ORIENTATIONS: usize = 6;

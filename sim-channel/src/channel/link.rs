@@ -1,9 +1,10 @@
-//! One direction between two nodes: its instance of the loss model and its own random streams.
+//! One direction between two nodes, with its loss model and random streams; scheduled silences, and nodes that only disturb.
 
 use super::ChannelConfig;
 use crate::loss::{FrameContext, FrameFate, LinkLoss, LossModel};
 use crate::nodes::NodeId;
 use crate::random::RandomStream;
+use std::time::Duration;
 
 /// The random draws for one transmission on one link, before collisions are known.
 #[derive(Clone, Debug)]
@@ -73,4 +74,154 @@ pub(super) fn flip_bits(bytes: &mut [u8], rng: &mut RandomStream) -> bool {
         }
     }
     !flipped.is_empty()
+}
+
+/// A scheduled silence of the whole channel, of a node, or of one direction of a link.
+///
+/// ```
+/// use sim_channel::{Channel, ChannelConfig, Duration, LossReason, NodeId, Outage, ReceptionOutcome, NodePosition};
+///
+/// let outages = vec![Outage::all(Duration::ZERO, Duration::from_secs(60))];
+/// let mut channel = Channel::new(ChannelConfig { outages, ..ChannelConfig::default() }, 1);
+/// channel.place(NodeId(1), NodePosition::new(0.0, 0.0, 0.0));
+/// channel.place(NodeId(2), NodePosition::new(300.0, 0.0, 0.0));
+/// channel.transmit(NodeId(1), vec![0; 8], Duration::from_millis(100), Duration::from_secs(30));
+///
+/// let arrival = channel.poll_arrival(Duration::MAX).unwrap();
+/// assert!(matches!(arrival.outcome, ReceptionOutcome::Lost { reason: LossReason::Outage, .. }));
+/// ```
+#[derive(Clone, PartialEq, Debug)]
+pub struct Outage {
+    /// Start, since the start of the run; inclusive.
+    pub from: Duration,
+    /// End, since the start of the run; exclusive. `Duration::MAX` for ever.
+    pub until: Duration,
+    /// The links that are silent.
+    pub scope: OutageScope,
+}
+
+/// The links that an outage silences.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[non_exhaustive]
+pub enum OutageScope {
+    /// Every link of the channel.
+    All,
+    /// Both directions of every link of one node.
+    Node(NodeId),
+    /// One direction of one link; for ever, it makes a one-way link.
+    Link {
+        /// The sender that does not get through.
+        from: NodeId,
+        /// The receiver that it does not reach.
+        to: NodeId,
+    },
+}
+
+impl Outage {
+    /// Silence of the whole channel from `from` (inclusive) to `until` (exclusive).
+    #[must_use]
+    pub fn all(from: Duration, until: Duration) -> Self {
+        Self { from, until, scope: OutageScope::All }
+    }
+
+    /// `to` never receives `from`, while the other direction works.
+    #[must_use]
+    pub fn one_way(from: NodeId, to: NodeId) -> Self {
+        Self { from: Duration::ZERO, until: Duration::MAX, scope: OutageScope::Link { from, to } }
+    }
+
+    /// Whether the outage touches a reception over `start..end` on the link `from` -> `to`.
+    pub(crate) fn covers(&self, from: NodeId, to: NodeId, start: Duration, end: Duration) -> bool {
+        let concerned = match self.scope {
+            OutageScope::All => true,
+            OutageScope::Node(node) => node == from || node == to,
+            OutageScope::Link { from: f, to: t } => f == from && t == to,
+        };
+        concerned && start < self.until && self.from < end.max(start.saturating_add(Duration::from_nanos(1)))
+    }
+}
+
+/// A node with Poisson traffic of random bytes, which other modems receive as noise.
+///
+/// ```
+/// use sim_channel::{Channel, ChannelConfig, Duration, Interferer, NodeId, NodePosition};
+///
+/// let mut channel = Channel::new(ChannelConfig::default(), 1);
+/// channel.place(NodeId(99), NodePosition::new(0.0, 500.0, 0.0));
+/// let mut noise = Interferer::new(NodeId(99), 16, Duration::from_millis(200), Duration::from_secs(60), 1);
+/// let at = noise.poll_timeout().unwrap();
+/// let (bytes, airtime) = noise.poll_transmit(at).unwrap();
+/// channel.transmit(noise.node(), bytes, airtime, at);
+/// assert!(noise.poll_transmit(at).is_none() && noise.poll_timeout() > Some(at + airtime));
+/// ```
+///
+/// [`Basin`](crate::modem::Basin) drives it. Without a basin, place its node and put its frames on air:
+#[derive(Debug)]
+pub struct Interferer {
+    node: NodeId,
+    bytes: usize,
+    airtime: Duration,
+    mean_gap: Duration,
+    next: Duration,
+    rng: RandomStream,
+}
+
+impl Interferer {
+    /// An interferer at `node` whose frames of `bytes` random bytes take `airtime`, with `mean_gap` between them on average.
+    #[must_use]
+    pub fn new(node: NodeId, bytes: usize, airtime: Duration, mean_gap: Duration, seed: u64) -> Self {
+        const PURPOSE: u64 = 0x7a1c;
+        let rng = RandomStream::new(seed, &[PURPOSE, u64::from(node.0)]);
+        let mut interferer = Self { node, bytes, airtime, mean_gap, next: Duration::ZERO, rng };
+        interferer.schedule(Duration::ZERO);
+        interferer
+    }
+
+    /// The node whose position it transmits from.
+    #[must_use]
+    pub fn node(&self) -> NodeId {
+        self.node
+    }
+
+    /// Time of its next transmission; never `None`.
+    #[must_use]
+    pub fn poll_timeout(&self) -> Option<Duration> {
+        Some(self.next)
+    }
+
+    /// Bytes and airtime of the transmission that is due by `now`; `None` before its time.
+    #[must_use]
+    pub fn poll_transmit(&mut self, now: Duration) -> Option<(Vec<u8>, Duration)> {
+        if now < self.next {
+            return None;
+        }
+        self.schedule(now.saturating_add(self.airtime));
+        Some(((0..self.bytes).map(|_| self.rng.below(256) as u8).collect(), self.airtime))
+    }
+
+    fn schedule(&mut self, free: Duration) {
+        let gap = self.rng.exponential(self.mean_gap.as_secs_f64());
+        self.next = free.saturating_add(Duration::try_from_secs_f64(gap).unwrap_or(Duration::MAX));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn transmits_at_its_mean_rate_without_overlap() {
+        let airtime = Duration::from_millis(500);
+        let mut interferer = Interferer::new(NodeId(9), 16, airtime, Duration::from_secs(10), 1);
+        let hour = Duration::from_secs(36_000);
+        let mut times = Vec::new();
+        while let Some(at) = interferer.poll_timeout().filter(|at| *at < hour) {
+            let (bytes, _) = interferer.poll_transmit(at).expect("due");
+            assert_eq!(bytes.len(), 16);
+            times.push(at);
+        }
+        assert!(times.windows(2).all(|w| w[1] - w[0] >= airtime));
+        let expected = 36_000.0 / 10.5;
+        assert!((times.len() as f64 / expected - 1.0).abs() < 0.05, "{}", times.len());
+    }
 }

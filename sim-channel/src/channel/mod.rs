@@ -1,17 +1,13 @@
 //! The acoustic channel: when each node receives each transmission, and which receptions are lost.
 
-mod arrival;
 mod config;
-mod interferer;
 mod link;
-mod outage;
 pub mod presets;
 mod reception;
 
-pub use arrival::{Arrival, LossReason, Onset, ReceptionOutcome};
 pub use config::ChannelConfig;
-pub use interferer::Interferer;
-pub use outage::{Outage, OutageScope};
+pub use link::{Interferer, Outage, OutageScope};
+pub use reception::{Arrival, LossReason, Onset, ReceptionOutcome};
 
 use crate::loss::{FrameContext, FrameFate, LossModel};
 use crate::nodes::{NodeId, NodePosition, Track};

@@ -2,20 +2,14 @@
 //!
 //! A [`LossModel`] is a description. Each directed link runs an instance of its own, which holds the state of the model.
 
-mod dwell_chain;
-mod fits;
-mod gilbert_elliott;
-mod independent;
-mod range_table;
+mod bursts;
+mod measured;
 mod snr;
-mod three_state;
 mod trace;
 
-pub use fits::{FitError, FittedLink};
-pub use gilbert_elliott::GilbertElliott;
-pub use range_table::{RangeTable, RangeTableError};
+pub use bursts::{GilbertElliott, ThreeState};
+pub use measured::{FitError, FittedLink, RangeTable, RangeTableError};
 pub use snr::Snr;
-pub use three_state::ThreeState;
 pub use trace::{Trace, TraceError};
 
 use crate::random::RandomStream;
@@ -61,8 +55,8 @@ impl LossModel {
     /// A new instance for one link; draws its first state from `rng`.
     pub(crate) fn instance(&self, rng: &mut RandomStream) -> Box<dyn LinkLoss> {
         match self {
-            LossModel::None => Box::new(independent::Independent::new(0.0)),
-            LossModel::Independent { probability } => Box::new(independent::Independent::new(*probability)),
+            LossModel::None => Box::new(bursts::Independent::new(0.0)),
+            LossModel::Independent { probability } => Box::new(bursts::Independent::new(*probability)),
             LossModel::GilbertElliott(model) => model.instance(rng),
             LossModel::ThreeState(model) => model.instance(rng),
             LossModel::Snr(model) => model.instance(),

@@ -1,7 +1,6 @@
 //! The map's stream, the camera and the scene model.
 
-use crate::key::section;
-use crate::rule::{ANY, range};
+use crate::key::{ANY, range, section};
 use crate::setting::{
     BandRange, BirthRule, CalibrationSource, CameraSource, CameraStamps, Debounce, DepthSource, LabelSource, LayerName,
     MapCells, SceneLabels, Votes,

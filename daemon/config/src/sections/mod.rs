@@ -3,18 +3,14 @@
 //! The structs, `scenecast config`, the files in `config/`, the reference in `docs/` and the JSON Schema are made from
 //! these tables.
 
-mod link;
 mod map;
 mod modem;
 mod node;
-mod ros2;
 mod survey;
 
-pub use link::Link;
 pub use map::{Bands, Camera, Labels, Map, Scene};
-pub use modem::{Channel, Modem};
-pub use node::{Console, Mission, Operator, Runtime, SurfaceSection, VehicleSection, WorldSection};
-pub use ros2::Ros2;
+pub use modem::{Channel, Link, Modem};
+pub use node::{Console, Mission, Operator, Ros2, Runtime, SurfaceSection, VehicleSection, WorldSection};
 pub use survey::{Autopilot, Navigation, Position, Registration, Survey};
 
 use crate::key::Section;

@@ -1,7 +1,6 @@
 //! The survey, the vehicle's navigation, autopilots and the localisation relay.
 
-use crate::key::section;
-use crate::rule::{ANY, ports, range};
+use crate::key::{ANY, ports, range, section};
 use crate::setting::{AutopilotKind, GpsPort, NavigationSource, StartMode};
 use scenecast_core::{Area, PortAddress};
 use scenecast_protocol::directive::{AtEnd, PlannerKind, Reaction};

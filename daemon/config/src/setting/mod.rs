@@ -1,10 +1,7 @@
 //! How values of each type are read from TOML, written and described.
 
-mod addresses;
 mod choices;
-mod debounce;
 mod labels;
-mod layers;
 mod numbers;
 mod ports;
 mod ros2;
@@ -16,14 +13,13 @@ pub use choices::{
     Authenticate, AutopilotKind, BirthRule, CameraStamps, MapCells, ModemKind, OperatorScript, RestoreOrders,
     RosTransport, S2cMode, SceneLabels, StartMode, WorldKind,
 };
-pub use debounce::Debounce;
-pub use labels::{BandRange, LabelMessage, LabelSource, Votes};
-pub use layers::LayerName;
+pub use labels::{BandRange, Debounce, LabelMessage, LabelSource, Votes};
 pub use ports::{GpsPort, HostPort, PageOrigin};
 pub use ros2::{Remap, RosName, ZenohEndpoint};
 pub use sources::{CalibrationSource, CameraSource, DepthSource, NavigationSource};
+pub use tables::LayerName;
 
-use crate::rule::Rule;
+use crate::key::Rule;
 use serde_json::json;
 use toml::Value;
 

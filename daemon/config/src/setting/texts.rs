@@ -1,7 +1,7 @@
-//! Names and files.
+//! Names, files, and lists of vehicles' addresses.
 
-use super::Setting;
-use crate::rule::Rule;
+use super::{Setting, different, read_different, unit};
+use crate::key::Rule;
 use serde_json::json;
 use std::path::PathBuf;
 use toml::Value;
@@ -59,5 +59,23 @@ impl Setting for Option<PathBuf> {
 
     fn schema(_: &Rule) -> serde_json::Value {
         json!({ "type": "string" })
+    }
+}
+
+impl Setting for Vec<u8> {
+    fn read(value: &Value, rule: &Rule) -> Option<Self> {
+        read_different(value, |v| u8::read(v, rule))
+    }
+
+    fn write(&self) -> Value {
+        Value::Array(self.iter().map(u8::write).collect())
+    }
+
+    fn allowed(rule: &Rule) -> String {
+        format!("a list of different whole numbers from {} to {}{}", rule.range.0, rule.range.1, unit(rule))
+    }
+
+    fn schema(rule: &Rule) -> serde_json::Value {
+        different(u8::schema(rule))
     }
 }

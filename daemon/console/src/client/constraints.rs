@@ -1,12 +1,10 @@
 //! Fence, limits, hold and abort.
 
-use super::follow::follow;
-use super::session::Session;
+use super::session::{Session, follow};
 use super::text;
 use crate::orders::{AgainOrder, ConstraintsOrder, RestoreOrder, TakeOverOrder};
 use crate::state::{AppliedOrder, MissionState, OrderProgress, OrderStatus, VehicleState};
-use scenecast_core::UserError;
-use scenecast_core::{LatLon, TangentPlane};
+use scenecast_core::{LatLon, TangentPlane, UserError};
 use scenecast_files::{CoordinateFrame, FenceShapes, read_fence};
 use scenecast_surface::{FenceOrder, LimitsOrder};
 use serde::Serialize;

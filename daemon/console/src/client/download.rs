@@ -1,7 +1,6 @@
 //! Maps and images as files.
 
-use super::follow::follow;
-use super::session::Session;
+use super::session::{Session, follow};
 use crate::orders::{ExemplarAction, ExemplarOrder};
 use crate::state::{AcceptedOrder, ExemplarProgress, ExemplarStage, MissionState};
 use scenecast_core::UserError;

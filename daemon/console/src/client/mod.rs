@@ -1,32 +1,27 @@
 //! The client behind `scenecast ctl`: it reads the state, writes files, and gives orders.
 
 mod changes;
-mod command;
 mod constraints;
 mod download;
-mod follow;
 mod http;
-mod log;
 mod orders;
-mod places;
 mod session;
 mod settings;
 mod text;
-mod watch;
 
-pub use command::{change_command, show_command};
+pub use changes::{LogSelection, save_log, show_labels, show_log, show_status, watch};
 pub use constraints::{
     FenceFile, clear_fence, give_again, restore_orders, send_constraints, set_fence, set_limits, set_return_point,
     show_fence, show_limits, take_over,
 };
 pub use download::{cancel_exemplar, save_exemplar, save_map};
 pub use http::Client;
-pub use log::{LogSelection, save_log, show_log};
-pub use orders::{BudgetChange, set_budget, set_utility, show_budget, show_utility};
-pub use places::{AreasFile, go, set_areas, show_areas};
+pub use orders::{
+    AreasFile, BudgetChange, change_command, go, set_areas, set_budget, set_utility, show_areas, show_budget,
+    show_command, show_utility,
+};
 pub use session::Session;
 pub use settings::{SettingsChange, change_settings};
-pub use watch::{show_labels, show_status, watch};
 
 use scenecast_core::UserError;
 use std::pin::Pin;

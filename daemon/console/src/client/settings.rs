@@ -1,7 +1,6 @@
 //! Settings of a vehicle: shown, sent, or fitted to a budget.
 
-use super::follow::follow;
-use super::session::Session;
+use super::session::{Session, follow};
 use super::text;
 use crate::fit::{Fit, FittedSettings};
 use crate::state::{MissionState, VehicleState};

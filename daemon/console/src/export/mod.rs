@@ -2,11 +2,10 @@
 
 mod cells;
 mod files;
-mod format;
 mod geotiff;
 mod projection;
 mod regions;
 
 pub(crate) use cells::Tiles;
 pub use cells::{CellLayer, MapCaption, MapCells};
-pub use format::MapFormat;
+pub use files::MapFormat;

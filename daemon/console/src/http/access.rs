@@ -1,11 +1,14 @@
-//! Access by tokens: programs send it in a header, the page sends a cookie that it received at the login.
+//! Access by tokens, which programs send in a header and the page in a cookie; how many streams a principal has, and how fast it
+//! may edit.
 
 use axum::http::{HeaderMap, header};
 use scenecast_config::TokenGrant;
 use scenecast_surface::Principal;
-use std::collections::VecDeque;
-use std::sync::{Mutex, PoisonError};
+use std::collections::{BTreeMap, VecDeque};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
 use subtle::ConstantTimeEq;
+use tokio::sync::oneshot;
 
 /// Sessions of a principal; a further login ends the oldest of them, and never that of another principal.
 const MAX_SESSIONS: usize = 16;
@@ -103,11 +106,106 @@ fn cookies(headers: &HeaderMap) -> impl Iterator<Item = &str> {
     pairs.filter(|(name, _)| *name == COOKIE).map(|(_, session)| session)
 }
 
+/// Open streams at a time.
+pub(super) const MAX_STREAMS: usize = 64;
+/// When one principal has all seats, its oldest stream gives up its seat once it has had it for this time. The server cannot
+/// see whether a client reads: the system's buffers hold what it does not read.
+pub(super) const MIN_TIME: Duration = Duration::from_secs(8);
+
+/// The seats, shared by all requests.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Seats(Arc<Mutex<Taken>>);
+
+#[derive(Debug, Default)]
+struct Taken {
+    next: u64,
+    seats: BTreeMap<u64, Holder>,
+}
+
+#[derive(Debug)]
+struct Holder {
+    principal: String,
+    since: Instant,
+    /// Ends the stream when it is dropped.
+    _end: oneshot::Sender<()>,
+}
+
+/// A seat; it is free again when this is dropped.
+#[derive(Debug)]
+pub(super) struct Seat {
+    seats: Seats,
+    number: u64,
+    /// Resolves once the stream must end.
+    pub(super) end: oneshot::Receiver<()>,
+}
+
+impl Seats {
+    fn lock(&self) -> MutexGuard<'_, Taken> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// A seat for a new stream of a principal. If all are taken, the principal with most seats gives up its oldest one: at once to a
+    /// principal with fewer seats, or else after [`MIN_TIME`]; `None` before.
+    pub(super) fn take(&self, principal: &str, now: Instant) -> Option<Seat> {
+        let mut taken = self.lock();
+        if taken.seats.len() >= MAX_STREAMS {
+            let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
+            taken.seats.values().for_each(|holder| *counts.entry(&holder.principal).or_default() += 1);
+            let held = counts.get(principal).copied().unwrap_or(0);
+            let (greediest, most) = counts.into_iter().max_by_key(|(_, seats)| *seats)?;
+            let (&oldest, holder) = taken.seats.iter().find(|(_, holder)| holder.principal == greediest)?;
+            if held + 1 >= most && now.saturating_duration_since(holder.since) < MIN_TIME {
+                return None;
+            }
+            taken.seats.remove(&oldest);
+        }
+        let number = taken.next;
+        taken.next += 1;
+        let (sender, end) = oneshot::channel();
+        taken.seats.insert(number, Holder { principal: principal.to_owned(), since: now, _end: sender });
+        Some(Seat { seats: self.clone(), number, end })
+    }
+}
+
+impl Drop for Seat {
+    fn drop(&mut self) {
+        self.seats.lock().seats.remove(&self.number);
+    }
+}
+
+/// Edits of a principal in a second in the long run, and at once.
+const PER_SECOND: f64 = 10.0;
+const AT_ONCE: f64 = 100.0;
+
+/// A token bucket (RFC 2215) for each principal, shared by all requests. Principals are those of the token file.
+#[derive(Debug, Clone, Default)]
+pub(super) struct EditRate(Arc<Mutex<BTreeMap<String, Bucket>>>);
+
+#[derive(Debug)]
+struct Bucket {
+    edits: f64,
+    at: Instant,
+}
+
+impl EditRate {
+    /// Takes one edit of a principal; whether there was one left.
+    pub(super) fn take(&self, principal: &str, now: Instant) -> bool {
+        let mut buckets = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let bucket = buckets.entry(principal.to_owned()).or_insert(Bucket { edits: AT_ONCE, at: now });
+        let since_s = now.saturating_duration_since(bucket.at).as_secs_f64();
+        *bucket = Bucket { edits: (bucket.edits + PER_SECOND * since_s).min(AT_ONCE), at: now };
+        let is_left = bucket.edits >= 1.0;
+        bucket.edits -= f64::from(u8::from(is_left));
+        is_left
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use axum::http::HeaderValue;
     use scenecast_surface::Role;
+    use std::time::Duration;
     use zeroize::Zeroizing;
 
     fn access() -> Access {
@@ -160,5 +258,40 @@ mod tests {
         assert_eq!(name(&access, &second).as_deref(), Some("anna"), "logins of others");
         (0..MAX_SESSIONS).for_each(|_| drop(begin("0123456789abcdef")));
         assert_eq!(name(&access, &second), None);
+    }
+
+    #[test]
+    fn only_a_stream_that_had_its_time_gives_up_its_seat() {
+        let (seats, begin) = (Seats::default(), Instant::now());
+        let mut held: Vec<_> = (0..MAX_STREAMS).map(|_| seats.take("ann", begin).unwrap()).collect();
+        assert!(seats.take("ann", begin + MIN_TIME / 2).is_none());
+        let newer = seats.take("ann", begin + MIN_TIME).unwrap();
+        assert_eq!(held[0].end.try_recv(), Err(oneshot::error::TryRecvError::Closed), "the oldest must end");
+        assert_eq!(held[1].end.try_recv(), Err(oneshot::error::TryRecvError::Empty));
+        drop(held);
+        let seated = seats.lock().seats.len();
+        assert_eq!(seated, 1, "the seat of the newest stream alone is taken");
+        drop(newer);
+    }
+
+    #[test]
+    fn a_principal_with_all_seats_keeps_no_other_one_out() {
+        let (seats, begin) = (Seats::default(), Instant::now());
+        let mut crowd: Vec<_> = (0..MAX_STREAMS).map(|_| seats.take("victor", begin).unwrap()).collect();
+        let mut operator = seats.take("ann", begin).unwrap();
+        assert_eq!(crowd[0].end.try_recv(), Err(oneshot::error::TryRecvError::Closed));
+        assert!(seats.take("victor", begin).is_none());
+        assert!(seats.take("victor", begin + MIN_TIME).is_some());
+        assert_eq!(operator.end.try_recv(), Err(oneshot::error::TryRecvError::Empty));
+    }
+
+    #[test]
+    fn only_a_principal_that_edits_too_fast_waits() {
+        let (rate, now) = (EditRate::default(), Instant::now());
+        let taken = |at| (0..1000).filter(|_| rate.take("ann", at)).count();
+        assert_eq!(taken(now), 100);
+        assert!(rate.take("bob", now));
+        assert_eq!(taken(now + Duration::from_secs(2)), 20);
+        assert_eq!(taken(now + Duration::from_secs(3600)), 100);
     }
 }

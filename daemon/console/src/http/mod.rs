@@ -2,21 +2,15 @@
 //! bounds time and memory, `shared` is the state of the handlers.
 
 mod access;
-mod assets;
-mod body;
-mod compress;
 mod connections;
-mod edit_rate;
 mod guard;
 mod handlers;
 mod openapi;
 mod operations;
 mod response;
-mod seats;
 mod server;
 mod shared;
 
-pub use assets::page_files;
-pub use compress::gzip;
-pub use server::{Console, ConsoleListener, bind, start};
+pub use response::gzip;
+pub use server::{Console, ConsoleListener, bind, page_files, start};
 pub use shared::PendingRequest;

@@ -4,7 +4,7 @@ mod archive;
 mod directive;
 
 use super::handlers::maps::{self, MapQuery};
-use super::handlers::{command, events, log, login, metrics, orders, readings};
+use super::handlers::{login, metrics, orders, readings};
 use super::shared::{Shared, VehicleId};
 use crate::export::MapFormat;
 use crate::fit::Fit;
@@ -123,14 +123,14 @@ fn readings() -> Vec<Operation> {
             "The log of the mission: orders and edits with their authors, answers, silences, new labels, images; its last 2000 \
              entries at most. `vehicle`, `kind` and `since` (a number) select some.",
             Content::Json(schema::<LogList>),
-            || get(log::log),
+            || get(readings::log),
         ),
         read(
             "/api/v2/log.csv",
             "log_csv",
             "The same as a table, with the same selections",
             Content::File("text/csv; charset=utf-8"),
-            || get(log::table),
+            || get(readings::table),
         ),
         read("/api/v2/state", "state", "The state", Content::Json(schema::<MissionState>), || get(readings::state)),
         read(
@@ -139,7 +139,7 @@ fn readings() -> Vec<Operation> {
             "Changes: `state` with the whole state after each change and at least once a second; `map` after a change of a \
              map. A slow reader misses states, but never the last one.",
             Content::Events,
-            || get(events::events),
+            || get(readings::events),
         ),
         read(
             "/api/v2/vehicles/{id}/map",
@@ -312,7 +312,7 @@ fn commands() -> Vec<Operation> {
             "principal",
             "Name and role of the principal that the request's token or cookie identifies",
             Content::Json(schema::<PrincipalInfo>),
-            || get(command::principal),
+            || get(login::principal),
         ),
         Operation {
             success: (200, Content::Json(schema::<CommandState>)),
@@ -322,7 +322,7 @@ fn commands() -> Vec<Operation> {
                 "Requests command, hands it over, takes it or gives it up. Without command, orders other than hold and abort \
                  are refused with status 409.",
                 schema::<CommandOrder>,
-                || post(command::command),
+                || post(login::command),
             )
         },
     ]

@@ -1,10 +1,21 @@
-//! Replies as HTTP responses.
+//! Bodies of orders and of responses, in fewer bytes where the client takes them, or none where it has them.
 
 use crate::request::Reply;
 use crate::state::{ArchiveList, ErrorBody};
 use axum::Json;
-use axum::http::{StatusCode, header};
+use axum::body::{Body, to_bytes};
+use axum::extract::{FromRequest, Request};
+use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
+use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
+use flate2::Compression;
+use flate2::write::GzEncoder;
+use serde::de::value::MapAccessDeserializer;
+use serde::de::{DeserializeOwned, MapAccess, Visitor};
+use serde::{Deserialize, Deserializer};
+use std::fmt::Formatter;
+use std::io::Write;
+use std::marker::PhantomData;
 
 /// The response to a handled request.
 pub(super) fn respond(reply: Reply) -> Response {
@@ -36,4 +47,133 @@ pub(super) fn error(status: StatusCode, line: &str) -> Response {
 
 pub(super) fn not_found() -> Response {
     error(StatusCode::NOT_FOUND, "there is no such page, vehicle, label or image")
+}
+
+/// The body of an order: a JSON object. Serde would also accept a list of the members in their order.
+pub(super) struct JsonOrder<T>(pub(super) T);
+
+impl<'de, T: Deserialize<'de>> Deserialize<'de> for JsonOrder<T> {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_map(Members(PhantomData))
+    }
+}
+
+struct Members<T>(PhantomData<T>);
+
+impl<'de, T: Deserialize<'de>> Visitor<'de> for Members<T> {
+    type Value = JsonOrder<T>;
+
+    fn expecting(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
+        f.write_str("an object")
+    }
+
+    fn visit_map<A: MapAccess<'de>>(self, members: A) -> Result<JsonOrder<T>, A::Error> {
+        T::deserialize(MapAccessDeserializer::new(members)).map(JsonOrder)
+    }
+}
+
+impl<T: DeserializeOwned, S: Send + Sync> FromRequest<S> for JsonOrder<T> {
+    type Rejection = Response;
+
+    async fn from_request(request: Request, state: &S) -> Result<Self, Response> {
+        let body = Json::<Self>::from_request(request, state).await;
+        body.map(|Json(order)| order).map_err(|e| error(e.status(), &e.body_text()))
+    }
+}
+
+/// Shorter responses are sent as they are.
+const MIN_BYTES: usize = 512;
+const MAX_BYTES: usize = 1 << 28;
+
+/// Bytes in gzip (RFC 1952); `None` if there is no memory for them.
+pub fn gzip(bytes: &[u8]) -> Option<Vec<u8>> {
+    let mut encoder = GzEncoder::new(Vec::new(), Compression::fast());
+    encoder.write_all(bytes).ok()?;
+    encoder.finish().ok()
+}
+
+/// Whether the client accepts gzip.
+pub(super) fn accepts_gzip(headers: &HeaderMap) -> bool {
+    let offered = headers.get_all(header::ACCEPT_ENCODING).iter().filter_map(|v| v.to_str().ok());
+    offered.flat_map(|list| list.split(',')).any(|one| {
+        let (name, weight) = one.split_once(';').unwrap_or((one, ""));
+        name.trim().eq_ignore_ascii_case("gzip") && !matches!(weight.trim(), "q=0" | "q=0.0" | "q=0.00" | "q=0.000")
+    })
+}
+
+pub(super) async fn compress(request: Request, next: Next) -> Response {
+    let wanted = accepts_gzip(request.headers());
+    let mut response = next.run(request).await;
+    if !is_text(response.headers()) {
+        return response;
+    }
+    response.headers_mut().insert(header::VARY, HeaderValue::from_static("accept-encoding"));
+    if !wanted || response.headers().contains_key(header::CONTENT_ENCODING) {
+        return response;
+    }
+    let (mut parts, body) = response.into_parts();
+    let Ok(bytes) = to_bytes(body, MAX_BYTES).await else { return StatusCode::INTERNAL_SERVER_ERROR.into_response() };
+    let Some(packed) = (bytes.len() >= MIN_BYTES).then(|| gzip(&bytes)).flatten() else {
+        return Response::from_parts(parts, Body::from(bytes));
+    };
+    parts.headers.remove(header::CONTENT_LENGTH);
+    parts.headers.insert(header::CONTENT_ENCODING, HeaderValue::from_static("gzip"));
+    Response::from_parts(parts, Body::from(packed))
+}
+
+fn is_text(headers: &HeaderMap) -> bool {
+    let kind = headers.get(header::CONTENT_TYPE).and_then(|v| v.to_str().ok()).unwrap_or_default();
+    let text = kind.starts_with("text/") || kind.contains("json") || kind.contains("xml") || kind.contains("ply");
+    text && !kind.starts_with("text/event-stream")
+}
+
+/// A response that the client may keep while `tag` is the same; status 304 if it has the response.
+pub(super) fn tagged(headers: &HeaderMap, tag: &str, response: impl FnOnce() -> Response) -> Response {
+    // The same content in another encoding has the same tag, so it is a weak one (RFC 9110, section 8.8.1).
+    let tag = format!("W/\"{tag}\"");
+    let held = headers.get_all(header::IF_NONE_MATCH).iter().filter_map(|v| v.to_str().ok());
+    let is_held = held.flat_map(|list| list.split(',')).any(|one| one.trim() == tag);
+    let mut response = if is_held { StatusCode::NOT_MODIFIED.into_response() } else { response() };
+    if response.status().is_success() || is_held {
+        let headers = response.headers_mut();
+        headers.insert(header::CACHE_CONTROL, HeaderValue::from_static("no-cache"));
+        if let Ok(tag) = HeaderValue::from_str(&tag) {
+            headers.insert(header::ETAG, tag);
+        }
+    }
+    response
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use scenecast_surface::SettingsOrder;
+
+    #[test]
+    fn an_order_is_an_object_and_not_a_list() {
+        let read = |json: &str| serde_json::from_str::<JsonOrder<SettingsOrder>>(json).map(|JsonOrder(o)| o.planner);
+        assert_eq!(read(r#"{"planner": "greedy"}"#).unwrap().as_deref(), Some("greedy"));
+        assert!(read("[null, null]").unwrap_err().to_string().contains("an object"));
+        assert!(read(r#"{"plan": 1}"#).unwrap_err().to_string().contains("unknown field"));
+    }
+
+    #[test]
+    fn gzip_is_sent_only_to_clients_that_accept_it() {
+        let accepts = |value: &'static str| {
+            accepts_gzip(&HeaderMap::from_iter([(header::ACCEPT_ENCODING, HeaderValue::from_static(value))]))
+        };
+        assert!(accepts("gzip, deflate, br") && accepts("br;q=1, GZIP;q=0.5"));
+        assert!(!accepts("identity") && !accepts("gzip;q=0, br") && !accepts("x-gzip-like"));
+        assert!(!accepts_gzip(&HeaderMap::new()));
+    }
+
+    #[test]
+    fn a_client_with_the_same_tag_receives_status_304() {
+        let held =
+            |value: &'static str| HeaderMap::from_iter([(header::IF_NONE_MATCH, HeaderValue::from_static(value))]);
+        let status = |headers| tagged(&headers, "a1", || "text".into_response()).status();
+        assert_eq!(status(HeaderMap::new()), StatusCode::OK);
+        assert_eq!(status(held("W/\"a0\"")), StatusCode::OK);
+        assert_eq!(status(held("W/\"a0\", W/\"a1\"")), StatusCode::NOT_MODIFIED);
+    }
 }

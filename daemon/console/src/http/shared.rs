@@ -1,9 +1,7 @@
 //! The state that all handlers share.
 
-use super::access::Access;
-use super::edit_rate::EditRate;
+use super::access::{Access, EditRate, Seats};
 use super::response::{error, not_found, respond};
-use super::seats::Seats;
 use crate::request::{ClientRequest, Reply, SurfaceRequest};
 use crate::snapshot::Snapshot;
 use crate::tiles::TiledMap;

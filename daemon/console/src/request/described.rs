@@ -1,8 +1,7 @@
 //! Requests in words, for the log of the mission.
 
 use super::SurfaceRequest;
-use crate::order_changes::OrderChanges;
-use crate::orders::{ExemplarAction, LabelOrder};
+use crate::orders::{ExemplarAction, LabelOrder, OrderChanges};
 use scenecast_protocol::directive::Constraints;
 use scenecast_protocol::wire::Address;
 use scenecast_surface::{LimitsOrder, LogKind};

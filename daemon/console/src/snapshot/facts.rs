@@ -1,11 +1,16 @@
-//! Facts of the mission that the surface does not have, and mission time in the API.
+//! Facts of the mission: its time, who has command, where the surface and the world frame are.
 
-use crate::state::{Origin, StorageInfo};
+use crate::state::{
+    CommandChangeName, CommandChangeState, CommandHolderState, CommandRequestState, CommandState, MapPlacement, Origin,
+    PrincipalInfo, PrincipalRole, StorageInfo, SurfacePosition,
+};
 use crate::truth::Truth;
 use scenecast_config::{self as config, Config};
 use scenecast_core::LatLon;
 use scenecast_protocol::mac::ModemProfile;
 use scenecast_protocol::time::Instant;
+use scenecast_protocol::wire::Placement;
+use scenecast_surface::{COMMAND_SILENCE, Command, CommandChange, CommandChangeKind, Principal, Role, Surface};
 use std::sync::Arc;
 
 /// Facts of the mission that the surface does not have.
@@ -66,4 +71,82 @@ fn configured_origin(config: &Config) -> Option<Origin> {
 /// Mission time in the API, rounded to a hundredth of a second.
 pub(crate) fn seconds(at: Instant) -> f64 {
     (at.as_secs_f64() * 100.0).round() / 100.0
+}
+
+pub(crate) fn command_state(command: &Command, now: Instant) -> CommandState {
+    CommandState {
+        holder: command.holder().map(|h| CommandHolderState {
+            name: h.principal.name().to_owned(),
+            role: role(h.principal.role()),
+            client: h.client.as_ref().map(|client| client.as_str().to_owned()),
+            since_s: seconds(h.since),
+            last_active_s: seconds(h.last_active),
+            takeable_s: seconds(h.last_active + COMMAND_SILENCE),
+        }),
+        requests: command
+            .requests(now)
+            .map(|r| CommandRequestState { name: r.principal.name().to_owned(), at_s: seconds(r.at) })
+            .collect(),
+        principals: command.principals().iter().map(principal_info).collect(),
+        history: command.changes().map(change).collect(),
+    }
+}
+
+/// A principal as the API shows it.
+pub(crate) fn principal_info(principal: &Principal) -> PrincipalInfo {
+    PrincipalInfo { name: principal.name().to_owned(), role: role(principal.role()) }
+}
+
+fn role(role: Role) -> PrincipalRole {
+    match role {
+        Role::Viewer => PrincipalRole::Viewer,
+        Role::Operator => PrincipalRole::Operator,
+        Role::Administrator => PrincipalRole::Administrator,
+    }
+}
+
+fn change(change: &CommandChange) -> CommandChangeState {
+    let kind = match change.kind {
+        CommandChangeKind::Taken => CommandChangeName::Taken,
+        CommandChangeKind::HandedOver => CommandChangeName::HandedOver,
+        CommandChangeKind::Released => CommandChangeName::Released,
+        CommandChangeKind::Requested => CommandChangeName::Requested,
+        CommandChangeKind::Withdrawn => CommandChangeName::Withdrawn,
+        CommandChangeKind::Moved => CommandChangeName::Moved,
+    };
+    let CommandChange { at, by, from, to, .. } = change.clone();
+    CommandChangeState { at_s: seconds(at), kind, by, from, to }
+}
+
+/// The place of x = y = 0 on the Earth by the GPS of the surface. 0, 0 stands for a rehearsal without a
+/// place, as in the configuration.
+pub fn measured_origin(surface: &Surface) -> Option<Origin> {
+    let origin = surface.relay()?.plane().map(|p| p.origin()).filter(|o| (o.lat_deg, o.lon_deg) != (0.0, 0.0))?;
+    Some(Origin { lat_deg: origin.lat_deg, lon_deg: origin.lon_deg })
+}
+
+pub(super) fn placement(placement: Placement) -> MapPlacement {
+    let Placement { version, origin } = placement;
+    MapPlacement { version, east_m: origin.east_m, north_m: origin.north_m }
+}
+
+/// The position of the surface; `None` without a GPS.
+pub(super) fn surface_position(surface: &Surface, now: Instant) -> Option<SurfacePosition> {
+    let relay = surface.relay()?;
+    let (gps, own) = (relay.gps(), relay.own(now));
+    let fix = gps.fix();
+    Some(SurfacePosition {
+        is_valid: own.is_some(),
+        x_m: own.map(|e| e.x_m),
+        y_m: own.map(|e| e.y_m),
+        sigma_m: own.map(|e| e.sigma_m()),
+        lat_deg: fix.map(|f| f.place.lat_deg),
+        lon_deg: fix.map(|f| f.place.lon_deg),
+        at_s: fix.map(|f| f.at.as_secs_f64()),
+        heading_deg: relay.heading_rad(now).map(|h| h.to_degrees().rem_euclid(360.0)),
+        rejected: gps.faults().map(|(f, n)| (f.name().to_owned(), n)).collect(),
+        outliers: relay.gps_outliers(),
+        fixes_sent: relay.fixes(),
+        usbl_rejected: relay.faults().map(|(f, n)| (f.name().to_owned(), n)).collect(),
+    })
 }

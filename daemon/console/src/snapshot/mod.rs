@@ -1,16 +1,12 @@
 //! The state of the surface at one moment, as all pages show it.
 
-mod command;
 mod exemplar;
 mod facts;
 mod link;
-mod position;
 mod vehicle;
 
-pub(crate) use command::{command_state, principal_info};
-pub use facts::MissionFacts;
-pub(crate) use facts::seconds;
-pub use position::measured_origin;
+pub use facts::{MissionFacts, measured_origin};
+pub(crate) use facts::{command_state, principal_info, seconds};
 pub(crate) use vehicle::marker;
 
 use crate::link_meter::LinkMeter;
@@ -55,10 +51,10 @@ pub fn snapshot(surface: &Surface, facts: &MissionFacts, meter: &LinkMeter, now:
             speed: facts.speed,
             ended: facts.ended_s.is_some(),
             ended_s: facts.ended_s,
-            origin: position::measured_origin(surface).or(facts.origin),
+            origin: facts::measured_origin(surface).or(facts.origin),
         },
         vehicles: vehicle::vehicles(surface, facts, now),
-        position: position::surface_position(surface, now),
+        position: facts::surface_position(surface, now),
         link: link::summary(surface, facts, meter, now),
         command: command_state(surface.command(), now),
         layers: surface.layers().iter().map(|(_, layer)| layer_info(layer)).collect(),

@@ -1,7 +1,7 @@
 //! Vehicles as the surface knows them.
 
 use super::facts::{MissionFacts, seconds};
-use super::{exemplar, link, position};
+use super::{exemplar, facts, link};
 use crate::state::{
     AppliedOrder, DirectiveSlots, EarlierMap, InForceKnowledge, MapLabel, MapLabelTree, MapSummary, OrderProgress,
     OrderStatus, OtherSurface, PlannedPath, ReportedDisk, ReportedFault, ReportedMode, ReportedPose,
@@ -148,7 +148,7 @@ fn map(
             Some(earlier) => earlier.placement(),
             None => record.status(view).and_then(|(s, _)| s.placement),
         }
-        .map(position::placement),
+        .map(facts::placement),
     }
 }
 

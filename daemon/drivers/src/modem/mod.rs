@@ -9,12 +9,12 @@
 
 mod driver;
 pub mod framing;
-mod kinds;
 pub mod micromodem;
 pub mod paced;
 pub mod s2c;
 mod station;
 
-pub use driver::{Class, Destination, Driver, Event, Reception, Refusal, Token};
-pub use kinds::{address_book, driver, modem_of_process};
+pub use driver::{
+    Class, Destination, Driver, Event, Reception, Refusal, Token, address_book, driver, modem_of_process,
+};
 pub use station::{AddressBook, ModemEvent, PIPE_FRAMING_BITS, Station};

@@ -1,7 +1,7 @@
 //! The measurements of one setting.
 
 use super::bench::{LinkBench, LinkSetting, auv};
-use super::summary::Summary;
+use super::tally::Summary;
 use crate::virtual_time::VirtualTime;
 use scenecast_protocol::coordinates::WorldPoint;
 use scenecast_protocol::directive::{Fix, OrderStatus, Slot, SlotId, Utility};

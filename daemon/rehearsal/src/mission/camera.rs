@@ -1,6 +1,6 @@
 //! The camera of a rehearsal: a view of the simulated sea floor, or a recording.
 
-use super::true_cells::TrueCells;
+use super::accuracy::TrueCells;
 use crate::world::World;
 use image::RgbImage;
 use scenecast_config::{Config, cell_m};

@@ -2,8 +2,7 @@
 
 use super::Mission;
 use super::camera::NextFrame;
-use super::logbook::FramePoses;
-use super::timetable::STEP_S;
+use super::logbook::{FramePoses, STEP_S};
 use crate::modem_rig::{SURFACE, VEHICLE};
 use scene_model::project::{Pose, View};
 use scenecast_core::UserError;

@@ -2,21 +2,17 @@
 
 mod accuracy;
 mod anchored;
-mod blocks;
 mod camera;
 mod events;
 #[cfg(test)]
 mod label_tests;
 mod labels;
 mod logbook;
-mod meters;
 #[cfg(test)]
 mod planned_tests;
 mod quality;
-mod timetable;
 #[cfg(test)]
 mod track_tests;
-mod true_cells;
 #[cfg(test)]
 mod tuned_tests;
 
@@ -30,9 +26,9 @@ use anchored::Anchored;
 use camera::Camera;
 use labels::LabelReplay;
 pub use logbook::Leg;
-use logbook::Logbook;
-use meters::Meters;
+use logbook::{Logbook, Timetable};
 pub use quality::MapQuality;
+use quality::Meters;
 use scenecast_config::{Config, OperatorScript, cell_m};
 use scenecast_core::{Area, UserError};
 use scenecast_drivers::modem::Station;
@@ -46,7 +42,6 @@ use scenecast_surface::{Surface, SurfaceOutput};
 use scenecast_vehicle::{Durable, Mapper, Vehicle};
 use sim_channel::NodePosition;
 use std::time::Duration;
-use timetable::Timetable;
 
 /// The choices of a rehearsal besides its configuration.
 pub struct MissionOptions {

@@ -1,10 +1,8 @@
 //! Throughput and latency through drivers and emulated modems, in virtual time.
 
 mod load;
-mod pusher;
 
-pub use load::{ModemBench, ModemSetting};
-pub use pusher::push;
+pub use load::{ModemBench, ModemSetting, push};
 
 use crate::mission::{Mission, MissionOptions};
 use crate::report::report;

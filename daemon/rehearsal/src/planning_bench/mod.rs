@@ -1,20 +1,17 @@
 //! A comparison of the planners: utility per metre on label maps that the vehicle sees cell by cell.
 
-mod label_file;
 mod planner_run;
-mod plot;
 mod scene;
 mod table;
 
 use planner_run::{MapKnowledge, PlannerRun, Task};
-pub use plot::plot;
 use scene::Scene;
 use scenecast_core::UserError;
 use scenecast_protocol::directive::PlannerKind;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 use table::Row;
-pub use table::{Estimate, PlanningTable, SourceTable};
+pub use table::{Estimate, PlanningTable, SourceTable, plot};
 
 /// Where the label maps of a comparison come from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]

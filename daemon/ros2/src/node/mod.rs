@@ -1,10 +1,8 @@
 //! The node: its threads, its peers, and the subscriptions and publishers at it, on one transport or on both.
 
-mod health;
-mod publisher;
 mod watch;
 
-pub use publisher::Publisher;
+pub use watch::Publisher;
 
 use crate::dds::Dds;
 use crate::inbox::Inbox;
@@ -104,7 +102,7 @@ impl RosNode {
 
     /// Which transports see peers, as a part of diagnostics.
     pub fn health(&self) -> Health {
-        health::health(&self.shared.peers(), self.shared.has_router())
+        watch::health(&self.shared.peers(), self.shared.has_router())
     }
 
     /// Subscribes to a topic; its messages wait in the inbox, at most `capacity` of them.

@@ -1,8 +1,14 @@
-//! Reports peers, and topics that nobody publishes.
+//! Publishers that never wait, reports of peers, and topics that nobody publishes.
 
 use super::Shared;
+use crate::dds::DdsPublisher;
 use crate::transport::{Peers, Transport, counts, locked};
+use crate::zenoh::ZenohPublisher;
+use scenecast_messages::diagnostic_msgs::DiagnosticStatus;
+use scenecast_messages::{Message, encode};
+use scenecast_outlets::Health;
 use std::sync::Weak;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
 /// Time between two looks at the peers.
@@ -182,6 +188,55 @@ pub(super) async fn run(shared: Weak<Shared>, endpoint: String) {
     }
 }
 
+/// `has_router` is `None` if rmw_zenoh is not used.
+pub(super) fn health(by_transport: &[(Transport, Peers)], has_router: Option<bool>) -> Health {
+    let level = if has_router == Some(false) { DiagnosticStatus::WARN } else { DiagnosticStatus::OK };
+    let router = if has_router == Some(false) { "; no router of Zenoh" } else { "" };
+    let message = format!("peers: {}{router}", counts(by_transport));
+    let mut values: Vec<(&'static str, String)> =
+        by_transport.iter().map(|(transport, peers)| (key(*transport), peers.participants.to_string())).collect();
+    values.extend(has_router.map(|has| ("zenoh_router", has.to_string())));
+    Health { level, part: "ros2", message, values }
+}
+
+fn key(transport: Transport) -> &'static str {
+    match transport {
+        Transport::Dds => "dds_peers",
+        Transport::Zenoh => "zenoh_peers",
+    }
+}
+
+/// A publisher of one topic, on every transport of the node.
+pub struct Publisher<M: Message> {
+    pub(super) dds: Option<DdsPublisher<M>>,
+    pub(super) zenoh: Option<ZenohPublisher>,
+    pub(super) refused: AtomicU64,
+}
+
+impl<M: Message> Publisher<M> {
+    /// The number of subscribers now.
+    pub fn subscribers(&self) -> usize {
+        let dds = self.dds.as_ref().map_or(0, DdsPublisher::subscribers);
+        dds + self.zenoh.as_ref().map_or(0, ZenohPublisher::subscribers)
+    }
+
+    /// Publishes a message; returns whether every transport took it. DDS refuses one while its window to a slow subscriber is
+    /// full.
+    pub fn publish(&self, message: M) -> bool {
+        let by_zenoh = self.zenoh.as_ref().is_none_or(|zenoh| !zenoh.is_wanted() || zenoh.publish(encode(&message)));
+        let is_published = self.dds.as_ref().is_none_or(|dds| dds.publish(message)) && by_zenoh;
+        if !is_published {
+            self.refused.fetch_add(1, Ordering::Relaxed);
+        }
+        is_published
+    }
+
+    /// Messages that a transport refused.
+    pub fn refused(&self) -> u64 {
+        self.refused.load(Ordering::Relaxed)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::Transport::{Dds, Zenoh};
@@ -265,5 +320,16 @@ mod tests {
         assert_eq!(router.handle(true, after(30)), None);
         assert_eq!(router.handle(false, after(31)), None, "it may come back soon");
         assert!(router.handle(false, after(40)).is_some());
+    }
+
+    #[test]
+    fn diagnostics_name_the_transport_that_sees_peers() {
+        let peers = |participants| Peers { participants, ..Peers::default() };
+        let both = [(Transport::Dds, peers(0)), (Transport::Zenoh, peers(2))];
+        let seen = health(&both, Some(true));
+        assert_eq!((seen.level, seen.message.as_str()), (DiagnosticStatus::OK, "peers: 0 on DDS, 2 on rmw_zenoh"));
+        assert!(seen.values.contains(&("zenoh_peers", "2".to_owned())));
+        assert_eq!(health(&both, Some(false)).level, DiagnosticStatus::WARN);
+        assert_eq!(health(&both[..1], None).message, "peers: 0 on DDS");
     }
 }

@@ -5,16 +5,12 @@
 
 mod health;
 mod map;
-mod order;
 mod orders;
-mod parts;
 mod stamps;
-mod state;
 mod vehicle;
 
 use crate::node::RosNode;
 use crate::stop::{self, Owned, Owner};
-use parts::Parts;
 use scenecast_config::Ros2;
 use scenecast_console::{ClientRequest, PendingRequest, Reply, Snapshot};
 use scenecast_core::{ClientName, Giver, Principal, UserError};
@@ -23,7 +19,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Duration;
 use tokio::sync::{mpsc, oneshot, watch};
-use vehicle::VehicleTopics;
+use vehicle::{Parts, VehicleTopics};
 
 /// Time between two looks at snapshots, subscribers and orders.
 const TICK: Duration = Duration::from_millis(100);

@@ -1,22 +1,23 @@
-//! The topics of one vehicle at the surface.
+//! The topics of one vehicle at the surface: their names, its pose, path, plan and position.
 
 use super::Desk;
 use super::health::health;
 use super::map::MapTopics;
 use super::orders::OrderTopics;
 use super::stamps::Stamps;
-use super::state::StateTopics;
-use crate::node::Publisher;
-use crate::node::RosNode;
+use crate::node::{Publisher, RosNode};
 use crate::transport::Qos;
-use scenecast_console::state::{MapLabelTree, MissionState, OrderStatus, VehicleState};
+use crate::valid_part;
+use scenecast_console::state::{MapLabelTree, MissionState, OrderStatus, StatusReport, VehicleState};
 use scenecast_console::{ClientRequest, Reply, SurfaceRequest};
-use scenecast_core::UserError;
+use scenecast_core::{LatLon, TangentPlane, UserError};
 use scenecast_messages::diagnostic_msgs::DiagnosticArray;
+use scenecast_messages::geometry_msgs::PoseWithCovarianceStamped;
+use scenecast_messages::nav_msgs::Path;
 use scenecast_messages::scenecast_msgs::{self, Event};
-use scenecast_messages::sensor_msgs::CompressedImage;
+use scenecast_messages::sensor_msgs::{CompressedImage, NavSatFix};
 use scenecast_messages::std_msgs::Header;
-use scenecast_outlets::{WORLD_FRAME, diagnostics, exemplar_jpeg, header};
+use scenecast_outlets::{Place, WORLD_FRAME, diagnostics, exemplar_jpeg, fix, header, path, pose};
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::{Duration, Instant};
 
@@ -185,5 +186,136 @@ fn status(state: OrderStatus) -> u8 {
         OrderStatus::Applied => scenecast_msgs::OrderStatus::APPLIED,
         OrderStatus::Refused => scenecast_msgs::OrderStatus::REFUSED,
         OrderStatus::Withdrawn => scenecast_msgs::OrderStatus::WITHDRAWN,
+    }
+}
+
+/// What depends on the last report of a vehicle.
+pub(super) struct StateTopics {
+    pose: Publisher<PoseWithCovarianceStamped>,
+    path: Publisher<Path>,
+    plan: Publisher<Path>,
+    fix: Publisher<NavSatFix>,
+    /// The mission time of the report that was published last.
+    last_s: Option<f64>,
+}
+
+impl StateTopics {
+    pub fn new(node: &RosNode, part: &str) -> Result<Self, UserError> {
+        let topic = |name: &str| node.own_topic(&format!("{part}/{name}"));
+        Ok(Self {
+            pose: node.publisher(&topic("pose")?, Qos::Reliable(10))?,
+            path: node.publisher(&topic("path")?, Qos::Reliable(1))?,
+            plan: node.publisher(&topic("plan")?, Qos::Reliable(1))?,
+            fix: node.publisher(&topic("fix")?, Qos::Reliable(10))?,
+            last_s: None,
+        })
+    }
+
+    /// Publishes each report once, in the world frame, for those who subscribe.
+    pub fn publish(&mut self, mission: &MissionState, vehicle: &VehicleState, stamps: &Stamps) {
+        let Some(status) = vehicle.status.as_ref().filter(|status| self.last_s != Some(status.at_s)) else { return };
+        self.last_s = Some(status.at_s);
+        let stamp = stamps.at(status.at_s);
+        let shift = vehicle.map.placement.as_ref().map_or((0.0, 0.0), |p| (p.east_m, p.north_m));
+        let place = place(status, shift, stamps);
+        if self.pose.subscribers() > 0 {
+            self.pose.publish(pose(&place, status.pose.sigma_m, WORLD_FRAME));
+        }
+        let at = |s: f64, (east, north): (f64, f64)| Place {
+            stamp: stamps.at(s),
+            position_m: [east + shift.0, north + shift.1, place.position_m[2]],
+            heading_rad: 0.0,
+        };
+        if self.path.subscribers() > 0 {
+            let track: Vec<Place> = vehicle.track.iter().map(|&(s, east, north)| at(s, (east, north))).collect();
+            self.path.publish(path(&track, header(stamp.clone(), WORLD_FRAME)));
+        }
+        if self.plan.subscribers() > 0 {
+            let waypoints = status.plan.waypoint.iter().chain(&status.plan.path);
+            let plan: Vec<Place> = waypoints.map(|&waypoint| at(status.at_s, waypoint)).collect();
+            self.plan.publish(path(&plan, header(stamp.clone(), WORLD_FRAME)));
+        }
+        let origin = mission.mission.origin.and_then(|o| LatLon::new(o.lat_deg, o.lon_deg));
+        if let Some(origin) = origin.filter(|_| self.fix.subscribers() > 0) {
+            let [east, north, _] = place.position_m;
+            let on_earth = TangentPlane::new(origin).to_place(east, north);
+            self.fix.publish(fix(on_earth, status.pose.sigma_m, header(stamp, WORLD_FRAME)));
+        }
+    }
+}
+
+fn place(status: &StatusReport, shift_m: (f64, f64), stamps: &Stamps) -> Place {
+    let pose = &status.pose;
+    Place {
+        stamp: stamps.at(status.at_s),
+        position_m: [pose.x_m + shift_m.0, pose.y_m + shift_m.1, pose.z_m],
+        heading_rad: pose.heading_deg.to_radians(),
+    }
+}
+
+/// Which vehicle has which part, with its address and its name.
+#[derive(Debug, Default)]
+pub(super) struct Parts(BTreeMap<String, (u8, String)>);
+
+impl Parts {
+    /// The parts of these vehicles, by address and name.
+    ///
+    /// # Errors
+    ///
+    /// Two vehicles whose topics would be the same.
+    pub fn new(vehicles: impl IntoIterator<Item = (u8, String)>) -> Result<Self, UserError> {
+        let mut parts = Self::default();
+        vehicles.into_iter().try_for_each(|(address, name)| parts.claim(address, &name).map(drop))?;
+        Ok(parts)
+    }
+
+    /// The part of a vehicle.
+    ///
+    /// # Errors
+    ///
+    /// Another vehicle has it, so that an order to one would go to both.
+    pub fn claim(&mut self, address: u8, name: &str) -> Result<String, UserError> {
+        let part = valid_part(name);
+        let (owner, other) = self.0.entry(part.clone()).or_insert_with(|| (address, name.to_owned()));
+        if *owner == address {
+            return Ok(part);
+        }
+        let vehicles = format!("{other:?} (address {owner}) and {name:?} (address {address})");
+        Err(UserError::Input(format!(
+            "ROS 2: the vehicles {vehicles} would share the topics {part}/...; choose a vehicle.name that differs in letters \
+             or digits"
+        )))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn parts(names: &[&str]) -> Result<Parts, UserError> {
+        Parts::new((1..).zip(names.iter().map(|&name| name.to_owned())))
+    }
+
+    #[test]
+    fn vehicles_with_the_same_topics_are_refused() {
+        assert!(parts(&["auv-1", "auv-2"]).is_ok());
+        let refusal = parts(&["auv-1", "auv_1"]).unwrap_err();
+        assert!(matches!(refusal, UserError::Input(_)));
+        let text = refusal.to_string();
+        assert!(
+            text.contains("\"auv-1\" (address 1) and \"auv_1\" (address 2)") && text.contains("auv_1/..."),
+            "{text}"
+        );
+        assert!(parts(&["auv", "auv"]).is_err());
+        let long = "a".repeat(64);
+        assert!(parts(&[&format!("{long}1"), &format!("{long}2")]).is_err(), "names are cut");
+    }
+
+    #[test]
+    fn a_vehicle_that_is_found_later_takes_no_topics_of_others() {
+        let mut parts = parts(&["vehicle-2"]).unwrap();
+        assert!(parts.claim(2, "vehicle 2").is_err());
+        assert_eq!(parts.claim(1, "vehicle-2").unwrap(), "vehicle_2");
+        assert_eq!(parts.claim(3, "vehicle 3").unwrap(), "vehicle_3");
     }
 }

@@ -1,10 +1,13 @@
-//! The nodes, publishers and subscriptions of other sessions, by their liveliness tokens.
+//! Sessions as the default settings of rmw_zenoh open them, and the nodes, publishers and subscriptions of others, by their
+//! liveliness.
 
 use super::keys::{Endpoint, Kind, NO_HASH, Token};
 use crate::dds::ros_type;
 use crate::transport::{OwnId, OwnIds, Peers, locked};
+use scenecast_config::Ros2;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Mutex;
+use zenoh::{Config, Session, Wait};
 
 /// Tokens that are kept at most; a large robot has some hundred.
 const MAX_TOKENS: usize = 20_000;
@@ -66,6 +69,34 @@ impl Graph {
         let same = |other: &&Endpoint| other.topic == at.topic && other.dds_type == at.dds_type;
         endpoints.filter(same).filter(|other| hashes.contains(&other.hash.as_str())).count()
     }
+}
+
+/// Bytes of a received message at most: an image of 20 megapixels.
+const MAX_MESSAGE: usize = 64 << 20;
+
+/// A session that connects to the router in the background, and again whenever the connection ends.
+pub(super) fn open(settings: &Ros2) -> zenoh::Result<Session> {
+    let router = format!("[\"{}\"]", settings.zenoh_router);
+    let max_message = MAX_MESSAGE.to_string();
+    let mut config = Config::default();
+    for (key, value) in [
+        ("mode", r#""peer""#),
+        ("connect/endpoints", &router),
+        ("connect/timeout_ms", "-1"),
+        ("connect/exit_on_failure", "false"),
+        // Peers on this machine send their samples without the router.
+        ("listen/endpoints", r#"["tcp/localhost:0"]"#),
+        ("open/return_conditions/connect_scouted", "false"),
+        ("scouting/multicast/enabled", "false"),
+        ("scouting/gossip/target", r#"{ router: ["router", "peer"], peer: ["router"] }"#),
+        ("scouting/gossip/autoconnect_strategy", r#"{ peer: { to_router: "always", to_peer: "greater-zid" } }"#),
+        // Samples that are kept for later subscribers are told apart by their times.
+        ("timestamping/enabled", "true"),
+        ("transport/link/rx/max_message_size", &max_message),
+    ] {
+        config.insert_json5(key, value)?;
+    }
+    zenoh::open(config).wait()
 }
 
 #[cfg(test)]

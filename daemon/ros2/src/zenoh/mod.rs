@@ -3,12 +3,9 @@
 //! Nodes find each other by a router, and by liveliness tokens that each of them declares. A session that loses the router
 //! looks for it again by itself.
 
-mod attachment;
 mod graph;
 mod keys;
 mod publisher;
-mod session;
-mod subscription;
 
 pub(crate) use publisher::ZenohPublisher;
 
@@ -42,7 +39,7 @@ impl Zenoh {
     ///
     /// The session did not open, for example since no port of the loopback network is free.
     pub fn start(settings: &Ros2, name: &str) -> Result<Arc<Self>, UserError> {
-        let session = session::open(settings).map_err(|e| failed("Zenoh did not start", &e))?;
+        let session = graph::open(settings).map_err(|e| failed("Zenoh did not start", &e))?;
         let id = session.zid().to_string();
         let graph = Arc::new(Graph::new(id.clone()));
         let tokens = TokenMaker { domain: settings.domain, session: id, node: name.to_owned() };
@@ -68,8 +65,8 @@ impl Zenoh {
         let refused = |e: zenoh::Error| failed(name.as_str(), &e);
         // Any type hash, for publishers of Humble, which have none.
         let key = endpoint.key(self.tokens.domain, "*");
-        let read = subscription::reader(filler, &endpoint);
-        let subscriber = subscription::declare(&self.session, key, qos, read).map_err(refused)?;
+        let read = publisher::reader(filler, &endpoint);
+        let subscriber = publisher::declare(&self.session, key, qos, read).map_err(refused)?;
         let (token, _) = self.announce(Kind::Subscription, &endpoint, qos).map_err(refused)?;
         let alive = Arc::new(());
         let (ended, graph) = (Arc::downgrade(&alive), self.graph.clone());

@@ -1,6 +1,6 @@
-//! Log lines about a camera and the source of its poses: each kind of fault at once when it is new, and then seldom.
+//! What is logged about a camera and the source of its poses: each kind of fault once, then how often.
 
-use scenecast_sensors::{CameraFault, CameraTally};
+use scenecast_sensors::{CameraFault, CameraTally, FrameMatcher};
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
@@ -40,6 +40,52 @@ impl FaultLog {
             lines.push(format!("{of}: {what}{} ({count} so far){why}", fault.name()));
         }
         lines
+    }
+}
+
+/// The last text about each kind of fault, and whether the camera is away.
+#[derive(Debug, Default)]
+pub(super) struct FaultReports {
+    log: FaultLog,
+    texts: BTreeMap<CameraFault, String>,
+    /// Whether the camera was lost or has stalled since its last image.
+    is_lost: bool,
+    was_matched: bool,
+}
+
+impl FaultReports {
+    pub(super) fn handle_fault(&mut self, fault: CameraFault, text: String) {
+        self.is_lost |= matches!(fault, CameraFault::SourceLost | CameraFault::Stalled);
+        self.texts.insert(fault, text);
+    }
+
+    pub(super) fn handle_image(&mut self) {
+        if std::mem::take(&mut self.is_lost) {
+            tracing::info!("camera: images come in again");
+        }
+    }
+
+    pub(super) fn handle_matched(&mut self) {
+        if !std::mem::replace(&mut self.was_matched, true) {
+            tracing::info!("camera: the first image has a pose");
+        }
+    }
+
+    /// Whether the camera was lost or has stalled since its last image.
+    pub(super) fn is_silent(&self) -> bool {
+        self.is_lost
+    }
+
+    /// Logs the kinds of faults that are new or have grown.
+    pub(super) fn log<I>(&mut self, matcher: &FrameMatcher<I>) {
+        let texts = &self.texts;
+        let explain = |fault| match fault {
+            CameraFault::NoPose => Some(matcher.times()),
+            _ => texts.get(&fault).cloned(),
+        };
+        for line in self.log.lines(matcher.tally(), std::time::Instant::now(), explain) {
+            tracing::warn!("{line}");
+        }
     }
 }
 

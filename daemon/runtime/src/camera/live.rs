@@ -1,8 +1,7 @@
 //! A live camera: its images wait for their poses, and the newest ones go to the scene model.
 
-use super::depth_feed::{DepthAnswer, DepthFeed};
-use super::fault_reports::FaultReports;
-use super::pose_feed::PoseFeed;
+use super::fault_log::FaultReports;
+use super::pose_feed::{DepthAnswer, DepthFeed, PoseFeed};
 use super::{CameraFrame, FramePicture, ReceivedImage};
 use crate::ros2::RosSensors;
 use scenecast_config::{CameraSource, CameraStamps, Config, NavigationSource};

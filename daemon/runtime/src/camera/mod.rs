@@ -1,8 +1,6 @@
 //! The camera of a vehicle: a recording, or a live camera whose images are matched with poses.
 
-mod depth_feed;
 mod fault_log;
-mod fault_reports;
 mod live;
 mod pose_feed;
 mod recorded;

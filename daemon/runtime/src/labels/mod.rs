@@ -1,28 +1,22 @@
 //! Labels of other programs: their sources, and the thread that makes them a map.
 
-#[cfg(any(test, feature = "ros2"))]
-mod echo;
 mod feed;
-#[cfg(unix)]
-mod local;
 mod moment;
 mod own_poses;
-mod pace;
 mod refusal_log;
 mod restore;
 mod serve;
 mod topic;
 
-use feed::Arrived;
 pub(super) use feed::Feeds;
+use feed::{Arrived, Pace};
 use own_poses::OwnPoses;
-use pace::Pace;
 use refusal_log::RefusalLog;
 pub(super) use restore::{open, restore};
 pub(super) use topic::topic;
 
 use super::clock::Clock;
-use super::label_health::{LabelHealth, LabelTally};
+use super::equipment::{LabelHealth, LabelTally};
 use super::mapping::Keep;
 use scenecast_config::{AutopilotKind, Config, LabelSource, NavigationSource};
 use scenecast_core::UserError;

@@ -2,8 +2,8 @@
 
 use super::feed::{Feed, Feeds};
 use super::topic::TopicFeed;
-use crate::checkpoint::CheckpointFile;
 use crate::journal::Folder;
+use crate::restore::CheckpointFile;
 use scenecast_config::{Config, LabelMessage, LabelSource};
 use scenecast_core::UserError;
 use scenecast_files::LabelFolder;
@@ -50,7 +50,7 @@ fn feed(
         LabelSource::Folder(dir) => Ok(Feed::folder(LabelFolder::new(dir, mark.map(str::to_owned)))),
         LabelSource::Network(place) => super::serve::network(place.as_str(), key),
         #[cfg(unix)]
-        LabelSource::Local(path) => super::local::local(path, key),
+        LabelSource::Local(path) => super::serve::local(path, key),
         #[cfg(not(unix))]
         LabelSource::Local(_) => Err(UserError::Input(format!("{key}: this system has no Unix sockets"))),
         LabelSource::Ros2(topic, message) => {

@@ -1,6 +1,6 @@
 //! The vehicle's end.
 
-use crate::label_health::LabelHealth;
+use crate::equipment::LabelHealth;
 use scenecast_config::Config;
 use scenecast_core::UserError;
 use scenecast_host::VehicleHost;
@@ -45,8 +45,8 @@ impl VehicleRos2 {
 
 #[cfg(feature = "ros2")]
 mod on {
+    use crate::equipment::LabelHealth;
     use crate::equipment::RecentFaults;
-    use crate::label_health::LabelHealth;
     use scenecast_config::Config;
     use scenecast_core::UserError;
     use scenecast_drivers::autopilot::{self, Counters};

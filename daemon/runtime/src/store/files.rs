@@ -2,7 +2,7 @@
 
 use super::SurfaceStore;
 use crate::clock::Clock;
-use crate::disk_space::free_bytes;
+use crate::durable::free_bytes;
 use crate::journal::Folder;
 use scenecast_config::Config;
 use scenecast_console::state::{ArchivedMap, StorageInfo};

@@ -5,11 +5,9 @@
 //! gives fixes in the world frame, the plane that touches the Earth at the mission's origin. It does no IO.
 
 mod filter;
-mod follow;
 mod relay;
 mod usbl;
 
 pub use filter::{Estimate, MeasurementVerdict, PlaneFilter};
-pub use follow::Follow;
-pub use relay::{Relay, RelayConfig, RelayFault};
+pub use relay::{Follow, Relay, RelayConfig, RelayFault};
 pub use usbl::{Mounting, UsblFault, UsblSighting};

@@ -1,13 +1,12 @@
 //! The surface's knowledge, folded from its events.
 
-use super::cells::{EarlierMap, MapCopy};
+use super::cells::{EarlierMap, FormerLabels, MapCopy};
 use super::contact::StoredContact;
 use super::event::{
     Event, EventKind, EventTime, RunId, StoredBudget, StoredCommand, StoredCommandChange, StoredDraft, StoredImage,
     StoredIntent, StoredLabel, StoredLogEntry, StoredMarker, StoredNote, StoredOrder, StoredPlaces, StoredRequest,
     VehicleEvent,
 };
-use super::former_labels::FormerLabels;
 use crate::log::make_room;
 use scenecast_protocol::map::{Cell, LabelTree};
 use scenecast_protocol::time::Instant;

@@ -1,22 +1,15 @@
 //! The scene model over files: sources of words, learning, scoring and output.
 
-mod annotations;
-mod bounds;
-mod frames;
 mod learn;
-mod lines;
 mod mosaic;
-mod process;
 mod quality;
 mod run_report;
 mod tum;
 mod words_file;
 
-pub(crate) use annotations::Annotated;
-pub(crate) use frames::Frames;
 pub(crate) use learn::{LearningEffort, Schedule, learn, learn_habitats};
-pub(crate) use mosaic::Mosaic;
-pub(crate) use quality::{Quality, quality};
+pub(crate) use mosaic::{Frames, Mosaic};
+pub(crate) use quality::{Annotated, Quality, quality};
 pub(crate) use run_report::{RunReport, write};
 pub(crate) use scenecast_files::read_vocabulary;
 pub(crate) use tum::{Intrinsics, Tum};

@@ -1,7 +1,6 @@
 //! Bands: quantities of another program, as layers of the map.
 
-use super::changes::ChangingGrid;
-use super::ground::GroundRaster;
+use super::ground::{ChangingGrid, GroundRaster};
 use scenecast_labels::{Band, BandScale, Ground, QuantityBand, Raster, Refusal};
 use scenecast_protocol::map::{
     BUILT_IN_LAYERS, Cell, Decimal, LabelGrid, LayerDescriptor, MAX_LABEL, Palette, Quantity, Spread, Steps,

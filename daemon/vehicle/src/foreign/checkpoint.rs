@@ -2,8 +2,7 @@
 
 use super::ForeignMap;
 use super::band::BandMap;
-use super::changes::ChangingGrid;
-use super::votes::Votes;
+use super::ground::{ChangingGrid, Votes};
 use scene_model::envelope::{Envelope, EnvelopeError};
 use scenecast_config::Config;
 use scenecast_protocol::map::{Cell, ClassEntry, LabelGrid, LayerDescriptor};

@@ -3,23 +3,19 @@
 //! Class n has label n + 1, always; so no label changes its meaning, whatever restarts.
 
 mod band;
-mod changes;
 mod checkpoint;
 mod ground;
-mod votes;
 
 use crate::{MapProducer, MapUpdate};
 use band::BandMap;
-use changes::ChangingGrid;
 pub use checkpoint::ForeignRestoreError;
-use ground::GroundRaster;
+use ground::{CellVotes, ChangingGrid, GroundRaster, Votes};
 use scene_model::project::{DownCamera, Pose};
 use scene_model::words::Word;
 use scenecast_config::{BandRange, Config, LabelSource, Votes as VotesKept, cell_m};
 use scenecast_labels::{Band, BandScale, Content, Ground, ImagePose, Item, QuantityBand, Raster, Refusal};
 use scenecast_protocol::map::{BUILT_IN_LAYERS, Cell, ClassEntry, LabelGrid, LayerDescriptor, LayerId, UNEXPLORED};
 use std::collections::BTreeMap;
-use votes::{CellVotes, Votes};
 
 /// A cell without a class.
 const UNKNOWN: u8 = u8::MAX;

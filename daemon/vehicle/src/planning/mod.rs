@@ -2,22 +2,17 @@
 
 mod bounds;
 mod expect;
-mod greedy;
 mod horizon;
-mod interest;
 mod lattice;
 mod lawnmower;
-mod return_gain;
 mod value;
 
 pub use bounds::{Bounds, Point, distance};
 pub use expect::{Expectation, SeenLabels};
-pub use greedy::Greedy;
 pub use horizon::Horizon;
-pub use interest::Interest;
 pub use lattice::{Lattice, Node, Paths};
-pub use lawnmower::Lawnmower;
-pub use value::{BlockValues, CellWindow, Knowledge, ShownBlocks};
+pub use lawnmower::{Greedy, Lawnmower};
+pub use value::{BlockValues, CellWindow, Interest, Knowledge, ShownBlocks};
 
 use scenecast_protocol::directive::PlannerKind;
 

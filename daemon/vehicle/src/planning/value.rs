@@ -1,9 +1,10 @@
-//! The value of the next look at each part of the sea floor.
+//! The value of the next look at each part of the sea floor, by what the operator favours.
 
 use super::bounds::Point;
 use super::expect::{Expectation, SeenLabels};
-use super::interest::Interest;
 use super::lattice::{Lattice, Node};
+use scenecast_protocol::coordinates::{DecimetrePoint, WorldPoint};
+use scenecast_protocol::directive::{Utility, WeightedArea};
 use scenecast_protocol::map::{Cell, LabelGrid};
 
 /// The state of knowledge about the sea floor.
@@ -232,6 +233,35 @@ fn oddness(surprise: &[u8]) -> Vec<f32> {
     let count = known().count().max(1) as f32;
     let mean = known().map(|s| (s - least) * scale).sum::<f32>() / count;
     surprise.iter().map(|&s| if s == 0 { mean } else { (f32::from(s) - least) * scale }).collect()
+}
+
+/// The operator's utility, and the areas that are weighted whatever lies there.
+#[derive(Debug, Clone, Copy)]
+pub struct Interest<'a> {
+    pub utility: &'a Utility,
+    pub areas: &'a [WeightedArea],
+}
+
+impl<'a> Interest<'a> {
+    /// The interest of an operator who has weighted no area.
+    pub fn in_labels(utility: &'a Utility) -> Self {
+        Self { utility, areas: &[] }
+    }
+
+    /// The largest weight, from 0 to 1.
+    pub fn largest_weight(&self) -> f64 {
+        let labels = self.utility.weights.values().copied();
+        let areas = self.areas.iter().map(|area| area.weight);
+        let others = [self.utility.exploration, self.utility.curiosity];
+        f64::from(labels.chain(areas).chain(others).fold(0, i8::max)) / 100.0
+    }
+
+    /// The weight of a place of the world frame by the areas alone.
+    pub fn weight_of_place(&self, place: Point) -> f32 {
+        let point = DecimetrePoint::nearest(WorldPoint::new(place.0, place.1));
+        let contains = |area: &&WeightedArea| point.is_some_and(|point| area.outline.contains(point));
+        self.areas.iter().filter(contains).map(|area| f32::from(area.weight) / 100.0).sum()
+    }
 }
 
 #[cfg(test)]

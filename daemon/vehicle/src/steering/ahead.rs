@@ -1,8 +1,9 @@
-//! The planned path after the waypoint, in the form that is reported.
+//! The planned path after the waypoint: as it is reported, its purpose, and whether a new plan is better than the present one.
 
 use super::Steering;
-use crate::planning::{Point, distance};
-use scenecast_protocol::wire::PlannedPath;
+use crate::planning::{BlockValues, Interest, Node, PlanRequest, Point, distance};
+use scenecast_protocol::directive::{Utility, WeightedArea};
+use scenecast_protocol::wire::{Intent, PlannedPath};
 
 /// A path, reduced to its corners.
 struct Corners {
@@ -109,6 +110,108 @@ impl Steering {
     }
 }
 
+/// Labels that a purpose can name: those with the largest weights, since each costs a valuation of the map.
+const MAX_LABELS: usize = 4;
+
+/// The part of `interest` with the greatest `gain`; `None` if no part gains anything.
+pub(super) fn purpose(interest: Interest<'_>, gain: impl Fn(Interest<'_>) -> Gain) -> Option<Intent> {
+    let parts = parts(interest);
+    let gain_of = |(_, utility, areas): &Part<'_>| gain(Interest { utility, areas });
+    if let [only] = &parts[..] {
+        return Some(after_looks(only.0, || gain_of(only)));
+    }
+    let gains: Vec<Gain> = parts.iter().map(gain_of).collect();
+    let best = (0..parts.len()).max_by(|&a, &b| gains[a].whole.total_cmp(&gains[b].whole).then(b.cmp(&a)))?;
+    (gains[best].whole > 0.0).then(|| after_looks(parts[best].0, || gains[best]))
+}
+
+/// The intent in view of the looks so far: a label is revisited if more than half of what it gains is on seen floor.
+fn after_looks(intent: Intent, gain: impl FnOnce() -> Gain) -> Intent {
+    let Intent::Label(label) = intent else { return intent };
+    let Gain { whole, on_seen } = gain();
+    if on_seen > 0.5 * whole { Intent::LabelAgain(label) } else { intent }
+}
+
+/// A part of an interest, as an interest of its own.
+type Part<'a> = (Intent, Utility, &'a [WeightedArea]);
+
+/// The parts with a positive weight.
+fn parts<'a>(Interest { utility, areas }: Interest<'a>) -> Vec<Part<'a>> {
+    const NOWHERE: &[WeightedArea] = &[];
+    let none = Utility { epoch: utility.epoch, ..Utility::default() };
+    let mut labels: Vec<(u8, i8)> = utility.weights.iter().map(|(&l, &w)| (l, w)).filter(|&(_, w)| w > 0).collect();
+    labels.sort_by_key(|&(label, weight)| (std::cmp::Reverse(weight), label));
+    labels.truncate(MAX_LABELS);
+    let of_label = |(label, weight)| {
+        (Intent::Label(label), Utility { weights: [(label, weight)].into(), ..none.clone() }, NOWHERE)
+    };
+    let mut parts: Vec<_> = labels.into_iter().map(of_label).collect();
+    if utility.exploration > 0 {
+        parts.push((Intent::Unseen, Utility { exploration: utility.exploration, ..none.clone() }, NOWHERE));
+    }
+    if utility.curiosity > 0 {
+        parts.push((Intent::Curiosity, Utility { curiosity: utility.curiosity, ..none.clone() }, NOWHERE));
+    }
+    let favoured = (1..).zip(areas.chunks(1)).filter(|(_, area)| area.iter().all(|area| area.weight > 0));
+    parts.extend(favoured.map(|(number, area)| (Intent::Area(number), none.clone(), area)));
+    parts
+}
+
+/// The gain a metre of a new plan, divided by that of the present one, from which the new one replaces it, if it turns back,
+/// and in rounds of repeated looks, where a place keeps much of its value after a look. Without such margins two goals of
+/// like worth take the vehicle to and fro, because each step changes the map. A margin for all new plans costs the horizon
+/// planner a tenth of its gain.
+const TURN_BACK: f64 = 1.3;
+const IN_ROUNDS: f64 = 1.15;
+/// The mean value of a cell, divided by the largest weight, from which a look at it pays: a fifth look at a favoured label
+/// does, and a sixth one does not.
+const PAYS: f64 = 0.02;
+
+/// The least gain a metre of a plan that replaces the present one, in gains a metre of that. `before` is the place that the
+/// vehicle comes from.
+pub(super) fn margin(plan: &[Node], before: Option<Node>, is_in_rounds: bool) -> f64 {
+    let turns_back = before.is_some() && plan.first().copied() == before;
+    let margin = if turns_back { TURN_BACK } else { 1.0 };
+    if is_in_rounds { IN_ROUNDS.max(margin) } else { margin }
+}
+
+/// Whether the present plan is kept although another one was made from the same place.
+pub(super) fn keeps(q: &PlanRequest<'_>, present: &[Node], other: &[Node], margin: f64) -> bool {
+    let rate = gain_a_metre(q, present);
+    rate > 0.0 && gain_a_metre(q, other) < margin * rate
+}
+
+/// Whether a path shows a block of which the cells are worth another look.
+pub(super) fn pays(q: &PlanRequest<'_>, path: &[Node], interest: Interest<'_>, cells_in_block: f64) -> bool {
+    let values = path.iter().flat_map(|&node| q.values.shown(node)).map(|block| f64::from(q.values.of(block)));
+    values.fold(0.0, f64::max) > PAYS * interest.largest_weight() * cells_in_block
+}
+
+/// What a path gains: the values of the blocks that it shows.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Gain {
+    pub whole: f64,
+    /// The part of it on seen floor.
+    pub on_seen: f64,
+}
+
+/// The values of all blocks that a path shows, each once.
+pub(super) fn gain(values: &BlockValues, path: &[Node]) -> Gain {
+    let mut blocks: Vec<usize> = path.iter().flat_map(|&node| values.shown(node)).collect();
+    blocks.sort_unstable();
+    blocks.dedup();
+    let sum = |value: fn(&BlockValues, usize) -> f32| blocks.iter().map(|&block| f64::from(value(values, block))).sum();
+    Gain { whole: sum(BlockValues::of), on_seen: sum(BlockValues::of_seen) }
+}
+
+/// The gain of a path for each of its metres.
+fn gain_a_metre(q: &PlanRequest<'_>, path: &[Node]) -> f64 {
+    let places = std::iter::once(&q.from).chain(path);
+    let metres: f64 = places.zip(path).map(|(&a, &b)| distance(q.lattice.place(a), q.lattice.place(b))).sum();
+    // A stop and a turn cost as much as one step of the lattice.
+    gain(q.values, path).whole / (metres + q.lattice.step_m())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -208,5 +311,33 @@ mod tests {
         assert!(planned.points.iter().any(|p| p.1 > 8.0), "{planned:?}");
         let path: Vec<Point> = std::iter::once(to).chain(planned.points).collect();
         assert!(path.windows(2).all(|w| steering.bounds().allows_leg(w[0], w[1])));
+    }
+
+    #[test]
+    fn the_part_that_gains_most_is_the_purpose() {
+        let utility = Utility { exploration: 10, weights: [(3, 80), (5, -20), (7, 40)].into(), ..Utility::default() };
+        let weigh = |by: [f64; 4]| {
+            move |Interest { utility, areas }: Interest<'_>| {
+                let labels = by[0] * utility.weight(3) + by[1] * utility.weight(7);
+                let whole = labels + by[2] * f64::from(utility.exploration) / 100.0 + by[3] * areas.len() as f64;
+                Gain { whole, on_seen: 0.0 }
+            }
+        };
+        let in_labels = Interest::in_labels(&utility);
+        assert_eq!(purpose(in_labels, weigh([1.0, 1.0, 1.0, 9.0])), Some(Intent::Label(3)));
+        assert_eq!(purpose(in_labels, weigh([1.0, 3.0, 1.0, 9.0])), Some(Intent::Label(7)));
+        assert_eq!(purpose(in_labels, weigh([1.0, 1.0, 20.0, 9.0])), Some(Intent::Unseen));
+        assert_eq!(purpose(in_labels, weigh([0.0; 4])), None);
+        let areas = [-50, 60].map(|weight| WeightedArea { outline: Polygon::default(), weight });
+        let in_places = Interest { areas: &areas, ..in_labels };
+        assert_eq!(purpose(in_places, weigh([1.0, 1.0, 1.0, 9.0])), Some(Intent::Area(2)));
+        let again = |intent, on_seen| after_looks(intent, || Gain { whole: 1.0, on_seen });
+        assert_eq!(again(Intent::Label(3), 0.4), Intent::Label(3));
+        assert_eq!(again(Intent::Label(3), 0.6), Intent::LabelAgain(3));
+        assert_eq!(again(Intent::Unseen, 1.0), Intent::Unseen);
+        let only = Utility { curiosity: 5, ..Utility::default() };
+        let unreachable = |_: Interest<'_>| unreachable!("one part needs no gain");
+        assert_eq!(purpose(Interest::in_labels(&only), unreachable), Some(Intent::Curiosity));
+        assert_eq!(purpose(Interest::in_labels(&Utility::default()), |_| Gain { whole: 1.0, on_seen: 0.0 }), None);
     }
 }

@@ -1,8 +1,8 @@
-//! The survey area within the fence, and the return path from each place of it.
+//! The survey area within the fence, the return path from each place of it, and the planner that is in use.
 
-use crate::planning::{Bounds, Lattice, Node, Paths, Point, distance};
+use crate::planning::{Bounds, Lattice, Node, Paths, Planner, Point, distance, planner};
 use scenecast_core::Area;
-use scenecast_protocol::directive::Fence;
+use scenecast_protocol::directive::{Fence, PlannerKind};
 
 /// The lattice over area and fence, in the world frame.
 #[derive(Debug)]
@@ -107,6 +107,49 @@ impl Grounds {
     /// The distance in metres at which a waypoint counts as reached.
     pub(super) fn arrival_m(&self) -> f64 {
         0.5f64.min(self.clearance_m.max(0.1) / 2.0)
+    }
+}
+
+#[derive(Debug)]
+pub(super) struct PlannerChoice {
+    configured: PlannerKind,
+    chosen: Option<PlannerKind>,
+    planner: Box<dyn Planner>,
+    running: PlannerKind,
+}
+
+impl PlannerChoice {
+    pub(super) fn new(configured: PlannerKind) -> Self {
+        let running = PlannerKind::Lawnmower;
+        Self { configured, chosen: None, planner: planner(running), running }
+    }
+
+    pub(super) fn choose(&mut self, chosen: Option<PlannerKind>) {
+        self.chosen = chosen;
+    }
+
+    /// Selects the lawnmower until there is a utility, then the ordered or the configured planner. Returns
+    /// whether the planner has changed.
+    pub(super) fn follow(&mut self, has_utility: bool) -> bool {
+        let wanted = if has_utility { self.chosen.unwrap_or(self.configured) } else { PlannerKind::Lawnmower };
+        let changes = wanted != self.running;
+        if changes {
+            (self.planner, self.running) = (planner(wanted), wanted);
+        }
+        changes
+    }
+
+    /// Whether the plan depends on the map.
+    pub(super) fn adapts(&self) -> bool {
+        self.running != PlannerKind::Lawnmower
+    }
+
+    pub(super) fn planner(&self) -> &dyn Planner {
+        &*self.planner
+    }
+
+    pub(super) fn planner_mut(&mut self) -> &mut dyn Planner {
+        &mut *self.planner
     }
 }
 

@@ -11,18 +11,14 @@ mod gallery;
 mod guidance;
 #[cfg(test)]
 mod in_force_tests;
-mod kept_keys;
 #[cfg(test)]
 mod orders_tests;
 mod publisher;
 mod report;
 mod slots;
 mod storing;
-mod weights;
-mod withheld;
 
-pub use durable::{Durable, LostOrders};
-pub use kept_keys::KeptKeys;
+pub use durable::{Durable, KeptKeys, LostOrders};
 pub use storing::VehicleDisk;
 
 use super::failsafe::FailsafePolicy;
@@ -44,10 +40,10 @@ use scenecast_protocol::map::ClassEntry;
 use scenecast_protocol::map_codec::Codec;
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::{EquipmentFaults, UtcHours};
+use slots::Weights;
 use std::collections::VecDeque;
 use std::time::Duration;
 use storing::{Storing, WaitingMap};
-use weights::Weights;
 
 /// Metres and seconds of use of the limits after which they are stored again.
 const RECORD_INTERVAL: (f64, f64) = (50.0, 60.0);

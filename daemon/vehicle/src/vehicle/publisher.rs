@@ -1,7 +1,7 @@
 //! The vehicle's map, and the choice of the cells and layers of it that are sent.
 
 use super::bands::Bands;
-use super::withheld::Withheld;
+use super::storing::Withheld;
 use crate::{LabelChanges, MapUpdate};
 use scenecast_config::Debounce;
 use scenecast_protocol::directive::{CellBand, Settings};

@@ -3,13 +3,11 @@
 //! Everything is a function of the seed and of the position. Nothing of a floor is stored except the tiles that the
 //! camera has drawn last; patterns of 51 MB, which all floors share, are painted at the first use.
 
-mod branches;
 mod camera;
 mod corals;
 mod fields;
 mod grass;
 mod ground;
-mod jittered;
 mod layout;
 mod optics;
 mod patterns;
@@ -19,18 +17,15 @@ mod shading;
 mod surface;
 mod texture;
 mod things;
-mod tiles;
-mod water;
-mod wreck;
 
 pub use camera::{ReefCamera, View};
 
 use ground::Ground;
 use image::{GrayImage, RgbImage};
 use layout::Layout;
+use optics::Water;
 use scene_model::random::{CounterRng, derive};
 use surface::Surface;
-use water::Water;
 
 const SAND: u8 = 0;
 const RUBBLE: u8 = 1;

@@ -1,13 +1,12 @@
 //! A part of the sea floor on a grid of nodes: height, colour and class of each.
 
 use super::Reef;
-use super::branches::branches;
+use super::corals::branches;
 use super::fields::{Colour, blend};
 use super::grass::blades;
 use super::ground::Slow;
-use super::jittered::Region;
 use super::layout::Habitat;
-use super::scatter::{large_things, small_things};
+use super::scatter::{Region, large_things, small_things};
 use super::things::{Form, Thing};
 
 /// Nodes between two places at which the habitats are computed; between these places they are interpolated.

@@ -4,18 +4,14 @@
 //! for unknown ones), `polled` (cycles of a modem that polls). `transmit` decides when a frame goes out.
 
 mod config;
-mod discovery;
-mod event;
 mod fleet;
 mod layers;
 mod peer;
-mod polled;
 mod transmit;
 
-pub use config::SurfaceConfig;
-pub use event::{IssueError, SurfaceEvent};
+pub use config::{IssueError, SurfaceConfig, SurfaceEvent};
 pub use peer::{EndedRun, InForce, OtherSurface, PeerView};
-pub use polled::Cycle;
+pub use transmit::Cycle;
 
 use crate::directive::{Series, Slot, SlotId, SlotProgress, VersionedSlot};
 use crate::link::run::Identities;
@@ -24,8 +20,7 @@ use crate::map::{Replica, StateReplica};
 use crate::schedule::{BitBudget, ClassShares, Shares};
 use crate::time::Instant;
 use crate::wire::{Address, Envelope, FrameKind, Introduction, Seal, UtcHours};
-use discovery::Discovery;
-use fleet::Fleet;
+use fleet::{Discovery, Fleet};
 use peer::{Ready, VehiclePeer, room_for_slot};
 use std::collections::VecDeque;
 
@@ -49,7 +44,7 @@ pub struct SurfaceLink<R: StateReplica = Replica> {
     turn: VecDeque<Ready>,
     in_modem: VecDeque<OnAir>,
     discovery: Discovery,
-    cycle: polled::Cycles,
+    cycle: transmit::Cycles,
     series: Series,
     clock: Option<UtcHours>,
     random: u64,
@@ -71,7 +66,7 @@ impl<R: StateReplica> SurfaceLink<R> {
             turn: VecDeque::new(),
             in_modem: VecDeque::new(),
             discovery: Discovery::new(config.discovery_period, is_any_known, config.master.max_propagation, calls, now),
-            cycle: polled::Cycles::default(),
+            cycle: transmit::Cycles::default(),
             series,
             clock: None,
             random,

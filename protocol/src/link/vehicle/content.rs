@@ -1,6 +1,6 @@
 //! The content of the vehicle's frames: chosen and encoded when a frame is written.
 
-use super::event::OversizedChunk;
+use super::config::OversizedChunk;
 use super::in_force::{InForceSender, SentPart};
 use super::layers::LayerOut;
 use super::status::StatusSender;

@@ -4,23 +4,18 @@
 //! of the frames of a turn), `timing` (the surface's clock), `discovery` (the answer to a call), `hellos` (how often
 //! hellos are answered). `turn` writes frames, `receive` handles them.
 
-mod background;
 mod config;
 mod content;
-mod discovery;
-mod event;
 mod hellos;
 mod in_force;
 mod layers;
-mod probe;
 mod receive;
 mod repeat;
 mod status;
 mod timing;
 mod turn;
 
-pub use config::VehicleConfig;
-pub use event::{OversizedChunk, VehicleEvent};
+pub use config::{OversizedChunk, VehicleConfig, VehicleEvent};
 
 use super::{LinkPair, LinkStats, SlotInbox, SlotInboxState, Wakeup};
 use crate::directive::{Budget, Slot, SlotId, SlotState};
@@ -33,10 +28,8 @@ use crate::schedule::{BackgroundOrder, BitBudget, Shares};
 use crate::time::Instant;
 use crate::wire::{Address, Introduction, UtcHours, VehicleStatus};
 use content::{Carried, VehicleContent};
-use discovery::CallReply;
-use hellos::HelloLimit;
-use probe::TailProbe;
-use repeat::Repeater;
+use hellos::{CallReply, HelloLimit};
+use repeat::{Repeater, TailProbe};
 use std::collections::VecDeque;
 use std::time::Duration;
 use timing::SurfaceTiming;

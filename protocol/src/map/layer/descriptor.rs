@@ -1,7 +1,7 @@
 //! The description of a layer: all that a reader needs to show its levels.
 
 use super::Decimal;
-use super::built_in::DEPTH;
+use super::set::DEPTH;
 use crate::map::{MAX_LABEL, TextPart, UNEXPLORED};
 use std::borrow::Cow;
 
@@ -262,7 +262,7 @@ impl Steps {
 
 #[cfg(test)]
 mod tests {
-    use super::super::built_in::{CONFIDENCE, CURIOSITY};
+    use super::super::set::{CONFIDENCE, CURIOSITY};
     use super::*;
     use proptest::prelude::*;
 

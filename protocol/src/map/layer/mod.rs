@@ -1,17 +1,13 @@
 //! Layers: one quantity a cell beside the label, in few levels. A descriptor gives them their meaning; each is replicated by
 //! itself, as the labels are.
 
-mod built_in;
 mod chunk;
-mod decimal;
 mod descriptor;
 mod set;
 
-pub use built_in::{BUILT_IN_LAYERS, BuiltInLayer};
-pub use chunk::LayerChunk;
-pub use decimal::Decimal;
+pub use chunk::{Decimal, LayerChunk};
 pub use descriptor::{LayerDescriptor, Palette, Quantity, Spread, Steps, UpperEnd};
-pub use set::{LayerId, LayerMask, LayerSet};
+pub use set::{BUILT_IN_LAYERS, BuiltInLayer, LayerId, LayerMask, LayerSet};
 
 use super::{Cell, LabelGrid, MapSource, Replica, StateReplica, StateSource, TextPart, TextSender};
 use crate::map_codec::Codec;

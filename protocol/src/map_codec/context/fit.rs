@@ -3,9 +3,8 @@
 use super::{LastRow, Reach, head, write};
 use crate::map_codec::MapChunk;
 use crate::map_codec::chunk::chunk;
-use crate::map_codec::grow::Growth;
-use crate::map_codec::lattice::Lattice;
-use crate::map_codec::window::Patch;
+use crate::map_codec::grow::{Growth, Lattice};
+use crate::map_codec::series::Patch;
 
 /// The chunk of at most `room` bytes with the most changes along `growth`; `None` if not even its seed fits.
 ///

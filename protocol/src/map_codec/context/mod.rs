@@ -2,35 +2,26 @@
 //! shipped prior for each chunk.
 
 mod arith;
-mod calm;
 mod canvas;
-mod estimate;
+mod decisions;
 mod fit;
-mod flip;
-mod label;
-mod logistic;
 mod model;
-mod prior;
-mod recent;
 mod stage;
-mod trace;
 pub mod training;
-mod unseen;
-mod view;
 
 use super::DecodeError;
 use super::header::ChunkHeader;
-use super::window::Patch;
+use super::series::Patch;
 use crate::bytes::{BitReader, BitWriter};
 use crate::grid::Rect;
-use crate::map_codec::lattice::Lattice;
+use crate::map_codec::grow::Lattice;
 use arith::{BitCoder, Decoder, Encoder};
 use canvas::Canvas;
 pub(super) use fit::{best_chunk, prefix_chunk, quick_chunk};
 use model::Model;
-use prior::Prior;
-pub use trace::Decision;
-pub(super) use trace::trace;
+pub use training::Decision;
+use training::Prior;
+pub(super) use training::trace;
 
 /// The length of the last row.
 ///

@@ -1,14 +1,10 @@
 //! A patch as a string of decisions: which cells keep their label, and which labels the others get.
 
 use super::arith::BitCoder;
-use super::canvas::Canvas;
-use super::label::{self, Votes};
-use super::prior::Prior;
-use super::recent::Recent;
+use super::canvas::{Canvas, View};
+use super::decisions::{self, CellRun, Recent, Votes};
 use super::stage::{Contexts, Stage};
-use super::unseen::{self, CellRun};
-use super::view::View;
-use super::{calm, flip};
+use super::training::Prior;
 use crate::grid::{MAX_LABEL, UNEXPLORED};
 
 /// The adaptive state of a chunk, initialised from the prior for each.
@@ -29,10 +25,10 @@ const CLEARED: u32 = 1 << 12;
 impl Model {
     pub(super) fn new(prior: &'static Prior) -> Self {
         Self {
-            calm: Stage::new(&calm::LAYOUT, &prior.calm),
-            flip: Stage::new(&flip::LAYOUT, &prior.flip),
-            unseen: Stage::new(&unseen::LAYOUT, &prior.unseen),
-            label: Stage::new(&label::LAYOUT, &prior.label),
+            calm: Stage::new(&decisions::CALM_LAYOUT, &prior.calm),
+            flip: Stage::new(&decisions::FLIP_LAYOUT, &prior.flip),
+            unseen: Stage::new(&decisions::UNSEEN_LAYOUT, &prior.unseen),
+            label: Stage::new(&decisions::LABEL_LAYOUT, &prior.label),
             inside: Recent::default(),
             border: Recent::default(),
             run: CellRun::default(),
@@ -51,7 +47,7 @@ impl Model {
         let at = canvas.at(column, row);
         let view = View::of(canvas, at);
         let kept = if view.held == UNEXPLORED {
-            let contexts = unseen::contexts(canvas, at, (column, row), &view, &self.run);
+            let contexts = decisions::unseen_contexts(canvas, at, (column, row), &view, &self.run);
             let kept = decide(&mut self.unseen, coder, &contexts, wanted == view.held);
             self.run.note(column, !kept);
             kept
@@ -68,14 +64,14 @@ impl Model {
     }
 
     fn code_kept(&mut self, coder: &mut impl BitCoder, canvas: &Canvas, at: usize, view: &View, kept: bool) -> bool {
-        let wide = flip::wider_ring(canvas, at, view.held);
+        let wide = decisions::wider_ring(canvas, at, view.held);
         if wide == 0 && view.ring(view.held) == 255 && view.changed == 0 {
-            let contexts = calm::contexts(view, canvas.noise, &self.inside, &self.border);
+            let contexts = decisions::calm_contexts(view, canvas.noise, &self.inside, &self.border);
             let kept = decide(&mut self.calm, coder, &contexts, kept);
             self.inside.note(kept);
             kept
         } else {
-            let contexts = flip::contexts(canvas, view, wide, &self.inside, &self.border);
+            let contexts = decisions::flip_contexts(canvas, view, wide, &self.inside, &self.border);
             let kept = decide(&mut self.flip, coder, &contexts, kept);
             self.border.note(kept);
             kept
@@ -86,14 +82,15 @@ impl Model {
         let votes = Votes::around(view);
         let in_use = canvas.kinds_beside(view.held);
         for (rank, &(candidate, _)) in votes.ranked().iter().enumerate() {
-            let contexts = label::contexts(view, &votes, candidate, rank, in_use.saturating_sub(rank));
+            let contexts = decisions::label_contexts(view, &votes, candidate, rank, in_use.saturating_sub(rank));
             if decide(&mut self.label, coder, &contexts, wanted == candidate) {
                 return Some(candidate);
             }
         }
         let voted = votes.ranked().len();
-        for (i, candidate) in label::others(canvas, view, &votes).into_iter().enumerate() {
-            let contexts = label::contexts(view, &votes, candidate, voted + i, in_use.saturating_sub(voted + i));
+        for (i, candidate) in decisions::other_labels(canvas, view, &votes).into_iter().enumerate() {
+            let contexts =
+                decisions::label_contexts(view, &votes, candidate, voted + i, in_use.saturating_sub(voted + i));
             if decide(&mut self.label, coder, &contexts, wanted == candidate) {
                 return Some(candidate);
             }

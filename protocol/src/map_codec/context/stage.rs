@@ -1,9 +1,9 @@
-//! One kind of decision: its contexts, their mixing and a final adaptive probability map (APM, also SSE; Shkarin 2002).
+//! One kind of decision: its contexts, their mixing and a final adaptive probability map (APM, also SSE; Shkarin 2002), in
+//! integers, so that every CPU computes the same.
 
-use super::estimate::BitEstimate;
-use super::logistic::{MAX_LOGIT, logit, probability};
-use super::prior::StagePrior;
+use super::training::StagePrior;
 use std::collections::BTreeMap;
+use std::sync::LazyLock;
 
 pub(super) const MAX_DIRECT: usize = 10;
 pub(super) const MAX_KEYED: usize = 5;
@@ -266,4 +266,119 @@ impl VisitCounts {
 /// A logit as a prior stores it.
 pub(super) fn stored_logit(p: u32) -> i16 {
     logit(p) as i16
+}
+
+/// Logits are in 1/256 of a binary order of magnitude, and lie between minus and plus this.
+pub(super) const MAX_LOGIT: i32 = 4095;
+
+/// log2 of 1 + i/256, in 1/256.
+const MANTISSA: [u8; 256] = {
+    let mut table = [0u8; 256];
+    let mut i = 0;
+    while i < 256 {
+        // Eight squarings yield eight bits of the logarithm.
+        let mut x = (256 + i as u64) << 22;
+        let mut bits = 0u16;
+        let mut step = 0;
+        while step < 9 {
+            x = (x * x) >> 30;
+            bits <<= 1;
+            if x >= 1 << 31 {
+                bits |= 1;
+                x >>= 1;
+            }
+            step += 1;
+        }
+        let rounded = (bits + 1) >> 1;
+        table[i] = if rounded > 255 { 255 } else { rounded as u8 };
+        i += 1;
+    }
+    table
+};
+
+/// log2 of `x` in 1/256; `x` must be at least 1.
+pub(super) fn log2(x: u32) -> i32 {
+    let top = 31 - x.leading_zeros() as i32;
+    let fraction = ((u64::from(x) << 8 >> top) & 255) as usize;
+    top * 256 + i32::from(MANTISSA[fraction])
+}
+
+/// The logit of a probability in 1/2^32.
+pub(super) fn logit(p: u32) -> i32 {
+    (log2(p.max(1)) - log2((u32::MAX - p).max(1))).clamp(-MAX_LOGIT, MAX_LOGIT)
+}
+
+static PROBABILITY: LazyLock<Vec<u16>> = LazyLock::new(|| {
+    let of = |p: u32| logit(p << 16 | 0x8000);
+    let mut p = 1;
+    let table = (-MAX_LOGIT..=MAX_LOGIT).map(|logit| {
+        while p < 65_535 && of(p) < logit {
+            p += 1;
+        }
+        p as u16
+    });
+    table.collect()
+});
+
+/// The probability in 1/65536, from 1 to 65535, of a logit.
+pub(super) fn probability(logit: i32) -> u32 {
+    let at = (logit.clamp(-MAX_LOGIT, MAX_LOGIT) + MAX_LOGIT) as usize;
+    PROBABILITY.get(at).map_or(32_768, |&p| u32::from(p))
+}
+
+/// 65536 / (visits + 1.6).
+const RATE: [u32; 1024] = {
+    let mut table = [0; 1024];
+    let mut n = 0;
+    while n < 1024 {
+        table[n] = 655_360 / (10 * n as u32 + 16);
+        n += 1;
+    }
+    table
+};
+
+/// The estimated probability of `true` in one context.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct BitEstimate {
+    /// The probability of `true` in units of 1/2^32.
+    pub p: u32,
+    /// Decisions that the estimate is worth, at most [`Self::MAX_VISITS`].
+    pub visits: u16,
+}
+
+impl BitEstimate {
+    /// Decisions after which the estimate adapts no more slowly.
+    pub const MAX_VISITS: u16 = 1020;
+
+    /// One half, worth no decision.
+    pub const BLANK: Self = Self { p: 1 << 31, visits: 0 };
+
+    pub(super) fn logit(self) -> i32 {
+        logit(self.p)
+    }
+
+    pub(super) fn update(&mut self, bit: bool) {
+        let goal = if bit { i64::from(u32::MAX) } else { 0 };
+        let step = ((goal - i64::from(self.p)) * i64::from(RATE[usize::from(self.visits)])) >> 16;
+        self.p = (i64::from(self.p) + step) as u32;
+        if self.visits < Self::MAX_VISITS {
+            self.visits += 1;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn logit_and_probability_are_inverse() {
+        for p in [1u32, 2, 9, 100, 3000, 32_768, 60_000, 65_500, 65_534] {
+            let back = probability(logit(p << 16 | 0x8000));
+            assert!(back.abs_diff(p) <= 1 + p.min(65_536 - p) / 100, "{p} came back as {back}");
+        }
+        assert_eq!(log2(1), 0);
+        assert_eq!(log2(1 << 20), 20 * 256);
+        assert!((log2(3) - 406).abs() <= 1);
+    }
 }

@@ -8,8 +8,9 @@ use std::arch::x86_64::*;
 use super::active_cell::ActiveCell;
 use super::gibbs::choose_block;
 use crate::random::unit_f32;
-use crate::topics::label_changes::{LabelChange, LabelChanges};
-use crate::topics::labels::{Counts, LANES, Labels, Lanes, UNLABELLED, label_of, pack, word_of};
+use crate::topics::labels::{
+    Counts, LANES, LabelChange, LabelChanges, Labels, Lanes, UNLABELLED, label_of, pack, word_of,
+};
 
 /// Has the contract of the portable `advance`.
 #[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512vl,popcnt,bmi1,bmi2")]

@@ -7,8 +7,7 @@
 
 use super::active_cell::ActiveCell;
 use crate::random::unit_f32;
-use crate::topics::label_changes::{LabelChange, LabelChanges};
-use crate::topics::labels::{LANES, Labels, Lanes, label_of, pack, word_of};
+use crate::topics::labels::{LANES, LabelChange, LabelChanges, Labels, Lanes, label_of, pack, word_of};
 
 /// Draws a new label for the next `steps` words of each active cell, given frozen global counts.
 ///

@@ -12,8 +12,7 @@ mod avx512;
 mod gibbs;
 mod votes;
 
-use super::label_changes::LabelChanges;
-use super::labels::Labels;
+use super::labels::{LabelChanges, Labels};
 pub(crate) use active_cell::{ActiveCell, Job};
 pub(crate) use votes::LabelVotes;
 

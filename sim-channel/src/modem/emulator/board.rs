@@ -1,8 +1,8 @@
-//! The state that every emulated modem has, and the one implementation of [`Emulator`] on top of it.
+//! The state that every emulated modem has, and the one implementation of [`Emulator`] on top of it; its tasks in order of time,
+//! and faults on demand.
 
 use super::serial_line::SerialLine;
-use super::task_queue::TaskQueue;
-use super::{Emulator, Fault, HostId, ModemEvent, Transmission};
+use super::{Emulator, HostId, ModemEvent, Transmission};
 use crate::channel::{Arrival, Onset};
 use crate::random::RandomStream;
 use std::collections::{BTreeMap, VecDeque};
@@ -172,5 +172,73 @@ impl<M: ModemLogic> Emulator for M {
         if !self.board_mut().inject(fault, now) {
             self.break_down(fault, now);
         }
+    }
+}
+
+/// CRC-16/CCITT-FALSE: polynomial 0x1021, start 0xFFFF.
+pub(crate) fn crc16(bytes: &[u8]) -> u16 {
+    bytes.iter().fold(0xFFFF, |crc, byte| {
+        (0..8)
+            .fold(crc ^ (u16::from(*byte) << 8), |crc, _| if crc & 0x8000 == 0 { crc << 1 } else { crc << 1 ^ 0x1021 })
+    })
+}
+
+/// A fault to inject; durations count from the moment of injection.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[non_exhaustive]
+pub enum Fault {
+    /// Refuses every message for this long, with `BUSY` (S2C) or an error (Micromodem).
+    Busy(Duration),
+    /// Restarts; settings that were not stored and queued messages are lost.
+    Reboot,
+    /// Sends this many bytes of noise to each host.
+    Garbage(u16),
+    /// Drops the rear half of the bytes that are on their way to each host.
+    HalfLine,
+    /// Neither reads nor writes for this long; the bytes that wait come afterwards.
+    Freeze(Duration),
+    /// Uses this address instead of the configured one.
+    WrongAddress(u8),
+    /// The supply fails: a transmission is cut short, then the modem restarts.
+    BrownOut,
+    /// Accepts up to a megabyte of data before it reports a full buffer.
+    BigBuffer,
+}
+
+#[derive(Debug)]
+pub(super) struct TaskQueue<Task> {
+    entries: BTreeMap<(Duration, u64), Task>,
+    added: u64,
+}
+
+impl<Task> TaskQueue<Task> {
+    pub(super) fn new() -> Self {
+        Self { entries: BTreeMap::new(), added: 0 }
+    }
+
+    pub(super) fn add(&mut self, at: Duration, task: Task) {
+        self.added += 1;
+        self.entries.insert((at, self.added), task);
+    }
+
+    pub(super) fn next(&self) -> Option<Duration> {
+        self.entries.keys().next().map(|(at, _)| *at)
+    }
+
+    /// The first task due by `now`, with its time.
+    pub(super) fn pop(&mut self, now: Duration) -> Option<(Duration, Task)> {
+        let entry = self.entries.first_entry().filter(|entry| entry.key().0 <= now)?;
+        let ((at, _), task) = entry.remove_entry();
+        Some((at, task))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn crc_matches_its_check_value() {
+        assert_eq!(crc16(b"123456789"), 0x29B1);
     }
 }

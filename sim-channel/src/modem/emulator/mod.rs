@@ -1,12 +1,9 @@
 //! The interface of every emulated modem, and the parts that all makes of modem share.
 
 pub(crate) mod board;
-pub(crate) mod crc;
-mod fault;
 mod serial_line;
-mod task_queue;
 
-pub use fault::Fault;
+pub use board::Fault;
 
 use crate::channel::{Arrival, Onset};
 use std::time::Duration;

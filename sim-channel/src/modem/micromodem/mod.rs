@@ -4,36 +4,24 @@
 //! statistics of version 6, configuration, clock and reboot, in the sequences that fielded drivers expect.
 
 mod base;
-mod clock;
 mod cycle;
-mod data;
-mod detector;
-mod flexible;
 mod housekeeping;
 mod minipacket;
-mod nvram;
 mod packet;
-mod rates;
 mod sentence;
-mod signal;
-mod statistics;
-mod transmitter;
+mod transducer;
 
 use crate::channel::{Arrival, Onset};
 use crate::modem::emulator::board::{ModemBoard, ModemLogic};
 use crate::modem::emulator::{Fault, HostId, Transmission};
 use base::{MicromodemBase, MicromodemTask};
 use cycle::CycleService;
-use detector::Detector;
-use housekeeping::Sleep;
-use nvram::Nvram;
-use packet::{Packet, PacketKind};
-use rates::PacketRate;
+use housekeeping::{Nvram, Sleep};
+use packet::{Packet, PacketKind, PacketRate};
 use sentence::{HostLine, LineCollector, NmeaSentence};
-use signal::PacketSignal;
 use std::collections::BTreeMap;
 use std::time::Duration;
-use transmitter::{QueuedPacket, SentPacket};
+use transducer::{Detector, PacketSignal, QueuedPacket, SentPacket};
 
 /// The generation of a Micromodem.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -154,7 +142,7 @@ impl Micromodem {
             "CCCYC" => cycles.on_command(base, sentence, now),
             "CCTXD" => cycles.on_data(base, sentence, false, now),
             "CCTXA" => cycles.on_data(base, sentence, true, now),
-            "CCTDP" => flexible::on_command(base, sentence, now),
+            "CCTDP" => minipacket::on_command(base, sentence, now),
             "CCMPC" => minipacket::on_ping_command(base, sentence, now),
             "CCMUC" => minipacket::on_user_command(base, sentence, now),
             "CCMSC" => {
@@ -171,9 +159,9 @@ impl Micromodem {
         let Self { base, cycles, .. } = self;
         match packet.kind {
             PacketKind::CycleInit => cycles.on_init(base, packet, signal, now),
-            PacketKind::Data => data::on_data_packet(base, packet, signal, now),
-            PacketKind::Ack => data::on_ack(base, packet, signal, now),
-            PacketKind::Flexible => flexible::on_packet(base, packet, signal, now),
+            PacketKind::Data => cycle::on_data_packet(base, packet, signal, now),
+            PacketKind::Ack => cycle::on_ack(base, packet, signal, now),
+            PacketKind::Flexible => minipacket::on_packet(base, packet, signal, now),
             PacketKind::Ping => minipacket::on_ping(base, packet, signal, now),
             PacketKind::PingReply => minipacket::on_ping_reply(base, packet, signal, now),
             PacketKind::User => minipacket::on_user(base, packet, signal, now),
@@ -181,7 +169,7 @@ impl Micromodem {
     }
 
     fn on_sent(&mut self, sent: &SentPacket, now: Duration) {
-        statistics::report_transmission(&mut self.base, sent, now);
+        transducer::report_transmission(&mut self.base, sent, now);
         if sent.out.then_request_data {
             self.cycles.request_data(&mut self.base, now);
         }

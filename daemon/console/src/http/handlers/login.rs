@@ -1,19 +1,23 @@
-//! The login form, which exchanges a token for a cookie, and the end of the session.
+//! The login form, which exchanges a token for a cookie; the client's principal, and changes of command.
 
 use crate::http::access::COOKIE;
-use crate::http::assets;
-use crate::http::response::error;
+use crate::http::response::{JsonOrder, error, not_found};
+use crate::http::server;
 use crate::http::shared::Shared;
-use axum::Form;
+use crate::orders::{CommandOrder, CommandOrderAction};
+use crate::request::SurfaceRequest;
+use crate::snapshot::principal_info;
 use axum::extract::State;
 use axum::extract::rejection::FormRejection;
 use axum::http::{HeaderMap, StatusCode, header};
 use axum::response::{Html, IntoResponse, Redirect, Response};
+use axum::{Extension, Form, Json};
+use scenecast_surface::{CommandAction, Giver};
 use serde::Deserialize;
 use zeroize::Zeroizing;
 
 fn form(message: &str) -> Html<String> {
-    let (_, page) = assets::find("login.html").unwrap_or_default();
+    let (_, page) = server::find("login.html").unwrap_or_default();
     Html(String::from_utf8_lossy(page).replace("<!-- message -->", message))
 }
 
@@ -53,4 +57,25 @@ pub(in crate::http) async fn logout(State(shared): State<Shared>, headers: Heade
     shared.access.end_session(&headers);
     let cookie = format!("{COOKIE}=; HttpOnly; SameSite=Strict; Path=/; Max-Age=0");
     ([(header::SET_COOKIE, cookie)], Redirect::to("/login")).into_response()
+}
+
+/// Name and role of the client's principal.
+pub(in crate::http) async fn principal(by: Option<Extension<Giver>>) -> Response {
+    by.map_or_else(not_found, |Extension(by)| Json(principal_info(&by.principal)).into_response())
+}
+
+pub(in crate::http) async fn command(
+    State(shared): State<Shared>,
+    Extension(by): Extension<Giver>,
+    JsonOrder(order): JsonOrder<CommandOrder>,
+) -> Response {
+    let action = match order.action {
+        CommandOrderAction::Request => CommandAction::Request,
+        CommandOrderAction::Withdraw => CommandAction::Withdraw,
+        CommandOrderAction::Take => CommandAction::Take,
+        CommandOrderAction::HandOver => CommandAction::HandOver(order.to),
+        CommandOrderAction::Release => CommandAction::Release,
+        CommandOrderAction::Keep => CommandAction::Keep,
+    };
+    shared.order(by, SurfaceRequest::Command(action)).await
 }

@@ -1,10 +1,9 @@
 //! Maps. Each version is requested from the surface once, however many clients read it, and everything is made of it beside the
 //! link.
 
-use super::log::MissionUtc;
+use super::readings::MissionUtc;
 use crate::export::{MapCaption, MapCells, MapFormat};
-use crate::http::compress::{accepts_gzip, gzip, tagged};
-use crate::http::response::{error, respond};
+use crate::http::response::{accepts_gzip, error, gzip, respond, tagged};
 use crate::http::shared::{CachedMap, MapCell, Shared, VehicleId};
 use crate::request::{Reply, SurfaceRequest};
 use crate::snapshot::seconds;

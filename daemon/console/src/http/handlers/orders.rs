@@ -1,7 +1,6 @@
 //! Orders: each is handed to the surface.
 
-use crate::http::body::JsonOrder;
-use crate::http::response::error;
+use crate::http::response::{JsonOrder, error};
 use crate::http::shared::{Shared, VehicleId};
 use crate::orders::{AgainOrder, BudgetOrder, DraftOrder, MarkerOrder, NoteOrder, UtilityOrder};
 use crate::request::SurfaceRequest;

@@ -1,13 +1,24 @@
-//! The state, exemplars, settings that fit a budget, and the OpenAPI document.
+//! Readings: the state and its changes as server-sent events, exemplars, fitting settings, the log of the mission.
 
-use crate::http::response::{error, not_found};
+use crate::http::access::{MAX_STREAMS, Seat};
+use crate::http::connections::EVENT_STREAM;
+use crate::http::response::{error, not_found, respond};
 use crate::http::shared::{Shared, VehicleId};
-use crate::request::SurfaceRequest;
+use crate::request::{Reply, SurfaceRequest};
+use crate::snapshot::{Snapshot, seconds};
+use crate::state::{LogLine, LogList, MapEvent, MissionState};
+use axum::body::{Body, Bytes};
 use axum::extract::{Query, State};
-use axum::http::{StatusCode, Uri, header};
+use axum::http::{HeaderName, HeaderValue, StatusCode, Uri, header};
 use axum::response::{IntoResponse, Response};
-use std::collections::BTreeMap;
-use std::time::Duration;
+use axum::{Extension, Json};
+use scenecast_surface::{Giver, LogEntry, LogKind};
+use serde::Deserialize;
+use std::collections::{BTreeMap, VecDeque};
+use std::convert::Infallible;
+use std::sync::Arc;
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+use tokio::sync::watch;
 
 const JSON: &str = "application/json";
 const MAX_FIT_BPS: f64 = 1e7;
@@ -61,4 +72,200 @@ pub(in crate::http) async fn truth(State(shared): State<Shared>) -> Response {
 
 pub(in crate::http) async fn document(State(shared): State<Shared>) -> Response {
     ([(header::CONTENT_TYPE, JSON)], shared.document).into_response()
+}
+
+/// The stream of one reader.
+struct Feed {
+    snapshots: watch::Receiver<Arc<Snapshot>>,
+    /// The version of each vehicle's map in the last event.
+    versions: BTreeMap<u8, u64>,
+    queue: VecDeque<Bytes>,
+    is_first: bool,
+    seat: Seat,
+}
+
+/// The latest state after each change, and the maps that have changed. A slow reader misses states, but never the last one.
+pub(in crate::http) async fn events(State(shared): State<Shared>, Extension(by): Extension<Giver>) -> Response {
+    let Some(seat) = shared.seats.take(by.name(), Instant::now()) else {
+        let line = format!("{MAX_STREAMS} streams of events are open, which is the maximum");
+        return error(StatusCode::SERVICE_UNAVAILABLE, &line);
+    };
+    let (versions, queue) = (BTreeMap::new(), VecDeque::new());
+    let feed = Feed { snapshots: shared.snapshots, versions, queue, is_first: true, seat };
+    let stream = futures_util::stream::unfold(feed, |mut feed| async move {
+        while feed.queue.is_empty() {
+            feed.next().await?;
+        }
+        feed.queue.pop_front().map(|bytes| (Ok::<_, Infallible>(bytes), feed))
+    });
+    // A proxy must not collect events.
+    let unbuffered = (HeaderName::from_static("x-accel-buffering"), HeaderValue::from_static("no"));
+    let head = [(header::CONTENT_TYPE, HeaderValue::from_static(EVENT_STREAM)), unbuffered];
+    (head, Body::from_stream(stream)).into_response()
+}
+
+impl Feed {
+    /// Waits for a new state; `None` at the end of the program, and when another stream gets the seat.
+    async fn next(&mut self) -> Option<()> {
+        if !std::mem::take(&mut self.is_first) {
+            tokio::select! {
+                change = self.snapshots.changed() => change.ok()?,
+                _ = &mut self.seat.end => return None,
+            }
+        }
+        let snapshot = self.snapshots.borrow_and_update().clone();
+        if snapshot.json.is_empty() {
+            return Some(());
+        }
+        // All readers share the text.
+        let (begin, end) = (Bytes::from_static(b"event: state\ndata: "), Bytes::from_static(b"\n\n"));
+        self.queue.extend([begin, snapshot.json.clone(), end]);
+        for v in &snapshot.state.vehicles {
+            if self.versions.insert(v.id, v.map.version) != Some(v.map.version) {
+                let event = MapEvent { vehicle: v.id, version: v.map.version };
+                let data = serde_json::to_string(&event).unwrap_or_default();
+                self.queue.push_back(format!("event: map\ndata: {data}\n\n").into());
+            }
+        }
+        Some(())
+    }
+}
+
+/// The entries that a client wants; without a member, all.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(in crate::http) struct LogFilter {
+    vehicle: Option<u8>,
+    kind: Option<String>,
+    /// Only entries with a higher number.
+    since: Option<u64>,
+}
+
+/// The last entries as JSON.
+pub(in crate::http) async fn log(State(shared): State<Shared>, filter: LogQuery) -> Response {
+    lines(&shared, filter).await.map_or_else(|refused| refused, |entries| Json(LogList { entries }).into_response())
+}
+
+/// The same as a table for a spreadsheet.
+pub(in crate::http) async fn table(State(shared): State<Shared>, filter: LogQuery) -> Response {
+    let entries = match lines(&shared, filter).await {
+        Ok(entries) => entries,
+        Err(refused) => return refused,
+    };
+    match to_csv(&entries) {
+        Ok(bytes) => ([(header::CONTENT_TYPE, "text/csv; charset=utf-8")], bytes).into_response(),
+        Err(fault) => error(StatusCode::INTERNAL_SERVER_ERROR, &fault.to_string()),
+    }
+}
+
+type LogQuery = Result<Query<LogFilter>, axum::extract::rejection::QueryRejection>;
+
+async fn lines(shared: &Shared, filter: LogQuery) -> Result<Vec<LogLine>, Response> {
+    let names = || LogKind::ALL.map(LogKind::name).join(", ");
+    let refused = |line: &str| error(StatusCode::UNPROCESSABLE_ENTITY, line);
+    let Query(filter) = filter.map_err(|_| refused("the query takes vehicle, kind and since"))?;
+    if let Some(kind) = filter.kind.as_ref().filter(|kind| LogKind::ALL.iter().all(|k| k.name() != kind.as_str())) {
+        return Err(refused(&format!("kind {kind:?}: it takes one of {}", names())));
+    }
+    let entries = match shared.request(SurfaceRequest::Log).await? {
+        Reply::Log(entries) => entries,
+        other => return Err(respond(other)),
+    };
+    let utc = MissionUtc::now(&shared.snapshots.borrow().state);
+    let is_wanted = |entry: &&LogEntry| {
+        filter.vehicle.is_none_or(|vehicle| entry.vehicle.is_some_and(|v| v.number() == vehicle))
+            && filter.kind.as_ref().is_none_or(|kind| entry.kind.name() == kind)
+            && filter.since.is_none_or(|since| entry.number > since)
+    };
+    let line = |entry: &LogEntry| {
+        let at_s = seconds(entry.at);
+        LogLine {
+            number: entry.number,
+            at_s,
+            utc: utc.at(at_s),
+            vehicle: entry.vehicle.map(|v| v.number()),
+            kind: entry.kind.name().to_owned(),
+            by: entry.by.clone(),
+            text: entry.text.clone(),
+        }
+    };
+    Ok(entries.iter().filter(is_wanted).map(line).collect())
+}
+
+fn to_csv(entries: &[LogLine]) -> Result<Vec<u8>, csv::Error> {
+    let mut table = csv::Writer::from_writer(Vec::new());
+    table.write_record(["number", "utc", "mission_s", "vehicle", "kind", "by", "text"])?;
+    for e in entries {
+        let vehicle = e.vehicle.map_or(String::new(), |v| v.to_string());
+        let (number, at_s, by) = (e.number.to_string(), format!("{:.1}", e.at_s), e.by.as_deref().unwrap_or_default());
+        table.write_record([&number, &e.utc, &at_s, &vehicle, &e.kind, by, &harmless(&e.text)])?;
+    }
+    table.into_inner().map_err(|e| e.into_error().into())
+}
+
+/// A text that no spreadsheet takes for a formula.
+fn harmless(text: &str) -> String {
+    if text.starts_with(['=', '+', '-', '@']) { format!("'{text}") } else { text.to_owned() }
+}
+
+/// Moments of the mission in UTC, by the clock of this computer.
+pub(in crate::http) struct MissionUtc {
+    unix_s: f64,
+    /// Mission time, seconds, and seconds of it for each second of the clock.
+    now_s: f64,
+    speed: f64,
+}
+
+impl MissionUtc {
+    pub(in crate::http) fn now(state: &MissionState) -> Self {
+        let unix_s = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_secs_f64();
+        Self { unix_s, now_s: state.now_s, speed: state.mission.speed.max(1e-3) }
+    }
+
+    /// A mission time in seconds, as in RFC 3339.
+    pub(in crate::http) fn at(&self, at_s: f64) -> String {
+        utc(self.unix_s - (self.now_s - at_s) / self.speed)
+    }
+}
+
+/// Seconds since 1970 as in RFC 3339, in whole seconds. The date: H. Hinnant, "chrono-compatible low-level date
+/// algorithms", `civil_from_days`.
+fn utc(unix_s: f64) -> String {
+    let seconds = unix_s.max(0.0) as i64;
+    let (days, s) = (seconds.div_euclid(86_400) + 719_468, seconds.rem_euclid(86_400));
+    let (era, day_of_era) = (days.div_euclid(146_097), days.rem_euclid(146_097));
+    let year = (day_of_era - day_of_era / 1460 + day_of_era / 36_524 - day_of_era / 146_096) / 365;
+    let day_of_year = day_of_era - (365 * year + year / 4 - year / 100);
+    let shifted = (5 * day_of_year + 2) / 153;
+    let (day, month) =
+        (day_of_year - (153 * shifted + 2) / 5 + 1, if shifted < 10 { shifted + 3 } else { shifted - 9 });
+    let year = year + era * 400 + i64::from(month <= 2);
+    format!("{year:04}-{month:02}-{day:02}T{:02}:{:02}:{:02}Z", s / 3600, s / 60 % 60, s % 60)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn times_are_in_utc() {
+        for (unix_s, text) in [
+            (0.0, "1970-01-01T00:00:00Z"),
+            (951_782_399.9, "2000-02-28T23:59:59Z"),
+            (951_782_400.0, "2000-02-29T00:00:00Z"),
+            (1_795_462_527.0, "2026-11-23T19:35:27Z"),
+        ] {
+            assert_eq!(utc(unix_s), text);
+        }
+    }
+
+    #[test]
+    fn a_table_quotes_texts_and_starts_no_formula() {
+        let text = "=1, \"wreck\"".to_owned();
+        let line =
+            LogLine { number: 7, at_s: 1.25, utc: utc(0.0), vehicle: Some(2), kind: "record".into(), by: None, text };
+        let table = String::from_utf8(to_csv(&[line]).unwrap()).unwrap();
+        let row = "7,1970-01-01T00:00:00Z,1.2,2,record,,\"'=1, \"\"wreck\"\"\"";
+        assert_eq!(table, format!("number,utc,mission_s,vehicle,kind,by,text\n{row}\n"));
+    }
 }

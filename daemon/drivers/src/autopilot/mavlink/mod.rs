@@ -1,26 +1,18 @@
 //! ArduSub and ArduRover over MAVLink 2.
 
-mod altimeter;
-mod command;
-mod echo;
 pub mod frame;
 pub mod message;
 mod sources;
 mod targets;
-mod texts;
 
 use super::{Autopilot, Counters, Goal, Health, Step, Tray};
-use altimeter::{Altimeter, HeightSource};
-use command::CommandWatch;
-use echo::{Echo, Verdict};
 use frame::{Deframer, Frame, encode};
 use message::{Heard, Said, heard_extra};
 use scenecast_core::LatLon;
 use scenecast_protocol::time::Instant;
-use sources::{Claim, Sources};
+use sources::{Altimeter, Claim, HeightSource, Sources, Texts};
 use std::time::Duration;
-use targets::Sent;
-use texts::Texts;
+use targets::{CommandWatch, Echo, Sent, Verdict};
 
 /// How this end presents itself and what it may do.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -1,10 +1,13 @@
-//! Which of the components on a MAVLink network is the autopilot.
+//! What a MAVLink network has for this end: the component that is the autopilot, the best height above the sea floor, texts for
+//! people.
 //!
 //! A vehicle has many: companion computers, cameras and gimbals share the autopilot's system number, and a ground station and other
 //! vehicles share its network. Only the autopilot's heartbeat says ArduPilot. Source: <https://mavlink.io/en/services/heartbeat.html>.
 
 use super::MavlinkConfig;
+use scenecast_protocol::time::Instant;
 use std::collections::BTreeSet;
+use std::time::Duration;
 
 /// Counter of frames of other systems.
 pub(super) const OTHER_SYSTEMS: &str = "other_systems";
@@ -85,6 +88,64 @@ impl Sources {
     }
 }
 
+/// A height counts for this long.
+const LASTS: Duration = Duration::from_secs(2);
+
+/// The message that a height is from, the best first.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum HeightSource {
+    DistanceSensor,
+    Rangefinder,
+    Altitude,
+}
+
+/// The last height of the best source that is not old.
+#[derive(Debug, Default)]
+pub(super) struct Altimeter {
+    last: Option<(HeightSource, f64, Instant)>,
+}
+
+impl Altimeter {
+    /// Takes a height; that of a better source stays until it is old.
+    pub(super) fn handle(&mut self, source: HeightSource, height_m: Option<f64>, now: Instant) {
+        let is_better = self.last.is_none_or(|(last, _, at)| source <= last || now.since(at) >= LASTS);
+        if is_better {
+            self.last = height_m.filter(|m| m.is_finite() && *m > 0.0).map(|m| (source, m, now));
+        }
+    }
+
+    /// Metres above the sea floor, if they were measured not long ago.
+    pub(super) fn height_m(&self, now: Instant) -> Option<f64> {
+        self.last.filter(|(_, _, at)| now.since(*at) < LASTS).map(|(_, height_m, _)| height_m)
+    }
+
+    pub(super) fn forget(&mut self) {
+        self.last = None;
+    }
+}
+
+/// The last texts that were passed on.
+#[derive(Debug, Default)]
+pub(super) struct Texts {
+    told: Vec<(String, Instant)>,
+}
+
+impl Texts {
+    /// The same text is passed on once in this time, and so many different ones.
+    const PERIOD: Duration = Duration::from_secs(600);
+    const MAX: usize = 20;
+
+    /// Whether a text is to be passed on.
+    pub(super) fn is_news(&mut self, text: &str, now: Instant) -> bool {
+        self.told.retain(|(_, at)| now.since(*at) < Self::PERIOD);
+        let is_news = self.told.len() < Self::MAX && self.told.iter().all(|(told, _)| told != text);
+        if is_news {
+            self.told.push((text.to_owned(), now));
+        }
+        is_news
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -125,5 +186,31 @@ mod tests {
         let (claim, note) = sources.judge(&config(Some(2)), (1, 1), (SUB, 3), Some(2));
         assert_eq!((claim, note.is_some()), (Claim::Passed(OTHER_COMPONENTS), true));
         assert_eq!(sources.judge(&config(Some(9)), (1, 9), (18, 0), None).0, Claim::Autopilot, "as configured");
+    }
+
+    #[test]
+    fn the_best_height_counts_until_it_is_old() {
+        let at = |s: f64| Instant::from_secs_f64(s);
+        let mut altimeter = Altimeter::default();
+        altimeter.handle(HeightSource::Altitude, Some(9.0), at(0.0));
+        altimeter.handle(HeightSource::DistanceSensor, Some(4.0), at(0.1));
+        altimeter.handle(HeightSource::Altitude, Some(9.0), at(0.2));
+        assert_eq!(altimeter.height_m(at(0.3)), Some(4.0));
+        assert_eq!(altimeter.height_m(at(2.2)), None);
+        altimeter.handle(HeightSource::Altitude, Some(9.0), at(2.2));
+        assert_eq!(altimeter.height_m(at(2.3)), Some(9.0));
+        altimeter.handle(HeightSource::Rangefinder, None, at(2.4));
+        assert_eq!(altimeter.height_m(at(2.5)), None, "out of range");
+    }
+
+    #[test]
+    fn an_hour_of_warnings_is_logged_in_few_lines() {
+        let mut texts = Texts::default();
+        let told = |s: &u32| {
+            texts.is_news(["PreArm: no GPS", "EKF variance"][(s % 2) as usize], Instant::from_secs_f64(f64::from(*s)))
+        };
+        assert_eq!((0..3600).filter(told).count(), 12);
+        let all_different = |n: &u32| texts.is_news(&n.to_string(), Instant::from_secs_f64(5000.0));
+        assert_eq!((0..1000).filter(all_different).count(), 20);
     }
 }

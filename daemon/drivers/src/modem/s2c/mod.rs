@@ -4,31 +4,26 @@
 //! `+++AT`. Burst records are pieces of a framed stream ([`super::framing`]), so modems with different interpreters can
 //! communicate, and no payload contains a command.
 
-mod bursts;
-mod config;
 mod dialogue;
-mod jobs;
 mod line;
 mod notice;
 mod receive;
 mod send;
 mod setup;
-mod supervision;
 
-pub use config::{BURST_FRAME_BYTES, INSTANT_BYTES, S2cConfig, S2cMode, instant_airtime};
 pub use line::{Line, LineParser};
+pub use setup::{BURST_FRAME_BYTES, INSTANT_BYTES, S2cConfig, S2cMode, instant_airtime};
 
 use super::driver::{Class, Destination, Driver, Event, Refusal, Token, check_length};
-use bursts::{BurstAirtime, BurstStreams};
 use dialogue::{Dialogue, Pending};
-use jobs::{Job, Jobs};
+use receive::{BurstAirtime, BurstStreams};
 use scenecast_core::ModemAddress;
 use scenecast_protocol::mac::{Access, ModemProfile};
 use scenecast_protocol::time::Instant;
-use setup::{Step, Verdict};
+use send::{Job, Jobs};
+use setup::{Step, Supervision, Verdict};
 use std::collections::VecDeque;
 use std::time::Duration;
-use supervision::Supervision;
 
 /// Quiet before the modem is spoken to: half a line may be under way.
 const SETTLE: Duration = Duration::from_millis(300);
@@ -201,15 +196,15 @@ impl Driver for S2c {
         match self.config.mode {
             S2cMode::Instant => ModemProfile {
                 frame_bytes: INSTANT_BYTES,
-                bit_rate_bps: config::INSTANT_BPS,
-                overhead_bits: config::INSTANT_OVERHEAD_BITS,
+                bit_rate_bps: setup::INSTANT_BPS,
+                overhead_bits: setup::INSTANT_OVERHEAD_BITS,
                 turn_around,
                 access: Access::Shared,
             },
             S2cMode::Burst => ModemProfile {
                 frame_bytes: BURST_FRAME_BYTES,
                 bit_rate_bps: self.config.burst_bps,
-                overhead_bits: config::BURST_OVERHEAD_BITS,
+                overhead_bits: setup::BURST_OVERHEAD_BITS,
                 turn_around,
                 access: Access::ModemOwned { pool_frames: self.config.pool_frames },
             },

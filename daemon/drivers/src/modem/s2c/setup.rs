@@ -1,6 +1,11 @@
-//! Commands to an S2C modem at the start, and its regular queries: it does not report a restart.
+//! The configuration of an S2C modem: commands at the start, and checks that the modem still has it.
 
-use super::config::S2cConfig;
+use super::setup::{self};
+pub use scenecast_config::S2cMode;
+use scenecast_core::ModemAddress;
+pub use scenecast_core::{S2C_BURST_FRAME_BYTES as BURST_FRAME_BYTES, S2C_INSTANT_BYTES as INSTANT_BYTES};
+use scenecast_protocol::time::Instant;
+use std::time::Duration;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Expect {
@@ -86,5 +91,150 @@ impl Step {
             Expect::Counter => return number.map_or(Verdict::Bad, Verdict::Counter),
         };
         if good { Verdict::Good } else { Verdict::Bad }
+    }
+}
+
+/// Interval between two queries of a modem at work.
+const BEAT_INTERVAL: Duration = Duration::from_secs(2);
+/// After this silence the port is opened again.
+const DEAF_TIMEOUT: Duration = Duration::from_secs(15);
+
+/// The state of the modem as far as its replies show it.
+#[derive(Debug, Default)]
+pub(super) struct Supervision {
+    beat_at: Instant,
+    beats: usize,
+    /// The modem's packet counter, once it was read.
+    counter: Option<u32>,
+    last_reply: Instant,
+    opened: Instant,
+    /// Whether the modem has ever been at work.
+    was_ready: bool,
+    /// The step of the start-up that failed last.
+    failed: Option<Step>,
+    refusal: Option<String>,
+}
+
+impl Supervision {
+    pub(super) fn open(&mut self, now: Instant) {
+        (self.opened, self.last_reply) = (now, now);
+    }
+
+    pub(super) fn note_reply(&mut self, now: Instant) {
+        self.last_reply = now;
+    }
+
+    pub(super) fn is_deaf(&self, now: Instant) -> bool {
+        now.since(self.last_reply.max(self.opened)) >= DEAF_TIMEOUT
+    }
+
+    /// The step of the start-up at `index`; `None` behind the last one.
+    pub(super) fn start_up(&self, config: &S2cConfig, index: usize) -> Option<Step> {
+        setup::start_up(config, !self.was_ready).into_iter().nth(index)
+    }
+
+    pub(super) fn set_ready(&mut self, now: Instant) {
+        self.was_ready = true;
+        (self.refusal, self.failed) = (None, None);
+        self.beat_at = now + BEAT_INTERVAL;
+    }
+
+    pub(super) fn beat_at(&self) -> Instant {
+        self.beat_at
+    }
+
+    /// The next query of a modem at work, once it is due.
+    pub(super) fn next_beat(&mut self, config: &S2cConfig, now: Instant) -> Option<Step> {
+        if now < self.beat_at {
+            return None;
+        }
+        self.beat_at = now + BEAT_INTERVAL;
+        self.beats += 1;
+        Some(setup::beat(config, self.beats))
+    }
+
+    pub(super) fn counter(&self) -> Option<u32> {
+        self.counter
+    }
+
+    pub(super) fn set_counter(&mut self, counter: Option<u32>) {
+        self.counter = counter;
+    }
+
+    /// Whether this step failed twice in a row: once may be the reply to another command.
+    pub(super) fn fails_again(&mut self, step: &Step) -> bool {
+        self.failed.replace(step.clone()).as_ref() == Some(step)
+    }
+
+    /// The text, if it was not the last one reported.
+    pub(super) fn refuse(&mut self, text: String) -> Option<String> {
+        if self.refusal.as_ref() == Some(&text) {
+            return None;
+        }
+        self.refusal = Some(text.clone());
+        Some(text)
+    }
+}
+
+/// Settings of an S2C modem and of the way to it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct S2cConfig {
+    /// The address that the modem must have.
+    pub address: ModemAddress,
+    pub mode: S2cMode,
+    /// Source level 0..=3: 3 is the least, and the only one for air.
+    pub source_level: u8,
+    /// Highest address of the network, the same on all modems.
+    pub highest_address: u8,
+    pub cluster: u8,
+    /// Longest data packet, the same on all modems, milliseconds.
+    pub packet_ms: u16,
+    /// Whether commands end in LF, as over Ethernet, instead of CR.
+    pub ethernet: bool,
+    /// Speed of the serial line, bit/s; ten bits a byte.
+    pub baud: Option<u32>,
+    /// Bit rate of bursts for plans, bit/s.
+    pub burst_bps: f64,
+    /// Frames in the modem at most.
+    pub pool_frames: u32,
+}
+
+/// An instant message takes 161 ms and 10.9 ms a byte: bits a second, and the preamble in bits.
+///
+/// Source: a fit to the table of measured durations shipped with a fielded driver.
+pub const INSTANT_BPS: f64 = 8.0 / 0.0109;
+pub const INSTANT_OVERHEAD_BITS: u64 = 119;
+/// Bits around a frame in a burst: delimiters, stuffing, heads of pieces.
+pub const BURST_OVERHEAD_BITS: u64 = 8 * 12;
+
+/// Air time of an instant message.
+pub fn instant_airtime(bytes: usize) -> Duration {
+    Duration::from_secs_f64((bytes as f64 * 8.0 + INSTANT_OVERHEAD_BITS as f64) / INSTANT_BPS)
+}
+
+impl S2cConfig {
+    /// Settings to write and to read back.
+    ///
+    /// No retries of messages: duplicates cost airtime, and the driver repeats by itself. Two retries of a
+    /// connection: more would keep on speaking for long to a modem that has restarted. Idle connections end soon, so
+    /// that others get to speak.
+    pub(super) fn settings(&self) -> [(&'static str, u32); 10] {
+        [
+            ("L", self.source_level.into()),
+            ("AM", self.highest_address.into()),
+            ("C", 2),
+            ("ZC", self.cluster.into()),
+            ("ZP", self.packet_ms.into()),
+            ("RC", 2),
+            ("RT", 4000),
+            ("RI", 0),
+            ("ZI", 20),
+            ("RP", 0),
+        ]
+    }
+
+    /// Time that so many bytes take on the way to the modem.
+    pub(super) fn line_time(&self, bytes: usize) -> Duration {
+        self.baud.map_or(Duration::ZERO, |baud| Duration::from_secs_f64(bytes as f64 * 10.0 / f64::from(baud.max(1))))
     }
 }

@@ -1,8 +1,7 @@
 //! `scenecast map bench`
 
 use super::Coding;
-use super::change::{PngSizes, Sizes, encode, refused, sizes};
-use super::files::{numbered, read_map, same_size};
+use super::change::{PngSizes, Sizes, encode, numbered, read_map, refused, same_size, sizes};
 use crate::progress::Progress;
 use clap::Args;
 use scenecast_core::{UserError, outln};

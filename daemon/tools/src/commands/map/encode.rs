@@ -1,13 +1,12 @@
-//! `scenecast map encode`
+//! `scenecast map encode` and `scenecast map decode`
 
 use super::Coding;
-use super::change::{PngSizes, encode, sizes};
-use super::files::{read_map, same_size};
+use super::change::{MAX_MAP_BYTES, PngSizes, encode, read_map, same_size, sizes};
 use crate::print_figures;
 use clap::Args;
 use scenecast_core::UserError;
 use scenecast_files::write_whole;
-use scenecast_protocol::map_codec::LabelRaster;
+use scenecast_protocol::map_codec::{ChunkFile, LabelRaster};
 use std::path::PathBuf;
 
 /// Write the chunks that turn one map into another, and print their sizes: in a pipe or a file as one line of JSON.
@@ -53,5 +52,31 @@ impl Encode {
         let sizes = sizes(&self.coding, &file, cells_changed, png);
         write_whole(&self.out, &file.to_bytes())?;
         print_figures(&sizes, self.json)
+    }
+}
+
+/// Decode chunks into a map: an indexed PNG, pixel value = label, 0 = unexplored.
+#[derive(Debug, Args)]
+#[command(after_help = "Example: scenecast map decode --base yesterday.png --in change.scmc --out today.png")]
+pub struct Decode {
+    /// Map against which the chunks were encoded [default: an empty map]
+    #[arg(long, value_name = "B.png")]
+    base: Option<PathBuf>,
+    /// File of chunks that map encode has written
+    #[arg(long = "in", value_name = "FILE")]
+    input: PathBuf,
+    /// Map to write, an indexed PNG
+    #[arg(long, value_name = "T2.png")]
+    out: PathBuf,
+}
+
+impl Decode {
+    pub fn run(self) -> Result<(), UserError> {
+        let refused = |e| UserError::file(&self.input, e);
+        let bytes = scenecast_config::read_regular(&self.input, MAX_MAP_BYTES)?;
+        let file = ChunkFile::from_bytes(&bytes).map_err(refused)?;
+        let base = self.base.as_deref().map(read_map).transpose()?;
+        let map = file.apply(base.as_ref()).map_err(refused)?;
+        write_whole(&self.out, &map.to_png())
     }
 }

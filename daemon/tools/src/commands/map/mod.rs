@@ -2,9 +2,7 @@
 
 mod bench;
 mod change;
-mod decode;
 mod encode;
-mod files;
 
 use clap::{Args, Subcommand};
 use scenecast_core::UserError;
@@ -16,7 +14,7 @@ pub enum Map {
     /// Write the chunks that turn one map into another, and print their sizes.
     Encode(encode::Encode),
     /// Decode such chunks into a map.
-    Decode(decode::Decode),
+    Decode(encode::Decode),
     /// Measure a folder of numbered maps, each encoded against the one before.
     Bench(bench::MapBench),
 }

@@ -1,6 +1,5 @@
 //! `scenecast tune`
 
-mod best;
 mod grid;
 mod measure;
 mod plot;
@@ -170,7 +169,7 @@ impl Tune {
             let cause = format!("no setting's stream fits --budget {budget_bps} bit/s: the lowest has {least:.0}");
             return Err(UserError::Failed(cause));
         };
-        write_whole(&path, best::toml(best, config, budget_bps).as_bytes())?;
+        write_whole(&path, grid::toml(best, config, budget_bps).as_bytes())?;
         let Measurement { mutual_information_nats, map_bytes, stream_bps, .. } = best.measurement;
         outln!(
             "{}: {}; MI {mutual_information_nats:.3} nats, map {map_bytes} bytes, stream {stream_bps:.0} bit/s",

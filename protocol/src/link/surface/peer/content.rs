@@ -1,8 +1,7 @@
-//! The surface's copy of a vehicle's state: map, layers, status and objects.
+//! The surface's copy of a vehicle's state: map, layers, status and objects, and frames whose chunks do not decode here.
 
-use super::backlog::ReportedBacklog;
-use super::ended::EndedRun;
-use super::status::StatusParts;
+use super::status::{ReportedBacklog, StatusParts};
+use super::strangers::EndedRun;
 use crate::directive::InForcePart;
 use crate::link::surface::layers::{LayerOutcome, Layers};
 use crate::link::{FrameNumber, LinkStats, SurfaceEvent};
@@ -12,6 +11,7 @@ use crate::schedule::Class;
 use crate::time::Instant;
 use crate::wire::{Address, Chunk, ChunkKind, Chunks, Introduction, VehicleStatus};
 use std::collections::VecDeque;
+use std::time::Duration;
 
 /// The result of handling a chunk.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -217,4 +217,32 @@ fn decode<R: StateReplica>(replica: &R, layers: &Layers, base: FrameNumber, mut 
         ChunkKind::Details => true,
         ChunkKind::Slot | ChunkKind::Introduction | ChunkKind::Inquiry | ChunkKind::NextKey => true,
     })
+}
+
+/// Decides from undecodable frames whether the two ends hold different states.
+///
+/// A single such frame may be forged or damaged. If the states differ, no map chunk decodes any more.
+#[derive(Debug, Default)]
+pub(super) struct Divergence {
+    /// Undecodable frames since a map chunk was last accepted, at most one in each [`Self::INTERVAL`].
+    count: u32,
+    last: Option<Instant>,
+}
+
+impl Divergence {
+    const INTERVAL: Duration = Duration::from_secs(5);
+    const CERTAIN: u32 = 3;
+
+    /// Counts an undecodable frame; returns whether the states certainly differ.
+    pub(super) fn note_undecodable(&mut self, now: Instant) -> bool {
+        if self.last.is_none_or(|at| now.since(at) >= Self::INTERVAL) {
+            (self.count, self.last) = (self.count + 1, Some(now));
+        }
+        self.count >= Self::CERTAIN
+    }
+
+    /// A map chunk was accepted, or a new run has begun.
+    pub(super) fn clear(&mut self) {
+        *self = Self::default();
+    }
 }

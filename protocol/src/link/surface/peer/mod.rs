@@ -3,24 +3,16 @@
 //! [`VehiclePeer`] joins parts that own their state: `content` (the copy of its state), `timing` (its clock),
 //! [`Contact`] (when it was last in contact). `turn` writes the frames of a turn, `pool` those that go out without one.
 
-mod backlog;
 mod contact;
 mod content;
-mod divergence;
-mod ended;
 mod in_force;
-mod pool;
-mod rival;
-mod rotation;
 mod status;
-mod timing;
+mod strangers;
 mod turn;
-mod twin;
 mod view;
 
-pub use ended::EndedRun;
 pub use in_force::InForce;
-pub use rival::OtherSurface;
+pub use strangers::{EndedRun, OtherSurface};
 pub(super) use turn::{Ready, room_for_slot};
 pub use view::PeerView;
 
@@ -34,16 +26,13 @@ use crate::time::Instant;
 use crate::wire::{
     Address, Chunk, ChunkKind, Envelope, Header, Introduction, MissionId, Stamp, UtcHours, VehicleStatus,
 };
-use contact::Contact;
-use content::{ChunkOutcome, PeerContent, class_of};
-use divergence::Divergence;
+use contact::{Contact, VehicleTiming};
+use content::{ChunkOutcome, Divergence, PeerContent, class_of};
 use in_force::InForceCopy;
-use rival::Rivals;
-use rotation::KeyOffers;
 use std::collections::VecDeque;
 use std::time::Duration;
-use timing::VehicleTiming;
-use twin::TwinWatch;
+use strangers::{Rivals, TwinWatch};
+use turn::KeyOffers;
 
 /// The slots that a frame to a vehicle carried: versions, each with its bytes.
 type Carried = Vec<(SlotId, u16, usize)>;

@@ -1,4 +1,5 @@
-//! The frames between S2C emulators. The layout is this crate's own; real S2C waveforms are not public.
+//! The frames between S2C emulators, and measurements of a received one. The layout is this crate's own; real S2C waveforms are
+//! not public.
 //!
 //! ```text
 //! byte 0     magic 0xE5
@@ -13,7 +14,11 @@
 //!     27-    piggyback message, then payload; unprotected, so that corruption can pass
 //! ```
 
-use crate::modem::emulator::crc::crc16;
+use crate::channel::Arrival;
+use crate::modem::emulator::board::crc16;
+use crate::nodes::NodePosition;
+use crate::usbl::UsblFix;
+use std::time::Duration;
 
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub(crate) struct S2cFrame {
@@ -139,6 +144,49 @@ impl S2cFrame {
             payload: payload.to_vec(),
         })
     }
+}
+
+/// Relative velocity in m/s: the emulator does not differentiate tracks.
+pub(crate) const VELOCITY: &str = "0.0000";
+
+/// How a frame was received.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct ReceivedSignal {
+    pub airtime: Duration,
+    pub received_at: Duration,
+    pub one_way: Duration,
+    /// Received level, dB; -20 within 10 m, -85 at the least.
+    pub rssi: i32,
+    pub integrity: i32,
+    pub sender: NodePosition,
+    pub receiver: NodePosition,
+}
+
+impl ReceivedSignal {
+    pub(crate) fn of(arrival: &Arrival) -> Self {
+        let flight = arrival.at.saturating_sub(arrival.sent_at).saturating_sub(arrival.airtime);
+        let rssi = -20.0 - 15.0 * (arrival.range_m.max(10.0) / 10.0).log10();
+        let rssi = rssi.max(-85.0) as i32;
+        Self {
+            airtime: arrival.airtime,
+            received_at: arrival.at,
+            one_way: flight,
+            rssi,
+            integrity: 230 + rssi,
+            sender: arrival.sender,
+            receiver: arrival.receiver,
+        }
+    }
+}
+
+/// A USBL fix that the head is still computing.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct PendingFix {
+    pub remote: u8,
+    pub fix: UsblFix,
+    pub travel: Duration,
+    pub rssi: i32,
+    pub integrity: i32,
 }
 
 #[cfg(test)]

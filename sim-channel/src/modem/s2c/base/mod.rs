@@ -3,26 +3,19 @@
 //! A service (instant messages, bursts, reception, positions) owns its own state and borrows this base for the length of
 //! one call. The base never calls a service.
 
-mod condition;
 mod config;
 mod frame;
-mod options;
 mod port;
 mod settings;
-mod signal;
-mod task;
 pub(crate) mod timing;
 mod transmitter;
 
-pub(crate) use condition::{Condition, ReceiverMode};
+pub(crate) use config::{Condition, ReceiverMode};
 pub use config::{Interpreter, S2cConfig};
-pub(crate) use frame::{FrameKind, Network, S2cFrame};
-pub(crate) use options::PortOptions;
+pub(crate) use frame::{FrameKind, Network, PendingFix, ReceivedSignal, S2cFrame, VELOCITY};
 pub(crate) use port::{CommandPort, PortMode};
-pub(crate) use settings::{SettingError, Settings};
-pub(crate) use signal::{PendingFix, ReceivedSignal, VELOCITY};
-pub(crate) use task::S2cTask;
-pub(crate) use transmitter::{AfterSending, QueuedFrame, Transmitter};
+pub(crate) use settings::{PortOptions, SettingError, Settings};
+pub(crate) use transmitter::{AfterSending, QueuedFrame, S2cTask, Transmitter};
 
 use crate::modem::emulator::Transmission;
 use crate::modem::emulator::board::ModemBoard;

@@ -1,7 +1,6 @@
 //! The state of the acoustic connection, and whose turn it is.
 
-use super::receiver::Receiver;
-use super::sender::Sender;
+use super::pool::{Receiver, Sender};
 use crate::modem::s2c::base::{QueuedFrame, ReceivedSignal, S2cFrame};
 use std::time::Duration;
 

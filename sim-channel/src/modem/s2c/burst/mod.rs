@@ -9,8 +9,6 @@
 mod connection;
 mod establish;
 mod pool;
-mod receiver;
-mod sender;
 mod turns;
 
 use super::base::{QueuedFrame, ReceiverMode, S2cBase, S2cTask};
