@@ -168,7 +168,6 @@ pub mod mac;
 pub mod map;
 pub mod map_codec;
 pub mod object;
-mod random;
 pub mod schedule;
 pub mod seal;
 pub mod time;

@@ -22,7 +22,7 @@ const IO_CRATES: [&str; 14] = [
 ];
 
 /// Crates that do no IO.
-const SANS_IO: [&str; 17] = [
+const SANS_IO: [&str; 15] = [
     "scenecast-core",
     "scenecast-drivers",
     "scenecast-fourier",
@@ -30,8 +30,6 @@ const SANS_IO: [&str; 17] = [
     "scenecast-labels",
     "scenecast-messages",
     "scenecast-sensors",
-    "scenecast-motion",
-    "scenecast-outlets",
     "scenecast-protocol",
     "scenecast-registration",
     "scenecast-scoring",
@@ -43,11 +41,10 @@ const SANS_IO: [&str; 17] = [
 ];
 
 /// Crates that no vehicle carries.
-const ASHORE: [&str; 11] = [
+const ASHORE: [&str; 10] = [
     "scenecast-bench",
     "scenecast-console",
     "scenecast-modem-sim",
-    "scenecast-motion",
     "scenecast-rehearsal",
     "scenecast-scoring",
     "scenecast-tests",

@@ -2,7 +2,7 @@
 
 use scenecast_protocol::directive::Constraints;
 use schemars::JsonSchema;
-use serde::de::{DeserializeOwned, Error};
+use serde::de::{DeserializeOwned, Error, MapAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use serde_json::{Map, Value};
 use std::collections::BTreeMap;
@@ -147,7 +147,7 @@ pub struct LabelOrder {
     pub label: u8,
     /// Its name, at most 60 characters.
     #[serde(default)]
-    #[schemars(length(min = 1, max = 40))]
+    #[schemars(length(min = 1, max = 60))]
     pub name: Option<String>,
     /// Its colour, as in `#a0b1c2`.
     #[serde(default)]
@@ -164,7 +164,7 @@ pub struct LabelOrder {
 #[serde(deny_unknown_fields)]
 pub struct NoteOrder {
     /// The text of the note, at most 1000 characters.
-    #[schemars(length(min = 1, max = 1000))]
+    #[schemars(length(min = 1, max = 1000), regex(pattern = r"\S"))]
     pub text: String,
 }
 
@@ -177,7 +177,7 @@ pub struct MarkerOrder {
     /// Metres north of the origin in the world frame.
     pub y_m: f64,
     /// The text of the marker, at most 200 characters.
-    #[schemars(length(min = 1, max = 200))]
+    #[schemars(length(min = 1, max = 200), regex(pattern = r"\S"))]
     pub text: String,
 }
 
@@ -185,7 +185,8 @@ pub struct MarkerOrder {
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RemoveMarkerOrder {
-    /// The number of the marker.
+    /// The number of the marker, as the state has it.
+    #[schemars(range(min = 1))]
     pub number: u32,
 }
 
@@ -282,9 +283,31 @@ impl<T: Serialize + DeserializeOwned + Default> OrderChanges<T> {
 
 impl<'de, T: Serialize + DeserializeOwned + Default> Deserialize<'de> for OrderChanges<T> {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        let named = Map::deserialize(deserializer)?;
+        let named = deserializer.deserialize_map(EachOnce)?;
         merged::<T>(Map::new(), &named).map_err(D::Error::custom)?;
         Ok(Self { named, order: PhantomData })
+    }
+}
+
+/// Reads an object that names each member once: of two values, one would be lost silently.
+struct EachOnce;
+
+impl<'de> Visitor<'de> for EachOnce {
+    type Value = Map<String, Value>;
+
+    fn expecting(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str("an object")
+    }
+
+    fn visit_map<A: MapAccess<'de>>(self, mut access: A) -> Result<Self::Value, A::Error> {
+        let mut members = Map::new();
+        while let Some((name, value)) = access.next_entry::<String, Value>()? {
+            if members.contains_key(&name) {
+                return Err(A::Error::custom(format!("{name} is named twice")));
+            }
+            members.insert(name, value);
+        }
+        Ok(members)
     }
 }
 
@@ -343,5 +366,7 @@ mod tests {
         assert!(read::<FenceOrder>(r#"{"fenze": null}"#).unwrap_err().contains("unknown field"));
         assert!(read::<LimitsOrder>(r#"{"time_s": "long"}"#).is_err());
         assert!(read::<LimitsOrder>("[]").is_err());
+        let twice = r#"{"fence": [[0, 0], [9, 0], [9, 9]], "fence": null}"#;
+        assert!(read::<FenceOrder>(twice).unwrap_err().contains("fence is named twice"));
     }
 }

@@ -16,6 +16,7 @@
 
 mod catalogue;
 mod cdr;
+pub mod contents;
 mod definition;
 mod field;
 mod message;

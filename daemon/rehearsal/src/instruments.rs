@@ -3,8 +3,8 @@
 use scenecast_config::{Config, survey_depth_m};
 use scenecast_core::{LatLon, TangentPlane, nmea};
 use scenecast_drivers::autopilot::{Autopilot, Counters, Goal, Health, Step, Tray};
-use scenecast_motion::Motion;
 use scenecast_protocol::time::Instant;
+use scenecast_worlds::Motion;
 use sim_channel::RandomStream;
 use std::time::Duration;
 

@@ -19,7 +19,6 @@
 
 mod dds;
 mod inbox;
-mod map_versions;
 mod names;
 mod node;
 mod stop;

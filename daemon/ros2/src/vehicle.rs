@@ -1,18 +1,20 @@
 //! The vehicle in ROS 2: its own map, pose, path and state.
 
-use crate::map_versions::MapVersions;
+use crate::names::MapVersions;
 use crate::node::{Publisher, RosNode};
 use crate::stop::{self, Owned, Owner};
 use crate::transport::Qos;
 use scenecast_config::Ros2;
 use scenecast_core::{UserError, palette};
 use scenecast_messages::builtin_interfaces::Time;
+use scenecast_messages::contents::{
+    Health, MAP_FRAME, Place, cloud, diagnostics, header, layers, occupancy, path, pose,
+};
 use scenecast_messages::diagnostic_msgs::DiagnosticArray;
 use scenecast_messages::geometry_msgs::PoseWithCovarianceStamped;
 use scenecast_messages::grid_map_msgs::GridMap;
 use scenecast_messages::nav_msgs::{OccupancyGrid, Path};
 use scenecast_messages::sensor_msgs::PointCloud2;
-use scenecast_outlets::{Health, MAP_FRAME, Place, cloud, diagnostics, header, layers, occupancy, path, pose};
 use scenecast_protocol::map::{LabelGrid, LayerDescriptor};
 use std::collections::VecDeque;
 use std::sync::atomic::{AtomicBool, Ordering};

@@ -12,14 +12,14 @@ use serde::{Deserialize, Deserializer, Serialize};
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct FenceOrder {
-    /// The vehicle stays inside; `None`: no fence.
+    /// The vehicle stays inside; null: no fence.
     #[schemars(length(min = 3, max = 34))]
     pub fence: Option<Vec<[f64; 2]>>,
     /// The vehicle stays outside each of these outlines; null: of none.
     #[serde(default, deserialize_with = "listed")]
     #[schemars(with = "Option<Vec<Vec<[f64; 2]>>>", length(max = 15), inner(length(min = 3, max = 34)))]
     pub keep_outs: Vec<Vec<[f64; 2]>>,
-    /// The end of the return path; `None`: the start of the vehicle's run.
+    /// The end of the return path; null: the start of the vehicle's run.
     pub return_point: Option<[f64; 2]>,
 }
 
@@ -27,7 +27,7 @@ fn listed<'de, D: Deserializer<'de>, T: Deserialize<'de>>(deserializer: D) -> Re
     Option::deserialize(deserializer).map(Option::unwrap_or_default)
 }
 
-/// Limits as they are typed. A value that is left out is not limited, or as configured on the vehicle.
+/// Limits as they are typed. An absent member stays as it is; null: no limit, or the reaction that is configured on the vehicle.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LimitsOrder {
@@ -83,6 +83,9 @@ pub struct AreaOrder {
 #[serde(deny_unknown_fields)]
 pub struct DestinationOrder {
     /// Metres east and north of the origin; null withdraws the destination.
+    // An absent place must not withdraw it.
+    #[serde(deserialize_with = "Option::deserialize")]
+    #[schemars(required)]
     pub place: Option<[f64; 2]>,
 }
 
@@ -205,9 +208,8 @@ fn band(what: &str, [low, high]: [f64; 2]) -> Result<Band, String> {
 }
 
 fn whole(what: &str, value: f64, most: u32) -> Result<u32, String> {
-    let rounded = value.round();
-    let ok = (1.0..=f64::from(most)).contains(&rounded);
-    ok.then_some(rounded as u32).ok_or(format!("{what} {value}: it takes 1 to {most}"))
+    let ok = (1.0..=f64::from(most)).contains(&value);
+    ok.then_some(value.round() as u32).ok_or(format!("{what} {value}: it takes 1 to {most}"))
 }
 
 fn reaction(what: &str, name: Option<&str>) -> Result<Option<Reaction>, String> {

@@ -16,7 +16,6 @@ mod picker;
 pub mod planning;
 mod producer;
 mod registration;
-mod registration_monitor;
 mod relief;
 mod steering;
 mod track;

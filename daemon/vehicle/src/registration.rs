@@ -1,9 +1,10 @@
-//! Places camera frames by their overlap with earlier ones before they are mapped.
+//! Places camera frames by their overlap with earlier ones before they are mapped, and shows the operator how well.
 
 use crate::frame::{Frame, Nadir};
 use crate::mapper::Mapper;
 use scene_model::project::Pose;
 use scenecast_protocol::coordinates::MapPoint;
+use scenecast_protocol::wire::{FrameTie, RegistrationReport};
 use scenecast_registration::{CameraImage, FrameInput, GeometryCheck, Placed, Registrar, Tally};
 
 /// Standard deviation of the position after a gap in dead reckoning, metres.
@@ -107,13 +108,53 @@ impl Mapper {
     }
 }
 
+/// Frames that the share of placed ones is taken over.
+const RECENT: u32 = 32;
+
+/// Watches the registration of camera frames.
+#[derive(Debug, Default)]
+pub(crate) struct RegistrationMonitor {
+    /// Whether images placed each of the last frames, the newest in the lowest bit.
+    recent: u32,
+    frames: u32,
+    last: Option<RegistrationReport>,
+}
+
+impl RegistrationMonitor {
+    pub(crate) fn handle_frame(&mut self, frame: &RegisteredFrame) {
+        let Some(found) = &frame.found else { return };
+        self.recent = self.recent << 1 | u32::from(frame.is_seen());
+        self.frames = (self.frames + 1).min(RECENT);
+        let tie = match &found.placed {
+            _ if !found.is_on => FrameTie::Off,
+            placed if placed.loops > 0 => FrameTie::EarlierTrack,
+            placed if placed.is_chained => FrameTie::FrameBefore,
+            _ => FrameTie::Odometry,
+        };
+        self.last = Some(RegistrationReport {
+            tie,
+            share: f64::from(self.recent.count_ones()) / f64::from(self.frames),
+            sigma_m: found.placed.sigma_m,
+            closed: found.closed.min(u16::MAX.into()) as u16,
+        });
+    }
+
+    /// `None` before the first frame, and where frames were never registered.
+    pub(crate) fn report(&self) -> Option<RegistrationReport> {
+        self.last
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::Restored;
     use image::{Rgb, RgbImage};
+    use scene_model::project::Pose;
     use scenecast_config::Config;
+    use scenecast_protocol::coordinates::MapPoint;
     use scenecast_protocol::directive::{Change, Registration, Settings};
+    use scenecast_registration::{Evidence, FramePose, Placed};
 
     fn config(sets: &[&str]) -> Config {
         let sets: Vec<String> = sets.iter().map(|set| (*set).to_owned()).collect();
@@ -188,5 +229,33 @@ mod tests {
         let last = (0..4).map(|i| step(&mut mapper, i)).last().unwrap();
         assert_eq!((last.pose.y, last.scale, last.is_seen()), (1.5, 1.0, false));
         assert_eq!(mapper.registration(), None);
+    }
+
+    fn judged_frame(is_chained: bool, loops: u8, is_on: bool) -> RegisteredFrame {
+        let at = MapPoint::new(0.0, 0.0);
+        let pose = FramePose::new(at, 0.0, 0.0);
+        let placed = Placed { pose, is_chained, loops, sigma_m: 0.1, evidence: Evidence::default() };
+        RegisteredFrame {
+            pose: Pose { x: 0.0, y: 0.0, z: 0.0, yaw_rad: 0.0 },
+            scale: 1.0,
+            dead_reckoned: at,
+            found: Some(FoundFrame { placed, closed: 70_000, is_on }),
+        }
+    }
+
+    #[test]
+    fn the_report_follows_the_last_frame_and_the_share_the_last_32() {
+        let mut monitor = RegistrationMonitor::default();
+        assert_eq!(monitor.report(), None);
+        let mut see = |is_chained, loops, is_on| {
+            monitor.handle_frame(&judged_frame(is_chained, loops, is_on));
+            monitor.report().map(|report| (report.tie, report.share)).unwrap()
+        };
+        assert_eq!(see(false, 0, true), (FrameTie::Odometry, 0.0));
+        assert_eq!(see(true, 0, true), (FrameTie::FrameBefore, 0.5));
+        assert_eq!(see(true, 2, true), (FrameTie::EarlierTrack, 2.0 / 3.0));
+        let last = (0..40).map(|_| see(false, 0, false)).last();
+        assert_eq!(last, Some((FrameTie::Off, 0.0)));
+        assert_eq!(monitor.report().map(|report| report.closed), Some(u16::MAX));
     }
 }

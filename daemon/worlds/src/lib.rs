@@ -2,7 +2,7 @@
 //!
 //! [`patches`] draws a sea floor from the generative process of the scene model, as an image with the class of each
 //! pixel. [`Reef`] is a sea floor that looks like one, with a camera over it. [`sample`] draws a label map from the prior
-//! itself. All are functions of their arguments: the same seed gives the same world. The crate does no input or output.
+//! itself. [`Motion`] and [`Odometry`] are the true motion of a vehicle and what its sensors make of it. All are functions of their arguments: the same seed gives the same world. The crate does no input or output.
 //!
 //! ```
 //! // 640 x 480 pixels, patches of about 60 pixels, at most 6 classes.
@@ -12,11 +12,15 @@
 //! assert!(class_of_the_first_pixel < 6);
 //! ```
 
+mod motion;
 mod noise;
 mod patches;
 mod reef;
 mod sample;
+mod track_audit;
 
+pub use motion::{Motion, Odometry};
 pub use patches::{Patches, patches};
 pub use reef::{Reef, ReefCamera, View};
 pub use sample::{LabelWorld, sample};
+pub use track_audit::{length_m, stretches_outside};

@@ -150,8 +150,8 @@ impl Identities {
     }
 
     pub(super) fn draw(&mut self) -> Identity {
-        let session = SessionId::from_random(crate::random::next(&mut self.random) as u16);
-        let drawn = crate::random::next(&mut self.random);
+        let session = SessionId::from_random(next_random(&mut self.random) as u16);
+        let drawn = next_random(&mut self.random);
         Identity { session, nonce: self.key.as_ref().map_or(drawn, |key| key.nonce(drawn)) }
     }
 }
@@ -281,4 +281,13 @@ impl<T> LinkRun<T> {
         }
         self.seals.open(envelope, mission, direction, keyed, self.window.highest())
     }
+}
+
+/// The next number of a SplitMix64 sequence (Steele, Lea and Flood 2014); `state` advances.
+pub(super) fn next_random(state: &mut u64) -> u64 {
+    *state = state.wrapping_add(0x9E37_79B9_7F4A_7C15);
+    let mut z = *state;
+    z = (z ^ z >> 30).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+    z = (z ^ z >> 27).wrapping_mul(0x94D0_49BB_1331_11EB);
+    z ^ z >> 31
 }

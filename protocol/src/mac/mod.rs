@@ -3,11 +3,9 @@
 //! The ends share no clock; every wait follows from measured propagation times and known airtimes. [`Access`] describes
 //! how a modem divides the medium by itself.
 
-mod clock_map;
 mod floor;
 mod master;
 
-pub use clock_map::ClockMap;
 pub use floor::Grant;
 pub(crate) use floor::{Floor, quarter_seconds};
 pub(crate) use master::Master;

@@ -22,7 +22,6 @@
 #[allow(clippy::indexing_slicing)] // Tables of 256 rows and columns, indexed by bytes.
 mod gf256;
 
-mod code;
 mod layout;
 mod part;
 mod receiver;

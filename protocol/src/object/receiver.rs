@@ -1,7 +1,6 @@
 //! The receiving side of objects, and an object during its reception.
 
-use super::code::{Placed, recover};
-use super::layout::SymbolPlace;
+use super::layout::{Placed, SymbolPlace, recover};
 use super::{Layout, ObjectId, Part};
 use std::collections::{BTreeMap, VecDeque};
 

@@ -1,7 +1,6 @@
 //! The sending side of objects, and the symbols of one object on their way.
 
-use super::code::add_repair;
-use super::layout::SymbolPlace;
+use super::layout::{SymbolPlace, add_repair};
 use super::part::Supply;
 use super::{Layout, MAX_OBJECT, ObjectId, Part};
 use std::collections::VecDeque;

@@ -17,7 +17,6 @@
 
 mod key;
 mod offer;
-mod prf;
 mod session;
 mod text;
 

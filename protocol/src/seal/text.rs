@@ -1,7 +1,6 @@
 //! The text of a key file.
 
-use super::key::{HeldKey, LinkKey, MissionKey, VehicleKey};
-use super::prf::{join, prf};
+use super::key::{HeldKey, LinkKey, MissionKey, VehicleKey, join, prf};
 use zeroize::Zeroizing;
 
 const VERSION: &str = "2";

@@ -1,8 +1,7 @@
 //! The vehicle's status.
 
 use super::details::{Backlog, DiskReport, EquipmentFaults};
-use super::path::PlannedPath;
-use super::placement::Placement;
+use super::path::{Placement, PlannedPath};
 use super::trail::{Intent, RegistrationReport, TrailCorner};
 use crate::bytes::{Reader, Truncated, decimetres, put24};
 use crate::coordinates::MapPoint;

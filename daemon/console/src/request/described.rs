@@ -90,9 +90,6 @@ fn utility(weights: &BTreeMap<u8, f64>, (exploration, curiosity): (f64, f64)) ->
 
 /// The limits that an order names, those that it removes last.
 fn limits_named(order: &OrderChanges<LimitsOrder>) -> String {
-    if order.is_whole() {
-        return format!("{}; no others", members(order.named()));
-    }
     let removed: Vec<String> =
         order.named().iter().filter(|(_, v)| v.is_null()).map(|(name, _)| name.replace('_', " ")).collect();
     let stated = members(order.named());
@@ -120,7 +117,7 @@ mod tests {
         let limits = LimitsOrder { time_s: Some(600.0), on_silence: Some("hold".into()), ..LimitsOrder::default() };
         assert_eq!(
             text(SurfaceRequest::Limits(1, OrderChanges::whole(&limits))),
-            Some(("order", "limits: on silence hold, time s 600.0; no others".into()))
+            Some(("order", "limits: on silence hold, time s 600.0; removed: altitude m, depth m, distance m, on abort, on breach, silence s".into()))
         );
         let changes = serde_json::from_str(r#"{"depth_m": null, "time_s": 60}"#).unwrap();
         assert_eq!(

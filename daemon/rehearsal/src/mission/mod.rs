@@ -33,13 +33,13 @@ use scenecast_config::{Config, OperatorScript, cell_m};
 use scenecast_core::{Area, UserError};
 use scenecast_drivers::modem::Station;
 use scenecast_host::{SurfaceHost, VehicleHost};
-use scenecast_motion::Motion;
 use scenecast_protocol::mac::ModemProfile;
 use scenecast_protocol::schedule::Audit;
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::Address;
 use scenecast_surface::{Surface, SurfaceOutput};
 use scenecast_vehicle::{Durable, Mapper, Vehicle};
+use scenecast_worlds::Motion;
 use sim_channel::NodePosition;
 use std::time::Duration;
 

@@ -2,11 +2,11 @@
 
 use super::scene::{CELL_M, Scene};
 use scenecast_core::Area;
-use scenecast_motion::{length_m, stretches_outside};
 use scenecast_protocol::coordinates::{DecimetrePoint, WorldPoint};
 use scenecast_protocol::directive::{Fence, PlannerKind, Polygon};
 use scenecast_protocol::map::{Cell, LabelGrid};
 use scenecast_vehicle::{Course, Footprint, Steering};
+use scenecast_worlds::{length_m, stretches_outside};
 use sim_channel::RandomStream;
 
 /// Edge of the camera's footprint, metres: eight cells.

@@ -13,7 +13,7 @@ use crate::zenoh::Zenoh;
 use scenecast_config::{Remap, Ros2, RosName, RosTransport};
 use scenecast_core::UserError;
 use scenecast_messages::Message;
-use scenecast_outlets::Health;
+use scenecast_messages::contents::Health;
 use std::sync::atomic::AtomicU64;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;

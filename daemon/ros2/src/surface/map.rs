@@ -6,11 +6,11 @@ use crate::transport::Qos;
 use scenecast_console::state::{MapLabel, VehicleState};
 use scenecast_console::{ClientRequest, MapCells, Reply, SurfaceRequest};
 use scenecast_core::{UserError, palette};
+use scenecast_messages::contents::{Grid, MAX_GRID_CELLS, cloud, layers, occupancy};
 use scenecast_messages::grid_map_msgs::GridMap;
 use scenecast_messages::nav_msgs::OccupancyGrid;
 use scenecast_messages::sensor_msgs::PointCloud2;
 use scenecast_messages::std_msgs::Header;
-use scenecast_outlets::{Grid, MAX_GRID_CELLS, cloud, layers, occupancy};
 use scenecast_protocol::map::Quantity;
 use std::time::{Duration, Instant};
 

@@ -11,13 +11,13 @@ use crate::valid_part;
 use scenecast_console::state::{MapLabelTree, MissionState, OrderStatus, StatusReport, VehicleState};
 use scenecast_console::{ClientRequest, Reply, SurfaceRequest};
 use scenecast_core::{LatLon, TangentPlane, UserError};
+use scenecast_messages::contents::{Place, WORLD_FRAME, diagnostics, exemplar_jpeg, fix, header, path, pose};
 use scenecast_messages::diagnostic_msgs::DiagnosticArray;
 use scenecast_messages::geometry_msgs::PoseWithCovarianceStamped;
 use scenecast_messages::nav_msgs::Path;
 use scenecast_messages::scenecast_msgs::{self, Event};
 use scenecast_messages::sensor_msgs::{CompressedImage, NavSatFix};
 use scenecast_messages::std_msgs::Header;
-use scenecast_outlets::{Place, WORLD_FRAME, diagnostics, exemplar_jpeg, fix, header, path, pose};
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::{Duration, Instant};
 

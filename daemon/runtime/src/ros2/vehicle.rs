@@ -51,8 +51,8 @@ mod on {
     use scenecast_core::UserError;
     use scenecast_drivers::autopilot::{self, Counters};
     use scenecast_host::VehicleHost;
+    use scenecast_messages::contents::Health;
     use scenecast_messages::diagnostic_msgs::DiagnosticStatus;
-    use scenecast_outlets::Health;
     use scenecast_protocol::wire::VehicleMode;
     use scenecast_ros2::{VehicleMap, VehicleOutlet, VehicleView, start_vehicle};
     use scenecast_sensors::{CameraFault, CameraTally};

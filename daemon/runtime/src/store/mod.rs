@@ -6,8 +6,6 @@ mod files;
 #[cfg(test)]
 mod fuzz_corpus;
 #[cfg(test)]
-mod kept_command;
-#[cfg(test)]
 mod kept_log;
 mod log;
 #[cfg(test)]

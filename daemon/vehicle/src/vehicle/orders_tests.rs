@@ -5,8 +5,6 @@ use crate::{Durable, MapUpdate, Navigator};
 use proptest::prelude::*;
 use scenecast_config::Config;
 use scenecast_core::Area;
-use scenecast_motion::Motion;
-use scenecast_motion::stretches_outside;
 use scenecast_protocol::coordinates::{DecimetrePoint, MapPoint, WorldPoint};
 use scenecast_protocol::directive::{
     Areas, CellBand, Change, Constraints, Destination, Fence, Limits, PlannerKind, Polygon, Reaction, RefusalReason,
@@ -16,6 +14,8 @@ use scenecast_protocol::mac::ModemProfile;
 use scenecast_protocol::map::Cell;
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::{Intent, ModeReason, VehicleMode};
+use scenecast_worlds::Motion;
+use scenecast_worlds::stretches_outside;
 use std::collections::BTreeMap;
 use std::time::Duration;
 

@@ -3,14 +3,14 @@
 use super::raw::{self, Covered, Script};
 use scenecast_protocol::directive::{InForceDigests, InForcePart, REPORTED_SLOTS, Series, SlotState, VersionedSlot};
 use scenecast_protocol::link::{Admission, Flight, LinkWindow, SlotInbox};
-use scenecast_protocol::mac::ClockMap;
+
 use scenecast_protocol::map::{
     ClassChunk, ClassEntry, ClassReplica, LabelTree, LayerChunk, LayerDescriptor, LayerReplica, LayerSet, TextPart,
     TreeReplica,
 };
 use scenecast_protocol::object::{MAX_OBJECT, ObjectReceiver, Part, Received};
 use scenecast_protocol::seal::{Direction, HeldKey, MissionKey};
-use scenecast_protocol::time::Instant;
+use scenecast_protocol::time::{ClockMap, Instant};
 use scenecast_protocol::wire::{
     AckStatement, Address, Envelope, Frame, FrameBuilder, Header, Introduction, MAX_WINDOW, MissionId, PoseDetails,
     Reader, Seal, SessionId, Stamp, VehicleStatus,

@@ -1,7 +1,7 @@
 //! The surface's end of the link.
 //!
-//! [`SurfaceLink`] joins parts that own their state: `fleet` (the known vehicles, each a `peer`), `discovery` (calls
-//! for unknown ones), `polled` (cycles of a modem that polls). `transmit` decides when a frame goes out.
+//! [`SurfaceLink`] joins parts that own their state: `fleet` (the known vehicles, each a `peer`, and the calls for unknown
+//! ones). `transmit` decides when a frame goes out, also in the cycles of a modem that polls.
 
 mod config;
 mod fleet;
@@ -56,7 +56,7 @@ impl<R: StateReplica> SurfaceLink<R> {
     /// An end without contact; `seed` must be random for each run.
     pub fn new(config: SurfaceConfig, seed: u64, now: Instant) -> Self {
         let mut random = seed;
-        let series = Series::from_random(crate::random::next(&mut random));
+        let series = Series::from_random(crate::link::run::next_random(&mut random));
         let is_any_known = !config.vehicles.is_empty();
         let calls = Identities::new(seed ^ 0xCA11, config.authenticity.as_ref().map(|a| a.key.calls()));
         let mut link = Self {
@@ -81,7 +81,7 @@ impl<R: StateReplica> SurfaceLink<R> {
     }
 
     fn add(&mut self, vehicle: Address, now: Instant) {
-        let seed = crate::random::next(&mut self.random);
+        let seed = crate::link::run::next_random(&mut self.random);
         let c = &self.config;
         let (cell_edge, series, name) = (c.cell_edge, Some(self.series), c.name);
         let introduction = Introduction { cell_edge, series, name, clock: self.clock, ..Introduction::default() };

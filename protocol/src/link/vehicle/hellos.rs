@@ -135,7 +135,7 @@ impl CallReply {
     ) -> Grant {
         self.pending = Some((session, call.nonce.unwrap_or_default(), generation));
         let window = Duration::from_millis(250) * u32::from(call.turn.unwrap_or_default());
-        let share = (crate::random::next(&mut self.random) >> 40) as f64 / (1u64 << 24) as f64;
+        let share = (crate::link::run::next_random(&mut self.random) >> 40) as f64 / (1u64 << 24) as f64;
         let begins = now + config.modem.turn_around + window.mul_f64(share);
         Grant { begins, ends: begins + config.modem.frame_airtime() * 2 }
     }

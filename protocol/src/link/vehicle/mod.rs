@@ -1,8 +1,7 @@
 //! The vehicle's end of the link.
 //!
 //! [`VehicleLink`] joins parts that own their state: `content` (the data to send), `repeat` (copies
-//! of the frames of a turn), `timing` (the surface's clock), `discovery` (the answer to a call), `hellos` (how often
-//! hellos are answered). `turn` writes frames, `receive` handles them.
+//! of the frames of a turn), `timing` (the surface's clock), `hellos` (the answers to hellos and calls). `turn` writes frames, `receive` handles them.
 
 mod config;
 mod content;
@@ -19,13 +18,13 @@ pub use config::{OversizedChunk, VehicleConfig, VehicleEvent};
 
 use super::{LinkPair, LinkStats, SlotInbox, SlotInboxState, Wakeup};
 use crate::directive::{Budget, Slot, SlotId, SlotState};
-use crate::mac::{Access, ClockMap, Floor};
+use crate::mac::{Access, Floor};
 use crate::map::{
     Cell, ClassEntry, ClassSource, LabelGrid, LabelTree, LayerId, LayerMask, LayerSource, MapSource, StateSource,
 };
 use crate::object::ObjectId;
 use crate::schedule::{BackgroundOrder, BitBudget, Shares};
-use crate::time::Instant;
+use crate::time::{ClockMap, Instant};
 use crate::wire::{Address, Introduction, UtcHours, VehicleStatus};
 use content::{Carried, VehicleContent};
 use hellos::{CallReply, HelloLimit};

@@ -1,7 +1,6 @@
 //! The surface's clock and distance, measured from the stamps in its frames.
 
-use crate::mac::ClockMap;
-use crate::time::Instant;
+use crate::time::{ClockMap, Instant};
 use crate::wire::Stamp;
 use std::time::Duration;
 

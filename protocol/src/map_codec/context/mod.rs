@@ -4,7 +4,6 @@
 mod arith;
 mod canvas;
 mod decisions;
-mod fit;
 mod model;
 mod stage;
 pub mod training;
@@ -17,8 +16,8 @@ use crate::grid::Rect;
 use crate::map_codec::grow::Lattice;
 use arith::{BitCoder, Decoder, Encoder};
 use canvas::Canvas;
-pub(super) use fit::{best_chunk, prefix_chunk, quick_chunk};
 use model::Model;
+pub(super) use model::{best_chunk, prefix_chunk, quick_chunk};
 pub use training::Decision;
 use training::Prior;
 pub(super) use training::trace;

@@ -59,8 +59,11 @@ pub(in crate::http) async fn draft(
 
 /// The weights by the numbers of their labels. The error is one line for the operator.
 fn by_label(weights: BTreeMap<String, f64>) -> Result<BTreeMap<u8, f64>, String> {
-    let number =
-        |(label, w): (String, f64)| label.parse().map(|l| (l, w)).map_err(|_| format!("{label:?} is not a label"));
+    // `+1` and `01` would name label 1 a second time.
+    let number = |(label, weight): (String, f64)| match label.parse::<u8>() {
+        Ok(number) if number.to_string() == label => Ok((number, weight)),
+        _ => Err(format!("{label:?} is not a label")),
+    };
     weights.into_iter().map(number).collect()
 }
 

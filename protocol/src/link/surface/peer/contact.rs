@@ -1,8 +1,7 @@
 //! When a vehicle was last in contact, its clock, and when it must be contacted without a turn.
 
 use crate::link::FrameNumber;
-use crate::mac::ClockMap;
-use crate::time::Instant;
+use crate::time::{ClockMap, Instant};
 use crate::wire::Stamp;
 use std::collections::VecDeque;
 use std::time::Duration;

@@ -1,7 +1,7 @@
 //! One vehicle as the surface knows it.
 //!
-//! [`VehiclePeer`] joins parts that own their state: `content` (the copy of its state), `timing` (its clock),
-//! [`Contact`] (when it was last in contact). `turn` writes the frames of a turn, `pool` those that go out without one.
+//! [`VehiclePeer`] joins parts that own their state: `content` (the copy of its state), `contact` (when it was last in contact, and
+//! its clock), `strangers` (other surfaces, a second vehicle). `turn` writes the frames that go out to it.
 
 mod contact;
 mod content;

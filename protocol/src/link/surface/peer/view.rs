@@ -3,9 +3,8 @@
 use super::{EndedRun, InForce, OtherSurface, VehiclePeer};
 use crate::directive::{Series, Slot, SlotId, SlotProgress};
 use crate::link::{LinkStats, Mismatch};
-use crate::mac::ClockMap;
 use crate::map::{ClassReplica, LabelTree, LayerId, LayerReplica, LayerSet, Replica, StateReplica};
-use crate::time::Instant;
+use crate::time::{ClockMap, Instant};
 use crate::wire::{Backlog, VehicleStatus};
 use std::time::Duration;
 

@@ -1,10 +1,10 @@
 //! The map as messages of ROS 2: labels as an occupancy grid, explored cells as a coloured cloud, all layers as a grid map.
 
-use scenecast_messages::geometry_msgs::{Point, Pose, Quaternion};
-use scenecast_messages::grid_map_msgs::{GridMap, GridMapInfo};
-use scenecast_messages::nav_msgs::{MapMetaData, OccupancyGrid};
-use scenecast_messages::sensor_msgs::{PointCloud2, PointField};
-use scenecast_messages::std_msgs::{Float32MultiArray, Header, MultiArrayDimension, MultiArrayLayout};
+use crate::geometry_msgs::{Point, Pose, Quaternion};
+use crate::grid_map_msgs::{GridMap, GridMapInfo};
+use crate::nav_msgs::{MapMetaData, OccupancyGrid};
+use crate::sensor_msgs::{PointCloud2, PointField};
+use crate::std_msgs::{Float32MultiArray, Header, MultiArrayDimension, MultiArrayLayout};
 use scenecast_protocol::map::{Cell, Rect};
 
 /// Bytes of a point: x, y, z and the colour with four bytes each, the label, and three of padding.

@@ -1,4 +1,4 @@
-//! Maps, poses and states of scenecast as messages of ROS 2. No IO.
+//! Maps, poses and states of scenecast as messages of ROS 2.
 //!
 //! The conversions stand apart from DDS, so that recordings and viewers write the same messages without it.
 //!
@@ -11,8 +11,8 @@ mod vehicle;
 pub use map::{Grid, GridLayer, MAX_GRID_CELLS, cloud, layers, occupancy};
 pub use vehicle::{Health, Place, diagnostics, exemplar_jpeg, fix, path, pose};
 
-use scenecast_messages::builtin_interfaces::Time;
-use scenecast_messages::std_msgs::Header;
+use crate::builtin_interfaces::Time;
+use crate::std_msgs::Header;
 
 /// The world frame in ROS 2.
 pub const WORLD_FRAME: &str = "map";

@@ -1,16 +1,14 @@
 //! A vehicle as messages of ROS 2: poses, paths and positions on the Earth, exemplars, the state of its parts.
 
+use crate::Byte;
+use crate::builtin_interfaces::Time;
+use crate::diagnostic_msgs::{DiagnosticArray, DiagnosticStatus, KeyValue};
+use crate::geometry_msgs::{Point, Pose, PoseStamped, PoseWithCovariance, PoseWithCovarianceStamped, Quaternion};
+use crate::nav_msgs::Path;
+use crate::sensor_msgs::{CompressedImage, NavSatFix, NavSatStatus};
+use crate::std_msgs::Header;
 use image::codecs::jpeg::JpegEncoder;
 use scenecast_core::LatLon;
-use scenecast_messages::Byte;
-use scenecast_messages::builtin_interfaces::Time;
-use scenecast_messages::diagnostic_msgs::{DiagnosticArray, DiagnosticStatus, KeyValue};
-use scenecast_messages::geometry_msgs::{
-    Point, Pose, PoseStamped, PoseWithCovariance, PoseWithCovarianceStamped, Quaternion,
-};
-use scenecast_messages::nav_msgs::Path;
-use scenecast_messages::sensor_msgs::{CompressedImage, NavSatFix, NavSatStatus};
-use scenecast_messages::std_msgs::Header;
 use std::f64::consts::FRAC_PI_2;
 
 /// The state of one part.
@@ -87,7 +85,7 @@ pub fn pose(place: &Place, sigma_m: f64, frame: &str) -> PoseWithCovarianceStamp
     // East and north: the first and the second element of the diagonal.
     (covariance[0], covariance[7]) = (sigma_m * sigma_m, sigma_m * sigma_m);
     PoseWithCovarianceStamped {
-        header: crate::header(place.stamp.clone(), frame),
+        header: super::header(place.stamp.clone(), frame),
         pose: PoseWithCovariance { pose: place.pose(), covariance },
     }
 }
@@ -96,7 +94,7 @@ pub fn pose(place: &Place, sigma_m: f64, frame: &str) -> PoseWithCovarianceStamp
 pub fn path<'a>(places: impl IntoIterator<Item = &'a Place>, header: Header) -> Path {
     let frame = header.frame_id.clone();
     let stamped =
-        |place: &Place| PoseStamped { header: crate::header(place.stamp.clone(), &frame), pose: place.pose() };
+        |place: &Place| PoseStamped { header: super::header(place.stamp.clone(), &frame), pose: place.pose() };
     Path { poses: places.into_iter().map(stamped).collect(), header }
 }
 
