@@ -2,6 +2,7 @@
 
 use scenecast_tests::{Process, assert_refused, free_port, http, python, run, run_script, scratch, state, wait_until};
 use serde_json::Value;
+use std::collections::BTreeSet;
 use std::path::Path;
 use std::process::Output;
 use std::time::Duration;
@@ -429,6 +430,20 @@ fn assert_exports_open(name: &str, origin: &[&str]) {
         std::fs::write(path("state.json"), state(port).unwrap().to_string()).unwrap();
         placement() == before
     });
+    let labels_in = |file: &str| {
+        let table = std::fs::read_to_string(path(file)).unwrap();
+        let column = table.lines().next().unwrap().split(',').position(|name| name == "label").unwrap();
+        table.lines().skip(1).map(|line| line.split(',').nth(column).unwrap().to_owned()).collect::<BTreeSet<_>>()
+    };
+    let two = ctl(port, &["map", "--labels", "2", "--out", &path("two.csv")]);
+    assert_eq!(two.status.code(), Some(0), "{}", text(&two));
+    let (cut, all) = (labels_in("two.csv"), labels_in("map.csv"));
+    let tree = &state(port).unwrap()["vehicles"][0]["label_tree"];
+    assert!(cut.is_subset(&all) && (tree.is_null() || cut.len() <= 2), "{cut:?} of {all:?}, {tree}");
+    let png = ctl(port, &["map", "--labels", "2", "--out", &path("two.png")]);
+    assert_eq!(png.status.code(), Some(0), "{}", text(&png));
+    let json = ctl(port, &["map", "--labels", "2", "--out", &path("two.json")]);
+    assert!(json.status.code() == Some(2) && text(&json).contains("two.json"), "{}", text(&json));
     run_script(&python, "tests/exports/check.py", &[&path("")]);
 }
 

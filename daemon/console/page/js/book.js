@@ -83,15 +83,17 @@ store.on("state select", take);
 /** The number of labels that the vehicle's tree can tell apart; 0 without a tree. */
 export const finestCut = (vehicle) => (vehicle?.label_tree ? vehicle.label_tree.merges.length + 1 : 0);
 
-/** The number of labels at the cut in view. The operator's choice stays in this browser; without one all labels are shown. */
+const cutKey = (vehicle) => `label-cut ${vehicle?.id}`;
+
+/** The number of labels at the cut in view. The operator's choice for a vehicle stays in this browser; without one all are shown. */
 export function cut(vehicle) {
   const finest = finestCut(vehicle);
-  return Math.min(finest, recall("label-cut", finest) ?? finest);
+  return Math.min(finest, recall(cutKey(vehicle), finest) ?? finest);
 }
 
 /** Cuts the tree at `count` labels; null: all labels, also those to come. */
 export function setCut(count) {
-  remember("label-cut", count);
+  remember(cutKey(store.vehicle), count);
   store.emit("book");
 }
 

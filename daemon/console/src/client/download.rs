@@ -11,22 +11,27 @@ use std::time::Duration;
 const MAP_FORMATS: [&str; 8] = ["png", "geojson", "ply", "csv", "json", "utm.tif", "wgs84.tif", "tif"];
 const IMAGE_TIMEOUT: Duration = Duration::from_secs(600);
 
-/// Writes the map of a vehicle in the format of the extension.
-pub async fn save_map(session: &Session, out: &Path) -> Result<(), UserError> {
+/// Writes the map of a vehicle in the format of the extension, with `labels` labels or all of them.
+pub async fn save_map(session: &Session, out: &Path, labels: Option<u8>) -> Result<(), UserError> {
     let name = out.file_name().and_then(|name| name.to_str()).unwrap_or_default();
     let Some(format) = MAP_FORMATS.into_iter().find(|format| name.ends_with(&format!(".{format}"))) else {
         return Err(UserError::file(out, format!("the name must end in one of .{}", MAP_FORMATS.join(", ."))));
     };
+    if format == "json" && labels.is_some() {
+        return Err(UserError::file(out, "a map as JSON has all labels, and their tree to cut: leave out --labels"));
+    }
     let state = session.state().await?;
     let base = format!("/api/v2/vehicles/{}/map", session.choose(&state)?.id);
+    let cut = labels.map_or_else(String::new, |count| format!("?labels={count}"));
+    let file = |extension: &str| format!("{base}.{extension}{cut}");
     let files: Vec<(String, PathBuf)> = match format {
         "json" => vec![(base, out.to_owned())],
         "png" => vec![
-            (format!("{base}.png"), out.to_owned()),
-            (format!("{base}.pgw"), out.with_extension("pgw")),
-            (format!("{base}.png.aux.xml"), out.with_extension("png.aux.xml")),
+            (file("png"), out.to_owned()),
+            (file("pgw"), out.with_extension("pgw")),
+            (file("png.aux.xml"), out.with_extension("png.aux.xml")),
         ],
-        _ => vec![(format!("{base}.{format}"), out.to_owned())],
+        _ => vec![(file(format), out.to_owned())],
     };
     for ((_, path), bytes) in files.iter().zip(of_one_version(session, &files).await?) {
         write_whole(path, &bytes)?;

@@ -34,6 +34,12 @@ pub(crate) struct LabelsBench {
     /// Images of sea floors, in place of drawn reefs, sand and a featureless floor
     #[arg(long, value_name = "IMG", num_args = 1..)]
     mosaics: Vec<PathBuf>,
+    /// Images with the classes of the mosaics, one for each in their order, in place of NAME_label.png
+    #[arg(long, value_name = "IMG", num_args = 1.., requires = "mosaics")]
+    classes: Vec<PathBuf>,
+    /// The class of pixels that are not annotated
+    #[arg(long, value_name = "N", default_value_t = 255)]
+    no_class: u8,
     /// Write a picture of the maps of each floor: along, back, across, the true classes, seams
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
@@ -47,7 +53,7 @@ impl LabelsBench {
         let SeedArguments { first, count } = self.seeds;
         let floors = if self.mosaics.is_empty() { count as usize + 2 } else { self.mosaics.len() };
         let site = |index: usize| match (self.mosaics.get(index), index as u64) {
-            (Some(path), _) => Site::mosaic(path),
+            (Some(path), _) => Site::mosaic(path, self.classes.get(index).map(PathBuf::as_path), self.no_class),
             (None, reef) if reef < count => Ok(Site::reef(first + reef)),
             (None, other) if other == count => Ok(Site::sand()),
             (None, _) => Ok(Site::featureless()),

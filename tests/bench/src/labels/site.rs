@@ -11,7 +11,7 @@ use std::path::Path;
 /// Edge of a cell, metres and pixels.
 pub(super) const CELL_M: f64 = 0.25;
 pub(super) const CELL_PX: u32 = 25;
-/// A class that is not annotated.
+/// A class that is not annotated in drawn material.
 const NO_CLASS: u8 = 255;
 
 /// An image of a sea floor from above, a pixel a centimetre.
@@ -24,13 +24,17 @@ pub struct Site {
 
 impl Site {
     fn new(name: String, image: RgbImage, classes: &GrayImage) -> Self {
+        Self::annotated(name, image, classes, NO_CLASS)
+    }
+
+    fn annotated(name: String, image: RgbImage, classes: &GrayImage, no_class: u8) -> Self {
         let mut counts: BTreeMap<(u32, u32), BTreeMap<u8, u32>> = BTreeMap::new();
         for (x, y, pixel) in classes.enumerate_pixels() {
             *counts.entry((x / CELL_PX, y / CELL_PX)).or_default().entry(pixel.0[0]).or_default() += 1;
         }
         let most =
             |counts: BTreeMap<u8, u32>| counts.into_iter().max_by_key(|&(_, count)| count).map(|(class, _)| class);
-        let class = |(place, counts)| Some((place, most(counts).filter(|&class| class != NO_CLASS)?.into()));
+        let class = |(place, counts)| Some((place, most(counts).filter(|&class| class != no_class)?.into()));
         Self { name, image, classes: counts.into_iter().filter_map(class).collect() }
     }
 
@@ -40,18 +44,18 @@ impl Site {
         Self::new(format!("reef {seed}"), image, &classes)
     }
 
-    /// A mosaic with the classes of NAME_label.png; without this file, the site has no classes.
-    pub fn mosaic(path: &Path) -> Result<Self, UserError> {
+    /// A mosaic with the classes of this file, or of NAME_label.png; without this file, the site has no classes.
+    pub fn mosaic(path: &Path, classes: Option<&Path>, no_class: u8) -> Result<Self, UserError> {
         let image = read_image(path)?.to_rgb8();
         let name = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
-        let file = path.with_file_name(format!("{name}_label.png"));
+        let file = classes.map_or_else(|| path.with_file_name(format!("{name}_label.png")), Path::to_owned);
         let (width, height) = image.dimensions();
-        let classes = match file.is_file() {
+        let classes = match classes.is_some() || file.is_file() {
             true => read_classes(&file, (width, height))?,
-            false => vec![NO_CLASS; (width * height) as usize],
+            false => vec![no_class; (width * height) as usize],
         };
         let classes = GrayImage::from_raw(width, height, classes).unwrap_or_default();
-        Ok(Self::new(name, image, &classes))
+        Ok(Self::annotated(name, image, &classes, no_class))
     }
 
     /// Sand all over: a colour with grain of three sizes.

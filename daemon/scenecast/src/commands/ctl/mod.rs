@@ -79,6 +79,9 @@ enum CtlCommand {
         /// File to write, replaced if it exists
         #[arg(long, value_name = "FILE")]
         out: PathBuf,
+        /// Number of labels at which the tree of the labels is cut, as with the slider of the page; without it all labels
+        #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=254))]
+        labels: Option<u8>,
     },
     /// Print the labels on the map.
     #[command(after_help = "Example: scenecast ctl labels --json")]
@@ -352,7 +355,7 @@ impl CtlCommand {
     async fn run(self, session: &Session) -> Result<(), UserError> {
         match self {
             Self::Status => client::show_status(session).await,
-            Self::Map { out } => client::save_map(session, &out).await,
+            Self::Map { out, labels } => client::save_map(session, &out, labels).await,
             Self::Labels => client::show_labels(session).await,
             Self::Utility { change: None } => client::show_utility(session).await,
             Self::Utility { change: Some(UtilityCommand::Set { weights, exploration, keep }) } => {
