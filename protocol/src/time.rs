@@ -1,4 +1,4 @@
-//! Time as an argument; the crate reads no clock. The clock of the peer relative to ours.
+//! Time as an argument: the crate reads no clock. Also an estimate of the peer's clock relative to ours.
 
 use crate::wire::Stamp;
 use std::collections::VecDeque;

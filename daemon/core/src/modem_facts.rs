@@ -1,4 +1,5 @@
-//! What depends on the make of a modem: the packets of each rate, sizes, and the address of its port.
+//! Packets of a Micromodem at each rate, sizes that depend on the make of a modem, and the address of the port of a modem or an
+//! instrument.
 
 use std::fmt;
 use std::path::PathBuf;

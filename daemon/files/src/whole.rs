@@ -1,4 +1,5 @@
-//! Files that are written whole or not at all; vocabularies, and names and colours of classes.
+//! Files that are written whole or not at all, and the small ones that are read whole: vocabularies, names and colours of
+//! classes.
 
 use scene_model::words::Measures;
 use scenecast_core::UserError;

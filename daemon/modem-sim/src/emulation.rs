@@ -2,7 +2,7 @@
 //! at its ports.
 
 use super::commands::EmulatorCommand;
-use super::pty::Links;
+use super::links::Links;
 use super::scenario::{EmulatedPort, ModemFault, Scenario, ScenarioModem, node};
 use super::{Pace, tcp};
 use scenecast_core::UserError;

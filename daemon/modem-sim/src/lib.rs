@@ -6,6 +6,7 @@
 
 mod commands;
 mod emulation;
+mod links;
 #[cfg(unix)]
 mod pty;
 mod scenario;
@@ -15,7 +16,7 @@ pub use scenario::Scenario;
 
 use commands::EmulatorCommand;
 use emulation::{Emulation, FromHost};
-use pty::Links;
+use links::Links;
 use scenecast_core::UserError;
 use scenecast_runtime::Stop;
 use std::path::PathBuf;

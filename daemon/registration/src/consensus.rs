@@ -1,4 +1,5 @@
-//! The similarity (turn, scale, shift) that most tiles of a frame agree on, with relief along the rest.
+//! Similarities of the plane (turn, scale and shift), and the one that most tiles of a frame agree on, with relief along the
+//! parallax.
 
 use crate::refine::Fit;
 use crate::tiles::TileMatch;

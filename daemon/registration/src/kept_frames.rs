@@ -109,8 +109,7 @@ impl KeptFrames {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::camera_image::CameraImage;
-    use crate::camera_image::FlatField;
+    use crate::camera_image::{CameraImage, FlatField};
     use scenecast_protocol::coordinates::MapPoint;
 
     fn frame(number: u32, x_m: f64, y_m: f64) -> KeptFrame {

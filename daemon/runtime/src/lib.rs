@@ -6,6 +6,8 @@ mod durable;
 mod equipment;
 #[cfg(test)]
 mod fuzz_corpus_tests;
+#[cfg(feature = "surface")]
+mod instruments;
 mod journal;
 #[cfg(test)]
 mod kept_label_tests;

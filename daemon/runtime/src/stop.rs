@@ -3,6 +3,8 @@
 use scenecast_config::Config;
 use scenecast_core::UserError;
 use scenecast_protocol::directive::Budget;
+#[cfg(unix)]
+use tokio::signal::unix::{Signal, SignalKind, signal};
 
 /// Catches Ctrl-C and SIGTERM from its creation on, so that none is lost while the process does other work.
 pub struct Stop {
@@ -42,9 +44,6 @@ impl Stop {
         let _ = self.interrupt.recv().await;
     }
 }
-
-#[cfg(unix)]
-use tokio::signal::unix::{Signal, SignalKind, signal};
 
 /// Reads a configuration, the same file and options each time.
 pub type Load = Box<dyn Fn() -> Result<Config, UserError>>;

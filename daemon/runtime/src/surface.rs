@@ -1,9 +1,10 @@
 //! `scenecast asv`: ports, page, files and clock around the surface's host.
 
 use super::clock::{Clock, utc_hours};
+use super::instruments::{Instruments, relay};
 use super::map_files::{MapFile, MapFiles};
 use super::modem::{self, ModemPort, warn_without_key};
-use super::pilot::{self, Instruments, PilotPort, SimulatedAutopilot, relay};
+use super::pilot::{self, PilotPort, SimulatedAutopilot};
 use super::ros2::SurfaceRos2;
 use super::stop::{Load, Reload, Stop, configured_budget, keep_private};
 use super::store::{ArchivedFile, SurfaceFiles};

@@ -1,4 +1,5 @@
-//! Mutual information of two labellings of the same cells (Cover and Thomas), the score of a map, and its spatial null model.
+//! Mutual information of two labellings of the same cells (Cover and Thomas, Elements of Information Theory), the V-measure
+//! (Rosenberg and Hirschberg, EMNLP-CoNLL 2007), and the score of a map with its spatial null model.
 //!
 //! On a small scene, mutual information alone is misleading: any map made of patches has some mutual information with
 //! any annotation made of patches. The null model is the mean over the same map flipped in 3 ways and shifted on a

@@ -1,4 +1,5 @@
-//! Calibrations in the YAML that ROS writes (`camera_calibration`, `camera_info`), and the topic where it publishes them.
+//! Calibrations in the YAML that ROS writes (`camera_calibration`, `camera_calibration_parsers`), and the topic `camera_info`,
+//! where it publishes them.
 
 use crate::MAX_PIXELS;
 use scenecast_messages::sensor_msgs::CameraInfo;

@@ -1,4 +1,4 @@
-//! Depth images of ROS 2 as depth images of a camera, within their bounds.
+//! Depth images and clouds of ROS 2 as depth images of a camera, and the bounds that they are checked against.
 
 use crate::MAX_PIXELS;
 use crate::point_cloud::CloudPoints;

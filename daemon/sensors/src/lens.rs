@@ -1,5 +1,5 @@
-//! Distortion models of ROS 2 (`sensor_msgs/distortion_models.hpp`, REP 104), and the table by which distorted images are
-//! sampled.
+//! Distortion models of ROS 2 (`sensor_msgs/distortion_models.hpp`, REP 104) by the formulas of OpenCV's calib3d, and the table
+//! by which distorted images are sampled.
 
 use image::RgbImage;
 

@@ -1,4 +1,4 @@
-//! Images and poses of ROS 2 messages, and the pose of a vehicle from transforms (REP 105).
+//! What is read from ROS 2 messages: times, pixels, poses, and the pose of a vehicle from a tree of transforms (REP 105).
 
 use crate::{BitDepth, RawImage, RawImageError, Rotation, SensorPose, Stamp};
 use image::RgbImage;

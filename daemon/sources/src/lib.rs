@@ -27,14 +27,10 @@ pub use live::{
 #[cfg(feature = "ros2")]
 pub use ros_calibration::CalibrationTopic;
 #[cfg(feature = "ros2")]
-pub use ros_camera::RosDepth;
-#[cfg(feature = "ros2")]
-pub use ros_camera::{RosCamera, RosCameraOptions};
+pub use ros_camera::{RosCamera, RosCameraOptions, RosDepth};
 #[cfg(feature = "ros2")]
 pub use ros_node::SensorNode;
 #[cfg(feature = "ros2")]
-pub use ros_transforms::RosNavigation;
-#[cfg(feature = "ros2")]
-pub use ros_transforms::RosTransforms;
+pub use ros_transforms::{RosNavigation, RosTransforms};
 pub use tum_poses::read_tum_poses;
 pub use watch::WatchSource;

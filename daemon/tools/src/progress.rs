@@ -1,4 +1,5 @@
-//! What commands print: progress of long work on the standard error output, figures as lines or JSON; and their seeds.
+//! Progress of long work on the standard error output, figures as lines for people or as JSON, and the seeds of repeated
+//! measurements.
 
 use clap::{Args, ValueEnum};
 use indicatif::{FormattedDuration, ProgressBar, ProgressState, ProgressStyle};

@@ -2,7 +2,8 @@
 //!
 //! [`patches`] draws a sea floor from the generative process of the scene model, as an image with the class of each
 //! pixel. [`Reef`] is a sea floor that looks like one, with a camera over it. [`sample`] draws a label map from the prior
-//! itself. [`Motion`] and [`Odometry`] are the true motion of a vehicle and what its sensors make of it. All are functions of their arguments: the same seed gives the same world. The crate does no input or output.
+//! itself. [`Motion`] and [`Odometry`] are the true motion of a vehicle and what its sensors make of it. All are functions of
+//! their arguments: the same seed gives the same world. No input or output; no crate that goes to sea uses this one.
 //!
 //! ```
 //! // 640 x 480 pixels, patches of about 60 pixels, at most 6 classes.

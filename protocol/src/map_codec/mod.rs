@@ -12,10 +12,11 @@ mod header;
 mod png;
 #[allow(clippy::indexing_slicing)]
 mod raster;
-#[allow(clippy::indexing_slicing)]
+#[allow(clippy::indexing_slicing)] // Columns and rows of its own square.
 mod series;
 #[cfg(test)]
 mod tests;
+
 pub(crate) use chunk::encode_quickly;
 pub use chunk::{ChunkPatch, Codec, DecodeError, MapChunk, decode, encode, encode_every, patch, trace};
 pub use context::{Decision, training};

@@ -1,4 +1,5 @@
-//! The places of cells with their neighbours, the space in which they are compared, and the mean with those that look alike.
+//! The places of cells with their neighbours, the space in which they are compared, and the mean with those that look alike: a
+//! bilateral filter (Tomasi and Manduchi 1998), as a fixed window mixes habitats at their borders.
 //!
 //! Neighbouring cells mostly show one habitat, so their differences are noise, and a measure counts for little where it differs much
 //! between them: a discriminant without classes, as in maximum autocorrelation factors (Switzer and Green 1984).

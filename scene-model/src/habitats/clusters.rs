@@ -1,5 +1,5 @@
-//! Clusters of cells that look alike, found without random numbers, and the tree over them: which two become one at each coarser
-//! cut.
+//! Clusters of cells that look alike, found without random numbers by splits across the main direction, then k-means (Lloyd
+//! 1982). The tree over their labels tells which two become one at each coarser cut (Ward 1963).
 
 use super::cells::{Coordinates, squared_distance};
 use nalgebra::{DMatrix, SymmetricEigen};

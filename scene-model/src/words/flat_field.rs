@@ -1,4 +1,5 @@
-//! Brightness: the flat field that lamp, lens and water make, the tone stretch, and running means and variances.
+//! The flat field (how bright lamp, lens and water make each part of a frame, learnt from the frames themselves), the tone
+//! stretch of each channel, and running means and variances.
 
 use super::grey_plane::GreyPlane;
 use image::RgbImage;

@@ -1,5 +1,5 @@
-//! Access by tokens, which programs send in a header and the page in a cookie; how many streams a principal has, and how fast it
-//! may edit.
+//! Access by tokens: programs send one in a header, the page a cookie from the login. Also the limits of each principal: streams
+//! of events, and edits a second.
 
 use axum::http::{HeaderMap, header};
 use scenecast_config::TokenGrant;

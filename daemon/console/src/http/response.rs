@@ -1,4 +1,5 @@
-//! Bodies of orders and of responses, in fewer bytes where the client takes them, or none where it has them.
+//! Replies as HTTP responses, compressed for clients that accept gzip, or only status 304 for those that have the content; and
+//! the bodies of orders as JSON.
 
 use crate::request::Reply;
 use crate::state::{ArchiveList, ErrorBody};

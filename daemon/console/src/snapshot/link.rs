@@ -6,8 +6,7 @@ use crate::state::{ChannelQuality, LinkDirection, LinkSummary, ReportedBacklog, 
 use scenecast_core::drop_counts::dropped;
 use scenecast_protocol::link::{Goodput, LinkStats, Loss, PeerView};
 use scenecast_protocol::schedule::Class;
-use scenecast_protocol::time::ClockMap;
-use scenecast_protocol::time::Instant;
+use scenecast_protocol::time::{ClockMap, Instant};
 use scenecast_protocol::wire::{Backlog, Stamp};
 use scenecast_surface::Surface;
 use std::collections::BTreeMap;

@@ -1,6 +1,6 @@
 //! Autopilots: state machines between the vehicle's role and the bytes of its flight controller.
 //!
-//! Waypoints go out, steps of the track come in, fixes go out. None of them does IO; [`crate::runtime`] moves their bytes.
+//! Waypoints go out, steps of the track come in, fixes go out. None of them does IO; `scenecast-runtime` moves their bytes.
 //!
 //! | kind | is |
 //! |---|---|

@@ -7,8 +7,7 @@ use scenecast_config::{Config, cell_m};
 use scenecast_core::{Area, UserError};
 use scenecast_files::{RecordedFrame, Recorder, Recording, configured_recording};
 use scenecast_protocol::time::Instant;
-use scenecast_worlds::Motion;
-use scenecast_worlds::View;
+use scenecast_worlds::{Motion, View};
 use std::path::Path;
 use std::sync::OnceLock;
 

@@ -1,6 +1,10 @@
 //! Labels of other programs: their sources, and the thread that makes them a map.
 
+#[cfg(any(test, feature = "ros2"))]
+mod echo;
 mod feed;
+#[cfg(unix)]
+mod local;
 mod moment;
 mod own_poses;
 mod refusal_log;

@@ -50,7 +50,7 @@ fn feed(
         LabelSource::Folder(dir) => Ok(Feed::folder(LabelFolder::new(dir, mark.map(str::to_owned)))),
         LabelSource::Network(place) => super::serve::network(place.as_str(), key),
         #[cfg(unix)]
-        LabelSource::Local(path) => super::serve::local(path, key),
+        LabelSource::Local(path) => super::local::local(path, key),
         #[cfg(not(unix))]
         LabelSource::Local(_) => Err(UserError::Input(format!("{key}: this system has no Unix sockets"))),
         LabelSource::Ros2(topic, message) => {

@@ -45,8 +45,7 @@ impl VehicleRos2 {
 
 #[cfg(feature = "ros2")]
 mod on {
-    use crate::equipment::LabelHealth;
-    use crate::equipment::RecentFaults;
+    use crate::equipment::{LabelHealth, RecentFaults};
     use scenecast_config::Config;
     use scenecast_core::UserError;
     use scenecast_drivers::autopilot::{self, Counters};

@@ -14,8 +14,7 @@ use scenecast_protocol::mac::ModemProfile;
 use scenecast_protocol::map::Cell;
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::{Intent, ModeReason, VehicleMode};
-use scenecast_worlds::Motion;
-use scenecast_worlds::stretches_outside;
+use scenecast_worlds::{Motion, stretches_outside};
 use std::collections::BTreeMap;
 use std::time::Duration;
 

@@ -1,7 +1,6 @@
 //! The kinds of decisions about a cell: whether it stays unexplored, whether it keeps its label, and which label it gets.
 
-use super::canvas::Canvas;
-use super::canvas::{View, magnitude};
+use super::canvas::{Canvas, View, magnitude};
 use super::stage::{Contexts, MAX_KEYED, StageLayout};
 use crate::grid::MAX_LABEL;
 

@@ -1,4 +1,5 @@
-//! The login form, which exchanges a token for a cookie; the client's principal, and changes of command.
+//! Who a client is: the login form, which exchanges a token for a cookie, the end of the session, the client's principal, and
+//! changes of command.
 
 use crate::http::access::COOKIE;
 use crate::http::response::{JsonOrder, error, not_found};
