@@ -4,7 +4,7 @@
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 version=4.32.5
-program=${SCENECAST:-${CARGO_TARGET_DIR:-target}/release/scenecast}
+program=$(realpath "${SCENECAST:-${CARGO_TARGET_DIR:-target}/release/scenecast}")
 mkdir -p "${CARGO_TARGET_DIR:-target}"
 place=$(realpath "${CARGO_TARGET_DIR:-target}")/schemathesis
 if [ "$(cat "$place/version" 2> /dev/null)" != "$version" ]; then
@@ -25,6 +25,8 @@ cat > "$out/schemathesis.toml" << 'TOML'
 [checks]
 positive_data_acceptance.expected-statuses = ["2xx", "3xx", "401", "403", "404", "409", "422", "429"]
 TOML
+# It keeps files of its own in the folder that it runs in.
+cd "$out"
 # The stream of events never ends. One name of a client for all requests, so that most of them have command.
 code=0
 "$place/bin/schemathesis" --config-file "$out/schemathesis.toml" run "http://127.0.0.1:$port/api/openapi.json" \

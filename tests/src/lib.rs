@@ -54,11 +54,14 @@ pub fn skip(why: &str) {
     let _ = std::io::stderr().write_all(line.as_bytes());
 }
 
+/// Settings of a sea floor and of images that cost a machine a quarter of the usual ones.
+pub const LIGHT: [&str; 6] =
+    ["--set", "world.kind=patches", "--set", "camera.width_px=320", "--set", "camera.height_px=240"];
+
 /// A demo at a speed, with more arguments. Its sea floor and its images cost a machine a quarter of the usual ones.
 pub fn demo(port: u16, speed: u32, more: &[&str]) -> Process {
     let (port, speed) = (port.to_string(), speed.to_string());
-    let light = ["--set", "world.kind=patches", "--set", "camera.width_px=320", "--set", "camera.height_px=240"];
-    Process::start(&[&["demo", "--port", &port, "--speed", &speed][..], &light, more].concat())
+    Process::start(&[&["demo", "--port", &port, "--speed", &speed][..], &LIGHT, more].concat())
 }
 
 /// Runs a command to its end.

@@ -1,6 +1,8 @@
 //! The API as used by programs: its document, its files, `scenecast ctl`.
 
-use scenecast_tests::{Process, assert_refused, free_port, http, python, run, run_script, scratch, state, wait_until};
+use scenecast_tests::{
+    LIGHT, Process, assert_refused, free_port, http, python, run, run_script, scratch, state, wait_until,
+};
 use serde_json::Value;
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -367,8 +369,7 @@ fn command_passes_from_one_operator_to_another_in_a_shell() {
 fn last_seen_reaches_the_surface_and_its_exports_if_requested() {
     let out = scratch("last-seen");
     let report = |sets: &[&str]| -> Value {
-        let small = ["--set", "world.kind=patches", "--set", "camera.width_px=320", "--set", "camera.height_px=240"];
-        let sim = [&["sim", "--duration", "120", "--seed", "3", "--force", "--out", out.to_str().unwrap()], &small[..]]
+        let sim = [&["sim", "--duration", "120", "--seed", "3", "--force", "--out", out.to_str().unwrap()], &LIGHT[..]]
             .concat();
         let ran = run(&[&sim[..], sets].concat());
         assert_eq!(ran.status.code(), Some(0), "{}", text(&ran));

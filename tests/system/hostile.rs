@@ -1,7 +1,7 @@
 //! Clients that are slow or hostile: they cost the surface neither its link nor its memory.
 
 use super::api::surface_at;
-use scenecast_tests::{Process, free_port, http, http_whole, is_full, scratch, state, wait_until};
+use scenecast_tests::{LIGHT, Process, free_port, http, http_whole, is_full, scratch, state, wait_until};
 use serde_json::Value;
 use std::io::{Read, Write};
 use std::net::TcpStream;
@@ -140,14 +140,8 @@ fn no_client_stalls_the_link_or_fills_the_memory() {
 /// A vehicle whose modem is at this port of the surface.
 fn vehicle_at(modem: u16, dir: &Path) -> Process {
     let config = scenecast_tests::workspace().join("config/auv.toml");
-    let sets = [
-        format!("modem.connect=127.0.0.1:{modem}"),
-        format!("runtime.state_dir=\"{}\"", dir.display()),
-        "world.kind=patches".to_owned(),
-        "camera.width_px=320".to_owned(),
-        "camera.height_px=240".to_owned(),
-    ];
-    let mut arguments = vec!["auv", "--config", config.to_str().unwrap()];
+    let sets = [format!("modem.connect=127.0.0.1:{modem}"), format!("runtime.state_dir=\"{}\"", dir.display())];
+    let mut arguments = [&["auv", "--config", config.to_str().unwrap()][..], &LIGHT].concat();
     arguments.extend(sets.iter().flat_map(|s| ["--set", s]));
     Process::start(&arguments)
 }

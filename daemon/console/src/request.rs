@@ -349,7 +349,7 @@ fn accepted_as(slot: SlotId, name: &str, vehicle: Address, issued: Result<u16, S
 fn order_exemplar(surface: &mut Surface, vehicle: Address, order: &ExemplarOrder, now: Instant) -> Result<u16, String> {
     let ExemplarOrder { label, action, image } = *order;
     if action != ExemplarAction::Larger && image.is_some() {
-        return Err("image names the picture of the action larger alone".to_owned());
+        return Err("image is for the action larger only".to_owned());
     }
     match action {
         ExemplarAction::Another => surface.request_exemplar(vehicle, label, RequestKind::Another, now),

@@ -82,6 +82,7 @@ impl std::error::Error for UserError {}
 /// The text with each control character but line feed and tab, and each character that changes the direction of writing, as
 /// `\uXXXX`. A name could otherwise move the cursor, or show one word in place of another. In JSON the text stays the same value.
 pub fn printable(text: &str) -> Cow<'_, str> {
+    use std::fmt::Write as _;
     if !text.chars().any(is_unsafe) {
         return Cow::Borrowed(text);
     }
@@ -89,7 +90,7 @@ pub fn printable(text: &str) -> Cow<'_, str> {
     for character in text.chars() {
         match is_unsafe(character) {
             // All of them have four digits.
-            true => drop(std::fmt::Write::write_fmt(&mut out, format_args!("\\u{:04x}", u32::from(character)))),
+            true => drop(write!(out, "\\u{:04x}", u32::from(character))),
             false => out.push(character),
         }
     }

@@ -321,7 +321,7 @@ mod tests {
     use proptest::prelude::*;
     use scenecast_protocol::directive::CellBand;
 
-    pub(in self::super) fn row(alpha: f64, mutual_information_nats: f64, stream_bps: f64) -> Row {
+    fn row(alpha: f64, mutual_information_nats: f64, stream_bps: f64) -> Row {
         let setting = Setting {
             cell_m: 0.25,
             alpha,

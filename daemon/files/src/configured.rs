@@ -1,9 +1,10 @@
-//! The recording that the settings name as the camera.
+//! The recording that the settings name as the camera, and the vocabulary that they name.
 
 use crate::bag_recording::{BagTiming, BagTopics};
 use crate::recording::Recording;
 use crate::tum_recording::TumOptions;
 use scene_model::project::View;
+use scene_model::words::Measures;
 use scenecast_config::{CalibrationSource, CameraSource, Config, NavigationSource};
 use scenecast_core::UserError;
 use scenecast_sensors::{BitDepth, Calibration, CameraMounting, Sight, read_calibration};
@@ -94,4 +95,22 @@ pub fn open_bag(bag: &str, odometry: Option<&str>, timing: &BagTiming) -> Result
         None => (bag, None),
     };
     Recording::open_bag(Path::new(file), BagTopics { images, odometry }, timing)
+}
+
+/// Most bytes of a vocabulary; one takes some kilobytes.
+const MAX_VOCABULARY_BYTES: u64 = 1 << 20;
+
+/// Reads a vocabulary that `scenecast vocabulary train` wrote.
+pub fn read_vocabulary(path: &Path) -> Result<Measures, UserError> {
+    let bytes = scenecast_config::read_regular(path, MAX_VOCABULARY_BYTES)?;
+    let advice = "make one with scenecast vocabulary train";
+    scene_model::vocabulary::load(&bytes).map_err(|e| UserError::file(path, format!("{e}; {advice}")))
+}
+
+/// The vocabulary of `scene.vocabulary`; `None` for the one that ships.
+///
+/// # Errors
+/// As [`read_vocabulary`].
+pub fn configured_vocabulary(file: Option<&Path>) -> Result<Option<Measures>, UserError> {
+    file.map(read_vocabulary).transpose()
 }

@@ -14,10 +14,12 @@ mod whole;
 
 pub use bag::Bag;
 pub use bag_recording::{BagTiming, BagTopics};
-pub use configured::{configured_calibration, configured_mounting, configured_recording, open_bag};
+pub use configured::{
+    configured_calibration, configured_mounting, configured_recording, configured_vocabulary, open_bag, read_vocabulary,
+};
 pub use geojson::{AreaShape, CoordinateFrame, FenceShapes, read_areas, read_fence};
 pub use images::{FrameImage, read_classes, read_image};
-pub use label_folder::{FolderItem, LabelFolder};
+pub use label_folder::{FolderItem, LabelFolder, read_class_names};
 pub use recording::{DepthFile, RecordedFrame, Recorder, Recording, write_poses};
 pub use tum_recording::{TUM_UNITS_PER_M, TumFolder, TumFrame, TumOptions, read_depth, tum_camera};
-pub use whole::{configured_vocabulary, read_class_names, read_vocabulary, sync_folder, write_whole};
+pub use whole::{sync_folder, write_whole};

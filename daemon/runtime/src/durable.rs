@@ -91,7 +91,7 @@ impl<S: Storage> Keeper<S> {
             forgetful(&storage.path(name), damage, lineage, checkpoint, first)
         };
         let (mut durable, is_again) = match found {
-            Found::Absent if !restore::is_there(storage) => (first.durable(lineage), false),
+            Found::Absent if !restore::has_checkpoint(storage) => (first.durable(lineage), false),
             Found::Absent => (forgotten(JOURNAL.journal, &Damage::Missing), true),
             Found::Lost(name, damage) => (forgotten(name, &damage), true),
             Found::State { body, damage } => match decode(&body) {

@@ -128,7 +128,7 @@ const NAME: &str = "scene.checkpoint";
 const LABELS: &str = "labels.checkpoint";
 
 /// Whether the folder has a checkpoint, readable or not.
-pub(super) fn is_there(storage: &impl Storage) -> bool {
+pub(super) fn has_checkpoint(storage: &impl Storage) -> bool {
     [NAME, LABELS].into_iter().any(|name| !matches!(storage.read(name), Ok(None)))
 }
 

@@ -8,5 +8,5 @@ mod progress;
 mod scene;
 mod zopfli;
 
-pub use progress::{Progress, ProgressForm, SeedArguments, print_figures};
+pub use progress::{Progress, ProgressForm, print_figures};
 pub use zopfli::Zopfli;

@@ -1,7 +1,6 @@
-//! Progress of long work on the standard error output, figures as lines for people or as JSON, and the seeds of repeated
-//! measurements.
+//! What commands print: progress of long work on the standard error output, and figures as lines for people or as JSON.
 
-use clap::{Args, ValueEnum};
+use clap::ValueEnum;
 use indicatif::{FormattedDuration, ProgressBar, ProgressState, ProgressStyle};
 use scenecast_core::{UserError, errln, out, outln};
 use serde::Serialize;
@@ -171,17 +170,6 @@ fn text(value: &Value) -> String {
         Value::Number(number) if number.is_f64() => format!("{:.4}", number.as_f64().unwrap_or_default()),
         other => other.to_string(),
     }
-}
-
-/// The seeds of a measurement that is repeated.
-#[derive(Debug, Clone, Copy, Args)]
-pub struct SeedArguments {
-    /// First seed
-    #[arg(long = "seed", value_name = "SEED", default_value_t = 1)]
-    pub first: u64,
-    /// Number of seeds, from --seed on; each draws all that is random
-    #[arg(long = "seeds", value_name = "N", default_value_t = 10, value_parser = clap::value_parser!(u64).range(1..=1000))]
-    pub count: u64,
 }
 
 #[cfg(test)]

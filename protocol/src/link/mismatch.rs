@@ -124,7 +124,7 @@ impl MismatchReport {
     }
 
     pub(super) fn handle_accepted(&mut self) {
-        (self.tagged, self.current, self.untrue) = (0, None, None);
+        (self.tagged, self.from_own_address, self.current, self.untrue) = (0, 0, None, None);
     }
 
     pub(super) fn current(&self) -> Option<Mismatch> {

@@ -4,7 +4,8 @@ use clap::Args;
 use scenecast_config::Config;
 use scenecast_core::UserError;
 use scenecast_rehearsal::World;
-use scenecast_tools::{Progress, SeedArguments};
+use scenecast_tools::Progress;
+use scenecast_tools::commands::SeedArguments;
 use std::path::{Path, PathBuf};
 
 /// The seeds, the sea floors and the duration of surveys.

@@ -322,7 +322,7 @@ fn commands() -> Vec<Operation> {
                 "Requests command, hands it over, takes it or gives it up. Without command, orders other than hold and abort \
                  are refused with status 409.",
                 schema::<CommandOrder>,
-                || post(login::command),
+                || post(orders::command),
             )
         },
     ]

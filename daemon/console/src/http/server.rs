@@ -106,7 +106,7 @@ fn router(shared: Shared) -> Router {
 static FILES: &[(&str, &[u8])] = include!(concat!(env!("OUT_DIR"), "/page.rs"));
 
 /// Content type and bytes of a file of the page; the empty path means index.html.
-pub(super) fn find(path: &str) -> Option<(&'static str, &'static [u8])> {
+pub(super) fn find_page_file(path: &str) -> Option<(&'static str, &'static [u8])> {
     let path = if path.is_empty() { "index.html" } else { path };
     let &(name, bytes) = FILES.iter().find(|(name, _)| *name == path)?;
     let content_type = match name.rsplit('.').next() {
@@ -129,7 +129,7 @@ pub fn page_files() -> impl Iterator<Item = (&'static str, &'static [u8])> {
 /// Serves a file of the page.
 pub(super) async fn page(uri: Uri, headers: HeaderMap) -> Response {
     const SUM: Crc<u32> = Crc::<u32>::new(&CRC_32_ISCSI);
-    let Some((content_type, bytes)) = find(uri.path().trim_start_matches('/')) else { return not_found() };
+    let Some((content_type, bytes)) = find_page_file(uri.path().trim_start_matches('/')) else { return not_found() };
     let tag = format!("{:08x}", SUM.checksum(bytes));
     tagged(&headers, &tag, || ([(header::CONTENT_TYPE, content_type)], bytes).into_response())
 }
@@ -140,7 +140,7 @@ mod tests {
 
     #[test]
     fn the_page_and_the_daemon_have_the_same_palette() {
-        let (_, script) = find("js/palette-table.js").unwrap();
+        let (_, script) = find_page_file("js/palette-table.js").unwrap();
         let hex: String = std::str::from_utf8(script).unwrap().split('"').skip(1).step_by(2).collect();
         let page: Vec<u32> = hex
             .as_bytes()

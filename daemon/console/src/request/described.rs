@@ -115,10 +115,9 @@ mod tests {
         let weights = SurfaceRequest::Utility(1, [(3, 0.8), (4, 0.0)].into(), (0.1, 0.0));
         assert_eq!(text(weights), Some(("order", "weights: label 3 +0.80, unexplored +0.10".into())));
         let limits = LimitsOrder { time_s: Some(600.0), on_silence: Some("hold".into()), ..LimitsOrder::default() };
-        assert_eq!(
-            text(SurfaceRequest::Limits(1, OrderChanges::whole(&limits))),
-            Some(("order", "limits: on silence hold, time s 600.0; removed: altitude m, depth m, distance m, on abort, on breach, silence s".into()))
-        );
+        let whole = "limits: on silence hold, time s 600.0; \
+                     removed: altitude m, depth m, distance m, on abort, on breach, silence s";
+        assert_eq!(text(SurfaceRequest::Limits(1, OrderChanges::whole(&limits))), Some(("order", whole.into())));
         let changes = serde_json::from_str(r#"{"depth_m": null, "time_s": 60}"#).unwrap();
         assert_eq!(
             text(SurfaceRequest::Limits(1, changes)),

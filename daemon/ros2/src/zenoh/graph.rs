@@ -75,7 +75,7 @@ impl Graph {
 const MAX_MESSAGE: usize = 64 << 20;
 
 /// A session that connects to the router in the background, and again whenever the connection ends.
-pub(super) fn open(settings: &Ros2) -> zenoh::Result<Session> {
+pub(super) fn open_session(settings: &Ros2) -> zenoh::Result<Session> {
     let router = format!("[\"{}\"]", settings.zenoh_router);
     let max_message = MAX_MESSAGE.to_string();
     let mut config = Config::default();

@@ -39,7 +39,7 @@ impl Zenoh {
     ///
     /// The session did not open, for example since no port of the loopback network is free.
     pub fn start(settings: &Ros2, name: &str) -> Result<Arc<Self>, UserError> {
-        let session = graph::open(settings).map_err(|e| failed("Zenoh did not start", &e))?;
+        let session = graph::open_session(settings).map_err(|e| failed("Zenoh did not start", &e))?;
         let id = session.zid().to_string();
         let graph = Arc::new(Graph::new(id.clone()));
         let tokens = TokenMaker { domain: settings.domain, session: id, node: name.to_owned() };
@@ -65,8 +65,8 @@ impl Zenoh {
         let refused = |e: zenoh::Error| failed(name.as_str(), &e);
         // Any type hash, for publishers of Humble, which have none.
         let key = endpoint.key(self.tokens.domain, "*");
-        let read = publisher::reader(filler, &endpoint);
-        let subscriber = publisher::declare(&self.session, key, qos, read).map_err(refused)?;
+        let read = publisher::subscription_reader(filler, &endpoint);
+        let subscriber = publisher::declare_subscription(&self.session, key, qos, read).map_err(refused)?;
         let (token, _) = self.announce(Kind::Subscription, &endpoint, qos).map_err(refused)?;
         let alive = Arc::new(());
         let (ended, graph) = (Arc::downgrade(&alive), self.graph.clone());

@@ -139,7 +139,10 @@ enum Unreadable {
 }
 
 /// Reads samples into an inbox.
-pub(super) fn reader<M: Message>(filler: Filler<M>, endpoint: &Endpoint) -> impl Fn(Sample) + Send + Sync + 'static {
+pub(super) fn subscription_reader<M: Message>(
+    filler: Filler<M>,
+    endpoint: &Endpoint,
+) -> impl Fn(Sample) + Send + Sync + 'static {
     let Endpoint { topic, hash, .. } = endpoint.clone();
     let is_told = AtomicBool::new(false);
     move |sample| {
@@ -163,7 +166,7 @@ pub(super) fn reader<M: Message>(filler: Filler<M>, endpoint: &Endpoint) -> impl
 }
 
 /// Declares a subscription, which ends when it is dropped.
-pub(super) fn declare(
+pub(super) fn declare_subscription(
     session: &Session,
     key: String,
     qos: Qos,

@@ -54,7 +54,7 @@ impl Planner for Horizon {
             rate = found;
         }
         // Where everything around is seen, every path of the beam turns on the spot; the greedy path leads out.
-        let (path, found) = lawnmower::best(q);
+        let (path, found) = lawnmower::best_gain(q);
         if found > own { path } else { best }
     }
 }

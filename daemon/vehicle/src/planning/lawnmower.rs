@@ -104,12 +104,12 @@ pub struct Greedy;
 
 impl Planner for Greedy {
     fn plan(&mut self, q: &PlanRequest<'_>) -> Vec<Node> {
-        best(q).0
+        best_gain(q).0
     }
 }
 
 /// The path with the best gain a metre, and this rate.
-pub(super) fn best(q: &PlanRequest<'_>) -> (Vec<Node>, f64) {
+pub(super) fn best_gain(q: &PlanRequest<'_>) -> (Vec<Node>, f64) {
     let paths = q.lattice.paths(q.from);
     let mut mark = vec![usize::MAX; q.values.blocks()];
     let mut best = (f64::MIN, None);

@@ -56,7 +56,7 @@ pub(super) fn on_user(base: &mut MicromodemBase, packet: &Packet, signal: &Packe
 }
 
 /// The host sends flexible data: `$CCTDP,<dst>,<rate>,<ack>,<reserved>,<hex>`.
-pub(super) fn on_command(base: &mut MicromodemBase, sentence: &NmeaSentence, now: Duration) {
+pub(super) fn on_flexible_command(base: &mut MicromodemBase, sentence: &NmeaSentence, now: Duration) {
     let fields = (sentence.number::<u8>(0), sentence.number::<u8>(1), from_hex(sentence.text(4)));
     let (Some(dst), Some(rate), Some(data)) = fields else {
         return base.report_error("NMEA", 1, "CCTDP: wrong field", now);
@@ -87,7 +87,7 @@ pub(super) fn on_command(base: &mut MicromodemBase, sentence: &NmeaSentence, now
 }
 
 /// `$CARDP,<src>,<dst>,<rate>,<ack>,<reserved>,<mini>,<data>`, the last two empty or triples joined by `;`.
-pub(super) fn on_packet(base: &mut MicromodemBase, packet: &Packet, signal: &PacketSignal, now: Duration) {
+pub(super) fn on_flexible_packet(base: &mut MicromodemBase, packet: &Packet, signal: &PacketSignal, now: Duration) {
     let base64 = base.nvram.is_on("recv.base64data");
     let (mini, data) = packet.frames.split_at(packet.frames.len().min(1));
     let (mini, data) = (triples(mini, base64), triples(data, base64));

@@ -142,7 +142,7 @@ impl Micromodem {
             "CCCYC" => cycles.on_command(base, sentence, now),
             "CCTXD" => cycles.on_data(base, sentence, false, now),
             "CCTXA" => cycles.on_data(base, sentence, true, now),
-            "CCTDP" => minipacket::on_command(base, sentence, now),
+            "CCTDP" => minipacket::on_flexible_command(base, sentence, now),
             "CCMPC" => minipacket::on_ping_command(base, sentence, now),
             "CCMUC" => minipacket::on_user_command(base, sentence, now),
             "CCMSC" => {
@@ -161,7 +161,7 @@ impl Micromodem {
             PacketKind::CycleInit => cycles.on_init(base, packet, signal, now),
             PacketKind::Data => cycle::on_data_packet(base, packet, signal, now),
             PacketKind::Ack => cycle::on_ack(base, packet, signal, now),
-            PacketKind::Flexible => minipacket::on_packet(base, packet, signal, now),
+            PacketKind::Flexible => minipacket::on_flexible_packet(base, packet, signal, now),
             PacketKind::Ping => minipacket::on_ping(base, packet, signal, now),
             PacketKind::PingReply => minipacket::on_ping_reply(base, packet, signal, now),
             PacketKind::User => minipacket::on_user(base, packet, signal, now),

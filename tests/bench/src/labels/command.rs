@@ -6,7 +6,8 @@ use crate::surveys::{nats, print_json};
 use clap::Args;
 use scenecast_core::UserError;
 use scenecast_files::write_whole;
-use scenecast_tools::{Progress, SeedArguments};
+use scenecast_tools::Progress;
+use scenecast_tools::commands::SeedArguments;
 use std::io::Cursor;
 use std::path::PathBuf;
 

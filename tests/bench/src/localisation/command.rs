@@ -4,7 +4,8 @@ use super::{Localisation, localisation, localisation_plot, run_with_outliers};
 use clap::Args;
 use scenecast_core::UserError;
 use scenecast_files::write_whole;
-use scenecast_tools::{Progress, SeedArguments};
+use scenecast_tools::Progress;
+use scenecast_tools::commands::SeedArguments;
 use std::path::PathBuf;
 
 /// The error of the vehicle's position over 3 km, with a drift of 1 % of the distance: by dead reckoning alone, with a

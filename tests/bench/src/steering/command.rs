@@ -3,7 +3,8 @@
 use super::{SteeringFigures, SteeringPair, measure_steering};
 use clap::Args;
 use scenecast_core::UserError;
-use scenecast_tools::{Progress, SeedArguments};
+use scenecast_tools::Progress;
+use scenecast_tools::commands::SeedArguments;
 
 /// The effect of a weighed label on the survey of a drawn reef: two rehearsals a seed, one with the order and one without.
 ///

@@ -1,24 +1,21 @@
-//! Who a client is: the login form, which exchanges a token for a cookie, the end of the session, the client's principal, and
-//! changes of command.
+//! Who a client is: the login form, which exchanges a token for a cookie, the end of the session, and the client's principal.
 
 use crate::http::access::COOKIE;
-use crate::http::response::{JsonOrder, error, not_found};
+use crate::http::response::{error, not_found};
 use crate::http::server;
 use crate::http::shared::Shared;
-use crate::orders::{CommandOrder, CommandOrderAction};
-use crate::request::SurfaceRequest;
 use crate::snapshot::principal_info;
 use axum::extract::State;
 use axum::extract::rejection::FormRejection;
 use axum::http::{HeaderMap, StatusCode, header};
 use axum::response::{Html, IntoResponse, Redirect, Response};
 use axum::{Extension, Form, Json};
-use scenecast_surface::{CommandAction, Giver};
+use scenecast_surface::Giver;
 use serde::Deserialize;
 use zeroize::Zeroizing;
 
 fn form(message: &str) -> Html<String> {
-    let (_, page) = server::find("login.html").unwrap_or_default();
+    let (_, page) = server::find_page_file("login.html").unwrap_or_default();
     Html(String::from_utf8_lossy(page).replace("<!-- message -->", message))
 }
 
@@ -63,20 +60,4 @@ pub(in crate::http) async fn logout(State(shared): State<Shared>, headers: Heade
 /// Name and role of the client's principal.
 pub(in crate::http) async fn principal(by: Option<Extension<Giver>>) -> Response {
     by.map_or_else(not_found, |Extension(by)| Json(principal_info(&by.principal)).into_response())
-}
-
-pub(in crate::http) async fn command(
-    State(shared): State<Shared>,
-    Extension(by): Extension<Giver>,
-    JsonOrder(order): JsonOrder<CommandOrder>,
-) -> Response {
-    let action = match order.action {
-        CommandOrderAction::Request => CommandAction::Request,
-        CommandOrderAction::Withdraw => CommandAction::Withdraw,
-        CommandOrderAction::Take => CommandAction::Take,
-        CommandOrderAction::HandOver => CommandAction::HandOver(order.to),
-        CommandOrderAction::Release => CommandAction::Release,
-        CommandOrderAction::Keep => CommandAction::Keep,
-    };
-    shared.order(by, SurfaceRequest::Command(action)).await
 }

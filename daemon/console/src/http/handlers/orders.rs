@@ -1,8 +1,10 @@
-//! Orders: each is handed to the surface.
+//! Orders and changes of command: each is handed to the surface.
 
 use crate::http::response::{JsonOrder, error};
 use crate::http::shared::{Shared, VehicleId};
-use crate::orders::{AgainOrder, BudgetOrder, DraftOrder, MarkerOrder, NoteOrder, UtilityOrder};
+use crate::orders::{
+    AgainOrder, BudgetOrder, CommandOrder, CommandOrderAction, DraftOrder, MarkerOrder, NoteOrder, UtilityOrder,
+};
 use crate::request::SurfaceRequest;
 use axum::Extension;
 use axum::extract::State;
@@ -10,7 +12,7 @@ use axum::http::StatusCode;
 use axum::response::Response;
 use axum::routing::{MethodRouter, post};
 use scenecast_protocol::directive::SlotId;
-use scenecast_surface::Giver;
+use scenecast_surface::{CommandAction, Giver};
 use serde::de::DeserializeOwned;
 use std::collections::BTreeMap;
 
@@ -106,4 +108,20 @@ pub(in crate::http) async fn marker(
 ) -> Response {
     let author = by.name().to_owned();
     shared.order(by, SurfaceRequest::Marker(id, author, order)).await
+}
+
+pub(in crate::http) async fn command(
+    State(shared): State<Shared>,
+    Extension(by): Extension<Giver>,
+    JsonOrder(order): JsonOrder<CommandOrder>,
+) -> Response {
+    let action = match order.action {
+        CommandOrderAction::Request => CommandAction::Request,
+        CommandOrderAction::Withdraw => CommandAction::Withdraw,
+        CommandOrderAction::Take => CommandAction::Take,
+        CommandOrderAction::HandOver => CommandAction::HandOver(order.to),
+        CommandOrderAction::Release => CommandAction::Release,
+        CommandOrderAction::Keep => CommandAction::Keep,
+    };
+    shared.order(by, SurfaceRequest::Command(action)).await
 }

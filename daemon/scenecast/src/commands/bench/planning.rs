@@ -6,7 +6,8 @@ use scenecast_files::write_whole;
 use scenecast_rehearsal::planning_bench::{
     Estimate, PlanningFiles, PlanningTable, SourceTable, Trial, annotated_images, plot, run_all,
 };
-use scenecast_tools::{Progress, SeedArguments};
+use scenecast_tools::Progress;
+use scenecast_tools::commands::SeedArguments;
 use std::path::PathBuf;
 
 /// Utility that each planner collects per metre, with a fence, keep-outs and 40 % of the
