@@ -159,7 +159,7 @@ fn a_shell_sets_fence_and_limits_and_holds_and_resumes() {
     assert!(text(&ctl(port, &["fence"])).contains("return point E -5.0 N 2.5"));
 
     applied(&["limits", "set", "--depth", "0..60", "--on-silence", "hold"]);
-    applied(&["limits", "set", "--silence", "900", "--keep"]);
+    applied(&["limits", "set", "--silence", "900"]);
     let limits = text(&ctl(port, &["limits"]));
     assert!(limits.contains("0.0 to 60.0 m") && limits.contains("15 min"), "{limits}");
 
@@ -169,9 +169,13 @@ fn a_shell_sets_fence_and_limits_and_holds_and_resumes() {
     wait_until("it surveys", || vehicle()["status"]["mode"] == "survey");
 
     // A fence that the vehicle refuses, fences that the surface refuses, and files that are not a fence.
-    let elsewhere = fence.replace("-80", "300").replace("80", "400");
+    let back = r#"{"type": "Feature", "properties": {}, "geometry": {"type": "Point", "coordinates": [350, 350]}}"#;
+    let moved = fence.replace("-80", "300").replace("80", "400");
+    let elsewhere = format!(r#"{{"type": "FeatureCollection", "features": [{moved}, {back}]}}"#);
     let refused = ctl(port, &["fence", "set", "--metres", &file("elsewhere.geojson", &elsewhere), "--wait", "80"]);
     assert!(refused.status.code() == Some(1) && text(&refused).contains("refused"), "{}", text(&refused));
+    let alone = ctl(port, &["fence", "set", "--metres", &file("moved.geojson", &moved), "--wait", "80"]);
+    assert!(text(&alone).contains("return_point lies outside"), "the return point stays: {}", text(&alone));
     assert!(text(&ctl(port, &["fence"])).contains("in force: version 2"));
     let url = format!("http://127.0.0.1:{port}");
     let crossed = fence.replace("[80, 80], [-80, 80]", "[-80, 80], [80, 80]");

@@ -1,6 +1,6 @@
 //! The bodies of orders, and changes of an order that stays in force.
 
-use scenecast_protocol::directive::Constraints;
+use scenecast_protocol::directive::{Constraints, SlotId};
 use schemars::JsonSchema;
 use serde::de::{DeserializeOwned, Error, MapAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
@@ -8,12 +8,15 @@ use serde_json::{Map, Value};
 use std::collections::BTreeMap;
 use std::marker::PhantomData;
 
+/// The number of a label as the name of a member: 1 to 254, without a sign or a leading zero.
+const LABEL: &str = "^([1-9][0-9]?|1[0-9]{2}|2[0-4][0-9]|25[0-4])$";
+
 /// Weights of labels on the map. A label that is not listed gets the weight 0.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct UtilityOrder {
     /// -1 to 1 by label, which must be on the map.
-    #[schemars(extend("propertyNames" = { "pattern": "^[1-9][0-9]{0,2}$" }))]
+    #[schemars(extend("propertyNames" = { "pattern": LABEL }))]
     #[schemars(extend("additionalProperties" = { "type": "number", "minimum": -1, "maximum": 1 }))]
     pub weights: BTreeMap<String, f64>,
     /// The weight of unexplored cells, -1 to 1.
@@ -32,7 +35,7 @@ pub struct UtilityOrder {
 #[serde(deny_unknown_fields)]
 pub struct DraftOrder {
     /// -1 to 1 by label.
-    #[schemars(extend("propertyNames" = { "pattern": "^[1-9][0-9]{0,2}$" }))]
+    #[schemars(extend("propertyNames" = { "pattern": LABEL }))]
     #[schemars(extend("additionalProperties" = { "type": "number", "minimum": -1, "maximum": 1 }))]
     pub weights: BTreeMap<String, f64>,
     /// The weight of unexplored cells, -1 to 1; by default as last sent.
@@ -195,11 +198,15 @@ pub struct RemoveMarkerOrder {
 #[serde(deny_unknown_fields)]
 pub struct DismissOrder {}
 
+/// The names of orders in the slot constraints.
+pub(crate) const CONSTRAINTS: [&str; 3] = ["hold", "resume", "abort"];
+
 /// Gives a withdrawn order again, as a new one.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct AgainOrder {
-    /// The slot of the order: utility, constraints, settings, budget, limits, fence, destination or areas.
+    /// The slot of the order, whose state is `withdrawn`; hold, resume and abort share the slot constraints.
+    #[schemars(extend("enum" = SlotId::ALL.map(SlotId::name).into_iter().chain(CONSTRAINTS).collect::<Vec<_>>()))]
     pub slot: String,
 }
 

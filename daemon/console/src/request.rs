@@ -56,8 +56,8 @@ pub enum SurfaceRequest {
     Areas(u8, AreasOrder),
     Destination(u8, DestinationOrder),
     Settings(u8, SettingsOrder),
-    /// Give a withdrawn order again.
-    Again(u8, SlotId),
+    /// Give the withdrawn order of this name again: that of its slot, or hold, resume or abort.
+    Again(u8, SlotId, String),
     /// Send the orders again that the vehicle has lost.
     Restore(u8),
     /// Take the vehicle over from another surface.
@@ -175,7 +175,9 @@ pub fn handle_request(surface: &mut Surface, request: ClientRequest, cell_m: f64
     {
         return Reply::Forbidden(reason);
     }
-    let entry = describe(&request);
+    let entry = describe(&request, |id, slot| {
+        Address::vehicle(id).map_or(slot.name(), |vehicle| name_of_order(surface, vehicle, slot))
+    });
     let reply = reply(surface, request, cell_m, now);
     if matches!(reply, Reply::Accepted(_)) {
         surface.handle_accepted(&by, kind, now);
@@ -264,9 +266,15 @@ fn handle(surface: &mut Surface, request: SurfaceRequest, cell_m: f64, now: Inst
             let vehicle = known(surface, id)?;
             accepted(vehicle, SlotId::Settings, surface.set_settings(vehicle, &order, now))
         }
-        SurfaceRequest::Again(id, slot) => {
+        SurfaceRequest::Again(id, slot, name) => {
             let vehicle = known(surface, id)?;
-            accepted(vehicle, slot, surface.give_again(vehicle, slot, now))
+            let own_name = name_of_order(surface, vehicle, slot);
+            if name != slot.name() && name != own_name {
+                return Some(Reply::Refused(format!(
+                    "no {name} is withdrawn: the last order of its kind is {own_name}"
+                )));
+            }
+            accepted_as(slot, own_name, vehicle, surface.give_again(vehicle, slot, now))
         }
         SurfaceRequest::Restore(id) => done(surface.restore_lost(known(surface, id)?, now).map(drop)),
         SurfaceRequest::TakeOver(id) => done(surface.take_over(known(surface, id)?, now)),
@@ -328,6 +336,12 @@ pub fn archived_cells(map: &VehicleMemory, cell_m: f64) -> MapCells {
         tiles: labels.tiles().clone(),
         layers: layers::layers(&layers),
     }
+}
+
+/// What the latest order in a slot is called.
+fn name_of_order(surface: &Surface, vehicle: Address, slot: SlotId) -> &'static str {
+    let order = surface.view(vehicle).and_then(|view| view.slots().find(|order| order.id == slot));
+    order.map_or(slot.name(), |order| order_name(&order.slot))
 }
 
 fn accepted(vehicle: Address, slot: SlotId, issued: Result<u16, String>) -> Reply {

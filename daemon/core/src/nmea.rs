@@ -94,7 +94,9 @@ pub fn sentences(line: &[u8]) -> impl Iterator<Item = &[u8]> {
 /// The fields of a sentence whose checksum is right: talker with formatter first.
 pub fn fields(sentence: &[u8]) -> Result<Vec<&str>, NmeaError> {
     let text = std::str::from_utf8(sentence).map_err(|_| NmeaError::NoSentence)?;
-    let (body, sum) = text.trim().strip_prefix('$').and_then(|t| t.split_once('*')).ok_or(NmeaError::NoSentence)?;
+    // Some receivers write a zero byte behind the sum.
+    let text = text.trim_matches(|c: char| c.is_whitespace() || c == '\0');
+    let (body, sum) = text.strip_prefix('$').and_then(|t| t.split_once('*')).ok_or(NmeaError::NoSentence)?;
     let sum = (sum.len() == 2).then(|| u8::from_str_radix(sum, 16).ok()).flatten().ok_or(NmeaError::Checksum)?;
     if sum != checksum(body.as_bytes()) {
         return Err(NmeaError::Checksum);
@@ -106,16 +108,17 @@ pub fn fields(sentence: &[u8]) -> Result<Vec<&str>, NmeaError> {
 pub fn parse(sentence: &[u8]) -> Result<Vec<Sentence>, NmeaError> {
     let all = fields(sentence)?;
     let f = |i: usize| all.get(i).copied().unwrap_or("");
-    let formatter = f(0).get(2..).unwrap_or("");
+    // `P` and a maker begin a sentence of his own, such as `PGRMC`.
+    let formatter = f(0).get(2..).filter(|_| !f(0).starts_with('P')).unwrap_or("");
     Ok(match formatter {
         "GGA" => vec![gga(&f)?],
         "GNS" => vec![gns(&f)?],
         "RMC" => rmc(&f)?,
         "GLL" => vec![gll(&f)?],
-        "VTG" => motion(number(f(5))?.map(|knots| knots * KNOT_M_S), number(f(1))?)?.into_iter().collect(),
+        "VTG" if f(9) != "N" => motion(f(5), f(1))?.into_iter().collect(),
         "HDT" => degrees(f(1))?.map(Sentence::Heading).into_iter().collect(),
-        // The second field of THS says how good it is; V is no heading.
-        "THS" if f(2) != "V" => degrees(f(1))?.map(Sentence::Heading).into_iter().collect(),
+        // The second field of THS says how it is known: E is estimated, M typed in, S simulated, V not valid.
+        "THS" if !matches!(f(2), "E" | "M" | "S" | "V") => degrees(f(1))?.map(Sentence::Heading).into_iter().collect(),
         "ZDA" => time(f(1))?.map(Sentence::Time).into_iter().collect(),
         _ => Vec::new(),
     })
@@ -157,7 +160,8 @@ fn rmc<'a>(f: &impl Fn(usize) -> &'a str) -> Result<Vec<Sentence>, NmeaError> {
         return Ok(vec![Sentence::NoPosition]);
     }
     let at = position(PositionKind::Rmc, [f(3), f(4), f(5), f(6)], f(1), None, is_mode_corrected(f(12)))?;
-    let motion = motion(number(f(7))?.map(|knots| knots * KNOT_M_S), number(f(8))?)?;
+    // The position counts even if the way over ground makes no sense.
+    let motion = motion(f(7), f(8)).unwrap_or_default();
     Ok(std::iter::once(at).chain(motion).collect())
 }
 
@@ -179,8 +183,9 @@ fn position(
     Ok(Sentence::Position { kind, place, utc_s: time(utc)?, hdop, is_corrected })
 }
 
-fn motion(speed_m_s: Option<f64>, course_deg: Option<f64>) -> Result<Option<Sentence>, NmeaError> {
-    let Some(speed_m_s) = speed_m_s else { return Ok(None) };
+fn motion(knots: &str, course_deg: &str) -> Result<Option<Sentence>, NmeaError> {
+    let Some(knots) = number(knots)? else { return Ok(None) };
+    let (speed_m_s, course_deg) = (knots * KNOT_M_S, number(course_deg)?);
     let is_sound = (0.0..200.0).contains(&speed_m_s) && course_deg.is_none_or(|c| (0.0..=360.0).contains(&c));
     let motion = Sentence::Motion { speed_m_s, course_rad: course_deg.map(f64::to_radians) };
     is_sound.then_some(Some(motion)).ok_or(NmeaError::Field)
@@ -268,6 +273,12 @@ mod tests {
         let hdt = line("HEHDT,180.0,T");
         assert_eq!(parse(hdt.as_bytes()), Ok(vec![Sentence::Heading(std::f64::consts::PI)]));
         assert_eq!(parse(line("GPGSV,1,1,00").as_bytes()), Ok(vec![]));
+        assert_eq!(parse(hdt.replace("\r\n", "\0\r\n").as_bytes()), parse(hdt.as_bytes()));
+        for passed_over in ["PGRMC,A,218.8,100,6378137.000", "HETHS,12.0,S", "GPVTG,77.52,T,,M,0.004,N,0.008,K,N"] {
+            assert_eq!(parse(line(passed_over).as_bytes()), Ok(vec![]), "{passed_over}");
+        }
+        let aft = line("GPRMC,083559.00,A,4717.11437,N,00833.91522,E,0.004,-12.0,091202,,,A");
+        assert!(matches!(parse(aft.as_bytes()).unwrap()[..], [Sentence::Position { .. }]), "a course below 0");
     }
 
     #[test]

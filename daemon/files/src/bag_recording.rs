@@ -26,11 +26,15 @@ struct Contents {
     topics: BTreeSet<BagTopic>,
     /// The topic and time of each image; `None` without a time.
     images: Vec<(BagTopic, Option<Stamp>)>,
-    poses: Vec<(BagTopic, Stamp, SensorPose)>,
+    /// The topic and pose of each odometry; `None` without a time or a rotation.
+    poses: Vec<(BagTopic, Option<(Stamp, SensorPose)>)>,
     /// The first calibration of each topic that can be used, or why the last one cannot.
     infos: BTreeMap<String, Result<CameraInfo, CalibrationError>>,
-    /// Where the file breaks off.
+    /// The first damage, and how many there are.
     damage: Option<String>,
+    damages: usize,
+    /// Encodings of messages that are not read.
+    encodings: BTreeSet<String>,
 }
 
 impl Contents {
@@ -47,15 +51,19 @@ impl Contents {
                     contents.topics.insert(topic.clone());
                     if topic.kind != ODOMETRY {
                         contents.images.push((topic, stamp_of_cdr(&bytes)));
-                    } else if let Some((stamp, pose)) = decode_cdr::<Odometry>(&bytes).ok().as_ref().and_then(pose_of) {
-                        contents.poses.push((topic, stamp, pose));
+                    } else {
+                        let pose = decode_cdr::<Odometry>(&bytes).ok().as_ref().and_then(pose_of);
+                        contents.poses.push((topic, pose));
                     }
                 }
                 Ok(None) => break,
-                // The next file of a split bag follows.
-                Err(error) => contents.damage = contents.damage.or(Some(error)),
+                Err(error) => {
+                    contents.damages += 1;
+                    contents.damage = contents.damage.or(Some(error));
+                }
             }
         }
+        contents.encodings = stream.other_encodings().map(str::to_owned).collect();
         match contents.damage {
             Some(error) if contents.topics.is_empty() => Err(UserError::file(path, error)),
             _ => Ok(contents),
@@ -92,7 +100,14 @@ impl Contents {
         let names = || all.iter().map(|topic| topic.name.as_str()).collect::<Vec<_>>().join(", ");
         let kinds = kinds.join(" or ");
         match (name, all.as_slice()) {
-            (_, []) => Err(UserError::file(path, format!("there are no messages of {kinds}"))),
+            (_, []) => {
+                let encodings: Vec<&str> = self.encodings.iter().map(String::as_str).collect();
+                let others = match encodings.as_slice() {
+                    [] => String::new(),
+                    found => format!("; CDR of ROS 2 is read, and its messages are in {}", found.join(", ")),
+                };
+                Err(UserError::file(path, format!("there are no messages of {kinds}{others}")))
+            }
             (None, [only]) => Ok((*only).clone()),
             (None, _) => Err(UserError::file(path, format!("which topic of {kinds}, {}? set it by {key}", names()))),
             (Some(name), all) => {
@@ -157,9 +172,18 @@ impl Recording {
         let (info, note) = if is_info_read { contents.calibration(&images.name) } else { (None, None) };
         let timing = &BagTiming { calibration: timing.calibration.clone().or(info), ..timing.clone() };
         let odometry = contents.choose(path, topics.odometry, &[ODOMETRY], "navigation.source = \"ros2:TOPIC\"")?;
-        let mut poses: Vec<_> = contents.poses.iter().filter(|(topic, ..)| *topic == odometry).collect();
-        poses.sort_by_key(|(_, stamp, _)| *stamp);
-        let track = PoseTrack::of(poses.iter().map(|(_, stamp, pose)| (*stamp, *pose)), timing.max_gap);
+        let of_topic = || contents.poses.iter().filter(|(topic, _)| *topic == odometry);
+        let mut poses: Vec<(Stamp, SensorPose)> = of_topic().filter_map(|(_, pose)| *pose).collect();
+        poses.sort_by_key(|(stamp, _)| *stamp);
+        let unusable = (of_topic().count() - poses.len(), of_topic().count());
+        let unusable = (unusable.0 > 0).then(|| {
+            let (unusable, all) = unusable;
+            format!(
+                "{unusable} of {all} messages of {} have no time, or a quaternion that has not the length 1",
+                odometry.name
+            )
+        });
+        let track = PoseTrack::of(poses, timing.max_gap);
         let bag = Arc::new(Bag::new(path, images, timing.bits));
         let mut frames: Vec<(Stamp, RecordedFrame)> = Vec::new();
         let of_topic = contents.images.iter().filter(|(topic, _)| *topic == *bag.topic());
@@ -175,17 +199,23 @@ impl Recording {
             frames.push((stamp, frame));
         }
         let Some(&(first, _)) = frames.first() else {
-            let cause = format!("none of its {all} images has a pose at its time; {without_time} have no later time");
+            let mut cause =
+                format!("none of its {all} images has a pose at its time; {without_time} have no later time");
+            cause.extend(unusable.map(|text| format!("; {text}")));
             return Err(UserError::file(path, cause));
         };
         let dropped = all - frames.len() as u64;
-        let mut notes: Vec<String> = note.into_iter().collect();
+        let mut notes: Vec<String> = note.into_iter().chain(unusable).collect();
         if dropped > 0 {
             notes.push(format!(
-                "{dropped} of {all} images have no time or no pose at their time, or were tilted too much"
+                "{dropped} of {all} images are left out: {without_time} have no time or an earlier one than the image before, the others \
+                 no pose at their time or too much tilt"
             ));
         }
-        notes.extend(contents.damage.map(|damage| format!("the file breaks off: {damage}")));
+        notes.extend(contents.damage.map(|damage| match contents.damages {
+            0 | 1 => damage,
+            n => format!("{n} damages, the first: {damage}"),
+        }));
         let frames =
             frames.into_iter().map(|(stamp, frame)| RecordedFrame { t_s: stamp.seconds_since(first), ..frame });
         Ok(Self { frames: frames.collect(), notes })
@@ -201,6 +231,11 @@ mod tests {
 
     /// A bag of two images of 4 x 2 pixels at the poses of their times, with these messages of `/camera/camera_info`.
     fn bag(name: &str, infos: &[CameraInfo]) -> PathBuf {
+        bag_with(name, infos, &[1.0, 1.0])
+    }
+
+    /// The same with a pose for each of these w of its quaternion, whose other members are 0.
+    fn bag_with(name: &str, infos: &[CameraInfo], turns: &[f64]) -> PathBuf {
         let path = std::env::temp_dir().join(format!("scenecast-{}-{name}.mcap", std::process::id()));
         let mut writer = mcap::Writer::new(std::fs::File::create(&path).unwrap()).unwrap();
         let mut sequence = 0;
@@ -209,9 +244,11 @@ mod tests {
         for sec in 1..3 {
             let mut image = Image { width: 4, height: 2, step: 12, encoding: "rgb8".into(), ..Image::default() };
             (image.header.stamp.sec, image.data) = (sec, vec![50; 24]);
-            let mut odometry = Odometry::default();
-            (odometry.header.stamp.sec, odometry.pose.pose.orientation.w) = (sec, 1.0);
             images.push(image);
+        }
+        for (sec, w) in (1..).zip(turns) {
+            let mut odometry = Odometry::default();
+            (odometry.header.stamp.sec, odometry.pose.pose.orientation.w) = (sec, *w);
             poses.push(odometry);
         }
         write(&mut writer, "/camera/image_raw", &images, &mut sequence);
@@ -262,6 +299,43 @@ mod tests {
         assert_eq!(focal(&recording.frames[0]), Some(500.0));
         let recording = open(&path, |timing| timing.reads_info = false);
         assert!(recording.frames[0].sight.is_none());
+    }
+
+    #[test]
+    fn what_lies_behind_damage_is_read() {
+        let path = std::env::temp_dir().join(format!("scenecast-{}-damaged.mcap", std::process::id()));
+        let file = std::fs::File::create(&path).unwrap();
+        let options = mcap::WriteOptions::new().chunk_size(Some(200)).compression(None);
+        let mut writer = options.create(file).unwrap();
+        let images = (1..7).map(|sec| {
+            let mut image = Image { width: 4, height: 2, step: 12, encoding: "rgb8".into(), ..Image::default() };
+            (image.header.stamp.sec, image.data) = (sec, vec![50 + sec as u8; 24]);
+            image
+        });
+        let poses = (1..7).map(|sec| {
+            let mut odometry = Odometry::default();
+            (odometry.header.stamp.sec, odometry.pose.pose.orientation.w) = (sec, 1.0);
+            odometry
+        });
+        let mut sequence = 0;
+        write(&mut writer, "/odometry", &poses.collect::<Vec<_>>(), &mut sequence);
+        write(&mut writer, "/camera/image_raw", &images.collect::<Vec<_>>(), &mut sequence);
+        writer.finish().unwrap();
+        let mut bytes = std::fs::read(&path).unwrap();
+        let third = bytes.windows(24).position(|pixels| pixels == [53; 24]).unwrap();
+        bytes[third + 3] = 0;
+        std::fs::write(&path, bytes).unwrap();
+        let recording = open(&path, |_| {});
+        assert!(recording.notes[0].starts_with("a chunk is damaged and left out"), "{:?}", recording.notes);
+        let kept: Vec<u8> = recording.frames.iter().map(|frame| frame.image.read().unwrap().as_raw()[0]).collect();
+        assert!(kept.len() < 6 && kept.contains(&51) && kept.contains(&56) && !kept.contains(&53), "{kept:?}");
+    }
+
+    #[test]
+    fn poses_without_a_rotation_are_named() {
+        let recording = open(&bag_with("turns", &[], &[1.0, 0.0]), |_| {});
+        assert_eq!(recording.frames.len(), 1);
+        assert!(recording.notes[0].starts_with("1 of 2 messages of /odometry have no time, or a quaternion"));
     }
 
     #[test]

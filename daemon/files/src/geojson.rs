@@ -69,34 +69,50 @@ fn areas_of(whole: &Value, frame: CoordinateFrame) -> Result<Vec<AreaShape>, Str
             return Err(format!("type {}: expected a FeatureCollection or a Feature", other.unwrap_or("is missing")));
         }
     };
-    let area = |(i, feature): (usize, &Value)| {
-        let geometry = &feature["geometry"];
-        let weight = feature["properties"]["weight"].as_f64().ok_or("the property weight is not a number");
-        let outline = match geometry["type"].as_str() {
-            Some("Polygon") => outline(&geometry["coordinates"], frame),
-            other => Err(format!("geometry {}: expected a Polygon", other.unwrap_or("null"))),
-        };
-        let area = outline.and_then(|outline| Ok(AreaShape { outline, weight: weight? }));
-        area.map_err(|line| format!("features[{i}]: {line}"))
+    let areas = |(i, feature): (usize, &Value)| {
+        areas_of_feature(feature, frame).map_err(|line| format!("features[{i}]: {line}"))
     };
     let features: Vec<_> = features.iter().enumerate().filter(|(_, feature)| !is_empty(&feature["geometry"])).collect();
     if features.is_empty() {
         return Err("it has no area; scenecast ctl areas clear removes all areas".to_owned());
     }
-    features.into_iter().map(area).collect()
+    let areas: Vec<Vec<AreaShape>> = features.into_iter().map(areas).collect::<Result<_, _>>()?;
+    Ok(areas.concat())
+}
+
+fn areas_of_feature(feature: &Value, frame: CoordinateFrame) -> Result<Vec<AreaShape>, String> {
+    let geometry = &feature["geometry"];
+    let weight = feature["properties"]["weight"].as_f64().ok_or("the property weight is not a number");
+    let coordinates = &geometry["coordinates"];
+    let polygons: Vec<&Value> = match geometry["type"].as_str() {
+        Some("Polygon") => vec![coordinates],
+        Some("MultiPolygon") => coordinates.as_array().ok_or("coordinates are missing")?.iter().collect(),
+        other => return Err(format!("geometry {}: expected a Polygon or a MultiPolygon", other.unwrap_or("null"))),
+    };
+    let area = |polygon: &Value| Ok(AreaShape { outline: outline(polygon, frame)?, weight: weight? });
+    polygons.into_iter().map(area).collect()
 }
 
 /// Whether a feature has no place: its geometry is null or has no coordinates.
 fn is_empty(geometry: &Value) -> bool {
-    geometry.is_null() || geometry["coordinates"].as_array().is_some_and(Vec::is_empty)
+    fn has_no_place(coordinates: &Value) -> bool {
+        coordinates.as_array().is_some_and(|parts| parts.iter().all(has_no_place))
+    }
+    geometry.is_null() || has_no_place(&geometry["coordinates"])
 }
 
-/// Refuses degrees of another datum: the same numbers lie a hundred metres off. The member `crs` is of GeoJSON before RFC 7946.
+/// Refuses degrees of another datum: the same numbers lie a hundred metres off. The member `crs` is of GeoJSON before RFC 7946; it may be
+/// that of the file, of a feature or of a geometry.
 fn check_crs(whole: &Value, frame: CoordinateFrame) -> Result<(), String> {
-    let crs = &whole["crs"];
-    if crs.is_null() || matches!(frame, CoordinateFrame::Metres) {
+    if matches!(frame, CoordinateFrame::Metres) {
         return Ok(());
     }
+    let features = whole["features"].as_array().map_or(&[][..], Vec::as_slice);
+    let all = std::iter::once(whole).chain(features).flat_map(|part| [&part["crs"], &part["geometry"]["crs"]]);
+    all.filter(|crs| !crs.is_null()).try_for_each(check_wgs84)
+}
+
+fn check_wgs84(crs: &Value) -> Result<(), String> {
     let name = crs["properties"]["name"].as_str().map_or_else(|| crs.to_string(), str::to_owned);
     let code = name.rsplit([':', '/']).next().unwrap_or_default();
     let is_wgs84 = matches!(code, "CRS84" | "WGS84") || code == "4326" && name.to_ascii_uppercase().contains("EPSG");
@@ -144,10 +160,11 @@ fn shapes_of(whole: &Value, frame: CoordinateFrame) -> Result<FenceShapes, Strin
 
 /// Adds a feature to the order.
 fn add(order: &mut FenceShapes, feature: &Value, frame: CoordinateFrame) -> Result<(), String> {
-    let (geometry, role) = (&feature["geometry"], role(feature)?);
+    let geometry = &feature["geometry"];
     if is_empty(geometry) {
         return Ok(());
     }
+    let role = role(feature)?;
     let coordinates = &geometry["coordinates"];
     let rings: Vec<&Value> = match geometry["type"].as_str() {
         Some("Point") if matches!(role, None | Some(FeatureRole::ReturnPoint)) => {
@@ -185,6 +202,7 @@ fn add(order: &mut FenceShapes, feature: &Value, frame: CoordinateFrame) -> Resu
 fn role(feature: &Value) -> Result<Option<FeatureRole>, String> {
     match &feature["properties"]["role"] {
         Value::Null => Ok(None),
+        Value::String(s) if s.is_empty() => Ok(None),
         Value::String(s) if s == "fence" => Ok(Some(FeatureRole::Fence)),
         Value::String(s) if s == "keep_out" => Ok(Some(FeatureRole::KeepOut)),
         Value::String(s) if s == "return_point" => Ok(Some(FeatureRole::ReturnPoint)),
@@ -279,7 +297,9 @@ mod tests {
             |feature: &str| areas(&format!(r#"{{"type": "FeatureCollection", "features": [{feature}]}}"#)).unwrap_err();
         assert_eq!(refused(&feature.replace("-0.5", "null")), "features[0]: the property weight is not a number");
         let point = r#"{"properties": {"weight": 1}, "geometry": {"type": "Point", "coordinates": [1, 2]}}"#;
-        assert_eq!(refused(point), "features[0]: geometry Point: expected a Polygon");
+        assert_eq!(refused(point), "features[0]: geometry Point: expected a Polygon or a MultiPolygon");
+        let both = list.replace("\"Polygon\"", "\"MultiPolygon\"").replace("[[[", "[[[[").replace("]]]", "]]]]");
+        assert_eq!(areas(&both).unwrap().len(), 1);
     }
 
     #[test]
@@ -313,6 +333,15 @@ mod tests {
             assert!(named(name).is_ok(), "{name}");
         }
         assert!(with_crs("null").is_ok());
+        let crs = r#"{"crs": {"properties": {"name": "EPSG:25832"}}, "#;
+        let of_geometry = near.replacen('{', crs, 1);
+        for feature in [
+            format!(r#"{{"type": "Feature", "geometry": {of_geometry}}}"#),
+            format!(r#"{crs} "type": "Feature", "geometry": {near}}}"#),
+        ] {
+            let file = format!(r#"{{"type": "FeatureCollection", "features": [{feature}]}}"#);
+            assert!(read(&file, frame).unwrap_err().contains("crs EPSG:25832"));
+        }
         for name in ["urn:ogc:def:crs:EPSG::4230", "EPSG:32632", "EPSG:14326", "ESRI:4326"] {
             let error = named(name).unwrap_err();
             assert!(error.contains(name) && error.contains("ogr2ogr -t_srs EPSG:4326"), "{error}");
@@ -327,7 +356,9 @@ mod tests {
         let plain = format!(r#"{{"geometry": {SQUARE}}}"#);
         let null = r#"{"type": "Feature", "properties": {}, "geometry": null}"#;
         let empty = r#"{"geometry": {"type": "Polygon", "coordinates": []}}"#;
-        let json = format!(r#"{{"type": "FeatureCollection", "features": [{null}, {plain}, {empty}]}}"#);
+        let without = r#"{"properties": {"role": "camp"}, "geometry": {"type": "Polygon", "coordinates": [[]]}}"#;
+        let blank = plain.replacen('{', r#"{"properties": {"role": ""}, "#, 1);
+        let json = format!(r#"{{"type": "FeatureCollection", "features": [{null}, {blank}, {empty}, {without}]}}"#);
         let fence = read(&json, CoordinateFrame::Metres).unwrap().fence;
         assert_eq!(fence.unwrap().len(), 4);
         let nearly = SQUARE.replace("[0, 60], [0, 0]", "[0, 60], [1e-9, 0]");

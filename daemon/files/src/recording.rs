@@ -288,9 +288,17 @@ pub struct Recorder {
 }
 
 impl Recorder {
-    /// Records into a folder, which is made.
+    /// Records into a folder, which is made. The images of an earlier recording in it are removed.
     pub fn new(dir: &Path) -> Result<Self, UserError> {
-        std::fs::create_dir_all(dir).map_err(|e| UserError::file(dir, e))?;
+        let failed = |e| UserError::file(dir, e);
+        std::fs::create_dir_all(dir).map_err(failed)?;
+        for entry in std::fs::read_dir(dir).map_err(failed)? {
+            let path = entry.map_err(failed)?.path();
+            let name = path.file_name().unwrap_or_default().to_string_lossy();
+            if name.starts_with("frame-") && name.ends_with(".png") {
+                std::fs::remove_file(&path).map_err(|e| UserError::file(&path, e))?;
+            }
+        }
         let poses = METRE_COLUMNS.join(",") + "\n";
         Ok(Self { dir: dir.to_owned(), poses, frames: 0 })
     }

@@ -1,5 +1,6 @@
 //! An autopilot in a host: its odometry moves the vehicle, and the vehicle's goal moves it.
 
+use crate::link_host::FrameOutcome;
 use scenecast_core::TangentPlane;
 use scenecast_drivers::autopilot::{Autopilot, Goal, Health, Step};
 use scenecast_protocol::time::Instant;
@@ -46,9 +47,11 @@ impl Pilot {
         self.collect(now);
     }
 
-    pub(crate) fn handle_bytes(&mut self, bytes: &[u8], now: Instant) {
-        self.autopilot.handle_bytes(bytes, now);
+    /// Returns [`FrameOutcome::Accepted`] where the autopilot itself is the sender.
+    pub(crate) fn handle_bytes(&mut self, bytes: &[u8], now: Instant) -> FrameOutcome {
+        let is_heard = self.autopilot.handle_bytes(bytes, now);
         self.collect(now);
+        if is_heard { FrameOutcome::Accepted } else { FrameOutcome::Dropped }
     }
 
     /// As of its last message or timeout.

@@ -1,6 +1,6 @@
 //! The host of the surface: role, modem and the surface vehicle's autopilot.
 
-use crate::link_host::{FrameEvent, LinkHost};
+use crate::link_host::{FrameEvent, FrameOutcome, LinkHost};
 use crate::pilot::{Pilot, PilotEvent};
 use scenecast_drivers::autopilot::{Autopilot, Goal};
 use scenecast_drivers::modem::Station;
@@ -122,9 +122,10 @@ impl SurfaceHost {
     }
 
     /// Takes bytes of the autopilot's port, in pieces of any size.
-    pub fn handle_pilot_bytes(&mut self, bytes: &[u8], now: Instant) {
-        self.follower.iter_mut().for_each(|f| f.pilot.handle_bytes(bytes, now));
+    pub fn handle_pilot_bytes(&mut self, bytes: &[u8], now: Instant) -> FrameOutcome {
+        let outcome = self.follower.as_mut().map_or(FrameOutcome::Dropped, |f| f.pilot.handle_bytes(bytes, now));
         self.sail(now);
+        outcome
     }
 
     /// Lets time pass in the modem's driver and in the autopilot.

@@ -1,6 +1,6 @@
 //! The host of the vehicle: role, modem, autopilot, persistent state and mapper.
 
-use crate::link_host::{FrameEvent, LinkHost};
+use crate::link_host::{FrameEvent, FrameOutcome, LinkHost};
 use crate::pilot::{PilotEvent, VehiclePilot};
 use scenecast_drivers::autopilot::{Counters, Health, Plausible, Step};
 use scenecast_drivers::modem::Station;
@@ -121,12 +121,13 @@ impl VehicleHost {
         }
     }
 
-    /// Takes bytes of the autopilot's port, in pieces of any size.
-    pub fn handle_pilot_bytes(&mut self, bytes: &[u8], now: Instant) {
-        if let Some(pilot) = &mut self.pilot {
-            pilot.pilot.handle_bytes(bytes, now);
-            pilot.fly(self.link.end_mut(), now);
-        }
+    /// Takes bytes of the autopilot's port, in pieces of any size. Returns [`FrameOutcome::Accepted`] where the autopilot itself is the
+    /// sender.
+    pub fn handle_pilot_bytes(&mut self, bytes: &[u8], now: Instant) -> FrameOutcome {
+        let Some(pilot) = &mut self.pilot else { return FrameOutcome::Dropped };
+        let outcome = pilot.pilot.handle_bytes(bytes, now);
+        pilot.fly(self.link.end_mut(), now);
+        outcome
     }
 
     /// Lets time pass in the modem's driver and in the autopilot.

@@ -18,12 +18,14 @@ const MAX_TRIED: usize = 120;
 const MAX_FRAMES: u32 = 1500;
 /// Of a straight pair the heading changes by less, radians; of one in a turn by so much.
 const STRAIGHT_RAD: f64 = 0.1;
-const TURN_RAD: std::ops::Range<f64> = 0.15..0.7;
+const TURN_RAD: std::ops::Range<f64> = 0.15..1.8;
 /// Shifts of fewer pixels of the reduced frames are too inexact, and shorter displacements, metres, are noise of odometry.
 const MIN_SHIFT_PX: f64 = 12.0;
 const MIN_DISPLACEMENT_M: f64 = 0.05;
 /// Frames after which a frame is given up to which no later one fits.
 const MAX_AGE: u32 = 12;
+/// Share of the view by which frames are displaced that surely overlap.
+const WITHIN_VIEW: f64 = 0.4;
 /// Least confidence of a match, in standard deviations by chance, and least overlap.
 const MIN_CONFIDENCE: f32 = 7.0;
 const MIN_OVERLAP: f32 = 0.2;
@@ -43,7 +45,8 @@ pub struct CameraGeometry {
     pub size_ratio: f64,
     /// The direction of the bow in the images, clockwise from their top, radians, beside what is configured.
     pub turn_rad: f64,
-    pub is_mirrored: bool,
+    /// `None` before the vehicle has turned: straight ahead, mirrored images move as others do.
+    pub is_mirrored: Option<bool>,
 }
 
 impl CameraGeometry {
@@ -59,11 +62,19 @@ impl CameraGeometry {
         }
         if self.turn_rad.abs() > WRONG_TURN_RAD {
             let degrees = self.turn_rad.to_degrees();
+            let is_half = self.turn_rad.abs() > std::f64::consts::PI - WRONG_TURN_RAD;
+            let or_mirrored = match self.is_mirrored {
+                None if is_half => {
+                    " (or they are mirrored from top to bottom, which shows only when the vehicle turns)"
+                }
+                _ => "",
+            };
             parts.push(format!(
-                "the bow is {degrees:.0} degrees clockwise from the top of the images: set camera.mount_deg, or turn the images"
+                "the bow is {degrees:.0} degrees clockwise from the top of the images{or_mirrored}: set camera.mount_deg, or turn the \
+                 images"
             ));
         }
-        if self.is_mirrored {
+        if self.is_mirrored == Some(true) {
             parts.push("the images are mirrored: mirror them in the camera or its driver".to_owned());
         }
         (!parts.is_empty())
@@ -91,13 +102,34 @@ pub struct GeometryCheck {
     turns: f32,
     tried: usize,
     frames: u32,
+    told: Option<String>,
 }
 
 impl GeometryCheck {
     /// Whether it needs no more frames.
     #[must_use]
     pub fn is_complete(&self) -> bool {
-        self.pairs.len() >= PAIRS || self.tried >= MAX_TRIED || self.frames >= MAX_FRAMES
+        let has_all = self.pairs.len() >= PAIRS && self.is_mirrored().is_some();
+        has_all || self.tried >= MAX_TRIED || self.frames >= MAX_FRAMES
+    }
+
+    fn is_mirrored(&self) -> Option<bool> {
+        (self.turns.abs() > MIN_TURNS).then_some(self.turns < 0.0)
+    }
+
+    /// What people should change at the camera, once its frames have shown it, and again when a turn has shown more.
+    /// `metres_per_pixel` is the configured size.
+    pub fn poll_advice(&mut self, metres_per_pixel: f64) -> Option<String> {
+        if self.pairs.len() < PAIRS && !self.is_complete() {
+            return None;
+        }
+        let found = self.geometry()?.advice(metres_per_pixel)?;
+        // Without the figures, which change with each frame.
+        let subject = |text: &str| text.chars().filter(|c| c.is_alphabetic()).collect::<String>();
+        if self.told.as_deref().map(subject) == Some(subject(&found)) {
+            return None;
+        }
+        self.told.insert(found).clone().into()
     }
 
     /// Takes the next frame of the track.
@@ -139,6 +171,10 @@ impl GeometryCheck {
         if moved.norm() < MIN_DISPLACEMENT_M {
             return true;
         }
+        if self.pairs.len() >= PAIRS {
+            // Only a turn is of use now, of a frame that still overlaps with this one.
+            return moved.norm() < WITHIN_VIEW * pitch_m * now.plane.columns().min(now.plane.rows()) as f64;
+        }
         self.tried += 1;
         let Some(peak) = matched(earlier, now, 0.0) else { return false };
         let [right, down] = [0, 1].map(|axis| f64::from(peak.shift_px[axis]) + f64::from(peak.offset_px[axis]));
@@ -158,9 +194,10 @@ impl GeometryCheck {
         if self.pairs.len() < MIN_PAIRS {
             return None;
         }
-        let is_mirrored = self.turns < -MIN_TURNS;
+        let is_mirrored = self.is_mirrored();
         let ratio = |[by_images, by_odometry]: &[Complex<f64>; 2]| {
-            let by_images = if is_mirrored { Complex::new(-by_images.re, by_images.im) } else { *by_images };
+            let by_images =
+                if is_mirrored == Some(true) { Complex::new(-by_images.re, by_images.im) } else { *by_images };
             by_images / by_odometry
         };
         let ratios: Vec<Complex<f64>> = self.pairs.iter().map(ratio).collect();
@@ -287,7 +324,7 @@ mod tests {
         for (degrees, is_mirrored) in [(90.0f64, false), (180.0, false), (-90.0, false), (0.0, true), (90.0, true)] {
             let geometry = found(Camera { turn_rad: degrees.to_radians(), is_mirrored }, PIXEL_M).unwrap();
             let off = wrap_rad(geometry.turn_rad - degrees.to_radians()).abs();
-            assert!(geometry.is_mirrored == is_mirrored && off < 0.1, "{degrees} {is_mirrored}: {geometry:?}");
+            assert!(geometry.is_mirrored == Some(is_mirrored) && off < 0.1, "{degrees} {is_mirrored}: {geometry:?}");
             let advice = geometry.advice(PIXEL_M).unwrap();
             assert_eq!(
                 (advice.contains("clockwise"), advice.contains("mirrored")),

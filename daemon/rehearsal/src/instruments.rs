@@ -87,7 +87,9 @@ pub fn simulated_autopilot(config: &Config, now: Instant) -> Box<dyn Autopilot> 
 impl Autopilot for SimulatedAutopilot {
     fn handle_open(&mut self, _now: Instant) {}
 
-    fn handle_bytes(&mut self, _bytes: &[u8], _now: Instant) {}
+    fn handle_bytes(&mut self, _bytes: &[u8], _now: Instant) -> bool {
+        false
+    }
 
     fn handle_timeout(&mut self, now: Instant) {
         // After a long sleep of the host at most one minute is simulated.

@@ -5,8 +5,9 @@ use scenecast_config::{AutopilotKind, Config};
 use scenecast_core::UserError;
 use scenecast_drivers::autopilot::mavlink::MavlinkConfig;
 use scenecast_drivers::autopilot::{Autopilot, Mavlink, Nmea};
-use scenecast_host::PilotEvent;
+use scenecast_host::{FrameOutcome, PilotEvent};
 use scenecast_protocol::time::Instant;
+use std::net::SocketAddr;
 use std::time::Duration;
 
 /// Makes the autopilot of kind `rehearsal`, a simulated vehicle; builds without the simulator have none.
@@ -48,7 +49,17 @@ impl PilotPort {
     pub(super) fn open(config: &Config, has_autopilot: bool) -> Self {
         let a = &config.autopilot;
         let port = a.port.clone().filter(|_| has_autopilot && a.kind != AutopilotKind::Rehearsal);
-        Self { port: port.map(|port| Port::open_when_there("autopilot", port, None)) }
+        // Over UDP, a camera or a ground station may speak before the autopilot.
+        let open = match a.kind {
+            AutopilotKind::Mavlink => Port::open_judged_when_there,
+            _ => |name, place| Port::open_when_there(name, place, None),
+        };
+        Self { port: port.map(|port| open("autopilot", port)) }
+    }
+
+    /// Reports whether the sender of a datagram is the autopilot.
+    pub(super) fn judge(&self, sender: SocketAddr, outcome: FrameOutcome) {
+        self.port.iter().for_each(|port| port.judge(sender, outcome));
     }
 
     /// The next report of the port; without a port it never returns. Cancel-safe.

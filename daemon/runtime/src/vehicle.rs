@@ -235,7 +235,11 @@ impl VehicleShell {
         let now = self.clock.now();
         match report {
             FromPort::Open => self.host.handle_pilot_open(now),
-            FromPort::Bytes(bytes) | FromPort::Datagram(bytes, _) => self.host.handle_pilot_bytes(&bytes, now),
+            FromPort::Bytes(bytes) => _ = self.host.handle_pilot_bytes(&bytes, now),
+            FromPort::Datagram(bytes, sender) => {
+                let outcome = self.host.handle_pilot_bytes(&bytes, now);
+                self.ports.pilot.judge(sender, outcome);
+            }
             FromPort::Closed => {}
         }
     }

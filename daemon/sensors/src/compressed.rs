@@ -1,7 +1,11 @@
 //! Compressed images: JPEG, PNG, PPM and TIFF.
 
+use crate::exif::exif_stamp;
 use crate::{BitDepth, Stamp, complete_length};
-use image::{DynamicImage, ImageBuffer, ImageDecoder, ImageFormat, ImageReader, Limits, Rgb, RgbImage};
+use image::{
+    ColorType, DynamicImage, ExtendedColorType, ImageBuffer, ImageDecoder, ImageFormat, ImageReader, Limits, Rgb,
+    RgbImage,
+};
 use std::io::Cursor;
 
 /// Pixels of the largest image that is decoded.
@@ -14,6 +18,8 @@ pub enum DecodeError {
     UnknownFormat,
     #[error("the JPEG has no end, so a part of it is missing")]
     CutJpeg,
+    #[error("its levels are floats: convert it to 8 or 16 bits, with levels from black to white")]
+    Floats,
     #[error("the image has {width} x {height} pixels; allowed are up to {MAX_PIXELS}")]
     TooLarge { width: u32, height: u32 },
     #[error("not an image that can be read: {0}")]
@@ -53,6 +59,12 @@ fn upright(mut decoder: impl ImageDecoder, mut limits: Limits) -> Result<Dynamic
     // The decoder counts its own memory only.
     limits.reserve(decoder.total_bytes()).map_err(broken)?;
     let orientation = decoder.orientation().map_err(broken)?;
+    // Nothing says which of their values is white.
+    if matches!(decoder.color_type(), ColorType::Rgb32F | ColorType::Rgba32F)
+        || matches!(decoder.original_color_type(), ExtendedColorType::Unknown(32 | 64 | 96))
+    {
+        return Err(DecodeError::Floats);
+    }
     let mut image = DynamicImage::from_decoder(decoder).map_err(broken)?;
     image.apply_orientation(orientation);
     Ok(image)
@@ -99,9 +111,14 @@ fn limits() -> Limits {
 /// Bytes at the head of an image among which its own time is looked for.
 const HEAD_BYTES: usize = 4096;
 
-/// The time at which an image was taken, if the image itself says so by a text `stamp=SECONDS`: in a comment of a PPM or JPEG, or
-/// in a tEXt chunk with the keyword `stamp` of a PNG. The text stands in the first 4096 bytes.
+/// The time at which an image was taken, if the image itself says so: by a text `stamp=SECONDS` in a comment of a PPM or JPEG, or
+/// in a tEXt chunk with the keyword `stamp` of a PNG, within the first 4096 bytes; or by EXIF data with a time of original that
+/// has a fraction and a zone.
 pub fn own_stamp(bytes: &[u8]) -> Option<Stamp> {
+    stamp_in_text(bytes).or_else(|| exif_stamp(bytes))
+}
+
+fn stamp_in_text(bytes: &[u8]) -> Option<Stamp> {
     let head = &bytes[..bytes.len().min(HEAD_BYTES)];
     let find = |key: &[u8]| head.windows(key.len()).position(|w| w == key);
     let text = if head.starts_with(b"\x89PNG") {
@@ -152,6 +169,15 @@ mod tests {
             assert_eq!(greys(WHOLE), [0, 8, 16, 233], "{format:?}");
         }
         assert_eq!(decode(&encoded(ImageFormat::Png), BitDepth::Fixed(12)).unwrap(), image(), "8 bits stay");
+    }
+
+    #[test]
+    fn an_image_of_floats_is_refused_by_name() {
+        let floats = ImageBuffer::<Rgb<f32>, _>::from_vec(2, 1, vec![0.0, 10.0, 255.0, 1.0, 2.0, 3.0]).unwrap();
+        let mut bytes = Cursor::new(Vec::new());
+        DynamicImage::ImageRgb32F(floats).write_to(&mut bytes, ImageFormat::Tiff).unwrap();
+        assert_eq!(decode(bytes.get_ref(), WHOLE), Err(DecodeError::Floats));
+        assert_eq!(decode_upright(bytes.get_ref(), Limits::default()), Err(DecodeError::Floats));
     }
 
     #[test]

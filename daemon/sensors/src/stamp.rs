@@ -11,6 +11,8 @@ const NANOS: i64 = 1_000_000_000;
 
 /// Times in seconds since the Unix epoch by which the unit of a whole number is told: the years 2000 to 2099.
 const EPOCHS_S: std::ops::Range<i64> = 946_684_800..4_102_444_800;
+/// A clock that began at 0, as of a simulator, shows less, seconds.
+const FROM_ZERO_S: i64 = 10_000_000;
 
 /// The form of a time in a text.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -37,18 +39,48 @@ impl StampForm {
     }
 }
 
-/// Seconds since the Unix epoch of a date `yyyymmddThhmmss`, also with `_`, `-`, a space or nothing between day and hour, and with `Z`
-/// at its end; `None` if it is no date of the years 2000 to 2099.
-fn seconds_of_date(text: &str) -> Option<i64> {
-    let text = text.strip_suffix('Z').unwrap_or(text);
-    let (day, time) = (text.get(..8)?, text.get(8..)?);
-    let time = time.strip_prefix(['T', 't', '_', '-', ' ']).unwrap_or(time);
-    if time.len() != 6 || !day.bytes().chain(time.bytes()).all(|b| b.is_ascii_digit()) {
+/// The rest of a text that is read from its front.
+struct Rest<'a>(&'a str);
+
+impl Rest<'_> {
+    /// A number of so many digits.
+    fn number(&mut self, digits: usize) -> Option<i64> {
+        let (number, rest) = self.0.split_at_checked(digits)?;
+        self.0 = rest;
+        number.bytes().all(|b| b.is_ascii_digit()).then(|| number.parse().ok())?
+    }
+
+    /// Passes over one of these signs; returns whether it was there.
+    fn passes(&mut self, signs: &[char]) -> bool {
+        let rest = self.0.strip_prefix(signs);
+        self.0 = rest.unwrap_or(self.0);
+        rest.is_some()
+    }
+}
+
+/// Nanoseconds since the Unix epoch of a date `yyyymmddThhmmss`, also with `_`, `-`, a space or nothing between day and hour, with `-`
+/// between its parts, with a fraction behind `.`, `_`, `-` or (of 3, 6 or 9 digits) nothing, and with `Z` at its end; `None` if it is no
+/// date of the years 2000 to 2099.
+fn nanos_of_date(text: &str) -> Option<i64> {
+    let mut rest = Rest(text.strip_suffix('Z').unwrap_or(text));
+    let year = rest.number(4)?;
+    rest.passes(&['-']);
+    let month = rest.number(2)?;
+    rest.passes(&['-']);
+    let of_month = rest.number(2)?;
+    rest.passes(&['T', 't', '_', '-', ' ']);
+    let hour = rest.number(2)?;
+    rest.passes(&['-', ':']);
+    let minute = rest.number(2)?;
+    rest.passes(&['-', ':']);
+    let second = rest.number(2)?;
+    let is_apart = rest.passes(&['.', '_', '-']);
+    let fraction = rest.0;
+    let is_fraction = fraction.bytes().all(|b| b.is_ascii_digit());
+    let is_whole = if is_apart { !fraction.is_empty() } else { fraction.len() % 3 == 0 };
+    if !is_fraction || !is_whole {
         return None;
     }
-    let number = |text: &str| text.parse::<i64>().ok();
-    let (year, month, of_month) = (number(day.get(..4)?)?, number(day.get(4..6)?)?, number(day.get(6..)?)?);
-    let (hour, minute, second) = (number(time.get(..2)?)?, number(time.get(2..4)?)?, number(time.get(4..)?)?);
     let is_date = (2000..2100).contains(&year) && (1..=12).contains(&month) && (1..=31).contains(&of_month);
     if !is_date || hour > 23 || minute > 59 || second > 60 {
         return None;
@@ -56,7 +88,13 @@ fn seconds_of_date(text: &str) -> Option<i64> {
     // Days since the epoch, with years that begin in March (H. Hinnant, "chrono-compatible low-level date algorithms").
     let (y, m) = if month > 2 { (year, month - 3) } else { (year - 1, month + 9) };
     let days = 365 * y + y / 4 - y / 100 + y / 400 + (153 * m + 2) / 5 + of_month - 1 - 719_468;
-    Some(days * 86_400 + hour * 3600 + minute * 60 + second)
+    let seconds = days * 86_400 + hour * 3600 + minute * 60 + second;
+    seconds.checked_mul(NANOS)?.checked_add(nanos_of_fraction(fraction)?)
+}
+
+/// Nanoseconds of the digits behind the point of a second; those behind the ninth are dropped.
+fn nanos_of_fraction(digits: &str) -> Option<i64> {
+    format!("{:0<9}", digits.get(..9).unwrap_or(digits)).parse().ok()
 }
 
 impl Stamp {
@@ -81,29 +119,26 @@ impl Stamp {
 
     /// The same, with the form that the text has.
     pub fn parse_with_form(text: &str) -> Option<(Self, StampForm)> {
+        if let Some(nanos) = nanos_of_date(text) {
+            return Some((Self(nanos), StampForm::Date));
+        }
         let is_digits = |digits: &str| digits.bytes().all(|b| b.is_ascii_digit());
         let (whole, decimals) = text.split_once('.').unwrap_or((text, ""));
-        if !is_digits(decimals) {
-            return None;
-        }
-        let nanos: i64 = format!("{:0<9}", decimals.get(..9).unwrap_or(decimals)).parse().ok()?;
-        let of_seconds = |seconds: i64| seconds.checked_mul(NANOS)?.checked_add(nanos).map(Self);
-        if let Some(seconds) = seconds_of_date(whole) {
-            return Some((of_seconds(seconds)?, StampForm::Date));
-        }
-        if whole.is_empty() || whole.len() > 19 || !is_digits(whole) {
+        if whole.is_empty() || whole.len() > 19 || !is_digits(whole) || !is_digits(decimals) {
             return None;
         }
         let number: i64 = whole.parse().ok()?;
         if !decimals.is_empty() || whole.len() <= 11 {
-            return Some((of_seconds(number)?, StampForm::Seconds));
+            let nanos = number.checked_mul(NANOS)?.checked_add(nanos_of_fraction(decimals)?)?;
+            return Some((Self(nanos), StampForm::Seconds));
         }
         let is_of = |in_a_second: i64| EPOCHS_S.contains(&(number / in_a_second));
-        Some(match () {
-            () if is_of(1_000) => (Self(number * 1_000_000), StampForm::Milliseconds),
-            () if is_of(1_000_000) => (Self(number * 1_000), StampForm::Microseconds),
-            () => (Self(number), StampForm::Nanoseconds),
-        })
+        match () {
+            () if is_of(1_000) => Some((Self(number * 1_000_000), StampForm::Milliseconds)),
+            () if is_of(1_000_000) => Some((Self(number * 1_000), StampForm::Microseconds)),
+            () if is_of(NANOS) || number / NANOS < FROM_ZERO_S => Some((Self(number), StampForm::Nanoseconds)),
+            () => None,
+        }
     }
 
     /// Seconds from `earlier` to this stamp; negative if it is later.
@@ -171,13 +206,25 @@ mod tests {
             ("20261126185000", SECONDS * NANOS, Date),
             ("20261126_185000.250", SECONDS * NANOS + 250_000_000, Date),
             ("20261126-185000Z", SECONDS * NANOS, Date),
+            ("20261126T185000.250Z", SECONDS * NANOS + 250_000_000, Date),
+            ("20261126185000250", SECONDS * NANOS + 250_000_000, Date),
+            ("20261126T185000250", SECONDS * NANOS + 250_000_000, Date),
+            ("20261126_185000_25", SECONDS * NANOS + 250_000_000, Date),
+            ("2026-11-26T18-50-00.5", SECONDS * NANOS + 500_000_000, Date),
             ("20240229T000000", 1_709_164_800 * NANOS, Date),
             // A clock that began at 0, as of a simulator.
             ("123000000000", 123 * NANOS, Nanoseconds),
         ] {
             assert_eq!(Stamp::parse_with_form(text), Some((Stamp::from_nanos(nanos), form)), "{text}");
         }
-        for wrong in ["20261326T185000", "20261126T256000", "20261126T18500", "2026-11-26", "IMG_0001"] {
+        for wrong in [
+            "20261326T185000",
+            "20261126T256000",
+            "20261126T18500",
+            "2026-11-26",
+            "IMG_20261126_185000",
+            "99991126185000250",
+        ] {
             assert_eq!(Stamp::parse(wrong), None, "{wrong}");
         }
         assert_eq!(Stamp::from_ros(-1, 5).unwrap().to_string(), "-1.000000005");

@@ -2,8 +2,8 @@
 
 use crate::ArrivalClock;
 use crate::live::{Reading, SensorKind, SensorSource, SourceError, SourceImage};
-use scenecast_sensors::{CameraFault, MAX_IMAGE_BYTES, Stamp, StampForm, complete_length};
-use std::collections::{BTreeMap, VecDeque};
+use scenecast_sensors::{CameraFault, MAX_IMAGE_BYTES, Stamp, StampForm, complete_length, is_known_image};
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::fs::DirEntry;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant, SystemTime};
@@ -43,17 +43,25 @@ pub struct WatchSource {
     told: ToldNames,
 }
 
-/// What people were told of the times in names.
-#[derive(Debug, Clone, Copy, Default)]
+/// What people were told of the names.
+#[derive(Debug, Clone, Default)]
 struct ToldNames {
-    form: Option<StampForm>,
+    /// The form of the last name's time; `None` within for a name without one.
+    form: Option<Option<StampForm>>,
     is_ahead_told: bool,
+    /// Endings of files that are not read.
+    endings: BTreeSet<String>,
 }
 
 impl ToldNames {
     /// A new name; returns what people should know of its time, once.
     fn handle(&mut self, name: &str, now: SystemTime) -> Option<String> {
-        let (stamp, form) = Stamp::parse_with_form(Path::new(name).file_stem()?.to_str()?)?;
+        let found = Path::new(name).file_stem().and_then(|stem| Stamp::parse_with_form(stem.to_str()?));
+        let Some((stamp, form)) = found else {
+            let is_new = self.form.replace(None) != Some(None);
+            let text = "its name is no time: its own one counts, or else that of its arrival";
+            return is_new.then(|| format!("{name}: {text}"));
+        };
         let now = now.duration_since(SystemTime::UNIX_EPOCH).ok()?;
         let now = Stamp::from_nanos(i64::try_from(now.as_nanos()).ok()?);
         let ahead_s = stamp.seconds_since(now);
@@ -61,8 +69,18 @@ impl ToldNames {
             let hours = ahead_s / 3600.0;
             return Some(format!("{name}: its time is {hours:.1} hours ahead of the clock of this computer"));
         }
-        let is_new = self.form.replace(form) != Some(form);
+        let is_new = self.form.replace(Some(form)) != Some(Some(form));
         is_new.then(|| format!("{name}: names are read as {}", form.name()))
+    }
+
+    /// A file that is not named as one that is read; returns what people should know of it, once for each ending.
+    fn handle_other(&mut self, path: &Path) -> Option<String> {
+        let ending = ending(path).filter(|ending| UNREAD.contains(&ending.as_str()))?;
+        let is_new = self.endings.insert(ending);
+        is_new.then(|| {
+            let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+            format!("{name}: files of this kind are not read; it takes .{}", EXTENSIONS.join(", ."))
+        })
     }
 }
 
@@ -89,10 +107,15 @@ impl WatchSource {
         }
     }
 
-    fn entries(&self) -> Result<Vec<DirEntry>, SourceError> {
+    fn entries(&mut self) -> Result<Vec<DirEntry>, SourceError> {
         let failed = |e: std::io::Error| SourceError(format!("{}: {e}", self.dir.display()));
         let entries = std::fs::read_dir(&self.dir).map_err(failed)?;
-        Ok(entries.filter_map(Result::ok).filter(|entry| is_image(&entry.path())).collect())
+        let (images, others): (Vec<DirEntry>, Vec<DirEntry>) =
+            entries.filter_map(Result::ok).partition(|entry| is_image(&entry.path()));
+        for line in others.iter().filter_map(|entry| self.told.handle_other(&entry.path())) {
+            tracing::warn!("camera: {line}");
+        }
+        Ok(images)
     }
 
     /// Of many new files at once, only the last ones are read: the others would be overtaken.
@@ -150,7 +173,12 @@ impl WatchSource {
                     complete.push((stamp_of_name(path), path.clone(), bytes));
                 }
             } else if still >= ABANDONED {
-                fault(CameraFault::CutOff, format!("{name}: not a complete image after {} s", ABANDONED.as_secs()));
+                let is_known = std::fs::read(path).is_ok_and(|bytes| is_known_image(&bytes));
+                if is_known {
+                    fault(CameraFault::CutOff, format!("{name}: not a complete image after {} s", ABANDONED.as_secs()));
+                } else {
+                    fault(CameraFault::Unreadable, format!("{name}: not a JPEG, PNG, PPM or TIFF image"));
+                }
                 *state = FileState::Done;
             }
         }
@@ -206,15 +234,22 @@ impl SensorSource for WatchSource {
 
 const EXTENSIONS: [&str; 8] = ["jpeg", "jpg", "pgm", "png", "pnm", "ppm", "tif", "tiff"];
 
+/// Images of kinds that are not read.
+const UNREAD: [&str; 14] =
+    ["arw", "avif", "bmp", "cr2", "cr3", "dng", "gif", "heic", "heif", "jp2", "jxl", "nef", "raw", "webp"];
+
 /// Whether a file is named as an image; hidden files are not.
 fn is_image(path: &Path) -> bool {
     let is_hidden = path.file_name().is_none_or(|name| name.to_string_lossy().starts_with('.'));
-    let extension = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
-    !is_hidden && extension.is_some_and(|extension| EXTENSIONS.contains(&extension.as_str()))
+    !is_hidden && ending(path).is_some_and(|ending| EXTENSIONS.contains(&ending.as_str()))
 }
 
 fn is_tiff(path: &Path) -> bool {
-    path.extension().is_some_and(|e| e.to_string_lossy().to_ascii_lowercase().starts_with("tif"))
+    ending(path).is_some_and(|ending| ending.starts_with("tif"))
+}
+
+fn ending(path: &Path) -> Option<String> {
+    path.extension().map(|ending| ending.to_string_lossy().to_ascii_lowercase())
 }
 
 fn stamp_of_name(path: &Path) -> Option<Stamp> {
@@ -293,10 +328,25 @@ mod tests {
         let mut told = ToldNames::default();
         let first = told.handle("1795719000567.jpg", now).unwrap();
         assert_eq!(first, "1795719000567.jpg: names are read as milliseconds since 1970");
-        assert_eq!((told.handle("1795719001567.jpg", now), told.handle("IMG_0001.jpg", now)), (None, None));
+        assert_eq!(told.handle("1795719001567.jpg", now), None);
+        assert!(told.handle("IMG_0001.jpg", now).unwrap().contains("its name is no time"));
+        assert_eq!(told.handle("IMG_0002.jpg", now), None);
         let ahead = told.handle("20261127T185000.jpg", now).unwrap();
         assert!(ahead.contains("24.0 hours ahead"), "{ahead}");
         assert!(told.handle("20261126T185000.jpg", now).unwrap().contains("date and time of UTC"));
+    }
+
+    #[test]
+    fn a_kind_of_image_that_is_not_read_is_named_once() {
+        let mut told = ToldNames::default();
+        let line = told.handle_other(Path::new("/frames/0001.BMP")).unwrap();
+        assert_eq!(
+            line,
+            "0001.BMP: files of this kind are not read; it takes .jpeg, .jpg, .pgm, .png, .pnm, .ppm, .tif, .tiff"
+        );
+        assert_eq!(told.handle_other(Path::new("/frames/0002.bmp")), None);
+        assert_eq!(told.handle_other(Path::new("/frames/notes.txt")), None, "it may belong to the camera's program");
+        assert!(told.handle_other(Path::new("/frames/0001.dng")).is_some());
     }
 
     #[test]

@@ -7,7 +7,7 @@ pub(super) use watch::Watch;
 use super::record::{MAX_LOG, StoredLogEntry};
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::Address;
-use std::collections::VecDeque;
+use std::collections::{BTreeMap, VecDeque};
 
 /// The kind of an entry.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -46,7 +46,7 @@ impl LogKind {
         Self::Fault,
     ];
 
-    /// Whether entries give room first to orders, answers, modes and faults: anybody can cause many of them.
+    /// Whether entries give room first to orders, answers, modes and faults.
     fn is_minor(self) -> bool {
         !matches!(self, Self::Order | Self::Answer | Self::Mode | Self::Fault)
     }
@@ -90,7 +90,7 @@ pub struct MissionLog {
 }
 
 impl MissionLog {
-    /// The most entries that are kept. Those that concern nobody's safety go first, so that many of them do not push an order out.
+    /// The most entries that are kept. Nobody's entries push those of another out, nor those of another kind: see [`make_room`].
     pub const MAX: usize = MAX_LOG;
     /// The most characters of a text.
     const MAX_TEXT: usize = 240;
@@ -114,7 +114,7 @@ impl MissionLog {
     fn push(&mut self, entry: LogEntry) {
         self.last = entry.number;
         self.entries.push_back(entry);
-        make_room(&mut self.entries, |entry| entry.kind.is_minor());
+        make_room(&mut self.entries, |entry| (entry.kind as u8, entry.by.as_deref()));
     }
 
     /// Puts the entries of an earlier run of the surface back, before any other entry.
@@ -123,13 +123,18 @@ impl MissionLog {
     }
 }
 
-/// Removes the oldest minor entry while there are too many entries and minor ones are more than a quarter of them, or else the oldest
-/// entry.
-pub(super) fn make_room<T>(entries: &mut VecDeque<T>, is_minor: impl Fn(&T) -> bool) {
+/// Removes entries while there are too many: the oldest of the group of one kind and one author that has most of them. While minor kinds
+/// are more than a quarter, the group is one of theirs.
+pub(super) fn make_room<T>(entries: &mut VecDeque<T>, group: impl Fn(&T) -> (u8, Option<&str>)) {
+    let is_minor = |kind: u8| LogKind::ALL.into_iter().any(|known| known as u8 == kind && known.is_minor());
     while entries.len() > MAX_LOG {
-        let minor = entries.iter().filter(|entry| is_minor(entry)).count();
-        let oldest_minor = entries.iter().position(&is_minor).filter(|_| minor > MAX_LOG / 4);
-        entries.remove(oldest_minor.unwrap_or(0));
+        let minor = entries.iter().filter(|entry| is_minor(group(entry).0)).count();
+        let may_go = |entry: &&T| minor <= MAX_LOG / 4 || is_minor(group(entry).0);
+        let mut groups: BTreeMap<(u8, Option<&str>), usize> = BTreeMap::new();
+        entries.iter().filter(may_go).for_each(|entry| *groups.entry(group(entry)).or_default() += 1);
+        let largest = groups.into_iter().max_by_key(|(_, count)| *count).map(|(group, _)| group);
+        let oldest = entries.iter().position(|entry| Some(group(entry)) == largest);
+        entries.remove(oldest.unwrap_or(0));
     }
 }
 
@@ -147,9 +152,9 @@ impl From<&LogEntry> for StoredLogEntry {
 }
 
 impl StoredLogEntry {
-    /// A kind that this build does not know is kept.
-    pub(super) fn is_minor(&self) -> bool {
-        LogKind::ALL.into_iter().any(|kind| kind as u8 == self.kind && kind.is_minor())
+    /// Its kind and its author, as [`make_room`] takes them.
+    pub(super) fn group(&self) -> (u8, Option<&str>) {
+        (self.kind, self.by.as_deref())
     }
 
     /// `None` if this build does not know the kind.
@@ -176,7 +181,7 @@ mod tests {
         let mut add = |kind, text: &str| {
             log.add(Address::vehicle(1), kind, Some("ann"), text, Instant::ZERO);
             stored.push_back(StoredLogEntry::from(log.entries().next_back().unwrap()));
-            make_room(&mut stored, StoredLogEntry::is_minor);
+            make_room(&mut stored, StoredLogEntry::group);
         };
         add(LogKind::Order, "hold");
         (0..9000).for_each(|number| {
@@ -188,6 +193,21 @@ mod tests {
         let texts: Vec<&str> = log.entries().map(|entry| entry.text.as_str()).collect();
         assert_eq!((texts.len(), texts[0], texts[1]), (MissionLog::MAX, "hold", "entry 7002"));
         assert!(log.entries().map(StoredLogEntry::from).eq(stored));
+    }
+
+    #[test]
+    fn nobody_pushes_the_orders_of_another_out_by_orders_of_his_own() {
+        let mut log = MissionLog::default();
+        let mut add = |kind, by, text: &str| log.add(Address::vehicle(1), kind, by, text, Instant::ZERO);
+        add(LogKind::Order, Some("carla"), "fence: 4 corners");
+        add(LogKind::Mode, None, "it holds");
+        for number in 0..3000 {
+            add(LogKind::Order, Some("anna"), &format!("hold {number}"));
+            add(LogKind::Answer, None, "hold applied");
+        }
+        let texts: Vec<&str> = log.entries().map(|entry| entry.text.as_str()).collect();
+        assert_eq!((texts.len(), texts[0], texts[1]), (MissionLog::MAX, "fence: 4 corners", "it holds"));
+        assert!(texts.contains(&"hold 2999"));
     }
 
     #[test]

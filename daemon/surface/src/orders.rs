@@ -11,15 +11,17 @@ use serde::{Deserialize, Deserializer, Serialize};
 /// A fence as it is typed: vertices in metres east and north of the origin.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(extend("minProperties" = 1))]
 pub struct FenceOrder {
     /// The vehicle stays inside; null: no fence.
-    #[schemars(length(min = 3, max = 34))]
+    #[schemars(length(min = 3, max = 34), inner(inner(range(min = -838_860.7, max = 838_860.7))))]
     pub fence: Option<Vec<[f64; 2]>>,
     /// The vehicle stays outside each of these outlines; null: of none.
     #[serde(default, deserialize_with = "listed")]
-    #[schemars(with = "Option<Vec<Vec<[f64; 2]>>>", length(max = 15), inner(length(min = 3, max = 34)))]
+    #[schemars(with = "Option<Vec<Vec<[f64; 2]>>>", length(max = 15), inner(length(min = 3, max = 34), inner(inner(range(min = -838_860.7, max = 838_860.7)))))]
     pub keep_outs: Vec<Vec<[f64; 2]>>,
     /// The end of the return path; null: the start of the vehicle's run.
+    #[schemars(inner(range(min = -838_860.7, max = 838_860.7)))]
     pub return_point: Option<[f64; 2]>,
 }
 
@@ -30,6 +32,7 @@ fn listed<'de, D: Deserializer<'de>, T: Deserialize<'de>>(deserializer: D) -> Re
 /// Limits as they are typed. An absent member stays as it is; null: no limit, or the reaction that is configured on the vehicle.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(extend("minProperties" = 1))]
 pub struct LimitsOrder {
     /// Minimum and maximum depth, metres.
     #[schemars(inner(range(min = 0.0, max = 6553.5)))]
@@ -71,7 +74,7 @@ pub struct AreasOrder {
 #[serde(deny_unknown_fields)]
 pub struct AreaOrder {
     /// Vertices in metres east and north of the origin.
-    #[schemars(length(min = 3, max = 34))]
+    #[schemars(length(min = 3, max = 34), inner(inner(range(min = -838_860.7, max = 838_860.7))))]
     pub outline: Vec<[f64; 2]>,
     /// Added to the weights of labels and of unexplored cells inside.
     #[schemars(range(min = -1.0, max = 1.0))]
@@ -85,7 +88,7 @@ pub struct DestinationOrder {
     /// Metres east and north of the origin; null withdraws the destination.
     // An absent place must not withdraw it.
     #[serde(deserialize_with = "Option::deserialize")]
-    #[schemars(required)]
+    #[schemars(required, inner(range(min = -838_860.7, max = 838_860.7)))]
     pub place: Option<[f64; 2]>,
 }
 

@@ -13,29 +13,39 @@ use serde::{Deserialize, Serialize};
 #[serde(default, deny_unknown_fields)]
 pub struct SettingsOrder {
     /// The planner: lawnmower, greedy or horizon.
+    #[schemars(extend("enum" = ["lawnmower", "greedy", "horizon", "", null]))]
     pub planner: Option<String>,
     /// What an adaptive survey does once no look pays any more: repeat (explore the rest of the area, then look at the
     /// favoured labels again), explore (explore the rest, then hold) or hold.
+    #[schemars(extend("enum" = ["repeat", "explore", "hold", "", null]))]
     pub at_end: Option<String>,
     /// Whether images place the frames of the camera on the map: on, or off for odometry and compass alone.
+    #[schemars(extend("enum" = ["on", "off", "", null]))]
     pub registration: Option<String>,
     /// The cells of the map that are sent: fine (all), coarse (every fourth in both directions), or coarse-to-fine (the
     /// coarse ones first where the backlog is large). The scene model keeps all cells.
+    #[schemars(extend("enum" = ["fine", "coarse-to-fine", "coarse", "", null]))]
     pub cells: Option<String>,
     /// The layers that are sent in addition to the labels: none, or names of layers in any order, separated by commas.
     pub layers: Option<String>,
     /// Preference for topics that are common elsewhere in the map, 1e-9 to 1e3. Alpha, beta and gamma have an effect on the labels only
     /// where these are topics.
+    #[schemars(range(min = 0.0, max = 1e3))]
     pub alpha: Option<f64>,
     /// Prior weight of each word in a topic, 1e-9 to 1e3.
+    #[schemars(range(min = 0.0, max = 1e3))]
     pub beta: Option<f64>,
     /// Weight of a new topic, 1e-12 to 1e3.
+    #[schemars(range(min = 0.0, max = 1e3))]
     pub gamma: Option<f64>,
     /// Words resampled a second of mission time, 1 to 1e8.
+    #[schemars(range(min = 0.0, max = 1e8))]
     pub refine_words_per_s: Option<f64>,
     /// Maximum number of camera frames a second that are mapped, 0.01 to 30.
+    #[schemars(range(min = 0.0, max = 30.0))]
     pub frames_per_s: Option<f64>,
     /// Most labels that the map tells apart at one time, 2 to 32, where labels are habitats.
+    #[schemars(range(max = 32))]
     pub labels: Option<u8>,
 }
 

@@ -47,7 +47,8 @@ pub struct Failsafe {
     /// A breach until the operator's next order or fence, or a silence after which the vehicle has surfaced.
     pub latched: ModeReason,
     last_received: Instant,
-    now: Instant,
+    /// The time of the last step.
+    pub now: Instant,
 }
 
 /// The share of the limits that is kept in reserve for errors of the estimate.

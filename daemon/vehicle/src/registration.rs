@@ -96,10 +96,13 @@ impl Mapper {
         self.geometry = Some(GeometryCheck::default());
     }
 
-    /// What people should change at the camera, once its first frames and odometry have shown it. It is returned once.
+    /// What people should change at the camera, once its first frames and odometry have shown it.
     pub fn poll_camera_advice(&mut self) -> Option<String> {
-        let geometry = self.geometry.take_if(|geometry| geometry.is_complete())?.geometry();
-        geometry.and_then(|geometry| geometry.advice(self.metres_per_pixel()))
+        let metres_per_pixel = self.metres_per_pixel();
+        let geometry = self.geometry.as_mut()?;
+        let advice = geometry.poll_advice(metres_per_pixel);
+        self.geometry.take_if(|geometry| geometry.is_complete());
+        advice
     }
 
     /// The evidence of the registration so far; `None` without registration.

@@ -206,6 +206,11 @@ pub enum Slot {
 }
 
 impl Slot {
+    /// Whether it stops the vehicle: a hold or an abort.
+    pub fn stops(&self) -> bool {
+        matches!(self, Self::Constraints(constraints) if constraints.stops())
+    }
+
     /// The slot that this payload belongs to.
     pub fn id(&self) -> SlotId {
         match self {

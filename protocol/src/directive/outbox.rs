@@ -35,6 +35,8 @@ pub struct SlotOutbox {
     has_report: bool,
     /// Whether a report of this run has said that another surface's order of the slot is newer.
     is_overtaken: [bool; SLOTS],
+    /// Whether the vehicle has refused this surface since its last report.
+    was_refused: bool,
     /// Age after which an abort that has not arrived is withdrawn.
     abort_lifetime: Option<Duration>,
     /// The frame that acknowledged each slot that is received.
@@ -65,6 +67,7 @@ impl SlotOutbox {
             was_on_air: [false; SLOTS],
             has_report: false,
             is_overtaken: [false; SLOTS],
+            was_refused: false,
             abort_lifetime: None,
             received_in: [0; SLOTS],
             skipped: [0; SLOTS],
@@ -201,7 +204,7 @@ impl SlotOutbox {
                 decided.push(id);
             }
         }
-        self.has_report = true;
+        (self.has_report, self.was_refused) = (true, false);
         decided
     }
 
@@ -279,9 +282,23 @@ impl SlotOutbox {
     /// Whether an order may go out. A hold or an abort that another surface's order may have overtaken waits for the first
     /// report of a run; the vehicle itself sorts out the other orders, and obeys these at once.
     fn may_go(&self, order: &SlotProgress, now: Instant) -> bool {
-        let stops = matches!(order.slot, Slot::Constraints(constraints) if constraints.stops());
-        let is_prompt = now.since(order.issued) < Self::PROMPT;
+        let stops = order.slot.stops();
+        let is_prompt = now.since(order.issued) < Self::PROMPT && !self.was_refused;
         !self.is_keyed || !stops || self.has_report || is_prompt
+    }
+
+    /// The vehicle has refused this surface for another one. Whether a hold or an abort waits for which the vehicle is to be taken over:
+    /// one that was given less than `lifetime` ago, and that goes out once the vehicle has reported that it has no newer one. An
+    /// older one is withdrawn, and the operator is asked.
+    pub fn handle_refusal(&mut self, lifetime: Duration, now: Instant) -> bool {
+        self.was_refused = true;
+        let waits = |order: &&mut SlotProgress| order.slot.stops() && order.status.is_pending();
+        let Some(order) = self.slots.iter_mut().flatten().find(waits) else { return false };
+        let is_recent = now.since(order.issued) < lifetime;
+        if !is_recent {
+            (order.status, order.changed) = (OrderStatus::Withdrawn(Withdrawal::Late), now);
+        }
+        is_recent
     }
 
     /// Begins a new series if the report in frame `number` alone, without earlier ones, shows that the vehicle ignores a

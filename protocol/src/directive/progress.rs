@@ -48,7 +48,7 @@ impl Withdrawal {
         match self {
             Self::Superseded => "another surface has given a newer order of this kind",
             Self::Overtaken => {
-                "another surface gave a newer order of this kind before it arrived: is it still to be sent?"
+                "another surface gave an order of this kind, perhaps a newer one, before it arrived: is it still to be sent?"
             }
             Self::Late => "it has not arrived in time: is it still to be sent?",
             Self::Lost => "the vehicle has no record of it any more: is it to be sent again?",

@@ -45,16 +45,27 @@ impl fmt::Display for HostPort {
 pub struct PageOrigin(String);
 
 impl PageOrigin {
-    /// Scheme and host, with a port where it is not the usual one, and no path.
+    /// A text of `https://`, a host, and a port where it is not 443; no path. Without encryption there is no proxy that needs it.
     pub fn parse(text: &str) -> Option<Self> {
-        let host = text.strip_prefix("https://").or_else(|| text.strip_prefix("http://"))?;
+        let (host, port) = Self::split(text)?;
         let is_allowed = |b: u8| b.is_ascii_alphanumeric() || b".-:[]".contains(&b);
-        (!host.is_empty() && host.len() <= 255 && host.bytes().all(is_allowed)).then(|| Self(text.to_owned()))
+        let is_port = |port: &str| port.parse::<u16>().is_ok_and(|port| port > 0);
+        let is_host = !host.is_empty() && host.len() <= 255 && host.bytes().all(is_allowed);
+        (is_host && port.is_none_or(is_port)).then(|| Self(text.to_owned()))
     }
 
-    /// The text, as browsers send it.
+    fn split(text: &str) -> Option<(&str, Option<&str>)> {
+        let place = text.strip_prefix("https://")?;
+        // The colons of an IPv6 address stand in brackets.
+        Some(match place.rsplit_once(':') {
+            Some((host, port)) if !port.contains(']') => (host, Some(port)),
+            _ => (place, None),
+        })
+    }
+
+    /// The text as browsers send it: without the usual port.
     pub fn as_str(&self) -> &str {
-        &self.0
+        self.0.strip_suffix(":443").unwrap_or(&self.0)
     }
 }
 
@@ -72,7 +83,7 @@ impl Setting for Vec<PageOrigin> {
     }
 
     fn schema(_: &Rule) -> serde_json::Value {
-        different(json!({ "type": "string", "pattern": r"^https?://[A-Za-z0-9.:\[\]-]+$" }))
+        different(json!({ "type": "string", "pattern": r"^https://[A-Za-z0-9.:\[\]-]+$" }))
     }
 }
 

@@ -8,7 +8,7 @@ use scenecast_core::{LatLon, TangentPlane, UserError};
 use scenecast_files::{CoordinateFrame, FenceShapes, read_fence};
 use scenecast_surface::{FenceOrder, LimitsOrder};
 use serde::Serialize;
-use serde_json::json;
+use serde_json::{Value, json};
 use std::fmt::Write;
 use std::path::Path;
 
@@ -36,9 +36,12 @@ pub struct FenceFile<'a> {
     pub in_metres: bool,
     /// A file without a fence is accepted: it removes the present one.
     pub without_fence: bool,
+    /// A file without keep-outs removes the present ones.
+    pub without_keep_outs: bool,
 }
 
-/// Sends the fence, the keep-outs and the return point of a GeoJSON file.
+/// Sends the fence, the keep-outs and the return point of a GeoJSON file. What the file does not have stays, if the surface knows what
+/// there is.
 pub async fn set_fence(session: &Session, file: FenceFile<'_>) -> Result<(), UserError> {
     let state = session.state().await?;
     let v = session.choose(&state)?;
@@ -49,7 +52,17 @@ pub async fn set_fence(session: &Session, file: FenceFile<'_>) -> Result<(), Use
         let line = "it has no fence, and an order replaces the present one; --without-fence removes it on purpose";
         return Err(UserError::file(file.path, line));
     }
-    send(session, v, "fence", &order).await
+    let mut changes = json!(order);
+    let is_known = v.orders.fence.is_some() || v.orders.fence_in_force.is_some();
+    if let Some(members) = changes.as_object_mut().filter(|_| is_known) {
+        let stays = |name: &str| match name {
+            "keep_outs" => order.keep_outs.is_empty() && !file.without_keep_outs,
+            "return_point" => order.return_point.is_none(),
+            _ => false,
+        };
+        members.retain(|name, _| !stays(name));
+    }
+    send(session, v, "fence", &changes).await
 }
 
 /// Removes the fence, the keep-outs and the return point.
@@ -73,15 +86,36 @@ pub async fn show_limits(session: &Session) -> Result<(), UserError> {
     session.print(&view, || view.text(state.now_s, limits_text))
 }
 
-/// Sends limits. Limits that are not given stay if `keep`, else they are removed.
-pub async fn set_limits(session: &Session, given: &LimitsOrder, keep: bool) -> Result<(), UserError> {
+/// Sends limits. Those that are not given stay.
+pub async fn set_limits(session: &Session, given: &LimitsOrder) -> Result<(), UserError> {
     given.read().map_err(UserError::Input)?;
-    let mut order = json!(given);
-    if let Some(members) = order.as_object_mut().filter(|_| keep) {
-        members.retain(|_, value| !value.is_null());
-    }
+    change_limits(session, |_, value| !value.is_null(), given).await
+}
+
+/// Removes limits and reactions by their names, such as `on-silence`; `all` is all of them.
+pub async fn clear_limits(session: &Session, names: &[String]) -> Result<(), UserError> {
+    let is_named = |member: &str, name: &str| {
+        name == "all"
+            || member.strip_suffix("_m").or(member.strip_suffix("_s")).unwrap_or(member) == name.replace('-', "_")
+    };
+    change_limits(session, |member, _| names.iter().any(|name| is_named(member, name)), &LimitsOrder::default()).await
+}
+
+/// Sends the members of an order that are to be named. Where the surface does not know the present limits, all must be named.
+async fn change_limits(
+    session: &Session,
+    is_named: impl Fn(&str, &Value) -> bool,
+    order: &LimitsOrder,
+) -> Result<(), UserError> {
     let state = session.state().await?;
-    send(session, session.choose(&state)?, "limits", &order).await
+    let v = session.choose(&state)?;
+    let mut changes = json!(order);
+    let is_known = v.orders.limits.is_some() || v.orders.limits_in_force.is_some();
+    let is_empty = order == &LimitsOrder::default();
+    if let Some(members) = changes.as_object_mut().filter(|_| is_known || is_empty) {
+        members.retain(|name, value| is_named(name, value));
+    }
+    send(session, v, "limits", &changes).await
 }
 
 /// Orders the vehicle to hold, to abort, or to resume its survey.

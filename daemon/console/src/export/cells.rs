@@ -44,10 +44,18 @@ pub struct MapCells {
 /// What a file of a map says of itself.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct MapCaption {
-    /// The address of the vehicle.
-    pub vehicle: u8,
+    /// The address and the name of the vehicle.
+    pub vehicle: (u8, String),
     /// The moment of the map in UTC, as in RFC 3339.
     pub utc: String,
+}
+
+impl MapCaption {
+    /// The same in words.
+    pub(super) fn title(&self) -> String {
+        let (address, name) = &self.vehicle;
+        format!("scenecast map of {name} (vehicle {address}) at {}", self.utc)
+    }
 }
 
 /// A quantity of each cell.

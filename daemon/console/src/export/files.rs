@@ -33,9 +33,15 @@ pub(super) fn world_file(cells: &MapCells) -> String {
 }
 
 /// The `.aux.xml` file in which GDAL and QGIS look for the projection of a PNG.
-pub(super) fn projection(origin: Option<Origin>) -> String {
+pub(super) fn projection(cells: &MapCells, origin: Option<Origin>) -> String {
     let text = well_known_text(origin).replace('"', "&quot;");
-    format!("<PAMDataset>\n  <SRS dataAxisToSRSAxisMapping=\"1,2\">{text}</SRS>\n</PAMDataset>\n")
+    let facts = cells.caption.as_ref().map_or(String::new(), |MapCaption { vehicle: (address, name), utc }| {
+        let name = name.replace('&', "&amp;").replace('<', "&lt;");
+        let item = |key: &str, value: &str| format!("    <MDI key=\"{key}\">{value}</MDI>\n");
+        let items = [item("vehicle", &address.to_string()), item("vehicle_name", &name), item("utc", utc)].concat();
+        format!("  <Metadata>\n{items}  </Metadata>\n")
+    });
+    format!("<PAMDataset>\n  <SRS dataAxisToSRSAxisMapping=\"1,2\">{text}</SRS>\n{facts}</PAMDataset>\n")
 }
 
 /// Regions of equal label, and markers: WGS 84 if the mission has an origin, else metres east and north of it.
@@ -84,7 +90,8 @@ pub(super) fn geojson(cells: &MapCells, origin: Option<Origin>) -> String {
     }
     let mut facts = json!({ "map_version": cells.version, "mission_time_s": crate::snapshot::seconds(cells.at) });
     if let Some(caption) = &cells.caption {
-        (facts["vehicle"], facts["utc"]) = (caption.vehicle.into(), caption.utc.as_str().into());
+        (facts["vehicle"], facts["vehicle_name"]) = (caption.vehicle.0.into(), caption.vehicle.1.as_str().into());
+        facts["utc"] = caption.utc.as_str().into();
     }
     if origin.is_none() {
         facts["coordinates"] = json!("metres east and north of the mission's origin");
@@ -108,16 +115,13 @@ fn tidy(degrees: f64) -> f64 {
 
 /// ASCII PLY: the centre of each explored cell in metres east, north and up (0 where the depth is unknown), colour, label.
 pub(super) fn ply(cells: &MapCells, origin: Option<Origin>) -> String {
-    let of = cells
-        .caption
-        .as_ref()
-        .map_or(String::new(), |MapCaption { vehicle, utc }| format!(" of vehicle {vehicle} at {utc}"));
+    let title = cells.caption.as_ref().map_or("scenecast map".to_owned(), MapCaption::title);
     let from = origin.map_or(String::new(), |Origin { lat_deg, lon_deg }| {
         format!(" from latitude {lat_deg}, longitude {lon_deg} (WGS 84)")
     });
     let count = cells.explored().count();
     let mut out = format!(
-        "ply\nformat ascii 1.0\ncomment scenecast map{of}, metres east, north, up{from}\nelement vertex {count}\n\
+        "ply\nformat ascii 1.0\ncomment {title}, metres east, north, up{from}\nelement vertex {count}\n\
          property double x\nproperty double y\nproperty double z\nproperty uchar red\nproperty uchar green\n\
          property uchar blue\nproperty uchar label\nend_header\n"
     );
@@ -130,10 +134,19 @@ pub(super) fn ply(cells: &MapCells, origin: Option<Origin>) -> String {
     out
 }
 
-/// One line for each explored cell: the centre in metres, the label, its age in seconds, the value of each layer if known.
-pub(super) fn csv(cells: &MapCells) -> String {
+/// One line for each explored cell: the centre in metres, the label, its age in seconds, the value of each layer if known; the
+/// operator's name of the label; vehicle and time of the map; latitude and longitude (WGS 84) if the mission has an origin.
+pub(super) fn csv(cells: &MapCells, origin: Option<Origin>) -> String {
     let mut out = String::from("east_m,north_m,label,age_s");
     cells.layers.iter().for_each(|layer| out.extend([",", &layer.descriptor.name]));
+    out.push_str(",name");
+    let caption = cells
+        .caption
+        .as_ref()
+        .map(|MapCaption { vehicle: (address, name), utc }| format!(",{address},{},{utc}", quoted(Some(name))));
+    out.push_str(if caption.is_some() { ",vehicle,vehicle_name,utc" } else { "" });
+    let projection = origin.map(TransverseMercator::about);
+    out.push_str(if projection.is_some() { ",lat_deg,lon_deg" } else { "" });
     for ExploredCell { cell, x, y, label, age_s } in cells.explored() {
         let age = age_s.map_or(String::new(), |age| age.to_string());
         let _ = write!(out, "\n{x:.3},{y:.3},{label},{age}");
@@ -141,9 +154,19 @@ pub(super) fn csv(cells: &MapCells) -> String {
             let value = layer.value(cell).map_or(String::new(), |value| format!("{value:.3}"));
             let _ = write!(out, ",{value}");
         }
+        let _ = write!(out, ",{}{}", quoted(cells.names.get(&label)), caption.as_deref().unwrap_or_default());
+        if let Some(projection) = &projection {
+            let (lon, lat) = projection.lon_lat(x, y);
+            let _ = write!(out, ",{},{}", tidy(lat), tidy((lon + 180.0).rem_euclid(360.0) - 180.0));
+        }
     }
     out.push('\n');
     out
+}
+
+/// A name as a field of a table; empty without one.
+fn quoted(name: Option<&String>) -> String {
+    name.map_or(String::new(), |name| format!("\"{}\"", name.replace('"', "\"\"")))
 }
 
 /// The number of cells of each label.
@@ -159,7 +182,7 @@ pub(super) fn labels(cells: &MapCells) -> String {
     let mut out = String::from("label,name,cells,area_m2");
     cuts().for_each(|count| _ = write!(out, ",of_{count}"));
     for (label, count) in counts(cells) {
-        let name = cells.names.get(&label).map_or(String::new(), |name| format!("\"{}\"", name.replace('"', "\"\"")));
+        let name = quoted(cells.names.get(&label));
         let _ = write!(out, "\n{label},{name},{count},{:.3}", f64::from(count) * cells.cell_m * cells.cell_m);
         let groups = cells.tree.iter().flat_map(|tree| cuts().map(|count| tree.group_of(label, count)));
         groups.for_each(|group| _ = write!(out, ",{group}"));
@@ -246,10 +269,10 @@ impl MapCells {
         match format {
             MapFormat::Png => indexed_png(self),
             MapFormat::WorldFile => Ok(world_file(self).into()),
-            MapFormat::Projection => Ok(projection(origin).into()),
+            MapFormat::Projection => Ok(projection(self, origin).into()),
             MapFormat::GeoJson => Ok(geojson(self, origin).into()),
             MapFormat::Ply => Ok(ply(self, origin).into()),
-            MapFormat::Csv => Ok(csv(self).into()),
+            MapFormat::Csv => Ok(csv(self, origin).into()),
             MapFormat::Labels => Ok(labels(self).into()),
             MapFormat::Tiff => geotiff(self, origin, Reference::Mission),
             MapFormat::UtmTiff => geotiff(self, origin, Reference::Utm),

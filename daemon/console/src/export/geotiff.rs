@@ -134,7 +134,10 @@ fn raster(cells: &MapCells, origin: Option<Origin>, reference: Reference, places
             // All of it beyond 180 degrees is on the other side; a file across it is none that others read.
             let turned = west - 360.0 * west.signum();
             if turned.abs() > 180.0 || (turned + columns * pixel.0).abs() > 180.0 {
-                return Err("the map lies across 180 degrees of longitude: take map.utm.tif or map.tif".to_owned());
+                return Err(
+                    "the map lies across 180 degrees of longitude: take map.tif, or map.utm.tif up to 84 degrees north"
+                        .to_owned(),
+                );
             }
             turned
         }
@@ -289,8 +292,8 @@ fn write(
     directory.write_tag(Tag::SamplesPerPixel, 1u16)?;
     directory.write_tag(Tag::Compression, 8u16)?; // Adobe deflate
     directory.write_tag(Tag::PhotometricInterpretation, 3u16)?; // palette
-    if let Some(MapCaption { vehicle, utc }) = caption {
-        let text = format!("scenecast map of vehicle {vehicle} at {utc}, pixel value = label");
+    if let Some(caption) = caption {
+        let text = format!("{}, pixel value = label", caption.title());
         directory.write_tag(Tag::ImageDescription, text.as_str())?;
     }
     directory.write_tag(Tag::PlanarConfiguration, 1u16)?;

@@ -5,12 +5,13 @@ use axum::http::{HeaderMap, header};
 use scenecast_config::TokenGrant;
 use scenecast_surface::Principal;
 use std::collections::{BTreeMap, VecDeque};
+use std::net::IpAddr;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 use subtle::ConstantTimeEq;
 use tokio::sync::oneshot;
 
-/// Sessions of a principal; a further login ends the oldest of them, and never that of another principal.
+/// Sessions of a principal; a further login ends the oldest of the address with most of them, and never that of another principal.
 const MAX_SESSIONS: usize = 16;
 pub(super) const COOKIE: &str = "scenecast-session";
 /// Paths that the login form needs.
@@ -34,7 +35,20 @@ pub(super) struct Access {
     /// Further origins of the page, as of a proxy that encrypts.
     pub(super) origins: Vec<String>,
     grants: Vec<TokenGrant>,
-    sessions: Mutex<VecDeque<(String, Principal)>>,
+    /// The oldest first.
+    sessions: Mutex<VecDeque<Session>>,
+}
+
+/// Where a request comes from.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct PeerAddress(pub(super) IpAddr);
+
+/// A login of the page.
+#[derive(Debug)]
+struct Session {
+    cookie: String,
+    principal: Principal,
+    address: IpAddr,
 }
 
 /// Whether anybody may read this path.
@@ -73,29 +87,34 @@ impl Access {
     fn principal_of_session(&self, candidate: &str) -> Option<Principal> {
         let sessions = self.sessions.lock().unwrap_or_else(PoisonError::into_inner);
         let is_it = |session: &str| bool::from(session.as_bytes().ct_eq(candidate.as_bytes()));
-        let found = sessions.iter().fold(None, |found, (s, principal)| if is_it(s) { Some(principal) } else { found });
+        let found = sessions.iter().fold(None, |found, s| if is_it(&s.cookie) { Some(&s.principal) } else { found });
         found.cloned()
     }
 
-    /// Begins a session; `None` if the system has no random bytes.
-    pub(super) fn begin_session(&self, principal: Principal) -> Option<String> {
+    /// Begins a session of a client at an address; `None` if the system has no random bytes.
+    pub(super) fn begin_session(&self, principal: Principal, address: IpAddr) -> Option<String> {
         let mut bytes = [0; 16];
         getrandom::fill(&mut bytes).ok()?;
-        let session = format!("{:032x}", u128::from_be_bytes(bytes));
+        let cookie = format!("{:032x}", u128::from_be_bytes(bytes));
         let mut sessions = self.sessions.lock().unwrap_or_else(PoisonError::into_inner);
-        let held: Vec<usize> = (0..sessions.len()).filter(|&index| sessions[index].1 == principal).collect();
-        if held.len() >= MAX_SESSIONS {
-            sessions.remove(held[0]);
+        sessions.push_back(Session { cookie: cookie.clone(), principal: principal.clone(), address });
+        let mut held: BTreeMap<IpAddr, usize> = BTreeMap::new();
+        let own = sessions.iter().filter(|session| session.principal == principal);
+        own.for_each(|session| *held.entry(session.address).or_default() += 1);
+        if held.values().sum::<usize>() > MAX_SESSIONS {
+            let most = held.into_iter().max_by_key(|(_, count)| *count).map(|(address, _)| address);
+            let is_of_it = |session: &Session| session.principal == principal && Some(session.address) == most;
+            let oldest = sessions.iter().position(is_of_it);
+            oldest.map(|index| sessions.remove(index));
         }
-        sessions.push_back((session.clone(), principal));
-        Some(session)
+        Some(cookie)
     }
 
     /// Ends the sessions of a request's cookies.
     pub(super) fn end_session(&self, headers: &HeaderMap) {
         let mut sessions = self.sessions.lock().unwrap_or_else(PoisonError::into_inner);
         let is_ended = |session: &str| cookies(headers).any(|c| bool::from(c.as_bytes().ct_eq(session.as_bytes())));
-        sessions.retain(|(session, _)| !is_ended(session));
+        sessions.retain(|session| !is_ended(&session.cookie));
     }
 }
 
@@ -247,7 +266,9 @@ mod tests {
     #[test]
     fn a_session_ends_at_the_logout_and_after_many_of_its_principal() {
         let access = access();
-        let begin = |token| access.begin_session(access.principal_of_token(token).unwrap()).unwrap();
+        let at = |last| IpAddr::from([192, 0, 2, last]);
+        let begin_at = |token, last| access.begin_session(access.principal_of_token(token).unwrap(), at(last)).unwrap();
+        let begin = |token| begin_at(token, 1);
         let cookie = |session: &str| with(header::COOKIE, &format!("theme=dark; {COOKIE}={session}"));
         let [first, second] = ["fedcba9876543210", "0123456789abcdef"].map(|token| cookie(&begin(token)));
         assert_eq!([&first, &second].map(|c| name(&access, c).unwrap()), ["victor", "anna"]);
@@ -256,6 +277,8 @@ mod tests {
         assert_eq!((name(&access, &first), name(&access, &second).as_deref()), (None, Some("anna")));
         (0..9 * MAX_SESSIONS).for_each(|_| drop(begin("fedcba9876543210")));
         assert_eq!(name(&access, &second).as_deref(), Some("anna"), "logins of others");
+        (0..9 * MAX_SESSIONS).for_each(|_| drop(begin_at("0123456789abcdef", 2)));
+        assert_eq!(name(&access, &second).as_deref(), Some("anna"), "logins elsewhere by the same token");
         (0..MAX_SESSIONS).for_each(|_| drop(begin("0123456789abcdef")));
         assert_eq!(name(&access, &second), None);
     }

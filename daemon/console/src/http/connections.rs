@@ -1,8 +1,9 @@
 //! Connections, with bounds on their number, time and memory.
 
-use axum::Router;
+use super::access::PeerAddress;
 use axum::body::{Body, Bytes};
 use axum::http::header::CONTENT_TYPE;
+use axum::{Extension, Router};
 use http_body_util::BodyExt;
 use hyper::body::{Body as HttpBody, Frame, Incoming, SizeHint};
 use hyper::server::conn::http1;
@@ -46,8 +47,8 @@ const STREAM_SEND_BUFFER_BYTES: usize = 8 * 1024;
 pub(super) async fn serve(listener: TcpListener, router: Router) {
     let connections = Connections::default();
     for number in 0u64.. {
-        let stream = match listener.accept().await {
-            Ok((stream, _)) => stream,
+        let (stream, from) = match listener.accept().await {
+            Ok((stream, from)) => (stream, PeerAddress(from.ip())),
             Err(e) => {
                 // Out of file descriptors, or the client has left: a later connection may succeed.
                 tracing::warn!("the operator's page cannot take a connection: {e}");
@@ -56,7 +57,7 @@ pub(super) async fn serve(listener: TcpListener, router: Router) {
             }
         };
         let activity = connections.room(number).await;
-        let (all, router) = (connections.clone(), router.clone());
+        let (all, router) = (connections.clone(), router.clone().layer(Extension(from)));
         let task = tokio::spawn(async move {
             // An error here is the fault of the client.
             let _ = serve_one(stream, router, activity).await;

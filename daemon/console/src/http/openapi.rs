@@ -3,6 +3,7 @@
 use super::handlers::maps::TILES;
 use super::operations::{Content, Operation, SchemaOf, operations};
 use crate::state::{ErrorBody, MapEvent, MapIndex, MissionState};
+use scenecast_protocol::map::MAX_LABEL;
 use scenecast_surface::LogKind;
 use schemars::SchemaGenerator;
 use schemars::generate::SchemaSettings;
@@ -71,6 +72,12 @@ fn as_json(schema: Value) -> Value {
 fn describe_operation(operation: &Operation, schemas: &mut Schemas) -> Value {
     let (status, content) = &operation.success;
     let mut responses = json!({ "default": { "$ref": "#/components/responses/Error" } });
+    if operation.body.is_some() {
+        responses["422"] = json!({
+            "description": "It has the documented form, and its meaning is refused, such as a fence that crosses itself",
+            "content": as_json(json!({ "$ref": "#/components/schemas/ErrorBody" })),
+        });
+    }
     responses[status.to_string()] = describe_response(content, &mut schemas.response);
     let mut described = json!({ "operationId": operation.id, "summary": operation.summary, "responses": responses });
     if let Some(role) = operation.role {
@@ -174,15 +181,21 @@ fn parameters(operation: &Operation) -> Vec<Value> {
         }
     }
     if operation.id == "map" {
-        for (name, text) in [
-            ("x0", "Column of the south-west cell of a region, which needs all four parameters"),
-            ("y0", "Row of the south-west cell of the region"),
-            ("width", "Columns of the region"),
-            ("height", "Rows of the region"),
+        let (corner, size) = ((i64::from(i32::MIN), i64::from(i32::MAX)), (1, i64::from(u32::MAX)));
+        for (name, text, (low, high)) in [
+            ("x0", "Column of the south-west cell of a region, which needs all four parameters", corner),
+            ("y0", "Row of the south-west cell of the region", corner),
+            ("width", "Columns of the region", size),
+            ("height", "Rows of the region", size),
         ] {
-            let schema = json!({ "type": "integer" });
+            let schema = json!({ "type": "integer", "minimum": low, "maximum": high });
             parameters.push(json!({ "name": name, "in": "query", "description": text, "schema": schema }));
         }
+    }
+    if operation.path.contains("/map.") {
+        let schema = json!({ "type": "integer", "minimum": 1, "maximum": MAX_LABEL });
+        let text = "The number of labels at which the tree of the labels is cut; all by default";
+        parameters.push(json!({ "name": "labels", "in": "query", "description": text, "schema": schema }));
     }
     if operation.body.is_some() || operation.id == "logout" {
         let schema = json!({ "type": "string", "const": "1" });

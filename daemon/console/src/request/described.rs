@@ -2,14 +2,18 @@
 
 use super::SurfaceRequest;
 use crate::orders::{ExemplarAction, LabelOrder, OrderChanges};
-use scenecast_protocol::directive::Constraints;
+use scenecast_protocol::directive::{Constraints, SlotId};
 use scenecast_protocol::wire::Address;
 use scenecast_surface::{LimitsOrder, LogKind};
 use serde_json::Value;
 use std::collections::BTreeMap;
 
-/// The vehicle, the kind and the text of the entry for a request; `None` if it changes nothing that the log has.
-pub(super) fn describe(request: &SurfaceRequest) -> Option<(Option<Address>, LogKind, String)> {
+/// The vehicle, the kind and the text of the entry for a request; `None` if it changes nothing that the log has. `name_of_order` says
+/// what the latest order in a slot of a vehicle is called.
+pub(super) fn describe(
+    request: &SurfaceRequest,
+    name_of_order: impl Fn(u8, SlotId) -> &'static str,
+) -> Option<(Option<Address>, LogKind, String)> {
     use SurfaceRequest as R;
     let order = |id: u8, text: String| (Address::vehicle(id), LogKind::Order, text);
     let record = |id: u8, text: String| (Address::vehicle(id), LogKind::Record, text);
@@ -34,6 +38,7 @@ pub(super) fn describe(request: &SurfaceRequest) -> Option<(Option<Address>, Log
             let part = |(name, value): (&String, &Value)| match name.as_str() {
                 "fence" if value.is_null() => "no fence".to_owned(),
                 "fence" => format!("{} corners", count(value)),
+                "keep_outs" if count(value) == 0 => "no keep-outs".to_owned(),
                 "keep_outs" => format!("{} keep-outs", count(value)),
                 _ if value.is_null() => "no return point".to_owned(),
                 _ => format!("return point {value}"),
@@ -50,7 +55,7 @@ pub(super) fn describe(request: &SurfaceRequest) -> Option<(Option<Address>, Log
             to.place.map_or("destination withdrawn".into(), |[x, y]| format!("destination: E {x:.1} N {y:.1} m")),
         ),
         R::Settings(id, settings) => order(*id, format!("settings: {}", members(settings))),
-        R::Again(id, slot) => order(*id, format!("{} sent again", slot.name())),
+        R::Again(id, slot, _) => order(*id, format!("{} sent again", name_of_order(*id, *slot))),
         R::Restore(id) => order(*id, "the lost orders are sent again".into()),
         R::TakeOver(id) => order(*id, "the vehicle is taken over from another surface".into()),
         R::Budget(budget) => (None, LogKind::Order, format!("budget: {} bit/s", budget.budget_bps)),
@@ -92,8 +97,9 @@ fn utility(weights: &BTreeMap<u8, f64>, (exploration, curiosity): (f64, f64)) ->
 fn limits_named(order: &OrderChanges<LimitsOrder>) -> String {
     let removed: Vec<String> =
         order.named().iter().filter(|(_, v)| v.is_null()).map(|(name, _)| name.replace('_', " ")).collect();
-    let stated = members(order.named());
-    if removed.is_empty() { stated } else { format!("{stated}; removed: {}", removed.join(", ")) }
+    let stated = Some(members(order.named())).filter(|_| removed.len() < order.named().len());
+    let removed = (!removed.is_empty()).then(|| format!("removed: {}", removed.join(", ")));
+    stated.into_iter().chain(removed).collect::<Vec<_>>().join("; ")
 }
 
 /// The members of an order that it states.
@@ -111,7 +117,10 @@ mod tests {
 
     #[test]
     fn requests_are_described_by_what_they_change() {
-        let text = |request: SurfaceRequest| describe(&request).map(|(_, kind, text)| (kind.name(), text));
+        let text =
+            |request: SurfaceRequest| describe(&request, |_, _| "abort").map(|(_, kind, text)| (kind.name(), text));
+        let again = SurfaceRequest::Again(1, SlotId::Constraints, "constraints".into());
+        assert_eq!(text(again), Some(("order", "abort sent again".into())));
         let weights = SurfaceRequest::Utility(1, [(3, 0.8), (4, 0.0)].into(), (0.1, 0.0));
         assert_eq!(text(weights), Some(("order", "weights: label 3 +0.80, unexplored +0.10".into())));
         let limits = LimitsOrder { time_s: Some(600.0), on_silence: Some("hold".into()), ..LimitsOrder::default() };
@@ -119,6 +128,8 @@ mod tests {
                      removed: altitude m, depth m, distance m, on abort, on breach, silence s";
         assert_eq!(text(SurfaceRequest::Limits(1, OrderChanges::whole(&limits))), Some(("order", whole.into())));
         let changes = serde_json::from_str(r#"{"depth_m": null, "time_s": 60}"#).unwrap();
+        let removed = serde_json::from_str(r#"{"silence_s": null}"#).unwrap();
+        assert_eq!(text(SurfaceRequest::Limits(1, removed)), Some(("order", "limits: removed: silence s".into())));
         assert_eq!(
             text(SurfaceRequest::Limits(1, changes)),
             Some(("order", "limits: time s 60; removed: depth m".into()))

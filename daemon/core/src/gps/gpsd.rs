@@ -17,6 +17,7 @@ pub const MAX_LINE: usize = 16_384;
 #[derive(Deserialize)]
 struct Report {
     class: String,
+    device: Option<String>,
     mode: Option<u8>,
     status: Option<u8>,
     time: Option<String>,
@@ -36,6 +37,8 @@ pub struct Said {
     /// As sentences of NMEA 0183 would.
     pub sentences: Vec<Sentence>,
     pub sigma_m: Option<f64>,
+    /// The receiver that gpsd has it from.
+    pub device: Option<String>,
 }
 
 /// The errors of gpsd are taken for bounds at 95 %: 1.96 standard deviations. Releases before 3.20 say so, later ones that the certainty
@@ -46,8 +49,8 @@ const CONFIDENCE: f64 = 1.96;
 pub fn parse(line: &[u8]) -> Option<Said> {
     let report: Report = serde_json::from_slice(line).ok()?;
     match report.class.as_str() {
-        "TPV" => position(&report),
-        "ATT" => Some(Said { sentences: heading(report.heading)?, sigma_m: None }),
+        "TPV" => position(&report).map(|said| Said { device: report.device, ..said }),
+        "ATT" => Some(Said { sentences: heading(report.heading)?, ..Said::default() }),
         _ => Some(Said::default()),
     }
 }
@@ -60,7 +63,7 @@ fn heading(degrees: Option<f64>) -> Option<Vec<Sentence>> {
 fn position(r: &Report) -> Option<Said> {
     // Status 5 is dead reckoning, 8 simulated; 6 is dead reckoning with satellites.
     if r.mode.unwrap_or(0) < 2 || matches!(r.status, Some(5 | 8)) {
-        return Some(Said { sentences: vec![Sentence::NoPosition], sigma_m: None });
+        return Some(Said { sentences: vec![Sentence::NoPosition], ..Said::default() });
     }
     let place = LatLon::new(r.lat?, r.lon?)?;
     let utc_s = r.time.as_deref().and_then(time_of_day);
@@ -72,7 +75,8 @@ fn position(r: &Report) -> Option<Said> {
     }
     sentences.extend(heading(r.heading)?);
     let error = r.eph.or_else(|| Some(r.epx?.hypot(r.epy?)));
-    Some(Said { sentences, sigma_m: error.filter(|e| e.is_finite() && *e > 0.0).map(|e| e / CONFIDENCE) })
+    let sigma_m = error.filter(|e| e.is_finite() && *e > 0.0).map(|e| e / CONFIDENCE);
+    Some(Said { sentences, sigma_m, device: None })
 }
 
 /// Seconds of the day of `2005-06-08T10:34:48.283Z`.

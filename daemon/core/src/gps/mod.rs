@@ -92,6 +92,8 @@ pub struct Gps {
     lines: Lines,
     faults: BTreeMap<GpsFault, u64>,
     fix: Option<GpsFix>,
+    /// The receiver of that fix, where a daemon has several.
+    device: Option<String>,
     kinds: BTreeMap<PositionKind, KindHealth>,
     /// Places in a row that were too far from the last good one, and the last of them.
     jumps: (u32, Option<GpsFix>),
@@ -123,6 +125,7 @@ impl Gps {
             lines: Lines::new(longest),
             faults: BTreeMap::new(),
             fix: None,
+            device: None,
             kinds: BTreeMap::new(),
             jumps: (0, None),
             motion: None,
@@ -169,10 +172,7 @@ impl Gps {
 
     fn handle_line(&mut self, line: &[u8], now: Instant) -> Vec<GpsFix> {
         if self.language == GpsLanguage::Gpsd {
-            return match gpsd::parse(line) {
-                Some(said) => self.handle_sentences(said.sentences, said.sigma_m, now).into_iter().collect(),
-                None => self.refuse(GpsFault::Unreadable).into_iter().collect(),
-            };
+            return self.handle_said(gpsd::parse(line), now).into_iter().collect();
         }
         let mut fixes = Vec::new();
         // Other vessels, by AIS, begin with another sign.
@@ -184,6 +184,21 @@ impl Gps {
             });
         }
         fixes
+    }
+
+    /// Follows one receiver of a daemon that has several, whose antennas stand apart, until it has had no position for a while.
+    fn handle_said(&mut self, said: Option<gpsd::Said>, now: Instant) -> Option<GpsFix> {
+        let Some(said) = said else { return self.refuse(GpsFault::Unreadable) };
+        let followed =
+            self.device.as_ref().filter(|_| self.fix.is_some_and(|last| now.since(last.at) < Self::BETTER_LASTS));
+        if followed.is_some() && said.device.is_some() && followed != said.device.as_ref() {
+            return self.refuse(GpsFault::Repeated);
+        }
+        let fix = self.handle_sentences(said.sentences, said.sigma_m, now);
+        if fix.is_some() {
+            self.device = said.device;
+        }
+        fix
     }
 
     fn handle_sentences(&mut self, sentences: Vec<Sentence>, sigma_m: Option<f64>, now: Instant) -> Option<GpsFix> {
@@ -268,6 +283,26 @@ mod tests {
 
     fn faults(gps: &Gps) -> Vec<(&'static str, u64)> {
         gps.faults().map(|(f, n)| (f.name(), n)).collect()
+    }
+
+    #[test]
+    fn of_two_receivers_of_a_daemon_one_is_followed_until_it_is_silent() {
+        let mut gps = Gps::new(GpsLanguage::Gpsd);
+        let mut say = |device: &str, second: u32| {
+            let lat = if device == "/dev/a" { 29.5 } else { 29.500_04 };
+            let line = format!(
+                "{{\"class\":\"TPV\",\"device\":\"{device}\",\"mode\":3,\"time\":\"2026-11-28T12:00:{second:02}Z\",\"lat\":{lat},\
+                 \"lon\":34.92}}\n"
+            );
+            let from = if device == "/dev/a" { 0.0 } else { 0.5 };
+            gps.handle_bytes(line.as_bytes(), at(f64::from(second) + from)).first().map(|fix| fix.place.lat_deg)
+        };
+        for second in 0..5 {
+            assert_eq!((say("/dev/a", second), say("/dev/b", second)), (Some(29.5), None));
+        }
+        assert_eq!((say("/dev/b", 5), say("/dev/b", 6), say("/dev/b", 7)), (None, Some(29.500_04), Some(29.500_04)));
+        assert_eq!(say("/dev/a", 8), None);
+        assert_eq!(faults(&gps), [("repeated", 7)]);
     }
 
     #[test]

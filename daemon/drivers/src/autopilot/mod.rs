@@ -98,8 +98,9 @@ pub trait Autopilot: Send {
     /// The port was opened; earlier messages are forgotten.
     fn handle_open(&mut self, now: Instant);
 
-    /// Bytes of it, in pieces of any size. Anything may be in them.
-    fn handle_bytes(&mut self, bytes: &[u8], now: Instant);
+    /// Bytes from its port, in pieces of any size. Anything may be in them. Returns whether the autopilot itself is certainly the
+    /// sender, and no camera or ground station.
+    fn handle_bytes(&mut self, bytes: &[u8], now: Instant) -> bool;
 
     fn handle_timeout(&mut self, now: Instant);
 

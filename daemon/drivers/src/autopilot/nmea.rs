@@ -128,7 +128,7 @@ impl Autopilot for Nmea {
         self.second = now;
     }
 
-    fn handle_bytes(&mut self, bytes: &[u8], now: Instant) {
+    fn handle_bytes(&mut self, bytes: &[u8], now: Instant) -> bool {
         let mut lines = Vec::new();
         self.lines.push(bytes, |line| lines.push(line.to_vec()));
         for line in lines {
@@ -143,6 +143,7 @@ impl Autopilot for Nmea {
                 self.handle_place_of_vehicle(fix.place, now);
             }
         }
+        self.heard == Some(now)
     }
 
     fn handle_timeout(&mut self, now: Instant) {

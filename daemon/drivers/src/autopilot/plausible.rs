@@ -1,4 +1,4 @@
-//! Depths, headings and heights above the sea floor that no vehicle can reach so fast.
+//! Depths, headings, heights above the sea floor and velocities that no vehicle can reach so fast.
 //!
 //! One false value must not end a mission or bend a map, nor must an autopilot that moves its home and so the zero of its depths. A
 //! value that jumps is not used until it has stayed for a while; until then only its changes count. Of a depth that was right before, only
@@ -19,6 +19,8 @@ struct Bounds {
     margin: f64,
     /// A value that stays for this time is right.
     persists: Duration,
+    /// The least value that there is.
+    least: f64,
     /// The size of a whole turn, for angles.
     turn: Option<f64>,
     /// Whether a value that jumps and stays, after others that agreed, has another zero.
@@ -32,6 +34,7 @@ const DEPTH: Bounds = Bounds {
     rate: 3.0,
     margin: 2.0,
     persists: Duration::from_secs(3),
+    least: 0.0,
     turn: None,
     has_zero: true,
 };
@@ -43,6 +46,7 @@ const HEIGHT: Bounds = Bounds {
     rate: 5.0,
     margin: 3.0,
     persists: Duration::from_secs(1),
+    least: 0.0,
     turn: None,
     has_zero: false,
 };
@@ -54,7 +58,21 @@ const HEADING: Bounds = Bounds {
     rate: 180.0,
     margin: 45.0,
     persists: Duration::from_secs(1),
+    least: f64::NEG_INFINITY,
     turn: Some(360.0),
+    has_zero: false,
+};
+
+/// East or north.
+const VELOCITY: Bounds = Bounds {
+    name: "velocity",
+    counter: "velocity_jumps",
+    unit: "m/s",
+    rate: 5.0,
+    margin: 2.0,
+    persists: Duration::from_secs(1),
+    least: f64::NEG_INFINITY,
+    turn: None,
     has_zero: false,
 };
 
@@ -100,7 +118,7 @@ impl Series {
         let before = self.other.filter(|[_, last]| bounds.can_follow(*last, (value, now)));
         let [first, last] = before.unwrap_or([(value, now); 2]);
         let moved = used + value - last.0;
-        let tracked = if bounds.turn.is_some() { moved } else { moved.max(0.0) };
+        let tracked = moved.max(bounds.least);
         let (value, other, note) = if now.since(first.1) < bounds.persists {
             let note = if before.is_none() { self.note((used, value), bounds, now) } else { None };
             (tracked, Some([first, (value, now)]), note)
@@ -150,6 +168,7 @@ pub struct Plausible {
     depth: Series,
     height: Series,
     heading: Series,
+    velocity: [Series; 2],
 }
 
 impl Plausible {
@@ -157,6 +176,13 @@ impl Plausible {
     #[must_use]
     pub fn depth_zero_m(&self) -> Option<f64> {
         self.depth.other.is_none().then_some(self.depth.zero)
+    }
+
+    /// The velocity east and north, metres a second, as far as it can be, and the jump that was found.
+    pub fn check_velocity(&mut self, (east, north): (f64, f64), now: Instant) -> ((f64, f64), Option<Jump>) {
+        let [of_east, of_north] = &mut self.velocity;
+        let (east, north) = (of_east.check(east, &VELOCITY, now), of_north.check(north, &VELOCITY, now));
+        ((east.0, north.0), east.1.or(north.1))
     }
 
     /// The step with values that can be, and the jumps that were found.

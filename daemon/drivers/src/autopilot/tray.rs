@@ -1,6 +1,6 @@
 //! The outbox of an autopilot: bytes, steps and notes for its host.
 
-use super::plausible::Plausible;
+use super::plausible::{Jump, Plausible};
 use super::{Counters, Step};
 use scenecast_protocol::time::Instant;
 use std::collections::VecDeque;
@@ -42,11 +42,20 @@ impl Tray {
     /// ones that can, and named.
     pub(super) fn walk_measured(&mut self, step: Step, now: Instant) {
         let (step, jumps) = self.plausible.check(step, now);
-        for jump in jumps {
-            self.count(jump.counter);
-            jump.note.into_iter().for_each(|note| self.note(note));
-        }
+        jumps.into_iter().for_each(|jump| self.take_jump(jump));
         self.walk(step);
+    }
+
+    /// A measured velocity east and north, metres a second, or the last one before it jumped.
+    pub(super) fn plausible_velocity(&mut self, measured: (f64, f64), now: Instant) -> (f64, f64) {
+        let (velocity, jump) = self.plausible.check_velocity(measured, now);
+        jump.into_iter().for_each(|jump| self.take_jump(jump));
+        velocity
+    }
+
+    fn take_jump(&mut self, jump: Jump) {
+        self.count(jump.counter);
+        jump.note.into_iter().for_each(|note| self.note(note));
     }
 
     /// The depth that the autopilot reports at the surface, metres; `None` while its depth is in doubt.

@@ -49,7 +49,7 @@ impl Bag {
             return Err(UserError::Failed(format!("{}: it is not open", self.path.display())));
         };
         loop {
-            // Behind damage, the next file of a split bag follows, as when the images were counted.
+            // What lies behind damage follows, as when the images were counted.
             let Ok(message) = stream.next(|topic| *topic == self.topic) else { continue };
             let message = message.ok_or_else(|| UserError::file(&self.path, "the image is not there any more"))?;
             *next += 1;

@@ -1,9 +1,11 @@
-//! The messages of an MCAP file, one after the other, with bounded memory. Chunks and single messages may be compressed.
+//! The messages of an MCAP file, one after the other, with bounded memory. Chunks and single messages may be compressed. A chunk that is
+//! damaged is left out, and what follows is read.
 
-use mcap::records::{Channel, Record, SchemaHeader};
+use mcap::read::ChunkReader;
+use mcap::records::{Channel, ChunkHeader, Record, SchemaHeader};
 use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use scenecast_core::UserError;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, VecDeque};
 use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
@@ -32,6 +34,8 @@ pub(crate) struct BagStream {
     open: Option<(File, LinearReader)>,
     schemas: BTreeMap<u16, String>,
     channels: BTreeMap<u16, BagTopic>,
+    /// Messages of the chunk that was read last.
+    read: VecDeque<BagMessage>,
 }
 
 impl BagStream {
@@ -49,31 +53,43 @@ impl BagStream {
                 return Err(UserError::file(file, other.advice));
             }
         }
-        Ok(Self { rest: files.into_iter(), open: None, schemas: BTreeMap::new(), channels: BTreeMap::new() })
+        let (schemas, channels) = (BTreeMap::new(), BTreeMap::new());
+        Ok(Self { rest: files.into_iter(), open: None, schemas, channels, read: VecDeque::new() })
     }
 
-    /// The next message of a topic that is `wanted`; `None` at the end. After an error the next file follows.
+    /// The next message of a topic that is `wanted`; `None` at the end. After an error what lies behind the damage follows.
     pub(crate) fn next(&mut self, wanted: impl Fn(&BagTopic) -> bool) -> Result<Option<BagMessage>, String> {
         loop {
+            if let Some(message) = self.read.pop_front() {
+                return Ok(Some(message));
+            }
             if self.open.is_none() {
                 let Some(path) = self.rest.next() else { return Ok(None) };
                 let file = File::open(&path).map_err(|e| format!("{}: {e}", path.display()))?;
+                if file.metadata().is_ok_and(|file| file.len() == 0) {
+                    return Err(format!("{}: it is empty", path.display()));
+                }
                 self.open = Some((file, reader()));
                 self.schemas.clear();
                 self.channels.clear();
             }
-            match self.next_of_file(&wanted) {
-                Ok(Some(message)) => return Ok(Some(message)),
+            match self.next_record() {
+                Ok(Some(Record::Chunk { header, data })) => self.handle_chunk(header, &data, &wanted)?,
+                Ok(Some(record)) => {
+                    let message = self.handle_record(record, &wanted)?;
+                    self.read.extend(message);
+                }
                 Ok(None) => self.open = None,
                 Err(error) => {
                     self.open = None;
-                    return Err(error);
+                    return Err(format!("it breaks off: {error}; mcap recover OLD.mcap -o NEW.mcap may find more"));
                 }
             }
         }
     }
 
-    fn next_of_file(&mut self, wanted: &impl Fn(&BagTopic) -> bool) -> Result<Option<BagMessage>, String> {
+    /// The next chunk, or record outside of chunks, of the open file.
+    fn next_record(&mut self) -> Result<Option<Record<'static>>, String> {
         let Some((file, reader)) = &mut self.open else { return Ok(None) };
         while let Some(event) = reader.next_event() {
             match event.map_err(|e| e.to_string())? {
@@ -81,27 +97,67 @@ impl BagStream {
                     let read = file.read(reader.insert(length)).map_err(|e| e.to_string())?;
                     reader.notify_read(read);
                 }
-                LinearReadEvent::Record { data, opcode } => match mcap::parse_record(opcode, data) {
-                    Err(error) => return Err(error.to_string()),
-                    Ok(Record::Schema { header: SchemaHeader { id, name, .. }, .. }) => {
-                        self.schemas.insert(id, name);
-                    }
-                    Ok(Record::Channel(Channel { id, schema_id, topic, message_encoding, .. })) => {
-                        let kind = self.schemas.get(&schema_id).filter(|_| message_encoding == "cdr");
-                        let kind = kind.cloned().unwrap_or_default();
-                        self.channels.insert(id, BagTopic { name: topic, kind });
-                    }
-                    Ok(Record::Message { header, data }) => {
-                        let topic = self.channels.get(&header.channel_id).filter(|topic| wanted(topic));
-                        if let Some(topic) = topic {
-                            return Ok(Some(BagMessage { topic: topic.clone(), bytes: unpacked(data.into_owned())? }));
-                        }
-                    }
-                    Ok(_) => {}
-                },
+                LinearReadEvent::Record { data, opcode } => {
+                    return mcap::parse_record(opcode, data)
+                        .map(|record| Some(record.into_owned()))
+                        .map_err(|e| e.to_string());
+                }
             }
         }
         Ok(None)
+    }
+
+    /// Takes the messages of a chunk, all or none.
+    fn handle_chunk(
+        &mut self,
+        header: ChunkHeader,
+        bytes: &[u8],
+        wanted: &impl Fn(&BagTopic) -> bool,
+    ) -> Result<(), String> {
+        let damaged = |error: String| format!("a chunk is damaged and left out: {error}");
+        if header.uncompressed_size > MAX_RECORD_BYTES as u64 {
+            return Err(damaged(format!("it has {} bytes, more than {MAX_RECORD_BYTES}", header.uncompressed_size)));
+        }
+        let mut messages = VecDeque::new();
+        for record in ChunkReader::new(header, bytes).map_err(|e| damaged(e.to_string()))? {
+            let message = self.handle_record(record.map_err(|e| damaged(e.to_string()))?, wanted)?;
+            messages.extend(message);
+        }
+        self.read = messages;
+        Ok(())
+    }
+
+    /// Takes a record outside of chunks or of a chunk; returns a wanted message.
+    fn handle_record(
+        &mut self,
+        record: Record<'_>,
+        wanted: &impl Fn(&BagTopic) -> bool,
+    ) -> Result<Option<BagMessage>, String> {
+        match record {
+            Record::Schema { header: SchemaHeader { id, name, .. }, .. } => {
+                self.schemas.insert(id, name);
+            }
+            Record::Channel(Channel { id, schema_id, topic, message_encoding, .. }) => {
+                let kind = self.schemas.get(&schema_id).map_or("", String::as_str);
+                // A type that is never wanted, and that names the encoding.
+                let kind =
+                    if message_encoding == "cdr" { kind.to_owned() } else { format!("{kind} in {message_encoding}") };
+                self.channels.insert(id, BagTopic { name: topic, kind });
+            }
+            Record::Message { header, data } => {
+                if let Some(topic) = self.channels.get(&header.channel_id).filter(|topic| wanted(topic)) {
+                    let bytes = unpacked(data.into_owned())?;
+                    return Ok(Some(BagMessage { topic: topic.clone(), bytes }));
+                }
+            }
+            _ => {}
+        }
+        Ok(None)
+    }
+
+    /// The encodings other than CDR of the topics so far.
+    pub(crate) fn other_encodings(&self) -> impl Iterator<Item = &str> {
+        self.channels.values().filter_map(|topic| Some(topic.kind.split_once(" in ")?.1))
     }
 }
 
@@ -136,7 +192,8 @@ const OTHER_FORMATS: [OtherFormat; 3] = [
     OtherFormat {
         magic: b"#ROSBAG V2",
         extensions: &["bag"],
-        advice: "it is a bag of ROS 1, and MCAP is read: mcap convert OLD.bag NEW.mcap converts it",
+        advice: "it is a bag of ROS 1, and MCAP of ROS 2 is read: rosbags-convert --src OLD.bag --dst NEW --dst-storage mcap converts it \
+                 (pip install rosbags)",
     },
     OtherFormat {
         magic: ZSTD,
@@ -149,7 +206,7 @@ fn reader() -> LinearReader {
     // A recorder without power leaves a file without its end; chunks that are whole are read.
     let options = LinearReaderOptions::default()
         .with_skip_end_magic(true)
-        .with_validate_chunk_crcs(true)
+        .with_emit_chunks(true)
         .with_record_length_limit(MAX_RECORD_BYTES);
     LinearReader::new_with_options(options)
 }
@@ -163,6 +220,10 @@ fn files_of(dir: &Path) -> Result<Vec<PathBuf>, UserError> {
         let is_there = |extension: &&str| paths.iter().any(|path| ends_in(path, extension));
         let other = OTHER_FORMATS.iter().find(|other| other.extensions.iter().any(is_there));
         return Err(UserError::file(dir, other.map_or("the folder has no file *.mcap", |other| other.advice)));
+    }
+    // A recorder that broke down leaves its last file, or all others, uncompressed.
+    if let Some(packed) = paths.iter().find(|path| ends_in(path, "zstd") || ends_in(path, "zst")) {
+        return Err(UserError::file(packed, "a part of the bag is compressed as a whole: zstd -d *.zstd unpacks it"));
     }
     // The files of a split bag end in _0, _1, ..., _10.
     files.sort_by_key(|path| (path.as_os_str().len(), path.clone()));
@@ -182,7 +243,7 @@ mod tests {
         assert!(refused(&dir).contains("no file *.mcap"));
         for (name, head, command) in [
             ("a.db3", &b"SQLite format 3\0"[..], "ros2 bag convert"),
-            ("a.bag", b"#ROSBAG V2.0\n", "mcap convert"),
+            ("a.bag", b"#ROSBAG V2.0\n", "rosbags-convert"),
             ("a.mcap.zstd", b"\x28\xB5\x2F\xFD", "zstd -d"),
         ] {
             let file = dir.join(name);

@@ -73,6 +73,13 @@ impl Port {
         port
     }
 
+    /// The same for a port whose owner gives [`Self::judge`] the result of each datagram.
+    pub fn open_judged_when_there(name: &'static str, place: PortAddress) -> Self {
+        let (port, ends) = Self::pair();
+        tokio::spawn(PortKeeper { name, place, quiet: None, rule: PeerRule::Judged, ends }.run(None));
+        port
+    }
+
     fn pair() -> (Self, PortEnds) {
         let (to, to_port) = mpsc::channel(64);
         let (from_port, from) = mpsc::channel(64);

@@ -10,7 +10,7 @@ use scenecast_rehearsal::{Mission, MissionOptions};
 #[command(after_help = "Example: scenecast demo --speed 4, then open http://127.0.0.1:8460")]
 pub(super) struct Demo {
     /// Port of the operator's page on 127.0.0.1
-    #[arg(long, default_value_t = 8460)]
+    #[arg(long, default_value_t = 8460, allow_negative_numbers = true)]
     port: u16,
     /// Mission seconds per second of wall time
     #[arg(long, default_value_t = 1.0, allow_negative_numbers = true)]

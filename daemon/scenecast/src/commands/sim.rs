@@ -6,7 +6,7 @@ use scenecast_core::{UserError, errln, outln};
 use scenecast_rehearsal::{Mission, MissionOptions, World, report, write_outputs};
 use scenecast_tools::Progress;
 use serde_json::json;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 /// The sea floor and the configuration of a rehearsal.
@@ -28,7 +28,7 @@ pub(super) struct WorldArguments {
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
     pub duration: Option<f64>,
     /// Seed of all random numbers
-    #[arg(long, default_value_t = 1)]
+    #[arg(long, default_value_t = 1, allow_negative_numbers = true)]
     pub seed: u64,
     /// Set a key of the configuration, as in link.budget_bps=2000 (scenecast config lists them)
     #[arg(long = "set", value_name = "KEY=VALUE")]
@@ -84,7 +84,7 @@ pub(super) struct Sim {
     /// Folder for report.json, maps, images and frames.log
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// Replace the results that the folder has
+    /// Replace the results that the folder has, and the recording
     #[arg(long)]
     force: bool,
     /// Print the report as JSON instead of a line of figures
@@ -98,14 +98,21 @@ impl Sim {
         if !self.drain.is_finite() || self.drain < 0.0 {
             return Err(UserError::Input(format!("--drain {} is not allowed; allowed: 0 s or more", self.drain)));
         }
-        if !self.force && self.out.join("report.json").exists() {
+        let is_kept = |folder: &Path, file: &str| !self.force && folder.join(file).exists();
+        if is_kept(&self.out, "report.json") {
             let what = "it has the results of another run: give a new folder, or replace them by --force";
             return Err(UserError::file(&self.out, what));
+        }
+        if let Some(record) = self.record.as_ref().filter(|record| is_kept(record, "poses.csv")) {
+            let what = "it has another recording: give a new folder, or replace it by --force";
+            return Err(UserError::file(record, what));
         }
         let config = self.world.config()?;
         let world = self.world.world(&config)?;
         let options = MissionOptions { world, seed: self.world.seed, record: self.record.clone() };
         let mut mission = Mission::new(config, options)?;
+        // Before the mission flies, which may take long.
+        std::fs::create_dir_all(&self.out).map_err(|e| UserError::file(&self.out, e))?;
         let mut progress = Progress::new("survey");
         mission.run(Duration::from_secs_f64(self.drain), &mut |share| progress.show(share))?;
         drop(progress);

@@ -110,7 +110,7 @@ impl SurfaceMemory {
             EventKind::Vehicle(address, event) => self.vehicles.entry(*address).or_default().apply(event),
             EventKind::Logged(entry) => {
                 self.log.push_back(entry.clone());
-                make_room(&mut self.log, StoredLogEntry::is_minor);
+                make_room(&mut self.log, StoredLogEntry::group);
             }
             EventKind::Command(command) => self.command = command.clone(),
             EventKind::CommandChanged(change) => {

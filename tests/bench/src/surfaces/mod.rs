@@ -16,7 +16,8 @@ use serde::Serialize;
 use std::time::Duration;
 use waters::{SURFACES, Waters};
 
-pub const ACCESSES: [Access; 3] = [Access::Shared, Access::ModemOwned { pool_frames: 8 }, Access::FullDuplex];
+pub const ACCESSES: [Access; 4] =
+    [Access::Shared, Access::ModemOwned { pool_frames: 8 }, Access::FullDuplex, Access::Polled];
 /// Steps of a schedule, with a pause after each.
 const STEPS: u32 = 60;
 /// How long each surface has the vehicle for itself at the end of a schedule.

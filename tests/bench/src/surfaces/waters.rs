@@ -6,6 +6,7 @@ use scenecast_protocol::directive::{Constraints, OrderStatus, Series, Slot, Slot
 use scenecast_protocol::link::{
     Mismatch, PeerView, SlotInboxState, SurfaceEvent, SurfaceLink, VehicleEvent, VehicleLink,
 };
+use scenecast_protocol::mac::Access;
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::VehicleStatus;
 use sim_channel::RandomStream;
@@ -25,6 +26,8 @@ enum End {
 enum WaterEvent {
     Sent(End),
     Arrives(End, Vec<u8>),
+    /// The modem of an end asks for so many frames of a cycle.
+    Polls(End, u32),
 }
 
 /// A frame queue, and whether its first frame is on air.
@@ -200,11 +203,14 @@ impl Waters {
             WaterEvent::Arrives(End::Vehicle(number), bytes) => self.vehicles[number].handle_frame(&bytes, self.now),
             WaterEvent::Arrives(End::Surface(number), _) if self.is_asleep[number] => {}
             WaterEvent::Arrives(End::Surface(number), bytes) => self.surfaces[number].handle_frame(&bytes, self.now),
+            WaterEvent::Polls(End::Vehicle(number), frames) => self.vehicles[number].handle_poll(frames),
+            WaterEvent::Polls(End::Surface(number), frames) => self.surfaces[number].handle_poll(frames),
         }
     }
 
     fn pump(&mut self) {
         self.apply_orders();
+        self.begin_cycles();
         for (number, vehicle) in self.vehicles.iter_mut().enumerate() {
             vehicle.set_status(VehicleStatus { labels: 3, budget_bps: BUDGET_BPS, ..VehicleStatus::default() });
             while let Some(sent) = vehicle.poll_transmit(self.now) {
@@ -247,6 +253,27 @@ impl Waters {
                 self.twin_found_itself |= matches!(event, VehicleEvent::Mismatch(Mismatch::OwnAddress));
             }
             vehicle.handle_persisted();
+        }
+    }
+
+    /// The initiation of a cycle, which may be lost, then the requests of the modem for the sender's frames.
+    fn begin_cycles(&mut self) {
+        if self.setup.access != Access::Polled {
+            return;
+        }
+        for number in (0..SURFACES).filter(|&number| !self.is_asleep[number]).collect::<Vec<_>>() {
+            let Some(cycle) = self.surfaces[number].poll_cycle(self.now) else { continue };
+            let frames = cycle.frames.min(8);
+            let at = self.now + Duration::from_millis(300);
+            if cycle.from != auv() {
+                self.schedule(at, WaterEvent::Polls(End::Surface(number), frames));
+            } else if !self.is_away[number] {
+                for vehicle in 0..self.vehicles.len() {
+                    if !self.rng.bernoulli(self.loss) {
+                        self.schedule(at + PROPAGATION, WaterEvent::Polls(End::Vehicle(vehicle), frames));
+                    }
+                }
+            }
         }
     }
 

@@ -1,6 +1,6 @@
 //! Who a client is: the login form, which exchanges a token for a cookie, the end of the session, and the client's principal.
 
-use crate::http::access::COOKIE;
+use crate::http::access::{COOKIE, PeerAddress};
 use crate::http::response::{error, not_found};
 use crate::http::server;
 use crate::http::shared::Shared;
@@ -33,6 +33,7 @@ pub(in crate::http) struct LoginForm {
 /// Sets a cookie in exchange for the token.
 pub(in crate::http) async fn login(
     State(shared): State<Shared>,
+    Extension(PeerAddress(address)): Extension<PeerAddress>,
     login: Result<Form<LoginForm>, FormRejection>,
 ) -> Response {
     let token = match login {
@@ -43,7 +44,7 @@ pub(in crate::http) async fn login(
         let message = "<p class=\"warn\" role=\"alert\">This is not the token.</p>";
         return (StatusCode::UNAUTHORIZED, form(message)).into_response();
     };
-    let Some(session) = shared.access.begin_session(principal) else {
+    let Some(session) = shared.access.begin_session(principal, address) else {
         return StatusCode::INTERNAL_SERVER_ERROR.into_response();
     };
     let cookie = format!("{COOKIE}={session}; HttpOnly; SameSite=Strict; Path=/");

@@ -3,7 +3,8 @@
 use crate::http::response::{JsonOrder, error};
 use crate::http::shared::{Shared, VehicleId};
 use crate::orders::{
-    AgainOrder, BudgetOrder, CommandOrder, CommandOrderAction, DraftOrder, MarkerOrder, NoteOrder, UtilityOrder,
+    AgainOrder, BudgetOrder, CONSTRAINTS, CommandOrder, CommandOrderAction, DraftOrder, MarkerOrder, NoteOrder,
+    UtilityOrder,
 };
 use crate::request::SurfaceRequest;
 use axum::Extension;
@@ -83,11 +84,13 @@ pub(in crate::http) async fn again(
     VehicleId(id): VehicleId,
     JsonOrder(AgainOrder { slot }): JsonOrder<AgainOrder>,
 ) -> Response {
-    let Some(slot) = SlotId::ALL.into_iter().find(|id| id.name() == slot) else {
-        let names = SlotId::ALL.map(SlotId::name).join(", ");
-        return error(StatusCode::UNPROCESSABLE_ENTITY, &format!("slot {slot:?}: it takes {names}"));
+    // Hold, resume and abort share a slot.
+    let of_constraints = CONSTRAINTS.contains(&slot.as_str()).then_some(SlotId::Constraints);
+    let Some(found) = of_constraints.or_else(|| SlotId::ALL.into_iter().find(|id| id.name() == slot)) else {
+        let names: Vec<&str> = SlotId::ALL.map(SlotId::name).into_iter().chain(CONSTRAINTS).collect();
+        return error(StatusCode::UNPROCESSABLE_ENTITY, &format!("slot {slot:?}: it takes {}", names.join(", ")));
     };
-    shared.order(by, SurfaceRequest::Again(id, slot)).await
+    shared.order(by, SurfaceRequest::Again(id, found, slot)).await
 }
 
 pub(in crate::http) async fn note(

@@ -73,6 +73,8 @@ pub struct Mavlink {
     /// Starboard down and bow up, radians.
     tilt: (f64, f64),
     yaw: Option<f64>,
+    /// When ATTITUDE was heard last: its yaw is finer than the heading of a global position.
+    attitude_heard: Option<Instant>,
     altimeter: Altimeter,
     /// The distance that remains, east and north, and the depth; `None`: stay.
     goal: Option<Goal>,
@@ -86,6 +88,8 @@ pub struct Mavlink {
     tray: Tray,
     was_silent: bool,
     is_position_lost: bool,
+    /// Whether the last bytes had a heartbeat of the autopilot.
+    is_heard: bool,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -137,6 +141,7 @@ impl Mavlink {
             pose: None,
             tilt: (0.0, 0.0),
             yaw: None,
+            attitude_heard: None,
             altimeter: Altimeter::default(),
             goal: None,
             stay: None,
@@ -148,6 +153,7 @@ impl Mavlink {
             tray: Tray::default(),
             was_silent: false,
             is_position_lost: false,
+            is_heard: false,
         }
     }
 
@@ -185,6 +191,7 @@ impl Mavlink {
             Heard::Attitude { time_boot_ms, roll, pitch, yaw } => {
                 self.handle_boot_time(time_boot_ms, now);
                 (self.tilt, self.yaw) = ((f64::from(roll), f64::from(pitch)), Some(f64::from(yaw)));
+                self.attitude_heard = Some(now);
             }
             Heard::DistanceDown(along_m) => self.handle_beam(HeightSource::DistanceSensor, along_m, now),
             Heard::Rangefinder(along_m) => self.handle_beam(HeightSource::Rangefinder, Some(along_m), now),
@@ -202,7 +209,7 @@ impl Mavlink {
             }
             Heard::Global { time_boot_ms, lat, lon, relative_alt, velocity: [north, east, _], heading } => {
                 self.handle_boot_time(time_boot_ms, now);
-                if heading != u16::MAX && self.yaw.is_none() {
+                if heading != u16::MAX && self.attitude_heard.is_none_or(|at| now.since(at) > BRIDGED) {
                     self.yaw = Some((f64::from(heading) / 100.0).to_radians());
                 }
                 let velocity = (f64::from(east) / 100.0, f64::from(north) / 100.0);
@@ -242,6 +249,7 @@ impl Mavlink {
     }
 
     fn handle_heartbeat(&mut self, component: u8, custom_mode: u32, kind: u8, base_mode: u8, now: Instant) {
+        self.is_heard = true;
         // GUIDED is 4 of ArduSub and ArduCopter, 15 of ArduRover, which drives boats too.
         let guided_mode = if matches!(kind, 10 | 11) { 15 } else { 4 };
         let peer = Peer { component, guided_mode, custom_mode, is_armed: base_mode & 128 != 0, heard: now };
@@ -305,6 +313,7 @@ impl Mavlink {
             }
             return;
         }
+        let pose = Pose { velocity: self.tray.plausible_velocity(pose.velocity, pose.heard), ..pose };
         self.pose = Some(pose);
         if std::mem::take(&mut self.is_position_lost) {
             self.tray.note("the autopilot reports its position again");
@@ -402,10 +411,12 @@ impl Autopilot for Mavlink {
         self.due = Due { second: now, gps: now, streams: now };
     }
 
-    fn handle_bytes(&mut self, bytes: &[u8], now: Instant) {
+    fn handle_bytes(&mut self, bytes: &[u8], now: Instant) -> bool {
         let mut frames = Vec::new();
         self.deframer.push(bytes, heard_extra, |frame| frames.push(frame));
+        self.is_heard = false;
         frames.iter().for_each(|frame| self.handle_frame(frame, now));
+        self.is_heard
     }
 
     fn handle_timeout(&mut self, now: Instant) {

@@ -236,7 +236,10 @@ impl CommandWatch {
     /// last reported depth.
     pub(super) fn handle_boot_time(&mut self, ms: u32, depth_m: Option<f64>, now: Instant) -> bool {
         let before = self.time_boot_ms.replace(ms);
-        let is_restarted = before.is_some_and(|before| before > ms.saturating_add(CLOCKS_APART_MS));
+        // After 49.7 days the clock begins at 0 again.
+        let has_wrapped = |before: u32| ms.wrapping_sub(before) < CLOCKS_APART_MS;
+        let is_restarted =
+            before.is_some_and(|before| before > ms.saturating_add(CLOCKS_APART_MS) && !has_wrapped(before));
         if is_restarted {
             self.restarted = Some(now - Duration::from_millis(u64::from(ms)));
             self.was_under_water = depth_m.is_some_and(|depth_m| depth_m > MIN_ARMED_DEPTH_M);

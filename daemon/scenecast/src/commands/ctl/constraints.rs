@@ -16,7 +16,8 @@ an origin needs --metres.";
 
 #[derive(Debug, Subcommand)]
 pub(super) enum FenceCommand {
-    /// Replace fence, keep-outs and return point by those of a GeoJSON file.
+    /// Replace the fence, the keep-outs and the return point that a GeoJSON file has. Keep-outs or a return point that it
+    /// does not have stay.
     #[command(after_help = FILE)]
     Set {
         /// GeoJSON file with the outlines and the return point
@@ -27,6 +28,9 @@ pub(super) enum FenceCommand {
         /// Accept a file without a fence; it removes the present fence
         #[arg(long)]
         without_fence: bool,
+        /// Remove the keep-outs that the file does not have
+        #[arg(long)]
+        without_keep_outs: bool,
     },
     /// Remove fence, keep-outs and return point.
     #[command(after_help = "Example: scenecast ctl fence clear --wait 120")]
@@ -52,13 +56,23 @@ pub(super) enum ReturnPointCommand {
 
 #[derive(Debug, Subcommand)]
 pub(super) enum LimitsCommand {
-    /// Replace the limits. A limit that is not given is removed; a reaction that is not given is
-    /// as configured on the vehicle.
+    /// Set limits and reactions. Those that are not given stay.
     #[command(
         after_help = "Example: scenecast ctl limits set --depth 5..30 --silence 300 --on-silence return --wait 120"
     )]
     Set(Limits),
+    /// Remove limits; a reaction is then as configured on the vehicle.
+    #[command(after_help = "Example: scenecast ctl limits clear depth time --wait 120")]
+    Clear {
+        /// The limits and reactions to remove
+        #[arg(required = true, value_parser = LIMITS)]
+        names: Vec<String>,
+    },
 }
+
+/// Limits and reactions; `all` stands for all of them.
+const LIMITS: [&str; 9] =
+    ["depth", "altitude", "distance", "time", "silence", "on-silence", "on-breach", "on-abort", "all"];
 
 #[derive(Debug, Args)]
 pub(super) struct Limits {
@@ -86,9 +100,6 @@ pub(super) struct Limits {
     /// Reaction to an abort: hold, return or surface
     #[arg(long, value_name = "REACTION")]
     on_abort: Option<String>,
-    /// Keep the last limits that are not given
-    #[arg(long)]
-    keep: bool,
 }
 
 fn band(text: &str) -> Result<[f64; 2], String> {
@@ -99,8 +110,8 @@ fn band(text: &str) -> Result<[f64; 2], String> {
 pub(super) async fn fence(session: &Session, change: Option<FenceCommand>) -> Result<(), UserError> {
     match change {
         None => client::show_fence(session).await,
-        Some(FenceCommand::Set { file, metres, without_fence }) => {
-            let file = FenceFile { path: &file, in_metres: metres, without_fence };
+        Some(FenceCommand::Set { file, metres, without_fence, without_keep_outs }) => {
+            let file = FenceFile { path: &file, in_metres: metres, without_fence, without_keep_outs };
             client::set_fence(session, file).await
         }
         Some(FenceCommand::Clear) => client::clear_fence(session).await,
@@ -115,7 +126,11 @@ pub(super) async fn return_point(session: &Session, change: ReturnPointCommand) 
 }
 
 pub(super) async fn limits(session: &Session, change: Option<LimitsCommand>) -> Result<(), UserError> {
-    let Some(LimitsCommand::Set(l)) = change else { return client::show_limits(session).await };
+    let l = match change {
+        None => return client::show_limits(session).await,
+        Some(LimitsCommand::Clear { names }) => return client::clear_limits(session, &names).await,
+        Some(LimitsCommand::Set(l)) => l,
+    };
     let order = LimitsOrder {
         depth_m: l.depth,
         altitude_m: l.altitude,
@@ -126,7 +141,7 @@ pub(super) async fn limits(session: &Session, change: Option<LimitsCommand>) -> 
         on_breach: l.on_breach,
         on_abort: l.on_abort,
     };
-    client::set_limits(session, &order, l.keep).await
+    client::set_limits(session, &order).await
 }
 
 /// Orders the vehicle to hold or to resume.

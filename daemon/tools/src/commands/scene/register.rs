@@ -63,6 +63,9 @@ impl Register {
         if let Some(advice) = placed.geometry.and_then(|geometry| geometry.advice(self.metres_per_pixel)) {
             errln!("{advice}");
         }
+        if placed.geometry.is_some_and(|geometry| geometry.is_mirrored.is_none()) {
+            errln!("the vehicle turns too little to show whether the images are mirrored");
+        }
         let solved = placed.graph.solve();
         let frames = placed.frames.iter().zip(&solved).map(|(frame, pose)| {
             let (x_m, y_m) = pose.at().xy();

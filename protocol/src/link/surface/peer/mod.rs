@@ -18,7 +18,9 @@ pub use view::PeerView;
 
 use crate::directive::{InForcePart, Series, Slot, SlotId, SlotOutbox, SlotProgress};
 use crate::link::handshake::FramePurpose;
-use crate::link::{Authenticity, DropReason, FrameNumber, Inbound, LinkPair, LinkStats, Mismatch, SurfaceEvent};
+use crate::link::{
+    Authenticity, DropReason, FrameNumber, HOLDER_SILENCE, Inbound, LinkPair, LinkStats, Mismatch, SurfaceEvent,
+};
 use crate::mac::{Access, Master, MasterConfig, ModemProfile};
 use crate::map::StateReplica;
 use crate::schedule::Class;
@@ -166,16 +168,19 @@ impl<R: StateReplica> VehiclePeer<R> {
 
     /// Issues a new version of a slot; returns the version.
     pub(super) fn issue(&mut self, slot: Slot, now: Instant) -> u16 {
-        let stops = matches!(slot, Slot::Constraints(order) if order.stops());
-        if stops && self.rivals.holder().is_some() {
-            // A hold or an abort of any surface is obeyed at once.
-            self.take_over(now);
-        }
+        self.take_over_to_stop(&slot, now);
         let replaced = self.outbox.progress().find(|order| order.id == slot.id() && order.status.is_pending());
         replaced.into_iter().for_each(|order| self.in_force.note_replaced(&order.slot));
         let version = self.outbox.issue(slot, now);
         self.follow_series();
         version
+    }
+
+    /// A hold or an abort of any surface is obeyed at once.
+    fn take_over_to_stop(&mut self, slot: &Slot, now: Instant) {
+        if slot.stops() && self.rivals.holder().is_some() {
+            self.take_over(now);
+        }
     }
 
     /// Has the vehicle leave another surface that holds it.
@@ -194,15 +199,22 @@ impl<R: StateReplica> VehiclePeer<R> {
     /// Gives a withdrawn order again; returns its version.
     pub(super) fn give_again(&mut self, id: SlotId, now: Instant) -> Option<u16> {
         let version = self.outbox.give_again(id, now);
-        self.follow_series();
+        self.follow_given_again(&[id], now);
         version
     }
 
     /// Sends the orders that the vehicle has lost again; returns them.
     pub(super) fn restore_lost(&mut self, now: Instant) -> Vec<SlotId> {
         let restored = self.outbox.restore_lost(now);
-        self.follow_series();
+        self.follow_given_again(&restored, now);
         restored
+    }
+
+    fn follow_given_again(&mut self, ids: &[SlotId], now: Instant) {
+        let given = |order: &&SlotProgress| ids.contains(&order.id) && order.status.is_pending();
+        let slots: Vec<Slot> = self.outbox.progress().filter(given).map(|order| order.slot.clone()).collect();
+        slots.iter().for_each(|slot| self.take_over_to_stop(slot, now));
+        self.follow_series();
     }
 
     /// Withdraws an abort that has not arrived in time; returns whether there was one.
@@ -219,6 +231,10 @@ impl<R: StateReplica> VehiclePeer<R> {
         self.contact.hellos = 0;
         // A refusal ends this run, so that a copy of it has no effect on a later one.
         self.is_out_of_step = true;
+        // Given before this surface knew of the other one.
+        if !self.pair.takes_over() && self.outbox.handle_refusal(HOLDER_SILENCE, now) {
+            self.take_over(now);
+        }
     }
 
     /// Begins a new series of orders if one of the present series was never in force, although the vehicle reports so.
@@ -324,7 +340,7 @@ impl<R: StateReplica> VehiclePeer<R> {
         }
         let Some(number) = inbound.number else { return };
         self.pair.set_takes_over(false);
-        if self.rivals.handle_contact() {
+        if self.rivals.handle_contact(now) {
             events.push_back(SurfaceEvent::Rivalry(self.address()));
         }
         (self.contact.last_received, self.contact.ordered) = (Some(now), None);

@@ -77,14 +77,12 @@ impl Rivals {
         !is_known
     }
 
-    /// The vehicle uses a run of this surface; returns whether another one held it before.
-    pub(super) fn handle_contact(&mut self) -> bool {
+    /// The vehicle uses a run of this surface; returns whether another one held it before. That one is known still, unless it is gone.
+    pub(super) fn handle_contact(&mut self, now: Instant) -> bool {
         self.next_call = None;
-        let was_held = self.holder.take().is_some();
-        if was_held {
-            self.caller = None;
-        }
-        was_held
+        let Some(holder) = self.holder.take() else { return false };
+        self.caller = Some(holder).filter(|holder| !holder.is_silent(now));
+        true
     }
 
     /// Calls the vehicle at once.
