@@ -14,18 +14,21 @@ fn state(port: u16) -> Option<Value> {
 /// Starts both ends; the section `link` of the surface's and of the vehicle's file has these lines.
 fn start(dir: &Path, vehicle_key: &str, surface_key: &str, surface_link: &str, link: &str) -> (u16, Process, Process) {
     let (modem, page) = (free_port(), free_port());
-    let seal = |key: &str| format!("key_file = \"{key}\"\nauthenticate = \"all\"\nencrypt = true\n");
+    let seal = |key: &str, link: &str| {
+        let encrypt = if link.contains("encrypt") { "" } else { "encrypt = true\n" };
+        format!("key_file = \"{key}\"\nauthenticate = \"all\"\n{encrypt}")
+    };
     let runtime = |who: &str| format!("[runtime]\ntime_scale = 20\nstate_dir = \"{}\"\n", dir.join(who).display());
     let surface = format!(
         "{}[link]\n{}{surface_link}[modem]\nlisten = \"127.0.0.1:{modem}\"\n[console]\nlisten = \"127.0.0.1:{page}\"\n",
         runtime("asv"),
-        seal(surface_key)
+        seal(surface_key, surface_link)
     );
     std::fs::write(dir.join("asv.toml"), surface).unwrap();
     let vehicle = format!(
         "{}[survey]\narea_m = [0, 0, 20, 20]\n[modem]\nconnect = \"127.0.0.1:{modem}\"\n[link]\n{}",
         runtime("auv"),
-        seal(vehicle_key)
+        seal(vehicle_key, link)
     );
     std::fs::write(dir.join("auv.toml"), format!("{vehicle}{link}")).unwrap();
     let process = |role: &str| {
@@ -95,10 +98,29 @@ fn another_frame_length_is_named_and_the_link_still_works() {
     let dir = scratch("another-length");
     let key = key(&dir, "mission.key");
     let (page, _surface, _vehicle) = start(&dir, &key, &key, "frame_bytes = 48\n", "frame_bytes = 512\n");
-    let vehicle = || state(page).map(|s| s["vehicles"][0].clone());
-    wait_until("a status", || vehicle().is_some_and(|v| v["status"].is_object()));
-    wait_until("the difference", || {
-        let said = vehicle().and_then(|v| v["link"]["mismatch"].as_str().map(str::to_owned)).unwrap_or_default();
-        said.contains("longer than those of this end (48 bytes)") && said.contains("link.frame_bytes at both ends")
-    });
+    wait_until("a status", || state(page).is_some_and(|s| s["vehicles"][0]["status"].is_object()));
+    let text = |its, own| {
+        format!(
+            "its frames have up to {its} bytes, those of this end {own}: set the same link.frame_bytes at both ends"
+        )
+    };
+    assert_both_name(page, &dir, &text(512, 48), &text(48, 512));
+}
+
+#[test]
+fn an_end_that_does_not_encrypt_is_named_at_both_ends() {
+    let dir = scratch("another-mode");
+    let key = key(&dir, "mission.key");
+    let (page, _surface, _vehicle) = start(&dir, &key, &key, "encrypt = false\n", "");
+    let [at_surface, at_vehicle] = ["it encrypts and this end does not", "this end encrypts and it does not"]
+        .map(|text| format!("{text}: set the same link.encrypt at both ends"));
+    assert_both_name(page, &dir, &at_surface, &at_vehicle);
+}
+
+/// The page names a mismatch, and so does the log of the vehicle.
+fn assert_both_name(page: u16, dir: &Path, at_surface: &str, at_vehicle: &str) {
+    let said = || state(page)?["vehicles"][0]["link"]["mismatch"].as_str().map(str::to_owned);
+    wait_until(at_surface, || said().as_deref() == Some(at_surface));
+    let log = || std::fs::read_to_string(dir.join("auv.log")).unwrap_or_default();
+    wait_until(at_vehicle, || log().contains(at_vehicle));
 }

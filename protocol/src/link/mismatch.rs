@@ -1,6 +1,6 @@
 //! Settings of the other end that do not fit.
 
-use crate::wire::{SessionId, UtcHours, WIRE_VERSION};
+use crate::wire::{Introduction, SessionId, UtcHours, WIRE_VERSION};
 use std::collections::BTreeSet;
 
 /// A setting of the other end that does not fit, so that its frames are refused, wasteful or those of two. It is found in a frame
@@ -23,9 +23,12 @@ pub enum Mismatch {
         "its hellos fit neither the key nor the mission number here: set the same link.key_file and mission.id at both ends"
     )]
     Key,
-    /// Its frames are longer than those of this end, which have so many bytes. They are read all the same.
-    #[error("its frames are longer than those of this end ({0} bytes): set the same link.frame_bytes at both ends")]
-    Longer(usize),
+    /// Its frames have up to so many bytes, and those of this end another number. They are read all the same.
+    #[error("its frames have up to {0} bytes, those of this end {1}: set the same link.frame_bytes at both ends")]
+    Length(usize, usize),
+    /// It encrypts and this end does not, or the other way round: no frame but hellos is read.
+    #[error("{0}: set the same link.encrypt at both ends")]
+    Encryption(&'static str),
     /// Its clock and that of this end are apart by so many days, rounded down. Its frames are read all the same.
     #[error(
         "its clock and the clock of this end are {0} days apart: set both to UTC, or the times of files and logs do not fit"
@@ -50,8 +53,10 @@ pub(super) struct MismatchReport {
     found: Option<Mismatch>,
     /// The last one since a frame was accepted.
     current: Option<Mismatch>,
-    /// Frames that are accepted, but longer than ours.
-    longer: Option<Mismatch>,
+    /// Frames of the peer are longer or shorter than ours.
+    length: Option<Mismatch>,
+    /// One end encrypts, by the last hello that verified.
+    encryption: Option<Mismatch>,
     /// The clock in the last hello that verified.
     clock: Option<Mismatch>,
     reported: BTreeSet<Mismatch>,
@@ -101,9 +106,9 @@ impl MismatchReport {
 
     /// A frame of so many bytes was accepted; those of this end have `own`.
     pub(super) fn note_length(&mut self, bytes: usize, own: usize) {
-        if bytes > own && self.longer.is_none() {
-            self.longer = Some(Mismatch::Longer(own));
-            self.found = self.longer;
+        if bytes > own && self.length.is_none() {
+            self.length = Some(Mismatch::Length(bytes, own));
+            self.found = self.length;
         }
     }
 
@@ -113,8 +118,27 @@ impl MismatchReport {
         self.current.take_if(|mismatch| *mismatch == Mismatch::Key);
     }
 
+    /// A hello that has verified says this of the peer, and this end says `own`.
+    pub(super) fn note_introduction(&mut self, peer: &Introduction, own: &Introduction) {
+        let lengths = (usize::from(peer.frame_bytes), usize::from(own.frame_bytes));
+        let length =
+            (lengths.0 != lengths.1 && lengths.0.min(lengths.1) > 0).then_some(Mismatch::Length(lengths.0, lengths.1));
+        let encryption = match (peer.encrypts, own.encrypts) {
+            (true, false) => Some(Mismatch::Encryption("it encrypts and this end does not")),
+            (false, true) => Some(Mismatch::Encryption("this end encrypts and it does not")),
+            _ => None,
+        };
+        for (found, known) in [(length, &mut self.length), (encryption, &mut self.encryption)] {
+            if found.is_some() && known.is_none() {
+                self.found = found;
+            }
+            *known = found;
+        }
+        self.note_clock(peer.clock, own.clock);
+    }
+
     /// A hello that has verified has this clock, and this end has `own`.
-    pub(super) fn note_clock(&mut self, clock: Option<UtcHours>, own: Option<UtcHours>) {
+    fn note_clock(&mut self, clock: Option<UtcHours>, own: Option<UtcHours>) {
         let hours = clock.zip(own).map_or(0, |(clock, own)| clock.apart(own));
         let found = (hours > 24).then_some(Mismatch::Clock(hours / 24));
         if found.is_some() && self.clock.is_none() {
@@ -128,7 +152,7 @@ impl MismatchReport {
     }
 
     pub(super) fn current(&self) -> Option<Mismatch> {
-        self.current.or(self.longer).or(self.clock)
+        self.current.or(self.encryption).or(self.length).or(self.clock)
     }
 
     pub(super) fn poll(&mut self) -> Option<Mismatch> {

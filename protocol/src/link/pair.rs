@@ -69,6 +69,7 @@ impl<T> LinkPair<T> {
         introduction: Introduction,
         seed: u64,
     ) -> Self {
+        let encrypts = authenticity.as_ref().is_some_and(|a| a.encrypt);
         let authenticity = authenticity.map(|a| a.link(if us == Address::SURFACE { peer } else { us }));
         let handshake = Handshake::new(Identities::new(seed, authenticity.as_ref().map(|a| a.key.link().clone())));
         let (mismatch, stats) = (MismatchReport::default(), LinkStats::default());
@@ -77,7 +78,7 @@ impl<T> LinkPair<T> {
             us,
             peer,
             authenticity,
-            introduction,
+            introduction: Introduction { encrypts, ..introduction },
             handshake,
             mismatch,
             owes_hello: false,

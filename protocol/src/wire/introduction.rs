@@ -92,9 +92,11 @@ impl UtcHours {
 ///  9    5     silence        from a vehicle that refuses: time since it has heard that surface, 8 s; 31: 248 s or more
 /// 10-12 24    clock          hours since 1970, UTC; 0: not known
 /// 13    1     plain          from a surface: it reads map chunks with the body `png` alone
-/// 13    3     -              0, not read
+/// 13    1     encrypts       with a key: it encrypts the content of authenticated frames
+/// 13    2     -              0, not read
 /// 13    4     name's length  bytes, 0..12
 /// 14..        name           of the surface that the series belongs to, UTF-8
+///  ..   16    frame length   bytes of the longest frame of the sender; 0 or missing: not known
 ///  ..         reserved for later versions; skipped
 /// ```
 ///
@@ -104,7 +106,7 @@ impl UtcHours {
 ///
 /// let (series, name) = (Some(Series::from_random(0xABCD)), SurfaceName::from_text("tug"));
 /// let surface = Introduction { cell_edge: CellEdge::from_metres(0.25), series, name, ..Introduction::default() };
-/// assert_eq!(surface.encode(26), [0x00, 0x09, 0xC4, 0, 0, 0, 0, 0xAB, 0xCD, 0, 0, 0, 0, 3, b't', b'u', b'g']);
+/// assert_eq!(surface.encode(26), [0x00, 0x09, 0xC4, 0, 0, 0, 0, 0xAB, 0xCD, 0, 0, 0, 0, 3, b't', b'u', b'g', 0, 0]);
 /// assert_eq!(Introduction::decode(&surface.encode(26)), Ok(surface));
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -123,6 +125,10 @@ pub struct Introduction {
     pub silence_s: u8,
     /// From a surface: it reads map and layer chunks with the body `png` alone.
     pub is_plain: bool,
+    /// It encrypts the content of authenticated frames.
+    pub encrypts: bool,
+    /// Bytes of the longest frame of the sender; 0: not known.
+    pub frame_bytes: u16,
     /// The clock of the sender's computer.
     pub clock: Option<UtcHours>,
     /// The name of the surface that the series belongs to.
@@ -131,12 +137,13 @@ pub struct Introduction {
 
 impl Introduction {
     /// Bytes of the longest introduction.
-    pub const MAX_BYTES: usize = Self::HEAD + SurfaceName::MAX_BYTES;
+    pub const MAX_BYTES: usize = Self::HEAD + SurfaceName::MAX_BYTES + 2;
     /// Bytes of the fixed fields, which are before the name.
     const HEAD: usize = 14;
     const PLAIN: u8 = 0x80;
+    const ENCRYPTS: u8 = 0x40;
 
-    /// The bytes of the payload: 14, and the name as far as it fits into `room`.
+    /// The bytes of the payload: 14, the name as far as it fits into `room`, and the frame length if it fits too.
     #[must_use]
     pub fn encode(&self, room: usize) -> Vec<u8> {
         let mut out = Vec::new();
@@ -152,8 +159,13 @@ impl Introduction {
         while !name.is_char_boundary(length) {
             length -= 1;
         }
-        out.push(length as u8 | if self.is_plain { Self::PLAIN } else { 0 });
+        let flags = [(self.is_plain, Self::PLAIN), (self.encrypts, Self::ENCRYPTS)];
+        let flags = flags.iter().filter(|(is_set, _)| *is_set).fold(0, |all, (_, bit)| all | bit);
+        out.push(length as u8 | flags);
         out.extend_from_slice(name.as_bytes().get(..length).unwrap_or_default());
+        if out.len() + 2 <= room {
+            out.extend_from_slice(&self.frame_bytes.to_be_bytes());
+        }
         out
     }
 
@@ -175,8 +187,10 @@ impl Introduction {
             has_no_memory: flags & 0x20 != 0,
             silence_s: if refuses { (flags & 0x1F) * 8 } else { 0 },
             is_plain: name & Self::PLAIN != 0,
+            encrypts: name & Self::ENCRYPTS != 0,
             clock: (hours != 0).then_some(UtcHours(hours)),
             name: SurfaceName::from_text(&String::from_utf8_lossy(r.take(length)?)),
+            frame_bytes: r.u16().unwrap_or(0),
         })
     }
 }
@@ -191,7 +205,8 @@ mod tests {
         fn an_introduction_reads_back(
             edge in 0u32..=CellEdge::MAX,
             bits in 1u64..,
-            [is_surface, takes_over, refuses, has_no_memory, is_plain]: [bool; 5],
+            [is_surface, takes_over, refuses, has_no_memory, is_plain, encrypts]: [bool; 6],
+            frame_bytes: u16,
             silence in 0u8..32,
             hours in 0u32..1 << 24,
             name: String,
@@ -202,8 +217,9 @@ mod tests {
             let name = if is_surface { SurfaceName::from_text(&name) } else { SurfaceName::default() };
             let cell_edge = CellEdge(edge);
             let clock = UtcHours::from_unix(Duration::from_secs(3600 * u64::from(hours)));
-            let sent =
-                Introduction { cell_edge, series, takes_over, refuses, has_no_memory, silence_s, is_plain, clock, name };
+            let sent = Introduction {
+                cell_edge, series, takes_over, refuses, has_no_memory, silence_s, is_plain, encrypts, frame_bytes, clock, name,
+            };
             let mut bytes = sent.encode(Introduction::MAX_BYTES);
             prop_assert!(bytes.len() <= Introduction::MAX_BYTES);
             prop_assert_eq!(Introduction::decode(&bytes), Ok(sent));
@@ -214,7 +230,7 @@ mod tests {
                 prop_assert!(cut.len() <= room);
                 let read = Introduction::decode(&cut).unwrap();
                 prop_assert!(name.as_str().starts_with(read.name.as_str()));
-                prop_assert_eq!(Introduction { name, ..read }, sent);
+                prop_assert_eq!(Introduction { name, frame_bytes, ..read }, sent);
             }
         }
 

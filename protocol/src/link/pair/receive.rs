@@ -91,7 +91,7 @@ impl<T> LinkPair<T> {
             None
         };
         if let Some(introduction) = &introduction {
-            self.mismatch.note_clock(introduction.clock, self.introduction.clock);
+            self.mismatch.note_introduction(introduction, &self.introduction);
         }
         if own.is_some() {
             self.rotation.handle_voice(generation);

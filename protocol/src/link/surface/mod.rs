@@ -84,7 +84,9 @@ impl<R: StateReplica> SurfaceLink<R> {
         let seed = crate::link::run::next_random(&mut self.random);
         let c = &self.config;
         let (cell_edge, series, name) = (c.cell_edge, Some(self.series), c.name);
-        let introduction = Introduction { cell_edge, series, name, clock: self.clock, ..Introduction::default() };
+        let frame_bytes = self.config.modem.frame_bytes as u16;
+        let introduction =
+            Introduction { cell_edge, series, name, clock: self.clock, frame_bytes, ..Introduction::default() };
         let peer = VehiclePeer::new(c.mission, vehicle, c.authenticity.clone(), introduction, seed, c.master, now);
         let peer = peer.with_modem(&c.modem).with_abort_lifetime(c.abort_lifetime);
         self.fleet.insert(vehicle, peer);

@@ -65,7 +65,8 @@ impl<S: StateSource> VehicleLink<S> {
         now: Instant,
     ) -> Self {
         source.set_quick(config.modem.access == Access::FullDuplex);
-        let introduction = Introduction { cell_edge: config.cell_edge, ..Introduction::default() };
+        let frame_bytes = config.modem.frame_bytes as u16;
+        let introduction = Introduction { cell_edge: config.cell_edge, frame_bytes, ..Introduction::default() };
         let (mission, authenticity) = (config.mission, config.authenticity.clone());
         let mut link = Self {
             pair: LinkPair::new(mission, config.address, Address::SURFACE, authenticity, introduction, seed),

@@ -47,6 +47,8 @@ pub struct LateRecovery {
     pub state: &'static str,
     /// The only kind of frame in the burst; `None` for a mixture of all.
     pub kind: Option<AttackKind>,
+    /// The state in which the wait was given up; empty if it was not.
+    pub given_up: String,
 }
 
 /// The figures of one protection.
@@ -197,7 +199,7 @@ impl Campaign {
                 break;
             }
             let (state, kind) = self.burst(&mut ends, burst, frames);
-            let seconds = self.quiet(&mut ends);
+            let (seconds, given_up) = self.quiet(&mut ends);
             if seconds > RECOVERY_S {
                 let access = match access {
                     Access::Shared => "shared",
@@ -205,7 +207,7 @@ impl Campaign {
                     Access::Polled => "polled",
                     Access::FullDuplex => "full-duplex",
                 };
-                self.late.push(LateRecovery { seconds, dive: number, burst, access, state, kind });
+                self.late.push(LateRecovery { seconds, dive: number, burst, access, state, kind, given_up });
             }
             progress(self.frames as f64 / frames as f64);
         }
@@ -307,8 +309,8 @@ impl Campaign {
     }
 
     /// The operator gives an order after the last forged frame; then the link has time to recover.
-    /// Returns the seconds that it took.
-    fn quiet(&mut self, ends: &mut AttackedEnds) -> f64 {
+    /// Returns the seconds that it took, and the state in which the wait was given up.
+    fn quiet(&mut self, ends: &mut AttackedEnds) -> (f64, String) {
         ends.issue();
         let began = ends.now();
         let mut checked = began;
@@ -326,10 +328,11 @@ impl Campaign {
             ends.answer_question();
         }
         let time = ends.now().since(began).as_secs_f64();
+        let given_up = if is_recovered { String::new() } else { ends.facts() };
         self.recoveries.push(if is_recovered { time } else { f64::INFINITY });
         self.forger.overhear(std::mem::take(&mut ends.overheard));
         ends.run(Duration::from_secs(1 + self.rng.below(20) as u64));
-        time
+        (time, given_up)
     }
 
     fn figures(self, control: &Self) -> StrangerFigures {

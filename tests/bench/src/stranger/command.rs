@@ -110,6 +110,9 @@ fn print(row: &StrangerFigures) {
             "    {:>5.1} s after burst {} of dive {}, {}, {}: {kind}",
             late.seconds, late.burst, late.dive, late.access, late.state
         );
+        if !late.given_up.is_empty() {
+            println!("      {}", late.given_up);
+        }
     }
     println!();
 }

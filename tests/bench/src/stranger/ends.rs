@@ -167,6 +167,20 @@ impl AttackedEnds {
             && view.replica().shown() == self.vehicle.map()
     }
 
+    /// The facts by which [`Self::is_recovered`] decides, for people.
+    pub(super) fn facts(&self) -> String {
+        let Some(view) = self.surface.vehicle(auv()) else { return "the surface has no vehicle".to_owned() };
+        let order = view.slots().find(|s| s.id == SlotId::Utility).map(|s| s.status);
+        format!(
+            "order {:?} is {order:?}, {:?} in force, holder {:?}, map complete {}, equal {}",
+            self.orders.issued,
+            self.orders.in_force,
+            view.holder().map(|holder| holder.series),
+            self.vehicle.is_converged(),
+            view.replica().shown() == self.vehicle.map()
+        )
+    }
+
     /// Counts the copy of an ended run if it was lost: neither a copy that is as large nor the present map has replaced it.
     fn note_ended(&mut self) {
         let Some(view) = self.surface.vehicle(auv()) else { return };

@@ -270,12 +270,16 @@ fn introduction(payload: &[u8]) -> Option<Fields> {
         ("refuses", introduction.refuses),
         ("no_memory", introduction.has_no_memory),
         ("plain", introduction.is_plain),
+        ("encrypts", introduction.encrypts),
     ];
     fields.extend(flags.into_iter().filter(|(_, is_set)| *is_set).map(|(name, _)| (name, true.into())));
     if introduction.refuses {
         fields.push(("silence_s", introduction.silence_s.into()));
     }
     fields.extend(introduction.clock.map(|clock| ("clock_h", clock.hours().into())));
+    if introduction.frame_bytes > 0 {
+        fields.push(("frame_bytes", introduction.frame_bytes.into()));
+    }
     Some(fields)
 }
 
