@@ -8,6 +8,7 @@ fn keyed(access: Access) -> EndsSetup {
 }
 
 const LIMITS: SlotId = SlotId::Limits;
+const CONSTRAINTS: SlotId = SlotId::Constraints;
 const APPLIED: Option<OrderStatus> = Some(OrderStatus::Applied);
 
 fn withdrawn(why: Withdrawal) -> Option<OrderStatus> {
@@ -53,6 +54,51 @@ fn a_hold_of_any_surface_is_applied_within_seconds() {
     for seed in 0..60 {
         let seconds = hold_of_second_s(seed);
         assert!(seconds.is_some_and(|seconds| seconds <= 8.0), "{seed}: {seconds:?}");
+    }
+}
+
+#[test]
+fn a_hold_that_was_given_before_the_other_surface_was_known_takes_over() {
+    for access in ACCESSES {
+        let mut waters = Waters::held_by_first(5, keyed(access));
+        waters.hold(1);
+        waters.is_away = [false, false, true];
+        run_s(&mut waters, 40);
+        assert_eq!(waters.status(1, CONSTRAINTS), APPLIED, "a new surface: {access:?}");
+        assert_eq!(waters.holder(0), Some(first_series(1)), "{access:?}");
+        let known = waters.view(1).caller(waters.now).map(|other| other.series);
+        assert_eq!(known, Some(first_series(0)), "it knows from whom it took the vehicle: {access:?}");
+
+        // The first one is cut off, so that it does not know of the second.
+        let mut waters = Waters::held_by_first(5, keyed(access));
+        waters.is_away = [true, false, true];
+        waters.take_over(1);
+        run_s(&mut waters, 60);
+        waters.hold(0);
+        run_s(&mut waters, 10);
+        waters.is_away = [false, false, true];
+        run_s(&mut waters, 90);
+        assert_eq!(waters.status(0, CONSTRAINTS), APPLIED, "a surface that was cut off: {access:?}");
+    }
+}
+
+#[test]
+fn an_old_hold_asks_and_takes_over_once_it_is_given_again() {
+    for access in ACCESSES {
+        let mut waters = Waters::held_by_first(6, keyed(access));
+        waters.is_away = [true, false, true];
+        run_s(&mut waters, 130);
+        waters.hold(0);
+        run_s(&mut waters, 130);
+        waters.is_away = [false, false, true];
+        run_s(&mut waters, 120);
+        assert_eq!(waters.status(0, CONSTRAINTS), withdrawn(Withdrawal::Late), "{access:?}");
+        assert_eq!(waters.holder(0), Some(first_series(1)), "{access:?}");
+        waters.confirm(0);
+        run_s(&mut waters, 40);
+        assert_eq!(waters.status(0, CONSTRAINTS), APPLIED, "{access:?}");
+        run_s(&mut waters, 60);
+        assert_eq!(waters.holder(1), Some(first_series(0)), "{access:?}");
     }
 }
 
