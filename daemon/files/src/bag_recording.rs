@@ -63,7 +63,7 @@ impl Contents {
                 }
             }
         }
-        contents.encodings = stream.other_encodings().map(str::to_owned).collect();
+        contents.encodings.clone_from(stream.other_encodings());
         match contents.damage {
             Some(error) if contents.topics.is_empty() => Err(UserError::file(path, error)),
             _ => Ok(contents),
@@ -104,7 +104,7 @@ impl Contents {
                 let encodings: Vec<&str> = self.encodings.iter().map(String::as_str).collect();
                 let others = match encodings.as_slice() {
                     [] => String::new(),
-                    found => format!("; CDR of ROS 2 is read, and its messages are in {}", found.join(", ")),
+                    found => format!("; CDR of ROS 2 is read, and some of its messages are in {}", found.join(", ")),
                 };
                 Err(UserError::file(path, format!("there are no messages of {kinds}{others}")))
             }

@@ -287,15 +287,26 @@ pub struct Recorder {
     frames: u32,
 }
 
+/// Whether a file is one that a [`Recorder`] writes.
+fn is_recorded(path: &Path) -> bool {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let number = name.strip_prefix("frame-").and_then(|rest| rest.strip_suffix(".png"));
+    name == "poses.csv" || number.is_some_and(|n| n.len() == 6 && n.bytes().all(|b| b.is_ascii_digit()))
+}
+
 impl Recorder {
-    /// Records into a folder, which is made. The images of an earlier recording in it are removed.
+    /// Whether a folder has a recording, or a part of one.
+    pub fn has_recording(dir: &Path) -> bool {
+        std::fs::read_dir(dir).is_ok_and(|entries| entries.flatten().any(|entry| is_recorded(&entry.path())))
+    }
+
+    /// Records into a folder, which is made. An earlier recording in it is removed.
     pub fn new(dir: &Path) -> Result<Self, UserError> {
         let failed = |e| UserError::file(dir, e);
         std::fs::create_dir_all(dir).map_err(failed)?;
         for entry in std::fs::read_dir(dir).map_err(failed)? {
             let path = entry.map_err(failed)?.path();
-            let name = path.file_name().unwrap_or_default().to_string_lossy();
-            if name.starts_with("frame-") && name.ends_with(".png") {
+            if is_recorded(&path) {
                 std::fs::remove_file(&path).map_err(|e| UserError::file(&path, e))?;
             }
         }

@@ -2,6 +2,7 @@
 
 use crate::exif::exif_stamp;
 use crate::{BitDepth, Stamp, complete_length};
+use image::error::{ImageError, UnsupportedErrorKind};
 use image::{
     ColorType, DynamicImage, ExtendedColorType, ImageBuffer, ImageDecoder, ImageFormat, ImageReader, Limits, Rgb,
     RgbImage,
@@ -18,8 +19,9 @@ pub enum DecodeError {
     UnknownFormat,
     #[error("the JPEG has no end, so a part of it is missing")]
     CutJpeg,
-    #[error("its levels are floats: convert it to 8 or 16 bits, with levels from black to white")]
-    Floats,
+    /// Nothing says which of them is white.
+    #[error("its levels have 32 bits or more, or are floats: convert it to 8 or 16 bits, from black to white")]
+    WideLevels,
     #[error("the image has {width} x {height} pixels; allowed are up to {MAX_PIXELS}")]
     TooLarge { width: u32, height: u32 },
     #[error("not an image that can be read: {0}")]
@@ -47,7 +49,13 @@ fn decoder_of(bytes: &[u8], limits: Limits) -> Result<impl ImageDecoder, DecodeE
     let format = if is_big_tiff(bytes) { Some(ImageFormat::Tiff) } else { guessed.format() };
     let mut reader = ImageReader::with_format(Cursor::new(bytes), format.ok_or(DecodeError::UnknownFormat)?);
     reader.limits(limits);
-    reader.into_decoder().map_err(broken)
+    reader.into_decoder().map_err(|error| if has_wide_levels(&error) { DecodeError::WideLevels } else { broken(error) })
+}
+
+/// Whether the library knows no pixels with so many bits: grey levels of 32 bits or more, floats or whole numbers.
+fn has_wide_levels(error: &ImageError) -> bool {
+    let ImageError::Unsupported(unsupported) = error else { return false };
+    matches!(unsupported.kind(), UnsupportedErrorKind::Color(ExtendedColorType::Unknown(32 | 64 | 96 | 128)))
 }
 
 fn broken(error: image::ImageError) -> DecodeError {
@@ -59,11 +67,8 @@ fn upright(mut decoder: impl ImageDecoder, mut limits: Limits) -> Result<Dynamic
     // The decoder counts its own memory only.
     limits.reserve(decoder.total_bytes()).map_err(broken)?;
     let orientation = decoder.orientation().map_err(broken)?;
-    // Nothing says which of their values is white.
-    if matches!(decoder.color_type(), ColorType::Rgb32F | ColorType::Rgba32F)
-        || matches!(decoder.original_color_type(), ExtendedColorType::Unknown(32 | 64 | 96))
-    {
-        return Err(DecodeError::Floats);
+    if matches!(decoder.color_type(), ColorType::Rgb32F | ColorType::Rgba32F) {
+        return Err(DecodeError::WideLevels);
     }
     let mut image = DynamicImage::from_decoder(decoder).map_err(broken)?;
     image.apply_orientation(orientation);
@@ -112,8 +117,8 @@ fn limits() -> Limits {
 const HEAD_BYTES: usize = 4096;
 
 /// The time at which an image was taken, if the image itself says so: by a text `stamp=SECONDS` in a comment of a PPM or JPEG, or
-/// in a tEXt chunk with the keyword `stamp` of a PNG, within the first 4096 bytes; or by EXIF data with a time of original that
-/// has a fraction and a zone.
+/// in a tEXt chunk with the keyword `stamp` of a PNG, within the first 4096 bytes; or by EXIF data whose
+/// `DateTimeOriginal` has a fraction and a zone.
 pub fn own_stamp(bytes: &[u8]) -> Option<Stamp> {
     stamp_in_text(bytes).or_else(|| exif_stamp(bytes))
 }
@@ -176,8 +181,16 @@ mod tests {
         let floats = ImageBuffer::<Rgb<f32>, _>::from_vec(2, 1, vec![0.0, 10.0, 255.0, 1.0, 2.0, 3.0]).unwrap();
         let mut bytes = Cursor::new(Vec::new());
         DynamicImage::ImageRgb32F(floats).write_to(&mut bytes, ImageFormat::Tiff).unwrap();
-        assert_eq!(decode(bytes.get_ref(), WHOLE), Err(DecodeError::Floats));
-        assert_eq!(decode_upright(bytes.get_ref(), Limits::default()), Err(DecodeError::Floats));
+        assert_eq!(decode(bytes.get_ref(), WHOLE), Err(DecodeError::WideLevels));
+        assert_eq!(decode_upright(bytes.get_ref(), Limits::default()), Err(DecodeError::WideLevels));
+        // One grey pixel of 32 bits: width, height, bits, no compression, black is 0, its place, one row, its bytes, IEEE floats.
+        let tags =
+            [(256u16, 1u32), (257, 1), (258, 32), (259, 1), (262, 1), (273, 8), (277, 1), (278, 1), (279, 4), (339, 3)];
+        let entry =
+            |(tag, value): &(u16, u32)| [&tag.to_le_bytes()[..], &[4, 0, 1, 0, 0, 0], &value.to_le_bytes()].concat();
+        let entries: Vec<u8> = tags.iter().flat_map(entry).collect();
+        let grey = [&b"II*\0\x0C\0\0\0"[..], &1f32.to_le_bytes(), &[tags.len() as u8, 0], &entries, &[0; 4]].concat();
+        assert_eq!(decode(&grey, WHOLE), Err(DecodeError::WideLevels));
     }
 
     #[test]

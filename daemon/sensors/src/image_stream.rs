@@ -88,7 +88,7 @@ pub fn complete_length(bytes: &[u8]) -> Option<usize> {
 
 /// Whether bytes begin as an image of a stream does: a JPEG, PNG or PPM, complete or not.
 pub fn is_known_image(bytes: &[u8]) -> bool {
-    bytes.len() > 2 && may_begin(bytes)
+    may_begin(bytes)
 }
 
 const PNG: &[u8] = b"\x89PNG\r\n\x1A\n";

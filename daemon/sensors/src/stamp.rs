@@ -15,7 +15,7 @@ const EPOCHS_S: std::ops::Range<i64> = 946_684_800..4_102_444_800;
 const FROM_ZERO_S: i64 = 10_000_000;
 
 /// The form of a time in a text.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum StampForm {
     Seconds,
     Milliseconds,
@@ -59,8 +59,8 @@ impl Rest<'_> {
 }
 
 /// Nanoseconds since the Unix epoch of a date `yyyymmddThhmmss`, also with `_`, `-`, a space or nothing between day and hour, with `-`
-/// between its parts, with a fraction behind `.`, `_`, `-` or (of 3, 6 or 9 digits) nothing, and with `Z` at its end; `None` if it is no
-/// date of the years 2000 to 2099.
+/// between its parts, with a fraction behind `.`, or of 3, 6 or 9 digits behind `_`, `-` or nothing, and with `Z` at its end; `None` if
+/// it is no date of the years 2000 to 2099.
 fn nanos_of_date(text: &str) -> Option<i64> {
     let mut rest = Rest(text.strip_suffix('Z').unwrap_or(text));
     let year = rest.number(4)?;
@@ -74,10 +74,16 @@ fn nanos_of_date(text: &str) -> Option<i64> {
     let minute = rest.number(2)?;
     rest.passes(&['-', ':']);
     let second = rest.number(2)?;
-    let is_apart = rest.passes(&['.', '_', '-']);
+    let is_decimal = rest.passes(&['.']);
+    let is_apart = is_decimal || rest.passes(&['_', '-']);
     let fraction = rest.0;
     let is_fraction = fraction.bytes().all(|b| b.is_ascii_digit());
-    let is_whole = if is_apart { !fraction.is_empty() } else { fraction.len() % 3 == 0 };
+    // Behind other signs than a point, a short number counts images.
+    let is_whole = match fraction.len() {
+        0 => !is_apart,
+        3 | 6 | 9 => true,
+        _ => is_decimal,
+    };
     if !is_fraction || !is_whole {
         return None;
     }
@@ -209,7 +215,7 @@ mod tests {
             ("20261126T185000.250Z", SECONDS * NANOS + 250_000_000, Date),
             ("20261126185000250", SECONDS * NANOS + 250_000_000, Date),
             ("20261126T185000250", SECONDS * NANOS + 250_000_000, Date),
-            ("20261126_185000_25", SECONDS * NANOS + 250_000_000, Date),
+            ("20261126_185000_250", SECONDS * NANOS + 250_000_000, Date),
             ("2026-11-26T18-50-00.5", SECONDS * NANOS + 500_000_000, Date),
             ("20240229T000000", 1_709_164_800 * NANOS, Date),
             // A clock that began at 0, as of a simulator.
@@ -223,6 +229,7 @@ mod tests {
             "20261126T18500",
             "2026-11-26",
             "IMG_20261126_185000",
+            "20261126_185000_1",
             "99991126185000250",
         ] {
             assert_eq!(Stamp::parse(wrong), None, "{wrong}");

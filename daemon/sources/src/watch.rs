@@ -5,6 +5,7 @@ use crate::live::{Reading, SensorKind, SensorSource, SourceError, SourceImage};
 use scenecast_sensors::{CameraFault, MAX_IMAGE_BYTES, Stamp, StampForm, complete_length, is_known_image};
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::fs::DirEntry;
+use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant, SystemTime};
 
@@ -46,8 +47,8 @@ pub struct WatchSource {
 /// What people were told of the names.
 #[derive(Debug, Clone, Default)]
 struct ToldNames {
-    /// The form of the last name's time; `None` within for a name without one.
-    form: Option<Option<StampForm>>,
+    /// The forms of the times in names so far; `None` for a name without one.
+    forms: BTreeSet<Option<StampForm>>,
     is_ahead_told: bool,
     /// Endings of files that are not read.
     endings: BTreeSet<String>,
@@ -58,9 +59,8 @@ impl ToldNames {
     fn handle(&mut self, name: &str, now: SystemTime) -> Option<String> {
         let found = Path::new(name).file_stem().and_then(|stem| Stamp::parse_with_form(stem.to_str()?));
         let Some((stamp, form)) = found else {
-            let is_new = self.form.replace(None) != Some(None);
-            let text = "its name is no time: its own one counts, or else that of its arrival";
-            return is_new.then(|| format!("{name}: {text}"));
+            let text = "the name has no time: the time in the image counts, or else its arrival";
+            return self.forms.insert(None).then(|| format!("{name}: {text}"));
         };
         let now = now.duration_since(SystemTime::UNIX_EPOCH).ok()?;
         let now = Stamp::from_nanos(i64::try_from(now.as_nanos()).ok()?);
@@ -69,8 +69,7 @@ impl ToldNames {
             let hours = ahead_s / 3600.0;
             return Some(format!("{name}: its time is {hours:.1} hours ahead of the clock of this computer"));
         }
-        let is_new = self.form.replace(Some(form)) != Some(Some(form));
-        is_new.then(|| format!("{name}: names are read as {}", form.name()))
+        self.forms.insert(Some(form)).then(|| format!("{name}: names are read as {}", form.name()))
     }
 
     /// A file that is not named as one that is read; returns what people should know of it, once for each ending.
@@ -173,11 +172,19 @@ impl WatchSource {
                     complete.push((stamp_of_name(path), path.clone(), bytes));
                 }
             } else if still >= ABANDONED {
-                let is_known = std::fs::read(path).is_ok_and(|bytes| is_known_image(&bytes));
-                if is_known {
-                    fault(CameraFault::CutOff, format!("{name}: not a complete image after {} s", ABANDONED.as_secs()));
-                } else {
-                    fault(CameraFault::Unreadable, format!("{name}: not a JPEG, PNG, PPM or TIFF image"));
+                match head_of(path) {
+                    Some(head) if head.len() > 2 && !is_known_image(&head) => {
+                        fault(
+                            CameraFault::Unreadable,
+                            format!("{name}: not a JPEG, PNG or PPM image, as its name says"),
+                        );
+                    }
+                    Some(_) => {
+                        let seconds = ABANDONED.as_secs();
+                        fault(CameraFault::CutOff, format!("{name}: not a complete image after {seconds} s"));
+                    }
+                    // It was removed.
+                    None => {}
                 }
                 *state = FileState::Done;
             }
@@ -250,6 +257,13 @@ fn is_tiff(path: &Path) -> bool {
 
 fn ending(path: &Path) -> Option<String> {
     path.extension().map(|ending| ending.to_string_lossy().to_ascii_lowercase())
+}
+
+/// The first bytes of a file; `None` if it cannot be read.
+fn head_of(path: &Path) -> Option<Vec<u8>> {
+    let mut head = Vec::new();
+    std::fs::File::open(path).ok()?.take(4).read_to_end(&mut head).ok()?;
+    Some(head)
 }
 
 fn stamp_of_name(path: &Path) -> Option<Stamp> {
@@ -329,11 +343,12 @@ mod tests {
         let first = told.handle("1795719000567.jpg", now).unwrap();
         assert_eq!(first, "1795719000567.jpg: names are read as milliseconds since 1970");
         assert_eq!(told.handle("1795719001567.jpg", now), None);
-        assert!(told.handle("IMG_0001.jpg", now).unwrap().contains("its name is no time"));
+        assert!(told.handle("IMG_0001.jpg", now).unwrap().contains("the name has no time"));
         assert_eq!(told.handle("IMG_0002.jpg", now), None);
+        assert!(told.handle("20261126T185000.jpg", now).unwrap().contains("date and time of UTC"));
         let ahead = told.handle("20261127T185000.jpg", now).unwrap();
         assert!(ahead.contains("24.0 hours ahead"), "{ahead}");
-        assert!(told.handle("20261126T185000.jpg", now).unwrap().contains("date and time of UTC"));
+        assert_eq!(told.handle("1795719002567.jpg", now), None, "a form is told once");
     }
 
     #[test]

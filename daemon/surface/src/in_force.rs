@@ -87,7 +87,7 @@ fn present<T: Clone + Default>(order: &SentOrder<T>, id: SlotId, view: &PeerView
         let name = id.name();
         format!(
             "the surface does not know yet which {name} the vehicle obeys, so a part cannot be changed: wait for the \
-             vehicle's report, or name the whole {name}"
+             vehicle's report, or name the whole {name} (scenecast ctl {name} clear removes it)"
         )
     })
 }

@@ -90,7 +90,7 @@ pub struct MissionLog {
 }
 
 impl MissionLog {
-    /// The most entries that are kept. Nobody's entries push those of another out, nor those of another kind: see [`make_room`].
+    /// The most entries that are kept; [`make_room`] says which of them go.
     pub const MAX: usize = MAX_LOG;
     /// The most characters of a text.
     const MAX_TEXT: usize = 240;

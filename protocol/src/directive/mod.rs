@@ -18,7 +18,7 @@ pub(crate) use in_force::InForceAssembly;
 pub use in_force::{InForceDigests, InForcePart, InForceSummary, PerSlot, REPORTED_SLOTS};
 pub use limits::{Band, Limits, LimitsFault, Reaction};
 pub use orders::{Budget, Constraints, Destination, ExemplarRequest, ExemplarRequests, Fix, Utility};
-pub(crate) use outbox::{PendingSlot, SlotOutbox};
+pub(crate) use outbox::{PendingSlot, SlotOutbox, WaitingStop};
 pub use polygon::{Polygon, PolygonFault};
 pub use progress::{OrderStatus, Series, SlotProgress, SlotReport, SlotState, Withdrawal};
 pub use settings::{Settings, SettingsFault};

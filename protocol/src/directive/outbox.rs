@@ -18,6 +18,16 @@ pub struct PendingSlot {
     pub bytes: Vec<u8>,
 }
 
+/// A hold or an abort that waits while the vehicle refuses this surface for another one.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum WaitingStop {
+    None,
+    /// The vehicle is to be taken over. The order goes out once the vehicle has reported that it has no newer one.
+    TakesOver,
+    /// It is old: it is withdrawn, and the operator is asked.
+    Withdrawn,
+}
+
 /// The directive of one vehicle at the surface.
 #[derive(Debug)]
 pub struct SlotOutbox {
@@ -35,8 +45,8 @@ pub struct SlotOutbox {
     has_report: bool,
     /// Whether a report of this run has said that another surface's order of the slot is newer.
     is_overtaken: [bool; SLOTS],
-    /// Whether the vehicle has refused this surface since its last report.
-    was_refused: bool,
+    /// When the vehicle refused this surface for another one last.
+    refused: Option<Instant>,
     /// Age after which an abort that has not arrived is withdrawn.
     abort_lifetime: Option<Duration>,
     /// The frame that acknowledged each slot that is received.
@@ -56,6 +66,9 @@ impl SlotOutbox {
     /// Age up to which a hold or an abort goes out before the vehicle has reported which orders of others it has.
     const PROMPT: Duration = Duration::from_secs(20);
 
+    /// Age from which a hold or an abort no longer takes a vehicle over by itself.
+    const STOP_LIFETIME: Duration = Duration::from_secs(120);
+
     /// An empty directive; `series` must be drawn at random by a surface that does not know its last orders.
     pub fn new(series: Series, is_keyed: bool) -> Self {
         Self {
@@ -67,7 +80,7 @@ impl SlotOutbox {
             was_on_air: [false; SLOTS],
             has_report: false,
             is_overtaken: [false; SLOTS],
-            was_refused: false,
+            refused: None,
             abort_lifetime: None,
             received_in: [0; SLOTS],
             skipped: [0; SLOTS],
@@ -204,7 +217,7 @@ impl SlotOutbox {
                 decided.push(id);
             }
         }
-        (self.has_report, self.was_refused) = (true, false);
+        self.has_report = true;
         decided
     }
 
@@ -255,11 +268,10 @@ impl SlotOutbox {
         late.map(|order| (order.status, order.changed) = (OrderStatus::Withdrawn(Withdrawal::Late), now)).is_some()
     }
 
-    /// Gives a withdrawn order again, as a new one; `None` if there is none of this kind.
-    pub fn give_again(&mut self, id: SlotId, now: Instant) -> Option<u16> {
+    /// The order of a kind, if it is withdrawn.
+    pub fn withdrawn(&self, id: SlotId) -> Option<Slot> {
         let order = self.progress().find(|order| order.id == id)?;
-        let slot = matches!(order.status, OrderStatus::Withdrawn(_)).then(|| order.slot.clone())?;
-        Some(self.issue(slot, now))
+        matches!(order.status, OrderStatus::Withdrawn(_)).then(|| order.slot.clone())
     }
 
     /// The newest order of a slot in force is another surface's. One of ours that the vehicle has not decided about was given
@@ -267,12 +279,18 @@ impl SlotOutbox {
     fn handle_overtaken(&mut self, id: SlotId, now: Instant) -> bool {
         let Some(is_known) = self.is_overtaken.get_mut(id.index()) else { return false };
         let is_known = std::mem::replace(is_known, true);
+        let refused = self.refused;
+        // A stop that the operator has just given although he knew of the other surface is obeyed.
+        let is_given_against = |order: &SlotProgress| {
+            let is_prompt = now.since(order.issued) < Self::PROMPT;
+            order.slot.stops() && is_prompt && refused.is_some_and(|at| order.issued > at)
+        };
         let Some(order) = self.slots.get_mut(id.index()).and_then(Option::as_mut).filter(|_| self.is_keyed) else {
             return false;
         };
         let withdrawal = match order.status {
             OrderStatus::Applied => Withdrawal::Superseded,
-            status if status.is_pending() && !is_known => Withdrawal::Overtaken,
+            status if status.is_pending() && !is_known && !is_given_against(order) => Withdrawal::Overtaken,
             _ => return false,
         };
         (order.status, order.changed) = (OrderStatus::Withdrawn(withdrawal), now);
@@ -283,22 +301,25 @@ impl SlotOutbox {
     /// report of a run; the vehicle itself sorts out the other orders, and obeys these at once.
     fn may_go(&self, order: &SlotProgress, now: Instant) -> bool {
         let stops = order.slot.stops();
-        let is_prompt = now.since(order.issued) < Self::PROMPT && !self.was_refused;
+        let is_prompt = now.since(order.issued) < Self::PROMPT && self.is_after_refusal(order);
         !self.is_keyed || !stops || self.has_report || is_prompt
     }
 
-    /// The vehicle has refused this surface for another one. Whether a hold or an abort waits for which the vehicle is to be taken over:
-    /// one that was given less than `lifetime` ago, and that goes out once the vehicle has reported that it has no newer one. An
-    /// older one is withdrawn, and the operator is asked.
-    pub fn handle_refusal(&mut self, lifetime: Duration, now: Instant) -> bool {
-        self.was_refused = true;
+    /// Whether the operator gave an order when he could know of the other surface that holds the vehicle.
+    fn is_after_refusal(&self, order: &SlotProgress) -> bool {
+        self.refused.is_none_or(|at| order.issued > at)
+    }
+
+    /// The vehicle has refused this surface for another one.
+    pub fn handle_refusal(&mut self, now: Instant) -> WaitingStop {
+        self.refused = Some(now);
         let waits = |order: &&mut SlotProgress| order.slot.stops() && order.status.is_pending();
-        let Some(order) = self.slots.iter_mut().flatten().find(waits) else { return false };
-        let is_recent = now.since(order.issued) < lifetime;
-        if !is_recent {
-            (order.status, order.changed) = (OrderStatus::Withdrawn(Withdrawal::Late), now);
+        let Some(order) = self.slots.iter_mut().flatten().find(waits) else { return WaitingStop::None };
+        if now.since(order.issued) < Self::STOP_LIFETIME {
+            return WaitingStop::TakesOver;
         }
-        is_recent
+        (order.status, order.changed) = (OrderStatus::Withdrawn(Withdrawal::Late), now);
+        WaitingStop::Withdrawn
     }
 
     /// Begins a new series if the report in frame `number` alone, without earlier ones, shows that the vehicle ignores a

@@ -45,7 +45,7 @@ impl fmt::Display for HostPort {
 pub struct PageOrigin(String);
 
 impl PageOrigin {
-    /// A text of `https://`, a host, and a port where it is not 443; no path. Without encryption there is no proxy that needs it.
+    /// A text of `https://`, a host, and a port where it is not 443; no path. Origins without encryption are not taken.
     pub fn parse(text: &str) -> Option<Self> {
         let (host, port) = Self::split(text)?;
         let is_allowed = |b: u8| b.is_ascii_alphanumeric() || b".-:[]".contains(&b);

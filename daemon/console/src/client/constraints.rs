@@ -40,8 +40,7 @@ pub struct FenceFile<'a> {
     pub without_keep_outs: bool,
 }
 
-/// Sends the fence, the keep-outs and the return point of a GeoJSON file. What the file does not have stays, if the surface knows what
-/// there is.
+/// Sends the fence, the keep-outs and the return point of a GeoJSON file. What the file does not have stays.
 pub async fn set_fence(session: &Session, file: FenceFile<'_>) -> Result<(), UserError> {
     let state = session.state().await?;
     let v = session.choose(&state)?;
@@ -53,8 +52,7 @@ pub async fn set_fence(session: &Session, file: FenceFile<'_>) -> Result<(), Use
         return Err(UserError::file(file.path, line));
     }
     let mut changes = json!(order);
-    let is_known = v.orders.fence.is_some() || v.orders.fence_in_force.is_some();
-    if let Some(members) = changes.as_object_mut().filter(|_| is_known) {
+    if let Some(members) = changes.as_object_mut() {
         let stays = |name: &str| match name {
             "keep_outs" => order.keep_outs.is_empty() && !file.without_keep_outs,
             "return_point" => order.return_point.is_none(),
@@ -92,30 +90,40 @@ pub async fn set_limits(session: &Session, given: &LimitsOrder) -> Result<(), Us
     change_limits(session, |_, value| !value.is_null(), given).await
 }
 
-/// Removes limits and reactions by their names, such as `on-silence`; `all` is all of them.
+/// The names of limits and reactions for people, and the members of their order. `all` stands for all of them.
+pub const LIMITS: [(&str, &str); 9] = [
+    ("depth", "depth_m"),
+    ("altitude", "altitude_m"),
+    ("distance", "distance_m"),
+    ("time", "time_s"),
+    ("silence", "silence_s"),
+    ("on-silence", "on_silence"),
+    ("on-breach", "on_breach"),
+    ("on-abort", "on_abort"),
+    ("all", ""),
+];
+
+/// Removes limits and reactions by their names in [`LIMITS`].
 pub async fn clear_limits(session: &Session, names: &[String]) -> Result<(), UserError> {
-    let is_named = |member: &str, name: &str| {
-        name == "all"
-            || member.strip_suffix("_m").or(member.strip_suffix("_s")).unwrap_or(member) == name.replace('-', "_")
+    let is_named = |member: &str| {
+        let is_it = |(name, of): &(&str, &str)| names.iter().any(|n| n == name) && (*of == member || *name == "all");
+        LIMITS.iter().any(is_it)
     };
-    change_limits(session, |member, _| names.iter().any(|name| is_named(member, name)), &LimitsOrder::default()).await
+    change_limits(session, |member, _| is_named(member), &LimitsOrder::default()).await
 }
 
-/// Sends the members of an order that are to be named. Where the surface does not know the present limits, all must be named.
+/// Sends the members of an order that are to be named.
 async fn change_limits(
     session: &Session,
     is_named: impl Fn(&str, &Value) -> bool,
     order: &LimitsOrder,
 ) -> Result<(), UserError> {
     let state = session.state().await?;
-    let v = session.choose(&state)?;
     let mut changes = json!(order);
-    let is_known = v.orders.limits.is_some() || v.orders.limits_in_force.is_some();
-    let is_empty = order == &LimitsOrder::default();
-    if let Some(members) = changes.as_object_mut().filter(|_| is_known || is_empty) {
+    if let Some(members) = changes.as_object_mut() {
         members.retain(|name, value| is_named(name, value));
     }
-    send(session, v, "limits", &changes).await
+    send(session, session.choose(&state)?, "limits", &changes).await
 }
 
 /// Orders the vehicle to hold, to abort, or to resume its survey.
@@ -221,4 +229,17 @@ fn limits_text(order: &LimitsOrder) -> String {
         line(name, reaction.clone());
     }
     if out.is_empty() { "  no limits\n".to_owned() } else { out }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_member_of_the_limits_has_a_name() {
+        let order = json!(LimitsOrder::default());
+        let members: Vec<&String> = order.as_object().unwrap().keys().collect();
+        assert_eq!(members.len(), LIMITS.len() - 1);
+        assert!(members.into_iter().all(|member| LIMITS.iter().any(|(_, of)| of == member)));
+    }
 }

@@ -11,7 +11,7 @@ mod text;
 
 pub use changes::{LogSelection, save_log, show_labels, show_log, show_status, watch};
 pub use constraints::{
-    FenceFile, clear_fence, clear_limits, give_again, restore_orders, send_constraints, set_fence, set_limits,
+    FenceFile, LIMITS, clear_fence, clear_limits, give_again, restore_orders, send_constraints, set_fence, set_limits,
     set_return_point, show_fence, show_limits, take_over,
 };
 pub use download::{cancel_exemplar, save_exemplar, save_map};

@@ -44,17 +44,20 @@ pub struct MapCells {
 /// What a file of a map says of itself.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct MapCaption {
-    /// The address and the name of the vehicle.
-    pub vehicle: (u8, String),
+    /// The address of the vehicle.
+    pub address: u8,
+    /// Its name, which may be empty.
+    pub name: String,
     /// The moment of the map in UTC, as in RFC 3339.
     pub utc: String,
 }
 
 impl MapCaption {
-    /// The same in words.
+    /// The same in words, on one line.
     pub(super) fn title(&self) -> String {
-        let (address, name) = &self.vehicle;
-        format!("scenecast map of {name} (vehicle {address}) at {}", self.utc)
+        let name = if self.name.is_empty() { String::new() } else { format!(" ({})", self.name) };
+        let title = format!("scenecast map of vehicle {}{name} at {}", self.address, self.utc);
+        title.replace(char::is_control, " ")
     }
 }
 

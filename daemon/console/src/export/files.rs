@@ -35,7 +35,7 @@ pub(super) fn world_file(cells: &MapCells) -> String {
 /// The `.aux.xml` file in which GDAL and QGIS look for the projection of a PNG.
 pub(super) fn projection(cells: &MapCells, origin: Option<Origin>) -> String {
     let text = well_known_text(origin).replace('"', "&quot;");
-    let facts = cells.caption.as_ref().map_or(String::new(), |MapCaption { vehicle: (address, name), utc }| {
+    let facts = cells.caption.as_ref().map_or(String::new(), |MapCaption { address, name, utc }| {
         let name = name.replace('&', "&amp;").replace('<', "&lt;");
         let item = |key: &str, value: &str| format!("    <MDI key=\"{key}\">{value}</MDI>\n");
         let items = [item("vehicle", &address.to_string()), item("vehicle_name", &name), item("utc", utc)].concat();
@@ -90,7 +90,7 @@ pub(super) fn geojson(cells: &MapCells, origin: Option<Origin>) -> String {
     }
     let mut facts = json!({ "map_version": cells.version, "mission_time_s": crate::snapshot::seconds(cells.at) });
     if let Some(caption) = &cells.caption {
-        (facts["vehicle"], facts["vehicle_name"]) = (caption.vehicle.0.into(), caption.vehicle.1.as_str().into());
+        (facts["vehicle"], facts["vehicle_name"]) = (caption.address.into(), caption.name.as_str().into());
         facts["utc"] = caption.utc.as_str().into();
     }
     if origin.is_none() {
@@ -143,7 +143,7 @@ pub(super) fn csv(cells: &MapCells, origin: Option<Origin>) -> String {
     let caption = cells
         .caption
         .as_ref()
-        .map(|MapCaption { vehicle: (address, name), utc }| format!(",{address},{},{utc}", quoted(Some(name))));
+        .map(|MapCaption { address, name, utc }| format!(",{address},{},{utc}", quoted(Some(name))));
     out.push_str(if caption.is_some() { ",vehicle,vehicle_name,utc" } else { "" });
     let projection = origin.map(TransverseMercator::about);
     out.push_str(if projection.is_some() { ",lat_deg,lon_deg" } else { "" });

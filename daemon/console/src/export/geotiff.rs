@@ -293,7 +293,9 @@ fn write(
     directory.write_tag(Tag::Compression, 8u16)?; // Adobe deflate
     directory.write_tag(Tag::PhotometricInterpretation, 3u16)?; // palette
     if let Some(caption) = caption {
-        let text = format!("{}, pixel value = label", caption.title());
+        // The field has ASCII.
+        let title = caption.title().replace(|c: char| !c.is_ascii(), "?");
+        let text = format!("{title}, pixel value = label");
         directory.write_tag(Tag::ImageDescription, text.as_str())?;
     }
     directory.write_tag(Tag::PlanarConfiguration, 1u16)?;

@@ -11,7 +11,7 @@ use std::time::{Duration, Instant};
 use subtle::ConstantTimeEq;
 use tokio::sync::oneshot;
 
-/// Sessions of a principal; a further login ends the oldest of the address with most of them, and never that of another principal.
+/// Sessions of a principal; a further login ends the oldest one of the address that has most of them.
 const MAX_SESSIONS: usize = 16;
 pub(super) const COOKIE: &str = "scenecast-session";
 /// Paths that the login form needs.

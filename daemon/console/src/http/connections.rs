@@ -1,9 +1,9 @@
 //! Connections, with bounds on their number, time and memory.
 
 use super::access::PeerAddress;
+use axum::Router;
 use axum::body::{Body, Bytes};
 use axum::http::header::CONTENT_TYPE;
-use axum::{Extension, Router};
 use http_body_util::BodyExt;
 use hyper::body::{Body as HttpBody, Frame, Incoming, SizeHint};
 use hyper::server::conn::http1;
@@ -57,22 +57,28 @@ pub(super) async fn serve(listener: TcpListener, router: Router) {
             }
         };
         let activity = connections.room(number).await;
-        let (all, router) = (connections.clone(), router.clone().layer(Extension(from)));
+        let (all, router) = (connections.clone(), router.clone());
         let task = tokio::spawn(async move {
             // An error here is the fault of the client.
-            let _ = serve_one(stream, router, activity).await;
+            let _ = serve_one(stream, from, router, activity).await;
             all.remove(number);
         });
         connections.add(number, task.abort_handle());
     }
 }
 
-async fn serve_one(stream: TcpStream, router: Router, activity: Arc<Activity>) -> Result<(), hyper::Error> {
+async fn serve_one(
+    stream: TcpStream,
+    from: PeerAddress,
+    router: Router,
+    activity: Arc<Activity>,
+) -> Result<(), hyper::Error> {
     let _ = stream.set_nodelay(true);
     let io = TimeoutStream::new(stream, activity.clone());
     let service = hyper::service::service_fn(move |request: hyper::Request<Incoming>| {
         let active = Arc::new(ActiveRequest::new(&activity));
-        let request = request.map(|body| Body::new(RequestBody::new(body, active.clone())));
+        let mut request = request.map(|body| Body::new(RequestBody::new(body, active.clone())));
+        request.extensions_mut().insert(from);
         let mut router = router.clone();
         async move {
             let response = router.call(request).await?;
@@ -329,7 +335,7 @@ mod tests {
     use super::*;
 
     #[tokio::test]
-    async fn a_new_connection_replaces_the_oldest_that_had_time_and_only_waits() {
+    async fn a_new_connection_replaces_the_oldest_one_that_only_waits() {
         let (connections, begin) = (Connections::default(), Instant::now());
         let open = |number: u64, now| {
             let activity = connections.take_room(number, now)?;

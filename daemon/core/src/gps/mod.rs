@@ -286,7 +286,7 @@ mod tests {
     }
 
     #[test]
-    fn of_two_receivers_of_a_daemon_one_is_followed_until_it_is_silent() {
+    fn one_of_two_receivers_is_followed_until_it_is_silent() {
         let mut gps = Gps::new(GpsLanguage::Gpsd);
         let mut say = |device: &str, second: u32| {
             let lat = if device == "/dev/a" { 29.5 } else { 29.500_04 };

@@ -63,9 +63,8 @@ const HEADING: Bounds = Bounds {
     has_zero: false,
 };
 
-/// East or north.
-const VELOCITY: Bounds = Bounds {
-    name: "velocity",
+const VELOCITY_EAST: Bounds = Bounds {
+    name: "velocity east",
     counter: "velocity_jumps",
     unit: "m/s",
     rate: 5.0,
@@ -75,6 +74,8 @@ const VELOCITY: Bounds = Bounds {
     turn: None,
     has_zero: false,
 };
+
+const VELOCITY_NORTH: Bounds = Bounds { name: "velocity north", ..VELOCITY_EAST };
 
 /// A value that was not used.
 #[derive(Debug, PartialEq)]
@@ -178,11 +179,12 @@ impl Plausible {
         self.depth.other.is_none().then_some(self.depth.zero)
     }
 
-    /// The velocity east and north, metres a second, as far as it can be, and the jump that was found.
-    pub fn check_velocity(&mut self, (east, north): (f64, f64), now: Instant) -> ((f64, f64), Option<Jump>) {
+    /// The velocity east and north, metres a second, as far as it can be, and the jumps that were found.
+    pub fn check_velocity(&mut self, (east, north): (f64, f64), now: Instant) -> ((f64, f64), Vec<Jump>) {
         let [of_east, of_north] = &mut self.velocity;
-        let (east, north) = (of_east.check(east, &VELOCITY, now), of_north.check(north, &VELOCITY, now));
-        ((east.0, north.0), east.1.or(north.1))
+        let (east, east_jump) = of_east.check(east, &VELOCITY_EAST, now);
+        let (north, north_jump) = of_north.check(north, &VELOCITY_NORTH, now);
+        ((east, north), [east_jump, north_jump].into_iter().flatten().collect())
     }
 
     /// The step with values that can be, and the jumps that were found.
@@ -200,6 +202,19 @@ impl Plausible {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_velocity_that_jumps_is_used_once_it_stays() {
+        let mut plausible = Plausible::default();
+        let mut check = |velocity, tenths| plausible.check_velocity(velocity, at(tenths));
+        assert_eq!(check((0.1, -0.2), 0).0, (0.1, -0.2));
+        let (velocity, jumps) = check((15.0, -9.0), 1);
+        assert!((velocity.0 - 0.1).hypot(velocity.1 + 0.2) < 1e-9 && jumps.len() == 2, "{velocity:?}");
+        assert!(jumps[1].note.as_ref().unwrap().starts_with("the velocity north jumps from -0.2 to -9.0 m/s"));
+        assert_eq!(check((0.2, -0.3), 2), ((0.2, -0.3), Vec::new()), "it was one false value");
+        let used: Vec<f64> = (3..20).map(|tenths| check((6.0, -0.3), tenths).0.0).collect();
+        assert!(used[..10].iter().all(|v| *v < 1.0) && used[10..].iter().all(|v| *v == 6.0), "{used:?}");
+    }
 
     fn at(tenths: u32) -> Instant {
         Instant::from_secs_f64(f64::from(tenths) / 10.0)

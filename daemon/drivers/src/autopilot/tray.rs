@@ -48,8 +48,8 @@ impl Tray {
 
     /// A measured velocity east and north, metres a second, or the last one before it jumped.
     pub(super) fn plausible_velocity(&mut self, measured: (f64, f64), now: Instant) -> (f64, f64) {
-        let (velocity, jump) = self.plausible.check_velocity(measured, now);
-        jump.into_iter().for_each(|jump| self.take_jump(jump));
+        let (velocity, jumps) = self.plausible.check_velocity(measured, now);
+        jumps.into_iter().for_each(|jump| self.take_jump(jump));
         velocity
     }
 

@@ -1,11 +1,10 @@
 //! The messages of an MCAP file, one after the other, with bounded memory. Chunks and single messages may be compressed. A chunk that is
 //! damaged is left out, and what follows is read.
 
-use mcap::read::ChunkReader;
-use mcap::records::{Channel, ChunkHeader, Record, SchemaHeader};
+use mcap::records::{Channel, Record, SchemaHeader, op};
 use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use scenecast_core::UserError;
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
@@ -34,8 +33,9 @@ pub(crate) struct BagStream {
     open: Option<(File, LinearReader)>,
     schemas: BTreeMap<u16, String>,
     channels: BTreeMap<u16, BagTopic>,
-    /// Messages of the chunk that was read last.
-    read: VecDeque<BagMessage>,
+    /// Messages of the chunk that was read last, as they are in the file.
+    read: VecDeque<(BagTopic, Vec<u8>)>,
+    other_encodings: BTreeSet<String>,
 }
 
 impl BagStream {
@@ -54,14 +54,15 @@ impl BagStream {
             }
         }
         let (schemas, channels) = (BTreeMap::new(), BTreeMap::new());
-        Ok(Self { rest: files.into_iter(), open: None, schemas, channels, read: VecDeque::new() })
+        let (read, other_encodings) = (VecDeque::new(), BTreeSet::new());
+        Ok(Self { rest: files.into_iter(), open: None, schemas, channels, read, other_encodings })
     }
 
     /// The next message of a topic that is `wanted`; `None` at the end. After an error what lies behind the damage follows.
     pub(crate) fn next(&mut self, wanted: impl Fn(&BagTopic) -> bool) -> Result<Option<BagMessage>, String> {
         loop {
-            if let Some(message) = self.read.pop_front() {
-                return Ok(Some(message));
+            if let Some((topic, bytes)) = self.read.pop_front() {
+                return Ok(Some(BagMessage { topic, bytes: unpacked(bytes)? }));
             }
             if self.open.is_none() {
                 let Some(path) = self.rest.next() else { return Ok(None) };
@@ -74,11 +75,8 @@ impl BagStream {
                 self.channels.clear();
             }
             match self.next_record() {
-                Ok(Some(Record::Chunk { header, data })) => self.handle_chunk(header, &data, &wanted)?,
-                Ok(Some(record)) => {
-                    let message = self.handle_record(record, &wanted)?;
-                    self.read.extend(message);
-                }
+                Ok(Some((op::CHUNK, chunk))) => self.handle_chunk(&chunk, &wanted)?,
+                Ok(Some((opcode, record))) => self.handle_record(opcode, &record, &wanted)?,
                 Ok(None) => self.open = None,
                 Err(error) => {
                     self.open = None;
@@ -88,77 +86,73 @@ impl BagStream {
         }
     }
 
-    /// The next chunk, or record outside of chunks, of the open file.
-    fn next_record(&mut self) -> Result<Option<Record<'static>>, String> {
+    /// The next chunk, or record outside of chunks, of the open file: its kind and its bytes.
+    fn next_record(&mut self) -> Result<Option<(u8, Vec<u8>)>, String> {
         let Some((file, reader)) = &mut self.open else { return Ok(None) };
-        while let Some(event) = reader.next_event() {
-            match event.map_err(|e| e.to_string())? {
-                LinearReadEvent::ReadRequest(length) => {
-                    let read = file.read(reader.insert(length)).map_err(|e| e.to_string())?;
-                    reader.notify_read(read);
-                }
-                LinearReadEvent::Record { data, opcode } => {
-                    return mcap::parse_record(opcode, data)
-                        .map(|record| Some(record.into_owned()))
-                        .map_err(|e| e.to_string());
-                }
-            }
-        }
-        Ok(None)
+        next_of(reader, file)
     }
 
     /// Takes the messages of a chunk, all or none.
-    fn handle_chunk(
-        &mut self,
-        header: ChunkHeader,
-        bytes: &[u8],
-        wanted: &impl Fn(&BagTopic) -> bool,
-    ) -> Result<(), String> {
+    fn handle_chunk(&mut self, chunk: &[u8], wanted: &impl Fn(&BagTopic) -> bool) -> Result<(), String> {
         let damaged = |error: String| format!("a chunk is damaged and left out: {error}");
-        if header.uncompressed_size > MAX_RECORD_BYTES as u64 {
-            return Err(damaged(format!("it has {} bytes, more than {MAX_RECORD_BYTES}", header.uncompressed_size)));
+        match mcap::parse_record(op::CHUNK, chunk) {
+            Ok(Record::Chunk { header, .. }) if header.uncompressed_size > MAX_RECORD_BYTES as u64 => {
+                let size = header.uncompressed_size;
+                return Err(damaged(format!("it has {size} bytes, more than {MAX_RECORD_BYTES}")));
+            }
+            Ok(_) => {}
+            Err(error) => return Err(damaged(error.to_string())),
         }
-        let mut messages = VecDeque::new();
-        for record in ChunkReader::new(header, bytes).map_err(|e| damaged(e.to_string()))? {
-            let message = self.handle_record(record.map_err(|e| damaged(e.to_string()))?, wanted)?;
-            messages.extend(message);
+        let head = [&[op::CHUNK][..], &(chunk.len() as u64).to_le_bytes()].concat();
+        let (mut reader, mut bytes) = (chunk_reader(), head.chain(chunk));
+        while let Some((opcode, record)) = next_of(&mut reader, &mut bytes).map_err(damaged)? {
+            self.handle_record(opcode, &record, wanted).map_err(damaged)?;
         }
-        self.read = messages;
         Ok(())
     }
 
-    /// Takes a record outside of chunks or of a chunk; returns a wanted message.
-    fn handle_record(
-        &mut self,
-        record: Record<'_>,
-        wanted: &impl Fn(&BagTopic) -> bool,
-    ) -> Result<Option<BagMessage>, String> {
-        match record {
+    /// Takes a record outside of chunks or of a chunk.
+    fn handle_record(&mut self, opcode: u8, bytes: &[u8], wanted: &impl Fn(&BagTopic) -> bool) -> Result<(), String> {
+        match mcap::parse_record(opcode, bytes).map_err(|e| e.to_string())? {
             Record::Schema { header: SchemaHeader { id, name, .. }, .. } => {
                 self.schemas.insert(id, name);
             }
             Record::Channel(Channel { id, schema_id, topic, message_encoding, .. }) => {
-                let kind = self.schemas.get(&schema_id).map_or("", String::as_str);
-                // A type that is never wanted, and that names the encoding.
-                let kind =
-                    if message_encoding == "cdr" { kind.to_owned() } else { format!("{kind} in {message_encoding}") };
-                self.channels.insert(id, BagTopic { name: topic, kind });
+                let kind = self.schemas.get(&schema_id).cloned().unwrap_or_default();
+                if message_encoding == "cdr" {
+                    self.channels.insert(id, BagTopic { name: topic, kind });
+                } else {
+                    self.channels.remove(&id);
+                    self.other_encodings.insert(message_encoding);
+                }
             }
             Record::Message { header, data } => {
-                if let Some(topic) = self.channels.get(&header.channel_id).filter(|topic| wanted(topic)) {
-                    let bytes = unpacked(data.into_owned())?;
-                    return Ok(Some(BagMessage { topic: topic.clone(), bytes }));
-                }
+                let topic = self.channels.get(&header.channel_id).filter(|topic| wanted(topic));
+                self.read.extend(topic.map(|topic| (topic.clone(), data.into_owned())));
             }
             _ => {}
         }
-        Ok(None)
+        Ok(())
     }
 
-    /// The encodings other than CDR of the topics so far.
-    pub(crate) fn other_encodings(&self) -> impl Iterator<Item = &str> {
-        self.channels.values().filter_map(|topic| Some(topic.kind.split_once(" in ")?.1))
+    /// The encodings other than CDR of topics so far.
+    pub(crate) fn other_encodings(&self) -> &BTreeSet<String> {
+        &self.other_encodings
     }
+}
+
+/// The next record of a reader that takes its bytes from a source: its kind and its bytes.
+fn next_of(reader: &mut LinearReader, source: &mut impl Read) -> Result<Option<(u8, Vec<u8>)>, String> {
+    while let Some(event) = reader.next_event() {
+        match event.map_err(|e| e.to_string())? {
+            LinearReadEvent::ReadRequest(length) => {
+                let read = source.read(reader.insert(length)).map_err(|e| e.to_string())?;
+                reader.notify_read(read);
+            }
+            LinearReadEvent::Record { data, opcode } => return Ok(Some((opcode, data.to_vec()))),
+        }
+    }
+    Ok(None)
 }
 
 /// A message as it was published: rosbag2 compresses each by itself with `compression_mode: message`. A message in CDR begins with a
@@ -211,6 +205,16 @@ fn reader() -> LinearReader {
     LinearReader::new_with_options(options)
 }
 
+/// Reads the records of a chunk once its sum is right.
+fn chunk_reader() -> LinearReader {
+    let options = LinearReaderOptions::default()
+        .with_skip_start_magic(true)
+        .with_skip_end_magic(true)
+        .with_prevalidate_chunk_crcs(true)
+        .with_record_length_limit(MAX_RECORD_BYTES);
+    LinearReader::new_with_options(options)
+}
+
 fn files_of(dir: &Path) -> Result<Vec<PathBuf>, UserError> {
     let entries = std::fs::read_dir(dir).map_err(|e| UserError::file(dir, e))?;
     let paths: Vec<PathBuf> = entries.filter_map(|entry| Some(entry.ok()?.path())).collect();
@@ -222,7 +226,11 @@ fn files_of(dir: &Path) -> Result<Vec<PathBuf>, UserError> {
         return Err(UserError::file(dir, other.map_or("the folder has no file *.mcap", |other| other.advice)));
     }
     // A recorder that broke down leaves its last file, or all others, uncompressed.
-    if let Some(packed) = paths.iter().find(|path| ends_in(path, "zstd") || ends_in(path, "zst")) {
+    let is_missing = |path: &&PathBuf| {
+        let whole = path.with_extension("");
+        (ends_in(path, "zstd") || ends_in(path, "zst")) && ends_in(&whole, "mcap") && !whole.exists()
+    };
+    if let Some(packed) = paths.iter().find(is_missing) {
         return Err(UserError::file(packed, "a part of the bag is compressed as a whole: zstd -d *.zstd unpacks it"));
     }
     // The files of a split bag end in _0, _1, ..., _10.
@@ -251,6 +259,20 @@ mod tests {
             assert!(refused(&file).contains(command) && refused(&dir).contains(command), "{name}: {}", refused(&file));
             std::fs::remove_file(file).unwrap();
         }
+        std::fs::remove_dir_all(dir).unwrap();
+    }
+
+    #[test]
+    fn a_bag_with_a_compressed_part_is_refused_until_it_is_unpacked() {
+        let dir = std::env::temp_dir().join(format!("scenecast-{}-part-of-a-bag", std::process::id()));
+        let _ = std::fs::remove_dir_all(&dir);
+        std::fs::create_dir_all(&dir).unwrap();
+        for name in ["bag_0.mcap", "bag_1.mcap.zstd", "notes.zst"] {
+            std::fs::write(dir.join(name), b"x").unwrap();
+        }
+        assert!(files_of(&dir).unwrap_err().to_string().contains("bag_1.mcap.zstd"));
+        std::fs::write(dir.join("bag_1.mcap"), b"x").unwrap();
+        assert_eq!(files_of(&dir).unwrap(), [dir.join("bag_0.mcap"), dir.join("bag_1.mcap")]);
         std::fs::remove_dir_all(dir).unwrap();
     }
 

@@ -191,7 +191,7 @@ impl Mission {
         let pose = Pose { x: x_m, y: y_m, z: -depth_m, yaw_rad: -heading_rad };
         let frame = Frame { image, pose, scale, view };
         let placed = self.mapper.register(&frame);
-        self.logbook.camera_advice = self.logbook.camera_advice.take().or(self.mapper.poll_camera_advice());
+        self.logbook.camera_advice = self.mapper.poll_camera_advice().or(self.logbook.camera_advice.take());
         self.vehicle.handle_registration(&placed, now);
         if let Some(found) = &placed.found {
             self.logbook.graph.add(&found.placed);

@@ -3,10 +3,11 @@
 use clap::Args;
 use scenecast_config::Config;
 use scenecast_core::{UserError, errln, outln};
+use scenecast_files::Recorder;
 use scenecast_rehearsal::{Mission, MissionOptions, World, report, write_outputs};
 use scenecast_tools::Progress;
 use serde_json::json;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 /// The sea floor and the configuration of a rehearsal.
@@ -98,12 +99,11 @@ impl Sim {
         if !self.drain.is_finite() || self.drain < 0.0 {
             return Err(UserError::Input(format!("--drain {} is not allowed; allowed: 0 s or more", self.drain)));
         }
-        let is_kept = |folder: &Path, file: &str| !self.force && folder.join(file).exists();
-        if is_kept(&self.out, "report.json") {
+        if !self.force && self.out.join("report.json").exists() {
             let what = "it has the results of another run: give a new folder, or replace them by --force";
             return Err(UserError::file(&self.out, what));
         }
-        if let Some(record) = self.record.as_ref().filter(|record| is_kept(record, "poses.csv")) {
+        if let Some(record) = self.record.as_ref().filter(|record| !self.force && Recorder::has_recording(record)) {
             let what = "it has another recording: give a new folder, or replace it by --force";
             return Err(UserError::file(record, what));
         }

@@ -31,7 +31,7 @@ struct Activity {
     was_in_band: bool,
 }
 
-/// Tells a vehicle that has left its fence from a position that has jumped out of it: one false fix must not end a survey.
+/// Tells a vehicle that has left its fence from a position that has jumped out of it. One that is back within two seconds is no breach.
 #[derive(Debug, Clone, Copy, Default)]
 struct FenceWatch {
     /// The last place inside, and when the vehicle was there.
@@ -57,8 +57,7 @@ impl FenceWatch {
             let reach_m = Self::MARGIN_M + 2.0 * speed_m_s * now.since(then).as_secs_f64();
             distance(from, at) > reach_m
         });
-        if is_jump && is_first {
-            let from = self.inside.map_or(at, |(from, _)| from);
+        if let Some((from, _)) = self.inside.filter(|_| is_jump && is_first) {
             tracing::warn!(
                 "the position jumps out of the fence, from ({:.1}, {:.1}) m to ({:.1}, {:.1}) m: a breach if it stays for {} s",
                 from.0,

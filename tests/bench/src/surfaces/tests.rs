@@ -58,7 +58,7 @@ fn a_hold_of_any_surface_is_applied_within_seconds() {
 }
 
 #[test]
-fn a_hold_that_was_given_before_the_other_surface_was_known_takes_over() {
+fn a_hold_from_before_the_other_surface_was_known_takes_over() {
     for access in ACCESSES {
         let mut waters = Waters::held_by_first(5, keyed(access));
         waters.hold(1);
@@ -79,6 +79,22 @@ fn a_hold_that_was_given_before_the_other_surface_was_known_takes_over() {
         waters.is_away = [false, false, true];
         run_s(&mut waters, 90);
         assert_eq!(waters.status(0, CONSTRAINTS), APPLIED, "a surface that was cut off: {access:?}");
+    }
+}
+
+#[test]
+fn a_hold_against_a_known_surface_is_obeyed_despite_its_orders() {
+    for access in ACCESSES {
+        let mut waters = Waters::held_by_first(7, keyed(access));
+        waters.give(0, Slot::Constraints(Constraints { hold: false, abort: false }));
+        run_s(&mut waters, 60);
+        assert_eq!(waters.status(0, CONSTRAINTS), APPLIED, "{access:?}");
+        waters.is_away = [false, false, true];
+        run_s(&mut waters, 60);
+        assert_eq!(waters.holder(1), Some(first_series(0)), "{access:?}");
+        waters.hold(1);
+        run_s(&mut waters, 40);
+        assert_eq!(waters.status(1, CONSTRAINTS), APPLIED, "{access:?}");
     }
 }
 

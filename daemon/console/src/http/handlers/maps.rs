@@ -193,7 +193,7 @@ pub(in crate::http) async fn file(
         let tree = vehicle.and_then(|v| v.label_tree.as_ref()).and_then(MapLabelTree::tree);
         let markers = vehicle.map(|v| v.markers.clone()).unwrap_or_default();
         let name = vehicle.map_or(String::new(), |v| v.name.clone());
-        let caption = MapCaption { vehicle: (id, name), utc: MissionUtc::now(&snapshot.state).at(seconds(at)) };
+        let caption = MapCaption { address: id, name, utc: MissionUtc::now(&snapshot.state).at(seconds(at)) };
         let placement = vehicle.and_then(|v| v.map.placement.clone());
         (snapshot.state.mission.origin, placement, names, tree, markers, Some(caption))
     };

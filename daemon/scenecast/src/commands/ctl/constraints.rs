@@ -1,7 +1,7 @@
 //! `scenecast ctl fence`, `return-point`, `limits`, `hold`, `resume`, `abort`
 
 use clap::{Args, Subcommand};
-use scenecast_console::client::{self, FenceFile, Session};
+use scenecast_console::client::{self, FenceFile, LIMITS, Session};
 use scenecast_console::orders::{ConstraintsAction, ConstraintsOrder};
 use scenecast_core::UserError;
 use scenecast_surface::LimitsOrder;
@@ -65,14 +65,10 @@ pub(super) enum LimitsCommand {
     #[command(after_help = "Example: scenecast ctl limits clear depth time --wait 120")]
     Clear {
         /// The limits and reactions to remove
-        #[arg(required = true, value_parser = LIMITS)]
+        #[arg(required = true, value_parser = LIMITS.map(|(name, _)| name))]
         names: Vec<String>,
     },
 }
-
-/// Limits and reactions; `all` stands for all of them.
-const LIMITS: [&str; 9] =
-    ["depth", "altitude", "distance", "time", "silence", "on-silence", "on-breach", "on-abort", "all"];
 
 #[derive(Debug, Args)]
 pub(super) struct Limits {

@@ -16,11 +16,9 @@ pub use strangers::{EndedRun, OtherSurface};
 pub(super) use turn::{Ready, room_for_slot};
 pub use view::PeerView;
 
-use crate::directive::{InForcePart, Series, Slot, SlotId, SlotOutbox, SlotProgress};
+use crate::directive::{InForcePart, Series, Slot, SlotId, SlotOutbox, SlotProgress, WaitingStop};
 use crate::link::handshake::FramePurpose;
-use crate::link::{
-    Authenticity, DropReason, FrameNumber, HOLDER_SILENCE, Inbound, LinkPair, LinkStats, Mismatch, SurfaceEvent,
-};
+use crate::link::{Authenticity, DropReason, FrameNumber, Inbound, LinkPair, LinkStats, Mismatch, SurfaceEvent};
 use crate::mac::{Access, Master, MasterConfig, ModemProfile};
 use crate::map::StateReplica;
 use crate::schedule::Class;
@@ -198,23 +196,18 @@ impl<R: StateReplica> VehiclePeer<R> {
 
     /// Gives a withdrawn order again; returns its version.
     pub(super) fn give_again(&mut self, id: SlotId, now: Instant) -> Option<u16> {
-        let version = self.outbox.give_again(id, now);
-        self.follow_given_again(&[id], now);
-        version
+        let slot = self.outbox.withdrawn(id)?;
+        Some(self.issue(slot, now))
     }
 
     /// Sends the orders that the vehicle has lost again; returns them.
     pub(super) fn restore_lost(&mut self, now: Instant) -> Vec<SlotId> {
         let restored = self.outbox.restore_lost(now);
-        self.follow_given_again(&restored, now);
-        restored
-    }
-
-    fn follow_given_again(&mut self, ids: &[SlotId], now: Instant) {
-        let given = |order: &&SlotProgress| ids.contains(&order.id) && order.status.is_pending();
-        let slots: Vec<Slot> = self.outbox.progress().filter(given).map(|order| order.slot.clone()).collect();
-        slots.iter().for_each(|slot| self.take_over_to_stop(slot, now));
+        let of_constraints = self.outbox.progress().find(|order| order.id == SlotId::Constraints);
+        let stop = of_constraints.filter(|order| restored.contains(&order.id)).map(|order| order.slot.clone());
+        stop.iter().for_each(|slot| self.take_over_to_stop(slot, now));
         self.follow_series();
+        restored
     }
 
     /// Withdraws an abort that has not arrived in time; returns whether there was one.
@@ -232,8 +225,14 @@ impl<R: StateReplica> VehiclePeer<R> {
         // A refusal ends this run, so that a copy of it has no effect on a later one.
         self.is_out_of_step = true;
         // Given before this surface knew of the other one.
-        if !self.pair.takes_over() && self.outbox.handle_refusal(HOLDER_SILENCE, now) {
-            self.take_over(now);
+        if !self.pair.takes_over() {
+            match self.outbox.handle_refusal(now) {
+                WaitingStop::None => {}
+                WaitingStop::TakesOver => self.take_over(now),
+                WaitingStop::Withdrawn => {
+                    events.push_back(SurfaceEvent::SlotDecided(self.address(), SlotId::Constraints));
+                }
+            }
         }
     }
 
