@@ -81,16 +81,20 @@ fn areas_of(whole: &Value, frame: CoordinateFrame) -> Result<Vec<AreaShape>, Str
 }
 
 fn areas_of_feature(feature: &Value, frame: CoordinateFrame) -> Result<Vec<AreaShape>, String> {
-    let geometry = &feature["geometry"];
     let weight = feature["properties"]["weight"].as_f64().ok_or("the property weight is not a number");
-    let coordinates = &geometry["coordinates"];
-    let polygons: Vec<&Value> = match geometry["type"].as_str() {
-        Some("Polygon") => vec![coordinates],
-        Some("MultiPolygon") => coordinates.as_array().ok_or("coordinates are missing")?.iter().collect(),
-        other => return Err(format!("geometry {}: expected a Polygon or a MultiPolygon", other.unwrap_or("null"))),
-    };
+    let polygons = polygons_of(&feature["geometry"], "a Polygon or a MultiPolygon")?;
     let area = |polygon: &Value| Ok(AreaShape { outline: outline(polygon, frame)?, weight: weight? });
     polygons.into_iter().map(area).collect()
+}
+
+/// The polygons of a geometry; another one is refused with what is `expected`.
+fn polygons_of<'a>(geometry: &'a Value, expected: &str) -> Result<Vec<&'a Value>, String> {
+    let coordinates = &geometry["coordinates"];
+    match geometry["type"].as_str() {
+        Some("Polygon") => Ok(vec![coordinates]),
+        Some("MultiPolygon") => Ok(coordinates.as_array().ok_or("coordinates are missing")?.iter().collect()),
+        other => Err(format!("geometry {}: expected {expected}", other.unwrap_or("null"))),
+    }
 }
 
 /// Whether a feature has no place: its geometry is null or has no coordinates.
@@ -165,23 +169,14 @@ fn add(order: &mut FenceShapes, feature: &Value, frame: CoordinateFrame) -> Resu
         return Ok(());
     }
     let role = role(feature)?;
-    let coordinates = &geometry["coordinates"];
-    let rings: Vec<&Value> = match geometry["type"].as_str() {
-        Some("Point") if matches!(role, None | Some(FeatureRole::ReturnPoint)) => {
-            let at = place(coordinates, frame)?;
-            return match order.return_point.replace(at) {
-                None => Ok(()),
-                Some(_) => Err("a second return point".to_owned()),
-            };
-        }
-        Some("Polygon") => vec![coordinates],
-        Some("MultiPolygon") => coordinates.as_array().ok_or("coordinates are missing")?.iter().collect(),
-        other => {
-            let other = other.unwrap_or("null");
-            return Err(format!("geometry {other}: expected a Polygon, or a Point for the return point"));
-        }
-    };
-    for polygon in rings {
+    if geometry["type"] == "Point" && matches!(role, None | Some(FeatureRole::ReturnPoint)) {
+        let at = place(&geometry["coordinates"], frame)?;
+        return match order.return_point.replace(at) {
+            None => Ok(()),
+            Some(_) => Err("a second return point".to_owned()),
+        };
+    }
+    for polygon in polygons_of(geometry, "a Polygon, or a Point for the return point")? {
         let outline = outline(polygon, frame)?;
         match role {
             Some(FeatureRole::KeepOut) => order.keep_outs.push(outline),

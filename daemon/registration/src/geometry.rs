@@ -50,36 +50,54 @@ pub struct CameraGeometry {
 }
 
 impl CameraGeometry {
+    fn wrong(&self) -> Wrong {
+        let is_half = self.turn_rad.abs() > std::f64::consts::PI - WRONG_TURN_RAD;
+        Wrong {
+            size: (self.size_ratio - 1.0).abs() > WRONG_SIZE,
+            turn: self.turn_rad.abs() > WRONG_TURN_RAD,
+            mirrored: self.is_mirrored == Some(true),
+            perhaps_mirrored: is_half && self.is_mirrored.is_none(),
+        }
+    }
+
     /// What people should change; `None` if images and odometry agree. `metres_per_pixel` is the configured size.
     #[must_use]
     pub fn advice(&self, metres_per_pixel: f64) -> Option<String> {
+        let wrong = self.wrong();
         let mut parts = Vec::new();
-        if (self.size_ratio - 1.0).abs() > WRONG_SIZE {
+        if wrong.size {
             let measured = metres_per_pixel / self.size_ratio;
             parts.push(format!(
                 "a pixel measures {measured:.5} m on the sea floor and not {metres_per_pixel} m: set camera.metres_per_pixel = {measured:.5}"
             ));
         }
-        if self.turn_rad.abs() > WRONG_TURN_RAD {
+        if wrong.turn {
             let degrees = self.turn_rad.to_degrees();
-            let is_half = self.turn_rad.abs() > std::f64::consts::PI - WRONG_TURN_RAD;
-            let or_mirrored = match self.is_mirrored {
-                None if is_half => {
-                    " (or they are mirrored from top to bottom, which shows only when the vehicle turns)"
-                }
-                _ => "",
+            let or_mirrored = match wrong.perhaps_mirrored {
+                true => " (or they are mirrored from top to bottom, which shows only when the vehicle turns)",
+                false => "",
             };
             parts.push(format!(
                 "the bow is {degrees:.0} degrees clockwise from the top of the images{or_mirrored}: set camera.mount_deg, or turn the \
                  images"
             ));
         }
-        if self.is_mirrored == Some(true) {
+        if wrong.mirrored {
             parts.push("the images are mirrored: mirror them in the camera or its driver".to_owned());
         }
         (!parts.is_empty())
             .then(|| format!("by its images and odometry the camera is not as configured: {}", parts.join("; ")))
     }
+}
+
+/// What is not as configured.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Wrong {
+    size: bool,
+    turn: bool,
+    mirrored: bool,
+    /// Half a turn may also be images that are mirrored from top to bottom.
+    perhaps_mirrored: bool,
 }
 
 /// A frame with which later ones are compared.
@@ -102,7 +120,7 @@ pub struct GeometryCheck {
     turns: f32,
     tried: usize,
     frames: u32,
-    told: Option<String>,
+    told: Option<Wrong>,
 }
 
 impl GeometryCheck {
@@ -123,13 +141,10 @@ impl GeometryCheck {
         if self.pairs.len() < PAIRS && !self.is_complete() {
             return None;
         }
-        let found = self.geometry()?.advice(metres_per_pixel)?;
-        // Without the figures, which change with each frame.
-        let subject = |text: &str| text.chars().filter(|c| c.is_alphabetic()).collect::<String>();
-        if self.told.as_deref().map(subject) == Some(subject(&found)) {
-            return None;
-        }
-        self.told.insert(found).clone().into()
+        let found = self.geometry()?;
+        let advice = found.advice(metres_per_pixel)?;
+        let is_new = self.told.replace(found.wrong()) != Some(found.wrong());
+        is_new.then_some(advice)
     }
 
     /// Takes the next frame of the track.

@@ -237,8 +237,7 @@ impl VehicleShell {
             FromPort::Open => self.host.handle_pilot_open(now),
             FromPort::Bytes(bytes) => _ = self.host.handle_pilot_bytes(&bytes, now),
             FromPort::Datagram(bytes, sender) => {
-                let outcome = self.host.handle_pilot_bytes(&bytes, now);
-                self.ports.pilot.judge(sender, outcome);
+                self.ports.pilot.judge(sender, self.host.handle_pilot_bytes(&bytes, now));
             }
             FromPort::Closed => {}
         }

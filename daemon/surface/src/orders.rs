@@ -8,20 +8,23 @@ use scenecast_protocol::directive::{
 use schemars::JsonSchema;
 use serde::{Deserialize, Deserializer, Serialize};
 
+/// The largest coordinate of a place, metres, of either sign.
+const MAX_M: f64 = DecimetrePoint::MAX_DM as f64 / 10.0;
+
 /// A fence as it is typed: vertices in metres east and north of the origin.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[schemars(extend("minProperties" = 1))]
 pub struct FenceOrder {
     /// The vehicle stays inside; null: no fence.
-    #[schemars(length(min = 3, max = 34), inner(inner(range(min = -838_860.7, max = 838_860.7))))]
+    #[schemars(length(min = 3, max = 34), inner(inner(range(min = -MAX_M, max = MAX_M))))]
     pub fence: Option<Vec<[f64; 2]>>,
     /// The vehicle stays outside each of these outlines; null: of none.
     #[serde(default, deserialize_with = "listed")]
-    #[schemars(with = "Option<Vec<Vec<[f64; 2]>>>", length(max = 15), inner(length(min = 3, max = 34), inner(inner(range(min = -838_860.7, max = 838_860.7)))))]
+    #[schemars(with = "Option<Vec<Vec<[f64; 2]>>>", length(max = 15), inner(length(min = 3, max = 34), inner(inner(range(min = -MAX_M, max = MAX_M)))))]
     pub keep_outs: Vec<Vec<[f64; 2]>>,
     /// The end of the return path; null: the start of the vehicle's run.
-    #[schemars(inner(range(min = -838_860.7, max = 838_860.7)))]
+    #[schemars(inner(range(min = -MAX_M, max = MAX_M)))]
     pub return_point: Option<[f64; 2]>,
 }
 
@@ -74,7 +77,7 @@ pub struct AreasOrder {
 #[serde(deny_unknown_fields)]
 pub struct AreaOrder {
     /// Vertices in metres east and north of the origin.
-    #[schemars(length(min = 3, max = 34), inner(inner(range(min = -838_860.7, max = 838_860.7))))]
+    #[schemars(length(min = 3, max = 34), inner(inner(range(min = -MAX_M, max = MAX_M))))]
     pub outline: Vec<[f64; 2]>,
     /// Added to the weights of labels and of unexplored cells inside.
     #[schemars(range(min = -1.0, max = 1.0))]
@@ -88,7 +91,7 @@ pub struct DestinationOrder {
     /// Metres east and north of the origin; null withdraws the destination.
     // An absent place must not withdraw it.
     #[serde(deserialize_with = "Option::deserialize")]
-    #[schemars(required, inner(range(min = -838_860.7, max = 838_860.7)))]
+    #[schemars(required, inner(range(min = -MAX_M, max = MAX_M)))]
     pub place: Option<[f64; 2]>,
 }
 

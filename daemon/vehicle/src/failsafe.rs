@@ -1,8 +1,10 @@
 //! The conditions under which the vehicle leaves its survey: by an order, or by itself.
 
+use crate::planning::{Point, distance};
 use scenecast_protocol::directive::{Constraints, Limits, Reaction};
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::ModeReason;
+use std::time::Duration;
 
 /// The configured policy, which applies where the operator's limits have no value.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -35,6 +37,46 @@ impl Default for FailsafePolicy {
 /// The reaction that takes the place of the survey, and its reason.
 pub type Stop = (Reaction, ModeReason);
 
+/// Tells a vehicle that has left its fence from a position that has jumped out of it. One that is back within two seconds is no breach.
+#[derive(Debug, Clone, Copy, Default)]
+struct FenceWatch {
+    /// The last place inside, and when the vehicle was there.
+    inside: Option<(Point, Instant)>,
+    outside_since: Option<Instant>,
+}
+
+impl FenceWatch {
+    /// A position that stays outside for this time is right, however it came there.
+    const PERSISTS: Duration = Duration::from_secs(2);
+    /// A step of the position that is no jump, metres.
+    const MARGIN_M: f64 = 0.5;
+
+    /// Whether a position outside is a breach, because the vehicle could have travelled there or because it stays.
+    fn is_breach(&mut self, at: Point, is_inside: bool, speed_m_s: f64, now: Instant) -> bool {
+        if is_inside {
+            *self = Self { inside: Some((at, now)), outside_since: None };
+            return false;
+        }
+        let is_first = self.outside_since.is_none();
+        let since = *self.outside_since.get_or_insert(now);
+        let is_jump = self.inside.is_none_or(|(from, then)| {
+            let reach_m = Self::MARGIN_M + 2.0 * speed_m_s * now.since(then).as_secs_f64();
+            distance(from, at) > reach_m
+        });
+        if let Some((from, _)) = self.inside.filter(|_| is_jump && is_first) {
+            tracing::warn!(
+                "the position jumps out of the fence, from ({:.1}, {:.1}) m to ({:.1}, {:.1}) m: a breach if it stays for {} s",
+                from.0,
+                from.1,
+                at.0,
+                at.1,
+                Self::PERSISTS.as_secs()
+            );
+        }
+        !is_jump || now.since(since) >= Self::PERSISTS
+    }
+}
+
 /// Watches limits, silence and breaches.
 #[derive(Debug)]
 pub struct Failsafe {
@@ -47,8 +89,8 @@ pub struct Failsafe {
     /// A breach until the operator's next order or fence, or a silence after which the vehicle has surfaced.
     pub latched: ModeReason,
     last_received: Instant,
-    /// The time of the last step.
-    pub now: Instant,
+    now: Instant,
+    fence: FenceWatch,
 }
 
 /// The share of the limits that is kept in reserve for errors of the estimate.
@@ -58,7 +100,17 @@ impl Failsafe {
     /// Starts at `now`, as if a frame of the surface had been received then.
     pub fn new(policy: FailsafePolicy, now: Instant) -> Self {
         let (limits, order, latched) = (Limits::default(), Constraints::default(), ModeReason::Survey);
-        Self { policy, limits, order, used_m: 0.0, used_s: 0.0, latched, last_received: now, now }
+        Self {
+            policy,
+            limits,
+            order,
+            used_m: 0.0,
+            used_s: 0.0,
+            latched,
+            last_received: now,
+            now,
+            fence: FenceWatch::default(),
+        }
     }
 
     pub fn handle_time(&mut self, now: Instant) {
@@ -78,6 +130,13 @@ impl Failsafe {
     /// The link received a frame of the surface.
     pub fn handle_received(&mut self, at: Instant) {
         self.last_received = self.last_received.max(at);
+    }
+
+    /// The vehicle is at a place, in metres east and north in the world frame, inside its fence or outside.
+    pub fn handle_position(&mut self, at: Point, is_inside: bool) {
+        if self.fence.is_breach(at, is_inside, self.policy.speed_m_s, self.now) {
+            self.handle_breach(ModeReason::Fence);
+        }
     }
 
     /// The vehicle is outside its fence or depth band.

@@ -277,20 +277,17 @@ impl SlotOutbox {
     /// The newest order of a slot in force is another surface's. One of ours that the vehicle has not decided about was given
     /// before this surface knew that. Returns whether it is withdrawn.
     fn handle_overtaken(&mut self, id: SlotId, now: Instant) -> bool {
+        // A stop that the operator has just given although he knew of the other surface is obeyed.
+        let is_obeyed = |order: &SlotProgress| order.id == id && order.slot.stops() && self.is_prompt(order, now);
+        let is_given_against = self.refused.is_some() && self.progress().any(is_obeyed);
         let Some(is_known) = self.is_overtaken.get_mut(id.index()) else { return false };
         let is_known = std::mem::replace(is_known, true);
-        let refused = self.refused;
-        // A stop that the operator has just given although he knew of the other surface is obeyed.
-        let is_given_against = |order: &SlotProgress| {
-            let is_prompt = now.since(order.issued) < Self::PROMPT;
-            order.slot.stops() && is_prompt && refused.is_some_and(|at| order.issued > at)
-        };
         let Some(order) = self.slots.get_mut(id.index()).and_then(Option::as_mut).filter(|_| self.is_keyed) else {
             return false;
         };
         let withdrawal = match order.status {
             OrderStatus::Applied => Withdrawal::Superseded,
-            status if status.is_pending() && !is_known && !is_given_against(order) => Withdrawal::Overtaken,
+            status if status.is_pending() && !is_known && !is_given_against => Withdrawal::Overtaken,
             _ => return false,
         };
         (order.status, order.changed) = (OrderStatus::Withdrawn(withdrawal), now);
@@ -300,14 +297,12 @@ impl SlotOutbox {
     /// Whether an order may go out. A hold or an abort that another surface's order may have overtaken waits for the first
     /// report of a run; the vehicle itself sorts out the other orders, and obeys these at once.
     fn may_go(&self, order: &SlotProgress, now: Instant) -> bool {
-        let stops = order.slot.stops();
-        let is_prompt = now.since(order.issued) < Self::PROMPT && self.is_after_refusal(order);
-        !self.is_keyed || !stops || self.has_report || is_prompt
+        !self.is_keyed || !order.slot.stops() || self.has_report || self.is_prompt(order, now)
     }
 
-    /// Whether the operator gave an order when he could know of the other surface that holds the vehicle.
-    fn is_after_refusal(&self, order: &SlotProgress) -> bool {
-        self.refused.is_none_or(|at| order.issued > at)
+    /// Whether the operator has just given an order, and could know of another surface that holds the vehicle.
+    fn is_prompt(&self, order: &SlotProgress, now: Instant) -> bool {
+        now.since(order.issued) < Self::PROMPT && self.refused.is_none_or(|at| order.issued > at)
     }
 
     /// The vehicle has refused this surface for another one.

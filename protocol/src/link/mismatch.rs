@@ -1,6 +1,6 @@
 //! Settings of the other end that do not fit.
 
-use crate::wire::{Introduction, SessionId, UtcHours, WIRE_VERSION};
+use crate::wire::{Introduction, SessionId, WIRE_VERSION};
 use std::collections::BTreeSet;
 
 /// A setting of the other end that does not fit, so that its frames are refused, wasteful or those of two. It is found in a frame
@@ -128,23 +128,15 @@ impl MismatchReport {
             (false, true) => Some(Mismatch::Encryption("this end encrypts and it does not")),
             _ => None,
         };
-        for (found, known) in [(length, &mut self.length), (encryption, &mut self.encryption)] {
+        let hours = peer.clock.zip(own.clock).map_or(0, |(clock, own)| clock.apart(own));
+        let clock = (hours > 24).then_some(Mismatch::Clock(hours / 24));
+        let known = [&mut self.length, &mut self.encryption, &mut self.clock];
+        for (found, known) in [length, encryption, clock].into_iter().zip(known) {
             if found.is_some() && known.is_none() {
                 self.found = found;
             }
             *known = found;
         }
-        self.note_clock(peer.clock, own.clock);
-    }
-
-    /// A hello that has verified has this clock, and this end has `own`.
-    fn note_clock(&mut self, clock: Option<UtcHours>, own: Option<UtcHours>) {
-        let hours = clock.zip(own).map_or(0, |(clock, own)| clock.apart(own));
-        let found = (hours > 24).then_some(Mismatch::Clock(hours / 24));
-        if found.is_some() && self.clock.is_none() {
-            self.found = found;
-        }
-        self.clock = found;
     }
 
     pub(super) fn handle_accepted(&mut self) {

@@ -51,16 +51,21 @@ pub async fn set_fence(session: &Session, file: FenceFile<'_>) -> Result<(), Use
         let line = "it has no fence, and an order replaces the present one; --without-fence removes it on purpose";
         return Err(UserError::file(file.path, line));
     }
-    let mut changes = json!(order);
-    if let Some(members) = changes.as_object_mut() {
-        let stays = |name: &str| match name {
-            "keep_outs" => order.keep_outs.is_empty() && !file.without_keep_outs,
-            "return_point" => order.return_point.is_none(),
-            _ => false,
-        };
-        members.retain(|name, _| !stays(name));
+    let is_named = |name: &str, _: &Value| match name {
+        "keep_outs" => !order.keep_outs.is_empty() || file.without_keep_outs,
+        "return_point" => order.return_point.is_some(),
+        _ => true,
+    };
+    send(session, v, "fence", &named(&order, is_named)).await
+}
+
+/// The members of an order that are to be named.
+fn named(order: &impl Serialize, is_named: impl Fn(&str, &Value) -> bool) -> Value {
+    let mut members = json!(order);
+    if let Some(members) = members.as_object_mut() {
+        members.retain(|name, value| is_named(name, value));
     }
-    send(session, v, "fence", &changes).await
+    members
 }
 
 /// Removes the fence, the keep-outs and the return point.
@@ -87,7 +92,8 @@ pub async fn show_limits(session: &Session) -> Result<(), UserError> {
 /// Sends limits. Those that are not given stay.
 pub async fn set_limits(session: &Session, given: &LimitsOrder) -> Result<(), UserError> {
     given.read().map_err(UserError::Input)?;
-    change_limits(session, |_, value| !value.is_null(), given).await
+    let state = session.state().await?;
+    send(session, session.choose(&state)?, "limits", &named(given, |_, value| !value.is_null())).await
 }
 
 /// The names of limits and reactions for people, and the members of their order. `all` stands for all of them.
@@ -109,21 +115,9 @@ pub async fn clear_limits(session: &Session, names: &[String]) -> Result<(), Use
         let is_it = |(name, of): &(&str, &str)| names.iter().any(|n| n == name) && (*of == member || *name == "all");
         LIMITS.iter().any(is_it)
     };
-    change_limits(session, |member, _| is_named(member), &LimitsOrder::default()).await
-}
-
-/// Sends the members of an order that are to be named.
-async fn change_limits(
-    session: &Session,
-    is_named: impl Fn(&str, &Value) -> bool,
-    order: &LimitsOrder,
-) -> Result<(), UserError> {
     let state = session.state().await?;
-    let mut changes = json!(order);
-    if let Some(members) = changes.as_object_mut() {
-        members.retain(|name, value| is_named(name, value));
-    }
-    send(session, session.choose(&state)?, "limits", &changes).await
+    let removed = named(&LimitsOrder::default(), |member, _| is_named(member));
+    send(session, session.choose(&state)?, "limits", &removed).await
 }
 
 /// Orders the vehicle to hold, to abort, or to resume its survey.

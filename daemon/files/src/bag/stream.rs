@@ -89,7 +89,7 @@ impl BagStream {
     /// The next chunk, or record outside of chunks, of the open file: its kind and its bytes.
     fn next_record(&mut self) -> Result<Option<(u8, Vec<u8>)>, String> {
         let Some((file, reader)) = &mut self.open else { return Ok(None) };
-        next_of(reader, file)
+        next_of(reader, file, |opcode, record| (opcode, record.to_vec()))
     }
 
     /// Takes the messages of a chunk, all or none.
@@ -105,8 +105,9 @@ impl BagStream {
         }
         let head = [&[op::CHUNK][..], &(chunk.len() as u64).to_le_bytes()].concat();
         let (mut reader, mut bytes) = (chunk_reader(), head.chain(chunk));
-        while let Some((opcode, record)) = next_of(&mut reader, &mut bytes).map_err(damaged)? {
-            self.handle_record(opcode, &record, wanted).map_err(damaged)?;
+        let mut take = |opcode, record: &[u8]| self.handle_record(opcode, record, wanted);
+        while let Some(taken) = next_of(&mut reader, &mut bytes, &mut take).map_err(damaged)? {
+            taken.map_err(damaged)?;
         }
         Ok(())
     }
@@ -141,15 +142,19 @@ impl BagStream {
     }
 }
 
-/// The next record of a reader that takes its bytes from a source: its kind and its bytes.
-fn next_of(reader: &mut LinearReader, source: &mut impl Read) -> Result<Option<(u8, Vec<u8>)>, String> {
+/// What `take` makes of the kind and the bytes of the next record of a reader, which takes its bytes from a source.
+fn next_of<T>(
+    reader: &mut LinearReader,
+    source: &mut impl Read,
+    take: impl FnOnce(u8, &[u8]) -> T,
+) -> Result<Option<T>, String> {
     while let Some(event) = reader.next_event() {
         match event.map_err(|e| e.to_string())? {
             LinearReadEvent::ReadRequest(length) => {
                 let read = source.read(reader.insert(length)).map_err(|e| e.to_string())?;
                 reader.notify_read(read);
             }
-            LinearReadEvent::Record { data, opcode } => return Ok(Some((opcode, data.to_vec()))),
+            LinearReadEvent::Record { data, opcode } => return Ok(Some(take(opcode, data))),
         }
     }
     Ok(None)

@@ -68,15 +68,17 @@ impl Port {
     /// for this time is opened again: an unplugged adapter or a half-open connection may never report an error. Of
     /// datagrams, those of the first sender are taken until it is silent.
     pub fn open_when_there(name: &'static str, place: PortAddress, quiet: Option<Duration>) -> Self {
-        let (port, ends) = Self::pair();
-        tokio::spawn(PortKeeper { name, place, quiet, rule: PeerRule::First, ends }.run(None));
-        port
+        Self::kept(name, place, quiet, PeerRule::First)
     }
 
     /// The same for a port whose owner gives [`Self::judge`] the result of each datagram.
     pub fn open_judged_when_there(name: &'static str, place: PortAddress) -> Self {
+        Self::kept(name, place, None, PeerRule::Judged)
+    }
+
+    fn kept(name: &'static str, place: PortAddress, quiet: Option<Duration>, rule: PeerRule) -> Self {
         let (port, ends) = Self::pair();
-        tokio::spawn(PortKeeper { name, place, quiet: None, rule: PeerRule::Judged, ends }.run(None));
+        tokio::spawn(PortKeeper { name, place, quiet, rule, ends }.run(None));
         port
     }
 

@@ -10,7 +10,6 @@ use scenecast_protocol::directive::{Areas, Constraints, Fence, Limits, Reaction,
 use scenecast_protocol::map::{Cell, LabelGrid};
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::{Intent, ModeReason, PlannedPath, VehicleMode};
-use std::time::Duration;
 
 /// The last request to the host.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -31,46 +30,6 @@ struct Activity {
     was_in_band: bool,
 }
 
-/// Tells a vehicle that has left its fence from a position that has jumped out of it. One that is back within two seconds is no breach.
-#[derive(Debug, Clone, Copy, Default)]
-struct FenceWatch {
-    /// The last place inside, and when the vehicle was there.
-    inside: Option<(Point, Instant)>,
-    outside_since: Option<Instant>,
-}
-
-impl FenceWatch {
-    /// A position that stays outside for this time is right, however it came there.
-    const PERSISTS: Duration = Duration::from_secs(2);
-    /// A step of the position that is no jump, metres.
-    const MARGIN_M: f64 = 0.5;
-
-    /// Whether a position outside is a breach, because the vehicle could have travelled there or because it stays.
-    fn is_breach(&mut self, at: Point, is_inside: bool, speed_m_s: f64, now: Instant) -> bool {
-        if is_inside {
-            *self = Self { inside: Some((at, now)), outside_since: None };
-            return false;
-        }
-        let is_first = self.outside_since.is_none();
-        let since = *self.outside_since.get_or_insert(now);
-        let is_jump = self.inside.is_none_or(|(from, then)| {
-            let reach_m = Self::MARGIN_M + 2.0 * speed_m_s * now.since(then).as_secs_f64();
-            distance(from, at) > reach_m
-        });
-        if let Some((from, _)) = self.inside.filter(|_| is_jump && is_first) {
-            tracing::warn!(
-                "the position jumps out of the fence, from ({:.1}, {:.1}) m to ({:.1}, {:.1}) m: a breach if it stays for {} s",
-                from.0,
-                from.1,
-                at.0,
-                at.1,
-                Self::PERSISTS.as_secs()
-            );
-        }
-        !is_jump || now.since(since) >= Self::PERSISTS
-    }
-}
-
 /// The facts by which a waypoint is chosen.
 pub(super) struct Situation<'a> {
     pub(super) navigator: &'a Navigator,
@@ -86,7 +45,6 @@ pub(super) struct Situation<'a> {
 pub(super) struct Guidance {
     steering: Steering,
     failsafe: Failsafe,
-    fence_watch: FenceWatch,
     activity: Activity,
     waypoint: Option<MapPoint>,
     /// The plan after the waypoint.
@@ -104,8 +62,7 @@ impl Guidance {
         now: Instant,
     ) -> Self {
         let (failsafe, activity, path) = (Failsafe::new(policy, now), Activity::default(), PlannedPath::default());
-        let fence_watch = FenceWatch::default();
-        let mut guidance = Self { steering, failsafe, fence_watch, activity, waypoint: None, path, is_finished: false };
+        let mut guidance = Self { steering, failsafe, activity, waypoint: None, path, is_finished: false };
         let failsafe = &mut guidance.failsafe;
         failsafe.order = Constraints { hold: durable.hold, abort: durable.abort };
         if let Some(limits) = Limits::from_bytes(&durable.limits) {
@@ -292,10 +249,7 @@ impl Guidance {
     }
 
     fn watch(&mut self, at: Point, depth_m: f64) {
-        let is_inside = self.steering.bounds().holds(at);
-        if self.fence_watch.is_breach(at, is_inside, self.failsafe.speed_m_s(), self.failsafe.now) {
-            self.failsafe.handle_breach(ModeReason::Fence);
-        }
+        self.failsafe.handle_position(at, self.steering.bounds().holds(at));
         let is_broken = self.failsafe.is_band_broken(depth_m);
         if is_broken && self.activity.was_in_band && self.activity.motion != Motion::Rising {
             self.failsafe.handle_breach(ModeReason::Band);

@@ -4,6 +4,9 @@
 //! and a quarter more time for a clean build. It would also reject messages whose enumerations are newer than the
 //! dialect. The layouts are from `common.xml` of MAVLink; the tests compare them with bytes that pymavlink wrote.
 
+/// The number of HEARTBEAT.
+pub const HEARTBEAT: u32 = 0;
+
 /// A message that is read.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Heard {
@@ -93,7 +96,7 @@ pub enum Said {
 /// The byte that stands for the layout of a message that is read.
 pub fn heard_extra(id: u32) -> Option<u8> {
     Some(match id {
-        0 => 50,
+        HEARTBEAT => 50,
         30 => 39,
         32 => 185,
         33 => 104,
@@ -151,7 +154,7 @@ impl Heard {
     pub fn read(id: u32, payload: &[u8]) -> Option<Self> {
         let mut f = Fields(payload);
         let read = match id {
-            0 => Self::Heartbeat { custom_mode: f.u32(), kind: f.u8(), autopilot: f.u8(), base_mode: f.u8() },
+            HEARTBEAT => Self::Heartbeat { custom_mode: f.u32(), kind: f.u8(), autopilot: f.u8(), base_mode: f.u8() },
             30 => Self::Attitude { time_boot_ms: f.u32(), roll: f.f32(), pitch: f.f32(), yaw: f.f32() },
             32 => Self::Local {
                 time_boot_ms: f.u32(),

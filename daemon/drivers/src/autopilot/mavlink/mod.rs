@@ -88,8 +88,6 @@ pub struct Mavlink {
     tray: Tray,
     was_silent: bool,
     is_position_lost: bool,
-    /// Whether the last bytes had a heartbeat of the autopilot.
-    is_heard: bool,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -153,7 +151,6 @@ impl Mavlink {
             tray: Tray::default(),
             was_silent: false,
             is_position_lost: false,
-            is_heard: false,
         }
     }
 
@@ -249,7 +246,6 @@ impl Mavlink {
     }
 
     fn handle_heartbeat(&mut self, component: u8, custom_mode: u32, kind: u8, base_mode: u8, now: Instant) {
-        self.is_heard = true;
         // GUIDED is 4 of ArduSub and ArduCopter, 15 of ArduRover, which drives boats too.
         let guided_mode = if matches!(kind, 10 | 11) { 15 } else { 4 };
         let peer = Peer { component, guided_mode, custom_mode, is_armed: base_mode & 128 != 0, heard: now };
@@ -414,9 +410,12 @@ impl Autopilot for Mavlink {
     fn handle_bytes(&mut self, bytes: &[u8], now: Instant) -> bool {
         let mut frames = Vec::new();
         self.deframer.push(bytes, heard_extra, |frame| frames.push(frame));
-        self.is_heard = false;
         frames.iter().for_each(|frame| self.handle_frame(frame, now));
-        self.is_heard
+        let is_heard = |peer: Peer| {
+            let is_its = |frame: &Frame| frame.system == self.config.system && frame.component == peer.component;
+            peer.heard == now && frames.iter().any(|frame| frame.id == message::HEARTBEAT && is_its(frame))
+        };
+        self.peer.is_some_and(is_heard)
     }
 
     fn handle_timeout(&mut self, now: Instant) {
