@@ -172,6 +172,18 @@ pub fn fence_of(
 
 /// The outline with these corners, which is not checked yet.
 pub fn outline_of(what: &str, corners: &[[f64; 2]]) -> Result<Polygon, String> {
+    const LEAST_M: f64 = 1.0;
+    let extent = |axis: fn(&[f64; 2]) -> f64| {
+        let (low, high) =
+            corners.iter().map(axis).fold((f64::INFINITY, -f64::INFINITY), |(l, h), v| (l.min(v), h.max(v)));
+        high - low
+    };
+    // Latitudes and longitudes of an outline of 100 km lie within a degree of each other.
+    if corners.len() > 2 && extent(|c| c[0]) < LEAST_M && extent(|c| c[1]) < LEAST_M {
+        return Err(format!(
+            "{what}: it is smaller than a metre; it takes metres east and north of the origin, not degrees"
+        ));
+    }
     corners.iter().map(|&corner| place_of(what, corner)).collect::<Result<_, _>>().map(Polygon)
 }
 

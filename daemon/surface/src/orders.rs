@@ -243,6 +243,11 @@ mod tests {
         assert_eq!(refused(r#"{"fence": []}"#), "fence: 0 vertices: it takes 3 to 34");
         assert_eq!(refused(r#"{"fence": [[0,0],[9,9],[9,0],[0,9]]}"#), "fence: edge 1 crosses or touches edge 3");
         assert_eq!(refused(r#"{"fence": [[0,0],[1,1],[2,2]]}"#), "fence: it has no area");
+        let degrees = refused(r#"{"fence": [[-4.15,50.34],[-4.13,50.34],[-4.13,50.36]]}"#);
+        assert_eq!(
+            degrees,
+            "fence: it is smaller than a metre; it takes metres east and north of the origin, not degrees"
+        );
         assert_eq!(
             refused(r#"{"fence": [[0,0],[9,0],[9,9]], "return_point": [0, 9]}"#),
             "return_point lies outside the fence"

@@ -113,12 +113,16 @@ fn selected_layers(config: &Config) -> LayerMask {
 fn layers(config: &Config, codec: Codec) -> impl Iterator<Item = LayerSource> {
     let map = &config.map;
     let debounce = debounce(config).of_layers();
-    BUILT_IN_LAYERS.iter().zip(LayerName::all()).map(move |(layer, name)| {
-        let built_in = match layer.id {
-            LayerId::DEPTH => LayerDescriptor::depth_around(config.survey.depth_m, map.depth_step_m),
-            _ => layer.descriptor.clone(),
-        };
+    descriptors(config).zip(LayerName::all()).map(move |((id, built_in), name)| {
         let share = map.layer_shares.get(&name).copied().unwrap_or(0);
-        LayerSource::new(layer.id, LayerDescriptor { share, ..built_in }, codec, debounce)
+        LayerSource::new(id, LayerDescriptor { share, ..built_in }, codec, debounce)
+    })
+}
+
+/// The scales of the built-in layers on this vehicle.
+pub(super) fn descriptors(config: &Config) -> impl Iterator<Item = (LayerId, LayerDescriptor)> {
+    BUILT_IN_LAYERS.iter().map(|layer| match layer.id {
+        LayerId::DEPTH => (layer.id, LayerDescriptor::depth_around(config.survey.depth_m, config.map.depth_step_m)),
+        _ => (layer.id, layer.descriptor.clone()),
     })
 }

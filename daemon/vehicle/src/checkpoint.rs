@@ -1,5 +1,6 @@
 //! The checkpoint of a mapper: the scene model, its labels, its vocabulary and its exemplars as bytes.
 
+use super::levels::HeldLevels;
 use super::mapper::{Mapper, label_by};
 use super::relief::Relief;
 use scene_model::envelope::{Envelope, EnvelopeError};
@@ -15,7 +16,7 @@ use scenecast_registration::Registrar;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-const ENVELOPE: Envelope = Envelope { magic: *b"SCNMAPPR", version: 1 };
+const ENVELOPE: Envelope = Envelope { magic: *b"SCNMAPPR", version: 2 };
 
 /// The reason why a checkpoint cannot be restored.
 #[derive(Debug, thiserror::Error)]
@@ -47,7 +48,7 @@ struct CheckpointContent<M, B, W, E, R> {
 }
 
 /// The content after [`CheckpointContent`]: the last sight of each cell, the light, the registration, the discriminant, the
-/// inference under way, and the habitats.
+/// inference under way, the habitats, and the levels of the layers.
 type AddedContent<'a> = (
     BTreeMap<(i32, i32), f64>,
     Option<FlatField>,
@@ -55,6 +56,7 @@ type AddedContent<'a> = (
     Option<Discriminant>,
     OnlineInference,
     Option<Habitats>,
+    HeldLevels,
 );
 
 /// A mapper that continues from a checkpoint, and the mission that it belongs to.
@@ -77,8 +79,8 @@ impl Mapper {
         };
         let registration = self.registrar.as_ref().map(Registrar::save);
         let measures = self.extractor.measures();
-        let added =
-            (&self.last_seen_s, &self.light, registration, measures.discriminant(), &self.online, &self.habitats);
+        let Self { last_seen_s, light, online, habitats, levels, .. } = self;
+        let added = (last_seen_s, light, registration, measures.discriminant(), online, habitats, levels);
         ENVELOPE.seal(&postcard::to_allocvec(&(kept, added)).unwrap_or_default())
     }
 
@@ -88,7 +90,7 @@ impl Mapper {
         let content = ENVELOPE.open(bytes)?;
         let (kept, added): (CheckpointContent<Vec<u8>, LabelBook, Measures, ExemplarStore, Relief>, AddedContent<'_>) =
             postcard::from_bytes(content).map_err(|_| RestoreError::Inconsistent)?;
-        let (last_seen_s, light, registration, discriminant, online, habitats) = added;
+        let (last_seen_s, light, registration, discriminant, online, habitats, levels) = added;
         let kept_words = kept.words.with_discriminant(discriminant);
         let model = SceneModel::load(&kept.model)?;
         let fresh = Mapper::new(config, vocabulary, kept.book.epoch(), config.runtime.seed)?;
@@ -100,7 +102,7 @@ impl Mapper {
             return Err(RestoreError::OtherParameters);
         }
         let mut mapper = fresh;
-        mapper.last_seen_s = last_seen_s;
+        (mapper.last_seen_s, mapper.levels) = (last_seen_s, levels);
         mapper.light = mapper.light.map(|fresh| light.unwrap_or(fresh));
         let kept_registrar = registration.and_then(registrar_of).map(|kept| kept.with_loops(config.registration.loops));
         mapper.registrar = kept_registrar.or(mapper.registrar);
@@ -191,12 +193,12 @@ mod tests {
         assert!(first.len() > 3 && first.iter().all(|&(_, minutes)| minutes == 0.0));
         let (seen, _) = first[0];
         let age = |update: &MapUpdate| update.layers[&LayerId::LAST_SEEN].iter().find(|(c, _)| *c == seen).unwrap().1;
-        assert_eq!(age(&frame(&mut mapper, 30)), 1.0);
-        let later = frame(&mut mapper, 60);
-        assert_eq!((age(&later), later.cells.len()), (2.0, later.layers[&LayerId::LAST_SEEN].len()));
+        assert_eq!(age(&frame(&mut mapper, 45)), 1.5);
+        let later = frame(&mut mapper, 90);
+        assert_eq!((age(&later), later.cells.len()), (3.0, later.layers[&LayerId::LAST_SEEN].len()));
         let image = RgbImage::from_pixel(160, 120, Rgb([90, 120, 60]));
         let again =
-            mapper.handle_frame(&Frame::flat(&image, Pose { x: 0.0, y: 0.0, z: -4.0, yaw_rad: 0.0 }, 1.0), 150.0);
+            mapper.handle_frame(&Frame::flat(&image, Pose { x: 0.0, y: 0.0, z: -4.0, yaw_rad: 0.0 }, 1.0), 200.0);
         assert_eq!(age(&again), 0.0);
     }
 

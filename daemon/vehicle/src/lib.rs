@@ -10,6 +10,7 @@ pub mod exemplar;
 mod failsafe;
 mod foreign;
 mod frame;
+mod levels;
 mod mapper;
 mod navigator;
 mod picker;

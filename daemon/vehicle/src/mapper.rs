@@ -1,6 +1,8 @@
 //! The mapper: from camera frames to the label map.
 
+use super::assemble::descriptors;
 use super::frame::{Frame, Projection};
+use super::levels::{HeldLevels, Quantities};
 use super::picker::{Judge, PATCH_PX};
 use super::relief::Relief;
 use image::RgbImage;
@@ -14,7 +16,7 @@ use scene_model::words::{FlatField, Measures, Word, WordConfig, WordExtractor};
 use scenecast_config::{BirthRule, Config, SceneLabels, cell_m};
 use scenecast_core::UserError;
 use scenecast_protocol::directive::{Change, Registration, Settings, ShortDecimal};
-use scenecast_protocol::map::{Cell, LabelTree, LayerId};
+use scenecast_protocol::map::{Cell, LabelTree, LayerDescriptor, LayerId};
 use scenecast_registration::{GeometryCheck, Registrar};
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -44,7 +46,7 @@ pub struct MapUpdate {
     pub epoch: u8,
     /// The label of every explored cell.
     pub cells: Vec<(Cell, u8)>,
-    /// The quantities of each layer, in the unit of its descriptor.
+    /// The quantities of each layer, in the unit of its descriptor, each within the level that the cell has.
     pub layers: BTreeMap<LayerId, Vec<(Cell, f64)>>,
     pub labels: u8,
     /// The perplexity of each cell under the model.
@@ -94,6 +96,7 @@ pub struct Mapper {
     pub(super) geometry: Option<GeometryCheck>,
     /// Mission time of the last frame that had a word in the cell, by the cell's x and y, seconds.
     pub(super) last_seen_s: BTreeMap<(i32, i32), f64>,
+    pub(super) levels: HeldLevels,
     refine_words_per_s: f64,
     /// Maximum rate of camera frames, 1/s; `None`: every frame.
     frames_per_s: Option<f64>,
@@ -111,6 +114,7 @@ struct Configured {
     refine_words_per_s: f64,
     frames_per_s: Option<f64>,
     labels: u32,
+    layers: BTreeMap<LayerId, LayerDescriptor>,
 }
 
 /// A configured frame rate, where 0 stands for every frame.
@@ -163,6 +167,7 @@ impl Mapper {
             registers,
             geometry: None,
             last_seen_s: BTreeMap::new(),
+            levels: HeldLevels::default(),
             refine_words_per_s: f64::from(config.scene.refine_words_per_s),
             frames_per_s: every_frame_or(config.scene.frames_per_s),
             configured: Configured {
@@ -172,6 +177,7 @@ impl Mapper {
                 refine_words_per_s: f64::from(config.scene.refine_words_per_s),
                 frames_per_s: every_frame_or(config.scene.frames_per_s),
                 labels: config.scene.max_labels,
+                layers: descriptors(config).collect(),
             },
             last_s: None,
             flat: Vec::new(),
@@ -248,7 +254,9 @@ impl Mapper {
             projection.project(image.dimensions(), &pose, &centre).first().map(|seen| (seen.x, seen.y))
         };
         judge.offer(&mut self.exemplars, image, place, t_s);
-        self.update(&published)
+        let mut layers = self.quantities(&published);
+        self.levels.hold(&self.configured.layers, &mut layers);
+        self.update(&published, layers)
     }
 
     /// Adds a frame to the habitats, if the labels are habitats, and labels the map by them.
@@ -265,10 +273,13 @@ impl Mapper {
 
     /// The map after the last frame.
     pub fn current(&self) -> MapUpdate {
-        self.update(&self.book.published(&self.flat))
+        let published = self.book.published(&self.flat);
+        let mut layers = self.quantities(&published);
+        self.levels.settle(&self.configured.layers, &mut layers);
+        self.update(&published, layers)
     }
 
-    fn update(&self, published: &[PublishedCell]) -> MapUpdate {
+    fn quantities(&self, published: &[PublishedCell]) -> Quantities {
         let place = |c: &PublishedCell| Cell::new(c.x, c.y);
         let confidence = published.iter().map(|c| (place(c), f64::from(c.confidence))).collect();
         let depth = published.iter().filter_map(|c| Some((place(c), self.relief.depth_m(place(c))?))).collect();
@@ -276,17 +287,21 @@ impl Mapper {
         let t_s = self.last_s.unwrap_or(0.0);
         let minutes = |c: &PublishedCell| Some((t_s - self.last_seen_s.get(&(c.x, c.y))?).max(0.0) / 60.0);
         let last_seen = published.iter().filter_map(|c| Some((place(c), minutes(c)?))).collect();
-        let layers = [
+        BTreeMap::from([
             (LayerId::CONFIDENCE, confidence),
             (LayerId::DEPTH, depth),
             (LayerId::CURIOSITY, curiosity),
             (LayerId::LAST_SEEN, last_seen),
-        ];
+        ])
+    }
+
+    fn update(&self, published: &[PublishedCell], layers: Quantities) -> MapUpdate {
+        let place = |c: &PublishedCell| Cell::new(c.x, c.y);
         MapUpdate {
-            t_s,
+            t_s: self.last_s.unwrap_or(0.0),
             epoch: self.book.epoch(),
             cells: published.iter().map(|c| (place(c), c.label)).collect(),
-            layers: BTreeMap::from(layers),
+            layers,
             perplexity: published.iter().map(|c| (place(c), c.perplexity)).collect(),
             labels: self.book.labels().count() as u8,
             tree: self.habitats.as_ref().and_then(|habitats| published_tree(habitats.tree(), &self.book)),

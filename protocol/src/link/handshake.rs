@@ -274,6 +274,11 @@ impl<T> Handshake<T> {
         }
     }
 
+    /// At the vehicle: forgets the run that it has offered to another run of a surface.
+    pub(super) fn withdraw_offer(&mut self) {
+        self.offered.clear();
+    }
+
     fn drop_oldest_offer(&mut self) {
         self.dropped.push_back(self.offered.remove(0).end());
         if self.dropped.len() > Self::OFFERS {

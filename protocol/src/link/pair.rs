@@ -45,6 +45,9 @@ pub struct LinkPair<T> {
     strays: Strays,
     /// At the vehicle: hellos of ended runs of the surface since the last frame that was accepted.
     ended_hellos: u32,
+    /// At the vehicle: hellos of the surface's current run since the last frame that was accepted, or the last answer that
+    /// names the vehicle's.
+    known_hellos: u32,
     /// At the vehicle: how long the surface that holds it was silent; `None` if it was never heard.
     silence: Option<Duration>,
     /// At the vehicle: the run of a surface that the next hello refuses, and the generation of the key by which it called.
@@ -59,6 +62,9 @@ impl<T> LinkPair<T> {
     const STRAYS: u32 = 3;
     /// Hellos of an ended run, with no accepted frame between them, after which a forged frame seems to have ended it.
     const ENDED_HELLOS: u32 = 2;
+    /// After so many hellos of the current run, with no accepted frame between them, the vehicle names its own run: the surface
+    /// may take a forged one for it.
+    const KNOWN_HELLOS: u32 = 3;
 
     /// A pair without contact; `seed` must be random for each start of the program.
     pub fn new(
@@ -84,6 +90,7 @@ impl<T> LinkPair<T> {
             owes_hello: false,
             strays: Strays::default(),
             ended_hellos: 0,
+            known_hellos: 0,
             silence: None,
             refused: None,
             rotation: KeyRotation::default(),
@@ -362,8 +369,8 @@ impl<T> LinkPair<T> {
             // The current run may be in use still: the hello of the surface may be a replay.
             self.owes_hello &= self.handshake.is_leaving();
             let is_surface = self.us == Address::SURFACE;
-            let to = self.handshake.offered().filter(|_| !is_surface).map(|r| (r.peer, r.generation));
-            let to = self.refused.take().or(to);
+            let named = self.handshake.offered().or(self.handshake.run()).filter(|_| !is_surface);
+            let to = self.refused.take().or(named.map(|r| (r.peer, r.generation)));
             let (session, nonce) = to.map_or((0, 0), |(p, _)| (p.session.get(), p.nonce));
             let generation = if is_surface { self.next_voice() } else { to.map(|(_, used)| used).unwrap_or_default() };
             return match &self.authenticity {
@@ -471,6 +478,32 @@ mod tests {
             }
         }
         assert!(delivered > 139_000, "{delivered}");
+    }
+
+    /// Without a key, a stranger answers the surface's hello before the vehicle does, and acknowledges the vehicle's frames.
+    #[test]
+    fn a_vehicle_names_its_run_where_a_forged_one_stands() {
+        let (mut surface, mut vehicle) = (end_of_surface(None, 1), end_of_vehicle(None, 2));
+        // With the seed of the surface, a stranger has its runs.
+        let (mut false_surface, mut false_vehicle) = (end_of_surface(None, 1), end_of_vehicle(None, 3));
+        carry(&mut surface, &mut false_vehicle, 0, FramePurpose::Hello);
+        carry(&mut false_vehicle, &mut surface, 0, FramePurpose::Hello);
+        carry(&mut false_surface, &mut vehicle, 0, FramePurpose::Hello);
+        carry(&mut vehicle, &mut false_surface, 0, FramePurpose::Hello);
+        carry(&mut false_surface, &mut vehicle, 0, FramePurpose::Content);
+        carry(&mut vehicle, &mut false_surface, 0, FramePurpose::Content);
+        assert_eq!(carry(&mut false_surface, &mut vehicle, 0, FramePurpose::Content).len(), 1);
+        for _ in 0..LinkPair::<u64>::KNOWN_HELLOS {
+            assert!(!vehicle.must_send_hello());
+            carry(&mut surface, &mut vehicle, 0, FramePurpose::Hello);
+        }
+        assert!(vehicle.must_send_hello());
+        carry(&mut vehicle, &mut surface, 0, FramePurpose::Hello);
+        assert!(surface.has_offer());
+        // The surface has never acknowledged what the vehicle builds on, so it begins a new run.
+        let bytes = sent(&mut vehicle, FramePurpose::Content);
+        let envelope = Envelope::decode(&bytes, |a| a == Address::SURFACE).unwrap();
+        assert!(surface.handle_frame(&envelope, |_, _| true).unwrap().lacks_base);
     }
 
     fn sent(from: &mut LinkPair<u64>, purpose: FramePurpose) -> Vec<u8> {

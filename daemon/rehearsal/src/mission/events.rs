@@ -160,7 +160,13 @@ impl Mission {
             NextFrame::Recorded(frame) => {
                 let RecordedFrame { x_m, y_m, heading_rad, depth_m, .. } = *frame;
                 self.vehicle.handle_pose(CameraPose { x_m, y_m, heading_rad, depth_m }, now);
-                let (image, view) = frame.read()?;
+                let (image, view) = match frame.read() {
+                    Ok(read) => read,
+                    Err(error) => {
+                        self.logbook.unreadable.get_or_insert((0, error.to_string())).0 += 1;
+                        return Ok(());
+                    }
+                };
                 self.map(&image, frame.scale, view.as_ref())?;
             }
             NextFrame::Simulated(image) => {

@@ -50,6 +50,8 @@ pub(crate) struct Logbook {
     pub(crate) received_bits: u64,
     /// What people should change at the camera.
     pub(crate) camera_advice: Option<String>,
+    /// Frames of a recording that cannot be read: how many, and why the first one.
+    pub(crate) unreadable: Option<(u64, String)>,
 }
 
 impl Logbook {

@@ -160,9 +160,10 @@ impl Mission {
     }
 
     /// What people should know of a recording: what could not be read, and what is wrong with the camera.
-    pub fn notes(&self) -> impl Iterator<Item = &str> {
-        let notes = self.camera.recording_notes().iter().map(String::as_str);
-        notes.chain(self.logbook.camera_advice.as_deref())
+    pub fn notes(&self) -> impl Iterator<Item = String> {
+        let unreadable = self.logbook.unreadable.as_ref();
+        let unreadable = unreadable.map(|(count, first)| format!("{count} frames cannot be read, the first: {first}"));
+        self.camera.recording_notes().iter().cloned().chain(self.logbook.camera_advice.clone()).chain(unreadable)
     }
 
     /// The surface's role, which has what the operator sees.

@@ -52,16 +52,22 @@ pub(super) struct Derive {
 /// Add the next key of the mission to its file. The surface offers each vehicle its own under the present one.
 ///
 /// Restart the surface then. Its log names each vehicle that uses the next key. When all do, --finish makes it the present one;
-/// until then the surface accepts both.
+/// until then the surface accepts both. A vehicle that has not changed by then is out of reach until it has a new key file.
 #[derive(Debug, Args)]
-#[command(after_help = "Example: scenecast key rotate mission.key\n         scenecast key rotate mission.key --finish")]
+#[command(
+    after_help = "Example: scenecast key rotate mission.key\n         scenecast key rotate mission.key --finish --changed 1,2"
+)]
 pub(super) struct Rotate {
     /// Key file of the mission
     #[arg(value_name = "FILE")]
     file: PathBuf,
     /// Remove the present key: the next one takes its place
-    #[arg(long)]
+    #[arg(long, requires = "changed")]
     finish: bool,
+    /// Addresses of the vehicles that use the next key, by the surface's log: every one that is still to be reached
+    #[arg(long, value_name = "ADDRESSES", value_delimiter = ',', requires = "finish",
+          value_parser = clap::value_parser!(u8).range(1..=14))]
+    changed: Vec<u8>,
 }
 
 /// Write a new random token to a new file that only its owner may read. Without a role its holders are administrators.
@@ -161,20 +167,24 @@ impl Rotate {
                 outln!(
                     "Restart the surface: it gives each vehicle that it hears its own. When its log names every vehicle:"
                 );
-                outln!("scenecast key rotate {} --finish", path.display());
+                outln!("scenecast key rotate {} --finish --changed 1,2", path.display());
             }
             (Some(next), true) => {
                 replace(path, &next.to_text())?;
                 outln!("{}: mission, fingerprint {:08x}", path.display(), next.fingerprint());
                 outln!(
-                    "Restart the surface. A vehicle that loses its state folder falls back to its key file: write it a new one in time:"
+                    "Restart the surface. A vehicle that loses its state folder falls back to its key file: write each a new one in \
+                     time:"
                 );
-                outln!("scenecast key derive {} --vehicle 1", path.display());
+                for vehicle in &self.changed {
+                    outln!("scenecast key derive {} --vehicle {vehicle}", path.display());
+                }
+                outln!("Any other vehicle is out of reach until it has such a file.");
             }
             (Some(next), false) => {
                 let fingerprint = next.fingerprint();
                 let line = format!(
-                    "it has a next key already, fingerprint {fingerprint:08x}; --finish lets it take the place of the present one"
+                    "it has a next key already, fingerprint {fingerprint:08x}; --finish --changed 1,2 lets it take the place of the present one"
                 );
                 return Err(UserError::file(path, line));
             }
@@ -275,7 +285,7 @@ mod tests {
     fn a_next_key_is_added_once_and_replaces_the_present_one() {
         let (path, key) = (fresh("rotate"), random_key().unwrap());
         write_new(&path, &key.to_text()).unwrap();
-        let rotate = |finish: bool| Rotate { file: path.clone(), finish }.run();
+        let rotate = |finish: bool| Rotate { file: path.clone(), finish, changed: vec![1] }.run();
         let prints = || {
             let (present, next) = mission_keys(&path).unwrap();
             (present.fingerprint(), next.map(|next| next.fingerprint()))

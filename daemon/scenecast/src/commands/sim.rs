@@ -95,6 +95,7 @@ pub(super) struct Sim {
 
 impl Sim {
     pub(super) fn run(self) -> Result<(), UserError> {
+        scenecast_runtime::keep_private();
         let started = Instant::now();
         if !self.drain.is_finite() || self.drain < 0.0 {
             return Err(UserError::Input(format!("--drain {} is not allowed; allowed: 0 s or more", self.drain)));

@@ -97,8 +97,8 @@ pub(crate) trait WordSource {
     /// The next sighting in order of time; `None` at the end.
     fn next(&mut self) -> Result<Option<Sighting>, UserError>;
 
-    /// A message about the input that was skipped so far; `None` if all was used.
-    fn skipped(&self) -> Option<String> {
+    /// What people should know of the input so far: what was skipped, and what differs from the settings of the camera.
+    fn notes(&self) -> Option<String> {
         None
     }
 }

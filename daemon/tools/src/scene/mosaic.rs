@@ -1,10 +1,13 @@
 //! Words of images of the ground from above: one mosaic, or the frames of a survey with their poses.
 
 use super::{Look, Sighting, WordSource};
+use image::RgbImage;
 use scene_model::habitats::MeasuredPoint;
 use scene_model::project::{DownCamera, Observation, Pose};
 use scenecast_core::UserError;
-use scenecast_files::{Recording, read_image};
+use scenecast_files::{RecordedFrame, Recording, read_image};
+use scenecast_protocol::coordinates::MapPoint;
+use scenecast_registration::{CameraImage, FrameInput, GeometryCheck};
 use std::path::Path;
 
 /// Minimum edge of a cell, in pixels; a smaller one holds no texture.
@@ -62,6 +65,8 @@ pub(crate) struct Frames {
     cell_m: f64,
     next: usize,
     unreadable: Vec<String>,
+    /// Whether the camera is as stated.
+    geometry: GeometryCheck,
     /// What of the recording is not among its frames.
     notes: Vec<String>,
 }
@@ -79,7 +84,17 @@ impl Frames {
     /// The frames of a recording that is open.
     pub(crate) fn of(recording: Recording, look: Look, metres_per_pixel: f64, cell_m: f64) -> Self {
         let notes = recording.notes.clone();
-        Self { recording, look, metres_per_pixel, cell_m, next: 0, unreadable: Vec::new(), notes }
+        let (unreadable, geometry) = (Vec::new(), GeometryCheck::default());
+        Self { recording, look, metres_per_pixel, cell_m, next: 0, unreadable, geometry, notes }
+    }
+}
+
+/// Shows a frame to the check of the camera.
+fn check(geometry: &mut GeometryCheck, image: &RgbImage, frame: &RecordedFrame, metres_per_pixel: f64) {
+    let pixels = CameraImage::rgb(image.width() as usize, image.height() as usize, image.as_raw());
+    if let Some(image) = pixels.filter(|_| !geometry.is_complete()) {
+        let dead_reckoned = MapPoint::new(frame.x_m, frame.y_m);
+        geometry.handle_frame(&FrameInput { image, metres_per_pixel, dead_reckoned, compass_rad: frame.heading_rad });
     }
 }
 
@@ -104,6 +119,7 @@ impl WordSource for Frames {
                 self.unreadable.push(format!("{file}: {width} x {height} pixels are less than a cell of {cell_px:.1}"));
                 continue;
             }
+            check(&mut self.geometry, &image, frame, camera.metres_per_pixel);
             let content = self.look.at(&image, cell_px);
             let observations = camera.project(image.width(), image.height(), &pose, &content.as_words());
             let image = (image.dimensions(), content.into_points());
@@ -112,11 +128,12 @@ impl WordSource for Frames {
         Ok(None)
     }
 
-    fn skipped(&self) -> Option<String> {
+    fn notes(&self) -> Option<String> {
         let (count, all) = (self.unreadable.len(), self.recording.frames.len());
         let unreadable =
             self.unreadable.first().map(|first| format!("{count} of {all} frames skipped, the first: {first}"));
-        let notes: Vec<String> = self.notes.iter().cloned().chain(unreadable).collect();
+        let advice = self.geometry.geometry().and_then(|found| found.advice(self.metres_per_pixel));
+        let notes: Vec<String> = self.notes.iter().cloned().chain(unreadable).chain(advice).collect();
         (!notes.is_empty()).then(|| notes.join("; "))
     }
 }

@@ -104,7 +104,7 @@ impl WordSource for Tum {
         Ok(None)
     }
 
-    fn skipped(&self) -> Option<String> {
+    fn notes(&self) -> Option<String> {
         let mut notes = Vec::new();
         notes.extend(self.note.clone());
         if let Some(first) = self.unreadable.first() {

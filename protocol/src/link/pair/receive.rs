@@ -133,7 +133,14 @@ impl<T> LinkPair<T> {
         }
         self.ended_hellos = 0;
         let is_new = outcome == HandshakeOutcome::New;
-        self.owes_hello = is_new && own.is_none();
+        // Without a key, a surface that knows a forged run of the vehicle hears nothing but that: it learns the true one again.
+        self.known_hellos += u32::from(!is_new && own.is_none() && self.authenticity.is_none());
+        let names_run = self.known_hellos >= Self::KNOWN_HELLOS;
+        if names_run {
+            self.known_hellos = 0;
+            self.handshake.withdraw_offer();
+        }
+        self.owes_hello = own.is_none() && (is_new || names_run);
         let restarted = is_new && own.is_some();
         self.stats.peer_restarts += u64::from(restarted);
         if restarted || own.is_none() {
@@ -167,7 +174,7 @@ impl<T> LinkPair<T> {
             return Err(DropReason::Undecodable);
         }
         self.mismatch.handle_accepted();
-        self.ended_hellos = 0;
+        (self.ended_hellos, self.known_hellos) = (0, 0);
         if let Some(index) = offer {
             self.handshake.accept_offered(index);
             if self.us != Address::SURFACE {

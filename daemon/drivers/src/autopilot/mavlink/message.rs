@@ -52,8 +52,8 @@ pub enum Heard {
     LocalTarget(Option<[f32; 2]>),
     /// POSITION_TARGET_GLOBAL_INT: degrees times ten million; `None` if its target is no position.
     GlobalTarget(Option<(i32, i32)>),
-    /// DISTANCE_SENSOR that looks down: metres along its beam; `None` if that is out of its range.
-    DistanceDown(Option<f32>),
+    /// DISTANCE_SENSOR of this number that looks down: metres along its beam; `None` if that is out of its range.
+    DistanceDown(u8, Option<f32>),
     /// DISTANCE_SENSOR of a sensor that does not look down.
     DistanceElsewhere,
     /// RANGEFINDER: metres along the beam of a sensor that looks down.
@@ -193,11 +193,11 @@ impl Heard {
             132 => {
                 f.u32();
                 let (least, most, now) = (f.u16(), f.u16(), f.u16());
-                f.u16();
+                let [_, number] = f.u16().to_le_bytes();
                 match f.u8() {
                     LOOKS_DOWN => {
                         let is_in_range = now > 0 && (least..=most).contains(&now);
-                        Self::DistanceDown(is_in_range.then_some(f32::from(now) / 100.0))
+                        Self::DistanceDown(number, is_in_range.then_some(f32::from(now) / 100.0))
                     }
                     _ => Self::DistanceElsewhere,
                 }
@@ -355,7 +355,7 @@ mod tests {
             ),
             (
                 format!("fd270000000101840000d0070000140088139c01000119ff{}5a5f27", zeros(24)),
-                Heard::DistanceDown(Some(4.12)),
+                Heard::DistanceDown(1, Some(4.12)),
             ),
             ("fd080000000101ad0000000090400000a03fb335".to_owned(), Heard::Rangefinder(4.5)),
             (
@@ -379,7 +379,7 @@ mod tests {
                 [&[0; 4][..], &20u16.to_le_bytes(), &500u16.to_le_bytes(), &now.to_le_bytes(), &[0, 1, orientation]];
             Heard::read(132, &payload.concat())
         };
-        assert_eq!(distance(501, 25), Some(Heard::DistanceDown(None)));
+        assert_eq!(distance(501, 25), Some(Heard::DistanceDown(1, None)));
         assert_eq!(distance(300, 0), Some(Heard::DistanceElsewhere));
         let mut velocity_only = vec![1; 51];
         velocity_only[48..50].copy_from_slice(&0x0DC7u16.to_le_bytes());

@@ -190,7 +190,9 @@ impl Mavlink {
                 (self.tilt, self.yaw) = ((f64::from(roll), f64::from(pitch)), Some(f64::from(yaw)));
                 self.attitude_heard = Some(now);
             }
-            Heard::DistanceDown(along_m) => self.handle_beam(HeightSource::DistanceSensor, along_m, now),
+            Heard::DistanceDown(number, along_m) => {
+                self.handle_beam(HeightSource::DistanceSensor(number), along_m, now);
+            }
             Heard::Rangefinder(along_m) => self.handle_beam(HeightSource::Rangefinder, Some(along_m), now),
             Heard::Altitude(m) => self.altimeter.handle(HeightSource::Altitude, m.map(f64::from), now),
             Heard::LocalTarget(told) => self.handle_local_target(told, now),

@@ -94,9 +94,15 @@ const LASTS: Duration = Duration::from_secs(2);
 /// The message that a height is from, the best first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum HeightSource {
-    DistanceSensor,
+    /// The one with the lowest number is the best.
+    DistanceSensor(u8),
     Rangefinder,
     Altitude,
+}
+
+/// Whether both are distance sensors.
+fn is_distance_sensor(source: HeightSource, other: HeightSource) -> bool {
+    matches!((source, other), (HeightSource::DistanceSensor(_), HeightSource::DistanceSensor(_)))
 }
 
 /// The last height of the best source that is not old.
@@ -106,11 +112,16 @@ pub(super) struct Altimeter {
 }
 
 impl Altimeter {
-    /// Takes a height; that of a better source stays until it is old.
+    /// Takes a height; that of a better source stays until it is old. Out of range of one of several distance sensors is no
+    /// sign about the others.
     pub(super) fn handle(&mut self, source: HeightSource, height_m: Option<f64>, now: Instant) {
-        let is_better = self.last.is_none_or(|(last, _, at)| source <= last || now.since(at) >= LASTS);
-        if is_better {
-            self.last = height_m.filter(|m| m.is_finite() && *m > 0.0).map(|m| (source, m, now));
+        let height_m = height_m.filter(|m| m.is_finite() && *m > 0.0);
+        let counts = self.last.is_none_or(|(last, _, at)| {
+            let is_other_beam = height_m.is_none() && source != last && is_distance_sensor(source, last);
+            (source <= last || now.since(at) >= LASTS) && !is_other_beam
+        });
+        if counts {
+            self.last = height_m.map(|m| (source, m, now));
         }
     }
 
@@ -193,7 +204,7 @@ mod tests {
         let at = |s: f64| Instant::from_secs_f64(s);
         let mut altimeter = Altimeter::default();
         altimeter.handle(HeightSource::Altitude, Some(9.0), at(0.0));
-        altimeter.handle(HeightSource::DistanceSensor, Some(4.0), at(0.1));
+        altimeter.handle(HeightSource::DistanceSensor(1), Some(4.0), at(0.1));
         altimeter.handle(HeightSource::Altitude, Some(9.0), at(0.2));
         assert_eq!(altimeter.height_m(at(0.3)), Some(4.0));
         assert_eq!(altimeter.height_m(at(2.2)), None);
@@ -201,6 +212,17 @@ mod tests {
         assert_eq!(altimeter.height_m(at(2.3)), Some(9.0));
         altimeter.handle(HeightSource::Rangefinder, None, at(2.4));
         assert_eq!(altimeter.height_m(at(2.5)), None, "out of range");
+        // A second sensor that looks down, such as one of a longer range.
+        for (number, height_m, is) in [
+            (1, Some(4.0), Some(4.0)),
+            (0, None, Some(4.0)),
+            (0, Some(3.9), Some(3.9)),
+            (1, None, Some(3.9)),
+            (0, None, None),
+        ] {
+            altimeter.handle(HeightSource::DistanceSensor(number), height_m, at(2.6));
+            assert_eq!(altimeter.height_m(at(2.7)), is, "{number} {height_m:?}");
+        }
     }
 
     #[test]

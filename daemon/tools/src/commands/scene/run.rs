@@ -109,14 +109,14 @@ impl Run {
             }
             Labels::Habitats => self.habitats(&mut opened)?,
         };
-        let skipped = opened.source.skipped();
+        let notes = opened.source.notes();
         if map.flat.is_empty() {
-            let cause = skipped.unwrap_or_else(|| "the source gave none".to_owned());
+            let cause = notes.unwrap_or_else(|| "the source gave none".to_owned());
             let what = if kind == Labels::Topics { "words" } else { "cells with enough pixels" };
             return Err(UserError::Input(format!("there are no {what} to label: {cause}")));
         }
-        if let Some(skipped) = skipped {
-            errln!("scenecast: {skipped}");
+        if let Some(notes) = notes {
+            errln!("scenecast: {notes}");
         }
         if effort.skipped.skipped_full > 0 {
             errln!("scenecast: {} words of full cells skipped", effort.skipped.skipped_full);
