@@ -54,14 +54,17 @@ pub fn skip(why: &str) {
     let _ = std::io::stderr().write_all(line.as_bytes());
 }
 
+/// Without a record in the present folder.
+pub const UNRECORDED: [&str; 2] = ["--set", "record.enabled=false"];
+
 /// Settings of a sea floor and of images that cost a machine a quarter of the usual ones.
 pub const LIGHT: [&str; 6] =
     ["--set", "world.kind=patches", "--set", "camera.width_px=320", "--set", "camera.height_px=240"];
 
-/// A demo at a speed, with more arguments. Its sea floor and its images cost a machine a quarter of the usual ones.
+/// A demo at a speed, with more arguments, that leaves no record. Its sea floor and its images cost a machine a quarter of the usual ones.
 pub fn demo(port: u16, speed: u32, more: &[&str]) -> Process {
     let (port, speed) = (port.to_string(), speed.to_string());
-    Process::start(&[&["demo", "--port", &port, "--speed", &speed][..], &LIGHT, more].concat())
+    Process::start(&[&["demo", "--port", &port, "--speed", &speed][..], &UNRECORDED, &LIGHT, more].concat())
 }
 
 /// Runs a command to its end.
@@ -215,13 +218,14 @@ pub fn python(modules: &str) -> Option<String> {
     None
 }
 
-/// Runs a script to its end; fails with what it said if it fails.
-pub fn run_script(program: &str, script: &str, arguments: &[&str]) {
+/// Runs a script to its end, and returns its output; fails with what it said if it fails.
+pub fn run_script(program: &str, script: &str, arguments: &[&str]) -> String {
     let mut command = Command::new(program);
     let output = command.arg(workspace().join(script)).args(arguments).output();
     let output = output.unwrap_or_else(|e| panic!("{program}: {e}"));
-    let said = String::from_utf8_lossy(&output.stdout).into_owned() + &String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.success(), "{script}: {said}");
+    let said = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert!(output.status.success(), "{script}: {said}{}", String::from_utf8_lossy(&output.stderr));
+    said
 }
 
 /// The state that a surface on `port` tells, once it does.

@@ -18,7 +18,7 @@ pub fn recorded() -> &'static (PathBuf, Vec<u8>) {
             let config = scenecast_config::load(None, &sets).expect("the settings are allowed");
             let options = MissionOptions { world: World::patches(2, 0.01), seed: 1, record };
             let mut mission = Mission::new(config, options).expect("a mission");
-            mission.run(Duration::from_secs(3600), &mut |_| {}).expect("the mission ends");
+            mission.run(Duration::from_secs(3600), &mut |_| Ok(())).expect("the mission ends");
             mission
         };
         fly(&["survey.duration_s=60".into()], Some(dir.clone()));

@@ -1,6 +1,8 @@
 //! The operator's page in headless Chromium: the stories of `tests/browser`, against the mock and against real processes.
 
-use scenecast_tests::{Process, free_port, http, is_full, lacks_browser, run, scratch, state, wait_until, workspace};
+use scenecast_tests::{
+    Process, UNRECORDED, free_port, http, is_full, lacks_browser, run, scratch, state, wait_until, workspace,
+};
 use std::collections::BTreeMap;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -38,7 +40,9 @@ fn every_story_without_mock_passes_against_a_demo() {
         return;
     }
     let port = free_port();
-    let _demo = Process::start(&["demo", "--port", &port.to_string(), "--speed", "5", "--duration", "100000"]);
+    let _demo = Process::start(
+        &[&["demo", "--port", &port.to_string(), "--speed", "5", "--duration", "100000"][..], &UNRECORDED].concat(),
+    );
     wait_until("labels on the map", || {
         state(port).is_some_and(|s| s["vehicles"][0]["labels"].as_array().is_some_and(|l| l.len() > 3))
     });

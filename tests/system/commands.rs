@@ -110,6 +110,7 @@ fn every_command_has_help_with_an_example() {
         &["config"],
         &["key", "new"],
         &["key", "show"],
+        &["record", "recover"],
         &["key", "token"],
         &["ctl"],
         &["ctl", "status"],

@@ -91,7 +91,7 @@ fn a_sequence_with_depth_is_rehearsed() {
     let direct = map(&config, |_| {});
     let options = MissionOptions { world: World::patches(2, 0.01), seed: 1, record: None };
     let mut mission = Mission::new(config, options).unwrap();
-    mission.run(Duration::from_secs(3600), &mut |_| {}).unwrap();
+    mission.run(Duration::from_secs(3600), &mut |_| Ok(())).unwrap();
     let sent = mission.vehicle().map();
     let cells = direct.cells.iter().filter(|(cell, _)| sent.get(*cell) > 0).count();
     assert!(cells > direct.cells.len() * 9 / 10, "{cells} of {}", direct.cells.len());

@@ -239,7 +239,7 @@ fn relief_by_dds(name: &str, domain: u8, depth: &str, options: &[&str]) -> Optio
     let config = scenecast_config::load(None, &sets.chain(tum).collect::<Vec<_>>()).unwrap();
     let mission = MissionOptions { world: World::patches(2, 0.01), seed: 1, record: None };
     let mut mission = Mission::new(config, mission).unwrap();
-    mission.run(Duration::from_secs(3600), &mut |_| {}).unwrap();
+    mission.run(Duration::from_secs(3600), &mut |_| Ok(())).unwrap();
     let expected = scenecast_core::label_picture::encode(mission.vehicle().map()).unwrap();
     let dive = Dive::with_settings(name, &|_| {
         let sets = RELIEF.iter().map(|set| (*set).to_owned());
@@ -303,7 +303,7 @@ fn a_bag_of_compressed_images_gives_the_map_in_rehearsal() {
     let config = scenecast_config::load(None, &sets.map(str::to_owned)).unwrap();
     let options = MissionOptions { world: World::patches(2, 0.01), seed: 1, record: None };
     let mut mission = Mission::new(config, options).unwrap();
-    mission.run(Duration::from_secs(3600), &mut |_| {}).unwrap();
+    mission.run(Duration::from_secs(3600), &mut |_| Ok(())).unwrap();
     let map = scenecast_core::label_picture::encode(mission.vehicle().map()).unwrap();
     assert!(map == recorded().1, "the maps differ");
 }

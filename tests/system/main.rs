@@ -22,6 +22,7 @@ mod navigation;
 mod page;
 mod ports;
 mod position;
+mod record;
 mod restart;
 mod ros2;
 mod ros2_labels;

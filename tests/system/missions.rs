@@ -25,7 +25,7 @@ fn reef() -> World {
 
 fn fly(sets: &[&str], seed: u64) -> Value {
     let mut mission = Mission::new(config(sets), MissionOptions { world: reef(), seed, record: None }).unwrap();
-    mission.run(Duration::from_secs(7200), &mut |_| {}).unwrap();
+    mission.run(Duration::from_secs(7200), &mut |_| Ok(())).unwrap();
     report(&mission, "test").json
 }
 
@@ -178,7 +178,7 @@ fn assert_annotated_files_are_surveyed(image: &Path, classes: &Path, at_least_na
     let world = World::from_files(image, Some(classes), 0.01).unwrap();
     let mut mission =
         Mission::new(config(&["survey.duration_s=200"]), MissionOptions { world, seed: 1, record: None }).unwrap();
-    mission.run(Duration::from_secs(7200), &mut |_| {}).unwrap();
+    mission.run(Duration::from_secs(7200), &mut |_| Ok(())).unwrap();
     let figures = report(&mission, "test").json;
     assert_sound(&figures);
     assert!(figures["scene"]["labels"].as_u64() > Some(1));

@@ -1,6 +1,6 @@
 //! The operator's page and API of a running demo.
 
-use scenecast_tests::{Process, demo, free_port, http, http_whole, state, wait_until};
+use scenecast_tests::{Process, UNRECORDED, demo, free_port, http, http_whole, state, wait_until};
 use serde_json::Value;
 
 fn slot(state: &Value, name: &str) -> Option<String> {
@@ -105,7 +105,9 @@ fn the_page_is_small_and_cached() {
 #[test]
 fn a_demo_too_fast_for_the_machine_still_answers() {
     let port = free_port();
-    let mut demo = Process::start(&["demo", "--port", &port.to_string(), "--speed", "1000", "--duration", "1000000"]);
+    let mut demo = Process::start(
+        &[&["demo", "--port", &port.to_string(), "--speed", "1000", "--duration", "1000000"][..], &UNRECORDED].concat(),
+    );
     wait_until("labels on the map", || {
         state(port).is_some_and(|s| s["vehicles"][0]["labels"].as_array().is_some_and(|l| l.len() > 1))
     });

@@ -25,7 +25,7 @@ pub use secret_files::{
 };
 pub use sections::{
     Autopilot, Bands, Camera, Channel, Config, Console, Labels, Link, Map, Mission, Modem, Navigation, Operator,
-    Position, Ros2, Runtime, Scene, SurfaceSection, Survey, VehicleSection,
+    Position, Record, Ros2, Runtime, Scene, SurfaceSection, Survey, VehicleSection,
 };
 pub use setting::{
     Authenticate, AutopilotKind, BandRange, BirthRule, CalibrationSource, CameraSource, CameraStamps, Debounce,

@@ -12,6 +12,7 @@ pub mod fit;
 mod http;
 mod layers;
 mod link_meter;
+pub mod messages;
 pub mod orders;
 mod request;
 mod snapshot;

@@ -14,6 +14,7 @@ pub mod palette;
 mod principal;
 pub mod tuning_table;
 mod usbl_line;
+mod utc;
 
 pub use geodesy::{Area, BodyOffset, LatLon, MAX_DISTANCE_M, TangentPlane, fence_of, outline_of, place_of, wrap_rad};
 pub use label_picture::{WGS84_AUX_XML, world_file};
@@ -24,3 +25,4 @@ pub use modem_facts::{
 pub use output::{UserError, printable, write_error, write_or_exit};
 pub use principal::{ClientName, Giver, Principal, Role};
 pub use usbl_line::{ModemAddress, UsblLine};
+pub use utc::utc_text;

@@ -1,6 +1,6 @@
 //! An end of the link and its modem.
 
-use crate::LinkEnd;
+use crate::{FrameCounts, LinkEnd};
 use scenecast_config::Config;
 use scenecast_core::UserError;
 use scenecast_drivers::modem::paced::Paced;
@@ -12,19 +12,19 @@ use scenecast_protocol::wire::Address;
 use std::collections::VecDeque;
 use std::time::Duration;
 
-/// Events of frames and of the modem, for meters and logs. The link needs no reaction to them.
+/// Events of frames and of the modem, for meters, logs and records. The link needs no reaction to them.
 #[derive(Debug, Clone, PartialEq)]
 pub enum FrameEvent {
     /// A frame was given to the modem.
     Sent {
-        bytes: usize,
+        frame: Vec<u8>,
         /// Kind of the frame, as the link names it.
         kind: scenecast_protocol::link::TransmitKind,
     },
     /// The modem refused the last frame. The link repairs it like a lost one.
     NotSent(Refusal),
     /// A frame was received and given to the link.
-    Received { bytes: usize },
+    Received { frame: Vec<u8>, outcome: FrameOutcome },
     /// The bits on air exceed the budget of a window for the first time.
     OverBudget {
         /// Mean bit rate of the fullest window, bit/s.
@@ -42,7 +42,7 @@ pub enum FrameEvent {
     },
 }
 
-/// The result of a datagram, which shows whether its sender is the other end.
+/// What became of a received frame. It shows whether its sender is the other end.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum FrameOutcome {
     /// It is no frame, or one that the link drops.
@@ -51,6 +51,17 @@ pub enum FrameOutcome {
     Opened,
     /// A numbered frame that verified and was new: with a key, only the other end can have written it.
     Accepted,
+}
+
+impl FrameOutcome {
+    /// Of one frame, by the counts before and after it.
+    fn between(before: FrameCounts, after: FrameCounts) -> Self {
+        match after.accepted > before.accepted {
+            true => Self::Accepted,
+            false if after.dropped == before.dropped => Self::Opened,
+            false => Self::Dropped,
+        }
+    }
 }
 
 /// An end of the link at its modem: the only caller of a link's `poll_transmit`.
@@ -113,15 +124,13 @@ impl<E: LinkEnd> LinkHost<E> {
 
     /// Takes a datagram, which is a frame of its own, and returns the judgement of the link.
     pub fn handle_datagram(&mut self, bytes: &[u8], now: Instant) -> FrameOutcome {
-        let (events, before) = (self.events.len(), self.end.frame_counts());
+        let events = self.events.len();
         self.handle_bytes(bytes, now);
-        let after = self.end.frame_counts();
-        let is_frame = self.events.iter().skip(events).any(|event| matches!(event, FrameEvent::Received { .. }));
-        match is_frame {
-            true if after.accepted > before.accepted => FrameOutcome::Accepted,
-            true if after.dropped == before.dropped => FrameOutcome::Opened,
-            _ => FrameOutcome::Dropped,
-        }
+        let outcomes = self.events.iter().skip(events).filter_map(|event| match event {
+            FrameEvent::Received { outcome, .. } => Some(*outcome),
+            _ => None,
+        });
+        outcomes.max().unwrap_or(FrameOutcome::Dropped)
     }
 
     /// Lets time pass in the modem's driver.
@@ -169,7 +178,7 @@ impl<E: LinkEnd> LinkHost<E> {
         while self.station.takes_frames()
             && let Some(transmit) = self.end.poll_transmit(now)
         {
-            self.events.push_back(FrameEvent::Sent { bytes: transmit.bytes.len(), kind: transmit.kind });
+            self.events.push_back(FrameEvent::Sent { frame: transmit.bytes.clone(), kind: transmit.kind });
             if let Err(refusal) = self.station.send(transmit, now) {
                 self.events.push_back(FrameEvent::NotSent(refusal));
             }
@@ -183,9 +192,11 @@ impl<E: LinkEnd> LinkHost<E> {
         while let Some(event) = self.station.poll_event() {
             match event {
                 ModemEvent::Sent => self.end.handle_transmit_outcome(now),
-                ModemEvent::Received(bytes) => {
-                    self.events.push_back(FrameEvent::Received { bytes: bytes.len() });
-                    self.end.handle_frame(&bytes, now);
+                ModemEvent::Received(frame) => {
+                    let before = self.end.frame_counts();
+                    self.end.handle_frame(&frame, now);
+                    let outcome = FrameOutcome::between(before, self.end.frame_counts());
+                    self.events.push_back(FrameEvent::Received { frame: frame.to_vec(), outcome });
                 }
                 ModemEvent::Poll(frames) => self.end.handle_poll(frames),
                 ModemEvent::Repeated(bits) => self.end.handle_repeated(bits, now),

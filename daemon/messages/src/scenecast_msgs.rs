@@ -54,6 +54,26 @@ messages! {
         digest: u16,
     }
 
+    /// Cells of a replicated map that have changed.
+    message MapCells {
+        header: Header,
+        vehicle: String,
+        /// The epoch, in which no label number changes its meaning.
+        epoch: u32,
+        version: u64,
+        /// The name of the layer; empty for the labels.
+        layer: String,
+        /// The edge of a cell, metres.
+        cell_m: f64,
+        /// Whether these are all cells; otherwise the others are as before.
+        whole: bool,
+        /// Column and row of each cell; (0, 0) lies north-east of the map's origin.
+        x: Vec<i32>,
+        y: Vec<i32>,
+        /// The label or the level of each cell; 0 is unexplored.
+        value: Vec<u8>,
+    }
+
     /// Which labels of a map become one at coarser cuts.
     message LabelTree {
         header: Header,

@@ -122,10 +122,10 @@ impl Carrier {
 
     /// Logs that an end has given a frame to its modem or to the channel.
     pub(crate) fn log_event(&mut self, end: usize, event: &FrameEvent, now: Instant) {
-        let FrameEvent::Sent { bytes, kind } = *event else { return };
+        let FrameEvent::Sent { frame, kind } = event else { return };
         match self.unlogged[end].pop_front() {
             Some(transmission) => {
-                self.log.handle_sent(transmission, end == VEHICLE, bytes, kind.name(), now.as_secs_f64());
+                self.log.handle_sent(transmission, end == VEHICLE, frame.len(), kind.name(), now.as_secs_f64());
             }
             None => self.log.sent[end] += 1,
         }

@@ -67,7 +67,10 @@ pub fn fidelity(
         config.link.budget_bps = budget_bps;
         let mut baseline = Baseline::new(&config, seed)?;
         let mut mission = Mission::new(config, MissionOptions { world: world.clone(), seed, record: None })?;
-        mission.run_survey(STEP, &mut |mission| baseline.follow(mission))?;
+        mission.run_survey(STEP, &mut |mission| {
+            baseline.follow(mission);
+            Ok(())
+        })?;
         for stream in [delta(&mission), baseline.stream(&mission)] {
             let row = FidelityRow::new(&mission, stream);
             progress(&row);

@@ -29,7 +29,7 @@ pub use fidelity::{Delays, FidelityRow, fidelity, fidelity_panels};
 pub use frames_log::{FramesLog, Repeats, Uplink};
 pub use instruments::{Instruments, Receiver, SimulatedAutopilot, simulated_autopilot};
 pub use link_rig::LinkRig;
-pub use mission::{FrameErrors, MapInformation, MapQuality, Mission, MissionOptions};
+pub use mission::{EndEvent, FrameErrors, MapInformation, MapQuality, Mission, MissionOptions};
 pub use outputs::write_outputs;
 pub use quality::{Curve, Line, Panel, quality_plot};
 pub use report::{Report, report};

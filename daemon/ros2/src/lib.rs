@@ -33,8 +33,9 @@ mod zenoh;
 mod zenoh;
 
 pub use inbox::{Inbox, Received};
-pub use names::{topic, valid_part};
+pub use names::topic;
 pub use node::{Publisher, RosNode};
+pub use scenecast_messages::contents::valid_part;
 #[cfg(feature = "surface")]
 pub use surface::{SurfaceOutlet, start_surface};
 pub use transport::{Peers, Qos, Transport};

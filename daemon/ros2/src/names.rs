@@ -16,15 +16,6 @@ pub fn topic(name: &str) -> Result<RosName, UserError> {
     RosName::parse(name).ok_or_else(|| UserError::Input(format!("{name:?}: {rule}")))
 }
 
-/// A name for people as a part of a topic's name: `auv-1` becomes `auv_1`.
-pub fn valid_part(name: &str) -> String {
-    let part: String = name.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).take(64).collect();
-    match part.chars().next() {
-        Some(first) if !first.is_ascii_digit() => part,
-        _ => format!("_{part}"),
-    }
-}
-
 /// The name under which a topic is used.
 pub(crate) fn remapped<'a>(name: &'a RosName, remaps: &'a [Remap]) -> &'a RosName {
     remaps.iter().find(|remap| remap.from == *name).map_or(name, |remap| &remap.to)
@@ -78,6 +69,7 @@ fn grid(map: &VehicleMap) -> Option<Grid> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use scenecast_messages::contents::valid_part;
     use scenecast_protocol::map::{Cell, LabelGrid};
 
     #[test]

@@ -20,6 +20,7 @@ mod pilot;
 mod port;
 #[cfg(all(test, feature = "surface"))]
 mod power_cut_tests;
+pub mod record;
 #[cfg(all(test, feature = "surface"))]
 mod refusing_disk_tests;
 mod restore;

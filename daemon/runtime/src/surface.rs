@@ -5,6 +5,7 @@ use super::instruments::{Instruments, relay};
 use super::map_files::{MapFile, MapFiles};
 use super::modem::{self, ModemPort, warn_without_key};
 use super::pilot::{self, PilotPort, SimulatedAutopilot};
+use super::record::SurfaceRecord;
 use super::ros2::SurfaceRos2;
 use super::stop::{Load, Reload, Stop, configured_budget, keep_private};
 use super::store::{ArchivedFile, SurfaceFiles};
@@ -103,6 +104,8 @@ pub fn run_surface(load: Load, simulated: Option<SimulatedAutopilot>) -> Result<
         let maps = MapFiles::start(config.runtime.state_dir.clone());
         let (is_stale, reading) = (true, Arc::default());
         let budget = configured_budget(&config);
+        let folder = config.runtime.state_dir.join("records");
+        let record = SurfaceRecord::start(&config, &config.surface.name, &folder, config.runtime.time_scale);
         let shell = SurfaceShell {
             host,
             ports,
@@ -113,6 +116,7 @@ pub fn run_surface(load: Load, simulated: Option<SimulatedAutopilot>) -> Result<
             maps,
             facts,
             meter,
+            record,
             reading,
             reload,
             budget,
@@ -139,6 +143,7 @@ struct SurfaceShell {
     maps: MapFiles,
     facts: MissionFacts,
     meter: LinkMeter,
+    record: SurfaceRecord,
     /// Held while an archived map is read.
     reading: Arc<Mutex<()>>,
     reload: Reload,
@@ -165,6 +170,7 @@ impl SurfaceShell {
                     self.publish();
                     modem::log_audit(self.host.link());
                     self.maps.finish().await;
+                    self.record.finish();
                     return Ok(());
                 }
                 _ = tokio::time::sleep_until(self.clock.wall(wake)) => {}
@@ -257,11 +263,12 @@ impl SurfaceShell {
         let now = self.clock.now();
         self.files.commit(self.host.surface_mut(), None, now);
         self.is_stale = false;
-        if self.console.is_none() && !self.ros2.is_on() {
+        if self.console.is_none() && !self.ros2.is_on() && !self.record.is_on() {
             return;
         }
         self.meter.handle_budgets(self.host.surface());
         let snapshot = Arc::new(snapshot(self.host.surface(), &self.facts, &self.meter, now));
+        self.record.observe(self.host.surface(), &snapshot);
         if let Some(console) = &self.console {
             console.snapshots.send_replace(snapshot.clone());
         }
@@ -301,6 +308,7 @@ impl SurfaceShell {
                 SurfaceHostEvent::Frame(event) => {
                     modem::log(&event)?;
                     self.measure(&event);
+                    self.record.handle_frame(&event, self.clock.now().as_secs_f64());
                 }
                 SurfaceHostEvent::Pilot(event) => pilot::log(event),
             }
@@ -330,10 +338,10 @@ impl SurfaceShell {
 
     fn measure(&mut self, event: &FrameEvent) {
         let now = self.clock.now();
-        let bits_on_air = |bytes: usize| self.host.link().profile().bits_on_air(bytes);
-        match *event {
-            FrameEvent::Sent { bytes, .. } => self.meter.sent(bits_on_air(bytes), now),
-            FrameEvent::Received { bytes } => self.meter.received(bits_on_air(bytes), now),
+        let bits_on_air = |frame: &[u8]| self.host.link().profile().bits_on_air(frame.len());
+        match event {
+            FrameEvent::Sent { frame, .. } => self.meter.sent(bits_on_air(frame), now),
+            FrameEvent::Received { frame, .. } => self.meter.received(bits_on_air(frame), now),
             _ => {}
         }
     }

@@ -8,6 +8,7 @@ use super::labels::{self, FromLabels, LabelThread, move_the_vehicle};
 use super::mapping::{Disagreement, FromMapper, Mapped, MapperThread, ToMapper};
 use super::modem::{self, ModemPort, warn_without_key};
 use super::pilot::{self, PilotPort, SimulatedAutopilot};
+use super::record::VehicleRecord;
 use super::restore::{Start, start};
 use super::ros2::{RosSensors, VehicleRos2};
 use super::stop::{Load, Reload, Stop, configured_budget, keep_private};
@@ -107,6 +108,7 @@ pub fn run_vehicle(load: Load, simulated: Option<SimulatedAutopilot>) -> Result<
         let is_foreign = config.labels.source != LabelSource::SceneModel;
         let labels = Labels { thread: labels, is_foreign, move_vehicle: move_the_vehicle(&config) };
         let (faults, disagreement) = (SensorFaults::default(), Disagreement::default());
+        let record = VehicleRecord::start(&config);
         let shell = VehicleShell {
             host,
             camera,
@@ -119,6 +121,7 @@ pub fn run_vehicle(load: Load, simulated: Option<SimulatedAutopilot>) -> Result<
             disk,
             faults,
             disagreement,
+            record,
             reload,
             missed: 0,
         };
@@ -159,6 +162,7 @@ struct VehicleShell {
     disk: DiskWatch,
     faults: SensorFaults,
     disagreement: Disagreement,
+    record: VehicleRecord,
     reload: Reload,
     /// Frames of a recording that could not be read.
     missed: u64,
@@ -176,6 +180,7 @@ impl VehicleShell {
                     self.camera.log_end();
                     self.mapper.finish();
                     self.labels.thread.into_iter().for_each(LabelThread::finish);
+                    self.record.finish();
                     return Ok(());
                 }
                 _ = tokio::time::sleep_until(self.clock.wall(wake)) => {}
@@ -331,6 +336,7 @@ impl VehicleShell {
             labels.handle_pose(ImagePose { x_m, y_m, depth_m, heading_rad: navigator.heading_rad() }, now);
         }
         self.host.steer(now);
+        self.record.observe(self.host.vehicle(), now);
         self.ros2.publish(&self.host, self.camera.tally(), || self.labels.thread.as_ref().map(LabelThread::health));
         self.handle_events()?;
         while let Some(bytes) = self.host.poll_output(now) {
@@ -345,6 +351,7 @@ impl VehicleShell {
 
     fn handle_events(&mut self) -> Result<(), UserError> {
         while let Some(event) = self.host.poll_event() {
+            self.record.handle_event(&event, self.clock.now());
             match event {
                 VehicleHostEvent::Persist => {
                     // A refusing disk must not end the link: the vehicle then obeys hold and abort from memory.

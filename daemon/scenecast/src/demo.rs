@@ -1,5 +1,6 @@
 //! A rehearsal in real time, with the operator's page.
 
+use crate::mission_record::{MissionRecord, RecordClock, count};
 use scenecast_console::state::{TrueClass, TruthInfo};
 use scenecast_console::{
     ClientRequest, Console, LinkMeter, MissionFacts, Reply, SurfaceRequest, bind, former_labels, handle_request,
@@ -9,6 +10,7 @@ use scenecast_core::palette::colour;
 use scenecast_core::{Area, UserError, errln, outln};
 use scenecast_protocol::time::Instant;
 use scenecast_rehearsal::{Mission, Truth};
+use scenecast_runtime::record::new_dir;
 use scenecast_runtime::{Stop, block_on, random_bits};
 use scenecast_surface::record::EventTime;
 use scenecast_surface::recorder::Recorder;
@@ -93,6 +95,22 @@ fn shown(truth: Truth) -> scenecast_console::Truth {
     scenecast_console::Truth { info, picture: truth.png.into() }
 }
 
+/// The records of both ends, in the folder of the configuration or `records` in the present one.
+fn record(mission: &mut Mission, speed: f64) -> Option<MissionRecord> {
+    let config = mission.config();
+    if !config.record.enabled {
+        return None;
+    }
+    let folder = config.record.folder.clone().unwrap_or_else(|| "records".into());
+    let dirs = ["surface", config.vehicle.name.as_str()].map(|name| new_dir(&folder, name));
+    let begun = MissionRecord::create(mission, RecordClock::Wall(speed), [&dirs[0], &dirs[1]]);
+    match &begun {
+        Ok(_) => dirs.iter().for_each(|dir| outln!("record: {}", dir.display())),
+        Err(error) => errln!("scenecast: this mission is not recorded: {error}"),
+    }
+    begun.ok()
+}
+
 struct Demo {
     mission: Mission,
     /// Makes the picture of the true classes.
@@ -104,6 +122,8 @@ struct Demo {
     pace: Pace,
     counted: [u64; 2],
     published: Option<std::time::Instant>,
+    /// `None` if the mission is not recorded.
+    record: Option<MissionRecord>,
 }
 
 impl Demo {
@@ -115,7 +135,8 @@ impl Demo {
         let truth = Some(make_truth(&mission));
         let mut recorder = Recorder::default();
         recorder.begin(mission.surface_mut(), 0, 0, EventTime::default());
-        Self { meter, pace, truth, mission, facts, recorder, counted: [0; 2], published: None }
+        let record = record(&mut mission, speed);
+        Self { meter, pace, truth, mission, facts, recorder, counted: [0; 2], published: None, record }
     }
 
     async fn run(mut self, mut console: Option<Console>, mut stop: Stop) -> Result<(), UserError> {
@@ -124,7 +145,7 @@ impl Demo {
         let mut before = std::time::Instant::now();
         loop {
             tokio::select! {
-                () = stop.asked() => return Ok(()),
+                () = stop.asked() => return self.finish(),
                 _ = tick.tick() => {}
             }
             // A machine that is too slow for the speed must not try to catch up, or each step
@@ -132,14 +153,25 @@ impl Demo {
             let passed = before.elapsed().min(MAX_STEP + TICK);
             before = std::time::Instant::now();
             self.fly(self.mission.now() + passed.mul_f64(self.pace.demanded))?;
-            self.count();
+            count(&mut self.meter, &mut self.counted, &self.mission);
             let changed = !self.mission.take_events().is_empty();
             match &mut console {
                 Some(console) => self.serve(console, changed),
-                None if self.mission.is_drained() => return Ok(()),
+                None if self.mission.is_drained() => return self.finish(),
+                None if self.is_due() => self.publish(None),
                 None => {}
             }
         }
+    }
+
+    /// Ends the records, and prints where they are.
+    fn finish(mut self) -> Result<(), UserError> {
+        self.publish(None);
+        let Some(record) = self.record.take() else { return Ok(()) };
+        let dirs = record.dirs();
+        record.finish()?;
+        dirs.iter().for_each(|dir| outln!("record: {}", dir.display()));
+        Ok(())
     }
 
     /// Advances the mission to `until`, or as far as [`MAX_STEP`] allows.
@@ -169,26 +201,43 @@ impl Demo {
     }
 
     fn serve(&mut self, console: &mut Console, mut changed: bool) {
-        let now = self.mission.now();
         self.take_truth();
         let mut answers = Vec::new();
         while let Ok((request, reply)) = console.requests.try_recv() {
             answers.push((reply, self.answer(request)));
             changed = true;
         }
-        let due = self.published.is_none_or(|at| at.elapsed() >= PUBLISH_INTERVAL);
-        if changed || due {
-            self.published = Some(std::time::Instant::now());
-            self.meter.handle_budgets(self.mission.surface());
-            self.facts.speed = self.pace.reached(now);
-            self.record();
-            let snapshot = snapshot(self.mission.surface(), &self.facts, &self.meter, now);
-            console.snapshots.send_replace(Arc::new(snapshot));
+        if changed || self.is_due() {
+            self.publish(Some(console));
         }
         // Who reads the state after the reply finds the order in it.
         for (reply, answer) in answers {
             // A browser that closed its connection needs no reply.
             let _ = reply.send(answer);
+        }
+    }
+
+    /// Whether the state was published so long ago that it is to be published again.
+    fn is_due(&self) -> bool {
+        self.published.is_none_or(|at| at.elapsed() >= PUBLISH_INTERVAL)
+    }
+
+    /// Shows the state on the page, and records it.
+    fn publish(&mut self, console: Option<&Console>) {
+        let now = self.mission.now();
+        self.published = Some(std::time::Instant::now());
+        self.meter.handle_budgets(self.mission.surface());
+        self.facts.speed = self.pace.reached(now);
+        self.remember();
+        let snapshot = Arc::new(snapshot(self.mission.surface(), &self.facts, &self.meter, now));
+        if let Some(record) = &mut self.record
+            && let Err(error) = record.observe(&mut self.mission, &snapshot)
+        {
+            errln!("scenecast: the record ends here: {error}");
+            self.record = None;
+        }
+        if let Some(console) = console {
+            console.snapshots.send_replace(snapshot);
         }
     }
 
@@ -201,21 +250,8 @@ impl Demo {
     }
 
     /// Follows the surface's knowledge, as its store would.
-    fn record(&mut self) {
+    fn remember(&mut self) {
         let time = EventTime { mission_us: self.mission.now().as_micros(), unix_ms: 0 };
         self.recorder.observe(self.mission.surface_mut(), None, time);
-    }
-
-    /// Counts the bits that the surface received and sent, for the page's link panel.
-    fn count(&mut self) {
-        let now = self.mission.now();
-        let totals = [self.mission.received_bits(), self.mission.audits()[1].total_bits()];
-        if totals[0] > self.counted[0] {
-            self.meter.received(totals[0] - self.counted[0], now);
-        }
-        if totals[1] > self.counted[1] {
-            self.meter.sent(totals[1] - self.counted[1], now);
-        }
-        self.counted = totals;
     }
 }

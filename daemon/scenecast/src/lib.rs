@@ -3,3 +3,5 @@
 pub mod commands;
 #[cfg(feature = "rehearsal")]
 mod demo;
+#[cfg(feature = "rehearsal")]
+mod mission_record;

@@ -36,11 +36,18 @@ impl HeldLevels {
     }
 }
 
-/// The level of a cell that was of level `held`, and a quantity that is of this level whatever level is held.
+/// The level of a cell that was of level `held`, and the nearest quantity that is of this level for who holds none.
 fn settle(descriptor: &LayerDescriptor, quantity: f64, held: u8) -> (u8, f64) {
+    /// Distance from the bounds of the level, as a share of its width: beyond the errors of rounding.
+    const INSET: f64 = 0.01;
     let level = descriptor.level(quantity, held);
-    let is_plain = level == descriptor.level(quantity, 0);
-    (level, if is_plain { quantity } else { descriptor.middle(level).unwrap_or(quantity) })
+    match descriptor.bounds(level).filter(|_| level != descriptor.level(quantity, 0)) {
+        None => (level, quantity),
+        Some((low, high)) => {
+            let inset = (high - low) * INSET;
+            (level, quantity.clamp(low + inset, high - inset))
+        }
+    }
 }
 
 #[cfg(test)]

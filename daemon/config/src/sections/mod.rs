@@ -10,7 +10,7 @@ mod survey;
 
 pub use map::{Bands, Camera, Labels, Map, Scene};
 pub use modem::{Channel, Link, Modem};
-pub use node::{Console, Mission, Operator, Ros2, Runtime, SurfaceSection, VehicleSection, WorldSection};
+pub use node::{Console, Mission, Operator, Record, Ros2, Runtime, SurfaceSection, VehicleSection, WorldSection};
 pub use survey::{Autopilot, Navigation, Position, Registration, Survey};
 
 use crate::key::Section;
@@ -38,6 +38,7 @@ pub struct Config {
     pub operator: Operator,
     pub console: Console,
     pub ros2: Ros2,
+    pub record: Record,
     pub runtime: Runtime,
 }
 
@@ -64,6 +65,7 @@ impl Section {
         Operator::SECTION,
         Console::SECTION,
         Ros2::SECTION,
+        Record::SECTION,
         Runtime::SECTION,
     ];
 }

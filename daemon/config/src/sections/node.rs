@@ -94,6 +94,21 @@ section! {
 }
 
 section! {
+    /// The record of the mission: a bag of rosbag2 in MCAP.
+    record: Record {
+        /// Whether the mission is recorded.
+        enabled: bool = true, ANY, [Auv Asv Scenario];
+        /// Folder in which each mission gets a folder of its own, named by the vehicle or the surface and the time. Empty: the
+        /// folder "records" in runtime.state_dir.
+        folder: Option<PathBuf> = None, ANY, [Auv Asv Scenario];
+        /// Size at which the next file of a record begins, megabytes.
+        part_mb: u64 = 64, range(1.0, 1e5, "MB"), [Auv Asv Scenario];
+        /// Size of one mission's record above which its oldest file is removed, megabytes.
+        quota_mb: u64 = 4096, range(2.0, 1e7, "MB"), [Auv Asv Scenario];
+    }
+}
+
+section! {
     /// ROS 2 by DDS and, in builds with the feature `zenoh`, by rmw_zenoh.
     ros2: Ros2 {
         /// Whether the process publishes its map and its state to ROS 2. A camera.source of ROS 2 is independent of it.

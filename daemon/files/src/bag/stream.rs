@@ -6,7 +6,7 @@ use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOp
 use scenecast_core::UserError;
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::fs::File;
-use std::io::Read;
+use std::io::{Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
 /// Size of the largest record, bytes: a chunk of some raw images.
@@ -44,7 +44,7 @@ impl BagStream {
     /// # Errors
     /// There is no such file, or the folder has none.
     pub(crate) fn open(path: &Path) -> Result<Self, UserError> {
-        let files = if path.is_dir() { files_of(path)? } else { vec![path.to_owned()] };
+        let files = mcap_files(path)?;
         for file in &files {
             let mut head = Vec::new();
             let mut opened = scenecast_config::open_regular(file, u64::MAX)?.take(16);
@@ -94,22 +94,13 @@ impl BagStream {
 
     /// Takes the messages of a chunk, all or none.
     fn handle_chunk(&mut self, chunk: &[u8], wanted: &impl Fn(&BagTopic) -> bool) -> Result<(), String> {
-        let damaged = |error: String| format!("a chunk is damaged and left out: {error}");
-        match mcap::parse_record(op::CHUNK, chunk) {
-            Ok(Record::Chunk { header, .. }) if header.uncompressed_size > MAX_RECORD_BYTES as u64 => {
-                let size = header.uncompressed_size;
-                return Err(damaged(format!("it has {size} bytes, more than {MAX_RECORD_BYTES}")));
+        let mut handled = Ok(());
+        read_chunk(chunk, |opcode, record| {
+            if handled.is_ok() {
+                handled = self.handle_record(opcode, record, wanted);
             }
-            Ok(_) => {}
-            Err(error) => return Err(damaged(error.to_string())),
-        }
-        let head = [&[op::CHUNK][..], &(chunk.len() as u64).to_le_bytes()].concat();
-        let (mut reader, mut bytes) = (chunk_reader(), head.chain(chunk));
-        let mut take = |opcode, record: &[u8]| self.handle_record(opcode, record, wanted);
-        while let Some(taken) = next_of(&mut reader, &mut bytes, &mut take).map_err(damaged)? {
-            taken.map_err(damaged)?;
-        }
-        Ok(())
+        })?;
+        handled.map_err(|error| format!("a chunk is damaged and left out: {error}"))
     }
 
     /// Takes a record outside of chunks or of a chunk.
@@ -140,6 +131,78 @@ impl BagStream {
     pub(crate) fn other_encodings(&self) -> &BTreeSet<String> {
         &self.other_encodings
     }
+}
+
+/// The file of this path, or the files `*.mcap` of a folder in the order of their numbers.
+pub(crate) fn mcap_files(path: &Path) -> Result<Vec<PathBuf>, UserError> {
+    if path.is_dir() { files_of(path) } else { Ok(vec![path.to_owned()]) }
+}
+
+/// Whether a file has its end.
+pub(crate) fn is_whole(path: &Path) -> Result<bool, UserError> {
+    let ends = |path: &Path| -> std::io::Result<bool> {
+        let mut file = File::open(path)?;
+        let mut end = [0; mcap::MAGIC.len()];
+        if file.metadata()?.len() < 2 * end.len() as u64 {
+            return Ok(false);
+        }
+        file.seek(SeekFrom::End(-(end.len() as i64)))?;
+        file.read_exact(&mut end)?;
+        Ok(end == mcap::MAGIC)
+    };
+    ends(path).map_err(|e| UserError::file(path, e))
+}
+
+/// Gives `take` the records of a file, those of chunks too. Returns what could not be read of it: a damaged chunk is left out, and the
+/// end may be missing.
+pub(crate) fn records(
+    path: &Path,
+    mut take: impl FnMut(Record<'_>) -> Result<(), UserError>,
+) -> Result<Option<String>, UserError> {
+    let mut file = File::open(path).map_err(|e| UserError::file(path, e))?;
+    let (mut reader, mut damage) = (reader(), None);
+    loop {
+        match next_of(&mut reader, &mut file, |opcode, record| (opcode, record.to_vec())) {
+            Ok(Some((op::CHUNK, chunk))) => {
+                // All of a chunk or nothing.
+                let mut found = Vec::new();
+                match read_chunk(&chunk, |opcode, record| found.push((opcode, record.to_vec()))) {
+                    Ok(()) => {
+                        for (opcode, bytes) in found {
+                            if let Ok(record) = mcap::parse_record(opcode, &bytes) {
+                                take(record)?;
+                            }
+                        }
+                    }
+                    Err(error) => damage = damage.or(Some(error)),
+                }
+            }
+            Ok(Some((opcode, bytes))) => {
+                if let Ok(record) = mcap::parse_record(opcode, &bytes) {
+                    take(record)?;
+                }
+            }
+            Ok(None) => return Ok(damage),
+            Err(error) => return Ok(damage.or(Some(error))),
+        }
+    }
+}
+
+/// Gives `take` the kinds and the bytes of the records of a chunk.
+fn read_chunk(chunk: &[u8], mut take: impl FnMut(u8, &[u8])) -> Result<(), String> {
+    let damaged = |error: String| format!("a chunk is damaged and left out: {error}");
+    match mcap::parse_record(op::CHUNK, chunk) {
+        Ok(Record::Chunk { header, .. }) if header.uncompressed_size > MAX_RECORD_BYTES as u64 => {
+            let size = header.uncompressed_size;
+            return Err(damaged(format!("it has {size} bytes, more than {MAX_RECORD_BYTES}")));
+        }
+        Ok(_) => {}
+        Err(error) => return Err(damaged(error.to_string())),
+    }
+    let head = [&[op::CHUNK][..], &(chunk.len() as u64).to_le_bytes()].concat();
+    let (mut reader, mut bytes) = (chunk_reader(), head.chain(chunk));
+    while next_of(&mut reader, &mut bytes, &mut take).map_err(damaged)?.is_some() {}
+    Ok(())
 }
 
 /// What `take` makes of the kind and the bytes of the next record of a reader, which takes its bytes from a source.

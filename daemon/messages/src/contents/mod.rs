@@ -6,9 +6,11 @@
 //! east, north and up; headings become angles from east, anticlockwise.
 
 mod map;
+mod stamps;
 mod vehicle;
 
 pub use map::{Grid, GridLayer, MAX_GRID_CELLS, cloud, layers, occupancy};
+pub use stamps::{Stamps, valid_part};
 pub use vehicle::{Health, Place, diagnostics, exemplar_jpeg, fix, path, pose};
 
 use crate::builtin_interfaces::Time;

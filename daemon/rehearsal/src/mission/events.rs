@@ -2,7 +2,7 @@
 
 use super::Mission;
 use super::camera::NextFrame;
-use super::logbook::{FramePoses, STEP_S};
+use super::logbook::{EndEvent, FramePoses, STEP_S};
 use crate::modem_rig::{SURFACE, VEHICLE};
 use scene_model::project::{Pose, View};
 use scenecast_core::UserError;
@@ -75,10 +75,11 @@ impl Mission {
                     self.events.push(output);
                 }
                 SurfaceHostEvent::Frame(event) => {
-                    if let FrameEvent::Received { bytes } = event {
-                        self.logbook.received_bits += self.surface.link().profile().bits_on_air(bytes);
+                    if let FrameEvent::Received { frame, .. } = &event {
+                        self.logbook.received_bits += self.surface.link().profile().bits_on_air(frame.len());
                     }
                     self.carrier.log_event(SURFACE, &event, self.times.now);
+                    self.logbook.note_event(|| EndEvent::Surface(event), self.times.now);
                 }
                 SurfaceHostEvent::Following(..) | SurfaceHostEvent::Pilot(_) => {}
             }
@@ -86,6 +87,7 @@ impl Mission {
     }
 
     fn handle_vehicle_event(&mut self, event: VehicleHostEvent) {
+        self.logbook.note_event(|| EndEvent::Vehicle(event.clone()), self.times.now);
         match event {
             VehicleHostEvent::Persist => self.vehicle.handle_persisted(),
             VehicleHostEvent::Waypoint(to) => {
@@ -96,7 +98,9 @@ impl Mission {
             VehicleHostEvent::Surface => self.motion.come_up(),
             VehicleHostEvent::Tune(settings) => self.mapper.tune(&settings),
             VehicleHostEvent::Applied(applied) => self.logbook.note_applied(applied),
-            VehicleHostEvent::Frame(event) => self.carrier.log_event(VEHICLE, &event, self.times.now),
+            VehicleHostEvent::Frame(event) => {
+                self.carrier.log_event(VEHICLE, &event, self.times.now);
+            }
             VehicleHostEvent::Fixed(..)
             | VehicleHostEvent::SurveyEnded
             | VehicleHostEvent::Pilot(_)

@@ -148,7 +148,7 @@ fn a_band_arrives_beside_the_labels_of_the_scene_model() {
     ];
     let mut mission = mission(&dir, &sets.each_ref().map(String::as_str));
     assert!(!mission.has_foreign_labels());
-    mission.run(std::time::Duration::from_secs(600), &mut |_| {}).unwrap();
+    mission.run(std::time::Duration::from_secs(600), &mut |_| Ok(())).unwrap();
     let (vehicle, address) = (mission.vehicle(), mission.address());
     assert!(vehicle.is_converged() && vehicle.map().explored() > 100, "{}", vehicle.map().explored());
     assert_eq!(mission.surface().map(address), Some(vehicle.map()));

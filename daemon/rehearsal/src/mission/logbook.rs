@@ -1,6 +1,7 @@
 //! The record of a mission, the source of its report; its clock and its regular events.
 
 use scenecast_config::Config;
+use scenecast_host::{FrameEvent, VehicleHostEvent};
 use scenecast_protocol::coordinates::MapPoint;
 use scenecast_protocol::directive::SlotId;
 use scenecast_protocol::link::PeerView;
@@ -50,11 +51,27 @@ pub(crate) struct Logbook {
     pub(crate) received_bits: u64,
     /// What people should change at the camera.
     pub(crate) camera_advice: Option<String>,
+    /// The events of both ends and their times, if they are kept.
+    pub(crate) events: Option<Vec<(Instant, EndEvent)>>,
     /// Frames of a recording that cannot be read: how many, and why the first one.
     pub(crate) unreadable: Option<(u64, String)>,
 }
 
+/// An event of one of the ends.
+#[derive(Debug, Clone, PartialEq)]
+pub enum EndEvent {
+    /// A frame of the surface.
+    Surface(FrameEvent),
+    Vehicle(VehicleHostEvent),
+}
+
 impl Logbook {
+    pub(super) fn note_event(&mut self, event: impl FnOnce() -> EndEvent, at: Instant) {
+        if let Some(events) = &mut self.events {
+            events.push((at, event()));
+        }
+    }
+
     pub(super) fn note_waypoint(&mut self, vehicle: &Vehicle, to: MapPoint) {
         let navigator = vehicle.navigator();
         self.legs.push((navigator.to_world(navigator.position()).xy(), navigator.to_world(to).xy()));

@@ -25,7 +25,7 @@ pub use accuracy::{FrameErrors, MapInformation};
 use anchored::Anchored;
 use camera::Camera;
 use labels::LabelReplay;
-pub use logbook::Leg;
+pub use logbook::{EndEvent, Leg};
 use logbook::{Logbook, Timetable};
 pub use quality::MapQuality;
 use quality::Meters;
@@ -205,6 +205,16 @@ impl Mission {
         [vehicle.audit().total_bits() + vehicle.repeated_bits(), surface.audit().total_bits() + surface.repeated_bits()]
     }
 
+    /// Keeps the events of both ends from now on, for [`Self::take_end_events`].
+    pub fn keep_end_events(&mut self) {
+        self.logbook.events.get_or_insert_default();
+    }
+
+    /// The events of both ends since the last call, with their times.
+    pub fn take_end_events(&mut self) -> Vec<(Instant, EndEvent)> {
+        self.logbook.events.as_mut().map(std::mem::take).unwrap_or_default()
+    }
+
     pub fn frames(&self) -> &FramesLog {
         &self.carrier.log
     }
@@ -235,23 +245,32 @@ impl Mission {
         Ok(())
     }
 
-    /// Runs the survey to its end, then lets the link drain for at most `drain`.
-    pub fn run(&mut self, drain: Duration, progress: &mut dyn FnMut(f64)) -> Result<(), UserError> {
-        let end_s = self.config.survey.duration_s;
-        self.run_survey(Duration::from_secs(10), &mut |mission| progress(mission.now().as_secs_f64() / end_s))?;
+    /// Runs the survey to its end, then lets the link drain for at most `drain`. `then` is called every ten seconds of the survey and
+    /// every second after it.
+    pub fn run(
+        &mut self,
+        drain: Duration,
+        then: &mut dyn FnMut(&mut Self) -> Result<(), UserError>,
+    ) -> Result<(), UserError> {
+        self.run_survey(Duration::from_secs(10), then)?;
         let give_up = self.now() + drain;
         while !self.is_drained() && self.now() < give_up {
             self.advance(self.now() + Duration::from_secs(1))?;
+            then(self)?;
         }
         self.camera.finish_recording()
     }
 
     /// Runs the survey to its end in steps, with a call of `then` after each of them.
-    pub(crate) fn run_survey(&mut self, step: Duration, then: &mut dyn FnMut(&Self)) -> Result<(), UserError> {
+    pub(crate) fn run_survey(
+        &mut self,
+        step: Duration,
+        then: &mut dyn FnMut(&mut Self) -> Result<(), UserError>,
+    ) -> Result<(), UserError> {
         let end = Instant::from_secs_f64(self.config.survey.duration_s);
         while self.now() < end {
             self.advance((self.now() + step).min(end))?;
-            then(self);
+            then(self)?;
         }
         self.end_survey();
         Ok(())

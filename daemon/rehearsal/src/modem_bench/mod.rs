@@ -111,7 +111,7 @@ pub fn survey(name: &str, sets: &[&str], seed: u64, duration_s: f64) -> Result<S
     config.survey.duration_s = duration_s;
     let options = MissionOptions { world: World::patches(seed, config.camera.metres_per_pixel), seed, record: None };
     let mut mission = Mission::new(config, options)?;
-    mission.run(Duration::from_secs(7200), &mut |_| {})?;
+    mission.run(Duration::from_secs(7200), &mut |_| Ok(()))?;
     let report = report(&mission, name);
     let value = |key: &str| report.json["map"][key].as_f64().unwrap_or_default();
     Ok(SurveyRow {

@@ -6,7 +6,6 @@
 mod health;
 mod map;
 mod orders;
-mod stamps;
 mod vehicle;
 
 use crate::node::RosNode;
@@ -14,12 +13,16 @@ use crate::stop::{self, Owned, Owner};
 use scenecast_config::Ros2;
 use scenecast_console::{ClientRequest, PendingRequest, Reply, Snapshot};
 use scenecast_core::{ClientName, Giver, Principal, UserError};
-use stamps::Stamps;
+use scenecast_messages::contents::Stamps;
 use std::collections::BTreeMap;
 use std::sync::Arc;
-use std::time::Duration;
+use std::time::{Duration, SystemTime, UNIX_EPOCH};
 use tokio::sync::{mpsc, oneshot, watch};
 use vehicle::{Parts, VehicleTopics};
+
+fn nanos(time: SystemTime) -> i64 {
+    time.duration_since(UNIX_EPOCH).map_or(0, |since| since.as_nanos() as i64)
+}
 
 /// Time between two looks at snapshots, subscribers and orders.
 const TICK: Duration = Duration::from_millis(100);
@@ -95,7 +98,7 @@ impl Worker {
         while owned.wait(TICK) {
             if self.snapshots.has_changed().unwrap_or(false) {
                 snapshot = self.snapshots.borrow_and_update().clone();
-                stamps = Stamps::new(&snapshot.state);
+                stamps = Stamps::new(snapshot.state.now_s, snapshot.state.mission.speed, nanos(SystemTime::now()));
             }
             self.handle(&snapshot, &stamps);
         }

@@ -1,6 +1,6 @@
 //! The orders of ROS 2 to one vehicle, as requests of the surface.
 
-use super::{Desk, stamps};
+use super::{Desk, nanos};
 use crate::inbox::Inbox;
 use crate::node::RosNode;
 use crate::transport::Qos;
@@ -67,7 +67,7 @@ impl OrderTopics {
 }
 
 fn fresh(header: &Header) -> Result<(), String> {
-    check_age(header, stamps::nanos(SystemTime::now()))
+    check_age(header, nanos(SystemTime::now()))
 }
 
 fn outcome(name: &str, by: &Giver, reply: Result<Option<Reply>, String>) -> Outcome {

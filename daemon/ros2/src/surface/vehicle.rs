@@ -4,14 +4,14 @@ use super::Desk;
 use super::health::health;
 use super::map::MapTopics;
 use super::orders::OrderTopics;
-use super::stamps::Stamps;
 use crate::node::{Publisher, RosNode};
 use crate::transport::Qos;
 use crate::valid_part;
-use scenecast_console::state::{MapLabelTree, MissionState, OrderStatus, StatusReport, VehicleState};
+use scenecast_console::messages::{label_tree, order_status, place, place_on_earth};
+use scenecast_console::state::{MapLabelTree, MissionState, OrderStatus, VehicleState};
 use scenecast_console::{ClientRequest, Reply, SurfaceRequest};
-use scenecast_core::{LatLon, TangentPlane, UserError};
-use scenecast_messages::contents::{Place, WORLD_FRAME, diagnostics, exemplar_jpeg, fix, header, path, pose};
+use scenecast_core::UserError;
+use scenecast_messages::contents::{Place, Stamps, WORLD_FRAME, diagnostics, exemplar_jpeg, header, path, pose};
 use scenecast_messages::diagnostic_msgs::DiagnosticArray;
 use scenecast_messages::geometry_msgs::PoseWithCovarianceStamped;
 use scenecast_messages::nav_msgs::Path;
@@ -109,15 +109,7 @@ impl VehicleTopics {
         if self.tree_published.as_ref() == Some(&found) {
             return;
         }
-        let (into, joins) = tree.merges.iter().copied().unzip();
-        let message = scenecast_msgs::LabelTree {
-            header: header(),
-            vehicle: vehicle.name.clone(),
-            epoch: vehicle.map.epoch.into(),
-            into,
-            joins,
-            clearest: tree.clearest.unwrap_or(0),
-        };
+        let message = label_tree(vehicle, tree, header());
         // One that was refused is tried again.
         if self.tree.publish(message) {
             self.tree_published = Some(found);
@@ -162,30 +154,11 @@ impl VehicleTopics {
             if self.orders_published.get(&slot.slot) == Some(&state) {
                 continue;
             }
-            let message = scenecast_msgs::OrderStatus {
-                header: header(stamps.at(slot.changed_s), ""),
-                vehicle: vehicle.name.clone(),
-                slot: slot.slot.clone(),
-                version: slot.version.into(),
-                status: status(slot.state),
-                reason: slot.reason.clone().unwrap_or_default(),
-                given: stamps.at(slot.issued_s),
-            };
+            let message = order_status(vehicle, slot, stamps);
             if self.order_status.publish(message) {
                 self.orders_published.insert(slot.slot.clone(), state);
             }
         }
-    }
-}
-
-fn status(state: OrderStatus) -> u8 {
-    match state {
-        OrderStatus::Queued => scenecast_msgs::OrderStatus::QUEUED,
-        OrderStatus::OnAir => scenecast_msgs::OrderStatus::ON_AIR,
-        OrderStatus::Received => scenecast_msgs::OrderStatus::RECEIVED,
-        OrderStatus::Applied => scenecast_msgs::OrderStatus::APPLIED,
-        OrderStatus::Refused => scenecast_msgs::OrderStatus::REFUSED,
-        OrderStatus::Withdrawn => scenecast_msgs::OrderStatus::WITHDRAWN,
     }
 }
 
@@ -235,21 +208,11 @@ impl StateTopics {
             let plan: Vec<Place> = waypoints.map(|&waypoint| at(status.at_s, waypoint)).collect();
             self.plan.publish(path(&plan, header(stamp.clone(), WORLD_FRAME)));
         }
-        let origin = mission.mission.origin.and_then(|o| LatLon::new(o.lat_deg, o.lon_deg));
-        if let Some(origin) = origin.filter(|_| self.fix.subscribers() > 0) {
-            let [east, north, _] = place.position_m;
-            let on_earth = TangentPlane::new(origin).to_place(east, north);
-            self.fix.publish(fix(on_earth, status.pose.sigma_m, header(stamp, WORLD_FRAME)));
+        if self.fix.subscribers() > 0
+            && let Some(fix) = place_on_earth(mission, &place, status.pose.sigma_m)
+        {
+            self.fix.publish(fix);
         }
-    }
-}
-
-fn place(status: &StatusReport, shift_m: (f64, f64), stamps: &Stamps) -> Place {
-    let pose = &status.pose;
-    Place {
-        stamp: stamps.at(status.at_s),
-        position_m: [pose.x_m + shift_m.0, pose.y_m + shift_m.1, pose.z_m],
-        heading_rad: pose.heading_deg.to_radians(),
     }
 }
 

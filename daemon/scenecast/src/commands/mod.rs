@@ -15,6 +15,7 @@ mod manual;
 #[cfg(feature = "rehearsal")]
 mod modem_sim;
 mod node;
+mod record;
 #[cfg(feature = "rehearsal")]
 mod sim;
 
@@ -74,6 +75,9 @@ enum Command {
     /// Make the key of a mission or of a vehicle, show a key, or make a token for the operator's page.
     #[command(subcommand)]
     Key(key::Key),
+    /// Repair the record of a mission.
+    #[command(subcommand)]
+    Record(record::Record),
     #[cfg(feature = "tools")]
     /// Encode label maps as on the link, and measure the codecs.
     #[command(subcommand)]
@@ -122,6 +126,7 @@ pub fn run(arguments: Arguments) -> Result<(), UserError> {
         #[cfg(feature = "rehearsal")]
         Command::Bench(bench) => bench.run(),
         Command::Key(key) => key.run(),
+        Command::Record(record) => record.run(),
         #[cfg(feature = "tools")]
         Command::Map(map) => map.run(),
         #[cfg(feature = "tools")]

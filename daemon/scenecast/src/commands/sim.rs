@@ -1,5 +1,6 @@
 //! `scenecast sim`
 
+use crate::mission_record::{MissionRecord, RecordClock, UnseenPage};
 use clap::Args;
 use scenecast_config::Config;
 use scenecast_core::{UserError, errln, outln};
@@ -111,11 +112,17 @@ impl Sim {
         let config = self.world.config()?;
         let world = self.world.world(&config)?;
         let options = MissionOptions { world, seed: self.world.seed, record: self.record.clone() };
-        let mut mission = Mission::new(config, options)?;
+        let mut mission = Mission::new(config.clone(), options)?;
         // Before the mission flies, which may take long.
         std::fs::create_dir_all(&self.out).map_err(|e| UserError::file(&self.out, e))?;
         let mut progress = Progress::new("survey");
-        mission.run(Duration::from_secs_f64(self.drain), &mut |share| progress.show(share))?;
+        let mut record = self.record_ends(&mut mission)?;
+        let (mut page, end_s) = (UnseenPage::new(&mission, self.world.seed), config.survey.duration_s);
+        mission.run(Duration::from_secs_f64(self.drain), &mut |mission| {
+            progress.show((mission.now().as_secs_f64() / end_s).min(1.0));
+            record.as_mut().map_or(Ok(()), |record| record.observe(mission, &page.snapshot(mission)))
+        })?;
+        record.map_or(Ok(()), MissionRecord::finish)?;
         drop(progress);
         for refused in mission.refused_labels() {
             errln!("refused: {refused}");
@@ -145,5 +152,17 @@ impl Sim {
             map["agreement_mean"],
         );
         Ok(())
+    }
+
+    /// The records of both ends, in folders beside the report.
+    fn record_ends(&self, mission: &mut Mission) -> Result<Option<MissionRecord>, UserError> {
+        if !mission.config().record.enabled {
+            return Ok(None);
+        }
+        let dirs = ["record_surface", "record_vehicle"].map(|name| self.out.join(name));
+        for dir in dirs.iter().filter(|dir| dir.exists()) {
+            std::fs::remove_dir_all(dir).map_err(|e| UserError::file(dir, e))?;
+        }
+        MissionRecord::create(mission, RecordClock::Virtual, [&dirs[0], &dirs[1]]).map(Some)
     }
 }

@@ -87,7 +87,7 @@ fn fly(config: &Config, world: &World, seed: u64) -> Result<Mission, UserError> 
     let mut config = config.clone();
     navigate_perfectly(&mut config);
     let mut mission = Mission::new(config, MissionOptions { world: world.clone(), seed, record: None })?;
-    mission.run(Duration::ZERO, &mut |_| {})?;
+    mission.run(Duration::ZERO, &mut |_| Ok(()))?;
     Ok(mission)
 }
 

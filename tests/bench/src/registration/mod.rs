@@ -91,7 +91,7 @@ fn fly(
         navigate_perfectly(&mut config);
     }
     let mut mission = Mission::new(config, MissionOptions { world: world.clone(), seed, record: None })?;
-    mission.run(Duration::ZERO, &mut |_| {})?;
+    mission.run(Duration::ZERO, &mut |_| Ok(()))?;
     let cells = |metres: Option<f64>| metres.unwrap_or(0.0) / mission.cell_m();
     let errors = mission.registration_error_m();
     let information = mission.map_information(&mission.operator_map());

@@ -123,5 +123,5 @@ fn record(dir: &Path) -> Result<(), UserError> {
     ];
     let config = scenecast_config::load(None, &sets)?;
     let options = MissionOptions { world: World::patches(2, 0.01), seed: 1, record: Some(dir.to_owned()) };
-    Mission::new(config, options)?.run(Duration::ZERO, &mut |_| {})
+    Mission::new(config, options)?.run(Duration::ZERO, &mut |_| Ok(()))
 }

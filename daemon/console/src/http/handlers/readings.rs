@@ -12,6 +12,7 @@ use axum::extract::{Query, State};
 use axum::http::{HeaderName, HeaderValue, StatusCode, Uri, header};
 use axum::response::{IntoResponse, Response};
 use axum::{Extension, Json};
+use scenecast_core::utc_text;
 use scenecast_surface::{Giver, LogEntry, LogKind};
 use serde::Deserialize;
 use std::collections::{BTreeMap, VecDeque};
@@ -224,23 +225,8 @@ impl MissionUtc {
 
     /// A mission time in seconds, as in RFC 3339.
     pub(in crate::http) fn at(&self, at_s: f64) -> String {
-        utc(self.unix_s - (self.now_s - at_s) / self.speed)
+        utc_text(self.unix_s - (self.now_s - at_s) / self.speed)
     }
-}
-
-/// Seconds since 1970 as in RFC 3339, in whole seconds. The date: H. Hinnant, "chrono-compatible low-level date
-/// algorithms", `civil_from_days`.
-fn utc(unix_s: f64) -> String {
-    let seconds = unix_s.max(0.0) as i64;
-    let (days, s) = (seconds.div_euclid(86_400) + 719_468, seconds.rem_euclid(86_400));
-    let (era, day_of_era) = (days.div_euclid(146_097), days.rem_euclid(146_097));
-    let year = (day_of_era - day_of_era / 1460 + day_of_era / 36_524 - day_of_era / 146_096) / 365;
-    let day_of_year = day_of_era - (365 * year + year / 4 - year / 100);
-    let shifted = (5 * day_of_year + 2) / 153;
-    let (day, month) =
-        (day_of_year - (153 * shifted + 2) / 5 + 1, if shifted < 10 { shifted + 3 } else { shifted - 9 });
-    let year = year + era * 400 + i64::from(month <= 2);
-    format!("{year:04}-{month:02}-{day:02}T{:02}:{:02}:{:02}Z", s / 3600, s / 60 % 60, s % 60)
 }
 
 #[cfg(test)]
@@ -248,22 +234,17 @@ mod tests {
     use super::*;
 
     #[test]
-    fn times_are_in_utc() {
-        for (unix_s, text) in [
-            (0.0, "1970-01-01T00:00:00Z"),
-            (951_782_399.9, "2000-02-28T23:59:59Z"),
-            (951_782_400.0, "2000-02-29T00:00:00Z"),
-            (1_795_462_527.0, "2026-11-23T19:35:27Z"),
-        ] {
-            assert_eq!(utc(unix_s), text);
-        }
-    }
-
-    #[test]
     fn a_table_quotes_texts_and_starts_no_formula() {
         let text = "=1, \"wreck\"".to_owned();
-        let line =
-            LogLine { number: 7, at_s: 1.25, utc: utc(0.0), vehicle: Some(2), kind: "record".into(), by: None, text };
+        let line = LogLine {
+            number: 7,
+            at_s: 1.25,
+            utc: utc_text(0.0),
+            vehicle: Some(2),
+            kind: "record".into(),
+            by: None,
+            text,
+        };
         let table = String::from_utf8(to_csv(&[line]).unwrap()).unwrap();
         let row = "7,1970-01-01T00:00:00Z,1.2,2,record,,\"'=1, \"\"wreck\"\"\"";
         assert_eq!(table, format!("number,utc,mission_s,vehicle,kind,by,text\n{row}\n"));

@@ -32,6 +32,8 @@ pub(super) enum CaptureError {
     Broken { packet: usize, what: String },
     #[error("packet {packet}: link type {link} is unknown; known: Ethernet, Linux cooked, raw IP, loopback, User 0")]
     Link { packet: usize, link: u32 },
+    #[error("{0}")]
+    Record(String),
     #[error("packet {packet}: its interface is not described")]
     Interface { packet: usize },
 }

@@ -4,11 +4,12 @@ mod capture;
 mod fields;
 mod line;
 
-use capture::Capture;
+use capture::{Capture, CaptureError, Captured};
 use clap::{Args, Subcommand};
 use line::FrameLine;
 use scenecast_config::{read_key, read_regular};
 use scenecast_core::{UserError, errln};
+use scenecast_files::{RecordedFrames, is_record};
 use scenecast_protocol::MissionId;
 use scenecast_protocol::seal::HeldKey;
 use scenecast_protocol::wire::Listener;
@@ -24,15 +25,16 @@ pub enum Wire {
     Decode(Decode),
 }
 
-/// Print the frames of a capture or of a text, a line each.
+/// Print the frames of a capture, of a record or of a text, a line each.
 ///
-/// A capture (pcap, pcapng) has them in UDP datagrams, or as packets of the link type User 0; a text has the hexadecimal digits of a
+/// A capture (pcap, pcapng) has them in UDP datagrams, or as packets of the link type User 0; a record of a mission has those that its
+/// end has sent and received; a text has the hexadecimal digits of a
 /// frame in each line. With --mission the CRC of each frame is checked, with --key its tag; a CRC proves no sender. The hellos of both
 /// ends must be among the frames. --json has all bytes, too.
 #[derive(Debug, Args)]
 #[command(after_help = EXAMPLES)]
 pub struct Decode {
-    /// Capture or text; - reads the standard input
+    /// Capture, record (a file or its folder) or text; - reads the standard input
     #[arg(value_name = "FILE")]
     input: PathBuf,
     /// Mission, mission.id of the configuration: decimal, or hexadecimal after 0x
@@ -70,8 +72,7 @@ impl Wire {
 
 impl Decode {
     fn run(self) -> Result<(), UserError> {
-        let bytes = read_input(&self.input)?;
-        let Capture { frames, fault } = capture::frames(&bytes, self.port);
+        let Capture { frames, fault } = self.read()?;
         let mut listener = match self.mission {
             Some(mission) => Some(Listener::new(mission, self.keys()?)),
             None => None,
@@ -90,6 +91,16 @@ impl Decode {
             }
         }
         fault.map_or(Ok(()), |fault| Err(UserError::file(&self.input, fault)))
+    }
+
+    fn read(&self) -> Result<Capture, UserError> {
+        if self.input != Path::new("-") && is_record(&self.input) {
+            let RecordedFrames { frames, damage } = RecordedFrames::read(&self.input)?;
+            let captured = |(nanos, bytes)| Captured { time_s: Some(nanos as f64 / 1e9), bytes, is_cut: false };
+            let frames = frames.into_iter().map(captured).collect();
+            return Ok(Capture { frames, fault: damage.map(CaptureError::Record) });
+        }
+        Ok(capture::frames(&read_input(&self.input)?, self.port))
     }
 
     fn keys(&self) -> Result<Vec<HeldKey>, UserError> {

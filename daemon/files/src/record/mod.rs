@@ -1,0 +1,241 @@
+//! The record of a mission: a bag of rosbag2 in MCAP, in a folder of its own. A power cut takes its last two seconds at most.
+
+mod frames;
+mod metadata;
+mod recover;
+
+pub use frames::{RecordedFrames, is_record};
+pub use recover::{RecoveredPart, recover};
+
+use mcap::records::MessageHeader;
+use mcap::{WriteOptions, Writer};
+use metadata::Metadata;
+use scenecast_core::UserError;
+use scenecast_messages::{Definition, Message, encode};
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::{BufWriter, Write};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// Bytes of messages in a chunk at most, before compression.
+const CHUNK_BYTES: u64 = 256 << 10;
+
+/// A message with its topic and its time.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RecordEntry {
+    pub topic: String,
+    pub definition: &'static Definition,
+    /// Nanoseconds since 1970, UTC.
+    pub nanos: u64,
+    /// The message in CDR.
+    pub data: Vec<u8>,
+}
+
+impl RecordEntry {
+    /// An entry of a message.
+    pub fn new<M: Message>(topic: String, nanos: u64, message: &M) -> Self {
+        Self { topic, definition: M::DEFINITION, nanos, data: encode(message) }
+    }
+}
+
+/// Sizes of a record on disk.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct RecordLimits {
+    /// Size at which the next file begins, bytes.
+    pub part_bytes: u64,
+    /// Size of all files together, above which the oldest is removed, bytes.
+    pub all_bytes: u64,
+}
+
+/// Writes a record. After an error its files are as they were synced last, and it is to be dropped.
+pub struct RecordWriter {
+    dir: PathBuf,
+    limits: RecordLimits,
+    metadata: Metadata,
+    open: OpenPart,
+}
+
+/// The file that is written now.
+struct OpenPart {
+    writer: Writer<BufWriter<Arc<File>>>,
+    file: Arc<File>,
+    /// Identifier and number of messages of each topic in this file.
+    channels: BTreeMap<String, (u16, u32)>,
+}
+
+impl OpenPart {
+    fn create(path: &Path) -> Result<Self, UserError> {
+        let create = || -> std::io::Result<Arc<File>> { Ok(Arc::new(File::create_new(path)?)) };
+        let file = create().map_err(|e| UserError::file(path, e))?;
+        // One thread compresses: chunks are small.
+        let options = WriteOptions::new().profile("ros2").library("scenecast").chunk_size(Some(CHUNK_BYTES));
+        let writer = options.compression_threads(0).create(BufWriter::new(file.clone()));
+        let writer = writer.map_err(|e| UserError::file(path, e))?;
+        Ok(Self { writer, file, channels: BTreeMap::new() })
+    }
+
+    fn write(&mut self, entry: &RecordEntry) -> Result<(), mcap::McapError> {
+        let channel = match self.channels.get_mut(&entry.topic) {
+            Some(channel) => channel,
+            None => {
+                let definition = entry.definition;
+                let text = definition.ros2msg();
+                let schema = self.writer.add_schema(&definition.full_name(), "ros2msg", text.as_bytes())?;
+                let qos = BTreeMap::from([("offered_qos_profiles".to_owned(), String::new())]);
+                let id = self.writer.add_channel(schema, &entry.topic, "cdr", &qos)?;
+                self.channels.entry(entry.topic.clone()).or_insert((id, 0))
+            }
+        };
+        let (channel_id, sequence) = *channel;
+        channel.1 = sequence.wrapping_add(1);
+        let times = (entry.nanos, entry.nanos);
+        let header = MessageHeader { channel_id, sequence, log_time: times.0, publish_time: times.1 };
+        self.writer.write_to_known_channel(&header, &entry.data)
+    }
+
+    /// Ends the chunk, and makes all durable. Returns the size of the file.
+    fn sync(&mut self) -> Result<u64, mcap::McapError> {
+        self.writer.flush()?;
+        self.file.sync_data()?;
+        Ok(self.file.metadata()?.len())
+    }
+
+    fn finish(mut self) -> Result<(), mcap::McapError> {
+        self.writer.finish()?;
+        self.writer.into_inner().flush()?;
+        Ok(self.file.sync_all()?)
+    }
+}
+
+impl RecordWriter {
+    /// Begins a record in a new folder.
+    ///
+    /// # Errors
+    /// The folder or its files cannot be written, or the folder exists.
+    pub fn create(dir: &Path, limits: RecordLimits) -> Result<Self, UserError> {
+        let parent = dir.parent().unwrap_or(Path::new(""));
+        std::fs::create_dir_all(parent).map_err(|e| UserError::file(parent, e))?;
+        std::fs::create_dir(dir).map_err(|e| UserError::file(dir, e))?;
+        let stem = dir.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let mut metadata = Metadata::new(stem);
+        let open = OpenPart::create(&dir.join(metadata.begin_part()))?;
+        metadata.write(dir)?;
+        Ok(Self { dir: dir.to_owned(), limits, metadata, open })
+    }
+
+    /// Adds a message.
+    ///
+    /// # Errors
+    /// The disk refuses it.
+    pub fn write(&mut self, entry: &RecordEntry) -> Result<(), UserError> {
+        self.metadata.note(entry);
+        self.open.write(entry).map_err(|e| UserError::file(&self.dir, e))
+    }
+
+    /// Makes what was written durable; to be called every two seconds. Returns whether a new file has begun, which is to repeat
+    /// the state of the map.
+    ///
+    /// # Errors
+    /// The disk refuses it.
+    pub fn sync(&mut self) -> Result<bool, UserError> {
+        let bytes = self.open.sync().map_err(|e| UserError::file(&self.dir, e))?;
+        self.metadata.set_bytes(bytes);
+        if bytes < self.limits.part_bytes {
+            return Ok(false);
+        }
+        let next = OpenPart::create(&self.dir.join(self.metadata.begin_part()))?;
+        std::mem::replace(&mut self.open, next).finish().map_err(|e| UserError::file(&self.dir, e))?;
+        for old in self.metadata.take_excess(self.limits.all_bytes) {
+            let path = self.dir.join(old);
+            std::fs::remove_file(&path).map_err(|e| UserError::file(&path, e))?;
+        }
+        self.metadata.write(&self.dir)?;
+        Ok(true)
+    }
+
+    /// Ends the record.
+    ///
+    /// # Errors
+    /// The disk refuses it.
+    pub fn finish(self) -> Result<(), UserError> {
+        self.open.finish().map_err(|e| UserError::file(&self.dir, e))?;
+        self.metadata.write(&self.dir)
+    }
+
+    /// The folder of the record.
+    pub fn dir(&self) -> &Path {
+        &self.dir
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bag::stream::BagStream;
+    use scenecast_messages::scenecast_msgs::Event;
+
+    const LIMITS: RecordLimits = RecordLimits { part_bytes: 1 << 20, all_bytes: 10 << 20 };
+
+    pub(super) fn fresh(name: &str) -> PathBuf {
+        let dir = std::env::temp_dir().join(format!("scenecast-{}-record-{name}", std::process::id()));
+        let _ = std::fs::remove_dir_all(&dir);
+        dir
+    }
+
+    pub(super) fn event(second: u64) -> RecordEntry {
+        let text = format!("event {second}");
+        let event = Event { vehicle: "auv-1".to_owned(), level: Event::INFO, text, ..Event::default() };
+        RecordEntry::new("/auv_1/events".to_owned(), second * 1_000_000_000, &event)
+    }
+
+    pub(super) fn texts(path: &Path) -> Vec<String> {
+        let mut stream = BagStream::open(path).unwrap();
+        let mut texts = Vec::new();
+        while let Some(message) = stream.next(|_| true).unwrap() {
+            texts.push(scenecast_messages::decode::<Event>(&message.bytes).unwrap().text);
+        }
+        texts
+    }
+
+    #[test]
+    fn what_was_synced_is_read_after_a_power_cut() {
+        let dir = fresh("cut");
+        let mut writer = RecordWriter::create(&dir, LIMITS).unwrap();
+        assert!(dir.join("metadata.yaml").exists());
+        (0..5).for_each(|second| writer.write(&event(second)).unwrap());
+        assert!(!writer.sync().unwrap());
+        writer.write(&event(5)).unwrap();
+        std::mem::forget(writer);
+        let part = dir.join(format!("{}_0.mcap", dir.file_name().unwrap().to_str().unwrap()));
+        assert!(part.exists());
+        let recovered = recover(&dir).unwrap();
+        assert_eq!(recovered.iter().map(|part| part.messages).collect::<Vec<_>>(), [Some(5)]);
+        assert_eq!(texts(&dir), ["event 0", "event 1", "event 2", "event 3", "event 4"]);
+        assert_eq!(recover(&dir).unwrap()[0].messages, None, "it is whole now");
+        std::fs::remove_dir_all(&dir).unwrap();
+    }
+
+    #[test]
+    fn the_oldest_files_give_room_to_the_newest() {
+        let dir = fresh("parts");
+        let limits = RecordLimits { part_bytes: 2000, all_bytes: 5000 };
+        let mut writer = RecordWriter::create(&dir, limits).unwrap();
+        let mut parts = 1;
+        for second in 0..40 {
+            writer.write(&event(second)).unwrap();
+            parts += u32::from(writer.sync().unwrap());
+        }
+        writer.finish().unwrap();
+        let files =
+            std::fs::read_dir(&dir).unwrap().filter(|f| f.as_ref().unwrap().path().extension().unwrap() == "mcap");
+        let files = files.count() as u32;
+        assert!(parts > 6 && files < parts, "{files} of {parts}");
+        let texts = texts(&dir);
+        assert_eq!(texts.last().map(String::as_str), Some("event 39"));
+        assert!(texts.len() < 40);
+        let metadata = std::fs::read_to_string(dir.join("metadata.yaml")).unwrap();
+        assert_eq!(metadata.matches("path: ").count() as u32, files);
+        std::fs::remove_dir_all(&dir).unwrap();
+    }
+}

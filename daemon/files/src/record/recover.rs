@@ -1,0 +1,104 @@
+//! Records that a power cut has left without their end: what was synced is written anew, with an index.
+
+use super::metadata::{Metadata, Part};
+use crate::bag::stream::{is_whole, mcap_files, records};
+use mcap::records::{MessageHeader, Record};
+use mcap::{WriteOptions, Writer};
+use scenecast_core::UserError;
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::{BufWriter, Write};
+use std::path::{Path, PathBuf};
+
+/// A file of a record.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct RecoveredPart {
+    pub path: PathBuf,
+    /// The number of messages that were found; `None` if the file was whole.
+    pub messages: Option<u64>,
+    /// Why some of it could not be read.
+    pub damage: Option<String>,
+}
+
+/// What the records of a file add up to.
+#[derive(Default)]
+struct Contents {
+    part: Part,
+    types: BTreeMap<String, String>,
+    damage: Option<String>,
+}
+
+/// Makes the files of a record whole that are not, and writes `metadata.yaml` anew. `path` is a file or the folder of a record.
+///
+/// # Errors
+/// There is no file, or it cannot be written; it is then as it was.
+pub fn recover(path: &Path) -> Result<Vec<RecoveredPart>, UserError> {
+    let files = mcap_files(path)?;
+    let (mut found, mut parts, mut types) = (Vec::new(), Vec::new(), BTreeMap::new());
+    for file in files {
+        let whole = is_whole(&file)?;
+        let beside = file.with_extension("mcap.new");
+        let copy = if whole { None } else { Some(beside.as_path()) };
+        let contents = read(&file, copy)?;
+        if copy.is_some() {
+            std::fs::rename(&beside, &file).map_err(|e| UserError::file(&file, e))?;
+        }
+        let messages = (!whole).then(|| contents.part.messages.values().sum());
+        found.push(RecoveredPart { path: file, messages, damage: contents.damage });
+        parts.push(contents.part);
+        types.extend(contents.types);
+    }
+    if path.is_dir() {
+        Metadata::of(parts, types).write(path)?;
+    }
+    Ok(found)
+}
+
+/// Reads a file as far as that goes, and writes what it has to `copy`.
+fn read(file: &Path, copy: Option<&Path>) -> Result<Contents, UserError> {
+    let failed = |e: &dyn std::fmt::Display| UserError::file(copy.unwrap_or(file), e);
+    let mut contents = Contents::default();
+    contents.part.name = file.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let create = |path| -> Result<Writer<BufWriter<File>>, UserError> {
+        let to = BufWriter::new(File::create(path).map_err(|e| failed(&e))?);
+        let options = WriteOptions::new().profile("ros2").library("scenecast").compression_threads(0);
+        options.create(to).map_err(|e| failed(&e))
+    };
+    let mut writer = copy.map(create).transpose()?;
+    let mut schemas: BTreeMap<u16, (String, u16)> = BTreeMap::new();
+    let mut topics: BTreeMap<u16, (String, u16)> = BTreeMap::new();
+    let damage = records(file, |record| {
+        match record {
+            Record::Schema { header, data } => {
+                let added = writer.as_mut().map(|w| w.add_schema(&header.name, &header.encoding, &data));
+                let id = added.transpose().map_err(|e| failed(&e))?.unwrap_or_default();
+                schemas.insert(header.id, (header.name, id));
+            }
+            Record::Channel(channel) => {
+                let (kind, schema) = schemas.get(&channel.schema_id).cloned().unwrap_or_default();
+                let add = |w: &mut Writer<_>| {
+                    w.add_channel(schema, &channel.topic, &channel.message_encoding, &channel.metadata)
+                };
+                let id = writer.as_mut().map(add).transpose().map_err(|e| failed(&e))?.unwrap_or_default();
+                contents.types.insert(channel.topic.clone(), kind);
+                topics.insert(channel.id, (channel.topic, id));
+            }
+            Record::Message { header, data } => {
+                let Some((topic, channel_id)) = topics.get(&header.channel_id) else { return Ok(()) };
+                contents.part.note(topic, header.log_time);
+                let header = MessageHeader { channel_id: *channel_id, ..header };
+                let written = writer.as_mut().map(|w| w.write_to_known_channel(&header, &data));
+                written.transpose().map_err(|e| failed(&e))?;
+            }
+            _ => {}
+        }
+        Ok(())
+    })?;
+    contents.damage = damage;
+    if let Some(mut writer) = writer {
+        writer.finish().map_err(|e| failed(&e))?;
+        let mut inner = writer.into_inner();
+        inner.flush().and_then(|()| inner.get_ref().sync_all()).map_err(|e| failed(&e))?;
+    }
+    Ok(contents)
+}

@@ -1,0 +1,224 @@
+//! What the operator knew.
+
+use super::{MapState, Record, RecordedMap, entry, frame_entry, stamps_now};
+use scenecast_config::Config;
+use scenecast_console::Snapshot;
+use scenecast_console::messages::{label_tree, order_status, place, place_on_earth};
+use scenecast_console::state::{MapLabelTree, MissionState, OrderStatus, VehicleState};
+use scenecast_files::RecordEntry;
+use scenecast_host::FrameEvent;
+use scenecast_messages::contents::{Stamps, WORLD_FRAME, header, pose, valid_part};
+use scenecast_messages::scenecast_msgs::{Event, Exemplar, Link};
+use scenecast_messages::std_msgs::Text;
+use scenecast_protocol::wire::Address;
+use scenecast_surface::Surface;
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
+
+/// Mission time between two messages about the link, and between two states that the page would show, seconds.
+const STATE_INTERVAL_S: f64 = 10.0;
+
+/// The record of a surface's process; without one, nothing is done.
+pub struct SurfaceRecord {
+    record: Option<Record>,
+    recorder: SurfaceRecorder,
+    speed: f64,
+}
+
+impl SurfaceRecord {
+    /// Begins it in a folder in `folder`, unless the configuration names another one.
+    pub fn start(config: &Config, name: &str, folder: &Path, speed: f64) -> Self {
+        Self { record: Record::start(config, name, folder), recorder: SurfaceRecorder::default(), speed }
+    }
+
+    /// Whether there is a record.
+    pub fn is_on(&self) -> bool {
+        self.record.is_some()
+    }
+
+    /// Records what has changed.
+    pub fn observe(&mut self, surface: &Surface, snapshot: &Snapshot) {
+        let Some(record) = &mut self.record else { return };
+        let stamps = stamps_now(snapshot.state.now_s, self.speed);
+        record.put(self.recorder.observe(record.parts(), surface, snapshot, &stamps));
+    }
+
+    /// Records a frame.
+    pub fn handle_frame(&mut self, event: &FrameEvent, now_s: f64) {
+        let Some(record) = &mut self.record else { return };
+        record.put(self.recorder.frame(event, &stamps_now(now_s, self.speed)));
+    }
+
+    /// Ends the record, and prints where it is.
+    pub fn finish(self) {
+        self.record.into_iter().for_each(Record::finish);
+    }
+}
+
+/// Records the surface: of each vehicle what the operator knew of it, and the state that the page showed.
+#[derive(Default)]
+pub struct SurfaceRecorder {
+    part: u32,
+    vehicles: BTreeMap<u8, RecordedVehicle>,
+    state_s: Option<f64>,
+    /// The last entry of the surface's log that was recorded.
+    log: u64,
+    /// The vehicles' names by address.
+    names: BTreeMap<u8, String>,
+}
+
+/// What a record has of a vehicle.
+#[derive(Default)]
+struct RecordedVehicle {
+    map: RecordedMap,
+    tree: Option<(u8, MapLabelTree)>,
+    /// Version and state by slot.
+    orders: BTreeMap<String, (u16, OrderStatus)>,
+    /// Mission time of the last report.
+    report_s: Option<f64>,
+    /// Epoch, label and number of the images.
+    exemplars: BTreeSet<(u8, u8, u8)>,
+}
+
+impl SurfaceRecorder {
+    /// What has changed since the last call. `part` is the number of the record's file: each begins with the whole state.
+    pub fn observe(&mut self, part: u32, surface: &Surface, snapshot: &Snapshot, stamps: &Stamps) -> Vec<RecordEntry> {
+        if std::mem::replace(&mut self.part, part) != part {
+            *self = Self { part, log: self.log, names: std::mem::take(&mut self.names), ..Self::default() };
+        }
+        let mut entries = self.events(surface, snapshot, stamps);
+        let now_s = snapshot.state.now_s;
+        let is_due = self.state_s.is_none_or(|last| now_s - last >= STATE_INTERVAL_S);
+        let mut has_news = is_due;
+        for vehicle in &snapshot.state.vehicles {
+            if self.names.get(&vehicle.id) != Some(&vehicle.name) {
+                self.names.insert(vehicle.id, vehicle.name.clone());
+            }
+            let recorded = self.vehicles.entry(vehicle.id).or_default();
+            let before = entries.len();
+            recorded.record_orders(vehicle, stamps, &mut entries);
+            has_news |= entries.len() > before;
+            recorded.record(surface, &snapshot.state, vehicle, stamps, &mut entries);
+            if is_due {
+                entries.push(of(vehicle, "link", stamps, &link(&snapshot.state, vehicle, stamps)));
+            }
+        }
+        if has_news {
+            self.state_s = Some(now_s);
+            let data = String::from_utf8_lossy(&snapshot.json).into_owned();
+            entries.push(entry("state".to_owned(), stamps, &Text { data }));
+        }
+        entries
+    }
+
+    /// A frame of the link.
+    pub fn frame(&self, event: &FrameEvent, stamps: &Stamps) -> Option<RecordEntry> {
+        frame_entry(event, |vehicle| self.names.get(&vehicle.number()).cloned().unwrap_or_default(), stamps)
+    }
+
+    /// The entries of the surface's log since the last call.
+    fn events(&mut self, surface: &Surface, snapshot: &Snapshot, stamps: &Stamps) -> Vec<RecordEntry> {
+        let after = std::mem::replace(&mut self.log, surface.log().last());
+        let new = surface.log().entries().filter(|logged| logged.number > after);
+        let event = |logged: &scenecast_surface::LogEntry| {
+            let vehicle = logged.vehicle.and_then(|address| snapshot.vehicle(address.number()));
+            let by = logged.by.as_deref().map(|by| format!("{by}: ")).unwrap_or_default();
+            let message = Event {
+                header: header(stamps.at(logged.at.as_secs_f64()), ""),
+                vehicle: vehicle.map(|vehicle| vehicle.name.clone()).unwrap_or_default(),
+                level: Event::INFO,
+                source: logged.kind.name().to_owned(),
+                text: format!("{by}{}", logged.text),
+            };
+            entry("events".to_owned(), stamps, &message)
+        };
+        new.map(event).collect()
+    }
+}
+
+impl RecordedVehicle {
+    fn record_orders(&mut self, vehicle: &VehicleState, stamps: &Stamps, entries: &mut Vec<RecordEntry>) {
+        for slot in &vehicle.orders.directive.slots {
+            let state = (slot.version, slot.state);
+            if self.orders.insert(slot.slot.clone(), state) != Some(state) {
+                entries.push(of(vehicle, "order_status", stamps, &order_status(vehicle, slot, stamps)));
+            }
+        }
+    }
+
+    fn record(
+        &mut self,
+        surface: &Surface,
+        mission: &MissionState,
+        vehicle: &VehicleState,
+        stamps: &Stamps,
+        entries: &mut Vec<RecordEntry>,
+    ) {
+        let address = Address::vehicle(vehicle.id);
+        let earlier = vehicle.map.earlier.as_ref();
+        let epoch = earlier.map_or(vehicle.map.epoch, |earlier| earlier.current_epoch);
+        if let Some(view) = address.and_then(|address| surface.view(address)) {
+            let (version, labels) = (vehicle.map.version, view.replica().shown());
+            let map = MapState { vehicle: &vehicle.name, epoch, version, cell_m: vehicle.map.cell_m, labels };
+            entries.extend(self.map.record(&map, stamps));
+        }
+        let tree = vehicle.label_tree.clone().map(|tree| (vehicle.map.epoch, tree));
+        if let Some((_, tree)) = tree.as_ref().filter(|tree| self.tree.as_ref() != Some(tree)) {
+            let message = label_tree(vehicle, tree, header(stamps.now(), WORLD_FRAME));
+            entries.push(of(vehicle, "label_tree", stamps, &message));
+            self.tree = Some((vehicle.map.epoch, tree.clone()));
+        }
+        if let Some(status) = vehicle.status.as_ref().filter(|status| self.report_s != Some(status.at_s)) {
+            self.report_s = Some(status.at_s);
+            let shift = vehicle.map.placement.as_ref().map_or((0.0, 0.0), |p| (p.east_m, p.north_m));
+            let place = place(status, shift, stamps);
+            let sigma_m = status.pose.sigma_m;
+            entries.push(of(vehicle, "pose", stamps, &pose(&place, sigma_m, WORLD_FRAME)));
+            entries.extend(place_on_earth(mission, &place, sigma_m).map(|fix| of(vehicle, "fix", stamps, &fix)));
+        }
+        for label in &vehicle.labels {
+            for image in &label.exemplar.images {
+                let is_new = self.exemplars.insert((vehicle.map.epoch, label.id, image.number));
+                let record = address.filter(|_| is_new).and_then(|address| surface.record(address));
+                let stored = record.and_then(|record| record.exemplars.label(label.id)?.exemplar(Some(image.number)));
+                let Some(stored) = stored else { continue };
+                let message = Exemplar {
+                    header: header(stamps.at(image.at_s), ""),
+                    vehicle: vehicle.name.clone(),
+                    epoch: vehicle.map.epoch.into(),
+                    label: label.id,
+                    image: image.number,
+                    name: label.name.clone().unwrap_or_default(),
+                    format: "webp".to_owned(),
+                    data: stored.webp.clone(),
+                };
+                entries.push(of(vehicle, "exemplars", stamps, &message));
+            }
+        }
+    }
+}
+
+/// An entry of a topic of this vehicle.
+fn of<M: scenecast_messages::Message>(
+    vehicle: &VehicleState,
+    topic: &str,
+    stamps: &Stamps,
+    message: &M,
+) -> RecordEntry {
+    entry(format!("{}/{topic}", valid_part(&vehicle.name)), stamps, message)
+}
+
+fn link(mission: &MissionState, vehicle: &VehicleState, stamps: &Stamps) -> Link {
+    let (link, channel) = (&mission.link, &vehicle.link);
+    Link {
+        header: header(stamps.now(), ""),
+        vehicle: vehicle.name.clone(),
+        budget_bps: link.budget_bps,
+        sent_bps: link.down.bps_1min as f32,
+        received_bps: link.up.bps_1min as f32,
+        loss: channel.up.loss as f32,
+        round_trip_s: channel.round_trip_s.map_or(f32::NAN, |s| s as f32),
+        age_s: vehicle.last_received_s.map_or(f32::NAN, |at| (mission.now_s - at) as f32),
+        backlog_bits: channel.backlog.as_ref().map_or(0, |backlog| backlog.bits),
+    }
+}

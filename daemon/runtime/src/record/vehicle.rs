@@ -1,0 +1,171 @@
+//! What the vehicle knew.
+
+use super::{MapState, Record, RecordedMap, entry, frame_entry, stamps_now};
+use scenecast_config::{Config, cell_m};
+use scenecast_files::RecordEntry;
+use scenecast_host::{FrameEvent, VehicleHostEvent};
+use scenecast_messages::contents::{MAP_FRAME, Place, Stamps, header, pose, valid_part};
+use scenecast_messages::scenecast_msgs::{Event, Link, OrderStatus};
+use scenecast_protocol::directive::SlotState;
+use scenecast_protocol::time::Instant;
+use scenecast_vehicle::{AppliedSlot, Vehicle};
+
+/// Mission time between two messages about the link, seconds.
+const LINK_INTERVAL_S: f64 = 10.0;
+/// Mission time between two poses, seconds.
+const POSE_INTERVAL_S: f64 = 1.0;
+
+/// The record of a vehicle's process; without one, nothing is done.
+pub(crate) struct VehicleRecord {
+    record: Option<Record>,
+    recorder: VehicleRecorder,
+    speed: f64,
+}
+
+impl VehicleRecord {
+    pub(crate) fn start(config: &Config) -> Self {
+        let name = &config.vehicle.name;
+        let folder = config.runtime.state_dir.join("records");
+        let record = Record::start(config, name, &folder);
+        Self { record, recorder: VehicleRecorder::new(name, cell_m(config)), speed: config.runtime.time_scale }
+    }
+
+    /// Records what has changed.
+    pub(crate) fn observe(&mut self, vehicle: &Vehicle, now: Instant) {
+        let Some(record) = &mut self.record else { return };
+        let stamps = stamps_now(now.as_secs_f64(), self.speed);
+        record.put(self.recorder.observe(record.parts(), vehicle, &stamps));
+    }
+
+    /// Records an event of the host.
+    pub(crate) fn handle_event(&mut self, event: &VehicleHostEvent, now: Instant) {
+        let Some(record) = &mut self.record else { return };
+        record.put(self.recorder.handle_event(event, &stamps_now(now.as_secs_f64(), self.speed)));
+    }
+
+    pub(crate) fn finish(self) {
+        self.record.into_iter().for_each(Record::finish);
+    }
+}
+
+/// Records the vehicle.
+pub struct VehicleRecorder {
+    name: String,
+    cell_m: f64,
+    part: u32,
+    map: RecordedMap,
+    mode: String,
+    pose_s: Option<f64>,
+    link_s: Option<f64>,
+}
+
+impl VehicleRecorder {
+    /// Records a vehicle of this name, whose cells have this edge.
+    pub fn new(name: &str, cell_m: f64) -> Self {
+        let (name, map, mode) = (name.to_owned(), RecordedMap::default(), String::new());
+        Self { name, cell_m, part: 0, map, mode, pose_s: None, link_s: None }
+    }
+
+    /// What has changed since the last call. `part` is the number of the record's file: each begins with the whole state.
+    pub fn observe(&mut self, part: u32, vehicle: &Vehicle, stamps: &Stamps) -> Vec<RecordEntry> {
+        if std::mem::replace(&mut self.part, part) != part {
+            (self.map, self.mode) = (RecordedMap::default(), String::new());
+        }
+        let labels = vehicle.map();
+        let (epoch, version) = (vehicle.durable().epoch, vehicle.map_version());
+        let state = MapState { vehicle: &self.name, epoch, version, cell_m: self.cell_m, labels };
+        let mut entries = self.map.record(&state, stamps);
+        let now_s = stamps.now_s();
+        if is_due(&mut self.pose_s, POSE_INTERVAL_S, now_s) {
+            let navigator = vehicle.navigator();
+            let at = navigator.position();
+            let place = Place {
+                stamp: stamps.now(),
+                position_m: [at.x_m, at.y_m, -navigator.depth_m()],
+                heading_rad: navigator.heading_rad(),
+            };
+            entries.push(self.entry("pose", stamps, &pose(&place, navigator.sigma_m(), MAP_FRAME)));
+        }
+        if is_due(&mut self.link_s, LINK_INTERVAL_S, now_s) {
+            entries.push(self.entry("link", stamps, &self.link(vehicle, stamps)));
+        }
+        let (mode, reason) = vehicle.mode();
+        let mode = reason.name().map_or_else(|| format!("{mode:?}"), |reason| format!("{mode:?}: {reason}"));
+        if self.mode != mode {
+            entries.push(self.event(Event::INFO, "mode", &mode, stamps));
+            self.mode = mode;
+        }
+        entries
+    }
+
+    /// What is to be recorded of an event of the host.
+    pub fn handle_event(&self, event: &VehicleHostEvent, stamps: &Stamps) -> Option<RecordEntry> {
+        match event {
+            VehicleHostEvent::Frame(event) => self.frame(event, stamps),
+            VehicleHostEvent::Applied(applied) => Some(self.decision(applied, stamps)),
+            VehicleHostEvent::Note(text) => Some(self.event(Event::WARN, "navigation", text, stamps)),
+            VehicleHostEvent::Fixed(fix, _) => {
+                let at = fix.position;
+                let text = format!("{:.1} m east, {:.1} m north, {:.1} m", at.east_m, at.north_m, fix.sigma_m);
+                Some(self.event(Event::INFO, "fix", &text, stamps))
+            }
+            _ => None,
+        }
+    }
+
+    fn frame(&self, event: &FrameEvent, stamps: &Stamps) -> Option<RecordEntry> {
+        frame_entry(event, |_| self.name.clone(), stamps)
+    }
+
+    /// A decision of the vehicle about an order.
+    fn decision(&self, applied: &AppliedSlot, stamps: &Stamps) -> RecordEntry {
+        let (status, reason) = match applied.state {
+            SlotState::Refused(reason) => (OrderStatus::REFUSED, format!("{reason:?}")),
+            _ => (OrderStatus::APPLIED, String::new()),
+        };
+        let message = OrderStatus {
+            header: header(stamps.at(applied.at.as_secs_f64()), ""),
+            vehicle: self.name.clone(),
+            slot: applied.id.name().to_owned(),
+            version: applied.version.into(),
+            status,
+            reason,
+            ..OrderStatus::default()
+        };
+        self.entry("order_status", stamps, &message)
+    }
+
+    fn event(&self, level: u8, source: &str, text: &str, stamps: &Stamps) -> RecordEntry {
+        let (header, vehicle) = (header(stamps.now(), ""), self.name.clone());
+        let message = Event { header, vehicle, level, source: source.to_owned(), text: text.to_owned() };
+        self.entry("events", stamps, &message)
+    }
+
+    fn link(&self, vehicle: &Vehicle, stamps: &Stamps) -> Link {
+        let stats = vehicle.stats();
+        Link {
+            header: header(stamps.now(), ""),
+            vehicle: self.name.clone(),
+            budget_bps: vehicle.budget_bps(),
+            sent_bps: f32::NAN,
+            received_bps: f32::NAN,
+            loss: stats.loss_out.expected() as f32,
+            round_trip_s: f32::NAN,
+            age_s: f32::NAN,
+            backlog_bits: 0,
+        }
+    }
+
+    fn entry<M: scenecast_messages::Message>(&self, topic: &str, stamps: &Stamps, message: &M) -> RecordEntry {
+        entry(format!("{}/{topic}", valid_part(&self.name)), stamps, message)
+    }
+}
+
+/// Whether so much time has passed since the last time, which is set.
+fn is_due(last: &mut Option<f64>, interval_s: f64, now_s: f64) -> bool {
+    let is_due = last.is_none_or(|last| now_s - last >= interval_s || now_s < last);
+    if is_due {
+        *last = Some(now_s);
+    }
+    is_due
+}
