@@ -5,7 +5,7 @@
 use clap::CommandFactory;
 use scenecast::commands::Arguments;
 use scenecast_tests::pages::{Page, all_files, all_pages, arguments, command_faults, pages, words};
-use scenecast_tests::{Process, free_port, http, run, scenecast, scratch, wait_until, workspace};
+use scenecast_tests::{Process, free_port, http, run, scenecast, scratch, state, wait_until, workspace};
 use serde_json::Value;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
@@ -105,6 +105,10 @@ fn commands_of_the_documents_run() {
     let dir = scratch("documents");
     RUN.iter().for_each(|(line, parts)| run_line(line, parts, &[], &dir));
     let (_demo, port) = demo("/api/v2/vehicles/1/map.png");
+    // A part of the limits can be changed once the vehicle has reported those in force.
+    let limits = |state: Value| state["vehicles"][0]["in_force"]["limits"].as_str().map(str::to_owned);
+    let is_reported = || state(port).and_then(limits).is_some_and(|known| known != "not_reported");
+    wait_until("the vehicle reports its limits", is_reported);
     let url = format!("http://127.0.0.1:{port}");
     RUN_WITH_DEMO.iter().for_each(|(line, parts)| run_line(line, parts, &["--url", &url], &dir));
     let report = std::fs::read_to_string(dir.join("run2/report.json")).expect("a report was written");

@@ -1,6 +1,8 @@
 //! Records of missions: read by another program, cut by a kill, the same for the same seed.
 
-use scenecast_tests::{Process, free_port, python, run, run_script, scenecast, scratch, state, wait_until, workspace};
+use scenecast_tests::{
+    Process, assert_refused, free_port, python, run, run_script, scenecast, scratch, state, wait_until, workspace,
+};
 use std::path::{Path, PathBuf};
 
 /// What `tests/read_record.py` found in a record.
@@ -43,6 +45,39 @@ fn both_records_of_a_rehearsal_end_with_the_same_map() {
     let decoded = run(&["wire", "decode", dir.join("a/record_surface").to_str().unwrap(), "--mission", "1"]);
     let lines = String::from_utf8_lossy(&decoded.stdout).lines().count() as u64;
     assert_eq!(Some(lines), surface["topics"]["/scenecast/frames"].as_u64(), "{decoded:?}");
+    std::fs::remove_dir_all(dir).unwrap();
+}
+
+#[test]
+fn a_report_says_what_the_record_has() {
+    let dir = scratch("record-report");
+    simulate(&dir);
+    let record = dir.join("record_surface");
+    let report = |more: &[&str]| {
+        let output = run(&[&["report", record.to_str().unwrap()][..], more].concat());
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        String::from_utf8(output.stdout).unwrap()
+    };
+    let figures: serde_json::Value = serde_json::from_str(&report(&["--json"])).unwrap();
+    let vehicle = &figures["vehicles"][0];
+    let cells: u64 = vehicle["classes"].as_array().unwrap().iter().filter_map(|class| class["cells"].as_u64()).sum();
+    let page = dir.join("dive.html");
+    report(&["--out", page.to_str().unwrap()]);
+    let page = std::fs::read_to_string(page).unwrap();
+    assert!(page.contains(&format!("The map that arrived has {cells} cells")), "{vehicle}");
+    for sentence in vehicle["summary"].as_array().unwrap() {
+        assert!(page.contains(sentence.as_str().unwrap()), "{sentence}");
+    }
+    for part in
+        ["<svg", "class=\"track\"", "data:image/webp;base64,", "<h3>Orders</h3>", "<h2>Events</h2>", "2000-01-01T00:0"]
+    {
+        assert!(page.contains(part), "{part}");
+    }
+    assert!(
+        !page.contains("http://")
+            || page.matches("http://").count() == page.matches("http://www.w3.org/2000/svg").count()
+    );
+    assert_refused(&["report", dir.join("record_vehicle").to_str().unwrap()], &["no record of a surface"]);
     std::fs::remove_dir_all(dir).unwrap();
 }
 

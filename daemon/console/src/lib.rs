@@ -14,6 +14,7 @@ mod layers;
 mod link_meter;
 pub mod messages;
 pub mod orders;
+pub mod report;
 mod request;
 mod snapshot;
 pub mod state;

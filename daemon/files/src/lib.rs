@@ -21,7 +21,10 @@ pub use configured::{
 pub use geojson::{AreaShape, CoordinateFrame, FenceShapes, read_areas, read_fence};
 pub use images::{FrameImage, read_classes, read_image};
 pub use label_folder::{FolderItem, LabelFolder, read_class_names};
-pub use record::{RecordEntry, RecordLimits, RecordWriter, RecordedFrames, RecoveredPart, is_record, recover};
+pub use record::{
+    RecordEntry, RecordLimits, RecordWriter, RecordedFrames, RecordedMessage, RecoveredPart, is_record, read_record,
+    recover,
+};
 pub use recording::{DepthFile, RecordedFrame, Recorder, Recording, write_poses};
 pub use tum_recording::{TUM_UNITS_PER_M, TumFolder, TumFrame, TumOptions, read_depth, tum_camera};
 pub use whole::{sync_folder, write_whole};

@@ -16,6 +16,8 @@ mod manual;
 mod modem_sim;
 mod node;
 mod record;
+#[cfg(feature = "surface")]
+mod report;
 #[cfg(feature = "rehearsal")]
 mod sim;
 
@@ -75,6 +77,9 @@ enum Command {
     /// Make the key of a mission or of a vehicle, show a key, or make a token for the operator's page.
     #[command(subcommand)]
     Key(key::Key),
+    #[cfg(feature = "surface")]
+    /// Write the report of a dive from its record.
+    Report(report::Report),
     /// Repair the record of a mission.
     #[command(subcommand)]
     Record(record::Record),
@@ -127,6 +132,8 @@ pub fn run(arguments: Arguments) -> Result<(), UserError> {
         Command::Bench(bench) => bench.run(),
         Command::Key(key) => key.run(),
         Command::Record(record) => record.run(),
+        #[cfg(feature = "surface")]
+        Command::Report(report) => report.run(),
         #[cfg(feature = "tools")]
         Command::Map(map) => map.run(),
         #[cfg(feature = "tools")]

@@ -1,0 +1,203 @@
+//! What a record says about a dive.
+
+use crate::state::{MapLabel, MissionState, VehicleState};
+use scenecast_core::{UserError, palette};
+use scenecast_files::{RecordedMessage, read_record};
+use scenecast_messages::contents::valid_part;
+use scenecast_messages::geometry_msgs::PoseWithCovarianceStamped;
+use scenecast_messages::scenecast_msgs::{Event, Exemplar, Frame, Link, MapCells, OrderStatus};
+use scenecast_messages::std_msgs::Text;
+use scenecast_protocol::map::{Cell, LabelGrid};
+use std::collections::BTreeMap;
+use std::path::Path;
+
+/// The dive of a record of the surface.
+#[derive(Debug, Default)]
+pub struct Dive {
+    /// The times of its first and its last message, seconds since 1970.
+    pub span_s: (f64, f64),
+    /// The last state that the page showed.
+    pub state: MissionState,
+    /// What is known of each vehicle, by the part of its topics.
+    pub(super) vehicles: BTreeMap<String, DiveVehicle>,
+    pub(super) events: Vec<(f64, Event)>,
+    /// Frames sent, received and dropped.
+    pub(super) frames: [u64; 3],
+    /// Why some of the record could not be read.
+    pub damage: Option<String>,
+}
+
+/// What a record says about a vehicle.
+#[derive(Debug, Default)]
+pub(super) struct DiveVehicle {
+    /// The labels of the operator's map at the end.
+    pub(super) labels: LabelGrid,
+    /// The edge of a cell, metres.
+    pub(super) cell_m: f64,
+    pub(super) epoch: u32,
+    pub(super) track: Vec<TrackPoint>,
+    /// The way of each order, by slot and version.
+    pub(super) orders: BTreeMap<(String, u32), Vec<OrderStep>>,
+    pub(super) exemplars: Vec<(f64, Exemplar)>,
+    pub(super) link: Vec<(f64, Link)>,
+}
+
+/// A reported place, metres in the world frame.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct TrackPoint {
+    pub(super) at_s: f64,
+    pub(super) east_m: f64,
+    pub(super) north_m: f64,
+    pub(super) depth_m: f64,
+    pub(super) sigma_m: f64,
+}
+
+/// A status of an order.
+#[derive(Debug, Clone)]
+pub(super) struct OrderStep {
+    pub(super) at_s: f64,
+    pub(super) given_s: f64,
+    pub(super) status: u8,
+    pub(super) reason: String,
+}
+
+impl Dive {
+    /// Reads the record of a surface: a file, or its folder.
+    ///
+    /// # Errors
+    /// There is no record, or none of a surface.
+    pub fn read(path: &Path) -> Result<Self, UserError> {
+        let mut dive = Self { span_s: (f64::INFINITY, f64::NEG_INFINITY), ..Self::default() };
+        let mut last_state = None;
+        dive.damage = read_record(path, |message| dive.take(message, &mut last_state))?;
+        let Some(state) = last_state else {
+            let what = "it is no record of a surface: it has no topic /scenecast/state";
+            return Err(UserError::file(path, what));
+        };
+        dive.state =
+            serde_json::from_str(&state).map_err(|e| UserError::file(path, format!("/scenecast/state: {e}")))?;
+        Ok(dive)
+    }
+
+    fn take(&mut self, message: RecordedMessage<'_>, last_state: &mut Option<String>) {
+        let at_s = message.nanos as f64 / 1e9;
+        self.span_s = (self.span_s.0.min(at_s), self.span_s.1.max(at_s));
+        let Some(topic) = message.topic.strip_prefix("/scenecast/") else { return };
+        let Some((vehicle, topic)) = topic.split_once('/') else {
+            match topic {
+                "state" => *last_state = message.decode::<Text>().map(|text| text.data).or(last_state.take()),
+                "events" => self.events.extend(message.decode().map(|event| (at_s, event))),
+                "frames" => {
+                    let direction = message.decode::<Frame>().map(|frame| usize::from(frame.direction));
+                    direction.and_then(|d| self.frames.get_mut(d)).into_iter().for_each(|count| *count += 1);
+                }
+                _ => {}
+            }
+            return;
+        };
+        let vehicle = self.vehicles.entry(vehicle.to_owned()).or_default();
+        match topic {
+            "map_cells" => message.decode().iter().for_each(|cells| vehicle.take_cells(cells)),
+            "pose" => vehicle.track.extend(message.decode().map(|pose| TrackPoint::of(&pose))),
+            "order_status" => message.decode().into_iter().for_each(|status| vehicle.take_order(status)),
+            "exemplars" => vehicle.exemplars.extend(message.decode().map(|exemplar| (at_s, exemplar))),
+            "link" => vehicle.link.extend(message.decode().map(|link| (at_s, link))),
+            _ => {}
+        }
+    }
+
+    /// The vehicles, as the page showed them last and as the record has them.
+    pub(super) fn vehicles(&self) -> impl Iterator<Item = (&VehicleState, &DiveVehicle)> {
+        let known = |state: &VehicleState| self.vehicles.get(&valid_part(&state.name));
+        self.state.vehicles.iter().filter_map(move |state| Some((state, known(state)?)))
+    }
+}
+
+impl DiveVehicle {
+    fn take_cells(&mut self, cells: &MapCells) {
+        if cells.whole {
+            self.labels.clear();
+            if self.epoch != cells.epoch {
+                // Their numbers mean something else now.
+                self.exemplars.clear();
+            }
+        }
+        (self.epoch, self.cell_m) = (cells.epoch, cells.cell_m);
+        for ((&x, &y), &value) in cells.x.iter().zip(&cells.y).zip(&cells.value) {
+            self.labels.set(Cell::new(x, y), value);
+        }
+    }
+
+    fn take_order(&mut self, status: OrderStatus) {
+        let seconds = |time: &scenecast_messages::builtin_interfaces::Time| time.nanos() as f64 / 1e9;
+        let step = OrderStep {
+            at_s: seconds(&status.header.stamp),
+            given_s: seconds(&status.given),
+            status: status.status,
+            reason: status.reason,
+        };
+        let way = self.orders.entry((status.slot, status.version)).or_default();
+        // The next file of a record repeats the last status.
+        if way.last().is_none_or(|last| last.status != step.status) {
+            way.push(step);
+        }
+    }
+
+    /// Length of the reported track, metres.
+    pub(super) fn distance_m(&self) -> f64 {
+        let step = |pair: &[TrackPoint]| match pair {
+            [a, b] => (b.east_m - a.east_m).hypot(b.north_m - a.north_m),
+            _ => 0.0,
+        };
+        self.track.windows(2).map(step).sum()
+    }
+
+    /// Cells of each label, the label that it is shown as a part of counted with it; the largest first.
+    pub(super) fn classes(&self, state: &VehicleState) -> Vec<(u8, u64)> {
+        let mut counts: BTreeMap<u8, u64> = BTreeMap::new();
+        for (_, label) in self.labels.iter() {
+            *counts.entry(shown_as(state, label)).or_default() += 1;
+        }
+        let mut classes: Vec<(u8, u64)> = counts.into_iter().collect();
+        classes.sort_by_key(|&(label, cells)| (std::cmp::Reverse(cells), label));
+        classes
+    }
+}
+
+impl TrackPoint {
+    fn of(message: &PoseWithCovarianceStamped) -> Self {
+        let position = &message.pose.pose.position;
+        Self {
+            at_s: message.header.stamp.nanos() as f64 / 1e9,
+            east_m: position.x,
+            north_m: position.y,
+            depth_m: -position.z,
+            sigma_m: message.pose.covariance.first().map_or(f64::NAN, |variance| variance.sqrt()),
+        }
+    }
+}
+
+fn label(state: &VehicleState, number: u8) -> Option<&MapLabel> {
+    state.labels.iter().find(|label| label.id == number)
+}
+
+/// The label that a label is shown as a part of, by the operator's merging; itself without one.
+pub(super) fn shown_as(state: &VehicleState, number: u8) -> u8 {
+    label(state, number).and_then(|label| label.merged_into).unwrap_or(number)
+}
+
+/// The operator's name of a label, or its number.
+pub(super) fn name(state: &VehicleState, number: u8) -> String {
+    label(state, number).and_then(|label| label.name.clone()).unwrap_or_else(|| format!("label {number}"))
+}
+
+/// The colour of a label, as in `#a0b1c2`.
+pub(super) fn colour(state: &VehicleState, number: u8) -> String {
+    let own = label(state, number).and_then(|label| label.colour.clone());
+    let is_colour =
+        |text: &String| text.len() == 7 && text.starts_with('#') && text.bytes().skip(1).all(|b| b.is_ascii_hexdigit());
+    own.filter(is_colour).unwrap_or_else(|| {
+        let [red, green, blue] = palette::colour(number);
+        format!("#{red:02x}{green:02x}{blue:02x}")
+    })
+}

@@ -1,0 +1,42 @@
+//! The report of a dive: what a record of the surface says, as one page that needs no other file.
+
+mod chart;
+mod dive;
+mod page;
+mod words;
+
+pub use dive::Dive;
+
+use std::fmt;
+
+/// A text in HTML.
+struct Escaped<'a>(&'a str);
+
+impl fmt::Display for Escaped<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for character in self.0.chars() {
+            match character {
+                '&' => f.write_str("&amp;")?,
+                '<' => f.write_str("&lt;")?,
+                '>' => f.write_str("&gt;")?,
+                '"' => f.write_str("&quot;")?,
+                // Characters that nobody sees, or that turn the direction of the text.
+                c if c.is_control()
+                    || matches!(c, '\u{200B}'..='\u{200F}' | '\u{202A}'..='\u{202E}' | '\u{2066}'..='\u{2069}') => {}
+                c => write!(f, "{c}")?,
+            }
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn texts_from_outside_are_no_html() {
+        let text = Escaped("<script>a & \"b\"</script>\u{202E}\u{7}").to_string();
+        assert_eq!(text, "&lt;script&gt;a &amp; &quot;b&quot;&lt;/script&gt;");
+    }
+}

@@ -1,0 +1,244 @@
+//! The page of a report.
+
+use super::chart::{self, Series};
+use super::dive::{Dive, DiveVehicle, OrderStep, colour, name, shown_as};
+use super::{Escaped, words};
+use crate::state::VehicleState;
+use base64::Engine;
+use base64::prelude::BASE64_STANDARD;
+use scenecast_core::utc_text;
+use serde_json::json;
+use std::fmt::Write;
+
+/// Images of a label in the report.
+const IMAGES: usize = 3;
+
+const STYLE: &str = "body{font:16px/1.45 system-ui,sans-serif;max-width:800px;margin:2em auto;padding:0 1em;color:#111;background:#fff}\
+table{border-collapse:collapse;width:100%;font-size:.9em}th,td{text-align:left;vertical-align:top;padding:.25em .6em;\
+border-bottom:1px solid #ccc}td.n{text-align:right}figure{margin:1em 0}figcaption{font-size:.85em}svg{width:100%;height:auto}\
+svg text{font:11px system-ui,sans-serif}.grid{stroke:#000;stroke-opacity:.25;stroke-width:.6;fill:none}\
+.track{fill:none;stroke:#000;stroke-width:1.5;stroke-linejoin:round}.line{fill:none;stroke:#000;stroke-width:1.2}\
+.scale{fill:none;stroke:#000;stroke-width:1.5}.swatch{display:inline-block;width:1em;height:1em;border:1px solid #000;\
+vertical-align:-.15em;margin-right:.4em}.images{display:flex;flex-wrap:wrap;gap:.6em}.images img{width:160px;display:block;\
+image-rendering:pixelated}@media print{body{margin:0;max-width:none}table,figure{break-inside:avoid}}";
+
+impl Dive {
+    /// The report as one HTML file.
+    pub fn html(&self) -> String {
+        let mission = Escaped(&self.state.mission.name);
+        let mut page = format!(
+            "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" content=\"width=device-width\">\
+             <title>Dive report: {mission}</title><style>{STYLE}</style></head><body>\n<h1>Dive report: {mission}</h1>\n"
+        );
+        if self.state.vehicles.is_empty() {
+            page += "<p>The surface knew no vehicle.</p>\n";
+        }
+        for (state, vehicle) in self.vehicles() {
+            self.vehicle(&mut page, state, vehicle);
+        }
+        self.events_table(&mut page);
+        // Writing to a string cannot fail.
+        let _ = writeln!(
+            page,
+            "<h2>How this was made</h2>\n<p>By scenecast {} from the record of the surface, run {}, of {} to {}. The map is the operator's: \
+             what had arrived by the acoustic link. Areas are counts of cells; what the model is unsure of is counted with the rest. Please \
+             name the mission, the vehicle and the version of scenecast where you use these figures.</p>\n</body></html>",
+            env!("CARGO_PKG_VERSION"),
+            Escaped(&self.state.mission.id),
+            utc_text(self.span_s.0),
+            utc_text(self.span_s.1)
+        );
+        page
+    }
+
+    fn vehicle(&self, page: &mut String, state: &VehicleState, vehicle: &DiveVehicle) {
+        let _ = writeln!(page, "<h2>{}</h2>\n<p>", Escaped(&state.name));
+        for sentence in words::summary(self, state, vehicle) {
+            let _ = writeln!(page, "{}", Escaped(&sentence));
+        }
+        *page += "</p>\n";
+        if let Some(map) = chart::map(state, vehicle) {
+            let _ = writeln!(
+                page,
+                "<figure>{map}<figcaption>The map of the operator at the end and the reported track (line). Metres east and north of the \
+                 mission's origin; north is up.</figcaption></figure>"
+            );
+        }
+        classes(page, state, vehicle);
+        notes(page, self, state);
+        orders(page, vehicle);
+        self.link(page, vehicle);
+    }
+
+    fn link(&self, page: &mut String, vehicle: &DiveVehicle) {
+        let (begin, end) = self.span_s;
+        let series = |name, unit, value: fn(&scenecast_messages::scenecast_msgs::Link) -> f32| Series {
+            name,
+            unit,
+            points: vehicle.link.iter().map(|(at_s, link)| (at_s - begin, f64::from(value(link)))).collect(),
+        };
+        let uncertainty = Series {
+            name: "standard deviation of the position",
+            unit: "m",
+            points: vehicle.track.iter().map(|point| (point.at_s - begin, point.sigma_m)).collect(),
+        };
+        let charts = [
+            series("received from the vehicle", "bit/s", |link| link.received_bps),
+            series("sent to the vehicle", "bit/s", |link| link.sent_bps),
+            series("share of frames lost", "1", |link| link.loss),
+            series("data that waited at the vehicle", "bit", |link| link.backlog_bits as f32),
+            uncertainty,
+        ];
+        let charts: Vec<String> = charts.iter().filter_map(|series| chart::line(series, end - begin)).collect();
+        if !charts.is_empty() {
+            let _ = writeln!(page, "<h3>Link and position over time</h3>\n<figure>{}</figure>", charts.join("\n"));
+        }
+        let direction = |name: &str, direction: &crate::state::LinkDirection| {
+            let classes = direction.bytes_by_class.iter().filter(|(_, bytes)| **bytes > 0);
+            let classes: Vec<String> = classes.map(|(class, bytes)| format!("{class} {bytes}")).collect();
+            format!(
+                "<tr><td>{name}</td><td class=\"n\">{}</td><td class=\"n\">{:.1} %</td><td>{}</td></tr>",
+                direction.frames,
+                direction.loss * 100.0,
+                Escaped(&classes.join(", "))
+            )
+        };
+        let _ = writeln!(
+            page,
+            "<table><tr><th>direction</th><th>frames</th><th>lost</th><th>bytes by class</th></tr>{}{}</table>",
+            direction("from the vehicles", &self.state.link.up),
+            direction("to the vehicles", &self.state.link.down)
+        );
+    }
+
+    fn events_table(&self, page: &mut String) {
+        if self.events.is_empty() {
+            return;
+        }
+        *page += "<h2>Events</h2>\n<table><tr><th>time (UTC)</th><th>vehicle</th><th>kind</th><th>event</th></tr>\n";
+        for (at_s, event) in &self.events {
+            let _ = writeln!(
+                page,
+                "<tr><td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>",
+                utc_text(*at_s),
+                Escaped(&event.vehicle),
+                Escaped(&event.source),
+                Escaped(&event.text)
+            );
+        }
+        *page += "</table>\n";
+    }
+
+    /// The figures of the report.
+    pub fn json(&self) -> serde_json::Value {
+        let vehicles = self.vehicles().map(|(state, vehicle)| {
+            let square = vehicle.cell_m * vehicle.cell_m;
+            let classes = vehicle.classes(state).into_iter().map(|(label, cells)| {
+                json!({ "label": label, "name": name(state, label), "colour": colour(state, label), "cells": cells,
+                        "area_m2": cells as f64 * square })
+            });
+            let orders = vehicle.orders.iter().map(|((slot, version), way)| {
+                let steps = way.iter().map(|step| {
+                    json!({ "utc": utc_text(step.at_s), "status": words::status(step.status), "reason": step.reason })
+                });
+                json!({ "slot": slot, "version": version, "steps": steps.collect::<Vec<_>>() })
+            });
+            json!({
+                "name": state.name,
+                "summary": words::summary(self, state, vehicle),
+                "distance_m": vehicle.distance_m(),
+                "cell_m": vehicle.cell_m,
+                "classes": classes.collect::<Vec<_>>(),
+                "orders": orders.collect::<Vec<_>>(),
+                "exemplars": vehicle.exemplars.len(),
+            })
+        });
+        json!({
+            "mission": self.state.mission.name,
+            "begin": utc_text(self.span_s.0),
+            "end": utc_text(self.span_s.1),
+            "frames": { "sent": self.frames[0], "received": self.frames[1], "dropped": self.frames[2] },
+            "vehicles": vehicles.collect::<Vec<_>>(),
+        })
+    }
+}
+
+fn classes(page: &mut String, state: &VehicleState, vehicle: &DiveVehicle) {
+    let classes = vehicle.classes(state);
+    let all: u64 = classes.iter().map(|(_, cells)| cells).sum();
+    if all == 0 {
+        return;
+    }
+    *page +=
+        "<h3>Classes</h3>\n<table><tr><th>class</th><th>cells</th><th>area</th><th>share</th><th>images</th></tr>\n";
+    let square = vehicle.cell_m * vehicle.cell_m;
+    for (label, cells) in classes {
+        let _ = writeln!(
+            page,
+            "<tr><td><span class=\"swatch\" style=\"background:{}\"></span>{}</td><td class=\"n\">{cells}</td><td class=\"n\">{}</td>\
+             <td class=\"n\">{:.1} %</td><td><div class=\"images\">{}</div></td></tr>",
+            colour(state, label),
+            Escaped(&name(state, label)),
+            words::area(cells as f64 * square),
+            cells as f64 / all as f64 * 100.0,
+            images(state, vehicle, label)
+        );
+    }
+    *page += "</table>\n";
+}
+
+/// The largest images of a class, each with its label and time.
+fn images(state: &VehicleState, vehicle: &DiveVehicle, class: u8) -> String {
+    let of_class = |label: u8| shown_as(state, label) == class;
+    let mut found: Vec<_> = vehicle.exemplars.iter().filter(|(_, exemplar)| of_class(exemplar.label)).collect();
+    found.sort_by_key(|(_, exemplar)| std::cmp::Reverse(exemplar.data.len()));
+    let image = |(at_s, exemplar): &&(f64, scenecast_messages::scenecast_msgs::Exemplar)| {
+        let kind = if exemplar.format == "webp" { "webp" } else { "jpeg" };
+        format!(
+            "<figure><img alt=\"label {label}\" src=\"data:image/{kind};base64,{}\"><figcaption>label {label}, {}</figcaption></figure>",
+            BASE64_STANDARD.encode(&exemplar.data),
+            utc_text(*at_s),
+            label = exemplar.label
+        )
+    };
+    found.iter().take(IMAGES).map(image).collect()
+}
+
+fn notes(page: &mut String, dive: &Dive, state: &VehicleState) {
+    if state.notes.is_empty() && state.markers.is_empty() {
+        return;
+    }
+    *page += "<h3>Notes and markers</h3>\n<ul>\n";
+    let utc = |at_s: f64| utc_text(dive.span_s.1 - (dive.state.now_s - at_s) / dive.state.mission.speed.max(1e-3));
+    for note in &state.notes {
+        let _ = writeln!(page, "<li>{}: {}</li>", utc(note.at_s), Escaped(&note.text));
+    }
+    for marker in &state.markers {
+        let _ =
+            writeln!(page, "<li>{:.1} m east, {:.1} m north: {}</li>", marker.x_m, marker.y_m, Escaped(&marker.text));
+    }
+    *page += "</ul>\n";
+}
+
+fn orders(page: &mut String, vehicle: &DiveVehicle) {
+    if vehicle.orders.is_empty() {
+        return;
+    }
+    *page += "<h3>Orders</h3>\n<table><tr><th>order</th><th>given (UTC)</th><th>end</th><th>after</th></tr>\n";
+    let mut orders: Vec<(&(String, u32), &OrderStep, &OrderStep)> =
+        vehicle.orders.iter().filter_map(|(order, way)| Some((order, way.first()?, way.last()?))).collect();
+    orders.sort_by(|a, b| a.1.given_s.total_cmp(&b.1.given_s));
+    for ((slot, version), first, last) in orders {
+        let reason = if last.reason.is_empty() { String::new() } else { format!(": {}", last.reason) };
+        let _ = writeln!(
+            page,
+            "<tr><td>{} {version}</td><td>{}</td><td>{}{}</td><td class=\"n\">{:.0} s</td></tr>",
+            Escaped(slot),
+            utc_text(first.given_s),
+            words::status(last.status),
+            Escaped(&reason),
+            (last.at_s - first.given_s).max(0.0)
+        );
+    }
+    *page += "</table>\n";
+}

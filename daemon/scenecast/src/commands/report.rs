@@ -1,0 +1,40 @@
+//! `scenecast report`
+
+use clap::Args;
+use scenecast_console::report::Dive;
+use scenecast_core::{UserError, errln, outln};
+use scenecast_files::write_whole;
+use std::path::PathBuf;
+
+/// Write the report of a dive from the record of the surface: one HTML file with summary, map, classes, images, orders and link.
+#[derive(Debug, Args)]
+#[command(after_help = "Example: scenecast report state/records/bridge-20261129T101500Z --out dive.html")]
+pub(super) struct Report {
+    /// Record of a surface: its folder, or one of its files
+    #[arg(value_name = "RECORD")]
+    record: PathBuf,
+    /// File to write [default: report.html in the present folder]
+    #[arg(long, value_name = "FILE", default_value = "report.html", hide_default_value = true)]
+    out: PathBuf,
+    /// Print the figures as JSON, and write no file
+    #[arg(long, conflicts_with = "out")]
+    json: bool,
+}
+
+impl Report {
+    pub(super) fn run(self) -> Result<(), UserError> {
+        scenecast_runtime::keep_private();
+        let dive = Dive::read(&self.record)?;
+        if let Some(damage) = &dive.damage {
+            errln!("scenecast: a part of the record could not be read: {damage}");
+        }
+        if self.json {
+            let text = serde_json::to_string_pretty(&dive.json()).map_err(|e| UserError::Failed(e.to_string()))?;
+            outln!("{text}");
+            return Ok(());
+        }
+        write_whole(&self.out, dive.html().as_bytes())?;
+        outln!("{}", self.out.display());
+        Ok(())
+    }
+}
