@@ -62,6 +62,7 @@ pub fn run_surface(load: Load, simulated: Option<SimulatedAutopilot>) -> Result<
         };
         warn_without_key(&config);
         let authenticity = scenecast_config::authenticity(&config, Address::SURFACE)?;
+        let offers_key = authenticity.as_ref().is_some_and(|keys| keys.next.is_some());
         let was_there = config.runtime.state_dir.exists();
         let (mut files, clock) = SurfaceFiles::open(&config)?;
         let profile = scenecast_drivers::modem::modem_of_process(&config, Address::SURFACE)?;
@@ -105,7 +106,8 @@ pub fn run_surface(load: Load, simulated: Option<SimulatedAutopilot>) -> Result<
         let (is_stale, reading) = (true, Arc::default());
         let budget = configured_budget(&config);
         let folder = config.runtime.state_dir.join("records");
-        let record = SurfaceRecord::start(&config, &config.surface.name, &folder, config.runtime.time_scale);
+        let speed = config.runtime.time_scale;
+        let record = SurfaceRecord::start(&config, &config.surface.name, &folder, offers_key, speed);
         let shell = SurfaceShell {
             host,
             ports,

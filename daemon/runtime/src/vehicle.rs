@@ -108,7 +108,7 @@ pub fn run_vehicle(load: Load, simulated: Option<SimulatedAutopilot>) -> Result<
         let is_foreign = config.labels.source != LabelSource::SceneModel;
         let labels = Labels { thread: labels, is_foreign, move_vehicle: move_the_vehicle(&config) };
         let (faults, disagreement) = (SensorFaults::default(), Disagreement::default());
-        let record = VehicleRecord::start(&config);
+        let record = VehicleRecord::start(&config, &dir.join("records"), config.runtime.time_scale);
         let shell = VehicleShell {
             host,
             camera,

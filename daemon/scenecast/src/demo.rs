@@ -1,6 +1,6 @@
 //! A rehearsal in real time, with the operator's page.
 
-use crate::mission_record::{MissionRecord, RecordClock, count};
+use crate::mission_record::count;
 use scenecast_console::state::{TrueClass, TruthInfo};
 use scenecast_console::{
     ClientRequest, Console, LinkMeter, MissionFacts, Reply, SurfaceRequest, bind, former_labels, handle_request,
@@ -9,11 +9,12 @@ use scenecast_console::{
 use scenecast_core::palette::colour;
 use scenecast_core::{Area, UserError, errln, outln};
 use scenecast_protocol::time::Instant;
-use scenecast_rehearsal::{Mission, Truth};
-use scenecast_runtime::record::new_dir;
-use scenecast_runtime::{Stop, block_on, random_bits};
+use scenecast_rehearsal::{EndEvent, Mission, Truth};
+use scenecast_runtime::record::{SurfaceRecord, VehicleRecord};
+use scenecast_runtime::{Stop, block_on, keep_private, random_bits};
 use scenecast_surface::record::EventTime;
 use scenecast_surface::recorder::Recorder;
+use std::path::Path;
 use std::sync::Arc;
 use std::thread::JoinHandle;
 use std::time::Duration;
@@ -30,6 +31,7 @@ const PUBLISH_INTERVAL: Duration = Duration::from_secs(1);
 /// Runs a mission at `speed` mission seconds per second of wall time and serves the operator's page on `port`, until it
 /// is interrupted; without a page, until the survey has ended and the link has drained.
 pub fn run_demo(mission: Mission, speed: f64, port: Option<u16>) -> Result<(), UserError> {
+    keep_private();
     block_on(async move {
         let stop = Stop::new()?;
         let console = match port {
@@ -95,22 +97,6 @@ fn shown(truth: Truth) -> scenecast_console::Truth {
     scenecast_console::Truth { info, picture: truth.png.into() }
 }
 
-/// The records of both ends, in the folder of the configuration or `records` in the present one.
-fn record(mission: &mut Mission, speed: f64) -> Option<MissionRecord> {
-    let config = mission.config();
-    if !config.record.enabled {
-        return None;
-    }
-    let folder = config.record.folder.clone().unwrap_or_else(|| "records".into());
-    let dirs = ["surface", config.vehicle.name.as_str()].map(|name| new_dir(&folder, name));
-    let begun = MissionRecord::create(mission, RecordClock::Wall(speed), [&dirs[0], &dirs[1]]);
-    match &begun {
-        Ok(_) => dirs.iter().for_each(|dir| outln!("record: {}", dir.display())),
-        Err(error) => errln!("scenecast: this mission is not recorded: {error}"),
-    }
-    begun.ok()
-}
-
 struct Demo {
     mission: Mission,
     /// Makes the picture of the true classes.
@@ -122,8 +108,7 @@ struct Demo {
     pace: Pace,
     counted: [u64; 2],
     published: Option<std::time::Instant>,
-    /// `None` if the mission is not recorded.
-    record: Option<MissionRecord>,
+    records: (SurfaceRecord, VehicleRecord),
 }
 
 impl Demo {
@@ -135,8 +120,12 @@ impl Demo {
         let truth = Some(make_truth(&mission));
         let mut recorder = Recorder::default();
         recorder.begin(mission.surface_mut(), 0, 0, EventTime::default());
-        let record = record(&mut mission, speed);
-        Self { meter, pace, truth, mission, facts, recorder, counted: [0; 2], published: None, record }
+        mission.keep_end_events();
+        // In the present folder, so that it is found after the demo.
+        let (config, folder) = (mission.config(), Path::new("records"));
+        let surface = SurfaceRecord::start(config, "surface", folder, false, speed);
+        let records = (surface, VehicleRecord::start(config, folder, speed));
+        Self { meter, pace, truth, mission, facts, recorder, counted: [0; 2], published: None, records }
     }
 
     async fn run(mut self, mut console: Option<Console>, mut stop: Stop) -> Result<(), UserError> {
@@ -167,10 +156,8 @@ impl Demo {
     /// Ends the records, and prints where they are.
     fn finish(mut self) -> Result<(), UserError> {
         self.publish(None);
-        let Some(record) = self.record.take() else { return Ok(()) };
-        let dirs = record.dirs();
-        record.finish()?;
-        dirs.iter().for_each(|dir| outln!("record: {}", dir.display()));
+        self.records.0.finish();
+        self.records.1.finish();
         Ok(())
     }
 
@@ -230,12 +217,14 @@ impl Demo {
         self.facts.speed = self.pace.reached(now);
         self.remember();
         let snapshot = Arc::new(snapshot(self.mission.surface(), &self.facts, &self.meter, now));
-        if let Some(record) = &mut self.record
-            && let Err(error) = record.observe(&mut self.mission, &snapshot)
-        {
-            errln!("scenecast: the record ends here: {error}");
-            self.record = None;
+        for (at, event) in self.mission.take_end_events() {
+            match event {
+                EndEvent::Surface(event) => self.records.0.handle_frame(&event, at.as_secs_f64()),
+                EndEvent::Vehicle(event) => self.records.1.handle_event(&event, at),
+            }
         }
+        self.records.0.observe(self.mission.surface(), &snapshot);
+        self.records.1.observe(self.mission.vehicle(), now);
         if let Some(console) = console {
             console.snapshots.send_replace(snapshot);
         }

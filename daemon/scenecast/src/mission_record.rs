@@ -1,39 +1,24 @@
-//! The records of both ends of a rehearsal.
+//! The records of both ends of a rehearsal in virtual time.
 
 use scenecast_console::{LinkMeter, MissionFacts, Snapshot, snapshot};
 use scenecast_core::UserError;
 use scenecast_files::{RecordEntry, RecordLimits, RecordWriter};
 use scenecast_protocol::time::Instant;
 use scenecast_rehearsal::{EndEvent, Mission};
-use scenecast_runtime::record::{Stamps, SurfaceRecorder, VehicleRecorder, limits, stamps_now};
-use std::path::{Path, PathBuf};
+use scenecast_runtime::record::{Stamps, SurfaceRecorder, VehicleRecorder, limits};
+use std::path::Path;
 use std::time::Duration;
 
 /// The time of day at which missions in virtual time begin, so that the same seed gives the same record: 2000-01-01.
 const BEGINS_NANOS: i64 = 946_684_800_000_000_000;
 
-/// What gives entries their time of day.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum RecordClock {
-    /// Mission time, from a fixed day on.
-    Virtual,
-    /// The computer's clock, in which mission time is so many times as fast.
-    Wall(f64),
-}
-
-impl RecordClock {
-    fn stamps(self, now: Instant) -> Stamps {
-        let now_s = now.as_secs_f64();
-        match self {
-            Self::Virtual => Stamps::new(now_s, 1.0, BEGINS_NANOS + (now_s * 1e9) as i64),
-            Self::Wall(speed) => stamps_now(now_s, speed),
-        }
-    }
+fn stamps(now: Instant) -> Stamps {
+    let now_s = now.as_secs_f64();
+    Stamps::new(now_s, 1.0, BEGINS_NANOS + (now_s * 1e9) as i64)
 }
 
 /// Records both ends of a mission.
 pub struct MissionRecord {
-    clock: RecordClock,
     surface: (RecordWriter, SurfaceRecorder),
     vehicle: (RecordWriter, VehicleRecorder),
     /// Files begun so far: of the surface, of the vehicle.
@@ -42,16 +27,11 @@ pub struct MissionRecord {
 
 impl MissionRecord {
     /// Begins both records in these new folders.
-    pub fn create(
-        mission: &mut Mission,
-        clock: RecordClock,
-        [surface, vehicle]: [&Path; 2],
-    ) -> Result<Self, UserError> {
+    pub fn create(mission: &mut Mission, [surface, vehicle]: [&Path; 2]) -> Result<Self, UserError> {
         let limits: RecordLimits = limits(mission.config());
         mission.keep_end_events();
         let name = mission.config().vehicle.name.clone();
         Ok(Self {
-            clock,
             surface: (RecordWriter::create(surface, limits)?, SurfaceRecorder::default()),
             vehicle: (RecordWriter::create(vehicle, limits)?, VehicleRecorder::new(&name, mission.cell_m())),
             parts: [1; 2],
@@ -61,13 +41,13 @@ impl MissionRecord {
     /// Records what has changed since the last call, and makes it durable.
     pub fn observe(&mut self, mission: &mut Mission, snapshot: &Snapshot) -> Result<(), UserError> {
         for (at, event) in mission.take_end_events() {
-            let stamps = self.clock.stamps(at);
+            let stamps = stamps(at);
             match &event {
                 EndEvent::Vehicle(event) => write(&mut self.vehicle.0, self.vehicle.1.handle_event(event, &stamps))?,
                 EndEvent::Surface(event) => write(&mut self.surface.0, self.surface.1.frame(event, &stamps))?,
             }
         }
-        let stamps = self.clock.stamps(mission.now());
+        let stamps = stamps(mission.now());
         let entries = self.surface.1.observe(self.parts[0], mission.surface(), snapshot, &stamps);
         write(&mut self.surface.0, entries)?;
         let entries = self.vehicle.1.observe(self.parts[1], mission.vehicle(), &stamps);
@@ -77,13 +57,9 @@ impl MissionRecord {
         Ok(())
     }
 
-    /// Their folders: of the surface, of the vehicle.
-    pub fn dirs(&self) -> [PathBuf; 2] {
-        [self.surface.0.dir().to_owned(), self.vehicle.0.dir().to_owned()]
-    }
-
     /// Ends both records.
-    pub fn finish(self) -> Result<(), UserError> {
+    pub fn finish(mut self) -> Result<(), UserError> {
+        write(&mut self.surface.0, self.surface.1.last_state())?;
         self.surface.0.finish()?;
         self.vehicle.0.finish()
     }

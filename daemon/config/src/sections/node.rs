@@ -104,7 +104,7 @@ section! {
         /// Size at which the next file of a record begins, megabytes.
         part_mb: u64 = 64, range(1.0, 1e5, "MB"), [Auv Asv Scenario];
         /// Size of one mission's record above which its oldest file is removed, megabytes.
-        quota_mb: u64 = 4096, range(2.0, 1e7, "MB"), [Auv Asv Scenario];
+        quota_mb: u64 = 1024, range(2.0, 1e7, "MB"), [Auv Asv Scenario];
     }
 }
 

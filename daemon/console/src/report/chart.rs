@@ -94,7 +94,7 @@ fn cells(svg: &mut String, frame: &Frame, bounds: Rect, state: &VehicleState, ve
         }
     }
     for (label, path) in runs {
-        let _ = writeln!(svg, "<path fill=\"{}\" d=\"{path}\"/>", colour(state, label));
+        let _ = writeln!(svg, "<path fill=\"{}\" shape-rendering=\"crispEdges\" d=\"{path}\"/>", colour(state, label));
     }
 }
 
@@ -170,12 +170,13 @@ pub(super) fn line(series: &Series<'_>, length_s: f64) -> Option<String> {
     Some(format!(
         "<svg viewBox=\"0 0 {WIDTH} {HEIGHT}\" role=\"img\" aria-label=\"{name} over time\" xmlns=\"http://www.w3.org/2000/svg\">\
          <path class=\"grid\" d=\"M60 {bottom}H{WIDTH}M60 14H{WIDTH}\"/><polyline class=\"line\" points=\"{}\"/>\
-         <text x=\"2\" y=\"{bottom}\">0</text><text x=\"2\" y=\"18\">{top:.3}</text><text x=\"60\" y=\"11\">{name}, {unit}</text>\
+         <text x=\"2\" y=\"{bottom}\">0</text><text x=\"2\" y=\"18\">{top:.digits$}</text><text x=\"60\" y=\"11\">{name}, {unit}</text>\
          <text x=\"60\" y=\"{HEIGHT}\">0 min</text><text x=\"{end}\" y=\"{HEIGHT}\">{minutes:.0} min</text></svg>",
         points.join(" "),
         name = Escaped(series.name),
         unit = Escaped(series.unit),
         bottom = HEIGHT - 20.0,
+        digits = if top >= 10.0 { 0 } else { 3 },
         end = WIDTH - 50.0,
         minutes = length_s / 60.0
     ))

@@ -7,6 +7,7 @@ use scenecast_messages::contents::valid_part;
 use scenecast_messages::geometry_msgs::PoseWithCovarianceStamped;
 use scenecast_messages::scenecast_msgs::{Event, Exemplar, Frame, Link, MapCells, OrderStatus};
 use scenecast_messages::std_msgs::Text;
+use scenecast_protocol::directive::SlotId;
 use scenecast_protocol::map::{Cell, LabelGrid};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -115,6 +116,10 @@ impl Dive {
 
 impl DiveVehicle {
     fn take_cells(&mut self, cells: &MapCells) {
+        if !cells.whole && self.cell_m == 0.0 {
+            // The first file of the record is gone; the whole map follows.
+            return;
+        }
         if cells.whole {
             self.labels.clear();
             if self.epoch != cells.epoch {
@@ -141,6 +146,11 @@ impl DiveVehicle {
         if way.last().is_none_or(|last| last.status != step.status) {
             way.push(step);
         }
+    }
+
+    /// The orders but for position fixes, which the surface gives by itself.
+    pub(super) fn orders_of_people(&self) -> impl Iterator<Item = (&(String, u32), &Vec<OrderStep>)> {
+        self.orders.iter().filter(|((slot, _), _)| slot != SlotId::Fix.name())
     }
 
     /// Length of the reported track, metres.

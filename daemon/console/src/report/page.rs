@@ -15,7 +15,7 @@ const IMAGES: usize = 3;
 
 const STYLE: &str = "body{font:16px/1.45 system-ui,sans-serif;max-width:800px;margin:2em auto;padding:0 1em;color:#111;background:#fff}\
 table{border-collapse:collapse;width:100%;font-size:.9em}th,td{text-align:left;vertical-align:top;padding:.25em .6em;\
-border-bottom:1px solid #ccc}td.n{text-align:right}figure{margin:1em 0}figcaption{font-size:.85em}svg{width:100%;height:auto}\
+border-bottom:1px solid #ccc}td.n{text-align:right;white-space:nowrap}td.t{white-space:nowrap}figure{margin:1em 0}figcaption{font-size:.85em}svg{width:100%;height:auto}\
 svg text{font:11px system-ui,sans-serif}.grid{stroke:#000;stroke-opacity:.25;stroke-width:.6;fill:none}\
 .track{fill:none;stroke:#000;stroke-width:1.5;stroke-linejoin:round}.line{fill:none;stroke:#000;stroke-width:1.2}\
 .scale{fill:none;stroke:#000;stroke-width:1.5}.swatch{display:inline-block;width:1em;height:1em;border:1px solid #000;\
@@ -119,7 +119,7 @@ impl Dive {
         for (at_s, event) in &self.events {
             let _ = writeln!(
                 page,
-                "<tr><td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>",
+                "<tr><td class=\"t\">{}</td><td>{}</td><td>{}</td><td>{}</td></tr>",
                 utc_text(*at_s),
                 Escaped(&event.vehicle),
                 Escaped(&event.source),
@@ -137,7 +137,7 @@ impl Dive {
                 json!({ "label": label, "name": name(state, label), "colour": colour(state, label), "cells": cells,
                         "area_m2": cells as f64 * square })
             });
-            let orders = vehicle.orders.iter().map(|((slot, version), way)| {
+            let orders = vehicle.orders_of_people().map(|((slot, version), way)| {
                 let steps = way.iter().map(|step| {
                     json!({ "utc": utc_text(step.at_s), "status": words::status(step.status), "reason": step.reason })
                 });
@@ -221,18 +221,18 @@ fn notes(page: &mut String, dive: &Dive, state: &VehicleState) {
 }
 
 fn orders(page: &mut String, vehicle: &DiveVehicle) {
-    if vehicle.orders.is_empty() {
+    if vehicle.orders_of_people().next().is_none() {
         return;
     }
     *page += "<h3>Orders</h3>\n<table><tr><th>order</th><th>given (UTC)</th><th>end</th><th>after</th></tr>\n";
     let mut orders: Vec<(&(String, u32), &OrderStep, &OrderStep)> =
-        vehicle.orders.iter().filter_map(|(order, way)| Some((order, way.first()?, way.last()?))).collect();
+        vehicle.orders_of_people().filter_map(|(order, way)| Some((order, way.first()?, way.last()?))).collect();
     orders.sort_by(|a, b| a.1.given_s.total_cmp(&b.1.given_s));
     for ((slot, version), first, last) in orders {
         let reason = if last.reason.is_empty() { String::new() } else { format!(": {}", last.reason) };
         let _ = writeln!(
             page,
-            "<tr><td>{} {version}</td><td>{}</td><td>{}{}</td><td class=\"n\">{:.0} s</td></tr>",
+            "<tr><td>{} {version}</td><td class=\"t\">{}</td><td>{}{}</td><td class=\"n\">{:.0} s</td></tr>",
             Escaped(slot),
             utc_text(first.given_s),
             words::status(last.status),

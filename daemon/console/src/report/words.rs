@@ -1,6 +1,6 @@
 //! The summary of a dive in sentences.
 
-use super::dive::{Dive, DiveVehicle, name};
+use super::dive::{Dive, DiveVehicle, OrderStep, name};
 use crate::state::VehicleState;
 use scenecast_core::utc_text;
 use scenecast_messages::scenecast_msgs::OrderStatus;
@@ -18,9 +18,9 @@ pub(super) fn duration(seconds: f64) -> String {
 /// An area for people, with three digits.
 pub(super) fn area(m2: f64) -> String {
     if m2 >= 1e6 {
-        format!("{:.2} km2", m2 / 1e6)
+        format!("{:.2} km²", m2 / 1e6)
     } else {
-        format!("{m2:.prec$} m2", prec = if m2 < 100.0 { 1 } else { 0 })
+        format!("{m2:.prec$} m²", prec = if m2 < 100.0 { 1 } else { 0 })
     }
 }
 
@@ -96,7 +96,7 @@ fn found(state: &VehicleState, vehicle: &DiveVehicle) -> String {
     let Some(&(largest, cells)) = classes.first() else { return "No part of the map arrived.".to_owned() };
     let square = vehicle.cell_m * vehicle.cell_m;
     format!(
-        "The map that arrived has {all} cells of {:.2} m, {}, with {} classes; {} covers most of it: {} ({:.0} %).",
+        "The map that arrived has {all} cells of {:.2} m, {}, with {} classes; the largest is {} with {} ({:.0} %).",
         vehicle.cell_m,
         area(all as f64 * square),
         classes.len(),
@@ -107,12 +107,17 @@ fn found(state: &VehicleState, vehicle: &DiveVehicle) -> String {
 }
 
 fn orders(vehicle: &DiveVehicle) -> String {
-    let ends =
-        |status: u8| vehicle.orders.values().filter(|way| way.last().is_some_and(|last| last.status == status)).count();
-    match vehicle.orders.len() {
-        0 => "No order was given.".to_owned(),
+    let ends = |status: u8| {
+        let is_end = |way: &[OrderStep]| way.last().is_some_and(|last| last.status == status);
+        vehicle.orders_of_people().filter(|(_, way)| is_end(way)).count()
+    };
+    let all = vehicle.orders_of_people().count();
+    let fixes = vehicle.orders.len() - all;
+    let fixes = if fixes == 0 { String::new() } else { format!(" The surface sent {fixes} position fixes.") };
+    match all {
+        0 => format!("No order was given.{fixes}"),
         n => format!(
-            "{n} orders were given; of these {} were applied, {} refused and {} withdrawn.",
+            "{n} orders were given; of these {} were applied, {} refused and {} withdrawn.{fixes}",
             ends(OrderStatus::APPLIED),
             ends(OrderStatus::REFUSED),
             ends(OrderStatus::WITHDRAWN)
@@ -127,6 +132,6 @@ mod tests {
     #[test]
     fn spans_and_areas_are_for_people() {
         assert_eq!([59.6, 130.0, 7265.0].map(duration), ["60 s", "2 min", "2 h 01 min"]);
-        assert_eq!([3.0625, 415.2, 2.5e6].map(area), ["3.1 m2", "415 m2", "2.50 km2"]);
+        assert_eq!([3.0625, 415.2, 2.5e6].map(area), ["3.1 m²", "415 m²", "2.50 km²"]);
     }
 }

@@ -7,6 +7,7 @@ mod recover;
 pub use reader::{RecordedFrames, RecordedMessage, is_record, read_record};
 pub use recover::{RecoveredPart, recover};
 
+use crate::sync_folder;
 use mcap::records::MessageHeader;
 use mcap::{WriteOptions, Writer};
 use metadata::Metadata;
@@ -114,9 +115,10 @@ impl RecordWriter {
     /// # Errors
     /// The folder or its files cannot be written, or the folder exists.
     pub fn create(dir: &Path, limits: RecordLimits) -> Result<Self, UserError> {
-        let parent = dir.parent().unwrap_or(Path::new(""));
+        let parent = dir.parent().filter(|parent| *parent != Path::new("")).unwrap_or(Path::new("."));
         std::fs::create_dir_all(parent).map_err(|e| UserError::file(parent, e))?;
         std::fs::create_dir(dir).map_err(|e| UserError::file(dir, e))?;
+        sync_folder(parent).map_err(|e| UserError::file(parent, e))?;
         let stem = dir.file_name().unwrap_or_default().to_string_lossy().into_owned();
         let mut metadata = Metadata::new(stem);
         let open = OpenPart::create(&dir.join(metadata.begin_part()))?;
@@ -146,11 +148,13 @@ impl RecordWriter {
         }
         let next = OpenPart::create(&self.dir.join(self.metadata.begin_part()))?;
         std::mem::replace(&mut self.open, next).finish().map_err(|e| UserError::file(&self.dir, e))?;
-        for old in self.metadata.take_excess(self.limits.all_bytes) {
+        let excess = self.metadata.take_excess(self.limits.all_bytes);
+        // The list of files is never longer than there are files.
+        self.metadata.write(&self.dir)?;
+        for old in excess {
             let path = self.dir.join(old);
             std::fs::remove_file(&path).map_err(|e| UserError::file(&path, e))?;
         }
-        self.metadata.write(&self.dir)?;
         Ok(true)
     }
 

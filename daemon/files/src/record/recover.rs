@@ -2,6 +2,7 @@
 
 use super::metadata::{Metadata, Part};
 use crate::bag::stream::{is_whole, mcap_files, records};
+use crate::sync_folder;
 use mcap::records::{MessageHeader, Record};
 use mcap::{WriteOptions, Writer};
 use scenecast_core::UserError;
@@ -26,9 +27,28 @@ struct Contents {
     part: Part,
     types: BTreeMap<String, String>,
     damage: Option<String>,
+    /// Messages whose topic was described in a part that could not be read.
+    without_topic: u64,
 }
 
-/// Makes the files of a record whole that are not, and writes `metadata.yaml` anew. `path` is a file or the folder of a record.
+impl Contents {
+    /// Whether more is wrong than that the end is missing.
+    fn is_damaged(&self) -> bool {
+        self.without_topic > 0 || self.damage.as_ref().is_some_and(|damage| damage.contains("damaged"))
+    }
+
+    fn damage(self) -> Option<String> {
+        let lost = (self.without_topic > 0)
+            .then(|| format!("{} messages are lost with the description of their topics", self.without_topic));
+        match (self.damage, lost) {
+            (Some(damage), Some(lost)) => Some(format!("{damage}; {lost}")),
+            (damage, lost) => damage.or(lost),
+        }
+    }
+}
+
+/// Makes the files of a record whole that are not, and writes `metadata.yaml` anew. `path` is a file or the folder of a record. A file of
+/// which more than the end is damaged is kept beside as `*.mcap.damaged`.
 ///
 /// # Errors
 /// There is no file, or it cannot be written; it is then as it was.
@@ -41,12 +61,19 @@ pub fn recover(path: &Path) -> Result<Vec<RecoveredPart>, UserError> {
         let copy = if whole { None } else { Some(beside.as_path()) };
         let contents = read(&file, copy)?;
         if copy.is_some() {
+            if contents.is_damaged() {
+                // Another program may find more in it.
+                let kept = file.with_extension("mcap.damaged");
+                std::fs::rename(&file, &kept).map_err(|e| UserError::file(&kept, e))?;
+            }
             std::fs::rename(&beside, &file).map_err(|e| UserError::file(&file, e))?;
+            let folder = file.parent().filter(|folder| *folder != Path::new("")).unwrap_or(Path::new("."));
+            sync_folder(folder).map_err(|e| UserError::file(folder, e))?;
         }
         let messages = (!whole).then(|| contents.part.messages.values().sum());
-        found.push(RecoveredPart { path: file, messages, damage: contents.damage });
-        parts.push(contents.part);
-        types.extend(contents.types);
+        parts.push(contents.part.clone());
+        types.extend(contents.types.clone());
+        found.push(RecoveredPart { path: file, messages, damage: contents.damage() });
     }
     if path.is_dir() {
         Metadata::of(parts, types).write(path)?;
@@ -84,7 +111,10 @@ fn read(file: &Path, copy: Option<&Path>) -> Result<Contents, UserError> {
                 topics.insert(channel.id, (channel.topic, id));
             }
             Record::Message { header, data } => {
-                let Some((topic, channel_id)) = topics.get(&header.channel_id) else { return Ok(()) };
+                let Some((topic, channel_id)) = topics.get(&header.channel_id) else {
+                    contents.without_topic += 1;
+                    return Ok(());
+                };
                 contents.part.note(topic, header.log_time);
                 let header = MessageHeader { channel_id: *channel_id, ..header };
                 let written = writer.as_mut().map(|w| w.write_to_known_channel(&header, &data));

@@ -7,16 +7,16 @@ mod vehicle;
 
 #[cfg(feature = "surface")]
 pub use surface::{SurfaceRecord, SurfaceRecorder};
-pub(crate) use vehicle::VehicleRecord;
-pub use vehicle::VehicleRecorder;
+pub use vehicle::{VehicleRecord, VehicleRecorder};
 
+use crate::durable::free_bytes;
 use scenecast_config::Config;
-use scenecast_core::{outln, utc_text};
+use scenecast_core::{UserError, outln, utc_text};
 use scenecast_files::{RecordEntry, RecordLimits, RecordWriter};
 use scenecast_host::{FrameEvent, FrameOutcome};
 pub use scenecast_messages::contents::Stamps;
 use scenecast_messages::contents::{header, valid_part};
-use scenecast_messages::scenecast_msgs::{Frame, MapCells, MapVersion};
+use scenecast_messages::scenecast_msgs::{Event, Frame, MapCells, MapVersion};
 use scenecast_protocol::map::{Cell, LabelGrid, MapDigest, UNEXPLORED};
 use scenecast_protocol::wire::{Address, Envelope};
 use std::path::{Path, PathBuf};
@@ -31,6 +31,10 @@ const WAITING: usize = 4096;
 /// Time between two syncs; a power cut takes so much at most.
 const SYNC_INTERVAL: Duration = Duration::from_millis(1500);
 const MEGABYTE: u64 = 1 << 20;
+/// Space that the record leaves to other files, bytes.
+const LEFT_FREE: u64 = 256 << 20;
+/// The longest wait for the disk at the end.
+const END_TIMEOUT: Duration = Duration::from_secs(3);
 
 /// Nanoseconds of the computer's clock since 1970.
 fn unix_nanos() -> i64 {
@@ -38,7 +42,7 @@ fn unix_nanos() -> i64 {
 }
 
 /// A new folder for a record that begins now: the name and the time, and a number if there is one of this second.
-pub fn new_dir(folder: &Path, name: &str) -> PathBuf {
+fn new_dir(folder: &Path, name: &str) -> PathBuf {
     let time = utc_text(unix_nanos() as f64 / 1e9).replace(['-', ':'], "");
     let named = |n: u32| match n {
         1 => folder.join(format!("{}-{time}", valid_part(name))),
@@ -65,7 +69,10 @@ struct Record {
     entries: Option<SyncSender<RecordEntry>>,
     /// Files that were begun: each is to repeat the state of the map.
     parts: Arc<AtomicU32>,
-    lost: u64,
+    /// Messages that were left out, and those that the record does not tell yet.
+    lost: [u64; 2],
+    /// Calls that have left some out: the whole state follows each.
+    gaps: u32,
     thread: Option<JoinHandle<()>>,
 }
 
@@ -85,7 +92,7 @@ impl Record {
                 let ((entries, received), parts) = (sync_channel(WAITING), Arc::new(AtomicU32::new(1)));
                 let begun = parts.clone();
                 let thread = std::thread::spawn(move || write(writer, &received, &begun));
-                Some(Self { dir, entries: Some(entries), parts, lost: 0, thread: Some(thread) })
+                Some(Self { dir, entries: Some(entries), parts, lost: [0; 2], gaps: 0, thread: Some(thread) })
             }
             Err(error) => {
                 tracing::error!("record: this mission is not recorded: {error}");
@@ -94,36 +101,59 @@ impl Record {
         }
     }
 
-    /// The number of files so far.
-    fn parts(&self) -> u32 {
-        self.parts.load(Ordering::Relaxed)
+    /// Changes when the record needs the whole state again: in a new file, and after messages were left out.
+    fn state_number(&self) -> u32 {
+        self.parts.load(Ordering::Relaxed).wrapping_add(self.gaps)
     }
 
     /// Adds entries; those that find no room are left out.
-    fn put(&mut self, entries: impl IntoIterator<Item = RecordEntry>) {
+    fn put(&mut self, entries: impl IntoIterator<Item = RecordEntry>, stamps: &Stamps) {
+        let [all, untold] = self.lost;
+        if untold > 0 && self.send(gap_entry(untold, stamps)) {
+            self.lost[1] = 0;
+        }
         for entry in entries {
-            let Some(sender) = &self.entries else { return };
-            match sender.try_send(entry) {
-                Ok(()) => {}
-                Err(TrySendError::Full(_)) => {
-                    self.lost += 1;
-                    if self.lost.is_power_of_two() {
-                        tracing::warn!("record: the disk is too slow: {} messages left out so far", self.lost);
-                    }
-                }
-                // The thread has said why.
-                Err(TrySendError::Disconnected(_)) => self.entries = None,
+            _ = self.send(entry);
+        }
+        let lost = self.lost[0] - all;
+        if lost > 0 {
+            self.gaps = self.gaps.wrapping_add(1);
+            if all.checked_ilog2() != self.lost[0].checked_ilog2() {
+                tracing::warn!("record: the disk is too slow: {} messages left out so far", self.lost[0]);
             }
         }
     }
 
-    /// Ends the record, and prints where it is.
-    fn finish(mut self) {
-        let is_whole = self.entries.take().is_some();
-        if self.thread.take().is_some_and(|thread| thread.join().is_ok()) && is_whole {
-            outln!("record: {}", self.dir.display());
+    /// Whether the thread takes the entry.
+    fn send(&mut self, entry: RecordEntry) -> bool {
+        let Some(sender) = &self.entries else { return false };
+        match sender.try_send(entry) {
+            Ok(()) => return true,
+            Err(TrySendError::Full(_)) => self.lost.iter_mut().for_each(|count| *count += 1),
+            // The thread has said why.
+            Err(TrySendError::Disconnected(_)) => self.entries = None,
         }
+        false
     }
+
+    /// Ends the record, and prints where it is. A disk that hangs does not hold the end.
+    fn finish(mut self) {
+        self.entries = None;
+        let Some(thread) = self.thread.take() else { return };
+        let began = Instant::now();
+        while !thread.is_finished() && began.elapsed() < END_TIMEOUT {
+            std::thread::sleep(Duration::from_millis(10));
+        }
+        outln!("record: {}", self.dir.display());
+    }
+}
+
+/// That messages are missing.
+fn gap_entry(count: u64, stamps: &Stamps) -> RecordEntry {
+    let text = format!("{count} messages of this record were left out: the disk was too slow");
+    let (header, source) = (header(stamps.now(), ""), "record".to_owned());
+    let message = Event { header, vehicle: String::new(), level: Event::WARN, source, text };
+    entry("events".to_owned(), stamps, &message)
 }
 
 fn write(mut writer: RecordWriter, entries: &Receiver<RecordEntry>, parts: &AtomicU32) {
@@ -140,8 +170,12 @@ fn write(mut writer: RecordWriter, entries: &Receiver<RecordEntry>, parts: &Atom
         if !ends && synced.elapsed() >= SYNC_INTERVAL {
             parts.fetch_add(u32::from(writer.sync()?), Ordering::Relaxed);
             synced = Instant::now();
+            // The journal needs the rest.
+            if free_bytes(writer.dir()).is_some_and(|free| free < LEFT_FREE) {
+                return Err(UserError::file(writer.dir(), "the disk is almost full"));
+            }
         }
-        Ok::<bool, scenecast_core::UserError>(ends)
+        Ok::<bool, UserError>(ends)
     };
     let ended = loop {
         match step() {
@@ -155,8 +189,16 @@ fn write(mut writer: RecordWriter, entries: &Receiver<RecordEntry>, parts: &Atom
     }
 }
 
-/// A frame on the link as a message.
-fn frame_entry(event: &FrameEvent, name: impl Fn(Address) -> String, stamps: &Stamps) -> Option<RecordEntry> {
+/// A frame on the link as a message; without its bytes if it may carry a next key and `hides_keys`.
+///
+/// The surface hides a next key in frames to the vehicle under the present one, so that who has both a record and a key that was
+/// replaced would have the one that replaced it.
+fn frame_entry(
+    event: &FrameEvent,
+    name: impl Fn(Address) -> String,
+    hides_keys: bool,
+    stamps: &Stamps,
+) -> Option<RecordEntry> {
     let (direction, frame) = match event {
         FrameEvent::Sent { frame, .. } => (Frame::SENT, frame),
         FrameEvent::Received { frame, outcome: FrameOutcome::Dropped } => (Frame::DROPPED, frame),
@@ -164,6 +206,7 @@ fn frame_entry(event: &FrameEvent, name: impl Fn(Address) -> String, stamps: &St
         _ => return None,
     };
     let ends = Envelope::decode(frame, |_| true).ok().map(|envelope| [envelope.header.from, envelope.header.to]);
+    let is_to_vehicle = ends.is_none_or(|[_, to]| to != Address::SURFACE);
     let vehicle = ends.into_iter().flatten().find(|end| end.is_vehicle()).map(name).unwrap_or_default();
     let message = Frame {
         header: header(stamps.now(), ""),
@@ -171,7 +214,7 @@ fn frame_entry(event: &FrameEvent, name: impl Fn(Address) -> String, stamps: &St
         direction,
         bits: frame.len() as u32 * 8,
         reason: String::new(),
-        data: frame.clone(),
+        data: if hides_keys && is_to_vehicle { Vec::new() } else { frame.clone() },
     };
     Some(entry("frames".to_owned(), stamps, &message))
 }
@@ -245,5 +288,68 @@ impl RecordedMap {
             entries.push(entry(topic("map_cells"), stamps, &cells));
         }
         entries
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use scenecast_protocol::wire::{FrameBuilder, Header, MissionId, Seal, SessionId};
+
+    fn stamps() -> Stamps {
+        Stamps::new(10.0, 1.0, 1_000_000_000_000)
+    }
+
+    fn frame(from: Address, to: Address) -> Vec<u8> {
+        let header = Header::hello(from, to, SessionId::from_random(7));
+        FrameBuilder::new(&header, 64).finish(&Seal::Crc(MissionId(1), 0), true)
+    }
+
+    #[test]
+    fn frames_that_may_hide_a_key_have_no_bytes() {
+        let auv = Address::vehicle(1).unwrap();
+        let recorded = |frame: Vec<u8>, hides_keys: bool| {
+            let event = FrameEvent::Received { frame, outcome: FrameOutcome::Opened };
+            let entry = frame_entry(&event, |_| "auv-1".to_owned(), hides_keys, &stamps()).unwrap();
+            scenecast_messages::decode::<Frame>(&entry.data).unwrap()
+        };
+        let (down, up) = (frame(Address::SURFACE, auv), frame(auv, Address::SURFACE));
+        assert!(recorded(down.clone(), true).data.is_empty());
+        assert_eq!(recorded(down.clone(), false).data, down);
+        assert_eq!(recorded(up.clone(), true).data, up);
+        // Who reads no addresses does not know whose frame it is.
+        assert!(recorded(vec![0xFF; 9], true).data.is_empty());
+    }
+
+    #[test]
+    fn the_whole_map_follows_what_was_left_out() {
+        let (entries, waiting) = sync_channel(2);
+        let parts = Arc::new(AtomicU32::new(1));
+        let mut record =
+            Record { dir: PathBuf::new(), entries: Some(entries), parts, lost: [0; 2], gaps: 0, thread: None };
+        let mut map = RecordedMap::default();
+        let mut labels = LabelGrid::default();
+        let mut change = |record: &mut Record, map: &mut RecordedMap, x: i32| {
+            labels.set(Cell::new(x, 0), 3);
+            let state = MapState { vehicle: "auv-1", epoch: 0, version: x as u64, cell_m: 0.5, labels: &labels };
+            record.put(map.record(&state, &stamps()), &stamps());
+        };
+        let before = record.state_number();
+        change(&mut record, &mut map, 1);
+        assert_eq!(record.state_number(), before);
+        change(&mut record, &mut map, 2);
+        assert_ne!(record.state_number(), before, "the disk has taken nothing yet");
+        while waiting.try_recv().is_ok() {}
+        record.put([], &stamps());
+        let told = waiting.try_recv().unwrap();
+        let text = scenecast_messages::decode::<Event>(&told.data).unwrap().text;
+        assert!(text.starts_with("2 messages of this record were left out"), "{text}");
+        let mut map = RecordedMap::default();
+        change(&mut record, &mut map, 3);
+        let cells = waiting.try_iter().find_map(|entry| {
+            let is_cells = entry.topic.ends_with("/map_cells");
+            is_cells.then(|| scenecast_messages::decode::<MapCells>(&entry.data).unwrap())
+        });
+        assert_eq!(cells.map(|cells| (cells.whole, cells.x.len())), Some((true, 3)));
     }
 }

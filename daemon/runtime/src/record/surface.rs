@@ -10,6 +10,7 @@ use scenecast_host::FrameEvent;
 use scenecast_messages::contents::{Stamps, WORLD_FRAME, header, pose, valid_part};
 use scenecast_messages::scenecast_msgs::{Event, Exemplar, Link};
 use scenecast_messages::std_msgs::Text;
+use scenecast_protocol::map::StateReplica;
 use scenecast_protocol::wire::Address;
 use scenecast_surface::Surface;
 use std::collections::{BTreeMap, BTreeSet};
@@ -27,8 +28,10 @@ pub struct SurfaceRecord {
 
 impl SurfaceRecord {
     /// Begins it in a folder in `folder`, unless the configuration names another one.
-    pub fn start(config: &Config, name: &str, folder: &Path, speed: f64) -> Self {
-        Self { record: Record::start(config, name, folder), recorder: SurfaceRecorder::default(), speed }
+    /// `offers_key` is whether it offers the vehicles a next key.
+    pub fn start(config: &Config, name: &str, folder: &Path, offers_key: bool, speed: f64) -> Self {
+        let recorder = SurfaceRecorder { hides_keys: offers_key, ..SurfaceRecorder::default() };
+        Self { record: Record::start(config, name, folder), recorder, speed }
     }
 
     /// Whether there is a record.
@@ -39,19 +42,22 @@ impl SurfaceRecord {
     /// Records what has changed.
     pub fn observe(&mut self, surface: &Surface, snapshot: &Snapshot) {
         let Some(record) = &mut self.record else { return };
-        let stamps = stamps_now(snapshot.state.now_s, self.speed);
-        record.put(self.recorder.observe(record.parts(), surface, snapshot, &stamps));
+        let stamps = stamps_now(snapshot.state.now_s, snapshot.state.mission.speed);
+        record.put(self.recorder.observe(record.state_number(), surface, snapshot, &stamps), &stamps);
     }
 
     /// Records a frame.
     pub fn handle_frame(&mut self, event: &FrameEvent, now_s: f64) {
         let Some(record) = &mut self.record else { return };
-        record.put(self.recorder.frame(event, &stamps_now(now_s, self.speed)));
+        let stamps = stamps_now(now_s, self.speed);
+        record.put(self.recorder.frame(event, &stamps), &stamps);
     }
 
     /// Ends the record, and prints where it is.
-    pub fn finish(self) {
-        self.record.into_iter().for_each(Record::finish);
+    pub fn finish(mut self) {
+        let Some(mut record) = self.record.take() else { return };
+        record.put(self.recorder.last_state(), &Stamps::default());
+        record.finish();
     }
 }
 
@@ -61,10 +67,15 @@ pub struct SurfaceRecorder {
     part: u32,
     vehicles: BTreeMap<u8, RecordedVehicle>,
     state_s: Option<f64>,
+    link_s: Option<f64>,
+    /// The last state, unless it was recorded.
+    last_state: Option<RecordEntry>,
     /// The last entry of the surface's log that was recorded.
     log: u64,
     /// The vehicles' names by address.
     names: BTreeMap<u8, String>,
+    /// Frames to the vehicle may carry a next key.
+    hides_keys: bool,
 }
 
 /// What a record has of a vehicle.
@@ -81,15 +92,20 @@ struct RecordedVehicle {
 }
 
 impl SurfaceRecorder {
-    /// What has changed since the last call. `part` is the number of the record's file: each begins with the whole state.
+    /// What has changed since the last call, or the whole state where `part` is another one than then.
     pub fn observe(&mut self, part: u32, surface: &Surface, snapshot: &Snapshot, stamps: &Stamps) -> Vec<RecordEntry> {
         if std::mem::replace(&mut self.part, part) != part {
-            *self = Self { part, log: self.log, names: std::mem::take(&mut self.names), ..Self::default() };
+            let names = std::mem::take(&mut self.names);
+            *self = Self { part, log: self.log, names, hides_keys: self.hides_keys, ..Self::default() };
         }
         let mut entries = self.events(surface, snapshot, stamps);
         let now_s = snapshot.state.now_s;
-        let is_due = self.state_s.is_none_or(|last| now_s - last >= STATE_INTERVAL_S);
-        let mut has_news = is_due;
+        let is_due = |last: Option<f64>| last.is_none_or(|last| now_s - last >= STATE_INTERVAL_S);
+        let is_link_due = is_due(self.link_s);
+        if is_link_due {
+            self.link_s = Some(now_s);
+        }
+        let mut has_news = is_due(self.state_s);
         for vehicle in &snapshot.state.vehicles {
             if self.names.get(&vehicle.id) != Some(&vehicle.name) {
                 self.names.insert(vehicle.id, vehicle.name.clone());
@@ -99,21 +115,32 @@ impl SurfaceRecorder {
             recorded.record_orders(vehicle, stamps, &mut entries);
             has_news |= entries.len() > before;
             recorded.record(surface, &snapshot.state, vehicle, stamps, &mut entries);
-            if is_due {
+            if is_link_due {
                 entries.push(of(vehicle, "link", stamps, &link(&snapshot.state, vehicle, stamps)));
             }
         }
-        if has_news {
-            self.state_s = Some(now_s);
-            let data = String::from_utf8_lossy(&snapshot.json).into_owned();
-            entries.push(entry("state".to_owned(), stamps, &Text { data }));
-        }
+        let data = String::from_utf8_lossy(&snapshot.json).into_owned();
+        let state = entry("state".to_owned(), stamps, &Text { data });
+        self.last_state = match has_news {
+            true => {
+                self.state_s = Some(now_s);
+                entries.push(state);
+                None
+            }
+            false => Some(state),
+        };
         entries
+    }
+
+    /// The last state, if it is not recorded.
+    pub fn last_state(&mut self) -> Option<RecordEntry> {
+        self.last_state.take()
     }
 
     /// A frame of the link.
     pub fn frame(&self, event: &FrameEvent, stamps: &Stamps) -> Option<RecordEntry> {
-        frame_entry(event, |vehicle| self.names.get(&vehicle.number()).cloned().unwrap_or_default(), stamps)
+        let name = |vehicle: Address| self.names.get(&vehicle.number()).cloned().unwrap_or_default();
+        frame_entry(event, name, self.hides_keys, stamps)
     }
 
     /// The entries of the surface's log since the last call.
@@ -158,7 +185,8 @@ impl RecordedVehicle {
         let earlier = vehicle.map.earlier.as_ref();
         let epoch = earlier.map_or(vehicle.map.epoch, |earlier| earlier.current_epoch);
         if let Some(view) = address.and_then(|address| surface.view(address)) {
-            let (version, labels) = (vehicle.map.version, view.replica().shown());
+            // The page may show an earlier map meanwhile, with its version.
+            let (version, labels) = (view.replica().version(), view.replica().shown());
             let map = MapState { vehicle: &vehicle.name, epoch, version, cell_m: vehicle.map.cell_m, labels };
             entries.extend(self.map.record(&map, stamps));
         }

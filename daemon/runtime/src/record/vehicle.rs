@@ -9,6 +9,7 @@ use scenecast_messages::scenecast_msgs::{Event, Link, OrderStatus};
 use scenecast_protocol::directive::SlotState;
 use scenecast_protocol::time::Instant;
 use scenecast_vehicle::{AppliedSlot, Vehicle};
+use std::path::Path;
 
 /// Mission time between two messages about the link, seconds.
 const LINK_INTERVAL_S: f64 = 10.0;
@@ -16,34 +17,37 @@ const LINK_INTERVAL_S: f64 = 10.0;
 const POSE_INTERVAL_S: f64 = 1.0;
 
 /// The record of a vehicle's process; without one, nothing is done.
-pub(crate) struct VehicleRecord {
+pub struct VehicleRecord {
     record: Option<Record>,
     recorder: VehicleRecorder,
     speed: f64,
 }
 
 impl VehicleRecord {
-    pub(crate) fn start(config: &Config) -> Self {
+    /// Begins it in a folder in `folder`, unless the configuration names another one.
+    pub fn start(config: &Config, folder: &Path, speed: f64) -> Self {
         let name = &config.vehicle.name;
-        let folder = config.runtime.state_dir.join("records");
-        let record = Record::start(config, name, &folder);
-        Self { record, recorder: VehicleRecorder::new(name, cell_m(config)), speed: config.runtime.time_scale }
+        let hides_keys = config.link.key_file.is_some();
+        let recorder = VehicleRecorder { hides_keys, ..VehicleRecorder::new(name, cell_m(config)) };
+        Self { record: Record::start(config, name, folder), recorder, speed }
     }
 
     /// Records what has changed.
-    pub(crate) fn observe(&mut self, vehicle: &Vehicle, now: Instant) {
+    pub fn observe(&mut self, vehicle: &Vehicle, now: Instant) {
         let Some(record) = &mut self.record else { return };
         let stamps = stamps_now(now.as_secs_f64(), self.speed);
-        record.put(self.recorder.observe(record.parts(), vehicle, &stamps));
+        record.put(self.recorder.observe(record.state_number(), vehicle, &stamps), &stamps);
     }
 
     /// Records an event of the host.
-    pub(crate) fn handle_event(&mut self, event: &VehicleHostEvent, now: Instant) {
+    pub fn handle_event(&mut self, event: &VehicleHostEvent, now: Instant) {
         let Some(record) = &mut self.record else { return };
-        record.put(self.recorder.handle_event(event, &stamps_now(now.as_secs_f64(), self.speed)));
+        let stamps = stamps_now(now.as_secs_f64(), self.speed);
+        record.put(self.recorder.handle_event(event, &stamps), &stamps);
     }
 
-    pub(crate) fn finish(self) {
+    /// Ends the record, and prints where it is.
+    pub fn finish(self) {
         self.record.into_iter().for_each(Record::finish);
     }
 }
@@ -57,16 +61,18 @@ pub struct VehicleRecorder {
     mode: String,
     pose_s: Option<f64>,
     link_s: Option<f64>,
+    /// Frames to the vehicle may carry a next key.
+    hides_keys: bool,
 }
 
 impl VehicleRecorder {
     /// Records a vehicle of this name, whose cells have this edge.
     pub fn new(name: &str, cell_m: f64) -> Self {
         let (name, map, mode) = (name.to_owned(), RecordedMap::default(), String::new());
-        Self { name, cell_m, part: 0, map, mode, pose_s: None, link_s: None }
+        Self { name, cell_m, part: 0, map, mode, pose_s: None, link_s: None, hides_keys: false }
     }
 
-    /// What has changed since the last call. `part` is the number of the record's file: each begins with the whole state.
+    /// What has changed since the last call, or the whole state where `part` is another one than then.
     pub fn observe(&mut self, part: u32, vehicle: &Vehicle, stamps: &Stamps) -> Vec<RecordEntry> {
         if std::mem::replace(&mut self.part, part) != part {
             (self.map, self.mode) = (RecordedMap::default(), String::new());
@@ -114,7 +120,7 @@ impl VehicleRecorder {
     }
 
     fn frame(&self, event: &FrameEvent, stamps: &Stamps) -> Option<RecordEntry> {
-        frame_entry(event, |_| self.name.clone(), stamps)
+        frame_entry(event, |_| self.name.clone(), self.hides_keys, stamps)
     }
 
     /// A decision of the vehicle about an order.

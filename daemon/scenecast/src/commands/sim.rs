@@ -1,6 +1,6 @@
 //! `scenecast sim`
 
-use crate::mission_record::{MissionRecord, RecordClock, UnseenPage};
+use crate::mission_record::{MissionRecord, UnseenPage};
 use clap::Args;
 use scenecast_config::Config;
 use scenecast_core::{UserError, errln, outln};
@@ -163,6 +163,6 @@ impl Sim {
         for dir in dirs.iter().filter(|dir| dir.exists()) {
             std::fs::remove_dir_all(dir).map_err(|e| UserError::file(dir, e))?;
         }
-        MissionRecord::create(mission, RecordClock::Virtual, [&dirs[0], &dirs[1]]).map(Some)
+        MissionRecord::create(mission, [&dirs[0], &dirs[1]]).map(Some)
     }
 }

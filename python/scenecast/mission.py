@@ -1,0 +1,181 @@
+"""A mission as both ends recorded it."""
+
+import json
+import re
+from pathlib import Path
+
+import numpy as np
+
+from .label_map import LabelMap
+from .record import Record
+
+STATUS = ("queued", "on air", "received", "applied", "refused", "withdrawn")
+DIRECTION = ("sent", "received", "dropped")
+LEVEL = {20: "info", 30: "warning", 40: "error"}
+LINK = ("budget_bps", "sent_bps", "received_bps", "loss", "round_trip_s", "age_s", "backlog_bits")
+TRACK = ("time", "x_m", "y_m", "z_m", "heading_deg", "sigma_m")
+
+
+def _record(path):
+    return None if path is None else path if isinstance(path, Record) else Record(path)
+
+
+def _part(name):
+    """The part of a topic that stands for a vehicle."""
+    part = re.sub(r"[^0-9A-Za-z]", "_", name)[:64]
+    return part if part[:1] and not part[0].isdigit() else f"_{part}"
+
+
+def _vehicles(record):
+    found = (re.fullmatch(r"/scenecast/(\w+)/\w+", topic) for topic in (record.index if record else ()))
+    return {match[1] for match in found if match}
+
+
+class Mission:
+    """A mission of one vehicle, as one end or both recorded it; times are seconds of UTC since 1970."""
+
+    @classmethod
+    def open(cls, surface=None, vehicle=None, name=None):
+        """Opens one or two records, or a folder with both; `name` selects one of several vehicles."""
+        if surface is not None and vehicle is None and not isinstance(surface, Record):
+            both = [Path(surface) / part for part in ("record_surface", "record_vehicle")]
+            if any(folder.is_dir() for folder in both):
+                surface, vehicle = (folder if folder.is_dir() else None for folder in both)
+        return cls(_record(surface), _record(vehicle), name)
+
+    def __init__(self, surface, vehicle, name=None):
+        """A mission of these records, of which one may be None."""
+        self.records = {"operator": surface, "vehicle": vehicle}
+        present = [record for record in (surface, vehicle) if record]
+        if not present:
+            raise ValueError("give the record of the surface, that of the vehicle, or both")
+        if surface and any(f"/scenecast/{found}/events" in surface.index for found in _vehicles(surface)):
+            raise ValueError(f"{surface.path} is the record of a vehicle: Mission.open(vehicle=...)")
+        self.vehicles = sorted(_vehicles(surface) | _vehicles(vehicle))
+        names = {_part(name)} if name else _vehicles(vehicle) or _vehicles(surface)
+        if len(names) > 1 or names - set(self.vehicles):
+            raise ValueError(f"give the name of one of the vehicles: {', '.join(self.vehicles)}")
+        self.name = next(iter(names), "")
+        self.begin = float(np.nanmin([record.begin for record in present]))
+        self.end = float(np.nanmax([record.end for record in present]))
+
+    def _side(self, side):
+        if side not in self.records:
+            raise ValueError('side is "operator" or "vehicle"')
+        if self.records[side] is None:
+            raise ValueError(f"the record of the {'surface' if side == 'operator' else 'vehicle'} is missing")
+        return self.records[side]
+
+    def _messages(self, side, topic, until=None):
+        return self._side(side).messages(f"/scenecast/{self.name}/{topic}", until)
+
+    def state(self, t=None):
+        """The state that the page showed last up to a time, as `/api/v2/state`; empty before the first one."""
+        record = self.records["operator"]
+        found = record.last("/scenecast/state", t) if record else None
+        return json.loads(found[1].data) if found else {}
+
+    def _vehicle_state(self, state):
+        """The part of a state that is about the vehicle."""
+        named = [found for found in state.get("vehicles", ()) if _part(found["name"]) == self.name]
+        return named[0] if named else {}
+
+    def versions(self, side="operator"):
+        """The versions of an end's map: time in s, epoch, version, number of cells and fingerprint of each."""
+        rows = [(t, m.epoch, m.version, m.cells, m.digest) for t, m in self._messages(side, "map_version")]
+        kinds = {"time": "f8", "epoch": "u4", "version": "u8", "cells": "u4", "fingerprint": "u2"}
+        return np.array(rows, list(kinds.items()))
+
+    def map(self, t=None, side="operator"):
+        """The map of an end at a time, by default its last one."""
+        parts, cell_m, epoch = [], float("nan"), 0
+        for _, change in self._messages(side, "map_cells", t):
+            # Without its first files, a record has changes of a map that it does not have.
+            if change.layer or not (parts or change.whole):
+                continue
+            if change.whole:
+                parts.clear()
+            parts.append((change.x, change.y, change.value))
+            cell_m, epoch = change.cell_m, change.epoch
+        found = self._side(side).last(f"/scenecast/{self.name}/map_version", t)
+        time, version = (found[0], found[1].version) if found else (float("nan"), 0)
+        x, y, label = (np.concatenate(arrays) for arrays in zip(*parts)) if parts else (np.zeros(0, "i4"),) * 3
+        # The last change of each cell is the one in force.
+        _, last = np.unique(((x.astype("i8") << 32) + y)[::-1], return_index=True)
+        last = len(x) - 1 - last
+        last = last[label[last] != 0]
+        state = self.state(t)
+        vehicle = self._vehicle_state(state)
+        shown = vehicle.get("map") or {}
+        known = vehicle.get("labels", ()) if shown.get("epoch") == epoch else ()
+        names, merged = ({found["id"]: found[key] for found in known if found[key]} for key in ("name", "merged_into"))
+        place = shown.get("placement") if side == "operator" else None
+        origin = state.get("mission", {}).get("origin")
+        return LabelMap(x[last], y[last], label[last].astype("u1"), cell_m, epoch, version, time, side,
+                        names, merged,
+                        (place["east_m"], place["north_m"]) if place else (0.0, 0.0),
+                        (origin["lat_deg"], origin["lon_deg"]) if origin else None)
+
+    def agreement(self, t=None):
+        """The share, 0 to 1, of the vehicle's cells whose label the operator's map has too; NaN without cells."""
+        vehicle, operator = self.map(t, "vehicle"), self.map(t, "operator")
+        if not len(vehicle):
+            return float("nan")
+        known = {} if vehicle.epoch != operator.epoch else dict(
+            zip(zip(operator.x.tolist(), operator.y.tolist()), operator.label.tolist()))
+        cells = zip(vehicle.x.tolist(), vehicle.y.tolist(), vehicle.label.tolist())
+        return sum(known.get((x, y)) == label for x, y, label in cells) / len(vehicle)
+
+    def exemplars(self):
+        """The images of labels: label, number, name as last given, epoch, time, format and bytes of the file."""
+        vehicle, images = self._vehicle_state(self.state()), {}
+        names = {found["id"]: found["name"] for found in vehicle.get("labels", ())}
+        for _, m in self._messages("operator", "exemplars"):
+            name = names.get(m.label) if (vehicle.get("map") or {}).get("epoch") == m.epoch else None
+            images[m.epoch, m.label, m.image] = {
+                "label": m.label, "number": m.image, "name": name or m.name or None, "epoch": m.epoch,
+                "time": m.header.stamp, "format": m.format, "data": m.data.tobytes()}
+        return list(images.values())
+
+    def orders(self):
+        """The orders: slot, version, time at which it was given, and its history of (time, side, status, reason)."""
+        orders = {}
+        for side in (side for side, record in self.records.items() if record):
+            for _, m in self._messages(side, "order_status"):
+                new = {"slot": m.slot, "version": m.version, "given": None, "history": []}
+                order = orders.setdefault((m.slot, m.version), new)
+                order["given"] = order["given"] or m.given or None
+                before = [step[1:] for step in order["history"] if step[1] == side][-1:]
+                step = (m.header.stamp, side, STATUS[m.status], m.reason or None)
+                # Each file of a record repeats the present status, whose time is then estimated anew.
+                if before != [step[1:]]:
+                    order["history"].append(step)
+        for order in orders.values():
+            order["history"].sort(key=lambda step: step[0])
+        return sorted(orders.values(), key=lambda order: (order["given"] or order["history"][0][0], order["slot"]))
+
+    def link(self, side="operator"):
+        """The link over time: rates in bit/s of the last minute, loss 0 to 1, times in s; NaN is unknown."""
+        rows = [(m.header.stamp, *(getattr(m, name) for name in LINK)) for _, m in self._messages(side, "link")]
+        return np.array(rows, [(name, "f8") for name in ("time", *LINK)])
+
+    def track(self, side="operator"):
+        """Poses: m east, north and up, degrees from north, sigma in m; of the vehicle's record in its map frame."""
+        rows = []
+        for _, m in self._messages(side, "pose"):
+            at, turn = m.pose.pose.position, m.pose.pose.orientation
+            yaw = np.degrees(2 * np.arctan2(turn.z, turn.w))
+            rows.append((m.header.stamp, at.x, at.y, at.z, (90 - yaw) % 360, m.pose.covariance[0] ** 0.5))
+        return np.array(rows, [(name, "f8") for name in TRACK])
+
+    def frames(self, side="operator"):
+        """The frames of all vehicles: time, vehicle, direction, bits on air, reason of a drop and bytes."""
+        found = self._side(side).messages("/scenecast/frames")
+        return [{"time": m.header.stamp, "vehicle": m.vehicle, "direction": DIRECTION[m.direction], "bits": m.bits,
+                 "reason": m.reason or None, "data": m.data.tobytes()} for _, m in found]
+
+    def events(self, side="operator"):
+        """The entries of the page's log, or the vehicle's events: time, vehicle, level, source and text."""
+        topic = "/scenecast/events" if side == "operator" else f"/scenecast/{self.name}/events"
+        return [{"time": m.header.stamp, "vehicle": m.vehicle, "level": LEVEL.get(m.level, m.level), "source": m.source,
+                 "text": m.text} for _, m in self._side(side).messages(topic)]
