@@ -1,7 +1,8 @@
 //! Records of missions: read by another program, cut by a kill, the same for the same seed.
 
 use scenecast_tests::{
-    Process, assert_refused, free_port, python, run, run_script, scenecast, scratch, state, wait_until, workspace,
+    LIGHT, Process, assert_refused, free_port, python, run, run_script, scenecast, scratch, state, wait_until,
+    workspace,
 };
 use std::path::{Path, PathBuf};
 
@@ -14,7 +15,9 @@ fn read(folder: &Path) -> Option<serde_json::Value> {
 
 fn simulate(out: &Path) {
     let out = out.to_str().unwrap();
-    let said = run(&["sim", "--duration", "120", "--seed", "3", "--set", "channel.loss=0.2", "--out", out]);
+    let said =
+        run(&[&["sim", "--duration", "60", "--seed", "3", "--set", "channel.loss=0.2", "--out", out][..], &LIGHT]
+            .concat());
     assert!(said.status.success(), "{}", String::from_utf8_lossy(&said.stderr));
 }
 
@@ -26,6 +29,8 @@ fn both_records_of_a_rehearsal_end_with_the_same_map() {
     let vehicle = read(&dir.join("a/record_vehicle")).unwrap();
     assert!(surface["cells"].as_u64() > Some(100), "{surface}");
     assert_eq!((&surface["cells"], &surface["digest"]), (&vehicle["cells"], &vehicle["digest"]));
+    let report: serde_json::Value = serde_json::from_slice(&std::fs::read(dir.join("a/report.json")).unwrap()).unwrap();
+    assert_eq!(surface["cells"], report["survey"]["explored_cells"], "the map at the end");
     assert!(surface["versions"].as_u64() > Some(3) && vehicle["versions"].as_u64() > Some(3));
     for topic in [
         "state",

@@ -122,7 +122,12 @@ impl Sim {
             progress.show((mission.now().as_secs_f64() / end_s).min(1.0));
             record.as_mut().map_or(Ok(()), |record| record.observe(mission, &page.snapshot(mission)))
         })?;
-        record.map_or(Ok(()), MissionRecord::finish)?;
+        if let Some(mut record) = record {
+            // What the end of the survey has brought.
+            let last = page.snapshot(&mission);
+            record.observe(&mut mission, &last)?;
+            record.finish()?;
+        }
         drop(progress);
         for refused in mission.refused_labels() {
             errln!("refused: {refused}");
