@@ -44,10 +44,10 @@ impl Contents {
         let is_wanted = |topic: &BagTopic| [RAW, COMPRESSED, ODOMETRY, CAMERA_INFO].contains(&topic.kind.as_str());
         loop {
             match stream.next(is_wanted) {
-                Ok(Some(BagMessage { topic, bytes })) if topic.kind == CAMERA_INFO => {
+                Ok(Some(BagMessage { topic, bytes, .. })) if topic.kind == CAMERA_INFO => {
                     contents.handle_info(topic.name, &bytes);
                 }
-                Ok(Some(BagMessage { topic, bytes })) => {
+                Ok(Some(BagMessage { topic, bytes, .. })) => {
                     contents.topics.insert(topic.clone());
                     if topic.kind != ODOMETRY {
                         contents.images.push((topic, stamp_of_cdr(&bytes)));

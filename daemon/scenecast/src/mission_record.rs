@@ -2,7 +2,7 @@
 
 use scenecast_console::{LinkMeter, MissionFacts, Snapshot, snapshot};
 use scenecast_core::UserError;
-use scenecast_files::{RecordEntry, RecordLimits, RecordWriter};
+use scenecast_files::{RecordEntry, RecordWriter};
 use scenecast_protocol::time::Instant;
 use scenecast_rehearsal::{EndEvent, Mission};
 use scenecast_runtime::record::{Stamps, SurfaceRecorder, VehicleRecorder, limits};
@@ -28,7 +28,7 @@ pub struct MissionRecord {
 impl MissionRecord {
     /// Begins both records in these new folders.
     pub fn create(mission: &mut Mission, [surface, vehicle]: [&Path; 2]) -> Result<Self, UserError> {
-        let limits: RecordLimits = limits(mission.config());
+        let limits = limits(mission.config());
         mission.keep_end_events();
         let name = mission.config().vehicle.name.clone();
         Ok(Self {

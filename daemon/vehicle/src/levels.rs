@@ -13,24 +13,13 @@ pub(super) type Quantities = BTreeMap<LayerId, Vec<(Cell, f64)>>;
 pub(super) struct HeldLevels(BTreeMap<(i32, i32), [u8; BUILT_IN_LAYERS.len()]>);
 
 impl HeldLevels {
-    /// Takes new quantities, and moves each into the level that its cell has now.
+    /// Takes quantities, and moves each into the level that its cell has now. Those that it has taken last stay as they are.
     pub(super) fn hold(&mut self, descriptors: &BTreeMap<LayerId, LayerDescriptor>, quantities: &mut Quantities) {
         for (id, cells) in quantities {
             let Some(descriptor) = descriptors.get(id) else { continue };
             for (cell, quantity) in cells {
                 let Some(held) = self.0.entry((cell.x, cell.y)).or_default().get_mut(id.index()) else { continue };
                 (*held, *quantity) = settle(descriptor, *quantity, *held);
-            }
-        }
-    }
-
-    /// Moves quantities that [`Self::hold`] has taken before into the levels of their cells.
-    pub(super) fn settle(&self, descriptors: &BTreeMap<LayerId, LayerDescriptor>, quantities: &mut Quantities) {
-        for (id, cells) in quantities {
-            let Some(descriptor) = descriptors.get(id) else { continue };
-            for (cell, quantity) in cells {
-                let held = self.0.get(&(cell.x, cell.y)).and_then(|levels| levels.get(id.index()));
-                *quantity = settle(descriptor, *quantity, held.copied().unwrap_or_default()).1;
             }
         }
     }
@@ -64,7 +53,7 @@ mod tests {
             let mut quantities = BTreeMap::from([(LayerId::CONFIDENCE, vec![(cell, quantity)])]);
             levels.hold(&descriptors, &mut quantities);
             let mut again = BTreeMap::from([(LayerId::CONFIDENCE, vec![(cell, quantity)])]);
-            levels.settle(&descriptors, &mut again);
+            levels.clone().hold(&descriptors, &mut again);
             assert_eq!(again, quantities);
             descriptor.level(quantities[&LayerId::CONFIDENCE][0].1, 0)
         };

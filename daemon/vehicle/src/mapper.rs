@@ -275,7 +275,7 @@ impl Mapper {
     pub fn current(&self) -> MapUpdate {
         let published = self.book.published(&self.flat);
         let mut layers = self.quantities(&published);
-        self.levels.settle(&self.configured.layers, &mut layers);
+        self.levels.clone().hold(&self.configured.layers, &mut layers);
         self.update(&published, layers)
     }
 

@@ -80,17 +80,19 @@ impl Dive {
         Ok(dive)
     }
 
-    fn take(&mut self, message: RecordedMessage<'_>, last_state: &mut Option<String>) {
-        let at_s = message.nanos as f64 / 1e9;
+    fn take(&mut self, message: RecordedMessage, last_state: &mut Option<String>) {
+        let at_s = message.nanos() as f64 / 1e9;
         self.span_s = (self.span_s.0.min(at_s), self.span_s.1.max(at_s));
-        let Some(topic) = message.topic.strip_prefix("/scenecast/") else { return };
+        let Some(topic) = message.topic().strip_prefix("/scenecast/") else { return };
         let Some((vehicle, topic)) = topic.split_once('/') else {
             match topic {
                 "state" => *last_state = message.decode::<Text>().map(|text| text.data).or(last_state.take()),
                 "events" => self.events.extend(message.decode().map(|event| (at_s, event))),
                 "frames" => {
                     let direction = message.decode::<Frame>().map(|frame| usize::from(frame.direction));
-                    direction.and_then(|d| self.frames.get_mut(d)).into_iter().for_each(|count| *count += 1);
+                    if let Some(count) = direction.and_then(|direction| self.frames.get_mut(direction)) {
+                        *count += 1;
+                    }
                 }
                 _ => {}
             }

@@ -5,6 +5,7 @@ use mcap::records::{Channel, Record, SchemaHeader, op};
 use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use scenecast_core::UserError;
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
+use std::fmt;
 use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
@@ -24,6 +25,8 @@ pub(crate) struct BagTopic {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct BagMessage {
     pub(crate) topic: BagTopic,
+    /// When it was recorded, nanoseconds since 1970.
+    pub(crate) nanos: u64,
     pub(crate) bytes: Vec<u8>,
 }
 
@@ -34,7 +37,7 @@ pub(crate) struct BagStream {
     schemas: BTreeMap<u16, String>,
     channels: BTreeMap<u16, BagTopic>,
     /// Messages of the chunk that was read last, as they are in the file.
-    read: VecDeque<(BagTopic, Vec<u8>)>,
+    read: VecDeque<BagMessage>,
     other_encodings: BTreeSet<String>,
 }
 
@@ -61,8 +64,8 @@ impl BagStream {
     /// The next message of a topic that is `wanted`; `None` at the end. After an error what lies behind the damage follows.
     pub(crate) fn next(&mut self, wanted: impl Fn(&BagTopic) -> bool) -> Result<Option<BagMessage>, String> {
         loop {
-            if let Some((topic, bytes)) = self.read.pop_front() {
-                return Ok(Some(BagMessage { topic, bytes: unpacked(bytes)? }));
+            if let Some(message) = self.read.pop_front() {
+                return Ok(Some(BagMessage { bytes: unpacked(message.bytes)?, ..message }));
             }
             if self.open.is_none() {
                 let Some(path) = self.rest.next() else { return Ok(None) };
@@ -120,7 +123,12 @@ impl BagStream {
             }
             Record::Message { header, data } => {
                 let topic = self.channels.get(&header.channel_id).filter(|topic| wanted(topic));
-                self.read.extend(topic.map(|topic| (topic.clone(), data.into_owned())));
+                let nanos = header.log_time;
+                self.read.extend(topic.map(|topic| BagMessage {
+                    topic: topic.clone(),
+                    nanos,
+                    bytes: data.into_owned(),
+                }));
             }
             _ => {}
         }
@@ -153,12 +161,27 @@ pub(crate) fn is_whole(path: &Path) -> Result<bool, UserError> {
     ends(path).map_err(|e| UserError::file(path, e))
 }
 
-/// Gives `take` the records of a file, those of chunks too. Returns what could not be read of it: a damaged chunk is left out, and the
-/// end may be missing.
+/// What could not be read of a file, for people.
+#[derive(Debug)]
+pub(crate) enum Damage {
+    /// A chunk is left out.
+    Chunk(String),
+    /// From here on it is missing or cannot be read.
+    End(String),
+}
+
+impl fmt::Display for Damage {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (Self::Chunk(why) | Self::End(why)) = self;
+        f.write_str(why)
+    }
+}
+
+/// Gives `take` the records of a file as they are, those of chunks too. Returns the first damage.
 pub(crate) fn records(
     path: &Path,
     mut take: impl FnMut(Record<'_>) -> Result<(), UserError>,
-) -> Result<Option<String>, UserError> {
+) -> Result<Option<Damage>, UserError> {
     let mut file = File::open(path).map_err(|e| UserError::file(path, e))?;
     let (mut reader, mut damage) = (reader(), None);
     loop {
@@ -174,7 +197,7 @@ pub(crate) fn records(
                             }
                         }
                     }
-                    Err(error) => damage = damage.or(Some(error)),
+                    Err(error) => damage = damage.or(Some(Damage::Chunk(error))),
                 }
             }
             Ok(Some((opcode, bytes))) => {
@@ -183,7 +206,7 @@ pub(crate) fn records(
                 }
             }
             Ok(None) => return Ok(damage),
-            Err(error) => return Ok(damage.or(Some(error))),
+            Err(error) => return Ok(damage.or(Some(Damage::End(error)))),
         }
     }
 }

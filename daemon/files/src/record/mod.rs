@@ -57,6 +57,12 @@ pub struct RecordWriter {
     open: OpenPart,
 }
 
+/// One thread compresses: chunks are small.
+fn options() -> WriteOptions {
+    let options = WriteOptions::new().profile("ros2").library("scenecast").chunk_size(Some(CHUNK_BYTES));
+    options.compression_threads(0)
+}
+
 /// The file that is written now.
 struct OpenPart {
     writer: Writer<BufWriter<Arc<File>>>,
@@ -69,9 +75,7 @@ impl OpenPart {
     fn create(path: &Path) -> Result<Self, UserError> {
         let create = || -> std::io::Result<Arc<File>> { Ok(Arc::new(File::create_new(path)?)) };
         let file = create().map_err(|e| UserError::file(path, e))?;
-        // One thread compresses: chunks are small.
-        let options = WriteOptions::new().profile("ros2").library("scenecast").chunk_size(Some(CHUNK_BYTES));
-        let writer = options.compression_threads(0).create(BufWriter::new(file.clone()));
+        let writer = options().create(BufWriter::new(file.clone()));
         let writer = writer.map_err(|e| UserError::file(path, e))?;
         Ok(Self { writer, file, channels: BTreeMap::new() })
     }
@@ -115,7 +119,7 @@ impl RecordWriter {
     /// # Errors
     /// The folder or its files cannot be written, or the folder exists.
     pub fn create(dir: &Path, limits: RecordLimits) -> Result<Self, UserError> {
-        let parent = dir.parent().filter(|parent| *parent != Path::new("")).unwrap_or(Path::new("."));
+        let parent = dir.parent().unwrap_or(Path::new(""));
         std::fs::create_dir_all(parent).map_err(|e| UserError::file(parent, e))?;
         std::fs::create_dir(dir).map_err(|e| UserError::file(dir, e))?;
         sync_folder(parent).map_err(|e| UserError::file(parent, e))?;

@@ -1,29 +1,30 @@
 //! The messages of a record.
 
-use crate::bag::stream::{mcap_files, records};
-use mcap::records::Record;
+use crate::bag::stream::{BagMessage, BagStream};
 use scenecast_core::UserError;
 use scenecast_messages::scenecast_msgs::Frame;
 use scenecast_messages::{Message, decode};
-use std::collections::BTreeMap;
 use std::path::Path;
 
 /// A message of a record.
-#[derive(Debug, Clone, Copy)]
-pub struct RecordedMessage<'a> {
-    pub topic: &'a str,
-    /// The full name of its type, such as `std_msgs/msg/String`.
-    kind: &'a str,
-    /// Nanoseconds since 1970.
-    pub nanos: u64,
-    data: &'a [u8],
-}
+#[derive(Debug)]
+pub struct RecordedMessage(BagMessage);
 
-impl RecordedMessage<'_> {
+impl RecordedMessage {
+    /// The name of its topic.
+    pub fn topic(&self) -> &str {
+        &self.0.topic.name
+    }
+
+    /// When it was recorded, nanoseconds since 1970.
+    pub fn nanos(&self) -> u64 {
+        self.0.nanos
+    }
+
     /// The message, if it is of this type and sound.
     pub fn decode<M: Message>(&self) -> Option<M> {
-        let is_of_type = self.kind == M::DEFINITION.full_name();
-        is_of_type.then(|| decode(self.data).ok()).flatten()
+        let is_of_type = self.0.topic.kind == M::DEFINITION.full_name();
+        is_of_type.then(|| decode(&self.0.bytes).ok()).flatten()
     }
 }
 
@@ -32,29 +33,15 @@ impl RecordedMessage<'_> {
 ///
 /// # Errors
 /// There is no file, or it cannot be opened.
-pub fn read_record(path: &Path, mut take: impl FnMut(RecordedMessage<'_>)) -> Result<Option<String>, UserError> {
-    let mut damage = None;
-    for file in mcap_files(path)? {
-        let mut schemas: BTreeMap<u16, String> = BTreeMap::new();
-        let mut channels: BTreeMap<u16, (String, String)> = BTreeMap::new();
-        let found = records(&file, |record| {
-            match record {
-                Record::Schema { header, .. } => _ = schemas.insert(header.id, header.name),
-                Record::Channel(channel) if channel.message_encoding == "cdr" => {
-                    let kind = schemas.get(&channel.schema_id).cloned().unwrap_or_default();
-                    channels.insert(channel.id, (channel.topic, kind));
-                }
-                Record::Message { header, data } => {
-                    let Some((topic, kind)) = channels.get(&header.channel_id) else { return Ok(()) };
-                    take(RecordedMessage { topic, kind, nanos: header.log_time, data: &data });
-                }
-                _ => {}
-            }
-            Ok(())
-        })?;
-        damage = damage.or(found);
+pub fn read_record(path: &Path, mut take: impl FnMut(RecordedMessage)) -> Result<Option<String>, UserError> {
+    let (mut stream, mut damage) = (BagStream::open(path)?, None);
+    loop {
+        match stream.next(|_| true) {
+            Ok(Some(message)) => take(RecordedMessage(message)),
+            Ok(None) => return Ok(damage),
+            Err(error) => damage = damage.or(Some(error)),
+        }
     }
-    Ok(damage)
 }
 
 /// The frames that an end has sent and received, in the order of their times.
@@ -74,7 +61,7 @@ impl RecordedFrames {
     pub fn read(path: &Path) -> Result<Self, UserError> {
         let mut frames = Vec::new();
         let damage = read_record(path, |message| {
-            frames.extend(message.decode::<Frame>().map(|frame| (message.nanos, frame.data)));
+            frames.extend(message.decode::<Frame>().map(|frame| (message.nanos(), frame.data)));
         })?;
         frames.sort_by_key(|(nanos, _)| *nanos);
         Ok(Self { frames, damage })

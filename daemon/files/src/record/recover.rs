@@ -1,10 +1,11 @@
 //! Records that a power cut has left without their end: what was synced is written anew, with an index.
 
 use super::metadata::{Metadata, Part};
-use crate::bag::stream::{is_whole, mcap_files, records};
+use super::options;
+use crate::bag::stream::{Damage, is_whole, mcap_files, records};
 use crate::sync_folder;
+use mcap::Writer;
 use mcap::records::{MessageHeader, Record};
-use mcap::{WriteOptions, Writer};
 use scenecast_core::UserError;
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -26,7 +27,7 @@ pub struct RecoveredPart {
 struct Contents {
     part: Part,
     types: BTreeMap<String, String>,
-    damage: Option<String>,
+    damage: Option<Damage>,
     /// Messages whose topic was described in a part that could not be read.
     without_topic: u64,
 }
@@ -34,16 +35,14 @@ struct Contents {
 impl Contents {
     /// Whether more is wrong than that the end is missing.
     fn is_damaged(&self) -> bool {
-        self.without_topic > 0 || self.damage.as_ref().is_some_and(|damage| damage.contains("damaged"))
+        self.without_topic > 0 || matches!(self.damage, Some(Damage::Chunk(_)))
     }
 
-    fn damage(self) -> Option<String> {
+    fn damage(&self) -> Option<String> {
         let lost = (self.without_topic > 0)
             .then(|| format!("{} messages are lost with the description of their topics", self.without_topic));
-        match (self.damage, lost) {
-            (Some(damage), Some(lost)) => Some(format!("{damage}; {lost}")),
-            (damage, lost) => damage.or(lost),
-        }
+        let all: Vec<String> = self.damage.iter().map(Damage::to_string).chain(lost).collect();
+        (!all.is_empty()).then(|| all.join("; "))
     }
 }
 
@@ -67,13 +66,13 @@ pub fn recover(path: &Path) -> Result<Vec<RecoveredPart>, UserError> {
                 std::fs::rename(&file, &kept).map_err(|e| UserError::file(&kept, e))?;
             }
             std::fs::rename(&beside, &file).map_err(|e| UserError::file(&file, e))?;
-            let folder = file.parent().filter(|folder| *folder != Path::new("")).unwrap_or(Path::new("."));
+            let folder = file.parent().unwrap_or(Path::new(""));
             sync_folder(folder).map_err(|e| UserError::file(folder, e))?;
         }
         let messages = (!whole).then(|| contents.part.messages.values().sum());
-        parts.push(contents.part.clone());
-        types.extend(contents.types.clone());
         found.push(RecoveredPart { path: file, messages, damage: contents.damage() });
+        parts.push(contents.part);
+        types.extend(contents.types);
     }
     if path.is_dir() {
         Metadata::of(parts, types).write(path)?;
@@ -88,8 +87,7 @@ fn read(file: &Path, copy: Option<&Path>) -> Result<Contents, UserError> {
     contents.part.name = file.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let create = |path| -> Result<Writer<BufWriter<File>>, UserError> {
         let to = BufWriter::new(File::create(path).map_err(|e| failed(&e))?);
-        let options = WriteOptions::new().profile("ros2").library("scenecast").compression_threads(0);
-        options.create(to).map_err(|e| failed(&e))
+        options().create(to).map_err(|e| failed(&e))
     };
     let mut writer = copy.map(create).transpose()?;
     let mut schemas: BTreeMap<u16, (String, u16)> = BTreeMap::new();

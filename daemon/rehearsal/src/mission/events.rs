@@ -98,9 +98,7 @@ impl Mission {
             VehicleHostEvent::Surface => self.motion.come_up(),
             VehicleHostEvent::Tune(settings) => self.mapper.tune(&settings),
             VehicleHostEvent::Applied(applied) => self.logbook.note_applied(applied),
-            VehicleHostEvent::Frame(event) => {
-                self.carrier.log_event(VEHICLE, &event, self.times.now);
-            }
+            VehicleHostEvent::Frame(event) => self.carrier.log_event(VEHICLE, &event, self.times.now),
             VehicleHostEvent::Fixed(..)
             | VehicleHostEvent::SurveyEnded
             | VehicleHostEvent::Pilot(_)

@@ -223,6 +223,20 @@ fn entry<M: scenecast_messages::Message>(topic: String, stamps: &Stamps, message
     RecordEntry::new(format!("/scenecast/{topic}"), stamps.now().nanos().max(0) as u64, message)
 }
 
+/// An entry of a topic of this vehicle.
+fn entry_of<M: scenecast_messages::Message>(vehicle: &str, topic: &str, stamps: &Stamps, message: &M) -> RecordEntry {
+    entry(format!("{}/{topic}", valid_part(vehicle)), stamps, message)
+}
+
+/// Whether so much mission time has passed since the last time, which is set.
+fn is_due(last: &mut Option<f64>, interval_s: f64, now_s: f64) -> bool {
+    let is_due = last.is_none_or(|last| now_s - last >= interval_s || now_s < last);
+    if is_due {
+        *last = Some(now_s);
+    }
+    is_due
+}
+
 /// What a record has of a map.
 #[derive(Default)]
 struct RecordedMap {
@@ -262,7 +276,6 @@ impl RecordedMap {
         }
         let head = || header(stamps.now(), scenecast_messages::contents::MAP_FRAME);
         let name = || vehicle.to_owned();
-        let topic = |topic: &str| format!("{}/{topic}", valid_part(vehicle));
         let state = MapVersion {
             header: head(),
             vehicle: name(),
@@ -283,9 +296,9 @@ impl RecordedMap {
             y: changed.iter().map(|(cell, _)| cell.y).collect(),
             value: changed.iter().map(|&(_, label)| label).collect(),
         };
-        let mut entries = vec![entry(topic("map_version"), stamps, &state)];
+        let mut entries = vec![entry_of(vehicle, "map_version", stamps, &state)];
         if whole || !changed.is_empty() {
-            entries.push(entry(topic("map_cells"), stamps, &cells));
+            entries.push(entry_of(vehicle, "map_cells", stamps, &cells));
         }
         entries
     }

@@ -1,13 +1,14 @@
 //! What the operator knew.
 
-use super::{MapState, Record, RecordedMap, entry, frame_entry, stamps_now};
+use super::{MapState, Record, RecordedMap, entry, entry_of, frame_entry, is_due, stamps_now};
+use bytes::Bytes;
 use scenecast_config::Config;
 use scenecast_console::Snapshot;
 use scenecast_console::messages::{label_tree, order_status, place, place_on_earth};
 use scenecast_console::state::{MapLabelTree, MissionState, OrderStatus, VehicleState};
 use scenecast_files::RecordEntry;
 use scenecast_host::FrameEvent;
-use scenecast_messages::contents::{Stamps, WORLD_FRAME, header, pose, valid_part};
+use scenecast_messages::contents::{Stamps, WORLD_FRAME, header, pose};
 use scenecast_messages::scenecast_msgs::{Event, Exemplar, Link};
 use scenecast_messages::std_msgs::Text;
 use scenecast_protocol::map::StateReplica;
@@ -69,7 +70,7 @@ pub struct SurfaceRecorder {
     state_s: Option<f64>,
     link_s: Option<f64>,
     /// The last state, unless it was recorded.
-    last_state: Option<RecordEntry>,
+    last_state: Option<(Bytes, Stamps)>,
     /// The last entry of the surface's log that was recorded.
     log: u64,
     /// The vehicles' names by address.
@@ -100,12 +101,8 @@ impl SurfaceRecorder {
         }
         let mut entries = self.events(surface, snapshot, stamps);
         let now_s = snapshot.state.now_s;
-        let is_due = |last: Option<f64>| last.is_none_or(|last| now_s - last >= STATE_INTERVAL_S);
-        let is_link_due = is_due(self.link_s);
-        if is_link_due {
-            self.link_s = Some(now_s);
-        }
-        let mut has_news = is_due(self.state_s);
+        let is_link_due = is_due(&mut self.link_s, STATE_INTERVAL_S, now_s);
+        let mut has_news = is_due(&mut self.state_s, STATE_INTERVAL_S, now_s);
         for vehicle in &snapshot.state.vehicles {
             if self.names.get(&vehicle.id) != Some(&vehicle.name) {
                 self.names.insert(vehicle.id, vehicle.name.clone());
@@ -116,25 +113,22 @@ impl SurfaceRecorder {
             has_news |= entries.len() > before;
             recorded.record(surface, &snapshot.state, vehicle, stamps, &mut entries);
             if is_link_due {
-                entries.push(of(vehicle, "link", stamps, &link(&snapshot.state, vehicle, stamps)));
+                entries.push(entry_of(&vehicle.name, "link", stamps, &link(&snapshot.state, vehicle, stamps)));
             }
         }
-        let data = String::from_utf8_lossy(&snapshot.json).into_owned();
-        let state = entry("state".to_owned(), stamps, &Text { data });
-        self.last_state = match has_news {
-            true => {
-                self.state_s = Some(now_s);
-                entries.push(state);
-                None
-            }
-            false => Some(state),
-        };
+        self.last_state = Some((snapshot.json.clone(), stamps.clone()));
+        if has_news {
+            self.state_s = Some(now_s);
+            entries.extend(self.last_state());
+        }
         entries
     }
 
     /// The last state, if it is not recorded.
     pub fn last_state(&mut self) -> Option<RecordEntry> {
-        self.last_state.take()
+        let (json, stamps) = self.last_state.take()?;
+        let data = String::from_utf8_lossy(&json).into_owned();
+        Some(entry("state".to_owned(), &stamps, &Text { data }))
     }
 
     /// A frame of the link.
@@ -168,7 +162,7 @@ impl RecordedVehicle {
         for slot in &vehicle.orders.directive.slots {
             let state = (slot.version, slot.state);
             if self.orders.insert(slot.slot.clone(), state) != Some(state) {
-                entries.push(of(vehicle, "order_status", stamps, &order_status(vehicle, slot, stamps)));
+                entries.push(entry_of(&vehicle.name, "order_status", stamps, &order_status(vehicle, slot, stamps)));
             }
         }
     }
@@ -190,10 +184,11 @@ impl RecordedVehicle {
             let map = MapState { vehicle: &vehicle.name, epoch, version, cell_m: vehicle.map.cell_m, labels };
             entries.extend(self.map.record(&map, stamps));
         }
-        let tree = vehicle.label_tree.clone().map(|tree| (vehicle.map.epoch, tree));
-        if let Some((_, tree)) = tree.as_ref().filter(|tree| self.tree.as_ref() != Some(tree)) {
+        let is_recorded =
+            |tree: &MapLabelTree| self.tree.as_ref().is_some_and(|(e, t)| (*e, t) == (vehicle.map.epoch, tree));
+        if let Some(tree) = vehicle.label_tree.as_ref().filter(|tree| !is_recorded(tree)) {
             let message = label_tree(vehicle, tree, header(stamps.now(), WORLD_FRAME));
-            entries.push(of(vehicle, "label_tree", stamps, &message));
+            entries.push(entry_of(&vehicle.name, "label_tree", stamps, &message));
             self.tree = Some((vehicle.map.epoch, tree.clone()));
         }
         if let Some(status) = vehicle.status.as_ref().filter(|status| self.report_s != Some(status.at_s)) {
@@ -201,8 +196,10 @@ impl RecordedVehicle {
             let shift = vehicle.map.placement.as_ref().map_or((0.0, 0.0), |p| (p.east_m, p.north_m));
             let place = place(status, shift, stamps);
             let sigma_m = status.pose.sigma_m;
-            entries.push(of(vehicle, "pose", stamps, &pose(&place, sigma_m, WORLD_FRAME)));
-            entries.extend(place_on_earth(mission, &place, sigma_m).map(|fix| of(vehicle, "fix", stamps, &fix)));
+            entries.push(entry_of(&vehicle.name, "pose", stamps, &pose(&place, sigma_m, WORLD_FRAME)));
+            entries.extend(
+                place_on_earth(mission, &place, sigma_m).map(|fix| entry_of(&vehicle.name, "fix", stamps, &fix)),
+            );
         }
         for label in &vehicle.labels {
             for image in &label.exemplar.images {
@@ -220,20 +217,10 @@ impl RecordedVehicle {
                     format: "webp".to_owned(),
                     data: stored.webp.clone(),
                 };
-                entries.push(of(vehicle, "exemplars", stamps, &message));
+                entries.push(entry_of(&vehicle.name, "exemplars", stamps, &message));
             }
         }
     }
-}
-
-/// An entry of a topic of this vehicle.
-fn of<M: scenecast_messages::Message>(
-    vehicle: &VehicleState,
-    topic: &str,
-    stamps: &Stamps,
-    message: &M,
-) -> RecordEntry {
-    entry(format!("{}/{topic}", valid_part(&vehicle.name)), stamps, message)
 }
 
 fn link(mission: &MissionState, vehicle: &VehicleState, stamps: &Stamps) -> Link {

@@ -1,10 +1,10 @@
 //! What the vehicle knew.
 
-use super::{MapState, Record, RecordedMap, entry, frame_entry, stamps_now};
+use super::{MapState, Record, RecordedMap, entry_of, frame_entry, is_due, stamps_now};
 use scenecast_config::{Config, cell_m};
 use scenecast_files::RecordEntry;
-use scenecast_host::{FrameEvent, VehicleHostEvent};
-use scenecast_messages::contents::{MAP_FRAME, Place, Stamps, header, pose, valid_part};
+use scenecast_host::VehicleHostEvent;
+use scenecast_messages::contents::{MAP_FRAME, Place, Stamps, header, pose};
 use scenecast_messages::scenecast_msgs::{Event, Link, OrderStatus};
 use scenecast_protocol::directive::SlotState;
 use scenecast_protocol::time::Instant;
@@ -107,7 +107,7 @@ impl VehicleRecorder {
     /// What is to be recorded of an event of the host.
     pub fn handle_event(&self, event: &VehicleHostEvent, stamps: &Stamps) -> Option<RecordEntry> {
         match event {
-            VehicleHostEvent::Frame(event) => self.frame(event, stamps),
+            VehicleHostEvent::Frame(event) => frame_entry(event, |_| self.name.clone(), self.hides_keys, stamps),
             VehicleHostEvent::Applied(applied) => Some(self.decision(applied, stamps)),
             VehicleHostEvent::Note(text) => Some(self.event(Event::WARN, "navigation", text, stamps)),
             VehicleHostEvent::Fixed(fix, _) => {
@@ -117,10 +117,6 @@ impl VehicleRecorder {
             }
             _ => None,
         }
-    }
-
-    fn frame(&self, event: &FrameEvent, stamps: &Stamps) -> Option<RecordEntry> {
-        frame_entry(event, |_| self.name.clone(), self.hides_keys, stamps)
     }
 
     /// A decision of the vehicle about an order.
@@ -163,15 +159,6 @@ impl VehicleRecorder {
     }
 
     fn entry<M: scenecast_messages::Message>(&self, topic: &str, stamps: &Stamps, message: &M) -> RecordEntry {
-        entry(format!("{}/{topic}", valid_part(&self.name)), stamps, message)
+        entry_of(&self.name, topic, stamps, message)
     }
-}
-
-/// Whether so much time has passed since the last time, which is set.
-fn is_due(last: &mut Option<f64>, interval_s: f64, now_s: f64) -> bool {
-    let is_due = last.is_none_or(|last| now_s - last >= interval_s || now_s < last);
-    if is_due {
-        *last = Some(now_s);
-    }
-    is_due
 }

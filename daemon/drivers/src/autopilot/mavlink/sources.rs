@@ -7,6 +7,7 @@
 use super::MavlinkConfig;
 use scenecast_protocol::time::Instant;
 use std::collections::BTreeSet;
+use std::mem::discriminant;
 use std::time::Duration;
 
 /// Counter of frames of other systems.
@@ -100,11 +101,6 @@ pub(super) enum HeightSource {
     Altitude,
 }
 
-/// Whether both are distance sensors.
-fn is_distance_sensor(source: HeightSource, other: HeightSource) -> bool {
-    matches!((source, other), (HeightSource::DistanceSensor(_), HeightSource::DistanceSensor(_)))
-}
-
 /// The last height of the best source that is not old.
 #[derive(Debug, Default)]
 pub(super) struct Altimeter {
@@ -117,7 +113,7 @@ impl Altimeter {
     pub(super) fn handle(&mut self, source: HeightSource, height_m: Option<f64>, now: Instant) {
         let height_m = height_m.filter(|m| m.is_finite() && *m > 0.0);
         let counts = self.last.is_none_or(|(last, _, at)| {
-            let is_other_beam = height_m.is_none() && source != last && is_distance_sensor(source, last);
+            let is_other_beam = height_m.is_none() && source != last && discriminant(&source) == discriminant(&last);
             (source <= last || now.since(at) >= LASTS) && !is_other_beam
         });
         if counts {
