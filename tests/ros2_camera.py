@@ -1,11 +1,11 @@
 """Publishes a recorded folder as a robot's camera and odometry would come, by Cyclone DDS without a ROS installation.
 
-Usage: ros2_camera.py FOLDER --domain N [--pace S] [--compressed] [--rest S] [--rows FROM:TO] [--faulty] [--transforms]
+Usage: ros2_camera.py FOLDER --domain N --log FILE [--pace S] [--compressed] [--rest S] [--rows FROM:TO] [--faulty] [--transforms]
 
 The folder has poses.csv with t_s, file, x_m, y_m, depth_m and heading_deg. Each image has the stamp t_s + 1000 s; its
 odometry is published a moment later, as estimators do. With --faulty, wrong images come between the good ones, and some good ones
 have 16 bits a channel. With --transforms, the poses are transforms from map to odom and from there to base_link; one from
-world to map, which stays, is published before.
+world to map, which stays, is published before. The log of the vehicle tells how many images it has mapped.
 """
 
 import argparse
@@ -35,7 +35,7 @@ from cyclonedds.util import duration
 
 from PIL import Image as Picture
 
-from ros2_recorded import header, odometry_at, wait_for_reader
+from ros2_recorded import header, odometry_at, wait_for_model, wait_for_reader
 
 def odometry(row):
     # Axes of ROS: the heading is clockwise from north, yaw counts counter-clockwise from east.
@@ -86,6 +86,7 @@ def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("folder", type=Path)
     parser.add_argument("--domain", type=int, required=True)
+    parser.add_argument("--log", type=Path, required=True)
     parser.add_argument("--pace", type=float, default=0.25)
     parser.add_argument("--compressed", action="store_true")
     parser.add_argument("--rest", type=float, default=5.0)
@@ -105,7 +106,8 @@ def main():
     wait_for_reader(images)
     wait_for_reader(poses)
     time.sleep(0.5)
-    for number, row in enumerate(rows):
+    for number, row in enumerate(rows, begin or 0):
+        wait_for_model(options.log, number)
         path = options.folder / row["file"]
         head = header(float(row["t_s"]), "camera")
         if options.compressed:

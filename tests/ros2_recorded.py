@@ -1,4 +1,4 @@
-"""What publishers of recorded images share: times, odometry, and the wait for a subscriber."""
+"""What publishers of recorded images share: times, odometry, and the waits for a subscriber and for its scene model."""
 
 import time
 
@@ -30,3 +30,11 @@ def wait_for_reader(writer):
     while not writer.get_matched_subscriptions():
         assert time.monotonic() < until, "no subscriber came"
         time.sleep(0.05)
+
+
+def wait_for_model(log, number):
+    """Waits until the images before this one are with the scene model: a busy machine drops none."""
+    until = time.monotonic() + 300
+    while log.read_text().count("goes to the scene model") < number:
+        assert time.monotonic() < until, "images are not mapped"
+        time.sleep(0.1)

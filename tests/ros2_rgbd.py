@@ -1,6 +1,6 @@
 """Publishes an RGB-D folder in the layout of the TUM benchmark as a robot's camera would come, by Cyclone DDS.
 
-Usage: ros2_rgbd.py FOLDER --domain N --matrix FX,FY,CX,CY [--cloud] [--without 3,7] [--pace S]
+Usage: ros2_rgbd.py FOLDER --domain N --matrix FX,FY,CX,CY --log FILE [--cloud] [--without 3,7] [--pace S]
 
 Images, their CameraInfo, and depth images (32FC1) or clouds have the stamp t + 1000 s; odometry of the vehicle, whose camera looks
 down with the top of its images to the bow, follows. Images of --without have no depth.
@@ -31,7 +31,7 @@ from cyclonedds.util import duration
 
 from PIL import Image as Picture
 
-from ros2_recorded import header, odometry_at, wait_for_reader
+from ros2_recorded import header, odometry_at, wait_for_model, wait_for_reader
 
 def lines(path):
     return [line.split() for line in path.read_text().splitlines() if line and not line.startswith("#")]
@@ -74,6 +74,7 @@ def main():
     parser.add_argument("--matrix", required=True)
     parser.add_argument("--cloud", action="store_true")
     parser.add_argument("--without", default="")
+    parser.add_argument("--log", type=Path, required=True)
     parser.add_argument("--pace", type=float, default=0.25)
     options = parser.parse_args()
     matrix = [float(field) for field in options.matrix.split(",")]
@@ -93,6 +94,7 @@ def main():
     time.sleep(0.5)
     rows = zip(lines(options.folder / "rgb.txt"), lines(options.folder / "depth.txt"), lines(options.folder / "groundtruth.txt"))
     for number, ((t, colour), (_, depth), pose) in enumerate(rows):
+        wait_for_model(options.log, number)
         head = header(float(t), "camera")
         picture = Picture.open(options.folder / colour).convert("RGB")
         width, height = picture.size

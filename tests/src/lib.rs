@@ -101,10 +101,12 @@ impl Process {
         Self(child.expect("scenecast starts"))
     }
 
-    /// Starts it with its log in a file.
+    /// Starts it with its log in a file, which has a line for each image that goes to the scene model.
     pub fn start_logged(arguments: &[&str], log: &Path) -> Self {
         let log = std::fs::File::create(log).expect("the log can be written");
-        let child = scenecast().args(arguments).stdout(Stdio::null()).stderr(log).spawn();
+        let levels = "info,ros2_client=off,rustdds=error,zenoh=warn,scenecast_runtime::camera=debug";
+        let mut process = scenecast();
+        let child = process.env("RUST_LOG", levels).args(arguments).stdout(Stdio::null()).stderr(log).spawn();
         Self(child.expect("scenecast starts"))
     }
 

@@ -60,6 +60,24 @@ impl Dive {
         Self { map: dir.join("asv/operator-map-1.png"), dir, frames, page, processes }
     }
 
+    fn log(&self) -> String {
+        std::fs::read_to_string(self.dir.join("auv.log")).unwrap_or_default()
+    }
+
+    /// Writes images into the camera's folder at the vehicle's pace, from the first one on: a busy machine drops none.
+    fn write_at_its_pace(&self, first: usize, frames: &[RecordedFrame]) {
+        wait_until("the vehicle looks at the folder", || self.log().contains("camera: open"));
+        for (index, frame) in (first..).zip(frames) {
+            self.write_after(index, frame);
+        }
+    }
+
+    /// Writes an image once those before it are with the scene model.
+    fn write_after(&self, before: usize, frame: &RecordedFrame) {
+        wait_until("the images before are mapped", || self.log().matches(MAPPED).count() >= before);
+        self.write_slowly(frame);
+    }
+
     /// Writes an image into the camera's folder as a slow program does: the file stays half written for a moment.
     fn write_slowly(&self, frame: &RecordedFrame) {
         let bytes = std::fs::read(frame.image.file().unwrap()).unwrap();
@@ -84,7 +102,7 @@ impl Dive {
     /// Ends the vehicle and reads its log.
     fn log_of_vehicle(&mut self) -> String {
         assert_eq!(self.processes[1].interrupt(), Some(0));
-        std::fs::read_to_string(self.dir.join("auv.log")).unwrap()
+        self.log()
     }
 
     fn assert_map(&self, expected: &[u8]) {
@@ -110,8 +128,11 @@ fn stamped_ppm(image: &RgbImage, t_s: f64) -> Vec<u8> {
     [format!("P6\n# stamp={t_s:.9}\n{width} {height}\n255\n").as_bytes(), image.as_raw()].concat()
 }
 
-/// Time between two images: the scene model of a debug build keeps up.
+/// Shortest time between two images.
 const PACE: Duration = Duration::from_millis(250);
+
+/// What the log of a vehicle says of each image that it maps.
+const MAPPED: &str = "goes to the scene model";
 
 #[test]
 fn images_written_to_a_folder_give_the_map_of_the_recording() {
@@ -120,7 +141,7 @@ fn images_written_to_a_folder_give_the_map_of_the_recording() {
         std::fs::create_dir_all(&camera).unwrap();
         format!("watch:{}", camera.display())
     });
-    dive.frames.iter().for_each(|frame| dive.write_slowly(frame));
+    dive.write_at_its_pace(0, &dive.frames);
     dive.assert_map_of_the_rehearsal();
 }
 
@@ -134,16 +155,18 @@ fn a_camera_that_stalls_is_reported_and_the_map_is_the_same() {
         let poses = format!("navigation.source=tum:{}", dir.join("poses.txt").display());
         vec![format!("camera.source=watch:{}", camera.display()), poses, "camera.timeout_s=2".to_owned()]
     });
-    let (before, after) = dive.frames.split_at(dive.frames.len() / 2);
-    before.iter().for_each(|frame| dive.write_slowly(frame));
+    let (before, _) = dive.frames.split_at(dive.frames.len() / 2);
+    dive.write_at_its_pace(0, before);
     let began = Instant::now();
     let is_silent = || dive.faults().map(|faults| faults.iter().any(|fault| fault == "no image comes in"));
     wait_until("the page shows that no image comes in", || is_silent() == Some(true));
     std::thread::sleep(Duration::from_secs_f64(stall_s).saturating_sub(began.elapsed()));
     let resumed = Instant::now();
-    let (mut after, mut is_over) = (after.iter(), false);
+    let (mut index, mut is_over) = (before.len(), false);
     while !is_over {
-        dive.write_slowly(after.next().expect("the page shows images again before the last one"));
+        let frame = dive.frames.get(index).expect("the page shows images again before the last one");
+        dive.write_after(index, frame);
+        index += 1;
         let limit = Instant::now() + Duration::from_secs(1);
         while !is_over && Instant::now() < limit {
             is_over = is_silent() == Some(false);
@@ -152,24 +175,28 @@ fn a_camera_that_stalls_is_reported_and_the_map_is_the_same() {
     }
     let shown_s = resumed.elapsed().as_secs_f64();
     println!("a stall of {stall_s} s; the page showed images again after {shown_s:.1} s");
-    after.for_each(|frame| dive.write_slowly(frame));
+    dive.write_at_its_pace(index, &dive.frames[index..]);
     dive.assert_map_of_the_rehearsal();
 }
 
 #[test]
 fn images_of_a_command_give_the_map_of_the_recording() {
-    let dive = Dive::start("command", &|dir| {
+    let dive = Dive::with_settings("command", &|dir| {
         let frames = Recording::open(&recorded().0, None, 0.01).unwrap().frames;
         for (index, frame) in frames.iter().enumerate() {
             let path = dir.join(format!("{index:03}.ppm"));
             std::fs::write(path, stamped_ppm(&frame.image.read().unwrap(), frame.t_s)).unwrap();
         }
-        let pace = PACE.as_secs_f64();
-        // The command ends once and is started again where it was; each image is written once.
-        let script =
-            "cd DIR && for f in *.ppm; do cat $f; rm $f; sleep PACE; case $f in 010*) exit 1;; esac; done; sleep 600";
-        let script = script.replace("DIR", &dir.display().to_string()).replace("PACE", &pace.to_string());
-        format!("command:{script}")
+        // The command ends once and is started again where it was; each image is written once, at the vehicle's pace.
+        let script = "cd DIR && for f in *.ppm; do cat $f; rm $f; sleep PACE; \
+            until [ $((1$(basename $f .ppm) - 1000)) -lt $(grep -c 'MAPPED' auv.log) ]; do sleep PACE; done; \
+            case $f in 010*) exit 1;; esac; done; sleep 600";
+        let script = script.replace("DIR", &dir.display().to_string()).replace("MAPPED", MAPPED);
+        let script = script.replace("PACE", &PACE.as_secs_f64().to_string());
+        // A command that waits for a busy machine is not started again.
+        let mut sets = vec![format!("camera.source=command:{script}"), "camera.timeout_s=300".to_owned()];
+        sets.push(format!("navigation.source=tum:{}", dir.join("poses.txt").display()));
+        sets
     });
     dive.assert_map_of_the_rehearsal();
 }
@@ -188,7 +215,8 @@ fn assert_topics_give_the_map(name: &str, domain: u8, (topic, poses): (&str, &st
     let folder = recorded().0.display().to_string();
     let domain = domain.to_string();
     for options in publishers {
-        let arguments = [&[folder.as_str(), "--domain", &domain], *options].concat();
+        let log = dive.dir.join("auv.log").display().to_string();
+        let arguments = [&[folder.as_str(), "--domain", &domain, "--log", &log], *options].concat();
         run_script(&python, "tests/ros2_camera.py", &arguments);
     }
     dive.assert_map_of_the_rehearsal();
@@ -248,7 +276,8 @@ fn relief_by_dds(name: &str, domain: u8, depth: &str, options: &[&str]) -> Optio
         sets.chain(topics).chain([format!("ros2.domain={domain}")]).collect()
     });
     let (folder, domain) = (folder.display().to_string(), domain.to_string());
-    let arguments = [&[folder.as_str(), "--domain", &domain, "--matrix", &matrix], options].concat();
+    let log = dive.dir.join("auv.log").display().to_string();
+    let arguments = [&[folder.as_str(), "--domain", &domain, "--matrix", &matrix, "--log", &log], options].concat();
     run_script(&python, "tests/ros2_rgbd.py", &arguments);
     Some((dive, expected))
 }

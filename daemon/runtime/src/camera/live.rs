@@ -219,7 +219,8 @@ impl LiveCamera {
     pub(super) fn poll_frame(&mut self, mapping: u32) -> Option<CameraFrame> {
         self.is_model_busy = mapping >= MAX_MAPPING;
         let frame = if self.is_model_busy { None } else { self.next_frame() };
-        if frame.is_some() {
+        if let Some(frame) = &frame {
+            tracing::debug!("camera: the image of {:.3} s goes to the scene model", frame.t_s);
             self.faults.handle_matched();
         }
         self.faults.log(&self.matcher);
