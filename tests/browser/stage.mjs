@@ -8,7 +8,7 @@ export const PHONE = { width: 390, height: 844 };
 export const API = "/api/v2";
 
 /** The limit of each wait. A condition that holds is noticed at once, so a slow machine does not fail a story. */
-const TIMEOUT_MS = 120000;
+const TIMEOUT_MS = 300000;
 const POLL_MS = 60;
 /** Time of a page whose clock is stopped: any fixed date. */
 const START_MS = Date.UTC(2026, 0, 1);

@@ -162,6 +162,9 @@ fn a_shell_sets_fence_and_limits_and_holds_and_resumes() {
     applied(&["limits", "set", "--silence", "900"]);
     let limits = text(&ctl(port, &["limits"]));
     assert!(limits.contains("0.0 to 60.0 m") && limits.contains("15 min"), "{limits}");
+    applied(&["limits", "clear", "depth"]);
+    let limits = text(&ctl(port, &["limits"]));
+    assert!(!limits.contains("60.0 m") && limits.contains("15 min"), "the others stay: {limits}");
 
     applied(&["hold"]);
     wait_until("it holds", || vehicle()["status"]["mode"] == "hold");

@@ -213,6 +213,9 @@ fn ardusub_that_refuses_gets_lost_or_restarts_is_recovered() {
     assert_eq!(peer.seen()["bad"].as_u64(), Some(0));
 }
 
+/// HEARTBEAT of a ground station (system 255, component 190, no autopilot), MAVLink 1.
+const GROUND_STATION: [u8; 17] = [0xFE, 9, 0, 255, 190, 0, 0, 0, 0, 0, 6, 8, 0, 4, 3, 0x49, 0x21];
+
 #[test]
 fn a_vehicle_surveys_on_ardusub_and_reports_its_silence() {
     let Some(python) = python("pymavlink") else { return };
@@ -244,12 +247,20 @@ fn a_vehicle_surveys_on_ardusub_and_reports_its_silence() {
     let _asv = Process::start(&["asv", "--config", &asv]);
     let log = dir.join("auv.log");
     let _auv = Process::start_logged(&["auv", "--config", &auv], &log);
+    // A ground station is heard before the autopilot, and beside it.
+    let station = std::net::UdpSocket::bind("127.0.0.1:0").unwrap();
+    let heartbeat = || station.send_to(&GROUND_STATION, ("127.0.0.1", mavlink)).is_ok();
+    let mut heartbeats = 0;
+    wait_until("a ground station has sent heartbeats", || {
+        heartbeats += u32::from(heartbeat());
+        heartbeats > 20 && std::fs::read_to_string(&log).is_ok_and(|log| log.contains("autopilot: "))
+    });
     let mut peer = Peer::start(&python, mavlink, 3.0);
     let status = || {
         let (_, body) = http(page, "GET", "/api/v2/state", "", "")?;
         Some(serde_json::from_slice::<Value>(&body).ok()?["vehicles"][0]["status"].clone())
     };
-    wait_until("the survey is flown", || peer.number("targets") > 5.0 && peer.number("east") > 10.0);
+    wait_until("the survey is flown", || heartbeat() && peer.number("targets") > 5.0 && peer.number("east") > 10.0);
     wait_until("the operator sees it move", || {
         status().is_some_and(|s| s["x_m"].as_f64() > Some(8.0) && s["autopilot_silent"] == false)
     });

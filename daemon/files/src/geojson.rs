@@ -195,13 +195,19 @@ fn add(order: &mut FenceShapes, feature: &Value, frame: CoordinateFrame) -> Resu
 }
 
 fn role(feature: &Value) -> Result<Option<FeatureRole>, String> {
-    match &feature["properties"]["role"] {
-        Value::Null => Ok(None),
-        Value::String(s) if s.is_empty() => Ok(None),
-        Value::String(s) if s == "fence" => Ok(Some(FeatureRole::Fence)),
-        Value::String(s) if s == "keep_out" => Ok(Some(FeatureRole::KeepOut)),
-        Value::String(s) if s == "return_point" => Ok(Some(FeatureRole::ReturnPoint)),
-        other => Err(format!("role {other}: expected fence, keep_out or return_point")),
+    // Shapefiles and some editors change the case of names.
+    let is_role = |name: &str| name.eq_ignore_ascii_case("role");
+    let given = feature["properties"].as_object().and_then(|all| all.iter().find(|(name, _)| is_role(name)));
+    let role = match given {
+        None | Some((_, Value::Null)) => return Ok(None),
+        Some((_, role)) => role,
+    };
+    match role.as_str().map(str::to_ascii_lowercase).as_deref() {
+        Some("") => Ok(None),
+        Some("fence") => Ok(Some(FeatureRole::Fence)),
+        Some("keep_out") => Ok(Some(FeatureRole::KeepOut)),
+        Some("return_point") => Ok(Some(FeatureRole::ReturnPoint)),
+        _ => Err(format!("role {role}: expected fence, keep_out or return_point")),
     }
 }
 
@@ -364,6 +370,13 @@ mod tests {
         std::fs::write(&file, b"\xFF\xFE{\0").unwrap();
         assert!(read_fence(&file, CoordinateFrame::Metres).unwrap_err().to_string().contains("UTF-16"));
         std::fs::remove_file(file).unwrap();
+    }
+
+    #[test]
+    fn the_case_of_a_role_does_not_matter() {
+        let keep_out = format!(r#"{{"type": "Feature", "properties": {{"ROLE": "Keep_Out"}}, "geometry": {SQUARE}}}"#);
+        let order = read(&keep_out, CoordinateFrame::Metres).unwrap();
+        assert!(order.fence.is_none() && order.keep_outs.len() == 1);
     }
 
     #[test]

@@ -300,21 +300,36 @@ mod tests {
     /// What is found on two legs with a turn between them, where a pixel is believed to measure `believed_m`.
     fn found(camera: Camera, believed_m: f64) -> Option<CameraGeometry> {
         let mut check = GeometryCheck::default();
+        fly(camera, believed_m, 30, &mut |input, _| check.handle_frame(&input));
+        check.geometry()
+    }
+
+    /// The frames of two legs with a turn from frame `turn` on between them, each with its number.
+    fn fly(camera: Camera, believed_m: f64, turn: usize, handle: &mut dyn FnMut(FrameInput<'_>, usize)) {
         let (mut at, mut heading_rad) = ([3.0, 4.0], 0.3f64);
-        for step in 0..70 {
-            if (30..36).contains(&step) {
+        for step in 0..turn + 40 {
+            if (turn..turn + 6).contains(&step) {
                 heading_rad += 0.5;
             }
             at = [at[0] + 0.3 * heading_rad.sin(), at[1] + 0.3 * heading_rad.cos()];
             let image = camera.image(at, heading_rad);
-            check.handle_frame(&FrameInput {
-                image: CameraImage::grey(SIZE[0], SIZE[1], &image).unwrap(),
-                metres_per_pixel: believed_m,
-                dead_reckoned: MapPoint::new(at[0], at[1]),
-                compass_rad: heading_rad,
-            });
+            let image = CameraImage::grey(SIZE[0], SIZE[1], &image).unwrap();
+            let dead_reckoned = MapPoint::new(at[0], at[1]);
+            let input = FrameInput { image, metres_per_pixel: believed_m, dead_reckoned, compass_rad: heading_rad };
+            handle(input, step);
         }
-        check.geometry()
+    }
+
+    #[test]
+    fn advice_comes_before_a_turn_and_again_when_it_shows_more() {
+        let (mut check, mut told) = (GeometryCheck::default(), Vec::new());
+        fly(Camera { turn_rad: 0.0, is_mirrored: true }, 3.0 * PIXEL_M, 80, &mut |input, step| {
+            check.handle_frame(&input);
+            told.extend(check.poll_advice(3.0 * PIXEL_M).map(|advice| (step, advice)));
+        });
+        let [(before, size), (after, mirrored)] = &told[..] else { panic!("{told:?}") };
+        assert!(*before < 80 && size.contains("set camera.metres_per_pixel = 0.0") && *after >= 80, "{told:?}");
+        assert!(mirrored.contains("mirrored") && mirrored.contains("set camera.metres_per_pixel"), "{told:?}");
     }
 
     #[test]
