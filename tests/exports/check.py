@@ -3,14 +3,16 @@
     python check.py DIR
 
 DIR has state.json and map.json from the API, and map.png with map.pgw and map.png.aux.xml, map.geojson, map.ply, map.csv,
-map.tif and, with an origin, map.utm.tif and map.wgs84.tif.
+map.labels.csv, map.coco.json, map.taglab.json, map.tif and, with an origin, map.utm.tif and map.wgs84.tif, each with its .aux.xml.
 """
 
 import base64
 import csv
 import json
 import math
+import struct
 import sys
+import xml.etree.ElementTree
 from pathlib import Path
 
 import numpy as np
@@ -56,6 +58,25 @@ class ApiMap:
         self.y = self.south + (rows + 0.5) * self.cell
         self.label = self.labels[rows, columns]
         assert len(self.label) > 100, "the map has too few cells for this check"
+        vehicle = state["vehicles"][0]
+        self.vehicle, self.book = vehicle["name"], {int(label): entry for label, entry in vehicle["label_book"].items()}
+        assert any(entry["merged_into"] for entry in self.book.values()), "no label is merged"
+
+    def of(self, label, what):
+        return self.book.get(label, {}).get(what)
+
+    def shown_as(self, label):
+        into = self.of(label, "merged_into")
+        return self.shown_as(into) if into else label
+
+    def class_name(self, label):
+        shown = self.shown_as(label)
+        return self.of(shown, "name") or f"label {shown}"
+
+    def colour(self, label):
+        """The operator's colour of the class, if there is one."""
+        text = self.of(self.shown_as(label), "colour")
+        return text and tuple(bytes.fromhex(text[1:]))
 
 
 def close(a, b, name, tolerance=CENTIMETRE):
@@ -63,8 +84,28 @@ def close(a, b, name, tolerance=CENTIMETRE):
     assert error <= tolerance, f"{name}: error {error}, {tolerance} allowed"
 
 
+def check_colours(image, api):
+    colours = image.colormap(1)
+    for label in set(api.label.tolist()):
+        assert colours[label] == colours[api.shown_as(label)] and colours[label][:3] != (0, 0, 0), f"colour of label {label}"
+        assert api.colour(label) in (None, colours[label][:3]), f"the operator's colour of label {label}"
+
+
+def check_companion(path, api):
+    """The names of the classes, where GDAL looks for them."""
+    root = xml.etree.ElementTree.parse(f"{path}.aux.xml").getroot()
+    names = [category.text for category in root.findall("PAMRasterBand/CategoryNames/Category")]
+    for label in set(api.label.tolist()):
+        assert names[label] == api.class_name(label), f"{names[label]} instead of {api.class_name(label)}"
+    facts = {item.get("key"): item.text for item in root.findall("Metadata/MDI")}
+    assert facts["vehicle_name"] == api.vehicle and facts["utc"].endswith("Z"), facts
+
+
 def check_png(path, api):
+    check_companion(path, api)
     with rasterio.open(path) as image:
+        check_colours(image, api)
+        assert image.nodata == 0, "unexplored cells are data"
         a = image.transform
         assert (a.b, a.d) == (0, 0), "rotated"
         rows, columns = rasterio.transform.rowcol(a, api.x, api.y)
@@ -80,11 +121,16 @@ def check_png(path, api):
 
 
 def check_tiff(path, api):
+    check_companion(path, api)
+    start, = struct.unpack("<I", path.read_bytes()[4:8])
+    assert start < 300, "the directory is not at the beginning, as readers by network want it"
     with rasterio.open(path) as image:
+        check_colours(image, api)
+        tags = image.tags()
+        assert tags["vehicle_name"] == api.vehicle, tags
+        assert all(tags[f"label_{label}"] == api.class_name(label) for label in set(api.label.tolist())), tags
         assert image.is_tiled and image.block_shapes == [(256, 256)] and image.nodata == 0, "tiles"
         assert image.compression == rasterio.enums.Compression.deflate, "compression"
-        colours = image.colormap(1)
-        assert all(colours[label][:3] != (0, 0, 0) for label in set(api.label.tolist())), "palette"
         read, place = image.read(1), image.transform
         x, y = api.x, api.y
         if api.origin is None:
@@ -118,7 +164,9 @@ def check_geojson(path, api):
     document = json.loads(path.read_text())
     regions = {f["properties"]["label"]: shapely.geometry.shape(f["geometry"]) for f in document["features"]}
     assert set(regions) == set(api.label.tolist()), "labels"
+    check_fields([f["properties"] for f in document["features"]], api)
     if api.origin is None:
+        assert document["crs"]["properties"]["name"].startswith("LOCAL_CS["), "metres that are taken for degrees"
         place = list(zip(api.x, api.y))
     else:
         crs = rasterio.crs.CRS.from_dict(proj="tmerc", lat_0=api.origin["lat_deg"], lon_0=api.origin["lon_deg"], k=1, datum="WGS84")
@@ -148,12 +196,59 @@ def check_csv(path, api):
     close([float(line["east_m"]) for line in lines], api.x, "east")
     close([float(line["north_m"]) for line in lines], api.y, "north")
     assert [int(line["label"]) for line in lines] == api.label.tolist(), "labels"
+    check_fields(lines, api)
+    assert not any(line["name"].startswith("=") for line in lines), "a formula"
+
+
+def check_fields(lines, api):
+    """Name, class and colour of each label as fields of a table. A name that begins as a formula has an apostrophe before."""
+    for line in lines:
+        label = int(line["label"])
+        assert int(line["class"]) == api.shown_as(label), line
+        assert (line["class_name"] or "").lstrip("'") == api.class_name(label), line
+        assert (line["name"] or "").lstrip("'") == (api.of(label, "name") or ""), line
+        assert api.colour(label) in (None, tuple(bytes.fromhex(line["colour"][1:]))), line
+
+
+def check_labels(path, api):
+    with path.open(newline="") as file:
+        lines = list(csv.DictReader(file))
+    assert {int(line["label"]): int(line["cells"]) for line in lines} == dict(zip(*np.unique(api.label, return_counts=True))), "cells"
+    check_fields(lines, api)
+    assert all(line["vehicle_name"] == api.vehicle for line in lines), "vehicle"
+
+
+def check_coco(path, api):
+    document = json.loads(path.read_text())
+    names = {category["id"]: category["name"] for category in document["categories"]}
+    height, width = api.labels.shape
+    found = np.zeros((height, width), np.uint8)
+    for annotation in document["annotations"]:
+        counts = annotation["segmentation"]["counts"]
+        assert annotation["segmentation"]["size"] == [height, width] and sum(counts) == height * width, "runs"
+        mask = np.repeat(np.arange(len(counts)) % 2 == 1, counts).reshape(width, height).T
+        rows, columns = np.nonzero(mask)
+        box = [columns.min(), rows.min(), np.ptp(columns) + 1, np.ptp(rows) + 1]
+        assert annotation["bbox"] == box and annotation["area"] == mask.sum(), "box"
+        assert names[annotation["category_id"]] == api.class_name(annotation["category_id"]), "names"
+        found[mask] = annotation["category_id"]
+    shown = np.array([api.shown_as(label) if label else 0 for label in range(256)], np.uint8)
+    assert (found == shown[api.labels[::-1]]).all(), "classes"
+
+
+def check_tag_lab(path, api):
+    labels = {label["name"]: tuple(label["fill"]) for label in json.loads(path.read_text())["Labels"]}
+    with rasterio.open(path.parent / "map.png") as image:
+        colours = image.colormap(1)
+    for label in set(api.label.tolist()):
+        assert labels[api.class_name(label)] == colours[label][:3], f"label {label}"
 
 
 def main():
     directory = Path(sys.argv[1])
     api = ApiMap(directory)
     checks = {"png": check_png, "geojson": check_geojson, "ply": check_ply, "csv": check_csv, "tif": check_tiff}
+    checks.update({"labels.csv": check_labels, "coco.json": check_coco, "taglab.json": check_tag_lab})
     if api.origin is not None:
         checks.update({"utm.tif": check_tiff, "wgs84.tif": check_tiff})
     for extension, check in checks.items():

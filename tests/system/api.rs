@@ -3,7 +3,7 @@
 use scenecast_tests::{
     LIGHT, Process, assert_refused, free_port, http, python, run, run_script, scratch, state, wait_until,
 };
-use serde_json::Value;
+use serde_json::{Value, json};
 use std::collections::BTreeSet;
 use std::path::Path;
 use std::process::Output;
@@ -413,6 +413,36 @@ fn last_seen_reaches_the_surface_and_its_exports_if_requested() {
     assert_eq!((&layer["unit"], &layer["edges"][0], &layer["edges"][1]), (&"min".into(), &0.0.into(), &2.0.into()));
 }
 
+/// Names the largest label, whose class has a colour and two others that are merged into it, one by way of the other.
+fn name_labels(port: u16) {
+    let mut labels = state(port).unwrap()["vehicles"][0]["labels"].as_array().unwrap().clone();
+    labels.sort_by_key(|label| std::cmp::Reverse(label["cells"].as_u64()));
+    let [a, b, c] = [0, 1, 2].map(|i| labels[i]["id"].clone());
+    let entries = [
+        json!({ "label": a, "name": "sand, \"fine\" & <wet>", "colour": "#12ab34" }),
+        json!({ "label": b, "name": "=rubble", "merged_into": a }),
+        json!({ "label": c, "merged_into": b }),
+    ];
+    let post = |entry: &Value| {
+        let headers = "Content-Type: application/json\r\nX-Scenecast: 1\r\n";
+        http(port, "POST", "/api/v2/vehicles/1/labels", headers, &entry.to_string()).map(|(status, _)| status)
+    };
+    entries.iter().for_each(|entry| assert_eq!(post(entry), Some(204), "{entry}"));
+    assert_eq!(post(&json!({ "label": a, "merged_into": c })), Some(422), "a circle");
+    wait_until("the labels are named", || {
+        state(port).unwrap()["vehicles"][0]["label_book"][c.to_string()]["merged_into"] == b
+    });
+    let sent = ctl(port, &["utility", "set", "SAND, \"fine\" & <wet>=0.5", "--wait", "0"]);
+    assert_eq!(sent.status.code(), Some(0), "{}", text(&sent));
+    wait_until("the class has the weight, and those that are merged into it", || {
+        let labels = state(port).unwrap()["vehicles"][0]["labels"].clone();
+        let weight = |id: &Value| labels.as_array()?.iter().find(|label| label["id"] == *id)?["weight"].as_f64();
+        [&a, &b, &c].iter().all(|id| weight(id) == Some(0.5))
+    });
+    let wrong = ctl(port, &["utility", "set", "kelp=0.5"]);
+    assert!(wrong.status.code() == Some(2) && text(&wrong).contains("=rubble"), "{}", text(&wrong));
+}
+
 /// Exports the map of an ended mission in all formats, and opens the files with other programs.
 fn assert_exports_open(name: &str, origin: &[&str]) {
     let Some(python) = python("plyfile, rasterio, shapely") else { return };
@@ -425,13 +455,15 @@ fn assert_exports_open(name: &str, origin: &[&str]) {
         std::thread::sleep(Duration::from_secs(1));
         state["mission"]["ended"] == true && std::mem::replace(&mut last, version.clone()) == version
     });
+    name_labels(port);
     let path = |file: &str| dir.join(file).display().to_string();
     let placement = || state(port).unwrap()["vehicles"][0]["map"]["placement"].clone();
     // A late fix may move the map between two files.
     wait_until("all files with the map in one place", || {
         let before = placement();
         let projected: &[&str] = if origin.is_empty() { &[] } else { &["map.utm.tif", "map.wgs84.tif"] };
-        for file in ["map.json", "map.png", "map.geojson", "map.ply", "map.csv", "map.tif"].iter().chain(projected) {
+        let files = ["map.json", "map.png", "map.geojson", "map.ply", "map.csv", "map.labels.csv", "map.tif"];
+        for file in files.iter().chain(&["map.coco.json", "map.taglab.json"]).chain(projected) {
             let made = ctl(port, &["map", "--out", &path(file)]);
             assert_eq!(made.status.code(), Some(0), "{file}: {}", text(&made));
         }

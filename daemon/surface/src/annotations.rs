@@ -36,8 +36,13 @@ impl Annotations {
         if !(1..=MAX_LABEL).contains(&label) {
             return Err(format!("label {label}: it takes 1 to {MAX_LABEL}"));
         }
-        if book.name.as_ref().is_some_and(|name| name.is_empty() || name.chars().count() > MAX_NAME) {
-            return Err(format!("name: it takes 1 to {MAX_NAME} characters, or null"));
+        let is_name = |name: &String| {
+            (1..=MAX_NAME).contains(&name.chars().count()) && name.trim() == name && !name.contains(char::is_control)
+        };
+        if book.name.as_ref().is_some_and(|name| !is_name(name)) {
+            return Err(format!(
+                "name: it takes 1 to {MAX_NAME} characters without control characters, and no blank at its ends, or null"
+            ));
         }
         let is_colour = |c: &String| {
             c.strip_prefix('#').is_some_and(|hex| hex.len() == 6 && hex.bytes().all(|b| b.is_ascii_hexdigit()))
@@ -48,8 +53,23 @@ impl Annotations {
         if book.merged_into.is_some_and(|into| into == label || !(1..=MAX_LABEL).contains(&into)) {
             return Err(format!("merged_into: it takes another label, 1 to {MAX_LABEL}, or null"));
         }
+        if book.merged_into.is_some_and(|into| self.leads_to(into, label)) {
+            return Err(format!("merged_into: label {label} is what that label is shown as, by its merges"));
+        }
         self.labels.insert(label, book);
         Ok(())
+    }
+
+    /// Whether the merges of a label lead to another one.
+    fn leads_to(&self, from: u8, label: u8) -> bool {
+        let mut at = Some(from);
+        for _ in 0..=self.labels.len() {
+            at = at.and_then(|at| self.labels.get(&at)?.merged_into);
+            if at == Some(label) {
+                return true;
+            }
+        }
+        false
     }
 
     /// Gives a label the name and the colour of its class where the operator has given it none.

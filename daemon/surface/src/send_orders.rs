@@ -33,8 +33,11 @@ impl Surface {
             curiosity: hundredths("curiosity", curiosity)?,
             ..Utility::default()
         };
+        // A label may have lost its last cell since the operator looked at the map.
+        let reported = self.status(vehicle).map_or(0, |(status, _)| status.labels);
+        let highest = known.keys().last().map_or(reported, |&highest| highest.max(reported));
         for (&label, &weight) in weights {
-            if !known.contains_key(&label) {
+            if !(1..=highest).contains(&label) {
                 return Err(format!("label {label} is not on the map"));
             }
             let weight = hundredths(&format!("weight of label {label}:"), weight)?;
@@ -42,11 +45,10 @@ impl Surface {
                 utility.weights.insert(label, weight);
             }
         }
-        let reported = self.status(vehicle).map_or(0, |(status, _)| status.labels);
         let record = self.records.get_mut(&vehicle).ok_or("no such vehicle")?;
         utility.epoch = record.epoch;
         record.utility = utility.clone();
-        record.weighed = known.keys().last().map_or(reported, |&highest| highest.max(reported));
+        record.weighed = highest;
         self.issue(vehicle, Slot::Utility(utility), now)
     }
 

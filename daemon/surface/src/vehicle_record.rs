@@ -161,8 +161,13 @@ impl VehicleRecord {
 
     /// Name, colour and merging of a label of the map in view.
     pub fn label_book(&self, label: u8) -> Option<&StoredLabel> {
+        self.label_books().get(&label)
+    }
+
+    /// Names, colours and merges of the labels of the map in view.
+    pub fn label_books(&self) -> &BTreeMap<u8, StoredLabel> {
         let of_earlier = self.earlier_map().filter(|earlier| earlier.epoch != self.epoch).map(|e| &e.names);
-        of_earlier.unwrap_or(&self.annotations.labels).get(&label)
+        of_earlier.unwrap_or(&self.annotations.labels)
     }
 
     /// Takes the names and colours that the vehicle has given its labels.

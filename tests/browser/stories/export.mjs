@@ -1,7 +1,7 @@
 import assert from "node:assert/strict";
 import { readFile } from "node:fs/promises";
 
-const EXTENSIONS = ["png", "pgw", "png.aux.xml", "tif", "csv", "labels.csv", "geojson", "ply"];
+const EXTENSIONS = ["png", "pgw", "png.aux.xml", "tif", "tif.aux.xml", "csv", "labels.csv", "geojson", "coco.json", "taglab.json", "ply"];
 
 /** Clicks a link of the export dialog; resolves to the name and the bytes of the file. */
 async function take(s, title) {

@@ -68,10 +68,12 @@ function take() {
     else b[part][id] = value;
     changed = true;
   };
-  for (const l of store.vehicle?.labels ?? []) {
-    put("names", l.id, l.name);
-    put("colours", l.id, l.colour);
-    put("merged", l.id, l.merged_into);
+  const entries = store.vehicle?.label_book ?? {};
+  for (const id of new Set([...(store.vehicle?.labels ?? []).map((l) => l.id), ...Object.keys(entries).map(Number)])) {
+    const entry = store.vehicle.label_book && { name: null, colour: null, merged_into: null, ...entries[id] };
+    put("names", id, entry?.name);
+    put("colours", id, entry?.colour);
+    put("merged", id, entry?.merged_into);
   }
   if (changed) {
     remember(loadedKey, b);
@@ -158,11 +160,9 @@ export function split(id) {
 
 /** The vehicle's labels as the operator sees them: merged ones summed up, each with its `members`. */
 export function shownLabels(vehicle) {
-  const ids = new Set(vehicle.labels.map((l) => l.id));
   const shown = new Map();
   for (const label of vehicle.labels) {
-    const into = shownAs(label.id);
-    const id = ids.has(into) ? into : label.id;
+    const id = shownAs(label.id);
     if (!shown.has(id)) shown.set(id, { members: [], cells: 0, area_m2: 0, gained_m2: 0 });
     const sum = shown.get(id);
     sum.members.push(label.id);
@@ -170,5 +170,8 @@ export function shownLabels(vehicle) {
     sum.area_m2 += label.area_m2;
     sum.gained_m2 += label.gained_m2 ?? 0;
   }
-  return vehicle.labels.filter((l) => shown.has(l.id)).map((l) => ({ ...l, ...shown.get(l.id) }));
+  // A label without cells of its own is shown with those of its largest member.
+  const whole = (id, sum) => vehicle.labels.find((l) => l.id === id) ?? { ...vehicle.labels.find((l) => l.id === sum.members[0]), id };
+  const inOrder = [...shown].sort(([a], [b]) => a - b);
+  return inOrder.map(([id, sum]) => ({ ...whole(id, sum), ...sum }));
 }

@@ -1,5 +1,6 @@
 //! The differences between two states, changes as they happen, and the log of the mission.
 
+use super::names;
 use super::session::{Session, json, write};
 use super::text::{self, is_silent, mode, span};
 use crate::state::{ExemplarImage, ExemplarStage, LogLine, LogList, MissionState, VehicleState};
@@ -117,14 +118,19 @@ fn of_labels(old: &VehicleState, new: &VehicleState, add: &mut dyn FnMut(&'stati
 
 pub async fn show_status(session: &Session) -> Result<(), UserError> {
     let state = session.state().await?;
-    session.print(&state, || text::status(&state, session.vehicle))
+    let only = session.selected(&state)?;
+    session.print(&state, || text::status(&state, only))
 }
 
-/// Prints the labels of a vehicle.
-pub async fn show_labels(session: &Session) -> Result<(), UserError> {
+/// Prints the labels of a vehicle; if `count` is given, the groups that they form where their tree is cut at that number.
+pub async fn show_labels(session: &Session, count: Option<u8>) -> Result<(), UserError> {
     let state = session.state().await?;
     let vehicle = session.choose(&state)?;
-    session.print(&vehicle.labels, || text::labels(vehicle, state.now_s))
+    let Some(count) = count else {
+        return session.print(&vehicle.labels, || text::labels(vehicle, state.now_s));
+    };
+    let groups = names::groups(&vehicle.labels, &vehicle.label_book, vehicle.label_tree.as_ref(), count.into())?;
+    session.print(&groups, || text::groups(&groups))
 }
 
 pub async fn watch(session: &Session) -> Result<(), UserError> {
@@ -143,7 +149,8 @@ async fn print_changes(session: &Session) -> Result<(), UserError> {
             Some(before) => changes(before, &after),
             None => first(&after),
         };
-        let is_selected = |id: Option<u8>| session.vehicle.is_none() || id.is_none() || id == session.vehicle;
+        let selected = session.selected(&after)?;
+        let is_selected = |id: Option<u8>| selected.is_none() || id.is_none() || id == selected;
         for change in all.iter().filter(|c| is_selected(c.vehicle)) {
             let line = if session.json { json(change)? } else { change.line() };
             if !write(&format!("{line}\n"))? {
@@ -175,7 +182,8 @@ impl LogSelection {
 
 /// Prints the entries of the log, the oldest first.
 pub async fn show_log(session: &Session, selection: &LogSelection) -> Result<(), UserError> {
-    let (bytes, _) = session.client.get(&format!("/api/v2/log{}", selection.query(session.vehicle))).await?;
+    let only = session.selected(&session.state().await?)?;
+    let (bytes, _) = session.client.get(&format!("/api/v2/log{}", selection.query(only))).await?;
     let log: LogList = serde_json::from_slice(&bytes).map_err(|e| session.client.unreadable(&e))?;
     session.print(&log, || match log.entries.is_empty() {
         true => "no entry\n".to_owned(),
@@ -185,7 +193,8 @@ pub async fn show_log(session: &Session, selection: &LogSelection) -> Result<(),
 
 /// Writes the entries of the log to a file, as a table for a spreadsheet.
 pub async fn save_log(session: &Session, selection: &LogSelection, out: &Path) -> Result<(), UserError> {
-    let (bytes, _) = session.client.get(&format!("/api/v2/log.csv{}", selection.query(session.vehicle))).await?;
+    let only = session.selected(&session.state().await?)?;
+    let (bytes, _) = session.client.get(&format!("/api/v2/log.csv{}", selection.query(only))).await?;
     std::fs::write(out, bytes).map_err(|e| UserError::file(out, e))
 }
 

@@ -1,5 +1,6 @@
 //! Maps and images as files.
 
+use super::names;
 use super::session::{Session, follow};
 use crate::orders::{ExemplarAction, ExemplarOrder};
 use crate::state::{AcceptedOrder, ExemplarProgress, ExemplarStage, MissionState};
@@ -8,7 +9,9 @@ use scenecast_files::write_whole;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-const MAP_FORMATS: [&str; 8] = ["png", "geojson", "ply", "csv", "json", "utm.tif", "wgs84.tif", "tif"];
+/// The first that fits counts.
+const MAP_FORMATS: [&str; 11] =
+    ["png", "geojson", "ply", "labels.csv", "csv", "coco.json", "taglab.json", "json", "utm.tif", "wgs84.tif", "tif"];
 const IMAGE_TIMEOUT: Duration = Duration::from_secs(600);
 
 /// Writes the map of a vehicle in the format of the extension, with `labels` labels or all of them.
@@ -31,6 +34,10 @@ pub async fn save_map(session: &Session, out: &Path, labels: Option<u8>) -> Resu
             (file("pgw"), out.with_extension("pgw")),
             (file("png.aux.xml"), out.with_extension("png.aux.xml")),
         ],
+        "tif" | "utm.tif" | "wgs84.tif" => {
+            let classes = out.with_file_name(format!("{name}.aux.xml"));
+            vec![(file(format), out.to_owned()), (file(&format!("{format}.aux.xml")), classes)]
+        }
         _ => vec![(file(format), out.to_owned())],
     };
     for ((_, path), bytes) in files.iter().zip(of_one_version(session, &files).await?) {
@@ -58,15 +65,16 @@ async fn of_one_version(session: &Session, files: &[(String, PathBuf)]) -> Resul
     Err(UserError::Failed(format!("the map changed {MAX_TRIES} times during the download; try again")))
 }
 
-/// Writes an image of a label. Requests it from the vehicle if `action` is given or the surface has no image.
+/// Writes an image of a label, which is given by number or by name. Requests it from the vehicle if `action` is given or the surface has no image.
 pub async fn save_exemplar(
     session: &Session,
-    label: u8,
+    label: &str,
     out: &Path,
     action: Option<ExemplarAction>,
 ) -> Result<(), UserError> {
     let state = session.state().await?;
-    let vehicle = session.choose(&state)?.id;
+    let vehicle = session.choose(&state)?;
+    let (vehicle, label) = (vehicle.id, names::label(&vehicle.label_book, label)?);
     let latest = find(&state, vehicle, label).and_then(|e| e.images.last()).map(|i| i.at_s);
     if action.is_some() || latest.is_none() {
         let accepted = request(session, vehicle, label, action.unwrap_or_default()).await?;
@@ -80,9 +88,11 @@ pub async fn save_exemplar(
 }
 
 /// Cancels the request for an image of a label.
-pub async fn cancel_exemplar(session: &Session, label: u8) -> Result<(), UserError> {
+pub async fn cancel_exemplar(session: &Session, label: &str) -> Result<(), UserError> {
     let state = session.state().await?;
-    let accepted = request(session, session.choose(&state)?.id, label, ExemplarAction::Cancel).await?;
+    let vehicle = session.choose(&state)?;
+    let label = names::label(&vehicle.label_book, label)?;
+    let accepted = request(session, vehicle.id, label, ExemplarAction::Cancel).await?;
     follow(session, accepted).await
 }
 

@@ -4,6 +4,7 @@ mod changes;
 mod constraints;
 mod download;
 mod http;
+mod names;
 mod orders;
 mod session;
 mod settings;

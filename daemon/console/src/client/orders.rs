@@ -1,6 +1,7 @@
 //! Weights, budget, weighted areas, the destination, and who has command.
 
 use super::constraints::{OrderView, degrees, send, slot};
+use super::names;
 use super::session::{Session, follow};
 use super::text::{self, span};
 use crate::orders::{BudgetOrder, CommandOrder, SharesOrder, UtilityOrder};
@@ -35,20 +36,31 @@ pub async fn show_utility(session: &Session) -> Result<(), UserError> {
         curiosity: vehicle.orders.utility.curiosity,
     };
     session.print(&order, || {
-        let weights = order.weights.iter().map(|(label, w)| format!("label {label}: {w:.2}\n"));
+        let weighted = vehicle.labels.iter().filter(|l| l.weight != 0.0);
+        let name = |name: &Option<String>| name.as_ref().map(|name| format!(" ({name})")).unwrap_or_default();
+        let weights = weighted.map(|l| format!("label {}{}: {:.2}\n", l.id, name(&l.name), l.weight));
         format!("{}unexplored cells: {:.2}\n", weights.collect::<String>(), order.exploration)
     })
 }
 
-/// Sends weights. Labels that are not listed keep their last weight if `keep`, else they get 0.
+/// Sends weights of labels, by number or by name; a name stands for its label and for those that are merged into it. Labels that are not
+/// listed keep their last weight if `keep`, else they get 0.
 pub async fn set_utility(
     session: &Session,
-    weights: BTreeMap<u8, f64>,
+    weights: &[(String, f64)],
     exploration: Option<f64>,
     keep: bool,
 ) -> Result<(), UserError> {
     let state = session.state().await?;
     let vehicle = session.choose(&state)?;
+    let mut given: BTreeMap<u8, f64> = BTreeMap::new();
+    for (text, weight) in weights {
+        for label in names::labels(&vehicle.label_book, text)? {
+            if given.insert(label, *weight).is_some_and(|other| other != *weight) {
+                return Err(UserError::Input(format!("{text}: label {label} has two weights")));
+            }
+        }
+    }
     let mut order = UtilityOrder { weights: BTreeMap::new(), exploration: exploration.unwrap_or(0.0), curiosity: 0.0 };
     if keep {
         let last = vehicle.labels.iter().filter(|l| l.weight != 0.0).map(|l| (l.id.to_string(), l.weight));
@@ -56,7 +68,7 @@ pub async fn set_utility(
         order.exploration = exploration.unwrap_or(vehicle.orders.utility.exploration);
         order.curiosity = vehicle.orders.utility.curiosity;
     }
-    order.weights.extend(weights.into_iter().map(|(label, w)| (label.to_string(), w)));
+    order.weights.extend(given.into_iter().map(|(label, w)| (label.to_string(), w)));
     let accepted = session.client.post(&format!("/api/v2/vehicles/{}/utility", vehicle.id), &order).await?;
     follow(session, accepted).await
 }

@@ -2,7 +2,7 @@
 //! refused them.
 
 use super::http::Client;
-use super::text;
+use super::{names, text};
 use crate::state::{AcceptedOrder, MissionState, OrderStatus, VehicleState};
 use scenecast_core::{UserError, printable};
 use serde::Serialize;
@@ -16,8 +16,8 @@ pub struct Session {
     pub client: Client,
     /// Whether to print JSON instead of text.
     pub json: bool,
-    /// The address of the vehicle; `None` selects the only one.
-    pub vehicle: Option<u8>,
+    /// Address or name of the vehicle; `None` selects the only one.
+    pub vehicle: Option<String>,
     /// Maximum wait for an order to be applied; `None` means the default of the command.
     pub wait: Option<Duration>,
 }
@@ -31,14 +31,17 @@ impl Session {
     pub(super) fn choose<'a>(&self, state: &'a MissionState) -> Result<&'a VehicleState, UserError> {
         let known: Vec<String> = state.vehicles.iter().map(|v| v.id.to_string()).collect();
         let known = known.join(", ");
-        match (self.vehicle, &state.vehicles[..]) {
-            (Some(id), all) => all.iter().find(|v| v.id == id).ok_or_else(|| {
-                UserError::Input(format!("--vehicle {id}: there is no such vehicle; the surface knows {known}"))
-            }),
+        match (&self.vehicle, &state.vehicles[..]) {
+            (Some(text), _) => names::vehicle(state, text),
             (None, [one]) => Ok(one),
             (None, []) => Err(UserError::Failed("the surface knows no vehicle yet".to_owned())),
             (None, _) => Err(UserError::Input(format!("select a vehicle with --vehicle: one of {known}"))),
         }
+    }
+
+    /// The address of the vehicle that the person has named; `None` for all.
+    pub(super) fn selected(&self, state: &MissionState) -> Result<Option<u8>, UserError> {
+        self.vehicle.as_ref().map(|text| Ok(names::vehicle(state, text)?.id)).transpose()
     }
 
     /// Prints a value as JSON, or a text.

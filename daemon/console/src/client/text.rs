@@ -1,5 +1,6 @@
 //! The state as text.
 
+use super::names::LabelGroup;
 use crate::state::{
     CommandChangeName, CommandChangeState, CommandState, ExemplarProgress, ExemplarStage, LinkSummary, MissionState,
     OrderProgress, OrderStatus, PrincipalRole, ReportedBacklog, ReportedDisk, ReportedMode, ReportedRegistration,
@@ -149,6 +150,7 @@ pub(super) fn labels(v: &VehicleState, now_s: f64) -> String {
     for l in &v.labels {
         let image = image(&l.exemplar, now_s);
         let name = l.name.as_ref().map(|name| format!(": {name}")).unwrap_or_default();
+        let name = l.merged_into.map_or(name.clone(), |into| format!("{name}, part of label {into}"));
         let _ = writeln!(
             out,
             "{:>5} {:>8} {:>10.2} {:>+9.2} {:>7.2}  {image}{name}",
@@ -156,6 +158,24 @@ pub(super) fn labels(v: &VehicleState, now_s: f64) -> String {
         );
     }
     let _ = writeln!(out, "weight of unexplored cells {:.2}", v.orders.utility.exploration);
+    out
+}
+
+/// Groups of labels as a table.
+pub(super) fn groups(groups: &[LabelGroup]) -> String {
+    let mut out = format!("{:>5} {:>8} {:>10}  labels\n", "label", "cells", "area m2");
+    for group in groups {
+        let members: Vec<String> = group.members.iter().map(u8::to_string).collect();
+        let name = group.name.as_ref().map(|name| format!(": {name}")).unwrap_or_default();
+        let _ = writeln!(
+            out,
+            "{:>5} {:>8} {:>10.2}  {}{name}",
+            group.label,
+            group.cells,
+            group.area_m2,
+            members.join(", ")
+        );
+    }
     out
 }
 

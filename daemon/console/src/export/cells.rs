@@ -1,6 +1,6 @@
 //! A map in shared tiles, its cells one by one, and its form in JSON.
 
-use crate::state::{LayerBody, MapBody, VehicleMarker};
+use crate::state::{LabelBook, LayerBody, MapBody, VehicleMarker};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use scenecast_protocol::map::{
@@ -29,8 +29,8 @@ pub struct MapCells {
     pub cell_m: f64,
     /// The shift from the map frame to the world frame, metres east and north.
     pub moved_m: (f64, f64),
-    /// The operator's names of labels.
-    pub names: BTreeMap<u8, String>,
+    /// What the operator says of the labels.
+    pub book: LabelBook,
     /// Which labels become one at coarser cuts, if that is known.
     pub tree: Option<LabelTree>,
     /// The markers that the operator has put on the map.
@@ -53,6 +53,11 @@ pub struct MapCaption {
 }
 
 impl MapCaption {
+    /// What it says, by key.
+    pub(super) fn facts(&self) -> [(&'static str, String); 3] {
+        [("vehicle", self.address.to_string()), ("vehicle_name", self.name.clone()), ("utc", self.utc.clone())]
+    }
+
     /// The same in words, on one line.
     pub(super) fn title(&self) -> String {
         let name = if self.name.is_empty() { String::new() } else { format!(" ({})", self.name) };
@@ -143,7 +148,7 @@ impl MapCells {
             bounds: grid.bounds(),
             cell_m,
             moved_m: (0.0, 0.0),
-            names: BTreeMap::new(),
+            book: LabelBook::default(),
             tree: None,
             markers: Vec::new(),
             caption: None,
@@ -157,9 +162,17 @@ impl MapCells {
     pub fn cut(mut self, count: usize) -> Self {
         if let Some(tree) = &self.tree {
             let group = |label: u8| tree.group_of(label, count);
+            self.book = self.book.grouped(group, &self.counts());
             self.tiles.values_mut().for_each(|tile| *tile = Arc::new(tile.relabelled(group)));
         }
         self
+    }
+
+    /// The number of cells of each label.
+    pub(super) fn counts(&self) -> BTreeMap<u8, u32> {
+        let mut counts = BTreeMap::new();
+        self.explored().for_each(|cell| *counts.entry(cell.label).or_default() += 1);
+        counts
     }
 
     /// The cells of a region, by default of the bounds. The error is one line for people.

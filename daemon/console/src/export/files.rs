@@ -1,5 +1,6 @@
 //! The file formats of a map: indexed PNG with world file and projection, GeoJSON, PLY, CSV.
 
+use super::annotations::{coco, tag_lab};
 use super::cells::{ExploredCell, MapCaption, MapCells};
 use super::geotiff::{Reference, geotiff};
 use super::projection::{TransverseMercator, well_known_text};
@@ -8,6 +9,7 @@ use crate::state::{Origin, VehicleMarker};
 use scenecast_core::label_picture;
 use scenecast_protocol::map::{Cell, LabelGrid, Quantity, Rect};
 use serde_json::{Value, json};
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::fmt::Write;
 
@@ -21,7 +23,9 @@ pub(super) fn indexed_png(cells: &MapCells) -> Result<Vec<u8>, String> {
         ));
     }
     let grid: LabelGrid = cells.explored().map(|c| (c.cell, c.label)).collect();
-    label_picture::encode(&grid).map_err(|e| e.to_string())
+    let bounds = grid.bounds().unwrap_or(Rect { x: 0, y: 0, width: 1, height: 1 });
+    let colour = |label| if label == 0 { [0; 3] } else { cells.book.colour(cells.book.shown_as(label)) };
+    label_picture::encode_coloured(&grid, bounds, colour, Some(0)).map_err(|e| e.to_string())
 }
 
 /// The six lines of a world file: the size of a pixel and the centre of the north-west pixel.
@@ -32,16 +36,31 @@ pub(super) fn world_file(cells: &MapCells) -> String {
     [cell, 0.0, 0.0, -cell, west + half, north - half].map(|v| format!("{v}\n")).concat()
 }
 
-/// The `.aux.xml` file in which GDAL and QGIS look for the projection of a PNG.
-pub(super) fn projection(cells: &MapCells, origin: Option<Origin>) -> String {
-    let text = well_known_text(origin).replace('"', "&quot;");
-    let facts = cells.caption.as_ref().map_or(String::new(), |MapCaption { address, name, utc }| {
-        let name = name.replace('&', "&amp;").replace('<', "&lt;");
-        let item = |key: &str, value: &str| format!("    <MDI key=\"{key}\">{value}</MDI>\n");
-        let items = [item("vehicle", &address.to_string()), item("vehicle_name", &name), item("utc", utc)].concat();
-        format!("  <Metadata>\n{items}  </Metadata>\n")
+/// The `.aux.xml` file in which GDAL and QGIS look for the projection of a PNG and the classes of pictures. A GeoTIFF has its projection
+/// itself.
+pub(super) fn companion(cells: &MapCells, projection: Option<String>) -> String {
+    let srs = projection
+        .map_or(String::new(), |text| format!("  <SRS dataAxisToSRSAxisMapping=\"1,2\">{}</SRS>\n", escaped(&text)));
+    let item = |(key, value): (&str, String)| format!("    <MDI key=\"{key}\">{}</MDI>\n", escaped(&value));
+    let facts = cells.caption.as_ref().map_or(String::new(), |caption| {
+        format!("  <Metadata>\n{}  </Metadata>\n", caption.facts().map(item).concat())
     });
-    format!("<PAMDataset>\n  <SRS dataAxisToSRSAxisMapping=\"1,2\">{text}</SRS>\n{facts}</PAMDataset>\n")
+    let highest = cells.counts().keys().max().copied().unwrap_or(0);
+    let class = |label: u8| match label {
+        0 => "unexplored".to_owned(),
+        label => cells.book.title(cells.book.shown_as(label)),
+    };
+    let classes: String =
+        (0..=highest).map(|label| format!("      <Category>{}</Category>\n", escaped(&class(label)))).collect();
+    format!(
+        "<PAMDataset>\n{srs}{facts}  <PAMRasterBand band=\"1\">\n    <NoDataValue>0</NoDataValue>\n    <CategoryNames>\n{classes}    \
+         </CategoryNames>\n  </PAMRasterBand>\n</PAMDataset>\n"
+    )
+}
+
+/// A text as XML has it.
+pub(super) fn escaped(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 
 /// Regions of equal label, and markers: WGS 84 if the mission has an origin, else metres east and north of it.
@@ -56,18 +75,25 @@ pub(super) fn geojson(cells: &MapCells, origin: Option<Origin>) -> String {
     let side_of = |(x, y): (f64, f64)| {
         projection.as_ref().map_or(0, |projection| ((projection.lon_lat(x, y).0 + 180.0) / 360.0).floor() as i64)
     };
-    let counts = counts(cells);
+    let counts = cells.counts();
     let feature = |(label, polygons): (u8, Vec<(i64, Polygon)>)| {
         let count = counts.get(&label).copied().unwrap_or(0);
         let rings = |(side, polygon): &(i64, Polygon)| {
             let corner = |&(column, row): &(i64, i64)| position(cells.corner_m(column, row), *side);
             polygon.iter().map(|r| r.iter().map(corner).collect()).collect::<Vec<Value>>()
         };
-        let (name, area_m2) = (cells.names.get(&label), f64::from(count) * cells.cell_m * cells.cell_m);
+        let class = cells.book.shown_as(label);
         json!({
             "type": "Feature",
             "id": label,
-            "properties": { "label": label, "name": name, "area_m2": area_m2 },
+            "properties": {
+                "label": label,
+                "name": cells.book.name(label),
+                "class": class,
+                "class_name": cells.book.title(class),
+                "colour": cells.book.colour_text(class),
+                "area_m2": f64::from(count) * cells.cell_m * cells.cell_m,
+            },
             "geometry": { "type": "MultiPolygon", "coordinates": polygons.iter().map(rings).collect::<Vec<_>>() },
         })
     };
@@ -93,9 +119,6 @@ pub(super) fn geojson(cells: &MapCells, origin: Option<Origin>) -> String {
         (facts["vehicle"], facts["vehicle_name"]) = (caption.address.into(), caption.name.as_str().into());
         facts["utc"] = caption.utc.as_str().into();
     }
-    if origin.is_none() {
-        facts["coordinates"] = json!("metres east and north of the mission's origin");
-    }
     let marker = |m: &VehicleMarker| {
         json!({
             "type": "Feature",
@@ -105,7 +128,13 @@ pub(super) fn geojson(cells: &MapCells, origin: Option<Origin>) -> String {
         })
     };
     let features: Vec<Value> = all.into_iter().map(feature).chain(cells.markers.iter().map(marker)).collect();
-    json!({ "type": "FeatureCollection", "scenecast": facts, "features": features }).to_string()
+    let mut file = json!({ "type": "FeatureCollection", "scenecast": facts, "features": features });
+    if origin.is_none() {
+        file["scenecast"]["coordinates"] = json!("metres east and north of the mission's origin");
+        // Without it, programs take the metres for degrees.
+        file["crs"] = json!({ "type": "name", "properties": { "name": well_known_text(None) } });
+    }
+    file.to_string()
 }
 
 /// Degrees to a tenth of a millimetre.
@@ -119,15 +148,18 @@ pub(super) fn ply(cells: &MapCells, origin: Option<Origin>) -> String {
     let from = origin.map_or(String::new(), |Origin { lat_deg, lon_deg }| {
         format!(" from latitude {lat_deg}, longitude {lon_deg} (WGS 84)")
     });
-    let count = cells.explored().count();
+    let counts = cells.counts();
+    let count: u32 = counts.values().sum();
+    let class = |label: u8| cells.book.title(cells.book.shown_as(label)).replace(char::is_control, " ");
+    let classes: String = counts.keys().map(|&label| format!("comment label {label}: {}\n", class(label))).collect();
     let mut out = format!(
-        "ply\nformat ascii 1.0\ncomment {title}, metres east, north, up{from}\nelement vertex {count}\n\
+        "ply\nformat ascii 1.0\ncomment {title}, metres east, north, up{from}\n{classes}element vertex {count}\n\
          property double x\nproperty double y\nproperty double z\nproperty uchar red\nproperty uchar green\n\
          property uchar blue\nproperty uchar label\nend_header\n"
     );
     let depth = cells.layers.iter().find(|l| l.descriptor.quantity == Quantity::Depth);
     for ExploredCell { cell, x, y, label, .. } in cells.explored() {
-        let [red, green, blue] = scenecast_core::palette::colour(label);
+        let [red, green, blue] = cells.book.colour(cells.book.shown_as(label));
         let up = depth.and_then(|layer| layer.value(cell)).map_or(0.0, |depth| -depth);
         let _ = writeln!(out, "{x:.3} {y:.3} {up:.3} {red} {green} {blue} {label}");
     }
@@ -135,16 +167,16 @@ pub(super) fn ply(cells: &MapCells, origin: Option<Origin>) -> String {
 }
 
 /// One line for each explored cell: the centre in metres, the label, its age in seconds, the value of each layer if known; the
-/// operator's name of the label; vehicle and time of the map; latitude and longitude (WGS 84) if the mission has an origin.
+/// operator's name of the label; the label that it is shown as, with its name and colour; vehicle and time of the map; latitude and
+/// longitude (WGS 84) if the mission has an origin.
 pub(super) fn csv(cells: &MapCells, origin: Option<Origin>) -> String {
     let mut out = String::from("east_m,north_m,label,age_s");
     cells.layers.iter().for_each(|layer| out.extend([",", &layer.descriptor.name]));
-    out.push_str(",name");
-    let caption = cells
-        .caption
-        .as_ref()
-        .map(|MapCaption { address, name, utc }| format!(",{address},{},{utc}", quoted(Some(name))));
-    out.push_str(if caption.is_some() { ",vehicle,vehicle_name,utc" } else { "" });
+    out.push_str(CLASS_COLUMNS);
+    let classes: BTreeMap<u8, String> =
+        cells.counts().into_keys().map(|label| (label, class_fields(cells, label))).collect();
+    let caption = caption_fields(cells);
+    out.push_str(if caption.is_some() { CAPTION_COLUMNS } else { "" });
     let projection = origin.map(TransverseMercator::about);
     out.push_str(if projection.is_some() { ",lat_deg,lon_deg" } else { "" });
     for ExploredCell { cell, x, y, label, age_s } in cells.explored() {
@@ -154,7 +186,7 @@ pub(super) fn csv(cells: &MapCells, origin: Option<Origin>) -> String {
             let value = layer.value(cell).map_or(String::new(), |value| format!("{value:.3}"));
             let _ = write!(out, ",{value}");
         }
-        let _ = write!(out, ",{}{}", quoted(cells.names.get(&label)), caption.as_deref().unwrap_or_default());
+        out.extend([classes.get(&label).map_or("", String::as_str), caption.as_deref().unwrap_or_default()]);
         if let Some(projection) = &projection {
             let (lon, lat) = projection.lon_lat(x, y);
             let _ = write!(out, ",{},{}", tidy(lat), tidy((lon + 180.0).rem_euclid(360.0) - 180.0));
@@ -164,26 +196,42 @@ pub(super) fn csv(cells: &MapCells, origin: Option<Origin>) -> String {
     out
 }
 
-/// A name as a field of a table; empty without one.
-fn quoted(name: Option<&String>) -> String {
-    name.map_or(String::new(), |name| format!("\"{}\"", name.replace('"', "\"\"")))
+const CLASS_COLUMNS: &str = ",name,class,class_name,colour";
+const CAPTION_COLUMNS: &str = ",vehicle,vehicle_name,utc";
+
+/// What the operator says of a label, as fields of a table.
+fn class_fields(cells: &MapCells, label: u8) -> String {
+    let (book, class) = (&cells.book, cells.book.shown_as(label));
+    format!(",{},{class},{},{}", quoted(book.name(label)), quoted(Some(&book.title(class))), book.colour_text(class))
 }
 
-/// The number of cells of each label.
-fn counts(cells: &MapCells) -> BTreeMap<u8, u32> {
-    let mut counts = BTreeMap::new();
-    cells.explored().for_each(|c| *counts.entry(c.label).or_default() += 1);
-    counts
+/// Vehicle and time of a map, as fields of a table.
+fn caption_fields(cells: &MapCells) -> Option<String> {
+    let MapCaption { address, name, utc } = cells.caption.as_ref()?;
+    Some(format!(",{address},{},{utc}", quoted(Some(name))))
 }
 
-/// A line for each label of the map: its name, cells and area, and at each cut of the tree the label that stands for it.
+/// A text as a field of a table; empty without one.
+fn quoted(text: Option<&str>) -> String {
+    text.map_or(String::new(), |text| format!("\"{}\"", harmless(text).replace('"', "\"\"")))
+}
+
+/// A text that no spreadsheet takes for a formula.
+pub(crate) fn harmless(text: &str) -> Cow<'_, str> {
+    if text.starts_with(['=', '+', '-', '@', '\t', '\r']) { format!("'{text}").into() } else { text.into() }
+}
+
+/// A line for each label of the map: what the operator says of it, its cells and area, whose map it is, and at each cut of the tree the
+/// label that stands for it.
 pub(super) fn labels(cells: &MapCells) -> String {
     let cuts = || (2..=cells.tree.as_ref().map_or(0, |tree| tree.merges().len())).rev();
-    let mut out = String::from("label,name,cells,area_m2");
+    let caption = caption_fields(cells);
+    let mut out = format!("label{CLASS_COLUMNS},cells,area_m2");
+    out.push_str(if caption.is_some() { CAPTION_COLUMNS } else { "" });
     cuts().for_each(|count| _ = write!(out, ",of_{count}"));
-    for (label, count) in counts(cells) {
-        let name = quoted(cells.names.get(&label));
-        let _ = write!(out, "\n{label},{name},{count},{:.3}", f64::from(count) * cells.cell_m * cells.cell_m);
+    for (label, count) in cells.counts() {
+        let (class, area_m2) = (class_fields(cells, label), f64::from(count) * cells.cell_m * cells.cell_m);
+        let _ = write!(out, "\n{label}{class},{count},{area_m2:.3}{}", caption.as_deref().unwrap_or_default());
         let groups = cells.tree.iter().flat_map(|tree| cuts().map(|count| tree.group_of(label, count)));
         groups.for_each(|group| _ = write!(out, ",{group}"));
     }
@@ -206,18 +254,26 @@ pub enum MapFormat {
     Ply,
     /// A line for each explored cell.
     Csv,
-    /// A line for each label: name, area, and the label that stands for it at each cut of the tree.
+    /// A line for each label: name, class, colour, area, and the label that stands for it at each cut of the tree.
     Labels,
+    /// The classes as annotations of that PNG, as COCO has them.
+    Coco,
+    /// The classes as a dictionary of labels for TagLab.
+    TagLab,
     /// A GeoTIFF in the projection of the mission, a pixel a cell.
     Tiff,
     /// A GeoTIFF in the zone of UTM.
     UtmTiff,
     /// A GeoTIFF in longitude and latitude.
     Wgs84Tiff,
+    /// The classes of the GeoTIFFs, in the file beside each in which GDAL and QGIS look for them.
+    TiffClasses,
+    UtmTiffClasses,
+    Wgs84TiffClasses,
 }
 
 impl MapFormat {
-    pub const ALL: [Self; 10] = [
+    pub const ALL: [Self; 15] = [
         Self::Png,
         Self::WorldFile,
         Self::Projection,
@@ -225,9 +281,14 @@ impl MapFormat {
         Self::Ply,
         Self::Csv,
         Self::Labels,
+        Self::Coco,
+        Self::TagLab,
         Self::Tiff,
         Self::UtmTiff,
         Self::Wgs84Tiff,
+        Self::TiffClasses,
+        Self::UtmTiffClasses,
+        Self::Wgs84TiffClasses,
     ];
 
     /// The end of the name of a file in this format.
@@ -240,9 +301,14 @@ impl MapFormat {
             Self::Ply => "ply",
             Self::Csv => "csv",
             Self::Labels => "labels.csv",
+            Self::Coco => "coco.json",
+            Self::TagLab => "taglab.json",
             Self::Tiff => "tif",
             Self::UtmTiff => "utm.tif",
             Self::Wgs84Tiff => "wgs84.tif",
+            Self::TiffClasses => "tif.aux.xml",
+            Self::UtmTiffClasses => "utm.tif.aux.xml",
+            Self::Wgs84TiffClasses => "wgs84.tif.aux.xml",
         }
     }
 
@@ -250,7 +316,8 @@ impl MapFormat {
         match self {
             Self::Png => "image/png",
             Self::WorldFile => "text/plain",
-            Self::Projection => "application/xml",
+            Self::Projection | Self::TiffClasses | Self::UtmTiffClasses | Self::Wgs84TiffClasses => "application/xml",
+            Self::Coco | Self::TagLab => "application/json",
             Self::GeoJson => "application/geo+json",
             Self::Ply => "application/ply",
             Self::Csv | Self::Labels => "text/csv",
@@ -269,7 +336,12 @@ impl MapCells {
         match format {
             MapFormat::Png => indexed_png(self),
             MapFormat::WorldFile => Ok(world_file(self).into()),
-            MapFormat::Projection => Ok(projection(self, origin).into()),
+            MapFormat::Projection => Ok(companion(self, Some(well_known_text(origin))).into()),
+            MapFormat::TiffClasses | MapFormat::UtmTiffClasses | MapFormat::Wgs84TiffClasses => {
+                Ok(companion(self, None).into())
+            }
+            MapFormat::Coco => coco(self),
+            MapFormat::TagLab => Ok(tag_lab(self).into()),
             MapFormat::GeoJson => Ok(geojson(self, origin).into()),
             MapFormat::Ply => Ok(ply(self, origin).into()),
             MapFormat::Csv => Ok(csv(self, origin).into()),

@@ -4,15 +4,14 @@
 //! that the size of the file grows with the cells and not with their extent.
 
 use super::cells::{MapCaption, MapCells};
+use super::files::escaped;
 use super::projection::TransverseMercator;
 use crate::state::Origin;
 use flate2::Compression;
 use flate2::write::ZlibEncoder;
 use scenecast_protocol::map::{Cell, REPLICA_TILE, Rect};
 use std::collections::BTreeSet;
-use std::io::{Cursor, Write};
-use tiff::encoder::TiffEncoder;
-use tiff::tags::Tag;
+use std::io::Write;
 
 /// Edge of a tile of the file in pixels.
 const TILE: u32 = 256;
@@ -92,7 +91,7 @@ pub(super) fn geotiff(cells: &MapCells, origin: Option<Origin>, reference: Refer
     let tiles = touched_tiles(cells, &raster, &places);
     let pixels = |&tile: &(u32, u32)| tile_pixels(cells, &raster, &places, tile);
     let tiles = tiles.iter().map(|tile| (*tile, pixels(tile)));
-    write(&raster, &keys, cells.caption.as_ref(), tiles).map_err(|e| e.to_string())
+    write(cells, &raster, &keys, tiles)
 }
 
 fn raster(cells: &MapCells, origin: Option<Origin>, reference: Reference, places: &Places) -> Result<Raster, String> {
@@ -209,6 +208,8 @@ fn label(cells: &MapCells, x: f64, y: f64) -> Option<u8> {
 struct GeoKeys {
     shorts: Vec<(u16, u16)>,
     doubles: Vec<(u16, f64)>,
+    /// The name of the projection, in ASCII; empty for one with a number.
+    citation: String,
 }
 
 const MODEL_TYPE: u16 = 1024;
@@ -216,6 +217,7 @@ const RASTER_TYPE: u16 = 1025;
 const GEODETIC_CRS: u16 = 2048;
 const ANGULAR_UNITS: u16 = 2054;
 const PROJECTED_CRS: u16 = 3072;
+const PROJECTED_CITATION: u16 = 3073;
 const PROJECTION: u16 = 3074;
 const PROJECTION_METHOD: u16 = 3075;
 const LINEAR_UNITS: u16 = 3076;
@@ -231,12 +233,12 @@ const DEGREE: u16 = 9102;
 
 fn utm_keys(epsg: u16) -> GeoKeys {
     let shorts = vec![(MODEL_TYPE, 1), (RASTER_TYPE, 1), (PROJECTED_CRS, epsg), (LINEAR_UNITS, METRE)];
-    GeoKeys { shorts, doubles: Vec::new() }
+    GeoKeys { shorts, ..GeoKeys::default() }
 }
 
 fn wgs84_keys() -> GeoKeys {
     let shorts = vec![(MODEL_TYPE, 2), (RASTER_TYPE, 1), (GEODETIC_CRS, WGS_84), (ANGULAR_UNITS, DEGREE)];
-    GeoKeys { shorts, doubles: Vec::new() }
+    GeoKeys { shorts, ..GeoKeys::default() }
 }
 
 fn mission_keys(origin: Origin) -> GeoKeys {
@@ -248,79 +250,196 @@ fn mission_keys(origin: Origin) -> GeoKeys {
     shorts.extend(method);
     let mut doubles = place.to_vec();
     doubles.push((ORIGIN_SCALE, 1.0));
-    GeoKeys { shorts, doubles }
+    let citation = format!("metres east and north of {} {}|", origin.lat_deg, origin.lon_deg);
+    GeoKeys { shorts, doubles, citation }
 }
 
 impl GeoKeys {
     /// The directory of keys, each with its tag (0 = the value itself), count and value or index.
     fn directory(&self) -> Vec<u16> {
-        let mut directory = vec![1, 1, 0, (self.shorts.len() + self.doubles.len()) as u16];
-        directory.extend(self.shorts.iter().flat_map(|&(key, value)| [key, 0, 1, value]));
-        let tag = Tag::GeoDoubleParamsTag.to_u16();
-        directory.extend(self.doubles.iter().zip(0u16..).flat_map(|(&(key, _), at)| [key, tag, 1, at]));
-        directory
+        let shorts = self.shorts.iter().map(|&(key, value)| [key, 0, 1, value]);
+        let doubles = self.doubles.iter().zip(0u16..).map(|(&(key, _), at)| [key, GEO_DOUBLES, 1, at]);
+        let citation = Some([PROJECTED_CITATION, GEO_TEXTS, self.citation.len() as u16, 0]);
+        let citation = citation.filter(|_| !self.citation.is_empty());
+        let mut keys: Vec<[u16; 4]> = shorts.chain(doubles).chain(citation).collect();
+        keys.sort_unstable();
+        [[1, 1, 0, keys.len() as u16]].into_iter().chain(keys).flatten().collect()
     }
 }
 
+/// A file under way: its directory comes first, as readers by network want it (cloud-optimised GeoTIFF), and tiles after it.
+#[derive(Default)]
+struct Directory {
+    /// Tag, type, count and bytes of each field, by rising tag.
+    fields: Vec<(u16, u16, u32, Vec<u8>)>,
+}
+
+/// Types of fields.
+const ASCII: u16 = 2;
+const SHORT: u16 = 3;
+const LONG: u16 = 4;
+const DOUBLE: u16 = 12;
+
+impl Directory {
+    fn shorts(&mut self, tag: u16, values: &[u16]) {
+        self.add(tag, SHORT, values.len(), values.iter().flat_map(|value| value.to_le_bytes()).collect());
+    }
+
+    fn longs(&mut self, tag: u16, values: &[u32]) {
+        self.add(tag, LONG, values.len(), values.iter().flat_map(|value| value.to_le_bytes()).collect());
+    }
+
+    fn doubles(&mut self, tag: u16, values: &[f64]) {
+        self.add(tag, DOUBLE, values.len(), values.iter().flat_map(|value| value.to_le_bytes()).collect());
+    }
+
+    fn text(&mut self, tag: u16, text: &str) {
+        let bytes = [text.as_bytes(), &[0]].concat();
+        self.add(tag, ASCII, bytes.len(), bytes);
+    }
+
+    fn add(&mut self, tag: u16, kind: u16, count: usize, bytes: Vec<u8>) {
+        self.fields.push((tag, kind, count as u32, bytes));
+    }
+
+    /// Bytes of header, directory and the values beyond it.
+    fn length(&self) -> usize {
+        let beyond =
+            self.fields.iter().map(|(.., bytes)| if bytes.len() > 4 { bytes.len().next_multiple_of(2) } else { 0 });
+        HEADER_BYTES + 2 + 12 * self.fields.len() + 4 + beyond.sum::<usize>()
+    }
+
+    fn bytes(&self) -> Vec<u8> {
+        let mut file = b"II*\0".to_vec();
+        file.extend((HEADER_BYTES as u32).to_le_bytes());
+        file.extend((self.fields.len() as u16).to_le_bytes());
+        let mut beyond: Vec<u8> = Vec::new();
+        let from = HEADER_BYTES + 2 + 12 * self.fields.len() + 4;
+        for (tag, kind, count, bytes) in &self.fields {
+            file.extend(tag.to_le_bytes());
+            file.extend(kind.to_le_bytes());
+            file.extend(count.to_le_bytes());
+            if bytes.len() > 4 {
+                file.extend(((from + beyond.len()) as u32).to_le_bytes());
+                beyond.extend(bytes);
+                beyond.resize(beyond.len().next_multiple_of(2), 0);
+            } else {
+                file.extend(bytes.iter().copied().chain(std::iter::repeat(0)).take(4));
+            }
+        }
+        file.extend([0; 4]);
+        file.extend(beyond);
+        file
+    }
+}
+
+const HEADER_BYTES: usize = 8;
+
 fn write(
+    cells: &MapCells,
     raster: &Raster,
     keys: &GeoKeys,
-    caption: Option<&MapCaption>,
     tiles: impl Iterator<Item = ((u32, u32), Vec<u8>)>,
-) -> Result<Vec<u8>, tiff::TiffError> {
-    let (columns, rows) = (raster.width.div_ceil(TILE), raster.height.div_ceil(TILE));
-    let mut file = Cursor::new(Vec::new());
-    let mut encoder = TiffEncoder::new(&mut file)?;
-    let mut directory = encoder.image_directory()?;
-    let empty = deflate(&[0; (TILE * TILE) as usize])?;
-    let empty = (directory.write_data(&empty[..])? as u32, empty.len() as u32);
-    let mut offsets = vec![empty.0; (columns * rows) as usize];
-    let mut counts = vec![empty.1; (columns * rows) as usize];
+) -> Result<Vec<u8>, String> {
+    let columns = raster.width.div_ceil(TILE);
+    let count = (columns * raster.height.div_ceil(TILE)) as usize;
+    let packed = |pixels: &[u8]| deflate(pixels).map_err(|e| e.to_string());
+    // Tiles without an explored cell share the first one.
+    let mut data = packed(&[0; (TILE * TILE) as usize])?;
+    let mut places = vec![(0, data.len()); count];
     for ((row, column), pixels) in tiles {
         if pixels.iter().all(|&label| label == 0) {
             continue;
         }
-        let packed = deflate(&pixels)?;
-        let at = (row * columns + column) as usize;
-        if let (Some(offset), Some(count)) = (offsets.get_mut(at), counts.get_mut(at)) {
-            (*offset, *count) = (directory.write_data(&packed[..])? as u32, packed.len() as u32);
+        let tile = packed(&pixels)?;
+        if let Some(place) = places.get_mut((row * columns + column) as usize) {
+            *place = (data.len(), tile.len());
+            data.extend(tile);
         }
     }
-    directory.write_tag(Tag::ImageWidth, raster.width)?;
-    directory.write_tag(Tag::ImageLength, raster.height)?;
-    directory.write_tag(Tag::BitsPerSample, 8u16)?;
-    directory.write_tag(Tag::SamplesPerPixel, 1u16)?;
-    directory.write_tag(Tag::Compression, 8u16)?; // Adobe deflate
-    directory.write_tag(Tag::PhotometricInterpretation, 3u16)?; // palette
-    if let Some(caption) = caption {
+    let from = directory(cells, raster, keys, &vec![0; count], &vec![0; count]).length();
+    let too_long = "the map is too large for a GeoTIFF of 4 GB";
+    let offset = |&(at, _): &(usize, usize)| u32::try_from(from + at).map_err(|_| too_long.to_owned());
+    let offsets = places.iter().map(offset).collect::<Result<Vec<u32>, String>>()?;
+    let lengths: Vec<u32> = places.iter().map(|&(_, length)| length as u32).collect();
+    let mut file = directory(cells, raster, keys, &offsets, &lengths).bytes();
+    file.extend(data);
+    Ok(file)
+}
+
+/// The fields of a file, whose length does not depend on where the tiles are.
+fn directory(cells: &MapCells, raster: &Raster, keys: &GeoKeys, offsets: &[u32], lengths: &[u32]) -> Directory {
+    let mut directory = Directory::default();
+    directory.longs(IMAGE_WIDTH, &[raster.width]);
+    directory.longs(IMAGE_LENGTH, &[raster.height]);
+    directory.shorts(BITS_PER_SAMPLE, &[8]);
+    directory.shorts(COMPRESSION, &[ADOBE_DEFLATE]);
+    directory.shorts(PHOTOMETRIC, &[PALETTE]);
+    if let Some(caption) = &cells.caption {
         // The field has ASCII.
         let title = caption.title().replace(|c: char| !c.is_ascii(), "?");
-        let text = format!("{title}, pixel value = label");
-        directory.write_tag(Tag::ImageDescription, text.as_str())?;
+        directory.text(IMAGE_DESCRIPTION, &format!("{title}, pixel value = label"));
     }
-    directory.write_tag(Tag::PlanarConfiguration, 1u16)?;
-    directory.write_tag(Tag::ColorMap, &colour_map()[..])?;
-    directory.write_tag(Tag::TileWidth, TILE)?;
-    directory.write_tag(Tag::TileLength, TILE)?;
-    directory.write_tag(Tag::TileOffsets, &offsets[..])?;
-    directory.write_tag(Tag::TileByteCounts, &counts[..])?;
-    directory.write_tag(Tag::GdalNodata, "0")?;
-    directory.write_tag(Tag::ModelPixelScaleTag, &[raster.pixel.0, raster.pixel.1, 0.0][..])?;
-    directory.write_tag(Tag::ModelTiepointTag, &[0.0, 0.0, 0.0, raster.west, raster.north, 0.0][..])?;
+    directory.shorts(SAMPLES_PER_PIXEL, &[1]);
+    directory.shorts(PLANAR_CONFIGURATION, &[1]);
+    directory.shorts(COLOUR_MAP, &colour_map(cells));
+    directory.longs(TILE_WIDTH, &[TILE]);
+    directory.longs(TILE_LENGTH, &[TILE]);
+    directory.longs(TILE_OFFSETS, offsets);
+    directory.longs(TILE_BYTE_COUNTS, lengths);
+    directory.doubles(PIXEL_SCALE, &[raster.pixel.0, raster.pixel.1, 0.0]);
+    directory.doubles(TIE_POINT, &[0.0, 0.0, 0.0, raster.west, raster.north, 0.0]);
     if !keys.shorts.is_empty() {
-        directory.write_tag(Tag::GeoKeyDirectoryTag, &keys.directory()[..])?;
+        directory.shorts(GEO_KEYS, &keys.directory());
     }
     if !keys.doubles.is_empty() {
-        let doubles: Vec<f64> = keys.doubles.iter().map(|(_, value)| *value).collect();
-        directory.write_tag(Tag::GeoDoubleParamsTag, &doubles[..])?;
+        directory.doubles(GEO_DOUBLES, &keys.doubles.iter().map(|(_, value)| *value).collect::<Vec<f64>>());
     }
-    directory.finish()?;
-    Ok(file.into_inner())
+    if !keys.citation.is_empty() {
+        directory.text(GEO_TEXTS, &keys.citation);
+    }
+    directory.text(GDAL_METADATA, &metadata(cells));
+    directory.text(GDAL_NODATA, "0");
+    directory
+}
+
+const IMAGE_WIDTH: u16 = 256;
+const IMAGE_LENGTH: u16 = 257;
+const BITS_PER_SAMPLE: u16 = 258;
+const COMPRESSION: u16 = 259;
+const ADOBE_DEFLATE: u16 = 8;
+const PHOTOMETRIC: u16 = 262;
+const PALETTE: u16 = 3;
+const IMAGE_DESCRIPTION: u16 = 270;
+const SAMPLES_PER_PIXEL: u16 = 277;
+const PLANAR_CONFIGURATION: u16 = 284;
+const COLOUR_MAP: u16 = 320;
+const TILE_WIDTH: u16 = 322;
+const TILE_LENGTH: u16 = 323;
+const TILE_OFFSETS: u16 = 324;
+const TILE_BYTE_COUNTS: u16 = 325;
+const PIXEL_SCALE: u16 = 33_550;
+const TIE_POINT: u16 = 33_922;
+const GEO_KEYS: u16 = 34_735;
+const GEO_DOUBLES: u16 = 34_736;
+const GEO_TEXTS: u16 = 34_737;
+const GDAL_METADATA: u16 = 42_112;
+const GDAL_NODATA: u16 = 42_113;
+
+/// Vehicle, time and the name of each label, which GDAL shows as the metadata of the file.
+fn metadata(cells: &MapCells) -> String {
+    // GDAL escapes these texts twice.
+    let item = |key: &str, value: &str| format!("<Item name=\"{key}\">{}</Item>", escaped(&escaped(value)));
+    let facts = cells.caption.iter().flat_map(MapCaption::facts).map(|(key, value)| item(key, &value));
+    let class = |label: u8| item(&format!("label_{label}"), &cells.book.title(cells.book.shown_as(label)));
+    let classes = cells.counts().into_keys().map(class);
+    format!("<GDALMetadata>{}</GDALMetadata>", facts.chain(classes).collect::<String>())
 }
 
 /// The colours of the labels: all reds, then all greens, then all blues, in 16 bits each.
-fn colour_map() -> Vec<u16> {
-    let colours: Vec<[u8; 3]> = (0..=u8::MAX).map(scenecast_core::palette::colour).collect();
+fn colour_map(cells: &MapCells) -> Vec<u16> {
+    let colour = |label: u8| if label == 0 { [0; 3] } else { cells.book.colour(cells.book.shown_as(label)) };
+    let colours: Vec<[u8; 3]> = (0..=u8::MAX).map(colour).collect();
     (0..3).flat_map(|channel| colours.iter().map(move |colour| u16::from(colour[channel]) * 257)).collect()
 }
 

@@ -1,5 +1,6 @@
 //! The map as georeferenced files for other programs.
 
+mod annotations;
 mod cells;
 mod files;
 mod geotiff;
@@ -9,3 +10,4 @@ mod regions;
 pub(crate) use cells::Tiles;
 pub use cells::{CellLayer, MapCaption, MapCells};
 pub use files::MapFormat;
+pub(crate) use files::harmless;

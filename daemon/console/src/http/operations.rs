@@ -215,7 +215,7 @@ fn map_files() -> Vec<Operation> {
         map_file!(
             "/api/v2/vehicles/{id}/map.png.aux.xml",
             "map_projection",
-            "The projection of that PNG, in the file that GDAL and QGIS read",
+            "The projection and the classes of that PNG, in the file that GDAL and QGIS read",
             MapFormat::Projection
         ),
         map_file!(
@@ -234,8 +234,38 @@ fn map_files() -> Vec<Operation> {
         map_file!(
             "/api/v2/vehicles/{id}/map.labels.csv",
             "map_labels",
-            "One line for each label: name, cells, area, and the label that stands for it at each cut of the tree",
+            "One line for each label: name, class, colour, cells, area, and the label that stands for it at each cut of the tree",
             MapFormat::Labels
+        ),
+        map_file!(
+            "/api/v2/vehicles/{id}/map.coco.json",
+            "map_coco",
+            "The classes as annotations of map.png in the format of COCO",
+            MapFormat::Coco
+        ),
+        map_file!(
+            "/api/v2/vehicles/{id}/map.taglab.json",
+            "map_tag_lab",
+            "The classes as a dictionary of labels for TagLab, which reads map.png as a label image by their colours",
+            MapFormat::TagLab
+        ),
+        map_file!(
+            "/api/v2/vehicles/{id}/map.tif.aux.xml",
+            "map_tiff_classes",
+            "The names of the classes, in the file beside map.tif in which GDAL and QGIS look for them",
+            MapFormat::TiffClasses
+        ),
+        map_file!(
+            "/api/v2/vehicles/{id}/map.utm.tif.aux.xml",
+            "map_utm_classes",
+            "The same beside map.utm.tif",
+            MapFormat::UtmTiffClasses
+        ),
+        map_file!(
+            "/api/v2/vehicles/{id}/map.wgs84.tif.aux.xml",
+            "map_wgs84_classes",
+            "The same beside map.wgs84.tif",
+            MapFormat::Wgs84TiffClasses
         ),
         map_file!(
             "/api/v2/vehicles/{id}/map.tif",

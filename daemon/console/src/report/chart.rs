@@ -1,7 +1,7 @@
 //! The figures of a report as SVG: the map with its track, and lines over time. They are readable in print.
 
 use super::Escaped;
-use super::dive::{DiveVehicle, TrackPoint, colour, shown_as};
+use super::dive::{DiveVehicle, TrackPoint};
 use crate::state::VehicleState;
 use scenecast_protocol::map::Rect;
 use std::fmt::Write;
@@ -85,7 +85,7 @@ fn cells(svg: &mut String, frame: &Frame, bounds: Rect, state: &VehicleState, ve
             if let Some(&label) = run.first().filter(|label| **label != 0) {
                 let west = (f64::from(bounds.x) + column as f64) * edge + shift.0;
                 let (x, y) = frame.place(west, north);
-                let path = runs.entry(shown_as(state, label)).or_default();
+                let path = runs.entry(state.label_book.shown_as(label)).or_default();
                 let (width, height) = (run.len() as f64 * edge * frame.px_m, edge * frame.px_m);
                 // Writing to a string cannot fail.
                 let _ = write!(path, "M{x:.2} {y:.2}h{width:.2}v{height:.2}h-{width:.2}z");
@@ -94,7 +94,11 @@ fn cells(svg: &mut String, frame: &Frame, bounds: Rect, state: &VehicleState, ve
         }
     }
     for (label, path) in runs {
-        let _ = writeln!(svg, "<path fill=\"{}\" shape-rendering=\"crispEdges\" d=\"{path}\"/>", colour(state, label));
+        let _ = writeln!(
+            svg,
+            "<path fill=\"{}\" shape-rendering=\"crispEdges\" d=\"{path}\"/>",
+            state.label_book.colour_text(label)
+        );
     }
 }
 

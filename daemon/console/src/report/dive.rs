@@ -1,7 +1,7 @@
 //! What a record says about a dive.
 
-use crate::state::{MapLabel, MissionState, VehicleState};
-use scenecast_core::{UserError, palette};
+use crate::state::{MissionState, VehicleState};
+use scenecast_core::UserError;
 use scenecast_files::{RecordedMessage, read_record};
 use scenecast_messages::contents::valid_part;
 use scenecast_messages::geometry_msgs::PoseWithCovarianceStamped;
@@ -168,7 +168,7 @@ impl DiveVehicle {
     pub(super) fn classes(&self, state: &VehicleState) -> Vec<(u8, u64)> {
         let mut counts: BTreeMap<u8, u64> = BTreeMap::new();
         for (_, label) in self.labels.iter() {
-            *counts.entry(shown_as(state, label)).or_default() += 1;
+            *counts.entry(state.label_book.shown_as(label)).or_default() += 1;
         }
         let mut classes: Vec<(u8, u64)> = counts.into_iter().collect();
         classes.sort_by_key(|&(label, cells)| (std::cmp::Reverse(cells), label));
@@ -187,29 +187,4 @@ impl TrackPoint {
             sigma_m: message.pose.covariance.first().map_or(f64::NAN, |variance| variance.sqrt()),
         }
     }
-}
-
-fn label(state: &VehicleState, number: u8) -> Option<&MapLabel> {
-    state.labels.iter().find(|label| label.id == number)
-}
-
-/// The label that a label is shown as a part of, by the operator's merging; itself without one.
-pub(super) fn shown_as(state: &VehicleState, number: u8) -> u8 {
-    label(state, number).and_then(|label| label.merged_into).unwrap_or(number)
-}
-
-/// The operator's name of a label, or its number.
-pub(super) fn name(state: &VehicleState, number: u8) -> String {
-    label(state, number).and_then(|label| label.name.clone()).unwrap_or_else(|| format!("label {number}"))
-}
-
-/// The colour of a label, as in `#a0b1c2`.
-pub(super) fn colour(state: &VehicleState, number: u8) -> String {
-    let own = label(state, number).and_then(|label| label.colour.clone());
-    let is_colour =
-        |text: &String| text.len() == 7 && text.starts_with('#') && text.bytes().skip(1).all(|b| b.is_ascii_hexdigit());
-    own.filter(is_colour).unwrap_or_else(|| {
-        let [red, green, blue] = palette::colour(number);
-        format!("#{red:02x}{green:02x}{blue:02x}")
-    })
 }

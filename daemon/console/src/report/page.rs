@@ -1,7 +1,7 @@
 //! The page of a report.
 
 use super::chart::{self, Series};
-use super::dive::{Dive, DiveVehicle, OrderStep, colour, name, shown_as};
+use super::dive::{Dive, DiveVehicle, OrderStep};
 use super::{Escaped, words};
 use crate::state::VehicleState;
 use base64::Engine;
@@ -134,7 +134,7 @@ impl Dive {
         let vehicles = self.vehicles().map(|(state, vehicle)| {
             let square = vehicle.cell_m * vehicle.cell_m;
             let classes = vehicle.classes(state).into_iter().map(|(label, cells)| {
-                json!({ "label": label, "name": name(state, label), "colour": colour(state, label), "cells": cells,
+                json!({ "label": label, "name": state.label_book.title(label), "colour": state.label_book.colour_text(label), "cells": cells,
                         "area_m2": cells as f64 * square })
             });
             let orders = vehicle.orders_of_people().map(|((slot, version), way)| {
@@ -177,8 +177,8 @@ fn classes(page: &mut String, state: &VehicleState, vehicle: &DiveVehicle) {
             page,
             "<tr><td><span class=\"swatch\" style=\"background:{}\"></span>{}</td><td class=\"n\">{cells}</td><td class=\"n\">{}</td>\
              <td class=\"n\">{:.1} %</td><td><div class=\"images\">{}</div></td></tr>",
-            colour(state, label),
-            Escaped(&name(state, label)),
+            state.label_book.colour_text(label),
+            Escaped(&state.label_book.title(label)),
             words::area(cells as f64 * square),
             cells as f64 / all as f64 * 100.0,
             images(state, vehicle, label)
@@ -189,7 +189,7 @@ fn classes(page: &mut String, state: &VehicleState, vehicle: &DiveVehicle) {
 
 /// The largest images of a class, each with its label and time.
 fn images(state: &VehicleState, vehicle: &DiveVehicle, class: u8) -> String {
-    let of_class = |label: u8| shown_as(state, label) == class;
+    let of_class = |label: u8| state.label_book.shown_as(label) == class;
     let mut found: Vec<_> = vehicle.exemplars.iter().filter(|(_, exemplar)| of_class(exemplar.label)).collect();
     found.sort_by_key(|(_, exemplar)| std::cmp::Reverse(exemplar.data.len()));
     let image = |(at_s, exemplar): &&(f64, scenecast_messages::scenecast_msgs::Exemplar)| {

@@ -1,6 +1,6 @@
 //! The summary of a dive in sentences.
 
-use super::dive::{Dive, DiveVehicle, OrderStep, name};
+use super::dive::{Dive, DiveVehicle, OrderStep};
 use crate::state::VehicleState;
 use scenecast_core::utc_text;
 use scenecast_messages::scenecast_msgs::OrderStatus;
@@ -100,7 +100,7 @@ fn found(state: &VehicleState, vehicle: &DiveVehicle) -> String {
         vehicle.cell_m,
         area(all as f64 * square),
         classes.len(),
-        name(state, largest),
+        state.label_book.title(largest),
         area(cells as f64 * square),
         cells as f64 / all as f64 * 100.0
     )

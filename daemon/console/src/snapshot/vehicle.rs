@@ -43,6 +43,7 @@ fn vehicle(
         closed_loops: track(record.registration.closures()),
         map: map(surface, address, record, &view, labels.values().sum(), facts),
         labels: labels.iter().map(|(&l, &n)| label(l, n, record, &view, address, facts)).collect(),
+        label_book: record.label_books().iter().map(|(&label, book)| (label, book.into())).collect(),
         label_tree: record.tree_in_view().map(MapLabelTree::of),
         link: link::channel(&view, now),
         usbl: record.found.as_ref().map(|(line, at)| UsblMeasurement {

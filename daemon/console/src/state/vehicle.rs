@@ -1,5 +1,6 @@
 //! A vehicle as the surface knows it.
 
+use super::label_book::LabelBook;
 use super::labels::{MapLabel, MapLabelTree};
 use super::link::VehicleChannel;
 use super::map::MapSummary;
@@ -41,6 +42,9 @@ pub struct VehicleState {
     pub map: MapSummary,
     /// The labels on the map.
     pub labels: Vec<MapLabel>,
+    /// What the operator says of labels, also of those that have no cells.
+    #[serde(default)]
+    pub label_book: LabelBook,
     /// Which of them become one at coarser cuts; null if the vehicle has not sent it.
     #[serde(default)]
     pub label_tree: Option<MapLabelTree>,

@@ -3,7 +3,7 @@
 use super::Desk;
 use crate::node::{Publisher, RosNode};
 use crate::transport::Qos;
-use scenecast_console::state::{MapLabel, VehicleState};
+use scenecast_console::state::VehicleState;
 use scenecast_console::{ClientRequest, MapCells, Reply, SurfaceRequest};
 use scenecast_core::{UserError, palette};
 use scenecast_messages::contents::{Grid, MAX_GRID_CELLS, cloud, layers, occupancy};
@@ -94,22 +94,15 @@ impl MapTopics {
 }
 
 fn key(vehicle: &VehicleState) -> MapKey {
-    let map = &vehicle.map;
+    let (map, book) = (&vehicle.map, &vehicle.label_book);
     let placement = map.placement.as_ref();
     MapKey {
         version: map.version,
         epoch: map.epoch,
         earlier_run: map.earlier.as_ref().map(|earlier| earlier.run),
         shift_m: placement.map_or((0.0, 0.0), |p| (p.east_m, p.north_m)),
-        colours: vehicle.labels.iter().map(|label| (label.id, colour(label, &vehicle.labels))).collect(),
+        colours: vehicle.labels.iter().map(|label| (label.id, book.colour(book.shown_as(label.id)))).collect(),
     }
-}
-
-/// The colour of a label on the page: the operator's, that of the label that it is a part of, or that of the palette.
-fn colour(label: &MapLabel, all: &[MapLabel]) -> [u8; 3] {
-    let whole = label.merged_into.and_then(|into| all.iter().find(|l| l.id == into)).unwrap_or(label);
-    let typed = whole.colour.as_deref().and_then(|text| u32::from_str_radix(text.strip_prefix('#')?, 16).ok());
-    typed.map_or(palette::colour(whole.id), |rgb| [(rgb >> 16) as u8, (rgb >> 8) as u8, rgb as u8])
 }
 
 fn grid(cells: &MapCells, shift_m: (f64, f64)) -> Option<Grid> {

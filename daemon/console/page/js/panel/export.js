@@ -11,19 +11,24 @@ import { ageOf, store } from "../store.js";
 const FILES = [
   ["PNG", "one pixel a cell, pixel value = label", "png"],
   ["World file", "the place of the PNG, beside it", "pgw"],
-  ["Projection", "the projection of the PNG, beside it", "png.aux.xml"],
+  ["Projection", "projection and classes of the PNG, beside it", "png.aux.xml"],
   ["GeoTIFF", "one pixel a cell, of any extent, pixel value = label", "tif"],
   ["GeoTIFF, UTM", "the same in the UTM zone of the origin", "utm.tif"],
   ["GeoTIFF, WGS 84", "the same in longitude and latitude", "wgs84.tif"],
+  ["Classes", "the names of the classes, beside the GeoTIFF", "tif.aux.xml"],
+  ["Classes, UTM", "the same beside the GeoTIFF in UTM", "utm.tif.aux.xml"],
+  ["Classes, WGS 84", "the same beside the GeoTIFF in WGS 84", "wgs84.tif.aux.xml"],
   ["CSV", "one line a cell with label, age and layers", "csv"],
   ["Labels, CSV", "one line a label with name, area and its group at each cut of the tree", "labels.csv"],
-  ["GeoJSON", "regions of equal label", "geojson"],
+  ["GeoJSON", "regions of equal label, and markers", "geojson"],
+  ["COCO", "the classes as annotations of the PNG", "coco.json"],
+  ["TagLab", "the classes as labels; the PNG is the label image", "taglab.json"],
   ["PLY", "coloured points for 3-D tools", "ply"],
 ];
 
-const NEEDS_ORIGIN = ["utm.tif", "wgs84.tif"];
+const NEEDS_ORIGIN = ["utm.tif", "wgs84.tif", "utm.tif.aux.xml", "wgs84.tif.aux.xml"];
 /** A PNG has no empty tiles: the server makes none of more cells than this. */
-const PNG_FILES = ["png", "pgw", "png.aux.xml"];
+const PNG_FILES = ["png", "pgw", "png.aux.xml", "coco.json"];
 const MAX_PNG_CELLS = 2 ** 23;
 
 /** Whether the server can make a file of this map. */
@@ -52,6 +57,6 @@ function offer(vehicle) {
   return [
     h("p", {}, `Version ${vehicle.map.version} of ${vehicle.name}, changed ${ago(ageOf(vehicle.map.updated_s))}.${local}`),
     h("ul.files", {}, ...FILES.filter(([, , extension]) => isOffered(extension, store.snapshot, vehicle.map)).map(item)),
-    h("p.hint", {}, `Files have label numbers, without names, colours and merges${isGrouped ? `, with the ${shown} labels that the page shows` : ""}.`),
+    h("p.hint", {}, `Files keep the numbers of labels${isGrouped ? `, of the ${shown} that the page shows` : ""}, with names, colours and what each is merged into.`),
   ];
 }

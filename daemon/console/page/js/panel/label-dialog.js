@@ -29,7 +29,7 @@ export function editLabel(label) {
       h("button.link", { type: "button", onclick: () => (colour.value = tableColour(label.id)) }, "Use the standard colour"),
       h("label.field", {}, "Show as part of", into),
       merged.length > 0 ? h("p", {}, `Stands for ${merged.map((m) => `label ${m}`).join(", ")}. `, merged.some(isMerged) ? divide : null) : null,
-      h("p.hint", {}, "These choices stay at the surface. The vehicle and exported files continue to use label numbers. A merged label is sent with the weight of the label that it is part of."),
+      h("p.hint", {}, "These choices stay at the surface. The vehicle continues to use label numbers; exported files have both. A merged label is sent with the weight of the label that it is part of."),
       h("div.buttons", {},
         h("button", { type: "button", onclick: () => dialog.close() }, "Cancel"),
         h("button.primary", { type: "submit" }, "Save"))),

@@ -185,21 +185,22 @@ pub(in crate::http) async fn file(
         Err(response) => return response,
     };
     let at = cached.map.cells().at;
-    let (origin, placement, names, tree, markers, caption) = {
+    let (origin, placement, book, tree, markers, caption) = {
         let snapshot = shared.snapshots.borrow();
         let vehicle = snapshot.vehicle(id);
-        let labels = vehicle.iter().flat_map(|v| &v.labels);
-        let names: BTreeMap<u8, String> = labels.filter_map(|l| Some((l.id, l.name.clone()?))).collect();
+        let book = vehicle.map(|v| v.label_book.clone()).unwrap_or_default();
         let tree = vehicle.and_then(|v| v.label_tree.as_ref()).and_then(MapLabelTree::tree);
         let markers = vehicle.map(|v| v.markers.clone()).unwrap_or_default();
         let name = vehicle.map_or(String::new(), |v| v.name.clone());
         let caption = MapCaption { address: id, name, utc: MissionUtc::now(&snapshot.state).at(seconds(at)) };
         let placement = vehicle.and_then(|v| v.map.placement.clone());
-        (snapshot.state.mission.origin, placement, names, tree, markers, Some(caption))
+        (snapshot.state.mission.origin, placement, book, tree, markers, Some(caption))
     };
     let moves = placement.as_ref().map_or(0, |p| p.version);
     let mut named = DefaultHasher::new();
-    names.hash(&mut named);
+    book.hash(&mut named);
+    origin.map(|o| [o.lat_deg, o.lon_deg].map(f64::to_bits)).hash(&mut named);
+    caption.as_ref().map(|c: &MapCaption| &c.name).hash(&mut named);
     (count, tree.as_ref().map(LabelTree::to_bytes)).hash(&mut named);
     markers.iter().for_each(|m| (m.number, &m.text, m.at_s.to_bits()).hash(&mut named));
     let tag = format!("{id}-{}-{moves}-{:x}", cached.map.tag(), named.finish());
@@ -211,7 +212,7 @@ pub(in crate::http) async fn file(
     };
     let made = tokio::task::spawn_blocking(move || {
         let moved_m = placement.map_or((0.0, 0.0), |p| (p.east_m, p.north_m));
-        let cells = MapCells { moved_m, names, tree, markers, caption, ..cached.map.cells().clone() };
+        let cells = MapCells { moved_m, book, tree, markers, caption, ..cached.map.cells().clone() };
         cut_at(count, cells).export(format, origin)
     });
     match made.await {

@@ -1,5 +1,6 @@
 //! Readings: the state and its changes as server-sent events, exemplars, fitting settings, the log of the mission.
 
+use crate::export::harmless;
 use crate::http::access::{MAX_STREAMS, Seat};
 use crate::http::connections::EVENT_STREAM;
 use crate::http::response::{error, not_found, respond};
@@ -202,11 +203,6 @@ fn to_csv(entries: &[LogLine]) -> Result<Vec<u8>, csv::Error> {
         table.write_record([&number, &e.utc, &at_s, &vehicle, &e.kind, by, &harmless(&e.text)])?;
     }
     table.into_inner().map_err(|e| e.into_error().into())
-}
-
-/// A text that no spreadsheet takes for a formula.
-fn harmless(text: &str) -> String {
-    if text.starts_with(['=', '+', '-', '@']) { format!("'{text}") } else { text.to_owned() }
 }
 
 /// Moments of the mission in UTC, by the clock of this computer.

@@ -45,7 +45,7 @@ pub(super) fn operations() -> Vec<Operation> {
         archive_file!(
             "/api/v2/archive/{name}/map.png.aux.xml",
             "archived_map_projection",
-            "The projection of that PNG, in the file that GDAL and QGIS read",
+            "The projection and the classes of that PNG, in the file that GDAL and QGIS read",
             MapFormat::Projection
         ),
         archive_file!(
@@ -71,6 +71,36 @@ pub(super) fn operations() -> Vec<Operation> {
             "archived_map_labels",
             "One line for each label of an archived map, with the label that stands for it at each cut of the tree",
             MapFormat::Labels
+        ),
+        archive_file!(
+            "/api/v2/archive/{name}/map.coco.json",
+            "archived_map_coco",
+            "The classes of an archived map as annotations of its PNG in the format of COCO",
+            MapFormat::Coco
+        ),
+        archive_file!(
+            "/api/v2/archive/{name}/map.taglab.json",
+            "archived_map_tag_lab",
+            "The classes of an archived map as a dictionary of labels for TagLab",
+            MapFormat::TagLab
+        ),
+        archive_file!(
+            "/api/v2/archive/{name}/map.tif.aux.xml",
+            "archived_map_tiff_classes",
+            "The names of the classes, in the file beside map.tif in which GDAL and QGIS look for them",
+            MapFormat::TiffClasses
+        ),
+        archive_file!(
+            "/api/v2/archive/{name}/map.utm.tif.aux.xml",
+            "archived_map_utm_classes",
+            "The same beside map.utm.tif",
+            MapFormat::UtmTiffClasses
+        ),
+        archive_file!(
+            "/api/v2/archive/{name}/map.wgs84.tif.aux.xml",
+            "archived_map_wgs84_classes",
+            "The same beside map.wgs84.tif",
+            MapFormat::Wgs84TiffClasses
         ),
         archive_file!(
             "/api/v2/archive/{name}/map.tif",

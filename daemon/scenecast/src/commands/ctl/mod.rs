@@ -57,9 +57,9 @@ pub(super) struct Ctl {
     /// Print JSON instead of text
     #[arg(long, global = true)]
     json: bool,
-    /// Address of the vehicle, if there are several
-    #[arg(long, global = true, value_name = "N")]
-    vehicle: Option<u8>,
+    /// Address or name of the vehicle, if there are several
+    #[arg(long, global = true, value_name = "VEHICLE")]
+    vehicle: Option<String>,
     /// Maximum wait for an order to be applied [default: 0; for an image 600]
     #[arg(long, global = true, value_name = "SECONDS", allow_negative_numbers = true)]
     wait: Option<f64>,
@@ -72,8 +72,9 @@ enum CtlCommand {
     /// Print the state of mission, link and vehicles, with the age of each value.
     #[command(after_help = "Example: scenecast ctl status")]
     Status,
-    /// Write the operator's map in the format of the file's extension: .png (with world file and
-    /// projection), .tif, .utm.tif and .wgs84.tif (GeoTIFF), .geojson, .ply, .csv, .json.
+    /// Write the operator's map in the format of the file's extension: .png (with world file, projection and
+    /// classes), .tif, .utm.tif and .wgs84.tif (GeoTIFF with classes), .geojson, .ply, .csv, .labels.csv,
+    /// .coco.json and .taglab.json (classes for annotation), .json.
     #[command(after_help = "Example: scenecast ctl map --out reef.png")]
     Map {
         /// File to write, replaced if it exists
@@ -85,7 +86,11 @@ enum CtlCommand {
     },
     /// Print the labels on the map.
     #[command(after_help = "Example: scenecast ctl labels --json")]
-    Labels,
+    Labels {
+        /// Print the groups of labels where their tree is cut at this number, as with the slider of the page
+        #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=254))]
+        labels: Option<u8>,
+    },
     /// Print the last weights sent, or send others.
     #[command(after_help = "Example: scenecast ctl utility set 3=0.8 5=-1 --exploration 0.2 --wait 120")]
     Utility {
@@ -107,8 +112,8 @@ enum CtlCommand {
     /// Write an image of a label, and request it from the vehicle if the surface has none.
     #[command(after_help = EXEMPLAR_EXAMPLES)]
     Exemplar {
-        /// Label on the map, 1 to 254
-        label: u8,
+        /// Label on the map: its number, 1 to 254, or its name
+        label: String,
         /// WebP file to write, replaced if it exists
         #[arg(long, value_name = "FILE", required_unless_present = "cancel")]
         out: Option<PathBuf>,
@@ -280,11 +285,12 @@ impl SettingsArgs {
 #[derive(Debug, Subcommand)]
 enum UtilityCommand {
     /// Send weights. Labels that are not listed get 0.
-    #[command(after_help = "Example: scenecast ctl utility set 3=0.8 5=-1 --exploration 0.2")]
+    #[command(after_help = "Example: scenecast ctl utility set 3=0.8 5=-1 --exploration 0.2
+         scenecast ctl utility set 'soft coral=0.5' --keep")]
     Set {
-        /// Label and weight, -1 to 1
+        /// Number or name of a label, and its weight, -1 to 1. A name stands also for the labels that are merged into it
         #[arg(value_name = "LABEL=WEIGHT", value_parser = label_weight)]
-        weights: Vec<(u8, f64)>,
+        weights: Vec<(String, f64)>,
         /// Weight of unexplored cells, -1 to 1
         #[arg(long, value_name = "WEIGHT", value_parser = weight, allow_hyphen_values = true)]
         exploration: Option<f64>,
@@ -322,10 +328,13 @@ fn weight(text: &str) -> Result<f64, String> {
     weight.ok_or_else(|| "expected a number from -1 to 1".to_owned())
 }
 
-fn label_weight(text: &str) -> Result<(u8, f64), String> {
-    let (label, w) = text.split_once('=').ok_or("expected LABEL=WEIGHT, as in 3=0.8")?;
-    let label = label.parse().ok().filter(|l| (1..=254).contains(l)).ok_or("a label is a number from 1 to 254")?;
-    Ok((label, weight(w)?))
+fn label_weight(text: &str) -> Result<(String, f64), String> {
+    // A name may contain an equals sign.
+    let (label, w) = text.rsplit_once('=').ok_or("expected LABEL=WEIGHT, as in 3=0.8 or 'soft coral=0.5'")?;
+    if label.trim().parse().is_ok_and(|number: i64| !(1..=254).contains(&number)) {
+        return Err("a label is a number from 1 to 254, or a name".to_owned());
+    }
+    Ok((label.to_owned(), weight(w)?))
 }
 
 fn class_percent(text: &str) -> Result<(String, u8), String> {
@@ -356,10 +365,10 @@ impl CtlCommand {
         match self {
             Self::Status => client::show_status(session).await,
             Self::Map { out, labels } => client::save_map(session, &out, labels).await,
-            Self::Labels => client::show_labels(session).await,
+            Self::Labels { labels } => client::show_labels(session, labels).await,
             Self::Utility { change: None } => client::show_utility(session).await,
             Self::Utility { change: Some(UtilityCommand::Set { weights, exploration, keep }) } => {
-                client::set_utility(session, BTreeMap::from_iter(weights), exploration, keep).await
+                client::set_utility(session, &weights, exploration, keep).await
             }
             Self::Budget { change: None } => client::show_budget(session).await,
             Self::Budget { change: Some(BudgetCommand::Set { bits_per_s, shares, background }) } => {
@@ -370,9 +379,9 @@ impl CtlCommand {
             Self::Settings(settings) => client::change_settings(session, settings.change()).await,
             Self::Exemplar { label, out: Some(out), again, larger, .. } => {
                 let action = larger.then_some(ExemplarAction::Larger).or(again.then_some(ExemplarAction::Another));
-                client::save_exemplar(session, label, &out, action).await
+                client::save_exemplar(session, &label, &out, action).await
             }
-            Self::Exemplar { label, out: None, .. } => client::cancel_exemplar(session, label).await,
+            Self::Exemplar { label, out: None, .. } => client::cancel_exemplar(session, &label).await,
             Self::Fence { change } => constraints::fence(session, change).await,
             Self::Go(go) => places::go(session, go).await,
             Self::Areas { change } => places::areas(session, change).await,
