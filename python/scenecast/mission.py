@@ -6,13 +6,14 @@ from pathlib import Path
 
 import numpy as np
 
-from .label_map import LabelMap
+from .label_map import LabelMap, described, keys
 from .record import Record
 
 STATUS = ("queued", "on air", "received", "applied", "refused", "withdrawn")
 DIRECTION = ("sent", "received", "dropped")
 LEVEL = {20: "info", 30: "warning", 40: "error"}
 LINK = ("budget_bps", "sent_bps", "received_bps", "loss", "round_trip_s", "age_s", "backlog_bits")
+VERSION = [("time", "f8"), ("epoch", "u4"), ("version", "u8"), ("cells", "u4"), ("fingerprint", "u2")]
 TRACK = ("time", "x_m", "y_m", "z_m", "heading_deg", "sigma_m")
 
 
@@ -20,7 +21,7 @@ def _record(path):
     return None if path is None else path if isinstance(path, Record) else Record(path)
 
 
-def _part(name):
+def part_of(name):
     """The part of a topic that stands for a vehicle."""
     part = re.sub(r"[^0-9A-Za-z]", "_", name)[:64]
     return part if part[:1] and not part[0].isdigit() else f"_{part}"
@@ -52,7 +53,7 @@ class Mission:
         if surface and any(f"/scenecast/{found}/events" in surface.index for found in _vehicles(surface)):
             raise ValueError(f"{surface.path} is the record of a vehicle: Mission.open(vehicle=...)")
         self.vehicles = sorted(_vehicles(surface) | _vehicles(vehicle))
-        names = {_part(name)} if name else _vehicles(vehicle) or _vehicles(surface)
+        names = {part_of(name)} if name else _vehicles(vehicle) or _vehicles(surface)
         if len(names) > 1 or names - set(self.vehicles):
             raise ValueError(f"give the name of one of the vehicles: {', '.join(self.vehicles)}")
         self.name = next(iter(names), "")
@@ -77,14 +78,13 @@ class Mission:
 
     def _vehicle_state(self, state):
         """The part of a state that is about the vehicle."""
-        named = [found for found in state.get("vehicles", ()) if _part(found["name"]) == self.name]
+        named = [found for found in state.get("vehicles", ()) if part_of(found["name"]) == self.name]
         return named[0] if named else {}
 
     def versions(self, side="operator"):
         """The versions of an end's map: time in s, epoch, version, number of cells and fingerprint of each."""
         rows = [(t, m.epoch, m.version, m.cells, m.digest) for t, m in self._messages(side, "map_version")]
-        kinds = {"time": "f8", "epoch": "u4", "version": "u8", "cells": "u4", "fingerprint": "u2"}
-        return np.array(rows, list(kinds.items()))
+        return np.array(rows, VERSION)
 
     def map(self, t=None, side="operator"):
         """The map of an end at a time, by default its last one."""
@@ -101,20 +101,12 @@ class Mission:
         time, version = (found[0], found[1].version) if found else (float("nan"), 0)
         x, y, label = (np.concatenate(arrays) for arrays in zip(*parts)) if parts else (np.zeros(0, "i4"),) * 3
         # The last change of each cell is the one in force.
-        _, last = np.unique(((x.astype("i8") << 32) + y)[::-1], return_index=True)
+        _, last = np.unique(keys(x, y)[::-1], return_index=True)
         last = len(x) - 1 - last
         last = last[label[last] != 0]
         state = self.state(t)
-        vehicle = self._vehicle_state(state)
-        shown = vehicle.get("map") or {}
-        known = vehicle.get("labels", ()) if shown.get("epoch") == epoch else ()
-        names, merged = ({found["id"]: found[key] for found in known if found[key]} for key in ("name", "merged_into"))
-        place = shown.get("placement") if side == "operator" else None
-        origin = state.get("mission", {}).get("origin")
         return LabelMap(x[last], y[last], label[last].astype("u1"), cell_m, epoch, version, time, side,
-                        names, merged,
-                        (place["east_m"], place["north_m"]) if place else (0.0, 0.0),
-                        (origin["lat_deg"], origin["lon_deg"]) if origin else None)
+                        **described(state, self._vehicle_state(state), epoch, side))
 
     def agreement(self, t=None):
         """The share, 0 to 1, of the vehicle's cells whose label the operator's map has too; NaN without cells."""

@@ -13,6 +13,7 @@ from .cdr import Decoder
 MAGIC = b"\x89MCAP0\r\n"
 SCHEMA, CHANNEL, MESSAGE, CHUNK, DATA_END = 3, 4, 5, 6, 15
 LARGEST = 512 << 20
+UNKNOWN = (1 << 64) - 1
 
 
 class DamagedRecord(UserWarning):
@@ -83,6 +84,8 @@ class Record:
             kind, size = struct.unpack("<BQ", head)
             if kind == DATA_END:
                 return
+            if kind == CHUNK and size == UNKNOWN:
+                raise ValueError("its last part is not finished: the mission runs, or the recorder was cut off")
             if not 0 < kind < 128 or size > LARGEST:
                 raise ValueError(f"damage at byte {at}")
             body = opened.read(size)
