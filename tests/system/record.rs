@@ -73,9 +73,18 @@ fn a_report_says_what_the_record_has() {
     for sentence in vehicle["summary"].as_array().unwrap() {
         assert!(page.contains(sentence.as_str().unwrap()), "{sentence}");
     }
-    for part in
-        ["<svg", "class=\"track\"", "data:image/webp;base64,", "<h3>Orders</h3>", "<h2>Events</h2>", "2000-01-01T00:0"]
-    {
+    for part in [
+        "<svg",
+        "class=\"track\"",
+        "data:image/webp;base64,",
+        "<h3>Orders</h3>",
+        "<h2>Events</h2>",
+        "2000-01-01T00:0",
+        "channel.loss</td><td>0.2",
+        "<h2>How to cite</h2>",
+        "rehearsal over a simulated sea floor",
+        "have arrived by the end",
+    ] {
         assert!(page.contains(part), "{part}");
     }
     assert!(

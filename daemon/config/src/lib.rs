@@ -19,7 +19,7 @@ pub use derived::{
 };
 pub use key::{Key, Role, Rule};
 pub use load::load;
-pub use print::{print, reference, schema, shipped_files};
+pub use print::{changed_settings, print, reference, schema, shipped_files};
 pub use secret_files::{
     TokenGrant, load_key, load_tokens, open_regular, read_key, read_regular, read_regular_text, read_token, read_tokens,
 };

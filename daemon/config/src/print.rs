@@ -110,6 +110,19 @@ pub fn shipped_files() -> Result<Vec<(&'static str, String)>, UserError> {
     SHIPPED.iter().map(text).collect()
 }
 
+/// A program, whether its mission is simulated, and the keys that differ from their defaults, as JSON. Commands, which may hold passwords, are not told.
+pub fn changed_settings(program: &str, is_simulated: bool, config: &Config) -> String {
+    let defaults = Config::default();
+    let differs = |key: &&Key| key.value(config) != key.value(&defaults);
+    let told = |key: &Key| {
+        let value = key.value(config);
+        let is_command = value.as_str().is_some_and(|text| text.starts_with("command:"));
+        (key.name.to_owned(), if is_command { json!("command:...") } else { json!(value) })
+    };
+    let settings: Map<String, Value> = Key::all().filter(differs).map(told).collect();
+    json!({ "program": program, "simulated": is_simulated, "settings": settings }).to_string()
+}
+
 /// A file with the defaults of every key that a role reads.
 pub fn print(role: Role) -> String {
     print_values(role, &Config::default())
@@ -212,4 +225,18 @@ fn key_schema(key: &Key, defaults: &Config) -> Value {
     schema["description"] = json!(format!("{} Allowed: {}.", key.doc(), key.allowed()));
     schema["default"] = json!(key.value(defaults));
     schema
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn changed_settings_tell_no_command() {
+        let sets =
+            ["camera.source=command:ffmpeg -i rtsp://anna:secret@camera", "autopilot.kind=log", "channel.loss=0.2"];
+        let text = changed_settings("scenecast 1", true, &load(None, &sets.map(str::to_owned)).unwrap());
+        assert!(text.starts_with(r#"{"program":"scenecast 1","#) && !text.contains("secret"), "{text}");
+        assert!(text.contains(r#""camera.source":"command:...""#) && text.contains(r#""channel.loss":0.2"#), "{text}");
+    }
 }

@@ -123,8 +123,8 @@ impl Demo {
         mission.keep_end_events();
         // In the present folder, so that it is found after the demo.
         let (config, folder) = (mission.config(), Path::new("records"));
-        let surface = SurfaceRecord::start(config, "surface", folder, false, speed);
-        let records = (surface, VehicleRecord::start(config, folder, speed));
+        let surface = SurfaceRecord::rehearsed(config, folder, speed);
+        let records = (surface, VehicleRecord::rehearsed(config, folder, speed));
         Self { meter, pace, truth, mission, facts, recorder, counted: [0; 2], published: None, records }
     }
 

@@ -30,10 +30,10 @@ impl MissionRecord {
     pub fn create(mission: &mut Mission, [surface, vehicle]: [&Path; 2]) -> Result<Self, UserError> {
         let limits = limits(mission.config());
         mission.keep_end_events();
-        let name = mission.config().vehicle.name.clone();
+        let config = mission.config();
         Ok(Self {
-            surface: (RecordWriter::create(surface, limits)?, SurfaceRecorder::default()),
-            vehicle: (RecordWriter::create(vehicle, limits)?, VehicleRecorder::new(&name, mission.cell_m())),
+            surface: (RecordWriter::create(surface, limits)?, SurfaceRecorder::new(config, true)),
+            vehicle: (RecordWriter::create(vehicle, limits)?, VehicleRecorder::new(config, true)),
             parts: [1; 2],
         })
     }

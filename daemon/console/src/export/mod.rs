@@ -11,3 +11,4 @@ pub(crate) use cells::Tiles;
 pub use cells::{CellLayer, MapCaption, MapCells};
 pub use files::MapFormat;
 pub(crate) use files::harmless;
+pub(crate) use projection::TransverseMercator;

@@ -11,7 +11,7 @@ const F: f64 = 1.0 / 298.257_223_563;
 /// Karney (2011), "Transverse Mercator with an accuracy of a few nanometers". Within 4000 km of its meridian it is less than a
 /// hundredth of a millimetre off.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct TransverseMercator {
+pub(crate) struct TransverseMercator {
     lon0_deg: f64,
     scale: f64,
     false_m: (f64, f64),
@@ -48,7 +48,7 @@ const UTM_LAT_DEG: std::ops::RangeInclusive<f64> = -80.0..=84.0;
 
 impl TransverseMercator {
     /// The projection of the mission: metres east and north of its origin.
-    pub(super) fn about(origin: Origin) -> Self {
+    pub(crate) fn about(origin: Origin) -> Self {
         let plain = Self { lon0_deg: origin.lon_deg, scale: 1.0, false_m: (0.0, 0.0) };
         let (_, north) = plain.metres(origin.lon_deg, origin.lat_deg);
         Self { false_m: (0.0, -north), ..plain }
@@ -79,7 +79,7 @@ impl TransverseMercator {
     }
 
     /// Longitude and latitude in degrees of a projected place. Near 180 degrees the longitude goes on beyond.
-    pub(super) fn lon_lat(&self, x: f64, y: f64) -> (f64, f64) {
+    pub(crate) fn lon_lat(&self, x: f64, y: f64) -> (f64, f64) {
         let radius = self.scale * MERIDIAN_M;
         let (xi, eta) = ((y - self.false_m.1) / radius, (x - self.false_m.0) / radius);
         let (mut north, mut east) = (xi, eta);

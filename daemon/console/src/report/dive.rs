@@ -24,8 +24,19 @@ pub struct Dive {
     pub(super) events: Vec<(f64, Event)>,
     /// Frames sent, received and dropped.
     pub(super) frames: [u64; 3],
+    /// What the surface ran with.
+    pub(super) settings: SettingsRecord,
     /// Why some of the record could not be read.
     pub damage: Option<String>,
+}
+
+/// The program that made a record, and its settings that differed from their defaults, by key.
+#[derive(Debug, Default, serde::Deserialize)]
+#[serde(default)]
+pub(super) struct SettingsRecord {
+    pub(super) program: String,
+    pub(super) simulated: bool,
+    pub(super) settings: BTreeMap<String, serde_json::Value>,
 }
 
 /// What a record says about a vehicle.
@@ -87,6 +98,10 @@ impl Dive {
         let Some((vehicle, topic)) = topic.split_once('/') else {
             match topic {
                 "state" => *last_state = message.decode::<Text>().map(|text| text.data).or(last_state.take()),
+                "settings" => {
+                    let text = message.decode::<Text>();
+                    self.settings = text.and_then(|text| serde_json::from_str(&text.data).ok()).unwrap_or_default();
+                }
                 "events" => self.events.extend(message.decode().map(|event| (at_s, event))),
                 "frames" => {
                     let direction = message.decode::<Frame>().map(|frame| usize::from(frame.direction));
@@ -107,6 +122,11 @@ impl Dive {
             "link" => vehicle.link.extend(message.decode().map(|link| (at_s, link))),
             _ => {}
         }
+    }
+
+    /// The moment of a mission time, seconds since 1970.
+    pub(super) fn unix_s(&self, at_s: f64) -> f64 {
+        self.span_s.1 - (self.state.now_s - at_s) / self.state.mission.speed.max(1e-3)
     }
 
     /// The vehicles, as the page showed them last and as the record has them.

@@ -37,18 +37,33 @@ impl Dive {
             self.vehicle(&mut page, state, vehicle);
         }
         self.events_table(&mut page);
-        // Writing to a string cannot fail.
+        self.origin_of_figures(&mut page);
+        page
+    }
+
+    /// Settings, versions, and how to cite.
+    fn origin_of_figures(&self, page: &mut String) {
+        if !self.settings.settings.is_empty() {
+            *page += "<h2>Settings of the surface</h2>\n<p>Those that differ from their defaults.</p>\n<table>";
+            for (key, value) in &self.settings.settings {
+                let _ = write!(page, "<tr><td>{}</td><td>{}</td></tr>", Escaped(key), Escaped(&value.to_string()));
+            }
+            *page += "</table>\n";
+        }
+        let (begin, end) = (utc_text(self.span_s.0), utc_text(self.span_s.1));
+        let (mission, run) = (Escaped(&self.state.mission.name), Escaped(&self.state.mission.id));
+        let recorded = if self.settings.program.is_empty() { "an earlier scenecast" } else { &self.settings.program };
+        let names: Vec<&str> = self.state.vehicles.iter().map(|vehicle| vehicle.name.as_str()).collect();
+        let program = format!("scenecast {}", env!("CARGO_PKG_VERSION"));
         let _ = writeln!(
             page,
-            "<h2>How this was made</h2>\n<p>By scenecast {} from the record of the surface, run {}, of {} to {}. The map is the operator's: \
-             what had arrived by the acoustic link. Areas are counts of cells; what the model is unsure of is counted with the rest. Please \
-             name the mission, the vehicle and the version of scenecast where you use these figures.</p>\n</body></html>",
-            env!("CARGO_PKG_VERSION"),
-            Escaped(&self.state.mission.id),
-            utc_text(self.span_s.0),
-            utc_text(self.span_s.1)
+            "<h2>How this was made</h2>\n<p>By {program} from the record of the surface, run {run}, which {} wrote from {begin} to {end}. \
+             The map is the operator's: what had arrived by the acoustic link. Areas are counts of cells; what the model is unsure of is \
+             counted with the rest.</p>\n<h2>How to cite</h2>\n<p>Mission \u{201c}{mission}\u{201d}, vehicle {}, {begin} to {end}: map of the \
+             sea floor by an unsupervised scene model, run {run}, {program}.</p>\n</body></html>",
+            Escaped(recorded),
+            Escaped(&names.join(", ")),
         );
-        page
     }
 
     fn vehicle(&self, page: &mut String, state: &VehicleState, vehicle: &DiveVehicle) {
@@ -66,7 +81,7 @@ impl Dive {
         }
         classes(page, state, vehicle);
         notes(page, self, state);
-        orders(page, vehicle);
+        orders(page, self, vehicle);
         self.link(page, vehicle);
     }
 
@@ -209,18 +224,26 @@ fn notes(page: &mut String, dive: &Dive, state: &VehicleState) {
         return;
     }
     *page += "<h3>Notes and markers</h3>\n<ul>\n";
-    let utc = |at_s: f64| utc_text(dive.span_s.1 - (dive.state.now_s - at_s) / dive.state.mission.speed.max(1e-3));
+    let utc = |at_s: f64| utc_text(dive.unix_s(at_s));
     for note in &state.notes {
-        let _ = writeln!(page, "<li>{}: {}</li>", utc(note.at_s), Escaped(&note.text));
+        let _ = writeln!(page, "<li>{}, {}: {}</li>", utc(note.at_s), Escaped(&note.author), Escaped(&note.text));
     }
     for marker in &state.markers {
-        let _ =
-            writeln!(page, "<li>{:.1} m east, {:.1} m north: {}</li>", marker.x_m, marker.y_m, Escaped(&marker.text));
+        let _ = writeln!(
+            page,
+            "<li>{}, {}: {} ({:.1} m east, {:.1} m north{})</li>",
+            utc(marker.at_s),
+            Escaped(&marker.author),
+            Escaped(&marker.text),
+            marker.x_m,
+            marker.y_m,
+            words::on_earth(dive, (marker.x_m, marker.y_m))
+        );
     }
     *page += "</ul>\n";
 }
 
-fn orders(page: &mut String, vehicle: &DiveVehicle) {
+fn orders(page: &mut String, dive: &Dive, vehicle: &DiveVehicle) {
     if vehicle.orders_of_people().next().is_none() {
         return;
     }
@@ -232,12 +255,12 @@ fn orders(page: &mut String, vehicle: &DiveVehicle) {
         let reason = if last.reason.is_empty() { String::new() } else { format!(": {}", last.reason) };
         let _ = writeln!(
             page,
-            "<tr><td>{} {version}</td><td class=\"t\">{}</td><td>{}{}</td><td class=\"n\">{:.0} s</td></tr>",
+            "<tr><td>{} {version}</td><td class=\"t\">{}</td><td>{}{}</td><td class=\"n\">{:.1} s</td></tr>",
             Escaped(slot),
             utc_text(first.given_s),
             words::status(last.status),
             Escaped(&reason),
-            (last.at_s - first.given_s).max(0.0)
+            ((last.at_s - first.given_s) * dive.state.mission.speed).max(0.0)
         );
     }
     *page += "</table>\n";

@@ -1,9 +1,10 @@
 //! The summary of a dive in sentences.
 
 use super::dive::{Dive, DiveVehicle, OrderStep};
-use crate::state::VehicleState;
+use crate::export::TransverseMercator;
+use crate::state::{Origin, VehicleState};
 use scenecast_core::utc_text;
-use scenecast_messages::scenecast_msgs::OrderStatus;
+use scenecast_messages::scenecast_msgs::{Event, OrderStatus};
 
 /// A time span for people, such as "1 h 05 min".
 pub(super) fn duration(seconds: f64) -> String {
@@ -38,9 +39,15 @@ pub(super) fn status(status: u8) -> &'static str {
 
 /// Where, when, how long, how far, what was found, what was ordered and what failed, a sentence each.
 pub(super) fn summary(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -> Vec<String> {
-    let mut sentences = vec![when(dive, state, vehicle)];
+    let mut sentences = Vec::new();
+    if dive.settings.simulated {
+        sentences.push("This was a rehearsal over a simulated sea floor.".to_owned());
+    }
+    sentences.push(when(dive, state, vehicle));
     sentences.push(place(dive, vehicle));
     sentences.push(found(state, vehicle));
+    sentences.extend(extent(dive, vehicle));
+    sentences.extend(arrived(state, vehicle));
     sentences.push(orders(vehicle));
     let [sent, received, dropped] = dive.frames;
     let loss = state.link.up.loss * 100.0;
@@ -48,10 +55,16 @@ pub(super) fn summary(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) 
         "The surface sent {sent} frames, received {received} and could not use {dropped}; of the vehicle's last frames {loss:.0} % were \
          lost."
     ));
-    let is_trouble = |source: &str| matches!(source, "fault" | "contact");
-    let troubles = dive.events.iter().filter(|(_, event)| is_trouble(&event.source)).count();
-    sentences.push(match troubles {
+    // The first contact begins a run, too.
+    let first_run = dive.events.iter().position(|(_, event)| event.text == "another run begins");
+    let is_trouble = |(number, (_, event)): &(usize, &(f64, Event))| match event.source.as_str() {
+        "fault" => true,
+        "contact" => event.text != "received" && Some(*number) != first_run,
+        _ => false,
+    };
+    sentences.push(match dive.events.iter().enumerate().filter(is_trouble).count() {
         0 => "No fault and no silence was reported.".to_owned(),
+        1 => "One event is about a fault, a silence or a new run; it is listed below.".to_owned(),
         n => format!("{n} events are about faults, silences or new runs; they are listed below."),
     });
     if let Some(damage) = &dive.damage {
@@ -62,14 +75,57 @@ pub(super) fn summary(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) 
 
 fn when(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -> String {
     let (begin, end) = dive.span_s;
+    let speed = dive.state.mission.speed;
+    let speed = match (speed - 1.0).abs() > 0.01 {
+        true => format!(" at {speed:.1} times the speed of the clock, {} of mission time", duration(dive.state.now_s)),
+        false => String::new(),
+    };
     format!(
-        "{} was recorded from {} to {} (UTC), {} long, and reported its place {} times.",
+        "{} (address {}) was recorded from {} to {} (UTC), {} long{speed}, and reported its place {} times.",
         state.name,
+        state.id,
         utc_text(begin),
         utc_text(end),
         duration(end - begin),
         vehicle.track.len()
     )
+}
+
+/// A place as latitude and longitude, with a comma before; empty without an origin.
+pub(super) fn on_earth(dive: &Dive, (east_m, north_m): (f64, f64)) -> String {
+    dive.state.mission.origin.map_or_else(String::new, |origin| {
+        let (lat, lon) = lat_lon(origin, east_m, north_m);
+        format!(", {lat:.6}, {lon:.6}")
+    })
+}
+
+fn lat_lon(origin: Origin, east_m: f64, north_m: f64) -> (f64, f64) {
+    let (lon, lat) = TransverseMercator::about(origin).lon_lat(east_m, north_m);
+    (lat, (lon + 180.0).rem_euclid(360.0) - 180.0)
+}
+
+/// Where the map lies.
+fn extent(dive: &Dive, vehicle: &DiveVehicle) -> Option<String> {
+    let bounds = vehicle.labels.bounds()?;
+    let metres = |cells: i32| f64::from(cells) * vehicle.cell_m;
+    let (west, south) = (metres(bounds.x), metres(bounds.y));
+    let (east, north) =
+        (west + f64::from(bounds.width) * vehicle.cell_m, south + f64::from(bounds.height) * vehicle.cell_m);
+    let on_earth = dive.state.mission.origin.map_or_else(String::new, |origin| {
+        let [(south, west), (north, east)] = [(west, south), (east, north)].map(|(x, y)| lat_lon(origin, x, y));
+        format!(", or from latitude {south:.6} to {north:.6} and from longitude {west:.6} to {east:.6}")
+    });
+    Some(format!("It reaches from {west:.1} to {east:.1} m east and from {south:.1} to {north:.1} m north{on_earth}."))
+}
+
+/// How much of the vehicle's map has arrived.
+fn arrived(state: &VehicleState, vehicle: &DiveVehicle) -> Option<String> {
+    let reported = u64::from(state.status.as_ref()?.cells);
+    let held = vehicle.labels.explored() as u64;
+    let share = (held as f64 / reported.max(1) as f64 * 100.0).min(100.0);
+    (reported > 0).then(|| {
+        format!("In its last report the vehicle had {reported} cells; {held} have arrived by the end, {share:.0} %.")
+    })
 }
 
 fn place(dive: &Dive, vehicle: &DiveVehicle) -> String {

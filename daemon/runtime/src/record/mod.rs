@@ -17,6 +17,7 @@ use scenecast_host::{FrameEvent, FrameOutcome};
 pub use scenecast_messages::contents::Stamps;
 use scenecast_messages::contents::{header, valid_part};
 use scenecast_messages::scenecast_msgs::{Event, Frame, MapCells, MapVersion};
+use scenecast_messages::std_msgs::Text;
 use scenecast_protocol::map::{Cell, LabelGrid, MapDigest, UNEXPLORED};
 use scenecast_protocol::wire::{Address, Envelope};
 use std::path::{Path, PathBuf};
@@ -146,6 +147,16 @@ impl Record {
         }
         outln!("record: {}", self.dir.display());
     }
+}
+
+/// The program, whether the mission is simulated, and the settings that differ from their defaults, as JSON.
+fn settings_text(config: &Config, is_simulated: bool) -> String {
+    scenecast_config::changed_settings(&format!("scenecast {}", env!("CARGO_PKG_VERSION")), is_simulated, config)
+}
+
+/// What an end ran with.
+fn settings_entry(settings: &str, stamps: &Stamps) -> RecordEntry {
+    entry("settings".to_owned(), stamps, &Text { data: settings.to_owned() })
 }
 
 /// That messages are missing.

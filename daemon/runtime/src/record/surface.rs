@@ -1,6 +1,8 @@
 //! What the operator knew.
 
-use super::{MapState, Record, RecordedMap, entry, entry_of, frame_entry, is_due, stamps_now};
+use super::{
+    MapState, Record, RecordedMap, entry, entry_of, frame_entry, is_due, settings_entry, settings_text, stamps_now,
+};
 use bytes::Bytes;
 use scenecast_config::Config;
 use scenecast_console::Snapshot;
@@ -31,8 +33,13 @@ impl SurfaceRecord {
     /// Begins it in a folder in `folder`, unless the configuration names another one.
     /// `offers_key` is whether it offers the vehicles a next key.
     pub fn start(config: &Config, name: &str, folder: &Path, offers_key: bool, speed: f64) -> Self {
-        let recorder = SurfaceRecorder { hides_keys: offers_key, ..SurfaceRecorder::default() };
+        let recorder = SurfaceRecorder { hides_keys: offers_key, ..SurfaceRecorder::new(config, false) };
         Self { record: Record::start(config, name, folder), recorder, speed }
+    }
+
+    /// Begins that of a rehearsal.
+    pub fn rehearsed(config: &Config, folder: &Path, speed: f64) -> Self {
+        Self { record: Record::start(config, "surface", folder), recorder: SurfaceRecorder::new(config, true), speed }
     }
 
     /// Whether there is a record.
@@ -77,6 +84,8 @@ pub struct SurfaceRecorder {
     names: BTreeMap<u8, String>,
     /// Frames to the vehicle may carry a next key.
     hides_keys: bool,
+    /// What the surface runs with.
+    settings: String,
 }
 
 /// What a record has of a vehicle.
@@ -93,13 +102,20 @@ struct RecordedVehicle {
 }
 
 impl SurfaceRecorder {
+    /// Records a surface of this configuration.
+    pub fn new(config: &Config, is_simulated: bool) -> Self {
+        Self { settings: settings_text(config, is_simulated), ..Self::default() }
+    }
+
     /// What has changed since the last call, or the whole state where `part` is another one than then.
     pub fn observe(&mut self, part: u32, surface: &Surface, snapshot: &Snapshot, stamps: &Stamps) -> Vec<RecordEntry> {
+        let mut entries = Vec::new();
         if std::mem::replace(&mut self.part, part) != part {
-            let names = std::mem::take(&mut self.names);
-            *self = Self { part, log: self.log, names, hides_keys: self.hides_keys, ..Self::default() };
+            let (names, settings) = (std::mem::take(&mut self.names), std::mem::take(&mut self.settings));
+            *self = Self { part, log: self.log, names, hides_keys: self.hides_keys, settings, ..Self::default() };
+            entries.push(settings_entry(&self.settings, stamps));
         }
-        let mut entries = self.events(surface, snapshot, stamps);
+        entries.extend(self.events(surface, snapshot, stamps));
         let now_s = snapshot.state.now_s;
         let is_link_due = is_due(&mut self.link_s, STATE_INTERVAL_S, now_s);
         let mut has_news = is_due(&mut self.state_s, STATE_INTERVAL_S, now_s);

@@ -1,6 +1,6 @@
 //! What the vehicle knew.
 
-use super::{MapState, Record, RecordedMap, entry_of, frame_entry, is_due, stamps_now};
+use super::{MapState, Record, RecordedMap, entry_of, frame_entry, is_due, settings_entry, settings_text, stamps_now};
 use scenecast_config::{Config, cell_m};
 use scenecast_files::RecordEntry;
 use scenecast_host::VehicleHostEvent;
@@ -26,10 +26,15 @@ pub struct VehicleRecord {
 impl VehicleRecord {
     /// Begins it in a folder in `folder`, unless the configuration names another one.
     pub fn start(config: &Config, folder: &Path, speed: f64) -> Self {
-        let name = &config.vehicle.name;
         let hides_keys = config.link.key_file.is_some();
-        let recorder = VehicleRecorder { hides_keys, ..VehicleRecorder::new(name, cell_m(config)) };
-        Self { record: Record::start(config, name, folder), recorder, speed }
+        let recorder = VehicleRecorder { hides_keys, ..VehicleRecorder::new(config, false) };
+        Self { record: Record::start(config, &config.vehicle.name, folder), recorder, speed }
+    }
+
+    /// Begins that of a rehearsal.
+    pub fn rehearsed(config: &Config, folder: &Path, speed: f64) -> Self {
+        let record = Record::start(config, &config.vehicle.name, folder);
+        Self { record, recorder: VehicleRecorder::new(config, true), speed }
     }
 
     /// Records what has changed.
@@ -63,24 +68,29 @@ pub struct VehicleRecorder {
     link_s: Option<f64>,
     /// Frames to the vehicle may carry a next key.
     hides_keys: bool,
+    /// What the vehicle runs with.
+    settings: String,
 }
 
 impl VehicleRecorder {
-    /// Records a vehicle of this name, whose cells have this edge.
-    pub fn new(name: &str, cell_m: f64) -> Self {
-        let (name, map, mode) = (name.to_owned(), RecordedMap::default(), String::new());
-        Self { name, cell_m, part: 0, map, mode, pose_s: None, link_s: None, hides_keys: false }
+    /// Records a vehicle of this configuration.
+    pub fn new(config: &Config, is_simulated: bool) -> Self {
+        let (name, map, mode) = (config.vehicle.name.clone(), RecordedMap::default(), String::new());
+        let (cell_m, settings) = (cell_m(config), settings_text(config, is_simulated));
+        Self { name, cell_m, part: 0, map, mode, pose_s: None, link_s: None, hides_keys: false, settings }
     }
 
     /// What has changed since the last call, or the whole state where `part` is another one than then.
     pub fn observe(&mut self, part: u32, vehicle: &Vehicle, stamps: &Stamps) -> Vec<RecordEntry> {
+        let mut entries = Vec::new();
         if std::mem::replace(&mut self.part, part) != part {
             (self.map, self.mode) = (RecordedMap::default(), String::new());
+            entries.push(settings_entry(&self.settings, stamps));
         }
         let labels = vehicle.map();
         let (epoch, version) = (vehicle.durable().epoch, vehicle.map_version());
         let state = MapState { vehicle: &self.name, epoch, version, cell_m: self.cell_m, labels };
-        let mut entries = self.map.record(&state, stamps);
+        entries.extend(self.map.record(&state, stamps));
         let now_s = stamps.now_s();
         if is_due(&mut self.pose_s, POSE_INTERVAL_S, now_s) {
             let navigator = vehicle.navigator();
