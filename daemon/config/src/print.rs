@@ -230,12 +230,14 @@ fn key_schema(key: &Key, defaults: &Config) -> Value {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::CameraSource;
 
     #[test]
     fn changed_settings_tell_no_command() {
-        let sets =
-            ["camera.source=command:ffmpeg -i rtsp://anna:secret@camera", "autopilot.kind=log", "channel.loss=0.2"];
-        let text = changed_settings("scenecast 1", true, &load(None, &sets.map(str::to_owned)).unwrap());
+        let mut config = Config::default();
+        config.camera.source = CameraSource::Command("ffmpeg -i rtsp://anna:secret@camera".to_owned());
+        config.channel.loss = 0.2;
+        let text = changed_settings("scenecast 1", true, &config);
         assert!(text.starts_with(r#"{"program":"scenecast 1","#) && !text.contains("secret"), "{text}");
         assert!(text.contains(r#""camera.source":"command:...""#) && text.contains(r#""channel.loss":0.2"#), "{text}");
     }
