@@ -20,15 +20,14 @@ pub enum PictureError {
 
 /// The map within `bounds` as an indexed PNG, north up; pixel value = label.
 pub fn encode_within(grid: &LabelGrid, bounds: Rect) -> Result<Vec<u8>, PictureError> {
-    encode_coloured(grid, bounds, colour, None)
+    encode_coloured(grid, bounds, colour)
 }
 
-/// The same in other colours; `unexplored` is the opacity of unexplored cells, 255 without one.
+/// The same in other colours.
 pub fn encode_coloured(
     grid: &LabelGrid,
     bounds: Rect,
     colour: impl Fn(u8) -> [u8; 3],
-    unexplored: Option<u8>,
 ) -> Result<Vec<u8>, PictureError> {
     if bounds.area() > MAX_CELLS {
         return Err(PictureError::TooLarge(bounds.width, bounds.height));
@@ -58,7 +57,6 @@ pub fn encode_coloured(
     encoder.set_color(png::ColorType::Indexed);
     encoder.set_depth(depth);
     encoder.set_palette((0..=highest).flat_map(colour).collect::<Vec<u8>>());
-    unexplored.into_iter().for_each(|opacity| encoder.set_trns(vec![opacity]));
     encoder.set_compression(png::Compression::High);
     encoder.set_filter(png::Filter::NoFilter);
     let mut writer = encoder.write_header()?;

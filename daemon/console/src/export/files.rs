@@ -25,7 +25,7 @@ pub(super) fn indexed_png(cells: &MapCells) -> Result<Vec<u8>, String> {
     let grid: LabelGrid = cells.explored().map(|c| (c.cell, c.label)).collect();
     let bounds = grid.bounds().unwrap_or(Rect { x: 0, y: 0, width: 1, height: 1 });
     let colour = |label| if label == 0 { [0; 3] } else { cells.book.colour(cells.book.shown_as(label)) };
-    label_picture::encode_coloured(&grid, bounds, colour, Some(0)).map_err(|e| e.to_string())
+    label_picture::encode_coloured(&grid, bounds, colour).map_err(|e| e.to_string())
 }
 
 /// The six lines of a world file: the size of a pixel and the centre of the north-west pixel.
