@@ -110,7 +110,8 @@ pub fn shipped_files() -> Result<Vec<(&'static str, String)>, UserError> {
     SHIPPED.iter().map(text).collect()
 }
 
-/// A program, whether its mission is simulated, and the keys that differ from their defaults, as JSON. Commands, which may hold passwords, are not told.
+/// A program, whether its mission is simulated, and the keys that differ from their defaults, as JSON. Commands, which may hold
+/// passwords, are not told.
 pub fn changed_settings(program: &str, is_simulated: bool, config: &Config) -> String {
     let defaults = Config::default();
     let differs = |key: &&Key| key.value(config) != key.value(&defaults);

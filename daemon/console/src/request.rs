@@ -9,7 +9,7 @@ use crate::orders::{
     BudgetOrder, ExemplarAction, ExemplarOrder, LabelOrder, MarkerOrder, NoteOrder, OrderChanges, RemoveMarkerOrder,
 };
 use crate::snapshot::{command_state, seconds};
-use crate::state::{AcceptedOrder, ArchivedMap, CellHistory, CommandState, FormerLabel, LabelBook};
+use crate::state::{AcceptedOrder, ArchivedMap, CellHistory, CommandState, FormerLabel};
 use described::describe;
 use scenecast_protocol::coordinates::WorldPoint;
 use scenecast_protocol::directive::{Constraints, Slot, SlotId};
@@ -329,7 +329,7 @@ pub fn archived_cells(map: &VehicleMemory, cell_m: f64) -> MapCells {
         bounds: labels.bounds(),
         cell_m,
         moved_m: map.placement_m().unwrap_or((0.0, 0.0)),
-        book: map.labels().iter().map(|(&label, book)| (label, book.into())).collect(),
+        book: map.labels().clone(),
         tree: map.tree(),
         markers: map.markers().map(crate::snapshot::marker).collect(),
         caption: None,
@@ -403,7 +403,7 @@ fn map(surface: &Surface, vehicle: Address, cell_m: f64, now: Instant) -> Option
         bounds: surface.map_bounds(vehicle),
         cell_m,
         moved_m: (0.0, 0.0),
-        book: LabelBook::default(),
+        book: scenecast_surface::LabelBook::default(),
         tree: None,
         markers: Vec::new(),
         caption: None,

@@ -1,7 +1,6 @@
 //! The types of the API's replies, from which the OpenAPI document is made.
 
 mod command;
-mod label_book;
 mod labels;
 mod link;
 mod map;
@@ -12,7 +11,6 @@ pub use command::{
     CommandChangeName, CommandChangeState, CommandHolderState, CommandRequestState, CommandState, PrincipalInfo,
     PrincipalRole,
 };
-pub use label_book::{LabelBook, LabelEntry};
 pub use labels::{ExemplarImage, ExemplarProgress, ExemplarStage, MapLabel, MapLabelTree};
 pub use link::{ChannelQuality, LinkDirection, LinkRates, LinkSummary, ReportedBacklog, VehicleChannel};
 pub use map::{

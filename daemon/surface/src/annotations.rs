@@ -1,6 +1,7 @@
 //! The operator's own names of labels, notes about a vehicle, markers on its map, and weights that are not sent. They stay
 //! at the surface.
 
+use super::label_book::LabelBook;
 use super::record::{MAX_MARKERS, StoredDraft, StoredLabel, StoredMarker, StoredNote};
 use scenecast_protocol::coordinates::{DecimetrePoint, WorldPoint};
 use scenecast_protocol::map::{ClassEntry, MAX_LABEL};
@@ -18,7 +19,7 @@ const MAX_MARKER: usize = 200;
 /// Names of labels of the current epoch, notes, markers, and the weights that are not sent.
 #[derive(Debug, Clone, Default)]
 pub struct Annotations {
-    pub labels: BTreeMap<u8, StoredLabel>,
+    pub labels: LabelBook,
     /// The notes in the order of their times.
     pub notes: VecDeque<StoredNote>,
     /// The markers by their numbers.
@@ -53,23 +54,11 @@ impl Annotations {
         if book.merged_into.is_some_and(|into| into == label || !(1..=MAX_LABEL).contains(&into)) {
             return Err(format!("merged_into: it takes another label, 1 to {MAX_LABEL}, or null"));
         }
-        if book.merged_into.is_some_and(|into| self.leads_to(into, label)) {
+        if book.merged_into.is_some_and(|into| self.labels.merges(into).any(|at| at == label)) {
             return Err(format!("merged_into: label {label} is what that label is shown as, by its merges"));
         }
         self.labels.insert(label, book);
         Ok(())
-    }
-
-    /// Whether the merges of a label lead to another one.
-    fn leads_to(&self, from: u8, label: u8) -> bool {
-        let mut at = Some(from);
-        for _ in 0..=self.labels.len() {
-            at = at.and_then(|at| self.labels.get(&at)?.merged_into);
-            if at == Some(label) {
-                return true;
-            }
-        }
-        false
     }
 
     /// Gives a label the name and the colour of its class where the operator has given it none.

@@ -7,6 +7,7 @@ mod command;
 mod command_tests;
 mod exemplar_cache;
 mod in_force;
+mod label_book;
 mod log;
 mod logging;
 mod map_in_view;
@@ -27,6 +28,7 @@ pub use command::{
     CommandRequest, OrderKind,
 };
 pub use exemplar_cache::{ExemplarCache, LabelExemplars, OpenRequest, RequestKind, RequestState, StoredExemplar};
+pub use label_book::LabelBook;
 pub use log::{LogEntry, LogKind, MissionLog};
 pub use map_in_view::LabelGains;
 pub use orders::{AreaOrder, AreasOrder, DestinationOrder, FenceOrder, LimitsOrder, order_name};

@@ -2,6 +2,7 @@
 
 use super::annotations::Annotations;
 use super::exemplar_cache::ExemplarCache;
+use super::label_book::LabelBook;
 use super::map_in_view::{Corrections, LabelGains};
 use super::record::{EarlierMap, StoredLabel};
 use super::settings::SettingsRecord;
@@ -161,11 +162,11 @@ impl VehicleRecord {
 
     /// Name, colour and merging of a label of the map in view.
     pub fn label_book(&self, label: u8) -> Option<&StoredLabel> {
-        self.label_books().get(&label)
+        self.labels_in_view().get(&label)
     }
 
     /// Names, colours and merges of the labels of the map in view.
-    pub fn label_books(&self) -> &BTreeMap<u8, StoredLabel> {
+    pub fn labels_in_view(&self) -> &LabelBook {
         let of_earlier = self.earlier_map().filter(|earlier| earlier.epoch != self.epoch).map(|e| &e.names);
         of_earlier.unwrap_or(&self.annotations.labels)
     }

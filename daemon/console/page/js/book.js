@@ -170,7 +170,7 @@ export function shownLabels(vehicle) {
     sum.area_m2 += label.area_m2;
     sum.gained_m2 += label.gained_m2 ?? 0;
   }
-  // A label without cells of its own is shown with those of its largest member.
+  // A label without cells of its own has the rest (weight, images) of its first member.
   const whole = (id, sum) => vehicle.labels.find((l) => l.id === id) ?? { ...vehicle.labels.find((l) => l.id === sum.members[0]), id };
   const inOrder = [...shown].sort(([a], [b]) => a - b);
   return inOrder.map(([id, sum]) => ({ ...whole(id, sum), ...sum }));

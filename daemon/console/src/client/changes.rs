@@ -182,7 +182,7 @@ impl LogSelection {
 
 /// Prints the entries of the log, the oldest first.
 pub async fn show_log(session: &Session, selection: &LogSelection) -> Result<(), UserError> {
-    let only = session.selected(&session.state().await?)?;
+    let only = session.selected_now().await?;
     let (bytes, _) = session.client.get(&format!("/api/v2/log{}", selection.query(only))).await?;
     let log: LogList = serde_json::from_slice(&bytes).map_err(|e| session.client.unreadable(&e))?;
     session.print(&log, || match log.entries.is_empty() {
@@ -193,7 +193,7 @@ pub async fn show_log(session: &Session, selection: &LogSelection) -> Result<(),
 
 /// Writes the entries of the log to a file, as a table for a spreadsheet.
 pub async fn save_log(session: &Session, selection: &LogSelection, out: &Path) -> Result<(), UserError> {
-    let only = session.selected(&session.state().await?)?;
+    let only = session.selected_now().await?;
     let (bytes, _) = session.client.get(&format!("/api/v2/log.csv{}", selection.query(only))).await?;
     std::fs::write(out, bytes).map_err(|e| UserError::file(out, e))
 }

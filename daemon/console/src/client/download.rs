@@ -65,7 +65,7 @@ async fn of_one_version(session: &Session, files: &[(String, PathBuf)]) -> Resul
     Err(UserError::Failed(format!("the map changed {MAX_TRIES} times during the download; try again")))
 }
 
-/// Writes an image of a label, which is given by number or by name. Requests it from the vehicle if `action` is given or the surface has no image.
+/// Writes an image of a label, by number or by name. Requests it from the vehicle if `action` is given or the surface has no image.
 pub async fn save_exemplar(
     session: &Session,
     label: &str,

@@ -1,9 +1,11 @@
 //! Labels and vehicles as people name them: by number, or by name in any case.
 
-use crate::state::{LabelBook, MapLabel, MapLabelTree, MissionState, VehicleState};
+use crate::state::{MapLabel, MapLabelTree, MissionState, VehicleState};
 use scenecast_core::UserError;
+use scenecast_protocol::map::MAX_LABEL;
+use scenecast_surface::LabelBook;
 use serde::Serialize;
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// The vehicle that `--vehicle` names. Its address goes before a name that looks like one.
 pub(super) fn vehicle<'a>(state: &'a MissionState, text: &str) -> Result<&'a VehicleState, UserError> {
@@ -29,10 +31,10 @@ pub(super) fn vehicle<'a>(state: &'a MissionState, text: &str) -> Result<&'a Veh
 
 /// The label that a person means. A number goes before a name that looks like one.
 pub(super) fn label(book: &LabelBook, text: &str) -> Result<u8, UserError> {
-    if let Some(number) = text.trim().parse().ok().filter(|number| (1..=254).contains(number)) {
+    if let Some(number) = number(text) {
         return Ok(number);
     }
-    let names = || book.entries().filter_map(|(label, entry)| Some((label, entry.name.as_deref()?)));
+    let names = || book.iter().filter_map(|(&label, entry)| Some((label, entry.name.as_deref()?)));
     let named = names().filter(|(_, name)| is_same(name, text));
     let mut shown = named.map(|(label, _)| book.shown_as(label)).collect::<BTreeSet<u8>>().into_iter();
     match (shown.next(), shown.next()) {
@@ -51,12 +53,12 @@ pub(super) fn label(book: &LabelBook, text: &str) -> Result<u8, UserError> {
 /// The label that a person means, and after a name also those that are merged into it.
 pub(super) fn labels(book: &LabelBook, text: &str) -> Result<Vec<u8>, UserError> {
     let found = label(book, text)?;
-    if text.trim().parse::<u8>().is_ok() {
-        return Ok(vec![found]);
-    }
-    let merged =
-        book.entries().map(|(label, _)| label).filter(|label| *label != found && book.shown_as(*label) == found);
-    Ok([found].into_iter().chain(merged).collect())
+    let is_merged = |label: &u8| number(text).is_none() && *label != found && book.shown_as(*label) == found;
+    Ok([found].into_iter().chain(book.keys().copied().filter(is_merged)).collect())
+}
+
+fn number(text: &str) -> Option<u8> {
+    text.trim().parse().ok().filter(|number| (1..=MAX_LABEL).contains(number))
 }
 
 fn is_same(name: &str, text: &str) -> bool {
@@ -85,36 +87,31 @@ pub(super) fn groups(
     let tree = tree.ok_or_else(|| UserError::Failed("the vehicle has sent no tree of its labels yet".to_owned()))?;
     let group = |label: u8| tree.group_of(label, count);
     let book = book.grouped(group, &labels.iter().map(|label| (label.id, label.cells)).collect());
-    let mut groups: Vec<LabelGroup> = Vec::new();
+    let mut groups: BTreeMap<u8, LabelGroup> = BTreeMap::new();
     for label in labels {
         let stands = group(label.id);
-        let at = groups.iter().position(|group| group.label == stands).unwrap_or_else(|| {
-            let name = book.name(stands).map(str::to_owned);
-            groups.push(LabelGroup { label: stands, members: Vec::new(), cells: 0, area_m2: 0.0, name });
-            groups.len() - 1
-        });
-        if let Some(group) = groups.get_mut(at) {
-            group.members.push(label.id);
-            group.cells += label.cells;
-            group.area_m2 += label.area_m2;
-        }
+        let name = || book.name(stands).map(str::to_owned);
+        let new = || LabelGroup { label: stands, members: Vec::new(), cells: 0, area_m2: 0.0, name: name() };
+        let group = groups.entry(stands).or_insert_with(new);
+        group.members.push(label.id);
+        group.cells += label.cells;
+        group.area_m2 += label.area_m2;
     }
-    groups.sort_by_key(|group| group.label);
-    Ok(groups)
+    Ok(groups.into_values().collect())
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::state::LabelEntry;
+    use scenecast_surface::record::StoredLabel;
     use serde_json::json;
 
     /// 2 is "Soft coral", 3 is merged into it, 4 and 5 are both "sand".
     fn reef() -> LabelBook {
-        let entry = |name: Option<&str>, merged_into| LabelEntry {
+        let entry = |name: Option<&str>, merged_into| StoredLabel {
             name: name.map(str::to_owned),
             merged_into,
-            ..LabelEntry::default()
+            ..StoredLabel::default()
         };
         let (coral, sand) = (entry(Some("Soft coral"), None), entry(Some("sand"), None));
         LabelBook::from_iter([(2, coral), (3, entry(None, Some(2))), (4, sand.clone()), (5, sand)])

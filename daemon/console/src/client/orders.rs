@@ -38,12 +38,12 @@ pub async fn show_utility(session: &Session) -> Result<(), UserError> {
     session.print(&order, || {
         let weighted = vehicle.labels.iter().filter(|l| l.weight != 0.0);
         let name = |name: &Option<String>| name.as_ref().map(|name| format!(" ({name})")).unwrap_or_default();
-        let weights = weighted.map(|l| format!("label {}{}: {:.2}\n", l.id, name(&l.name), l.weight));
+        let weights = weighted.map(|l| format!("label {}{}: {:.2}\n", l.id, name(&l.book.name), l.weight));
         format!("{}unexplored cells: {:.2}\n", weights.collect::<String>(), order.exploration)
     })
 }
 
-/// Sends weights of labels, by number or by name; a name stands for its label and for those that are merged into it. Labels that are not
+/// Sends weights of labels, by number or by name, which stands also for labels that are merged into its own. Labels that are not
 /// listed keep their last weight if `keep`, else they get 0.
 pub async fn set_utility(
     session: &Session,

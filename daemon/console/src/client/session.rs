@@ -39,9 +39,17 @@ impl Session {
         }
     }
 
-    /// The address of the vehicle that the person has named; `None` for all.
+    /// The address of the vehicle that the person has named, also of one that is not known yet; `None` for all.
     pub(super) fn selected(&self, state: &MissionState) -> Result<Option<u8>, UserError> {
-        self.vehicle.as_ref().map(|text| Ok(names::vehicle(state, text)?.id)).transpose()
+        let Some(text) = &self.vehicle else { return Ok(None) };
+        text.parse().or_else(|_| names::vehicle(state, text).map(|vehicle| vehicle.id)).map(Some)
+    }
+
+    /// The same, with the present state where there is a name.
+    pub(super) async fn selected_now(&self) -> Result<Option<u8>, UserError> {
+        let is_named = self.vehicle.as_ref().is_some_and(|text| text.parse::<u8>().is_err());
+        let state = if is_named { self.state().await? } else { MissionState::default() };
+        self.selected(&state)
     }
 
     /// Prints a value as JSON, or a text.

@@ -144,13 +144,13 @@ fn backlog(b: &ReportedBacklog, now_s: f64) -> String {
 /// The labels of a vehicle as a table.
 pub(super) fn labels(v: &VehicleState, now_s: f64) -> String {
     let mut out = format!("{:>5} {:>8} {:>10} {:>9} {:>7}  image\n", "label", "cells", "area m2", "5 min m2", "weight");
-    if v.labels.iter().any(|l| l.name.is_some()) {
+    if v.labels.iter().any(|l| l.book.name.is_some()) {
         out = out.replace("  image", "  image: name");
     }
     for l in &v.labels {
         let image = image(&l.exemplar, now_s);
-        let name = l.name.as_ref().map(|name| format!(": {name}")).unwrap_or_default();
-        let name = l.merged_into.map_or(name.clone(), |into| format!("{name}, part of label {into}"));
+        let name = l.book.name.as_ref().map(|name| format!(": {name}")).unwrap_or_default();
+        let name = l.book.merged_into.map_or(name.clone(), |into| format!("{name}, part of label {into}"));
         let _ = writeln!(
             out,
             "{:>5} {:>8} {:>10.2} {:>+9.2} {:>7.2}  {image}{name}",

@@ -1,12 +1,13 @@
 //! A map in shared tiles, its cells one by one, and its form in JSON.
 
-use crate::state::{LabelBook, LayerBody, MapBody, VehicleMarker};
+use crate::state::{LayerBody, MapBody, VehicleMarker};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use scenecast_protocol::map::{
-    Cell, LabelGrid, LabelTree, LayerDescriptor, Quantity, REPLICA_TILE, Rect, ReplicaTile, ReplicaTileKey,
+    Cell, LabelGrid, LabelTree, LayerDescriptor, Quantity, REPLICA_TILE, Rect, ReplicaTile, ReplicaTileKey, UNEXPLORED,
 };
 use scenecast_protocol::time::Instant;
+use scenecast_surface::LabelBook;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -171,7 +172,8 @@ impl MapCells {
     /// The number of cells of each label.
     pub(super) fn counts(&self) -> BTreeMap<u8, u32> {
         let mut counts = BTreeMap::new();
-        self.explored().for_each(|cell| *counts.entry(cell.label).or_default() += 1);
+        let labels = self.tiles.values().flat_map(|tile| tile.labels().iter()).filter(|label| **label != UNEXPLORED);
+        labels.for_each(|label| *counts.entry(*label).or_default() += 1);
         counts
     }
 

@@ -13,19 +13,24 @@ use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::fmt::Write;
 
-/// An indexed PNG, north up, pixel value = label. A PNG has no empty tiles, so its extent is limited.
-pub(super) fn indexed_png(cells: &MapCells) -> Result<Vec<u8>, String> {
+/// Whether the map is small enough for a picture. The error is one line for people.
+pub(super) fn check_picture(cells: &MapCells) -> Result<(), String> {
     let Rect { width, height, .. } = cells.rectangle();
-    if cells.rectangle().area() > label_picture::MAX_CELLS {
-        let most = label_picture::MAX_CELLS;
+    let most = label_picture::MAX_CELLS;
+    if cells.rectangle().area() > most {
         return Err(format!(
             "the map spans {width} x {height} cells: a PNG has at most {most}; a GeoTIFF (map.tif) has all"
         ));
     }
+    Ok(())
+}
+
+/// An indexed PNG, north up, pixel value = label. A PNG has no empty tiles, so its extent is limited.
+pub(super) fn indexed_png(cells: &MapCells) -> Result<Vec<u8>, String> {
+    check_picture(cells)?;
     let grid: LabelGrid = cells.explored().map(|c| (c.cell, c.label)).collect();
     let bounds = grid.bounds().unwrap_or(Rect { x: 0, y: 0, width: 1, height: 1 });
-    let colour = |label| if label == 0 { [0; 3] } else { cells.book.colour(cells.book.shown_as(label)) };
-    label_picture::encode_coloured(&grid, bounds, colour).map_err(|e| e.to_string())
+    label_picture::encode_coloured(&grid, bounds, |label| cells.book.class_colour(label)).map_err(|e| e.to_string())
 }
 
 /// The six lines of a world file: the size of a pixel and the centre of the north-west pixel.
@@ -48,7 +53,7 @@ pub(super) fn companion(cells: &MapCells, projection: Option<String>) -> String 
     let highest = cells.counts().keys().max().copied().unwrap_or(0);
     let class = |label: u8| match label {
         0 => "unexplored".to_owned(),
-        label => cells.book.title(cells.book.shown_as(label)),
+        label => cells.book.class_title(label),
     };
     let classes: String =
         (0..=highest).map(|label| format!("      <Category>{}</Category>\n", escaped(&class(label)))).collect();
@@ -150,7 +155,7 @@ pub(super) fn ply(cells: &MapCells, origin: Option<Origin>) -> String {
     });
     let counts = cells.counts();
     let count: u32 = counts.values().sum();
-    let class = |label: u8| cells.book.title(cells.book.shown_as(label)).replace(char::is_control, " ");
+    let class = |label: u8| cells.book.class_title(label).replace(char::is_control, " ");
     let classes: String = counts.keys().map(|&label| format!("comment label {label}: {}\n", class(label))).collect();
     let mut out = format!(
         "ply\nformat ascii 1.0\ncomment {title}, metres east, north, up{from}\n{classes}element vertex {count}\n\
@@ -159,7 +164,7 @@ pub(super) fn ply(cells: &MapCells, origin: Option<Origin>) -> String {
     );
     let depth = cells.layers.iter().find(|l| l.descriptor.quantity == Quantity::Depth);
     for ExploredCell { cell, x, y, label, .. } in cells.explored() {
-        let [red, green, blue] = cells.book.colour(cells.book.shown_as(label));
+        let [red, green, blue] = cells.book.class_colour(label);
         let up = depth.and_then(|layer| layer.value(cell)).map_or(0.0, |depth| -depth);
         let _ = writeln!(out, "{x:.3} {y:.3} {up:.3} {red} {green} {blue} {label}");
     }

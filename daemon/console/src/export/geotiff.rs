@@ -6,6 +6,7 @@
 use super::cells::{MapCaption, MapCells};
 use super::files::escaped;
 use super::projection::TransverseMercator;
+use super::tiff::Directory;
 use crate::state::Origin;
 use flate2::Compression;
 use flate2::write::ZlibEncoder;
@@ -212,6 +213,15 @@ struct GeoKeys {
     citation: String,
 }
 
+const IMAGE_DESCRIPTION: u16 = 270;
+const PIXEL_SCALE: u16 = 33_550;
+const TIE_POINT: u16 = 33_922;
+const GEO_KEYS: u16 = 34_735;
+const GEO_DOUBLES: u16 = 34_736;
+const GEO_TEXTS: u16 = 34_737;
+const GDAL_METADATA: u16 = 42_112;
+const GDAL_NODATA: u16 = 42_113;
+
 const MODEL_TYPE: u16 = 1024;
 const RASTER_TYPE: u16 = 1025;
 const GEODETIC_CRS: u16 = 2048;
@@ -267,74 +277,6 @@ impl GeoKeys {
     }
 }
 
-/// A file under way: its directory comes first, as readers by network want it (cloud-optimised GeoTIFF), and tiles after it.
-#[derive(Default)]
-struct Directory {
-    /// Tag, type, count and bytes of each field, by rising tag.
-    fields: Vec<(u16, u16, u32, Vec<u8>)>,
-}
-
-/// Types of fields.
-const ASCII: u16 = 2;
-const SHORT: u16 = 3;
-const LONG: u16 = 4;
-const DOUBLE: u16 = 12;
-
-impl Directory {
-    fn shorts(&mut self, tag: u16, values: &[u16]) {
-        self.add(tag, SHORT, values.len(), values.iter().flat_map(|value| value.to_le_bytes()).collect());
-    }
-
-    fn longs(&mut self, tag: u16, values: &[u32]) {
-        self.add(tag, LONG, values.len(), values.iter().flat_map(|value| value.to_le_bytes()).collect());
-    }
-
-    fn doubles(&mut self, tag: u16, values: &[f64]) {
-        self.add(tag, DOUBLE, values.len(), values.iter().flat_map(|value| value.to_le_bytes()).collect());
-    }
-
-    fn text(&mut self, tag: u16, text: &str) {
-        let bytes = [text.as_bytes(), &[0]].concat();
-        self.add(tag, ASCII, bytes.len(), bytes);
-    }
-
-    fn add(&mut self, tag: u16, kind: u16, count: usize, bytes: Vec<u8>) {
-        self.fields.push((tag, kind, count as u32, bytes));
-    }
-
-    /// Bytes of header, directory and the values beyond it.
-    fn length(&self) -> usize {
-        let beyond =
-            self.fields.iter().map(|(.., bytes)| if bytes.len() > 4 { bytes.len().next_multiple_of(2) } else { 0 });
-        HEADER_BYTES + 2 + 12 * self.fields.len() + 4 + beyond.sum::<usize>()
-    }
-
-    fn bytes(&self) -> Vec<u8> {
-        let mut file = b"II*\0".to_vec();
-        file.extend((HEADER_BYTES as u32).to_le_bytes());
-        file.extend((self.fields.len() as u16).to_le_bytes());
-        let mut beyond: Vec<u8> = Vec::new();
-        let from = HEADER_BYTES + 2 + 12 * self.fields.len() + 4;
-        for (tag, kind, count, bytes) in &self.fields {
-            file.extend(tag.to_le_bytes());
-            file.extend(kind.to_le_bytes());
-            file.extend(count.to_le_bytes());
-            if bytes.len() > 4 {
-                file.extend(((from + beyond.len()) as u32).to_le_bytes());
-                beyond.extend(bytes);
-                beyond.resize(beyond.len().next_multiple_of(2), 0);
-            } else {
-                file.extend(bytes.iter().copied().chain(std::iter::repeat(0)).take(4));
-            }
-        }
-        file.extend([0; 4]);
-        file.extend(beyond);
-        file
-    }
-}
-
-const HEADER_BYTES: usize = 8;
-
 fn write(
     cells: &MapCells,
     raster: &Raster,
@@ -357,36 +299,19 @@ fn write(
             data.extend(tile);
         }
     }
-    let from = directory(cells, raster, keys, &vec![0; count], &vec![0; count]).length();
-    let too_long = "the map is too large for a GeoTIFF of 4 GB";
-    let offset = |&(at, _): &(usize, usize)| u32::try_from(from + at).map_err(|_| too_long.to_owned());
-    let offsets = places.iter().map(offset).collect::<Result<Vec<u32>, String>>()?;
-    let lengths: Vec<u32> = places.iter().map(|&(_, length)| length as u32).collect();
-    let mut file = directory(cells, raster, keys, &offsets, &lengths).bytes();
-    file.extend(data);
-    Ok(file)
+    let mut directory = directory(cells, raster, keys);
+    directory.tiles(TILE, &places)?;
+    Ok([directory.bytes(), data].concat())
 }
 
-/// The fields of a file, whose length does not depend on where the tiles are.
-fn directory(cells: &MapCells, raster: &Raster, keys: &GeoKeys, offsets: &[u32], lengths: &[u32]) -> Directory {
-    let mut directory = Directory::default();
-    directory.longs(IMAGE_WIDTH, &[raster.width]);
-    directory.longs(IMAGE_LENGTH, &[raster.height]);
-    directory.shorts(BITS_PER_SAMPLE, &[8]);
-    directory.shorts(COMPRESSION, &[ADOBE_DEFLATE]);
-    directory.shorts(PHOTOMETRIC, &[PALETTE]);
+/// What the file says of itself.
+fn directory(cells: &MapCells, raster: &Raster, keys: &GeoKeys) -> Directory {
+    let mut directory = Directory::of_labels([raster.width, raster.height], |label| cells.book.class_colour(label));
     if let Some(caption) = &cells.caption {
         // The field has ASCII.
         let title = caption.title().replace(|c: char| !c.is_ascii(), "?");
         directory.text(IMAGE_DESCRIPTION, &format!("{title}, pixel value = label"));
     }
-    directory.shorts(SAMPLES_PER_PIXEL, &[1]);
-    directory.shorts(PLANAR_CONFIGURATION, &[1]);
-    directory.shorts(COLOUR_MAP, &colour_map(cells));
-    directory.longs(TILE_WIDTH, &[TILE]);
-    directory.longs(TILE_LENGTH, &[TILE]);
-    directory.longs(TILE_OFFSETS, offsets);
-    directory.longs(TILE_BYTE_COUNTS, lengths);
     directory.doubles(PIXEL_SCALE, &[raster.pixel.0, raster.pixel.1, 0.0]);
     directory.doubles(TIE_POINT, &[0.0, 0.0, 0.0, raster.west, raster.north, 0.0]);
     if !keys.shorts.is_empty() {
@@ -403,44 +328,14 @@ fn directory(cells: &MapCells, raster: &Raster, keys: &GeoKeys, offsets: &[u32],
     directory
 }
 
-const IMAGE_WIDTH: u16 = 256;
-const IMAGE_LENGTH: u16 = 257;
-const BITS_PER_SAMPLE: u16 = 258;
-const COMPRESSION: u16 = 259;
-const ADOBE_DEFLATE: u16 = 8;
-const PHOTOMETRIC: u16 = 262;
-const PALETTE: u16 = 3;
-const IMAGE_DESCRIPTION: u16 = 270;
-const SAMPLES_PER_PIXEL: u16 = 277;
-const PLANAR_CONFIGURATION: u16 = 284;
-const COLOUR_MAP: u16 = 320;
-const TILE_WIDTH: u16 = 322;
-const TILE_LENGTH: u16 = 323;
-const TILE_OFFSETS: u16 = 324;
-const TILE_BYTE_COUNTS: u16 = 325;
-const PIXEL_SCALE: u16 = 33_550;
-const TIE_POINT: u16 = 33_922;
-const GEO_KEYS: u16 = 34_735;
-const GEO_DOUBLES: u16 = 34_736;
-const GEO_TEXTS: u16 = 34_737;
-const GDAL_METADATA: u16 = 42_112;
-const GDAL_NODATA: u16 = 42_113;
-
 /// Vehicle, time and the name of each label, which GDAL shows as the metadata of the file.
 fn metadata(cells: &MapCells) -> String {
     // GDAL escapes these texts twice.
     let item = |key: &str, value: &str| format!("<Item name=\"{key}\">{}</Item>", escaped(&escaped(value)));
     let facts = cells.caption.iter().flat_map(MapCaption::facts).map(|(key, value)| item(key, &value));
-    let class = |label: u8| item(&format!("label_{label}"), &cells.book.title(cells.book.shown_as(label)));
+    let class = |label: u8| item(&format!("label_{label}"), &cells.book.class_title(label));
     let classes = cells.counts().into_keys().map(class);
     format!("<GDALMetadata>{}</GDALMetadata>", facts.chain(classes).collect::<String>())
-}
-
-/// The colours of the labels: all reds, then all greens, then all blues, in 16 bits each.
-fn colour_map(cells: &MapCells) -> Vec<u16> {
-    let colour = |label: u8| if label == 0 { [0; 3] } else { cells.book.colour(cells.book.shown_as(label)) };
-    let colours: Vec<[u8; 3]> = (0..=u8::MAX).map(colour).collect();
-    (0..3).flat_map(|channel| colours.iter().map(move |colour| u16::from(colour[channel]) * 257)).collect()
 }
 
 fn deflate(bytes: &[u8]) -> std::io::Result<Vec<u8>> {

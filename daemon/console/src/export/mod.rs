@@ -6,6 +6,7 @@ mod files;
 mod geotiff;
 mod projection;
 mod regions;
+mod tiff;
 
 pub(crate) use cells::Tiles;
 pub use cells::{CellLayer, MapCaption, MapCells};

@@ -13,7 +13,7 @@ const WIDTH: f64 = 760.0;
 /// cells.
 pub(super) fn map(state: &VehicleState, vehicle: &DiveVehicle) -> Option<String> {
     let bounds = vehicle.labels.bounds()?;
-    let shift = state.map.placement.as_ref().map_or((0.0, 0.0), |p| (p.east_m, p.north_m));
+    let shift = state.map.shift_m();
     let frame = Frame::around(bounds, vehicle.cell_m, shift);
     let mut svg = format!(
         "<svg viewBox=\"0 0 {WIDTH} {:.0}\" role=\"img\" aria-label=\"map of the sea floor\" xmlns=\"http://www.w3.org/2000/svg\">\n",
@@ -69,7 +69,7 @@ fn round_length(length: f64) -> f64 {
 
 /// Cells of one label side by side in a row are one rectangle.
 fn cells(svg: &mut String, frame: &Frame, bounds: Rect, state: &VehicleState, vehicle: &DiveVehicle) {
-    let shift = state.map.placement.as_ref().map_or((0.0, 0.0), |p| (p.east_m, p.north_m));
+    let shift = state.map.shift_m();
     let edge = vehicle.cell_m;
     let mut runs: std::collections::BTreeMap<u8, String> = std::collections::BTreeMap::new();
     let rows = vehicle.labels.copy_area(

@@ -46,7 +46,7 @@ pub(super) fn summary(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) 
     sentences.push(when(dive, state, vehicle));
     sentences.push(place(dive, vehicle));
     sentences.push(found(state, vehicle));
-    sentences.extend(extent(dive, vehicle));
+    sentences.extend(extent(dive, state, vehicle));
     sentences.extend(arrived(state, vehicle));
     sentences.push(orders(vehicle));
     let [sent, received, dropped] = dive.frames;
@@ -105,12 +105,11 @@ fn lat_lon(origin: Origin, east_m: f64, north_m: f64) -> (f64, f64) {
 }
 
 /// Where the map lies.
-fn extent(dive: &Dive, vehicle: &DiveVehicle) -> Option<String> {
+fn extent(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -> Option<String> {
     let bounds = vehicle.labels.bounds()?;
-    let metres = |cells: i32| f64::from(cells) * vehicle.cell_m;
-    let (west, south) = (metres(bounds.x), metres(bounds.y));
-    let (east, north) =
-        (west + f64::from(bounds.width) * vehicle.cell_m, south + f64::from(bounds.height) * vehicle.cell_m);
+    let (shift, cell_m) = (state.map.shift_m(), vehicle.cell_m);
+    let (west, south) = (f64::from(bounds.x) * cell_m + shift.0, f64::from(bounds.y) * cell_m + shift.1);
+    let (east, north) = (west + f64::from(bounds.width) * cell_m, south + f64::from(bounds.height) * cell_m);
     let on_earth = dive.state.mission.origin.map_or_else(String::new, |origin| {
         let [(south, west), (north, east)] = [(west, south), (east, north)].map(|(x, y)| lat_lon(origin, x, y));
         format!(", or from latitude {south:.6} to {north:.6} and from longitude {west:.6} to {east:.6}")

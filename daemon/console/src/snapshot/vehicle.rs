@@ -43,7 +43,7 @@ fn vehicle(
         closed_loops: track(record.registration.closures()),
         map: map(surface, address, record, &view, labels.values().sum(), facts),
         labels: labels.iter().map(|(&l, &n)| label(l, n, record, &view, address, facts)).collect(),
-        label_book: record.label_books().iter().map(|(&label, book)| (label, book.into())).collect(),
+        label_book: record.labels_in_view().clone(),
         label_tree: record.tree_in_view().map(MapLabelTree::of),
         link: link::channel(&view, now),
         usbl: record.found.as_ref().map(|(line, at)| UsblMeasurement {
@@ -261,7 +261,6 @@ fn label(
 ) -> MapLabel {
     // Weights and images belong to the labels of the current epoch.
     let is_current = record.earlier_map().is_none_or(|earlier| earlier.epoch == record.epoch);
-    let book = record.label_book(id);
     let cell_m = view.cell_m().unwrap_or(facts.cell_m);
     MapLabel {
         id,
@@ -273,9 +272,7 @@ fn label(
             true => exemplar::progress(id, record, view, address),
             false => exemplar::none(),
         },
-        name: book.and_then(|book| book.name.clone()),
-        colour: book.and_then(|book| book.colour.clone()),
-        merged_into: book.and_then(|book| book.merged_into),
+        book: record.label_book(id).cloned().unwrap_or_default(),
     }
 }
 

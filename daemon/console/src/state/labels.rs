@@ -1,6 +1,7 @@
 //! The labels of a map and their exemplars.
 
 use scenecast_protocol::map::LabelTree;
+use scenecast_surface::record::StoredLabel;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -22,15 +23,9 @@ pub struct MapLabel {
     pub weight: f64,
     /// The exemplars of the label, and the request for another.
     pub exemplar: ExemplarProgress,
-    /// The operator's name of the label; null without one.
-    #[serde(default)]
-    pub name: Option<String>,
-    /// The operator's colour of the label, as in `#a0b1c2`; null without one.
-    #[serde(default)]
-    pub colour: Option<String>,
-    /// The label that it is shown as a part of; null without one.
-    #[serde(default)]
-    pub merged_into: Option<u8>,
+    /// What the operator says of it.
+    #[serde(flatten)]
+    pub book: StoredLabel,
 }
 
 /// Which labels become one at coarser cuts.

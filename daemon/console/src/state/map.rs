@@ -45,6 +45,13 @@ pub struct EarlierMap {
     pub current_cells: u32,
 }
 
+impl MapSummary {
+    /// The shift from the map to the world frame, metres east and north.
+    pub fn shift_m(&self) -> (f64, f64) {
+        self.placement.as_ref().map_or((0.0, 0.0), |p| (p.east_m, p.north_m))
+    }
+}
+
 /// The shift from a vehicle's map to the world frame.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct MapPlacement {

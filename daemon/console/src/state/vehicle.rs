@@ -1,11 +1,10 @@
 //! A vehicle as the surface knows it.
 
-use super::label_book::LabelBook;
 use super::labels::{MapLabel, MapLabelTree};
 use super::link::VehicleChannel;
 use super::map::MapSummary;
 use super::storage::{VehicleMarker, VehicleNote};
-use scenecast_surface::{AreasOrder, DestinationOrder, FenceOrder, LimitsOrder, SettingsOrder};
+use scenecast_surface::{AreasOrder, DestinationOrder, FenceOrder, LabelBook, LimitsOrder, SettingsOrder};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;

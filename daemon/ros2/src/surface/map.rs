@@ -95,13 +95,12 @@ impl MapTopics {
 
 fn key(vehicle: &VehicleState) -> MapKey {
     let (map, book) = (&vehicle.map, &vehicle.label_book);
-    let placement = map.placement.as_ref();
     MapKey {
         version: map.version,
         epoch: map.epoch,
         earlier_run: map.earlier.as_ref().map(|earlier| earlier.run),
-        shift_m: placement.map_or((0.0, 0.0), |p| (p.east_m, p.north_m)),
-        colours: vehicle.labels.iter().map(|label| (label.id, book.colour(book.shown_as(label.id)))).collect(),
+        shift_m: map.shift_m(),
+        colours: vehicle.labels.iter().map(|label| (label.id, book.class_colour(label.id))).collect(),
     }
 }
 

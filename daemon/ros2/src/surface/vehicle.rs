@@ -189,7 +189,7 @@ impl StateTopics {
         let Some(status) = vehicle.status.as_ref().filter(|status| self.last_s != Some(status.at_s)) else { return };
         self.last_s = Some(status.at_s);
         let stamp = stamps.at(status.at_s);
-        let shift = vehicle.map.placement.as_ref().map_or((0.0, 0.0), |p| (p.east_m, p.north_m));
+        let shift = vehicle.map.shift_m();
         let place = place(status, shift, stamps);
         if self.pose.subscribers() > 0 {
             self.pose.publish(pose(&place, status.pose.sigma_m, WORLD_FRAME));

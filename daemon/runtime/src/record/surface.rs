@@ -209,7 +209,7 @@ impl RecordedVehicle {
         }
         if let Some(status) = vehicle.status.as_ref().filter(|status| self.report_s != Some(status.at_s)) {
             self.report_s = Some(status.at_s);
-            let shift = vehicle.map.placement.as_ref().map_or((0.0, 0.0), |p| (p.east_m, p.north_m));
+            let shift = vehicle.map.shift_m();
             let place = place(status, shift, stamps);
             let sigma_m = status.pose.sigma_m;
             entries.push(entry_of(&vehicle.name, "pose", stamps, &pose(&place, sigma_m, WORLD_FRAME)));
@@ -229,7 +229,7 @@ impl RecordedVehicle {
                     epoch: vehicle.map.epoch.into(),
                     label: label.id,
                     image: image.number,
-                    name: label.name.clone().unwrap_or_default(),
+                    name: label.book.name.clone().unwrap_or_default(),
                     format: "webp".to_owned(),
                     data: stored.webp.clone(),
                 };

@@ -1,7 +1,8 @@
 //! Copies of maps: what the surface has received, cell by cell, with its time, and the labels that cells had before.
 
 use super::contact::StoredContact;
-use super::event::{StoredCells, StoredLabel};
+use super::event::StoredCells;
+use crate::label_book::LabelBook;
 use scenecast_protocol::map::{Cell, LayerDescriptor, LayerId, LayerReplica, Replica, SharedTiles};
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::Placement;
@@ -33,7 +34,7 @@ pub struct EarlierMap {
     /// The epoch of its labels.
     pub epoch: u8,
     /// The operator's names of its labels.
-    pub names: BTreeMap<u8, StoredLabel>,
+    pub names: LabelBook,
     pub map: MapCopy,
     /// The last report of its run.
     pub(crate) contact: StoredContact,

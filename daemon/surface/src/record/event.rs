@@ -2,6 +2,7 @@
 //! numbers.
 
 use super::contact::StoredContact;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -234,12 +235,16 @@ pub struct StoredRequest {
 }
 
 /// The operator's name, colour and merging of a label.
-#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Hash, Default, Serialize, Deserialize, JsonSchema)]
 pub struct StoredLabel {
+    /// The operator's name of the label; null without one.
+    #[serde(default)]
     pub name: Option<String>,
-    /// Its colour, as in `#a0b1c2`.
+    /// The operator's colour of the label, as in `#a0b1c2`; null without one.
+    #[serde(default)]
     pub colour: Option<String>,
-    /// The label that it is shown as a part of.
+    /// The label that it is shown as a part of; null without one.
+    #[serde(default)]
     pub merged_into: Option<u8>,
 }
 

@@ -7,6 +7,7 @@ use super::event::{
     StoredIntent, StoredLabel, StoredLogEntry, StoredMarker, StoredNote, StoredOrder, StoredPlaces, StoredRequest,
     VehicleEvent,
 };
+use crate::label_book::LabelBook;
 use crate::log::make_room;
 use scenecast_protocol::map::{Cell, LabelTree};
 use scenecast_protocol::time::Instant;
@@ -84,7 +85,7 @@ pub struct VehicleMemory {
     pub(crate) exemplars: BTreeMap<u8, Vec<StoredImage>>,
     /// Serial number of requests and the open one, by label.
     pub(crate) requests: BTreeMap<u8, (u8, Option<StoredRequest>)>,
-    pub(crate) labels: BTreeMap<u8, StoredLabel>,
+    pub(crate) labels: LabelBook,
     /// The tree of the labels as on the wire; empty before the first.
     pub(crate) tree: Vec<u8>,
     pub(crate) notes: VecDeque<StoredNote>,
@@ -186,7 +187,7 @@ impl VehicleMemory {
     }
 
     /// The operator's names of labels.
-    pub fn labels(&self) -> &BTreeMap<u8, StoredLabel> {
+    pub fn labels(&self) -> &LabelBook {
         &self.labels
     }
 

@@ -40,7 +40,10 @@ impl Shown {
         Self {
             cells: vehicle.map.explored_cells,
             track: !vehicle.track.is_empty(),
-            names: (vehicle.map.epoch, vehicle.labels.iter().filter_map(|l| Some((l.id, l.name.clone()?))).collect()),
+            names: (
+                vehicle.map.epoch,
+                vehicle.labels.iter().filter_map(|l| Some((l.id, l.book.name.clone()?))).collect(),
+            ),
             notes: vehicle.notes.iter().map(|note| note.text.clone()).collect(),
             constraints: [
                 value(serde_json::to_value(&orders.fence)),

@@ -185,7 +185,7 @@ pub(in crate::http) async fn file(
         Err(response) => return response,
     };
     let at = cached.map.cells().at;
-    let (origin, placement, book, tree, markers, caption) = {
+    let (origin, moved_m, book, tree, markers, caption) = {
         let snapshot = shared.snapshots.borrow();
         let vehicle = snapshot.vehicle(id);
         let book = vehicle.map(|v| v.label_book.clone()).unwrap_or_default();
@@ -193,17 +193,17 @@ pub(in crate::http) async fn file(
         let markers = vehicle.map(|v| v.markers.clone()).unwrap_or_default();
         let name = vehicle.map_or(String::new(), |v| v.name.clone());
         let caption = MapCaption { address: id, name, utc: MissionUtc::now(&snapshot.state).at(seconds(at)) };
-        let placement = vehicle.and_then(|v| v.map.placement.clone());
-        (snapshot.state.mission.origin, placement, book, tree, markers, Some(caption))
+        let moved_m = vehicle.map_or((0.0, 0.0), |v| v.map.shift_m());
+        (snapshot.state.mission.origin, moved_m, book, tree, markers, Some(caption))
     };
-    let moves = placement.as_ref().map_or(0, |p| p.version);
     let mut named = DefaultHasher::new();
     book.hash(&mut named);
+    [moved_m.0, moved_m.1].map(f64::to_bits).hash(&mut named);
     origin.map(|o| [o.lat_deg, o.lon_deg].map(f64::to_bits)).hash(&mut named);
     caption.as_ref().map(|c: &MapCaption| &c.name).hash(&mut named);
     (count, tree.as_ref().map(LabelTree::to_bytes)).hash(&mut named);
     markers.iter().for_each(|m| (m.number, &m.text, m.at_s.to_bits()).hash(&mut named));
-    let tag = format!("{id}-{}-{moves}-{:x}", cached.map.tag(), named.finish());
+    let tag = format!("{id}-{}-{:x}", cached.map.tag(), named.finish());
     if is_held(&headers, &tag) {
         return tagged(&headers, &tag, || StatusCode::OK.into_response());
     }
@@ -211,7 +211,6 @@ pub(in crate::http) async fn file(
         return StatusCode::INTERNAL_SERVER_ERROR.into_response();
     };
     let made = tokio::task::spawn_blocking(move || {
-        let moved_m = placement.map_or((0.0, 0.0), |p| (p.east_m, p.north_m));
         let cells = MapCells { moved_m, book, tree, markers, caption, ..cached.map.cells().clone() };
         cut_at(count, cells).export(format, origin)
     });

@@ -1,59 +1,57 @@
 //! What the operator says of labels: one truth for the page, exports, reports and other programs.
 
+use super::record::StoredLabel;
 use scenecast_core::palette;
-use scenecast_surface::record::StoredLabel;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
+use std::ops::{Deref, DerefMut};
 
 /// The operator's names, colours and merges, by label.
 #[derive(Debug, Clone, PartialEq, Eq, Hash, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(transparent)]
-pub struct LabelBook(BTreeMap<u8, LabelEntry>);
+pub struct LabelBook(BTreeMap<u8, StoredLabel>);
 
-/// What the operator says of a label.
-#[derive(Debug, Clone, PartialEq, Eq, Hash, Default, Serialize, Deserialize, JsonSchema)]
-pub struct LabelEntry {
-    /// Its name; null without one.
-    #[serde(default)]
-    pub name: Option<String>,
-    /// Its colour, as in `#a0b1c2`; null without one.
-    #[serde(default)]
-    pub colour: Option<String>,
-    /// The label that it is shown as a part of; null without one.
-    #[serde(default)]
-    pub merged_into: Option<u8>,
-}
-
-impl From<&StoredLabel> for LabelEntry {
-    fn from(StoredLabel { name, colour, merged_into }: &StoredLabel) -> Self {
-        Self { name: name.clone(), colour: colour.clone(), merged_into: *merged_into }
-    }
-}
-
-impl FromIterator<(u8, LabelEntry)> for LabelBook {
-    fn from_iter<I: IntoIterator<Item = (u8, LabelEntry)>>(entries: I) -> Self {
+impl FromIterator<(u8, StoredLabel)> for LabelBook {
+    fn from_iter<I: IntoIterator<Item = (u8, StoredLabel)>>(entries: I) -> Self {
         Self(entries.into_iter().collect())
     }
 }
 
+impl Deref for LabelBook {
+    type Target = BTreeMap<u8, StoredLabel>;
+
+    fn deref(&self) -> &Self::Target {
+        &self.0
+    }
+}
+
+impl DerefMut for LabelBook {
+    fn deref_mut(&mut self) -> &mut Self::Target {
+        &mut self.0
+    }
+}
+
 impl LabelBook {
-    /// The labels that the operator has said something of.
-    pub fn entries(&self) -> impl Iterator<Item = (u8, &LabelEntry)> {
-        self.0.iter().map(|(&label, entry)| (label, entry))
+    /// The labels that the merges of `label` lead to, one after the other; a circle of an earlier version is left after its members.
+    pub(super) fn merges(&self, label: u8) -> impl Iterator<Item = u8> + '_ {
+        let into = |at: &u8| self.0.get(at)?.merged_into;
+        std::iter::successors(into(&label), into).take(self.0.len())
     }
 
     /// The label that `label` is shown as: itself, or where its merges lead.
     pub fn shown_as(&self, label: u8) -> u8 {
-        let mut at = label;
-        // Merges in a circle, of an earlier version, end somewhere.
-        for _ in 0..self.0.len() {
-            match self.0.get(&at).and_then(|entry| entry.merged_into) {
-                Some(into) => at = into,
-                None => break,
-            }
-        }
-        at
+        self.merges(label).last().unwrap_or(label)
+    }
+
+    /// The name of the label that `label` is shown as, or its number in words.
+    pub fn class_title(&self, label: u8) -> String {
+        self.title(self.shown_as(label))
+    }
+
+    /// The colour in which `label` is shown; black for an unexplored cell.
+    pub fn class_colour(&self, label: u8) -> [u8; 3] {
+        self.colour(self.shown_as(label))
     }
 
     /// The operator's name of a label.
@@ -84,9 +82,9 @@ impl LabelBook {
     #[must_use]
     pub fn grouped(&self, group: impl Fn(u8) -> u8, cells: &BTreeMap<u8, u32>) -> Self {
         let mut grouped = Self::default();
-        for (label, entry) in self.entries().filter(|(label, _)| group(*label) == *label) {
+        for (&label, entry) in self.0.iter().filter(|(label, _)| group(**label) == **label) {
             let merged_into = entry.merged_into.map(&group).filter(|into| *into != label);
-            grouped.0.insert(label, LabelEntry { merged_into, ..entry.clone() });
+            grouped.0.insert(label, StoredLabel { merged_into, ..entry.clone() });
         }
         let mut members: Vec<(u8, u32)> = cells.iter().map(|(&label, &count)| (label, count)).collect();
         members.sort_by_key(|&(label, count)| (std::cmp::Reverse(count), label));
@@ -103,8 +101,8 @@ impl LabelBook {
 mod tests {
     use super::*;
 
-    fn entry(name: Option<&str>, merged_into: Option<u8>) -> LabelEntry {
-        LabelEntry { name: name.map(str::to_owned), colour: None, merged_into }
+    fn entry(name: Option<&str>, merged_into: Option<u8>) -> StoredLabel {
+        StoredLabel { name: name.map(str::to_owned), colour: None, merged_into }
     }
 
     #[test]
@@ -122,7 +120,7 @@ mod tests {
 
     #[test]
     fn a_colour_is_the_operators_or_that_of_the_palette() {
-        let own = LabelEntry { colour: Some("#0a0Bff".to_owned()), ..LabelEntry::default() };
+        let own = StoredLabel { colour: Some("#0a0Bff".to_owned()), ..StoredLabel::default() };
         let book = LabelBook::from_iter([(3, own)]);
         assert_eq!((book.colour(3), book.colour_text(3)), ([10, 11, 255], "#0a0bff".to_owned()));
         assert_eq!(book.colour(4), palette::colour(4));
