@@ -211,7 +211,7 @@ mod tests {
         assert!(found.map_bytes < 56_000 && found.page_bytes < 200_000, "{found:?}");
         assert!(found.update.tiles_bytes < 20_000.0 && found.update.cells >= 500.0, "{found:?}");
         let refused: Vec<&str> = found.exports.iter().filter(|e| e.refused.is_some()).map(|e| e.format).collect();
-        assert_eq!(refused, ["png"], "a PNG has no empty tiles");
+        assert_eq!(refused, ["png", "coco.json"], "a PNG has no empty tiles, and COCO annotates it");
         let tiff = found.exports.iter().find(|e| e.format == "utm.tif").unwrap();
         assert!(tiff.bytes < 2_000_000, "{tiff:?}");
         let again = run();
