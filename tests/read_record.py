@@ -52,7 +52,7 @@ def main(folder):
         for connection, _, data in reader.messages():
             message = store.deserialize_cdr(data, connection.msgtype)
             counts[connection.topic] = counts.get(connection.topic, 0) + 1
-            if connection.topic.endswith("/map_cells"):
+            if connection.topic.endswith("/map_cells") and not message.layer:
                 change(cells, message)
             if connection.topic.endswith("/map_version"):
                 if stated is not None:

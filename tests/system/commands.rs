@@ -111,6 +111,7 @@ fn every_command_has_help_with_an_example() {
         &["key", "new"],
         &["key", "show"],
         &["record", "recover"],
+        &["replay"],
         &["report"],
         &["key", "token"],
         &["ctl"],

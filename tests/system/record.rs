@@ -1,7 +1,7 @@
 //! Records of missions: read by another program, cut by a kill, the same for the same seed.
 
 use scenecast_tests::{
-    LIGHT, Process, assert_refused, free_port, python, run, run_script, scenecast, scratch, state, wait_until,
+    LIGHT, Process, assert_refused, free_port, http, python, run, run_script, scenecast, scratch, state, wait_until,
     workspace,
 };
 use std::path::{Path, PathBuf};
@@ -92,6 +92,85 @@ fn a_report_says_what_the_record_has() {
             || page.matches("http://").count() == page.matches("http://www.w3.org/2000/svg").count()
     );
     assert_refused(&["report", dir.join("record_vehicle").to_str().unwrap()], &["no record of a surface"]);
+    std::fs::remove_dir_all(dir).unwrap();
+}
+
+#[test]
+fn a_replay_shows_each_moment_as_either_side_knew_it() {
+    let (dir, port) = (scratch("record-replay"), free_port().to_string());
+    simulate(&dir);
+    let records = ["record_surface", "record_vehicle"].map(|name| dir.join(name));
+    let [surface, vehicle] = records.each_ref().map(|record| record.to_str().unwrap());
+    let replay = Process::start(&["replay", surface, vehicle, "--port", &port]);
+    let port = port.parse().unwrap();
+    wait_until("the page is there", || state(port).is_some());
+    let begin = state(port).unwrap();
+    let times = ["from_utc_s", "to_utc_s"].map(|name| begin["replay"][name].as_f64().unwrap());
+    assert_eq!(begin["replay"]["sides"], serde_json::json!(["operator", "vehicle", "difference"]));
+    let post = |path: &str, body: serde_json::Value| {
+        http(port, "POST", path, "X-Scenecast: 1\r\nContent-Type: application/json\r\n", &body.to_string()).unwrap()
+    };
+    let cells_of = |side: &str, at: f64| {
+        let (status, _) = post("/api/v2/replay", serde_json::json!({ "at_utc_s": at, "side": side }));
+        assert_eq!(status, 200);
+        state(port).unwrap()["vehicles"][0]["map"]["explored_cells"].as_u64().unwrap()
+    };
+    let sides = ["operator", "vehicle", "difference"];
+    let end = sides.map(|side| cells_of(side, times[1]));
+    assert!(end[0] > 100 && end[0] == end[1] && end[2] == 0, "{end:?}");
+    let middle = sides.map(|side| cells_of(side, times[0] + 40.0));
+    assert!(middle[0] < middle[1] && middle[1] < end[1] && middle[2] >= middle[1] - middle[0], "{middle:?}");
+    let map = http(port, "GET", "/api/v2/vehicles/1/map.csv", "", "").unwrap();
+    let lines = String::from_utf8(map.1).unwrap().lines().count() as u64;
+    assert_eq!((map.0, lines), (200, middle[2] + 1), "a file of the map that is shown");
+    let (status, events) = http(port, "GET", "/api/v2/replay/events", "", "").unwrap();
+    assert!(status == 200 && String::from_utf8(events).unwrap().contains("\"label\""));
+    let log = |at: f64| {
+        cells_of("operator", at);
+        let body = http(port, "GET", "/api/v2/log", "", "").unwrap().1;
+        serde_json::from_slice::<serde_json::Value>(&body).unwrap()["entries"].as_array().unwrap().clone()
+    };
+    assert!(log(times[0]).len() < log(times[1]).len());
+    assert!(log(times[1])[0]["utc"].as_str().unwrap().starts_with("2000-01-01T00:0"), "{}", log(times[1])[0]);
+    let refused = [
+        ("/api/v2/vehicles/1/constraints", serde_json::json!({ "hold": true, "abort": false }), 403),
+        ("/api/v2/replay", serde_json::json!({ "speed": 0 }), 422),
+        ("/api/v2/replay", serde_json::json!({ "moment": 1 }), 422),
+    ];
+    for (path, body, status) in refused {
+        assert_eq!(post(path, body.clone()).0, status, "{path} {body}");
+    }
+    drop(replay);
+    assert_refused(&["replay", dir.join("none").to_str().unwrap()], &["none"]);
+    std::fs::remove_dir_all(dir).unwrap();
+}
+
+#[test]
+fn a_replayed_channel_loses_the_same_frames() {
+    let dir = scratch("record-channel");
+    let [first, again, other] = ["first", "again", "other"].map(|name| dir.join(name));
+    simulate(&first);
+    let replay = format!("channel.replay={}", first.display());
+    let fly = |out: &Path, seed: &str| {
+        let fixed = ["sim", "--duration", "60", "--seed", seed, "--set", &replay, "--out", out.to_str().unwrap()];
+        let flown = run(&[&fixed[..], &LIGHT].concat());
+        assert!(flown.status.success(), "{}", String::from_utf8_lossy(&flown.stderr));
+    };
+    fly(&again, "3");
+    let text = |out: &Path, file: &str| std::fs::read_to_string(out.join(file)).unwrap();
+    // Fields of a line: time, direction, bytes, kind, fate, reason.
+    let fates = |out: &Path| -> Vec<String> {
+        text(out, "frames.log").lines().map(|line| line.split(' ').take(5).collect::<Vec<_>>().join(" ")).collect()
+    };
+    let lost = |out: &Path| fates(out).iter().filter(|line| line.ends_with("lost")).count();
+    assert!(lost(&first) > 3);
+    assert_eq!(fates(&first), fates(&again));
+    let map = |out: &Path| std::fs::read(out.join("operator-map.png")).unwrap();
+    assert!(map(&first) == map(&again), "the operator's map");
+    fly(&other, "4");
+    assert!(lost(&other) > 0 && fates(&other) != fates(&first), "another mission over the same channel");
+    let (nowhere, out) = (format!("channel.replay={}", dir.display()), dir.join("none"));
+    assert_refused(&["sim", "--set", &nowhere, "--out", out.to_str().unwrap()], &["no record"]);
     std::fs::remove_dir_all(dir).unwrap();
 }
 

@@ -9,7 +9,9 @@ use crate::orders::{
     BudgetOrder, ExemplarAction, ExemplarOrder, LabelOrder, MarkerOrder, NoteOrder, OrderChanges, RemoveMarkerOrder,
 };
 use crate::snapshot::{command_state, seconds};
-use crate::state::{AcceptedOrder, ArchivedMap, CellHistory, CommandState, FormerLabel};
+use crate::state::{
+    AcceptedOrder, ArchivedMap, CellHistory, CommandState, FormerLabel, ReplayEventList, ReplayOrder, ReplayState,
+};
 use described::describe;
 use scenecast_protocol::coordinates::WorldPoint;
 use scenecast_protocol::directive::{Constraints, Slot, SlotId};
@@ -84,6 +86,9 @@ pub enum SurfaceRequest {
     ArchivedMap(String),
     /// Request command, hand it over, take it or give it up.
     Command(CommandAction),
+    /// Show another moment of a record. A surface that is live handles neither this request nor the next one.
+    Replay(ReplayOrder),
+    ReplayEvents,
 }
 
 impl SurfaceRequest {
@@ -96,7 +101,7 @@ impl SurfaceRequest {
     pub(crate) fn order_kind(&self) -> Option<OrderKind> {
         match self {
             Self::Map(_) | Self::FormerLabels(..) | Self::Exemplar(..) | Self::Fit(..) | Self::Command(_) => None,
-            Self::Log | Self::Archives | Self::ArchivedMap(_) => None,
+            Self::Log | Self::Archives | Self::ArchivedMap(_) | Self::Replay(_) | Self::ReplayEvents => None,
             Self::Label(..)
             | Self::Draft(..)
             | Self::Note(..)
@@ -142,6 +147,9 @@ pub enum Reply {
     Log(Vec<LogEntry>),
     /// Who has command after a change.
     Command(CommandState),
+    /// The moment of a record that is shown.
+    Replay(Box<ReplayState>),
+    ReplayEvents(ReplayEventList),
     /// The role of the principal does not allow it: the reason in one line.
     Forbidden(String),
     /// Another principal has command: the reason and the remedy in one line.
@@ -304,6 +312,7 @@ fn handle(surface: &mut Surface, request: SurfaceRequest, cell_m: f64, now: Inst
         SurfaceRequest::Log => Reply::Log(surface.log().entries().cloned().collect()),
         SurfaceRequest::Archives => Reply::Archives(Vec::new()),
         SurfaceRequest::FormerLabels(..) | SurfaceRequest::ArchivedMap(_) => return None,
+        SurfaceRequest::Replay(_) | SurfaceRequest::ReplayEvents => return None,
         // Handled with its principal, before.
         SurfaceRequest::Command(_) => return None,
     })

@@ -4,6 +4,7 @@ mod command;
 mod labels;
 mod link;
 mod map;
+mod replay;
 mod storage;
 mod vehicle;
 
@@ -16,6 +17,7 @@ pub use link::{ChannelQuality, LinkDirection, LinkRates, LinkSummary, ReportedBa
 pub use map::{
     CellHistory, EarlierMap, FormerLabel, LayerBody, MapBody, MapEvent, MapIndex, MapPlacement, MapSummary, TileLayer,
 };
+pub use replay::{DifferingCells, ReplayEvent, ReplayEventList, ReplayOrder, ReplaySide, ReplayState};
 pub use storage::{ArchiveList, ArchivedMap, LogLine, LogList, StorageInfo, VehicleMarker, VehicleNote};
 pub use vehicle::{
     AppliedOrder, DirectiveSlots, InForceKnowledge, OrderProgress, OrderStatus, OtherSurface, PlannedPath,
@@ -56,6 +58,9 @@ pub struct MissionState {
     /// The true classes of a simulated sea floor; null where they are not known, and so in each real mission.
     #[serde(default)]
     pub truth: Option<TruthInfo>,
+    /// The moment of the record that is shown; null for a live surface.
+    #[serde(default)]
+    pub replay: Option<ReplayState>,
 }
 
 /// The true classes of a part of a simulated sea floor, of which `/api/v2/truth.png` is the picture. No vehicle knows them.

@@ -56,6 +56,11 @@ impl Principal {
         Self { name: "local".to_owned(), role: Role::Administrator }
     }
 
+    /// Every client of a record that is replayed without tokens.
+    pub fn local_viewer() -> Self {
+        Self { name: "local".to_owned(), role: Role::Viewer }
+    }
+
     /// The holder of the only token of a file that names neither roles nor people.
     pub fn sole_administrator() -> Self {
         Self { name: "administrator".to_owned(), role: Role::Administrator }

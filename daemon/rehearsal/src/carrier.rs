@@ -5,11 +5,14 @@ use crate::modem_rig::{ModemRig, SURFACE, VEHICLE};
 use scenecast_config::{Config, ModemKind};
 use scenecast_core::UserError;
 use scenecast_drivers::modem::Station;
+use scenecast_files::RecordedLink;
 use scenecast_host::{FrameEvent, LinkEnd, LinkHost, channel_station};
 use scenecast_protocol::mac::ModemProfile;
 use scenecast_protocol::time::Instant;
+use sim_channel::loss::Replayed;
 use sim_channel::{Channel, ChannelConfig, LossModel, NodeId, NodePosition, ReceptionOutcome};
 use std::collections::VecDeque;
+use std::path::Path;
 use std::time::Duration;
 
 const NODES: [NodeId; 2] = [NodeId(1), NodeId(0)];
@@ -33,7 +36,10 @@ pub(crate) struct Carrier {
 impl Carrier {
     /// The configured medium, and the stations of vehicle and surface.
     pub(crate) fn new(config: &Config, seed: u64, now: Instant) -> Result<(Self, [Station; 2]), UserError> {
-        let channel = Channel::new(channel_config(config), seed);
+        let mut channel = Channel::new(channel_config(config), seed);
+        if let Some(folder) = &config.channel.replay {
+            replay(&mut channel, folder)?;
+        }
         let (medium, stations) = match config.modem.kind {
             ModemKind::Tcp | ModemKind::Udp => {
                 let profile = scenecast_config::modem_profile(config, config.channel.bit_rate);
@@ -138,6 +144,18 @@ fn timed<T>(spent: &mut Duration, compute: impl FnOnce() -> T) -> T {
     let result = compute();
     *spent += began.elapsed();
     result
+}
+
+/// Loses the frames of a recorded link again.
+fn replay(channel: &mut Channel, folder: &Path) -> Result<(), UserError> {
+    let link = RecordedLink::read(folder)?;
+    for (from, to, frames) in [(VEHICLE, SURFACE, link.up), (SURFACE, VEHICLE, link.down)] {
+        let recorded = frames.iter().map(|frame| (Duration::from_secs_f64(frame.arrives_s), frame.delivered));
+        if let Some(losses) = Replayed::new(recorded) {
+            channel.set_link_loss(NODES[from], NODES[to], losses.into());
+        }
+    }
+    Ok(())
 }
 
 fn channel_config(config: &Config) -> ChannelConfig {

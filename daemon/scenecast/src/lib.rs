@@ -4,4 +4,4 @@ pub mod commands;
 #[cfg(feature = "rehearsal")]
 mod demo;
 #[cfg(feature = "rehearsal")]
-mod mission_record;
+pub mod mission_record;

@@ -23,11 +23,17 @@ pub struct MissionRecord {
     vehicle: (RecordWriter, VehicleRecorder),
     /// Files begun so far: of the surface, of the vehicle.
     parts: [u32; 2],
+    /// Mission time between two syncs, and of the last one.
+    sync: (Duration, Instant),
 }
 
 impl MissionRecord {
-    /// Begins both records in these new folders.
-    pub fn create(mission: &mut Mission, [surface, vehicle]: [&Path; 2]) -> Result<Self, UserError> {
+    /// Begins both records in these new folders. After each `sync_interval` of mission time they are made durable.
+    pub fn create(
+        mission: &mut Mission,
+        [surface, vehicle]: [&Path; 2],
+        sync_interval: Duration,
+    ) -> Result<Self, UserError> {
         let limits = limits(mission.config());
         mission.keep_end_events();
         let config = mission.config();
@@ -35,10 +41,11 @@ impl MissionRecord {
             surface: (RecordWriter::create(surface, limits)?, SurfaceRecorder::new(config, true)),
             vehicle: (RecordWriter::create(vehicle, limits)?, VehicleRecorder::new(config, true)),
             parts: [1; 2],
+            sync: (sync_interval, mission.now()),
         })
     }
 
-    /// Records what has changed since the last call, and makes it durable.
+    /// Records what has changed since the last call.
     pub fn observe(&mut self, mission: &mut Mission, snapshot: &Snapshot) -> Result<(), UserError> {
         for (at, event) in mission.take_end_events() {
             let stamps = stamps(at);
@@ -52,8 +59,12 @@ impl MissionRecord {
         write(&mut self.surface.0, entries)?;
         let entries = self.vehicle.1.observe(self.parts[1], mission.vehicle(), &stamps);
         write(&mut self.vehicle.0, entries)?;
-        self.parts[0] += u32::from(self.surface.0.sync()?);
-        self.parts[1] += u32::from(self.vehicle.0.sync()?);
+        let (interval, synced) = &mut self.sync;
+        if mission.now().since(*synced) >= *interval {
+            *synced = mission.now();
+            self.parts[0] += u32::from(self.surface.0.sync()?);
+            self.parts[1] += u32::from(self.vehicle.0.sync()?);
+        }
         Ok(())
     }
 

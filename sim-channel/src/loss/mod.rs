@@ -4,11 +4,13 @@
 
 mod bursts;
 mod measured;
+mod replayed;
 mod snr;
 mod trace;
 
 pub use bursts::{GilbertElliott, ThreeState};
 pub use measured::{FitError, FittedLink, RangeTable, RangeTableError};
+pub use replayed::Replayed;
 pub use snr::Snr;
 pub use trace::{Trace, TraceError};
 
@@ -49,6 +51,8 @@ pub enum LossModel {
     Range(RangeTable),
     /// Loss replayed from a record.
     Trace(Trace),
+    /// The frames of a real link, lost again.
+    Replayed(Replayed),
 }
 
 impl LossModel {
@@ -62,6 +66,7 @@ impl LossModel {
             LossModel::Snr(model) => model.instance(),
             LossModel::Range(table) => table.instance(),
             LossModel::Trace(trace) => trace.instance(),
+            LossModel::Replayed(link) => link.instance(),
         }
     }
 }
@@ -93,6 +98,12 @@ impl From<RangeTable> for LossModel {
 impl From<Trace> for LossModel {
     fn from(trace: Trace) -> Self {
         Self::Trace(trace)
+    }
+}
+
+impl From<Replayed> for LossModel {
+    fn from(link: Replayed) -> Self {
+        Self::Replayed(link)
     }
 }
 

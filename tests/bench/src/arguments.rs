@@ -10,6 +10,7 @@ use crate::live::LiveBench;
 use crate::localisation::LocalisationBench;
 use crate::map_codec::MapCodecBench;
 use crate::raster::RasterBench;
+use crate::record::RecordBench;
 use crate::registration::RegistrationBench;
 use crate::restart::{ForgetBench, RestartBench};
 use crate::steering::SteeringBench;
@@ -60,6 +61,8 @@ enum Bench {
     Steering(SteeringBench),
     /// A stranger at the link: forged, replayed and damaged frames, with and without a key.
     Stranger(StrangerBench),
+    /// Records of missions: the maps that a replay shows, what a power cut takes, what recording costs.
+    Record(RecordBench),
     /// Three surfaces with one key and one vehicle: random schedules of orders, take-overs, crashes and losses.
     Surfaces(SurfacesBench),
     /// Train the table that the context coder starts from.
@@ -86,6 +89,7 @@ impl Arguments {
             Bench::Restart(r) => r.run(),
             Bench::Steering(s) => s.run(),
             Bench::Stranger(s) => s.run(),
+            Bench::Record(r) => r.run(),
             Bench::Surfaces(s) => s.run(),
             Bench::TrainPrior(t) => t.run(),
             Bench::Wide(w) => w.run(),

@@ -15,6 +15,7 @@ mod map_codec;
 mod process;
 mod program;
 mod raster;
+mod record;
 mod registration;
 mod restart;
 mod steering;

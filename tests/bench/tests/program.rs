@@ -33,6 +33,14 @@ fn exports_of_a_wide_survey_have_each_cell_in_its_place() {
 
 /// Needs the program `scenecast` beside this one, which Cargo builds for the tests of its package.
 #[test]
+fn a_replay_equals_its_mission_and_a_power_cut_takes_two_seconds() {
+    let judged = run(&["record", "--missions", "1", "--seed", "4", "--duration", "90", "--cuts", "6", "--json"]);
+    assert!(judged.status.success(), "{}", String::from_utf8_lossy(&judged.stderr));
+    let rows: serde_json::Value = serde_json::from_slice(&judged.stdout).unwrap();
+    assert!(rows[0]["compared"].as_u64() > Some(180) && rows[0]["cuts"].as_u64() > Some(3), "{rows}");
+}
+
+#[test]
 fn restarts_of_either_end_lose_nothing_and_repeat_no_order() {
     let (runs, page_limit_s) = if is_full() { ("20", "2") } else { ("3", "60") };
     let output = run(&["restart", "--runs", runs, "--page-limit", page_limit_s]);

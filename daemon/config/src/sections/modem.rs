@@ -61,6 +61,9 @@ section! {
         bit_rate: f64 = 10_000.0, range(10.0, 1e7, "bit/s"), [Scenario];
         /// Horizontal distance between the surface vehicle and the middle of the survey.
         range_m: f64 = 500.0, range(1.0, 20_000.0, "m"), [Scenario];
+        /// Folder with the records of both ends of a mission: frames that are on air when a recorded one was share its fate, others are
+        /// lost as often as those around them, and loss does not count. Empty: no record.
+        replay: Option<PathBuf> = None, ANY, [Scenario];
         /// Probability that a frame is lost.
         loss: f64 = 0.1, range(0.0, 0.99, ""), [Scenario];
         /// Probability that a frame arrives twice.

@@ -80,6 +80,11 @@ export const readFit = (id, bps) => read(`/vehicles/${id}/fit${bps === null ? ""
 export const sendBudget = (bps, shares = null, background = null) =>
   write("/budget", { budget_bps: bps, ...(shares && { shares }), ...(background && { background }) });
 
+/** The events of a record: {at_utc_s, kind, vehicle, text}, in the order of their times. */
+export const readReplayEvents = async () => (await read("/replay/events")).events;
+/** `change`: any of at_utc_s, is_playing, speed and side. Resolves to the replay as it is then. */
+export const sendReplay = (change) => write("/replay", change);
+
 export const readPrincipal = () => read("/principal");
 /** `action`: request, withdraw, take, hand_over (to `to`), release or keep. */
 export const sendCommand = (action, to = null) => write("/command", { action, ...(to && { to }) });

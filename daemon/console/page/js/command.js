@@ -12,7 +12,7 @@ let keptMs = -KEEP_MS;
 
 export const principal = () => me;
 export const holder = () => store.snapshot?.command?.holder ?? null;
-const isHolder = () => me !== null && holder()?.name === me.name;
+const isHolder = () => me !== null && !store.replay && holder()?.name === me.name;
 const isHere = () => (holder().client ?? client) === client;
 export const hasCommand = () => isHolder() && isHere();
 /** Whether our principal has command at another client. */
@@ -46,9 +46,13 @@ function keep() {
   sendCommand("keep").catch(() => {});
 }
 
+/** Why a record takes no order. */
+const RECORD = "This is a record: it takes no orders.";
+
 /** Why this page must not give an order of a kind now, or null. `kind`: stop (hold, abort), record (what stays at the surface), order
  * or settings. */
 export function denial(kind) {
+  if (store.replay) return RECORD;
   if (!me) return null;
   if (kind !== "record" && store.snapshot?.mission.ended) return "The mission has ended: the vehicle takes no more orders.";
   const least = kind === "settings" ? "administrator" : "operator";
@@ -56,4 +60,14 @@ export function denial(kind) {
   if (["stop", "record"].includes(kind) || holder() === null || hasCommand()) return null;
   const { name } = holder();
   return isElsewhere() ? `${name} has command at another client: take it in the bar at the top.` : `${name} has command: request it in the bar at the top.`;
+}
+
+/** Disables all controls in `part` of the page that edit an order, while the page shows a record; those that match `kept` stay. */
+export function lockInRecord(part, kept = "[role=tab]") {
+  if (!store.replay) return;
+  for (const control of part.querySelectorAll("button, input, select")) {
+    if (control.matches(kept)) continue;
+    control.disabled = true;
+    control.title = RECORD;
+  }
 }

@@ -16,12 +16,18 @@ export function span(s) {
 
 export const ago = (s) => (s === null ? "never" : `${span(s)} ago`);
 
-/** Mission time as T+ h:mm:ss. */
-export function missionTime(s) {
+/** Seconds as h:mm:ss. */
+export function elapsed(s) {
   const t = Math.max(0, Math.floor(s));
   const two = (n) => String(n).padStart(2, "0");
-  return `T+${Math.floor(t / 3600)}:${two(Math.floor(t / 60) % 60)}:${two(t % 60)}`;
+  return `${Math.floor(t / 3600)}:${two(Math.floor(t / 60) % 60)}:${two(t % 60)}`;
 }
+
+/** Mission time as T+ h:mm:ss. */
+export const missionTime = (s) => `T+${elapsed(s)}`;
+
+/** Seconds since 1970 as "2026-11-29 10:15:00 UTC", or with `length` 16 without the seconds. */
+export const utc = (s, length = 19) => `${new Date(1000 * s).toISOString().slice(0, length).replace("T", " ")} UTC`;
 
 /** The name of a layer or another one of the API, for people. */
 export const plain = (name) => name.replaceAll("_", " ");

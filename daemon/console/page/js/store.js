@@ -12,8 +12,10 @@ export const store = new (class extends EventTarget {
   /** Why the map of a vehicle is not the latest, by vehicle. */
   mapFaults = new Map();
   #fetching = new Set();
+  /** Vehicles of which another version was announced while one was being fetched. */
+  #announced = new Set();
 
-  /** Calls `fn` on each named event: state, map, feed, select, tick, tab, view, edit, book, highlight, natural, place, theme. */
+  /** Calls `fn` on each named event: state, replay, map, feed, select, tick, tab, view, edit, book, highlight, natural, place, theme. */
   on(names, fn) {
     for (const name of names.split(" ")) this.addEventListener(name, fn);
   }
@@ -24,13 +26,19 @@ export const store = new (class extends EventTarget {
 
   setSnapshot(snapshot) {
     const first = this.snapshot === null;
-    if (!first && snapshot.now_s < this.snapshot.now_s - 5) this.maps.clear();
+    // A record that is set back keeps its maps in view until those of the earlier moment are here.
+    if (!first && !snapshot.replay && snapshot.now_s < this.snapshot.now_s - 5) this.maps.clear();
     this.snapshot = snapshot;
     this.receivedMs = performance.now();
     if (!this.vehicle) this.selectedId = snapshot.vehicles[0]?.id ?? null;
     this.emit("state");
     if (first) performance.mark("scenecast-ready");
     for (const v of snapshot.vehicles) this.fetchMap(v.id, v.map);
+  }
+
+  /** The moment of a record that is shown, and how it is played; null for a live surface. */
+  get replay() {
+    return this.snapshot?.replay ?? null;
   }
 
   select(id) {
@@ -50,7 +58,8 @@ export const store = new (class extends EventTarget {
   get nowS() {
     if (!this.snapshot) return 0;
     const { now_s, mission } = this.snapshot;
-    if (mission.ended) return now_s;
+    // Between two states a fast replay would run far ahead of what it shows.
+    if (mission.ended || this.replay) return now_s;
     return now_s + ((performance.now() - this.receivedMs) / 1000) * mission.speed;
   }
 
@@ -62,13 +71,17 @@ export const store = new (class extends EventTarget {
   async fetchMap(id, latest) {
     const have = this.maps.get(id);
     if (have && have.version === latest.version && have.epoch === latest.epoch) return;
-    if (this.#fetching.has(id)) return;
+    if (this.#fetching.has(id)) {
+      this.#announced.add(id);
+      return;
+    }
     if (latest.width === 0 || latest.height === 0) {
       this.maps.set(id, Object.assign(TiledMap.empty(latest), { epoch: latest.epoch }));
       this.emit("map", { id });
       return;
     }
     this.#fetching.add(id);
+    this.#announced.delete(id);
     try {
       const answer = await readTiles(id, have?.tag);
       const summary = this.snapshot?.vehicles.find((v) => v.id === id)?.map;
@@ -80,6 +93,9 @@ export const store = new (class extends EventTarget {
     } finally {
       this.#fetching.delete(id);
     }
+    // A record that stands still announces its map once.
+    const now = this.snapshot?.vehicles.find((v) => v.id === id)?.map;
+    if (this.replay && now && this.#announced.has(id)) this.fetchMap(id, now);
   }
 })();
 

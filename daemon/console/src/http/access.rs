@@ -34,6 +34,8 @@ pub(super) struct Access {
     pub(super) names: HostNames,
     /// Further origins of the page, as of a proxy that encrypts.
     pub(super) origins: Vec<String>,
+    /// Whoever reaches the listener, where there are no tokens.
+    pub(super) local: Principal,
     grants: Vec<TokenGrant>,
     /// The oldest first.
     sessions: Mutex<VecDeque<Session>>,
@@ -59,13 +61,13 @@ pub(super) fn is_open(path: &str) -> bool {
 impl Access {
     /// Without tokens, all who reach the listener are administrators.
     pub(super) fn new(names: HostNames, grants: Vec<TokenGrant>) -> Self {
-        Self { names, origins: Vec::new(), grants, sessions: Mutex::default() }
+        Self { names, origins: Vec::new(), local: Principal::local(), grants, sessions: Mutex::default() }
     }
 
     /// The principal that the headers of a request identify.
     pub(super) fn identify(&self, headers: &HeaderMap) -> Option<Principal> {
         if self.grants.is_empty() {
-            return Some(Principal::local());
+            return Some(self.local.clone());
         }
         if let Some(credentials) = headers.get(header::AUTHORIZATION) {
             let (scheme, token) = credentials.to_str().ok()?.split_once(' ')?;
@@ -77,7 +79,7 @@ impl Access {
     /// The principal with this token. All tokens are compared, so that the duration does not depend on the candidate.
     pub(super) fn principal_of_token(&self, candidate: &str) -> Option<Principal> {
         if self.grants.is_empty() {
-            return Some(Principal::local());
+            return Some(self.local.clone());
         }
         let is_it = |grant: &TokenGrant| bool::from(grant.token.as_bytes().ct_eq(candidate.as_bytes()));
         let found = self.grants.iter().fold(None, |found, grant| if is_it(grant) { Some(grant) } else { found });

@@ -10,7 +10,10 @@ use crate::export::MapFormat;
 use crate::fit::Fit;
 use crate::orders::{CommandOrder, DismissOrder, DraftOrder, LabelOrder, MarkerOrder, NoteOrder, RemoveMarkerOrder};
 use crate::request::SurfaceRequest;
-use crate::state::{AcceptedOrder, CellHistory, CommandState, LogList, MapBody, MissionState, PrincipalInfo};
+use crate::state::{
+    AcceptedOrder, CellHistory, CommandState, LogList, MapBody, MissionState, PrincipalInfo, ReplayEventList,
+    ReplayOrder, ReplayState,
+};
 use axum::extract::{Query, State};
 use axum::http::{HeaderMap, Method};
 use axum::routing::{MethodRouter, get, post};
@@ -132,6 +135,23 @@ fn readings() -> Vec<Operation> {
             Content::File("text/csv; charset=utf-8"),
             || get(readings::table),
         ),
+        read(
+            "/api/v2/replay/events",
+            "replay_events",
+            "The events of a record, for its time line; 404 for a surface that is live",
+            Content::Json(schema::<ReplayEventList>),
+            || get(readings::replay_events),
+        ),
+        Operation {
+            method: Method::POST,
+            path: "/api/v2/replay",
+            id: "replay",
+            role: Some(Role::Viewer),
+            summary: "Show another moment of a record, play or stop it; 404 for a surface that is live",
+            body: Some(schema::<ReplayOrder>),
+            success: (200, Content::Json(schema::<ReplayState>)),
+            route: || post(readings::replay),
+        },
         read("/api/v2/state", "state", "The state", Content::Json(schema::<MissionState>), || get(readings::state)),
         read(
             "/api/v2/events",
@@ -401,7 +421,7 @@ mod tests {
     fn only_readings_and_logins_are_open_to_viewers() {
         for o in operations() {
             let is_open = o.role.is_none_or(|role| role == Role::Viewer);
-            assert_eq!(is_open, o.method == Method::GET || ["login", "logout"].contains(&o.id), "{}", o.path);
+            assert_eq!(is_open, o.method == Method::GET || ["login", "logout", "replay"].contains(&o.id), "{}", o.path);
             assert_eq!(o.role.is_none(), o.path.starts_with("/log"), "{}", o.path);
         }
     }

@@ -34,6 +34,8 @@ pub(super) fn respond(reply: Reply) -> Response {
         Reply::FormerLabels(history) => Json(history).into_response(),
         Reply::Archives(maps) => Json(ArchiveList { maps }).into_response(),
         Reply::Command(command) => Json(command).into_response(),
+        Reply::Replay(replay) => Json(*replay).into_response(),
+        Reply::ReplayEvents(events) => Json(events).into_response(),
         Reply::Forbidden(reason) => error(StatusCode::FORBIDDEN, &reason),
         Reply::NotInCommand(reason) => error(StatusCode::CONFLICT, &reason),
         Reply::NotFound => not_found(),

@@ -11,7 +11,7 @@ use axum::http::{HeaderMap, Uri, header};
 use axum::response::{IntoResponse, Response};
 use crc::{CRC_32_ISCSI, Crc};
 use scenecast_config::TokenGrant;
-use scenecast_core::UserError;
+use scenecast_core::{Principal, UserError};
 use std::sync::Arc;
 use tokio::net::TcpListener;
 use tokio::sync::{mpsc, watch};
@@ -71,6 +71,13 @@ impl ConsoleListener {
     #[must_use]
     pub fn with_origins(mut self, origins: Vec<String>) -> Self {
         self.access.origins = origins;
+        self
+    }
+
+    /// Whoever reaches the listener, where there are no tokens, may read and gives no orders.
+    #[must_use]
+    pub fn for_viewers(mut self) -> Self {
+        self.access.local = Principal::local_viewer();
         self
     }
 }

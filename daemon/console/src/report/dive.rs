@@ -138,6 +138,9 @@ impl Dive {
 
 impl DiveVehicle {
     fn take_cells(&mut self, cells: &MapCells) {
+        if !cells.layer.is_empty() {
+            return;
+        }
         if !cells.whole && self.cell_m == 0.0 {
             // The first file of the record is gone; the whole map follows.
             return;

@@ -29,7 +29,7 @@ pub struct Snapshot {
 }
 
 impl Snapshot {
-    fn new(state: MissionState, truth: Option<Arc<Truth>>) -> Self {
+    pub(crate) fn new(state: MissionState, truth: Option<Arc<Truth>>) -> Self {
         // All keys of maps in these types are strings or numbers, so this cannot fail.
         let json = serde_json::to_vec(&state).unwrap_or_default().into();
         Self { state, json, truth }
@@ -61,6 +61,7 @@ pub fn snapshot(surface: &Surface, facts: &MissionFacts, meter: &LinkMeter, now:
         storage: facts.storage.clone(),
         log: surface.log().last(),
         truth: facts.truth.as_ref().map(|truth| truth.info.clone()),
+        replay: None,
     };
     Snapshot::new(state, facts.truth.clone())
 }

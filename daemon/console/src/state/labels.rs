@@ -6,7 +6,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// A label on the map.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 pub struct MapLabel {
     /// The number of the label.
     #[schemars(range(min = 1, max = 254))]
@@ -49,7 +49,7 @@ impl MapLabelTree {
 }
 
 /// The exemplars of a label, and the request for another one.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 pub struct ExemplarProgress {
     /// The stage of the request; without a request, whether there is an image.
     pub state: ExemplarStage,
@@ -86,10 +86,11 @@ pub struct ExemplarImage {
 }
 
 /// The stage of a request for an image.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum ExemplarStage {
     /// There is no request and no image.
+    #[default]
     None,
     /// The request waits for its turn.
     Queued,

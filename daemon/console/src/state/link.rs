@@ -69,7 +69,7 @@ pub struct LinkRates {
 }
 
 /// Recent measurements of the channel to one vehicle.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 pub struct VehicleChannel {
     /// The channel from the vehicle to the surface.
     pub up: ChannelQuality,
@@ -92,7 +92,7 @@ pub struct VehicleChannel {
 }
 
 /// The quality of the channel in one direction.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 pub struct ChannelQuality {
     /// The share of the last 64 frames that were lost, 0 to 1.
     pub loss: f64,

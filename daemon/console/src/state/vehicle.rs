@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 /// A vehicle as the surface knows it.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 pub struct VehicleState {
     /// Acoustic address of the vehicle, 1 to 14.
     #[schemars(range(min = 1, max = 14))]
@@ -98,7 +98,7 @@ pub struct WeightDraft {
 }
 
 /// The orders to a vehicle: last sent, in force, and on their way.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 pub struct VehicleOrders {
     /// The last utility sent, without the weights of the labels.
     pub utility: UtilityTerms,

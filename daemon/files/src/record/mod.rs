@@ -1,10 +1,16 @@
 //! The record of a mission: a bag of rosbag2 in MCAP, in a folder of its own. A power cut takes its last two seconds at most.
 
+mod frame_times;
+mod link;
 mod metadata;
+mod mission_clock;
 mod reader;
 mod recover;
 
-pub use reader::{RecordedFrames, RecordedMessage, is_record, read_record};
+pub use frame_times::{FrameTimes, SentFrame};
+pub use link::{FrameFate, RecordedLink};
+pub use mission_clock::MissionClock;
+pub use reader::{RecordedFrames, RecordedMessage, is_record, mission_records, read_record};
 pub use recover::{RecoveredPart, recover};
 
 use crate::sync_folder;

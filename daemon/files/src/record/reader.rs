@@ -4,7 +4,7 @@ use crate::bag::stream::{BagMessage, BagStream};
 use scenecast_core::UserError;
 use scenecast_messages::scenecast_msgs::Frame;
 use scenecast_messages::{Message, decode};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// A message of a record.
 #[derive(Debug)]
@@ -42,6 +42,35 @@ pub fn read_record(path: &Path, mut take: impl FnMut(RecordedMessage)) -> Result
             Err(error) => damage = damage.or(Some(error)),
         }
     }
+}
+
+/// The records at a path: itself, or else those in the folders in it, by their names.
+///
+/// # Errors
+/// There is none.
+pub fn mission_records(path: &Path) -> Result<Vec<PathBuf>, UserError> {
+    let fault = |e| UserError::file(path, e);
+    if !path.is_dir() {
+        return Ok(vec![path.to_owned()]);
+    }
+    let entries = |folder: &Path| -> std::io::Result<Vec<PathBuf>> {
+        let entries = std::fs::read_dir(folder)?.map(|entry| entry.map(|entry| entry.path()));
+        let mut entries = entries.collect::<std::io::Result<Vec<_>>>()?;
+        entries.sort();
+        Ok(entries)
+    };
+    let has_files = |folder: &Path| {
+        entries(folder).is_ok_and(|files| files.iter().any(|file| file.extension().is_some_and(|e| e == "mcap")))
+    };
+    if has_files(path) {
+        return Ok(vec![path.to_owned()]);
+    }
+    let within = entries(path).map_err(fault)?.into_iter().filter(|folder| folder.is_dir() && has_files(folder));
+    let records: Vec<PathBuf> = within.collect();
+    if records.is_empty() {
+        return Err(UserError::file(path, "it is no record, and no folder in it is one: a record has files *.mcap"));
+    }
+    Ok(records)
 }
 
 /// The frames that an end has sent and received, in the order of their times.

@@ -245,14 +245,13 @@ impl Mission {
         Ok(())
     }
 
-    /// Runs the survey to its end, then lets the link drain for at most `drain`. `then` is called every ten seconds of the survey and
-    /// every second after it.
+    /// Runs the survey to its end, then lets the link drain for at most `drain`. `then` is called every second.
     pub fn run(
         &mut self,
         drain: Duration,
         then: &mut dyn FnMut(&mut Self) -> Result<(), UserError>,
     ) -> Result<(), UserError> {
-        self.run_survey(Duration::from_secs(10), then)?;
+        self.run_survey(Duration::from_secs(1), then)?;
         let give_up = self.now() + drain;
         while !self.is_drained() && self.now() < give_up {
             self.advance(self.now() + Duration::from_secs(1))?;

@@ -257,9 +257,11 @@ struct RecordedMap {
     digest: MapDigest,
 }
 
-/// A map that is to be recorded.
+/// A map that is to be recorded: the labels, or the levels of a layer.
 struct MapState<'a> {
     vehicle: &'a str,
+    /// The name of the layer; empty for the labels.
+    layer: &'a str,
     epoch: u8,
     version: u64,
     cell_m: f64,
@@ -269,7 +271,7 @@ struct MapState<'a> {
 impl RecordedMap {
     /// The changes since the last call, and the new version.
     fn record(&mut self, map: &MapState<'_>, stamps: &Stamps) -> Vec<RecordEntry> {
-        let &MapState { vehicle, epoch, version, cell_m, labels } = map;
+        let &MapState { vehicle, layer, epoch, version, cell_m, labels } = map;
         let whole = self.key.is_none_or(|(before, _)| before != epoch);
         if self.key.replace((epoch, version)) == Some((epoch, version)) {
             return Vec::new();
@@ -300,14 +302,17 @@ impl RecordedMap {
             vehicle: name(),
             epoch: epoch.into(),
             version,
-            layer: String::new(),
+            layer: layer.to_owned(),
             cell_m,
             whole,
             x: changed.iter().map(|(cell, _)| cell.x).collect(),
             y: changed.iter().map(|(cell, _)| cell.y).collect(),
             value: changed.iter().map(|&(_, label)| label).collect(),
         };
-        let mut entries = vec![entry_of(vehicle, "map_version", stamps, &state)];
+        let mut entries = Vec::new();
+        if layer.is_empty() {
+            entries.push(entry_of(vehicle, "map_version", stamps, &state));
+        }
         if whole || !changed.is_empty() {
             entries.push(entry_of(vehicle, "map_cells", stamps, &cells));
         }
@@ -355,7 +360,8 @@ mod tests {
         let mut labels = LabelGrid::default();
         let mut change = |record: &mut Record, map: &mut RecordedMap, x: i32| {
             labels.set(Cell::new(x, 0), 3);
-            let state = MapState { vehicle: "auv-1", epoch: 0, version: x as u64, cell_m: 0.5, labels: &labels };
+            let version = x as u64;
+            let state = MapState { vehicle: "auv-1", layer: "", epoch: 0, version, cell_m: 0.5, labels: &labels };
             record.put(map.record(&state, &stamps()), &stamps());
         };
         let before = record.state_number();

@@ -6,20 +6,20 @@ use super::{
 use bytes::Bytes;
 use scenecast_config::Config;
 use scenecast_console::Snapshot;
-use scenecast_console::messages::{label_tree, order_status, place, place_on_earth};
+use scenecast_console::messages::{label_tree, layer_text, order_status, place, place_on_earth};
 use scenecast_console::state::{MapLabelTree, MissionState, OrderStatus, VehicleState};
 use scenecast_files::RecordEntry;
 use scenecast_host::FrameEvent;
 use scenecast_messages::contents::{Stamps, WORLD_FRAME, header, pose};
 use scenecast_messages::scenecast_msgs::{Event, Exemplar, Link};
 use scenecast_messages::std_msgs::Text;
-use scenecast_protocol::map::StateReplica;
+use scenecast_protocol::map::{LayerDescriptor, LayerId, StateReplica};
 use scenecast_protocol::wire::Address;
 use scenecast_surface::Surface;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
-/// Mission time between two messages about the link, and between two states that the page would show, seconds.
+/// Mission time between two messages about the link, and at most between two states that the page would show, seconds.
 const STATE_INTERVAL_S: f64 = 10.0;
 
 /// The record of a surface's process; without one, nothing is done.
@@ -92,6 +92,8 @@ pub struct SurfaceRecorder {
 #[derive(Default)]
 struct RecordedVehicle {
     map: RecordedMap,
+    /// By number.
+    layers: BTreeMap<LayerId, RecordedLayer>,
     tree: Option<(u8, MapLabelTree)>,
     /// Version and state by slot.
     orders: BTreeMap<String, (u16, OrderStatus)>,
@@ -99,6 +101,12 @@ struct RecordedVehicle {
     report_s: Option<f64>,
     /// Epoch, label and number of the images.
     exemplars: BTreeSet<(u8, u8, u8)>,
+}
+
+/// What a record has of a layer.
+struct RecordedLayer {
+    descriptor: LayerDescriptor,
+    levels: RecordedMap,
 }
 
 impl SurfaceRecorder {
@@ -126,7 +134,8 @@ impl SurfaceRecorder {
             let recorded = self.vehicles.entry(vehicle.id).or_default();
             let before = entries.len();
             recorded.record_orders(vehicle, stamps, &mut entries);
-            has_news |= entries.len() > before;
+            let reported_s = vehicle.status.as_ref().map(|status| status.at_s);
+            has_news |= entries.len() > before || recorded.report_s != reported_s;
             recorded.record(surface, &snapshot.state, vehicle, stamps, &mut entries);
             if is_link_due {
                 entries.push(entry_of(&vehicle.name, "link", stamps, &link(&snapshot.state, vehicle, stamps)));
@@ -197,8 +206,16 @@ impl RecordedVehicle {
         if let Some(view) = address.and_then(|address| surface.view(address)) {
             // The page may show an earlier map meanwhile, with its version.
             let (version, labels) = (view.replica().version(), view.replica().shown());
-            let map = MapState { vehicle: &vehicle.name, epoch, version, cell_m: vehicle.map.cell_m, labels };
+            let (name, cell_m) = (vehicle.name.as_str(), vehicle.map.cell_m);
+            let map = MapState { vehicle: name, layer: "", epoch, version, cell_m, labels };
             entries.extend(self.map.record(&map, stamps));
+            for (id, descriptor) in view.layers().iter() {
+                let Some(layer) = view.layer(id).filter(|layer| layer.version() > 0) else { continue };
+                let recorded = self.layers.entry(id).or_insert_with(|| RecordedLayer::new(descriptor.clone()));
+                let (version, labels) = (layer.version(), layer.levels().shown());
+                let map = MapState { vehicle: name, layer: &descriptor.name, epoch, version, cell_m, labels };
+                entries.extend(recorded.record(descriptor, &map, stamps));
+            }
         }
         let is_recorded =
             |tree: &MapLabelTree| self.tree.as_ref().is_some_and(|(e, t)| (*e, t) == (vehicle.map.epoch, tree));
@@ -236,6 +253,24 @@ impl RecordedVehicle {
                 entries.push(entry_of(&vehicle.name, "exemplars", stamps, &message));
             }
         }
+    }
+}
+
+impl RecordedLayer {
+    fn new(descriptor: LayerDescriptor) -> Self {
+        Self { descriptor, levels: RecordedMap::default() }
+    }
+
+    /// The meaning of its levels, where it is new or another one, and the changes since the last call.
+    fn record(&mut self, descriptor: &LayerDescriptor, map: &MapState<'_>, stamps: &Stamps) -> Vec<RecordEntry> {
+        let mut entries = Vec::new();
+        if self.levels.key.is_none() || self.descriptor != *descriptor {
+            (self.descriptor, self.levels) = (descriptor.clone(), RecordedMap::default());
+            let data = layer_text(descriptor);
+            entries.push(entry_of(map.vehicle, "layers", stamps, &Text { data }));
+        }
+        entries.extend(self.levels.record(map, stamps));
+        entries
     }
 }
 

@@ -89,7 +89,7 @@ impl VehicleRecorder {
         }
         let labels = vehicle.map();
         let (epoch, version) = (vehicle.durable().epoch, vehicle.map_version());
-        let state = MapState { vehicle: &self.name, epoch, version, cell_m: self.cell_m, labels };
+        let state = MapState { vehicle: &self.name, layer: "", epoch, version, cell_m: self.cell_m, labels };
         entries.extend(self.map.record(&state, stamps));
         let now_s = stamps.now_s();
         if is_due(&mut self.pose_s, POSE_INTERVAL_S, now_s) {

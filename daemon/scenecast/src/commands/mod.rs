@@ -17,6 +17,8 @@ mod modem_sim;
 mod node;
 mod record;
 #[cfg(feature = "surface")]
+mod replay;
+#[cfg(feature = "surface")]
 mod report;
 #[cfg(feature = "rehearsal")]
 mod sim;
@@ -78,6 +80,9 @@ enum Command {
     #[command(subcommand)]
     Key(key::Key),
     #[cfg(feature = "surface")]
+    /// Show a mission from its records on the operator's page, with a time line.
+    Replay(replay::Replay),
+    #[cfg(feature = "surface")]
     /// Write the report of a dive from its record.
     Report(report::Report),
     /// Repair the record of a mission.
@@ -132,6 +137,8 @@ pub fn run(arguments: Arguments) -> Result<(), UserError> {
         Command::Bench(bench) => bench.run(),
         Command::Key(key) => key.run(),
         Command::Record(record) => record.run(),
+        #[cfg(feature = "surface")]
+        Command::Replay(replay) => replay.run(),
         #[cfg(feature = "surface")]
         Command::Report(report) => report.run(),
         #[cfg(feature = "tools")]

@@ -11,6 +11,9 @@ use serde_json::json;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
+/// Mission time after which the records are made durable. A simulated mission can be run again.
+const SYNC_INTERVAL: Duration = Duration::from_secs(10);
+
 /// The sea floor and the configuration of a rehearsal.
 #[derive(Debug, Args)]
 pub(super) struct WorldArguments {
@@ -168,6 +171,6 @@ impl Sim {
         for dir in dirs.iter().filter(|dir| dir.exists()) {
             std::fs::remove_dir_all(dir).map_err(|e| UserError::file(dir, e))?;
         }
-        MissionRecord::create(mission, [&dirs[0], &dirs[1]]).map(Some)
+        MissionRecord::create(mission, [&dirs[0], &dirs[1]], SYNC_INTERVAL).map(Some)
     }
 }

@@ -100,7 +100,7 @@ export function clickAt(x, y) {
 
 /** The handlers of a press at (px, py) on a corner, the middle of a side or the return point; else null. */
 export function grab(view, px, py) {
-  if (!pen.shown || !store.vehicle) return null;
+  if (!pen.shown || !store.vehicle || store.replay) return null;
   const near = (p) => {
     const [x, y] = view.toScreen(...p);
     return Math.hypot(x - px, y - py) < REACH_PX;

@@ -250,8 +250,18 @@ function drawCross(c) {
   c.stroke();
 }
 
+/** Why a map is empty at a moment of a record. */
+const EMPTY_THEN = {
+  operator: () => "No cell of the map had arrived by this moment.",
+  vehicle: (v) => `${v.name} had no map at this moment.`,
+  difference: () => "No cell differs at this moment.",
+};
+/** Whose map a record shows. */
+const SIDES = { operator: "Operator's map", vehicle: "Vehicle's map", difference: "Differing cells" };
+
 /** What an empty map shows soon. */
 function emptyText(v) {
+  if (store.replay) return EMPTY_THEN[store.replay.side](v);
   const when = `a frame is expected every ${span(v.expected_interval_s)}.`;
   if (v.last_received_s === null) return `No frame received from ${v.name} yet. Its position and its map appear here with the first frames; ${when}`;
   return `No cell of the map has arrived yet. The map appears here while ${v.name} surveys; ${when}`;
@@ -267,6 +277,7 @@ function plates() {
   const late = isStale(v);
   $("map-age").classList.toggle("stale", late);
   const state = late ? `stale, changed ${ago(age)}` : age === null ? "no data yet" : `changed ${span(age)} ago`;
-  text($("map-age"), `Map v${v.map.version} · ${state} · ${count(v.map.explored_cells)} cells`);
+  const which = store.replay ? SIDES[store.replay.side] : `Map v${v.map.version}`;
+  text($("map-age"), `${which} · ${state} · ${count(v.map.explored_cells)} cells`);
   canvas.dataset.layer = layer.name;
 }

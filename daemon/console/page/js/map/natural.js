@@ -37,6 +37,8 @@ export function loadLooks(vehicle) {
     const images = exemplar.images.slice(-MAX_IMAGES);
     const key = images.map((image) => `${image.url}?at=${image.at_s}`).join(" ");
     const known = lookOf(vehicle, id);
+    // A record was set back to a moment before the first image.
+    if (images.length === 0 && looks.delete(placeOf(vehicle, id))) naturalEdits += 1;
     if (images.length === 0 || known?.key === key) continue;
     // The look before is shown until the new images are loaded.
     const look = { ...known, key };

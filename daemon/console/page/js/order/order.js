@@ -46,6 +46,8 @@ export class Order {
   }
 
   set(vehicle, value, part = WHOLE) {
+    // A record shows the orders of its moment, which an edit would hide.
+    if (store.replay) return;
     const edit = this.#edit(vehicle);
     const before = edit.parts.get(part);
     const isSent = Boolean(before) && before.version !== null;

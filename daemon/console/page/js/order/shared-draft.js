@@ -63,7 +63,7 @@ export class SharedDraft {
   /** Takes the draft of the surface, unless an edit of this page is on its way there. */
   #adopt() {
     const { vehicle } = store;
-    if (!vehicle) return;
+    if (!vehicle || store.replay) return;
     const held = this.#of(vehicle);
     const { number, parts } = this.read(vehicle);
     if (held.timer !== null || held.busy || number === held.number || number < held.least) return;

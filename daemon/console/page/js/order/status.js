@@ -2,7 +2,7 @@
 
 import { announce, h, show, text } from "../dom.js";
 import { span } from "../format.js";
-import { ageOf } from "../store.js";
+import { ageOf, store } from "../store.js";
 
 const STEPS = ["queued", "on_air", "received", "applied"];
 const NAMES = { queued: "Queued", on_air: "On air", received: "Received", applied: "Applied", refused: "Refused", withdrawn: "Withdrawn" };
@@ -22,7 +22,7 @@ export function orderStatus(name) {
   function update(slot, waiting = null) {
     show(list, slot !== null);
     const status = slot && `${name}: ${nameOfStatus(slot.state)}`;
-    if (announced !== null && status !== announced) announce(status);
+    if (announced !== null && status !== announced && !store.replay) announce(status);
     announced = status;
     node.dataset.state = slot?.state ?? "none";
     if (slot) mark(steps, slot);

@@ -4,7 +4,7 @@ import { soundAlarm } from "../alarm.js";
 import { dismissEarlierMap, giveAgain, restoreOrders, sendCommand, takeOver } from "../api.js";
 import { denial, hasCommand } from "../command.js";
 import { $, announce, h, keyed, show, text } from "../dom.js";
-import { ago, freeSpace, missionTime, span } from "../format.js";
+import { ago, freeSpace, missionTime, span, utc } from "../format.js";
 import { ageOf, isHeard, isSilent, store } from "../store.js";
 import { retryNow } from "../feed.js";
 
@@ -19,10 +19,11 @@ export function startBanners() {
 function update() {
   const banners = current();
   const heads = banners.map((b) => b.head).join(". ");
-  if (heads !== announced) announce(heads || "All alarms have cleared.");
+  // The alarms of a record come and go with its moment.
+  if (heads !== announced && !(store.replay && announced)) announce(heads || "All alarms have cleared.");
   announced = heads;
   const alarms = banners.filter((b) => b.kind !== "info").map((b) => b.key);
-  if (alarms.some((key) => !sounded.has(key))) soundAlarm();
+  if (!store.replay && alarms.some((key) => !sounded.has(key))) soundAlarm();
   sounded = new Set(alarms);
   keyed($("banners"), banners, (b) => b.key, make, refresh);
   show($("banners"), $("banners").childElementCount > 0);
@@ -31,6 +32,7 @@ function update() {
 function current() {
   const found = [];
   if (store.feed.state === "lost") found.push(lost());
+  if (store.replay) found.push(recorded());
   for (const v of store.snapshot?.vehicles ?? []) {
     if (v.other_surface) found.push(rival(v));
     found.push(...withdrawn(v));
@@ -57,6 +59,10 @@ function lost() {
     key: "lost", kind: "bad", head: "No connection to scenecast",
     body: `for ${since}; ${next}. All displayed values may be out of date.`, action: ["Try now", retryNow],
   };
+}
+
+function recorded() {
+  return { key: "record", kind: "info", head: `Record of ${utc(store.replay.from_utc_s, 16)}: nothing here is live.`, body: "It takes no orders, and ages count to the moment that is shown." };
 }
 
 function silent(v) {
@@ -204,7 +210,7 @@ function requested({ name, at_s: at }) {
 }
 
 function make(banner) {
-  const [name, onclick] = banner.action ?? [];
+  const [name, onclick] = (!store.replay || banner.key === "lost" ? banner.action : null) ?? [];
   const button = name ? h("button", { type: "button", onclick }, name) : null;
   return h("p.banner", { data: { kind: banner.kind } }, h("b"), " ", h("span"), " ", button);
 }

@@ -1,6 +1,6 @@
 // The bar at the top: mission, choice of vehicle, mission time, state of the feed.
 
-import { $, h, keyed, text } from "../dom.js";
+import { $, h, keyed, show, text } from "../dom.js";
 import { missionTime, span } from "../format.js";
 import { ageOf, isSilent, store } from "../store.js";
 
@@ -11,13 +11,15 @@ export function startBar() {
 function update() {
   const feed = $("feed");
   const lost = store.feed.state === "lost";
-  text(feed, store.connected ? "Live" : lost ? "Not connected" : "Connecting");
+  text(feed, store.connected ? (store.replay ? "Record" : "Live") : lost ? "Not connected" : "Connecting");
   if (!store.snapshot) return;
   const { mission, vehicles } = store.snapshot;
-  text($("mission"), mission.speed === 1 ? mission.name : `${mission.name} ×${Number(mission.speed.toPrecision(3))}`);
+  text($("mission"), mission.speed === 1 || store.replay ? mission.name : `${mission.name} ×${Number(mission.speed.toPrecision(3))}`);
   text($("clock"), missionTime(store.nowS));
   keyed($("vehicles"), vehicles, (v) => v.id, make, refresh);
-  document.title = `${vehicles.some(isSilent) ? "(silent) " : ""}scenecast: ${mission.name}`;
+  // Command and alarms are of the present.
+  for (const id of ["command", "sound"]) show($(id), !store.replay);
+  document.title = `${store.replay ? "(record) " : ""}${vehicles.some(isSilent) ? "(silent) " : ""}scenecast: ${mission.name}`;
 }
 
 function make(vehicle) {

@@ -29,7 +29,7 @@ function update() {
   const now = caption();
   text($("command"), now);
   $("command").dataset.state = hasCommand() ? "own" : holder() ? "other" : "none";
-  if (announced !== null && announced !== now) announce(now);
+  if (announced !== null && announced !== now && !store.replay) announce(now);
   announced = now;
   if (shown !== null && $("dialog").open) refresh();
 }

@@ -1,5 +1,6 @@
 // The panel of constraints: fence, limits and weighted areas.
 
+import { lockInRecord } from "../command.js";
 import { $, h } from "../dom.js";
 import { areasOrder, fenceOrder, finish, pen } from "../fence/edit.js";
 import { store } from "../store.js";
@@ -24,6 +25,7 @@ function update() {
   updateFence();
   updateAreas();
   updateLimits();
+  lockInRecord($("constraints"), ".outline .quiet");
   const v = store.vehicle;
   const unsent = Boolean(v) && [fenceOrder, areasOrder, limitsOrder].some((order) => order.isChanged(v));
   $("tab-constraints").classList.toggle("unsent", unsent);

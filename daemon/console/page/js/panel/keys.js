@@ -1,6 +1,7 @@
 // The dialog that explains the keys.
 
 import { $, h } from "../dom.js";
+import { store } from "../store.js";
 
 const ANYWHERE = [["Shift+H", "hold the vehicle, or resume; asks first"], ["Shift+A", "abort the mission; asks first"]];
 const KEYS = [
@@ -11,6 +12,8 @@ const KEYS = [
   ["Wheel, drag, pinch", "zoom and pan with mouse or fingers"],
 ];
 
+const REPLAY = [["Space", "play or pause"], ["\u2190 and \u2192", "10 seconds back, forward"], ["Shift with \u2190 or \u2192", "the event before, the next event"]];
+
 const list = (keys) => h("dl.keys", {}, ...keys.map(([key, does]) => h("div", {}, h("dt", {}, key), h("dd", {}, does))));
 
 export function startKeys() {
@@ -18,8 +21,7 @@ export function startKeys() {
     const dialog = $("dialog");
     dialog.replaceChildren(
       h("h2", { id: "dialog-title" }, "Keys"),
-      h("p", {}, "Everywhere, except while you type:"),
-      list(ANYWHERE),
+      ...(store.replay ? [h("p", {}, "Record, except where a key has another use:"), list(REPLAY)] : [h("p", {}, "Everywhere, except while you type:"), list(ANYWHERE)]),
       h("p", {}, "On the map, while it has the focus:"),
       list(KEYS),
       h("div.buttons", {}, h("button.primary", { type: "button", onclick: () => dialog.close() }, "Close")),

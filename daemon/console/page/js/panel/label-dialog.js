@@ -1,5 +1,6 @@
 // The dialog for the name, colour and merging of one label. They stay at the surface.
 
+import { lockInRecord } from "../command.js";
 import { $, h } from "../dom.js";
 import { colourOf, hasName, isMerged, merge, nameOf, recolour, rename, shownLabels, split } from "../book.js";
 import { tableColour } from "../palette.js";
@@ -34,6 +35,7 @@ export function editLabel(label) {
         h("button", { type: "button", onclick: () => dialog.close() }, "Cancel"),
         h("button.primary", { type: "submit" }, "Save"))),
   );
+  lockInRecord(dialog, "[type=button]:not(.link)");
   dialog.showModal();
   name.focus();
 }

@@ -2,7 +2,7 @@
 
 import { $, h, keyed, show, text } from "../dom.js";
 import { shownLabels } from "../book.js";
-import { principal } from "../command.js";
+import { lockInRecord, principal } from "../command.js";
 import { ago } from "../format.js";
 import { orderFoot } from "../order/foot.js";
 import { recall, remember } from "../prefs.js";
@@ -69,6 +69,7 @@ function update() {
   show(empty, rows.length === 0);
   $("labels").classList.toggle("stale", isStale(vehicle));
   for (const t of terms) t.update(vehicle);
+  for (const part of document.querySelectorAll("#labels :is(.label .weight, .exploration)")) lockInRecord(part);
 }
 
 function refreshOrders() {

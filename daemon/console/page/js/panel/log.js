@@ -34,16 +34,20 @@ async function follow() {
   const isShown = document.body.dataset.tab === "log";
   if (!snapshot || !isShown || isReading) return;
   if (mission !== snapshot.mission.id) [mission, entries] = [snapshot.mission.id, []];
-  const last = entries.at(-1)?.number ?? 0;
-  if (snapshot.log <= last) return;
+  const held = entries.at(-1)?.number ?? 0;
+  if (snapshot.log === held) return;
+  // A record was set back: the entries after its moment are not known yet.
+  const last = snapshot.log < held ? 0 : held;
   isReading = true;
   try {
-    entries = [...entries, ...(await readLog(last))].slice(-MAX_ENTRIES);
+    const further = await readLog(last);
+    entries = [...(last === 0 ? [] : entries), ...further].slice(-MAX_ENTRIES);
     refresh();
   } catch {
     // The next state reads again.
   }
   isReading = false;
+  if (store.replay && store.snapshot !== snapshot) follow();
 }
 
 const authorOf = (e) => e.by ?? store.snapshot?.vehicles.find((v) => v.id === e.vehicle)?.name ?? "surface";

@@ -1,6 +1,7 @@
 // How the vehicle builds its map and which cells and layers it sends: typed, or fitted to a budget.
 
 import { readFit, sendSettings } from "../api.js";
+import { lockInRecord } from "../command.js";
 import { $, h, show, text } from "../dom.js";
 import { metres, rate } from "../format.js";
 import { orderFoot } from "../order/foot.js";
@@ -177,4 +178,5 @@ function update() {
   limit.placeholder = `${Math.round((budget * shares.map) / 100)}: its share`;
   fit.disabled = !store.connected;
   foot.update(vehicle, !sound);
+  lockInRecord($("model"));
 }

@@ -6,14 +6,16 @@ import { ago } from "../format.js";
 import { ageOf, store } from "../store.js";
 
 const MAX_LINES = 4;
-/** What was last read: vehicle, cell and its label as one text, and the former labels, the newest first. */
-const read = { key: "", former: [] };
+/** What was last read: vehicle, cell and its label as one text, in a record with the version of the map, and the former labels, the
+ * newest first. */
+const read = { cell: "", key: "", former: [] };
 
 /** One line for each former label of a cell, as `cellAt` gives it, or of null. `changed` is called when they have arrived. */
 export function historyLines(cell, changed) {
-  const key = cell ? [store.selectedId, ...cell.at, cell.label].join() : "";
+  const at = cell ? [store.selectedId, ...cell.at, cell.label].join() : "";
+  const key = cell && store.replay ? `${at} ${store.map.version}` : at;
   if (key !== read.key) {
-    Object.assign(read, { key, former: [] });
+    Object.assign(read, { cell: at, key, former: at === read.cell ? read.former : [] });
     if (cell) load(key, cell, changed);
   }
   // Labels that the operator shows as one are one here.

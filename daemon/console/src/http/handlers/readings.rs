@@ -3,11 +3,11 @@
 use crate::export::harmless;
 use crate::http::access::{MAX_STREAMS, Seat};
 use crate::http::connections::EVENT_STREAM;
-use crate::http::response::{error, not_found, respond};
+use crate::http::response::{JsonOrder, error, not_found, respond};
 use crate::http::shared::{Shared, VehicleId};
 use crate::request::{Reply, SurfaceRequest};
 use crate::snapshot::{Snapshot, seconds};
-use crate::state::{LogLine, LogList, MapEvent, MissionState};
+use crate::state::{LogLine, LogList, MapEvent, MissionState, ReplayOrder};
 use axum::body::{Body, Bytes};
 use axum::extract::{Query, State};
 use axum::http::{HeaderName, HeaderValue, StatusCode, Uri, header};
@@ -70,6 +70,19 @@ pub(in crate::http) async fn fit(
 pub(in crate::http) async fn truth(State(shared): State<Shared>) -> Response {
     let picture = shared.snapshots.borrow().truth.as_ref().map(|truth| truth.picture.clone());
     picture.map_or_else(not_found, |picture| ([(header::CONTENT_TYPE, "image/png")], picture).into_response())
+}
+
+/// Shows another moment of a record.
+pub(in crate::http) async fn replay(
+    State(shared): State<Shared>,
+    JsonOrder(order): JsonOrder<ReplayOrder>,
+) -> Response {
+    shared.respond(SurfaceRequest::Replay(order)).await
+}
+
+/// The events of a record.
+pub(in crate::http) async fn replay_events(State(shared): State<Shared>) -> Response {
+    shared.respond(SurfaceRequest::ReplayEvents).await
 }
 
 pub(in crate::http) async fn document(State(shared): State<Shared>) -> Response {
@@ -205,7 +218,7 @@ fn to_csv(entries: &[LogLine]) -> Result<Vec<u8>, csv::Error> {
     table.into_inner().map_err(|e| e.into_error().into())
 }
 
-/// Moments of the mission in UTC, by the clock of this computer.
+/// Moments of the mission in UTC, by the clock of this computer, or by that of a record.
 pub(in crate::http) struct MissionUtc {
     unix_s: f64,
     /// Mission time, seconds, and seconds of it for each second of the clock.
@@ -215,6 +228,10 @@ pub(in crate::http) struct MissionUtc {
 
 impl MissionUtc {
     pub(in crate::http) fn now(state: &MissionState) -> Self {
+        if let Some(replay) = &state.replay {
+            // A record that stands still has mission times all the same.
+            return Self { unix_s: replay.at_utc_s, now_s: state.now_s, speed: replay.mission_speed };
+        }
         let unix_s = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_secs_f64();
         Self { unix_s, now_s: state.now_s, speed: state.mission.speed.max(1e-3) }
     }

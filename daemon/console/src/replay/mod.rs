@@ -1,0 +1,325 @@
+//! The replay of a mission from its records: the state that the page shows at any moment of it, as each side knew it.
+
+mod events;
+mod map;
+mod on_board;
+mod recording;
+
+pub use recording::Recording;
+
+use crate::export::MapCells;
+use crate::request::{ClientRequest, Reply, SurfaceRequest};
+use crate::snapshot::Snapshot;
+use crate::state::{
+    CellHistory, DifferingCells, MissionState, ReplayEvent, ReplayEventList, ReplayOrder, ReplaySide, ReplayState,
+    VehicleState,
+};
+use map::ShownMap;
+use recording::Known;
+use scenecast_messages::contents::valid_part;
+use scenecast_messages::scenecast_msgs::Event;
+use scenecast_protocol::map::LabelGrid;
+use scenecast_protocol::wire::Address;
+use scenecast_surface::{LogEntry, LogKind};
+use std::collections::BTreeMap;
+use std::ops::RangeInclusive;
+use std::time::Duration;
+
+/// Recorded seconds for each second.
+const SPEEDS: RangeInclusive<f64> = 0.1..=1000.0;
+
+/// A mission that is played from its records.
+#[derive(Debug)]
+pub struct Replay {
+    recording: Recording,
+    events: Vec<ReplayEvent>,
+    /// The part of the topics of each vehicle, by its address.
+    parts: BTreeMap<u8, String>,
+    /// The moment that is shown, nanoseconds since 1970.
+    at: u64,
+    is_playing: bool,
+    speed: f64,
+    side: ReplaySide,
+    /// The state of the last moment, before it was completed, with the time of its record.
+    state: (u64, MissionState),
+    /// By vehicle, the map that was served last and its version: each other one has a higher version.
+    served: BTreeMap<u8, (ServedMap, u64)>,
+}
+
+/// Names a map: the side, and the places in the histories of both.
+type ServedMap = (ReplaySide, usize, usize);
+
+impl Replay {
+    /// Plays records from their beginning, once it is ordered to.
+    pub fn new(recording: Recording, speed: f64) -> Self {
+        let parts = addresses(&recording);
+        let address = |part: &str| parts.iter().find(|(_, own)| *own == part).map(|(&id, _)| id);
+        let events = events::events(&recording, address);
+        let side = if recording.timeline.states.is_empty() { ReplaySide::Vehicle } else { ReplaySide::Operator };
+        let at = recording.timeline.span.0;
+        let (state, served) = ((u64::MAX, MissionState::default()), BTreeMap::new());
+        Self { recording, events, parts, at, is_playing: false, speed, side, state, served }
+    }
+
+    /// Why some of the records could not be read.
+    pub fn damage(&self) -> &[String] {
+        &self.recording.damage
+    }
+
+    /// Moves on by a time of the clock, if the record is played. Whether the moment has changed.
+    pub fn advance(&mut self, passed: Duration) -> bool {
+        if !self.is_playing {
+            return false;
+        }
+        let nanos = passed.as_secs_f64() * self.speed * 1e9;
+        self.at = self.at.saturating_add(nanos as u64).min(self.recording.timeline.span.1);
+        self.is_playing = self.at < self.recording.timeline.span.1;
+        true
+    }
+
+    /// The state at the moment that is shown.
+    pub fn snapshot(&mut self) -> Snapshot {
+        let at = self.at;
+        let Recording { timeline, operator, vehicles, .. } = &mut self.recording;
+        for known in operator.values_mut().chain(vehicles.values_mut()) {
+            known.map.seek(at, |nanos| timeline.mission_time(nanos));
+        }
+        let mission_s = timeline.mission_s(at);
+        let mut state = self.recorded_state();
+        let mission_speed = state.mission.speed.max(1e-3);
+        state.mission.speed = if self.is_playing { mission_speed * self.speed } else { 0.0 };
+        state.now_s = mission_s;
+        // The picture of the true classes is in no record.
+        state.truth = None;
+        state.log = self.logged() as u64;
+        for (&id, part) in &self.parts {
+            if state.vehicles.iter().all(|vehicle| vehicle.id != id) && self.recording.vehicles.contains_key(part) {
+                let name = self.recording.vehicles.get(part).map_or(part, |known| &known.name).clone();
+                state.vehicles.push(VehicleState { id, name, ..VehicleState::default() });
+            }
+        }
+        for vehicle in &mut state.vehicles {
+            self.complete(vehicle);
+        }
+        state.replay = Some(ReplayState { mission_speed, ..self.replay_state() });
+        Snapshot::new(state, None)
+    }
+
+    /// The last recorded state.
+    fn recorded_state(&mut self) -> MissionState {
+        let Some(text) = self.recording.timeline.state_at(self.at) else {
+            let mut state = MissionState::default();
+            state.mission.speed = self.recording.timeline.clock.speed(self.at);
+            return state;
+        };
+        if self.state.0 != text.nanos {
+            let state = serde_json::from_str(&text.json).unwrap_or_default();
+            self.state = (text.nanos, state);
+        }
+        self.state.1.clone()
+    }
+
+    /// Brings the state of a vehicle from the last recorded one to the present moment.
+    fn complete(&mut self, vehicle: &mut VehicleState) {
+        let part = valid_part(&vehicle.name);
+        let (operator, on_board) = (self.recording.operator.get(&part), self.recording.vehicles.get(&part));
+        let place = |known: Option<&Known>| known.map_or(0, |known| known.map.place());
+        let key = (self.side, place(operator), place(on_board));
+        let (held, version) = self.served.entry(vehicle.id).or_insert((key, 1));
+        if *held != key {
+            (*held, *version) = (key, *version + 1);
+        }
+        vehicle.map.version = *version;
+        // It is the map of the run that was recorded.
+        vehicle.map.earlier = None;
+        if let Some(heard) = operator.and_then(|known| last_upto(&known.heard, self.at)) {
+            let heard_s = self.recording.timeline.mission_s(heard);
+            vehicle.last_received_s = Some(vehicle.last_received_s.map_or(heard_s, |before| before.max(heard_s)));
+        }
+        let Some(shown) = self.shown(&part) else { return };
+        if shown.cell_m > 0.0 {
+            (vehicle.map.cell_m, vehicle.map.epoch) = (shown.cell_m, shown.epoch);
+        }
+        vehicle.map.updated_s = shown.labels.updated().map(|at| at.as_secs_f64());
+        let (bounds, counts) = match self.side {
+            ReplaySide::Difference => {
+                let cells = self.difference(&part);
+                let mut counts = BTreeMap::new();
+                cells.iter().for_each(|(_, label)| *counts.entry(label).or_default() += 1);
+                (cells.bounds(), counts)
+            }
+            _ => (shown.bounds(), shown.counts().collect()),
+        };
+        let map = &mut vehicle.map;
+        (map.x0, map.y0) = bounds.map_or((0, 0), |b| (b.x, b.y));
+        (map.width, map.height) = bounds.map_or((0, 0), |b| (b.width, b.height));
+        on_board::recount(vehicle, &counts);
+        if let Some(known) = on_board.filter(|_| self.side == ReplaySide::Vehicle) {
+            on_board::show(vehicle, known, self.at, |nanos| self.recording.timeline.mission_s(nanos));
+        }
+    }
+
+    /// The map of the side that is shown; that of the operator for a difference.
+    fn shown(&self, part: &str) -> Option<&ShownMap> {
+        let known = match self.side {
+            ReplaySide::Vehicle => self.recording.vehicles.get(part),
+            ReplaySide::Operator | ReplaySide::Difference => self.recording.operator.get(part),
+        };
+        known.map(|known| known.map.shown())
+    }
+
+    /// The cells in which the maps of both sides differ.
+    fn difference(&self, part: &str) -> LabelGrid {
+        let both = (self.recording.vehicles.get(part), self.recording.operator.get(part));
+        let (Some(vehicle), Some(operator)) = both else { return LabelGrid::default() };
+        vehicle.map.shown().difference(operator.map.shown())
+    }
+
+    fn sides(&self) -> Vec<ReplaySide> {
+        match (self.recording.timeline.states.is_empty(), self.recording.vehicles.is_empty()) {
+            (true, _) => vec![ReplaySide::Vehicle],
+            (false, true) => vec![ReplaySide::Operator],
+            (false, false) => vec![ReplaySide::Operator, ReplaySide::Vehicle, ReplaySide::Difference],
+        }
+    }
+
+    fn replay_state(&self) -> ReplayState {
+        let utc_s = |nanos: u64| nanos as f64 / 1e9;
+        let known_twice = self.parts.iter().filter(|(_, part)| {
+            self.recording.vehicles.contains_key(*part) && self.recording.operator.contains_key(*part)
+        });
+        let differing = known_twice
+            .map(|(&vehicle, part)| DifferingCells { vehicle, cells: self.difference(part).explored() as u32 })
+            .collect();
+        ReplayState {
+            from_utc_s: utc_s(self.recording.timeline.span.0),
+            to_utc_s: utc_s(self.recording.timeline.span.1),
+            at_utc_s: utc_s(self.at),
+            is_playing: self.is_playing,
+            speed: self.speed,
+            mission_speed: 1.0,
+            side: self.side,
+            sides: self.sides(),
+            differing_cells: differing,
+        }
+    }
+
+    /// Answers a reading from the record, or changes what is shown. A record takes no orders.
+    pub fn handle_request(&mut self, request: ClientRequest) -> Reply {
+        self.reply(request.request).unwrap_or(Reply::NotFound)
+    }
+
+    fn reply(&mut self, request: SurfaceRequest) -> Option<Reply> {
+        let part = |id: u8| self.parts.get(&id).map(String::as_str);
+        Some(match request {
+            SurfaceRequest::Replay(order) => match self.change(&order) {
+                Ok(()) => Reply::Replay(Box::new(self.replay_state())),
+                Err(reason) => Reply::Refused(reason),
+            },
+            SurfaceRequest::ReplayEvents => Reply::ReplayEvents(ReplayEventList { events: self.events.clone() }),
+            SurfaceRequest::Map(id) => Reply::Map(self.map(id, part(id)?)?),
+            SurfaceRequest::FormerLabels(id, cell) => {
+                let known = self.known(part(id)?)?;
+                let former = known.map.former_labels(cell, |nanos| self.recording.timeline.mission_s(nanos));
+                Reply::FormerLabels(CellHistory { former })
+            }
+            SurfaceRequest::Exemplar(id, label, number) => {
+                let bytes = self.exemplar(part(id)?, label, number)?;
+                Reply::File("image/webp", bytes)
+            }
+            SurfaceRequest::Log => Reply::Log(self.log()),
+            SurfaceRequest::Archives => Reply::Archives(Vec::new()),
+            SurfaceRequest::ArchivedMap(_) => return None,
+            _ => Reply::Refused("this is a record: it takes no orders".to_owned()),
+        })
+    }
+
+    fn change(&mut self, order: &ReplayOrder) -> Result<(), String> {
+        let (from, to) = self.recording.timeline.span;
+        if let Some(at_s) = order.at_utc_s.filter(|at_s| !at_s.is_finite()) {
+            return Err(format!("at_utc_s {at_s}: it takes seconds since 1970"));
+        }
+        if let Some(speed) = order.speed.filter(|speed| !SPEEDS.contains(speed)) {
+            return Err(format!("speed {speed}: the range is {} to {}", SPEEDS.start(), SPEEDS.end()));
+        }
+        if let Some(side) = order.side.filter(|side| !self.sides().contains(side)) {
+            return Err(format!("side {side:?}: the record of the other end is missing"));
+        }
+        // A float holds the nanoseconds of today to a quarter of a microsecond.
+        self.at = order.at_utc_s.map_or(self.at, |at_s| ((at_s.max(0.0) * 1e9) as u64).clamp(from, to));
+        self.speed = order.speed.unwrap_or(self.speed);
+        self.side = order.side.unwrap_or(self.side);
+        self.is_playing = order.is_playing.unwrap_or(self.is_playing);
+        if order.is_playing == Some(true) && self.at >= to {
+            self.at = from;
+        }
+        Ok(())
+    }
+
+    /// The end that is shown.
+    fn known(&self, part: &str) -> Option<&Known> {
+        match self.side {
+            ReplaySide::Vehicle => self.recording.vehicles.get(part),
+            _ => self.recording.operator.get(part),
+        }
+    }
+
+    fn map(&self, id: u8, part: &str) -> Option<MapCells> {
+        let (version, at) = (self.served.get(&id)?.1, self.recording.timeline.mission_time(self.at));
+        let shown = self.shown(part)?;
+        if self.side == ReplaySide::Difference {
+            let cells = MapCells::of_labels(&self.difference(part), shown.cell_m);
+            return Some(MapCells { version, at, ..cells });
+        }
+        Some(shown.cells(version, at))
+    }
+
+    /// The WebP of an image that the operator had of a label: that with a number, or the latest.
+    fn exemplar(&self, part: &str, label: u8, number: Option<u8>) -> Option<Vec<u8>> {
+        let known = self.recording.operator.get(part)?;
+        let epoch = u32::from(known.map.shown().epoch);
+        let upto = known.exemplars.partition_point(|(at, _)| *at <= self.at);
+        let wanted = |image: u8| number.is_none_or(|number| image == number);
+        let mut held = known.exemplars.get(..upto)?.iter().rev().map(|(_, exemplar)| exemplar);
+        let found = held.find(|held| (held.epoch, held.label) == (epoch, label) && wanted(held.image))?;
+        Some(found.data.clone())
+    }
+
+    /// The number of entries of the log up to the moment.
+    fn logged(&self) -> usize {
+        self.recording.log.partition_point(|(at, _)| *at <= self.at)
+    }
+
+    fn log(&self) -> Vec<LogEntry> {
+        let entry = |(number, (at, event)): (u64, &(u64, Event))| {
+            let part = valid_part(&event.vehicle);
+            let vehicle = self.parts.iter().find(|(_, own)| **own == part).and_then(|(&id, _)| Address::vehicle(id));
+            let at = self.recording.timeline.mission_time(*at);
+            let kind = LogKind::ALL.into_iter().find(|kind| kind.name() == event.source)?;
+            Some(LogEntry { number, at, vehicle, kind, by: None, text: event.text.clone() })
+        };
+        (1..).zip(&self.recording.log[..self.logged()]).filter_map(entry).collect()
+    }
+}
+
+/// The last moment of a list up to this one.
+fn last_upto(moments: &[u64], at: u64) -> Option<u64> {
+    let next = moments.partition_point(|moment| *moment <= at);
+    moments.get(next.checked_sub(1)?).copied()
+}
+
+/// The part of the topics of each vehicle by its address: that of the states, or else the lowest that is free.
+fn addresses(recording: &Recording) -> BTreeMap<u8, String> {
+    let mut parts = BTreeMap::new();
+    for vehicle in recording.timeline.states.iter().flat_map(|state| &state.head.vehicles) {
+        parts.insert(vehicle.id, valid_part(&vehicle.name));
+    }
+    for part in recording.vehicles.keys() {
+        if !parts.values().any(|known| known == part)
+            && let Some(id) = (1..=14).find(|id| !parts.contains_key(id))
+        {
+            parts.insert(id, part.clone());
+        }
+    }
+    parts
+}

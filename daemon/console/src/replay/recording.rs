@@ -1,0 +1,224 @@
+//! The records of both ends of a mission, on the clock of the surface.
+
+use super::map::MapHistory;
+use crate::messages::layer_of_text;
+use scenecast_core::UserError;
+use scenecast_files::{FrameTimes, MissionClock, RecordedMessage, mission_records, read_record};
+use scenecast_messages::contents::valid_part;
+use scenecast_messages::geometry_msgs::PoseWithCovarianceStamped;
+use scenecast_messages::scenecast_msgs::{Event, Exemplar, Frame};
+use scenecast_messages::std_msgs::Text;
+use scenecast_protocol::time::Instant;
+use serde::Deserialize;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// What the records of a mission say, by the nanoseconds since 1970 of the surface's clock.
+#[derive(Debug, Default)]
+pub struct Recording {
+    pub(super) timeline: Timeline,
+    /// What the operator knew of each vehicle, by the part of its topics.
+    pub(super) operator: BTreeMap<String, Known>,
+    /// What each vehicle knew.
+    pub(super) vehicles: BTreeMap<String, Known>,
+    /// The surface's log.
+    pub(super) log: Vec<(u64, Event)>,
+    /// Why some of the records could not be read.
+    pub damage: Vec<String>,
+}
+
+/// The states that the page showed, and the mission times that they tell.
+#[derive(Debug, Default)]
+pub(super) struct Timeline {
+    /// The times of the first and the last message of all records.
+    pub(super) span: (u64, u64),
+    pub(super) clock: MissionClock,
+    pub(super) states: Vec<StateText>,
+}
+
+/// A state that the page showed.
+#[derive(Debug)]
+pub(super) struct StateText {
+    pub(super) nanos: u64,
+    pub(super) json: String,
+    pub(super) head: StateHead,
+}
+
+/// What the time line needs of a state.
+#[derive(Debug, Default, Deserialize)]
+pub(super) struct StateHead {
+    pub(super) vehicles: Vec<Loops>,
+}
+
+/// The loops that a vehicle has closed.
+#[derive(Debug, Deserialize)]
+pub(super) struct Loops {
+    pub(super) id: u8,
+    pub(super) name: String,
+    pub(super) registration: Option<Closed>,
+}
+
+#[derive(Debug, Deserialize)]
+pub(super) struct Closed {
+    pub(super) closed: u16,
+}
+
+/// What one end knew of a vehicle.
+#[derive(Debug, Default)]
+pub(super) struct Known {
+    /// The name for people; empty where no message has it.
+    pub(super) name: String,
+    pub(super) map: MapHistory,
+    pub(super) exemplars: Vec<(u64, Exemplar)>,
+    /// Frames of the vehicle that the surface received.
+    pub(super) heard: Vec<u64>,
+    pub(super) poses: Vec<(u64, PoseWithCovarianceStamped)>,
+    /// What the vehicle says of itself.
+    pub(super) events: Vec<(u64, Event)>,
+}
+
+/// One record.
+#[derive(Default)]
+struct Record {
+    states: Vec<StateText>,
+    clock: MissionClock,
+    known: BTreeMap<String, Known>,
+    log: Vec<(u64, Event)>,
+    frames: FrameTimes,
+    span: Option<(u64, u64)>,
+}
+
+impl Recording {
+    /// Reads records of a surface, of vehicles, or of both: files, their folders, or folders with such folders.
+    ///
+    /// # Errors
+    /// There is no record, or it has no message of an end.
+    pub fn read(paths: &[PathBuf]) -> Result<Self, UserError> {
+        let mut whole = Self::default();
+        let (mut surfaces, mut vehicles) = (Vec::new(), Vec::new());
+        let paths = paths.iter().map(|path| mission_records(path)).collect::<Result<Vec<_>, _>>()?.concat();
+        for path in &paths {
+            let record = Record::read(path, &mut whole.damage)?;
+            if record.span.is_none() || record.states.is_empty() && record.known.is_empty() {
+                return Err(UserError::file(path, "it is no record of a mission: it has no topic of scenecast"));
+            }
+            if record.states.is_empty() { &mut vehicles } else { &mut surfaces }.push(record);
+        }
+        let mut span = (u64::MAX, 0);
+        let frames = FrameTimes::joined(surfaces.iter().map(|surface| &surface.frames));
+        surfaces.sort_by_key(|record| record.span);
+        for surface in surfaces {
+            span = joined(span, surface.span, 0);
+            whole.timeline.states.extend(surface.states);
+            whole.timeline.clock.add(&surface.clock);
+            whole.log.extend(surface.log);
+            surface.known.into_iter().for_each(|(part, known)| whole.operator.entry(part).or_default().add(known, 0));
+        }
+        vehicles.sort_by_key(|record| record.span);
+        for vehicle in vehicles {
+            let shift = vehicle.frames.shift_to(&frames);
+            span = joined(span, vehicle.span, shift);
+            vehicle
+                .known
+                .into_iter()
+                .for_each(|(part, known)| whole.vehicles.entry(part).or_default().add(known, shift));
+        }
+        whole.timeline.span = span;
+        Ok(whole)
+    }
+}
+
+impl Timeline {
+    /// The mission time at a moment, seconds.
+    pub(super) fn mission_s(&self, nanos: u64) -> f64 {
+        // Without a surface the record has no other time than its own.
+        self.clock.mission_s(nanos).unwrap_or_else(|| nanos.saturating_sub(self.span.0) as f64 / 1e9)
+    }
+
+    /// The same as a moment.
+    pub(super) fn mission_time(&self, nanos: u64) -> Instant {
+        Instant::from_secs_f64(self.mission_s(nanos))
+    }
+
+    /// The last state up to a moment.
+    pub(super) fn state_at(&self, nanos: u64) -> Option<&StateText> {
+        let next = self.states.partition_point(|state| state.nanos <= nanos);
+        self.states.get(next.checked_sub(1)?)
+    }
+}
+
+fn joined(span: (u64, u64), with: Option<(u64, u64)>, shift: i64) -> (u64, u64) {
+    let Some((first, last)) = with else { return span };
+    (span.0.min(first.saturating_add_signed(shift)), span.1.max(last.saturating_add_signed(shift)))
+}
+
+impl Record {
+    fn read(path: &Path, damage: &mut Vec<String>) -> Result<Self, UserError> {
+        let mut record = Self::default();
+        damage.extend(read_record(path, |message| record.take(&message))?);
+        Ok(record)
+    }
+
+    fn take(&mut self, message: &RecordedMessage) {
+        let nanos = message.nanos();
+        let Some(topic) = message.topic().strip_prefix("/scenecast/") else { return };
+        let (first, last) = self.span.unwrap_or((nanos, nanos));
+        self.span = Some((first.min(nanos), last.max(nanos)));
+        let Some((part, topic)) = topic.split_once('/') else { return self.take_common(topic, nanos, message) };
+        let known = self.known.entry(part.to_owned()).or_default();
+        match topic {
+            "map_cells" => message.decode().into_iter().for_each(|cells| known.map.take(nanos, cells)),
+            "layers" => {
+                let descriptor = message.decode::<Text>().and_then(|text| layer_of_text(&text.data));
+                descriptor.into_iter().for_each(|descriptor| known.map.describe(descriptor));
+            }
+            "exemplars" => known.exemplars.extend(message.decode().map(|exemplar| (nanos, exemplar))),
+            "pose" => known.poses.extend(message.decode().map(|pose| (nanos, pose))),
+            "events" => {
+                let event: Option<Event> = message.decode();
+                if let Some(event) = &event {
+                    known.name.clone_from(&event.vehicle);
+                }
+                known.events.extend(event.map(|event| (nanos, event)));
+            }
+            _ => {}
+        }
+    }
+
+    fn take_common(&mut self, topic: &str, nanos: u64, message: &RecordedMessage) {
+        match topic {
+            "state" => {
+                let Some(text) = message.decode::<Text>() else { return };
+                if let Ok(head) = serde_json::from_str(&text.data)
+                    && self.clock.take(nanos, &text)
+                {
+                    self.states.push(StateText { nanos, json: text.data, head });
+                }
+            }
+            "events" => self.log.extend(message.decode().map(|event| (nanos, event))),
+            "frames" => {
+                let Some(frame) = message.decode::<Frame>() else { return };
+                self.frames.take(nanos, &frame);
+                if frame.direction == Frame::RECEIVED && !frame.vehicle.is_empty() {
+                    self.known.entry(valid_part(&frame.vehicle)).or_default().heard.push(nanos);
+                }
+            }
+            _ => {}
+        }
+    }
+}
+
+impl Known {
+    /// Adds what a later record knew, by a clock that is to be shifted by `shift` nanoseconds.
+    fn add(&mut self, later: Self, shift: i64) {
+        let moved = |nanos: u64| nanos.saturating_add_signed(shift);
+        if !later.name.is_empty() {
+            self.name = later.name;
+        }
+        self.map.add(later.map, moved);
+        self.exemplars.extend(later.exemplars.into_iter().map(|(at, exemplar)| (moved(at), exemplar)));
+        self.heard.extend(later.heard.into_iter().map(moved));
+        self.poses.extend(later.poses.into_iter().map(|(at, pose)| (moved(at), pose)));
+        self.events.extend(later.events.into_iter().map(|(at, event)| (moved(at), event)));
+    }
+}

@@ -1,0 +1,213 @@
+//! The frames that both ends of a link have recorded: the clock of one end against that of the other, and what became of each frame.
+
+use scenecast_messages::scenecast_msgs::Frame;
+use std::collections::BTreeMap;
+use std::hash::{DefaultHasher, Hash, Hasher};
+
+/// When an end sent and received each frame, nanoseconds of its clock, by a fingerprint of the frame's bytes. The same bytes
+/// may be sent several times.
+#[derive(Debug, Default, Clone)]
+pub struct FrameTimes {
+    sent: Times,
+    received: Times,
+}
+
+/// By length and fingerprint.
+type Times = BTreeMap<(u32, u64), Vec<u64>>;
+
+/// A frame that an end has sent.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct SentFrame {
+    /// Nanoseconds since 1970 of the sender's clock.
+    pub sent: u64,
+    /// When the other end had received it, by the same clock; `None` if it was lost.
+    pub received: Option<u64>,
+    /// The same, or when it would have received it.
+    pub arrives: u64,
+}
+
+impl FrameTimes {
+    /// Adds a frame; one without bytes cannot be found again.
+    pub fn take(&mut self, nanos: u64, frame: &Frame) {
+        if frame.data.is_empty() {
+            return;
+        }
+        let mut hasher = DefaultHasher::new();
+        frame.data.hash(&mut hasher);
+        let times = if frame.direction == Frame::SENT { &mut self.sent } else { &mut self.received };
+        times.entry((frame.data.len() as u32, hasher.finish())).or_default().push(nanos);
+    }
+
+    /// The frames of several records of one end, the earliest first.
+    pub fn joined<'a>(all: impl Iterator<Item = &'a Self>) -> Self {
+        all.fold(Self::default(), |mut joined, one| {
+            let add = |to: &mut Times, from: &Times| {
+                from.iter().for_each(|(frame, times)| to.entry(*frame).or_default().extend(times));
+            };
+            add(&mut joined.sent, &one.sent);
+            add(&mut joined.received, &one.received);
+            joined
+        })
+    }
+
+    /// Nanoseconds to add to this clock so that it agrees with `other`: none where every frame arrives after it was sent as
+    /// it is; else the middle of the shifts by which each does. Without frames in both directions, so much that the quickest frame
+    /// takes no time.
+    pub fn shift_to(&self, other: &Self) -> i64 {
+        // Own clock + shift <= other clock for frames to the other end, and the reverse for frames from it.
+        let highest = quickest(&self.sent, &other.received);
+        let lowest = quickest(&other.sent, &self.received).map(|quickest| -quickest);
+        match (lowest, highest) {
+            (Some(lowest), Some(highest)) if (lowest..=highest).contains(&0) => 0,
+            (Some(lowest), Some(highest)) => lowest.midpoint(highest),
+            (Some(lowest), None) => lowest.max(0),
+            (None, Some(highest)) => highest.min(0),
+            (None, None) => 0,
+        }
+    }
+
+    /// What became of each frame that this end sent to `other`, whose clock shows `shift` nanoseconds more, in the order of times.
+    pub fn fates(&self, other: &Self, shift: i64) -> Vec<SentFrame> {
+        let arrivals = |frame| {
+            let all = other.received.get(frame).into_iter().flatten();
+            all.map(|at| at.saturating_add_signed(-shift)).collect::<Vec<_>>()
+        };
+        let duration = Duration::of(self.sent.iter().filter_map(|(frame, sent)| {
+            match (sent.as_slice(), arrivals(frame).first()) {
+                (&[sent], Some(&received)) => Some((frame.0, received.saturating_sub(sent))),
+                _ => None,
+            }
+        }));
+        let mut fates = Vec::new();
+        for (frame, sent) in &self.sent {
+            let expected = |at: u64| at.saturating_add(duration.of_frame(frame.0));
+            let own = fates.len();
+            fates.extend(sent.iter().map(|&at| SentFrame { sent: at, received: None, arrives: expected(at) }));
+            // An arrival is that of the copy that was to arrive next to it; a second copy of one is none.
+            for arrival in arrivals(frame) {
+                let copies = fates.get_mut(own..).unwrap_or_default().iter_mut();
+                if let Some(copy) = copies.min_by_key(|copy| copy.arrives.abs_diff(arrival)) {
+                    copy.received = copy.received.or(Some(arrival));
+                }
+            }
+        }
+        fates.sort_by_key(|frame| frame.sent);
+        correct(&mut fates);
+        fates
+    }
+}
+
+/// How long frames take: a part for each byte, and one for the way.
+struct Duration {
+    way: f64,
+    per_byte: f64,
+}
+
+impl Duration {
+    /// The least squares of frames of which it is known: bytes and nanoseconds.
+    fn of(known: impl Iterator<Item = (u32, u64)>) -> Self {
+        let (mut n, mut x, mut y, mut xx, mut xy) = (0.0, 0.0, 0.0, 0.0, 0.0);
+        for (bytes, nanos) in known {
+            let (bytes, nanos) = (f64::from(bytes), nanos as f64);
+            (n, x, y, xx, xy) = (n + 1.0, x + bytes, y + nanos, xx + bytes * bytes, xy + bytes * nanos);
+        }
+        let spread = n * xx - x * x;
+        let per_byte = if spread > 0.0 { ((n * xy - x * y) / spread).max(0.0) } else { 0.0 };
+        Self { per_byte, way: if n > 0.0 { ((y - per_byte * x) / n).max(0.0) } else { 0.0 } }
+    }
+
+    fn of_frame(&self, bytes: u32) -> u64 {
+        (self.way + self.per_byte * f64::from(bytes)) as u64
+    }
+}
+
+/// Frames arrive when they did; one that was lost would have been as late as the frame that arrived next to it.
+fn correct(fates: &mut [SentFrame]) {
+    let late = |frame: &SentFrame| Some(frame.received? as i64 - frame.arrives as i64);
+    let before: Vec<Option<i64>> = carried(fates.iter().map(late));
+    let mut after = carried(fates.iter().rev().map(late));
+    after.reverse();
+    for (frame, (before, after)) in fates.iter_mut().zip(before.into_iter().zip(after)) {
+        let late = before.or(after).unwrap_or(0);
+        frame.arrives = frame.received.unwrap_or_else(|| frame.arrives.saturating_add_signed(late));
+    }
+}
+
+/// The last value so far.
+fn carried(values: impl Iterator<Item = Option<i64>>) -> Vec<Option<i64>> {
+    values
+        .scan(None, |last, value| {
+            *last = value.or(*last);
+            Some(*last)
+        })
+        .collect()
+}
+
+/// The least time from sending to reception, as the two clocks show it, of frames that were sent once.
+fn quickest(sent: &Times, received: &Times) -> Option<i64> {
+    let time = |(frame, sent): (&(u32, u64), &Vec<u64>)| {
+        let &[sent] = sent.as_slice() else { return None };
+        i64::try_from(i128::from(*received.get(frame)?.first()?) - i128::from(sent)).ok()
+    };
+    sent.iter().filter_map(time).min()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn times(frames: &[(u8, u8, u64)]) -> FrameTimes {
+        let mut times = FrameTimes::default();
+        for &(direction, byte, at) in frames {
+            times.take(at, &Frame { direction, data: vec![byte], ..Default::default() });
+        }
+        times
+    }
+
+    #[test]
+    fn clocks_that_agree_are_left_alone() {
+        let surface = times(&[(Frame::SENT, 1, 100), (Frame::RECEIVED, 2, 260)]);
+        let vehicle = times(&[(Frame::RECEIVED, 1, 150), (Frame::SENT, 2, 200)]);
+        assert_eq!(vehicle.shift_to(&surface), 0);
+    }
+
+    #[test]
+    fn a_clock_that_is_ahead_is_set_back_by_frames_of_both_directions() {
+        let surface = times(&[(Frame::SENT, 1, 100), (Frame::RECEIVED, 2, 250), (Frame::RECEIVED, 3, 800)]);
+        let vehicle = times(&[(Frame::RECEIVED, 1, 5150), (Frame::SENT, 2, 5200), (Frame::SENT, 3, 5600)]);
+        assert_eq!(vehicle.shift_to(&surface), -5000);
+    }
+
+    #[test]
+    fn frames_of_one_direction_are_enough_and_lost_ones_say_nothing() {
+        let surface = times(&[(Frame::RECEIVED, 2, 250)]);
+        let vehicle = times(&[(Frame::SENT, 2, 5200), (Frame::SENT, 4, 1)]);
+        assert_eq!(vehicle.shift_to(&surface), -4950);
+        assert_eq!(times(&[]).shift_to(&surface), 0);
+    }
+
+    #[test]
+    fn each_frame_is_received_or_lost_also_where_its_bytes_repeat() {
+        // Frames take 400; the first copy of frame 1 arrives after the second was sent.
+        let sent = [(Frame::SENT, 1, 100), (Frame::SENT, 1, 300), (Frame::SENT, 2, 500), (Frame::SENT, 3, 700)];
+        let received = [(Frame::RECEIVED, 1, 1510), (Frame::RECEIVED, 1, 1515), (Frame::RECEIVED, 2, 1900)];
+        let fates = times(&sent).fates(&times(&received), 1000);
+        let found: Vec<_> = fates.into_iter().map(|f| (f.sent, f.received, f.arrives)).collect();
+        let expected = [(100, Some(510), 510), (300, None, 710), (500, Some(900), 900), (700, None, 1100)];
+        assert_eq!(found, expected);
+    }
+
+    #[test]
+    fn long_frames_take_longer_than_short_ones() {
+        let frame = |direction: u8, length: usize, nanos: u64, times: &mut FrameTimes| {
+            times.take(nanos, &Frame { direction, data: vec![7; length], ..Default::default() });
+        };
+        let (mut vehicle, mut surface) = (FrameTimes::default(), FrameTimes::default());
+        for (at, length) in [(0, 10), (1000, 20), (2000, 30)] {
+            frame(Frame::SENT, length, at, &mut vehicle);
+            frame(Frame::RECEIVED, length, at + 100 + 10 * length as u64, &mut surface);
+        }
+        frame(Frame::SENT, 50, 3000, &mut vehicle);
+        assert_eq!(vehicle.fates(&surface, 0).last().map(|frame| frame.arrives), Some(3600));
+    }
+}

@@ -1,0 +1,83 @@
+//! The mission times that a record of the surface tells.
+
+use scenecast_messages::std_msgs::Text;
+use serde::Deserialize;
+
+/// The mission time at each state that the page showed.
+#[derive(Debug, Default, Clone)]
+pub struct MissionClock {
+    /// In the order of the surface's clock.
+    states: Vec<ClockState>,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct ClockState {
+    nanos: u64,
+    now_s: f64,
+    /// Seconds of mission time for each second of the clock.
+    speed: f64,
+}
+
+/// The part of a state that has its time.
+#[derive(Deserialize)]
+struct StateTime {
+    now_s: f64,
+    mission: Speed,
+}
+
+#[derive(Deserialize)]
+struct Speed {
+    speed: f64,
+}
+
+impl MissionClock {
+    /// Takes a state, which was recorded at `nanos` since 1970. States may come in any order. Whether it is one.
+    pub fn take(&mut self, nanos: u64, state: &Text) -> bool {
+        let Ok(StateTime { now_s, mission: Speed { speed } }) = serde_json::from_str(&state.data) else { return false };
+        let at = self.states.partition_point(|state| state.nanos <= nanos);
+        self.states.insert(at, ClockState { nanos, now_s, speed: speed.max(1e-3) });
+        true
+    }
+
+    /// Adds the states of another record.
+    pub fn add(&mut self, other: &Self) {
+        self.states.extend(&other.states);
+        self.states.sort_by_key(|state| state.nanos);
+    }
+
+    /// The mission time at a moment of the surface's clock, seconds; `None` if no state tells it.
+    pub fn mission_s(&self, nanos: u64) -> Option<f64> {
+        let state = self.nearest(nanos)?;
+        let since_s = (i128::from(nanos) - i128::from(state.nanos)) as f64 / 1e9;
+        Some((state.now_s + since_s * state.speed).max(0.0))
+    }
+
+    /// Seconds of mission time for each second of the clock at a moment; 1 if no state tells it.
+    pub fn speed(&self, nanos: u64) -> f64 {
+        self.nearest(nanos).map_or(1.0, |state| state.speed)
+    }
+
+    /// The last state up to a moment, or else the first.
+    fn nearest(&self, nanos: u64) -> Option<ClockState> {
+        let next = self.states.partition_point(|state| state.nanos <= nanos);
+        self.states.get(next.saturating_sub(1)).copied()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn mission_times_follow_the_states_and_reach_beyond_them() {
+        let mut clock = MissionClock::default();
+        assert_eq!(clock.mission_s(5), None);
+        let state =
+            |now_s: f64, speed: f64| Text { data: format!(r#"{{"now_s":{now_s},"mission":{{"speed":{speed}}}}}"#) };
+        assert!(clock.take(20_000_000_000, &state(100.0, 4.0)) && clock.take(10_000_000_000, &state(80.0, 2.0)));
+        assert!(!clock.take(0, &Text { data: "{}".to_owned() }));
+        let at = |s: u64| clock.mission_s(s * 1_000_000_000);
+        assert_eq!([5, 15, 20, 25].map(at), [70.0, 90.0, 100.0, 120.0].map(Some));
+        assert_eq!(clock.speed(30_000_000_000), 4.0);
+    }
+}
