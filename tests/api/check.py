@@ -35,8 +35,11 @@ ORDERS = {
 }
 
 
-# Those that are refused here: no order of the vehicle is withdrawn or lost.
-REFUSED = {"give_order_again": {"slot": "fence"}, "restore_orders": {}}
+# Those that are refused here: no order of the vehicle is withdrawn or lost, the surface is live, no record is kept, and this is
+# no WebSocket.
+REFUSED = {
+    "give_order_again": (422, {"slot": "fence"}), "restore_orders": (422, {}), "replay": (404, {}), "replay_events": (404, None),
+    "report": (422, None), "foxglove": (426, None)}
 
 
 class NoRedirect(urllib.request.HTTPRedirectHandler):
@@ -137,8 +140,9 @@ def check(document, path, method, operation, state):
     if name == "events":
         return events(document, content["text/event-stream"], not vehicle["labels"])
     if name in REFUSED:
-        status, _, why = ask(method, requested, json.dumps(REFUSED[name]).encode())
-        expect(status == 422, f"{name}: {status} instead of 422: {why[:200]}")
+        expected, order = REFUSED[name]
+        status, _, why = ask(method, requested, None if order is None else json.dumps(order).encode())
+        expect(status == expected, f"{name}: {status} instead of {expected}: {why[:200]}")
         return validate(document, {"$ref": "#/components/schemas/ErrorBody"}, json.loads(why), f"the refusal of {name}")
     body, headers = None, None
     if name == "login":

@@ -21,7 +21,7 @@ const option = (name) => {
   return at > 0 ? process.argv[at + 1] : null;
 };
 
-const STORIES = ["entrance", "map", "rehearsal", "natural", "place", "labels", "vehicle", "constraints", "model", "log", "help", "link", "truth", "export", "restart", "cloud", "access", "audit", "command", "wide", "cost"];
+const STORIES = ["entrance", "map", "rehearsal", "natural", "place", "labels", "vehicle", "constraints", "model", "log", "help", "link", "replay", "truth", "export", "restart", "cloud", "access", "audit", "command", "wide", "cost"];
 
 async function stories() {
   const modules = await Promise.all(STORIES.map((s) => import(`./stories/${s}.mjs`)));

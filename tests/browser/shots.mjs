@@ -40,6 +40,7 @@ const SCENES = {
   age: { scenario: "rich", sizes: ["wide"], steps: (page) => page.selectOption("#layer", "age") },
   curiosity: { scenario: "rich", sizes: ["wide"], steps: curious },
   cloud: { scenario: "rich", sizes: ["wide"], steps: cloud },
+  replay: { scenario: "replay", steps: (page) => page.locator("#replay .mark").first().waitFor() },
 };
 
 /** Weights in force and on the way, a further draft, two requested images, the pointer on the map. */

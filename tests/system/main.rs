@@ -27,4 +27,5 @@ mod restart;
 mod ros2;
 mod ros2_labels;
 mod scene;
+mod viewers;
 mod wire_tool;

@@ -1,15 +1,24 @@
 //! The state of a vehicle as messages of ROS 2, for those who publish and those who record it.
 
-use crate::state::{MapLabelTree, MissionState, OrderProgress, OrderStatus, StatusReport, VehicleState};
+use crate::export::MapCells;
+use crate::state::{
+    ExemplarStage, LinkSummary, MapLabelTree, MissionState, OrderProgress, OrderStatus, StatusReport, UtilityTerms,
+    VehicleState,
+};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use scenecast_core::{LatLon, TangentPlane};
-use scenecast_messages::contents::{Place, Stamps, WORLD_FRAME, fix, header};
-use scenecast_messages::scenecast_msgs::{self, LabelTree};
+use scenecast_messages::builtin_interfaces::Time;
+use scenecast_messages::contents::{Grid, Place, Stamps, WORLD_FRAME, fix, header, path};
+use scenecast_messages::nav_msgs::Path;
+use scenecast_messages::scenecast_msgs::{self, LabelTree, Link, Order};
 use scenecast_messages::sensor_msgs::NavSatFix;
 use scenecast_messages::std_msgs::Header;
+use scenecast_protocol::directive::SlotId;
 use scenecast_protocol::map::{LayerDescriptor, Quantity};
 use serde::{Deserialize, Serialize};
+use serde_json::json;
+use std::collections::BTreeMap;
 
 /// Which labels become one at coarser cuts.
 pub fn label_tree(vehicle: &VehicleState, tree: &MapLabelTree, header: Header) -> LabelTree {
@@ -50,6 +59,49 @@ pub(crate) fn layer_of_text(text: &str) -> Option<LayerDescriptor> {
     LayerDescriptor::from_bytes(&STANDARD.decode(text.descriptor).ok()?)
 }
 
+/// An order with its content as the HTTP API takes it; `None` for a position fix, which the surface gives by itself.
+pub fn order(
+    mission: &MissionState,
+    vehicle: &VehicleState,
+    slot: &OrderProgress,
+    principal: String,
+    stamps: &Stamps,
+) -> Option<Order> {
+    let orders = &vehicle.orders;
+    let content = match SlotId::ALL.into_iter().find(|id| id.name() == slot.slot)? {
+        SlotId::Utility => {
+            let weighed = vehicle.labels.iter().filter(|label| label.weight != 0.0);
+            let weights: BTreeMap<String, f64> = weighed.map(|label| (label.id.to_string(), label.weight)).collect();
+            let UtilityTerms { exploration, curiosity } = orders.utility;
+            json!({ "weights": weights, "exploration": exploration, "curiosity": curiosity })
+        }
+        SlotId::Constraints => json!({ "hold": slot.name == "hold", "abort": slot.name == "abort" }),
+        SlotId::Fence => json!(orders.fence),
+        SlotId::Limits => json!(orders.limits),
+        SlotId::Areas => json!(orders.areas),
+        SlotId::Destination => json!(orders.destination),
+        SlotId::Settings => json!(orders.settings.requested),
+        SlotId::Requests => {
+            let is_requested = |stage| matches!(stage, ExemplarStage::Queued | ExemplarStage::OnAir);
+            let requested = vehicle.labels.iter().filter(|label| is_requested(label.exemplar.state));
+            json!({ "labels": requested.map(|label| label.id).collect::<Vec<_>>() })
+        }
+        SlotId::Budget => {
+            let LinkSummary { budget_bps, shares, background, .. } = &mission.link;
+            json!({ "budget_bps": budget_bps, "shares": shares, "background": background })
+        }
+        _ => return None,
+    };
+    Some(Order {
+        header: header(stamps.at(slot.issued_s), ""),
+        vehicle: vehicle.name.clone(),
+        principal,
+        slot: slot.slot.clone(),
+        version: slot.version.into(),
+        content: content.to_string(),
+    })
+}
+
 /// How far an order has come.
 pub fn order_status(vehicle: &VehicleState, slot: &OrderProgress, stamps: &Stamps) -> scenecast_msgs::OrderStatus {
     let status = match slot.state {
@@ -68,6 +120,52 @@ pub fn order_status(vehicle: &VehicleState, slot: &OrderProgress, stamps: &Stamp
         status,
         reason: slot.reason.clone().unwrap_or_default(),
         given: stamps.at(slot.issued_s),
+    }
+}
+
+/// The track of a vehicle in the world frame, at the depth of its last report.
+pub fn track(vehicle: &VehicleState, status: &StatusReport, stamps: &Stamps) -> Path {
+    let places =
+        vehicle.track.iter().map(|&(s, east, north)| place_on_path(vehicle, status, stamps.at(s), (east, north)));
+    path(&places.collect::<Vec<_>>(), header(stamps.at(status.at_s), WORLD_FRAME))
+}
+
+/// The waypoints ahead of a vehicle, likewise.
+pub fn plan(vehicle: &VehicleState, status: &StatusReport, stamps: &Stamps) -> Path {
+    let stamp = stamps.at(status.at_s);
+    let waypoints = status.plan.waypoint.iter().chain(&status.plan.path);
+    let places = waypoints.map(|&waypoint| place_on_path(vehicle, status, stamp.clone(), waypoint));
+    path(&places.collect::<Vec<_>>(), header(stamp.clone(), WORLD_FRAME))
+}
+
+fn place_on_path(vehicle: &VehicleState, status: &StatusReport, stamp: Time, (east, north): (f64, f64)) -> Place {
+    let shift = vehicle.map.shift_m();
+    Place { stamp, position_m: [east + shift.0, north + shift.1, status.pose.z_m], heading_rad: 0.0 }
+}
+
+/// A map with its layers as a grid in the world frame; `None` without cells, or with too many for a message.
+pub fn grid(cells: &MapCells, shift_m: (f64, f64)) -> Option<Grid> {
+    let mut grid = Grid::new(cells.bounds?, cells.cell_m, shift_m, |cell| cells.label(cell))?;
+    for layer in cells.layers() {
+        let descriptor = layer.descriptor();
+        grid.add_layer(&descriptor.name, descriptor.quantity == Quantity::Depth, |cell| layer.value(cell));
+    }
+    Some(grid)
+}
+
+/// The measurements of the link to a vehicle.
+pub fn link(mission: &MissionState, vehicle: &VehicleState, stamps: &Stamps) -> Link {
+    let (link, channel) = (&mission.link, &vehicle.link);
+    Link {
+        header: header(stamps.now(), ""),
+        vehicle: vehicle.name.clone(),
+        budget_bps: link.budget_bps,
+        sent_bps: link.down.bps_1min as f32,
+        received_bps: link.up.bps_1min as f32,
+        loss: channel.up.loss as f32,
+        round_trip_s: channel.round_trip_s.map_or(f32::NAN, |s| s as f32),
+        age_s: vehicle.last_received_s.map_or(f32::NAN, |at| (mission.now_s - at) as f32),
+        backlog_bits: channel.backlog.as_ref().map_or(0, |backlog| backlog.bits),
     }
 }
 

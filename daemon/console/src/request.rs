@@ -89,6 +89,8 @@ pub enum SurfaceRequest {
     /// Show another moment of a record. A surface that is live handles neither this request nor the next one.
     Replay(ReplayOrder),
     ReplayEvents,
+    /// Read the report of the dive so far. The owner of the record handles this request.
+    Report,
 }
 
 impl SurfaceRequest {
@@ -101,7 +103,9 @@ impl SurfaceRequest {
     pub(crate) fn order_kind(&self) -> Option<OrderKind> {
         match self {
             Self::Map(_) | Self::FormerLabels(..) | Self::Exemplar(..) | Self::Fit(..) | Self::Command(_) => None,
-            Self::Log | Self::Archives | Self::ArchivedMap(_) | Self::Replay(_) | Self::ReplayEvents => None,
+            Self::Log | Self::Archives | Self::ArchivedMap(_) | Self::Replay(_) | Self::ReplayEvents | Self::Report => {
+                None
+            }
             Self::Label(..)
             | Self::Draft(..)
             | Self::Note(..)
@@ -312,7 +316,7 @@ fn handle(surface: &mut Surface, request: SurfaceRequest, cell_m: f64, now: Inst
         SurfaceRequest::Log => Reply::Log(surface.log().entries().cloned().collect()),
         SurfaceRequest::Archives => Reply::Archives(Vec::new()),
         SurfaceRequest::FormerLabels(..) | SurfaceRequest::ArchivedMap(_) => return None,
-        SurfaceRequest::Replay(_) | SurfaceRequest::ReplayEvents => return None,
+        SurfaceRequest::Replay(_) | SurfaceRequest::ReplayEvents | SurfaceRequest::Report => return None,
         // Handled with its principal, before.
         SurfaceRequest::Command(_) => return None,
     })

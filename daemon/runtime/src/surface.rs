@@ -11,6 +11,7 @@ use super::stop::{Load, Reload, Stop, configured_budget, keep_private};
 use super::store::{ArchivedFile, SurfaceFiles};
 use crate::port::FromPort;
 use scenecast_config::Config;
+use scenecast_console::report::report_reply;
 use scenecast_console::{
     ClientRequest, Console, LinkMeter, MissionFacts, PendingRequest, Reply, SurfaceRequest, archived_cells, bind,
     former_labels, handle_request, measured_origin, snapshot, start,
@@ -22,6 +23,7 @@ use scenecast_protocol::wire::Address;
 use scenecast_surface::position::Follow;
 use scenecast_surface::{CommandChange, SurfaceOutput};
 use std::io::Write;
+use std::path::Path;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 use tokio::sync::oneshot;
@@ -146,7 +148,7 @@ struct SurfaceShell {
     facts: MissionFacts,
     meter: LinkMeter,
     record: SurfaceRecord,
-    /// Held while an archived map is read.
+    /// Held while an archived map or the record is read.
     reading: Arc<Mutex<()>>,
     reload: Reload,
     /// The budget of the configuration, as it was read last.
@@ -228,6 +230,9 @@ impl SurfaceShell {
         if let SurfaceRequest::ArchivedMap(name) = &request.request {
             return self.read_archive(name, reply);
         }
+        if request.request == SurfaceRequest::Report {
+            return self.report(reply);
+        }
         let now = self.clock.now();
         self.files.commit(self.host.surface_mut(), None, now);
         let by = request.by.as_ref().map(|by| by.name().to_owned());
@@ -257,6 +262,17 @@ impl SurfaceShell {
             let answer = map.map_or(Reply::NotFound, |map| Reply::Map(archived_cells(&map, cell_m)));
             // A browser that closed its connection needs no reply.
             let _ = reply.send(answer);
+        });
+    }
+
+    /// Makes the report beside the loop of the link, one at a time.
+    fn report(&self, reply: oneshot::Sender<Reply>) {
+        let records: Vec<_> = self.record.folder().map(Path::to_owned).into_iter().collect();
+        let reading = self.reading.clone();
+        tokio::task::spawn_blocking(move || {
+            let _one = reading.lock();
+            // A browser that closed its connection needs no reply.
+            let _ = reply.send(report_reply(&records));
         });
     }
 

@@ -1,6 +1,7 @@
 //! A rehearsal in real time, with the operator's page.
 
 use crate::mission_record::count;
+use scenecast_console::report::report_reply;
 use scenecast_console::state::{TrueClass, TruthInfo};
 use scenecast_console::{
     ClientRequest, Console, LinkMeter, MissionFacts, Reply, SurfaceRequest, bind, former_labels, handle_request,
@@ -233,6 +234,10 @@ impl Demo {
     fn answer(&mut self, request: ClientRequest) -> Reply {
         if let SurfaceRequest::FormerLabels(vehicle, cell) = request.request {
             return former_labels(self.recorder.memory().vehicle(vehicle), cell);
+        }
+        if request.request == SurfaceRequest::Report {
+            let folders = [self.records.0.folder(), self.records.1.folder()];
+            return report_reply(&folders.into_iter().flatten().map(Path::to_owned).collect::<Vec<_>>());
         }
         let now = self.mission.now();
         handle_request(self.mission.surface_mut(), request, self.facts.cell_m, now)

@@ -40,6 +40,19 @@ export class Grid {
     this.box = [Math.min(x0, x), Math.min(y0, y), Math.max(x1, x), Math.max(y1, y)];
   }
 
+  /** The label of a cell, 0 = unexplored. */
+  label(x, y) {
+    const tile = this.tiles.get(`${Math.floor(x / EDGE)},${Math.floor(y / EDGE)}`);
+    return tile ? tile.labels[(y - tile.row * EDGE) * EDGE + x - tile.column * EDGE] : 0;
+  }
+
+  /** Calls `fn(x, y, label)` for each explored cell. */
+  each(fn) {
+    for (const { column, row, labels } of this.tiles.values()) {
+      labels.forEach((label, at) => label !== 0 && fn(column * EDGE + (at % EDGE), row * EDGE + Math.floor(at / EDGE), label));
+    }
+  }
+
   bounds() {
     const [x0, y0, x1, y1] = this.box ?? [0, 0, -1, -1];
     return { x0, y0, width: x1 - x0 + 1, height: y1 - y0 + 1 };

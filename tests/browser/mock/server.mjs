@@ -1,6 +1,6 @@
 // A stand-in for the daemon: serves the page and /api/v2 with a synthetic mission.
 //
-//   node mock/server.mjs [--port 8470] [--scenario rich|empty|start|silent|refused|two|big|wide]
+//   node mock/server.mjs [--port 8470] [--scenario rich|empty|start|silent|refused|two|big|wide|replay]
 //
 // Here the mission follows the clock. In stories it advances only when they say so, so that nothing changes between two reads.
 //
@@ -10,6 +10,7 @@
 //    "placement": {"version": 1, "east_m": 20, "north_m": -5}, "contact": {"received_s_ago": 300, "due_s_ago": 290},
 //    "registration": {"at_s": 5, "tie": "earlier_track", "share": 1, "sigma_m": 0.04, "closed": 12}, "closed_loops": [[5, 1.5, -2]],
 //    "label_at": {"x_m": 5.1, "y_m": -3, "label": 2},
+//    "replay": {"sides": ["vehicle"], "further": [{"at_utc_s": .., ..}]},
 //    "ended": true, "truth": true, "principals": [{"name": "anna", "role": "operator"}], "commander": "anna", "stream": false, "mute": true, "down": true}
 
 import http from "node:http";
@@ -18,6 +19,7 @@ import { dirname, extname, join, normalize } from "node:path";
 import { fileURLToPath } from "node:url";
 import { gzipSync } from "node:zlib";
 import { Mission } from "./mission.mjs";
+import { REFUSAL, Replay } from "./replay.mjs";
 import { faultOf, fit } from "./settings.mjs";
 import { PICTURE } from "./truth.mjs";
 
@@ -31,9 +33,11 @@ const POLICY =
   "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data: blob:; connect-src 'self'; " +
   "base-uri 'none'; form-action 'self'; frame-ancestors 'none'";
 
+const missionOf = (scenario) => (scenario === "replay" ? new Replay() : new Mission(scenario));
+
 /** Starts a mock; resolves to {url, close()}. The mission advances by itself if `live`. */
 export async function startMock({ port = 0, scenario = "rich", live = false } = {}) {
-  const mock = { mission: new Mission(scenario), streams: new Set(), stream: true, down: false, mute: false };
+  const mock = { mission: missionOf(scenario), streams: new Set(), stream: true, down: false, mute: false };
   const server = http.createServer((req, res) => {
     route(mock, req, res).catch((error) => reply(res, error.status ?? 500, { error: error.message }));
   });
@@ -41,10 +45,12 @@ export async function startMock({ port = 0, scenario = "rich", live = false } = 
     server.once("error", reject);
     server.listen(port, "127.0.0.1", resolve);
   });
+  // A record that plays has four states a second.
+  const pauseS = live && scenario === "replay" ? 0.25 : 1;
   const timer = setInterval(() => {
-    if (live) advance(mock, mock.mission.speed);
+    if (live) advance(mock, pauseS * mock.mission.speed);
     emit(mock, "state", mock.mission.json());
-  }, 1000);
+  }, 1000 * pauseS);
   const close = () => {
     clearInterval(timer);
     for (const s of mock.streams) s.destroy();
@@ -86,6 +92,8 @@ function subscribe(mock, res) {
 async function api(mock, req, res, path) {
   const { mission } = mock;
   if (req.method === "POST") return post(mock, req, res, path);
+  if (mission instanceof Replay && path === "principal") return reply(res, 200, mission.principal());
+  if (mission instanceof Replay && path === "replay/events") return reply(res, 200, { events: mission.events() });
   if (path === "principal") return reply(res, 200, mission.command.principal(req.headers.cookie));
   if (path === "state") return reply(res, 200, mission.json());
   if (path === "truth.png" && mission.truth) return send(res, 200, "image/png", PICTURE);
@@ -111,7 +119,8 @@ async function api(mock, req, res, path) {
 /** Tiles in gzip, as the daemon packs them. */
 function tiles({ mission }, req, res, vehicle) {
   const since = new URL(req.url, "http://mock").searchParams.get("since");
-  const bytes = gzipSync(vehicle.mapBytes(mission.nowS, mission.layers ? mission.background : [], since), { level: 1 });
+  const map = mission instanceof Replay ? mission.mapBytes(vehicle, since) : vehicle.mapBytes(mission.nowS, mission.layers ? mission.background : [], since);
+  const bytes = gzipSync(map, { level: 1 });
   res.writeHead(200, { "content-type": "application/x-scenecast-tiles", "content-encoding": "gzip", "content-length": bytes.length, "cache-control": "no-store" });
   res.end(bytes);
 }
@@ -120,6 +129,7 @@ async function post(mock, req, res, path) {
   if (req.headers["x-scenecast"] !== "1") return reply(res, 403, { error: "header X-Scenecast is missing" });
   const { mission } = mock;
   const given = await body(req);
+  if (mission instanceof Replay) return replay(mock, res, path, given);
   const by = mission.command.giver(req.headers);
   if (path === "command") {
     const refused = mission.command.act(by, given, mission.nowS);
@@ -200,6 +210,14 @@ async function post(mock, req, res, path) {
   return reply(res, 404, { error: "no such thing" });
 }
 
+function replay(mock, res, path, given) {
+  const { mission } = mock;
+  if (path !== "replay") return reply(res, 403, { error: REFUSAL });
+  const refused = mission.change(given);
+  reply(res, refused ? 422 : 200, refused ? { error: refused } : mission.replay());
+  emit(mock, "state", mission.json());
+}
+
 const fence = (f) => ({ fence: f.fence ?? null, keep_outs: f.keep_outs ?? [], return_point: f.return_point ?? null });
 
 function limits(given) {
@@ -213,7 +231,8 @@ function accepted(mock, res, response) {
 }
 
 function steer(mock, order, res) {
-  if (order.scenario) mock.mission = new Mission(order.scenario);
+  if (order.scenario) mock.mission = missionOf(order.scenario);
+  if (order.replay) Object.assign(mock.mission, order.replay);
   const { mission } = mock;
   if ("in_force" in order) mission.vehicles[0].knownInForce = order.in_force;
   if (order.contact) mission.vehicles[0].setContact(mission.nowS, order.contact);

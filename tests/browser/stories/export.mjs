@@ -29,7 +29,7 @@ export default [
     async run(s) {
       await s.button("Export").click();
       const links = await s.page.locator("#dialog .files a").evaluateAll((all) => all.map((a) => a.getAttribute("href").split("/map.")[1]));
-      assert.deepEqual(links, ["tif", "csv", "labels.csv", "geojson", "ply"]);
+      assert.deepEqual(links, ["tif", "tif.aux.xml", "csv", "labels.csv", "geojson", "ply"]);
     },
   },
   {

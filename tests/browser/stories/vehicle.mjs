@@ -1,7 +1,7 @@
 import assert from "node:assert/strict";
 
 /** Counts the tones that the page plays from now on, as `tones` of its window. */
-const countTones = (s) =>
+export const countTones = (s) =>
   s.page.evaluate(() => {
     window.tones = 0;
     const part = () => ({ connect: (to) => to, start: () => (window.tones += 1), stop() {}, frequency: {}, gain: { setValueAtTime() {}, exponentialRampToValueAtTime() {} } });

@@ -108,9 +108,9 @@ export function missionKey(vehicle) {
 /** Seconds since a mission time, or null. */
 export const ageOf = (s) => (s === null || s === undefined ? null : Math.max(0, store.nowS - s));
 
-/** Silent: no frame for three times the expected interval. A mission that has ended is not silent. */
+/** Silent: no frame for three times the expected interval. A mission that has ended is not silent, nor is a vehicle to itself. */
 export function isSilent(vehicle) {
-  if (store.snapshot.mission.ended) return false;
+  if (store.snapshot.mission.ended || store.replay?.side === "vehicle") return false;
   const age = vehicle.last_received_s === null ? store.nowS : ageOf(vehicle.last_received_s);
   return age > 3 * vehicle.expected_interval_s;
 }

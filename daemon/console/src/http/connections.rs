@@ -99,7 +99,7 @@ async fn serve_one(
         .header_read_timeout(HEAD_TIMEOUT)
         .max_buf_size(MAX_HEAD_BYTES)
         .max_headers(MAX_HEADERS);
-    http.serve_connection(TokioIo::new(io), service).await
+    http.serve_connection(TokioIo::new(io), service).with_upgrades().await
 }
 
 /// The use of a connection.

@@ -1,6 +1,7 @@
 //! Admits requests.
 
 use super::access::{self, Access, HostNames};
+use super::handlers::viewers::VIEWERS;
 use super::response::error;
 use axum::Extension;
 use axum::extract::{Request, State};
@@ -8,7 +9,7 @@ use axum::http::uri::Authority;
 use axum::http::{HeaderMap, HeaderName, HeaderValue, Method, StatusCode, Uri, header};
 use axum::middleware::Next;
 use axum::response::{IntoResponse, Redirect, Response};
-use scenecast_surface::{ClientName, Giver, Role};
+use scenecast_surface::{ClientName, Giver, Principal, Role};
 use std::net::IpAddr;
 use std::sync::Arc;
 use std::time::Duration;
@@ -21,7 +22,7 @@ const RESPONSE_TIMEOUT: Duration = Duration::from_secs(15);
 /// Refuses requests that the page of another site could have made and those without a token, notes the principal, and
 /// adds the headers that isolate our page.
 pub(super) async fn guard(State(access): State<Arc<Access>>, mut request: Request, next: Next) -> Response {
-    let principal = access.identify(request.headers());
+    let principal = access.identify(request.headers()).or_else(|| viewer(&access, request.uri()));
     let is_admitted = principal.is_some() || access::is_open(request.uri().path());
     let client = client_name(request.headers());
     if let (Some(principal), Some(client)) = (principal, client.clone()) {
@@ -48,6 +49,25 @@ pub(super) async fn guard(State(access): State<Arc<Access>>, mut request: Reques
     headers.insert(HeaderName::from_static("cross-origin-resource-policy"), HeaderValue::from_static("same-origin"));
     headers.entry(header::CACHE_CONTROL).or_insert(HeaderValue::from_static("no-store"));
     response
+}
+
+/// The principal whose token is in the address, for viewers: they can set no header.
+fn viewer(access: &Access, uri: &Uri) -> Option<Principal> {
+    let pairs = uri.query().filter(|_| uri.path() == VIEWERS)?.split('&');
+    let token =
+        pairs.filter_map(|pair| pair.split_once('=')).find_map(|(name, token)| (name == "token").then_some(token))?;
+    access.principal_of_token(token)
+}
+
+/// Whether an origin is that of a viewer: a program on this machine, or a page that another program on it serves. The pages of other
+/// sites have neither.
+fn is_viewer(path: &str, origin: &str) -> bool {
+    let is_local = |host: &str| ["localhost", "127.0.0.1", "[::1]"].contains(&host);
+    let page = origin.strip_prefix("http://").map(|place| match place.rsplit_once(':') {
+        Some((host, port)) if port.parse::<u16>().is_ok() => host,
+        _ => place,
+    });
+    path == VIEWERS && (origin == "file://" || page.is_some_and(is_local))
 }
 
 /// Refuses principals below a role, before the body of the request is read.
@@ -116,6 +136,7 @@ fn check(method: &Method, uri: &Uri, headers: &HeaderMap, access: &Access) -> Re
             .iter()
             .any(|scheme| origin.strip_prefix(scheme).is_some_and(|o| o.eq_ignore_ascii_case(host)))
         && !access.origins.iter().any(|own| own.eq_ignore_ascii_case(origin))
+        && !is_viewer(uri.path(), origin)
     {
         return Err("the request comes from the page of another site; console.origins has those of a proxy");
     }
@@ -193,6 +214,22 @@ mod tests {
             checked(Method::POST, &[("host", "localhost:1"), ("x-scenecast", "1"), ("origin", "http://localhost:1")])
                 .is_ok()
         );
+    }
+
+    #[test]
+    fn viewers_on_this_machine_read_and_other_sites_do_not() {
+        let from = |path: &'static str, origin: &'static str| {
+            let pairs = [("host", "127.0.0.1:8460"), ("origin", origin)];
+            let headers = pairs.map(|(k, v)| (HeaderName::from_static(k), HeaderValue::from_static(v)));
+            let access = Access::new(HostNames::default(), Vec::new());
+            check(&Method::GET, &Uri::from_static(path), &HeaderMap::from_iter(headers), &access).is_ok()
+        };
+        for origin in ["file://", "http://localhost:8080", "http://127.0.0.1", "http://[::1]:9"] {
+            assert!(from(VIEWERS, origin) && !from("/api/v2/state", origin), "{origin}");
+        }
+        for origin in ["null", "http://evil.example", "http://localhost.evil.example:80", "https://localhost:1"] {
+            assert!(!from(VIEWERS, origin), "{origin}");
+        }
     }
 
     fn on_network(own: &str) -> HostNames {

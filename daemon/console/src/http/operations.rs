@@ -4,11 +4,13 @@ mod archive;
 mod directive;
 
 use super::handlers::maps::{self, MapQuery};
+use super::handlers::viewers::{self, VIEWERS};
 use super::handlers::{login, metrics, orders, readings};
 use super::shared::{Shared, VehicleId};
 use crate::export::MapFormat;
 use crate::fit::Fit;
 use crate::orders::{CommandOrder, DismissOrder, DraftOrder, LabelOrder, MarkerOrder, NoteOrder, RemoveMarkerOrder};
+use crate::report::HTML;
 use crate::request::SurfaceRequest;
 use crate::state::{
     AcceptedOrder, CellHistory, CommandState, LogList, MapBody, MissionState, PrincipalInfo, ReplayEventList,
@@ -141,6 +143,23 @@ fn readings() -> Vec<Operation> {
             "The events of a record, for its time line; 404 for a surface that is live",
             Content::Json(schema::<ReplayEventList>),
             || get(readings::replay_events),
+        ),
+        Operation {
+            method: Method::GET,
+            path: VIEWERS,
+            id: "foxglove",
+            role: Some(Role::Viewer),
+            summary: "Maps and states as messages of ROS 2 for Foxglove and Lichtblick: a WebSocket of the subprotocol foxglove.sdk.v1",
+            body: None,
+            success: (101, Content::Empty),
+            route: || get(viewers::viewers),
+        },
+        read(
+            "/api/v2/report.html",
+            "report",
+            "The report of the dive so far, one HTML file that needs no other",
+            Content::File(HTML),
+            || get(readings::report),
         ),
         Operation {
             method: Method::POST,

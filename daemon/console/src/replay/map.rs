@@ -30,7 +30,7 @@ struct Change {
 #[derive(Debug, Default)]
 pub(crate) struct ShownMap {
     pub(crate) labels: Replica,
-    layers: BTreeMap<String, LayerReplica>,
+    pub(crate) layers: BTreeMap<String, LayerReplica>,
     pub(crate) epoch: u8,
     /// The edge of a cell, metres; 0 before the first cells.
     pub(crate) cell_m: f64,

@@ -5,17 +5,18 @@ mod map;
 mod on_board;
 mod recording;
 
+pub(crate) use map::ShownMap;
+pub(crate) use recording::Known;
 pub use recording::Recording;
 
 use crate::export::MapCells;
+use crate::report::{Dive, HTML};
 use crate::request::{ClientRequest, Reply, SurfaceRequest};
 use crate::snapshot::Snapshot;
 use crate::state::{
     CellHistory, DifferingCells, MissionState, ReplayEvent, ReplayEventList, ReplayOrder, ReplaySide, ReplayState,
     VehicleState,
 };
-use map::ShownMap;
-use recording::Known;
 use scenecast_messages::contents::valid_part;
 use scenecast_messages::scenecast_msgs::Event;
 use scenecast_protocol::map::LabelGrid;
@@ -95,7 +96,9 @@ impl Replay {
         for (&id, part) in &self.parts {
             if state.vehicles.iter().all(|vehicle| vehicle.id != id) && self.recording.vehicles.contains_key(part) {
                 let name = self.recording.vehicles.get(part).map_or(part, |known| &known.name).clone();
-                state.vehicles.push(VehicleState { id, name, ..VehicleState::default() });
+                // A vehicle knows of itself at any time.
+                let expected_interval_s = 60.0;
+                state.vehicles.push(VehicleState { id, name, expected_interval_s, ..VehicleState::default() });
             }
         }
         for vehicle in &mut state.vehicles {
@@ -217,6 +220,7 @@ impl Replay {
                 Err(reason) => Reply::Refused(reason),
             },
             SurfaceRequest::ReplayEvents => Reply::ReplayEvents(ReplayEventList { events: self.events.clone() }),
+            SurfaceRequest::Report => self.report(),
             SurfaceRequest::Map(id) => Reply::Map(self.map(id, part(id)?)?),
             SurfaceRequest::FormerLabels(id, cell) => {
                 let known = self.known(part(id)?)?;
@@ -254,6 +258,14 @@ impl Replay {
             self.at = from;
         }
         Ok(())
+    }
+
+    /// The report of the whole record.
+    fn report(&mut self) -> Reply {
+        let dive = Dive::of(&mut self.recording);
+        // The maps are at the end now.
+        self.snapshot();
+        dive.map_or_else(Reply::Refused, |dive| Reply::File(HTML, dive.html().into_bytes()))
     }
 
     /// The end that is shown.
@@ -295,10 +307,10 @@ impl Replay {
             let part = valid_part(&event.vehicle);
             let vehicle = self.parts.iter().find(|(_, own)| **own == part).and_then(|(&id, _)| Address::vehicle(id));
             let at = self.recording.timeline.mission_time(*at);
-            let kind = LogKind::ALL.into_iter().find(|kind| kind.name() == event.source)?;
-            Some(LogEntry { number, at, vehicle, kind, by: None, text: event.text.clone() })
+            let kind = LogKind::ALL.into_iter().find(|kind| kind.name() == event.source).unwrap_or(LogKind::Record);
+            LogEntry { number, at, vehicle, kind, by: None, text: event.text.clone() }
         };
-        (1..).zip(&self.recording.log[..self.logged()]).filter_map(entry).collect()
+        (1..).zip(&self.recording.log[..self.logged()]).map(entry).collect()
     }
 }
 

@@ -6,7 +6,7 @@ use scenecast_core::UserError;
 use scenecast_files::{FrameTimes, MissionClock, RecordedMessage, mission_records, read_record};
 use scenecast_messages::contents::valid_part;
 use scenecast_messages::geometry_msgs::PoseWithCovarianceStamped;
-use scenecast_messages::scenecast_msgs::{Event, Exemplar, Frame};
+use scenecast_messages::scenecast_msgs::{Event, Exemplar, Frame, Link, Order, OrderStatus};
 use scenecast_messages::std_msgs::Text;
 use scenecast_protocol::time::Instant;
 use serde::Deserialize;
@@ -16,31 +16,35 @@ use std::path::{Path, PathBuf};
 /// What the records of a mission say, by the nanoseconds since 1970 of the surface's clock.
 #[derive(Debug, Default)]
 pub struct Recording {
-    pub(super) timeline: Timeline,
+    pub(crate) timeline: Timeline,
     /// What the operator knew of each vehicle, by the part of its topics.
-    pub(super) operator: BTreeMap<String, Known>,
+    pub(crate) operator: BTreeMap<String, Known>,
     /// What each vehicle knew.
-    pub(super) vehicles: BTreeMap<String, Known>,
+    pub(crate) vehicles: BTreeMap<String, Known>,
     /// The surface's log.
-    pub(super) log: Vec<(u64, Event)>,
+    pub(crate) log: Vec<(u64, Event)>,
+    /// Frames that the surface has sent, received and dropped.
+    pub(crate) frames: [u64; 3],
+    /// What the surface ran with, as JSON.
+    pub(crate) settings: String,
     /// Why some of the records could not be read.
     pub damage: Vec<String>,
 }
 
 /// The states that the page showed, and the mission times that they tell.
 #[derive(Debug, Default)]
-pub(super) struct Timeline {
+pub(crate) struct Timeline {
     /// The times of the first and the last message of all records.
-    pub(super) span: (u64, u64),
+    pub(crate) span: (u64, u64),
     pub(super) clock: MissionClock,
-    pub(super) states: Vec<StateText>,
+    pub(crate) states: Vec<StateText>,
 }
 
 /// A state that the page showed.
 #[derive(Debug)]
-pub(super) struct StateText {
-    pub(super) nanos: u64,
-    pub(super) json: String,
+pub(crate) struct StateText {
+    pub(crate) nanos: u64,
+    pub(crate) json: String,
     pub(super) head: StateHead,
 }
 
@@ -65,16 +69,20 @@ pub(super) struct Closed {
 
 /// What one end knew of a vehicle.
 #[derive(Debug, Default)]
-pub(super) struct Known {
+pub(crate) struct Known {
     /// The name for people; empty where no message has it.
     pub(super) name: String,
-    pub(super) map: MapHistory,
-    pub(super) exemplars: Vec<(u64, Exemplar)>,
+    pub(crate) map: MapHistory,
+    pub(crate) exemplars: Vec<(u64, Exemplar)>,
     /// Frames of the vehicle that the surface received.
     pub(super) heard: Vec<u64>,
-    pub(super) poses: Vec<(u64, PoseWithCovarianceStamped)>,
+    pub(crate) poses: Vec<(u64, PoseWithCovarianceStamped)>,
     /// What the vehicle says of itself.
     pub(super) events: Vec<(u64, Event)>,
+    /// Orders as they were given, and how far each had come.
+    pub(crate) given: Vec<Order>,
+    pub(crate) orders: Vec<OrderStatus>,
+    pub(crate) link: Vec<(u64, Link)>,
 }
 
 /// One record.
@@ -84,6 +92,8 @@ struct Record {
     clock: MissionClock,
     known: BTreeMap<String, Known>,
     log: Vec<(u64, Event)>,
+    settings: String,
+    counts: [u64; 3],
     frames: FrameTimes,
     span: Option<(u64, u64)>,
 }
@@ -112,6 +122,8 @@ impl Recording {
             whole.timeline.states.extend(surface.states);
             whole.timeline.clock.add(&surface.clock);
             whole.log.extend(surface.log);
+            whole.frames.iter_mut().zip(surface.counts).for_each(|(all, own)| *all += own);
+            whole.settings = surface.settings;
             surface.known.into_iter().for_each(|(part, known)| whole.operator.entry(part).or_default().add(known, 0));
         }
         vehicles.sort_by_key(|record| record.span);
@@ -123,20 +135,21 @@ impl Recording {
                 .into_iter()
                 .for_each(|(part, known)| whole.vehicles.entry(part).or_default().add(known, shift));
         }
-        whole.timeline.span = span;
+        // Before the first state the page would show nothing.
+        whole.timeline.span = (whole.timeline.states.first().map_or(span.0, |first| first.nanos), span.1);
         Ok(whole)
     }
 }
 
 impl Timeline {
     /// The mission time at a moment, seconds.
-    pub(super) fn mission_s(&self, nanos: u64) -> f64 {
+    pub(crate) fn mission_s(&self, nanos: u64) -> f64 {
         // Without a surface the record has no other time than its own.
         self.clock.mission_s(nanos).unwrap_or_else(|| nanos.saturating_sub(self.span.0) as f64 / 1e9)
     }
 
     /// The same as a moment.
-    pub(super) fn mission_time(&self, nanos: u64) -> Instant {
+    pub(crate) fn mission_time(&self, nanos: u64) -> Instant {
         Instant::from_secs_f64(self.mission_s(nanos))
     }
 
@@ -173,6 +186,9 @@ impl Record {
                 descriptor.into_iter().for_each(|descriptor| known.map.describe(descriptor));
             }
             "exemplars" => known.exemplars.extend(message.decode().map(|exemplar| (nanos, exemplar))),
+            "orders" => known.given.extend(message.decode::<Order>()),
+            "order_status" => known.orders.extend(message.decode::<OrderStatus>()),
+            "link" => known.link.extend(message.decode().map(|link| (nanos, link))),
             "pose" => known.poses.extend(message.decode().map(|pose| (nanos, pose))),
             "events" => {
                 let event: Option<Event> = message.decode();
@@ -195,10 +211,14 @@ impl Record {
                     self.states.push(StateText { nanos, json: text.data, head });
                 }
             }
+            "settings" => self.settings = message.decode::<Text>().map_or_else(String::new, |text| text.data),
             "events" => self.log.extend(message.decode().map(|event| (nanos, event))),
             "frames" => {
                 let Some(frame) = message.decode::<Frame>() else { return };
                 self.frames.take(nanos, &frame);
+                if let Some(count) = self.counts.get_mut(usize::from(frame.direction)) {
+                    *count += 1;
+                }
                 if frame.direction == Frame::RECEIVED && !frame.vehicle.is_empty() {
                     self.known.entry(valid_part(&frame.vehicle)).or_default().heard.push(nanos);
                 }
@@ -218,6 +238,9 @@ impl Known {
         self.map.add(later.map, moved);
         self.exemplars.extend(later.exemplars.into_iter().map(|(at, exemplar)| (moved(at), exemplar)));
         self.heard.extend(later.heard.into_iter().map(moved));
+        self.given.extend(later.given);
+        self.orders.extend(later.orders);
+        self.link.extend(later.link.into_iter().map(|(at, link)| (moved(at), link)));
         self.poses.extend(later.poses.into_iter().map(|(at, pose)| (moved(at), pose)));
         self.events.extend(later.events.into_iter().map(|(at, event)| (moved(at), event)));
     }

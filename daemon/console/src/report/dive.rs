@@ -1,16 +1,20 @@
 //! What a record says about a dive.
 
+use super::areas::{ClassArea, areas};
+use super::words;
+use crate::replay::{Known, Recording};
 use crate::state::{MissionState, VehicleState};
 use scenecast_core::UserError;
-use scenecast_files::{RecordedMessage, read_record};
 use scenecast_messages::contents::valid_part;
 use scenecast_messages::geometry_msgs::PoseWithCovarianceStamped;
-use scenecast_messages::scenecast_msgs::{Event, Exemplar, Frame, Link, MapCells, OrderStatus};
-use scenecast_messages::std_msgs::Text;
+use scenecast_messages::scenecast_msgs::{Event, Exemplar, Link, Order, OrderStatus};
 use scenecast_protocol::directive::SlotId;
-use scenecast_protocol::map::{Cell, LabelGrid};
+use scenecast_protocol::map::LabelGrid;
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::PathBuf;
+
+/// Moments of a record at which its maps are looked at.
+const MOMENTS: u64 = 60;
 
 /// The dive of a record of the surface.
 #[derive(Debug, Default)]
@@ -46,12 +50,18 @@ pub(super) struct DiveVehicle {
     pub(super) labels: LabelGrid,
     /// The edge of a cell, metres.
     pub(super) cell_m: f64,
-    pub(super) epoch: u32,
+    /// The areas of the classes, the largest first.
+    pub(super) classes: Vec<ClassArea>,
     pub(super) track: Vec<TrackPoint>,
     /// The way of each order, by slot and version.
     pub(super) orders: BTreeMap<(String, u32), Vec<OrderStep>>,
+    pub(super) given: BTreeMap<(String, u32), Order>,
     pub(super) exemplars: Vec<(f64, Exemplar)>,
     pub(super) link: Vec<(f64, Link)>,
+    /// Of the vehicle's cells the share that the operator's map has with the same label, over time; empty without the vehicle's record.
+    pub(super) agreement: Vec<(f64, f64)>,
+    /// The cells of the operator's map over time.
+    pub(super) explored: Vec<(f64, u64)>,
 }
 
 /// A reported place, metres in the world frame.
@@ -73,55 +83,42 @@ pub(super) struct OrderStep {
     pub(super) reason: String,
 }
 
+fn seconds(nanos: u64) -> f64 {
+    nanos as f64 / 1e9
+}
+
 impl Dive {
-    /// Reads the record of a surface: a file, or its folder.
+    /// Reads the record of a surface, and of vehicles if they are given: files, or their folders.
     ///
     /// # Errors
     /// There is no record, or none of a surface.
-    pub fn read(path: &Path) -> Result<Self, UserError> {
-        let mut dive = Self { span_s: (f64::INFINITY, f64::NEG_INFINITY), ..Self::default() };
-        let mut last_state = None;
-        dive.damage = read_record(path, |message| dive.take(message, &mut last_state))?;
-        let Some(state) = last_state else {
-            let what = "it is no record of a surface: it has no topic /scenecast/state";
-            return Err(UserError::file(path, what));
-        };
-        dive.state =
-            serde_json::from_str(&state).map_err(|e| UserError::file(path, format!("/scenecast/state: {e}")))?;
-        Ok(dive)
+    pub fn read(paths: &[PathBuf]) -> Result<Self, UserError> {
+        let names: Vec<_> = paths.iter().map(|path| path.display().to_string()).collect();
+        Self::of(&mut Recording::read(paths)?).map_err(|what| UserError::Input(format!("{}: {what}", names.join(", "))))
     }
 
-    fn take(&mut self, message: RecordedMessage, last_state: &mut Option<String>) {
-        let at_s = message.nanos() as f64 / 1e9;
-        self.span_s = (self.span_s.0.min(at_s), self.span_s.1.max(at_s));
-        let Some(topic) = message.topic().strip_prefix("/scenecast/") else { return };
-        let Some((vehicle, topic)) = topic.split_once('/') else {
-            match topic {
-                "state" => *last_state = message.decode::<Text>().map(|text| text.data).or(last_state.take()),
-                "settings" => {
-                    let text = message.decode::<Text>();
-                    self.settings = text.and_then(|text| serde_json::from_str(&text.data).ok()).unwrap_or_default();
-                }
-                "events" => self.events.extend(message.decode().map(|event| (at_s, event))),
-                "frames" => {
-                    let direction = message.decode::<Frame>().map(|frame| usize::from(frame.direction));
-                    if let Some(count) = direction.and_then(|direction| self.frames.get_mut(direction)) {
-                        *count += 1;
-                    }
-                }
-                _ => {}
-            }
-            return;
+    /// The dive of a recording, of which the maps are at its end afterwards. The error is one line for people.
+    pub(crate) fn of(recording: &mut Recording) -> Result<Self, String> {
+        let Some(last) = recording.timeline.states.last() else {
+            return Err("no record of a surface: it has no topic /scenecast/state".to_owned());
         };
-        let vehicle = self.vehicles.entry(vehicle.to_owned()).or_default();
-        match topic {
-            "map_cells" => message.decode().iter().for_each(|cells| vehicle.take_cells(cells)),
-            "pose" => vehicle.track.extend(message.decode().map(|pose| TrackPoint::of(&pose))),
-            "order_status" => message.decode().into_iter().for_each(|status| vehicle.take_order(status)),
-            "exemplars" => vehicle.exemplars.extend(message.decode().map(|exemplar| (at_s, exemplar))),
-            "link" => vehicle.link.extend(message.decode().map(|link| (at_s, link))),
-            _ => {}
+        let state: MissionState =
+            serde_json::from_str(&last.json).map_err(|e| format!("/scenecast/state of the record: {e}"))?;
+        let (first, last) = recording.timeline.span;
+        let mut vehicles = BTreeMap::new();
+        for vehicle in &state.vehicles {
+            let part = valid_part(&vehicle.name);
+            vehicles.extend(DiveVehicle::of(recording, vehicle, &part).map(|known| (part, known)));
         }
+        Ok(Self {
+            span_s: (seconds(first), seconds(last)),
+            state,
+            vehicles,
+            events: recording.log.iter().map(|(at, event)| (seconds(*at), event.clone())).collect(),
+            frames: recording.frames,
+            settings: serde_json::from_str(&recording.settings).unwrap_or_default(),
+            damage: (!recording.damage.is_empty()).then(|| recording.damage.join("; ")),
+        })
     }
 
     /// The moment of a mission time, seconds since 1970.
@@ -134,39 +131,57 @@ impl Dive {
         let known = |state: &VehicleState| self.vehicles.get(&valid_part(&state.name));
         self.state.vehicles.iter().filter_map(move |state| Some((state, known(state)?)))
     }
+
+    /// What an order to a vehicle was: by the log, which has the words of the page, or else by its content.
+    pub(super) fn ordered(&self, state: &VehicleState, vehicle: &DiveVehicle, order: &(String, u32)) -> String {
+        let Some(given) = vehicle.given.get(order) else { return "not recorded".to_owned() };
+        let given_s = given.header.stamp.nanos() as f64 / 1e9;
+        let is_it = |(at_s, event): &&(f64, Event)| {
+            let is_of_it = event.vehicle == state.name || event.vehicle.is_empty();
+            event.source == "order" && is_of_it && (at_s - given_s).abs() < 0.5
+        };
+        let logged = self.events.iter().find(is_it).map(|(_, event)| event.text.clone());
+        logged.unwrap_or_else(|| words::content(&state.label_book, given))
+    }
 }
 
 impl DiveVehicle {
-    fn take_cells(&mut self, cells: &MapCells) {
-        if !cells.layer.is_empty() {
-            return;
-        }
-        if !cells.whole && self.cell_m == 0.0 {
-            // The first file of the record is gone; the whole map follows.
-            return;
-        }
-        if cells.whole {
-            self.labels.clear();
-            if self.epoch != cells.epoch {
-                // Their numbers mean something else now.
-                self.exemplars.clear();
-            }
-        }
-        (self.epoch, self.cell_m) = (cells.epoch, cells.cell_m);
-        for ((&x, &y), &value) in cells.x.iter().zip(&cells.y).zip(&cells.value) {
-            self.labels.set(Cell::new(x, y), value);
-        }
+    /// What a recording says about a vehicle with this part of topics; `None` if it has nothing.
+    fn of(recording: &mut Recording, state: &VehicleState, part: &str) -> Option<Self> {
+        let agreement = agreement(recording, part);
+        let explored = explored(recording, part);
+        let Recording { timeline, operator, .. } = recording;
+        let known = operator.get_mut(part)?;
+        known.map.seek(u64::MAX, |nanos| timeline.mission_time(nanos));
+        let shown = known.map.shown();
+        let mut vehicle = Self {
+            labels: shown.labels.shown().clone(),
+            cell_m: shown.cell_m,
+            classes: areas(shown, |label| state.label_book.shown_as(label)),
+            track: known.poses.iter().map(|(_, pose)| TrackPoint::of(pose)).collect(),
+            link: known.link.iter().map(|(at, link)| (seconds(*at), link.clone())).collect(),
+            agreement,
+            explored,
+            ..Self::default()
+        };
+        // Of an earlier epoch, their numbers mean something else.
+        let is_current = |exemplar: &Exemplar| exemplar.epoch == u32::from(shown.epoch);
+        let exemplars = known.exemplars.iter().filter(|(_, exemplar)| is_current(exemplar));
+        vehicle.exemplars = exemplars.map(|(at, exemplar)| (seconds(*at), exemplar.clone())).collect();
+        vehicle.given = known.given.iter().map(|order| ((order.slot.clone(), order.version), order.clone())).collect();
+        known.orders.iter().for_each(|status| vehicle.take_order(status));
+        Some(vehicle)
     }
 
-    fn take_order(&mut self, status: OrderStatus) {
+    fn take_order(&mut self, status: &OrderStatus) {
         let seconds = |time: &scenecast_messages::builtin_interfaces::Time| time.nanos() as f64 / 1e9;
         let step = OrderStep {
             at_s: seconds(&status.header.stamp),
             given_s: seconds(&status.given),
             status: status.status,
-            reason: status.reason,
+            reason: status.reason.clone(),
         };
-        let way = self.orders.entry((status.slot, status.version)).or_default();
+        let way = self.orders.entry((status.slot.clone(), status.version)).or_default();
         // The next file of a record repeats the last status.
         if way.last().is_none_or(|last| last.status != step.status) {
             way.push(step);
@@ -186,17 +201,38 @@ impl DiveVehicle {
         };
         self.track.windows(2).map(step).sum()
     }
+}
 
-    /// Cells of each label, the label that it is shown as a part of counted with it; the largest first.
-    pub(super) fn classes(&self, state: &VehicleState) -> Vec<(u8, u64)> {
-        let mut counts: BTreeMap<u8, u64> = BTreeMap::new();
-        for (_, label) in self.labels.iter() {
-            *counts.entry(state.label_book.shown_as(label)).or_default() += 1;
-        }
-        let mut classes: Vec<(u8, u64)> = counts.into_iter().collect();
-        classes.sort_by_key(|&(label, cells)| (std::cmp::Reverse(cells), label));
-        classes
-    }
+/// Of the vehicle's cells the share that the operator's map has, at moments of the record.
+fn agreement(recording: &mut Recording, part: &str) -> Vec<(f64, f64)> {
+    let Recording { timeline, operator, vehicles, .. } = recording;
+    let (Some(operator), Some(vehicle)) = (operator.get_mut(part), vehicles.get_mut(part)) else { return Vec::new() };
+    let (first, last) = timeline.span;
+    let at = |known: &mut Known, nanos: u64| known.map.seek(nanos, |nanos| timeline.mission_time(nanos));
+    let moment = |number: u64| first + (last - first) / MOMENTS * number;
+    let share = |number| {
+        at(operator, moment(number));
+        at(vehicle, moment(number));
+        let (own, others) = (vehicle.map.shown(), operator.map.shown());
+        let (cells, held) = (own.labels.shown(), others.labels.shown());
+        let same = cells.iter().filter(|&(cell, label)| own.epoch == others.epoch && held.get(cell) == label).count();
+        let share = if cells.explored() == 0 { f64::NAN } else { same as f64 / cells.explored() as f64 };
+        (seconds(moment(number)), share)
+    };
+    (1..=MOMENTS).map(share).collect()
+}
+
+/// The cells of the operator's map, at moments of the record.
+fn explored(recording: &mut Recording, part: &str) -> Vec<(f64, u64)> {
+    let Recording { timeline, operator, .. } = recording;
+    let Some(operator) = operator.get_mut(part) else { return Vec::new() };
+    let (first, last) = timeline.span;
+    let cells = |number| {
+        let nanos = first + (last - first) / MOMENTS * number;
+        operator.map.seek(nanos, |nanos| timeline.mission_time(nanos));
+        (seconds(nanos), operator.map.shown().labels.shown().explored() as u64)
+    };
+    (0..=MOMENTS).map(cells).collect()
 }
 
 impl TrackPoint {

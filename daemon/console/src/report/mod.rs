@@ -1,11 +1,27 @@
 //! The report of a dive: what a record of the surface says, as one page that needs no other file.
 
+mod areas;
 mod chart;
 mod dive;
 mod page;
 mod words;
 
 pub use dive::Dive;
+
+use crate::request::Reply;
+use std::path::PathBuf;
+
+/// The content type of a report.
+pub(crate) const HTML: &str = "text/html; charset=utf-8";
+
+/// The report of the records of a mission, which may go on.
+pub fn report_reply(records: &[PathBuf]) -> Reply {
+    match Dive::read(records) {
+        Ok(dive) => Reply::File(HTML, dive.html().into_bytes()),
+        Err(_) if records.is_empty() => Reply::Refused("this mission is not recorded (record.enabled)".to_owned()),
+        Err(error) => Reply::Refused(error.to_string()),
+    }
+}
 
 use std::fmt;
 

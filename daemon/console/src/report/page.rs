@@ -7,6 +7,7 @@ use crate::state::VehicleState;
 use base64::Engine;
 use base64::prelude::BASE64_STANDARD;
 use scenecast_core::utc_text;
+use scenecast_protocol::directive::SlotId;
 use serde_json::json;
 use std::fmt::Write;
 
@@ -58,8 +59,7 @@ impl Dive {
         let _ = writeln!(
             page,
             "<h2>How this was made</h2>\n<p>By {program} from the record of the surface, run {run}, which {} wrote from {begin} to {end}. \
-             The map is the operator's: what had arrived by the acoustic link. Areas are counts of cells; what the model is unsure of is \
-             counted with the rest.</p>\n<h2>How to cite</h2>\n<p>Mission \u{201c}{mission}\u{201d}, vehicle {}, {begin} to {end}: map of the \
+             The map is the operator's: what had arrived by the acoustic link. Areas are counts of cells.</p>\n<h2>How to cite</h2>\n<p>Mission \u{201c}{mission}\u{201d}, vehicle {}, {begin} to {end}: map of the \
              sea floor by an unsupervised scene model, run {run}, {program}.</p>\n</body></html>",
             Escaped(recorded),
             Escaped(&names.join(", ")),
@@ -81,7 +81,8 @@ impl Dive {
         }
         classes(page, state, vehicle);
         notes(page, self, state);
-        orders(page, self, vehicle);
+        orders(page, self, state, vehicle);
+        steering(page, self, state, vehicle);
         self.link(page, vehicle);
     }
 
@@ -102,6 +103,12 @@ impl Dive {
             series("sent to the vehicle", "bit/s", |link| link.sent_bps),
             series("share of frames lost", "1", |link| link.loss),
             series("data that waited at the vehicle", "bit", |link| link.backlog_bits as f32),
+            series("age of the last frame from the vehicle", "s", |link| link.age_s),
+            Series {
+                name: "share of the vehicle's cells that the operator's map had with the same label",
+                unit: "1",
+                points: vehicle.agreement.iter().map(|(at_s, share)| (at_s - begin, *share)).collect(),
+            },
             uncertainty,
         ];
         let charts: Vec<String> = charts.iter().filter_map(|series| chart::line(series, end - begin)).collect();
@@ -120,7 +127,9 @@ impl Dive {
         };
         let _ = writeln!(
             page,
-            "<table><tr><th>direction</th><th>frames</th><th>lost</th><th>bytes by class</th></tr>{}{}</table>",
+            "<table><tr><th>direction</th><th>frames</th><th>lost</th><th>bytes by class</th></tr>{}{}</table>\n<p>Frames are numbered: \
+             those are lost whose number the other end never received, over the whole mission. The chart shows the share of the last 64 \
+             frames. The operator's map lacks nothing that was lost: it was sent again.</p>",
             direction("from the vehicles", &self.state.link.up),
             direction("to the vehicles", &self.state.link.down)
         );
@@ -147,16 +156,17 @@ impl Dive {
     /// The figures of the report.
     pub fn json(&self) -> serde_json::Value {
         let vehicles = self.vehicles().map(|(state, vehicle)| {
-            let square = vehicle.cell_m * vehicle.cell_m;
-            let classes = vehicle.classes(state).into_iter().map(|(label, cells)| {
-                json!({ "label": label, "name": state.label_book.title(label), "colour": state.label_book.colour_text(label), "cells": cells,
-                        "area_m2": cells as f64 * square })
+            let classes = vehicle.classes.iter().map(|class| {
+                let book = &state.label_book;
+                json!({ "label": class.label, "name": book.title(class.label), "colour": book.colour_text(class.label),
+                        "cells": class.cells, "area_m2": class.area_m2, "interval_m2": class.interval_m2 })
             });
-            let orders = vehicle.orders_of_people().map(|((slot, version), way)| {
+            let orders = vehicle.orders_of_people().map(|(order @ (slot, version), way)| {
+                let ordered = self.ordered(state, vehicle, order);
                 let steps = way.iter().map(|step| {
                     json!({ "utc": utc_text(step.at_s), "status": words::status(step.status), "reason": step.reason })
                 });
-                json!({ "slot": slot, "version": version, "steps": steps.collect::<Vec<_>>() })
+                json!({ "slot": slot, "version": version, "ordered": ordered, "steps": steps.collect::<Vec<_>>() })
             });
             json!({
                 "name": state.name,
@@ -179,27 +189,27 @@ impl Dive {
 }
 
 fn classes(page: &mut String, state: &VehicleState, vehicle: &DiveVehicle) {
-    let classes = vehicle.classes(state);
-    let all: u64 = classes.iter().map(|(_, cells)| cells).sum();
+    let all: u64 = vehicle.classes.iter().map(|class| class.cells).sum();
     if all == 0 {
         return;
     }
-    *page +=
-        "<h3>Classes</h3>\n<table><tr><th>class</th><th>cells</th><th>area</th><th>share</th><th>images</th></tr>\n";
-    let square = vehicle.cell_m * vehicle.cell_m;
-    for (label, cells) in classes {
+    *page += "<h3>Classes</h3>\n<table><tr><th>class</th><th>cells</th><th>area</th><th>95 % interval</th><th>share</th>\
+              <th>images</th></tr>\n";
+    for class in &vehicle.classes {
         let _ = writeln!(
             page,
-            "<tr><td><span class=\"swatch\" style=\"background:{}\"></span>{}</td><td class=\"n\">{cells}</td><td class=\"n\">{}</td>\
-             <td class=\"n\">{:.1} %</td><td><div class=\"images\">{}</div></td></tr>",
-            state.label_book.colour_text(label),
-            Escaped(&state.label_book.title(label)),
-            words::area(cells as f64 * square),
-            cells as f64 / all as f64 * 100.0,
-            images(state, vehicle, label)
+            "<tr><td><span class=\"swatch\" style=\"background:{}\"></span>{}</td><td class=\"n\">{}</td><td class=\"n\">{}</td>\
+             <td class=\"n\">{}</td><td class=\"n\">{:.1} %</td><td><div class=\"images\">{}</div></td></tr>",
+            state.label_book.colour_text(class.label),
+            Escaped(&state.label_book.title(class.label)),
+            class.cells,
+            words::area(class.area_m2),
+            words::interval(class.interval_m2),
+            class.cells as f64 / all as f64 * 100.0,
+            images(state, vehicle, class.label)
         );
     }
-    *page += "</table>\n";
+    let _ = writeln!(page, "</table>\n<p>{}</p>", words::of_intervals(&vehicle.classes));
 }
 
 /// The largest images of a class, each with its label and time.
@@ -243,20 +253,48 @@ fn notes(page: &mut String, dive: &Dive, state: &VehicleState) {
     *page += "</ul>\n";
 }
 
-fn orders(page: &mut String, dive: &Dive, vehicle: &DiveVehicle) {
+/// The weights and the modes over time.
+fn steering(page: &mut String, dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) {
+    let modes = dive.events.iter().filter(|(_, event)| event.vehicle == state.name && event.source == "mode");
+    let modes = modes.map(|(at_s, event)| (*at_s, event.text.clone()));
+    let weights = vehicle.given.iter().filter(|((slot, _), _)| slot == SlotId::Utility.name());
+    let weights = weights.map(|(order, given)| {
+        (given.header.stamp.nanos() as f64 / 1e9, format!("ordered: {}", dive.ordered(state, vehicle, order)))
+    });
+    let mut steps: Vec<(f64, String)> = modes.chain(weights).collect();
+    if steps.is_empty() {
+        return;
+    }
+    steps.sort_by(|a, b| a.0.total_cmp(&b.0));
+    *page += "<h3>What the vehicle was steered by, and its modes</h3>\n<table><tr><th>time (UTC)</th><th>what</th><th>cells on the map by \
+              then</th></tr>\n";
+    for (at_s, text) in &steps {
+        let cells = vehicle.explored.iter().rev().find(|(at, _)| at <= at_s).map_or(0, |(_, cells)| *cells);
+        let _ = writeln!(
+            page,
+            "<tr><td class=\"t\">{}</td><td>{}</td><td class=\"n\">{cells}</td></tr>",
+            utc_text(*at_s),
+            Escaped(text)
+        );
+    }
+    *page += "</table>\n";
+}
+
+fn orders(page: &mut String, dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) {
     if vehicle.orders_of_people().next().is_none() {
         return;
     }
-    *page += "<h3>Orders</h3>\n<table><tr><th>order</th><th>given (UTC)</th><th>end</th><th>after</th></tr>\n";
+    *page += "<h3>Orders</h3>\n<table><tr><th>order</th><th>what was ordered</th><th>given (UTC)</th><th>end</th><th>after</th></tr>\n";
     let mut orders: Vec<(&(String, u32), &OrderStep, &OrderStep)> =
         vehicle.orders_of_people().filter_map(|(order, way)| Some((order, way.first()?, way.last()?))).collect();
     orders.sort_by(|a, b| a.1.given_s.total_cmp(&b.1.given_s));
-    for ((slot, version), first, last) in orders {
+    for (order @ (slot, version), first, last) in orders {
         let reason = if last.reason.is_empty() { String::new() } else { format!(": {}", last.reason) };
         let _ = writeln!(
             page,
-            "<tr><td>{} {version}</td><td class=\"t\">{}</td><td>{}{}</td><td class=\"n\">{:.1} s</td></tr>",
+            "<tr><td>{} {version}</td><td>{}</td><td class=\"t\">{}</td><td>{}{}</td><td class=\"n\">{:.1} s</td></tr>",
             Escaped(slot),
+            Escaped(&dive.ordered(state, vehicle, order)),
             utc_text(first.given_s),
             words::status(last.status),
             Escaped(&reason),

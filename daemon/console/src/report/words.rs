@@ -1,10 +1,13 @@
 //! The summary of a dive in sentences.
 
+use super::areas::ClassArea;
 use super::dive::{Dive, DiveVehicle, OrderStep};
 use crate::export::TransverseMercator;
 use crate::state::{Origin, VehicleState};
 use scenecast_core::utc_text;
-use scenecast_messages::scenecast_msgs::{Event, OrderStatus};
+use scenecast_messages::scenecast_msgs::{Event, Order, OrderStatus};
+use scenecast_surface::LabelBook;
+use serde_json::Value;
 
 /// A time span for people, such as "1 h 05 min".
 pub(super) fn duration(seconds: f64) -> String {
@@ -22,6 +25,45 @@ pub(super) fn area(m2: f64) -> String {
         format!("{:.2} km²", m2 / 1e6)
     } else {
         format!("{m2:.prec$} m²", prec = if m2 < 100.0 { 1 } else { 0 })
+    }
+}
+
+/// The content of an order, with the principal who gave it.
+pub(super) fn content(book: &LabelBook, order: &Order) -> String {
+    let by = if order.principal.is_empty() { String::new() } else { format!("{}: ", order.principal) };
+    let Ok(Value::Object(members)) = serde_json::from_str(&order.content) else { return by + &order.content };
+    let title =
+        |label: &Value| label.as_u64().and_then(|label| u8::try_from(label).ok()).map(|label| book.title(label));
+    let member = |(name, value): (&String, &Value)| match (name.as_str(), value) {
+        (_, Value::Null) => None,
+        ("weights", Value::Object(weights)) => {
+            let weight = |(label, weight): (&String, &Value)| {
+                format!("{} {weight}", label.parse().map_or_else(|_| label.clone(), |label| book.title(label)))
+            };
+            Some(format!("weights: {}", weights.iter().map(weight).collect::<Vec<_>>().join(", ")))
+        }
+        ("labels", Value::Array(labels)) => {
+            Some(format!("images of {}", labels.iter().filter_map(title).collect::<Vec<_>>().join(", ")))
+        }
+        _ => Some(format!("{} {value}", name.replace('_', " "))),
+    };
+    by + &members.iter().filter_map(member).collect::<Vec<_>>().join("; ")
+}
+
+/// The ends of an interval of areas for people.
+pub(super) fn interval(interval_m2: Option<(f64, f64)>) -> String {
+    interval_m2.map_or("not known".to_owned(), |(low, high)| format!("{} to {}", area(low), area(high)))
+}
+
+/// How the intervals of areas were made.
+pub(super) fn of_intervals(classes: &[ClassArea]) -> &'static str {
+    match classes.iter().any(|class| class.interval_m2.is_some()) {
+        true => {
+            "An interval is that of the model's own doubt: its confidence in each cell, which arrives in quarters, is taken as the \
+             probability that the label is right; the doubt goes to the other labels by their cells, and cells of a square of 4 x 4 are right or \
+             wrong together. A class that the model does not tell from another one, and sea floor that nobody has seen, are not in it."
+        }
+        false => "The surface has received no confidence, so the intervals are not known.",
     }
 }
 
@@ -52,8 +94,8 @@ pub(super) fn summary(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) 
     let [sent, received, dropped] = dive.frames;
     let loss = state.link.up.loss * 100.0;
     sentences.push(format!(
-        "The surface sent {sent} frames, received {received} and could not use {dropped}; of the vehicle's last frames {loss:.0} % were \
-         lost."
+        "The surface sent {sent} frames, received {received} and could not use {dropped} more, which were damaged or copies of others; \
+         {loss:.0} % of the vehicle's last 64 frames were lost."
     ));
     // The first contact begins a run, too.
     let first_run = dive.events.iter().position(|(_, event)| event.text == "another run begins");
@@ -146,18 +188,19 @@ fn place(dive: &Dive, vehicle: &DiveVehicle) -> String {
 }
 
 fn found(state: &VehicleState, vehicle: &DiveVehicle) -> String {
-    let classes = vehicle.classes(state);
-    let all: u64 = classes.iter().map(|(_, cells)| cells).sum();
-    let Some(&(largest, cells)) = classes.first() else { return "No part of the map arrived.".to_owned() };
-    let square = vehicle.cell_m * vehicle.cell_m;
+    let all: u64 = vehicle.classes.iter().map(|class| class.cells).sum();
+    let Some(largest) = vehicle.classes.first() else { return "No part of the map arrived.".to_owned() };
+    let doubt = largest.interval_m2.map_or_else(String::new, |_| {
+        format!("; by the model's own doubt it has {}, with a probability of 95 %", interval(largest.interval_m2))
+    });
     format!(
-        "The map that arrived has {all} cells of {:.2} m, {}, with {} classes; the largest is {} with {} ({:.0} %).",
+        "The map that arrived has {all} cells of {:.2} m, {}, with {} classes; the largest is {} with {} ({:.0} %){doubt}.",
         vehicle.cell_m,
-        area(all as f64 * square),
-        classes.len(),
-        state.label_book.title(largest),
-        area(cells as f64 * square),
-        cells as f64 / all as f64 * 100.0
+        area(all as f64 * vehicle.cell_m * vehicle.cell_m),
+        vehicle.classes.len(),
+        state.label_book.title(largest.label),
+        area(largest.area_m2),
+        largest.cells as f64 / all as f64 * 100.0
     )
 }
 
@@ -183,6 +226,16 @@ fn orders(vehicle: &DiveVehicle) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn orders_are_told_in_words() {
+        let order = |content: &str| Order { principal: "ann".into(), content: content.into(), ..Order::default() };
+        let told = |text: &str| content(&LabelBook::default(), &order(text));
+        let weights = r#"{"weights": {"3": 0.5, "7": -1.0}, "exploration": 0.1}"#;
+        assert_eq!(told(weights), "ann: exploration 0.1; weights: label 3 0.5, label 7 -1.0");
+        assert_eq!(told(r#"{"labels": [4]}"#), "ann: images of label 4");
+        assert_eq!(told(r#"{"max_depth_m": 20, "max_time_s": null}"#), "ann: max depth m 20");
+    }
 
     #[test]
     fn spans_and_areas_are_for_people() {

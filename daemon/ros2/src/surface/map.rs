@@ -3,15 +3,15 @@
 use super::Desk;
 use crate::node::{Publisher, RosNode};
 use crate::transport::Qos;
+use scenecast_console::messages::grid;
 use scenecast_console::state::VehicleState;
-use scenecast_console::{ClientRequest, MapCells, Reply, SurfaceRequest};
+use scenecast_console::{ClientRequest, Reply, SurfaceRequest};
 use scenecast_core::{UserError, palette};
-use scenecast_messages::contents::{Grid, MAX_GRID_CELLS, cloud, layers, occupancy};
+use scenecast_messages::contents::{MAX_GRID_CELLS, cloud, layers, occupancy};
 use scenecast_messages::grid_map_msgs::GridMap;
 use scenecast_messages::nav_msgs::OccupancyGrid;
 use scenecast_messages::sensor_msgs::PointCloud2;
 use scenecast_messages::std_msgs::Header;
-use scenecast_protocol::map::Quantity;
 use std::time::{Duration, Instant};
 
 /// Minimum time between two maps.
@@ -102,13 +102,4 @@ fn key(vehicle: &VehicleState) -> MapKey {
         shift_m: map.shift_m(),
         colours: vehicle.labels.iter().map(|label| (label.id, book.class_colour(label.id))).collect(),
     }
-}
-
-fn grid(cells: &MapCells, shift_m: (f64, f64)) -> Option<Grid> {
-    let mut grid = Grid::new(cells.bounds?, cells.cell_m, shift_m, |cell| cells.label(cell))?;
-    for layer in cells.layers() {
-        let descriptor = layer.descriptor();
-        grid.add_layer(&descriptor.name, descriptor.quantity == Quantity::Depth, |cell| layer.value(cell));
-    }
-    Some(grid)
 }

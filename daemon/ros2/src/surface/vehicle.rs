@@ -7,11 +7,11 @@ use super::orders::OrderTopics;
 use crate::node::{Publisher, RosNode};
 use crate::transport::Qos;
 use crate::valid_part;
-use scenecast_console::messages::{label_tree, order_status, place, place_on_earth};
+use scenecast_console::messages::{label_tree, order_status, place, place_on_earth, plan, track};
 use scenecast_console::state::{MapLabelTree, MissionState, OrderStatus, VehicleState};
 use scenecast_console::{ClientRequest, Reply, SurfaceRequest};
 use scenecast_core::UserError;
-use scenecast_messages::contents::{Place, Stamps, WORLD_FRAME, diagnostics, exemplar_jpeg, header, path, pose};
+use scenecast_messages::contents::{Stamps, WORLD_FRAME, diagnostics, exemplar_jpeg, header, pose};
 use scenecast_messages::diagnostic_msgs::DiagnosticArray;
 use scenecast_messages::geometry_msgs::PoseWithCovarianceStamped;
 use scenecast_messages::nav_msgs::Path;
@@ -188,25 +188,15 @@ impl StateTopics {
     pub fn publish(&mut self, mission: &MissionState, vehicle: &VehicleState, stamps: &Stamps) {
         let Some(status) = vehicle.status.as_ref().filter(|status| self.last_s != Some(status.at_s)) else { return };
         self.last_s = Some(status.at_s);
-        let stamp = stamps.at(status.at_s);
-        let shift = vehicle.map.shift_m();
-        let place = place(status, shift, stamps);
+        let place = place(status, vehicle.map.shift_m(), stamps);
         if self.pose.subscribers() > 0 {
             self.pose.publish(pose(&place, status.pose.sigma_m, WORLD_FRAME));
         }
-        let at = |s: f64, (east, north): (f64, f64)| Place {
-            stamp: stamps.at(s),
-            position_m: [east + shift.0, north + shift.1, place.position_m[2]],
-            heading_rad: 0.0,
-        };
         if self.path.subscribers() > 0 {
-            let track: Vec<Place> = vehicle.track.iter().map(|&(s, east, north)| at(s, (east, north))).collect();
-            self.path.publish(path(&track, header(stamp.clone(), WORLD_FRAME)));
+            self.path.publish(track(vehicle, status, stamps));
         }
         if self.plan.subscribers() > 0 {
-            let waypoints = status.plan.waypoint.iter().chain(&status.plan.path);
-            let plan: Vec<Place> = waypoints.map(|&waypoint| at(status.at_s, waypoint)).collect();
-            self.plan.publish(path(&plan, header(stamp.clone(), WORLD_FRAME)));
+            self.plan.publish(plan(vehicle, status, stamps));
         }
         if self.fix.subscribers() > 0
             && let Some(fix) = place_on_earth(mission, &place, status.pose.sigma_m)

@@ -6,16 +6,16 @@ use super::{
 use bytes::Bytes;
 use scenecast_config::Config;
 use scenecast_console::Snapshot;
-use scenecast_console::messages::{label_tree, layer_text, order_status, place, place_on_earth};
+use scenecast_console::messages::{label_tree, layer_text, link, order, order_status, place, place_on_earth};
 use scenecast_console::state::{MapLabelTree, MissionState, OrderStatus, VehicleState};
 use scenecast_files::RecordEntry;
 use scenecast_host::FrameEvent;
 use scenecast_messages::contents::{Stamps, WORLD_FRAME, header, pose};
-use scenecast_messages::scenecast_msgs::{Event, Exemplar, Link};
+use scenecast_messages::scenecast_msgs::{Event, Exemplar};
 use scenecast_messages::std_msgs::Text;
 use scenecast_protocol::map::{LayerDescriptor, LayerId, StateReplica};
 use scenecast_protocol::wire::Address;
-use scenecast_surface::Surface;
+use scenecast_surface::{LogKind, Surface};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
@@ -45,6 +45,11 @@ impl SurfaceRecord {
     /// Whether there is a record.
     pub fn is_on(&self) -> bool {
         self.record.is_some()
+    }
+
+    /// The folder of the record, if there is one.
+    pub fn folder(&self) -> Option<&Path> {
+        self.record.as_ref().map(|record| record.dir.as_path())
     }
 
     /// Records what has changed.
@@ -133,7 +138,7 @@ impl SurfaceRecorder {
             }
             let recorded = self.vehicles.entry(vehicle.id).or_default();
             let before = entries.len();
-            recorded.record_orders(vehicle, stamps, &mut entries);
+            recorded.record_orders(surface, &snapshot.state, vehicle, stamps, &mut entries);
             let reported_s = vehicle.status.as_ref().map(|status| status.at_s);
             has_news |= entries.len() > before || recorded.report_s != reported_s;
             recorded.record(surface, &snapshot.state, vehicle, stamps, &mut entries);
@@ -183,10 +188,23 @@ impl SurfaceRecorder {
 }
 
 impl RecordedVehicle {
-    fn record_orders(&mut self, vehicle: &VehicleState, stamps: &Stamps, entries: &mut Vec<RecordEntry>) {
+    fn record_orders(
+        &mut self,
+        surface: &Surface,
+        mission: &MissionState,
+        vehicle: &VehicleState,
+        stamps: &Stamps,
+        entries: &mut Vec<RecordEntry>,
+    ) {
         for slot in &vehicle.orders.directive.slots {
             let state = (slot.version, slot.state);
-            if self.orders.insert(slot.slot.clone(), state) != Some(state) {
+            let before = self.orders.insert(slot.slot.clone(), state);
+            if before.is_none_or(|(version, _)| version != slot.version) {
+                let principal = principal(surface, vehicle.id, slot.issued_s);
+                let order = order(mission, vehicle, slot, principal, stamps);
+                entries.extend(order.map(|order| entry_of(&vehicle.name, "orders", stamps, &order)));
+            }
+            if before != Some(state) {
                 entries.push(entry_of(&vehicle.name, "order_status", stamps, &order_status(vehicle, slot, stamps)));
             }
         }
@@ -256,6 +274,16 @@ impl RecordedVehicle {
     }
 }
 
+/// Who has given an order to a vehicle at a mission time, by the log; empty if it does not say.
+fn principal(surface: &Surface, vehicle: u8, issued_s: f64) -> String {
+    let is_it = |logged: &&scenecast_surface::LogEntry| {
+        logged.kind == LogKind::Order
+            && logged.vehicle.is_none_or(|address| address.number() == vehicle)
+            && (logged.at.as_secs_f64() - issued_s).abs() < 1e-3
+    };
+    surface.log().entries().rev().find(is_it).and_then(|logged| logged.by.clone()).unwrap_or_default()
+}
+
 impl RecordedLayer {
     fn new(descriptor: LayerDescriptor) -> Self {
         Self { descriptor, levels: RecordedMap::default() }
@@ -271,20 +299,5 @@ impl RecordedLayer {
         }
         entries.extend(self.levels.record(map, stamps));
         entries
-    }
-}
-
-fn link(mission: &MissionState, vehicle: &VehicleState, stamps: &Stamps) -> Link {
-    let (link, channel) = (&mission.link, &vehicle.link);
-    Link {
-        header: header(stamps.now(), ""),
-        vehicle: vehicle.name.clone(),
-        budget_bps: link.budget_bps,
-        sent_bps: link.down.bps_1min as f32,
-        received_bps: link.up.bps_1min as f32,
-        loss: channel.up.loss as f32,
-        round_trip_s: channel.round_trip_s.map_or(f32::NAN, |s| s as f32),
-        age_s: vehicle.last_received_s.map_or(f32::NAN, |at| (mission.now_s - at) as f32),
-        backlog_bits: channel.backlog.as_ref().map_or(0, |backlog| backlog.bits),
     }
 }

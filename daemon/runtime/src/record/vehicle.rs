@@ -37,6 +37,11 @@ impl VehicleRecord {
         Self { record, recorder: VehicleRecorder::new(config, true), speed }
     }
 
+    /// The folder of the record, if there is one.
+    pub fn folder(&self) -> Option<&Path> {
+        self.record.as_ref().map(|record| record.dir.as_path())
+    }
+
     /// Records what has changed.
     pub fn observe(&mut self, vehicle: &Vehicle, now: Instant) {
         let Some(record) = &mut self.record else { return };

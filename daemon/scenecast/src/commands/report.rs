@@ -10,9 +10,9 @@ use std::path::PathBuf;
 #[derive(Debug, Args)]
 #[command(after_help = "Example: scenecast report state/records/bridge-20261129T101500Z --out dive.html")]
 pub(super) struct Report {
-    /// Record of a surface: its folder, or one of its files
-    #[arg(value_name = "RECORD")]
-    record: PathBuf,
+    /// Record of a surface, and those of vehicles, which show how far the operator's map agreed with theirs: folders or files
+    #[arg(value_name = "RECORD", required = true)]
+    records: Vec<PathBuf>,
     /// File to write [default: report.html in the present folder]
     #[arg(long, value_name = "FILE", default_value = "report.html", hide_default_value = true)]
     out: PathBuf,
@@ -24,7 +24,7 @@ pub(super) struct Report {
 impl Report {
     pub(super) fn run(self) -> Result<(), UserError> {
         scenecast_runtime::keep_private();
-        let dive = Dive::read(&self.record)?;
+        let dive = Dive::read(&self.records)?;
         if let Some(damage) = &dive.damage {
             errln!("scenecast: a part of the record could not be read: {damage}");
         }

@@ -70,7 +70,7 @@ pub(crate) fn judge(config: &Config, seed: u64, cuts: usize, dir: &Path) -> Resu
     compare(&folders, &moments, &mut figures)?;
     cut(&folders, &moments, cuts, seed, &mut figures)?;
     let began = Instant::now();
-    figures.report_bytes = Dive::read(&folders[0])?.html().len();
+    figures.report_bytes = Dive::read(folders.as_slice())?.html().len();
     figures.report_s = began.elapsed().as_secs_f64();
     std::fs::remove_dir_all(dir).map_err(|e| UserError::file(dir, e))?;
     Ok(figures)

@@ -8,6 +8,9 @@ import { ago, freeSpace, missionTime, span, utc } from "../format.js";
 import { ageOf, isHeard, isSilent, store } from "../store.js";
 import { retryNow } from "../feed.js";
 
+/** Keys of the banners of a record that concern the present. */
+const OF_THE_PAGE = ["lost", "record"];
+
 let announced = "";
 /** Keys of the alarms that have sounded and are not over. */
 let sounded = new Set();
@@ -18,9 +21,9 @@ export function startBanners() {
 
 function update() {
   const banners = current();
-  const heads = banners.map((b) => b.head).join(". ");
   // The alarms of a record come and go with its moment.
-  if (heads !== announced && !(store.replay && announced)) announce(heads || "All alarms have cleared.");
+  const heads = banners.filter((b) => !store.replay || OF_THE_PAGE.includes(b.key)).map((b) => b.head).join(". ");
+  if (heads !== announced) announce(heads || "All alarms have cleared.");
   announced = heads;
   const alarms = banners.filter((b) => b.kind !== "info").map((b) => b.key);
   if (!store.replay && alarms.some((key) => !sounded.has(key))) soundAlarm();
@@ -210,7 +213,7 @@ function requested({ name, at_s: at }) {
 }
 
 function make(banner) {
-  const [name, onclick] = (!store.replay || banner.key === "lost" ? banner.action : null) ?? [];
+  const [name, onclick] = (!store.replay || OF_THE_PAGE.includes(banner.key) ? banner.action : null) ?? [];
   const button = name ? h("button", { type: "button", onclick }, name) : null;
   return h("p.banner", { data: { kind: banner.kind } }, h("b"), " ", h("span"), " ", button);
 }

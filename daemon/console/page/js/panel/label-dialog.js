@@ -35,7 +35,7 @@ export function editLabel(label) {
         h("button", { type: "button", onclick: () => dialog.close() }, "Cancel"),
         h("button.primary", { type: "submit" }, "Save"))),
   );
-  lockInRecord(dialog, "[type=button]:not(.link)");
+  lockInRecord(dialog, ".buttons > [type=button]");
   dialog.showModal();
   name.focus();
 }

@@ -124,12 +124,13 @@ function lag() {
 
 /** The bar runs to the budget line at 80 % of its length, so that a breach would show. */
 function refreshDirection(d, side, link, budgetBps) {
-  const place = (bps) => `${Math.min(100, (80 * bps) / budgetBps)}%`;
+  // The record of a vehicle alone has no link.
+  const place = (bps) => `${budgetBps > 0 ? Math.min(100, (80 * bps) / budgetBps) : 0}%`;
   d.bar.children[0].style.width = place(side.bps_1min);
   d.bar.children[1].style.left = place(side.max_window_bps);
   d.bar.classList.toggle("over", side.max_window_bps > budgetBps);
   text(d.now, rate(side.bps_1min));
-  text(d.max, `max. in ${link.budget_window_s} s: ${percent(side.max_window_bps / budgetBps)} of budget`);
+  text(d.max, `max. in ${link.budget_window_s} s: ${percent(budgetBps > 0 ? side.max_window_bps / budgetBps : null)} of budget`);
   d.node.title = `${count(side.frames)} frames, ${count(side.lost)} lost`;
 }
 

@@ -15,23 +15,28 @@ const SIDES = {
   vehicle: ["Vehicle knew", "The map on board at this moment, whether or not it had been sent."],
   difference: ["Difference", "Only the cells in which the two maps differ: with the vehicle's label, or with the operator's where the vehicle has none."],
 };
+/** The event that is shown is at most this far before the moment. */
+const EVENT_S = 0.002;
 /** A record that is playing has passed the event to which it jumped just now. */
 const PASSED_S = 1.5;
 
-const button = (words, label, keys, onclick) => h("button", { type: "button", title: `${label} (${keys})`, "aria-label": label, onclick }, words);
-const before = button("\u2039 Event", "Previous event", "Shift+\u2190", () => jump(-1));
-const back = button("\u221210\u202fs", "10 seconds back", "\u2190", () => step(-STEP_S));
-const play = button("Play", "Play", "Space", toggle);
-const on = button("+10\u202fs", "10 seconds forward", "\u2192", () => step(STEP_S));
-const next = button("Event \u203a", "Next event", "Shift+\u2192", () => jump(1));
+const button = (words, title, onclick) => h("button", { type: "button", title, onclick }, words);
+const before = button("\u2039 Event", "The event before (Shift+\u2190)", () => jump(-1));
+const back = button("\u221210\u202fs", "10 seconds back (\u2190)", () => step(-STEP_S));
+const play = button("Play", "Play or pause (Space)", toggle);
+const on = button("+10\u202fs", "10 seconds forward (\u2192)", () => step(STEP_S));
+const next = button("Event \u203a", "The next event (Shift+\u2192)", () => jump(1));
+before.setAttribute("aria-label", "Previous event");
+next.setAttribute("aria-label", "Next event");
 const speed = h("select", { id: "replay-speed", onchange: () => change({ speed: Number(speed.value) }) });
 const filter = h("select", { id: "replay-filter", onchange: refresh }, ...Object.entries(FILTERS).map(([value, words]) => h("option", { value }, words)));
 const latest = h("p.replay-event", { title: "The last event up to this moment, of those to jump to" });
 const errorLine = h("p.error", { role: "alert" });
 const sides = Object.entries(SIDES).map(([side, [words, hint]]) => h("button", { type: "button", title: hint, data: { side }, onclick: () => change({ side }) }, words));
 const hint = h("p.hint");
-const differing = h("b.differing", { title: "Cells in which the vehicle's map and the operator's differ at this moment" });
-const knowledge = h("div.sides", { role: "group", "aria-label": "Whose knowledge is shown" }, ...sides, differing);
+const knowledge = h("div.sides", { role: "group", "aria-label": "Whose knowledge is shown" }, ...sides);
+
+const row = (...parts) => h("div.replay-row", {}, ...parts);
 
 /** The events of the record with this key. */
 let events = [];
@@ -39,10 +44,10 @@ let eventsOf = null;
 
 export function startReplay() {
   $("replay").append(
-    h("div.replay-keys", { role: "group", "aria-label": "Play" }, before, back, play, on, next), timeLine, timeText,
-    h("div.replay-choices", {}, h("label.tool-field", { title: "Recorded seconds for each second" }, "Speed", speed),
-      h("label.tool-field", { title: "The events to which the buttons jump" }, "Jump to", filter)),
-    h("div.replay-events", {}, latest, markLegend(), errorLine), h("div.replay-sides", {}, knowledge, hint));
+    row(h("div.replay-keys", { role: "group", "aria-label": "Play" }, before, back, play, on, next), timeLine, timeText),
+    row(h("div.replay-choices", {}, h("label.tool-field", { title: "Recorded seconds for each second" }, "Speed", speed),
+      h("label.tool-field", { title: "The events to which the buttons jump" }, "Jump to", filter)), latest, markLegend()),
+    row(knowledge, hint, errorLine));
   startTimeLine();
   addEventListener("keydown", press);
   store.on("state replay select", refresh);
@@ -51,12 +56,12 @@ export function startReplay() {
 function refresh() {
   show($("replay"), store.replay !== null);
   if (!store.replay) return;
+  // Its controls are disabled, so that it has to take the focus to be scrolled by keys.
+  $("side").tabIndex = 0;
   readEvents();
   const head = playHead();
   refreshTimeLine();
   text(play, head.is_playing ? "Pause" : "Play");
-  play.setAttribute("aria-label", play.textContent);
-  play.title = `${play.textContent} (Space)`;
   refreshSpeed(head.speed);
   const last = wanted().findLast((event) => event.at_utc_s <= head.at_utc_s);
   text(latest, last ? lineOf(last) : "No event yet.");
@@ -78,12 +83,16 @@ function refreshSides(head) {
   for (const button of sides) {
     show(button, head.sides.length > 1 && head.sides.includes(button.dataset.side));
     button.setAttribute("aria-pressed", String(head.side === button.dataset.side));
+    text(button, SIDES[button.dataset.side][0] + (button.dataset.side === "difference" ? differing(head) : ""));
   }
-  const found = head.differing_cells.find(({ vehicle }) => vehicle === store.selectedId);
   show(knowledge, head.sides.length > 1);
-  show(differing, found !== undefined);
-  if (found) text(differing, found.cells === 1 ? "1 cell differs" : `${count(found.cells)} cells differ`);
   text(hint, SIDES[head.side]?.[1] ?? "");
+}
+
+/** In how many cells the maps of the selected vehicle differ, where both are known. */
+function differing(head) {
+  const found = head.differing_cells.find(({ vehicle }) => vehicle === store.selectedId);
+  return found ? `: ${found.cells === 1 ? "1 cell" : `${count(found.cells)} cells`}` : "";
 }
 
 /** Reads the events once for each record; after a fault, with the next state. */
@@ -107,9 +116,9 @@ const wanted = () => (filter.value === "all" ? events : events.filter((event) =>
 /** The next event from the moment that is shown, or with `direction` -1 the one before. */
 function target(direction) {
   const { at_utc_s: at, is_playing: isPlaying, speed: factor } = playHead();
-  if (direction > 0) return wanted().find((event) => momentOf(event) > at);
-  const passed = isPlaying ? Math.max(1, factor) * PASSED_S : 0;
-  return wanted().findLast((event) => momentOf(event) < at - passed);
+  if (direction > 0) return wanted().find((event) => event.at_utc_s > at);
+  const passed = isPlaying ? Math.max(1, factor) * PASSED_S : EVENT_S;
+  return wanted().findLast((event) => event.at_utc_s < at - passed);
 }
 
 function jump(direction) {

@@ -8,7 +8,7 @@ import { store } from "../store.js";
 /** The kinds of events with a mark of their own. Events of one pixel column share the mark of the first kind here. */
 export const KINDS = { fault: "fault", silence: "silence", order: "order", label: "new label", loop: "loop closed", other: "other event" };
 const RANKS = Object.keys(KINDS);
-export const kindOf = (event) => (event.kind in KINDS ? event.kind : "other");
+export const kindOf = (event) => (Object.hasOwn(KINDS, event.kind) ? event.kind : "other");
 
 /** The middle of the slider's thumb stays this far from its ends. */
 const END_PX = 8;
@@ -16,7 +16,7 @@ const MAX_LINES = 8;
 
 export const slider = h("input", {
   type: "range", id: "replay-at", min: 0, step: "any", "aria-label": "Moment of the record",
-  oninput: () => seekTo(slider.valueAsNumber), onpointerdown: hold, onpointerup: release, onpointercancel: release,
+  oninput: () => seekTo(slider.valueAsNumber), onpointerdown: hold,
 });
 const marks = h("div.marks", { "aria-hidden": "true", onclick: (event) => event.target.dataset.at && seek(Number(event.target.dataset.at)) });
 const moment = h("b.moment", { title: "The moment that is shown" });
@@ -47,12 +47,14 @@ function seekTo(seconds) {
 
 function hold() {
   [isHeld, movedTo] = [true, null];
+  for (const end of ["pointerup", "pointercancel"]) addEventListener(end, release, { once: true });
 }
 
 /** The record stands where the thumb was left, wherever it has played on to meanwhile. */
 function release() {
   isHeld = false;
-  if (movedTo !== null) seekTo(movedTo);
+  if (movedTo !== null && playHead().is_playing) seekTo(movedTo);
+  movedTo = null;
 }
 
 export function refreshTimeLine() {
@@ -65,7 +67,7 @@ export function refreshTimeLine() {
   slider.setAttribute("aria-valuetext", `${utc(shown)}, ${place.textContent}`);
 }
 
-export const vehicleName = (event) => store.snapshot.vehicles.find((v) => v.id === event.vehicle)?.name;
+const vehicleName = (event) => store.snapshot.vehicles.find((v) => v.id === event.vehicle)?.name;
 
 /** An event as one line, for people. */
 export const lineOf = (event) => `${utc(event.at_utc_s)}: ${[vehicleName(event), event.text].filter(Boolean).join(": ")}`;

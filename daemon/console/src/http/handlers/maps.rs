@@ -25,7 +25,7 @@ pub(in crate::http) const TILES: &str = "application/x-scenecast-tiles";
 const MAX_PACKED: usize = 16;
 
 /// The latest map of a vehicle.
-async fn latest(shared: &Shared, id: u8) -> Result<Arc<CachedMap>, Response> {
+pub(super) async fn latest(shared: &Shared, id: u8) -> Result<Arc<CachedMap>, Response> {
     let mut maps = shared.maps.maps.lock().await;
     let published = {
         let snapshot = shared.snapshots.borrow();

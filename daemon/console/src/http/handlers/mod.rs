@@ -5,3 +5,4 @@ pub(super) mod maps;
 pub(super) mod metrics;
 pub(super) mod orders;
 pub(super) mod readings;
+pub(super) mod viewers;

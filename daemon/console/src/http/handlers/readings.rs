@@ -14,6 +14,7 @@ use axum::http::{HeaderName, HeaderValue, StatusCode, Uri, header};
 use axum::response::{IntoResponse, Response};
 use axum::{Extension, Json};
 use scenecast_core::utc_text;
+use scenecast_messages::contents::Stamps;
 use scenecast_surface::{Giver, LogEntry, LogKind};
 use serde::Deserialize;
 use std::collections::{BTreeMap, VecDeque};
@@ -78,6 +79,11 @@ pub(in crate::http) async fn replay(
     JsonOrder(order): JsonOrder<ReplayOrder>,
 ) -> Response {
     shared.respond(SurfaceRequest::Replay(order)).await
+}
+
+/// The report of the dive so far.
+pub(in crate::http) async fn report(State(shared): State<Shared>) -> Response {
+    shared.respond(SurfaceRequest::Report).await
 }
 
 /// The events of a record.
@@ -234,6 +240,11 @@ impl MissionUtc {
         }
         let unix_s = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_secs_f64();
         Self { unix_s, now_s: state.now_s, speed: state.mission.speed.max(1e-3) }
+    }
+
+    /// The stamps of messages now.
+    pub(in crate::http) fn stamps(&self) -> Stamps {
+        Stamps::new(self.now_s, self.speed, (self.unix_s * 1e9) as i64)
     }
 
     /// A mission time in seconds, as in RFC 3339.
