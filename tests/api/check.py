@@ -194,7 +194,8 @@ def fuzz(document, path, operation, vehicle):
         return 0
     if "$ref" in schema:
         schema = document["components"]["schemas"][schema["$ref"].rsplit("/", 1)[1]]
-    order = {**ORDERS, **REFUSED}.get(name) or {"label": largest_label(vehicle)}
+    given = {**ORDERS, **{refused: order for refused, (_, order) in REFUSED.items()}}
+    order = given.get(name) or {"label": largest_label(vehicle)}
     requested, bodies = path.replace("{id}", str(vehicle)), [{}]
     for member in schema.get("properties", {}):
         bodies.append({k: v for k, v in order.items() if k != member})

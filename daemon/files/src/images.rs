@@ -34,7 +34,10 @@ pub fn read_classes(path: &Path, size: (u32, u32)) -> Result<Vec<u8>, UserError>
             let grey = match read_image(path)? {
                 image::DynamicImage::ImageLuma8(grey) => grey,
                 _ => {
-                    return Err(UserError::file(path, "annotations need a grey or indexed image: pixel value = class"));
+                    return Err(UserError::file(
+                        path,
+                        "annotations need a grey or indexed image of 8 bits: pixel value = class",
+                    ));
                 }
             };
             let (w, h) = grey.dimensions();

@@ -78,8 +78,9 @@ impl CameraGeometry {
                 false => "",
             };
             parts.push(format!(
-                "the bow is {degrees:.0} degrees clockwise from the top of the images{or_mirrored}: set camera.mount_deg, or turn the \
-                 images"
+                "the bow is {degrees:.0} degrees clockwise from the top of the images{or_mirrored}: turn the images, or, of a live camera, \
+                 change the first number of camera.mount_deg by {:.0}",
+                -degrees
             ));
         }
         if wrong.mirrored {

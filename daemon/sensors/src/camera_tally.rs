@@ -58,6 +58,8 @@ pub enum CameraFault {
     NoBottomLock,
     /// The dead reckoning of the source began anew, and its track continues at the last pose.
     DeadReckoningReset,
+    /// A heading, a depth or a height above the sea floor of the source was one that no vehicle can reach so fast.
+    PoseJump,
 }
 
 impl CameraFault {
@@ -90,6 +92,7 @@ impl CameraFault {
             Self::PoseRefused => "pose not valid",
             Self::NoBottomLock => "no bottom lock",
             Self::DeadReckoningReset => "dead reckoning began anew",
+            Self::PoseJump => "pose that jumps",
         }
     }
 
@@ -105,6 +108,7 @@ impl CameraFault {
                 | Self::PoseRefused
                 | Self::NoBottomLock
                 | Self::DeadReckoningReset
+                | Self::PoseJump
         )
     }
 

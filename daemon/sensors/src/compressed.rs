@@ -24,6 +24,14 @@ pub enum DecodeError {
     WideLevels,
     #[error("the image has {width} x {height} pixels; allowed are up to {MAX_PIXELS}")]
     TooLarge { width: u32, height: u32 },
+    /// Mosaics in TIFF often have them.
+    #[error(
+        "its colours are not red, green and blue, as in a TIFF with JPEG inside: convert it, as with gdal_translate -expand rgb, or \
+             gdal_translate -co PHOTOMETRIC=RGB -co COMPRESS=DEFLATE"
+    )]
+    OtherColours,
+    #[error("it breaks off before its last row")]
+    CutOff,
     #[error("not an image that can be read: {0}")]
     Broken(String),
 }
@@ -49,17 +57,21 @@ fn decoder_of(bytes: &[u8], limits: Limits) -> Result<impl ImageDecoder, DecodeE
     let format = if is_big_tiff(bytes) { Some(ImageFormat::Tiff) } else { guessed.format() };
     let mut reader = ImageReader::with_format(Cursor::new(bytes), format.ok_or(DecodeError::UnknownFormat)?);
     reader.limits(limits);
-    reader.into_decoder().map_err(|error| if has_wide_levels(&error) { DecodeError::WideLevels } else { broken(error) })
+    reader.into_decoder().map_err(broken)
 }
 
-/// Whether the library knows no pixels with so many bits: grey levels of 32 bits or more, floats or whole numbers.
-fn has_wide_levels(error: &ImageError) -> bool {
-    let ImageError::Unsupported(unsupported) = error else { return false };
-    matches!(unsupported.kind(), UnsupportedErrorKind::Color(ExtendedColorType::Unknown(32 | 64 | 96 | 128)))
-}
-
-fn broken(error: image::ImageError) -> DecodeError {
-    DecodeError::Broken(error.to_string())
+/// What the library says, in words for people.
+fn broken(error: ImageError) -> DecodeError {
+    match &error {
+        ImageError::Unsupported(unsupported) => match unsupported.kind() {
+            // Grey levels of so many bits: floats or whole numbers.
+            UnsupportedErrorKind::Color(ExtendedColorType::Unknown(32 | 64 | 96 | 128)) => DecodeError::WideLevels,
+            UnsupportedErrorKind::Color(_) => DecodeError::OtherColours,
+            _ => DecodeError::Broken(error.to_string()),
+        },
+        ImageError::IoError(cause) if cause.kind() == std::io::ErrorKind::UnexpectedEof => DecodeError::CutOff,
+        _ => DecodeError::Broken(error.to_string()),
+    }
 }
 
 /// The image of a decoder, turned as its EXIF data say.
@@ -205,7 +217,7 @@ mod tests {
         let huge = b"P6\n100000 100000\n255\n";
         assert_eq!(decode(huge, WHOLE), Err(DecodeError::TooLarge { width: 100_000, height: 100_000 }));
         let cut = encoded(ImageFormat::Png);
-        assert!(matches!(decode(&cut[..60], WHOLE), Err(DecodeError::Broken(_))));
+        assert!(matches!(decode(&cut[..60], WHOLE), Err(DecodeError::Broken(_) | DecodeError::CutOff)));
     }
 
     #[test]

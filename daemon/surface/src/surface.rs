@@ -233,7 +233,11 @@ impl Surface {
     }
 
     pub fn handle_gps(&mut self, bytes: &[u8], now: Instant) {
-        self.relay.iter_mut().for_each(|relay| relay.handle_gps(bytes, now));
+        let Some(relay) = &mut self.relay else { return };
+        relay.handle_gps(bytes, now);
+        if let Some(note) = relay.poll_gps_note() {
+            self.log.add(None, LogKind::Fault, None, &note, now);
+        }
     }
 
     /// Takes bytes of a separate compass.

@@ -16,7 +16,8 @@ section! {
         /// Number of the mission, the same at both ends. Frames of another mission are dropped.
         id: u32 = 1, range(0.0, 4_294_967_295.0, ""), [Auv Asv Scenario];
         /// Latitude and longitude of the origin of the world frame (x = y = 0), the same at both ends. With [0.0, 0.0]
-        /// the vehicle does not know the origin, and the surface uses the first position of its GPS receiver.
+        /// the vehicle does not know the origin, and the surface uses the place of its GPS receiver once that has agreed with itself for
+        /// 5 s.
         origin_deg: Option<LatLon> = None, range(-180.0, 180.0, "deg"), [Auv Asv Scenario];
     }
 }

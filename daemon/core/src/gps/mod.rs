@@ -95,8 +95,12 @@ pub struct Gps {
     /// The receiver of that fix, where a daemon has several.
     device: Option<String>,
     kinds: BTreeMap<PositionKind, KindHealth>,
-    /// Places in a row that were too far from the last good one, and the last of them.
+    /// Places near each other that were too far from the last good one, less good ones since, and the last of them.
     jumps: (u32, Option<GpsFix>),
+    /// Jumps since the last note, when that was, and the note until it is fetched.
+    untold: u32,
+    told: Option<Instant>,
+    note: Option<String>,
     /// Way over ground: speed in m/s, course, when.
     motion: Option<(f64, Option<f64>, Instant)>,
     heading: Option<(f64, Instant)>,
@@ -109,8 +113,10 @@ impl Gps {
     const FROZEN: Duration = Duration::from_secs(5);
     /// A position of a better kind counts for this time.
     const BETTER_LASTS: Duration = Duration::from_secs(2);
-    /// So many places in a row, near each other, are believed however far they are from the last good one.
+    /// So many more places near each other than good ones are believed however far they are from those.
     const JUMPS_BELIEVED: u32 = 10;
+    /// Notes are this far apart.
+    const NOTE_PERIOD: Duration = Duration::from_secs(60);
     /// Slower than this the course over ground is noise, m/s.
     const COURSE_SPEED_M_S: f64 = 0.5;
 
@@ -128,6 +134,9 @@ impl Gps {
             device: None,
             kinds: BTreeMap::new(),
             jumps: (0, None),
+            untold: 0,
+            told: None,
+            note: None,
             motion: None,
             heading: None,
         }
@@ -237,13 +246,47 @@ impl Gps {
             let goes_on = before.is_some_and(|b| b.leads_to(&fix));
             self.jumps = (if goes_on { row + 1 } else { 1 }, Some(fix));
             if self.jumps.0 < Self::JUMPS_BELIEVED {
+                self.note_jump(&fix);
                 return self.refuse(GpsFault::Jump);
             }
+            self.jumps = (0, None);
         }
-        self.jumps = (0, None);
+        // One good place does not outvote many others.
+        self.jumps.0 = self.jumps.0.saturating_sub(1);
         self.fix = Some(fix);
         self.kinds.entry(kind).or_default().used = Some(fix.at);
         Some(fix)
+    }
+
+    fn note_jump(&mut self, fix: &GpsFix) {
+        self.untold += 1;
+        let Some(last) = self.fix.filter(|_| self.told.is_none_or(|at| fix.at.since(at) >= Self::NOTE_PERIOD)) else {
+            return;
+        };
+        let (x, y) = TangentPlane::new(last.place).to_plane(fix.place);
+        let place = |place: LatLon| format!("{:.5}, {:.5}", place.lat_deg, place.lon_deg);
+        let more = match self.untold {
+            0 | 1 => String::new(),
+            n => format!("; it has jumped {n} times: check this receiver"),
+        };
+        self.note = Some(format!(
+            "the position jumps by {:.0} m, from {} to {}, which is not used unless it stays{more}",
+            x.hypot(y),
+            place(last.place),
+            place(fix.place)
+        ));
+        (self.told, self.untold) = (Some(fix.at), 0);
+    }
+
+    /// What people should read about jumps, at most once a minute.
+    pub fn poll_note(&mut self) -> Option<String> {
+        self.note.take()
+    }
+
+    /// Whether the last positions contradict each other, and it is open which of them are right.
+    #[must_use]
+    pub fn is_contested(&self) -> bool {
+        self.jumps.0 > 0
     }
 
     fn is_frozen(&mut self, kind: PositionKind, place: LatLon, utc_s: Option<f64>, now: Instant) -> bool {
@@ -324,6 +367,23 @@ mod tests {
         assert!(gps.handle_bytes(wrong.as_bytes(), at(0.0)).is_empty());
         assert!(gps.handle_bytes(&[&[b'$'; 4000][..], b"\r\n"].concat(), at(0.0)).is_empty());
         assert_eq!(faults(&gps), [("checksum", 1), ("too_long", 1)]);
+    }
+
+    #[test]
+    fn the_many_outvote_a_first_place_that_returns() {
+        let mut gps = Gps::new(GpsLanguage::Nmea);
+        let mut notes = Vec::new();
+        let mut last = 0.0;
+        for quarter in 0..240_u32 {
+            let lat = if quarter % 4 == 0 { 29.6 } else { 29.5 };
+            let line = gga(lat, quarter / 4 % 60).replace(".00,", &format!(".{:02},", quarter % 4 * 25));
+            let line = nmea::line(line.trim_start_matches('$').split('*').next().unwrap());
+            let fixes = gps.handle_bytes(line.as_bytes(), at(f64::from(quarter) / 4.0));
+            last = fixes.last().map_or(last, |fix| fix.place.lat_deg);
+            notes.extend(gps.poll_note());
+        }
+        assert!((last - 29.5).abs() < 1e-6 && notes.len() == 1, "{last} {notes:?}");
+        assert!(notes[0].contains("from 29.60000, 34.92000 to 29.50000, 34.92000"), "{notes:?}");
     }
 
     #[test]

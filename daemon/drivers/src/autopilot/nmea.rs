@@ -9,7 +9,7 @@
 //! ```
 //! and `$PSCHD*hh` while the vehicle holds its position. The driver reads positions (GGA, GNS, RMC, GLL), headings (HDT, THS),
 //! depths of the water (DBS) and heights of the transducer above the sea floor (DPT, DBT); the vehicle's depth is the difference of
-//! the two, and 0 until both were heard.
+//! the two, and 0 until both were heard. A depth that is not known, or not any more, is named.
 
 use super::{Autopilot, Counters, Goal, Health, Step, Tray};
 use scenecast_core::gps::{Gps, GpsLanguage};
@@ -19,6 +19,11 @@ use std::time::Duration;
 
 /// A height, or a depth of the water, counts for this long.
 const HEIGHT_LASTS: Duration = Duration::from_secs(2);
+
+/// A depth of which a part is missing for this long is not known.
+const UNKNOWN_AFTER: Duration = Duration::from_secs(3);
+const FOOT_M: f64 = 0.3048;
+const FATHOM_M: f64 = 1.8288;
 
 /// A state machine of lines.
 #[derive(Debug)]
@@ -34,6 +39,8 @@ pub struct Nmea {
     water_depth: Option<(f64, Instant)>,
     /// Height of the transducer above the sea floor, metres.
     height: Option<(f64, Instant)>,
+    /// Since when one of both is missing while the other is heard, or was; and whether that was said.
+    depth_unknown: Option<(Instant, bool)>,
     at: Option<(LatLon, Instant)>,
     goal: Option<Goal>,
     has_order: bool,
@@ -54,6 +61,7 @@ impl Nmea {
             depth_m: 0.0,
             water_depth: None,
             height: None,
+            depth_unknown: None,
             at: None,
             goal: None,
             has_order: false,
@@ -103,19 +111,43 @@ impl Nmea {
         let water = self.water_depth.filter(|(_, at)| now.since(*at) < HEIGHT_LASTS);
         if let (Some((water_m, _)), Some((height_m, _))) = (water, height) {
             self.depth_m = (water_m - height_m).max(0.0);
+            self.depth_unknown = None;
+        } else if self.water_depth.is_some() || self.height.is_some() {
+            self.say_unknown_depth(now);
         }
         let (depth_m, altitude_m) = (self.depth_m, height.map(|(height_m, _)| height_m));
         self.tray.walk_measured(Step { dx_m, dy_m, heading_rad, depth_m, altitude_m, unseen, ..Step::default() }, now);
     }
 
+    /// Says once that the depth is not known, when one of its two parts has been missing for a while.
+    fn say_unknown_depth(&mut self, now: Instant) {
+        let (since, is_said) = self.depth_unknown.get_or_insert((now, false));
+        if *is_said || now.since(*since) < UNKNOWN_AFTER {
+            return;
+        }
+        *is_said = true;
+        let missing = match self.water_depth.is_none_or(|(_, at)| now.since(at) >= HEIGHT_LASTS) {
+            true => "the depth of the water (DBS)",
+            false => "the height above the sea floor (DBT or DPT)",
+        };
+        self.tray.count("depths_unknown");
+        self.tray.note(format!(
+            "the depth of the vehicle is not known, since {missing} is missing: {:.1} m is used",
+            self.depth_m
+        ));
+    }
+
     /// DBS, from the surface to the sea floor, and DBT: feet, f, metres, M, fathoms, F. DPT: metres, offset of the transducer.
     fn handle_sounding(&mut self, fields: &[&str], now: Instant) {
-        let metres = |index: usize| fields.get(index)?.parse::<f64>().ok().filter(|m| (0.0..12_000.0).contains(m));
+        let number = |index: usize| fields.get(index)?.parse::<f64>().ok();
+        let length = |index: usize, metres: f64| number(index).map(|n| n * metres);
+        // Sounders without a bottom send 0 or nothing; some send feet alone.
+        let sounding = || length(3, 1.0).or_else(|| length(1, FOOT_M)).or_else(|| length(5, FATHOM_M));
+        let known = |m: Option<f64>| m.filter(|m| *m > 0.0 && *m < 12_000.0).map(|m| (m, now));
         match fields.first().and_then(|field| field.get(2..)).unwrap_or_default() {
-            "DBS" => self.water_depth = metres(3).filter(|m| *m > 0.0).map(|m| (m, now)),
-            // Sounders without a bottom send 0 or nothing.
-            "DBT" => self.height = metres(3).filter(|m| *m > 0.0).map(|m| (m, now)),
-            "DPT" => self.height = metres(1).filter(|m| *m > 0.0).map(|m| (m, now)),
+            "DBS" => self.water_depth = known(sounding()).or(self.water_depth),
+            "DBT" => self.height = known(sounding()),
+            "DPT" => self.height = known(number(1)),
             _ => {}
         }
     }
@@ -141,6 +173,9 @@ impl Autopilot for Nmea {
             }
             for fix in self.gps.handle_bytes(&[&line[..], b"\n"].concat(), now) {
                 self.handle_place_of_vehicle(fix.place, now);
+            }
+            if let Some(note) = self.gps.poll_note() {
+                self.tray.note(note);
             }
         }
         // Any sounder has sentences.

@@ -100,6 +100,8 @@ struct Series {
     /// Jumps since the last note, and when that was.
     untold: u32,
     told: Option<Instant>,
+    /// When it was noted last that a value has stayed, or that its zero has moved.
+    settled: Option<Instant>,
 }
 
 impl Series {
@@ -127,14 +129,23 @@ impl Series {
             self.zero += value - tracked;
             let Bounds { name, unit, .. } = bounds;
             let note = format!("the zero of the {name} has moved by {:.1} {unit}: only its changes count", self.zero);
-            (tracked, None, Some(note))
+            (tracked, None, self.note_of_settling(note, now))
         } else {
             self.since = Some(now);
             let note = format!("the {} has stayed near {value:.1} {} and is used", bounds.name, bounds.unit);
-            (value, None, Some(note))
+            (value, None, self.note_of_settling(note, now))
         };
         (self.used, self.other) = (Some((value, now)), other);
         (value, Some(Jump { counter: bounds.counter, note }))
+    }
+
+    /// Where values alternate, one note a minute says so; the jumps are told with the next one of their own.
+    fn note_of_settling(&mut self, note: String, now: Instant) -> Option<String> {
+        if self.settled.is_some_and(|at| now.since(at) < Self::NOTE_PERIOD) {
+            return None;
+        }
+        self.settled = Some(now);
+        Some(note)
     }
 
     fn note(&mut self, (used, value): (f64, f64), bounds: &Bounds, now: Instant) -> Option<String> {
@@ -289,6 +300,20 @@ mod tests {
         assert!(depths.iter().all(|depth| *depth == 5.0));
         assert_eq!(notes.len(), 3);
         assert!(notes[1].ends_with("it has jumped 60 times: check this sensor"), "{}", notes[1]);
+    }
+
+    #[test]
+    fn heights_that_alternate_are_named_twice_a_minute_at_most() {
+        let mut plausible = Plausible::default();
+        let mut notes = Vec::new();
+        for i in 0..3000 {
+            // A ledge: 3 m and 9 m above the sea floor, two seconds each.
+            let altitude_m = Some(if i / 20 % 2 == 0 { 3.0 } else { 9.0 });
+            let (_, jumps) = plausible.check(Step { altitude_m, ..Step::default() }, at(i));
+            notes.extend(jumps.into_iter().filter_map(|jump| jump.note));
+        }
+        assert!(notes.len() <= 10, "{} in five minutes", notes.len());
+        assert!(notes.iter().any(|note| note.ends_with("check this sensor")), "{notes:?}");
     }
 
     #[test]

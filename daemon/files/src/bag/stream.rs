@@ -69,9 +69,14 @@ impl BagStream {
             }
             if self.open.is_none() {
                 let Some(path) = self.rest.next() else { return Ok(None) };
-                let file = File::open(&path).map_err(|e| format!("{}: {e}", path.display()))?;
-                if file.metadata().is_ok_and(|file| file.len() == 0) {
-                    return Err(format!("{}: it is empty", path.display()));
+                let fault = |e| format!("{}: {e}", path.display());
+                let mut file = File::open(&path).map_err(fault)?;
+                let mut head = Vec::new();
+                (&mut file).take(mcap::MAGIC.len() as u64).read_to_end(&mut head).map_err(fault)?;
+                file.rewind().map_err(fault)?;
+                if head != mcap::MAGIC {
+                    let what = if head.is_empty() { "it is empty" } else { "it does not begin as an MCAP file does" };
+                    return Err(format!("{}: {what}", path.display()));
                 }
                 self.open = Some((file, reader()));
                 self.schemas.clear();

@@ -1,6 +1,7 @@
 //! The poses of a live vehicle and the distances of its camera's pixels: each image waits for those of its moment.
 
 use scenecast_config::{Config, NavigationSource};
+use scenecast_drivers::autopilot::{Jump, Plausible, Step};
 use scenecast_host::{CameraPose, MeasuredPose};
 use scenecast_protocol::time::Instant;
 use scenecast_sensors::{DepthMatch, DepthMessage, DepthTrack, SensorPose, Stamp};
@@ -22,6 +23,7 @@ pub(super) struct PoseFeed {
     max_gap: Duration,
     /// Whether the vehicle does not know the newest pose yet.
     is_new: bool,
+    plausible: Plausible,
 }
 
 impl PoseFeed {
@@ -34,6 +36,7 @@ impl PoseFeed {
             posed: (clock.now(), clock.now()),
             max_gap: Duration::from_secs_f64(config.navigation.max_gap_s),
             is_new: false,
+            plausible: Plausible::default(),
         }
     }
 
@@ -42,12 +45,18 @@ impl PoseFeed {
         LiveSource::next_of(&mut self.source).await
     }
 
-    /// Takes a pose of the source.
-    pub(super) fn handle_pose(&mut self, pose: SensorPose, now: Stamp) {
-        let SensorPose { x_m, y_m, heading_rad, depth_m, .. } = pose;
+    /// Takes a pose that the source measured at `stamp`. Returns it with the heading, the depth and the height above the sea floor that
+    /// can be, and the jumps that were found.
+    pub(super) fn handle_pose(&mut self, stamp: Stamp, pose: SensorPose, now: Stamp) -> (SensorPose, Vec<Jump>) {
+        let SensorPose { x_m, y_m, heading_rad, depth_m, altitude_m, .. } = pose;
+        let measured = Step { heading_rad, depth_m, altitude_m, ..Step::default() };
+        // Only differences of these times count.
+        let at = Instant::from_micros((stamp.nanos() / 1000).max(0) as u64);
+        let (Step { heading_rad, depth_m, altitude_m, .. }, jumps) = self.plausible.check(measured, at);
         self.is_new = true;
         self.posed.0 = now;
         self.newest = Some(CameraPose { x_m, y_m, heading_rad, depth_m });
+        (SensorPose { heading_rad, depth_m, altitude_m, ..pose }, jumps)
     }
 
     /// The autopilot's pose, if images are mapped at it and it is a new one: a pose that is not measured again is not that of
@@ -145,4 +154,27 @@ pub(super) enum DepthAnswer {
     Missing,
     /// No source of distances is configured.
     Unmeasured,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn one_wrong_height_of_a_velocity_log_is_not_used_and_named() {
+        let clock = ArrivalClock::start();
+        let mut feed = PoseFeed::new(&Config::default(), None, &clock);
+        let mut heights = Vec::new();
+        let mut notes = Vec::new();
+        for tenths in 0..100 {
+            let altitude_m = Some(if tenths % 40 == 20 { 60.0 } else { 2.0 });
+            let at = clock.now().after(Duration::from_millis(100 * tenths));
+            let (pose, jumps) = feed.handle_pose(at, SensorPose { altitude_m, ..SensorPose::default() }, clock.now());
+            heights.push(pose.altitude_m);
+            notes.extend(jumps.into_iter().filter_map(|jump| jump.note));
+        }
+        assert_eq!(heights, [Some(2.0); 100]);
+        assert_eq!(notes.len(), 1, "{notes:?}");
+        assert!(notes[0].starts_with("the height above the sea floor jumps from 2.0 to 60.0 m"), "{notes:?}");
+    }
 }

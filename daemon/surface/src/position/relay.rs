@@ -163,11 +163,17 @@ impl Relay {
         }
     }
 
+    /// What people should read about the receiver.
+    pub fn poll_gps_note(&mut self) -> Option<String> {
+        self.gps.poll_note()
+    }
+
     /// The world frame; a position of the surface becomes its origin once it agrees with those before.
     fn plane_at(&mut self, fix: &GpsFix) -> Option<TangentPlane> {
         if self.plane.is_none() {
             let first = *self.first.get_or_insert(*fix);
-            if !first.leads_to(fix) {
+            // It is open which place is right while another one returns.
+            if !first.leads_to(fix) || self.gps.is_contested() {
                 self.first = Some(*fix);
             } else if fix.at.since(first.at) >= Self::ORIGIN_AFTER {
                 self.plane = Some(TangentPlane::new(fix.place));
