@@ -21,6 +21,19 @@ def keys(x, y):
     return (x.astype("i8") << 32) + y
 
 
+def level_bounds(layer, place, cells):
+    """The bounds of the levels of a layer at the keys of places, NaN where they are unknown."""
+    found, edges = np.full((len(place), 2), np.nan), np.array(layer["edges"], float)
+    if cells and len(cells[0]):
+        held, levels = keys(cells[0], cells[1]), cells[2].astype(int) - layer["lowest"]
+        order = np.argsort(held)
+        at = order[np.minimum(np.searchsorted(held, place, sorter=order), len(held) - 1)]
+        known = (held[at] == place) & (levels[at] >= 0) & (levels[at] < len(edges) - 1)
+        level = levels[at][known]
+        found[known] = np.stack((edges[level], edges[level + 1]), axis=1)
+    return found
+
+
 @dataclass
 class LabelMap:
     """The labelled cells of a map: columns, rows and labels; cell (0, 0) lies north-east of the map's origin."""

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from .label_map import LabelMap, described, keys
+from .label_map import LabelMap, described, keys, level_bounds
 from .record import Record
 
 STATUS = ("queued", "on air", "received", "applied", "refused", "withdrawn")
@@ -19,6 +19,15 @@ TRACK = ("time", "x_m", "y_m", "z_m", "heading_deg", "sigma_m")
 
 def _record(path):
     return None if path is None else path if isinstance(path, Record) else Record(path)
+
+
+def _in_force(changes):
+    """Columns, rows and values of the known cells after some changes: the last one of each cell is in force."""
+    x, y, value = (np.concatenate(arrays) for arrays in zip(*changes)) if changes else (np.zeros(0, "i4"),) * 3
+    _, last = np.unique(keys(x, y)[::-1], return_index=True)
+    last = len(x) - 1 - last
+    last = last[value[last] != 0]
+    return x[last], y[last], value[last].astype("u1")
 
 
 def part_of(name):
@@ -88,25 +97,28 @@ class Mission:
 
     def map(self, t=None, side="operator"):
         """The map of an end at a time, by default its last one."""
-        parts, cell_m, epoch = [], float("nan"), 0
+        parts, cell_m, epoch = {}, float("nan"), 0
         for _, change in self._messages(side, "map_cells", t):
+            known = parts.setdefault(change.layer, [])
             # Without its first files, a record has changes of a map that it does not have.
-            if change.layer or not (parts or change.whole):
+            if not (known or change.whole):
                 continue
             if change.whole:
-                parts.clear()
-            parts.append((change.x, change.y, change.value))
-            cell_m, epoch = change.cell_m, change.epoch
+                known.clear()
+            known.append((change.x, change.y, change.value))
+            if not change.layer:
+                if change.epoch != epoch:
+                    parts = {"": known}
+                cell_m, epoch = change.cell_m, change.epoch
         found = self._side(side).last(f"/scenecast/{self.name}/map_version", t)
         time, version = (found[0], found[1].version) if found else (float("nan"), 0)
-        x, y, label = (np.concatenate(arrays) for arrays in zip(*parts)) if parts else (np.zeros(0, "i4"),) * 3
-        # The last change of each cell is the one in force.
-        _, last = np.unique(keys(x, y)[::-1], return_index=True)
-        last = len(x) - 1 - last
-        last = last[label[last] != 0]
+        x, y, label = _in_force(parts.pop("", []))
+        meanings = {layer["name"]: layer for layer in map(json.loads, (m.data for _, m in self._messages(side, "layers", t)))}
+        layers = {name: level_bounds({**meanings[name], "lowest": 1}, keys(x, y), _in_force(cells))
+                  for name, cells in parts.items() if name in meanings}
         state = self.state(t)
-        return LabelMap(x[last], y[last], label[last].astype("u1"), cell_m, epoch, version, time, side,
-                        **described(state, self._vehicle_state(state), epoch, side))
+        return LabelMap(x, y, label, cell_m, epoch, version, time, side, **described(state, self._vehicle_state(state), epoch, side),
+                        layers=layers, units={name: meanings[name]["unit"] for name in layers})
 
     def agreement(self, t=None):
         """The share, 0 to 1, of the vehicle's cells whose label the operator's map has too; NaN without cells."""

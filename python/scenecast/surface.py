@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from .label_map import LabelMap, described, keys
+from .label_map import LabelMap, described, keys, level_bounds
 from .mission import LINK, TRACK, VERSION, part_of
 
 REMEDY = {401: "give the token: open_surface(url, token=...)",
@@ -78,19 +78,6 @@ def read_tiles(data):
         raise SurfaceError(f"the map is cut off or damaged: {error}") from error
     joined = {layer: [np.concatenate(arrays) for arrays in zip(*found)] for layer, found in cells.items()}
     return index, joined
-
-
-def _bounds(layer, place, cells):
-    """The bounds of the levels of a layer at the keys of places, NaN where they are unknown."""
-    found, edges = np.full((len(place), 2), np.nan), np.array(layer["edges"], float)
-    if cells:
-        held, levels = keys(cells[0], cells[1]), cells[2].astype(int) - layer["lowest"]
-        order = np.argsort(held)
-        at = order[np.minimum(np.searchsorted(held, place, sorter=order), len(held) - 1)]
-        known = (held[at] == place) & (levels[at] >= 0) & (levels[at] < len(edges) - 1)
-        level = levels[at][known]
-        found[known] = np.stack((edges[level], edges[level + 1]), axis=1)
-    return found
 
 
 class Surface:
@@ -186,7 +173,7 @@ class Surface:
         x, y, label = cells.get(0, none)
         order = np.argsort(keys(x, y))
         x, y, label = x[order], y[order], label[order]
-        layers = {layer["name"]: _bounds(layer, keys(x, y), cells.get(number)) for number, layer in enumerate(index["layers"], 1)}
+        layers = {layer["name"]: level_bounds(layer, keys(x, y), cells.get(number)) for number, layer in enumerate(index["layers"], 1)}
         units = {layer["name"]: layer["unit"] for layer in index["layers"]}
         epoch = vehicle["map"]["epoch"]
         return LabelMap(x.astype("i4"), y.astype("i4"), label, index["cell_m"], epoch, index["version"],

@@ -57,7 +57,9 @@ def test_the_map_is_the_same_in_all_forms(mission, tmp_path):
     areas = found.areas()
     assert np.count_nonzero(array) == len(found) == sum(area["cells"] for area in areas)
     assert sum(area["area_m2"] for area in areas) == pytest.approx(len(found) * found.cell_m ** 2)
-    assert all(np.isnan(area["low_m2"]) and np.isnan(area["high_m2"]) for area in areas)
+    # The surface receives the confidence with what the map leaves of the link.
+    assert all(area["low_m2"] <= area["area_m2"] <= area["high_m2"] for area in areas)
+    assert all(np.isnan(area["low_m2"]) for area in mission.map(side="vehicle").areas())
     found.to_asc(tmp_path / "map.asc")
     assert (np.loadtxt(tmp_path / "map.asc", skiprows=6)[::-1] == array).all()
     labels = pytest.importorskip("xarray") and found.to_xarray()
