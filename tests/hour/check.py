@@ -40,7 +40,9 @@ NEAR_M = 50
 # The part of `--minutes` that the round with images has.
 IMAGES_SHARE = 0.5
 # What a log says where a link was lost, or the autopilot or the camera came anew.
-RESTARTS = re.compile(r"opened again|set up again|has restarted|\bstalled|is lost|gives way")
+RESTARTS = re.compile(r"opened again|set up again|has restarted|\bstalled|is lost|gives way|any more$")
+# What it says where a port was opened, a connection was taken, or the autopilot was heard anew.
+OPENED = re.compile(r"(\w+): (?:open|\S+ connected|the autopilot (answers))$")
 
 
 def free_port(kind=socket.SOCK_STREAM):
@@ -157,8 +159,8 @@ class Logs:
         found = []
         for end, lines in self.lines.items():
             found += [f"{end}: {line}" for line in lines if RESTARTS.search(line)]
-            opened = collections.Counter(line.split()[-2] for line in lines if re.search(r": open$|autopilot answers$", line))
-            found += [f"{end}: {name} {count} times" for name, count in opened.items() if count > 1]
+            opened = collections.Counter(match.groups() for line in lines if (match := OPENED.search(line)))
+            found += [f"{end}: {port} has come {count} times" for (port, _), count in opened.items() if count > 1]
         return found
 
     def tells(self, text):

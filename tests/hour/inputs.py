@@ -126,8 +126,8 @@ def nmea(second):
 
 def gpsd(second):
     """A second of gpsd: two receivers, of which the first has no satellites for a minute of ten, the sky, the heading."""
-    lat, lon, course = Craft().at(second)
-    lat, lon = misplaced(second, lat, lon)
+    true_lat, true_lon, course = Craft().at(second)
+    lat, lon = misplaced(second, true_lat, true_lon)
     clock = f"2026-11-26T{10 + second // 3600:02d}:{second // 60 % 60:02d}:{second % 60:02d}.000Z"
     report = {"class": "TPV", "device": "/dev/ttyACM0", "mode": 3, "time": clock, "lat": lat, "lon": lon, "eph": 5.0}
     report |= {"speed": Craft.SPEED_M_S, "track": course}
@@ -135,7 +135,7 @@ def gpsd(second):
         report["status"] = 5
     elif second % 30 == 17:
         report = {"class": "TPV", "device": "/dev/ttyACM0", "mode": 1, "time": clock}
-    other = {"class": "TPV", "device": "/dev/ttyUSB1", "mode": 3, "time": clock, "lat": lat + 2e-5, "lon": lon, "eph": 9.0}
+    other = {"class": "TPV", "device": "/dev/ttyUSB1", "mode": 3, "time": clock, "lat": true_lat, "lon": true_lon, "eph": 9.0}
     sky = {"class": "SKY", "device": "/dev/ttyACM0", "hdop": 0.9, "satellites": [{"PRN": n, "used": True} for n in range(9)]}
     reports = [report, sky, {"class": "ATT", "device": "/dev/ttyACM0", "heading": course}, other]
     return [json.dumps(each).encode() + b"\r\n" for each in reports]

@@ -3,7 +3,6 @@
 use super::recording::Recording;
 use crate::state::ReplayEvent;
 use scenecast_messages::contents::valid_part;
-use scenecast_messages::scenecast_msgs::Event;
 use scenecast_surface::LogKind;
 use std::collections::BTreeMap;
 
@@ -26,8 +25,9 @@ pub(super) fn events(recording: &Recording, vehicle: impl Fn(&str) -> Option<u8>
     let is_alone = recording.timeline.states.is_empty();
     let on_board = recording.vehicles.iter().flat_map(|(part, known)| {
         let id = vehicle(part);
-        // The surface's log has the modes too, as they became known.
-        let told = known.events.iter().filter(move |(_, said)| is_alone || is_of_the_vehicle_alone(said));
+        // Fixes come too often to be marks; the surface's log has the modes too, as they became known.
+        let told =
+            known.events.iter().filter(move |(_, said)| said.source != "fix" && (is_alone || said.source != "mode"));
         told.map(move |(at, said)| event(*at, "vehicle", id, format!("on board: {}", said.text)))
     });
     let mut events: Vec<ReplayEvent> = logged.chain(on_board).collect();
@@ -35,11 +35,6 @@ pub(super) fn events(recording: &Recording, vehicle: impl Fn(&str) -> Option<u8>
     events.sort_by(|a, b| a.at_utc_s.total_cmp(&b.at_utc_s));
     events.truncate(MAX_EVENTS);
     events
-}
-
-/// Fixes come too often to be marks.
-fn is_of_the_vehicle_alone(event: &Event) -> bool {
-    event.source != "fix"
 }
 
 /// The kind of mark of an entry of the log.
