@@ -125,19 +125,21 @@ def nmea(second):
 
 
 def gpsd(second):
-    """A second of gpsd: two receivers, of which the first has no satellites for a minute of ten, the sky, the heading."""
+    """A second of gpsd: a receiver that only reckons for a minute of ten, another one for that time and the next, sky, heading."""
     true_lat, true_lon, course = Craft().at(second)
     lat, lon = misplaced(second, true_lat, true_lon)
     clock = f"2026-11-26T{10 + second // 3600:02d}:{second // 60 % 60:02d}:{second % 60:02d}.000Z"
     report = {"class": "TPV", "device": "/dev/ttyACM0", "mode": 3, "time": clock, "lat": lat, "lon": lon, "eph": 5.0}
     report |= {"speed": Craft.SPEED_M_S, "track": course}
-    if second // 60 % 10 == 1:
+    minute = second // 60 % 10
+    if minute == 1:
         report["status"] = 5
     elif second % 30 == 17:
         report = {"class": "TPV", "device": "/dev/ttyACM0", "mode": 1, "time": clock}
     other = {"class": "TPV", "device": "/dev/ttyUSB1", "mode": 3, "time": clock, "lat": true_lat, "lon": true_lon, "eph": 9.0}
     sky = {"class": "SKY", "device": "/dev/ttyACM0", "hdop": 0.9, "satellites": [{"PRN": n, "used": True} for n in range(9)]}
-    reports = [report, sky, {"class": "ATT", "device": "/dev/ttyACM0", "heading": course}, other]
+    reports = [report, sky, {"class": "ATT", "device": "/dev/ttyACM0", "heading": course}]
+    reports += [other] if minute in (1, 2) else []
     return [json.dumps(each).encode() + b"\r\n" for each in reports]
 
 

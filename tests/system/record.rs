@@ -131,6 +131,8 @@ fn a_replay_shows_each_moment_as_either_side_knew_it() {
     let map = http(port, "GET", "/api/v2/vehicles/1/map.csv", "", "").unwrap();
     let lines = String::from_utf8(map.1).unwrap().lines().count() as u64;
     assert_eq!((map.0, lines), (200, differing[4][2] + 1), "a file of the map that is shown");
+    let (status, report) = http(port, "GET", "/api/v2/report.html", "", "").unwrap();
+    assert!(status == 200 && String::from_utf8(report).unwrap().contains("<h1>Dive report"));
     let (status, events) = http(port, "GET", "/api/v2/replay/events", "", "").unwrap();
     assert!(status == 200 && String::from_utf8(events).unwrap().contains("\"label\""));
     let log = |at: f64| {

@@ -266,7 +266,7 @@ impl Mapper {
         let places = projection.project(image.dimensions(), pose, &Habitats::as_words(&points));
         habitats.add(image.dimensions(), &points, &places, self.cell_m);
         if habitats.update() {
-            tracing::info!("the map has hardly grown for a while: its labels are corrected");
+            tracing::debug!("the map has hardly grown for a while: its labels are corrected");
         }
         label_by(habitats, &mut self.flat);
     }

@@ -36,7 +36,7 @@ pub struct Recording {
 pub(crate) struct Timeline {
     /// The times of the first and the last message of all records.
     pub(crate) span: (u64, u64),
-    pub(super) clock: MissionClock,
+    pub(crate) clock: MissionClock,
     pub(crate) states: Vec<StateText>,
 }
 

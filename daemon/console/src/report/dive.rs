@@ -2,14 +2,15 @@
 
 use super::areas::{ClassArea, areas};
 use super::words;
-use crate::replay::{Known, Recording};
+use crate::replay::{Known, Recording, ShownMap};
 use crate::state::{MissionState, VehicleState};
 use scenecast_core::UserError;
+use scenecast_files::MissionClock;
 use scenecast_messages::contents::valid_part;
 use scenecast_messages::geometry_msgs::PoseWithCovarianceStamped;
 use scenecast_messages::scenecast_msgs::{Event, Exemplar, Link, Order, OrderStatus};
 use scenecast_protocol::directive::SlotId;
-use scenecast_protocol::map::LabelGrid;
+use scenecast_protocol::map::{Cell, LabelGrid};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
@@ -28,6 +29,8 @@ pub struct Dive {
     pub(super) events: Vec<(f64, Event)>,
     /// Frames sent, received and dropped.
     pub(super) frames: [u64; 3],
+    /// The mission times.
+    clock: MissionClock,
     /// What the surface ran with.
     pub(super) settings: SettingsRecord,
     /// Why some of the record could not be read.
@@ -58,10 +61,17 @@ pub(super) struct DiveVehicle {
     pub(super) given: BTreeMap<(String, u32), Order>,
     pub(super) exemplars: Vec<(f64, Exemplar)>,
     pub(super) link: Vec<(f64, Link)>,
-    /// Of the vehicle's cells the share that the operator's map has with the same label, over time; empty without the vehicle's record.
-    pub(super) agreement: Vec<(f64, f64)>,
-    /// The cells of the operator's map over time.
-    pub(super) explored: Vec<(f64, u64)>,
+    pub(super) maps: Vec<MapsAt>,
+}
+
+/// The maps of both sides at one moment.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct MapsAt {
+    pub(super) at_s: f64,
+    /// Cells of the operator's map.
+    pub(super) cells: u64,
+    /// Of the vehicle's cells the share that the operator's map has with the same label; NaN without the vehicle's record.
+    pub(super) agreement: f64,
 }
 
 /// A reported place, metres in the world frame.
@@ -116,6 +126,7 @@ impl Dive {
             vehicles,
             events: recording.log.iter().map(|(at, event)| (seconds(*at), event.clone())).collect(),
             frames: recording.frames,
+            clock: recording.timeline.clock.clone(),
             settings: serde_json::from_str(&recording.settings).unwrap_or_default(),
             damage: (!recording.damage.is_empty()).then(|| recording.damage.join("; ")),
         })
@@ -123,7 +134,7 @@ impl Dive {
 
     /// The moment of a mission time, seconds since 1970.
     pub(super) fn unix_s(&self, at_s: f64) -> f64 {
-        self.span_s.1 - (self.state.now_s - at_s) / self.state.mission.speed.max(1e-3)
+        self.clock.nanos(at_s).map_or(self.span_s.1, seconds)
     }
 
     /// The vehicles, as the page showed them last and as the record has them.
@@ -136,11 +147,15 @@ impl Dive {
     pub(super) fn ordered(&self, state: &VehicleState, vehicle: &DiveVehicle, order: &(String, u32)) -> String {
         let Some(given) = vehicle.given.get(order) else { return "not recorded".to_owned() };
         let given_s = given.header.stamp.nanos() as f64 / 1e9;
-        let is_it = |(at_s, event): &&(f64, Event)| {
+        // Several orders may be given within a second: the words are those of the nearest one in this slot.
+        let is_it = |(_, event): &&(f64, Event)| {
             let is_of_it = event.vehicle == state.name || event.vehicle.is_empty();
-            event.source == "order" && is_of_it && (at_s - given_s).abs() < 0.5
+            let words = event.text.split_once(": ").map_or(event.text.as_str(), |(_, words)| words);
+            event.source == "order" && is_of_it && [words, &event.text].iter().any(|text| text.starts_with(&given.slot))
         };
-        let logged = self.events.iter().find(is_it).map(|(_, event)| event.text.clone());
+        let away_s = |at_s: &f64| (at_s - given_s).abs();
+        let nearest = self.events.iter().filter(is_it).min_by(|a, b| away_s(&a.0).total_cmp(&away_s(&b.0)));
+        let logged = nearest.filter(|(at_s, _)| away_s(at_s) < 0.5).map(|(_, event)| event.text.clone());
         logged.unwrap_or_else(|| words::content(&state.label_book, given))
     }
 }
@@ -148,8 +163,7 @@ impl Dive {
 impl DiveVehicle {
     /// What a recording says about a vehicle with this part of topics; `None` if it has nothing.
     fn of(recording: &mut Recording, state: &VehicleState, part: &str) -> Option<Self> {
-        let agreement = agreement(recording, part);
-        let explored = explored(recording, part);
+        let maps = maps_over_time(recording, part);
         let Recording { timeline, operator, .. } = recording;
         let known = operator.get_mut(part)?;
         known.map.seek(u64::MAX, |nanos| timeline.mission_time(nanos));
@@ -160,8 +174,7 @@ impl DiveVehicle {
             classes: areas(shown, |label| state.label_book.shown_as(label)),
             track: known.poses.iter().map(|(_, pose)| TrackPoint::of(pose)).collect(),
             link: known.link.iter().map(|(at, link)| (seconds(*at), link.clone())).collect(),
-            agreement,
-            explored,
+            maps,
             ..Self::default()
         };
         // Of an earlier epoch, their numbers mean something else.
@@ -203,36 +216,29 @@ impl DiveVehicle {
     }
 }
 
-/// Of the vehicle's cells the share that the operator's map has, at moments of the record.
-fn agreement(recording: &mut Recording, part: &str) -> Vec<(f64, f64)> {
+/// The maps at moments of the record.
+fn maps_over_time(recording: &mut Recording, part: &str) -> Vec<MapsAt> {
     let Recording { timeline, operator, vehicles, .. } = recording;
-    let (Some(operator), Some(vehicle)) = (operator.get_mut(part), vehicles.get_mut(part)) else { return Vec::new() };
+    let Some(operator) = operator.get_mut(part) else { return Vec::new() };
+    let mut vehicle = vehicles.get_mut(part);
     let (first, last) = timeline.span;
-    let at = |known: &mut Known, nanos: u64| known.map.seek(nanos, |nanos| timeline.mission_time(nanos));
-    let moment = |number: u64| first + (last - first) / MOMENTS * number;
-    let share = |number| {
-        at(operator, moment(number));
-        at(vehicle, moment(number));
-        let (own, others) = (vehicle.map.shown(), operator.map.shown());
-        let (cells, held) = (own.labels.shown(), others.labels.shown());
-        let same = cells.iter().filter(|&(cell, label)| own.epoch == others.epoch && held.get(cell) == label).count();
-        let share = if cells.explored() == 0 { f64::NAN } else { same as f64 / cells.explored() as f64 };
-        (seconds(moment(number)), share)
+    let maps = |number| {
+        let nanos = first + (last - first) / MOMENTS * number;
+        let seek = |known: &mut Known| known.map.seek(nanos, |nanos| timeline.mission_time(nanos));
+        seek(operator);
+        vehicle.iter_mut().for_each(|vehicle| seek(vehicle));
+        let held = operator.map.shown();
+        let agreement = vehicle.as_ref().map_or(f64::NAN, |vehicle| agreement(vehicle.map.shown(), held));
+        MapsAt { at_s: seconds(nanos), cells: held.labels.shown().explored() as u64, agreement }
     };
-    (1..=MOMENTS).map(share).collect()
+    (0..=MOMENTS).map(maps).collect()
 }
 
-/// The cells of the operator's map, at moments of the record.
-fn explored(recording: &mut Recording, part: &str) -> Vec<(f64, u64)> {
-    let Recording { timeline, operator, .. } = recording;
-    let Some(operator) = operator.get_mut(part) else { return Vec::new() };
-    let (first, last) = timeline.span;
-    let cells = |number| {
-        let nanos = first + (last - first) / MOMENTS * number;
-        operator.map.seek(nanos, |nanos| timeline.mission_time(nanos));
-        (seconds(nanos), operator.map.shown().labels.shown().explored() as u64)
-    };
-    (0..=MOMENTS).map(cells).collect()
+/// Of the vehicle's cells the share that the operator's map has with the same label; NaN without cells.
+fn agreement(vehicle: &ShownMap, operator: &ShownMap) -> f64 {
+    let (cells, held) = (vehicle.labels.shown(), operator.labels.shown());
+    let is_same = |&(cell, label): &(Cell, u8)| vehicle.epoch == operator.epoch && held.get(cell) == label;
+    cells.iter().filter(is_same).count() as f64 / cells.explored() as f64
 }
 
 impl TrackPoint {

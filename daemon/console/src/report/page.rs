@@ -107,7 +107,7 @@ impl Dive {
             Series {
                 name: "share of the vehicle's cells that the operator's map had with the same label",
                 unit: "1",
-                points: vehicle.agreement.iter().map(|(at_s, share)| (at_s - begin, *share)).collect(),
+                points: vehicle.maps.iter().map(|maps| (maps.at_s - begin, maps.agreement)).collect(),
             },
             uncertainty,
         ];
@@ -269,7 +269,7 @@ fn steering(page: &mut String, dive: &Dive, state: &VehicleState, vehicle: &Dive
     *page += "<h3>What the vehicle was steered by, and its modes</h3>\n<table><tr><th>time (UTC)</th><th>what</th><th>cells on the map by \
               then</th></tr>\n";
     for (at_s, text) in &steps {
-        let cells = vehicle.explored.iter().rev().find(|(at, _)| at <= at_s).map_or(0, |(_, cells)| *cells);
+        let cells = vehicle.maps.iter().rev().find(|maps| maps.at_s <= *at_s).map_or(0, |maps| maps.cells);
         let _ = writeln!(
             page,
             "<tr><td class=\"t\">{}</td><td>{}</td><td class=\"n\">{cells}</td></tr>",

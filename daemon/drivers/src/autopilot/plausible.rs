@@ -75,6 +75,20 @@ const VELOCITY_EAST: Bounds = Bounds {
     has_zero: false,
 };
 
+const PLACE_NORTH: Bounds = Bounds {
+    name: "position north",
+    counter: "position_jumps",
+    unit: "m",
+    rate: 10.0,
+    margin: 5.0,
+    persists: Duration::from_secs(1),
+    least: f64::NEG_INFINITY,
+    turn: None,
+    has_zero: false,
+};
+
+const PLACE_EAST: Bounds = Bounds { name: "position east", ..PLACE_NORTH };
+
 const VELOCITY_NORTH: Bounds = Bounds { name: "velocity north", ..VELOCITY_EAST };
 
 /// A value that was not used.
@@ -181,6 +195,7 @@ pub struct Plausible {
     height: Series,
     heading: Series,
     velocity: [Series; 2],
+    place: [Series; 2],
 }
 
 impl Plausible {
@@ -188,6 +203,21 @@ impl Plausible {
     #[must_use]
     pub fn depth_zero_m(&self) -> Option<f64> {
         self.depth.other.is_none().then_some(self.depth.zero)
+    }
+
+    /// Takes a position, metres north and east in any frame. Returns the jump that was found.
+    pub fn check_place(&mut self, (north, east): (f64, f64), now: Instant) -> Option<Jump> {
+        let [of_north, of_east] = &mut self.place;
+        let (_, north_jump) = of_north.check(north, &PLACE_NORTH, now);
+        let (_, east_jump) = of_east.check(east, &PLACE_EAST, now);
+        // One line for both.
+        north_jump.or(east_jump)
+    }
+
+    /// Whether the last position is one that no vehicle can reach so fast, and has not stayed yet.
+    #[must_use]
+    pub fn is_place_in_doubt(&self) -> bool {
+        self.place.iter().any(|series| series.other.is_some())
     }
 
     /// The velocity east and north, metres a second, as far as it can be, and the jumps that were found.

@@ -53,6 +53,17 @@ impl Tray {
         velocity
     }
 
+    /// A measured position, metres north and east.
+    pub(super) fn check_place(&mut self, place: (f64, f64), now: Instant) {
+        let jump = self.plausible.check_place(place, now);
+        jump.into_iter().for_each(|jump| self.take_jump(jump));
+    }
+
+    /// Whether a target must not count from the last position.
+    pub(super) fn is_place_in_doubt(&self) -> bool {
+        self.plausible.is_place_in_doubt()
+    }
+
     fn take_jump(&mut self, jump: Jump) {
         self.count(jump.counter);
         jump.note.into_iter().for_each(|note| self.note(note));

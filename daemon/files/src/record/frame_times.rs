@@ -12,6 +12,9 @@ pub struct FrameTimes {
     received: Times,
 }
 
+/// No frame is under way for longer, nanoseconds.
+const LONGEST: u64 = 20_000_000_000;
+
 /// By length and fingerprint.
 type Times = BTreeMap<(u32, u64), Vec<u64>>;
 
@@ -72,25 +75,40 @@ impl FrameTimes {
             let all = other.received.get(frame).into_iter().flatten();
             all.map(|at| at.saturating_add_signed(-shift)).collect::<Vec<_>>()
         };
-        let duration = Duration::of(self.sent.iter().filter_map(|(frame, sent)| {
-            match (sent.as_slice(), arrivals(frame).first()) {
-                (&[sent], Some(&received)) => Some((frame.0, received.saturating_sub(sent))),
+        let duration =
+            Duration::of(self.sent.iter().filter_map(|(frame, sent)| match (sent.as_slice(), &*arrivals(frame)) {
+                (&[sent], &[received]) if received.abs_diff(sent) < LONGEST => {
+                    Some((frame.0, received.saturating_sub(sent)))
+                }
                 _ => None,
-            }
-        }));
+            }));
         let mut fates = Vec::new();
         for (frame, sent) in &self.sent {
             let expected = |at: u64| at.saturating_add(duration.of_frame(frame.0));
-            let own = fates.len();
-            fates.extend(sent.iter().map(|&at| SentFrame { sent: at, received: None, arrives: expected(at) }));
-            // An arrival is that of the copy that was to arrive next to it; a second copy of one is none.
+            fates
+                .extend(sent.iter().map(|&at| (*frame, SentFrame { sent: at, received: None, arrives: expected(at) })));
+        }
+        fates.sort_by_key(|(frame, _)| *frame);
+        let mut unrecorded = Vec::new();
+        for frame in other.received.keys() {
+            let own =
+                fates.partition_point(|(known, _)| known < frame)..fates.partition_point(|(known, _)| known <= frame);
             for arrival in arrivals(frame) {
-                let copies = fates.get_mut(own..).unwrap_or_default().iter_mut();
-                if let Some(copy) = copies.min_by_key(|copy| copy.arrives.abs_diff(arrival)) {
-                    copy.received = copy.received.or(Some(arrival));
+                // An arrival is that of the copy that was to arrive next to it; a second copy of one is none.
+                let copies = fates.get_mut(own.clone()).unwrap_or_default().iter_mut().map(|(_, copy)| copy);
+                let near = copies.filter(|copy| copy.arrives.abs_diff(arrival) < LONGEST);
+                match near.min_by_key(|copy| copy.arrives.abs_diff(arrival)) {
+                    Some(copy) => copy.received = copy.received.or(Some(arrival)),
+                    // It was sent before the record of its sender began, or while that was not written.
+                    None => unrecorded.push(SentFrame {
+                        sent: arrival.saturating_sub(duration.of_frame(frame.0)),
+                        received: Some(arrival),
+                        arrives: arrival,
+                    }),
                 }
             }
         }
+        let mut fates: Vec<SentFrame> = fates.into_iter().map(|(_, fate)| fate).chain(unrecorded).collect();
         fates.sort_by_key(|frame| frame.sent);
         correct(&mut fates);
         fates
@@ -143,13 +161,17 @@ fn carried(values: impl Iterator<Item = Option<i64>>) -> Vec<Option<i64>> {
         .collect()
 }
 
-/// The least time from sending to reception, as the two clocks show it, of frames that were sent once.
+/// The least time from sending to reception, as the two clocks show it, of frames that were sent and received once. The same bytes may
+/// have been sent before a record began: a time far below that of most frames is that of another copy.
 fn quickest(sent: &Times, received: &Times) -> Option<i64> {
-    let time = |(frame, sent): (&(u32, u64), &Vec<u64>)| {
-        let &[sent] = sent.as_slice() else { return None };
-        i64::try_from(i128::from(*received.get(frame)?.first()?) - i128::from(sent)).ok()
+    let time = |(frame, sent): (&(u32, u64), &Vec<u64>)| match (sent.as_slice(), received.get(frame)?.as_slice()) {
+        (&[sent], &[received]) => i64::try_from(i128::from(received) - i128::from(sent)).ok(),
+        _ => None,
     };
-    sent.iter().filter_map(time).min()
+    let mut times: Vec<i64> = sent.iter().filter_map(time).collect();
+    times.sort_unstable();
+    let median = *times.get(times.len() / 2)?;
+    times.into_iter().find(|time| median.abs_diff(*time) < LONGEST)
 }
 
 #[cfg(test)]
@@ -184,6 +206,32 @@ mod tests {
         let vehicle = times(&[(Frame::SENT, 2, 5200), (Frame::SENT, 4, 1)]);
         assert_eq!(vehicle.shift_to(&surface), -4950);
         assert_eq!(times(&[]).shift_to(&surface), 0);
+    }
+
+    #[test]
+    fn bytes_that_were_sent_before_the_record_began_move_no_clock() {
+        let s = 1_000_000_000;
+        // Frame 1 was sent at 0 too, before the surface recorded; its second copy was lost, and that of frame 2 was not.
+        let surface = times(&[
+            (Frame::SENT, 1, 154 * s),
+            (Frame::SENT, 2, 160 * s),
+            (Frame::SENT, 3, 170 * s),
+            (Frame::SENT, 4, 180 * s),
+            (Frame::RECEIVED, 9, 201 * s),
+        ]);
+        let vehicle = times(&[
+            (Frame::RECEIVED, 1, s),
+            (Frame::RECEIVED, 2, s),
+            (Frame::RECEIVED, 2, 161 * s),
+            (Frame::RECEIVED, 3, 171 * s),
+            (Frame::RECEIVED, 4, 181 * s),
+            (Frame::SENT, 9, 200 * s),
+        ]);
+        assert_eq!(vehicle.shift_to(&surface), 0);
+        let fates: Vec<_> =
+            surface.fates(&vehicle, 0).into_iter().map(|f| (f.sent / s, f.received.map(|at| at / s))).collect();
+        let after = [(154, None), (160, Some(161)), (170, Some(171)), (180, Some(181))];
+        assert_eq!(fates, [[(0, Some(1)), (0, Some(1))].as_slice(), &after].concat());
     }
 
     #[test]

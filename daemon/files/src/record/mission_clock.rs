@@ -52,6 +52,14 @@ impl MissionClock {
         Some((state.now_s + since_s * state.speed).max(0.0))
     }
 
+    /// The moment of the surface's clock at a mission time; `None` if no state tells it.
+    pub fn nanos(&self, at_s: f64) -> Option<u64> {
+        let next = self.states.partition_point(|state| state.now_s <= at_s);
+        let state = self.states.get(next.saturating_sub(1))?;
+        let since = ((at_s - state.now_s) / state.speed * 1e9) as i64;
+        Some(state.nanos.saturating_add_signed(since))
+    }
+
     /// Seconds of mission time for each second of the clock at a moment; 1 if no state tells it.
     pub fn speed(&self, nanos: u64) -> f64 {
         self.nearest(nanos).map_or(1.0, |state| state.speed)
@@ -79,5 +87,7 @@ mod tests {
         let at = |s: u64| clock.mission_s(s * 1_000_000_000);
         assert_eq!([5, 15, 20, 25].map(at), [70.0, 90.0, 100.0, 120.0].map(Some));
         assert_eq!(clock.speed(30_000_000_000), 4.0);
+        let back = |at_s| clock.nanos(at_s).map(|nanos| nanos / 1_000_000_000);
+        assert_eq!([70.0, 90.0, 120.0].map(back), [5, 15, 25].map(Some));
     }
 }

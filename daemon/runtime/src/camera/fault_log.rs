@@ -4,8 +4,9 @@ use scenecast_sensors::{CameraFault, CameraTally, FrameMatcher};
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
-/// Shortest time between two lines about the same kind of fault.
+/// Shortest time between the first two lines about the same kind of fault; it doubles with each line, up to the longest.
 const MIN_INTERVAL: Duration = Duration::from_secs(30);
+const MAX_INTERVAL: Duration = Duration::from_secs(480);
 
 /// What was last logged of each kind of fault.
 #[derive(Debug, Default)]
@@ -17,6 +18,8 @@ pub(super) struct FaultLog {
 struct Logged {
     at: Instant,
     count: u64,
+    /// Until the next line.
+    interval: Duration,
 }
 
 impl FaultLog {
@@ -30,10 +33,11 @@ impl FaultLog {
         let mut lines = Vec::new();
         for (fault, count) in tally.iter() {
             let last = self.logged.get(&fault);
-            if last.is_some_and(|last| count == last.count || now.duration_since(last.at) < MIN_INTERVAL) {
+            if last.is_some_and(|last| count == last.count || now.duration_since(last.at) < last.interval) {
                 continue;
             }
-            self.logged.insert(fault, Logged { at: now, count });
+            let interval = last.map_or(MIN_INTERVAL, |last| (last.interval * 2).min(MAX_INTERVAL));
+            self.logged.insert(fault, Logged { at: now, count, interval });
             let what = if fault.is_dropped_image() { "dropped, " } else { "" };
             let why = explain(fault).map(|text| format!(": {text}")).unwrap_or_default();
             let of = if fault.is_of_navigation() { "navigation" } else { "camera" };

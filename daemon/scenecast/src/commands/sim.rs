@@ -8,6 +8,7 @@ use scenecast_files::Recorder;
 use scenecast_rehearsal::{Mission, MissionOptions, World, report, write_outputs};
 use scenecast_tools::Progress;
 use serde_json::json;
+use std::collections::BTreeSet;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
@@ -151,11 +152,14 @@ impl Sim {
             (Some(joules), None) => format!("{joules:.1} J up, "),
             _ => String::new(),
         };
+        // What the pictures and the records have; the scene model has more cells until they are published.
+        let operator_map = mission.operator_map();
+        let labels: BTreeSet<u8> = operator_map.iter().map(|(_, label)| label).collect();
         outln!(
             "{}: {} cells, {} labels, agreement {} at the end, {} on the mean, {energy}{seconds:.1} s",
             self.out.join("report.json").display(),
-            report.json["scene"]["cells"],
-            report.json["scene"]["labels"],
+            operator_map.explored(),
+            labels.len(),
             map["agreement_final"],
             map["agreement_mean"],
         );

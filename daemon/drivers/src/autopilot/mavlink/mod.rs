@@ -313,6 +313,13 @@ impl Mavlink {
         }
         let pose = Pose { velocity: self.tray.plausible_velocity(pose.velocity, pose.heard), ..pose };
         self.pose = Some(pose);
+        if let Some([north, east, _]) = pose.local {
+            self.tray.check_place((north.into(), east.into()), pose.heard);
+        } else if let Some((lat, lon)) = pose.place {
+            // Of a degree of latitude, everywhere long enough.
+            let metres = |units: i32| f64::from(units) / 1e7 * 111_320.0;
+            self.tray.check_place((metres(lat), metres(lon)), pose.heard);
+        }
         if std::mem::take(&mut self.is_position_lost) {
             self.tray.note("the autopilot reports its position again");
         }

@@ -38,6 +38,10 @@ impl Mavlink {
         let Some(pose) = self.pose.filter(|p| now.since(p.heard) < BRIDGED) else { return };
         // Depths of targets count from the autopilot's own zero. While that is in doubt, the last target stays.
         let Some(zero_m) = self.tray.depth_zero_m() else { return };
+        // A target counts from the position: one false position would send the vehicle far away.
+        if self.tray.is_place_in_doubt() {
+            return;
+        }
         match (pose.local, self.goal) {
             (Some(at), Some(goal)) => {
                 let down = goal.depth_m.map_or(at[2], |d| (d + zero_m) as f32);

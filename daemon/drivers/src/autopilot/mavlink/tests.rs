@@ -47,6 +47,12 @@ fn sent(pilot: &mut Mavlink) -> Vec<(u32, Vec<u8>)> {
     found
 }
 
+/// The targets that were sent: north, east, down.
+fn targets_of(pilot: &mut Mavlink) -> Vec<[f32; 3]> {
+    let targets = sent(pilot).into_iter().filter(|(id, _)| *id == 84);
+    targets.map(|(_, p)| [4, 8, 12].map(|i| f32::from_le_bytes(p[i..i + 4].try_into().unwrap()))).collect()
+}
+
 fn count(sent: &[(u32, Vec<u8>)], id: u32) -> usize {
     sent.iter().filter(|(i, _)| *i == id).count()
 }
@@ -85,14 +91,10 @@ fn a_target_is_repeated_each_second_in_the_autopilots_frame() {
         pilot.handle_bytes(&heartbeat(4, true), at(f64::from(s)));
         pilot.handle_bytes(&local(1000 * s as u32, [jump, s as f32 + jump, 4.0], [0.0, 1.0, 0.0]), at(f64::from(s)));
         pilot.handle_timeout(at(f64::from(s)));
-        targets.extend(
-            sent(&mut pilot)
-                .into_iter()
-                .filter(|(id, _)| *id == 84)
-                .map(|(_, p)| [4, 8, 12].map(|i| f32::from_le_bytes(p[i..i + 4].try_into().unwrap()))),
-        );
+        targets.extend(targets_of(&mut pilot));
     }
-    assert_eq!(targets, [[0.0, 10.0, 5.0], [0.0, 10.0, 5.0], [100.0, 110.0, 5.0], [100.0, 110.0, 5.0]]);
+    // At 2 s it is open whether the position is false, and the last target stays.
+    assert_eq!(targets, [[0.0, 10.0, 5.0], [0.0, 10.0, 5.0], [100.0, 110.0, 5.0]]);
     let steps: Vec<Step> = std::iter::from_fn(|| pilot.poll_step()).collect();
     assert_eq!(steps.len(), 3);
     assert!(steps.iter().all(|s| s.dx_m == 1.0 && s.dy_m == 0.0 && s.depth_m == 4.0), "{steps:?}");
@@ -459,4 +461,28 @@ proptest! {
             }
         }
     }
+}
+
+#[test]
+fn a_target_does_not_count_from_one_false_position() {
+    let mut pilot = pilot(true);
+    pilot.set_goal(GOAL, at(0.0));
+    let mut norths = Vec::new();
+    for tenth in 0..100_u32 {
+        // One false position just before a target goes out, and at last another frame, which stays.
+        let north = if tenth == 40 {
+            300.0
+        } else if tenth >= 60 {
+            500.0
+        } else {
+            0.0
+        };
+        let now = at(f64::from(tenth) / 10.0);
+        pilot.handle_bytes(&heartbeat(4, true), now);
+        pilot.handle_bytes(&local(100 * tenth, [north, 0.0, 4.0], [0.0; 3]), now);
+        pilot.handle_timeout(now);
+        norths.extend(targets_of(&mut pilot).iter().map(|[north, ..]| *north));
+    }
+    assert!(norths.iter().all(|north| [0.0, 500.0].contains(north)), "{norths:?}");
+    assert!(norths.contains(&0.0) && norths.last() == Some(&500.0), "{norths:?}");
 }
