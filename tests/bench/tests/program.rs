@@ -33,7 +33,7 @@ fn exports_of_a_wide_survey_have_each_cell_in_its_place() {
 
 /// Needs the program `scenecast` beside this one, which Cargo builds for the tests of its package.
 #[test]
-fn a_replay_equals_its_mission_and_a_power_cut_takes_two_seconds() {
+fn a_replay_equals_its_mission_and_a_cut_takes_two_seconds() {
     let judged = run(&["record", "--missions", "1", "--seed", "4", "--duration", "90", "--cuts", "6", "--json"]);
     assert!(judged.status.success(), "{}", String::from_utf8_lossy(&judged.stderr));
     let rows: serde_json::Value = serde_json::from_slice(&judged.stdout).unwrap();

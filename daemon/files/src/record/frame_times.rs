@@ -194,7 +194,7 @@ mod tests {
     }
 
     #[test]
-    fn a_clock_that_is_ahead_is_set_back_by_frames_of_both_directions() {
+    fn a_clock_that_is_ahead_is_set_back_by_frames_of_both_ways() {
         let surface = times(&[(Frame::SENT, 1, 100), (Frame::RECEIVED, 2, 250), (Frame::RECEIVED, 3, 800)]);
         let vehicle = times(&[(Frame::RECEIVED, 1, 5150), (Frame::SENT, 2, 5200), (Frame::SENT, 3, 5600)]);
         assert_eq!(vehicle.shift_to(&surface), -5000);
