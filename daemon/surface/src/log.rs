@@ -82,6 +82,14 @@ pub struct LogEntry {
     pub text: String,
 }
 
+impl LogEntry {
+    /// The text, with the principal who caused it.
+    pub fn line(&self) -> String {
+        let by = self.by.as_deref().map(|by| format!("{by}: ")).unwrap_or_default();
+        format!("{by}{}", self.text)
+    }
+}
+
 /// The last entries of the log.
 #[derive(Debug, Default)]
 pub struct MissionLog {

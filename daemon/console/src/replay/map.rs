@@ -45,6 +45,18 @@ impl Change {
     fn is_of_labels(&self) -> bool {
         self.message.layer.is_empty()
     }
+
+    /// The cells that were received with this message. The next file of a record repeats the whole map, of which the others were received
+    /// before.
+    fn news(&self, held: &Replica) -> Vec<(Cell, u8)> {
+        if !self.message.whole {
+            return self.cells().collect();
+        }
+        let all: LabelGrid = self.cells().collect();
+        let missing = held.shown().iter().filter(|&(cell, _)| all.get(cell) == UNEXPLORED);
+        let gone = missing.map(|(cell, _)| (cell, UNEXPLORED));
+        gone.chain(self.cells().filter(|&(cell, value)| held.shown().get(cell) != value)).collect()
+    }
 }
 
 impl MapHistory {
@@ -119,24 +131,16 @@ impl ShownMap {
                 *self = Self { epoch, ..Self::default() };
             }
             self.cell_m = message.cell_m;
-            let gone = if message.whole { gone(&self.labels, change) } else { Vec::new() };
-            let is_whole = message.whole;
-            for (cell, label) in gone.into_iter().chain(change.cells()) {
-                // The next file of a record repeats the whole map, of which the cells were received before.
-                if !is_whole || self.labels.shown().get(cell) != label {
-                    self.labels.restore(cell, label, at);
-                }
+            for (cell, label) in change.news(&self.labels) {
+                self.labels.restore(cell, label, at);
             }
             return;
         }
         let Some(descriptor) = descriptors.get(&message.layer) else { return };
         let new = || LayerReplica::new(descriptor.clone());
         let layer = self.layers.entry(message.layer.clone()).or_insert_with(new);
-        let gone = if message.whole { gone(layer.levels(), change) } else { Vec::new() };
-        for (cell, level) in gone.into_iter().chain(change.cells()) {
-            if !message.whole || layer.levels().shown().get(cell) != level {
-                layer.restore(cell, level, at);
-            }
+        for (cell, level) in change.news(layer.levels()) {
+            layer.restore(cell, level, at);
         }
     }
 
@@ -173,13 +177,6 @@ impl ShownMap {
     pub(crate) fn bounds(&self) -> Option<Rect> {
         self.labels.bounds()
     }
-}
-
-/// The cells of a map that a message of all its cells lacks, unexplored.
-fn gone(held: &Replica, change: &Change) -> Vec<(Cell, u8)> {
-    let all: LabelGrid = change.cells().collect();
-    let missing = held.shown().iter().filter(|&(cell, _)| all.get(cell) == UNEXPLORED);
-    missing.map(|(cell, _)| (cell, UNEXPLORED)).collect()
 }
 
 #[cfg(test)]

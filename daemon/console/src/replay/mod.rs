@@ -26,9 +26,6 @@ use std::collections::BTreeMap;
 use std::ops::RangeInclusive;
 use std::time::Duration;
 
-/// Recorded seconds for each second.
-const SPEEDS: RangeInclusive<f64> = 0.1..=1000.0;
-
 /// A mission that is played from its records.
 #[derive(Debug)]
 pub struct Replay {
@@ -43,23 +40,35 @@ pub struct Replay {
     side: ReplaySide,
     /// The state of the last moment, before it was completed, with the time of its record.
     state: (u64, MissionState),
-    /// By vehicle, the map that was served last and its version: each other one has a higher version.
-    served: BTreeMap<u8, (ServedMap, u64)>,
+    /// The maps of the vehicles at that moment.
+    shown: BTreeMap<u8, ShownVehicle>,
 }
 
-/// Names a map: the side, and the places in the histories of both.
-type ServedMap = (ReplaySide, usize, usize);
+/// The map of a vehicle that is shown.
+#[derive(Debug, Default)]
+struct ShownVehicle {
+    /// The side, and the places in the histories of both.
+    of: Option<(ReplaySide, [usize; 2])>,
+    /// Each other map that is shown has a higher version.
+    version: u64,
+    /// The cells in which both sides differ; empty where only one is known.
+    difference: LabelGrid,
+}
 
 impl Replay {
+    /// Recorded seconds for each second.
+    pub const SPEEDS: RangeInclusive<f64> = 0.1..=1000.0;
+
     /// Plays records from their beginning, once it is ordered to.
     pub fn new(recording: Recording, speed: f64) -> Self {
         let parts = addresses(&recording);
-        let address = |part: &str| parts.iter().find(|(_, own)| *own == part).map(|(&id, _)| id);
-        let events = events::events(&recording, address);
+        let events = events::events(&recording, |part| address(&parts, part));
         let side = if recording.timeline.states.is_empty() { ReplaySide::Vehicle } else { ReplaySide::Operator };
         let at = recording.timeline.span.0;
-        let (state, served) = ((u64::MAX, MissionState::default()), BTreeMap::new());
-        Self { recording, events, parts, at, is_playing: false, speed, side, state, served }
+        let (state, shown) = ((u64::MAX, MissionState::default()), BTreeMap::new());
+        let mut replay = Self { recording, events, parts, at, is_playing: false, speed, side, state, shown };
+        replay.show();
+        replay
     }
 
     /// Why some of the records could not be read.
@@ -75,17 +84,36 @@ impl Replay {
         let nanos = passed.as_secs_f64() * self.speed * 1e9;
         self.at = self.at.saturating_add(nanos as u64).min(self.recording.timeline.span.1);
         self.is_playing = self.at < self.recording.timeline.span.1;
+        self.show();
         true
+    }
+
+    /// Brings the maps to the moment and the side that are shown.
+    fn show(&mut self) {
+        let Recording { timeline, operator, vehicles, .. } = &mut self.recording;
+        for known in operator.values_mut().chain(vehicles.values_mut()) {
+            known.map.seek(self.at, |nanos| timeline.mission_time(nanos));
+        }
+        for (&id, part) in &self.parts {
+            let both = [operator.get(part), vehicles.get(part)];
+            let places = both.map(|known| known.map_or(0, |known| known.map.place()));
+            let shown = self.shown.entry(id).or_default();
+            let before = shown.of.replace((self.side, places));
+            if before == shown.of {
+                continue;
+            }
+            shown.version += 1;
+            if let [Some(operator), Some(vehicle)] = both
+                && before.is_none_or(|(_, before)| before != places)
+            {
+                shown.difference = vehicle.map.shown().difference(operator.map.shown());
+            }
+        }
     }
 
     /// The state at the moment that is shown.
     pub fn snapshot(&mut self) -> Snapshot {
-        let at = self.at;
-        let Recording { timeline, operator, vehicles, .. } = &mut self.recording;
-        for known in operator.values_mut().chain(vehicles.values_mut()) {
-            known.map.seek(at, |nanos| timeline.mission_time(nanos));
-        }
-        let mission_s = timeline.mission_s(at);
+        let mission_s = self.recording.timeline.mission_s(self.at);
         let mut state = self.recorded_state();
         let mission_speed = state.mission.speed.max(1e-3);
         state.mission.speed = if self.is_playing { mission_speed * self.speed } else { 0.0 };
@@ -123,30 +151,23 @@ impl Replay {
     }
 
     /// Brings the state of a vehicle from the last recorded one to the present moment.
-    fn complete(&mut self, vehicle: &mut VehicleState) {
+    fn complete(&self, vehicle: &mut VehicleState) {
         let part = valid_part(&vehicle.name);
-        let (operator, on_board) = (self.recording.operator.get(&part), self.recording.vehicles.get(&part));
-        let place = |known: Option<&Known>| known.map_or(0, |known| known.map.place());
-        let key = (self.side, place(operator), place(on_board));
-        let (held, version) = self.served.entry(vehicle.id).or_insert((key, 1));
-        if *held != key {
-            (*held, *version) = (key, *version + 1);
-        }
-        vehicle.map.version = *version;
+        let maps = self.shown.get(&vehicle.id);
+        vehicle.map.version = maps.map_or(0, |maps| maps.version);
         // It is the map of the run that was recorded.
         vehicle.map.earlier = None;
-        if let Some(heard) = operator.and_then(|known| last_upto(&known.heard, self.at)) {
+        if let Some(heard) = self.recording.operator.get(&part).and_then(|known| last_upto(&known.heard, self.at)) {
             let heard_s = self.recording.timeline.mission_s(heard);
             vehicle.last_received_s = Some(vehicle.last_received_s.map_or(heard_s, |before| before.max(heard_s)));
         }
-        let Some(shown) = self.shown(&part) else { return };
+        let Some(shown) = self.known(&part).map(|known| known.map.shown()) else { return };
         if shown.cell_m > 0.0 {
             (vehicle.map.cell_m, vehicle.map.epoch) = (shown.cell_m, shown.epoch);
         }
         vehicle.map.updated_s = shown.labels.updated().map(|at| at.as_secs_f64());
-        let (bounds, counts) = match self.side {
-            ReplaySide::Difference => {
-                let cells = self.difference(&part);
+        let (bounds, counts) = match maps {
+            Some(ShownVehicle { difference: cells, .. }) if self.side == ReplaySide::Difference => {
                 let mut counts = BTreeMap::new();
                 cells.iter().for_each(|(_, label)| *counts.entry(label).or_default() += 1);
                 (cells.bounds(), counts)
@@ -157,25 +178,17 @@ impl Replay {
         (map.x0, map.y0) = bounds.map_or((0, 0), |b| (b.x, b.y));
         (map.width, map.height) = bounds.map_or((0, 0), |b| (b.width, b.height));
         on_board::recount(vehicle, &counts);
-        if let Some(known) = on_board.filter(|_| self.side == ReplaySide::Vehicle) {
+        if let Some(known) = self.recording.vehicles.get(&part).filter(|_| self.side == ReplaySide::Vehicle) {
             on_board::show(vehicle, known, self.at, |nanos| self.recording.timeline.mission_s(nanos));
         }
     }
 
-    /// The map of the side that is shown; that of the operator for a difference.
-    fn shown(&self, part: &str) -> Option<&ShownMap> {
-        let known = match self.side {
+    /// What the side that is shown knew of a vehicle; the operator for a difference.
+    fn known(&self, part: &str) -> Option<&Known> {
+        match self.side {
             ReplaySide::Vehicle => self.recording.vehicles.get(part),
             ReplaySide::Operator | ReplaySide::Difference => self.recording.operator.get(part),
-        };
-        known.map(|known| known.map.shown())
-    }
-
-    /// The cells in which the maps of both sides differ.
-    fn difference(&self, part: &str) -> LabelGrid {
-        let both = (self.recording.vehicles.get(part), self.recording.operator.get(part));
-        let (Some(vehicle), Some(operator)) = both else { return LabelGrid::default() };
-        vehicle.map.shown().difference(operator.map.shown())
+        }
     }
 
     fn sides(&self) -> Vec<ReplaySide> {
@@ -191,9 +204,8 @@ impl Replay {
         let known_twice = self.parts.iter().filter(|(_, part)| {
             self.recording.vehicles.contains_key(*part) && self.recording.operator.contains_key(*part)
         });
-        let differing = known_twice
-            .map(|(&vehicle, part)| DifferingCells { vehicle, cells: self.difference(part).explored() as u32 })
-            .collect();
+        let cells = |id| self.shown.get(id).map_or(0, |shown| shown.difference.explored() as u32);
+        let differing = known_twice.map(|(id, _)| DifferingCells { vehicle: *id, cells: cells(id) }).collect();
         ReplayState {
             from_utc_s: utc_s(self.recording.timeline.span.0),
             to_utc_s: utc_s(self.recording.timeline.span.1),
@@ -243,8 +255,8 @@ impl Replay {
         if let Some(at_s) = order.at_utc_s.filter(|at_s| !at_s.is_finite()) {
             return Err(format!("at_utc_s {at_s}: it takes seconds since 1970"));
         }
-        if let Some(speed) = order.speed.filter(|speed| !SPEEDS.contains(speed)) {
-            return Err(format!("speed {speed}: the range is {} to {}", SPEEDS.start(), SPEEDS.end()));
+        if let Some(speed) = order.speed.filter(|speed| !Self::SPEEDS.contains(speed)) {
+            return Err(format!("speed {speed}: the range is {} to {}", Self::SPEEDS.start(), Self::SPEEDS.end()));
         }
         if let Some(side) = order.side.filter(|side| !self.sides().contains(side)) {
             return Err(format!("side {side:?}: the record of the other end is missing"));
@@ -257,6 +269,7 @@ impl Replay {
         if order.is_playing == Some(true) && self.at >= to {
             self.at = from;
         }
+        self.show();
         Ok(())
     }
 
@@ -264,23 +277,16 @@ impl Replay {
     fn report(&mut self) -> Reply {
         let dive = Dive::of(&mut self.recording);
         // The maps are at the end now.
-        self.snapshot();
+        self.show();
         dive.map_or_else(Reply::Refused, |dive| Reply::File(HTML, dive.html().into_bytes()))
     }
 
-    /// The end that is shown.
-    fn known(&self, part: &str) -> Option<&Known> {
-        match self.side {
-            ReplaySide::Vehicle => self.recording.vehicles.get(part),
-            _ => self.recording.operator.get(part),
-        }
-    }
-
     fn map(&self, id: u8, part: &str) -> Option<MapCells> {
-        let (version, at) = (self.served.get(&id)?.1, self.recording.timeline.mission_time(self.at));
-        let shown = self.shown(part)?;
+        let ShownVehicle { version, difference, .. } = self.shown.get(&id)?;
+        let (version, at) = (*version, self.recording.timeline.mission_time(self.at));
+        let shown = self.known(part)?.map.shown();
         if self.side == ReplaySide::Difference {
-            let cells = MapCells::of_labels(&self.difference(part), shown.cell_m);
+            let cells = MapCells::of_labels(difference, shown.cell_m);
             return Some(MapCells { version, at, ..cells });
         }
         Some(shown.cells(version, at))
@@ -304,14 +310,18 @@ impl Replay {
 
     fn log(&self) -> Vec<LogEntry> {
         let entry = |(number, (at, event)): (u64, &(u64, Event))| {
-            let part = valid_part(&event.vehicle);
-            let vehicle = self.parts.iter().find(|(_, own)| **own == part).and_then(|(&id, _)| Address::vehicle(id));
+            let vehicle = address(&self.parts, &valid_part(&event.vehicle)).and_then(Address::vehicle);
             let at = self.recording.timeline.mission_time(*at);
             let kind = LogKind::ALL.into_iter().find(|kind| kind.name() == event.source).unwrap_or(LogKind::Record);
             LogEntry { number, at, vehicle, kind, by: None, text: event.text.clone() }
         };
         (1..).zip(&self.recording.log[..self.logged()]).map(entry).collect()
     }
+}
+
+/// The address of the vehicle with this part of topics.
+fn address(parts: &BTreeMap<u8, String>, part: &str) -> Option<u8> {
+    parts.iter().find(|(_, own)| *own == part).map(|(&id, _)| id)
 }
 
 /// The last moment of a list up to this one.

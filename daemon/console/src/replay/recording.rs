@@ -3,7 +3,9 @@
 use super::map::MapHistory;
 use crate::messages::layer_of_text;
 use scenecast_core::UserError;
-use scenecast_files::{FrameTimes, MissionClock, RecordedMessage, mission_records, read_record};
+use scenecast_files::{
+    FrameTimes, MissionClock, MissionSpeed, RecordedMessage, StateTime, mission_records, read_record,
+};
 use scenecast_messages::contents::valid_part;
 use scenecast_messages::geometry_msgs::PoseWithCovarianceStamped;
 use scenecast_messages::scenecast_msgs::{Event, Exemplar, Frame, Link, Order, OrderStatus};
@@ -48,9 +50,11 @@ pub(crate) struct StateText {
     pub(super) head: StateHead,
 }
 
-/// What the time line needs of a state.
-#[derive(Debug, Default, Deserialize)]
+/// The time of a state, and what the time line needs of it.
+#[derive(Debug, Deserialize)]
 pub(super) struct StateHead {
+    now_s: f64,
+    mission: MissionSpeed,
     pub(super) vehicles: Vec<Loops>,
 }
 
@@ -205,9 +209,8 @@ impl Record {
         match topic {
             "state" => {
                 let Some(text) = message.decode::<Text>() else { return };
-                if let Ok(head) = serde_json::from_str(&text.data)
-                    && self.clock.take(nanos, &text)
-                {
+                if let Ok(head) = serde_json::from_str::<StateHead>(&text.data) {
+                    self.clock.take(nanos, StateTime { now_s: head.now_s, mission: head.mission });
                     self.states.push(StateText { nanos, json: text.data, head });
                 }
             }

@@ -16,13 +16,15 @@ pub(crate) const HTML: &str = "text/html; charset=utf-8";
 
 /// The report of the records of a mission, which may go on.
 pub fn report_reply(records: &[PathBuf]) -> Reply {
+    if records.is_empty() {
+        return Reply::Refused("this mission is not recorded (record.enabled)".to_owned());
+    }
     match Dive::read(records) {
         Ok(mut dive) => {
             // The chunk that is being written is no damage.
             dive.damage = None;
             Reply::File(HTML, dive.html().into_bytes())
         }
-        Err(_) if records.is_empty() => Reply::Refused("this mission is not recorded (record.enabled)".to_owned()),
         Err(error) => Reply::Refused(error.to_string()),
     }
 }

@@ -15,8 +15,9 @@ pub struct FrameTimes {
 /// No frame is under way for longer, nanoseconds.
 const LONGEST: u64 = 20_000_000_000;
 
-/// By length and fingerprint.
-type Times = BTreeMap<(u32, u64), Vec<u64>>;
+/// The length of a frame, and its fingerprint.
+type FrameKey = (u32, u64);
+type Times = BTreeMap<FrameKey, Vec<u64>>;
 
 /// A frame that an end has sent.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -71,7 +72,7 @@ impl FrameTimes {
 
     /// What became of each frame that this end sent to `other`, whose clock shows `shift` nanoseconds more, in the order of times.
     pub fn fates(&self, other: &Self, shift: i64) -> Vec<SentFrame> {
-        let arrivals = |frame| {
+        let arrivals = |frame: &FrameKey| {
             let all = other.received.get(frame).into_iter().flatten();
             all.map(|at| at.saturating_add_signed(-shift)).collect::<Vec<_>>()
         };
@@ -82,25 +83,24 @@ impl FrameTimes {
                 }
                 _ => None,
             }));
-        let mut fates = Vec::new();
-        for (frame, sent) in &self.sent {
-            let expected = |at: u64| at.saturating_add(duration.of_frame(frame.0));
-            fates
-                .extend(sent.iter().map(|&at| (*frame, SentFrame { sent: at, received: None, arrives: expected(at) })));
-        }
-        fates.sort_by_key(|(frame, _)| *frame);
-        let mut unrecorded = Vec::new();
+        let copies = |(frame, sent): (&FrameKey, &Vec<u64>)| {
+            let copy = |&at: &u64| SentFrame {
+                sent: at,
+                received: None,
+                arrives: at.saturating_add(duration.of_frame(frame.0)),
+            };
+            (*frame, sent.iter().map(copy).collect::<Vec<_>>())
+        };
+        let mut fates: BTreeMap<FrameKey, Vec<SentFrame>> = self.sent.iter().map(copies).collect();
         for frame in other.received.keys() {
-            let own =
-                fates.partition_point(|(known, _)| known < frame)..fates.partition_point(|(known, _)| known <= frame);
+            let copies = fates.entry(*frame).or_default();
             for arrival in arrivals(frame) {
                 // An arrival is that of the copy that was to arrive next to it; a second copy of one is none.
-                let copies = fates.get_mut(own.clone()).unwrap_or_default().iter_mut().map(|(_, copy)| copy);
-                let near = copies.filter(|copy| copy.arrives.abs_diff(arrival) < LONGEST);
+                let near = copies.iter_mut().filter(|copy| copy.arrives.abs_diff(arrival) < LONGEST);
                 match near.min_by_key(|copy| copy.arrives.abs_diff(arrival)) {
                     Some(copy) => copy.received = copy.received.or(Some(arrival)),
                     // It was sent before the record of its sender began, or while that was not written.
-                    None => unrecorded.push(SentFrame {
+                    None => copies.push(SentFrame {
                         sent: arrival.saturating_sub(duration.of_frame(frame.0)),
                         received: Some(arrival),
                         arrives: arrival,
@@ -108,7 +108,7 @@ impl FrameTimes {
                 }
             }
         }
-        let mut fates: Vec<SentFrame> = fates.into_iter().map(|(_, fate)| fate).chain(unrecorded).collect();
+        let mut fates: Vec<SentFrame> = fates.into_values().flatten().collect();
         fates.sort_by_key(|frame| frame.sent);
         correct(&mut fates);
         fates
@@ -164,7 +164,7 @@ fn carried(values: impl Iterator<Item = Option<i64>>) -> Vec<Option<i64>> {
 /// The least time from sending to reception, as the two clocks show it, of frames that were sent and received once. The same bytes may
 /// have been sent before a record began: a time far below that of most frames is that of another copy.
 fn quickest(sent: &Times, received: &Times) -> Option<i64> {
-    let time = |(frame, sent): (&(u32, u64), &Vec<u64>)| match (sent.as_slice(), received.get(frame)?.as_slice()) {
+    let time = |(frame, sent): (&FrameKey, &Vec<u64>)| match (sent.as_slice(), received.get(frame)?.as_slice()) {
         (&[sent], &[received]) => i64::try_from(i128::from(received) - i128::from(sent)).ok(),
         _ => None,
     };

@@ -1,6 +1,6 @@
 //! The link of a mission as it was: which frames arrived, and when.
 
-use super::{FrameTimes, MissionClock, SentFrame, mission_records, read_record};
+use super::{FrameTimes, MissionClock, SentFrame, StateTime, mission_records, read_record};
 use scenecast_core::UserError;
 use scenecast_messages::scenecast_msgs::Frame;
 use scenecast_messages::std_msgs::Text;
@@ -31,19 +31,19 @@ impl RecordedLink {
     pub fn read(folder: &Path) -> Result<Self, UserError> {
         let (mut surfaces, mut vehicles, mut clock) = (Vec::new(), Vec::new(), MissionClock::default());
         for record in mission_records(folder)? {
-            let (mut frames, mut own) = (FrameTimes::default(), MissionClock::default());
-            let mut is_surface = false;
+            let (mut frames, mut is_surface) = (FrameTimes::default(), false);
             let _damaged = read_record(&record, |message| {
                 let nanos = message.nanos();
                 match message.topic() {
                     "/scenecast/frames" => message.decode::<Frame>().iter().for_each(|frame| frames.take(nanos, frame)),
                     "/scenecast/state" => {
-                        is_surface |= message.decode::<Text>().is_some_and(|text| own.take(nanos, &text))
+                        let time = message.decode::<Text>().and_then(|text| StateTime::of_json(&text.data));
+                        is_surface |= time.is_some();
+                        time.into_iter().for_each(|time| clock.take(nanos, time));
                     }
                     _ => {}
                 }
             })?;
-            clock.add(&own);
             if is_surface { &mut surfaces } else { &mut vehicles }.push(frames);
         }
         let [surface, vehicle] = [&surfaces, &vehicles].map(|frames| FrameTimes::joined(frames.iter()));

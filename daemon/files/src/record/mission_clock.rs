@@ -1,6 +1,5 @@
 //! The mission times that a record of the surface tells.
 
-use scenecast_messages::std_msgs::Text;
 use serde::Deserialize;
 
 /// The mission time at each state that the page showed.
@@ -19,24 +18,30 @@ struct ClockState {
 }
 
 /// The part of a state that has its time.
-#[derive(Deserialize)]
-struct StateTime {
-    now_s: f64,
-    mission: Speed,
+#[derive(Debug, Clone, Copy, Deserialize)]
+pub struct StateTime {
+    pub now_s: f64,
+    pub mission: MissionSpeed,
 }
 
-#[derive(Deserialize)]
-struct Speed {
-    speed: f64,
+/// Seconds of mission time for each second of the clock.
+#[derive(Debug, Clone, Copy, Deserialize)]
+pub struct MissionSpeed {
+    pub speed: f64,
+}
+
+impl StateTime {
+    /// Reads it from a state in JSON; `None` if it is none.
+    pub fn of_json(text: &str) -> Option<Self> {
+        serde_json::from_str(text).ok()
+    }
 }
 
 impl MissionClock {
-    /// Takes a state, which was recorded at `nanos` since 1970. States may come in any order. Whether it is one.
-    pub fn take(&mut self, nanos: u64, state: &Text) -> bool {
-        let Ok(StateTime { now_s, mission: Speed { speed } }) = serde_json::from_str(&state.data) else { return false };
+    /// Takes the time of a state, which was recorded at `nanos` since 1970. States may come in any order.
+    pub fn take(&mut self, nanos: u64, StateTime { now_s, mission }: StateTime) {
         let at = self.states.partition_point(|state| state.nanos <= nanos);
-        self.states.insert(at, ClockState { nanos, now_s, speed: speed.max(1e-3) });
-        true
+        self.states.insert(at, ClockState { nanos, now_s, speed: mission.speed.max(1e-3) });
     }
 
     /// Adds the states of another record.
@@ -80,10 +85,12 @@ mod tests {
     fn mission_times_follow_the_states_and_reach_beyond_them() {
         let mut clock = MissionClock::default();
         assert_eq!(clock.mission_s(5), None);
-        let state =
-            |now_s: f64, speed: f64| Text { data: format!(r#"{{"now_s":{now_s},"mission":{{"speed":{speed}}}}}"#) };
-        assert!(clock.take(20_000_000_000, &state(100.0, 4.0)) && clock.take(10_000_000_000, &state(80.0, 2.0)));
-        assert!(!clock.take(0, &Text { data: "{}".to_owned() }));
+        let state = |now_s: f64, speed: f64| {
+            StateTime::of_json(&format!(r#"{{"now_s":{now_s},"mission":{{"speed":{speed}}}}}"#)).unwrap()
+        };
+        clock.take(20_000_000_000, state(100.0, 4.0));
+        clock.take(10_000_000_000, state(80.0, 2.0));
+        assert!(StateTime::of_json("{}").is_none());
         let at = |s: u64| clock.mission_s(s * 1_000_000_000);
         assert_eq!([5, 15, 20, 25].map(at), [70.0, 90.0, 100.0, 120.0].map(Some));
         assert_eq!(clock.speed(30_000_000_000), 4.0);

@@ -10,6 +10,7 @@ use scenecast_console::messages::{label_tree, layer_text, link, order, order_sta
 use scenecast_console::state::{MapLabelTree, MissionState, OrderStatus, VehicleState};
 use scenecast_files::RecordEntry;
 use scenecast_host::FrameEvent;
+use scenecast_messages::Message;
 use scenecast_messages::contents::{Stamps, WORLD_FRAME, header, pose};
 use scenecast_messages::scenecast_msgs::{Event, Exemplar};
 use scenecast_messages::std_msgs::Text;
@@ -138,12 +139,16 @@ impl SurfaceRecorder {
             }
             let recorded = self.vehicles.entry(vehicle.id).or_default();
             let before = entries.len();
-            recorded.record_orders(surface, &snapshot.state, vehicle, stamps, &mut entries);
+            let seen = Seen { surface, mission: &snapshot.state, vehicle, stamps };
+            recorded.record_orders(seen, &mut entries);
             let reported_s = vehicle.status.as_ref().map(|status| status.at_s);
             has_news |= entries.len() > before || recorded.report_s != reported_s;
-            recorded.record(surface, &snapshot.state, vehicle, stamps, &mut entries);
+            recorded.record_map(seen, &mut entries);
+            recorded.record_tree(seen, &mut entries);
+            recorded.record_report(seen, &mut entries);
+            recorded.record_exemplars(seen, &mut entries);
             if is_link_due {
-                entries.push(entry_of(&vehicle.name, "link", stamps, &link(&snapshot.state, vehicle, stamps)));
+                entries.push(seen.entry("link", &link(&snapshot.state, vehicle, stamps)));
             }
         }
         self.last_state = Some((snapshot.json.clone(), stamps.clone()));
@@ -173,13 +178,12 @@ impl SurfaceRecorder {
         let new = surface.log().entries().filter(|logged| logged.number > after);
         let event = |logged: &scenecast_surface::LogEntry| {
             let vehicle = logged.vehicle.and_then(|address| snapshot.vehicle(address.number()));
-            let by = logged.by.as_deref().map(|by| format!("{by}: ")).unwrap_or_default();
             let message = Event {
                 header: header(stamps.at(logged.at.as_secs_f64()), ""),
                 vehicle: vehicle.map(|vehicle| vehicle.name.clone()).unwrap_or_default(),
                 level: Event::INFO,
                 source: logged.kind.name().to_owned(),
-                text: format!("{by}{}", logged.text),
+                text: logged.line(),
             };
             entry("events".to_owned(), stamps, &message)
         };
@@ -187,75 +191,89 @@ impl SurfaceRecorder {
     }
 }
 
+/// What is known of a vehicle at one moment.
+#[derive(Clone, Copy)]
+struct Seen<'a> {
+    surface: &'a Surface,
+    mission: &'a MissionState,
+    vehicle: &'a VehicleState,
+    stamps: &'a Stamps,
+}
+
+impl Seen<'_> {
+    /// An entry of a topic of the vehicle.
+    fn entry<M: Message>(&self, topic: &str, message: &M) -> RecordEntry {
+        entry_of(&self.vehicle.name, topic, self.stamps, message)
+    }
+
+    fn address(&self) -> Option<Address> {
+        Address::vehicle(self.vehicle.id)
+    }
+}
+
 impl RecordedVehicle {
-    fn record_orders(
-        &mut self,
-        surface: &Surface,
-        mission: &MissionState,
-        vehicle: &VehicleState,
-        stamps: &Stamps,
-        entries: &mut Vec<RecordEntry>,
-    ) {
+    fn record_orders(&mut self, seen: Seen<'_>, entries: &mut Vec<RecordEntry>) {
+        let Seen { surface, mission, vehicle, stamps } = seen;
         for slot in &vehicle.orders.directive.slots {
             let state = (slot.version, slot.state);
             let before = self.orders.insert(slot.slot.clone(), state);
             if before.is_none_or(|(version, _)| version != slot.version) {
                 let principal = principal(surface, vehicle.id, slot.issued_s);
                 let order = order(mission, vehicle, slot, principal, stamps);
-                entries.extend(order.map(|order| entry_of(&vehicle.name, "orders", stamps, &order)));
+                entries.extend(order.map(|order| seen.entry("orders", &order)));
             }
             if before != Some(state) {
-                entries.push(entry_of(&vehicle.name, "order_status", stamps, &order_status(vehicle, slot, stamps)));
+                entries.push(seen.entry("order_status", &order_status(vehicle, slot, stamps)));
             }
         }
     }
 
-    fn record(
-        &mut self,
-        surface: &Surface,
-        mission: &MissionState,
-        vehicle: &VehicleState,
-        stamps: &Stamps,
-        entries: &mut Vec<RecordEntry>,
-    ) {
-        let address = Address::vehicle(vehicle.id);
+    /// Labels and layers.
+    fn record_map(&mut self, seen: Seen<'_>, entries: &mut Vec<RecordEntry>) {
+        let Seen { surface, vehicle, stamps, .. } = seen;
+        let Some(view) = seen.address().and_then(|address| surface.view(address)) else { return };
         let earlier = vehicle.map.earlier.as_ref();
         let epoch = earlier.map_or(vehicle.map.epoch, |earlier| earlier.current_epoch);
-        if let Some(view) = address.and_then(|address| surface.view(address)) {
-            // The page may show an earlier map meanwhile, with its version.
-            let (version, labels) = (view.replica().version(), view.replica().shown());
-            let (name, cell_m) = (vehicle.name.as_str(), vehicle.map.cell_m);
-            let map = MapState { vehicle: name, layer: "", epoch, version, cell_m, labels };
-            entries.extend(self.map.record(&map, stamps));
-            for (id, descriptor) in view.layers().iter() {
-                let Some(layer) = view.layer(id).filter(|layer| layer.version() > 0) else { continue };
-                let recorded = self.layers.entry(id).or_insert_with(|| RecordedLayer::new(descriptor.clone()));
-                let (version, labels) = (layer.version(), layer.levels().shown());
-                let map = MapState { vehicle: name, layer: &descriptor.name, epoch, version, cell_m, labels };
-                entries.extend(recorded.record(descriptor, &map, stamps));
-            }
+        let (name, cell_m) = (vehicle.name.as_str(), vehicle.map.cell_m);
+        // The page may show an earlier map meanwhile, with its version.
+        let (version, labels) = (view.replica().version(), view.replica().shown());
+        let map = MapState { vehicle: name, layer: "", epoch, version, cell_m, labels };
+        entries.extend(self.map.record(&map, stamps));
+        for (id, descriptor) in view.layers().iter() {
+            let Some(layer) = view.layer(id).filter(|layer| layer.version() > 0) else { continue };
+            let recorded = self.layers.entry(id).or_insert_with(|| RecordedLayer::new(descriptor.clone()));
+            let (version, labels) = (layer.version(), layer.levels().shown());
+            let map = MapState { layer: &descriptor.name, version, labels, ..map };
+            entries.extend(recorded.record(descriptor, &map, stamps));
         }
+    }
+
+    fn record_tree(&mut self, seen: Seen<'_>, entries: &mut Vec<RecordEntry>) {
+        let Seen { vehicle, stamps, .. } = seen;
         let is_recorded =
             |tree: &MapLabelTree| self.tree.as_ref().is_some_and(|(e, t)| (*e, t) == (vehicle.map.epoch, tree));
         if let Some(tree) = vehicle.label_tree.as_ref().filter(|tree| !is_recorded(tree)) {
-            let message = label_tree(vehicle, tree, header(stamps.now(), WORLD_FRAME));
-            entries.push(entry_of(&vehicle.name, "label_tree", stamps, &message));
+            entries.push(seen.entry("label_tree", &label_tree(vehicle, tree, header(stamps.now(), WORLD_FRAME))));
             self.tree = Some((vehicle.map.epoch, tree.clone()));
         }
-        if let Some(status) = vehicle.status.as_ref().filter(|status| self.report_s != Some(status.at_s)) {
-            self.report_s = Some(status.at_s);
-            let shift = vehicle.map.shift_m();
-            let place = place(status, shift, stamps);
-            let sigma_m = status.pose.sigma_m;
-            entries.push(entry_of(&vehicle.name, "pose", stamps, &pose(&place, sigma_m, WORLD_FRAME)));
-            entries.extend(
-                place_on_earth(mission, &place, sigma_m).map(|fix| entry_of(&vehicle.name, "fix", stamps, &fix)),
-            );
-        }
+    }
+
+    fn record_report(&mut self, seen: Seen<'_>, entries: &mut Vec<RecordEntry>) {
+        let Seen { mission, vehicle, stamps, .. } = seen;
+        let Some(status) = vehicle.status.as_ref().filter(|status| self.report_s != Some(status.at_s)) else { return };
+        self.report_s = Some(status.at_s);
+        let place = place(status, vehicle.map.shift_m(), stamps);
+        let sigma_m = status.pose.sigma_m;
+        entries.push(seen.entry("pose", &pose(&place, sigma_m, WORLD_FRAME)));
+        entries.extend(place_on_earth(mission, &place, sigma_m).map(|fix| seen.entry("fix", &fix)));
+    }
+
+    fn record_exemplars(&mut self, seen: Seen<'_>, entries: &mut Vec<RecordEntry>) {
+        let Seen { surface, vehicle, stamps, .. } = seen;
         for label in &vehicle.labels {
             for image in &label.exemplar.images {
                 let is_new = self.exemplars.insert((vehicle.map.epoch, label.id, image.number));
-                let record = address.filter(|_| is_new).and_then(|address| surface.record(address));
+                let record = seen.address().filter(|_| is_new).and_then(|address| surface.record(address));
                 let stored = record.and_then(|record| record.exemplars.label(label.id)?.exemplar(Some(image.number)));
                 let Some(stored) = stored else { continue };
                 let message = Exemplar {
@@ -268,7 +286,7 @@ impl RecordedVehicle {
                     format: "webp".to_owned(),
                     data: stored.webp.clone(),
                 };
-                entries.push(entry_of(&vehicle.name, "exemplars", stamps, &message));
+                entries.push(seen.entry("exemplars", &message));
             }
         }
     }

@@ -34,7 +34,7 @@ pub(super) struct Replay {
 
 impl Replay {
     pub(super) fn run(self) -> Result<(), UserError> {
-        if !(0.1..=1000.0).contains(&self.speed) {
+        if !Player::SPEEDS.contains(&self.speed) {
             return Err(UserError::Input(format!("--speed {} is not allowed; allowed: 0.1 to 1000", self.speed)));
         }
         keep_private();

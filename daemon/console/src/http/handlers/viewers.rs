@@ -300,9 +300,8 @@ impl Viewer {
         }
         let Ok(Reply::Log(entries)) = self.shared.request(SurfaceRequest::Log).await else { return Ok(()) };
         for entry in entries.iter().filter(|entry| entry.number > sent.entry) {
-            let by = entry.by.as_deref().map(|by| format!("{by}: ")).unwrap_or_default();
             let (stamp, name) = (stamps.at(seconds(entry.at)), entry.kind.name().to_owned());
-            let message = Log { stamp, level: Log::INFO, name, msg: format!("{by}{}", entry.text), ..Log::default() };
+            let message = Log { stamp, level: Log::INFO, name, msg: entry.line(), ..Log::default() };
             self.send(id, stamps, &encode(&message)).await?;
         }
         self.subscriptions.insert(id, Sent { entry: last, ..sent });
