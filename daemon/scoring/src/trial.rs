@@ -75,6 +75,8 @@ pub struct MeanScore {
     pub normalised_mutual_information: f64,
     /// The harmonic mean of homogeneity and completeness, 0 to 1.
     pub v_measure: f64,
+    /// The same with the tree of the labels cut at 8; only [`Method::Habitats`] has a tree.
+    pub v_measure_at_8: Option<f64>,
     /// The mean mutual information of the flipped and shifted maps, nats.
     pub null_mutual_information_nats: f64,
     /// Mutual information minus that of the null model, nats.
@@ -163,6 +165,10 @@ impl<'a> AnnotatedScene<'a> {
         for seed in 1..=seeds {
             mean.add(&score(&self.labels(method, seed)?, &self.annotations), 1.0 / seeds as f64);
         }
+        if method == Method::Habitats {
+            let cut = score(&self.habitats(8), &self.annotations);
+            mean.v_measure_at_8 = Some(cut.mutual_information.v_measure());
+        }
         Ok(mean)
     }
 
@@ -172,7 +178,7 @@ impl<'a> AnnotatedScene<'a> {
         match method {
             Method::MeanLab => Ok(mean_lab_labels(self.image, self.cell_px, k, seed)),
             Method::PooledWords => Ok(pooled_word_labels(&self.words, self.vocabulary, size, self.cell_px, k, seed)),
-            Method::Habitats => Ok(self.habitats()),
+            Method::Habitats => Ok(self.habitats(usize::MAX)),
             Method::SceneModel => self.scene_model_labels(seed),
         }
     }
@@ -186,8 +192,8 @@ impl<'a> AnnotatedScene<'a> {
         camera.project(width, height, &middle, words)
     }
 
-    /// They depend on no random number.
-    fn habitats(&self) -> LabelGrid {
+    /// The habitats, of which at most `count` are told apart. They depend on no random number.
+    fn habitats(&self, count: usize) -> LabelGrid {
         let mut habitats = Habitats::new(self.trial.labels);
         let points = measure(self.image, self.cell_px);
         habitats.add(self.image.dimensions(), &points, &self.projected(&Habitats::as_words(&points)), 1.0);
@@ -195,7 +201,8 @@ impl<'a> AnnotatedScene<'a> {
         let (columns, rows) = self.annotations.size();
         let mut grid = LabelGrid::empty(columns, rows);
         for (index, label) in grid.labels.iter_mut().enumerate() {
-            *label = habitats.label_at((index % columns) as i32, -1 - (index / columns) as i32);
+            let own = habitats.label_at((index % columns) as i32, -1 - (index / columns) as i32);
+            *label = own.map(|own| habitats.tree().at(own, count));
         }
         grid
     }
@@ -229,23 +236,26 @@ impl MeanScore {
     /// Returns the median over scenes, each number on its own; zeros for an empty slice.
     #[must_use]
     pub fn median(scores: &[Self]) -> Self {
-        let median = |pick: fn(&Self) -> f64| {
-            let mut values: Vec<f64> = scores.iter().map(pick).collect();
-            values.sort_by(f64::total_cmp);
-            match (values.len() / 2, values.len() % 2) {
-                (0, 0) => 0.0,
-                (middle, 1) => values[middle],
-                (middle, _) => 0.5 * (values[middle - 1] + values[middle]),
-            }
-        };
+        let median = |pick: fn(&Self) -> f64| median(scores.iter().map(pick).collect());
+        let at_8: Option<Vec<f64>> = scores.iter().map(|s| s.v_measure_at_8).collect();
         Self {
             mutual_information_nats: median(|s| s.mutual_information_nats),
             normalised_mutual_information: median(|s| s.normalised_mutual_information),
             v_measure: median(|s| s.v_measure),
+            v_measure_at_8: at_8.filter(|values| !values.is_empty()).map(self::median),
             null_mutual_information_nats: median(|s| s.null_mutual_information_nats),
             excess_nats: median(|s| s.excess_nats),
             labels_used: median(|s| s.labels_used),
         }
+    }
+}
+
+fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    match (values.len() / 2, values.len() % 2) {
+        (0, 0) => 0.0,
+        (middle, 1) => values[middle],
+        (middle, _) => 0.5 * (values[middle - 1] + values[middle]),
     }
 }
 
@@ -289,6 +299,8 @@ mod tests {
         let scores = Method::ALL.map(|method| scene.mean_score(method).unwrap());
         assert!(scores.iter().all(|score| score.excess_nats > 0.5 && score.labels_used <= 8.0), "{scores:?}");
         assert!(scores[3].excess_nats > scores[1].excess_nats, "{scores:?}");
+        // At most 8 labels are allowed, so that the cut at 8 tells all apart.
+        assert_eq!(scores.map(|score| score.v_measure_at_8), [None, None, Some(scores[2].v_measure), None]);
     }
 
     #[test]

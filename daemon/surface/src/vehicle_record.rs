@@ -181,7 +181,10 @@ impl VehicleRecord {
 
     /// The tree of the labels of the map in view, if one is known.
     pub fn tree_in_view(&self) -> Option<&LabelTree> {
-        self.tree.as_ref().filter(|_| self.earlier_map().is_none_or(|earlier| earlier.epoch == self.epoch))
+        match self.earlier_map().filter(|earlier| earlier.epoch != self.epoch) {
+            Some(earlier) => earlier.tree.as_ref(),
+            None => self.tree.as_ref(),
+        }
     }
 
     /// The weight of a label: the one that was sent, or that of the nearest relative of a label that the vehicle assigned later.

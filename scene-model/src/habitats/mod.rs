@@ -135,6 +135,12 @@ impl Habitats {
         }
     }
 
+    /// What each cell looks like over all its sights, by (y, x).
+    #[must_use]
+    pub fn appearance(&self) -> Vec<((i32, i32), MeasuredValues)> {
+        self.sights.means()
+    }
+
     /// Allows at most `most` labels at one time, at least one, from the next [`Habitats::learn`] on.
     pub fn limit(&mut self, most: u32) {
         self.most = most.max(1);

@@ -109,8 +109,8 @@ section! {
         /// The labels of the map. topics: the topics of the visual words, as in the paper; habitats: cells that look alike over all
         /// their sights, in whatever order they were seen. alpha, beta and gamma are those of topics.
         labels: SceneLabels = SceneLabels::Habitats, ANY, [Auv Scenario];
-        /// Maximum number of labels at a time. 32 show more of a reef than 16 for a third more bits; choose them where the
-        /// budget allows. An order changes it during a mission where labels are habitats (2 to 32).
+        /// Maximum number of labels at a time. Habitats have no more than the sea floor calls for, and an order changes their maximum during
+        /// a mission (2 to 32). Of topics, 32 show more of a reef than 16 for a third more bits.
         max_labels: u32 = 16, range(2.0, 254.0, ""), [Auv Scenario];
         /// Words that are resampled per second of mission time.
         refine_words_per_s: u32 = 250_000, range(0.0, 1e8, "1/s"), [Auv Scenario];

@@ -3,7 +3,7 @@
 use super::contact::StoredContact;
 use super::event::StoredCells;
 use crate::label_book::LabelBook;
-use scenecast_protocol::map::{Cell, LayerDescriptor, LayerId, LayerReplica, Replica, SharedTiles};
+use scenecast_protocol::map::{Cell, LabelTree, LayerDescriptor, LayerId, LayerReplica, Replica, SharedTiles};
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::Placement;
 use std::collections::{BTreeMap, VecDeque};
@@ -35,6 +35,8 @@ pub struct EarlierMap {
     pub epoch: u8,
     /// The operator's names of its labels.
     pub names: LabelBook,
+    /// The last tree of its labels.
+    pub tree: Option<LabelTree>,
     pub map: MapCopy,
     /// The last report of its run.
     pub(crate) contact: StoredContact,

@@ -304,9 +304,9 @@ impl VehicleMemory {
         let map = std::mem::take(&mut self.map);
         let is_larger = self.earlier.as_ref().is_none_or(|earlier| map.explored() >= earlier.map.explored());
         if map.explored() > 0 && is_larger {
-            let (RunId { run, epoch, .. }, names) = (self.id, self.labels.clone());
+            let (RunId { run, epoch, .. }, names, tree) = (self.id, self.labels.clone(), self.tree());
             let contact = StoredContact { usbl: None, ..self.contact.clone() };
-            self.earlier = Some(Arc::new(EarlierMap { run, epoch, names, map, contact }));
+            self.earlier = Some(Arc::new(EarlierMap { run, epoch, names, tree, map, contact }));
         }
     }
 
@@ -319,7 +319,9 @@ impl VehicleMemory {
             all.push(VehicleEvent::Identified(id));
             all.extend(earlier.map.to_events().into_iter().map(VehicleEvent::Cells));
             all.extend(earlier.names.iter().map(named));
+            all.extend(earlier.tree.iter().map(|tree| VehicleEvent::Tree(tree.to_bytes())));
             all.extend([VehicleEvent::Contact(earlier.contact.clone()), VehicleEvent::Replaced]);
+            all.push(VehicleEvent::Tree(Vec::new()));
             let book = StoredLabel::default();
             all.extend(earlier.names.keys().map(|&label| VehicleEvent::Label { label, book: book.clone() }));
         }
@@ -370,5 +372,29 @@ impl VehicleMemory {
         let cells = self.map.explored() as u64;
         let head = [VehicleEvent::Archived { ended_us, cells }, VehicleEvent::Named(self.name.clone())];
         head.into_iter().chain(self.run_events()).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::event::StoredCells;
+    use super::*;
+
+    #[test]
+    fn an_earlier_map_keeps_the_tree_of_its_labels() {
+        let tree = |merges: &[(u8, u8)]| LabelTree::new(merges.to_vec(), None).unwrap();
+        let (first, second) = (tree(&[(1, 2), (1, 3)]), tree(&[(2, 4)]));
+        let epoch = |epoch: u8| VehicleEvent::Identified(RunId { run: epoch.into(), epoch, began_unix_ms: 0 });
+        let cells = VehicleEvent::Cells(StoredCells { layer: None, cells: vec![(3, -2, 1, 0), (1, 0, 2, 0)] });
+        let mut memory = VehicleMemory::default();
+        for event in [epoch(1), cells, VehicleEvent::Tree(first.to_bytes()), VehicleEvent::Replaced, epoch(2)] {
+            memory.apply(&event);
+        }
+        let trees = |memory: &VehicleMemory| (memory.earlier.as_ref().and_then(|map| map.tree.clone()), memory.tree());
+        assert_eq!(trees(&memory), (Some(first.clone()), None));
+        memory.apply(&VehicleEvent::Tree(second.to_bytes()));
+        let mut again = VehicleMemory::default();
+        memory.to_events().iter().for_each(|event| again.apply(event));
+        assert_eq!(trees(&again), (Some(first), Some(second)));
     }
 }

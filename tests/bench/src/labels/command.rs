@@ -20,7 +20,8 @@ const FLIGHTS: f64 = 7.0;
 /// of the vehicle under way, and below those after five minutes in which the vehicle sees nothing new. `V` is the V-measure against the
 /// true classes, of all labels and with the tree cut at 8; `orders` and `paths` are the agreement (normalised mutual information) of the
 /// maps of two orders and of two paths; `within` and `across` the shares of neighbours of one class that have one label, first seen
-/// together and far apart in time; `changed` the share of cells that change their label in five minutes, in the second half of the survey,
+/// together and far apart in time; `drift` the share of the variance between cells of one class that the time of their first sight
+/// explains; `changed` the share of cells that change their label in five minutes, in the second half of the survey,
 /// and below the share that the rest corrects; `cpu` the share of a core. Then the mutual information with the true classes, of the clear
 /// floor and of grey, turbid, dark and blurred copies, nats. A mosaic NAME.jpg has its classes in NAME_label.png. Apart from the time of
 /// the processor, the same floors give the same figures.
@@ -89,7 +90,7 @@ impl LabelsBench {
 
 fn print_head() {
     println!(
-        "{:<16} {:>6} {:>5} {:>5} {:>6} {:>5} {:>5} {:>5} {:>6} {:>6} {:>7} {:>5} {:>6} {:>6} {:>6} {:>6} {:>7}",
+        "{:<16} {:>6} {:>5} {:>5} {:>6} {:>5} {:>5} {:>5} {:>6} {:>6} {:>7} {:>5} {:>5} {:>6} {:>6} {:>6} {:>6} {:>7}",
         "floor",
         "labels",
         "V",
@@ -101,6 +102,7 @@ fn print_head() {
         "within",
         "across",
         "changed",
+        "drift",
         "cpu",
         "clear",
         "grey",
@@ -114,7 +116,8 @@ fn print_row(r: &LabelRow) {
     let sight = |name: &str| nats(r.sights.get(name).copied());
     print_map(&r.site, &r.under_way, r.relabelled);
     println!(
-        " {:>5.3} {:>6} {:>6} {:>6} {:>6} {:>7}",
+        " {:>5} {:>5.3} {:>6} {:>6} {:>6} {:>6} {:>7}",
+        nats(r.drift),
         r.cpu,
         sight("clear"),
         sight("grey"),

@@ -1,9 +1,10 @@
 //! A virtual camera over a floor, and the map of habitats that it gives.
 
+use super::drift::drift;
 use super::site::{CELL_M, CELL_PX, Site};
 use crate::cpu_meter::CpuMeter;
 use image::RgbImage;
-use scene_model::habitats::{Habitats, LabelTree, measure};
+use scene_model::habitats::{Habitats, LabelTree, MeasuredValues, measure};
 use scene_model::project::{DownCamera, Pose};
 use scenecast_scoring::TimedCell;
 use std::collections::BTreeMap;
@@ -14,6 +15,8 @@ const STEP: (u32, u32) = (100, 380);
 /// Time between two frames, and for the turn between two lines, seconds.
 const INTERVAL_S: f64 = 2.0;
 const TURN_S: f64 = 60.0;
+/// Cells that are seen in so many first frames are seen early.
+const EARLY_FRAMES: usize = 48;
 /// Frames that are taken in five minutes.
 const FIVE_MINUTES: usize = 150;
 /// Frames at the end of a flight that show nothing new, so that the map is corrected.
@@ -42,6 +45,10 @@ pub struct Flight {
     pub(super) under_way: Labelled,
     pub(super) rested: Labelled,
     first_seen_s: BTreeMap<(i32, i32), f64>,
+    /// What each cell looks like over all its sights, by (y, x).
+    appearance: Vec<((i32, i32), MeasuredValues)>,
+    /// When the first frames are over.
+    early_s: f64,
     pub(super) relabelled: f64,
     pub(super) cpu: f64,
 }
@@ -55,6 +62,7 @@ impl Flight {
         let (mut maps, mut relabelled) = (Vec::<BTreeMap<(i32, i32), u32>>::new(), Vec::new());
         let size = (FRAME.0.min(image.width()), FRAME.1.min(image.height()));
         let (corners, in_line) = corners(image.dimensions(), size, path);
+        let time_of = |index: usize| index as f64 * INTERVAL_S + (index / in_line) as f64 * TURN_S;
         let meter = CpuMeter::start();
         for (index, &(left, top)) in corners.iter().enumerate() {
             let frame = image::imageops::crop_imm(image, left, top, size.0, size.1).to_image();
@@ -65,7 +73,7 @@ impl Flight {
             habitats.add(size, &points, &places, CELL_M);
             habitats.update();
             let map = cells(&habitats);
-            let time_s = index as f64 * INTERVAL_S + (index / in_line) as f64 * TURN_S;
+            let time_s = time_of(index);
             for &place in map.keys() {
                 first_seen_s.entry(place).or_insert(time_s);
             }
@@ -83,7 +91,8 @@ impl Flight {
         }
         let late = &relabelled[relabelled.len() / 2..];
         let relabelled = late.iter().fold(0.0, |sum, share| sum + share) / late.len().max(1) as f64;
-        Self { under_way, rested: Labelled::of(&habitats, site), first_seen_s, relabelled, cpu }
+        let (appearance, early_s) = (habitats.appearance(), time_of(EARLY_FRAMES));
+        Self { under_way, rested: Labelled::of(&habitats, site), first_seen_s, appearance, early_s, relabelled, cpu }
     }
 
     /// The share of cells whose label the rest has corrected.
@@ -91,6 +100,15 @@ impl Flight {
         let (before, after) = (&self.under_way.cells, &self.rested.cells);
         after.iter().filter(|(place, label)| before.get(place) != Some(label)).count() as f64
             / after.len().max(1) as f64
+    }
+
+    /// How far cells of a class look different because they were seen in the first frames.
+    pub(super) fn drift(&self, class: impl Fn((i32, i32)) -> Option<u32>) -> Option<f64> {
+        let seen = |&((y, x), values): &((i32, i32), MeasuredValues)| {
+            let is_early = *self.first_seen_s.get(&(x, y))? < self.early_s;
+            Some((class((x, y))?, is_early, values))
+        };
+        drift(self.appearance.iter().filter_map(seen))
     }
 
     /// The cells of a map that are of a known class.

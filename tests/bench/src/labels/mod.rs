@@ -1,6 +1,7 @@
 //! Whether one habitat has one label: whenever, in whatever order and on whichever path it was seen.
 
 mod command;
+mod drift;
 mod flight;
 mod picture;
 mod site;
@@ -20,6 +21,8 @@ pub struct LabelRow {
     /// When all has been seen, and after a rest, in which the map is corrected.
     pub under_way: MapFigures,
     pub rested: MapFigures,
+    /// Share of the variance between cells of one class that the time of their first sight explains.
+    pub drift: Option<f64>,
     /// Share of the cells of five minutes before that have another label, mean over the second half of the survey.
     pub relabelled: f64,
     /// Share of the cells whose label the rest corrects.
@@ -93,6 +96,7 @@ pub fn measure(site: &Site, progress: &mut dyn FnMut()) -> (LabelRow, [Flight; 3
         site: site.name.clone(),
         under_way: MapFigures::of(site, &flights, |flight| &flight.under_way),
         rested: MapFigures::of(site, &flights, |flight| &flight.rested),
+        drift: flights[0].drift(|place| site.class(place)),
         relabelled: flights[0].relabelled,
         corrected: flights[0].corrected(),
         cpu: flights[0].cpu,

@@ -161,7 +161,17 @@ fn print_json(report: &impl Serialize) -> Result<(), UserError> {
 impl ScoreReport {
     fn print(&self) {
         outln!("K {}, {} sweeps, mean of {} seeds, nats", self.max_labels, self.sweeps, self.seeds);
-        outln!("{:<20} {:<20} {:>6} {:>6} {:>6} {:>6} {:>7}", "scene", "method", "MI", "NMI", "V", "null", "excess");
+        outln!(
+            "{:<20} {:<20} {:>6} {:>6} {:>6} {:>6} {:>6} {:>7}",
+            "scene",
+            "method",
+            "MI",
+            "NMI",
+            "V",
+            "V at 8",
+            "null",
+            "excess"
+        );
         for scene in &self.scenes {
             print_methods(&scene.scene, &scene.methods);
         }
@@ -178,11 +188,12 @@ impl ScoreReport {
 fn print_methods(scene: &str, methods: &BTreeMap<&'static str, MeanScore>) {
     for (row, (method, score)) in methods.iter().enumerate() {
         outln!(
-            "{:<20} {method:<20} {:>6.3} {:>6.3} {:>6.3} {:>6.3} {:>7.3}",
+            "{:<20} {method:<20} {:>6.3} {:>6.3} {:>6.3} {:>6} {:>6.3} {:>7.3}",
             if row == 0 { scene } else { "" },
             score.mutual_information_nats,
             score.normalised_mutual_information,
             score.v_measure,
+            score.v_measure_at_8.map_or_else(|| "-".to_owned(), |v| format!("{v:.3}")),
             score.null_mutual_information_nats,
             score.excess_nats
         );

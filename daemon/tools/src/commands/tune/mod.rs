@@ -12,7 +12,7 @@ use measure::{mean, measure};
 use scenecast_config::Config;
 use scenecast_core::tuning_table::{Measurement, Row, Setting, TuningTable, least, most};
 use scenecast_core::{UserError, errln, label_picture, outln};
-use scenecast_files::write_whole;
+use scenecast_files::{read_image, write_whole};
 use scenecast_protocol::map::LabelGrid;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -144,10 +144,14 @@ impl Tune {
         Ok(())
     }
 
-    /// Writes the map of the first sea floor.
-    fn draw(&self, setting: &Setting, maps: &[LabelGrid]) -> Result<(), UserError> {
+    /// The picture of the map of the first sea floor.
+    fn picture(&self, setting: &Setting) -> PathBuf {
         let name = setting.to_string().replace(", ", "_").replace([' ', '/'], "-");
-        let path = self.out.join("maps").join(format!("{name}.png"));
+        self.out.join("maps").join(format!("{name}.png"))
+    }
+
+    fn draw(&self, setting: &Setting, maps: &[LabelGrid]) -> Result<(), UserError> {
+        let path = self.picture(setting);
         let Some(map) = maps.first() else { return Ok(()) };
         let picture = label_picture::encode(map).map_err(|e| UserError::Failed(format!("{}: {e}", path.display())))?;
         write_whole(&path, &picture)
@@ -155,7 +159,9 @@ impl Tune {
 
     fn conclude(&self, config: &Config, rows: &[Row], budget_bps: f64) -> Result<(), UserError> {
         let best = most(rows.iter().filter(|row| row.measurement.stream_bps <= budget_bps));
-        let plot = plot::Plot::new(rows, best);
+        let examples = plot::Plot::front_examples(rows).into_iter().filter(|row| self.picture(&row.setting).is_file());
+        let examples = examples.map(|row| Ok((row, read_image(&self.picture(&row.setting))?.to_rgb8())));
+        let plot = plot::Plot::new(rows, best).with_examples(examples.collect::<Result<_, UserError>>()?);
         write_whole(&self.out.join("tuning.svg"), plot.svg()?.as_bytes())?;
         write_whole(&self.out.join("tuning.png"), &plot.png()?)?;
         let path = self.out.join("best.toml");

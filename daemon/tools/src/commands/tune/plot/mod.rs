@@ -1,8 +1,9 @@
 //! The paper's scatter plot: mutual information of the map, with the mosaic's colours and with
-//! the annotations, against its bytes.
+//! the annotations, against its bytes; and below it example maps from the Pareto front.
 
 mod raster;
 
+use image::RgbImage;
 use plotters::prelude::*;
 use raster::Raster;
 use scenecast_core::UserError;
@@ -10,7 +11,11 @@ use scenecast_core::tuning_table::{Measurement, Row, Setting};
 use std::ops::Range;
 
 const WIDTH: u32 = 1240;
-const HEIGHT: u32 = 620;
+const SCATTER_HEIGHT: u32 = 620;
+const EXAMPLE_HEIGHT: u32 = 380;
+const HEIGHT: u32 = SCATTER_HEIGHT + EXAMPLE_HEIGHT;
+/// Example maps.
+pub const EXAMPLES: usize = 3;
 const LEGEND_WIDTH: u32 = 220;
 /// Height of a line of the legend, pixels.
 const LEGEND_LINE: i32 = 26;
@@ -37,6 +42,8 @@ type Area<Db> = DrawingArea<Db, plotters::coord::Shift>;
 pub struct Plot<'a> {
     rows: &'a [Row],
     best: Option<&'a Row>,
+    /// The maps of some rows, of the first sea floor, a pixel a cell.
+    examples: Vec<(&'a Row, RgbImage)>,
     /// What the colours stand for: alpha, or where labels are habitats their number.
     series: Vec<f64>,
 }
@@ -50,7 +57,21 @@ impl<'a> Plot<'a> {
         let mut all: Vec<f64> = rows.iter().map(|row| series(&row.setting)).collect();
         all.sort_by(|a, b| b.total_cmp(a));
         all.dedup();
-        Self { rows, best, series: all }
+        Self { rows, best, examples: Vec::new(), series: all }
+    }
+
+    /// The smallest map of the Pareto front of the annotations, one in the middle and the largest.
+    pub fn front_examples(rows: &'a [Row]) -> Vec<&'a Row> {
+        let front = front(rows, |row| row.measurement.mutual_information_nats);
+        let last = front.len().saturating_sub(1);
+        let mut indices: Vec<usize> = (0..EXAMPLES).map(|i| i * last / (EXAMPLES - 1)).collect();
+        indices.dedup();
+        indices.into_iter().filter_map(|index| front.get(index).copied()).collect()
+    }
+
+    /// Draws these maps below.
+    pub fn with_examples(self, examples: Vec<(&'a Row, RgbImage)>) -> Self {
+        Self { examples, ..self }
     }
 
     pub fn svg(&self) -> Result<String, UserError> {
@@ -68,11 +89,15 @@ impl<'a> Plot<'a> {
     fn draw<Db: DrawingBackend>(&self, backend: Db) -> Drawn<Db> {
         let root = backend.into_drawing_area();
         root.fill(&WHITE)?;
-        let (panels, legend) = root.split_horizontally(WIDTH - LEGEND_WIDTH);
+        let (scatter, below) = root.split_vertically(SCATTER_HEIGHT);
+        let (panels, legend) = scatter.split_horizontally(WIDTH - LEGEND_WIDTH);
         let (mosaic, annotations) = panels.split_horizontally((WIDTH - LEGEND_WIDTH) / 2);
         self.panel(&mosaic, "MI with the mosaic's colours, nats", |m| m.mosaic_mutual_information_nats)?;
         self.panel(&annotations, "MI with the annotations, nats", |m| m.mutual_information_nats)?;
         self.legend(&legend)?;
+        for (area, (row, map)) in below.split_evenly((1, EXAMPLES)).iter().zip(&self.examples) {
+            example(area, row, map)?;
+        }
         root.present()
     }
 
@@ -150,6 +175,34 @@ impl<'a> Plot<'a> {
     }
 }
 
+/// A map under its setting; equal neighbours of a row are one rectangle.
+fn example<Db: DrawingBackend>(area: &Area<Db>, row: &Row, map: &RgbImage) -> Drawn<Db> {
+    let Row { setting, measurement, .. } = row;
+    let labels = match setting.is_of_habitats() {
+        true => format!("{} labels", setting.max_labels),
+        false => format!("alpha {}", setting.alpha),
+    };
+    let title = format!("{labels}: {:.2} nats, {} bytes", measurement.mutual_information_nats, measurement.map_bytes);
+    area.draw(&Text::new(title, (16, 8), FONT.into_font().color(&INK)))?;
+    let (wide, high) = area.dim_in_pixel();
+    let (columns, rows) = map.dimensions();
+    let scale = (f64::from(wide - 32) / f64::from(columns)).min(f64::from(high - 56) / f64::from(rows));
+    let at = |column: u32, row: u32| {
+        (16 + (f64::from(column) * scale).round() as i32, 40 + (f64::from(row) * scale).round() as i32)
+    };
+    for (row, pixels) in (0..).zip(map.rows()) {
+        let pixels: Vec<_> = pixels.collect();
+        let mut column = 0;
+        for run in pixels.chunk_by(|a, b| a == b) {
+            let [red, green, blue] = run[0].0;
+            let corners = [at(column, row), at(column + run.len() as u32, row + 1)];
+            area.draw(&Rectangle::new(corners, RGBColor(red, green, blue).filled()))?;
+            column += run.len() as u32;
+        }
+    }
+    Ok(())
+}
+
 fn failed(error: impl std::fmt::Display) -> UserError {
     UserError::Failed(error.to_string())
 }
@@ -219,6 +272,21 @@ mod tests {
         assert_eq!(svg.matches("r=\"5\"").count(), 2 * rows.len() + plot.series.len());
         let png = image::load_from_memory(&plot.png().unwrap()).unwrap();
         assert_eq!((png.width(), png.height()), (WIDTH, HEIGHT));
+    }
+
+    #[test]
+    fn example_maps_of_the_front_are_drawn_below_it() {
+        let rows = rows();
+        let map = RgbImage::from_fn(6, 4, |x, _| image::Rgb([if x < 3 { 9 } else { 250 }, 100, 7]));
+        let examples: Vec<_> = Plot::front_examples(&rows).into_iter().map(|row| (row, map.clone())).collect();
+        let bytes: Vec<usize> = examples.iter().map(|(row, _)| row.measurement.map_bytes).collect();
+        assert_eq!(bytes, [500, 900, 1500]);
+        let plot = Plot::new(&rows, rows.first()).with_examples(examples);
+        assert_eq!(plot.svg().unwrap().matches("fill=\"#096407\"").count(), 3 * 4);
+        let png = image::load_from_memory(&plot.png().unwrap()).unwrap().to_rgb8();
+        let is_left = |&(_, y, pixel): &(u32, u32, &image::Rgb<u8>)| y > SCATTER_HEIGHT && pixel.0 == [9, 100, 7];
+        assert!(png.enumerate_pixels().filter(is_left).count() > 3 * 100 * 100);
+        assert!(Plot::front_examples(&rows[..1]).len() == 1 && Plot::front_examples(&[]).is_empty());
     }
 
     #[test]
