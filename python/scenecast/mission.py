@@ -21,6 +21,18 @@ def _record(path):
     return None if path is None else path if isinstance(path, Record) else Record(path)
 
 
+def _both(folder):
+    """The records of surface and vehicle in a folder, as `sim` and `demo` make it; the folder itself if it is one record."""
+    if not folder.is_dir() or any(folder.glob("*.mcap")):
+        return folder, None
+    found = sorted(part for part in folder.iterdir() if part.is_dir() and any(part.glob("*.mcap")))
+    surfaces = [part for part in found if part.name == "record_surface" or part.name.startswith("surface-")]
+    vehicles = [part for part in found if part not in surfaces]
+    if len(surfaces) > 1 or len(vehicles) > 1:
+        raise ValueError(f"{folder} has several records of one end: give those of one mission")
+    return next(iter(surfaces), None), next(iter(vehicles), None)
+
+
 def _in_force(changes):
     """Columns, rows and values of the known cells after some changes: the last one of each cell is in force."""
     x, y, value = (np.concatenate(arrays) for arrays in zip(*changes)) if changes else (np.zeros(0, "i4"),) * 3
@@ -48,9 +60,7 @@ class Mission:
     def open(cls, surface=None, vehicle=None, name=None):
         """Opens one or two records, or a folder with both; `name` selects one of several vehicles."""
         if surface is not None and vehicle is None and not isinstance(surface, Record):
-            both = [Path(surface) / part for part in ("record_surface", "record_vehicle")]
-            if any(folder.is_dir() for folder in both):
-                surface, vehicle = (folder if folder.is_dir() else None for folder in both)
+            surface, vehicle = _both(Path(surface))
         return cls(_record(surface), _record(vehicle), name)
 
     def __init__(self, surface, vehicle, name=None):

@@ -17,7 +17,7 @@ UNKNOWN = (1 << 64) - 1
 
 
 class DamagedRecord(UserWarning):
-    """A file of a record ends early or is damaged; what is before the damage is read."""
+    """A file of a record ends early or is damaged; what is before and after the damage is read."""
 
 
 def _text(data, at):
@@ -68,13 +68,17 @@ class Record:
             self._channels, self._schemas = {}, {}
             try:
                 with file.open("rb") as opened:
-                    self._read(file, opened)
+                    damage = self._read(file, opened)
+                if damage:
+                    warnings.warn(f"{file}: {len(damage)} chunks are left out: {damage[0]}", DamagedRecord, stacklevel=3)
             except (ValueError, KeyError, struct.error, zstandard.ZstdError) as error:
                 warnings.warn(f"{file}: read as far as it is whole: {error}", DamagedRecord, stacklevel=3)
         times = [time for entries in self.index.values() for time, *_ in entries]
         self.begin, self.end = (min(times), max(times)) if times else (float("nan"), float("nan"))
 
     def _read(self, file, opened):
+        """Finds the messages of a file, and returns what is wrong with the chunks that are left out."""
+        damage = []
         if opened.read(8) != MAGIC:
             raise ValueError("it is no MCAP file")
         while True:
@@ -83,7 +87,7 @@ class Record:
                 raise ValueError("its end is missing")
             kind, size = struct.unpack("<BQ", head)
             if kind == DATA_END:
-                return
+                return damage
             if kind == CHUNK and size == UNKNOWN:
                 raise ValueError("its last part is not finished: the mission runs, or the recorder was cut off")
             if not 0 < kind < 128 or size > LARGEST:
@@ -93,7 +97,10 @@ class Record:
                 raise ValueError("its last part is cut")
             if kind in (SCHEMA, CHANNEL, MESSAGE, CHUNK):
                 self._blocks.append((file, at, 9 + size, kind == CHUNK))
-                self._find(_unpack(body) if kind == CHUNK else head + body)
+                try:
+                    self._find(_unpack(body) if kind == CHUNK else head + body)
+                except (ValueError, KeyError, struct.error, zstandard.ZstdError) as error:
+                    damage.append(error)
 
     def _find(self, data):
         found = []
@@ -110,8 +117,9 @@ class Record:
             elif kind == MESSAGE:
                 nanos, = struct.unpack_from("<Q", data, at + 6)
                 entry = nanos / 1e9, len(self._blocks) - 1, at + 22, size - 22
-                found.append((self._channels[data[at:at + 2]], entry))
-        for topic, entry in found:
+                # The chunk that described the channel may be one that is left out.
+                found.append((self._channels.get(data[at:at + 2]), entry))
+        for topic, entry in (pair for pair in found if pair[0]):
             self.index.setdefault(topic, []).append(entry)
 
     def _block(self, number):

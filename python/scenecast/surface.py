@@ -20,7 +20,7 @@ from .mission import LINK, TRACK, VERSION, part_of
 REMEDY = {401: "give the token: open_surface(url, token=...)",
           403: "the address must be one that the surface knows, and the role of the token must allow it",
           404: "the surface is of another version than 2 of the interface, or it has no such vehicle, label or image"}
-FILES = ("utm.tif", "wgs84.tif", "tif", "geojson", "labels.csv", "csv", "ply")
+FILES = ("utm.tif", "wgs84.tif", "tif", "png", "geojson", "coco.json", "taglab.json", "labels.csv", "csv", "ply")
 TILE = 64
 NAN = float("nan")
 

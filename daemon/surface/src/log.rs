@@ -122,7 +122,7 @@ impl MissionLog {
     fn push(&mut self, entry: LogEntry) {
         self.last = entry.number;
         self.entries.push_back(entry);
-        make_room(&mut self.entries, |entry| (entry.kind as u8, entry.by.as_deref()));
+        make_room(&mut self.entries, LogEntry::group);
     }
 
     /// Puts the entries of an earlier run of the surface back, before any other entry.
@@ -131,18 +131,31 @@ impl MissionLog {
     }
 }
 
-/// Removes entries while there are too many: the oldest of the group of one kind and one author that has most of them. While minor kinds
-/// are more than a quarter, the group is one of theirs.
-pub(super) fn make_room<T>(entries: &mut VecDeque<T>, group: impl Fn(&T) -> (u8, Option<&str>)) {
+/// The kind of an entry, its author, and the first word of its text, which names what was ordered.
+type Group<'a> = (u8, Option<&'a str>, &'a str);
+
+fn subject(text: &str) -> &str {
+    text.split([':', ' ']).next().unwrap_or_default()
+}
+
+/// Removes entries while there are too many: the oldest of the largest group. While minor kinds are more than a quarter, the group is
+/// one of theirs. So no number of weights pushes a hold out.
+pub(super) fn make_room<T>(entries: &mut VecDeque<T>, group: impl Fn(&T) -> Group<'_>) {
     let is_minor = |kind: u8| LogKind::ALL.into_iter().any(|known| known as u8 == kind && known.is_minor());
     while entries.len() > MAX_LOG {
         let minor = entries.iter().filter(|entry| is_minor(group(entry).0)).count();
         let may_go = |entry: &&T| minor <= MAX_LOG / 4 || is_minor(group(entry).0);
-        let mut groups: BTreeMap<(u8, Option<&str>), usize> = BTreeMap::new();
+        let mut groups: BTreeMap<Group<'_>, usize> = BTreeMap::new();
         entries.iter().filter(may_go).for_each(|entry| *groups.entry(group(entry)).or_default() += 1);
         let largest = groups.into_iter().max_by_key(|(_, count)| *count).map(|(group, _)| group);
         let oldest = entries.iter().position(|entry| Some(group(entry)) == largest);
         entries.remove(oldest.unwrap_or(0));
+    }
+}
+
+impl LogEntry {
+    fn group(&self) -> Group<'_> {
+        (self.kind as u8, self.by.as_deref(), subject(&self.text))
     }
 }
 
@@ -160,9 +173,8 @@ impl From<&LogEntry> for StoredLogEntry {
 }
 
 impl StoredLogEntry {
-    /// Its kind and its author, as [`make_room`] takes them.
-    pub(super) fn group(&self) -> (u8, Option<&str>) {
-        (self.kind, self.by.as_deref())
+    pub(super) fn group(&self) -> Group<'_> {
+        (self.kind, self.by.as_deref(), subject(&self.text))
     }
 
     /// `None` if this build does not know the kind.
@@ -216,6 +228,20 @@ mod tests {
         let texts: Vec<&str> = log.entries().map(|entry| entry.text.as_str()).collect();
         assert_eq!((texts.len(), texts[0], texts[1]), (MissionLog::MAX, "fence: 4 corners", "it holds"));
         assert!(texts.contains(&"hold 2999"));
+    }
+
+    #[test]
+    fn weights_push_no_hold_of_the_same_author_out() {
+        let mut log = MissionLog::default();
+        let mut add = |kind, by, text: &str| log.add(Address::vehicle(1), kind, by, text, Instant::ZERO);
+        add(LogKind::Order, Some("anna"), "hold");
+        add(LogKind::Answer, None, "hold version 1 applied");
+        for number in 0..3000 {
+            add(LogKind::Order, Some("anna"), &format!("weights: label {} +0.50", number % 254));
+            add(LogKind::Answer, None, &format!("utility version {number} applied"));
+        }
+        let texts: Vec<&str> = log.entries().map(|entry| entry.text.as_str()).take(2).collect();
+        assert_eq!(texts, ["hold", "hold version 1 applied"]);
     }
 
     #[test]

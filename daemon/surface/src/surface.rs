@@ -322,7 +322,10 @@ impl Surface {
                 Some(SurfaceOutput::KeyChanged(vehicle))
             }
             SurfaceEvent::RunEnded(vehicle) => Some(SurfaceOutput::RunEnded(vehicle)),
-            SurfaceEvent::Mismatch(vehicle, mismatch) => Some(SurfaceOutput::Mismatch(vehicle, mismatch)),
+            SurfaceEvent::Mismatch(vehicle, mismatch) => {
+                self.log_fact(vehicle, LogKind::Fault, &mismatch.to_string(), now);
+                Some(SurfaceOutput::Mismatch(vehicle, mismatch))
+            }
             SurfaceEvent::SlotDecided(vehicle, slot) => {
                 let decided = self.link.vehicle(vehicle)?.slots().find(|s| s.id == slot)?;
                 let (status, version) = (decided.status, decided.version);

@@ -43,6 +43,8 @@ pub struct SlotOutbox {
     was_on_air: [bool; SLOTS],
     /// Whether a report has come in since the run began.
     has_report: bool,
+    /// Whether each slot was applied in an earlier run, until the vehicle has reported on it in this one.
+    was_applied: [bool; SLOTS],
     /// Whether a report of this run has said that another surface's order of the slot is newer.
     is_overtaken: [bool; SLOTS],
     /// When the vehicle refused this surface for another one last.
@@ -63,8 +65,10 @@ impl SlotOutbox {
     /// Versions that are left out after a restart: an order whose record was lost may have used one of them.
     const RESTART_GAP: u16 = 64;
 
-    /// Age up to which a hold or an abort goes out before the vehicle has reported which orders of others it has.
+    /// Age up to which a hold or an abort is obeyed although another surface may have given a newer order: to stop is safe. One
+    /// that was as young when the vehicle refused this surface for another one has the time that taking over may need.
     const PROMPT: Duration = Duration::from_secs(20);
+    const PROMPT_AGAINST_HOLDER: Duration = Duration::from_secs(60);
 
     /// Age from which a hold or an abort no longer takes a vehicle over by itself.
     const STOP_LIFETIME: Duration = Duration::from_secs(120);
@@ -79,6 +83,7 @@ impl SlotOutbox {
             has_acknowledged: false,
             was_on_air: [false; SLOTS],
             has_report: false,
+            was_applied: [false; SLOTS],
             is_overtaken: [false; SLOTS],
             refused: None,
             abort_lifetime: None,
@@ -105,6 +110,9 @@ impl SlotOutbox {
         for order in orders {
             self.is_forgotten |= is_forgotten(order.status);
             self.has_acknowledged |= !matches!(order.status, OrderStatus::Queued | OrderStatus::OnAir);
+            if let Some(was_applied) = self.was_applied.get_mut(order.id.index()) {
+                *was_applied = order.status == OrderStatus::Applied;
+            }
             if let Some(was_on_air) = self.was_on_air.get_mut(order.id.index()) {
                 *was_on_air = matches!(order.status, OrderStatus::OnAir | OrderStatus::Received);
             }
@@ -192,10 +200,14 @@ impl SlotOutbox {
         }
     }
 
-    /// Takes the decisions in the vehicle's report; returns the slots that are newly applied or refused.
+    /// Takes the decisions in the vehicle's report; returns the slots that are newly applied, refused or withdrawn.
     pub fn handle_report(&mut self, reports: &[SlotReport; SLOTS], now: Instant) -> Vec<SlotId> {
         let mut decided = Vec::new();
         for (id, report) in SlotId::ALL.into_iter().zip(reports) {
+            if self.handle_older_memory(id, report, now) {
+                decided.push(id);
+                continue;
+            }
             if report.state == SlotState::Refused(RefusalReason::Overtaken) {
                 decided.extend(self.handle_overtaken(id, now).then_some(id));
                 continue;
@@ -221,6 +233,27 @@ impl SlotOutbox {
         decided
     }
 
+    /// A vehicle that has decided about an older version than the one that it had applied before has the memory of an earlier
+    /// time, such as a copy of its folder: that order is lost. Returns whether it is.
+    fn handle_older_memory(&mut self, id: SlotId, report: &SlotReport, now: Instant) -> bool {
+        let decided = matches!(report.state, SlotState::Applied | SlotState::Refused(_));
+        let is_own = report.state != SlotState::Refused(RefusalReason::Overtaken);
+        let Some(was_applied) = self.was_applied.get_mut(id.index()).filter(|_| report.state != SlotState::Pending)
+        else {
+            return false;
+        };
+        let was_applied = std::mem::take(was_applied);
+        let Some(Some(order)) = self.slots.get_mut(id.index()) else { return false };
+        let is_older = (1..128).contains(&(order.version as u8).wrapping_sub(report.version_low));
+        let is_lost =
+            was_applied && decided && is_own && is_older && order.status == OrderStatus::Applied && !is_given_anew(id);
+        if is_lost {
+            (order.status, order.changed) = (OrderStatus::Withdrawn(Withdrawal::Lost), now);
+            self.is_forgotten = true;
+        }
+        is_lost
+    }
+
     /// The vehicle has no record of this series: if it has acknowledged any order before, every one that it may have received
     /// is withdrawn. Fixes and requests grow old soon, and are given anew anyway. Returns the withdrawn slots.
     pub fn handle_lost_memory(&mut self, now: Instant) -> Vec<SlotId> {
@@ -229,8 +262,7 @@ impl SlotOutbox {
             return lost;
         }
         for (order, was_on_air) in self.slots.iter_mut().zip(&mut self.was_on_air) {
-            let is_given_anew = |order: &&mut SlotProgress| matches!(order.id, SlotId::Fix | SlotId::Requests);
-            let Some(order) = order.as_mut().filter(|order| !is_given_anew(order)) else { continue };
+            let Some(order) = order.as_mut().filter(|order| !is_given_anew(order.id)) else { continue };
             let was_known = matches!(order.status, OrderStatus::OnAir | OrderStatus::Received | OrderStatus::Applied);
             let was_sent = order.status == OrderStatus::Queued && std::mem::take(was_on_air);
             if was_known || was_sent {
@@ -277,9 +309,8 @@ impl SlotOutbox {
     /// The newest order of a slot in force is another surface's. One of ours that the vehicle has not decided about was given
     /// before this surface knew that. Returns whether it is withdrawn.
     fn handle_overtaken(&mut self, id: SlotId, now: Instant) -> bool {
-        // A stop that the operator has just given although he knew of the other surface is obeyed.
         let is_obeyed = |order: &SlotProgress| order.id == id && order.slot.stops() && self.is_prompt(order, now);
-        let is_given_against = self.refused.is_some() && self.progress().any(is_obeyed);
+        let is_prompt_stop = self.progress().any(is_obeyed);
         let Some(is_known) = self.is_overtaken.get_mut(id.index()) else { return false };
         let is_known = std::mem::replace(is_known, true);
         let Some(order) = self.slots.get_mut(id.index()).and_then(Option::as_mut).filter(|_| self.is_keyed) else {
@@ -287,7 +318,7 @@ impl SlotOutbox {
         };
         let withdrawal = match order.status {
             OrderStatus::Applied => Withdrawal::Superseded,
-            status if status.is_pending() && !is_known && !is_given_against => Withdrawal::Overtaken,
+            status if status.is_pending() && !is_known && !is_prompt_stop => Withdrawal::Overtaken,
             _ => return false,
         };
         (order.status, order.changed) = (OrderStatus::Withdrawn(withdrawal), now);
@@ -300,9 +331,11 @@ impl SlotOutbox {
         !self.is_keyed || !order.slot.stops() || self.has_report || self.is_prompt(order, now)
     }
 
-    /// Whether the operator has just given an order, and could know of another surface that holds the vehicle.
+    /// Whether the operator has just given an order.
     fn is_prompt(&self, order: &SlotProgress, now: Instant) -> bool {
-        now.since(order.issued) < Self::PROMPT && self.refused.is_none_or(|at| order.issued > at)
+        let is_against_holder = self.refused.is_some_and(|at| at.since(order.issued) < Self::PROMPT);
+        let most = if is_against_holder { Self::PROMPT_AGAINST_HOLDER } else { Self::PROMPT };
+        now.since(order.issued) < most
     }
 
     /// The vehicle has refused this surface for another one.
@@ -339,8 +372,11 @@ impl SlotOutbox {
     /// Queues again each order that a restarted vehicle is not known to have in force.
     pub fn handle_peer_restart(&mut self, now: Instant) {
         (self.has_report, self.is_overtaken) = (false, [false; SLOTS]);
-        for (slot, was_on_air) in self.slots.iter_mut().zip(&mut self.was_on_air) {
+        for ((slot, was_on_air), was_applied) in
+            self.slots.iter_mut().zip(&mut self.was_on_air).zip(&mut self.was_applied)
+        {
             let Some(slot) = slot else { continue };
+            *was_applied = slot.status == OrderStatus::Applied;
             if matches!(slot.status, OrderStatus::OnAir | OrderStatus::Received) {
                 (slot.status, slot.changed, slot.sent) = (OrderStatus::Queued, now, None);
                 *was_on_air = true;
@@ -403,6 +439,11 @@ fn is_pending(order: &SlotProgress) -> bool {
         OrderStatus::Received => order.sent.is_none(),
         OrderStatus::Applied | OrderStatus::Refused(_) | OrderStatus::Withdrawn(_) => false,
     }
+}
+
+/// Whether orders of a kind grow old soon, so that they are given anew anyway.
+fn is_given_anew(id: SlotId) -> bool {
+    matches!(id, SlotId::Fix | SlotId::Requests)
 }
 
 /// Whether an order only lifts a hold or an abort.

@@ -25,11 +25,13 @@ pub(crate) struct EndsSetup {
     pub(crate) authenticity: Option<Authenticity>,
     /// The longest time between two discovery calls; `None`: there are none.
     pub(crate) discovery: Option<Duration>,
+    /// Age after which an abort that has not arrived is withdrawn; `None`: it never is.
+    pub(crate) abort_lifetime: Option<Duration>,
 }
 
 impl EndsSetup {
     pub(crate) fn new(access: Access) -> Self {
-        Self { access, authenticity: None, discovery: None }
+        Self { access, authenticity: None, discovery: None, abort_lifetime: None }
     }
 
     /// Both ends with a key.
@@ -60,6 +62,7 @@ impl EndsSetup {
         let config = SurfaceConfig {
             vehicles: vec![auv()],
             discovery_period: self.discovery,
+            abort_lifetime: self.abort_lifetime,
             authenticity: self.authenticity.clone(),
             ..SurfaceConfig::new(MISSION, self.modem(), BUDGET_BPS)
         };

@@ -43,6 +43,9 @@ fn vehicle(out: &mut String, v: &VehicleState, state: &MissionState) {
     let received = v.last_received_s.map_or("no frame yet".to_owned(), |at| format!("received {} ago", span(now - at)));
     let expected = format!("a frame is expected within {}", span(v.expected_interval_s));
     let _ = writeln!(out, "\nvehicle {} {}  {received}, {expected}{silent}", v.id, v.name);
+    if let Some(mismatch) = &v.link.mismatch {
+        let _ = writeln!(out, "  mismatch   {mismatch}");
+    }
     if let Some(other) = &v.other_surface {
         let name = if other.name.is_empty() { "another surface".to_owned() } else { format!("surface {}", other.name) };
         let does = if other.holds { "HOLDS THE VEHICLE" } else { "calls the vehicle" };

@@ -1,5 +1,6 @@
 //! A map in shared tiles, its cells one by one, and its form in JSON.
 
+use crate::state::ReplaySide;
 use crate::state::{LayerBody, MapBody, VehicleMarker};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
@@ -51,18 +52,30 @@ pub struct MapCaption {
     pub name: String,
     /// The moment of the map in UTC, as in RFC 3339.
     pub utc: String,
+    /// Whose knowledge it is; a surface has that of the operator.
+    pub side: ReplaySide,
 }
 
 impl MapCaption {
     /// What it says, by key.
-    pub(super) fn facts(&self) -> [(&'static str, String); 3] {
-        [("vehicle", self.address.to_string()), ("vehicle_name", self.name.clone()), ("utc", self.utc.clone())]
+    pub(super) fn facts(&self) -> [(&'static str, String); 4] {
+        [
+            ("vehicle", self.address.to_string()),
+            ("vehicle_name", self.name.clone()),
+            ("utc", self.utc.clone()),
+            ("known_by", self.side.name().to_owned()),
+        ]
     }
 
     /// The same in words, on one line.
     pub(super) fn title(&self) -> String {
         let name = if self.name.is_empty() { String::new() } else { format!(" ({})", self.name) };
-        let title = format!("scenecast map of vehicle {}{name} at {}", self.address, self.utc);
+        let what = match self.side {
+            ReplaySide::Operator => "scenecast map",
+            ReplaySide::Vehicle => "scenecast map as the vehicle knew it,",
+            ReplaySide::Difference => "cells that differ between the maps of operator and vehicle,",
+        };
+        let title = format!("{what} of vehicle {}{name} at {}", self.address, self.utc);
         title.replace(char::is_control, " ")
     }
 }

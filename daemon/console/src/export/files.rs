@@ -123,6 +123,7 @@ pub(super) fn geojson(cells: &MapCells, origin: Option<Origin>) -> String {
     if let Some(caption) = &cells.caption {
         (facts["vehicle"], facts["vehicle_name"]) = (caption.address.into(), caption.name.as_str().into());
         facts["utc"] = caption.utc.as_str().into();
+        facts["known_by"] = caption.side.name().into();
     }
     let marker = |m: &VehicleMarker| {
         json!({
@@ -212,7 +213,7 @@ fn class_fields(cells: &MapCells, label: u8) -> String {
 
 /// Vehicle and time of a map, as fields of a table.
 fn caption_fields(cells: &MapCells) -> Option<String> {
-    let MapCaption { address, name, utc } = cells.caption.as_ref()?;
+    let MapCaption { address, name, utc, .. } = cells.caption.as_ref()?;
     Some(format!(",{address},{},{utc}", quoted(Some(name))))
 }
 

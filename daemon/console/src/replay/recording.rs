@@ -54,8 +54,16 @@ pub(crate) struct StateText {
 #[derive(Debug, Deserialize)]
 pub(super) struct StateHead {
     now_s: f64,
-    mission: MissionSpeed,
+    mission: MissionHead,
     pub(super) vehicles: Vec<Loops>,
+}
+
+#[derive(Debug, Deserialize)]
+struct MissionHead {
+    #[serde(default)]
+    id: String,
+    #[serde(flatten)]
+    speed: MissionSpeed,
 }
 
 /// The loops that a vehicle has closed.
@@ -106,18 +114,20 @@ impl Recording {
     /// Reads records of a surface, of vehicles, or of both: files, their folders, or folders with such folders.
     ///
     /// # Errors
-    /// There is no record, or it has no message of an end.
+    /// There is no record, it has no message of an end, or two of them are of different missions.
     pub fn read(paths: &[PathBuf]) -> Result<Self, UserError> {
         let mut whole = Self::default();
-        let (mut surfaces, mut vehicles) = (Vec::new(), Vec::new());
+        let (mut surfaces, mut vehicles): (Vec<RecordAt>, Vec<RecordAt>) = (Vec::new(), Vec::new());
         let paths = paths.iter().map(|path| mission_records(path)).collect::<Result<Vec<_>, _>>()?.concat();
         for path in &paths {
             let record = Record::read(path, &mut whole.damage)?;
             if record.span.is_none() || record.states.is_empty() && record.known.is_empty() {
                 return Err(UserError::file(path, "it is no record of a mission: it has no topic of scenecast"));
             }
-            if record.states.is_empty() { &mut vehicles } else { &mut surfaces }.push(record);
+            if record.states.is_empty() { &mut vehicles } else { &mut surfaces }.push((path, record));
         }
+        of_one_mission(&surfaces, &vehicles)?;
+        let (mut surfaces, mut vehicles) = (without_paths(surfaces), without_paths(vehicles));
         let mut span = (u64::MAX, 0);
         let frames = FrameTimes::joined(surfaces.iter().map(|surface| &surface.frames));
         surfaces.sort_by_key(|record| record.span);
@@ -164,6 +174,37 @@ impl Timeline {
     }
 }
 
+/// A record with the file or folder that it was read from.
+type RecordAt<'a> = (&'a PathBuf, Record);
+
+fn without_paths(records: Vec<RecordAt>) -> Vec<Record> {
+    records.into_iter().map(|(_, record)| record).collect()
+}
+
+/// Labels and clocks of two missions have nothing to do with each other, so records of two are refused by name.
+fn of_one_mission(surfaces: &[RecordAt], vehicles: &[RecordAt]) -> Result<(), UserError> {
+    let refused = |a: &Path, b: &Path, why: &str| {
+        let (a, b) = (a.display(), b.display());
+        Err(UserError::Input(format!("{a} and {b} are records of two missions: {why}; give those of one")))
+    };
+    if let [(first, record), others @ ..] = surfaces {
+        let other = others.iter().find(|(_, other)| other.mission() != record.mission());
+        if let Some((path, other)) = other {
+            let why = format!("the surface names them {} and {}", record.mission(), other.mission());
+            return refused(first, path, &why);
+        }
+    }
+    for (path, vehicle) in vehicles {
+        let meets = |(_, surface): &RecordAt| vehicle.frames.meets(&surface.frames) || vehicle.overlaps(surface);
+        if let [(surface, _), ..] = surfaces
+            && !surfaces.iter().any(meets)
+        {
+            return refused(surface, path, "they have no frame in common, and their times do not overlap");
+        }
+    }
+    Ok(())
+}
+
 fn joined(span: (u64, u64), with: Option<(u64, u64)>, shift: i64) -> (u64, u64) {
     let Some((first, last)) = with else { return span };
     (span.0.min(first.saturating_add_signed(shift)), span.1.max(last.saturating_add_signed(shift)))
@@ -174,6 +215,15 @@ impl Record {
         let mut record = Self::default();
         damage.extend(read_record(path, |message| record.take(&message))?);
         Ok(record)
+    }
+
+    /// The mission, as the surface names it.
+    fn mission(&self) -> &str {
+        self.states.last().map_or("", |state| &state.head.mission.id)
+    }
+
+    fn overlaps(&self, other: &Self) -> bool {
+        self.span.zip(other.span).is_some_and(|(own, other)| own.0 <= other.1 && other.0 <= own.1)
     }
 
     fn take(&mut self, message: &RecordedMessage) {
@@ -210,7 +260,7 @@ impl Record {
             "state" => {
                 let Some(text) = message.decode::<Text>() else { return };
                 if let Ok(head) = serde_json::from_str::<StateHead>(&text.data) {
-                    self.clock.take(nanos, StateTime { now_s: head.now_s, mission: head.mission });
+                    self.clock.take(nanos, StateTime { now_s: head.now_s, mission: head.mission.speed });
                     self.states.push(StateText { nanos, json: text.data, head });
                 }
             }
@@ -246,5 +296,39 @@ impl Known {
         self.link.extend(later.link.into_iter().map(|(at, link)| (moved(at), link)));
         self.poses.extend(later.poses.into_iter().map(|(at, pose)| (moved(at), pose)));
         self.events.extend(later.events.into_iter().map(|(at, event)| (moved(at), event)));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn record(mission: Option<&str>, span: (u64, u64)) -> Record {
+        let head =
+            |id: &str| serde_json::json!({ "now_s": 1.0, "mission": { "id": id, "speed": 1.0 }, "vehicles": [] });
+        let state = |id: &str| {
+            let head = serde_json::from_value(head(id)).expect("the head of a state");
+            StateText { nanos: span.0, json: String::new(), head }
+        };
+        Record { states: mission.map(state).into_iter().collect(), span: Some(span), ..Record::default() }
+    }
+
+    fn refusal(surfaces: &[RecordAt<'_>], vehicles: &[RecordAt<'_>]) -> Option<String> {
+        of_one_mission(surfaces, vehicles).err().map(|error| error.to_string())
+    }
+
+    #[test]
+    fn records_of_two_missions_are_refused_by_name() {
+        let [ship, boat, auv] = ["ship", "boat", "auv"].map(PathBuf::from);
+        let first = || (&ship, record(Some("0a"), (100, 200)));
+        assert_eq!(
+            refusal(&[first(), (&boat, record(Some("0a"), (300, 400)))], &[(&auv, record(None, (350, 360)))]),
+            None
+        );
+        let two = refusal(&[first(), (&boat, record(Some("0b"), (100, 200)))], &[]).expect("they are of two missions");
+        assert!(["ship", "boat", "0a", "0b"].iter().all(|word| two.contains(word)), "{two}");
+        let later = refusal(&[first()], &[(&auv, record(None, (201, 300)))]).expect("they have nothing in common");
+        assert!(later.contains("ship and auv") && later.contains("no frame"), "{later}");
+        assert_eq!(refusal(&[], &[(&auv, record(None, (201, 300)))]), None);
     }
 }

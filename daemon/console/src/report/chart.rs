@@ -3,6 +3,7 @@
 use super::Escaped;
 use super::dive::{DiveVehicle, TrackPoint};
 use crate::state::VehicleState;
+use scenecast_core::utc_text;
 use scenecast_protocol::map::Rect;
 use std::fmt::Write;
 
@@ -22,6 +23,10 @@ pub(super) fn map(state: &VehicleState, vehicle: &DiveVehicle) -> Option<String>
     cells(&mut svg, &frame, bounds, state, vehicle);
     grid(&mut svg, &frame);
     track(&mut svg, &frame, &vehicle.track);
+    numbers(&mut svg, &frame, bounds, state, vehicle);
+    for marker in &state.markers {
+        point(&mut svg, &frame, (marker.x_m, marker.y_m), "marker");
+    }
     scale(&mut svg, &frame);
     svg += "</svg>";
     Some(svg)
@@ -113,7 +118,8 @@ fn grid(svg: &mut String, frame: &Frame) {
         let (x, _) = frame.place(east, frame.north);
         let _ = writeln!(
             svg,
-            "<path class=\"grid\" d=\"M{x:.1} 0V{height:.1}\"/><text x=\"{x:.1}\" y=\"{:.1}\">{east} m E</text>",
+            "<path class=\"grid\" d=\"M{x:.1} 0V{height:.1}\"/><text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"middle\">{east} m E</text>",
+            x.clamp(30.0, WIDTH - 60.0),
             height + 14.0
         );
     }
@@ -133,6 +139,74 @@ fn track(svg: &mut String, frame: &Frame, track: &[TrackPoint]) {
     if points.len() > 1 {
         let _ = writeln!(svg, "<polyline class=\"track\" points=\"{}\"/>", points.join(" "));
     }
+    for (end, name) in [(track.first(), "start"), (track.last(), "end")] {
+        end.into_iter().for_each(|end| point(svg, frame, (end.east_m, end.north_m), name));
+    }
+}
+
+/// A place with its name.
+fn point(svg: &mut String, frame: &Frame, (east_m, north_m): (f64, f64), name: &str) {
+    let (x, y) = frame.place(east_m, north_m);
+    let _ = writeln!(
+        svg,
+        "<circle class=\"point\" cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"4\"/><text class=\"number\" x=\"{:.1}\" y=\"{:.1}\">{name}</text>",
+        x + 6.0,
+        y - 5.0
+    );
+}
+
+/// Most cells of a map whose classes are numbered.
+const MAX_NUMBERED: u64 = 1 << 22;
+
+/// The number of each class where it is widest, so that classes can be told apart in grey.
+fn numbers(svg: &mut String, frame: &Frame, bounds: Rect, state: &VehicleState, vehicle: &DiveVehicle) {
+    if bounds.area() > MAX_NUMBERED {
+        return;
+    }
+    let (width, height) = (bounds.width as usize, bounds.height as usize);
+    let labels = vehicle.labels.copy_area(i64::from(bounds.x), i64::from(bounds.y), width, height);
+    let classes: Vec<u8> = labels.into_iter().map(|label| state.label_book.shown_as(label)).collect();
+    let (shift, edge) = (state.map.shift_m(), vehicle.cell_m);
+    for (class, (column, row)) in widest(&classes, width) {
+        let middle = |from: i32, cell: usize, shift: f64| (f64::from(from) + cell as f64 + 0.5) * edge + shift;
+        let (x, y) = frame.place(middle(bounds.x, column, shift.0), middle(bounds.y, row, shift.1));
+        let _ = writeln!(
+            svg,
+            "<text class=\"number\" x=\"{x:.1}\" y=\"{:.1}\" text-anchor=\"middle\">{class}</text>",
+            y + 4.0
+        );
+    }
+}
+
+/// Column and row of the cell of each class that is farthest, along both axes, from the ends of its runs; 0 is no class.
+fn widest(classes: &[u8], width: usize) -> Vec<(u8, (usize, usize))> {
+    let height = classes.len() / width.max(1);
+    let mut room = vec![u32::MAX; classes.len()];
+    // The lengths so far of runs in each of the four directions.
+    let mut measure = |line: &mut dyn Iterator<Item = usize>| {
+        let (mut before, mut length) = (0, 0);
+        for cell in line {
+            length = if classes[cell] == before { length + 1 } else { 1 };
+            before = classes[cell];
+            room[cell] = room[cell].min(length);
+        }
+    };
+    for row in 0..height {
+        measure(&mut (0..width).map(|column| row * width + column));
+        measure(&mut (0..width).rev().map(|column| row * width + column));
+    }
+    for column in 0..width {
+        measure(&mut (0..height).map(|row| row * width + column));
+        measure(&mut (0..height).rev().map(|row| row * width + column));
+    }
+    let mut best: std::collections::BTreeMap<u8, usize> = std::collections::BTreeMap::new();
+    for (cell, class) in classes.iter().enumerate().filter(|(_, class)| **class != 0) {
+        let known = best.entry(*class).or_insert(cell);
+        if room[cell] > room[*known] {
+            *known = cell;
+        }
+    }
+    best.into_iter().map(|(class, cell)| (class, (cell % width, cell / width))).collect()
 }
 
 fn scale(svg: &mut String, frame: &Frame) {
@@ -158,32 +232,48 @@ pub(super) struct Series<'a> {
     pub(super) points: Vec<(f64, f64)>,
 }
 
-/// A quantity over time as a line; `None` with fewer than two known values.
-pub(super) fn line(series: &Series<'_>, length_s: f64) -> Option<String> {
+/// A quantity over time as a line, from `begin_s` on, seconds since 1970; `None` with fewer than two known values.
+pub(super) fn line(series: &Series<'_>, begin_s: f64, length_s: f64) -> Option<String> {
     const HEIGHT: f64 = 110.0;
     let known: Vec<(f64, f64)> = series.points.iter().copied().filter(|(_, value)| value.is_finite()).collect();
     if known.len() < 2 || length_s <= 0.0 {
         return None;
     }
     let most = known.iter().map(|(_, value)| *value).fold(0.0, f64::max);
-    let top = if most > 0.0 { most } else { 1.0 };
+    let top = round_height(most);
     let place = |&(at_s, value): &(f64, f64)| {
-        format!("{:.1},{:.1}", 60.0 + at_s / length_s * (WIDTH - 70.0), HEIGHT - 20.0 - value / top * (HEIGHT - 34.0))
+        let x = 60.0 + (at_s / length_s).clamp(0.0, 1.0) * (WIDTH - 70.0);
+        format!("{x:.1},{:.1}", HEIGHT - 20.0 - value / top * (HEIGHT - 34.0))
     };
     let points: Vec<String> = known.iter().map(place).collect();
     Some(format!(
         "<svg viewBox=\"0 0 {WIDTH} {HEIGHT}\" role=\"img\" aria-label=\"{name} over time\" xmlns=\"http://www.w3.org/2000/svg\">\
-         <path class=\"grid\" d=\"M60 {bottom}H{WIDTH}M60 14H{WIDTH}\"/><polyline class=\"line\" points=\"{}\"/>\
-         <text x=\"2\" y=\"{bottom}\">0</text><text x=\"2\" y=\"18\">{top:.digits$}</text><text x=\"60\" y=\"11\">{name}, {unit}</text>\
-         <text x=\"60\" y=\"{HEIGHT}\">0 min</text><text x=\"{end}\" y=\"{HEIGHT}\">{minutes:.0} min</text></svg>",
+         <path class=\"grid\" d=\"M60 {bottom}H{WIDTH}M60 {middle}H{WIDTH}M60 14H{WIDTH}\"/><polyline class=\"line\" points=\"{}\"/>\
+         <text x=\"2\" y=\"{bottom}\">0</text><text x=\"2\" y=\"18\">{top}</text><text x=\"60\" y=\"11\">{name}, {unit}</text>\
+         <text x=\"60\" y=\"{low}\">{begin}</text><text x=\"{WIDTH}\" y=\"{low}\" text-anchor=\"end\">{end} UTC</text></svg>",
         points.join(" "),
         name = Escaped(series.name),
         unit = Escaped(series.unit),
         bottom = HEIGHT - 20.0,
-        digits = if top >= 10.0 { 0 } else { 3 },
-        end = WIDTH - 50.0,
-        minutes = length_s / 60.0
+        middle = HEIGHT / 2.0 - 3.0,
+        low = HEIGHT - 4.0,
+        begin = clock(begin_s),
+        end = clock(begin_s + length_s)
     ))
+}
+
+/// Hours and minutes of a moment, UTC.
+fn clock(at_s: f64) -> String {
+    utc_text(at_s).get(11..16).unwrap_or_default().to_owned()
+}
+
+/// The next higher of 1, 2 and 5 times a power of ten; 1 for nothing.
+fn round_height(most: f64) -> f64 {
+    if most <= 0.0 {
+        return 1.0;
+    }
+    let power = 10f64.powf(most.log10().floor());
+    [1.0, 2.0, 5.0, 10.0].into_iter().map(|n| n * power).find(|n| *n >= most * 0.999_999).unwrap_or(most)
 }
 
 #[cfg(test)]
@@ -193,5 +283,14 @@ mod tests {
     #[test]
     fn scale_bars_have_round_lengths() {
         assert_eq!([1.0, 3.7, 19.9, 50.0, 0.7].map(round_length), [1.0, 2.0, 10.0, 50.0, 0.5]);
+        assert_eq!([0.0, 1.0, 3.7, 24_992.0, 61.0].map(round_height), [1.0, 1.0, 5.0, 50_000.0, 100.0]);
+    }
+
+    #[test]
+    fn a_class_is_numbered_where_it_is_widest() {
+        let map = "1111111 1333111 1333220 1333222 1111222";
+        let classes: Vec<u8> = map.bytes().filter(u8::is_ascii_digit).map(|digit| digit - b'0').collect();
+        assert_eq!(widest(&classes, 7), [(1, (0, 0)), (2, (5, 3)), (3, (2, 2))]);
+        assert_eq!(widest(&[], 0), []);
     }
 }

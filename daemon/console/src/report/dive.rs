@@ -143,21 +143,32 @@ impl Dive {
         self.state.vehicles.iter().filter_map(move |state| Some((state, known(state)?)))
     }
 
-    /// What an order to a vehicle was: by the log, which has the words of the page, or else by its content.
-    pub(super) fn ordered(&self, state: &VehicleState, vehicle: &DiveVehicle, order: &(String, u32)) -> String {
-        let Some(given) = vehicle.given.get(order) else { return "not recorded".to_owned() };
+    /// Who gave an order to a vehicle, and what it was: by the log, which has the words of the page, or else by its content.
+    pub(super) fn ordered(
+        &self,
+        state: &VehicleState,
+        vehicle: &DiveVehicle,
+        order: &(String, u32),
+    ) -> (String, String) {
+        let Some(given) = vehicle.given.get(order) else { return (String::new(), "not recorded".to_owned()) };
         let given_s = given.header.stamp.nanos() as f64 / 1e9;
+        let content = words::content(&state.label_book, given);
         // Several orders may be given within a second: the words are those of the nearest one in this slot.
-        let is_it = |(_, event): &&(f64, Event)| {
+        let logged = self.events.iter().filter_map(|(at_s, event)| {
             let is_of_it = event.vehicle == state.name || event.vehicle.is_empty();
-            let words = event.text.split_once(": ").map_or(event.text.as_str(), |(_, words)| words);
-            event.source == "order" && is_of_it && [words, &event.text].iter().any(|text| text.starts_with(&given.slot))
-        };
-        let away_s = |at_s: &f64| (at_s - given_s).abs();
-        let nearest = self.events.iter().filter(is_it).min_by(|a, b| away_s(&a.0).total_cmp(&away_s(&b.0)));
-        let logged = nearest.filter(|(at_s, _)| away_s(at_s) < 0.5).map(|(_, event)| event.text.clone());
-        logged.unwrap_or_else(|| words::content(&state.label_book, given))
+            let (by, words) = said(&event.text, |words| words.starts_with(&given.slot) || words == content)?;
+            (event.source == "order" && is_of_it).then_some(((at_s - given_s).abs(), by, words))
+        });
+        let nearest = logged.filter(|(away_s, ..)| *away_s < 0.5).min_by(|a, b| a.0.total_cmp(&b.0));
+        let (by, words) = nearest.map_or((String::new(), content.clone()), |(_, by, words)| (by, words));
+        (if given.principal.is_empty() { by } else { given.principal.clone() }, words)
     }
+}
+
+/// The author and the words of an entry of the log, of which the words are to be recognised.
+fn said(text: &str, is_it: impl Fn(&str) -> bool) -> Option<(String, String)> {
+    let (by, words) = text.split_once(": ").filter(|(_, words)| is_it(words)).unwrap_or(("", text));
+    is_it(words).then(|| (by.to_owned(), words.to_owned()))
 }
 
 impl DiveVehicle {

@@ -1,5 +1,6 @@
 //! The page of a report.
 
+use super::areas::ClassArea;
 use super::chart::{self, Series};
 use super::dive::{Dive, DiveVehicle, OrderStep};
 use super::{Escaped, words};
@@ -9,6 +10,7 @@ use base64::prelude::BASE64_STANDARD;
 use scenecast_core::utc_text;
 use scenecast_protocol::directive::SlotId;
 use serde_json::json;
+use std::collections::BTreeSet;
 use std::fmt::Write;
 
 /// Images of a label in the report.
@@ -21,7 +23,9 @@ svg text{font:11px system-ui,sans-serif}.grid{stroke:#000;stroke-opacity:.25;str
 .track{fill:none;stroke:#000;stroke-width:1.5;stroke-linejoin:round}.line{fill:none;stroke:#000;stroke-width:1.2}\
 .scale{fill:none;stroke:#000;stroke-width:1.5}.swatch{display:inline-block;width:1em;height:1em;border:1px solid #000;\
 vertical-align:-.15em;margin-right:.4em}.images{display:flex;flex-wrap:wrap;gap:.6em}.images img{width:160px;display:block;\
-image-rendering:pixelated}@media print{body{margin:0;max-width:none}table,figure{break-inside:avoid}}";
+image-rendering:pixelated}.number{font-weight:600;paint-order:stroke;stroke:#fff;stroke-width:3px}\
+.point{fill:#fff;stroke:#000;stroke-width:1.5}.legend span{white-space:nowrap;margin-right:1em}\
+h2,h3{break-after:avoid}tr,svg{break-inside:avoid}@media print{body{margin:0;max-width:none}figure.map{break-inside:avoid}}";
 
 impl Dive {
     /// The report as one HTML file.
@@ -46,7 +50,8 @@ impl Dive {
     fn origin_of_figures(&self, page: &mut String) {
         if !self.settings.settings.is_empty() {
             *page += "<h2>Settings of the surface</h2>\n<p>Those that differ from their defaults.</p>\n<table>";
-            for (key, value) in &self.settings.settings {
+            // A folder of the computer says nothing about the mission.
+            for (key, value) in self.settings.settings.iter().filter(|(key, _)| *key != "record.folder") {
                 let _ = write!(page, "<tr><td>{}</td><td>{}</td></tr>", Escaped(key), Escaped(&value.to_string()));
             }
             *page += "</table>\n";
@@ -75,8 +80,10 @@ impl Dive {
         if let Some(map) = chart::map(state, vehicle) {
             let _ = writeln!(
                 page,
-                "<figure>{map}<figcaption>The map of the operator at the end and the reported track (line). Metres east and north of the \
-                 mission's origin; north is up.</figcaption></figure>"
+                "<figure class=\"map\">{map}<figcaption><div class=\"legend\">{}</div>The map of the operator at the end, each class with its \
+                 number, and the reported track: straight lines between the places that the vehicle has reported. Metres east and north of \
+                 the mission's origin (WGS 84 where it has one); north is up.</figcaption></figure>",
+                legend(state, vehicle)
             );
         }
         classes(page, state, vehicle);
@@ -101,17 +108,17 @@ impl Dive {
         let charts = [
             series("received from the vehicle", "bit/s", |link| link.received_bps),
             series("sent to the vehicle", "bit/s", |link| link.sent_bps),
-            series("share of frames lost", "1", |link| link.loss),
+            series("share of the last 64 frames lost", "%", |link| link.loss * 100.0),
             series("data that waited at the vehicle", "bit", |link| link.backlog_bits as f32),
             series("age of the last frame from the vehicle", "s", |link| link.age_s),
             Series {
                 name: "share of the vehicle's cells that the operator's map had with the same label",
-                unit: "1",
-                points: vehicle.maps.iter().map(|maps| (maps.at_s - begin, maps.agreement)).collect(),
+                unit: "%",
+                points: vehicle.maps.iter().map(|maps| (maps.at_s - begin, maps.agreement * 100.0)).collect(),
             },
             uncertainty,
         ];
-        let charts: Vec<String> = charts.iter().filter_map(|series| chart::line(series, end - begin)).collect();
+        let charts: Vec<String> = charts.iter().filter_map(|series| chart::line(series, begin, end - begin)).collect();
         if !charts.is_empty() {
             let _ = writeln!(page, "<h3>Link and position over time</h3>\n<figure>{}</figure>", charts.join("\n"));
         }
@@ -128,10 +135,12 @@ impl Dive {
         let _ = writeln!(
             page,
             "<table><tr><th>direction</th><th>frames</th><th>lost</th><th>bytes by class</th></tr>{}{}</table>\n<p>Frames are numbered: \
-             those are lost whose number the other end never received, over the whole mission. The chart shows the share of the last 64 \
-             frames. The operator's map lacks nothing that was lost: it was sent again.</p>",
+             those are lost whose number the other end never received, over the whole mission. The surface could not use {} frames that it \
+             heard: they were damaged, copies of others, or of earlier runs. Classes: map and layers, status of the vehicle, directive \
+             (orders), fix (positions for the vehicle), exemplar (images), and overhead (heads and tags of frames).</p>",
             direction("from the vehicles", &self.state.link.up),
-            direction("to the vehicles", &self.state.link.down)
+            direction("to the vehicles", &self.state.link.down),
+            self.frames[2]
         );
     }
 
@@ -162,11 +171,11 @@ impl Dive {
                         "cells": class.cells, "area_m2": class.area_m2, "interval_m2": class.interval_m2 })
             });
             let orders = vehicle.orders_of_people().map(|(order @ (slot, version), way)| {
-                let ordered = self.ordered(state, vehicle, order);
+                let (by, ordered) = self.ordered(state, vehicle, order);
                 let steps = way.iter().map(|step| {
                     json!({ "utc": utc_text(step.at_s), "status": words::status(step.status), "reason": step.reason })
                 });
-                json!({ "slot": slot, "version": version, "ordered": ordered, "steps": steps.collect::<Vec<_>>() })
+                json!({ "slot": slot, "version": version, "by": by, "ordered": ordered, "steps": steps.collect::<Vec<_>>() })
             });
             json!({
                 "name": state.name,
@@ -178,8 +187,16 @@ impl Dive {
                 "exemplars": vehicle.exemplars.len(),
             })
         });
+        let events = self.events.iter().map(|(at_s, event)| {
+            json!({ "utc": utc_text(*at_s), "vehicle": event.vehicle, "kind": event.source, "text": event.text })
+        });
         json!({
             "mission": self.state.mission.name,
+            "run": self.state.mission.id,
+            "origin": self.state.mission.origin,
+            "link": { "up": self.state.link.up, "down": self.state.link.down },
+            "events": events.collect::<Vec<_>>(),
+            "damage": self.damage,
             "begin": utc_text(self.span_s.0),
             "end": utc_text(self.span_s.1),
             "frames": { "sent": self.frames[0], "received": self.frames[1], "dropped": self.frames[2] },
@@ -193,15 +210,17 @@ fn classes(page: &mut String, state: &VehicleState, vehicle: &DiveVehicle) {
     if all == 0 {
         return;
     }
-    *page += "<h3>Classes</h3>\n<table><tr><th>class</th><th>cells</th><th>area</th><th>95 % interval</th><th>share</th>\
+    *page += "<h3>Classes</h3>\n<table><tr><th>no.</th><th>class</th><th>cells</th><th>area</th><th>95 % interval</th><th>share</th>\
               <th>images</th></tr>\n";
     for class in &vehicle.classes {
         let _ = writeln!(
             page,
-            "<tr><td><span class=\"swatch\" style=\"background:{}\"></span>{}</td><td class=\"n\">{}</td><td class=\"n\">{}</td>\
+            "<tr><td class=\"n\">{}</td><td><span class=\"swatch\" style=\"background:{}\"></span>{}{}</td><td class=\"n\">{}</td><td class=\"n\">{}</td>\
              <td class=\"n\">{}</td><td class=\"n\">{:.1} %</td><td><div class=\"images\">{}</div></td></tr>",
+            class.label,
             state.label_book.colour_text(class.label),
             Escaped(&state.label_book.title(class.label)),
+            merged(state, vehicle, class.label),
             class.cells,
             words::area(class.area_m2),
             words::interval(class.interval_m2),
@@ -210,6 +229,24 @@ fn classes(page: &mut String, state: &VehicleState, vehicle: &DiveVehicle) {
         );
     }
     let _ = writeln!(page, "</table>\n<p>{}</p>", words::of_intervals(&vehicle.classes));
+}
+
+/// The classes by their colours and numbers.
+fn legend(state: &VehicleState, vehicle: &DiveVehicle) -> String {
+    let entry = |class: &ClassArea| {
+        let (colour, title) = (state.label_book.colour_text(class.label), state.label_book.title(class.label));
+        let swatch = format!("<span class=\"swatch\" style=\"background:{colour}\"></span>");
+        format!("<span>{swatch}{} {}</span> ", class.label, Escaped(&title))
+    };
+    vehicle.classes.iter().map(entry).collect()
+}
+
+/// The labels that are shown as a class, if there are several on the map.
+fn merged(state: &VehicleState, vehicle: &DiveVehicle, class: u8) -> String {
+    let labels: BTreeSet<u8> = vehicle.labels.iter().map(|(_, label)| label).collect();
+    let of_class = labels.into_iter().filter(|label| state.label_book.shown_as(*label) == class);
+    let labels: Vec<String> = of_class.map(|label| label.to_string()).collect();
+    if labels.len() < 2 { String::new() } else { format!(" (labels {})", labels.join(", ")) }
 }
 
 /// The largest images of a class, each with its label and time.
@@ -226,7 +263,7 @@ fn images(state: &VehicleState, vehicle: &DiveVehicle, class: u8) -> String {
             label = exemplar.label
         )
     };
-    found.iter().take(IMAGES).map(image).collect()
+    if found.is_empty() { "no image was received".to_owned() } else { found.iter().take(IMAGES).map(image).collect() }
 }
 
 fn notes(page: &mut String, dive: &Dive, state: &VehicleState) {
@@ -259,7 +296,7 @@ fn steering(page: &mut String, dive: &Dive, state: &VehicleState, vehicle: &Dive
     let modes = modes.map(|(at_s, event)| (*at_s, event.text.clone()));
     let weights = vehicle.given.iter().filter(|((slot, _), _)| slot == SlotId::Utility.name());
     let weights = weights.map(|(order, given)| {
-        (given.header.stamp.nanos() as f64 / 1e9, format!("ordered: {}", dive.ordered(state, vehicle, order)))
+        (given.header.stamp.nanos() as f64 / 1e9, format!("ordered: {}", dive.ordered(state, vehicle, order).1))
     });
     let mut steps: Vec<(f64, String)> = modes.chain(weights).collect();
     if steps.is_empty() {
@@ -284,17 +321,19 @@ fn orders(page: &mut String, dive: &Dive, state: &VehicleState, vehicle: &DiveVe
     if vehicle.orders_of_people().next().is_none() {
         return;
     }
-    *page += "<h3>Orders</h3>\n<table><tr><th>order</th><th>what was ordered</th><th>given (UTC)</th><th>end</th><th>after</th></tr>\n";
+    *page += "<h3>Orders</h3>\n<table><tr><th>order</th><th>what was ordered</th><th>by</th><th>given (UTC)</th><th>end</th><th>after</th></tr>\n";
     let mut orders: Vec<(&(String, u32), &OrderStep, &OrderStep)> =
         vehicle.orders_of_people().filter_map(|(order, way)| Some((order, way.first()?, way.last()?))).collect();
     orders.sort_by(|a, b| a.1.given_s.total_cmp(&b.1.given_s));
     for (order @ (slot, version), first, last) in orders {
+        let (by, ordered) = dive.ordered(state, vehicle, order);
         let reason = if last.reason.is_empty() { String::new() } else { format!(": {}", last.reason) };
         let _ = writeln!(
             page,
-            "<tr><td>{} {version}</td><td>{}</td><td class=\"t\">{}</td><td>{}{}</td><td class=\"n\">{:.1} s</td></tr>",
+            "<tr><td>{} {version}</td><td>{}</td><td>{}</td><td class=\"t\">{}</td><td>{}{}</td><td class=\"n\">{:.1} s</td></tr>",
             Escaped(slot),
-            Escaped(&dive.ordered(state, vehicle, order)),
+            Escaped(&ordered),
+            Escaped(&by),
             utc_text(first.given_s),
             words::status(last.status),
             Escaped(&reason),

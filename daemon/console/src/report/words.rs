@@ -3,9 +3,10 @@
 use super::areas::ClassArea;
 use super::dive::{Dive, DiveVehicle, OrderStep};
 use crate::export::TransverseMercator;
-use crate::state::{Origin, VehicleState};
+use crate::state::{LinkDirection, Origin, VehicleState};
 use scenecast_core::utc_text;
 use scenecast_messages::scenecast_msgs::{Event, Order, OrderStatus};
+use scenecast_protocol::directive::SlotId;
 use scenecast_surface::LabelBook;
 use serde_json::Value;
 
@@ -28,10 +29,20 @@ pub(super) fn area(m2: f64) -> String {
     }
 }
 
-/// The content of an order, with the principal who gave it.
+/// The content of an order.
 pub(super) fn content(book: &LabelBook, order: &Order) -> String {
-    let by = if order.principal.is_empty() { String::new() } else { format!("{}: ", order.principal) };
-    let Ok(Value::Object(members)) = serde_json::from_str(&order.content) else { return by + &order.content };
+    let Ok(Value::Object(members)) = serde_json::from_str(&order.content) else { return order.content.clone() };
+    if order.slot == SlotId::Constraints.name() {
+        let is_set = |name: &str| members.get(name).and_then(Value::as_bool).unwrap_or_default();
+        return if is_set("abort") {
+            "abort"
+        } else if is_set("hold") {
+            "hold"
+        } else {
+            "resume"
+        }
+        .to_owned();
+    }
     let title =
         |label: &Value| label.as_u64().and_then(|label| u8::try_from(label).ok()).map(|label| book.title(label));
     let member = |(name, value): (&String, &Value)| match (name.as_str(), value) {
@@ -45,9 +56,30 @@ pub(super) fn content(book: &LabelBook, order: &Order) -> String {
         ("labels", Value::Array(labels)) => {
             Some(format!("images of {}", labels.iter().filter_map(title).collect::<Vec<_>>().join(", ")))
         }
-        _ => Some(format!("{} {value}", name.replace('_', " "))),
+        _ => Some(limit(name, value)),
     };
-    by + &members.iter().filter_map(member).collect::<Vec<_>>().join("; ")
+    let all: Vec<String> = members.iter().filter_map(member).collect();
+    if all.is_empty() { "nothing, so that what was ordered before ends".to_owned() } else { all.join("; ") }
+}
+
+/// A member of an order with its unit, as in "depth 5 to 30 m".
+fn limit(name: &str, value: &Value) -> String {
+    let units = [("_bps", "bit/s"), ("_m", "m"), ("_s", "s")];
+    let unit = units.into_iter().find_map(|(end, unit)| Some((name.strip_suffix(end)?, unit)));
+    let (name, unit) = unit.map_or((name, String::new()), |(name, unit)| (name, format!(" {unit}")));
+    let said = match value {
+        Value::Array(ends) if ends.len() == 2 && ends.iter().all(Value::is_number) => {
+            format!("{} to {}", number(&ends[0]), number(&ends[1]))
+        }
+        Value::String(text) => text.clone(),
+        other => number(other),
+    };
+    format!("{} {said}{unit}", name.replace('_', " "))
+}
+
+/// A number without a fraction of 0.
+fn number(value: &Value) -> String {
+    value.as_f64().map_or_else(|| value.to_string(), |number| number.to_string())
 }
 
 /// The ends of an interval of areas for people.
@@ -59,7 +91,7 @@ pub(super) fn interval(interval_m2: Option<(f64, f64)>) -> String {
 pub(super) fn of_intervals(classes: &[ClassArea]) -> &'static str {
     match classes.iter().any(|class| class.interval_m2.is_some()) {
         true => {
-            "An interval is that of the model's own doubt: its confidence in each cell, which arrives in quarters, is taken as the \
+            "An interval is that of the model's own doubt, without the error of positions: its confidence in each cell, which arrives in quarters, is taken as the \
              probability that the label is right; the doubt goes to the other labels by their cells, and cells of a square of 4 x 4 are right or \
              wrong together. A class that the model does not tell from another one, and sea floor that nobody has seen, are not in it."
         }
@@ -91,11 +123,14 @@ pub(super) fn summary(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) 
     sentences.extend(extent(dive, state, vehicle));
     sentences.extend(arrived(state, vehicle));
     sentences.push(orders(vehicle));
-    let [sent, received, dropped] = dive.frames;
-    let loss = state.link.up.loss * 100.0;
+    let link = &dive.state.link;
+    let lost = |direction: &LinkDirection| direction.loss * 100.0;
     sentences.push(format!(
-        "The surface sent {sent} frames, received {received} and could not use {dropped} more, which were damaged or copies of others; \
-         {loss:.0} % of the vehicle's last 64 frames were lost."
+        "Of {} frames from the vehicles {:.1} % were lost over the whole mission, of {} to them {:.1} %; what they carried was sent again.",
+        link.up.frames,
+        lost(&link.up),
+        link.down.frames,
+        lost(&link.down)
     ));
     // The first contact begins a run, too.
     let first_run = dive.events.iter().position(|(_, event)| event.text == "another run begins");
@@ -117,9 +152,9 @@ pub(super) fn summary(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) 
 
 fn when(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -> String {
     let (begin, end) = dive.span_s;
-    let speed = dive.state.mission.speed;
-    let speed = match (speed - 1.0).abs() > 0.01 {
-        true => format!(" at {speed:.1} times the speed of the clock, {} of mission time", duration(dive.state.now_s)),
+    let is_faster = (dive.state.mission.speed - 1.0).abs() > 0.01;
+    let speed = match is_faster {
+        true => format!(", which was {} of the mission, rehearsed faster than the clock", duration(dive.state.now_s)),
         false => String::new(),
     };
     format!(
@@ -177,8 +212,16 @@ fn place(dive: &Dive, vehicle: &DiveVehicle) -> String {
         || "the mission has no origin on the globe".to_owned(),
         |origin| format!("the origin is at latitude {:.6}, longitude {:.6} (WGS 84)", origin.lat_deg, origin.lon_deg),
     );
+    let begin = vehicle.track.first().map_or_else(String::new, |first| {
+        format!(
+            " from {:.1} m east and {:.1} m north{}",
+            first.east_m,
+            first.north_m,
+            on_earth(dive, (first.east_m, first.north_m))
+        )
+    });
     format!(
-        "By its reports it went {:.0} m at depths of {least:.1} to {most:.1} m; at the end it was {:.1} m east and {:.1} m north of the \
+        "By its reports it went {:.0} m{begin}, at depths of {least:.1} to {most:.1} m below the surface; at the end it was {:.1} m east and {:.1} m north of the \
          origin, with a standard deviation of {:.1} m; {origin}.",
         vehicle.distance_m(),
         last.east_m,
@@ -194,7 +237,7 @@ fn found(state: &VehicleState, vehicle: &DiveVehicle) -> String {
         format!("; by the model's own doubt it has {}, with a probability of 95 %", interval(largest.interval_m2))
     });
     format!(
-        "The map that arrived has {all} cells of {:.2} m, {}, with {} classes; the largest is {} with {} ({:.0} %){doubt}.",
+        "The map that arrived has {all} cells of {0:.2} m x {0:.2} m, {1}, with {2} classes; the largest is {3} with {4} ({5:.0} %){doubt}.",
         vehicle.cell_m,
         area(all as f64 * vehicle.cell_m * vehicle.cell_m),
         vehicle.classes.len(),
@@ -232,9 +275,14 @@ mod tests {
         let order = |content: &str| Order { principal: "ann".into(), content: content.into(), ..Order::default() };
         let told = |text: &str| content(&LabelBook::default(), &order(text));
         let weights = r#"{"weights": {"3": 0.5, "7": -1.0}, "exploration": 0.1}"#;
-        assert_eq!(told(weights), "ann: exploration 0.1; weights: label 3 0.5, label 7 -1.0");
-        assert_eq!(told(r#"{"labels": [4]}"#), "ann: images of label 4");
-        assert_eq!(told(r#"{"max_depth_m": 20, "max_time_s": null}"#), "ann: max depth m 20");
+        assert_eq!(told(weights), "exploration 0.1; weights: label 3 0.5, label 7 -1.0");
+        assert_eq!(told(r#"{"labels": [4]}"#), "images of label 4");
+        let limits = r#"{"depth_m": [5.0, 30.5], "on_silence": "return", "silence_s": 300.0, "time_s": null}"#;
+        assert_eq!(told(limits), "depth 5 to 30.5 m; on silence return; silence 300 s");
+        let stops = |content: &str| Order { slot: "constraints".into(), ..order(content) };
+        let told = |text: &str| content(&LabelBook::default(), &stops(text));
+        assert_eq!(told(r#"{"hold": true, "abort": false}"#), "hold");
+        assert_eq!(told(r#"{"hold": false, "abort": false}"#), "resume");
     }
 
     #[test]

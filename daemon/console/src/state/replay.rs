@@ -39,6 +39,17 @@ pub enum ReplaySide {
     Difference,
 }
 
+impl ReplaySide {
+    /// The name in the API.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Operator => "operator",
+            Self::Vehicle => "vehicle",
+            Self::Difference => "difference",
+        }
+    }
+}
+
 /// The cells in which two maps of a vehicle differ.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct DifferingCells {

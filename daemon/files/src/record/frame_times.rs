@@ -54,6 +54,12 @@ impl FrameTimes {
         })
     }
 
+    /// Whether both ends have recorded a same frame.
+    pub fn meets(&self, other: &Self) -> bool {
+        let is_in = |times: &Times, others: &Times| times.keys().any(|frame| others.contains_key(frame));
+        is_in(&self.sent, &other.received) || is_in(&self.received, &other.sent)
+    }
+
     /// Nanoseconds to add to this clock so that it agrees with `other`: none where every frame arrives after it was sent as
     /// it is; else the middle of the shifts by which each does. Without frames in both directions, so much that the quickest frame
     /// takes no time.
@@ -191,6 +197,7 @@ mod tests {
         let surface = times(&[(Frame::SENT, 1, 100), (Frame::RECEIVED, 2, 260)]);
         let vehicle = times(&[(Frame::RECEIVED, 1, 150), (Frame::SENT, 2, 200)]);
         assert_eq!(vehicle.shift_to(&surface), 0);
+        assert!(vehicle.meets(&surface) && !vehicle.meets(&times(&[(Frame::SENT, 3, 100), (Frame::SENT, 2, 100)])));
     }
 
     #[test]

@@ -231,6 +231,32 @@ mod tests {
     }
 
     #[test]
+    fn a_damaged_middle_is_left_out_and_the_rest_made_whole() {
+        let dir = fresh("middle");
+        let mut writer = RecordWriter::create(&dir, LIMITS).unwrap();
+        let part = dir.join(format!("{}_0.mcap", dir.file_name().unwrap().to_str().unwrap()));
+        let mut lengths: Vec<usize> = Vec::new();
+        for seconds in [0..3, 3..300, 300..303] {
+            seconds.for_each(|second| writer.write(&event(second)).unwrap());
+            writer.sync().unwrap();
+            lengths.push(std::fs::metadata(&part).unwrap().len() as usize);
+        }
+        writer.finish().unwrap();
+        let mut bytes = std::fs::read(&part).unwrap();
+        // The second chunk begins where the first one and its index end.
+        let damaged = lengths[0] + 100;
+        bytes[damaged..damaged + 20].iter_mut().for_each(|byte| *byte ^= 0x55);
+        std::fs::write(&part, &bytes).unwrap();
+        let recovered = recover(&dir).unwrap();
+        assert_eq!(recovered[0].messages, Some(6), "{recovered:?}");
+        assert!(recovered[0].damage.is_some());
+        assert_eq!(texts(&dir), [0, 1, 2, 300, 301, 302].map(|second| format!("event {second}")));
+        assert_eq!(std::fs::read(part.with_extension("mcap.damaged")).unwrap(), bytes, "another program may find more");
+        assert_eq!(recover(&dir).unwrap()[0].messages, None, "it is whole now");
+        std::fs::remove_dir_all(&dir).unwrap();
+    }
+
+    #[test]
     fn the_oldest_files_give_room_to_the_newest() {
         let dir = fresh("parts");
         let limits = RecordLimits { part_bytes: 2000, all_bytes: 5000 };

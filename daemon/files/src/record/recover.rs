@@ -55,11 +55,15 @@ pub fn recover(path: &Path) -> Result<Vec<RecoveredPart>, UserError> {
     let files = mcap_files(path)?;
     let (mut found, mut parts, mut types) = (Vec::new(), Vec::new(), BTreeMap::new());
     for file in files {
-        let whole = is_whole(&file)?;
         let beside = file.with_extension("mcap.new");
-        let copy = if whole { None } else { Some(beside.as_path()) };
-        let contents = read(&file, copy)?;
-        if copy.is_some() {
+        let known = if is_whole(&file)? { Some(read(&file, None)?) } else { None };
+        let known = known.filter(|contents| !contents.is_damaged());
+        let whole = known.is_some();
+        let contents = match known {
+            Some(contents) => contents,
+            None => read(&file, Some(&beside))?,
+        };
+        if !whole {
             if contents.is_damaged() {
                 // Another program may find more in it.
                 let kept = file.with_extension("mcap.damaged");

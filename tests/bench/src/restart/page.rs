@@ -151,13 +151,22 @@ impl Page {
         block_on(self.0.send_order(&format!("/api/v2/vehicles/1/{path}"), order))
     }
 
+    /// Orders limits whole, since a restarted surface may not know yet which ones the vehicle obeys.
+    pub(super) fn limits(&self, depth_m: &Value) -> Result<(), UserError> {
+        let limits = json!({
+            "depth_m": depth_m, "altitude_m": null, "distance_m": null, "time_s": null, "silence_s": 3600, "on_silence": "hold",
+            "on_breach": null, "on_abort": null
+        });
+        self.order("limits", &limits)
+    }
+
     /// The orders and records of an operator at the beginning of a mission.
     pub(super) fn begin(&self) -> Result<(), UserError> {
         let label = self.vehicle().and_then(|v| v.labels.first().map(|l| l.id));
         // The whole fence, since a vehicle may have one of its own that the surface does not know yet.
         let fence = [[-500, -500], [500, -500], [500, 500], [-500, 500]];
         self.order("fence", &json!({"fence": fence, "keep_outs": null, "return_point": null}))?;
-        self.order("limits", &json!({"silence_s": 3600, "on_silence": "hold"}))?;
+        self.limits(&Value::Null)?;
         self.order("notes", &json!({"text": "a wreck"}))?;
         match label {
             Some(label) => {

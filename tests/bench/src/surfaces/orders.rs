@@ -5,8 +5,9 @@ use scenecast_protocol::time::Instant;
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-/// A hold or an abort this young is obeyed at once, even if a newer order of another surface has arrived before.
-const PROMPT: Duration = Duration::from_secs(30);
+/// A hold or an abort this young is obeyed, even if a newer order of another surface has arrived before: it stops the vehicle, after the time
+/// that taking it over may need.
+const PROMPT: Duration = Duration::from_secs(70);
 
 /// An order that the vehicle has applied.
 #[derive(Debug, Clone)]

@@ -99,6 +99,64 @@ fn a_hold_against_a_known_surface_is_obeyed_despite_its_orders() {
 }
 
 #[test]
+fn a_hold_is_obeyed_although_the_holder_has_given_an_older_order() {
+    for access in ACCESSES {
+        for age_s in [0, 4] {
+            let mut waters = Waters::held_by_first(8, keyed(access));
+            waters.give(0, Slot::Constraints(Constraints { hold: false, abort: false }));
+            run_s(&mut waters, 60);
+            // A laptop that is started to stop the vehicle does not know of the holder yet.
+            waters.hold(1);
+            run_s(&mut waters, age_s);
+            waters.is_away = [false, false, true];
+            run_s(&mut waters, 60);
+            assert_eq!(waters.status(1, CONSTRAINTS), APPLIED, "{access:?}, {age_s} s before it is heard");
+        }
+    }
+}
+
+#[test]
+fn a_withdrawn_abort_takes_no_vehicle() {
+    let abort = Slot::Constraints(Constraints { hold: false, abort: true });
+    for access in ACCESSES {
+        let setup = EndsSetup { abort_lifetime: Some(Duration::from_secs(60)), ..keyed(access) };
+        let mut waters = Waters::held_by_first(9, setup);
+        waters.is_away = [false, false, true];
+        run_s(&mut waters, 60);
+        assert_eq!(waters.holder(1), Some(first_series(0)), "{access:?}");
+        waters.is_away = [false, true, true];
+        waters.give(1, abort.clone());
+        run_s(&mut waters, 70);
+        assert_eq!(waters.status(1, CONSTRAINTS), withdrawn(Withdrawal::Late), "{access:?}");
+        waters.is_away = [false, false, true];
+        run_s(&mut waters, 90);
+        assert_eq!(waters.holder(0), None, "{access:?}");
+        assert_eq!(waters.holder(1), Some(first_series(0)), "{access:?}");
+    }
+}
+
+#[test]
+fn a_vehicle_with_an_older_folder_has_lost_the_orders_since() {
+    for access in ACCESSES {
+        let mut waters = Waters::held_by_first(10, keyed(access));
+        waters.give(0, limits(1));
+        run_s(&mut waters, 30);
+        let copy = waters.durable();
+        waters.give(0, limits(2));
+        run_s(&mut waters, 30);
+        assert_eq!(waters.status(0, LIMITS), APPLIED, "{access:?}");
+        waters.restart_vehicle_with(copy);
+        run_s(&mut waters, 60);
+        assert_eq!(waters.status(0, LIMITS), withdrawn(Withdrawal::Lost), "{access:?}");
+        assert!(waters.lost[0], "{access:?}: the person is asked");
+        waters.confirm(0);
+        run_s(&mut waters, 40);
+        assert_eq!(waters.status(0, LIMITS), APPLIED, "{access:?}");
+        assert_eq!(waters.orders.applied.last().map(|order| order.slot.clone()), Some(limits(2)), "{access:?}");
+    }
+}
+
+#[test]
 fn an_old_hold_asks_and_takes_over_once_it_is_given_again() {
     for access in ACCESSES {
         let mut waters = Waters::held_by_first(6, keyed(access));

@@ -154,11 +154,20 @@ impl Waters {
         self.forget_modem(End::Surface(number));
     }
 
+    /// What the vehicle has on disk.
+    pub(super) fn durable(&self) -> SlotInboxState {
+        self.durable.clone()
+    }
+
     pub(super) fn restart_vehicle(&mut self, keeps_memory: bool) {
         if !keeps_memory {
-            self.durable = SlotInboxState::default();
             self.orders.applied.clear();
         }
+        self.restart_vehicle_with(if keeps_memory { self.durable() } else { SlotInboxState::default() });
+    }
+
+    pub(super) fn restart_vehicle_with(&mut self, durable: SlotInboxState) {
+        self.durable = durable;
         self.vehicles[0] = self.setup.vehicle(draw_seed(&mut self.rng), self.durable.clone(), self.now);
         self.vehicles[0].assume_budget_spent(self.now);
         self.forget_modem(End::Vehicle(0));

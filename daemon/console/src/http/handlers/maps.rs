@@ -7,7 +7,7 @@ use crate::http::response::{accepts_gzip, error, gzip, respond, tagged};
 use crate::http::shared::{CachedMap, MapCell, Shared, VehicleId};
 use crate::request::{Reply, SurfaceRequest};
 use crate::snapshot::seconds;
-use crate::state::MapLabelTree;
+use crate::state::{MapLabelTree, ReplaySide};
 use crate::tiles::TiledMap;
 use axum::Json;
 use axum::body::Bytes;
@@ -192,7 +192,8 @@ pub(in crate::http) async fn file(
         let tree = vehicle.and_then(|v| v.label_tree.as_ref()).and_then(MapLabelTree::tree);
         let markers = vehicle.map(|v| v.markers.clone()).unwrap_or_default();
         let name = vehicle.map_or(String::new(), |v| v.name.clone());
-        let caption = MapCaption { address: id, name, utc: MissionUtc::now(&snapshot.state).at(seconds(at)) };
+        let side = snapshot.state.replay.as_ref().map_or(ReplaySide::Operator, |replay| replay.side);
+        let caption = MapCaption { address: id, name, utc: MissionUtc::now(&snapshot.state).at(seconds(at)), side };
         let moved_m = vehicle.map_or((0.0, 0.0), |v| v.map.shift_m());
         (snapshot.state.mission.origin, moved_m, book, tree, markers, Some(caption))
     };
@@ -200,7 +201,7 @@ pub(in crate::http) async fn file(
     book.hash(&mut named);
     [moved_m.0, moved_m.1].map(f64::to_bits).hash(&mut named);
     origin.map(|o| [o.lat_deg, o.lon_deg].map(f64::to_bits)).hash(&mut named);
-    caption.as_ref().map(|c: &MapCaption| &c.name).hash(&mut named);
+    caption.as_ref().map(|c: &MapCaption| (&c.name, c.side.name())).hash(&mut named);
     (count, tree.as_ref().map(LabelTree::to_bytes)).hash(&mut named);
     markers.iter().for_each(|m| (m.number, &m.text, m.at_s.to_bits()).hash(&mut named));
     let tag = format!("{id}-{}-{:x}", cached.map.tag(), named.finish());

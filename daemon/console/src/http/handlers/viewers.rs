@@ -42,6 +42,8 @@ const PROTOCOLS: [&str; 2] = ["foxglove.sdk.v1", "foxglove.websocket.v1"];
 const MAX_REQUEST_BYTES: usize = 64 << 10;
 const MAX_SUBSCRIPTIONS: usize = 256;
 const MESSAGE_DATA: u8 = 1;
+/// The level of a status that tells of a wrong request.
+const ERROR: u8 = 2;
 
 /// Joins a viewer. One that does not read is dropped by the timeouts of its connection; a slow one misses states, but never
 /// the last.
@@ -203,9 +205,12 @@ impl Viewer {
                 },
                 packet = self.socket.recv() => match packet {
                     Some(Ok(Packet::Text(text))) => {
-                        self.handle(serde_json::from_str(&text).unwrap_or(ViewerRequest::Other));
+                        for refusal in self.handle(&text) {
+                            self.refuse(&refusal).await?;
+                        }
                         self.publish().await?;
                     }
+                    Some(Ok(Packet::Binary(_))) => self.refuse("this server takes no data of clients").await?,
                     Some(Ok(_)) => {}
                     Some(Err(_)) | None => return Ok(()),
                 },
@@ -214,20 +219,40 @@ impl Viewer {
         }
     }
 
-    fn handle(&mut self, request: ViewerRequest) {
-        match request {
-            ViewerRequest::Subscribe { subscriptions } => {
-                for Subscription { id, channel_id } in subscriptions {
-                    if self.subscriptions.len() < MAX_SUBSCRIPTIONS && channel_id < self.channels.len() {
-                        self.subscriptions.insert(id, Sent { channel: channel_id, ..Sent::default() });
-                    }
-                }
+    /// Tells what is wrong with a request.
+    async fn refuse(&mut self, message: &str) -> Result<(), axum::Error> {
+        self.socket.send(Packet::text(json!({ "op": "status", "level": ERROR, "message": message }).to_string())).await
+    }
+
+    /// What is wrong with a request, a line each.
+    fn handle(&mut self, text: &str) -> Vec<String> {
+        match serde_json::from_str(text) {
+            Ok(ViewerRequest::Subscribe { subscriptions }) => {
+                subscriptions.into_iter().filter_map(|subscription| self.subscribe(&subscription).err()).collect()
             }
-            ViewerRequest::Unsubscribe { subscription_ids } => {
-                self.subscriptions.retain(|id, _| !subscription_ids.contains(id));
+            Ok(ViewerRequest::Unsubscribe { subscription_ids }) => {
+                let unknown = |id: &u32| {
+                    self.subscriptions.remove(id).is_none().then(|| format!("there is no subscription {id}"))
+                };
+                subscription_ids.iter().filter_map(unknown).collect()
             }
-            ViewerRequest::Other => {}
+            Ok(ViewerRequest::Other) => vec!["the operations are subscribe and unsubscribe".to_owned()],
+            Err(e) => vec![format!("it cannot be read: {e}")],
         }
+    }
+
+    fn subscribe(&mut self, &Subscription { id, channel_id }: &Subscription) -> Result<(), String> {
+        if channel_id >= self.channels.len() {
+            return Err(format!("there is no channel {channel_id}"));
+        }
+        if self.subscriptions.contains_key(&id) {
+            return Err(format!("there is a subscription {id} already"));
+        }
+        if self.subscriptions.len() >= MAX_SUBSCRIPTIONS {
+            return Err(format!("there are {MAX_SUBSCRIPTIONS} subscriptions, which is the most"));
+        }
+        self.subscriptions.insert(id, Sent { channel: channel_id, ..Sent::default() });
+        Ok(())
     }
 
     /// Sends what has changed, for those that subscribe.

@@ -16,7 +16,9 @@ pub use strangers::{EndedRun, OtherSurface};
 pub(super) use turn::{Ready, room_for_slot};
 pub use view::PeerView;
 
-use crate::directive::{InForcePart, Series, Slot, SlotId, SlotOutbox, SlotProgress, WaitingStop};
+use crate::directive::{
+    InForcePart, OrderStatus, Series, Slot, SlotId, SlotOutbox, SlotProgress, WaitingStop, Withdrawal,
+};
 use crate::link::handshake::FramePurpose;
 use crate::link::{Authenticity, DropReason, FrameNumber, Inbound, LinkPair, LinkStats, Mismatch, SurfaceEvent};
 use crate::mac::{Access, Master, MasterConfig, ModemProfile};
@@ -72,6 +74,8 @@ pub(super) struct VehiclePeer<R> {
     last_turn: LastTurn,
     divergence: Divergence,
     twins: TwinWatch,
+    /// Whether only a hold or an abort takes the vehicle over.
+    takes_over_to_stop: bool,
     key_offers: KeyOffers,
     /// The two ends were found to differ: a new run must begin.
     is_out_of_step: bool,
@@ -103,6 +107,7 @@ impl<R: StateReplica> VehiclePeer<R> {
             last_turn: LastTurn { began: 0, purpose: FramePurpose::Content },
             divergence: Divergence::default(),
             twins: TwinWatch::default(),
+            takes_over_to_stop: false,
             key_offers: KeyOffers::new(now),
             is_out_of_step: false,
             is_full_duplex: false,
@@ -177,8 +182,13 @@ impl<R: StateReplica> VehiclePeer<R> {
     /// A hold or an abort of any surface is obeyed at once.
     fn take_over_to_stop(&mut self, slot: &Slot, now: Instant) {
         if slot.stops() && self.rivals.holder().is_some() {
-            self.take_over(now);
+            self.take_over_to_obey(now);
         }
+    }
+
+    fn take_over_to_obey(&mut self, now: Instant) {
+        self.takes_over_to_stop |= !self.pair.takes_over();
+        self.take_over(now);
     }
 
     /// Has the vehicle leave another surface that holds it.
@@ -212,7 +222,12 @@ impl<R: StateReplica> VehiclePeer<R> {
 
     /// Withdraws an abort that has not arrived in time; returns whether there was one.
     pub(super) fn withdraw_late_abort(&mut self, now: Instant) -> bool {
-        self.outbox.withdraw_late_abort(now)
+        let is_withdrawn = self.outbox.withdraw_late_abort(now);
+        // What is withdrawn takes no vehicle.
+        if is_withdrawn && std::mem::take(&mut self.takes_over_to_stop) {
+            self.pair.set_takes_over(false);
+        }
+        is_withdrawn
     }
 
     /// The vehicle has refused a hello of this surface, because another one holds it.
@@ -225,13 +240,13 @@ impl<R: StateReplica> VehiclePeer<R> {
         // A refusal ends this run, so that a copy of it has no effect on a later one.
         self.is_out_of_step = true;
         // Given before this surface knew of the other one.
-        if !self.pair.takes_over() {
-            match self.outbox.handle_refusal(now) {
-                WaitingStop::None => {}
-                WaitingStop::TakesOver => self.take_over(now),
-                WaitingStop::Withdrawn => {
-                    events.push_back(SurfaceEvent::SlotDecided(self.address(), SlotId::Constraints));
-                }
+        match self.outbox.handle_refusal(now) {
+            // The refused hello is from before this surface wanted to take over.
+            _ if self.pair.takes_over() => self.take_over(now),
+            WaitingStop::None => {}
+            WaitingStop::TakesOver => self.take_over_to_obey(now),
+            WaitingStop::Withdrawn => {
+                events.push_back(SurfaceEvent::SlotDecided(self.address(), SlotId::Constraints));
             }
         }
     }
@@ -310,7 +325,7 @@ impl<R: StateReplica> VehiclePeer<R> {
             return self.handle_refusal(&refusal, now, events);
         }
         if inbound.restarted {
-            self.twins.handle_new_run();
+            self.twins.handle_new_run(inbound.header().kind().is_hello(), now);
             self.forget_peer(now, events);
             if self.pair.peer_introduction().is_some_and(|i| i.has_no_memory) {
                 let lost = self.outbox.handle_lost_memory(now);
@@ -325,7 +340,8 @@ impl<R: StateReplica> VehiclePeer<R> {
         let header = inbound.header().clone();
         if header.kind().is_hello() {
             if !self.pair.is_of_current_run(&header) {
-                self.twins.handle_stranger(now);
+                let is_found = self.twins.handle_other_hello(now);
+                events.extend(is_found.then(|| SurfaceEvent::Mismatch(self.address(), Mismatch::Twin)));
             }
             // A hello of the current run may be a replay, so it is no sign of life.
             if inbound.restarted {
@@ -339,6 +355,7 @@ impl<R: StateReplica> VehiclePeer<R> {
         }
         let Some(number) = inbound.number else { return };
         self.pair.set_takes_over(false);
+        self.takes_over_to_stop = false;
         if self.rivals.handle_contact(now) {
             events.push_back(SurfaceEvent::Rivalry(self.address()));
         }
@@ -410,6 +427,10 @@ impl<R: StateReplica> VehiclePeer<R> {
         }
         if chunk.kind == ChunkKind::Report {
             let settled = self.outbox.handle_report(&self.content.status.latest().slots, now);
+            let is_lost = |order: &SlotProgress| {
+                settled.contains(&order.id) && order.status == OrderStatus::Withdrawn(Withdrawal::Lost)
+            };
+            events.extend(self.outbox.progress().any(is_lost).then_some(SurfaceEvent::OrdersLost(vehicle)));
             for order in self.outbox.progress().filter(|order| settled.contains(&order.id)) {
                 self.in_force.apply(order);
             }
@@ -479,6 +500,7 @@ impl<R: StateReplica> VehiclePeer<R> {
             return false;
         }
         self.pair.renew();
+        self.twins.handle_own_run();
         self.forget_peer(now, events);
         true
     }

@@ -104,11 +104,15 @@ pub(super) struct TwinWatch {
     contact: Option<(Instant, Instant)>,
     /// When another run said hello, or answered a call.
     stranger: Option<Instant>,
+    /// When a vehicle first answered the present run of this surface by a hello.
+    answered: Option<Instant>,
     /// When both were last heard.
     found: Option<Instant>,
 }
 
 impl TwinWatch {
+    /// Time in which several vehicles answer one hello, shorter than a restart takes.
+    const ANSWERS: Duration = Duration::from_secs(5);
     /// Longer than a frame of the run before may take.
     const LATE: Duration = Duration::from_secs(10);
     /// A vehicle answers a call once it has had no frame of its run for a minute, as after a silence. One that has taken turns for
@@ -119,8 +123,15 @@ impl TwinWatch {
     const LIFETIME: Duration = Duration::from_secs(600);
 
     /// Another run than the current one is heard.
-    pub(super) fn handle_stranger(&mut self, now: Instant) {
+    fn handle_stranger(&mut self, now: Instant) {
         self.stranger.get_or_insert(now);
+    }
+
+    /// A hello of another run than the current one, sealed to the present run of this surface; returns whether a second vehicle is
+    /// found by it: one vehicle does not answer one hello by two runs.
+    pub(super) fn handle_other_hello(&mut self, now: Instant) -> bool {
+        self.handle_stranger(now);
+        self.answered.is_some_and(|at| now.since(at) < Self::ANSWERS) && self.find(now)
     }
 
     /// A call was answered: by a second vehicle, if the first one was in contact all the time.
@@ -139,14 +150,25 @@ impl TwinWatch {
         if self.stranger.take_if(|at| now.since(*at) >= Self::LATE).is_none() {
             return false;
         }
+        self.find(now)
+    }
+
+    /// A second vehicle is heard; returns whether it was not known before.
+    fn find(&mut self, now: Instant) -> bool {
         let was_found = self.is_found(now);
         self.found = Some(now);
         !was_found
     }
 
-    /// Another run has become the current one, perhaps the one that was heard.
-    pub(super) fn handle_new_run(&mut self) {
+    /// Another run has become the current one, perhaps the one that was heard: by a hello, the first vehicle has answered.
+    pub(super) fn handle_new_run(&mut self, is_by_hello: bool, now: Instant) {
         (self.contact, self.stranger) = (None, None);
+        self.answered = is_by_hello.then_some(now).or(self.answered);
+    }
+
+    /// This surface begins a run of its own, which no vehicle has answered.
+    pub(super) fn handle_own_run(&mut self) {
+        self.answered = None;
     }
 
     /// Whether two vehicles have this address, as far as is known.
