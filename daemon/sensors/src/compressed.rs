@@ -1,13 +1,17 @@
 //! Compressed images: JPEG, PNG, PPM and TIFF.
 
-use crate::exif::exif_stamp;
-use crate::{BitDepth, Stamp, complete_length};
+use crate::exif::{exif_orientation, exif_stamp};
+use crate::jpeg_end::{is_cut_jpeg, missing_rows};
+use crate::tiff_pages::{Prepared, prepared};
+use crate::{BitDepth, Stamp};
 use image::error::{ImageError, UnsupportedErrorKind};
+use image::metadata::Orientation;
 use image::{
     ColorType, DynamicImage, ExtendedColorType, ImageBuffer, ImageDecoder, ImageFormat, ImageReader, Limits, Rgb,
     RgbImage,
 };
 use std::io::Cursor;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 
 /// Pixels of the largest image that is decoded.
 pub const MAX_PIXELS: u32 = 64 << 20;
@@ -15,6 +19,8 @@ pub const MAX_PIXELS: u32 = 64 << 20;
 /// An image that cannot be used, as one line for people.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum DecodeError {
+    #[error("it is empty")]
+    Empty,
     #[error("not a JPEG, PNG, PPM or TIFF image")]
     UnknownFormat,
     #[error("the JPEG has no end, so a part of it is missing")]
@@ -32,14 +38,16 @@ pub enum DecodeError {
     OtherColours,
     #[error("it breaks off before its last row")]
     CutOff,
+    /// The rows from `row` on are missing or damaged.
+    #[error("it breaks off in row {row} of {rows}")]
+    BreaksOff { row: u32, rows: u32 },
+    #[error("it needs more memory than the {megabytes} MB that are allowed for an image")]
+    TooMuchMemory { megabytes: u64 },
+    /// A panic within a library.
+    #[error("not an image that can be read: its decoder failed; save it anew, or in another format")]
+    DecoderFailed,
     #[error("not an image that can be read: {0}")]
     Broken(String),
-}
-
-/// Whether the end of a JPEG is missing. The decoder fills the missing part with grey, which would be mapped as sea floor. What
-/// follows the end, as of cameras that write blocks, does not count.
-fn is_cut_jpeg(bytes: &[u8]) -> bool {
-    bytes.starts_with(&[0xFF, 0xD8]) && complete_length(bytes).is_none()
 }
 
 /// BigTIFF, with offsets of 64 bits; the library reads it but does not recognise it.
@@ -49,6 +57,9 @@ fn is_big_tiff(bytes: &[u8]) -> bool {
 
 /// The decoder of an image, in whatever format it has.
 fn decoder_of(bytes: &[u8], limits: Limits) -> Result<impl ImageDecoder, DecodeError> {
+    if bytes.is_empty() {
+        return Err(DecodeError::Empty);
+    }
     if is_cut_jpeg(bytes) {
         return Err(DecodeError::CutJpeg);
     }
@@ -56,13 +67,15 @@ fn decoder_of(bytes: &[u8], limits: Limits) -> Result<impl ImageDecoder, DecodeE
     let guessed = reader.with_guessed_format().map_err(|e| DecodeError::Broken(e.to_string()))?;
     let format = if is_big_tiff(bytes) { Some(ImageFormat::Tiff) } else { guessed.format() };
     let mut reader = ImageReader::with_format(Cursor::new(bytes), format.ok_or(DecodeError::UnknownFormat)?);
+    let broken = broken_within(&limits);
     reader.limits(limits);
     reader.into_decoder().map_err(broken)
 }
 
-/// What the library says, in words for people.
-fn broken(error: ImageError) -> DecodeError {
-    match &error {
+/// What the library says of an image that was read within `limits`, in words for people.
+fn broken_within(limits: &Limits) -> impl Fn(ImageError) -> DecodeError + use<> {
+    let megabytes = limits.max_alloc.unwrap_or(u64::MAX) >> 20;
+    move |error| match &error {
         ImageError::Unsupported(unsupported) => match unsupported.kind() {
             // Grey levels of so many bits: floats or whole numbers.
             UnsupportedErrorKind::Color(ExtendedColorType::Unknown(32 | 64 | 96 | 128)) => DecodeError::WideLevels,
@@ -70,21 +83,57 @@ fn broken(error: ImageError) -> DecodeError {
             _ => DecodeError::Broken(error.to_string()),
         },
         ImageError::IoError(cause) if cause.kind() == std::io::ErrorKind::UnexpectedEof => DecodeError::CutOff,
+        ImageError::Limits(_) => DecodeError::TooMuchMemory { megabytes },
         _ => DecodeError::Broken(error.to_string()),
     }
 }
 
+/// Runs a decoder, whose panic is an error of the image and does not end the process.
+fn guarded<T>(decodes: impl FnOnce() -> Result<T, DecodeError>) -> Result<T, DecodeError> {
+    // The image is dropped with all that the decoder had begun.
+    catch_unwind(AssertUnwindSafe(decodes)).unwrap_or(Err(DecodeError::DecoderFailed))
+}
+
 /// The image of a decoder, turned as its EXIF data say.
-fn upright(mut decoder: impl ImageDecoder, mut limits: Limits) -> Result<DynamicImage, DecodeError> {
+fn upright(
+    mut decoder: impl ImageDecoder,
+    prepared: &Prepared,
+    mut limits: Limits,
+) -> Result<DynamicImage, DecodeError> {
+    let bytes: &[u8] = &prepared.bytes;
+    let broken = broken_within(&limits);
     // The decoder counts its own memory only.
-    limits.reserve(decoder.total_bytes()).map_err(broken)?;
-    let orientation = decoder.orientation().map_err(broken)?;
+    limits.reserve(decoder.total_bytes()).map_err(&broken)?;
+    let orientation = match decoder.orientation().map_err(&broken)? {
+        // The library reads it only as a number of 16 bits.
+        Orientation::NoTransforms => exif_orientation(bytes).unwrap_or(Orientation::NoTransforms),
+        turned => turned,
+    };
     if matches!(decoder.color_type(), ColorType::Rgb32F | ColorType::Rgba32F) {
         return Err(DecodeError::WideLevels);
     }
-    let mut image = DynamicImage::from_decoder(decoder).map_err(broken)?;
+    let mut image = DynamicImage::from_decoder(decoder).map_err(&broken)?;
+    if let Some(row) = missing_rows(bytes, &image) {
+        return Err(DecodeError::BreaksOff { row, rows: image.height() });
+    }
+    if let Some((width, height)) = prepared.crop {
+        image = image.crop_imm(0, 0, width, height);
+    }
     image.apply_orientation(orientation);
     Ok(image)
+}
+
+/// Decodes an image of at most so many pixels, of a TIFF its first whole page.
+fn decode_within(bytes: &[u8], max_pixels: u64, limits: Limits) -> Result<DynamicImage, DecodeError> {
+    let prepared = prepared(bytes);
+    guarded(|| {
+        let decoder = decoder_of(&prepared.bytes, limits.clone())?;
+        let (width, height) = decoder.dimensions();
+        if u64::from(width) * u64::from(height) > max_pixels {
+            return Err(DecodeError::TooLarge { width, height });
+        }
+        upright(decoder, &prepared, limits)
+    })
 }
 
 /// Decodes an image of a file and turns it upright as its EXIF data say. `limits` bounds its size and the memory for it.
@@ -92,18 +141,13 @@ fn upright(mut decoder: impl ImageDecoder, mut limits: Limits) -> Result<Dynamic
 /// # Errors
 /// The format is not known, a part of the image is missing, or it is larger than `limits`.
 pub fn decode_upright(bytes: &[u8], limits: Limits) -> Result<DynamicImage, DecodeError> {
-    upright(decoder_of(bytes, limits.clone())?, limits)
+    decode_within(bytes, u64::MAX, limits)
 }
 
 /// Decodes an image to 8 bits a channel; of 16 bits, `bits` gives the highest level, or 16 where it is automatic. Transparency is
 /// dropped.
 pub fn decode(bytes: &[u8], bits: BitDepth) -> Result<RgbImage, DecodeError> {
-    let decoder = decoder_of(bytes, limits())?;
-    let (width, height) = decoder.dimensions();
-    if u64::from(width) * u64::from(height) > u64::from(MAX_PIXELS) {
-        return Err(DecodeError::TooLarge { width, height });
-    }
-    Ok(match (upright(decoder, limits())?, bits) {
+    Ok(match (decode_within(bytes, u64::from(MAX_PIXELS), limits())?, bits) {
         (image, BitDepth::Fixed(bits)) if bits < 16 && is_deep(&image) => scaled(&image.into_rgb16(), bits),
         (image, _) => image.into_rgb8(),
     })
@@ -276,6 +320,24 @@ mod tests {
             let with_exif = [&png[..33], &chunk, &png[33..]].concat();
             assert_eq!(decode(&with_exif, WHOLE).unwrap(), turned, "orientation {orientation}");
         }
+    }
+
+    #[test]
+    fn a_panic_of_a_decoder_is_an_error_of_the_image() {
+        let failed: Result<(), _> = guarded(|| panic!("within a library"));
+        assert_eq!(failed, Err(DecodeError::DecoderFailed));
+    }
+
+    #[test]
+    fn an_empty_file_and_the_limit_of_memory_are_named() {
+        assert_eq!(decode(b"", WHOLE), Err(DecodeError::Empty));
+        let mut small = Limits::default();
+        small.max_alloc = Some(1 << 20);
+        let wide = RgbImage::new(1000, 1000);
+        let mut bytes = Cursor::new(Vec::new());
+        wide.write_to(&mut bytes, ImageFormat::Png).unwrap();
+        let refused = decode_upright(bytes.get_ref(), small);
+        assert_eq!(refused, Err(DecodeError::TooMuchMemory { megabytes: 1 }));
     }
 
     #[test]

@@ -1,10 +1,12 @@
 //! The time in the EXIF data of an image (CIPA DC-008, Exif 2.31): JPEG, PNG and TIFF.
 
 use crate::Stamp;
+use image::metadata::Orientation;
 
 /// Bytes at the head of a JPEG or PNG among which its EXIF data begin.
 const HEAD_BYTES: usize = 1 << 16;
 
+const ORIENTATION: u16 = 0x0112;
 const EXIF_DATA: u16 = 0x8769;
 const DATE_TIME_ORIGINAL: u16 = 0x9003;
 const OFFSET_TIME_ORIGINAL: u16 = 0x9011;
@@ -19,6 +21,13 @@ pub(crate) fn exif_stamp(bytes: &[u8]) -> Option<Stamp> {
     let seconds = text(DATE_TIME_ORIGINAL)?.replace(':', "");
     let local = Stamp::parse(&format!("{seconds}.{}", text(SUB_SEC_TIME_ORIGINAL).filter(|s| !s.is_empty())?))?;
     Some(local.shifted(-zone_s(text(OFFSET_TIME_ORIGINAL)?)?))
+}
+
+/// How an image is to be turned, by its EXIF data or its TIFF, if they say so. Some programs write it as a byte or a long.
+pub(crate) fn exif_orientation(bytes: &[u8]) -> Option<Orientation> {
+    let data = ExifData::of(bytes)?;
+    let number = data.number(data.long(4)?, ORIENTATION)?;
+    Orientation::from_exif(u8::try_from(number).ok()?)
 }
 
 /// Seconds that the time of a zone is ahead of UTC, of a text such as `+05:30`.
@@ -38,7 +47,7 @@ fn zone_s(zone: &str) -> Option<f64> {
 }
 
 /// The fields of an image, in the form of a TIFF.
-struct ExifData<'a> {
+pub(crate) struct ExifData<'a> {
     bytes: &'a [u8],
     is_little_endian: bool,
 }
@@ -52,8 +61,17 @@ impl<'a> ExifData<'a> {
             () if head.starts_with(b"\x89PNG") => after(b"eXIf")?,
             () => bytes,
         };
+        Self::of_tiff(bytes)
+    }
+
+    /// The fields of a TIFF; `None` of anything else, and of BigTIFF.
+    pub(crate) fn of_tiff(bytes: &'a [u8]) -> Option<Self> {
         let is_little_endian = bytes.starts_with(b"II*\0");
         (is_little_endian || bytes.starts_with(b"MM\0*")).then_some(Self { bytes, is_little_endian })
+    }
+
+    pub(crate) fn is_little_endian(&self) -> bool {
+        self.is_little_endian
     }
 
     fn array<const N: usize>(&self, at: usize) -> Option<[u8; N]> {
@@ -68,19 +86,32 @@ impl<'a> ExifData<'a> {
         self.array(at).map(u16::from_be_bytes)
     }
 
-    fn long(&self, at: usize) -> Option<usize> {
+    pub(crate) fn long(&self, at: usize) -> Option<usize> {
         self.array(at).map(|bytes| u32::from_be_bytes(bytes) as usize)
     }
 
     /// Where the entry of a tag is, in the directory at `directory`: tag, type, count and value, 12 bytes.
-    fn entry(&self, directory: usize, tag: u16) -> Option<usize> {
+    pub(crate) fn entry(&self, directory: usize, tag: u16) -> Option<usize> {
         let first = directory.checked_add(2)?;
         let entries = usize::from(self.short(directory)?);
         (0..entries).map(|i| first + 12 * i).find(|&at| self.short(at) == Some(tag))
     }
 
-    fn number(&self, directory: usize, tag: u16) -> Option<usize> {
-        self.long(self.entry(directory, tag)? + 8)
+    /// The number of a field, the first if it has several; `None` if its type is none of whole numbers.
+    pub(crate) fn number(&self, directory: usize, tag: u16) -> Option<usize> {
+        let entry = self.entry(directory, tag)?;
+        match self.short(entry + 2)? {
+            1 => self.array(entry + 8).map(|[byte]| usize::from(byte)),
+            3 => self.short(entry + 8).map(usize::from),
+            4 | 13 => self.long(entry + 8),
+            _ => None,
+        }
+    }
+
+    /// Where the next directory of a file is.
+    pub(crate) fn next_directory(&self, directory: usize) -> Option<usize> {
+        let entries = usize::from(self.short(directory)?);
+        self.long(directory.checked_add(2 + 12 * entries)?).filter(|next| *next > 0)
     }
 
     /// A field of ASCII, without what follows its end. Up to four bytes stand in the entry itself.
@@ -141,6 +172,18 @@ pub(crate) mod tests {
         for zone in ["02:00", "+99:00", "+2", ""] {
             assert_eq!(exif_stamp(&exif(&[TAKEN, (OFFSET_TIME_ORIGINAL, zone), fraction])), None, "{zone:?}");
         }
+    }
+
+    #[test]
+    fn an_orientation_is_read_whatever_its_type_of_number() {
+        let of = |kind: u8, value: [u8; 4]| {
+            let entry = [&[1, 0x12, 0, kind, 0, 0, 0, 1][..], &value, &[0; 4]].concat();
+            exif_orientation(&[&b"MM\0*\0\0\0\x08\0\x01"[..], &entry].concat())
+        };
+        for (kind, value) in [(1, [6, 0, 0, 0]), (3, [0, 6, 0, 0]), (4, [0, 0, 0, 6])] {
+            assert_eq!(of(kind, value), Some(Orientation::Rotate90), "type {kind}");
+        }
+        assert_eq!((of(3, [0, 9, 0, 0]), of(5, [0, 0, 0, 6]), of(4, [0, 0, 1, 6])), (None, None, None));
     }
 
     #[test]

@@ -27,6 +27,7 @@ mod dvl;
 mod exif;
 mod frame_matcher;
 mod image_stream;
+mod jpeg_end;
 mod lens;
 mod point_cloud;
 mod pose_track;
@@ -34,6 +35,7 @@ mod raw_image;
 mod rotation;
 mod sight;
 mod stamp;
+mod tiff_pages;
 mod transforms;
 
 pub use calibration::{Calibration, CalibrationError};

@@ -147,6 +147,16 @@ impl Stamp {
         }
     }
 
+    /// The time in the name of an image, as [`Self::parse_with_form`] reads it, unless the name only counts images or is the time of a
+    /// day: a whole number with a leading zero, or one that is no second of the years 2000 to 2099. The seconds of a clock that began
+    /// at 0, as of a simulator, have decimals.
+    pub fn of_name(stem: &str) -> Option<(Self, StampForm)> {
+        let found = Self::parse_with_form(stem)?;
+        let is_whole = stem.bytes().all(|b| b.is_ascii_digit());
+        let is_second = found.1 != StampForm::Seconds || EPOCHS_S.contains(&(found.0.0 / NANOS));
+        (!is_whole || is_second && !stem.starts_with('0')).then_some(found)
+    }
+
     /// Seconds from `earlier` to this stamp; negative if it is later.
     pub fn seconds_since(self, earlier: Self) -> f64 {
         let nanos = i128::from(self.0) - i128::from(earlier.0);
@@ -235,5 +245,19 @@ mod tests {
             assert_eq!(Stamp::parse(wrong), None, "{wrong}");
         }
         assert_eq!(Stamp::from_ros(-1, 5).unwrap().to_string(), "-1.000000005");
+    }
+
+    #[test]
+    fn numbers_that_count_images_are_no_times() {
+        for counter in
+            ["0001", "1", "000001", "00000001", "115442", "115442123", "0123456789", "9999999999", "000000000123"]
+        {
+            assert_eq!(Stamp::of_name(counter), None, "{counter}");
+        }
+        for time in ["1795719000", "1795719000567", "123000000000", "10.5", "0.25", "20261126T185000", "20261126185000"]
+        {
+            assert_eq!(Stamp::of_name(time), Stamp::parse_with_form(time), "{time}");
+            assert!(Stamp::of_name(time).is_some(), "{time}");
+        }
     }
 }

@@ -57,10 +57,16 @@ struct ToldNames {
 impl ToldNames {
     /// A new name; returns what people should know of its time, once.
     fn handle(&mut self, name: &str, now: SystemTime) -> Option<String> {
-        let found = Path::new(name).file_stem().and_then(|stem| Stamp::parse_with_form(stem.to_str()?));
-        let Some((stamp, form)) = found else {
-            let text = "the name has no time: the time in the image counts, or else its arrival";
-            return self.forms.insert(None).then(|| format!("{name}: {text}"));
+        let stem = Path::new(name).file_stem()?.to_string_lossy().into_owned();
+        let Some((stamp, form)) = Stamp::of_name(&stem) else {
+            let is_number = stem.bytes().all(|b| b.is_ascii_digit());
+            let what = if is_number {
+                "the number in the name is no time since the year 2000"
+            } else {
+                "the name has no time"
+            };
+            let text = format!("{name}: {what}: the time in the image counts, or else its arrival");
+            return self.forms.insert(None).then_some(text);
         };
         let now = now.duration_since(SystemTime::UNIX_EPOCH).ok()?;
         let now = Stamp::from_nanos(i64::try_from(now.as_nanos()).ok()?);
@@ -267,7 +273,7 @@ fn head_of(path: &Path) -> Option<Vec<u8>> {
 }
 
 fn stamp_of_name(path: &Path) -> Option<Stamp> {
-    Stamp::parse(&path.file_stem()?.to_string_lossy())
+    Stamp::of_name(&path.file_stem()?.to_string_lossy()).map(|(stamp, _)| stamp)
 }
 
 #[cfg(test)]
@@ -327,7 +333,7 @@ mod tests {
         let folder = Folder::new("order");
         let mut source = folder.source();
         source.open().unwrap();
-        for name in ["10.5.ppm", "9.25.ppm", "100.ppm"] {
+        for name in ["10.5.ppm", "9.25.ppm", "100.0.ppm"] {
             folder.write(name, PPM);
         }
         let mut stamp =
@@ -349,6 +355,22 @@ mod tests {
         let ahead = told.handle("20261127T185000.jpg", now).unwrap();
         assert!(ahead.contains("24.0 hours ahead"), "{ahead}");
         assert_eq!(told.handle("1795719002567.jpg", now), None, "a form is told once");
+    }
+
+    #[test]
+    fn images_that_are_only_counted_have_no_time_of_their_own() {
+        let folder = Folder::new("counted");
+        let mut source = folder.source();
+        source.open().unwrap();
+        for name in ["0001.ppm", "0002.ppm", "115442.ppm"] {
+            folder.write(name, PPM);
+        }
+        let mut image = || source.next(Duration::ZERO, &mut |_, _| ()).unwrap().map(image_of);
+        let stamps: Vec<_> =
+            std::iter::repeat_with(&mut image).map_while(|image| image.map(|i| i.stamp)).take(3).collect();
+        assert_eq!(stamps, [None; 3]);
+        let line = ToldNames::default().handle("0001.jpg", SystemTime::now()).unwrap();
+        assert!(line.contains("no time since the year 2000"), "{line}");
     }
 
     #[test]

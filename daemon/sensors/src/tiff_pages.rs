@@ -1,0 +1,184 @@
+//! TIFF files in the form in which the library reads them (TIFF 6.0, Adobe 1992).
+
+use crate::exif::ExifData;
+use std::borrow::Cow;
+
+const NEW_SUBFILE_TYPE: u16 = 254;
+const IMAGE_WIDTH: u16 = 256;
+const IMAGE_LENGTH: u16 = 257;
+const PLANAR_CONFIGURATION: u16 = 284;
+const TILE_WIDTH: u16 = 322;
+const TILE_LENGTH: u16 = 323;
+
+/// Bits of `NEW_SUBFILE_TYPE`: a reduced image, a mask.
+const NOT_WHOLE: usize = 1 | 4;
+/// Separate planes.
+const PLANAR: usize = 2;
+/// Pages that are looked at.
+const MAX_PAGES: usize = 64;
+
+/// The bytes of an image for the library, and the size to which its picture is then cropped.
+#[derive(Debug, PartialEq)]
+pub(crate) struct Prepared<'a> {
+    pub(crate) bytes: Cow<'a, [u8]>,
+    pub(crate) crop: Option<(u32, u32)>,
+}
+
+/// Prepares an image; one that is no TIFF, or a TIFF that needs nothing, is left as it is.
+///
+/// The library reads the first page, which may be a reduced image: the first whole one is put there. Of separate planes in tiles,
+/// tiff 0.11.3 reads only images whose size is a multiple of the tile's: the size is that of the tiles, until it is cropped.
+pub(crate) fn prepared(bytes: &[u8]) -> Prepared<'_> {
+    let as_it_is = Prepared { bytes: Cow::Borrowed(bytes), crop: None };
+    let Some(tiff) = ExifData::of_tiff(bytes) else { return as_it_is };
+    let Some((first, page)) = tiff.long(4).zip(first_whole_page(&tiff)) else { return as_it_is };
+    let padded = padded_size(&tiff, page);
+    if first == page && padded.is_none() {
+        return as_it_is;
+    }
+    let mut changed = bytes.to_vec();
+    write_long(&mut changed, 4, page as u32, tiff.is_little_endian());
+    let crop = padded.map(|sizes| {
+        for (tag, size) in [(IMAGE_WIDTH, sizes.padded.0), (IMAGE_LENGTH, sizes.padded.1)] {
+            if let Some(entry) = tiff.entry(page, tag) {
+                write_as_long(&mut changed, entry, size, tiff.is_little_endian());
+            }
+        }
+        sizes.own
+    });
+    Prepared { bytes: Cow::Owned(changed), crop }
+}
+
+/// Where the first page that is neither reduced nor a mask begins; without one, where the first page does.
+fn first_whole_page(tiff: &ExifData) -> Option<usize> {
+    let first = tiff.long(4)?;
+    let next = |page: &usize| tiff.next_directory(*page);
+    let is_whole = |page: &usize| tiff.number(*page, NEW_SUBFILE_TYPE).is_none_or(|kind| kind & NOT_WHOLE == 0);
+    std::iter::successors(Some(first), next).take(MAX_PAGES).find(is_whole).or(Some(first))
+}
+
+struct Sizes {
+    own: (u32, u32),
+    /// That of all tiles together.
+    padded: (u32, u32),
+}
+
+/// The sizes of a page of separate planes in tiles, if they differ.
+fn padded_size(tiff: &ExifData, page: usize) -> Option<Sizes> {
+    if tiff.number(page, PLANAR_CONFIGURATION)? != PLANAR {
+        return None;
+    }
+    let size = |tag| u32::try_from(tiff.number(page, tag)?).ok();
+    let own = (size(IMAGE_WIDTH)?, size(IMAGE_LENGTH)?);
+    let padded =
+        (own.0.checked_next_multiple_of(size(TILE_WIDTH)?)?, own.1.checked_next_multiple_of(size(TILE_LENGTH)?)?);
+    (own != padded).then_some(Sizes { own, padded })
+}
+
+fn write_long(bytes: &mut [u8], at: usize, number: u32, is_little_endian: bool) {
+    let number = if is_little_endian { number.to_le_bytes() } else { number.to_be_bytes() };
+    if let Some(place) = bytes.get_mut(at..at + 4) {
+        place.copy_from_slice(&number);
+    }
+}
+
+/// Makes an entry one number of 32 bits.
+fn write_as_long(bytes: &mut [u8], entry: usize, number: u32, is_little_endian: bool) {
+    const LONG: u16 = 4;
+    let kind = if is_little_endian { LONG.to_le_bytes() } else { LONG.to_be_bytes() };
+    if let Some(place) = bytes.get_mut(entry + 2..entry + 4) {
+        place.copy_from_slice(&kind);
+    }
+    write_long(bytes, entry + 8, number, is_little_endian);
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::{BitDepth, decode};
+    use image::{Rgb, RgbImage};
+
+    const SHORT: u16 = 3;
+    const LONG: u16 = 4;
+
+    /// Entries of a directory in little-endian order: tag, type and numbers, which stand behind it where they are many.
+    fn directory(at: u32, entries: &[(u16, u16, Vec<u32>)], next: u32) -> Vec<u8> {
+        let mut after = at + 2 + 12 * entries.len() as u32 + 4;
+        let (mut head, mut values) = ((entries.len() as u16).to_le_bytes().to_vec(), Vec::new());
+        for (tag, kind, numbers) in entries {
+            head.extend([&tag.to_le_bytes()[..], &kind.to_le_bytes(), &(numbers.len() as u32).to_le_bytes()].concat());
+            let bytes: Vec<u8> = match *kind {
+                SHORT => numbers.iter().flat_map(|n| (*n as u16).to_le_bytes()).collect(),
+                _ => numbers.iter().flat_map(|n| n.to_le_bytes()).collect(),
+            };
+            if bytes.len() <= 4 {
+                head.extend([&bytes[..], &[0; 4]].concat()[..4].iter());
+            } else {
+                head.extend(after.to_le_bytes());
+                after += bytes.len() as u32;
+                values.extend(bytes);
+            }
+        }
+        [head, next.to_le_bytes().to_vec(), values].concat()
+    }
+
+    fn pixel(x: u32, y: u32) -> [u8; 3] {
+        [x as u8 * 5, y as u8 * 7, (x + y) as u8]
+    }
+
+    /// Three planes of 20 x 18 pixels in tiles of 16 x 16.
+    fn planar_tiled() -> Vec<u8> {
+        let tiles = (0..3).flat_map(|plane| (0..4).map(move |tile| (plane, tile)));
+        let bytes: Vec<u8> = tiles
+            .flat_map(|(plane, tile)| (0..256).map(move |i| (plane, tile % 2 * 16 + i % 16, tile / 2 * 16 + i / 16)))
+            .map(|(plane, x, y)| if x < 20 && y < 18 { pixel(x, y)[plane] } else { 77 })
+            .collect();
+        let at = 8 + bytes.len() as u32;
+        let entries = [
+            (256, SHORT, vec![20]),
+            (257, SHORT, vec![18]),
+            (258, SHORT, vec![8, 8, 8]),
+            (259, SHORT, vec![1]),
+            (262, SHORT, vec![2]),
+            (277, SHORT, vec![3]),
+            (284, SHORT, vec![2]),
+            (322, SHORT, vec![16]),
+            (323, SHORT, vec![16]),
+            (324, LONG, (0..12).map(|i| 8 + 256 * i).collect()),
+            (325, LONG, vec![256; 12]),
+        ];
+        [&b"II*\0"[..], &at.to_le_bytes(), &bytes, &directory(at, &entries, 0)].concat()
+    }
+
+    #[test]
+    fn planes_in_tiles_that_reach_beyond_the_image_are_read() {
+        let expected = RgbImage::from_fn(20, 18, |x, y| Rgb(pixel(x, y)));
+        assert_eq!(decode(&planar_tiled(), BitDepth::Fixed(16)), Ok(expected));
+    }
+
+    #[test]
+    fn the_first_whole_page_counts_and_not_its_reduced_image() {
+        let strip = |width: u32, place: u32, subfile: u32| {
+            vec![
+                (254, LONG, vec![subfile]),
+                (256, SHORT, vec![width]),
+                (257, SHORT, vec![1]),
+                (258, SHORT, vec![8]),
+                (259, SHORT, vec![1]),
+                (262, SHORT, vec![1]),
+                (273, LONG, vec![place]),
+                (277, SHORT, vec![1]),
+                (278, SHORT, vec![1]),
+                (279, LONG, vec![width]),
+            ]
+        };
+        let length = directory(0, &strip(2, 0, 1), 0).len() as u32;
+        let (first, second) = (16, 16 + length);
+        let file = |kinds: [u32; 2]| {
+            let pages =
+                [directory(first, &strip(2, 8, kinds[0]), second), directory(second, &strip(6, 10, kinds[1]), 0)];
+            [&b"II*\0"[..], &first.to_le_bytes(), &[1, 2, 3, 4, 5, 6, 7, 8], &pages.concat()].concat()
+        };
+        let width = |kinds| decode(&file(kinds), BitDepth::Fixed(16)).unwrap().width();
+        assert_eq!([width([1, 0]), width([0, 1]), width([4, 0]), width([1, 1])], [6, 2, 6, 2]);
+    }
+}
