@@ -9,6 +9,8 @@ use std::fmt::Write;
 
 /// Width of a figure, pixels.
 const WIDTH: f64 = 760.0;
+/// Characters of a marker's text on the map.
+const MAX_MARKER: usize = 30;
 
 /// The map of the operator, north up, with the reported track, a grid of metres, a scale bar and an arrow to the north; `None` without
 /// cells.
@@ -25,7 +27,8 @@ pub(super) fn map(state: &VehicleState, vehicle: &DiveVehicle) -> Option<String>
     track(&mut svg, &frame, &vehicle.track);
     numbers(&mut svg, &frame, bounds, state, vehicle);
     for marker in &state.markers {
-        point(&mut svg, &frame, (marker.x_m, marker.y_m), "marker");
+        let text: String = marker.text.chars().take(MAX_MARKER).collect();
+        point(&mut svg, &frame, (marker.x_m, marker.y_m), &text);
     }
     scale(&mut svg, &frame);
     svg += "</svg>";
@@ -149,9 +152,10 @@ fn point(svg: &mut String, frame: &Frame, (east_m, north_m): (f64, f64), name: &
     let (x, y) = frame.place(east_m, north_m);
     let _ = writeln!(
         svg,
-        "<circle class=\"point\" cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"4\"/><text class=\"number\" x=\"{:.1}\" y=\"{:.1}\">{name}</text>",
+        "<circle class=\"point\" cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"4\"/><text class=\"number\" x=\"{:.1}\" y=\"{:.1}\">{}</text>",
         x + 6.0,
-        y - 5.0
+        y - 5.0,
+        Escaped(name)
     );
 }
 

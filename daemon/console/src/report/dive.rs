@@ -16,6 +16,8 @@ use std::path::PathBuf;
 
 /// Moments of a record at which its maps are looked at.
 const MOMENTS: u64 = 60;
+/// The longest content of an order that is told whole, bytes.
+const MAX_CONTENT: usize = 200;
 
 /// The dive of a record of the surface.
 #[derive(Debug, Default)]
@@ -161,6 +163,8 @@ impl Dive {
         });
         let nearest = logged.filter(|(away_s, ..)| *away_s < 0.5).min_by(|a, b| a.0.total_cmp(&b.0));
         let (by, words) = nearest.map_or((String::new(), content.clone()), |(_, by, words)| (by, words));
+        // The log has places in a few words.
+        let words = if content.len() > MAX_CONTENT { words } else { content };
         (if given.principal.is_empty() { by } else { given.principal.clone() }, words)
     }
 }

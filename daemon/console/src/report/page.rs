@@ -22,7 +22,7 @@ border-bottom:1px solid #ccc}td.n{text-align:right;white-space:nowrap}td.t{white
 svg text{font:11px system-ui,sans-serif}.grid{stroke:#000;stroke-opacity:.25;stroke-width:.6;fill:none}\
 .track{fill:none;stroke:#000;stroke-width:1.5;stroke-linejoin:round}.line{fill:none;stroke:#000;stroke-width:1.2}\
 .scale{fill:none;stroke:#000;stroke-width:1.5}.swatch{display:inline-block;width:1em;height:1em;border:1px solid #000;\
-vertical-align:-.15em;margin-right:.4em}.images{display:flex;flex-wrap:wrap;gap:.6em}.images img{width:160px;display:block;\
+vertical-align:-.15em;margin-right:.4em}.images{display:flex;flex-wrap:wrap;gap:.6em}.images figure{margin:0}.images img{width:130px;display:block;\
 image-rendering:pixelated}.number{font-weight:600;paint-order:stroke;stroke:#fff;stroke-width:3px}\
 .point{fill:#fff;stroke:#000;stroke-width:1.5}.legend span{white-space:nowrap;margin-right:1em}\
 h2,h3{break-after:avoid}tr,svg{break-inside:avoid}@media print{body{margin:0;max-width:none}figure.map{break-inside:avoid}}";
@@ -72,11 +72,11 @@ impl Dive {
     }
 
     fn vehicle(&self, page: &mut String, state: &VehicleState, vehicle: &DiveVehicle) {
-        let _ = writeln!(page, "<h2>{}</h2>\n<p>", Escaped(&state.name));
+        let _ = writeln!(page, "<h2>{}</h2>\n<ul>", Escaped(&state.name));
         for sentence in words::summary(self, state, vehicle) {
-            let _ = writeln!(page, "{}", Escaped(&sentence));
+            let _ = writeln!(page, "<li>{}</li>", Escaped(&sentence));
         }
-        *page += "</p>\n";
+        *page += "</ul>\n";
         if let Some(map) = chart::map(state, vehicle) {
             let _ = writeln!(
                 page,
