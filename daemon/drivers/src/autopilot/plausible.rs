@@ -87,7 +87,8 @@ const PLACE_NORTH: Bounds = Bounds {
     has_zero: false,
 };
 
-const PLACE_EAST: Bounds = Bounds { name: "position east", ..PLACE_NORTH };
+/// Longitudes begin anew once around the Earth: 360 degrees of 111.32 km.
+const PLACE_EAST: Bounds = Bounds { name: "position east", turn: Some(360.0 * 111_320.0), ..PLACE_NORTH };
 
 const VELOCITY_NORTH: Bounds = Bounds { name: "velocity north", ..VELOCITY_EAST };
 

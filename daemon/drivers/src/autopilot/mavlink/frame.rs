@@ -39,6 +39,8 @@ pub struct Refused {
 pub struct Deframer {
     held: Vec<u8>,
     refused: Refused,
+    /// Whether the held bytes begin where a frame has ended.
+    is_aligned: bool,
 }
 
 /// The frame at the front of the collected bytes.
@@ -58,6 +60,7 @@ impl Deframer {
 
     pub fn clear(&mut self) {
         self.held.clear();
+        self.is_aligned = false;
     }
 
     /// Takes bytes; calls `found` with each frame of a message whose layout byte `extra` knows.
@@ -70,10 +73,14 @@ impl Deframer {
             match self.front(rest, &extra) {
                 Front::Incomplete => break,
                 Front::Whole(n, frame) => {
+                    self.is_aligned = true;
                     frame.into_iter().for_each(&mut found);
                     rest = rest.get(n..).unwrap_or_default();
                 }
-                Front::Skip(n) => rest = rest.get(n.max(1)..).unwrap_or_default(),
+                Front::Skip(n) => {
+                    self.is_aligned = false;
+                    rest = rest.get(n.max(1)..).unwrap_or_default();
+                }
             }
         }
         self.held = rest.to_vec();
@@ -106,7 +113,7 @@ impl Deframer {
             false => number(5),
         };
         let Some(id) = id else { return Front::Incomplete };
-        let Some(extra) = extra(id) else { return Front::Whole(whole.len(), None) };
+        let Some(extra) = extra(id) else { return self.unknown(whole.len(), rest.get(whole.len())) };
         let told = whole.get(body).zip(whole.get(body + 1)).map(|(&low, &high)| u16::from_le_bytes([low, high]));
         if told != Some(check(whole.get(1..body).unwrap_or_default(), extra)) {
             self.refused.checksum += 1;
@@ -115,6 +122,22 @@ impl Deframer {
         let payload = whole.get(head..body).unwrap_or_default().to_vec();
         let frame = Frame { system: byte(at).unwrap_or(0), component: byte(at + 1).unwrap_or(0), id, payload };
         Front::Whole(whole.len(), Some(frame))
+    }
+}
+
+impl Deframer {
+    /// A frame of an unknown message has a check that cannot be verified, and may be noise that hides other frames: another frame must
+    /// be `next`, or nothing behind a frame.
+    fn unknown(&mut self, length: usize, next: Option<&u8>) -> Front {
+        match next {
+            Some(&V1 | &V2) => Front::Whole(length, None),
+            None if self.is_aligned => Front::Whole(length, None),
+            None => Front::Incomplete,
+            Some(_) => {
+                self.refused.garbage += 1;
+                Front::Skip(1)
+            }
+        }
     }
 }
 
@@ -189,6 +212,23 @@ mod tests {
         let (mut found, mut deframer) = (Vec::new(), Deframer::default());
         deframer.push(&[v1, signed, unknown].concat(), extra, |f| found.push(f.system));
         assert_eq!((found, deframer.refused()), (vec![1, 255], Refused::default()));
+    }
+
+    #[test]
+    fn noise_that_looks_like_an_unknown_frame_hides_nothing() {
+        let beats = bytes(HEARTBEAT).repeat(20);
+        for noise in [vec![V2], vec![V1], vec![V2, 250, 0, 0], b"x\xFD\xC8\0\0\x01\x01\x01\x09\x09".to_vec()] {
+            let (mut found, mut deframer) = (0, Deframer::default());
+            deframer.push(&[&bytes(HEARTBEAT)[..], &noise, &beats].concat(), extra, |_| found += 1);
+            assert_eq!(found, 21, "{noise:?}");
+        }
+        let mut unknown = bytes(HEARTBEAT);
+        unknown[7] = 99;
+        let (mut found, mut deframer) = (0, Deframer::default());
+        for datagram in [unknown, bytes(HEARTBEAT), bytes(HEARTBEAT)] {
+            deframer.push(&datagram, extra, |_| found += 1);
+        }
+        assert_eq!((found, deframer.refused()), (2, Refused::default()));
     }
 
     proptest! {

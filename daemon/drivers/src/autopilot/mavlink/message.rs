@@ -20,13 +20,7 @@ pub enum Heard {
         base_mode: u8,
     },
     /// ATTITUDE, radians: starboard down, bow up, clockwise from north.
-    Attitude {
-        /// Milliseconds since the autopilot started.
-        time_boot_ms: u32,
-        roll: f32,
-        pitch: f32,
-        yaw: f32,
-    },
+    Attitude { roll: f32, pitch: f32, yaw: f32 },
     /// LOCAL_POSITION_NED: metres and metres a second; north, east, down.
     Local {
         /// Milliseconds since the autopilot started.
@@ -69,6 +63,10 @@ pub enum Heard {
         /// MAV_SEVERITY: 0 emergency to 7 debug.
         severity: u8,
         text: String,
+        /// The number of a text in several messages and the place of this one; 0: it is alone.
+        part: (u16, u8),
+        /// Whether it ends in this message.
+        is_end: bool,
     },
 }
 
@@ -110,6 +108,11 @@ pub fn heard_extra(id: u32) -> Option<u8> {
         253 => 83,
         _ => return None,
     })
+}
+
+/// The time since the autopilot's start in a message that has one, milliseconds. 0 is what programs write that do not know it.
+pub fn boot_time_ms(id: u32, payload: &[u8]) -> Option<u32> {
+    matches!(id, 30 | 32 | 33 | 85 | 87 | 132).then(|| Fields(payload).u32()).filter(|ms| *ms > 0)
 }
 
 /// Fields of a payload, in order; fields missing at its end are zero.
@@ -155,7 +158,10 @@ impl Heard {
         let mut f = Fields(payload);
         let read = match id {
             HEARTBEAT => Self::Heartbeat { custom_mode: f.u32(), kind: f.u8(), autopilot: f.u8(), base_mode: f.u8() },
-            30 => Self::Attitude { time_boot_ms: f.u32(), roll: f.f32(), pitch: f.f32(), yaw: f.f32() },
+            30 => {
+                f.u32();
+                Self::Attitude { roll: f.f32(), pitch: f.f32(), yaw: f.f32() }
+            }
             32 => Self::Local {
                 time_boot_ms: f.u32(),
                 place: [f.f32(), f.f32(), f.f32()],
@@ -196,7 +202,10 @@ impl Heard {
                 let [_, number] = f.u16().to_le_bytes();
                 match f.u8() {
                     LOOKS_DOWN => {
-                        let is_in_range = now > 0 && (least..=most).contains(&now);
+                        // Covariance, angles of view and attitude.
+                        f.take::<25>();
+                        let is_valid = f.u8() != INVALID_QUALITY;
+                        let is_in_range = is_valid && now > 0 && (least..=most).contains(&now);
                         Self::DistanceDown(number, is_in_range.then_some(f32::from(now) / 100.0))
                     }
                     _ => Self::DistanceElsewhere,
@@ -212,9 +221,11 @@ impl Heard {
             77 => Self::Ack { command: f.u16(), result: f.u8() },
             253 => {
                 let severity = f.u8();
-                let text: Vec<u8> = f.0.iter().take(50).copied().take_while(|b| *b != 0).collect();
-                let text = String::from_utf8_lossy(&text).chars().filter(|c| !c.is_control()).collect();
-                Self::Text { severity, text }
+                let text = f.take::<50>();
+                let text = text.split(|b| *b == 0).next().unwrap_or_default();
+                let is_end = text.len() < 50;
+                let text = String::from_utf8_lossy(text).chars().filter(|c| !c.is_control()).collect();
+                Self::Text { severity, text, part: (f.u16(), f.u8()), is_end }
             }
             _ => return None,
         };
@@ -228,6 +239,9 @@ impl Heard {
         is_sound.then_some(read)
     }
 }
+
+/// `signal_quality` of a measurement that is not valid; 0 is not known.
+const INVALID_QUALITY: u8 = 1;
 
 /// MAV_SENSOR_ROTATION_PITCH_270: the sensor looks down.
 const LOOKS_DOWN: u8 = 25;
@@ -342,7 +356,7 @@ mod tests {
         let frames = [
             (
                 "fd1000000001011e0000e8030000cdcccc3dcdcc4cbe0000c03f61b4".to_owned(),
-                Heard::Attitude { time_boot_ms: 1000, roll: 0.1, pitch: -0.2, yaw: 1.5 },
+                Heard::Attitude { roll: 0.1, pitch: -0.2, yaw: 1.5 },
             ),
             (format!("fd1900000001013e0000{}5a002d00110a72", zeros(20)), Heard::WaypointDistance(17)),
             (
@@ -381,6 +395,15 @@ mod tests {
         };
         assert_eq!(distance(501, 25), Some(Heard::DistanceDown(1, None)));
         assert_eq!(distance(300, 0), Some(Heard::DistanceElsewhere));
+        let of_quality = |quality: u8| {
+            let head = [&[0; 4][..], &[20, 0, 244, 1, 44, 1, 0, 1, 25]].concat();
+            Heard::read(132, &[&head[..], &[0; 25], &[quality]].concat())
+        };
+        assert_eq!(of_quality(1), Some(Heard::DistanceDown(1, None)), "its quality is invalid");
+        assert_eq!(
+            [of_quality(0), of_quality(100)],
+            [Some(Heard::DistanceDown(1, Some(3.0))), Some(Heard::DistanceDown(1, Some(3.0)))]
+        );
         let mut velocity_only = vec![1; 51];
         velocity_only[48..50].copy_from_slice(&0x0DC7u16.to_le_bytes());
         assert_eq!(Heard::read(85, &velocity_only), Some(Heard::LocalTarget(None)));

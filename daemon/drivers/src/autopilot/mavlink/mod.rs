@@ -1,13 +1,17 @@
 //! ArduSub and ArduRover over MAVLink 2.
 
+mod boot_clock;
 pub mod frame;
 pub mod message;
+mod reception;
 mod sources;
 mod targets;
 
 use super::{Autopilot, Counters, Goal, Health, Step, Tray};
+use boot_clock::{BootClock, BootTime};
 use frame::{Deframer, Frame, encode};
-use message::{Heard, Said, heard_extra};
+use message::{Heard, Said, boot_time_ms, heard_extra};
+use reception::Reception;
 use scenecast_core::LatLon;
 use scenecast_protocol::time::Instant;
 use sources::{Altimeter, Claim, HeightSource, Sources, Texts};
@@ -68,6 +72,8 @@ pub struct Mavlink {
     texts: Texts,
     seq: u8,
     began: Instant,
+    reception: Reception,
+    clock: BootClock,
     peer: Option<Peer>,
     pose: Option<Pose>,
     /// Starboard down and bow up, radians.
@@ -94,7 +100,7 @@ pub struct Mavlink {
 struct Due {
     second: Instant,
     gps: Instant,
-    /// When the streams may be asked for again because no target is reported.
+    /// When the streams may be asked for again because no position or no target is reported.
     streams: Instant,
 }
 
@@ -135,6 +141,8 @@ impl Mavlink {
             texts: Texts::default(),
             seq: 0,
             began: now,
+            reception: Reception::default(),
+            clock: BootClock::default(),
             peer: None,
             pose: None,
             tilt: (0.0, 0.0),
@@ -183,10 +191,12 @@ impl Mavlink {
             return self.tray.count(sources::OTHER_COMPONENTS);
         }
         self.tray.count("messages");
+        if self.is_of_other_vehicle(frame, &heard, now) {
+            return self.tray.count(sources::OTHER_VEHICLE);
+        }
         match heard {
             Heard::Heartbeat { .. } | Heard::DistanceElsewhere => {}
-            Heard::Attitude { time_boot_ms, roll, pitch, yaw } => {
-                self.handle_boot_time(time_boot_ms, now);
+            Heard::Attitude { roll, pitch, yaw } => {
                 (self.tilt, self.yaw) = ((f64::from(roll), f64::from(pitch)), Some(f64::from(yaw)));
                 self.attitude_heard = Some(now);
             }
@@ -199,7 +209,6 @@ impl Mavlink {
             Heard::GlobalTarget(told) => self.handle_global_target(told, now),
             Heard::WaypointDistance(told_m) => self.handle_distance(told_m, now),
             Heard::Local { time_boot_ms, place, velocity: [north, east, _] } => {
-                self.handle_boot_time(time_boot_ms, now);
                 let velocity = (f64::from(east), f64::from(north));
                 let was = self.pose.and_then(|p| p.place);
                 let depth_m = f64::from(place[2]);
@@ -207,11 +216,14 @@ impl Mavlink {
                 self.handle_pose(pose, true);
             }
             Heard::Global { time_boot_ms, lat, lon, relative_alt, velocity: [north, east, _], heading } => {
-                self.handle_boot_time(time_boot_ms, now);
                 if heading != u16::MAX && self.attitude_heard.is_none_or(|at| now.since(at) > BRIDGED) {
                     self.yaw = Some((f64::from(heading) / 100.0).to_radians());
                 }
                 let velocity = (f64::from(east) / 100.0, f64::from(north) / 100.0);
+                // Without a fix or an origin it has no place.
+                if (lat, lon) == (0, 0) {
+                    return self.tray.count("null_islands");
+                }
                 let local = self.pose.filter(|p| now.since(p.heard) < BRIDGED).and_then(|p| p.local);
                 let depth_m = -f64::from(relative_alt) / 1000.0;
                 let pose = Pose { local, place: Some((lat, lon)), depth_m, velocity, time_boot_ms, heard: now };
@@ -222,17 +234,24 @@ impl Mavlink {
                 if !matches!(result, 0 | 5) {
                     self.tray.count("commands_refused");
                     if command != INTERVAL {
-                        self.tray.note(format!("the autopilot refuses command {command}: result {result}"));
+                        self.note_rarely(format!("the autopilot refuses command {command}: result {result}"), now);
                     }
                 }
             }
-            Heard::Text { severity, text } => {
-                if severity <= 4 && self.texts.is_news(&text, now) {
-                    self.tray.note(format!("the autopilot says: {text}"));
-                } else if severity <= 4 {
-                    self.tray.count("texts_repeated");
+            Heard::Text { severity, text, part, is_end } if severity <= 4 => {
+                for text in self.texts.join(part, text, is_end) {
+                    self.note_rarely(format!("the autopilot says: {text}"), now);
                 }
             }
+            Heard::Text { .. } => {}
+        }
+    }
+
+    /// Notes a text unless it was noted not long ago.
+    fn note_rarely(&mut self, text: String, now: Instant) {
+        match self.texts.is_news(&text, now) {
+            true => self.tray.note(text),
+            false => self.tray.count("texts_repeated"),
         }
     }
 
@@ -254,6 +273,7 @@ impl Mavlink {
         if self.peer.is_some_and(|before| before.component != component) {
             // Another autopilot, with a clock and a frame of its own.
             (self.peer, self.pose, self.stay, self.command) = (None, None, None, CommandWatch::default());
+            self.clock = BootClock::default();
             self.echo.forget();
             self.altimeter.forget();
             self.tray.forget_measured();
@@ -264,6 +284,7 @@ impl Mavlink {
         if is_new {
             self.tray.note("the autopilot answers");
             self.was_silent = false;
+            self.reception.handle_answer(now);
             self.ask_for_streams(now);
         }
         if self.command.handle_heartbeat(was_in_command, peer.is_in_command(), now) {
@@ -274,11 +295,28 @@ impl Mavlink {
         }
     }
 
-    /// A clock that went back is another run of the autopilot.
-    fn handle_boot_time(&mut self, ms: u32, now: Instant) {
-        if !self.command.handle_boot_time(ms, self.pose.map(|pose| pose.depth_m), now) {
-            return;
+    /// Whether a message is of another vehicle with the same numbers, by its clock or while two clocks are heard.
+    fn is_of_other_vehicle(&mut self, frame: &Frame, heard: &Heard, now: Instant) -> bool {
+        let Some(ms) = boot_time_ms(frame.id, &frame.payload) else {
+            let is_measured = matches!(heard, Heard::Rangefinder(_) | Heard::Altitude(_) | Heard::WaypointDistance(_));
+            return is_measured && self.clock.is_contested(now);
+        };
+        let verdict = self.clock.handle(frame.id, ms, now);
+        if verdict == BootTime::Restarted {
+            self.handle_restart(ms, now);
         }
+        if let Some(apart_s) = self.clock.poll_conflict_s() {
+            let MavlinkConfig { system, .. } = self.config;
+            let component = frame.component;
+            self.tray.note(format!(
+                "two vehicles answer as system {system} component {component}, with clocks {apart_s} s apart: the first one is used; give each its own SYSID_THISMAV"
+            ));
+        }
+        verdict == BootTime::Foreign
+    }
+
+    fn handle_restart(&mut self, ms: u32, now: Instant) {
+        self.command.handle_restart(ms, self.pose.map(|pose| pose.depth_m), now);
         self.tray.count("restarts");
         self.tray.note("the autopilot has restarted");
         self.echo.forget();
@@ -320,6 +358,7 @@ impl Mavlink {
             let metres = |units: i32| f64::from(units) / 1e7 * 111_320.0;
             self.tray.check_place((metres(lat), metres(lon)), pose.heard);
         }
+        self.reception.handle_position();
         if std::mem::take(&mut self.is_position_lost) {
             self.tray.note("the autopilot reports its position again");
         }
@@ -362,9 +401,21 @@ impl Mavlink {
             self.tray.count("silences");
             self.tray.note("the autopilot does not answer any more");
         }
-        let Some(peer) = self.peer.filter(|_| !health.is_silent()) else { return self.echo.forget() };
+        let Some(peer) = self.peer.filter(|_| !health.is_silent()) else {
+            let refused = self.deframer.refused();
+            let note = self.reception.poll_silence(self.config.system, refused, now).filter(|_| self.peer.is_none());
+            note.into_iter().for_each(|note| self.tray.note(note));
+            return self.echo.forget();
+        };
         if self.pose.is_none_or(|p| now.since(p.heard) > BRIDGED) {
-            self.ask_for_streams(now);
+            if now >= self.due.streams {
+                self.ask_for_streams(now);
+            }
+            if let Some(note) = self.reception.poll_no_position(now) {
+                self.tray.count("position_losses");
+                self.tray.note(note);
+                self.is_position_lost = true;
+            }
             if self.pose.is_some() && !std::mem::replace(&mut self.is_position_lost, true) {
                 self.tray.count("position_losses");
                 self.tray.note("the autopilot reports no position any more");
@@ -412,12 +463,14 @@ fn moved(place: LatLon, east_m: f64, north_m: f64) -> LatLon {
 impl Autopilot for Mavlink {
     fn handle_open(&mut self, now: Instant) {
         self.deframer.clear();
+        self.reception.handle_open();
         self.echo.forget();
         self.due = Due { second: now, gps: now, streams: now };
     }
 
     fn handle_bytes(&mut self, bytes: &[u8], now: Instant) -> bool {
         let mut frames = Vec::new();
+        self.reception.handle_bytes(bytes.len(), now);
         self.deframer.push(bytes, heard_extra, |frame| frames.push(frame));
         frames.iter().for_each(|frame| self.handle_frame(frame, now));
         let is_heard = |peer: Peer| {
@@ -463,7 +516,9 @@ impl Autopilot for Mavlink {
         match self.peer {
             None => Health::Awaited,
             Some(peer) if now.since(peer.heard) >= self.config.silence => Health::Silent,
-            Some(peer) if peer.is_in_command() && self.echo.verdict() != Verdict::Refuses => Health::InCommand,
+            Some(peer) if peer.is_in_command() && !self.is_position_lost && self.echo.verdict() != Verdict::Refuses => {
+                Health::InCommand
+            }
             Some(_) => Health::NotInCommand,
         }
     }

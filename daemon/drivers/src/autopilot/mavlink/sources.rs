@@ -14,6 +14,8 @@ use std::time::Duration;
 pub(super) const OTHER_SYSTEMS: &str = "other_systems";
 /// Counter of frames of other components of the autopilot's system.
 pub(super) const OTHER_COMPONENTS: &str = "other_components";
+/// Counter of messages of another vehicle with the same numbers.
+pub(super) const OTHER_VEHICLE: &str = "other_vehicle";
 
 /// MAV_AUTOPILOT_ARDUPILOTMEGA, in the field `autopilot` of HEARTBEAT.
 const ARDUPILOT: u8 = 3;
@@ -21,8 +23,11 @@ const ARDUPILOT: u8 = 3;
 const NO_AUTOPILOT: u8 = 8;
 /// MAV_COMP_ID_AUTOPILOT1: the usual component of an autopilot.
 const FIRST_AUTOPILOT: u8 = 1;
-/// Ground station, onboard computer, gimbal, camera: kinds (MAV_TYPE) that are no vehicle whatever autopilot they name.
-const EQUIPMENT: [u8; 4] = [6, 18, 26, 30];
+/// Antenna tracker, ground station, onboard computer, gimbal, ADS-B receiver, camera, charger, FLARM, servo, remote identification,
+/// battery, parachute, log, display, IMU, GPS, winch: kinds (MAV_TYPE) that are no vehicle whatever autopilot they name.
+const EQUIPMENT: [u8; 17] = [5, 6, 18, 26, 27, 30, 31, 32, 33, 34, 36, 37, 38, 39, 40, 41, 42];
+/// MAV_COMP_ID_CAMERA: components from here on are equipment, unless one is configured as the autopilot.
+const FIRST_EQUIPMENT: u8 = 100;
 
 /// Whether a heartbeat is the autopilot's.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -52,7 +57,8 @@ impl Sources {
         (kind, autopilot): (u8, u8),
         current: Option<u8>,
     ) -> (Claim, Option<String>) {
-        let says_ardupilot = autopilot == ARDUPILOT && !EQUIPMENT.contains(&kind);
+        let is_equipment = EQUIPMENT.contains(&kind) || component >= FIRST_EQUIPMENT;
+        let says_ardupilot = autopilot == ARDUPILOT && !is_equipment;
         if system != config.system {
             let note = || {
                 let own = config.system;
@@ -131,16 +137,39 @@ impl Altimeter {
     }
 }
 
-/// The last texts that were passed on.
+/// The last texts that were passed on, and one that is not complete.
 #[derive(Debug, Default)]
 pub(super) struct Texts {
     told: Vec<(String, Instant)>,
+    /// Number of the text, number of its next part, the parts so far.
+    begun: Option<(u16, u8, String)>,
 }
 
 impl Texts {
     /// The same text is passed on once in this time, and so many different ones.
     const PERIOD: Duration = Duration::from_secs(600);
     const MAX: usize = 20;
+    /// Most parts of a text.
+    const MAX_PARTS: u8 = 8;
+
+    /// Joins the parts of a text in several messages: its number and that of the part, and whether it is the last. Returns what is
+    /// complete, and what was begun and misses parts.
+    pub(super) fn join(&mut self, (number, part): (u16, u8), text: String, is_end: bool) -> Vec<String> {
+        let begun = self.begun.take();
+        let (mut out, text) = match begun {
+            Some((begun, next, before)) if number != 0 && (begun, next) == (number, part) => {
+                (Vec::new(), before + &text)
+            }
+            Some((_, _, before)) => (vec![before], text),
+            None => (Vec::new(), text),
+        };
+        if number == 0 || is_end || part >= Self::MAX_PARTS {
+            out.push(text);
+        } else {
+            self.begun = Some((number, part + 1, text));
+        }
+        out
+    }
 
     /// Whether a text is to be passed on.
     pub(super) fn is_news(&mut self, text: &str, now: Instant) -> bool {
@@ -230,5 +259,25 @@ mod tests {
         assert_eq!((0..3600).filter(told).count(), 12);
         let all_different = |n: &u32| texts.is_news(&n.to_string(), Instant::from_secs_f64(5000.0));
         assert_eq!((0..1000).filter(all_different).count(), 20);
+    }
+
+    #[test]
+    fn a_text_in_several_messages_is_one_text() {
+        let mut texts = Texts::default();
+        let mut join = |part, text: &str, is_end| texts.join(part, text.to_owned(), is_end);
+        assert_eq!(join((0, 0), "alone", true), ["alone"]);
+        assert!(join((7, 0), "a long ", false).is_empty());
+        assert_eq!(join((7, 1), "text", true), ["a long text"]);
+        assert!(join((8, 0), "cut ", false).is_empty());
+        assert_eq!(join((9, 0), "next", true), ["cut ", "next"], "a part was lost");
+    }
+
+    #[test]
+    fn equipment_is_no_second_autopilot() {
+        let mut sources = Sources::default();
+        for (component, kind) in [(156, 27), (100, 0), (1, 27), (154, 12)] {
+            let (claim, note) = sources.judge(&config(None), (1, component), (kind, ARDUPILOT), Some(1));
+            assert_eq!((claim, note), (Claim::Passed(OTHER_COMPONENTS), None), "{component} {kind}");
+        }
     }
 }

@@ -213,10 +213,10 @@ impl Echo {
     }
 }
 
-/// Messages of one run of the autopilot may be this much out of order, milliseconds.
-const CLOCKS_APART_MS: u32 = 1000;
 /// Uncertainty of the time at which it restarted.
 const RESTART_MARGIN: Duration = Duration::from_secs(1);
+/// Notes of an autopilot that is taken out of command again and again are this far apart.
+const NOTE_PERIOD: Duration = Duration::from_secs(60);
 /// Depth below which an autopilot that has restarted is armed again, metres.
 const MIN_ARMED_DEPTH_M: f64 = 0.5;
 
@@ -225,10 +225,9 @@ const MIN_ARMED_DEPTH_M: f64 = 0.5;
 pub(super) struct CommandWatch {
     /// Whether it was in command once: from then on whoever takes it out of that is obeyed.
     was_in_command: bool,
-    /// When it was taken out of command last.
+    /// When it was taken out of command last, and when people were told of that.
     left: Option<Instant>,
-    /// Milliseconds since its start, by its last message.
-    time_boot_ms: Option<u32>,
+    told: Option<Instant>,
     /// When it started again, until it is in command again.
     restarted: Option<Instant>,
     /// Whether it was under water when it started again.
@@ -236,22 +235,13 @@ pub(super) struct CommandWatch {
 }
 
 impl CommandWatch {
-    /// Takes a time since the autopilot's start; returns whether it has restarted, since its clock went back. `depth_m` is the
-    /// last reported depth.
-    pub(super) fn handle_boot_time(&mut self, ms: u32, depth_m: Option<f64>, now: Instant) -> bool {
-        let before = self.time_boot_ms.replace(ms);
-        // After 49.7 days the clock begins at 0 again.
-        let has_wrapped = |before: u32| ms.wrapping_sub(before) < CLOCKS_APART_MS;
-        let is_restarted =
-            before.is_some_and(|before| before > ms.saturating_add(CLOCKS_APART_MS) && !has_wrapped(before));
-        if is_restarted {
-            self.restarted = Some(now - Duration::from_millis(u64::from(ms)));
-            self.was_under_water = depth_m.is_some_and(|depth_m| depth_m > MIN_ARMED_DEPTH_M);
-        }
-        is_restarted
+    /// It has restarted so many milliseconds ago. `depth_m` is the last reported depth.
+    pub(super) fn handle_restart(&mut self, ms: u32, depth_m: Option<f64>, now: Instant) {
+        self.restarted = Some(now - Duration::from_millis(u64::from(ms)));
+        self.was_under_water = depth_m.is_some_and(|depth_m| depth_m > MIN_ARMED_DEPTH_M);
     }
 
-    /// Takes whether it is in command; returns whether it no longer is.
+    /// Takes whether it is in command; returns whether people should know that it no longer is, at most once a minute.
     pub(super) fn handle_heartbeat(&mut self, before: bool, is_in_command: bool, now: Instant) -> bool {
         if is_in_command {
             (self.was_in_command, self.restarted) = (true, None);
@@ -260,7 +250,11 @@ impl CommandWatch {
         if has_left {
             self.left = Some(now);
         }
-        has_left
+        let is_news = has_left && self.told.is_none_or(|at| now.since(at) >= NOTE_PERIOD);
+        if is_news {
+            self.told = Some(now);
+        }
+        is_news
     }
 
     /// Whether it may be armed and switched to guided mode: it never was, or nobody but its own restart has ended that, and it
@@ -331,5 +325,12 @@ mod tests {
         assert_eq!((told.len(), verdict), (2, Verdict::Follows));
         let (told, verdict) = notes(&[Some(Report::Target(None)); 10]);
         assert!(told[0].1.ends_with("it reports a target without a position") && verdict == Verdict::Refuses);
+    }
+
+    #[test]
+    fn a_mode_that_flips_each_second_is_noted_once_a_minute() {
+        let mut watch = CommandWatch::default();
+        let flip = |s: &u64| watch.handle_heartbeat(!s.is_multiple_of(2), s.is_multiple_of(2), at(*s));
+        assert_eq!((0..300).filter(flip).count(), 5);
     }
 }

@@ -486,3 +486,61 @@ fn a_target_does_not_count_from_one_false_position() {
     assert!(norths.iter().all(|north| [0.0, 500.0].contains(north)), "{norths:?}");
     assert!(norths.contains(&0.0) && norths.last() == Some(&500.0), "{norths:?}");
 }
+
+#[test]
+fn of_two_vehicles_with_the_same_numbers_one_is_followed() {
+    let mut pilot = pilot(false);
+    pilot.set_goal(GOAL, at(0.0));
+    let (mut targets, mut commands) = (Vec::new(), 0);
+    for tenth in 0..300_u32 {
+        let now = at(f64::from(tenth) / 10.0);
+        if tenth % 10 == 0 {
+            pilot.handle_bytes(&heartbeat(4, true), now);
+        }
+        pilot.handle_bytes(&local(60_000 + 100 * tenth, [0.0, 0.0, 5.0], [0.0; 3]), now);
+        pilot.handle_bytes(&local(960_000 + 100 * tenth, [500.0, 200.0, 30.0], [0.0; 3]), now);
+        pilot.handle_timeout(now);
+        let said = sent(&mut pilot);
+        commands += count(&said, 76);
+        targets.extend(said.into_iter().filter(|(id, _)| *id == 84).map(|(_, p)| p[4..12].to_vec()));
+    }
+    let expected = [0f32.to_le_bytes(), 10f32.to_le_bytes()].concat();
+    assert!(targets.len() > 25 && targets.iter().all(|target| *target == expected), "{targets:?}");
+    assert_eq!((pilot.counters()["other_vehicle"], pilot.counters().get("restarts")), (300, None));
+    assert!(commands <= 3 * STREAMS.len(), "{commands}");
+    let notes = notes(&mut pilot);
+    assert_eq!(notes.iter().filter(|note| note.contains("two vehicles answer as system 1 component 1")).count(), 1);
+    assert!(notes.len() < 6, "{notes:?}");
+}
+
+#[test]
+fn an_autopilot_without_a_position_is_named_and_asked_rarely() {
+    let mut pilot = pilot(false);
+    let mut commands = 0;
+    for s in 0..40_u32 {
+        let now = at(f64::from(s));
+        pilot.handle_bytes(&heartbeat(4, true), now);
+        // Latitude and longitude 0 are none.
+        let fields: Vec<u8> = [1000 * s as i32, 0, 0, 0, -5000].iter().flat_map(|v| v.to_le_bytes()).collect();
+        pilot.handle_bytes(&frame(1, 33, fields), now);
+        pilot.handle_timeout(now);
+        commands += count(&sent(&mut pilot), 76);
+        if s == 10 {
+            assert!(notes(&mut pilot).iter().any(|note| note.contains("reports no position")));
+        }
+    }
+    assert!(commands <= 5 * STREAMS.len(), "{commands}");
+    assert_eq!((pilot.health(at(39.0)), notes(&mut pilot).len()), (Health::NotInCommand, 0));
+}
+
+#[test]
+fn a_vehicle_that_crosses_180_degrees_does_not_jump() {
+    let mut pilot = pilot(false);
+    pilot.handle_bytes(&heartbeat(4, true), at(0.0));
+    for (tenth, lon) in (0_i32..).zip([1_799_999_900_i32, 1_799_999_990, -1_799_999_920, -1_799_999_830]) {
+        let fields: Vec<u8> =
+            [60_000 + 100 * tenth, -168_500_000, lon, 0, -5000].iter().flat_map(|v| v.to_le_bytes()).collect();
+        pilot.handle_bytes(&frame(1, 33, fields), at(f64::from(tenth) / 10.0));
+    }
+    assert_eq!(pilot.counters().get("position_jumps"), None);
+}
