@@ -5,31 +5,14 @@
 
 use crate::geodesy::LatLon;
 use crate::nmea::{PositionKind, Sentence};
-use serde::Deserialize;
+use serde_json::{Map, Value};
+use std::borrow::Cow;
 
 /// The request that makes gpsd send reports.
 pub const WATCH: &[u8] = b"?WATCH={\"enable\":true,\"json\":true};\n";
 
 /// Longest line that is taken: a sky view of many satellites has some kilobytes.
 pub const MAX_LINE: usize = 16_384;
-
-/// Members of a report that are of use; units of gpsd: degrees, metres, metres a second.
-#[derive(Deserialize)]
-struct Report {
-    class: String,
-    device: Option<String>,
-    mode: Option<u8>,
-    status: Option<u8>,
-    time: Option<String>,
-    lat: Option<f64>,
-    lon: Option<f64>,
-    epx: Option<f64>,
-    epy: Option<f64>,
-    eph: Option<f64>,
-    speed: Option<f64>,
-    track: Option<f64>,
-    heading: Option<f64>,
-}
 
 /// The content of a report, and the standard deviation of its position in metres if it has one.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -45,36 +28,80 @@ pub struct Said {
 /// is unknown.
 const CONFIDENCE: f64 = 1.96;
 
-/// Parses a line; `None` if it is no report or has impossible values.
+/// The members of a report; units of gpsd: degrees, metres, metres a second.
+struct Report(Map<String, Value>);
+
+impl Report {
+    fn parse(line: &[u8]) -> Option<Self> {
+        serde_json::from_slice(line).or_else(|_| serde_json::from_slice(&without_nan(line))).ok().map(Self)
+    }
+
+    fn text(&self, name: &str) -> Option<&str> {
+        self.0.get(name)?.as_str()
+    }
+
+    fn number(&self, name: &str) -> Option<f64> {
+        self.0.get(name)?.as_f64()
+    }
+
+    /// An angle clockwise from north, radians; `None` if it is none.
+    fn angle_rad(&self, name: &str) -> Option<f64> {
+        self.number(name).filter(|degrees| (0.0..=360.0).contains(degrees)).map(f64::to_radians)
+    }
+
+    fn is_absent(&self, name: &str) -> bool {
+        self.0.get(name).is_none_or(Value::is_null)
+    }
+}
+
+/// A line in which numbers that are none, as releases before 3.20 write them, are `null`.
+fn without_nan(line: &[u8]) -> Cow<'_, [u8]> {
+    const NAMES: [&[u8]; 4] = [b"-nan", b"nan", b"-inf", b"inf"];
+    let (mut out, mut rest, mut is_in_text) = (Vec::with_capacity(line.len()), line, false);
+    while let Some((&byte, after)) = rest.split_first() {
+        let begins = |name: &&&[u8]| rest.get(..name.len()).is_some_and(|head| head.eq_ignore_ascii_case(name));
+        if let Some(name) = NAMES.iter().find(begins).filter(|_| !is_in_text) {
+            out.extend_from_slice(b"null");
+            rest = rest.get(name.len()..).unwrap_or_default();
+            continue;
+        }
+        is_in_text ^= byte == b'"' && out.last() != Some(&b'\\');
+        out.push(byte);
+        rest = after;
+    }
+    Cow::Owned(out)
+}
+
+/// Parses a line; `None` if it is no report or has an impossible position.
 pub fn parse(line: &[u8]) -> Option<Said> {
-    let report: Report = serde_json::from_slice(line).ok()?;
-    match report.class.as_str() {
-        "TPV" => position(&report).map(|said| Said { device: report.device, ..said }),
-        "ATT" => Some(Said { sentences: heading(report.heading)?, ..Said::default() }),
+    let report = Report::parse(line)?;
+    match report.text("class")? {
+        "TPV" => position(&report).map(|said| Said { device: report.text("device").map(str::to_owned), ..said }),
+        "ATT" => Some(Said { sentences: heading(&report), ..Said::default() }),
         _ => Some(Said::default()),
     }
 }
 
-fn heading(degrees: Option<f64>) -> Option<Vec<Sentence>> {
-    let Some(degrees) = degrees else { return Some(Vec::new()) };
-    (0.0..=360.0).contains(&degrees).then(|| vec![Sentence::Heading(degrees.to_radians())])
+fn heading(report: &Report) -> Vec<Sentence> {
+    report.angle_rad("heading").map(Sentence::Heading).into_iter().collect()
 }
 
+/// The position of a report. A course, a speed, a heading or an error that cannot be is left out.
 fn position(r: &Report) -> Option<Said> {
+    let status = r.number("status").unwrap_or(0.0) as u8;
     // Status 5 is dead reckoning, 8 simulated; 6 is dead reckoning with satellites.
-    if r.mode.unwrap_or(0) < 2 || matches!(r.status, Some(5 | 8)) {
+    let is_none = r.number("mode").unwrap_or(0.0) < 2.0 || matches!(status, 5 | 8);
+    if is_none || r.is_absent("lat") || r.is_absent("lon") {
         return Some(Said { sentences: vec![Sentence::NoPosition], ..Said::default() });
     }
-    let place = LatLon::new(r.lat?, r.lon?)?;
-    let utc_s = r.time.as_deref().and_then(time_of_day);
-    let is_corrected = matches!(r.status, Some(2..=4));
+    let place = LatLon::new(r.number("lat")?, r.number("lon")?)?;
+    let utc_s = r.text("time").and_then(time_of_day);
+    let is_corrected = matches!(status, 2..=4);
     let mut sentences = vec![Sentence::Position { kind: PositionKind::Gga, place, utc_s, hdop: None, is_corrected }];
-    if let Some(speed_m_s) = r.speed {
-        let course_rad = r.track.filter(|t| (0.0..=360.0).contains(t)).map(f64::to_radians);
-        (0.0..200.0).contains(&speed_m_s).then(|| sentences.push(Sentence::Motion { speed_m_s, course_rad }))?;
-    }
-    sentences.extend(heading(r.heading)?);
-    let error = r.eph.or_else(|| Some(r.epx?.hypot(r.epy?)));
+    let speed = r.number("speed").filter(|speed| (0.0..200.0).contains(speed));
+    sentences.extend(speed.map(|speed_m_s| Sentence::Motion { speed_m_s, course_rad: r.angle_rad("track") }));
+    sentences.extend(heading(r));
+    let error = r.number("eph").or_else(|| Some(r.number("epx")?.hypot(r.number("epy")?)));
     let sigma_m = error.filter(|e| e.is_finite() && *e > 0.0).map(|e| e / CONFIDENCE);
     Some(Said { sentences, sigma_m, device: None })
 }
@@ -118,13 +145,48 @@ mod tests {
         );
     }
 
+    /// The report of a position with these members beside it.
+    fn tpv(members: &str) -> Option<Vec<Sentence>> {
+        let text = format!(r#"{{"class":"TPV","device":"/dev/nan","mode":3{members}}}"#);
+        parse(text.as_bytes()).map(|said| said.sentences)
+    }
+
     #[test]
-    fn impossible_values_are_refused() {
-        assert_eq!(parse(b"{\"class\":\"TPV\",\"mode\":3,\"lat\":95,\"lon\":0}"), None);
-        assert_eq!(parse(b"{\"class\":\"TPV\",\"mode\":3,\"lat\":1}"), None);
-        assert_eq!(parse(b"{\"class\":\"TPV\",\"mode\":3,\"lat\":NaN,\"lon\":0}"), None);
-        assert_eq!(parse(b"{\"class\":\"TPV\",\"mode\":3,\"lat\":1,\"lon\":1,\"speed\":1e9}"), None);
+    fn impossible_positions_are_refused_and_missing_ones_are_none() {
+        assert_eq!(tpv(r#","lat":95,"lon":0"#), None);
+        assert_eq!(tpv(r#","lat":"60.5","lon":5.1"#), None);
         assert_eq!(parse(b"$GPGGA"), None);
+        for none in ["", r#","lat":1"#, r#","lat":null,"lon":2"#, r#","lat":nan,"lon":NaN"#] {
+            assert_eq!(tpv(none), Some(vec![Sentence::NoPosition]), "{none}");
+        }
+    }
+
+    #[test]
+    fn a_side_value_that_cannot_be_does_not_cost_the_position() {
+        for bad in [
+            r#""speed":-0.5"#,
+            r#""speed":1e9"#,
+            r#""speed":nan"#,
+            r#""heading":361"#,
+            r#""heading":-nan"#,
+            r#""track":nan"#,
+            r#""eph":inf"#,
+            r#""status":"DGPS""#,
+        ] {
+            let said = tpv(&format!(r#","lat":1.5,"lon":2.5,{bad}"#)).unwrap();
+            assert!(matches!(said[..], [Sentence::Position { .. }]), "{bad} {said:?}");
+        }
+        let said = tpv(r#","lat":1.5,"lon":2.5,"speed":1.0,"track":nan"#).unwrap();
+        assert!(matches!(said[1], Sentence::Motion { course_rad: None, .. }), "{said:?}");
+    }
+
+    #[test]
+    fn reports_of_other_classes_are_passed_over() {
+        for other in
+            [r#"{"class":"AIS","status":"Under way","heading":"511","lat":"n/a"}"#, r#"{"class":"SKY","hdop":nan}"#]
+        {
+            assert_eq!(parse(other.as_bytes()), Some(Said::default()), "{other}");
+        }
     }
 
     proptest! {

@@ -2,9 +2,11 @@
 
 use crate::geodesy::{LatLon, TangentPlane};
 use crate::nmea::{PositionKind, Sentence};
+mod first_fix;
 mod gpsd;
 
 use crate::{Lines, nmea};
+use first_fix::FirstFix;
 use scenecast_protocol::time::Instant;
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -91,6 +93,7 @@ pub struct Gps {
     language: GpsLanguage,
     lines: Lines,
     faults: BTreeMap<GpsFault, u64>,
+    first_fix: FirstFix,
     fix: Option<GpsFix>,
     /// The receiver of that fix, where a daemon has several.
     device: Option<String>,
@@ -130,6 +133,7 @@ impl Gps {
             language,
             lines: Lines::new(longest),
             faults: BTreeMap::new(),
+            first_fix: FirstFix::default(),
             fix: None,
             device: None,
             kinds: BTreeMap::new(),
@@ -173,9 +177,16 @@ impl Gps {
     /// Takes bytes; returns the good positions in them, oldest first.
     pub fn handle_bytes(&mut self, bytes: &[u8], now: Instant) -> Vec<GpsFix> {
         let mut lines = std::mem::replace(&mut self.lines, Lines::new(0));
-        let mut fixes = Vec::new();
-        lines.push(bytes, |line| fixes.extend(self.handle_line(line, now)));
+        let (mut fixes, mut count) = (Vec::new(), 0);
+        lines.push(bytes, |line| {
+            count += 1;
+            fixes.extend(self.handle_line(line, now));
+        });
         self.lines = lines;
+        self.first_fix.handle(count, !fixes.is_empty(), now);
+        if self.first_fix.is_missing(now) {
+            self.note = Some(self.first_fix.explain(self.language, &self.faults().collect()));
+        }
         fixes
     }
 
@@ -278,7 +289,7 @@ impl Gps {
         (self.told, self.untold) = (Some(fix.at), 0);
     }
 
-    /// What people should read about jumps, at most once a minute.
+    /// What people should read: about jumps at most once a minute, and of a receiver without any position once.
     pub fn poll_note(&mut self) -> Option<String> {
         self.note.take()
     }
