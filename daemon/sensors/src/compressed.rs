@@ -2,7 +2,7 @@
 
 use crate::exif::{exif_orientation, exif_stamp};
 use crate::jpeg_end::{is_cut_jpeg, missing_rows};
-use crate::tiff_pages::{Prepared, prepared};
+use crate::tiff_pages::{Prepared, has_all_its_data, prepared};
 use crate::{BitDepth, Stamp};
 use image::error::{ImageError, UnsupportedErrorKind};
 use image::metadata::Orientation;
@@ -38,6 +38,10 @@ pub enum DecodeError {
     OtherColours,
     #[error("it breaks off before its last row")]
     CutOff,
+    #[error(
+        "its data, which are all there, are compressed in a way that is not read: convert it, as with gdal_translate -co COMPRESS=DEFLATE"
+    )]
+    OtherCompression,
     /// The rows from `row` on are missing or damaged.
     #[error("it breaks off in row {row} of {rows}")]
     BreaksOff { row: u32, rows: u32 },
@@ -126,13 +130,18 @@ fn upright(
 /// Decodes an image of at most so many pixels, of a TIFF its first whole page.
 fn decode_within(bytes: &[u8], max_pixels: u64, limits: Limits) -> Result<DynamicImage, DecodeError> {
     let prepared = prepared(bytes);
-    guarded(|| {
+    let decoded = guarded(|| {
         let decoder = decoder_of(&prepared.bytes, limits.clone())?;
         let (width, height) = decoder.dimensions();
         if u64::from(width) * u64::from(height) > max_pixels {
             return Err(DecodeError::TooLarge { width, height });
         }
         upright(decoder, &prepared, limits)
+    });
+    // Some files with LZW end too early for the library.
+    decoded.map_err(|error| match error {
+        DecodeError::CutOff if has_all_its_data(bytes) => DecodeError::OtherCompression,
+        error => error,
     })
 }
 

@@ -12,6 +12,7 @@
 
 use crate::{CameraFault, SensorPose, Stamp};
 use serde::Deserialize;
+use serde_json::Value;
 use std::time::Duration;
 
 /// Length of the longest line, bytes.
@@ -41,6 +42,9 @@ pub struct DvlPosition {
     /// Clockwise from the heading at the reset, radians.
     pub yaw_rad: f64,
 }
+
+/// The types of objects that are used.
+const USED: [&str; 2] = ["velocity", "position_local"];
 
 /// All fields of both types; those of the other type are missing.
 #[derive(Deserialize)]
@@ -77,12 +81,24 @@ fn number(value: Option<f64>, name: &'static str, most: f64) -> Result<f64, DvlE
 }
 
 impl DvlReport {
-    /// Parses a line; `None` if its type is not used.
+    /// Parses a line, which may have several objects where an end of line was lost. Objects of other types are passed over.
     ///
     /// # Errors
-    /// The line is not JSON, or a number is missing or absurd.
-    pub fn parse(line: &[u8]) -> Result<Option<Self>, DvlError> {
-        let fields: Fields = serde_json::from_slice(line).map_err(|_| DvlError::NotJson)?;
+    /// A part of the line is not JSON, or a number is missing or absurd.
+    pub fn all_of(line: &[u8]) -> Vec<Result<Self, DvlError>> {
+        let objects = serde_json::Deserializer::from_slice(line).into_iter::<Value>();
+        objects.filter_map(|object| Self::of_object(object.map_err(|_| DvlError::NotJson)).transpose()).collect()
+    }
+
+    fn of_object(object: Result<Value, DvlError>) -> Result<Option<Self>, DvlError> {
+        let object = object?;
+        if !object.is_object() {
+            return Err(DvlError::NotJson);
+        }
+        if !USED.iter().any(|used| object["type"] == **used) {
+            return Ok(None);
+        }
+        let fields = Fields::deserialize(object).map_err(|_| DvlError::NotJson)?;
         match fields.kind.as_deref() {
             Some("velocity") => {
                 let altitude = fields.altitude.filter(|m| *m > 0.0 && *m <= MAX_M);
@@ -265,20 +281,40 @@ mod tests {
         (poses.collect(), faults)
     }
 
+    /// The first report of a line.
+    fn parse(line: &[u8]) -> Result<Option<DvlReport>, DvlError> {
+        DvlReport::all_of(line).into_iter().next().transpose()
+    }
+
+    #[test]
+    fn joined_objects_are_read_and_other_types_passed_over() {
+        let other = r#"{"type":"temperature","x":"warm","altitude":[1]}"#;
+        let line = [VELOCITY, other, POSITION, VELOCITY].concat();
+        let found = DvlReport::all_of(line.as_bytes());
+        assert!(found.len() == 3 && found.iter().all(Result::is_ok), "{found:?}");
+        assert_eq!(DvlReport::all_of(other.as_bytes()), []);
+        assert_eq!(
+            DvlReport::all_of(&line.as_bytes()[..line.len() - 5]).last(),
+            Some(&Err(DvlError::NotJson)),
+            "half an object"
+        );
+        assert_eq!(DvlReport::all_of(b"12"), [Err(DvlError::NotJson)]);
+    }
+
     #[test]
     fn the_lines_of_the_maker_are_read() {
-        let Ok(Some(DvlReport::Position(read))) = DvlReport::parse(POSITION.as_bytes()) else { panic!() };
+        let Ok(Some(DvlReport::Position(read))) = parse(POSITION.as_bytes()) else { panic!() };
         assert_eq!((read.ts_s, read.place), (49056.809, [12.43, 64.61, 1.76]));
         assert_eq!([read.roll_rad, read.pitch_rad, read.yaw_rad], [0.6f64, -0.9, 13.6].map(f64::to_radians));
-        assert_eq!(DvlReport::parse(VELOCITY.as_bytes()), Ok(Some(DvlReport::Altitude(Some(0.495)))));
+        assert_eq!(parse(VELOCITY.as_bytes()), Ok(Some(DvlReport::Altitude(Some(0.495)))));
         let invalid = VELOCITY.replace("true,\"status\"", "false,\"status\"");
-        assert_eq!(DvlReport::parse(invalid.as_bytes()), Ok(Some(DvlReport::Altitude(None))));
+        assert_eq!(parse(invalid.as_bytes()), Ok(Some(DvlReport::Altitude(None))));
         let faulty = POSITION.replace("\"status\": 0", "\"status\": 1");
-        assert_eq!(DvlReport::parse(faulty.as_bytes()), Ok(Some(DvlReport::PositionFault)));
-        assert_eq!(DvlReport::parse(br#"{"response_to":"reset","success":true,"type":"response"}"#), Ok(None));
-        assert_eq!(DvlReport::parse(b"wrx,112.83,0.007"), Err(DvlError::NotJson));
+        assert_eq!(parse(faulty.as_bytes()), Ok(Some(DvlReport::PositionFault)));
+        assert_eq!(parse(br#"{"response_to":"reset","success":true,"type":"response"}"#), Ok(None));
+        assert_eq!(parse(b"wrx,112.83,0.007"), Err(DvlError::NotJson));
         let absurd = POSITION.replace("64.61", "1e300");
-        assert_eq!(DvlReport::parse(absurd.as_bytes()), Err(DvlError::Number("y")));
+        assert_eq!(parse(absurd.as_bytes()), Err(DvlError::Number("y")));
     }
 
     #[test]
@@ -338,7 +374,7 @@ mod tests {
     proptest! {
         #[test]
         fn any_line_is_read_or_refused(line in proptest::collection::vec(any::<u8>(), 0..300)) {
-            let _ = DvlReport::parse(&line);
+            let _ = parse(&line);
         }
 
         #[test]
@@ -350,7 +386,7 @@ mod tests {
                 let line = format!(
                     r#"{{"type":"position_local","ts":{ts:?},"x":{x:?},"y":{y:?},"z":1,"roll":0,"pitch":0,"yaw":{yaw:?}}}"#
                 );
-                let Ok(Some(report)) = DvlReport::parse(line.as_bytes()) else { continue };
+                let Ok(Some(report)) = parse(line.as_bytes()) else { continue };
                 let (_, pose) = track.handle(report, at(arrival_s), &mut |_, _| {}).unwrap();
                 prop_assert!(pose.is_finite());
             }

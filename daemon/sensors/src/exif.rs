@@ -108,6 +108,25 @@ impl<'a> ExifData<'a> {
         }
     }
 
+    /// The whole numbers of a field.
+    pub(crate) fn numbers(&self, directory: usize, tag: u16) -> Option<Vec<usize>> {
+        let entry = self.entry(directory, tag)?;
+        let count = self.long(entry + 4)?;
+        let size = if self.short(entry + 2)? == 3 { 2 } else { 4 };
+        let at = if count.checked_mul(size)? <= 4 { entry + 8 } else { self.long(entry + 8)? };
+        let number = |i: usize| {
+            let at = at.checked_add(i * size)?;
+            if size == 2 { self.short(at).map(usize::from) } else { self.long(at) }
+        };
+        // A count that is not true ends at the end of the file.
+        Some((0..count).map_while(number).collect())
+    }
+
+    /// Whether all these bytes are in the file.
+    pub(crate) fn has(&self, at: usize, length: usize) -> bool {
+        at.checked_add(length).is_some_and(|end| end <= self.bytes.len())
+    }
+
     /// Where the next directory of a file is.
     pub(crate) fn next_directory(&self, directory: usize) -> Option<usize> {
         let entries = usize::from(self.short(directory)?);

@@ -10,6 +10,9 @@ const PLANAR_CONFIGURATION: u16 = 284;
 const TILE_WIDTH: u16 = 322;
 const TILE_LENGTH: u16 = 323;
 
+/// The places of the data of strips and of tiles, and their lengths.
+const DATA: [(u16, u16); 2] = [(273, 279), (324, 325)];
+
 /// Bits of `NEW_SUBFILE_TYPE`: a reduced image, a mask.
 const NOT_WHOLE: usize = 1 | 4;
 /// Separate planes.
@@ -55,6 +58,19 @@ fn first_whole_page(tiff: &ExifData) -> Option<usize> {
     let next = |page: &usize| tiff.next_directory(*page);
     let is_whole = |page: &usize| tiff.number(*page, NEW_SUBFILE_TYPE).is_none_or(|kind| kind & NOT_WHOLE == 0);
     std::iter::successors(Some(first), next).take(MAX_PAGES).find(is_whole).or(Some(first))
+}
+
+/// Whether all the data of the first whole page of a TIFF are in the file.
+pub(crate) fn has_all_its_data(bytes: &[u8]) -> bool {
+    let Some(tiff) = ExifData::of_tiff(bytes) else { return false };
+    let Some(page) = first_whole_page(&tiff) else { return false };
+    DATA.into_iter().any(|(places, lengths)| {
+        let pieces = tiff.numbers(page, places).zip(tiff.numbers(page, lengths));
+        pieces.is_some_and(|(places, lengths)| {
+            let are_in_file = places.iter().zip(&lengths).all(|(place, length)| tiff.has(*place, *length));
+            !places.is_empty() && places.len() == lengths.len() && lengths.iter().all(|n| *n > 0) && are_in_file
+        })
+    })
 }
 
 struct Sizes {
@@ -123,6 +139,18 @@ mod tests {
 
     fn pixel(x: u32, y: u32) -> [u8; 3] {
         [x as u8 * 5, y as u8 * 7, (x + y) as u8]
+    }
+
+    #[test]
+    fn a_page_whose_data_are_beyond_its_end_is_cut() {
+        let whole = planar_tiled();
+        assert!(super::has_all_its_data(&whole));
+        let mut cut = whole.clone();
+        // The place of the first tile.
+        let at = cut.windows(8).position(|w| w == [8, 0, 0, 0, 8, 1, 0, 0]).unwrap();
+        cut[at + 2] = 99;
+        assert!(!super::has_all_its_data(&cut));
+        assert!(!super::has_all_its_data(b"II*\0") && !super::has_all_its_data(b"P6"));
     }
 
     /// Three planes of 20 x 18 pixels in tiles of 16 x 16.

@@ -59,10 +59,13 @@ impl DvlSource {
 
     fn handle_bytes(&mut self, bytes: &[u8], fault: &mut dyn FnMut(CameraFault, String)) {
         let (track, poses, arrival) = (&mut self.track, &mut self.poses, self.clock.now());
-        self.lines.push(bytes, |line| match DvlReport::parse(line) {
-            Ok(Some(report)) => poses.extend(track.handle(report, arrival, fault)),
-            Ok(None) => {}
-            Err(error) => fault(CameraFault::PosesUnreadable, error.to_string()),
+        self.lines.push(bytes, |line| {
+            for report in DvlReport::all_of(line) {
+                match report {
+                    Ok(report) => poses.extend(track.handle(report, arrival, fault)),
+                    Err(error) => fault(CameraFault::PosesUnreadable, error.to_string()),
+                }
+            }
         });
         let overlong = self.lines.overlong();
         if std::mem::replace(&mut self.overlong, overlong) != overlong {

@@ -8,13 +8,14 @@ use std::path::Path;
 const MAX_BYTES: u64 = 256 << 20;
 
 /// Reads the poses of a camera that looks ahead along its z axis, x to the right and y down in the image, in a world of east,
-/// north, up. Lines that begin with `#` are comments.
+/// north, up. Lines that begin with `#` are comments, also behind a byte order mark.
 ///
 /// # Errors
 /// A file that cannot be read, or a line that is not a time and seven finite numbers.
 pub fn read_tum_poses(path: &Path) -> Result<Vec<(Stamp, SensorPose)>, UserError> {
     let text = scenecast_config::read_regular(path, MAX_BYTES)?;
     let text = String::from_utf8(text).map_err(|_| UserError::file(path, "it is not text in UTF-8"))?;
+    let text = text.strip_prefix('\u{feff}').unwrap_or(&text);
     let mut poses = Vec::new();
     for (index, line) in text.lines().enumerate() {
         let line = line.trim();
@@ -57,7 +58,8 @@ mod tests {
             std::fs::write(&path, text).unwrap();
             read_tum_poses(&path).map_err(|error| error.to_string())
         };
-        let poses = read("good", "# time\n1305031102.5 1 2 -3 1 0 0 0\n\n1305031103.5,2,2,-3,1,0,0,0\n").unwrap();
+        let poses =
+            read("good", "\u{feff}# time\n1305031102.5 1 2 -3 1 0 0 0\n\n1305031103.5,2,2,-3,1,0,0,0\n").unwrap();
         assert_eq!(poses[1].0, Stamp::parse("1305031103.5").unwrap());
         assert_eq!((poses[1].1.x_m, poses[1].1.y_m, poses[1].1.depth_m), (2.0, 2.0, 3.0));
         assert!(poses[1].1.heading_rad.abs() < 1e-12);
