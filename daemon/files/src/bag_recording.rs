@@ -13,6 +13,7 @@ use scenecast_sensors::{
     camera_info_beside, pose_of, stamp_of_cdr,
 };
 use std::collections::{BTreeMap, BTreeSet};
+use std::fmt;
 use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
@@ -160,6 +161,29 @@ impl BagTiming {
     }
 }
 
+/// Images of a bag, and those that are left out by reason.
+#[derive(Debug, Default)]
+struct LeftOut {
+    all: u64,
+    without_time: u64,
+    not_later: u64,
+    without_pose: u64,
+    tilted: u64,
+}
+
+impl fmt::Display for LeftOut {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let reasons = [
+            (self.without_time, "have no time in their headers"),
+            (self.not_later, "are not later than the image before"),
+            (self.without_pose, "have no pose at their time"),
+            (self.tilted, "are tilted too much"),
+        ];
+        let texts = reasons.iter().filter(|(count, _)| *count > 0).map(|(count, reason)| format!("{count} {reason}"));
+        write!(f, "{}", texts.collect::<Vec<_>>().join(", "))
+    }
+}
+
 impl Recording {
     /// The images of a bag at the poses of its odometry.
     ///
@@ -179,7 +203,7 @@ impl Recording {
         let unusable = (unusable.0 > 0).then(|| {
             let (unusable, all) = unusable;
             format!(
-                "{unusable} of {all} messages of {} have no time, or a quaternion that has not the length 1",
+                "{unusable} of {all} messages of {} have no time, a position that is not finite, or a quaternion that has not the length 1",
                 odometry.name
             )
         });
@@ -187,30 +211,35 @@ impl Recording {
         let bag = Arc::new(Bag::new(path, images, timing.bits));
         let mut frames: Vec<(Stamp, RecordedFrame)> = Vec::new();
         let of_topic = contents.images.iter().filter(|(topic, _)| *topic == *bag.topic());
-        let (mut all, mut without_time) = (0, 0);
+        let mut left_out = LeftOut::default();
         for (number, (_, stamp)) in (0..).zip(of_topic) {
-            all += 1;
-            let Some(stamp) = stamp.filter(|stamp| frames.last().is_none_or(|(last, _)| last < stamp)) else {
-                without_time += 1;
+            left_out.all += 1;
+            let Some(stamp) = *stamp else {
+                left_out.without_time += 1;
                 continue;
             };
-            let PoseMatch::Found(pose) = track.at(stamp.shifted(timing.clock_offset_s)) else { continue };
-            let Some(frame) = timing.frame(&pose, FrameImage::Bag(bag.clone(), number)) else { continue };
-            frames.push((stamp, frame));
+            if frames.last().is_some_and(|(last, _)| *last >= stamp) {
+                left_out.not_later += 1;
+                continue;
+            }
+            let PoseMatch::Found(pose) = track.at(stamp.shifted(timing.clock_offset_s)) else {
+                left_out.without_pose += 1;
+                continue;
+            };
+            match timing.frame(&pose, FrameImage::Bag(bag.clone(), number)) {
+                Some(frame) => frames.push((stamp, frame)),
+                None => left_out.tilted += 1,
+            }
         }
         let Some(&(first, _)) = frames.first() else {
-            let mut cause =
-                format!("none of its {all} images has a pose at its time; {without_time} have no later time");
+            let mut cause = format!("none of its {} images is used: {left_out}", left_out.all);
             cause.extend(unusable.map(|text| format!("; {text}")));
             return Err(UserError::file(path, cause));
         };
-        let dropped = all - frames.len() as u64;
+        let dropped = left_out.all - frames.len() as u64;
         let mut notes: Vec<String> = note.into_iter().chain(unusable).collect();
         if dropped > 0 {
-            notes.push(format!(
-                "{dropped} of {all} images are left out: {without_time} have no time or an earlier one than the image before, the others \
-                 no pose at their time or too much tilt"
-            ));
+            notes.push(format!("{dropped} of {} images are left out: {left_out}", left_out.all));
         }
         notes.extend(contents.damage.map(|damage| match contents.damages {
             0 | 1 => damage,
@@ -335,7 +364,7 @@ mod tests {
     fn poses_without_a_rotation_are_named() {
         let recording = open(&bag_with("turns", &[], &[1.0, 0.0]), |_| {});
         assert_eq!(recording.frames.len(), 1);
-        assert!(recording.notes[0].starts_with("1 of 2 messages of /odometry have no time, or a quaternion"));
+        assert!(recording.notes[0].starts_with("1 of 2 messages of /odometry have no time, a position that is not finite, or a quaternion"));
     }
 
     #[test]
@@ -345,5 +374,11 @@ mod tests {
         let recording = open(&bag("wrong", &[info(-1.0)]), |_| {});
         assert!(recording.frames[0].sight.is_none());
         assert!(recording.notes[0].contains("/camera/camera_info can be used: the matrix K"), "{:?}", recording.notes);
+    }
+
+    #[test]
+    fn images_that_are_left_out_are_counted_by_their_reasons() {
+        let left_out = LeftOut { all: 9, without_time: 2, tilted: 3, ..LeftOut::default() };
+        assert_eq!(left_out.to_string(), "2 have no time in their headers, 3 are tilted too much");
     }
 }

@@ -1,11 +1,10 @@
 //! Reads a fence, or weighted areas, from a GeoJSON file (RFC 7946). Features without a geometry are passed over.
 
+use crate::json_file::read_json;
 use scenecast_core::{LatLon, MAX_DISTANCE_M, TangentPlane, UserError, fence_of};
 use scenecast_protocol::directive::Fence;
 use serde_json::Value;
 use std::path::Path;
-
-const MAX_BYTES: u64 = 1 << 20;
 
 /// Corners so close to each other are the same, metres.
 const SAME_M: f64 = 0.001;
@@ -81,10 +80,22 @@ fn areas_of(whole: &Value, frame: CoordinateFrame) -> Result<Vec<AreaShape>, Str
 }
 
 fn areas_of_feature(feature: &Value, frame: CoordinateFrame) -> Result<Vec<AreaShape>, String> {
-    let weight = feature["properties"]["weight"].as_f64().ok_or("the property weight is not a number");
+    let weight = property(feature, "weight");
+    let weight = weight.and_then(Value::as_f64).ok_or(match (weight, property(feature, "role")) {
+        (None, Some(role)) if !role.is_null() => {
+            "it has a role and no weight, as the shapes of a fence, which scenecast ctl fence reads"
+        }
+        _ => "the property weight is not a number",
+    });
     let polygons = polygons_of(&feature["geometry"], "a Polygon or a MultiPolygon")?;
     let area = |polygon: &Value| Ok(AreaShape { outline: outline(polygon, frame)?, weight: weight? });
     polygons.into_iter().map(area).collect()
+}
+
+/// A property of a feature. Shapefiles and some editors change the case of names.
+fn property<'a>(feature: &'a Value, name: &str) -> Option<&'a Value> {
+    let properties = feature["properties"].as_object()?;
+    properties.iter().find(|(other, _)| other.eq_ignore_ascii_case(name)).map(|(_, value)| value)
 }
 
 /// The polygons of a geometry; another one is refused with what is `expected`.
@@ -127,16 +138,6 @@ fn check_wgs84(crs: &Value) -> Result<(), String> {
     Err(format!("crs {name}: only longitude and latitude of WGS 84 are read, as RFC 7946 has it; {convert}"))
 }
 
-fn read_json(file: &Path) -> Result<Value, UserError> {
-    let text = scenecast_config::read_regular(file, MAX_BYTES)?;
-    if text.starts_with(b"\xFF\xFE") || text.starts_with(b"\xFE\xFF") {
-        return Err(UserError::file(file, "it is UTF-16; GeoJSON is UTF-8"));
-    }
-    const BYTE_ORDER_MARK: &[u8] = b"\xEF\xBB\xBF";
-    let text = text.strip_prefix(BYTE_ORDER_MARK).unwrap_or(&text);
-    serde_json::from_slice(text).map_err(|e| UserError::file(file, format!("it is not JSON: {e}")))
-}
-
 fn shapes_of(whole: &Value, frame: CoordinateFrame) -> Result<FenceShapes, String> {
     check_crs(whole, frame)?;
     let mut order = FenceShapes::default();
@@ -169,6 +170,9 @@ fn add(order: &mut FenceShapes, feature: &Value, frame: CoordinateFrame) -> Resu
         return Ok(());
     }
     let role = role(feature)?;
+    if role.is_none() && property(feature, "weight").is_some_and(Value::is_number) {
+        return Err("it has a weight: scenecast ctl areas reads weighted areas, and a fence has none".to_owned());
+    }
     if geometry["type"] == "Point" && matches!(role, None | Some(FeatureRole::ReturnPoint)) {
         let at = place(&geometry["coordinates"], frame)?;
         return match order.return_point.replace(at) {
@@ -195,12 +199,9 @@ fn add(order: &mut FenceShapes, feature: &Value, frame: CoordinateFrame) -> Resu
 }
 
 fn role(feature: &Value) -> Result<Option<FeatureRole>, String> {
-    // Shapefiles and some editors change the case of names.
-    let is_role = |name: &str| name.eq_ignore_ascii_case("role");
-    let given = feature["properties"].as_object().and_then(|all| all.iter().find(|(name, _)| is_role(name)));
-    let role = match given {
-        None | Some((_, Value::Null)) => return Ok(None),
-        Some((_, role)) => role,
+    let role = match property(feature, "role") {
+        None | Some(Value::Null) => return Ok(None),
+        Some(role) => role,
     };
     match role.as_str().map(str::to_ascii_lowercase).as_deref() {
         Some("") => Ok(None),
@@ -292,6 +293,11 @@ mod tests {
         let outline = vec![[0.0, 0.0], [90.0, 0.0], [90.0, 60.0], [0.0, 60.0]];
         let order = vec![AreaShape { outline, weight: -0.5 }];
         assert_eq!(areas(&feature), Ok(order.clone()));
+        assert_eq!(areas(&feature.replace("weight", "Weight")), Ok(order.clone()));
+        let as_fence = read(&feature, CoordinateFrame::Metres).unwrap_err();
+        assert!(as_fence.contains("scenecast ctl areas"), "{as_fence}");
+        let fence = feature.replace(r#""weight": -0.5"#, r#""role": "fence""#);
+        assert!(areas(&fence).unwrap_err().contains("scenecast ctl fence"));
         let list = format!(r#"{{"type": "FeatureCollection", "features": [{feature}]}}"#);
         assert_eq!(areas(&list), Ok(order));
         let refused =

@@ -1,6 +1,7 @@
 //! Recorded missions: images with their poses.
 
 use crate::images::FrameImage;
+use crate::pose_table::{Columns, PoseRow};
 use crate::tum_recording::read_depth;
 use image::RgbImage;
 use scene_model::project::View;
@@ -8,7 +9,7 @@ use scenecast_core::{Area, UserError};
 use scenecast_sensors::Sight;
 use std::fmt::Write as _;
 use std::io::Read as _;
-use std::path::{Component, Path, PathBuf};
+use std::path::{Path, PathBuf};
 
 /// A camera frame of a recorded mission.
 #[derive(Debug, Clone, PartialEq)]
@@ -85,19 +86,18 @@ impl Recording {
             true => (Columns::find(&names, &MOSAIC_COLUMNS), true),
             false => (Columns::find(&names, &METRE_COLUMNS), false),
         };
-        let columns = columns.map_err(|name| UserError::Input(format!("{}:1: no column {name}", path.display())))?;
+        let columns = columns.map_err(|wrong| UserError::Input(format!("{}:1: {wrong}", path.display())))?;
         let mut frames: Vec<RecordedFrame> = Vec::new();
         for row in reader.records() {
             let row = row.map_err(|e| UserError::file(&path, e))?;
             let place = format!("{}:{}", path.display(), row.position().map_or(0, csv::Position::line));
-            let row = PoseRow { columns: &columns, fields: &row };
-            let frame = match in_pixels {
+            let frame = PoseRow::new(&columns, &row).and_then(|row| match in_pixels {
                 true => {
                     let midnight = frames.last().map_or(0.0, |last| (last.t_s / DAY_S).floor() * DAY_S);
                     of_mosaic(dir, row, metres_per_pixel).map(|f| after(f, midnight, frames.last()))
                 }
                 false => of_metres(dir, row),
-            };
+            });
             let frame = frame.map_err(|wrong| UserError::Input(format!("{place}: {wrong}")))?;
             if let Some(last) = frames.last().filter(|last| last.t_s > frame.t_s) {
                 let (before, now) = (last.t_s, frame.t_s);
@@ -129,63 +129,6 @@ impl Recording {
 
 const METRE_COLUMNS: [&str; 6] = ["t_s", "file", "x_m", "y_m", "depth_m", "heading_deg"];
 const MOSAIC_COLUMNS: [&str; 6] = ["file", "time_utc_hms", "x_px", "y_px", "yaw_deg", "scale"];
-
-/// Where the wanted columns are in a row.
-struct Columns {
-    wanted: [(&'static str, usize); 6],
-    scale: Option<usize>,
-}
-
-impl Columns {
-    /// The name of a column that is missing is the error.
-    fn find(names: &csv::StringRecord, wanted: &[&'static str; 6]) -> Result<Self, &'static str> {
-        let mut found = wanted.map(|name| (name, 0));
-        for (name, place) in &mut found {
-            *place = names.iter().position(|other| other == *name).ok_or(*name)?;
-        }
-        Ok(Self { wanted: found, scale: names.iter().position(|name| name == "scale") })
-    }
-}
-
-#[derive(Clone, Copy)]
-struct PoseRow<'a> {
-    columns: &'a Columns,
-    fields: &'a csv::StringRecord,
-}
-
-impl<'a> PoseRow<'a> {
-    fn text(self, name: &str) -> Result<&'a str, String> {
-        let place = self.columns.wanted.iter().find(|(column, _)| *column == name).map(|(_, place)| *place);
-        let text = place.and_then(|place| self.fields.get(place)).filter(|text| !text.is_empty());
-        text.ok_or_else(|| format!("{name} is missing"))
-    }
-
-    /// A file of the folder or of a folder below it.
-    fn file(self, dir: &Path) -> Result<PathBuf, String> {
-        let text = self.text("file")?;
-        let is_inside =
-            Path::new(text).components().all(|part| matches!(part, Component::Normal(_) | Component::CurDir));
-        if is_inside { Ok(dir.join(text)) } else { Err(format!("file is {text:?}; expected a file below the folder")) }
-    }
-
-    fn depth_m(self) -> Result<f64, String> {
-        let depth_m = self.number("depth_m")?;
-        if depth_m >= 0.0 { Ok(depth_m) } else { Err(format!("depth_m is {depth_m}; expected 0 or more, downwards")) }
-    }
-
-    /// The scale of a table in metres, in which it may be missing.
-    fn scale(self) -> Result<f64, String> {
-        let Some(text) = self.columns.scale.and_then(|place| self.fields.get(place)) else { return Ok(1.0) };
-        let value = text.parse::<f64>().ok().filter(|value| (1e-3..=1e3).contains(value));
-        value.ok_or_else(|| format!("scale is {text:?}; expected 0.001 to 1000"))
-    }
-
-    fn number(self, name: &str) -> Result<f64, String> {
-        let text = self.text(name)?;
-        let value = text.parse::<f64>().ok().filter(|value| value.is_finite());
-        value.ok_or_else(|| format!("{name} is {text:?}; expected a finite number"))
-    }
-}
 
 fn of_metres(dir: &Path, row: PoseRow<'_>) -> Result<RecordedFrame, String> {
     let t_s = row.number("t_s")?;
@@ -385,6 +328,19 @@ mod tests {
         let text = "t_s,file,x_m,y_m,depth_m,heading_deg\n0,a.png,1,2,3,4\n1,b.png,nan,2,3,4\n";
         let wrong = open("wrong", "poses.csv", text).unwrap_err().to_string();
         assert!(wrong.contains("poses.csv:3: x_m is \"nan\"; expected a finite number"), "{wrong}");
+    }
+
+    #[test]
+    fn a_row_with_other_fields_or_a_column_twice_is_refused() {
+        let head = "t_s,file,x_m,y_m,depth_m,heading_deg";
+        for (name, row, count) in [("fewer", "1,b.png,1,2,3", 5), ("more", "1,b.png,1,5,2,3,4", 7)] {
+            let wrong = open(name, "poses.csv", &format!("{head}\n0,a.png,1,2,3,4\n{row}\n")).unwrap_err().to_string();
+            let expected = format!("poses.csv:3: the row has {count} fields; the first line names 6 columns");
+            assert!(wrong.contains(&expected), "{wrong}");
+        }
+        let wrong = open("twice", "poses.csv", &format!("{head},x_m\n0,a.png,1,2,3,4,5\n")).unwrap_err().to_string();
+        assert!(wrong.contains("poses.csv:1: two columns x_m, the columns 3 and 7"), "{wrong}");
+        assert!(open("notes", "poses.csv", &format!("{head},note,note\n0,a.png,1,2,3,4,,\n")).is_ok());
     }
 
     #[test]

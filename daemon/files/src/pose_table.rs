@@ -1,0 +1,83 @@
+//! Rows of a table of poses, by the names of their columns.
+
+use std::path::{Component, Path, PathBuf};
+
+/// Where the wanted columns are in a row.
+pub(crate) struct Columns {
+    wanted: [(&'static str, usize); 6],
+    scale: Option<usize>,
+    /// All columns of the table.
+    count: usize,
+}
+
+impl Columns {
+    /// Where the wanted columns are, and `scale` if there is one.
+    ///
+    /// # Errors
+    /// A column that is missing, or is there twice.
+    pub(crate) fn find(names: &csv::StringRecord, wanted: &[&'static str; 6]) -> Result<Self, String> {
+        let place = |name: &str| {
+            let mut places = names.iter().enumerate().filter(|(_, other)| *other == name).map(|(place, _)| place);
+            match (places.next(), places.next()) {
+                (Some(one), Some(other)) => {
+                    Err(format!("two columns {name}, the columns {} and {}", one + 1, other + 1))
+                }
+                (one, _) => Ok(one),
+            }
+        };
+        let mut found = wanted.map(|name| (name, 0));
+        for (name, at) in &mut found {
+            *at = place(name)?.ok_or_else(|| format!("no column {name}"))?;
+        }
+        Ok(Self { wanted: found, scale: place("scale")?, count: names.len() })
+    }
+}
+
+#[derive(Clone, Copy)]
+pub(crate) struct PoseRow<'a> {
+    columns: &'a Columns,
+    fields: &'a csv::StringRecord,
+}
+
+impl<'a> PoseRow<'a> {
+    /// A row that has a field for each column: with another number, as of a comma too many, its numbers would be those of other columns.
+    pub(crate) fn new(columns: &'a Columns, fields: &'a csv::StringRecord) -> Result<Self, String> {
+        let (count, expected) = (fields.len(), columns.count);
+        let is_whole = count == expected;
+        is_whole
+            .then_some(Self { columns, fields })
+            .ok_or_else(|| format!("the row has {count} fields; the first line names {expected} columns"))
+    }
+
+    pub(crate) fn text(self, name: &str) -> Result<&'a str, String> {
+        let place = self.columns.wanted.iter().find(|(column, _)| *column == name).map(|(_, place)| *place);
+        let text = place.and_then(|place| self.fields.get(place)).filter(|text| !text.is_empty());
+        text.ok_or_else(|| format!("{name} is missing"))
+    }
+
+    /// A file of the folder or of a folder below it.
+    pub(crate) fn file(self, dir: &Path) -> Result<PathBuf, String> {
+        let text = self.text("file")?;
+        let is_inside =
+            Path::new(text).components().all(|part| matches!(part, Component::Normal(_) | Component::CurDir));
+        if is_inside { Ok(dir.join(text)) } else { Err(format!("file is {text:?}; expected a file below the folder")) }
+    }
+
+    pub(crate) fn depth_m(self) -> Result<f64, String> {
+        let depth_m = self.number("depth_m")?;
+        if depth_m >= 0.0 { Ok(depth_m) } else { Err(format!("depth_m is {depth_m}; expected 0 or more, downwards")) }
+    }
+
+    /// The scale of a table in metres, in which it may be missing.
+    pub(crate) fn scale(self) -> Result<f64, String> {
+        let Some(text) = self.columns.scale.and_then(|place| self.fields.get(place)) else { return Ok(1.0) };
+        let value = text.parse::<f64>().ok().filter(|value| (1e-3..=1e3).contains(value));
+        value.ok_or_else(|| format!("scale is {text:?}; expected 0.001 to 1000"))
+    }
+
+    pub(crate) fn number(self, name: &str) -> Result<f64, String> {
+        let text = self.text(name)?;
+        let value = text.parse::<f64>().ok().filter(|value| value.is_finite());
+        value.ok_or_else(|| format!("{name} is {text:?}; expected a finite number"))
+    }
+}
