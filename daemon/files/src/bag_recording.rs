@@ -364,7 +364,11 @@ mod tests {
     fn poses_without_a_rotation_are_named() {
         let recording = open(&bag_with("turns", &[], &[1.0, 0.0]), |_| {});
         assert_eq!(recording.frames.len(), 1);
-        assert!(recording.notes[0].starts_with("1 of 2 messages of /odometry have no time, a position that is not finite, or a quaternion"));
+        assert!(
+            recording.notes[0].starts_with(
+                "1 of 2 messages of /odometry have no time, a position that is not finite, or a quaternion"
+            )
+        );
     }
 
     #[test]
