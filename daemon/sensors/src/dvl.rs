@@ -92,11 +92,10 @@ impl DvlReport {
 
     fn of_object(object: Result<Value, DvlError>) -> Result<Option<Self>, DvlError> {
         let object = object?;
-        if !object.is_object() {
-            return Err(DvlError::NotJson);
-        }
-        if !USED.iter().any(|used| object["type"] == **used) {
-            return Ok(None);
+        match (object.is_object(), &object["type"]) {
+            (true, Value::String(kind)) if USED.contains(&kind.as_str()) => {}
+            (true, Value::String(_) | Value::Null) => return Ok(None),
+            _ => return Err(DvlError::NotJson),
         }
         let fields = Fields::deserialize(object).map_err(|_| DvlError::NotJson)?;
         match fields.kind.as_deref() {
