@@ -309,7 +309,7 @@ impl Mavlink {
             let MavlinkConfig { system, .. } = self.config;
             let component = frame.component;
             self.tray.note(format!(
-                "two vehicles answer as system {system} component {component}, with clocks {apart_s} s apart: the first one is used; give each its own SYSID_THISMAV"
+                "two vehicles answer as system {system} component {component}, with clocks {apart_s} s apart: the first one is used; give each a system of its own (SYSID_THISMAV, or MAV_SYSID from ArduSub 4.7 on)"
             ));
         }
         verdict == BootTime::Foreign
