@@ -53,6 +53,14 @@ impl FrameContent {
         }
     }
 
+    /// Keeps what was taken at places of the image, in pixels, that are wanted.
+    pub(crate) fn retain(&mut self, is_wanted: impl Fn(f32, f32) -> bool) {
+        match self {
+            Self::Words(words) => words.retain(|word| is_wanted(word.u, word.v)),
+            Self::Points(points) => points.retain(|point| is_wanted(point.u, point.v)),
+        }
+    }
+
     /// The points; none of words.
     pub(crate) fn into_points(self) -> Vec<MeasuredPoint> {
         match self {

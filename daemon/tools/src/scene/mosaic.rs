@@ -1,7 +1,7 @@
 //! Words of images of the ground from above: one mosaic, or the frames of a survey with their poses.
 
 use super::{Look, Sighting, WordSource};
-use image::RgbImage;
+use image::{DynamicImage, GenericImageView, RgbImage};
 use scene_model::habitats::MeasuredPoint;
 use scene_model::project::{DownCamera, Observation, Pose};
 use scenecast_core::UserError;
@@ -19,13 +19,43 @@ pub(crate) struct Mosaic {
     pub(crate) size: (u32, u32),
     /// Edge of a cell, pixels.
     pub(crate) cell_px: f32,
+    note: Option<String>,
+}
+
+/// Shares of pixels without an image of the ground that people are told of.
+const TOLD_SHARE: f64 = 0.02;
+
+/// Whether an image has nothing at a place, in pixels.
+fn is_clear(image: &DynamicImage, u: f32, v: f32) -> bool {
+    let (x, y) = ((u as u32).min(image.width() - 1), (v as u32).min(image.height() - 1));
+    image.get_pixel(x, y).0[3] == 0
+}
+
+/// What people should know of the parts of a mosaic that show no ground.
+fn note_of_empty(image: &DynamicImage) -> Option<String> {
+    let all = f64::from(image.width()) * f64::from(image.height());
+    let share =
+        |is_empty: fn([u8; 4]) -> bool| image.pixels().filter(|(_, _, pixel)| is_empty(pixel.0)).count() as f64 / all;
+    let clear = if image.color().has_alpha() { share(|[.., alpha]| alpha == 0) } else { 0.0 };
+    let black = share(|[r, g, b, alpha]| [r, g, b] == [0; 3] && alpha > 0);
+    match (clear, black) {
+        (clear, _) if clear >= TOLD_SHARE => {
+            Some(format!("{:.0} % of the mosaic are transparent and get no label", clear * 100.0))
+        }
+        (_, black) if black >= TOLD_SHARE => Some(format!(
+            "{:.0} % of the mosaic are exactly black and get labels; gdalwarp -srcnodata 0 -dstalpha makes a border without data transparent",
+            black * 100.0
+        )),
+        _ => None,
+    }
 }
 
 impl Mosaic {
     /// Looks at a mosaic whose pixels are `metres_per_pixel` wide.
     pub(crate) fn open(path: &Path, look: &mut Look, metres_per_pixel: f64, cell_m: f64) -> Result<Self, UserError> {
         let cell_px = cell_m / metres_per_pixel;
-        let image = read_image(path)?.to_rgb8();
+        let picture = read_image(path)?;
+        let image = picture.to_rgb8();
         let (width, height) = image.dimensions();
         if cell_px < MIN_CELL_PX {
             let cause =
@@ -44,9 +74,13 @@ impl Mosaic {
             y: -f64::from(word.v).max(1e-3) * metres_per_pixel,
             z: 0.0,
         };
-        let content = look.at(&image, cell_px as f32);
+        let mut content = look.at(&image, cell_px as f32);
+        if picture.color().has_alpha() {
+            content.retain(|u, v| !is_clear(&picture, u, v));
+        }
         let seen = Some((content.as_words().iter().map(place).collect(), content.into_points()));
-        Ok(Self { seen, size: (width, height), cell_px: cell_px as f32 })
+        let note = note_of_empty(&picture);
+        Ok(Self { seen, size: (width, height), cell_px: cell_px as f32, note })
     }
 }
 
@@ -54,6 +88,10 @@ impl WordSource for Mosaic {
     fn next(&mut self) -> Result<Option<Sighting>, UserError> {
         let (size, seen) = (self.size, self.seen.take());
         Ok(seen.map(|(observations, points)| Sighting { t_s: 0.0, observations, image: (size, points), done: 1.0 }))
+    }
+
+    fn notes(&self) -> Option<String> {
+        self.note.clone()
     }
 }
 
@@ -135,5 +173,32 @@ impl WordSource for Frames {
         let advice = self.geometry.geometry().and_then(|found| found.advice(self.metres_per_pixel));
         let notes: Vec<String> = self.notes.iter().cloned().chain(unreadable).chain(advice).collect();
         (!notes.is_empty()).then(|| notes.join("; "))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use image::{Rgba, RgbaImage};
+
+    #[test]
+    fn transparent_parts_of_a_mosaic_are_not_looked_at() {
+        let path = std::env::temp_dir().join(format!("scenecast-{}-mosaic-clear.png", std::process::id()));
+        let pixel =
+            |x: u32, y: u32| Rgba([(x * 7 % 251) as u8, (y * 5 % 251) as u8, 90, if x < 120 { 0 } else { 255 }]);
+        RgbaImage::from_fn(240, 200, pixel).save(&path).unwrap();
+        let mosaic = Mosaic::open(&path, &mut Look::Points, 0.01, 0.2).unwrap();
+        assert_eq!(mosaic.notes().as_deref(), Some("50 % of the mosaic are transparent and get no label"));
+        let (observations, points) = mosaic.seen.unwrap();
+        assert!(points.len() == observations.len() && points.len() > 100, "{}", points.len());
+        assert!(points.iter().all(|point| point.u >= 120.0) && observations.iter().all(|seen| seen.x >= 1.2));
+    }
+
+    #[test]
+    fn a_black_border_is_named_with_its_share() {
+        let border = RgbImage::from_fn(100, 100, |x, _| image::Rgb(if x < 25 { [0; 3] } else { [9; 3] }));
+        let note = note_of_empty(&DynamicImage::ImageRgb8(border)).unwrap();
+        assert!(note.starts_with("25 % of the mosaic are exactly black"), "{note}");
+        assert_eq!(note_of_empty(&DynamicImage::ImageRgb8(RgbImage::from_pixel(9, 9, image::Rgb([9; 3])))), None);
     }
 }
