@@ -1,7 +1,6 @@
 //! A map in shared tiles, its cells one by one, and its form in JSON.
 
-use crate::state::ReplaySide;
-use crate::state::{LayerBody, MapBody, VehicleMarker};
+use crate::state::{LayerBody, MapBody, ReplaySide, VehicleMarker};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use scenecast_protocol::map::{

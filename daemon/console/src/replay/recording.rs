@@ -100,6 +100,7 @@ pub(crate) struct Known {
 /// One record.
 #[derive(Default)]
 struct Record {
+    path: PathBuf,
     states: Vec<StateText>,
     clock: MissionClock,
     known: BTreeMap<String, Known>,
@@ -117,17 +118,16 @@ impl Recording {
     /// There is no record, it has no message of an end, or two of them are of different missions.
     pub fn read(paths: &[PathBuf]) -> Result<Self, UserError> {
         let mut whole = Self::default();
-        let (mut surfaces, mut vehicles): (Vec<RecordAt>, Vec<RecordAt>) = (Vec::new(), Vec::new());
+        let (mut surfaces, mut vehicles) = (Vec::new(), Vec::new());
         let paths = paths.iter().map(|path| mission_records(path)).collect::<Result<Vec<_>, _>>()?.concat();
         for path in &paths {
             let record = Record::read(path, &mut whole.damage)?;
             if record.span.is_none() || record.states.is_empty() && record.known.is_empty() {
                 return Err(UserError::file(path, "it is no record of a mission: it has no topic of scenecast"));
             }
-            if record.states.is_empty() { &mut vehicles } else { &mut surfaces }.push((path, record));
+            if record.states.is_empty() { &mut vehicles } else { &mut surfaces }.push(record);
         }
         of_one_mission(&surfaces, &vehicles)?;
-        let (mut surfaces, mut vehicles) = (without_paths(surfaces), without_paths(vehicles));
         let mut span = (u64::MAX, 0);
         let frames = FrameTimes::joined(surfaces.iter().map(|surface| &surface.frames));
         surfaces.sort_by_key(|record| record.span);
@@ -174,35 +174,24 @@ impl Timeline {
     }
 }
 
-/// A record with the file or folder that it was read from.
-type RecordAt<'a> = (&'a PathBuf, Record);
-
-fn without_paths(records: Vec<RecordAt>) -> Vec<Record> {
-    records.into_iter().map(|(_, record)| record).collect()
-}
-
 /// Labels and clocks of two missions have nothing to do with each other, so records of two are refused by name.
-fn of_one_mission(surfaces: &[RecordAt], vehicles: &[RecordAt]) -> Result<(), UserError> {
-    let refused = |a: &Path, b: &Path, why: &str| {
-        let (a, b) = (a.display(), b.display());
+fn of_one_mission(surfaces: &[Record], vehicles: &[Record]) -> Result<(), UserError> {
+    let Some(first) = surfaces.first() else { return Ok(()) };
+    let refused = |other: &Record, why: &str| {
+        let (a, b) = (first.path.display(), other.path.display());
         Err(UserError::Input(format!("{a} and {b} are records of two missions: {why}; give those of one")))
     };
-    if let [(first, record), others @ ..] = surfaces {
-        let other = others.iter().find(|(_, other)| other.mission() != record.mission());
-        if let Some((path, other)) = other {
-            let why = format!("the surface names them {} and {}", record.mission(), other.mission());
-            return refused(first, path, &why);
-        }
+    if let Some(other) = surfaces.iter().find(|other| other.mission() != first.mission()) {
+        return refused(other, &format!("the surface names them {} and {}", first.mission(), other.mission()));
     }
-    for (path, vehicle) in vehicles {
-        let meets = |(_, surface): &RecordAt| vehicle.frames.meets(&surface.frames) || vehicle.overlaps(surface);
-        if let [(surface, _), ..] = surfaces
-            && !surfaces.iter().any(meets)
-        {
-            return refused(surface, path, "they have no frame in common, and their times do not overlap");
-        }
+    let is_apart = |vehicle: &&Record| {
+        let meets = |surface: &Record| vehicle.frames.meets(&surface.frames) || vehicle.overlaps(surface);
+        !surfaces.iter().any(meets)
+    };
+    match vehicles.iter().find(is_apart) {
+        Some(vehicle) => refused(vehicle, "they have no frame in common, and their times do not overlap"),
+        None => Ok(()),
     }
-    Ok(())
 }
 
 fn joined(span: (u64, u64), with: Option<(u64, u64)>, shift: i64) -> (u64, u64) {
@@ -212,7 +201,7 @@ fn joined(span: (u64, u64), with: Option<(u64, u64)>, shift: i64) -> (u64, u64) 
 
 impl Record {
     fn read(path: &Path, damage: &mut Vec<String>) -> Result<Self, UserError> {
-        let mut record = Self::default();
+        let mut record = Self { path: path.to_owned(), ..Self::default() };
         damage.extend(read_record(path, |message| record.take(&message))?);
         Ok(record)
     }
@@ -303,32 +292,36 @@ impl Known {
 mod tests {
     use super::*;
 
-    fn record(mission: Option<&str>, span: (u64, u64)) -> Record {
+    fn record(path: &str, mission: Option<&str>, span: (u64, u64)) -> Record {
         let head =
             |id: &str| serde_json::json!({ "now_s": 1.0, "mission": { "id": id, "speed": 1.0 }, "vehicles": [] });
         let state = |id: &str| {
             let head = serde_json::from_value(head(id)).expect("the head of a state");
             StateText { nanos: span.0, json: String::new(), head }
         };
-        Record { states: mission.map(state).into_iter().collect(), span: Some(span), ..Record::default() }
+        Record {
+            path: path.into(),
+            states: mission.map(state).into_iter().collect(),
+            span: Some(span),
+            ..Record::default()
+        }
     }
 
-    fn refusal(surfaces: &[RecordAt<'_>], vehicles: &[RecordAt<'_>]) -> Option<String> {
+    fn refusal(surfaces: &[Record], vehicles: &[Record]) -> Option<String> {
         of_one_mission(surfaces, vehicles).err().map(|error| error.to_string())
     }
 
     #[test]
     fn records_of_two_missions_are_refused_by_name() {
-        let [ship, boat, auv] = ["ship", "boat", "auv"].map(PathBuf::from);
-        let first = || (&ship, record(Some("0a"), (100, 200)));
+        let first = || record("ship", Some("0a"), (100, 200));
         assert_eq!(
-            refusal(&[first(), (&boat, record(Some("0a"), (300, 400)))], &[(&auv, record(None, (350, 360)))]),
+            refusal(&[first(), record("boat", Some("0a"), (300, 400))], &[record("auv", None, (350, 360))]),
             None
         );
-        let two = refusal(&[first(), (&boat, record(Some("0b"), (100, 200)))], &[]).expect("they are of two missions");
+        let two = refusal(&[first(), record("boat", Some("0b"), (100, 200))], &[]).expect("they are of two missions");
         assert!(["ship", "boat", "0a", "0b"].iter().all(|word| two.contains(word)), "{two}");
-        let later = refusal(&[first()], &[(&auv, record(None, (201, 300)))]).expect("they have nothing in common");
+        let later = refusal(&[first()], &[record("auv", None, (201, 300))]).expect("they have nothing in common");
         assert!(later.contains("ship and auv") && later.contains("no frame"), "{later}");
-        assert_eq!(refusal(&[], &[(&auv, record(None, (201, 300)))]), None);
+        assert_eq!(refusal(&[], &[record("auv", None, (201, 300))]), None);
     }
 }

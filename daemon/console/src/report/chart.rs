@@ -22,10 +22,11 @@ pub(super) fn map(state: &VehicleState, vehicle: &DiveVehicle) -> Option<String>
         "<svg viewBox=\"0 0 {WIDTH} {:.0}\" role=\"img\" aria-label=\"map of the sea floor\" xmlns=\"http://www.w3.org/2000/svg\">\n",
         frame.height_px() + 40.0
     );
-    cells(&mut svg, &frame, bounds, state, vehicle);
+    let classes = classes(bounds, state, vehicle);
+    cells(&mut svg, &frame, bounds, &classes, state, vehicle);
     grid(&mut svg, &frame);
     track(&mut svg, &frame, &vehicle.track);
-    numbers(&mut svg, &frame, bounds, state, vehicle);
+    numbers(&mut svg, &frame, bounds, &classes, state, vehicle);
     for marker in &state.markers {
         let text: String = marker.text.chars().take(MAX_MARKER).collect();
         point(&mut svg, &frame, (marker.x_m, marker.y_m), &text);
@@ -75,25 +76,25 @@ fn round_length(length: f64) -> f64 {
     [5.0, 2.0, 1.0].into_iter().map(|n| n * power).find(|n| *n <= length * 1.000_001).unwrap_or(power)
 }
 
-/// Cells of one label side by side in a row are one rectangle.
-fn cells(svg: &mut String, frame: &Frame, bounds: Rect, state: &VehicleState, vehicle: &DiveVehicle) {
+/// The class of each cell of a part of the map, row by row from the south; 0 is none.
+fn classes(Rect { x, y, width, height }: Rect, state: &VehicleState, vehicle: &DiveVehicle) -> Vec<u8> {
+    let labels = vehicle.labels.copy_area(i64::from(x), i64::from(y), width as usize, height as usize);
+    labels.into_iter().map(|label| state.label_book.shown_as(label)).collect()
+}
+
+/// Cells of one class side by side in a row are one rectangle.
+fn cells(svg: &mut String, frame: &Frame, bounds: Rect, classes: &[u8], state: &VehicleState, vehicle: &DiveVehicle) {
     let shift = state.map.shift_m();
     let edge = vehicle.cell_m;
     let mut runs: std::collections::BTreeMap<u8, String> = std::collections::BTreeMap::new();
-    let rows = vehicle.labels.copy_area(
-        i64::from(bounds.x),
-        i64::from(bounds.y),
-        bounds.width as usize,
-        bounds.height as usize,
-    );
-    for (row, labels) in rows.chunks(bounds.width.max(1) as usize).enumerate() {
+    for (row, classes) in classes.chunks(bounds.width.max(1) as usize).enumerate() {
         let north = (f64::from(bounds.y) + row as f64 + 1.0) * edge + shift.1;
         let mut column = 0;
-        for run in labels.chunk_by(|a, b| a == b) {
-            if let Some(&label) = run.first().filter(|label| **label != 0) {
+        for run in classes.chunk_by(|a, b| a == b) {
+            if let Some(&class) = run.first().filter(|class| **class != 0) {
                 let west = (f64::from(bounds.x) + column as f64) * edge + shift.0;
                 let (x, y) = frame.place(west, north);
-                let path = runs.entry(state.label_book.shown_as(label)).or_default();
+                let path = runs.entry(class).or_default();
                 let (width, height) = (run.len() as f64 * edge * frame.px_m, edge * frame.px_m);
                 // Writing to a string cannot fail.
                 let _ = write!(path, "M{x:.2} {y:.2}h{width:.2}v{height:.2}h-{width:.2}z");
@@ -163,15 +164,12 @@ fn point(svg: &mut String, frame: &Frame, (east_m, north_m): (f64, f64), name: &
 const MAX_NUMBERED: u64 = 1 << 22;
 
 /// The number of each class where it is widest, so that classes can be told apart in grey.
-fn numbers(svg: &mut String, frame: &Frame, bounds: Rect, state: &VehicleState, vehicle: &DiveVehicle) {
+fn numbers(svg: &mut String, frame: &Frame, bounds: Rect, classes: &[u8], state: &VehicleState, vehicle: &DiveVehicle) {
     if bounds.area() > MAX_NUMBERED {
         return;
     }
-    let (width, height) = (bounds.width as usize, bounds.height as usize);
-    let labels = vehicle.labels.copy_area(i64::from(bounds.x), i64::from(bounds.y), width, height);
-    let classes: Vec<u8> = labels.into_iter().map(|label| state.label_book.shown_as(label)).collect();
     let (shift, edge) = (state.map.shift_m(), vehicle.cell_m);
-    for (class, (column, row)) in widest(&classes, width) {
+    for (class, (column, row)) in widest(classes, bounds.width as usize) {
         let middle = |from: i32, cell: usize, shift: f64| (f64::from(from) + cell as f64 + 0.5) * edge + shift;
         let (x, y) = frame.place(middle(bounds.x, column, shift.0), middle(bounds.y, row, shift.1));
         let _ = writeln!(

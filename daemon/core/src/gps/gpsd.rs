@@ -6,7 +6,6 @@
 use crate::geodesy::LatLon;
 use crate::nmea::{PositionKind, Sentence};
 use serde_json::{Map, Value};
-use std::borrow::Cow;
 
 /// The request that makes gpsd send reports.
 pub const WATCH: &[u8] = b"?WATCH={\"enable\":true,\"json\":true};\n";
@@ -55,7 +54,7 @@ impl Report {
 }
 
 /// A line in which numbers that are none, as releases before 3.20 write them, are `null`.
-fn without_nan(line: &[u8]) -> Cow<'_, [u8]> {
+fn without_nan(line: &[u8]) -> Vec<u8> {
     const NAMES: [&[u8]; 4] = [b"-nan", b"nan", b"-inf", b"inf"];
     let (mut out, mut rest, mut is_in_text) = (Vec::with_capacity(line.len()), line, false);
     while let Some((&byte, after)) = rest.split_first() {
@@ -69,7 +68,7 @@ fn without_nan(line: &[u8]) -> Cow<'_, [u8]> {
         out.push(byte);
         rest = after;
     }
-    Cow::Owned(out)
+    out
 }
 
 /// Parses a line; `None` if it is no report or has an impossible position.

@@ -132,6 +132,16 @@ fn a_withdrawn_abort_takes_no_vehicle() {
         run_s(&mut waters, 90);
         assert_eq!(waters.holder(0), None, "{access:?}");
         assert_eq!(waters.holder(1), Some(first_series(0)), "{access:?}");
+
+        // What the operator wishes besides stays.
+        waters.is_away = [false, true, true];
+        waters.give(1, abort.clone());
+        waters.take_over(1);
+        run_s(&mut waters, 70);
+        assert_eq!(waters.status(1, CONSTRAINTS), withdrawn(Withdrawal::Late), "{access:?}");
+        waters.is_away = [false, false, true];
+        run_s(&mut waters, 90);
+        assert_eq!(waters.holder(0), Some(first_series(1)), "{access:?}");
     }
 }
 

@@ -123,9 +123,7 @@ impl Deframer {
         let frame = Frame { system: byte(at).unwrap_or(0), component: byte(at + 1).unwrap_or(0), id, payload };
         Front::Whole(whole.len(), Some(frame))
     }
-}
 
-impl Deframer {
     /// A frame of an unknown message has a check that cannot be verified, and may be noise that hides other frames: another frame must
     /// be `next`, or nothing behind a frame.
     fn unknown(&mut self, length: usize, next: Option<&u8>) -> Front {

@@ -188,11 +188,16 @@ impl<R: StateReplica> VehiclePeer<R> {
 
     fn take_over_to_obey(&mut self, now: Instant) {
         self.takes_over_to_stop |= !self.pair.takes_over();
-        self.take_over(now);
+        self.call_to_take_over(now);
     }
 
-    /// Has the vehicle leave another surface that holds it.
+    /// Has the vehicle leave another surface that holds it, as the operator wishes.
     pub(super) fn take_over(&mut self, now: Instant) {
+        self.takes_over_to_stop = false;
+        self.call_to_take_over(now);
+    }
+
+    fn call_to_take_over(&mut self, now: Instant) {
         self.pair.set_takes_over(true);
         self.rivals.hurry();
         self.contact.hello_due = now;
@@ -242,7 +247,7 @@ impl<R: StateReplica> VehiclePeer<R> {
         // Given before this surface knew of the other one.
         match self.outbox.handle_refusal(now) {
             // The refused hello is from before this surface wanted to take over.
-            _ if self.pair.takes_over() => self.take_over(now),
+            _ if self.pair.takes_over() => self.call_to_take_over(now),
             WaitingStop::None => {}
             WaitingStop::TakesOver => self.take_over_to_obey(now),
             WaitingStop::Withdrawn => {
