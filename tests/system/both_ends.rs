@@ -84,13 +84,18 @@ fn budget_and_shares_change_from_either_end_under_a_key() {
 }
 
 #[test]
-fn an_end_with_another_key_is_not_heard() {
+fn another_key_is_named_at_both_ends_and_nothing_is_heard() {
     let dir = scratch("another-key");
     let (page, _surface, _vehicle) = start(&dir, &key(&dir, "one.key"), &key(&dir, "other.key"), "", "");
     wait_until("two minutes of the mission pass", || state(page).is_some_and(|s| s["now_s"].as_f64() > Some(120.0)));
     assert!(state(page).unwrap()["vehicles"][0]["last_received_s"].is_null());
-    let log = std::fs::read_to_string(dir.join("auv.log")).unwrap();
-    assert!(log.contains("its hellos fit neither the key nor the mission number here"), "{log}");
+    let same = "set the same link.key_file and mission.id at both ends";
+    assert_both_name(
+        page,
+        &dir,
+        &format!("it hears this end, whose hellos fit neither its key nor its mission number: {same}"),
+        &format!("its hellos fit neither the key nor the mission number here: {same}"),
+    );
 }
 
 #[test]

@@ -23,6 +23,12 @@ pub enum Mismatch {
         "its hellos fit neither the key nor the mission number here: set the same link.key_file and mission.id at both ends"
     )]
     Key,
+    /// Only at the surface: the vehicle says that no hello of this end verifies there. Everybody can say so.
+    #[error(
+        "it hears this end, whose hellos fit neither its key nor its mission number: set the same link.key_file and mission.id \
+         at both ends"
+    )]
+    Unverified,
     /// Its frames have up to so many bytes, and those of this end another number. They are read all the same.
     #[error("its frames have up to {0} bytes, those of this end {1}: set the same link.frame_bytes at both ends")]
     Length(usize, usize),

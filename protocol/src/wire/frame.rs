@@ -64,6 +64,11 @@ pub enum Seal<'a> {
 }
 
 impl Seal<'_> {
+    /// The seal of a complaint about a hello of this session: the same whatever key and mission the ends have.
+    pub const fn complaint(session: u16) -> Self {
+        Self::Crc(MissionId(0), session)
+    }
+
     /// The length of the seal in bytes.
     pub const fn bytes(keyed: bool, kind: FrameKind) -> usize {
         match (keyed, kind) {
@@ -181,6 +186,11 @@ impl<'a> Envelope<'a> {
             Seal::Crc(..) | Seal::Hello(..) => 0,
         };
         sound.then(|| Frame { header: self.header.clone(), number, body })
+    }
+
+    /// Whether a vehicle complains that it cannot verify a hello of this session. Everybody can write this frame.
+    pub fn is_complaint(&self, session: u16) -> bool {
+        self.open(&Seal::complaint(session)).is_some_and(|frame| frame.chunks().next().is_none())
     }
 
     /// The chunks before they are verified: they may be damaged, forged or encrypted.

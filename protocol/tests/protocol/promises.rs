@@ -109,17 +109,25 @@ fn clocks_that_are_more_than_a_day_apart_are_named_at_both_ends() {
 }
 
 #[test]
-fn a_vehicle_names_another_key_or_mission_within_30_seconds() {
+fn both_ends_name_another_key_or_mission_within_30_seconds() {
     let common = || Setup::new(64, 10_000, Codec::Png);
     let key = HeldKey::Mission(MissionKey::from_bytes([43; 16]));
     let other_key = Setup { authenticity: Some(Authenticity::new(key, true, false)), ..common() };
     let other_mission = Setup { mission: MissionId(8), ..common() };
-    for (vehicle, surface) in [(common().keyed(true, false), other_key), (common(), other_mission)] {
+    let cases = [
+        (common().keyed(true, false), other_key, Mismatch::Key),
+        (common(), other_mission, Mismatch::Key),
+        (common().keyed(true, false), common(), Mismatch::NoTag),
+        (common(), common().keyed(true, false), Mismatch::Tag),
+    ];
+    for (vehicle, surface, named) in cases {
         for access in [Access::Shared, Access::ModemOwned { pool_frames: 8 }, Access::Polled, Access::FullDuplex] {
             let mut pair = LinkedEnds::new(3, Setup { access, ..vehicle.clone() }, STILL);
             pair.surface = surface_of(&Setup { access, ..surface.clone() }, 4, pair.now);
             pair.run(pair.now + Duration::from_secs(30), false);
-            assert_eq!(pair.vehicle_events, [VehicleEvent::Mismatch(Mismatch::Key)], "{access:?}");
+            assert_eq!(pair.vehicle_events, [VehicleEvent::Mismatch(named)], "{access:?}");
+            let mismatch = pair.surface.vehicle(auv()).unwrap().mismatch(pair.now);
+            assert_eq!(mismatch, Some(Mismatch::Unverified), "{access:?}, {named}");
         }
     }
 }

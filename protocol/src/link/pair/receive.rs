@@ -73,6 +73,10 @@ impl<T> LinkPair<T> {
         let header = &envelope.header;
         let own = if self.us == Address::SURFACE { Some(self.handshake.own()) } else { None };
         let (session, nonce) = own.map_or((0, 0), |o| (o.session.get(), o.nonce));
+        if own.is_some() && envelope.is_complaint(session) {
+            self.mismatch.note(Mismatch::Unverified);
+            return Err(DropReason::Checksum);
+        }
         let opened = match &self.authenticity {
             Some(a) => a.open_hello(envelope, self.mission, session, nonce),
             None => envelope.open(&Seal::Crc(self.mission, session)).map(|frame| (Generation::Present, frame)),

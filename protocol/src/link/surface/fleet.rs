@@ -7,7 +7,7 @@ use crate::mac::{ModemProfile, quarter_seconds};
 use crate::map::StateReplica;
 use crate::time::Instant;
 use crate::wire::{Address, Envelope, FrameBuilder, Header, MissionId, Seal, UtcHours};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
 /// The known vehicles; the surface exchanges turns with one of them at a time.
@@ -139,6 +139,8 @@ pub(super) struct Discovery {
     pause: Duration,
     next: Instant,
     open: Option<(Identity, Instant)>,
+    /// Vehicles that could not verify a call.
+    complaints: BTreeSet<Address>,
     /// The longest one-way propagation time.
     reach: Duration,
     identities: Identities,
@@ -161,7 +163,8 @@ impl Discovery {
     ) -> Self {
         let pause = if anybody_known { every.unwrap_or_default() } else { Self::FIRST_PAUSE };
         let next = if anybody_known { now + pause } else { now };
-        Self { every, pause, next, open: None, reach, identities, generation: Generation::Present }
+        let (open, complaints) = (None, BTreeSet::new());
+        Self { every, pause, next, open, complaints, reach, identities, generation: Generation::Present }
     }
 
     /// When the next call is due, or when the time for answers ends.
@@ -230,6 +233,12 @@ impl Discovery {
             None => envelope.open(&Seal::Crc(mission, session)).is_some(),
         };
         sound && now < until + Duration::from_secs(10)
+    }
+
+    /// Whether a vehicle says for the first time that it could not verify the last call.
+    pub(super) fn is_new_complaint(&mut self, envelope: &Envelope<'_>) -> bool {
+        self.open.is_some_and(|(call, _)| envelope.is_complaint(call.session.get()))
+            && self.complaints.insert(envelope.header.from)
     }
 
     /// The length of a call in bytes.

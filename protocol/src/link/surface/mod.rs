@@ -15,7 +15,7 @@ pub use transmit::Cycle;
 
 use crate::directive::{Series, Slot, SlotId, SlotProgress, VersionedSlot};
 use crate::link::run::Identities;
-use crate::link::{DropReason, FrameNumber, Transmit};
+use crate::link::{DropReason, FrameNumber, Mismatch, Transmit};
 use crate::map::{Replica, StateReplica};
 use crate::schedule::{BitBudget, ClassShares, Shares};
 use crate::time::Instant;
@@ -251,6 +251,9 @@ impl<R: StateReplica> SurfaceLink<R> {
         let authenticity = self.config.authenticity.as_ref();
         if self.discovery.is_answered_by(&envelope, self.config.mission, authenticity, now) {
             return self.handle_call_answer(from, now);
+        }
+        if self.discovery.is_new_complaint(&envelope) {
+            self.events.push_back(SurfaceEvent::Mismatch(from, Mismatch::Unverified));
         }
         let Some(peer) = self.fleet.get_mut(from) else { return self.drop_unknown(DropReason::UnknownSender) };
         peer.handle_frame(&envelope, bytes.len(), &self.config.modem, now, &mut self.events);

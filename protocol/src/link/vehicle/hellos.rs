@@ -98,18 +98,34 @@ impl HelloLimit {
     }
 }
 
-/// The answer that is owed to a discovery call.
+/// A hello without content that is owed: the answer to a discovery call, or a complaint.
 #[derive(Debug)]
-pub(super) struct CallReply {
-    /// Session and nonce of the call, and the generation of its key.
-    pending: Option<(SessionId, u64, Generation)>,
-    /// State of the generator that draws the time of the answer.
+pub(super) struct ShortReply {
+    pending: Option<(SessionId, Purpose)>,
+    /// Hellos and calls that do not verify, since a frame verified.
+    unverified: u32,
+    /// When the last complaint was owed.
+    complained: Option<Instant>,
+    /// State of the generator that draws the time of the answer to a call.
     random: u64,
 }
 
-impl CallReply {
+/// The purpose of a short hello to the session that it names.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Purpose {
+    /// It answers a call with this nonce under the key of this generation.
+    Answer(u64, Generation),
+    /// It says that hellos or calls do not verify here.
+    Complaint,
+}
+
+impl ShortReply {
+    /// Hellos and calls that do not verify before the first complaint. Each may be damaged, or meant for another vehicle.
+    const MIN_UNVERIFIED: u32 = 3;
+    const COMPLAINT_INTERVAL: Duration = Duration::from_secs(30);
+
     pub(super) fn new(seed: u64) -> Self {
-        Self { pending: None, random: seed ^ 0x0CA1_15EA }
+        Self { pending: None, unverified: 0, complained: None, random: seed ^ 0x0CA1_15EA }
     }
 
     /// The generation of the key of a frame to everybody, if it is a discovery call of this mission.
@@ -125,16 +141,25 @@ impl CallReply {
         generation.filter(|_| envelope.header.kind().is_hello())
     }
 
-    /// Takes a call; returns the turn in which it is answered, at a random time in the window that the call names.
-    pub(super) fn handle_call(
-        &mut self,
-        config: &VehicleConfig,
-        call: &Header,
-        (session, generation): (SessionId, Generation),
-        now: Instant,
-    ) -> Grant {
-        self.pending = Some((session, call.nonce.unwrap_or_default(), generation));
-        let window = Duration::from_millis(250) * u32::from(call.turn.unwrap_or_default());
+    /// Owes the answer to a call.
+    pub(super) fn handle_call(&mut self, call: &Header, (session, generation): (SessionId, Generation)) {
+        self.pending = Some((session, Purpose::Answer(call.nonce.unwrap_or_default(), generation)));
+    }
+
+    /// A hello or a call of this session does not verify; returns whether a complaint is owed now.
+    pub(super) fn handle_unverified(&mut self, session: SessionId, now: Instant) -> bool {
+        self.unverified += 1;
+        let is_recent = self.complained.is_some_and(|at| now.since(at) < Self::COMPLAINT_INTERVAL);
+        let complains = self.unverified >= Self::MIN_UNVERIFIED && !is_recent && self.pending.is_none();
+        if complains {
+            (self.pending, self.complained) = (Some((session, Purpose::Complaint)), Some(now));
+        }
+        complains
+    }
+
+    /// The turn in which a call is answered, at a random time in the window that the call names.
+    pub(super) fn draw_turn(&mut self, config: &VehicleConfig, window: Option<u8>, now: Instant) -> Grant {
+        let window = Duration::from_millis(250) * u32::from(window.unwrap_or_default());
         let share = (crate::link::run::next_random(&mut self.random) >> 40) as f64 / (1u64 << 24) as f64;
         let begins = now + config.modem.turn_around + window.mul_f64(share);
         Grant { begins, ends: begins + config.modem.frame_airtime() * 2 }
@@ -144,24 +169,28 @@ impl CallReply {
         self.pending.is_some()
     }
 
+    pub(super) fn handle_verified(&mut self) {
+        self.unverified = 0;
+    }
+
+    /// A turn is granted to other frames.
     pub(super) fn cancel(&mut self) {
         self.pending = None;
     }
 
-    /// The frame that answers the pending call, if there is one.
+    /// The frame that is owed, if there is one.
     pub(super) fn take(&mut self, config: &VehicleConfig, authenticity: Option<&LinkAuthenticity>) -> Option<Vec<u8>> {
-        let (session, nonce, generation) = self.pending.take()?;
-        let header = Header {
-            nonce: authenticity.map(|_| nonce),
-            keyed: authenticity.is_some(),
-            ..Header::hello(config.address, Address::SURFACE, session)
+        let (session, purpose) = self.pending.take()?;
+        let hello = Header::hello(config.address, Address::SURFACE, session);
+        let (header, seal) = match (purpose, authenticity) {
+            (Purpose::Complaint, _) => (hello, Seal::complaint(session.get())),
+            (Purpose::Answer(..), None) => (hello, Seal::Crc(config.mission, session.get())),
+            (Purpose::Answer(nonce, generation), Some(a)) => (
+                Header { nonce: Some(nonce), keyed: true, ..hello },
+                Seal::Hello(a.key(generation), config.mission, session.get(), nonce),
+            ),
         };
-        let builder = FrameBuilder::new(&header, config.modem.frame_bytes);
-        let seal = match authenticity {
-            Some(a) => Seal::Hello(a.key(generation), config.mission, session.get(), nonce),
-            None => Seal::Crc(config.mission, session.get()),
-        };
-        Some(builder.finish(&seal, true))
+        Some(FrameBuilder::new(&header, config.modem.frame_bytes).finish(&seal, true))
     }
 }
 

@@ -27,7 +27,7 @@ use crate::schedule::{BackgroundOrder, BitBudget, Shares};
 use crate::time::{ClockMap, Instant};
 use crate::wire::{Address, Introduction, UtcHours, VehicleStatus};
 use content::{Carried, VehicleContent};
-use hellos::{CallReply, HelloLimit};
+use hellos::{HelloLimit, ShortReply};
 use repeat::{Repeater, TailProbe};
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -44,7 +44,7 @@ pub struct VehicleLink<S: StateSource = MapSource> {
     floor: Floor,
     repeater: Repeater,
     timing: SurfaceTiming,
-    call_reply: CallReply,
+    reply: ShortReply,
     hello_limit: HelloLimit,
     probe: TailProbe,
     /// Where the modem decides when to transmit: when an acknowledgement or a hello is due.
@@ -76,7 +76,7 @@ impl<S: StateSource> VehicleLink<S> {
             floor: Floor::default(),
             repeater: Repeater::default(),
             timing: SurfaceTiming::default(),
-            call_reply: CallReply::new(seed),
+            reply: ShortReply::new(seed),
             hello_limit: HelloLimit::new(config.modem.access, now),
             probe: TailProbe::default(),
             answer_due: None,

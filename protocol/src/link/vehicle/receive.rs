@@ -1,7 +1,7 @@
 //! Handling of received frames.
 
 use super::content::Carried;
-use super::hellos::CallReply;
+use super::hellos::ShortReply;
 use super::{VehicleEvent, VehicleLink};
 use crate::bytes::Truncated;
 use crate::directive::{InForceDigests, Slot, VersionedSlot};
@@ -37,11 +37,14 @@ impl<S: StateSource> VehicleLink<S> {
         self.pair.set_silence(self.last_received().map(|at| now.since(at)));
         let inbound = self.pair.handle_frame(&envelope, |_, _| true);
         if inbound.is_ok() {
+            self.reply.handle_verified();
             self.pair.note_length(bytes.len(), self.config.modem.frame_bytes);
         }
         self.events.extend(self.pair.poll_mismatch().map(VehicleEvent::Mismatch));
+        let is_hello = envelope.header.kind().is_hello();
         let inbound = match inbound {
             Ok(inbound) => inbound,
+            Err(DropReason::Checksum | DropReason::Keyed) if is_hello => return self.complain(&envelope.header, now),
             Err(DropReason::NoBase) => {
                 // The surface builds on frames that we never acknowledged: in between it took us for another run.
                 return self.renew(now);
@@ -51,6 +54,9 @@ impl<S: StateSource> VehicleLink<S> {
                 return self.renew(now);
             }
             Err(DropReason::Unauthenticated) => {
+                if is_hello {
+                    self.complain(&envelope.header, now);
+                }
                 return self.content.status.owe_report_by(now + Duration::from_secs(60));
             }
             Err(_) => {
@@ -67,7 +73,7 @@ impl<S: StateSource> VehicleLink<S> {
             self.content.caller = Some(caller.encode(Introduction::MAX_BYTES));
             self.content.status.owe_report_by(now + Duration::from_secs(5));
         }
-        match inbound.header().kind().is_hello() {
+        match is_hello {
             true if envelope.header.session.is_some_and(|session| self.hello_limit.admit(session, now)) => {
                 match self.pair.must_send_hello() && inbound.refusal.is_none() {
                     true => self.hello_limit.handle_offer(),
@@ -158,7 +164,8 @@ impl<S: StateSource> VehicleLink<S> {
     /// Answers a discovery call, unless the surface is in contact with us.
     fn handle_call(&mut self, envelope: &Envelope<'_>, now: Instant) {
         const CONTACT_TIMEOUT: Duration = Duration::from_secs(60);
-        let Some(generation) = CallReply::called_by(self.pair.authenticity(), self.config.mission, envelope) else {
+        let Some(generation) = ShortReply::called_by(self.pair.authenticity(), self.config.mission, envelope) else {
+            self.complain(&envelope.header, now);
             return self.pair.stats.drop(DropReason::Checksum);
         };
         if self.pair.has_run() && self.last_received().is_some_and(|at| now.since(at) < CONTACT_TIMEOUT) {
@@ -167,14 +174,33 @@ impl<S: StateSource> VehicleLink<S> {
         let Some(session) = envelope.header.session.filter(|&session| self.hello_limit.admit(session, now)) else {
             return;
         };
-        let grant = self.call_reply.handle_call(&self.config, &envelope.header, (session, generation), now);
+        self.reply.handle_call(&envelope.header, (session, generation));
+        self.grant_reply(&envelope.header, now);
+    }
+
+    /// A hello or a call does not verify. After some of them, and in no contact, the vehicle tells so whoever sends them.
+    fn complain(&mut self, header: &Header, now: Instant) {
+        if let Some(session) = header.session
+            && self.is_silent_for(STRAYS_TIMEOUT, now)
+            && self.reply.handle_unverified(session, now)
+        {
+            self.grant_reply(header, now);
+        }
+    }
+
+    /// The short hello that is owed goes out in the turn that a hello or a call names.
+    fn grant_reply(&mut self, header: &Header, now: Instant) {
+        let grant = match header.to {
+            Address::EVERYBODY => Some(self.reply.draw_turn(&self.config, header.turn, now)),
+            _ => header.turn.map(|quarters| Grant::received(quarters, header.remaining, &self.config.modem, now)),
+        };
         self.begin_turn();
-        self.floor.handle_grant(Some(grant));
+        self.floor.handle_grant(grant);
     }
 
     fn handle_turn(&mut self, header: &Header, now: Instant) {
         let Some(quarters) = header.turn else { return };
-        self.call_reply.cancel();
+        self.reply.cancel();
         self.begin_turn();
         if header.kind().is_hello() {
             // A hello does not acknowledge our frames, so it is not known which of them to repeat.

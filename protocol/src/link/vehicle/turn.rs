@@ -41,7 +41,7 @@ impl<S: StateSource> VehicleLink<S> {
             self.end_turn();
         }
         let open = self.floor.frames(&modem, now).min(u32::from(u8::MAX));
-        let has_no_peer = !self.pair.has_contact() && !self.call_reply.is_pending();
+        let has_no_peer = !self.pair.has_contact() && !self.reply.is_pending();
         if open == 0 || has_no_peer || !self.has_reason_to_transmit(now) {
             return None;
         }
@@ -71,7 +71,7 @@ impl<S: StateSource> VehicleLink<S> {
 
     /// The frame to send now, of at most `frames` in this turn, and whether the turn ends with it.
     fn next_frame(&mut self, frames: u32, now: Instant) -> (Transmit, bool) {
-        if let Some(bytes) = self.call_reply.take(&self.config, self.pair.authenticity()) {
+        if let Some(bytes) = self.reply.take(&self.config, self.pair.authenticity()) {
             self.pair.stats.count(Class::Overhead, bytes.len());
             return (Transmit { to: Address::SURFACE, bytes, kind: TransmitKind::Hello }, true);
         }
@@ -103,7 +103,7 @@ impl<S: StateSource> VehicleLink<S> {
         }
         let is_repeat_due = self.hello_limit.next_repeat().is_some_and(|at| now >= at);
         let is_probe_due = self.probe.is_due(now) && self.pair.has_run();
-        let answer = is_probe_due || self.is_answer_due(now) || is_repeat_due || self.call_reply.is_pending();
+        let answer = is_probe_due || self.is_answer_due(now) || is_repeat_due || self.reply.is_pending();
         let news = self.content.backlog_bytes(&self.budget, now) > 0;
         answer || (self.pair.has_run() && (news || self.content.status.is_waiting(now)))
     }
