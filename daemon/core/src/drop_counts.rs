@@ -5,10 +5,11 @@ use std::collections::BTreeMap;
 
 /// Received bytes that were dropped, by the name of the reason.
 pub fn dropped(stats: &LinkStats) -> BTreeMap<&'static str, u64> {
-    stats.dropped.iter().map(|(&reason, &n)| (name(reason), n)).collect()
+    stats.dropped.iter().map(|(&reason, &n)| (reason_name(reason), n)).collect()
 }
 
-fn name(reason: DropReason) -> &'static str {
+/// The name of a reason, in reports and records.
+pub fn reason_name(reason: DropReason) -> &'static str {
     match reason {
         DropReason::Truncated => "truncated",
         DropReason::Version => "version",

@@ -1,25 +1,32 @@
 //! The interface of a link's end toward its modem.
 
 use scenecast_core::UsblLine;
-use scenecast_protocol::link::{Cycle, LinkStats, SurfaceLink, Transmit, VehicleLink};
+use scenecast_protocol::link::{Cycle, DropReason, LinkStats, SurfaceLink, Transmit, VehicleLink};
 use scenecast_protocol::map::{StateReplica, StateSource};
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::Address;
 use scenecast_vehicle::Vehicle;
+use std::collections::BTreeMap;
 
 /// The frames that an end has received so far.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct FrameCounts {
     /// Numbered frames that verified and were new.
     pub accepted: u64,
-    /// Frames that were dropped, for any reason.
-    pub dropped: u64,
+    /// Frames that were dropped, by reason.
+    pub dropped: BTreeMap<DropReason, u64>,
 }
 
 impl FrameCounts {
-    fn add(self, stats: &LinkStats) -> Self {
-        let dropped = self.dropped + stats.dropped.values().sum::<u64>();
-        Self { accepted: self.accepted + stats.frames_received, dropped }
+    /// Frames that a surface can attribute to none of its vehicles.
+    fn of_unknown(count: u64) -> Self {
+        Self { accepted: 0, dropped: BTreeMap::from([(DropReason::UnknownSender, count)]) }
+    }
+
+    fn add(mut self, stats: &LinkStats) -> Self {
+        self.accepted += stats.frames_received;
+        stats.dropped.iter().for_each(|(&reason, count)| *self.dropped.entry(reason).or_default() += count);
+        self
     }
 }
 
@@ -115,7 +122,7 @@ impl<R: StateReplica> LinkEnd for SurfaceLink<R> {
     forward!();
 
     fn frame_counts(&self) -> FrameCounts {
-        let unknown = FrameCounts { accepted: 0, dropped: self.unknown_senders() };
+        let unknown = FrameCounts::of_unknown(self.unknown_senders());
         let views = self.vehicles().filter_map(|address| self.vehicle(address));
         views.fold(unknown, |counts, view| counts.add(view.stats()))
     }
@@ -134,7 +141,7 @@ impl LinkEnd for scenecast_surface::Surface {
     forward!();
 
     fn frame_counts(&self) -> FrameCounts {
-        let unknown = FrameCounts { accepted: 0, dropped: self.unknown_senders() };
+        let unknown = FrameCounts::of_unknown(self.unknown_senders());
         let views = self.vehicles().filter_map(|(address, _)| self.view(address));
         views.fold(unknown, |counts, view| counts.add(view.stats()))
     }

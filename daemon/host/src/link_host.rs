@@ -5,6 +5,7 @@ use scenecast_config::Config;
 use scenecast_core::UserError;
 use scenecast_drivers::modem::paced::Paced;
 use scenecast_drivers::modem::{AddressBook, ModemEvent, Refusal, Station, address_book, driver};
+use scenecast_protocol::link::DropReason;
 use scenecast_protocol::mac::ModemProfile;
 use scenecast_protocol::schedule::Audit;
 use scenecast_protocol::time::Instant;
@@ -24,7 +25,13 @@ pub enum FrameEvent {
     /// The modem refused the last frame. The link repairs it like a lost one.
     NotSent(Refusal),
     /// A frame was received and given to the link.
-    Received { frame: Vec<u8>, outcome: FrameOutcome },
+    Received {
+        /// The bytes on air.
+        frame: Vec<u8>,
+        outcome: FrameOutcome,
+        /// Why it was dropped, if it was.
+        reason: Option<DropReason>,
+    },
     /// The bits on air exceed the budget of a window for the first time.
     OverBudget {
         /// Mean bit rate of the fullest window, bit/s.
@@ -54,12 +61,14 @@ pub enum FrameOutcome {
 }
 
 impl FrameOutcome {
-    /// Of one frame, by the counts before and after it.
-    fn between(before: FrameCounts, after: FrameCounts) -> Self {
-        match after.accepted > before.accepted {
-            true => Self::Accepted,
-            false if after.dropped == before.dropped => Self::Opened,
-            false => Self::Dropped,
+    /// Of one frame, by the counts before and after it; and why it was dropped, if it was.
+    fn between(before: &FrameCounts, after: &FrameCounts) -> (Self, Option<DropReason>) {
+        let mut dropped = after.dropped.iter();
+        let dropped = dropped.find(|(reason, count)| before.dropped.get(reason).is_none_or(|before| before < count));
+        match dropped {
+            _ if after.accepted > before.accepted => (Self::Accepted, None),
+            None => (Self::Opened, None),
+            Some((&reason, _)) => (Self::Dropped, Some(reason)),
         }
     }
 }
@@ -195,8 +204,8 @@ impl<E: LinkEnd> LinkHost<E> {
                 ModemEvent::Received(frame) => {
                     let before = self.end.frame_counts();
                     self.end.handle_frame(&frame, now);
-                    let outcome = FrameOutcome::between(before, self.end.frame_counts());
-                    self.events.push_back(FrameEvent::Received { frame: frame.to_vec(), outcome });
+                    let (outcome, reason) = FrameOutcome::between(&before, &self.end.frame_counts());
+                    self.events.push_back(FrameEvent::Received { frame: frame.to_vec(), outcome, reason });
                 }
                 ModemEvent::Poll(frames) => self.end.handle_poll(frames),
                 ModemEvent::Repeated(bits) => self.end.handle_repeated(bits, now),

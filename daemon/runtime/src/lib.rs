@@ -41,6 +41,8 @@ pub use vehicle::run_vehicle;
 
 use scenecast_core::UserError;
 use std::pin::Pin;
+use tracing_subscriber::layer::SubscriberExt;
+use tracing_subscriber::util::SubscriberInitExt;
 
 /// Maximum wait for other threads at the end.
 const SHUTDOWN_TIMEOUT: std::time::Duration = std::time::Duration::from_secs(1);
@@ -66,8 +68,8 @@ pub fn block_on<T>(future: impl Future<Output = Result<T, UserError>>) -> Result
     let filter = tracing_subscriber::EnvFilter::try_from_default_env().unwrap_or_else(|_| LOG_LEVELS.into());
     // A second command in the same process (as in tests) keeps the first one's log.
     // A log on a full disk must not end the process: a failed write would be reported on the same stream, and panic.
-    let log = tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr);
-    let _ = log.log_internal_errors(false).try_init();
+    let log = tracing_subscriber::fmt::layer().with_writer(std::io::stderr).log_internal_errors(false);
+    let _ = tracing_subscriber::registry().with(filter).with(log).with(record::LogLines).try_init();
     let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build();
     let runtime = runtime.map_err(|e| UserError::Failed(e.to_string()))?;
     // Of a boxed future the runtime has one copy of the code, of another one several.

@@ -188,7 +188,8 @@ mod tests {
         stranger.send_to(b"second", free).await.unwrap();
         exchange(&mut surface, &mut vehicle, start + Duration::from_secs(100), 6).await;
         assert!(surface.accepted() >= 6 && vehicle.accepted() >= 6);
-        assert_eq!(vehicle.link.end().frame_counts().dropped, 1, "only the first datagram of the stranger was read");
+        let dropped: u64 = vehicle.link.end().frame_counts().dropped.values().sum();
+        assert_eq!(dropped, 1, "only the first datagram of the stranger was read");
     }
 }
 

@@ -5,7 +5,7 @@ use super::instruments::{Instruments, relay};
 use super::map_files::{MapFile, MapFiles};
 use super::modem::{self, ModemPort, warn_without_key};
 use super::pilot::{self, PilotPort, SimulatedAutopilot};
-use super::record::SurfaceRecord;
+use super::record::{SurfaceRecord, unix_nanos};
 use super::ros2::SurfaceRos2;
 use super::stop::{Load, Reload, Stop, configured_budget, keep_private};
 use super::store::{ArchivedFile, SurfaceFiles};
@@ -108,8 +108,7 @@ pub fn run_surface(load: Load, simulated: Option<SimulatedAutopilot>) -> Result<
         let (is_stale, reading) = (true, Arc::default());
         let budget = configured_budget(&config);
         let folder = config.runtime.state_dir.join("records");
-        let speed = config.runtime.time_scale;
-        let record = SurfaceRecord::start(&config, &config.surface.name, &folder, offers_key, speed);
+        let record = SurfaceRecord::start(&config, &config.surface.name, &folder, offers_key);
         let shell = SurfaceShell {
             host,
             ports,
@@ -285,6 +284,7 @@ impl SurfaceShell {
             return;
         }
         self.meter.handle_budgets(self.host.surface());
+        self.facts.stamps.observe(now.as_secs_f64(), unix_nanos());
         let snapshot = Arc::new(snapshot(self.host.surface(), &self.facts, &self.meter, now));
         self.record.observe(self.host.surface(), &snapshot);
         if let Some(console) = &self.console {
@@ -326,7 +326,8 @@ impl SurfaceShell {
                 SurfaceHostEvent::Frame(event) => {
                     modem::log(&event)?;
                     self.measure(&event);
-                    self.record.handle_frame(&event, self.clock.now().as_secs_f64());
+                    self.facts.stamps.observe(self.clock.now().as_secs_f64(), unix_nanos());
+                    self.record.handle_frame(&event, &self.facts.stamps);
                 }
                 SurfaceHostEvent::Pilot(event) => pilot::log(event),
             }

@@ -11,7 +11,7 @@ use scenecast_core::palette::colour;
 use scenecast_core::{Area, UserError, errln, outln};
 use scenecast_protocol::time::Instant;
 use scenecast_rehearsal::{EndEvent, Mission, Truth};
-use scenecast_runtime::record::{SurfaceRecord, VehicleRecord};
+use scenecast_runtime::record::{SurfaceRecord, VehicleRecord, unix_nanos};
 use scenecast_runtime::{Stop, block_on, keep_private, random_bits};
 use scenecast_surface::record::EventTime;
 use scenecast_surface::recorder::Recorder;
@@ -124,7 +124,7 @@ impl Demo {
         mission.keep_end_events();
         // In the present folder, so that it is found after the demo.
         let (config, folder) = (mission.config(), Path::new("records"));
-        let surface = SurfaceRecord::rehearsed(config, folder, speed);
+        let surface = SurfaceRecord::rehearsed(config, folder);
         let records = (surface, VehicleRecord::rehearsed(config, folder, speed));
         Self { meter, pace, truth, mission, facts, recorder, counted: [0; 2], published: None, records }
     }
@@ -217,13 +217,17 @@ impl Demo {
         self.meter.handle_budgets(self.mission.surface());
         self.facts.speed = self.pace.reached(now);
         self.remember();
-        let snapshot = Arc::new(snapshot(self.mission.surface(), &self.facts, &self.meter, now));
         for (at, event) in self.mission.take_end_events() {
             match event {
-                EndEvent::Surface(event) => self.records.0.handle_frame(&event, at.as_secs_f64()),
+                EndEvent::Surface(event) => {
+                    self.facts.stamps.observe(at.as_secs_f64(), unix_nanos());
+                    self.records.0.handle_frame(&event, &self.facts.stamps);
+                }
                 EndEvent::Vehicle(event) => self.records.1.handle_event(&event, at),
             }
         }
+        self.facts.stamps.observe(now.as_secs_f64(), unix_nanos());
+        let snapshot = Arc::new(snapshot(self.mission.surface(), &self.facts, &self.meter, now));
         self.records.0.observe(self.mission.surface(), &snapshot);
         self.records.1.observe(self.mission.vehicle(), now);
         if let Some(console) = console {

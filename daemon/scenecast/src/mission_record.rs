@@ -99,6 +99,7 @@ impl UnseenPage {
         count(&mut self.meter, &mut self.counted, mission);
         self.meter.handle_budgets(mission.surface());
         self.facts.ended_s = mission.ended().map(Instant::as_secs_f64);
+        self.facts.stamps = stamps(mission.now());
         snapshot(mission.surface(), &self.facts, &self.meter, mission.now())
     }
 }

@@ -17,7 +17,7 @@ use crate::state::{
     CellHistory, DifferingCells, MissionState, ReplayEvent, ReplayEventList, ReplayOrder, ReplaySide, ReplayState,
     VehicleState,
 };
-use scenecast_messages::contents::valid_part;
+use scenecast_messages::contents::{Stamps, valid_part};
 use scenecast_messages::scenecast_msgs::Event;
 use scenecast_protocol::map::LabelGrid;
 use scenecast_protocol::wire::Address;
@@ -35,6 +35,8 @@ pub struct Replay {
     parts: BTreeMap<u8, String>,
     /// The moment that is shown, nanoseconds since 1970.
     at: u64,
+    /// The times of day of the mission.
+    stamps: Stamps,
     is_playing: bool,
     speed: f64,
     side: ReplaySide,
@@ -66,7 +68,9 @@ impl Replay {
         let side = if recording.timeline.states.is_empty() { ReplaySide::Vehicle } else { ReplaySide::Operator };
         let at = recording.timeline.span.0;
         let (state, shown) = ((u64::MAX, MissionState::default()), BTreeMap::new());
-        let mut replay = Self { recording, events, parts, at, is_playing: false, speed, side, state, shown };
+        let mut stamps = Stamps::with_speed(1.0);
+        recording.timeline.clock.moments().for_each(|(now_s, nanos)| stamps.observe(now_s, nanos as i64));
+        let mut replay = Self { recording, events, parts, at, stamps, is_playing: false, speed, side, state, shown };
         replay.show();
         replay
     }
@@ -133,7 +137,7 @@ impl Replay {
             self.complete(vehicle);
         }
         state.replay = Some(ReplayState { mission_speed, ..self.replay_state() });
-        Snapshot::new(state, None)
+        Snapshot::new(state, None, self.stamps.seen_at(mission_s, self.at as i64))
     }
 
     /// The last recorded state.

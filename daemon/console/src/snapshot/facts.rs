@@ -7,6 +7,7 @@ use crate::state::{
 use crate::truth::Truth;
 use scenecast_config::{self as config, Config};
 use scenecast_core::LatLon;
+use scenecast_messages::contents::Stamps;
 use scenecast_protocol::mac::ModemProfile;
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::Placement;
@@ -40,6 +41,8 @@ pub struct MissionFacts {
     pub storage: Option<StorageInfo>,
     /// The true classes of a simulated sea floor, once they are known.
     pub truth: Option<Arc<Truth>>,
+    /// The times of day of the mission so far.
+    pub stamps: Stamps,
 }
 
 impl MissionFacts {
@@ -58,6 +61,7 @@ impl MissionFacts {
             origin: configured_origin(config),
             storage: None,
             truth: None,
+            stamps: Stamps::with_speed(speed),
         }
     }
 }

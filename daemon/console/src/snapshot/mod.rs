@@ -13,6 +13,7 @@ use crate::link_meter::LinkMeter;
 use crate::state::{LayerInfo, MissionInfo, MissionState, VehicleState};
 use crate::truth::Truth;
 use axum::body::Bytes;
+use scenecast_messages::contents::Stamps;
 use scenecast_protocol::map::{BUILT_IN_LAYERS, LayerDescriptor};
 use scenecast_protocol::time::Instant;
 use scenecast_surface::Surface;
@@ -26,13 +27,15 @@ pub struct Snapshot {
     pub json: Bytes,
     /// The true classes of a simulated sea floor.
     pub truth: Option<Arc<Truth>>,
+    /// The times of day of the mission so far.
+    pub stamps: Stamps,
 }
 
 impl Snapshot {
-    pub(crate) fn new(state: MissionState, truth: Option<Arc<Truth>>) -> Self {
+    pub(crate) fn new(state: MissionState, truth: Option<Arc<Truth>>, stamps: Stamps) -> Self {
         // All keys of maps in these types are strings or numbers, so this cannot fail.
         let json = serde_json::to_vec(&state).unwrap_or_default().into();
-        Self { state, json, truth }
+        Self { state, json, truth, stamps }
     }
 
     /// A vehicle by its address.
@@ -63,7 +66,7 @@ pub fn snapshot(surface: &Surface, facts: &MissionFacts, meter: &LinkMeter, now:
         truth: facts.truth.as_ref().map(|truth| truth.info.clone()),
         replay: None,
     };
-    Snapshot::new(state, facts.truth.clone())
+    Snapshot::new(state, facts.truth.clone(), facts.stamps.clone())
 }
 
 fn layer_info(layer: &LayerDescriptor) -> LayerInfo {

@@ -54,7 +54,8 @@ impl MissionClock {
     pub fn mission_s(&self, nanos: u64) -> Option<f64> {
         let state = self.nearest(nanos)?;
         let since_s = (i128::from(nanos) - i128::from(state.nanos)) as f64 / 1e9;
-        Some((state.now_s + since_s * state.speed).max(0.0))
+        let next_s = self.states.iter().find(|later| later.nanos > nanos).map_or(f64::INFINITY, |later| later.now_s);
+        Some((state.now_s + since_s * state.speed).min(next_s.max(state.now_s)).max(0.0))
     }
 
     /// The moment of the surface's clock at a mission time; `None` if no state tells it.
@@ -62,7 +63,13 @@ impl MissionClock {
         let next = self.states.partition_point(|state| state.now_s <= at_s);
         let state = self.states.get(next.saturating_sub(1))?;
         let since = ((at_s - state.now_s) / state.speed * 1e9) as i64;
-        Some(state.nanos.saturating_add_signed(since))
+        let latest = self.states.get(next.max(1)).map_or(u64::MAX, |later| later.nanos.max(state.nanos));
+        Some(state.nanos.saturating_add_signed(since).min(latest))
+    }
+
+    /// Mission times in seconds and the nanoseconds since 1970 at which they were shown.
+    pub fn moments(&self) -> impl Iterator<Item = (f64, u64)> {
+        self.states.iter().map(|state| (state.now_s, state.nanos))
     }
 
     /// Seconds of mission time for each second of the clock at a moment; 1 if no state tells it.

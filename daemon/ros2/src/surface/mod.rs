@@ -98,7 +98,7 @@ impl Worker {
         while owned.wait(TICK) {
             if self.snapshots.has_changed().unwrap_or(false) {
                 snapshot = self.snapshots.borrow_and_update().clone();
-                stamps = Stamps::new(snapshot.state.now_s, snapshot.state.mission.speed, nanos(SystemTime::now()));
+                stamps = snapshot.stamps.clone();
             }
             self.handle(&snapshot, &stamps);
         }

@@ -1,9 +1,13 @@
 //! The record of a mission: what an end knew and sent, as messages in a bag that a thread of its own writes. The link never waits for
 //! it: what a slow disk does not take is left out, and counted.
 
+mod log;
 #[cfg(feature = "surface")]
 mod surface;
 mod vehicle;
+
+pub(crate) use log::LogLines;
+use log::log_entries;
 
 #[cfg(feature = "surface")]
 pub use surface::{SurfaceRecord, SurfaceRecorder};
@@ -11,6 +15,7 @@ pub use vehicle::{VehicleRecord, VehicleRecorder};
 
 use crate::durable::free_bytes;
 use scenecast_config::Config;
+use scenecast_core::drop_counts::reason_name;
 use scenecast_core::{UserError, outln, utc_text};
 use scenecast_files::{RecordEntry, RecordLimits, RecordWriter};
 use scenecast_host::{FrameEvent, FrameOutcome};
@@ -38,7 +43,7 @@ const LEFT_FREE: u64 = 256 << 20;
 const END_TIMEOUT: Duration = Duration::from_secs(3);
 
 /// Nanoseconds of the computer's clock since 1970.
-fn unix_nanos() -> i64 {
+pub fn unix_nanos() -> i64 {
     SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |since| since.as_nanos() as i64)
 }
 
@@ -56,11 +61,6 @@ fn new_dir(folder: &Path, name: &str) -> PathBuf {
 pub fn limits(config: &Config) -> RecordLimits {
     let record = &config.record;
     RecordLimits { part_bytes: record.part_mb * MEGABYTE, all_bytes: record.quota_mb * MEGABYTE }
-}
-
-/// The stamps of a process whose mission time is `now_s`, and advances by `speed` seconds a second.
-pub fn stamps_now(now_s: f64, speed: f64) -> Stamps {
-    Stamps::new(now_s, speed, unix_nanos())
 }
 
 /// The record of an end, written by a thread.
@@ -210,10 +210,10 @@ fn frame_entry(
     hides_keys: bool,
     stamps: &Stamps,
 ) -> Option<RecordEntry> {
-    let (direction, frame) = match event {
-        FrameEvent::Sent { frame, .. } => (Frame::SENT, frame),
-        FrameEvent::Received { frame, outcome: FrameOutcome::Dropped } => (Frame::DROPPED, frame),
-        FrameEvent::Received { frame, .. } => (Frame::RECEIVED, frame),
+    let (direction, reason, frame) = match event {
+        FrameEvent::Sent { frame, .. } => (Frame::SENT, None, frame),
+        FrameEvent::Received { frame, outcome: FrameOutcome::Dropped, reason } => (Frame::DROPPED, *reason, frame),
+        FrameEvent::Received { frame, .. } => (Frame::RECEIVED, None, frame),
         _ => return None,
     };
     let ends = Envelope::decode(frame, |_| true).ok().map(|envelope| [envelope.header.from, envelope.header.to]);
@@ -224,7 +224,7 @@ fn frame_entry(
         vehicle,
         direction,
         bits: frame.len() as u32 * 8,
-        reason: String::new(),
+        reason: reason.map_or_else(String::new, |reason| reason_name(reason).to_owned()),
         data: if hides_keys && is_to_vehicle { Vec::new() } else { frame.clone() },
     };
     Some(entry("frames".to_owned(), stamps, &message))
@@ -338,7 +338,7 @@ mod tests {
     fn frames_that_may_hide_a_key_have_no_bytes() {
         let auv = Address::vehicle(1).unwrap();
         let recorded = |frame: Vec<u8>, hides_keys: bool| {
-            let event = FrameEvent::Received { frame, outcome: FrameOutcome::Opened };
+            let event = FrameEvent::Received { frame, outcome: FrameOutcome::Opened, reason: None };
             let entry = frame_entry(&event, |_| "auv-1".to_owned(), hides_keys, &stamps()).unwrap();
             scenecast_messages::decode::<Frame>(&entry.data).unwrap()
         };

@@ -1,7 +1,7 @@
 //! What the operator knew.
 
 use super::{
-    MapState, Record, RecordedMap, entry, entry_of, frame_entry, is_due, settings_entry, settings_text, stamps_now,
+    MapState, Record, RecordedMap, entry, entry_of, frame_entry, is_due, log_entries, settings_entry, settings_text,
 };
 use bytes::Bytes;
 use scenecast_config::Config;
@@ -22,25 +22,26 @@ use std::path::Path;
 
 /// Mission time between two messages about the link, and at most between two states that the page would show, seconds.
 const STATE_INTERVAL_S: f64 = 10.0;
+/// The time of an order in the state is rounded to a hundredth of a second.
+const ROUNDING_S: f64 = 0.01;
 
 /// The record of a surface's process; without one, nothing is done.
 pub struct SurfaceRecord {
     record: Option<Record>,
     recorder: SurfaceRecorder,
-    speed: f64,
 }
 
 impl SurfaceRecord {
     /// Begins it in a folder in `folder`, unless the configuration names another one.
     /// `offers_key` is whether it offers the vehicles a next key.
-    pub fn start(config: &Config, name: &str, folder: &Path, offers_key: bool, speed: f64) -> Self {
+    pub fn start(config: &Config, name: &str, folder: &Path, offers_key: bool) -> Self {
         let recorder = SurfaceRecorder { hides_keys: offers_key, ..SurfaceRecorder::new(config, false) };
-        Self { record: Record::start(config, name, folder), recorder, speed }
+        Self { record: Record::start(config, name, folder), recorder }
     }
 
     /// Begins that of a rehearsal.
-    pub fn rehearsed(config: &Config, folder: &Path, speed: f64) -> Self {
-        Self { record: Record::start(config, "surface", folder), recorder: SurfaceRecorder::new(config, true), speed }
+    pub fn rehearsed(config: &Config, folder: &Path) -> Self {
+        Self { record: Record::start(config, "surface", folder), recorder: SurfaceRecorder::new(config, true) }
     }
 
     /// Whether there is a record.
@@ -56,15 +57,15 @@ impl SurfaceRecord {
     /// Records what has changed.
     pub fn observe(&mut self, surface: &Surface, snapshot: &Snapshot) {
         let Some(record) = &mut self.record else { return };
-        let stamps = stamps_now(snapshot.state.now_s, snapshot.state.mission.speed);
-        record.put(self.recorder.observe(record.state_number(), surface, snapshot, &stamps), &stamps);
+        let stamps = &snapshot.stamps;
+        record.put(log_entries(stamps), stamps);
+        record.put(self.recorder.observe(record.state_number(), surface, snapshot, stamps), stamps);
     }
 
     /// Records a frame.
-    pub fn handle_frame(&mut self, event: &FrameEvent, now_s: f64) {
+    pub fn handle_frame(&mut self, event: &FrameEvent, stamps: &Stamps) {
         let Some(record) = &mut self.record else { return };
-        let stamps = stamps_now(now_s, self.speed);
-        record.put(self.recorder.frame(event, &stamps), &stamps);
+        record.put(self.recorder.frame(event, stamps), stamps);
     }
 
     /// Ends the record, and prints where it is.
@@ -297,7 +298,7 @@ fn principal(surface: &Surface, vehicle: u8, issued_s: f64) -> String {
     let is_it = |logged: &&scenecast_surface::LogEntry| {
         logged.kind == LogKind::Order
             && logged.vehicle.is_none_or(|address| address.number() == vehicle)
-            && (logged.at.as_secs_f64() - issued_s).abs() < 1e-3
+            && (logged.at.as_secs_f64() - issued_s).abs() < ROUNDING_S
     };
     surface.log().entries().rev().find(is_it).and_then(|logged| logged.by.clone()).unwrap_or_default()
 }

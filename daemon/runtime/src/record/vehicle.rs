@@ -1,6 +1,9 @@
 //! What the vehicle knew.
 
-use super::{MapState, Record, RecordedMap, entry_of, frame_entry, is_due, settings_entry, settings_text, stamps_now};
+use super::{
+    MapState, Record, RecordedMap, entry_of, frame_entry, is_due, log_entries, settings_entry, settings_text,
+    unix_nanos,
+};
 use scenecast_config::{Config, cell_m};
 use scenecast_files::RecordEntry;
 use scenecast_host::VehicleHostEvent;
@@ -20,7 +23,9 @@ const POSE_INTERVAL_S: f64 = 1.0;
 pub struct VehicleRecord {
     record: Option<Record>,
     recorder: VehicleRecorder,
-    speed: f64,
+    stamps: Stamps,
+    /// Whether the log of the process is that of the vehicle; in a rehearsal it is that of the surface.
+    has_log: bool,
 }
 
 impl VehicleRecord {
@@ -28,13 +33,15 @@ impl VehicleRecord {
     pub fn start(config: &Config, folder: &Path, speed: f64) -> Self {
         let hides_keys = config.link.key_file.is_some();
         let recorder = VehicleRecorder { hides_keys, ..VehicleRecorder::new(config, false) };
-        Self { record: Record::start(config, &config.vehicle.name, folder), recorder, speed }
+        let record = Record::start(config, &config.vehicle.name, folder);
+        Self { record, recorder, stamps: Stamps::with_speed(speed), has_log: true }
     }
 
     /// Begins that of a rehearsal.
     pub fn rehearsed(config: &Config, folder: &Path, speed: f64) -> Self {
         let record = Record::start(config, &config.vehicle.name, folder);
-        Self { record, recorder: VehicleRecorder::new(config, true), speed }
+        let recorder = VehicleRecorder::new(config, true);
+        Self { record, recorder, stamps: Stamps::with_speed(speed), has_log: false }
     }
 
     /// The folder of the record, if there is one.
@@ -45,15 +52,18 @@ impl VehicleRecord {
     /// Records what has changed.
     pub fn observe(&mut self, vehicle: &Vehicle, now: Instant) {
         let Some(record) = &mut self.record else { return };
-        let stamps = stamps_now(now.as_secs_f64(), self.speed);
-        record.put(self.recorder.observe(record.state_number(), vehicle, &stamps), &stamps);
+        self.stamps.observe(now.as_secs_f64(), unix_nanos());
+        if self.has_log {
+            record.put(log_entries(&self.stamps), &self.stamps);
+        }
+        record.put(self.recorder.observe(record.state_number(), vehicle, &self.stamps), &self.stamps);
     }
 
     /// Records an event of the host.
     pub fn handle_event(&mut self, event: &VehicleHostEvent, now: Instant) {
         let Some(record) = &mut self.record else { return };
-        let stamps = stamps_now(now.as_secs_f64(), self.speed);
-        record.put(self.recorder.handle_event(event, &stamps), &stamps);
+        self.stamps.observe(now.as_secs_f64(), unix_nanos());
+        record.put(self.recorder.handle_event(event, &self.stamps), &self.stamps);
     }
 
     /// Ends the record, and prints where it is.

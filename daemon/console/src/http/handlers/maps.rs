@@ -1,7 +1,7 @@
 //! Maps. Each version is requested from the surface once, however many clients read it, and everything is made of it beside the
 //! link.
 
-use super::readings::MissionUtc;
+use super::readings::utc_at;
 use crate::export::{MapCaption, MapCells, MapFormat};
 use crate::http::response::{accepts_gzip, error, gzip, respond, tagged};
 use crate::http::shared::{CachedMap, MapCell, Shared, VehicleId};
@@ -193,7 +193,7 @@ pub(in crate::http) async fn file(
         let markers = vehicle.map(|v| v.markers.clone()).unwrap_or_default();
         let name = vehicle.map_or(String::new(), |v| v.name.clone());
         let side = snapshot.state.replay.as_ref().map_or(ReplaySide::Operator, |replay| replay.side);
-        let caption = MapCaption { address: id, name, utc: MissionUtc::now(&snapshot.state).at(seconds(at)), side };
+        let caption = MapCaption { address: id, name, utc: utc_at(&snapshot.stamps, seconds(at)), side };
         let moved_m = vehicle.map_or((0.0, 0.0), |v| v.map.shift_m());
         (snapshot.state.mission.origin, moved_m, book, tree, markers, Some(caption))
     };

@@ -7,7 +7,7 @@ use crate::http::response::{JsonOrder, error, not_found, respond};
 use crate::http::shared::{Shared, VehicleId};
 use crate::request::{Reply, SurfaceRequest};
 use crate::snapshot::{Snapshot, seconds};
-use crate::state::{LogLine, LogList, MapEvent, MissionState, ReplayOrder};
+use crate::state::{LogLine, LogList, MapEvent, ReplayOrder};
 use axum::body::{Body, Bytes};
 use axum::extract::{Query, State};
 use axum::http::{HeaderName, HeaderValue, StatusCode, Uri, header};
@@ -20,7 +20,7 @@ use serde::Deserialize;
 use std::collections::{BTreeMap, VecDeque};
 use std::convert::Infallible;
 use std::sync::Arc;
-use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+use std::time::{Duration, Instant};
 use tokio::sync::watch;
 
 const JSON: &str = "application/json";
@@ -192,7 +192,7 @@ async fn lines(shared: &Shared, filter: LogQuery) -> Result<Vec<LogLine>, Respon
         Reply::Log(entries) => entries,
         other => return Err(respond(other)),
     };
-    let utc = MissionUtc::now(&shared.snapshots.borrow().state);
+    let stamps = shared.snapshots.borrow().stamps.clone();
     let is_wanted = |entry: &&LogEntry| {
         filter.vehicle.is_none_or(|vehicle| entry.vehicle.is_some_and(|v| v.number() == vehicle))
             && filter.kind.as_ref().is_none_or(|kind| entry.kind.name() == kind)
@@ -203,7 +203,7 @@ async fn lines(shared: &Shared, filter: LogQuery) -> Result<Vec<LogLine>, Respon
         LogLine {
             number: entry.number,
             at_s,
-            utc: utc.at(at_s),
+            utc: utc_at(&stamps, at_s),
             vehicle: entry.vehicle.map(|v| v.number()),
             kind: entry.kind.name().to_owned(),
             by: entry.by.clone(),
@@ -224,33 +224,9 @@ fn to_csv(entries: &[LogLine]) -> Result<Vec<u8>, csv::Error> {
     table.into_inner().map_err(|e| e.into_error().into())
 }
 
-/// Moments of the mission in UTC, by the clock of this computer, or by that of a record.
-pub(in crate::http) struct MissionUtc {
-    unix_s: f64,
-    /// Mission time, seconds, and seconds of it for each second of the clock.
-    now_s: f64,
-    speed: f64,
-}
-
-impl MissionUtc {
-    pub(in crate::http) fn now(state: &MissionState) -> Self {
-        if let Some(replay) = &state.replay {
-            // A record that stands still has mission times all the same.
-            return Self { unix_s: replay.at_utc_s, now_s: state.now_s, speed: replay.mission_speed };
-        }
-        let unix_s = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_secs_f64();
-        Self { unix_s, now_s: state.now_s, speed: state.mission.speed.max(1e-3) }
-    }
-
-    /// The stamps of messages now.
-    pub(in crate::http) fn stamps(&self) -> Stamps {
-        Stamps::new(self.now_s, self.speed, (self.unix_s * 1e9) as i64)
-    }
-
-    /// A mission time in seconds, as in RFC 3339.
-    pub(in crate::http) fn at(&self, at_s: f64) -> String {
-        utc_text(self.unix_s - (self.now_s - at_s) / self.speed)
-    }
+/// A mission time in seconds in UTC, as in RFC 3339.
+pub(in crate::http) fn utc_at(stamps: &Stamps, at_s: f64) -> String {
+    utc_text(stamps.at(at_s).nanos() as f64 / 1e9)
 }
 
 #[cfg(test)]

@@ -2,7 +2,6 @@
 //! <https://github.com/foxglove/ws-protocol/blob/main/docs/spec.md>
 
 use super::maps::latest;
-use super::readings::MissionUtc;
 use crate::http::access::{MAX_STREAMS, Seat};
 use crate::http::response::error;
 use crate::http::shared::Shared;
@@ -262,8 +261,7 @@ impl Viewer {
             return Ok(());
         }
         self.advertise(&snapshot).await?;
-        let utc = MissionUtc::now(&snapshot.state);
-        let stamps = utc.stamps();
+        let stamps = snapshot.stamps.clone();
         let subscribed: Vec<(u32, Sent)> = self.subscriptions.iter().map(|(id, sent)| (*id, *sent)).collect();
         for (id, sent) in subscribed {
             match self.channels.get(sent.channel).copied() {

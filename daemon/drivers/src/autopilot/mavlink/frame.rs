@@ -23,6 +23,8 @@ pub struct Frame {
     pub id: u32,
     /// Its fields; trailing zeros may be missing.
     pub payload: Vec<u8>,
+    /// Whether a signature follows, which is not verified. Own frames have none.
+    pub is_signed: bool,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -120,7 +122,8 @@ impl Deframer {
             return Front::Skip(1);
         }
         let payload = whole.get(head..body).unwrap_or_default().to_vec();
-        let frame = Frame { system: byte(at).unwrap_or(0), component: byte(at + 1).unwrap_or(0), id, payload };
+        let (system, component) = (byte(at).unwrap_or(0), byte(at + 1).unwrap_or(0));
+        let frame = Frame { system, component, id, payload, is_signed: signature > 0 };
         Front::Whole(whole.len(), Some(frame))
     }
 
@@ -139,7 +142,7 @@ impl Deframer {
     }
 }
 
-fn check(bytes: &[u8], extra: u8) -> u16 {
+pub(super) fn check(bytes: &[u8], extra: u8) -> u16 {
     let mut digest = CRC.digest();
     digest.update(bytes);
     digest.update(&[extra]);
@@ -178,7 +181,7 @@ mod tests {
         let (mut found, mut deframer) = (Vec::new(), Deframer::default());
         deframer.push(&bytes(HEARTBEAT), extra, |f| found.push(f));
         let payload = vec![0, 0, 0, 0, 6, 8, 0, 4, 3];
-        let frame = Frame { system: 255, component: 190, id: 0, payload };
+        let frame = Frame { system: 255, component: 190, id: 0, payload, is_signed: false };
         assert_eq!(found, std::slice::from_ref(&frame));
         assert_eq!(encode(&frame, 0, 50), bytes(HEARTBEAT));
     }

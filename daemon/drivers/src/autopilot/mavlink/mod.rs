@@ -167,7 +167,7 @@ impl Mavlink {
         let component = self.peer.map_or(1, |p| p.component);
         let time_ms = now.since(self.began).as_millis() as u32;
         let payload = said.payload(self.config.system, component, time_ms);
-        let frame = Frame { system: self.config.system, component: OWN_COMPONENT, id, payload };
+        let frame = Frame { system: self.config.system, component: OWN_COMPONENT, id, payload, is_signed: false };
         self.tray.write(encode(&frame, self.seq, extra));
         self.seq = self.seq.wrapping_add(1);
     }
@@ -179,7 +179,7 @@ impl Mavlink {
         };
         if let Heard::Heartbeat { custom_mode, kind, autopilot, base_mode } = heard {
             return match self.claim(frame, kind, autopilot, now) {
-                Claim::Autopilot => self.handle_heartbeat(frame.component, custom_mode, kind, base_mode, now),
+                Claim::Autopilot => self.handle_heartbeat(frame, custom_mode, kind, base_mode, now),
                 Claim::Passed(reason) => self.tray.count(reason),
             };
         }
@@ -266,7 +266,8 @@ impl Mavlink {
         claim
     }
 
-    fn handle_heartbeat(&mut self, component: u8, custom_mode: u32, kind: u8, base_mode: u8, now: Instant) {
+    fn handle_heartbeat(&mut self, frame: &Frame, custom_mode: u32, kind: u8, base_mode: u8, now: Instant) {
+        let component = frame.component;
         // GUIDED is 4 of ArduSub and ArduCopter, 15 of ArduRover, which drives boats too.
         let guided_mode = if matches!(kind, 10 | 11) { 15 } else { 4 };
         let peer = Peer { component, guided_mode, custom_mode, is_armed: base_mode & 128 != 0, heard: now };
@@ -282,7 +283,13 @@ impl Mavlink {
         let was_in_command = self.peer.is_some_and(|p| p.is_in_command());
         self.peer = Some(peer);
         if is_new {
-            self.tray.note("the autopilot answers");
+            self.tray.note(match frame.is_signed {
+                false => "the autopilot answers",
+                true => {
+                    "the autopilot answers and signs its messages: those of this vehicle have no signature, so it may obey none of \
+                     them; switch signing off for this link"
+                }
+            });
             self.was_silent = false;
             self.reception.handle_answer(now);
             self.ask_for_streams(now);

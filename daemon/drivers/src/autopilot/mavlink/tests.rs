@@ -12,7 +12,7 @@ fn pilot(arms: bool) -> Mavlink {
 }
 
 fn frame_of(system: u8, component: u8, id: u32, payload: Vec<u8>) -> Vec<u8> {
-    encode(&Frame { system, component, id, payload }, 0, heard_extra(id).unwrap())
+    encode(&Frame { system, component, id, payload, is_signed: false }, 0, heard_extra(id).unwrap())
 }
 
 fn frame(system: u8, id: u32, payload: Vec<u8>) -> Vec<u8> {
@@ -543,4 +543,18 @@ fn a_vehicle_that_crosses_180_degrees_does_not_jump() {
         pilot.handle_bytes(&frame(1, 33, fields), at(f64::from(tenth) / 10.0));
     }
     assert_eq!(pilot.counters().get("position_jumps"), None);
+}
+
+#[test]
+fn an_autopilot_that_signs_its_messages_is_named() {
+    let mut bytes = heartbeat(4, true);
+    bytes[2] = 1;
+    let end = bytes.len() - 2;
+    let crc = frame::check(&bytes[1..end], 50).to_le_bytes();
+    bytes[end..].copy_from_slice(&crc);
+    bytes.extend([7; 13]);
+    let mut pilot = pilot(true);
+    pilot.handle_bytes(&bytes, at(0.0));
+    let notes = notes(&mut pilot);
+    assert!(notes[0].contains("signs its messages") && notes[0].contains("switch signing off"), "{notes:?}");
 }
