@@ -1,9 +1,12 @@
 //! Exemplars on the wire: a small image that shows one label.
 
+use crate::bytes::{Reader, decimetres, put24};
 use crate::directive::ExemplarRequest;
+use crate::time::{ClockMap, Instant};
+use std::time::Duration;
 
-/// Length of the header before the image, in bytes.
-pub const HEAD: usize = 4;
+/// Length of the header before the image, in bytes: what it answers, then what it shows.
+pub const HEAD: usize = 4 + ExemplarView::BYTES;
 /// Bytes of a VP8 key frame before its size: frame tag and start code.
 const TAG: usize = 3;
 const START_CODE: [u8; 3] = [0x9D, 0x01, 0x2A];
@@ -27,14 +30,16 @@ pub fn max_bytes(size: u8) -> usize {
 ///  0    label epoch
 ///  1    label, 1..=254
 ///  2    serial number of the request that it answers; 0: it was not requested
-///  3    bits 7-6 size: an edge of 64 << size pixels; bits 5-0 number of the picture, 0: there is none
-///  4..  VP8 key frame without start code and size
+///  3    bits 7-6 size: an edge of 64 << size pixels; bits 5-0 number of the picture, 0: there is none, and the object ends here
+///  4-14 what it shows ([`ExemplarView`])
+/// 15..  VP8 key frame without start code and size
 /// ```
 ///
 /// ```
-/// use scenecast_protocol::exemplar::{Exemplar, edge_px};
+/// use scenecast_protocol::exemplar::{Exemplar, ExemplarView, edge_px};
 ///
-/// let empty = Exemplar { epoch: 0, label: 4, serial: 1, size: 1, picture: 0, bytes: Vec::new() };
+/// let view = ExemplarView::default();
+/// let empty = Exemplar { epoch: 0, label: 4, serial: 1, size: 1, picture: 0, view, bytes: Vec::new() };
 /// assert_eq!(edge_px(empty.size), 128);
 /// assert_eq!(Exemplar::decode(&empty.encode()).as_ref(), Some(&empty));
 /// assert_eq!(empty.webp(), None, "the vehicle has no image of label 4 yet");
@@ -51,6 +56,8 @@ pub struct Exemplar {
     pub size: u8,
     /// Its number among the exemplars of the label, 1..=63.
     pub picture: u8,
+    /// What it shows; unknown without an image.
+    pub view: ExemplarView,
     /// The image without its constant bytes; empty if the vehicle has none that matches the request.
     pub bytes: Vec<u8>,
 }
@@ -59,20 +66,98 @@ impl Exemplar {
     /// Encodes header and image for the sender of objects.
     pub fn encode(&self) -> Vec<u8> {
         let what = self.size << 6 | self.picture & ExemplarRequest::MAX_PICTURE;
-        [&[self.epoch, self.label, self.serial, what][..], &self.bytes].concat()
+        let mut object = vec![self.epoch, self.label, self.serial, what];
+        if !self.bytes.is_empty() {
+            self.view.encode(&mut object);
+            object.extend_from_slice(&self.bytes);
+        }
+        object
     }
 
     /// Decodes an object; `None` if it names no label, or a picture without bytes.
     pub fn decode(object: &[u8]) -> Option<Self> {
-        let (&[epoch, label, serial, what], bytes) = object.split_first_chunk::<HEAD>()?;
+        let (&[epoch, label, serial, what], rest) = object.split_first_chunk::<4>()?;
         let (size, picture) = (what >> 6, what & ExemplarRequest::MAX_PICTURE);
-        let is_sound = label != 0 && label != 255 && (picture == 0) == bytes.is_empty();
-        is_sound.then(|| Self { epoch, label, serial, size, picture, bytes: bytes.to_vec() })
+        let (view, bytes) = match rest.split_first_chunk() {
+            Some((view, bytes)) => (ExemplarView::decode(view), bytes),
+            None if rest.is_empty() => (ExemplarView::default(), rest),
+            None => return None,
+        };
+        let is_sound =
+            label != 0 && label != 255 && (picture == 0) == bytes.is_empty() && bytes.is_empty() == rest.is_empty();
+        is_sound.then(|| Self { epoch, label, serial, size, picture, view, bytes: bytes.to_vec() })
     }
 
     /// The WebP file; `None` if there is no picture, or if the bytes cannot be one. The pixels are not decoded here.
     pub fn webp(&self) -> Option<Vec<u8>> {
         unstrip(&self.bytes, edge_px(self.size) as u16)
+    }
+}
+
+/// What an exemplar shows: how wide its image is, and where and when it was taken.
+///
+/// ```text
+/// bytes  field
+///  0-1   width on the sea floor in mm; 0: not known; 65 535: that or more
+///  2-4   its middle, east of the origin of the vehicle's map in decimetres, two's complement
+///  5-7   the same, north
+///  8-10  the vehicle's clock when it was taken: milliseconds, low 24; FF FF FF: more than 4 h before it was sent
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct ExemplarView {
+    /// Width on the sea floor in mm; 0: not known.
+    pub width_mm: u16,
+    /// The middle of the image in the vehicle's map frame, decimetres east of its origin.
+    pub east_dm: i32,
+    /// The same, north.
+    pub north_dm: i32,
+    /// The vehicle's clock when it was taken: milliseconds, low 24; `None` if that is more than four hours ago.
+    pub clock_ms: Option<u32>,
+}
+
+impl ExemplarView {
+    const BYTES: usize = 11;
+    const UNKNOWN_CLOCK: u32 = 0xFF_FFFF;
+    /// The clock wraps after 4 h 39 min.
+    const MAX_AGE_S: f64 = 4.0 * 3600.0;
+
+    /// Of an image `width_m` wide around a place of the map, taken at `taken` and sent from `now` on.
+    pub fn new(width_m: f64, (east_m, north_m): (f64, f64), taken: Instant, now: Instant) -> Self {
+        let clock_ms = (taken.as_micros() / 1000 % (1 << 24)) as u32;
+        let is_recent = now.since(taken).as_secs_f64() < Self::MAX_AGE_S && clock_ms != Self::UNKNOWN_CLOCK;
+        Self {
+            width_mm: (width_m * 1000.0).round().clamp(0.0, 65535.0) as u16,
+            east_dm: decimetres(east_m),
+            north_dm: decimetres(north_m),
+            clock_ms: is_recent.then_some(clock_ms),
+        }
+    }
+
+    /// Our time at which it was taken, by the map of the vehicle's clock; `None` if that is not known.
+    pub fn taken(&self, clock: &ClockMap, now: Instant) -> Option<Instant> {
+        let half_wrap = Duration::from_millis(1 << 23);
+        self.clock_ms.map(|clock_ms| clock.to_ours(clock_ms, now - half_wrap))
+    }
+
+    /// The middle of the image in the vehicle's map frame, metres east and north.
+    pub fn middle_m(&self) -> (f64, f64) {
+        (f64::from(self.east_dm) / 10.0, f64::from(self.north_dm) / 10.0)
+    }
+
+    fn encode(&self, out: &mut Vec<u8>) {
+        out.extend(self.width_mm.to_be_bytes());
+        put24(out, self.east_dm as u32);
+        put24(out, self.north_dm as u32);
+        put24(out, self.clock_ms.unwrap_or(Self::UNKNOWN_CLOCK));
+    }
+
+    fn decode(bytes: &[u8; Self::BYTES]) -> Self {
+        let mut reader = Reader::new(bytes);
+        // The bytes are enough for all fields.
+        let width_mm = reader.u16().unwrap_or_default();
+        let [east_dm, north_dm] = [reader.i24(), reader.i24()].map(|dm| dm.unwrap_or_default());
+        let clock_ms = reader.u24().ok().filter(|&clock| clock != Self::UNKNOWN_CLOCK);
+        Self { width_mm, east_dm, north_dm, clock_ms }
     }
 }
 
@@ -114,12 +199,15 @@ mod tests {
 
     #[test]
     fn golden_bytes_of_an_exemplar() {
-        let sent = Exemplar { epoch: 1, label: 5, serial: 2, size: 1, picture: 9, bytes: vec![7, 8] };
-        assert_eq!(sent.encode(), [1, 5, 2, 0x49, 7, 8]);
+        let view = ExemplarView { width_mm: 260, east_dm: -123, north_dm: 45, clock_ms: Some(0x01_0203) };
+        let sent = Exemplar { epoch: 1, label: 5, serial: 2, size: 1, picture: 9, view, bytes: vec![7, 8] };
+        assert_eq!(sent.encode(), [1, 5, 2, 0x49, 1, 4, 0xFF, 0xFF, 0x85, 0, 0, 0x2D, 1, 2, 3, 7, 8]);
         assert_eq!(Exemplar::decode(&sent.encode()), Some(sent));
-        let none = Exemplar { epoch: 1, label: 5, serial: 2, size: 0, picture: 0, bytes: Vec::new() };
+        let view = ExemplarView::default();
+        let none = Exemplar { epoch: 1, label: 5, serial: 2, size: 0, picture: 0, view, bytes: Vec::new() };
         assert_eq!(Exemplar::decode(&[1, 5, 2, 0]), Some(none));
-        for wrong in [&[1, 5, 2][..], &[1, 0, 2, 0], &[1, 255, 2, 0], &[1, 5, 2, 9], &[1, 5, 2, 0, 7]] {
+        let without_image = [[1, 5, 2, 9].as_slice(), &[0; ExemplarView::BYTES]].concat();
+        for wrong in [&without_image[..], &[1, 5, 2], &[1, 0, 2, 0], &[1, 255, 2, 0], &[1, 5, 2, 9], &[1, 5, 2, 0, 7]] {
             assert_eq!(Exemplar::decode(wrong), None, "{wrong:?}");
         }
     }

@@ -141,14 +141,18 @@ class Mission:
         return sum(known.get((x, y)) == label for x, y, label in cells) / len(vehicle)
 
     def exemplars(self):
-        """The images of labels: label, number, name as last given, epoch, time, format and bytes of the file."""
+        """The images of labels: label, number, name as last given, epoch, time of arrival, format and bytes of the file;
+        when it was taken, its width on the sea floor in metres, and its middle in the world frame, each None where it is not known."""
         vehicle, images = self._vehicle_state(self.state()), {}
         names = {found["id"]: found["name"] for found in vehicle.get("labels", ())}
         for _, m in self._messages("operator", "exemplars"):
             name = names.get(m.label) if (vehicle.get("map") or {}).get("epoch") == m.epoch else None
             images[m.epoch, m.label, m.image] = {
                 "label": m.label, "number": m.image, "name": name or m.name or None, "epoch": m.epoch,
-                "time": m.header.stamp, "format": m.format, "data": m.data.tobytes()}
+                "time": m.header.stamp, "taken": m.taken if m.taken else None,
+                "width_m": m.width_m if m.width_m > 0 else None,
+                "middle_m": (m.middle.x, m.middle.y) if m.width_m > 0 else None,
+                "format": m.format, "data": m.data.tobytes()}
         return list(images.values())
 
     def orders(self):

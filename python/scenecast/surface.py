@@ -213,7 +213,11 @@ class Surface:
                         continue
                     raise
                 found.append({"label": label["id"], "number": image["number"], "name": label.get("name"),
-                              "epoch": vehicle["map"]["epoch"], "time": utc(image["at_s"]), "format": "webp", "data": data})
+                              "epoch": vehicle["map"]["epoch"], "time": utc(image["at_s"]),
+                              "taken": None if image["taken_s"] is None else utc(image["taken_s"]),
+                              "width_m": image["width_m"],
+                              "middle_m": None if image["x_m"] is None else (image["x_m"], image["y_m"]),
+                              "format": "webp", "data": data})
         return found
 
     @_expects

@@ -20,18 +20,21 @@ pub struct ExemplarPatch {
     pub t_s: f64,
     /// The position on the ground: metres to the east and to the north.
     pub place: (f64, f64),
+    /// The size of a pixel on the ground, metres.
+    pub pixel_m: f64,
 }
 
 /// The best few patches of each topic.
 ///
 /// ```
 /// use image::RgbImage;
-/// use scene_model::exemplars::ExemplarStore;
+/// use scene_model::exemplars::{ExemplarPatch, ExemplarStore};
 /// use scene_model::topics::TopicId;
 ///
 /// let mut store = ExemplarStore::new(2, 32);
 /// for (score, east) in [(0.5, 0.0), (0.9, 4.0), (0.7, 8.0)] {
-///     store.offer(TopicId(3), RgbImage::new(64, 64), score, 12.5, (east, 0.0));
+///     let patch = RgbImage::new(64, 64).into();
+///     store.offer(TopicId(3), ExemplarPatch { patch, score, t_s: 12.5, place: (east, 0.0), pixel_m: 0.004 });
 /// }
 /// let scores: Vec<f32> = store.all(TopicId(3)).iter().map(|exemplar| exemplar.score).collect();
 /// assert_eq!(scores, [0.9, 0.7]);
@@ -67,15 +70,17 @@ impl ExemplarStore {
     ///
     /// `t_s` is the time of the frame in seconds, `place` its position in metres to the east and to the north. A NaN
     /// score and a patch without pixels are ignored.
-    pub fn offer(&mut self, topic: TopicId, patch: RgbImage, score: f32, t_s: f64, place: (f64, f64)) {
+    pub fn offer(&mut self, topic: TopicId, offered: ExemplarPatch) {
+        let ExemplarPatch { patch, score, t_s, place, pixel_m } = offered;
         if score.is_nan() || patch.width() == 0 || patch.height() == 0 || !self.would_keep(topic, score) {
             return;
         }
         let edge = self.edge_px;
+        let pixel_m = pixel_m * f64::from(patch.width()) / f64::from(edge);
         let patch = if patch.dimensions() == (edge, edge) {
             patch
         } else {
-            imageops::resize(&patch, edge, edge, imageops::FilterType::Triangle)
+            imageops::resize(patch.as_ref(), edge, edge, imageops::FilterType::Triangle).into()
         };
         let apart = self.apart_m;
         let kept = self.topics.entry(topic).or_default();
@@ -85,7 +90,7 @@ impl ExemplarStore {
         }
         kept.retain(|other| !near(other));
         let rank = kept.partition_point(|other| other.score >= score);
-        kept.insert(rank, ExemplarPatch { patch: Arc::new(patch), score, t_s, place });
+        kept.insert(rank, ExemplarPatch { patch, score, t_s, place, pixel_m });
         kept.truncate(self.per_label);
         self.drop_lowest_topic();
     }
@@ -162,15 +167,20 @@ mod pixels {
 mod tests {
     use super::*;
 
+    fn patch((width, height): (u32, u32), score: f32, east_m: f64) -> ExemplarPatch {
+        let patch = RgbImage::new(width, height).into();
+        ExemplarPatch { patch, score, t_s: 1.0, place: (east_m, 0.0), pixel_m: 0.01 }
+    }
+
     fn offer(store: &mut ExemplarStore, topic: u32, score: f32) {
-        store.offer(TopicId(topic), RgbImage::new(20, 10), score, 1.0, (f64::from(score) * 100.0, 0.0));
+        store.offer(TopicId(topic), patch((20, 10), score, f64::from(score) * 100.0));
     }
 
     #[test]
     fn better_of_two_views_of_one_place_is_kept() {
         let mut store = ExemplarStore::new(4, 8);
         for (score, east) in [(0.5, 0.0), (0.4, 0.1), (0.3, 9.0), (0.8, 0.2)] {
-            store.offer(TopicId(1), RgbImage::new(8, 8), score, 1.0, (east, 0.0));
+            store.offer(TopicId(1), patch((8, 8), score, east));
         }
         let scores: Vec<f32> = store.all(TopicId(1)).iter().map(|exemplar| exemplar.score).collect();
         assert_eq!(scores, [0.8, 0.3]);

@@ -72,6 +72,35 @@ fn settings_are_fitted_to_a_budget_and_sent() {
 }
 
 #[test]
+fn labels_are_named_and_merged_and_places_marked_by_ctl() {
+    let port = free_port();
+    let _demo = demo(port, &["--duration", "3000"]);
+    wait_until("two labels", || labels(port).len() > 1);
+    let [coral, other] = [labels(port)[0], labels(port)[1]].map(|label| label.to_string());
+    let done = |arguments: &[&str]| {
+        let output = ctl(port, arguments);
+        assert_eq!(output.status.code(), Some(0), "{}", text(&output));
+        text(&output)
+    };
+    done(&["label", &coral, "--name", "Soft coral", "--colour", "#a0b1c2"]);
+    done(&["label", &other, "--merge-into", "soft CORAL"]);
+    done(&["label", "soft coral", "--colour", ""]);
+    let book = || state(port).unwrap()["vehicles"][0]["label_book"].clone();
+    wait_until("the names are shown", || book()[&coral]["colour"].is_null());
+    assert_eq!(book()[&coral]["name"], "Soft coral");
+    assert_eq!(book()[&other]["merged_into"].to_string(), coral);
+    done(&["note", "turbid since noon"]);
+    done(&["mark", "set", "2.5", "-4", "lost anchor"]);
+    let marks = || text(&ctl(port, &["mark"]));
+    wait_until("the marker is shown", || marks().contains("1: 2.5 m east, -4.0 m north: lost anchor"));
+    let unknown = ctl(port, &["mark", "remove", "7"]);
+    assert!(unknown.status.code() == Some(2) && text(&unknown).contains("known: 1"), "{}", text(&unknown));
+    done(&["mark", "remove", "1"]);
+    wait_until("the marker is gone", || marks() == "no marker\n");
+    assert!(done(&["log"]).contains("turbid since noon"));
+}
+
+#[test]
 fn orders_are_followed_until_applied_or_refused() {
     let port = free_port();
     let _demo = demo(port, &["--duration", "3000", "--set", "mission.origin_deg=[60.17, -10.25]"]);

@@ -118,6 +118,8 @@ fn every_command_has_help_with_an_example() {
         &["ctl", "status"],
         &["ctl", "map"],
         &["ctl", "labels"],
+        &["ctl", "label"],
+        &["ctl", "mark", "set"],
         &["ctl", "utility", "set"],
         &["ctl", "budget", "set"],
         &["ctl", "exemplar"],

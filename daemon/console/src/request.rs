@@ -2,7 +2,7 @@
 
 mod described;
 
-use crate::export::MapCells;
+use crate::export::{MapCaption, MapCells};
 use crate::fit::{self, Fit};
 use crate::layers;
 use crate::orders::{
@@ -334,7 +334,7 @@ fn done(result: Result<(), String>) -> Reply {
 }
 
 /// The cells of an archived map. Their ages count from the last one that was received.
-pub fn archived_cells(map: &VehicleMemory, cell_m: f64) -> MapCells {
+pub fn archived_cells(map: &VehicleMemory, cell_m: f64, caption: Option<MapCaption>) -> MapCells {
     let (labels, layers) = (map.map().labels(), map.map().layers().map(|(_, layer)| layer).collect::<Vec<_>>());
     MapCells {
         version: map.archived().map_or(0, |(_, cells)| cells),
@@ -344,8 +344,8 @@ pub fn archived_cells(map: &VehicleMemory, cell_m: f64) -> MapCells {
         moved_m: map.placement_m().unwrap_or((0.0, 0.0)),
         book: map.labels().clone(),
         tree: map.tree(),
-        markers: map.markers().map(crate::snapshot::marker).collect(),
-        caption: None,
+        markers: map.markers().map(|marker| (crate::snapshot::marker(marker), None)).collect(),
+        caption,
         tiles: labels.tiles().clone(),
         layers: layers::layers(&layers),
     }

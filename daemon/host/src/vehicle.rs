@@ -254,7 +254,7 @@ impl VehicleHost {
             self.handle_registration(frame, now);
         }
         self.handle_map(update, now);
-        self.handle_exemplars(exemplars);
+        self.handle_exemplars(exemplars, now);
         self.finish_after_last_frame();
     }
 
@@ -280,8 +280,8 @@ impl VehicleHost {
     }
 
     /// Takes the mapper's exemplars of each label, the best first.
-    pub fn handle_exemplars(&mut self, exemplars: SharedExemplars) {
-        self.link.end_mut().handle_exemplars(exemplars);
+    pub fn handle_exemplars(&mut self, exemplars: SharedExemplars, now: Instant) {
+        self.link.end_mut().handle_exemplars(exemplars, now);
     }
 
     fn finish_after_last_frame(&mut self) {

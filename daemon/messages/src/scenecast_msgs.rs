@@ -133,6 +133,12 @@ messages! {
         image: u8,
         /// The name of the label that an operator gave; empty without one.
         name: String,
+        /// When it was taken; 0 where that is not known.
+        taken: Time,
+        /// How wide it is on the sea floor, metres; NaN where it is not known.
+        width_m: f64,
+        /// Its middle in the world frame.
+        middle: Point,
         /// The codec of the data: jpeg or webp.
         format: String,
         data: Vec<u8>,

@@ -12,11 +12,12 @@ use super::store::{ArchivedFile, SurfaceFiles};
 use crate::port::FromPort;
 use scenecast_config::Config;
 use scenecast_console::report::report_reply;
+use scenecast_console::state::ReplaySide;
 use scenecast_console::{
-    ClientRequest, Console, LinkMeter, MissionFacts, PendingRequest, Reply, SurfaceRequest, archived_cells, bind,
-    former_labels, handle_request, measured_origin, snapshot, start,
+    ClientRequest, Console, LinkMeter, MapCaption, MissionFacts, PendingRequest, Reply, SurfaceRequest, archived_cells,
+    bind, former_labels, handle_request, measured_origin, snapshot, start,
 };
-use scenecast_core::{LatLon, TangentPlane, UserError, world_file};
+use scenecast_core::{LatLon, TangentPlane, UserError, utc_text, world_file};
 use scenecast_host::{Follower, FrameEvent, SurfaceHost, SurfaceHostEvent, modem_station};
 use scenecast_protocol::directive::Budget;
 use scenecast_protocol::wire::Address;
@@ -254,11 +255,21 @@ impl SurfaceShell {
     /// Reads an archived map beside the loop of the link, one at a time.
     fn read_archive(&self, name: &str, reply: oneshot::Sender<Reply>) {
         let (file, cell_m) = (self.files.store.archived(name), self.facts.cell_m);
+        let info = self.files.store.archives().find(|info| info.name == name);
+        // The mission of an archived map may be an earlier one.
+        let caption = info.map(|info| MapCaption {
+            mission: String::new(),
+            address: info.vehicle,
+            name: info.vehicle_name.clone(),
+            epoch: info.id.epoch,
+            utc: utc_text(info.ended_unix_ms as f64 / 1000.0),
+            side: ReplaySide::Operator,
+        });
         let reading = self.reading.clone();
         tokio::task::spawn_blocking(move || {
             let _one = reading.lock();
             let map = file.and_then(ArchivedFile::read);
-            let answer = map.map_or(Reply::NotFound, |map| Reply::Map(archived_cells(&map, cell_m)));
+            let answer = map.map_or(Reply::NotFound, |map| Reply::Map(archived_cells(&map, cell_m, caption)));
             // A browser that closed its connection needs no reply.
             let _ = reply.send(answer);
         });

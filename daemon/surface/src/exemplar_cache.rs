@@ -1,8 +1,7 @@
 //! The exemplars of a vehicle's labels that have arrived, and the requests for more.
 
 use scenecast_protocol::directive::{ExemplarRequest, ExemplarRequests};
-use scenecast_protocol::exemplar::Exemplar;
-use scenecast_protocol::exemplar::edge_px;
+use scenecast_protocol::exemplar::{Exemplar, ExemplarView, edge_px};
 use scenecast_protocol::time::Instant;
 use std::collections::BTreeMap;
 
@@ -48,6 +47,10 @@ pub struct StoredExemplar {
     pub sent_bytes: usize,
     pub received: Instant,
     pub requested: bool,
+    /// How wide it is on the sea floor, and where it was taken.
+    pub view: ExemplarView,
+    /// When it was taken; `None` where that is not known.
+    pub taken: Option<Instant>,
 }
 
 /// The exemplars of a label.
@@ -155,8 +158,8 @@ impl ExemplarCache {
         }
     }
 
-    /// Takes a complete object. Returns whether the operator has something new to see.
-    pub fn handle_exemplar(&mut self, exemplar: &Exemplar, now: Instant) -> bool {
+    /// Takes a complete object, whose image was `taken` then. Returns whether the operator has something new to see.
+    pub fn handle_exemplar(&mut self, exemplar: &Exemplar, taken: Option<Instant>, now: Instant) -> bool {
         let is_meant = |asked: &OpenRequest| asked.request.serial == exemplar.serial;
         let entry = self.labels.entry(exemplar.label).or_default();
         let asked = entry.request.is_some_and(|a| is_meant(&a));
@@ -168,10 +171,11 @@ impl ExemplarCache {
             return none_yet;
         };
         entry.request = entry.request.filter(|_| !asked);
-        let Exemplar { picture: number, size, .. } = *exemplar;
+        let Exemplar { picture: number, size, view, .. } = *exemplar;
         let sent_bytes = exemplar.encode().len();
         entry.stored.retain(|p| p.number != number);
-        entry.stored.push(StoredExemplar { number, size, webp, sent_bytes, received: now, requested: asked });
+        let (received, requested) = (now, asked);
+        entry.stored.push(StoredExemplar { number, size, webp, sent_bytes, received, requested, view, taken });
         if entry.stored.len() > Self::MAX_OF_LABEL {
             entry.stored.remove(0);
         }
@@ -217,7 +221,7 @@ mod tests {
     const NOW: Instant = Instant::ZERO;
 
     fn come(label: u8, serial: u8, size: u8, picture: u8) -> Exemplar {
-        Exemplar { epoch: 0, label, serial, size, picture, bytes: vec![0x10, 0, 0, 9] }
+        Exemplar { epoch: 0, label, serial, size, picture, view: ExemplarView::default(), bytes: vec![0x10, 0, 0, 9] }
     }
 
     #[test]
@@ -234,11 +238,11 @@ mod tests {
         );
         cache.handle_progress([3, 5, 1, 0x09], (60, 500), NOW);
         assert_eq!(cache.label(5).unwrap().request.unwrap().state, RequestState::Arriving(60, 500));
-        assert!(cache.handle_exemplar(&come(5, 1, 0, 9), NOW));
+        assert!(cache.handle_exemplar(&come(5, 1, 0, 9), None, NOW));
         assert!(cache.wanted(3).wanted.is_empty());
         cache.request(5, RequestKind::Larger(None), NOW).unwrap();
         assert_eq!(cache.wanted(3).wanted, [ExemplarRequest { label: 5, serial: 2, size: 1, picture: 9 }]);
-        assert!(cache.handle_exemplar(&come(5, 2, 1, 9), NOW));
+        assert!(cache.handle_exemplar(&come(5, 2, 1, 9), None, NOW));
         let sizes: Vec<(u8, u8)> = cache.label(5).unwrap().stored.iter().map(|p| (p.number, p.size)).collect();
         assert_eq!(sizes, [(9, 1)]);
         let said = cache.request(5, RequestKind::Larger(Some(9)), NOW).unwrap_err();
@@ -252,7 +256,7 @@ mod tests {
     #[test]
     fn cancelled_and_refused_requests_end_and_images_stay() {
         let mut cache = ExemplarCache::default();
-        assert!(cache.handle_exemplar(&come(5, 0, 0, 9), NOW), "nobody had to ask");
+        assert!(cache.handle_exemplar(&come(5, 0, 0, 9), None, NOW), "nobody had to ask");
         assert!(!cache.label(5).unwrap().stored[0].requested);
         cache.request(5, RequestKind::Another, NOW).unwrap();
         cache.cancel(5).unwrap();
@@ -272,10 +276,10 @@ mod tests {
         let mut cache = ExemplarCache::default();
         cache.request(5, RequestKind::Another, NOW).unwrap();
         let none = Exemplar { bytes: Vec::new(), ..come(5, 1, 0, 0) };
-        assert!(cache.handle_exemplar(&none, NOW));
+        assert!(cache.handle_exemplar(&none, None, NOW));
         assert_eq!(cache.label(5).unwrap().request.unwrap().state, RequestState::NoneYet);
         assert_eq!(cache.wanted(0).wanted.len(), 1);
-        assert!(!cache.handle_exemplar(&Exemplar { serial: 7, ..none }, NOW), "an answer to what was not asked");
+        assert!(!cache.handle_exemplar(&Exemplar { serial: 7, ..none }, None, NOW), "an answer to what was not asked");
     }
 
     #[test]
@@ -290,7 +294,7 @@ mod tests {
         };
         for picture in 1..=20 {
             for label in 1..=20 {
-                cache.handle_exemplar(&large(label, picture), Instant::from_secs_f64(f64::from(picture)));
+                cache.handle_exemplar(&large(label, picture), None, Instant::from_secs_f64(f64::from(picture)));
             }
         }
         let kept: Vec<&StoredExemplar> = cache.labels().flat_map(|(_, entry)| &entry.stored).collect();

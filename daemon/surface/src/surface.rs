@@ -356,7 +356,9 @@ impl Surface {
             }
             SurfaceEvent::Object(vehicle, bytes) => {
                 let exemplar = Exemplar::decode(&bytes)?;
-                let is_new = self.records.get_mut(&vehicle)?.handle_exemplar(&exemplar, now);
+                let clock = self.link.vehicle(vehicle).and_then(|view| view.clock());
+                let taken = clock.and_then(|clock| exemplar.view.taken(clock, now));
+                let is_new = self.records.get_mut(&vehicle)?.handle_exemplar(&exemplar, taken, now);
                 if is_new {
                     let text = match exemplar.bytes.is_empty() {
                         true => format!("no image of label {} yet", exemplar.label),

@@ -252,8 +252,8 @@ impl VehicleRecord {
     }
 
     /// Takes a complete exemplar. Returns whether the operator has something new to see.
-    pub fn handle_exemplar(&mut self, exemplar: &Exemplar, now: Instant) -> bool {
-        exemplar.epoch == self.epoch && self.exemplars.handle_exemplar(exemplar, now)
+    pub fn handle_exemplar(&mut self, exemplar: &Exemplar, taken: Option<Instant>, now: Instant) -> bool {
+        exemplar.epoch == self.epoch && self.exemplars.handle_exemplar(exemplar, taken, now)
     }
 
     /// The open requests for exemplars.

@@ -139,7 +139,7 @@ fn smooth(values: &[f64], width: usize) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use scenecast_protocol::exemplar::{Exemplar, max_bytes};
+    use scenecast_protocol::exemplar::{Exemplar, ExemplarView, max_bytes};
 
     #[test]
     fn an_image_fits_its_budget_and_decodes_at_the_other_end() {
@@ -148,7 +148,8 @@ mod tests {
             let (cut, small) = middle(&patch, size).unwrap();
             assert_eq!((u32::from(cut), small.width()), (u32::from(size.min(1)), edge_px(cut)));
             let bytes = compress_to(&small, GOOD_SSIM, max_bytes(cut)).unwrap().bytes;
-            let sent = Exemplar { epoch: 1, label: 5, serial: 2, size: cut, picture: 1, bytes };
+            let sent =
+                Exemplar { epoch: 1, label: 5, serial: 2, size: cut, picture: 1, view: ExemplarView::default(), bytes };
             assert!(sent.encode().len() <= 700 << (2 * cut));
             let file = Exemplar::decode(&sent.encode()).unwrap().webp().unwrap();
             assert_eq!(decode_webp(&file).unwrap().width(), edge_px(cut));

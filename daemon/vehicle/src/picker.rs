@@ -1,6 +1,6 @@
 //! The choice of the patches of a camera frame that represent the labels best.
 
-use scene_model::exemplars::ExemplarStore;
+use scene_model::exemplars::{ExemplarPatch, ExemplarStore};
 use scene_model::topics::{FlatCell, TopicId};
 use scenecast_protocol::exemplar::edge_px;
 
@@ -66,8 +66,9 @@ impl Judge<'_> {
             let Some(place) = place_of(middle.0, middle.1) else { continue };
             let Some((topic, score)) = self.score(place).filter(|s| s.1 >= MIN_SCORE) else { continue };
             if store.would_keep(topic, score) {
-                let patch = image::imageops::crop_imm(frame, left, top, edge, edge).to_image();
-                store.offer(topic, patch, score, t_s, place);
+                let patch = image::imageops::crop_imm(frame, left, top, edge, edge).to_image().into();
+                let pixel_m = self.metres_per_pixel;
+                store.offer(topic, ExemplarPatch { patch, score, t_s, place, pixel_m });
             }
         }
     }

@@ -1,5 +1,6 @@
 //! The client behind `scenecast ctl`: it reads the state, writes files, and gives orders.
 
+mod book;
 mod changes;
 mod constraints;
 mod download;
@@ -10,6 +11,7 @@ mod session;
 mod settings;
 mod text;
 
+pub use book::{LabelChange, edit_label, mark, note, remove_mark, show_marks};
 pub use changes::{LogSelection, save_log, show_labels, show_log, show_status, watch};
 pub use constraints::{
     FenceFile, LIMITS, clear_fence, clear_limits, give_again, restore_orders, send_constraints, set_fence, set_limits,

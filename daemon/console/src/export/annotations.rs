@@ -27,8 +27,9 @@ pub(super) fn coco(cells: &MapCells) -> Result<Vec<u8>, String> {
         })
     };
     let caption = cells.caption.as_ref();
+    // The PNG of a map without cells has a pixel.
     let image = json!({
-        "id": 1, "file_name": "map.png", "width": width, "height": height, "date_captured": caption.map(|caption| &caption.utc),
+        "id": 1, "file_name": "map.png", "width": width.max(1), "height": height.max(1), "date_captured": caption.map(|caption| &caption.utc),
     });
     let file = json!({
         "info": { "description": caption.map(MapCaption::title) },

@@ -34,8 +34,8 @@ pub struct MapCells {
     pub book: LabelBook,
     /// Which labels become one at coarser cuts, if that is known.
     pub tree: Option<LabelTree>,
-    /// The markers that the operator has put on the map.
-    pub markers: Vec<VehicleMarker>,
+    /// The markers that the operator has put on the map, each with its moment in UTC, where that is known.
+    pub markers: Vec<(VehicleMarker, Option<String>)>,
     /// Whose map it is, and of when; `None` where that is not known.
     pub caption: Option<MapCaption>,
     pub(crate) tiles: Tiles,
@@ -45,10 +45,14 @@ pub struct MapCells {
 /// What a file of a map says of itself.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct MapCaption {
+    /// The name of the mission; empty where it is not known.
+    pub mission: String,
     /// The address of the vehicle.
     pub address: u8,
     /// Its name, which may be empty.
     pub name: String,
+    /// The epoch, in which no label number changes its meaning.
+    pub epoch: u8,
     /// The moment of the map in UTC, as in RFC 3339.
     pub utc: String,
     /// Whose knowledge it is; a surface has that of the operator.
@@ -57,8 +61,10 @@ pub struct MapCaption {
 
 impl MapCaption {
     /// What it says, by key.
-    pub(super) fn facts(&self) -> [(&'static str, String); 4] {
+    pub(super) fn facts(&self) -> [(&'static str, String); 6] {
         [
+            ("mission", self.mission.clone()),
+            ("epoch", self.epoch.to_string()),
             ("vehicle", self.address.to_string()),
             ("vehicle_name", self.name.clone()),
             ("utc", self.utc.clone()),

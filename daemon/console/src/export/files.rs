@@ -121,15 +121,16 @@ pub(super) fn geojson(cells: &MapCells, origin: Option<Origin>) -> String {
     }
     let mut facts = json!({ "map_version": cells.version, "mission_time_s": crate::snapshot::seconds(cells.at) });
     if let Some(caption) = &cells.caption {
+        (facts["mission"], facts["epoch"]) = (caption.mission.as_str().into(), caption.epoch.into());
         (facts["vehicle"], facts["vehicle_name"]) = (caption.address.into(), caption.name.as_str().into());
         facts["utc"] = caption.utc.as_str().into();
         facts["known_by"] = caption.side.name().into();
     }
-    let marker = |m: &VehicleMarker| {
+    let marker = |(m, utc): &(VehicleMarker, Option<String>)| {
         json!({
             "type": "Feature",
             "id": format!("marker-{}", m.number),
-            "properties": { "marker": m.text, "author": m.author, "mission_time_s": m.at_s },
+            "properties": { "marker": m.text, "author": m.author, "mission_time_s": m.at_s, "utc": utc },
             "geometry": { "type": "Point", "coordinates": position((m.x_m, m.y_m), side_of((m.x_m, m.y_m))) },
         })
     };

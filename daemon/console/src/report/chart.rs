@@ -76,6 +76,22 @@ fn round_length(length: f64) -> f64 {
     [5.0, 2.0, 1.0].into_iter().map(|n| n * power).find(|n| *n <= length * 1.000_001).unwrap_or(power)
 }
 
+/// The scale bar below an image that is so wide on the sea floor: a round length of at most half of the width.
+pub(super) fn scale_of_image(width_m: f64) -> String {
+    let length_m = round_length(width_m / 2.0);
+    let bar = 130.0 * length_m / width_m;
+    let length = match length_m {
+        m if m < 0.0095 => format!("{:.0} mm", m * 1000.0),
+        m if m < 0.95 => format!("{:.0} cm", m * 100.0),
+        m => format!("{m:.0} m"),
+    };
+    format!(
+        "<svg viewBox=\"0 0 130 14\" role=\"img\" aria-label=\"scale\"><path class=\"scale\" d=\"M1 3v6h{bar:.1}v-6\"/>\
+         <text x=\"{:.1}\" y=\"11\">{length}</text></svg>",
+        bar + 6.0
+    )
+}
+
 /// The class of each cell of a part of the map, row by row from the south; 0 is none.
 fn classes(Rect { x, y, width, height }: Rect, state: &VehicleState, vehicle: &DiveVehicle) -> Vec<u8> {
     let labels = vehicle.labels.copy_area(i64::from(x), i64::from(y), width as usize, height as usize);

@@ -86,7 +86,7 @@ impl Dive {
                 legend(state, vehicle)
             );
         }
-        classes(page, state, vehicle);
+        classes(page, self, state, vehicle);
         notes(page, self, state);
         orders(page, self, state, vehicle);
         steering(page, self, state, vehicle);
@@ -205,7 +205,7 @@ impl Dive {
     }
 }
 
-fn classes(page: &mut String, state: &VehicleState, vehicle: &DiveVehicle) {
+fn classes(page: &mut String, dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) {
     let all: u64 = vehicle.classes.iter().map(|class| class.cells).sum();
     if all == 0 {
         return;
@@ -225,7 +225,7 @@ fn classes(page: &mut String, state: &VehicleState, vehicle: &DiveVehicle) {
             words::area(class.area_m2),
             words::interval(class.interval_m2),
             class.cells as f64 / all as f64 * 100.0,
-            images(state, vehicle, class.label)
+            images(dive, state, vehicle, class.label)
         );
     }
     let _ = writeln!(page, "</table>\n<p>{}</p>", words::of_intervals(&vehicle.classes));
@@ -249,17 +249,27 @@ fn merged(state: &VehicleState, vehicle: &DiveVehicle, class: u8) -> String {
     if labels.len() < 2 { String::new() } else { format!(" (labels {})", labels.join(", ")) }
 }
 
-/// The largest images of a class, each with its label and time.
-fn images(state: &VehicleState, vehicle: &DiveVehicle, class: u8) -> String {
+/// The largest images of a class, each with its label, time, place and scale.
+fn images(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle, class: u8) -> String {
     let of_class = |label: u8| state.label_book.shown_as(label) == class;
     let mut found: Vec<_> = vehicle.exemplars.iter().filter(|(_, exemplar)| of_class(exemplar.label)).collect();
     found.sort_by_key(|(_, exemplar)| std::cmp::Reverse(exemplar.data.len()));
     let image = |(at_s, exemplar): &&(f64, scenecast_messages::scenecast_msgs::Exemplar)| {
         let kind = if exemplar.format == "webp" { "webp" } else { "jpeg" };
+        let taken = match exemplar.taken.nanos() {
+            0 => format!("received {}", utc_text(*at_s)),
+            nanos => utc_text(nanos as f64 / 1e9),
+        };
+        let (middle, is_placed) = (&exemplar.middle, exemplar.width_m > 0.0);
+        let place = || {
+            let on_earth = words::on_earth(dive, (middle.x, middle.y));
+            format!("<br>{:.1} m east, {:.1} m north{on_earth}", middle.x, middle.y)
+        };
         format!(
-            "<figure><img alt=\"label {label}\" src=\"data:image/{kind};base64,{}\"><figcaption>label {label}, {}</figcaption></figure>",
+            "<figure><img alt=\"label {label}\" src=\"data:image/{kind};base64,{}\">{}<figcaption>label {label}, {taken}{}</figcaption></figure>",
             BASE64_STANDARD.encode(&exemplar.data),
-            utc_text(*at_s),
+            if is_placed { chart::scale_of_image(exemplar.width_m) } else { String::new() },
+            if is_placed { place() } else { String::new() },
             label = exemplar.label
         )
     };

@@ -8,12 +8,19 @@ use scenecast_protocol::link::PeerView;
 use scenecast_protocol::wire::Address;
 use scenecast_surface::{ExemplarCache, RequestState, StoredExemplar, VehicleRecord};
 
-pub(super) fn progress(label: u8, record: &VehicleRecord, view: &PeerView<'_>, address: Address) -> ExemplarProgress {
+/// `shift_m` moves places of the vehicle's map frame into the world frame.
+pub(super) fn progress(
+    label: u8,
+    record: &VehicleRecord,
+    view: &PeerView<'_>,
+    address: Address,
+    shift_m: (f64, f64),
+) -> ExemplarProgress {
     let entry = record.exemplars.label(label);
     let request = entry.and_then(|entry| entry.request);
     let base = format!("/api/v2/vehicles/{}/exemplars/{label}", address.number());
     let images: Vec<ExemplarImage> =
-        entry.into_iter().flat_map(|entry| &entry.stored).map(|p| image(p, &base)).collect();
+        entry.into_iter().flat_map(|entry| &entry.stored).map(|p| image(p, &base, shift_m)).collect();
     let latest = images.last();
     let (state, progress, bytes) = match request.map(|r| r.state) {
         None if latest.is_some() => (ExemplarStage::Received, 1.0, None),
@@ -42,7 +49,9 @@ pub(super) fn none() -> ExemplarProgress {
     ExemplarProgress { state, progress: 0.0, bytes: None, url: None, at_s: None, images }
 }
 
-fn image(p: &StoredExemplar, base: &str) -> ExemplarImage {
+fn image(p: &StoredExemplar, base: &str, shift_m: (f64, f64)) -> ExemplarImage {
+    let width_m = (p.view.width_mm > 0).then(|| f64::from(p.view.width_mm) / 1000.0);
+    let (east_m, north_m) = p.view.middle_m();
     ExemplarImage {
         number: p.number,
         edge_px: edge_px(p.size),
@@ -50,6 +59,10 @@ fn image(p: &StoredExemplar, base: &str) -> ExemplarImage {
         bytes: p.sent_bytes,
         url: format!("{base}-{}.webp", p.number),
         at_s: seconds(p.received),
+        taken_s: p.taken.map(seconds),
+        width_m,
+        x_m: width_m.map(|_| east_m + shift_m.0),
+        y_m: width_m.map(|_| north_m + shift_m.1),
         requested: p.requested,
     }
 }

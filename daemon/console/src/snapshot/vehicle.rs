@@ -262,6 +262,8 @@ fn label(
     // Weights and images belong to the labels of the current epoch.
     let is_current = record.earlier_map().is_none_or(|earlier| earlier.epoch == record.epoch);
     let cell_m = view.cell_m().unwrap_or(facts.cell_m);
+    let placement = record.status(view).and_then(|(status, _)| status.placement).map(facts::placement);
+    let shift_m = placement.map_or((0.0, 0.0), |placement| (placement.east_m, placement.north_m));
     MapLabel {
         id,
         cells,
@@ -269,7 +271,7 @@ fn label(
         gained_m2: if is_current { record.gains.gained(id, cells) as f64 * cell_m * cell_m } else { 0.0 },
         weight: if is_current { record.weight(id) } else { 0.0 },
         exemplar: match is_current {
-            true => exemplar::progress(id, record, view, address),
+            true => exemplar::progress(id, record, view, address, shift_m),
             false => exemplar::none(),
         },
         book: record.label_book(id).cloned().unwrap_or_default(),

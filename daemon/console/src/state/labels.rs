@@ -81,6 +81,18 @@ pub struct ExemplarImage {
     pub url: String,
     /// Mission time of its arrival, seconds.
     pub at_s: f64,
+    /// Mission time at which it was taken, seconds; null where it is not known.
+    #[serde(default)]
+    pub taken_s: Option<f64>,
+    /// How wide it is on the sea floor, metres; null where it is not known.
+    #[serde(default)]
+    pub width_m: Option<f64>,
+    /// Its middle in the world frame, metres east of the origin; null where it is not known.
+    #[serde(default)]
+    pub x_m: Option<f64>,
+    /// The same, metres north.
+    #[serde(default)]
+    pub y_m: Option<f64>,
     /// Whether it was requested; otherwise the vehicle sent it with spare capacity.
     pub requested: bool,
 }

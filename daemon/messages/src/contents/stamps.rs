@@ -118,7 +118,7 @@ mod tests {
     }
 
     #[test]
-    fn what_has_happened_keeps_its_stamp_when_the_mission_slows_down_or_stands_still() {
+    fn a_stamp_stays_when_the_mission_slows_down_or_stops() {
         let mut stamps = Stamps::new(0.0, 20.0, 1000 * SECOND);
         let at = |second: i64| 1000 * SECOND + second * SECOND;
         (1..=10).for_each(|second| stamps.observe(20.0 * second as f64, at(second)));

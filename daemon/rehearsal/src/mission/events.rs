@@ -211,7 +211,7 @@ impl Mission {
         });
         let update = self.mapper.handle_frame(&frame.placed(&placed), t_s);
         self.vehicle.handle_map(&update, now);
-        self.vehicle.handle_exemplars(self.mapper.shared_exemplars());
+        self.vehicle.handle_exemplars(self.mapper.shared_exemplars(), now);
         self.logbook.note_update(self.vehicle.vehicle(), update);
         Ok(())
     }

@@ -12,6 +12,7 @@ use scenecast_files::RecordEntry;
 use scenecast_host::FrameEvent;
 use scenecast_messages::Message;
 use scenecast_messages::contents::{Stamps, WORLD_FRAME, header, pose};
+use scenecast_messages::geometry_msgs::Point;
 use scenecast_messages::scenecast_msgs::{Event, Exemplar};
 use scenecast_messages::std_msgs::Text;
 use scenecast_protocol::map::{LayerDescriptor, LayerId, StateReplica};
@@ -284,6 +285,9 @@ impl RecordedVehicle {
                     label: label.id,
                     image: image.number,
                     name: label.book.name.clone().unwrap_or_default(),
+                    taken: image.taken_s.map(|taken_s| stamps.at(taken_s)).unwrap_or_default(),
+                    width_m: image.width_m.unwrap_or(f64::NAN),
+                    middle: Point { x: image.x_m.unwrap_or(f64::NAN), y: image.y_m.unwrap_or(f64::NAN), z: f64::NAN },
                     format: "webp".to_owned(),
                     data: stored.webp.clone(),
                 };

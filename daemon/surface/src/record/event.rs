@@ -219,6 +219,11 @@ pub struct StoredImage {
     pub sent_bytes: u32,
     pub received: u64,
     pub requested: bool,
+    pub width_mm: u16,
+    /// Decimetres east and north in the vehicle's map frame.
+    pub middle_dm: (i32, i32),
+    /// When it was taken, if that is known.
+    pub taken: Option<u64>,
 }
 
 /// An open request for an image.

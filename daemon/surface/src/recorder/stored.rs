@@ -8,6 +8,7 @@ use scenecast_protocol::directive::{
     Areas, Destination, ExemplarRequest, Fence, Limits, OrderStatus, RefusalReason, Settings, Slot, SlotProgress,
     Utility, VersionedSlot, Withdrawal,
 };
+use scenecast_protocol::exemplar::ExemplarView;
 use scenecast_protocol::link::PeerView;
 use scenecast_protocol::time::Instant;
 
@@ -167,6 +168,9 @@ pub(super) fn image(exemplar: &StoredExemplar) -> StoredImage {
         sent_bytes: exemplar.sent_bytes as u32,
         received: exemplar.received.as_micros(),
         requested: exemplar.requested,
+        width_mm: exemplar.view.width_mm,
+        middle_dm: (exemplar.view.east_dm, exemplar.view.north_dm),
+        taken: exemplar.taken.map(Instant::as_micros),
     }
 }
 
@@ -178,6 +182,13 @@ pub(super) fn exemplar(image: &StoredImage) -> StoredExemplar {
         sent_bytes: image.sent_bytes as usize,
         received: Instant::from_micros(image.received),
         requested: image.requested,
+        view: ExemplarView {
+            width_mm: image.width_mm,
+            east_dm: image.middle_dm.0,
+            north_dm: image.middle_dm.1,
+            clock_ms: None,
+        },
+        taken: image.taken.map(Instant::from_micros),
     }
 }
 

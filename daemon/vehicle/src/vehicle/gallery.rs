@@ -2,16 +2,15 @@
 
 use crate::SharedExemplars;
 use crate::exemplar::{GOOD_SSIM, compress_to, middle};
-use image::RgbImage;
 use scene_model::exemplars::ExemplarPatch;
 use scenecast_protocol::directive::Series;
 use scenecast_protocol::directive::{ExemplarRequest, ExemplarRequests};
-use scenecast_protocol::exemplar::{Exemplar, max_bytes};
+use scenecast_protocol::exemplar::{Exemplar, ExemplarView, edge_px, max_bytes};
 use scenecast_protocol::link::VehicleLink;
 use scenecast_protocol::object::ObjectId;
 use scenecast_protocol::schedule::BackgroundStream;
+use scenecast_protocol::time::Instant;
 use std::collections::{BTreeMap, BTreeSet};
-use std::sync::Arc;
 
 /// Sent exemplars of a label that are remembered.
 const MAX_SHOWN: usize = 8;
@@ -118,17 +117,17 @@ impl Gallery {
 
     /// Sends the requested exemplars that exist. Without a request it sends one of a label of which the surface has
     /// none, the label with the greatest weight first.
-    pub(super) fn serve(&mut self, epoch: u8, weight: impl Fn(u8) -> f64, link: &mut VehicleLink) {
+    pub(super) fn serve(&mut self, epoch: u8, weight: impl Fn(u8) -> f64, link: &mut VehicleLink, now: Instant) {
         for request in self.requests.wanted.clone() {
-            self.reply(request, epoch, link);
+            self.reply(request, epoch, link, now);
         }
         if self.unrequested.is_none() && !self.has_open_request() && link.background().has(BackgroundStream::Exemplars)
         {
-            self.show_unrequested(epoch, weight, link);
+            self.show_unrequested(epoch, weight, link, now);
         }
     }
 
-    fn reply(&mut self, request: ExemplarRequest, epoch: u8, link: &mut VehicleLink) {
+    fn reply(&mut self, request: ExemplarRequest, epoch: u8, link: &mut VehicleLink, now: Instant) {
         let before = self.replies.iter().position(|a| a.request == request);
         let was_none = before.and_then(|at| self.replies.get(at)).map(|a| a.number == 0);
         let chosen = if was_none == Some(false) { None } else { self.choose(request) };
@@ -139,9 +138,8 @@ impl Gallery {
             let Reply { object, .. } = self.replies.remove(at);
             object.into_iter().for_each(|id| link.cancel_object(id));
         }
-        let head = Exemplar { epoch, label: request.label, serial: request.serial, size: 0, picture: 0, bytes: vec![] };
-        let exemplar =
-            chosen.as_ref().and_then(|(n, p)| fill(head.clone(), *n, &p.patch, request.size)).unwrap_or(head);
+        let head = head(epoch, request.label, request.serial);
+        let exemplar = chosen.as_ref().and_then(|(n, p)| fill(head.clone(), *n, p, request.size, now)).unwrap_or(head);
         let Some(object) = link.push_object(exemplar.encode()) else { return };
         self.replies.push(Reply { request, number: exemplar.picture, object: Some(object) });
         if let Some((number, picture)) = chosen {
@@ -149,7 +147,7 @@ impl Gallery {
         }
     }
 
-    fn show_unrequested(&mut self, epoch: u8, weight: impl Fn(u8) -> f64, link: &mut VehicleLink) {
+    fn show_unrequested(&mut self, epoch: u8, weight: impl Fn(u8) -> f64, link: &mut VehicleLink, now: Instant) {
         let unseen = self.exemplars.keys().filter(|label| !self.seen.contains(label));
         let Some(label) = unseen.copied().max_by(|&a, &b| weight(a).total_cmp(&weight(b)).then(b.cmp(&a))) else {
             return;
@@ -157,8 +155,8 @@ impl Gallery {
         let Some((number, picture)) = self.choose(ExemplarRequest { label, ..ExemplarRequest::default() }) else {
             return;
         };
-        let head = Exemplar { epoch, label, serial: 0, size: 0, picture: 0, bytes: Vec::new() };
-        let Some(exemplar) = fill(head, number, &picture.patch, 0) else { return };
+        let head = head(epoch, label, 0);
+        let Some(exemplar) = fill(head, number, &picture, 0, now) else { return };
         self.note_shown(label, number, picture);
         let object = link.push_background_object(exemplar.encode());
         self.unrequested = object.map(|object| Unrequested { label, number, object });
@@ -226,8 +224,15 @@ fn is_same(a: &ExemplarPatch, b: &ExemplarPatch) -> bool {
 }
 
 /// The object of an exemplar in at most the requested size class; `None` if it cannot be compressed.
-fn fill(head: Exemplar, picture: u8, patch: &Arc<RgbImage>, size: u8) -> Option<Exemplar> {
-    let (size, image) = middle(patch, size)?;
+fn fill(head: Exemplar, number: u8, picture: &ExemplarPatch, size: u8, now: Instant) -> Option<Exemplar> {
+    let (size, image) = middle(&picture.patch, size)?;
     let bytes = compress_to(&image, GOOD_SSIM, max_bytes(size))?.bytes;
-    Some(Exemplar { size, picture, bytes, ..head })
+    let width_m = f64::from(edge_px(size)) * picture.pixel_m;
+    let view = ExemplarView::new(width_m, picture.place, Instant::from_secs_f64(picture.t_s), now);
+    Some(Exemplar { size, picture: number, view, bytes, ..head })
+}
+
+/// An exemplar of a label without an image, which answers a request with this serial number.
+fn head(epoch: u8, label: u8, serial: u8) -> Exemplar {
+    Exemplar { epoch, label, serial, size: 0, picture: 0, view: ExemplarView::default(), bytes: Vec::new() }
 }

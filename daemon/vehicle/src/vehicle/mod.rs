@@ -287,16 +287,16 @@ impl Vehicle {
     }
 
     /// Takes the best exemplars of each label, the best first.
-    pub fn handle_exemplars(&mut self, exemplars: SharedExemplars) {
+    pub fn handle_exemplars(&mut self, exemplars: SharedExemplars, now: Instant) {
         if let Some(exemplars) = self.storing.hold_exemplars(exemplars) {
             self.gallery.set_exemplars(exemplars);
-            self.serve_exemplars();
+            self.serve_exemplars(now);
         }
     }
 
-    fn serve_exemplars(&mut self) {
+    fn serve_exemplars(&mut self, now: Instant) {
         let Self { weights, gallery, link, storing, .. } = self;
-        gallery.serve(storing.epoch(), |label| weights.weight(label), link);
+        gallery.serve(storing.epoch(), |label| weights.weight(label), link, now);
     }
 
     pub fn handle_frame(&mut self, bytes: &[u8], now: Instant) {
@@ -309,10 +309,10 @@ impl Vehicle {
                 VehicleEvent::Slot { id, version, content } => self.handle_slot(id, version, content, now),
                 VehicleEvent::ObjectDelivered(id) => {
                     self.gallery.handle_delivered(id);
-                    self.serve_exemplars();
+                    self.serve_exemplars(now);
                 }
                 VehicleEvent::SurfaceMet => self.handle_meeting(),
-                VehicleEvent::SurfaceRestarted => self.handle_surface_restart(),
+                VehicleEvent::SurfaceRestarted => self.handle_surface_restart(now),
                 VehicleEvent::NextKey(key) => {
                     tracing::info!(
                         "the surface gives the next key, of the mission key with fingerprint {:08x}",
@@ -344,10 +344,10 @@ impl Vehicle {
     }
 
     /// Everything that was in flight is lost.
-    fn handle_surface_restart(&mut self) {
+    fn handle_surface_restart(&mut self, now: Instant) {
         self.gallery.handle_restart(&mut self.link);
         self.link.cancel_objects();
-        self.serve_exemplars();
+        self.serve_exemplars(now);
     }
 
     /// Chooses a waypoint if there is none or the last one is reached, or carries out the reaction of the failsafe.
@@ -407,7 +407,7 @@ impl Vehicle {
             }
             self.publish(&update, at);
             if let Some(exemplars) = exemplars {
-                self.handle_exemplars(exemplars);
+                self.handle_exemplars(exemplars, at);
             }
         }
         self.publisher.handle_stored(self.storing.labels(), &mut self.link);

@@ -120,7 +120,7 @@ impl Vehicle {
                 Ok(())
             }
             Slot::Budget(_) => Err(RefusalReason::OutOfRange),
-            Slot::Requests(requests) => self.apply_requests(requests),
+            Slot::Requests(requests) => self.apply_requests(requests, now),
             Slot::Limits(limits) => self.apply_limits(limits),
             Slot::Fence(fence) => self.apply_fence(&fence),
             Slot::Fix(fix) => self.apply_fix(fix, now),
@@ -129,7 +129,7 @@ impl Vehicle {
         }
     }
 
-    fn apply_requests(&mut self, requests: ExemplarRequests) -> Result<(), RefusalReason> {
+    fn apply_requests(&mut self, requests: ExemplarRequests, now: Instant) -> Result<(), RefusalReason> {
         if requests.epoch != self.storing.epoch() {
             return Err(RefusalReason::OtherEpoch);
         }
@@ -141,7 +141,7 @@ impl Vehicle {
         }
         let series = self.link.persistent_state().series();
         self.gallery.replace_requests(requests, series, &mut self.link);
-        self.serve_exemplars();
+        self.serve_exemplars(now);
         Ok(())
     }
 
@@ -270,7 +270,7 @@ impl Vehicle {
         if live(&self.link) != before {
             self.publisher.publish(&mut self.link, now);
         }
-        self.serve_exemplars();
+        self.serve_exemplars(now);
         self.durable.budget_bps = Some(budget.bits_per_s);
         self.durable.shares = Some(budget.shares.0);
         self.durable.background = Some(budget.background.to_bytes());

@@ -149,7 +149,7 @@ impl ExemplarBench {
         )?;
         let window = Duration::from_secs_f64(config.link.budget_window_s);
         let mut vehicle = VehicleHost::new(vehicle, channel_station(modem, window, now), None);
-        vehicle.handle_exemplars(Arc::new(gallery(patches)));
+        vehicle.handle_exemplars(Arc::new(gallery(patches)), now);
         Ok(Self {
             setting,
             now,
@@ -284,7 +284,7 @@ fn gallery(patches: &[RgbImage]) -> BTreeMap<u8, Vec<Picture>> {
     let picture = |label: u8, i: usize| {
         let at = usize::from(label) + i * usize::from(LABELS);
         let patch = usable.get(at % usable.len().max(1))?.clone();
-        Some(Picture { patch, score: 1.0, t_s: at as f64, place: (at as f64, 0.0) })
+        Some(Picture { patch, score: 1.0, t_s: at as f64, place: (at as f64, 0.0), pixel_m: 0.004 })
     };
     (1..=LABELS).map(|label| (label, (0..EACH).filter_map(|i| picture(label, i)).collect())).collect()
 }

@@ -88,13 +88,13 @@ fn a_cancelled_image_costs_no_more_bits() {
 fn a_vehicle_without_an_image_reports_so_and_sends_it_later() {
     let mut bench = bench(IDLE, 3);
     let gallery = bench.vehicle.vehicle().exemplars().clone();
-    bench.vehicle.handle_exemplars(Default::default());
+    bench.vehicle.handle_exemplars(Default::default(), bench.now);
     bench.surface.surface_mut().request_exemplar(bench.address, 2, RequestKind::Another, bench.now).unwrap();
     let until = bench.now + std::time::Duration::from_secs(120);
     assert!(bench.run_until(until, |w| state(w, 2) == Some(RequestState::NoneYet)));
     wait(&mut bench, 60.0);
     assert_eq!(state(&bench, 2), Some(RequestState::NoneYet));
-    bench.vehicle.handle_exemplars(gallery);
+    bench.vehicle.handle_exemplars(gallery, bench.now);
     assert!(bench.run_until(until, |w| w.page(2).unwrap().stored.len() == 1));
     assert_eq!(state(&bench, 2), None);
 }

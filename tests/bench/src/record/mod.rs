@@ -163,18 +163,19 @@ fn cut(
         std::fs::create_dir(&folder).map_err(|e| UserError::file(&folder, e))?;
         std::fs::write(part(&folder), bytes).map_err(|e| UserError::file(&folder, e))?;
         recover(&folder)?;
-        let (mut first, mut last) = (u64::MAX, 0);
-        let mut take = |nanos: u64| (first, last) = (first.min(nanos), last.max(nanos));
-        read_record(&folders[end], |message| take(message.nanos()))?;
-        let begin = first;
+        let mut written = Vec::new();
+        read_record(&folders[end], |message| written.push(message.nanos()))?;
+        let begin_s = moments.first().map_or(0.0, |moment| moment.at_s);
+        let begin = written.iter().min().copied().unwrap_or_default();
+        let cut = begin + ((moment.at_s - begin_s).max(0.0) * 1e9) as u64;
+        // While nothing happens, nothing is lost.
+        let last = written.into_iter().filter(|nanos| *nanos <= cut).max().unwrap_or(begin);
         let mut kept = 0;
         if let Some(damage) = read_record(&folder, |message| kept = kept.max(message.nanos()))? {
             return Err(UserError::file(&folder, format!("after recover: {damage}")));
         }
-        let begin_s = moments.first().map_or(0.0, |moment| moment.at_s);
-        let kept_s = kept.saturating_sub(begin) as f64 / 1e9 + begin_s;
         figures.cuts += 1;
-        figures.worst_lost_s = figures.worst_lost_s.max(moment.at_s - kept_s);
+        figures.worst_lost_s = figures.worst_lost_s.max(last.saturating_sub(kept) as f64 / 1e9);
         std::fs::remove_dir_all(&folder).map_err(|e| UserError::file(&folder, e))?;
     }
     Ok(())

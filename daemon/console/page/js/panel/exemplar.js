@@ -110,7 +110,25 @@ function figure(label, image, pending) {
   const larger = h("button", { type: "button", onclick: () => request(label, "larger", image.number), disabled: denial("order") !== null }, "Larger");
   show(larger, image.can_enlarge && !pending);
   larger.setAttribute("aria-label", `Larger: image ${image.number} of ${nameOf(label.id)}`);
+  const { taken_s: taken, width_m: width } = image;
+  const when = taken === null ? `received ${ago(ageOf(image.at_s))}` : `taken ${ago(ageOf(taken))}, received ${ago(ageOf(image.at_s))}`;
+  const where = width === null ? "" : `${metres(width)} wide, E ${image.x_m.toFixed(1)} N ${image.y_m.toFixed(1)} m; `;
   return h("figure", {},
     h("img.large", { src: `${image.url}?at=${image.at_s}`, alt: `Representative image of ${nameOf(label.id)}` }),
-    h("figcaption", {}, `${image.edge_px} px, ${bytes(image.bytes)}${unrequested}, received ${ago(ageOf(image.at_s))}. `, larger));
+    width === null ? "" : scale(width),
+    h("figcaption", {}, `${where}${image.edge_px} px, ${bytes(image.bytes)}${unrequested}, ${when}. `, larger));
+}
+
+/** A length of an image: centimetres below a metre. */
+function metres(m) {
+  return m < 0.995 ? `${Number((m * 100).toPrecision(2))} cm` : `${Number(m.toPrecision(2))} m`;
+}
+
+/** A scale bar below an image that is so wide: a round length of at most half of the width. */
+function scale(width) {
+  const power = 10 ** Math.floor(Math.log10(width / 2));
+  const length = [5, 2, 1].map((n) => n * power).find((m) => m <= (width / 2) * 1.000001) ?? power;
+  const bar = h("div.scale", {}, metres(length));
+  bar.style.width = `calc(min(320px, 80vw) * ${length / width})`;
+  return bar;
 }

@@ -7,7 +7,7 @@ use crate::http::response::{accepts_gzip, error, gzip, respond, tagged};
 use crate::http::shared::{CachedMap, MapCell, Shared, VehicleId};
 use crate::request::{Reply, SurfaceRequest};
 use crate::snapshot::seconds;
-use crate::state::{MapLabelTree, ReplaySide};
+use crate::state::{MapLabelTree, ReplaySide, VehicleMarker};
 use crate::tiles::TiledMap;
 use axum::Json;
 use axum::body::Bytes;
@@ -190,10 +190,13 @@ pub(in crate::http) async fn file(
         let vehicle = snapshot.vehicle(id);
         let book = vehicle.map(|v| v.label_book.clone()).unwrap_or_default();
         let tree = vehicle.and_then(|v| v.label_tree.as_ref()).and_then(MapLabelTree::tree);
-        let markers = vehicle.map(|v| v.markers.clone()).unwrap_or_default();
+        let dated = |m: &VehicleMarker| (m.clone(), Some(utc_at(&snapshot.stamps, m.at_s)));
+        let markers: Vec<_> = vehicle.iter().flat_map(|v| v.markers.iter().map(dated)).collect();
         let name = vehicle.map_or(String::new(), |v| v.name.clone());
         let side = snapshot.state.replay.as_ref().map_or(ReplaySide::Operator, |replay| replay.side);
-        let caption = MapCaption { address: id, name, utc: utc_at(&snapshot.stamps, seconds(at)), side };
+        let (mission, epoch) = (snapshot.state.mission.name.clone(), vehicle.map_or(0, |v| v.map.epoch));
+        let utc = utc_at(&snapshot.stamps, seconds(at));
+        let caption = MapCaption { mission, address: id, name, epoch, utc, side };
         let moved_m = vehicle.map_or((0.0, 0.0), |v| v.map.shift_m());
         (snapshot.state.mission.origin, moved_m, book, tree, markers, Some(caption))
     };
@@ -203,7 +206,7 @@ pub(in crate::http) async fn file(
     origin.map(|o| [o.lat_deg, o.lon_deg].map(f64::to_bits)).hash(&mut named);
     caption.as_ref().map(|c: &MapCaption| (&c.name, c.side.name())).hash(&mut named);
     (count, tree.as_ref().map(LabelTree::to_bytes)).hash(&mut named);
-    markers.iter().for_each(|m| (m.number, &m.text, m.at_s.to_bits()).hash(&mut named));
+    markers.iter().for_each(|(m, _)| (m.number, &m.text, m.at_s.to_bits()).hash(&mut named));
     let tag = format!("{id}-{}-{:x}", cached.map.tag(), named.finish());
     if is_held(&headers, &tag) {
         return tagged(&headers, &tag, || StatusCode::OK.into_response());

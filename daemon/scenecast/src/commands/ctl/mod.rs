@@ -1,9 +1,11 @@
 //! `scenecast ctl`
 
+mod book;
 mod command;
 mod constraints;
 mod places;
 
+use book::{LabelArgs, MarkCommand};
 use clap::builder::PossibleValuesParser;
 use clap::{Args, Subcommand};
 use command::CommandChange;
@@ -90,6 +92,22 @@ enum CtlCommand {
         /// Print the groups of labels where their tree is cut at this number, as with the slider of the page
         #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=254))]
         labels: Option<u8>,
+    },
+    /// Change name, colour or merging of a label; they stay at the surface, and are in every export.
+    #[command(after_help = "Example: scenecast ctl label 3 --name 'soft coral'
+         scenecast ctl label 5 --merge-into 'soft coral'")]
+    Label(LabelArgs),
+    /// Print the markers on the map, set one, or remove one; they stay at the surface, and are in the exports.
+    #[command(after_help = "Example: scenecast ctl mark set 12.5 -40 'lost anchor'")]
+    Mark {
+        #[command(subcommand)]
+        change: Option<MarkCommand>,
+    },
+    /// Add a note about the vehicle to the log and to the report.
+    #[command(after_help = "Example: scenecast ctl note 'turbid since noon'")]
+    Note {
+        /// At most 1000 characters
+        text: String,
     },
     /// Print the last weights sent, or send others.
     #[command(after_help = "Example: scenecast ctl utility set 3=0.8 5=-1 --exploration 0.2 --wait 120")]
@@ -366,6 +384,9 @@ impl CtlCommand {
             Self::Status => client::show_status(session).await,
             Self::Map { out, labels } => client::save_map(session, &out, labels).await,
             Self::Labels { labels } => client::show_labels(session, labels).await,
+            Self::Label(args) => book::label(session, args).await,
+            Self::Mark { change } => book::mark(session, change).await,
+            Self::Note { text } => client::note(session, text).await,
             Self::Utility { change: None } => client::show_utility(session).await,
             Self::Utility { change: Some(UtilityCommand::Set { weights, exploration, keep }) } => {
                 client::set_utility(session, &weights, exploration, keep).await
