@@ -88,6 +88,8 @@ fn a_report_says_what_the_record_has() {
         "<h2>How to cite</h2>",
         "rehearsal over a simulated sea floor",
         "have arrived by the end",
+        "aria-label=\"scale\"",
+        "<h3>Link over range</h3>",
     ] {
         assert!(page.contains(part), "{part}");
     }
@@ -95,6 +97,12 @@ fn a_report_says_what_the_record_has() {
         !page.contains("http://")
             || page.matches("http://").count() == page.matches("http://www.w3.org/2000/svg").count()
     );
+    let zip = dir.join("dive.zip");
+    report(&["--zip", zip.to_str().unwrap()]);
+    if let Some(python) = python("zipfile") {
+        let files: u32 = run_script(&python, "tests/read_report.py", &[zip.to_str().unwrap()]).trim().parse().unwrap();
+        assert!(files > 15, "{files}");
+    }
     assert_refused(&["report", dir.join("record_vehicle").to_str().unwrap()], &["no record of a surface"]);
     std::fs::remove_dir_all(dir).unwrap();
 }

@@ -120,6 +120,15 @@ pub fn changed_settings(program: &str, is_simulated: bool, config: &Config) -> S
         let is_command = value.as_str().is_some_and(|text| text.starts_with("command:"));
         (key.name.to_owned(), if is_command { json!("command:...") } else { json!(value) })
     };
+    // Names of files, addresses and topics of a computer say nothing about the mission.
+    let is_of_computer = |key: &&Key| {
+        let leaf = key.leaf();
+        ["_file", "_folder", "_dir", "listen", "address", "token", "device", "port"]
+            .iter()
+            .any(|end| leaf.ends_with(end))
+            || leaf == "folder"
+    };
+    let differs = |key: &&Key| differs(key) && !is_of_computer(key);
     let settings: Map<String, Value> = Key::all().filter(differs).map(told).collect();
     json!({ "program": program, "simulated": is_simulated, "settings": settings }).to_string()
 }

@@ -12,6 +12,7 @@ pub mod nmea;
 mod output;
 pub mod palette;
 mod principal;
+mod program;
 pub mod tuning_table;
 mod usbl_line;
 mod utc;
@@ -24,5 +25,6 @@ pub use modem_facts::{
 };
 pub use output::{UserError, printable, write_error, write_or_exit};
 pub use principal::{ClientName, Giver, Principal, Role};
+pub use program::{program, set_program};
 pub use usbl_line::{ModemAddress, UsblLine};
 pub use utc::utc_text;

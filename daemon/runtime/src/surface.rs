@@ -109,7 +109,8 @@ pub fn run_surface(load: Load, simulated: Option<SimulatedAutopilot>) -> Result<
         let (is_stale, reading) = (true, Arc::default());
         let budget = configured_budget(&config);
         let folder = config.runtime.state_dir.join("records");
-        let record = SurfaceRecord::start(&config, &config.surface.name, &folder, offers_key);
+        let record =
+            SurfaceRecord::start(&config, &config.surface.name, &folder, offers_key, host.surface().log().last());
         let shell = SurfaceShell {
             host,
             ports,

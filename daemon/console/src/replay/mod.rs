@@ -6,8 +6,8 @@ mod on_board;
 mod recording;
 
 pub(crate) use map::ShownMap;
-pub(crate) use recording::Known;
 pub use recording::Recording;
+pub(crate) use recording::{Known, StateText};
 
 use crate::export::MapCells;
 use crate::report::{Dive, HTML};

@@ -55,7 +55,21 @@ pub(crate) struct StateText {
 pub(super) struct StateHead {
     now_s: f64,
     mission: MissionHead,
+    #[serde(default)]
+    link: LinkHead,
     pub(super) vehicles: Vec<Loops>,
+}
+
+/// The numbers of frames in both directions, which begin again with each process of the surface.
+#[derive(Debug, Default, Deserialize)]
+struct LinkHead {
+    up: FrameCount,
+    down: FrameCount,
+}
+
+#[derive(Debug, Default, Deserialize)]
+struct FrameCount {
+    frames: u64,
 }
 
 #[derive(Debug, Deserialize)]
@@ -87,14 +101,16 @@ pub(crate) struct Known {
     pub(crate) map: MapHistory,
     pub(crate) exemplars: Vec<(u64, Exemplar)>,
     /// Frames of the vehicle that the surface received.
-    pub(super) heard: Vec<u64>,
+    pub(crate) heard: Vec<u64>,
     pub(crate) poses: Vec<(u64, PoseWithCovarianceStamped)>,
     /// What the vehicle says of itself.
-    pub(super) events: Vec<(u64, Event)>,
+    pub(crate) events: Vec<(u64, Event)>,
     /// Orders as they were given, and how far each had come.
     pub(crate) given: Vec<Order>,
     pub(crate) orders: Vec<OrderStatus>,
     pub(crate) link: Vec<(u64, Link)>,
+    /// Frames that the end of this record has transmitted, copies included.
+    pub(crate) sent: u64,
 }
 
 /// One record.
@@ -143,11 +159,12 @@ impl Recording {
         vehicles.sort_by_key(|record| record.span);
         for vehicle in vehicles {
             let shift = vehicle.frames.shift_to(&frames);
+            let sent = vehicle.counts[0];
             span = joined(span, vehicle.span, shift);
             vehicle
                 .known
                 .into_iter()
-                .for_each(|(part, known)| whole.vehicles.entry(part).or_default().add(known, shift));
+                .for_each(|(part, known)| whole.vehicles.entry(part).or_default().add(Known { sent, ..known }, shift));
         }
         // Before the first state the page would show nothing.
         whole.timeline.span = (whole.timeline.states.first().map_or(span.0, |first| first.nanos), span.1);
@@ -165,6 +182,18 @@ impl Timeline {
     /// The same as a moment.
     pub(crate) fn mission_time(&self, nanos: u64) -> Instant {
         Instant::from_secs_f64(self.mission_s(nanos))
+    }
+
+    /// The last state of each process of the surface but the last.
+    pub(crate) fn ends_of_runs(&self) -> impl Iterator<Item = &StateText> {
+        let is_end = |pair: &&[StateText]| match pair {
+            [a, b] => {
+                let (a, b) = (&a.head.link, &b.head.link);
+                b.up.frames < a.up.frames || b.down.frames < a.down.frames
+            }
+            _ => false,
+        };
+        self.states.windows(2).filter(is_end).filter_map(|pair| pair.first())
     }
 
     /// The last state up to a moment.
@@ -280,6 +309,7 @@ impl Known {
         self.map.add(later.map, moved);
         self.exemplars.extend(later.exemplars.into_iter().map(|(at, exemplar)| (moved(at), exemplar)));
         self.heard.extend(later.heard.into_iter().map(moved));
+        self.sent += later.sent;
         self.given.extend(later.given);
         self.orders.extend(later.orders);
         self.link.extend(later.link.into_iter().map(|(at, link)| (moved(at), link)));

@@ -44,7 +44,9 @@ pub(super) fn areas(map: &ShownMap, class: impl Fn(u8) -> u8) -> Vec<ClassArea> 
         area_m2: cells as f64 * square,
         interval_m2: doubted.as_ref().map(|doubted| {
             let (low, high) = interval(doubted, label, cells, &of_label);
-            (low * square, high * square)
+            // What is on the map may be more, or less, than the doubt lets expect: it is in the interval all the same.
+            let cells = cells as f64;
+            (low.min(cells) * square, high.max(cells) * square)
         }),
     };
     let mut areas: Vec<ClassArea> = cells.into_iter().map(area).collect();

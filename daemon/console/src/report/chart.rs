@@ -9,6 +9,8 @@ use std::fmt::Write;
 
 /// Width of a figure, pixels.
 const WIDTH: f64 = 760.0;
+/// Where nothing was measured for so long, a line over time has a gap, seconds.
+const MAX_GAP_S: f64 = 45.0;
 /// Characters of a marker's text on the map.
 const MAX_MARKER: usize = 30;
 
@@ -17,7 +19,10 @@ const MAX_MARKER: usize = 30;
 pub(super) fn map(state: &VehicleState, vehicle: &DiveVehicle) -> Option<String> {
     let bounds = vehicle.labels.bounds()?;
     let shift = state.map.shift_m();
-    let frame = Frame::around(bounds, vehicle.cell_m, shift);
+    let path = vehicle.path();
+    let places = path.iter().map(|point| (point.east_m, point.north_m));
+    let frame =
+        Frame::around(bounds, vehicle.cell_m, shift, places.chain(state.markers.iter().map(|m| (m.x_m, m.y_m))));
     let mut svg = format!(
         "<svg viewBox=\"0 0 {WIDTH} {:.0}\" role=\"img\" aria-label=\"map of the sea floor\" xmlns=\"http://www.w3.org/2000/svg\">\n",
         frame.height_px() + 40.0
@@ -25,10 +30,12 @@ pub(super) fn map(state: &VehicleState, vehicle: &DiveVehicle) -> Option<String>
     let classes = classes(bounds, state, vehicle);
     cells(&mut svg, &frame, bounds, &classes, state, vehicle);
     grid(&mut svg, &frame);
-    track(&mut svg, &frame, &vehicle.track);
+    fence(&mut svg, &frame, state);
+    track(&mut svg, &frame, path);
     numbers(&mut svg, &frame, bounds, &classes, state, vehicle);
     for marker in &state.markers {
-        let text: String = marker.text.chars().take(MAX_MARKER).collect();
+        let mut text: String = marker.text.chars().take(MAX_MARKER).collect();
+        text += if marker.text.chars().count() > MAX_MARKER { "\u{2026}" } else { "" };
         point(&mut svg, &frame, (marker.x_m, marker.y_m), &text);
     }
     scale(&mut svg, &frame);
@@ -46,10 +53,24 @@ struct Frame {
 }
 
 impl Frame {
-    fn around(Rect { x, y, width, height }: Rect, cell_m: f64, (east_m, north_m): (f64, f64)) -> Self {
+    /// The map, and places within its own size around it: one that is far away must not make the map small.
+    fn around(
+        Rect { x, y, width, height }: Rect,
+        cell_m: f64,
+        (east_m, north_m): (f64, f64),
+        places: impl Iterator<Item = (f64, f64)>,
+    ) -> Self {
         let west = f64::from(x) * cell_m + east_m;
         let south = f64::from(y) * cell_m + north_m;
         let (east, north) = (west + f64::from(width) * cell_m, south + f64::from(height) * cell_m);
+        let reach = (east - west).max(north - south);
+        let is_near = |(x, y): &(f64, f64)| {
+            (*x - x.clamp(west, east)).abs() <= reach && (*y - y.clamp(south, north)).abs() <= reach
+        };
+        let whole = places.filter(is_near).fold((west, south, east, north), |(west, south, east, north), (x, y)| {
+            (west.min(x), south.min(y), east.max(x), north.max(y))
+        });
+        let (west, south, east, north) = whole;
         // A narrow map gets room at its sides.
         let margin = ((north - south) * 0.6 - (east - west)).max(0.0) / 2.0 + 0.02 * (east - west);
         let (west, east) = (west - margin, east + margin);
@@ -71,7 +92,7 @@ impl Frame {
 }
 
 /// The next lower of 1, 2 and 5 times a power of ten.
-fn round_length(length: f64) -> f64 {
+pub(super) fn round_length(length: f64) -> f64 {
     let power = 10f64.powf(length.log10().floor());
     [5.0, 2.0, 1.0].into_iter().map(|n| n * power).find(|n| *n <= length * 1.000_001).unwrap_or(power)
 }
@@ -139,7 +160,7 @@ fn grid(svg: &mut String, frame: &Frame) {
         let _ = writeln!(
             svg,
             "<path class=\"grid\" d=\"M{x:.1} 0V{height:.1}\"/><text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"middle\">{east} m E</text>",
-            x.clamp(30.0, WIDTH - 60.0),
+            x.clamp(26.0, WIDTH - 26.0),
             height + 14.0
         );
     }
@@ -151,6 +172,19 @@ fn grid(svg: &mut String, frame: &Frame) {
             y - 3.0
         );
     }
+}
+
+/// Fence and keep-outs that were in force at the end, and where the vehicle returns to.
+fn fence(svg: &mut String, frame: &Frame, state: &VehicleState) {
+    let Some(order) = state.orders.fence_in_force.as_ref().map(|applied| &applied.order) else { return };
+    let mut outline = |corners: &[[f64; 2]], class: &str| {
+        let corners = corners.iter().map(|&[east_m, north_m]| frame.place(east_m, north_m));
+        let points: Vec<String> = corners.map(|(x, y)| format!("{x:.1},{y:.1}")).collect();
+        let _ = writeln!(svg, "<polygon class=\"{class}\" points=\"{}\"/>", points.join(" "));
+    };
+    order.fence.iter().for_each(|fence| outline(fence, "fence"));
+    order.keep_outs.iter().for_each(|keep_out| outline(keep_out, "out"));
+    order.return_point.iter().for_each(|&[east_m, north_m]| point(svg, frame, (east_m, north_m), "return"));
 }
 
 fn track(svg: &mut String, frame: &Frame, track: &[TrackPoint]) {
@@ -261,28 +295,33 @@ pub(super) fn line(series: &Series<'_>, begin_s: f64, length_s: f64) -> Option<S
     let top = round_height(most);
     let place = |&(at_s, value): &(f64, f64)| {
         let x = 60.0 + (at_s / length_s).clamp(0.0, 1.0) * (WIDTH - 70.0);
-        format!("{x:.1},{:.1}", HEIGHT - 20.0 - value / top * (HEIGHT - 34.0))
+        format!("{x:.1} {:.1}", HEIGHT - 20.0 - value / top * (HEIGHT - 42.0))
     };
-    let points: Vec<String> = known.iter().map(place).collect();
+    let most_apart_s = MAX_GAP_S.max(3.0 * length_s / known.len() as f64);
+    let lines = known.chunk_by(|a, b| b.0 - a.0 <= most_apart_s).map(|row| {
+        let points: Vec<String> = row.iter().map(place).collect();
+        // A point alone is a dot.
+        format!("M{}h0", points.join("L"))
+    });
+    let lines: String = lines.collect();
     Some(format!(
         "<svg viewBox=\"0 0 {WIDTH} {HEIGHT}\" role=\"img\" aria-label=\"{name} over time\" xmlns=\"http://www.w3.org/2000/svg\">\
-         <path class=\"grid\" d=\"M60 {bottom}H{WIDTH}M60 {middle}H{WIDTH}M60 14H{WIDTH}\"/><polyline class=\"line\" points=\"{}\"/>\
-         <text x=\"2\" y=\"{bottom}\">0</text><text x=\"2\" y=\"18\">{top}</text><text x=\"60\" y=\"11\">{name}, {unit}</text>\
-         <text x=\"60\" y=\"{low}\">{begin}</text><text x=\"{WIDTH}\" y=\"{low}\" text-anchor=\"end\">{end} UTC</text></svg>",
-        points.join(" "),
+         <path class=\"grid\" d=\"M60 {bottom}H{WIDTH}M60 {middle}H{WIDTH}M60 22H{WIDTH}\"/><path class=\"line\" stroke-linecap=\"round\" d=\"{lines}\"/>\
+         <text x=\"2\" y=\"{bottom}\">0</text><text x=\"2\" y=\"26\">{top}</text><text x=\"60\" y=\"11\">{name}, {unit}</text>\
+         <text x=\"60\" y=\"{low}\">{begin} UTC</text><text x=\"{WIDTH}\" y=\"{low}\" text-anchor=\"end\">{end} UTC</text></svg>",
         name = Escaped(series.name),
         unit = Escaped(series.unit),
         bottom = HEIGHT - 20.0,
-        middle = HEIGHT / 2.0 - 3.0,
+        middle = (HEIGHT - 20.0 + 22.0) / 2.0,
         low = HEIGHT - 4.0,
         begin = clock(begin_s),
         end = clock(begin_s + length_s)
     ))
 }
 
-/// Hours and minutes of a moment, UTC.
+/// Month, day, hours, minutes and seconds of a moment, UTC.
 fn clock(at_s: f64) -> String {
-    utc_text(at_s).get(11..16).unwrap_or_default().to_owned()
+    utc_text(at_s).get(5..19).unwrap_or_default().replace('T', " ")
 }
 
 /// The next higher of 1, 2 and 5 times a power of ten; 1 for nothing.

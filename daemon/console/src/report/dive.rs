@@ -2,9 +2,10 @@
 
 use super::areas::{ClassArea, areas};
 use super::words;
-use crate::replay::{Known, Recording, ShownMap};
-use crate::state::{MissionState, VehicleState};
-use scenecast_core::UserError;
+use crate::export::{MapCaption, MapCells};
+use crate::replay::{Known, Recording, ShownMap, StateText};
+use crate::state::{LinkDirection, LinkSummary, MapLabelTree, MissionState, ReplaySide, VehicleMarker, VehicleState};
+use scenecast_core::{UserError, utc_text};
 use scenecast_files::MissionClock;
 use scenecast_messages::contents::valid_part;
 use scenecast_messages::geometry_msgs::PoseWithCovarianceStamped;
@@ -28,7 +29,10 @@ pub struct Dive {
     pub state: MissionState,
     /// What is known of each vehicle, by the part of its topics.
     pub(super) vehicles: BTreeMap<String, DiveVehicle>,
+    /// The log of the surface, and modes and notes of the vehicles' own records, by time.
     pub(super) events: Vec<(f64, Event)>,
+    /// Begin and end of the times in which the surface recorded nothing.
+    pub(super) gaps_s: Vec<(f64, f64)>,
     /// Frames sent, received and dropped.
     pub(super) frames: [u64; 3],
     /// The mission times.
@@ -53,11 +57,21 @@ pub(super) struct SettingsRecord {
 pub(super) struct DiveVehicle {
     /// The labels of the operator's map at the end.
     pub(super) labels: LabelGrid,
+    /// The same with its layers, as files have it.
+    cells: Option<MapCells>,
+    epoch: u8,
+    /// When frames of it were received, seconds since 1970, and at the ends of the record.
+    pub(super) heard_s: Vec<f64>,
     /// The edge of a cell, metres.
     pub(super) cell_m: f64,
     /// The areas of the classes, the largest first.
     pub(super) classes: Vec<ClassArea>,
+    /// The places that it has reported.
     pub(super) track: Vec<TrackPoint>,
+    /// The places of its own record, in the world frame as its map lies at the end; empty without one.
+    pub(super) own_track: Vec<TrackPoint>,
+    /// Frames that it has transmitted, by its own record.
+    pub(super) sent: u64,
     /// The way of each order, by slot and version.
     pub(super) orders: BTreeMap<(String, u32), Vec<OrderStep>>,
     pub(super) given: BTreeMap<(String, u32), Order>,
@@ -114,8 +128,15 @@ impl Dive {
         let Some(last) = recording.timeline.states.last() else {
             return Err("no record of a surface: it has no topic /scenecast/state".to_owned());
         };
-        let state: MissionState =
-            serde_json::from_str(&last.json).map_err(|e| format!("/scenecast/state of the record: {e}"))?;
+        let read = |json: &str| {
+            serde_json::from_str::<MissionState>(json).map_err(|e| format!("/scenecast/state of the record: {e}"))
+        };
+        let mut state = read(&last.json)?;
+        for end in recording.timeline.ends_of_runs() {
+            let LinkSummary { up, down, .. } = read(&end.json)?.link;
+            state.link.up = sum(&state.link.up, &up);
+            state.link.down = sum(&state.link.down, &down);
+        }
         let (first, last) = recording.timeline.span;
         let mut vehicles = BTreeMap::new();
         for vehicle in &state.vehicles {
@@ -126,7 +147,8 @@ impl Dive {
             span_s: (seconds(first), seconds(last)),
             state,
             vehicles,
-            events: recording.log.iter().map(|(at, event)| (seconds(*at), event.clone())).collect(),
+            events: events(recording),
+            gaps_s: gaps(recording),
             frames: recording.frames,
             clock: recording.timeline.clock.clone(),
             settings: serde_json::from_str(&recording.settings).unwrap_or_default(),
@@ -143,6 +165,29 @@ impl Dive {
     pub(super) fn vehicles(&self) -> impl Iterator<Item = (&VehicleState, &DiveVehicle)> {
         let known = |state: &VehicleState| self.vehicles.get(&valid_part(&state.name));
         self.state.vehicles.iter().filter_map(move |state| Some((state, known(state)?)))
+    }
+
+    /// The map of a vehicle at the end as files have it, with what the operator has written on it.
+    pub(super) fn map_cells(&self, state: &VehicleState, vehicle: &DiveVehicle) -> MapCells {
+        let cells = vehicle.cells.clone().unwrap_or_else(|| MapCells::of_labels(&vehicle.labels, vehicle.cell_m));
+        let caption = MapCaption {
+            mission: self.state.mission.name.clone(),
+            address: state.id,
+            name: state.name.clone(),
+            epoch: vehicle.epoch,
+            utc: utc_text(self.span_s.1),
+            side: ReplaySide::Operator,
+        };
+        let dated = |marker: &VehicleMarker| (marker.clone(), Some(utc_text(self.unix_s(marker.at_s))));
+        MapCells {
+            version: state.map.version,
+            moved_m: state.map.shift_m(),
+            book: state.label_book.clone(),
+            tree: state.label_tree.as_ref().and_then(MapLabelTree::tree),
+            markers: state.markers.iter().map(dated).collect(),
+            caption: Some(caption),
+            ..cells
+        }
     }
 
     /// Who gave an order to a vehicle, and what it was: by the log, which has the words of the page, or else by its content.
@@ -179,15 +224,27 @@ impl DiveVehicle {
     /// What a recording says about a vehicle with this part of topics; `None` if it has nothing.
     fn of(recording: &mut Recording, state: &VehicleState, part: &str) -> Option<Self> {
         let maps = maps_over_time(recording, part);
-        let Recording { timeline, operator, .. } = recording;
+        let Recording { timeline, operator, vehicles, .. } = recording;
+        let own = vehicles.get(part);
+        let shift = state.map.shift_m();
+        let moved = |(at, pose): &(u64, PoseWithCovarianceStamped)| {
+            let point = TrackPoint::of(pose);
+            let (east_m, north_m) = (point.east_m + shift.0, point.north_m + shift.1);
+            TrackPoint { at_s: seconds(*at), east_m, north_m, ..point }
+        };
         let known = operator.get_mut(part)?;
         known.map.seek(u64::MAX, |nanos| timeline.mission_time(nanos));
         let shown = known.map.shown();
         let mut vehicle = Self {
             labels: shown.labels.shown().clone(),
+            cells: Some(shown.cells(0, timeline.mission_time(timeline.span.1))),
+            epoch: shown.epoch,
+            heard_s: known.heard.iter().copied().chain([timeline.span.1]).map(seconds).collect(),
             cell_m: shown.cell_m,
             classes: areas(shown, |label| state.label_book.shown_as(label)),
             track: known.poses.iter().map(|(_, pose)| TrackPoint::of(pose)).collect(),
+            own_track: own.iter().flat_map(|own| own.poses.iter().map(moved)).collect(),
+            sent: own.map_or(0, |own| own.sent),
             link: known.link.iter().map(|(at, link)| (seconds(*at), link.clone())).collect(),
             maps,
             ..Self::default()
@@ -195,7 +252,16 @@ impl DiveVehicle {
         // Of an earlier epoch, their numbers mean something else.
         let is_current = |exemplar: &Exemplar| exemplar.epoch == u32::from(shown.epoch);
         let exemplars = known.exemplars.iter().filter(|(_, exemplar)| is_current(exemplar));
-        vehicle.exemplars = exemplars.map(|(at, exemplar)| (seconds(*at), exemplar.clone())).collect();
+        for (at, exemplar) in exemplars {
+            // A surface that was restarted has recorded again what it knew.
+            let is_same = |other: &Exemplar| {
+                (other.label, other.image, &other.data) == (exemplar.label, exemplar.image, &exemplar.data)
+            };
+            if !vehicle.exemplars.iter().any(|(_, other)| is_same(other)) {
+                let received = exemplar.header.stamp.nanos().max(0) as u64;
+                vehicle.exemplars.push((seconds(if received == 0 { *at } else { received }), exemplar.clone()));
+            }
+        }
         vehicle.given = known.given.iter().map(|order| ((order.slot.clone(), order.version), order.clone())).collect();
         known.orders.iter().for_each(|status| vehicle.take_order(status));
         Some(vehicle)
@@ -221,14 +287,66 @@ impl DiveVehicle {
         self.orders.iter().filter(|((slot, _), _)| slot != SlotId::Fix.name())
     }
 
-    /// Length of the reported track, metres.
+    /// The places of its own record, or else those that it has reported.
+    pub(super) fn path(&self) -> &[TrackPoint] {
+        if self.own_track.len() > 1 { &self.own_track } else { &self.track }
+    }
+
+    /// The label that a place in the world frame has on the map at the end; 0 without one.
+    pub(super) fn label_at(&self, (shift_east_m, shift_north_m): (f64, f64), east_m: f64, north_m: f64) -> u8 {
+        let index = |m: f64| (m / self.cell_m).floor() as i32;
+        self.labels.get(Cell::new(index(east_m - shift_east_m), index(north_m - shift_north_m)))
+    }
+
+    /// Length of its path, metres: at least so far, where only reports tell it.
     pub(super) fn distance_m(&self) -> f64 {
         let step = |pair: &[TrackPoint]| match pair {
             [a, b] => (b.east_m - a.east_m).hypot(b.north_m - a.north_m),
             _ => 0.0,
         };
-        self.track.windows(2).map(step).sum()
+        self.path().windows(2).map(step).sum()
     }
+}
+
+/// Two counts of one direction as one.
+fn sum(a: &LinkDirection, b: &LinkDirection) -> LinkDirection {
+    let (frames, lost) = (a.frames + b.frames, a.lost + b.lost);
+    let mut bytes_by_class = a.bytes_by_class.clone();
+    b.bytes_by_class.iter().for_each(|(class, bytes)| *bytes_by_class.entry(class.clone()).or_default() += bytes);
+    let energy_j = a.energy_j.zip(b.energy_j).map(|(a, b)| a + b);
+    LinkDirection { frames, lost, loss: lost as f64 / frames.max(1) as f64, bytes_by_class, energy_j, ..a.clone() }
+}
+
+/// The entries of the surface's log at the times at which they happened, each once, and what vehicles have recorded themselves.
+fn events(recording: &Recording) -> Vec<(f64, Event)> {
+    let happened = |at: u64, event: &Event| match event.header.stamp.nanos() {
+        0 => seconds(at),
+        nanos => nanos as f64 / 1e9,
+    };
+    let mut events: Vec<(f64, Event)> =
+        recording.log.iter().map(|(at, event)| (happened(*at, event), event.clone())).collect();
+    for known in recording.vehicles.values() {
+        let told = known.events.iter().filter(|(_, event)| event.source != "fix");
+        events.extend(told.map(|(at, event)| {
+            let source = format!("{}, on board", event.source);
+            (seconds(*at), Event { source, ..event.clone() })
+        }));
+    }
+    events.sort_by(|a, b| a.0.total_cmp(&b.0));
+    // A surface that was restarted may have recorded again what it knew.
+    events
+        .dedup_by(|a, b| a.0 == b.0 && a.1.text == b.1.text && a.1.source == b.1.source && a.1.vehicle == b.1.vehicle);
+    events
+}
+
+/// The times in which a surface that records its state every ten seconds recorded none.
+fn gaps(recording: &Recording) -> Vec<(f64, f64)> {
+    const LONGEST: u64 = 30_000_000_000;
+    let apart = |pair: &[StateText]| match pair {
+        [a, b] if b.nanos - a.nanos > LONGEST => Some((seconds(a.nanos), seconds(b.nanos))),
+        _ => None,
+    };
+    recording.timeline.states.windows(2).filter_map(apart).collect()
 }
 
 /// The maps at moments of the record.

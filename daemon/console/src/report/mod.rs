@@ -1,5 +1,6 @@
 //! The report of a dive: what a record of the surface says, as one page that needs no other file.
 
+mod archive;
 mod areas;
 mod chart;
 mod dive;

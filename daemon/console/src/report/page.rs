@@ -8,9 +8,10 @@ use crate::state::VehicleState;
 use base64::Engine;
 use base64::prelude::BASE64_STANDARD;
 use scenecast_core::utc_text;
+use scenecast_messages::scenecast_msgs::{Exemplar, Link};
 use scenecast_protocol::directive::SlotId;
 use serde_json::json;
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
 
 /// Images of a label in the report.
@@ -21,7 +22,7 @@ table{border-collapse:collapse;width:100%;font-size:.9em}th,td{text-align:left;v
 border-bottom:1px solid #ccc}td.n{text-align:right;white-space:nowrap}td.t{white-space:nowrap}figure{margin:1em 0}figcaption{font-size:.85em}svg{width:100%;height:auto}\
 svg text{font:11px system-ui,sans-serif}.grid{stroke:#000;stroke-opacity:.25;stroke-width:.6;fill:none}\
 .track{fill:none;stroke:#000;stroke-width:1.5;stroke-linejoin:round}.line{fill:none;stroke:#000;stroke-width:1.2}\
-.scale{fill:none;stroke:#000;stroke-width:1.5}.swatch{display:inline-block;width:1em;height:1em;border:1px solid #000;\
+thead{display:table-header-group}.swatch,svg{-webkit-print-color-adjust:exact;print-color-adjust:exact}thead tr{break-after:avoid}.fence{fill:none;stroke:#000;stroke-width:1.5;stroke-dasharray:6 3}.out{fill:#000;fill-opacity:.12;stroke:#000;stroke-dasharray:2 2}.scale{fill:none;stroke:#000;stroke-width:1.5}.swatch{display:inline-block;width:1em;height:1em;border:1px solid #000;\
 vertical-align:-.15em;margin-right:.4em}.images{display:flex;flex-wrap:wrap;gap:.6em}.images figure{margin:0}.images img{width:130px;display:block;\
 image-rendering:pixelated}.number{font-weight:600;paint-order:stroke;stroke:#fff;stroke-width:3px}\
 .point{fill:#fff;stroke:#000;stroke-width:1.5}.legend span{white-space:nowrap;margin-right:1em}\
@@ -60,7 +61,7 @@ impl Dive {
         let (mission, run) = (Escaped(&self.state.mission.name), Escaped(&self.state.mission.id));
         let recorded = if self.settings.program.is_empty() { "an earlier scenecast" } else { &self.settings.program };
         let names: Vec<&str> = self.state.vehicles.iter().map(|vehicle| vehicle.name.as_str()).collect();
-        let program = format!("scenecast {}", env!("CARGO_PKG_VERSION"));
+        let program = Escaped(scenecast_core::program());
         let _ = writeln!(
             page,
             "<h2>How this was made</h2>\n<p>By {program} from the record of the surface, run {run}, which {} wrote from {begin} to {end}. \
@@ -81,9 +82,13 @@ impl Dive {
             let _ = writeln!(
                 page,
                 "<figure class=\"map\">{map}<figcaption><div class=\"legend\">{}</div>The map of the operator at the end, each class with its \
-                 number, and the reported track: straight lines between the places that the vehicle has reported. Metres east and north of \
+                 number, and its track: {}. Dashed: fence and areas to stay out of that were in force at the end. Metres east and north of \
                  the mission's origin (WGS 84 where it has one); north is up.</figcaption></figure>",
-                legend(state, vehicle)
+                legend(state, vehicle),
+                match vehicle.own_track.len() {
+                    0 | 1 => "straight lines between the places that the vehicle has reported",
+                    _ => "by its own record",
+                }
             );
         }
         classes(page, self, state, vehicle);
@@ -95,7 +100,7 @@ impl Dive {
 
     fn link(&self, page: &mut String, vehicle: &DiveVehicle) {
         let (begin, end) = self.span_s;
-        let series = |name, unit, value: fn(&scenecast_messages::scenecast_msgs::Link) -> f32| Series {
+        let series = |name, unit, value: fn(&Link) -> f32| Series {
             name,
             unit,
             points: vehicle.link.iter().map(|(at_s, link)| (at_s - begin, f64::from(value(link)))).collect(),
@@ -122,6 +127,7 @@ impl Dive {
         if !charts.is_empty() {
             let _ = writeln!(page, "<h3>Link and position over time</h3>\n<figure>{}</figure>", charts.join("\n"));
         }
+        *page += &over_range(vehicle);
         let direction = |name: &str, direction: &crate::state::LinkDirection| {
             let classes = direction.bytes_by_class.iter().filter(|(_, bytes)| **bytes > 0);
             let classes: Vec<String> = classes.map(|(class, bytes)| format!("{class} {bytes}")).collect();
@@ -148,7 +154,7 @@ impl Dive {
         if self.events.is_empty() {
             return;
         }
-        *page += "<h2>Events</h2>\n<table><tr><th>time (UTC)</th><th>vehicle</th><th>kind</th><th>event</th></tr>\n";
+        *page += "<h2>Events</h2>\n<table><thead><tr><th>time (UTC)</th><th>vehicle</th><th>kind</th><th>event</th></tr></thead>\n";
         for (at_s, event) in &self.events {
             let _ = writeln!(
                 page,
@@ -185,6 +191,15 @@ impl Dive {
                 "classes": classes.collect::<Vec<_>>(),
                 "orders": orders.collect::<Vec<_>>(),
                 "exemplars": vehicle.exemplars.len(),
+                "track": vehicle.path().iter().map(|point| json!({
+                    "utc": utc_text(point.at_s), "east_m": point.east_m, "north_m": point.north_m,
+                    "depth_m": point.depth_m, "sigma_m": point.sigma_m,
+                })).collect::<Vec<_>>(),
+                "agreement": vehicle.maps.iter().map(|maps| json!({
+                    "utc": utc_text(maps.at_s), "cells": maps.cells, "share": maps.agreement,
+                })).collect::<Vec<_>>(),
+                "notes": state.notes,
+                "markers": state.markers,
             })
         });
         let events = self.events.iter().map(|(at_s, event)| {
@@ -197,6 +212,10 @@ impl Dive {
             "link": { "up": self.state.link.up, "down": self.state.link.down },
             "events": events.collect::<Vec<_>>(),
             "damage": self.damage,
+            "program": self.settings.program,
+            "simulated": self.settings.simulated,
+            "settings": self.settings.settings,
+            "mission_speed": self.state.mission.speed,
             "begin": utc_text(self.span_s.0),
             "end": utc_text(self.span_s.1),
             "frames": { "sent": self.frames[0], "received": self.frames[1], "dropped": self.frames[2] },
@@ -205,13 +224,45 @@ impl Dive {
     }
 }
 
+/// The quality of the link by the distance of the vehicle, which the round trips tell; empty where they are not known.
+fn over_range(vehicle: &DiveVehicle) -> String {
+    const SOUND_M_S: f64 = 1500.0;
+    let known = vehicle.link.iter().filter(|(_, link)| link.round_trip_s > 0.0);
+    let known: Vec<(f64, &Link)> =
+        known.map(|(_, link)| (f64::from(link.round_trip_s) / 2.0 * SOUND_M_S, link)).collect();
+    let Some(farthest_m) = known.iter().map(|(range_m, _)| *range_m).reduce(f64::max) else { return String::new() };
+    let step_m = chart::round_length(farthest_m / 4.0).max(10.0);
+    let mut bins: BTreeMap<u64, Vec<&Link>> = BTreeMap::new();
+    known.into_iter().for_each(|(range_m, link)| bins.entry((range_m / step_m) as u64).or_default().push(link));
+    let mut table = "<h3>Link over range</h3>\n<table><tr><th>distance</th><th>moments</th><th>frames lost</th><th>received from it</th></tr>".to_owned();
+    for (bin, links) in bins {
+        let mean = |value: fn(&Link) -> f32| {
+            let values: Vec<f64> =
+                links.iter().map(|link| f64::from(value(link))).filter(|value| value.is_finite()).collect();
+            values.iter().sum::<f64>() / values.len().max(1) as f64
+        };
+        let _ = write!(
+            table,
+            "<tr><td>{:.0} to {:.0} m</td><td class=\"n\">{}</td><td class=\"n\">{:.1} %</td><td class=\"n\">{:.0} bit/s</td></tr>",
+            bin as f64 * step_m,
+            (bin + 1) as f64 * step_m,
+            links.len(),
+            mean(|link| link.loss) * 100.0,
+            mean(|link| link.received_bps)
+        );
+    }
+    table
+        + "</table>\n<p>Each moment is one of every ten seconds; the distance is half of the round trip at 1500 m/s, and the share lost that of \
+             the last 64 frames.</p>\n"
+}
+
 fn classes(page: &mut String, dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) {
     let all: u64 = vehicle.classes.iter().map(|class| class.cells).sum();
     if all == 0 {
         return;
     }
-    *page += "<h3>Classes</h3>\n<table><tr><th>no.</th><th>class</th><th>cells</th><th>area</th><th>95 % interval</th><th>share</th>\
-              <th>images</th></tr>\n";
+    *page += "<h3>Classes</h3>\n<table><thead><tr><th>no.</th><th>class</th><th>cells</th><th>area</th><th>95 % interval</th><th>share</th>\
+              <th>images</th></tr></thead>\n";
     for class in &vehicle.classes {
         let _ = writeln!(
             page,
@@ -246,15 +297,25 @@ fn merged(state: &VehicleState, vehicle: &DiveVehicle, class: u8) -> String {
     let labels: BTreeSet<u8> = vehicle.labels.iter().map(|(_, label)| label).collect();
     let of_class = labels.into_iter().filter(|label| state.label_book.shown_as(*label) == class);
     let labels: Vec<String> = of_class.map(|label| label.to_string()).collect();
-    if labels.len() < 2 { String::new() } else { format!(" (labels {})", labels.join(", ")) }
+    match &labels[..] {
+        [only] if *only == class.to_string() => String::new(),
+        [only] => format!(" (label {only})"),
+        _ => format!(" (labels {})", labels.join(", ")),
+    }
 }
 
 /// The largest images of a class, each with its label, time, place and scale.
 fn images(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle, class: u8) -> String {
     let of_class = |label: u8| state.label_book.shown_as(label) == class;
-    let mut found: Vec<_> = vehicle.exemplars.iter().filter(|(_, exemplar)| of_class(exemplar.label)).collect();
+    // The label of a place may have changed since its image was sent.
+    let shows_it = |exemplar: &Exemplar| {
+        let (x, y) = (exemplar.middle.x, exemplar.middle.y);
+        exemplar.width_m.is_nan() || of_class(vehicle.label_at(state.map.shift_m(), x, y))
+    };
+    let of_it: Vec<_> = vehicle.exemplars.iter().filter(|(_, exemplar)| of_class(exemplar.label)).collect();
+    let mut found: Vec<_> = of_it.iter().copied().filter(|(_, exemplar)| shows_it(exemplar)).collect();
     found.sort_by_key(|(_, exemplar)| std::cmp::Reverse(exemplar.data.len()));
-    let image = |(at_s, exemplar): &&(f64, scenecast_messages::scenecast_msgs::Exemplar)| {
+    let image = |(at_s, exemplar): &&(f64, Exemplar)| {
         let kind = if exemplar.format == "webp" { "webp" } else { "jpeg" };
         let taken = match exemplar.taken.nanos() {
             0 => format!("received {}", utc_text(*at_s)),
@@ -273,7 +334,11 @@ fn images(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle, class: u8) -
             label = exemplar.label
         )
     };
-    if found.is_empty() { "no image was received".to_owned() } else { found.iter().take(IMAGES).map(image).collect() }
+    match (found.is_empty(), of_it.is_empty()) {
+        (true, true) => "no image was received".to_owned(),
+        (true, false) => "the images that were received show places of other classes, by the map at the end".to_owned(),
+        (false, _) => found.iter().take(IMAGES).map(image).collect(),
+    }
 }
 
 fn notes(page: &mut String, dive: &Dive, state: &VehicleState) {
@@ -313,8 +378,8 @@ fn steering(page: &mut String, dive: &Dive, state: &VehicleState, vehicle: &Dive
         return;
     }
     steps.sort_by(|a, b| a.0.total_cmp(&b.0));
-    *page += "<h3>What the vehicle was steered by, and its modes</h3>\n<table><tr><th>time (UTC)</th><th>what</th><th>cells on the map by \
-              then</th></tr>\n";
+    *page += "<h3>What the vehicle was steered by, and its modes</h3>\n<table><thead><tr><th>time (UTC)</th><th>what</th><th>cells on the map by \
+              then</th></tr></thead>\n";
     for (at_s, text) in &steps {
         let cells = vehicle.maps.iter().rev().find(|maps| maps.at_s <= *at_s).map_or(0, |maps| maps.cells);
         let _ = writeln!(
@@ -331,7 +396,7 @@ fn orders(page: &mut String, dive: &Dive, state: &VehicleState, vehicle: &DiveVe
     if vehicle.orders_of_people().next().is_none() {
         return;
     }
-    *page += "<h3>Orders</h3>\n<table><tr><th>order</th><th>what was ordered</th><th>by</th><th>given (UTC)</th><th>end</th><th>after</th></tr>\n";
+    *page += "<h3>Orders</h3>\n<table><thead><tr><th>order</th><th>what was ordered</th><th>by</th><th>given (UTC)</th><th>end</th><th>known at the surface after</th></tr></thead>\n";
     let mut orders: Vec<(&(String, u32), &OrderStep, &OrderStep)> =
         vehicle.orders_of_people().filter_map(|(order, way)| Some((order, way.first()?, way.last()?))).collect();
     orders.sort_by(|a, b| a.1.given_s.total_cmp(&b.1.given_s));

@@ -10,6 +10,9 @@ use scenecast_protocol::directive::SlotId;
 use scenecast_surface::LabelBook;
 use serde_json::Value;
 
+/// Time without a frame from which on it is a silence, seconds.
+const SILENCE_S: f64 = 60.0;
+
 /// A time span for people, such as "1 h 05 min".
 pub(super) fn duration(seconds: f64) -> String {
     let s = seconds.max(0.0).round() as u64;
@@ -49,17 +52,41 @@ pub(super) fn content(book: &LabelBook, order: &Order) -> String {
         (_, Value::Null) => None,
         ("weights", Value::Object(weights)) => {
             let weight = |(label, weight): (&String, &Value)| {
-                format!("{} {weight}", label.parse().map_or_else(|_| label.clone(), |label| book.title(label)))
+                format!("{}: {weight}", label.parse().map_or_else(|_| label.clone(), |label| book.title(label)))
             };
             Some(format!("weights: {}", weights.iter().map(weight).collect::<Vec<_>>().join(", ")))
         }
         ("labels", Value::Array(labels)) => {
             Some(format!("images of {}", labels.iter().filter_map(title).collect::<Vec<_>>().join(", ")))
         }
+        ("shares", Value::Object(shares)) => {
+            let share = |(class, percent): (&String, &Value)| format!("{class} {percent} %");
+            Some(format!("shares: {}", shares.iter().map(share).collect::<Vec<_>>().join(", ")))
+        }
+        ("place" | "return_point", Value::Array(at)) => Some(format!(
+            "{} {}",
+            name.replace('_', " "),
+            at.first().zip(at.get(1)).map_or_else(String::new, east_north)
+        )),
+        ("fence", Value::Array(corners)) => Some(format!("a fence with {} corners", corners.len())),
+        ("keep_outs", Value::Array(outlines)) => Some(format!("{} areas to stay out of", outlines.len())),
+        ("areas", Value::Array(areas)) => {
+            let weights: Vec<String> = areas.iter().map(|area| number(&area["weight"])).collect();
+            Some(format!("{} weighted areas, of weights {}", areas.len(), weights.join(", ")))
+        }
+        ("background", Value::Array(streams)) => Some(format!(
+            "spare capacity for {}",
+            streams.iter().filter_map(Value::as_str).collect::<Vec<_>>().join(", ")
+        )),
         _ => Some(limit(name, value)),
     };
     let all: Vec<String> = members.iter().filter_map(member).collect();
     if all.is_empty() { "nothing, so that what was ordered before ends".to_owned() } else { all.join("; ") }
+}
+
+/// A place in the world frame.
+fn east_north((east, north): (&Value, &Value)) -> String {
+    format!("{} m east, {} m north", number(east), number(north))
 }
 
 /// A member of an order with its unit, as in "depth 5 to 30 m".
@@ -126,28 +153,54 @@ pub(super) fn summary(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) 
     let link = &dive.state.link;
     let lost = |direction: &LinkDirection| direction.loss * 100.0;
     sentences.push(format!(
-        "Of {} frames from the vehicles {:.1} % were lost over the whole mission, of {} to them {:.1} %; what they carried was sent again.",
+        "Of {} numbered frames from the vehicles {:.1} % arrived in no copy over the whole mission, of {} to them {:.1} %{}.",
         link.up.frames,
         lost(&link.up),
         link.down.frames,
-        lost(&link.down)
+        lost(&link.down),
+        if link.up.lost + link.down.lost > 0 { "; what they carried was sent again" } else { "" }
     ));
+    if vehicle.sent > 0 && dive.state.vehicles.len() == 1 {
+        let [_, received, dropped] = dive.frames;
+        sentences.push(format!(
+            "By its own record it transmitted {} frames, copies included; the surface heard {}.",
+            vehicle.sent,
+            received + dropped
+        ));
+    }
+    for (from_s, to_s) in &dive.gaps_s {
+        sentences.push(format!("The surface recorded nothing from {} to {}.", utc_text(*from_s), utc_text(*to_s)));
+    }
+    sentences.extend(silence(vehicle));
     // The first contact begins a run, too.
     let first_run = dive.events.iter().position(|(_, event)| event.text == "another run begins");
     let is_trouble = |(number, (_, event)): &(usize, &(f64, Event))| match event.source.as_str() {
         "fault" => true,
+        "mode, on board" => !event.text.starts_with("Survey"),
         "contact" => event.text != "received" && Some(*number) != first_run,
         _ => false,
     };
     sentences.push(match dive.events.iter().enumerate().filter(is_trouble).count() {
         0 => "No fault and no silence was reported.".to_owned(),
-        1 => "One event is about a fault, a silence or a new run; it is listed below.".to_owned(),
-        n => format!("{n} events are about faults, silences or new runs; they are listed below."),
+        1 => "One event is about a fault, a silence, a new run or a mode other than the survey; it is listed below."
+            .to_owned(),
+        n => format!(
+            "{n} events are about faults, silences, new runs or modes other than the survey; they are listed below."
+        ),
     });
     if let Some(damage) = &dive.damage {
         sentences.push(format!("A part of the record could not be read: {damage}."));
     }
     sentences
+}
+
+/// The longest time without a frame from the vehicle, if people would call it a silence.
+fn silence(vehicle: &DiveVehicle) -> Option<String> {
+    let gap = |pair: &[f64]| if let [a, b] = pair { (b - a, *b) } else { (0.0, 0.0) };
+    let (longest_s, until_s) = vehicle.heard_s.windows(2).map(gap).max_by(|a, b| a.0.total_cmp(&b.0))?;
+    (longest_s >= SILENCE_S).then(|| {
+        format!("The longest time without a frame from it was {}, until {}.", duration(longest_s), utc_text(until_s))
+    })
 }
 
 fn when(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -> String {
@@ -176,7 +229,7 @@ pub(super) fn on_earth(dive: &Dive, (east_m, north_m): (f64, f64)) -> String {
     })
 }
 
-fn lat_lon(origin: Origin, east_m: f64, north_m: f64) -> (f64, f64) {
+pub(super) fn lat_lon(origin: Origin, east_m: f64, north_m: f64) -> (f64, f64) {
     let (lon, lat) = TransverseMercator::about(origin).lon_lat(east_m, north_m);
     (lat, (lon + 180.0).rem_euclid(360.0) - 180.0)
 }
@@ -221,8 +274,9 @@ fn place(dive: &Dive, vehicle: &DiveVehicle) -> String {
         )
     });
     format!(
-        "By its reports it went {:.0} m{begin}, at depths of {least:.1} to {most:.1} m below the surface; at the end it was {:.1} m east and {:.1} m north of the \
+        "By its {} {:.0} m{begin}, at depths of {least:.1} to {most:.1} m below the surface; at the end it was {:.1} m east and {:.1} m north of the \
          origin, with a standard deviation of {:.1} m; {origin}.",
+        if vehicle.own_track.len() > 1 { "own record it went" } else { "reports it went at least" },
         vehicle.distance_m(),
         last.east_m,
         last.north_m,
@@ -275,8 +329,10 @@ mod tests {
         let order = |content: &str| Order { principal: "ann".into(), content: content.into(), ..Order::default() };
         let told = |text: &str| content(&LabelBook::default(), &order(text));
         let weights = r#"{"weights": {"3": 0.5, "7": -1.0}, "exploration": 0.1}"#;
-        assert_eq!(told(weights), "exploration 0.1; weights: label 3 0.5, label 7 -1.0");
+        assert_eq!(told(weights), "exploration 0.1; weights: label 3: 0.5, label 7: -1.0");
         assert_eq!(told(r#"{"labels": [4]}"#), "images of label 4");
+        assert_eq!(told(r#"{"place": [46.5, -28]}"#), "place 46.5 m east, -28 m north");
+        assert_eq!(told(r#"{"areas": [{"outline": [], "weight": 0.5}]}"#), "1 weighted areas, of weights 0.5");
         let limits = r#"{"depth_m": [5.0, 30.5], "on_silence": "return", "silence_s": 300.0, "time_s": null}"#;
         assert_eq!(told(limits), "depth 5 to 30.5 m; on silence return; silence 300 s");
         let stops = |content: &str| Order { slot: "constraints".into(), ..order(content) };

@@ -88,7 +88,10 @@ impl BagStream {
                 Ok(None) => self.open = None,
                 Err(error) => {
                     self.open = None;
-                    return Err(format!("it breaks off: {error}; mcap recover OLD.mcap -o NEW.mcap may find more"));
+                    return Err(format!(
+                        "it breaks off: {error}; scenecast record recover FOLDER makes a record whole, and mcap recover OLD.mcap -o \
+                         NEW.mcap another bag"
+                    ));
                 }
             }
         }

@@ -151,7 +151,7 @@ impl Record {
 
 /// The program, whether the mission is simulated, and the settings that differ from their defaults, as JSON.
 fn settings_text(config: &Config, is_simulated: bool) -> String {
-    scenecast_config::changed_settings(&format!("scenecast {}", env!("CARGO_PKG_VERSION")), is_simulated, config)
+    scenecast_config::changed_settings(scenecast_core::program(), is_simulated, config)
 }
 
 /// What an end ran with.

@@ -34,9 +34,10 @@ pub struct SurfaceRecord {
 
 impl SurfaceRecord {
     /// Begins it in a folder in `folder`, unless the configuration names another one.
-    /// `offers_key` is whether it offers the vehicles a next key.
-    pub fn start(config: &Config, name: &str, folder: &Path, offers_key: bool) -> Self {
-        let recorder = SurfaceRecorder { hides_keys: offers_key, ..SurfaceRecorder::new(config, false) };
+    /// `offers_key` is whether it offers the vehicles a next key, `log` the last entry of the surface's log, which an earlier
+    /// process has recorded.
+    pub fn start(config: &Config, name: &str, folder: &Path, offers_key: bool, log: u64) -> Self {
+        let recorder = SurfaceRecorder { hides_keys: offers_key, log, ..SurfaceRecorder::new(config, false) };
         Self { record: Record::start(config, name, folder), recorder }
     }
 

@@ -119,6 +119,7 @@ enum Command {
 
 /// Runs the command that was parsed; an error has its exit code.
 pub fn run(arguments: Arguments) -> Result<(), UserError> {
+    scenecast_core::set_program(&format!("scenecast {}", VERSION.as_str()));
     #[cfg(feature = "tools")]
     arguments.progress.choose();
     match arguments.command {

@@ -8,7 +8,8 @@ use std::path::PathBuf;
 
 /// Write the report of a dive from the record of the surface: one HTML file with summary, map, classes, images, orders and link.
 #[derive(Debug, Args)]
-#[command(after_help = "Example: scenecast report state/records/bridge-20261129T101500Z --out dive.html")]
+#[command(after_help = "Example: scenecast report state/records/bridge-20261129T101500Z --out dive.html
+         scenecast report state/records/bridge-20261129T101500Z --zip dive.zip")]
 pub(super) struct Report {
     /// Record of a surface, and those of vehicles, which show how far the operator's map agreed with theirs: folders or files
     #[arg(value_name = "RECORD", required = true)]
@@ -16,8 +17,11 @@ pub(super) struct Report {
     /// File to write [default: report.html in the present folder]
     #[arg(long, value_name = "FILE", default_value = "report.html", hide_default_value = true)]
     out: PathBuf,
+    /// ZIP archive to write instead: the report, and for each vehicle its map in all formats, images, track and orders
+    #[arg(long, value_name = "FILE", conflicts_with = "out")]
+    zip: Option<PathBuf>,
     /// Print the figures as JSON, and write no file
-    #[arg(long, conflicts_with = "out")]
+    #[arg(long, conflicts_with_all = ["out", "zip"])]
     json: bool,
 }
 
@@ -33,8 +37,12 @@ impl Report {
             outln!("{text}");
             return Ok(());
         }
-        write_whole(&self.out, dive.html().as_bytes())?;
-        outln!("{}", self.out.display());
+        let (out, bytes) = match self.zip {
+            Some(zip) => (zip, dive.zip()?),
+            None => (self.out, dive.html().into_bytes()),
+        };
+        write_whole(&out, &bytes)?;
+        outln!("{}", out.display());
         Ok(())
     }
 }
