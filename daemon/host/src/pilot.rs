@@ -128,7 +128,11 @@ impl VehiclePilot {
             if !self.measures {
                 continue;
             }
-            vehicle.handle_odometry(step.dx_m, step.dy_m, step.heading_rad, step.depth_m, now);
+            // What is not measured is as it was.
+            let navigator = vehicle.navigator();
+            let heading_rad = step.heading_rad.unwrap_or(navigator.heading_rad());
+            let depth_m = step.depth_m.unwrap_or(navigator.depth_m());
+            vehicle.handle_odometry(step.dx_m, step.dy_m, heading_rad, depth_m, now);
             vehicle.handle_unmeasured(step.unseen);
             self.last_step = Some((step, now));
         }

@@ -182,10 +182,12 @@ impl VehicleHost {
         if self.is_measured_by_pilot() {
             return;
         }
-        let step = Step { heading_rad: pose.heading_rad, depth_m: pose.depth_m, ..Step::default() };
+        let step = Step { heading_rad: Some(pose.heading_rad), depth_m: Some(pose.depth_m), ..Step::default() };
         let (step, jumps) = self.plausible.check(step, now);
+        let (heading_rad, depth_m) =
+            (step.heading_rad.unwrap_or(pose.heading_rad), step.depth_m.unwrap_or(pose.depth_m));
         self.events.extend(jumps.into_iter().filter_map(|jump| jump.note).map(VehicleHostEvent::Note));
-        self.link.end_mut().set_pose(pose.x_m, pose.y_m, step.heading_rad, step.depth_m, now);
+        self.link.end_mut().set_pose(pose.x_m, pose.y_m, heading_rad, depth_m, now);
     }
 
     /// Replaces the budget and the shares that the surface ordered by those of the configuration.
@@ -212,10 +214,11 @@ impl VehicleHost {
         self.mapper.outstanding
     }
 
-    /// The vehicle's pose by the last report of its autopilot; `None` if there is none yet, or if another source measures the
-    /// pose.
+    /// The vehicle's pose by the last report of its autopilot; `None` if there is none yet, if it has no heading, or if another
+    /// source measures the pose.
     pub fn measured_pose(&self) -> Option<MeasuredPose> {
-        let (Step { roll_rad, pitch_rad, altitude_m, .. }, at) = self.pilot.as_ref()?.last_step?;
+        let (Step { heading_rad, roll_rad, pitch_rad, altitude_m, .. }, at) = self.pilot.as_ref()?.last_step?;
+        heading_rad?;
         Some(MeasuredPose { pose: self.dead_reckoned_pose(), roll_rad, pitch_rad, altitude_m, at })
     }
 

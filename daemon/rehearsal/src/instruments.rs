@@ -99,7 +99,7 @@ impl Autopilot for SimulatedAutopilot {
         while now >= self.next {
             self.next = self.next + Duration::from_secs_f64(Self::STEP_S);
             let o = self.motion.step_on(Self::STEP_S);
-            let (dx_m, dy_m, heading_rad, depth_m) = (o.dx_m, o.dy_m, o.heading_rad, self.depth_m);
+            let (dx_m, dy_m, heading_rad, depth_m) = (o.dx_m, o.dy_m, Some(o.heading_rad), Some(self.depth_m));
             self.tray.walk(Step { dx_m, dy_m, heading_rad, depth_m, ..Step::default() });
         }
     }

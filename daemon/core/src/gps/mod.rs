@@ -120,6 +120,8 @@ impl Gps {
     const JUMPS_BELIEVED: u32 = 10;
     /// Notes are this far apart.
     const NOTE_PERIOD: Duration = Duration::from_secs(60);
+    /// A heading or a course counts for this time.
+    const HEADING_LASTS: Duration = Duration::from_secs(5);
     /// Slower than this the course over ground is noise, m/s.
     const COURSE_SPEED_M_S: f64 = 0.5;
 
@@ -159,10 +161,18 @@ impl Gps {
 
     /// Where the bow points, clockwise from true north in radians: a compass first, else the course while under way.
     pub fn heading_rad(&self, now: Instant) -> Option<f64> {
-        const FRESH: Duration = Duration::from_secs(5);
-        let compass = self.heading.filter(|(_, at)| now.since(*at) < FRESH).map(|(h, _)| h);
-        let course = || self.motion.filter(|(v, _, at)| *v > Self::COURSE_SPEED_M_S && now.since(*at) < FRESH);
-        compass.or_else(|| course().and_then(|(_, course, _)| course))
+        self.compass_rad(Self::HEADING_LASTS, now).or_else(|| self.course_rad(now))
+    }
+
+    /// Where the bow points by a compass, if that was heard in the last `lasts`.
+    pub fn compass_rad(&self, lasts: Duration, now: Instant) -> Option<f64> {
+        self.heading.filter(|(_, at)| now.since(*at) < lasts).map(|(heading, _)| heading)
+    }
+
+    /// The course while under way.
+    pub fn course_rad(&self, now: Instant) -> Option<f64> {
+        let is_fresh = |speed: f64, at| speed > Self::COURSE_SPEED_M_S && now.since(at) < Self::HEADING_LASTS;
+        self.motion.filter(|(speed, _, at)| is_fresh(*speed, *at)).and_then(|(_, course, _)| course)
     }
 
     /// Returns the request to send on a new connection, and drops a half line of the old one.

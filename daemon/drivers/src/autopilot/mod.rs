@@ -8,6 +8,7 @@
 //! | [`Nmea`] | NMEA 0183 sentences for other vehicles, or for a file |
 //! | [`Rehearsed`] | a simulated vehicle |
 
+mod absence;
 pub mod mavlink;
 mod nmea;
 mod plausible;
@@ -48,10 +49,10 @@ impl Goal {
 pub struct Step {
     pub dx_m: f64,
     pub dy_m: f64,
-    /// Heading clockwise from north, radians.
-    pub heading_rad: f64,
-    /// Depth below the surface, metres.
-    pub depth_m: f64,
+    /// Heading clockwise from north, radians; `None` if it is not measured.
+    pub heading_rad: Option<f64>,
+    /// Depth below the surface, metres; `None` if it is not measured.
+    pub depth_m: Option<f64>,
     /// Rotation about the forward axis, starboard down, radians; 0 if it is not measured.
     pub roll_rad: f64,
     /// Rotation about the starboard axis, bow up, radians; 0 if it is not measured.

@@ -7,10 +7,11 @@
 //! $SCRMB,A,0.00,L,,SC,ddmm.mmmmm,N,dddmm.mmmmm,E,miles,degrees,,V*hh   way to it
 //! $PSCWP,east,north,depth*hh                                           metres still to go, depth or nothing
 //! ```
-//! and `$PSCHD*hh` while the vehicle holds its position. The driver reads positions (GGA, GNS, RMC, GLL), headings (HDT, THS),
-//! depths of the water (DBS) and heights of the transducer above the sea floor (DPT, DBT); the vehicle's depth is the difference of
-//! the two, and 0 until both were heard. A depth that is not known, or not any more, is named.
+//! and `$PSCHD*hh` while the vehicle holds its position. The driver reads positions (GGA, GNS, RMC, GLL), headings (HDT, THS, or else
+//! the course while under way), depths of the water (DBS) and heights of the transducer above the sea floor (DPT, DBT); the vehicle's
+//! depth is the difference of the two. A heading or a depth that is not known, or not any more, is named.
 
+use super::absence::Absence;
 use super::{Autopilot, Counters, Goal, Health, Step, Tray};
 use scenecast_core::gps::{Gps, GpsLanguage};
 use scenecast_core::{LatLon, Lines, TangentPlane, nmea};
@@ -20,7 +21,10 @@ use std::time::Duration;
 /// A height, or a depth of the water, counts for this long.
 const HEIGHT_LASTS: Duration = Duration::from_secs(2);
 
-/// A depth of which a part is missing for this long is not known.
+/// A heading of a compass counts for this long.
+const HEADING_LASTS: Duration = Duration::from_secs(10);
+
+/// A heading, or a part of the depth, that is missing for this long is named.
 const UNKNOWN_AFTER: Duration = Duration::from_secs(3);
 const FOOT_M: f64 = 0.3048;
 const FATHOM_M: f64 = 1.8288;
@@ -34,13 +38,18 @@ pub struct Nmea {
     answers: bool,
     silence: Duration,
     heard: Option<Instant>,
-    depth_m: f64,
+    /// The last depth that was measured, metres.
+    depth_m: Option<f64>,
     /// Depth of the water, metres.
     water_depth: Option<(f64, Instant)>,
     /// Height of the transducer above the sea floor, metres.
     height: Option<(f64, Instant)>,
-    /// Since when one of both is missing while the other is heard, or was; and whether that was said.
-    depth_unknown: Option<(Instant, bool)>,
+    /// One of both is missing while the other is heard, or was.
+    depth_absence: Absence,
+    /// No compass is heard.
+    heading_absence: Absence,
+    /// Whether a magnetic heading was heard.
+    hears_magnetic: bool,
     at: Option<(LatLon, Instant)>,
     goal: Option<Goal>,
     has_order: bool,
@@ -58,10 +67,12 @@ impl Nmea {
             answers,
             silence,
             heard: None,
-            depth_m: 0.0,
+            depth_m: None,
             water_depth: None,
             height: None,
-            depth_unknown: None,
+            depth_absence: Absence::default(),
+            heading_absence: Absence::default(),
+            hears_magnetic: false,
             at: None,
             goal: None,
             has_order: false,
@@ -89,7 +100,7 @@ impl Nmea {
     }
 
     fn handle_place_of_vehicle(&mut self, place: LatLon, now: Instant) {
-        let heading_rad = self.gps.heading_rad(now).unwrap_or(0.0);
+        let heading_rad = self.heading_rad(now);
         if let Some((before, at)) = self.at.replace((place, now)) {
             let (dx_m, dy_m) = TangentPlane::new(before).to_plane(place);
             let passed = now.since(at);
@@ -106,26 +117,41 @@ impl Nmea {
         }
     }
 
-    fn push_step(&mut self, dx_m: f64, dy_m: f64, heading_rad: f64, unseen: Duration, now: Instant) {
+    /// Where the bow points: an old heading of a compass is better than the course, which may be astern.
+    fn heading_rad(&mut self, now: Instant) -> Option<f64> {
+        let compass = self.gps.compass_rad(HEADING_LASTS, now);
+        if compass.is_some() {
+            self.heading_absence.end();
+        } else if self.heading_absence.is_news(UNKNOWN_AFTER, now) {
+            self.tray.count("headings_unknown");
+            let magnetic = if self.hears_magnetic { "; HDM and HDG are magnetic and not used" } else { "" };
+            self.tray.note(format!(
+                "the vehicle's GPS reports no heading (HDT or THS): its course counts while it is under way, and images have no pose \
+                 otherwise{magnetic}"
+            ));
+        }
+        compass.or_else(|| self.gps.course_rad(now))
+    }
+
+    fn push_step(&mut self, dx_m: f64, dy_m: f64, heading_rad: Option<f64>, unseen: Duration, now: Instant) {
         let height = self.height.filter(|(_, at)| now.since(*at) < HEIGHT_LASTS);
         let water = self.water_depth.filter(|(_, at)| now.since(*at) < HEIGHT_LASTS);
-        if let (Some((water_m, _)), Some((height_m, _))) = (water, height) {
-            self.depth_m = (water_m - height_m).max(0.0);
-            self.depth_unknown = None;
+        let depth_m = water.zip(height).map(|((water_m, _), (height_m, _))| (water_m - height_m).max(0.0));
+        if depth_m.is_some() {
+            self.depth_m = depth_m;
+            self.depth_absence.end();
         } else if self.water_depth.is_some() || self.height.is_some() {
             self.say_unknown_depth(now);
         }
-        let (depth_m, altitude_m) = (self.depth_m, height.map(|(height_m, _)| height_m));
+        let altitude_m = height.map(|(height_m, _)| height_m);
         self.tray.walk_measured(Step { dx_m, dy_m, heading_rad, depth_m, altitude_m, unseen, ..Step::default() }, now);
     }
 
     /// Says once that the depth is not known, when one of its two parts has been missing for a while.
     fn say_unknown_depth(&mut self, now: Instant) {
-        let (since, is_said) = self.depth_unknown.get_or_insert((now, false));
-        if *is_said || now.since(*since) < UNKNOWN_AFTER {
+        if !self.depth_absence.is_news(UNKNOWN_AFTER, now) {
             return;
         }
-        *is_said = true;
         let missing = match self.water_depth.is_none_or(|(_, at)| now.since(at) >= HEIGHT_LASTS) {
             true => "the depth of the water (DBS)",
             false => "the height above the sea floor (DBT or DPT)",
@@ -133,12 +159,12 @@ impl Nmea {
         self.tray.count("depths_unknown");
         self.tray.note(format!(
             "the depth of the vehicle is not known, since {missing} is missing: {:.1} m is used",
-            self.depth_m
+            self.depth_m.unwrap_or(0.0)
         ));
     }
 
-    /// DBS, from the surface to the sea floor, and DBT: feet, f, metres, M, fathoms, F. DPT: metres, offset of the transducer.
-    fn handle_sounding(&mut self, fields: &[&str], now: Instant) {
+    /// HDM and HDG are only noticed. DBS, from the surface to the sea floor, and DBT: feet, f, metres, M, fathoms, F. DPT: metres, offset of the transducer.
+    fn handle_sensor(&mut self, fields: &[&str], now: Instant) {
         let number = |index: usize| fields.get(index)?.parse::<f64>().ok();
         let length = |index: usize, metres: f64| number(index).map(|n| n * metres);
         // Sounders without a bottom send 0 or nothing; some send feet alone.
@@ -148,6 +174,7 @@ impl Nmea {
             "DBS" => self.water_depth = known(sounding()).or(self.water_depth),
             "DBT" => self.height = known(sounding()),
             "DPT" => self.height = known(number(1)),
+            "HDM" | "HDG" => self.hears_magnetic = true,
             _ => {}
         }
     }
@@ -165,7 +192,7 @@ impl Autopilot for Nmea {
         self.lines.push(bytes, |line| lines.push(line.to_vec()));
         for line in lines {
             for fields in nmea::sentences(&line).filter_map(|sentence| nmea::fields(sentence).ok()) {
-                self.handle_sounding(&fields, now);
+                self.handle_sensor(&fields, now);
                 if self.heard.is_none() || self.was_silent {
                     self.tray.note("the autopilot answers");
                 }
@@ -271,10 +298,46 @@ mod tests {
         let steps: Vec<Step> = std::iter::from_fn(|| pilot.poll_step()).collect();
         assert_eq!(steps.len(), 2);
         assert_eq!([steps[0].altitude_m, steps[1].altitude_m], [Some(4.5), None], "the last sounder has no bottom");
-        assert!((steps[0].dx_m - 1.0).abs() < 0.03 && steps[0].depth_m == 7.5, "{steps:?}");
+        assert!((steps[0].dx_m - 1.0).abs() < 0.03 && steps[0].depth_m == Some(7.5), "{steps:?}");
         for s in 3..12 {
             pilot.handle_timeout(at(f64::from(s)));
         }
         assert_eq!((pilot.health(at(12.0)), pilot.counters()["silences"]), (Health::Silent, 1));
+    }
+
+    /// The steps and the lines of a vehicle that sends these sentences each second, beside a position 1 m further east.
+    fn dive(seconds: u32, sentences: impl Fn(u32) -> Vec<&'static str>) -> (Vec<Step>, Vec<String>) {
+        let mut pilot = Nmea::new(true, Duration::from_secs(5), at(0.0));
+        let plane = TangentPlane::new(LatLon::new(29.5, 34.92).unwrap());
+        for s in 0..seconds {
+            let place = nmea::place_fields(plane.to_place(f64::from(s), 0.0));
+            let gga = nmea::line(&format!("GPGGA,00{:02}{:02},{place},1,9,1,0,M,0,M,,", s / 60, s % 60));
+            let lines: String = sentences(s).into_iter().map(nmea::line).chain([gga]).collect();
+            pilot.handle_bytes(lines.as_bytes(), at(f64::from(s)));
+            pilot.handle_timeout(at(f64::from(s)));
+        }
+        (std::iter::from_fn(|| pilot.poll_step()).collect(), std::iter::from_fn(|| pilot.poll_note()).collect())
+    }
+
+    #[test]
+    fn a_missing_heading_is_named_once_and_no_default_takes_its_place() {
+        let (steps, notes) = dive(40, |s| if s < 5 { vec!["HEHDT,90.0,T"] } else { vec!["HCHDM,80.0,M"] });
+        let known = steps.iter().filter(|step| step.heading_rad.is_some()).count();
+        assert!(known == 13 && steps[0].heading_rad == Some(90f64.to_radians()), "{steps:?}");
+        let named: Vec<&String> = notes.iter().filter(|note| note.contains("no heading (HDT or THS)")).collect();
+        assert!(named.len() == 1 && named[0].ends_with("HDM and HDG are magnetic and not used"), "{notes:?}");
+        let (steps, notes) = dive(40, |s| if s % 6 == 0 { vec!["HEHDT,90.0,T"] } else { vec![] });
+        assert!(notes.len() == 1 && steps.iter().all(|step| step.heading_rad.is_some()), "{notes:?}");
+    }
+
+    #[test]
+    fn the_first_measured_depth_is_no_jump_from_a_default() {
+        let (steps, notes) = dive(20, |s| match s {
+            0..5 => vec!["HEHDT,90.0,T"],
+            _ => vec!["HEHDT,90.0,T", "SDDBS,,f,14.0,M,,F", "SDDBT,,f,4.0,M,,F"],
+        });
+        assert!(steps[..4].iter().all(|step| step.depth_m.is_none()), "{steps:?}");
+        assert!(steps[4..].iter().all(|step| step.depth_m == Some(10.0)), "{steps:?}");
+        assert_eq!(notes, ["the autopilot answers"]);
     }
 }

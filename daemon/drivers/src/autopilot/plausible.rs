@@ -231,12 +231,15 @@ impl Plausible {
 
     /// The step with values that can be, and the jumps that were found.
     pub fn check(&mut self, step: Step, now: Instant) -> (Step, Vec<Jump>) {
-        let (depth_m, depth_jump) = self.depth.check(step.depth_m, &DEPTH, now);
-        let (heading_deg, heading_jump) = self.heading.check(step.heading_rad.to_degrees(), &HEADING, now);
-        let heading_rad = if heading_jump.is_some() { heading_deg.to_radians() } else { step.heading_rad };
+        let (depth_m, depth_jump) = step.depth_m.map(|depth_m| self.depth.check(depth_m, &DEPTH, now)).unzip();
+        let check_heading = |rad: f64| match self.heading.check(rad.to_degrees(), &HEADING, now) {
+            (_, None) => (rad, None),
+            (degrees, jump) => (degrees.to_radians(), jump),
+        };
+        let (heading_rad, heading_jump) = step.heading_rad.map(check_heading).unzip();
         let (altitude_m, height_jump) =
             step.altitude_m.map(|height_m| self.height.check(height_m, &HEIGHT, now)).unzip();
-        let jumps = [depth_jump, heading_jump, height_jump.flatten()].into_iter().flatten().collect();
+        let jumps = [depth_jump, heading_jump, height_jump].into_iter().flatten().flatten().collect();
         (Step { depth_m, heading_rad, altitude_m, ..step }, jumps)
     }
 }
@@ -267,9 +270,9 @@ mod tests {
         let mut plausible = Plausible::default();
         let mut notes = Vec::new();
         let steps = (0..).zip(depths).map(|(i, depth_m)| {
-            let (step, jumps) = plausible.check(Step { depth_m, ..Step::default() }, at(i));
+            let (step, jumps) = plausible.check(Step { depth_m: Some(depth_m), ..Step::default() }, at(i));
             notes.extend(jumps.into_iter().filter_map(|jump| jump.note));
-            step.depth_m
+            step.depth_m.unwrap()
         });
         (steps.collect(), notes)
     }
@@ -297,8 +300,8 @@ mod tests {
         let mut zeros = Vec::new();
         for i in 0..600 {
             let depth_m = if (200..400).contains(&i) { 42.0 } else { 5.0 };
-            let (step, _) = plausible.check(Step { depth_m, ..Step::default() }, at(i));
-            assert_eq!(step.depth_m, 5.0);
+            let (step, _) = plausible.check(Step { depth_m: Some(depth_m), ..Step::default() }, at(i));
+            assert_eq!(step.depth_m, Some(5.0));
             zeros.push(plausible.depth_zero_m());
         }
         assert_eq!(
@@ -320,8 +323,8 @@ mod tests {
         assert_eq!(used(depths.clone()), (depths, vec![]));
         let mut plausible = Plausible::default();
         for (tenths, depth_m) in [(0, 5.0), (200, 60.0)] {
-            let (step, jumps) = plausible.check(Step { depth_m, ..Step::default() }, at(tenths));
-            assert_eq!((step.depth_m, jumps), (depth_m, vec![]));
+            let (step, jumps) = plausible.check(Step { depth_m: Some(depth_m), ..Step::default() }, at(tenths));
+            assert_eq!((step.depth_m, jumps), (Some(depth_m), vec![]));
         }
     }
 
@@ -351,9 +354,9 @@ mod tests {
     fn headings_are_compared_across_north_and_heights_by_themselves() {
         let mut plausible = Plausible::default();
         let mut check = |tenths, heading_deg: f64, altitude_m| {
-            let step = Step { heading_rad: heading_deg.to_radians(), altitude_m, ..Step::default() };
+            let step = Step { heading_rad: Some(heading_deg.to_radians()), altitude_m, ..Step::default() };
             let (step, jumps) = plausible.check(step, at(tenths));
-            (step.heading_rad.to_degrees().round(), step.altitude_m, jumps.len())
+            (step.heading_rad.unwrap().to_degrees().round(), step.altitude_m, jumps.len())
         };
         assert_eq!(check(0, 350.0, Some(4.0)), (350.0, Some(4.0), 0));
         assert_eq!(check(1, 10.0, None), (10.0, None, 0));

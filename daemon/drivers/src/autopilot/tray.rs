@@ -102,7 +102,7 @@ mod tests {
         let mut tray = Tray::default();
         for i in 0..10_000 {
             let unseen = Duration::from_millis(u64::from(i % 2 == 0));
-            tray.walk(Step { dx_m: 1.0, dy_m: -2.0, heading_rad: f64::from(i), unseen, ..Step::default() });
+            tray.walk(Step { dx_m: 1.0, dy_m: -2.0, heading_rad: Some(f64::from(i)), unseen, ..Step::default() });
             tray.note("the same");
             tray.write(vec![0]);
         }
@@ -110,6 +110,6 @@ mod tests {
         let (x, y) = tray.steps.iter().fold((0.0, 0.0), |(x, y), s| (x + s.dx_m, y + s.dy_m));
         assert_eq!((x, y), (10_000.0, -20_000.0));
         assert_eq!(tray.steps.iter().map(|s| s.unseen).sum::<Duration>(), Duration::from_secs(5));
-        assert_eq!(tray.steps.back().map(|s| s.heading_rad), Some(9_999.0));
+        assert_eq!(tray.steps.back().and_then(|s| s.heading_rad), Some(9_999.0));
     }
 }

@@ -49,14 +49,15 @@ impl PoseFeed {
     /// can be, and the jumps that were found.
     pub(super) fn handle_pose(&mut self, stamp: Stamp, pose: SensorPose, now: Stamp) -> (SensorPose, Vec<Jump>) {
         let SensorPose { x_m, y_m, heading_rad, depth_m, altitude_m, .. } = pose;
-        let measured = Step { heading_rad, depth_m, altitude_m, ..Step::default() };
+        let measured = Step { heading_rad: Some(heading_rad), depth_m: Some(depth_m), altitude_m, ..Step::default() };
         // Only differences of these times count.
         let at = Instant::from_micros((stamp.nanos() / 1000).max(0) as u64);
-        let (Step { heading_rad, depth_m, altitude_m, .. }, jumps) = self.plausible.check(measured, at);
+        let (step, jumps) = self.plausible.check(measured, at);
+        let (heading_rad, depth_m) = (step.heading_rad.unwrap_or(heading_rad), step.depth_m.unwrap_or(depth_m));
         self.is_new = true;
         self.posed.0 = now;
         self.newest = Some(CameraPose { x_m, y_m, heading_rad, depth_m });
-        (SensorPose { heading_rad, depth_m, altitude_m, ..pose }, jumps)
+        (SensorPose { heading_rad, depth_m, altitude_m: step.altitude_m, ..pose }, jumps)
     }
 
     /// The autopilot's pose, if images are mapped at it and it is a new one: a pose that is not measured again is not that of

@@ -1,5 +1,6 @@
 //! ArduSub and ArduRover over MAVLink 2.
 
+mod attitude;
 mod boot_clock;
 pub mod frame;
 pub mod message;
@@ -8,6 +9,7 @@ mod sources;
 mod targets;
 
 use super::{Autopilot, Counters, Goal, Health, Step, Tray};
+use attitude::Attitude;
 use boot_clock::{BootClock, BootTime};
 use frame::{Deframer, Frame, encode};
 use message::{Heard, Said, boot_time_ms, heard_extra};
@@ -76,11 +78,7 @@ pub struct Mavlink {
     clock: BootClock,
     peer: Option<Peer>,
     pose: Option<Pose>,
-    /// Starboard down and bow up, radians.
-    tilt: (f64, f64),
-    yaw: Option<f64>,
-    /// When ATTITUDE was heard last: its yaw is finer than the heading of a global position.
-    attitude_heard: Option<Instant>,
+    attitude: Attitude,
     altimeter: Altimeter,
     /// The distance that remains, east and north, and the depth; `None`: stay.
     goal: Option<Goal>,
@@ -145,9 +143,7 @@ impl Mavlink {
             clock: BootClock::default(),
             peer: None,
             pose: None,
-            tilt: (0.0, 0.0),
-            yaw: None,
-            attitude_heard: None,
+            attitude: Attitude::default(),
             altimeter: Altimeter::default(),
             goal: None,
             stay: None,
@@ -196,10 +192,7 @@ impl Mavlink {
         }
         match heard {
             Heard::Heartbeat { .. } | Heard::DistanceElsewhere => {}
-            Heard::Attitude { roll, pitch, yaw } => {
-                (self.tilt, self.yaw) = ((f64::from(roll), f64::from(pitch)), Some(f64::from(yaw)));
-                self.attitude_heard = Some(now);
-            }
+            Heard::Attitude { roll, pitch, yaw } => self.attitude.handle([roll, pitch, yaw], now),
             Heard::DistanceDown(number, along_m) => {
                 self.handle_beam(HeightSource::DistanceSensor(number), along_m, now);
             }
@@ -216,8 +209,8 @@ impl Mavlink {
                 self.handle_pose(pose, true);
             }
             Heard::Global { time_boot_ms, lat, lon, relative_alt, velocity: [north, east, _], heading } => {
-                if heading != u16::MAX && self.attitude_heard.is_none_or(|at| now.since(at) > BRIDGED) {
-                    self.yaw = Some((f64::from(heading) / 100.0).to_radians());
+                if heading != u16::MAX {
+                    self.attitude.handle_heading((f64::from(heading) / 100.0).to_radians(), now);
                 }
                 let velocity = (f64::from(east) / 100.0, f64::from(north) / 100.0);
                 // Without a fix or an origin it has no place.
@@ -335,7 +328,7 @@ impl Mavlink {
 
     /// A distance along a beam that is fixed to the vehicle and looks down.
     fn handle_beam(&mut self, source: HeightSource, along_m: Option<f32>, now: Instant) {
-        let (roll, pitch) = self.tilt;
+        let (roll, pitch) = self.attitude.tilt(now);
         let upright = roll.cos() * pitch.cos();
         self.altimeter.handle(source, along_m.map(|m| f64::from(m) * upright), now);
     }
@@ -393,10 +386,10 @@ impl Mavlink {
     }
 
     fn push_step(&mut self, dx_m: f64, dy_m: f64, pose: &Pose, unseen: Duration) {
-        let heading_rad = self.yaw.unwrap_or(0.0);
-        let (roll_rad, pitch_rad) = self.tilt;
+        let heading_rad = self.attitude.heading_rad(pose.heard);
+        let (roll_rad, pitch_rad) = self.attitude.tilt(pose.heard);
         let altitude_m = self.altimeter.height_m(pose.heard);
-        let depth_m = pose.depth_m;
+        let depth_m = Some(pose.depth_m);
         let step = Step { dx_m, dy_m, heading_rad, depth_m, roll_rad, pitch_rad, altitude_m, unseen };
         self.tray.walk_measured(step, pose.heard);
     }
@@ -429,6 +422,14 @@ impl Mavlink {
             }
             // Without a position no target goes out that it could follow.
             self.echo.forget();
+        } else if self.attitude.is_missing(now) {
+            if now >= self.due.streams {
+                self.ask_for_streams(now);
+            }
+            if let Some(note) = self.attitude.poll_absence(now) {
+                self.tray.count("attitude_losses");
+                self.tray.note(note);
+            }
         }
         if peer.is_in_command() {
             self.send_target(now);

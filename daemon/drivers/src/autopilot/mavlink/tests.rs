@@ -35,6 +35,12 @@ fn global(ms: i32, depth_mm: i32) -> Vec<u8> {
     frame(1, 33, [&fields[..], &[0, 0, 0, 0, 0, 0, 0xFF, 0xFF]].concat())
 }
 
+/// An attitude with its bow at this angle.
+fn attitude(ms: u32, yaw: f32) -> Vec<u8> {
+    let angles = [0.0, 0.0, yaw].into_iter().flat_map(f32::to_le_bytes);
+    frame(1, 30, ms.to_le_bytes().into_iter().chain(angles).collect())
+}
+
 /// Everything that was sent, as message number and payload.
 fn sent(pilot: &mut Mavlink) -> Vec<(u32, Vec<u8>)> {
     let mut deframer = Deframer::default();
@@ -97,7 +103,7 @@ fn a_target_is_repeated_each_second_in_the_autopilots_frame() {
     assert_eq!(targets, [[0.0, 10.0, 5.0], [0.0, 10.0, 5.0], [100.0, 110.0, 5.0]]);
     let steps: Vec<Step> = std::iter::from_fn(|| pilot.poll_step()).collect();
     assert_eq!(steps.len(), 3);
-    assert!(steps.iter().all(|s| s.dx_m == 1.0 && s.dy_m == 0.0 && s.depth_m == 4.0), "{steps:?}");
+    assert!(steps.iter().all(|s| s.dx_m == 1.0 && s.dy_m == 0.0 && s.depth_m == Some(4.0)), "{steps:?}");
 }
 
 #[test]
@@ -277,7 +283,7 @@ fn an_hour_of_a_real_robot_is_followed_with_few_log_lines() {
         hear(&mut pilot, of_component(154, 30, attitude), now);
         pilot.handle_timeout(now);
         while let Some(step) = pilot.poll_step() {
-            assert_eq!(step.depth_m, 5.0);
+            assert_eq!(step.depth_m, Some(5.0));
             unseen += step.unseen;
         }
         notes += std::iter::from_fn(|| pilot.poll_note()).count();
@@ -296,7 +302,7 @@ fn a_depth_that_jumps_does_not_reach_the_vehicle() {
         pilot.handle_bytes(&heartbeat(4, true), now);
         pilot.handle_bytes(&global(100 * tenth, if tenth == 20 { 42_000 } else { 5000 }), now);
     }
-    assert!(std::iter::from_fn(|| pilot.poll_step()).all(|step| step.depth_m == 5.0));
+    assert!(std::iter::from_fn(|| pilot.poll_step()).all(|step| step.depth_m == Some(5.0)));
     assert_eq!(pilot.counters()["depth_jumps"], 1);
     let expected = "the depth jumps from 5.0 to 42.0 m, which is not used unless it stays";
     assert_eq!(notes(&mut pilot).last().map(String::as_str), Some(expected));
@@ -327,6 +333,7 @@ fn a_target_that_is_not_taken_takes_it_out_of_command() {
     for s in 0..20 {
         let now = at(f64::from(s));
         pilot.handle_bytes(&heartbeat(4, true), now);
+        pilot.handle_bytes(&attitude(1000 * s as u32, 0.0), now);
         pilot.handle_bytes(&local(1000 * s as u32, [0.0, 0.0, 4.0], [0.0; 3]), now);
         // From 5 s to 14 s it flies to somewhere else.
         let east = if (5..15).contains(&s) { -30.0 } else { 10.0 };
@@ -376,6 +383,7 @@ fn a_restart_under_water_arms_unless_a_pilot_disarmed() {
         pilot.set_goal(GOAL, at(0.0));
         let beat = |pilot: &mut Mavlink, s: f64, boot_s: f64, armed| {
             pilot.handle_bytes(&heartbeat(if armed { 4 } else { 19 }, armed), at(s));
+            pilot.handle_bytes(&attitude(((s - boot_s) * 1000.0) as u32, 0.0), at(s));
             pilot.handle_bytes(&local(((s - boot_s) * 1000.0) as u32, [0.0, 0.0, depth_m], [0.0; 3]), at(s));
             sent(pilot);
             pilot.handle_timeout(at(s));
@@ -406,7 +414,7 @@ fn tilt_and_height_come_with_each_step() {
     pilot.handle_bytes(&frame(1, 173, rangefinder), at(0.5));
     pilot.handle_bytes(&local(1000, [0.0; 3], [0.0; 3]), at(1.0));
     let step = pilot.poll_step().unwrap();
-    assert_eq!((step.roll_rad, step.pitch_rad, step.heading_rad), (0.5, -0.25, 1.0));
+    assert_eq!((step.roll_rad, step.pitch_rad, step.heading_rad), (0.5, -0.25, Some(1.0)));
     // 4 m along a beam that leans by roll and pitch.
     assert!((step.altitude_m.unwrap() - 4.0 * 0.5f64.cos() * 0.25f64.cos()).abs() < 1e-6, "{step:?}");
     pilot.handle_bytes(&local(3000, [0.0; 3], [0.0; 3]), at(3.0));
@@ -424,6 +432,7 @@ fn a_lost_position_is_named_once_and_no_target_goes_out() {
         if !(3..15).contains(&s) {
             // It comes back 40 m away, by its own account.
             let north = if s < 3 { 0.0 } else { 40.0 };
+            pilot.handle_bytes(&attitude(1000 * s as u32, 0.0), now);
             pilot.handle_bytes(&local(1000 * s as u32, [north, 0.0, 4.0], [0.0; 3]), now);
         }
         pilot.handle_timeout(now);
@@ -557,4 +566,24 @@ fn an_autopilot_that_signs_its_messages_is_named() {
     pilot.handle_bytes(&bytes, at(0.0));
     let notes = notes(&mut pilot);
     assert!(notes[0].contains("signs its messages") && notes[0].contains("switch signing off"), "{notes:?}");
+}
+
+#[test]
+fn an_attitude_that_stops_is_named_once_and_gives_no_heading() {
+    let mut pilot = pilot(false);
+    for s in 0..40_u32 {
+        let now = at(f64::from(s));
+        pilot.handle_bytes(&heartbeat(4, true), now);
+        if !(5..20).contains(&s) {
+            pilot.handle_bytes(&attitude(1000 * s, 1.0), now);
+        }
+        pilot.handle_bytes(&local(1000 * s, [0.0, 0.0, 4.0], [0.0; 3]), now);
+        pilot.handle_timeout(now);
+    }
+    let headings: Vec<_> = std::iter::from_fn(|| pilot.poll_step()).map(|step| step.heading_rad).collect();
+    assert_eq!(headings, [[Some(1.0); 5].as_slice(), &[None; 14], &[Some(1.0); 20]].concat());
+    let notes = notes(&mut pilot);
+    assert_eq!(notes[1], "the autopilot reports no attitude: images have no pose until it does");
+    assert!(!notes[2..].iter().any(|note| note.contains("attitude")), "{notes:?}");
+    assert_eq!(pilot.counters()["attitude_losses"], 1);
 }
