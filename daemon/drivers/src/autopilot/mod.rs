@@ -8,7 +8,7 @@
 //! | [`Nmea`] | NMEA 0183 sentences for other vehicles, or for a file |
 //! | [`Rehearsed`] | a simulated vehicle |
 
-mod absence;
+mod lasting;
 pub mod mavlink;
 mod nmea;
 mod plausible;

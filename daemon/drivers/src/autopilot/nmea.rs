@@ -9,9 +9,9 @@
 //! ```
 //! and `$PSCHD*hh` while the vehicle holds its position. The driver reads positions (GGA, GNS, RMC, GLL), headings (HDT, THS, or else
 //! the course while under way), depths of the water (DBS) and heights of the transducer above the sea floor (DPT, DBT); the vehicle's
-//! depth is the difference of the two. A heading or a depth that is not known, or not any more, is named.
+//! depth is the difference of the two. A position, a heading or a depth that is not known, or not any more, is named.
 
-use super::absence::Absence;
+use super::lasting::Lasting;
 use super::{Autopilot, Counters, Goal, Health, Step, Tray};
 use scenecast_core::gps::{Gps, GpsLanguage};
 use scenecast_core::{LatLon, Lines, TangentPlane, nmea};
@@ -26,6 +26,8 @@ const HEADING_LASTS: Duration = Duration::from_secs(10);
 
 /// A heading, or a part of the depth, that is missing for this long is named.
 const UNKNOWN_AFTER: Duration = Duration::from_secs(3);
+/// A height above the sea floor that is greater than the depth of the water by more is false, metres.
+const HEIGHT_MARGIN_M: f64 = 1.0;
 const FOOT_M: f64 = 0.3048;
 const FATHOM_M: f64 = 1.8288;
 
@@ -45,12 +47,16 @@ pub struct Nmea {
     /// Height of the transducer above the sea floor, metres.
     height: Option<(f64, Instant)>,
     /// One of both is missing while the other is heard, or was.
-    depth_absence: Absence,
+    depth_absence: Lasting,
     /// No compass is heard.
-    heading_absence: Absence,
+    heading_absence: Lasting,
     /// Whether a magnetic heading was heard.
     hears_magnetic: bool,
+    /// A height is greater than the depth of the water.
+    height_trouble: Lasting,
     at: Option<(LatLon, Instant)>,
+    /// Other sentences come in without a position.
+    position_absence: Lasting,
     goal: Option<Goal>,
     has_order: bool,
     second: Instant,
@@ -70,10 +76,12 @@ impl Nmea {
             depth_m: None,
             water_depth: None,
             height: None,
-            depth_absence: Absence::default(),
-            heading_absence: Absence::default(),
+            depth_absence: Lasting::default(),
+            heading_absence: Lasting::default(),
             hears_magnetic: false,
+            height_trouble: Lasting::default(),
             at: None,
+            position_absence: Lasting::default(),
             goal: None,
             has_order: false,
             second: now,
@@ -100,6 +108,9 @@ impl Nmea {
     }
 
     fn handle_place_of_vehicle(&mut self, place: LatLon, now: Instant) {
+        if self.position_absence.end() {
+            self.tray.note("the autopilot reports its position again");
+        }
         let heading_rad = self.heading_rad(now);
         if let Some((before, at)) = self.at.replace((place, now)) {
             let (dx_m, dy_m) = TangentPlane::new(before).to_plane(place);
@@ -134,16 +145,14 @@ impl Nmea {
     }
 
     fn push_step(&mut self, dx_m: f64, dy_m: f64, heading_rad: Option<f64>, unseen: Duration, now: Instant) {
-        let height = self.height.filter(|(_, at)| now.since(*at) < HEIGHT_LASTS);
-        let water = self.water_depth.filter(|(_, at)| now.since(*at) < HEIGHT_LASTS);
-        let depth_m = water.zip(height).map(|((water_m, _), (height_m, _))| (water_m - height_m).max(0.0));
+        let (altitude_m, water_m) = (fresh(self.height, now), fresh(self.water_depth, now));
+        let depth_m = water_m.zip(altitude_m).map(|(water_m, height_m)| (water_m - height_m).max(0.0));
         if depth_m.is_some() {
             self.depth_m = depth_m;
             self.depth_absence.end();
         } else if self.water_depth.is_some() || self.height.is_some() {
             self.say_unknown_depth(now);
         }
-        let altitude_m = height.map(|(height_m, _)| height_m);
         self.tray.walk_measured(Step { dx_m, dy_m, heading_rad, depth_m, altitude_m, unseen, ..Step::default() }, now);
     }
 
@@ -152,7 +161,7 @@ impl Nmea {
         if !self.depth_absence.is_news(UNKNOWN_AFTER, now) {
             return;
         }
-        let missing = match self.water_depth.is_none_or(|(_, at)| now.since(at) >= HEIGHT_LASTS) {
+        let missing = match fresh(self.water_depth, now).is_none() {
             true => "the depth of the water (DBS)",
             false => "the height above the sea floor (DBT or DPT)",
         };
@@ -172,12 +181,56 @@ impl Nmea {
         let known = |m: Option<f64>| m.filter(|m| *m > 0.0 && *m < 12_000.0).map(|m| (m, now));
         match fields.first().and_then(|field| field.get(2..)).unwrap_or_default() {
             "DBS" => self.water_depth = known(sounding()).or(self.water_depth),
-            "DBT" => self.height = known(sounding()),
-            "DPT" => self.height = known(number(1)),
+            "DBT" => self.set_height(known(sounding()), now),
+            "DPT" => self.set_height(known(number(1)), now),
             "HDM" | "HDG" => self.hears_magnetic = true,
             _ => {}
         }
+        if self.is_above_water(self.height, now) {
+            self.height = None;
+        }
     }
+
+    fn set_height(&mut self, height: Option<(f64, Instant)>, now: Instant) {
+        if !self.is_above_water(height, now) {
+            self.height = height;
+            self.height_trouble.end();
+        }
+    }
+
+    /// Whether a height is greater than the depth of the water, which is named.
+    fn is_above_water(&mut self, height: Option<(f64, Instant)>, now: Instant) -> bool {
+        let Some((height_m, water_m)) = fresh(height, now).zip(fresh(self.water_depth, now)) else { return false };
+        if height_m <= water_m + HEIGHT_MARGIN_M {
+            return false;
+        }
+        self.tray.count("heights_refused");
+        if self.height_trouble.is_news(Duration::ZERO, now) {
+            self.tray.note(format!(
+                "the height above the sea floor (DBT or DPT), {height_m:.1} m, is greater than the depth of the water (DBS), {water_m:.1} \
+                 m: it is not used; check the sounders"
+            ));
+        }
+        true
+    }
+
+    /// Notices that other sentences come in without a position.
+    fn watch_position(&mut self, now: Instant) {
+        if self.is_position_lost(now) && self.position_absence.is_news(Duration::ZERO, now) {
+            self.tray.count("position_losses");
+            self.tray.note("the autopilot reports no position any more");
+        }
+    }
+
+    /// Whether it has reported positions, and does not any more; of a receiver that never had one `Gps` gives the reason.
+    fn is_position_lost(&self, now: Instant) -> bool {
+        self.at.is_some_and(|(_, at)| now.since(at) >= self.silence)
+    }
+}
+
+/// A length that was measured not long ago.
+fn fresh(length: Option<(f64, Instant)>, now: Instant) -> Option<f64> {
+    length.filter(|(_, at)| now.since(*at) < HEIGHT_LASTS).map(|(m, _)| m)
 }
 
 impl Autopilot for Nmea {
@@ -217,7 +270,11 @@ impl Autopilot for Nmea {
         if self.has_order {
             self.say_goal();
         }
-        if self.health(now) == Health::Silent && !std::mem::replace(&mut self.was_silent, true) {
+        let health = self.health(now);
+        if health == Health::NotInCommand {
+            self.watch_position(now);
+        }
+        if health == Health::Silent && !std::mem::replace(&mut self.was_silent, true) {
             self.tray.count("silences");
             self.tray.note("the autopilot does not answer any more");
         }
@@ -243,6 +300,7 @@ impl Autopilot for Nmea {
             _ if !self.answers => Health::InCommand,
             None => Health::Awaited,
             Some(at) if now.since(at) >= self.silence => Health::Silent,
+            Some(_) if self.is_position_lost(now) => Health::NotInCommand,
             Some(_) => Health::InCommand,
         }
     }
@@ -328,6 +386,40 @@ mod tests {
         assert!(named.len() == 1 && named[0].ends_with("HDM and HDG are magnetic and not used"), "{notes:?}");
         let (steps, notes) = dive(40, |s| if s % 6 == 0 { vec!["HEHDT,90.0,T"] } else { vec![] });
         assert!(notes.len() == 1 && steps.iter().all(|step| step.heading_rad.is_some()), "{notes:?}");
+    }
+
+    #[test]
+    fn a_height_above_the_depth_of_the_water_is_not_used_and_named() {
+        // A second sounder, which measures the depth of another place.
+        let (steps, notes) =
+            dive(30, |_| vec!["HEHDT,90.0,T", "SDDBS,,f,14.0,M,,F", "SDDBT,,f,4.0,M,,F", "IIDBT,,f,40.0,M,,F"]);
+        assert!(steps.iter().all(|s| s.depth_m == Some(10.0) && s.altitude_m == Some(4.0)), "{steps:?}");
+        assert!(notes.len() == 2 && notes[1].contains("40.0 m, is greater than the depth of the water"), "{notes:?}");
+        let (steps, _) = dive(30, |_| vec!["HEHDT,90.0,T", "IIDBT,,f,40.0,M,,F", "SDDBS,,f,14.0,M,,F"]);
+        assert!(steps.iter().all(|s| s.depth_m.is_none() && s.altitude_m.is_none()), "{steps:?}");
+    }
+
+    #[test]
+    fn a_position_that_stops_takes_it_out_of_command() {
+        let mut pilot = Nmea::new(true, Duration::from_secs(5), at(0.0));
+        let mut healths = Vec::new();
+        for s in 0..30u32 {
+            let now = at(f64::from(s));
+            let quality = if (6..20).contains(&s) { "0,00,99.9" } else { "1,09,0.9" };
+            let gga = nmea::line(&format!("GPGGA,0000{s:02},2930.0,N,03455.2,E,{quality},0,M,0,M,,"));
+            pilot.handle_bytes((nmea::line("HEHDT,90.0,T") + &gga).as_bytes(), now);
+            pilot.handle_timeout(now);
+            healths.push(pilot.health(now));
+        }
+        assert_eq!(healths.iter().filter(|health| **health == Health::NotInCommand).count(), 10);
+        assert_eq!([healths[9], healths[10], healths[20]].map(|h| h == Health::InCommand), [true, false, true]);
+        let notes: Vec<String> = std::iter::from_fn(|| pilot.poll_note()).collect();
+        let expected = [
+            "the autopilot answers",
+            "the autopilot reports no position any more",
+            "the autopilot reports its position again",
+        ];
+        assert_eq!(notes, expected);
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! How the vehicle lies in the water, by ATTITUDE, or else by the heading of a global position.
 
-use super::super::absence::Absence;
+use super::super::lasting::Lasting;
 use scenecast_protocol::time::Instant;
 use std::time::Duration;
 
@@ -17,7 +17,7 @@ pub(super) struct Attitude {
     measured: Option<([f64; 3], Instant)>,
     /// The heading of GLOBAL_POSITION_INT, radians.
     heading: Option<(f64, Instant)>,
-    absence: Absence,
+    absence: Lasting,
 }
 
 impl Attitude {

@@ -1,30 +1,30 @@
-//! Something that an autopilot should report and does not.
+//! What is wrong with the reports of an autopilot for a while.
 
 use scenecast_protocol::time::Instant;
 use std::time::Duration;
 
-/// Time between two notes of the same absence.
+/// Time between two notes of the same trouble.
 const NOTE_PERIOD: Duration = Duration::from_secs(60);
 
-/// Since when it is missing, and what people were told.
+/// Since when something is missing or cannot be, and what people were told.
 #[derive(Debug, Default)]
-pub(super) struct Absence {
-    /// `None` while it is there.
+pub(super) struct Lasting {
+    /// `None` while all is well.
     since: Option<Instant>,
-    /// Whether people were told of this absence.
+    /// Whether people were told of it since.
     is_told: bool,
     /// When people were told last.
     told: Option<Instant>,
 }
 
-impl Absence {
-    /// It is there.
-    pub(super) fn end(&mut self) {
-        (self.since, self.is_told) = (None, false);
+impl Lasting {
+    /// All is well. Returns whether people were told that it was not.
+    pub(super) fn end(&mut self) -> bool {
+        self.since = None;
+        std::mem::take(&mut self.is_told)
     }
 
-    /// It is missing; returns whether people should know now: once, as soon as it has been missing for `after`, and at most once a
-    /// minute.
+    /// It goes on; returns whether people should know now: once, as soon as it has lasted for `after`, and at most once a minute.
     pub(super) fn is_news(&mut self, after: Duration, now: Instant) -> bool {
         let since = *self.since.get_or_insert(now);
         let is_recent = self.told.is_some_and(|at| now.since(at) < NOTE_PERIOD);
@@ -41,15 +41,15 @@ mod tests {
     use super::*;
 
     #[test]
-    fn an_absence_is_named_once_and_a_flickering_one_once_a_minute() {
+    fn a_trouble_is_named_once_and_one_that_flickers_once_a_minute() {
         let told = |is_there: fn(u32) -> bool| {
-            let mut absence = Absence::default();
+            let mut trouble = Lasting::default();
             let second = |s: u32| {
                 if is_there(s) {
-                    absence.end();
+                    trouble.end();
                     return false;
                 }
-                absence.is_news(Duration::from_secs(3), Instant::from_secs_f64(f64::from(s)))
+                trouble.is_news(Duration::from_secs(3), Instant::from_secs_f64(f64::from(s)))
             };
             (0..100).map(second).enumerate().filter(|(_, is_told)| *is_told).map(|(s, _)| s).collect::<Vec<_>>()
         };
