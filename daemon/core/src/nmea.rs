@@ -104,6 +104,12 @@ pub fn fields(sentence: &[u8]) -> Result<Vec<&str>, NmeaError> {
     Ok(body.split(',').collect())
 }
 
+/// The two letters of who speaks, such as `GP`; a maker's own sentences have none.
+pub fn talker(sentence: &[u8]) -> Option<&str> {
+    let talker = sentence.strip_prefix(b"$")?.get(..2).filter(|letters| !letters.starts_with(b"P"))?;
+    std::str::from_utf8(talker).ok()
+}
+
 /// Parses a sentence; empty for one that is not used here.
 pub fn parse(sentence: &[u8]) -> Result<Vec<Sentence>, NmeaError> {
     let all = fields(sentence)?;

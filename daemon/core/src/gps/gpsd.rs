@@ -31,8 +31,10 @@ const CONFIDENCE: f64 = 1.96;
 struct Report(Map<String, Value>);
 
 impl Report {
-    fn parse(line: &[u8]) -> Option<Self> {
-        serde_json::from_slice(line).or_else(|_| serde_json::from_slice(&without_nan(line))).ok().map(Self)
+    /// The objects of a line; `None` for the rest of a line that is none.
+    fn all_of(line: &[u8]) -> Vec<Option<Self>> {
+        let objects = serde_json::Deserializer::from_slice(line).into_iter();
+        objects.map(|object| object.ok().map(Self)).collect()
     }
 
     fn text(&self, name: &str) -> Option<&str> {
@@ -71,12 +73,20 @@ fn without_nan(line: &[u8]) -> Vec<u8> {
     out
 }
 
-/// Parses a line; `None` if it is no report or has an impossible position.
-pub fn parse(line: &[u8]) -> Option<Said> {
-    let report = Report::parse(line)?;
+/// Parses a line, which may have several reports where an end of line was lost; `None` for what is no report or has an impossible
+/// position.
+pub fn all_of(line: &[u8]) -> Vec<Option<Said>> {
+    let mut reports = Report::all_of(line);
+    if reports.iter().any(Option::is_none) {
+        reports = Report::all_of(&without_nan(line));
+    }
+    reports.into_iter().map(|report| said_by(&report?)).collect()
+}
+
+fn said_by(report: &Report) -> Option<Said> {
     match report.text("class")? {
-        "TPV" => position(&report).map(|said| Said { device: report.text("device").map(str::to_owned), ..said }),
-        "ATT" => Some(Said { sentences: heading(&report), ..Said::default() }),
+        "TPV" => position(report).map(|said| Said { device: report.text("device").map(str::to_owned), ..said }),
+        "ATT" => Some(Said { sentences: heading(report), ..Said::default() }),
         _ => Some(Said::default()),
     }
 }
@@ -117,6 +127,20 @@ fn time_of_day(iso: &str) -> Option<f64> {
 mod tests {
     use super::*;
     use proptest::prelude::*;
+
+    /// The first report of a line.
+    fn parse(line: &[u8]) -> Option<Said> {
+        all_of(line).into_iter().next().flatten()
+    }
+
+    #[test]
+    fn reports_that_share_a_line_are_all_read() {
+        let nan = r#"{"class":"SKY","hdop":nan}"#;
+        let read = |line: &str| all_of(line.as_bytes()).iter().map(Option::is_some).collect::<Vec<_>>();
+        assert_eq!(read(&[TPV, nan, TPV].concat()), [true; 3]);
+        assert_eq!(all_of([TPV, TPV].concat().as_bytes())[1], parse(TPV.as_bytes()));
+        assert_eq!(read(&[TPV, &TPV[..40]].concat()), [true, false]);
+    }
 
     const TPV: &str = r#"{"class":"TPV","device":"/dev/pts/1","time":"2005-06-08T10:34:48.283Z","ept":0.005,"lat":46.498293369,"lon":7.567411672,"alt":1343.127,"eph":36.000,"epv":32.321,"track":10.3788,"speed":0.091,"climb":-0.085,"mode":3}"#;
 

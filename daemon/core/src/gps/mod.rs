@@ -77,14 +77,15 @@ impl GpsFix {
 }
 
 /// What one kind of sentence has said.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Default)]
 struct KindHealth {
     /// The last place, and since when it is the same.
     told: Option<(LatLon, Instant)>,
     /// The last time of day, and since when it is the same.
     utc: Option<(f64, Instant)>,
-    /// When a position of it was used last.
+    /// When a position of it was used last, and of which receiver.
     used: Option<Instant>,
+    receiver: Option<String>,
 }
 
 /// A receiver as its bytes come in.
@@ -95,8 +96,6 @@ pub struct Gps {
     faults: BTreeMap<GpsFault, u64>,
     first_fix: FirstFix,
     fix: Option<GpsFix>,
-    /// The receiver of that fix, where a daemon has several.
-    device: Option<String>,
     kinds: BTreeMap<PositionKind, KindHealth>,
     /// Places near each other that were too far from the last good one, less good ones since, and the last of them.
     jumps: (u32, Option<GpsFix>),
@@ -104,6 +103,9 @@ pub struct Gps {
     untold: u32,
     told: Option<Instant>,
     note: Option<String>,
+    /// Whether people were told of a second receiver, and of one that stands still.
+    is_second_told: bool,
+    is_frozen_told: bool,
     /// Way over ground: speed in m/s, course, when.
     motion: Option<(f64, Option<f64>, Instant)>,
     heading: Option<(f64, Instant)>,
@@ -137,12 +139,13 @@ impl Gps {
             faults: BTreeMap::new(),
             first_fix: FirstFix::default(),
             fix: None,
-            device: None,
             kinds: BTreeMap::new(),
             jumps: (0, None),
             untold: 0,
             told: None,
             note: None,
+            is_second_told: false,
+            is_frozen_told: false,
             motion: None,
             heading: None,
         }
@@ -202,13 +205,14 @@ impl Gps {
 
     fn handle_line(&mut self, line: &[u8], now: Instant) -> Vec<GpsFix> {
         if self.language == GpsLanguage::Gpsd {
-            return self.handle_said(gpsd::parse(line), now).into_iter().collect();
+            let reports = gpsd::all_of(line).into_iter();
+            return reports.filter_map(|said| self.handle_said(said, now)).collect();
         }
         let mut fixes = Vec::new();
         // Other vessels, by AIS, begin with another sign.
         for sentence in nmea::sentences(line).filter(|sentence| !sentence.starts_with(b"!")) {
             fixes.extend(match nmea::parse(sentence) {
-                Ok(said) => self.handle_sentences(said, None, now),
+                Ok(said) => self.handle_sentences(said, None, nmea::talker(sentence), now),
                 Err(nmea::NmeaError::Checksum) => self.refuse(GpsFault::Checksum),
                 Err(_) => self.refuse(GpsFault::Unreadable),
             });
@@ -216,22 +220,27 @@ impl Gps {
         fixes
     }
 
-    /// Follows one receiver of a daemon that has several, whose antennas stand apart, until it has had no position for a while.
     fn handle_said(&mut self, said: Option<gpsd::Said>, now: Instant) -> Option<GpsFix> {
         let Some(said) = said else { return self.refuse(GpsFault::Unreadable) };
-        let followed =
-            self.device.as_ref().filter(|_| self.fix.is_some_and(|last| now.since(last.at) < Self::BETTER_LASTS));
-        if followed.is_some() && said.device.is_some() && followed != said.device.as_ref() {
-            return self.refuse(GpsFault::Repeated);
-        }
-        let fix = self.handle_sentences(said.sentences, said.sigma_m, now);
-        if fix.is_some() {
-            self.device = said.device;
-        }
-        fix
+        self.handle_sentences(said.sentences, said.sigma_m, said.device.as_deref(), now)
     }
 
-    fn handle_sentences(&mut self, sentences: Vec<Sentence>, sigma_m: Option<f64>, now: Instant) -> Option<GpsFix> {
+    /// Takes what a receiver said: a device of gpsd, or a talker of NMEA 0183.
+    fn handle_sentences(
+        &mut self,
+        sentences: Vec<Sentence>,
+        sigma_m: Option<f64>,
+        receiver: Option<&str>,
+        now: Instant,
+    ) -> Option<GpsFix> {
+        let position = |sentence: &Sentence| match sentence {
+            Sentence::Position { kind, .. } => Some(*kind),
+            _ => None,
+        };
+        let kind = sentences.iter().find_map(position);
+        if kind.is_some_and(|kind| self.is_of_second(kind, receiver, now)) {
+            return self.refuse(GpsFault::Repeated);
+        }
         // The motion first: it says whether a place that stays the same is frozen.
         for sentence in &sentences {
             match *sentence {
@@ -240,7 +249,7 @@ impl Gps {
                 _ => {}
             }
         }
-        sentences.into_iter().find_map(|sentence| match sentence {
+        let fix = sentences.into_iter().find_map(|sentence| match sentence {
             Sentence::Position { kind, place, utc_s, hdop, is_corrected } => {
                 let plain = Self::PLAIN_SIGMA_M * hdop.unwrap_or(1.5).clamp(0.5, 50.0);
                 let sigma_m = sigma_m.unwrap_or(if is_corrected { plain / 3.0 } else { plain }).clamp(0.02, 200.0);
@@ -248,7 +257,29 @@ impl Gps {
             }
             Sentence::NoPosition => self.refuse(GpsFault::NoPosition),
             _ => None,
-        })
+        })?;
+        if let Some(health) = kind.and_then(|kind| self.kinds.get_mut(&kind)) {
+            health.receiver = receiver.map(str::to_owned);
+        }
+        Some(fix)
+    }
+
+    /// Whether another receiver than this one is followed. Antennas stand apart: where several receivers give positions, one is
+    /// followed until it has had none for a while.
+    fn is_of_second(&mut self, kind: PositionKind, receiver: Option<&str>, now: Instant) -> bool {
+        let is_fresh = |health: &&KindHealth| health.used.is_some_and(|at| now.since(at) < Self::BETTER_LASTS);
+        let followed = self.kinds.get(&kind).filter(is_fresh).and_then(|health| health.receiver.as_deref());
+        let Some((followed, other)) = followed.zip(receiver).filter(|(followed, other)| followed != other) else {
+            return false;
+        };
+        if self.note.is_none() && !self.is_second_told {
+            self.is_second_told = true;
+            self.note = Some(format!(
+                "positions come from {followed} and {other}, as of two receivers: {followed} is followed until it has had none for {} s",
+                Self::BETTER_LASTS.as_secs()
+            ));
+        }
+        true
     }
 
     fn handle_position(&mut self, kind: PositionKind, fix: GpsFix, utc_s: Option<f64>) -> Option<GpsFix> {
@@ -322,7 +353,15 @@ impl Gps {
         let moves = self.motion.is_some_and(|(v, _, at)| v > Self::COURSE_SPEED_M_S && now.since(at) < Self::FROZEN);
         let is_place_frozen = moves && now.since(same_place) > Self::FROZEN;
         let is_time_frozen = utc_s.is_some() && health.utc.is_some_and(|(_, at)| now.since(at) > Self::FROZEN);
-        is_place_frozen || is_time_frozen
+        let is_frozen = is_place_frozen || is_time_frozen;
+        if is_frozen && self.note.is_none() && !std::mem::replace(&mut self.is_frozen_told, true) {
+            let what = match is_time_frozen {
+                true => "the time (UTC) of its positions stands still",
+                false => "it repeats one place although it reports motion",
+            };
+            self.note = Some(format!("the receiver is frozen: {what}, and they are not used; restart it"));
+        }
+        is_frozen
     }
 
     fn refuse<T>(&mut self, fault: GpsFault) -> Option<T> {
@@ -370,6 +409,20 @@ mod tests {
     }
 
     #[test]
+    fn two_receivers_in_one_burst_leave_no_doubt_and_are_named_once() {
+        let mut gps = Gps::new(GpsLanguage::Nmea);
+        let mut notes = Vec::new();
+        for second in 0..60 {
+            let other = nmea::line(gga(29.501, second).trim_start_matches("$GP").split('*').next().unwrap());
+            let other = nmea::line(&format!("GN{}", other.trim_start_matches('$').split('*').next().unwrap()));
+            let fixes = gps.handle_bytes((gga(29.5, second) + &other).as_bytes(), at(f64::from(second)));
+            assert!(fixes.len() == 1 && (fixes[0].place.lat_deg - 29.5).abs() < 1e-6 && !gps.is_contested());
+            notes.extend(gps.poll_note());
+        }
+        assert!(notes.len() == 1 && notes[0].contains("from GP and GN"), "{notes:?}");
+    }
+
+    #[test]
     fn positions_come_out_of_pieces_of_lines() {
         let mut gps = Gps::new(GpsLanguage::Nmea);
         let stream = format!("garbage\r\n{}{}", gga(29.5, 1), gga(29.50001, 2));
@@ -412,6 +465,7 @@ mod tests {
         let mut gps = Gps::new(GpsLanguage::Nmea);
         let used = (0..20).filter(|&s| !gps.handle_bytes(gga(29.5, 7).as_bytes(), at(f64::from(s))).is_empty()).count();
         assert_eq!((used, faults(&gps)), (6, vec![("frozen", 14)]));
+        assert!(gps.poll_note().unwrap().contains("the time (UTC) of its positions stands still"));
         assert_eq!(gps.handle_bytes(gga(29.5, 27).as_bytes(), at(20.0)).len(), 1, "it is back");
     }
 
