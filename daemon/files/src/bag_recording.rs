@@ -208,6 +208,13 @@ impl Recording {
             )
         });
         let track = PoseTrack::of(poses, timing.max_gap);
+        let unreachable = (track.unreachable() > 0).then(|| {
+            format!(
+                "{} messages of {} are left out, because no vehicle can reach their place from the one before",
+                track.unreachable(),
+                odometry.name
+            )
+        });
         let bag = Arc::new(Bag::new(path, images, timing.bits));
         let mut frames: Vec<(Stamp, RecordedFrame)> = Vec::new();
         let of_topic = contents.images.iter().filter(|(topic, _)| *topic == *bag.topic());
@@ -237,7 +244,7 @@ impl Recording {
             return Err(UserError::file(path, cause));
         };
         let dropped = left_out.all - frames.len() as u64;
-        let mut notes: Vec<String> = note.into_iter().chain(unusable).collect();
+        let mut notes: Vec<String> = note.into_iter().chain(unusable).chain(unreachable).collect();
         if dropped > 0 {
             notes.push(format!("{dropped} of {} images are left out: {left_out}", left_out.all));
         }
@@ -265,6 +272,11 @@ mod tests {
 
     /// The same with a pose for each of these w of its quaternion, whose other members are 0.
     fn bag_with(name: &str, infos: &[CameraInfo], turns: &[f64]) -> PathBuf {
+        bag_at(name, infos, &turns.iter().map(|w| (0.0, *w)).collect::<Vec<_>>())
+    }
+
+    /// The same with a place east beside each w.
+    fn bag_at(name: &str, infos: &[CameraInfo], poses_of: &[(f64, f64)]) -> PathBuf {
         let path = std::env::temp_dir().join(format!("scenecast-{}-{name}.mcap", std::process::id()));
         let mut writer = mcap::Writer::new(std::fs::File::create(&path).unwrap()).unwrap();
         let mut sequence = 0;
@@ -275,8 +287,9 @@ mod tests {
             (image.header.stamp.sec, image.data) = (sec, vec![50; 24]);
             images.push(image);
         }
-        for (sec, w) in (1..).zip(turns) {
+        for (sec, (east, w)) in (1..).zip(poses_of) {
             let mut odometry = Odometry::default();
+            odometry.pose.pose.position.x = *east;
             (odometry.header.stamp.sec, odometry.pose.pose.orientation.w) = (sec, *w);
             poses.push(odometry);
         }
@@ -369,6 +382,14 @@ mod tests {
                 "1 of 2 messages of /odometry have no time, a position that is not finite, or a quaternion"
             )
         );
+    }
+
+    #[test]
+    fn a_pose_that_no_vehicle_reaches_is_left_out_and_named() {
+        let recording = open(&bag_at("spike", &[], &[(0.0, 1.0), (500.0, 1.0), (1.0, 1.0)]), |_| {});
+        let places: Vec<f64> = recording.frames.iter().map(|frame| frame.x_m).collect();
+        assert_eq!(places, [0.0, 0.5]);
+        assert!(recording.notes[0].starts_with("1 messages of /odometry are left out, because no vehicle"));
     }
 
     #[test]

@@ -58,7 +58,7 @@ pub enum CameraFault {
     NoBottomLock,
     /// The dead reckoning of the source began anew, and its track continues at the last pose.
     DeadReckoningReset,
-    /// A heading, a depth or a height above the sea floor of the source was one that no vehicle can reach so fast.
+    /// A place, a heading, a depth or a height above the sea floor of the source was one that no vehicle can reach so fast.
     PoseJump,
 }
 

@@ -91,6 +91,7 @@ impl<I> FrameMatcher<I> {
     /// Takes all poses of a mission, in order of time; those in a file need no time of arrival.
     pub fn set_poses(&mut self, poses: impl IntoIterator<Item = (Stamp, SensorPose)>) {
         self.track = PoseTrack::of(poses, self.limits.max_gap);
+        (0..self.track.unreachable()).for_each(|_| self.tally.count(CameraFault::PoseJump));
     }
 
     /// Takes a pose of the time `stamp` that came in at `arrival`.

@@ -69,10 +69,27 @@ const JUMP: Duration = Duration::from_secs(1);
 /// Poses in a row from which a clock that went back is believed.
 const JUMP_POSES: u32 = 3;
 
+/// Faster than this is no vehicle, metres a second.
+const FASTEST_M_S: f64 = 20.0;
+
+/// A step at once that is no jump, metres.
+const STEP_M: f64 = 5.0;
+
+/// Poses elsewhere that follow each other for so many seconds are right.
+const PERSISTS_S: f64 = 1.0;
+
+/// Whether a vehicle can come from a pose to a later one.
+fn leads_to((before, from): (Stamp, SensorPose), (later, to): (Stamp, SensorPose)) -> bool {
+    let moved = (to.x_m - from.x_m).hypot(to.y_m - from.y_m);
+    moved <= STEP_M + FASTEST_M_S * later.seconds_since(before)
+}
+
 /// Poses in order of their stamps.
 #[derive(Debug, Clone)]
 pub struct PoseTrack {
     poses: VecDeque<(Stamp, SensorPose)>,
+    /// Poses that were left out because no vehicle can reach them from the one before.
+    unreachable: usize,
     max_gap: Duration,
     /// Poses in a row that were from before the last one.
     earlier: u32,
@@ -84,18 +101,48 @@ impl PoseTrack {
 
     /// No pose is interpolated between two that are more than `max_gap` apart.
     pub fn new(max_gap: Duration) -> Self {
-        Self { poses: VecDeque::new(), max_gap, earlier: 0 }
+        Self { poses: VecDeque::new(), unreachable: 0, max_gap, earlier: 0 }
     }
 
-    /// A track of all these poses, however many; those that are not later than the one before are left out.
+    /// A track of all these poses, however many; those that are not later than the one before are left out, and those that no vehicle
+    /// can reach from it, unless they stay.
     pub fn of(poses: impl IntoIterator<Item = (Stamp, SensorPose)>, max_gap: Duration) -> Self {
         let mut track = Self::new(max_gap);
-        for (stamp, pose) in poses {
-            if pose.is_finite() && track.poses.back().is_none_or(|(last, _)| *last < stamp) {
-                track.poses.push_back((stamp, pose));
+        // Poses that follow each other, and that the last one of the track does not lead to.
+        let mut elsewhere: Vec<(Stamp, SensorPose)> = Vec::new();
+        for posed in poses.into_iter().filter(|(_, pose)| pose.is_finite()) {
+            let newest = elsewhere.last().or(track.poses.back());
+            if newest.is_some_and(|(last, _)| *last >= posed.0) {
+                continue;
+            }
+            if track.last().is_none_or(|last| leads_to(last, posed)) {
+                track.unreachable += elsewhere.drain(..).count();
+                track.poses.push_back(posed);
+                continue;
+            }
+            if elsewhere.last().is_some_and(|last| !leads_to(*last, posed)) {
+                track.unreachable += elsewhere.drain(..).count();
+            }
+            elsewhere.push(posed);
+            if elsewhere.first().is_some_and(|(first, _)| posed.0.seconds_since(*first) >= PERSISTS_S) {
+                track.continue_at(&mut elsewhere);
             }
         }
+        track.unreachable += elsewhere.len();
         track
+    }
+
+    /// Believes poses elsewhere. A track of one pose before was wrong itself.
+    fn continue_at(&mut self, elsewhere: &mut Vec<(Stamp, SensorPose)>) {
+        if self.poses.len() == 1 {
+            self.unreachable += self.poses.drain(..).count();
+        }
+        self.poses.extend(elsewhere.drain(..));
+    }
+
+    /// How many of all poses were left out because no vehicle can reach them from the one before.
+    pub fn unreachable(&self) -> usize {
+        self.unreachable
     }
 
     /// Takes a pose. Returns whether the clock of the poses went back, so that earlier poses were forgotten. A pose of the
@@ -183,6 +230,20 @@ mod tests {
         assert_eq!(track.at(seconds(11.6)), PoseMatch::NotYet);
         track.push(seconds(12.0), at(f64::NAN, 0.0));
         assert_eq!(track.last().unwrap().0, seconds(11.5));
+    }
+
+    #[test]
+    fn a_place_that_no_vehicle_reaches_is_left_out_unless_it_stays() {
+        let places = |x_m: fn(i32) -> f64| {
+            let poses = (0..40).map(|i| (seconds(100.0 + f64::from(i) / 4.0), at(x_m(i), 0.0)));
+            let track = PoseTrack::of(poses, Duration::from_secs(1));
+            let furthest = track.poses.iter().map(|(_, pose)| pose.x_m).fold(0.0, f64::max);
+            (track.poses.len(), track.unreachable(), furthest)
+        };
+        assert_eq!(places(|i| if i == 20 { 400.0 } else { 1.0 }), (39, 1, 1.0));
+        assert_eq!(places(|i| if i == 0 || i == 39 { 400.0 } else { 1.0 }), (38, 2, 1.0));
+        assert_eq!(places(|i| if i < 20 { 1.0 } else { 400.0 }), (40, 0, 400.0));
+        assert_eq!(places(|i| 4.0 * f64::from(i)), (40, 0, 156.0));
     }
 
     #[test]

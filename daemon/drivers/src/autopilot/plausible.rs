@@ -79,7 +79,7 @@ const PLACE_NORTH: Bounds = Bounds {
     name: "position north",
     counter: "position_jumps",
     unit: "m",
-    rate: 10.0,
+    rate: 20.0,
     margin: 5.0,
     persists: Duration::from_secs(1),
     least: f64::NEG_INFINITY,

@@ -153,7 +153,9 @@ impl LiveCamera {
             SourceReport::Reading(Reading::Image(image)) => self.handle_image(image),
             SourceReport::Reading(Reading::Pose(stamp, pose)) => {
                 let (pose, jumps) = self.poses.handle_pose(stamp, pose, self.clock.now());
-                self.matcher.handle_pose(stamp, self.clock.now(), pose);
+                if let Some(pose) = pose {
+                    self.matcher.handle_pose(stamp, self.clock.now(), pose);
+                }
                 for jump in jumps {
                     self.matcher.count(CameraFault::PoseJump);
                     jump.note.into_iter().for_each(|note| self.faults.handle_fault(CameraFault::PoseJump, note));

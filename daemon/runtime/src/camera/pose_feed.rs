@@ -46,18 +46,27 @@ impl PoseFeed {
     }
 
     /// Takes a pose that the source measured at `stamp`. Returns it with the heading, the depth and the height above the sea floor that
-    /// can be, and the jumps that were found.
-    pub(super) fn handle_pose(&mut self, stamp: Stamp, pose: SensorPose, now: Stamp) -> (SensorPose, Vec<Jump>) {
+    /// can be, and the jumps that were found; `None` in place of a pose that no vehicle can reach so fast, until it stays.
+    pub(super) fn handle_pose(
+        &mut self,
+        stamp: Stamp,
+        pose: SensorPose,
+        now: Stamp,
+    ) -> (Option<SensorPose>, Vec<Jump>) {
         let SensorPose { x_m, y_m, heading_rad, depth_m, altitude_m, .. } = pose;
         let measured = Step { heading_rad: Some(heading_rad), depth_m: Some(depth_m), altitude_m, ..Step::default() };
         // Only differences of these times count.
         let at = Instant::from_micros((stamp.nanos() / 1000).max(0) as u64);
-        let (step, jumps) = self.plausible.check(measured, at);
+        let (step, mut jumps) = self.plausible.check(measured, at);
+        jumps.extend(self.plausible.check_place((y_m, x_m), at));
+        if self.plausible.is_place_in_doubt() {
+            return (None, jumps);
+        }
         let (heading_rad, depth_m) = (step.heading_rad.unwrap_or(heading_rad), step.depth_m.unwrap_or(depth_m));
         self.is_new = true;
         self.posed.0 = now;
         self.newest = Some(CameraPose { x_m, y_m, heading_rad, depth_m });
-        (SensorPose { heading_rad, depth_m, altitude_m: step.altitude_m, ..pose }, jumps)
+        (Some(SensorPose { heading_rad, depth_m, altitude_m: step.altitude_m, ..pose }), jumps)
     }
 
     /// The autopilot's pose, if images are mapped at it and it is a new one: a pose that is not measured again is not that of
@@ -171,11 +180,29 @@ mod tests {
             let altitude_m = Some(if tenths % 40 == 20 { 60.0 } else { 2.0 });
             let at = clock.now().after(Duration::from_millis(100 * tenths));
             let (pose, jumps) = feed.handle_pose(at, SensorPose { altitude_m, ..SensorPose::default() }, clock.now());
-            heights.push(pose.altitude_m);
+            heights.push(pose.unwrap().altitude_m);
             notes.extend(jumps.into_iter().filter_map(|jump| jump.note));
         }
         assert_eq!(heights, [Some(2.0); 100]);
         assert_eq!(notes.len(), 1, "{notes:?}");
         assert!(notes[0].starts_with("the height above the sea floor jumps from 2.0 to 60.0 m"), "{notes:?}");
+    }
+
+    #[test]
+    fn a_place_that_no_vehicle_reaches_is_no_pose_until_it_stays() {
+        let clock = ArrivalClock::start();
+        let mut feed = PoseFeed::new(&Config::default(), None, &clock);
+        let mut notes = Vec::new();
+        let mut places = Vec::new();
+        for tenths in 0..60 {
+            let x_m = if tenths == 20 || tenths >= 40 { 400.0 } else { 1.0 };
+            let at = clock.now().after(Duration::from_millis(100 * tenths));
+            let (pose, jumps) = feed.handle_pose(at, SensorPose { x_m, ..SensorPose::default() }, clock.now());
+            places.extend(pose.map(|pose| (tenths, pose.x_m)));
+            notes.extend(jumps.into_iter().filter_map(|jump| jump.note));
+        }
+        assert!(places.iter().all(|(tenths, x_m)| *x_m == if *tenths < 50 { 1.0 } else { 400.0 }), "{places:?}");
+        assert!((48..=50).contains(&places.len()) && feed.newest().is_some_and(|pose| pose.x_m == 400.0), "{places:?}");
+        assert!(notes[0].starts_with("the position east jumps from 1.0 to 400.0 m"), "{notes:?}");
     }
 }
