@@ -314,6 +314,19 @@ fn chunk_reader() -> LinearReader {
     LinearReader::new_with_options(options)
 }
 
+/// How to convert a part of a bag that is of another format, if it was not converted yet: a recorder that broke down leaves its last
+/// file, or all others, uncompressed.
+fn unread_part(path: &Path) -> Option<&'static str> {
+    let extension = |path: &Path| path.extension().map(|e| e.to_string_lossy().into_owned());
+    let own = extension(path)?;
+    let format = OTHER_FORMATS.iter().find(|other| other.extensions.contains(&own.as_str()))?;
+    let (converted, is_part) = match format.magic {
+        ZSTD => (path.with_extension(""), extension(&path.with_extension(""))? == "mcap"),
+        _ => (path.with_extension("mcap"), true),
+    };
+    (is_part && !converted.exists()).then_some(format.advice)
+}
+
 fn files_of(dir: &Path) -> Result<Vec<PathBuf>, UserError> {
     let entries = std::fs::read_dir(dir).map_err(|e| UserError::file(dir, e))?;
     let paths: Vec<PathBuf> = entries.filter_map(|entry| Some(entry.ok()?.path())).collect();
@@ -324,13 +337,8 @@ fn files_of(dir: &Path) -> Result<Vec<PathBuf>, UserError> {
         let other = OTHER_FORMATS.iter().find(|other| other.extensions.iter().any(is_there));
         return Err(UserError::file(dir, other.map_or("the folder has no file *.mcap", |other| other.advice)));
     }
-    // A recorder that broke down leaves its last file, or all others, uncompressed.
-    let is_missing = |path: &&PathBuf| {
-        let whole = path.with_extension("");
-        (ends_in(path, "zstd") || ends_in(path, "zst")) && ends_in(&whole, "mcap") && !whole.exists()
-    };
-    if let Some(packed) = paths.iter().find(is_missing) {
-        return Err(UserError::file(packed, "a part of the bag is compressed as a whole: zstd -d *.zstd unpacks it"));
+    if let Some((part, advice)) = paths.iter().find_map(|path| Some((path, unread_part(path)?))) {
+        return Err(UserError::file(part, format!("a part of the bag is of another format: {advice}")));
     }
     // The files of a split bag end in _0, _1, ..., _10.
     files.sort_by_key(|path| (path.as_os_str().len(), path.clone()));
@@ -362,7 +370,7 @@ mod tests {
     }
 
     #[test]
-    fn a_bag_with_a_compressed_part_is_refused_until_it_is_unpacked() {
+    fn a_bag_with_a_part_of_another_format_is_refused() {
         let dir = std::env::temp_dir().join(format!("scenecast-{}-part-of-a-bag", std::process::id()));
         let _ = std::fs::remove_dir_all(&dir);
         std::fs::create_dir_all(&dir).unwrap();
@@ -371,7 +379,13 @@ mod tests {
         }
         assert!(files_of(&dir).unwrap_err().to_string().contains("bag_1.mcap.zstd"));
         std::fs::write(dir.join("bag_1.mcap"), b"x").unwrap();
-        assert_eq!(files_of(&dir).unwrap(), [dir.join("bag_0.mcap"), dir.join("bag_1.mcap")]);
+        let both = [dir.join("bag_0.mcap"), dir.join("bag_1.mcap")];
+        assert_eq!(files_of(&dir).unwrap(), both);
+        std::fs::write(dir.join("bag_1.db3"), b"x").unwrap();
+        assert_eq!(files_of(&dir).unwrap(), both, "it was converted");
+        std::fs::write(dir.join("bag_2.db3"), b"x").unwrap();
+        let refused = files_of(&dir).unwrap_err().to_string();
+        assert!(refused.contains("bag_2.db3") && refused.contains("ros2 bag convert"), "{refused}");
         std::fs::remove_dir_all(dir).unwrap();
     }
 
