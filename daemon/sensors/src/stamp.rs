@@ -148,13 +148,13 @@ impl Stamp {
     }
 
     /// The time in the name of an image, as [`Self::parse_with_form`] reads it, unless the name only counts images or is the time of a
-    /// day: a whole number with a leading zero, or one that is no second of the years 2000 to 2099. The seconds of a clock that began
-    /// at 0, as of a simulator, have decimals.
+    /// day: a whole number with a leading zero, or one that is no time of the years 2000 to 2099. The seconds of a clock that began at 0,
+    /// as of a simulator, have decimals.
     pub fn of_name(stem: &str) -> Option<(Self, StampForm)> {
         let found = Self::parse_with_form(stem)?;
         let is_whole = stem.bytes().all(|b| b.is_ascii_digit());
-        let is_second = found.1 != StampForm::Seconds || EPOCHS_S.contains(&(found.0.0 / NANOS));
-        (!is_whole || is_second && !stem.starts_with('0')).then_some(found)
+        let is_time = EPOCHS_S.contains(&(found.0.0 / NANOS));
+        (!is_whole || is_time && !stem.starts_with('0')).then_some(found)
     }
 
     /// Seconds from `earlier` to this stamp; negative if it is later.
@@ -249,13 +249,23 @@ mod tests {
 
     #[test]
     fn numbers_that_count_images_are_no_times() {
-        for counter in
-            ["0001", "1", "000001", "00000001", "115442", "115442123", "0123456789", "9999999999", "000000000123"]
-        {
+        for counter in [
+            "0001",
+            "1",
+            "000001",
+            "00000001",
+            "115442",
+            "115442123",
+            "0123456789",
+            "9999999999",
+            "000000000123",
+            "261129145528",
+            "202611291455",
+            "201126000100",
+        ] {
             assert_eq!(Stamp::of_name(counter), None, "{counter}");
         }
-        for time in ["1795719000", "1795719000567", "123000000000", "10.5", "0.25", "20261126T185000", "20261126185000"]
-        {
+        for time in ["1795719000", "1795719000567", "10.5", "0.25", "20261126T185000", "20261126185000"] {
             assert_eq!(Stamp::of_name(time), Stamp::parse_with_form(time), "{time}");
             assert!(Stamp::of_name(time).is_some(), "{time}");
         }
