@@ -27,7 +27,7 @@ const SETTLED: Duration = Duration::from_millis(300);
 /// Files that were written this long before the folder is opened are live; older ones are not mapped.
 const LIVE: Duration = Duration::from_secs(2);
 
-/// A time in a name that is later than this computer's by more is named.
+/// A time of an image that is later than this computer's by more is named.
 const AHEAD: Duration = Duration::from_secs(600);
 
 /// Images of a folder, each as soon as it is complete. A name that is a number or a date is the time of its image, as in
@@ -68,14 +68,19 @@ impl ToldNames {
             let text = format!("{name}: {what}: the time in the image counts, or else its arrival");
             return self.forms.insert(None).then_some(text);
         };
+        self.handle_stamp(name, stamp, now)
+            .or_else(|| self.forms.insert(Some(form)).then(|| format!("{name}: names are read as {}", form.name())))
+    }
+
+    /// The time of an image, by its name or by itself; returns what people should know if it is far ahead of `now`, once.
+    fn handle_stamp(&mut self, name: &str, stamp: Stamp, now: SystemTime) -> Option<String> {
         let now = now.duration_since(SystemTime::UNIX_EPOCH).ok()?;
         let now = Stamp::from_nanos(i64::try_from(now.as_nanos()).ok()?);
         let ahead_s = stamp.seconds_since(now);
-        if ahead_s > AHEAD.as_secs_f64() && !std::mem::replace(&mut self.is_ahead_told, true) {
-            let hours = ahead_s / 3600.0;
-            return Some(format!("{name}: its time is {hours:.1} hours ahead of the clock of this computer"));
+        if ahead_s <= AHEAD.as_secs_f64() || std::mem::replace(&mut self.is_ahead_told, true) {
+            return None;
         }
-        self.forms.insert(Some(form)).then(|| format!("{name}: names are read as {}", form.name()))
+        Some(format!("{name}: its time is {:.1} hours ahead of the clock of this computer", ahead_s / 3600.0))
     }
 
     /// A file that is not named as one that is read; returns what people should know of it, once for each ending.
@@ -197,7 +202,13 @@ impl WatchSource {
         }
         complete.sort_by(|a, b| (a.0, &a.1).cmp(&(b.0, &b.1)));
         let arrival = self.clock.now();
-        self.ready.extend(complete.into_iter().map(|(stamp, _, bytes)| SourceImage::compressed(stamp, arrival, bytes)));
+        for (stamp, path, bytes) in complete {
+            let image = SourceImage::compressed(stamp, arrival, bytes);
+            let name = path.file_name().unwrap_or_default().to_string_lossy();
+            let own = image.stamp.and_then(|own| self.told.handle_stamp(&name, own, SystemTime::now()));
+            own.into_iter().for_each(|line| tracing::info!("camera: {line}"));
+            self.ready.push_back(image);
+        }
         Ok(())
     }
 }
@@ -355,6 +366,16 @@ mod tests {
         let ahead = told.handle("20261127T185000.jpg", now).unwrap();
         assert!(ahead.contains("24.0 hours ahead"), "{ahead}");
         assert_eq!(told.handle("1795719002567.jpg", now), None, "a form is told once");
+    }
+
+    #[test]
+    fn a_future_time_in_an_image_is_told_as_that_of_a_name() {
+        let folder = Folder::new("ahead");
+        let mut source = folder.source();
+        source.open().unwrap();
+        folder.write("a.ppm", b"P6\n# stamp=4000000000.5\n1 1\n255\nabc");
+        assert!(next(&mut source).is_some());
+        assert!(source.told.is_ahead_told);
     }
 
     #[test]
