@@ -2,7 +2,7 @@
 
 use crate::exif::{exif_orientation, exif_stamp};
 use crate::jpeg_end::{is_cut_jpeg, missing_rows};
-use crate::tiff_pages::{Prepared, has_all_its_data, prepared};
+use crate::tiff_pages::{Prepared, Samples, has_all_its_data, prepared, samples};
 use crate::{BitDepth, Stamp};
 use image::error::{ImageError, UnsupportedErrorKind};
 use image::metadata::Orientation;
@@ -36,6 +36,14 @@ pub enum DecodeError {
              gdal_translate -co PHOTOMETRIC=RGB -co COMPRESS=DEFLATE"
     )]
     OtherColours,
+    #[error(
+        "it is grey with transparency: convert it, as with gdal_translate -b 1 -b 1 -b 1 -b 2 -co PHOTOMETRIC=RGB -co ALPHA=YES"
+    )]
+    GreyWithAlpha,
+    #[error(
+        "its levels have {bits} bits: convert it to 8 bits, as with gdal_translate -ot Byte -co NBITS=8 -scale 0 {highest} 0 255"
+    )]
+    OddBits { bits: usize, highest: u64 },
     #[error("it breaks off before its last row")]
     CutOff,
     #[error(
@@ -141,8 +149,20 @@ fn decode_within(bytes: &[u8], max_pixels: u64, limits: Limits) -> Result<Dynami
     // Some files with LZW end too early for the library.
     decoded.map_err(|error| match error {
         DecodeError::CutOff if has_all_its_data(bytes) => DecodeError::OtherCompression,
+        DecodeError::OtherColours | DecodeError::WideLevels => cause_in_samples(bytes).unwrap_or(error),
         error => error,
     })
+}
+
+/// Why the pixels of a TIFF are not read; the library says only how many bits they have.
+fn cause_in_samples(bytes: &[u8]) -> Option<DecodeError> {
+    match samples(bytes)? {
+        Samples { bits: 8 | 16, count: 2, is_grey: true } => Some(DecodeError::GreyWithAlpha),
+        Samples { bits, .. } if bits < 32 && !matches!(bits, 8 | 16) => {
+            Some(DecodeError::OddBits { bits, highest: (1 << bits) - 1 })
+        }
+        Samples { .. } => None,
+    }
 }
 
 /// Decodes an image of a file and turns it upright as its EXIF data say. `limits` bounds its size and the memory for it.
@@ -329,6 +349,31 @@ mod tests {
             let with_exif = [&png[..33], &chunk, &png[33..]].concat();
             assert_eq!(decode(&with_exif, WHOLE).unwrap(), turned, "orientation {orientation}");
         }
+    }
+
+    #[test]
+    fn grey_with_transparency_and_odd_bits_of_a_tiff_are_named() {
+        let tiff = |bits: [u8; 2], count: u8| {
+            // Tag, type (short, or long for 273 and 279), count, value.
+            let fields: [(u16, u8, u8, [u8; 4]); 9] = [
+                (256, 3, 1, [2, 0, 0, 0]),
+                (257, 3, 1, [1, 0, 0, 0]),
+                (258, 3, count, [bits[0], 0, bits[1], 0]),
+                (259, 3, 1, [1, 0, 0, 0]),
+                (262, 3, 1, [1, 0, 0, 0]),
+                (273, 4, 1, [130, 0, 0, 0]),
+                (277, 3, 1, [count, 0, 0, 0]),
+                (278, 3, 1, [1, 0, 0, 0]),
+                (279, 4, 1, [8, 0, 0, 0]),
+            ];
+            let field = |(tag, kind, count, value): (u16, u8, u8, [u8; 4])| {
+                [&tag.to_le_bytes()[..], &[kind, 0, count, 0, 0, 0], &value].concat()
+            };
+            [&b"II*\0\x08\0\0\0\x09\0"[..], &fields.map(field).concat(), &[0; 20]].concat()
+        };
+        assert_eq!(decode(&tiff([8, 8], 2), WHOLE), Err(DecodeError::GreyWithAlpha));
+        assert_eq!(decode(&tiff([16, 16], 2), WHOLE), Err(DecodeError::GreyWithAlpha));
+        assert_eq!(decode(&tiff([12, 0], 1), WHOLE), Err(DecodeError::OddBits { bits: 12, highest: 4095 }));
     }
 
     #[test]

@@ -6,6 +6,9 @@ use std::borrow::Cow;
 const NEW_SUBFILE_TYPE: u16 = 254;
 const IMAGE_WIDTH: u16 = 256;
 const IMAGE_LENGTH: u16 = 257;
+const BITS_PER_SAMPLE: u16 = 258;
+const PHOTOMETRIC: u16 = 262;
+const SAMPLES_PER_PIXEL: u16 = 277;
 const PLANAR_CONFIGURATION: u16 = 284;
 const TILE_WIDTH: u16 = 322;
 const TILE_LENGTH: u16 = 323;
@@ -58,6 +61,24 @@ fn first_whole_page(tiff: &ExifData) -> Option<usize> {
     let next = |page: &usize| tiff.next_directory(*page);
     let is_whole = |page: &usize| tiff.number(*page, NEW_SUBFILE_TYPE).is_none_or(|kind| kind & NOT_WHOLE == 0);
     std::iter::successors(Some(first), next).take(MAX_PAGES).find(is_whole).or(Some(first))
+}
+
+/// The samples of the pixels of a TIFF's first whole page.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Samples {
+    pub(crate) bits: usize,
+    pub(crate) count: usize,
+    /// Whether the first one is a level of grey.
+    pub(crate) is_grey: bool,
+}
+
+pub(crate) fn samples(bytes: &[u8]) -> Option<Samples> {
+    let tiff = ExifData::of_tiff(bytes)?;
+    let page = first_whole_page(&tiff)?;
+    let number = |tag, default| tiff.numbers(page, tag).and_then(|all| all.first().copied()).unwrap_or(default);
+    // White may be 0.
+    let is_grey = number(PHOTOMETRIC, 0) < 2;
+    Some(Samples { bits: number(BITS_PER_SAMPLE, 1), count: number(SAMPLES_PER_PIXEL, 1), is_grey })
 }
 
 /// Whether all the data of the first whole page of a TIFF are in the file.
