@@ -12,6 +12,7 @@
 
 use crate::{CameraFault, SensorPose, Stamp};
 use serde::Deserialize;
+use serde::de::DeserializeOwned;
 use serde_json::Value;
 use std::time::Duration;
 
@@ -43,24 +44,10 @@ pub struct DvlPosition {
     pub yaw_rad: f64,
 }
 
-/// The types of objects that are used.
-const USED: [&str; 2] = ["velocity", "position_local"];
-
-/// All fields of both types; those of the other type are missing.
-#[derive(Deserialize)]
-struct Fields {
-    #[serde(rename = "type")]
-    kind: Option<String>,
-    ts: Option<f64>,
-    x: Option<f64>,
-    y: Option<f64>,
-    z: Option<f64>,
-    roll: Option<f64>,
-    pitch: Option<f64>,
-    yaw: Option<f64>,
-    altitude: Option<f64>,
-    velocity_valid: Option<bool>,
-    status: Option<u32>,
+/// A field of an object; `None` if it is missing or null.
+fn field<T: DeserializeOwned>(object: &Value, name: &'static str) -> Result<Option<T>, DvlError> {
+    let value = object.get(name).unwrap_or(&Value::Null);
+    Option::<T>::deserialize(value).map_err(|_| DvlError::Type(name))
 }
 
 /// A line that is not a report.
@@ -70,14 +57,16 @@ pub enum DvlError {
     NotJson,
     #[error("{0} is missing or too large")]
     Number(&'static str),
+    #[error("{0} is not of the type that the maker documents")]
+    Type(&'static str),
 }
 
 /// Largest position, metres, and largest time, seconds.
 const MAX_M: f64 = 1e6;
 const MAX_S: f64 = 1e10;
 
-fn number(value: Option<f64>, name: &'static str, most: f64) -> Result<f64, DvlError> {
-    value.filter(|value| value.abs() <= most).ok_or(DvlError::Number(name))
+fn number(object: &Value, name: &'static str, most: f64) -> Result<f64, DvlError> {
+    field::<f64>(object, name)?.filter(|value| value.abs() <= most).ok_or(DvlError::Number(name))
 }
 
 impl DvlReport {
@@ -93,32 +82,32 @@ impl DvlReport {
     fn of_object(object: Result<Value, DvlError>) -> Result<Option<Self>, DvlError> {
         let object = object?;
         match (object.is_object(), &object["type"]) {
-            (true, Value::String(kind)) if USED.contains(&kind.as_str()) => {}
-            (true, Value::String(_) | Value::Null) => return Ok(None),
-            _ => return Err(DvlError::NotJson),
+            (true, Value::String(kind)) if kind == "velocity" => Self::of_velocity(&object).map(Some),
+            (true, Value::String(kind)) if kind == "position_local" => Self::of_position(&object).map(Some),
+            (true, Value::String(_) | Value::Null) => Ok(None),
+            _ => Err(DvlError::NotJson),
         }
-        let fields = Fields::deserialize(object).map_err(|_| DvlError::NotJson)?;
-        match fields.kind.as_deref() {
-            Some("velocity") => {
-                let altitude = fields.altitude.filter(|m| *m > 0.0 && *m <= MAX_M);
-                Ok(Some(Self::Altitude(altitude.filter(|_| fields.velocity_valid == Some(true)))))
-            }
-            Some("position_local") if fields.status.unwrap_or(0) != 0 => Ok(Some(Self::PositionFault)),
-            Some("position_local") => {
-                let place = [(fields.x, "x"), (fields.y, "y"), (fields.z, "z")];
-                let [x, y, z] = place.map(|(value, name)| number(value, name, MAX_M));
-                let angles = [(fields.roll, "roll"), (fields.pitch, "pitch"), (fields.yaw, "yaw")];
-                let [roll, pitch, yaw] = angles.map(|(value, name)| number(value, name, 720.0));
-                Ok(Some(Self::Position(DvlPosition {
-                    ts_s: number(fields.ts, "ts", MAX_S)?,
-                    place: [x?, y?, z?],
-                    roll_rad: roll?.to_radians(),
-                    pitch_rad: pitch?.to_radians(),
-                    yaw_rad: yaw?.to_radians(),
-                })))
-            }
-            _ => Ok(None),
+    }
+
+    fn of_velocity(object: &Value) -> Result<Self, DvlError> {
+        let altitude = field::<f64>(object, "altitude")?.filter(|m| *m > 0.0 && *m <= MAX_M);
+        let is_valid = field(object, "velocity_valid")? == Some(true);
+        Ok(Self::Altitude(altitude.filter(|_| is_valid)))
+    }
+
+    fn of_position(object: &Value) -> Result<Self, DvlError> {
+        if field::<u32>(object, "status")?.unwrap_or(0) != 0 {
+            return Ok(Self::PositionFault);
         }
+        let length = |name| number(object, name, MAX_M);
+        let angle = |name| number(object, name, 720.0).map(f64::to_radians);
+        Ok(Self::Position(DvlPosition {
+            ts_s: number(object, "ts", MAX_S)?,
+            place: [length("x")?, length("y")?, length("z")?],
+            roll_rad: angle("roll")?,
+            pitch_rad: angle("pitch")?,
+            yaw_rad: angle("yaw")?,
+        }))
     }
 }
 
@@ -133,6 +122,9 @@ const CLOCK_DRIFT: f64 = 2e-4;
 
 /// A delay by which the log's clock must have been set back instead.
 const MAX_DELAY_S: f64 = 30.0;
+
+/// A log that sends velocities and no position for so many seconds is named.
+const POSITION_AWAITED_S: f64 = 2.0;
 
 /// A height counts for this long.
 const ALTITUDE_LASTS_S: f64 = 2.0;
@@ -151,13 +143,15 @@ pub struct DvlTrack {
     offset: Option<(f64, Stamp)>,
     altitude: Option<(f64, Stamp)>,
     has_bottom_lock: bool,
+    /// Since when a position is awaited.
+    awaited: Option<Stamp>,
 }
 
 impl DvlTrack {
     /// `heading_rad` is the heading at the reset of the log, clockwise from north.
     pub fn new(heading_rad: f64) -> Self {
         let origin = SensorPose { heading_rad, ..SensorPose::default() };
-        Self { origin, last: None, offset: None, altitude: None, has_bottom_lock: true }
+        Self { origin, last: None, offset: None, altitude: None, has_bottom_lock: true, awaited: None }
     }
 
     /// Takes a report that came in at `arrival`. Passes what people should read to `fault`.
@@ -174,13 +168,23 @@ impl DvlTrack {
                     fault(CameraFault::NoBottomLock, "its dead reckoning drifts until it is back".to_owned());
                 }
                 self.altitude = altitude.map(|m| (m, arrival));
+                let since = *self.awaited.get_or_insert(arrival);
+                if arrival.seconds_since(since) >= POSITION_AWAITED_S {
+                    self.awaited = Some(arrival);
+                    let text = "it sends velocities but no position_local: switch on its dead reckoning";
+                    fault(CameraFault::PosesStalled, text.to_owned());
+                }
                 None
             }
             DvlReport::PositionFault => {
+                self.awaited = Some(arrival);
                 fault(CameraFault::PoseRefused, "the log reports a fault of its dead reckoning".to_owned());
                 None
             }
-            DvlReport::Position(position) => Some(self.handle_position(position, arrival, fault)),
+            DvlReport::Position(position) => {
+                self.awaited = Some(arrival);
+                Some(self.handle_position(position, arrival, fault))
+            }
         }
     }
 
@@ -368,6 +372,27 @@ mod tests {
         handle(3.2, DvlReport::Altitude(None));
         handle(3.3, DvlReport::PositionFault);
         assert_eq!(faults, [CameraFault::NoBottomLock, CameraFault::PoseRefused]);
+    }
+
+    #[test]
+    fn velocities_without_a_position_are_named() {
+        let (mut track, mut texts) = (DvlTrack::new(0.0), Vec::new());
+        for tenths in 0..100 {
+            let now = at(f64::from(tenths) / 10.0);
+            if tenths < 30 {
+                track.handle(position(f64::from(tenths), 0.0, 0.0, 0.0), now, &mut |_, text| texts.push(text));
+            }
+            track.handle(DvlReport::Altitude(Some(2.0)), now, &mut |_, text| texts.push(text));
+        }
+        assert!(texts.len() == 3 && texts[0].contains("no position_local"), "{texts:?}");
+    }
+
+    #[test]
+    fn a_field_of_another_type_is_named() {
+        let valid = VELOCITY.replace("true,\"status\"", "1,\"status\"");
+        assert_eq!(parse(valid.as_bytes()), Err(DvlError::Type("velocity_valid")));
+        let status = POSITION.replace("\"status\": 0", "\"status\": -1");
+        assert_eq!(parse(status.as_bytes()), Err(DvlError::Type("status")));
     }
 
     proptest! {
