@@ -201,7 +201,7 @@ fn a_shell_sets_fence_and_limits_and_holds_and_resumes() {
     wait_until("it surveys", || vehicle()["status"]["mode"] == "survey");
 
     // A fence that the vehicle refuses, fences that the surface refuses, and files that are not a fence.
-    let back = r#"{"type": "Feature", "properties": {}, "geometry": {"type": "Point", "coordinates": [350, 350]}}"#;
+    let back = r#"{"type": "Feature", "properties": {"role": "return_point"}, "geometry": {"type": "Point", "coordinates": [350, 350]}}"#;
     let moved = fence.replace("-80", "300").replace("80", "400");
     let elsewhere = format!(r#"{{"type": "FeatureCollection", "features": [{moved}, {back}]}}"#);
     let refused = ctl(port, &["fence", "set", "--metres", &file("elsewhere.geojson", &elsewhere), "--wait", "80"]);

@@ -48,6 +48,17 @@ enum FeatureRole {
     ReturnPoint,
 }
 
+impl FeatureRole {
+    /// Its value in a file.
+    fn name(self) -> &'static str {
+        match self {
+            Self::Fence => "fence",
+            Self::KeepOut => "keep_out",
+            Self::ReturnPoint => "return_point",
+        }
+    }
+}
+
 /// Reads fence, keep-outs and return point.
 pub fn read_fence(file: &Path, frame: CoordinateFrame) -> Result<FenceShapes, UserError> {
     let shapes = shapes_of(&read_json(file)?, frame);
@@ -130,7 +141,8 @@ fn check_crs(whole: &Value, frame: CoordinateFrame) -> Result<(), String> {
 fn check_wgs84(crs: &Value) -> Result<(), String> {
     let name = crs["properties"]["name"].as_str().map_or_else(|| crs.to_string(), str::to_owned);
     let code = name.rsplit([':', '/']).next().unwrap_or_default();
-    let is_wgs84 = matches!(code, "CRS84" | "WGS84") || code == "4326" && name.to_ascii_uppercase().contains("EPSG");
+    let is_wgs84 = matches!(code, "CRS84" | "CRS84h" | "WGS84")
+        || matches!(code, "4326" | "4979") && name.to_ascii_uppercase().contains("EPSG");
     if is_wgs84 {
         return Ok(());
     }
@@ -149,8 +161,10 @@ fn shapes_of(whole: &Value, frame: CoordinateFrame) -> Result<FenceShapes, Strin
             }
         }
         Some("Feature") => add(&mut order, whole, frame)?,
-        Some("Polygon" | "MultiPolygon" | "Point") => {
-            add(&mut order, &serde_json::json!({ "geometry": whole }), frame)?;
+        Some("Polygon" | "MultiPolygon") => add(&mut order, &serde_json::json!({ "geometry": whole }), frame)?,
+        Some("Point") => {
+            let feature = serde_json::json!({ "properties": { "role": "return_point" }, "geometry": whole });
+            add(&mut order, &feature, frame)?;
         }
         other => {
             let expected = "expected a FeatureCollection, a Feature, or a geometry: Polygon, MultiPolygon, Point";
@@ -167,13 +181,22 @@ fn shapes_of(whole: &Value, frame: CoordinateFrame) -> Result<FenceShapes, Strin
 fn add(order: &mut FenceShapes, feature: &Value, frame: CoordinateFrame) -> Result<(), String> {
     let geometry = &feature["geometry"];
     if is_empty(geometry) {
-        return Ok(());
+        return match role(feature) {
+            Ok(Some(role)) => Err(format!("it has role = {} and no geometry: draw it, or leave it out", role.name())),
+            Ok(None) | Err(_) => Ok(()),
+        };
     }
     let role = role(feature)?;
     if role.is_none() && property(feature, "weight").is_some_and(Value::is_number) {
         return Err("it has a weight: scenecast ctl areas reads weighted areas, and a fence has none".to_owned());
     }
-    if geometry["type"] == "Point" && matches!(role, None | Some(FeatureRole::ReturnPoint)) {
+    if geometry["type"] == "Point" && role.is_none() {
+        return Err(
+            "a point without a role: give the return point the property role = return_point, and leave out others"
+                .to_owned(),
+        );
+    }
+    if geometry["type"] == "Point" && role == Some(FeatureRole::ReturnPoint) {
         let at = place(&geometry["coordinates"], frame)?;
         return match order.return_point.replace(at) {
             None => Ok(()),
@@ -277,7 +300,7 @@ mod tests {
             r#"{{"type": "FeatureCollection", "features": [
                 {{"type": "Feature", "properties": {{"role": "keep_out"}}, "geometry": {keep_out}}},
                 {{"type": "Feature", "properties": {{"id": 3}}, "geometry": {SQUARE}}},
-                {{"type": "Feature", "properties": null, "geometry": {{"type": "Point", "coordinates": [5, 6, -3]}}}}]}}"#
+                {{"type": "Feature", "properties": {{"role": "return_point"}}, "geometry": {{"type": "Point", "coordinates": [5, 6, -3]}}}}]}}"#
         );
         let order = read(&json, CoordinateFrame::Metres).unwrap();
         assert_eq!(order.fence, Some(vec![[0.0, 0.0], [90.0, 0.0], [90.0, 60.0], [0.0, 60.0]]));
@@ -336,6 +359,8 @@ mod tests {
             "EPSG:4326",
             "urn:ogc:def:crs:EPSG::4326",
             "http://www.opengis.net/def/crs/OGC/1.3/CRS84",
+            "urn:ogc:def:crs:OGC::CRS84h",
+            "urn:ogc:def:crs:EPSG::4979",
         ] {
             assert!(named(name).is_ok(), "{name}");
         }
@@ -430,6 +455,10 @@ mod tests {
         );
         let role = format!(r#"{{"properties": {{"role": "wall"}}, "geometry": {SQUARE}}}"#);
         assert!(in_list(&role).contains("keep_out or return_point"));
+        let wreck = r#"{"properties": {"name": "wreck"}, "geometry": {"type": "Point", "coordinates": [1, 2]}}"#;
+        assert!(in_list(wreck).contains("give the return point the property role = return_point"));
+        let nowhere = r#"{"properties": {"role": "keep_out"}, "geometry": null}"#;
+        assert_eq!(in_list(nowhere), "features[0]: it has role = keep_out and no geometry: draw it, or leave it out");
         let plain = format!(r#"{{"geometry": {SQUARE}}}"#);
         assert!(in_list(&format!("{plain}, {plain}")).contains("features[1]: a second fence"));
         assert!(
