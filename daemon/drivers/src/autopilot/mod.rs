@@ -12,6 +12,7 @@ mod lasting;
 pub mod mavlink;
 mod nmea;
 mod plausible;
+mod soundings;
 mod tray;
 
 pub use mavlink::Mavlink;

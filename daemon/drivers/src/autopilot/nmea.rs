@@ -12,24 +12,18 @@
 //! depth is the difference of the two. A position, a heading or a depth that is not known, or not any more, is named.
 
 use super::lasting::Lasting;
+use super::soundings::Soundings;
 use super::{Autopilot, Counters, Goal, Health, Step, Tray};
 use scenecast_core::gps::{Gps, GpsLanguage};
 use scenecast_core::{LatLon, Lines, TangentPlane, nmea};
 use scenecast_protocol::time::Instant;
 use std::time::Duration;
 
-/// A height, or a depth of the water, counts for this long.
-const HEIGHT_LASTS: Duration = Duration::from_secs(2);
-
 /// A heading of a compass counts for this long.
 const HEADING_LASTS: Duration = Duration::from_secs(10);
 
-/// A heading, or a part of the depth, that is missing for this long is named.
+/// A heading that is missing for this long is named.
 const UNKNOWN_AFTER: Duration = Duration::from_secs(3);
-/// A height above the sea floor that is greater than the depth of the water by more is false, metres.
-const HEIGHT_MARGIN_M: f64 = 1.0;
-const FOOT_M: f64 = 0.3048;
-const FATHOM_M: f64 = 1.8288;
 
 /// A state machine of lines.
 #[derive(Debug)]
@@ -40,20 +34,11 @@ pub struct Nmea {
     answers: bool,
     silence: Duration,
     heard: Option<Instant>,
-    /// The last depth that was measured, metres.
-    depth_m: Option<f64>,
-    /// Depth of the water, metres.
-    water_depth: Option<(f64, Instant)>,
-    /// Height of the transducer above the sea floor, metres.
-    height: Option<(f64, Instant)>,
-    /// One of both is missing while the other is heard, or was.
-    depth_absence: Lasting,
+    soundings: Soundings,
     /// No compass is heard.
     heading_absence: Lasting,
     /// Whether a magnetic heading was heard.
     hears_magnetic: bool,
-    /// A height is greater than the depth of the water.
-    height_trouble: Lasting,
     at: Option<(LatLon, Instant)>,
     /// Other sentences come in without a position.
     position_absence: Lasting,
@@ -73,13 +58,9 @@ impl Nmea {
             answers,
             silence,
             heard: None,
-            depth_m: None,
-            water_depth: None,
-            height: None,
-            depth_absence: Lasting::default(),
+            soundings: Soundings::default(),
             heading_absence: Lasting::default(),
             hears_magnetic: false,
-            height_trouble: Lasting::default(),
             at: None,
             position_absence: Lasting::default(),
             goal: None,
@@ -145,73 +126,16 @@ impl Nmea {
     }
 
     fn push_step(&mut self, dx_m: f64, dy_m: f64, heading_rad: Option<f64>, unseen: Duration, now: Instant) {
-        let (altitude_m, water_m) = (fresh(self.height, now), fresh(self.water_depth, now));
-        let depth_m = water_m.zip(altitude_m).map(|(water_m, height_m)| (water_m - height_m).max(0.0));
-        if depth_m.is_some() {
-            self.depth_m = depth_m;
-            self.depth_absence.end();
-        } else if self.water_depth.is_some() || self.height.is_some() {
-            self.say_unknown_depth(now);
-        }
+        let altitude_m = self.soundings.height_m(now);
+        let depth_m = self.soundings.depth_m(&mut self.tray, now);
         self.tray.walk_measured(Step { dx_m, dy_m, heading_rad, depth_m, altitude_m, unseen, ..Step::default() }, now);
     }
 
-    /// Says once that the depth is not known, when one of its two parts has been missing for a while.
-    fn say_unknown_depth(&mut self, now: Instant) {
-        if !self.depth_absence.is_news(UNKNOWN_AFTER, now) {
-            return;
-        }
-        let missing = match fresh(self.water_depth, now).is_none() {
-            true => "the depth of the water (DBS)",
-            false => "the height above the sea floor (DBT or DPT)",
-        };
-        self.tray.count("depths_unknown");
-        self.tray.note(format!(
-            "the depth of the vehicle is not known, since {missing} is missing: {:.1} m is used",
-            self.depth_m.unwrap_or(0.0)
-        ));
-    }
-
-    /// HDM and HDG are only noticed. DBS, from the surface to the sea floor, and DBT: feet, f, metres, M, fathoms, F. DPT: metres, offset of the transducer.
+    /// Soundings, and magnetic headings, which are only noticed.
     fn handle_sensor(&mut self, fields: &[&str], now: Instant) {
-        let number = |index: usize| fields.get(index)?.parse::<f64>().ok();
-        let length = |index: usize, metres: f64| number(index).map(|n| n * metres);
-        // Sounders without a bottom send 0 or nothing; some send feet alone.
-        let sounding = || length(3, 1.0).or_else(|| length(1, FOOT_M)).or_else(|| length(5, FATHOM_M));
-        let known = |m: Option<f64>| m.filter(|m| *m > 0.0 && *m < 12_000.0).map(|m| (m, now));
-        match fields.first().and_then(|field| field.get(2..)).unwrap_or_default() {
-            "DBS" => self.water_depth = known(sounding()).or(self.water_depth),
-            "DBT" => self.set_height(known(sounding()), now),
-            "DPT" => self.set_height(known(number(1)), now),
-            "HDM" | "HDG" => self.hears_magnetic = true,
-            _ => {}
-        }
-        if self.is_above_water(self.height, now) {
-            self.height = None;
-        }
-    }
-
-    fn set_height(&mut self, height: Option<(f64, Instant)>, now: Instant) {
-        if !self.is_above_water(height, now) {
-            self.height = height;
-            self.height_trouble.end();
-        }
-    }
-
-    /// Whether a height is greater than the depth of the water, which is named.
-    fn is_above_water(&mut self, height: Option<(f64, Instant)>, now: Instant) -> bool {
-        let Some((height_m, water_m)) = fresh(height, now).zip(fresh(self.water_depth, now)) else { return false };
-        if height_m <= water_m + HEIGHT_MARGIN_M {
-            return false;
-        }
-        self.tray.count("heights_refused");
-        if self.height_trouble.is_news(Duration::ZERO, now) {
-            self.tray.note(format!(
-                "the height above the sea floor (DBT or DPT), {height_m:.1} m, is greater than the depth of the water (DBS), {water_m:.1} \
-                 m: it is not used; check the sounders"
-            ));
-        }
-        true
+        let formatter = fields.first().and_then(|field| field.get(2..)).unwrap_or_default();
+        self.hears_magnetic |= matches!(formatter, "HDM" | "HDG");
+        self.soundings.handle(formatter, fields, &mut self.tray, now);
     }
 
     /// Notices that other sentences come in without a position.
@@ -226,11 +150,6 @@ impl Nmea {
     fn is_position_lost(&self, now: Instant) -> bool {
         self.at.is_some_and(|(_, at)| now.since(at) >= self.silence)
     }
-}
-
-/// A length that was measured not long ago.
-fn fresh(length: Option<(f64, Instant)>, now: Instant) -> Option<f64> {
-    length.filter(|(_, at)| now.since(*at) < HEIGHT_LASTS).map(|(m, _)| m)
 }
 
 impl Autopilot for Nmea {
