@@ -176,7 +176,7 @@ fn ardusub_that_refuses_gets_lost_or_restarts_is_recovered() {
     let last = bench.last.unwrap();
     assert_eq!((last.roll_rad as f32, last.pitch_rad as f32), (0.1, -0.05));
     // 20 m of water, and a beam that leans with the vehicle.
-    assert!((last.altitude_m.unwrap() - (20.0 - last.depth_m)).abs() < 0.6, "{last:?}");
+    assert!((last.altitude_m.unwrap() - (20.0 - last.depth_m.unwrap())).abs() < 0.6, "{last:?}");
 
     peer.order("refuse");
     goal(&mut bench, -100.0);
