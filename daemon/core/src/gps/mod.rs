@@ -103,6 +103,8 @@ pub struct Gps {
     untold: u32,
     told: Option<Instant>,
     note: Option<String>,
+    /// A receiver that was not followed since the last position.
+    second: Option<String>,
     /// Whether people were told of a second receiver, and of one that stands still.
     is_second_told: bool,
     is_frozen_told: bool,
@@ -144,6 +146,7 @@ impl Gps {
             untold: 0,
             told: None,
             note: None,
+            second: None,
             is_second_told: false,
             is_frozen_told: false,
             motion: None,
@@ -261,7 +264,22 @@ impl Gps {
         if let Some(health) = kind.and_then(|kind| self.kinds.get_mut(&kind)) {
             health.receiver = receiver.map(str::to_owned);
         }
+        self.note_second(receiver);
         Some(fix)
+    }
+
+    /// Names a second receiver once the followed one speaks again: one that changes its talker is no second one.
+    fn note_second(&mut self, followed: Option<&str>) {
+        let Some((other, followed)) = self.second.take().zip(followed).filter(|(other, followed)| other != followed)
+        else {
+            return;
+        };
+        if self.note.is_none() && !std::mem::replace(&mut self.is_second_told, true) {
+            self.note = Some(format!(
+                "positions come from {followed} and {other}, as of two receivers: {followed} is followed until it has had none for {} s",
+                Self::BETTER_LASTS.as_secs()
+            ));
+        }
     }
 
     /// Whether another receiver than this one is followed. Antennas stand apart: where several receivers give positions, one is
@@ -269,16 +287,10 @@ impl Gps {
     fn is_of_second(&mut self, kind: PositionKind, receiver: Option<&str>, now: Instant) -> bool {
         let is_fresh = |health: &&KindHealth| health.used.is_some_and(|at| now.since(at) < Self::BETTER_LASTS);
         let followed = self.kinds.get(&kind).filter(is_fresh).and_then(|health| health.receiver.as_deref());
-        let Some((followed, other)) = followed.zip(receiver).filter(|(followed, other)| followed != other) else {
+        let Some(other) = receiver.filter(|other| followed.is_some_and(|followed| followed != *other)) else {
             return false;
         };
-        if self.note.is_none() && !self.is_second_told {
-            self.is_second_told = true;
-            self.note = Some(format!(
-                "positions come from {followed} and {other}, as of two receivers: {followed} is followed until it has had none for {} s",
-                Self::BETTER_LASTS.as_secs()
-            ));
-        }
+        self.second = Some(other.to_owned());
         true
     }
 
@@ -413,13 +425,25 @@ mod tests {
         let mut gps = Gps::new(GpsLanguage::Nmea);
         let mut notes = Vec::new();
         for second in 0..60 {
-            let other = nmea::line(gga(29.501, second).trim_start_matches("$GP").split('*').next().unwrap());
-            let other = nmea::line(&format!("GN{}", other.trim_start_matches('$').split('*').next().unwrap()));
+            let other = gga(29.501, second);
+            let other = nmea::line(&other[1..other.len() - 5].replace("GP", "GN"));
             let fixes = gps.handle_bytes((gga(29.5, second) + &other).as_bytes(), at(f64::from(second)));
             assert!(fixes.len() == 1 && (fixes[0].place.lat_deg - 29.5).abs() < 1e-6 && !gps.is_contested());
             notes.extend(gps.poll_note());
         }
         assert!(notes.len() == 1 && notes[0].contains("from GP and GN"), "{notes:?}");
+    }
+
+    #[test]
+    fn a_receiver_that_changes_its_talker_is_followed_without_a_word() {
+        let mut gps = Gps::new(GpsLanguage::Nmea);
+        let used = (0..20).filter(|&second| {
+            let sentence = gga(29.5, second);
+            let sentence =
+                if second < 10 { sentence } else { nmea::line(&sentence[1..sentence.len() - 5].replace("GP", "GN")) };
+            !gps.handle_bytes(sentence.as_bytes(), at(f64::from(second))).is_empty()
+        });
+        assert_eq!((used.count(), gps.poll_note()), (19, None));
     }
 
     #[test]
