@@ -23,6 +23,11 @@ pub fn read_image(path: &Path) -> Result<image::DynamicImage, UserError> {
     scenecast_sensors::decode_upright(&bytes, image::Limits::default()).map_err(refused)
 }
 
+/// Metres across a pixel of a file with a projection in metres, if it has one.
+pub fn own_scale_m(path: &Path) -> Result<Option<f64>, UserError> {
+    Ok(scenecast_sensors::geotiff_scale_m(&read_regular(path, MAX_BYTES)?))
+}
+
 /// Classes from a grey or indexed image of `size` pixels: the pixel value is the class.
 pub fn read_classes(path: &Path, size: (u32, u32)) -> Result<Vec<u8>, UserError> {
     let bytes = read_regular(path, MAX_BYTES)?;

@@ -122,6 +122,12 @@ impl<'a> ExifData<'a> {
         Some((0..count).map_while(number).collect())
     }
 
+    /// The first number of a field of 64-bit floats.
+    pub(crate) fn double(&self, directory: usize, tag: u16) -> Option<f64> {
+        let entry = self.entry(directory, tag).filter(|entry| self.short(entry + 2) == Some(12))?;
+        self.array(self.long(entry + 8)?).map(f64::from_be_bytes)
+    }
+
     /// Whether all these bytes are in the file.
     pub(crate) fn has(&self, at: usize, length: usize) -> bool {
         at.checked_add(length).is_some_and(|end| end <= self.bytes.len())

@@ -53,4 +53,5 @@ pub use raw_image::{BitDepth, RawImage, RawImageError};
 pub use rotation::Rotation;
 pub use sight::{CameraMounting, MountedCamera, Sight, tilt_of};
 pub use stamp::{Stamp, StampForm};
+pub use tiff_pages::geotiff_scale_m;
 pub use transforms::{TransformError, TransformTree, pose_of, rgb_of, stamp_of, stamp_of_cdr};

@@ -81,6 +81,28 @@ pub(crate) fn samples(bytes: &[u8]) -> Option<Samples> {
     Some(Samples { bits: number(BITS_PER_SAMPLE, 1), count: number(SAMPLES_PER_PIXEL, 1), is_grey })
 }
 
+/// Metres across a pixel, as a GeoTIFF with a projection in metres has it (OGC 19-008r4).
+pub fn geotiff_scale_m(bytes: &[u8]) -> Option<f64> {
+    const PIXEL_SCALE: u16 = 33_550;
+    const GEO_KEYS: u16 = 34_735;
+    const MODEL_TYPE: usize = 1024;
+    const PROJECTED: usize = 1;
+    const LINEAR_UNITS: usize = 3076;
+    const METRE: usize = 9001;
+    let tiff = ExifData::of_tiff(bytes)?;
+    let page = first_whole_page(&tiff)?;
+    let keys = tiff.numbers(page, GEO_KEYS)?;
+    // Behind a head of four numbers each key has four: key, place of its value (0: here), count, value.
+    let value = |wanted| {
+        keys.chunks_exact(4).skip(1).find_map(|key| match *key {
+            [key, 0, _, value] if key == wanted => Some(value),
+            _ => None,
+        })
+    };
+    let is_in_metres = value(MODEL_TYPE) == Some(PROJECTED) && value(LINEAR_UNITS).is_none_or(|unit| unit == METRE);
+    tiff.double(page, PIXEL_SCALE).filter(|m| is_in_metres && m.is_finite() && *m > 0.0)
+}
+
 /// Whether all the data of the first whole page of a TIFF are in the file.
 pub(crate) fn has_all_its_data(bytes: &[u8]) -> bool {
     let Some(tiff) = ExifData::of_tiff(bytes) else { return false };
@@ -156,6 +178,21 @@ mod tests {
             }
         }
         [head, next.to_le_bytes().to_vec(), values].concat()
+    }
+
+    #[test]
+    fn the_scale_of_a_projection_in_metres_is_read_and_no_other() {
+        const DOUBLE: u16 = 12;
+        let scale = |model: u32, unit: u32| {
+            let keys = vec![1, 1, 0, 2, 1024, 0, 1, model, 3076, 0, 1, unit];
+            let bits = 0.25f64.to_bits();
+            let halves = vec![bits as u32, (bits >> 32) as u32];
+            let mut page = directory(8, &[(33_550, DOUBLE, halves), (34_735, SHORT, keys)], 0);
+            // The number of floats, and not of their halves.
+            page[6] = 1;
+            super::geotiff_scale_m(&[&b"II*\0\x08\0\0\0"[..], &page].concat())
+        };
+        assert_eq!([scale(1, 9001), scale(2, 9001), scale(1, 9002)], [Some(0.25), None, None]);
     }
 
     fn pixel(x: u32, y: u32) -> [u8; 3] {

@@ -5,7 +5,7 @@ use image::{DynamicImage, GenericImageView, RgbImage};
 use scene_model::habitats::MeasuredPoint;
 use scene_model::project::{DownCamera, Observation, Pose};
 use scenecast_core::UserError;
-use scenecast_files::{RecordedFrame, Recording, read_image};
+use scenecast_files::{RecordedFrame, Recording, own_scale_m, read_image};
 use scenecast_protocol::coordinates::MapPoint;
 use scenecast_registration::{CameraImage, FrameInput, GeometryCheck};
 use std::path::Path;
@@ -50,6 +50,14 @@ fn note_of_empty(image: &DynamicImage) -> Option<String> {
     }
 }
 
+/// What people should know of a mosaic that says another size of its pixels than is given.
+fn note_of_scale(own_m: Option<f64>, metres_per_pixel: f64) -> Option<String> {
+    let own_m = own_m.filter(|own_m| !(0.9..=1.1).contains(&(own_m / metres_per_pixel)))?;
+    Some(format!(
+        "a pixel measures {own_m} m by the mosaic itself, and {metres_per_pixel} m by --metres-per-pixel, which is used"
+    ))
+}
+
 impl Mosaic {
     /// Looks at a mosaic whose pixels are `metres_per_pixel` wide.
     pub(crate) fn open(path: &Path, look: &mut Look, metres_per_pixel: f64, cell_m: f64) -> Result<Self, UserError> {
@@ -79,7 +87,9 @@ impl Mosaic {
             content.retain(|u, v| !is_clear(&picture, u, v));
         }
         let seen = Some((content.as_words().iter().map(place).collect(), content.into_points()));
-        let note = note_of_empty(&picture);
+        let notes = [note_of_scale(own_scale_m(path)?, metres_per_pixel), note_of_empty(&picture)];
+        let notes: Vec<String> = notes.into_iter().flatten().collect();
+        let note = (!notes.is_empty()).then(|| notes.join("; "));
         Ok(Self { seen, size: (width, height), cell_px: cell_px as f32, note })
     }
 }
@@ -192,6 +202,14 @@ mod tests {
         let (observations, points) = mosaic.seen.unwrap();
         assert!(points.len() == observations.len() && points.len() > 100, "{}", points.len());
         assert!(points.iter().all(|point| point.u >= 120.0) && observations.iter().all(|seen| seen.x >= 1.2));
+    }
+
+    #[test]
+    fn a_size_of_pixels_that_differs_from_that_of_the_mosaic_is_named() {
+        let named = |own_m| note_of_scale(own_m, 0.002).is_some();
+        assert_eq!([named(Some(0.01)), named(Some(0.0021)), named(None)], [true, false, false]);
+        let note = note_of_scale(Some(0.01), 0.002).unwrap();
+        assert!(note.contains("0.01 m by the mosaic itself, and 0.002 m by --metres-per-pixel"), "{note}");
     }
 
     #[test]
