@@ -220,6 +220,7 @@ impl Replay {
             side: self.side,
             sides: self.sides(),
             differing_cells: differing,
+            damage: self.recording.damage.clone(),
         }
     }
 

@@ -111,6 +111,8 @@ pub(crate) struct Known {
     pub(crate) link: Vec<(u64, Link)>,
     /// Frames that the end of this record has transmitted, copies included.
     pub(crate) sent: u64,
+    /// What this end ran with, as JSON.
+    pub(crate) settings: String,
 }
 
 /// One record.
@@ -161,10 +163,13 @@ impl Recording {
             let shift = vehicle.frames.shift_to(&frames);
             let sent = vehicle.counts[0];
             span = joined(span, vehicle.span, shift);
-            vehicle
-                .known
-                .into_iter()
-                .for_each(|(part, known)| whole.vehicles.entry(part).or_default().add(Known { sent, ..known }, shift));
+            vehicle.known.into_iter().for_each(|(part, known)| {
+                whole
+                    .vehicles
+                    .entry(part)
+                    .or_default()
+                    .add(Known { sent, settings: vehicle.settings.clone(), ..known }, shift)
+            });
         }
         // Before the first state the page would show nothing.
         whole.timeline.span = (whole.timeline.states.first().map_or(span.0, |first| first.nanos), span.1);
@@ -310,6 +315,9 @@ impl Known {
         self.exemplars.extend(later.exemplars.into_iter().map(|(at, exemplar)| (moved(at), exemplar)));
         self.heard.extend(later.heard.into_iter().map(moved));
         self.sent += later.sent;
+        if !later.settings.is_empty() {
+            self.settings = later.settings;
+        }
         self.given.extend(later.given);
         self.orders.extend(later.orders);
         self.link.extend(later.link.into_iter().map(|(at, link)| (moved(at), link)));

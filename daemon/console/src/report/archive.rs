@@ -64,7 +64,9 @@ impl Dive {
     fn add_vehicle(&self, archive: &mut Archive, state: &VehicleState, vehicle: &DiveVehicle) -> Result<(), UserError> {
         let folder = valid_part(&state.name);
         let cells = self.map_cells(state, vehicle);
-        for format in MapFormat::ALL {
+        let has_origin = self.state.mission.origin.is_some();
+        let is_on_earth = |format: &MapFormat| matches!(format, MapFormat::UtmTiffClasses | MapFormat::Wgs84TiffClasses);
+        for format in MapFormat::ALL.into_iter().filter(|format| has_origin || !is_on_earth(format)) {
             // A mission without an origin has no place for some formats.
             if let Ok(bytes) = cells.export(format, self.state.mission.origin) {
                 archive.add(&format!("{folder}/map.{}", format.extension()), &bytes)?;
@@ -78,7 +80,7 @@ impl Dive {
             [vec![utc_text(point.at_s), lat, lon], metres.to_vec()].concat()
         };
         let track = ["utc", "latitude", "longitude", "east_m", "north_m", "depth_m", "sigma_m"];
-        archive.add_table(&format!("{folder}/track.csv"), &track, vehicle.track.iter().map(point).collect())?;
+        archive.add_table(&format!("{folder}/track.csv"), &track, vehicle.path().iter().map(point).collect())?;
         let order = |(order, way): (&(String, u32), &Vec<super::dive::OrderStep>)| {
             let (by, ordered) = self.ordered(state, vehicle, order);
             let given = way.first().map_or(String::new(), |first| utc_text(first.given_s));

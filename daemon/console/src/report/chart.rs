@@ -5,6 +5,7 @@ use super::dive::{DiveVehicle, TrackPoint};
 use crate::state::VehicleState;
 use scenecast_core::utc_text;
 use scenecast_protocol::map::Rect;
+use std::collections::BTreeMap;
 use std::fmt::Write;
 
 /// Width of a figure, pixels.
@@ -123,7 +124,7 @@ fn classes(Rect { x, y, width, height }: Rect, state: &VehicleState, vehicle: &D
 fn cells(svg: &mut String, frame: &Frame, bounds: Rect, classes: &[u8], state: &VehicleState, vehicle: &DiveVehicle) {
     let shift = state.map.shift_m();
     let edge = vehicle.cell_m;
-    let mut runs: std::collections::BTreeMap<u8, String> = std::collections::BTreeMap::new();
+    let mut runs: BTreeMap<u8, String> = BTreeMap::new();
     for (row, classes) in classes.chunks(bounds.width.max(1) as usize).enumerate() {
         let north = (f64::from(bounds.y) + row as f64 + 1.0) * edge + shift.1;
         let mut column = 0;
@@ -213,13 +214,19 @@ fn point(svg: &mut String, frame: &Frame, (east_m, north_m): (f64, f64), name: &
 /// Most cells of a map whose classes are numbered.
 const MAX_NUMBERED: u64 = 1 << 22;
 
-/// The number of each class where it is widest, so that classes can be told apart in grey.
+/// The least room for a number, and how far numbers of one class are apart, pixels.
+const NUMBER_ROOM: f64 = 7.0;
+const NUMBERS_APART: f64 = 110.0;
+
+/// The number of each class where it is wide, so that classes can be told apart in grey.
 fn numbers(svg: &mut String, frame: &Frame, bounds: Rect, classes: &[u8], state: &VehicleState, vehicle: &DiveVehicle) {
     if bounds.area() > MAX_NUMBERED {
         return;
     }
     let (shift, edge) = (state.map.shift_m(), vehicle.cell_m);
-    for (class, (column, row)) in widest(classes, bounds.width as usize) {
+    let cell_px = edge * frame.px_m;
+    let (room, apart) = ((NUMBER_ROOM / cell_px).ceil() as u32, NUMBERS_APART / cell_px);
+    for (class, (column, row)) in wide_places(classes, bounds.width as usize, room, apart) {
         let middle = |from: i32, cell: usize, shift: f64| (f64::from(from) + cell as f64 + 0.5) * edge + shift;
         let (x, y) = frame.place(middle(bounds.x, column, shift.0), middle(bounds.y, row, shift.1));
         let _ = writeln!(
@@ -230,8 +237,9 @@ fn numbers(svg: &mut String, frame: &Frame, bounds: Rect, classes: &[u8], state:
     }
 }
 
-/// Column and row of the cell of each class that is farthest, along both axes, from the ends of its runs; 0 is no class.
-fn widest(classes: &[u8], width: usize) -> Vec<(u8, (usize, usize))> {
+/// Columns and rows of cells of each class that are far, along both axes, from the ends of their runs: the farthest of all, and those with
+/// at least so much room, `apart` cells from each other; 0 is no class.
+fn wide_places(classes: &[u8], width: usize, least_room: u32, apart: f64) -> Vec<(u8, (usize, usize))> {
     let height = classes.len() / width.max(1);
     let mut room = vec![u32::MAX; classes.len()];
     // The lengths so far of runs in each of the four directions.
@@ -251,14 +259,18 @@ fn widest(classes: &[u8], width: usize) -> Vec<(u8, (usize, usize))> {
         measure(&mut (0..height).map(|row| row * width + column));
         measure(&mut (0..height).rev().map(|row| row * width + column));
     }
-    let mut best: std::collections::BTreeMap<u8, usize> = std::collections::BTreeMap::new();
-    for (cell, class) in classes.iter().enumerate().filter(|(_, class)| **class != 0) {
-        let known = best.entry(*class).or_insert(cell);
-        if room[cell] > room[*known] {
-            *known = cell;
+    let mut found: BTreeMap<u8, Vec<(usize, usize)>> = BTreeMap::new();
+    let mut cells: Vec<usize> = (0..classes.len()).filter(|cell| classes[*cell] != 0).collect();
+    cells.sort_by_key(|cell| (std::cmp::Reverse(room[*cell]), *cell));
+    for cell in cells {
+        let (column, row) = (cell % width, cell / width);
+        let places = found.entry(classes[cell]).or_default();
+        let is_far = |&(x, y): &(usize, usize)| (x.abs_diff(column) as f64).hypot(y.abs_diff(row) as f64) >= apart;
+        if places.is_empty() || room[cell] >= least_room && places.iter().all(is_far) {
+            places.push((column, row));
         }
     }
-    best.into_iter().map(|(class, cell)| (class, (cell % width, cell / width))).collect()
+    found.into_iter().flat_map(|(class, places)| places.into_iter().map(move |place| (class, place))).collect()
 }
 
 fn scale(svg: &mut String, frame: &Frame) {
@@ -267,11 +279,12 @@ fn scale(svg: &mut String, frame: &Frame) {
     let _ = writeln!(
         svg,
         "<path class=\"scale\" d=\"M10 {y:.1}H{end:.1}M10 {a:.1}v8M{end:.1} {a:.1}v8\"/><text x=\"{:.1}\" y=\"{:.1}\">{length} m</text>\
-         <path class=\"scale\" d=\"M{right} {y:.1}v-20l-5 8m5-8l5 8\"/><text x=\"{:.1}\" y=\"{:.1}\">N</text>",
+         <path class=\"scale\" d=\"M{right} {:.1}v-18l-5 7m5-7l5 7\"/><text x=\"{:.1}\" y=\"{:.1}\">N</text>",
         end + 6.0,
         y + 4.0,
+        y + 10.0,
         right - 18.0,
-        y - 8.0,
+        y + 4.0,
         a = y - 4.0
     );
 }
@@ -344,10 +357,12 @@ mod tests {
     }
 
     #[test]
-    fn a_class_is_numbered_where_it_is_widest() {
+    fn a_class_is_numbered_where_it_is_wide() {
         let map = "1111111 1333111 1333220 1333222 1111222";
         let classes: Vec<u8> = map.bytes().filter(u8::is_ascii_digit).map(|digit| digit - b'0').collect();
-        assert_eq!(widest(&classes, 7), [(1, (0, 0)), (2, (5, 3)), (3, (2, 2))]);
-        assert_eq!(widest(&[], 0), []);
+        assert_eq!(wide_places(&classes, 7, 9, 1.0), [(1, (0, 0)), (2, (5, 3)), (3, (2, 2))]);
+        let far = wide_places(&classes, 7, 1, 5.0);
+        assert_eq!(far.iter().filter(|(class, _)| *class == 1).count(), 2, "{far:?}");
+        assert_eq!(wide_places(&[], 0, 1, 1.0), []);
     }
 }

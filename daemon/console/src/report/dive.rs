@@ -72,6 +72,8 @@ pub(super) struct DiveVehicle {
     pub(super) own_track: Vec<TrackPoint>,
     /// Frames that it has transmitted, by its own record.
     pub(super) sent: u64,
+    /// What it ran with, by its own record.
+    pub(super) settings: SettingsRecord,
     /// The way of each order, by slot and version.
     pub(super) orders: BTreeMap<(String, u32), Vec<OrderStep>>,
     pub(super) given: BTreeMap<(String, u32), Order>,
@@ -245,6 +247,7 @@ impl DiveVehicle {
             track: known.poses.iter().map(|(_, pose)| TrackPoint::of(pose)).collect(),
             own_track: own.iter().flat_map(|own| own.poses.iter().map(moved)).collect(),
             sent: own.map_or(0, |own| own.sent),
+            settings: own.and_then(|own| serde_json::from_str(&own.settings).ok()).unwrap_or_default(),
             link: known.link.iter().map(|(at, link)| (seconds(*at), link.clone())).collect(),
             maps,
             ..Self::default()

@@ -2,7 +2,7 @@
 
 use super::areas::ClassArea;
 use super::chart::{self, Series};
-use super::dive::{Dive, DiveVehicle, OrderStep};
+use super::dive::{Dive, DiveVehicle, OrderStep, SettingsRecord};
 use super::{Escaped, words};
 use crate::state::VehicleState;
 use base64::Engine;
@@ -23,7 +23,7 @@ border-bottom:1px solid #ccc}td.n{text-align:right;white-space:nowrap}td.t{white
 svg text{font:11px system-ui,sans-serif}.grid{stroke:#000;stroke-opacity:.25;stroke-width:.6;fill:none}\
 .track{fill:none;stroke:#000;stroke-width:1.5;stroke-linejoin:round}.line{fill:none;stroke:#000;stroke-width:1.2}\
 thead{display:table-header-group}.swatch,svg{-webkit-print-color-adjust:exact;print-color-adjust:exact}thead tr{break-after:avoid}.fence{fill:none;stroke:#000;stroke-width:1.5;stroke-dasharray:6 3}.out{fill:#000;fill-opacity:.12;stroke:#000;stroke-dasharray:2 2}.scale{fill:none;stroke:#000;stroke-width:1.5}.swatch{display:inline-block;width:1em;height:1em;border:1px solid #000;\
-vertical-align:-.15em;margin-right:.4em}.images{display:flex;flex-wrap:wrap;gap:.6em}.images figure{margin:0}.images img{width:130px;display:block;\
+vertical-align:-.15em;margin-right:.4em}.images{display:flex;flex-wrap:wrap;gap:.6em}.images figure{margin:0;width:112px}.images svg{width:112px}.images img{width:112px;display:block;\
 image-rendering:pixelated}.number{font-weight:600;paint-order:stroke;stroke:#fff;stroke-width:3px}\
 .point{fill:#fff;stroke:#000;stroke-width:1.5}.legend span{white-space:nowrap;margin-right:1em}\
 h2,h3{break-after:avoid}tr,svg{break-inside:avoid}@media print{body{margin:0;max-width:none}figure.map{break-inside:avoid}}";
@@ -49,13 +49,9 @@ impl Dive {
 
     /// Settings, versions, and how to cite.
     fn origin_of_figures(&self, page: &mut String) {
-        if !self.settings.settings.is_empty() {
-            *page += "<h2>Settings of the surface</h2>\n<p>Those that differ from their defaults.</p>\n<table>";
-            // A folder of the computer says nothing about the mission.
-            for (key, value) in self.settings.settings.iter().filter(|(key, _)| *key != "record.folder") {
-                let _ = write!(page, "<tr><td>{}</td><td>{}</td></tr>", Escaped(key), Escaped(&value.to_string()));
-            }
-            *page += "</table>\n";
+        settings(page, "the surface", &self.settings);
+        for (state, vehicle) in self.vehicles() {
+            settings(page, &state.name, &vehicle.settings);
         }
         let (begin, end) = (utc_text(self.span_s.0), utc_text(self.span_s.1));
         let (mission, run) = (Escaped(&self.state.mission.name), Escaped(&self.state.mission.id));
@@ -129,8 +125,12 @@ impl Dive {
         }
         *page += &over_range(vehicle);
         let direction = |name: &str, direction: &crate::state::LinkDirection| {
-            let classes = direction.bytes_by_class.iter().filter(|(_, bytes)| **bytes > 0);
-            let classes: Vec<String> = classes.map(|(class, bytes)| format!("{class} {bytes}")).collect();
+            let mut classes: Vec<_> = direction.bytes_by_class.iter().filter(|(_, bytes)| **bytes > 0).collect();
+            classes.sort_by_key(|(_, bytes)| std::cmp::Reverse(**bytes));
+            let all: u64 = classes.iter().map(|(_, bytes)| **bytes).sum();
+            let share = |bytes: u64| bytes as f64 / all.max(1) as f64 * 100.0;
+            let classes: Vec<String> =
+                classes.iter().map(|(class, bytes)| format!("{class} {bytes} ({:.0} %)", share(**bytes))).collect();
             format!(
                 "<tr><td>{name}</td><td class=\"n\">{}</td><td class=\"n\">{:.1} %</td><td>{}</td></tr>",
                 direction.frames,
@@ -148,6 +148,17 @@ impl Dive {
             direction("to the vehicles", &self.state.link.down),
             self.frames[2]
         );
+        let map = self.state.link.up.bytes_by_class.get("map").copied().unwrap_or_default();
+        let cells: usize = self.vehicles().map(|(_, vehicle)| vehicle.labels.explored()).sum();
+        if map > 0 && cells > 0 {
+            let _ = writeln!(
+                page,
+                "<p>The budget at the end was {} bit/s. The {map} bytes of the map brought {cells} cells, {:.2} bits a cell, each change of a \
+                 label included.</p>",
+                self.state.link.budget_bps,
+                map as f64 * 8.0 / cells as f64
+            );
+        }
     }
 
     fn events_table(&self, page: &mut String) {
@@ -222,6 +233,23 @@ impl Dive {
             "vehicles": vehicles.collect::<Vec<_>>(),
         })
     }
+}
+
+/// What an end ran with.
+fn settings(page: &mut String, end: &str, settings: &SettingsRecord) {
+    if settings.settings.is_empty() {
+        return;
+    }
+    let _ = write!(
+        page,
+        "<h2>Settings of {}</h2>\n<p>{}: those that differ from their defaults.</p>\n<table>",
+        Escaped(end),
+        Escaped(&settings.program)
+    );
+    for (key, value) in &settings.settings {
+        let _ = write!(page, "<tr><td>{}</td><td>{}</td></tr>", Escaped(key), Escaped(&value.to_string()));
+    }
+    *page += "</table>\n";
 }
 
 /// The quality of the link by the distance of the vehicle, which the round trips tell; empty where they are not known.

@@ -9,6 +9,7 @@ use scenecast_messages::scenecast_msgs::{Event, Order, OrderStatus};
 use scenecast_protocol::directive::SlotId;
 use scenecast_surface::LabelBook;
 use serde_json::Value;
+use std::collections::BTreeSet;
 
 /// Time without a frame from which on it is a silence, seconds.
 const SILENCE_S: f64 = 60.0;
@@ -149,7 +150,7 @@ pub(super) fn summary(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) 
     sentences.push(found(state, vehicle));
     sentences.extend(extent(dive, state, vehicle));
     sentences.extend(arrived(state, vehicle));
-    sentences.push(orders(vehicle));
+    sentences.push(orders(dive, state, vehicle));
     let link = &dive.state.link;
     let lost = |direction: &LinkDirection| direction.loss * 100.0;
     sentences.push(format!(
@@ -176,7 +177,7 @@ pub(super) fn summary(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) 
     let first_run = dive.events.iter().position(|(_, event)| event.text == "another run begins");
     let is_trouble = |(number, (_, event)): &(usize, &(f64, Event))| match event.source.as_str() {
         "fault" => true,
-        "mode, on board" => !event.text.starts_with("Survey"),
+        "mode, on board" => !["Survey", "Done"].iter().any(|mode| event.text.starts_with(mode)),
         "contact" => event.text != "received" && Some(*number) != first_run,
         _ => false,
     };
@@ -301,18 +302,22 @@ fn found(state: &VehicleState, vehicle: &DiveVehicle) -> String {
     )
 }
 
-fn orders(vehicle: &DiveVehicle) -> String {
+fn orders(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -> String {
     let ends = |status: u8| {
         let is_end = |way: &[OrderStep]| way.last().is_some_and(|last| last.status == status);
         vehicle.orders_of_people().filter(|(_, way)| is_end(way)).count()
     };
     let all = vehicle.orders_of_people().count();
     let fixes = vehicle.orders.len() - all;
+    let authors: BTreeSet<String> =
+        vehicle.orders_of_people().map(|(order, _)| dive.ordered(state, vehicle, order).0).collect();
+    let authors: Vec<String> = authors.into_iter().filter(|author| !author.is_empty()).collect();
+    let authors = if authors.is_empty() { String::new() } else { format!(" by {}", authors.join(", ")) };
     let fixes = if fixes == 0 { String::new() } else { format!(" The surface sent {fixes} position fixes.") };
     match all {
         0 => format!("No order was given.{fixes}"),
         n => format!(
-            "{n} orders were given; of these {} were applied, {} refused and {} withdrawn.{fixes}",
+            "{n} orders were given{authors}; of these {} were applied, {} refused and {} withdrawn.{fixes}",
             ends(OrderStatus::APPLIED),
             ends(OrderStatus::REFUSED),
             ends(OrderStatus::WITHDRAWN)

@@ -24,6 +24,9 @@ pub struct ReplayState {
     pub sides: Vec<ReplaySide>,
     /// In how many cells the maps of both sides differ at this moment, where both are known.
     pub differing_cells: Vec<DifferingCells>,
+    /// Why parts of the records could not be read; a line for people each.
+    #[serde(default)]
+    pub damage: Vec<String>,
 }
 
 /// Whose knowledge a replay shows.

@@ -22,7 +22,8 @@ const TERM_TEXTS = {
   exploration: ["Unexplored", "Weight of unexplored cells, compared with the weights of labels"],
   curiosity: ["Curiosity", "Weight of cells that the scene model explains badly (perplexity)"],
 };
-const empty = h("p.empty", {}, "No labels yet. They appear with the first cells of the map.");
+const EMPTY = { map: "No labels yet. They appear with the first cells of the map.", difference: "The two maps are the same at this moment." };
+const empty = h("p.empty", {}, EMPTY.map);
 const terms = TERMS.map(termRow);
 const caption = (unsent) => (unsent === 0 ? "Send weights" : `Send ${unsent} change${unsent === 1 ? "" : "s"}`);
 const foot = orderFoot(weightsOrder, "Weights", "send-weights", caption);
@@ -67,6 +68,7 @@ function update() {
   const rows = shownLabels(vehicle).sort(SORTINGS[$("label-order").value] ?? SORTINGS.id);
   keyed($("label-list"), rows, (l) => l.id, makeRow, refreshRow);
   show(empty, rows.length === 0);
+  text(empty, store.replay?.side === "difference" ? EMPTY.difference : EMPTY.map);
   $("labels").classList.toggle("stale", isStale(vehicle));
   for (const t of terms) t.update(vehicle);
   for (const part of document.querySelectorAll("#labels :is(.label .weight, .exploration)")) lockInRecord(part);

@@ -8,7 +8,7 @@ use crate::http::shared::Shared;
 use crate::messages::{grid, label_tree, link, place, place_on_earth, plan, track};
 use crate::request::{Reply, SurfaceRequest};
 use crate::snapshot::{Snapshot, seconds};
-use crate::state::VehicleState;
+use crate::state::{ExemplarImage, VehicleState};
 use axum::Extension;
 use axum::extract::State;
 use axum::extract::ws::rejection::WebSocketUpgradeRejection;
@@ -129,7 +129,7 @@ impl Quantity {
             Self::Pose | Self::Path | Self::Plan | Self::Fix => reported?.hash(&mut hasher),
             Self::Exemplars => {
                 let (label, image) = newest_image(vehicle)?;
-                (vehicle.map.epoch, label, image).hash(&mut hasher);
+                (vehicle.map.epoch, label, image.number).hash(&mut hasher);
             }
             Self::Link => (now_s as u64).hash(&mut hasher),
         }
@@ -137,11 +137,10 @@ impl Quantity {
     }
 }
 
-/// Label and number of the image that came in last.
-fn newest_image(vehicle: &VehicleState) -> Option<(u8, u8)> {
+/// The image that came in last, with its label.
+fn newest_image(vehicle: &VehicleState) -> Option<(u8, &ExemplarImage)> {
     let images = vehicle.labels.iter().flat_map(|label| label.exemplar.images.iter().map(|image| (label.id, image)));
-    let newest = images.max_by(|a, b| a.1.at_s.total_cmp(&b.1.at_s))?;
-    Some((newest.0, newest.1.number))
+    images.max_by(|a, b| a.1.at_s.total_cmp(&b.1.at_s))
 }
 
 /// A channel that was advertised; its place in the list is its number.
@@ -370,10 +369,10 @@ async fn message(
             encode(&place_on_earth(&snapshot.state, &place(status, shift, stamps), status.pose.sigma_m)?)
         }
         Quantity::Exemplars => {
-            let (label, number) = newest_image(vehicle)?;
-            let request = SurfaceRequest::Exemplar(vehicle.id, label, Some(number));
+            let (label, image) = newest_image(vehicle)?;
+            let request = SurfaceRequest::Exemplar(vehicle.id, label, Some(image.number));
             let Ok(Reply::File(_, webp)) = shared.request(request).await else { return None };
-            encode(&exemplar_jpeg(&webp, header(stamps.now(), &format!("label_{label}")))?)
+            encode(&exemplar_jpeg(&webp, header(stamps.at(image.taken_s.unwrap_or(image.at_s)), &format!("label_{label}")))?)
         }
         Quantity::Link => encode(&link(&snapshot.state, vehicle, stamps)),
     })
