@@ -106,6 +106,7 @@ export class Replay {
     return {
       from_utc_s: FROM_UTC_S, to_utc_s: FROM_UTC_S + LENGTH_S, at_utc_s: FROM_UTC_S + this.atS, is_playing, speed, mission_speed: 1, side, sides,
       differing_cells: sides.length > 1 ? this.vehicles.map((v) => ({ vehicle: v.id, cells: difference(v).size })) : [],
+      damage: [],
     };
   }
 

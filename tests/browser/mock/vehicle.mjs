@@ -144,7 +144,7 @@ export class Vehicle {
     const kept = e.images.filter((i) => i.number !== number);
     const url = `/api/v2/vehicles/${this.id}/exemplars/${e.label}-${number}.webp`;
     const size = e.larger ? 128 : 64;
-    e.images = [...kept, { number, edge_px: size, can_enlarge: size < 128, bytes: e.bytes, url, at_s: nowS, requested: true }];
+    e.images = [...kept, { number, edge_px: size, can_enlarge: size < 128, bytes: e.bytes, url, at_s: nowS, taken_s: nowS - 40, width_m: 0.26, x_m: 12.3, y_m: -4.5, requested: true }];
   }
 
   request({ label, action = "another", image = null }, nowS) {

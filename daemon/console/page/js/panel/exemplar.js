@@ -110,7 +110,7 @@ function figure(label, image, pending) {
   const larger = h("button", { type: "button", onclick: () => request(label, "larger", image.number), disabled: denial("order") !== null }, "Larger");
   show(larger, image.can_enlarge && !pending);
   larger.setAttribute("aria-label", `Larger: image ${image.number} of ${nameOf(label.id)}`);
-  const { taken_s: taken, width_m: width } = image;
+  const { taken_s: taken = null, width_m: width = null } = image;
   const when = taken === null ? `received ${ago(ageOf(image.at_s))}` : `taken ${ago(ageOf(taken))}, received ${ago(ageOf(image.at_s))}`;
   const where = width === null ? "" : `${metres(width)} wide, E ${image.x_m.toFixed(1)} N ${image.y_m.toFixed(1)} m; `;
   return h("figure", {},

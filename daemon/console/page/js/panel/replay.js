@@ -66,7 +66,7 @@ function refresh() {
   const last = wanted().findLast((event) => event.at_utc_s <= head.at_utc_s);
   text(latest, last ? lineOf(last) : "No event yet.");
   for (const [button, direction] of [[before, -1], [next, 1]]) button.setAttribute("aria-disabled", String(target(direction) === undefined));
-  text(errorLine, playFault() ?? (head.damage.length ? `A part of the record could not be read: ${head.damage.join("; ")}` : ""));
+  text(errorLine, playFault() ?? (head.damage?.length ? `A part of the record could not be read: ${head.damage.join("; ")}` : ""));
   refreshSides(head);
 }
 
