@@ -23,8 +23,8 @@ VEHICLE = {
     "map": {"epoch": 3, "earlier": None, "placement": {"version": 1, "east_m": 10.0, "north_m": -20.0}},
     "label_book": {"1": {"name": "sand", "colour": None, "merged_into": None}, "2": {"name": None, "colour": None, "merged_into": 1}},
     "labels": [{"id": 1, "name": "sand", "merged_into": None, "exemplar": {"images": [
-        {"number": 7, "url": "/api/v2/vehicles/1/exemplars/1-7.webp", "at_s": 50.0},
-        {"number": 8, "url": "/api/v2/vehicles/1/exemplars/1-8.webp", "at_s": 60.0}]}},
+        {"number": 7, "url": "/api/v2/vehicles/1/exemplars/1-7.webp", "at_s": 50.0, "taken_s": 40.0, "width_m": 0.3, "x_m": 1.0, "y_m": 2.0},
+        {"number": 8, "url": "/api/v2/vehicles/1/exemplars/1-8.webp", "at_s": 60.0, "taken_s": None, "width_m": None, "x_m": None, "y_m": None}]}},
         {"id": 2, "name": None, "merged_into": 1, "exemplar": {"images": []}}],
     "status": {"at_s": 90.0, "x_m": 5.0, "y_m": 6.0, "z_m": -7.0, "heading_deg": 45.0, "sigma_m": 0.5},
     "link": {"up": {"loss": 0.25}, "round_trip_s": None, "backlog": {"bits": 800}},
@@ -126,7 +126,8 @@ def test_one_of_several_vehicles_is_named(fake):
 
 def test_an_image_that_was_replaced_meanwhile_is_left_out(fake):
     image, = open_surface(fake["url"]).exemplars()
-    assert image == {"label": 1, "number": 7, "name": "sand", "epoch": 3, "time": NOW - 25, "format": "webp", "data": b"RIFF"}
+    assert image == {"label": 1, "number": 7, "name": "sand", "epoch": 3, "time": NOW - 25, "taken": NOW - 30,
+                     "width_m": 0.3, "middle_m": (1.0, 2.0), "format": "webp", "data": b"RIFF"}
 
 
 def test_a_file_is_saved_by_its_ending(fake, tmp_path):

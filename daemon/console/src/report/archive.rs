@@ -65,7 +65,8 @@ impl Dive {
         let folder = valid_part(&state.name);
         let cells = self.map_cells(state, vehicle);
         let has_origin = self.state.mission.origin.is_some();
-        let is_on_earth = |format: &MapFormat| matches!(format, MapFormat::UtmTiffClasses | MapFormat::Wgs84TiffClasses);
+        let is_on_earth =
+            |format: &MapFormat| matches!(format, MapFormat::UtmTiffClasses | MapFormat::Wgs84TiffClasses);
         for format in MapFormat::ALL.into_iter().filter(|format| has_origin || !is_on_earth(format)) {
             // A mission without an origin has no place for some formats.
             if let Ok(bytes) = cells.export(format, self.state.mission.origin) {

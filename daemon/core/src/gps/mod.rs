@@ -435,7 +435,7 @@ mod tests {
     }
 
     #[test]
-    fn a_receiver_that_changes_its_talker_is_followed_without_a_word() {
+    fn a_receiver_that_changes_its_talker_is_followed_silently() {
         let mut gps = Gps::new(GpsLanguage::Nmea);
         let used = (0..20).filter(|&second| {
             let sentence = gga(29.5, second);

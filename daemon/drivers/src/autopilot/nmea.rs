@@ -297,7 +297,7 @@ mod tests {
     }
 
     #[test]
-    fn a_missing_heading_is_named_once_and_no_default_takes_its_place() {
+    fn a_missing_heading_is_named_once_and_no_default_replaces_it() {
         let (steps, notes) = dive(40, |s| if s < 5 { vec!["HEHDT,90.0,T"] } else { vec!["HCHDM,80.0,M"] });
         let known = steps.iter().filter(|step| step.heading_rad.is_some()).count();
         assert!(known == 13 && steps[0].heading_rad == Some(90f64.to_radians()), "{steps:?}");

@@ -205,7 +205,7 @@ mod tests {
     }
 
     #[test]
-    fn a_size_of_pixels_that_differs_from_that_of_the_mosaic_is_named() {
+    fn a_pixel_size_that_differs_from_that_of_a_mosaic_is_named() {
         let named = |own_m| note_of_scale(own_m, 0.002).is_some();
         assert_eq!([named(Some(0.01)), named(Some(0.0021)), named(None)], [true, false, false]);
         let note = note_of_scale(Some(0.01), 0.002).unwrap();

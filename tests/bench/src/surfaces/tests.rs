@@ -99,7 +99,7 @@ fn a_hold_against_a_known_surface_is_obeyed_despite_its_orders() {
 }
 
 #[test]
-fn a_hold_is_obeyed_although_the_holder_has_given_an_older_order() {
+fn a_hold_is_obeyed_after_an_older_order_of_the_holder() {
     for access in ACCESSES {
         for age_s in [0, 4] {
             let mut waters = Waters::held_by_first(8, keyed(access));

@@ -372,7 +372,10 @@ async fn message(
             let (label, image) = newest_image(vehicle)?;
             let request = SurfaceRequest::Exemplar(vehicle.id, label, Some(image.number));
             let Ok(Reply::File(_, webp)) = shared.request(request).await else { return None };
-            encode(&exemplar_jpeg(&webp, header(stamps.at(image.taken_s.unwrap_or(image.at_s)), &format!("label_{label}")))?)
+            encode(&exemplar_jpeg(
+                &webp,
+                header(stamps.at(image.taken_s.unwrap_or(image.at_s)), &format!("label_{label}")),
+            )?)
         }
         Quantity::Link => encode(&link(&snapshot.state, vehicle, stamps)),
     })
