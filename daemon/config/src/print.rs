@@ -120,13 +120,9 @@ pub fn changed_settings(program: &str, is_simulated: bool, config: &Config) -> S
         let is_command = value.as_str().is_some_and(|text| text.starts_with("command:"));
         (key.name.to_owned(), if is_command { json!("command:...") } else { json!(value) })
     };
-    // Names of files, addresses and topics of a computer say nothing about the mission.
+    // Files, devices and ports of a computer say nothing about the mission.
     let is_of_computer = |key: &&Key| {
-        let leaf = key.leaf();
-        ["_file", "_folder", "_dir", "listen", "address", "token", "device", "port"]
-            .iter()
-            .any(|end| leaf.ends_with(end))
-            || leaf == "folder"
+        ["_file", "_dir", ".folder", ".listen", ".device", ".port"].iter().any(|end| key.name.ends_with(end))
     };
     let differs = |key: &&Key| differs(key) && !is_of_computer(key);
     let settings: Map<String, Value> = Key::all().filter(differs).map(told).collect();
@@ -247,6 +243,7 @@ mod tests {
         let mut config = Config::default();
         config.camera.source = CameraSource::Command("ffmpeg -i rtsp://anna:secret@camera".to_owned());
         config.channel.loss = 0.2;
+        config.link.key_file = Some("secret.key".into());
         let text = changed_settings("scenecast 1", true, &config);
         assert!(text.starts_with(r#"{"program":"scenecast 1","#) && !text.contains("secret"), "{text}");
         assert!(text.contains(r#""camera.source":"command:...""#) && text.contains(r#""channel.loss":0.2"#), "{text}");
