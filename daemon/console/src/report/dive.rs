@@ -346,7 +346,7 @@ fn events(recording: &Recording) -> Vec<(f64, Event)> {
 fn gaps(recording: &Recording) -> Vec<(f64, f64)> {
     const LONGEST: u64 = 30_000_000_000;
     let apart = |pair: &[StateText]| match pair {
-        [a, b] if b.nanos - a.nanos > LONGEST => Some((seconds(a.nanos), seconds(b.nanos))),
+        [a, b] if b.nanos.saturating_sub(a.nanos) > LONGEST => Some((seconds(a.nanos), seconds(b.nanos))),
         _ => None,
     };
     recording.timeline.states.windows(2).filter_map(apart).collect()
