@@ -1,11 +1,11 @@
 //! What people write on the map, which stays at the surface: names, colours and merging of labels, markers, notes.
 
+use super::constraints::{ask_of, ask_surface};
 use super::names;
 use super::session::Session;
 use crate::orders::{LabelOrder, MarkerOrder, NoteOrder, RemoveMarkerOrder};
-use crate::state::{VehicleMarker, VehicleState};
+use crate::state::VehicleMarker;
 use scenecast_core::UserError;
-use serde::Serialize;
 
 /// What is to be changed of a label; `None` stays as it is, an empty text is removed.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
@@ -31,13 +31,12 @@ pub async fn edit_label(session: &Session, label: &str, change: LabelChange) -> 
     };
     let changed = |new: Option<String>, old| new.map_or(old, |text| Some(text).filter(|text| !text.is_empty()));
     let (name, colour) = (changed(change.name, before.name), changed(change.colour, before.colour));
-    send(session, vehicle, "labels", &LabelOrder { label, name, colour, merged_into }).await
+    ask_of(session, vehicle, "labels", &LabelOrder { label, name, colour, merged_into }).await
 }
 
 /// Sets a marker at a place in the world frame, metres east and north.
 pub async fn mark(session: &Session, [x_m, y_m]: [f64; 2], text: String) -> Result<(), UserError> {
-    let state = session.state().await?;
-    send(session, session.choose(&state)?, "markers", &MarkerOrder { x_m, y_m, text }).await
+    ask_surface(session, "markers", &MarkerOrder { x_m, y_m, text }).await
 }
 
 /// Removes the marker with this number.
@@ -49,7 +48,7 @@ pub async fn remove_mark(session: &Session, number: u32) -> Result<(), UserError
         let known = if known.is_empty() { "there are none".to_owned() } else { known.join(", ") };
         return Err(UserError::Input(format!("marker {number}: there is no such marker; known: {known}")));
     }
-    send(session, vehicle, "markers/remove", &RemoveMarkerOrder { number }).await
+    ask_of(session, vehicle, "markers/remove", &RemoveMarkerOrder { number }).await
 }
 
 /// Prints the markers.
@@ -69,15 +68,5 @@ pub async fn show_marks(session: &Session) -> Result<(), UserError> {
 
 /// Adds a note about the vehicle to the log.
 pub async fn note(session: &Session, text: String) -> Result<(), UserError> {
-    let state = session.state().await?;
-    send(session, session.choose(&state)?, "notes", &NoteOrder { text }).await
-}
-
-async fn send(
-    session: &Session,
-    vehicle: &VehicleState,
-    resource: &str,
-    order: &impl Serialize,
-) -> Result<(), UserError> {
-    session.client.send_order(&format!("/api/v2/vehicles/{}/{resource}", vehicle.id), order).await
+    ask_surface(session, "notes", &NoteOrder { text }).await
 }

@@ -143,10 +143,19 @@ pub async fn take_over(session: &Session) -> Result<(), UserError> {
 }
 
 /// Has the surface do something with the vehicle at once, which no version follows.
-async fn ask_surface(session: &Session, resource: &str, order: &impl Serialize) -> Result<(), UserError> {
+pub(super) async fn ask_surface(session: &Session, resource: &str, order: &impl Serialize) -> Result<(), UserError> {
     let state = session.state().await?;
-    let path = format!("/api/v2/vehicles/{}/{resource}", session.choose(&state)?.id);
-    session.client.send_order(&path, order).await
+    ask_of(session, session.choose(&state)?, resource, order).await
+}
+
+/// The same with a vehicle that is known.
+pub(super) async fn ask_of(
+    session: &Session,
+    vehicle: &VehicleState,
+    resource: &str,
+    order: &impl Serialize,
+) -> Result<(), UserError> {
+    session.client.send_order(&format!("/api/v2/vehicles/{}/{resource}", vehicle.id), order).await
 }
 
 pub(super) async fn send(

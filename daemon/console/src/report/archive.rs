@@ -1,11 +1,12 @@
 //! The report with the files of the map, its images and its tables, as one ZIP archive.
 
-use super::dive::{Dive, DiveVehicle};
+use super::dive::{Dive, DiveVehicle, OrderStep, TrackPoint};
 use super::words;
 use crate::export::{MapFormat, harmless};
 use crate::state::VehicleState;
 use scenecast_core::{UserError, utc_text};
 use scenecast_messages::contents::valid_part;
+use scenecast_messages::scenecast_msgs::Event;
 use std::fmt::Display;
 use std::io::{Cursor, Write};
 use zip::ZipWriter;
@@ -49,7 +50,7 @@ impl Dive {
         let json = serde_json::to_string_pretty(&self.json()).map_err(|e| UserError::Failed(e.to_string()))?;
         archive.add("report.json", json.as_bytes())?;
         let event = |(at_s, event): &(f64, _)| {
-            let scenecast_messages::scenecast_msgs::Event { vehicle, source, text, .. } = event;
+            let Event { vehicle, source, text, .. } = event;
             vec![utc_text(*at_s), said(vehicle), source.clone(), said(text)]
         };
         let events = self.events.iter().map(event).collect();
@@ -73,7 +74,7 @@ impl Dive {
                 archive.add(&format!("{folder}/map.{}", format.extension()), &bytes)?;
             }
         }
-        let point = |point: &super::dive::TrackPoint| {
+        let point = |point: &TrackPoint| {
             let on_earth = self.state.mission.origin.map(|origin| words::lat_lon(origin, point.east_m, point.north_m));
             let [lat, lon] =
                 on_earth.map_or([String::new(), String::new()], |(lat, lon)| [lat, lon].map(|v| format!("{v:.8}")));
@@ -82,7 +83,7 @@ impl Dive {
         };
         let track = ["utc", "latitude", "longitude", "east_m", "north_m", "depth_m", "sigma_m"];
         archive.add_table(&format!("{folder}/track.csv"), &track, vehicle.path().iter().map(point).collect())?;
-        let order = |(order, way): (&(String, u32), &Vec<super::dive::OrderStep>)| {
+        let order = |(order, way): (&(String, u32), &Vec<OrderStep>)| {
             let (by, ordered) = self.ordered(state, vehicle, order);
             let given = way.first().map_or(String::new(), |first| utc_text(first.given_s));
             let last = way.last().map(|last| (words::status(last.status), utc_text(last.at_s), last.reason.clone()));
@@ -98,8 +99,7 @@ impl Dive {
         for (at_s, image) in &vehicle.exemplars {
             let name = format!("images/label-{}-{}.{}", image.label, image.image, image.format);
             archive.add(&format!("{folder}/{name}"), &image.data)?;
-            let taken =
-                if image.taken.nanos() == 0 { String::new() } else { utc_text(image.taken.nanos() as f64 / 1e9) };
+            let taken = words::taken(image).unwrap_or_default();
             let known =
                 |value: f64, digits: usize| if value.is_finite() { format!("{value:.digits$}") } else { String::new() };
             let title = state.label_book.title(state.label_book.shown_as(image.label));

@@ -175,13 +175,18 @@ fn grid(svg: &mut String, frame: &Frame) {
     }
 }
 
+/// Places in metres east and north as the points of a line.
+fn points(frame: &Frame, places: impl Iterator<Item = (f64, f64)>) -> String {
+    let points = places.map(|(east_m, north_m)| frame.place(east_m, north_m));
+    points.map(|(x, y)| format!("{x:.1},{y:.1}")).collect::<Vec<_>>().join(" ")
+}
+
 /// Fence and keep-outs that were in force at the end, and where the vehicle returns to.
 fn fence(svg: &mut String, frame: &Frame, state: &VehicleState) {
     let Some(order) = state.orders.fence_in_force.as_ref().map(|applied| &applied.order) else { return };
     let mut outline = |corners: &[[f64; 2]], class: &str| {
-        let corners = corners.iter().map(|&[east_m, north_m]| frame.place(east_m, north_m));
-        let points: Vec<String> = corners.map(|(x, y)| format!("{x:.1},{y:.1}")).collect();
-        let _ = writeln!(svg, "<polygon class=\"{class}\" points=\"{}\"/>", points.join(" "));
+        let points = points(frame, corners.iter().map(|&[east_m, north_m]| (east_m, north_m)));
+        let _ = writeln!(svg, "<polygon class=\"{class}\" points=\"{points}\"/>");
     };
     order.fence.iter().for_each(|fence| outline(fence, "fence"));
     order.keep_outs.iter().for_each(|keep_out| outline(keep_out, "out"));
@@ -189,10 +194,9 @@ fn fence(svg: &mut String, frame: &Frame, state: &VehicleState) {
 }
 
 fn track(svg: &mut String, frame: &Frame, track: &[TrackPoint]) {
-    let places = track.iter().map(|point| frame.place(point.east_m, point.north_m));
-    let points: Vec<String> = places.map(|(x, y)| format!("{x:.1},{y:.1}")).collect();
-    if points.len() > 1 {
-        let _ = writeln!(svg, "<polyline class=\"track\" points=\"{}\"/>", points.join(" "));
+    if track.len() > 1 {
+        let points = points(frame, track.iter().map(|point| (point.east_m, point.north_m)));
+        let _ = writeln!(svg, "<polyline class=\"track\" points=\"{points}\"/>");
     }
     for (end, name) in [(track.first(), "start"), (track.last(), "end")] {
         end.into_iter().for_each(|end| point(svg, frame, (end.east_m, end.north_m), name));

@@ -4,6 +4,7 @@ mod archive;
 mod areas;
 mod chart;
 mod dive;
+mod link;
 mod page;
 mod words;
 

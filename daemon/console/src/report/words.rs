@@ -5,7 +5,7 @@ use super::dive::{Dive, DiveVehicle, OrderStep};
 use crate::export::TransverseMercator;
 use crate::state::{LinkDirection, Origin, VehicleState};
 use scenecast_core::utc_text;
-use scenecast_messages::scenecast_msgs::{Event, Order, OrderStatus};
+use scenecast_messages::scenecast_msgs::{Event, Exemplar, Order, OrderStatus};
 use scenecast_protocol::directive::SlotId;
 use scenecast_surface::LabelBook;
 use serde_json::Value;
@@ -125,6 +125,11 @@ pub(super) fn of_intervals(classes: &[ClassArea]) -> &'static str {
         }
         false => "The surface has received no confidence, so the intervals are not known.",
     }
+}
+
+/// When an image was taken, in UTC; `None` where that is not known.
+pub(super) fn taken(image: &Exemplar) -> Option<String> {
+    Some(image.taken.nanos()).filter(|nanos| *nanos != 0).map(|nanos| utc_text(nanos as f64 / 1e9))
 }
 
 /// The name of an order's status.

@@ -52,9 +52,10 @@ impl MissionClock {
 
     /// The mission time at a moment of the surface's clock, seconds; `None` if no state tells it.
     pub fn mission_s(&self, nanos: u64) -> Option<f64> {
-        let state = self.nearest(nanos)?;
+        let next = self.next(nanos);
+        let state = self.states.get(next.saturating_sub(1))?;
         let since_s = (i128::from(nanos) - i128::from(state.nanos)) as f64 / 1e9;
-        let next_s = self.states.iter().find(|later| later.nanos > nanos).map_or(f64::INFINITY, |later| later.now_s);
+        let next_s = self.states.get(next.max(1)).map_or(f64::INFINITY, |later| later.now_s);
         Some((state.now_s + since_s * state.speed).min(next_s.max(state.now_s)).max(0.0))
     }
 
@@ -74,13 +75,13 @@ impl MissionClock {
 
     /// Seconds of mission time for each second of the clock at a moment; 1 if no state tells it.
     pub fn speed(&self, nanos: u64) -> f64 {
-        self.nearest(nanos).map_or(1.0, |state| state.speed)
+        // That of the last state up to it, or else of the first.
+        self.states.get(self.next(nanos).saturating_sub(1)).map_or(1.0, |state| state.speed)
     }
 
-    /// The last state up to a moment, or else the first.
-    fn nearest(&self, nanos: u64) -> Option<ClockState> {
-        let next = self.states.partition_point(|state| state.nanos <= nanos);
-        self.states.get(next.saturating_sub(1)).copied()
+    /// The place of the first state after a moment.
+    fn next(&self, nanos: u64) -> usize {
+        self.states.partition_point(|state| state.nanos <= nanos)
     }
 }
 
