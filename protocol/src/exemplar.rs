@@ -79,12 +79,11 @@ impl Exemplar {
         let (&[epoch, label, serial, what], rest) = object.split_first_chunk::<4>()?;
         let (size, picture) = (what >> 6, what & ExemplarRequest::MAX_PICTURE);
         let (view, bytes) = match rest.split_first_chunk() {
-            Some((view, bytes)) => (ExemplarView::decode(view), bytes),
-            None if rest.is_empty() => (ExemplarView::default(), rest),
-            None => return None,
+            Some((view, bytes)) if !bytes.is_empty() => (ExemplarView::decode(view), bytes),
+            _ if rest.is_empty() => (ExemplarView::default(), rest),
+            _ => return None,
         };
-        let is_sound =
-            label != 0 && label != 255 && (picture == 0) == bytes.is_empty() && bytes.is_empty() == rest.is_empty();
+        let is_sound = label != 0 && label != 255 && (picture == 0) == bytes.is_empty();
         is_sound.then(|| Self { epoch, label, serial, size, picture, view, bytes: bytes.to_vec() })
     }
 
