@@ -3,7 +3,8 @@
 usage: read_record.py FOLDER
 
 Every message must decode, and every version of the map must have the cells and the fingerprint that the record states for it. Prints
-JSON: messages by topic, versions of the map, cells and fingerprint of the last one.
+JSON: messages by topic, versions of the map, cells and fingerprint of the last one, camera frames that changed cells, and what the
+frames of the link carried.
 """
 
 import json
@@ -43,8 +44,21 @@ def change(cells, message):
             cells.pop((int(x), int(y)), None)
 
 
+def evidence(message):
+    """Camera frames that changed cells. Each change must come from one, at most some seconds before, that saw words in the cell."""
+    seconds = lambda time: time.sec + time.nanosec / 1e9
+    if not message.frames or message.whole:
+        return 0
+    for index, words, confidence, value in zip(message.frame, message.words, message.confidence, message.value):
+        assert not value or words > 0 and 0 <= confidence <= 1, (words, confidence)
+        age = seconds(message.header.stamp) - seconds(message.frames[index].taken)
+        assert 0 <= age < 20, age
+    return len(message.frames)
+
+
 def main(folder):
     store = get_typestore(Stores.EMPTY)
+    frames, carried = 0, set()
     counts, cells, versions, stated = {}, {}, 0, None
     with Reader(Path(folder)) as reader:
         for connection in reader.connections:
@@ -54,6 +68,10 @@ def main(folder):
             counts[connection.topic] = counts.get(connection.topic, 0) + 1
             if connection.topic.endswith("/map_cells") and not message.layer:
                 change(cells, message)
+                frames += evidence(message)
+            if connection.topic == "/scenecast/frames":
+                carried.update(message.contents)
+                assert sum(message.content_bits) <= message.bits, message
             if connection.topic.endswith("/map_version"):
                 if stated is not None:
                     assert (stated.cells, stated.digest) == (len(cells), digest(cells)), f"version {stated.version}"
@@ -61,7 +79,8 @@ def main(folder):
                 stated = message
         assert sum(counts.values()) == reader.message_count, (counts, reader.message_count)
     assert stated is not None and (stated.cells, stated.digest) == (len(cells), digest(cells)), "the last version"
-    print(json.dumps({"topics": counts, "versions": versions + 1, "cells": len(cells), "digest": int(stated.digest)}))
+    print(json.dumps({"topics": counts, "versions": versions + 1, "cells": len(cells), "digest": int(stated.digest), "frames": frames,
+                      "carried": sorted(carried)}))
 
 
 main(sys.argv[1])

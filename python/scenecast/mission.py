@@ -14,7 +14,16 @@ DIRECTION = ("sent", "received", "dropped")
 LEVEL = {20: "info", 30: "warning", 40: "error"}
 LINK = ("budget_bps", "sent_bps", "received_bps", "loss", "round_trip_s", "age_s", "backlog_bits")
 VERSION = [("time", "f8"), ("epoch", "u4"), ("version", "u8"), ("cells", "u4"), ("fingerprint", "u2")]
+FRAME = ("frame", "camera_x_m", "camera_y_m", "camera_z_m", "camera_heading_deg")
+CHANGE = [("time", "f8"), ("version", "u8"), ("x", "i4"), ("y", "i4"), ("label", "u1"), *((name, "f8") for name in FRAME),
+          ("words", "u4"), ("confidence", "f4")]
 TRACK = ("time", "x_m", "y_m", "z_m", "heading_deg", "sigma_m")
+
+
+def _place(pose):
+    """Metres east, north and up, and degrees from north."""
+    at, turn = pose.position, pose.orientation
+    return at.x, at.y, at.z, (90 - np.degrees(2 * np.arctan2(turn.z, turn.w))) % 360
 
 
 def _record(path):
@@ -130,6 +139,31 @@ class Mission:
         return LabelMap(x, y, label, cell_m, epoch, version, time, side, **described(state, self._vehicle_state(state), epoch, side),
                         layers=layers, units={name: meanings[name]["unit"] for name in layers})
 
+    def changes(self, t=None, side="operator"):
+        """Every change of a cell's label up to a time: when, in which version of the map, which cell, and its label since then.
+
+        Of the vehicle's map also when the camera frame was taken after which it changed, where the camera was (m east, north and up,
+        degrees from north), how many words the cell had, and how sure its label was; 0 and NaN where no frame of that run changed it.
+        The camera saw a cell that is new; what a frame teaches may change known cells anywhere.
+        """
+        found = []
+        for _, m in self._messages(side, "map_cells", t):
+            if m.layer or not len(m.x):
+                continue
+            rows = np.zeros(len(m.x), CHANGE)
+            rows["time"], rows["version"] = m.header.stamp, m.version
+            rows["x"], rows["y"], rows["label"] = m.x, m.y, m.value
+            for name in (*FRAME, "confidence"):
+                rows[name] = np.nan
+            if m.frames:
+                frames = np.array([(f.taken, *_place(f.camera)) for f in m.frames])
+                known = m.frame < len(frames)
+                for column, name in enumerate(FRAME):
+                    rows[name][known] = frames[m.frame[known], column]
+                rows["words"], rows["confidence"] = m.words, m.confidence
+            found.append(rows)
+        return np.concatenate(found) if found else np.zeros(0, CHANGE)
+
     def agreement(self, t=None):
         """The share, 0 to 1, of the vehicle's cells whose label the operator's map has too; NaN without cells."""
         vehicle, operator = self.map(t, "vehicle"), self.map(t, "operator")
@@ -181,15 +215,15 @@ class Mission:
         """Poses: m east, north and up, degrees from north, sigma in m; of the vehicle's record in its map frame."""
         rows = []
         for _, m in self._messages(side, "pose"):
-            at, turn = m.pose.pose.position, m.pose.pose.orientation
-            yaw = np.degrees(2 * np.arctan2(turn.z, turn.w))
-            rows.append((m.header.stamp, at.x, at.y, at.z, (90 - yaw) % 360, m.pose.covariance[0] ** 0.5))
+            rows.append((m.header.stamp, *_place(m.pose.pose), m.pose.covariance[0] ** 0.5))
         return np.array(rows, [(name, "f8") for name in TRACK])
 
     def frames(self, side="operator"):
-        """The frames of all vehicles: time, vehicle, direction, bits on air, reason of a drop and bytes."""
+        """The frames of all vehicles: time, vehicle, direction, number, bits on air, bits of each kind of content (a map, a status),
+        reason of a drop and bytes."""
         found = self._side(side).messages("/scenecast/frames")
-        return [{"time": m.header.stamp, "vehicle": m.vehicle, "direction": DIRECTION[m.direction], "bits": m.bits,
+        return [{"time": m.header.stamp, "vehicle": m.vehicle, "direction": DIRECTION[m.direction],
+                 "number": m.number, "bits": m.bits, "contents": dict(zip(m.contents, m.content_bits.tolist())),
                  "reason": m.reason or None, "data": m.data.tobytes()} for _, m in found]
 
     def events(self, side="operator"):

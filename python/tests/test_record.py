@@ -84,6 +84,11 @@ def test_the_tables_have_content(mission):
         assert len(mission.link(side)) and len(mission.track(side)) and mission.frames(side) and mission.events(side)
     assert all(image["data"][:4] == b"RIFF" for image in mission.exemplars() if image["format"] == "webp")
     assert all(order["history"] for order in mission.orders())
+    changes = mission.changes(side="vehicle")
+    seen = changes[changes["frame"] > 0]
+    assert len(seen) > len(changes) / 2 and (seen["frame"] <= seen["time"]).all() and (seen["words"] > 0).all()
+    assert np.isnan(mission.changes()["frame"]).all() and len(mission.changes()) >= len(mission.map())
+    assert any(frame["contents"].get("map") for frame in mission.frames())
     assert mission.state(mission.begin - 1) == {}
 
 

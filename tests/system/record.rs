@@ -47,6 +47,12 @@ fn both_records_of_a_rehearsal_end_with_the_same_map() {
     for topic in ["frames", "auv_1/map_cells", "auv_1/order_status", "auv_1/pose", "auv_1/link", "auv_1/events"] {
         assert!(vehicle["topics"][format!("/scenecast/{topic}")].as_u64() > Some(0), "{topic}: {vehicle}");
     }
+    assert!(vehicle["frames"].as_u64() > Some(10), "camera frames that changed cells: {vehicle}");
+    assert_eq!(surface["frames"], 0, "the surface knows no camera frames");
+    for end in [&surface, &vehicle] {
+        let carried = end["carried"].as_array().unwrap();
+        assert!(["map", "status"].iter().all(|content| carried.contains(&(*content).into())), "{end}");
+    }
     let decoded = run(&["wire", "decode", dir.join("a/record_surface").to_str().unwrap(), "--mission", "1"]);
     let lines = String::from_utf8_lossy(&decoded.stdout).lines().count() as u64;
     assert_eq!(Some(lines), surface["topics"]["/scenecast/frames"].as_u64(), "{decoded:?}");
@@ -87,7 +93,7 @@ fn a_report_says_what_the_record_has() {
         "channel.loss</td><td>0.2",
         "<h2>How to cite</h2>",
         "rehearsal over a simulated sea floor",
-        "have arrived by the end",
+        "had arrived by the end",
         "aria-label=\"scale\"",
         "<h3>Link over range</h3>",
     ] {

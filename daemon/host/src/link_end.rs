@@ -3,29 +3,41 @@
 use scenecast_core::UsblLine;
 use scenecast_protocol::link::{Cycle, DropReason, LinkStats, SurfaceLink, Transmit, VehicleLink};
 use scenecast_protocol::map::{StateReplica, StateSource};
+use scenecast_protocol::schedule::Class;
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::Address;
 use scenecast_vehicle::Vehicle;
 use std::collections::BTreeMap;
 
-/// The frames that an end has received so far.
+/// The frames that an end has received so far, and what they carried.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct FrameCounts {
     /// Numbered frames that verified and were new.
     pub accepted: u64,
     /// Frames that were dropped, by reason.
     pub dropped: BTreeMap<DropReason, u64>,
+    /// Bytes of accepted frames, by class; a vehicle does not count them.
+    bytes: BTreeMap<Class, u64>,
 }
 
 impl FrameCounts {
     /// Frames that a surface can attribute to none of its vehicles.
     fn of_unknown(count: u64) -> Self {
-        Self { accepted: 0, dropped: BTreeMap::from([(DropReason::UnknownSender, count)]) }
+        Self { dropped: BTreeMap::from([(DropReason::UnknownSender, count)]), ..Self::default() }
+    }
+
+    /// What the frame carries that was received between those counts and these: bytes by class, headers not included.
+    pub(crate) fn contents_since(&self, before: &Self) -> BTreeMap<Class, u64> {
+        let bytes = self.bytes.iter().filter(|(class, _)| **class != Class::Overhead);
+        let before = |class| before.bytes.get(class).copied().unwrap_or_default();
+        let grown = bytes.map(|(class, bytes)| (*class, bytes.saturating_sub(before(class))));
+        grown.filter(|(_, bytes)| *bytes > 0).collect()
     }
 
     fn add(mut self, stats: &LinkStats) -> Self {
         self.accepted += stats.frames_received;
         stats.dropped.iter().for_each(|(&reason, count)| *self.dropped.entry(reason).or_default() += count);
+        stats.received_by_class.iter().for_each(|(&class, bytes)| *self.bytes.entry(class).or_default() += bytes);
         self
     }
 }

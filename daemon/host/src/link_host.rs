@@ -7,10 +7,10 @@ use scenecast_drivers::modem::paced::Paced;
 use scenecast_drivers::modem::{AddressBook, ModemEvent, Refusal, Station, address_book, driver};
 use scenecast_protocol::link::DropReason;
 use scenecast_protocol::mac::ModemProfile;
-use scenecast_protocol::schedule::Audit;
+use scenecast_protocol::schedule::{Audit, Class};
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::Address;
-use std::collections::VecDeque;
+use std::collections::{BTreeMap, VecDeque};
 use std::time::Duration;
 
 /// Events of frames and of the modem, for meters, logs and records. The link needs no reaction to them.
@@ -21,6 +21,8 @@ pub enum FrameEvent {
         frame: Vec<u8>,
         /// Kind of the frame, as the link names it.
         kind: scenecast_protocol::link::TransmitKind,
+        /// Bytes of what it carries, headers not included; empty for a copy of an earlier frame.
+        contents: BTreeMap<Class, u64>,
     },
     /// The modem refused the last frame. The link repairs it like a lost one.
     NotSent(Refusal),
@@ -28,6 +30,8 @@ pub enum FrameEvent {
     Received {
         /// The bytes on air.
         frame: Vec<u8>,
+        /// The same; a vehicle does not know it.
+        contents: BTreeMap<Class, u64>,
         outcome: FrameOutcome,
         /// Why it was dropped, if it was.
         reason: Option<DropReason>,
@@ -187,7 +191,8 @@ impl<E: LinkEnd> LinkHost<E> {
         while self.station.takes_frames()
             && let Some(transmit) = self.end.poll_transmit(now)
         {
-            self.events.push_back(FrameEvent::Sent { frame: transmit.bytes.clone(), kind: transmit.kind });
+            let (frame, contents) = (transmit.bytes.clone(), transmit.contents.clone());
+            self.events.push_back(FrameEvent::Sent { frame, kind: transmit.kind, contents });
             if let Err(refusal) = self.station.send(transmit, now) {
                 self.events.push_back(FrameEvent::NotSent(refusal));
             }
@@ -204,8 +209,10 @@ impl<E: LinkEnd> LinkHost<E> {
                 ModemEvent::Received(frame) => {
                     let before = self.end.frame_counts();
                     self.end.handle_frame(&frame, now);
-                    let (outcome, reason) = FrameOutcome::between(&before, &self.end.frame_counts());
-                    self.events.push_back(FrameEvent::Received { frame: frame.to_vec(), outcome, reason });
+                    let after = self.end.frame_counts();
+                    let (outcome, reason) = FrameOutcome::between(&before, &after);
+                    let (frame, contents) = (frame.to_vec(), after.contents_since(&before));
+                    self.events.push_back(FrameEvent::Received { frame, contents, outcome, reason });
                 }
                 ModemEvent::Poll(frames) => self.end.handle_poll(frames),
                 ModemEvent::Repeated(bits) => self.end.handle_repeated(bits, now),

@@ -39,5 +39,5 @@ catalogue! {
     rcl_interfaces: Log;
     diagnostic_msgs: KeyValue DiagnosticStatus DiagnosticArray;
     grid_map_msgs: GridMapInfo GridMap;
-    scenecast_msgs: Frame Chunk MapVersion MapCells LabelTree Order OrderStatus Exemplar Link Event LabelUtility Utility Fence Hold Abort;
+    scenecast_msgs: Frame MapVersion CameraFrame MapCells LabelTree Order OrderStatus Exemplar Link Event LabelUtility Utility Fence Hold Abort;
 }

@@ -3,7 +3,7 @@
 //! Places are metres east, north and up of the mission's origin, in the frame of the header.
 
 use crate::builtin_interfaces::Time;
-use crate::geometry_msgs::{Point, Polygon};
+use crate::geometry_msgs::{Point, Polygon, Pose};
 use crate::message::messages;
 use crate::std_msgs::Header;
 
@@ -17,8 +17,14 @@ messages! {
         vehicle: String,
         /// SENT, RECEIVED or DROPPED.
         direction: u8,
+        /// Its number among those of its sender: as many low bits as are on air; 0 in a hello.
+        number: u16,
         /// Bits on air.
         bits: u32,
+        /// What it carries, headers not included: directive, status, fix, map, exemplar, or the name of a layer.
+        contents: Vec<String>,
+        /// Bits of each of them. Copies of earlier frames, and what a vehicle receives, have none.
+        content_bits: Vec<u32>,
         /// The reason for which it was dropped; empty otherwise.
         reason: String,
         /// The bytes on air; empty where they are not recorded.
@@ -28,17 +34,6 @@ messages! {
         uint8 SENT: u8 = 0;
         uint8 RECEIVED: u8 = 1;
         uint8 DROPPED: u8 = 2;
-    }
-
-    /// One chunk of a frame: a piece of a map, a status, a slot, or a part of an image.
-    message Chunk {
-        header: Header,
-        vehicle: String,
-        /// directive, status, fix, map or exemplar.
-        kind: String,
-        /// The name of the layer of a map chunk; empty otherwise.
-        layer: String,
-        bits: u32,
     }
 
     /// The state of a replicated map.
@@ -52,6 +47,13 @@ messages! {
         cells: u32,
         /// Fingerprint of the labels.
         digest: u16,
+    }
+
+    /// A camera frame that was mapped.
+    message CameraFrame {
+        taken: Time,
+        /// Where the camera was; by registration, where that is on.
+        camera: Pose,
     }
 
     /// Cells of a replicated map that have changed.
@@ -72,6 +74,17 @@ messages! {
         y: Vec<i32>,
         /// The label or the level of each cell; 0 is unexplored.
         value: Vec<u8>,
+        /// Camera frames after which the vehicle changed cells; none at the surface.
+        frames: Vec<CameraFrame>,
+        /// Of each cell, if there are frames: the index of its frame, or NO_FRAME.
+        frame: Vec<u16>,
+        /// How many visual words it had after that frame.
+        words: Vec<u32>,
+        /// How sure its label was then, 0 to 1; NaN where that is not known.
+        confidence: Vec<f32>,
+    }
+    constants {
+        uint16 NO_FRAME: u16 = 65535;
     }
 
     /// Which labels of a map become one at coarser cuts.

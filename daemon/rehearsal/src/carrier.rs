@@ -128,7 +128,7 @@ impl Carrier {
 
     /// Logs that an end has given a frame to its modem or to the channel.
     pub(crate) fn log_event(&mut self, end: usize, event: &FrameEvent, now: Instant) {
-        let FrameEvent::Sent { frame, kind } = event else { return };
+        let FrameEvent::Sent { frame, kind, .. } = event else { return };
         match self.unlogged[end].pop_front() {
             Some(transmission) => {
                 self.log.handle_sent(transmission, end == VEHICLE, frame.len(), kind.name(), now.as_secs_f64());

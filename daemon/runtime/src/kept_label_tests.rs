@@ -73,6 +73,7 @@ impl TopicScene {
             perplexity,
             labels: self.book.labels().count() as u8,
             tree: None,
+            seen: None,
         }
     }
 

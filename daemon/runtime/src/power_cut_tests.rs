@@ -245,8 +245,16 @@ impl PowerCutTrial {
         let label = onboard.book_epoch % LABELS + 1;
         let cells = (0..40).map(|i| (Cell::new(i % 8, i / 8), label)).collect();
         let (layers, perplexity) = (BTreeMap::new(), Vec::new());
-        let update =
-            MapUpdate { t_s: 0.0, epoch: onboard.book_epoch, cells, layers, perplexity, labels: LABELS, tree: None };
+        let update = MapUpdate {
+            t_s: 0.0,
+            epoch: onboard.book_epoch,
+            cells,
+            layers,
+            perplexity,
+            labels: LABELS,
+            tree: None,
+            seen: None,
+        };
         onboard.host.handle_map(&update, Instant::ZERO + TICK * self.ticks);
     }
 

@@ -27,9 +27,12 @@ pub use checkpoint::{RestoreError, Restored};
 pub use failsafe::{Failsafe, FailsafePolicy};
 pub use foreign::{ForeignMap, ForeignRestoreError, ForeignSource, ForeignUpdate, LabelChanges};
 pub use frame::Frame;
-pub use mapper::{MapUpdate, Mapper, SharedExemplars};
+pub use mapper::{MapUpdate, Mapper, SeenFrame, SharedExemplars};
 pub use navigator::{FixVerdict, LastPlace, Navigator};
 pub use producer::MapProducer;
 pub use registration::{FoundFrame, RegisteredFrame};
 pub use steering::{Course, Footprint, Steering};
-pub use vehicle::{AppliedSlot, Durable, KeptKeys, LostOrders, MapSelection, Vehicle, VehicleDisk, VehicleOutput};
+pub use vehicle::{
+    AppliedSlot, Durable, Evidence, KeptKeys, LostOrders, MapSelection, MappedFrame, Vehicle, VehicleDisk,
+    VehicleOutput,
+};

@@ -53,6 +53,17 @@ pub struct MapUpdate {
     pub perplexity: Vec<(Cell, f32)>,
     /// Which labels become one at coarser cuts; `None` where that is not known.
     pub tree: Option<LabelTree>,
+    /// The frame; `None` if the map is no frame's.
+    pub seen: Option<SeenFrame>,
+}
+
+/// A camera frame after which the map is as it is.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SeenFrame {
+    /// Where the camera was.
+    pub camera: Pose,
+    /// Visual words of each cell.
+    pub words: Vec<(Cell, u32)>,
 }
 
 /// The tree of the labels that are published.
@@ -256,7 +267,8 @@ impl Mapper {
         judge.offer(&mut self.exemplars, image, place, t_s);
         let mut layers = self.quantities(&published);
         self.levels.hold(&self.configured.layers, &mut layers);
-        self.update(&published, layers)
+        let words = self.flat.iter().map(|cell| (Cell::new(cell.x, cell.y), cell.words)).collect();
+        MapUpdate { seen: Some(SeenFrame { camera: pose, words }), ..self.update(&published, layers) }
     }
 
     /// Adds a frame to the habitats, if the labels are habitats, and labels the map by them.
@@ -305,6 +317,7 @@ impl Mapper {
             perplexity: published.iter().map(|c| (place(c), c.perplexity)).collect(),
             labels: self.book.labels().count() as u8,
             tree: self.habitats.as_ref().and_then(|habitats| published_tree(habitats.tree(), &self.book)),
+            seen: None,
         }
     }
 

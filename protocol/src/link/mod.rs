@@ -26,6 +26,7 @@ pub use vehicle::{OversizedChunk, VehicleConfig, VehicleEvent, VehicleLink};
 pub use window::{Flight, LinkWindow, WindowRefusal};
 
 use crate::schedule::Class;
+use std::collections::BTreeMap;
 
 /// A frame that the host must transmit.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -36,6 +37,15 @@ pub struct Transmit {
     pub bytes: Vec<u8>,
     /// The main purpose of the frame.
     pub kind: TransmitKind,
+    /// Bytes of its chunks by class; none for a copy of an earlier frame.
+    pub contents: BTreeMap<Class, u64>,
+}
+
+/// Bytes of chunks by class.
+fn by_class(chunks: impl IntoIterator<Item = (Class, usize)>) -> BTreeMap<Class, u64> {
+    let mut bytes = BTreeMap::new();
+    chunks.into_iter().for_each(|(class, n)| *bytes.entry(class).or_default() += n as u64);
+    bytes
 }
 
 /// The main purpose of a transmission.

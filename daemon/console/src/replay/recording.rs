@@ -236,7 +236,9 @@ fn joined(span: (u64, u64), with: Option<(u64, u64)>, shift: i64) -> (u64, u64) 
 impl Record {
     fn read(path: &Path, damage: &mut Vec<String>) -> Result<Self, UserError> {
         let mut record = Self { path: path.to_owned(), ..Self::default() };
-        damage.extend(read_record(path, |message| record.take(&message))?);
+        let found = read_record(path, |message| record.take(&message))?;
+        let name = path.file_name().unwrap_or_default().display();
+        damage.extend(found.map(|found| format!("{name}: {found}")));
         Ok(record)
     }
 

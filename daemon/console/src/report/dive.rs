@@ -41,6 +41,8 @@ pub struct Dive {
     pub(super) settings: SettingsRecord,
     /// Why some of the record could not be read.
     pub damage: Option<String>,
+    /// When the surface ended, if it was started again.
+    pub(super) ended_s: Vec<f64>,
 }
 
 /// The program that made a record, and its settings that differed from their defaults, by key.
@@ -151,6 +153,7 @@ impl Dive {
             vehicles,
             events: events(recording),
             gaps_s: gaps(recording),
+            ended_s: recording.timeline.ends_of_runs().map(|state| seconds(state.nanos)).collect(),
             frames: recording.frames,
             clock: recording.timeline.clock.clone(),
             settings: serde_json::from_str(&recording.settings).unwrap_or_default(),
@@ -212,7 +215,12 @@ impl Dive {
         let (by, words) = nearest.map_or((String::new(), content.clone()), |(_, by, words)| (by, words));
         // The log has places in a few words.
         let words = if content.len() > MAX_CONTENT { words } else { content };
-        (if given.principal.is_empty() { by } else { given.principal.clone() }, words)
+        let by = match (given.principal.is_empty(), by.is_empty()) {
+            (false, _) => given.principal.clone(),
+            (true, true) if self.settings.simulated => "the script of the rehearsal".to_owned(),
+            (true, _) => by,
+        };
+        (by, words)
     }
 }
 

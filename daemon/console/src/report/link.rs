@@ -57,12 +57,17 @@ impl Dive {
         let _ = writeln!(
             page,
             "<table><tr><th>direction</th><th>frames</th><th>lost</th><th>bytes by class</th></tr>{}{}</table>\n<p>Frames are numbered: \
-             those are lost whose number the other end never received, over the whole mission. The surface could not use {} frames that it \
-             heard: they were damaged, copies of others, or of earlier runs. Classes: map and layers, status of the vehicle, directive \
+             those are lost whose number the other end never received, over the whole mission.{} Classes: map and layers, status of the vehicle, directive \
              (orders), fix (positions for the vehicle), exemplar (images), and overhead (heads and tags of frames).</p>",
             direction("from the vehicles", &self.state.link.up),
             direction("to the vehicles", &self.state.link.down),
-            self.frames[2]
+            match self.frames[2] {
+                0 => String::new(),
+                unused => format!(
+                    " The surface could not use {unused} of the frames that it heard: they were damaged, copies of others, or of earlier \
+                     runs."
+                ),
+            }
         );
         let map = self.state.link.up.bytes_by_class.get("map").copied().unwrap_or_default();
         let cells: usize = self.vehicles().map(|(_, vehicle)| vehicle.labels.explored()).sum();

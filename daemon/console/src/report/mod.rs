@@ -6,6 +6,7 @@ mod chart;
 mod dive;
 mod link;
 mod page;
+mod summary;
 mod words;
 
 pub use dive::Dive;

@@ -3,7 +3,7 @@
 use super::areas::ClassArea;
 use super::chart;
 use super::dive::{Dive, DiveVehicle, OrderStep, SettingsRecord};
-use super::{Escaped, words};
+use super::{Escaped, summary, words};
 use crate::state::VehicleState;
 use base64::Engine;
 use base64::prelude::BASE64_STANDARD;
@@ -25,8 +25,8 @@ svg text{font:11px system-ui,sans-serif}.grid{stroke:#000;stroke-opacity:.25;str
 thead{display:table-header-group}.swatch,svg{-webkit-print-color-adjust:exact;print-color-adjust:exact}thead tr{break-after:avoid}.fence{fill:none;stroke:#000;stroke-width:1.5;stroke-dasharray:6 3}.out{fill:#000;fill-opacity:.12;stroke:#000;stroke-dasharray:2 2}.scale{fill:none;stroke:#000;stroke-width:1.5}.swatch{display:inline-block;width:1em;height:1em;border:1px solid #000;\
 vertical-align:-.15em;margin-right:.4em}.images{display:flex;flex-wrap:wrap;gap:.6em}.images figure{margin:0;width:112px}.images svg{width:112px}.images img{width:112px;display:block;\
 image-rendering:pixelated}.number{font-weight:600;paint-order:stroke;stroke:#fff;stroke-width:3px}\
-.point{fill:#fff;stroke:#000;stroke-width:1.5}.legend span{white-space:nowrap;margin-right:1em}\
-h2,h3{break-after:avoid}tr,svg{break-inside:avoid}@media print{body{margin:0;max-width:none}figure.map{break-inside:avoid}}";
+.point{fill:#fff;stroke:#000;stroke-width:1.5}.legend>span{display:inline-block;margin-right:1em}@media(max-width:700px){table{display:block;overflow-x:auto}}\
+h2,h3{break-after:avoid}tr,svg{break-inside:avoid}@media print{body{margin:0;max-width:none}figure.map{break-inside:avoid}thead+tbody>tr:first-child{break-before:avoid}h2+p,h3+p,p:last-child{break-before:avoid}}";
 
 impl Dive {
     /// The report as one HTML file.
@@ -70,7 +70,7 @@ impl Dive {
 
     fn vehicle(&self, page: &mut String, state: &VehicleState, vehicle: &DiveVehicle) {
         let _ = writeln!(page, "<h2>{}</h2>\n<ul>", Escaped(&state.name));
-        for sentence in words::summary(self, state, vehicle) {
+        for sentence in summary::summary(self, state, vehicle) {
             let _ = writeln!(page, "<li>{}</li>", Escaped(&sentence));
         }
         *page += "</ul>\n";
@@ -129,7 +129,7 @@ impl Dive {
             });
             json!({
                 "name": state.name,
-                "summary": words::summary(self, state, vehicle),
+                "summary": summary::summary(self, state, vehicle),
                 "distance_m": vehicle.distance_m(),
                 "cell_m": vehicle.cell_m,
                 "classes": classes.collect::<Vec<_>>(),

@@ -1,18 +1,14 @@
-//! The summary of a dive in sentences.
+//! Times, areas, places and orders in words.
 
 use super::areas::ClassArea;
-use super::dive::{Dive, DiveVehicle, OrderStep};
+use super::dive::Dive;
 use crate::export::TransverseMercator;
-use crate::state::{LinkDirection, Origin, VehicleState};
+use crate::state::Origin;
 use scenecast_core::utc_text;
-use scenecast_messages::scenecast_msgs::{Event, Exemplar, Order, OrderStatus};
+use scenecast_messages::scenecast_msgs::{Exemplar, Order, OrderStatus};
 use scenecast_protocol::directive::SlotId;
 use scenecast_surface::LabelBook;
 use serde_json::Value;
-use std::collections::BTreeSet;
-
-/// Time without a frame from which on it is a silence, seconds.
-const SILENCE_S: f64 = 60.0;
 
 /// A time span for people, such as "1 h 05 min".
 pub(super) fn duration(seconds: f64) -> String {
@@ -69,11 +65,13 @@ pub(super) fn content(book: &LabelBook, order: &Order) -> String {
             name.replace('_', " "),
             at.first().zip(at.get(1)).map_or_else(String::new, east_north)
         )),
-        ("fence", Value::Array(corners)) => Some(format!("a fence with {} corners", corners.len())),
-        ("keep_outs", Value::Array(outlines)) => Some(format!("{} areas to stay out of", outlines.len())),
+        ("fence", Value::Array(corners)) => Some(format!("a fence with {}", outline(corners))),
+        ("keep_outs", Value::Array(outlines)) => {
+            Some(counted(outlines.len(), "area to stay out of", "areas to stay out of"))
+        }
         ("areas", Value::Array(areas)) => {
             let weights: Vec<String> = areas.iter().map(|area| number(&area["weight"])).collect();
-            Some(format!("{} weighted areas, of weights {}", areas.len(), weights.join(", ")))
+            Some(format!("{} of weight {}", counted(areas.len(), "area", "areas"), weights.join(", ")))
         }
         ("background", Value::Array(streams)) => Some(format!(
             "spare capacity for {}",
@@ -83,6 +81,20 @@ pub(super) fn content(book: &LabelBook, order: &Order) -> String {
     };
     let all: Vec<String> = members.iter().filter_map(member).collect();
     if all.is_empty() { "nothing, so that what was ordered before ends".to_owned() } else { all.join("; ") }
+}
+
+/// A number of things.
+pub(super) fn counted(count: usize, one: &str, several: &str) -> String {
+    format!("{count} {}", if count == 1 { one } else { several })
+}
+
+/// The corners of a closed line, metres east and north.
+fn outline(corners: &[Value]) -> String {
+    let is_closed = corners.len() > 1 && corners.first() == corners.last();
+    let corners = &corners[..corners.len() - usize::from(is_closed)];
+    let place = |corner: &Value| format!("({}, {})", number(&corner[0]), number(&corner[1]));
+    let places: Vec<String> = corners.iter().map(place).collect();
+    format!("{} in m east and north: {}", counted(corners.len(), "corner", "corners"), places.join(" "))
 }
 
 /// A place in the world frame.
@@ -144,190 +156,17 @@ pub(super) fn status(status: u8) -> &'static str {
     }
 }
 
-/// Where, when, how long, how far, what was found, what was ordered and what failed, a sentence each.
-pub(super) fn summary(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -> Vec<String> {
-    let mut sentences = Vec::new();
-    if dive.settings.simulated {
-        sentences.push("This was a rehearsal over a simulated sea floor.".to_owned());
-    }
-    sentences.push(when(dive, state, vehicle));
-    sentences.push(place(dive, vehicle));
-    sentences.push(found(state, vehicle));
-    sentences.extend(extent(dive, state, vehicle));
-    sentences.extend(arrived(state, vehicle));
-    sentences.push(orders(dive, state, vehicle));
-    let link = &dive.state.link;
-    let lost = |direction: &LinkDirection| direction.loss * 100.0;
-    sentences.push(format!(
-        "Of {} numbered frames from the vehicles {:.1} % arrived in no copy over the whole mission, of {} to them {:.1} %{}.",
-        link.up.frames,
-        lost(&link.up),
-        link.down.frames,
-        lost(&link.down),
-        if link.up.lost + link.down.lost > 0 { "; what they carried was sent again" } else { "" }
-    ));
-    if vehicle.sent > 0 && dive.state.vehicles.len() == 1 {
-        let [_, received, dropped] = dive.frames;
-        sentences.push(format!(
-            "By its own record it transmitted {} frames, copies included; the surface heard {}.",
-            vehicle.sent,
-            received + dropped
-        ));
-    }
-    for (from_s, to_s) in &dive.gaps_s {
-        sentences.push(format!("The surface recorded nothing from {} to {}.", utc_text(*from_s), utc_text(*to_s)));
-    }
-    sentences.extend(silence(vehicle));
-    // The first contact begins a run, too.
-    let first_run = dive.events.iter().position(|(_, event)| event.text == "another run begins");
-    let is_trouble = |(number, (_, event)): &(usize, &(f64, Event))| match event.source.as_str() {
-        "fault" => true,
-        "mode, on board" => !["Survey", "Done"].iter().any(|mode| event.text.starts_with(mode)),
-        "contact" => event.text != "received" && Some(*number) != first_run,
-        _ => false,
-    };
-    sentences.push(match dive.events.iter().enumerate().filter(is_trouble).count() {
-        0 => "No fault and no silence was reported.".to_owned(),
-        1 => "One event is about a fault, a silence, a new run or a mode other than the survey; it is listed below."
-            .to_owned(),
-        n => format!(
-            "{n} events are about faults, silences, new runs or modes other than the survey; they are listed below."
-        ),
-    });
-    if let Some(damage) = &dive.damage {
-        sentences.push(format!("A part of the record could not be read: {damage}."));
-    }
-    sentences
-}
-
-/// The longest time without a frame from the vehicle, if people would call it a silence.
-fn silence(vehicle: &DiveVehicle) -> Option<String> {
-    let gap = |pair: &[f64]| if let [a, b] = pair { (b - a, *b) } else { (0.0, 0.0) };
-    let (longest_s, until_s) = vehicle.heard_s.windows(2).map(gap).max_by(|a, b| a.0.total_cmp(&b.0))?;
-    (longest_s >= SILENCE_S).then(|| {
-        format!("The longest time without a frame from it was {}, until {}.", duration(longest_s), utc_text(until_s))
-    })
-}
-
-fn when(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -> String {
-    let (begin, end) = dive.span_s;
-    let is_faster = (dive.state.mission.speed - 1.0).abs() > 0.01;
-    let speed = match is_faster {
-        true => format!(", which was {} of the mission, rehearsed faster than the clock", duration(dive.state.now_s)),
-        false => String::new(),
-    };
-    format!(
-        "{} (address {}) was recorded from {} to {} (UTC), {} long{speed}, and reported its place {} times.",
-        state.name,
-        state.id,
-        utc_text(begin),
-        utc_text(end),
-        duration(end - begin),
-        vehicle.track.len()
-    )
-}
-
-/// A place as latitude and longitude, with a comma before; empty without an origin.
+/// A place as latitude and longitude in brackets; empty without an origin.
 pub(super) fn on_earth(dive: &Dive, (east_m, north_m): (f64, f64)) -> String {
     dive.state.mission.origin.map_or_else(String::new, |origin| {
         let (lat, lon) = lat_lon(origin, east_m, north_m);
-        format!(", {lat:.6}, {lon:.6}")
+        format!(" (latitude {lat:.6}, longitude {lon:.6})")
     })
 }
 
 pub(super) fn lat_lon(origin: Origin, east_m: f64, north_m: f64) -> (f64, f64) {
     let (lon, lat) = TransverseMercator::about(origin).lon_lat(east_m, north_m);
     (lat, (lon + 180.0).rem_euclid(360.0) - 180.0)
-}
-
-/// Where the map lies.
-fn extent(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -> Option<String> {
-    let bounds = vehicle.labels.bounds()?;
-    let (shift, cell_m) = (state.map.shift_m(), vehicle.cell_m);
-    let (west, south) = (f64::from(bounds.x) * cell_m + shift.0, f64::from(bounds.y) * cell_m + shift.1);
-    let (east, north) = (west + f64::from(bounds.width) * cell_m, south + f64::from(bounds.height) * cell_m);
-    let on_earth = dive.state.mission.origin.map_or_else(String::new, |origin| {
-        let [(south, west), (north, east)] = [(west, south), (east, north)].map(|(x, y)| lat_lon(origin, x, y));
-        format!(", or from latitude {south:.6} to {north:.6} and from longitude {west:.6} to {east:.6}")
-    });
-    Some(format!("It reaches from {west:.1} to {east:.1} m east and from {south:.1} to {north:.1} m north{on_earth}."))
-}
-
-/// How much of the vehicle's map has arrived.
-fn arrived(state: &VehicleState, vehicle: &DiveVehicle) -> Option<String> {
-    let reported = u64::from(state.status.as_ref()?.cells);
-    let held = vehicle.labels.explored() as u64;
-    let share = (held as f64 / reported.max(1) as f64 * 100.0).min(100.0);
-    (reported > 0).then(|| {
-        format!("In its last report the vehicle had {reported} cells; {held} have arrived by the end, {share:.0} %.")
-    })
-}
-
-fn place(dive: &Dive, vehicle: &DiveVehicle) -> String {
-    let Some(last) = vehicle.track.last() else { return "It never reported a place.".to_owned() };
-    let depths = || vehicle.track.iter().map(|point| point.depth_m);
-    let (least, most) = (depths().fold(f64::INFINITY, f64::min), depths().fold(f64::NEG_INFINITY, f64::max));
-    let origin = dive.state.mission.origin.map_or_else(
-        || "the mission has no origin on the globe".to_owned(),
-        |origin| format!("the origin is at latitude {:.6}, longitude {:.6} (WGS 84)", origin.lat_deg, origin.lon_deg),
-    );
-    let begin = vehicle.track.first().map_or_else(String::new, |first| {
-        format!(
-            " from {:.1} m east and {:.1} m north{}",
-            first.east_m,
-            first.north_m,
-            on_earth(dive, (first.east_m, first.north_m))
-        )
-    });
-    format!(
-        "By its {} {:.0} m{begin}, at depths of {least:.1} to {most:.1} m below the surface; at the end it was {:.1} m east and {:.1} m north of the \
-         origin, with a standard deviation of {:.1} m; {origin}.",
-        if vehicle.own_track.len() > 1 { "own record it went" } else { "reports it went at least" },
-        vehicle.distance_m(),
-        last.east_m,
-        last.north_m,
-        last.sigma_m
-    )
-}
-
-fn found(state: &VehicleState, vehicle: &DiveVehicle) -> String {
-    let all: u64 = vehicle.classes.iter().map(|class| class.cells).sum();
-    let Some(largest) = vehicle.classes.first() else { return "No part of the map arrived.".to_owned() };
-    let doubt = largest.interval_m2.map_or_else(String::new, |_| {
-        format!("; by the model's own doubt it has {}, with a probability of 95 %", interval(largest.interval_m2))
-    });
-    format!(
-        "The map that arrived has {all} cells of {0:.2} m x {0:.2} m, {1}, with {2} classes; the largest is {3} with {4} ({5:.0} %){doubt}.",
-        vehicle.cell_m,
-        area(all as f64 * vehicle.cell_m * vehicle.cell_m),
-        vehicle.classes.len(),
-        state.label_book.title(largest.label),
-        area(largest.area_m2),
-        largest.cells as f64 / all as f64 * 100.0
-    )
-}
-
-fn orders(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -> String {
-    let ends = |status: u8| {
-        let is_end = |way: &[OrderStep]| way.last().is_some_and(|last| last.status == status);
-        vehicle.orders_of_people().filter(|(_, way)| is_end(way)).count()
-    };
-    let all = vehicle.orders_of_people().count();
-    let fixes = vehicle.orders.len() - all;
-    let authors: BTreeSet<String> =
-        vehicle.orders_of_people().map(|(order, _)| dive.ordered(state, vehicle, order).0).collect();
-    let authors: Vec<String> = authors.into_iter().filter(|author| !author.is_empty()).collect();
-    let authors = if authors.is_empty() { String::new() } else { format!(" by {}", authors.join(", ")) };
-    let fixes = if fixes == 0 { String::new() } else { format!(" The surface sent {fixes} position fixes.") };
-    match all {
-        0 => format!("No order was given.{fixes}"),
-        n => format!(
-            "{n} orders were given{authors}; of these {} were applied, {} refused and {} withdrawn.{fixes}",
-            ends(OrderStatus::APPLIED),
-            ends(OrderStatus::REFUSED),
-            ends(OrderStatus::WITHDRAWN)
-        ),
-    }
 }
 
 #[cfg(test)]
@@ -342,7 +181,10 @@ mod tests {
         assert_eq!(told(weights), "exploration 0.1; weights: label 3: 0.5, label 7: -1.0");
         assert_eq!(told(r#"{"labels": [4]}"#), "images of label 4");
         assert_eq!(told(r#"{"place": [46.5, -28]}"#), "place 46.5 m east, -28 m north");
-        assert_eq!(told(r#"{"areas": [{"outline": [], "weight": 0.5}]}"#), "1 weighted areas, of weights 0.5");
+        let fence = r#"{"fence": [[0, 0], [9.5, 0], [9, 9], [0, 0]], "keep_outs": [[[1, 1], [2, 1], [2, 2]]]}"#;
+        let words = "a fence with 3 corners in m east and north: (0, 0) (9.5, 0) (9, 9); 1 area to stay out of";
+        assert_eq!(told(fence), words, "a closed line repeats its first corner");
+        assert_eq!(told(r#"{"areas": [{"outline": [], "weight": 0.5}]}"#), "1 area of weight 0.5");
         let limits = r#"{"depth_m": [5.0, 30.5], "on_silence": "return", "silence_s": 300.0, "time_s": null}"#;
         assert_eq!(told(limits), "depth 5 to 30.5 m; on silence return; silence 300 s");
         let stops = |content: &str| Order { slot: "constraints".into(), ..order(content) };

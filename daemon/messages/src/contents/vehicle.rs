@@ -73,9 +73,13 @@ pub struct Place {
 
 impl Place {
     fn pose(&self) -> Pose {
-        let [x, y, z] = self.position_m;
-        Pose { position: Point { x, y, z }, orientation: Quaternion::from_yaw(FRAC_PI_2 - self.heading_rad) }
+        camera_pose(self.position_m, -self.heading_rad)
     }
+}
+
+/// The pose of something that points `yaw_rad` counter-clockwise from north; metres east, north and up.
+pub fn camera_pose([x, y, z]: [f64; 3], yaw_rad: f64) -> Pose {
+    Pose { position: Point { x, y, z }, orientation: Quaternion::from_yaw(FRAC_PI_2 + yaw_rad) }
 }
 
 /// A pose with the standard deviation of its position, metres. The covariance has 0 for the depth and the angles, of which

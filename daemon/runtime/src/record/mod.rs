@@ -2,12 +2,14 @@
 //! it: what a slow disk does not take is left out, and counted.
 
 mod log;
+mod map;
 #[cfg(feature = "surface")]
 mod surface;
 mod vehicle;
 
 pub(crate) use log::LogLines;
 use log::log_entries;
+use map::{MapState, RecordedMap};
 
 #[cfg(feature = "surface")]
 pub use surface::{SurfaceRecord, SurfaceRecorder};
@@ -21,9 +23,9 @@ use scenecast_files::{RecordEntry, RecordLimits, RecordWriter};
 use scenecast_host::{FrameEvent, FrameOutcome};
 pub use scenecast_messages::contents::Stamps;
 use scenecast_messages::contents::{header, valid_part};
-use scenecast_messages::scenecast_msgs::{Event, Frame, MapCells, MapVersion};
+use scenecast_messages::scenecast_msgs::{Event, Frame};
 use scenecast_messages::std_msgs::Text;
-use scenecast_protocol::map::{Cell, LabelGrid, MapDigest, UNEXPLORED};
+use scenecast_protocol::map::LayerSet;
 use scenecast_protocol::wire::{Address, Envelope};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -200,30 +202,44 @@ fn write(mut writer: RecordWriter, entries: &Receiver<RecordEntry>, parts: &Atom
     }
 }
 
+/// What the messages about frames of a vehicle name it, and its layers.
+#[derive(Default)]
+struct Named {
+    name: String,
+    layers: LayerSet,
+}
+
 /// A frame on the link as a message; without its bytes if it may carry a next key and `hides_keys`.
 ///
 /// The surface hides a next key in frames to the vehicle under the present one, so that who has both a record and a key that was
 /// replaced would have the one that replaced it.
-fn frame_entry(
+fn frame_entry<'a>(
     event: &FrameEvent,
-    name: impl Fn(Address) -> String,
+    named: impl Fn(Address) -> Option<&'a Named>,
     hides_keys: bool,
     stamps: &Stamps,
 ) -> Option<RecordEntry> {
-    let (direction, reason, frame) = match event {
-        FrameEvent::Sent { frame, .. } => (Frame::SENT, None, frame),
-        FrameEvent::Received { frame, outcome: FrameOutcome::Dropped, reason } => (Frame::DROPPED, *reason, frame),
-        FrameEvent::Received { frame, .. } => (Frame::RECEIVED, None, frame),
+    let (direction, reason, frame, contents) = match event {
+        FrameEvent::Sent { frame, contents, .. } => (Frame::SENT, None, frame, contents),
+        FrameEvent::Received { frame, contents, outcome: FrameOutcome::Dropped, reason } => {
+            (Frame::DROPPED, *reason, frame, contents)
+        }
+        FrameEvent::Received { frame, contents, .. } => (Frame::RECEIVED, None, frame, contents),
         _ => return None,
     };
-    let ends = Envelope::decode(frame, |_| true).ok().map(|envelope| [envelope.header.from, envelope.header.to]);
+    let sent = Envelope::decode(frame, |_| true).ok().map(|envelope| envelope.header);
+    let ends = sent.as_ref().map(|header| [header.from, header.to]);
     let is_to_vehicle = ends.is_none_or(|[_, to]| to != Address::SURFACE);
-    let vehicle = ends.into_iter().flatten().find(|end| end.is_vehicle()).map(name).unwrap_or_default();
+    let named = ends.into_iter().flatten().find(|end| end.is_vehicle()).and_then(named);
+    let layers = named.map_or_else(LayerSet::default, |named| named.layers.clone());
     let message = Frame {
         header: header(stamps.now(), ""),
-        vehicle,
+        vehicle: named.map(|named| named.name.clone()).unwrap_or_default(),
         direction,
+        number: sent.map_or(0, |header| header.number),
         bits: frame.len() as u32 * 8,
+        contents: contents.keys().map(|class| class.name_in(&layers)).collect(),
+        content_bits: contents.values().map(|bytes| *bytes as u32 * 8).collect(),
         reason: reason.map_or_else(String::new, |reason| reason_name(reason).to_owned()),
         data: if hides_keys && is_to_vehicle { Vec::new() } else { frame.clone() },
     };
@@ -248,81 +264,12 @@ fn is_due(last: &mut Option<f64>, interval_s: f64, now_s: f64) -> bool {
     is_due
 }
 
-/// What a record has of a map.
-#[derive(Default)]
-struct RecordedMap {
-    /// Epoch and version.
-    key: Option<(u8, u64)>,
-    shown: LabelGrid,
-    digest: MapDigest,
-}
-
-/// A map that is to be recorded: the labels, or the levels of a layer.
-struct MapState<'a> {
-    vehicle: &'a str,
-    /// The name of the layer; empty for the labels.
-    layer: &'a str,
-    epoch: u8,
-    version: u64,
-    cell_m: f64,
-    labels: &'a LabelGrid,
-}
-
-impl RecordedMap {
-    /// The changes since the last call, and the new version.
-    fn record(&mut self, map: &MapState<'_>, stamps: &Stamps) -> Vec<RecordEntry> {
-        let &MapState { vehicle, layer, epoch, version, cell_m, labels } = map;
-        let whole = self.key.is_none_or(|(before, _)| before != epoch);
-        if self.key.replace((epoch, version)) == Some((epoch, version)) {
-            return Vec::new();
-        }
-        if whole {
-            (self.shown, self.digest) = (LabelGrid::default(), MapDigest::default());
-        }
-        let gone = self.shown.iter().filter(|&(cell, _)| labels.get(cell) == UNEXPLORED);
-        let gone: Vec<(Cell, u8)> = gone.map(|(cell, _)| (cell, UNEXPLORED)).collect();
-        let changed = labels.iter().filter(|&(cell, label)| self.shown.get(cell) != label).chain(gone);
-        let changed: Vec<(Cell, u8)> = changed.collect();
-        for &(cell, label) in &changed {
-            let before = self.shown.set(cell, label);
-            self.digest.change(cell, before, label);
-        }
-        let head = || header(stamps.now(), scenecast_messages::contents::MAP_FRAME);
-        let name = || vehicle.to_owned();
-        let state = MapVersion {
-            header: head(),
-            vehicle: name(),
-            epoch: epoch.into(),
-            version,
-            cells: labels.explored() as u32,
-            digest: self.digest.value(),
-        };
-        let cells = MapCells {
-            header: head(),
-            vehicle: name(),
-            epoch: epoch.into(),
-            version,
-            layer: layer.to_owned(),
-            cell_m,
-            whole,
-            x: changed.iter().map(|(cell, _)| cell.x).collect(),
-            y: changed.iter().map(|(cell, _)| cell.y).collect(),
-            value: changed.iter().map(|&(_, label)| label).collect(),
-        };
-        let mut entries = Vec::new();
-        if layer.is_empty() {
-            entries.push(entry_of(vehicle, "map_version", stamps, &state));
-        }
-        if whole || !changed.is_empty() {
-            entries.push(entry_of(vehicle, "map_cells", stamps, &cells));
-        }
-        entries
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use scenecast_messages::scenecast_msgs::MapCells;
+    use scenecast_protocol::map::{Cell, LabelGrid, LayerId};
+    use scenecast_protocol::schedule::Class;
     use scenecast_protocol::wire::{FrameBuilder, Header, MissionId, Seal, SessionId};
 
     fn stamps() -> Stamps {
@@ -338,13 +285,17 @@ mod tests {
     fn frames_that_may_hide_a_key_have_no_bytes() {
         let auv = Address::vehicle(1).unwrap();
         let recorded = |frame: Vec<u8>, hides_keys: bool| {
-            let event = FrameEvent::Received { frame, outcome: FrameOutcome::Opened, reason: None };
-            let entry = frame_entry(&event, |_| "auv-1".to_owned(), hides_keys, &stamps()).unwrap();
+            let contents = [(Class::Map, 9), (Class::Layer(LayerId::DEPTH), 4)].into();
+            let event = FrameEvent::Received { frame, contents, outcome: FrameOutcome::Opened, reason: None };
+            let named = Named { name: "auv-1".to_owned(), ..Named::default() };
+            let entry = frame_entry(&event, |_| Some(&named), hides_keys, &stamps()).unwrap();
             scenecast_messages::decode::<Frame>(&entry.data).unwrap()
         };
         let (down, up) = (frame(Address::SURFACE, auv), frame(auv, Address::SURFACE));
         assert!(recorded(down.clone(), true).data.is_empty());
-        assert_eq!(recorded(down.clone(), false).data, down);
+        let shown = recorded(down.clone(), false);
+        assert_eq!(shown.data, down);
+        assert_eq!((shown.contents.join(" "), shown.content_bits), ("map depth".to_owned(), vec![72, 32]));
         assert_eq!(recorded(up.clone(), true).data, up);
         // Who reads no addresses does not know whose frame it is.
         assert!(recorded(vec![0xFF; 9], true).data.is_empty());
@@ -361,7 +312,8 @@ mod tests {
         let mut change = |record: &mut Record, map: &mut RecordedMap, x: i32| {
             labels.set(Cell::new(x, 0), 3);
             let version = x as u64;
-            let state = MapState { vehicle: "auv-1", layer: "", epoch: 0, version, cell_m: 0.5, labels: &labels };
+            let (vehicle, layer, source) = ("auv-1", "", None);
+            let state = MapState { vehicle, layer, epoch: 0, version, cell_m: 0.5, labels: &labels, source };
             record.put(map.record(&state, &stamps()), &stamps());
         };
         let before = record.state_number();

@@ -1,7 +1,8 @@
 //! What the operator knew.
 
 use super::{
-    MapState, Record, RecordedMap, entry, entry_of, frame_entry, is_due, log_entries, settings_entry, settings_text,
+    MapState, Named, Record, RecordedMap, entry, entry_of, frame_entry, is_due, log_entries, settings_entry,
+    settings_text,
 };
 use bytes::Bytes;
 use scenecast_config::Config;
@@ -15,7 +16,7 @@ use scenecast_messages::contents::{Stamps, WORLD_FRAME, header, pose};
 use scenecast_messages::geometry_msgs::Point;
 use scenecast_messages::scenecast_msgs::{Event, Exemplar};
 use scenecast_messages::std_msgs::Text;
-use scenecast_protocol::map::{LayerDescriptor, LayerId, StateReplica};
+use scenecast_protocol::map::{LayerDescriptor, StateReplica};
 use scenecast_protocol::wire::Address;
 use scenecast_surface::{LogKind, Surface};
 use std::collections::{BTreeMap, BTreeSet};
@@ -89,8 +90,8 @@ pub struct SurfaceRecorder {
     last_state: Option<(Bytes, Stamps)>,
     /// The last entry of the surface's log that was recorded.
     log: u64,
-    /// The vehicles' names by address.
-    names: BTreeMap<u8, String>,
+    /// By address.
+    named: BTreeMap<u8, Named>,
     /// Frames to the vehicle may carry a next key.
     hides_keys: bool,
     /// What the surface runs with.
@@ -101,8 +102,8 @@ pub struct SurfaceRecorder {
 #[derive(Default)]
 struct RecordedVehicle {
     map: RecordedMap,
-    /// By number.
-    layers: BTreeMap<LayerId, RecordedLayer>,
+    /// By name.
+    layers: BTreeMap<String, RecordedLayer>,
     tree: Option<(u8, MapLabelTree)>,
     /// Version and state by slot.
     orders: BTreeMap<String, (u16, OrderStatus)>,
@@ -128,8 +129,8 @@ impl SurfaceRecorder {
     pub fn observe(&mut self, part: u32, surface: &Surface, snapshot: &Snapshot, stamps: &Stamps) -> Vec<RecordEntry> {
         let mut entries = Vec::new();
         if std::mem::replace(&mut self.part, part) != part {
-            let (names, settings) = (std::mem::take(&mut self.names), std::mem::take(&mut self.settings));
-            *self = Self { part, log: self.log, names, hides_keys: self.hides_keys, settings, ..Self::default() };
+            let (named, settings) = (std::mem::take(&mut self.named), std::mem::take(&mut self.settings));
+            *self = Self { part, log: self.log, named, hides_keys: self.hides_keys, settings, ..Self::default() };
             entries.push(settings_entry(&self.settings, stamps));
         }
         entries.extend(self.events(surface, snapshot, stamps));
@@ -137,8 +138,11 @@ impl SurfaceRecorder {
         let is_link_due = is_due(&mut self.link_s, STATE_INTERVAL_S, now_s);
         let mut has_news = is_due(&mut self.state_s, STATE_INTERVAL_S, now_s);
         for vehicle in &snapshot.state.vehicles {
-            if self.names.get(&vehicle.id) != Some(&vehicle.name) {
-                self.names.insert(vehicle.id, vehicle.name.clone());
+            let named = self.named.entry(vehicle.id).or_default();
+            named.name.clone_from(&vehicle.name);
+            let view = Address::vehicle(vehicle.id).and_then(|address| surface.view(address));
+            if let Some(layers) = view.map(|view| view.layers()).filter(|layers| **layers != named.layers) {
+                named.layers.clone_from(layers);
             }
             let recorded = self.vehicles.entry(vehicle.id).or_default();
             let before = entries.len();
@@ -171,8 +175,7 @@ impl SurfaceRecorder {
 
     /// A frame of the link.
     pub fn frame(&self, event: &FrameEvent, stamps: &Stamps) -> Option<RecordEntry> {
-        let name = |vehicle: Address| self.names.get(&vehicle.number()).cloned().unwrap_or_default();
-        frame_entry(event, name, self.hides_keys, stamps)
+        frame_entry(event, |vehicle| self.named.get(&vehicle.number()), self.hides_keys, stamps)
     }
 
     /// The entries of the surface's log since the last call.
@@ -231,21 +234,23 @@ impl RecordedVehicle {
         }
     }
 
-    /// Labels and layers.
+    /// Labels and layers of the map in view.
     fn record_map(&mut self, seen: Seen<'_>, entries: &mut Vec<RecordEntry>) {
         let Seen { surface, vehicle, stamps, .. } = seen;
-        let Some(view) = seen.address().and_then(|address| surface.view(address)) else { return };
-        let earlier = vehicle.map.earlier.as_ref();
-        let epoch = earlier.map_or(vehicle.map.epoch, |earlier| earlier.current_epoch);
-        let (name, cell_m) = (vehicle.name.as_str(), vehicle.map.cell_m);
-        // The page may show an earlier map meanwhile, with its version.
-        let (version, labels) = (view.replica().version(), view.replica().shown());
-        let map = MapState { vehicle: name, layer: "", epoch, version, cell_m, labels };
+        let Some((address, labels)) = seen.address().and_then(|address| Some((address, surface.map(address)?))) else {
+            return;
+        };
+        // A map of an earlier run that comes into view, or leaves it, is a new version.
+        let shown = surface.record(address).map_or(0, |record| record.earlier.version_base);
+        let version = shown + surface.view(address).map_or(0, |view| view.replica().version());
+        let (name, epoch, cell_m) = (vehicle.name.as_str(), vehicle.map.epoch, vehicle.map.cell_m);
+        let map = MapState { vehicle: name, layer: "", epoch, version, cell_m, labels, source: None };
         entries.extend(self.map.record(&map, stamps));
-        for (id, descriptor) in view.layers().iter() {
-            let Some(layer) = view.layer(id).filter(|layer| layer.version() > 0) else { continue };
-            let recorded = self.layers.entry(id).or_insert_with(|| RecordedLayer::new(descriptor.clone()));
-            let (version, labels) = (layer.version(), layer.levels().shown());
+        for layer in surface.map_layers(address).into_iter().filter(|layer| layer.levels().shown().explored() > 0) {
+            let descriptor = layer.descriptor();
+            let name = descriptor.name.clone().into_owned();
+            let recorded = self.layers.entry(name).or_insert_with(|| RecordedLayer::new(descriptor.clone()));
+            let (version, labels) = (shown + layer.version(), layer.levels().shown());
             let map = MapState { layer: &descriptor.name, version, labels, ..map };
             entries.extend(recorded.record(descriptor, &map, stamps));
         }

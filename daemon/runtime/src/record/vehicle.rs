@@ -1,7 +1,7 @@
 //! What the vehicle knew.
 
 use super::{
-    MapState, Record, RecordedMap, entry_of, frame_entry, is_due, log_entries, settings_entry, settings_text,
+    MapState, Named, Record, RecordedMap, entry_of, frame_entry, is_due, log_entries, settings_entry, settings_text,
     unix_nanos,
 };
 use scenecast_config::{Config, cell_m};
@@ -74,7 +74,7 @@ impl VehicleRecord {
 
 /// Records the vehicle.
 pub struct VehicleRecorder {
-    name: String,
+    named: Named,
     cell_m: f64,
     part: u32,
     map: RecordedMap,
@@ -90,9 +90,10 @@ pub struct VehicleRecorder {
 impl VehicleRecorder {
     /// Records a vehicle of this configuration.
     pub fn new(config: &Config, is_simulated: bool) -> Self {
-        let (name, map, mode) = (config.vehicle.name.clone(), RecordedMap::default(), String::new());
+        let named = Named { name: config.vehicle.name.clone(), ..Named::default() };
+        let (map, mode) = (RecordedMap::default(), String::new());
         let (cell_m, settings) = (cell_m(config), settings_text(config, is_simulated));
-        Self { name, cell_m, part: 0, map, mode, pose_s: None, link_s: None, hides_keys: false, settings }
+        Self { named, cell_m, part: 0, map, mode, pose_s: None, link_s: None, hides_keys: false, settings }
     }
 
     /// What has changed since the last call, or the whole state where `part` is another one than then.
@@ -102,9 +103,15 @@ impl VehicleRecorder {
             (self.map, self.mode) = (RecordedMap::default(), String::new());
             entries.push(settings_entry(&self.settings, stamps));
         }
+        for layer in vehicle.layers() {
+            if self.named.layers.get(layer.id()) != Some(layer.descriptor()) {
+                self.named.layers.insert(layer.id(), layer.descriptor().clone());
+            }
+        }
         let labels = vehicle.map();
         let (epoch, version) = (vehicle.durable().epoch, vehicle.map_version());
-        let state = MapState { vehicle: &self.name, layer: "", epoch, version, cell_m: self.cell_m, labels };
+        let (cell_m, source) = (self.cell_m, Some(vehicle));
+        let state = MapState { vehicle: &self.named.name, layer: "", epoch, version, cell_m, labels, source };
         entries.extend(self.map.record(&state, stamps));
         let now_s = stamps.now_s();
         if is_due(&mut self.pose_s, POSE_INTERVAL_S, now_s) {
@@ -132,7 +139,7 @@ impl VehicleRecorder {
     /// What is to be recorded of an event of the host.
     pub fn handle_event(&self, event: &VehicleHostEvent, stamps: &Stamps) -> Option<RecordEntry> {
         match event {
-            VehicleHostEvent::Frame(event) => frame_entry(event, |_| self.name.clone(), self.hides_keys, stamps),
+            VehicleHostEvent::Frame(event) => frame_entry(event, |_| Some(&self.named), self.hides_keys, stamps),
             VehicleHostEvent::Applied(applied) => Some(self.decision(applied, stamps)),
             VehicleHostEvent::Note(text) => Some(self.event(Event::WARN, "navigation", text, stamps)),
             VehicleHostEvent::Fixed(fix, _) => {
@@ -152,7 +159,7 @@ impl VehicleRecorder {
         };
         let message = OrderStatus {
             header: header(stamps.at(applied.at.as_secs_f64()), ""),
-            vehicle: self.name.clone(),
+            vehicle: self.named.name.clone(),
             slot: applied.id.name().to_owned(),
             version: applied.version.into(),
             status,
@@ -163,7 +170,7 @@ impl VehicleRecorder {
     }
 
     fn event(&self, level: u8, source: &str, text: &str, stamps: &Stamps) -> RecordEntry {
-        let (header, vehicle) = (header(stamps.now(), ""), self.name.clone());
+        let (header, vehicle) = (header(stamps.now(), ""), self.named.name.clone());
         let message = Event { header, vehicle, level, source: source.to_owned(), text: text.to_owned() };
         self.entry("events", stamps, &message)
     }
@@ -172,7 +179,7 @@ impl VehicleRecorder {
         let stats = vehicle.stats();
         Link {
             header: header(stamps.now(), ""),
-            vehicle: self.name.clone(),
+            vehicle: self.named.name.clone(),
             budget_bps: vehicle.budget_bps(),
             sent_bps: f32::NAN,
             received_bps: f32::NAN,
@@ -184,6 +191,6 @@ impl VehicleRecorder {
     }
 
     fn entry<M: scenecast_messages::Message>(&self, topic: &str, stamps: &Stamps, message: &M) -> RecordEntry {
-        entry_of(&self.name, topic, stamps, message)
+        entry_of(&self.named.name, topic, stamps, message)
     }
 }

@@ -195,7 +195,8 @@ impl Trial {
             let many = if self.epoch == 1 { (self.ticks / 5).min(40) } else { (self.ticks - VEHICLE_RESTART).min(60) };
             let cells = (0..many as i32).map(|i| (Cell::new(i % 8, i / 8), self.epoch)).collect();
             let (layers, perplexity) = (BTreeMap::new(), Vec::new());
-            let update = MapUpdate { t_s: 0.0, epoch: self.epoch, cells, layers, perplexity, labels: 9, tree: None };
+            let update =
+                MapUpdate { t_s: 0.0, epoch: self.epoch, cells, layers, perplexity, labels: 9, tree: None, seen: None };
             self.vehicle.handle_map(&update, now);
         }
         self.vehicle.steer(now);

@@ -303,7 +303,8 @@ impl MapProducer for ForeignMap {
         let erased = self.erased.iter().map(|(cell, _)| (cell, UNEXPLORED));
         let cells: Vec<(Cell, u8)> = self.labels.grid().iter().chain(erased).collect();
         let (t_s, labels) = (self.last_s.unwrap_or(0.0), self.highest);
-        MapUpdate { t_s, epoch: self.epoch, cells, layers: BTreeMap::new(), labels, perplexity: Vec::new(), tree: None }
+        let (layers, perplexity, tree, seen) = (BTreeMap::new(), Vec::new(), None, None);
+        MapUpdate { t_s, epoch: self.epoch, cells, layers, labels, perplexity, tree, seen }
     }
 
     fn epoch(&self) -> u8 {

@@ -52,7 +52,7 @@ fn give_of(vehicle: &mut Vehicle, share: u8, levels: &[(Cell, u8)]) {
 /// A map of the scene model in an epoch.
 fn see(vehicle: &mut Vehicle, epoch: u8, cells: &[(Cell, u8)]) {
     let (cells, layers, perplexity) = (cells.to_vec(), BTreeMap::new(), Vec::new());
-    let update = MapUpdate { t_s: 0.0, epoch, cells, layers, perplexity, labels: 4, tree: None };
+    let update = MapUpdate { t_s: 0.0, epoch, cells, layers, perplexity, labels: 4, tree: None, seen: None };
     vehicle.handle_map(&update, Instant::ZERO);
     vehicle.handle_persisted();
 }

@@ -28,7 +28,8 @@ fn reported(vehicle: &Vehicle) -> PerSlot<Option<Slot>> {
 /// Shows the vehicle a map of two labels in an epoch.
 fn see(vehicle: &mut Vehicle, epoch: u8) {
     let (layers, perplexity) = (Default::default(), Vec::new());
-    let update = MapUpdate { t_s: 0.0, epoch, cells: Vec::new(), layers, perplexity, labels: 2, tree: None };
+    let update =
+        MapUpdate { t_s: 0.0, epoch, cells: Vec::new(), layers, perplexity, labels: 2, tree: None, seen: None };
     vehicle.handle_map(&update, Instant::ZERO);
     vehicle.handle_persisted();
 }

@@ -7,6 +7,7 @@
 mod band_tests;
 mod bands;
 mod durable;
+mod evidence;
 mod gallery;
 mod guidance;
 #[cfg(test)]
@@ -19,6 +20,7 @@ mod slots;
 mod storing;
 
 pub use durable::{Durable, KeptKeys, LostOrders};
+pub use evidence::{Evidence, MappedFrame};
 pub use storing::VehicleDisk;
 
 use super::failsafe::FailsafePolicy;

@@ -66,7 +66,8 @@ impl Sea {
         let mut known: Vec<(Cell, u8)> = self.vehicle.cells().collect();
         known.extend(cells.map(|(x, y)| (Cell::new(x, y), patch(x, y))));
         let (layers, perplexity) = (BTreeMap::new(), Vec::new());
-        let update = MapUpdate { t_s: 0.0, epoch: 0, cells: known, layers, perplexity, labels: 4, tree: None };
+        let update =
+            MapUpdate { t_s: 0.0, epoch: 0, cells: known, layers, perplexity, labels: 4, tree: None, seen: None };
         self.vehicle.handle_map(&update, self.now);
         self.vehicle.handle_persisted();
     }

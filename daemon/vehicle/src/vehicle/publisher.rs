@@ -1,6 +1,7 @@
 //! The vehicle's map, and the choice of the cells and layers of it that are sent.
 
 use super::bands::Bands;
+use super::evidence::{Evidence, EvidenceByCell};
 use super::storing::Withheld;
 use crate::{LabelChanges, MapUpdate};
 use scenecast_config::Debounce;
@@ -11,7 +12,7 @@ use scenecast_protocol::map::{
 };
 use scenecast_protocol::map_codec::{Codec, Stride};
 use scenecast_protocol::time::Instant;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
 /// The limit of the backlog, in seconds of the budget, where the operator orders coarse to fine and the
@@ -46,6 +47,7 @@ pub(super) struct MapPublisher {
     /// Every cell that has a label.
     map: LabelGrid,
     version: u64,
+    evidence: EvidenceByCell,
     /// Whether cells have lost their labels, as those of another program may.
     has_erased: bool,
     /// Layers of the scene model.
@@ -68,6 +70,11 @@ impl MapPublisher {
     /// The map of the scene model and its version, which grows with each change.
     pub(super) fn seen(&self) -> (&LabelGrid, u64) {
         (&self.map, self.version)
+    }
+
+    /// Why a cell has its label, if a camera frame of this run gave it.
+    pub(super) fn evidence(&self, cell: Cell) -> Option<&Evidence> {
+        self.evidence.get(cell)
     }
 
     /// The highest label so far.
@@ -128,8 +135,10 @@ impl MapPublisher {
         self.labels = update.labels;
         self.tree = update.tree.clone().or_else(|| self.tree.take());
         self.explored = update.cells.iter().filter(|&&(_, label)| label != UNEXPLORED).count() as u32;
-        let changed = update.cells.iter().filter(|&&(cell, label)| self.map.set(cell, label) != label).count();
-        self.version += u64::from(changed > 0);
+        let changed = update.cells.iter().filter(|&&(cell, label)| self.map.set(cell, label) != label);
+        let changed: BTreeSet<Cell> = changed.map(|(cell, _)| *cell).collect();
+        self.version += u64::from(!changed.is_empty());
+        self.evidence.handle_change(&changed, update);
         self.has_erased |= (self.explored as usize) < update.cells.len();
         // A band in the place of a built-in layer has its cells to itself.
         let own = update.layers.iter().filter(|(id, _)| !self.bands.has(**id));
@@ -209,6 +218,7 @@ impl MapPublisher {
     /// Forgets the map, because labels change their meaning. The link, which has cleared its layers, receives the bands again.
     pub(super) fn begin_epoch(&mut self, link: &mut VehicleLink, now: Instant) {
         self.map.clear();
+        self.evidence.clear();
         self.explored = 0;
         self.layers.clear();
         (self.tree, self.tree_at) = (None, None);

@@ -1,6 +1,6 @@
 //! Read access to the vehicle: for its host, for reports, and for the status that it sends.
 
-use super::{Durable, Vehicle};
+use super::{Durable, Evidence, Vehicle};
 use crate::{Navigator, SharedExemplars};
 use scenecast_protocol::coordinates::MapPoint;
 use scenecast_protocol::directive::{Settings, Utility};
@@ -33,6 +33,11 @@ impl Vehicle {
     /// The layers that are selected to be sent.
     pub fn layers(&self) -> impl Iterator<Item = &LayerSource> {
         self.link.layers()
+    }
+
+    /// Why a cell of [`Self::map`] has its label, if a camera frame of this run gave it.
+    pub fn evidence(&self, cell: Cell) -> Option<&Evidence> {
+        self.publisher.evidence(cell)
     }
 
     /// The map of the scene model, of which [`Self::map`] may be a part.

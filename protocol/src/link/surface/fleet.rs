@@ -215,7 +215,7 @@ impl Discovery {
         self.open = Some((own, until));
         self.next = until + self.pause;
         self.pause = (self.pause * 2).min(self.every.unwrap_or_default()).max(Self::FIRST_PAUSE);
-        Transmit { to: Address::EVERYBODY, bytes, kind: TransmitKind::DiscoveryCall }
+        Transmit { to: Address::EVERYBODY, bytes, kind: TransmitKind::DiscoveryCall, contents: BTreeMap::new() }
     }
 
     /// Whether a hello answers the last call.

@@ -4,12 +4,13 @@ use super::content::{Carried, FillContext, Part};
 use super::repeat::RepeatTerms;
 use super::{VehicleEvent, VehicleLink};
 use crate::link::handshake::FramePurpose;
-use crate::link::{Transmit, TransmitKind};
+use crate::link::{Transmit, TransmitKind, by_class};
 use crate::mac::{Access, quarter_seconds};
 use crate::map::StateSource;
 use crate::schedule::Class;
 use crate::time::Instant;
 use crate::wire::{Address, FrameBuilder, Stamp};
+use std::collections::BTreeMap;
 use std::time::Duration;
 
 /// Frames smaller than this have no room for both a status and a stamp.
@@ -73,11 +74,17 @@ impl<S: StateSource> VehicleLink<S> {
     fn next_frame(&mut self, frames: u32, now: Instant) -> (Transmit, bool) {
         if let Some(bytes) = self.reply.take(&self.config, self.pair.authenticity()) {
             self.pair.stats.count(Class::Overhead, bytes.len());
-            return (Transmit { to: Address::SURFACE, bytes, kind: TransmitKind::Hello }, true);
+            return (
+                Transmit { to: Address::SURFACE, bytes, kind: TransmitKind::Hello, contents: BTreeMap::new() },
+                true,
+            );
         }
         if let Some((bytes, last)) = self.repeater.pop() {
             self.pair.stats.repeated_bytes += bytes.len() as u64;
-            return (Transmit { to: Address::SURFACE, bytes, kind: TransmitKind::Repeat }, last);
+            return (
+                Transmit { to: Address::SURFACE, bytes, kind: TransmitKind::Repeat, contents: BTreeMap::new() },
+                last,
+            );
         }
         self.write_frame(frames, now)
     }
@@ -255,13 +262,14 @@ impl<S: StateSource> VehicleLink<S> {
             .max_by_key(|(_, n)| *n)
             .map_or(TransmitKind::Acknowledgement, |(p, _)| TransmitKind::Content(p.class()));
         let payload: usize = carried.iter().map(|(_, n)| n).sum();
-        for (part, n) in &carried {
-            self.pair.stats.count(part.class(), *n);
+        let contents = by_class(carried.iter().map(|(part, n)| (part.class(), *n)));
+        contents.iter().for_each(|(class, n)| self.pair.stats.count(*class, *n as usize));
+        for (part, _) in &carried {
             self.pair.stats.chunks_sent += u64::from(matches!(part, Part::Map(_)));
         }
         let bytes = self.pair.finish_frame(builder, carried, purpose, short);
         self.pair.stats.count(Class::Overhead, bytes.len().saturating_sub(payload));
-        Transmit { to: Address::SURFACE, bytes, kind: mainly }
+        Transmit { to: Address::SURFACE, bytes, kind: mainly, contents }
     }
 
     /// When another turn would be of use, in the quarter seconds of the turn byte.

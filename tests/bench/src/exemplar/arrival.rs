@@ -204,8 +204,16 @@ impl ExemplarBench {
             (Cell::new(i % EDGE, i / EDGE), label)
         });
         let (cells, layers, perplexity) = (cells.collect(), BTreeMap::new(), Vec::new());
-        let update =
-            MapUpdate { t_s: self.now.as_secs_f64(), epoch: 0, cells, layers, perplexity, labels: LABELS, tree: None };
+        let update = MapUpdate {
+            t_s: self.now.as_secs_f64(),
+            epoch: 0,
+            cells,
+            layers,
+            perplexity,
+            labels: LABELS,
+            tree: None,
+            seen: None,
+        };
         self.vehicle.handle_map(&update, self.now);
     }
 }

@@ -5,7 +5,7 @@ use super::contact::Contact;
 use super::{Carried, InForceCopy, LastTurn, VehiclePeer};
 use crate::directive::PendingSlot;
 use crate::link::handshake::FramePurpose;
-use crate::link::{FrameNumber, Transmit, TransmitKind};
+use crate::link::{FrameNumber, Transmit, TransmitKind, by_class};
 use crate::mac::{Grant, ModemProfile};
 use crate::map::StateReplica;
 use crate::schedule::{BitBudget, Class, ClassShares};
@@ -147,31 +147,30 @@ impl<R: StateReplica> VehiclePeer<R> {
         purpose: FramePurpose,
         at: Instant,
     ) -> Ready {
-        let chunks =
+        let wanted =
             beside.map_or(0, |(_, bytes)| bytes.len() + 2) + slots.iter().map(|s| s.bytes.len() + 2).sum::<usize>();
-        let has_room = modem.frame_bytes >= SMALL_FRAME + chunks;
+        let has_room = modem.frame_bytes >= SMALL_FRAME + wanted;
         let one_way = self.master.round_trip().map(|both| both / 2);
         let stamp = Stamp::Surface { clock_ms: Stamp::clock(at), one_way };
         let fixed = MAX_HEADER + 1 + Stamp::SURFACE_BYTES + self.pair.seal_bytes();
-        let ack_room = modem.frame_bytes.saturating_sub(chunks + fixed).max(SHORT_ACK);
+        let ack_room = modem.frame_bytes.saturating_sub(wanted + fixed).max(SHORT_ACK);
         let number = (purpose == FramePurpose::Content && self.pair.has_run()).then(|| self.pair.next_number());
         let has_room = has_room && number.is_some();
         let mut builder = self.pair.begin_frame(modem.frame_bytes, ack_room, grant, has_room.then_some(stamp), purpose);
         builder.set_remaining(remaining);
         let mut carried = Carried::new();
-        let mut payload = 0;
+        let mut chunks = Vec::new();
         if let Some((kind, bytes)) = beside
             && builder.push(*kind, bytes)
         {
-            self.pair.stats.count(Class::Directive, bytes.len());
-            payload += bytes.len();
+            chunks.push((Class::Directive, bytes.len()));
         }
         for slot in slots {
             // The age of a fix is that at the start of this transmission.
             let Some(bytes) = self.outbox.encode(slot.id, slot.version, at) else { continue };
             if room_for_payload(builder.room()) >= bytes.len() && builder.push(ChunkKind::Slot, &bytes) {
                 self.outbox.mark_on_air(slot.id, slot.version, at);
-                self.pair.stats.count(slot.id.class(), bytes.len());
+                chunks.push((slot.id.class(), bytes.len()));
                 carried.push((slot.id, slot.version, bytes.len()));
             }
         }
@@ -180,10 +179,12 @@ impl<R: StateReplica> VehiclePeer<R> {
             (_, None) => TransmitKind::Grant,
             (_, Some((id, ..))) => TransmitKind::Content(id.class()),
         };
-        payload += carried.iter().map(|(_, _, n)| n).sum::<usize>();
+        let payload: usize = chunks.iter().map(|(_, n)| n).sum();
+        let contents = by_class(chunks);
+        contents.iter().for_each(|(class, n)| self.pair.stats.count(*class, *n as usize));
         let bytes = self.pair.finish_frame(builder, carried, purpose, true);
         self.pair.stats.count(Class::Overhead, bytes.len().saturating_sub(payload));
-        Ready { transmit: Transmit { to: self.pair.peer(), bytes, kind: mainly }, number }
+        Ready { transmit: Transmit { to: self.pair.peer(), bytes, kind: mainly, contents }, number }
     }
 }
 

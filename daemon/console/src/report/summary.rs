@@ -1,0 +1,256 @@
+//! The summary of a dive in sentences.
+
+use super::dive::{Dive, DiveVehicle, OrderStep};
+use super::words::{area, counted, duration, interval, lat_lon, on_earth};
+use crate::state::{LinkDirection, VehicleState};
+use scenecast_core::utc_text;
+use scenecast_messages::scenecast_msgs::{Event, OrderStatus};
+use scenecast_protocol::directive::SlotId;
+use serde_json::Value;
+use std::collections::BTreeSet;
+
+/// Time without a frame from which on it is a silence, seconds.
+const SILENCE_S: f64 = 60.0;
+
+/// Where, when, how long, how far, what was found, what was ordered and what failed, a sentence each.
+pub(super) fn summary(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -> Vec<String> {
+    let mut sentences = Vec::new();
+    if dive.settings.simulated {
+        sentences.push("This was a rehearsal over a simulated sea floor.".to_owned());
+    }
+    if dive.settings.simulated && utc_text(dive.span_s.0).starts_with("2000-01-01") {
+        sentences.push("Its dates mean nothing: a rehearsal in virtual time begins on 2000-01-01.".to_owned());
+    }
+    sentences.push(when(dive, state, vehicle));
+    sentences.push(place(dive, vehicle));
+    sentences.push(equipment(dive, vehicle));
+    sentences.push(found(state, vehicle));
+    sentences.extend(extent(dive, state, vehicle));
+    sentences.extend(arrived(state, vehicle));
+    sentences.push(orders(dive, state, vehicle));
+    sentences.extend(link(dive, vehicle));
+    for (from_s, to_s) in &dive.gaps_s {
+        sentences.push(format!("The surface recorded nothing from {} to {}.", utc_text(*from_s), utc_text(*to_s)));
+    }
+    for ended_s in &dive.ended_s {
+        sentences.push(format!("The surface ended at {} and was started again.", utc_text(*ended_s)));
+    }
+    sentences.extend(silence(vehicle));
+    sentences.push(trouble(dive));
+    if let Some(damage) = &dive.damage {
+        sentences.push(format!("Not all of the record could be read: {damage}."));
+    }
+    sentences
+}
+
+/// What became of the frames.
+fn link(dive: &Dive, vehicle: &DiveVehicle) -> Vec<String> {
+    let mut sentences = Vec::new();
+    let link = &dive.state.link;
+    let lost = |direction: &LinkDirection| direction.loss * 100.0;
+    sentences.push(match link.up.lost + link.down.lost {
+        0 => format!(
+            "Of {} numbered frames from the vehicles and {} to them none was lost.",
+            link.up.frames, link.down.frames
+        ),
+        _ => format!(
+            "Of {} numbered frames from the vehicles {:.1} % arrived in no copy over the whole mission, of {} to them {:.1} %; what they \
+             carried was sent again.",
+            link.up.frames,
+            lost(&link.up),
+            link.down.frames,
+            lost(&link.down)
+        ),
+    });
+    if vehicle.sent > 0 && dive.state.vehicles.len() == 1 {
+        let [_, received, dropped] = dive.frames;
+        sentences.push(format!(
+            "By its own record it transmitted {} frames, copies included; the surface heard {}.",
+            vehicle.sent,
+            received + dropped
+        ));
+    }
+    sentences
+}
+
+/// How many events people should look at.
+fn trouble(dive: &Dive) -> String {
+    // The first contact begins a run, too.
+    let first_run = dive.events.iter().position(|(_, event)| event.text == "another run begins");
+    let is_trouble = |(number, (_, event)): &(usize, &(f64, Event))| match event.source.as_str() {
+        "fault" => true,
+        "mode, on board" => !["Survey", "Done"].iter().any(|mode| event.text.starts_with(mode)),
+        "contact" => event.text != "received" && Some(*number) != first_run,
+        _ => false,
+    };
+    match dive.events.iter().enumerate().filter(is_trouble).count() {
+        0 => "No fault and no silence was reported.".to_owned(),
+        1 => "One event is about a fault, a silence, a new run or a mode other than the survey; it is listed below."
+            .to_owned(),
+        n => format!(
+            "{n} events are about faults, silences, new runs or modes other than the survey; they are listed below."
+        ),
+    }
+}
+
+/// The longest time without a frame from the vehicle, if people would call it a silence.
+fn silence(vehicle: &DiveVehicle) -> Option<String> {
+    let gap = |pair: &[f64]| if let [a, b] = pair { (b - a, *b) } else { (0.0, 0.0) };
+    let (longest_s, until_s) = vehicle.heard_s.windows(2).map(gap).max_by(|a, b| a.0.total_cmp(&b.0))?;
+    (longest_s >= SILENCE_S).then(|| {
+        format!("The longest time without a frame from it was {}, until {}.", duration(longest_s), utc_text(until_s))
+    })
+}
+
+fn when(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -> String {
+    let (begin, end) = dive.span_s;
+    let is_faster = (dive.state.mission.speed - 1.0).abs() > 0.01;
+    let speed = match is_faster {
+        true => format!(", which was {} of the mission, rehearsed faster than the clock", duration(dive.state.now_s)),
+        false => String::new(),
+    };
+    format!(
+        "{} (address {}) was recorded from {} to {} (UTC), {} long{speed}, and reported its place {} times.",
+        state.name,
+        state.id,
+        utc_text(begin),
+        utc_text(end),
+        duration(end - begin),
+        vehicle.track.len()
+    )
+}
+
+/// Where the map lies.
+fn extent(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -> Option<String> {
+    let bounds = vehicle.labels.bounds()?;
+    let (shift, cell_m) = (state.map.shift_m(), vehicle.cell_m);
+    let (west, south) = (f64::from(bounds.x) * cell_m + shift.0, f64::from(bounds.y) * cell_m + shift.1);
+    let (east, north) = (west + f64::from(bounds.width) * cell_m, south + f64::from(bounds.height) * cell_m);
+    let on_earth = dive.state.mission.origin.map_or_else(String::new, |origin| {
+        let [(south, west), (north, east)] = [(west, south), (east, north)].map(|(x, y)| lat_lon(origin, x, y));
+        format!(", or from latitude {south:.6} to {north:.6} and from longitude {west:.6} to {east:.6}")
+    });
+    Some(format!(
+        "The map reaches from {west:.1} to {east:.1} m east and from {south:.1} to {north:.1} m north{on_earth}."
+    ))
+}
+
+/// How much of the vehicle's map has arrived.
+fn arrived(state: &VehicleState, vehicle: &DiveVehicle) -> Option<String> {
+    let reported = u64::from(state.status.as_ref()?.cells);
+    let held = vehicle.labels.explored() as u64;
+    let share = (held as f64 / reported.max(1) as f64 * 100.0).min(100.0);
+    let coarse = match is_coarse(vehicle) {
+        true => {
+            " Only every fourth cell in each direction was sent, as ordered or configured: areas count these cells alone."
+        }
+        false => "",
+    };
+    (reported > 0).then(|| {
+        format!(
+            "In its last report the vehicle had {reported} cells; {held} had arrived by the end, {share:.0} %.{coarse}"
+        )
+    })
+}
+
+/// Whether the last order about it, or else the vehicle's configuration, was to send coarse cells only.
+fn is_coarse(vehicle: &DiveVehicle) -> bool {
+    let settings = vehicle.given.iter().filter(|((slot, _), _)| slot == SlotId::Settings.name());
+    let ordered = settings.filter_map(|((_, version), order)| {
+        let content = serde_json::from_str::<Value>(&order.content).ok()?;
+        Some((*version, content.get("cells")?.clone()))
+    });
+    let last = ordered.max_by_key(|(version, _)| *version).map(|(_, cells)| cells).filter(|cells| !cells.is_null());
+    let configured = || vehicle.settings.settings.get("map.cells").cloned();
+    last.or_else(configured).is_some_and(|cells| cells == "coarse")
+}
+
+/// How the vehicle looked at the sea floor.
+fn equipment(dive: &Dive, vehicle: &DiveVehicle) -> String {
+    let all = if vehicle.settings.settings.is_empty() { &dive.settings } else { &vehicle.settings };
+    let set = |key: &str, default: f64| all.settings.get(key).and_then(Value::as_f64).unwrap_or(default);
+    let defaults = scenecast_config::Config::default();
+    format!(
+        "By its settings it was to survey {} m above the sea floor at {} m/s, with camera images whose pixels are {} m wide there.",
+        set("survey.altitude_m", defaults.survey.altitude_m),
+        set("survey.speed_m_s", defaults.survey.speed_m_s),
+        set("camera.metres_per_pixel", defaults.camera.metres_per_pixel)
+    )
+}
+
+fn place(dive: &Dive, vehicle: &DiveVehicle) -> String {
+    let Some(last) = vehicle.track.last() else { return "It never reported a place.".to_owned() };
+    let depths = || vehicle.track.iter().map(|point| point.depth_m);
+    let (least, most) = (depths().fold(f64::INFINITY, f64::min), depths().fold(f64::NEG_INFINITY, f64::max));
+    let origin = dive.state.mission.origin.map_or_else(
+        || "the mission has no origin on the globe".to_owned(),
+        |origin| format!("the origin is at latitude {:.6}, longitude {:.6} (WGS 84)", origin.lat_deg, origin.lon_deg),
+    );
+    let begin = vehicle.track.first().map_or_else(String::new, |first| {
+        format!(
+            ", beginning {:.1} m east and {:.1} m north of the origin{}",
+            first.east_m,
+            first.north_m,
+            on_earth(dive, (first.east_m, first.north_m))
+        )
+    });
+    let depth = match format!("{least:.1}") == format!("{most:.1}") {
+        true => format!("at a depth of {least:.1} m"),
+        false => format!("at depths of {least:.1} to {most:.1} m"),
+    };
+    format!(
+        "By its {} {:.0} m{begin}, {depth} below the surface; at the end it was {:.1} m east and {:.1} m north of the \
+         origin, with a standard deviation of {:.1} m; {origin}.",
+        if vehicle.own_track.len() > 1 { "own record it went" } else { "reports it went at least" },
+        vehicle.distance_m(),
+        last.east_m,
+        last.north_m,
+        last.sigma_m
+    )
+}
+
+fn found(state: &VehicleState, vehicle: &DiveVehicle) -> String {
+    let all: u64 = vehicle.classes.iter().map(|class| class.cells).sum();
+    let Some(largest) = vehicle.classes.first() else { return "No part of the map arrived.".to_owned() };
+    let doubt = largest.interval_m2.map_or_else(String::new, |_| {
+        format!("; by the model's own doubt it has {}, with a probability of 95 %", interval(largest.interval_m2))
+    });
+    format!(
+        "The map that arrived has {all} cells of {0:.2} m x {0:.2} m, {1}, with {2} classes; the largest is {3} with {4} ({5:.0} %){doubt}.",
+        vehicle.cell_m,
+        area(all as f64 * vehicle.cell_m * vehicle.cell_m),
+        vehicle.classes.len(),
+        state.label_book.title(largest.label),
+        area(largest.area_m2),
+        largest.cells as f64 / all as f64 * 100.0
+    )
+}
+
+fn orders(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -> String {
+    let ends = |status: u8| {
+        let is_end = |way: &[OrderStep]| way.last().is_some_and(|last| last.status == status);
+        vehicle.orders_of_people().filter(|(_, way)| is_end(way)).count()
+    };
+    let all = vehicle.orders_of_people().count();
+    let fixes = vehicle.orders.len() - all;
+    let authors: BTreeSet<String> =
+        vehicle.orders_of_people().map(|(order, _)| dive.ordered(state, vehicle, order).0).collect();
+    let authors: Vec<String> = authors.into_iter().filter(|author| !author.is_empty()).collect();
+    let authors = if authors.is_empty() { String::new() } else { format!(" by {}", authors.join(", ")) };
+    let fixes = if fixes == 0 { String::new() } else { format!(" The surface sent {fixes} position fixes.") };
+    match all {
+        0 => format!("No order was given.{fixes}"),
+        n => {
+            let [applied, refused, withdrawn] =
+                [OrderStatus::APPLIED, OrderStatus::REFUSED, OrderStatus::WITHDRAWN].map(ends);
+            let open = match n - applied - refused - withdrawn {
+                0 => String::new(),
+                open => format!(" Of {open} the surface did not know the end."),
+            };
+            format!(
+                "{} given{authors}; of these {applied} were applied, {refused} refused and {withdrawn} withdrawn.{open}{fixes}",
+                counted(n, "order was", "orders were")
+            )
+        }
+    }
+}

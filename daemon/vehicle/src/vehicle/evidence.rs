@@ -1,0 +1,54 @@
+//! From which camera frame each cell has its label, and what the scene model knew of it then.
+
+use crate::MapUpdate;
+use scene_model::project::Pose;
+use scenecast_protocol::map::{Cell, LayerId};
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
+
+/// A camera frame that was mapped.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MappedFrame {
+    /// Mission time at which it was taken, seconds.
+    pub taken_s: f64,
+    /// Where the camera was.
+    pub camera: Pose,
+}
+
+/// Why a cell has its label.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Evidence {
+    /// The frame after which the cell changed.
+    pub frame: Arc<MappedFrame>,
+    /// Visual words in the cell after that frame.
+    pub words: u32,
+    /// How sure the label was then, 0 to 1; NaN where the scene model does not tell.
+    pub confidence: f32,
+}
+
+/// The evidence of each cell that has changed in this run.
+#[derive(Debug, Default)]
+pub(super) struct EvidenceByCell(BTreeMap<Cell, Evidence>);
+
+impl EvidenceByCell {
+    /// These cells have changed with the update.
+    pub(super) fn handle_change(&mut self, changed: &BTreeSet<Cell>, update: &MapUpdate) {
+        let Some(seen) = &update.seen else { return };
+        let frame = Arc::new(MappedFrame { taken_s: update.t_s, camera: seen.camera });
+        let confidence = update.layers.get(&LayerId::CONFIDENCE).into_iter().flatten();
+        let confidence: BTreeMap<Cell, f64> = confidence.copied().filter(|(cell, _)| changed.contains(cell)).collect();
+        for &(cell, words) in seen.words.iter().filter(|(cell, _)| changed.contains(cell)) {
+            let confidence = confidence.get(&cell).map_or(f32::NAN, |share| *share as f32);
+            self.0.insert(cell, Evidence { frame: frame.clone(), words, confidence });
+        }
+    }
+
+    pub(super) fn get(&self, cell: Cell) -> Option<&Evidence> {
+        self.0.get(&cell)
+    }
+
+    /// Forgets all, because labels change their meaning.
+    pub(super) fn clear(&mut self) {
+        self.0.clear();
+    }
+}
