@@ -1,4 +1,4 @@
-//! Whether the camera is as configured: the size of its pixels, its turn on the vehicle, and whether its images are mirrored.
+//! Whether the camera is as configured: the size of its pixels, its turn on the vehicle, and whether its images or the poses are mirrored.
 //!
 //! The registration searches for overlaps near where odometry expects them, so that a wrong size of pixels only makes it find fewer. Here
 //! frames are compared over all shifts, and their displacements by the images with those by odometry.
@@ -14,6 +14,9 @@ use scenecast_core::wrap_rad;
 const PAIRS: usize = 24;
 const MIN_PAIRS: usize = 12;
 const MAX_TRIED: usize = 120;
+/// Further pairs of a camera that seems wrong, of headings apart from the first one's: their least sine of the angle between.
+const FURTHER_PAIRS: usize = 24;
+const APART: f64 = 0.5;
 /// Frames that are looked at.
 const MAX_FRAMES: u32 = 1500;
 /// Of a straight pair the heading changes by less, radians; of one in a turn by so much.
@@ -45,8 +48,22 @@ pub struct CameraGeometry {
     pub size_ratio: f64,
     /// The direction of the bow in the images, clockwise from their top, radians, beside what is configured.
     pub turn_rad: f64,
-    /// `None` before the vehicle has turned: straight ahead, mirrored images move as others do.
+    /// `None` before the vehicle has turned: straight ahead, mirrored images move as others do. Mirrored places with headings to match
+    /// look the same.
     pub is_mirrored: Option<bool>,
+    /// Whether places and headings turn in opposite directions; then `turn_rad` is 0.
+    pub is_torn: bool,
+    /// Pairs of frames that were compared, and frames that were looked at.
+    pub pairs: usize,
+    pub frames: u32,
+}
+
+/// What the images show of the camera, for people.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum CameraFinding {
+    AsConfigured(String),
+    /// What people should change.
+    Wrong(String),
 }
 
 impl CameraGeometry {
@@ -56,6 +73,7 @@ impl CameraGeometry {
             size: (self.size_ratio - 1.0).abs() > WRONG_SIZE,
             turn: self.turn_rad.abs() > WRONG_TURN_RAD,
             mirrored: self.is_mirrored == Some(true),
+            torn: self.is_torn,
             perhaps_mirrored: is_half && self.is_mirrored.is_none(),
         }
     }
@@ -83,11 +101,52 @@ impl CameraGeometry {
                 -degrees
             ));
         }
-        if wrong.mirrored {
-            parts.push("the images are mirrored: mirror them in the camera or its driver".to_owned());
+        match (wrong.torn, self.is_mirrored) {
+            (false, Some(true)) => parts.push(
+                "the images are mirrored: mirror them in the camera or its driver; or the poses are, which looks the same: east and north \
+                 exchanged, or headings that grow to the left"
+                    .to_owned(),
+            ),
+            (false, _) => {}
+            (true, is_reversed) => parts.push(torn(is_reversed)),
         }
-        (!parts.is_empty())
-            .then(|| format!("by its images and odometry the camera is not as configured: {}", parts.join("; ")))
+        let what = if wrong.torn { "the poses are wrong" } else { "the camera is not as configured" };
+        (!parts.is_empty()).then(|| format!("by its images and odometry {what}: {}", parts.join("; ")))
+    }
+
+    /// What was measured, for people whose camera needs no change.
+    #[must_use]
+    pub fn confirmation(&self, metres_per_pixel: f64) -> String {
+        let Self { size_ratio, turn_rad, is_mirrored, pairs, frames, .. } = self;
+        let mirrored = match is_mirrored {
+            Some(_) => "they are not mirrored",
+            None => "whether they are mirrored shows only when the vehicle turns",
+        };
+        format!(
+            "by {pairs} pairs of its first {frames} frames and odometry the camera is as configured: a pixel measures {:.5} m on the sea \
+             floor (configured: {metres_per_pixel} m), the bow is {:.0} degrees clockwise from the top of the images, and {mirrored}",
+            metres_per_pixel / size_ratio,
+            turn_rad.to_degrees()
+        )
+    }
+
+    /// What people should know of it. `metres_per_pixel` is the configured size.
+    #[must_use]
+    pub fn finding(&self, metres_per_pixel: f64) -> CameraFinding {
+        let advice = self.advice(metres_per_pixel);
+        advice.map_or_else(|| CameraFinding::AsConfigured(self.confirmation(metres_per_pixel)), CameraFinding::Wrong)
+    }
+}
+
+/// How places and headings that turn in opposite directions can be mended. The images turn against the headings where these are reversed.
+fn torn(is_reversed: Option<bool>) -> String {
+    let headings = "the headings of the poses grow to the left: they are to grow clockwise from north";
+    let places =
+        "the places of the poses are mirrored: east and north are exchanged, or one of them has the wrong sign";
+    match is_reversed {
+        Some(true) => headings.to_owned(),
+        Some(false) => places.to_owned(),
+        None => format!("{headings}; or {places}"),
     }
 }
 
@@ -97,6 +156,7 @@ struct Wrong {
     size: bool,
     turn: bool,
     mirrored: bool,
+    torn: bool,
     /// Half a turn may also be images that are mirrored from top to bottom.
     perhaps_mirrored: bool,
 }
@@ -110,13 +170,32 @@ struct Earlier {
     age: u32,
 }
 
-/// Collects evidence from the first frames of a mission, at most [`PAIRS`] pairs of them.
+/// How a vehicle has moved between two frames.
+#[derive(Debug, Clone, Copy)]
+struct Pair {
+    /// By the images: to the right, and ahead as the imaginary part, metres.
+    by_images: Complex<f64>,
+    /// By odometry: east, and north as the imaginary part, metres.
+    by_odometry: Complex<f64>,
+    /// Halfway.
+    heading_rad: f64,
+}
+
+impl Pair {
+    /// The displacement by the images in relation to that by odometry, with the headings as they are or reversed.
+    fn ratio(&self, is_mirrored: bool, is_reversed: bool) -> Complex<f64> {
+        let Self { by_images, by_odometry, heading_rad } = *self;
+        let by_images = if is_mirrored { Complex::new(-by_images.re, by_images.im) } else { by_images };
+        by_images / (by_odometry * Complex::from_polar(1.0, if is_reversed { -heading_rad } else { heading_rad }))
+    }
+}
+
+/// Collects evidence from the first frames of a mission, at most [`PAIRS`] and [`FURTHER_PAIRS`] pairs of them.
 #[derive(Debug, Clone, Default)]
 pub struct GeometryCheck {
     flat: FlatField,
     earlier: Option<Earlier>,
-    /// Displacements by the images and by odometry: to the right, and ahead as the imaginary part, metres.
-    pairs: Vec<[Complex<f64>; 2]>,
+    pairs: Vec<Pair>,
     /// The confidence of turns as of a camera that is not mirrored, less that as of a mirrored one.
     turns: f32,
     tried: usize,
@@ -128,7 +207,8 @@ impl GeometryCheck {
     /// Whether it needs no more frames.
     #[must_use]
     pub fn is_complete(&self) -> bool {
-        let has_all = self.pairs.len() >= PAIRS && self.is_mirrored().is_some();
+        let wanted = if self.seems_wrong() { PAIRS + FURTHER_PAIRS } else { PAIRS };
+        let has_all = self.pairs.len() >= wanted && self.is_mirrored().is_some();
         has_all || self.tried >= MAX_TRIED || self.frames >= MAX_FRAMES
     }
 
@@ -136,16 +216,29 @@ impl GeometryCheck {
         (self.turns.abs() > MIN_TURNS).then_some(self.turns < 0.0)
     }
 
-    /// What people should change at the camera, once its frames have shown it, and again when a turn has shown more.
-    /// `metres_per_pixel` is the configured size.
-    pub fn poll_advice(&mut self, metres_per_pixel: f64) -> Option<String> {
+    /// Whether pairs of other headings may show that the poses are wrong, and not the camera.
+    fn seems_wrong(&self) -> bool {
+        self.geometry().is_none_or(|found| found.wrong().turn || found.is_torn || found.is_mirrored == Some(true))
+    }
+
+    /// Whether a pair at a heading is of use.
+    fn wants(&self, heading_rad: f64) -> bool {
+        let is_apart = || self.pairs.first().is_some_and(|first| (heading_rad - first.heading_rad).sin().abs() > APART);
+        match self.pairs.len() {
+            ..PAIRS => true,
+            count => count < PAIRS + FURTHER_PAIRS && is_apart() && self.seems_wrong(),
+        }
+    }
+
+    /// What people should know of the camera, once its frames have shown it, and again when a turn has shown more. `metres_per_pixel`
+    /// is the configured size.
+    pub fn poll_finding(&mut self, metres_per_pixel: f64) -> Option<CameraFinding> {
         if self.pairs.len() < PAIRS && !self.is_complete() {
             return None;
         }
         let found = self.geometry()?;
-        let advice = found.advice(metres_per_pixel)?;
         let is_new = self.told.replace(found.wrong()) != Some(found.wrong());
-        is_new.then_some(advice)
+        is_new.then(|| found.finding(metres_per_pixel))
     }
 
     /// Takes the next frame of the track.
@@ -187,7 +280,8 @@ impl GeometryCheck {
         if moved.norm() < MIN_DISPLACEMENT_M {
             return true;
         }
-        if self.pairs.len() >= PAIRS {
+        let heading_rad = earlier.heading_rad + turned / 2.0;
+        if !self.wants(heading_rad) {
             // Only a turn is of use now, of a frame that still overlaps with this one.
             return moved.norm() < WITHIN_VIEW * pitch_m * now.plane.columns().min(now.plane.rows()) as f64;
         }
@@ -197,10 +291,7 @@ impl GeometryCheck {
         if right.hypot(down) < MIN_SHIFT_PX {
             return true;
         }
-        // From east and north to the axes of the vehicle halfway.
-        let heading = earlier.heading_rad + turned / 2.0;
-        let by_odometry = moved * Complex::from_polar(1.0, heading);
-        self.pairs.push([Complex::new(right, -down) * pitch_m, by_odometry]);
+        self.pairs.push(Pair { by_images: Complex::new(right, -down) * pitch_m, by_odometry: moved, heading_rad });
         false
     }
 
@@ -211,18 +302,33 @@ impl GeometryCheck {
             return None;
         }
         let is_mirrored = self.is_mirrored();
-        let ratio = |[by_images, by_odometry]: &[Complex<f64>; 2]| {
-            let by_images =
-                if is_mirrored == Some(true) { Complex::new(-by_images.re, by_images.im) } else { *by_images };
-            by_images / by_odometry
+        let as_said = self.agreed(is_mirrored == Some(true), false);
+        // Headings that are reversed let the images turn as mirrored ones do, and mirrored places do not.
+        let reversed = || match is_mirrored {
+            Some(is_mirrored) => self.agreed(!is_mirrored, true),
+            None => self.agreed(false, true).or_else(|| self.agreed(true, true)),
         };
-        let ratios: Vec<Complex<f64>> = self.pairs.iter().map(ratio).collect();
-        let size_ratio = median(ratios.iter().map(|ratio| ratio.norm()));
-        let spread = median(ratios.iter().map(|ratio| (ratio.norm() - size_ratio).abs()));
-        let direction = ratios.iter().map(|ratio| ratio / ratio.norm()).sum::<Complex<f64>>() / ratios.len() as f64;
-        let agree = spread <= MAX_SPREAD * size_ratio && direction.norm() >= MIN_AGREEMENT;
+        let is_torn = as_said.is_none();
+        let (size_ratio, direction) = as_said.or_else(reversed)?;
         // The bow at an angle to the left of the top is a negative turn.
-        agree.then_some(CameraGeometry { size_ratio, turn_rad: -direction.arg(), is_mirrored })
+        let turn_rad = if is_torn { 0.0 } else { -direction.arg() };
+        Some(CameraGeometry {
+            size_ratio,
+            turn_rad,
+            is_mirrored,
+            is_torn,
+            pairs: self.pairs.len(),
+            frames: self.frames,
+        })
+    }
+
+    /// The median size and the mean direction of the ratios of all pairs, if they agree.
+    fn agreed(&self, is_mirrored: bool, is_reversed: bool) -> Option<(f64, Complex<f64>)> {
+        let ratios: Vec<Complex<f64>> = self.pairs.iter().map(|pair| pair.ratio(is_mirrored, is_reversed)).collect();
+        let size = median(ratios.iter().map(|ratio| ratio.norm()));
+        let spread = median(ratios.iter().map(|ratio| (ratio.norm() - size).abs()));
+        let direction = ratios.iter().map(|ratio| ratio / ratio.norm()).sum::<Complex<f64>>() / ratios.len() as f64;
+        (spread <= MAX_SPREAD * size && direction.norm() >= MIN_AGREEMENT).then_some((size, direction))
     }
 }
 
@@ -255,6 +361,7 @@ mod tests {
     use super::*;
     use crate::camera_image::CameraImage;
     use scenecast_protocol::coordinates::MapPoint;
+    use std::f64::consts::FRAC_PI_2;
 
     /// Size of a pixel in truth, metres.
     const PIXEL_M: f64 = 0.01;
@@ -310,7 +417,7 @@ mod tests {
         let (mut at, mut heading_rad) = ([3.0, 4.0], 0.3f64);
         for step in 0..turn + 40 {
             if (turn..turn + 6).contains(&step) {
-                heading_rad += 0.5;
+                heading_rad += 0.35;
             }
             at = [at[0] + 0.3 * heading_rad.sin(), at[1] + 0.3 * heading_rad.cos()];
             let image = camera.image(at, heading_rad);
@@ -326,7 +433,7 @@ mod tests {
         let (mut check, mut told) = (GeometryCheck::default(), Vec::new());
         fly(Camera { turn_rad: 0.0, is_mirrored: true }, 3.0 * PIXEL_M, 80, &mut |input, step| {
             check.handle_frame(&input);
-            told.extend(check.poll_advice(3.0 * PIXEL_M).map(|advice| (step, advice)));
+            told.extend(check.poll_finding(3.0 * PIXEL_M).map(|finding| (step, format!("{finding:?}"))));
         });
         let [(before, size), (after, mirrored)] = &told[..] else { panic!("{told:?}") };
         assert!(*before < 80 && size.contains("set camera.metres_per_pixel = 0.0") && *after >= 80, "{told:?}");
@@ -337,7 +444,47 @@ mod tests {
     fn a_camera_as_configured_needs_no_advice() {
         let geometry = found(Camera { turn_rad: 0.0, is_mirrored: false }, PIXEL_M).unwrap();
         assert!((geometry.size_ratio - 1.0).abs() < 0.05 && geometry.turn_rad.abs() < 0.05, "{geometry:?}");
-        assert_eq!(geometry.advice(PIXEL_M), None);
+        let CameraFinding::AsConfigured(text) = geometry.finding(PIXEL_M) else { panic!("{geometry:?}") };
+        assert!(text.contains("a pixel measures 0.0") && text.contains("they are not mirrored"), "{text}");
+        assert!(text.starts_with("by 24 pairs of its first "), "{text}");
+    }
+
+    #[test]
+    fn a_camera_as_configured_is_told_of_once() {
+        let (mut check, mut told) = (GeometryCheck::default(), Vec::new());
+        fly(Camera { turn_rad: 0.0, is_mirrored: false }, PIXEL_M, 80, &mut |input, _| {
+            check.handle_frame(&input);
+            told.extend(check.poll_finding(PIXEL_M));
+        });
+        assert!(matches!(&told[..], [CameraFinding::AsConfigured(_)]), "{told:?}");
+    }
+
+    /// A place and a heading.
+    type Posed = ([f64; 2], f64);
+
+    #[test]
+    fn mirrored_poses_are_told_from_a_mirrored_camera() {
+        let advice = |wrong: fn(Posed) -> Posed| {
+            let mut check = GeometryCheck::default();
+            fly(Camera { turn_rad: 0.0, is_mirrored: false }, PIXEL_M, 30, &mut |input, _| {
+                let (x, y) = input.dead_reckoned.xy();
+                let ([x, y], compass_rad) = wrong(([x, y], input.compass_rad));
+                check.handle_frame(&FrameInput { dead_reckoned: MapPoint::new(x, y), compass_rad, ..input });
+            });
+            check.geometry().unwrap().advice(PIXEL_M).unwrap()
+        };
+        for (wrong, expected) in [
+            (
+                (|(at, heading)| (at, -heading)) as fn(Posed) -> Posed,
+                "the poses are wrong: the headings of the poses grow",
+            ),
+            (|([x, y], heading)| ([y, x], heading), "the poses are wrong: the places of the poses are mirrored"),
+            (|([x, y], heading)| ([y, x], FRAC_PI_2 - heading), "or the poses are, which looks the same"),
+            (|([x, y], heading)| ([-x, y], -heading), "or the poses are, which looks the same"),
+        ] {
+            let advice = advice(wrong);
+            assert!(advice.contains(expected) && !advice.contains("metres_per_pixel"), "{expected}: {advice}");
+        }
     }
 
     #[test]

@@ -27,7 +27,7 @@ mod skerki_tests;
 mod tiles;
 
 pub use camera_image::CameraImage;
-pub use geometry::{CameraGeometry, GeometryCheck};
+pub use geometry::{CameraFinding, CameraGeometry, GeometryCheck};
 pub use graph::FrameGraph;
 pub use pose::{Evidence, FramePose, RestoreError, Tally};
 pub use registrar::{FrameInput, Placed, Registrar};

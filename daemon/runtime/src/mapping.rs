@@ -7,7 +7,7 @@ use scene_model::project::Pose;
 use scenecast_core::UserError;
 use scenecast_protocol::directive::Settings;
 use scenecast_sensors::DepthError;
-use scenecast_vehicle::{Frame, MapProducer, MapUpdate, Mapper, RegisteredFrame, SharedExemplars};
+use scenecast_vehicle::{CameraFinding, Frame, MapProducer, MapUpdate, Mapper, RegisteredFrame, SharedExemplars};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 use tokio::sync::mpsc;
@@ -176,8 +176,10 @@ impl Work {
                 let pose = Pose { x: at.x_m, y: at.y_m, z: -at.depth_m, yaw_rad: -at.heading_rad };
                 let shot = Frame { image: &image, pose, scale: frame.scale, view: view.as_ref() };
                 let placed = self.mapper.register(&shot);
-                if let Some(advice) = self.mapper.poll_camera_advice() {
-                    tracing::warn!("camera: {advice}");
+                match self.mapper.poll_camera_finding() {
+                    Some(CameraFinding::AsConfigured(text)) => tracing::info!("camera: {text}"),
+                    Some(CameraFinding::Wrong(advice)) => tracing::warn!("camera: {advice}"),
+                    None => {}
                 }
                 let update = self.mapper.handle_frame(&shot.placed(&placed), frame.t_s);
                 let mapped = self.mapped(Some(frame), Some(placed), update);

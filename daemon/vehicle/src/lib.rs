@@ -31,6 +31,7 @@ pub use mapper::{MapUpdate, Mapper, SeenFrame, SharedExemplars};
 pub use navigator::{FixVerdict, LastPlace, Navigator};
 pub use producer::MapProducer;
 pub use registration::{FoundFrame, RegisteredFrame};
+pub use scenecast_registration::CameraFinding;
 pub use steering::{Course, Footprint, Steering};
 pub use vehicle::{
     AppliedSlot, Durable, Evidence, KeptKeys, LostOrders, MapSelection, MappedFrame, Vehicle, VehicleDisk,

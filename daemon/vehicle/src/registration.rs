@@ -5,7 +5,7 @@ use crate::mapper::Mapper;
 use scene_model::project::Pose;
 use scenecast_protocol::coordinates::MapPoint;
 use scenecast_protocol::wire::{FrameTie, RegistrationReport};
-use scenecast_registration::{CameraImage, FrameInput, GeometryCheck, Placed, Registrar, Tally};
+use scenecast_registration::{CameraFinding, CameraImage, FrameInput, GeometryCheck, Placed, Registrar, Tally};
 
 /// Standard deviation of the position after a gap in dead reckoning, metres.
 const GAP_SIGMA_M: f64 = 3.0;
@@ -96,13 +96,13 @@ impl Mapper {
         self.geometry = Some(GeometryCheck::default());
     }
 
-    /// What people should change at the camera, once its first frames and odometry have shown it.
-    pub fn poll_camera_advice(&mut self) -> Option<String> {
+    /// What people should know of the camera, once its first frames and odometry have shown it.
+    pub fn poll_camera_finding(&mut self) -> Option<CameraFinding> {
         let metres_per_pixel = self.metres_per_pixel();
         let geometry = self.geometry.as_mut()?;
-        let advice = geometry.poll_advice(metres_per_pixel);
+        let finding = geometry.poll_finding(metres_per_pixel);
         self.geometry.take_if(|geometry| geometry.is_complete());
-        advice
+        finding
     }
 
     /// The evidence of the registration so far; `None` without registration.

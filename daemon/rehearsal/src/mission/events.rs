@@ -9,6 +9,7 @@ use scenecast_core::UserError;
 use scenecast_files::{FrameImage, RecordedFrame};
 use scenecast_host::{CameraPose, FrameEvent, SurfaceHostEvent, VehicleHostEvent};
 use scenecast_protocol::time::Instant;
+use scenecast_registration::CameraFinding;
 use scenecast_surface::SurfaceOutput;
 use scenecast_vehicle::Frame;
 use sim_channel::NodePosition;
@@ -199,7 +200,9 @@ impl Mission {
         let pose = Pose { x: x_m, y: y_m, z: -depth_m, yaw_rad: -heading_rad };
         let frame = Frame { image, pose, scale, view };
         let placed = self.mapper.register(&frame);
-        self.logbook.camera_advice = self.mapper.poll_camera_advice().or(self.logbook.camera_advice.take());
+        if let Some(CameraFinding::Wrong(advice)) = self.mapper.poll_camera_finding() {
+            self.logbook.camera_advice = Some(advice);
+        }
         self.vehicle.handle_registration(&placed, now);
         if let Some(found) = &placed.found {
             self.logbook.graph.add(&found.placed);

@@ -6,7 +6,7 @@ use scenecast_core::{UserError, errln, outln};
 use scenecast_files::{RecordedFrame, Recording, write_poses};
 use scenecast_protocol::coordinates::MapPoint;
 use scenecast_registration::{
-    CameraGeometry, CameraImage, FrameGraph, FrameInput, FramePose, GeometryCheck, Registrar, Tally,
+    CameraFinding, CameraGeometry, CameraImage, FrameGraph, FrameInput, FramePose, GeometryCheck, Registrar, Tally,
 };
 use std::path::PathBuf;
 
@@ -60,8 +60,10 @@ impl Register {
         if let [first, ..] = placed.unreadable.as_slice() {
             errln!("{} frames that cannot be read are left out; the first: {first}", placed.unreadable.len());
         }
-        if let Some(advice) = placed.geometry.and_then(|geometry| geometry.advice(self.metres_per_pixel)) {
-            errln!("{advice}");
+        if let Some(geometry) = placed.geometry {
+            let (CameraFinding::AsConfigured(text) | CameraFinding::Wrong(text)) =
+                geometry.finding(self.metres_per_pixel);
+            errln!("{text}");
         }
         if placed.geometry.is_some_and(|geometry| geometry.is_mirrored.is_none()) {
             errln!("the vehicle turns too little to show whether the images are mirrored");
