@@ -1,5 +1,6 @@
 //! Rows of a table of poses, by the names of their columns.
 
+use scenecast_sensors::{Stamp, Times, reachable};
 use std::path::{Component, Path, PathBuf};
 
 /// Where the wanted columns are in a row.
@@ -31,6 +32,44 @@ impl Columns {
         }
         Ok(Self { wanted: found, scale: place("scale")?, count: names.len() })
     }
+}
+
+/// A row of poses whose place is compared with those before.
+pub(crate) struct Placed<T> {
+    /// File and line, for people.
+    pub(crate) line: u64,
+    pub(crate) t_s: f64,
+    /// Metres east and north.
+    pub(crate) at: [f64; 2],
+    pub(crate) content: T,
+}
+
+/// Leaves out the rows whose places no vehicle can reach from those before, and says so. If they are half of all, the table is of another
+/// kind, and all are taken.
+pub(crate) fn reachable_rows<T>(path: &Path, rows: Vec<Placed<T>>, times: Times) -> (Vec<T>, Option<String>) {
+    let place = |row: &usize| (Stamp::from_nanos((rows[*row].t_s * 1e9).round() as i64), rows[*row].at);
+    let (_, left_out) = reachable(0..rows.len(), times, place);
+    let (count, all) = (left_out.len(), rows.len());
+    let Some(first) = left_out.first().map(|row| &rows[*row]) else {
+        return (rows.into_iter().map(|row| row.content).collect(), None);
+    };
+    let [east, north] = first.at;
+    let first = format!("{}:{}: [{east:.1}, {north:.1}] m", path.display(), first.line);
+    if 2 * count >= all {
+        let note = format!(
+            "no vehicle can reach {count} of {all} places from the one before, the first: {first}; all are used: check times and units"
+        );
+        return (rows.into_iter().map(|row| row.content).collect(), Some(note));
+    }
+    let note = format!(
+        "{count} of {all} poses are left out, because no vehicle can reach their place from the one before, the first: {first}"
+    );
+    let kept = rows
+        .into_iter()
+        .enumerate()
+        .filter(|(row, _)| left_out.binary_search(row).is_err())
+        .map(|(_, row)| row.content);
+    (kept.collect(), Some(note))
 }
 
 #[derive(Clone, Copy)]

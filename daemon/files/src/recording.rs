@@ -1,12 +1,12 @@
 //! Recorded missions: images with their poses.
 
 use crate::images::FrameImage;
-use crate::pose_table::{Columns, PoseRow};
+use crate::pose_table::{Columns, Placed, PoseRow, reachable_rows};
 use crate::tum_recording::read_depth;
 use image::RgbImage;
 use scene_model::project::View;
 use scenecast_core::{Area, UserError};
-use scenecast_sensors::Sight;
+use scenecast_sensors::{Sight, Times};
 use std::fmt::Write as _;
 use std::io::Read as _;
 use std::path::{Path, PathBuf};
@@ -87,32 +87,35 @@ impl Recording {
             false => (Columns::find(&names, &METRE_COLUMNS), false),
         };
         let columns = columns.map_err(|wrong| UserError::Input(format!("{}:1: {wrong}", path.display())))?;
-        let mut frames: Vec<RecordedFrame> = Vec::new();
+        let mut frames: Vec<Placed<RecordedFrame>> = Vec::new();
         for row in reader.records() {
             let row = row.map_err(|e| UserError::file(&path, e))?;
-            let place = format!("{}:{}", path.display(), row.position().map_or(0, csv::Position::line));
+            let line = row.position().map_or(0, csv::Position::line);
+            let place = format!("{}:{line}", path.display());
+            let last = frames.last().map(|last| last.t_s);
             let frame = PoseRow::new(&columns, &row).and_then(|row| match in_pixels {
                 true => {
-                    let midnight = frames.last().map_or(0.0, |last| (last.t_s / DAY_S).floor() * DAY_S);
-                    of_mosaic(dir, row, metres_per_pixel).map(|f| after(f, midnight, frames.last()))
+                    let midnight = last.map_or(0.0, |last_s| (last_s / DAY_S).floor() * DAY_S);
+                    of_mosaic(dir, row, metres_per_pixel).map(|f| after(f, midnight, last))
                 }
                 false => of_metres(dir, row),
             });
             let frame = frame.map_err(|wrong| UserError::Input(format!("{place}: {wrong}")))?;
-            if let Some(last) = frames.last().filter(|last| last.t_s > frame.t_s) {
-                let (before, now) = (last.t_s, frame.t_s);
+            if let Some(before) = last.filter(|last_s| *last_s > frame.t_s) {
+                let now = frame.t_s;
                 let line = format!("{place}: the time {now} s is earlier than {before} s on the line before");
                 return Err(UserError::Input(line));
             }
-            frames.push(frame);
+            frames.push(Placed { line, t_s: frame.t_s, at: [frame.x_m, frame.y_m], content: frame });
         }
         if frames.is_empty() {
             return Err(UserError::file(&path, "there are no frames"));
         }
+        let (mut frames, note) = reachable_rows(&path, frames, Times::Coarse);
         // The table gives the time of the day, not the mission's.
         let began_s = if in_pixels { frames[0].t_s } else { 0.0 };
         frames.iter_mut().for_each(|frame| frame.t_s -= began_s);
-        Ok(Self { frames, notes: Vec::new() })
+        Ok(Self { frames, notes: note.into_iter().collect() })
     }
 
     /// Limits of the places in the recording.
@@ -178,9 +181,9 @@ fn time_of_day(text: &str) -> Option<f64> {
 }
 
 /// The frame on the day of the one before it, or on the next if it is more than half a day earlier.
-fn after(frame: RecordedFrame, midnight: f64, last: Option<&RecordedFrame>) -> RecordedFrame {
+fn after(frame: RecordedFrame, midnight: f64, last_s: Option<f64>) -> RecordedFrame {
     let t_s = frame.t_s + midnight;
-    let is_next_day = last.is_some_and(|last| t_s < last.t_s - DAY_S / 2.0);
+    let is_next_day = last_s.is_some_and(|last_s| t_s < last_s - DAY_S / 2.0);
     RecordedFrame { t_s: if is_next_day { t_s + DAY_S } else { t_s }, ..frame }
 }
 
@@ -315,6 +318,29 @@ mod tests {
         let text = "t_s,file,x_m,y_m,depth_m,heading_deg,scale\n0,a.png,1,2,3,4,0\n";
         let wrong = open("scale", "poses.csv", text).unwrap_err().to_string();
         assert!(wrong.contains("poses.csv:2: scale is \"0\"; expected 0.001 to 1000"), "{wrong}");
+    }
+
+    #[test]
+    fn a_place_that_no_vehicle_reaches_is_left_out_and_named() {
+        let table = |x_m: fn(i32) -> f64| {
+            let row = |i| format!("{},{i}.png,{},2,3,90\n", 0.5 * f64::from(i), x_m(i));
+            "t_s,file,x_m,y_m,depth_m,heading_deg\n".to_owned() + &(0..20).map(row).collect::<String>()
+        };
+        let read = |x_m| open("spikes", "poses.csv", &table(x_m)).unwrap();
+        let spiked = read(|i| if i == 7 { 400.0 } else { f64::from(i) });
+        assert!(spiked.frames.len() == 19 && spiked.frames.iter().all(|frame| frame.x_m < 20.0));
+        let [note] = &spiked.notes[..] else { panic!("{:?}", spiked.notes) };
+        assert!(
+            note.starts_with("1 of 20 poses are left out") && note.contains("poses.csv:9: [400.0, 2.0] m"),
+            "{note}"
+        );
+        assert_eq!(read(|i| if i < 7 { 400.0 } else { f64::from(i) }).notes, [""; 0]);
+        let fast = read(|i| 400.0 * f64::from(i));
+        assert!(
+            fast.frames.len() == 20 && fast.notes[0].contains("all are used: check times and units"),
+            "{:?}",
+            fast.notes
+        );
     }
 
     #[test]

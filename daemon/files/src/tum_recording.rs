@@ -5,11 +5,12 @@
 //! world. Depth is a 16-bit PNG in units of 1/5000 m, 0 where there is no reading.
 
 use crate::images::{FrameImage, read_image};
+use crate::pose_table::{Placed, reachable_rows};
 use crate::recording::{DepthFile, RecordedFrame, Recording};
 use image::DynamicImage;
 use scene_model::project::{CameraPose, DepthImage};
 use scenecast_core::UserError;
-use scenecast_sensors::{Calibration, Rotation, Sight, tilt_of};
+use scenecast_sensors::{Calibration, Rotation, Sight, Times, tilt_of};
 use std::path::{Component, Path, PathBuf};
 use std::sync::Arc;
 
@@ -53,7 +54,7 @@ impl Recording {
                 ))
             })?);
         }
-        Ok(Self { frames, notes: folder.note().into_iter().collect() })
+        Ok(Self { frames, notes: folder.notes().collect() })
     }
 }
 
@@ -108,6 +109,8 @@ pub struct TumFolder {
     pub frames: Vec<TumFrame>,
     /// Images of the sequence, with those that are not among the frames.
     pub images: usize,
+    /// About poses that are left out.
+    note: Option<String>,
 }
 
 /// An image with its depth image and its pose.
@@ -126,9 +129,14 @@ impl TumFolder {
     /// # Errors
     /// A list that cannot be read, by its line, or no image with depth and pose.
     pub fn open(dir: &Path) -> Result<Self, UserError> {
-        let images = read_list(&dir.join("rgb.txt"), file)?;
-        let depths = read_list(&dir.join("depth.txt"), file)?;
-        let poses = read_list(&dir.join("groundtruth.txt"), pose)?;
+        let images = times_and(read_list(&dir.join("rgb.txt"), file)?);
+        let depths = times_and(read_list(&dir.join("depth.txt"), file)?);
+        let path = dir.join("groundtruth.txt");
+        let poses = read_list(&path, pose)?.into_iter().map(|Entry { line, t_s, content: pose }| {
+            let [east, north, _] = pose.position;
+            Placed { line, t_s, at: [east, north], content: (t_s, pose) }
+        });
+        let (poses, note) = reachable_rows(&path, poses.collect(), Times::Exact);
         let mut frames = Vec::new();
         for (t_s, image) in &images {
             if let (Some(depth), Some(pose)) = (nearest(&depths, *t_s), nearest(&poses, *t_s)) {
@@ -140,14 +148,16 @@ impl TumFolder {
                 format!("none of its {} images has a depth image and a pose within {MAX_APART_S} s", images.len());
             return Err(UserError::file(&dir.join("rgb.txt"), cause));
         }
-        Ok(Self { images: images.len(), frames })
+        Ok(Self { images: images.len(), frames, note })
     }
 
-    /// A line about images without a depth image or a pose; `None` if all have both.
-    pub fn note(&self) -> Option<String> {
+    /// Lines about poses that are left out, and about images without a depth image or a pose.
+    pub fn notes(&self) -> impl Iterator<Item = String> {
         let few = self.images - self.frames.len();
         let all = self.images;
-        (few > 0).then(|| format!("{few} of {all} images have no depth image or no pose within {MAX_APART_S} s"))
+        let few =
+            (few > 0).then(|| format!("{few} of {all} images have no depth image or no pose within {MAX_APART_S} s"));
+        self.note.clone().into_iter().chain(few)
     }
 }
 
@@ -171,25 +181,37 @@ pub fn read_depth(path: &Path, units_per_m: f64) -> Result<DepthImage, UserError
     }
 }
 
+/// A line of a list.
+struct Entry<T> {
+    line: u64,
+    t_s: f64,
+    content: T,
+}
+
+fn times_and<T>(list: Vec<Entry<T>>) -> Vec<(f64, T)> {
+    list.into_iter().map(|entry| (entry.t_s, entry.content)).collect()
+}
+
 /// Reads lines `time value` and sorts them by time; errors name the line.
-fn read_list<T>(path: &Path, read: impl Fn(&str) -> Result<T, String>) -> Result<Vec<(f64, T)>, UserError> {
+fn read_list<T>(path: &Path, read: impl Fn(&str) -> Result<T, String>) -> Result<Vec<Entry<T>>, UserError> {
     let text = scenecast_config::read_regular(path, MAX_LIST_BYTES)?;
     let text = String::from_utf8(text).map_err(|_| UserError::file(path, "it is not text in UTF-8"))?;
     let mut list = Vec::new();
-    for (index, line) in text.lines().enumerate() {
+    for (place, line) in (1..).zip(text.lines()) {
         let line = line.trim_start_matches('\u{feff}').trim();
         if line.is_empty() || line.starts_with('#') {
             continue;
         }
         let (time, rest) = line.split_once([' ', '\t', ',']).unwrap_or((line, ""));
-        let entry = number(Some(time), "the time").and_then(|t_s| Ok((t_s, read(rest.trim())?)));
-        let place = || format!("{}:{}", path.display(), index + 1);
+        let entry =
+            number(Some(time), "the time").and_then(|t_s| Ok(Entry { line: place, t_s, content: read(rest.trim())? }));
+        let place = || format!("{}:{place}", path.display());
         list.push(entry.map_err(|error| UserError::Input(format!("{}: {error}", place())))?);
     }
     if list.is_empty() {
         return Err(UserError::file(path, "there are no lines"));
     }
-    list.sort_by(|a, b| a.0.total_cmp(&b.0));
+    list.sort_by(|a, b| a.t_s.total_cmp(&b.t_s));
     Ok(list)
 }
 

@@ -32,6 +32,7 @@ mod lens;
 mod point_cloud;
 mod pose_track;
 mod raw_image;
+mod reach;
 mod rotation;
 mod sight;
 mod stamp;
@@ -50,6 +51,7 @@ pub use image_stream::{ImageStream, MAX_IMAGE_BYTES, complete_length, is_known_i
 pub use lens::LensError;
 pub use pose_track::{PoseMatch, PoseTrack, SensorPose};
 pub use raw_image::{BitDepth, RawImage, RawImageError};
+pub use reach::{Times, reachable};
 pub use rotation::Rotation;
 pub use sight::{CameraMounting, MountedCamera, Sight, tilt_of};
 pub use stamp::{Stamp, StampForm};

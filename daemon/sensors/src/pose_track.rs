@@ -1,6 +1,7 @@
 //! The poses of the last minutes, and the pose at the time of an image.
 
 use crate::Stamp;
+use crate::reach::{Times, reachable};
 use std::collections::VecDeque;
 use std::f64::consts::{PI, TAU};
 use std::time::Duration;
@@ -69,21 +70,6 @@ const JUMP: Duration = Duration::from_secs(1);
 /// Poses in a row from which a clock that went back is believed.
 const JUMP_POSES: u32 = 3;
 
-/// Faster than this is no vehicle, metres a second.
-const FASTEST_M_S: f64 = 20.0;
-
-/// A step at once that is no jump, metres.
-const STEP_M: f64 = 5.0;
-
-/// Poses elsewhere that follow each other for so many seconds are right.
-const PERSISTS_S: f64 = 1.0;
-
-/// Whether a vehicle can come from a pose to a later one.
-fn leads_to((before, from): (Stamp, SensorPose), (later, to): (Stamp, SensorPose)) -> bool {
-    let moved = (to.x_m - from.x_m).hypot(to.y_m - from.y_m);
-    moved <= STEP_M + FASTEST_M_S * later.seconds_since(before)
-}
-
 /// Poses in order of their stamps.
 #[derive(Debug, Clone)]
 pub struct PoseTrack {
@@ -107,37 +93,14 @@ impl PoseTrack {
     /// A track of all these poses, however many; those that are not later than the one before are left out, and those that no vehicle
     /// can reach from it, unless they stay.
     pub fn of(poses: impl IntoIterator<Item = (Stamp, SensorPose)>, max_gap: Duration) -> Self {
-        let mut track = Self::new(max_gap);
-        // Poses that follow each other, and that the last one of the track does not lead to.
-        let mut elsewhere: Vec<(Stamp, SensorPose)> = Vec::new();
-        for posed in poses.into_iter().filter(|(_, pose)| pose.is_finite()) {
-            let newest = elsewhere.last().or(track.poses.back());
-            if newest.is_some_and(|(last, _)| *last >= posed.0) {
-                continue;
-            }
-            if track.last().is_none_or(|last| leads_to(last, posed)) {
-                track.unreachable += elsewhere.drain(..).count();
-                track.poses.push_back(posed);
-                continue;
-            }
-            if elsewhere.last().is_some_and(|last| !leads_to(*last, posed)) {
-                track.unreachable += elsewhere.drain(..).count();
-            }
-            elsewhere.push(posed);
-            if elsewhere.first().is_some_and(|(first, _)| posed.0.seconds_since(*first) >= PERSISTS_S) {
-                track.continue_at(&mut elsewhere);
-            }
-        }
-        track.unreachable += elsewhere.len();
-        track
-    }
-
-    /// Believes poses elsewhere. A track of one pose before was wrong itself.
-    fn continue_at(&mut self, elsewhere: &mut Vec<(Stamp, SensorPose)>) {
-        if self.poses.len() == 1 {
-            self.unreachable += self.poses.drain(..).count();
-        }
-        self.poses.extend(elsewhere.drain(..));
+        let mut newest = None;
+        let later = poses.into_iter().filter(|(stamp, pose)| {
+            let is_later = pose.is_finite() && newest.is_none_or(|newest| *stamp > newest);
+            newest = if is_later { Some(*stamp) } else { newest };
+            is_later
+        });
+        let (poses, unreachable) = reachable(later, Times::Exact, |(stamp, pose)| (*stamp, [pose.x_m, pose.y_m]));
+        Self { poses: poses.into(), unreachable: unreachable.len(), ..Self::new(max_gap) }
     }
 
     /// How many of all poses were left out because no vehicle can reach them from the one before.

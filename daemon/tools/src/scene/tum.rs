@@ -35,8 +35,8 @@ pub(crate) struct Tum {
     intrinsics: Option<Intrinsics>,
     depth_scale: f64,
     cell_m: f64,
-    /// About images without depth or pose.
-    note: Option<String>,
+    /// About poses that are left out, and images without depth or pose.
+    folder_notes: Vec<String>,
     unreadable: Vec<String>,
     words_without_depth: u64,
 }
@@ -51,7 +51,7 @@ impl Tum {
         cell_m: f64,
     ) -> Result<Self, UserError> {
         let folder = TumFolder::open(dir)?;
-        let note = folder.note();
+        let folder_notes = folder.notes().collect();
         let frames = folder.frames;
         Ok(Self {
             all: folder.images,
@@ -61,7 +61,7 @@ impl Tum {
             intrinsics,
             depth_scale,
             cell_m,
-            note,
+            folder_notes,
             unreadable: Vec::new(),
             words_without_depth: 0,
         })
@@ -105,8 +105,7 @@ impl WordSource for Tum {
     }
 
     fn notes(&self) -> Option<String> {
-        let mut notes = Vec::new();
-        notes.extend(self.note.clone());
+        let mut notes = self.folder_notes.clone();
         if let Some(first) = self.unreadable.first() {
             notes.push(format!("{} frames skipped, the first: {first}", self.unreadable.len()));
         }

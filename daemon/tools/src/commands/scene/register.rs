@@ -56,6 +56,7 @@ impl Register {
         within("metres-per-pixel", self.metres_per_pixel, 1e-6, 1e3, "0.000001 to 1000 m")?;
         within("drift", self.drift, 0.0, 50.0, "0 to 50 %")?;
         let recording = Recording::open(&self.frames, None, self.metres_per_pixel)?;
+        recording.notes.iter().for_each(|note| errln!("{note}"));
         let placed = self.place(&recording)?;
         if let [first, ..] = placed.unreadable.as_slice() {
             errln!("{} frames that cannot be read are left out; the first: {first}", placed.unreadable.len());
