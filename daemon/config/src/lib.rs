@@ -21,7 +21,8 @@ pub use key::{Key, Role, Rule};
 pub use load::load;
 pub use print::{changed_settings, print, reference, schema, shipped_files};
 pub use secret_files::{
-    TokenGrant, load_key, load_tokens, open_regular, read_key, read_regular, read_regular_text, read_token, read_tokens,
+    TokenGrant, load_key, load_tokens, open_regular, read_key, read_regular, read_regular_text, read_text, read_token,
+    read_tokens, utf16_fault,
 };
 pub use sections::{
     Autopilot, Bands, Camera, Channel, Config, Console, Labels, Link, Map, Mission, Modem, Navigation, Operator,

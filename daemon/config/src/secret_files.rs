@@ -205,7 +205,30 @@ pub fn read_regular(path: &Path, max: u64) -> Result<Vec<u8>, UserError> {
 /// # Errors
 /// As [`read_regular`], and a file that is not UTF-8.
 pub fn read_regular_text(path: &Path) -> Result<String, UserError> {
-    let bytes = read_regular(path, MAX_TEXT_BYTES)?;
+    read_text(path, MAX_TEXT_BYTES)
+}
+
+/// Why a text that begins with these bytes cannot be read as UTF-8, with the command that converts it, if it is UTF-16.
+pub fn utf16_fault(text: &[u8]) -> Option<String> {
+    // The first signs of a text are those of its format, which have one byte in ASCII.
+    let encoding = match text {
+        [0xFF, 0xFE, ..] | [0xFE, 0xFF, ..] => "UTF-16",
+        [a, 0, b, 0, ..] if *a != 0 && *b != 0 => "UTF-16LE",
+        [0, a, 0, b, ..] if *a != 0 && *b != 0 => "UTF-16BE",
+        _ => return None,
+    };
+    Some(format!("it is UTF-16 and not UTF-8: iconv -f {encoding} -t UTF-8 OLD > NEW converts it"))
+}
+
+/// The text of a file of at most `max` bytes.
+///
+/// # Errors
+/// As [`read_regular`], and a file that is not UTF-8.
+pub fn read_text(path: &Path, max: u64) -> Result<String, UserError> {
+    let bytes = read_regular(path, max)?;
+    if let Some(fault) = utf16_fault(&bytes) {
+        return Err(UserError::file(path, fault));
+    }
     String::from_utf8(bytes).map_err(|e| {
         let line = 1 + e.as_bytes().iter().take(e.utf8_error().valid_up_to()).filter(|byte| **byte == b'\n').count();
         UserError::file(path, format!("line {line} is not text in UTF-8"))
@@ -351,6 +374,16 @@ mod tests {
         assert!(error(Path::new("/dev/zero"), 9).contains("not a regular file"));
         std::fs::write(&file, [b'1', b'\n', 0xFF]).unwrap();
         assert!(read_regular_text(&file).unwrap_err().to_string().contains("line 2 is not text in UTF-8"));
+        for (bytes, encoding) in [
+            (&b"\xFF\xFE[\0l\0"[..], "UTF-16"),
+            (b"[\0l\0", "UTF-16LE"),
+            (b"\xFE\xFF\0[", "UTF-16"),
+            (b"\0[\0l", "UTF-16BE"),
+        ] {
+            std::fs::write(&file, bytes).unwrap();
+            let error = read_regular_text(&file).unwrap_err().to_string();
+            assert!(error.contains(&format!("it is UTF-16 and not UTF-8: iconv -f {encoding} -t UTF-8")), "{error}");
+        }
         std::fs::remove_dir_all(&dir).unwrap();
     }
 }

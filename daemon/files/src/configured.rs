@@ -66,8 +66,7 @@ const MAX_CALIBRATION_BYTES: u64 = 1 << 20;
 pub fn configured_calibration(config: &Config) -> Result<Option<Arc<Calibration>>, UserError> {
     let calibration = match &config.camera.calibration {
         CalibrationSource::File(path) => {
-            let text = scenecast_config::read_regular(path, MAX_CALIBRATION_BYTES)?;
-            let text = String::from_utf8(text).map_err(|_| UserError::file(path, "it is not text in UTF-8"))?;
+            let text = scenecast_config::read_text(path, MAX_CALIBRATION_BYTES)?;
             let info = read_calibration(&text);
             let info = info.map_err(|error| UserError::Input(format!("{}:{error}", path.display())))?;
             Calibration::of_info(&info, false).map_err(|error| UserError::file(path, error))?

@@ -8,7 +8,7 @@ use scene_model::project::View;
 use scenecast_core::{Area, UserError};
 use scenecast_sensors::{Sight, Times};
 use std::fmt::Write as _;
-use std::io::Read as _;
+use std::io::{BufRead as _, Read as _};
 use std::path::{Path, PathBuf};
 
 /// A camera frame of a recorded mission.
@@ -77,10 +77,11 @@ impl Recording {
     pub fn open(dir: &Path, poses: Option<&Path>, metres_per_pixel: f64) -> Result<Self, UserError> {
         let path = poses.map_or_else(|| table(dir), |path| Ok(path.to_owned()))?;
         let file = scenecast_config::open_regular(&path, MAX_TABLE_BYTES)?;
-        let mut reader = csv::ReaderBuilder::new()
-            .flexible(true)
-            .trim(csv::Trim::All)
-            .from_reader(std::io::BufReader::new(file.take(MAX_TABLE_BYTES)));
+        let mut file = std::io::BufReader::new(file.take(MAX_TABLE_BYTES));
+        if let Some(fault) = scenecast_config::utf16_fault(file.fill_buf().map_err(|e| UserError::file(&path, e))?) {
+            return Err(UserError::file(&path, fault));
+        }
+        let mut reader = csv::ReaderBuilder::new().flexible(true).trim(csv::Trim::All).from_reader(file);
         let names = reader.headers().map_err(|e| UserError::file(&path, e))?.clone();
         let (columns, in_pixels) = match names.iter().any(|name| name == "x_px") {
             true => (Columns::find(&names, &MOSAIC_COLUMNS), true),
@@ -341,6 +342,18 @@ mod tests {
             "{:?}",
             fast.notes
         );
+    }
+
+    #[test]
+    fn a_table_in_utf_16_is_refused_by_name() {
+        let text: Vec<u8> = "t_s,file\r\n0,a.png\r\n".encode_utf16().flat_map(u16::to_le_bytes).collect();
+        let dir = std::env::temp_dir().join(format!("scenecast-{}-recording-utf-16", std::process::id()));
+        std::fs::create_dir_all(&dir).unwrap();
+        for (head, encoding) in [(&b""[..], "UTF-16LE"), (b"\xFF\xFE", "UTF-16")] {
+            std::fs::write(dir.join("poses.csv"), [head, &text].concat()).unwrap();
+            let error = Recording::open(&dir, None, 0.5).unwrap_err().to_string();
+            assert!(error.contains(&format!("poses.csv: it is UTF-16 and not UTF-8: iconv -f {encoding} ")), "{error}");
+        }
     }
 
     #[test]

@@ -194,8 +194,7 @@ fn times_and<T>(list: Vec<Entry<T>>) -> Vec<(f64, T)> {
 
 /// Reads lines `time value` and sorts them by time; errors name the line.
 fn read_list<T>(path: &Path, read: impl Fn(&str) -> Result<T, String>) -> Result<Vec<Entry<T>>, UserError> {
-    let text = scenecast_config::read_regular(path, MAX_LIST_BYTES)?;
-    let text = String::from_utf8(text).map_err(|_| UserError::file(path, "it is not text in UTF-8"))?;
+    let text = scenecast_config::read_text(path, MAX_LIST_BYTES)?;
     let mut list = Vec::new();
     for (place, line) in (1..).zip(text.lines()) {
         let line = line.trim_start_matches('\u{feff}').trim();
@@ -270,6 +269,24 @@ mod tests {
         assert!(pose("1 2 3 0 0 0 0").unwrap_err().contains("length 1"));
         assert!(pose("1 2 nan 0 0 0 1").unwrap_err().contains("tz"));
         assert!(pose("1 2 3 0 0 1").unwrap_err().contains("qw is missing"));
+    }
+
+    #[test]
+    fn a_pose_that_no_vehicle_reaches_is_left_out_and_named() {
+        let dir = std::env::temp_dir().join(format!("scenecast-{}-tum-spikes", std::process::id()));
+        std::fs::create_dir_all(&dir).unwrap();
+        let list = |name: &str, line: fn(i32) -> String| {
+            let text: String = (0..40).map(|i| format!("{}.5 {}\n", 1_305_031_102 + i, line(i))).collect();
+            std::fs::write(dir.join(name), "# time\n".to_owned() + &text).unwrap();
+        };
+        list("rgb.txt", |i| format!("{i}.png"));
+        list("depth.txt", |i| format!("{i}d.png"));
+        list("groundtruth.txt", |i| format!("{} 0 -3 1 0 0 0", if i == 9 { 400 } else { i }));
+        let folder = TumFolder::open(&dir).unwrap();
+        assert!(folder.frames.len() == 39 && folder.frames.iter().all(|frame| frame.pose.position[0] < 40.0));
+        let notes: Vec<String> = folder.notes().collect();
+        assert!(notes.len() == 2 && notes[0].contains("groundtruth.txt:11: [400.0, 0.0] m"), "{notes:?}");
+        std::fs::remove_dir_all(&dir).unwrap();
     }
 
     #[test]

@@ -13,8 +13,7 @@ const MAX_BYTES: u64 = 256 << 20;
 /// # Errors
 /// A file that cannot be read, or a line that is not a time and seven finite numbers.
 pub fn read_tum_poses(path: &Path) -> Result<Vec<(Stamp, SensorPose)>, UserError> {
-    let text = scenecast_config::read_regular(path, MAX_BYTES)?;
-    let text = String::from_utf8(text).map_err(|_| UserError::file(path, "it is not text in UTF-8"))?;
+    let text = scenecast_config::read_text(path, MAX_BYTES)?;
     let text = text.strip_prefix('\u{feff}').unwrap_or(&text);
     let mut poses = Vec::new();
     for (index, line) in text.lines().enumerate() {
