@@ -46,6 +46,24 @@ const MERIDIAN_M: f64 = A / (1.0 + N) * (1.0 + N2 / 4.0 + N4 / 64.0);
 /// The latitudes of UTM, degrees.
 const UTM_LAT_DEG: std::ops::RangeInclusive<f64> = -80.0..=84.0;
 
+/// The number of the zone of a place. The zones of the west of Norway and of Svalbard have widths of their own (NGA.STND.0037, section 7).
+fn utm_zone(Origin { lat_deg, lon_deg }: Origin) -> u16 {
+    let lon_deg = (lon_deg + 180.0).rem_euclid(360.0) - 180.0;
+    let of = |lons: std::ops::Range<f64>| lons.contains(&lon_deg);
+    let is_norway = (56.0..64.0).contains(&lat_deg) && of(3.0..12.0);
+    if is_norway {
+        return 32;
+    }
+    let is_svalbard = (72.0..=84.0).contains(&lat_deg);
+    match () {
+        () if is_svalbard && of(0.0..9.0) => 31,
+        () if is_svalbard && of(9.0..21.0) => 33,
+        () if is_svalbard && of(21.0..33.0) => 35,
+        () if is_svalbard && of(33.0..42.0) => 37,
+        () => (((lon_deg + 180.0) / 6.0) as u16).min(59) + 1,
+    }
+}
+
 impl TransverseMercator {
     /// The projection of the mission: metres east and north of its origin.
     pub(crate) fn about(origin: Origin) -> Self {
@@ -56,7 +74,7 @@ impl TransverseMercator {
 
     /// The UTM zone of a place, with its EPSG code; `None` near the poles.
     pub(super) fn utm(at: Origin) -> Option<(Self, u16)> {
-        let zone = (((at.lon_deg + 180.0).rem_euclid(360.0) / 6.0) as u16).min(59) + 1;
+        let zone = utm_zone(at);
         let is_south = at.lat_deg < 0.0;
         let lon0_deg = f64::from(zone) * 6.0 - 183.0;
         let found = Self { lon0_deg, scale: 0.9996, false_m: (500_000.0, if is_south { 1e7 } else { 0.0 }) };
@@ -142,6 +160,15 @@ mod tests {
             (Some(32_629), Some(32_760), Some(32_601))
         );
         assert_eq!([zone(84.1, 0.0), zone(-80.1, 0.0), zone(-90.0, 0.0)], [None; 3]);
+        // Bergen, its sea to the west, Trondheim, Longyearbyen, and the bounds of the zones of Norway and Svalbard.
+        let zones = |lat_deg: f64, lons: &[f64]| lons.iter().map(|lon| zone(lat_deg, *lon)).collect::<Vec<_>>();
+        let north = |zones: &[u16]| zones.iter().map(|zone| Some(32_600 + zone)).collect::<Vec<_>>();
+        assert_eq!(zones(60.39, &[2.9, 3.0, 5.32, 11.9, 12.0]), north(&[31, 32, 32, 32, 33]));
+        assert_eq!(zones(63.43, &[4.0, 10.4]), north(&[32, 32]));
+        assert_eq!([zones(55.9, &[5.0]), zones(64.0, &[5.0])].concat(), north(&[31, 31]));
+        let svalbard = north(&[30, 31, 31, 33, 33, 35, 35, 37, 37, 38]);
+        assert_eq!(zones(78.22, &[-0.1, 0.0, 8.9, 9.0, 20.9, 21.0, 32.9, 33.0, 41.9, 42.0]), svalbard);
+        assert_eq!([zones(71.9, &[10.0]), zones(84.0, &[10.0])].concat(), north(&[32, 33]));
         let (utm, _) = TransverseMercator::utm(Origin { lat_deg: 60.17, lon_deg: -10.25 }).unwrap();
         // On the central meridian of zone 29, 1 degree of latitude from the equator: 0.9996 of the meridian's length.
         let (east, north) = utm.metres(-9.0, 1.0);
