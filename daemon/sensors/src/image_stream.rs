@@ -13,6 +13,8 @@ pub struct ImageStream {
     /// Bytes of the buffer that are known not to end the image.
     searched: usize,
     skipped: u64,
+    /// Images in which another one began.
+    cut_off: u64,
 }
 
 /// The state of the image at the start of some bytes.
@@ -24,6 +26,8 @@ enum Extent {
     Needs(usize),
     /// No image begins with these bytes.
     Nothing,
+    /// The image has no end: another one begins after this many bytes.
+    CutOff(usize),
 }
 
 impl ImageStream {
@@ -48,14 +52,25 @@ impl ImageStream {
                     self.searched = searched;
                     return None;
                 }
+                Extent::CutOff(length) => {
+                    self.cut_off += 1;
+                    self.skipped += length as u64;
+                    self.buffer.drain(..length);
+                    self.searched = 0;
+                }
                 Extent::Needs(_) | Extent::Nothing => self.skip_to_next_image(),
             }
         }
     }
 
-    /// Bytes that belonged to no image.
+    /// Bytes that belonged to no whole image.
     pub fn skipped(&self) -> u64 {
         self.skipped
+    }
+
+    /// Images that had no end before the next one began.
+    pub fn cut_off(&self) -> u64 {
+        self.cut_off
     }
 
     /// Whether an image has begun and is not complete.
@@ -82,7 +97,7 @@ impl ImageStream {
 pub fn complete_length(bytes: &[u8]) -> Option<usize> {
     match extent(bytes, 0) {
         Extent::Whole(length) => Some(length),
-        Extent::Needs(_) | Extent::Nothing => None,
+        Extent::Needs(_) | Extent::Nothing | Extent::CutOff(_) => None,
     }
 }
 
@@ -125,8 +140,7 @@ fn jpeg(bytes: &[u8], searched: usize) -> Extent {
         match bytes.get(at + 1) {
             None => return Extent::Needs(at),
             Some(0xD9) => return Extent::Whole(at + 2),
-            // Another image begins: this one has no end.
-            Some(0xD8) => return Extent::Nothing,
+            Some(0xD8) => return Extent::CutOff(at),
             // Fill bytes.
             Some(0xFF) => at += 1,
             Some(0x00 | 0x01 | 0xD0..=0xD7) => at += 2,

@@ -45,8 +45,9 @@ struct Running {
     messages: Option<JoinHandle<()>>,
     /// The last line that the program wrote to its standard error.
     last_line: Arc<Mutex<String>>,
-    /// Bytes between images that are already reported.
+    /// Bytes between images, and images without an end, that are already reported.
     skipped: u64,
+    cut_off: u64,
 }
 
 impl CommandSource {
@@ -82,7 +83,16 @@ impl CommandSource {
             std::thread::Builder::new().name("camera messages".to_owned()).spawn(read)
         });
         let messages = messages.transpose()?;
-        Ok(Running { child, pieces, stream: ImageStream::default(), begun: None, messages, last_line, skipped: 0 })
+        Ok(Running {
+            child,
+            pieces,
+            stream: ImageStream::default(),
+            begun: None,
+            messages,
+            last_line,
+            skipped: 0,
+            cut_off: 0,
+        })
     }
 }
 
@@ -199,6 +209,11 @@ impl SensorSource for CommandSource {
                         began = arrival;
                     }
                     running.begun = running.stream.is_within_image().then_some(began);
+                    let cut_off = running.stream.cut_off();
+                    for _ in std::mem::replace(&mut running.cut_off, cut_off)..cut_off {
+                        running.skipped = running.stream.skipped();
+                        fault(CameraFault::CutOff, "another image began before the end of this one".to_owned());
+                    }
                     let skipped = running.stream.skipped();
                     if skipped > running.skipped && self.ready.is_empty() {
                         let bytes = skipped - running.skipped;
@@ -274,6 +289,13 @@ mod tests {
         let (images, faults, end) = all("printf 'P6 1 1 255\\nab'");
         assert_eq!((images.len(), faults), (0, vec![CameraFault::CutOff]));
         assert_eq!(end, "the command ended with exit status: 0");
+    }
+
+    #[test]
+    fn a_half_jpeg_before_another_image_is_counted() {
+        let (half, whole) = (r"\377\330\377\332\0\2abc", r"\377\330\377\332\0\2abc\377\331");
+        let (images, faults, _) = all(&format!("printf '{half}{whole}{half}{half}{whole}'"));
+        assert_eq!((images.len(), faults), (2, vec![CameraFault::CutOff; 3]));
     }
 
     #[test]
