@@ -21,6 +21,9 @@ const MAX_TILES: u64 = 1 << 20;
 /// Metres of one degree of latitude, for the size of a pixel in degrees.
 const DEGREE_M: f64 = 111_320.0;
 
+/// Nearer to a pole, a map of some kilometres may have all longitudes.
+const WGS84_LAT_DEG: f64 = 89.0;
+
 /// The coordinate reference system of a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Reference {
@@ -85,6 +88,10 @@ pub(super) fn geotiff(cells: &MapCells, origin: Option<Origin>, reference: Refer
             let (utm, epsg) =
                 zone.ok_or("UTM reaches from 80 degrees south to 84 degrees north: take map.wgs84.tif or map.tif")?;
             (Places::Projected(TransverseMercator::about(origin), utm), utm_keys(epsg))
+        }
+        (Reference::Wgs84, Some(origin)) if origin.lat_deg.abs() > WGS84_LAT_DEG => {
+            let line = "within a degree of a pole a map has no rectangle of longitudes and latitudes: take map.tif";
+            return Err(line.to_owned());
         }
         (Reference::Wgs84, Some(origin)) => (Places::Degrees(TransverseMercator::about(origin)), wgs84_keys()),
     };
