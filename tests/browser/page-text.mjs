@@ -11,7 +11,7 @@ import { WIDE } from "./stage.mjs";
 
 const TABS = ["vehicle", "constraints", "model", "log"];
 /** What counts from the start of the program: gains of labels, and whether the vehicle has reported since then. */
-const OF_THIS_RUN = /^\+[\d.]+ m²$|^In force|^The vehicle (has not reported|reports)/;
+const OF_THIS_RUN = /^[+−][\d.]+ m²$|^In force|^The vehicle (has not reported|reports)/;
 
 const url = process.argv[process.argv.indexOf("--url") + 1];
 const browser = await chromium.launch(LAUNCH);

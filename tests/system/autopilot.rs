@@ -272,6 +272,9 @@ fn a_vehicle_surveys_on_ardusub_and_reports_its_silence() {
     peer.order("speak");
     wait_until("it is back", || status().is_some_and(|s| s["autopilot_silent"] == false));
     let is_logged = |text: &str| std::fs::read_to_string(&log).is_ok_and(|log| log.contains(text));
+    // A vehicle that refuses only what corrects its place after the silence would stop beside its waypoint, as if it had followed.
+    let targets = peer.number("targets");
+    wait_until("it flies on", || heartbeat() && peer.number("targets") > targets + 3.0);
     peer.order("refuse");
     wait_until("a refused waypoint is logged", || {
         is_logged("the autopilot does not follow the waypoint: it reports") && is_logged("autopilot: not in command;")

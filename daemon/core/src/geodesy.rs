@@ -140,6 +140,22 @@ impl Area {
         }
     }
 
+    /// From west to east and from south to north, metres.
+    pub fn size_m(&self) -> (f64, f64) {
+        (self.east - self.west, self.north - self.south)
+    }
+
+    /// The part of the area that lies in another one; `None` if there is none.
+    pub fn common(&self, other: &Self) -> Option<Self> {
+        let common = Self {
+            west: self.west.max(other.west),
+            south: self.south.max(other.south),
+            east: self.east.min(other.east),
+            north: self.north.min(other.north),
+        };
+        (common.west <= common.east && common.south <= common.north).then_some(common)
+    }
+
     pub fn moved(&self, east_m: f64, north_m: f64) -> Self {
         Self {
             west: self.west + east_m,

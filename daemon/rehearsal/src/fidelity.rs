@@ -240,7 +240,8 @@ impl Meter {
     /// Seconds for which the labels have differed, mean over the explored cells; 0 where the maps agree.
     pub fn age_s(&self, now: Instant) -> f64 {
         let sum: f64 = self.differing.values().map(|since| now.since(*since).as_secs_f64()).sum();
-        sum / f64::from(self.explored.max(1))
+        // The sum of no numbers is -0.
+        (sum + 0.0) / f64::from(self.explored.max(1))
     }
 
     /// Mean over time of [`Self::agreement`].

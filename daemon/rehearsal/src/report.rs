@@ -3,9 +3,11 @@
 use super::fidelity::mean_share;
 use super::frames_log::{Repeats, Uplink};
 use super::mission::{MapInformation, MapQuality, Mission};
+use scenecast_config::cell_m;
 use scenecast_core::drop_counts::dropped;
+use scenecast_protocol::coordinates::MapPoint;
 use scenecast_protocol::directive::{SlotId, SlotState};
-use scenecast_protocol::map::{LabelGrid, LayerSource};
+use scenecast_protocol::map::{Cell, LabelGrid, LayerSource};
 use scenecast_protocol::schedule::Class;
 use scenecast_scoring::MutualInformation;
 use serde_json::{Value, json};
@@ -263,6 +265,7 @@ fn survey(m: &Mission) -> Value {
         "waypoints": m.logbook.legs.len(),
         "waypoints_outside_fence": m.legs_outside_fence(),
         "explored_cells": m.vehicle().map().explored(),
+        "area_seen": m.area_seen().map(round),
         "utility_collected": round(m.utility_collected()),
     })
 }
@@ -284,6 +287,16 @@ impl Mission {
             if outside(from, from) { outside(to, to) } else { outside(from, to) }
         };
         self.logbook.legs.iter().skip(self.logbook.legs_before_fence).filter(is_out).count()
+    }
+
+    /// The share of the survey's area that the vehicle's map shows, 0 to 1.
+    pub fn area_seen(&self) -> Option<f64> {
+        let (area, cell_m) = (self.camera.survey_area(&self.config).ok()?, cell_m(&self.config));
+        let (width_m, height_m) = area.size_m();
+        let middle = |cell: Cell| MapPoint::new((f64::from(cell.x) + 0.5) * cell_m, (f64::from(cell.y) + 0.5) * cell_m);
+        let place = |cell: Cell| self.vehicle().navigator().to_world(middle(cell)).xy();
+        let seen = self.vehicle().cells().filter(|&(cell, _)| area.contains(place(cell))).count();
+        Some((seen as f64 * cell_m * cell_m / (width_m * height_m)).min(1.0))
     }
 
     /// Explored cells, each weighted by its label's value in the operator's last utility.

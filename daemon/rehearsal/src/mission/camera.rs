@@ -59,7 +59,7 @@ impl Camera {
     ///
     /// # Errors
     /// The configured area is outside of the sea floor.
-    pub(super) fn survey_area(&self, config: &Config) -> Result<Area, UserError> {
+    pub(crate) fn survey_area(&self, config: &Config) -> Result<Area, UserError> {
         let all = || self.recording.as_ref().map_or_else(|| self.world.survey_area(), Recording::area);
         let area = config.survey.area_m.unwrap_or_else(all);
         if self.recording.is_none() && !overlap(&area, &self.world.area()) {

@@ -1,5 +1,6 @@
 //! The outlines that limit where the vehicle may go.
 
+use scenecast_core::Area;
 use scenecast_protocol::directive::{Fence, Polygon};
 
 /// East and north of the origin, metres.
@@ -22,6 +23,15 @@ impl Bounds {
             keep_outs: fence.keep_outs.iter().map(metres).collect(),
             clearance_m,
         }
+    }
+
+    /// The smallest rectangle around all places within the fence that a plan may contain; `None` without a fence.
+    pub fn extent(&self) -> Option<Area> {
+        let corners = self.fence.as_ref()?;
+        let edge = |of: fn(&Point) -> f64, pick: fn(f64, f64) -> f64| corners.iter().map(of).reduce(pick);
+        let [west, south] = [edge(|p| p.0, f64::min)?, edge(|p| p.1, f64::min)?];
+        let [east, north] = [edge(|p| p.0, f64::max)?, edge(|p| p.1, f64::max)?];
+        Some(Area { west, south, east, north }.shrunk(self.clearance_m))
     }
 
     /// Whether the vehicle may be at a place. The clearance does not count.

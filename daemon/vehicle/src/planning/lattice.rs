@@ -10,18 +10,61 @@ const MAX_SIDE: usize = 192;
 /// Steps to the eight places around, in the order of the bits of a move mask.
 const MOVES: [(i32, i32); 8] = [(1, 0), (1, 1), (0, 1), (-1, 1), (-1, 0), (-1, -1), (0, -1), (1, -1)];
 
-/// A square lattice of places that the vehicle may be at. Neighbours are joined where the straight
-/// line between them is allowed.
+/// A lattice of places that the vehicle may be at. Neighbours are joined where the straight line between them is allowed.
+///
+/// Its columns and rows are evenly spaced so that the first and the last over the area lie on its edges, and so does the last
+/// one of every other line, the legs of a survey. Legs run in the direction in which the path with its turns is shorter.
 #[derive(Debug, Clone)]
 pub struct Lattice {
-    origin: Point,
-    step_m: f64,
-    columns: usize,
-    rows: usize,
-    /// The columns and the rows over the area itself.
-    area: (Range<usize>, Range<usize>),
-    /// Allowed moves from each place, one bit for each direction. 0: the vehicle may not be there.
+    columns: Axis,
+    rows: Axis,
+    legs_run_north: bool,
+    /// Allowed moves from each place, one bit for each direction. 0: the vehicle may not be there, unless it is the only place.
     moves: Vec<u8>,
+    /// Whether there is one place, and the vehicle may be there.
+    is_one_place: bool,
+}
+
+/// The columns from west to east, or the rows from south to north.
+#[derive(Debug, Clone)]
+struct Axis {
+    first_m: f64,
+    step_m: f64,
+    count: usize,
+    /// Those over the area itself.
+    area: Range<usize>,
+}
+
+impl Axis {
+    /// Lines over an area `from..to` in so many equal steps, and as far `beyond` it as that reaches.
+    fn new((from, to): (f64, f64), beyond: (f64, f64), step_m: f64, steps: usize) -> Self {
+        let (least, most) = (from.min(beyond.0), to.max(beyond.1));
+        let fitted_m = if steps > 0 { (to - from) / steps as f64 } else { step_m };
+        // A place far beyond a small area would take too many lines.
+        let is_fitted = most - least <= (MAX_SIDE - 2) as f64 * fitted_m;
+        let step_m = if is_fitted { fitted_m } else { step_m };
+        let over = if is_fitted { steps } else { ((to - from) / step_m + 1e-9).floor() as usize };
+        // Lines beyond the area lie whole steps from its edge.
+        let before = ((from - least) / step_m - 1e-9).ceil().max(0.0);
+        let first_m = from - before * step_m;
+        let count = ((most - first_m) / step_m + 1e-9).floor() as usize + 1;
+        let before = before as usize;
+        Self { first_m, step_m, count: count.max(before + over + 1), area: before..before + over + 1 }
+    }
+
+    fn place(&self, index: usize) -> f64 {
+        self.first_m + index as f64 * self.step_m
+    }
+}
+
+/// Equal steps over a length of which every other line is a leg, at most two of `step_m` from the next.
+fn steps_across(length_m: f64, step_m: f64) -> usize {
+    2 * steps_along(length_m, 2.0 * step_m)
+}
+
+/// Equal steps over a length, of at most `step_m`.
+fn steps_along(length_m: f64, step_m: f64) -> usize {
+    (length_m / step_m - 1e-9).ceil().max(0.0) as usize
 }
 
 /// The index of a place: row times columns plus column.
@@ -36,28 +79,31 @@ pub struct Paths {
 }
 
 impl Lattice {
-    /// Places over `area` and the points `beyond` it, `step_m` apart, or farther where there would be more than 192
-    /// in a row or column.
+    /// Places over `area` and the points `beyond` it, at most `step_m` apart in a row or column, or farther where there would be
+    /// more than 192.
     pub fn new(area: Area, beyond: &[Point], step_m: f64, bounds: &Bounds) -> Self {
-        let fold = |least: f64, most: f64, of: fn(&Point) -> f64| {
-            beyond.iter().map(of).fold((least, most), |(l, m), v| (l.min(v), m.max(v)))
+        Self::with_legs(Self::legs_run_north(area, step_m), area, beyond, step_m, bounds)
+    }
+
+    /// The same with legs in a chosen direction.
+    pub fn with_legs(legs_run_north: bool, area: Area, beyond: &[Point], step_m: f64, bounds: &Bounds) -> Self {
+        let span = |from: f64, to: f64, of: fn(&Point) -> f64| {
+            beyond.iter().map(of).fold((from, to), |(least, most), v| (least.min(v), most.max(v)))
         };
-        let (west, east) = fold(area.west, area.east, |p| p.0);
-        let (south, north) = fold(area.south, area.north, |p| p.1);
-        let step_m = step_m.max((east - west).max(north - south) / (MAX_SIDE - 2) as f64).max(1e-3);
-        // Places beyond the area lie a whole number of steps from its corner.
-        let before = |from: f64, to: f64| ((to - from) / step_m - 1e-9).ceil().max(0.0);
-        let origin = (area.west - before(west, area.west) * step_m, area.south - before(south, area.south) * step_m);
-        let count = |from: f64, to: f64| ((to - from) / step_m + 1e-9).floor() as usize + 1;
-        let (columns, rows) = (count(origin.0, east), count(origin.1, north));
-        let over = |first: f64, count: usize| (first as usize)..(first as usize + count);
-        let area = (
-            over(before(west, area.west), count(area.west, area.east)),
-            over(before(south, area.south), count(area.south, area.north)),
-        );
-        let mut lattice = Self { origin, step_m, columns, rows, area, moves: vec![0; columns * rows] };
-        let open: Vec<bool> = (0..columns * rows).map(|n| bounds.allows(lattice.place(n))).collect();
-        for node in 0..columns * rows {
+        let (across, up) = (span(area.west, area.east, |p| p.0), span(area.south, area.north, |p| p.1));
+        let step_m = step_m.max((across.1 - across.0).max(up.1 - up.0) / (MAX_SIDE - 2) as f64).max(1e-3);
+        let (width_m, height_m) = area.size_m();
+        let (steps_x, steps_y) = match legs_run_north {
+            true => (steps_across(width_m, step_m), steps_along(height_m, step_m)),
+            false => (steps_along(width_m, step_m), steps_across(height_m, step_m)),
+        };
+        let columns = Axis::new((area.west, area.east), across, step_m, steps_x);
+        let rows = Axis::new((area.south, area.north), up, step_m, steps_y);
+        let places = columns.count * rows.count;
+        let mut lattice = Self { columns, rows, legs_run_north, moves: vec![0; places], is_one_place: false };
+        let open: Vec<bool> = (0..places).map(|n| bounds.allows(lattice.place(n))).collect();
+        lattice.is_one_place = open == [true];
+        for node in 0..places {
             let allowed = (0..MOVES.len()).filter(|&m| {
                 let to = lattice.moved(node, m);
                 to.is_some_and(|to| open[to] && bounds.allows_leg(lattice.place(node), lattice.place(to)))
@@ -67,20 +113,46 @@ impl Lattice {
         lattice
     }
 
-    /// Distance in metres between neighbouring places of a row.
+    /// Whether the path along legs over an area, at most two of `step_m` apart, takes less from south to north than from west to east.
+    pub fn legs_run_north(area: Area, step_m: f64) -> bool {
+        let cost_m = |long: f64, wide: f64| {
+            let legs = (steps_across(wide, step_m) / 2 + 1) as f64;
+            // A turn costs as much as one step of the lattice, and there are two between legs.
+            legs * long + wide + 2.0 * (legs - 1.0) * step_m
+        };
+        let (width_m, height_m) = area.size_m();
+        cost_m(height_m, width_m) + 1e-6 < cost_m(width_m, height_m)
+    }
+
+    /// Mean distance in metres between neighbouring places of a row and of a column: a block between four places has its square.
     pub fn step_m(&self) -> f64 {
-        self.step_m
+        let (x, y) = self.steps_m();
+        (x * y).sqrt()
+    }
+
+    /// Distance in metres between neighbouring places of a row, and of a column.
+    pub fn steps_m(&self) -> (f64, f64) {
+        (self.columns.step_m, self.rows.step_m)
     }
 
     /// The number of columns and of rows.
     pub fn size(&self) -> (usize, usize) {
-        (self.columns, self.rows)
+        (self.columns.count, self.rows.count)
     }
 
-    /// The places of each row over the area, from the south, without those beyond it.
-    pub fn area_rows(&self) -> impl Iterator<Item = Range<Node>> + '_ {
-        let (columns, rows) = self.area.clone();
-        rows.map(move |row| row * self.columns + columns.start..row * self.columns + columns.end)
+    /// The places of each line along a leg over the area, without those beyond it: rows from the south, or columns from the west.
+    pub fn lines(&self) -> Vec<Vec<Node>> {
+        let node = |column: usize, row: usize| row * self.columns.count + column;
+        let (columns, rows) = (self.columns.area.clone(), self.rows.area.clone());
+        match self.legs_run_north {
+            true => columns.map(|column| rows.clone().map(|row| node(column, row)).collect()).collect(),
+            false => rows.map(|row| columns.clone().map(|column| node(column, row)).collect()).collect(),
+        }
+    }
+
+    /// How far a place lies from the first leg's side of the world frame, metres.
+    pub fn across_legs(&self, (east_m, north_m): Point) -> f64 {
+        if self.legs_run_north { east_m } else { north_m }
     }
 
     pub fn places(&self) -> usize {
@@ -88,28 +160,29 @@ impl Lattice {
     }
 
     pub fn place(&self, node: Node) -> Point {
-        let (column, row) = (node % self.columns, node / self.columns);
-        (self.origin.0 + column as f64 * self.step_m, self.origin.1 + row as f64 * self.step_m)
+        let (column, row) = (node % self.columns.count, node / self.columns.count);
+        (self.columns.place(column), self.rows.place(row))
     }
 
-    /// Whether the vehicle can leave a place, and may hence be there.
+    /// Whether the vehicle may be at a place: it can leave it, or there is no other.
     pub fn is_open(&self, node: Node) -> bool {
-        self.moves[node] != 0
+        self.moves[node] != 0 || self.is_one_place
     }
 
     fn moved(&self, node: Node, m: usize) -> Option<Node> {
         let (dx, dy) = MOVES[m];
-        let column = (node % self.columns).checked_add_signed(dx as isize)?;
-        let row = (node / self.columns).checked_add_signed(dy as isize)?;
-        (column < self.columns && row < self.rows).then_some(row * self.columns + column)
+        let (columns, rows) = self.size();
+        let column = (node % columns).checked_add_signed(dx as isize)?;
+        let row = (node / columns).checked_add_signed(dy as isize)?;
+        (column < columns && row < rows).then_some(row * columns + column)
     }
 
     /// The neighbours that can be reached from a place, each with its distance in metres.
     pub fn around(&self, node: Node) -> impl Iterator<Item = (Node, f64)> + '_ {
-        let mask = self.moves[node];
+        let (mask, (x, y)) = (self.moves[node], self.steps_m());
         (0..MOVES.len()).filter(move |m| mask & 1 << m != 0).filter_map(move |m| {
-            let length = if m % 2 == 0 { self.step_m } else { self.step_m * std::f64::consts::SQRT_2 };
-            Some((self.moved(node, m)?, length))
+            let (dx, dy) = MOVES[m];
+            Some((self.moved(node, m)?, (f64::from(dx) * x).hypot(f64::from(dy) * y)))
         })
     }
 
@@ -123,7 +196,7 @@ impl Lattice {
         if !bounds.holds(from) {
             return nearest(&mut open());
         }
-        let near_m = 6.0 * self.step_m;
+        let near_m = 6.0 * self.step_m();
         let first_reached = |mut nodes: Vec<Node>| {
             nodes.sort_by(|&a, &b| distance(from, self.place(a)).total_cmp(&distance(from, self.place(b))));
             nodes.into_iter().find(|&n| bounds.allows_exit(from, self.place(n)))
@@ -137,7 +210,8 @@ impl Lattice {
     /// and every step is allowed.
     pub fn straight(&self, from: Node, to: Node) -> Option<Vec<Node>> {
         let steps = |a: usize, b: usize| b as i32 - a as i32;
-        let (x, y) = (steps(from % self.columns, to % self.columns), steps(from / self.columns, to / self.columns));
+        let columns = self.columns.count;
+        let (x, y) = (steps(from % columns, to % columns), steps(from / columns, to / columns));
         let m = MOVES.iter().position(|&step| step == (x.signum(), y.signum()))?;
         let count = x.abs().max(y.abs());
         let mut path = Vec::with_capacity(count as usize);
@@ -235,6 +309,33 @@ mod tests {
         }
         assert!(straight > 100);
         assert_eq!(lattice.straight(2 * columns + 5, 2 * columns + 15), None, "the wall");
+    }
+
+    #[test]
+    fn first_and_last_legs_lie_on_the_edges_of_any_area() {
+        for tenths in (1..4000).step_by(7) {
+            let (width, height) = (f64::from(tenths) / 10.0, f64::from(4001 - tenths) / 90.0);
+            let area = Area { west: 3.0, south: -7.0, east: 3.0 + width, north: -7.0 + height };
+            let lattice = Lattice::new(area, &[], 2.16, &Bounds::default());
+            let legs: Vec<Vec<Node>> = lattice.lines().into_iter().step_by(2).collect();
+            let ends = [legs.first().unwrap(), legs.last().unwrap()].map(|leg| [leg[0], *leg.last().unwrap()]);
+            let [[a, b], [c, d]] = ends.map(|leg| leg.map(|node| lattice.place(node)));
+            let is_near = |p: Point, q: Point| distance(p, q) < 1e-6;
+            assert!(is_near(a, (3.0, -7.0)) && is_near(d, (area.east, area.north)), "{width} x {height}: {a:?} {d:?}");
+            let corners = [(area.east, area.south), (area.west, area.north)];
+            assert!(corners.iter().all(|&corner| is_near(b, corner) || is_near(c, corner)), "{b:?} {c:?}");
+            let (x, y) = lattice.steps_m();
+            assert!(x.max(y) <= 2.16 + 1e-6, "{width} x {height}: {x} {y}");
+        }
+    }
+
+    #[test]
+    fn legs_run_along_a_narrow_area() {
+        let legs = |width: f64, height: f64| {
+            let area = Area { west: 0.0, south: 0.0, east: width, north: height };
+            Lattice::new(area, &[], 2.0, &Bounds::default()).lines().len().div_ceil(2)
+        };
+        assert_eq!((legs(40.0, 7.0), legs(7.0, 40.0)), (3, 3));
     }
 
     #[test]

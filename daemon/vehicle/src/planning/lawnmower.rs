@@ -4,14 +4,14 @@ use super::bounds::{Point, distance};
 use super::lattice::{Lattice, Node, Paths};
 use super::{PlanRequest, Planner};
 
-/// East-west legs from the south, each one camera width from the last. After the last leg it
-/// begins again from the north. After a change of the lattice it resumes at the leg that it was on.
+/// Parallel legs over the area from one side to the other. After the last leg it begins again from there. After a change of the
+/// lattice it resumes at the leg that it was on.
 #[derive(Debug, Default)]
 pub struct Lawnmower {
     /// Places still to visit, the next one last.
     coming: Vec<Node>,
-    /// Whether the legs begin in the north.
-    is_southward: bool,
+    /// Whether the legs begin in the north or east.
+    is_backward: bool,
     /// The next place before the lattice changed.
     resume: Option<Point>,
 }
@@ -25,18 +25,16 @@ impl Lawnmower {
             // Begins at the nearer end.
             let paths = q.lattice.paths(q.from);
             let metres = |node: Option<&Node>| node.map_or(f64::INFINITY, |&n| paths.metres[n]);
-            self.is_southward = metres(legs.first()) > metres(legs.last());
+            self.is_backward = metres(legs.first()) > metres(legs.last());
         }
-        if !self.is_southward {
+        if !self.is_backward {
             legs.reverse();
         }
         let Some(next) = resume else { return legs };
         let half = q.lattice.step_m() / 2.0;
         let is_next = |n: &Node| distance(q.lattice.place(*n), next) < half;
-        let is_later = |n: &Node| match self.is_southward {
-            true => q.lattice.place(*n).1 < next.1 + half,
-            false => q.lattice.place(*n).1 > next.1 - half,
-        };
+        let ahead = |n: &Node| q.lattice.across_legs(q.lattice.place(*n)) - q.lattice.across_legs(next);
+        let is_later = |n: &Node| if self.is_backward { ahead(n) < half } else { ahead(n) > -half };
         if let Some(at) = legs.iter().rposition(is_next).or_else(|| legs.iter().rposition(is_later)) {
             legs.truncate(at + 1);
         }
@@ -78,18 +76,19 @@ impl Planner for Lawnmower {
     }
 }
 
-/// The ends of the open stretches of every other row of the area, in alternating direction.
+/// The ends of the open stretches of every other line of the area, in alternating direction.
 fn legs(q: &PlanRequest<'_>) -> Vec<Node> {
     let mut legs = Vec::new();
-    for (leg, row) in q.lattice.area_rows().step_by(2).enumerate() {
+    for (leg, line) in q.lattice.lines().into_iter().step_by(2).enumerate() {
         let is_open = |n: &Node| q.lattice.is_open(*n) && q.return_paths.metres[*n].is_finite();
-        let mut stretch: Vec<Node> = row.filter(is_open).collect();
+        let next = line.get(1).map_or(1, |second| second - line[0]);
+        let mut stretch: Vec<Node> = line.into_iter().filter(is_open).collect();
         if leg % 2 == 1 {
             stretch.reverse();
         }
         let inner = |i: usize| {
             let joined =
-                |j: Option<usize>| j.and_then(|j| stretch.get(j)).is_some_and(|&n| stretch[i].abs_diff(n) == 1);
+                |j: Option<usize>| j.and_then(|j| stretch.get(j)).is_some_and(|&n| stretch[i].abs_diff(n) == next);
             joined(i.checked_sub(1)) && joined(Some(i + 1))
         };
         legs.extend((0..stretch.len()).filter(|&i| !inner(i)).map(|i| stretch[i]));

@@ -97,18 +97,18 @@ impl BlockValues {
         let columns = places + 1;
         let none = vec![0.0; columns * (rows + 1)];
         let mut values = Self { columns, blocks: none.clone(), seen: none };
-        let (south_west, step) = (lattice.place(0), lattice.step_m());
-        let block = |at: f64, origin: f64| ((at - origin) / step).floor() as i64 + 1;
+        let (south_west, step) = (lattice.place(0), lattice.steps_m());
+        let block = |at: f64, origin: f64, step: f64| ((at - origin) / step).floor() as i64 + 1;
         let labels = window.copy(map);
         let cells = window.cell_values(map_origin, &labels, known, interest);
         let width = window.width.max(1);
         for (row, (line, labels)) in (0..).zip(cells.chunks(width).zip(labels.chunks(width))) {
-            let y = block(window.centre(row, window.y) + map_origin.1, south_west.1);
+            let y = block(window.centre(row, window.y) + map_origin.1, south_west.1, step.1);
             if !(0..=rows as i64).contains(&y) {
                 continue;
             }
             for (column, (value, label)) in (0..).zip(line.iter().zip(labels)) {
-                let x = block(window.centre(column, window.x) + map_origin.0, south_west.0);
+                let x = block(window.centre(column, window.x) + map_origin.0, south_west.0, step.0);
                 if (0..columns as i64).contains(&x) {
                     let at = y as usize * columns + x as usize;
                     values.blocks[at] += value;

@@ -256,7 +256,7 @@ mod tests {
     fn the_lawnmower_reports_the_legs_that_it_takes() {
         let mut steering = steering(PlannerKind::Horizon);
         let (mut at, planned) = first(&mut steering, &LabelGrid::default(), None, f64::INFINITY);
-        assert_eq!((planned.points.len(), planned.continues), (4, false));
+        assert_eq!((planned.points.len(), planned.continues), (7, true));
         for place in planned.points {
             let Course::Go(to) = steering.next(at, (&LabelGrid::default(), 1), None, f64::INFINITY) else { panic!() };
             assert!(distance(to, place) < 1e-9, "{to:?} instead of {place:?}");

@@ -31,6 +31,8 @@ impl Grounds {
         let (return_point, return_paths, last_leg_m) = (None, None, 0.0);
         let mut grounds =
             Self { area, reach_m, step_m, clearance_m, bounds, start, return_point, lattice, return_paths, last_leg_m };
+        let (_, legs) = grounds.legs_area();
+        grounds.start = (legs.west, legs.south);
         grounds.lay_out();
         grounds
     }
@@ -72,13 +74,34 @@ impl Grounds {
     }
 
     fn lay_out(&mut self) -> Lattice {
-        let inner = self.area.shrunk(self.reach_m);
-        let lattice = Lattice::new(inner, &[self.return_place()], self.step_m, &self.bounds);
+        let (legs_run_north, area) = self.legs_area();
+        let lattice = Lattice::with_legs(legs_run_north, area, &[self.return_place()], self.step_m, &self.bounds);
         let before = std::mem::replace(&mut self.lattice, lattice);
         let end = self.entry(self.return_place());
         self.return_paths = end.map(|n| self.lattice.paths(n));
         self.last_leg_m = end.map_or(0.0, |n| distance(self.return_place(), self.lattice.place(n)));
         before
+    }
+
+    /// Whether the legs run north, and the area that they are fitted to: from its edges the camera sees those of the survey area, as
+    /// far as the fence allows.
+    fn legs_area(&self) -> (bool, Area) {
+        let inner = self.within_fence(self.area.shrunk(self.reach_m));
+        let legs_run_north = Lattice::legs_run_north(inner, self.step_m);
+        // The end of a leg counts as reached before the vehicle is there.
+        let ends = self.area.shrunk((self.reach_m - self.arrival_m()).max(self.reach_m / 2.0));
+        let (width_m, height_m) = inner.size_m();
+        let legs = match legs_run_north {
+            _ if width_m.max(height_m) <= 0.0 => inner,
+            true => Area { south: ends.south, north: ends.north, ..inner },
+            false => Area { west: ends.west, east: ends.east, ..inner },
+        };
+        (legs_run_north, self.within_fence(legs))
+    }
+
+    /// What the fence leaves of an area; all of it if that is nothing.
+    fn within_fence(&self, area: Area) -> Area {
+        self.bounds.extent().and_then(|fence| fence.common(&area)).unwrap_or(area)
     }
 
     /// The place at which a path from `from` enters the lattice.

@@ -201,7 +201,7 @@ fn a_survey_of_one_place_ends_as_arrived() {
     let mut config = Config::default();
     (config.camera.width_px, config.camera.height_px) = (400, 400);
     let width = 400.0 * config.camera.metres_per_pixel;
-    let area = Area { west: 0.0, south: 0.0, east: width, north: 1.5 * width };
+    let area = Area { west: 0.0, south: 0.0, east: width, north: width };
     let profile = profile(&config);
     let mut vehicle = crate::assemble(&config, None, profile, area, Durable::default(), 1, Instant::ZERO).unwrap();
     vehicle.steer(Instant::ZERO);

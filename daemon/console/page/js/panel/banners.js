@@ -11,6 +11,9 @@ import { retryNow } from "../feed.js";
 /** Keys of the banners of a record that concern the present. */
 const OF_THE_PAGE = ["lost", "record"];
 
+/** How long orders may be unknown before people are told. */
+const UNKNOWN_MS = 10_000;
+
 let announced = "";
 /** Keys of the alarms that have sounded and are not over. */
 let sounded = new Set();
@@ -42,7 +45,7 @@ function current() {
     if (isSilent(v)) found.push(silent(v));
     if (store.connected && store.mapFaults.has(v.id)) found.push(outdated(v));
     if (v.link.mismatch) found.push(mismatched(v));
-    if (unknownOrders(v).length > 0) found.push(unknownInForce(v));
+    if (isLongUnknown(v)) found.push(unknownInForce(v));
     if (v.map.earlier) found.push(earlier(v));
     if (isHolding(v) || isStopped(v)) found.push(stopped(v));
     if (v.status?.faults?.some((fault) => fault.is_grave)) found.push(faulty(v));
@@ -148,6 +151,19 @@ function mismatched(v) {
 }
 
 const unknownOrders = (v) => Object.keys(v.in_force).filter((slot) => v.in_force[slot] === "unknown");
+
+/** Since when a vehicle has followed orders that are unknown here. */
+const unknownSince = new Map();
+
+/** Orders that have just been given, or asked for, are known within some seconds. */
+function isLongUnknown(v) {
+  if (unknownOrders(v).length === 0) {
+    unknownSince.delete(v.id);
+    return false;
+  }
+  if (!unknownSince.has(v.id)) unknownSince.set(v.id, performance.now());
+  return performance.now() - unknownSince.get(v.id) >= UNKNOWN_MS;
+}
 
 function unknownInForce(v) {
   return {

@@ -4,6 +4,9 @@ import { $, h, keyed, show, text } from "../dom.js";
 import { missionTime, span } from "../format.js";
 import { ageOf, isSilent, store } from "../store.js";
 
+/** The speed of a rehearsal that has just begun is not measured yet. */
+const LEAST_SPEED = 0.05;
+
 export function startBar() {
   store.on("state select feed tick", update);
 }
@@ -14,7 +17,7 @@ function update() {
   text(feed, store.connected ? (store.replay ? "Record" : "Live") : lost ? "Not connected" : "Connecting");
   if (!store.snapshot) return;
   const { mission, vehicles } = store.snapshot;
-  text($("mission"), mission.speed === 1 || store.replay ? mission.name : `${mission.name} ×${Number(mission.speed.toPrecision(3))}`);
+  text($("mission"), mission.speed === 1 || mission.speed < LEAST_SPEED || store.replay ? mission.name : `${mission.name} ×${Number(mission.speed.toPrecision(2))}`);
   text($("clock"), missionTime(store.nowS));
   keyed($("vehicles"), vehicles, (v) => v.id, make, refresh);
   // Command and alarms are of the present.

@@ -6,11 +6,13 @@ import { $, h, show, text } from "../dom.js";
 import { ago, bytes, percent } from "../format.js";
 import { nameOf } from "../book.js";
 import { slotOf } from "../order/status.js";
-import { ageOf, store } from "../store.js";
+import { ageOf, missionKey, store } from "../store.js";
 
 const NAMES = { queued: "Queued", on_air: "On air", not_available: "None yet", receiving: "Receiving", refused: "Refused" };
 const PENDING = ["queued", "on_air", "not_available", "receiving"];
 const errors = new Map();
+/** Time after which the ages in the dialog are written again. */
+const REDRAW_MS = 10_000;
 let viewer = null;
 
 export function exemplar(of) {
@@ -84,7 +86,10 @@ export function viewExemplars(label) {
   const another = h("button", { type: "button", onclick: () => request(viewer.label) }, "Another");
   const cancel = h("button", { type: "button", onclick: () => request(viewer.label, "cancel") }, "Cancel");
   const state = h("p.state", { role: "status" });
+  const mission = missionKey(store.vehicle);
+  let drawnAt = performance.now();
   const refresh = (now) => {
+    if (missionKey(store.vehicle) !== mission) return close();
     viewer.label = now;
     const e = now.exemplar;
     const pending = PENDING.includes(e.state);
@@ -92,8 +97,9 @@ export function viewExemplars(label) {
     show(cancel, pending);
     for (const button of [another, cancel]) button.disabled = denial("order") !== null;
     const key = e.images.map((i) => `${i.url}${i.at_s}`).join() + pending;
-    if (shown.dataset.key === key) return;
-    shown.dataset.key = key;
+    // The captions tell ages.
+    if (shown.dataset.key === key && performance.now() - drawnAt < REDRAW_MS) return;
+    [shown.dataset.key, drawnAt] = [key, performance.now()];
     shown.replaceChildren(...[...e.images].reverse().map((i) => figure(now, i, pending)));
   };
   viewer = { id: label.id, label, refresh };

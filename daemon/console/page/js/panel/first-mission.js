@@ -1,11 +1,12 @@
 // The first mission in five steps. Each step is done by the state of the mission, not by a click, and the card can be closed for good.
 
-import { hasName, nameOf, shownLabels } from "../book.js";
+import { hasName, nameOf, shownAs, shownLabels } from "../book.js";
 import { denial } from "../command.js";
 import { $, data, h, show, text } from "../dom.js";
+import { cellAt } from "../map/readout.js";
 import { slotOf } from "../order/status.js";
 import { recall, remember } from "../prefs.js";
-import { store } from "../store.js";
+import { missionKey, store } from "../store.js";
 import { weightsOrder } from "./weights.js";
 
 /** Cells from which a map shows more than one kind of sea floor. */
@@ -14,6 +15,12 @@ const FIRST_CELLS = 200;
 const hasWeight = (v) => shownLabels(v).some((l) => weightsOrder.value(v, l.id) !== 0);
 const utility = (v) => slotOf(v, "utility");
 const isInForce = (v) => utility(v)?.state === "applied";
+
+/** The weight of the label that the vehicle was over at its last report. */
+function weightBelow(v) {
+  const cell = store.map ? cellAt(store.map, v.status.x_m, v.status.y_m) : null;
+  return cell?.label ? weightsOrder.value(v, shownAs(cell.label)) : 0;
+}
 
 /** What to expect after an order of weights. A vehicle without a plan holds because the weighed labels are done. */
 function steerInstruction(v) {
@@ -40,21 +47,22 @@ const STEPS = [
     (v) => v.map.explored_cells >= FIRST_CELLS],
   ["Name", "Click the name of a label and enter a word for it, such as sand.",
     (v) => shownLabels(v).some((l) => hasName(l.id))],
-  ["Weigh", "Move the slider of a label that you want to see more of to the right, then press Send below the list.",
+  ["Weigh", "Move the slider of a label that you want to see more of to the right, then press Send weights below the list.",
     (v) => isInForce(v) && hasWeight(v)],
   ["Steer", steerInstruction,
-    (v) => isInForce(v) && Boolean(v.status?.waypoint) && v.status.at_s > utility(v).changed_s],
+    (v) => isInForce(v) && v.status?.at_s > utility(v).changed_s && weightBelow(v) > 0],
   ["Picture", pictureInstruction,
     (v) => v.labels.some((l) => l.exemplar.images.some((image) => image.requested))],
 ];
 
-/** The steps that were done, for each vehicle: a step that was done once stays done. */
+/** The steps that were done, for each mission and vehicle: a step that was done once stays done. */
 const reached = new Map();
 
 function doneSteps(v) {
-  const done = reached.get(v.id) ?? STEPS.map(() => false);
-  reached.set(v.id, done.map((was, i) => was || STEPS[i][2](v)));
-  return reached.get(v.id);
+  const key = missionKey(v);
+  const done = reached.get(key) ?? STEPS.map(() => false);
+  reached.set(key, done.map((was, i) => was || STEPS[i][2](v)));
+  return reached.get(key);
 }
 
 const lines = STEPS.map(([name, instruction]) => {

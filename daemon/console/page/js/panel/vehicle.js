@@ -74,6 +74,7 @@ function update() {
   values.cells(s ? `${count(s.cells)} cells, ${s.labels} labels` : none);
   values.contact(v.next_contact_s === null ? "unknown" : `${missionTime(v.next_contact_s)}, ${due(v)}`);
   values.disk(disk(s?.disk));
+  show(lines.disk, Boolean(s?.disk));
   lines.disk.classList.toggle("warn", isDiskWanting(s?.disk));
   values.gps(gps(store.snapshot.position));
   keyed(slots, v.directive.slots, (x) => x.slot, makeSlot, refreshSlot);
@@ -87,7 +88,8 @@ const TIES = { odometry: "lost, by odometry", frame_before: "by the frame before
 
 /** What placed the last camera frames on the map. */
 function registration(r) {
-  if (!r) return none;
+  // Before the first frame there is nothing to place.
+  if (!r || (r.tie === "odometry" && r.sigma_m === 0)) return none;
   if (r.tie === "off") return TIES.off;
   const share = r.share < 0.995 ? `, ${Math.round(100 * r.share)} % of the last 32 by images` : "";
   return `${TIES[r.tie]}, \u00b1 ${metres(r.sigma_m, 2)}${share}, ${count(r.closed)} closed loops`;
