@@ -189,9 +189,9 @@ impl<E: LinkEnd> LinkHost<E> {
             self.station.begin_cycle(cycle, now);
         }
         while self.station.takes_frames()
-            && let Some(transmit) = self.end.poll_transmit(now)
+            && let Some(mut transmit) = self.end.poll_transmit(now)
         {
-            let (frame, contents) = (transmit.bytes.clone(), transmit.contents.clone());
+            let (frame, contents) = (transmit.bytes.clone(), std::mem::take(&mut transmit.contents));
             self.events.push_back(FrameEvent::Sent { frame, kind: transmit.kind, contents });
             if let Err(refusal) = self.station.send(transmit, now) {
                 self.events.push_back(FrameEvent::NotSent(refusal));

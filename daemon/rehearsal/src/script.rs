@@ -41,7 +41,7 @@ impl Script {
     /// of half the survey's path.
     pub fn fenced(duration_s: f64, area: Area, speed_m_s: f64) -> Self {
         let mut script = Self::of_survey(duration_s);
-        let (w, h) = (area.east - area.west, area.north - area.south);
+        let (w, h) = area.size_m();
         let at = |x: f64, y: f64| [area.west + x * w, area.south + y * h];
         let inside = vec![at(0.0, 0.0), at(0.9, 0.0), at(0.9, 0.6), at(0.6, 0.9), at(0.0, 0.9)];
         let wreck = vec![at(0.4, 0.4), at(0.55, 0.4), at(0.5, 0.55)];

@@ -38,14 +38,16 @@ impl MapState<'_> {
         let evidence: Vec<Option<&Evidence>> = changed.collect();
         let mut frames: Vec<&Arc<MappedFrame>> = evidence.iter().flatten().map(|evidence| &evidence.frame).collect();
         frames.sort_by(|a, b| a.taken_s.total_cmp(&b.taken_s));
-        frames.dedup_by(|a, b| Arc::ptr_eq(a, b));
+        frames.dedup_by(|a, b| a.taken_s == b.taken_s);
         // A number has no more bits; a map that changed with more frames between two looks loses the oldest ones.
         let frames = &frames[frames.len().saturating_sub(MapCells::NO_FRAME.into())..];
         if frames.is_empty() {
             return;
         }
-        let index = |evidence: &&Evidence| frames.iter().position(|frame| Arc::ptr_eq(frame, &evidence.frame));
-        let index = |evidence: &Option<&Evidence>| evidence.as_ref().and_then(index);
+        let index = |evidence: &Option<&Evidence>| {
+            let taken_s = evidence.as_ref()?.frame.taken_s;
+            frames.binary_search_by(|frame| frame.taken_s.total_cmp(&taken_s)).ok()
+        };
         cells.frame = evidence.iter().map(|e| index(e).map_or(MapCells::NO_FRAME, |index| index as u16)).collect();
         cells.words = evidence.iter().map(|e| e.map_or(0, |evidence| evidence.words)).collect();
         cells.confidence = evidence.iter().map(|e| e.map_or(f32::NAN, |evidence| evidence.confidence)).collect();

@@ -230,15 +230,15 @@ fn frame_entry<'a>(
     let sent = Envelope::decode(frame, |_| true).ok().map(|envelope| envelope.header);
     let ends = sent.as_ref().map(|header| [header.from, header.to]);
     let is_to_vehicle = ends.is_none_or(|[_, to]| to != Address::SURFACE);
-    let named = ends.into_iter().flatten().find(|end| end.is_vehicle()).and_then(named);
-    let layers = named.map_or_else(LayerSet::default, |named| named.layers.clone());
+    let unknown = Named::default();
+    let named = ends.into_iter().flatten().find(|end| end.is_vehicle()).and_then(named).unwrap_or(&unknown);
     let message = Frame {
         header: header(stamps.now(), ""),
-        vehicle: named.map(|named| named.name.clone()).unwrap_or_default(),
+        vehicle: named.name.clone(),
         direction,
         number: sent.map_or(0, |header| header.number),
         bits: frame.len() as u32 * 8,
-        contents: contents.keys().map(|class| class.name_in(&layers)).collect(),
+        contents: contents.keys().map(|class| class.name_in(&named.layers)).collect(),
         content_bits: contents.values().map(|bytes| *bytes as u32 * 8).collect(),
         reason: reason.map_or_else(String::new, |reason| reason_name(reason).to_owned()),
         data: if hides_keys && is_to_vehicle { Vec::new() } else { frame.clone() },
