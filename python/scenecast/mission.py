@@ -42,6 +42,18 @@ def _both(folder):
     return next(iter(surfaces), None), next(iter(vehicles), None)
 
 
+def _ends(paths):
+    """The records of surface and vehicle among several; those of one end, which was started again, are joined."""
+    ends = {False: [], True: []}
+    for path in paths:
+        ends[_is_of_vehicle(Record(path))].append(path)
+    return tuple(Record(found) if found else None for found in (ends[False], ends[True]))
+
+
+def _is_of_vehicle(record):
+    return any(f"/scenecast/{found}/events" in record.index for found in _vehicles(record))
+
+
 def _in_force(changes):
     """Columns, rows and values of the known cells after some changes: the last one of each cell is in force."""
     x, y, value = (np.concatenate(arrays) for arrays in zip(*changes)) if changes else (np.zeros(0, "i4"),) * 3
@@ -67,8 +79,11 @@ class Mission:
 
     @classmethod
     def open(cls, surface=None, vehicle=None, name=None):
-        """Opens one or two records, or a folder with both; `name` selects one of several vehicles."""
-        if surface is not None and vehicle is None and not isinstance(surface, Record):
+        """Opens one or two records, a folder with both, or a list of records, of which several may be of one end that was started
+        again; `name` selects one of several vehicles."""
+        if isinstance(surface, (list, tuple)) and vehicle is None:
+            surface, vehicle = _ends(surface)
+        elif surface is not None and vehicle is None and not isinstance(surface, Record):
             surface, vehicle = _both(Path(surface))
         return cls(_record(surface), _record(vehicle), name)
 
@@ -78,7 +93,7 @@ class Mission:
         present = [record for record in (surface, vehicle) if record]
         if not present:
             raise ValueError("give the record of the surface, that of the vehicle, or both")
-        if surface and any(f"/scenecast/{found}/events" in surface.index for found in _vehicles(surface)):
+        if surface and _is_of_vehicle(surface):
             raise ValueError(f"{surface.path} is the record of a vehicle: Mission.open(vehicle=...)")
         self.vehicles = sorted(_vehicles(surface) | _vehicles(vehicle))
         names = {part_of(name)} if name else _vehicles(vehicle) or _vehicles(surface)

@@ -55,16 +55,21 @@ class Record:
     """A record: the messages of each topic in the order in which they were written."""
 
     def __init__(self, path):
-        """Finds the messages of a folder of files `*.mcap`, or of one file; they are decoded on demand."""
-        self.path = Path(path)
+        """Finds the messages of a folder of files `*.mcap`, of one file, or of a list of folders, as an end makes that was started again;
+        they are decoded on demand."""
+        paths = [Path(part) for part in (path if isinstance(path, (list, tuple)) else [path])]
+        self.path = paths[0]
         self.index = {}  # by topic: (time in s, block, first byte, size) of each message
         self._blocks = []  # file, first byte and size of each chunk, and whether it is one
         self._decoders, self._channels, self._schemas, self._held = {}, {}, {}, (None, b"")
-        files = [self.path] if self.path.is_file() else list(self.path.glob("*.mcap"))
-        if not files:
-            raise FileNotFoundError(f"{path}: there is no file *.mcap")
-        # The number at the end of a name counts the files.
-        for file in sorted(files, key=lambda file: [int(n) for n in re.findall(r"\d+", file.stem)[-1:]]):
+        files = []
+        for part in paths:
+            found = [part] if part.is_file() else list(part.glob("*.mcap"))
+            if not found:
+                raise FileNotFoundError(f"{part}: there is no file *.mcap")
+            # The number at the end of a name counts the files.
+            files += sorted(found, key=lambda file: [int(n) for n in re.findall(r"\d+", file.stem)[-1:]])
+        for file in files:
             self._channels, self._schemas = {}, {}
             try:
                 with file.open("rb") as opened:
@@ -73,6 +78,9 @@ class Record:
                     warnings.warn(f"{file}: {len(damage)} chunks are left out: {damage[0]}", DamagedRecord, stacklevel=3)
             except (ValueError, KeyError, struct.error, zstandard.ZstdError) as error:
                 warnings.warn(f"{file}: read as far as it is whole: {error}", DamagedRecord, stacklevel=3)
+        if len(paths) > 1:
+            for entries in self.index.values():
+                entries.sort(key=lambda entry: entry[0])
         times = [time for entries in self.index.values() for time, *_ in entries]
         self.begin, self.end = (min(times), max(times)) if times else (float("nan"), float("nan"))
 

@@ -152,6 +152,18 @@ def test_records_that_are_exchanged_are_refused():
         Mission.open(surface=Path(FOLDER) / "record_vehicle")
 
 
+@recorded
+def test_a_list_has_the_records_of_both_ends_in_any_order(mission):
+    ends = [Path(FOLDER) / f"record_{end}" for end in ("vehicle", "surface")]
+    assert Mission.open(ends).map().fingerprint() == mission.map().fingerprint()
+    assert Mission.open(ends[:1]).records["operator"] is None
+    # An end that was started again has several records: these are one twice.
+    twice = Mission.open(ends + [str(ends[1])]).records["operator"]
+    assert {topic: len(found) for topic, found in twice.index.items()} == {
+        topic: 2 * len(found) for topic, found in mission.records["operator"].index.items()}
+    assert all(found == sorted(found) for found in ([entry[0] for entry in entries] for entries in twice.index.values()))
+
+
 def test_cdr_aligns_and_follows_the_order_of_bytes():
     text = "uint8 ONE=1\nuint8 a # first\nfloat64[2] b\nstring c\nTwo[] d\n"
     text += "=" * 80 + "\nMSG: some/Two\nint16 e\nstring<=5 f\n"
