@@ -18,7 +18,7 @@ use scenecast_core::Area;
 use scenecast_protocol::directive::{Areas, AtEnd, Fence, PlannerKind, Utility, WeightedArea};
 use scenecast_protocol::map::{Cell, LabelGrid};
 use scenecast_protocol::wire::Intent;
-use std::collections::VecDeque;
+use std::collections::{BTreeMap, VecDeque};
 
 /// The extent of a camera frame on the sea floor, metres.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -65,6 +65,8 @@ pub struct Steering {
     /// The end of the survey: as configured, and as ordered.
     at_end: (AtEnd, Option<AtEnd>),
     areas: Vec<WeightedArea>,
+    /// The weights of labels and the areas for which the looks are counted.
+    counted: (BTreeMap<u8, i8>, Vec<WeightedArea>),
     /// The place to which the operator has ordered the vehicle.
     destination: Option<Point>,
     window: CellWindow,
@@ -113,6 +115,7 @@ impl Steering {
             choice: PlannerChoice::new(configured),
             at_end: (AtEnd::Explore, None),
             areas: Vec::new(),
+            counted: Default::default(),
             destination: None,
             window: CellWindow::new(area, cell_m),
             known: Knowledge::default(),
@@ -227,6 +230,7 @@ impl Steering {
         if self.choice.follow(utility.is_some() || !self.areas.is_empty()) {
             self.replan();
         }
+        self.handle_interest(map.0, utility);
         let left_m = left_m - self.grounds.last_leg_m();
         let Some(at) = self.grounds.entry(from) else { return Course::NoPath };
         let approach = distance(from, self.grounds.lattice().place(at));
@@ -266,7 +270,9 @@ impl Steering {
         let found = self.paying_plan(from, map, utility, left_m, &present, at_end != AtEnd::Hold);
         let repeats = at_end == AtEnd::Repeat && self.choice.adapts() && found.0.is_empty();
         let begins = repeats && self.views.begin_round(self.grounds.lattice().step_m());
-        if begins && self.forget_looks(map, utility) {
+        let areas = self.areas.clone();
+        if begins && self.forget_looks(map, Interest { utility, areas: &areas }) {
+            self.known.begin_round();
             // The next round begins elsewhere.
             self.views.last().into_iter().for_each(|at| self.exhaust_around(at));
             return self.paying_plan(from, map, utility, left_m, &present, false);
@@ -274,13 +280,30 @@ impl Steering {
         found
     }
 
+    /// Counts the looks at what the operator favours more than before from now on: he asks to see it, whatever was passed over
+    /// before he asked.
+    fn handle_interest(&mut self, map: &LabelGrid, utility: Option<&Utility>) {
+        let weights = utility.map(|utility| &utility.weights);
+        if weights.map_or(self.counted.0.is_empty(), |weights| *weights == self.counted.0)
+            && self.areas == self.counted.1
+        {
+            return;
+        }
+        let now = (weights.cloned().unwrap_or_default(), self.areas.clone());
+        let before = std::mem::replace(&mut self.counted, now.clone());
+        let is_raised = |(label, weight): &(u8, i8)| *weight > before.0.get(label).copied().unwrap_or(0).max(0);
+        let raised = Utility { weights: now.0.into_iter().filter(is_raised).collect(), ..Utility::default() };
+        let areas: Vec<WeightedArea> = now.1.into_iter().filter(|area| !before.1.contains(area)).collect();
+        self.forget_looks(map, Interest { utility: &raised, areas: &areas });
+        self.replan();
+    }
+
     /// Forgets the looks at favoured labels and in favoured areas; returns whether there were any.
-    fn forget_looks(&mut self, map: &LabelGrid, utility: &Utility) -> bool {
-        let Self { known, areas, window, map_origin, .. } = self;
-        let interest = Interest { utility, areas };
+    fn forget_looks(&mut self, map: &LabelGrid, interest: Interest<'_>) -> bool {
+        let Self { known, window, map_origin, .. } = self;
         known.forget_looks(map, |cell, label| {
             let (x, y) = window.centre_of(cell);
-            utility.weight(label) > 0.0 || interest.weight_of_place((x + map_origin.0, y + map_origin.1)) > 0.0
+            interest.utility.weight(label) > 0.0 || interest.weight_of_place((x + map_origin.0, y + map_origin.1)) > 0.0
         })
     }
 

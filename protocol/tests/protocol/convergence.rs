@@ -68,7 +68,7 @@ fn play(pair: &mut LinkedEnds, steps: &[(u8, u8)]) {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(40))]
+    #![proptest_config(ProptestConfig::with_cases(crate::cases(40) as u32))]
 
     #[test]
     fn the_maps_converge_over_any_channel_and_restarts(
@@ -302,7 +302,7 @@ fn a_modem_owned_link_keeps_its_run_in_the_smallest_frames() {
 #[test]
 fn verdicts_keep_up_with_losses_in_the_smallest_frames() {
     let channel = LossyChannel { loss: 0.896, talker: 0.056, propagation: Duration::from_millis(951), ..CALM };
-    for seed in 0..4 {
+    for seed in 0..crate::cases(4) {
         let setup = Setup { access: Access::Polled, ..Setup::new(32, 1000, Codec::Png) };
         let mut pair = LinkedEnds::new(seed, setup, channel.clone());
         pair.vehicle.set_map(patchy(24, 5).iter(), pair.now);

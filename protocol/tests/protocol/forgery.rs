@@ -200,13 +200,13 @@ fn attack(seed: u64) -> Option<Duration> {
 
 #[test]
 fn a_link_recovers_from_forgeries_that_it_accepted() {
-    const ATTACKS: u64 = 400;
-    let times: Vec<Option<Duration>> = (0..ATTACKS).map(attack).collect();
+    let attacks = crate::cases(400);
+    let times: Vec<Option<Duration>> = (0..attacks).map(attack).collect();
     let late: Vec<(usize, &Option<Duration>)> =
         times.iter().enumerate().filter(|(_, time)| time.is_none_or(|t| t > USUAL_RECOVERY)).collect();
-    println!("{} of {ATTACKS} links took longer than {USUAL_RECOVERY:?}: {late:?}", late.len());
+    println!("{} of {attacks} links took longer than {USUAL_RECOVERY:?}: {late:?}", late.len());
     assert!(times.iter().all(Option::is_some), "not within {MAX_RECOVERY:?}: {late:?}");
-    assert!(late.len() as u64 * 50 <= ATTACKS, "longer than {USUAL_RECOVERY:?}: {late:?}");
+    assert!(late.len() as u64 * 50 <= attacks, "longer than {USUAL_RECOVERY:?}: {late:?}");
 }
 
 /// Begins a run of the surface at the vehicle by a forged hello, and gives it an order of a series.

@@ -84,7 +84,7 @@ fn run(pair: &mut LinkedEnds, seconds: u64) {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(40))]
+    #![proptest_config(ProptestConfig::with_cases(crate::cases(40) as u32))]
 
     #[test]
     fn all_that_is_in_force_is_known_after_quiet(

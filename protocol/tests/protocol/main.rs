@@ -13,3 +13,8 @@ mod promises;
 mod replay;
 mod rotation;
 mod vectors;
+
+/// `all` cases in `.ci/full`, a third of them in `.ci/run`.
+fn cases(all: u64) -> u64 {
+    if std::env::var_os("SCENECAST_FULL").is_some() { all } else { all.div_ceil(3) }
+}

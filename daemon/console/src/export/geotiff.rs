@@ -350,3 +350,25 @@ fn deflate(bytes: &[u8]) -> std::io::Result<Vec<u8>> {
     encoder.write_all(bytes)?;
     encoder.finish()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use scenecast_protocol::map::{Cell, LabelGrid};
+
+    #[test]
+    fn degrees_and_utm_are_refused_where_they_have_no_rectangle() {
+        let labels: LabelGrid = (0..9).map(|i| (Cell::new(i % 3, i / 3), 1)).collect();
+        let cells = MapCells::of_labels(&labels, 0.25);
+        for (lat_deg, degrees, utm) in
+            [(0.0, true, true), (83.0, true, true), (88.9, true, false), (89.5, false, false), (-90.0, false, false)]
+        {
+            let origin = Some(Origin { lat_deg, lon_deg: 12.0 });
+            let refused = |reference| geotiff(&cells, origin, reference).err();
+            assert_eq!(refused(Reference::Mission), None);
+            let [of_degrees, of_utm] = [Reference::Wgs84, Reference::Utm].map(refused);
+            assert_eq!((of_degrees.is_none(), of_utm.is_none()), (degrees, utm), "{lat_deg}");
+            assert!([of_degrees, of_utm].iter().flatten().all(|line| line.contains("take map.")));
+        }
+    }
+}

@@ -26,7 +26,7 @@ thead{display:table-header-group}.swatch,svg{-webkit-print-color-adjust:exact;pr
 vertical-align:-.15em;margin-right:.4em}.images{display:flex;flex-wrap:wrap;gap:.6em}.images figure{margin:0;width:112px}.images svg{width:112px}.images img{width:112px;display:block;\
 image-rendering:pixelated}.number{font-weight:600;paint-order:stroke;stroke:#fff;stroke-width:3px}\
 .point{fill:#fff;stroke:#000;stroke-width:1.5}.legend>span{display:inline-block;margin-right:1em}@media(max-width:700px){table{display:block;overflow-x:auto}}\
-h2,h3{break-after:avoid}tr,svg{break-inside:avoid}@media print{body{margin:0;max-width:none}figure.map{break-inside:avoid}thead+tbody>tr:first-child{break-before:avoid}h2+p,h3+p,p:last-child{break-before:avoid}}";
+h2,h3{break-after:avoid}tr,svg{break-inside:avoid}@media print{body{margin:0;max-width:none}figure.map{break-inside:avoid}figure.map svg{max-height:13cm}thead+tbody>tr:first-child{break-before:avoid}h2+p,h3+p,p:last-child{break-before:avoid}}";
 
 impl Dive {
     /// The report as one HTML file.
@@ -102,7 +102,7 @@ impl Dive {
         for (at_s, event) in &self.events {
             let _ = writeln!(
                 page,
-                "<tr><td class=\"t\">{}</td><td>{}</td><td>{}</td><td>{}</td></tr>",
+                "<tr><td class=\"t\">{}</td><td class=\"t\">{}</td><td class=\"t\">{}</td><td>{}</td></tr>",
                 utc_text(*at_s),
                 Escaped(&event.vehicle),
                 Escaped(&event.source),

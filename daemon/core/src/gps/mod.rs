@@ -4,12 +4,14 @@ use crate::geodesy::{LatLon, TangentPlane};
 use crate::nmea::{PositionKind, Sentence};
 mod first_fix;
 mod gpsd;
+mod way;
 
 use crate::{Lines, nmea};
 use first_fix::FirstFix;
 use scenecast_protocol::time::Instant;
 use std::collections::BTreeMap;
 use std::time::Duration;
+use way::Way;
 
 /// The language of a receiver.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -111,6 +113,7 @@ pub struct Gps {
     /// Way over ground: speed in m/s, course, when.
     motion: Option<(f64, Option<f64>, Instant)>,
     heading: Option<(f64, Instant)>,
+    way: Way,
 }
 
 impl Gps {
@@ -151,6 +154,7 @@ impl Gps {
             is_frozen_told: false,
             motion: None,
             heading: None,
+            way: Way::default(),
         }
     }
 
@@ -179,6 +183,13 @@ impl Gps {
     pub fn course_rad(&self, now: Instant) -> Option<f64> {
         let is_fresh = |speed: f64, at| speed > Self::COURSE_SPEED_M_S && now.since(at) < Self::HEADING_LASTS;
         self.motion.filter(|(speed, _, at)| is_fresh(*speed, *at)).and_then(|(_, course, _)| course)
+    }
+
+    /// The velocity over ground, metres a second east and north.
+    fn velocity(&self, now: Instant) -> Option<(f64, f64)> {
+        let (speed, course, at) = self.motion?;
+        let course = course.or((speed < Self::COURSE_SPEED_M_S).then_some(0.0))?;
+        (now.since(at) < Self::BETTER_LASTS).then(|| (speed * course.sin(), speed * course.cos()))
     }
 
     /// Returns the request to send on a new connection, and drops a half line of the old one.
@@ -318,6 +329,8 @@ impl Gps {
         // One good place does not outvote many others.
         self.jumps.0 = self.jumps.0.saturating_sub(1);
         self.fix = Some(fix);
+        let note = self.way.handle(fix, self.velocity(fix.at));
+        self.note = note.or_else(|| self.note.take());
         self.kinds.entry(kind).or_default().used = Some(fix.at);
         Some(fix)
     }

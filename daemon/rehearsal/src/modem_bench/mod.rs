@@ -147,7 +147,7 @@ mod tests {
         let (duration_s, least) = if is_full { (1200.0, 0.9) } else { (400.0, 0.7) };
         // An area of which such a modem can keep up with the map.
         let small = ["camera.width_px=320", "camera.height_px=240", "survey.area_m=[0.5, 0.5, 19.4, 19.4]"];
-        for sets in [im, rate_1] {
+        for sets in [rate_1, im].into_iter().take(if is_full { 2 } else { 1 }) {
             let row = survey(&sets.join(" "), &[&sets[..], &small].concat(), 1, duration_s).unwrap();
             assert_eq!(row.agreement_final, 1.0, "{row:?}");
             assert!(row.agreement_mean >= least, "{row:?}");

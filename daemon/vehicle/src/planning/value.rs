@@ -38,15 +38,19 @@ impl Knowledge {
         self.looks.set(cell, u8::MAX);
     }
 
-    /// Forgets the looks at the favoured cells and begins a round of further looks; returns whether there are any.
+    /// Forgets the looks at the favoured cells; returns whether there are any.
     pub fn forget_looks(&mut self, map: &LabelGrid, is_favoured: impl Fn(Cell, u8) -> bool) -> bool {
         let favoured = map.iter().filter(|&(cell, label)| is_favoured(cell, label));
         let favoured: Vec<Cell> = favoured.map(|(cell, _)| cell).collect();
         for &cell in &favoured {
             self.looks.set(cell, 0);
         }
-        self.repeats = true;
         !favoured.is_empty()
+    }
+
+    /// Begins a round of further looks.
+    pub fn begin_round(&mut self) {
+        self.repeats = true;
     }
 
     /// Whether the survey is in a round of further looks.

@@ -122,3 +122,37 @@ fn a_weighted_area_attracts_or_repels_without_a_utility() {
     let track = drive(&mut steering, &map, Some(&utility), 12);
     assert!(!track.iter().any(|&(x, y)| x > 15.0 && y > 8.0), "{track:?}");
 }
+
+#[test]
+fn what_was_passed_over_before_it_was_favoured_is_visited_first() {
+    let is_patch = |(x, y): Point| x < 3.0 && y > 8.0;
+    let map: LabelGrid = (0..48 * 44)
+        .map(|i| (Cell::new(i % 44, i / 44), (0.25 * f64::from(i % 44), 0.25 * f64::from(i / 44))))
+        .map(|(cell, at)| (cell, if is_patch(at) { 2 } else { 1 }))
+        .collect();
+    let favour = |weight| Utility { weights: [(2, weight)].into(), ..Utility::default() };
+    let mut steering = steering(PlannerKind::Horizon);
+    // Several passes over the patch, and unseen floor beside the vehicle.
+    for pass in 0..6 {
+        (0..24).for_each(|i| steering.handle_view((f64::from(i) / 2.0, 8.0 + 0.5 * f64::from(pass))));
+    }
+    let mut at = (10.0, 4.0);
+    let mut fly = |steering: &mut Steering, utility: &Utility, legs: u64| {
+        (0..legs)
+            .map(|version| {
+                let Course::Go(to) = steering.next(at, (&map, version), Some(utility), f64::INFINITY) else {
+                    return at;
+                };
+                at = to;
+                steering.handle_view(at);
+                at
+            })
+            .collect::<Vec<Point>>()
+    };
+    let track = fly(&mut steering, &favour(80), 12);
+    assert!(track[0].0 < 10.0 && track.iter().any(|&to| is_patch(to)), "{track:?}");
+    // The same order again forgets no looks: the survey goes on to unseen floor.
+    fly(&mut steering, &favour(80), 40);
+    let track = fly(&mut steering, &favour(80), 20);
+    assert!(track.iter().any(|&(x, _)| x > 12.0), "{track:?}");
+}

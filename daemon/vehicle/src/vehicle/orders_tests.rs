@@ -172,7 +172,7 @@ fn order() -> impl Strategy<Value = Slot> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(24))]
+    #![proptest_config(ProptestConfig::with_cases(if std::env::var_os("SCENECAST_FULL").is_some() { 24 } else { 12 }))]
     #[test]
     fn no_waypoint_leaves_the_fence_or_exceeds_a_limit(
         orders in proptest::collection::vec((0u32..160, order()), 1..12),
