@@ -59,7 +59,20 @@ impl WorldArguments {
     /// The sea floor: the given image or a procedural reef.
     pub fn world(&self, config: &Config) -> Result<World, UserError> {
         match &self.mosaic {
-            Some(mosaic) => World::from_files(mosaic, self.annotations.as_deref(), config.camera.metres_per_pixel),
+            Some(mosaic) => {
+                let metres_per_pixel = config.camera.metres_per_pixel;
+                let world = World::from_files(mosaic, self.annotations.as_deref(), metres_per_pixel)?;
+                let ((width_m, height_m), area) = (world.area().size_m(), config.survey.area_m);
+                let beyond = match area.is_some_and(|area| world.area().common(&area) != Some(area)) {
+                    true => "; survey.area_m reaches beyond it, where the sea floor is its mirror image",
+                    false => "",
+                };
+                errln!(
+                    "{}: {width_m:.1} x {height_m:.1} m of sea floor, with pixels of {metres_per_pixel} m (--metres-per-pixel){beyond}",
+                    mosaic.display()
+                );
+                Ok(world)
+            }
             None => Ok(World::procedural(config, self.seed)),
         }
     }

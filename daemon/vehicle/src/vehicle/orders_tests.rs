@@ -29,6 +29,8 @@ struct Sea {
     fence: Fence,
     /// The limit of distance, and the metres used of it.
     limit: Option<(f64, f64)>,
+    /// The autopilot ends its legs this far before their ends, metres.
+    stops_before_m: f64,
 }
 
 fn profile(config: &Config) -> ModemProfile {
@@ -44,7 +46,14 @@ impl Sea {
         let now = Instant::ZERO;
         let vehicle = crate::assemble(&config, None, profile, AREA, Durable::default(), seed, now).unwrap();
         let (x, y) = vehicle.navigator().position().xy();
-        Self { vehicle, motion: Motion::new(x, y, 0.5, drift, seed), now, fence: Fence::default(), limit: None }
+        Self {
+            vehicle,
+            motion: Motion::new(x, y, 0.5, drift, seed),
+            now,
+            fence: Fence::default(),
+            limit: None,
+            stops_before_m: 0.0,
+        }
     }
 
     fn order(&mut self, slot: Slot) {
@@ -83,7 +92,9 @@ impl Sea {
                     let navigator = self.vehicle.navigator();
                     self.check(navigator.to_world(at).xy(), navigator.to_world(to).xy());
                     self.check_path();
-                    self.motion.set_target(Some(to.xy()));
+                    let leg = (to.x_m - at.x_m, to.y_m - at.y_m);
+                    let part = 1.0 - (self.stops_before_m / leg.0.hypot(leg.1).max(1e-9)).min(1.0);
+                    self.motion.set_target(Some((at.x_m + part * leg.0, at.y_m + part * leg.1)));
                 }
                 VehicleOutput::Hold => self.motion.set_target(None),
                 VehicleOutput::Surface => self.motion.come_up(),
@@ -176,9 +187,9 @@ proptest! {
     #[test]
     fn no_waypoint_leaves_the_fence_or_exceeds_a_limit(
         orders in proptest::collection::vec((0u32..160, order()), 1..12),
-        drift in 0.0f64..0.05, seed: u64, fixes: bool,
+        drift in 0.0f64..0.05, seed: u64, fixes: bool, stops_before_m in prop_oneof![Just(0.0), 0.0f64..2.5],
     ) {
-        let mut sea = Sea::new(drift, seed);
+        let mut sea = Sea { stops_before_m, ..Sea::new(drift, seed) };
         sea.see(seed);
         for (steps, slot) in orders {
             sea.order(slot);
@@ -193,6 +204,20 @@ proptest! {
                 }
             }
         }
+    }
+}
+
+#[test]
+fn a_survey_goes_on_where_the_autopilot_stops_before_its_waypoints() {
+    for (stops_before_m, goes_on) in [(0.0, true), (0.7, true), (1.8, true), (4.0, false)] {
+        let mut sea = Sea { stops_before_m, ..Sea::new(0.0, 1) };
+        let mut metres = 0.0;
+        for _ in 0..2400 {
+            let before = sea.vehicle.navigator().position();
+            sea.step();
+            metres += before.distance_m(sea.vehicle.navigator().position());
+        }
+        assert_eq!(metres > 300.0, goes_on, "{stops_before_m} m before: {metres} m in 20 minutes");
     }
 }
 
