@@ -18,7 +18,6 @@ use scenecast_protocol::directive::SlotId;
 use scenecast_protocol::map::{LayerDescriptor, Quantity};
 use serde::{Deserialize, Serialize};
 use serde_json::json;
-use std::collections::BTreeMap;
 
 /// Which labels become one at coarser cuts.
 pub fn label_tree(vehicle: &VehicleState, tree: &MapLabelTree, header: Header) -> LabelTree {
@@ -70,9 +69,7 @@ pub fn order(
     let orders = &vehicle.orders;
     let content = match SlotId::ALL.into_iter().find(|id| id.name() == slot.slot)? {
         SlotId::Utility => {
-            let weighed = vehicle.labels.iter().filter(|label| label.weight != 0.0);
-            let weights: BTreeMap<String, f64> = weighed.map(|label| (label.id.to_string(), label.weight)).collect();
-            let UtilityTerms { exploration, curiosity } = orders.utility;
+            let UtilityTerms { exploration, curiosity, weights } = &orders.utility;
             json!({ "weights": weights, "exploration": exploration, "curiosity": curiosity })
         }
         SlotId::Constraints => json!({ "hold": slot.name == "hold", "abort": slot.name == "abort" }),

@@ -62,7 +62,7 @@ pub(super) struct DiveVehicle {
     /// The same with its layers, as files have it.
     cells: Option<MapCells>,
     epoch: u8,
-    /// When frames of it were received, seconds since 1970, and at the ends of the record.
+    /// When frames of it were received, seconds since 1970.
     pub(super) heard_s: Vec<f64>,
     /// The edge of a cell, metres.
     pub(super) cell_m: f64,
@@ -249,7 +249,7 @@ impl DiveVehicle {
             labels: shown.labels.shown().clone(),
             cells: Some(shown.cells(0, timeline.mission_time(timeline.span.1))),
             epoch: shown.epoch,
-            heard_s: known.heard.iter().copied().chain([timeline.span.1]).map(seconds).collect(),
+            heard_s: known.heard.iter().copied().map(seconds).collect(),
             cell_m: shown.cell_m,
             classes: areas(shown, |label| state.label_book.shown_as(label)),
             track: known.poses.iter().map(|(_, pose)| TrackPoint::of(pose)).collect(),

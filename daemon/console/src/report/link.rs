@@ -56,7 +56,7 @@ impl Dive {
         };
         let _ = writeln!(
             page,
-            "<table><tr><th>direction</th><th>frames</th><th>lost</th><th>bytes by class</th></tr>{}{}</table>\n<p>Frames are numbered: \
+            "<table><tr><th>direction</th><th>frames</th><th>lost</th><th>bytes by class: heard from the vehicles, sent to them</th></tr>{}{}</table>\n<p>Frames are numbered: \
              those are lost whose number the other end never received, over the whole mission.{} Classes: map and layers, status of the vehicle, directive \
              (orders), fix (positions for the vehicle), exemplar (images), and overhead (heads and tags of frames).</p>",
             direction("from the vehicles", &self.state.link.up),
@@ -74,7 +74,7 @@ impl Dive {
         if map > 0 && cells > 0 {
             let _ = writeln!(
                 page,
-                "<p>The budget at the end was {} bit/s. The {map} bytes of the map brought {cells} cells, {:.2} bits a cell, each change of a \
+                "<p>The budget at the end was {} bit/s. The {map} bytes of the map that arrived brought {cells} cells, {:.2} bits a cell, each change of a \
                  label included.</p>",
                 self.state.link.budget_bps,
                 map as f64 * 8.0 / cells as f64

@@ -8,7 +8,7 @@ use crate::state::VehicleState;
 use base64::Engine;
 use base64::prelude::BASE64_STANDARD;
 use scenecast_core::utc_text;
-use scenecast_messages::scenecast_msgs::Exemplar;
+use scenecast_messages::scenecast_msgs::{Exemplar, OrderStatus};
 use scenecast_protocol::directive::SlotId;
 use serde_json::json;
 use std::collections::BTreeSet;
@@ -58,13 +58,18 @@ impl Dive {
         let recorded = if self.settings.program.is_empty() { "an earlier scenecast" } else { &self.settings.program };
         let names: Vec<&str> = self.state.vehicles.iter().map(|vehicle| vehicle.name.as_str()).collect();
         let program = Escaped(scenecast_core::program());
+        let origin = self.state.mission.origin.map_or_else(String::new, |origin| {
+            format!(", at latitude {:.6}, longitude {:.6} (WGS 84)", origin.lat_deg, origin.lon_deg)
+        });
         let _ = writeln!(
             page,
             "<h2>How this was made</h2>\n<p>By {program} from the record of the surface, run {run}, which {} wrote from {begin} to {end}. \
              The map is the operator's: what had arrived by the acoustic link. Areas are counts of cells.</p>\n<h2>How to cite</h2>\n<p>Mission \u{201c}{mission}\u{201d}, vehicle {}, {begin} to {end}: map of the \
-             sea floor by an unsupervised scene model, run {run}, {program}.</p>\n</body></html>",
+             sea floor by an unsupervised scene model{}, run {run}, {program}.</p>\n</body></html>",
             Escaped(recorded),
             Escaped(&names.join(", ")),
+            [if self.settings.simulated { ", a rehearsal over a simulated sea floor" } else { "" }.to_owned(), origin]
+                .concat(),
         );
     }
 
@@ -331,14 +336,19 @@ fn orders(page: &mut String, dive: &Dive, state: &VehicleState, vehicle: &DiveVe
         let reason = if last.reason.is_empty() { String::new() } else { format!(": {}", last.reason) };
         let _ = writeln!(
             page,
-            "<tr><td>{} {version}</td><td>{}</td><td>{}</td><td class=\"t\">{}</td><td>{}{}</td><td class=\"n\">{:.1} s</td></tr>",
+            "<tr><td>{} {version}</td><td>{}</td><td>{}</td><td class=\"t\">{}</td><td>{}{}</td><td class=\"n\">{}</td></tr>",
             Escaped(slot),
             Escaped(&ordered),
             Escaped(&by),
             utc_text(first.given_s),
             words::status(last.status),
             Escaped(&reason),
-            ((last.at_s - first.given_s) * dive.state.mission.speed).max(0.0)
+            match last.status {
+                OrderStatus::APPLIED | OrderStatus::REFUSED | OrderStatus::WITHDRAWN => {
+                    format!("{:.1} s", ((last.at_s - first.given_s) * dive.state.mission.speed).max(0.0))
+                }
+                _ => "not known".to_owned(),
+            }
         );
     }
     *page += "</table>\n";

@@ -27,6 +27,7 @@ pub(super) fn summary(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) 
     sentences.push(found(state, vehicle));
     sentences.extend(extent(dive, state, vehicle));
     sentences.extend(arrived(state, vehicle));
+    sentences.extend(agreement(vehicle));
     sentences.push(orders(dive, state, vehicle));
     sentences.extend(link(dive, vehicle));
     for (from_s, to_s) in &dive.gaps_s {
@@ -35,8 +36,8 @@ pub(super) fn summary(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) 
     for ended_s in &dive.ended_s {
         sentences.push(format!("The surface ended at {} and was started again.", utc_text(*ended_s)));
     }
-    sentences.extend(silence(vehicle));
-    sentences.push(trouble(dive));
+    sentences.push(heard(dive, vehicle));
+    sentences.push(trouble(dive, vehicle));
     if let Some(damage) = &dive.damage {
         sentences.push(format!("Not all of the record could be read: {damage}."));
     }
@@ -48,6 +49,9 @@ fn link(dive: &Dive, vehicle: &DiveVehicle) -> Vec<String> {
     let mut sentences = Vec::new();
     let link = &dive.state.link;
     let lost = |direction: &LinkDirection| direction.loss * 100.0;
+    if link.up.frames == 0 {
+        return sentences;
+    }
     sentences.push(match link.up.lost + link.down.lost {
         0 => format!(
             "Of {} numbered frames from the vehicles and {} to them none was lost.",
@@ -74,17 +78,24 @@ fn link(dive: &Dive, vehicle: &DiveVehicle) -> Vec<String> {
 }
 
 /// How many events people should look at.
-fn trouble(dive: &Dive) -> String {
+fn trouble(dive: &Dive, vehicle: &DiveVehicle) -> String {
     // The first contact begins a run, too.
     let first_run = dive.events.iter().position(|(_, event)| event.text == "another run begins");
+    let is_survey = |text: &str| ["Survey", "surveying", "Done", "done"].iter().any(|mode| text.starts_with(mode));
+    // Where its own record is missing, the modes that it has reported stand for those on board.
+    let modes = match dive.events.iter().any(|(_, event)| event.source == "mode, on board") {
+        true => "mode, on board",
+        false => "mode",
+    };
     let is_trouble = |(number, (_, event)): &(usize, &(f64, Event))| match event.source.as_str() {
         "fault" => true,
-        "mode, on board" => !["Survey", "Done"].iter().any(|mode| event.text.starts_with(mode)),
+        source if source == modes => !is_survey(&event.text),
         "contact" => event.text != "received" && Some(*number) != first_run,
         _ => false,
     };
     match dive.events.iter().enumerate().filter(is_trouble).count() {
-        0 => "No fault and no silence was reported.".to_owned(),
+        0 if longest_silence(dive, vehicle).0 < SILENCE_S => "No fault and no silence was reported.".to_owned(),
+        0 => "No fault was reported.".to_owned(),
         1 => "One event is about a fault, a silence, a new run or a mode other than the survey; it is listed below."
             .to_owned(),
         n => format!(
@@ -93,12 +104,37 @@ fn trouble(dive: &Dive) -> String {
     }
 }
 
-/// The longest time without a frame from the vehicle, if people would call it a silence.
-fn silence(vehicle: &DiveVehicle) -> Option<String> {
-    let gap = |pair: &[f64]| if let [a, b] = pair { (b - a, *b) } else { (0.0, 0.0) };
-    let (longest_s, until_s) = vehicle.heard_s.windows(2).map(gap).max_by(|a, b| a.0.total_cmp(&b.0))?;
-    (longest_s >= SILENCE_S).then(|| {
-        format!("The longest time without a frame from it was {}, until {}.", duration(longest_s), utc_text(until_s))
+/// The longest time of the record without a frame from the vehicle, seconds, and its end.
+fn longest_silence(dive: &Dive, vehicle: &DiveVehicle) -> (f64, f64) {
+    let (begin, end) = dive.span_s;
+    let heard = || vehicle.heard_s.iter().copied();
+    let gaps = std::iter::once(begin).chain(heard()).zip(heard().chain([end])).map(|(a, b)| (b - a, b));
+    gaps.fold((0.0, begin), |longest, gap| if gap.0 > longest.0 { gap } else { longest })
+}
+
+/// When frames of the vehicle were heard.
+fn heard(dive: &Dive, vehicle: &DiveVehicle) -> String {
+    let (longest_s, until_s) = longest_silence(dive, vehicle);
+    let Some(last_s) = vehicle.heard_s.last() else { return "No frame from it was heard.".to_owned() };
+    format!(
+        "The last frame from it was heard at {}, {} before the end of the record; the longest time without one was {}, until {}.",
+        utc_text(*last_s),
+        duration(dive.span_s.1 - last_s),
+        duration(longest_s),
+        utc_text(until_s)
+    )
+}
+
+/// How far the operator's map was that of the vehicle, where its record says so.
+fn agreement(vehicle: &DiveVehicle) -> Option<String> {
+    let shares: Vec<f64> = vehicle.maps.iter().map(|maps| maps.agreement).filter(|share| share.is_finite()).collect();
+    let mean = shares.iter().sum::<f64>() / shares.len() as f64;
+    shares.last().map(|last| {
+        format!(
+            "Of the vehicle's cells {:.0} % had the same label on the operator's map at the end, and {:.0} % on the mean of the record.",
+            last * 100.0,
+            mean * 100.0
+        )
     })
 }
 
@@ -110,13 +146,13 @@ fn when(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -> String {
         false => String::new(),
     };
     format!(
-        "{} (address {}) was recorded from {} to {} (UTC), {} long{speed}, and reported its place {} times.",
+        "{} (address {}) was recorded from {} to {} (UTC), {} long{speed}, and reported its place {}.",
         state.name,
         state.id,
         utc_text(begin),
         utc_text(end),
         duration(end - begin),
-        vehicle.track.len()
+        counted(vehicle.track.len(), "time", "times")
     )
 }
 
@@ -131,8 +167,27 @@ fn extent(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -> Option<St
         format!(", or from latitude {south:.6} to {north:.6} and from longitude {west:.6} to {east:.6}")
     });
     Some(format!(
-        "The map reaches from {west:.1} to {east:.1} m east and from {south:.1} to {north:.1} m north{on_earth}."
+        "The map reaches from {west:.1} to {east:.1} m east and from {south:.1} to {north:.1} m north{on_earth}.{}",
+        unseen(dive, vehicle, shift)
     ))
+}
+
+/// How much of the configured area has cells; empty where none is configured.
+fn unseen(dive: &Dive, vehicle: &DiveVehicle, shift: (f64, f64)) -> String {
+    let all = if vehicle.settings.settings.is_empty() { &dive.settings } else { &vehicle.settings };
+    let corners = all.settings.get("survey.area_m").and_then(Value::as_array);
+    let corners: Vec<f64> = corners.into_iter().flatten().filter_map(Value::as_f64).collect();
+    let [west, south, east, north] = corners[..] else { return String::new() };
+    let middle = |index: i32, shift_m: f64| (f64::from(index) + 0.5) * vehicle.cell_m + shift_m;
+    let inside = vehicle.labels.iter().filter(|(cell, _)| {
+        let (x, y) = (middle(cell.x, shift.0), middle(cell.y, shift.1));
+        (west..=east).contains(&x) && (south..=north).contains(&y)
+    });
+    let share = inside.count() as f64 * vehicle.cell_m * vehicle.cell_m / ((east - west) * (north - south)).max(1e-9);
+    format!(
+        " Of the area of the survey, {west} to {east} m east and {south} to {north} m north, {:.1} % has cells.",
+        (share * 100.0).min(100.0)
+    )
 }
 
 /// How much of the vehicle's map has arrived.
@@ -179,14 +234,14 @@ fn equipment(dive: &Dive, vehicle: &DiveVehicle) -> String {
 }
 
 fn place(dive: &Dive, vehicle: &DiveVehicle) -> String {
-    let Some(last) = vehicle.track.last() else { return "It never reported a place.".to_owned() };
-    let depths = || vehicle.track.iter().map(|point| point.depth_m);
+    let Some(last) = vehicle.path().last() else { return "It never reported a place.".to_owned() };
+    let depths = || vehicle.path().iter().map(|point| point.depth_m);
     let (least, most) = (depths().fold(f64::INFINITY, f64::min), depths().fold(f64::NEG_INFINITY, f64::max));
     let origin = dive.state.mission.origin.map_or_else(
         || "the mission has no origin on the globe".to_owned(),
         |origin| format!("the origin is at latitude {:.6}, longitude {:.6} (WGS 84)", origin.lat_deg, origin.lon_deg),
     );
-    let begin = vehicle.track.first().map_or_else(String::new, |first| {
+    let begin = vehicle.path().first().map_or_else(String::new, |first| {
         format!(
             ", beginning {:.1} m east and {:.1} m north of the origin{}",
             first.east_m,

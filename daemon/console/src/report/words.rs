@@ -66,8 +66,14 @@ pub(super) fn content(book: &LabelBook, order: &Order) -> String {
             at.first().zip(at.get(1)).map_or_else(String::new, east_north)
         )),
         ("fence", Value::Array(corners)) => Some(format!("a fence with {}", outline(corners))),
+        ("keep_outs", Value::Array(outlines)) if outlines.is_empty() => Some("no area to stay out of".to_owned()),
         ("keep_outs", Value::Array(outlines)) => {
-            Some(counted(outlines.len(), "area to stay out of", "areas to stay out of"))
+            let corners = |area: &Value| area.as_array().map(|corners| outline(corners)).unwrap_or_default();
+            Some(format!(
+                "{} ({})",
+                counted(outlines.len(), "area to stay out of", "areas to stay out of"),
+                outlines.iter().map(corners).collect::<Vec<_>>().join("; ")
+            ))
         }
         ("areas", Value::Array(areas)) => {
             let weights: Vec<String> = areas.iter().map(|area| number(&area["weight"])).collect();
@@ -182,7 +188,7 @@ mod tests {
         assert_eq!(told(r#"{"labels": [4]}"#), "images of label 4");
         assert_eq!(told(r#"{"place": [46.5, -28]}"#), "place 46.5 m east, -28 m north");
         let fence = r#"{"fence": [[0, 0], [9.5, 0], [9, 9], [0, 0]], "keep_outs": [[[1, 1], [2, 1], [2, 2]]]}"#;
-        let words = "a fence with 3 corners in m east and north: (0, 0) (9.5, 0) (9, 9); 1 area to stay out of";
+        let words = "a fence with 3 corners in m east and north: (0, 0) (9.5, 0) (9, 9); 1 area to stay out of (3 corners in m east and north: (1, 1) (2, 1) (2, 2))";
         assert_eq!(told(fence), words, "a closed line repeats its first corner");
         assert_eq!(told(r#"{"areas": [{"outline": [], "weight": 0.5}]}"#), "1 area of weight 0.5");
         let limits = r#"{"depth_m": [5.0, 30.5], "on_silence": "return", "silence_s": 300.0, "time_s": null}"#;

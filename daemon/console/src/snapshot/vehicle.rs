@@ -92,6 +92,7 @@ fn orders(record: &VehicleRecord, view: &PeerView<'_>) -> VehicleOrders {
         utility: UtilityTerms {
             exploration: f64::from(record.utility.exploration) / 100.0,
             curiosity: f64::from(record.utility.curiosity) / 100.0,
+            weights: record.utility.weights.keys().map(|&label| (label, record.utility.weight(label))).collect(),
         },
         fence: record.fence.sent.as_ref().map(Into::into),
         limits: record.limits.sent.as_ref().map(Into::into),

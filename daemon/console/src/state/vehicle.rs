@@ -304,13 +304,16 @@ pub enum ReportedMode {
     Done,
 }
 
-/// The utility without the weights of labels.
+/// The utility; in the API without the weights of labels.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 pub struct UtilityTerms {
     /// Weight of unexplored cells, -1 to 1.
     pub exploration: f64,
     /// Weight of cells that the scene model explains badly, -1 to 1.
     pub curiosity: f64,
+    /// The weights of labels as they were sent, for the record; the API has those of labels on the map, at the labels.
+    #[serde(skip)]
+    pub weights: BTreeMap<u8, f64>,
 }
 
 /// The orders of a vehicle.
