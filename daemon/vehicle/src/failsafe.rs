@@ -91,7 +91,12 @@ pub struct Failsafe {
     last_received: Instant,
     now: Instant,
     fence: FenceWatch,
+    /// The limits are used up but for the return path.
+    is_used_up: bool,
 }
+
+/// A return path may become shorter on the way by as much, because it follows the lattice, metres: the vehicle goes on with it.
+const SHORTER_M: f64 = 10.0;
 
 /// The share of the limits that is kept in reserve for errors of the estimate.
 const RESERVE: f64 = 0.03;
@@ -110,6 +115,7 @@ impl Failsafe {
             last_received: now,
             now,
             fence: FenceWatch::default(),
+            is_used_up: false,
         }
     }
 
@@ -153,7 +159,7 @@ impl Failsafe {
 
     /// Puts limits in force; distance and time count from zero.
     pub fn set_limits(&mut self, limits: Limits) {
-        (self.limits, self.used_m, self.used_s) = (limits, 0.0, 0.0);
+        (self.limits, self.used_m, self.used_s, self.is_used_up) = (limits, 0.0, 0.0, false);
     }
 
     /// Whether the depth is outside its band.
@@ -210,7 +216,9 @@ impl Failsafe {
         if self.order.hold {
             return Some((Reaction::Hold, ModeReason::Order));
         }
-        (self.left_m() <= home_m.min(f64::MAX)).then(|| (Reaction::Return, self.tighter()))
+        let more_m = if self.is_used_up { SHORTER_M } else { 0.0 };
+        self.is_used_up = self.left_m() <= (home_m + more_m).min(f64::MAX);
+        self.is_used_up.then(|| (Reaction::Return, self.tighter()))
     }
 }
 
@@ -220,6 +228,21 @@ mod tests {
 
     fn at(s: f64) -> Instant {
         Instant::from_secs_f64(s)
+    }
+
+    #[test]
+    fn a_return_that_becomes_a_little_shorter_goes_on() {
+        let mut failsafe = Failsafe::new(FailsafePolicy::default(), at(0.0));
+        let limits = Limits { distance_m: Some(100), ..Limits::default() };
+        failsafe.set_limits(limits);
+        failsafe.handle_travel(60.0);
+        let is_returning = |failsafe: &mut Failsafe, home_m| failsafe.stop(home_m).is_some();
+        assert!(!is_returning(&mut failsafe, 36.0) && is_returning(&mut failsafe, 37.0));
+        assert!(is_returning(&mut failsafe, 35.0) && is_returning(&mut failsafe, 27.5));
+        assert!(!is_returning(&mut failsafe, 20.0), "the operator has moved the return point");
+        assert!(is_returning(&mut failsafe, 40.0));
+        failsafe.set_limits(limits);
+        assert!(!is_returning(&mut failsafe, 40.0));
     }
 
     #[test]
