@@ -44,10 +44,9 @@ def _both(folder):
 
 def _ends(paths):
     """The records of surface and vehicle among several; those of one end, which was started again, are joined."""
-    ends = {False: [], True: []}
-    for path in paths:
-        ends[_is_of_vehicle(Record(path))].append(path)
-    return tuple(Record(found) if found else None for found in (ends[False], ends[True]))
+    records = [_record(path) for path in paths]
+    ends = ([record for record in records if _is_of_vehicle(record) == is_of_vehicle] for is_of_vehicle in (False, True))
+    return tuple(Record([record.path for record in end]) if len(end) > 1 else next(iter(end), None) for end in ends)
 
 
 def _is_of_vehicle(record):

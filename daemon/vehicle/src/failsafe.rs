@@ -89,7 +89,7 @@ pub struct Failsafe {
     /// A breach until the operator's next order or fence, or a silence after which the vehicle has surfaced.
     pub latched: ModeReason,
     last_received: Instant,
-    now: Instant,
+    pub now: Instant,
     fence: FenceWatch,
     /// The limits are used up but for the return path.
     is_used_up: bool,

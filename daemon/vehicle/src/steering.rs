@@ -270,8 +270,8 @@ impl Steering {
         let found = self.paying_plan(from, map, utility, left_m, &present, at_end != AtEnd::Hold);
         let repeats = at_end == AtEnd::Repeat && self.choice.adapts() && found.0.is_empty();
         let begins = repeats && self.views.begin_round(self.grounds.lattice().step_m());
-        let areas = self.areas.clone();
-        if begins && self.forget_looks(map, Interest { utility, areas: &areas }) {
+        let interest = Interest { utility, areas: &self.areas };
+        if begins && self.known.forget_looks((&self.window, self.map_origin), map, interest) {
             self.known.begin_round();
             // The next round begins elsewhere.
             self.views.last().into_iter().for_each(|at| self.exhaust_around(at));
@@ -294,17 +294,9 @@ impl Steering {
         let is_raised = |(label, weight): &(u8, i8)| *weight > before.0.get(label).copied().unwrap_or(0).max(0);
         let raised = Utility { weights: now.0.into_iter().filter(is_raised).collect(), ..Utility::default() };
         let areas: Vec<WeightedArea> = now.1.into_iter().filter(|area| !before.1.contains(area)).collect();
-        self.forget_looks(map, Interest { utility: &raised, areas: &areas });
+        let interest = Interest { utility: &raised, areas: &areas };
+        self.known.forget_looks((&self.window, self.map_origin), map, interest);
         self.replan();
-    }
-
-    /// Forgets the looks at favoured labels and in favoured areas; returns whether there were any.
-    fn forget_looks(&mut self, map: &LabelGrid, interest: Interest<'_>) -> bool {
-        let Self { known, window, map_origin, .. } = self;
-        known.forget_looks(map, |cell, label| {
-            let (x, y) = window.centre_of(cell);
-            interest.utility.weight(label) > 0.0 || interest.weight_of_place((x + map_origin.0, y + map_origin.1)) > 0.0
-        })
     }
 
     /// The plan that pays by the operator's interest or, if `may_explore`, by exploration; empty if none does.

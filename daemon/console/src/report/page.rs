@@ -58,6 +58,7 @@ impl Dive {
         let recorded = if self.settings.program.is_empty() { "an earlier scenecast" } else { &self.settings.program };
         let names: Vec<&str> = self.state.vehicles.iter().map(|vehicle| vehicle.name.as_str()).collect();
         let program = Escaped(scenecast_core::program());
+        let rehearsal = if self.settings.simulated { ", a rehearsal over a simulated sea floor" } else { "" };
         let origin = self.state.mission.origin.map_or_else(String::new, |origin| {
             format!(", at latitude {:.6}, longitude {:.6} (WGS 84)", origin.lat_deg, origin.lon_deg)
         });
@@ -65,11 +66,9 @@ impl Dive {
             page,
             "<h2>How this was made</h2>\n<p>By {program} from the record of the surface, run {run}, which {} wrote from {begin} to {end}. \
              The map is the operator's: what had arrived by the acoustic link. Areas are counts of cells.</p>\n<h2>How to cite</h2>\n<p>Mission \u{201c}{mission}\u{201d}, vehicle {}, {begin} to {end}: map of the \
-             sea floor by an unsupervised scene model{}, run {run}, {program}.</p>\n</body></html>",
+             sea floor by an unsupervised scene model{rehearsal}{origin}, run {run}, {program}.</p>\n</body></html>",
             Escaped(recorded),
             Escaped(&names.join(", ")),
-            [if self.settings.simulated { ", a rehearsal over a simulated sea floor" } else { "" }.to_owned(), origin]
-                .concat(),
         );
     }
 

@@ -1,6 +1,6 @@
 //! The summary of a dive in sentences.
 
-use super::dive::{Dive, DiveVehicle, OrderStep};
+use super::dive::{Dive, DiveVehicle, OrderStep, SettingsRecord};
 use super::words::{area, counted, duration, interval, lat_lon, on_earth};
 use crate::state::{LinkDirection, VehicleState};
 use scenecast_core::utc_text;
@@ -36,8 +36,9 @@ pub(super) fn summary(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) 
     for ended_s in &dive.ended_s {
         sentences.push(format!("The surface ended at {} and was started again.", utc_text(*ended_s)));
     }
-    sentences.push(heard(dive, vehicle));
-    sentences.push(trouble(dive, vehicle));
+    let silence = longest_silence(dive, vehicle);
+    sentences.push(heard(dive, vehicle, silence));
+    sentences.push(trouble(dive, silence.0));
     if let Some(damage) = &dive.damage {
         sentences.push(format!("Not all of the record could be read: {damage}."));
     }
@@ -49,22 +50,21 @@ fn link(dive: &Dive, vehicle: &DiveVehicle) -> Vec<String> {
     let mut sentences = Vec::new();
     let link = &dive.state.link;
     let lost = |direction: &LinkDirection| direction.loss * 100.0;
-    if link.up.frames == 0 {
-        return sentences;
-    }
-    sentences.push(match link.up.lost + link.down.lost {
-        0 => format!(
+    sentences.extend(match link.up.lost + link.down.lost {
+        // Of the others nobody knows how many there were.
+        _ if link.up.frames == 0 => None,
+        0 => Some(format!(
             "Of {} numbered frames from the vehicles and {} to them none was lost.",
             link.up.frames, link.down.frames
-        ),
-        _ => format!(
+        )),
+        _ => Some(format!(
             "Of {} numbered frames from the vehicles {:.1} % arrived in no copy over the whole mission, of {} to them {:.1} %; what they \
              carried was sent again.",
             link.up.frames,
             lost(&link.up),
             link.down.frames,
             lost(&link.down)
-        ),
+        )),
     });
     if vehicle.sent > 0 && dive.state.vehicles.len() == 1 {
         let [_, received, dropped] = dive.frames;
@@ -78,7 +78,7 @@ fn link(dive: &Dive, vehicle: &DiveVehicle) -> Vec<String> {
 }
 
 /// How many events people should look at.
-fn trouble(dive: &Dive, vehicle: &DiveVehicle) -> String {
+fn trouble(dive: &Dive, longest_silence_s: f64) -> String {
     // The first contact begins a run, too.
     let first_run = dive.events.iter().position(|(_, event)| event.text == "another run begins");
     let is_survey = |text: &str| ["Survey", "surveying", "Done", "done"].iter().any(|mode| text.starts_with(mode));
@@ -94,7 +94,7 @@ fn trouble(dive: &Dive, vehicle: &DiveVehicle) -> String {
         _ => false,
     };
     match dive.events.iter().enumerate().filter(is_trouble).count() {
-        0 if longest_silence(dive, vehicle).0 < SILENCE_S => "No fault and no silence was reported.".to_owned(),
+        0 if longest_silence_s < SILENCE_S => "No fault and no silence was reported.".to_owned(),
         0 => "No fault was reported.".to_owned(),
         1 => "One event is about a fault, a silence, a new run or a mode other than the survey; it is listed below."
             .to_owned(),
@@ -113,8 +113,7 @@ fn longest_silence(dive: &Dive, vehicle: &DiveVehicle) -> (f64, f64) {
 }
 
 /// When frames of the vehicle were heard.
-fn heard(dive: &Dive, vehicle: &DiveVehicle) -> String {
-    let (longest_s, until_s) = longest_silence(dive, vehicle);
+fn heard(dive: &Dive, vehicle: &DiveVehicle, (longest_s, until_s): (f64, f64)) -> String {
     let Some(last_s) = vehicle.heard_s.last() else { return "No frame from it was heard.".to_owned() };
     format!(
         "The last frame from it was heard at {}, {} before the end of the record; the longest time without one was {}, until {}.",
@@ -174,10 +173,9 @@ fn extent(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -> Option<St
 
 /// How much of the configured area has cells; empty where none is configured.
 fn unseen(dive: &Dive, vehicle: &DiveVehicle, shift: (f64, f64)) -> String {
-    let all = if vehicle.settings.settings.is_empty() { &dive.settings } else { &vehicle.settings };
-    let corners = all.settings.get("survey.area_m").and_then(Value::as_array);
-    let corners: Vec<f64> = corners.into_iter().flatten().filter_map(Value::as_f64).collect();
-    let [west, south, east, north] = corners[..] else { return String::new() };
+    let area = ran_with(dive, vehicle).settings.get("survey.area_m");
+    let corners = area.and_then(|area| serde_json::from_value::<[f64; 4]>(area.clone()).ok());
+    let Some([west, south, east, north]) = corners else { return String::new() };
     let middle = |index: i32, shift_m: f64| (f64::from(index) + 0.5) * vehicle.cell_m + shift_m;
     let inside = vehicle.labels.iter().filter(|(cell, _)| {
         let (x, y) = (middle(cell.x, shift.0), middle(cell.y, shift.1));
@@ -220,9 +218,14 @@ fn is_coarse(vehicle: &DiveVehicle) -> bool {
     last.or_else(configured).is_some_and(|cells| cells == "coarse")
 }
 
+/// What the vehicle ran with, by its own record, or else the surface.
+fn ran_with<'a>(dive: &'a Dive, vehicle: &'a DiveVehicle) -> &'a SettingsRecord {
+    if vehicle.settings.settings.is_empty() { &dive.settings } else { &vehicle.settings }
+}
+
 /// How the vehicle looked at the sea floor.
 fn equipment(dive: &Dive, vehicle: &DiveVehicle) -> String {
-    let all = if vehicle.settings.settings.is_empty() { &dive.settings } else { &vehicle.settings };
+    let all = ran_with(dive, vehicle);
     let set = |key: &str, default: f64| all.settings.get(key).and_then(Value::as_f64).unwrap_or(default);
     let defaults = scenecast_config::Config::default();
     format!(

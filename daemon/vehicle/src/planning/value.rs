@@ -38,9 +38,18 @@ impl Knowledge {
         self.looks.set(cell, u8::MAX);
     }
 
-    /// Forgets the looks at the favoured cells; returns whether there are any.
-    pub fn forget_looks(&mut self, map: &LabelGrid, is_favoured: impl Fn(Cell, u8) -> bool) -> bool {
-        let favoured = map.iter().filter(|&(cell, label)| is_favoured(cell, label));
+    /// Forgets the looks at favoured labels and in favoured areas; returns whether there were any. `map_origin` is the origin of the
+    /// map frame in the world frame, metres.
+    pub fn forget_looks(
+        &mut self,
+        (window, map_origin): (&CellWindow, Point),
+        map: &LabelGrid,
+        interest: Interest<'_>,
+    ) -> bool {
+        let favoured = map.iter().filter(|&(cell, label)| {
+            let (x, y) = window.centre_of(cell);
+            interest.utility.weight(label) > 0.0 || interest.weight_of_place((x + map_origin.0, y + map_origin.1)) > 0.0
+        });
         let favoured: Vec<Cell> = favoured.map(|(cell, _)| cell).collect();
         for &cell in &favoured {
             self.looks.set(cell, 0);

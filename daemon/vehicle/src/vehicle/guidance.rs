@@ -39,14 +39,16 @@ pub(super) struct Situation<'a> {
     pub(super) utility: Option<&'a Utility>,
 }
 
-/// How near the vehicle has come to its waypoint.
+/// The way to a waypoint.
 #[derive(Debug, Clone, Copy)]
-struct Approach {
+struct Leg {
+    to: MapPoint,
+    /// How near to it the vehicle has come, and since when.
     nearest_m: f64,
     since: Instant,
 }
 
-impl Approach {
+impl Leg {
     /// Autopilots may end a leg this far from its end, metres.
     const NEAR_M: f64 = 2.0;
     /// A vehicle that comes no nearer for this time has ended its leg.
@@ -54,16 +56,17 @@ impl Approach {
     /// What a position at rest may come nearer by itself, metres.
     const NOISE_M: f64 = 0.1;
 
-    fn new(distance_m: f64, now: Instant) -> Self {
-        Self { nearest_m: distance_m, since: now }
+    fn new(to: MapPoint, at: MapPoint, now: Instant) -> Self {
+        Self { to, nearest_m: to.distance_m(at), since: now }
     }
 
-    fn handle(&mut self, distance_m: f64, now: Instant) {
-        if distance_m < self.nearest_m - Self::NOISE_M {
-            *self = Self::new(distance_m, now);
+    fn handle_position(&mut self, at: MapPoint, now: Instant) {
+        if self.to.distance_m(at) < self.nearest_m - Self::NOISE_M {
+            *self = Self::new(self.to, at, now);
         }
     }
 
+    /// Whether the autopilot has ended the leg some way from the waypoint.
     fn has_ended(&self, now: Instant) -> bool {
         self.nearest_m < Self::NEAR_M && now.since(self.since) >= Self::STOPPED
     }
@@ -77,9 +80,7 @@ pub(super) struct Guidance {
     steering: Steering,
     failsafe: Failsafe,
     activity: Activity,
-    waypoint: Option<MapPoint>,
-    approach: Option<Approach>,
-    now: Instant,
+    leg: Option<Leg>,
     /// The plan after the waypoint.
     path: PlannedPath,
     is_finished: bool,
@@ -95,8 +96,7 @@ impl Guidance {
         now: Instant,
     ) -> Self {
         let (failsafe, activity, path) = (Failsafe::new(policy, now), Activity::default(), PlannedPath::default());
-        let mut guidance =
-            Self { steering, failsafe, activity, waypoint: None, approach: None, now, path, is_finished: false };
+        let mut guidance = Self { steering, failsafe, activity, leg: None, path, is_finished: false };
         let failsafe = &mut guidance.failsafe;
         failsafe.order = Constraints { hold: durable.hold, abort: durable.abort };
         if let Some(limits) = Limits::from_bytes(&durable.limits) {
@@ -123,7 +123,7 @@ impl Guidance {
     }
 
     pub(super) fn waypoint(&self) -> Option<MapPoint> {
-        self.waypoint
+        self.leg.map(|leg| leg.to)
     }
 
     /// The purpose of the plan while the vehicle surveys by an adaptive planner or goes to a destination.
@@ -240,7 +240,7 @@ impl Guidance {
     }
 
     fn drop_path(&mut self) {
-        (self.waypoint, self.approach, self.path) = (None, None, PlannedPath::default());
+        (self.leg, self.path) = (None, PlannedPath::default());
     }
 
     /// Ends the survey for good: from now on the vehicle holds.
@@ -254,7 +254,6 @@ impl Guidance {
     /// Counts time against the limits. Returns whether the survey goes on.
     pub(super) fn handle_time(&mut self, now: Instant) -> bool {
         self.failsafe.handle_time(now);
-        self.now = now;
         !self.is_finished
     }
 
@@ -262,9 +261,8 @@ impl Guidance {
     pub(super) fn steer(&mut self, known: &Situation<'_>) -> Option<VehicleOutput> {
         let navigator = known.navigator;
         let at = self.follow_placement(navigator);
-        if let Some(waypoint) = self.waypoint {
-            let distance_m = waypoint.distance_m(navigator.position());
-            self.approach.get_or_insert(Approach::new(distance_m, self.now)).handle(distance_m, self.now);
+        if let Some(leg) = &mut self.leg {
+            leg.handle_position(navigator.position(), self.failsafe.now);
         }
         self.watch(at, navigator.depth_m());
         let return_m = if self.is_limited() { self.steering.return_path_m(at) } else { 0.0 };
@@ -299,38 +297,35 @@ impl Guidance {
     /// Whether the vehicle is on its way in `mode` and has not reached its waypoint.
     fn is_under_way(&self, mode: VehicleMode, navigator: &Navigator) -> bool {
         let is_moving = self.activity.motion == Motion::Going && self.activity.mode == mode;
-        let is_reached = |w: MapPoint| w.distance_m(navigator.position()) < self.steering.arrival_m();
-        is_moving && self.waypoint.is_some_and(|w| !is_reached(w)) && !self.has_stopped_beside()
+        let is_reached = |leg: &Leg| leg.to.distance_m(navigator.position()) < self.steering.arrival_m();
+        is_moving && self.leg.is_some_and(|leg| !is_reached(&leg) && !leg.has_ended(self.failsafe.now))
     }
 
-    /// Whether the autopilot has ended the leg some way from the waypoint.
-    fn has_stopped_beside(&self) -> bool {
-        self.approach.is_some_and(|approach| approach.has_ended(self.now))
-    }
-
-    /// Where the next leg is planned from: the waypoint, where the autopilot has stopped beside it.
-    fn place_reached(&self, at: Point, navigator: &Navigator) -> Point {
-        let waypoint = self.waypoint.filter(|_| self.has_stopped_beside());
-        waypoint.map_or(at, |waypoint| navigator.to_world(waypoint).xy())
-    }
-
-    /// The next course of the survey from a place.
-    fn next_course(&mut self, from: Point, known: &Situation<'_>) -> Course {
-        let left_m = self.failsafe.left_m();
-        let detour = self.steering.next_detour(from, left_m);
-        detour.unwrap_or_else(|| self.steering.next(from, known.map, known.utility, left_m))
+    /// The `next` course: from the waypoint, where the autopilot has stopped beside it and the new leg is allowed, or else from here.
+    fn next_course(
+        &mut self,
+        at: Point,
+        navigator: &Navigator,
+        next: impl Fn(&mut Steering, Point) -> Course,
+    ) -> Course {
+        if let Some(leg) = self.leg.filter(|leg| leg.has_ended(self.failsafe.now)) {
+            let course = next(&mut self.steering, navigator.to_world(leg.to).xy());
+            if !matches!(course, Course::Go(to) if !self.steering.bounds().allows_leg(at, to)) {
+                return course;
+            }
+        }
+        next(&mut self.steering, at)
     }
 
     fn survey(&mut self, at: Point, known: &Situation<'_>) -> Option<VehicleOutput> {
         if self.is_under_way(VehicleMode::Survey, known.navigator) {
             return None;
         }
-        let from = self.place_reached(at, known.navigator);
-        let course = match self.next_course(from, known) {
-            Course::Go(to) if from != at && !self.steering.bounds().allows_leg(at, to) => self.next_course(at, known),
-            course => course,
-        };
         let left_m = self.failsafe.left_m();
+        let course = self.next_course(at, known.navigator, |steering, from| {
+            let detour = steering.next_detour(from, left_m);
+            detour.unwrap_or_else(|| steering.next(from, known.map, known.utility, left_m))
+        });
         match course {
             Course::Go(to) => {
                 let path = match self.steering.has_destination() {
@@ -349,12 +344,7 @@ impl Guidance {
         if self.is_under_way(VehicleMode::Return, navigator) {
             return None;
         }
-        let from = self.place_reached(at, navigator);
-        let course = match self.steering.next_return(from) {
-            Course::Go(to) if from != at && !self.steering.bounds().allows_leg(at, to) => self.steering.next_return(at),
-            course => course,
-        };
-        match course {
+        match self.next_course(at, navigator, Steering::next_return) {
             Course::Go(to) => {
                 Some(self.go((to, self.steering.path_after_return(to)), VehicleMode::Return, why, navigator))
             }
@@ -375,7 +365,7 @@ impl Guidance {
         let to_map = |(east_m, north_m)| navigator.to_map(WorldPoint { east_m, north_m });
         let waypoint = to_map(to);
         let points = path.points.into_iter().map(to_map).collect();
-        (self.waypoint, self.approach) = (Some(waypoint), None);
+        self.leg = Some(Leg::new(waypoint, navigator.position(), self.failsafe.now));
         self.path = PlannedPath { points, continues: path.continues };
         VehicleOutput::Waypoint(waypoint)
     }
