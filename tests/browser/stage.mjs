@@ -150,7 +150,13 @@ export class Stage {
     assert.ok(!this.limits || ms < limit, `${text}: over ${limit} ms`);
   }
 
+  /** Once the server has answered every order of this page so far. */
+  answered() {
+    return Promise.allSettled((this.orders ?? []).map((request) => request.response()));
+  }
+
   async get(path) {
+    await this.answered();
     const response = await fetch(`${this.url}${API}${path}`);
     assert.equal(response.status, 200, path);
     return response.json();
@@ -168,6 +174,7 @@ export class Stage {
   }
 
   async steer(order) {
+    await this.answered();
     const response = await fetch(`${this.url}/mock`, { method: "POST", body: JSON.stringify(order) });
     assert.equal(response.status, 200);
     return response.json();
@@ -220,7 +227,7 @@ export class Stage {
   /** Ends the story once the mock has answered every order: one under way would reach the mission of the next story. The page stays open for
    *  the next story if this one passed and changed nothing of the page that would last. */
   async close(kept, passed) {
-    await Promise.allSettled((this.orders ?? []).map((request) => request.response()));
+    await this.answered();
     if (!passed || this.isAlone || this.page.isClosed()) {
       if (kept.context === this.context) Object.assign(kept, { context: null, page: null });
       await this.context?.close();
