@@ -2,6 +2,7 @@
 
 use scenecast_tests::{Process, free_port, http, run, scratch, wait_until};
 use serde_json::Value;
+use std::io::Write;
 use std::path::Path;
 
 const ORDER: &str = "Content-Type: application/json\r\nX-Scenecast: 1\r\n";
@@ -128,4 +129,31 @@ fn assert_both_name(page: u16, dir: &Path, at_surface: &str, at_vehicle: &str) {
     wait_until(at_surface, || said().as_deref() == Some(at_surface));
     let log = || std::fs::read_to_string(dir.join("auv.log")).unwrap_or_default();
     wait_until(at_vehicle, || log().contains(at_vehicle));
+}
+
+/// A terminal may close while a process still starts: here it waits for its key from a pipe.
+#[cfg(unix)]
+#[test]
+fn a_hang_up_during_the_start_ends_neither_end() {
+    let dir = scratch("hang-up-at-start");
+    let key = std::fs::read(key(&dir, "mission.key")).unwrap();
+    let (modem, page) = (free_port(), free_port());
+    let surface = format!("[modem]\nlisten = \"127.0.0.1:{modem}\"\n[console]\nlisten = \"127.0.0.1:{page}\"\n");
+    let vehicle = format!("[survey]\narea_m = [0, 0, 20, 20]\n[modem]\nconnect = \"127.0.0.1:{modem}\"\n");
+    for (end, text) in [("asv", surface), ("auv", vehicle)] {
+        let (pipe, state_dir) = (dir.join(format!("{end}.pipe")), dir.join(end));
+        assert!(std::process::Command::new("mkfifo").args(["-m", "600"]).arg(&pipe).status().unwrap().success());
+        let file = dir.join(format!("{end}.toml"));
+        let runtime = format!("[runtime]\nstate_dir = \"{}\"\n", state_dir.display());
+        let link = format!("[link]\nkey_file = \"{}\"\n", pipe.display());
+        std::fs::write(&file, text + &runtime + &link).unwrap();
+        let mut process = Process::start(&[end, "--config", file.to_str().unwrap()]);
+        // This opens only once the process reads.
+        let mut writer = std::fs::File::options().write(true).open(&pipe).unwrap();
+        process.hang_up();
+        writer.write_all(&key).unwrap();
+        drop(writer);
+        wait_until(&format!("{end} has a record"), || state_dir.join("records").is_dir());
+        assert_eq!(process.interrupt(), Some(0), "{end}");
+    }
 }

@@ -183,3 +183,27 @@ pub fn place_on_earth(mission: &MissionState, place: &Place, sigma_m: f64) -> Op
     let on_earth = TangentPlane::new(origin).to_place(east, north);
     Some(fix(on_earth, sigma_m, header(place.stamp.clone(), WORLD_FRAME)))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn weights_are_recorded_as_they_were_sent_whatever_is_on_the_map() {
+        let mut vehicle = VehicleState::default();
+        vehicle.orders.utility.weights = [(9, 0.5)].into();
+        let slot = OrderProgress {
+            slot: SlotId::Utility.name().to_owned(),
+            name: SlotId::Utility.name().to_owned(),
+            version: 1,
+            state: OrderStatus::Applied,
+            reason: None,
+            asks: false,
+            issued_s: 1.0,
+            changed_s: 2.0,
+        };
+        let order = order(&MissionState::default(), &vehicle, &slot, String::new(), &Stamps::default()).unwrap();
+        let content: serde_json::Value = serde_json::from_str(&order.content).unwrap();
+        assert_eq!(content["weights"], json!({ "9": 0.5 }));
+    }
+}

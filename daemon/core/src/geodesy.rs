@@ -169,6 +169,13 @@ impl Area {
     pub fn contains(&self, (x, y): (f64, f64)) -> bool {
         (self.west..=self.east).contains(&x) && (self.south..=self.north).contains(&y)
     }
+
+    /// The share of the area that cells of `cell_m` metres with these middles cover, 0 to 1.
+    pub fn covered(&self, middles: impl Iterator<Item = (f64, f64)>, cell_m: f64) -> f64 {
+        let (width_m, height_m) = self.size_m();
+        let inside = middles.filter(|&middle| self.contains(middle)).count();
+        (inside as f64 * cell_m * cell_m / (width_m * height_m).max(1e-9)).min(1.0)
+    }
 }
 
 /// The fence with these parts.

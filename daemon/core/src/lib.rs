@@ -13,6 +13,7 @@ mod output;
 pub mod palette;
 mod principal;
 mod program;
+mod reminder;
 pub mod tuning_table;
 mod usbl_line;
 mod utc;
@@ -26,5 +27,6 @@ pub use modem_facts::{
 pub use output::{UserError, printable, write_error, write_or_exit};
 pub use principal::{ClientName, Giver, Principal, Role};
 pub use program::{program, set_program};
+pub use reminder::Reminder;
 pub use usbl_line::{ModemAddress, UsblLine};
 pub use utc::utc_text;

@@ -292,11 +292,9 @@ impl Mission {
     /// The share of the survey's area that the vehicle's map shows, 0 to 1.
     pub fn area_seen(&self) -> Option<f64> {
         let (area, cell_m) = (self.camera.survey_area(&self.config).ok()?, cell_m(&self.config));
-        let (width_m, height_m) = area.size_m();
         let middle = |cell: Cell| MapPoint::new((f64::from(cell.x) + 0.5) * cell_m, (f64::from(cell.y) + 0.5) * cell_m);
         let place = |cell: Cell| self.vehicle().navigator().to_world(middle(cell)).xy();
-        let seen = self.vehicle().cells().filter(|&(cell, _)| area.contains(place(cell))).count();
-        Some((seen as f64 * cell_m * cell_m / (width_m * height_m)).min(1.0))
+        Some(area.covered(self.vehicle().cells().map(|(cell, _)| place(cell)), cell_m))
     }
 
     /// Explored cells, each weighted by its label's value in the operator's last utility.

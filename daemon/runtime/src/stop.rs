@@ -8,10 +8,13 @@ use tokio::signal::unix::{Signal, SignalKind, signal};
 
 /// Catches Ctrl-C and SIGTERM from its creation on, so that none is lost while the process does other work.
 pub struct Stop {
+    /// For a process that ends when its terminal is lost, too.
     #[cfg(unix)]
-    interrupt: tokio::signal::unix::Signal,
+    hang_up: Option<Signal>,
     #[cfg(unix)]
-    terminate: tokio::signal::unix::Signal,
+    interrupt: Signal,
+    #[cfg(unix)]
+    terminate: Signal,
     #[cfg(not(unix))]
     interrupt: tokio::signal::windows::CtrlC,
 }
@@ -19,12 +22,23 @@ pub struct Stop {
 impl Stop {
     #[cfg(unix)]
     pub fn new() -> Result<Self, UserError> {
-        use tokio::signal::unix::{SignalKind, signal};
         let error = |e| UserError::Failed(format!("the signals to end: {e}"));
         Ok(Self {
+            hang_up: None,
             interrupt: signal(SignalKind::interrupt()).map_err(error)?,
             terminate: signal(SignalKind::terminate()).map_err(error)?,
         })
+    }
+
+    /// The same, and SIGHUP: for a process that belongs to its terminal.
+    #[cfg(unix)]
+    pub fn or_hang_up() -> Result<Self, UserError> {
+        Ok(Self { hang_up: Some(hang_ups()?), ..Self::new()? })
+    }
+
+    #[cfg(not(unix))]
+    pub fn or_hang_up() -> Result<Self, UserError> {
+        Self::new()
     }
 
     #[cfg(not(unix))]
@@ -39,9 +53,34 @@ impl Stop {
         tokio::select! {
             _ = self.interrupt.recv() => {}
             _ = self.terminate.recv() => {}
+            _ = hang_up(self.hang_up.as_mut()) => {}
         }
         #[cfg(not(unix))]
         let _ = self.interrupt.recv().await;
+    }
+}
+
+#[cfg(unix)]
+fn hang_ups() -> Result<Signal, UserError> {
+    signal(SignalKind::hangup()).map_err(|e| UserError::Failed(format!("SIGHUP: {e}")))
+}
+
+#[cfg(unix)]
+async fn hang_up(signals: Option<&mut Signal>) {
+    if let Some(signals) = signals
+        && signals.recv().await.is_some()
+    {
+        return;
+    }
+    std::future::pending().await
+}
+
+/// Holds SIGHUP back, which would end the process, until this thread has made a [`Reload`]. Threads begun until then never get it.
+pub(super) fn hold_hang_up() {
+    #[cfg(unix)]
+    {
+        // A valid set is always taken.
+        let _ = nix::sys::signal::SigSet::from(nix::sys::signal::Signal::SIGHUP).thread_block();
     }
 }
 
@@ -64,7 +103,8 @@ pub(super) struct Reload {
 impl Reload {
     #[cfg(unix)]
     pub(super) fn new(load: Load) -> Result<Self, UserError> {
-        let hang_ups = signal(SignalKind::hangup()).map_err(|e| UserError::Failed(format!("SIGHUP: {e}")))?;
+        let hang_ups = hang_ups()?;
+        let _ = nix::sys::signal::SigSet::from(nix::sys::signal::Signal::SIGHUP).thread_unblock();
         Ok(Self { load, hang_ups })
     }
 
@@ -76,20 +116,15 @@ impl Reload {
     /// Waits for a SIGHUP and returns the new configuration; a file that cannot be read is logged and ignored.
     pub(super) async fn next(&mut self) -> Config {
         loop {
-            self.hang_up().await;
+            #[cfg(unix)]
+            hang_up(Some(&mut self.hang_ups)).await;
+            #[cfg(not(unix))]
+            std::future::pending::<()>().await;
             match (self.load)() {
                 Ok(config) => return config,
                 Err(error) => tracing::error!("{error}; no setting is changed"),
             }
         }
-    }
-
-    async fn hang_up(&mut self) {
-        #[cfg(unix)]
-        if self.hang_ups.recv().await.is_some() {
-            return;
-        }
-        std::future::pending().await
     }
 }
 

@@ -7,7 +7,7 @@ use super::modem::{self, ModemPort, warn_without_key};
 use super::pilot::{self, PilotPort, SimulatedAutopilot};
 use super::record::{SurfaceRecord, unix_nanos};
 use super::ros2::SurfaceRos2;
-use super::stop::{Load, Reload, Stop, configured_budget, keep_private};
+use super::stop::{Load, Reload, Stop, configured_budget, hold_hang_up, keep_private};
 use super::store::{ArchivedFile, SurfaceFiles};
 use crate::port::FromPort;
 use scenecast_config::Config;
@@ -48,6 +48,7 @@ pub fn host_name() -> String {
 
 /// Runs the surface until it is interrupted; on SIGHUP it calls `load` for a new budget and new shares.
 pub fn run_surface(load: Load, simulated: Option<SimulatedAutopilot>) -> Result<(), UserError> {
+    hold_hang_up();
     super::block_on(async move {
         let mut config = load()?;
         name_surface(&mut config);

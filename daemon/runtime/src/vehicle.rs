@@ -11,7 +11,7 @@ use super::pilot::{self, PilotPort, SimulatedAutopilot};
 use super::record::VehicleRecord;
 use super::restore::{Start, start};
 use super::ros2::{RosSensors, VehicleRos2};
-use super::stop::{Load, Reload, Stop, configured_budget, keep_private};
+use super::stop::{Load, Reload, Stop, configured_budget, hold_hang_up, keep_private};
 use crate::camera::{Camera, CameraFrame, LiveCamera, RecordedCamera};
 use crate::port::FromPort;
 use scenecast_config::{AutopilotKind, Config, LabelSource, NavigationSource, survey_depth_m};
@@ -31,6 +31,7 @@ const RESTART_S: f64 = 2.0;
 
 /// Runs the vehicle until it is interrupted; on SIGHUP it calls `load` for a new budget and new shares.
 pub fn run_vehicle(load: Load, simulated: Option<SimulatedAutopilot>) -> Result<(), UserError> {
+    hold_hang_up();
     super::block_on(async move {
         let config = load()?;
         keep_private();

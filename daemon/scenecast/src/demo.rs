@@ -34,7 +34,7 @@ const PUBLISH_INTERVAL: Duration = Duration::from_secs(1);
 pub fn run_demo(mission: Mission, speed: f64, port: Option<u16>) -> Result<(), UserError> {
     keep_private();
     block_on(async move {
-        let stop = Stop::new()?;
+        let stop = Stop::or_hang_up()?;
         let console = match port {
             Some(port) => {
                 let listener = bind(&format!("127.0.0.1:{port}"), "--port", Vec::new(), "").await?;

@@ -40,6 +40,11 @@ impl VehicleMode {
         }
     }
 
+    /// The mode with this [`name`](Self::name).
+    pub fn from_name(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|mode| mode.name() == name)
+    }
+
     fn code(self) -> u8 {
         Self::ALL.iter().position(|&m| m == self).unwrap_or_default() as u8
     }

@@ -3,6 +3,7 @@
 use super::recording::Known;
 use crate::state::{MapLabel, PlannedPath, ReportedMode, ReportedPose, StatusReport, VehicleState};
 use scenecast_messages::geometry_msgs::PoseWithCovarianceStamped;
+use scenecast_protocol::wire::VehicleMode;
 use std::collections::BTreeMap;
 
 /// Places of a track at most, and seconds between two of them.
@@ -64,17 +65,9 @@ fn reported(message: &PoseWithCovarianceStamped) -> ReportedPose {
 fn mode(known: &Known, nanos: u64) -> (ReportedMode, String) {
     let upto = known.events.partition_point(|(at, _)| *at <= nanos);
     let last = known.events[..upto].iter().rev().find(|(_, event)| event.source == "mode");
-    let text = last.map_or("", |(_, event)| event.text.as_str());
-    let (name, reason) = text.split_once(": ").unwrap_or((text, ""));
-    let (mode, activity) = match name {
-        "Hold" => (ReportedMode::Hold, "holding"),
-        "Return" => (ReportedMode::Return, "returning"),
-        "Surface" => (ReportedMode::Surface, "surfacing"),
-        "Abort" => (ReportedMode::Abort, "aborting"),
-        "Done" => (ReportedMode::Done, "survey complete"),
-        _ => (ReportedMode::Survey, "surveying"),
-    };
-    (mode, if reason.is_empty() { activity.to_owned() } else { format!("{activity}: {reason}") })
+    let text = last.map_or(VehicleMode::default().name(), |(_, event)| &event.text);
+    let name = text.split_once(": ").map_or(text, |(name, _)| name);
+    (VehicleMode::from_name(name).unwrap_or_default().into(), text.to_owned())
 }
 
 /// Shows the labels of a map with these numbers of cells; of what else is known of them, nothing changes.

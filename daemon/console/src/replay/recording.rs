@@ -6,6 +6,7 @@ use scenecast_core::UserError;
 use scenecast_files::{
     FrameTimes, MissionClock, MissionSpeed, RecordedMessage, StateTime, mission_records, read_record,
 };
+use scenecast_messages::builtin_interfaces::Time;
 use scenecast_messages::contents::valid_part;
 use scenecast_messages::geometry_msgs::PoseWithCovarianceStamped;
 use scenecast_messages::scenecast_msgs::{Event, Exemplar, Frame, Link, Order, OrderStatus};
@@ -171,9 +172,24 @@ impl Recording {
                     .add(Known { sent, settings: vehicle.settings.clone(), ..known }, shift)
             });
         }
+        whole.join_names();
         // Before the first state the page would show nothing.
         whole.timeline.span = (whole.timeline.states.first().map_or(span.0, |first| first.nanos), span.1);
         Ok(whole)
+    }
+
+    /// Takes the only vehicle that the surface knew by another name than it has itself for one of two names.
+    fn join_names(&mut self) {
+        let only = |here: &BTreeMap<String, Known>, there: &BTreeMap<String, Known>| {
+            let mut names = here.keys().filter(|name| !there.contains_key(*name));
+            names.next().filter(|_| names.next().is_none()).cloned()
+        };
+        let names = only(&self.vehicles, &self.operator).zip(only(&self.operator, &self.vehicles));
+        if let Some((own, shown)) = names
+            && let Some(known) = self.vehicles.remove(&own)
+        {
+            self.vehicles.insert(shown, known);
+        }
     }
 }
 
@@ -321,7 +337,11 @@ impl Known {
             self.settings = later.settings;
         }
         self.given.extend(later.given);
-        self.orders.extend(later.orders);
+        self.orders.extend(later.orders.into_iter().map(|mut order| {
+            let stamp = &mut order.header.stamp;
+            *stamp = Time::from_nanos(stamp.nanos().saturating_add(shift));
+            order
+        }));
         self.link.extend(later.link.into_iter().map(|(at, link)| (moved(at), link)));
         self.poses.extend(later.poses.into_iter().map(|(at, pose)| (moved(at), pose)));
         self.events.extend(later.events.into_iter().map(|(at, event)| (moved(at), event)));
@@ -349,6 +369,20 @@ mod tests {
 
     fn refusal(surfaces: &[Record], vehicles: &[Record]) -> Option<String> {
         of_one_mission(surfaces, vehicles).err().map(|error| error.to_string())
+    }
+
+    #[test]
+    fn the_only_vehicle_is_one_under_two_names() {
+        let known = |names: &[&str]| names.iter().map(|name| ((*name).to_owned(), Known::default())).collect();
+        let joined = |surface: &[&str], own: &[&str]| {
+            let mut both = Recording { operator: known(surface), vehicles: known(own), ..Recording::default() };
+            both.join_names();
+            both.vehicles.into_keys().collect::<Vec<_>>()
+        };
+        assert_eq!(joined(&["vehicle_1"], &["glider"]), ["vehicle_1"]);
+        assert_eq!(joined(&["auv_1", "vehicle_2"], &["auv_1", "glider"]), ["auv_1", "vehicle_2"]);
+        assert_eq!(joined(&["vehicle_1", "vehicle_2"], &["glider"]), ["glider"], "it may be either");
+        assert_eq!(joined(&[], &["glider"]), ["glider"]);
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! The report with the files of the map, its images and its tables, as one ZIP archive.
 
-use super::dive::{Dive, DiveVehicle, OrderStep, TrackPoint};
+use super::dive::{Dive, DiveVehicle, TrackPoint};
+use super::orders::OrderStep;
 use super::words;
 use crate::export::{MapFormat, harmless};
 use crate::state::VehicleState;

@@ -1,7 +1,7 @@
 //! What a record says about a dive.
 
 use super::areas::{ClassArea, areas};
-use super::words;
+use super::orders::{OrderKey, OrderStep};
 use crate::export::{MapCaption, MapCells};
 use crate::replay::{Known, Recording, ShownMap, StateText};
 use crate::state::{LinkDirection, LinkSummary, MapLabelTree, MissionState, ReplaySide, VehicleMarker, VehicleState};
@@ -9,16 +9,13 @@ use scenecast_core::{UserError, utc_text};
 use scenecast_files::MissionClock;
 use scenecast_messages::contents::valid_part;
 use scenecast_messages::geometry_msgs::PoseWithCovarianceStamped;
-use scenecast_messages::scenecast_msgs::{Event, Exemplar, Link, Order, OrderStatus};
-use scenecast_protocol::directive::SlotId;
+use scenecast_messages::scenecast_msgs::{Event, Exemplar, Link, Order};
 use scenecast_protocol::map::{Cell, LabelGrid};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 /// Moments of a record at which its maps are looked at.
 const MOMENTS: u64 = 60;
-/// The longest content of an order that is told whole, bytes.
-const MAX_CONTENT: usize = 200;
 
 /// The dive of a record of the surface.
 #[derive(Debug, Default)]
@@ -77,8 +74,8 @@ pub(super) struct DiveVehicle {
     /// What it ran with, by its own record.
     pub(super) settings: SettingsRecord,
     /// The way of each order, by slot and version.
-    pub(super) orders: BTreeMap<(String, u32), Vec<OrderStep>>,
-    pub(super) given: BTreeMap<(String, u32), Order>,
+    pub(super) orders: BTreeMap<OrderKey, Vec<OrderStep>>,
+    pub(super) given: BTreeMap<OrderKey, Order>,
     pub(super) exemplars: Vec<(f64, Exemplar)>,
     pub(super) link: Vec<(f64, Link)>,
     pub(super) maps: Vec<MapsAt>,
@@ -102,15 +99,6 @@ pub(super) struct TrackPoint {
     pub(super) north_m: f64,
     pub(super) depth_m: f64,
     pub(super) sigma_m: f64,
-}
-
-/// A status of an order.
-#[derive(Debug, Clone)]
-pub(super) struct OrderStep {
-    pub(super) at_s: f64,
-    pub(super) given_s: f64,
-    pub(super) status: u8,
-    pub(super) reason: String,
 }
 
 fn seconds(nanos: u64) -> f64 {
@@ -194,40 +182,6 @@ impl Dive {
             ..cells
         }
     }
-
-    /// Who gave an order to a vehicle, and what it was: by the log, which has the words of the page, or else by its content.
-    pub(super) fn ordered(
-        &self,
-        state: &VehicleState,
-        vehicle: &DiveVehicle,
-        order: &(String, u32),
-    ) -> (String, String) {
-        let Some(given) = vehicle.given.get(order) else { return (String::new(), "not recorded".to_owned()) };
-        let given_s = given.header.stamp.nanos() as f64 / 1e9;
-        let content = words::content(&state.label_book, given);
-        // Several orders may be given within a second: the words are those of the nearest one in this slot.
-        let logged = self.events.iter().filter_map(|(at_s, event)| {
-            let is_of_it = event.vehicle == state.name || event.vehicle.is_empty();
-            let (by, words) = said(&event.text, |words| words.starts_with(&given.slot) || words == content)?;
-            (event.source == "order" && is_of_it).then_some(((at_s - given_s).abs(), by, words))
-        });
-        let nearest = logged.filter(|(away_s, ..)| *away_s < 0.5).min_by(|a, b| a.0.total_cmp(&b.0));
-        let (by, words) = nearest.map_or((String::new(), content.clone()), |(_, by, words)| (by, words));
-        // The log has places in a few words.
-        let words = if content.len() > MAX_CONTENT { words } else { content };
-        let by = match (given.principal.is_empty(), by.is_empty()) {
-            (false, _) => given.principal.clone(),
-            (true, true) if self.settings.simulated => "the script of the rehearsal".to_owned(),
-            (true, _) => by,
-        };
-        (by, words)
-    }
-}
-
-/// The author and the words of an entry of the log, of which the words are to be recognised.
-fn said(text: &str, is_it: impl Fn(&str) -> bool) -> Option<(String, String)> {
-    let (by, words) = text.split_once(": ").filter(|(_, words)| is_it(words)).unwrap_or(("", text));
-    is_it(words).then(|| (by.to_owned(), words.to_owned()))
 }
 
 impl DiveVehicle {
@@ -275,32 +229,19 @@ impl DiveVehicle {
         }
         vehicle.given = known.given.iter().map(|order| ((order.slot.clone(), order.version), order.clone())).collect();
         known.orders.iter().for_each(|status| vehicle.take_order(status));
+        own.iter().flat_map(|own| &own.orders).for_each(|status| vehicle.take_decision(status));
         Some(vehicle)
-    }
-
-    fn take_order(&mut self, status: &OrderStatus) {
-        let seconds = |time: &scenecast_messages::builtin_interfaces::Time| time.nanos() as f64 / 1e9;
-        let step = OrderStep {
-            at_s: seconds(&status.header.stamp),
-            given_s: seconds(&status.given),
-            status: status.status,
-            reason: status.reason.clone(),
-        };
-        let way = self.orders.entry((status.slot.clone(), status.version)).or_default();
-        // The next file of a record repeats the last status.
-        if way.last().is_none_or(|last| last.status != step.status) {
-            way.push(step);
-        }
-    }
-
-    /// The orders but for position fixes, which the surface gives by itself.
-    pub(super) fn orders_of_people(&self) -> impl Iterator<Item = (&(String, u32), &Vec<OrderStep>)> {
-        self.orders.iter().filter(|((slot, _), _)| slot != SlotId::Fix.name())
     }
 
     /// The places of its own record, or else those that it has reported.
     pub(super) fn path(&self) -> &[TrackPoint] {
         if self.own_track.len() > 1 { &self.own_track } else { &self.track }
+    }
+
+    /// The uncertainty of its position at a moment, seconds since 1970; `None` if no place of a minute about it is known.
+    pub(super) fn sigma_m(&self, at_s: f64) -> Option<f64> {
+        let near = self.path().iter().filter(|point| (point.at_s - at_s).abs() < 60.0 && point.sigma_m.is_finite());
+        near.min_by(|a, b| (a.at_s - at_s).abs().total_cmp(&(b.at_s - at_s).abs())).map(|point| point.sigma_m)
     }
 
     /// The label that a place in the world frame has on the map at the end; 0 without one.

@@ -112,5 +112,5 @@ fn over_range(vehicle: &DiveVehicle) -> String {
     }
     table
         + "</table>\n<p>Each moment is one of every ten seconds; the distance is half of the round trip at 1500 m/s, and the share lost that of \
-             the last 64 frames.</p>\n"
+             the last 64 frames, or of all so far while there are fewer.</p>\n"
 }

@@ -5,6 +5,7 @@ mod areas;
 mod chart;
 mod dive;
 mod link;
+mod orders;
 mod page;
 mod summary;
 mod words;

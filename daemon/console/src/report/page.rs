@@ -2,14 +2,13 @@
 
 use super::areas::ClassArea;
 use super::chart;
-use super::dive::{Dive, DiveVehicle, OrderStep, SettingsRecord};
+use super::dive::{Dive, DiveVehicle, SettingsRecord};
 use super::{Escaped, summary, words};
 use crate::state::VehicleState;
 use base64::Engine;
 use base64::prelude::BASE64_STANDARD;
 use scenecast_core::utc_text;
-use scenecast_messages::scenecast_msgs::{Exemplar, OrderStatus};
-use scenecast_protocol::directive::SlotId;
+use scenecast_messages::scenecast_msgs::Exemplar;
 use serde_json::json;
 use std::collections::BTreeSet;
 use std::fmt::Write;
@@ -93,8 +92,8 @@ impl Dive {
         }
         classes(page, self, state, vehicle);
         notes(page, self, state);
-        orders(page, self, state, vehicle);
-        steering(page, self, state, vehicle);
+        self.orders_table(page, state, vehicle);
+        self.steering(page, state, vehicle);
         self.link(page, vehicle);
     }
 
@@ -213,6 +212,30 @@ fn classes(page: &mut String, dive: &Dive, state: &VehicleState, vehicle: &DiveV
         );
     }
     let _ = writeln!(page, "</table>\n<p>{}</p>", words::of_intervals(&vehicle.classes));
+    without_cells(page, dive, state, vehicle);
+}
+
+/// The labels that have a name or images, and no cell at the end.
+fn without_cells(page: &mut String, dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) {
+    let book = &state.label_book;
+    let has_cells = |label: u8| vehicle.classes.iter().any(|class| class.label == book.shown_as(label));
+    let named = book.iter().filter(|(_, entry)| entry.name.is_some()).map(|(label, _)| *label);
+    let pictured = vehicle.exemplars.iter().map(|(_, exemplar)| exemplar.label);
+    let labels: BTreeSet<u8> = named.chain(pictured).filter(|label| !has_cells(*label)).collect();
+    if labels.is_empty() {
+        return;
+    }
+    *page += "<h3>Labels without cells at the end</h3>\n<p>The scene model had them for some time, and gave their cells to other labels.</p>\n<ul>\n";
+    for label in labels {
+        let images = vehicle.exemplars.iter().filter(|(_, exemplar)| exemplar.label == label).take(IMAGES);
+        let images: String = images.map(|found| image(dive, vehicle, found)).collect();
+        let _ = writeln!(
+            page,
+            "<li>{label}: {}<div class=\"images\">{images}</div></li>",
+            Escaped(&book.class_title(label))
+        );
+    }
+    *page += "</ul>\n";
 }
 
 /// The classes by their colours and numbers.
@@ -225,11 +248,13 @@ fn legend(state: &VehicleState, vehicle: &DiveVehicle) -> String {
     vehicle.classes.iter().map(entry).collect()
 }
 
-/// The labels that are shown as a class, if there are several on the map.
+/// The labels that are shown as a class, if there are several: those with cells, and those that were merged into it.
 fn merged(state: &VehicleState, vehicle: &DiveVehicle, class: u8) -> String {
-    let labels: BTreeSet<u8> = vehicle.labels.iter().map(|(_, label)| label).collect();
-    let of_class = labels.into_iter().filter(|label| state.label_book.shown_as(*label) == class);
-    let labels: Vec<String> = of_class.map(|label| label.to_string()).collect();
+    let book = &state.label_book;
+    let on_map = vehicle.labels.iter().map(|(_, label)| label);
+    let labels: BTreeSet<u8> =
+        on_map.chain(book.keys().copied()).filter(|label| book.shown_as(*label) == class).collect();
+    let labels: Vec<String> = labels.into_iter().map(|label| label.to_string()).collect();
     match &labels[..] {
         [only] if *only == class.to_string() => String::new(),
         [only] => format!(" (label {only})"),
@@ -248,27 +273,31 @@ fn images(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle, class: u8) -
     let of_it: Vec<_> = vehicle.exemplars.iter().filter(|(_, exemplar)| of_class(exemplar.label)).collect();
     let mut found: Vec<_> = of_it.iter().copied().filter(|(_, exemplar)| shows_it(exemplar)).collect();
     found.sort_by_key(|(_, exemplar)| std::cmp::Reverse(exemplar.data.len()));
-    let image = |(at_s, exemplar): &&(f64, Exemplar)| {
-        let kind = if exemplar.format == "webp" { "webp" } else { "jpeg" };
-        let taken = words::taken(exemplar).unwrap_or_else(|| format!("received {}", utc_text(*at_s)));
-        let (middle, is_placed) = (&exemplar.middle, exemplar.width_m > 0.0);
-        let place = || {
-            let on_earth = words::on_earth(dive, (middle.x, middle.y));
-            format!("<br>{:.1} m east, {:.1} m north{on_earth}", middle.x, middle.y)
-        };
-        format!(
-            "<figure><img alt=\"label {label}\" src=\"data:image/{kind};base64,{}\">{}<figcaption>label {label}, {taken}{}</figcaption></figure>",
-            BASE64_STANDARD.encode(&exemplar.data),
-            if is_placed { chart::scale_of_image(exemplar.width_m) } else { String::new() },
-            if is_placed { place() } else { String::new() },
-            label = exemplar.label
-        )
-    };
     match (found.is_empty(), of_it.is_empty()) {
         (true, true) => "no image was received".to_owned(),
         (true, false) => "the images that were received show places of other classes, by the map at the end".to_owned(),
-        (false, _) => found.iter().take(IMAGES).map(image).collect(),
+        (false, _) => found.iter().take(IMAGES).map(|found| image(dive, vehicle, found)).collect(),
     }
+}
+
+/// An image with its label, time, place and scale.
+fn image(dive: &Dive, vehicle: &DiveVehicle, (at_s, exemplar): &(f64, Exemplar)) -> String {
+    let kind = if exemplar.format == "webp" { "webp" } else { "jpeg" };
+    let taken = words::taken(exemplar).unwrap_or_else(|| format!("received {}", utc_text(*at_s)));
+    let (middle, is_placed) = (&exemplar.middle, exemplar.width_m > 0.0);
+    let place = || {
+        let sigma = vehicle.sigma_m(exemplar.taken.nanos() as f64 / 1e9);
+        let sigma = sigma.map_or_else(String::new, |m| format!(", standard deviation {m:.1} m"));
+        let on_earth = words::on_earth(dive, (middle.x, middle.y));
+        format!("<br>{:.1} m east, {:.1} m north{on_earth}{sigma}", middle.x, middle.y)
+    };
+    format!(
+        "<figure><img alt=\"label {label}\" src=\"data:image/{kind};base64,{}\">{}<figcaption>label {label}, {taken}{}</figcaption></figure>",
+        BASE64_STANDARD.encode(&exemplar.data),
+        if is_placed { chart::scale_of_image(exemplar.width_m) } else { String::new() },
+        if is_placed { place() } else { String::new() },
+        label = exemplar.label
+    )
 }
 
 fn notes(page: &mut String, dive: &Dive, state: &VehicleState) {
@@ -293,62 +322,4 @@ fn notes(page: &mut String, dive: &Dive, state: &VehicleState) {
         );
     }
     *page += "</ul>\n";
-}
-
-/// The weights and the modes over time.
-fn steering(page: &mut String, dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) {
-    let modes = dive.events.iter().filter(|(_, event)| event.vehicle == state.name && event.source == "mode");
-    let modes = modes.map(|(at_s, event)| (*at_s, event.text.clone()));
-    let weights = vehicle.given.iter().filter(|((slot, _), _)| slot == SlotId::Utility.name());
-    let weights = weights.map(|(order, given)| {
-        (given.header.stamp.nanos() as f64 / 1e9, format!("ordered: {}", dive.ordered(state, vehicle, order).1))
-    });
-    let mut steps: Vec<(f64, String)> = modes.chain(weights).collect();
-    if steps.is_empty() {
-        return;
-    }
-    steps.sort_by(|a, b| a.0.total_cmp(&b.0));
-    *page += "<h3>What the vehicle was steered by, and its modes</h3>\n<table><thead><tr><th>time (UTC)</th><th>what</th><th>cells on the map by \
-              then</th></tr></thead>\n";
-    for (at_s, text) in &steps {
-        let cells = vehicle.maps.iter().rev().find(|maps| maps.at_s <= *at_s).map_or(0, |maps| maps.cells);
-        let _ = writeln!(
-            page,
-            "<tr><td class=\"t\">{}</td><td>{}</td><td class=\"n\">{cells}</td></tr>",
-            utc_text(*at_s),
-            Escaped(text)
-        );
-    }
-    *page += "</table>\n";
-}
-
-fn orders(page: &mut String, dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) {
-    if vehicle.orders_of_people().next().is_none() {
-        return;
-    }
-    *page += "<h3>Orders</h3>\n<table><thead><tr><th>order</th><th>what was ordered</th><th>by</th><th>given (UTC)</th><th>end</th><th>known at the surface after</th></tr></thead>\n";
-    let mut orders: Vec<(&(String, u32), &OrderStep, &OrderStep)> =
-        vehicle.orders_of_people().filter_map(|(order, way)| Some((order, way.first()?, way.last()?))).collect();
-    orders.sort_by(|a, b| a.1.given_s.total_cmp(&b.1.given_s));
-    for (order @ (slot, version), first, last) in orders {
-        let (by, ordered) = dive.ordered(state, vehicle, order);
-        let reason = if last.reason.is_empty() { String::new() } else { format!(": {}", last.reason) };
-        let _ = writeln!(
-            page,
-            "<tr><td>{} {version}</td><td>{}</td><td>{}</td><td class=\"t\">{}</td><td>{}{}</td><td class=\"n\">{}</td></tr>",
-            Escaped(slot),
-            Escaped(&ordered),
-            Escaped(&by),
-            utc_text(first.given_s),
-            words::status(last.status),
-            Escaped(&reason),
-            match last.status {
-                OrderStatus::APPLIED | OrderStatus::REFUSED | OrderStatus::WITHDRAWN => {
-                    format!("{:.1} s", ((last.at_s - first.given_s) * dive.state.mission.speed).max(0.0))
-                }
-                _ => "not known".to_owned(),
-            }
-        );
-    }
-    *page += "</table>\n";
 }

@@ -1,16 +1,22 @@
 //! The summary of a dive in sentences.
 
-use super::dive::{Dive, DiveVehicle, OrderStep, SettingsRecord};
+use super::dive::{Dive, DiveVehicle, SettingsRecord};
+use super::orders::OrderStep;
 use super::words::{area, counted, duration, interval, lat_lon, on_earth};
 use crate::state::{LinkDirection, VehicleState};
-use scenecast_core::utc_text;
+use scenecast_core::{Area, utc_text};
+use scenecast_messages::contents::valid_part;
 use scenecast_messages::scenecast_msgs::{Event, OrderStatus};
 use scenecast_protocol::directive::SlotId;
+use scenecast_protocol::map::Quantity;
+use scenecast_protocol::wire::VehicleMode;
 use serde_json::Value;
 use std::collections::BTreeSet;
 
 /// Time without a frame from which on it is a silence, seconds.
 const SILENCE_S: f64 = 60.0;
+/// Events that are told in a sentence; of more, the first.
+const MAX_TOLD: usize = 8;
 
 /// Where, when, how long, how far, what was found, what was ordered and what failed, a sentence each.
 pub(super) fn summary(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -> Vec<String> {
@@ -26,6 +32,7 @@ pub(super) fn summary(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) 
     sentences.push(equipment(dive, vehicle));
     sentences.push(found(state, vehicle));
     sentences.extend(extent(dive, state, vehicle));
+    sentences.extend(sea_floor(dive, state, vehicle));
     sentences.extend(arrived(state, vehicle));
     sentences.extend(agreement(vehicle));
     sentences.push(orders(dive, state, vehicle));
@@ -38,7 +45,7 @@ pub(super) fn summary(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) 
     }
     let silence = longest_silence(dive, vehicle);
     sentences.push(heard(dive, vehicle, silence));
-    sentences.push(trouble(dive, silence.0));
+    sentences.push(trouble(dive, state, silence.0));
     if let Some(damage) = &dive.damage {
         sentences.push(format!("Not all of the record could be read: {damage}."));
     }
@@ -77,11 +84,12 @@ fn link(dive: &Dive, vehicle: &DiveVehicle) -> Vec<String> {
     sentences
 }
 
-/// How many events people should look at.
-fn trouble(dive: &Dive, longest_silence_s: f64) -> String {
+/// The events that people should look at: faults, silences, new runs, and modes other than the survey.
+fn trouble(dive: &Dive, state: &VehicleState, longest_silence_s: f64) -> String {
     // The first contact begins a run, too.
     let first_run = dive.events.iter().position(|(_, event)| event.text == "another run begins");
-    let is_survey = |text: &str| ["Survey", "surveying", "Done", "done"].iter().any(|mode| text.starts_with(mode));
+    let is_planned =
+        |text: &str| [VehicleMode::Survey, VehicleMode::Done].iter().any(|mode| text.starts_with(mode.name()));
     // Where its own record is missing, the modes that it has reported stand for those on board.
     let modes = match dive.events.iter().any(|(_, event)| event.source == "mode, on board") {
         true => "mode, on board",
@@ -89,18 +97,21 @@ fn trouble(dive: &Dive, longest_silence_s: f64) -> String {
     };
     let is_trouble = |(number, (_, event)): &(usize, &(f64, Event))| match event.source.as_str() {
         "fault" => true,
-        source if source == modes => !is_survey(&event.text),
+        source if source == modes => !is_planned(&event.text),
         "contact" => event.text != "received" && Some(*number) != first_run,
         _ => false,
     };
-    match dive.events.iter().enumerate().filter(is_trouble).count() {
+    let is_of_it = |event: &Event| event.vehicle.is_empty() || valid_part(&event.vehicle) == valid_part(&state.name);
+    let found = dive.events.iter().enumerate().filter(|(_, (_, event))| is_of_it(event)).filter(is_trouble);
+    let told: Vec<String> = found.map(|(_, (at_s, event))| format!("{} at {}", event.text, utc_text(*at_s))).collect();
+    match told.len() {
         0 if longest_silence_s < SILENCE_S => "No fault and no silence was reported.".to_owned(),
         0 => "No fault was reported.".to_owned(),
-        1 => "One event is about a fault, a silence, a new run or a mode other than the survey; it is listed below."
-            .to_owned(),
-        n => format!(
-            "{n} events are about faults, silences, new runs or modes other than the survey; they are listed below."
+        n if n > MAX_TOLD => format!(
+            "{n} events are about faults, silences, new runs or modes other than the survey, first {}; all are listed below.",
+            told[..MAX_TOLD].join("; ")
         ),
+        _ => format!("Faults, silences, new runs, and modes other than the survey: {}.", told.join("; ")),
     }
 }
 
@@ -171,20 +182,27 @@ fn extent(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -> Option<St
     ))
 }
 
+/// How deep the sea floor is, where the map has a layer of it.
+fn sea_floor(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -> Option<String> {
+    let cells = dive.map_cells(state, vehicle);
+    let layer = cells.layers().iter().find(|layer| layer.descriptor().quantity == Quantity::Depth)?;
+    let depths = vehicle.labels.iter().filter_map(|(cell, _)| layer.value(cell));
+    let (least, most) = depths.fold((f64::INFINITY, f64::NEG_INFINITY), |(least, most), m| (least.min(m), most.max(m)));
+    (least <= most)
+        .then(|| format!("By the layer {} the sea floor is {least:.1} to {most:.1} m deep.", layer.descriptor().name))
+}
+
 /// How much of the configured area has cells; empty where none is configured.
 fn unseen(dive: &Dive, vehicle: &DiveVehicle, shift: (f64, f64)) -> String {
     let area = ran_with(dive, vehicle).settings.get("survey.area_m");
     let corners = area.and_then(|area| serde_json::from_value::<[f64; 4]>(area.clone()).ok());
     let Some([west, south, east, north]) = corners else { return String::new() };
     let middle = |index: i32, shift_m: f64| (f64::from(index) + 0.5) * vehicle.cell_m + shift_m;
-    let inside = vehicle.labels.iter().filter(|(cell, _)| {
-        let (x, y) = (middle(cell.x, shift.0), middle(cell.y, shift.1));
-        (west..=east).contains(&x) && (south..=north).contains(&y)
-    });
-    let share = inside.count() as f64 * vehicle.cell_m * vehicle.cell_m / ((east - west) * (north - south)).max(1e-9);
+    let middles = vehicle.labels.iter().map(|(cell, _)| (middle(cell.x, shift.0), middle(cell.y, shift.1)));
+    let share = Area { west, south, east, north }.covered(middles, vehicle.cell_m);
     format!(
         " Of the area of the survey, {west} to {east} m east and {south} to {north} m north, {:.1} % has cells.",
-        (share * 100.0).min(100.0)
+        share * 100.0
     )
 }
 

@@ -4,15 +4,15 @@ use super::facts::{MissionFacts, seconds};
 use super::{exemplar, facts, link};
 use crate::state::{
     AppliedOrder, DirectiveSlots, EarlierMap, InForceKnowledge, MapLabel, MapLabelTree, MapSummary, OrderProgress,
-    OrderStatus, OtherSurface, PlannedPath, ReportedDisk, ReportedFault, ReportedMode, ReportedPose,
-    ReportedRegistration, ReportedTie, StatusReport, UsblMeasurement, UtilityTerms, VehicleMarker, VehicleNote,
-    VehicleOrders, VehicleSettings, VehicleState, WeightDraft,
+    OrderStatus, OtherSurface, PlannedPath, ReportedDisk, ReportedFault, ReportedPose, ReportedRegistration,
+    ReportedTie, StatusReport, UsblMeasurement, UtilityTerms, VehicleMarker, VehicleNote, VehicleOrders,
+    VehicleSettings, VehicleState, WeightDraft,
 };
 use scenecast_protocol::coordinates::MapPoint;
 use scenecast_protocol::directive::{self, PlannerKind, REPORTED_SLOTS, SlotId, SlotProgress};
 use scenecast_protocol::link::{InForce, PeerView};
 use scenecast_protocol::time::Instant;
-use scenecast_protocol::wire::{Address, DiskReport, FrameTie, Intent, RegistrationReport, VehicleMode, VehicleStatus};
+use scenecast_protocol::wire::{Address, DiskReport, FrameTie, Intent, RegistrationReport, VehicleStatus};
 use scenecast_surface::record::{StoredDraft, StoredMarker, StoredNote};
 use scenecast_surface::{SettingsOrder, Surface, Track, VehicleRecord, order_name};
 
@@ -179,7 +179,7 @@ fn status(s: &VehicleStatus, record: &VehicleRecord, at: Instant) -> StatusRepor
             sigma_m: s.sigma_m,
             fix_age_s: s.fix_age_s,
         },
-        mode: mode(s.mode),
+        mode: s.mode.into(),
         autopilot_silent: s.autopilot_silent,
         reason: s.reason.name().map(str::to_owned),
         activity: activity(s, record),
@@ -215,17 +215,6 @@ fn registration((report, at): (RegistrationReport, Instant)) -> ReportedRegistra
 fn disk(disk: DiskReport) -> ReportedDisk {
     let DiskReport { journal_refused, checkpoint_refused, free_bytes } = disk;
     ReportedDisk { journal_refused, checkpoint_refused, free_bytes }
-}
-
-fn mode(mode: VehicleMode) -> ReportedMode {
-    match mode {
-        VehicleMode::Survey => ReportedMode::Survey,
-        VehicleMode::Hold => ReportedMode::Hold,
-        VehicleMode::Return => ReportedMode::Return,
-        VehicleMode::Surface => ReportedMode::Surface,
-        VehicleMode::Abort => ReportedMode::Abort,
-        VehicleMode::Done => ReportedMode::Done,
-    }
 }
 
 /// Mode with its reason or purpose as a text.

@@ -4,6 +4,7 @@ use super::labels::{MapLabel, MapLabelTree};
 use super::link::VehicleChannel;
 use super::map::MapSummary;
 use super::storage::{VehicleMarker, VehicleNote};
+use scenecast_protocol::wire::VehicleMode;
 use scenecast_surface::{AreasOrder, DestinationOrder, FenceOrder, LabelBook, LimitsOrder, SettingsOrder};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -302,6 +303,19 @@ pub enum ReportedMode {
     Abort,
     /// The survey of the vehicle is complete.
     Done,
+}
+
+impl From<VehicleMode> for ReportedMode {
+    fn from(mode: VehicleMode) -> Self {
+        match mode {
+            VehicleMode::Survey => Self::Survey,
+            VehicleMode::Hold => Self::Hold,
+            VehicleMode::Return => Self::Return,
+            VehicleMode::Surface => Self::Surface,
+            VehicleMode::Abort => Self::Abort,
+            VehicleMode::Done => Self::Done,
+        }
+    }
 }
 
 /// The utility; in the API without the weights of labels.

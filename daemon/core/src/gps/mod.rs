@@ -6,7 +6,7 @@ mod first_fix;
 mod gpsd;
 mod way;
 
-use crate::{Lines, nmea};
+use crate::{Lines, Reminder, nmea};
 use first_fix::FirstFix;
 use scenecast_protocol::time::Instant;
 use std::collections::BTreeMap;
@@ -101,9 +101,8 @@ pub struct Gps {
     kinds: BTreeMap<PositionKind, KindHealth>,
     /// Places near each other that were too far from the last good one, less good ones since, and the last of them.
     jumps: (u32, Option<GpsFix>),
-    /// Jumps since the last note, when that was, and the note until it is fetched.
-    untold: u32,
-    told: Option<Instant>,
+    /// Notes of jumps, and a note until it is fetched.
+    notes: Reminder,
     note: Option<String>,
     /// A receiver that was not followed since the last position.
     second: Option<String>,
@@ -125,8 +124,6 @@ impl Gps {
     const BETTER_LASTS: Duration = Duration::from_secs(2);
     /// So many more places near each other than good ones are believed however far they are from those.
     const JUMPS_BELIEVED: u32 = 10;
-    /// Notes are this far apart.
-    const NOTE_PERIOD: Duration = Duration::from_secs(60);
     /// A heading or a course counts for this time.
     const HEADING_LASTS: Duration = Duration::from_secs(5);
     /// Slower than this the course over ground is noise, m/s.
@@ -146,8 +143,7 @@ impl Gps {
             fix: None,
             kinds: BTreeMap::new(),
             jumps: (0, None),
-            untold: 0,
-            told: None,
+            notes: Reminder::default(),
             note: None,
             second: None,
             is_second_told: false,
@@ -336,14 +332,11 @@ impl Gps {
     }
 
     fn note_jump(&mut self, fix: &GpsFix) {
-        self.untold += 1;
-        let Some(last) = self.fix.filter(|_| self.told.is_none_or(|at| fix.at.since(at) >= Self::NOTE_PERIOD)) else {
-            return;
-        };
+        let Some((last, count)) = self.fix.zip(self.notes.handle(fix.at)) else { return };
         let (x, y) = TangentPlane::new(last.place).to_plane(fix.place);
         let place = |place: LatLon| format!("{:.5}, {:.5}", place.lat_deg, place.lon_deg);
-        let more = match self.untold {
-            0 | 1 => String::new(),
+        let more = match count {
+            1 => String::new(),
             n => format!("; it has jumped {n} times: check this receiver"),
         };
         self.note = Some(format!(
@@ -352,10 +345,9 @@ impl Gps {
             place(last.place),
             place(fix.place)
         ));
-        (self.told, self.untold) = (Some(fix.at), 0);
     }
 
-    /// What people should read: about jumps at most once a minute, and of a receiver without any position once.
+    /// What people should read: about jumps ever more rarely, and of a receiver without any position once.
     pub fn poll_note(&mut self) -> Option<String> {
         self.note.take()
     }

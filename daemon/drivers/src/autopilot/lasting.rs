@@ -1,10 +1,8 @@
 //! What is wrong with the reports of an autopilot for a while.
 
+use scenecast_core::Reminder;
 use scenecast_protocol::time::Instant;
 use std::time::Duration;
-
-/// Time between two notes of the same trouble.
-const NOTE_PERIOD: Duration = Duration::from_secs(60);
 
 /// Since when something is missing or cannot be, and what people were told.
 #[derive(Debug, Default)]
@@ -13,8 +11,7 @@ pub(super) struct Lasting {
     since: Option<Instant>,
     /// Whether people were told of it since.
     is_told: bool,
-    /// When people were told last.
-    told: Option<Instant>,
+    notes: Reminder,
 }
 
 impl Lasting {
@@ -24,15 +21,15 @@ impl Lasting {
         std::mem::take(&mut self.is_told)
     }
 
-    /// It goes on; returns whether people should know now: once, as soon as it has lasted for `after`, and at most once a minute.
+    /// It goes on; returns whether people should know now: once, as soon as it has lasted for `after`, and ever more
+    /// rarely if it comes again and again.
     pub(super) fn is_news(&mut self, after: Duration, now: Instant) -> bool {
         let since = *self.since.get_or_insert(now);
-        let is_recent = self.told.is_some_and(|at| now.since(at) < NOTE_PERIOD);
-        if self.is_told || is_recent || now.since(since) < after {
+        if self.is_told || now.since(since) < after {
             return false;
         }
-        (self.is_told, self.told) = (true, Some(now));
-        true
+        self.is_told = self.notes.handle(now).is_some();
+        self.is_told
     }
 }
 

@@ -5,6 +5,7 @@
 //! the changes count from then on.
 
 use super::Step;
+use scenecast_core::Reminder;
 use scenecast_protocol::time::Instant;
 use std::time::Duration;
 
@@ -97,7 +98,7 @@ const VELOCITY_NORTH: Bounds = Bounds { name: "velocity north", ..VELOCITY_EAST 
 pub struct Jump {
     /// The name of its counter.
     pub counter: &'static str,
-    /// What people should read, at most once a minute.
+    /// What people should read, ever more rarely while jumps go on.
     pub note: Option<String>,
 }
 
@@ -112,16 +113,13 @@ struct Series {
     zero: f64,
     /// The first and the last of the values that agree with each other, and not with the used one.
     other: Option<[(f64, Instant); 2]>,
-    /// Jumps since the last note, and when that was.
-    untold: u32,
-    told: Option<Instant>,
-    /// When it was noted last that a value has stayed, or that its zero has moved.
-    settled: Option<Instant>,
+    /// Notes of jumps.
+    jumps: Reminder,
+    /// Notes of values that have stayed, and of zeros that have moved.
+    settled: Reminder,
 }
 
 impl Series {
-    /// Notes are this far apart.
-    const NOTE_PERIOD: Duration = Duration::from_secs(60);
     /// Values that have followed each other for this time were right.
     const PROVEN: Duration = Duration::from_secs(10);
 
@@ -144,36 +142,22 @@ impl Series {
             self.zero += value - tracked;
             let Bounds { name, unit, .. } = bounds;
             let note = format!("the zero of the {name} has moved by {:.1} {unit}: only its changes count", self.zero);
-            (tracked, None, self.note_of_settling(note, now))
+            (tracked, None, self.settled.handle(now).map(|_| note))
         } else {
             self.since = Some(now);
             let note = format!("the {} has stayed near {value:.1} {} and is used", bounds.name, bounds.unit);
-            (value, None, self.note_of_settling(note, now))
+            (value, None, self.settled.handle(now).map(|_| note))
         };
         (self.used, self.other) = (Some((value, now)), other);
         (value, Some(Jump { counter: bounds.counter, note }))
     }
 
-    /// Where values alternate, one note a minute says so; the jumps are told with the next one of their own.
-    fn note_of_settling(&mut self, note: String, now: Instant) -> Option<String> {
-        if self.settled.is_some_and(|at| now.since(at) < Self::NOTE_PERIOD) {
-            return None;
-        }
-        self.settled = Some(now);
-        Some(note)
-    }
-
     fn note(&mut self, (used, value): (f64, f64), bounds: &Bounds, now: Instant) -> Option<String> {
-        self.untold += 1;
-        if self.told.is_some_and(|at| now.since(at) < Self::NOTE_PERIOD) {
-            return None;
-        }
         let Bounds { name, unit, .. } = bounds;
-        let more = match self.untold {
-            0 | 1 => String::new(),
+        let more = match self.jumps.handle(now)? {
+            1 => String::new(),
             n => format!("; it has jumped {n} times: check this sensor"),
         };
-        (self.told, self.untold) = (Some(now), 0);
         Some(format!("the {name} jumps from {used:.1} to {value:.1} {unit}, which is not used unless it stays{more}"))
     }
 }
@@ -225,7 +209,11 @@ impl Plausible {
     pub fn check_velocity(&mut self, (east, north): (f64, f64), now: Instant) -> ((f64, f64), Vec<Jump>) {
         let [of_east, of_north] = &mut self.velocity;
         let (east, east_jump) = of_east.check(east, &VELOCITY_EAST, now);
-        let (north, north_jump) = of_north.check(north, &VELOCITY_NORTH, now);
+        let (north, mut north_jump) = of_north.check(north, &VELOCITY_NORTH, now);
+        // One line for both.
+        if east_jump.as_ref().is_some_and(|jump| jump.note.is_some()) {
+            north_jump.iter_mut().for_each(|jump| jump.note = None);
+        }
         ((east, north), [east_jump, north_jump].into_iter().flatten().collect())
     }
 
@@ -255,7 +243,8 @@ mod tests {
         assert_eq!(check((0.1, -0.2), 0).0, (0.1, -0.2));
         let (velocity, jumps) = check((15.0, -9.0), 1);
         assert!((velocity.0 - 0.1).hypot(velocity.1 + 0.2) < 1e-9 && jumps.len() == 2, "{velocity:?}");
-        assert!(jumps[1].note.as_ref().unwrap().starts_with("the velocity north jumps from -0.2 to -9.0 m/s"));
+        let notes: Vec<&String> = jumps.iter().filter_map(|jump| jump.note.as_ref()).collect();
+        assert!(notes.len() == 1 && notes[0].starts_with("the velocity east jumps from 0.1 to 15.0 m/s"), "{notes:?}");
         assert_eq!(check((0.2, -0.3), 2), ((0.2, -0.3), Vec::new()), "it was one false value");
         let used: Vec<f64> = (3..20).map(|tenths| check((6.0, -0.3), tenths).0.0).collect();
         assert!(used[..10].iter().all(|v| *v < 1.0) && used[10..].iter().all(|v| *v == 6.0), "{used:?}");
@@ -329,8 +318,8 @@ mod tests {
     }
 
     #[test]
-    fn a_sensor_that_jumps_often_is_named_once_a_minute() {
-        let (depths, notes) = used((0..1300).map(|i| if i % 10 == 5 { 42.0 } else { 5.0 }));
+    fn a_sensor_that_jumps_often_is_named_ever_more_rarely() {
+        let (depths, notes) = used((0..2000).map(|i| if i % 10 == 5 { 42.0 } else { 5.0 }));
         assert!(depths.iter().all(|depth| *depth == 5.0));
         assert_eq!(notes.len(), 3);
         assert!(notes[1].ends_with("it has jumped 60 times: check this sensor"), "{}", notes[1]);

@@ -128,7 +128,8 @@ impl VehicleRecorder {
             entries.push(self.entry("link", stamps, &self.link(vehicle, stamps)));
         }
         let (mode, reason) = vehicle.mode();
-        let mode = reason.name().map_or_else(|| format!("{mode:?}"), |reason| format!("{mode:?}: {reason}"));
+        let mode = mode.name();
+        let mode = reason.name().map_or_else(|| mode.to_owned(), |reason| format!("{mode}: {reason}"));
         if self.mode != mode {
             entries.push(self.event(Event::INFO, "mode", &mode, stamps));
             self.mode = mode;

@@ -5,7 +5,7 @@
 
 use super::message::Said;
 use super::{BRIDGED, Mavlink, Pose, moved, units};
-use scenecast_core::{LatLon, TangentPlane};
+use scenecast_core::{LatLon, Reminder, TangentPlane};
 use scenecast_protocol::time::Instant;
 use std::time::Duration;
 
@@ -215,8 +215,6 @@ impl Echo {
 
 /// Uncertainty of the time at which it restarted.
 const RESTART_MARGIN: Duration = Duration::from_secs(1);
-/// Notes of an autopilot that is taken out of command again and again are this far apart.
-const NOTE_PERIOD: Duration = Duration::from_secs(60);
 /// Depth below which an autopilot that has restarted is armed again, metres.
 const MIN_ARMED_DEPTH_M: f64 = 0.5;
 
@@ -225,9 +223,9 @@ const MIN_ARMED_DEPTH_M: f64 = 0.5;
 pub(super) struct CommandWatch {
     /// Whether it was in command once: from then on whoever takes it out of that is obeyed.
     was_in_command: bool,
-    /// When it was taken out of command last, and when people were told of that.
+    /// When it was taken out of command last, and the notes of that.
     left: Option<Instant>,
-    told: Option<Instant>,
+    notes: Reminder,
     /// When it started again, until it is in command again.
     restarted: Option<Instant>,
     /// Whether it was under water when it started again.
@@ -241,7 +239,7 @@ impl CommandWatch {
         self.was_under_water = depth_m.is_some_and(|depth_m| depth_m > MIN_ARMED_DEPTH_M);
     }
 
-    /// Takes whether it is in command; returns whether people should know that it no longer is, at most once a minute.
+    /// Takes whether it is in command; returns whether people should know that it no longer is.
     pub(super) fn handle_heartbeat(&mut self, before: bool, is_in_command: bool, now: Instant) -> bool {
         if is_in_command {
             (self.was_in_command, self.restarted) = (true, None);
@@ -250,11 +248,7 @@ impl CommandWatch {
         if has_left {
             self.left = Some(now);
         }
-        let is_news = has_left && self.told.is_none_or(|at| now.since(at) >= NOTE_PERIOD);
-        if is_news {
-            self.told = Some(now);
-        }
-        is_news
+        has_left && self.notes.handle(now).is_some()
     }
 
     /// Whether it may be armed and switched to guided mode: it never was, or nobody but its own restart has ended that, and it
@@ -328,9 +322,9 @@ mod tests {
     }
 
     #[test]
-    fn a_mode_that_flips_each_second_is_noted_once_a_minute() {
+    fn a_mode_that_flips_each_second_is_noted_ever_more_rarely() {
         let mut watch = CommandWatch::default();
         let flip = |s: &u64| watch.handle_heartbeat(!s.is_multiple_of(2), s.is_multiple_of(2), at(*s));
-        assert_eq!((0..300).filter(flip).count(), 5);
+        assert_eq!((0..300).filter(flip).collect::<Vec<_>>(), [1, 61, 181]);
     }
 }

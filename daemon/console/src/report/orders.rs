@@ -1,0 +1,236 @@
+//! The orders of a dive: what was ordered, by whom, and what became of it.
+
+use super::dive::{Dive, DiveVehicle};
+use super::{Escaped, words};
+use crate::state::VehicleState;
+use scenecast_core::utc_text;
+use scenecast_messages::scenecast_msgs::OrderStatus;
+use scenecast_protocol::directive::SlotId;
+use serde_json::Value;
+use std::fmt::Write;
+
+/// The longest content of an order that is told whole, bytes.
+const MAX_CONTENT: usize = 200;
+
+/// An order by the name of its slot and its version.
+pub(super) type OrderKey = (String, u32);
+
+/// A status of an order.
+#[derive(Debug, Clone)]
+pub(super) struct OrderStep {
+    pub(super) at_s: f64,
+    pub(super) given_s: f64,
+    pub(super) status: u8,
+    pub(super) reason: String,
+    /// Whether only the vehicle's own record has it.
+    pub(super) is_own: bool,
+}
+
+impl OrderStep {
+    pub(super) fn of(message: &OrderStatus) -> Self {
+        let seconds = |time: &scenecast_messages::builtin_interfaces::Time| time.nanos() as f64 / 1e9;
+        Self {
+            at_s: seconds(&message.header.stamp),
+            given_s: seconds(&message.given),
+            status: message.status,
+            reason: message.reason.clone(),
+            is_own: false,
+        }
+    }
+
+    pub(super) fn is_end(&self) -> bool {
+        matches!(self.status, OrderStatus::APPLIED | OrderStatus::REFUSED | OrderStatus::WITHDRAWN)
+    }
+
+    /// The status with its reason, for people.
+    fn told(&self) -> String {
+        let reason = if self.reason.is_empty() { String::new() } else { format!(": {}", self.reason) };
+        let own = if self.is_own { ", by the vehicle's own record alone" } else { "" };
+        format!("{}{reason}{own}", words::status(self.status))
+    }
+
+    /// The time from the order to this status, mission seconds, if it is an end.
+    fn after_s(&self, dive: &Dive) -> Option<f64> {
+        self.is_end().then(|| ((self.at_s - self.given_s) * dive.state.mission.speed).max(0.0))
+    }
+}
+
+impl DiveVehicle {
+    /// Notes a status that the surface recorded.
+    pub(super) fn take_order(&mut self, message: &OrderStatus) {
+        let step = OrderStep::of(message);
+        let way = self.orders.entry((message.slot.clone(), message.version)).or_default();
+        // The next file of a record repeats the last status.
+        if way.last().is_none_or(|last| last.status != step.status) {
+            way.push(step);
+        }
+    }
+
+    /// Notes a decision that the vehicle recorded, where the surface learned of none.
+    pub(super) fn take_decision(&mut self, message: &OrderStatus) {
+        let Some(way) = self.orders.get_mut(&(message.slot.clone(), message.version)) else { return };
+        let Some(last) = way.last().filter(|last| !last.is_end()) else { return };
+        way.push(OrderStep { given_s: last.given_s, is_own: true, ..OrderStep::of(message) });
+    }
+
+    /// The orders but for position fixes, which the surface gives by itself.
+    pub(super) fn orders_of_people(&self) -> impl Iterator<Item = (&OrderKey, &Vec<OrderStep>)> {
+        self.orders.iter().filter(|((slot, _), _)| slot != SlotId::Fix.name())
+    }
+
+    /// What such an order says, in words.
+    fn content(&self, state: &VehicleState, order @ (slot, version): &OrderKey) -> Option<String> {
+        let given = self.given.get(order)?;
+        let labels = |version: &u32| -> Option<Vec<u64>> {
+            let content: Value = serde_json::from_str(&self.given.get(&(slot.clone(), *version))?.content).ok()?;
+            content.get("labels")?.as_array().map(|labels| labels.iter().filter_map(Value::as_u64).collect())
+        };
+        // An order of images has all that are awaited.
+        let before = self.given.range(..order.clone()).next_back().filter(|((other, _), _)| other == slot);
+        let before = before.and_then(|((_, version), _)| labels(version)).unwrap_or_default();
+        let title = |label: u64| u8::try_from(label).map_or_else(|_| label.to_string(), |l| state.label_book.title(l));
+        let named = |labels: Vec<u64>| labels.into_iter().map(title).collect::<Vec<_>>().join(", ");
+        let of_images = labels(version).map(|labels| {
+            let (awaited, new): (Vec<u64>, Vec<u64>) = labels.iter().partition(|label| before.contains(label));
+            match (new.is_empty(), awaited.is_empty()) {
+                (true, true) => "no image is asked for any more".to_owned(),
+                (true, false) => format!("images of {}, asked for before, again", named(awaited)),
+                (false, true) => format!("images of {}", named(new)),
+                (false, false) => format!("images of {}, beside those of {}", named(new), named(awaited)),
+            }
+        });
+        Some(of_images.unwrap_or_else(|| words::content(&state.label_book, given)))
+    }
+}
+
+impl Dive {
+    /// Who gave an order to a vehicle, and what it was: by the log, which has the words of the page, or else by its content.
+    pub(super) fn ordered(&self, state: &VehicleState, vehicle: &DiveVehicle, order: &OrderKey) -> (String, String) {
+        let known = vehicle.given.get(order).zip(vehicle.content(state, order));
+        let Some((given, content)) = known else { return (String::new(), "not recorded".to_owned()) };
+        let given_s = given.header.stamp.nanos() as f64 / 1e9;
+        // Several orders may be given within a second: the words are those of the nearest one in this slot.
+        let logged = self.events.iter().filter_map(|(at_s, event)| {
+            let is_of_it = event.vehicle == state.name || event.vehicle.is_empty();
+            let (by, words) = said(&event.text, |words| words.starts_with(&given.slot) || words == content)?;
+            (event.source == "order" && is_of_it).then_some(((at_s - given_s).abs(), by, words))
+        });
+        let nearest = logged.filter(|(away_s, ..)| *away_s < 0.5).min_by(|a, b| a.0.total_cmp(&b.0));
+        let (by, words) = nearest.map_or((String::new(), content.clone()), |(_, by, words)| (by, words));
+        // The log has places in a few words.
+        let words = if content.len() > MAX_CONTENT { words } else { content };
+        let by = match (given.principal.is_empty(), by.is_empty()) {
+            (false, _) => given.principal.clone(),
+            (true, true) if self.settings.simulated => "the script of the rehearsal".to_owned(),
+            (true, _) => by,
+        };
+        (by, words)
+    }
+
+    /// The orders with their ends, the first one first.
+    pub(super) fn orders_table(&self, page: &mut String, state: &VehicleState, vehicle: &DiveVehicle) {
+        if vehicle.orders_of_people().next().is_none() {
+            return;
+        }
+        *page += "<h3>Orders</h3>\n<table><thead><tr><th>order</th><th>what was ordered</th><th>by</th><th>given (UTC)</th><th>end</th><th>known at the surface after</th></tr></thead>\n";
+        let mut orders: Vec<(&OrderKey, &OrderStep)> =
+            vehicle.orders_of_people().filter_map(|(order, way)| Some((order, way.last()?))).collect();
+        orders.sort_by(|a, b| a.1.given_s.total_cmp(&b.1.given_s));
+        for (order @ (slot, version), last) in orders {
+            let (by, ordered) = self.ordered(state, vehicle, order);
+            let after_s = last.after_s(self).filter(|_| !last.is_own);
+            let _ = writeln!(
+                page,
+                "<tr><td>{} {version}</td><td>{}</td><td>{}</td><td class=\"t\">{}</td><td>{}</td><td class=\"n\">{}</td></tr>",
+                Escaped(slot),
+                Escaped(&ordered),
+                Escaped(&by),
+                utc_text(last.given_s),
+                Escaped(&last.told()),
+                after_s.map_or_else(|| "not known".to_owned(), |s| format!("{s:.1} s")),
+            );
+        }
+        *page += "</table>\n";
+    }
+
+    /// What the vehicle was steered by over time, and its modes.
+    pub(super) fn steering(&self, page: &mut String, state: &VehicleState, vehicle: &DiveVehicle) {
+        let modes = self.events.iter().filter(|(_, event)| event.vehicle == state.name && event.source == "mode");
+        let modes = modes.map(|(at_s, event)| (*at_s, event.text.clone()));
+        let steers = |slot: &str| ![SlotId::Requests.name(), SlotId::Budget.name()].contains(&slot);
+        let orders = vehicle.orders_of_people().filter(|((slot, _), _)| steers(slot));
+        let orders = orders.filter_map(|(order, way)| {
+            let last = way.last()?;
+            let after = last.after_s(self).map_or_else(String::new, |s| format!(" after {s:.1} s"));
+            Some((last.given_s, format!("ordered: {}; {}{after}", self.ordered(state, vehicle, order).1, last.told())))
+        });
+        let mut steps: Vec<(f64, String)> = modes.chain(orders).collect();
+        if steps.is_empty() {
+            return;
+        }
+        steps.sort_by(|a, b| a.0.total_cmp(&b.0));
+        *page += "<h3>What the vehicle was steered by, and its modes</h3>\n<table><thead><tr><th>time (UTC)</th><th>what</th><th>cells on the map by \
+                  then</th></tr></thead>\n";
+        for (at_s, text) in &steps {
+            let cells = vehicle.maps.iter().rev().find(|maps| maps.at_s <= *at_s).map_or(0, |maps| maps.cells);
+            let _ = writeln!(
+                page,
+                "<tr><td class=\"t\">{}</td><td>{}</td><td class=\"n\">{cells}</td></tr>",
+                utc_text(*at_s),
+                Escaped(text)
+            );
+        }
+        *page += "</table>\n";
+    }
+}
+
+/// The author and the words of an entry of the log, of which the words are to be recognised.
+fn said(text: &str, is_it: impl Fn(&str) -> bool) -> Option<(String, String)> {
+    let (by, words) = text.split_once(": ").filter(|(_, words)| is_it(words)).unwrap_or(("", text));
+    is_it(words).then(|| (by.to_owned(), words.to_owned()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use scenecast_messages::builtin_interfaces::Time;
+    use scenecast_messages::scenecast_msgs::Order;
+
+    fn status(version: u32, status: u8, s: i64) -> OrderStatus {
+        let mut message = OrderStatus { slot: "fence".into(), version, status, ..OrderStatus::default() };
+        (message.header.stamp, message.given) = (Time::from_nanos(s * 1_000_000_000), Time::from_nanos(1_000_000_000));
+        message
+    }
+
+    #[test]
+    fn an_order_of_images_tells_the_new_ones_first() {
+        let mut vehicle = DiveVehicle::default();
+        let slot = SlotId::Requests.name().to_owned();
+        for (version, labels) in [(1, "[4]"), (2, "[4, 7]"), (5, "[7]"), (6, "[]")] {
+            let content = format!("{{\"labels\": {labels}}}");
+            vehicle
+                .given
+                .insert((slot.clone(), version), Order { slot: slot.clone(), version, content, ..Order::default() });
+        }
+        let told = |version: u32| vehicle.content(&VehicleState::default(), &(slot.clone(), version)).unwrap();
+        assert_eq!(told(1), "images of label 4");
+        assert_eq!(told(2), "images of label 7, beside those of label 4");
+        assert_eq!(told(5), "images of label 7, asked for before, again");
+        assert_eq!(told(6), "no image is asked for any more");
+    }
+
+    #[test]
+    fn what_only_the_vehicle_recorded_ends_an_order_and_is_told_as_such() {
+        let mut vehicle = DiveVehicle::default();
+        for (version, state) in [(1, OrderStatus::ON_AIR), (2, OrderStatus::REFUSED)] {
+            vehicle.take_order(&status(version, state, 2));
+            vehicle.take_decision(&status(version, OrderStatus::APPLIED, 5));
+        }
+        vehicle.take_decision(&status(3, OrderStatus::APPLIED, 5));
+        let last = |version| vehicle.orders[&("fence".to_owned(), version)].last().unwrap();
+        assert_eq!(last(1).told(), "applied, by the vehicle's own record alone");
+        assert_eq!((last(1).at_s, last(1).given_s), (5.0, 1.0));
+        assert_eq!(last(2).told(), "refused");
+        assert_eq!(vehicle.orders.len(), 2, "the surface did not give a third one");
+    }
+}
