@@ -28,6 +28,11 @@ pub fn own_scale_m(path: &Path) -> Result<Option<f64>, UserError> {
     Ok(scenecast_sensors::geotiff_scale_m(&read_regular(path, MAX_BYTES)?))
 }
 
+/// What else than transparency says where an image has no data, for people.
+pub fn unread_emptiness(path: &Path) -> Result<Option<String>, UserError> {
+    Ok(scenecast_sensors::unread_emptiness(&read_regular(path, MAX_BYTES)?))
+}
+
 /// Classes from a grey or indexed image of `size` pixels: the pixel value is the class.
 pub fn read_classes(path: &Path, size: (u32, u32)) -> Result<Vec<u8>, UserError> {
     let bytes = read_regular(path, MAX_BYTES)?;

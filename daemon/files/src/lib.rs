@@ -21,7 +21,7 @@ pub use configured::{
     configured_calibration, configured_mounting, configured_recording, configured_vocabulary, open_bag, read_vocabulary,
 };
 pub use geojson::{AreaShape, CoordinateFrame, FenceShapes, read_areas, read_fence};
-pub use images::{FrameImage, own_scale_m, read_classes, read_image};
+pub use images::{FrameImage, own_scale_m, read_classes, read_image, unread_emptiness};
 pub use label_folder::{FolderItem, LabelFolder, read_class_names};
 pub use record::{
     FrameFate, FrameTimes, MissionClock, MissionSpeed, RecordEntry, RecordLimits, RecordWriter, RecordedFrames,

@@ -6,7 +6,7 @@ use crate::camera::{CameraFrame, ReadFrame};
 use scene_model::project::Pose;
 use scenecast_core::UserError;
 use scenecast_protocol::directive::Settings;
-use scenecast_sensors::DepthError;
+use scenecast_sensors::{DepthError, ImageSize};
 use scenecast_vehicle::{CameraFinding, Frame, MapProducer, MapUpdate, Mapper, RegisteredFrame, SharedExemplars};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
@@ -53,7 +53,8 @@ impl MapperThread {
         mapper.check_camera();
         let (orders, incoming) = mpsc::unbounded_channel();
         let (outgoing, mapped) = mpsc::channel(4);
-        let work = move || Work { mapper, keep, outgoing, is_refusal_reported: false }.run(incoming);
+        let size = ImageSize::default();
+        let work = move || Work { mapper, keep, outgoing, is_refusal_reported: false, size }.run(incoming);
         let thread = std::thread::Builder::new().name("scene-model".to_owned()).spawn(work);
         let thread = thread.map_err(|e| UserError::Failed(format!("the scene model's thread did not start: {e}")))?;
         Ok(Self { orders, mapped, thread })
@@ -120,6 +121,8 @@ struct Work {
     outgoing: mpsc::Sender<FromMapper>,
     /// Whether the host knows that the last checkpoint was refused.
     is_refusal_reported: bool,
+    /// Of images without a calibration, and of pixels as configured.
+    size: ImageSize,
 }
 
 impl Work {
@@ -170,7 +173,13 @@ impl Work {
     }
 
     fn see(&mut self, mut frame: CameraFrame) -> FromMapper {
-        match frame.take_image() {
+        let read = frame.take_image().and_then(|read| match &read.view {
+            None if frame.scale == 1.0 => {
+                self.size.check(read.image.dimensions()).map(|()| read).map_err(|e| UserError::Input(e.to_string()))
+            }
+            _ => Ok(read),
+        });
+        match read {
             Ok(ReadFrame { image, view, unusable_depth }) => {
                 let at = &frame.pose;
                 let pose = Pose { x: at.x_m, y: at.y_m, z: -at.depth_m, yaw_rad: -at.heading_rad };

@@ -26,7 +26,10 @@ pub enum DecodeError {
     #[error("the JPEG has no end, so a part of it is missing")]
     CutJpeg,
     /// Nothing says which of them is white.
-    #[error("its levels have 32 bits or more, or are floats: convert it to 8 or 16 bits, from black to white")]
+    #[error(
+        "its levels have 32 bits or more, or are floats or signed numbers: convert it to 8 or 16 bits, from black to white, as with \
+             gdal_translate -ot Byte -scale"
+    )]
     WideLevels,
     #[error("the image has {width} x {height} pixels; allowed are up to {MAX_PIXELS}")]
     TooLarge { width: u32, height: u32 },
@@ -47,7 +50,7 @@ pub enum DecodeError {
     #[error("it breaks off before its last row")]
     CutOff,
     #[error(
-        "its data, which are all there, are compressed in a way that is not read: convert it, as with gdal_translate -co COMPRESS=DEFLATE"
+        "its data are compressed in a way that is not read: convert it, as with gdal_translate -co COMPRESS=DEFLATE"
     )]
     OtherCompression,
     /// The rows from `row` on are missing or damaged.
@@ -60,6 +63,10 @@ pub enum DecodeError {
     DecoderFailed,
     #[error("not an image that can be read: {0}")]
     Broken(String),
+    #[error(
+        "it has a form that is not read: {0}; convert it, as with gdal_translate -co COMPRESS=DEFLATE -co PHOTOMETRIC=RGB -ot Byte"
+    )]
+    Unsupported(String),
 }
 
 /// BigTIFF, with offsets of 64 bits; the library reads it but does not recognise it.
@@ -92,7 +99,7 @@ fn broken_within(limits: &Limits) -> impl Fn(ImageError) -> DecodeError + use<> 
             // Grey levels of so many bits: floats or whole numbers.
             UnsupportedErrorKind::Color(ExtendedColorType::Unknown(32 | 64 | 96 | 128)) => DecodeError::WideLevels,
             UnsupportedErrorKind::Color(_) => DecodeError::OtherColours,
-            _ => DecodeError::Broken(error.to_string()),
+            _ => DecodeError::Unsupported(error.to_string()),
         },
         ImageError::IoError(cause) if cause.kind() == std::io::ErrorKind::UnexpectedEof => DecodeError::CutOff,
         ImageError::Limits(_) => DecodeError::TooMuchMemory { megabytes },
@@ -149,7 +156,9 @@ fn decode_within(bytes: &[u8], max_pixels: u64, limits: Limits) -> Result<Dynami
     // Some files with LZW end too early for the library.
     decoded.map_err(|error| match error {
         DecodeError::CutOff if has_all_its_data(bytes) => DecodeError::OtherCompression,
-        DecodeError::OtherColours | DecodeError::WideLevels => cause_in_samples(bytes).unwrap_or(error),
+        DecodeError::OtherColours | DecodeError::WideLevels | DecodeError::Unsupported(_) => {
+            cause_in_samples(bytes).unwrap_or(error)
+        }
         error => error,
     })
 }
@@ -157,10 +166,13 @@ fn decode_within(bytes: &[u8], max_pixels: u64, limits: Limits) -> Result<Dynami
 /// Why the pixels of a TIFF are not read; the library says only how many bits they have.
 fn cause_in_samples(bytes: &[u8]) -> Option<DecodeError> {
     match samples(bytes)? {
-        Samples { bits: 8 | 16, count: 2, is_grey: true } => Some(DecodeError::GreyWithAlpha),
+        Samples { bits: 8 | 16, count: 2, is_grey: true, .. } => Some(DecodeError::GreyWithAlpha),
         Samples { bits, .. } if bits < 32 && !matches!(bits, 8 | 16) => {
             Some(DecodeError::OddBits { bits, highest: (1 << bits) - 1 })
         }
+        Samples { are_unsigned: false, .. } => Some(DecodeError::WideLevels),
+        Samples { has_plain_colours: false, .. } => Some(DecodeError::OtherColours),
+        Samples { is_packed_well: false, .. } => Some(DecodeError::OtherCompression),
         Samples { .. } => None,
     }
 }
@@ -352,15 +364,16 @@ mod tests {
     }
 
     #[test]
-    fn grey_with_transparency_and_odd_bits_of_a_tiff_are_named() {
-        let tiff = |bits: [u8; 2], count: u8| {
+    fn forms_of_a_tiff_that_are_not_read_are_named() {
+        let tiff = |bits: [u8; 2], count: u8, [packing, colours]: [u16; 2]| {
+            let ([p, q], [c, d]) = (packing.to_le_bytes(), colours.to_le_bytes());
             // Tag, type (short, or long for 273 and 279), count, value.
             let fields: [(u16, u8, u8, [u8; 4]); 9] = [
                 (256, 3, 1, [2, 0, 0, 0]),
                 (257, 3, 1, [1, 0, 0, 0]),
                 (258, 3, count, [bits[0], 0, bits[1], 0]),
-                (259, 3, 1, [1, 0, 0, 0]),
-                (262, 3, 1, [1, 0, 0, 0]),
+                (259, 3, 1, [p, q, 0, 0]),
+                (262, 3, 1, [c, d, 0, 0]),
                 (273, 4, 1, [130, 0, 0, 0]),
                 (277, 3, 1, [count, 0, 0, 0]),
                 (278, 3, 1, [1, 0, 0, 0]),
@@ -371,9 +384,18 @@ mod tests {
             };
             [&b"II*\0\x08\0\0\0\x09\0"[..], &fields.map(field).concat(), &[0; 20]].concat()
         };
-        assert_eq!(decode(&tiff([8, 8], 2), WHOLE), Err(DecodeError::GreyWithAlpha));
-        assert_eq!(decode(&tiff([16, 16], 2), WHOLE), Err(DecodeError::GreyWithAlpha));
-        assert_eq!(decode(&tiff([12, 0], 1), WHOLE), Err(DecodeError::OddBits { bits: 12, highest: 4095 }));
+        let grey = [1, 1];
+        assert_eq!(decode(&tiff([8, 8], 2, grey), WHOLE), Err(DecodeError::GreyWithAlpha));
+        assert_eq!(decode(&tiff([16, 16], 2, grey), WHOLE), Err(DecodeError::GreyWithAlpha));
+        assert_eq!(decode(&tiff([12, 0], 1, grey), WHOLE), Err(DecodeError::OddBits { bits: 12, highest: 4095 }));
+        for packing in [34_925, 50_000, 50_001] {
+            let told = decode(&tiff([8, 0], 1, [packing, 1]), WHOLE);
+            assert_eq!(told, Err(DecodeError::OtherCompression), "LZMA, Zstandard, WebP");
+        }
+        for colours in [3, 6, 8] {
+            let told = decode(&tiff([8, 0], 1, [1, colours]), WHOLE);
+            assert_eq!(told, Err(DecodeError::OtherColours), "a palette, YCbCr, CIELab");
+        }
     }
 
     #[test]

@@ -122,10 +122,11 @@ impl<'a> ExifData<'a> {
         Some((0..count).map_while(number).collect())
     }
 
-    /// The first number of a field of 64-bit floats.
-    pub(crate) fn double(&self, directory: usize, tag: u16) -> Option<f64> {
+    /// A number of a field of 64-bit floats, the first one being 0.
+    pub(crate) fn double(&self, directory: usize, tag: u16, nth: usize) -> Option<f64> {
         let entry = self.entry(directory, tag).filter(|entry| self.short(entry + 2) == Some(12))?;
-        self.array(self.long(entry + 8)?).map(f64::from_be_bytes)
+        self.long(entry + 4).filter(|count| nth < *count)?;
+        self.array(self.long(entry + 8)?.checked_add(8 * nth)?).map(f64::from_be_bytes)
     }
 
     /// Whether all these bytes are in the file.
@@ -140,7 +141,7 @@ impl<'a> ExifData<'a> {
     }
 
     /// A field of ASCII, without what follows its end. Up to four bytes stand in the entry itself.
-    fn text(&self, directory: usize, tag: u16) -> Option<&'a str> {
+    pub(crate) fn text(&self, directory: usize, tag: u16) -> Option<&'a str> {
         let entry = self.entry(directory, tag)?;
         let length = self.long(entry + 4)?;
         let at = if length <= 4 { entry + 8 } else { self.long(entry + 8)? };

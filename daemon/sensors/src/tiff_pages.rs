@@ -7,17 +7,20 @@ const NEW_SUBFILE_TYPE: u16 = 254;
 const IMAGE_WIDTH: u16 = 256;
 const IMAGE_LENGTH: u16 = 257;
 const BITS_PER_SAMPLE: u16 = 258;
+const COMPRESSION: u16 = 259;
 const PHOTOMETRIC: u16 = 262;
 const SAMPLES_PER_PIXEL: u16 = 277;
 const PLANAR_CONFIGURATION: u16 = 284;
 const TILE_WIDTH: u16 = 322;
 const TILE_LENGTH: u16 = 323;
+const SAMPLE_FORMAT: u16 = 339;
 
 /// The places of the data of strips and of tiles, and their lengths.
 const DATA: [(u16, u16); 2] = [(273, 279), (324, 325)];
 
 /// Bits of `NEW_SUBFILE_TYPE`: a reduced image, a mask.
-const NOT_WHOLE: usize = 1 | 4;
+const NOT_WHOLE: usize = 1 | MASK;
+const MASK: usize = 4;
 /// Separate planes.
 const PLANAR: usize = 2;
 /// Pages that are looked at.
@@ -70,6 +73,12 @@ pub(crate) struct Samples {
     pub(crate) count: usize,
     /// Whether the first one is a level of grey.
     pub(crate) is_grey: bool,
+    /// Whether they are whole numbers without a sign.
+    pub(crate) are_unsigned: bool,
+    /// Whether they are red, green and blue, grey, or the four of print.
+    pub(crate) has_plain_colours: bool,
+    /// Whether they are packed in a way that is read.
+    pub(crate) is_packed_well: bool,
 }
 
 pub(crate) fn samples(bytes: &[u8]) -> Option<Samples> {
@@ -78,12 +87,19 @@ pub(crate) fn samples(bytes: &[u8]) -> Option<Samples> {
     let number = |tag, default| tiff.numbers(page, tag).and_then(|all| all.first().copied()).unwrap_or(default);
     // White may be 0.
     let is_grey = number(PHOTOMETRIC, 0) < 2;
-    Some(Samples { bits: number(BITS_PER_SAMPLE, 1), count: number(SAMPLES_PER_PIXEL, 1), is_grey })
+    let are_unsigned = number(SAMPLE_FORMAT, 1) == 1;
+    // 2 is red, green and blue, 5 is print.
+    let has_plain_colours = is_grey || matches!(number(PHOTOMETRIC, 0), 2 | 5);
+    // None, LZW, deflate in both forms, PackBits.
+    let is_packed_well = matches!(number(COMPRESSION, 1), 1 | 5 | 8 | 32_773 | 32_946);
+    let (bits, count) = (number(BITS_PER_SAMPLE, 1), number(SAMPLES_PER_PIXEL, 1));
+    Some(Samples { bits, count, is_grey, are_unsigned, has_plain_colours, is_packed_well })
 }
 
 /// Metres across a pixel, as a GeoTIFF with a projection in metres has it (OGC 19-008r4).
 pub fn geotiff_scale_m(bytes: &[u8]) -> Option<f64> {
     const PIXEL_SCALE: u16 = 33_550;
+    const MODEL_TRANSFORMATION: u16 = 34_264;
     const GEO_KEYS: u16 = 34_735;
     const MODEL_TYPE: usize = 1024;
     const PROJECTED: usize = 1;
@@ -100,7 +116,24 @@ pub fn geotiff_scale_m(bytes: &[u8]) -> Option<f64> {
         })
     };
     let is_in_metres = value(MODEL_TYPE) == Some(PROJECTED) && value(LINEAR_UNITS).is_none_or(|unit| unit == METRE);
-    tiff.double(page, PIXEL_SCALE).filter(|m| is_in_metres && m.is_finite() && *m > 0.0)
+    // A map that is turned has a matrix instead, row by row.
+    let matrix = |nth| tiff.double(page, MODEL_TRANSFORMATION, nth);
+    let turned = || Some(matrix(0)?.hypot(matrix(4)?));
+    let scale_m = tiff.double(page, PIXEL_SCALE, 0).or_else(turned);
+    scale_m.filter(|m| is_in_metres && m.is_finite() && *m > 0.0)
+}
+
+/// What else than transparency says where a TIFF has no data, for people: it is not read.
+pub fn unread_emptiness(bytes: &[u8]) -> Option<String> {
+    const GDAL_NODATA: u16 = 42_113;
+    let tiff = ExifData::of_tiff(bytes)?;
+    let page = first_whole_page(&tiff)?;
+    let pages = std::iter::successors(tiff.long(4), |page| tiff.next_directory(*page)).take(MAX_PAGES);
+    let is_mask = |page: usize| tiff.number(page, NEW_SUBFILE_TYPE).is_some_and(|kind| kind & MASK != 0);
+    match tiff.text(page, GDAL_NODATA) {
+        Some(value) => Some(format!("the level {value} for no data")),
+        None => pages.into_iter().any(is_mask).then(|| "a mask".to_owned()),
+    }
 }
 
 /// Whether all the data of the first whole page of a TIFF are in the file.
@@ -239,6 +272,24 @@ mod tests {
     fn planes_in_tiles_that_reach_beyond_the_image_are_read() {
         let expected = RgbImage::from_fn(20, 18, |x, y| Rgb(pixel(x, y)));
         assert_eq!(decode(&planar_tiled(), BitDepth::Fixed(16)), Ok(expected));
+    }
+
+    #[test]
+    fn a_mask_and_a_level_for_no_data_are_named() {
+        let page = |next: u32, fields: &[(u16, u16, u32, [u8; 4])]| {
+            let field = |(tag, kind, count, value): &(u16, u16, u32, [u8; 4])| {
+                [&tag.to_le_bytes()[..], &kind.to_le_bytes(), &count.to_le_bytes(), value].concat()
+            };
+            let fields: Vec<u8> = fields.iter().flat_map(field).collect();
+            [&((fields.len() / 12) as u16).to_le_bytes()[..], &fields, &next.to_le_bytes()].concat()
+        };
+        let tiff = |pages: &[Vec<u8>]| [&b"II*\0\x08\0\0\0"[..], &pages.concat()].concat();
+        let [whole, mask] = [0, 4].map(|kind: u8| (254, 4, 1, [kind, 0, 0, 0]));
+        assert_eq!(super::unread_emptiness(&tiff(&[page(0, &[whole])])), None);
+        let masked = tiff(&[page(26, &[whole]), page(0, &[mask])]);
+        assert_eq!(super::unread_emptiness(&masked).as_deref(), Some("a mask"));
+        let level = tiff(&[page(0, &[whole, (42_113, 2, 4, *b"255\0")])]);
+        assert_eq!(super::unread_emptiness(&level).as_deref(), Some("the level 255 for no data"));
     }
 
     #[test]

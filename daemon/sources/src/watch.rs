@@ -52,6 +52,7 @@ struct ToldNames {
     is_ahead_told: bool,
     /// Endings of files that are not read.
     endings: BTreeSet<String>,
+    is_folder_told: bool,
 }
 
 impl ToldNames {
@@ -83,8 +84,16 @@ impl ToldNames {
         Some(format!("{name}: its time is {:.1} hours ahead of the clock of this computer", ahead_s / 3600.0))
     }
 
-    /// A file that is not named as one that is read; returns what people should know of it, once for each ending.
+    /// A file that is not named as one that is read, or a folder; returns what people should know of it, once for each ending, and for
+    /// folders.
     fn handle_other(&mut self, path: &Path) -> Option<String> {
+        let is_hidden = path.file_name().is_some_and(|name| name.to_string_lossy().starts_with('.'));
+        if path.is_dir() && !is_hidden && !std::mem::replace(&mut self.is_folder_told, true) {
+            return Some(format!(
+                "{}: folders within the folder are not read: name the one with the images",
+                path.display()
+            ));
+        }
         let ending = ending(path).filter(|ending| UNREAD.contains(&ending.as_str()))?;
         let is_new = self.endings.insert(ending);
         is_new.then(|| {
@@ -405,6 +414,8 @@ mod tests {
         assert_eq!(told.handle_other(Path::new("/frames/0002.bmp")), None);
         assert_eq!(told.handle_other(Path::new("/frames/notes.txt")), None, "it may belong to the camera's program");
         assert!(told.handle_other(Path::new("/frames/0001.dng")).is_some());
+        let folders = [(); 2].map(|()| told.handle_other(&std::env::temp_dir()));
+        assert!(folders[0].as_ref().unwrap().contains("name the one with the images") && folders[1].is_none());
     }
 
     #[test]

@@ -120,8 +120,8 @@ impl Surface {
 
     pub(super) fn log_faults(&mut self, vehicle: Address, now: Instant) {
         let Some((status, _)) = self.link.vehicle(vehicle).and_then(|view| view.status()) else { return };
-        let faults = status.faults;
-        if let Some(text) = self.watches.entry(vehicle).or_default().handle_faults(faults, now) {
+        let (faults, is_silent) = (status.faults, status.autopilot_silent);
+        if let Some(text) = self.watches.entry(vehicle).or_default().handle_faults(faults, is_silent, now) {
             self.log_fact(vehicle, LogKind::Fault, &text, now);
         }
     }

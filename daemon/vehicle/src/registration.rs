@@ -105,6 +105,12 @@ impl Mapper {
         finding
     }
 
+    /// What people should know of the camera by all of a recording, if its frames have shown it and it was not told.
+    pub fn last_camera_finding(&self) -> Option<CameraFinding> {
+        let found = self.geometry.as_ref()?.geometry()?;
+        Some(found.finding(self.metres_per_pixel()))
+    }
+
     /// The evidence of the registration so far; `None` without registration.
     pub fn registration(&self) -> Option<Tally> {
         self.registrar.as_ref().map(Registrar::tally)

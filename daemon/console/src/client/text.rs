@@ -62,8 +62,9 @@ fn vehicle(out: &mut String, v: &VehicleState, state: &MissionState) {
         if let Some(path) = path(s) {
             let _ = writeln!(out, "  path       {path}");
         }
-        if !s.faults.is_empty() {
-            let faults: Vec<&str> = s.faults.iter().map(|fault| fault.text.as_str()).collect();
+        let silence = s.autopilot_silent.then_some("the autopilot does not answer");
+        let faults: Vec<&str> = silence.into_iter().chain(s.faults.iter().map(|fault| fault.text.as_str())).collect();
+        if !faults.is_empty() {
             let _ = writeln!(out, "  FAULTS     {}", faults.join(", "));
         }
         if let Some(state) = &s.disk {

@@ -40,9 +40,12 @@ impl FirstFix {
         if lines == 0 {
             return format!("no line came in {seconds} s, only bytes without an end of line: check the baud rate");
         }
-        let (check, count) = match faults.iter().max_by_key(|(_, count)| **count) {
-            Some((fault, count)) => (advice(*fault, language), *count),
-            None => ("none of them has a position: switch on sentences such as GGA or RMC", 0),
+        let (check, count) = match (faults.iter().max_by_key(|(_, count)| **count), language) {
+            (Some((fault, count)), _) => (advice(*fault, language), *count),
+            (None, GpsLanguage::Nmea) => ("none of them has a position: switch on sentences such as GGA or RMC", 0),
+            (None, GpsLanguage::Gpsd) => {
+                ("none of them has a position: check with cgps whether gpsd has a receiver", 0)
+            }
         };
         format!("no position came in {seconds} s: of {lines} lines {count} were not used; {check}")
     }
@@ -90,7 +93,7 @@ mod tests {
             (GpsLanguage::Nmea, "{\"class\":\"TPV\",\"mode\":3}\n", "gpsd"),
             (GpsLanguage::Nmea, "\u{1}\u{2}", "end of line"),
             (GpsLanguage::Gpsd, "{\"class\":\"TPV\",\"mode\":1}\n", "antenna"),
-            (GpsLanguage::Gpsd, "{\"class\":\"SKY\"}\n", "none of them has a position"),
+            (GpsLanguage::Gpsd, "{\"class\":\"DEVICES\",\"devices\":[]}\n", "whether gpsd has a receiver"),
         ] {
             let told = notes(language, line);
             assert!(told.len() == 1 && told[0].0 == 15 && told[0].1.contains(check), "{line} {told:?}");

@@ -33,6 +33,14 @@ impl Lasting {
     }
 }
 
+/// What people should read where an autopilot was never heard.
+pub(super) fn absence_text(awaited: &str, after: Duration) -> String {
+    format!(
+        "no {awaited} has come in {} s: check that the autopilot is on and sends to this end (autopilot.port)",
+        after.as_secs()
+    )
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

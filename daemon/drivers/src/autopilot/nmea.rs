@@ -11,7 +11,7 @@
 //! the course while under way), depths of the water (DBS) and heights of the transducer above the sea floor (DPT, DBT); the vehicle's
 //! depth is the difference of the two. A position, a heading or a depth that is not known, or not any more, is named.
 
-use super::lasting::Lasting;
+use super::lasting::{Lasting, absence_text};
 use super::soundings::Soundings;
 use super::{Autopilot, Counters, Goal, Health, Step, Tray};
 use scenecast_core::gps::{Gps, GpsLanguage};
@@ -34,6 +34,8 @@ pub struct Nmea {
     answers: bool,
     silence: Duration,
     heard: Option<Instant>,
+    /// Nothing was ever heard.
+    absence: Lasting,
     soundings: Soundings,
     /// No compass is heard.
     heading_absence: Lasting,
@@ -58,6 +60,7 @@ impl Nmea {
             answers,
             silence,
             heard: None,
+            absence: Lasting::default(),
             soundings: Soundings::default(),
             heading_absence: Lasting::default(),
             hears_magnetic: false,
@@ -192,6 +195,9 @@ impl Autopilot for Nmea {
         let health = self.health(now);
         if health == Health::NotInCommand {
             self.watch_position(now);
+        }
+        if health == Health::Awaited && self.absence.is_news(self.silence, now) {
+            self.tray.note(absence_text("sentence", self.silence));
         }
         if health == Health::Silent && !std::mem::replace(&mut self.was_silent, true) {
             self.tray.count("silences");

@@ -1,5 +1,6 @@
 //! The images of a recording of ROS 2 in MCAP.
 
+pub(crate) mod parts;
 pub(crate) mod stream;
 
 use image::RgbImage;

@@ -1,6 +1,7 @@
 //! The messages of an MCAP file, one after the other, with bounded memory. Chunks and single messages may be compressed. A chunk that is
 //! damaged is left out, and what follows is read.
 
+use super::parts::{check_format, gaps, mcap_files};
 use mcap::records::{Channel, Record, SchemaHeader, op};
 use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use scenecast_core::UserError;
@@ -32,6 +33,8 @@ pub(crate) struct BagMessage {
 
 /// The files of a bag, which are read from the beginning of the first.
 pub(crate) struct BagStream {
+    /// What is missing among the files, until it is told.
+    gaps: std::vec::IntoIter<String>,
     rest: std::vec::IntoIter<PathBuf>,
     open: Option<(File, LinearReader)>,
     schemas: BTreeMap<u16, String>,
@@ -48,22 +51,19 @@ impl BagStream {
     /// There is no such file, or the folder has none.
     pub(crate) fn open(path: &Path) -> Result<Self, UserError> {
         let files = mcap_files(path)?;
-        for file in &files {
-            let mut head = Vec::new();
-            let mut opened = scenecast_config::open_regular(file, u64::MAX)?.take(16);
-            opened.read_to_end(&mut head).map_err(|e| UserError::file(file, e))?;
-            if let Some(other) = OTHER_FORMATS.iter().find(|other| head.starts_with(other.magic)) {
-                return Err(UserError::file(file, other.advice));
-            }
-        }
+        files.iter().try_for_each(|file| check_format(file))?;
+        let gaps = gaps(path, &files).into_iter();
         let (schemas, channels) = (BTreeMap::new(), BTreeMap::new());
         let (read, other_encodings) = (VecDeque::new(), BTreeSet::new());
-        Ok(Self { rest: files.into_iter(), open: None, schemas, channels, read, other_encodings })
+        Ok(Self { gaps, rest: files.into_iter(), open: None, schemas, channels, read, other_encodings })
     }
 
     /// The next message of a topic that is `wanted`; `None` at the end. After an error what lies behind the damage follows.
     pub(crate) fn next(&mut self, wanted: impl Fn(&BagTopic) -> bool) -> Result<Option<BagMessage>, String> {
         loop {
+            if let Some(gap) = self.gaps.next() {
+                return Err(gap);
+            }
             if let Some(message) = self.read.pop_front() {
                 return Ok(Some(BagMessage { bytes: unpacked(message.bytes)?, ..message }));
             }
@@ -147,11 +147,6 @@ impl BagStream {
     pub(crate) fn other_encodings(&self) -> &BTreeSet<String> {
         &self.other_encodings
     }
-}
-
-/// The file of this path, or the files `*.mcap` of a folder in the order of their numbers.
-pub(crate) fn mcap_files(path: &Path) -> Result<Vec<PathBuf>, UserError> {
-    if path.is_dir() { files_of(path) } else { Ok(vec![path.to_owned()]) }
 }
 
 /// Whether a file has its end.
@@ -265,35 +260,7 @@ fn unpacked(bytes: Vec<u8>) -> Result<Vec<u8>, String> {
 
 /// Size of the largest message, bytes.
 const MAX_MESSAGE_BYTES: usize = 256 << 20;
-const ZSTD: &[u8] = b"\x28\xB5\x2F\xFD";
-
-/// A kind of recordings that are no MCAP file.
-struct OtherFormat {
-    magic: &'static [u8],
-    extensions: &'static [&'static str],
-    /// What it is, and the command that converts it.
-    advice: &'static str,
-}
-
-const OTHER_FORMATS: [OtherFormat; 3] = [
-    OtherFormat {
-        magic: b"SQLite format 3",
-        extensions: &["db3"],
-        advice: "it is a bag in SQLite (.db3), and MCAP is read: ros2 bag convert -i BAG -o OPTIONS.yaml converts it, where OPTIONS.yaml is \
-                 output_bags: [{uri: NEW, storage_id: mcap, all_topics: true}]",
-    },
-    OtherFormat {
-        magic: b"#ROSBAG V2",
-        extensions: &["bag"],
-        advice: "it is a bag of ROS 1, and MCAP of ROS 2 is read: rosbags-convert --src OLD.bag --dst NEW --dst-storage mcap converts it \
-                 (pip install rosbags)",
-    },
-    OtherFormat {
-        magic: ZSTD,
-        extensions: &["zstd", "zst"],
-        advice: "it is compressed as a whole: zstd -d *.zstd unpacks it",
-    },
-];
+pub(super) const ZSTD: &[u8] = b"\x28\xB5\x2F\xFD";
 
 fn reader() -> LinearReader {
     // A recorder without power leaves a file without its end; chunks that are whole are read.
@@ -314,80 +281,9 @@ fn chunk_reader() -> LinearReader {
     LinearReader::new_with_options(options)
 }
 
-/// How to convert a part of a bag that is of another format, if it was not converted yet: a recorder that broke down leaves its last
-/// file, or all others, uncompressed.
-fn unread_part(path: &Path) -> Option<&'static str> {
-    let extension = |path: &Path| path.extension().map(|e| e.to_string_lossy().into_owned());
-    let own = extension(path)?;
-    let format = OTHER_FORMATS.iter().find(|other| other.extensions.contains(&own.as_str()))?;
-    let (converted, is_part) = match format.magic {
-        ZSTD => (path.with_extension(""), extension(&path.with_extension(""))? == "mcap"),
-        _ => (path.with_extension("mcap"), true),
-    };
-    (is_part && !converted.exists()).then_some(format.advice)
-}
-
-fn files_of(dir: &Path) -> Result<Vec<PathBuf>, UserError> {
-    let entries = std::fs::read_dir(dir).map_err(|e| UserError::file(dir, e))?;
-    let paths: Vec<PathBuf> = entries.filter_map(|entry| Some(entry.ok()?.path())).collect();
-    let ends_in = |path: &PathBuf, extension: &str| path.extension().is_some_and(|e| e == extension);
-    let mut files: Vec<PathBuf> = paths.iter().filter(|path| ends_in(path, "mcap")).cloned().collect();
-    if files.is_empty() {
-        let is_there = |extension: &&str| paths.iter().any(|path| ends_in(path, extension));
-        let other = OTHER_FORMATS.iter().find(|other| other.extensions.iter().any(is_there));
-        return Err(UserError::file(dir, other.map_or("the folder has no file *.mcap", |other| other.advice)));
-    }
-    if let Some((part, advice)) = paths.iter().find_map(|path| Some((path, unread_part(path)?))) {
-        return Err(UserError::file(part, format!("a part of the bag is of another format: {advice}")));
-    }
-    // The files of a split bag end in _0, _1, ..., _10.
-    files.sort_by_key(|path| (path.as_os_str().len(), path.clone()));
-    Ok(files)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn other_recordings_are_refused_with_a_command_to_convert_them() {
-        let dir = std::env::temp_dir().join(format!("scenecast-{}-other-bags", std::process::id()));
-        let _ = std::fs::remove_dir_all(&dir);
-        std::fs::create_dir_all(&dir).unwrap();
-        let refused = |path: &Path| BagStream::open(path).err().unwrap().to_string();
-        assert!(refused(&dir).contains("no file *.mcap"));
-        for (name, head, command) in [
-            ("a.db3", &b"SQLite format 3\0"[..], "ros2 bag convert"),
-            ("a.bag", b"#ROSBAG V2.0\n", "rosbags-convert"),
-            ("a.mcap.zstd", b"\x28\xB5\x2F\xFD", "zstd -d"),
-        ] {
-            let file = dir.join(name);
-            std::fs::write(&file, head).unwrap();
-            assert!(refused(&file).contains(command) && refused(&dir).contains(command), "{name}: {}", refused(&file));
-            std::fs::remove_file(file).unwrap();
-        }
-        std::fs::remove_dir_all(dir).unwrap();
-    }
-
-    #[test]
-    fn a_bag_with_a_part_of_another_format_is_refused() {
-        let dir = std::env::temp_dir().join(format!("scenecast-{}-part-of-a-bag", std::process::id()));
-        let _ = std::fs::remove_dir_all(&dir);
-        std::fs::create_dir_all(&dir).unwrap();
-        for name in ["bag_0.mcap", "bag_1.mcap.zstd", "notes.zst"] {
-            std::fs::write(dir.join(name), b"x").unwrap();
-        }
-        assert!(files_of(&dir).unwrap_err().to_string().contains("bag_1.mcap.zstd"));
-        std::fs::write(dir.join("bag_1.mcap"), b"x").unwrap();
-        let both = [dir.join("bag_0.mcap"), dir.join("bag_1.mcap")];
-        assert_eq!(files_of(&dir).unwrap(), both);
-        std::fs::write(dir.join("bag_1.db3"), b"x").unwrap();
-        assert_eq!(files_of(&dir).unwrap(), both, "it was converted");
-        std::fs::write(dir.join("bag_2.db3"), b"x").unwrap();
-        let refused = files_of(&dir).unwrap_err().to_string();
-        assert!(refused.contains("bag_2.db3") && refused.contains("ros2 bag convert"), "{refused}");
-        std::fs::remove_dir_all(dir).unwrap();
-    }
 
     #[test]
     fn a_message_that_is_compressed_by_itself_is_unpacked() {

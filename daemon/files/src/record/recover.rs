@@ -2,7 +2,8 @@
 
 use super::metadata::{Metadata, Part};
 use super::options;
-use crate::bag::stream::{Damage, is_whole, mcap_files, records};
+use crate::bag::parts::mcap_files;
+use crate::bag::stream::{Damage, is_whole, records};
 use crate::sync_folder;
 use mcap::Writer;
 use mcap::records::{MessageHeader, Record};

@@ -37,6 +37,7 @@ use scenecast_protocol::mac::ModemProfile;
 use scenecast_protocol::schedule::Audit;
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::Address;
+use scenecast_registration::CameraFinding;
 use scenecast_surface::{Surface, SurfaceOutput};
 use scenecast_vehicle::{Durable, Mapper, Vehicle};
 use scenecast_worlds::Motion;
@@ -163,7 +164,10 @@ impl Mission {
     pub fn notes(&self) -> impl Iterator<Item = String> {
         let unreadable = self.logbook.unreadable.as_ref();
         let unreadable = unreadable.map(|(count, first)| format!("{count} frames cannot be read, the first: {first}"));
-        self.camera.recording_notes().iter().cloned().chain(self.logbook.camera_advice.clone()).chain(unreadable)
+        let wrong = |finding| if let CameraFinding::Wrong(advice) = finding { Some(advice) } else { None };
+        let of_all = || self.mapper.last_camera_finding().and_then(wrong);
+        let advice = self.logbook.camera_advice.clone().or_else(of_all);
+        self.camera.recording_notes().iter().cloned().chain(advice).chain(unreadable)
     }
 
     /// The surface's role, which has what the operator sees.

@@ -75,11 +75,12 @@ impl PortKeeper {
                 None => open(&self.place).await,
             };
             let ended = match opened {
-                Ok(opened) => self.serve(opened).await,
+                Ok(opened) => self.serve(opened, is_logged).await,
                 Err(e) => Err(e),
             };
             let Err(e) = ended else { return };
-            if began.elapsed() > MAX_RETRY_INTERVAL {
+            // A port that is opened again and says nothing, or only who it is, has not recovered.
+            if began.elapsed() > MAX_RETRY_INTERVAL + self.quiet.unwrap_or_default() {
                 (pause, is_logged) = (FIRST_RETRY_INTERVAL, false);
             }
             // A lasting failure is logged once as a warning.
@@ -92,10 +93,12 @@ impl PortKeeper {
         }
     }
 
-    /// Carries bytes until the port fails, or the host is gone (`Ok`).
-    async fn serve(&mut self, opened: Opened) -> io::Result<()> {
-        if !matches!(opened, Opened::Listener(_)) {
-            tracing::info!("{}: open", self.name);
+    /// Carries bytes until the port fails, or the host is gone (`Ok`). `is_again`: soon after a failure that was logged.
+    async fn serve(&mut self, opened: Opened, is_again: bool) -> io::Result<()> {
+        match opened {
+            Opened::Listener(_) => {}
+            _ if is_again => tracing::debug!("{}: open", self.name),
+            _ => tracing::info!("{}: open", self.name),
         }
         let result = match opened {
             Opened::Serial(stream) => carry(stream, self.quiet, &PortActivity::new(), &mut self.ends).await,

@@ -18,6 +18,8 @@ pub(crate) struct Watch {
     is_silent: bool,
     mode: Option<(VehicleMode, ModeReason)>,
     faults: EquipmentFaults,
+    /// Reports in a row that say that the autopilot does not answer.
+    silent_reports: u32,
     /// When faults that are not grave were logged last.
     minor_logged: Option<Instant>,
     /// The labels of an epoch.
@@ -51,19 +53,29 @@ impl Watch {
         self.mode.replace((mode, reason)).is_some_and(|before| before != (mode, reason))
     }
 
-    /// The vehicle reports the faults of its equipment. The text is for the log: at once when a grave fault comes or goes, and
-    /// seldom for the others, which may come and go for hours.
-    pub(crate) fn handle_faults(&mut self, faults: EquipmentFaults, now: Instant) -> Option<String> {
+    /// The vehicle reports the faults of its equipment, and whether its autopilot does not answer. The text is for the log: at once
+    /// when that or a grave fault comes or goes, and seldom for the others, which may come and go for hours.
+    pub(crate) fn handle_faults(
+        &mut self,
+        faults: EquipmentFaults,
+        is_autopilot_silent: bool,
+        now: Instant,
+    ) -> Option<String> {
         let before = std::mem::replace(&mut self.faults, faults);
+        // The first report of a run may leave before the autopilot has answered.
+        let was_silent = self.silent_reports > 1;
+        self.silent_reports = if is_autopilot_silent { self.silent_reports.saturating_add(1) } else { 0 };
+        let is_silent = self.silent_reports > 1;
         let is_minor_due = self.minor_logged.is_none_or(|at| now.since(at) >= MINOR_PAUSE);
         let is_minor = faults != faults.grave() && is_minor_due;
-        if before.grave() == faults.grave() && !is_minor {
+        if before.grave() == faults.grave() && was_silent == is_silent && !is_minor {
             return None;
         }
         if faults != faults.grave() {
             self.minor_logged = Some(now);
         }
-        let texts: Vec<&str> = faults.iter().map(|(text, _)| text).collect();
+        let silence = is_silent.then_some("the autopilot does not answer");
+        let texts: Vec<&str> = silence.into_iter().chain(faults.iter().map(|(text, _)| text)).collect();
         Some(if texts.is_empty() { "no fault any more".to_owned() } else { texts.join(", ") })
     }
 
@@ -121,17 +133,20 @@ mod tests {
         let (mut watch, none) = (Watch::default(), EquipmentFaults::default());
         let grave = EquipmentFaults { camera_silent: true, autopilot_refuses: true, ..none };
         let minor = EquipmentFaults { images_dropped: true, ..none };
-        assert_eq!(watch.handle_faults(none, at(0.0)), None);
-        let text = watch.handle_faults(grave, at(1.0));
+        assert_eq!(watch.handle_faults(none, false, at(0.0)), None);
+        let text = watch.handle_faults(grave, false, at(1.0));
         assert_eq!(text.as_deref(), Some("the autopilot does not follow, no image comes in"));
-        assert_eq!(watch.handle_faults(grave, at(2.0)), None);
-        assert_eq!(watch.handle_faults(none, at(3.0)).as_deref(), Some("no fault any more"));
-        assert_eq!(watch.handle_faults(minor, at(4.0)).as_deref(), Some("images are dropped"));
+        assert_eq!(watch.handle_faults(grave, false, at(2.0)), None);
+        assert_eq!(watch.handle_faults(none, false, at(3.0)).as_deref(), Some("no fault any more"));
+        assert_eq!(watch.handle_faults(none, true, at(3.1)), None);
+        assert_eq!(watch.handle_faults(none, true, at(3.2)).as_deref(), Some("the autopilot does not answer"));
+        assert_eq!(watch.handle_faults(none, false, at(3.3)).as_deref(), Some("no fault any more"));
+        assert_eq!(watch.handle_faults(minor, false, at(4.0)).as_deref(), Some("images are dropped"));
         for second in 5..600 {
             let faults = if second % 2 == 0 { minor } else { none };
-            assert_eq!(watch.handle_faults(faults, at(f64::from(second))), None);
+            assert_eq!(watch.handle_faults(faults, false, at(f64::from(second))), None);
         }
-        assert_eq!(watch.handle_faults(minor, at(1804.0)).as_deref(), Some("images are dropped"));
+        assert_eq!(watch.handle_faults(minor, false, at(1804.0)).as_deref(), Some("images are dropped"));
     }
 
     #[test]

@@ -5,9 +5,10 @@ use image::{DynamicImage, GenericImageView, RgbImage};
 use scene_model::habitats::MeasuredPoint;
 use scene_model::project::{DownCamera, Observation, Pose};
 use scenecast_core::UserError;
-use scenecast_files::{RecordedFrame, Recording, own_scale_m, read_image};
+use scenecast_files::{RecordedFrame, Recording, own_scale_m, read_image, unread_emptiness};
 use scenecast_protocol::coordinates::MapPoint;
 use scenecast_registration::{CameraImage, FrameInput, GeometryCheck};
+use scenecast_sensors::ImageSize;
 use std::path::Path;
 
 /// Minimum edge of a cell, in pixels; a smaller one holds no texture.
@@ -87,7 +88,11 @@ impl Mosaic {
             content.retain(|u, v| !is_clear(&picture, u, v));
         }
         let seen = Some((content.as_words().iter().map(place).collect(), content.into_points()));
-        let notes = [note_of_scale(own_scale_m(path)?, metres_per_pixel), note_of_empty(&picture)];
+        let unread = unread_emptiness(path)?.filter(|_| !picture.color().has_alpha());
+        let unread = unread.map(|what| {
+            format!("the mosaic has {what}, which is not read, so that all of it gets labels; gdalwarp -dstalpha OLD.tif NEW.tif makes what has no data transparent")
+        });
+        let notes = [note_of_scale(own_scale_m(path)?, metres_per_pixel), note_of_empty(&picture), unread];
         let notes: Vec<String> = notes.into_iter().flatten().collect();
         let note = (!notes.is_empty()).then(|| notes.join("; "));
         Ok(Self { seen, size: (width, height), cell_px: cell_px as f32, note })
@@ -113,6 +118,8 @@ pub(crate) struct Frames {
     cell_m: f64,
     next: usize,
     unreadable: Vec<String>,
+    /// Of frames without a scale of their own.
+    size: ImageSize,
     /// Whether the camera is as stated.
     geometry: GeometryCheck,
     /// What of the recording is not among its frames.
@@ -132,8 +139,8 @@ impl Frames {
     /// The frames of a recording that is open.
     pub(crate) fn of(recording: Recording, look: Look, metres_per_pixel: f64, cell_m: f64) -> Self {
         let notes = recording.notes.clone();
-        let (unreadable, geometry) = (Vec::new(), GeometryCheck::default());
-        Self { recording, look, metres_per_pixel, cell_m, next: 0, unreadable, geometry, notes }
+        let (unreadable, size, geometry) = (Vec::new(), ImageSize::default(), GeometryCheck::default());
+        Self { recording, look, metres_per_pixel, cell_m, next: 0, unreadable, size, geometry, notes }
     }
 }
 
@@ -158,6 +165,12 @@ impl WordSource for Frames {
                     continue;
                 }
             };
+            if frame.scale == 1.0
+                && let Err(error) = self.size.check(image.dimensions())
+            {
+                self.unreadable.push(format!("{}: {error}", frame.image));
+                continue;
+            }
             let camera = DownCamera { metres_per_pixel: self.metres_per_pixel * frame.scale, altitude_m: 0.0 };
             let pose = Pose { x: frame.x_m, y: frame.y_m, z: -frame.depth_m, yaw_rad: -frame.heading_rad };
             let cell_px = (self.cell_m / camera.metres_per_pixel) as f32;

@@ -1,5 +1,6 @@
 //! What is missing on the link to an autopilot from the beginning, in words for people.
 
+use super::super::lasting::{Lasting, absence_text};
 use super::frame::Refused;
 use scenecast_protocol::time::Instant;
 use std::time::Duration;
@@ -16,6 +17,8 @@ pub(super) struct Reception {
     /// When the autopilot answered, until it reports its position.
     answered: Option<Instant>,
     is_told: bool,
+    /// Nothing has come since the port was opened.
+    absence: Lasting,
 }
 
 impl Reception {
@@ -25,6 +28,7 @@ impl Reception {
     }
 
     pub(super) fn handle_bytes(&mut self, count: usize, now: Instant) {
+        self.absence.end();
         self.began.get_or_insert(now);
         self.bytes += count as u64;
     }
@@ -39,9 +43,14 @@ impl Reception {
         self.answered = None;
     }
 
-    /// What people should know of bytes without a heartbeat of `system`, once.
+    /// What people should know where no bytes come, or bytes without a heartbeat of `system`, once.
     pub(super) fn poll_silence(&mut self, system: u8, refused: Refused, now: Instant) -> Option<String> {
-        self.began.filter(|began| !self.is_told && now.since(*began) >= AWAITED)?;
+        let Some(began) = self.began else {
+            return self.absence.is_news(AWAITED, now).then(|| absence_text("heartbeat", AWAITED));
+        };
+        if self.is_told || now.since(began) < AWAITED {
+            return None;
+        }
         self.is_told = true;
         let Refused { checksum, garbage, .. } = refused;
         let cause = match garbage + checksum {
@@ -85,6 +94,14 @@ mod tests {
         let noise = lines(Refused { garbage: 700, ..Refused::default() });
         assert!(noise.len() == 1 && noise[0].0 == 8 && noise[0].1.contains("baud rate"), "{noise:?}");
         assert!(lines(Refused::default())[0].1.contains("autopilot.system"));
+    }
+
+    #[test]
+    fn an_autopilot_that_sends_nothing_is_named_once() {
+        let mut reception = Reception::default();
+        let second = |s: u32| reception.poll_silence(1, Refused::default(), at(f64::from(s))).map(|line| (s, line));
+        let lines: Vec<(u32, String)> = (0..100).filter_map(second).collect();
+        assert!(lines.len() == 1 && lines[0].0 == 8 && lines[0].1.contains("autopilot.port"), "{lines:?}");
     }
 
     #[test]

@@ -73,19 +73,19 @@ pub(super) enum LimitsCommand {
 #[derive(Debug, Args)]
 pub(super) struct Limits {
     /// Minimum and maximum depth, metres
-    #[arg(long, value_name = "LOW..HIGH", value_parser = band)]
+    #[arg(long, value_name = "LOW..HIGH", value_parser = band, allow_hyphen_values = true)]
     depth: Option<[f64; 2]>,
     /// Minimum and maximum altitude, metres
-    #[arg(long, value_name = "LOW..HIGH", value_parser = band)]
+    #[arg(long, value_name = "LOW..HIGH", value_parser = band, allow_hyphen_values = true)]
     altitude: Option<[f64; 2]>,
     /// Maximum distance over ground, including the return path
-    #[arg(long, value_name = "METRES")]
+    #[arg(long, value_name = "METRES", allow_negative_numbers = true)]
     distance: Option<f64>,
     /// Maximum duration of the survey, including the return path
-    #[arg(long, value_name = "SECONDS")]
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
     time: Option<f64>,
     /// Maximum silence of the surface, seconds
-    #[arg(long, value_name = "SECONDS")]
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
     silence: Option<f64>,
     /// Reaction to that silence: hold, return or surface
     #[arg(long, value_name = "REACTION")]
