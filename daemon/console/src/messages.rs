@@ -79,7 +79,10 @@ pub fn order(
         SlotId::Destination => json!(orders.destination),
         SlotId::Settings => json!(orders.settings.requested),
         SlotId::Requests => {
-            let is_requested = |stage| matches!(stage, ExemplarStage::Queued | ExemplarStage::OnAir);
+            let is_requested = |stage| {
+                use ExemplarStage::{NotAvailable, OnAir, Queued, Receiving};
+                matches!(stage, Queued | OnAir | NotAvailable | Receiving)
+            };
             let requested = vehicle.labels.iter().filter(|label| is_requested(label.exemplar.state));
             json!({ "labels": requested.map(|label| label.id).collect::<Vec<_>>() })
         }

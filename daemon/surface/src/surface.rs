@@ -302,7 +302,10 @@ impl Surface {
             SurfaceEvent::LabelNamed(vehicle) | SurfaceEvent::LabelsJoined(vehicle) => self.follow_labels(vehicle),
             SurfaceEvent::VehicleRestarted(vehicle) => {
                 self.records.get_mut(&vehicle).into_iter().for_each(VehicleRecord::begin_run);
-                self.log_fact(vehicle, LogKind::Contact, "another run begins", now);
+                // The first frame of all is told as such.
+                if self.watches.get(&vehicle).is_some_and(Watch::has_received) {
+                    self.log_fact(vehicle, LogKind::Contact, "the vehicle begins another run", now);
+                }
                 self.request_again(vehicle, now);
                 Some(SurfaceOutput::MapChanged(vehicle))
             }

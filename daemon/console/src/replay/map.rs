@@ -6,7 +6,7 @@ use crate::state::FormerLabel;
 use scenecast_messages::scenecast_msgs;
 use scenecast_protocol::map::{Cell, LabelGrid, LayerDescriptor, LayerReplica, Rect, Replica, UNEXPLORED};
 use scenecast_protocol::time::Instant;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// The changes of a map, and the map after those up to one moment.
 #[derive(Debug, Default)]
@@ -91,6 +91,13 @@ impl MapHistory {
             self.shown.apply(change, &self.descriptors, mission(change.nanos));
         }
         self.applied = upto;
+    }
+
+    /// All labels that the map of the last [`Self::seek`] has had in its epoch.
+    pub(crate) fn labels_so_far(&self) -> BTreeSet<u8> {
+        let is_of_it = |change: &&Change| change.is_of_labels() && change.message.epoch == u32::from(self.shown.epoch);
+        let values = self.changes[..self.applied].iter().filter(is_of_it).flat_map(|change| &change.message.value);
+        values.copied().filter(|label| *label != UNEXPLORED).collect()
     }
 
     /// The map of the last [`Self::seek`].

@@ -112,6 +112,8 @@ pub(crate) struct Known {
     pub(crate) link: Vec<(u64, Link)>,
     /// Frames that the end of this record has transmitted, copies included.
     pub(crate) sent: u64,
+    /// Begin and end of each record.
+    pub(crate) runs: Vec<(u64, u64)>,
     /// What this end ran with, as JSON.
     pub(crate) settings: String,
 }
@@ -162,14 +164,14 @@ impl Recording {
         vehicles.sort_by_key(|record| record.span);
         for vehicle in vehicles {
             let shift = vehicle.frames.shift_to(&frames);
-            let sent = vehicle.counts[0];
+            let (sent, runs) = (vehicle.counts[0], vehicle.span.into_iter().collect::<Vec<_>>());
             span = joined(span, vehicle.span, shift);
             vehicle.known.into_iter().for_each(|(part, known)| {
                 whole
                     .vehicles
                     .entry(part)
                     .or_default()
-                    .add(Known { sent, settings: vehicle.settings.clone(), ..known }, shift)
+                    .add(Known { sent, settings: vehicle.settings.clone(), runs: runs.clone(), ..known }, shift)
             });
         }
         whole.join_names();
@@ -333,6 +335,7 @@ impl Known {
         self.exemplars.extend(later.exemplars.into_iter().map(|(at, exemplar)| (moved(at), exemplar)));
         self.heard.extend(later.heard.into_iter().map(moved));
         self.sent += later.sent;
+        self.runs.extend(later.runs.into_iter().map(|(from, to)| (moved(from), moved(to))));
         if !later.settings.is_empty() {
             self.settings = later.settings;
         }

@@ -11,7 +11,7 @@ use scenecast_messages::contents::valid_part;
 use scenecast_messages::geometry_msgs::PoseWithCovarianceStamped;
 use scenecast_messages::scenecast_msgs::{Event, Exemplar, Link, Order};
 use scenecast_protocol::map::{Cell, LabelGrid};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 
 /// Moments of a record at which its maps are looked at.
@@ -71,10 +71,16 @@ pub(super) struct DiveVehicle {
     pub(super) own_track: Vec<TrackPoint>,
     /// Frames that it has transmitted, by its own record.
     pub(super) sent: u64,
+    /// Begin and end of each of its own records.
+    pub(super) runs_s: Vec<(f64, f64)>,
+    /// All labels that were on the operator's map of this epoch.
+    pub(super) had: BTreeSet<u8>,
     /// What it ran with, by its own record.
     pub(super) settings: SettingsRecord,
     /// The way of each order, by slot and version.
     pub(super) orders: BTreeMap<OrderKey, Vec<OrderStep>>,
+    /// When the vehicle decided about orders, by its own record.
+    pub(super) decided_s: BTreeMap<OrderKey, f64>,
     pub(super) given: BTreeMap<OrderKey, Order>,
     pub(super) exemplars: Vec<(f64, Exemplar)>,
     pub(super) link: Vec<(f64, Link)>,
@@ -209,6 +215,8 @@ impl DiveVehicle {
             track: known.poses.iter().map(|(_, pose)| TrackPoint::of(pose)).collect(),
             own_track: own.iter().flat_map(|own| own.poses.iter().map(moved)).collect(),
             sent: own.map_or(0, |own| own.sent),
+            runs_s: own.iter().flat_map(|own| &own.runs).map(|(from, to)| (seconds(*from), seconds(*to))).collect(),
+            had: known.map.labels_so_far(),
             settings: own.and_then(|own| serde_json::from_str(&own.settings).ok()).unwrap_or_default(),
             link: known.link.iter().map(|(at, link)| (seconds(*at), link.clone())).collect(),
             maps,
@@ -248,6 +256,18 @@ impl DiveVehicle {
     pub(super) fn label_at(&self, (shift_east_m, shift_north_m): (f64, f64), east_m: f64, north_m: f64) -> u8 {
         let index = |m: f64| (m / self.cell_m).floor() as i32;
         self.labels.get(Cell::new(index(east_m - shift_east_m), index(north_m - shift_north_m)))
+    }
+
+    /// Its speed while it moved, m/s, where its own record tells it. Times are of the wall clock, which the mission may be ahead of.
+    pub(super) fn speed_m_s(&self, mission_speed: f64) -> Option<f64> {
+        const LEAST_M_S: f64 = 0.05;
+        let steps = self.own_track.windows(2).filter_map(|pair| match pair {
+            [a, b] => Some(((b.east_m - a.east_m).hypot(b.north_m - a.north_m), (b.at_s - a.at_s) * mission_speed)),
+            _ => None,
+        });
+        let moving = steps.filter(|(m, s)| *s > 0.0 && m / s >= LEAST_M_S);
+        let (m, s) = moving.fold((0.0, 0.0), |sum, step| (sum.0 + step.0, sum.1 + step.1));
+        (s > 0.0).then(|| m / s)
     }
 
     /// Length of its path, metres: at least so far, where only reports tell it.

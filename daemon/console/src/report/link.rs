@@ -111,6 +111,7 @@ fn over_range(vehicle: &DiveVehicle) -> String {
         );
     }
     table
-        + "</table>\n<p>Each moment is one of every ten seconds; the distance is half of the round trip at 1500 m/s, and the share lost that of \
+        + "</table>\n<p>Each moment is one of every ten seconds; the distance is half of the round trip at 1500 m/s, and so at most that: the time that modems and \
+             serial lines take is in it. The share lost is that of \
              the last 64 frames, or of all so far while there are fewer.</p>\n"
 }

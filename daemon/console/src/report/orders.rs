@@ -10,7 +10,7 @@ use serde_json::Value;
 use std::fmt::Write;
 
 /// The longest content of an order that is told whole, bytes.
-const MAX_CONTENT: usize = 200;
+const MAX_CONTENT: usize = 2000;
 
 /// An order by the name of its slot and its version.
 pub(super) type OrderKey = (String, u32);
@@ -48,11 +48,11 @@ impl OrderStep {
         let own = if self.is_own { ", by the vehicle's own record alone" } else { "" };
         format!("{}{reason}{own}", words::status(self.status))
     }
+}
 
-    /// The time from the order to this status, mission seconds, if it is an end.
-    fn after_s(&self, dive: &Dive) -> Option<f64> {
-        self.is_end().then(|| ((self.at_s - self.given_s) * dive.state.mission.speed).max(0.0))
-    }
+/// The time from an order to a moment, mission seconds.
+fn after(dive: &Dive, given_s: f64, at_s: f64) -> String {
+    format!("{:.1} s", ((at_s - given_s) * dive.state.mission.speed).max(0.0))
 }
 
 impl DiveVehicle {
@@ -66,11 +66,21 @@ impl DiveVehicle {
         }
     }
 
-    /// Notes a decision that the vehicle recorded, where the surface learned of none.
+    /// Notes a decision that the vehicle recorded: when it was made and, where the surface learned of none, what it was.
     pub(super) fn take_decision(&mut self, message: &OrderStatus) {
-        let Some(way) = self.orders.get_mut(&(message.slot.clone(), message.version)) else { return };
+        let order = (message.slot.clone(), message.version);
+        let Some(way) = self.orders.get_mut(&order) else { return };
+        self.decided_s.insert(order, OrderStep::of(message).at_s);
         let Some(last) = way.last().filter(|last| !last.is_end()) else { return };
         way.push(OrderStep { given_s: last.given_s, is_own: true, ..OrderStep::of(message) });
+    }
+
+    /// Why an order that has no end has none, as far as a later one of its kind tells it.
+    fn overtaken(&self, (slot, version): &OrderKey) -> Option<String> {
+        let later = self.orders.range((slot.clone(), version + 1)..).take_while(|((other, _), _)| other == slot);
+        let applied = |way: &Vec<OrderStep>| way.last().is_some_and(|last| last.status == OrderStatus::APPLIED);
+        let ((_, by), _) = later.into_iter().find(|(_, way)| applied(way))?;
+        Some(format!("{slot} {by} replaced it"))
     }
 
     /// The orders but for position fixes, which the surface gives by itself.
@@ -127,27 +137,38 @@ impl Dive {
         (by, words)
     }
 
+    /// The source of the events about modes: on board or, where no vehicle's own record is there, as they were reported.
+    pub(super) fn mode_source(&self) -> &'static str {
+        match self.events.iter().any(|(_, event)| event.source == "mode, on board") {
+            true => "mode, on board",
+            false => "mode",
+        }
+    }
+
     /// The orders with their ends, the first one first.
     pub(super) fn orders_table(&self, page: &mut String, state: &VehicleState, vehicle: &DiveVehicle) {
         if vehicle.orders_of_people().next().is_none() {
             return;
         }
-        *page += "<h3>Orders</h3>\n<table><thead><tr><th>order</th><th>what was ordered</th><th>by</th><th>given (UTC)</th><th>end</th><th>known at the surface after</th></tr></thead>\n";
+        *page += "<h3>Orders</h3>\n<table><thead><tr><th>order</th><th>what was ordered</th><th>by</th><th>given (UTC)</th><th>end</th><th>on board after</th><th>known at the surface after</th></tr></thead>\n";
         let mut orders: Vec<(&OrderKey, &OrderStep)> =
             vehicle.orders_of_people().filter_map(|(order, way)| Some((order, way.last()?))).collect();
         orders.sort_by(|a, b| a.1.given_s.total_cmp(&b.1.given_s));
         for (order @ (slot, version), last) in orders {
             let (by, ordered) = self.ordered(state, vehicle, order);
-            let after_s = last.after_s(self).filter(|_| !last.is_own);
+            let known = Some(last).filter(|last| last.is_end() && !last.is_own).map(|last| last.at_s);
+            let [on_board, known] = [vehicle.decided_s.get(order).copied(), known]
+                .map(|at_s| at_s.map_or_else(|| "not known".to_owned(), |at_s| after(self, last.given_s, at_s)));
+            let end = vehicle.overtaken(order).filter(|_| !last.is_end());
+            let end = end.map_or_else(|| last.told(), |by| format!("{}; {by}", last.told()));
             let _ = writeln!(
                 page,
-                "<tr><td>{} {version}</td><td>{}</td><td>{}</td><td class=\"t\">{}</td><td>{}</td><td class=\"n\">{}</td></tr>",
+                "<tr><td>{} {version}</td><td>{}</td><td>{}</td><td class=\"t\">{}</td><td>{}</td><td class=\"n\">{on_board}</td><td class=\"n\">{known}</td></tr>",
                 Escaped(slot),
                 Escaped(&ordered),
                 Escaped(&by),
                 utc_text(last.given_s),
-                Escaped(&last.told()),
-                after_s.map_or_else(|| "not known".to_owned(), |s| format!("{s:.1} s")),
+                Escaped(&end),
             );
         }
         *page += "</table>\n";
@@ -155,14 +176,21 @@ impl Dive {
 
     /// What the vehicle was steered by over time, and its modes.
     pub(super) fn steering(&self, page: &mut String, state: &VehicleState, vehicle: &DiveVehicle) {
-        let modes = self.events.iter().filter(|(_, event)| event.vehicle == state.name && event.source == "mode");
+        let of_modes = self.mode_source();
+        let modes = self.events.iter().filter(|(_, event)| event.vehicle == state.name && event.source == of_modes);
         let modes = modes.map(|(at_s, event)| (*at_s, event.text.clone()));
         let steers = |slot: &str| ![SlotId::Requests.name(), SlotId::Budget.name()].contains(&slot);
         let orders = vehicle.orders_of_people().filter(|((slot, _), _)| steers(slot));
         let orders = orders.filter_map(|(order, way)| {
             let last = way.last()?;
-            let after = last.after_s(self).map_or_else(String::new, |s| format!(" after {s:.1} s"));
-            Some((last.given_s, format!("ordered: {}; {}{after}", self.ordered(state, vehicle, order).1, last.told())))
+            let end = match vehicle.decided_s.get(order) {
+                Some(at_s) => format!(", on board after {}", after(self, last.given_s, *at_s)),
+                None if last.is_end() => {
+                    format!(", known at the surface after {}", after(self, last.given_s, last.at_s))
+                }
+                None => vehicle.overtaken(order).map_or_else(String::new, |by| format!("; {by}")),
+            };
+            Some((last.given_s, format!("ordered: {}; {}{end}", self.ordered(state, vehicle, order).1, last.told())))
         });
         let mut steps: Vec<(f64, String)> = modes.chain(orders).collect();
         if steps.is_empty() {
@@ -230,7 +258,17 @@ mod tests {
         let last = |version| vehicle.orders[&("fence".to_owned(), version)].last().unwrap();
         assert_eq!(last(1).told(), "applied, by the vehicle's own record alone");
         assert_eq!((last(1).at_s, last(1).given_s), (5.0, 1.0));
+        assert_eq!(vehicle.decided_s.len(), 2);
         assert_eq!(last(2).told(), "refused");
         assert_eq!(vehicle.orders.len(), 2, "the surface did not give a third one");
+    }
+
+    #[test]
+    fn a_later_order_tells_why_one_has_no_end() {
+        let (mut vehicle, order) = (DiveVehicle::default(), ("fence".to_owned(), 7));
+        vehicle.take_order(&status(7, OrderStatus::ON_AIR, 2));
+        assert_eq!(vehicle.overtaken(&order), None);
+        vehicle.take_order(&status(9, OrderStatus::APPLIED, 2));
+        assert_eq!(vehicle.overtaken(&order).as_deref(), Some("fence 9 replaced it"));
     }
 }

@@ -22,7 +22,7 @@ border-bottom:1px solid #ccc}td.n{text-align:right;white-space:nowrap}td.t{white
 svg text{font:11px system-ui,sans-serif}.grid{stroke:#000;stroke-opacity:.25;stroke-width:.6;fill:none}\
 .track{fill:none;stroke:#000;stroke-width:1.5;stroke-linejoin:round}.line{fill:none;stroke:#000;stroke-width:1.2}\
 thead{display:table-header-group}.swatch,svg{-webkit-print-color-adjust:exact;print-color-adjust:exact}thead tr{break-after:avoid}.fence{fill:none;stroke:#000;stroke-width:1.5;stroke-dasharray:6 3}.out{fill:#000;fill-opacity:.12;stroke:#000;stroke-dasharray:2 2}.scale{fill:none;stroke:#000;stroke-width:1.5}.swatch{display:inline-block;width:1em;height:1em;border:1px solid #000;\
-vertical-align:-.15em;margin-right:.4em}.images{display:flex;flex-wrap:wrap;gap:.6em}.images figure{margin:0;width:112px}.images svg{width:112px}.images img{width:112px;display:block;\
+vertical-align:-.15em;margin-right:.4em}.images{display:flex;flex-wrap:wrap;gap:.6em}.images figure{margin:0;width:200px}.images svg{width:112px}.images img{width:112px;display:block;\
 image-rendering:pixelated}.number{font-weight:600;paint-order:stroke;stroke:#fff;stroke-width:3px}\
 .point{fill:#fff;stroke:#000;stroke-width:1.5}.legend>span{display:inline-block;margin-right:1em}@media(max-width:700px){table{display:block;overflow-x:auto}}\
 h2,h3{break-after:avoid}tr,svg{break-inside:avoid}@media print{body{margin:0;max-width:none}figure.map{break-inside:avoid}figure.map svg{max-height:13cm}thead+tbody>tr:first-child{break-before:avoid}h2+p,h3+p,p:last-child{break-before:avoid}}";
@@ -80,9 +80,9 @@ impl Dive {
         if let Some(map) = chart::map(state, vehicle) {
             let _ = writeln!(
                 page,
-                "<figure class=\"map\">{map}<figcaption><div class=\"legend\">{}</div>The map of the operator at the end, each class with its \
-                 number, and its track: {}. Dashed: fence and areas to stay out of that were in force at the end. Metres east and north of \
-                 the mission's origin (WGS 84 where it has one); north is up.</figcaption></figure>",
+                "<figure class=\"map\">{map}<figcaption><div class=\"legend\">{}</div>The operator's map at the end, each class with its number, and the \
+                 track of the vehicle: {}. Long dashes: the fence that was in force at the end; grey: areas to stay out of. Metres east and \
+                 north of the mission's origin (WGS 84 where it has one); north is up.</figcaption></figure>",
                 legend(state, vehicle),
                 match vehicle.own_track.len() {
                     0 | 1 => "straight lines between the places that the vehicle has reported",
@@ -193,13 +193,12 @@ fn classes(page: &mut String, dive: &Dive, state: &VehicleState, vehicle: &DiveV
     if all == 0 {
         return;
     }
-    *page += "<h3>Classes</h3>\n<table><thead><tr><th>no.</th><th>class</th><th>cells</th><th>area</th><th>95 % interval</th><th>share</th>\
-              <th>images</th></tr></thead>\n";
+    *page += "<h3>Classes</h3>\n<table><thead><tr><th>no.</th><th>class</th><th>cells</th><th>area</th><th>95 % interval</th><th>share</th></tr></thead>\n";
     for class in &vehicle.classes {
         let _ = writeln!(
             page,
             "<tr><td class=\"n\">{}</td><td><span class=\"swatch\" style=\"background:{}\"></span>{}{}</td><td class=\"n\">{}</td><td class=\"n\">{}</td>\
-             <td class=\"n\">{}</td><td class=\"n\">{:.1} %</td><td><div class=\"images\">{}</div></td></tr>",
+             <td class=\"n\">{}</td><td class=\"n\">{:.1} %</td></tr><tr><td></td><td colspan=\"5\"><div class=\"images\">{}</div></td></tr>",
             class.label,
             state.label_book.colour_text(class.label),
             Escaped(&state.label_book.title(class.label)),
@@ -221,7 +220,8 @@ fn without_cells(page: &mut String, dive: &Dive, state: &VehicleState, vehicle: 
     let has_cells = |label: u8| vehicle.classes.iter().any(|class| class.label == book.shown_as(label));
     let named = book.iter().filter(|(_, entry)| entry.name.is_some()).map(|(label, _)| *label);
     let pictured = vehicle.exemplars.iter().map(|(_, exemplar)| exemplar.label);
-    let labels: BTreeSet<u8> = named.chain(pictured).filter(|label| !has_cells(*label)).collect();
+    let had = vehicle.had.iter().copied();
+    let labels: BTreeSet<u8> = named.chain(pictured).chain(had).filter(|label| !has_cells(*label)).collect();
     if labels.is_empty() {
         return;
     }
@@ -243,7 +243,9 @@ fn legend(state: &VehicleState, vehicle: &DiveVehicle) -> String {
     let entry = |class: &ClassArea| {
         let (colour, title) = (state.label_book.colour_text(class.label), state.label_book.title(class.label));
         let swatch = format!("<span class=\"swatch\" style=\"background:{colour}\"></span>");
-        format!("<span>{swatch}{} {}</span> ", class.label, Escaped(&title))
+        let is_named = state.label_book.name(class.label).is_some();
+        let title = if is_named { format!("{} {title}", class.label) } else { title };
+        format!("<span>{swatch}{}</span> ", Escaped(&title))
     };
     vehicle.classes.iter().map(entry).collect()
 }
@@ -273,10 +275,14 @@ fn images(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle, class: u8) -
     let of_it: Vec<_> = vehicle.exemplars.iter().filter(|(_, exemplar)| of_class(exemplar.label)).collect();
     let mut found: Vec<_> = of_it.iter().copied().filter(|(_, exemplar)| shows_it(exemplar)).collect();
     found.sort_by_key(|(_, exemplar)| std::cmp::Reverse(exemplar.data.len()));
+    let told =
+        |images: &[&(f64, Exemplar)]| images.iter().take(IMAGES).map(|found| image(dive, vehicle, found)).collect();
     match (found.is_empty(), of_it.is_empty()) {
-        (true, true) => "no image was received".to_owned(),
-        (true, false) => "the images that were received show places of other classes, by the map at the end".to_owned(),
-        (false, _) => found.iter().take(IMAGES).map(|found| image(dive, vehicle, found)).collect(),
+        (true, true) => "No image was received.".to_owned(),
+        (true, false) => {
+            format!("<span>By the map at the end these places belong to other classes:</span>{}", told(&of_it))
+        }
+        (false, _) => told(&found),
     }
 }
 
@@ -289,7 +295,7 @@ fn image(dive: &Dive, vehicle: &DiveVehicle, (at_s, exemplar): &(f64, Exemplar))
         let sigma = vehicle.sigma_m(exemplar.taken.nanos() as f64 / 1e9);
         let sigma = sigma.map_or_else(String::new, |m| format!(", standard deviation {m:.1} m"));
         let on_earth = words::on_earth(dive, (middle.x, middle.y));
-        format!("<br>{:.1} m east, {:.1} m north{on_earth}{sigma}", middle.x, middle.y)
+        format!("<br>{}, {}{on_earth}{sigma}", words::east(middle.x), words::north(middle.y))
     };
     format!(
         "<figure><img alt=\"label {label}\" src=\"data:image/{kind};base64,{}\">{}<figcaption>label {label}, {taken}{}</figcaption></figure>",
@@ -312,12 +318,12 @@ fn notes(page: &mut String, dive: &Dive, state: &VehicleState) {
     for marker in &state.markers {
         let _ = writeln!(
             page,
-            "<li>{}, {}: {} ({:.1} m east, {:.1} m north{})</li>",
+            "<li>{}, {}: {} ({}, {}{})</li>",
             utc(marker.at_s),
             Escaped(&marker.author),
             Escaped(&marker.text),
-            marker.x_m,
-            marker.y_m,
+            words::east(marker.x_m),
+            words::north(marker.y_m),
             words::on_earth(dive, (marker.x_m, marker.y_m))
         );
     }

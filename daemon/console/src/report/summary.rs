@@ -2,7 +2,7 @@
 
 use super::dive::{Dive, DiveVehicle, SettingsRecord};
 use super::orders::OrderStep;
-use super::words::{area, counted, duration, interval, lat_lon, on_earth};
+use super::words::{self, area, counted, duration, interval, lat_lon, on_earth};
 use crate::state::{LinkDirection, VehicleState};
 use scenecast_core::{Area, utc_text};
 use scenecast_messages::contents::valid_part;
@@ -33,7 +33,7 @@ pub(super) fn summary(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) 
     sentences.push(found(state, vehicle));
     sentences.extend(extent(dive, state, vehicle));
     sentences.extend(sea_floor(dive, state, vehicle));
-    sentences.extend(arrived(state, vehicle));
+    sentences.extend(arrived(dive, state, vehicle));
     sentences.extend(agreement(vehicle));
     sentences.push(orders(dive, state, vehicle));
     sentences.extend(link(dive, vehicle));
@@ -43,8 +43,17 @@ pub(super) fn summary(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) 
     for ended_s in &dive.ended_s {
         sentences.push(format!("The surface ended at {} and was started again.", utc_text(*ended_s)));
     }
+    for pair in vehicle.runs_s.windows(2) {
+        let [(_, ended_s), (began_s, _)] = pair else { continue };
+        sentences.push(format!(
+            "The vehicle's program ended at {} and began again at {}.",
+            utc_text(*ended_s),
+            utc_text(*began_s)
+        ));
+    }
     let silence = longest_silence(dive, vehicle);
     sentences.push(heard(dive, vehicle, silence));
+    sentences.extend(silences(dive, vehicle));
     sentences.push(trouble(dive, state, silence.0));
     if let Some(damage) = &dive.damage {
         sentences.push(format!("Not all of the record could be read: {damage}."));
@@ -86,24 +95,18 @@ fn link(dive: &Dive, vehicle: &DiveVehicle) -> Vec<String> {
 
 /// The events that people should look at: faults, silences, new runs, and modes other than the survey.
 fn trouble(dive: &Dive, state: &VehicleState, longest_silence_s: f64) -> String {
-    // The first contact begins a run, too.
-    let first_run = dive.events.iter().position(|(_, event)| event.text == "another run begins");
     let is_planned =
         |text: &str| [VehicleMode::Survey, VehicleMode::Done].iter().any(|mode| text.starts_with(mode.name()));
-    // Where its own record is missing, the modes that it has reported stand for those on board.
-    let modes = match dive.events.iter().any(|(_, event)| event.source == "mode, on board") {
-        true => "mode, on board",
-        false => "mode",
-    };
-    let is_trouble = |(number, (_, event)): &(usize, &(f64, Event))| match event.source.as_str() {
+    let modes = dive.mode_source();
+    let is_trouble = |event: &Event| match event.source.as_str() {
         "fault" => true,
         source if source == modes => !is_planned(&event.text),
-        "contact" => event.text != "received" && Some(*number) != first_run,
+        "contact" => event.text != "received",
         _ => false,
     };
     let is_of_it = |event: &Event| event.vehicle.is_empty() || valid_part(&event.vehicle) == valid_part(&state.name);
-    let found = dive.events.iter().enumerate().filter(|(_, (_, event))| is_of_it(event)).filter(is_trouble);
-    let told: Vec<String> = found.map(|(_, (at_s, event))| format!("{} at {}", event.text, utc_text(*at_s))).collect();
+    let found = dive.events.iter().filter(|(_, event)| is_of_it(event) && is_trouble(event));
+    let told: Vec<String> = found.map(|(at_s, event)| format!("{} at {}", event.text, utc_text(*at_s))).collect();
     match told.len() {
         0 if longest_silence_s < SILENCE_S => "No fault and no silence was reported.".to_owned(),
         0 => "No fault was reported.".to_owned(),
@@ -115,12 +118,27 @@ fn trouble(dive: &Dive, state: &VehicleState, longest_silence_s: f64) -> String 
     }
 }
 
-/// The longest time of the record without a frame from the vehicle, seconds, and its end.
-fn longest_silence(dive: &Dive, vehicle: &DiveVehicle) -> (f64, f64) {
+/// The times of the record without a frame from the vehicle: how long, seconds, and their ends.
+fn pauses(dive: &Dive, vehicle: &DiveVehicle) -> impl Iterator<Item = (f64, f64)> {
     let (begin, end) = dive.span_s;
     let heard = || vehicle.heard_s.iter().copied();
-    let gaps = std::iter::once(begin).chain(heard()).zip(heard().chain([end])).map(|(a, b)| (b - a, b));
-    gaps.fold((0.0, begin), |longest, gap| if gap.0 > longest.0 { gap } else { longest })
+    std::iter::once(begin).chain(heard()).zip(heard().chain([end])).map(|(a, b)| (b - a, b))
+}
+
+/// The longest of them.
+fn longest_silence(dive: &Dive, vehicle: &DiveVehicle) -> (f64, f64) {
+    let longer = |longest: (f64, f64), pause: (f64, f64)| if pause.0 > longest.0 { pause } else { longest };
+    pauses(dive, vehicle).fold((0.0, dive.span_s.0), longer)
+}
+
+/// The silences, if there are several.
+fn silences(dive: &Dive, vehicle: &DiveVehicle) -> Option<String> {
+    let long: Vec<(f64, f64)> = pauses(dive, vehicle).filter(|(length_s, _)| *length_s >= SILENCE_S).collect();
+    let told =
+        |(length_s, end_s): &(f64, f64)| format!("from {} for {}", utc_text(end_s - length_s), duration(*length_s));
+    let first: Vec<String> = long.iter().take(MAX_TOLD).map(told).collect();
+    let more = if long.len() > MAX_TOLD { ", and later ones" } else { "" };
+    (long.len() > 1).then(|| format!("No frame was heard for a minute or more {}{more}.", first.join(", ")))
 }
 
 /// When frames of the vehicle were heard.
@@ -141,7 +159,7 @@ fn agreement(vehicle: &DiveVehicle) -> Option<String> {
     let mean = shares.iter().sum::<f64>() / shares.len() as f64;
     shares.last().map(|last| {
         format!(
-            "Of the vehicle's cells {:.0} % had the same label on the operator's map at the end, and {:.0} % on the mean of the record.",
+            "Of the vehicle's cells {:.0} % had the same label on the operator's map at the end, and {:.0} % on average over the record.",
             last * 100.0,
             mean * 100.0
         )
@@ -177,7 +195,11 @@ fn extent(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -> Option<St
         format!(", or from latitude {south:.6} to {north:.6} and from longitude {west:.6} to {east:.6}")
     });
     Some(format!(
-        "The map reaches from {west:.1} to {east:.1} m east and from {south:.1} to {north:.1} m north{on_earth}.{}",
+        "The map reaches from {} to {} and from {} to {}{on_earth}.{}",
+        words::east(west),
+        words::east(east),
+        words::north(south),
+        words::north(north),
         unseen(dive, vehicle, shift)
     ))
 }
@@ -196,19 +218,22 @@ fn sea_floor(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -> Option
 fn unseen(dive: &Dive, vehicle: &DiveVehicle, shift: (f64, f64)) -> String {
     let area = ran_with(dive, vehicle).settings.get("survey.area_m");
     let corners = area.and_then(|area| serde_json::from_value::<[f64; 4]>(area.clone()).ok());
-    let Some([west, south, east, north]) = corners else { return String::new() };
+    let Some([west, south, east, north]) = corners else {
+        return " No area of the survey is configured, so how much of it was not seen is not known.".to_owned();
+    };
     let middle = |index: i32, shift_m: f64| (f64::from(index) + 0.5) * vehicle.cell_m + shift_m;
     let middles = vehicle.labels.iter().map(|(cell, _)| (middle(cell.x, shift.0), middle(cell.y, shift.1)));
     let share = Area { west, south, east, north }.covered(middles, vehicle.cell_m);
     format!(
-        " Of the area of the survey, {west} to {east} m east and {south} to {north} m north, {:.1} % has cells.",
+        " Of the area of the survey, {west} to {east} m east and {south} to {north} m north, {:.1} % is on the map.",
         share * 100.0
     )
 }
 
 /// How much of the vehicle's map has arrived.
-fn arrived(state: &VehicleState, vehicle: &DiveVehicle) -> Option<String> {
-    let reported = u64::from(state.status.as_ref()?.cells);
+fn arrived(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -> Option<String> {
+    let status = state.status.as_ref()?;
+    let (reported, before_end_s) = (u64::from(status.cells), dive.span_s.1 - dive.unix_s(status.at_s));
     let held = vehicle.labels.explored() as u64;
     let share = (held as f64 / reported.max(1) as f64 * 100.0).min(100.0);
     let coarse = match is_coarse(vehicle) {
@@ -219,7 +244,9 @@ fn arrived(state: &VehicleState, vehicle: &DiveVehicle) -> Option<String> {
     };
     (reported > 0).then(|| {
         format!(
-            "In its last report the vehicle had {reported} cells; {held} had arrived by the end, {share:.0} %.{coarse}"
+            "In its last report, {} before the end of the record, the vehicle had {reported} cells; {held} had arrived by the end{}.{coarse}",
+            duration(before_end_s),
+            if held > reported { String::new() } else { format!(", {share:.0} %") }
         )
     })
 }
@@ -243,6 +270,9 @@ fn ran_with<'a>(dive: &'a Dive, vehicle: &'a DiveVehicle) -> &'a SettingsRecord 
 
 /// How the vehicle looked at the sea floor.
 fn equipment(dive: &Dive, vehicle: &DiveVehicle) -> String {
+    if vehicle.settings.program.is_empty() && !dive.settings.simulated {
+        return "What the vehicle was set to, such as its altitude, speed and camera, is not known without its own record.".to_owned();
+    }
     let all = ran_with(dive, vehicle);
     let set = |key: &str, default: f64| all.settings.get(key).and_then(Value::as_f64).unwrap_or(default);
     let defaults = scenecast_config::Config::default();
@@ -264,9 +294,9 @@ fn place(dive: &Dive, vehicle: &DiveVehicle) -> String {
     );
     let begin = vehicle.path().first().map_or_else(String::new, |first| {
         format!(
-            ", beginning {:.1} m east and {:.1} m north of the origin{}",
-            first.east_m,
-            first.north_m,
+            ", beginning {} and {} of the origin{}",
+            words::east(first.east_m),
+            words::north(first.north_m),
             on_earth(dive, (first.east_m, first.north_m))
         )
     });
@@ -274,13 +304,16 @@ fn place(dive: &Dive, vehicle: &DiveVehicle) -> String {
         true => format!("at a depth of {least:.1} m"),
         false => format!("at depths of {least:.1} to {most:.1} m"),
     };
+    let speed = vehicle.speed_m_s(dive.state.mission.speed);
+    let speed = speed.map_or_else(String::new, |m_s| format!(", at {m_s:.2} m/s on average while it moved"));
+    let sigma_m = vehicle.path().iter().map(|point| point.sigma_m).fold(0.0, f64::max);
     format!(
-        "By its {} {:.0} m{begin}, {depth} below the surface; at the end it was {:.1} m east and {:.1} m north of the \
-         origin, with a standard deviation of {:.1} m; {origin}.",
+        "By its {} {:.0} m{speed}{begin}, {depth} below the surface; at the end it was {} and {} of the origin, with a \
+         standard deviation of {:.1} m, at most {sigma_m:.1} m before; {origin}.",
         if vehicle.own_track.len() > 1 { "own record it went" } else { "reports it went at least" },
         vehicle.distance_m(),
-        last.east_m,
-        last.north_m,
+        words::east(last.east_m),
+        words::north(last.north_m),
         last.sigma_m
     )
 }
@@ -313,7 +346,10 @@ fn orders(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -> String {
         vehicle.orders_of_people().map(|(order, _)| dive.ordered(state, vehicle, order).0).collect();
     let authors: Vec<String> = authors.into_iter().filter(|author| !author.is_empty()).collect();
     let authors = if authors.is_empty() { String::new() } else { format!(" by {}", authors.join(", ")) };
-    let fixes = if fixes == 0 { String::new() } else { format!(" The surface sent {fixes} position fixes.") };
+    let fixes = match fixes {
+        0 => " The surface sent no position fix.".to_owned(),
+        _ => format!(" The surface sent {}.", counted(fixes, "position fix", "position fixes")),
+    };
     match all {
         0 => format!("No order was given.{fixes}"),
         n => {
@@ -323,10 +359,11 @@ fn orders(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -> String {
                 0 => String::new(),
                 open => format!(" Of {open} the surface did not know the end."),
             };
-            format!(
-                "{} given{authors}; of these {applied} were applied, {refused} refused and {withdrawn} withdrawn.{open}{fixes}",
-                counted(n, "order was", "orders were")
-            )
+            let ends = [(applied, "applied"), (refused, "refused"), (withdrawn, "withdrawn")];
+            let ends = ends.iter().filter(|(count, _)| *count > 0).map(|(count, end)| format!("{count} {end}"));
+            let ends: Vec<String> = ends.collect();
+            let ends = if ends.is_empty() { String::new() } else { format!("; {}", ends.join(", ")) };
+            format!("{} given{authors}{ends}.{open}{fixes}", counted(n, "order was", "orders were"))
         }
     }
 }

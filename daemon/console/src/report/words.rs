@@ -76,8 +76,10 @@ pub(super) fn content(book: &LabelBook, order: &Order) -> String {
             ))
         }
         ("areas", Value::Array(areas)) => {
-            let weights: Vec<String> = areas.iter().map(|area| number(&area["weight"])).collect();
-            Some(format!("{} of weight {}", counted(areas.len(), "area", "areas"), weights.join(", ")))
+            let corners = |area: &Value| area["outline"].as_array().map(|corners| outline(corners)).unwrap_or_default();
+            let told = |area: &Value| format!("weight {} ({})", number(&area["weight"]), corners(area));
+            let all: Vec<String> = areas.iter().map(told).collect();
+            Some(format!("{}: {}", counted(areas.len(), "area", "areas"), all.join("; ")))
         }
         ("background", Value::Array(streams)) => Some(format!(
             "spare capacity for {}",
@@ -106,6 +108,16 @@ fn outline(corners: &[Value]) -> String {
 /// A place in the world frame.
 fn east_north((east, north): (&Value, &Value)) -> String {
     format!("{} m east, {} m north", number(east), number(north))
+}
+
+/// Metres east of the mission's origin in words; below 0 they are west of it.
+pub(super) fn east(m: f64) -> String {
+    format!("{:.1} m {}", m.abs(), if m < 0.0 { "west" } else { "east" })
+}
+
+/// The same to the north.
+pub(super) fn north(m: f64) -> String {
+    format!("{:.1} m {}", m.abs(), if m < 0.0 { "south" } else { "north" })
 }
 
 /// A member of an order with its unit, as in "depth 5 to 30 m".
@@ -137,11 +149,16 @@ pub(super) fn interval(interval_m2: Option<(f64, f64)>) -> String {
 pub(super) fn of_intervals(classes: &[ClassArea]) -> &'static str {
     match classes.iter().any(|class| class.interval_m2.is_some()) {
         true => {
-            "An interval is that of the model's own doubt, without the error of positions: its confidence in each cell, which arrives in quarters, is taken as the \
-             probability that the label is right; the doubt goes to the other labels by their cells, and cells of a square of 4 x 4 are right or \
-             wrong together. A class that the model does not tell from another one, and sea floor that nobody has seen, are not in it."
+            "Classes are groups that the scene model found without being taught; no person has verified them. An interval is that of the model's own \
+             doubt, without the error of positions: its confidence in each cell, known to a quarter, is taken as the probability that the label \
+             is right; otherwise the cell is taken to have one of the other labels, the more likely the more cells that has, and cells of a \
+             square of 4 x 4 are right or wrong together. Classes that the model does not tell apart, and sea floor that nobody has seen, are \
+             not in it."
         }
-        false => "The surface has received no confidence, so the intervals are not known.",
+        false => {
+            "Classes are groups that the scene model found without being taught; no person has verified them. The surface has received no \
+             confidence, so the intervals are not known."
+        }
     }
 }
 
@@ -190,7 +207,8 @@ mod tests {
         let fence = r#"{"fence": [[0, 0], [9.5, 0], [9, 9], [0, 0]], "keep_outs": [[[1, 1], [2, 1], [2, 2]]]}"#;
         let words = "a fence with 3 corners in m east and north: (0, 0) (9.5, 0) (9, 9); 1 area to stay out of (3 corners in m east and north: (1, 1) (2, 1) (2, 2))";
         assert_eq!(told(fence), words, "a closed line repeats its first corner");
-        assert_eq!(told(r#"{"areas": [{"outline": [], "weight": 0.5}]}"#), "1 area of weight 0.5");
+        let areas = r#"{"areas": [{"outline": [[0, 0], [2, 0], [2, 2]], "weight": 0.5}]}"#;
+        assert_eq!(told(areas), "1 area: weight 0.5 (3 corners in m east and north: (0, 0) (2, 0) (2, 2))");
         let limits = r#"{"depth_m": [5.0, 30.5], "on_silence": "return", "silence_s": 300.0, "time_s": null}"#;
         assert_eq!(told(limits), "depth 5 to 30.5 m; on silence return; silence 300 s");
         let stops = |content: &str| Order { slot: "constraints".into(), ..order(content) };
@@ -200,7 +218,8 @@ mod tests {
     }
 
     #[test]
-    fn spans_and_areas_are_for_people() {
+    fn spans_areas_and_places_are_for_people() {
+        assert_eq!((east(-23.58), north(13.0)), ("23.6 m west".to_owned(), "13.0 m north".to_owned()));
         assert_eq!([59.6, 130.0, 7265.0].map(duration), ["60 s", "2 min", "2 h 01 min"]);
         assert_eq!([3.0625, 415.2, 2.5e6].map(area), ["3.1 m²", "415 m²", "2.50 km²"]);
     }

@@ -39,6 +39,11 @@ impl Watch {
         }
     }
 
+    /// Whether a frame of the vehicle was accepted since this end began.
+    pub(crate) fn has_received(&self) -> bool {
+        self.last_received.is_some()
+    }
+
     /// Time passes; `usual` is the usual pause between two frames. The text is for the log.
     pub(crate) fn handle_time(&mut self, usual: Option<Duration>, now: Instant) -> Option<String> {
         let last = self.last_received?;
