@@ -37,7 +37,7 @@ pub(super) fn map(state: &VehicleState, vehicle: &DiveVehicle) -> Option<String>
     for marker in &state.markers {
         let mut text: String = marker.text.chars().take(MAX_MARKER).collect();
         text += if marker.text.chars().count() > MAX_MARKER { "\u{2026}" } else { "" };
-        point(&mut svg, &frame, (marker.x_m, marker.y_m), &text);
+        point(&mut svg, &frame, (marker.x_m, marker.y_m), (&text, -5.0));
     }
     scale(&mut svg, &frame);
     svg += "</svg>";
@@ -190,7 +190,7 @@ fn fence(svg: &mut String, frame: &Frame, state: &VehicleState) {
     };
     order.fence.iter().for_each(|fence| outline(fence, "fence"));
     order.keep_outs.iter().for_each(|keep_out| outline(keep_out, "out"));
-    order.return_point.iter().for_each(|&[east_m, north_m]| point(svg, frame, (east_m, north_m), "return"));
+    order.return_point.iter().for_each(|&[east_m, north_m]| point(svg, frame, (east_m, north_m), ("return", 16.0)));
 }
 
 fn track(svg: &mut String, frame: &Frame, track: &[TrackPoint]) {
@@ -199,18 +199,18 @@ fn track(svg: &mut String, frame: &Frame, track: &[TrackPoint]) {
         let _ = writeln!(svg, "<polyline class=\"track\" points=\"{points}\"/>");
     }
     for (end, name) in [(track.first(), "start"), (track.last(), "end")] {
-        end.into_iter().for_each(|end| point(svg, frame, (end.east_m, end.north_m), name));
+        end.into_iter().for_each(|end| point(svg, frame, (end.east_m, end.north_m), (name, -5.0)));
     }
 }
 
-/// A place with its name.
-fn point(svg: &mut String, frame: &Frame, (east_m, north_m): (f64, f64), name: &str) {
+/// A place with its name, so many pixels below it.
+fn point(svg: &mut String, frame: &Frame, (east_m, north_m): (f64, f64), (name, below): (&str, f64)) {
     let (x, y) = frame.place(east_m, north_m);
     let _ = writeln!(
         svg,
         "<circle class=\"point\" cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"4\"/><text class=\"number\" x=\"{:.1}\" y=\"{:.1}\">{}</text>",
         x + 6.0,
-        y - 5.0,
+        y + below,
         Escaped(name)
     );
 }
@@ -323,14 +323,18 @@ pub(super) fn line(series: &Series<'_>, begin_s: f64, length_s: f64) -> Option<S
     let lines: String = lines.collect();
     Some(format!(
         "<svg viewBox=\"0 0 {WIDTH} {HEIGHT}\" role=\"img\" aria-label=\"{name} over time\" xmlns=\"http://www.w3.org/2000/svg\">\
-         <path class=\"grid\" d=\"M60 {bottom}H{WIDTH}M60 {middle}H{WIDTH}M60 22H{WIDTH}\"/><path class=\"line\" stroke-linecap=\"round\" d=\"{lines}\"/>\
+         <path class=\"grid\" d=\"M60 {bottom}H{WIDTH}M60 {middle}H{WIDTH}M60 22H{WIDTH}{ticks}\"/><path class=\"line\" stroke-linecap=\"round\" d=\"{lines}\"/>\
          <text x=\"2\" y=\"{bottom}\">0</text><text x=\"2\" y=\"26\">{top}</text><text x=\"60\" y=\"11\">{name}, {unit}</text>\
-         <text x=\"60\" y=\"{low}\">{begin} UTC</text><text x=\"{WIDTH}\" y=\"{low}\" text-anchor=\"end\">{end} UTC</text></svg>",
+         <text x=\"60\" y=\"{low}\">{begin} UTC</text><text x=\"{half}\" y=\"{low}\" text-anchor=\"middle\">{noon}</text>\
+         <text x=\"{WIDTH}\" y=\"{low}\" text-anchor=\"end\">{end} UTC</text></svg>",
         name = Escaped(series.name),
         unit = Escaped(series.unit),
         bottom = HEIGHT - 20.0,
         middle = (HEIGHT - 20.0 + 22.0) / 2.0,
         low = HEIGHT - 4.0,
+        ticks = [0.25, 0.5, 0.75].map(|at| format!("M{:.1} 22V{}", 60.0 + at * (WIDTH - 70.0), HEIGHT - 20.0)).concat(),
+        half = 60.0 + 0.5 * (WIDTH - 70.0),
+        noon = clock(begin_s + length_s / 2.0),
         begin = clock(begin_s),
         end = clock(begin_s + length_s)
     ))

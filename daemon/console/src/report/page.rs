@@ -198,7 +198,7 @@ fn classes(page: &mut String, dive: &Dive, state: &VehicleState, vehicle: &DiveV
         let _ = writeln!(
             page,
             "<tr><td class=\"n\">{}</td><td><span class=\"swatch\" style=\"background:{}\"></span>{}{}</td><td class=\"n\">{}</td><td class=\"n\">{}</td>\
-             <td class=\"n\">{}</td><td class=\"n\">{:.1} %</td></tr><tr><td></td><td colspan=\"5\"><div class=\"images\">{}</div></td></tr>",
+             <td class=\"n\">{}</td><td class=\"n\">{:.1} %</td></tr>",
             class.label,
             state.label_book.colour_text(class.label),
             Escaped(&state.label_book.title(class.label)),
@@ -206,12 +206,27 @@ fn classes(page: &mut String, dive: &Dive, state: &VehicleState, vehicle: &DiveV
             class.cells,
             words::area(class.area_m2),
             words::interval(class.interval_m2),
-            class.cells as f64 / all as f64 * 100.0,
-            images(dive, state, vehicle, class.label)
+            class.cells as f64 / all as f64 * 100.0
         );
     }
     let _ = writeln!(page, "</table>\n<p>{}</p>", words::of_intervals(&vehicle.classes));
+    pictures(page, dive, state, vehicle);
     without_cells(page, dive, state, vehicle);
+}
+
+/// The images of the classes, and which have none.
+fn pictures(page: &mut String, dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) {
+    let images: Vec<(u8, String)> =
+        vehicle.classes.iter().map(|class| (class.label, images(dive, state, vehicle, class.label))).collect();
+    let all: String = images.iter().map(|(_, images)| images.as_str()).collect();
+    let bare = images.iter().filter(|(_, images)| images.is_empty()).map(|(class, _)| state.label_book.title(*class));
+    let bare: Vec<String> = bare.collect();
+    if !all.is_empty() {
+        let _ = writeln!(page, "<h3>Images of the classes</h3>\n<div class=\"images\">{all}</div>");
+    }
+    if !bare.is_empty() {
+        let _ = writeln!(page, "<p>Classes of which no image was received: {}.</p>", Escaped(&bare.join(", ")));
+    }
 }
 
 /// The labels that have a name or images, and no cell at the end.
@@ -228,11 +243,11 @@ fn without_cells(page: &mut String, dive: &Dive, state: &VehicleState, vehicle: 
     *page += "<h3>Labels without cells at the end</h3>\n<p>The scene model had them for some time, and gave their cells to other labels.</p>\n<ul>\n";
     for label in labels {
         let images = vehicle.exemplars.iter().filter(|(_, exemplar)| exemplar.label == label).take(IMAGES);
-        let images: String = images.map(|found| image(dive, vehicle, found)).collect();
+        let images: String = images.map(|found| image(dive, state, vehicle, found, "")).collect();
         let _ = writeln!(
             page,
-            "<li>{label}: {}<div class=\"images\">{images}</div></li>",
-            Escaped(&book.class_title(label))
+            "<li>{}<div class=\"images\">{images}</div></li>",
+            Escaped(&book.name(label).map_or_else(|| book.title(label), |name| format!("{label}: {name}")))
         );
     }
     *page += "</ul>\n";
@@ -275,22 +290,28 @@ fn images(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle, class: u8) -
     let of_it: Vec<_> = vehicle.exemplars.iter().filter(|(_, exemplar)| of_class(exemplar.label)).collect();
     let mut found: Vec<_> = of_it.iter().copied().filter(|(_, exemplar)| shows_it(exemplar)).collect();
     found.sort_by_key(|(_, exemplar)| std::cmp::Reverse(exemplar.data.len()));
-    let told =
-        |images: &[&(f64, Exemplar)]| images.iter().take(IMAGES).map(|found| image(dive, vehicle, found)).collect();
-    match (found.is_empty(), of_it.is_empty()) {
-        (true, true) => "No image was received.".to_owned(),
-        (true, false) => {
-            format!("<span>By the map at the end these places belong to other classes:</span>{}", told(&of_it))
-        }
-        (false, _) => told(&found),
-    }
+    // Without a better one, those that the vehicle sent for the class.
+    let shown = if found.is_empty() { &of_it } else { &found };
+    let note = |exemplar: &Exemplar| match shows_it(exemplar) {
+        true => String::new(),
+        false => "; by the map at the end its place has another class".to_owned(),
+    };
+    shown.iter().take(IMAGES).map(|found| image(dive, state, vehicle, found, &note(&found.1))).collect()
 }
 
 /// An image with its label, time, place and scale.
-fn image(dive: &Dive, vehicle: &DiveVehicle, (at_s, exemplar): &(f64, Exemplar)) -> String {
+fn image(
+    dive: &Dive,
+    state: &VehicleState,
+    vehicle: &DiveVehicle,
+    (at_s, exemplar): &(f64, Exemplar),
+    note: &str,
+) -> String {
     let kind = if exemplar.format == "webp" { "webp" } else { "jpeg" };
     let taken = words::taken(exemplar).unwrap_or_else(|| format!("received {}", utc_text(*at_s)));
     let (middle, is_placed) = (&exemplar.middle, exemplar.width_m > 0.0);
+    let (class, label) = (state.label_book.class_title(exemplar.label), format!("label {}", exemplar.label));
+    let title = if class == label { label } else { format!("{class} ({label})") };
     let place = || {
         let sigma = vehicle.sigma_m(exemplar.taken.nanos() as f64 / 1e9);
         let sigma = sigma.map_or_else(String::new, |m| format!(", standard deviation {m:.1} m"));
@@ -298,9 +319,10 @@ fn image(dive: &Dive, vehicle: &DiveVehicle, (at_s, exemplar): &(f64, Exemplar))
         format!("<br>{}, {}{on_earth}{sigma}", words::east(middle.x), words::north(middle.y))
     };
     format!(
-        "<figure><img alt=\"label {label}\" src=\"data:image/{kind};base64,{}\">{}<figcaption>label {label}, {taken}{}</figcaption></figure>",
+        "<figure><img alt=\"label {label}\" src=\"data:image/{kind};base64,{}\">{}<figcaption>{}, {taken}{}{note}</figcaption></figure>",
         BASE64_STANDARD.encode(&exemplar.data),
         if is_placed { chart::scale_of_image(exemplar.width_m) } else { String::new() },
+        Escaped(&title),
         if is_placed { place() } else { String::new() },
         label = exemplar.label
     )

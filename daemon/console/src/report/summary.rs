@@ -4,14 +4,16 @@ use super::dive::{Dive, DiveVehicle, SettingsRecord};
 use super::orders::OrderStep;
 use super::words::{self, area, counted, duration, interval, lat_lon, on_earth};
 use crate::state::{LinkDirection, VehicleState};
-use scenecast_core::{Area, utc_text};
+use scenecast_core::{Area, fence_of, utc_text};
 use scenecast_messages::contents::valid_part;
 use scenecast_messages::scenecast_msgs::{Event, OrderStatus};
+use scenecast_protocol::coordinates::DecimetrePoint;
 use scenecast_protocol::directive::SlotId;
-use scenecast_protocol::map::Quantity;
+use scenecast_protocol::map::{Cell, Quantity, UNEXPLORED};
 use scenecast_protocol::wire::VehicleMode;
 use serde_json::Value;
 use std::collections::BTreeSet;
+use std::ops::RangeInclusive;
 
 /// Time without a frame from which on it is a silence, seconds.
 const SILENCE_S: f64 = 60.0;
@@ -200,7 +202,7 @@ fn extent(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -> Option<St
         words::east(east),
         words::north(south),
         words::north(north),
-        unseen(dive, vehicle, shift)
+        unseen(dive, state, vehicle, shift)
     ))
 }
 
@@ -214,12 +216,15 @@ fn sea_floor(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -> Option
         .then(|| format!("By the layer {} the sea floor is {least:.1} to {most:.1} m deep.", layer.descriptor().name))
 }
 
-/// How much of the configured area has cells; empty where none is configured.
-fn unseen(dive: &Dive, vehicle: &DiveVehicle, shift: (f64, f64)) -> String {
+/// How much of the configured area, or else of what the fence leaves, has cells.
+fn unseen(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle, shift: (f64, f64)) -> String {
     let area = ran_with(dive, vehicle).settings.get("survey.area_m");
     let corners = area.and_then(|area| serde_json::from_value::<[f64; 4]>(area.clone()).ok());
     let Some([west, south, east, north]) = corners else {
-        return " No area of the survey is configured, so how much of it was not seen is not known.".to_owned();
+        return match seen_of_fence(state, vehicle, shift) {
+            Some(share) => format!(" Of the area within the fence, {:.1} % is on the map.", share * 100.0),
+            None => " No area of the survey is configured, so how much of it was not seen is not known.".to_owned(),
+        };
     };
     let middle = |index: i32, shift_m: f64| (f64::from(index) + 0.5) * vehicle.cell_m + shift_m;
     let middles = vehicle.labels.iter().map(|(cell, _)| (middle(cell.x, shift.0), middle(cell.y, shift.1)));
@@ -228,6 +233,32 @@ fn unseen(dive: &Dive, vehicle: &DiveVehicle, shift: (f64, f64)) -> String {
         " Of the area of the survey, {west} to {east} m east and {south} to {north} m north, {:.1} % is on the map.",
         share * 100.0
     )
+}
+
+/// The share of what the fence in force leaves that has cells; `None` without a fence.
+fn seen_of_fence(state: &VehicleState, vehicle: &DiveVehicle, shift: (f64, f64)) -> Option<f64> {
+    const MAX_CELLS: i64 = 1 << 22;
+    let order = &state.orders.fence_in_force.as_ref()?.order;
+    let corners = order.fence.as_ref()?;
+    let fence = fence_of(Some(corners), &order.keep_outs, None).ok()?;
+    let range = |axis: usize, shift_m: f64| {
+        let cells = corners.iter().map(|corner| ((corner[axis] - shift_m) / vehicle.cell_m).floor() as i32);
+        Some(cells.clone().min()?..=cells.max()?)
+    };
+    let (columns, rows) = (range(0, shift.0)?, range(1, shift.1)?);
+    let count = |range: &RangeInclusive<i32>| i64::from(*range.end()) - i64::from(*range.start()) + 1;
+    if count(&columns).checked_mul(count(&rows))? > MAX_CELLS {
+        return None;
+    }
+    let decimetres =
+        |index: i32, shift_m: f64| (((f64::from(index) + 0.5) * vehicle.cell_m + shift_m) * 10.0).round() as i32;
+    let place =
+        |cell: Cell| DecimetrePoint { east_dm: decimetres(cell.x, shift.0), north_dm: decimetres(cell.y, shift.1) };
+    let all = rows.flat_map(|y| columns.clone().map(move |x| Cell::new(x, y)));
+    let inside = all.filter(|&cell| fence.allows(place(cell)));
+    let (seen, all) = inside
+        .fold((0u64, 0u64), |(seen, all), cell| (seen + u64::from(vehicle.labels.get(cell) != UNEXPLORED), all + 1));
+    (all > 0).then(|| seen as f64 / all as f64)
 }
 
 /// How much of the vehicle's map has arrived.
