@@ -110,7 +110,8 @@ pub struct ExemplarView {
     pub east_dm: i32,
     /// The same, north.
     pub north_dm: i32,
-    /// The vehicle's clock when it was taken: milliseconds, low 24; `None` if that is more than four hours ago.
+    /// The vehicle's clock when it was taken: milliseconds, low 24; `None` if that is more than four hours
+    /// ago, or in an earlier run of its program.
     pub clock_ms: Option<u32>,
 }
 
@@ -120,15 +121,15 @@ impl ExemplarView {
     /// The clock wraps after 4 h 39 min.
     const MAX_AGE_S: f64 = 4.0 * 3600.0;
 
-    /// Of an image `width_m` wide around a place of the map, taken at `taken` and sent from `now` on.
-    pub fn new(width_m: f64, (east_m, north_m): (f64, f64), taken: Instant, now: Instant) -> Self {
-        let clock_ms = (taken.as_micros() / 1000 % (1 << 24)) as u32;
-        let is_recent = now.since(taken).as_secs_f64() < Self::MAX_AGE_S && clock_ms != Self::UNKNOWN_CLOCK;
+    /// Of an image `width_m` wide around a place of the map, taken at `taken`, if that is known, and sent from `now` on.
+    pub fn new(width_m: f64, (east_m, north_m): (f64, f64), taken: Option<Instant>, now: Instant) -> Self {
+        let recent = taken.filter(|taken| now.since(*taken).as_secs_f64() < Self::MAX_AGE_S);
+        let clock_ms = recent.map(|taken| (taken.as_micros() / 1000 % (1 << 24)) as u32);
         Self {
             width_mm: (width_m * 1000.0).round().clamp(0.0, 65535.0) as u16,
             east_dm: decimetres(east_m),
             north_dm: decimetres(north_m),
-            clock_ms: is_recent.then_some(clock_ms),
+            clock_ms: clock_ms.filter(|clock_ms| *clock_ms != Self::UNKNOWN_CLOCK),
         }
     }
 

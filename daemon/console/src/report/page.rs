@@ -22,7 +22,7 @@ border-bottom:1px solid #ccc}td.n{text-align:right;white-space:nowrap}td.t{white
 svg text{font:11px system-ui,sans-serif}.grid{stroke:#000;stroke-opacity:.25;stroke-width:.6;fill:none}\
 .track{fill:none;stroke:#000;stroke-width:1.5;stroke-linejoin:round}.line{fill:none;stroke:#000;stroke-width:1.2}\
 thead{display:table-header-group}.swatch,svg{-webkit-print-color-adjust:exact;print-color-adjust:exact}thead tr{break-after:avoid}.fence{fill:none;stroke:#000;stroke-width:1.5;stroke-dasharray:6 3}.out{fill:#000;fill-opacity:.12;stroke:#000;stroke-dasharray:2 2}.scale{fill:none;stroke:#000;stroke-width:1.5}.swatch{display:inline-block;width:1em;height:1em;border:1px solid #000;\
-vertical-align:-.15em;margin-right:.4em}.images{display:flex;flex-wrap:wrap;gap:.6em}.images figure{margin:0;width:200px}.images svg{width:112px}.images img{width:112px;display:block;\
+vertical-align:-.15em;margin-right:.4em}.images{display:flex;flex-wrap:wrap;gap:.6em}.images figure{margin:0;width:188px}.images svg{width:112px}.images img{width:112px;display:block;\
 image-rendering:pixelated}.number{font-weight:600;paint-order:stroke;stroke:#fff;stroke-width:3px}\
 .point{fill:#fff;stroke:#000;stroke-width:1.5}.legend>span{display:inline-block;margin-right:1em}@media(max-width:700px){table{display:block;overflow-x:auto}}\
 h2,h3{break-after:avoid}tr,svg{break-inside:avoid}@media print{body{margin:0;max-width:none}figure.map{break-inside:avoid}figure.map svg{max-height:13cm}thead+tbody>tr:first-child{break-before:avoid}h2+p,h3+p,p:last-child{break-before:avoid}}";
@@ -240,17 +240,16 @@ fn without_cells(page: &mut String, dive: &Dive, state: &VehicleState, vehicle: 
     if labels.is_empty() {
         return;
     }
-    *page += "<h3>Labels without cells at the end</h3>\n<p>The scene model had them for some time, and gave their cells to other labels.</p>\n<ul>\n";
-    for label in labels {
-        let images = vehicle.exemplars.iter().filter(|(_, exemplar)| exemplar.label == label).take(IMAGES);
-        let images: String = images.map(|found| image(dive, state, vehicle, found, "")).collect();
-        let _ = writeln!(
-            page,
-            "<li>{}<div class=\"images\">{images}</div></li>",
-            Escaped(&book.name(label).map_or_else(|| book.title(label), |name| format!("{label}: {name}")))
-        );
-    }
-    *page += "</ul>\n";
+    let images = vehicle.exemplars.iter().filter(|(_, exemplar)| labels.contains(&exemplar.label));
+    let images: String = images.map(|found| image(dive, state, vehicle, found, "")).collect();
+    let title = |label: &u8| book.name(*label).map_or_else(|| book.title(*label), |name| format!("{label}: {name}"));
+    let titles: Vec<String> = labels.iter().map(title).collect();
+    let _ = writeln!(
+        page,
+        "<h3>Labels without cells at the end</h3>\n<p>The scene model had these labels for some time, and gave their cells to others: \
+         {}.</p>\n<div class=\"images\">{images}</div>",
+        Escaped(&titles.join(", "))
+    );
 }
 
 /// The classes by their colours and numbers.
@@ -319,7 +318,7 @@ fn image(
         format!("<br>{}, {}{on_earth}{sigma}", words::east(middle.x), words::north(middle.y))
     };
     format!(
-        "<figure><img alt=\"label {label}\" src=\"data:image/{kind};base64,{}\">{}<figcaption>{}, {taken}{}{note}</figcaption></figure>",
+        "<figure><img alt=\"label {label}\" src=\"data:image/{kind};base64,{}\">{}<figcaption>{}<br>{taken}{}{note}</figcaption></figure>",
         BASE64_STANDARD.encode(&exemplar.data),
         if is_placed { chart::scale_of_image(exemplar.width_m) } else { String::new() },
         Escaped(&title),

@@ -1,5 +1,6 @@
 //! From which camera frame each cell has its label, and what the scene model knew of it then.
 
+use super::frame_clock::FrameClock;
 use crate::MapUpdate;
 use scene_model::project::Pose;
 use scenecast_protocol::map::{Cell, LayerId};
@@ -32,9 +33,9 @@ pub(super) struct EvidenceByCell(BTreeMap<Cell, Evidence>);
 
 impl EvidenceByCell {
     /// These cells have changed with the update.
-    pub(super) fn handle_change(&mut self, changed: &BTreeSet<Cell>, update: &MapUpdate) {
-        let Some(seen) = &update.seen else { return };
-        let frame = Arc::new(MappedFrame { taken_s: update.t_s, camera: seen.camera });
+    pub(super) fn handle_change(&mut self, changed: &BTreeSet<Cell>, update: &MapUpdate, frames: FrameClock) {
+        let Some((seen, taken)) = update.seen.as_ref().zip(frames.taken(update.t_s)) else { return };
+        let frame = Arc::new(MappedFrame { taken_s: taken.as_secs_f64(), camera: seen.camera });
         let confidence = update.layers.get(&LayerId::CONFIDENCE).into_iter().flatten();
         let confidence: BTreeMap<Cell, f64> = confidence.copied().filter(|(cell, _)| changed.contains(cell)).collect();
         for &(cell, words) in seen.words.iter().filter(|(cell, _)| changed.contains(cell)) {

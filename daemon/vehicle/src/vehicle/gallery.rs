@@ -1,5 +1,6 @@
 //! The exemplars of the vehicle: those that it has, those that it has sent, and those that the surface requests.
 
+use super::frame_clock::FrameClock;
 use crate::SharedExemplars;
 use crate::exemplar::{GOOD_SSIM, compress_to, middle};
 use scene_model::exemplars::ExemplarPatch;
@@ -54,9 +55,15 @@ pub(super) struct Gallery {
     /// Labels of which an exemplar was sent in this run of the link.
     seen: BTreeSet<u8>,
     unrequested: Option<Unrequested>,
+    /// The times of camera frames.
+    frames: FrameClock,
 }
 
 impl Gallery {
+    pub(super) fn set_frames(&mut self, frames: FrameClock) {
+        self.frames = frames;
+    }
+
     /// Maximum number of requests at a time.
     pub(super) const MAX_REQUESTS: usize = 8;
 
@@ -139,7 +146,8 @@ impl Gallery {
             object.into_iter().for_each(|id| link.cancel_object(id));
         }
         let head = head(epoch, request.label, request.serial);
-        let exemplar = chosen.as_ref().and_then(|(n, p)| fill(head.clone(), *n, p, request.size, now)).unwrap_or(head);
+        let exemplar =
+            chosen.as_ref().and_then(|(n, p)| self.fill(head.clone(), *n, p, request.size, now)).unwrap_or(head);
         let Some(object) = link.push_object(exemplar.encode()) else { return };
         self.replies.push(Reply { request, number: exemplar.picture, object: Some(object) });
         if let Some((number, picture)) = chosen {
@@ -156,10 +164,19 @@ impl Gallery {
             return;
         };
         let head = head(epoch, label, 0);
-        let Some(exemplar) = fill(head, number, &picture, 0, now) else { return };
+        let Some(exemplar) = self.fill(head, number, &picture, 0, now) else { return };
         self.note_shown(label, number, picture);
         let object = link.push_background_object(exemplar.encode());
         self.unrequested = object.map(|object| Unrequested { label, number, object });
+    }
+
+    /// The object of an exemplar in at most the requested size class; `None` if it cannot be compressed.
+    fn fill(&self, head: Exemplar, number: u8, picture: &ExemplarPatch, size: u8, now: Instant) -> Option<Exemplar> {
+        let (size, image) = middle(&picture.patch, size)?;
+        let bytes = compress_to(&image, GOOD_SSIM, max_bytes(size))?.bytes;
+        let width_m = f64::from(edge_px(size)) * picture.pixel_m;
+        let view = ExemplarView::new(width_m, picture.place, self.frames.taken(picture.t_s), now);
+        Some(Exemplar { size, picture: number, view, bytes, ..head })
     }
 
     /// The exemplar that a request asks for: the named one while it is known, otherwise the best one that was not sent.
@@ -221,15 +238,6 @@ fn number_of(picture: &ExemplarPatch) -> u8 {
 
 fn is_same(a: &ExemplarPatch, b: &ExemplarPatch) -> bool {
     (a.t_s, a.place) == (b.t_s, b.place)
-}
-
-/// The object of an exemplar in at most the requested size class; `None` if it cannot be compressed.
-fn fill(head: Exemplar, number: u8, picture: &ExemplarPatch, size: u8, now: Instant) -> Option<Exemplar> {
-    let (size, image) = middle(&picture.patch, size)?;
-    let bytes = compress_to(&image, GOOD_SSIM, max_bytes(size))?.bytes;
-    let width_m = f64::from(edge_px(size)) * picture.pixel_m;
-    let view = ExemplarView::new(width_m, picture.place, Instant::from_secs_f64(picture.t_s), now);
-    Some(Exemplar { size, picture: number, view, bytes, ..head })
 }
 
 /// An exemplar of a label without an image, which answers a request with this serial number.

@@ -8,6 +8,7 @@ mod band_tests;
 mod bands;
 mod durable;
 mod evidence;
+mod frame_clock;
 mod gallery;
 mod guidance;
 #[cfg(test)]
@@ -297,7 +298,8 @@ impl Vehicle {
     }
 
     fn serve_exemplars(&mut self, now: Instant) {
-        let Self { weights, gallery, link, storing, .. } = self;
+        let Self { weights, gallery, link, storing, publisher, .. } = self;
+        gallery.set_frames(publisher.frames());
         gallery.serve(storing.epoch(), |label| weights.weight(label), link, now);
     }
 

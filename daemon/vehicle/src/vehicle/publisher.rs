@@ -2,6 +2,7 @@
 
 use super::bands::Bands;
 use super::evidence::{Evidence, EvidenceByCell};
+use super::frame_clock::FrameClock;
 use super::storing::Withheld;
 use crate::{LabelChanges, MapUpdate};
 use scenecast_config::Debounce;
@@ -48,6 +49,7 @@ pub(super) struct MapPublisher {
     map: LabelGrid,
     version: u64,
     evidence: EvidenceByCell,
+    frames: FrameClock,
     /// Whether cells have lost their labels, as those of another program may.
     has_erased: bool,
     /// Layers of the scene model.
@@ -73,6 +75,11 @@ impl MapPublisher {
     }
 
     /// Why a cell has its label, if a camera frame of this run gave it.
+    /// The times of camera frames.
+    pub(super) fn frames(&self) -> FrameClock {
+        self.frames
+    }
+
     pub(super) fn evidence(&self, cell: Cell) -> Option<&Evidence> {
         self.evidence.get(cell)
     }
@@ -138,7 +145,8 @@ impl MapPublisher {
         let changed = update.cells.iter().filter(|&&(cell, label)| self.map.set(cell, label) != label);
         let changed: BTreeSet<Cell> = changed.map(|(cell, _)| *cell).collect();
         self.version += u64::from(!changed.is_empty());
-        self.evidence.handle_change(&changed, update);
+        self.frames.handle(update, now);
+        self.evidence.handle_change(&changed, update, self.frames);
         self.has_erased |= (self.explored as usize) < update.cells.len();
         // A band in the place of a built-in layer has its cells to itself.
         let own = update.layers.iter().filter(|(id, _)| !self.bands.has(**id));
