@@ -24,7 +24,7 @@ pub use lines::Lines;
 pub use modem_facts::{
     CYCLE_INIT, MicromodemRate, OVERHEAD_BITS, PortAddress, S2C_BURST_FRAME_BYTES, S2C_INSTANT_BYTES,
 };
-pub use output::{UserError, printable, write_error, write_or_exit};
+pub use output::{UserError, one_line, printable, write_error, write_or_exit};
 pub use principal::{ClientName, Giver, Principal, Role};
 pub use program::{program, set_program};
 pub use reminder::Reminder;

@@ -97,6 +97,11 @@ pub fn printable(text: &str) -> Cow<'_, str> {
     Cow::Owned(out)
 }
 
+/// The text as a part of one line: a break of the line in it, which could forge a line of its own, is a space.
+pub fn one_line(text: &str) -> String {
+    text.replace(['\n', '\r', '\u{0B}', '\u{0C}', '\u{85}', '\u{2028}', '\u{2029}'], " ")
+}
+
 fn is_unsafe(character: char) -> bool {
     let turns =
         matches!(character, '\u{61C}' | '\u{200E}' | '\u{200F}' | '\u{202A}'..='\u{202E}' | '\u{2066}'..='\u{2069}');
@@ -111,6 +116,7 @@ mod tests {
     fn a_text_moves_no_cursor_and_turns_no_line_around() {
         assert_eq!(printable("Plattfisch\n\tπλάτος"), "Plattfisch\n\tπλάτος");
         assert_eq!(printable("a\u{1b}[2Jb\u{9b}31m\r\u{7f}"), "a\\u001b[2Jb\\u009b31m\\u000d\\u007f");
+        assert_eq!(one_line("ok\n99 hold\u{2028}applied"), "ok 99 hold applied");
         assert_eq!(printable("hold\u{202e}emuser\u{2069}"), "hold\\u202eemuser\\u2069");
     }
 }

@@ -2,7 +2,7 @@
 
 use super::journal::Folder;
 use super::restore::CheckpointFile;
-use crate::camera::{CameraFrame, ReadFrame};
+use crate::camera::{CameraFrame, FramePicture, ReadFrame};
 use scene_model::project::Pose;
 use scenecast_core::UserError;
 use scenecast_protocol::directive::Settings;
@@ -173,8 +173,10 @@ impl Work {
     }
 
     fn see(&mut self, mut frame: CameraFrame) -> FromMapper {
+        // A recording may say by its scale that images of other sizes show as much.
+        let has_one_size = matches!(frame.picture, FramePicture::Received(_)) || frame.scale == 1.0;
         let read = frame.take_image().and_then(|read| match &read.view {
-            None if frame.scale == 1.0 => {
+            None if has_one_size => {
                 self.size.check(read.image.dimensions()).map(|()| read).map_err(|e| UserError::Input(e.to_string()))
             }
             _ => Ok(read),

@@ -3,7 +3,7 @@
 use super::Surface;
 use super::orders::{FenceOrder, LimitsOrder};
 use super::vehicle_record::{SentOrder, VehicleRecord};
-use scenecast_protocol::directive::{Constraints, OrderStatus, Slot, SlotId};
+use scenecast_protocol::directive::{Constraints, OrderStatus, Slot, SlotId, Withdrawal};
 use scenecast_protocol::link::{InForce, PeerView};
 use scenecast_protocol::map::MAX_LABEL;
 use scenecast_protocol::time::Instant;
@@ -74,6 +74,10 @@ fn follow_order<T: Clone + Default + PartialEq>(
 /// The vehicle may obey an order that this surface does not know, so that the rest of it would be removed.
 fn present<T: Clone + Default>(order: &SentOrder<T>, id: SlotId, view: &PeerView<'_>) -> Result<T, String> {
     if status(view, id).is_some_and(OrderStatus::is_pending) {
+        return Ok(order.sent.clone().unwrap_or_default());
+    }
+    // A change of a part of what the vehicle has lost gives it again.
+    if status(view, id) == Some(OrderStatus::Withdrawn(Withdrawal::Lost)) {
         return Ok(order.sent.clone().unwrap_or_default());
     }
     let in_force = order.in_force.as_ref().map(|(_, content)| content.clone());

@@ -127,7 +127,7 @@ impl SlotOutbox {
     /// If the vehicle has lost its record of the series, a new one begins, in which every order is sent again.
     pub fn issue(&mut self, slot: Slot, now: Instant) -> u16 {
         if self.is_forgotten {
-            self.begin_series(now);
+            self.begin_series(|_| false, now);
         }
         let id = slot.id();
         if let Some(was_on_air) = self.was_on_air.get_mut(id.index()) {
@@ -215,7 +215,9 @@ impl SlotOutbox {
             let Some(Some(slot)) = self.slots.get(id.index()) else { continue };
             let status = match report.state {
                 SlotState::Unknown => {
-                    let forgotten = |s| matches!(s, OrderStatus::Received | OrderStatus::Applied);
+                    // What has only lifted a hold is not given again by itself: the vehicle may hold for a newer reason.
+                    let is_lifted = lifts(&slot.slot);
+                    let forgotten = |s| s == OrderStatus::Received || s == OrderStatus::Applied && !is_lifted;
                     self.advance(id, slot.version, OrderStatus::Queued, now, forgotten);
                     continue;
                 }
@@ -224,7 +226,11 @@ impl SlotOutbox {
                 SlotState::Applied => OrderStatus::Applied,
                 SlotState::Refused(reason) => OrderStatus::Refused(reason),
             };
-            if self.advance(id, slot.version, status, now, |s| s == OrderStatus::Received) {
+            // One that was withdrawn because it seemed not to have arrived may have arrived.
+            let may_have_arrived = slot.sent.is_some();
+            let is_undecided =
+                |s| s == OrderStatus::Received || may_have_arrived && s == OrderStatus::Withdrawn(Withdrawal::Late);
+            if self.advance(id, slot.version, status, now, is_undecided) {
                 self.is_forgotten |= is_forgotten(status);
                 decided.push(id);
             }
@@ -284,17 +290,18 @@ impl SlotOutbox {
             restored.push(order.id);
         }
         if !restored.is_empty() {
-            self.begin_series(now);
+            self.begin_series(|_| false, now);
         }
         restored
     }
 
-    /// Withdraws an abort that has not arrived in time; returns whether there was one.
+    /// Withdraws an abort, or an order that lifts one or a hold, that has not arrived in time; returns whether there was one. A hold
+    /// stays, because to stop is safe.
     pub fn withdraw_late_abort(&mut self, now: Instant) -> bool {
         let Some(lifetime) = self.abort_lifetime else { return false };
         let is_late = |order: &&mut SlotProgress| {
             let is_abort = matches!(order.slot, Slot::Constraints(constraints) if constraints.abort);
-            is_abort && order.status.is_pending() && now.since(order.issued) >= lifetime
+            (is_abort || lifts(&order.slot)) && order.status.is_pending() && now.since(order.issued) >= lifetime
         };
         let late = self.slots.iter_mut().flatten().find(is_late);
         late.map(|order| (order.status, order.changed) = (OrderStatus::Withdrawn(Withdrawal::Late), now)).is_some()
@@ -354,7 +361,13 @@ impl SlotOutbox {
     /// received version, because it knows a newer one that was not issued here, which takes a forged frame. An order that it
     /// left out for another surface's, although this surface knows that, is only sent again. A vehicle decides before it acknowledges, so the reports after the acknowledgement
     /// have the decision. As the number of the acknowledgement may be forged, a report long after it has the decision too.
-    pub fn leave_overtaken_series(&mut self, report: &[SlotReport; SLOTS], number: u64, now: Instant) {
+    pub fn leave_overtaken_series(
+        &mut self,
+        report: &[SlotReport; SLOTS],
+        number: u64,
+        is_replaced: impl Fn(&SlotProgress) -> bool,
+        now: Instant,
+    ) {
         let ignored = |slot: &&SlotProgress| {
             let (report, received_in) = (report.get(slot.id.index()), self.received_in.get(slot.id.index()));
             let is_other = |r: &SlotReport| r.state != SlotState::Unknown && r.version_low != slot.version as u8;
@@ -365,7 +378,7 @@ impl SlotOutbox {
         let overtaken = SlotState::Refused(RefusalReason::Overtaken);
         match self.is_keyed && report.get(id.index()).is_some_and(|r| r.state == overtaken) {
             true => drop(self.advance(id, version, OrderStatus::Queued, now, |_| true)),
-            false => self.begin_series(now),
+            false => self.begin_series(is_replaced, now),
         }
     }
 
@@ -386,17 +399,17 @@ impl SlotOutbox {
 
     /// Begins a new series, because the latest order of a slot was displaced by one that was not issued here. An order is
     /// sent again for this reason once only, because a vehicle could report another content for ever.
-    pub fn leave_series_of_displaced(&mut self, id: SlotId, now: Instant) {
+    pub fn leave_series_of_displaced(&mut self, id: SlotId, is_replaced: impl Fn(&SlotProgress) -> bool, now: Instant) {
         let version = self.slots.get(id.index()).and_then(Option::as_ref).map(|order| order.version);
         if self.displaced.get_mut(id.index()).is_some_and(|displaced| std::mem::replace(displaced, version) != version)
         {
-            self.begin_series(now);
+            self.begin_series(is_replaced, now);
         }
     }
 
-    /// Sends every order again in a new series, except one that only lifts a hold or an abort: the vehicle holds since it
-    /// has lost its record, and the operator lifts that by a new order.
-    fn begin_series(&mut self, now: Instant) {
+    /// Sends every order again in a new series, except those of which nothing is in force any more, by `is_replaced`, and one that only
+    /// lifts a hold or an abort: the vehicle holds since it has lost its record, and the operator lifts that by a new order.
+    fn begin_series(&mut self, is_replaced: impl Fn(&SlotProgress) -> bool, now: Instant) {
         self.series = self.series.next();
         (self.is_forgotten, self.was_on_air) = (false, [false; SLOTS]);
         for progress in self.slots.iter_mut().flatten() {
@@ -405,9 +418,19 @@ impl SlotOutbox {
                 OrderStatus::Withdrawn(_) => true,
                 _ => false,
             };
-            if lifts(&progress.slot) && !is_final {
+            let is_applied = progress.status == OrderStatus::Applied;
+            if is_applied && is_replaced(progress) {
+                (progress.status, progress.changed) = (OrderStatus::Withdrawn(Withdrawal::Superseded), now);
+                continue;
+            }
+            let lifts = lifts(&progress.slot);
+            // What was applied before the vehicle lost its record is withdrawn as lost, so this was applied since.
+            if is_final || lifts && is_applied {
+                continue;
+            }
+            if lifts {
                 progress.status = OrderStatus::Refused(RefusalReason::Forgotten);
-            } else if !is_final {
+            } else {
                 (progress.status, progress.changed, progress.sent) = (OrderStatus::Queued, now, None);
             }
         }
@@ -500,6 +523,73 @@ mod tests {
                 assert!(!after.has_backlog());
             }
             assert!(after.issue(hold(false), now) > 3 + 1, "the next version may have been used by a lost order");
+        }
+    }
+
+    /// An outbox with these orders, which the vehicle is said to have applied.
+    fn applied(orders: &[Slot], now: Instant) -> SlotOutbox {
+        let mut outbox = SlotOutbox::new(Series::from_random(9), true);
+        for order in orders {
+            let version = outbox.issue(order.clone(), now);
+            outbox.advance(order.id(), version, OrderStatus::Applied, now, |_| true);
+        }
+        outbox
+    }
+
+    fn status_of(outbox: &SlotOutbox, id: SlotId) -> OrderStatus {
+        outbox.progress().find(|order| order.id == id).unwrap().status
+    }
+
+    #[test]
+    fn a_new_series_sends_nothing_that_a_newer_order_has_replaced() {
+        let now = Instant::from_secs_f64(5.0);
+        let limits = Slot::Limits(crate::directive::Limits::default());
+        let mut outbox = applied(&[limits, hold(true)], now);
+        outbox.begin_series(|order| order.id == SlotId::Limits, now);
+        assert_eq!(status_of(&outbox, SlotId::Limits), OrderStatus::Withdrawn(Withdrawal::Superseded));
+        assert_eq!(status_of(&outbox, SlotId::Constraints), OrderStatus::Queued);
+    }
+
+    #[test]
+    fn what_has_lifted_a_hold_is_neither_refused_nor_sent_again() {
+        let now = Instant::from_secs_f64(5.0);
+        let mut outbox = applied(&[hold(false)], now);
+        outbox.begin_series(|_| false, now);
+        outbox.handle_report(&Default::default(), now);
+        assert_eq!(status_of(&outbox, SlotId::Constraints), OrderStatus::Applied);
+        assert!(!outbox.has_backlog());
+    }
+
+    #[test]
+    fn an_abort_that_seemed_late_and_had_arrived_is_shown_as_applied() {
+        let at = Instant::from_secs_f64;
+        let abort = Slot::Constraints(Constraints { hold: false, abort: true });
+        for was_sent in [true, false] {
+            let mut outbox = SlotOutbox::new(Series::from_random(9), true);
+            outbox.set_abort_lifetime(Some(Duration::from_secs(120)));
+            let version = outbox.issue(abort.clone(), at(5.0));
+            if was_sent {
+                outbox.mark_on_air(SlotId::Constraints, version, at(6.0));
+            }
+            assert!(outbox.withdraw_late_abort(at(130.0)));
+            let mut reports = [SlotReport::default(); SLOTS];
+            reports[SlotId::Constraints.index()] = SlotReport { state: SlotState::Applied, version_low: version as u8 };
+            outbox.handle_report(&reports, at(140.0));
+            let late = OrderStatus::Withdrawn(Withdrawal::Late);
+            let status = status_of(&outbox, SlotId::Constraints);
+            assert_eq!(status, if was_sent { OrderStatus::Applied } else { late }, "{was_sent}");
+        }
+    }
+
+    #[test]
+    fn an_old_resume_is_withdrawn_and_a_hold_stays() {
+        let at = Instant::from_secs_f64;
+        for (order, is_withdrawn) in [(hold(false), true), (hold(true), false)] {
+            let mut outbox = SlotOutbox::new(Series::from_random(9), true);
+            outbox.set_abort_lifetime(Some(Duration::from_secs(120)));
+            outbox.issue(order, at(5.0));
+            assert!(!outbox.withdraw_late_abort(at(124.0)));
+            assert_eq!(outbox.withdraw_late_abort(at(125.0)), is_withdrawn);
         }
     }
 }

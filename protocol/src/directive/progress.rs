@@ -46,7 +46,7 @@ impl Withdrawal {
     /// An explanation for the operator, one clause.
     pub fn explain(self) -> &'static str {
         match self {
-            Self::Superseded => "another surface has given a newer order of this kind",
+            Self::Superseded => "a newer order of this kind is in force",
             Self::Overtaken => {
                 "another surface gave an order of this kind, perhaps a newer one, before it arrived: is it still to be sent?"
             }

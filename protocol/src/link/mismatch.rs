@@ -4,7 +4,7 @@ use crate::wire::{Introduction, SessionId, WIRE_VERSION};
 use std::collections::BTreeSet;
 
 /// A setting of the other end that does not fit, so that its frames are refused, wasteful or those of two. It is found in a frame
-/// with a valid CRC or tag, apart from [`Self::Tag`] and [`Self::Key`].
+/// with a valid CRC or tag, apart from [`Self::Tag`], [`Self::Key`] and [`Self::Foreign`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, thiserror::Error)]
 pub enum Mismatch {
     /// The other end has this wire version.
@@ -29,6 +29,12 @@ pub enum Mismatch {
          at both ends"
     )]
     Unverified,
+    /// Only at the surface: many frames from its address do not verify, and none does.
+    #[error(
+        "its frames do not verify here: another surface holds it, or link.key_file, link.authenticate or mission.id differ \
+         between the ends"
+    )]
+    Foreign,
     /// Its frames have up to so many bytes, and those of this end another number. They are read all the same.
     #[error("its frames have up to {0} bytes, those of this end {1}: set the same link.frame_bytes at both ends")]
     Length(usize, usize),
@@ -68,6 +74,8 @@ pub(super) struct MismatchReport {
     reported: BTreeSet<Mismatch>,
     /// Frames with an unexpected tag, which may also be damaged frames, since the last accepted one.
     tagged: u32,
+    /// Numbered frames that do not verify, since the last accepted one.
+    foreign: u32,
     /// Frames from the address of this end that it has not sent, or that noise has made.
     from_own_address: u32,
     /// Hellos of one session that do not verify, which may also be damaged ones, since the last one that does.
@@ -77,6 +85,8 @@ pub(super) struct MismatchReport {
 impl MismatchReport {
     /// Frames with an unexpected tag after which the other end is taken to write tags.
     const MIN_TAGGED: u32 = 3;
+    /// Frames without one between them that verifies: on a channel that damages every second one these are rarer than 1 in 4000.
+    const MIN_FOREIGN: u32 = 12;
     /// Hellos of one session after which the other end is taken to have another key or mission number.
     const MIN_UNTRUE: u32 = 3;
     /// Frames from the address of this end after which they are taken for those of another vehicle. None of them is verified.
@@ -99,6 +109,14 @@ impl MismatchReport {
         self.untrue = Some((session, before + 1));
         if before + 1 >= Self::MIN_UNTRUE {
             self.note(Mismatch::Key);
+        }
+    }
+
+    /// A numbered frame does not verify: it is damaged, or of another pair of runs.
+    pub(super) fn note_foreign(&mut self) {
+        self.foreign = self.foreign.saturating_add(1);
+        if self.foreign >= Self::MIN_FOREIGN && self.current.is_none() {
+            self.note(Mismatch::Foreign);
         }
     }
 
@@ -146,7 +164,7 @@ impl MismatchReport {
     }
 
     pub(super) fn handle_accepted(&mut self) {
-        (self.tagged, self.from_own_address, self.current, self.untrue) = (0, 0, None, None);
+        (self.tagged, self.foreign, self.from_own_address, self.current, self.untrue) = (0, 0, 0, None, None);
     }
 
     pub(super) fn current(&self) -> Option<Mismatch> {

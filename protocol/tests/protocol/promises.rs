@@ -136,6 +136,24 @@ fn both_ends_name_another_key_or_mission_within_30_seconds() {
 }
 
 #[test]
+fn a_surface_names_a_vehicle_whose_frames_do_not_verify() {
+    let common = Setup::new(64, 10_000, Codec::Png).keyed(true, false);
+    let mut pair = LinkedEnds::new(3, common.clone(), STILL);
+    pair.vehicle.set_map(flat(9, 1).iter(), pair.now);
+    pair.run(pair.now + Duration::from_secs(120), false);
+    let key = HeldKey::Mission(MissionKey::from_bytes([43; 16]));
+    let other_key = Setup { authenticity: Some(Authenticity::new(key, true, false)), ..common };
+    let mut listener = surface_of(&other_key, 4, pair.now);
+    let mut mismatches = Vec::new();
+    for bytes in &pair.overheard {
+        listener.handle_frame(bytes, pair.now);
+        mismatches.push(listener.vehicle(auv()).and_then(|view| view.mismatch(pair.now)));
+    }
+    assert_eq!(mismatches.last(), Some(&Some(Mismatch::Foreign)), "{} frames", mismatches.len());
+    assert_eq!(pair.surface.vehicle(auv()).unwrap().mismatch(pair.now), None);
+}
+
+#[test]
 fn frames_of_another_mission_are_dropped() {
     for keyed in [false, true] {
         let setup = Setup::new(64, 10_000, Codec::Png);

@@ -41,8 +41,8 @@ section! {
         /// What the surface does when a vehicle has lost the orders that it had received. ask: it shows them, and sends them
         /// again when an operator confirms it; auto: it sends them again by itself. An order to resume is never sent again.
         restore: RestoreOrders = RestoreOrders::Ask, ANY, [Asv Scenario];
-        /// Age after which an abort that has not arrived is sent no more, until an operator confirms it. 0: it is sent until
-        /// it arrives.
+        /// Age after which an abort, or an order to resume, that has not arrived is sent no more, until an operator confirms it. 0: it is
+        /// sent until it arrives.
         abort_lifetime_s: f64 = 120.0, range(0.0, 1e6, "s"), [Asv Scenario];
     }
 }

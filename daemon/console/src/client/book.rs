@@ -5,7 +5,7 @@ use super::names;
 use super::session::Session;
 use crate::orders::{LabelOrder, MarkerOrder, NoteOrder, RemoveMarkerOrder};
 use crate::state::VehicleMarker;
-use scenecast_core::UserError;
+use scenecast_core::{UserError, one_line};
 
 /// What is to be changed of a label; `None` stays as it is, an empty text is removed.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
@@ -59,7 +59,14 @@ pub async fn show_marks(session: &Session) -> Result<(), UserError> {
         [] => "no marker\n".to_owned(),
         markers => {
             let line = |m: &VehicleMarker| {
-                format!("{}: {:.1} m east, {:.1} m north: {} ({})\n", m.number, m.x_m, m.y_m, m.text, m.author)
+                format!(
+                    "{}: {:.1} m east, {:.1} m north: {} ({})\n",
+                    m.number,
+                    m.x_m,
+                    m.y_m,
+                    one_line(&m.text),
+                    one_line(&m.author)
+                )
             };
             markers.iter().map(line).collect()
         }

@@ -4,7 +4,7 @@ use super::names;
 use super::session::{Session, json, write};
 use super::text::{self, is_silent, mode, span};
 use crate::state::{ExemplarImage, ExemplarStage, LogLine, LogList, MissionState, VehicleState};
-use scenecast_core::UserError;
+use scenecast_core::{UserError, one_line};
 use serde::Serialize;
 use std::path::Path;
 
@@ -25,7 +25,7 @@ impl StateChange {
     /// The change as a line with its time.
     pub(super) fn line(&self) -> String {
         let vehicle = self.vehicle.map_or(String::new(), |id| format!("vehicle {id}: "));
-        format!("{:>10}  {vehicle}{}", span(self.t_s), self.text)
+        format!("{:>10}  {vehicle}{}", span(self.t_s), one_line(&self.text))
     }
 }
 
@@ -202,7 +202,7 @@ fn line(entry: &LogLine) -> String {
     let vehicle = entry.vehicle.map_or(String::new(), |id| format!("vehicle {id}: "));
     let by = entry.by.as_ref().map_or(String::new(), |by| format!(" (by {by})"));
     let LogLine { number, at_s, utc, kind, text, .. } = entry;
-    format!("{number:>5}  {utc}  {:>10}  {kind:<8} {vehicle}{text}{by}", span(*at_s))
+    one_line(&format!("{number:>5}  {utc}  {:>10}  {kind:<8} {vehicle}{text}{by}", span(*at_s)))
 }
 
 #[cfg(test)]

@@ -35,7 +35,9 @@ pub(super) fn gaps(path: &Path, files: &[PathBuf]) -> Vec<String> {
             numbers.entry(name.to_owned()).or_default().push(number);
         }
     }
-    for (name, mut numbers) in numbers.clone() {
+    let listed = if path.is_dir() { listed(path) } else { Vec::new() };
+    // What a list of the files says is better than their numbers.
+    for (name, mut numbers) in numbers.clone().into_iter().filter(|_| listed.is_empty()) {
         numbers.sort_unstable();
         for pair in numbers.windows(2).filter(|pair| pair[1] - pair[0] > 1) {
             lines.push(format!(
@@ -51,12 +53,8 @@ pub(super) fn gaps(path: &Path, files: &[PathBuf]) -> Vec<String> {
             names.join(", ")
         ));
     }
-    lines.extend(
-        listed(path)
-            .into_iter()
-            .filter(|name| !is_there(path, name))
-            .map(|name| format!("a part of the bag is missing: metadata.yaml lists {name}")),
-    );
+    let missing = listed.into_iter().filter(|name| !is_there(path, name));
+    lines.extend(missing.map(|name| format!("a part of the bag is missing: metadata.yaml lists {name}")));
     lines
 }
 

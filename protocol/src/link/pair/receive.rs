@@ -284,8 +284,10 @@ impl<T> LinkPair<T> {
             }
             _ => {
                 // At the surface, hellos of the vehicle to another surface do not verify.
-                if let Some(session) = envelope.header.session.filter(|_| self.us != Address::SURFACE) {
-                    self.mismatch.note_untrue_hello(session);
+                match (envelope.header.session, self.us == Address::SURFACE) {
+                    (Some(session), false) => self.mismatch.note_untrue_hello(session),
+                    (None, true) => self.mismatch.note_foreign(),
+                    _ => {}
                 }
                 DropReason::Checksum
             }

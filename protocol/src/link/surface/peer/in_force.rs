@@ -141,6 +141,21 @@ impl InForceCopy {
         is_judged && order.slot.clone().in_force().map(|slot| slot.payload()) != Some(held.payload())
     }
 
+    /// Whether something else than an order that was applied is in force, or may be. One that was never in force is not replaced but
+    /// refuted, and what orders of hold and abort have left is told by the vehicle's mode alone.
+    pub(super) fn has_replaced(&self, order: &SlotProgress) -> bool {
+        if self.refutes(order) {
+            return false;
+        }
+        let payload = |slot: Option<Slot>| slot.map(|slot| slot.payload());
+        match self.get(order.id) {
+            InForce::NotReported => order.id == SlotId::Constraints,
+            InForce::Unknown => true,
+            InForce::None => order.slot.clone().in_force().is_some(),
+            InForce::Known(held) => payload(joined(&order.slot, Some(held.clone()))) != payload(Some(held.clone())),
+        }
+    }
+
     /// The orders that are in force by now were so in an earlier run of the surface.
     pub(super) fn trust(&mut self) {
         self.proved = PerSlot::from_fn(|_| true);

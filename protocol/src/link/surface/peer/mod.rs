@@ -260,7 +260,7 @@ impl<R: StateReplica> VehiclePeer<R> {
     fn leave_refuted_series(&mut self, now: Instant) {
         let refuted = self.outbox.progress().find(|order| self.in_force.refutes(order)).map(|order| order.id);
         if let Some(id) = refuted {
-            self.outbox.leave_series_of_displaced(id, now);
+            self.outbox.leave_series_of_displaced(id, |order| self.in_force.has_replaced(order), now);
         }
     }
 
@@ -448,7 +448,8 @@ impl<R: StateReplica> VehiclePeer<R> {
                         self.outbox.progress().filter(is_pending).map(|o| o.slot.clone()).collect();
                     self.in_force.handle_report(summary, &pending, number, now);
                 }
-                self.outbox.leave_overtaken_series(&report.slots, number, now);
+                let is_replaced = |order: &SlotProgress| self.in_force.has_replaced(order);
+                self.outbox.leave_overtaken_series(&report.slots, number, is_replaced, now);
                 self.leave_refuted_series(now);
             }
             self.follow_series();

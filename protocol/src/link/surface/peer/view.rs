@@ -39,7 +39,9 @@ impl<'a, R: StateReplica> PeerView<'a, R> {
     /// A setting of the vehicle that does not fit, as far as is known.
     pub fn mismatch(&self, now: Instant) -> Option<Mismatch> {
         let twin = self.0.twins.is_found(now).then_some(Mismatch::Twin);
-        twin.or(self.0.pair.mismatch())
+        // A surface that holds the vehicle is shown by its name.
+        let is_explained = |found: &Mismatch| *found == Mismatch::Foreign && self.holder().is_some();
+        twin.or(self.0.pair.mismatch()).filter(|found| !is_explained(found))
     }
 
     /// The other surface that holds the vehicle.
