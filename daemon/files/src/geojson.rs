@@ -156,7 +156,15 @@ fn shapes_of(whole: &Value, frame: CoordinateFrame) -> Result<FenceShapes, Strin
     match whole["type"].as_str() {
         Some("FeatureCollection") => {
             let features = whole["features"].as_array().ok_or("the collection has no list of features")?;
-            for (i, feature) in features.iter().enumerate() {
+            let is_drawn = |feature: &&Value| !is_empty(&feature["geometry"]);
+            let drawn: Vec<_> = features.iter().filter(is_drawn).map(role).collect();
+            // Of the fence and of the return point there is one, so an empty one beside it is none; an area to stay out of may be
+            // the second one.
+            let is_spare = |feature: &Value| match role(feature) {
+                Ok(Some(FeatureRole::KeepOut) | None) | Err(_) => false,
+                Ok(role) => is_empty(&feature["geometry"]) && drawn.contains(&Ok(role)),
+            };
+            for (i, feature) in features.iter().enumerate().filter(|(_, feature)| !is_spare(feature)) {
                 add(&mut order, feature, frame).map_err(|line| format!("features[{i}]: {line}"))?;
             }
         }
@@ -459,6 +467,11 @@ mod tests {
         assert!(in_list(wreck).contains("give the return point the property role = return_point"));
         let nowhere = r#"{"properties": {"role": "keep_out"}, "geometry": null}"#;
         assert_eq!(in_list(nowhere), "features[0]: it has role = keep_out and no geometry: draw it, or leave it out");
+        let drawn = format!(r#"{{"properties": {{"role": "fence"}}, "geometry": {SQUARE}}}"#);
+        let empty = r#"{"properties": {"role": "fence"}, "geometry": null}"#;
+        assert!(in_list(empty).contains("role = fence and no geometry"));
+        let both = format!(r#"{{"type": "FeatureCollection", "features": [{empty}, {drawn}]}}"#);
+        assert!(read(&both, CoordinateFrame::Metres).is_ok());
         let plain = format!(r#"{{"geometry": {SQUARE}}}"#);
         assert!(in_list(&format!("{plain}, {plain}")).contains("features[1]: a second fence"));
         assert!(

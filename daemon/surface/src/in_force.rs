@@ -76,12 +76,10 @@ fn present<T: Clone + Default>(order: &SentOrder<T>, id: SlotId, view: &PeerView
     if status(view, id).is_some_and(OrderStatus::is_pending) {
         return Ok(order.sent.clone().unwrap_or_default());
     }
-    // A change of a part of what the vehicle has lost gives it again.
-    if status(view, id) == Some(OrderStatus::Withdrawn(Withdrawal::Lost)) {
-        return Ok(order.sent.clone().unwrap_or_default());
-    }
     let in_force = order.in_force.as_ref().map(|(_, content)| content.clone());
     let known = match view.in_force(id) {
+        // A change of a part of what the vehicle has lost gives it again.
+        InForce::None if status(view, id) == Some(OrderStatus::Withdrawn(Withdrawal::Lost)) => order.sent.clone(),
         InForce::None => Some(T::default()),
         InForce::Known(_) => in_force,
         InForce::NotReported => in_force.or_else(|| order.sent.clone()),

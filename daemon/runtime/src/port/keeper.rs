@@ -67,7 +67,7 @@ impl PortKeeper {
     pub(super) async fn run(mut self, first: Option<Opened>) {
         let mut next = first;
         let mut pause = FIRST_RETRY_INTERVAL;
-        let mut is_logged = false;
+        let (mut is_logged, mut was_silent) = (false, false);
         while !self.ends.from.is_closed() {
             let began = Instant::now();
             let opened = match next.take() {
@@ -75,10 +75,11 @@ impl PortKeeper {
                 None => open(&self.place).await,
             };
             let ended = match opened {
-                Ok(opened) => self.serve(opened, is_logged).await,
+                Ok(opened) => self.serve(opened, is_logged && was_silent).await,
                 Err(e) => Err(e),
             };
             let Err(e) = ended else { return };
+            was_silent = e.kind() == io::ErrorKind::TimedOut;
             // A port that is opened again and says nothing, or only who it is, has not recovered.
             if began.elapsed() > MAX_RETRY_INTERVAL + self.quiet.unwrap_or_default() {
                 (pause, is_logged) = (FIRST_RETRY_INTERVAL, false);
@@ -93,7 +94,8 @@ impl PortKeeper {
         }
     }
 
-    /// Carries bytes until the port fails, or the host is gone (`Ok`). `is_again`: soon after a failure that was logged.
+    /// Carries bytes until the port fails, or the host is gone (`Ok`). `is_again`: it was
+    /// there all the time and silent, which was logged.
     async fn serve(&mut self, opened: Opened, is_again: bool) -> io::Result<()> {
         match opened {
             Opened::Listener(_) => {}

@@ -5,6 +5,7 @@ use super::page::{Page, is_decided};
 use crate::process::free_port;
 use scenecast_console::state::{OrderStatus, ReportedMode, VehicleState};
 use scenecast_core::UserError;
+use scenecast_surface::LimitsOrder;
 use serde_json::json;
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -65,6 +66,7 @@ pub(super) fn run(program: &Path, dir: &Path, recording: &Path, number: u32) -> 
     page.wait("the orders", LIMIT, |v| {
         is_decided(v) && v.orders.directive.slots.len() >= 3 && mode(v) != Some(ReportedMode::Hold)
     })?;
+    let ordered = page.vehicle().as_ref().map(limits).unwrap_or_default();
     ends.stop(End::Vehicle, Stop::Kill).map_err(failed("ending a process"))?;
     std::fs::remove_dir_all(ends.state_dir(End::Vehicle)).map_err(failed("removing a folder"))?;
 
@@ -78,16 +80,24 @@ pub(super) fn run(program: &Path, dir: &Path, recording: &Path, number: u32) -> 
     let safe_s = began.elapsed().as_secs_f64();
     if setting != Setting::Automatic {
         page.wait("a surface that names the loss", LIMIT, |v| status(v, "fence") == Some(OrderStatus::Withdrawn))?;
+        // A change of a part keeps the rest of what was lost.
+        page.order("limits", &json!({"time_s": 9000}))?;
         page.order("orders/restore", &json!({}))?;
     }
     let is_restored =
         |v: &VehicleState| ["fence", "limits"].iter().all(|slot| status(v, slot) == Some(OrderStatus::Applied));
     page.wait("the orders again", LIMIT, is_restored)?;
+    page.wait("the whole limits", LIMIT, |v| limits(v).silence_s == ordered.silence_s)?;
     Ok(Forgotten { setting: name(setting), safe_s, restored_s: began.elapsed().as_secs_f64() })
 }
 
 fn mode(vehicle: &VehicleState) -> Option<ReportedMode> {
     vehicle.status.as_ref().map(|status| status.mode)
+}
+
+/// The limits in force.
+fn limits(vehicle: &VehicleState) -> LimitsOrder {
+    vehicle.orders.limits_in_force.as_ref().map(|applied| applied.order.clone()).unwrap_or_default()
 }
 
 fn status(vehicle: &VehicleState, slot: &str) -> Option<OrderStatus> {
