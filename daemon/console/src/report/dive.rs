@@ -2,6 +2,7 @@
 
 use super::areas::{ClassArea, areas};
 use super::orders::{OrderKey, OrderStep};
+use super::words;
 use crate::export::{MapCaption, MapCells};
 use crate::replay::{Known, Recording, ShownMap, StateText};
 use crate::state::{LinkDirection, LinkSummary, MapLabelTree, MissionState, ReplaySide, VehicleMarker, VehicleState};
@@ -252,6 +253,12 @@ impl DiveVehicle {
         near.min_by(|a, b| (a.at_s - at_s).abs().total_cmp(&(b.at_s - at_s).abs())).map(|point| point.sigma_m)
     }
 
+    /// The middle of a cell of its map, which lies `shift` from the world frame, metres.
+    pub(super) fn middle_of(&self, cell: Cell, shift: (f64, f64)) -> (f64, f64) {
+        let middle = |index: i32, shift_m: f64| (f64::from(index) + 0.5) * self.cell_m + shift_m;
+        (middle(cell.x, shift.0), middle(cell.y, shift.1))
+    }
+
     /// The label that a place in the world frame has on the map at the end; 0 without one.
     pub(super) fn label_at(&self, (shift_east_m, shift_north_m): (f64, f64), east_m: f64, north_m: f64) -> u8 {
         let index = |m: f64| (m / self.cell_m).floor() as i32;
@@ -350,7 +357,7 @@ impl TrackPoint {
     fn of(message: &PoseWithCovarianceStamped) -> Self {
         let position = &message.pose.pose.position;
         Self {
-            at_s: message.header.stamp.nanos() as f64 / 1e9,
+            at_s: words::unix_s(&message.header.stamp),
             east_m: position.x,
             north_m: position.y,
             depth_m: -position.z,

@@ -28,10 +28,9 @@ pub(super) struct OrderStep {
 
 impl OrderStep {
     pub(super) fn of(message: &OrderStatus) -> Self {
-        let seconds = |time: &scenecast_messages::builtin_interfaces::Time| time.nanos() as f64 / 1e9;
         Self {
-            at_s: seconds(&message.header.stamp),
-            given_s: seconds(&message.given),
+            at_s: words::unix_s(&message.header.stamp),
+            given_s: words::unix_s(&message.given),
             status: message.status,
             reason: message.reason.clone(),
             is_own: false,
@@ -70,9 +69,10 @@ impl DiveVehicle {
     pub(super) fn take_decision(&mut self, message: &OrderStatus) {
         let order = (message.slot.clone(), message.version);
         let Some(way) = self.orders.get_mut(&order) else { return };
-        self.decided_s.insert(order, OrderStep::of(message).at_s);
+        let decision = OrderStep { is_own: true, ..OrderStep::of(message) };
+        self.decided_s.insert(order, decision.at_s);
         let Some(last) = way.last().filter(|last| !last.is_end()) else { return };
-        way.push(OrderStep { given_s: last.given_s, is_own: true, ..OrderStep::of(message) });
+        way.push(OrderStep { given_s: last.given_s, ..decision });
     }
 
     /// Why an order that has no end has none, as far as a later one of its kind tells it.
@@ -118,7 +118,7 @@ impl Dive {
     pub(super) fn ordered(&self, state: &VehicleState, vehicle: &DiveVehicle, order: &OrderKey) -> (String, String) {
         let known = vehicle.given.get(order).zip(vehicle.content(state, order));
         let Some((given, content)) = known else { return (String::new(), "not recorded".to_owned()) };
-        let given_s = given.header.stamp.nanos() as f64 / 1e9;
+        let given_s = words::unix_s(&given.header.stamp);
         // Several orders may be given within a second: the words are those of the nearest one in this slot.
         let logged = self.events.iter().filter_map(|(at_s, event)| {
             let is_of_it = event.vehicle == state.name || event.vehicle.is_empty();

@@ -58,9 +58,8 @@ impl Dive {
         let names: Vec<&str> = self.state.vehicles.iter().map(|vehicle| vehicle.name.as_str()).collect();
         let program = Escaped(scenecast_core::program());
         let rehearsal = if self.settings.simulated { ", a rehearsal over a simulated sea floor" } else { "" };
-        let origin = self.state.mission.origin.map_or_else(String::new, |origin| {
-            format!(", at latitude {:.6}, longitude {:.6} (WGS 84)", origin.lat_deg, origin.lon_deg)
-        });
+        let origin =
+            self.state.mission.origin.map_or_else(String::new, |origin| format!(", at {}", words::origin(origin)));
         let _ = writeln!(
             page,
             "<h2>How this was made</h2>\n<p>By {program} from the record of the surface, run {run}, which {} wrote from {begin} to {end}. \
@@ -312,7 +311,7 @@ fn image(
     let (class, label) = (state.label_book.class_title(exemplar.label), format!("label {}", exemplar.label));
     let title = if class == label { label } else { format!("{class} ({label})") };
     let place = || {
-        let sigma = vehicle.sigma_m(exemplar.taken.nanos() as f64 / 1e9);
+        let sigma = vehicle.sigma_m(words::unix_s(&exemplar.taken));
         let sigma = sigma.map_or_else(String::new, |m| format!(", standard deviation {m:.1} m"));
         let on_earth = words::on_earth(dive, (middle.x, middle.y));
         format!("<br>{}, {}{on_earth}{sigma}", words::east(middle.x), words::north(middle.y))

@@ -4,10 +4,9 @@ use super::dive::{Dive, DiveVehicle, SettingsRecord};
 use super::orders::OrderStep;
 use super::words::{self, area, counted, duration, interval, lat_lon, on_earth};
 use crate::state::{LinkDirection, VehicleState};
-use scenecast_core::{Area, fence_of, utc_text};
+use scenecast_core::{Area, fence_of, place_of, utc_text};
 use scenecast_messages::contents::valid_part;
 use scenecast_messages::scenecast_msgs::{Event, OrderStatus};
-use scenecast_protocol::coordinates::DecimetrePoint;
 use scenecast_protocol::directive::SlotId;
 use scenecast_protocol::map::{Cell, Quantity, UNEXPLORED};
 use scenecast_protocol::wire::VehicleMode;
@@ -226,8 +225,7 @@ fn unseen(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle, shift: (f64,
             None => " No area of the survey is configured, so how much of it was not seen is not known.".to_owned(),
         };
     };
-    let middle = |index: i32, shift_m: f64| (f64::from(index) + 0.5) * vehicle.cell_m + shift_m;
-    let middles = vehicle.labels.iter().map(|(cell, _)| (middle(cell.x, shift.0), middle(cell.y, shift.1)));
+    let middles = vehicle.labels.iter().map(|(cell, _)| vehicle.middle_of(cell, shift));
     let share = Area { west, south, east, north }.covered(middles, vehicle.cell_m);
     format!(
         " Of the area of the survey, {west} to {east} m east and {south} to {north} m north, {:.1} % is on the map.",
@@ -250,12 +248,9 @@ fn seen_of_fence(state: &VehicleState, vehicle: &DiveVehicle, shift: (f64, f64))
     if count(&columns).checked_mul(count(&rows))? > MAX_CELLS {
         return None;
     }
-    let decimetres =
-        |index: i32, shift_m: f64| (((f64::from(index) + 0.5) * vehicle.cell_m + shift_m) * 10.0).round() as i32;
-    let place =
-        |cell: Cell| DecimetrePoint { east_dm: decimetres(cell.x, shift.0), north_dm: decimetres(cell.y, shift.1) };
+    let place = |cell: Cell| place_of("cell", vehicle.middle_of(cell, shift).into());
     let all = rows.flat_map(|y| columns.clone().map(move |x| Cell::new(x, y)));
-    let inside = all.filter(|&cell| fence.allows(place(cell)));
+    let inside = all.filter(|&cell| place(cell).is_ok_and(|place| fence.allows(place)));
     let (seen, all) = inside
         .fold((0u64, 0u64), |(seen, all), cell| (seen + u64::from(vehicle.labels.get(cell) != UNEXPLORED), all + 1));
     (all > 0).then(|| seen as f64 / all as f64)
@@ -321,7 +316,7 @@ fn place(dive: &Dive, vehicle: &DiveVehicle) -> String {
     let (least, most) = (depths().fold(f64::INFINITY, f64::min), depths().fold(f64::NEG_INFINITY, f64::max));
     let origin = dive.state.mission.origin.map_or_else(
         || "the mission has no origin on the globe".to_owned(),
-        |origin| format!("the origin is at latitude {:.6}, longitude {:.6} (WGS 84)", origin.lat_deg, origin.lon_deg),
+        |origin| format!("the origin is at {}", words::origin(origin)),
     );
     let begin = vehicle.path().first().map_or_else(String::new, |first| {
         format!(

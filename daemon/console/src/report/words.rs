@@ -5,6 +5,7 @@ use super::dive::Dive;
 use crate::export::TransverseMercator;
 use crate::state::Origin;
 use scenecast_core::utc_text;
+use scenecast_messages::builtin_interfaces::Time;
 use scenecast_messages::scenecast_msgs::{Exemplar, Order, OrderStatus};
 use scenecast_protocol::directive::SlotId;
 use scenecast_surface::LabelBook;
@@ -185,6 +186,16 @@ pub(super) fn on_earth(dive: &Dive, (east_m, north_m): (f64, f64)) -> String {
         let (lat, lon) = lat_lon(origin, east_m, north_m);
         format!(" (latitude {lat:.6}, longitude {lon:.6})")
     })
+}
+
+/// The origin of a mission on the globe.
+pub(super) fn origin(origin: Origin) -> String {
+    format!("latitude {:.6}, longitude {:.6} (WGS 84)", origin.lat_deg, origin.lon_deg)
+}
+
+/// A time of a message, seconds since 1970.
+pub(super) fn unix_s(time: &Time) -> f64 {
+    time.nanos() as f64 / 1e9
 }
 
 pub(super) fn lat_lon(origin: Origin, east_m: f64, north_m: f64) -> (f64, f64) {
