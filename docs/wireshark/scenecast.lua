@@ -38,7 +38,8 @@ end
 field("uint8", base.DEC, names.yes_no, [[
     flag.ack = Ack statement (A); flag.turn = Turn byte (T); flag.hello = Hello (H); flag.stamp = Time stamp (S);
     flag.keyed = Keyed (K); flag.up = From the vehicle (U); flag.remaining = Remaining (R); intro.takes_over = Takes over;
-    intro.refuses = Refuses; intro.no_memory = No memory; intro.plain = Plain; intro.encrypts = Encrypts; part.last = Ends the text (L);
+    intro.refuses = Refuses; intro.no_memory = No memory; intro.plain = Plain; intro.encrypts = Encrypts; intro.tags_all = Tags all;
+    intro.full_duplex = Full duplex; part.last = Ends the text (L);
     part.wide = Wide place (W); pose.waypoint = A waypoint follows; pose.silent = The autopilot does not answer;
     path.continues = The plan continues; details.has.faults = Faults follow (F); details.has.intent = Intent follows (I);
     details.has.registration = Registration follows (R); details.has.trail = Trail follows (T); report.has.summary = Summary;
@@ -51,7 +52,8 @@ field("uint32", base.DEC, nil, [[
     ack.length = Bytes of loss code; ack.lost = Lost, low 12; chunk.length = Bytes of payload;
     intro.edge = Edge of a cell (0.1 mm, 0: no map); intro.silence = Silence (8 s);
     intro.name_length = Bytes of the name; intro.clock = Clock (hours since 1970);
-    intro.frame_bytes = Longest frame (bytes, 0: not known);
+    intro.frame_bytes = Longest frame (bytes, 0: not known); intro.latitude = Latitude of the origin (180 / 2^24 degrees from -90);
+    intro.longitude = Longitude of the origin (360 / 2^24 degrees from -180);
     part.first = Place of the first byte; map.width = Width; map.height = Height; layer.index = Layer; label = Label;
     pose.heading = Heading (1/256 of a turn); pose.sigma = Standard deviation (quarter metres);
     pose.fix_age = Age of the last fix (s); pose.explored = Explored cells; path.count = Waypoints in the path;
@@ -328,9 +330,10 @@ local function introduction(r, tree)
     r:put(tree, "intro.edge", 24)
     r:bytes(tree, "intro.series", 6)
     local v = r:all(tree, [[intro.takes_over 1, intro.refuses 1, intro.no_memory 1, intro.silence 5, intro.clock 24, intro.plain 1,
-        intro.encrypts 1, reserved 2, intro.name_length 4]])
+        intro.encrypts 1, intro.tags_all 1, intro.full_duplex 1, intro.name_length 4]])
     r:bytes(tree, "intro.name", v["intro.name_length"])
     if r:left() >= 2 then r:put(tree, "intro.frame_bytes", 16) end
+    if r:left() >= 6 then r:all(tree, "intro.latitude 24, intro.longitude 24") end
     r:rest(tree, "payload")
     if v["intro.name_length"] > 12 then fail("The name has more than 12 bytes") end
     return v["intro.refuses"] == 1

@@ -202,13 +202,15 @@ pub(super) struct DiskWatch {
     dir: PathBuf,
     /// Whether the last checkpoint of each kind was refused.
     refused: [bool; 2],
+    /// Whether the last look did not find the folder.
+    is_gone: bool,
     /// `None` if a look is due at once.
     looked: Option<Instant>,
 }
 
 impl DiskWatch {
     pub(super) fn new(dir: &Path) -> Self {
-        Self { dir: dir.to_owned(), refused: [false; 2], looked: None }
+        Self { dir: dir.to_owned(), refused: [false; 2], is_gone: false, looked: None }
     }
 
     /// A checkpoint was written or refused.
@@ -222,7 +224,13 @@ impl DiskWatch {
             return None;
         }
         self.looked = Some(now);
-        let is_checkpoint_refused = self.refused.contains(&true);
+        // Open files are written on, although nobody finds them again.
+        let is_gone = !self.dir.is_dir();
+        if is_gone && !std::mem::replace(&mut self.is_gone, is_gone) {
+            tracing::error!("{}: the folder is gone: a restart would find neither orders nor map", self.dir.display());
+        }
+        self.is_gone = is_gone;
+        let is_checkpoint_refused = is_gone || self.refused.contains(&true);
         Some(VehicleDisk { free_bytes: free_bytes(&self.dir), is_checkpoint_refused })
     }
 }
@@ -457,6 +465,6 @@ mod tests {
         assert!(disk.look(now + LOOK_INTERVAL).is_none());
         assert!(disk.look(now + LOOK_INTERVAL * 2).is_some());
         let missing = DiskWatch::new(Path::new("/no such folder")).look(now).unwrap();
-        assert_eq!(missing.free_bytes, None);
+        assert_eq!((missing.free_bytes, missing.is_checkpoint_refused), (None, true));
     }
 }

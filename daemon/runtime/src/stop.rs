@@ -96,6 +96,8 @@ pub(super) fn configured_budget(config: &Config) -> Budget {
 /// Reads the configuration again after each SIGHUP.
 pub(super) struct Reload {
     load: Load,
+    /// The fingerprints of the present and the next key in the key file, as they were at the start.
+    keys: Option<(u32, Option<u32>)>,
     #[cfg(unix)]
     hang_ups: Signal,
 }
@@ -105,12 +107,12 @@ impl Reload {
     pub(super) fn new(load: Load) -> Result<Self, UserError> {
         let hang_ups = hang_ups()?;
         let _ = nix::sys::signal::SigSet::from(nix::sys::signal::Signal::SIGHUP).thread_unblock();
-        Ok(Self { load, hang_ups })
+        Ok(Self { keys: (load)().ok().and_then(|config| fingerprints(&config)), load, hang_ups })
     }
 
     #[cfg(not(unix))]
     pub(super) fn new(load: Load) -> Result<Self, UserError> {
-        Ok(Self { load })
+        Ok(Self { keys: None, load })
     }
 
     /// Waits for a SIGHUP and returns the new configuration; a file that cannot be read is logged and ignored.
@@ -121,11 +123,22 @@ impl Reload {
             #[cfg(not(unix))]
             std::future::pending::<()>().await;
             match (self.load)() {
-                Ok(config) => return config,
+                Ok(config) => {
+                    let keys = fingerprints(&config);
+                    if keys != self.keys {
+                        tracing::warn!("SIGHUP: link.key_file has other keys than at the start; a restart takes them");
+                    }
+                    return config;
+                }
                 Err(error) => tracing::error!("{error}; no setting is changed"),
             }
         }
     }
+}
+
+fn fingerprints(config: &Config) -> Option<(u32, Option<u32>)> {
+    let (file, _) = scenecast_config::read_key(config.link.key_file.as_ref()?).ok()?;
+    Some((file.key.fingerprint(), file.next.as_ref().map(|next| next.fingerprint())))
 }
 
 /// Makes new files and folders readable for the user of this process only.

@@ -244,6 +244,15 @@ mod tests {
     }
 
     #[test]
+    fn the_log_tells_the_end_of_an_order_that_a_newer_one_replaces() {
+        let mut surface = surface(1);
+        surface.set_order(auv(), Constraints { hold: true, abort: false }, at(1)).unwrap();
+        surface.set_order(auv(), Constraints { hold: false, abort: true }, at(2)).unwrap();
+        let texts: Vec<&str> = surface.log().entries().map(|entry| entry.text.as_str()).collect();
+        assert_eq!(texts, ["hold version 1 replaced before the vehicle has applied it"]);
+    }
+
+    #[test]
     fn without_order_and_report_a_hold_is_refused() {
         let mut surface = surface(1);
         for hold in [false, true] {

@@ -1,14 +1,14 @@
 //! The surface keeps the log of the mission.
 
+use super::Surface;
 use super::command::{CommandChange, CommandChangeKind};
 use super::log::{LogKind, MissionLog};
 use super::orders::order_name;
 use super::record::StoredLogEntry;
-use super::{Surface, VehicleRecord};
 use scenecast_protocol::directive::{OrderStatus, SlotId};
 use scenecast_protocol::map::Relabelled;
 use scenecast_protocol::time::Instant;
-use scenecast_protocol::wire::{Address, SurfaceName, VehicleMode};
+use scenecast_protocol::wire::{Address, SurfaceName};
 
 impl Surface {
     /// The log of the mission.
@@ -74,6 +74,19 @@ impl Surface {
         self.log_fact(vehicle, LogKind::Answer, &text, now);
     }
 
+    /// A newer order takes the place of the last one of its kind, which may be on its way still.
+    pub(super) fn log_replaced(&mut self, vehicle: Address, slot: SlotId, now: Instant) {
+        let Some(last) = self.link.vehicle(vehicle).and_then(|v| v.slots().find(|s| s.id == slot)) else { return };
+        if last.status.is_pending() && !matches!(slot, SlotId::Fix | SlotId::Requests) {
+            let text = format!(
+                "{} version {} replaced before the vehicle has applied it",
+                order_name(&last.slot),
+                last.version
+            );
+            self.log_fact(vehicle, LogKind::Answer, &text, now);
+        }
+    }
+
     /// Frames of these vehicles were accepted.
     pub(super) fn log_received(&mut self, vehicles: &[Address], now: Instant) {
         for &vehicle in vehicles {
@@ -106,14 +119,9 @@ impl Surface {
 
     pub(super) fn log_mode(&mut self, vehicle: Address, now: Instant) {
         let Some((status, _)) = self.link.vehicle(vehicle).and_then(|view| view.status()) else { return };
-        let (mode, reason) = (status.mode, status.reason);
-        let Some(end) = self.records.get(&vehicle).map(VehicleRecord::end_of_survey) else { return };
-        if self.watches.entry(vehicle).or_default().handle_mode(mode, reason) {
-            let text = match (mode, reason.name()) {
-                (_, Some(reason)) => format!("{}: {reason}", mode.name()),
-                (VehicleMode::Hold, None) => format!("holding: {end}"),
-                (_, None) => mode.name().to_owned(),
-            };
+        let Some((record, view)) = self.records.get(&vehicle).zip(self.link.vehicle(vehicle)) else { return };
+        let text = record.mode_text(status, &view);
+        if self.watches.entry(vehicle).or_default().handle_mode(status.mode, status.reason) {
             self.log_fact(vehicle, LogKind::Mode, &text, now);
         }
     }

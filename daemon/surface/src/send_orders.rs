@@ -115,6 +115,7 @@ impl Surface {
     }
 
     pub(super) fn issue(&mut self, vehicle: Address, slot: Slot, now: Instant) -> Result<u16, String> {
+        self.log_replaced(vehicle, slot.id(), now);
         let version = self.link.issue(vehicle, slot, now).map_err(|e| e.to_string())?;
         self.outputs.push_back(SurfaceOutput::Changed(vehicle));
         Ok(version)

@@ -13,7 +13,7 @@ use scenecast_protocol::exemplar::Exemplar;
 use scenecast_protocol::link::PeerView;
 use scenecast_protocol::map::{ClassEntry, ClassReplica, LabelTree, MAX_LABEL};
 use scenecast_protocol::time::Instant;
-use scenecast_protocol::wire::VehicleStatus;
+use scenecast_protocol::wire::{ModeReason, VehicleMode, VehicleStatus};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Duration;
@@ -89,10 +89,24 @@ pub struct VehicleRecord {
 
 impl VehicleRecord {
     /// Why a vehicle holds that has nothing left to do, as a text.
-    pub fn end_of_survey(&self) -> &'static str {
+    fn end_of_survey(&self) -> &'static str {
         let has_areas = self.areas.sent.as_ref().is_some_and(|areas| !areas.0.is_empty());
         let has_interests = has_areas || !self.utility.weights.is_empty();
         if has_interests { "nothing of interest is left" } else { "the survey is complete" }
+    }
+
+    /// The mode of a vehicle with its reason, for people.
+    pub fn mode_text(&self, status: &VehicleStatus, view: &PeerView<'_>) -> String {
+        let is_ours = || view.slots().any(|order| order.id == SlotId::Constraints);
+        let reason = match (status.mode, status.reason) {
+            (VehicleMode::Hold, ModeReason::Survey) => Some(self.end_of_survey()),
+            (VehicleMode::Hold, ModeReason::Order) if !is_ours() => {
+                Some("by an order of before or of another surface, or because it has no record of its orders")
+            }
+            (_, reason) => reason.name(),
+        };
+        let mode = status.mode.name();
+        reason.map_or_else(|| mode.to_owned(), |reason| format!("{mode}: {reason}"))
     }
 
     pub fn new(name: String) -> Self {

@@ -222,6 +222,13 @@ impl SlotOutbox {
                     continue;
                 }
                 SlotState::Pending => continue,
+                // This surface has forgotten a newer order of its own, such as one with the file of an hour ago.
+                SlotState::Applied if is_newer(report.version_low, slot.version) => {
+                    let superseded = OrderStatus::Withdrawn(Withdrawal::Superseded);
+                    let is_new = self.advance(id, slot.version, superseded, now, |s| s == OrderStatus::Applied);
+                    decided.extend(is_new.then_some(id));
+                    continue;
+                }
                 _ if slot.version as u8 != report.version_low => continue,
                 SlotState::Applied => OrderStatus::Applied,
                 SlotState::Refused(reason) => OrderStatus::Refused(reason),
@@ -250,7 +257,7 @@ impl SlotOutbox {
         };
         let was_applied = std::mem::take(was_applied);
         let Some(Some(order)) = self.slots.get_mut(id.index()) else { return false };
-        let is_older = (1..128).contains(&(order.version as u8).wrapping_sub(report.version_low));
+        let is_older = is_newer(order.version as u8, report.version_low as u16);
         let is_lost =
             was_applied && decided && is_own && is_older && order.status == OrderStatus::Applied && !is_given_anew(id);
         if is_lost {
@@ -297,7 +304,7 @@ impl SlotOutbox {
 
     /// Withdraws an abort, or an order that lifts one or a hold, that has not arrived in time; returns whether there was one. A hold
     /// stays, because to stop is safe.
-    pub fn withdraw_late_abort(&mut self, now: Instant) -> bool {
+    pub fn withdraw_late(&mut self, now: Instant) -> bool {
         let Some(lifetime) = self.abort_lifetime else { return false };
         let is_late = |order: &&mut SlotProgress| {
             let is_abort = matches!(order.slot, Slot::Constraints(constraints) if constraints.abort);
@@ -454,6 +461,11 @@ impl SlotOutbox {
     }
 }
 
+/// Whether the lowest bits of a version are of a later one than another.
+fn is_newer(low: u8, version: u16) -> bool {
+    (1..128).contains(&low.wrapping_sub(version as u8))
+}
+
 /// Whether the vehicle is not known to have received an order. One that an earlier run of the surface knew as received, and
 /// not as decided, has not been sent in this run.
 fn is_pending(order: &SlotProgress) -> bool {
@@ -571,7 +583,7 @@ mod tests {
             if was_sent {
                 outbox.mark_on_air(SlotId::Constraints, version, at(6.0));
             }
-            assert!(outbox.withdraw_late_abort(at(130.0)));
+            assert!(outbox.withdraw_late(at(130.0)));
             let mut reports = [SlotReport::default(); SLOTS];
             reports[SlotId::Constraints.index()] = SlotReport { state: SlotState::Applied, version_low: version as u8 };
             outbox.handle_report(&reports, at(140.0));
@@ -582,14 +594,34 @@ mod tests {
     }
 
     #[test]
+    fn an_order_is_superseded_once_a_later_one_of_its_series_is_in_force() {
+        let now = Instant::from_secs_f64(5.0);
+        for (state, version_low, is_superseded) in [
+            (SlotState::Applied, 2, true),
+            (SlotState::Applied, 1, false),
+            (SlotState::Pending, 2, false),
+            (SlotState::Refused(RefusalReason::Unable), 2, false),
+        ] {
+            let mut outbox = applied(&[hold(true)], now);
+            let mut reports = [SlotReport::default(); SLOTS];
+            reports[SlotId::Constraints.index()] = SlotReport { state, version_low };
+            let decided = outbox.handle_report(&reports, now);
+            assert_eq!(decided.contains(&SlotId::Constraints), is_superseded, "{state:?}");
+            let superseded = OrderStatus::Withdrawn(Withdrawal::Superseded);
+            let expected = if is_superseded { superseded } else { OrderStatus::Applied };
+            assert_eq!(status_of(&outbox, SlotId::Constraints), expected, "{state:?}");
+        }
+    }
+
+    #[test]
     fn an_old_resume_is_withdrawn_and_a_hold_stays() {
         let at = Instant::from_secs_f64;
         for (order, is_withdrawn) in [(hold(false), true), (hold(true), false)] {
             let mut outbox = SlotOutbox::new(Series::from_random(9), true);
             outbox.set_abort_lifetime(Some(Duration::from_secs(120)));
             outbox.issue(order, at(5.0));
-            assert!(!outbox.withdraw_late_abort(at(124.0)));
-            assert_eq!(outbox.withdraw_late_abort(at(125.0)), is_withdrawn);
+            assert!(!outbox.withdraw_late(at(124.0)));
+            assert_eq!(outbox.withdraw_late(at(125.0)), is_withdrawn);
         }
     }
 }

@@ -1,7 +1,9 @@
 //! Settings of the other end that do not fit.
 
-use crate::wire::{Introduction, SessionId, WIRE_VERSION};
-use std::collections::BTreeSet;
+use crate::time::Instant;
+use crate::wire::{Address, Introduction, SessionId, WIRE_VERSION};
+use std::collections::{BTreeSet, VecDeque};
+use std::time::Duration;
 
 /// A setting of the other end that does not fit, so that its frames are refused, wasteful or those of two. It is found in a frame
 /// with a valid CRC or tag, apart from [`Self::Tag`], [`Self::Key`] and [`Self::Foreign`].
@@ -38,9 +40,21 @@ pub enum Mismatch {
     /// Its frames have up to so many bytes, and those of this end another number. They are read all the same.
     #[error("its frames have up to {0} bytes, those of this end {1}: set the same link.frame_bytes at both ends")]
     Length(usize, usize),
-    /// It encrypts and this end does not, or the other way round: no frame but hellos is read.
-    #[error("{0}: set the same link.encrypt at both ends")]
-    Encryption(&'static str),
+    /// What is on at one end is off at the other: who has it, and the key of the configuration. Where encryption or tags differ,
+    /// frames of vehicles are not read.
+    #[error("{0}: set the same {1} at both ends")]
+    Switch(&'static str, &'static str),
+    /// The origin of its map is so many metres from that of this end. Its frames are read all the same.
+    #[error(
+        "the origin of its map is {0} m from the one here, so that places in degrees are as far off: set the same \
+         mission.origin_deg at both ends"
+    )]
+    Origin(u32),
+    /// Only at a vehicle: the surface calls the vehicle of this number, and never this one.
+    #[error(
+        "the surface calls vehicle {0} and not this one: set the vehicle.address here that asv.vehicles has at the surface"
+    )]
+    NotCalled(u8),
     /// Its clock and that of this end are apart by so many days, rounded down. Its frames are read all the same.
     #[error(
         "its clock and the clock of this end are {0} days apart: set both to UTC, or the times of files and logs do not fit"
@@ -62,15 +76,13 @@ pub enum Mismatch {
 /// Reports each mismatch once, so that no stranger can fill a log with them.
 #[derive(Debug, Default)]
 pub(super) struct MismatchReport {
-    found: Option<Mismatch>,
+    found: VecDeque<Mismatch>,
     /// The last one since a frame was accepted.
     current: Option<Mismatch>,
     /// Frames of the peer are longer or shorter than ours.
     length: Option<Mismatch>,
-    /// One end encrypts, by the last hello that verified.
-    encryption: Option<Mismatch>,
-    /// The clock in the last hello that verified.
-    clock: Option<Mismatch>,
+    /// By the last hello that verified: three switches, the origin, the clock.
+    introduced: [Option<Mismatch>; 5],
     reported: BTreeSet<Mismatch>,
     /// Frames with an unexpected tag, which may also be damaged frames, since the last accepted one.
     tagged: u32,
@@ -78,6 +90,8 @@ pub(super) struct MismatchReport {
     foreign: u32,
     /// Frames from the address of this end that it has not sent, or that noise has made.
     from_own_address: u32,
+    /// Frames of the surface to other vehicles, and the time of the first, since the last one to this end.
+    calls_of_others: Option<(Instant, u32)>,
     /// Hellos of one session that do not verify, which may also be damaged ones, since the last one that does.
     untrue: Option<(SessionId, u32)>,
 }
@@ -91,15 +105,24 @@ impl MismatchReport {
     const MIN_UNTRUE: u32 = 3;
     /// Frames from the address of this end after which they are taken for those of another vehicle. None of them is verified.
     const MIN_FROM_OWN_ADDRESS: u32 = 3;
+    /// Frames to other vehicles, and the time for which they are heard and none to this one, after which it is taken as not called.
+    const MIN_CALLS_OF_OTHERS: u32 = 8;
+    const UNCALLED: Duration = Duration::from_secs(300);
+    /// Four times what rounding makes of two equal origins at most.
+    const MIN_ORIGIN_M: f64 = 10.0;
 
     pub(super) fn note(&mut self, mismatch: Mismatch) {
+        let [_, tags, ..] = self.introduced;
+        if tags.is_some() && matches!(mismatch, Mismatch::Tag | Mismatch::NoTag) {
+            return;
+        }
         self.tagged += u32::from(mismatch == Mismatch::Tag);
         let is_certain = mismatch != Mismatch::Tag || self.tagged >= Self::MIN_TAGGED;
         if is_certain {
             self.current = Some(mismatch);
         }
         if is_certain && self.reported.insert(mismatch) {
-            self.found = Some(mismatch);
+            self.found.push_back(mismatch);
         }
     }
 
@@ -131,8 +154,13 @@ impl MismatchReport {
     /// A frame of so many bytes was accepted; those of this end have `own`.
     pub(super) fn note_length(&mut self, bytes: usize, own: usize) {
         if bytes > own && self.length.is_none() {
-            self.length = Some(Mismatch::Length(bytes, own));
-            self.found = self.length;
+            self.find_length(Mismatch::Length(bytes, own));
+        }
+    }
+
+    fn find_length(&mut self, length: Mismatch) {
+        if self.length.replace(length).is_none() {
+            self.found.push_back(length);
         }
     }
 
@@ -142,25 +170,54 @@ impl MismatchReport {
         self.current.take_if(|mismatch| *mismatch == Mismatch::Key);
     }
 
+    /// A frame of the surface to another vehicle is heard.
+    pub(super) fn note_call_of(&mut self, other: Address, now: Instant) {
+        let (since, count) = self.calls_of_others.unwrap_or((now, 0));
+        self.calls_of_others = Some((since, count + 1));
+        if count >= Self::MIN_CALLS_OF_OTHERS && now.since(since) >= Self::UNCALLED {
+            self.note(Mismatch::NotCalled(other.number()));
+        }
+    }
+
+    /// A frame of the peer to this end is heard, whether or not it verifies.
+    pub(super) fn handle_called(&mut self) {
+        self.calls_of_others = None;
+        self.current.take_if(|mismatch| matches!(mismatch, Mismatch::NotCalled(_)));
+    }
+
     /// A hello that has verified says this of the peer, and this end says `own`.
     pub(super) fn note_introduction(&mut self, peer: &Introduction, own: &Introduction) {
+        let switch =
+            |of: fn(&Introduction) -> bool, [it_has, this_has]: [&'static str; 2], key| match (of(peer), of(own)) {
+                (true, false) => Some(Mismatch::Switch(it_has, key)),
+                (false, true) => Some(Mismatch::Switch(this_has, key)),
+                _ => None,
+            };
+        let encryption = ["it encrypts and this end does not", "this end encrypts and it does not"];
+        let tags = [
+            "it has tags on frames of vehicles and this end has none",
+            "this end has tags on frames of vehicles and it has none",
+        ];
+        let duplex =
+            ["its modem is full duplex and the one here is not", "the modem here is full duplex and its is not"];
         let lengths = (usize::from(peer.frame_bytes), usize::from(own.frame_bytes));
-        let length =
-            (lengths.0 != lengths.1 && lengths.0.min(lengths.1) > 0).then_some(Mismatch::Length(lengths.0, lengths.1));
-        let encryption = match (peer.encrypts, own.encrypts) {
-            (true, false) => Some(Mismatch::Encryption("it encrypts and this end does not")),
-            (false, true) => Some(Mismatch::Encryption("this end encrypts and it does not")),
-            _ => None,
-        };
+        let is_other_length = lengths.0 != lengths.1 && lengths.0.min(lengths.1) > 0;
+        let off_m = peer.origin.zip(own.origin).map_or(0.0, |(origin, own)| origin.distance_m(own));
         let hours = peer.clock.zip(own.clock).map_or(0, |(clock, own)| clock.apart(own));
-        let clock = (hours > 24).then_some(Mismatch::Clock(hours / 24));
-        let known = [&mut self.length, &mut self.encryption, &mut self.clock];
-        for (found, known) in [length, encryption, clock].into_iter().zip(known) {
-            if found.is_some() && known.is_none() {
-                self.found = found;
-            }
-            *known = found;
+        self.length = self.length.filter(|_| is_other_length);
+        if is_other_length {
+            self.find_length(Mismatch::Length(lengths.0, lengths.1));
         }
+        let introduced = [
+            switch(|end| end.encrypts, encryption, "link.encrypt"),
+            switch(|end| end.tags_all, tags, "link.authenticate"),
+            switch(|end| end.is_full_duplex, duplex, "modem.full_duplex"),
+            (off_m >= Self::MIN_ORIGIN_M).then_some(Mismatch::Origin(off_m.round() as u32)),
+            (hours > 24).then_some(Mismatch::Clock(hours / 24)),
+        ];
+        let before = std::mem::replace(&mut self.introduced, introduced);
+        self.found
+            .extend(introduced.into_iter().zip(before).filter_map(|(now, before)| now.filter(|_| before.is_none())));
     }
 
     pub(super) fn handle_accepted(&mut self) {
@@ -168,10 +225,11 @@ impl MismatchReport {
     }
 
     pub(super) fn current(&self) -> Option<Mismatch> {
-        self.current.or(self.encryption).or(self.length).or(self.clock)
+        let [encryption, tags, duplex, origin, clock] = self.introduced;
+        self.current.or(encryption).or(tags).or(duplex).or(self.length).or(origin).or(clock)
     }
 
     pub(super) fn poll(&mut self) -> Option<Mismatch> {
-        self.found.take()
+        self.found.pop_front()
     }
 }

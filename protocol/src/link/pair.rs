@@ -12,6 +12,7 @@ use super::run::{Authenticity, Generation, Identities, Identity, LinkAuthenticit
 use super::{FrameNumber, LinkStats, LinkWindow};
 use crate::directive::Series;
 use crate::seal::{Direction, TAG_BYTES};
+use crate::time::Instant;
 use crate::wire::{
     Address, ChunkKind, FrameBuilder, FrameKind, Header, Introduction, MissionId, Seal, SessionId, Stamp, UtcHours,
     room_for_payload,
@@ -52,6 +53,8 @@ pub struct LinkPair<T> {
     silence: Option<Duration>,
     /// At the vehicle: the run of a surface that the next hello refuses, and the generation of the key by which it called.
     refused: Option<(Identity, Generation)>,
+    /// At the vehicle, without a key: another surface that has just called in a run that has ended here.
+    retired_caller: Option<Introduction>,
     rotation: KeyRotation,
     /// Counters and estimates of this link.
     pub stats: LinkStats,
@@ -76,6 +79,7 @@ impl<T> LinkPair<T> {
         seed: u64,
     ) -> Self {
         let encrypts = authenticity.as_ref().is_some_and(|a| a.encrypt);
+        let tags_all = authenticity.as_ref().is_some_and(|a| a.all);
         let authenticity = authenticity.map(|a| a.link(if us == Address::SURFACE { peer } else { us }));
         let handshake = Handshake::new(Identities::new(seed, authenticity.as_ref().map(|a| a.key.link().clone())));
         let (mismatch, stats) = (MismatchReport::default(), LinkStats::default());
@@ -84,7 +88,7 @@ impl<T> LinkPair<T> {
             us,
             peer,
             authenticity,
-            introduction: Introduction { encrypts, ..introduction },
+            introduction: Introduction { encrypts, tags_all, ..introduction },
             handshake,
             mismatch,
             owes_hello: false,
@@ -93,6 +97,7 @@ impl<T> LinkPair<T> {
             known_hellos: 0,
             silence: None,
             refused: None,
+            retired_caller: None,
             rotation: KeyRotation::default(),
             stats,
         }
@@ -123,14 +128,19 @@ impl<T> LinkPair<T> {
         self.refused.map(|(run, _)| run.session)
     }
 
+    /// At the vehicle, without a key: another surface than the one that holds it, which has just called in a run that has ended here.
+    pub fn poll_retired_caller(&mut self) -> Option<Introduction> {
+        self.retired_caller.take()
+    }
+
     /// At the vehicle: the introduction of later hellos says that it has no memory of orders, or that it has.
     pub fn set_memory(&mut self, has_memory: bool) {
         self.introduction.has_no_memory = !has_memory;
     }
 
-    /// At the vehicle: the series of the surface that the next hello answers.
-    pub fn called_series(&self) -> Option<Series> {
-        self.handshake.offered().or(self.handshake.run())?.introduction.series
+    /// At the vehicle: the introduction of the surface that the next hello answers.
+    pub fn caller(&self) -> Option<&Introduction> {
+        self.handshake.offered().or(self.handshake.run()).map(|run| &run.introduction)
     }
 
     /// At the surface: the introduction of later hellos has the vehicle leave another surface, or not.
@@ -161,6 +171,11 @@ impl<T> LinkPair<T> {
     /// A frame of the peer of so many bytes was accepted; those of this end have `own`.
     pub fn note_length(&mut self, bytes: usize, own: usize) {
         self.mismatch.note_length(bytes, own);
+    }
+
+    /// At a vehicle: a frame of the surface to another vehicle is heard.
+    pub fn note_call_of(&mut self, other: Address, now: Instant) {
+        self.mismatch.note_call_of(other, now);
     }
 
     /// A frame from our own address is heard, while we send none.

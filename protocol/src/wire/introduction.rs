@@ -22,6 +22,43 @@ impl CellEdge {
     }
 }
 
+/// The origin of the map frame on the earth, in steps of 1.1e-5 degrees of latitude and 2.1e-5 of longitude, at most 2.4 m.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct MapOrigin {
+    lat: u32,
+    lon: u32,
+}
+
+impl MapOrigin {
+    const STEPS: f64 = 16_777_216.0;
+    const METRES_PER_DEG: f64 = 111_195.0;
+
+    /// The nearest step to degrees of WGS 84.
+    pub fn from_degrees(lat_deg: f64, lon_deg: f64) -> Self {
+        let steps = |share: f64| (share * Self::STEPS).round().clamp(0.0, Self::STEPS - 1.0) as u32;
+        Self { lat: steps((lat_deg + 90.0) / 180.0), lon: steps((lon_deg + 180.0).rem_euclid(360.0) / 360.0) }
+    }
+
+    /// Latitude and longitude in degrees of WGS 84.
+    pub fn degrees(self) -> (f64, f64) {
+        let share = |steps: u32| f64::from(steps) / Self::STEPS;
+        (share(self.lat) * 180.0 - 90.0, share(self.lon) * 360.0 - 180.0)
+    }
+
+    /// Metres to another origin on a sphere; exact to 1 % where they are less than a degree apart.
+    pub fn distance_m(self, other: Self) -> f64 {
+        let ((lat, lon), (other_lat, other_lon)) = (self.degrees(), other.degrees());
+        let apart = (lon - other_lon).abs();
+        let east = apart.min(360.0 - apart) * lat.to_radians().cos();
+        (lat - other_lat).hypot(east) * Self::METRES_PER_DEG
+    }
+
+    fn decode(r: &mut Reader<'_>) -> Option<Self> {
+        let (lat, lon) = (r.u24().ok()?, r.u24().ok()?);
+        (lat != 0 || lon != 0).then_some(Self { lat, lon })
+    }
+}
+
 /// The name of a surface for people: letters, digits, and ` `, `-`, `_`, `.` between them; at most 12 bytes of UTF-8.
 #[derive(Clone, Copy, PartialEq, Eq, Default)]
 pub struct SurfaceName {
@@ -93,10 +130,13 @@ impl UtcHours {
 /// 10-12 24    clock          hours since 1970, UTC; 0: not known
 /// 13    1     plain          from a surface: it reads map chunks with the body `png` alone
 /// 13    1     encrypts       with a key: it encrypts the content of authenticated frames
-/// 13    2     -              0, not read
+/// 13    1     tags all       with a key: its frames have a tag if it is a vehicle, and those of vehicles must if it is a surface
+/// 13    1     full duplex    its modem transmits and receives at the same time
 /// 13    4     name's length  bytes, 0..12
 /// 14..        name           of the surface that the series belongs to, UTF-8
 ///  ..   16    frame length   bytes of the longest frame of the sender; 0 or missing: not known
+///  ..   24    latitude       of the origin of its map, from -90 degrees, 180 / 2^24 degrees; missing, or 0 in both: not known
+///  ..   24    longitude      from -180 degrees, 360 / 2^24 degrees
 ///  ..         reserved for later versions; skipped
 /// ```
 ///
@@ -127,6 +167,12 @@ pub struct Introduction {
     pub is_plain: bool,
     /// It encrypts the content of authenticated frames.
     pub encrypts: bool,
+    /// With a key: frames of vehicles have a tag too.
+    pub tags_all: bool,
+    /// Its modem transmits and receives at the same time.
+    pub is_full_duplex: bool,
+    /// The origin of its map.
+    pub origin: Option<MapOrigin>,
     /// Bytes of the longest frame of the sender; 0: not known.
     pub frame_bytes: u16,
     /// The clock of the sender's computer.
@@ -137,13 +183,15 @@ pub struct Introduction {
 
 impl Introduction {
     /// Bytes of the longest introduction.
-    pub const MAX_BYTES: usize = Self::HEAD + SurfaceName::MAX_BYTES + 2;
+    pub const MAX_BYTES: usize = Self::HEAD + SurfaceName::MAX_BYTES + 2 + 6;
     /// Bytes of the fixed fields, which are before the name.
     const HEAD: usize = 14;
     const PLAIN: u8 = 0x80;
     const ENCRYPTS: u8 = 0x40;
+    const TAGS_ALL: u8 = 0x20;
+    const FULL_DUPLEX: u8 = 0x10;
 
-    /// The bytes of the payload: 14, the name as far as it fits into `room`, and the frame length if it fits too.
+    /// The bytes of the payload: 14, the name as far as it fits into `room`, then the frame length and the origin if they fit too.
     #[must_use]
     pub fn encode(&self, room: usize) -> Vec<u8> {
         let mut out = Vec::new();
@@ -159,12 +207,21 @@ impl Introduction {
         while !name.is_char_boundary(length) {
             length -= 1;
         }
-        let flags = [(self.is_plain, Self::PLAIN), (self.encrypts, Self::ENCRYPTS)];
+        let flags = [
+            (self.is_plain, Self::PLAIN),
+            (self.encrypts, Self::ENCRYPTS),
+            (self.tags_all, Self::TAGS_ALL),
+            (self.is_full_duplex, Self::FULL_DUPLEX),
+        ];
         let flags = flags.iter().filter(|(is_set, _)| *is_set).fold(0, |all, (_, bit)| all | bit);
         out.push(length as u8 | flags);
         out.extend_from_slice(name.as_bytes().get(..length).unwrap_or_default());
         if out.len() + 2 <= room {
             out.extend_from_slice(&self.frame_bytes.to_be_bytes());
+        }
+        if let Some(origin) = self.origin.filter(|_| out.len() + 6 <= room) {
+            put24(&mut out, origin.lat);
+            put24(&mut out, origin.lon);
         }
         out
     }
@@ -188,9 +245,12 @@ impl Introduction {
             silence_s: if refuses { (flags & 0x1F) * 8 } else { 0 },
             is_plain: name & Self::PLAIN != 0,
             encrypts: name & Self::ENCRYPTS != 0,
+            tags_all: name & Self::TAGS_ALL != 0,
+            is_full_duplex: name & Self::FULL_DUPLEX != 0,
             clock: (hours != 0).then_some(UtcHours(hours)),
             name: SurfaceName::from_text(&String::from_utf8_lossy(r.take(length)?)),
             frame_bytes: r.u16().unwrap_or(0),
+            origin: MapOrigin::decode(&mut r),
         })
     }
 }
@@ -205,7 +265,8 @@ mod tests {
         fn an_introduction_reads_back(
             edge in 0u32..=CellEdge::MAX,
             bits in 1u64..,
-            [is_surface, takes_over, refuses, has_no_memory, is_plain, encrypts]: [bool; 6],
+            [is_surface, takes_over, refuses, has_no_memory, is_plain, encrypts, tags_all, is_full_duplex]: [bool; 8],
+            origin: Option<(u8, u8)>,
             frame_bytes: u16,
             silence in 0u8..32,
             hours in 0u32..1 << 24,
@@ -216,21 +277,23 @@ mod tests {
             let silence_s = if refuses { silence * 8 } else { 0 };
             let name = if is_surface { SurfaceName::from_text(&name) } else { SurfaceName::default() };
             let cell_edge = CellEdge(edge);
+            let origin = origin.map(|(lat, lon)| MapOrigin::from_degrees(f64::from(lat) - 89.0, f64::from(lon) - 179.0));
             let clock = UtcHours::from_unix(Duration::from_secs(3600 * u64::from(hours)));
             let sent = Introduction {
-                cell_edge, series, takes_over, refuses, has_no_memory, silence_s, is_plain, encrypts, frame_bytes, clock, name,
+                cell_edge, series, takes_over, refuses, has_no_memory, silence_s, is_plain, encrypts, tags_all, is_full_duplex,
+                frame_bytes, origin, clock, name,
             };
             let mut bytes = sent.encode(Introduction::MAX_BYTES);
             prop_assert!(bytes.len() <= Introduction::MAX_BYTES);
             prop_assert_eq!(Introduction::decode(&bytes), Ok(sent));
-            bytes.extend(tail);
+            bytes.extend(if origin.is_some() { tail } else { Vec::new() });
             prop_assert_eq!(Introduction::decode(&bytes), Ok(sent), "of a later version");
             for room in 14..Introduction::MAX_BYTES {
                 let cut = sent.encode(room);
                 prop_assert!(cut.len() <= room);
                 let read = Introduction::decode(&cut).unwrap();
                 prop_assert!(name.as_str().starts_with(read.name.as_str()));
-                prop_assert_eq!(Introduction { name, frame_bytes, ..read }, sent);
+                prop_assert_eq!(Introduction { name, frame_bytes, origin, ..read }, sent);
             }
         }
 
@@ -240,6 +303,16 @@ mod tests {
                 prop_assert!(read.name.as_str().chars().all(|c| c.is_alphanumeric() || " -_.".contains(c)));
             }
         }
+    }
+
+    #[test]
+    fn origins_are_as_far_apart_as_on_the_earth() {
+        let origin = MapOrigin::from_degrees(43.2, 5.1);
+        assert!(origin.distance_m(MapOrigin::from_degrees(43.2, 5.1)) < 1e-9);
+        assert!((origin.distance_m(MapOrigin::from_degrees(43.3, 5.1)) - 11_119.0).abs() < 20.0);
+        assert!((origin.distance_m(MapOrigin::from_degrees(43.2, 5.2)) - 8_106.0).abs() < 20.0);
+        let (west, east) = (MapOrigin::from_degrees(0.0, 179.999), MapOrigin::from_degrees(0.0, -179.999));
+        assert!((west.distance_m(east) - 222.0).abs() < 5.0, "across the date line");
     }
 
     #[test]

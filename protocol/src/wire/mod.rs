@@ -21,7 +21,7 @@ pub use chunk::{Chunk, ChunkKind, Chunks};
 pub use details::{Backlog, DiskReport, EquipmentFaults, PoseDetails};
 pub use frame::{Envelope, Frame, FrameBuilder, FrameError, Seal};
 pub use header::{Address, FrameKind, Header, MissionId, SessionId};
-pub use introduction::{CellEdge, Introduction, SurfaceName, UtcHours};
+pub use introduction::{CellEdge, Introduction, MapOrigin, SurfaceName, UtcHours};
 pub use listener::{Heard, Listener};
 pub use path::{Placement, PlannedPath};
 pub use stamp::Stamp;

@@ -2,12 +2,14 @@
 
 use crate::pair::{LinkedEnds, LossyChannel, Setup, auv, hold, patchy, surface_of, utility};
 use proptest::prelude::*;
-use scenecast_protocol::link::{Authenticity, DropReason, Mismatch, VehicleEvent};
+use scenecast_protocol::link::{
+    Authenticity, DropReason, Mismatch, SlotInboxState, VehicleConfig, VehicleEvent, VehicleLink,
+};
 use scenecast_protocol::mac::Access;
 use scenecast_protocol::map::{Cell, LabelGrid, StateSource};
 use scenecast_protocol::map_codec::Codec;
 use scenecast_protocol::seal::{HeldKey, MissionKey};
-use scenecast_protocol::wire::{Address, Envelope, MissionId, Seal, UtcHours};
+use scenecast_protocol::wire::{Address, Envelope, MapOrigin, MissionId, Seal, UtcHours};
 use std::collections::BTreeMap;
 use std::time::Duration;
 
@@ -109,6 +111,58 @@ fn clocks_that_are_more_than_a_day_apart_are_named_at_both_ends() {
             assert_eq!(named, expected);
         }
     }
+}
+
+#[test]
+fn settings_that_differ_are_named_at_both_ends() {
+    let common = || Setup::new(64, 10_000, Codec::Png).keyed(true, false);
+    let origin = |lat_deg| Setup { origin: Some(MapOrigin::from_degrees(lat_deg, 5.0)), ..common() };
+    let duplex = || Setup { access: Access::FullDuplex, ..common() };
+    let orders_only = || Setup::new(64, 10_000, Codec::Png).keyed(false, false);
+    let cases = [
+        (origin(43.0), origin(44.0), Some(Mismatch::Origin(111_195))),
+        (origin(43.0), origin(43.000_05), None),
+        (origin(43.0), common(), None),
+        (duplex(), common(), Some(Mismatch::Switch("", "modem.full_duplex"))),
+        (orders_only(), common(), Some(Mismatch::Switch("", "link.authenticate"))),
+        (common(), common().keyed(true, true), Some(Mismatch::Switch("", "link.encrypt"))),
+    ];
+    let kind = |mismatch: Mismatch| match mismatch {
+        Mismatch::Switch(_, key) => Mismatch::Switch("", key),
+        other => other,
+    };
+    for (one, other, named) in cases {
+        for (vehicle, surface) in [(&one, &other), (&other, &one)] {
+            let mut pair = LinkedEnds::new(3, vehicle.clone(), STILL);
+            pair.surface = surface_of(surface, 4, pair.now);
+            pair.run(pair.now + Duration::from_secs(30), false);
+            assert_eq!(pair.surface.vehicle(auv()).unwrap().mismatch(pair.now).map(kind), named);
+            let told = pair.vehicle_events.iter().find_map(|event| match event {
+                VehicleEvent::Mismatch(mismatch) => Some(kind(*mismatch)),
+                _ => None,
+            });
+            assert_eq!(told, named);
+        }
+    }
+}
+
+#[test]
+fn a_vehicle_that_is_never_called_names_the_one_that_is() {
+    let setup = Setup::new(64, 10_000, Codec::Png);
+    let mut pair = LinkedEnds::new(3, setup.clone(), STILL);
+    let config = VehicleConfig::new(Address::vehicle(2).unwrap(), setup.mission, setup.modem(), setup.budget_bps);
+    let mut uncalled = VehicleLink::new(config, setup.codec, 5, SlotInboxState::default(), pair.now);
+    let mut named_s = None;
+    for second in 0..400 {
+        pair.run(pair.now + Duration::from_secs(1), false);
+        for bytes in std::mem::take(&mut pair.overheard) {
+            uncalled.handle_frame(&bytes, pair.now);
+        }
+        let is_named = uncalled.poll_event() == Some(VehicleEvent::Mismatch(Mismatch::NotCalled(1)));
+        named_s = named_s.or(is_named.then_some(second));
+    }
+    assert!(named_s.is_some_and(|second| (300..360).contains(&second)), "{named_s:?}");
+    assert!(!pair.vehicle_events.iter().any(|event| matches!(event, VehicleEvent::Mismatch(_))));
 }
 
 #[test]

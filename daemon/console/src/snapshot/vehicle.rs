@@ -37,7 +37,7 @@ fn vehicle(
         expected_interval_s: expected_interval_s(surface, &view, record, facts),
         next_contact_s: view.next_contact(now).map(seconds),
         other_surface: other_surface(&view, now),
-        status: record.status(&view).map(|(s, at)| status(s, record, *at)),
+        status: record.status(&view).map(|(s, at)| status(s, record, &view, *at)),
         track: track(&record.track),
         registration: record.registration.latest().map(registration),
         closed_loops: track(record.registration.closures()),
@@ -168,7 +168,7 @@ fn in_force<T, O: for<'a> From<&'a T>>(applied: &Option<(u16, T)>) -> Option<App
     Some(AppliedOrder { version: *version, order: order.into() })
 }
 
-fn status(s: &VehicleStatus, record: &VehicleRecord, at: Instant) -> StatusReport {
+fn status(s: &VehicleStatus, record: &VehicleRecord, view: &PeerView<'_>, at: Instant) -> StatusReport {
     StatusReport {
         at_s: seconds(at),
         pose: ReportedPose {
@@ -182,7 +182,7 @@ fn status(s: &VehicleStatus, record: &VehicleRecord, at: Instant) -> StatusRepor
         mode: s.mode.into(),
         autopilot_silent: s.autopilot_silent,
         reason: s.reason.name().map(str::to_owned),
-        activity: activity(s, record),
+        activity: activity(s, record, view),
         plan: PlannedPath {
             waypoint: s.waypoint.map(MapPoint::xy),
             path: s.path.points.iter().copied().map(MapPoint::xy).collect(),
@@ -218,15 +218,11 @@ fn disk(disk: DiskReport) -> ReportedDisk {
 }
 
 /// Mode with its reason or purpose as a text.
-fn activity(s: &VehicleStatus, record: &VehicleRecord) -> String {
-    let mode = s.mode.name();
-    if s.has_arrived() {
-        return format!("{mode}: {}", record.end_of_survey());
+fn activity(s: &VehicleStatus, record: &VehicleRecord, view: &PeerView<'_>) -> String {
+    match s.intent.filter(|_| !s.has_arrived()) {
+        Some(intent) => format!("{}: {}", s.mode.name(), purpose(intent, record)),
+        None => record.mode_text(s, view),
     }
-    if let Some(intent) = s.intent {
-        return format!("{mode}: {}", purpose(intent, record));
-    }
-    s.reason.name().map_or(mode.to_owned(), |reason| format!("{mode}: {reason}"))
 }
 
 fn purpose(intent: Intent, record: &VehicleRecord) -> String {

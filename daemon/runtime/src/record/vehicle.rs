@@ -114,8 +114,8 @@ impl VehicleRecorder {
         let state = MapState { vehicle: &self.named.name, layer: "", epoch, version, cell_m, labels, source };
         entries.extend(self.map.record(&state, stamps));
         let now_s = stamps.now_s();
-        if is_due(&mut self.pose_s, POSE_INTERVAL_S, now_s) {
-            let navigator = vehicle.navigator();
+        let navigator = vehicle.navigator();
+        if navigator.is_measured() && is_due(&mut self.pose_s, POSE_INTERVAL_S, now_s) {
             let at = navigator.position();
             let place = Place {
                 stamp: stamps.now(),

@@ -56,6 +56,7 @@ impl<T> LinkPair<T> {
         envelope: &Envelope<'a>,
         decodes: impl Fn(Option<FrameNumber>, Chunks<'_>) -> bool,
     ) -> Result<Inbound<'a, T>, DropReason> {
+        self.mismatch.handle_called();
         let result = match envelope.header.kind() {
             FrameKind::Hello => self.read_hello(envelope),
             FrameKind::Numbered => self.read_numbered(envelope, decodes),
@@ -125,12 +126,13 @@ impl<T> LinkPair<T> {
         };
         if outcome == HandshakeOutcome::Retired {
             self.ended_hellos += 1;
-            let is_other = introduction.is_some_and(|caller| self.handshake.other_holder(&caller).is_some());
-            if own.is_none() && is_other && self.authenticity.is_some() {
+            let other = introduction.filter(|caller| own.is_none() && self.handshake.other_holder(caller).is_some());
+            if other.is_some() && self.authenticity.is_some() {
                 // It takes over, in a run that has ended here: it learns that, and begins another one.
                 (self.refused, self.owes_hello) = (Some((peer, generation)), true);
-                return Ok(Inbound { refusal: introduction, ..Inbound::empty(false, frame) });
+                return Ok(Inbound { refusal: other, ..Inbound::empty(false, frame) });
             }
+            self.retired_caller = other;
             // Where frames of the vehicle have no tag, a forged one may have proven a false run.
             self.strays.count += u32::from(own.is_some() && !self.is_keyed(self.direction_in()));
             return Err(DropReason::OldSession);

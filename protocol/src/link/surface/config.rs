@@ -4,7 +4,7 @@ use crate::directive::SlotId;
 use crate::link::{Authenticity, Mismatch};
 use crate::mac::{MasterConfig, ModemProfile};
 use crate::schedule::Shares;
-use crate::wire::{Address, CellEdge, MissionId, SurfaceName};
+use crate::wire::{Address, CellEdge, MapOrigin, MissionId, SurfaceName};
 use std::time::Duration;
 
 /// Settings of the surface's end.
@@ -24,6 +24,8 @@ pub struct SurfaceConfig {
     pub master: MasterConfig,
     /// The edge of a cell on the operator's map, until a vehicle has stated its own.
     pub cell_edge: CellEdge,
+    /// The configured origin of the map, which the hello states.
+    pub origin: Option<MapOrigin>,
     /// The name by which the vehicle shows this surface to others.
     pub name: SurfaceName,
     /// Age after which an abort that has not arrived is withdrawn, so that the operator is asked; `None`: it never is.
@@ -48,6 +50,7 @@ impl SurfaceConfig {
             shares: Shares::default(),
             master: MasterConfig::default(),
             cell_edge: CellEdge::default(),
+            origin: None,
             name: SurfaceName::default(),
             abort_lifetime: None,
             vehicles: Vec::new(),

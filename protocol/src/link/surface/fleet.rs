@@ -83,8 +83,8 @@ impl<R: StateReplica> Fleet<R> {
     }
 
     /// Withdraws aborts that have not arrived in time; returns their vehicles.
-    pub(super) fn withdraw_late_aborts(&mut self, now: Instant) -> impl Iterator<Item = Address> {
-        self.peers.iter_mut().filter_map(move |(&vehicle, peer)| peer.withdraw_late_abort(now).then_some(vehicle))
+    pub(super) fn withdraw_lates(&mut self, now: Instant) -> impl Iterator<Item = Address> {
+        self.peers.iter_mut().filter_map(move |(&vehicle, peer)| peer.withdraw_late(now).then_some(vehicle))
     }
 
     /// The vehicle to grant a turn to at `now`: of those that are due, the one that waited longest.

@@ -16,6 +16,7 @@ pub use transmit::Cycle;
 use crate::directive::{Series, Slot, SlotId, SlotProgress, VersionedSlot};
 use crate::link::run::Identities;
 use crate::link::{DropReason, FrameNumber, Mismatch, Transmit};
+use crate::mac::Access;
 use crate::map::{Replica, StateReplica};
 use crate::schedule::{BitBudget, ClassShares, Shares};
 use crate::time::Instant;
@@ -83,10 +84,16 @@ impl<R: StateReplica> SurfaceLink<R> {
     fn add(&mut self, vehicle: Address, now: Instant) {
         let seed = crate::link::run::next_random(&mut self.random);
         let c = &self.config;
-        let (cell_edge, series, name) = (c.cell_edge, Some(self.series), c.name);
-        let frame_bytes = self.config.modem.frame_bytes as u16;
-        let introduction =
-            Introduction { cell_edge, series, name, clock: self.clock, frame_bytes, ..Introduction::default() };
+        let introduction = Introduction {
+            cell_edge: c.cell_edge,
+            origin: c.origin,
+            series: Some(self.series),
+            name: c.name,
+            clock: self.clock,
+            frame_bytes: c.modem.frame_bytes as u16,
+            is_full_duplex: c.modem.access == Access::FullDuplex,
+            ..Introduction::default()
+        };
         let peer = VehiclePeer::new(c.mission, vehicle, c.authenticity.clone(), introduction, seed, c.master, now);
         let peer = peer.with_modem(&c.modem).with_abort_lifetime(c.abort_lifetime);
         self.fleet.insert(vehicle, peer);

@@ -6,7 +6,7 @@ use crate::mac::ModemProfile;
 use crate::object::ObjectId;
 use crate::schedule::Shares;
 use crate::seal::VehicleKey;
-use crate::wire::{Address, CellEdge, MissionId};
+use crate::wire::{Address, CellEdge, MapOrigin, MissionId};
 use std::time::Duration;
 
 /// Settings of the vehicle's end.
@@ -18,6 +18,8 @@ pub struct VehicleConfig {
     pub mission: MissionId,
     /// The edge of a map cell, which the hello states.
     pub cell_edge: CellEdge,
+    /// The configured origin of the map, which the hello states.
+    pub origin: Option<MapOrigin>,
     /// Frame size, bit rate and access scheme of the modem.
     pub modem: ModemProfile,
     /// Bit budget on air in bit/s.
@@ -40,6 +42,7 @@ impl VehicleConfig {
             address,
             mission,
             cell_edge: CellEdge::default(),
+            origin: None,
             modem,
             budget_bps,
             budget_window: Duration::from_secs(10),

@@ -66,7 +66,9 @@ impl<S: StateSource> VehicleLink<S> {
     ) -> Self {
         source.set_quick(config.modem.access == Access::FullDuplex);
         let frame_bytes = config.modem.frame_bytes as u16;
-        let introduction = Introduction { cell_edge: config.cell_edge, frame_bytes, ..Introduction::default() };
+        let (cell_edge, origin) = (config.cell_edge, config.origin);
+        let is_full_duplex = config.modem.access == Access::FullDuplex;
+        let introduction = Introduction { cell_edge, origin, frame_bytes, is_full_duplex, ..Introduction::default() };
         let (mission, authenticity) = (config.mission, config.authenticity.clone());
         let mut link = Self {
             pair: LinkPair::new(mission, config.address, Address::SURFACE, authenticity, introduction, seed),

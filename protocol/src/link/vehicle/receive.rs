@@ -6,7 +6,7 @@ use super::{VehicleEvent, VehicleLink};
 use crate::bytes::Truncated;
 use crate::directive::{InForceDigests, Slot, VersionedSlot};
 use crate::link::{Admission, DropReason};
-use crate::mac::Grant;
+use crate::mac::{Access, Grant};
 use crate::map::StateSource;
 use crate::seal::VehicleKey;
 use crate::time::Instant;
@@ -25,7 +25,7 @@ impl<S: StateSource> VehicleLink<S> {
             Ok(_) => return self.pair.stats.drop(DropReason::UnknownSender),
             Err(e) => {
                 if e == FrameError::NotForUs {
-                    self.watch_own_address(bytes);
+                    self.watch_others(bytes, now);
                 }
                 return self.pair.stats.drop(e.into());
             }
@@ -60,6 +60,9 @@ impl<S: StateSource> VehicleLink<S> {
                 return self.content.status.owe_report_by(now + Duration::from_secs(60));
             }
             Err(_) => {
+                if let Some(caller) = self.pair.poll_retired_caller() {
+                    self.tell_of(&caller, now);
+                }
                 // A frame of an ended run shows that another surface does not know that it has lost the vehicle.
                 if let Some(session) = self.pair.refused_session().filter(|_| !owed_hello)
                     && !self.hello_limit.admit(session, now)
@@ -70,8 +73,7 @@ impl<S: StateSource> VehicleLink<S> {
             }
         };
         if let Some(caller) = &inbound.refusal {
-            self.content.caller = Some(caller.encode(Introduction::MAX_BYTES));
-            self.content.status.owe_report_by(now + Duration::from_secs(5));
+            self.tell_of(caller, now);
         }
         match is_hello {
             true if envelope.header.session.is_some_and(|session| self.hello_limit.admit(session, now)) => {
@@ -132,13 +134,24 @@ impl<S: StateSource> VehicleLink<S> {
         self.owe_answer(now);
     }
 
-    /// A vehicle without a run sends at most answers to calls, so that frames of its address are those of another vehicle.
-    fn watch_own_address(&mut self, bytes: &[u8]) {
-        let is_ours = |envelope: Envelope<'_>| envelope.header.from == self.config.address;
-        if !self.pair.has_run() && Envelope::decode(bytes, |to| to == Address::SURFACE).is_ok_and(is_ours) {
-            self.pair.note_own_address();
-            self.events.extend(self.pair.poll_mismatch().map(VehicleEvent::Mismatch));
+    /// Tells the surface that holds this vehicle of another one that calls it.
+    fn tell_of(&mut self, other: &Introduction, now: Instant) {
+        self.content.caller = Some(other.encode(Introduction::MAX_BYTES));
+        self.content.status.owe_report_by(now + Duration::from_secs(5));
+    }
+
+    /// A frame that is not for this vehicle may show that its address is wrong. One without a run sends at most answers to calls,
+    /// so that frames of its address are those of another vehicle.
+    fn watch_others(&mut self, bytes: &[u8], now: Instant) {
+        let Ok(Envelope { header, .. }) = Envelope::decode(bytes, |_| true) else { return };
+        match (header.from, header.to) {
+            (from, Address::SURFACE) if from == self.config.address && !self.pair.has_run() => {
+                self.pair.note_own_address()
+            }
+            (Address::SURFACE, to) if to.is_vehicle() => self.pair.note_call_of(to, now),
+            _ => return,
         }
+        self.events.extend(self.pair.poll_mismatch().map(VehicleEvent::Mismatch));
     }
 
     /// Takes parts of the next key, and notes that the surface has proven a run under it.
@@ -199,7 +212,7 @@ impl<S: StateSource> VehicleLink<S> {
     }
 
     fn handle_turn(&mut self, header: &Header, now: Instant) {
-        let Some(quarters) = header.turn else { return };
+        let Some(quarters) = header.turn else { return self.answer_full_duplex(header, now) };
         self.reply.cancel();
         self.begin_turn();
         if header.kind().is_hello() {
@@ -208,6 +221,15 @@ impl<S: StateSource> VehicleLink<S> {
         }
         let grant = Grant::received(quarters, header.remaining, &self.config.modem, now);
         self.floor.handle_grant((quarters > 0).then_some(grant));
+    }
+
+    /// A surface whose modem is taken for full duplex grants no turns: it learns from a hello that the modem here is not.
+    fn answer_full_duplex(&mut self, header: &Header, now: Instant) {
+        let is_full_duplex = self.pair.caller().is_some_and(|surface| surface.is_full_duplex);
+        if is_full_duplex && self.config.modem.access == Access::Shared && self.pair.must_send_hello() {
+            self.begin_turn();
+            self.floor.handle_grant(Some(Grant::received(1, header.remaining, &self.config.modem, now)));
+        }
     }
 
     fn handle_fates(&mut self, fates: Vec<(Carried<S::Carried>, bool)>, now: Instant) {

@@ -192,7 +192,7 @@ impl<S: StateSource> VehicleLink<S> {
         let stamp = self.stamp(plan.is_last_new, now);
         let ack_room = self.ack_room(plan.is_last_new);
         if sends_hello {
-            let series = self.pair.called_series();
+            let series = self.pair.caller().and_then(|surface| surface.series);
             self.pair.set_memory(series.is_none_or(|series| self.inbox.knows(series)));
         }
         let takes_turns = !modem.access.is_free();

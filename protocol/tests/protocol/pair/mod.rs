@@ -356,6 +356,7 @@ impl LinkedEnds {
 pub(crate) fn vehicle_of(setup: &Setup, seed: u64, durable: SlotInboxState, now: Instant) -> VehicleLink {
     let config = VehicleConfig {
         authenticity: setup.authenticity.clone(),
+        origin: setup.origin,
         ..VehicleConfig::new(auv(), setup.mission, setup.modem(), setup.budget_bps)
     };
     let mut link = VehicleLink::new(config, setup.codec, seed, durable, now);
@@ -380,6 +381,7 @@ pub(crate) fn surface_of(setup: &Setup, seed: u64, now: Instant) -> SurfaceLink 
         vehicles: vec![auv()],
         discovery_period: setup.discovery,
         authenticity: setup.authenticity.clone(),
+        origin: setup.origin,
         ..SurfaceConfig::new(setup.mission, setup.modem(), setup.budget_bps)
     };
     SurfaceLink::new(config, seed, now)

@@ -4,7 +4,7 @@ use scenecast_protocol::link::Authenticity;
 use scenecast_protocol::mac::{Access, ModemProfile};
 use scenecast_protocol::map_codec::Codec;
 use scenecast_protocol::seal::{HeldKey, MissionKey};
-use scenecast_protocol::wire::MissionId;
+use scenecast_protocol::wire::{MapOrigin, MissionId};
 use std::time::Duration;
 
 /// How the channel treats frames.
@@ -38,6 +38,7 @@ pub(crate) struct Setup {
     pub(crate) codec: Codec,
     pub(crate) access: Access,
     pub(crate) authenticity: Option<Authenticity>,
+    pub(crate) origin: Option<MapOrigin>,
     /// The longest time between two discovery calls; `None`: there are none.
     pub(crate) discovery: Option<Duration>,
     /// How long a new label must be stable.
@@ -55,6 +56,7 @@ impl Setup {
             codec,
             access: Access::Shared,
             authenticity: None,
+            origin: None,
             discovery: None,
             debounce: Duration::ZERO,
             layers: None,

@@ -50,6 +50,26 @@ fn a_second_surface_is_refused_by_name_and_can_take_over() {
 }
 
 #[test]
+fn two_surfaces_without_a_key_learn_of_each_other() {
+    for access in ACCESSES {
+        let mut waters = Waters::held_by_first(1, EndsSetup::new(access));
+        waters.restart_surface(0);
+        run_s(&mut waters, 60);
+        assert_eq!(waters.view(0).caller(waters.now), None, "{access:?}: it is alone");
+        waters.is_away = [false, false, true];
+        run_s(&mut waters, 180);
+        let held = waters.view(1).caller(waters.now).map(|caller| caller.series.is_of_same_surface(first_series(0)));
+        assert_eq!(held, Some(true), "{access:?}: the holder learns of the other one by name");
+        // It names what it hears once it has heard enough of it, which takes longer where modems poll.
+        let is_named = (0..40).any(|_| {
+            run_s(&mut waters, 10);
+            waters.view(0).mismatch(waters.now) == Some(Mismatch::Foreign)
+        });
+        assert!(is_named, "{access:?}");
+    }
+}
+
+#[test]
 fn a_hold_of_any_surface_is_applied_within_seconds() {
     for seed in 0..60 {
         let seconds = hold_of_second_s(seed);

@@ -117,9 +117,24 @@ function withdrawn(v) {
 /** How the reason of an order begins that the vehicle has lost. */
 const LOST = "the vehicle has no record";
 
+/** The parts of an order by its slot, in short. */
+const PARTS = {
+  fence: ({ fence }) => [fence.fence && `${fence.fence.length} corners`, fence.keep_outs.length > 0 && `${fence.keep_outs.length} keep-outs`, fence.return_point && "return point"],
+  limits: ({ limits }) => Object.entries(limits).map(([name, value]) => value !== null && `${name.replaceAll("_", " ")} ${[value].flat().join(" to ")}`),
+  areas: ({ areas }) => areas.areas.map((area) => `weight ${area.weight}`),
+  destination: ({ destination }) => [destination.place && `E ${destination.place[0]} N ${destination.place[1]} m`],
+  utility: ({ utility }) => Object.entries(utility.weights).map(([label, weight]) => `label ${label} ${weight}`),
+};
+
+/** The name of an order and what it says, as this surface gave it. */
+function contentOf(v, slot) {
+  const parts = (v.orders[slot.slot] && PARTS[slot.slot]?.(v.orders).filter(Boolean)) || [];
+  return parts.length > 0 ? `${slot.name} (${parts.join(", ")})` : slot.name;
+}
+
 function lostOrders(v, lost) {
   const restored = lost.filter((slot) => slot.name !== "resume");
-  const names = lost.map((slot) => slot.name).join(", ");
+  const names = lost.map((slot) => contentOf(v, slot)).join("; ");
   return {
     key: `lost-${v.id}-${restored.length}`, kind: "bad", head: `${v.name} has lost its orders`,
     body: `It has no record any more of: ${names}. An order to resume is not sent again.`,

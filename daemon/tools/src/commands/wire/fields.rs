@@ -5,7 +5,9 @@ use scenecast_protocol::directive::{InForceDigests, InForcePart, Slot, SlotId, S
 use scenecast_protocol::map::{ClassChunk, LayerChunk, TextPart};
 use scenecast_protocol::map_codec::{Codec, Stride, patch};
 use scenecast_protocol::object::Part;
-use scenecast_protocol::wire::{Chunk, ChunkKind, FrameTie, Intent, Introduction, PoseDetails, VehicleStatus};
+use scenecast_protocol::wire::{
+    Chunk, ChunkKind, FrameTie, Intent, Introduction, MapOrigin, PoseDetails, VehicleStatus,
+};
 use serde_json::{Value, json};
 
 /// Names and values in the order in which they are shown.
@@ -271,6 +273,8 @@ fn introduction(payload: &[u8]) -> Option<Fields> {
         ("no_memory", introduction.has_no_memory),
         ("plain", introduction.is_plain),
         ("encrypts", introduction.encrypts),
+        ("tags_all", introduction.tags_all),
+        ("full_duplex", introduction.is_full_duplex),
     ];
     fields.extend(flags.into_iter().filter(|(_, is_set)| *is_set).map(|(name, _)| (name, true.into())));
     if introduction.refuses {
@@ -280,6 +284,10 @@ fn introduction(payload: &[u8]) -> Option<Fields> {
     if introduction.frame_bytes > 0 {
         fields.push(("frame_bytes", introduction.frame_bytes.into()));
     }
+    let origin = introduction.origin.map(MapOrigin::degrees);
+    fields.extend(
+        origin.into_iter().flat_map(|(lat, lon)| [("origin_lat_deg", lat.into()), ("origin_lon_deg", lon.into())]),
+    );
     Some(fields)
 }
 

@@ -226,8 +226,8 @@ impl<R: StateReplica> VehiclePeer<R> {
     }
 
     /// Withdraws an abort that has not arrived in time; returns whether there was one.
-    pub(super) fn withdraw_late_abort(&mut self, now: Instant) -> bool {
-        let is_withdrawn = self.outbox.withdraw_late_abort(now);
+    pub(super) fn withdraw_late(&mut self, now: Instant) -> bool {
+        let is_withdrawn = self.outbox.withdraw_late(now);
         // What is withdrawn takes no vehicle.
         if is_withdrawn && std::mem::take(&mut self.takes_over_to_stop) {
             self.pair.set_takes_over(false);
