@@ -86,7 +86,7 @@ fn a_report_says_what_the_record_has() {
         "data:image/webp;base64,",
         "<h3>Orders</h3>",
         "95 % interval",
-        "share of the vehicle's cells that the operator's map had",
+        "share of the cells that the vehicle had to send that the operator's map had",
         "age of the last frame",
         "<h2>Events</h2>",
         "2000-01-01T00:0",

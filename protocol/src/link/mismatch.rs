@@ -1,7 +1,7 @@
 //! Settings of the other end that do not fit.
 
 use crate::time::Instant;
-use crate::wire::{Address, Introduction, SessionId, WIRE_VERSION};
+use crate::wire::{Address, Introduction, SessionId, UtcHours, WIRE_VERSION};
 use std::collections::{BTreeSet, VecDeque};
 use std::time::Duration;
 
@@ -81,8 +81,11 @@ pub(super) struct MismatchReport {
     current: Option<Mismatch>,
     /// Frames of the peer are longer or shorter than ours.
     length: Option<Mismatch>,
-    /// By the last hello that verified: three switches, the origin, the clock.
-    introduced: [Option<Mismatch>; 5],
+    /// By the last hello that verified: three switches and the origin.
+    introduced: [Option<Mismatch>; 4],
+    /// The clock in that hello, and the own one at its time, which the steps of the own clock since have moved.
+    clocks: Option<(UtcHours, UtcHours)>,
+    clock: Option<Mismatch>,
     reported: BTreeSet<Mismatch>,
     /// Frames with an unexpected tag, which may also be damaged frames, since the last accepted one.
     tagged: u32,
@@ -203,7 +206,6 @@ impl MismatchReport {
         let lengths = (usize::from(peer.frame_bytes), usize::from(own.frame_bytes));
         let is_other_length = lengths.0 != lengths.1 && lengths.0.min(lengths.1) > 0;
         let off_m = peer.origin.zip(own.origin).map_or(0.0, |(origin, own)| origin.distance_m(own));
-        let hours = peer.clock.zip(own.clock).map_or(0, |(clock, own)| clock.apart(own));
         self.length = self.length.filter(|_| is_other_length);
         if is_other_length {
             self.find_length(Mismatch::Length(lengths.0, lengths.1));
@@ -213,11 +215,27 @@ impl MismatchReport {
             switch(|end| end.tags_all, tags, "link.authenticate"),
             switch(|end| end.is_full_duplex, duplex, "modem.full_duplex"),
             (off_m >= Self::MIN_ORIGIN_M).then_some(Mismatch::Origin(off_m.round() as u32)),
-            (hours > 24).then_some(Mismatch::Clock(hours / 24)),
         ];
         let before = std::mem::replace(&mut self.introduced, introduced);
         self.found
             .extend(introduced.into_iter().zip(before).filter_map(|(now, before)| now.filter(|_| before.is_none())));
+        self.clocks = peer.clock.zip(own.clock);
+        self.compare_clocks();
+    }
+
+    /// The own clock says another hour than before. It goes on by one; more is a step, by which it is set right or wrong.
+    pub(super) fn handle_clock(&mut self, before: UtcHours, now: UtcHours) {
+        if now.apart(before) > 1 {
+            self.clocks = self.clocks.map(|(peer, own)| (peer, own.moved(before, now)));
+            self.compare_clocks();
+        }
+    }
+
+    fn compare_clocks(&mut self) {
+        let hours = self.clocks.map_or(0, |(peer, own)| peer.apart(own));
+        let clock = (hours > 24).then_some(Mismatch::Clock(hours / 24));
+        let before = std::mem::replace(&mut self.clock, clock);
+        self.found.extend(clock.filter(|_| before.is_none()));
     }
 
     pub(super) fn handle_accepted(&mut self) {
@@ -225,8 +243,8 @@ impl MismatchReport {
     }
 
     pub(super) fn current(&self) -> Option<Mismatch> {
-        let [encryption, tags, duplex, origin, clock] = self.introduced;
-        self.current.or(encryption).or(tags).or(duplex).or(self.length).or(origin).or(clock)
+        let [encryption, tags, duplex, origin] = self.introduced;
+        self.current.or(encryption).or(tags).or(duplex).or(self.length).or(origin).or(self.clock)
     }
 
     pub(super) fn poll(&mut self) -> Option<Mismatch> {

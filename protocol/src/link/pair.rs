@@ -115,7 +115,9 @@ impl<T> LinkPair<T> {
 
     /// Sets the clock in later hellos of this end, with which those of the peer are compared.
     pub fn set_clock(&mut self, clock: UtcHours) {
-        self.introduction.clock = Some(clock);
+        if let Some(before) = self.introduction.clock.replace(clock) {
+            self.mismatch.handle_clock(before, clock);
+        }
     }
 
     /// At the vehicle: sets how long the surface that holds it was silent.

@@ -110,6 +110,11 @@ impl UtcHours {
         self.0
     }
 
+    /// This one moved by as much as it is from one time to another.
+    pub(crate) fn moved(self, from: Self, to: Self) -> Self {
+        Self((self.0 + to.0).saturating_sub(from.0))
+    }
+
     /// Hours from one to the other.
     pub fn apart(self, other: Self) -> u32 {
         self.0.abs_diff(other.0)

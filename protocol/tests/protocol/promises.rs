@@ -114,6 +114,22 @@ fn clocks_that_are_more_than_a_day_apart_are_named_at_both_ends() {
 }
 
 #[test]
+fn a_clock_that_is_set_right_or_wrong_under_way_is_noticed() {
+    let hours = |hours: u64| UtcHours::from_unix(Duration::from_secs(3600 * hours)).unwrap();
+    let mut pair = LinkedEnds::new(3, Setup::new(64, 10_000, Codec::Png).keyed(true, true), STILL);
+    pair.vehicle.set_clock(hours(500_000));
+    pair.surface.set_clock(hours(500_000));
+    pair.run(pair.now + Duration::from_secs(30), false);
+    let mismatch = |pair: &LinkedEnds| pair.surface.vehicle(auv()).unwrap().mismatch(pair.now);
+    (1..100).for_each(|hour| pair.surface.set_clock(hours(500_000 + hour)));
+    assert_eq!(mismatch(&pair), None, "it goes on");
+    pair.surface.set_clock(hours(500_099 - 24 * 30));
+    assert_eq!(mismatch(&pair), Some(Mismatch::Clock(30)));
+    pair.surface.set_clock(hours(500_099));
+    assert_eq!(mismatch(&pair), None);
+}
+
+#[test]
 fn settings_that_differ_are_named_at_both_ends() {
     let common = || Setup::new(64, 10_000, Codec::Png).keyed(true, false);
     let origin = |lat_deg| Setup { origin: Some(MapOrigin::from_degrees(lat_deg, 5.0)), ..common() };

@@ -112,6 +112,8 @@ pub(crate) struct Known {
     pub(crate) link: Vec<(u64, Link)>,
     /// Frames that the end of this record has transmitted, copies included.
     pub(crate) sent: u64,
+    /// The bits of what they carried first, by its name.
+    pub(crate) sent_bits: BTreeMap<String, u64>,
     /// Begin and end of each record.
     pub(crate) runs: Vec<(u64, u64)>,
     /// What this end ran with, as JSON.
@@ -128,6 +130,7 @@ struct Record {
     log: Vec<(u64, Event)>,
     settings: String,
     counts: [u64; 3],
+    sent_bits: BTreeMap<String, u64>,
     frames: FrameTimes,
     span: Option<(u64, u64)>,
 }
@@ -167,11 +170,16 @@ impl Recording {
             let (sent, runs) = (vehicle.counts[0], vehicle.span.into_iter().collect::<Vec<_>>());
             span = joined(span, vehicle.span, shift);
             vehicle.known.into_iter().for_each(|(part, known)| {
-                whole
-                    .vehicles
-                    .entry(part)
-                    .or_default()
-                    .add(Known { sent, settings: vehicle.settings.clone(), runs: runs.clone(), ..known }, shift)
+                whole.vehicles.entry(part).or_default().add(
+                    Known {
+                        sent,
+                        sent_bits: vehicle.sent_bits.clone(),
+                        settings: vehicle.settings.clone(),
+                        runs: runs.clone(),
+                        ..known
+                    },
+                    shift,
+                )
             });
         }
         whole.join_names();
@@ -207,20 +215,17 @@ impl Timeline {
         Instant::from_secs_f64(self.mission_s(nanos))
     }
 
-    /// The last state of each process of the surface but the last.
-    pub(crate) fn ends_of_runs(&self) -> impl Iterator<Item = &StateText> {
-        let is_end = |pair: &&[StateText]| match pair {
-            [a, b] => {
-                let (a, b) = (&a.head.link, &b.head.link);
-                b.up.frames < a.up.frames || b.down.frames < a.down.frames
-            }
-            _ => false,
-        };
-        self.states.windows(2).filter(is_end).filter_map(|pair| pair.first())
+    /// The last state of each process of the surface but the last, and the first one of the next.
+    pub(crate) fn restarts(&self) -> impl Iterator<Item = (&StateText, &StateText)> {
+        let pairs = self.states.iter().zip(self.states.iter().skip(1));
+        pairs.filter(|(a, b)| {
+            let (a, b) = (&a.head.link, &b.head.link);
+            b.up.frames < a.up.frames || b.down.frames < a.down.frames
+        })
     }
 
     /// The last state up to a moment.
-    pub(super) fn state_at(&self, nanos: u64) -> Option<&StateText> {
+    pub(crate) fn state_at(&self, nanos: u64) -> Option<&StateText> {
         let next = self.states.partition_point(|state| state.nanos <= nanos);
         self.states.get(next.checked_sub(1)?)
     }
@@ -315,6 +320,11 @@ impl Record {
                 if let Some(count) = self.counts.get_mut(usize::from(frame.direction)) {
                     *count += 1;
                 }
+                if frame.direction == Frame::SENT {
+                    for (content, bits) in frame.contents.iter().zip(&frame.content_bits) {
+                        *self.sent_bits.entry(content.clone()).or_default() += u64::from(*bits);
+                    }
+                }
                 if frame.direction == Frame::RECEIVED && !frame.vehicle.is_empty() {
                     self.known.entry(valid_part(&frame.vehicle)).or_default().heard.push(nanos);
                 }
@@ -335,6 +345,7 @@ impl Known {
         self.exemplars.extend(later.exemplars.into_iter().map(|(at, exemplar)| (moved(at), exemplar)));
         self.heard.extend(later.heard.into_iter().map(moved));
         self.sent += later.sent;
+        later.sent_bits.into_iter().for_each(|(content, bits)| *self.sent_bits.entry(content).or_default() += bits);
         self.runs.extend(later.runs.into_iter().map(|(from, to)| (moved(from), moved(to))));
         if !later.settings.is_empty() {
             self.settings = later.settings;

@@ -1,7 +1,8 @@
 //! The figures of a report as SVG: the map with its track, and lines over time. They are readable in print.
 
 use super::Escaped;
-use super::dive::{DiveVehicle, TrackPoint};
+use super::dive::DiveVehicle;
+use super::track::TrackPoint;
 use crate::state::VehicleState;
 use scenecast_core::utc_text;
 use scenecast_protocol::map::Rect;
@@ -17,13 +18,15 @@ const MAX_MARKER: usize = 30;
 
 /// The map of the operator, north up, with the reported track, a grid of metres, a scale bar and an arrow to the north; `None` without
 /// cells.
-pub(super) fn map(state: &VehicleState, vehicle: &DiveVehicle) -> Option<String> {
+pub(super) fn map(state: &VehicleState, vehicle: &DiveVehicle, mission_speed: f64) -> Option<String> {
     let bounds = vehicle.labels.bounds()?;
     let shift = state.map.shift_m();
     let path = vehicle.path();
     let places = path.iter().map(|point| (point.east_m, point.north_m));
-    let frame =
-        Frame::around(bounds, vehicle.cell_m, shift, places.chain(state.markers.iter().map(|m| (m.x_m, m.y_m))));
+    let fence_in_force = state.orders.fence_in_force.iter().flat_map(|applied| applied.order.fence.iter().flatten());
+    let places = places.chain(state.markers.iter().map(|m| (m.x_m, m.y_m)));
+    let places = places.chain(fence_in_force.map(|&[east_m, north_m]| (east_m, north_m)));
+    let frame = Frame::around(bounds, vehicle.cell_m, shift, places);
     let mut svg = format!(
         "<svg viewBox=\"0 0 {WIDTH} {:.0}\" role=\"img\" aria-label=\"map of the sea floor\" xmlns=\"http://www.w3.org/2000/svg\">\n",
         frame.height_px() + 40.0
@@ -32,7 +35,7 @@ pub(super) fn map(state: &VehicleState, vehicle: &DiveVehicle) -> Option<String>
     cells(&mut svg, &frame, bounds, &classes, state, vehicle);
     grid(&mut svg, &frame);
     fence(&mut svg, &frame, state);
-    track(&mut svg, &frame, path);
+    track(&mut svg, &frame, path, vehicle.legs(mission_speed));
     numbers(&mut svg, &frame, bounds, &classes, state, vehicle);
     for marker in &state.markers {
         let mut text: String = marker.text.chars().take(MAX_MARKER).collect();
@@ -72,6 +75,9 @@ impl Frame {
             (west.min(x), south.min(y), east.max(x), north.max(y))
         });
         let (west, south, east, north) = whole;
+        // Marks at an edge are whole.
+        let edge = 0.012 * (east - west).max(north - south);
+        let (south, north) = (south - edge, north + edge);
         // A narrow map gets room at its sides.
         let margin = ((north - south) * 0.6 - (east - west)).max(0.0) / 2.0 + 0.02 * (east - west);
         let (west, east) = (west - margin, east + margin);
@@ -193,9 +199,9 @@ fn fence(svg: &mut String, frame: &Frame, state: &VehicleState) {
     order.return_point.iter().for_each(|&[east_m, north_m]| point(svg, frame, (east_m, north_m), ("return", 16.0)));
 }
 
-fn track(svg: &mut String, frame: &Frame, track: &[TrackPoint]) {
-    if track.len() > 1 {
-        let points = points(frame, track.iter().map(|point| (point.east_m, point.north_m)));
+fn track<'a>(svg: &mut String, frame: &Frame, track: &[TrackPoint], legs: impl Iterator<Item = &'a [TrackPoint]>) {
+    for leg in legs.filter(|leg| leg.len() > 1) {
+        let points = points(frame, leg.iter().map(|point| (point.east_m, point.north_m)));
         let _ = writeln!(svg, "<polyline class=\"track\" points=\"{points}\"/>");
     }
     for (end, name) in [(track.first(), "start"), (track.last(), "end")] {
@@ -206,11 +212,13 @@ fn track(svg: &mut String, frame: &Frame, track: &[TrackPoint]) {
 /// A place with its name, so many pixels below it.
 fn point(svg: &mut String, frame: &Frame, (east_m, north_m): (f64, f64), (name, below): (&str, f64)) {
     let (x, y) = frame.place(east_m, north_m);
+    // A text near the right or the upper edge would be cut.
+    let (side, anchor) = if x > WIDTH * 0.75 { (-6.0, "end") } else { (6.0, "start") };
     let _ = writeln!(
         svg,
-        "<circle class=\"point\" cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"4\"/><text class=\"number\" x=\"{:.1}\" y=\"{:.1}\">{}</text>",
-        x + 6.0,
-        y + below,
+        "<circle class=\"point\" cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"4\"/><text class=\"number\" x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"{anchor}\">{}</text>",
+        x + side,
+        (y + below).max(12.0),
         Escaped(name)
     );
 }

@@ -2,7 +2,7 @@
 
 use super::areas::{ClassArea, areas};
 use super::orders::{OrderKey, OrderStep};
-use super::words;
+use super::track::TrackPoint;
 use crate::export::{MapCaption, MapCells};
 use crate::replay::{Known, Recording, ShownMap, StateText};
 use crate::state::{LinkDirection, LinkSummary, MapLabelTree, MissionState, ReplaySide, VehicleMarker, VehicleState};
@@ -39,8 +39,8 @@ pub struct Dive {
     pub(super) settings: SettingsRecord,
     /// Why some of the record could not be read.
     pub damage: Option<String>,
-    /// When the surface ended, if it was started again.
-    pub(super) ended_s: Vec<f64>,
+    /// When the surface ended and was started again.
+    pub(super) restarts_s: Vec<(f64, f64)>,
 }
 
 /// The program that made a record, and its settings that differed from their defaults, by key.
@@ -68,16 +68,10 @@ pub(super) struct DiveVehicle {
     pub(super) classes: Vec<ClassArea>,
     /// The places that it has reported.
     pub(super) track: Vec<TrackPoint>,
-    /// The places of its own record, in the world frame as its map lies at the end; empty without one.
-    pub(super) own_track: Vec<TrackPoint>,
-    /// Frames that it has transmitted, by its own record.
-    pub(super) sent: u64,
-    /// Begin and end of each of its own records.
-    pub(super) runs_s: Vec<(f64, f64)>,
+    /// What its own record says.
+    pub(super) own: OwnRecord,
     /// All labels that were on the operator's map of this epoch.
     pub(super) had: BTreeSet<u8>,
-    /// What it ran with, by its own record.
-    pub(super) settings: SettingsRecord,
     /// The way of each order, by slot and version.
     pub(super) orders: BTreeMap<OrderKey, Vec<OrderStep>>,
     /// When the vehicle decided about orders, by its own record.
@@ -88,24 +82,33 @@ pub(super) struct DiveVehicle {
     pub(super) maps: Vec<MapsAt>,
 }
 
+/// What a vehicle's own record says; empty without one.
+#[derive(Debug, Default)]
+pub(super) struct OwnRecord {
+    /// Its places, in the world frame as its map lies at the end.
+    pub(super) track: Vec<TrackPoint>,
+    /// Frames that it has transmitted, copies included.
+    pub(super) sent: u64,
+    /// The bits of what they carried first, by its name.
+    pub(super) sent_bits: BTreeMap<String, u64>,
+    /// When it heard frames of the surface, seconds since 1970.
+    pub(super) heard_s: Vec<f64>,
+    /// Begin and end of each of its records.
+    pub(super) runs_s: Vec<(f64, f64)>,
+    /// What it ran with.
+    pub(super) settings: SettingsRecord,
+}
+
 /// The maps of both sides at one moment.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct MapsAt {
     pub(super) at_s: f64,
     /// Cells of the operator's map.
     pub(super) cells: u64,
-    /// Of the vehicle's cells the share that the operator's map has with the same label; NaN without the vehicle's record.
+    /// Of the cells that the vehicle had to send, the share that the operator's map has with the same label; NaN without its record.
     pub(super) agreement: f64,
-}
-
-/// A reported place, metres in the world frame.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct TrackPoint {
-    pub(super) at_s: f64,
-    pub(super) east_m: f64,
-    pub(super) north_m: f64,
-    pub(super) depth_m: f64,
-    pub(super) sigma_m: f64,
+    /// How far the operator's map was behind that of the vehicle, as the page said, mission seconds; NaN where it is not known.
+    pub(super) lag_s: f64,
 }
 
 fn seconds(nanos: u64) -> f64 {
@@ -131,7 +134,7 @@ impl Dive {
             serde_json::from_str::<MissionState>(json).map_err(|e| format!("/scenecast/state of the record: {e}"))
         };
         let mut state = read(&last.json)?;
-        for end in recording.timeline.ends_of_runs() {
+        for (end, _) in recording.timeline.restarts() {
             let LinkSummary { up, down, .. } = read(&end.json)?.link;
             state.link.up = sum(&state.link.up, &up);
             state.link.down = sum(&state.link.down, &down);
@@ -148,12 +151,17 @@ impl Dive {
             vehicles,
             events: events(recording),
             gaps_s: gaps(recording),
-            ended_s: recording.timeline.ends_of_runs().map(|state| seconds(state.nanos)).collect(),
+            restarts_s: recording.timeline.restarts().map(|(a, b)| (seconds(a.nanos), seconds(b.nanos))).collect(),
             frames: recording.frames,
             clock: recording.timeline.clock.clone(),
             settings: serde_json::from_str(&recording.settings).unwrap_or_default(),
             damage: (!recording.damage.is_empty()).then(|| recording.damage.join("; ")),
         })
+    }
+
+    /// A time span of the record as mission time, seconds: the mission may run faster than the clock.
+    pub(super) fn mission_s(&self, span_s: f64) -> f64 {
+        span_s * self.state.mission.speed
     }
 
     /// The moment of a mission time, seconds since 1970.
@@ -194,7 +202,7 @@ impl Dive {
 impl DiveVehicle {
     /// What a recording says about a vehicle with this part of topics; `None` if it has nothing.
     fn of(recording: &mut Recording, state: &VehicleState, part: &str) -> Option<Self> {
-        let maps = maps_over_time(recording, part);
+        let maps = maps_over_time(recording, state.id, part);
         let Recording { timeline, operator, vehicles, .. } = recording;
         let own = vehicles.get(part);
         let shift = state.map.shift_m();
@@ -214,11 +222,15 @@ impl DiveVehicle {
             cell_m: shown.cell_m,
             classes: areas(shown, |label| state.label_book.shown_as(label)),
             track: known.poses.iter().map(|(_, pose)| TrackPoint::of(pose)).collect(),
-            own_track: own.iter().flat_map(|own| own.poses.iter().map(moved)).collect(),
-            sent: own.map_or(0, |own| own.sent),
-            runs_s: own.iter().flat_map(|own| &own.runs).map(|(from, to)| (seconds(*from), seconds(*to))).collect(),
+            own: own.map_or_else(OwnRecord::default, |own| OwnRecord {
+                track: own.poses.iter().map(moved).collect(),
+                sent: own.sent,
+                sent_bits: own.sent_bits.clone(),
+                heard_s: own.heard.iter().copied().map(seconds).collect(),
+                runs_s: own.runs.iter().map(|(from, to)| (seconds(*from), seconds(*to))).collect(),
+                settings: serde_json::from_str(&own.settings).unwrap_or_default(),
+            }),
             had: known.map.labels_so_far(),
-            settings: own.and_then(|own| serde_json::from_str(&own.settings).ok()).unwrap_or_default(),
             link: known.link.iter().map(|(at, link)| (seconds(*at), link.clone())).collect(),
             maps,
             ..Self::default()
@@ -242,15 +254,33 @@ impl DiveVehicle {
         Some(vehicle)
     }
 
-    /// The places of its own record, or else those that it has reported.
-    pub(super) fn path(&self) -> &[TrackPoint] {
-        if self.own_track.len() > 1 { &self.own_track } else { &self.track }
+    /// What was not a dive about it, in a clause; `None` if nothing says so.
+    pub(super) fn made_up(&self, dive: &Dive) -> Option<String> {
+        let set = |key: &str| self.own.settings.settings.get(key).and_then(serde_json::Value::as_str);
+        if dive.settings.simulated {
+            return Some("This was a rehearsal over a simulated sea floor".to_owned());
+        }
+        if self.is_played_back() {
+            return Some(format!(
+                "Its images were played back from {}: times are those of the playback, and orders could not move it",
+                set("camera.source").unwrap_or_default()
+            ));
+        }
+        (set("autopilot.kind") == Some("rehearsal"))
+            .then(|| "The vehicle's motion was simulated (autopilot.kind = rehearsal)".to_owned())
     }
 
-    /// The uncertainty of its position at a moment, seconds since 1970; `None` if no place of a minute about it is known.
-    pub(super) fn sigma_m(&self, at_s: f64) -> Option<f64> {
-        let near = self.path().iter().filter(|point| (point.at_s - at_s).abs() < 60.0 && point.sigma_m.is_finite());
-        near.min_by(|a, b| (a.at_s - at_s).abs().total_cmp(&(b.at_s - at_s).abs())).map(|point| point.sigma_m)
+    /// Whether its frames went through a modem, whose round trips are those of sound in water.
+    pub(super) fn has_modem(&self) -> bool {
+        let kind = self.own.settings.settings.get("modem.kind").and_then(serde_json::Value::as_str);
+        // The default is a socket.
+        kind.is_some_and(|kind| !["tcp", "udp"].contains(&kind))
+    }
+
+    /// Whether recorded images stood for a camera.
+    pub(super) fn is_played_back(&self) -> bool {
+        let source = self.own.settings.settings.get("camera.source").and_then(serde_json::Value::as_str);
+        source.is_some_and(|source| ["frames:", "bag:", "tum:"].iter().any(|kind| source.starts_with(kind)))
     }
 
     /// The middle of a cell of its map, which lies `shift` from the world frame, metres.
@@ -263,27 +293,6 @@ impl DiveVehicle {
     pub(super) fn label_at(&self, (shift_east_m, shift_north_m): (f64, f64), east_m: f64, north_m: f64) -> u8 {
         let index = |m: f64| (m / self.cell_m).floor() as i32;
         self.labels.get(Cell::new(index(east_m - shift_east_m), index(north_m - shift_north_m)))
-    }
-
-    /// Its speed while it moved, m/s, where its own record tells it. Times are of the wall clock, which the mission may be ahead of.
-    pub(super) fn speed_m_s(&self, mission_speed: f64) -> Option<f64> {
-        const LEAST_M_S: f64 = 0.05;
-        let steps = self.own_track.windows(2).filter_map(|pair| match pair {
-            [a, b] => Some(((b.east_m - a.east_m).hypot(b.north_m - a.north_m), (b.at_s - a.at_s) * mission_speed)),
-            _ => None,
-        });
-        let moving = steps.filter(|(m, s)| *s > 0.0 && m / s >= LEAST_M_S);
-        let (m, s) = moving.fold((0.0, 0.0), |sum, step| (sum.0 + step.0, sum.1 + step.1));
-        (s > 0.0).then(|| m / s)
-    }
-
-    /// Length of its path, metres: at least so far, where only reports tell it.
-    pub(super) fn distance_m(&self) -> f64 {
-        let step = |pair: &[TrackPoint]| match pair {
-            [a, b] => (b.east_m - a.east_m).hypot(b.north_m - a.north_m),
-            _ => 0.0,
-        };
-        self.path().windows(2).map(step).sum()
     }
 }
 
@@ -329,7 +338,7 @@ fn gaps(recording: &Recording) -> Vec<(f64, f64)> {
 }
 
 /// The maps at moments of the record.
-fn maps_over_time(recording: &mut Recording, part: &str) -> Vec<MapsAt> {
+fn maps_over_time(recording: &mut Recording, id: u8, part: &str) -> Vec<MapsAt> {
     let Recording { timeline, operator, vehicles, .. } = recording;
     let Some(operator) = operator.get_mut(part) else { return Vec::new() };
     let mut vehicle = vehicles.get_mut(part);
@@ -341,7 +350,8 @@ fn maps_over_time(recording: &mut Recording, part: &str) -> Vec<MapsAt> {
         vehicle.iter_mut().for_each(|vehicle| seek(vehicle));
         let held = operator.map.shown();
         let agreement = vehicle.as_ref().map_or(f64::NAN, |vehicle| agreement(vehicle.map.shown(), held));
-        MapsAt { at_s: seconds(nanos), cells: held.labels.shown().explored() as u64, agreement }
+        let lag_s = timeline.state_at(nanos).and_then(|state| lag_s(&state.json, id)).unwrap_or(f64::NAN);
+        MapsAt { at_s: seconds(nanos), cells: held.labels.shown().explored() as u64, agreement, lag_s }
     };
     (0..=MOMENTS).map(maps).collect()
 }
@@ -353,15 +363,8 @@ fn agreement(vehicle: &ShownMap, operator: &ShownMap) -> f64 {
     cells.iter().filter(is_same).count() as f64 / cells.explored() as f64
 }
 
-impl TrackPoint {
-    fn of(message: &PoseWithCovarianceStamped) -> Self {
-        let position = &message.pose.pose.position;
-        Self {
-            at_s: words::unix_s(&message.header.stamp),
-            east_m: position.x,
-            north_m: position.y,
-            depth_m: -position.z,
-            sigma_m: message.pose.covariance.first().map_or(f64::NAN, |variance| variance.sqrt()),
-        }
-    }
+/// How far the map of a vehicle is behind, by a state of the page.
+fn lag_s(json: &str, id: u8) -> Option<f64> {
+    let state: MissionState = serde_json::from_str(json).ok()?;
+    state.vehicles.iter().find(|vehicle| vehicle.id == id)?.link.backlog.as_ref()?.map_lag_s
 }

@@ -3,14 +3,14 @@
 use super::Escaped;
 use super::chart::{self, Series};
 use super::dive::{Dive, DiveVehicle};
-use crate::state::LinkDirection;
+use crate::state::{LinkDirection, VehicleState};
 use scenecast_messages::scenecast_msgs::Link;
 use std::collections::BTreeMap;
 use std::fmt::Write;
 
 impl Dive {
     /// The link and the position over time, the link over range, and what its bytes were.
-    pub(super) fn link(&self, page: &mut String, vehicle: &DiveVehicle) {
+    pub(super) fn link(&self, page: &mut String, state: &VehicleState, vehicle: &DiveVehicle) {
         let (begin, end) = self.span_s;
         let series = |name, unit, value: fn(&Link) -> f32| Series {
             name,
@@ -29,7 +29,7 @@ impl Dive {
             series("data that waited at the vehicle", "bit", |link| link.backlog_bits as f32),
             series("age of the last frame from the vehicle", "s", |link| link.age_s),
             Series {
-                name: "share of the vehicle's cells that the operator's map had with the same label",
+                name: "share of the cells that the vehicle had to send that the operator's map had with the same label",
                 unit: "%",
                 points: vehicle.maps.iter().map(|maps| (maps.at_s - begin, maps.agreement * 100.0)).collect(),
             },
@@ -39,7 +39,9 @@ impl Dive {
         if !charts.is_empty() {
             let _ = writeln!(page, "<h3>Link and position over time</h3>\n<figure>{}</figure>", charts.join("\n"));
         }
-        *page += &over_range(vehicle);
+        if self.settings.simulated || vehicle.has_modem() {
+            *page += &over_range(vehicle);
+        }
         let direction = |name: &str, direction: &LinkDirection| {
             let mut classes: Vec<_> = direction.bytes_by_class.iter().filter(|(_, bytes)| **bytes > 0).collect();
             classes.sort_by_key(|(_, bytes)| std::cmp::Reverse(**bytes));
@@ -58,7 +60,7 @@ impl Dive {
             page,
             "<table><tr><th>direction</th><th>frames</th><th>lost</th><th>bytes by class: heard from the vehicles, sent to them</th></tr>{}{}</table>\n<p>Frames are numbered: \
              those are lost whose number the other end never received, over the whole mission.{} Classes: map and layers, status of the vehicle, directive \
-             (orders), fix (positions for the vehicle), exemplar (images), and overhead (heads and tags of frames).</p>",
+             (orders), fix (positions for the vehicle), exemplar (images), and overhead (headers and checks of frames).</p>",
             direction("from the vehicles", &self.state.link.up),
             direction("to the vehicles", &self.state.link.down),
             match self.frames[2] {
@@ -71,15 +73,29 @@ impl Dive {
         );
         let map = self.state.link.up.bytes_by_class.get("map").copied().unwrap_or_default();
         let cells: usize = self.vehicles().map(|(_, vehicle)| vehicle.labels.explored()).sum();
+        let budget = state
+            .status
+            .as_ref()
+            .map_or_else(String::new, |status| format!("the vehicle's {} bit/s, ", status.budget_bps));
+        let _ = writeln!(page, "<p>Budgets at the end: {budget}the surface's {} bit/s.", self.state.link.budget_bps);
         if map > 0 && cells > 0 {
             let _ = writeln!(
                 page,
-                "<p>The budget at the end was {} bit/s. The {map} bytes of the map that arrived brought {cells} cells, {:.2} bits a cell, each change of a \
-                 label included.</p>",
-                self.state.link.budget_bps,
+                " The {map} bytes of the map that arrived brought {cells} cells, {:.2} bits a cell, each change of a label included.",
                 map as f64 * 8.0 / cells as f64
             );
         }
+        let sent = vehicle.own.sent_bits.iter().filter(|(_, bits)| **bits > 0);
+        let sent: Vec<String> = sent.map(|(content, bits)| format!("{content} {}", bits / 8)).collect();
+        if !sent.is_empty() {
+            let sent = sent.join(", ");
+            let _ = writeln!(
+                page,
+                " By its own record the vehicle sent so many bytes of each, copies not counted: {}.",
+                Escaped(&sent)
+            );
+        }
+        *page += "</p>\n";
     }
 }
 

@@ -4,10 +4,13 @@ mod archive;
 mod areas;
 mod chart;
 mod dive;
+mod extent;
+mod gaps;
 mod link;
 mod orders;
 mod page;
 mod summary;
+mod track;
 mod words;
 
 pub use dive::Dive;

@@ -80,7 +80,13 @@ impl DiveVehicle {
         let later = self.orders.range((slot.clone(), version + 1)..).take_while(|((other, _), _)| other == slot);
         let applied = |way: &Vec<OrderStep>| way.last().is_some_and(|last| last.status == OrderStatus::APPLIED);
         let ((_, by), _) = later.into_iter().find(|(_, way)| applied(way))?;
-        Some(format!("{slot} {by} replaced it"))
+        let given_s = self.orders.get(&(slot.clone(), *by))?.last()?.given_s;
+        Some(format!("the one of {} replaced it", utc_text(given_s)))
+    }
+
+    /// Whether a later order of the kind took the place of one that has no end.
+    pub(super) fn is_replaced(&self, order: &OrderKey, way: &[OrderStep]) -> bool {
+        !way.last().is_some_and(OrderStep::is_end) && self.overtaken(order).is_some()
     }
 
     /// The orders but for position fixes, which the surface gives by itself.
@@ -134,6 +140,7 @@ impl Dive {
             (true, true) if self.settings.simulated => "the script of the rehearsal".to_owned(),
             (true, _) => by,
         };
+        let by = if by == "local" { "the user of the surface's computer".to_owned() } else { by };
         (by, words)
     }
 
@@ -150,11 +157,11 @@ impl Dive {
         if vehicle.orders_of_people().next().is_none() {
             return;
         }
-        *page += "<h3>Orders</h3>\n<table><thead><tr><th>order</th><th>what was ordered</th><th>by</th><th>given (UTC)</th><th>end</th><th>on board after</th><th>known at the surface after</th></tr></thead>\n";
+        *page += "<h3>Orders</h3>\n<table><thead><tr><th>order</th><th>what was ordered</th><th>by</th><th>given (UTC)</th><th>outcome</th><th>in force on board after</th><th>known at the surface after</th></tr></thead>\n";
         let mut orders: Vec<(&OrderKey, &OrderStep)> =
             vehicle.orders_of_people().filter_map(|(order, way)| Some((order, way.last()?))).collect();
         orders.sort_by(|a, b| a.1.given_s.total_cmp(&b.1.given_s));
-        for (order @ (slot, version), last) in orders {
+        for (order @ (slot, _), last) in orders {
             let (by, ordered) = self.ordered(state, vehicle, order);
             let known = Some(last).filter(|last| last.is_end() && !last.is_own).map(|last| last.at_s);
             let [on_board, known] = [vehicle.decided_s.get(order).copied(), known]
@@ -163,8 +170,8 @@ impl Dive {
             let end = end.map_or_else(|| last.told(), |by| format!("{}; {by}", last.told()));
             let _ = writeln!(
                 page,
-                "<tr><td>{} {version}</td><td>{}</td><td>{}</td><td class=\"t\">{}</td><td>{}</td><td class=\"n\">{on_board}</td><td class=\"n\">{known}</td></tr>",
-                Escaped(slot),
+                "<tr><td>{}</td><td>{}</td><td>{}</td><td class=\"t\">{}</td><td>{}</td><td class=\"n\">{on_board}</td><td class=\"n\">{known}</td></tr>",
+                Escaped(words::order(slot, &ordered)),
                 Escaped(&ordered),
                 Escaped(&by),
                 utc_text(last.given_s),
@@ -178,7 +185,7 @@ impl Dive {
     pub(super) fn steering(&self, page: &mut String, state: &VehicleState, vehicle: &DiveVehicle) {
         let of_modes = self.mode_source();
         let modes = self.events.iter().filter(|(_, event)| event.vehicle == state.name && event.source == of_modes);
-        let modes = modes.map(|(at_s, event)| (*at_s, event.text.clone()));
+        let modes = modes.map(|(at_s, event)| (*at_s, words::event(&state.label_book, &event.text)));
         let steers = |slot: &str| ![SlotId::Requests.name(), SlotId::Budget.name()].contains(&slot);
         let orders = vehicle.orders_of_people().filter(|((slot, _), _)| steers(slot));
         let orders = orders.filter_map(|(order, way)| {
@@ -197,7 +204,7 @@ impl Dive {
             return;
         }
         steps.sort_by(|a, b| a.0.total_cmp(&b.0));
-        *page += "<h3>What the vehicle was steered by, and its modes</h3>\n<table><thead><tr><th>time (UTC)</th><th>what</th><th>cells on the map by \
+        *page += "<h3>Orders and modes over time</h3>\n<table><thead><tr><th>time (UTC)</th><th>what</th><th>cells on the map by \
                   then</th></tr></thead>\n";
         for (at_s, text) in &steps {
             let cells = vehicle.maps.iter().rev().find(|maps| maps.at_s <= *at_s).map_or(0, |maps| maps.cells);
@@ -269,6 +276,6 @@ mod tests {
         vehicle.take_order(&status(7, OrderStatus::ON_AIR, 2));
         assert_eq!(vehicle.overtaken(&order), None);
         vehicle.take_order(&status(9, OrderStatus::APPLIED, 2));
-        assert_eq!(vehicle.overtaken(&order).as_deref(), Some("fence 9 replaced it"));
+        assert_eq!(vehicle.overtaken(&order).as_deref(), Some("the one of 1970-01-01T00:00:01Z replaced it"));
     }
 }

@@ -9,6 +9,7 @@ use base64::Engine;
 use base64::prelude::BASE64_STANDARD;
 use scenecast_core::utc_text;
 use scenecast_messages::scenecast_msgs::Exemplar;
+use scenecast_surface::LabelBook;
 use serde_json::json;
 use std::collections::BTreeSet;
 use std::fmt::Write;
@@ -50,21 +51,24 @@ impl Dive {
     fn origin_of_figures(&self, page: &mut String) {
         settings(page, "the surface", &self.settings);
         for (state, vehicle) in self.vehicles() {
-            settings(page, &state.name, &vehicle.settings);
+            settings(page, &state.name, &vehicle.own.settings);
         }
         let (begin, end) = (utc_text(self.span_s.0), utc_text(self.span_s.1));
         let (mission, run) = (Escaped(&self.state.mission.name), Escaped(&self.state.mission.id));
         let recorded = if self.settings.program.is_empty() { "an earlier scenecast" } else { &self.settings.program };
         let names: Vec<&str> = self.state.vehicles.iter().map(|vehicle| vehicle.name.as_str()).collect();
         let program = Escaped(scenecast_core::program());
-        let rehearsal = if self.settings.simulated { ", a rehearsal over a simulated sea floor" } else { "" };
+        let made_up: Vec<String> = self.vehicles().filter_map(|(_, vehicle)| vehicle.made_up(self)).collect();
+        let made_up = made_up.first().map_or_else(String::new, |what| format!(" ({what})"));
+        let own = self.vehicles().filter(|(_, vehicle)| !vehicle.own.track.is_empty()).count();
+        let own = if own > 0 { " and those of the vehicles themselves" } else { "" };
         let origin =
             self.state.mission.origin.map_or_else(String::new, |origin| format!(", at {}", words::origin(origin)));
         let _ = writeln!(
             page,
-            "<h2>How this was made</h2>\n<p>By {program} from the record of the surface, run {run}, which {} wrote from {begin} to {end}. \
-             The map is the operator's: what had arrived by the acoustic link. Areas are counts of cells.</p>\n<h2>How to cite</h2>\n<p>Mission \u{201c}{mission}\u{201d}, vehicle {}, {begin} to {end}: map of the \
-             sea floor by an unsupervised scene model{rehearsal}{origin}, run {run}, {program}.</p>\n</body></html>",
+            "<h2>How this was made</h2>\n<p>By {program} from the records of the surface{own}, run {run}, which {} wrote from {begin} to {end}. \
+             The map is the operator's: what had arrived over the link. Areas are counts of cells.</p>\n<h2>How to cite</h2>\n<p>Mission \u{201c}{mission}\u{201d}, vehicle {}, {begin} to {end}: map of the \
+             sea floor by an unsupervised scene model{made_up}{origin}, run {run}, {program}.</p>\n</body></html>",
             Escaped(recorded),
             Escaped(&names.join(", ")),
         );
@@ -76,16 +80,20 @@ impl Dive {
             let _ = writeln!(page, "<li>{}</li>", Escaped(&sentence));
         }
         *page += "</ul>\n";
-        if let Some(map) = chart::map(state, vehicle) {
+        if let Some(map) = chart::map(state, vehicle, self.state.mission.speed) {
             let _ = writeln!(
                 page,
                 "<figure class=\"map\">{map}<figcaption><div class=\"legend\">{}</div>The operator's map at the end, each class with its number, and the \
-                 track of the vehicle: {}. Long dashes: the fence that was in force at the end; grey: areas to stay out of. Metres east and \
+                 track of the vehicle: {}. {}Metres east and \
                  north of the mission's origin (WGS 84 where it has one); north is up.</figcaption></figure>",
                 legend(state, vehicle),
-                match vehicle.own_track.len() {
+                match vehicle.own.track.len() {
                     0 | 1 => "straight lines between the places that the vehicle has reported",
                     _ => "by its own record",
+                },
+                match state.orders.fence_in_force {
+                    Some(_) => "Long dashes: the fence that was in force at the end; grey: areas to stay out of. ",
+                    None => "",
                 }
             );
         }
@@ -93,13 +101,18 @@ impl Dive {
         notes(page, self, state);
         self.orders_table(page, state, vehicle);
         self.steering(page, state, vehicle);
-        self.link(page, vehicle);
+        self.link(page, state, vehicle);
     }
 
     fn events_table(&self, page: &mut String) {
         if self.events.is_empty() {
             return;
         }
+        let unnamed = LabelBook::default();
+        let book = |vehicle: &str| {
+            let state = self.state.vehicles.iter().find(|state| state.name == vehicle);
+            state.map_or(&unnamed, |state| &state.label_book)
+        };
         *page += "<h2>Events</h2>\n<table><thead><tr><th>time (UTC)</th><th>vehicle</th><th>kind</th><th>event</th></tr></thead>\n";
         for (at_s, event) in &self.events {
             let _ = writeln!(
@@ -108,7 +121,7 @@ impl Dive {
                 utc_text(*at_s),
                 Escaped(&event.vehicle),
                 Escaped(&event.source),
-                Escaped(&event.text)
+                Escaped(&words::event(book(&event.vehicle), &event.text))
             );
         }
         *page += "</table>\n";
@@ -132,7 +145,7 @@ impl Dive {
             json!({
                 "name": state.name,
                 "summary": summary::summary(self, state, vehicle),
-                "distance_m": vehicle.distance_m(),
+                "distance_m": vehicle.distance_m(self.state.mission.speed),
                 "cell_m": vehicle.cell_m,
                 "classes": classes.collect::<Vec<_>>(),
                 "orders": orders.collect::<Vec<_>>(),
@@ -177,7 +190,7 @@ fn settings(page: &mut String, end: &str, settings: &SettingsRecord) {
     }
     let _ = write!(
         page,
-        "<h2>Settings of {}</h2>\n<p>{}: those that differ from their defaults.</p>\n<table>",
+        "<h2>Settings of {}</h2>\n<p>{}: those of the configuration that differ from their defaults. Orders may have replaced some of them.</p>\n<table>",
         Escaped(end),
         Escaped(&settings.program)
     );
@@ -245,7 +258,7 @@ fn without_cells(page: &mut String, dive: &Dive, state: &VehicleState, vehicle: 
     let titles: Vec<String> = labels.iter().map(title).collect();
     let _ = writeln!(
         page,
-        "<h3>Labels without cells at the end</h3>\n<p>The scene model had these labels for some time, and gave their cells to others: \
+        "<h3>Labels without cells at the end</h3>\n<p>The scene model had these labels for some time; it gave their cells to others: \
          {}.</p>\n<div class=\"images\">{images}</div>",
         Escaped(&titles.join(", "))
     );
@@ -294,7 +307,12 @@ fn images(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle, class: u8) -
         true => String::new(),
         false => "; by the map at the end its place has another class".to_owned(),
     };
-    shown.iter().take(IMAGES).map(|found| image(dive, state, vehicle, found, &note(&found.1))).collect()
+    let more = of_it.len() - shown.len().min(IMAGES);
+    let more = if more == 0 { String::new() } else { format!("; {more} more of this class came in") };
+    let shown = shown.iter().take(IMAGES).enumerate();
+    shown
+        .map(|(n, found)| image(dive, state, vehicle, found, &(note(&found.1) + if n == 0 { &more } else { "" })))
+        .collect()
 }
 
 /// An image with its label, time, place and scale.
@@ -312,7 +330,7 @@ fn image(
     let title = if class == label { label } else { format!("{class} ({label})") };
     let place = || {
         let sigma = vehicle.sigma_m(words::unix_s(&exemplar.taken));
-        let sigma = sigma.map_or_else(String::new, |m| format!(", standard deviation {m:.1} m"));
+        let sigma = sigma.map_or_else(String::new, |m| format!(", \u{b1} {m:.1} m"));
         let on_earth = words::on_earth(dive, (middle.x, middle.y));
         format!("<br>{}, {}{on_earth}{sigma}", words::east(middle.x), words::north(middle.y))
     };

@@ -21,6 +21,41 @@ pub(super) fn duration(seconds: f64) -> String {
     }
 }
 
+/// The middle one of some values; `None` without any.
+pub(super) fn median(values: &[f64]) -> Option<f64> {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    sorted.get(sorted.len() / 2).copied()
+}
+
+/// An event with reasons of modes in words, and labels by their names.
+pub(super) fn event(book: &LabelBook, text: &str) -> String {
+    let reasons = [
+        (": distance", ": the allowed distance, return path included, was used up"),
+        (": time", ": the allowed time, return path included, was used up"),
+        (": silence", ": the surface was silent for longer than allowed"),
+        (": fence", ": it was outside of the fence or in an area to stay out of"),
+        (": depth or altitude", ": it was outside of its limits of depth or altitude"),
+        (": no path", ": no path to its goals was allowed"),
+        (": order", ": by order"),
+    ];
+    let reason = reasons.iter().find_map(|(short, long)| text.strip_suffix(short).map(|mode| format!("{mode}{long}")));
+    let text = match text {
+        "the vehicle begins another run" => "the vehicle's program was restarted".to_owned(),
+        "received" => "first contact".to_owned(),
+        text => reason.unwrap_or_else(|| text.to_owned()),
+    };
+    let mut parts = text.split("label ");
+    let first = parts.next().unwrap_or_default().to_owned();
+    parts.fold(first, |told, part| {
+        let digits = part.bytes().take_while(u8::is_ascii_digit).count();
+        let name = part[..digits].parse().ok().and_then(|label: u8| book.name(label));
+        let name = name.map_or_else(String::new, |name| format!(" ({name})"));
+        let is_named = part[digits..].starts_with(" (") || part[digits..].starts_with(": name");
+        format!("{told}label {}{}{}", &part[..digits], if is_named { "" } else { &name }, &part[digits..])
+    })
+}
+
 /// An area for people, with three digits.
 pub(super) fn area(m2: f64) -> String {
     if m2 >= 1e6 {
@@ -48,6 +83,10 @@ pub(super) fn content(book: &LabelBook, order: &Order) -> String {
         |label: &Value| label.as_u64().and_then(|label| u8::try_from(label).ok()).map(|label| book.title(label));
     let member = |(name, value): (&String, &Value)| match (name.as_str(), value) {
         (_, Value::Null) => None,
+        ("curiosity" | "exploration", weight) if weight.as_f64() == Some(0.0) => None,
+        ("exploration", weight) => Some(format!("weight of unexplored sea floor {weight}")),
+        ("curiosity", weight) => Some(format!("weight of unusual places {weight}")),
+        ("weights", Value::Object(weights)) if weights.is_empty() => Some("no weights of labels".to_owned()),
         ("weights", Value::Object(weights)) => {
             let weight = |(label, weight): (&String, &Value)| {
                 format!("{}: {weight}", label.parse().map_or_else(|_| label.clone(), |label| book.title(label)))
@@ -168,6 +207,17 @@ pub(super) fn taken(image: &Exemplar) -> Option<String> {
     Some(image.taken.nanos()).filter(|nanos| *nanos != 0).map(|nanos| utc_text(nanos as f64 / 1e9))
 }
 
+/// What an order of a slot is called; `content` says what it orders.
+pub(super) fn order<'a>(slot: &'a str, content: &'a str) -> &'a str {
+    match slot {
+        "constraints" => content,
+        "requests" => "images",
+        "utility" => "weights",
+        "destination" => "go to",
+        other => other,
+    }
+}
+
 /// The name of an order's status.
 pub(super) fn status(status: u8) -> &'static str {
     match status {
@@ -212,7 +262,7 @@ mod tests {
         let order = |content: &str| Order { principal: "ann".into(), content: content.into(), ..Order::default() };
         let told = |text: &str| content(&LabelBook::default(), &order(text));
         let weights = r#"{"weights": {"3": 0.5, "7": -1.0}, "exploration": 0.1}"#;
-        assert_eq!(told(weights), "exploration 0.1; weights: label 3: 0.5, label 7: -1.0");
+        assert_eq!(told(weights), "weight of unexplored sea floor 0.1; weights: label 3: 0.5, label 7: -1.0");
         assert_eq!(told(r#"{"labels": [4]}"#), "images of label 4");
         assert_eq!(told(r#"{"place": [46.5, -28]}"#), "place 46.5 m east, -28 m north");
         let fence = r#"{"fence": [[0, 0], [9.5, 0], [9, 9], [0, 0]], "keep_outs": [[[1, 1], [2, 1], [2, 2]]]}"#;

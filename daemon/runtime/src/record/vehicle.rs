@@ -9,9 +9,10 @@ use scenecast_files::RecordEntry;
 use scenecast_host::VehicleHostEvent;
 use scenecast_messages::contents::{MAP_FRAME, Place, Stamps, header, pose};
 use scenecast_messages::scenecast_msgs::{Event, Link, OrderStatus};
-use scenecast_protocol::directive::SlotState;
+use scenecast_protocol::directive::{SlotId, SlotState};
 use scenecast_protocol::time::Instant;
-use scenecast_vehicle::{AppliedSlot, Vehicle};
+use scenecast_protocol::wire::{ModeReason, VehicleMode};
+use scenecast_vehicle::{AppliedSlot, LostOrders, Vehicle};
 use std::path::Path;
 
 /// Mission time between two messages about the link, seconds.
@@ -79,6 +80,8 @@ pub struct VehicleRecorder {
     part: u32,
     map: RecordedMap,
     mode: String,
+    /// Whether hold, resume or abort was ordered in this run.
+    was_stopped: bool,
     pose_s: Option<f64>,
     link_s: Option<f64>,
     /// Frames to the vehicle may carry a next key.
@@ -93,7 +96,18 @@ impl VehicleRecorder {
         let named = Named { name: config.vehicle.name.clone(), ..Named::default() };
         let (map, mode) = (RecordedMap::default(), String::new());
         let (cell_m, settings) = (cell_m(config), settings_text(config, is_simulated));
-        Self { named, cell_m, part: 0, map, mode, pose_s: None, link_s: None, hides_keys: false, settings }
+        Self {
+            named,
+            cell_m,
+            part: 0,
+            map,
+            mode,
+            was_stopped: false,
+            pose_s: None,
+            link_s: None,
+            hides_keys: false,
+            settings,
+        }
     }
 
     /// What has changed since the last call, or the whole state where `part` is another one than then.
@@ -128,8 +142,13 @@ impl VehicleRecorder {
             entries.push(self.entry("link", stamps, &self.link(vehicle, stamps)));
         }
         let (mode, reason) = vehicle.mode();
+        let waits = vehicle.durable().lost != LostOrders::None && !self.was_stopped;
+        let reason = match (mode, reason) {
+            (VehicleMode::Hold, ModeReason::Order) if waits => Some("it has no record of orders and waits for one"),
+            (_, reason) => reason.name(),
+        };
         let mode = mode.name();
-        let mode = reason.name().map_or_else(|| mode.to_owned(), |reason| format!("{mode}: {reason}"));
+        let mode = reason.map_or_else(|| mode.to_owned(), |reason| format!("{mode}: {reason}"));
         if self.mode != mode {
             entries.push(self.event(Event::INFO, "mode", &mode, stamps));
             self.mode = mode;
@@ -138,10 +157,13 @@ impl VehicleRecorder {
     }
 
     /// What is to be recorded of an event of the host.
-    pub fn handle_event(&self, event: &VehicleHostEvent, stamps: &Stamps) -> Option<RecordEntry> {
+    pub fn handle_event(&mut self, event: &VehicleHostEvent, stamps: &Stamps) -> Option<RecordEntry> {
         match event {
             VehicleHostEvent::Frame(event) => frame_entry(event, |_| Some(&self.named), self.hides_keys, stamps),
-            VehicleHostEvent::Applied(applied) => Some(self.decision(applied, stamps)),
+            VehicleHostEvent::Applied(applied) => {
+                self.was_stopped |= applied.id == SlotId::Constraints;
+                Some(self.decision(applied, stamps))
+            }
             VehicleHostEvent::Note(text) => Some(self.event(Event::WARN, "navigation", text, stamps)),
             VehicleHostEvent::Fixed(fix, _) => {
                 let at = fix.position;

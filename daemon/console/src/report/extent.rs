@@ -1,0 +1,82 @@
+//! What part of the sea floor the map covers, and how deep it is there.
+
+use super::dive::{Dive, DiveVehicle};
+use super::summary::ran_with;
+use super::words::{self, lat_lon};
+use crate::state::VehicleState;
+use scenecast_core::{Area, fence_of, place_of};
+use scenecast_protocol::map::{Cell, Quantity, UNEXPLORED};
+use std::ops::RangeInclusive;
+
+/// Where the map lies.
+pub(super) fn of_map(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -> Option<String> {
+    let bounds = vehicle.labels.bounds()?;
+    let (shift, cell_m) = (state.map.shift_m(), vehicle.cell_m);
+    let (west, south) = (f64::from(bounds.x) * cell_m + shift.0, f64::from(bounds.y) * cell_m + shift.1);
+    let (east, north) = (west + f64::from(bounds.width) * cell_m, south + f64::from(bounds.height) * cell_m);
+    let on_earth = dive.state.mission.origin.map_or_else(String::new, |origin| {
+        let [(south, west), (north, east)] = [(west, south), (east, north)].map(|(x, y)| lat_lon(origin, x, y));
+        format!(", or from latitude {south:.6} to {north:.6} and from longitude {west:.6} to {east:.6}")
+    });
+    Some(format!(
+        "The map reaches from {} to {} and from {} to {}{on_earth}.{}",
+        words::east(west),
+        words::east(east),
+        words::north(south),
+        words::north(north),
+        unseen(dive, state, vehicle, shift)
+    ))
+}
+
+/// How deep the sea floor is, where the map has a layer of it.
+pub(super) fn sea_floor(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -> Option<String> {
+    let cells = dive.map_cells(state, vehicle);
+    let layer = cells.layers().iter().find(|layer| layer.descriptor().quantity == Quantity::Depth)?;
+    let depths = vehicle.labels.iter().filter_map(|(cell, _)| layer.value(cell));
+    let (least, most) = depths.fold((f64::INFINITY, f64::NEG_INFINITY), |(least, most), m| (least.min(m), most.max(m)));
+    (least <= most).then(|| match format!("{least:.1}") == format!("{most:.1}") {
+        true => format!("The sea floor is {least:.1} m deep."),
+        false => format!("The sea floor is {least:.1} to {most:.1} m deep."),
+    })
+}
+
+/// How much of the configured area, or else of what the fence leaves, has cells.
+fn unseen(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle, shift: (f64, f64)) -> String {
+    let area = ran_with(dive, vehicle).settings.get("survey.area_m");
+    let corners = area.and_then(|area| serde_json::from_value::<[f64; 4]>(area.clone()).ok());
+    let Some([west, south, east, north]) = corners else {
+        return match seen_of_fence(state, vehicle, shift) {
+            Some(share) => format!(" Of the area within the fence, {:.1} % is on the map.", share * 100.0),
+            None => " No area of the survey is configured, so how much of it was not seen is not known.".to_owned(),
+        };
+    };
+    let middles = vehicle.labels.iter().map(|(cell, _)| vehicle.middle_of(cell, shift));
+    let share = Area { west, south, east, north }.covered(middles, vehicle.cell_m);
+    format!(
+        " Of the area of the survey, {west} to {east} m east and {south} to {north} m north, {:.1} % is on the map.",
+        share * 100.0
+    )
+}
+
+/// The share of what the fence in force leaves that has cells; `None` without a fence.
+fn seen_of_fence(state: &VehicleState, vehicle: &DiveVehicle, shift: (f64, f64)) -> Option<f64> {
+    const MAX_CELLS: i64 = 1 << 22;
+    let order = &state.orders.fence_in_force.as_ref()?.order;
+    let corners = order.fence.as_ref()?;
+    let fence = fence_of(Some(corners), &order.keep_outs, None).ok()?;
+    let range = |axis: usize, shift_m: f64| {
+        let cells = corners.iter().map(|corner| ((corner[axis] - shift_m) / vehicle.cell_m).floor() as i32);
+        Some(cells.clone().min()?..=cells.max()?)
+    };
+    let (columns, rows) = (range(0, shift.0)?, range(1, shift.1)?);
+    let count = |range: &RangeInclusive<i32>| i64::from(*range.end()) - i64::from(*range.start()) + 1;
+    if count(&columns).checked_mul(count(&rows))? > MAX_CELLS {
+        return None;
+    }
+    let place = |cell: Cell| place_of("cell", vehicle.middle_of(cell, shift).into());
+    let all = rows.flat_map(|y| columns.clone().map(move |x| Cell::new(x, y)));
+    let inside = all.filter(|&cell| place(cell).is_ok_and(|place| fence.allows(place)));
+    let (seen, all) = inside
+        .fold((0u64, 0u64), |(seen, all), cell| (seen + u64::from(vehicle.labels.get(cell) != UNEXPLORED), all + 1));
+    (all > 0).then(|| seen as f64 / all as f64)
+}
