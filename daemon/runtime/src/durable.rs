@@ -226,10 +226,10 @@ impl DiskWatch {
         self.looked = Some(now);
         // Open files are written on, although nobody finds them again.
         let is_gone = !self.dir.is_dir();
-        if is_gone && !std::mem::replace(&mut self.is_gone, is_gone) {
+        let was_gone = std::mem::replace(&mut self.is_gone, is_gone);
+        if is_gone && !was_gone {
             tracing::error!("{}: the folder is gone: a restart would find neither orders nor map", self.dir.display());
         }
-        self.is_gone = is_gone;
         let is_checkpoint_refused = is_gone || self.refused.contains(&true);
         Some(VehicleDisk { free_bytes: free_bytes(&self.dir), is_checkpoint_refused })
     }

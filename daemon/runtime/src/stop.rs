@@ -107,7 +107,7 @@ impl Reload {
     pub(super) fn new(load: Load) -> Result<Self, UserError> {
         let hang_ups = hang_ups()?;
         let _ = nix::sys::signal::SigSet::from(nix::sys::signal::Signal::SIGHUP).thread_unblock();
-        Ok(Self { keys: (load)().ok().and_then(|config| fingerprints(&config)), load, hang_ups })
+        Ok(Self { keys: (load)().ok().and_then(|config| fingerprints(&config).ok().flatten()), load, hang_ups })
     }
 
     #[cfg(not(unix))]
@@ -124,9 +124,12 @@ impl Reload {
             std::future::pending::<()>().await;
             match (self.load)() {
                 Ok(config) => {
-                    let keys = fingerprints(&config);
-                    if keys != self.keys {
-                        tracing::warn!("SIGHUP: link.key_file has other keys than at the start; a restart takes them");
+                    match fingerprints(&config) {
+                        Ok(keys) if keys == self.keys => {}
+                        Ok(_) => tracing::warn!(
+                            "SIGHUP: link.key_file has other keys than at the start; a restart takes them"
+                        ),
+                        Err(error) => tracing::error!("SIGHUP: {error}; a restart would fail"),
                     }
                     return config;
                 }
@@ -136,9 +139,10 @@ impl Reload {
     }
 }
 
-fn fingerprints(config: &Config) -> Option<(u32, Option<u32>)> {
-    let (file, _) = scenecast_config::read_key(config.link.key_file.as_ref()?).ok()?;
-    Some((file.key.fingerprint(), file.next.as_ref().map(|next| next.fingerprint())))
+fn fingerprints(config: &Config) -> Result<Option<(u32, Option<u32>)>, UserError> {
+    let Some(path) = &config.link.key_file else { return Ok(None) };
+    let (file, _) = scenecast_config::read_key(path)?;
+    Ok(Some((file.key.fingerprint(), file.next.as_ref().map(|next| next.fingerprint()))))
 }
 
 /// Makes new files and folders readable for the user of this process only.

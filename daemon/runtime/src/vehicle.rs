@@ -19,6 +19,7 @@ use scenecast_core::{Area, TangentPlane, UserError};
 use scenecast_files::{Recording, configured_recording, read_class_names};
 use scenecast_host::{CameraPose, VehicleHost, VehicleHostEvent, VehiclePilot, modem_station};
 use scenecast_labels::ImagePose;
+use scenecast_protocol::directive::{SlotId, SlotState};
 use scenecast_protocol::map::LayerSet;
 use scenecast_vehicle::ForeignUpdate;
 use std::time::Duration;
@@ -170,7 +171,19 @@ struct VehicleShell {
 }
 
 impl VehicleShell {
+    /// Tells how long one pass of the survey takes, where an autopilot carries it out.
+    fn tell_pass(&self) {
+        let (metres, time) = self.host.vehicle().pass();
+        if self.host.autopilot().is_some() && metres > 0.0 {
+            tracing::info!(
+                "one pass of the survey is {metres:.0} m long and takes {:.1} min",
+                time.as_secs_f64() / 60.0
+            );
+        }
+    }
+
     async fn run(mut self, mut stop: Stop) -> Result<(), UserError> {
+        self.tell_pass();
         loop {
             self.pump()?;
             let now = self.clock.now();
@@ -368,7 +381,12 @@ impl VehicleShell {
                     tracing::info!("the recorded mission has ended");
                     let _ = self.mapper.orders.send(ToMapper::Keep);
                 }
-                VehicleHostEvent::Applied(a) => tracing::info!("{} {}: {:?}", a.id.name(), a.version, a.state),
+                VehicleHostEvent::Applied(a) => {
+                    tracing::info!("{} {}: {:?}", a.id.name(), a.version, a.state);
+                    if a.id == SlotId::Fence && a.state == SlotState::Applied {
+                        self.tell_pass();
+                    }
+                }
                 VehicleHostEvent::Waypoint(at) => {
                     tracing::info!("waypoint {:.1} m east, {:.1} m north", at.x_m, at.y_m)
                 }

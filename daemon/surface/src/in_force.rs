@@ -249,7 +249,7 @@ mod tests {
         surface.set_order(auv(), Constraints { hold: true, abort: false }, at(1)).unwrap();
         surface.set_order(auv(), Constraints { hold: false, abort: true }, at(2)).unwrap();
         let texts: Vec<&str> = surface.log().entries().map(|entry| entry.text.as_str()).collect();
-        assert_eq!(texts, ["hold version 1 replaced before the vehicle has applied it"]);
+        assert_eq!(texts, ["hold version 1 was replaced before the vehicle was known to have applied it"]);
     }
 
     #[test]

@@ -74,17 +74,13 @@ impl Surface {
         self.log_fact(vehicle, LogKind::Answer, &text, now);
     }
 
-    /// A newer order takes the place of the last one of its kind, which may be on its way still.
-    pub(super) fn log_replaced(&mut self, vehicle: Address, slot: SlotId, now: Instant) {
-        let Some(last) = self.link.vehicle(vehicle).and_then(|v| v.slots().find(|s| s.id == slot)) else { return };
-        if last.status.is_pending() && !matches!(slot, SlotId::Fix | SlotId::Requests) {
-            let text = format!(
-                "{} version {} replaced before the vehicle has applied it",
-                order_name(&last.slot),
-                last.version
-            );
-            self.log_fact(vehicle, LogKind::Answer, &text, now);
-        }
+    /// What the log says about the last order of a kind, if a newer one takes its place before its end is known.
+    pub(super) fn replaced(&self, vehicle: Address, slot: SlotId) -> Option<String> {
+        let last = self.link.vehicle(vehicle)?.slots().find(|order| order.id == slot)?;
+        let is_told = last.status.is_pending() && !matches!(slot, SlotId::Fix | SlotId::Requests);
+        let (name, version) = (order_name(&last.slot), last.version);
+        is_told
+            .then(|| format!("{name} version {version} was replaced before the vehicle was known to have applied it"))
     }
 
     /// Frames of these vehicles were accepted.

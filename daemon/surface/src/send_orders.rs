@@ -115,8 +115,9 @@ impl Surface {
     }
 
     pub(super) fn issue(&mut self, vehicle: Address, slot: Slot, now: Instant) -> Result<u16, String> {
-        self.log_replaced(vehicle, slot.id(), now);
+        let replaced = self.replaced(vehicle, slot.id());
         let version = self.link.issue(vehicle, slot, now).map_err(|e| e.to_string())?;
+        replaced.iter().for_each(|text| self.log_fact(vehicle, LogKind::Answer, text, now));
         self.outputs.push_back(SurfaceOutput::Changed(vehicle));
         Ok(version)
     }

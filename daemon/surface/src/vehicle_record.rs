@@ -101,7 +101,7 @@ impl VehicleRecord {
         let reason = match (status.mode, status.reason) {
             (VehicleMode::Hold, ModeReason::Survey) => Some(self.end_of_survey()),
             (VehicleMode::Hold, ModeReason::Order) if !is_ours() => {
-                Some("by an order of before or of another surface, or because it has no record of its orders")
+                Some("by an earlier order, by one of another surface, or because it has no record of its orders")
             }
             (_, reason) => reason.name(),
         };

@@ -135,6 +135,11 @@ impl Steering {
         self
     }
 
+    /// The length of one pass of the survey, metres.
+    pub fn pass_m(&self) -> f64 {
+        self.grounds.lattice().pass_m()
+    }
+
     /// The first place of the survey.
     pub fn start(&self) -> Point {
         self.grounds.lattice().place(0)

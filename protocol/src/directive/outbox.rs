@@ -223,7 +223,7 @@ impl SlotOutbox {
                 }
                 SlotState::Pending => continue,
                 // This surface has forgotten a newer order of its own, such as one with the file of an hour ago.
-                SlotState::Applied if is_newer(report.version_low, slot.version) => {
+                SlotState::Applied if is_newer(report.version_low, slot.version as u8) => {
                     let superseded = OrderStatus::Withdrawn(Withdrawal::Superseded);
                     let is_new = self.advance(id, slot.version, superseded, now, |s| s == OrderStatus::Applied);
                     decided.extend(is_new.then_some(id));
@@ -257,7 +257,7 @@ impl SlotOutbox {
         };
         let was_applied = std::mem::take(was_applied);
         let Some(Some(order)) = self.slots.get_mut(id.index()) else { return false };
-        let is_older = is_newer(order.version as u8, report.version_low as u16);
+        let is_older = is_newer(order.version as u8, report.version_low);
         let is_lost =
             was_applied && decided && is_own && is_older && order.status == OrderStatus::Applied && !is_given_anew(id);
         if is_lost {
@@ -462,8 +462,8 @@ impl SlotOutbox {
 }
 
 /// Whether the lowest bits of a version are of a later one than another.
-fn is_newer(low: u8, version: u16) -> bool {
-    (1..128).contains(&low.wrapping_sub(version as u8))
+fn is_newer(low: u8, than: u8) -> bool {
+    (1..128).contains(&low.wrapping_sub(than))
 }
 
 /// Whether the vehicle is not known to have received an order. One that an earlier run of the surface knew as received, and

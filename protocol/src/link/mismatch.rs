@@ -6,7 +6,7 @@ use std::collections::{BTreeSet, VecDeque};
 use std::time::Duration;
 
 /// A setting of the other end that does not fit, so that its frames are refused, wasteful or those of two. It is found in a frame
-/// with a valid CRC or tag, apart from [`Self::Tag`], [`Self::Key`] and [`Self::Foreign`].
+/// with a valid CRC or tag, apart from [`Self::Tag`], [`Self::Key`], [`Self::Foreign`], [`Self::OwnAddress`] and [`Self::NotCalled`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, thiserror::Error)]
 pub enum Mismatch {
     /// The other end has this wire version.
@@ -50,9 +50,9 @@ pub enum Mismatch {
          mission.origin_deg at both ends"
     )]
     Origin(u32),
-    /// Only at a vehicle: the surface calls the vehicle of this number, and never this one.
+    /// Only at a vehicle without a run: a surface has called the vehicle of this number for long, and not this one.
     #[error(
-        "the surface calls vehicle {0} and not this one: set the vehicle.address here that asv.vehicles has at the surface"
+        "a surface calls vehicle {0} and has not called this one for ten minutes: set the vehicle.address here that asv.vehicles has at the surface"
     )]
     NotCalled(u8),
     /// Its clock and that of this end are apart by so many days, rounded down. Its frames are read all the same.
@@ -93,8 +93,8 @@ pub(super) struct MismatchReport {
     foreign: u32,
     /// Frames from the address of this end that it has not sent, or that noise has made.
     from_own_address: u32,
-    /// Frames of the surface to other vehicles, and the time of the first, since the last one to this end.
-    calls_of_others: Option<(Instant, u32)>,
+    /// The vehicle that the surface called first since its last frame to this one, when that was, and frames to others since.
+    calls_of_others: Option<(Address, Instant, u32)>,
     /// Hellos of one session that do not verify, which may also be damaged ones, since the last one that does.
     untrue: Option<(SessionId, u32)>,
 }
@@ -110,9 +110,11 @@ impl MismatchReport {
     const MIN_FROM_OWN_ADDRESS: u32 = 3;
     /// Frames to other vehicles, and the time for which they are heard and none to this one, after which it is taken as not called.
     const MIN_CALLS_OF_OTHERS: u32 = 8;
-    const UNCALLED: Duration = Duration::from_secs(300);
-    /// Four times what rounding makes of two equal origins at most.
+    const UNCALLED: Duration = Duration::from_secs(600);
+    /// Four steps in which origins are told.
     const MIN_ORIGIN_M: f64 = 10.0;
+    /// Found mismatches that wait for the host at most.
+    const MAX_FOUND: usize = 16;
 
     pub(super) fn note(&mut self, mismatch: Mismatch) {
         let [_, tags, ..] = self.introduced;
@@ -125,6 +127,12 @@ impl MismatchReport {
             self.current = Some(mismatch);
         }
         if is_certain && self.reported.insert(mismatch) {
+            self.tell(mismatch);
+        }
+    }
+
+    fn tell(&mut self, mismatch: Mismatch) {
+        if self.found.len() < Self::MAX_FOUND {
             self.found.push_back(mismatch);
         }
     }
@@ -163,7 +171,7 @@ impl MismatchReport {
 
     fn find_length(&mut self, length: Mismatch) {
         if self.length.replace(length).is_none() {
-            self.found.push_back(length);
+            self.tell(length);
         }
     }
 
@@ -175,10 +183,10 @@ impl MismatchReport {
 
     /// A frame of the surface to another vehicle is heard.
     pub(super) fn note_call_of(&mut self, other: Address, now: Instant) {
-        let (since, count) = self.calls_of_others.unwrap_or((now, 0));
-        self.calls_of_others = Some((since, count + 1));
+        let (called, since, count) = self.calls_of_others.unwrap_or((other, now, 0));
+        self.calls_of_others = Some((called, since, count.saturating_add(1)));
         if count >= Self::MIN_CALLS_OF_OTHERS && now.since(since) >= Self::UNCALLED {
-            self.note(Mismatch::NotCalled(other.number()));
+            self.note(Mismatch::NotCalled(called.number()));
         }
     }
 
@@ -217,16 +225,19 @@ impl MismatchReport {
             (off_m >= Self::MIN_ORIGIN_M).then_some(Mismatch::Origin(off_m.round() as u32)),
         ];
         let before = std::mem::replace(&mut self.introduced, introduced);
-        self.found
-            .extend(introduced.into_iter().zip(before).filter_map(|(now, before)| now.filter(|_| before.is_none())));
+        let new = introduced.into_iter().zip(before).filter(|(_, before)| before.is_none());
+        new.filter_map(|(now, _)| now).for_each(|mismatch| self.tell(mismatch));
         self.clocks = peer.clock.zip(own.clock);
         self.compare_clocks();
     }
 
-    /// The own clock says another hour than before. It goes on by one; more is a step, by which it is set right or wrong.
+    /// The own clock says another hour than before. One that goes back was set; one that goes on by more than an hour was set, too, if it
+    /// fits that of the peer better afterwards, and else the computer may have slept.
     pub(super) fn handle_clock(&mut self, before: UtcHours, now: UtcHours) {
-        if now.apart(before) > 1 {
-            self.clocks = self.clocks.map(|(peer, own)| (peer, own.moved(before, now)));
+        let Some((peer, own)) = self.clocks.filter(|_| now.apart(before) > 1) else { return };
+        let moved = own.moved(before, now);
+        if now.hours() < before.hours() || peer.apart(moved) < peer.apart(own) {
+            self.clocks = Some((peer, moved));
             self.compare_clocks();
         }
     }
@@ -235,7 +246,7 @@ impl MismatchReport {
         let hours = self.clocks.map_or(0, |(peer, own)| peer.apart(own));
         let clock = (hours > 24).then_some(Mismatch::Clock(hours / 24));
         let before = std::mem::replace(&mut self.clock, clock);
-        self.found.extend(clock.filter(|_| before.is_none()));
+        clock.filter(|_| before.is_none()).into_iter().for_each(|clock| self.tell(clock));
     }
 
     pub(super) fn handle_accepted(&mut self) {

@@ -180,6 +180,11 @@ impl<T> LinkPair<T> {
         self.mismatch.note_call_of(other, now);
     }
 
+    /// At a vehicle: a frame of the surface to this one, or to every vehicle, is heard.
+    pub fn note_called(&mut self) {
+        self.mismatch.handle_called();
+    }
+
     /// A frame from our own address is heard, while we send none.
     pub fn note_own_address(&mut self) {
         self.mismatch.note_own_address();

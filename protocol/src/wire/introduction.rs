@@ -45,11 +45,11 @@ impl MapOrigin {
         (share(self.lat) * 180.0 - 90.0, share(self.lon) * 360.0 - 180.0)
     }
 
-    /// Metres to another origin on a sphere; exact to 1 % where they are less than a degree apart.
+    /// Metres to another origin on a sphere; exact to 1 % where they are less than a degree apart and no pole is near.
     pub fn distance_m(self, other: Self) -> f64 {
         let ((lat, lon), (other_lat, other_lon)) = (self.degrees(), other.degrees());
         let apart = (lon - other_lon).abs();
-        let east = apart.min(360.0 - apart) * lat.to_radians().cos();
+        let east = apart.min(360.0 - apart) * ((lat + other_lat) / 2.0).to_radians().cos();
         (lat - other_lat).hypot(east) * Self::METRES_PER_DEG
     }
 

@@ -127,6 +127,8 @@ fn a_clock_that_is_set_right_or_wrong_under_way_is_noticed() {
     assert_eq!(mismatch(&pair), Some(Mismatch::Clock(30)));
     pair.surface.set_clock(hours(500_099));
     assert_eq!(mismatch(&pair), None);
+    pair.surface.set_clock(hours(500_200));
+    assert_eq!(mismatch(&pair), None, "the computer may have slept");
 }
 
 #[test]
@@ -168,16 +170,17 @@ fn a_vehicle_that_is_never_called_names_the_one_that_is() {
     let mut pair = LinkedEnds::new(3, setup.clone(), STILL);
     let config = VehicleConfig::new(Address::vehicle(2).unwrap(), setup.mission, setup.modem(), setup.budget_bps);
     let mut uncalled = VehicleLink::new(config, setup.codec, 5, SlotInboxState::default(), pair.now);
-    let mut named_s = None;
-    for second in 0..400 {
+    let mut named_s = Vec::new();
+    for second in 0..1500 {
         pair.run(pair.now + Duration::from_secs(1), false);
         for bytes in std::mem::take(&mut pair.overheard) {
             uncalled.handle_frame(&bytes, pair.now);
         }
-        let is_named = uncalled.poll_event() == Some(VehicleEvent::Mismatch(Mismatch::NotCalled(1)));
-        named_s = named_s.or(is_named.then_some(second));
+        while let Some(event) = uncalled.poll_event() {
+            named_s.extend((event == VehicleEvent::Mismatch(Mismatch::NotCalled(1))).then_some(second));
+        }
     }
-    assert!(named_s.is_some_and(|second| (300..360).contains(&second)), "{named_s:?}");
+    assert!(matches!(named_s[..], [second] if (600..660).contains(&second)), "{named_s:?}");
     assert!(!pair.vehicle_events.iter().any(|event| matches!(event, VehicleEvent::Mismatch(_))));
 }
 

@@ -174,7 +174,7 @@ export default [
       await s.until("the order", () => s.posts.some((p) => p.path.endsWith("/orders/again") && p.body.slot === "constraints"));
       await s.visible("#banners", false);
       await s.steer({ withdraw: { limits: "the vehicle has no record of it any more: is it to be sent again?" } });
-      await s.shows("#banners", /auv-1 has lost its orders.*no record any more of: limits \(time s 600\)/s);
+      await s.shows("#banners", /auv-1 has lost its orders.*no record any more of: limits \(time 600 s\)/s);
       await s.button("Send them again").click();
       await s.until("the orders", () => s.posts.some((p) => p.path.endsWith("/orders/restore")));
       await s.visible("#banners", false);

@@ -5,7 +5,9 @@ use super::orders::{OrderKey, OrderStep};
 use super::track::TrackPoint;
 use crate::export::{MapCaption, MapCells};
 use crate::replay::{Known, Recording, ShownMap, StateText};
-use crate::state::{LinkDirection, LinkSummary, MapLabelTree, MissionState, ReplaySide, VehicleMarker, VehicleState};
+use crate::state::{
+    LinkDirection, LinkSummary, MapLabelTree, MissionState, ReplaySide, VehicleChannel, VehicleMarker, VehicleState,
+};
 use scenecast_core::{UserError, utc_text};
 use scenecast_files::MissionClock;
 use scenecast_messages::contents::valid_part;
@@ -50,6 +52,13 @@ pub(super) struct SettingsRecord {
     pub(super) program: String,
     pub(super) simulated: bool,
     pub(super) settings: BTreeMap<String, serde_json::Value>,
+}
+
+impl SettingsRecord {
+    /// A text among the settings.
+    pub(super) fn text(&self, key: &str) -> Option<&str> {
+        self.settings.get(key).and_then(serde_json::Value::as_str)
+    }
 }
 
 /// What a record says about a vehicle.
@@ -164,6 +173,11 @@ impl Dive {
         span_s * self.state.mission.speed
     }
 
+    /// What the vehicle ran with, by its own record, or else the surface.
+    pub(super) fn ran_with<'a>(&'a self, vehicle: &'a DiveVehicle) -> &'a SettingsRecord {
+        if vehicle.own.settings.settings.is_empty() { &self.settings } else { &vehicle.own.settings }
+    }
+
     /// The moment of a mission time, seconds since 1970.
     pub(super) fn unix_s(&self, at_s: f64) -> f64 {
         self.clock.nanos(at_s).map_or(self.span_s.1, seconds)
@@ -221,9 +235,9 @@ impl DiveVehicle {
             heard_s: known.heard.iter().copied().map(seconds).collect(),
             cell_m: shown.cell_m,
             classes: areas(shown, |label| state.label_book.shown_as(label)),
-            track: known.poses.iter().map(|(_, pose)| TrackPoint::of(pose)).collect(),
+            track: known.poses.iter().map(|(_, pose)| TrackPoint::of(pose)).filter(TrackPoint::is_known).collect(),
             own: own.map_or_else(OwnRecord::default, |own| OwnRecord {
-                track: own.poses.iter().map(moved).collect(),
+                track: own.poses.iter().map(moved).filter(TrackPoint::is_known).collect(),
                 sent: own.sent,
                 sent_bits: own.sent_bits.clone(),
                 heard_s: own.heard.iter().copied().map(seconds).collect(),
@@ -256,30 +270,27 @@ impl DiveVehicle {
 
     /// What was not a dive about it, in a clause; `None` if nothing says so.
     pub(super) fn made_up(&self, dive: &Dive) -> Option<String> {
-        let set = |key: &str| self.own.settings.settings.get(key).and_then(serde_json::Value::as_str);
         if dive.settings.simulated {
-            return Some("This was a rehearsal over a simulated sea floor".to_owned());
+            return Some("a rehearsal over a simulated sea floor".to_owned());
         }
-        if self.is_played_back() {
-            return Some(format!(
-                "Its images were played back from {}: times are those of the playback, and orders could not move it",
-                set("camera.source").unwrap_or_default()
-            ));
-        }
-        (set("autopilot.kind") == Some("rehearsal"))
-            .then(|| "The vehicle's motion was simulated (autopilot.kind = rehearsal)".to_owned())
+        let source = self.own.settings.text("camera.source").filter(|_| self.is_played_back());
+        source.map(|source| format!("a playback of images and poses from {source}")).or_else(|| {
+            let is_simulated = self.own.settings.text("autopilot.kind") == Some("rehearsal");
+            is_simulated
+                .then(|| "a test in which the vehicle's motion was simulated (autopilot.kind = rehearsal)".to_owned())
+        })
     }
 
     /// Whether its frames went through a modem, whose round trips are those of sound in water.
-    pub(super) fn has_modem(&self) -> bool {
-        let kind = self.own.settings.settings.get("modem.kind").and_then(serde_json::Value::as_str);
+    pub(super) fn has_modem(&self, dive: &Dive) -> bool {
         // The default is a socket.
-        kind.is_some_and(|kind| !["tcp", "udp"].contains(&kind))
+        let kind = dive.ran_with(self).text("modem.kind");
+        dive.settings.simulated || kind.is_some_and(|kind| !["tcp", "udp"].contains(&kind))
     }
 
     /// Whether recorded images stood for a camera.
     pub(super) fn is_played_back(&self) -> bool {
-        let source = self.own.settings.settings.get("camera.source").and_then(serde_json::Value::as_str);
+        let source = self.own.settings.text("camera.source");
         source.is_some_and(|source| ["frames:", "bag:", "tum:"].iter().any(|kind| source.starts_with(kind)))
     }
 
@@ -365,6 +376,15 @@ fn agreement(vehicle: &ShownMap, operator: &ShownMap) -> f64 {
 
 /// How far the map of a vehicle is behind, by a state of the page.
 fn lag_s(json: &str, id: u8) -> Option<f64> {
-    let state: MissionState = serde_json::from_str(json).ok()?;
+    #[derive(serde::Deserialize)]
+    struct State {
+        vehicles: Vec<Lags>,
+    }
+    #[derive(serde::Deserialize)]
+    struct Lags {
+        id: u8,
+        link: VehicleChannel,
+    }
+    let state: State = serde_json::from_str(json).ok()?;
     state.vehicles.iter().find(|vehicle| vehicle.id == id)?.link.backlog.as_ref()?.map_lag_s
 }

@@ -1,7 +1,6 @@
 //! What part of the sea floor the map covers, and how deep it is there.
 
 use super::dive::{Dive, DiveVehicle};
-use super::summary::ran_with;
 use super::words::{self, lat_lon};
 use crate::state::VehicleState;
 use scenecast_core::{Area, fence_of, place_of};
@@ -42,7 +41,7 @@ pub(super) fn sea_floor(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle
 
 /// How much of the configured area, or else of what the fence leaves, has cells.
 fn unseen(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle, shift: (f64, f64)) -> String {
-    let area = ran_with(dive, vehicle).settings.get("survey.area_m");
+    let area = dive.ran_with(vehicle).settings.get("survey.area_m");
     let corners = area.and_then(|area| serde_json::from_value::<[f64; 4]>(area.clone()).ok());
     let Some([west, south, east, north]) = corners else {
         return match seen_of_fence(state, vehicle, shift) {

@@ -1,7 +1,7 @@
 //! Times in which nothing was heard, and those that a record lacks.
 
 use super::dive::{Dive, DiveVehicle};
-use super::words::{counted, duration};
+use super::words::{counted, duration, median};
 use scenecast_core::utc_text;
 
 /// Mission time without a frame that is never told, seconds.
@@ -10,7 +10,7 @@ const SHORT_S: f64 = 15.0;
 const USUAL: f64 = 5.0;
 /// Pauses that are told; of more, the longest.
 const MAX_TOLD: usize = 6;
-/// Time without a place in a vehicle's own record from which on it is a gap, seconds.
+/// Mission time without a place in a vehicle's own record from which on it is a gap, seconds.
 const MAX_PLACES_APART_S: f64 = 5.0;
 
 /// How often frames of a vehicle were heard, and its own record says how often it heard some, with the longer pauses.
@@ -21,48 +21,56 @@ pub(super) fn heard(dive: &Dive, vehicle: &DiveVehicle) -> Vec<String> {
         utc_text(*last_s),
         duration(dive.mission_s(dive.span_s.1 - last_s))
     );
-    let surface =
-        pauses(dive, &vehicle.heard_s, dive.span_s).map(|pauses| format!("The surface heard a frame from it {pauses}"));
+    let surface = format!("The surface heard a frame from it {}", pauses(dive, &vehicle.heard_s, dive.span_s));
     let span = vehicle.own.runs_s.first().zip(vehicle.own.runs_s.last()).map(|(first, last)| (first.0, last.1));
-    let own = span.and_then(|span| pauses(dive, &vehicle.own.heard_s, span));
-    let own = own.map(|pauses| format!("On board, a frame of the surface was heard {pauses}"));
-    [last].into_iter().chain(surface).chain(own).collect()
+    let own = span
+        .map(|span| format!("On board, a frame of the surface was heard {}", pauses(dive, &vehicle.own.heard_s, span)));
+    [last, surface].into_iter().chain(own).collect()
 }
 
 /// Whether the surface has heard nothing for longer than usual.
 pub(super) fn has_silence(dive: &Dive, vehicle: &DiveVehicle) -> bool {
-    long(dive, &vehicle.heard_s, dive.span_s).is_some_and(|(_, long)| !long.is_empty())
+    !long(dive, &vehicle.heard_s, dive.span_s).1.is_empty()
 }
 
-/// The usual pause between these moments, mission seconds, and begin and end of those that are longer.
-fn long(dive: &Dive, times_s: &[f64], (begin_s, end_s): (f64, f64)) -> Option<(f64, Vec<(f64, f64)>)> {
+/// The usual pause between these moments, mission seconds, if there are any, and begin and end of those that are longer.
+fn long(dive: &Dive, times_s: &[f64], (begin_s, end_s): (f64, f64)) -> (Option<f64>, Vec<(f64, f64)>) {
     let times = || times_s.iter().copied();
-    let all: Vec<(f64, f64)> = std::iter::once(begin_s).chain(times()).zip(times().chain([end_s])).collect();
-    let mut lengths: Vec<f64> = times_s.windows(2).map(|pair| dive.mission_s(pair[1] - pair[0])).collect();
-    lengths.sort_by(f64::total_cmp);
-    let usual_s = *lengths.get(lengths.len() / 2)?;
-    let least_s = SHORT_S.max(USUAL * usual_s);
-    Some((usual_s, all.into_iter().filter(|(from_s, to_s)| dive.mission_s(to_s - from_s) >= least_s).collect()))
+    let all = std::iter::once(begin_s).chain(times()).zip(times().chain([end_s]));
+    let lengths = times().zip(times().skip(1)).map(|(from_s, to_s)| dive.mission_s(to_s - from_s));
+    let usual_s = median(&lengths.collect::<Vec<f64>>());
+    let least_s = SHORT_S.max(USUAL * usual_s.unwrap_or_default());
+    (usual_s, all.filter(|(from_s, to_s)| dive.mission_s(to_s - from_s) >= least_s).collect())
 }
 
 /// The rest of a sentence about them.
-fn pauses(dive: &Dive, times_s: &[f64], span_s: (f64, f64)) -> Option<String> {
-    let (usual_s, mut long) = long(dive, times_s, span_s)?;
+fn pauses(dive: &Dive, times_s: &[f64], span_s: (f64, f64)) -> String {
+    let (usual_s, long) = long(dive, times_s, span_s);
     let all = long.len();
-    long.sort_by(|a, b| (b.1 - b.0).total_cmp(&(a.1 - a.0)));
-    long.truncate(MAX_TOLD);
-    long.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let told = |(from_s, to_s): &(f64, f64)| {
-        let length = duration(dive.mission_s(to_s - from_s));
-        format!("{length} from {} to {}", utc_text(*from_s), utc_text(*to_s))
-    };
-    let told: Vec<String> = long.iter().map(told).collect();
+    let told: Vec<String> = longest(long)
+        .iter()
+        .map(|gap| {
+            format!("{} from {} to {}", duration(dive.mission_s(gap.1 - gap.0)), utc_text(gap.0), utc_text(gap.1))
+        })
+        .collect();
     let pauses = match all {
         0 => "without a much longer pause".to_owned(),
         n if n > told.len() => format!("with {n} longer pauses, the longest of which were {}", told.join(", ")),
         n => format!("with {}: {}", counted(n, "longer pause", "longer pauses"), told.join(", ")),
     };
-    Some(format!("every {usual_s:.1} s as a rule, {pauses}."))
+    match usual_s {
+        Some(usual_s) if usual_s >= 0.95 => format!("every {usual_s:.1} s as a rule, {pauses}."),
+        Some(_) => format!("more often than every second as a rule, {pauses}."),
+        None => format!("{}, {pauses}.", counted(times_s.len(), "time", "times")),
+    }
+}
+
+/// The longest of some times, in their order.
+fn longest(mut gaps: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
+    gaps.sort_by(|a, b| (b.1 - b.0).total_cmp(&(a.1 - a.0)));
+    gaps.truncate(MAX_TOLD);
+    gaps.sort_by(|a, b| a.0.total_cmp(&b.0));
+    gaps
 }
 
 /// What the records of both ends lack, and why.
@@ -77,20 +85,61 @@ pub(super) fn of_records(dive: &Dive, vehicle: &DiveVehicle) -> Vec<String> {
     let runs = vehicle.own.runs_s.windows(2).map(|pair| (pair[0].1, pair[1].0));
     let vehicle_ended = runs.clone().map(|gap| {
         format!(
-            "The vehicle's program ended and began again: its own record has nothing {}, and what it had not stored by then is lost on board.",
+            "The vehicle's program ended and began again: its own record has nothing {}, and what it had not stored by then may be lost on board.",
             span(&gap)
         )
     });
     let pairs = vehicle.own.track.windows(2).map(|pair| (pair[0].at_s, pair[1].at_s));
     let holes = pairs.filter(|(from_s, to_s)| {
-        to_s - from_s > MAX_PLACES_APART_S && !runs.clone().any(|run| *from_s < run.1 && run.0 < *to_s)
+        dive.mission_s(to_s - from_s) > MAX_PLACES_APART_S && !runs.clone().any(|run| *from_s < run.1 && run.0 < *to_s)
     });
     let holes: Vec<(f64, f64)> = holes.collect();
-    let stood = holes.iter().take(MAX_TOLD).map(|gap| {
+    let more = holes.len().saturating_sub(MAX_TOLD);
+    let more =
+        (more > 0).then(|| format!("It has no place in {} besides.", counted(more, "shorter time", "shorter times")));
+    let holes = longest(holes);
+    let stood = holes.iter().map(|gap| {
         format!(
             "The vehicle's own record has no place {}: its program stood still, or nothing measured one.",
             span(gap)
         )
     });
-    surface.chain(idle).chain(vehicle_ended).chain(stood).collect()
+    surface.chain(idle).chain(vehicle_ended).chain(stood).chain(more).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn dive(end_s: f64, speed: f64) -> Dive {
+        let mut dive = Dive::default();
+        (dive.span_s, dive.state.mission.speed) = ((0.0, end_s), speed);
+        dive
+    }
+
+    #[test]
+    fn longer_pauses_than_usual_are_told_in_mission_time() {
+        let dive = dive(100.0, 1.0);
+        let times: Vec<f64> = (0..=100).filter(|s| !(31..60).contains(s)).map(f64::from).collect();
+        let told =
+            "every 1.0 s as a rule, with 1 longer pause: 30 s from 1970-01-01T00:00:30Z to 1970-01-01T00:01:00Z.";
+        assert_eq!(pauses(&dive, &times, dive.span_s), told);
+        assert_eq!(pauses(&dive, &times[..30], (0.0, 30.0)), "every 1.0 s as a rule, without a much longer pause.");
+        let faster = super::tests::dive(10.0, 10.0);
+        let times: Vec<f64> = times.iter().map(|s| s / 10.0).collect();
+        assert!(
+            pauses(&faster, &times, faster.span_s).starts_with("every 1.0 s as a rule, with 1 longer pause: 30 s from")
+        );
+    }
+
+    #[test]
+    fn a_vehicle_that_was_hardly_heard_was_silent() {
+        let (dive, mut vehicle) = (dive(100.0, 1.0), DiveVehicle::default());
+        assert_eq!(heard(&dive, &vehicle), ["No frame from it was heard."]);
+        assert!(has_silence(&dive, &vehicle));
+        vehicle.heard_s = vec![4.0];
+        let told = "The surface heard a frame from it 1 time, with 1 longer pause: 96 s from 1970-01-01T00:00:04Z to 1970-01-01T00:01:40Z.";
+        assert_eq!(heard(&dive, &vehicle)[1], told);
+        assert!(has_silence(&dive, &vehicle));
+    }
 }

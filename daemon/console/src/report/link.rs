@@ -39,7 +39,7 @@ impl Dive {
         if !charts.is_empty() {
             let _ = writeln!(page, "<h3>Link and position over time</h3>\n<figure>{}</figure>", charts.join("\n"));
         }
-        if self.settings.simulated || vehicle.has_modem() {
+        if vehicle.has_modem(self) {
             *page += &over_range(vehicle);
         }
         let direction = |name: &str, direction: &LinkDirection| {
@@ -86,7 +86,7 @@ impl Dive {
             );
         }
         let sent = vehicle.own.sent_bits.iter().filter(|(_, bits)| **bits > 0);
-        let sent: Vec<String> = sent.map(|(content, bits)| format!("{content} {}", bits / 8)).collect();
+        let sent: Vec<String> = sent.map(|(content, bits)| format!("{content} {}", bits.div_ceil(8))).collect();
         if !sent.is_empty() {
             let sent = sent.join(", ");
             let _ = writeln!(

@@ -58,8 +58,8 @@ impl Dive {
         let recorded = if self.settings.program.is_empty() { "an earlier scenecast" } else { &self.settings.program };
         let names: Vec<&str> = self.state.vehicles.iter().map(|vehicle| vehicle.name.as_str()).collect();
         let program = Escaped(scenecast_core::program());
-        let made_up: Vec<String> = self.vehicles().filter_map(|(_, vehicle)| vehicle.made_up(self)).collect();
-        let made_up = made_up.first().map_or_else(String::new, |what| format!(" ({what})"));
+        let made_up: BTreeSet<String> = self.vehicles().filter_map(|(_, vehicle)| vehicle.made_up(self)).collect();
+        let made_up: String = made_up.iter().map(|what| format!(", {what}")).collect();
         let own = self.vehicles().filter(|(_, vehicle)| !vehicle.own.track.is_empty()).count();
         let own = if own > 0 { " and those of the vehicles themselves" } else { "" };
         let origin =
@@ -121,7 +121,7 @@ impl Dive {
                 utc_text(*at_s),
                 Escaped(&event.vehicle),
                 Escaped(&event.source),
-                Escaped(&words::event(book(&event.vehicle), &event.text))
+                Escaped(&words::event(book(&event.vehicle), event))
             );
         }
         *page += "</table>\n";

@@ -1,6 +1,6 @@
 //! The summary of a dive in sentences.
 
-use super::dive::{Dive, DiveVehicle, SettingsRecord};
+use super::dive::{Dive, DiveVehicle};
 use super::orders::OrderStep;
 use super::words::{self, area, counted, duration, interval, on_earth};
 use super::{extent, gaps};
@@ -20,7 +20,7 @@ const MAX_TOLD: usize = 8;
 /// Where, when, how long, how far, what was found, what was ordered and what failed, a sentence each.
 pub(super) fn summary(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -> Vec<String> {
     let mut sentences = Vec::new();
-    sentences.extend(vehicle.made_up(dive).map(|what| format!("{what}.")));
+    sentences.extend(vehicle.made_up(dive).map(|what| format!("This was {what}.")));
     if dive.settings.simulated && utc_text(dive.span_s.0).starts_with("2000-01-01") {
         sentences.push("Its dates mean nothing: a rehearsal in virtual time begins on 2000-01-01.".to_owned());
     }
@@ -90,7 +90,7 @@ fn trouble(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -> String {
     let is_of_it = |event: &Event| event.vehicle.is_empty() || valid_part(&event.vehicle) == valid_part(&state.name);
     let found = dive.events.iter().filter(|(_, event)| is_of_it(event) && is_trouble(event));
     let told =
-        |(at_s, event): &(f64, Event)| format!("{}, {}", utc_text(*at_s), words::event(&state.label_book, &event.text));
+        |(at_s, event): &(f64, Event)| format!("{}, {}", utc_text(*at_s), words::event(&state.label_book, event));
     let told: Vec<String> = found.map(told).collect();
     match told.len() {
         0 if !gaps::has_silence(dive, vehicle) => "No fault and no silence was reported.".to_owned(),
@@ -121,7 +121,7 @@ fn agreement(vehicle: &DiveVehicle) -> Option<String> {
 fn lag(vehicle: &DiveVehicle) -> Option<String> {
     let lags: Vec<f64> = vehicle.maps.iter().map(|maps| maps.lag_s).filter(|lag_s| lag_s.is_finite()).collect();
     Some(format!(
-        "By the surface's estimate, the operator's map was {} behind that of the vehicle half of the time or less, and {} at most.",
+        "By the surface's estimate, the operator's map was behind the vehicle's by {} or less half of the time, and by {} at most.",
         duration(words::median(&lags)?),
         duration(lags.iter().copied().fold(0.0, f64::max))
     ))
@@ -157,13 +157,17 @@ fn arrived(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -> Option<S
     let held = vehicle.labels.explored() as u64;
     let share = (held as f64 / reported.max(1) as f64 * 100.0).min(100.0);
     let coarse = match is_coarse(vehicle).then(|| alone(vehicle)) {
+        None => String::new(),
+        Some(0) => {
+            " As ordered or configured, only every fourth cell in each direction was sent at the end.".to_owned()
+        }
         Some(alone) => format!(
-            " As ordered or configured, only every fourth cell in each direction was sent at the end: {} without a neighbour stand for 16 each \
-             and count as one, so that areas may be {} too small.",
-            counted(alone as usize, "cell", "cells"),
+            " As ordered or configured, only every fourth cell in each direction was sent at the end: {} for 16 and {} as one, so that \
+             areas may be {} too small.",
+            counted(alone as usize, "cell without a neighbour stands", "cells without a neighbour stand"),
+            if alone == 1 { "counts" } else { "each count" },
             area(15.0 * alone as f64 * vehicle.cell_m * vehicle.cell_m)
         ),
-        None => String::new(),
     };
     (reported > 0).then(|| {
         format!(
@@ -194,21 +198,16 @@ fn is_coarse(vehicle: &DiveVehicle) -> bool {
     last.or_else(configured).is_some_and(|cells| cells == "coarse")
 }
 
-/// What the vehicle ran with, by its own record, or else the surface.
-pub(super) fn ran_with<'a>(dive: &'a Dive, vehicle: &'a DiveVehicle) -> &'a SettingsRecord {
-    if vehicle.own.settings.settings.is_empty() { &dive.settings } else { &vehicle.own.settings }
-}
-
 /// How the vehicle looked at the sea floor.
 fn equipment(dive: &Dive, vehicle: &DiveVehicle) -> String {
     if vehicle.own.settings.program.is_empty() && !dive.settings.simulated {
         return "What the vehicle was set to, such as its altitude, speed and camera, is not known without its own record.".to_owned();
     }
-    let all = ran_with(dive, vehicle);
+    let all = dive.ran_with(vehicle);
     let set = |key: &str, default: f64| all.settings.get(key).and_then(Value::as_f64).unwrap_or(default);
     let defaults = scenecast_config::Config::default();
     if vehicle.is_played_back() {
-        return "What was played back decides its speed, its altitude and its path.".to_owned();
+        return "What was played back decides its speed, its altitude and its path, which no order changes; times are those of the playback.".to_owned();
     }
     let planner = all.settings.get("survey.planner").and_then(Value::as_str).unwrap_or(defaults.survey.planner.name());
     format!(
@@ -265,11 +264,14 @@ fn uncertainty(vehicle: &DiveVehicle) -> String {
     let most_m = sigmas.iter().copied().fold(0.0, f64::max);
     let least_m = sigmas.iter().copied().fold(f64::INFINITY, f64::min);
     if most_m - least_m < 0.005 {
-        return format!(" The uncertainty of its place was not measured: it stayed at {last_m:.1} m, as it began.");
+        return match vehicle.own.track.len() > 9 {
+            true => format!(" The uncertainty of its place was not measured: it stayed at {last_m:.2} m, as it began."),
+            false => format!(" It reported its place with a standard deviation of {last_m:.2} m."),
+        };
     }
     format!(
-        " By its own estimate, which nothing has checked, the standard deviation of its place along each axis was {median_m:.1} m half of the time or \
-         less, {most_m:.1} m at most, and {last_m:.1} m at the end."
+        " By its own estimate, which nothing has checked, the standard deviation of its place was {median_m:.1} m or less half of the time, \
+         {most_m:.1} m at most, and {last_m:.1} m at the end."
     )
 }
 
@@ -314,7 +316,7 @@ fn orders(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -> String {
             let replaced_text = match replaced {
                 0 => String::new(),
                 n => format!(
-                    " {n} had not been applied when a later one of the kind replaced {}.",
+                    " {n} had not been applied when a later one of its kind replaced {}.",
                     if n == 1 { "it" } else { "them" }
                 ),
             };

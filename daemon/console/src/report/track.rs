@@ -19,6 +19,10 @@ impl TrackPoint {
         (other.east_m - self.east_m).hypot(other.north_m - self.north_m)
     }
 
+    pub(super) fn is_known(&self) -> bool {
+        [self.east_m, self.north_m].iter().all(|m| m.is_finite())
+    }
+
     pub(super) fn of(message: &PoseWithCovarianceStamped) -> Self {
         let position = &message.pose.pose.position;
         Self {
@@ -61,8 +65,7 @@ impl DiveVehicle {
         if self.own.track.len() < 2 {
             return None;
         }
-        let steps = self.legs(mission_speed).flat_map(|leg| leg.iter().zip(leg.iter().skip(1)));
-        let steps = steps.map(|(a, b)| (a.distance_m(b), (b.at_s - a.at_s) * mission_speed));
+        let steps = self.steps(mission_speed).map(|(a, b)| (a.distance_m(b), (b.at_s - a.at_s) * mission_speed));
         let moving = steps.filter(|(m, s)| *s > 0.0 && m / s >= LEAST_M_S);
         let (m, s) = moving.fold((0.0, 0.0), |sum, step| (sum.0 + step.0, sum.1 + step.1));
         (s > 0.0).then(|| m / s)
@@ -70,7 +73,45 @@ impl DiveVehicle {
 
     /// Length of its path, metres: at least so far, where only reports tell it.
     pub(super) fn distance_m(&self, mission_speed: f64) -> f64 {
-        let steps = self.legs(mission_speed).flat_map(|leg| leg.iter().zip(leg.iter().skip(1)));
-        steps.map(|(a, b)| a.distance_m(b)).sum()
+        self.steps(mission_speed).map(|(a, b)| a.distance_m(b)).sum()
+    }
+
+    /// The places after each other on its legs.
+    fn steps(&self, mission_speed: f64) -> impl Iterator<Item = (&TrackPoint, &TrackPoint)> {
+        self.legs(mission_speed).flat_map(|leg| leg.iter().zip(leg.iter().skip(1)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::dive::OwnRecord;
+
+    /// A vehicle that was at these places east of the origin, each a second of the clock after the one before.
+    fn vehicle(east_m: &[f64], runs_s: &[(f64, f64)]) -> DiveVehicle {
+        let place = |(n, east_m): (usize, &f64)| TrackPoint {
+            at_s: n as f64,
+            east_m: *east_m,
+            north_m: 0.0,
+            depth_m: 5.0,
+            sigma_m: 1.0,
+        };
+        let track = east_m.iter().enumerate().map(place).collect();
+        let mut vehicle = DiveVehicle::default();
+        vehicle.own = OwnRecord { track, runs_s: runs_s.to_vec(), ..OwnRecord::default() };
+        vehicle
+    }
+
+    #[test]
+    fn jumps_are_no_part_of_the_path() {
+        let told = |vehicle: &DiveVehicle, speed: f64| {
+            (vehicle.legs(speed).count(), vehicle.distance_m(speed), vehicle.speed_m_s(speed))
+        };
+        assert_eq!(told(&vehicle(&[0.0, 1.0, 2.0, 30.0, 31.0], &[]), 1.0), (2, 3.0, Some(1.0)));
+        assert_eq!(told(&vehicle(&[0.0, 10.0, 20.0], &[]), 10.0), (1, 20.0, Some(1.0)), "ten times as fast");
+        let runs = [(0.0, 1.0), (1.5, 3.0)];
+        assert_eq!(told(&vehicle(&[0.0, 1.0, 3.0, 4.0], &runs), 1.0), (2, 2.0, Some(1.0)), "its program began again");
+        assert_eq!(told(&vehicle(&[0.0, 0.0], &[]), 1.0), (1, 0.0, None));
+        assert_eq!(told(&vehicle(&[], &[]), 1.0), (0, 0.0, None));
     }
 }

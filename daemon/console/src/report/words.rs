@@ -6,7 +6,7 @@ use crate::export::TransverseMercator;
 use crate::state::Origin;
 use scenecast_core::utc_text;
 use scenecast_messages::builtin_interfaces::Time;
-use scenecast_messages::scenecast_msgs::{Exemplar, Order, OrderStatus};
+use scenecast_messages::scenecast_msgs::{Event, Exemplar, Order, OrderStatus};
 use scenecast_protocol::directive::SlotId;
 use scenecast_surface::LabelBook;
 use serde_json::Value;
@@ -29,7 +29,7 @@ pub(super) fn median(values: &[f64]) -> Option<f64> {
 }
 
 /// An event with reasons of modes in words, and labels by their names.
-pub(super) fn event(book: &LabelBook, text: &str) -> String {
+pub(super) fn event(book: &LabelBook, Event { source, text, .. }: &Event) -> String {
     let reasons = [
         (": distance", ": the allowed distance, return path included, was used up"),
         (": time", ": the allowed time, return path included, was used up"),
@@ -39,11 +39,13 @@ pub(super) fn event(book: &LabelBook, text: &str) -> String {
         (": no path", ": no path to its goals was allowed"),
         (": order", ": by order"),
     ];
-    let reason = reasons.iter().find_map(|(short, long)| text.strip_suffix(short).map(|mode| format!("{mode}{long}")));
-    let text = match text {
-        "the vehicle begins another run" => "the vehicle's program was restarted".to_owned(),
-        "received" => "first contact".to_owned(),
-        text => reason.unwrap_or_else(|| text.to_owned()),
+    let is_mode = source.starts_with("mode");
+    let reasons = reasons.iter().filter(|_| is_mode);
+    let reason = { reasons }.find_map(|(short, long)| text.strip_suffix(short).map(|mode| format!("{mode}{long}")));
+    let text = match (source.as_str(), text.as_str()) {
+        ("contact", "the vehicle begins another run") => "the vehicle's program was restarted".to_owned(),
+        ("contact", "received") => "contact".to_owned(),
+        (_, text) => reason.unwrap_or_else(|| text.to_owned()),
     };
     let mut parts = text.split("label ");
     let first = parts.next().unwrap_or_default().to_owned();
@@ -276,6 +278,23 @@ mod tests {
         let told = |text: &str| content(&LabelBook::default(), &stops(text));
         assert_eq!(told(r#"{"hold": true, "abort": false}"#), "hold");
         assert_eq!(told(r#"{"hold": false, "abort": false}"#), "resume");
+    }
+
+    #[test]
+    fn events_have_reasons_of_modes_in_words_and_names_of_labels() {
+        let mut book = LabelBook::default();
+        book.entry(3).or_default().name = Some("coral".into());
+        let told = |source: &str, text: &str| {
+            event(&book, &Event { source: source.into(), text: text.into(), ..Event::default() })
+        };
+        assert_eq!(told("mode", "holding: order"), "holding: by order");
+        assert_eq!(told("record", "anna: note: order"), "anna: note: order");
+        assert_eq!(told("image", "image of label 3"), "image of label 3 (coral)");
+        assert_eq!(
+            told("order", "weights: label 3 +0.50, label 4 -1.00"),
+            "weights: label 3 (coral) +0.50, label 4 -1.00"
+        );
+        assert_eq!(told("record", "label 3: name coral"), "label 3: name coral");
     }
 
     #[test]

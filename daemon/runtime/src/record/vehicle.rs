@@ -161,7 +161,7 @@ impl VehicleRecorder {
         match event {
             VehicleHostEvent::Frame(event) => frame_entry(event, |_| Some(&self.named), self.hides_keys, stamps),
             VehicleHostEvent::Applied(applied) => {
-                self.was_stopped |= applied.id == SlotId::Constraints;
+                self.was_stopped |= applied.id == SlotId::Constraints && applied.state == SlotState::Applied;
                 Some(self.decision(applied, stamps))
             }
             VehicleHostEvent::Note(text) => Some(self.event(Event::WARN, "navigation", text, stamps)),

@@ -117,7 +117,6 @@ impl Guidance {
         guidance
     }
 
-    #[cfg(test)]
     pub(super) fn steering(&self) -> &Steering {
         &self.steering
     }

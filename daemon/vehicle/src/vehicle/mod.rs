@@ -197,6 +197,12 @@ impl Vehicle {
         self.outputs.pop_front()
     }
 
+    /// What one pass of the survey takes within the fence in force: metres, and the time at survey speed.
+    pub fn pass(&self) -> (f64, Duration) {
+        let metres = self.guidance.steering().pass_m();
+        (metres, Duration::try_from_secs_f64(metres / self.guidance.speed_m_s()).unwrap_or(Duration::MAX))
+    }
+
     /// The vehicle's own sensors measured a displacement since the last call: metres east and north.
     pub fn handle_odometry(&mut self, dx_m: f64, dy_m: f64, heading_rad: f64, depth_m: f64, now: Instant) {
         self.navigator.handle_odometry(dx_m, dy_m, heading_rad, depth_m, now);

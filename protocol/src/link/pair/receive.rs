@@ -56,7 +56,7 @@ impl<T> LinkPair<T> {
         envelope: &Envelope<'a>,
         decodes: impl Fn(Option<FrameNumber>, Chunks<'_>) -> bool,
     ) -> Result<Inbound<'a, T>, DropReason> {
-        self.mismatch.handle_called();
+        self.note_called();
         let result = match envelope.header.kind() {
             FrameKind::Hello => self.read_hello(envelope),
             FrameKind::Numbered => self.read_numbered(envelope, decodes),
@@ -95,10 +95,8 @@ impl<T> LinkPair<T> {
             // The answer to it names our version.
             None
         };
-        if let Some(introduction) = &introduction {
-            self.mismatch.note_introduction(introduction, &self.introduction);
-        }
         if own.is_some() {
+            self.note_introduction(introduction);
             self.rotation.handle_voice(generation);
         }
         let session = header.session.ok_or(DropReason::Malformed)?;
@@ -136,6 +134,10 @@ impl<T> LinkPair<T> {
             // Where frames of the vehicle have no tag, a forged one may have proven a false run.
             self.strays.count += u32::from(own.is_some() && !self.is_keyed(self.direction_in()));
             return Err(DropReason::OldSession);
+        }
+        if own.is_none() {
+            // A caller that is refused, or of an ended run, says nothing about the surface that holds the vehicle.
+            self.note_introduction(introduction);
         }
         self.ended_hellos = 0;
         let is_new = outcome == HandshakeOutcome::New;
@@ -209,6 +211,11 @@ impl<T> LinkPair<T> {
             self.handshake.handle_current();
         }
         Ok(inbound)
+    }
+
+    fn note_introduction(&mut self, peer: Option<Introduction>) {
+        let own = &self.introduction;
+        peer.iter().for_each(|peer| self.mismatch.note_introduction(peer, own));
     }
 
     /// At the vehicle: whether another surface holds it against this caller. Without a key, everybody could.

@@ -82,8 +82,8 @@ impl<R: StateReplica> Fleet<R> {
         self.peers.values().filter(|p| p.master.unanswered() < 3).count()
     }
 
-    /// Withdraws aborts that have not arrived in time; returns their vehicles.
-    pub(super) fn withdraw_lates(&mut self, now: Instant) -> impl Iterator<Item = Address> {
+    /// Withdraws orders that grow old and have not arrived in time; returns their vehicles.
+    pub(super) fn withdraw_late_orders(&mut self, now: Instant) -> impl Iterator<Item = Address> {
         self.peers.iter_mut().filter_map(move |(&vehicle, peer)| peer.withdraw_late(now).then_some(vehicle))
     }
 

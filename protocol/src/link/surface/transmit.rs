@@ -22,7 +22,7 @@ impl<R: StateReplica> SurfaceLink<R> {
     #[must_use]
     pub fn poll_transmit(&mut self, now: Instant) -> Option<Transmit> {
         self.events.extend(
-            self.fleet.withdraw_lates(now).map(|vehicle| SurfaceEvent::SlotDecided(vehicle, SlotId::Constraints)),
+            self.fleet.withdraw_late_orders(now).map(|vehicle| SurfaceEvent::SlotDecided(vehicle, SlotId::Constraints)),
         );
         match self.config.modem.access {
             Access::Shared => self.poll_shared(now),

@@ -46,6 +46,8 @@ pub struct VehicleLink<S: StateSource = MapSource> {
     timing: SurfaceTiming,
     reply: ShortReply,
     hello_limit: HelloLimit,
+    /// When the surface that holds the vehicle was told of another one.
+    told_caller: Option<Instant>,
     probe: TailProbe,
     /// Where the modem decides when to transmit: when an acknowledgement or a hello is due.
     answer_due: Option<Instant>,
@@ -79,6 +81,7 @@ impl<S: StateSource> VehicleLink<S> {
             repeater: Repeater::default(),
             timing: SurfaceTiming::default(),
             reply: ShortReply::new(seed),
+            told_caller: None,
             hello_limit: HelloLimit::new(config.modem.access, now),
             probe: TailProbe::default(),
             answer_due: None,

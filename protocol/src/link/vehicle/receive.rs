@@ -40,7 +40,7 @@ impl<S: StateSource> VehicleLink<S> {
             self.reply.handle_verified();
             self.pair.note_length(bytes.len(), self.config.modem.frame_bytes);
         }
-        self.events.extend(self.pair.poll_mismatch().map(VehicleEvent::Mismatch));
+        self.tell_mismatches();
         let is_hello = envelope.header.kind().is_hello();
         let inbound = match inbound {
             Ok(inbound) => inbound,
@@ -134,9 +134,17 @@ impl<S: StateSource> VehicleLink<S> {
         self.owe_answer(now);
     }
 
+    /// Time between two reports to the holder about others that call.
+    const CALLER_INTERVAL: Duration = Duration::from_secs(60);
+
     /// Tells the surface that holds this vehicle of another one that calls it.
     fn tell_of(&mut self, other: &Introduction, now: Instant) {
-        self.content.caller = Some(other.encode(Introduction::MAX_BYTES));
+        if self.told_caller.is_some_and(|at| now.since(at) < Self::CALLER_INTERVAL) {
+            return;
+        }
+        self.told_caller = Some(now);
+        let named = Introduction { origin: None, ..*other };
+        self.content.caller = Some(named.encode(Introduction::MAX_BYTES));
         self.content.status.owe_report_by(now + Duration::from_secs(5));
     }
 
@@ -148,10 +156,14 @@ impl<S: StateSource> VehicleLink<S> {
             (from, Address::SURFACE) if from == self.config.address && !self.pair.has_run() => {
                 self.pair.note_own_address()
             }
-            (Address::SURFACE, to) if to.is_vehicle() => self.pair.note_call_of(to, now),
+            (Address::SURFACE, to) if to.is_vehicle() && !self.pair.has_run() => self.pair.note_call_of(to, now),
             _ => return,
         }
-        self.events.extend(self.pair.poll_mismatch().map(VehicleEvent::Mismatch));
+        self.tell_mismatches();
+    }
+
+    fn tell_mismatches(&mut self) {
+        self.events.extend(std::iter::from_fn(|| self.pair.poll_mismatch()).map(VehicleEvent::Mismatch));
     }
 
     /// Takes parts of the next key, and notes that the surface has proven a run under it.
@@ -181,6 +193,7 @@ impl<S: StateSource> VehicleLink<S> {
             self.complain(&envelope.header, now);
             return self.pair.stats.drop(DropReason::Checksum);
         };
+        self.pair.note_called();
         if self.pair.has_run() && self.last_received().is_some_and(|at| now.since(at) < CONTACT_TIMEOUT) {
             return;
         }
@@ -212,7 +225,7 @@ impl<S: StateSource> VehicleLink<S> {
     }
 
     fn handle_turn(&mut self, header: &Header, now: Instant) {
-        let Some(quarters) = header.turn else { return self.answer_full_duplex(header, now) };
+        let Some(quarters) = header.turn else { return self.answer_full_duplex(now) };
         self.reply.cancel();
         self.begin_turn();
         if header.kind().is_hello() {
@@ -224,11 +237,12 @@ impl<S: StateSource> VehicleLink<S> {
     }
 
     /// A surface whose modem is taken for full duplex grants no turns: it learns from a hello that the modem here is not.
-    fn answer_full_duplex(&mut self, header: &Header, now: Instant) {
+    fn answer_full_duplex(&mut self, now: Instant) {
         let is_full_duplex = self.pair.caller().is_some_and(|surface| surface.is_full_duplex);
         if is_full_duplex && self.config.modem.access == Access::Shared && self.pair.must_send_hello() {
             self.begin_turn();
-            self.floor.handle_grant(Some(Grant::received(1, header.remaining, &self.config.modem, now)));
+            let begins = now + self.config.modem.turn_around;
+            self.floor.handle_grant(Some(Grant { begins, ends: begins + self.config.modem.frame_airtime() * 2 }));
         }
     }
 

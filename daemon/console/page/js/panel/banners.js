@@ -117,18 +117,25 @@ function withdrawn(v) {
 /** How the reason of an order begins that the vehicle has lost. */
 const LOST = "the vehicle has no record";
 
+/** A member of an order with its unit, such as "time 600 s". */
+const member = ([name, value]) => {
+  const [, what, unit] = /^(.*?)(?:_(m|s))?$/.exec(name);
+  return `${what.replaceAll("_", " ")} ${[value].flat().join(" to ")}${unit ? ` ${unit}` : ""}`;
+};
+
 /** The parts of an order by its slot, in short. */
 const PARTS = {
-  fence: ({ fence }) => [fence.fence && `${fence.fence.length} corners`, fence.keep_outs.length > 0 && `${fence.keep_outs.length} keep-outs`, fence.return_point && "return point"],
-  limits: ({ limits }) => Object.entries(limits).map(([name, value]) => value !== null && `${name.replaceAll("_", " ")} ${[value].flat().join(" to ")}`),
-  areas: ({ areas }) => areas.areas.map((area) => `weight ${area.weight}`),
-  destination: ({ destination }) => [destination.place && `E ${destination.place[0]} N ${destination.place[1]} m`],
-  utility: ({ utility }) => Object.entries(utility.weights).map(([label, weight]) => `label ${label} ${weight}`),
+  fence: ({ fence, keep_outs: outs, return_point: back }) => [fence && `${fence.length} corners`, outs.length > 0 && `${outs.length} area${outs.length === 1 ? "" : "s"} to stay out of`, back && "return point"],
+  limits: (limits) => Object.entries(limits).filter(([, value]) => value !== null).map(member),
+  areas: ({ areas }) => areas.map((area) => `weight ${area.weight}`),
+  destination: ({ place }) => [place && `E ${place[0].toFixed(1)} N ${place[1].toFixed(1)} m`],
+  utility: ({ weights }) => Object.entries(weights).map(([label, weight]) => `label ${label}: ${weight}`),
 };
 
 /** The name of an order and what it says, as this surface gave it. */
 function contentOf(v, slot) {
-  const parts = (v.orders[slot.slot] && PARTS[slot.slot]?.(v.orders).filter(Boolean)) || [];
+  const order = v.orders[slot.slot];
+  const parts = (order && PARTS[slot.slot]?.(order).filter(Boolean)) || [];
   return parts.length > 0 ? `${slot.name} (${parts.join(", ")})` : slot.name;
 }
 

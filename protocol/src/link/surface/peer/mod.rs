@@ -225,7 +225,7 @@ impl<R: StateReplica> VehiclePeer<R> {
         restored
     }
 
-    /// Withdraws an abort that has not arrived in time; returns whether there was one.
+    /// Withdraws an order that grows old and has not arrived in time; returns whether there was one.
     pub(super) fn withdraw_late(&mut self, now: Instant) -> bool {
         let is_withdrawn = self.outbox.withdraw_late(now);
         // What is withdrawn takes no vehicle.
@@ -303,7 +303,9 @@ impl<R: StateReplica> VehiclePeer<R> {
         }
         let has_changed_key = self.pair.poll_key_change();
         events.extend(has_changed_key.then(|| SurfaceEvent::KeyChanged(self.address())));
-        events.extend(self.pair.poll_mismatch().map(|m| SurfaceEvent::Mismatch(self.pair.peer(), m)));
+        let vehicle = self.address();
+        let found = std::iter::from_fn(|| self.pair.poll_mismatch());
+        events.extend(found.map(|mismatch| SurfaceEvent::Mismatch(vehicle, mismatch)));
         let inbound = match inbound {
             Ok(inbound) => inbound,
             Err(reason) => {
