@@ -140,7 +140,8 @@ impl Reload {
 }
 
 fn fingerprints(config: &Config) -> Result<Option<(u32, Option<u32>)>, UserError> {
-    let Some(path) = &config.link.key_file else { return Ok(None) };
+    // A pipe gives its key once.
+    let Some(path) = config.link.key_file.as_ref().filter(|path| path.is_file()) else { return Ok(None) };
     let (file, _) = scenecast_config::read_key(path)?;
     Ok(Some((file.key.fingerprint(), file.next.as_ref().map(|next| next.fingerprint()))))
 }

@@ -34,8 +34,8 @@ pub(super) fn sea_floor(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle
     let depths = vehicle.labels.iter().filter_map(|(cell, _)| layer.value(cell));
     let (least, most) = depths.fold((f64::INFINITY, f64::NEG_INFINITY), |(least, most), m| (least.min(m), most.max(m)));
     (least <= most).then(|| match format!("{least:.1}") == format!("{most:.1}") {
-        true => format!("The sea floor is {least:.1} m deep."),
-        false => format!("The sea floor is {least:.1} to {most:.1} m deep."),
+        true => format!("The water is {least:.1} m deep there."),
+        false => format!("The water is {least:.1} to {most:.1} m deep there."),
     })
 }
 

@@ -91,7 +91,7 @@ impl Dive {
             let sent = sent.join(", ");
             let _ = writeln!(
                 page,
-                " By its own record the vehicle sent so many bytes of each, copies not counted: {}.",
+                " By its own record the vehicle sent these bytes, copies not counted: {}.",
                 Escaped(&sent)
             );
         }

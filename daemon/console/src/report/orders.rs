@@ -81,7 +81,7 @@ impl DiveVehicle {
         let applied = |way: &Vec<OrderStep>| way.last().is_some_and(|last| last.status == OrderStatus::APPLIED);
         let ((_, by), _) = later.into_iter().find(|(_, way)| applied(way))?;
         let given_s = self.orders.get(&(slot.clone(), *by))?.last()?.given_s;
-        Some(format!("the one of {} replaced it", utc_text(given_s)))
+        Some(format!("the order of {} replaced it", utc_text(given_s)))
     }
 
     /// Whether a later order of the kind took the place of one that has no end.
@@ -157,7 +157,7 @@ impl Dive {
         if vehicle.orders_of_people().next().is_none() {
             return;
         }
-        *page += "<h3>Orders</h3>\n<table><thead><tr><th>order</th><th>what was ordered</th><th>by</th><th>given (UTC)</th><th>outcome</th><th>in force on board after</th><th>known at the surface after</th></tr></thead>\n";
+        *page += "<h3>Orders</h3>\n<table><thead><tr><th>order</th><th>what was ordered</th><th>by</th><th>given (UTC)</th><th>outcome</th><th>decided on board after</th><th>known at the surface after</th></tr></thead>\n";
         let mut orders: Vec<(&OrderKey, &OrderStep)> =
             vehicle.orders_of_people().filter_map(|(order, way)| Some((order, way.last()?))).collect();
         orders.sort_by(|a, b| a.1.given_s.total_cmp(&b.1.given_s));
@@ -276,6 +276,6 @@ mod tests {
         vehicle.take_order(&status(7, OrderStatus::ON_AIR, 2));
         assert_eq!(vehicle.overtaken(&order), None);
         vehicle.take_order(&status(9, OrderStatus::APPLIED, 2));
-        assert_eq!(vehicle.overtaken(&order).as_deref(), Some("the one of 1970-01-01T00:00:01Z replaced it"));
+        assert_eq!(vehicle.overtaken(&order).as_deref(), Some("the order of 1970-01-01T00:00:01Z replaced it"));
     }
 }

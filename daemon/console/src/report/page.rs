@@ -68,9 +68,10 @@ impl Dive {
             page,
             "<h2>How this was made</h2>\n<p>By {program} from the records of the surface{own}, run {run}, which {} wrote from {begin} to {end}. \
              The map is the operator's: what had arrived over the link. Areas are counts of cells.</p>\n<h2>How to cite</h2>\n<p>Mission \u{201c}{mission}\u{201d}, vehicle {}, {begin} to {end}: map of the \
-             sea floor by an unsupervised scene model{made_up}{origin}, run {run}, {program}.</p>\n</body></html>",
+             sea floor by an unsupervised scene model{made_up}{origin}, run {run}, recorded by {}, report by {program}.</p>\n</body></html>",
             Escaped(recorded),
             Escaped(&names.join(", ")),
+            Escaped(recorded),
         );
     }
 

@@ -57,8 +57,8 @@ fn link(dive: &Dive, vehicle: &DiveVehicle) -> Vec<String> {
             link.up.frames, link.down.frames
         )),
         _ => Some(format!(
-            "Of {} numbered frames from the vehicles {:.1} % never arrived, not even as a copy, of {} to them {:.1} %; what they \
-             carried was sent again.",
+            "Of {} numbered frames from the vehicles, {:.1} % never arrived in a usable form; of {} to them, {:.1} %. Lost changes of the \
+             map and lost orders were sent again.",
             link.up.frames,
             lost(&link.up),
             link.down.frames,
@@ -278,7 +278,9 @@ fn uncertainty(vehicle: &DiveVehicle) -> String {
 fn found(state: &VehicleState, vehicle: &DiveVehicle) -> String {
     let all: u64 = vehicle.classes.iter().map(|class| class.cells).sum();
     let Some(largest) = vehicle.classes.first() else { return "No part of the map arrived.".to_owned() };
-    let doubt = largest.interval_m2.map_or_else(String::new, |_| {
+    // Cells that were sent for 16 count as one.
+    let is_least = is_coarse(vehicle) && alone(vehicle) > 0;
+    let doubt = largest.interval_m2.filter(|_| !is_least).map_or_else(String::new, |_| {
         format!("; 95 % interval by the model's own confidence: {}", interval(largest.interval_m2))
     });
     format!(
@@ -287,7 +289,7 @@ fn found(state: &VehicleState, vehicle: &DiveVehicle) -> String {
         area(all as f64 * vehicle.cell_m * vehicle.cell_m),
         vehicle.classes.len(),
         state.label_book.title(largest.label),
-        area(largest.area_m2),
+        if is_least { format!("at least {}", area(largest.area_m2)) } else { area(largest.area_m2) },
         largest.cells as f64 / all as f64 * 100.0
     )
 }

@@ -16,7 +16,8 @@ pub(super) fn duration(seconds: f64) -> String {
     let s = seconds.max(0.0).round() as u64;
     match s {
         0..=119 => format!("{s} s"),
-        120..=7199 => format!("{} min", (s + 30) / 60),
+        120..=599 => format!("{} min {:02} s", s / 60, s % 60),
+        600..=7199 => format!("{} min", (s + 30) / 60),
         _ => format!("{} h {:02} min", s / 3600, s / 60 % 60),
     }
 }
@@ -224,7 +225,7 @@ pub(super) fn order<'a>(slot: &'a str, content: &'a str) -> &'a str {
 pub(super) fn status(status: u8) -> &'static str {
     match status {
         OrderStatus::QUEUED => "queued",
-        OrderStatus::ON_AIR => "on air",
+        OrderStatus::ON_AIR => "sent, not known to have arrived",
         OrderStatus::RECEIVED => "received",
         OrderStatus::APPLIED => "applied",
         OrderStatus::REFUSED => "refused",
@@ -300,7 +301,7 @@ mod tests {
     #[test]
     fn spans_areas_and_places_are_for_people() {
         assert_eq!((east(-23.58), north(13.0)), ("23.6 m west".to_owned(), "13.0 m north".to_owned()));
-        assert_eq!([59.6, 130.0, 7265.0].map(duration), ["60 s", "2 min", "2 h 01 min"]);
+        assert_eq!([59.6, 130.0, 640.0, 7265.0].map(duration), ["60 s", "2 min 10 s", "11 min", "2 h 01 min"]);
         assert_eq!([3.0625, 415.2, 2.5e6].map(area), ["3.1 m²", "415 m²", "2.50 km²"]);
     }
 }

@@ -134,7 +134,7 @@ const PARTS = {
 
 /** The name of an order and what it says, as this surface gave it. */
 function contentOf(v, slot) {
-  const order = v.orders[slot.slot];
+  const order = v[slot.slot];
   const parts = (order && PARTS[slot.slot]?.(order).filter(Boolean)) || [];
   return parts.length > 0 ? `${slot.name} (${parts.join(", ")})` : slot.name;
 }
