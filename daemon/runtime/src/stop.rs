@@ -104,15 +104,15 @@ pub(super) struct Reload {
 
 impl Reload {
     #[cfg(unix)]
-    pub(super) fn new(load: Load) -> Result<Self, UserError> {
+    pub(super) fn new(load: Load, config: &Config) -> Result<Self, UserError> {
         let hang_ups = hang_ups()?;
         let _ = nix::sys::signal::SigSet::from(nix::sys::signal::Signal::SIGHUP).thread_unblock();
-        Ok(Self { keys: (load)().ok().and_then(|config| fingerprints(&config).ok().flatten()), load, hang_ups })
+        Ok(Self { load, keys: fingerprints(config).unwrap_or_default(), hang_ups })
     }
 
     #[cfg(not(unix))]
-    pub(super) fn new(load: Load) -> Result<Self, UserError> {
-        Ok(Self { keys: None, load })
+    pub(super) fn new(load: Load, config: &Config) -> Result<Self, UserError> {
+        Ok(Self { load, keys: fingerprints(config).unwrap_or_default() })
     }
 
     /// Waits for a SIGHUP and returns the new configuration; a file that cannot be read is logged and ignored.

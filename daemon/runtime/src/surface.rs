@@ -79,7 +79,7 @@ pub fn run_surface(load: Load, simulated: Option<SimulatedAutopilot>) -> Result<
             clock.now(),
         )?;
         // Files that do not end, such as a pipe for a key, are read above: until there a signal ends the program at once.
-        let (stop, reload) = (Stop::new()?, Reload::new(load)?);
+        let (stop, reload) = (Stop::new()?, Reload::new(load, &config)?);
         let ros2 = SurfaceRos2::start(&config, &mut principals)?;
         surface.set_principals(principals);
         if let Some(relay) = relay(&config) {

@@ -94,7 +94,7 @@ pub fn run_vehicle(load: Load, simulated: Option<SimulatedAutopilot>) -> Result<
         let labels = labels.transpose()?;
         let modem = ModemPort::open(&config, clock.now()).await?;
         let station = modem_station(&config, address, profile)?;
-        let reload = Reload::new(load)?;
+        let reload = Reload::new(load, &config)?;
         let autopilot = pilot::autopilot(&config, simulated, clock.now())?;
         let ports = Ports { modem, pilot: PilotPort::open(&config, autopilot.is_some()) };
         let plane = config.mission.origin_deg.map(TangentPlane::new);

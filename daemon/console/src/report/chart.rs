@@ -18,7 +18,7 @@ const MAX_MARKER: usize = 30;
 
 /// The map of the operator, north up, with the reported track, a grid of metres, a scale bar and an arrow to the north; `None` without
 /// cells.
-pub(super) fn map(state: &VehicleState, vehicle: &DiveVehicle, mission_speed: f64) -> Option<String> {
+pub(super) fn map(state: &VehicleState, vehicle: &DiveVehicle) -> Option<String> {
     let bounds = vehicle.labels.bounds()?;
     let shift = state.map.shift_m();
     let path = vehicle.path();
@@ -35,7 +35,7 @@ pub(super) fn map(state: &VehicleState, vehicle: &DiveVehicle, mission_speed: f6
     cells(&mut svg, &frame, bounds, &classes, state, vehicle);
     grid(&mut svg, &frame);
     fence(&mut svg, &frame, state);
-    track(&mut svg, &frame, path, vehicle.legs(mission_speed));
+    track(&mut svg, &frame, path, vehicle.legs());
     numbers(&mut svg, &frame, bounds, &classes, state, vehicle);
     for marker in &state.markers {
         let mut text: String = marker.text.chars().take(MAX_MARKER).collect();

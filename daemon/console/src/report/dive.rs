@@ -79,12 +79,12 @@ pub(super) struct DiveVehicle {
     pub(super) track: Vec<TrackPoint>,
     /// What its own record says.
     pub(super) own: OwnRecord,
+    /// How many times as fast as the clock the mission was.
+    pub(super) mission_speed: f64,
     /// All labels that were on the operator's map of this epoch.
     pub(super) had: BTreeSet<u8>,
     /// The way of each order, by slot and version.
     pub(super) orders: BTreeMap<OrderKey, Vec<OrderStep>>,
-    /// When the vehicle decided about orders, by its own record.
-    pub(super) decided_s: BTreeMap<OrderKey, f64>,
     pub(super) given: BTreeMap<OrderKey, Order>,
     pub(super) exemplars: Vec<(f64, Exemplar)>,
     pub(super) link: Vec<(f64, Link)>,
@@ -104,6 +104,8 @@ pub(super) struct OwnRecord {
     pub(super) heard_s: Vec<f64>,
     /// Begin and end of each of its records.
     pub(super) runs_s: Vec<(f64, f64)>,
+    /// When it decided about orders.
+    pub(super) decided_s: BTreeMap<OrderKey, f64>,
     /// What it ran with.
     pub(super) settings: SettingsRecord,
 }
@@ -152,7 +154,7 @@ impl Dive {
         let mut vehicles = BTreeMap::new();
         for vehicle in &state.vehicles {
             let part = valid_part(&vehicle.name);
-            vehicles.extend(DiveVehicle::of(recording, vehicle, &part).map(|known| (part, known)));
+            vehicles.extend(DiveVehicle::of(recording, vehicle, &part, state.mission.speed).map(|known| (part, known)));
         }
         Ok(Self {
             span_s: (seconds(first), seconds(last)),
@@ -215,7 +217,7 @@ impl Dive {
 
 impl DiveVehicle {
     /// What a recording says about a vehicle with this part of topics; `None` if it has nothing.
-    fn of(recording: &mut Recording, state: &VehicleState, part: &str) -> Option<Self> {
+    fn of(recording: &mut Recording, state: &VehicleState, part: &str, mission_speed: f64) -> Option<Self> {
         let maps = maps_over_time(recording, state.id, part);
         let Recording { timeline, operator, vehicles, .. } = recording;
         let own = vehicles.get(part);
@@ -242,8 +244,10 @@ impl DiveVehicle {
                 sent_bits: own.sent_bits.clone(),
                 heard_s: own.heard.iter().copied().map(seconds).collect(),
                 runs_s: own.runs.iter().map(|(from, to)| (seconds(*from), seconds(*to))).collect(),
+                decided_s: BTreeMap::new(),
                 settings: serde_json::from_str(&own.settings).unwrap_or_default(),
             }),
+            mission_speed,
             had: known.map.labels_so_far(),
             link: known.link.iter().map(|(at, link)| (seconds(*at), link.clone())).collect(),
             maps,

@@ -111,7 +111,7 @@ pub(super) fn of_records(dive: &Dive, vehicle: &DiveVehicle) -> Vec<String> {
 mod tests {
     use super::*;
 
-    fn dive(end_s: f64, speed: f64) -> Dive {
+    fn dive_of(end_s: f64, speed: f64) -> Dive {
         let mut dive = Dive::default();
         (dive.span_s, dive.state.mission.speed) = ((0.0, end_s), speed);
         dive
@@ -119,13 +119,13 @@ mod tests {
 
     #[test]
     fn longer_pauses_than_usual_are_told_in_mission_time() {
-        let dive = dive(100.0, 1.0);
+        let dive = dive_of(100.0, 1.0);
         let times: Vec<f64> = (0..=100).filter(|s| !(31..60).contains(s)).map(f64::from).collect();
         let told =
             "every 1.0 s as a rule, with 1 longer pause: 30 s from 1970-01-01T00:00:30Z to 1970-01-01T00:01:00Z.";
         assert_eq!(pauses(&dive, &times, dive.span_s), told);
         assert_eq!(pauses(&dive, &times[..30], (0.0, 30.0)), "every 1.0 s as a rule, without a much longer pause.");
-        let faster = super::tests::dive(10.0, 10.0);
+        let faster = dive_of(10.0, 10.0);
         let times: Vec<f64> = times.iter().map(|s| s / 10.0).collect();
         assert!(
             pauses(&faster, &times, faster.span_s).starts_with("every 1.0 s as a rule, with 1 longer pause: 30 s from")
@@ -134,7 +134,7 @@ mod tests {
 
     #[test]
     fn a_vehicle_that_was_hardly_heard_was_silent() {
-        let (dive, mut vehicle) = (dive(100.0, 1.0), DiveVehicle::default());
+        let (dive, mut vehicle) = (dive_of(100.0, 1.0), DiveVehicle::default());
         assert_eq!(heard(&dive, &vehicle), ["No frame from it was heard."]);
         assert!(has_silence(&dive, &vehicle));
         vehicle.heard_s = vec![4.0];

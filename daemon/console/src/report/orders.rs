@@ -70,7 +70,7 @@ impl DiveVehicle {
         let order = (message.slot.clone(), message.version);
         let Some(way) = self.orders.get_mut(&order) else { return };
         let decision = OrderStep { is_own: true, ..OrderStep::of(message) };
-        self.decided_s.insert(order, decision.at_s);
+        self.own.decided_s.insert(order, decision.at_s);
         let Some(last) = way.last().filter(|last| !last.is_end()) else { return };
         way.push(OrderStep { given_s: last.given_s, ..decision });
     }
@@ -164,7 +164,7 @@ impl Dive {
         for (order @ (slot, _), last) in orders {
             let (by, ordered) = self.ordered(state, vehicle, order);
             let known = Some(last).filter(|last| last.is_end() && !last.is_own).map(|last| last.at_s);
-            let [on_board, known] = [vehicle.decided_s.get(order).copied(), known]
+            let [on_board, known] = [vehicle.own.decided_s.get(order).copied(), known]
                 .map(|at_s| at_s.map_or_else(|| "not known".to_owned(), |at_s| after(self, last.given_s, at_s)));
             let end = vehicle.overtaken(order).filter(|_| !last.is_end());
             let end = end.map_or_else(|| last.told(), |by| format!("{}; {by}", last.told()));
@@ -190,7 +190,7 @@ impl Dive {
         let orders = vehicle.orders_of_people().filter(|((slot, _), _)| steers(slot));
         let orders = orders.filter_map(|(order, way)| {
             let last = way.last()?;
-            let end = match vehicle.decided_s.get(order) {
+            let end = match vehicle.own.decided_s.get(order) {
                 Some(at_s) => format!(", on board after {}", after(self, last.given_s, *at_s)),
                 None if last.is_end() => {
                     format!(", known at the surface after {}", after(self, last.given_s, last.at_s))
@@ -265,7 +265,7 @@ mod tests {
         let last = |version| vehicle.orders[&("fence".to_owned(), version)].last().unwrap();
         assert_eq!(last(1).told(), "applied, by the vehicle's own record alone");
         assert_eq!((last(1).at_s, last(1).given_s), (5.0, 1.0));
-        assert_eq!(vehicle.decided_s.len(), 2);
+        assert_eq!(vehicle.own.decided_s.len(), 2);
         assert_eq!(last(2).told(), "refused");
         assert_eq!(vehicle.orders.len(), 2, "the surface did not give a third one");
     }

@@ -81,7 +81,7 @@ impl Dive {
             let _ = writeln!(page, "<li>{}</li>", Escaped(&sentence));
         }
         *page += "</ul>\n";
-        if let Some(map) = chart::map(state, vehicle, self.state.mission.speed) {
+        if let Some(map) = chart::map(state, vehicle) {
             let _ = writeln!(
                 page,
                 "<figure class=\"map\">{map}<figcaption><div class=\"legend\">{}</div>The operator's map at the end, each class with its number, and the \
@@ -146,7 +146,7 @@ impl Dive {
             json!({
                 "name": state.name,
                 "summary": summary::summary(self, state, vehicle),
-                "distance_m": vehicle.distance_m(self.state.mission.speed),
+                "distance_m": vehicle.distance_m(),
                 "cell_m": vehicle.cell_m,
                 "classes": classes.collect::<Vec<_>>(),
                 "orders": orders.collect::<Vec<_>>(),

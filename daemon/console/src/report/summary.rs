@@ -27,10 +27,11 @@ pub(super) fn summary(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) 
     sentences.push(when(dive, state, vehicle));
     sentences.push(place(dive, vehicle));
     sentences.push(equipment(dive, vehicle));
-    sentences.push(found(state, vehicle));
+    let alone = is_coarse(vehicle).then(|| alone(vehicle));
+    sentences.push(found(state, vehicle, alone));
     sentences.extend(extent::of_map(dive, state, vehicle));
     sentences.extend(extent::sea_floor(dive, state, vehicle));
-    sentences.extend(arrived(dive, state, vehicle));
+    sentences.extend(arrived(dive, state, vehicle, alone));
     sentences.extend(agreement(vehicle));
     sentences.extend(lag(vehicle));
     sentences.push(orders(dive, state, vehicle));
@@ -150,13 +151,13 @@ fn when(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -> String {
     )
 }
 
-/// How much of the vehicle's map has arrived.
-fn arrived(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -> Option<String> {
+/// How much of the vehicle's map has arrived; `alone`: cells without a neighbour, if every fourth one was sent.
+fn arrived(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle, alone: Option<u64>) -> Option<String> {
     let status = state.status.as_ref()?;
     let (reported, before_end_s) = (u64::from(status.cells), dive.span_s.1 - dive.unix_s(status.at_s));
     let held = vehicle.labels.explored() as u64;
     let share = (held as f64 / reported.max(1) as f64 * 100.0).min(100.0);
-    let coarse = match is_coarse(vehicle).then(|| alone(vehicle)) {
+    let coarse = match alone {
         None => String::new(),
         Some(0) => {
             " As ordered or configured, only every fourth cell in each direction was sent at the end.".to_owned()
@@ -239,16 +240,16 @@ fn place(dive: &Dive, vehicle: &DiveVehicle) -> String {
         true => format!("at a depth of {least:.1} m"),
         false => format!("at depths of {least:.1} to {most:.1} m"),
     };
-    let speed = vehicle.speed_m_s(dive.state.mission.speed).filter(|_| !vehicle.is_played_back());
+    let speed = vehicle.speed_m_s().filter(|_| !vehicle.is_played_back());
     let speed = speed.map_or_else(String::new, |m_s| format!(", at {m_s:.2} m/s on average while it moved"));
-    let jumps = match vehicle.legs(dive.state.mission.speed).count() {
+    let jumps = match vehicle.legs().count() {
         0 | 1 => String::new(),
         legs => format!(" ({} to another place not counted)", counted(legs - 1, "jump", "jumps")),
     };
     format!(
         "By its {} {:.0} m{jumps}{speed}{begin}, {depth} below the surface; at the end it was {} and {} of the origin{}; {origin}.{}",
         if vehicle.own.track.len() > 1 { "own record it went" } else { "reports it went at least" },
-        vehicle.distance_m(dive.state.mission.speed),
+        vehicle.distance_m(),
         words::east(last.east_m),
         words::north(last.north_m),
         on_earth(dive, (last.east_m, last.north_m)),
@@ -275,11 +276,11 @@ fn uncertainty(vehicle: &DiveVehicle) -> String {
     )
 }
 
-fn found(state: &VehicleState, vehicle: &DiveVehicle) -> String {
+fn found(state: &VehicleState, vehicle: &DiveVehicle, alone: Option<u64>) -> String {
     let all: u64 = vehicle.classes.iter().map(|class| class.cells).sum();
     let Some(largest) = vehicle.classes.first() else { return "No part of the map arrived.".to_owned() };
     // Cells that were sent for 16 count as one.
-    let is_least = is_coarse(vehicle) && alone(vehicle) > 0;
+    let is_least = alone.is_some_and(|alone| alone > 0);
     let doubt = largest.interval_m2.filter(|_| !is_least).map_or_else(String::new, |_| {
         format!("; 95 % interval by the model's own confidence: {}", interval(largest.interval_m2))
     });

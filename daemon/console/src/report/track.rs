@@ -42,12 +42,12 @@ impl DiveVehicle {
     }
 
     /// The parts of its path between jumps: where its program began again with another place, or no vehicle is so fast.
-    pub(super) fn legs(&self, mission_speed: f64) -> impl Iterator<Item = &[TrackPoint]> {
+    pub(super) fn legs(&self) -> impl Iterator<Item = &[TrackPoint]> {
         const JUMP_M: f64 = 5.0;
         const MAX_M_S: f64 = 3.0;
         let restarts = || self.own.runs_s.iter().skip(1).map(|(began_s, _)| *began_s);
         self.path().chunk_by(move |a, b| {
-            let (step_m, time_s) = (a.distance_m(b), (b.at_s - a.at_s) * mission_speed);
+            let (step_m, time_s) = (a.distance_m(b), (b.at_s - a.at_s) * self.mission_speed);
             let began_between = restarts().any(|began_s| a.at_s < began_s && b.at_s >= began_s);
             step_m < 1.0 || !began_between && (step_m < JUMP_M || step_m <= MAX_M_S * time_s)
         })
@@ -60,25 +60,25 @@ impl DiveVehicle {
     }
 
     /// Its speed while it moved, m/s, where its own record tells it. Times are of the wall clock, which the mission may be ahead of.
-    pub(super) fn speed_m_s(&self, mission_speed: f64) -> Option<f64> {
+    pub(super) fn speed_m_s(&self) -> Option<f64> {
         const LEAST_M_S: f64 = 0.05;
         if self.own.track.len() < 2 {
             return None;
         }
-        let steps = self.steps(mission_speed).map(|(a, b)| (a.distance_m(b), (b.at_s - a.at_s) * mission_speed));
+        let steps = self.steps().map(|(a, b)| (a.distance_m(b), (b.at_s - a.at_s) * self.mission_speed));
         let moving = steps.filter(|(m, s)| *s > 0.0 && m / s >= LEAST_M_S);
         let (m, s) = moving.fold((0.0, 0.0), |sum, step| (sum.0 + step.0, sum.1 + step.1));
         (s > 0.0).then(|| m / s)
     }
 
     /// Length of its path, metres: at least so far, where only reports tell it.
-    pub(super) fn distance_m(&self, mission_speed: f64) -> f64 {
-        self.steps(mission_speed).map(|(a, b)| a.distance_m(b)).sum()
+    pub(super) fn distance_m(&self) -> f64 {
+        self.steps().map(|(a, b)| a.distance_m(b)).sum()
     }
 
     /// The places after each other on its legs.
-    fn steps(&self, mission_speed: f64) -> impl Iterator<Item = (&TrackPoint, &TrackPoint)> {
-        self.legs(mission_speed).flat_map(|leg| leg.iter().zip(leg.iter().skip(1)))
+    fn steps(&self) -> impl Iterator<Item = (&TrackPoint, &TrackPoint)> {
+        self.legs().flat_map(|leg| leg.iter().zip(leg.iter().skip(1)))
     }
 }
 
@@ -104,14 +104,15 @@ mod tests {
 
     #[test]
     fn jumps_are_no_part_of_the_path() {
-        let told = |vehicle: &DiveVehicle, speed: f64| {
-            (vehicle.legs(speed).count(), vehicle.distance_m(speed), vehicle.speed_m_s(speed))
+        let told = |mut vehicle: DiveVehicle, mission_speed: f64| {
+            vehicle.mission_speed = mission_speed;
+            (vehicle.legs().count(), vehicle.distance_m(), vehicle.speed_m_s())
         };
-        assert_eq!(told(&vehicle(&[0.0, 1.0, 2.0, 30.0, 31.0], &[]), 1.0), (2, 3.0, Some(1.0)));
-        assert_eq!(told(&vehicle(&[0.0, 10.0, 20.0], &[]), 10.0), (1, 20.0, Some(1.0)), "ten times as fast");
+        assert_eq!(told(vehicle(&[0.0, 1.0, 2.0, 30.0, 31.0], &[]), 1.0), (2, 3.0, Some(1.0)));
+        assert_eq!(told(vehicle(&[0.0, 10.0, 20.0], &[]), 10.0), (1, 20.0, Some(1.0)), "ten times as fast");
         let runs = [(0.0, 1.0), (1.5, 3.0)];
-        assert_eq!(told(&vehicle(&[0.0, 1.0, 3.0, 4.0], &runs), 1.0), (2, 2.0, Some(1.0)), "its program began again");
-        assert_eq!(told(&vehicle(&[0.0, 0.0], &[]), 1.0), (1, 0.0, None));
-        assert_eq!(told(&vehicle(&[], &[]), 1.0), (0, 0.0, None));
+        assert_eq!(told(vehicle(&[0.0, 1.0, 3.0, 4.0], &runs), 1.0), (2, 2.0, Some(1.0)), "its program began again");
+        assert_eq!(told(vehicle(&[0.0, 0.0], &[]), 1.0), (1, 0.0, None));
+        assert_eq!(told(vehicle(&[], &[]), 1.0), (0, 0.0, None));
     }
 }

@@ -40,9 +40,8 @@ pub(super) fn event(book: &LabelBook, Event { source, text, .. }: &Event) -> Str
         (": no path", ": no path to its goals was allowed"),
         (": order", ": by order"),
     ];
-    let is_mode = source.starts_with("mode");
-    let reasons = reasons.iter().filter(|_| is_mode);
-    let reason = { reasons }.find_map(|(short, long)| text.strip_suffix(short).map(|mode| format!("{mode}{long}")));
+    let in_words = |(short, long): &(&str, &str)| text.strip_suffix(short).map(|mode| format!("{mode}{long}"));
+    let reason = if source.starts_with("mode") { reasons.iter().find_map(in_words) } else { None };
     let text = match (source.as_str(), text.as_str()) {
         ("contact", "the vehicle begins another run") => "the vehicle's program was restarted".to_owned(),
         ("contact", "received") => "contact".to_owned(),
