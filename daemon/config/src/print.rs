@@ -110,9 +110,9 @@ pub fn shipped_files() -> Result<Vec<(&'static str, String)>, UserError> {
     SHIPPED.iter().map(text).collect()
 }
 
-/// A program, whether its mission is simulated, and the keys that differ from their defaults, as JSON. Commands, which may hold
-/// passwords, are not told.
-pub fn changed_settings(program: &str, is_simulated: bool, config: &Config) -> String {
+/// A program, the seed of a rehearsal, and the keys that differ from their defaults, as JSON. Commands, which may hold passwords, are
+/// not told.
+pub fn changed_settings(program: &str, rehearsal_seed: Option<u64>, config: &Config) -> String {
     let defaults = Config::default();
     let differs = |key: &&Key| key.value(config) != key.value(&defaults);
     let told = |key: &Key| {
@@ -126,7 +126,7 @@ pub fn changed_settings(program: &str, is_simulated: bool, config: &Config) -> S
     };
     let differs = |key: &&Key| differs(key) && !is_of_computer(key);
     let settings: Map<String, Value> = Key::all().filter(differs).map(told).collect();
-    json!({ "program": program, "simulated": is_simulated, "settings": settings }).to_string()
+    json!({ "program": program, "rehearsal_seed": rehearsal_seed, "settings": settings }).to_string()
 }
 
 /// A file with the defaults of every key that a role reads.
@@ -244,8 +244,9 @@ mod tests {
         config.camera.source = CameraSource::Command("ffmpeg -i rtsp://anna:secret@camera".to_owned());
         config.channel.loss = 0.2;
         config.link.key_file = Some("secret.key".into());
-        let text = changed_settings("scenecast 1", true, &config);
+        let text = changed_settings("scenecast 1", Some(7), &config);
         assert!(text.starts_with(r#"{"program":"scenecast 1","#) && !text.contains("secret"), "{text}");
         assert!(text.contains(r#""camera.source":"command:...""#) && text.contains(r#""channel.loss":0.2"#), "{text}");
+        assert!(text.contains(r#""rehearsal_seed":7"#), "{text}");
     }
 }

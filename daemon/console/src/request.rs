@@ -1,29 +1,28 @@
 //! Requests of clients that only the surface can handle.
 
 mod described;
+mod maps;
+mod refused;
 
-use crate::export::{MapCaption, MapCells};
+use crate::export::MapCells;
 use crate::fit::{self, Fit};
-use crate::layers;
 use crate::orders::{
     BudgetOrder, ExemplarAction, ExemplarOrder, LabelOrder, MarkerOrder, NoteOrder, OrderChanges, RemoveMarkerOrder,
 };
-use crate::snapshot::{command_state, seconds};
-use crate::state::{
-    AcceptedOrder, ArchivedMap, CellHistory, CommandState, FormerLabel, ReplayEventList, ReplayOrder, ReplayState,
-};
+use crate::snapshot::command_state;
+use crate::state::{AcceptedOrder, ArchivedMap, CellHistory, CommandState, ReplayEventList, ReplayOrder, ReplayState};
 use described::describe;
+pub use maps::{archived_cells, former_labels};
 use scenecast_protocol::coordinates::WorldPoint;
 use scenecast_protocol::directive::{Constraints, Slot, SlotId};
-use scenecast_protocol::link::OtherSurface;
 use scenecast_protocol::map::Cell;
 use scenecast_protocol::schedule::{BackgroundOrder, Shares};
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::Address;
-use scenecast_surface::record::{StoredLabel, VehicleMemory};
+use scenecast_surface::record::StoredLabel;
 use scenecast_surface::{
-    AreasOrder, CommandAction, CommandRefusal, DestinationOrder, FenceOrder, Giver, LimitsOrder, LogEntry, OrderKind,
-    RequestKind, Role, SettingsOrder, Surface, order_name,
+    AreasOrder, CommandAction, DestinationOrder, FenceOrder, Giver, LimitsOrder, LogEntry, OrderKind, RequestKind,
+    SettingsOrder, Surface, order_name,
 };
 use std::collections::BTreeMap;
 
@@ -91,21 +90,22 @@ pub enum SurfaceRequest {
     ReplayEvents,
     /// Read the report of the dive so far. The owner of the record handles this request.
     Report,
+    /// Note in the log what was refused to a principal by its role, before it was read.
+    Barred(String),
 }
 
 impl SurfaceRequest {
     /// Whether it changes nothing, so that it needs no principal.
     pub(crate) fn is_reading(&self) -> bool {
-        self.order_kind().is_none() && !matches!(self, Self::Command(_))
+        self.order_kind().is_none() && !matches!(self, Self::Command(_) | Self::Barred(_))
     }
 
     /// The kind of an order; `None` for readings, and for changes of command, which have rules of their own.
     pub(crate) fn order_kind(&self) -> Option<OrderKind> {
         match self {
             Self::Map(_) | Self::FormerLabels(..) | Self::Exemplar(..) | Self::Fit(..) | Self::Command(_) => None,
-            Self::Log | Self::Archives | Self::ArchivedMap(_) | Self::Replay(_) | Self::ReplayEvents | Self::Report => {
-                None
-            }
+            Self::Log | Self::Archives | Self::ArchivedMap(_) | Self::Replay(_) | Self::ReplayEvents => None,
+            Self::Report | Self::Barred(_) => None,
             Self::Label(..)
             | Self::Draft(..)
             | Self::Note(..)
@@ -174,52 +174,50 @@ pub fn handle_request(surface: &mut Surface, request: ClientRequest, cell_m: f64
     if let SurfaceRequest::Command(action) = &request {
         return match surface.change_command(&by, action, now) {
             Ok(()) => Reply::Command(command_state(surface.command(), now)),
-            Err(refusal) => refused(&refusal),
+            Err(refusal) => refused::refused(&refusal),
         };
     }
+    if let SurfaceRequest::Barred(what) = &request {
+        refused::log(surface, None, by.name(), what, now);
+        return Reply::Done;
+    }
     let Some(kind) = request.order_kind() else { return reply(surface, request, cell_m, now) };
-    if let Err(refusal) = surface.command().check(&by, kind, now) {
-        return refused(&refusal);
-    }
-    if let SurfaceRequest::TakeOver(id) = request
-        && let Some(holder) = Address::vehicle(id).and_then(|vehicle| surface.view(vehicle)?.holder())
-        && let Some(reason) = why_not_taken_over(&holder, by.role(), now)
-    {
-        return Reply::Forbidden(reason);
-    }
     let entry = describe(&request, |id, slot| {
         Address::vehicle(id).map_or(slot.name(), |vehicle| name_of_order(surface, vehicle, slot))
     });
-    let reply = reply(surface, request, cell_m, now);
+    let reply = admitted(surface, request, kind, (&by, cell_m), now);
     if matches!(reply, Reply::Accepted(_)) {
         surface.handle_accepted(&by, kind, now);
     }
-    if let (Reply::Accepted(_) | Reply::Done, Some((vehicle, kind, text))) = (&reply, entry) {
-        surface.log_action(vehicle, kind, by.name(), &text, now);
+    let Some((vehicle, logged, text)) = entry else { return reply };
+    match (&reply, refused::why(&reply)) {
+        (Reply::Accepted(_) | Reply::Done, _) => surface.log_action(vehicle, logged, by.name(), &text, now),
+        (_, Some(why)) if kind != OrderKind::Record => {
+            refused::log(surface, vehicle, by.name(), &format!("{text}: not sent: {why}"), now)
+        }
+        _ => {}
     }
     reply
 }
 
-/// Why a principal of a role may not take a vehicle over from its holder, one line.
-fn why_not_taken_over(holder: &OtherSurface, role: Role, now: Instant) -> Option<String> {
-    let is_allowed = holder.is_silent(now) || role == Role::Administrator;
-    (!is_allowed).then(|| {
-        let (name, idle) = (holder.name, now.since(holder.heard).as_secs());
-        format!(
-            "the surface {:?} holds the vehicle and was heard {idle} s ago: an administrator may take it over, or an operator \
-             after 120 s without a sign of that surface",
-            name.as_str()
-        )
-    })
-}
-
-fn refused(refusal: &CommandRefusal) -> Reply {
-    let line = refusal.to_string();
-    match refusal {
-        CommandRefusal::Role { .. } => Reply::Forbidden(line),
-        CommandRefusal::Held { .. } | CommandRefusal::Elsewhere { .. } => Reply::NotInCommand(line),
-        _ => Reply::Refused(line),
+/// The reply to an order of a principal, if that may give it.
+fn admitted(
+    surface: &mut Surface,
+    request: SurfaceRequest,
+    kind: OrderKind,
+    (by, cell_m): (&Giver, f64),
+    now: Instant,
+) -> Reply {
+    if let Err(refusal) = surface.command().check(by, kind, now) {
+        return refused::refused(&refusal);
     }
+    if let SurfaceRequest::TakeOver(id) = request
+        && let Some(holder) = Address::vehicle(id).and_then(|vehicle| surface.view(vehicle)?.holder())
+        && let Some(reason) = refused::why_not_taken_over(&holder, by.role(), now)
+    {
+        return Reply::Forbidden(reason);
+    }
+    reply(surface, request, cell_m, now)
 }
 
 fn reply(surface: &mut Surface, request: SurfaceRequest, cell_m: f64, now: Instant) -> Reply {
@@ -229,7 +227,7 @@ fn reply(surface: &mut Surface, request: SurfaceRequest, cell_m: f64, now: Insta
 fn handle(surface: &mut Surface, request: SurfaceRequest, cell_m: f64, now: Instant) -> Option<Reply> {
     let known = |surface: &Surface, id: u8| Address::vehicle(id).filter(|&a| surface.record(a).is_some());
     Some(match request {
-        SurfaceRequest::Map(id) => map(surface, known(surface, id)?, cell_m, now)?,
+        SurfaceRequest::Map(id) => maps::map(surface, known(surface, id)?, cell_m, now)?,
         SurfaceRequest::Exemplar(id, label, number) => {
             let record = surface.record(known(surface, id)?)?;
             Reply::File("image/webp", record.exemplars.label(label)?.exemplar(number)?.webp.clone())
@@ -317,38 +315,13 @@ fn handle(surface: &mut Surface, request: SurfaceRequest, cell_m: f64, now: Inst
         SurfaceRequest::Archives => Reply::Archives(Vec::new()),
         SurfaceRequest::FormerLabels(..) | SurfaceRequest::ArchivedMap(_) => return None,
         SurfaceRequest::Replay(_) | SurfaceRequest::ReplayEvents | SurfaceRequest::Report => return None,
-        // Handled with its principal, before.
-        SurfaceRequest::Command(_) => return None,
+        // Handled with their principal, before.
+        SurfaceRequest::Command(_) | SurfaceRequest::Barred(_) => return None,
     })
-}
-
-/// The labels that a cell had before, of what the surface has kept about the vehicle.
-pub fn former_labels(kept: Option<&VehicleMemory>, cell: Cell) -> Reply {
-    let Some(kept) = kept else { return Reply::NotFound };
-    let former = kept.former_labels(cell).map(|(label, until)| FormerLabel { label, until_s: seconds(until) });
-    Reply::FormerLabels(CellHistory { former: former.collect() })
 }
 
 fn done(result: Result<(), String>) -> Reply {
     result.map_or_else(Reply::Refused, |()| Reply::Done)
-}
-
-/// The cells of an archived map. Their ages count from the last one that was received.
-pub fn archived_cells(map: &VehicleMemory, cell_m: f64, caption: Option<MapCaption>) -> MapCells {
-    let (labels, layers) = (map.map().labels(), map.map().layers().map(|(_, layer)| layer).collect::<Vec<_>>());
-    MapCells {
-        version: map.archived().map_or(0, |(_, cells)| cells),
-        at: labels.updated().unwrap_or_default(),
-        bounds: labels.bounds(),
-        cell_m,
-        moved_m: map.placement_m().unwrap_or((0.0, 0.0)),
-        book: map.labels().clone(),
-        tree: map.tree(),
-        markers: map.markers().map(|marker| (crate::snapshot::marker(marker), None)).collect(),
-        caption,
-        tiles: labels.tiles().clone(),
-        layers: layers::layers(&layers),
-    }
 }
 
 /// What the latest order in a slot is called.
@@ -405,50 +378,13 @@ fn fit(surface: &Surface, vehicle: Address, cell_m: f64, bits_per_s: Option<f64>
     fit::fit(surface, vehicle, cell_m, bits_per_s)
 }
 
-/// The map, whose tiles the surface shares: the link waits for a list of tiles and not for a copy of their cells.
-fn map(surface: &Surface, vehicle: Address, cell_m: f64, now: Instant) -> Option<Reply> {
-    let view = surface.view(vehicle)?;
-    // The vehicle states the edge of its cells; the configured one holds until then.
-    let cell_m = view.cell_m().unwrap_or(cell_m);
-    Some(Reply::Map(MapCells {
-        version: surface.map_version(vehicle),
-        at: now,
-        bounds: surface.map_bounds(vehicle),
-        cell_m,
-        moved_m: (0.0, 0.0),
-        book: scenecast_surface::LabelBook::default(),
-        tree: None,
-        markers: Vec::new(),
-        caption: None,
-        tiles: surface.map_tiles(vehicle)?,
-        layers: layers::layers(&surface.map_layers(vehicle)),
-    }))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use scenecast_protocol::directive::Series;
-    use scenecast_protocol::wire::SurfaceName;
-    use std::time::Duration;
 
     #[test]
     fn a_hold_needs_no_command_and_its_end_does() {
         assert_eq!(SurfaceRequest::Hold(1, true).order_kind(), Some(OrderKind::Stop));
         assert_eq!(SurfaceRequest::Hold(1, false).order_kind(), Some(OrderKind::Order));
-    }
-
-    #[test]
-    fn only_an_administrator_takes_over_from_a_surface_still_heard() {
-        let now = Instant::from_secs_f64(1000.0);
-        let refused = |role, idle_s| {
-            let heard = now - Duration::from_secs(idle_s);
-            let holder = OtherSurface { series: Series::from_random(1), name: SurfaceName::from_text("ship"), heard };
-            why_not_taken_over(&holder, role, now)
-        };
-        let reason = refused(Role::Operator, 119).unwrap();
-        assert!(reason.contains("\"ship\"") && reason.contains("119 s ago"), "{reason}");
-        assert_eq!(refused(Role::Operator, 120), None);
-        assert_eq!(refused(Role::Administrator, 0), None);
     }
 }

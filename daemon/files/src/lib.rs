@@ -24,9 +24,9 @@ pub use geojson::{AreaShape, CoordinateFrame, FenceShapes, read_areas, read_fenc
 pub use images::{FrameImage, own_scale_m, read_classes, read_image, unread_emptiness};
 pub use label_folder::{FolderItem, LabelFolder, read_class_names};
 pub use record::{
-    FrameFate, FrameTimes, MissionClock, MissionSpeed, RecordEntry, RecordLimits, RecordWriter, RecordedFrames,
-    RecordedLink, RecordedMessage, RecoveredPart, SentFrame, StateTime, is_record, mission_records, read_record,
-    recover,
+    FrameFate, FrameTimes, MissionClock, MissionSpeed, RecordEntry, RecordFile, RecordLimits, RecordWriter,
+    RecordedFrames, RecordedLink, RecordedMessage, RecoveredPart, SentFrame, StateTime, is_record, mission_records,
+    read_record, recover,
 };
 pub use recording::{DepthFile, RecordedFrame, Recorder, Recording, write_poses};
 pub use tum_recording::{TUM_UNITS_PER_M, TumFolder, TumFrame, TumOptions, read_depth, tum_camera};

@@ -124,8 +124,8 @@ impl Demo {
         mission.keep_end_events();
         // In the present folder, so that it is found after the demo.
         let (config, folder) = (mission.config(), Path::new("records"));
-        let surface = SurfaceRecord::rehearsed(config, folder);
-        let records = (surface, VehicleRecord::rehearsed(config, folder, speed));
+        let surface = SurfaceRecord::rehearsed(config, folder, mission.seed());
+        let records = (surface, VehicleRecord::rehearsed(config, folder, speed, mission.seed()));
         Self { meter, pace, truth, mission, facts, recorder, counted: [0; 2], published: None, records }
     }
 

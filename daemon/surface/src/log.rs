@@ -30,11 +30,13 @@ pub enum LogKind {
     Command,
     /// The equipment of a vehicle has failed, or works again.
     Fault,
+    /// An order was refused here, and not sent.
+    Refused,
 }
 
 impl LogKind {
     /// Every kind, in the order of the numbers in files.
-    pub const ALL: [Self; 9] = [
+    pub const ALL: [Self; 10] = [
         Self::Order,
         Self::Answer,
         Self::Contact,
@@ -44,6 +46,7 @@ impl LogKind {
         Self::Record,
         Self::Command,
         Self::Fault,
+        Self::Refused,
     ];
 
     /// Whether entries give room first to orders, answers, modes and faults.
@@ -63,6 +66,7 @@ impl LogKind {
             Self::Record => "record",
             Self::Command => "command",
             Self::Fault => "fault",
+            Self::Refused => "refused",
         }
     }
 }

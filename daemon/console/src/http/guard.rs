@@ -3,6 +3,8 @@
 use super::access::{self, Access, HostNames};
 use super::handlers::viewers::VIEWERS;
 use super::response::error;
+use super::shared::Shared;
+use crate::request::SurfaceRequest;
 use axum::Extension;
 use axum::extract::{Request, State};
 use axum::http::uri::Authority;
@@ -70,9 +72,9 @@ fn is_viewer(path: &str, origin: &str) -> bool {
     path == VIEWERS && (origin == "file://" || page.is_some_and(is_local))
 }
 
-/// Refuses principals below a role, before the body of the request is read.
+/// Refuses principals below a role, before the body of the request is read. The log has what they wanted to change.
 pub(super) async fn require_role(
-    State(needed): State<Role>,
+    State((needed, shared)): State<(Role, Shared)>,
     by: Option<Extension<Giver>>,
     request: Request,
     next: Next,
@@ -80,8 +82,11 @@ pub(super) async fn require_role(
     match by {
         Some(Extension(by)) if by.role() >= needed => next.run(request).await,
         Some(Extension(by)) => {
-            let (name, role) = (by.name(), by.role());
-            let line = format!("this needs the role {needed}; the role of {name} is {role}");
+            let line = format!("this needs the role {needed}; the role of {} is {}", by.name(), by.role());
+            if *request.method() != Method::GET {
+                let what = format!("{} {}: not sent: {line}", request.method(), request.uri().path());
+                let _ = shared.order(by, SurfaceRequest::Barred(what)).await;
+            }
             error(StatusCode::FORBIDDEN, &line)
         }
         None => unauthorized(request.uri().path()),

@@ -97,7 +97,10 @@ fn router(shared: Shared) -> Router {
         router.route(
             o.path,
             match o.role {
-                Some(role) => route.route_layer(axum::middleware::from_fn_with_state(role, guard::require_role)),
+                Some(role) => {
+                    let state = (role, shared.clone());
+                    route.route_layer(axum::middleware::from_fn_with_state(state, guard::require_role))
+                }
                 None => route,
             },
         )

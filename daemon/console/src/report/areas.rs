@@ -20,6 +20,13 @@ pub(super) struct ClassArea {
     pub(super) interval_m2: Option<(f64, f64)>,
 }
 
+impl ClassArea {
+    /// Whether its area may be the larger one, by the intervals of both.
+    pub(super) fn may_exceed(&self, larger: &Self) -> bool {
+        self.interval_m2.zip(larger.interval_m2).is_some_and(|((_, high), (low, _))| high > low)
+    }
+}
+
 /// A cell with the class of its label, and the bounds of the probability that the label is right.
 struct DoubtedCell {
     cell: Cell,

@@ -1,24 +1,20 @@
 //! What a record says about a dive.
 
 use super::areas::{ClassArea, areas};
+use super::maps::{MapsAt, maps_over_time};
 use super::orders::{OrderKey, OrderStep};
-use super::track::TrackPoint;
+use super::track::{TrackPoint, measured};
 use crate::export::{MapCaption, MapCells};
-use crate::replay::{Known, Recording, ShownMap, StateText};
-use crate::state::{
-    LinkDirection, LinkSummary, MapLabelTree, MissionState, ReplaySide, VehicleChannel, VehicleMarker, VehicleState,
-};
+use crate::replay::{Recording, StateText};
+use crate::state::{LinkDirection, LinkSummary, MapLabelTree, MissionState, ReplaySide, VehicleMarker, VehicleState};
 use scenecast_core::{UserError, utc_text};
-use scenecast_files::MissionClock;
+use scenecast_files::{MissionClock, RecordFile};
 use scenecast_messages::contents::valid_part;
 use scenecast_messages::geometry_msgs::PoseWithCovarianceStamped;
 use scenecast_messages::scenecast_msgs::{Event, Exemplar, Link, Order};
 use scenecast_protocol::map::{Cell, LabelGrid};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
-
-/// Moments of a record at which its maps are looked at.
-const MOMENTS: u64 = 60;
 
 /// The dive of a record of the surface.
 #[derive(Debug, Default)]
@@ -43,6 +39,8 @@ pub struct Dive {
     pub damage: Option<String>,
     /// When the surface ended and was started again.
     pub(super) restarts_s: Vec<(f64, f64)>,
+    /// The files that it was read from; empty while they are written.
+    pub(super) files: Vec<RecordFile>,
 }
 
 /// The program that made a record, and its settings that differed from their defaults, by key.
@@ -50,7 +48,8 @@ pub struct Dive {
 #[serde(default)]
 pub(super) struct SettingsRecord {
     pub(super) program: String,
-    pub(super) simulated: bool,
+    /// The seed of a rehearsal.
+    pub(super) rehearsal_seed: Option<u64>,
     pub(super) settings: BTreeMap<String, serde_json::Value>,
 }
 
@@ -69,6 +68,8 @@ pub(super) struct DiveVehicle {
     /// The same with its layers, as files have it.
     cells: Option<MapCells>,
     epoch: u8,
+    /// Cells of each layer of that map, by its name.
+    pub(super) layer_cells: BTreeMap<String, usize>,
     /// When frames of it were received, seconds since 1970.
     pub(super) heard_s: Vec<f64>,
     /// The edge of a cell, metres.
@@ -110,19 +111,7 @@ pub(super) struct OwnRecord {
     pub(super) settings: SettingsRecord,
 }
 
-/// The maps of both sides at one moment.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct MapsAt {
-    pub(super) at_s: f64,
-    /// Cells of the operator's map.
-    pub(super) cells: u64,
-    /// Of the cells that the vehicle had to send, the share that the operator's map has with the same label; NaN without its record.
-    pub(super) agreement: f64,
-    /// How far the operator's map was behind that of the vehicle, as the page said, mission seconds; NaN where it is not known.
-    pub(super) lag_s: f64,
-}
-
-fn seconds(nanos: u64) -> f64 {
+pub(super) fn seconds(nanos: u64) -> f64 {
     nanos as f64 / 1e9
 }
 
@@ -134,6 +123,15 @@ impl Dive {
     pub fn read(paths: &[PathBuf]) -> Result<Self, UserError> {
         let names: Vec<_> = paths.iter().map(|path| path.display().to_string()).collect();
         Self::of(&mut Recording::read(paths)?).map_err(|what| UserError::Input(format!("{}: {what}", names.join(", "))))
+    }
+
+    /// The same with the sums of the files, which nobody writes any more.
+    ///
+    /// # Errors
+    /// As for [`Self::read`]; or a file cannot be read.
+    pub fn read_ended(paths: &[PathBuf]) -> Result<Self, UserError> {
+        let files = paths.iter().map(|path| RecordFile::all(path)).collect::<Result<Vec<_>, _>>()?.concat();
+        Ok(Self { files, ..Self::read(paths)? })
     }
 
     /// The dive of a recording, of which the maps are at its end afterwards. The error is one line for people.
@@ -167,6 +165,7 @@ impl Dive {
             clock: recording.timeline.clock.clone(),
             settings: serde_json::from_str(&recording.settings).unwrap_or_default(),
             damage: (!recording.damage.is_empty()).then(|| recording.damage.join("; ")),
+            files: Vec::new(),
         })
     }
 
@@ -233,13 +232,18 @@ impl DiveVehicle {
         let mut vehicle = Self {
             labels: shown.labels.shown().clone(),
             cells: Some(shown.cells(0, timeline.mission_time(timeline.span.1))),
+            layer_cells: shown
+                .layers
+                .iter()
+                .map(|(name, layer)| (name.clone(), layer.levels().shown().explored()))
+                .collect(),
             epoch: shown.epoch,
             heard_s: known.heard.iter().copied().map(seconds).collect(),
             cell_m: shown.cell_m,
             classes: areas(shown, |label| state.label_book.shown_as(label)),
             track: known.poses.iter().map(|(_, pose)| TrackPoint::of(pose)).filter(TrackPoint::is_known).collect(),
             own: own.map_or_else(OwnRecord::default, |own| OwnRecord {
-                track: own.poses.iter().map(moved).filter(TrackPoint::is_known).collect(),
+                track: measured(own.poses.iter().map(moved).filter(TrackPoint::is_known).collect(), mission_speed),
                 sent: own.sent,
                 sent_bits: own.sent_bits.clone(),
                 heard_s: own.heard.iter().copied().map(seconds).collect(),
@@ -274,8 +278,8 @@ impl DiveVehicle {
 
     /// What was not a dive about it, in a clause; `None` if nothing says so.
     pub(super) fn made_up(&self, dive: &Dive) -> Option<String> {
-        if dive.settings.simulated {
-            return Some("a rehearsal over a simulated sea floor".to_owned());
+        if let Some(seed) = dive.settings.rehearsal_seed {
+            return Some(format!("a rehearsal over a simulated sea floor (seed {seed})"));
         }
         let source = self.own.settings.text("camera.source").filter(|_| self.is_played_back());
         source.map(|source| format!("a playback of images and poses from {source}")).or_else(|| {
@@ -289,7 +293,7 @@ impl DiveVehicle {
     pub(super) fn has_modem(&self, dive: &Dive) -> bool {
         // The default is a socket.
         let kind = dive.ran_with(self).text("modem.kind");
-        dive.settings.simulated || kind.is_some_and(|kind| !["tcp", "udp"].contains(&kind))
+        dive.settings.rehearsal_seed.is_some() || kind.is_some_and(|kind| !["tcp", "udp"].contains(&kind))
     }
 
     /// Whether recorded images stood for a camera.
@@ -350,45 +354,4 @@ fn gaps(recording: &Recording) -> Vec<(f64, f64)> {
         _ => None,
     };
     recording.timeline.states.windows(2).filter_map(apart).collect()
-}
-
-/// The maps at moments of the record.
-fn maps_over_time(recording: &mut Recording, id: u8, part: &str) -> Vec<MapsAt> {
-    let Recording { timeline, operator, vehicles, .. } = recording;
-    let Some(operator) = operator.get_mut(part) else { return Vec::new() };
-    let mut vehicle = vehicles.get_mut(part);
-    let (first, last) = timeline.span;
-    let maps = |number| {
-        let nanos = first + (last - first) / MOMENTS * number;
-        let seek = |known: &mut Known| known.map.seek(nanos, |nanos| timeline.mission_time(nanos));
-        seek(operator);
-        vehicle.iter_mut().for_each(|vehicle| seek(vehicle));
-        let held = operator.map.shown();
-        let agreement = vehicle.as_ref().map_or(f64::NAN, |vehicle| agreement(vehicle.map.shown(), held));
-        let lag_s = timeline.state_at(nanos).and_then(|state| lag_s(&state.json, id)).unwrap_or(f64::NAN);
-        MapsAt { at_s: seconds(nanos), cells: held.labels.shown().explored() as u64, agreement, lag_s }
-    };
-    (0..=MOMENTS).map(maps).collect()
-}
-
-/// Of the vehicle's cells the share that the operator's map has with the same label; NaN without cells.
-fn agreement(vehicle: &ShownMap, operator: &ShownMap) -> f64 {
-    let (cells, held) = (vehicle.labels.shown(), operator.labels.shown());
-    let is_same = |&(cell, label): &(Cell, u8)| vehicle.epoch == operator.epoch && held.get(cell) == label;
-    cells.iter().filter(is_same).count() as f64 / cells.explored() as f64
-}
-
-/// How far the map of a vehicle is behind, by a state of the page.
-fn lag_s(json: &str, id: u8) -> Option<f64> {
-    #[derive(serde::Deserialize)]
-    struct State {
-        vehicles: Vec<Lags>,
-    }
-    #[derive(serde::Deserialize)]
-    struct Lags {
-        id: u8,
-        link: VehicleChannel,
-    }
-    let state: State = serde_json::from_str(json).ok()?;
-    state.vehicles.iter().find(|vehicle| vehicle.id == id)?.link.backlog.as_ref()?.map_lag_s
 }

@@ -54,13 +54,17 @@ fn pauses(dive: &Dive, times_s: &[f64], span_s: (f64, f64)) -> String {
         })
         .collect();
     let pauses = match all {
-        0 => "without a much longer pause".to_owned(),
+        0 => {
+            let pauses = times_s.iter().zip(&times_s[1.min(times_s.len())..]).map(|(a, b)| dive.mission_s(b - a));
+            let longest = pauses.fold(0.0, f64::max);
+            format!("without a much longer pause (the longest was {})", duration(longest))
+        }
         n if n > told.len() => format!("with {n} longer pauses, the longest of which were {}", told.join(", ")),
         n => format!("with {}: {}", counted(n, "longer pause", "longer pauses"), told.join(", ")),
     };
     match usual_s {
-        Some(usual_s) if usual_s >= 0.95 => format!("every {usual_s:.1} s as a rule, {pauses}."),
-        Some(_) => format!("more often than every second as a rule, {pauses}."),
+        Some(usual_s) if usual_s >= 0.95 => format!("every {usual_s:.1} s in most cases, {pauses}."),
+        Some(_) => format!("more often than every second in most cases, {pauses}."),
         None => format!("{}, {pauses}.", counted(times_s.len(), "time", "times")),
     }
 }
@@ -122,13 +126,17 @@ mod tests {
         let dive = dive_of(100.0, 1.0);
         let times: Vec<f64> = (0..=100).filter(|s| !(31..60).contains(s)).map(f64::from).collect();
         let told =
-            "every 1.0 s as a rule, with 1 longer pause: 30 s from 1970-01-01T00:00:30Z to 1970-01-01T00:01:00Z.";
+            "every 1.0 s in most cases, with 1 longer pause: 30 s from 1970-01-01T00:00:30Z to 1970-01-01T00:01:00Z.";
         assert_eq!(pauses(&dive, &times, dive.span_s), told);
-        assert_eq!(pauses(&dive, &times[..30], (0.0, 30.0)), "every 1.0 s as a rule, without a much longer pause.");
+        assert_eq!(
+            pauses(&dive, &times[..30], (0.0, 30.0)),
+            "every 1.0 s in most cases, without a much longer pause (the longest was 1 s)."
+        );
         let faster = dive_of(10.0, 10.0);
         let times: Vec<f64> = times.iter().map(|s| s / 10.0).collect();
         assert!(
-            pauses(&faster, &times, faster.span_s).starts_with("every 1.0 s as a rule, with 1 longer pause: 30 s from")
+            pauses(&faster, &times, faster.span_s)
+                .starts_with("every 1.0 s in most cases, with 1 longer pause: 30 s from")
         );
     }
 

@@ -3,14 +3,14 @@
 use super::Escaped;
 use super::chart::{self, Series};
 use super::dive::{Dive, DiveVehicle};
-use crate::state::{LinkDirection, VehicleState};
+use super::words::counted;
 use scenecast_messages::scenecast_msgs::Link;
 use std::collections::BTreeMap;
 use std::fmt::Write;
 
 impl Dive {
     /// The link and the position over time, the link over range, and what its bytes were.
-    pub(super) fn link(&self, page: &mut String, state: &VehicleState, vehicle: &DiveVehicle) {
+    pub(super) fn link(&self, page: &mut String, vehicle: &DiveVehicle) {
         let (begin, end) = self.span_s;
         let series = |name, unit, value: fn(&Link) -> f32| Series {
             name,
@@ -41,28 +41,24 @@ impl Dive {
         }
         if vehicle.has_modem(self) {
             *page += &over_range(vehicle);
+        } else {
+            *page += "<p>The frames did not go through a modem, so their round trips tell no distance.</p>\n";
         }
-        let direction = |name: &str, direction: &LinkDirection| {
-            let mut classes: Vec<_> = direction.bytes_by_class.iter().filter(|(_, bytes)| **bytes > 0).collect();
-            classes.sort_by_key(|(_, bytes)| std::cmp::Reverse(**bytes));
-            let all: u64 = classes.iter().map(|(_, bytes)| **bytes).sum();
-            let share = |bytes: u64| bytes as f64 / all.max(1) as f64 * 100.0;
-            let classes: Vec<String> =
-                classes.iter().map(|(class, bytes)| format!("{class} {bytes} ({:.0} %)", share(**bytes))).collect();
-            format!(
-                "<tr><td>{name}</td><td class=\"n\">{}</td><td class=\"n\">{:.1} %</td><td>{}</td></tr>",
-                direction.frames,
-                direction.loss * 100.0,
-                Escaped(&classes.join(", "))
-            )
-        };
+        self.frames_and_bytes(page, vehicle);
+    }
+
+    /// What became of the frames, and what the bytes of each class brought.
+    fn frames_and_bytes(&self, page: &mut String, vehicle: &DiveVehicle) {
+        let directions = [("from the vehicles", &self.state.link.up), ("to the vehicles", &self.state.link.down)];
+        *page += "<table><thead><tr><th>direction</th><th>frames</th><th>lost</th></tr></thead>";
+        for (name, direction) in directions {
+            let (frames, lost) = (direction.frames, direction.loss * 100.0);
+            let _ =
+                write!(page, "<tr><td>{name}</td><td class=\"n\">{frames}</td><td class=\"n\">{lost:.1} %</td></tr>");
+        }
         let _ = writeln!(
             page,
-            "<table><tr><th>direction</th><th>frames</th><th>lost</th><th>bytes by class: heard from the vehicles, sent to them</th></tr>{}{}</table>\n<p>Frames are numbered: \
-             those are lost whose number the other end never received, over the whole mission.{} Classes: map and layers, status of the vehicle, directive \
-             (orders), fix (positions for the vehicle), exemplar (images), and overhead (headers and checks of frames).</p>",
-            direction("from the vehicles", &self.state.link.up),
-            direction("to the vehicles", &self.state.link.down),
+            "</table>\n<p>Frames are numbered: those are lost whose number the other end never received, over the whole mission.{}</p>",
             match self.frames[2] {
                 0 => String::new(),
                 unused => format!(
@@ -71,32 +67,75 @@ impl Dive {
                 ),
             }
         );
-        let map = self.state.link.up.bytes_by_class.get("map").copied().unwrap_or_default();
-        let cells: usize = self.vehicles().map(|(_, vehicle)| vehicle.labels.explored()).sum();
-        let budget = state
-            .status
-            .as_ref()
-            .map_or_else(String::new, |status| format!("the vehicle's {} bit/s, ", status.budget_bps));
-        let _ = writeln!(page, "<p>Budgets at the end: {budget}the surface's {} bit/s.", self.state.link.budget_bps);
-        if map > 0 && cells > 0 {
-            let _ = writeln!(
-                page,
-                " The {map} bytes of the map that arrived brought {cells} cells, {:.2} bits a cell, each change of a label included.",
-                map as f64 * 8.0 / cells as f64
-            );
+        let has_own = !vehicle.own.sent_bits.is_empty() && self.vehicles.len() == 1;
+        let own_title = if has_own { "<th>sent on board, copies not counted</th>" } else { "" };
+        let _ = writeln!(
+            page,
+            "<table><thead><tr><th>direction</th><th>class</th><th>bytes</th>{own_title}<th>share</th><th>what they brought</th></tr></thead>"
+        );
+        for (name, direction) in directions {
+            let mut classes: Vec<_> = direction.bytes_by_class.iter().filter(|(_, bytes)| **bytes > 0).collect();
+            classes.sort_by_key(|(_, bytes)| std::cmp::Reverse(**bytes));
+            let all: u64 = classes.iter().map(|(_, bytes)| **bytes).sum();
+            for (class, bytes) in classes {
+                let sent = vehicle.own.sent_bits.get(class).filter(|_| std::ptr::eq(direction, &self.state.link.up));
+                let sent = sent.map_or_else(String::new, |bits| bits.div_ceil(8).to_string());
+                let _ = writeln!(
+                    page,
+                    "<tr><td>{name}</td><td>{}</td><td class=\"n\">{bytes}</td>{}<td class=\"n\">{:.0} %</td><td>{}</td></tr>",
+                    Escaped(class),
+                    if has_own { format!("<td class=\"n\">{sent}</td>") } else { String::new() },
+                    *bytes as f64 / all.max(1) as f64 * 100.0,
+                    self.brought(class, *bytes)
+                );
+            }
         }
-        let sent = vehicle.own.sent_bits.iter().filter(|(_, bits)| **bits > 0);
-        let sent: Vec<String> = sent.map(|(content, bits)| format!("{content} {}", bits.div_ceil(8))).collect();
-        if !sent.is_empty() {
-            let sent = sent.join(", ");
-            let _ = writeln!(
-                page,
-                " By its own record the vehicle sent these bytes, copies not counted: {}.",
-                Escaped(&sent)
-            );
-        }
-        *page += "</p>\n";
+        *page +=
+            "</table>\n<p>Bytes from the vehicles are those that were heard, bytes to them those that were sent.</p>\n";
     }
+
+    /// What the bytes of a class brought.
+    fn brought(&self, class: &str, bytes: u64) -> String {
+        let each = |count: usize, one: &str, several: &str, what: &str| match count {
+            0 => String::new(),
+            n => format!("{}, {:.0} bytes {what}", counted(n, one, several), bytes as f64 / n as f64),
+        };
+        let sum = |count: fn(&DiveVehicle) -> usize| self.vehicles().map(|(_, vehicle)| count(vehicle)).sum::<usize>();
+        let cells = |count: usize| match count {
+            0 => String::new(),
+            n => format!(
+                "{}, {:.2} bits each, their changes included",
+                counted(n, "cell", "cells"),
+                bytes as f64 * 8.0 / n as f64
+            ),
+        };
+        match class {
+            "map" => cells(sum(|vehicle| vehicle.labels.explored())),
+            "exemplar" => each(sum(|vehicle| vehicle.exemplars.len()), "image", "images", "each"),
+            "status" => each(
+                sum(|vehicle| vehicle.track.len()),
+                "reported place",
+                "reported places",
+                "each, with all else of the status",
+            ),
+            "directive" => {
+                each(sum(|vehicle| vehicle.orders_of_people().count()), "order", "orders", "each, repeats included")
+            }
+            "fix" => each(
+                sum(|vehicle| vehicle.orders.len() - vehicle.orders_of_people().count()),
+                "position fix",
+                "position fixes",
+                "each, repeats included",
+            ),
+            "overhead" => "headers and checks of frames".to_owned(),
+            layer => cells(sum_of_layer(self, layer)),
+        }
+    }
+}
+
+/// The cells of a layer of the maps at the end.
+fn sum_of_layer(dive: &Dive, layer: &str) -> usize {
+    dive.vehicles().map(|(_, vehicle)| vehicle.layer_cells.get(layer).copied().unwrap_or_default()).sum()
 }
 
 /// The quality of the link by the distance of the vehicle, which the round trips tell; empty where they are not known.
@@ -105,7 +144,9 @@ fn over_range(vehicle: &DiveVehicle) -> String {
     let known = vehicle.link.iter().filter(|(_, link)| link.round_trip_s > 0.0);
     let known: Vec<(f64, &Link)> =
         known.map(|(_, link)| (f64::from(link.round_trip_s) / 2.0 * SOUND_M_S, link)).collect();
-    let Some(farthest_m) = known.iter().map(|(range_m, _)| *range_m).reduce(f64::max) else { return String::new() };
+    let Some(farthest_m) = known.iter().map(|(range_m, _)| *range_m).reduce(f64::max) else {
+        return "<p>No round trip was measured, so the distance of the vehicle is not known.</p>\n".to_owned();
+    };
     let step_m = chart::round_length(farthest_m / 4.0).max(10.0);
     let mut bins: BTreeMap<u64, Vec<&Link>> = BTreeMap::new();
     known.into_iter().for_each(|(range_m, link)| bins.entry((range_m / step_m) as u64).or_default().push(link));

@@ -7,10 +7,12 @@ mod dive;
 mod extent;
 mod gaps;
 mod link;
+mod maps;
 mod orders;
 mod page;
 mod summary;
 mod track;
+mod trouble;
 mod words;
 
 pub use dive::Dive;

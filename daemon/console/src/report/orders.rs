@@ -2,11 +2,12 @@
 
 use super::dive::{Dive, DiveVehicle};
 use super::{Escaped, words};
-use crate::state::VehicleState;
+use crate::state::{InForceKnowledge, VehicleState};
 use scenecast_core::utc_text;
 use scenecast_messages::scenecast_msgs::OrderStatus;
 use scenecast_protocol::directive::SlotId;
 use serde_json::Value;
+use std::collections::BTreeMap;
 use std::fmt::Write;
 
 /// The longest content of an order that is told whole, bytes.
@@ -104,7 +105,8 @@ impl DiveVehicle {
         // An order of images has all that are awaited.
         let before = self.given.range(..order.clone()).next_back().filter(|((other, _), _)| other == slot);
         let before = before.and_then(|((_, version), _)| labels(version)).unwrap_or_default();
-        let title = |label: u64| u8::try_from(label).map_or_else(|_| label.to_string(), |l| state.label_book.title(l));
+        let title =
+            |label: u64| u8::try_from(label).map_or_else(|_| label.to_string(), |l| words::label(&state.label_book, l));
         let named = |labels: Vec<u64>| labels.into_iter().map(title).collect::<Vec<_>>().join(", ");
         let of_images = labels(version).map(|labels| {
             let (awaited, new): (Vec<u64>, Vec<u64>) = labels.iter().partition(|label| before.contains(label));
@@ -137,11 +139,10 @@ impl Dive {
         let words = if content.len() > MAX_CONTENT { words } else { content };
         let by = match (given.principal.is_empty(), by.is_empty()) {
             (false, _) => given.principal.clone(),
-            (true, true) if self.settings.simulated => "the script of the rehearsal".to_owned(),
+            (true, true) if self.settings.rehearsal_seed.is_some() => "the script of the rehearsal".to_owned(),
             (true, _) => by,
         };
-        let by = if by == "local" { "the user of the surface's computer".to_owned() } else { by };
-        (by, words)
+        (words::author(&by).to_owned(), words)
     }
 
     /// The source of the events about modes: on board or, where no vehicle's own record is there, as they were reported.
@@ -179,6 +180,45 @@ impl Dive {
             );
         }
         *page += "</table>\n";
+    }
+
+    /// The orders that were in force at the end, beside what was configured.
+    pub(super) fn in_force(&self, page: &mut String, state: &VehicleState, vehicle: &DiveVehicle) {
+        let passing = [SlotId::Requests.name(), SlotId::Fix.name()];
+        let mut last: BTreeMap<&str, (&OrderKey, &OrderStep)> = BTreeMap::new();
+        for (order, way) in vehicle.orders_of_people().filter(|((slot, _), _)| !passing.contains(&slot.as_str())) {
+            if let Some(applied) = way.iter().rev().find(|step| step.status == OrderStatus::APPLIED) {
+                last.insert(order.0.as_str(), (order, applied));
+            }
+        }
+        last.retain(|slot, (order, _)| {
+            let is_over = state.orders.in_force.get(*slot) == Some(&InForceKnowledge::None);
+            !is_over && vehicle.content(state, order).is_none_or(|content| content != "resume")
+        });
+        let rows: String = last
+            .into_iter()
+            .map(|(slot, (order, step))| {
+                let (by, ordered) = self.ordered(state, vehicle, order);
+                let given = utc_text(step.given_s);
+                let kind = Escaped(words::order(slot, &ordered)).to_string();
+                let (ordered, by) = (Escaped(&ordered).to_string(), Escaped(&by).to_string());
+                format!("<tr><td>{kind}</td><td>{ordered}</td><td class=\"t\">{given}</td><td>{by}</td></tr>\n")
+            })
+            .collect();
+        let budget = state.status.as_ref().map_or_else(String::new, |status| {
+            format!(
+                " The vehicle kept to a budget of {} bit/s then, the surface to {}.",
+                status.budget_bps, self.state.link.budget_bps
+            )
+        });
+        *page += "<h3>In force at the end</h3>\n";
+        *page += &match rows.is_empty() {
+            true => format!("<p>No order was in force: all was as configured.{budget}</p>\n"),
+            false => format!(
+                "<p>The last order of each kind that the vehicle applied; all else was as configured.{budget}</p>\n<table><thead><tr><th>kind</th>\
+                 <th>what was ordered</th><th>given (UTC)</th><th>by</th></tr></thead>\n{rows}</table>\n"
+            ),
+        };
     }
 
     /// What the vehicle was steered by over time, and its modes.

@@ -8,6 +8,7 @@ use crate::state::VehicleState;
 use base64::Engine;
 use base64::prelude::BASE64_STANDARD;
 use scenecast_core::utc_text;
+use scenecast_files::RecordFile;
 use scenecast_messages::scenecast_msgs::Exemplar;
 use scenecast_surface::LabelBook;
 use serde_json::json;
@@ -67,12 +68,30 @@ impl Dive {
         let _ = writeln!(
             page,
             "<h2>How this was made</h2>\n<p>By {program} from the records of the surface{own}, run {run}, which {} wrote from {begin} to {end}. \
-             The map is the operator's: what had arrived over the link. Areas are counts of cells.</p>\n<h2>How to cite</h2>\n<p>Mission \u{201c}{mission}\u{201d}, vehicle {}, {begin} to {end}: map of the \
+             The map is the operator's: what had arrived over the link. Areas are counts of cells. Names of classes are those at the end.</p>\n{}<h2>How to cite</h2>\n<p>Mission \u{201c}{mission}\u{201d}, vehicle {}, {begin} to {end}: map of the \
              sea floor by an unsupervised scene model{made_up}{origin}, run {run}, recorded by {}, report by {program}.</p>\n</body></html>",
             Escaped(recorded),
+            self.files_table(),
             Escaped(&names.join(", ")),
             Escaped(recorded),
         );
+    }
+
+    /// The files of the records, so that others can tell whether they have the same.
+    fn files_table(&self) -> String {
+        if self.files.is_empty() {
+            return String::new();
+        }
+        let row = |file: &RecordFile| {
+            format!(
+                "<tr><td>{}</td><td class=\"n\">{}</td><td style=\"word-break:break-all\">{}</td></tr>\n",
+                Escaped(&file.name),
+                file.bytes,
+                file.sha256
+            )
+        };
+        let rows: String = self.files.iter().map(row).collect();
+        format!("<table><thead><tr><th>file</th><th>bytes</th><th>SHA-256</th></tr></thead>\n{rows}</table>\n")
     }
 
     fn vehicle(&self, page: &mut String, state: &VehicleState, vehicle: &DiveVehicle) {
@@ -101,8 +120,9 @@ impl Dive {
         classes(page, self, state, vehicle);
         notes(page, self, state);
         self.orders_table(page, state, vehicle);
+        self.in_force(page, state, vehicle);
         self.steering(page, state, vehicle);
-        self.link(page, state, vehicle);
+        self.link(page, vehicle);
     }
 
     fn events_table(&self, page: &mut String) {
@@ -156,7 +176,7 @@ impl Dive {
                     "depth_m": point.depth_m, "sigma_m": point.sigma_m,
                 })).collect::<Vec<_>>(),
                 "agreement": vehicle.maps.iter().map(|maps| json!({
-                    "utc": utc_text(maps.at_s), "cells": maps.cells, "share": maps.agreement,
+                    "utc": utc_text(maps.at_s), "cells": maps.cells, "share": maps.agreement, "lag_s": maps.lag_s,
                 })).collect::<Vec<_>>(),
                 "notes": state.notes,
                 "markers": state.markers,
@@ -172,8 +192,10 @@ impl Dive {
             "link": { "up": self.state.link.up, "down": self.state.link.down },
             "events": events.collect::<Vec<_>>(),
             "damage": self.damage,
+            "files": self.files.iter().map(|file| json!({ "name": file.name, "bytes": file.bytes, "sha256": file.sha256 }))
+                .collect::<Vec<_>>(),
             "program": self.settings.program,
-            "simulated": self.settings.simulated,
+            "rehearsal_seed": self.settings.rehearsal_seed,
             "settings": self.settings.settings,
             "mission_speed": self.state.mission.speed,
             "begin": utc_text(self.span_s.0),
@@ -191,7 +213,7 @@ fn settings(page: &mut String, end: &str, settings: &SettingsRecord) {
     }
     let _ = write!(
         page,
-        "<h2>Settings of {}</h2>\n<p>{}: those of the configuration that differ from their defaults. Orders may have replaced some of them.</p>\n<table>",
+        "<h2>Settings of {}</h2>\n<p>{}: those of the configuration that differ from their defaults.</p>\n<table>",
         Escaped(end),
         Escaped(&settings.program)
     );
@@ -232,7 +254,8 @@ fn pictures(page: &mut String, dive: &Dive, state: &VehicleState, vehicle: &Dive
     let images: Vec<(u8, String)> =
         vehicle.classes.iter().map(|class| (class.label, images(dive, state, vehicle, class.label))).collect();
     let all: String = images.iter().map(|(_, images)| images.as_str()).collect();
-    let bare = images.iter().filter(|(_, images)| images.is_empty()).map(|(class, _)| state.label_book.title(*class));
+    let bare = images.iter().filter(|(_, images)| images.is_empty());
+    let bare = bare.map(|(class, _)| words::label(&state.label_book, *class));
     let bare: Vec<String> = bare.collect();
     if !all.is_empty() {
         let _ = writeln!(page, "<h3>Images of the classes</h3>\n<div class=\"images\">{all}</div>");
@@ -255,8 +278,7 @@ fn without_cells(page: &mut String, dive: &Dive, state: &VehicleState, vehicle: 
     }
     let images = vehicle.exemplars.iter().filter(|(_, exemplar)| labels.contains(&exemplar.label));
     let images: String = images.map(|found| image(dive, state, vehicle, found, "")).collect();
-    let title = |label: &u8| book.name(*label).map_or_else(|| book.title(*label), |name| format!("{label}: {name}"));
-    let titles: Vec<String> = labels.iter().map(title).collect();
+    let titles: Vec<String> = labels.iter().map(|label| words::label(book, *label)).collect();
     let _ = writeln!(
         page,
         "<h3>Labels without cells at the end</h3>\n<p>The scene model had these labels for some time; it gave their cells to others: \
@@ -268,10 +290,8 @@ fn without_cells(page: &mut String, dive: &Dive, state: &VehicleState, vehicle: 
 /// The classes by their colours and numbers.
 fn legend(state: &VehicleState, vehicle: &DiveVehicle) -> String {
     let entry = |class: &ClassArea| {
-        let (colour, title) = (state.label_book.colour_text(class.label), state.label_book.title(class.label));
+        let (colour, title) = (state.label_book.colour_text(class.label), words::label(&state.label_book, class.label));
         let swatch = format!("<span class=\"swatch\" style=\"background:{colour}\"></span>");
-        let is_named = state.label_book.name(class.label).is_some();
-        let title = if is_named { format!("{} {title}", class.label) } else { title };
         format!("<span>{swatch}{}</span> ", Escaped(&title))
     };
     vehicle.classes.iter().map(entry).collect()
@@ -327,10 +347,14 @@ fn image(
     let kind = if exemplar.format == "webp" { "webp" } else { "jpeg" };
     let taken = words::taken(exemplar).unwrap_or_else(|| format!("received {}", utc_text(*at_s)));
     let (middle, is_placed) = (&exemplar.middle, exemplar.width_m > 0.0);
-    let (class, label) = (state.label_book.class_title(exemplar.label), format!("label {}", exemplar.label));
-    let title = if class == label { label } else { format!("{class} ({label})") };
+    let class = state.label_book.shown_as(exemplar.label);
+    let own = words::label(&state.label_book, exemplar.label);
+    let title = match class == exemplar.label {
+        true => own,
+        false => format!("{}, shown as {}", own, words::label(&state.label_book, class)),
+    };
     let place = || {
-        let sigma = vehicle.sigma_m(words::unix_s(&exemplar.taken));
+        let sigma = vehicle.sigma_m(words::unix_s(&exemplar.taken)).filter(|_| vehicle.measures_sigma());
         let sigma = sigma.map_or_else(String::new, |m| format!(", \u{b1} {m:.1} m"));
         let on_earth = words::on_earth(dive, (middle.x, middle.y));
         format!("<br>{}, {}{on_earth}{sigma}", words::east(middle.x), words::north(middle.y))
@@ -352,14 +376,20 @@ fn notes(page: &mut String, dive: &Dive, state: &VehicleState) {
     *page += "<h3>Notes and markers</h3>\n<ul>\n";
     let utc = |at_s: f64| utc_text(dive.unix_s(at_s));
     for note in &state.notes {
-        let _ = writeln!(page, "<li>{}, {}: {}</li>", utc(note.at_s), Escaped(&note.author), Escaped(&note.text));
+        let _ = writeln!(
+            page,
+            "<li>{}, {}: {}</li>",
+            utc(note.at_s),
+            Escaped(words::author(&note.author)),
+            Escaped(&note.text)
+        );
     }
     for marker in &state.markers {
         let _ = writeln!(
             page,
             "<li>{}, {}: {} ({}, {}{})</li>",
             utc(marker.at_s),
-            Escaped(&marker.author),
+            Escaped(words::author(&marker.author)),
             Escaped(&marker.text),
             words::east(marker.x_m),
             words::north(marker.y_m),

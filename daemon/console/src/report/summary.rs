@@ -3,25 +3,21 @@
 use super::dive::{Dive, DiveVehicle};
 use super::orders::OrderStep;
 use super::words::{self, area, counted, duration, interval, on_earth};
-use super::{extent, gaps};
+use super::{extent, gaps, trouble};
 use crate::state::{LinkDirection, VehicleState};
 use scenecast_core::utc_text;
-use scenecast_messages::contents::valid_part;
 use scenecast_messages::scenecast_msgs::{Event, OrderStatus};
 use scenecast_protocol::directive::SlotId;
 use scenecast_protocol::map::{Cell, UNEXPLORED};
-use scenecast_protocol::wire::VehicleMode;
+use scenecast_surface::LogKind;
 use serde_json::Value;
 use std::collections::BTreeSet;
-
-/// Events that are told in a sentence; of more, the first.
-const MAX_TOLD: usize = 8;
 
 /// Where, when, how long, how far, what was found, what was ordered and what failed, a sentence each.
 pub(super) fn summary(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -> Vec<String> {
     let mut sentences = Vec::new();
     sentences.extend(vehicle.made_up(dive).map(|what| format!("This was {what}.")));
-    if dive.settings.simulated && utc_text(dive.span_s.0).starts_with("2000-01-01") {
+    if dive.settings.rehearsal_seed.is_some() && utc_text(dive.span_s.0).starts_with("2000-01-01") {
         sentences.push("Its dates mean nothing: a rehearsal in virtual time begins on 2000-01-01.".to_owned());
     }
     sentences.push(when(dive, state, vehicle));
@@ -38,7 +34,7 @@ pub(super) fn summary(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) 
     sentences.extend(link(dive, vehicle));
     sentences.extend(gaps::heard(dive, vehicle));
     sentences.extend(gaps::of_records(dive, vehicle));
-    sentences.push(trouble(dive, state, vehicle));
+    sentences.extend(trouble::told(dive, state, vehicle));
     if let Some(damage) = &dive.damage {
         sentences.push(format!("Not all of the record could be read: {damage}."));
     }
@@ -77,33 +73,6 @@ fn link(dive: &Dive, vehicle: &DiveVehicle) -> Vec<String> {
     sentences
 }
 
-/// The events that people should look at: faults, silences, new runs, and modes other than the survey.
-fn trouble(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -> String {
-    let is_planned =
-        |text: &str| [VehicleMode::Survey, VehicleMode::Done].iter().any(|mode| text.starts_with(mode.name()));
-    let modes = dive.mode_source();
-    let is_trouble = |event: &Event| match event.source.as_str() {
-        "fault" => true,
-        source if source == modes => !is_planned(&event.text),
-        "contact" => event.text != "received",
-        _ => false,
-    };
-    let is_of_it = |event: &Event| event.vehicle.is_empty() || valid_part(&event.vehicle) == valid_part(&state.name);
-    let found = dive.events.iter().filter(|(_, event)| is_of_it(event) && is_trouble(event));
-    let told =
-        |(at_s, event): &(f64, Event)| format!("{}, {}", utc_text(*at_s), words::event(&state.label_book, event));
-    let told: Vec<String> = found.map(told).collect();
-    match told.len() {
-        0 if !gaps::has_silence(dive, vehicle) => "No fault and no silence was reported.".to_owned(),
-        0 => "No fault was reported.".to_owned(),
-        n if n > MAX_TOLD => format!(
-            "{n} events are about faults, silences, restarts or modes other than the survey, first {}; all are listed below.",
-            told[..MAX_TOLD].join("; ")
-        ),
-        _ => format!("Faults, silences, restarts, and modes other than the survey: {}.", told.join("; ")),
-    }
-}
-
 /// How far the operator's map was that of the vehicle, where its record says so.
 fn agreement(vehicle: &DiveVehicle) -> Option<String> {
     let shares: Vec<f64> = vehicle.maps.iter().map(|maps| maps.agreement).filter(|share| share.is_finite()).collect();
@@ -121,11 +90,16 @@ fn agreement(vehicle: &DiveVehicle) -> Option<String> {
 /// How far the operator's map was behind.
 fn lag(vehicle: &DiveVehicle) -> Option<String> {
     let lags: Vec<f64> = vehicle.maps.iter().map(|maps| maps.lag_s).filter(|lag_s| lag_s.is_finite()).collect();
-    Some(format!(
-        "By the surface's estimate, the operator's map was behind the vehicle's by {} or less half of the time, and by {} at most.",
-        duration(words::median(&lags)?),
-        duration(lags.iter().copied().fold(0.0, f64::max))
-    ))
+    let (median, most) = (duration(words::median(&lags)?), duration(lags.iter().copied().fold(0.0, f64::max)));
+    Some(match vehicle.own.runs_s.is_empty() {
+        true => format!(
+            "By the surface's estimate, the operator's map was behind the vehicle's by {median} or less half of the time, and by {most} at most."
+        ),
+        false => format!(
+            "By both records, the operator's map lacked changes of the vehicle's for {median} or less half of the time, and for {most} at \
+             most."
+        ),
+    })
 }
 
 fn when(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -> String {
@@ -201,8 +175,10 @@ fn is_coarse(vehicle: &DiveVehicle) -> bool {
 
 /// How the vehicle looked at the sea floor.
 fn equipment(dive: &Dive, vehicle: &DiveVehicle) -> String {
-    if vehicle.own.settings.program.is_empty() && !dive.settings.simulated {
-        return "What the vehicle was set to, such as its altitude, speed and camera, is not known without its own record.".to_owned();
+    if vehicle.own.settings.program.is_empty() && dive.settings.rehearsal_seed.is_none() {
+        return "What the vehicle was set to, such as its altitude, speed and camera, and whether its motion and its images were real, is not \
+                known without its own record."
+            .to_owned();
     }
     let all = dive.ran_with(vehicle);
     let set = |key: &str, default: f64| all.settings.get(key).and_then(Value::as_f64).unwrap_or(default);
@@ -263,12 +239,11 @@ fn uncertainty(vehicle: &DiveVehicle) -> String {
     let sigmas: Vec<f64> = sigmas.collect();
     let (Some(median_m), Some(last_m)) = (words::median(&sigmas), sigmas.last()) else { return String::new() };
     let most_m = sigmas.iter().copied().fold(0.0, f64::max);
-    let least_m = sigmas.iter().copied().fold(f64::INFINITY, f64::min);
-    if most_m - least_m < 0.005 {
-        return match vehicle.own.track.len() > 9 {
-            true => format!(" The uncertainty of its place was not measured: it stayed at {last_m:.2} m, as it began."),
-            false => format!(" It reported its place with a standard deviation of {last_m:.2} m."),
-        };
+    if !vehicle.measures_sigma() {
+        return format!(" The uncertainty of its place was not measured: it stayed at {last_m:.2} m, as it began.");
+    }
+    if format!("{median_m:.2} {last_m:.2}") == format!("{most_m:.2} {most_m:.2}") {
+        return format!(" It reported its place with a standard deviation of {last_m:.2} m.");
     }
     format!(
         " By its own estimate, which nothing has checked, the standard deviation of its place was {median_m:.1} m or less half of the time, \
@@ -284,12 +259,21 @@ fn found(state: &VehicleState, vehicle: &DiveVehicle, alone: Option<u64>) -> Str
     let doubt = largest.interval_m2.filter(|_| !is_least).map_or_else(String::new, |_| {
         format!("; 95 % interval by the model's own confidence: {}", interval(largest.interval_m2))
     });
+    let rivals = vehicle.classes.iter().skip(1).filter(|class| class.may_exceed(largest)).count();
+    let rivals = match rivals {
+        _ if is_least => String::new(),
+        0 => String::new(),
+        1 => " By these intervals one other class may be larger.".to_owned(),
+        n => {
+            format!(" By these intervals {n} other classes may be larger, so which one is the largest is not decided.")
+        }
+    };
     format!(
-        "The map that arrived has {all} cells of {0:.2} m x {0:.2} m, {1}, with {2} classes; the largest is {3} with {4} ({5:.0} %){doubt}.",
+        "The map that arrived has {all} cells of {0:.2} m x {0:.2} m, {1}, with {2} classes; the largest is {3} with {4} ({5:.0} %){doubt}.{rivals}",
         vehicle.cell_m,
         area(all as f64 * vehicle.cell_m * vehicle.cell_m),
         vehicle.classes.len(),
-        state.label_book.title(largest.label),
+        words::label(&state.label_book, largest.label),
         if is_least { format!("at least {}", area(largest.area_m2)) } else { area(largest.area_m2) },
         largest.cells as f64 / all as f64 * 100.0
     )
@@ -311,7 +295,7 @@ fn orders(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -> String {
         _ => format!(" The surface sent {}.", counted(fixes, "position fix", "position fixes")),
     };
     match all {
-        0 => format!("No order was given.{fixes}"),
+        0 => format!("No order was given.{}{fixes}", not_sent(dive, state)),
         n => {
             let [applied, refused, withdrawn] =
                 [OrderStatus::APPLIED, OrderStatus::REFUSED, OrderStatus::WITHDRAWN].map(ends);
@@ -331,7 +315,25 @@ fn orders(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -> String {
             let ends = ends.iter().filter(|(count, _)| *count > 0).map(|(count, end)| format!("{count} {end}"));
             let ends: Vec<String> = ends.collect();
             let ends = if ends.is_empty() { String::new() } else { format!("; {}", ends.join(", ")) };
-            format!("{} given{authors}{ends}.{open}{fixes}", counted(n, "order was", "orders were"))
+            format!(
+                "{} given{authors}{ends}.{open}{}{fixes}",
+                counted(n, "order was", "orders were"),
+                not_sent(dive, state)
+            )
         }
+    }
+}
+
+/// The orders that the surface refused itself.
+fn not_sent(dive: &Dive, state: &VehicleState) -> String {
+    let is_of_it = |event: &Event| event.vehicle == state.name || event.vehicle.is_empty();
+    let refused = |(_, event): &&(f64, Event)| event.source == LogKind::Refused.name() && is_of_it(event);
+    match dive.events.iter().filter(refused).count() {
+        0 => String::new(),
+        n => format!(
+            " The surface refused {} and did not send {}: see the events.",
+            counted(n, "order", "orders"),
+            if n == 1 { "it" } else { "them" }
+        ),
     }
 }

@@ -14,7 +14,24 @@ pub(super) struct TrackPoint {
     pub(super) sigma_m: f64,
 }
 
+/// The places of a path without those that a program began with before something measured one: a few, and then a jump.
+pub(super) fn measured(mut path: Vec<TrackPoint>, mission_speed: f64) -> Vec<TrackPoint> {
+    const FEW: usize = 3;
+    let pairs = path.iter().zip(path.iter().skip(1)).take(FEW);
+    let jump = pairs.enumerate().rfind(|(_, (a, b))| a.jumps_to(b, mission_speed));
+    path.drain(..jump.map_or(0, |(n, _)| n + 1));
+    path
+}
+
 impl TrackPoint {
+    /// Whether no vehicle is so fast as it would have been from here to there. Times are of the wall clock.
+    fn jumps_to(&self, next: &Self, mission_speed: f64) -> bool {
+        const JUMP_M: f64 = 5.0;
+        const MAX_M_S: f64 = 3.0;
+        let (step_m, time_s) = (self.distance_m(next), (next.at_s - self.at_s) * mission_speed);
+        step_m >= JUMP_M && step_m > MAX_M_S * time_s
+    }
+
     fn distance_m(&self, other: &Self) -> f64 {
         (other.east_m - self.east_m).hypot(other.north_m - self.north_m)
     }
@@ -43,13 +60,10 @@ impl DiveVehicle {
 
     /// The parts of its path between jumps: where its program began again with another place, or no vehicle is so fast.
     pub(super) fn legs(&self) -> impl Iterator<Item = &[TrackPoint]> {
-        const JUMP_M: f64 = 5.0;
-        const MAX_M_S: f64 = 3.0;
         let restarts = || self.own.runs_s.iter().skip(1).map(|(began_s, _)| *began_s);
         self.path().chunk_by(move |a, b| {
-            let (step_m, time_s) = (a.distance_m(b), (b.at_s - a.at_s) * self.mission_speed);
             let began_between = restarts().any(|began_s| a.at_s < began_s && b.at_s >= began_s);
-            step_m < 1.0 || !began_between && (step_m < JUMP_M || step_m <= MAX_M_S * time_s)
+            a.distance_m(b) < 1.0 || !began_between && !a.jumps_to(b, self.mission_speed)
         })
     }
 
@@ -57,6 +71,15 @@ impl DiveVehicle {
     pub(super) fn sigma_m(&self, at_s: f64) -> Option<f64> {
         let near = self.path().iter().filter(|point| (point.at_s - at_s).abs() < 60.0 && point.sigma_m.is_finite());
         near.min_by(|a, b| (a.at_s - at_s).abs().total_cmp(&(b.at_s - at_s).abs())).map(|point| point.sigma_m)
+    }
+
+    /// Whether something measured the uncertainty of its place, which stays as it began otherwise.
+    pub(super) fn measures_sigma(&self) -> bool {
+        const FEW: usize = 9;
+        let sigmas = self.path().iter().map(|point| point.sigma_m).filter(|sigma_m| sigma_m.is_finite());
+        let (least_m, most_m) =
+            sigmas.fold((f64::INFINITY, 0.0), |(least, most): (f64, f64), m| (least.min(m), most.max(m)));
+        self.own.track.len() <= FEW || most_m - least_m >= 0.005
     }
 
     /// Its speed while it moved, m/s, where its own record tells it. Times are of the wall clock, which the mission may be ahead of.
@@ -100,6 +123,16 @@ mod tests {
         let mut vehicle = DiveVehicle::default();
         vehicle.own = OwnRecord { track, runs_s: runs_s.to_vec(), ..OwnRecord::default() };
         vehicle
+    }
+
+    #[test]
+    fn the_places_that_a_program_began_with_are_no_part_of_the_path() {
+        let left = |east_m: &[f64]| -> Vec<f64> {
+            measured(vehicle(east_m, &[]).own.track, 1.0).iter().map(|point| point.east_m).collect()
+        };
+        assert_eq!(left(&[0.0, 0.0, 20.0, 21.0]), [20.0, 21.0]);
+        assert_eq!(left(&[0.0, 1.0, 2.0, 3.0, 4.0, 20.0]).len(), 6, "a jump under way");
+        assert_eq!(left(&[0.0]), [0.0]);
     }
 
     #[test]

@@ -29,32 +29,53 @@ pub(super) fn median(values: &[f64]) -> Option<f64> {
     sorted.get(sorted.len() / 2).copied()
 }
 
-/// An event with reasons of modes in words, and labels by their names.
+/// What the surface logs where a vehicle's program was restarted.
+pub(super) const ANOTHER_RUN: &str = "the vehicle begins another run";
+
+/// A label by its number and, where it has one, its name.
+pub(super) fn label(book: &LabelBook, label: u8) -> String {
+    book.name(label).map_or_else(|| format!("label {label}"), |name| format!("label {label} ({name})"))
+}
+
+/// Who gave an order or made an entry of the log.
+pub(super) fn author(name: &str) -> &str {
+    // The page without tokens, and `ctl` beside it.
+    if name == "local" { "the user of the surface's computer" } else { name }
+}
+
+/// An event with reasons of modes in words, and labels with their names.
 pub(super) fn event(book: &LabelBook, Event { source, text, .. }: &Event) -> String {
     let reasons = [
-        (": distance", ": the allowed distance, return path included, was used up"),
-        (": time", ": the allowed time, return path included, was used up"),
+        (": distance", ": the distance allowed since its limits were ordered, return path included, was used up"),
+        (": time", ": the time allowed since its limits were ordered, return path included, was used up"),
         (": silence", ": the surface was silent for longer than allowed"),
         (": fence", ": it was outside of the fence or in an area to stay out of"),
         (": depth or altitude", ": it was outside of its limits of depth or altitude"),
         (": no path", ": no path to its goals was allowed"),
         (": order", ": by order"),
+        ("holding", ": it had reached the end of its plan"),
+        ("done", ": the time of its survey was over"),
     ];
-    let in_words = |(short, long): &(&str, &str)| text.strip_suffix(short).map(|mode| format!("{mode}{long}"));
+    let in_words = |(short, long): &(&str, &str)| match text.strip_suffix(short)? {
+        "" => Some(format!("{short}{long}")),
+        mode => Some(format!("{mode}{long}")),
+    };
     let reason = if source.starts_with("mode") { reasons.iter().find_map(in_words) } else { None };
     let text = match (source.as_str(), text.as_str()) {
-        ("contact", "the vehicle begins another run") => "the vehicle's program was restarted".to_owned(),
+        ("contact", ANOTHER_RUN) => "the vehicle's program had been restarted".to_owned(),
         ("contact", "received") => "contact".to_owned(),
-        (_, text) => reason.unwrap_or_else(|| text.to_owned()),
+        (_, text) => reason.unwrap_or_else(|| match text.strip_prefix("local: ") {
+            Some(done) => format!("{}: {done}", author("local")),
+            None => text.to_owned(),
+        }),
     };
     let mut parts = text.split("label ");
     let first = parts.next().unwrap_or_default().to_owned();
     parts.fold(first, |told, part| {
         let digits = part.bytes().take_while(u8::is_ascii_digit).count();
-        let name = part[..digits].parse().ok().and_then(|label: u8| book.name(label));
-        let name = name.map_or_else(String::new, |name| format!(" ({name})"));
         let is_named = part[digits..].starts_with(" (") || part[digits..].starts_with(": name");
-        format!("{told}label {}{}{}", &part[..digits], if is_named { "" } else { &name }, &part[digits..])
+        let known = part[..digits].parse().ok().filter(|_| !is_named).map(|number| label(book, number));
+        format!("{told}{}{}", known.unwrap_or_else(|| format!("label {}", &part[..digits])), &part[digits..])
     })
 }
 
@@ -82,7 +103,7 @@ pub(super) fn content(book: &LabelBook, order: &Order) -> String {
         .to_owned();
     }
     let title =
-        |label: &Value| label.as_u64().and_then(|label| u8::try_from(label).ok()).map(|label| book.title(label));
+        |number: &Value| number.as_u64().and_then(|number| u8::try_from(number).ok()).map(|number| label(book, number));
     let member = |(name, value): (&String, &Value)| match (name.as_str(), value) {
         (_, Value::Null) => None,
         ("curiosity" | "exploration", weight) if weight.as_f64() == Some(0.0) => None,
@@ -90,8 +111,8 @@ pub(super) fn content(book: &LabelBook, order: &Order) -> String {
         ("curiosity", weight) => Some(format!("weight of unusual places {weight}")),
         ("weights", Value::Object(weights)) if weights.is_empty() => Some("no weights of labels".to_owned()),
         ("weights", Value::Object(weights)) => {
-            let weight = |(label, weight): (&String, &Value)| {
-                format!("{}: {weight}", label.parse().map_or_else(|_| label.clone(), |label| book.title(label)))
+            let weight = |(number, weight): (&String, &Value)| {
+                format!("{}: {weight}", number.parse().map_or_else(|_| number.clone(), |number| label(book, number)))
             };
             Some(format!("weights: {}", weights.iter().map(weight).collect::<Vec<_>>().join(", ")))
         }
@@ -174,7 +195,9 @@ fn limit(name: &str, value: &Value) -> String {
         Value::String(text) => text.clone(),
         other => number(other),
     };
-    format!("{} {said}{unit}", name.replace('_', " "))
+    // The vehicle counts both from the moment at which it takes the limits.
+    let since = if ["distance", "time"].contains(&name) { " since this order" } else { "" };
+    format!("{} {said}{unit}{since}", name.replace('_', " "))
 }
 
 /// A number without a fraction of 0.

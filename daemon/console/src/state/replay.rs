@@ -73,7 +73,7 @@ pub struct ReplayEventList {
 pub struct ReplayEvent {
     /// Seconds since 1970, UTC.
     pub at_utc_s: f64,
-    /// order, silence, mode, label, image, record, command, fault, loop or vehicle.
+    /// order, silence, mode, label, image, record, command, fault, refused, loop or vehicle.
     pub kind: String,
     /// The address of the vehicle; null if the event concerns the surface or all vehicles.
     pub vehicle: Option<u8>,

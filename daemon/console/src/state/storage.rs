@@ -89,7 +89,7 @@ pub struct LogLine {
     pub utc: String,
     /// The address of the vehicle; null if the entry concerns the surface or all vehicles.
     pub vehicle: Option<u8>,
-    /// order, answer, contact, mode, label, image, record or command.
+    /// order, answer, contact, mode, label, image, record, command, fault or refused.
     pub kind: String,
     /// The principal who caused it; null for the surface and the vehicle.
     pub by: Option<String>,

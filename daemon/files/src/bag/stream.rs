@@ -2,6 +2,7 @@
 //! damaged is left out, and what follows is read.
 
 use super::parts::{check_format, gaps, mcap_files};
+use mcap::McapError;
 use mcap::records::{Channel, Record, SchemaHeader, op};
 use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use scenecast_core::UserError;
@@ -231,6 +232,16 @@ fn read_chunk(chunk: &[u8], mut take: impl FnMut(u8, &[u8])) -> Result<(), Strin
     Ok(())
 }
 
+/// An error of the reader for people: a program that was killed leaves a record without its length.
+fn said(error: McapError) -> String {
+    match error {
+        McapError::RecordTooLarge { .. } | McapError::UnexpectedEof | McapError::UnexpectedEoc => {
+            "it ends in the middle of a record, as when a program is killed".to_owned()
+        }
+        other => other.to_string(),
+    }
+}
+
 /// What `take` makes of the kind and the bytes of the next record of a reader, which takes its bytes from a source.
 fn next_of<T>(
     reader: &mut LinearReader,
@@ -238,7 +249,7 @@ fn next_of<T>(
     take: impl FnOnce(u8, &[u8]) -> T,
 ) -> Result<Option<T>, String> {
     while let Some(event) = reader.next_event() {
-        match event.map_err(|e| e.to_string())? {
+        match event.map_err(said)? {
             LinearReadEvent::ReadRequest(length) => {
                 let read = source.read(reader.insert(length)).map_err(|e| e.to_string())?;
                 reader.notify_read(read);

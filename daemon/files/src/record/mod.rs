@@ -10,7 +10,7 @@ mod recover;
 pub use frame_times::{FrameTimes, SentFrame};
 pub use link::{FrameFate, RecordedLink};
 pub use mission_clock::{MissionClock, MissionSpeed, StateTime};
-pub use reader::{RecordedFrames, RecordedMessage, is_record, mission_records, read_record};
+pub use reader::{RecordFile, RecordedFrames, RecordedMessage, is_record, mission_records, read_record};
 pub use recover::{RecoveredPart, recover};
 
 use crate::sync_folder;

@@ -1,9 +1,13 @@
 //! The messages of a record.
 
+use crate::bag::parts::mcap_files;
 use crate::bag::stream::{BagMessage, BagStream};
 use scenecast_core::UserError;
 use scenecast_messages::scenecast_msgs::Frame;
 use scenecast_messages::{Message, decode};
+use sha2::{Digest, Sha256};
+use std::fs::File;
+use std::io::Read;
 use std::path::{Path, PathBuf};
 
 /// A message of a record.
@@ -71,6 +75,43 @@ pub fn mission_records(path: &Path) -> Result<Vec<PathBuf>, UserError> {
         return Err(UserError::file(path, "it is no record, and no folder in it is one: a record has files *.mcap"));
     }
     Ok(records)
+}
+
+/// A file of a record, as it can be recognised.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct RecordFile {
+    /// Its folder and its name.
+    pub name: String,
+    pub bytes: u64,
+    /// In hexadecimal digits.
+    pub sha256: String,
+}
+
+impl RecordFile {
+    /// The files of the records at a path.
+    ///
+    /// # Errors
+    /// There is none, or one cannot be read.
+    pub fn all(path: &Path) -> Result<Vec<Self>, UserError> {
+        let files = mission_records(path)?.iter().map(|record| mcap_files(record)).collect::<Result<Vec<_>, _>>()?;
+        files.concat().iter().map(|file| Self::of(file).map_err(|e| UserError::file(file, e))).collect()
+    }
+
+    fn of(path: &Path) -> std::io::Result<Self> {
+        let (mut file, mut sum, mut part) = (File::open(path)?, Sha256::new(), vec![0; 1 << 16]);
+        let mut bytes = 0;
+        loop {
+            let read = file.read(&mut part)?;
+            if read == 0 {
+                break;
+            }
+            bytes += read as u64;
+            sum.update(&part[..read]);
+        }
+        let within: PathBuf = path.components().skip(path.components().count().saturating_sub(2)).collect();
+        let sha256 = sum.finalize().iter().map(|byte| format!("{byte:02x}")).collect();
+        Ok(Self { name: within.display().to_string(), bytes, sha256 })
+    }
 }
 
 /// The frames that an end has sent and received, in the order of their times.

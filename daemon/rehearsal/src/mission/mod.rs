@@ -136,6 +136,11 @@ impl Mission {
         &self.config
     }
 
+    /// The seed of all its random numbers.
+    pub fn seed(&self) -> u64 {
+        self.seed
+    }
+
     /// The modem of both ends.
     pub fn modem(&self) -> &ModemProfile {
         self.vehicle.link().profile()

@@ -151,9 +151,9 @@ impl Record {
     }
 }
 
-/// The program, whether the mission is simulated, and the settings that differ from their defaults, as JSON.
-fn settings_text(config: &Config, is_simulated: bool) -> String {
-    scenecast_config::changed_settings(scenecast_core::program(), is_simulated, config)
+/// The program, the seed of a rehearsal, and the settings that differ from their defaults, as JSON.
+fn settings_text(config: &Config, rehearsal_seed: Option<u64>) -> String {
+    scenecast_config::changed_settings(scenecast_core::program(), rehearsal_seed, config)
 }
 
 /// What an end ran with.

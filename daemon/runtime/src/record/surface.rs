@@ -38,13 +38,13 @@ impl SurfaceRecord {
     /// `offers_key` is whether it offers the vehicles a next key, `log` the last entry of the surface's log, which an earlier
     /// process has recorded.
     pub fn start(config: &Config, name: &str, folder: &Path, offers_key: bool, log: u64) -> Self {
-        let recorder = SurfaceRecorder { hides_keys: offers_key, log, ..SurfaceRecorder::new(config, false) };
+        let recorder = SurfaceRecorder { hides_keys: offers_key, log, ..SurfaceRecorder::new(config, None) };
         Self { record: Record::start(config, name, folder), recorder }
     }
 
-    /// Begins that of a rehearsal.
-    pub fn rehearsed(config: &Config, folder: &Path) -> Self {
-        Self { record: Record::start(config, "surface", folder), recorder: SurfaceRecorder::new(config, true) }
+    /// Begins that of a rehearsal with this seed.
+    pub fn rehearsed(config: &Config, folder: &Path, seed: u64) -> Self {
+        Self { record: Record::start(config, "surface", folder), recorder: SurfaceRecorder::new(config, Some(seed)) }
     }
 
     /// Whether there is a record.
@@ -120,9 +120,9 @@ struct RecordedLayer {
 }
 
 impl SurfaceRecorder {
-    /// Records a surface of this configuration.
-    pub fn new(config: &Config, is_simulated: bool) -> Self {
-        Self { settings: settings_text(config, is_simulated), ..Self::default() }
+    /// Records a surface of this configuration, or that of a rehearsal with a seed.
+    pub fn new(config: &Config, rehearsal_seed: Option<u64>) -> Self {
+        Self { settings: settings_text(config, rehearsal_seed), ..Self::default() }
     }
 
     /// What has changed since the last call, or the whole state where `part` is another one than then.

@@ -33,15 +33,15 @@ impl VehicleRecord {
     /// Begins it in a folder in `folder`, unless the configuration names another one.
     pub fn start(config: &Config, folder: &Path, speed: f64) -> Self {
         let hides_keys = config.link.key_file.is_some();
-        let recorder = VehicleRecorder { hides_keys, ..VehicleRecorder::new(config, false) };
+        let recorder = VehicleRecorder { hides_keys, ..VehicleRecorder::new(config, None) };
         let record = Record::start(config, &config.vehicle.name, folder);
         Self { record, recorder, stamps: Stamps::with_speed(speed), has_log: true }
     }
 
-    /// Begins that of a rehearsal.
-    pub fn rehearsed(config: &Config, folder: &Path, speed: f64) -> Self {
+    /// Begins that of a rehearsal with this seed.
+    pub fn rehearsed(config: &Config, folder: &Path, speed: f64, seed: u64) -> Self {
         let record = Record::start(config, &config.vehicle.name, folder);
-        let recorder = VehicleRecorder::new(config, true);
+        let recorder = VehicleRecorder::new(config, Some(seed));
         Self { record, recorder, stamps: Stamps::with_speed(speed), has_log: false }
     }
 
@@ -91,11 +91,11 @@ pub struct VehicleRecorder {
 }
 
 impl VehicleRecorder {
-    /// Records a vehicle of this configuration.
-    pub fn new(config: &Config, is_simulated: bool) -> Self {
+    /// Records a vehicle of this configuration, or that of a rehearsal with a seed.
+    pub fn new(config: &Config, rehearsal_seed: Option<u64>) -> Self {
         let named = Named { name: config.vehicle.name.clone(), ..Named::default() };
         let (map, mode) = (RecordedMap::default(), String::new());
-        let (cell_m, settings) = (cell_m(config), settings_text(config, is_simulated));
+        let (cell_m, settings) = (cell_m(config), settings_text(config, rehearsal_seed));
         Self {
             named,
             cell_m,

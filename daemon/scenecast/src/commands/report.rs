@@ -28,7 +28,7 @@ pub(super) struct Report {
 impl Report {
     pub(super) fn run(self) -> Result<(), UserError> {
         scenecast_runtime::keep_private();
-        let dive = Dive::read(&self.records)?;
+        let dive = Dive::read_ended(&self.records)?;
         if let Some(damage) = &dive.damage {
             errln!("scenecast: a part of the record could not be read: {damage}");
         }

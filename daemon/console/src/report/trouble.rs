@@ -1,0 +1,101 @@
+//! What went wrong in a dive, and what it did by order or because of a limit.
+
+use super::dive::{Dive, DiveVehicle};
+use super::{gaps, words};
+use crate::state::VehicleState;
+use scenecast_core::utc_text;
+use scenecast_messages::contents::valid_part;
+use scenecast_messages::scenecast_msgs::Event;
+use scenecast_protocol::wire::{ModeReason, VehicleMode};
+
+/// Events that are told in a sentence; of more, the first.
+const MAX_TOLD: usize = 8;
+
+/// The events that people should look at: faults, silences, restarts, and modes that nobody had ordered; then the modes that were ordered
+/// or came from a limit.
+pub(super) fn told(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -> Vec<String> {
+    let modes = dive.mode_source();
+    let is_of_it = |event: &Event| event.vehicle.is_empty() || valid_part(&event.vehicle) == valid_part(&state.name);
+    let is_restart = |event: &Event| event.source == "contact" && event.text == words::ANOTHER_RUN;
+    let has_own = !vehicle.own.runs_s.is_empty();
+    let is_trouble = |event: &Event| match event.source.as_str() {
+        "fault" => true,
+        source if source == modes => !is_planned(&event.text),
+        // Its own record says when it was.
+        "contact" => event.text != "received" && !(has_own && is_restart(event)),
+        _ => false,
+    };
+    let of_it = || dive.events.iter().filter(|(_, event)| is_of_it(event));
+    let told = |(at_s, event): &(f64, Event)| (*at_s, words::event(&state.label_book, event));
+    let restarts = |who: &'static str| {
+        move |&(from_s, to_s): &(f64, f64)| {
+            (from_s, format!("{who} program ended, and ran again from {}", utc_text(to_s)))
+        }
+    };
+    let own = vehicle.own.runs_s.windows(2).map(|pair| (pair[0].1, pair[1].0)).collect::<Vec<_>>();
+    let mut found: Vec<(f64, String)> = of_it().filter(|(_, event)| is_trouble(event)).map(told).collect();
+    found.extend(dive.restarts_s.iter().map(restarts("the surface's")));
+    found.extend(own.iter().map(restarts("the vehicle's")));
+    found.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let planned = of_it().filter(|(_, event)| event.source == modes && is_limited(&event.text)).map(told);
+    let planned: Vec<(f64, String)> = planned.collect();
+    let none = match gaps::has_silence(dive, vehicle) {
+        true => "No fault was reported.",
+        false => "No fault and no silence was reported.",
+    };
+    let mut sentences = vec![listed("Faults, silences and restarts", &found).unwrap_or_else(|| none.to_owned())];
+    sentences.extend(listed("As ordered, or because of a limit or the end of its plan", &planned));
+    sentences
+}
+
+/// Whether a mode is the survey or its end, or one that was ordered or that a limit led to.
+fn is_planned(mode: &str) -> bool {
+    [VehicleMode::Survey, VehicleMode::Done].iter().any(|planned| mode.starts_with(planned.name())) || is_limited(mode)
+}
+
+/// Whether an order, a limit of distance or time, or the end of its plan led to a mode other than the survey.
+fn is_limited(mode: &str) -> bool {
+    let reasons = [ModeReason::Order, ModeReason::Distance, ModeReason::Time];
+    let is_of = |reason: &ModeReason| mode.rsplit_once(": ").is_some_and(|(_, end)| Some(end) == reason.name());
+    mode == VehicleMode::Hold.name() || mode == VehicleMode::Done.name() || reasons.iter().any(is_of)
+}
+
+fn listed(title: &str, found: &[(f64, String)]) -> Option<String> {
+    let told: Vec<String> = found.iter().map(|(at_s, text)| format!("{}, {text}", utc_text(*at_s))).collect();
+    match told.len() {
+        0 => None,
+        n if n > MAX_TOLD => {
+            let first = told[..MAX_TOLD].join("; ");
+            Some(format!("{title}: {n} events, which the table of events has; the first were {first}."))
+        }
+        _ => Some(format!("{title}: {}.", told.join("; "))),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_was_ordered_is_no_trouble() {
+        for planned in ["surveying", "done", "holding", "holding: order", "returning: distance"] {
+            assert!(is_planned(planned), "{planned}");
+        }
+        for trouble in ["returning: silence", "holding: fence", "holding: no path"] {
+            assert!(!is_planned(trouble), "{trouble}");
+        }
+        assert!(!is_limited("surveying"));
+    }
+
+    #[test]
+    fn of_many_events_the_first_are_told() {
+        let events: Vec<(f64, String)> = (0..9).map(|n| (f64::from(n), format!("event {n}"))).collect();
+        let told = listed("Faults", &events).unwrap();
+        assert!(
+            told.starts_with("Faults: 9 events") && told.contains("event 7") && !told.contains("event 8"),
+            "{told}"
+        );
+        assert_eq!(listed("Faults", &events[..1]).unwrap(), "Faults: 1970-01-01T00:00:00Z, event 0.");
+        assert_eq!(listed("Faults", &[]), None);
+    }
+}
