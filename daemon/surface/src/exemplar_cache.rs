@@ -53,6 +53,19 @@ pub struct StoredExemplar {
     pub taken: Option<Instant>,
 }
 
+impl StoredExemplar {
+    /// How wide it is on the sea floor, metres; `None` where that is not known.
+    pub fn width_m(&self) -> Option<f64> {
+        (self.view.width_mm > 0).then(|| f64::from(self.view.width_mm) / 1000.0)
+    }
+
+    /// Its middle in the world frame, from which the vehicle's map lies `shift_m` away, metres.
+    pub fn place_m(&self, shift_m: (f64, f64)) -> Option<(f64, f64)> {
+        let (east_m, north_m) = self.view.middle_m();
+        self.width_m().map(|_| (east_m + shift_m.0, north_m + shift_m.1))
+    }
+}
+
 /// The exemplars of a label.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct LabelExemplars {

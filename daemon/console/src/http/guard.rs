@@ -74,7 +74,7 @@ fn is_viewer(path: &str, origin: &str) -> bool {
 
 /// Refuses principals below a role, before the body of the request is read. The log has what they wanted to change.
 pub(super) async fn require_role(
-    State((needed, shared)): State<(Role, Shared)>,
+    State((needed, id, shared)): State<(Role, &'static str, Shared)>,
     by: Option<Extension<Giver>>,
     request: Request,
     next: Next,
@@ -84,7 +84,7 @@ pub(super) async fn require_role(
         Some(Extension(by)) => {
             let line = format!("this needs the role {needed}; the role of {} is {}", by.name(), by.role());
             if *request.method() != Method::GET {
-                let what = format!("{} {}: not sent: {line}", request.method(), request.uri().path());
+                let what = format!("{} ({}): not sent: {line}", id.replace('_', " "), request.uri().path());
                 let _ = shared.order(by, SurfaceRequest::Barred(what)).await;
             }
             error(StatusCode::FORBIDDEN, &line)

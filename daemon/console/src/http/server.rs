@@ -98,7 +98,7 @@ fn router(shared: Shared) -> Router {
             o.path,
             match o.role {
                 Some(role) => {
-                    let state = (role, shared.clone());
+                    let state = (role, o.id, shared.clone());
                     route.route_layer(axum::middleware::from_fn_with_state(state, guard::require_role))
                 }
                 None => route,

@@ -110,8 +110,8 @@ pub(crate) struct Known {
     pub(crate) given: Vec<Order>,
     pub(crate) orders: Vec<OrderStatus>,
     pub(crate) link: Vec<(u64, Link)>,
-    /// Frames that the end of this record has transmitted, copies included.
-    pub(crate) sent: u64,
+    /// Frames that the end of this record has sent, copies included, received and dropped.
+    pub(crate) frames: [u64; 3],
     /// The bits of what they carried first, by its name.
     pub(crate) sent_bits: BTreeMap<String, u64>,
     /// Begin and end of each record.
@@ -153,7 +153,7 @@ impl Recording {
         }
         of_one_mission(&surfaces, &vehicles)?;
         let mut span = (u64::MAX, 0);
-        let frames = FrameTimes::joined(surfaces.iter().map(|surface| &surface.frames));
+        let known_frames = FrameTimes::joined(surfaces.iter().map(|surface| &surface.frames));
         surfaces.sort_by_key(|record| record.span);
         for surface in surfaces {
             span = joined(span, surface.span, 0);
@@ -166,13 +166,13 @@ impl Recording {
         }
         vehicles.sort_by_key(|record| record.span);
         for vehicle in vehicles {
-            let shift = vehicle.frames.shift_to(&frames);
-            let (sent, runs) = (vehicle.counts[0], vehicle.span.into_iter().collect::<Vec<_>>());
+            let shift = vehicle.frames.shift_to(&known_frames);
+            let (frames, runs) = (vehicle.counts, vehicle.span.into_iter().collect::<Vec<_>>());
             span = joined(span, vehicle.span, shift);
             vehicle.known.into_iter().for_each(|(part, known)| {
                 whole.vehicles.entry(part).or_default().add(
                     Known {
-                        sent,
+                        frames,
                         sent_bits: vehicle.sent_bits.clone(),
                         settings: vehicle.settings.clone(),
                         runs: runs.clone(),
@@ -344,7 +344,7 @@ impl Known {
         self.map.add(later.map, moved);
         self.exemplars.extend(later.exemplars.into_iter().map(|(at, exemplar)| (moved(at), exemplar)));
         self.heard.extend(later.heard.into_iter().map(moved));
-        self.sent += later.sent;
+        self.frames.iter_mut().zip(later.frames).for_each(|(all, own)| *all += own);
         later.sent_bits.into_iter().for_each(|(content, bits)| *self.sent_bits.entry(content).or_default() += bits);
         self.runs.extend(later.runs.into_iter().map(|(from, to)| (moved(from), moved(to))));
         if !later.settings.is_empty() {

@@ -44,7 +44,7 @@ pub struct Dive {
 }
 
 /// The program that made a record, and its settings that differed from their defaults, by key.
-#[derive(Debug, Default, serde::Deserialize)]
+#[derive(Debug, Default, PartialEq, serde::Deserialize)]
 #[serde(default)]
 pub(super) struct SettingsRecord {
     pub(super) program: String,
@@ -97,8 +97,8 @@ pub(super) struct DiveVehicle {
 pub(super) struct OwnRecord {
     /// Its places, in the world frame as its map lies at the end.
     pub(super) track: Vec<TrackPoint>,
-    /// Frames that it has transmitted, copies included.
-    pub(super) sent: u64,
+    /// Frames that it has sent, copies included, received and dropped.
+    pub(super) frames: [u64; 3],
     /// The bits of what they carried first, by its name.
     pub(super) sent_bits: BTreeMap<String, u64>,
     /// When it heard frames of the surface, seconds since 1970.
@@ -244,7 +244,7 @@ impl DiveVehicle {
             track: known.poses.iter().map(|(_, pose)| TrackPoint::of(pose)).filter(TrackPoint::is_known).collect(),
             own: own.map_or_else(OwnRecord::default, |own| OwnRecord {
                 track: measured(own.poses.iter().map(moved).filter(TrackPoint::is_known).collect(), mission_speed),
-                sent: own.sent,
+                frames: own.frames,
                 sent_bits: own.sent_bits.clone(),
                 heard_s: own.heard.iter().copied().map(seconds).collect(),
                 runs_s: own.runs.iter().map(|(from, to)| (seconds(*from), seconds(*to))).collect(),
@@ -270,7 +270,10 @@ impl DiveVehicle {
                 vehicle.exemplars.push((seconds(if received == 0 { *at } else { received }), exemplar.clone()));
             }
         }
-        vehicle.given = known.given.iter().map(|order| ((order.slot.clone(), order.version), order.clone())).collect();
+        for order in &known.given {
+            // A surface that was restarted may record it again, without what has been done of it.
+            vehicle.given.entry((order.slot.clone(), order.version)).or_insert_with(|| order.clone());
+        }
         known.orders.iter().for_each(|status| vehicle.take_order(status));
         own.iter().flat_map(|own| &own.orders).for_each(|status| vehicle.take_decision(status));
         Some(vehicle)

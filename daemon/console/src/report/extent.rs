@@ -31,11 +31,14 @@ pub(super) fn of_map(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -
 pub(super) fn sea_floor(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -> Option<String> {
     let cells = dive.map_cells(state, vehicle);
     let layer = cells.layers().iter().find(|layer| layer.descriptor().quantity == Quantity::Depth)?;
-    let depths = vehicle.labels.iter().filter_map(|(cell, _)| layer.value(cell));
-    let (least, most) = depths.fold((f64::INFINITY, f64::NEG_INFINITY), |(least, most), m| (least.min(m), most.max(m)));
-    (least <= most).then(|| match format!("{least:.1}") == format!("{most:.1}") {
+    let depths: Vec<f64> = vehicle.labels.iter().filter_map(|(cell, _)| layer.value(cell)).collect();
+    let median = words::median(&depths)?;
+    let (least, most) = depths.iter().fold((median, median), |(least, most), m| (least.min(*m), most.max(*m)));
+    Some(match format!("{least:.1}") == format!("{most:.1}") {
         true => format!("The water is {least:.1} m deep there."),
-        false => format!("The water is {least:.1} to {most:.1} m deep there."),
+        false => format!(
+            "The water is {median:.1} m deep there in the median of the cells, and {least:.1} to {most:.1} m in all of them."
+        ),
     })
 }
 
@@ -51,8 +54,11 @@ fn unseen(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle, shift: (f64,
     };
     let middles = vehicle.labels.iter().map(|(cell, _)| vehicle.middle_of(cell, shift));
     let share = Area { west, south, east, north }.covered(middles, vehicle.cell_m);
+    let fence = seen_of_fence(state, vehicle, shift);
+    let fence =
+        fence.map_or_else(String::new, |share| format!(", and {:.1} % of the area within the fence", share * 100.0));
     format!(
-        " Of the area of the survey, {west} to {east} m east and {south} to {north} m north, {:.1} % is on the map.",
+        " Of the area of the survey, {west} to {east} m east and {south} to {north} m north, {:.1} % is on the map{fence}.",
         share * 100.0
     )
 }

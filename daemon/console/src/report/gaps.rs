@@ -57,7 +57,7 @@ fn pauses(dive: &Dive, times_s: &[f64], span_s: (f64, f64)) -> String {
         0 => {
             let pauses = times_s.iter().zip(&times_s[1.min(times_s.len())..]).map(|(a, b)| dive.mission_s(b - a));
             let longest = pauses.fold(0.0, f64::max);
-            format!("without a much longer pause (the longest was {})", duration(longest))
+            format!("the longest pause was {}", duration(longest))
         }
         n if n > told.len() => format!("with {n} longer pauses, the longest of which were {}", told.join(", ")),
         n => format!("with {}: {}", counted(n, "longer pause", "longer pauses"), told.join(", ")),
@@ -108,7 +108,11 @@ pub(super) fn of_records(dive: &Dive, vehicle: &DiveVehicle) -> Vec<String> {
             span(gap)
         )
     });
-    surface.chain(idle).chain(vehicle_ended).chain(stood).chain(more).collect()
+    let unknown = vehicle.own.runs_s.is_empty().then(|| {
+        "What went on on board between the frames that were heard, such as a restart of its program, is not known without its own record."
+            .to_owned()
+    });
+    surface.chain(idle).chain(unknown).chain(vehicle_ended).chain(stood).chain(more).collect()
 }
 
 #[cfg(test)]
@@ -128,10 +132,7 @@ mod tests {
         let told =
             "every 1.0 s in most cases, with 1 longer pause: 30 s from 1970-01-01T00:00:30Z to 1970-01-01T00:01:00Z.";
         assert_eq!(pauses(&dive, &times, dive.span_s), told);
-        assert_eq!(
-            pauses(&dive, &times[..30], (0.0, 30.0)),
-            "every 1.0 s in most cases, without a much longer pause (the longest was 1 s)."
-        );
+        assert_eq!(pauses(&dive, &times[..30], (0.0, 30.0)), "every 1.0 s in most cases, the longest pause was 1 s.");
         let faster = dive_of(10.0, 10.0);
         let times: Vec<f64> = times.iter().map(|s| s / 10.0).collect();
         assert!(

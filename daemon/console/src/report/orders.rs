@@ -191,10 +191,18 @@ impl Dive {
                 last.insert(order.0.as_str(), (order, applied));
             }
         }
+        let is_aborted = last
+            .get(SlotId::Constraints.name())
+            .is_some_and(|(order, _)| vehicle.content(state, order).is_some_and(|content| content == "abort"));
+        if is_aborted {
+            last.remove(SlotId::Destination.name());
+        }
         last.retain(|slot, (order, _)| {
             let is_over = state.orders.in_force.get(*slot) == Some(&InForceKnowledge::None);
             !is_over && vehicle.content(state, order).is_none_or(|content| content != "resume")
         });
+        let mut last: Vec<_> = last.into_iter().collect();
+        last.sort_by(|a, b| a.1.1.given_s.total_cmp(&b.1.1.given_s));
         let rows: String = last
             .into_iter()
             .map(|(slot, (order, step))| {

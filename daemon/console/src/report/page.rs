@@ -51,16 +51,20 @@ impl Dive {
     /// Settings, versions, and how to cite.
     fn origin_of_figures(&self, page: &mut String) {
         settings(page, "the surface", &self.settings);
-        for (state, vehicle) in self.vehicles() {
-            settings(page, &state.name, &vehicle.own.settings);
-        }
+        // Both ends of a rehearsal run with the same.
+        let others = self.vehicles().filter(|(_, vehicle)| vehicle.own.settings != self.settings);
+        others.for_each(|(state, vehicle)| settings(page, &state.name, &vehicle.own.settings));
         let (begin, end) = (utc_text(self.span_s.0), utc_text(self.span_s.1));
         let (mission, run) = (Escaped(&self.state.mission.name), Escaped(&self.state.mission.id));
         let recorded = if self.settings.program.is_empty() { "an earlier scenecast" } else { &self.settings.program };
         let names: Vec<&str> = self.state.vehicles.iter().map(|vehicle| vehicle.name.as_str()).collect();
         let program = Escaped(scenecast_core::program());
         let made_up: BTreeSet<String> = self.vehicles().filter_map(|(_, vehicle)| vehicle.made_up(self)).collect();
-        let made_up: String = made_up.iter().map(|what| format!(", {what}")).collect();
+        let is_known = self.vehicles().all(|(_, vehicle)| !vehicle.own.settings.program.is_empty());
+        let made_up: String = match made_up.is_empty() && !is_known {
+            true => ", of which these records do not say whether its motion and its images were real".to_owned(),
+            false => made_up.iter().map(|what| format!(", {what}")).collect(),
+        };
         let own = self.vehicles().filter(|(_, vehicle)| !vehicle.own.track.is_empty()).count();
         let own = if own > 0 { " and those of the vehicles themselves" } else { "" };
         let origin =
@@ -237,7 +241,7 @@ fn classes(page: &mut String, dive: &Dive, state: &VehicleState, vehicle: &DiveV
             class.label,
             state.label_book.colour_text(class.label),
             Escaped(&state.label_book.title(class.label)),
-            merged(state, vehicle, class.label),
+            words::merged(state, vehicle, class.label),
             class.cells,
             words::area(class.area_m2),
             words::interval(class.interval_m2),
@@ -272,7 +276,14 @@ fn without_cells(page: &mut String, dive: &Dive, state: &VehicleState, vehicle: 
     let named = book.iter().filter(|(_, entry)| entry.name.is_some()).map(|(label, _)| *label);
     let pictured = vehicle.exemplars.iter().map(|(_, exemplar)| exemplar.label);
     let had = vehicle.had.iter().copied();
-    let labels: BTreeSet<u8> = named.chain(pictured).chain(had).filter(|label| !has_cells(*label)).collect();
+    let never: Vec<String> = named
+        .filter(|label| !has_cells(*label) && !vehicle.had.contains(label))
+        .map(|label| words::label(book, label))
+        .collect();
+    if !never.is_empty() {
+        let _ = writeln!(page, "<p>People named labels that the map never had: {}.</p>", Escaped(&never.join(", ")));
+    }
+    let labels: BTreeSet<u8> = pictured.chain(had).filter(|label| !has_cells(*label)).collect();
     if labels.is_empty() {
         return;
     }
@@ -297,20 +308,6 @@ fn legend(state: &VehicleState, vehicle: &DiveVehicle) -> String {
     vehicle.classes.iter().map(entry).collect()
 }
 
-/// The labels that are shown as a class, if there are several: those with cells, and those that were merged into it.
-fn merged(state: &VehicleState, vehicle: &DiveVehicle, class: u8) -> String {
-    let book = &state.label_book;
-    let on_map = vehicle.labels.iter().map(|(_, label)| label);
-    let labels: BTreeSet<u8> =
-        on_map.chain(book.keys().copied()).filter(|label| book.shown_as(*label) == class).collect();
-    let labels: Vec<String> = labels.into_iter().map(|label| label.to_string()).collect();
-    match &labels[..] {
-        [only] if *only == class.to_string() => String::new(),
-        [only] => format!(" (label {only})"),
-        _ => format!(" (labels {})", labels.join(", ")),
-    }
-}
-
 /// The largest images of a class, each with its label, time, place and scale.
 fn images(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle, class: u8) -> String {
     let of_class = |label: u8| state.label_book.shown_as(label) == class;
@@ -322,15 +319,17 @@ fn images(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle, class: u8) -
     let of_it: Vec<_> = vehicle.exemplars.iter().filter(|(_, exemplar)| of_class(exemplar.label)).collect();
     let mut found: Vec<_> = of_it.iter().copied().filter(|(_, exemplar)| shows_it(exemplar)).collect();
     found.sort_by_key(|(_, exemplar)| std::cmp::Reverse(exemplar.data.len()));
-    // Without a better one, those that the vehicle sent for the class.
-    let shown = if found.is_empty() { &of_it } else { &found };
+    // Beside them those that the vehicle sent for the class.
+    found.extend(of_it.iter().copied().filter(|(_, exemplar)| !shows_it(exemplar)));
     let note = |exemplar: &Exemplar| match shows_it(exemplar) {
         true => String::new(),
         false => "; by the map at the end its place has another class".to_owned(),
     };
-    let more = of_it.len() - shown.len().min(IMAGES);
+    let more = found.len().saturating_sub(IMAGES);
     let more = if more == 0 { String::new() } else { format!("; {more} more of this class came in") };
-    let shown = shown.iter().take(IMAGES).enumerate();
+    found.truncate(IMAGES);
+    found.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let shown = found.iter().enumerate();
     shown
         .map(|(n, found)| image(dive, state, vehicle, found, &(note(&found.1) + if n == 0 { &more } else { "" })))
         .collect()
@@ -374,27 +373,17 @@ fn notes(page: &mut String, dive: &Dive, state: &VehicleState) {
         return;
     }
     *page += "<h3>Notes and markers</h3>\n<ul>\n";
-    let utc = |at_s: f64| utc_text(dive.unix_s(at_s));
-    for note in &state.notes {
-        let _ = writeln!(
-            page,
-            "<li>{}, {}: {}</li>",
-            utc(note.at_s),
-            Escaped(words::author(&note.author)),
-            Escaped(&note.text)
-        );
-    }
-    for marker in &state.markers {
-        let _ = writeln!(
-            page,
-            "<li>{}, {}: {} ({}, {}{})</li>",
-            utc(marker.at_s),
-            Escaped(words::author(&marker.author)),
-            Escaped(&marker.text),
-            words::east(marker.x_m),
-            words::north(marker.y_m),
-            words::on_earth(dive, (marker.x_m, marker.y_m))
-        );
+    let notes = state.notes.iter().map(|note| (note.at_s, &note.author, note.text.clone()));
+    let markers = state.markers.iter().map(|marker| {
+        let on_earth = words::on_earth(dive, (marker.x_m, marker.y_m));
+        let place = format!("{}, {}{on_earth}", words::east(marker.x_m), words::north(marker.y_m));
+        (marker.at_s, &marker.author, format!("{} ({place})", marker.text))
+    });
+    let mut all: Vec<(f64, &String, String)> = notes.chain(markers).collect();
+    all.sort_by(|a, b| a.0.total_cmp(&b.0));
+    for (at_s, author, text) in all {
+        let author = Escaped(words::author(author));
+        let _ = writeln!(page, "<li>{}, {author}: {}</li>", utc_text(dive.unix_s(at_s)), Escaped(&text));
     }
     *page += "</ul>\n";
 }

@@ -11,7 +11,7 @@ use scenecast_protocol::directive::SlotId;
 use scenecast_protocol::map::{Cell, UNEXPLORED};
 use scenecast_surface::LogKind;
 use serde_json::Value;
-use std::collections::BTreeSet;
+use std::collections::BTreeMap;
 
 /// Where, when, how long, how far, what was found, what was ordered and what failed, a sentence each.
 pub(super) fn summary(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -> Vec<String> {
@@ -21,7 +21,7 @@ pub(super) fn summary(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) 
         sentences.push("Its dates mean nothing: a rehearsal in virtual time begins on 2000-01-01.".to_owned());
     }
     sentences.push(when(dive, state, vehicle));
-    sentences.push(place(dive, vehicle));
+    sentences.push(place(dive, state, vehicle));
     sentences.push(equipment(dive, vehicle));
     let alone = is_coarse(vehicle).then(|| alone(vehicle));
     sentences.push(found(state, vehicle, alone));
@@ -46,6 +46,19 @@ fn link(dive: &Dive, vehicle: &DiveVehicle) -> Vec<String> {
     let mut sentences = Vec::new();
     let link = &dive.state.link;
     let lost = |direction: &LinkDirection| direction.loss * 100.0;
+    let [sent, received, dropped] = vehicle.own.frames;
+    if sent + received > 0 && dive.state.vehicles.len() == 1 {
+        let [down, heard, unusable] = dive.frames;
+        let share = |heard: u64, sent: u64| sent.saturating_sub(heard) as f64 / sent.max(1) as f64 * 100.0;
+        sentences.push(format!(
+            "By both records, the vehicle transmitted {sent} frames, copies included, of which the surface heard {} ({:.1} % were lost) and could \
+             not use {unusable}; the surface transmitted {down}, of which the vehicle heard {} ({:.1} % were lost) and could not use {dropped}.",
+            heard + unusable,
+            share(heard + unusable, sent),
+            received + dropped,
+            share(received + dropped, down)
+        ));
+    }
     sentences.extend(match link.up.lost + link.down.lost {
         // Of the others nobody knows how many there were.
         _ if link.up.frames == 0 => None,
@@ -54,20 +67,17 @@ fn link(dive: &Dive, vehicle: &DiveVehicle) -> Vec<String> {
             link.up.frames, link.down.frames
         )),
         _ => Some(format!(
-            "Of {} numbered frames from the vehicles, {:.1} % never arrived in a usable form; of {} to them, {:.1} %. Lost changes of the \
-             map and lost orders were sent again.",
+            "Of {} numbered frames from the vehicles, {:.1} % never arrived in a usable form, repeats included; of {} to them, {:.1} %. What \
+             they held of the map and of orders was sent again.",
             link.up.frames,
             lost(&link.up),
             link.down.frames,
             lost(&link.down)
         )),
     });
-    if vehicle.own.sent > 0 && dive.state.vehicles.len() == 1 {
-        let [_, received, dropped] = dive.frames;
+    if let (Some(up_j), Some(down_j)) = (link.up.energy_j, link.down.energy_j) {
         sentences.push(format!(
-            "By its own record it transmitted {} frames, copies included; the surface heard {}.",
-            vehicle.own.sent,
-            received + dropped
+            "By modem.tx_watts of the surface, the modems of the vehicles spent about {up_j:.0} J on transmitting, that of the surface {down_j:.0} J."
         ));
     }
     sentences
@@ -79,7 +89,7 @@ fn agreement(vehicle: &DiveVehicle) -> Option<String> {
     let mean = shares.iter().sum::<f64>() / shares.len() as f64;
     shares.last().map(|last| {
         format!(
-            "Of the cells that the vehicle had to send {:.0} % had the same label on the operator's map at the end, and {:.0} % on average \
+            "Of the cells that the vehicle had to send, {:.0} % had the same label on the operator's map at the end, and {:.0} % on average \
              over the record.",
             last * 100.0,
             mean * 100.0
@@ -90,14 +100,22 @@ fn agreement(vehicle: &DiveVehicle) -> Option<String> {
 /// How far the operator's map was behind.
 fn lag(vehicle: &DiveVehicle) -> Option<String> {
     let lags: Vec<f64> = vehicle.maps.iter().map(|maps| maps.lag_s).filter(|lag_s| lag_s.is_finite()).collect();
-    let (median, most) = (duration(words::median(&lags)?), duration(lags.iter().copied().fold(0.0, f64::max)));
+    let (median_s, most) = (words::median(&lags)?, duration(lags.iter().copied().fold(0.0, f64::max)));
+    let median = duration(median_s);
     Some(match vehicle.own.runs_s.is_empty() {
+        false if median_s < 1.0 => format!(
+            "By both records, at most of {} moments no change of the vehicle's map was missing on the operator's; at the worst one, changes had \
+             been missing for {most}.",
+            lags.len()
+        ),
         true => format!(
-            "By the surface's estimate, the operator's map was behind the vehicle's by {median} or less half of the time, and by {most} at most."
+            "By the surface's estimate, with the time in which all will have been sent, the operator's map was behind the vehicle's by {median} \
+             or less half of the time, and by {most} at most."
         ),
         false => format!(
-            "By both records, the operator's map lacked changes of the vehicle's for {median} or less half of the time, and for {most} at \
-             most."
+            "By both records, looked at {} moments, the operator's map lacked changes of the vehicle's for {median} or less half of the time, \
+             and for {most} at the worst one.",
+            lags.len()
         ),
     })
 }
@@ -188,7 +206,7 @@ fn equipment(dive: &Dive, vehicle: &DiveVehicle) -> String {
     }
     let planner = all.settings.get("survey.planner").and_then(Value::as_str).unwrap_or(defaults.survey.planner.name());
     format!(
-        "By its settings it was to survey {} m above the sea floor at {} m/s with the planner {planner}, with camera images whose pixels are {} m \
+        "By its settings it was to survey {} m above the sea floor at {} m/s with the planner {planner} at the start, with camera images whose pixels are {} m \
          wide there.",
         set("survey.altitude_m", defaults.survey.altitude_m),
         set("survey.speed_m_s", defaults.survey.speed_m_s),
@@ -196,7 +214,7 @@ fn equipment(dive: &Dive, vehicle: &DiveVehicle) -> String {
     )
 }
 
-fn place(dive: &Dive, vehicle: &DiveVehicle) -> String {
+fn place(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -> String {
     let Some(last) = vehicle.path().last() else { return "It never reported a place.".to_owned() };
     let depths = || vehicle.path().iter().map(|point| point.depth_m);
     let (least, most) = (depths().fold(f64::INFINITY, f64::min), depths().fold(f64::NEG_INFINITY, f64::max));
@@ -206,7 +224,7 @@ fn place(dive: &Dive, vehicle: &DiveVehicle) -> String {
     );
     let begin = vehicle.path().first().map_or_else(String::new, |first| {
         format!(
-            ", beginning {} and {} of the origin{}",
+            " It began {} and {} of the origin{}",
             words::east(first.east_m),
             words::north(first.north_m),
             on_earth(dive, (first.east_m, first.north_m))
@@ -223,14 +241,28 @@ fn place(dive: &Dive, vehicle: &DiveVehicle) -> String {
         legs => format!(" ({} to another place not counted)", counted(legs - 1, "jump", "jumps")),
     };
     format!(
-        "By its {} {:.0} m{jumps}{speed}{begin}, {depth} below the surface; at the end it was {} and {} of the origin{}; {origin}.{}",
+        "By its {} about {:.0} m{jumps}{speed}, {depth} below the surface.{begin}, and ended {} and {} of the origin{}; {origin}.{}{}",
         if vehicle.own.track.len() > 1 { "own record it went" } else { "reports it went at least" },
         vehicle.distance_m(),
         words::east(last.east_m),
         words::north(last.north_m),
         on_earth(dive, (last.east_m, last.north_m)),
+        moved(state),
         uncertainty(vehicle)
     )
+}
+
+/// How far its own record is moved so that it lies on the map.
+fn moved(state: &VehicleState) -> String {
+    let (east_m, north_m) = state.map.shift_m();
+    match east_m.hypot(north_m) < 0.05 {
+        true => String::new(),
+        false => format!(
+            " Places of its own record are moved {} and {}, as its map was by position fixes.",
+            words::east(east_m).replace("east", "to the east").replace("west", "to the west"),
+            words::north(north_m).replace("north", "to the north").replace("south", "to the south")
+        ),
+    }
 }
 
 /// The uncertainty of its place over the record.
@@ -259,6 +291,11 @@ fn found(state: &VehicleState, vehicle: &DiveVehicle, alone: Option<u64>) -> Str
     let doubt = largest.interval_m2.filter(|_| !is_least).map_or_else(String::new, |_| {
         format!("; 95 % interval by the model's own confidence: {}", interval(largest.interval_m2))
     });
+    let confident = vehicle.layer_cells.get("confidence").copied().unwrap_or_default() as u64;
+    let confident = match doubt.is_empty() || confident >= all {
+        true => String::new(),
+        false => format!(", which arrived for {confident} of the {all} cells"),
+    };
     let rivals = vehicle.classes.iter().skip(1).filter(|class| class.may_exceed(largest)).count();
     let rivals = match rivals {
         _ if is_least => String::new(),
@@ -269,11 +306,11 @@ fn found(state: &VehicleState, vehicle: &DiveVehicle, alone: Option<u64>) -> Str
         }
     };
     format!(
-        "The map that arrived has {all} cells of {0:.2} m x {0:.2} m, {1}, with {2} classes; the largest is {3} with {4} ({5:.0} %){doubt}.{rivals}",
+        "The map that arrived has {all} cells of {0:.2} m x {0:.2} m, {1}, with {2} classes; the largest is {3} with {4} ({5:.0} %){doubt}{confident}.{rivals}",
         vehicle.cell_m,
         area(all as f64 * vehicle.cell_m * vehicle.cell_m),
         vehicle.classes.len(),
-        words::label(&state.label_book, largest.label),
+        words::class(state, vehicle, largest.label),
         if is_least { format!("at least {}", area(largest.area_m2)) } else { area(largest.area_m2) },
         largest.cells as f64 / all as f64 * 100.0
     )
@@ -286,9 +323,15 @@ fn orders(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -> String {
     };
     let all = vehicle.orders_of_people().count();
     let fixes = vehicle.orders.len() - all;
-    let authors: BTreeSet<String> =
-        vehicle.orders_of_people().map(|(order, _)| dive.ordered(state, vehicle, order).0).collect();
-    let authors: Vec<String> = authors.into_iter().filter(|author| !author.is_empty()).collect();
+    let mut of_author: BTreeMap<String, usize> = BTreeMap::new();
+    for (order, _) in vehicle.orders_of_people() {
+        *of_author.entry(dive.ordered(state, vehicle, order).0).or_default() += 1;
+    }
+    of_author.remove("");
+    let authors: Vec<String> = match of_author.len() {
+        1 => of_author.into_keys().collect(),
+        _ => of_author.into_iter().map(|(author, count)| format!("{author} ({count})")).collect(),
+    };
     let authors = if authors.is_empty() { String::new() } else { format!(" by {}", authors.join(", ")) };
     let fixes = match fixes {
         0 => " The surface sent no position fix.".to_owned(),
@@ -331,8 +374,8 @@ fn not_sent(dive: &Dive, state: &VehicleState) -> String {
     match dive.events.iter().filter(refused).count() {
         0 => String::new(),
         n => format!(
-            " The surface refused {} and did not send {}: see the events.",
-            counted(n, "order", "orders"),
+            " The surface refused {} of people and did not send {}: see the events.",
+            counted(n, "request", "requests"),
             if n == 1 { "it" } else { "them" }
         ),
     }

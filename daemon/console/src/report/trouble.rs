@@ -7,6 +7,7 @@ use scenecast_core::utc_text;
 use scenecast_messages::contents::valid_part;
 use scenecast_messages::scenecast_msgs::Event;
 use scenecast_protocol::wire::{ModeReason, VehicleMode};
+use std::collections::BTreeSet;
 
 /// Events that are told in a sentence; of more, the first.
 const MAX_TOLD: usize = 8;
@@ -29,7 +30,7 @@ pub(super) fn told(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -> 
     let told = |(at_s, event): &(f64, Event)| (*at_s, words::event(&state.label_book, event));
     let restarts = |who: &'static str| {
         move |&(from_s, to_s): &(f64, f64)| {
-            (from_s, format!("{who} program ended, and ran again from {}", utc_text(to_s)))
+            (from_s, format!("{who} record stops; its program ran again from {}", utc_text(to_s)))
         }
     };
     let own = vehicle.own.runs_s.windows(2).map(|pair| (pair[0].1, pair[1].0)).collect::<Vec<_>>();
@@ -43,8 +44,9 @@ pub(super) fn told(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -> 
         true => "No fault was reported.",
         false => "No fault and no silence was reported.",
     };
-    let mut sentences = vec![listed("Faults, silences and restarts", &found).unwrap_or_else(|| none.to_owned())];
-    sentences.extend(listed("As ordered, or because of a limit or the end of its plan", &planned));
+    let mut sentences =
+        vec![listed("Faults, restarts and silences that were reported", &found).unwrap_or_else(|| none.to_owned())];
+    sentences.extend(listed("Why it left the survey", &planned));
     sentences
 }
 
@@ -61,7 +63,12 @@ fn is_limited(mode: &str) -> bool {
 }
 
 fn listed(title: &str, found: &[(f64, String)]) -> Option<String> {
-    let told: Vec<String> = found.iter().map(|(at_s, text)| format!("{}, {text}", utc_text(*at_s))).collect();
+    let mut said = BTreeSet::new();
+    let told = found.iter().map(|(at_s, text)| match said.insert(text) {
+        true => format!("{}, {text}", utc_text(*at_s)),
+        false => format!("{}, {} again", utc_text(*at_s), text.split(": ").next().unwrap_or(text)),
+    });
+    let told: Vec<String> = told.collect();
     match told.len() {
         0 => None,
         n if n > MAX_TOLD => {

@@ -1,15 +1,16 @@
 //! Times, areas, places and orders in words.
 
 use super::areas::ClassArea;
-use super::dive::Dive;
+use super::dive::{Dive, DiveVehicle};
 use crate::export::TransverseMercator;
-use crate::state::Origin;
+use crate::state::{Origin, VehicleState};
 use scenecast_core::utc_text;
 use scenecast_messages::builtin_interfaces::Time;
 use scenecast_messages::scenecast_msgs::{Event, Exemplar, Order, OrderStatus};
 use scenecast_protocol::directive::SlotId;
 use scenecast_surface::LabelBook;
 use serde_json::Value;
+use std::collections::BTreeSet;
 
 /// A time span for people, such as "1 h 05 min".
 pub(super) fn duration(seconds: f64) -> String {
@@ -43,6 +44,31 @@ pub(super) fn author(name: &str) -> &str {
     if name == "local" { "the user of the surface's computer" } else { name }
 }
 
+/// The labels that are shown as a class: those with cells, and those that were merged into it.
+fn labels_of(state: &VehicleState, vehicle: &DiveVehicle, class: u8) -> BTreeSet<u8> {
+    let book = &state.label_book;
+    let on_map = vehicle.labels.iter().map(|(_, label)| label);
+    on_map.chain(book.keys().copied()).filter(|label| book.shown_as(*label) == class).collect()
+}
+
+/// The numbers of these labels, unless the class is one label alone.
+pub(super) fn merged(state: &VehicleState, vehicle: &DiveVehicle, class: u8) -> String {
+    let labels: Vec<String> = labels_of(state, vehicle, class).iter().map(u8::to_string).collect();
+    match &labels[..] {
+        [only] if *only == class.to_string() => String::new(),
+        [only] => format!(" (label {only})"),
+        _ => format!(" (labels {})", labels.join(", ")),
+    }
+}
+
+/// A class by its label and its name, with the labels that people merged into it.
+pub(super) fn class(state: &VehicleState, vehicle: &DiveVehicle, class: u8) -> String {
+    let others = labels_of(state, vehicle, class).into_iter().filter(|label| *label != class);
+    let others: Vec<String> = others.map(|other| label(&state.label_book, other)).collect();
+    let own = label(&state.label_book, class);
+    if others.is_empty() { own } else { format!("{own}, into which people merged {},", others.join(" and ")) }
+}
+
 /// An event with reasons of modes in words, and labels with their names.
 pub(super) fn event(book: &LabelBook, Event { source, text, .. }: &Event) -> String {
     let reasons = [
@@ -63,7 +89,7 @@ pub(super) fn event(book: &LabelBook, Event { source, text, .. }: &Event) -> Str
     let reason = if source.starts_with("mode") { reasons.iter().find_map(in_words) } else { None };
     let text = match (source.as_str(), text.as_str()) {
         ("contact", ANOTHER_RUN) => "the vehicle's program had been restarted".to_owned(),
-        ("contact", "received") => "contact".to_owned(),
+        ("contact", "received") => "its first frame was heard".to_owned(),
         (_, text) => reason.unwrap_or_else(|| match text.strip_prefix("local: ") {
             Some(done) => format!("{}: {done}", author("local")),
             None => text.to_owned(),
@@ -146,8 +172,14 @@ pub(super) fn content(book: &LabelBook, order: &Order) -> String {
         }
         ("background", Value::Array(streams)) => Some(format!(
             "spare capacity for {}",
-            streams.iter().filter_map(Value::as_str).collect::<Vec<_>>().join(", ")
+            streams
+                .iter()
+                .filter_map(Value::as_str)
+                .map(|stream| if stream == "finer" { "the cells between those of a coarse map" } else { stream })
+                .collect::<Vec<_>>()
+                .join(", ")
         )),
+        ("labels", count) => Some(format!("at most {count} labels")),
         _ => Some(limit(name, value)),
     };
     let all: Vec<String> = members.iter().filter_map(member).collect();
@@ -214,11 +246,11 @@ pub(super) fn interval(interval_m2: Option<(f64, f64)>) -> String {
 pub(super) fn of_intervals(classes: &[ClassArea]) -> &'static str {
     match classes.iter().any(|class| class.interval_m2.is_some()) {
         true => {
-            "Classes are groups that the scene model found without being taught; no person has verified them. An interval is that of the model's own \
-             doubt, without the error of positions: its confidence in each cell, known to a quarter, is taken as the probability that the label \
-             is right; otherwise the cell is taken to have one of the other labels, the more likely the more cells that has, and cells of a \
-             square of 4 x 4 are right or wrong together. Classes that the model does not tell apart, and sea floor that nobody has seen, are \
-             not in it."
+            "Classes are groups that the scene model found without being taught; no person has verified them. The intervals come from the \
+             model's own confidence in each cell, which is known to a quarter and taken as the probability that the cell's label is right. A \
+             label that is wrong is taken to be one of the others, in proportion to their areas. Squares of 4 x 4 cells are taken to be right \
+             or wrong as a whole. Where no confidence arrived, all is taken to be possible. The intervals do not have the error of positions, \
+             sea floor that nobody has seen, or classes that the model does not tell apart."
         }
         false => {
             "Classes are groups that the scene model found without being taught; no person has verified them. The surface has received no \

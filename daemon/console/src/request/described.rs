@@ -40,6 +40,7 @@ pub(super) fn describe(
                 "fence" if value.is_null() => "no fence".to_owned(),
                 "fence" => format!("{} corners", count(value)),
                 "keep_outs" if count(value) == 0 => "no keep-outs".to_owned(),
+                "keep_outs" if count(value) == 1 => "1 keep-out".to_owned(),
                 "keep_outs" => format!("{} keep-outs", count(value)),
                 _ if value.is_null() => "no return point".to_owned(),
                 _ => format!("return point {value}"),

@@ -50,8 +50,7 @@ pub(super) fn none() -> ExemplarProgress {
 }
 
 fn image(p: &StoredExemplar, base: &str, shift_m: (f64, f64)) -> ExemplarImage {
-    let width_m = (p.view.width_mm > 0).then(|| f64::from(p.view.width_mm) / 1000.0);
-    let (east_m, north_m) = p.view.middle_m();
+    let place = p.place_m(shift_m);
     ExemplarImage {
         number: p.number,
         edge_px: edge_px(p.size),
@@ -60,9 +59,9 @@ fn image(p: &StoredExemplar, base: &str, shift_m: (f64, f64)) -> ExemplarImage {
         url: format!("{base}-{}.webp", p.number),
         at_s: seconds(p.received),
         taken_s: p.taken.map(seconds),
-        width_m,
-        x_m: width_m.map(|_| east_m + shift_m.0),
-        y_m: width_m.map(|_| north_m + shift_m.1),
+        width_m: p.width_m(),
+        x_m: place.map(|(east_m, _)| east_m),
+        y_m: place.map(|(_, north_m)| north_m),
         requested: p.requested,
     }
 }

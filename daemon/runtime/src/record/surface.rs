@@ -276,29 +276,33 @@ impl RecordedVehicle {
         entries.extend(place_on_earth(mission, &place, sigma_m).map(|fix| seen.entry("fix", &fix)));
     }
 
+    /// Records the images that have come in, also of labels that have no cell.
     fn record_exemplars(&mut self, seen: Seen<'_>, entries: &mut Vec<RecordEntry>) {
         let Seen { surface, vehicle, stamps, .. } = seen;
-        for label in &vehicle.labels {
-            for image in &label.exemplar.images {
-                let is_new = self.exemplars.insert((vehicle.map.epoch, label.id, image.number));
-                let record = seen.address().filter(|_| is_new).and_then(|address| surface.record(address));
-                let stored = record.and_then(|record| record.exemplars.label(label.id)?.exemplar(Some(image.number)));
-                let Some(stored) = stored else { continue };
-                let message = Exemplar {
-                    header: header(stamps.at(image.at_s), ""),
-                    vehicle: vehicle.name.clone(),
-                    epoch: vehicle.map.epoch.into(),
-                    label: label.id,
-                    image: image.number,
-                    name: label.book.name.clone().unwrap_or_default(),
-                    taken: image.taken_s.map(|taken_s| stamps.at(taken_s)).unwrap_or_default(),
-                    width_m: image.width_m.unwrap_or(f64::NAN),
-                    middle: Point { x: image.x_m.unwrap_or(f64::NAN), y: image.y_m.unwrap_or(f64::NAN), z: f64::NAN },
-                    format: "webp".to_owned(),
-                    data: stored.webp.clone(),
-                };
-                entries.push(seen.entry("exemplars", &message));
-            }
+        let Some(record) = seen.address().and_then(|address| surface.record(address)) else { return };
+        let images = record.exemplars.labels().flat_map(|(label, of_it)| of_it.stored.iter().map(move |i| (label, i)));
+        for (label, image) in
+            images.filter(|(label, image)| self.exemplars.insert((record.epoch, *label, image.number)))
+        {
+            let place = image.place_m(vehicle.map.shift_m());
+            let message = Exemplar {
+                header: header(stamps.at(image.received.as_secs_f64()), ""),
+                vehicle: vehicle.name.clone(),
+                epoch: record.epoch.into(),
+                label,
+                image: image.number,
+                name: record.label_name(label).unwrap_or_default().to_owned(),
+                taken: image.taken.map(|taken| stamps.at(taken.as_secs_f64())).unwrap_or_default(),
+                width_m: image.width_m().unwrap_or(f64::NAN),
+                middle: place.map_or(Point { x: f64::NAN, y: f64::NAN, z: f64::NAN }, |(x, y)| Point {
+                    x,
+                    y,
+                    z: f64::NAN,
+                }),
+                format: "webp".to_owned(),
+                data: image.webp.clone(),
+            };
+            entries.push(seen.entry("exemplars", &message));
         }
     }
 }
