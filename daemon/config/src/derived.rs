@@ -6,7 +6,7 @@ use scenecast_core::tuning_table::TuningTable;
 use scenecast_protocol::link::Authenticity;
 use scenecast_protocol::mac::{Access, ModemProfile};
 use scenecast_protocol::seal::{HeldKey, KeyFile};
-use scenecast_protocol::wire::Address;
+use scenecast_protocol::wire::{Address, MapOrigin};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Duration;
@@ -48,6 +48,11 @@ pub fn survey_depth_m(config: &Config) -> f64 {
 /// The edge of a map cell, metres.
 pub fn cell_m(config: &Config) -> f64 {
     if config.scene.cell_m > 0.0 { config.scene.cell_m } else { 25.0 * config.camera.metres_per_pixel }
+}
+
+/// The origin of the mission, as hellos tell it; `None` without one.
+pub fn map_origin(config: &Config) -> Option<MapOrigin> {
+    config.mission.origin_deg.map(|origin| MapOrigin::from_degrees(origin.lat_deg, origin.lon_deg))
 }
 
 /// The key of an end and the use of it, the same at both ends; `None` without a key.

@@ -32,4 +32,4 @@ pub use discriminant::{ClassStatistics, DiscriminantTrainingError, MIN_CLASS_CEL
 pub use mutual_information::{MutualInformation, SceneScore, mutual_information_nats, score};
 pub use rigid_fit::{PointPair, RigidFit, rms_distance};
 pub use seams::{Seams, TimedCell};
-pub use trial::{AnnotatedScene, MeanScore, Method, Trial, TrialError, train_vocabulary};
+pub use trial::{AnnotatedScene, MeanScore, Method, Trial, TrialError, median, train_vocabulary};

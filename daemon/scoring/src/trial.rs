@@ -236,13 +236,13 @@ impl MeanScore {
     /// Returns the median over scenes, each number on its own; zeros for an empty slice.
     #[must_use]
     pub fn median(scores: &[Self]) -> Self {
-        let median = |pick: fn(&Self) -> f64| median(scores.iter().map(pick).collect());
+        let median = |pick: fn(&Self) -> f64| median(&scores.iter().map(pick).collect::<Vec<f64>>());
         let at_8: Option<Vec<f64>> = scores.iter().map(|s| s.v_measure_at_8).collect();
         Self {
             mutual_information_nats: median(|s| s.mutual_information_nats),
             normalised_mutual_information: median(|s| s.normalised_mutual_information),
             v_measure: median(|s| s.v_measure),
-            v_measure_at_8: at_8.filter(|values| !values.is_empty()).map(self::median),
+            v_measure_at_8: at_8.filter(|values| !values.is_empty()).map(|values| self::median(&values)),
             null_mutual_information_nats: median(|s| s.null_mutual_information_nats),
             excess_nats: median(|s| s.excess_nats),
             labels_used: median(|s| s.labels_used),
@@ -250,12 +250,14 @@ impl MeanScore {
     }
 }
 
-fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    match (values.len() / 2, values.len() % 2) {
+/// The middle value, or the mean of the two middle ones; 0 without any.
+pub fn median(values: &[f64]) -> f64 {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    match (sorted.len() / 2, sorted.len() % 2) {
         (0, 0) => 0.0,
-        (middle, 1) => values[middle],
-        (middle, _) => 0.5 * (values[middle - 1] + values[middle]),
+        (middle, 1) => sorted[middle],
+        (middle, _) => 0.5 * (sorted[middle - 1] + sorted[middle]),
     }
 }
 

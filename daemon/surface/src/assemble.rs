@@ -1,13 +1,13 @@
 //! Builds a surface from a configuration.
 
 use crate::Surface;
-use scenecast_config::{Config, cell_m, vehicle_names};
+use scenecast_config::{Config, cell_m, map_origin, vehicle_names};
 use scenecast_core::UserError;
 use scenecast_core::tuning_table::TuningTable;
 use scenecast_protocol::link::{Authenticity, SurfaceConfig, SurfaceLink};
 use scenecast_protocol::mac::{MasterConfig, ModemProfile};
 use scenecast_protocol::time::Instant;
-use scenecast_protocol::wire::{CellEdge, MapOrigin, MissionId, SurfaceName};
+use scenecast_protocol::wire::{CellEdge, MissionId, SurfaceName};
 use std::time::Duration;
 
 /// Builds a surface for the configured vehicles. `seed` is random for each run.
@@ -38,7 +38,7 @@ pub fn link_config(
         abort_lifetime: (abort_lifetime_s > 0.0).then(|| Duration::from_secs_f64(abort_lifetime_s)),
         mission: MissionId(config.mission.id),
         cell_edge: CellEdge::from_metres(cell_m(config)),
-        origin: config.mission.origin_deg.map(|origin| MapOrigin::from_degrees(origin.lat_deg, origin.lon_deg)),
+        origin: map_origin(config),
         modem,
         budget_bps: config.link.budget_bps,
         budget_window: Duration::from_secs_f64(config.link.budget_window_s),

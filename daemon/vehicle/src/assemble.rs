@@ -1,7 +1,7 @@
 //! Builds a vehicle from a configuration.
 
 use crate::{Durable, FailsafePolicy, Footprint, MapSelection, Navigator, Steering, Vehicle};
-use scenecast_config::{Config, Debounce, LabelSource, LayerName, MapCells, cell_m, vehicle_address};
+use scenecast_config::{Config, Debounce, LabelSource, LayerName, MapCells, cell_m, map_origin, vehicle_address};
 use scenecast_core::{Area, UserError};
 use scenecast_protocol::link::{Authenticity, VehicleConfig, VehicleLink};
 use scenecast_protocol::mac::ModemProfile;
@@ -9,7 +9,7 @@ use scenecast_protocol::map::{BUILT_IN_LAYERS, LayerDescriptor, LayerId, LayerMa
 use scenecast_protocol::map_codec::Codec;
 use scenecast_protocol::schedule::{BackgroundOrder, Shares};
 use scenecast_protocol::time::Instant;
-use scenecast_protocol::wire::{CellEdge, MapOrigin, MissionId};
+use scenecast_protocol::wire::{CellEdge, MissionId};
 use std::time::Duration;
 
 /// Builds a vehicle that surveys `area`. `seed` is random for each run.
@@ -65,7 +65,7 @@ pub fn link_config(
         address: vehicle_address(config)?,
         mission: MissionId(config.mission.id),
         cell_edge: CellEdge::from_metres(cell_m(config)),
-        origin: config.mission.origin_deg.map(|origin| MapOrigin::from_degrees(origin.lat_deg, origin.lon_deg)),
+        origin: map_origin(config),
         modem,
         budget_bps: config.link.budget_bps,
         budget_window: Duration::from_secs_f64(config.link.budget_window_s),

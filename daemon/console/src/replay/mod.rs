@@ -7,7 +7,7 @@ mod recording;
 
 pub(crate) use map::ShownMap;
 pub use recording::Recording;
-pub(crate) use recording::{Known, StateText};
+pub(crate) use recording::{FrameCounts, Known, StateText};
 
 use crate::export::MapCells;
 use crate::report::{Dive, HTML};

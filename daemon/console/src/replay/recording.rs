@@ -26,8 +26,8 @@ pub struct Recording {
     pub(crate) vehicles: BTreeMap<String, Known>,
     /// The surface's log.
     pub(crate) log: Vec<(u64, Event)>,
-    /// Frames that the surface has sent, received and dropped.
-    pub(crate) frames: [u64; 3],
+    /// Frames of the surface.
+    pub(crate) frames: FrameCounts,
     /// What the surface ran with, as JSON.
     pub(crate) settings: String,
     /// Why some of the records could not be read.
@@ -94,6 +94,40 @@ pub(super) struct Closed {
     pub(super) closed: u16,
 }
 
+/// How many frames an end has sent, and what became of those that it heard.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct FrameCounts {
+    /// Copies included.
+    pub(crate) sent: u64,
+    pub(crate) received: u64,
+    /// By the reason for which they were dropped.
+    pub(crate) dropped: BTreeMap<String, u64>,
+}
+
+impl FrameCounts {
+    pub(crate) fn unused(&self) -> u64 {
+        self.dropped.values().sum()
+    }
+
+    pub(crate) fn heard(&self) -> u64 {
+        self.received + self.unused()
+    }
+
+    fn take(&mut self, frame: &Frame) {
+        match frame.direction {
+            Frame::SENT => self.sent += 1,
+            Frame::RECEIVED => self.received += 1,
+            Frame::DROPPED => *self.dropped.entry(frame.reason.clone()).or_default() += 1,
+            _ => {}
+        }
+    }
+
+    fn add(&mut self, other: &Self) {
+        (self.sent, self.received) = (self.sent + other.sent, self.received + other.received);
+        other.dropped.iter().for_each(|(reason, count)| *self.dropped.entry(reason.clone()).or_default() += count);
+    }
+}
+
 /// What one end knew of a vehicle.
 #[derive(Debug, Default)]
 pub(crate) struct Known {
@@ -110,8 +144,8 @@ pub(crate) struct Known {
     pub(crate) given: Vec<Order>,
     pub(crate) orders: Vec<OrderStatus>,
     pub(crate) link: Vec<(u64, Link)>,
-    /// Frames that the end of this record has sent, copies included, received and dropped.
-    pub(crate) frames: [u64; 3],
+    /// Frames of the end of this record.
+    pub(crate) frames: FrameCounts,
     /// The bits of what they carried first, by its name.
     pub(crate) sent_bits: BTreeMap<String, u64>,
     /// Begin and end of each record.
@@ -129,7 +163,7 @@ struct Record {
     known: BTreeMap<String, Known>,
     log: Vec<(u64, Event)>,
     settings: String,
-    counts: [u64; 3],
+    counts: FrameCounts,
     sent_bits: BTreeMap<String, u64>,
     frames: FrameTimes,
     span: Option<(u64, u64)>,
@@ -160,19 +194,19 @@ impl Recording {
             whole.timeline.states.extend(surface.states);
             whole.timeline.clock.add(&surface.clock);
             whole.log.extend(surface.log);
-            whole.frames.iter_mut().zip(surface.counts).for_each(|(all, own)| *all += own);
+            whole.frames.add(&surface.counts);
             whole.settings = surface.settings;
             surface.known.into_iter().for_each(|(part, known)| whole.operator.entry(part).or_default().add(known, 0));
         }
         vehicles.sort_by_key(|record| record.span);
         for vehicle in vehicles {
             let shift = vehicle.frames.shift_to(&known_frames);
-            let (frames, runs) = (vehicle.counts, vehicle.span.into_iter().collect::<Vec<_>>());
+            let (frames, runs) = (vehicle.counts.clone(), vehicle.span.into_iter().collect::<Vec<_>>());
             span = joined(span, vehicle.span, shift);
             vehicle.known.into_iter().for_each(|(part, known)| {
                 whole.vehicles.entry(part).or_default().add(
                     Known {
-                        frames,
+                        frames: frames.clone(),
                         sent_bits: vehicle.sent_bits.clone(),
                         settings: vehicle.settings.clone(),
                         runs: runs.clone(),
@@ -317,9 +351,7 @@ impl Record {
             "frames" => {
                 let Some(frame) = message.decode::<Frame>() else { return };
                 self.frames.take(nanos, &frame);
-                if let Some(count) = self.counts.get_mut(usize::from(frame.direction)) {
-                    *count += 1;
-                }
+                self.counts.take(&frame);
                 if frame.direction == Frame::SENT {
                     for (content, bits) in frame.contents.iter().zip(&frame.content_bits) {
                         *self.sent_bits.entry(content.clone()).or_default() += u64::from(*bits);
@@ -344,7 +376,7 @@ impl Known {
         self.map.add(later.map, moved);
         self.exemplars.extend(later.exemplars.into_iter().map(|(at, exemplar)| (moved(at), exemplar)));
         self.heard.extend(later.heard.into_iter().map(moved));
-        self.frames.iter_mut().zip(later.frames).for_each(|(all, own)| *all += own);
+        self.frames.add(&later.frames);
         later.sent_bits.into_iter().for_each(|(content, bits)| *self.sent_bits.entry(content).or_default() += bits);
         self.runs.extend(later.runs.into_iter().map(|(from, to)| (moved(from), moved(to))));
         if !later.settings.is_empty() {

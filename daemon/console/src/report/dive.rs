@@ -4,15 +4,18 @@ use super::areas::{ClassArea, areas};
 use super::maps::{MapsAt, maps_over_time};
 use super::orders::{OrderKey, OrderStep};
 use super::track::{TrackPoint, measured};
+use super::words::{self, NO_ORDER};
 use crate::export::{MapCaption, MapCells};
-use crate::replay::{Recording, StateText};
+use crate::replay::{FrameCounts, Recording, StateText};
 use crate::state::{LinkDirection, LinkSummary, MapLabelTree, MissionState, ReplaySide, VehicleMarker, VehicleState};
 use scenecast_core::{UserError, utc_text};
 use scenecast_files::{MissionClock, RecordFile};
 use scenecast_messages::contents::valid_part;
 use scenecast_messages::geometry_msgs::PoseWithCovarianceStamped;
 use scenecast_messages::scenecast_msgs::{Event, Exemplar, Link, Order};
+use scenecast_protocol::directive::SlotId;
 use scenecast_protocol::map::{Cell, LabelGrid};
+use scenecast_surface::LabelBook;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 
@@ -29,8 +32,8 @@ pub struct Dive {
     pub(super) events: Vec<(f64, Event)>,
     /// Begin and end of the times in which the surface recorded nothing.
     pub(super) gaps_s: Vec<(f64, f64)>,
-    /// Frames sent, received and dropped.
-    pub(super) frames: [u64; 3],
+    /// Frames of the surface.
+    pub(super) frames: FrameCounts,
     /// The mission times.
     clock: MissionClock,
     /// What the surface ran with.
@@ -97,8 +100,7 @@ pub(super) struct DiveVehicle {
 pub(super) struct OwnRecord {
     /// Its places, in the world frame as its map lies at the end.
     pub(super) track: Vec<TrackPoint>,
-    /// Frames that it has sent, copies included, received and dropped.
-    pub(super) frames: [u64; 3],
+    pub(super) frames: FrameCounts,
     /// The bits of what they carried first, by its name.
     pub(super) sent_bits: BTreeMap<String, u64>,
     /// When it heard frames of the surface, seconds since 1970.
@@ -161,7 +163,7 @@ impl Dive {
             events: events(recording),
             gaps_s: gaps(recording),
             restarts_s: recording.timeline.restarts().map(|(a, b)| (seconds(a.nanos), seconds(b.nanos))).collect(),
-            frames: recording.frames,
+            frames: recording.frames.clone(),
             clock: recording.timeline.clock.clone(),
             settings: serde_json::from_str(&recording.settings).unwrap_or_default(),
             damage: (!recording.damage.is_empty()).then(|| recording.damage.join("; ")),
@@ -244,7 +246,7 @@ impl DiveVehicle {
             track: known.poses.iter().map(|(_, pose)| TrackPoint::of(pose)).filter(TrackPoint::is_known).collect(),
             own: own.map_or_else(OwnRecord::default, |own| OwnRecord {
                 track: measured(own.poses.iter().map(moved).filter(TrackPoint::is_known).collect(), mission_speed),
-                frames: own.frames,
+                frames: own.frames.clone(),
                 sent_bits: own.sent_bits.clone(),
                 heard_s: own.heard.iter().copied().map(seconds).collect(),
                 runs_s: own.runs.iter().map(|(from, to)| (seconds(*from), seconds(*to))).collect(),
@@ -335,11 +337,19 @@ fn events(recording: &Recording) -> Vec<(f64, Event)> {
     };
     let mut events: Vec<(f64, Event)> =
         recording.log.iter().map(|(at, event)| (happened(*at, event), event.clone())).collect();
-    for known in recording.vehicles.values() {
+    let unnamed = LabelBook::default();
+    for (part, known) in &recording.vehicles {
+        let given = recording.operator.get(part).into_iter().flat_map(|known| &known.given);
+        let stops = given
+            .filter(|order| order.slot == SlotId::Constraints.name() && words::content(&unnamed, order) != "resume");
+        let first_stop = stops.map(|order| order.header.stamp.nanos()).min().unwrap_or(i64::MAX);
         let told = known.events.iter().filter(|(_, event)| event.source != "fix");
         events.extend(told.map(|(at, event)| {
-            let source = format!("{}, on board", event.source);
-            (seconds(*at), Event { source, ..event.clone() })
+            let mut event = Event { source: format!("{}, on board", event.source), ..event.clone() };
+            if let Some(mode) = event.text.strip_suffix(": order").filter(|_| (*at as i64) < first_stop) {
+                event.text = format!("{mode}{NO_ORDER}");
+            }
+            (seconds(*at), event)
         }));
     }
     events.sort_by(|a, b| a.0.total_cmp(&b.0));

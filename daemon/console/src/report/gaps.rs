@@ -23,8 +23,12 @@ pub(super) fn heard(dive: &Dive, vehicle: &DiveVehicle) -> Vec<String> {
     );
     let surface = format!("The surface heard a frame from it {}", pauses(dive, &vehicle.heard_s, dive.span_s));
     let span = vehicle.own.runs_s.first().zip(vehicle.own.runs_s.last()).map(|(first, last)| (first.0, last.1));
-    let own = span
-        .map(|span| format!("On board, a frame of the surface was heard {}", pauses(dive, &vehicle.own.heard_s, span)));
+    let own = span.map(|span| {
+        format!(
+            "On board, a frame of the surface that it could use was heard {}",
+            pauses(dive, &vehicle.own.heard_s, span)
+        )
+    });
     [last, surface].into_iter().chain(own).collect()
 }
 

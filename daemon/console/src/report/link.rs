@@ -3,7 +3,7 @@
 use super::Escaped;
 use super::chart::{self, Series};
 use super::dive::{Dive, DiveVehicle};
-use super::words::counted;
+use super::words::{self, counted};
 use scenecast_messages::scenecast_msgs::Link;
 use std::collections::BTreeMap;
 use std::fmt::Write;
@@ -59,12 +59,9 @@ impl Dive {
         let _ = writeln!(
             page,
             "</table>\n<p>Frames are numbered: those are lost whose number the other end never received, over the whole mission.{}</p>",
-            match self.frames[2] {
+            match self.frames.unused() {
                 0 => String::new(),
-                unused => format!(
-                    " The surface could not use {unused} of the frames that it heard: they were damaged, copies of others, or of earlier \
-                     runs."
-                ),
+                _ => format!(" At the surface, {}.", words::unused(&self.frames)),
             }
         );
         let has_own = !vehicle.own.sent_bits.is_empty() && self.vehicles.len() == 1;

@@ -37,12 +37,7 @@ pub(super) fn maps_over_time(recording: &mut Recording, id: u8, part: &str) -> V
         let agreement = vehicle.as_ref().map_or(f64::NAN, |vehicle| agreement(vehicle.map.shown(), held));
         let lag_s = match &vehicle {
             Some(vehicle) => missing_for_s(vehicle.map.shown(), held, timeline.mission_time(nanos)),
-            // It counts the time in which all will have been sent.
-            None => timeline.state_at(nanos).and_then(|state| lag_s(&state.json, id)).map_or(f64::NAN, |lag_s| {
-                let known_s =
-                    timeline.mission_s(nanos) - timeline.mission_s(operator.heard.first().copied().unwrap_or(nanos));
-                lag_s.min(known_s.max(0.0))
-            }),
+            None => timeline.state_at(nanos).and_then(|state| lag_s(&state.json, id)).unwrap_or(f64::NAN),
         };
         MapsAt { at_s: seconds(nanos), cells: held.labels.shown().explored() as u64, agreement, lag_s }
     };

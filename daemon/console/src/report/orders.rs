@@ -194,9 +194,6 @@ impl Dive {
         let is_aborted = last
             .get(SlotId::Constraints.name())
             .is_some_and(|(order, _)| vehicle.content(state, order).is_some_and(|content| content == "abort"));
-        if is_aborted {
-            last.remove(SlotId::Destination.name());
-        }
         last.retain(|slot, (order, _)| {
             let is_over = state.orders.in_force.get(*slot) == Some(&InForceKnowledge::None);
             !is_over && vehicle.content(state, order).is_none_or(|content| content != "resume")
@@ -206,9 +203,12 @@ impl Dive {
         let rows: String = last
             .into_iter()
             .map(|(slot, (order, step))| {
-                let (by, ordered) = self.ordered(state, vehicle, order);
+                let (by, mut ordered) = self.ordered(state, vehicle, order);
                 let given = utc_text(step.given_s);
                 let kind = Escaped(words::order(slot, &ordered)).to_string();
+                if is_aborted && slot == SlotId::Destination.name() {
+                    ordered += "; the abort ended it";
+                }
                 let (ordered, by) = (Escaped(&ordered).to_string(), Escaped(&by).to_string());
                 format!("<tr><td>{kind}</td><td>{ordered}</td><td class=\"t\">{given}</td><td>{by}</td></tr>\n")
             })
@@ -252,7 +252,7 @@ impl Dive {
             return;
         }
         steps.sort_by(|a, b| a.0.total_cmp(&b.0));
-        *page += "<h3>Orders and modes over time</h3>\n<table><thead><tr><th>time (UTC)</th><th>what</th><th>cells on the map by \
+        *page += "<h3>Orders that steer, and modes, over time</h3>\n<table><thead><tr><th>time (UTC)</th><th>what</th><th>cells on the map by \
                   then</th></tr></thead>\n";
         for (at_s, text) in &steps {
             let cells = vehicle.maps.iter().rev().find(|maps| maps.at_s <= *at_s).map_or(0, |maps| maps.cells);

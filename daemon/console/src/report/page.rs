@@ -204,7 +204,7 @@ impl Dive {
             "mission_speed": self.state.mission.speed,
             "begin": utc_text(self.span_s.0),
             "end": utc_text(self.span_s.1),
-            "frames": { "sent": self.frames[0], "received": self.frames[1], "dropped": self.frames[2] },
+            "frames": { "sent": self.frames.sent, "received": self.frames.received, "dropped": self.frames.unused() },
             "vehicles": vehicles.collect::<Vec<_>>(),
         })
     }

@@ -4,6 +4,7 @@ use super::dive::{Dive, DiveVehicle};
 use super::orders::OrderStep;
 use super::words::{self, area, counted, duration, interval, on_earth};
 use super::{extent, gaps, trouble};
+use crate::replay::FrameCounts;
 use crate::state::{LinkDirection, VehicleState};
 use scenecast_core::utc_text;
 use scenecast_messages::scenecast_msgs::{Event, OrderStatus};
@@ -12,6 +13,9 @@ use scenecast_protocol::map::{Cell, UNEXPLORED};
 use scenecast_surface::LogKind;
 use serde_json::Value;
 use std::collections::BTreeMap;
+
+/// Jumps that are told one by one.
+const MAX_JUMPS: usize = 4;
 
 /// Where, when, how long, how far, what was found, what was ordered and what failed, a sentence each.
 pub(super) fn summary(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -> Vec<String> {
@@ -46,18 +50,14 @@ fn link(dive: &Dive, vehicle: &DiveVehicle) -> Vec<String> {
     let mut sentences = Vec::new();
     let link = &dive.state.link;
     let lost = |direction: &LinkDirection| direction.loss * 100.0;
-    let [sent, received, dropped] = vehicle.own.frames;
-    if sent + received > 0 && dive.state.vehicles.len() == 1 {
-        let [down, heard, unusable] = dive.frames;
-        let share = |heard: u64, sent: u64| sent.saturating_sub(heard) as f64 / sent.max(1) as f64 * 100.0;
-        sentences.push(format!(
-            "By both records, the vehicle transmitted {sent} frames, copies included, of which the surface heard {} ({:.1} % were lost) and could \
-             not use {unusable}; the surface transmitted {down}, of which the vehicle heard {} ({:.1} % were lost) and could not use {dropped}.",
-            heard + unusable,
-            share(heard + unusable, sent),
-            received + dropped,
-            share(received + dropped, down)
-        ));
+    let (own, surface) = (&vehicle.own.frames, &dive.frames);
+    if own.sent + own.heard() > 0 && dive.state.vehicles.len() == 1 {
+        let told = |from: &FrameCounts, to: &FrameCounts| {
+            let lost = from.sent.saturating_sub(to.heard()) as f64 / from.sent.max(1) as f64 * 100.0;
+            format!("{} frames, copies included, of which {lost:.1} % were lost; {}", from.sent, words::unused(to))
+        };
+        sentences.push(format!("By both records, the vehicle transmitted {}.", told(own, surface)));
+        sentences.push(format!("By both records, the surface transmitted {}.", told(surface, own)));
     }
     sentences.extend(match link.up.lost + link.down.lost {
         // Of the others nobody knows how many there were.
@@ -67,17 +67,18 @@ fn link(dive: &Dive, vehicle: &DiveVehicle) -> Vec<String> {
             link.up.frames, link.down.frames
         )),
         _ => Some(format!(
-            "Of {} numbered frames from the vehicles, {:.1} % never arrived in a usable form, repeats included; of {} to them, {:.1} %. What \
-             they held of the map and of orders was sent again.",
+            "Copies not counted, {} frames from the vehicles and {} to them had numbers. {:.1} % and {:.1} % of these never arrived in a usable \
+             form; what they held of the map and of orders was sent again.",
             link.up.frames,
-            lost(&link.up),
             link.down.frames,
+            lost(&link.up),
             lost(&link.down)
         )),
     });
     if let (Some(up_j), Some(down_j)) = (link.up.energy_j, link.down.energy_j) {
         sentences.push(format!(
-            "By modem.tx_watts of the surface, the modems of the vehicles spent about {up_j:.0} J on transmitting, that of the surface {down_j:.0} J."
+            "By modem.tx_watts of the surface and the frames that it knows of, the modems of the vehicles spent about {up_j:.0} J on transmitting, \
+             that of the surface {down_j:.0} J."
         ));
     }
     sentences
@@ -104,13 +105,14 @@ fn lag(vehicle: &DiveVehicle) -> Option<String> {
     let median = duration(median_s);
     Some(match vehicle.own.runs_s.is_empty() {
         false if median_s < 1.0 => format!(
-            "By both records, at most of {} moments no change of the vehicle's map was missing on the operator's; at the worst one, changes had \
+            "By both records, at {} of {} moments no change of the vehicle's map was missing on the operator's; at the worst of them, changes had \
              been missing for {most}.",
+            lags.iter().filter(|lag_s| **lag_s < 1.0).count(),
             lags.len()
         ),
         true => format!(
-            "By the surface's estimate, with the time in which all will have been sent, the operator's map was behind the vehicle's by {median} \
-             or less half of the time, and by {most} at most."
+            "By the surface's forecast of when all that waits on board will have been sent, the operator's map was behind the vehicle's by \
+             {median} or less half of the time; the longest forecast was {most}."
         ),
         false => format!(
             "By both records, looked at {} moments, the operator's map lacked changes of the vehicle's for {median} or less half of the time, \
@@ -204,9 +206,15 @@ fn equipment(dive: &Dive, vehicle: &DiveVehicle) -> String {
     if vehicle.is_played_back() {
         return "What was played back decides its speed, its altitude and its path, which no order changes; times are those of the playback.".to_owned();
     }
+    let images = match all.text("camera.source") {
+        Some(source) if source.starts_with("command:") => {
+            "Its images came from a command (camera.source); what that read is not known. "
+        }
+        _ => "",
+    };
     let planner = all.settings.get("survey.planner").and_then(Value::as_str).unwrap_or(defaults.survey.planner.name());
     format!(
-        "By its settings it was to survey {} m above the sea floor at {} m/s with the planner {planner} at the start, with camera images whose pixels are {} m \
+        "{images}By its settings it was to survey {} m above the sea floor at {} m/s with the planner {planner} at the start, with camera images whose pixels are {} m \
          wide there.",
         set("survey.altitude_m", defaults.survey.altitude_m),
         set("survey.speed_m_s", defaults.survey.speed_m_s),
@@ -236,9 +244,12 @@ fn place(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -> String {
     };
     let speed = vehicle.speed_m_s().filter(|_| !vehicle.is_played_back());
     let speed = speed.map_or_else(String::new, |m_s| format!(", at {m_s:.2} m/s on average while it moved"));
-    let jumps = match vehicle.legs().count() {
-        0 | 1 => String::new(),
-        legs => format!(" ({} to another place not counted)", counted(legs - 1, "jump", "jumps")),
+    let jumps = vehicle.jumps().map(|(from, to)| format!("{:.0} m at {}", from.distance_m(to), utc_text(to.at_s)));
+    let jumps: Vec<String> = jumps.collect();
+    let jumps = match jumps.len() {
+        0 => String::new(),
+        n if n > MAX_JUMPS => format!(" ({n} jumps to another place not counted)"),
+        _ => format!(" (not counted: a jump of {})", jumps.join(", and one of ")),
     };
     format!(
         "By its {} about {:.0} m{jumps}{speed}, {depth} below the surface.{begin}, and ended {} and {} of the origin{}; {origin}.{}{}",

@@ -32,7 +32,7 @@ impl TrackPoint {
         step_m >= JUMP_M && step_m > MAX_M_S * time_s
     }
 
-    fn distance_m(&self, other: &Self) -> f64 {
+    pub(super) fn distance_m(&self, other: &Self) -> f64 {
         (other.east_m - self.east_m).hypot(other.north_m - self.north_m)
     }
 
@@ -65,6 +65,11 @@ impl DiveVehicle {
             let began_between = restarts().any(|began_s| a.at_s < began_s && b.at_s >= began_s);
             a.distance_m(b) < 1.0 || !began_between && !a.jumps_to(b, self.mission_speed)
         })
+    }
+
+    /// The places before and after each of these jumps.
+    pub(super) fn jumps(&self) -> impl Iterator<Item = (&TrackPoint, &TrackPoint)> {
+        self.legs().zip(self.legs().skip(1)).filter_map(|(before, after)| before.last().zip(after.first()))
     }
 
     /// The uncertainty of its position at a moment, seconds since 1970; `None` if no place of a minute about it is known.

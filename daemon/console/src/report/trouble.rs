@@ -21,6 +21,7 @@ pub(super) fn told(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -> 
     let has_own = !vehicle.own.runs_s.is_empty();
     let is_trouble = |event: &Event| match event.source.as_str() {
         "fault" => true,
+        _ if event.level >= Event::WARN && event.source.ends_with("on board") && event.source != modes => true,
         source if source == modes => !is_planned(&event.text),
         // Its own record says when it was.
         "contact" => event.text != "received" && !(has_own && is_restart(event)),
@@ -41,25 +42,25 @@ pub(super) fn told(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -> 
     let planned = of_it().filter(|(_, event)| event.source == modes && is_limited(&event.text)).map(told);
     let planned: Vec<(f64, String)> = planned.collect();
     let none = match gaps::has_silence(dive, vehicle) {
-        true => "No fault was reported.",
-        false => "No fault and no silence was reported.",
+        true => "No fault and no restart was reported.",
+        false => "No fault, no restart and no silence was reported.",
     };
     let mut sentences =
         vec![listed("Faults, restarts and silences that were reported", &found).unwrap_or_else(|| none.to_owned())];
-    sentences.extend(listed("Why it left the survey", &planned));
+    sentences.extend(listed("Why it did not survey", &planned));
     sentences
 }
 
 /// Whether a mode is the survey or its end, or one that was ordered or that a limit led to.
 fn is_planned(mode: &str) -> bool {
-    [VehicleMode::Survey, VehicleMode::Done].iter().any(|planned| mode.starts_with(planned.name())) || is_limited(mode)
+    mode.starts_with(VehicleMode::Survey.name()) || is_limited(mode)
 }
 
-/// Whether an order, a limit of distance or time, or the end of its plan led to a mode other than the survey.
+/// Whether an order, or the want of one, a limit of distance or time, or the end of its plan led to a mode other than the survey.
 fn is_limited(mode: &str) -> bool {
-    let reasons = [ModeReason::Order, ModeReason::Distance, ModeReason::Time];
+    let troubles = [ModeReason::Silence, ModeReason::Fence, ModeReason::Band, ModeReason::NoPath];
     let is_of = |reason: &ModeReason| mode.rsplit_once(": ").is_some_and(|(_, end)| Some(end) == reason.name());
-    mode == VehicleMode::Hold.name() || mode == VehicleMode::Done.name() || reasons.iter().any(is_of)
+    !mode.starts_with(VehicleMode::Survey.name()) && !troubles.iter().any(is_of)
 }
 
 fn listed(title: &str, found: &[(f64, String)]) -> Option<String> {
@@ -85,7 +86,9 @@ mod tests {
 
     #[test]
     fn what_was_ordered_is_no_trouble() {
-        for planned in ["surveying", "done", "holding", "holding: order", "returning: distance"] {
+        for planned in
+            ["surveying", "done", "holding", "holding: order", "holding: no order yet", "returning: distance"]
+        {
             assert!(is_planned(planned), "{planned}");
         }
         for trouble in ["returning: silence", "holding: fence", "holding: no path"] {

@@ -3,6 +3,7 @@
 use super::areas::ClassArea;
 use super::dive::{Dive, DiveVehicle};
 use crate::export::TransverseMercator;
+use crate::replay::FrameCounts;
 use crate::state::{Origin, VehicleState};
 use scenecast_core::utc_text;
 use scenecast_messages::builtin_interfaces::Time;
@@ -30,12 +31,28 @@ pub(super) fn median(values: &[f64]) -> Option<f64> {
     sorted.get(sorted.len() / 2).copied()
 }
 
+/// The reason of a mode that no order has led to: without a record of orders a vehicle waits for one.
+pub(super) const NO_ORDER: &str = ": no order yet";
+
 /// What the surface logs where a vehicle's program was restarted.
 pub(super) const ANOTHER_RUN: &str = "the vehicle begins another run";
 
 /// A label by its number and, where it has one, its name.
 pub(super) fn label(book: &LabelBook, label: u8) -> String {
     book.name(label).map_or_else(|| format!("label {label}"), |name| format!("label {label} ({name})"))
+}
+
+/// The frames that an end heard and could not use.
+pub(super) fn unused(frames: &FrameCounts) -> String {
+    let causes = frames.dropped.iter().map(|(reason, count)| match reason.as_str() {
+        "duplicate" => counted(*count as usize, "copy of a known frame", "copies of known frames"),
+        "checksum" => format!("{count} damaged or of another run"),
+        other => format!("{count} dropped for {other}"),
+    });
+    match frames.unused() {
+        0 => "all that arrived were used".to_owned(),
+        unused => format!("{unused} of those that arrived were not used: {}", causes.collect::<Vec<_>>().join(", ")),
+    }
 }
 
 /// Who gave an order or made an entry of the log.
@@ -79,6 +96,7 @@ pub(super) fn event(book: &LabelBook, Event { source, text, .. }: &Event) -> Str
         (": depth or altitude", ": it was outside of its limits of depth or altitude"),
         (": no path", ": no path to its goals was allowed"),
         (": order", ": by order"),
+        (NO_ORDER, ": it waited for an order to resume"),
         ("holding", ": it had reached the end of its plan"),
         ("done", ": the time of its survey was over"),
     ];
@@ -89,7 +107,10 @@ pub(super) fn event(book: &LabelBook, Event { source, text, .. }: &Event) -> Str
     let reason = if source.starts_with("mode") { reasons.iter().find_map(in_words) } else { None };
     let text = match (source.as_str(), text.as_str()) {
         ("contact", ANOTHER_RUN) => "the vehicle's program had been restarted".to_owned(),
-        ("contact", "received") => "its first frame was heard".to_owned(),
+        ("contact", "received") => "the surface heard it".to_owned(),
+        ("answer", text) => {
+            text.split_once(' ').map_or_else(|| text.to_owned(), |(slot, what)| format!("{} {what}", order(slot, slot)))
+        }
         (_, text) => reason.unwrap_or_else(|| match text.strip_prefix("local: ") {
             Some(done) => format!("{}: {done}", author("local")),
             None => text.to_owned(),
@@ -175,7 +196,11 @@ pub(super) fn content(book: &LabelBook, order: &Order) -> String {
             streams
                 .iter()
                 .filter_map(Value::as_str)
-                .map(|stream| if stream == "finer" { "the cells between those of a coarse map" } else { stream })
+                .map(|stream| match stream {
+                    "finer" => "the cells between those of a coarse map",
+                    "exemplars" => "images of labels",
+                    layer => layer,
+                })
                 .collect::<Vec<_>>()
                 .join(", ")
         )),

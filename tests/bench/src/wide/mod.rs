@@ -182,11 +182,7 @@ fn export(cells: &MapCells, format: MapFormat, keep: &mut Keep<'_>) -> Result<Ex
 }
 
 fn median(costs: &[UpdateCost]) -> UpdateCost {
-    let middle = |of: fn(&UpdateCost) -> f64| {
-        let mut values: Vec<f64> = costs.iter().map(of).collect();
-        values.sort_by(f64::total_cmp);
-        values.get(values.len() / 2).copied().unwrap_or(0.0)
-    };
+    let middle = |of: fn(&UpdateCost) -> f64| scenecast_scoring::median(&costs.iter().map(of).collect::<Vec<f64>>());
     UpdateCost {
         cells: middle(|c| c.cells),
         link_loop_ms: middle(|c| c.link_loop_ms),

@@ -7,7 +7,7 @@ use scenecast_config::Config;
 use scenecast_core::{UserError, outln};
 use scenecast_protocol::map::{Cell, LabelGrid as CodedGrid};
 use scenecast_protocol::map_codec::encode_all;
-use scenecast_scoring::{AnnotatedScene, ClassStatistics, LabelGrid, Method, Trial, score};
+use scenecast_scoring::{AnnotatedScene, ClassStatistics, LabelGrid, Method, Trial, median, score};
 use serde::Serialize;
 
 /// A choice: the number of labels, and whether the words include those learnt from the other images' annotations.
@@ -188,17 +188,6 @@ fn pair(median: f64, mean: f64) -> String {
 fn mean(values: impl ExactSizeIterator<Item = f64>) -> f64 {
     let count = values.len().max(1) as f64;
     values.sum::<f64>() / count
-}
-
-fn median(values: &[f64]) -> f64 {
-    let mut sorted = values.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    let middle = sorted.len() / 2;
-    match sorted.len() {
-        0 => 0.0,
-        length if length % 2 == 1 => sorted[middle],
-        _ => 0.5 * (sorted[middle - 1] + sorted[middle]),
-    }
 }
 
 /// The standard deviation of a sample; 0 for fewer than two values.
