@@ -108,6 +108,7 @@ fn every_command_has_help_with_an_example() {
         &["bench", "fidelity"],
         &["bench", "link"],
         &["config"],
+        &["doctor", "modem"],
         &["key", "new"],
         &["key", "show"],
         &["record", "recover"],

@@ -1,6 +1,6 @@
 //! The two ends as processes, over TCP and over real serial devices.
 
-use scenecast_tests::{Process, free_port, http, recorded, scratch, wait_until};
+use scenecast_tests::{Process, free_port, http, recorded, run, scratch, wait_until};
 use serialport::{SerialPort, TTYPort};
 use std::io::{Read, Write};
 use std::path::Path;
@@ -42,6 +42,13 @@ fn a_map_arrives_over_tcp_and_equals_the_one_of_the_rehearsal() {
         &[format!("modem.connect=127.0.0.1:{port}")],
         &[format!("modem.listen=127.0.0.1:{port}")],
     );
+}
+
+#[test]
+fn a_map_arrives_over_udp_where_the_surface_listens() {
+    let port = free_port();
+    let link = |end: &str| vec!["modem.kind=udp".to_owned(), format!("modem.{end}=127.0.0.1:{port}")];
+    assert_map_arrives("udp", &link("connect"), &link("listen"));
 }
 
 /// Joins two pseudo-terminals like a null modem, garbling the stream in between at first.
@@ -197,4 +204,107 @@ fn settings_survive_a_restart_of_the_vehicle() {
     let vehicle = told().unwrap();
     assert_eq!(vehicle["map"]["epoch"], 0, "labels continue: the checkpoint was not skipped");
     assert_eq!(vehicle["settings"]["in_force"]["alpha"], 0.5);
+}
+
+/// What speaks at a pseudo-terminal instead of the configured modem: every half second this, and that after a question of a modem.
+struct Stranger {
+    said: &'static [u8],
+    answer: &'static [u8],
+    /// Whether it sends back what it gets.
+    echoes: bool,
+    /// The only speed at which it understands and is understood, bit/s.
+    speed: Option<u32>,
+}
+
+impl Stranger {
+    /// Its device, as long as the pair lives.
+    fn plug_in(self) -> (String, TTYPort) {
+        let (mut port, end) = TTYPort::pair().unwrap();
+        port.set_timeout(Duration::from_millis(100)).unwrap();
+        let name = end.name().unwrap();
+        std::thread::spawn(move || {
+            let mut buffer = [0; 256];
+            for tick in 0.. {
+                if tick % 5 == 0 && port.write_all(self.said).is_err() {
+                    return;
+                }
+                match port.read(&mut buffer) {
+                    Ok(_) if self.speed.is_some_and(|speed| port.baud_rate().ok() != Some(speed)) => {}
+                    Ok(n) => {
+                        let back = if self.echoes { &buffer[..n] } else { self.answer };
+                        let _ = port.write_all(back);
+                    }
+                    Err(e) if e.kind() == std::io::ErrorKind::TimedOut => {}
+                    Err(_) => return,
+                }
+            }
+        });
+        (name, end)
+    }
+}
+
+#[test]
+fn what_is_wrong_at_the_port_of_a_modem_is_told() {
+    let none = || Stranger { said: b"", answer: b"", echoes: false, speed: None };
+    let says = |said: &'static [u8]| Stranger { said, ..none() };
+    let answers = |answer: &'static [u8]| Stranger { answer, ..none() };
+    let dir = scratch("doctor");
+    let file = dir.join("asv.toml");
+    std::fs::write(&file, "[modem]\nkind = \"s2c\"\n").unwrap();
+    let look = |kind: &str, device: &str| {
+        let (kind, device) = (format!("modem.kind={kind}"), format!("modem.device={device}"));
+        let asked = run(&["doctor", "modem", "--config", file.to_str().unwrap(), "--set", &kind, "--set", &device]);
+        (asked.status.code(), String::from_utf8_lossy(&asked.stderr).into_owned())
+    };
+    let check = |kind: &'static str, stranger: Stranger, words: &'static [&'static str]| {
+        let (device, _held) = stranger.plug_in();
+        let (code, line) = look(kind, &device);
+        assert!(code == Some(1) && words.iter().all(|word| line.contains(word)), "{kind} {words:?}: {line}");
+    };
+    std::thread::scope(|scope| {
+        scope.spawn(|| check("s2c", none(), &["nothing comes in", "no modem answers at other speeds"]));
+        scope.spawn(|| check("s2c", says(&[0xF8, 0, 0xE0, 0x80]), &["no text", "modem.baud"]));
+        scope.spawn(|| check("s2c", says(b"$GPGGA,120000,,,,,0,,,,,,,,*56\r\n"), &["satellite positions", "swapped"]));
+        scope.spawn(|| check("micromodem", says(b"$GPGGA,120000,,,,,0,,,,,,,,*56\r\n"), &["satellite positions"]));
+        scope.spawn(|| {
+            check("s2c", answers(b"$CAERR,120000,NMEA,1*00\r\n"), &["WHOI Micromodem", "modem.kind = \"micromodem\""])
+        });
+        scope.spawn(|| {
+            check("micromodem", answers(b"ERROR WRONG COMMAND\r\n"), &["EvoLogics S2C", "modem.kind = \"s2c\""])
+        });
+        scope.spawn(|| check("s2c", says(b"\r\nasv login:\r\n"), &["console"]));
+        scope.spawn(|| check("s2c", Stranger { echoes: true, ..none() }, &["comes back"]));
+        let slower = Stranger { speed: Some(9600), ..answers(b"$CACFG,SRC,7*0B\r\n") };
+        scope.spawn(|| check("micromodem", slower, &["WHOI Micromodem answers at 9600", "modem.baud = 9600"]));
+    });
+    let (code, line) = look("s2c", "/dev/null");
+    assert!(code == Some(2) && line.contains("is no serial device"), "{line}");
+    let (code, line) = look("s2c", "/dev/ttyNowhere");
+    assert!(code == Some(2) && line.contains("No such file") && line.contains("serial device"), "{line}");
+}
+
+#[test]
+fn a_running_surface_tells_what_is_wrong_at_its_modem() {
+    let (dir, page) = (scratch("wrong-modem"), free_port());
+    let device = dir.join("modem");
+    let file = dir.join("asv.toml");
+    let text = format!(
+        "[modem]\nkind = \"s2c\"\ndevice = \"{}\"\n[console]\nlisten = \"127.0.0.1:{page}\"\n[runtime]\nstate_dir = \"{}\"\n",
+        device.display(),
+        dir.join("asv").display()
+    );
+    std::fs::write(&file, text).unwrap();
+    let log = dir.join("asv.log");
+    let _surface = Process::start_logged(&["asv", "--config", file.to_str().unwrap()], &log);
+    let logged = |words: &str| std::fs::read_to_string(&log).is_ok_and(|text| text.contains(words));
+    wait_until("a device that is not there is waited for", || logged("opened again when it is available"));
+    let gnss = Stranger { said: b"$GPGGA,120000,,,,,0,,,,,,,,*56\r\n", answer: b"", echoes: false, speed: None };
+    let (there, _held) = gnss.plug_in();
+    std::os::unix::fs::symlink(there, &device).unwrap();
+    wait_until("the wrong device is named", || logged("a receiver of satellite positions speaks at"));
+    wait_until("the page says so", || {
+        http(page, "GET", "/api/v2/log", "", "").is_some_and(|(_, body)| {
+            String::from_utf8_lossy(&body).contains("the surface's modem: a receiver of satellite positions")
+        })
+    });
 }

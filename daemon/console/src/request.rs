@@ -90,14 +90,14 @@ pub enum SurfaceRequest {
     ReplayEvents,
     /// Read the report of the dive so far. The owner of the record handles this request.
     Report,
-    /// Note in the log what was refused to a principal by its role, before it was read.
-    Barred(String),
+    /// Note in the log what was refused to a principal by its role, before it was read; of a vehicle, or of the surface.
+    Barred(Option<u8>, String),
 }
 
 impl SurfaceRequest {
     /// Whether it changes nothing, so that it needs no principal.
     pub(crate) fn is_reading(&self) -> bool {
-        self.order_kind().is_none() && !matches!(self, Self::Command(_) | Self::Barred(_))
+        self.order_kind().is_none() && !matches!(self, Self::Command(_) | Self::Barred(..))
     }
 
     /// The kind of an order; `None` for readings, and for changes of command, which have rules of their own.
@@ -105,7 +105,7 @@ impl SurfaceRequest {
         match self {
             Self::Map(_) | Self::FormerLabels(..) | Self::Exemplar(..) | Self::Fit(..) | Self::Command(_) => None,
             Self::Log | Self::Archives | Self::ArchivedMap(_) | Self::Replay(_) | Self::ReplayEvents => None,
-            Self::Report | Self::Barred(_) => None,
+            Self::Report | Self::Barred(..) => None,
             Self::Label(..)
             | Self::Draft(..)
             | Self::Note(..)
@@ -177,8 +177,8 @@ pub fn handle_request(surface: &mut Surface, request: ClientRequest, cell_m: f64
             Err(refusal) => refused::refused(&refusal),
         };
     }
-    if let SurfaceRequest::Barred(what) = &request {
-        refused::log(surface, None, by.name(), what, now);
+    if let SurfaceRequest::Barred(vehicle, what) = &request {
+        refused::log(surface, vehicle.and_then(Address::vehicle), by.name(), what, now);
         return Reply::Done;
     }
     let Some(kind) = request.order_kind() else { return reply(surface, request, cell_m, now) };
@@ -316,7 +316,7 @@ fn handle(surface: &mut Surface, request: SurfaceRequest, cell_m: f64, now: Inst
         SurfaceRequest::FormerLabels(..) | SurfaceRequest::ArchivedMap(_) => return None,
         SurfaceRequest::Replay(_) | SurfaceRequest::ReplayEvents | SurfaceRequest::Report => return None,
         // Handled with their principal, before.
-        SurfaceRequest::Command(_) | SurfaceRequest::Barred(_) => return None,
+        SurfaceRequest::Command(_) | SurfaceRequest::Barred(..) => return None,
     })
 }
 

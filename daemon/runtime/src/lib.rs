@@ -2,6 +2,7 @@
 
 mod camera;
 mod clock;
+mod doctor;
 mod durable;
 mod equipment;
 #[cfg(test)]
@@ -33,6 +34,7 @@ mod surface;
 mod vehicle;
 
 pub use clock::Clock;
+pub use doctor::check_modem;
 pub use pilot::SimulatedAutopilot;
 pub use stop::{Load, Stop, keep_private};
 #[cfg(feature = "surface")]

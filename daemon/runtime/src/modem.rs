@@ -1,20 +1,30 @@
-//! The port of a process's modem, the log of its events, and the warning of a missing key.
+//! The port of a process's modem, the log of its events and of what is wrong there, and the warning of a missing key.
 
+use crate::clock::Clock;
 use crate::port::{FromPort, Port};
 use scenecast_config::Config;
 use scenecast_core::{PortAddress, UserError};
+use scenecast_drivers::modem::{PortFinding, PortListener, Speaker};
 use scenecast_host::{FrameEvent, LinkEnd, LinkHost};
 use scenecast_protocol::time::Instant;
+use std::io;
 use std::time::Duration;
 
 /// Minimum time between two reopenings of the port because of a silent modem.
 const REOPEN_INTERVAL: Duration = Duration::from_secs(10);
 
-/// The port to the modem, with the time of its last reopening.
+/// The port to the modem.
 #[derive(Debug)]
 pub(super) struct ModemPort {
     port: Port,
+    place: PortAddress,
+    /// When it was opened again last.
     reopened: Instant,
+    listener: PortListener,
+    /// Devices take their own time, however fast the mission runs.
+    clock: Clock,
+    /// What people are to be told next.
+    note: Option<String>,
 }
 
 impl ModemPort {
@@ -22,7 +32,8 @@ impl ModemPort {
     pub(super) async fn open(config: &Config, now: Instant) -> Result<Self, UserError> {
         let place = scenecast_config::modem_port(config)?;
         let port = Port::open_judged("modem", place.clone()).await.map_err(|e| not_there(&place, &e))?;
-        Ok(Self { port, reopened: now })
+        let (listener, clock) = (PortListener::new(config.modem.kind), Clock::new(1.0));
+        Ok(Self { port, place, reopened: now, listener, clock, note: None })
     }
 
     /// The next report of the port. Cancel-safe.
@@ -31,17 +42,30 @@ impl ModemPort {
     }
 
     /// Hands a host the report of the port.
-    pub(super) fn handle<E: LinkEnd>(&self, report: FromPort, link: &mut LinkHost<E>, now: Instant) {
+    pub(super) fn handle<E: LinkEnd>(&mut self, report: FromPort, link: &mut LinkHost<E>, now: Instant) {
         match report {
-            FromPort::Open => link.handle_open(now),
-            FromPort::Closed => link.handle_closed(now),
-            FromPort::Bytes(bytes) => link.handle_bytes(&bytes, now),
-            FromPort::Datagram(bytes, sender) => self.port.judge(sender, link.handle_datagram(&bytes, now)),
+            FromPort::Open => {
+                self.listener.handle_open(self.clock.now());
+                link.handle_open(now);
+            }
+            FromPort::Closed => {
+                self.listener.handle_closed();
+                link.handle_closed(now);
+            }
+            FromPort::Bytes(bytes) => {
+                self.listener.handle_bytes(&bytes);
+                link.handle_bytes(&bytes, now);
+            }
+            FromPort::Datagram(bytes, sender) => {
+                self.listener.handle_bytes(&bytes);
+                self.port.judge(sender, link.handle_datagram(&bytes, now));
+            }
         }
     }
 
     /// Refused bytes are dropped: the port is dead, the driver detects it, and by then the bytes are stale.
-    pub(super) fn write(&self, bytes: Vec<u8>) {
+    pub(super) fn write(&mut self, bytes: Vec<u8>) {
+        self.listener.handle_written(&bytes);
         if !self.port.write(bytes) {
             tracing::debug!("modem: the port takes no more");
         }
@@ -54,27 +78,89 @@ impl ModemPort {
             self.port.reopen();
         }
     }
+
+    /// Logs events of frames and modem.
+    ///
+    /// # Errors
+    /// A modem that refuses a setting before it ever worked ends the run, while the person who started it is still there.
+    pub(super) fn handle_event(&mut self, event: &FrameEvent) -> Result<(), UserError> {
+        match event {
+            FrameEvent::ModemReady => {
+                if self.listener.handle_ready() {
+                    self.note = Some("it is ready now".to_owned());
+                }
+                tracing::info!("modem: ready");
+            }
+            FrameEvent::ModemLost => tracing::warn!("modem: lost; it is set up again when it answers"),
+            FrameEvent::ModemRefused { reason, was_ready: false } => {
+                return Err(UserError::Failed(format!("modem: {reason}")));
+            }
+            FrameEvent::ModemRefused { reason, .. } => tracing::error!("modem: {reason}"),
+            FrameEvent::NotSent(refusal) => tracing::error!("modem: a frame is not sent: {refusal}"),
+            FrameEvent::OverBudget { max_window_bps } => {
+                tracing::error!("the bit budget was exceeded: {max_window_bps:.0} bit/s in the fullest window");
+            }
+            FrameEvent::Sent { .. } | FrameEvent::Received { .. } => {}
+        }
+        Ok(())
+    }
+
+    /// Logs what is wrong at a port whose modem does not get ready.
+    pub(super) fn listen<E: LinkEnd>(&mut self, link: &LinkHost<E>) {
+        if let Some(finding) = self.listener.poll(link.end().frame_counts().accepted > 0, self.clock.now()) {
+            let told = advice(&finding, &self.place);
+            tracing::warn!("modem: {told}");
+            self.note = Some(told);
+        }
+    }
+
+    /// What the log of the mission is to have about the modem: what is wrong, or that it is no more.
+    pub(super) fn poll_note(&mut self) -> Option<String> {
+        self.note.take()
+    }
 }
 
-/// Logs events of frames and modem.
-///
-/// # Errors
-/// A modem that refuses a setting before it ever worked ends the run, while the person who started it is still there.
-pub(super) fn log(event: &FrameEvent) -> Result<(), UserError> {
-    match event {
-        FrameEvent::ModemReady => tracing::info!("modem: ready"),
-        FrameEvent::ModemLost => tracing::warn!("modem: lost; it is set up again when it answers"),
-        FrameEvent::ModemRefused { reason, was_ready: false } => {
-            return Err(UserError::Failed(format!("modem: {reason}")));
+/// What is wrong at a port, and what to do.
+pub(super) fn advice(finding: &PortFinding, place: &PortAddress) -> String {
+    let is_serial = matches!(place, PortAddress::Serial(..));
+    let look = "`scenecast doctor modem` looks closer";
+    match finding {
+        PortFinding::Silent if is_serial => format!(
+            "nothing comes in from {place}: the modem may be off, its cable loose or crossed, or its speed another one; {look}"
+        ),
+        PortFinding::Silent => {
+            format!("nothing comes in from {place}, although it is connected: is the modem behind it on? {look}")
         }
-        FrameEvent::ModemRefused { reason, .. } => tracing::error!("modem: {reason}"),
-        FrameEvent::NotSent(refusal) => tracing::error!("modem: a frame is not sent: {refusal}"),
-        FrameEvent::OverBudget { max_window_bps } => {
-            tracing::error!("the bit budget was exceeded: {max_window_bps:.0} bit/s in the fullest window");
+        PortFinding::NoText if is_serial => {
+            format!("what comes in from {place} is no text, so its speed is probably another one (modem.baud); {look}")
         }
-        FrameEvent::Sent { .. } | FrameEvent::Received { .. } => {}
+        PortFinding::NoText => format!("what comes in from {place} is not what a modem of this kind writes; {look}"),
+        PortFinding::Speaks(Speaker::S2c) => {
+            format!("an EvoLogics S2C modem answers at {place}: set modem.kind = \"s2c\", or connect the other modem")
+        }
+        PortFinding::Speaks(Speaker::Micromodem) => {
+            format!("a WHOI Micromodem speaks at {place}: set modem.kind = \"micromodem\", or connect the other modem")
+        }
+        PortFinding::Speaks(Speaker::Gnss) => {
+            format!("a receiver of satellite positions speaks at {place}: its device and that of the modem are swapped")
+        }
+        PortFinding::Speaks(Speaker::Login) => {
+            format!("a computer at {place} asks for a name and a password: this is its console, not a modem")
+        }
+        PortFinding::Echo => {
+            format!("what is written to {place} comes back: its two data lines are joined, or nothing is behind it")
+        }
+        PortFinding::UnknownText(line) => format!(
+            "what comes in from {place} is text of no modem that scenecast knows, such as \"{}\"; {look}",
+            line.escape_default()
+        ),
+        PortFinding::NoFrames(bytes) => format!(
+            "{bytes} bytes have come in from {place}, and no frame of this mission is in them: {}is the other end's modem of the same kind, \
+             and mission.id the same?",
+            if is_serial { "is modem.baud its speed, " } else { "" }
+        ),
+        PortFinding::NotReady => format!("the modem at {place} answers, and does not get ready; {look}"),
     }
-    Ok(())
 }
 
 /// Logs the bits on air at the end of a run.
@@ -88,14 +174,49 @@ pub(super) fn log_audit<E: LinkEnd>(link: &LinkHost<E>) {
     }
 }
 
-fn not_there(place: &PortAddress, e: &std::io::Error) -> UserError {
+/// Why a port cannot be opened, and what to do.
+pub(super) fn not_there(place: &PortAddress, e: &io::Error) -> UserError {
     UserError::Input(match place {
-        PortAddress::Serial(device, _) => format!("modem.device: {device}: {e}"),
+        PortAddress::Serial(device, _) => format!("modem.device: {device}: {e}{}", remedy(e)),
         PortAddress::Listen(address) => format!("modem.listen: cannot listen on {address}: {e}"),
         PortAddress::Connect(address) => format!("modem.connect: {address}: {e}"),
         PortAddress::Datagrams(..) => format!("modem.listen, modem.connect: {e}"),
         PortAddress::File(path) => format!("{}: {e}", path.display()),
     })
+}
+
+/// What to do about a serial device that cannot be opened.
+fn remedy(e: &io::Error) -> String {
+    let text = e.to_string();
+    // The library reports a device that another program has open as missing.
+    if ["exclusive lock", "busy"].iter().any(|word| text.contains(word)) {
+        return "; another program has it open (`fuser` names it): a second scenecast, ModemManager, gpsd".to_owned();
+    }
+    match e.kind() {
+        io::ErrorKind::NotFound => {
+            let found = tokio_serial::available_ports().unwrap_or_default();
+            let found: Vec<String> = found.into_iter().map(|port| port.port_name).collect();
+            match found.is_empty() {
+                true => "; there is no serial device".to_owned(),
+                false => format!("; the serial devices here are {}", found.join(", ")),
+            }
+        }
+        io::ErrorKind::PermissionDenied => {
+            "; this user must be in the group of the device (often dialout), and log in again".to_owned()
+        }
+        _ if text.contains("typewriter") => "; it is no serial device".to_owned(),
+        _ => String::new(),
+    }
+}
+
+/// Warns of the risk of running without a key.
+pub(super) fn warn_without_key(config: &Config) {
+    if config.link.key_file.is_none() {
+        tracing::warn!(
+            "link.key_file is empty: whoever can transmit to the vehicle can give it orders and forge its map; \
+             scenecast key new makes a key, and both ends need the same file"
+        );
+    }
 }
 
 #[cfg(all(test, feature = "surface"))]
@@ -190,15 +311,5 @@ mod tests {
         assert!(surface.accepted() >= 6 && vehicle.accepted() >= 6);
         let dropped: u64 = vehicle.link.end().frame_counts().dropped.values().sum();
         assert_eq!(dropped, 1, "only the first datagram of the stranger was read");
-    }
-}
-
-/// Warns of the risk of running without a key.
-pub(super) fn warn_without_key(config: &Config) {
-    if config.link.key_file.is_none() {
-        tracing::warn!(
-            "link.key_file is empty: whoever can transmit to the vehicle can give it orders and forge its map; \
-             scenecast key new makes a key, and both ends need the same file"
-        );
     }
 }

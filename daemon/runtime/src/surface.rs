@@ -318,6 +318,11 @@ impl SurfaceShell {
             self.ports.modem.write(bytes);
         }
         self.ports.modem.reopen_if_silent(self.host.link(), now);
+        self.ports.modem.listen(self.host.link());
+        if let Some(note) = self.ports.modem.poll_note() {
+            self.host.surface_mut().log_fault(&format!("the surface's modem: {note}"), now);
+            is_changed = true;
+        }
         while let Some(bytes) = self.host.poll_pilot_output() {
             self.ports.pilot.write(bytes);
         }
@@ -337,7 +342,7 @@ impl SurfaceShell {
                     tracing::info!("following: to {x:.0} m east, {y:.0} m north");
                 }
                 SurfaceHostEvent::Frame(event) => {
-                    modem::log(&event)?;
+                    self.ports.modem.handle_event(&event)?;
                     self.measure(&event);
                     self.facts.stamps.observe(self.clock.now().as_secs_f64(), unix_nanos());
                     self.record.handle_frame(&event, &self.facts.stamps);

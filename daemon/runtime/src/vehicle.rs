@@ -357,6 +357,7 @@ impl VehicleShell {
             self.ports.modem.write(bytes);
         }
         self.ports.modem.reopen_if_silent(self.host.link(), now);
+        self.ports.modem.listen(self.host.link());
         while let Some(bytes) = self.host.poll_pilot_output() {
             self.ports.pilot.write(bytes);
         }
@@ -400,7 +401,7 @@ impl VehicleShell {
                         fix.sigma_m
                     );
                 }
-                VehicleHostEvent::Frame(event) => modem::log(&event)?,
+                VehicleHostEvent::Frame(event) => self.ports.modem.handle_event(&event)?,
                 VehicleHostEvent::Pilot(event) => pilot::log(event),
                 VehicleHostEvent::Note(note) => tracing::warn!("navigation: {note}"),
             }

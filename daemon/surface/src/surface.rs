@@ -236,8 +236,13 @@ impl Surface {
         let Some(relay) = &mut self.relay else { return };
         relay.handle_gps(bytes, now);
         if let Some(note) = relay.poll_gps_note() {
-            self.log.add(None, LogKind::Fault, None, &note, now);
+            self.log_fault(&note, now);
         }
+    }
+
+    /// Logs a fault of the surface's own equipment.
+    pub fn log_fault(&mut self, text: &str, now: Instant) {
+        self.log.add(None, LogKind::Fault, None, text, now);
     }
 
     /// Takes bytes of a separate compass.

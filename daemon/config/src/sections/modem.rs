@@ -20,7 +20,8 @@ section! {
         /// Address and port to listen on, or to receive datagrams at. Without modem.connect, the sender of the first
         /// datagram that the link accepts is the other end, until 10 s pass without another one.
         listen: Option<HostPort> = None, ANY, [Auv Asv];
-        /// Address and port to connect to, or to send datagrams to. The surface begins, so over UDP it needs this key.
+        /// Address and port to connect to, or to send datagrams to. Over UDP the end that has this key makes its own address known, so that
+        /// the other one needs modem.listen only.
         connect: Option<HostPort> = None, ANY, [Auv Asv];
         /// Bit rate of the modem on air. The rates of S2C instant messages and of Micromodem packets are built in.
         bit_rate: f64 = 10_000.0, range(10.0, 1e7, "bit/s"), [Auv Asv];

@@ -72,20 +72,31 @@ fn is_viewer(path: &str, origin: &str) -> bool {
     path == VIEWERS && (origin == "file://" || page.is_some_and(is_local))
 }
 
-/// Refuses principals below a role, before the body of the request is read. The log has what they wanted to change.
+/// What an operation needs, and how the log names it.
+#[derive(Clone)]
+pub(super) struct Need {
+    pub(super) role: Role,
+    pub(super) id: &'static str,
+    /// Whether it is an order, so that the log has who wanted to give it.
+    pub(super) is_order: bool,
+}
+
+/// Refuses principals below a role, before the body of the request is read.
 pub(super) async fn require_role(
-    State((needed, id, shared)): State<(Role, &'static str, Shared)>,
+    State((need, shared)): State<(Need, Shared)>,
     by: Option<Extension<Giver>>,
     request: Request,
     next: Next,
 ) -> Response {
     match by {
-        Some(Extension(by)) if by.role() >= needed => next.run(request).await,
+        Some(Extension(by)) if by.role() >= need.role => next.run(request).await,
         Some(Extension(by)) => {
-            let line = format!("this needs the role {needed}; the role of {} is {}", by.name(), by.role());
-            if *request.method() != Method::GET {
-                let what = format!("{} ({}): not sent: {line}", id.replace('_', " "), request.uri().path());
-                let _ = shared.order(by, SurfaceRequest::Barred(what)).await;
+            let line = format!("this needs the role {}; the role of {} is {}", need.role, by.name(), by.role());
+            if need.is_order {
+                let mut parts = request.uri().path().split('/').skip_while(|part| *part != "vehicles");
+                let vehicle = parts.nth(1).and_then(|id| id.parse().ok());
+                let what = format!("{}: not sent: {line}", need.id.replace('_', " "));
+                shared.note(by, SurfaceRequest::Barred(vehicle, what));
             }
             error(StatusCode::FORBIDDEN, &line)
         }

@@ -98,7 +98,9 @@ fn router(shared: Shared) -> Router {
             o.path,
             match o.role {
                 Some(role) => {
-                    let state = (role, o.id, shared.clone());
+                    let need =
+                        guard::Need { role, id: o.id, is_order: o.success.0 == axum::http::StatusCode::ACCEPTED };
+                    let state = (need, shared.clone());
                     route.route_layer(axum::middleware::from_fn_with_state(state, guard::require_role))
                 }
                 None => route,

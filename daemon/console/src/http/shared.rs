@@ -102,9 +102,17 @@ impl Shared {
         self.request(request).await.map_or_else(|busy| busy, respond)
     }
 
+    /// Tells the surface something of a principal that needs no reply, unless there is much of it.
+    pub(super) fn note(&self, by: Giver, request: SurfaceRequest) {
+        let has_room = self.requests.capacity() > self.requests.max_capacity() / 2;
+        if has_room && self.edit_rate.take(by.name(), Instant::now()) {
+            let _ = self.requests.try_send((ClientRequest { by: Some(by), request }, oneshot::channel().0));
+        }
+    }
+
     /// The reply of the surface to an order of a principal, as a response.
     pub(super) async fn order(&self, by: Giver, request: SurfaceRequest) -> Response {
-        let is_edit = request.order_kind() == Some(OrderKind::Record) || matches!(request, SurfaceRequest::Barred(_));
+        let is_edit = request.order_kind() == Some(OrderKind::Record) || matches!(request, SurfaceRequest::Barred(..));
         if is_edit && !self.edit_rate.take(by.name(), Instant::now()) {
             let refusal = error(
                 StatusCode::TOO_MANY_REQUESTS,

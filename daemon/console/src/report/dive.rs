@@ -24,6 +24,8 @@ use std::path::PathBuf;
 pub struct Dive {
     /// The times of its first and its last message, seconds since 1970.
     pub span_s: (f64, f64),
+    /// The times of the first and the last state that the surface recorded.
+    pub(super) surface_s: (f64, f64),
     /// The last state that the page showed.
     pub state: MissionState,
     /// What is known of each vehicle, by the part of its topics.
@@ -51,12 +53,17 @@ pub struct Dive {
 #[serde(default)]
 pub(super) struct SettingsRecord {
     pub(super) program: String,
-    /// The seed of a rehearsal.
     pub(super) rehearsal_seed: Option<u64>,
+    /// What records had before the seed.
+    simulated: bool,
     pub(super) settings: BTreeMap<String, serde_json::Value>,
 }
 
 impl SettingsRecord {
+    pub(super) fn is_rehearsal(&self) -> bool {
+        self.simulated || self.rehearsal_seed.is_some()
+    }
+
     /// A text among the settings.
     pub(super) fn text(&self, key: &str) -> Option<&str> {
         self.settings.get(key).and_then(serde_json::Value::as_str)
@@ -95,6 +102,13 @@ pub(super) struct DiveVehicle {
     pub(super) maps: Vec<MapsAt>,
 }
 
+impl OwnRecord {
+    /// The times between its runs.
+    pub(super) fn pauses(&self) -> impl Iterator<Item = (f64, f64)> {
+        self.runs_s.iter().zip(self.runs_s.iter().skip(1)).map(|(before, after)| (before.1, after.0))
+    }
+}
+
 /// What a vehicle's own record says; empty without one.
 #[derive(Debug, Default)]
 pub(super) struct OwnRecord {
@@ -117,6 +131,9 @@ pub(super) fn seconds(nanos: u64) -> f64 {
     nanos as f64 / 1e9
 }
 
+/// A second, nanoseconds.
+const SECOND: u64 = 1_000_000_000;
+
 impl Dive {
     /// Reads the record of a surface, and of vehicles if they are given: files, or their folders.
     ///
@@ -127,13 +144,16 @@ impl Dive {
         Self::of(&mut Recording::read(paths)?).map_err(|what| UserError::Input(format!("{}: {what}", names.join(", "))))
     }
 
-    /// The same with the sums of the files, which nobody writes any more.
+    /// The same with the sums of the files that nobody writes meanwhile.
     ///
     /// # Errors
     /// As for [`Self::read`]; or a file cannot be read.
     pub fn read_ended(paths: &[PathBuf]) -> Result<Self, UserError> {
-        let files = paths.iter().map(|path| RecordFile::all(path)).collect::<Result<Vec<_>, _>>()?.concat();
-        Ok(Self { files, ..Self::read(paths)? })
+        let began = std::time::SystemTime::now();
+        let dive = Self::read(paths)?;
+        let mut files = paths.iter().map(|path| RecordFile::all(path, began)).collect::<Result<Vec<_>, _>>()?.concat();
+        files.dedup();
+        Ok(Self { files, ..dive })
     }
 
     /// The dive of a recording, of which the maps are at its end afterwards. The error is one line for people.
@@ -141,6 +161,7 @@ impl Dive {
         let Some(last) = recording.timeline.states.last() else {
             return Err("no record of a surface: it has no topic /scenecast/state".to_owned());
         };
+        let ended_s = seconds(last.nanos);
         let read = |json: &str| {
             serde_json::from_str::<MissionState>(json).map_err(|e| format!("/scenecast/state of the record: {e}"))
         };
@@ -158,6 +179,7 @@ impl Dive {
         }
         Ok(Self {
             span_s: (seconds(first), seconds(last)),
+            surface_s: (seconds(first), ended_s),
             state,
             vehicles,
             events: events(recording),
@@ -281,10 +303,11 @@ impl DiveVehicle {
         Some(vehicle)
     }
 
-    /// What was not a dive about it, in a clause; `None` if nothing says so.
+    /// Why it was no real dive, in a clause; `None` if nothing says that it was not.
     pub(super) fn made_up(&self, dive: &Dive) -> Option<String> {
-        if let Some(seed) = dive.settings.rehearsal_seed {
-            return Some(format!("a rehearsal over a simulated sea floor (seed {seed})"));
+        if dive.settings.is_rehearsal() {
+            let seed = dive.settings.rehearsal_seed.map_or_else(String::new, |seed| format!(" (seed {seed})"));
+            return Some(format!("a rehearsal over a simulated sea floor{seed}"));
         }
         let source = self.own.settings.text("camera.source").filter(|_| self.is_played_back());
         source.map(|source| format!("a playback of images and poses from {source}")).or_else(|| {
@@ -294,17 +317,32 @@ impl DiveVehicle {
         })
     }
 
+    /// Whether its own record has about the same time as that of the surface, so that frames of the one can be looked for in the other.
+    pub(super) fn covers(&self, dive: &Dive) -> bool {
+        const MAX_APART_S: f64 = 15.0;
+        let own = self.own.runs_s.first().zip(self.own.runs_s.last()).map(|(first, last)| (first.0, last.1));
+        let is_near = |a: f64, b: f64| (a - b).abs() <= MAX_APART_S;
+        let pauses = || self.own.pauses().chain(dive.restarts_s.iter().copied());
+        own.is_some_and(|own| is_near(own.0, dive.surface_s.0) && is_near(own.1, dive.surface_s.1))
+            && pauses().all(|(from_s, to_s)| to_s - from_s <= MAX_APART_S)
+    }
+
     /// Whether its frames went through a modem, whose round trips are those of sound in water.
     pub(super) fn has_modem(&self, dive: &Dive) -> bool {
         // The default is a socket.
         let kind = dive.ran_with(self).text("modem.kind");
-        dive.settings.rehearsal_seed.is_some() || kind.is_some_and(|kind| !["tcp", "udp"].contains(&kind))
+        dive.settings.is_rehearsal() || kind.is_some_and(|kind| !["tcp", "udp"].contains(&kind))
     }
 
     /// Whether recorded images stood for a camera.
     pub(super) fn is_played_back(&self) -> bool {
         let source = self.own.settings.text("camera.source");
         source.is_some_and(|source| ["frames:", "bag:", "tum:"].iter().any(|kind| source.starts_with(kind)))
+    }
+
+    /// Whether the record has all of its map, and no other one of it.
+    pub(super) fn has_one_map(&self) -> bool {
+        self.epoch == 0 && self.maps.first().is_none_or(|first| first.cells == 0)
     }
 
     /// The middle of a cell of its map, which lies `shift` from the world frame, metres.
@@ -342,11 +380,16 @@ fn events(recording: &Recording) -> Vec<(f64, Event)> {
         let given = recording.operator.get(part).into_iter().flat_map(|known| &known.given);
         let stops = given
             .filter(|order| order.slot == SlotId::Constraints.name() && words::content(&unnamed, order) != "resume");
+        // Otherwise the order may have been given before the record.
+        let begins = recording.timeline.states.first().map(|state| state.nanos);
+        let is_whole =
+            begins.zip(known.runs.first()).is_some_and(|(begins, run)| begins <= run.0.saturating_add(SECOND));
         let first_stop = stops.map(|order| order.header.stamp.nanos()).min().unwrap_or(i64::MAX);
         let told = known.events.iter().filter(|(_, event)| event.source != "fix");
         events.extend(told.map(|(at, event)| {
             let mut event = Event { source: format!("{}, on board", event.source), ..event.clone() };
-            if let Some(mode) = event.text.strip_suffix(": order").filter(|_| (*at as i64) < first_stop) {
+            let waits = is_whole && (*at as i64) < first_stop;
+            if let Some(mode) = event.text.strip_suffix(": order").filter(|_| waits) {
                 event.text = format!("{mode}{NO_ORDER}");
             }
             (seconds(*at), event)

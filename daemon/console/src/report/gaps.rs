@@ -13,15 +13,15 @@ const MAX_TOLD: usize = 6;
 /// Mission time without a place in a vehicle's own record from which on it is a gap, seconds.
 const MAX_PLACES_APART_S: f64 = 5.0;
 
-/// How often frames of a vehicle were heard, and its own record says how often it heard some, with the longer pauses.
+/// How often frames of a vehicle were heard and, by its own record, those of the surface on board, with the longer pauses.
 pub(super) fn heard(dive: &Dive, vehicle: &DiveVehicle) -> Vec<String> {
     let Some(last_s) = vehicle.heard_s.last() else { return vec!["No frame from it was heard.".to_owned()] };
     let last = format!(
         "The last frame from it was heard at {}, {} before the end of the record.",
         utc_text(*last_s),
-        duration(dive.mission_s(dive.span_s.1 - last_s))
+        duration(dive.mission_s(dive.surface_s.1 - last_s))
     );
-    let surface = format!("The surface heard a frame from it {}", pauses(dive, &vehicle.heard_s, dive.span_s));
+    let surface = format!("The surface heard a frame from it {}", pauses(dive, &vehicle.heard_s, dive.surface_s));
     let span = vehicle.own.runs_s.first().zip(vehicle.own.runs_s.last()).map(|(first, last)| (first.0, last.1));
     let own = span.map(|span| {
         format!(
@@ -34,7 +34,7 @@ pub(super) fn heard(dive: &Dive, vehicle: &DiveVehicle) -> Vec<String> {
 
 /// Whether the surface has heard nothing for longer than usual.
 pub(super) fn has_silence(dive: &Dive, vehicle: &DiveVehicle) -> bool {
-    !long(dive, &vehicle.heard_s, dive.span_s).1.is_empty()
+    !long(dive, &vehicle.heard_s, dive.surface_s).1.is_empty()
 }
 
 /// The usual pause between these moments, mission seconds, if there are any, and begin and end of those that are longer.
@@ -81,30 +81,20 @@ fn longest(mut gaps: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
     gaps
 }
 
-/// What the records of both ends lack, and why.
+/// What the records of both ends lack, but for the times between two runs of a program.
 pub(super) fn of_records(dive: &Dive, vehicle: &DiveVehicle) -> Vec<String> {
     let span = |(from_s, to_s): &(f64, f64)| format!("from {} to {}", utc_text(*from_s), utc_text(*to_s));
     let restarted = |gap: &(f64, f64)| dive.restarts_s.iter().any(|(from_s, to_s)| gap.0 < *to_s && *from_s < gap.1);
-    let surface = dive.restarts_s.iter().map(|gap| {
-        format!("The surface's program ended and was started again: nothing is recorded there {}.", span(gap))
-    });
     let idle = dive.gaps_s.iter().filter(|gap| !restarted(gap));
     let idle = idle.map(|gap| format!("The surface recorded nothing {}.", span(gap)));
-    let runs = vehicle.own.runs_s.windows(2).map(|pair| (pair[0].1, pair[1].0));
-    let vehicle_ended = runs.clone().map(|gap| {
-        format!(
-            "The vehicle's program ended and began again: its own record has nothing {}, and what it had not stored by then may be lost on board.",
-            span(&gap)
-        )
-    });
     let pairs = vehicle.own.track.windows(2).map(|pair| (pair[0].at_s, pair[1].at_s));
     let holes = pairs.filter(|(from_s, to_s)| {
-        dive.mission_s(to_s - from_s) > MAX_PLACES_APART_S && !runs.clone().any(|run| *from_s < run.1 && run.0 < *to_s)
+        dive.mission_s(to_s - from_s) > MAX_PLACES_APART_S
+            && !vehicle.own.pauses().any(|pause| *from_s < pause.1 && pause.0 < *to_s)
     });
     let holes: Vec<(f64, f64)> = holes.collect();
     let more = holes.len().saturating_sub(MAX_TOLD);
-    let more =
-        (more > 0).then(|| format!("It has no place in {} besides.", counted(more, "shorter time", "shorter times")));
+    let more = (more > 0).then(|| format!("It has {} of this kind.", counted(more, "shorter gap", "shorter gaps")));
     let holes = longest(holes);
     let stood = holes.iter().map(|gap| {
         format!(
@@ -116,7 +106,7 @@ pub(super) fn of_records(dive: &Dive, vehicle: &DiveVehicle) -> Vec<String> {
         "What went on on board between the frames that were heard, such as a restart of its program, is not known without its own record."
             .to_owned()
     });
-    surface.chain(idle).chain(unknown).chain(vehicle_ended).chain(stood).chain(more).collect()
+    idle.chain(unknown).chain(stood).chain(more).collect()
 }
 
 #[cfg(test)]
@@ -125,7 +115,7 @@ mod tests {
 
     fn dive_of(end_s: f64, speed: f64) -> Dive {
         let mut dive = Dive::default();
-        (dive.span_s, dive.state.mission.speed) = ((0.0, end_s), speed);
+        (dive.span_s, dive.surface_s, dive.state.mission.speed) = ((0.0, end_s), (0.0, end_s), speed);
         dive
     }
 

@@ -4,6 +4,7 @@ use super::Escaped;
 use super::chart::{self, Series};
 use super::dive::{Dive, DiveVehicle};
 use super::words::{self, counted};
+use crate::state::VehicleState;
 use scenecast_messages::scenecast_msgs::Link;
 use std::collections::BTreeMap;
 use std::fmt::Write;
@@ -98,8 +99,12 @@ impl Dive {
             n => format!("{}, {:.0} bytes {what}", counted(n, one, several), bytes as f64 / n as f64),
         };
         let sum = |count: fn(&DiveVehicle) -> usize| self.vehicles().map(|(_, vehicle)| count(vehicle)).sum::<usize>();
+        // Bytes of a map that the record does not begin with, or of one that was dropped, would be counted for other cells.
+        let is_whole = |(_, vehicle): (&VehicleState, &DiveVehicle)| vehicle.has_one_map();
+        let is_whole = self.vehicles().all(is_whole);
         let cells = |count: usize| match count {
             0 => String::new(),
+            n if !is_whole => counted(n, "cell", "cells"),
             n => format!(
                 "{}, {:.2} bits each, their changes included",
                 counted(n, "cell", "cells"),

@@ -90,6 +90,11 @@ impl DiveVehicle {
         !way.last().is_some_and(OrderStep::is_end) && self.overtaken(order).is_some()
     }
 
+    /// The source of the events about its modes: on board or, without its own record, as they were reported.
+    pub(super) fn mode_source(&self) -> &'static str {
+        if self.own.runs_s.is_empty() { "mode" } else { "mode, on board" }
+    }
+
     /// The orders but for position fixes, which the surface gives by itself.
     pub(super) fn orders_of_people(&self) -> impl Iterator<Item = (&OrderKey, &Vec<OrderStep>)> {
         self.orders.iter().filter(|((slot, _), _)| slot != SlotId::Fix.name())
@@ -139,18 +144,10 @@ impl Dive {
         let words = if content.len() > MAX_CONTENT { words } else { content };
         let by = match (given.principal.is_empty(), by.is_empty()) {
             (false, _) => given.principal.clone(),
-            (true, true) if self.settings.rehearsal_seed.is_some() => "the script of the rehearsal".to_owned(),
+            (true, true) if self.settings.is_rehearsal() => "the script of the rehearsal".to_owned(),
             (true, _) => by,
         };
         (words::author(&by).to_owned(), words)
-    }
-
-    /// The source of the events about modes: on board or, where no vehicle's own record is there, as they were reported.
-    pub(super) fn mode_source(&self) -> &'static str {
-        match self.events.iter().any(|(_, event)| event.source == "mode, on board") {
-            true => "mode, on board",
-            false => "mode",
-        }
     }
 
     /// The orders with their ends, the first one first.
@@ -231,7 +228,7 @@ impl Dive {
 
     /// What the vehicle was steered by over time, and its modes.
     pub(super) fn steering(&self, page: &mut String, state: &VehicleState, vehicle: &DiveVehicle) {
-        let of_modes = self.mode_source();
+        let of_modes = vehicle.mode_source();
         let modes = self.events.iter().filter(|(_, event)| event.vehicle == state.name && event.source == of_modes);
         let modes = modes.map(|(at_s, event)| (*at_s, words::event(&state.label_book, event)));
         let steers = |slot: &str| ![SlotId::Requests.name(), SlotId::Budget.name()].contains(&slot);

@@ -21,7 +21,7 @@ const MAX_JUMPS: usize = 4;
 pub(super) fn summary(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -> Vec<String> {
     let mut sentences = Vec::new();
     sentences.extend(vehicle.made_up(dive).map(|what| format!("This was {what}.")));
-    if dive.settings.rehearsal_seed.is_some() && utc_text(dive.span_s.0).starts_with("2000-01-01") {
+    if dive.settings.is_rehearsal() && utc_text(dive.span_s.0).starts_with("2000-01-01") {
         sentences.push("Its dates mean nothing: a rehearsal in virtual time begins on 2000-01-01.".to_owned());
     }
     sentences.push(when(dive, state, vehicle));
@@ -52,9 +52,11 @@ fn link(dive: &Dive, vehicle: &DiveVehicle) -> Vec<String> {
     let lost = |direction: &LinkDirection| direction.loss * 100.0;
     let (own, surface) = (&vehicle.own.frames, &dive.frames);
     if own.sent + own.heard() > 0 && dive.state.vehicles.len() == 1 {
+        let is_whole = vehicle.covers(dive);
         let told = |from: &FrameCounts, to: &FrameCounts| {
             let lost = from.sent.saturating_sub(to.heard()) as f64 / from.sent.max(1) as f64 * 100.0;
-            format!("{} frames, copies included, of which {lost:.1} % were lost; {}", from.sent, words::unused(to))
+            let lost = if is_whole { format!(", of which {lost:.1} % were lost") } else { String::new() };
+            format!("{} frames, copies included{lost}; {}", from.sent, words::unused(to))
         };
         sentences.push(format!("By both records, the vehicle transmitted {}.", told(own, surface)));
         sentences.push(format!("By both records, the surface transmitted {}.", told(surface, own)));
@@ -115,7 +117,7 @@ fn lag(vehicle: &DiveVehicle) -> Option<String> {
              {median} or less half of the time; the longest forecast was {most}."
         ),
         false => format!(
-            "By both records, looked at {} moments, the operator's map lacked changes of the vehicle's for {median} or less half of the time, \
+            "At {} moments both records were compared: the operator's map lacked changes of the vehicle's for {median} or less at half of them, \
              and for {most} at the worst one.",
             lags.len()
         ),
@@ -195,7 +197,7 @@ fn is_coarse(vehicle: &DiveVehicle) -> bool {
 
 /// How the vehicle looked at the sea floor.
 fn equipment(dive: &Dive, vehicle: &DiveVehicle) -> String {
-    if vehicle.own.settings.program.is_empty() && dive.settings.rehearsal_seed.is_none() {
+    if vehicle.own.settings.program.is_empty() && !dive.settings.is_rehearsal() {
         return "What the vehicle was set to, such as its altitude, speed and camera, and whether its motion and its images were real, is not \
                 known without its own record."
             .to_owned();

@@ -15,7 +15,7 @@ const MAX_TOLD: usize = 8;
 /// The events that people should look at: faults, silences, restarts, and modes that nobody had ordered; then the modes that were ordered
 /// or came from a limit.
 pub(super) fn told(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -> Vec<String> {
-    let modes = dive.mode_source();
+    let modes = vehicle.mode_source();
     let is_of_it = |event: &Event| event.vehicle.is_empty() || valid_part(&event.vehicle) == valid_part(&state.name);
     let is_restart = |event: &Event| event.source == "contact" && event.text == words::ANOTHER_RUN;
     let has_own = !vehicle.own.runs_s.is_empty();
@@ -29,15 +29,16 @@ pub(super) fn told(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -> 
     };
     let of_it = || dive.events.iter().filter(|(_, event)| is_of_it(event));
     let told = |(at_s, event): &(f64, Event)| (*at_s, words::event(&state.label_book, event));
-    let restarts = |who: &'static str| {
-        move |&(from_s, to_s): &(f64, f64)| {
-            (from_s, format!("{who} record stops; its program ran again from {}", utc_text(to_s)))
+    let restarts = |who: &'static str, lost: &'static str| {
+        move |(from_s, to_s): (f64, f64)| {
+            (from_s, format!("{who} record stops; its program ran again from {}{lost}", utc_text(to_s)))
         }
     };
-    let own = vehicle.own.runs_s.windows(2).map(|pair| (pair[0].1, pair[1].0)).collect::<Vec<_>>();
     let mut found: Vec<(f64, String)> = of_it().filter(|(_, event)| is_trouble(event)).map(told).collect();
-    found.extend(dive.restarts_s.iter().map(restarts("the surface's")));
-    found.extend(own.iter().map(restarts("the vehicle's")));
+    found.extend(dive.restarts_s.iter().copied().map(restarts("the surface's", "")));
+    found.extend(
+        vehicle.own.pauses().map(restarts("the vehicle's", ", and what it had not stored may be lost on board")),
+    );
     found.sort_by(|a, b| a.0.total_cmp(&b.0));
     let planned = of_it().filter(|(_, event)| event.source == modes && is_limited(&event.text)).map(told);
     let planned: Vec<(f64, String)> = planned.collect();

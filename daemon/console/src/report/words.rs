@@ -46,7 +46,7 @@ pub(super) fn label(book: &LabelBook, label: u8) -> String {
 pub(super) fn unused(frames: &FrameCounts) -> String {
     let causes = frames.dropped.iter().map(|(reason, count)| match reason.as_str() {
         "duplicate" => counted(*count as usize, "copy of a known frame", "copies of known frames"),
-        "checksum" => format!("{count} damaged or of another run"),
+        "checksum" => format!("{count} damaged, of another run or of another mission"),
         other => format!("{count} dropped for {other}"),
     });
     match frames.unused() {

@@ -21,7 +21,7 @@ pub(super) fn describe(
         R::Map(_) | R::FormerLabels(..) | R::Exemplar(..) | R::Fit(..) => return None,
         // A draft changes with each move of a slider.
         R::Draft(..) | R::Log | R::Archives | R::ArchivedMap(_) | R::Command(_) => return None,
-        R::Replay(_) | R::ReplayEvents | R::Report | R::Barred(_) => return None,
+        R::Replay(_) | R::ReplayEvents | R::Report | R::Barred(..) => return None,
         R::Utility(id, weights, terms) => order(*id, utility(weights, *terms)),
         R::ExemplarOrder(id, wanted) => {
             let verb = match wanted.action {

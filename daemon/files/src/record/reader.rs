@@ -6,9 +6,9 @@ use scenecast_core::UserError;
 use scenecast_messages::scenecast_msgs::Frame;
 use scenecast_messages::{Message, decode};
 use sha2::{Digest, Sha256};
-use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
+use std::time::SystemTime;
 
 /// A message of a record.
 #[derive(Debug)]
@@ -88,26 +88,32 @@ pub struct RecordFile {
 }
 
 impl RecordFile {
-    /// The files of the records at a path.
+    /// The files of the records at a path that have not been written to since a moment.
     ///
     /// # Errors
     /// There is none, or one cannot be read.
-    pub fn all(path: &Path) -> Result<Vec<Self>, UserError> {
+    pub fn all(path: &Path, since: SystemTime) -> Result<Vec<Self>, UserError> {
         let files = mission_records(path)?.iter().map(|record| mcap_files(record)).collect::<Result<Vec<_>, _>>()?;
-        files.concat().iter().map(|file| Self::of(file).map_err(|e| UserError::file(file, e))).collect()
+        let is_ended = |file: &PathBuf| {
+            let modified = std::fs::metadata(file).and_then(|about| about.modified());
+            modified.is_ok_and(|modified| modified < since)
+        };
+        files.concat().iter().filter(|file| is_ended(file)).map(|file| Self::of(file)).collect()
     }
 
-    fn of(path: &Path) -> std::io::Result<Self> {
-        let (mut file, mut sum, mut part) = (File::open(path)?, Sha256::new(), vec![0; 1 << 16]);
+    fn of(path: &Path) -> Result<Self, UserError> {
+        let (mut file, mut sum, mut part) =
+            (scenecast_config::open_regular(path, u64::MAX)?, Sha256::new(), vec![0; 1 << 16]);
         let mut bytes = 0;
         loop {
-            let read = file.read(&mut part)?;
+            let read = file.read(&mut part).map_err(|e| UserError::file(path, e))?;
             if read == 0 {
                 break;
             }
             bytes += read as u64;
             sum.update(&part[..read]);
         }
+        let path = path.canonicalize().map_err(|e| UserError::file(path, e))?;
         let within: PathBuf = path.components().skip(path.components().count().saturating_sub(2)).collect();
         let sha256 = sum.finalize().iter().map(|byte| format!("{byte:02x}")).collect();
         Ok(Self { name: within.display().to_string(), bytes, sha256 })

@@ -20,7 +20,7 @@ const MAX_RETRY_INTERVAL: Duration = Duration::from_secs(2);
 const CONNECT_TIMEOUT: Duration = Duration::from_secs(5);
 
 /// An open port of any kind.
-pub(super) enum Opened {
+pub(crate) enum Opened {
     Serial(SerialStream),
     Connection(TcpStream),
     Listener(TcpListener),
@@ -28,7 +28,7 @@ pub(super) enum Opened {
     File(File),
 }
 
-pub(super) async fn open(place: &PortAddress) -> io::Result<Opened> {
+pub(crate) async fn open(place: &PortAddress) -> io::Result<Opened> {
     Ok(match place {
         PortAddress::Serial(device, baud) => Opened::Serial(serial(device, *baud)?),
         PortAddress::Listen(address) => Opened::Listener(TcpListener::bind(address).await?),
@@ -59,6 +59,8 @@ pub(super) struct PortKeeper {
     pub(super) place: PortAddress,
     pub(super) quiet: Option<Duration>,
     pub(super) rule: PeerRule,
+    /// Whether datagrams go to the end of a link, which may know no address of ours.
+    pub(super) knocks: bool,
     pub(super) ends: PortEnds,
 }
 
@@ -67,21 +69,23 @@ impl PortKeeper {
     pub(super) async fn run(mut self, first: Option<Opened>) {
         let mut next = first;
         let mut pause = FIRST_RETRY_INTERVAL;
-        let (mut is_logged, mut was_silent) = (false, false);
+        let (mut is_logged, mut was_open) = (false, false);
         while !self.ends.from.is_closed() {
             let began = Instant::now();
             let opened = match next.take() {
                 Some(opened) => Ok(opened),
                 None => open(&self.place).await,
             };
+            let activity = PortActivity::new();
+            let is_again = std::mem::replace(&mut was_open, opened.is_ok()) && is_logged;
             let ended = match opened {
-                Ok(opened) => self.serve(opened, is_logged && was_silent).await,
+                Ok(opened) => self.serve(opened, &activity, is_again).await,
                 Err(e) => Err(e),
             };
             let Err(e) = ended else { return };
-            was_silent = e.kind() == io::ErrorKind::TimedOut;
             // A port that is opened again and says nothing, or only who it is, has not recovered.
-            if began.elapsed() > MAX_RETRY_INTERVAL + self.quiet.unwrap_or_default() {
+            let lasted = began.elapsed() > MAX_RETRY_INTERVAL + self.quiet.unwrap_or_default();
+            if lasted && (activity.has_spoken() || !self.is_stream()) {
                 (pause, is_logged) = (FIRST_RETRY_INTERVAL, false);
             }
             // A lasting failure is logged once as a warning.
@@ -94,23 +98,27 @@ impl PortKeeper {
         }
     }
 
-    /// Carries bytes until the port fails, or the host is gone (`Ok`). `is_again`: it was
-    /// there all the time and silent, which was logged.
-    async fn serve(&mut self, opened: Opened, is_again: bool) -> io::Result<()> {
+    /// Whether the port is a stream of bytes of one device.
+    fn is_stream(&self) -> bool {
+        matches!(self.place, PortAddress::Serial(..) | PortAddress::Connect(_))
+    }
+
+    /// Carries bytes until the port fails, or the host is gone (`Ok`). `is_again`: it was open before and failed, which was logged.
+    async fn serve(&mut self, opened: Opened, activity: &PortActivity, is_again: bool) -> io::Result<()> {
         match opened {
             Opened::Listener(_) => {}
             _ if is_again => tracing::debug!("{}: open", self.name),
             _ => tracing::info!("{}: open", self.name),
         }
         let result = match opened {
-            Opened::Serial(stream) => carry(stream, self.quiet, &PortActivity::new(), &mut self.ends).await,
+            Opened::Serial(stream) => carry(stream, self.quiet, activity, &mut self.ends).await,
             Opened::Connection(stream) => {
                 let _ = stream.set_nodelay(true);
-                carry(stream, self.quiet, &PortActivity::new(), &mut self.ends).await
+                carry(stream, self.quiet, activity, &mut self.ends).await
             }
             Opened::Listener(listener) => return tcp::accept(self.name, listener, self.quiet, &mut self.ends).await,
             Opened::Socket(socket, remote) => {
-                let peer = UdpPeer::new(self.name, remote, self.rule, Instant::now());
+                let peer = UdpPeer::new(self.name, remote, self.rule, self.knocks, Instant::now());
                 udp::carry(socket, peer, self.quiet, &mut self.ends).await
             }
             Opened::File(file) => append(file, &mut self.ends).await,

@@ -6,12 +6,15 @@ mod udp;
 
 use bytes::Bytes;
 use keeper::PortKeeper;
+pub(crate) use keeper::{Opened, open};
 use scenecast_core::PortAddress;
 use scenecast_host::FrameOutcome;
 use std::io;
 use std::net::SocketAddr;
+use std::path::Path;
 use std::time::Duration;
 use tokio::sync::mpsc;
+use tokio::task::JoinHandle;
 use udp::PeerRule;
 
 /// A request to a port.
@@ -40,6 +43,8 @@ pub enum FromPort {
 pub struct Port {
     to: mpsc::Sender<ToPort>,
     from: mpsc::Receiver<FromPort>,
+    /// The keeper, which ends with the port.
+    task: Option<JoinHandle<()>>,
 }
 
 /// The task's side of a [`Port`].
@@ -53,14 +58,20 @@ impl Port {
     /// [`Self::judge`] the result of each datagram.
     ///
     /// # Errors
-    /// The port cannot be opened. A TCP peer that refuses the connection is no error: it is tried again.
+    /// The port cannot be opened. A TCP peer that refuses the connection, and an adapter that is not plugged in, are no errors: they
+    /// are tried again.
     pub async fn open_judged(name: &'static str, place: PortAddress) -> io::Result<Self> {
         let first = match &place {
             PortAddress::Connect(_) => None,
-            there => Some(keeper::open(there).await?),
+            there => match keeper::open(there).await {
+                // A device that another program has open is reported as missing, too.
+                Err(_) if matches!(there, PortAddress::Serial(device, _) if !Path::new(device).exists()) => None,
+                opened => Some(opened?),
+            },
         };
-        let (port, ends) = Self::pair();
-        tokio::spawn(PortKeeper { name, place, quiet: None, rule: PeerRule::Judged, ends }.run(first));
+        let (mut port, ends) = Self::pair();
+        let keeper = PortKeeper { name, place, quiet: None, rule: PeerRule::Judged, knocks: true, ends };
+        port.task = Some(tokio::spawn(keeper.run(first)));
         Ok(port)
     }
 
@@ -77,15 +88,24 @@ impl Port {
     }
 
     fn kept(name: &'static str, place: PortAddress, quiet: Option<Duration>, rule: PeerRule) -> Self {
-        let (port, ends) = Self::pair();
-        tokio::spawn(PortKeeper { name, place, quiet, rule, ends }.run(None));
+        let (mut port, ends) = Self::pair();
+        port.task = Some(tokio::spawn(PortKeeper { name, place, quiet, rule, knocks: false, ends }.run(None)));
         port
     }
 
     fn pair() -> (Self, PortEnds) {
         let (to, to_port) = mpsc::channel(64);
         let (from_port, from) = mpsc::channel(64);
-        (Self { to, from }, PortEnds { to: to_port, from: from_port })
+        (Self { to, from, task: None }, PortEnds { to: to_port, from: from_port })
+    }
+
+    /// Closes the port, and returns once its device is free for others.
+    pub async fn close(self) {
+        let Self { to, from, task } = self;
+        drop((to, from));
+        if let Some(task) = task {
+            let _ = task.await;
+        }
     }
 
     /// The next report of the port. Cancel-safe.

@@ -14,6 +14,10 @@ use tokio::time::Instant;
 const MAX_DATAGRAM_BYTES: usize = 2048;
 /// A peer that is silent for this time gives way to another one.
 const SILENCE_TIMEOUT: Duration = Duration::from_secs(10);
+/// Time between two empty datagrams by which an end with a configured address makes its own known, until it is answered.
+const KNOCK_INTERVAL: Duration = Duration::from_secs(2);
+/// Senders of empty datagrams that are answered.
+const MAX_KNOCKERS: usize = 4;
 /// Pause after an error of the system.
 const RETRY_INTERVAL: Duration = Duration::from_millis(200);
 
@@ -52,13 +56,27 @@ pub(super) struct UdpPeer {
     /// The end of the pin, if nothing renews it.
     pinned_until: Option<Instant>,
     last_read: Instant,
+    /// When its own address is to be made known again; `None` where the other end finds it by what it reads.
+    next_knock: Option<Instant>,
+    /// Who said where he is reached since the other end was heard last, the latest last.
+    knockers: Vec<SocketAddr>,
+    /// Whether the other end may make its address known.
+    is_of_link: bool,
 }
 
 impl UdpPeer {
     /// The peer `fixed`, or the one that `rule` finds. `name` appears in the log.
-    pub(super) fn new(name: &'static str, fixed: Option<SocketAddr>, rule: PeerRule, now: Instant) -> Self {
+    pub(super) fn new(
+        name: &'static str,
+        fixed: Option<SocketAddr>,
+        rule: PeerRule,
+        is_of_link: bool,
+        now: Instant,
+    ) -> Self {
+        let next_knock = fixed.filter(|_| is_of_link).map(|_| now);
         let rule = if fixed.is_some() { None } else { Some(rule) };
-        Self { name, rule, address: fixed, pinned_until: None, last_read: now }
+        let (knockers, pinned_until) = (Vec::new(), None);
+        Self { name, rule, address: fixed, pinned_until, last_read: now, next_knock, knockers, is_of_link }
     }
 
     /// Whether another sender than this one is pinned.
@@ -74,11 +92,37 @@ impl UdpPeer {
         };
         if is_taken {
             self.last_read = now;
+            self.next_knock = self.next_knock.map(|_| now + SILENCE_TIMEOUT);
             if self.rule == Some(PeerRule::First) {
                 self.pin(sender, now);
             }
         }
         is_taken
+    }
+
+    /// An empty datagram says where its sender is reached. While nobody is heard, datagrams go to the last of these senders too, so
+    /// that none keeps another one out.
+    fn handle_knock(&mut self, sender: SocketAddr, now: Instant) {
+        if self.is_of_link && self.rule.is_some() && !self.excludes(sender, now) {
+            self.knockers.retain(|known| *known != sender);
+            self.knockers.push(sender);
+            self.knockers.drain(..self.knockers.len().saturating_sub(MAX_KNOCKERS));
+        }
+    }
+
+    /// Where datagrams go.
+    fn receivers(&self) -> impl Iterator<Item = SocketAddr> {
+        let others = self.knockers.iter().copied().filter(|knocker| Some(*knocker) != self.address);
+        self.address.into_iter().chain(others)
+    }
+
+    /// Whether an empty datagram is due.
+    fn knocks(&mut self, now: Instant) -> bool {
+        let is_due = self.next_knock.is_some_and(|at| now >= at);
+        if is_due {
+            self.next_knock = Some(now + KNOCK_INTERVAL);
+        }
+        is_due
     }
 
     /// Follows the judgement of a datagram. One that only opened may be a replay: it is answered, but pins nobody.
@@ -99,6 +143,7 @@ impl UdpPeer {
         if self.pinned_until.is_none() || self.address != Some(sender) {
             tracing::info!("{}: datagrams of others than {sender} are dropped while it is heard", self.name);
         }
+        self.knockers.clear();
         self.address = Some(sender);
         self.pinned_until = Some(now + SILENCE_TIMEOUT);
     }
@@ -117,19 +162,26 @@ pub(super) async fn carry(
     let mut buffer = [0; MAX_DATAGRAM_BYTES];
     loop {
         tokio::select! {
-            order = ends.to.recv() => match (order, peer.address) {
-                (None, _) => return Ok(()),
-                (Some(ToPort::Reopen), _) => return Err(reopening()),
-                (Some(ToPort::Judged(sender, outcome)), _) => peer.handle_judged(sender, outcome, Instant::now()),
-                (Some(ToPort::Bytes(bytes)), Some(peer)) => {
-                    // A peer that is not running yet refuses datagrams; it may start later.
-                    if let Err(e) = socket.send_to(&bytes, peer).await {
-                        tracing::debug!("{peer}: {e}");
+            order = ends.to.recv() => match order {
+                None => return Ok(()),
+                Some(ToPort::Reopen) => return Err(reopening()),
+                Some(ToPort::Judged(sender, outcome)) => peer.handle_judged(sender, outcome, Instant::now()),
+                Some(ToPort::Bytes(bytes)) => {
+                    for receiver in peer.receivers() {
+                        // A peer that is not running yet refuses datagrams; it may start later.
+                        if let Err(e) = socket.send_to(&bytes, receiver).await {
+                            tracing::debug!("{receiver}: {e}");
+                        }
                     }
                 }
-                (Some(ToPort::Bytes(_)), None) => {}
             },
+            () = knock_time(peer.next_knock) => {
+                if let (true, Some(address)) = (peer.knocks(Instant::now()), peer.address) {
+                    let _ = socket.send_to(&[], address).await;
+                }
+            }
             received = socket.recv_from(&mut buffer) => match received {
+                Ok((0, sender)) => peer.handle_knock(sender, Instant::now()),
                 Ok((n, sender)) => {
                     let bytes = Bytes::copy_from_slice(buffer.get(..n).unwrap_or_default());
                     if peer.takes(sender, Instant::now()) && !ends.report(FromPort::Datagram(bytes, sender)).await {
@@ -141,6 +193,14 @@ pub(super) async fn carry(
             },
             e = silence(peer.last_read, quiet) => return Err(e),
         }
+    }
+}
+
+/// Returns when an empty datagram is due.
+async fn knock_time(due: Option<Instant>) {
+    match due {
+        Some(due) => tokio::time::sleep_until(due).await,
+        None => std::future::pending().await,
     }
 }
 
@@ -177,7 +237,7 @@ mod tests {
             let own = UdpSocket::bind("127.0.0.1:0").await.unwrap();
             let address = own.local_addr().unwrap();
             let (mut port, mut ends) = Port::pair();
-            let peer = UdpPeer::new("test", None, rule, Instant::now());
+            let peer = UdpPeer::new("test", None, rule, true, Instant::now());
             tokio::spawn(async move { carry(own, peer, None, &mut ends).await });
             assert_eq!(port.next().await, FromPort::Open);
             Self { port, address }
@@ -215,6 +275,36 @@ mod tests {
         carried.writes(&peer, 4).await;
         carried.send(&stranger, 5).await;
         carried.reports(&peer, 6).await;
+    }
+
+    #[tokio::test]
+    async fn an_end_without_an_address_answers_all_that_knock() {
+        let mut carried = Carried::new(PeerRule::Judged).await;
+        let (vehicle, stranger) = (Sender::new().await, Sender::new().await);
+        vehicle.0.send_to(&[], carried.address).await.unwrap();
+        stranger.0.send_to(&[], carried.address).await.unwrap();
+        carried.reports(&stranger, 1).await;
+        carried.writes(&vehicle, 2).await;
+        assert_eq!(stranger.0.recv(&mut [0; 8]).await.unwrap(), 1, "it is answered, too");
+        carried.port.judge(vehicle.address(), FrameOutcome::Accepted);
+        carried.writes(&vehicle, 3).await;
+        stranger.0.send_to(&[], carried.address).await.unwrap();
+        carried.reports(&vehicle, 4).await;
+        carried.writes(&vehicle, 5).await;
+        assert!(stranger.0.try_recv(&mut [0; 8]).is_err(), "the vehicle alone is heard");
+    }
+
+    #[test]
+    fn an_end_with_an_address_knocks_until_it_is_answered() {
+        let (now, address) = (Instant::now(), "192.0.2.1:4001".parse::<SocketAddr>().unwrap());
+        let mut peer = UdpPeer::new("test", Some(address), PeerRule::Judged, true, now);
+        assert!(peer.knocks(now) && !peer.knocks(now + KNOCK_INTERVAL / 2) && peer.knocks(now + KNOCK_INTERVAL));
+        assert!(peer.takes(address, now + KNOCK_INTERVAL));
+        assert!(!peer.knocks(now + SILENCE_TIMEOUT) && peer.knocks(now + KNOCK_INTERVAL + SILENCE_TIMEOUT));
+        assert!(
+            !UdpPeer::new("test", Some(address), PeerRule::Judged, false, now).knocks(now),
+            "an autopilot knows its own"
+        );
     }
 
     #[tokio::test]
@@ -269,7 +359,7 @@ mod tests {
     fn a_configured_address_is_listened_to_at_any_of_its_ports() {
         let now = Instant::now();
         let address = |text: &str| text.parse::<SocketAddr>().unwrap();
-        let mut peer = UdpPeer::new("test", Some(address("192.0.2.1:4001")), PeerRule::Judged, now);
+        let mut peer = UdpPeer::new("test", Some(address("192.0.2.1:4001")), PeerRule::Judged, true, now);
         assert!(peer.takes(address("192.0.2.1:9"), now));
         peer.handle_judged(address("192.0.2.1:9"), FrameOutcome::Accepted, now);
         assert!(!peer.takes(address("192.0.2.2:4001"), now + 9 * SILENCE_TIMEOUT));

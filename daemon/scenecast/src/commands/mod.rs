@@ -9,6 +9,7 @@ mod config;
 mod ctl;
 #[cfg(feature = "rehearsal")]
 mod demo;
+mod doctor;
 mod key;
 #[cfg(feature = "tools")]
 mod manual;
@@ -76,6 +77,9 @@ enum Command {
     /// Measure the link, the modems, the planners and the map that the operator sees.
     #[command(subcommand)]
     Bench(bench::BenchCommand),
+    /// Look at the equipment of an end, and say what to do where it does not work.
+    #[command(subcommand)]
+    Doctor(doctor::Doctor),
     /// Make the key of a mission or of a vehicle, show a key, or make a token for the operator's page.
     #[command(subcommand)]
     Key(key::Key),
@@ -136,6 +140,7 @@ pub fn run(arguments: Arguments) -> Result<(), UserError> {
         Command::ModemSim(sim) => sim.run(),
         #[cfg(feature = "rehearsal")]
         Command::Bench(bench) => bench.run(),
+        Command::Doctor(doctor) => doctor.run(),
         Command::Key(key) => key.run(),
         Command::Record(record) => record.run(),
         #[cfg(feature = "surface")]
