@@ -46,7 +46,7 @@ async fn check(config: &Config, end: Address) -> Result<(), UserError> {
     let place = scenecast_config::modem_port(config)?;
     outln!("port: {place}; modem.kind = \"{}\"", config.modem.kind);
     drop(open(&place).await.map_err(|e| not_there(&place, &e))?);
-    outln!("it opens; listening for {} s", LISTEN_TIME.as_secs());
+    outln!("it opens; listening for up to {} s", LISTEN_TIME.as_secs());
     let mut driver = driver(config, end, modem_of_process(config, end)?)?;
     let mut port = Port::open_judged("modem", place.clone()).await.map_err(|e| not_there(&place, &e))?;
     let (heard, bytes, frames) = listen(&mut port, config.modem.kind, driver.as_mut()).await;
@@ -125,7 +125,7 @@ async fn listen(port: &mut Port, kind: ModemKind, driver: &mut dyn Driver) -> (H
             }
             Err(_) if Instant::now() < end => {}
             Err(_) if !is_open => return (Heard::Closed, bytes, frames),
-            Err(_) if kind.is_pipe() => return (Heard::Ready, bytes, frames),
+            Err(_) if kind.is_pipe() && (frames > 0 || bytes == 0) => return (Heard::Ready, bytes, frames),
             Err(_) => return (Heard::Wrong(listener.finding()), bytes, frames),
         }
     }

@@ -13,6 +13,11 @@ use std::time::Duration;
 /// Minimum time between two reopenings of the port because of a silent modem.
 const REOPEN_INTERVAL: Duration = Duration::from_secs(10);
 
+/// A connection that lasts for less than this was of no use.
+const SHORT: Duration = Duration::from_secs(5);
+/// So many of them in a row are told.
+const MANY_SHORT: u32 = 3;
+
 /// The port to the modem.
 #[derive(Debug)]
 pub(super) struct ModemPort {
@@ -23,6 +28,10 @@ pub(super) struct ModemPort {
     listener: PortListener,
     /// Devices take their own time, however fast the mission runs.
     clock: Clock,
+    /// When the port was opened last, and how many short connections there were in a row.
+    opened: Instant,
+    short: u32,
+    is_lost: bool,
     /// What people are to be told next.
     note: Option<String>,
 }
@@ -33,7 +42,8 @@ impl ModemPort {
         let place = scenecast_config::modem_port(config)?;
         let port = Port::open_judged("modem", place.clone()).await.map_err(|e| not_there(&place, &e))?;
         let (listener, clock) = (PortListener::new(config.modem.kind), Clock::new(1.0));
-        Ok(Self { port, place, reopened: now, listener, clock, note: None })
+        let (opened, short, is_lost, note) = (Instant::ZERO, 0, false, None);
+        Ok(Self { port, place, reopened: now, listener, clock, opened, short, is_lost, note })
     }
 
     /// The next report of the port. Cancel-safe.
@@ -45,11 +55,12 @@ impl ModemPort {
     pub(super) fn handle<E: LinkEnd>(&mut self, report: FromPort, link: &mut LinkHost<E>, now: Instant) {
         match report {
             FromPort::Open => {
-                self.listener.handle_open(self.clock.now());
+                self.opened = self.clock.now();
+                self.listener.handle_open(self.opened);
                 link.handle_open(now);
             }
             FromPort::Closed => {
-                self.listener.handle_closed();
+                self.handle_closed();
                 link.handle_closed(now);
             }
             FromPort::Bytes(bytes) => {
@@ -61,6 +72,23 @@ impl ModemPort {
                 self.port.judge(sender, link.handle_datagram(&bytes, now));
             }
         }
+    }
+
+    fn handle_closed(&mut self) {
+        self.listener.handle_closed();
+        let is_short = self.clock.now().since(self.opened) < SHORT;
+        self.short = if is_short { self.short + 1 } else { 0 };
+        if self.short == MANY_SHORT {
+            let place = &self.place;
+            self.tell(format!(
+                "{place} is closed again and again as soon as it is open: another program has it, or no modem is there"
+            ));
+        }
+    }
+
+    fn tell(&mut self, text: String) {
+        tracing::warn!("modem: {text}");
+        self.note = Some(text);
     }
 
     /// Refused bytes are dropped: the port is dead, the driver detects it, and by then the bytes are stale.
@@ -86,12 +114,20 @@ impl ModemPort {
     pub(super) fn handle_event(&mut self, event: &FrameEvent) -> Result<(), UserError> {
         match event {
             FrameEvent::ModemReady => {
-                if self.listener.handle_ready() {
+                if self.listener.handle_ready() || std::mem::take(&mut self.is_lost) && self.short == 0 {
                     self.note = Some("it is ready now".to_owned());
                 }
-                tracing::info!("modem: ready");
+                match self.short {
+                    0 => tracing::info!("modem: ready"),
+                    _ => tracing::debug!("modem: ready"),
+                }
             }
-            FrameEvent::ModemLost => tracing::warn!("modem: lost; it is set up again when it answers"),
+            // A port that is closed at once is told as that.
+            FrameEvent::ModemLost if self.short > 0 => tracing::debug!("modem: lost"),
+            FrameEvent::ModemLost => {
+                self.is_lost = true;
+                self.tell("lost; it is set up again when it answers".to_owned());
+            }
             FrameEvent::ModemRefused { reason, was_ready: false } => {
                 return Err(UserError::Failed(format!("modem: {reason}")));
             }
@@ -108,9 +144,7 @@ impl ModemPort {
     /// Logs what is wrong at a port whose modem does not get ready.
     pub(super) fn listen<E: LinkEnd>(&mut self, link: &LinkHost<E>) {
         if let Some(finding) = self.listener.poll(link.end().frame_counts().accepted > 0, self.clock.now()) {
-            let told = advice(&finding, &self.place);
-            tracing::warn!("modem: {told}");
-            self.note = Some(told);
+            self.tell(format!("{}; `scenecast doctor modem` looks closer", advice(&finding, &self.place)));
         }
     }
 
@@ -123,18 +157,17 @@ impl ModemPort {
 /// What is wrong at a port, and what to do.
 pub(super) fn advice(finding: &PortFinding, place: &PortAddress) -> String {
     let is_serial = matches!(place, PortAddress::Serial(..));
-    let look = "`scenecast doctor modem` looks closer";
     match finding {
         PortFinding::Silent if is_serial => format!(
-            "nothing comes in from {place}: the modem may be off, its cable loose or crossed, or its speed another one; {look}"
+            "nothing comes in from {place}: the modem may be off, its cable loose or crossed, or its speed another one"
         ),
         PortFinding::Silent => {
-            format!("nothing comes in from {place}, although it is connected: is the modem behind it on? {look}")
+            format!("nothing comes in from {place}, although it is connected: is the modem behind it on?")
         }
         PortFinding::NoText if is_serial => {
-            format!("what comes in from {place} is no text, so its speed is probably another one (modem.baud); {look}")
+            format!("what comes in from {place} is no text, so its speed is probably another one (modem.baud)")
         }
-        PortFinding::NoText => format!("what comes in from {place} is not what a modem of this kind writes; {look}"),
+        PortFinding::NoText => format!("what comes in from {place} is not what a modem of this kind writes"),
         PortFinding::Speaks(Speaker::S2c) => {
             format!("an EvoLogics S2C modem answers at {place}: set modem.kind = \"s2c\", or connect the other modem")
         }
@@ -151,7 +184,7 @@ pub(super) fn advice(finding: &PortFinding, place: &PortAddress) -> String {
             format!("what is written to {place} comes back: its two data lines are joined, or nothing is behind it")
         }
         PortFinding::UnknownText(line) => format!(
-            "what comes in from {place} is text of no modem that scenecast knows, such as \"{}\"; {look}",
+            "what comes in from {place} is text of no modem that scenecast knows, such as \"{}\"",
             line.escape_default()
         ),
         PortFinding::NoFrames(bytes) => format!(
@@ -159,7 +192,7 @@ pub(super) fn advice(finding: &PortFinding, place: &PortAddress) -> String {
              and mission.id the same?",
             if is_serial { "is modem.baud its speed, " } else { "" }
         ),
-        PortFinding::NotReady => format!("the modem at {place} answers, and does not get ready; {look}"),
+        PortFinding::NotReady => format!("the modem at {place} answers, and does not get ready"),
     }
 }
 

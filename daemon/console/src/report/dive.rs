@@ -1,10 +1,10 @@
 //! What a record says about a dive.
 
 use super::areas::{ClassArea, areas};
+use super::log::events;
 use super::maps::{MapsAt, maps_over_time};
 use super::orders::{OrderKey, OrderStep};
 use super::track::{TrackPoint, measured};
-use super::words::{self, NO_ORDER};
 use crate::export::{MapCaption, MapCells};
 use crate::replay::{FrameCounts, Recording, StateText};
 use crate::state::{LinkDirection, LinkSummary, MapLabelTree, MissionState, ReplaySide, VehicleMarker, VehicleState};
@@ -13,9 +13,7 @@ use scenecast_files::{MissionClock, RecordFile};
 use scenecast_messages::contents::valid_part;
 use scenecast_messages::geometry_msgs::PoseWithCovarianceStamped;
 use scenecast_messages::scenecast_msgs::{Event, Exemplar, Link, Order};
-use scenecast_protocol::directive::SlotId;
 use scenecast_protocol::map::{Cell, LabelGrid};
-use scenecast_surface::LabelBook;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 
@@ -130,9 +128,6 @@ pub(super) struct OwnRecord {
 pub(super) fn seconds(nanos: u64) -> f64 {
     nanos as f64 / 1e9
 }
-
-/// A second, nanoseconds.
-const SECOND: u64 = 1_000_000_000;
 
 impl Dive {
     /// Reads the record of a surface, and of vehicles if they are given: files, or their folders.
@@ -365,41 +360,6 @@ fn sum(a: &LinkDirection, b: &LinkDirection) -> LinkDirection {
     b.bytes_by_class.iter().for_each(|(class, bytes)| *bytes_by_class.entry(class.clone()).or_default() += bytes);
     let energy_j = a.energy_j.zip(b.energy_j).map(|(a, b)| a + b);
     LinkDirection { frames, lost, loss: lost as f64 / frames.max(1) as f64, bytes_by_class, energy_j, ..a.clone() }
-}
-
-/// The entries of the surface's log at the times at which they happened, each once, and what vehicles have recorded themselves.
-fn events(recording: &Recording) -> Vec<(f64, Event)> {
-    let happened = |at: u64, event: &Event| match event.header.stamp.nanos() {
-        0 => seconds(at),
-        nanos => nanos as f64 / 1e9,
-    };
-    let mut events: Vec<(f64, Event)> =
-        recording.log.iter().map(|(at, event)| (happened(*at, event), event.clone())).collect();
-    let unnamed = LabelBook::default();
-    for (part, known) in &recording.vehicles {
-        let given = recording.operator.get(part).into_iter().flat_map(|known| &known.given);
-        let stops = given
-            .filter(|order| order.slot == SlotId::Constraints.name() && words::content(&unnamed, order) != "resume");
-        // Otherwise the order may have been given before the record.
-        let begins = recording.timeline.states.first().map(|state| state.nanos);
-        let is_whole =
-            begins.zip(known.runs.first()).is_some_and(|(begins, run)| begins <= run.0.saturating_add(SECOND));
-        let first_stop = stops.map(|order| order.header.stamp.nanos()).min().unwrap_or(i64::MAX);
-        let told = known.events.iter().filter(|(_, event)| event.source != "fix");
-        events.extend(told.map(|(at, event)| {
-            let mut event = Event { source: format!("{}, on board", event.source), ..event.clone() };
-            let waits = is_whole && (*at as i64) < first_stop;
-            if let Some(mode) = event.text.strip_suffix(": order").filter(|_| waits) {
-                event.text = format!("{mode}{NO_ORDER}");
-            }
-            (seconds(*at), event)
-        }));
-    }
-    events.sort_by(|a, b| a.0.total_cmp(&b.0));
-    // A surface that was restarted may have recorded again what it knew.
-    events
-        .dedup_by(|a, b| a.0 == b.0 && a.1.text == b.1.text && a.1.source == b.1.source && a.1.vehicle == b.1.vehicle);
-    events
 }
 
 /// The times in which a surface that records its state every ten seconds recorded none.

@@ -7,6 +7,7 @@ mod dive;
 mod extent;
 mod gaps;
 mod link;
+mod log;
 mod maps;
 mod orders;
 mod page;
