@@ -28,8 +28,8 @@ pub(super) struct ModemPort {
     listener: PortListener,
     /// Devices take their own time, however fast the mission runs.
     clock: Clock,
-    /// When the port was opened last, and how many short connections there were in a row.
-    opened: Instant,
+    /// Since when the port is open, and how many short connections there were in a row.
+    opened: Option<Instant>,
     short: u32,
     is_lost: bool,
     /// What people are to be told next.
@@ -42,7 +42,7 @@ impl ModemPort {
         let place = scenecast_config::modem_port(config)?;
         let port = Port::open_judged("modem", place.clone()).await.map_err(|e| not_there(&place, &e))?;
         let (listener, clock) = (PortListener::new(config.modem.kind), Clock::new(1.0));
-        let (opened, short, is_lost, note) = (Instant::ZERO, 0, false, None);
+        let (opened, short, is_lost, note) = (None, 0, false, None);
         Ok(Self { port, place, reopened: now, listener, clock, opened, short, is_lost, note })
     }
 
@@ -55,8 +55,8 @@ impl ModemPort {
     pub(super) fn handle<E: LinkEnd>(&mut self, report: FromPort, link: &mut LinkHost<E>, now: Instant) {
         match report {
             FromPort::Open => {
-                self.opened = self.clock.now();
-                self.listener.handle_open(self.opened);
+                self.opened = Some(self.clock.now());
+                self.listener.handle_open(self.clock.now());
                 link.handle_open(now);
             }
             FromPort::Closed => {
@@ -76,13 +76,22 @@ impl ModemPort {
 
     fn handle_closed(&mut self) {
         self.listener.handle_closed();
-        let is_short = self.clock.now().since(self.opened) < SHORT;
+        let is_short = self.opened.take().is_some_and(|opened| self.clock.now().since(opened) < SHORT);
         self.short = if is_short { self.short + 1 } else { 0 };
         if self.short == MANY_SHORT {
             let place = &self.place;
             self.tell(format!(
                 "{place} is closed again and again as soon as it is open: another program has it, or no modem is there"
             ));
+        }
+    }
+
+    /// Ends the row of short connections once one lasts, and says so where the row was told.
+    fn handle_lasting(&mut self) {
+        let lasts = self.opened.is_some_and(|opened| self.clock.now().since(opened) >= SHORT);
+        if lasts && std::mem::take(&mut self.short) >= MANY_SHORT {
+            tracing::info!("modem: open, and stays so");
+            self.note = Some("its port stays open now".to_owned());
         }
     }
 
@@ -114,7 +123,8 @@ impl ModemPort {
     pub(super) fn handle_event(&mut self, event: &FrameEvent) -> Result<(), UserError> {
         match event {
             FrameEvent::ModemReady => {
-                if self.listener.handle_ready() || std::mem::take(&mut self.is_lost) && self.short == 0 {
+                let (was_told, was_lost) = (self.listener.handle_ready(), std::mem::take(&mut self.is_lost));
+                if was_told || was_lost && self.short == 0 {
                     self.note = Some("it is ready now".to_owned());
                 }
                 match self.short {
@@ -143,6 +153,7 @@ impl ModemPort {
 
     /// Logs what is wrong at a port whose modem does not get ready.
     pub(super) fn listen<E: LinkEnd>(&mut self, link: &LinkHost<E>) {
+        self.handle_lasting();
         if let Some(finding) = self.listener.poll(link.end().frame_counts().accepted > 0, self.clock.now()) {
             self.tell(format!("{}; `scenecast doctor modem` looks closer", advice(&finding, &self.place)));
         }
