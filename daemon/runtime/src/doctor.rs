@@ -135,25 +135,19 @@ async fn listen(port: &mut Port, kind: ModemKind, driver: &mut dyn Driver) -> (H
 async fn other_speed(device: &str, configured: u32, kind: ModemKind) -> Option<String> {
     for baud in BAUDS.into_iter().filter(|baud| *baud != configured) {
         outln!("asking at {baud} bit/s");
-        let speaker = match ask(device, baud, kind).await {
+        let place = PortAddress::Serial(device.to_owned(), baud);
+        let speaker = match ask(&place, kind).await {
             Ok(Some(speaker)) => speaker,
             Ok(None) => continue,
             Err(e) => {
-                outln!("{device} at {baud} bit/s: {e}");
+                outln!("{place}: {e}");
                 continue;
             }
         };
         let (make, kind) = match speaker {
             Speaker::S2c => ("an EvoLogics S2C modem", "s2c"),
             Speaker::Micromodem => ("a WHOI Micromodem", "micromodem"),
-            Speaker::Gnss => {
-                return Some(format!(
-                    "a receiver of satellite positions speaks at {device} at {baud} bit/s, not a modem"
-                ));
-            }
-            Speaker::Login => {
-                return Some(format!("a computer asks for a name at {device} at {baud} bit/s: this is its console"));
-            }
+            Speaker::Gnss | Speaker::Login => return Some(advice(&PortFinding::Speaks(speaker), &place)),
         };
         return Some(format!("{make} answers at {baud} bit/s: set modem.kind = \"{kind}\" and modem.baud = {baud}"));
     }
@@ -161,10 +155,8 @@ async fn other_speed(device: &str, configured: u32, kind: ModemKind) -> Option<S
 }
 
 /// Who answers the question of the configured make at a speed.
-async fn ask(device: &str, baud: u32, kind: ModemKind) -> io::Result<Option<Speaker>> {
-    let Opened::Serial(mut stream) = open(&PortAddress::Serial(device.to_owned(), baud)).await? else {
-        return Ok(None);
-    };
+async fn ask(place: &PortAddress, kind: ModemKind) -> io::Result<Option<Speaker>> {
+    let Opened::Serial(mut stream) = open(place).await? else { return Ok(None) };
     let mut listener = PortListener::new(kind);
     listener.handle_open(Clock::new(1.0).now());
     let question = if kind == ModemKind::S2c { S2C_QUESTION } else { MICROMODEM_QUESTION };

@@ -112,7 +112,7 @@ impl Shared {
 
     /// The reply of the surface to an order of a principal, as a response.
     pub(super) async fn order(&self, by: Giver, request: SurfaceRequest) -> Response {
-        let is_edit = request.order_kind() == Some(OrderKind::Record) || matches!(request, SurfaceRequest::Barred(..));
+        let is_edit = request.order_kind() == Some(OrderKind::Record);
         if is_edit && !self.edit_rate.take(by.name(), Instant::now()) {
             let refusal = error(
                 StatusCode::TOO_MANY_REQUESTS,

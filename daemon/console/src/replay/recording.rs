@@ -187,7 +187,7 @@ impl Recording {
         }
         of_one_mission(&surfaces, &vehicles)?;
         let mut span = (u64::MAX, 0);
-        let known_frames = FrameTimes::joined(surfaces.iter().map(|surface| &surface.frames));
+        let frames = FrameTimes::joined(surfaces.iter().map(|surface| &surface.frames));
         surfaces.sort_by_key(|record| record.span);
         for surface in surfaces {
             span = joined(span, surface.span, 0);
@@ -200,13 +200,13 @@ impl Recording {
         }
         vehicles.sort_by_key(|record| record.span);
         for vehicle in vehicles {
-            let shift = vehicle.frames.shift_to(&known_frames);
-            let (frames, runs) = (vehicle.counts.clone(), vehicle.span.into_iter().collect::<Vec<_>>());
+            let shift = vehicle.frames.shift_to(&frames);
+            let runs: Vec<_> = vehicle.span.into_iter().collect();
             span = joined(span, vehicle.span, shift);
             vehicle.known.into_iter().for_each(|(part, known)| {
                 whole.vehicles.entry(part).or_default().add(
                     Known {
-                        frames: frames.clone(),
+                        frames: vehicle.counts.clone(),
                         sent_bits: vehicle.sent_bits.clone(),
                         settings: vehicle.settings.clone(),
                         runs: runs.clone(),

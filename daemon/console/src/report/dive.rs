@@ -100,13 +100,6 @@ pub(super) struct DiveVehicle {
     pub(super) maps: Vec<MapsAt>,
 }
 
-impl OwnRecord {
-    /// The times between its runs.
-    pub(super) fn pauses(&self) -> impl Iterator<Item = (f64, f64)> {
-        self.runs_s.iter().zip(self.runs_s.iter().skip(1)).map(|(before, after)| (before.1, after.0))
-    }
-}
-
 /// What a vehicle's own record says; empty without one.
 #[derive(Debug, Default)]
 pub(super) struct OwnRecord {
@@ -123,6 +116,13 @@ pub(super) struct OwnRecord {
     pub(super) decided_s: BTreeMap<OrderKey, f64>,
     /// What it ran with.
     pub(super) settings: SettingsRecord,
+}
+
+impl OwnRecord {
+    /// The times between its runs.
+    pub(super) fn pauses(&self) -> impl Iterator<Item = (f64, f64)> {
+        self.runs_s.iter().zip(self.runs_s.iter().skip(1)).map(|(before, after)| (before.1, after.0))
+    }
 }
 
 pub(super) fn seconds(nanos: u64) -> f64 {

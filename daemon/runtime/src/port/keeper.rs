@@ -220,11 +220,16 @@ pub(super) async fn carry(
 
 /// Returns an error after `quiet` without a received byte; without `quiet` it never returns.
 pub(super) async fn silence(last_read: Instant, quiet: Option<Duration>) -> io::Error {
-    match quiet {
-        Some(quiet) => tokio::time::sleep_until(last_read + quiet).await,
+    until(quiet.map(|quiet| last_read + quiet)).await;
+    io::Error::new(io::ErrorKind::TimedOut, "no bytes arrived for too long")
+}
+
+/// Returns at a moment; without one it never returns.
+pub(super) async fn until(due: Option<Instant>) {
+    match due {
+        Some(due) => tokio::time::sleep_until(due).await,
         None => std::future::pending().await,
     }
-    io::Error::new(io::ErrorKind::TimedOut, "no bytes arrived for too long")
 }
 
 /// The error that makes the keeper open the port again, on the host's request.

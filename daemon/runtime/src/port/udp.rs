@@ -1,6 +1,6 @@
 //! Datagrams with one frame each, for benches, radio links and autopilots.
 
-use super::keeper::{reopening, silence};
+use super::keeper::{reopening, silence, until};
 use super::{FromPort, PortEnds, ToPort};
 use bytes::Bytes;
 use scenecast_host::FrameOutcome;
@@ -175,7 +175,7 @@ pub(super) async fn carry(
                     }
                 }
             },
-            () = knock_time(peer.next_knock) => {
+            () = until(peer.next_knock) => {
                 if let (true, Some(address)) = (peer.knocks(Instant::now()), peer.address) {
                     let _ = socket.send_to(&[], address).await;
                 }
@@ -193,14 +193,6 @@ pub(super) async fn carry(
             },
             e = silence(peer.last_read, quiet) => return Err(e),
         }
-    }
-}
-
-/// Returns when an empty datagram is due.
-async fn knock_time(due: Option<Instant>) {
-    match due {
-        Some(due) => tokio::time::sleep_until(due).await,
-        None => std::future::pending().await,
     }
 }
 
