@@ -7,7 +7,7 @@ use scenecast_drivers::modem::Station;
 use scenecast_protocol::coordinates::MapPoint;
 use scenecast_protocol::directive::{Budget, Fix, Settings};
 use scenecast_protocol::time::Instant;
-use scenecast_protocol::wire::{EquipmentFaults, UtcHours};
+use scenecast_protocol::wire::{EquipmentFaults, UtcHours, VehicleMode};
 use scenecast_vehicle::{
     AppliedSlot, ForeignUpdate, MapUpdate, RegisteredFrame, SharedExemplars, Vehicle, VehicleDisk, VehicleOutput,
 };
@@ -226,6 +226,11 @@ impl VehicleHost {
     pub fn autopilot(&self) -> Option<(Health, Counters)> {
         let pilot = &self.pilot.as_ref()?.pilot;
         Some((pilot.health(), pilot.autopilot.counters()))
+    }
+
+    /// Whether its autopilot takes the vehicle to the surface of the sea.
+    pub fn is_coming_up(&self) -> bool {
+        self.pilot.is_some() && self.vehicle().mode().0 == VehicleMode::Surface
     }
 
     fn dead_reckoned_pose(&self) -> CameraPose {

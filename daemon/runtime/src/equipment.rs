@@ -77,9 +77,10 @@ fn missing_depth(tally: &CameraTally) -> u64 {
     [NoDepth, UnusableDepth, DepthLost, DepthStalled].map(|fault| tally.of(fault)).iter().sum()
 }
 
-/// Images that were dropped, without those of a camera that is faster than the scene model: to drop them is no fault.
+/// Images that were dropped, without those that it is no fault to drop: of a camera that is faster than the scene model, or of a
+/// vehicle that comes up.
 fn unusable_images(tally: &CameraTally) -> u64 {
-    tally.dropped() - tally.of(CameraFault::Overtaken)
+    tally.dropped() - tally.of(CameraFault::Overtaken) - tally.of(CameraFault::ComingUp)
 }
 
 fn unusable_poses(tally: &CameraTally) -> u64 {

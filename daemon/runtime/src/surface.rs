@@ -20,6 +20,7 @@ use scenecast_console::{
 use scenecast_core::{LatLon, TangentPlane, UserError, utc_text, world_file};
 use scenecast_host::{Follower, FrameEvent, SurfaceHost, SurfaceHostEvent, modem_station};
 use scenecast_protocol::directive::Budget;
+use scenecast_protocol::link::DropReason;
 use scenecast_protocol::wire::Address;
 use scenecast_surface::position::Follow;
 use scenecast_surface::{CommandChange, SurfaceOutput};
@@ -378,7 +379,9 @@ impl SurfaceShell {
         let bits_on_air = |frame: &[u8]| self.host.link().profile().bits_on_air(frame.len());
         match event {
             FrameEvent::Sent { frame, .. } => self.meter.sent(bits_on_air(frame), now),
-            FrameEvent::Received { frame, .. } => self.meter.received(bits_on_air(frame), now),
+            FrameEvent::Received { frame, reason, .. } if is_of_vehicle(*reason) => {
+                self.meter.received(bits_on_air(frame), now);
+            }
             _ => {}
         }
     }
@@ -417,4 +420,10 @@ async fn next_request(console: &mut Option<Console>) -> PendingRequest {
         Some(request) => request,
         None => std::future::pending().await,
     }
+}
+
+/// Whether a frame that was dropped for this reason, or for none, has verified: anybody may have sent another one.
+fn is_of_vehicle(dropped: Option<DropReason>) -> bool {
+    use DropReason::{Duplicate, Late, NoBase, OldSession, Undecodable};
+    dropped.is_none_or(|reason| matches!(reason, Duplicate | Late | NoBase | OldSession | Undecodable))
 }

@@ -194,7 +194,7 @@ impl VehicleShell {
                     self.camera.log_end();
                     self.mapper.finish();
                     self.labels.thread.into_iter().for_each(LabelThread::finish);
-                    self.record.finish();
+                    self.record.finish(self.camera.tally());
                     return Ok(());
                 }
                 _ = tokio::time::sleep_until(self.clock.wall(wake)) => {}
@@ -294,7 +294,8 @@ impl VehicleShell {
             }
             return;
         }
-        match &self.camera {
+        match &mut self.camera {
+            Camera::Live(camera) if self.host.is_coming_up() => return camera.drop_rising(),
             Camera::Recorded(_) => {
                 let pose = self.host.handle_camera(frame.camera_pose());
                 (frame.pose.x_m, frame.pose.y_m) = (pose.x_m, pose.y_m);
@@ -351,6 +352,7 @@ impl VehicleShell {
         }
         self.host.steer(now);
         self.record.observe(self.host.vehicle(), now);
+        self.record.observe_camera(self.camera.tally());
         self.ros2.publish(&self.host, self.camera.tally(), || self.labels.thread.as_ref().map(LabelThread::health));
         self.handle_events()?;
         while let Some(bytes) = self.host.poll_output(now) {

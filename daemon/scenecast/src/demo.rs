@@ -123,9 +123,9 @@ impl Demo {
         recorder.begin(mission.surface_mut(), 0, 0, EventTime::default());
         mission.keep_end_events();
         // In the present folder, so that it is found after the demo.
-        let (config, folder) = (mission.config(), Path::new("records"));
-        let surface = SurfaceRecord::rehearsed(config, folder, mission.seed());
-        let records = (surface, VehicleRecord::rehearsed(config, folder, speed, mission.seed()));
+        let (config, folder) = (mission.settings(), Path::new("records"));
+        let surface = SurfaceRecord::rehearsed(&config, folder, mission.seed());
+        let records = (surface, VehicleRecord::rehearsed(&config, folder, speed, mission.seed()));
         Self { meter, pace, truth, mission, facts, recorder, counted: [0; 2], published: None, records }
     }
 
@@ -158,7 +158,7 @@ impl Demo {
     fn finish(mut self) -> Result<(), UserError> {
         self.publish(None);
         self.records.0.finish();
-        self.records.1.finish();
+        self.records.1.finish(None);
         Ok(())
     }
 

@@ -36,10 +36,10 @@ impl MissionRecord {
     ) -> Result<Self, UserError> {
         let limits = limits(mission.config());
         mission.keep_end_events();
-        let (config, seed) = (mission.config(), Some(mission.seed()));
+        let (config, seed) = (mission.settings(), Some(mission.seed()));
         Ok(Self {
-            surface: (RecordWriter::create(surface, limits)?, SurfaceRecorder::new(config, seed)),
-            vehicle: (RecordWriter::create(vehicle, limits)?, VehicleRecorder::new(config, seed)),
+            surface: (RecordWriter::create(surface, limits)?, SurfaceRecorder::new(&config, seed)),
+            vehicle: (RecordWriter::create(vehicle, limits)?, VehicleRecorder::new(&config, seed)),
             parts: [1; 2],
             sync: (sync_interval, mission.now()),
         })

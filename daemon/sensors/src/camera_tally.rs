@@ -14,6 +14,8 @@ pub enum CameraFault {
     NoPose,
     /// The camera was tilted too much.
     Tilted,
+    /// The vehicle came up, and the camera lost sight of the sea floor.
+    ComingUp,
     /// A newer image came before the scene model was ready for this one.
     Overtaken,
     /// The bytes are not an image that can be read.
@@ -70,6 +72,7 @@ impl CameraFault {
             Self::NotLater => "not later than the one before",
             Self::NoPose => "no pose at its time",
             Self::Tilted => "tilted too much",
+            Self::ComingUp => "taken while the vehicle came up",
             Self::Overtaken => "overtaken by a newer one",
             Self::Unreadable => "unreadable",
             Self::CutOff => "cut off",
@@ -120,6 +123,7 @@ impl CameraFault {
                 | Self::NotLater
                 | Self::NoPose
                 | Self::Tilted
+                | Self::ComingUp
                 | Self::Overtaken
                 | Self::Unreadable
                 | Self::CutOff

@@ -1,7 +1,9 @@
 //! Builds a vehicle from a configuration.
 
-use crate::{Durable, FailsafePolicy, Footprint, MapSelection, Navigator, Steering, Vehicle};
-use scenecast_config::{Config, Debounce, LabelSource, LayerName, MapCells, cell_m, map_origin, vehicle_address};
+use crate::{Durable, FailsafePolicy, Footprint, LastPlace, MapSelection, Navigator, Steering, Vehicle};
+use scenecast_config::{
+    Config, Debounce, LabelSource, LayerName, MapCells, NavigationSource, cell_m, map_origin, vehicle_address,
+};
 use scenecast_core::{Area, UserError};
 use scenecast_protocol::link::{Authenticity, VehicleConfig, VehicleLink};
 use scenecast_protocol::mac::ModemProfile;
@@ -37,9 +39,12 @@ pub fn assemble(
     let (x, y) = steering.start();
     let depth = (config.survey.depth_m - config.survey.altitude_m).max(0.0);
     let drift = config.navigation.drift_percent / 100.0;
-    let navigator = match durable.place {
+    let at_start = Navigator::new(x, y, depth, drift);
+    // A vehicle that has mapped something is no longer at its start. Other sources than an autopilot give places.
+    let is_anywhere = durable.labels > 0 && config.navigation.source == NavigationSource::Autopilot;
+    let navigator = match durable.place.or_else(|| is_anywhere.then(|| LastPlace::of(&at_start))) {
         Some(last) => Navigator::resume(last, depth, drift),
-        None => Navigator::new(x, y, depth, drift).with_start_sigma(config.navigation.start_sigma_m),
+        None => at_start.with_start_sigma(config.navigation.start_sigma_m),
     };
     link.set_background(
         durable.background.as_deref().and_then(BackgroundOrder::from_bytes).unwrap_or(config.link.background),

@@ -99,6 +99,11 @@ impl Motion {
         (self.target, self.rising) = (None, true);
     }
 
+    /// Whether the vehicle comes up, or has come up.
+    pub fn is_rising(&self) -> bool {
+        self.rising
+    }
+
     /// The depth `dt_s` seconds after it was `depth_m`, for a survey at `survey_m`, in metres below the surface.
     pub fn depth_m(&self, depth_m: f64, survey_m: f64, dt_s: f64) -> f64 {
         let aim = if self.rising {

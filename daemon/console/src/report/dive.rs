@@ -1,7 +1,7 @@
 //! What a record says about a dive.
 
 use super::areas::{ClassArea, areas};
-use super::log::events;
+use super::log::{events, images};
 use super::maps::{MapsAt, maps_over_time};
 use super::orders::{OrderKey, OrderStep};
 use super::track::{TrackPoint, measured};
@@ -114,6 +114,8 @@ pub(super) struct OwnRecord {
     pub(super) runs_s: Vec<(f64, f64)>,
     /// When it decided about orders.
     pub(super) decided_s: BTreeMap<OrderKey, f64>,
+    /// What had become of the images of a live camera at the end of each run.
+    pub(super) images: Vec<String>,
     /// What it ran with.
     pub(super) settings: SettingsRecord,
 }
@@ -268,6 +270,7 @@ impl DiveVehicle {
                 heard_s: own.heard.iter().copied().map(seconds).collect(),
                 runs_s: own.runs.iter().map(|(from, to)| (seconds(*from), seconds(*to))).collect(),
                 decided_s: BTreeMap::new(),
+                images: images(&own.events, &own.runs),
                 settings: serde_json::from_str(&own.settings).unwrap_or_default(),
             }),
             mission_speed,

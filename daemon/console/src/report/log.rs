@@ -7,6 +7,9 @@ use scenecast_messages::scenecast_msgs::Event;
 use scenecast_protocol::directive::SlotId;
 use scenecast_surface::LabelBook;
 
+/// The source of the accounts of a vehicle's images.
+const IMAGES: &str = "images";
+
 /// A second, nanoseconds.
 const SECOND: u64 = 1_000_000_000;
 
@@ -28,7 +31,7 @@ pub(super) fn events(recording: &Recording) -> Vec<(f64, Event)> {
         let is_whole =
             begins.zip(known.runs.first()).is_some_and(|(begins, run)| begins <= run.0.saturating_add(SECOND));
         let first_stop = stops.map(|order| order.header.stamp.nanos()).min().unwrap_or(i64::MAX);
-        let told = known.events.iter().filter(|(_, event)| event.source != "fix");
+        let told = known.events.iter().filter(|(_, event)| !["fix", IMAGES].contains(&event.source.as_str()));
         events.extend(told.map(|(at, event)| {
             let mut event = Event { source: format!("{}, on board", event.source), ..event.clone() };
             let waits = is_whole && (*at as i64) < first_stop;
@@ -43,4 +46,13 @@ pub(super) fn events(recording: &Recording) -> Vec<(f64, Event)> {
     events
         .dedup_by(|a, b| a.0 == b.0 && a.1.text == b.1.text && a.1.source == b.1.source && a.1.vehicle == b.1.vehicle);
     events
+}
+
+/// The last account of the images in each of a vehicle's runs.
+pub(super) fn images(events: &[(u64, Event)], runs: &[(u64, u64)]) -> Vec<String> {
+    let last = |(from, to): &(u64, u64)| {
+        let mut of_run = events.iter().filter(|(at, event)| event.source == IMAGES && (from..=to).contains(&at));
+        of_run.next_back().map(|(_, event)| event.text.clone())
+    };
+    runs.iter().filter_map(last).collect()
 }

@@ -49,6 +49,10 @@ pub(super) fn told(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -> 
     let mut sentences =
         vec![listed("Faults, restarts and silences that were reported", &found).unwrap_or_else(|| none.to_owned())];
     sentences.extend(listed("Why it did not survey", &planned));
+    if !vehicle.own.images.is_empty() {
+        sentences
+            .push(format!("Images by the vehicle's own record: {}.", vehicle.own.images.join("; after a restart: ")));
+    }
     sentences
 }
 

@@ -139,10 +139,10 @@ impl Mission {
         (floor_m - self.config.survey.altitude_m).max(0.0)
     }
 
-    /// Whether the sea floor is out of the camera's sight.
+    /// Whether the vehicle comes up, or the sea floor is out of the camera's sight.
     fn is_high(&self) -> bool {
         let depth_m = self.vehicle.vehicle().navigator().depth_m();
-        !self.camera.is_recorded() && depth_m < self.survey_depth_m() - 1.0
+        !self.camera.is_recorded() && (self.motion.is_rising() || depth_m < self.survey_depth_m() - 1.0)
     }
 
     fn take_frame(&mut self) -> Result<(), UserError> {

@@ -306,6 +306,13 @@ impl Mission {
         &self.camera.world
     }
 
+    /// The configuration, with the area that is surveyed if it has none.
+    pub fn settings(&self) -> Config {
+        let mut config = self.config.clone();
+        config.survey.area_m = self.camera.survey_area(&config).ok();
+        config
+    }
+
     /// The part of the sea floor that pictures of the mission show, in the world frame.
     pub fn pictured_area(&self) -> Area {
         let surveyed = self.config.survey.area_m.unwrap_or_else(|| self.camera.world.survey_area());

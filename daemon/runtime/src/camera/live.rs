@@ -216,6 +216,11 @@ impl LiveCamera {
         self.faults.log(&self.matcher);
     }
 
+    /// The frame that was polled last is not mapped, as the vehicle comes up.
+    pub(crate) fn drop_rising(&mut self) {
+        self.matcher.drop_matched(CameraFault::ComingUp);
+    }
+
     pub(super) fn handle_unusable_depth(&mut self, error: &DepthError) {
         self.matcher.count(CameraFault::UnusableDepth);
         self.faults.handle_fault(CameraFault::UnusableDepth, error.to_string());

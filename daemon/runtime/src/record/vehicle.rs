@@ -12,11 +12,14 @@ use scenecast_messages::scenecast_msgs::{Event, Link, OrderStatus};
 use scenecast_protocol::directive::{SlotId, SlotState};
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::{ModeReason, VehicleMode};
+use scenecast_sensors::CameraTally;
 use scenecast_vehicle::{AppliedSlot, LostOrders, Vehicle};
 use std::path::Path;
 
 /// Mission time between two messages about the link, seconds.
 const LINK_INTERVAL_S: f64 = 10.0;
+/// Mission time between two accounts of the images, seconds.
+const IMAGES_INTERVAL_S: f64 = 60.0;
 /// Mission time between two poses, seconds.
 const POSE_INTERVAL_S: f64 = 1.0;
 
@@ -67,8 +70,17 @@ impl VehicleRecord {
         record.put(self.recorder.handle_event(event, &self.stamps), &self.stamps);
     }
 
-    /// Ends the record, and prints where it is.
-    pub fn finish(self) {
+    /// Records now and then what has become of the images of a live camera.
+    pub fn observe_camera(&mut self, tally: Option<&CameraTally>) {
+        let (Some(record), Some(tally)) = (&mut self.record, tally) else { return };
+        record.put(self.recorder.images(tally, IMAGES_INTERVAL_S, &self.stamps), &self.stamps);
+    }
+
+    /// Ends the record with what has become of the images, and prints where it is.
+    pub fn finish(mut self, tally: Option<&CameraTally>) {
+        if let (Some(record), Some(tally)) = (&mut self.record, tally) {
+            record.put(self.recorder.images(tally, 0.0, &self.stamps), &self.stamps);
+        }
         self.record.into_iter().for_each(Record::finish);
     }
 }
@@ -84,6 +96,8 @@ pub struct VehicleRecorder {
     was_stopped: bool,
     pose_s: Option<f64>,
     link_s: Option<f64>,
+    /// The last account of the images, and when it was made.
+    images: (String, Option<f64>),
     /// Frames to the vehicle may carry a next key.
     hides_keys: bool,
     /// What the vehicle runs with.
@@ -105,6 +119,7 @@ impl VehicleRecorder {
             was_stopped: false,
             pose_s: None,
             link_s: None,
+            images: Default::default(),
             hides_keys: false,
             settings,
         }
@@ -154,6 +169,17 @@ impl VehicleRecorder {
             self.mode = mode;
         }
         entries
+    }
+
+    /// What has become of the images, if that has changed and the last account is `interval_s` old.
+    fn images(&mut self, tally: &CameraTally, interval_s: f64, stamps: &Stamps) -> Option<RecordEntry> {
+        let (told, told_s) = &mut self.images;
+        let text = tally.to_string();
+        if *told == text || !is_due(told_s, interval_s, stamps.now_s()) {
+            return None;
+        }
+        told.clone_from(&text);
+        Some(self.event(Event::INFO, "images", &text, stamps))
     }
 
     /// What is to be recorded of an event of the host.
