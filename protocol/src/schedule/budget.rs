@@ -102,6 +102,14 @@ impl BitBudget {
         allowed.count()
     }
 
+    /// The budget as a transmission of `bits` at `now` leaves it.
+    #[must_use]
+    pub fn after(&self, bits: u64, now: Instant) -> Self {
+        let mut rest = self.clone();
+        rest.spend(bits, now);
+        rest
+    }
+
     /// Counts a transmission that begins at `now`.
     pub fn spend(&mut self, bits: u64, now: Instant) {
         self.advance(now);

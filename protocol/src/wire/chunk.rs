@@ -131,6 +131,19 @@ pub(super) fn push_chunk(kind: ChunkKind, payload: &[u8], room: usize, out: &mut
     true
 }
 
+/// Whether a second byte of length follows the first byte of a chunk.
+pub(super) fn has_second_byte(head: u8) -> bool {
+    (27..31).contains(&(head & 31))
+}
+
+/// Leaves out the second byte of the length of a chunk at `at`, which goes to the end of `out`.
+pub(super) fn to_the_end(at: usize, out: &mut Vec<u8>) {
+    if let Some(head) = out.get_mut(at).filter(|head| has_second_byte(**head)) {
+        *head |= 31;
+        out.remove(at + 1);
+    }
+}
+
 /// The chunks of a received frame, in order; ends at the first malformed one. Chunks of unknown kinds are skipped.
 #[derive(Debug, Clone, Default)]
 pub struct Chunks<'a> {

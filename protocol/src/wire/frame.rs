@@ -1,7 +1,7 @@
 //! Frames, the unit of transmission, and their seals.
 
 use super::WIRE_VERSION;
-use super::chunk::{ChunkKind, Chunks, push_chunk};
+use super::chunk::{ChunkKind, Chunks, has_second_byte, push_chunk, to_the_end};
 use super::header::{Address, FrameKind, Header, MissionId, SessionId};
 use crate::bytes::{Reader, Truncated};
 use crate::seal::{Direction, LinkKey, SessionKey, TAG_BYTES, Tag};
@@ -238,6 +238,8 @@ pub struct FrameBuilder {
     /// Whether there is room for the byte `remaining`.
     has_turn: bool,
     body_at: usize,
+    /// Where the last chunk begins.
+    last_chunk: Option<usize>,
 }
 
 impl FrameBuilder {
@@ -247,8 +249,9 @@ impl FrameBuilder {
         let remaining_at = header.encode(&mut bytes);
         let (kind, remaining) = (header.kind(), header.remaining);
         let seal_bytes = Seal::bytes(header.keyed, kind);
+        let (has_turn, body_at, last_chunk) = (remaining > 0, 0, None);
         let mut builder =
-            Self { bytes, size, kind, seal_bytes, remaining, remaining_at, has_turn: remaining > 0, body_at: 0 };
+            Self { bytes, size, kind, seal_bytes, remaining, remaining_at, has_turn, body_at, last_chunk };
         let room = builder.room();
         if let Some(ack) = &header.ack
             && ack.encode(room, &mut builder.bytes)
@@ -281,12 +284,21 @@ impl FrameBuilder {
 
     /// Adds a chunk; returns whether it fitted.
     pub fn push(&mut self, kind: ChunkKind, payload: &[u8]) -> bool {
-        push_chunk(kind, payload, self.room(), &mut self.bytes)
+        let (at, room) = (self.bytes.len(), self.room());
+        let fits = push_chunk(kind, payload, room, &mut self.bytes);
+        self.last_chunk = if fits { Some(at) } else { self.last_chunk };
+        fits
     }
 
     /// The length of the finished frame in bytes.
     pub fn len(&self, short: bool) -> usize {
-        if short { self.bytes.len() + usize::from(self.has_remaining()) + self.seal_bytes } else { self.size }
+        let open = usize::from(self.open_chunk().is_some());
+        if short { self.bytes.len() + usize::from(self.has_remaining()) + self.seal_bytes - open } else { self.size }
+    }
+
+    /// Where the last chunk begins, if it needs no second byte of length in a short frame.
+    fn open_chunk(&self) -> Option<usize> {
+        self.last_chunk.filter(|&at| self.bytes.get(at).is_some_and(|head| has_second_byte(*head)))
     }
 
     /// Whether the frame has the byte `remaining`: a hello always has it.
@@ -297,6 +309,9 @@ impl FrameBuilder {
     /// Seals the frame. A `short` frame ends where its content ends; any other is padded to its size.
     pub fn finish(mut self, seal: &Seal<'_>, short: bool) -> Vec<u8> {
         let content = self.len(short) - self.seal_bytes;
+        if let Some(at) = self.open_chunk().filter(|_| short) {
+            to_the_end(at, &mut self.bytes);
+        }
         if self.has_remaining() {
             self.bytes.insert(self.remaining_at, self.remaining);
             self.body_at += 1;
@@ -415,6 +430,18 @@ mod tests {
         assert!(b.push(ChunkKind::Map, &payload));
         assert!(payload.len() >= 50, "{} bytes of payload", payload.len());
         assert_eq!(b.finish(&run(1, 255), false).len(), 64);
+    }
+
+    #[test]
+    fn the_last_chunk_of_a_short_frame_has_one_byte_of_length() {
+        let length = |chunks: usize, short: bool| {
+            let mut builder = FrameBuilder::new(&header(), 200);
+            (0..chunks).for_each(|_| assert!(builder.push(ChunkKind::Map, &[5; 30])));
+            builder.finish(&run(7, 255), short).len()
+        };
+        let none = length(0, true);
+        assert_eq!([1, 2].map(|chunks| length(chunks, true) - none), [31, 32 + 31]);
+        assert_eq!(length(1, false), 200);
     }
 
     #[test]

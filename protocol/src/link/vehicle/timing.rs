@@ -23,8 +23,7 @@ pub(super) struct SurfaceTiming {
     is_stamped: bool,
 }
 
-/// The part of the bit budget that the first stamps of turns may take once the surface has measured the distance. A turn has
-/// two at most.
+/// The part of the bit budget that stamps may take once the surface has measured the distance. Before, a turn has two of them.
 const STAMP_SHARE: f64 = 0.01;
 
 impl SurfaceTiming {

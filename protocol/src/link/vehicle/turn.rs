@@ -209,7 +209,10 @@ impl<S: StateSource> VehicleLink<S> {
             carried = self.content.fill(&mut builder, &context);
             self.events.extend(self.content.oversized.take().map(VehicleEvent::Oversized));
         }
-        let is_complete = takes_turns && !sends_hello && self.content.backlog_bytes(&self.budget, now) == 0;
+        // Whether a frame after this one would have content.
+        let (rest, next) =
+            (self.budget.after(modem.bits_on_air(builder.len(true)), now), now + modem.airtime(builder.len(true)));
+        let is_complete = takes_turns && !sends_hello && self.content.backlog_bytes(&rest, next) == 0;
         if is_complete {
             self.repeater.note_complete();
         }
@@ -246,7 +249,8 @@ impl<S: StateSource> VehicleLink<S> {
         if is_first {
             self.timing.begin_turn(self.budget.bits_per_s(), now);
         }
-        let has_stamp = self.config.modem.frame_bytes >= SMALL_FRAME && (is_first || is_last_new);
+        let is_last = is_last_new && self.timing.one_way().is_none();
+        let has_stamp = self.config.modem.frame_bytes >= SMALL_FRAME && (is_first || is_last);
         self.timing.stamp(now).filter(|_| has_stamp)
     }
 
