@@ -10,7 +10,7 @@ use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::sync::OnceLock;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 /// The peer of Fast DDS, compiled; without its library the test is skipped, which CI takes for a failure.
 fn fast_dds() -> Option<String> {
@@ -194,12 +194,22 @@ fn every_topic_of_the_surface_reaches_cyclone() {
     assert!(all["age_s"].as_f64().unwrap() < 30.0);
 }
 
+/// When no part of an image has come in for so long, none is on its way.
+const IMAGES_PAUSE: Duration = Duration::from_secs(4);
+
 /// Bytes that a surface has received of its vehicle, once the survey is over and everything is acknowledged.
 fn bytes_of_the_survey(page: u16) -> u64 {
+    let mut images = (0, Instant::now());
     wait_until("everything is received", || {
-        let found = state(page).map(|state| state["vehicles"][0].clone()).unwrap_or_default();
+        let all = state(page).unwrap_or_default();
+        let bytes = all["link"]["up"]["bytes_by_class"]["exemplar"].as_u64().unwrap_or_default();
+        if images.0 != bytes {
+            images = (bytes, Instant::now());
+        }
+        let found = &all["vehicles"][0];
         let is_over = found["status"]["mode"] == "done" || found["status"]["mode"] == "hold";
-        is_over && found["link"]["backlog"]["bits"] == 0 && explored(page) > 100
+        // Further images follow each other without a pause.
+        is_over && found["link"]["backlog"]["bits"] == 0 && explored(page) > 100 && images.1.elapsed() > IMAGES_PAUSE
     });
     let classes = state(page).unwrap()["link"]["up"]["bytes_by_class"].clone();
     println!("{classes}");

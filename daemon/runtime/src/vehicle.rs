@@ -285,17 +285,20 @@ impl VehicleShell {
     }
 
     fn handle_camera(&mut self, mut frame: CameraFrame) {
-        if self.labels.is_foreign {
+        let is_rising = self.camera.is_live() && self.host.is_coming_up();
+        if self.labels.is_foreign || is_rising {
             // The frames still move the vehicle.
             let pose = self.camera.newest_pose().unwrap_or(frame.camera_pose());
             self.host.handle_pose(pose, self.clock.now());
+            if is_rising {
+                self.camera.drop_rising();
+            }
             if self.camera.is_over() {
                 self.host.finish_survey();
             }
             return;
         }
-        match &mut self.camera {
-            Camera::Live(camera) if self.host.is_coming_up() => return camera.drop_rising(),
+        match &self.camera {
             Camera::Recorded(_) => {
                 let pose = self.host.handle_camera(frame.camera_pose());
                 (frame.pose.x_m, frame.pose.y_m) = (pose.x_m, pose.y_m);
@@ -352,7 +355,7 @@ impl VehicleShell {
         }
         self.host.steer(now);
         self.record.observe(self.host.vehicle(), now);
-        self.record.observe_camera(self.camera.tally());
+        self.record.observe_images(self.camera.tally());
         self.ros2.publish(&self.host, self.camera.tally(), || self.labels.thread.as_ref().map(LabelThread::health));
         self.handle_events()?;
         while let Some(bytes) = self.host.poll_output(now) {

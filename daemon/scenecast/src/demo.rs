@@ -158,7 +158,7 @@ impl Demo {
     fn finish(mut self) -> Result<(), UserError> {
         self.publish(None);
         self.records.0.finish();
-        self.records.1.finish(None);
+        self.records.1.finish(Some(self.mission.images()));
         Ok(())
     }
 
@@ -230,6 +230,7 @@ impl Demo {
         let snapshot = Arc::new(snapshot(self.mission.surface(), &self.facts, &self.meter, now));
         self.records.0.observe(self.mission.surface(), &snapshot);
         self.records.1.observe(self.mission.vehicle(), now);
+        self.records.1.observe_images(Some(self.mission.images()));
         if let Some(console) = console {
             console.snapshots.send_replace(snapshot);
         }

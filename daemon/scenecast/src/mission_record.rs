@@ -5,7 +5,7 @@ use scenecast_core::UserError;
 use scenecast_files::{RecordEntry, RecordWriter};
 use scenecast_protocol::time::Instant;
 use scenecast_rehearsal::{EndEvent, Mission};
-use scenecast_runtime::record::{Stamps, SurfaceRecorder, VehicleRecorder, limits};
+use scenecast_runtime::record::{IMAGES_INTERVAL_S, Stamps, SurfaceRecorder, VehicleRecorder, limits};
 use std::path::Path;
 use std::time::Duration;
 
@@ -59,6 +59,8 @@ impl MissionRecord {
         write(&mut self.surface.0, entries)?;
         let entries = self.vehicle.1.observe(self.parts[1], mission.vehicle(), &stamps);
         write(&mut self.vehicle.0, entries)?;
+        let images = self.vehicle.1.images(&mission.images(), IMAGES_INTERVAL_S, &stamps);
+        write(&mut self.vehicle.0, images)?;
         let (interval, synced) = &mut self.sync;
         if mission.now().since(*synced) >= *interval {
             *synced = mission.now();
@@ -69,7 +71,9 @@ impl MissionRecord {
     }
 
     /// Ends both records.
-    pub fn finish(mut self) -> Result<(), UserError> {
+    pub fn finish(mut self, mission: &Mission) -> Result<(), UserError> {
+        let images = self.vehicle.1.images(&mission.images(), 0.0, &stamps(mission.now()));
+        write(&mut self.vehicle.0, images)?;
         write(&mut self.surface.0, self.surface.1.last_state())?;
         self.surface.0.finish()?;
         self.vehicle.0.finish()

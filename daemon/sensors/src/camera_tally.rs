@@ -162,10 +162,18 @@ impl CameraTally {
 
 impl fmt::Display for CameraTally {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let counts = |is_image: bool| {
+            let of_kind = self.iter().filter(|(fault, _)| fault.is_dropped_image() == is_image);
+            of_kind.map(|(fault, n)| format!("{} {n}", fault.name())).collect::<Vec<_>>().join(", ")
+        };
+        let (dropped, others) = (counts(true), counts(false));
         write!(f, "{} images mapped, {} dropped", self.matched, self.dropped())?;
-        for (index, (fault, n)) in self.iter().enumerate() {
-            write!(f, "{}{} {n}", if index == 0 { " (" } else { ", " }, fault.name())?;
+        if !dropped.is_empty() {
+            write!(f, " ({dropped})")?;
         }
-        if self.faults.is_empty() { Ok(()) } else { f.write_str(")") }
+        if !others.is_empty() {
+            write!(f, "; beside these: {others}")?;
+        }
+        Ok(())
     }
 }

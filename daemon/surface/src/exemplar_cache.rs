@@ -186,8 +186,9 @@ impl ExemplarCache {
         entry.request = entry.request.filter(|_| !asked);
         let Exemplar { picture: number, size, view, .. } = *exemplar;
         let sent_bytes = exemplar.encode().len();
+        let was_requested = entry.stored.iter().any(|p| p.number == number && p.requested);
         entry.stored.retain(|p| p.number != number);
-        let (received, requested) = (now, asked);
+        let (received, requested) = (now, asked || was_requested);
         entry.stored.push(StoredExemplar { number, size, webp, sent_bytes, received, requested, view, taken });
         if entry.stored.len() > Self::MAX_OF_LABEL {
             entry.stored.remove(0);
@@ -209,11 +210,11 @@ impl ExemplarCache {
 }
 
 impl LabelExemplars {
-    /// The exemplar of a number, or the latest one.
+    /// The exemplar of a number, or the latest of the largest ones.
     pub fn exemplar(&self, number: Option<u8>) -> Option<&StoredExemplar> {
         match number {
             Some(number) => self.stored.iter().find(|p| p.number == number),
-            None => self.stored.last(),
+            None => self.stored.iter().max_by_key(|p| p.size),
         }
     }
 

@@ -13,10 +13,15 @@ use scenecast_protocol::exemplar::{edge_px, strip, unstrip};
 /// The structural similarity beyond which more bytes bring no visible gain.
 pub const GOOD_SSIM: f64 = 0.9;
 
+/// The size class of the middle of a patch, at most `size`.
+pub fn middle_size(patch: &RgbImage, size: u8) -> Option<u8> {
+    let least = patch.width().min(patch.height());
+    (0..=size.min(3)).rev().find(|&s| edge_px(s) <= least)
+}
+
 /// Crops the middle of a patch to at most the edge of `size`, and returns the size class that it has.
 pub fn middle(patch: &RgbImage, size: u8) -> Option<(u8, RgbImage)> {
-    let least = patch.width().min(patch.height());
-    let size = (0..=size.min(3)).rev().find(|&s| edge_px(s) <= least)?;
+    let size = middle_size(patch, size)?;
     let edge = edge_px(size);
     let (x, y) = ((patch.width() - edge) / 2, (patch.height() - edge) / 2);
     Some((size, imageops::crop_imm(patch, x, y, edge, edge).to_image()))

@@ -6,6 +6,17 @@ use super::{Layout, MAX_OBJECT, ObjectId, Part};
 use std::collections::VecDeque;
 use std::ops::Range;
 
+/// What capacity an object may use.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Priority {
+    /// Its share.
+    Requested,
+    /// The spare capacity, in its place among the background streams.
+    Background,
+    /// What all other content leaves.
+    Spare,
+}
+
 /// The objects on their way to the peer, oldest first.
 #[derive(Debug, Default)]
 pub struct ObjectSender {
@@ -27,15 +38,20 @@ impl ObjectSender {
 
     /// Queues an object; `None` if it is empty or larger than [`MAX_OBJECT`].
     pub fn push(&mut self, bytes: Vec<u8>) -> Option<ObjectId> {
-        self.add(bytes, false)
+        self.add(bytes, Priority::Requested)
     }
 
     /// Queues an object that may use only spare capacity.
     pub fn push_background(&mut self, bytes: Vec<u8>) -> Option<ObjectId> {
-        self.add(bytes, true)
+        self.add(bytes, Priority::Background)
     }
 
-    fn add(&mut self, bytes: Vec<u8>, is_background: bool) -> Option<ObjectId> {
+    /// Queues an object that may use only what all other content leaves.
+    pub fn push_spare(&mut self, bytes: Vec<u8>) -> Option<ObjectId> {
+        self.add(bytes, Priority::Spare)
+    }
+
+    fn add(&mut self, bytes: Vec<u8>, priority: Priority) -> Option<ObjectId> {
         if bytes.is_empty() || bytes.len() > MAX_OBJECT {
             return None;
         }
@@ -45,7 +61,7 @@ impl ObjectSender {
         if self.objects.len() >= Self::MAX_OBJECTS || self.objects.front().is_some_and(too_old) {
             self.objects.pop_front();
         }
-        self.objects.push_back(OutgoingObject::new(serial, bytes, is_background));
+        self.objects.push_back(OutgoingObject::new(serial, bytes, priority));
         Some(ObjectId::of(serial))
     }
 
@@ -59,29 +75,29 @@ impl ObjectSender {
         self.objects.clear();
     }
 
-    /// Whether the peer is known to have every object.
-    pub fn is_empty(&self) -> bool {
-        self.objects.is_empty()
+    /// Whether the peer is known to have every object but those that only spare capacity carries.
+    pub fn has_only_spare(&self) -> bool {
+        self.objects.iter().all(|o| o.priority == Priority::Spare)
     }
 
     /// Whether the peer is known to have every object that has a share.
     pub fn has_only_background(&self) -> bool {
-        self.objects.iter().all(|o| o.is_background)
+        self.objects.iter().all(OutgoingObject::is_background)
     }
 
     /// Whether the peer is known to have every background object.
     pub fn has_no_background(&self) -> bool {
-        self.objects.iter().all(|o| !o.is_background)
+        !self.objects.iter().any(OutgoingObject::is_background)
     }
 
     /// Bytes that wait for transmission, repair symbols included, without background objects.
     pub fn backlog_bytes(&self) -> usize {
-        self.objects.iter().filter(|o| !o.is_background).map(OutgoingObject::backlog_bytes).sum()
+        self.objects.iter().filter(|o| !o.is_background()).map(OutgoingObject::backlog_bytes).sum()
     }
 
     /// Bytes of background objects that wait for transmission.
     pub fn background_backlog_bytes(&self) -> usize {
-        self.objects.iter().filter(|o| o.is_background).map(OutgoingObject::backlog_bytes).sum()
+        self.objects.iter().filter(|o| o.is_background()).map(OutgoingObject::backlog_bytes).sum()
     }
 
     /// Sets the expected share of lost frames, 0..=0.95; the number of repair symbols follows it, none at 0.
@@ -109,7 +125,7 @@ impl ObjectSender {
         self.usual_room = room.max(self.usual_room - self.usual_room.div_ceil(128));
         let (usual, loss) = (self.usual_room, self.loss);
         let (run, part) = {
-            let mut of_kind = self.objects.iter_mut().filter(|o| o.is_background == is_background);
+            let mut of_kind = self.objects.iter_mut().filter(|o| o.is_background() == is_background);
             of_kind.find_map(|o| o.next_part(room, usual, loss))?
         };
         Some((ObjectId::of(run.serial), run, part))
@@ -194,7 +210,7 @@ struct SymbolProgress {
 pub(super) struct OutgoingObject {
     pub(super) serial: u64,
     /// Whether it may use only spare capacity.
-    pub(super) is_background: bool,
+    priority: Priority,
     attempt: u32,
     /// The object; once the layout is fixed, the bytes of all source symbols.
     bytes: Vec<u8>,
@@ -202,8 +218,12 @@ pub(super) struct OutgoingObject {
 }
 
 impl OutgoingObject {
-    pub(super) fn new(serial: u64, bytes: Vec<u8>, is_background: bool) -> Self {
-        Self { serial, is_background, attempt: 0, bytes, progress: None }
+    pub(super) fn new(serial: u64, bytes: Vec<u8>, priority: Priority) -> Self {
+        Self { serial, priority, attempt: 0, bytes, progress: None }
+    }
+
+    fn is_background(&self) -> bool {
+        self.priority != Priority::Requested
     }
 
     /// Bytes of the symbols that wait for transmission.

@@ -5,6 +5,7 @@ use super::log::{events, images};
 use super::maps::{MapsAt, maps_over_time};
 use super::orders::{OrderKey, OrderStep};
 use super::track::{TrackPoint, measured};
+use super::words;
 use crate::export::{MapCaption, MapCells};
 use crate::replay::{FrameCounts, Recording, StateText};
 use crate::state::{LinkDirection, LinkSummary, MapLabelTree, MissionState, ReplaySide, VehicleMarker, VehicleState};
@@ -88,6 +89,8 @@ pub(super) struct DiveVehicle {
     pub(super) track: Vec<TrackPoint>,
     /// What its own record says.
     pub(super) own: OwnRecord,
+    /// When the surface learned that its program had begun again.
+    pub(super) restarts_s: Vec<f64>,
     /// How many times as fast as the clock the mission was.
     pub(super) mission_speed: f64,
     /// All labels that were on the operator's map of this epoch.
@@ -125,6 +128,22 @@ impl OwnRecord {
     pub(super) fn pauses(&self) -> impl Iterator<Item = (f64, f64)> {
         self.runs_s.iter().zip(self.runs_s.iter().skip(1)).map(|(before, after)| (before.1, after.0))
     }
+}
+
+/// The last that the record has of each process of the surface but the last, and the first state of the next.
+fn restarts_s(recording: &Recording) -> Vec<(f64, f64)> {
+    let heard = |until: u64| {
+        let all = recording.operator.values().flat_map(|known| known.heard.iter().copied());
+        all.filter(|at| *at < until).max().unwrap_or_default()
+    };
+    let restarts = recording.timeline.restarts();
+    restarts.map(|(a, b)| (seconds(a.nanos.max(heard(b.nanos))), seconds(b.nanos))).collect()
+}
+
+/// When the surface learned that the program of a vehicle had begun again.
+fn another_runs(log: &[(u64, Event)], vehicle: &str) -> Vec<f64> {
+    let is_of_it = |event: &Event| event.vehicle == vehicle && event.text == words::ANOTHER_RUN;
+    log.iter().filter(|(_, event)| is_of_it(event)).map(|(at, _)| seconds(*at)).collect()
 }
 
 pub(super) fn seconds(nanos: u64) -> f64 {
@@ -181,7 +200,7 @@ impl Dive {
             vehicles,
             events: events(recording),
             gaps_s: gaps(recording),
-            restarts_s: recording.timeline.restarts().map(|(a, b)| (seconds(a.nanos), seconds(b.nanos))).collect(),
+            restarts_s: restarts_s(recording),
             frames: recording.frames.clone(),
             clock: recording.timeline.clock.clone(),
             settings: serde_json::from_str(&recording.settings).unwrap_or_default(),
@@ -273,6 +292,7 @@ impl DiveVehicle {
                 images: images(&own.events, &own.runs),
                 settings: serde_json::from_str(&own.settings).unwrap_or_default(),
             }),
+            restarts_s: another_runs(&recording.log, &state.name),
             mission_speed,
             had: known.map.labels_so_far(),
             link: known.link.iter().map(|(at, link)| (seconds(*at), link.clone())).collect(),
@@ -310,9 +330,18 @@ impl DiveVehicle {
         let source = self.own.settings.text("camera.source").filter(|_| self.is_played_back());
         source.map(|source| format!("a playback of images and poses from {source}")).or_else(|| {
             let is_simulated = self.own.settings.text("autopilot.kind") == Some("rehearsal");
-            is_simulated
-                .then(|| "a test in which the vehicle's motion was simulated (autopilot.kind = rehearsal)".to_owned())
+            is_simulated.then(|| match self.own.settings.text("navigation.source") {
+                Some(source) if source != "autopilot" => {
+                    format!("a test: the autopilot was simulated (autopilot.kind = rehearsal), and places came from {source}")
+                }
+                _ => "a test in which the vehicle's motion was simulated (autopilot.kind = rehearsal)".to_owned(),
+            })
         })
+    }
+
+    /// Whether position fixes were sent to it.
+    pub(super) fn has_fixes(&self) -> bool {
+        self.orders.len() > self.orders_of_people().count()
     }
 
     /// Whether its own record has about the same time as that of the surface, so that frames of the one can be looked for in the other.

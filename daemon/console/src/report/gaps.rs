@@ -66,11 +66,29 @@ fn pauses(dive: &Dive, times_s: &[f64], span_s: (f64, f64)) -> String {
         n if n > told.len() => format!("with {n} longer pauses, the longest of which were {}", told.join(", ")),
         n => format!("with {}: {}", counted(n, "longer pause", "longer pauses"), told.join(", ")),
     };
+    let heard = counted(times_s.len(), "time", "times");
     match usual_s {
-        Some(usual_s) if usual_s >= 0.95 => format!("every {usual_s:.1} s in most cases, {pauses}."),
-        Some(_) => format!("more often than every second in most cases, {pauses}."),
-        None => format!("{}, {pauses}.", counted(times_s.len(), "time", "times")),
+        Some(_) => format!(
+            "{heard}: half of the time the last one was at most {:.1} s old, {pauses}.",
+            half_of_time_s(dive, times_s, span_s.1)
+        ),
+        None => format!("{heard}, {pauses}."),
     }
+}
+
+/// How old the last of these moments was at most, half of the time from the first one to the end, mission seconds.
+fn half_of_time_s(dive: &Dive, times_s: &[f64], end_s: f64) -> f64 {
+    let times = || times_s.iter().copied();
+    let pauses =
+        || times().zip(times().skip(1).chain([end_s])).map(|(from_s, to_s)| dive.mission_s(to_s - from_s).max(0.0));
+    let half_s = pauses().sum::<f64>() / 2.0;
+    let (mut low_s, mut high_s) = (0.0, pauses().fold(0.0, f64::max));
+    for _ in 0..40 {
+        let age_s = (low_s + high_s) / 2.0;
+        let older_s: f64 = pauses().map(|pause_s| (pause_s - age_s).max(0.0)).sum();
+        (low_s, high_s) = if older_s > half_s { (age_s, high_s) } else { (low_s, age_s) };
+    }
+    high_s
 }
 
 /// The longest of some times, in their order.
@@ -123,16 +141,13 @@ mod tests {
     fn longer_pauses_than_usual_are_told_in_mission_time() {
         let dive = dive_of(100.0, 1.0);
         let times: Vec<f64> = (0..=100).filter(|s| !(31..60).contains(s)).map(f64::from).collect();
-        let told =
-            "every 1.0 s in most cases, with 1 longer pause: 30 s from 1970-01-01T00:00:30Z to 1970-01-01T00:01:00Z.";
+        let told = "72 times: half of the time the last one was at most 0.7 s old, with 1 longer pause: 30 s from 1970-01-01T00:00:30Z to 1970-01-01T00:01:00Z.";
         assert_eq!(pauses(&dive, &times, dive.span_s), told);
-        assert_eq!(pauses(&dive, &times[..30], (0.0, 30.0)), "every 1.0 s in most cases, the longest pause was 1 s.");
+        let told_evenly = "30 times: half of the time the last one was at most 0.5 s old, the longest pause was 1 s.";
+        assert_eq!(pauses(&dive, &times[..30], (0.0, 30.0)), told_evenly);
         let faster = dive_of(10.0, 10.0);
         let times: Vec<f64> = times.iter().map(|s| s / 10.0).collect();
-        assert!(
-            pauses(&faster, &times, faster.span_s)
-                .starts_with("every 1.0 s in most cases, with 1 longer pause: 30 s from")
-        );
+        assert!(pauses(&faster, &times, faster.span_s).starts_with(&told[..told.len() - 50]));
     }
 
     #[test]

@@ -152,7 +152,7 @@ fn over_range(vehicle: &DiveVehicle) -> String {
     let step_m = chart::round_length(farthest_m / 4.0).max(10.0);
     let mut bins: BTreeMap<u64, Vec<&Link>> = BTreeMap::new();
     known.into_iter().for_each(|(range_m, link)| bins.entry((range_m / step_m) as u64).or_default().push(link));
-    let mut table = "<h3>Link over range</h3>\n<table><tr><th>distance</th><th>moments</th><th>frames lost</th><th>received from it</th></tr>".to_owned();
+    let mut table = "<h3>Link over range</h3>\n<table><tr><th>half of the round trip</th><th>moments</th><th>frames lost</th><th>received from it</th></tr>".to_owned();
     for (bin, links) in bins {
         let mean = |value: fn(&Link) -> f32| {
             let values: Vec<f64> =
@@ -170,7 +170,7 @@ fn over_range(vehicle: &DiveVehicle) -> String {
         );
     }
     table
-        + "</table>\n<p>Each moment is one of every ten seconds; the distance is half of the round trip at 1500 m/s, and so at most that: the time that modems and \
-             serial lines take is in it. The share lost is that of \
-             the last 64 frames, or of all so far while there are fewer.</p>\n"
+        + "</table>\n<p>Each moment is one of every ten seconds. Half of the round trip is told as a distance at 1500 m/s; the vehicle was nearer than that, \
+             as the time that modems and serial lines take is in it. The share lost is that of the last 64 frames, or of all so far while there \
+             are fewer.</p>\n"
 }

@@ -3,6 +3,7 @@
 use super::dive::seconds;
 use super::words::{self, NO_ORDER};
 use crate::replay::Recording;
+use scenecast_core::utc_text;
 use scenecast_messages::scenecast_msgs::Event;
 use scenecast_protocol::directive::SlotId;
 use scenecast_surface::LabelBook;
@@ -52,7 +53,11 @@ pub(super) fn events(recording: &Recording) -> Vec<(f64, Event)> {
 pub(super) fn images(events: &[(u64, Event)], runs: &[(u64, u64)]) -> Vec<String> {
     let last = |(from, to): &(u64, u64)| {
         let mut of_run = events.iter().filter(|(at, event)| event.source == IMAGES && (from..=to).contains(&at));
-        of_run.next_back().map(|(_, event)| event.text.clone())
+        let (at, event) = of_run.next_back()?;
+        // A program that is ended in order counts them once more.
+        let is_final = to.saturating_sub(*at) <= 5 * SECOND;
+        let least = if is_final { String::new() } else { format!(" by {}", utc_text(seconds(*at))) };
+        Some(format!("{}{least}", event.text))
     };
     runs.iter().filter_map(last).collect()
 }

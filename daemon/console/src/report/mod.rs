@@ -4,6 +4,7 @@ mod archive;
 mod areas;
 mod chart;
 mod dive;
+mod doubts;
 mod extent;
 mod gaps;
 mod link;

@@ -100,13 +100,16 @@ impl DiveVehicle {
         self.orders.iter().filter(|((slot, _), _)| slot != SlotId::Fix.name())
     }
 
+    /// The labels of which an order asks for images.
+    fn labels_of_images(&self, order: &OrderKey) -> Option<Vec<u64>> {
+        let content: Value = serde_json::from_str(&self.given.get(order)?.content).ok()?;
+        content.get("labels")?.as_array().map(|labels| labels.iter().filter_map(Value::as_u64).collect())
+    }
+
     /// What such an order says, in words.
     fn content(&self, state: &VehicleState, order @ (slot, version): &OrderKey) -> Option<String> {
         let given = self.given.get(order)?;
-        let labels = |version: &u32| -> Option<Vec<u64>> {
-            let content: Value = serde_json::from_str(&self.given.get(&(slot.clone(), *version))?.content).ok()?;
-            content.get("labels")?.as_array().map(|labels| labels.iter().filter_map(Value::as_u64).collect())
-        };
+        let labels = |version: &u32| self.labels_of_images(&(slot.clone(), *version));
         // An order of images has all that are awaited.
         let before = self.given.range(..order.clone()).next_back().filter(|((other, _), _)| other == slot);
         let before = before.and_then(|((_, version), _)| labels(version)).unwrap_or_default();
@@ -210,6 +213,7 @@ impl Dive {
                 format!("<tr><td>{kind}</td><td>{ordered}</td><td class=\"t\">{given}</td><td>{by}</td></tr>\n")
             })
             .collect();
+        let rows = rows + &self.awaited_images(state, vehicle);
         let budget = state.status.as_ref().map_or_else(String::new, |status| {
             format!(
                 " The vehicle kept to a budget of {} bit/s then, the surface to {}.",
@@ -224,6 +228,34 @@ impl Dive {
                  <th>what was ordered</th><th>given (UTC)</th><th>by</th></tr></thead>\n{rows}</table>\n"
             ),
         };
+    }
+
+    /// The images that the last order of them asked for and that have not arrived, as a row of the table.
+    fn awaited_images(&self, state: &VehicleState, vehicle: &DiveVehicle) -> String {
+        let slot = SlotId::Requests.name();
+        let last = vehicle
+            .orders_of_people()
+            .filter(|((of, _), _)| of == slot)
+            .filter_map(|(order, way)| Some((order, way.last()?)));
+        let Some((order, last)) = last.max_by_key(|((_, version), _)| *version) else { return String::new() };
+        let has_come =
+            |label: &u8| vehicle.exemplars.iter().any(|(at_s, image)| image.label == *label && *at_s >= last.given_s);
+        let awaited: Vec<String> = (vehicle.labels_of_images(order).into_iter().flatten())
+            .filter_map(|label| u8::try_from(label).ok())
+            .filter(|label| !has_come(label))
+            .map(|label| words::label(&state.label_book, label))
+            .collect();
+        if awaited.is_empty() || last.status == OrderStatus::REFUSED || last.status == OrderStatus::WITHDRAWN {
+            return String::new();
+        }
+        let (by, _) = self.ordered(state, vehicle, order);
+        let images = format!("images of {}, which have not arrived", awaited.join(", "));
+        format!(
+            "<tr><td>images</td><td>{}</td><td class=\"t\">{}</td><td>{}</td></tr>\n",
+            Escaped(&images),
+            utc_text(last.given_s),
+            Escaped(&by)
+        )
     }
 
     /// What the vehicle was steered by over time, and its modes.

@@ -3,14 +3,14 @@
 use super::areas::ClassArea;
 use super::chart;
 use super::dive::{Dive, DiveVehicle, SettingsRecord};
-use super::{Escaped, summary, words};
+use super::{Escaped, doubts, summary, words};
 use crate::state::VehicleState;
 use base64::Engine;
 use base64::prelude::BASE64_STANDARD;
 use scenecast_core::utc_text;
 use scenecast_files::RecordFile;
-use scenecast_messages::scenecast_msgs::Exemplar;
-use scenecast_surface::LabelBook;
+use scenecast_messages::scenecast_msgs::{Event, Exemplar};
+use scenecast_surface::{LabelBook, LogKind};
 use serde_json::json;
 use std::collections::BTreeSet;
 use std::fmt::Write;
@@ -43,6 +43,7 @@ impl Dive {
         for (state, vehicle) in self.vehicles() {
             self.vehicle(&mut page, state, vehicle);
         }
+        self.changes_of_labels(&mut page);
         self.events_table(&mut page);
         self.origin_of_figures(&mut page);
         page
@@ -103,6 +104,10 @@ impl Dive {
         for sentence in summary::summary(self, state, vehicle) {
             let _ = writeln!(page, "<li>{}</li>", Escaped(&sentence));
         }
+        *page += "</ul>\n<h3>What not to trust</h3>\n<ul>\n";
+        for sentence in doubts::doubts(self, vehicle) {
+            let _ = writeln!(page, "<li>{}</li>", Escaped(&sentence));
+        }
         *page += "</ul>\n";
         if let Some(map) = chart::map(state, vehicle) {
             let _ = writeln!(
@@ -129,6 +134,25 @@ impl Dive {
         self.link(page, vehicle);
     }
 
+    /// Who named and merged labels, and when.
+    fn changes_of_labels(&self, page: &mut String) {
+        let is_change = |event: &Event| {
+            let (_, words) =
+                event.text.split_once(": ").filter(|(by, _)| !by.starts_with("label ")).unwrap_or(("", &event.text));
+            event.source == LogKind::Record.name() && words.starts_with("label ")
+        };
+        let rows = self.events.iter().filter(|(_, event)| is_change(event)).map(|(at_s, event)| {
+            let (vehicle, text) = (Escaped(&event.vehicle), Escaped(&event.text));
+            format!("<tr><td class=\"t\">{}</td><td class=\"t\">{vehicle}</td><td>{text}</td></tr>\n", utc_text(*at_s))
+        });
+        let rows: String = rows.collect();
+        if !rows.is_empty() {
+            *page += "<h2>Names and merges of labels</h2>\n<table><thead><tr><th>time (UTC)</th><th>vehicle</th><th>by whom, and what</th></tr></thead>\n";
+            *page += &rows;
+            *page += "</table>\n";
+        }
+    }
+
     fn events_table(&self, page: &mut String) {
         if self.events.is_empty() {
             return;
@@ -145,7 +169,7 @@ impl Dive {
                 "<tr><td class=\"t\">{}</td><td class=\"t\">{}</td><td class=\"t\">{}</td><td>{}</td></tr>",
                 utc_text(*at_s),
                 Escaped(&event.vehicle),
-                Escaped(&event.source),
+                Escaped(words::kind(&event.source)),
                 Escaped(&words::event(book(&event.vehicle), event))
             );
         }
@@ -170,6 +194,7 @@ impl Dive {
             json!({
                 "name": state.name,
                 "summary": summary::summary(self, state, vehicle),
+                "doubts": doubts::doubts(self, vehicle),
                 "distance_m": vehicle.distance_m(),
                 "cell_m": vehicle.cell_m,
                 "classes": classes.collect::<Vec<_>>(),
@@ -217,7 +242,7 @@ fn settings(page: &mut String, end: &str, settings: &SettingsRecord) {
     }
     let _ = write!(
         page,
-        "<h2>Settings of {}</h2>\n<p>{}: those of the configuration that differ from their defaults.</p>\n<table>",
+        "<h2>Settings of {}</h2>\n<p>{}: those of the configuration that differ from their defaults, without files, folders and ports of the computer.</p>\n<table>",
         Escaped(end),
         Escaped(&settings.program)
     );

@@ -37,11 +37,7 @@ pub(super) fn summary(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) 
     sentences.push(orders(dive, state, vehicle));
     sentences.extend(link(dive, vehicle));
     sentences.extend(gaps::heard(dive, vehicle));
-    sentences.extend(gaps::of_records(dive, vehicle));
     sentences.extend(trouble::told(dive, state, vehicle));
-    if let Some(damage) = &dive.damage {
-        sentences.push(format!("Not all of the record could be read: {damage}."));
-    }
     sentences
 }
 
@@ -77,7 +73,7 @@ fn link(dive: &Dive, vehicle: &DiveVehicle) -> Vec<String> {
             lost(&link.down)
         )),
     });
-    if let (Some(up_j), Some(down_j)) = (link.up.energy_j, link.down.energy_j) {
+    if let (Some(up_j), Some(down_j), true) = (link.up.energy_j, link.down.energy_j, vehicle.has_modem(dive)) {
         sentences.push(format!(
             "By modem.tx_watts of the surface and the frames that it knows of, the modems of the vehicles spent about {up_j:.0} J on transmitting, \
              that of the surface {down_j:.0} J."
@@ -92,8 +88,8 @@ fn agreement(vehicle: &DiveVehicle) -> Option<String> {
     let mean = shares.iter().sum::<f64>() / shares.len() as f64;
     shares.last().map(|last| {
         format!(
-            "Of the cells that the vehicle had to send, {:.0} % had the same label on the operator's map at the end, and {:.0} % on average \
-             over the record.",
+            "Of the cells of the vehicle's map that were meant for the operator, {:.0} % had the same label on the operator's map at the end, \
+             and {:.0} % on average over the record.",
             last * 100.0,
             mean * 100.0
         )
@@ -107,8 +103,8 @@ fn lag(vehicle: &DiveVehicle) -> Option<String> {
     let median = duration(median_s);
     Some(match vehicle.own.runs_s.is_empty() {
         false if median_s < 1.0 => format!(
-            "By both records, at {} of {} moments no change of the vehicle's map was missing on the operator's; at the worst of them, changes had \
-             been missing for {most}.",
+            "Both records were compared every ten seconds: at {} of {} moments no change of the vehicle's map was missing on the operator's; at \
+             the worst of them, changes had been missing for {most}.",
             lags.iter().filter(|lag_s| **lag_s < 1.0).count(),
             lags.len()
         ),
@@ -117,8 +113,8 @@ fn lag(vehicle: &DiveVehicle) -> Option<String> {
              {median} or less half of the time; the longest forecast was {most}."
         ),
         false => format!(
-            "At {} moments both records were compared: the operator's map lacked changes of the vehicle's for {median} or less at half of them, \
-             and for {most} at the worst one.",
+            "Both records were compared every ten seconds: at half of the {} moments the operator's map had lacked changes of the vehicle's for \
+             {median} or less, at the worst one for {most}.",
             lags.len()
         ),
     })
@@ -136,8 +132,16 @@ fn when(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -> String {
         ),
         false => String::new(),
     };
+    let own_end_s = vehicle.own.runs_s.last().map(|run| run.1).filter(|own_s| (own_s - dive.surface_s.1).abs() > 5.0);
+    let ends = own_end_s.map_or_else(String::new, |own_s| {
+        format!(
+            " (the surface's record ends at {}, the vehicle's own at {})",
+            utc_text(dive.surface_s.1),
+            utc_text(own_s)
+        )
+    });
     format!(
-        "The record of {} (address {}) covers {} to {} (UTC), {}{speed}; the vehicle reported its place {}.",
+        "The record of {} (address {}) covers {} to {} (UTC){ends}, {}{speed}; the vehicle reported its place {}.",
         state.name,
         state.id,
         utc_text(begin),
@@ -260,15 +264,15 @@ fn place(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -> String {
         words::east(last.east_m),
         words::north(last.north_m),
         on_earth(dive, (last.east_m, last.north_m)),
-        moved(state),
+        moved(state, vehicle),
         uncertainty(vehicle)
     )
 }
 
 /// How far its own record is moved so that it lies on the map.
-fn moved(state: &VehicleState) -> String {
+fn moved(state: &VehicleState, vehicle: &DiveVehicle) -> String {
     let (east_m, north_m) = state.map.shift_m();
-    match east_m.hypot(north_m) < 0.05 {
+    match vehicle.own.track.is_empty() || east_m.hypot(north_m) < 0.05 {
         true => String::new(),
         false => format!(
             " Places of its own record are moved {} and {}, as its map was by position fixes.",
@@ -290,9 +294,10 @@ fn uncertainty(vehicle: &DiveVehicle) -> String {
     if format!("{median_m:.2} {last_m:.2}") == format!("{most_m:.2} {most_m:.2}") {
         return format!(" It reported its place with a standard deviation of {last_m:.2} m.");
     }
+    let checked = if vehicle.has_fixes() { "" } else { ", which nothing has checked" };
     format!(
-        " By its own estimate, which nothing has checked, the standard deviation of its place was {median_m:.1} m or less half of the time, \
-         {most_m:.1} m at most, and {last_m:.1} m at the end."
+        " By its own estimate{checked}, the standard deviation of its place was {median_m:.1} m or less half of the time, {most_m:.1} m at most, \
+         and {last_m:.1} m at the end."
     )
 }
 
@@ -307,7 +312,7 @@ fn found(state: &VehicleState, vehicle: &DiveVehicle, alone: Option<u64>) -> Str
     let confident = vehicle.layer_cells.get("confidence").copied().unwrap_or_default() as u64;
     let confident = match doubt.is_empty() || confident >= all {
         true => String::new(),
-        false => format!(", which arrived for {confident} of the {all} cells"),
+        false => format!(" (the confidence of {confident} of the {all} cells arrived)"),
     };
     let rivals = vehicle.classes.iter().skip(1).filter(|class| class.may_exceed(largest)).count();
     let rivals = match rivals {

@@ -60,9 +60,11 @@ impl DiveVehicle {
 
     /// The parts of its path between jumps: where its program began again with another place, or no vehicle is so fast.
     pub(super) fn legs(&self) -> impl Iterator<Item = &[TrackPoint]> {
-        let restarts = || self.own.runs_s.iter().skip(1).map(|(began_s, _)| *began_s);
+        let is_own = self.own.track.len() > 1;
+        let own = self.own.runs_s.iter().skip(1).map(|(began_s, _)| *began_s);
+        let restarts: Vec<f64> = if is_own { own.collect() } else { self.restarts_s.clone() };
         self.path().chunk_by(move |a, b| {
-            let began_between = restarts().any(|began_s| a.at_s < began_s && b.at_s >= began_s);
+            let began_between = restarts.iter().any(|began_s| a.at_s < *began_s && b.at_s >= *began_s);
             a.distance_m(b) < 1.0 || !began_between && !a.jumps_to(b, self.mission_speed)
         })
     }
@@ -90,13 +92,23 @@ impl DiveVehicle {
     /// Its speed while it moved, m/s, where its own record tells it. Times are of the wall clock, which the mission may be ahead of.
     pub(super) fn speed_m_s(&self) -> Option<f64> {
         const LEAST_M_S: f64 = 0.05;
+        // A record may have each place more than once.
+        const SPAN_S: f64 = 10.0;
         if self.own.track.len() < 2 {
             return None;
         }
-        let steps = self.steps().map(|(a, b)| (a.distance_m(b), (b.at_s - a.at_s) * self.mission_speed));
-        let moving = steps.filter(|(m, s)| *s > 0.0 && m / s >= LEAST_M_S);
-        let (m, s) = moving.fold((0.0, 0.0), |sum, step| (sum.0 + step.0, sum.1 + step.1));
-        (s > 0.0).then(|| m / s)
+        let (mut moved, mut span) = ((0.0, 0.0), (0.0, 0.0));
+        for (a, b) in self.steps() {
+            span = (span.0 + a.distance_m(b), span.1 + (b.at_s - a.at_s) * self.mission_speed);
+            if span.1 >= SPAN_S {
+                if span.0 / span.1 >= LEAST_M_S {
+                    moved = (moved.0 + span.0, moved.1 + span.1);
+                }
+                span = (0.0, 0.0);
+            }
+        }
+        let (m, s) = if moved.1 > 0.0 { moved } else { span };
+        (s > 0.0 && m / s >= LEAST_M_S).then(|| m / s)
     }
 
     /// Length of its path, metres: at least so far, where only reports tell it.

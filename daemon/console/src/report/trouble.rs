@@ -46,14 +46,41 @@ pub(super) fn told(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -> 
         true => "No fault and no restart was reported.",
         false => "No fault, no restart and no silence was reported.",
     };
-    let mut sentences =
-        vec![listed("Faults, restarts and silences that were reported", &found).unwrap_or_else(|| none.to_owned())];
-    sentences.extend(listed("Why it did not survey", &planned));
+    let mut sentences = vec![
+        listed("Faults, restarts and silences, when they were reported", &found).unwrap_or_else(|| none.to_owned()),
+    ];
+    let planned_title = match vehicle.own.runs_s.is_empty() {
+        true => "Why it did not survey, when the surface learned of it",
+        false => "Why it did not survey",
+    };
+    sentences.extend(listed(planned_title, &planned));
+    sentences.extend(times_of_modes(dive, state, vehicle));
     if !vehicle.own.images.is_empty() {
         sentences
             .push(format!("Images by the vehicle's own record: {}.", vehicle.own.images.join("; after a restart: ")));
     }
     sentences
+}
+
+/// How long it was in each mode, by its own record.
+fn times_of_modes(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -> Option<String> {
+    let is_mode =
+        |event: &Event| event.source == "mode, on board" && valid_part(&event.vehicle) == valid_part(&state.name);
+    let modes: Vec<(f64, &str)> = (dive.events.iter().filter(|(_, event)| is_mode(event)))
+        .map(|(at_s, event)| (*at_s, event.text.split(": ").next().unwrap_or_default()))
+        .collect();
+    let mut spent: Vec<(&str, f64)> = Vec::new();
+    for (n, (at_s, mode)) in modes.iter().enumerate() {
+        let Some((_, end_s)) = vehicle.own.runs_s.iter().find(|run| at_s - 1.0 <= run.1) else { continue };
+        let until_s = modes.get(n + 1).map_or(*end_s, |next| next.0.min(*end_s));
+        let time_s = dive.mission_s(until_s - at_s).max(0.0);
+        match spent.iter_mut().find(|(known, _)| known == mode) {
+            Some((_, sum_s)) => *sum_s += time_s,
+            None => spent.push((mode, time_s)),
+        }
+    }
+    let told: Vec<String> = spent.iter().map(|(mode, time_s)| format!("{mode} {}", words::duration(*time_s))).collect();
+    (told.len() > 1).then(|| format!("Time in each mode by its own record: {}.", told.join(", ")))
 }
 
 /// Whether a mode is the survey or its end, or one that was ordered or that a limit led to.

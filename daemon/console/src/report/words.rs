@@ -9,7 +9,7 @@ use scenecast_core::utc_text;
 use scenecast_messages::builtin_interfaces::Time;
 use scenecast_messages::scenecast_msgs::{Event, Exemplar, Order, OrderStatus};
 use scenecast_protocol::directive::SlotId;
-use scenecast_surface::LabelBook;
+use scenecast_surface::{LabelBook, LogKind};
 use serde_json::Value;
 use std::collections::BTreeSet;
 
@@ -53,6 +53,11 @@ pub(super) fn unused(frames: &FrameCounts) -> String {
         0 => "all that arrived were used".to_owned(),
         unused => format!("{unused} of those that arrived were not used: {}", causes.collect::<Vec<_>>().join(", ")),
     }
+}
+
+/// The kind of an event, in a word that says what it is about.
+pub(super) fn kind(source: &str) -> &str {
+    if source == LogKind::Record.name() { "annotation" } else { source }
 }
 
 /// Who gave an order or made an entry of the log.
@@ -286,7 +291,7 @@ pub(super) fn of_intervals(classes: &[ClassArea]) -> &'static str {
 
 /// When an image was taken, in UTC; `None` where that is not known.
 pub(super) fn taken(image: &Exemplar) -> Option<String> {
-    Some(image.taken.nanos()).filter(|nanos| *nanos != 0).map(|nanos| utc_text(nanos as f64 / 1e9))
+    Some(image.taken.nanos()).filter(|nanos| *nanos != 0).map(|nanos| utc_text((nanos as f64 / 1e9).round()))
 }
 
 /// What an order of a slot is called; `content` says what it orders.

@@ -306,6 +306,15 @@ impl Mission {
         &self.camera.world
     }
 
+    /// What has become of the camera's images.
+    pub fn images(&self) -> String {
+        let mapped = self.logbook.poses.len();
+        match &self.logbook.unreadable {
+            None => format!("{mapped} images mapped, 0 dropped"),
+            Some((count, _)) => format!("{mapped} images mapped, {count} dropped (unreadable {count})"),
+        }
+    }
+
     /// The configuration, with the area that is surveyed if it has none.
     pub fn settings(&self) -> Config {
         let mut config = self.config.clone();

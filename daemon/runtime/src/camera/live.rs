@@ -217,7 +217,7 @@ impl LiveCamera {
     }
 
     /// The frame that was polled last is not mapped, as the vehicle comes up.
-    pub(crate) fn drop_rising(&mut self) {
+    pub(super) fn drop_rising(&mut self) {
         self.matcher.drop_matched(CameraFault::ComingUp);
     }
 

@@ -161,6 +161,17 @@ impl Camera {
         }
     }
 
+    pub(crate) fn is_live(&self) -> bool {
+        matches!(self, Self::Live(_))
+    }
+
+    /// The frame of a live camera that was polled last is not mapped, as the vehicle comes up.
+    pub(crate) fn drop_rising(&mut self) {
+        if let Self::Live(camera) = self {
+            camera.drop_rising();
+        }
+    }
+
     /// Whether a live camera is lost or has stalled.
     pub(crate) fn is_silent(&self) -> bool {
         match self {

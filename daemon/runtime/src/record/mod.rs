@@ -13,7 +13,7 @@ use map::{MapState, RecordedMap};
 
 #[cfg(feature = "surface")]
 pub use surface::{SurfaceRecord, SurfaceRecorder};
-pub use vehicle::{VehicleRecord, VehicleRecorder};
+pub use vehicle::{IMAGES_INTERVAL_S, VehicleRecord, VehicleRecorder};
 
 use crate::durable::free_bytes;
 use scenecast_config::Config;

@@ -12,14 +12,13 @@ use scenecast_messages::scenecast_msgs::{Event, Link, OrderStatus};
 use scenecast_protocol::directive::{SlotId, SlotState};
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::{ModeReason, VehicleMode};
-use scenecast_sensors::CameraTally;
 use scenecast_vehicle::{AppliedSlot, LostOrders, Vehicle};
 use std::path::Path;
 
 /// Mission time between two messages about the link, seconds.
 const LINK_INTERVAL_S: f64 = 10.0;
 /// Mission time between two accounts of the images, seconds.
-const IMAGES_INTERVAL_S: f64 = 60.0;
+pub const IMAGES_INTERVAL_S: f64 = 60.0;
 /// Mission time between two poses, seconds.
 const POSE_INTERVAL_S: f64 = 1.0;
 
@@ -63,6 +62,11 @@ impl VehicleRecord {
         record.put(self.recorder.observe(record.state_number(), vehicle, &self.stamps), &self.stamps);
     }
 
+    fn put_images(&mut self, account: Option<impl ToString>, interval_s: f64) {
+        let (Some(record), Some(account)) = (&mut self.record, account) else { return };
+        record.put(self.recorder.images(&account.to_string(), interval_s, &self.stamps), &self.stamps);
+    }
+
     /// Records an event of the host.
     pub fn handle_event(&mut self, event: &VehicleHostEvent, now: Instant) {
         let Some(record) = &mut self.record else { return };
@@ -70,17 +74,14 @@ impl VehicleRecord {
         record.put(self.recorder.handle_event(event, &self.stamps), &self.stamps);
     }
 
-    /// Records now and then what has become of the images of a live camera.
-    pub fn observe_camera(&mut self, tally: Option<&CameraTally>) {
-        let (Some(record), Some(tally)) = (&mut self.record, tally) else { return };
-        record.put(self.recorder.images(tally, IMAGES_INTERVAL_S, &self.stamps), &self.stamps);
+    /// Records now and then what has become of the images; without an account, nobody counts them.
+    pub fn observe_images(&mut self, account: Option<impl ToString>) {
+        self.put_images(account, IMAGES_INTERVAL_S);
     }
 
     /// Ends the record with what has become of the images, and prints where it is.
-    pub fn finish(mut self, tally: Option<&CameraTally>) {
-        if let (Some(record), Some(tally)) = (&mut self.record, tally) {
-            record.put(self.recorder.images(tally, 0.0, &self.stamps), &self.stamps);
-        }
+    pub fn finish(mut self, account: Option<impl ToString>) {
+        self.put_images(account, 0.0);
         self.record.into_iter().for_each(Record::finish);
     }
 }
@@ -172,14 +173,13 @@ impl VehicleRecorder {
     }
 
     /// What has become of the images, if that has changed and the last account is `interval_s` old.
-    fn images(&mut self, tally: &CameraTally, interval_s: f64, stamps: &Stamps) -> Option<RecordEntry> {
+    pub fn images(&mut self, account: &str, interval_s: f64, stamps: &Stamps) -> Option<RecordEntry> {
         let (told, told_s) = &mut self.images;
-        let text = tally.to_string();
-        if *told == text || !is_due(told_s, interval_s, stamps.now_s()) {
+        if told == account || !is_due(told_s, interval_s, stamps.now_s()) {
             return None;
         }
-        told.clone_from(&text);
-        Some(self.event(Event::INFO, "images", &text, stamps))
+        account.clone_into(told);
+        Some(self.event(Event::INFO, "images", account, stamps))
     }
 
     /// What is to be recorded of an event of the host.

@@ -143,7 +143,7 @@ impl Sim {
             // What the end of the survey has brought.
             let last = page.snapshot(&mission);
             record.observe(&mut mission, &last)?;
-            record.finish()?;
+            record.finish(&mission)?;
         }
         drop(progress);
         for refused in mission.refused_labels() {

@@ -2,7 +2,7 @@
 
 use super::frame_clock::FrameClock;
 use crate::SharedExemplars;
-use crate::exemplar::{GOOD_SSIM, compress_to, middle};
+use crate::exemplar::{GOOD_SSIM, compress_to, middle, middle_size};
 use scene_model::exemplars::ExemplarPatch;
 use scenecast_protocol::directive::Series;
 use scenecast_protocol::directive::{ExemplarRequest, ExemplarRequests};
@@ -11,15 +11,21 @@ use scenecast_protocol::link::VehicleLink;
 use scenecast_protocol::object::ObjectId;
 use scenecast_protocol::schedule::BackgroundStream;
 use scenecast_protocol::time::Instant;
+use std::cmp::Ordering;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Sent exemplars of a label that are remembered.
 const MAX_SHOWN: usize = 8;
+/// Exemplars of a label that are sent without a request: fewer than are kept, so that a request finds another one.
+const MAX_UNREQUESTED: usize = 3;
+/// The size class of the largest exemplars.
+const LARGEST: u8 = 3;
 
 /// An exemplar that was sent to the surface.
 #[derive(Debug)]
 struct Shown {
     number: u8,
+    size: u8,
     picture: ExemplarPatch,
 }
 
@@ -39,6 +45,17 @@ struct Unrequested {
     label: u8,
     number: u8,
     object: ObjectId,
+    /// The size class in which the surface has it already.
+    had: Option<u8>,
+}
+
+/// An exemplar to be sent without a request.
+struct Offer {
+    label: u8,
+    number: u8,
+    picture: ExemplarPatch,
+    size: u8,
+    had: Option<u8>,
 }
 
 /// The exemplars of the labels of one epoch.
@@ -97,10 +114,21 @@ impl Gallery {
             self.withdraw(request.label, number, object, link);
         }
         self.requests = requests;
-        if self.has_open_request()
-            && let Some(Unrequested { label, number, object }) = self.unrequested.take()
-        {
-            self.withdraw(label, number, Some(object), link);
+        if self.has_open_request() {
+            self.withdraw_unrequested(link);
+        }
+    }
+
+    fn withdraw_unrequested(&mut self, link: &mut VehicleLink) {
+        let Some(Unrequested { label, number, object, had }) = self.unrequested.take() else { return };
+        let mut shown = self.shown.get_mut(&label).into_iter().flatten();
+        match (had, shown.find(|s| s.number == number)) {
+            // The surface has the smaller one.
+            (Some(size), Some(shown)) => {
+                shown.size = size;
+                link.cancel_object(object);
+            }
+            _ => self.withdraw(label, number, Some(object), link),
         }
     }
 
@@ -122,8 +150,8 @@ impl Gallery {
         !self.requests.wanted.iter().all(is_met)
     }
 
-    /// Sends the requested exemplars that exist. Without a request it sends one of a label of which the surface has
-    /// none, the label with the greatest weight first.
+    /// Sends the requested exemplars that exist. Without a request it sends one of a label of which the surface has none, the
+    /// label with the greatest weight first; when it has one of each, larger and further ones.
     pub(super) fn serve(&mut self, epoch: u8, weight: impl Fn(u8) -> f64, link: &mut VehicleLink, now: Instant) {
         for request in self.requests.wanted.clone() {
             self.reply(request, epoch, link, now);
@@ -151,23 +179,51 @@ impl Gallery {
         let Some(object) = link.push_object(exemplar.encode()) else { return };
         self.replies.push(Reply { request, number: exemplar.picture, object: Some(object) });
         if let Some((number, picture)) = chosen {
-            self.note_shown(request.label, number, picture);
+            self.note_shown(request.label, number, exemplar.size, picture);
         }
     }
 
     fn show_unrequested(&mut self, epoch: u8, weight: impl Fn(u8) -> f64, link: &mut VehicleLink, now: Instant) {
         let unseen = self.exemplars.keys().filter(|label| !self.seen.contains(label));
-        let Some(label) = unseen.copied().max_by(|&a, &b| weight(a).total_cmp(&weight(b)).then(b.cmp(&a))) else {
+        let by_weight = |a: &u8, b: &u8| weight(*a).total_cmp(&weight(*b)).then(b.cmp(a));
+        let first =
+            unseen.copied().filter_map(|label| self.new_offer(label)).max_by(|a, b| by_weight(&a.label, &b.label));
+        let is_further = first.is_none();
+        let Some(Offer { label, number, picture, size, had }) = first.or_else(|| self.further_offer(by_weight)) else {
             return;
         };
-        let Some((number, picture)) = self.choose(ExemplarRequest { label, ..ExemplarRequest::default() }) else {
-            return;
+        let Some(exemplar) = self.fill(head(epoch, label, 0), number, &picture, size, now) else { return };
+        self.note_shown(label, number, exemplar.size, picture);
+        let bytes = exemplar.encode();
+        let object = if is_further { link.push_spare_object(bytes) } else { link.push_background_object(bytes) };
+        self.unrequested = object.map(|object| Unrequested { label, number, object, had });
+    }
+
+    /// The best exemplar of a label that was not sent.
+    fn new_offer(&self, label: u8) -> Option<Offer> {
+        let (number, picture) = self.choose(ExemplarRequest { label, ..ExemplarRequest::default() })?;
+        Some(Offer { label, number, picture, size: 0, had: None })
+    }
+
+    /// The next exemplar of a label that has some: each is first sent small, then in its full size. The label that has got the
+    /// least comes first.
+    fn further_offer(&self, by_weight: impl Fn(&u8, &u8) -> Ordering) -> Option<Offer> {
+        let steps = |label: &u8| {
+            self.shown.get(label).into_iter().flatten().map(|s| 1 + usize::from(s.size > 0)).sum::<usize>()
         };
-        let head = head(epoch, label, 0);
-        let Some(exemplar) = self.fill(head, number, &picture, 0, now) else { return };
-        self.note_shown(label, number, picture);
-        let object = link.push_background_object(exemplar.encode());
-        self.unrequested = object.map(|object| Unrequested { label, number, object });
+        let offer = |label: &u8| {
+            let shown = self.shown.get(label).map_or(&[][..], Vec::as_slice);
+            let larger = shown.iter().find_map(|s| {
+                let full = middle_size(&s.picture.patch, LARGEST).filter(|full| *full > s.size)?;
+                let (picture, had) = (s.picture.clone(), Some(s.size));
+                Some(Offer { label: *label, number: s.number, picture, size: full, had })
+            });
+            let is_new = shown.len() < MAX_UNREQUESTED;
+            larger.or_else(|| self.new_offer(*label).filter(|_| is_new))
+        };
+        let labels = self.exemplars.keys().filter_map(|label| Some((steps(label), offer(label)?)));
+        let order = |a: &(usize, Offer), b: &(usize, Offer)| a.0.cmp(&b.0).then(by_weight(&b.1.label, &a.1.label));
+        labels.min_by(order).map(|(_, offer)| offer)
     }
 
     /// The object of an exemplar in at most the requested size class; `None` if it cannot be compressed.
@@ -198,11 +254,11 @@ impl Gallery {
         Some((numbers.into_iter().find(|n| !is_taken(n))?, new.clone()))
     }
 
-    fn note_shown(&mut self, label: u8, number: u8, picture: ExemplarPatch) {
+    fn note_shown(&mut self, label: u8, number: u8, size: u8, picture: ExemplarPatch) {
         self.seen.insert(label);
         let shown = self.shown.entry(label).or_default();
         shown.retain(|s| s.number != number);
-        shown.push(Shown { number, picture });
+        shown.push(Shown { number, size, picture });
         if shown.len() > MAX_SHOWN {
             shown.remove(0);
         }
@@ -221,9 +277,7 @@ impl Gallery {
         for Reply { request, number, object } in open {
             self.withdraw(request.label, number, object, link);
         }
-        if let Some(Unrequested { label, number, object }) = self.unrequested.take() {
-            self.withdraw(label, number, Some(object), link);
-        }
+        self.withdraw_unrequested(link);
         self.seen.clear();
     }
 }
@@ -243,4 +297,60 @@ fn is_same(a: &ExemplarPatch, b: &ExemplarPatch) -> bool {
 /// An exemplar of a label without an image, which answers a request with this serial number.
 fn head(epoch: u8, label: u8, serial: u8) -> Exemplar {
     Exemplar { epoch, label, serial, size: 0, picture: 0, view: ExemplarView::default(), bytes: Vec::new() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::link_config;
+    use image::{Rgb, RgbImage};
+    use scenecast_config::{Config, modem_profile};
+
+    fn link() -> VehicleLink {
+        let config = Config::default();
+        let profile = modem_profile(&config, config.modem.bit_rate);
+        let link = link_config(&config, None, profile).unwrap();
+        VehicleLink::new(link, config.map.codec, 1, Default::default(), Instant::ZERO)
+    }
+
+    fn patch(edge: u32, place: f64) -> ExemplarPatch {
+        let image = RgbImage::from_fn(edge, edge, |x, y| Rgb([(x * 7 % 250) as u8, (y * 5 % 250) as u8, 90]));
+        ExemplarPatch { patch: image.into(), score: 0.9, t_s: place, place: (place, 0.0), pixel_m: 0.01 }
+    }
+
+    /// Label, size class, and the size class that the surface had, of what is sent without requests.
+    fn sent(gallery: &mut Gallery, link: &mut VehicleLink, most: usize) -> Vec<(u8, u8, Option<u8>)> {
+        let mut sent = Vec::new();
+        while sent.len() < most {
+            gallery.serve(0, f64::from, link, Instant::ZERO);
+            let Some(Unrequested { label, number, object, had }) = gallery.unrequested else { break };
+            let shown = gallery.shown[&label].iter().find(|s| s.number == number).unwrap();
+            sent.push((label, shown.size, had));
+            gallery.handle_delivered(object);
+        }
+        sent
+    }
+
+    #[test]
+    fn each_label_gets_an_image_before_any_gets_a_larger_one() {
+        let (mut gallery, mut link) = (Gallery::default(), link());
+        let images = [(1, vec![patch(128, 1.0), patch(128, 2.0)]), (2, vec![patch(64, 3.0)])];
+        gallery.set_exemplars(SharedExemplars::new(images.into()));
+        let first = [(2, 0, None), (1, 0, None), (1, 1, Some(0)), (1, 0, None), (1, 1, Some(0))];
+        assert_eq!(sent(&mut gallery, &mut link, 99), first);
+    }
+
+    #[test]
+    fn a_request_ends_a_larger_image_and_the_smaller_one_stays_known() {
+        let (mut gallery, mut link) = (Gallery::default(), link());
+        gallery.set_exemplars(SharedExemplars::new([(1, vec![patch(128, 1.0)]), (2, vec![patch(64, 3.0)])].into()));
+        assert_eq!(sent(&mut gallery, &mut link, 2).len(), 2);
+        gallery.serve(0, f64::from, &mut link, Instant::ZERO);
+        assert_eq!(gallery.unrequested.unwrap().had, Some(0));
+        let wanted = vec![ExemplarRequest { label: 2, serial: 1, ..ExemplarRequest::default() }];
+        gallery.replace_requests(ExemplarRequests { epoch: 0, wanted }, None, &mut link);
+        assert!(gallery.unrequested.is_none());
+        gallery.replace_requests(ExemplarRequests::default(), None, &mut link);
+        assert_eq!(sent(&mut gallery, &mut link, 9), [(1, 1, Some(0))], "it is not sent small again");
+    }
 }

@@ -126,7 +126,7 @@ impl<S: StateSource> VehicleContent<S> {
     /// Whether the surface is known to hold the replicated state, its layers, and every object.
     pub(super) fn is_converged(&self) -> bool {
         let is_map_converged = self.source.is_converged() && self.about_labels_is_converged();
-        is_map_converged && self.layers().all(StateSource::is_converged) && self.objects.is_empty()
+        is_map_converged && self.layers().all(StateSource::is_converged) && self.objects.has_only_spare()
     }
 
     /// Whether no content waits that could be sent now.
@@ -161,11 +161,16 @@ impl<S: StateSource> VehicleContent<S> {
 
     /// About how many bytes wait and may be sent.
     pub(super) fn backlog_bytes(&self, budget: &BitBudget, now: Instant) -> usize {
-        let own = self.source.backlog_bytes()
+        self.urgent_bytes() + self.background_backlog(budget, now)
+    }
+
+    /// The same without what spare bits alone may carry.
+    pub(super) fn urgent_bytes(&self) -> usize {
+        self.source.backlog_bytes()
             + self.about_labels_backlog()
             + self.shared_layer_backlog()
-            + self.objects.backlog_bytes();
-        own + self.in_force.backlog_bytes() + self.background_backlog(budget, now)
+            + self.objects.backlog_bytes()
+            + self.in_force.backlog_bytes()
     }
 
     /// Whether changes of the state or of its layers wait.

@@ -117,7 +117,7 @@ impl<S: StateSource> VehicleContent<S> {
 
     /// The background streams that wait and may be sent now. There is spare capacity while less than half of the
     /// budget's window was used, so that urgent content that comes up next finds room. While finer cells wait, the
-    /// streams that the operator lists before them may be sent too.
+    /// streams that the operator lists before them may be sent too. Exemplars of labels of which the surface has one come last.
     pub(super) fn background_streams(
         &self,
         budget: &BitBudget,
@@ -126,10 +126,11 @@ impl<S: StateSource> VehicleContent<S> {
         let (spare, refining) = (budget.is_plentiful(now), self.is_refining());
         let finer = self.background.iter().position(|s| s == BackgroundStream::Finer).filter(|_| refining);
         let allowed = move |place: usize| spare || finer.is_some_and(|finer| place <= finer);
-        let in_order = self.background.iter().enumerate();
-        in_order
-            .filter(move |&(place, stream)| allowed(place) && self.waiting_bytes(stream) > 0)
-            .map(|(_, stream)| stream)
+        let is_last = |stream| stream == BackgroundStream::Exemplars && self.objects.has_only_spare();
+        let waits =
+            move |&(place, stream): &(usize, BackgroundStream)| allowed(place) && self.waiting_bytes(stream) > 0;
+        let in_order = move |last: bool| self.background.iter().enumerate().filter(move |&(_, s)| is_last(s) == last);
+        in_order(false).chain(in_order(true)).filter(waits).map(|(_, stream)| stream)
     }
 
     fn waiting_bytes(&self, stream: BackgroundStream) -> usize {

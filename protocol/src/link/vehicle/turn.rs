@@ -129,10 +129,23 @@ impl<S: StateSource> VehicleLink<S> {
         }
     }
 
+    /// Frames that the content which waits takes. What spare bits carry takes no longer than a change of turns, so that the
+    /// surface's orders do not wait for it.
     fn frames_wanted(&self, now: Instant) -> u32 {
-        let room = self.config.modem.frame_bytes.saturating_sub(14).max(1);
-        let bytes = self.content.backlog_bytes(&self.budget, now);
-        bytes.div_ceil(room).clamp(1, 255) as u32
+        const LONGEST_SPARE: Duration = Duration::from_secs(2);
+        let modem = &self.config.modem;
+        let room = modem.frame_bytes.saturating_sub(14).max(1);
+        let longest = self.handover().min(LONGEST_SPARE).as_secs_f64() / modem.frame_airtime().as_secs_f64().max(1e-6);
+        let spare = (longest as usize).saturating_sub(self.repeater.new_frames());
+        let frames = self.content.backlog_bytes(&self.budget, now).div_ceil(room).min(spare);
+        self.content.urgent_bytes().div_ceil(room).max(frames).clamp(1, 255) as u32
+    }
+
+    /// Time from the end of a turn to the beginning of the next, if both directions get through.
+    fn handover(&self) -> Duration {
+        let modem = self.config.modem;
+        let one_way = self.timing.one_way().unwrap_or(Duration::from_millis(300));
+        (modem.turn_around + one_way) * 2 + modem.airtime(32)
     }
 
     /// Bytes for an acknowledgement: in the first frames of a turn, as many as it takes for one to get through, and
@@ -156,13 +169,12 @@ impl<S: StateSource> VehicleLink<S> {
     fn repeat_terms(&self, now: Instant) -> RepeatTerms {
         let modem = self.config.modem;
         let is_limited = f64::from(self.budget.bits_per_s()) < modem.bit_rate_bps / 2.0;
-        let one_way = self.timing.one_way().unwrap_or(Duration::from_millis(300));
         RepeatTerms {
             modem,
             outstanding: self.pair.outstanding(),
             loss: self.pair.stats.loss_out.expected(),
             is_budget_bound: is_limited && !self.budget.is_plentiful(now),
-            handover: (modem.turn_around + one_way) * 2 + modem.airtime(32),
+            handover: self.handover(),
         }
     }
 
@@ -173,7 +185,12 @@ impl<S: StateSource> VehicleLink<S> {
         let wanted = self.frames_wanted(now);
         let turn = self.repeater.kept() + wanted;
         let bytes = self.config.modem.frame_bytes * turn as usize;
-        let repeats = turn * (self.repeater.copies(turn, bytes, &self.repeat_terms(now)) - 1);
+        // Objects have symbols of their own against losses.
+        let copies = match self.content.urgent_bytes() {
+            0 => 1,
+            _ => self.repeater.copies(turn, bytes, &self.repeat_terms(now)),
+        };
+        let repeats = turn * (copies - 1);
         FramePlan { remaining: (wanted + repeats).min(frames) - 1, is_last_new: wanted == 1 || frames == 1 }
     }
 

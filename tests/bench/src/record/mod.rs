@@ -97,7 +97,7 @@ fn fly(config: &Config, seed: u64, folders: &[PathBuf; 2]) -> Result<(Vec<Moment
     };
     mission.run(DRAIN, &mut |mission| observe(mission, &mut record))?;
     observe(&mut mission, &mut record)?;
-    record.finish()?;
+    record.finish(&mission)?;
     Ok((moments, recorder))
 }
 
