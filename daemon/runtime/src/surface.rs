@@ -422,7 +422,7 @@ async fn next_request(console: &mut Option<Console>) -> PendingRequest {
     }
 }
 
-/// Whether a frame that was dropped for this reason, or for none, has verified: anybody may have sent another one.
+/// Whether a frame that was dropped for this reason, or for none, is certainly one of a vehicle: anybody may have sent another one.
 fn is_of_vehicle(dropped: Option<DropReason>) -> bool {
     use DropReason::{Duplicate, Late, NoBase, OldSession, Undecodable};
     dropped.is_none_or(|reason| matches!(reason, Duplicate | Late | NoBase | OldSession | Undecodable))

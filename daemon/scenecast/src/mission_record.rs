@@ -59,7 +59,7 @@ impl MissionRecord {
         write(&mut self.surface.0, entries)?;
         let entries = self.vehicle.1.observe(self.parts[1], mission.vehicle(), &stamps);
         write(&mut self.vehicle.0, entries)?;
-        let images = self.vehicle.1.images(&mission.images(), IMAGES_INTERVAL_S, &stamps);
+        let images = self.vehicle.1.images(mission.images(), IMAGES_INTERVAL_S, &stamps);
         write(&mut self.vehicle.0, images)?;
         let (interval, synced) = &mut self.sync;
         if mission.now().since(*synced) >= *interval {
@@ -72,7 +72,7 @@ impl MissionRecord {
 
     /// Ends both records.
     pub fn finish(mut self, mission: &Mission) -> Result<(), UserError> {
-        let images = self.vehicle.1.images(&mission.images(), 0.0, &stamps(mission.now()));
+        let images = self.vehicle.1.images(mission.images(), 0.0, &stamps(mission.now()));
         write(&mut self.vehicle.0, images)?;
         write(&mut self.surface.0, self.surface.1.last_state())?;
         self.surface.0.finish()?;

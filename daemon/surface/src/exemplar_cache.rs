@@ -186,6 +186,10 @@ impl ExemplarCache {
         entry.request = entry.request.filter(|_| !asked);
         let Exemplar { picture: number, size, view, .. } = *exemplar;
         let sent_bytes = exemplar.encode().len();
+        if entry.stored.iter().any(|p| p.number == number && p.size > size) {
+            // A vehicle that was restarted does not know that the larger one is here.
+            return asked;
+        }
         let was_requested = entry.stored.iter().any(|p| p.number == number && p.requested);
         entry.stored.retain(|p| p.number != number);
         let (received, requested) = (now, asked || was_requested);
@@ -210,11 +214,11 @@ impl ExemplarCache {
 }
 
 impl LabelExemplars {
-    /// The exemplar of a number, or the latest of the largest ones.
+    /// The exemplar of a number, or the latest one.
     pub fn exemplar(&self, number: Option<u8>) -> Option<&StoredExemplar> {
         match number {
             Some(number) => self.stored.iter().find(|p| p.number == number),
-            None => self.stored.iter().max_by_key(|p| p.size),
+            None => self.stored.last(),
         }
     }
 
@@ -257,6 +261,7 @@ mod tests {
         cache.request(5, RequestKind::Larger(None), NOW).unwrap();
         assert_eq!(cache.wanted(3).wanted, [ExemplarRequest { label: 5, serial: 2, size: 1, picture: 9 }]);
         assert!(cache.handle_exemplar(&come(5, 2, 1, 9), None, NOW));
+        assert!(!cache.handle_exemplar(&come(5, 0, 0, 9), None, NOW), "the larger one stays");
         let sizes: Vec<(u8, u8)> = cache.label(5).unwrap().stored.iter().map(|p| (p.number, p.size)).collect();
         assert_eq!(sizes, [(9, 1)]);
         let said = cache.request(5, RequestKind::Larger(Some(9)), NOW).unwrap_err();

@@ -13,8 +13,8 @@ pub(super) enum Priority {
     Requested,
     /// The spare capacity, in its place among the background streams.
     Background,
-    /// What all other content leaves.
-    Spare,
+    /// The spare capacity, after all other content.
+    Last,
 }
 
 /// The objects on their way to the peer, oldest first.
@@ -46,9 +46,9 @@ impl ObjectSender {
         self.add(bytes, Priority::Background)
     }
 
-    /// Queues an object that may use only what all other content leaves.
-    pub fn push_spare(&mut self, bytes: Vec<u8>) -> Option<ObjectId> {
-        self.add(bytes, Priority::Spare)
+    /// Queues an object that is sent after all other content.
+    pub fn push_last(&mut self, bytes: Vec<u8>) -> Option<ObjectId> {
+        self.add(bytes, Priority::Last)
     }
 
     fn add(&mut self, bytes: Vec<u8>, priority: Priority) -> Option<ObjectId> {
@@ -75,9 +75,14 @@ impl ObjectSender {
         self.objects.clear();
     }
 
-    /// Whether the peer is known to have every object but those that only spare capacity carries.
-    pub fn has_only_spare(&self) -> bool {
-        self.objects.iter().all(|o| o.priority == Priority::Spare)
+    /// Whether the peer is known to have every object.
+    pub fn is_empty(&self) -> bool {
+        self.objects.is_empty()
+    }
+
+    /// Whether the peer is known to have every object but those that are sent after all other content.
+    pub fn has_only_last(&self) -> bool {
+        self.objects.iter().all(|o| o.priority == Priority::Last)
     }
 
     /// Whether the peer is known to have every object that has a share.
@@ -209,7 +214,6 @@ struct SymbolProgress {
 #[derive(Debug)]
 pub(super) struct OutgoingObject {
     pub(super) serial: u64,
-    /// Whether it may use only spare capacity.
     priority: Priority,
     attempt: u32,
     /// The object; once the layout is fixed, the bytes of all source symbols.

@@ -116,7 +116,7 @@ proptest! {
         let objects: Vec<_> = lens.iter().map(|&len| link.chance.object(len)).collect();
         let ids: Vec<_> = objects.iter().map(|o| link.sender.push(o.clone()).unwrap()).collect();
         let mut rounds = 0;
-        while !link.sender.has_only_spare() {
+        while !link.sender.is_empty() {
             prop_assert!(link.sender.backlog_bytes() > 0, "no part is under way, so content waits");
             for _ in 0..window {
                 let room = rooms.0 + link.chance.below(rooms.1 + 1);
@@ -152,7 +152,7 @@ proptest! {
         link.sender.set_loss(loss);
         let object = link.chance.object(MAX_OBJECT);
         link.sender.push(object.clone()).unwrap();
-        while !link.sender.has_only_spare() {
+        while !link.sender.is_empty() {
             while link.send(14) {}
             link.deliver_all();
         }
@@ -200,7 +200,7 @@ fn cost(len: usize, room: usize, loss: f64) -> Cost {
         one_pass += link.sent;
         link.deliver_all();
         complete += link.received.len();
-        while !link.sender.has_only_spare() {
+        while !link.sender.is_empty() {
             while link.send(room) {}
             link.deliver_all();
         }
@@ -261,7 +261,7 @@ fn an_object_is_dropped_before_its_name_is_reused() {
     for later in 1..3000 {
         let id = sender.push(vec![2; 50]).unwrap();
         sender.cancel(id);
-        assert_eq!(sender.has_only_spare(), later > 1023, "after {later} others");
+        assert_eq!(sender.is_empty(), later > 1023, "after {later} others");
         assert!(later > 1023 || id != first);
     }
 }

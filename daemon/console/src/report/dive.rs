@@ -13,7 +13,8 @@ use scenecast_core::{UserError, utc_text};
 use scenecast_files::{MissionClock, RecordFile};
 use scenecast_messages::contents::valid_part;
 use scenecast_messages::geometry_msgs::PoseWithCovarianceStamped;
-use scenecast_messages::scenecast_msgs::{Event, Exemplar, Link, Order};
+use scenecast_messages::scenecast_msgs::{Event, Exemplar, Link, Order, OrderStatus};
+use scenecast_protocol::directive::SlotId;
 use scenecast_protocol::map::{Cell, LabelGrid};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
@@ -339,9 +340,10 @@ impl DiveVehicle {
         })
     }
 
-    /// Whether position fixes were sent to it.
+    /// Whether it has used position fixes.
     pub(super) fn has_fixes(&self) -> bool {
-        self.orders.len() > self.orders_of_people().count()
+        let is_used = |way: &Vec<OrderStep>| way.iter().any(|step| step.status == OrderStatus::APPLIED);
+        self.orders.iter().any(|((slot, _), way)| slot == SlotId::Fix.name() && is_used(way))
     }
 
     /// Whether its own record has about the same time as that of the surface, so that frames of the one can be looked for in the other.

@@ -1,16 +1,16 @@
 //! What a reader of a report must not trust.
 
 use super::dive::{Dive, DiveVehicle};
-use super::gaps;
+use super::{extent, gaps, words};
+use crate::state::VehicleState;
 use scenecast_core::utc_text;
 
 /// A place with a greater standard deviation is worth a sentence, metres.
 const DOUBTFUL_M: f64 = 5.0;
 
 /// The doubts about what a report says of a vehicle, a sentence each.
-pub(super) fn doubts(dive: &Dive, vehicle: &DiveVehicle) -> Vec<String> {
+pub(super) fn doubts(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -> Vec<String> {
     let mut sentences = Vec::new();
-    sentences.extend(vehicle.made_up(dive).map(|what| format!("This was no dive, but {what}.")));
     sentences.extend(dive.damage.iter().map(|damage| format!("Not all of the record could be read: {damage}.")));
     sentences.extend(gaps::of_records(dive, vehicle));
     sentences.extend(dive.restarts_s.iter().map(|(stopped_s, _)| {
@@ -20,7 +20,7 @@ pub(super) fn doubts(dive: &Dive, vehicle: &DiveVehicle) -> Vec<String> {
             utc_text(*stopped_s)
         )
     }));
-    sentences.extend(place(vehicle));
+    sentences.extend(place(dive, vehicle));
     if vehicle.own.runs_s.is_empty() {
         sentences.push(
             "Times of modes, faults and restarts are those at which the surface learned of them, and how far its map was behind is its own \
@@ -28,22 +28,58 @@ pub(super) fn doubts(dive: &Dive, vehicle: &DiveVehicle) -> Vec<String> {
                 .to_owned(),
         );
     }
-    sentences.push(
-        "The depth of the water is the depth of the vehicle and its height above the sea floor; where nothing measured that height, it is the \
-         configured one (survey.altitude_m)."
-            .to_owned(),
-    );
+    if extent::sea_floor(dive, state, vehicle).is_some() {
+        sentences.push(
+            "The depth of the water is the depth of the vehicle and its height above the sea floor; where nothing measured that height, it is \
+             the configured one (survey.altitude_m)."
+                .to_owned(),
+        );
+    }
     sentences
 }
 
-/// From when on its place was not known well.
-fn place(vehicle: &DiveVehicle) -> Option<String> {
-    let known = || vehicle.path().iter().filter(|point| point.sigma_m.is_finite());
-    let doubtful = known().find(|point| point.sigma_m >= DOUBTFUL_M)?;
-    let most_m = known().map(|point| point.sigma_m).fold(0.0, f64::max);
+/// When its place was not known well.
+fn place(dive: &Dive, vehicle: &DiveVehicle) -> Option<String> {
+    let known: Vec<_> = vehicle.path().iter().filter(|point| point.sigma_m.is_finite()).collect();
+    let is_doubtful = |at: &usize| known[*at].sigma_m >= DOUBTFUL_M;
+    let all = || (0..known.len()).filter(is_doubtful);
+    let (first, last) = (known[all().next()?], known[all().next_back()?]);
+    let most_m = known.iter().map(|point| point.sigma_m).fold(0.0, f64::max);
+    let time_s: f64 = all().filter_map(|at| Some(known.get(at + 1)?.at_s - known[at].at_s)).sum();
     Some(format!(
-        "From {} on, the place of the vehicle was known to {DOUBTFUL_M} m only or worse, at worst to {most_m:.0} m (standard deviation): what was \
-         mapped then may lie so far off the rest.",
-        utc_text(doubtful.at_s)
+        "Between {} and {}, for {} in all, the standard deviation of its place was {DOUBTFUL_M} m or more, {most_m:.0} m at most: what was mapped \
+         then may lie so far off the rest.",
+        utc_text(first.at_s),
+        utc_text(last.at_s),
+        words::duration(dive.mission_s(time_s))
     ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::track::TrackPoint;
+    use super::*;
+
+    #[test]
+    fn a_place_is_doubted_for_the_time_in_which_it_was_not_known() {
+        let mut dive = Dive::default();
+        dive.state.mission.speed = 1.0;
+        let at = |(n, sigma_m): (usize, &f64)| TrackPoint {
+            at_s: n as f64,
+            east_m: 0.0,
+            north_m: 0.0,
+            depth_m: 0.0,
+            sigma_m: *sigma_m,
+        };
+        let told = |sigmas: &[f64]| {
+            let track = sigmas.iter().enumerate().map(at).collect();
+            let mut vehicle = DiveVehicle::default();
+            vehicle.track = track;
+            place(&dive, &vehicle)
+        };
+        assert_eq!(told(&[1.0, 4.9, f64::NAN]), None);
+        let told = told(&[1.0, 50.0, 40.0, 0.5, 0.5, 6.0, 1.0]).unwrap();
+        assert!(told.starts_with("Between 1970-01-01T00:00:01Z and 1970-01-01T00:00:05Z, for 3 s in all"), "{told}");
+        assert!(told.contains("50 m at most"), "{told}");
+    }
 }

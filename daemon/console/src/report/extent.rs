@@ -55,11 +55,12 @@ fn unseen(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle, shift: (f64,
     let middles = vehicle.labels.iter().map(|(cell, _)| vehicle.middle_of(cell, shift));
     let share = Area { west, south, east, north }.covered(middles, vehicle.cell_m);
     let fence = seen_of_fence(state, vehicle, shift);
-    let fence =
-        fence.map_or_else(String::new, |share| format!("; of the area within the fence {:.1} % is", share * 100.0));
+    let fence = fence.map_or_else(String::new, |share| {
+        format!(" Of the area within the fence, {:.1} % is on the map.", share * 100.0)
+    });
     let all_m2 = (east - west) * (north - south);
     format!(
-        " Of the area of the survey, {west} to {east} m east and {south} to {north} m north, {:.1} % is on the map, and {} of {} are not{fence}.",
+        " Of the area of the survey, {west} to {east} m east and {south} to {north} m north, {:.1} % is on the map, and {} of {} are not.{fence}",
         share * 100.0,
         words::area(all_m2 * (1.0 - share)),
         words::area(all_m2)

@@ -21,13 +21,10 @@ pub(super) fn heard(dive: &Dive, vehicle: &DiveVehicle) -> Vec<String> {
         utc_text(*last_s),
         duration(dive.mission_s(dive.surface_s.1 - last_s))
     );
-    let surface = format!("The surface heard a frame from it {}", pauses(dive, &vehicle.heard_s, dive.surface_s));
+    let surface = format!("The surface heard {}", pauses(dive, &vehicle.heard_s, dive.surface_s));
     let span = vehicle.own.runs_s.first().zip(vehicle.own.runs_s.last()).map(|(first, last)| (first.0, last.1));
     let own = span.map(|span| {
-        format!(
-            "On board, a frame of the surface that it could use was heard {}",
-            pauses(dive, &vehicle.own.heard_s, span)
-        )
+        format!("On board, of what it could use of the surface, it heard {}", pauses(dive, &vehicle.own.heard_s, span))
     });
     [last, surface].into_iter().chain(own).collect()
 }
@@ -66,10 +63,10 @@ fn pauses(dive: &Dive, times_s: &[f64], span_s: (f64, f64)) -> String {
         n if n > told.len() => format!("with {n} longer pauses, the longest of which were {}", told.join(", ")),
         n => format!("with {}: {}", counted(n, "longer pause", "longer pauses"), told.join(", ")),
     };
-    let heard = counted(times_s.len(), "time", "times");
+    let heard = counted(times_s.len(), "frame", "frames");
     match usual_s {
         Some(_) => format!(
-            "{heard}: half of the time the last one was at most {:.1} s old, {pauses}.",
+            "{heard}; half of the time, the last one was at most {:.1} s old, {pauses}.",
             half_of_time_s(dive, times_s, span_s.1)
         ),
         None => format!("{heard}, {pauses}."),
@@ -141,13 +138,16 @@ mod tests {
     fn longer_pauses_than_usual_are_told_in_mission_time() {
         let dive = dive_of(100.0, 1.0);
         let times: Vec<f64> = (0..=100).filter(|s| !(31..60).contains(s)).map(f64::from).collect();
-        let told = "72 times: half of the time the last one was at most 0.7 s old, with 1 longer pause: 30 s from 1970-01-01T00:00:30Z to 1970-01-01T00:01:00Z.";
+        let told = "72 frames; half of the time, the last one was at most 0.7 s old, with 1 longer pause: 30 s from 1970-01-01T00:00:30Z to 1970-01-01T00:01:00Z.";
         assert_eq!(pauses(&dive, &times, dive.span_s), told);
-        let told_evenly = "30 times: half of the time the last one was at most 0.5 s old, the longest pause was 1 s.";
+        let told_evenly = "30 frames; half of the time, the last one was at most 0.5 s old, the longest pause was 1 s.";
         assert_eq!(pauses(&dive, &times[..30], (0.0, 30.0)), told_evenly);
         let faster = dive_of(10.0, 10.0);
         let times: Vec<f64> = times.iter().map(|s| s / 10.0).collect();
-        assert!(pauses(&faster, &times, faster.span_s).starts_with(&told[..told.len() - 50]));
+        assert!(
+            pauses(&faster, &times, faster.span_s)
+                .starts_with("72 frames; half of the time, the last one was at most 0.7 s old")
+        );
     }
 
     #[test]
@@ -156,7 +156,8 @@ mod tests {
         assert_eq!(heard(&dive, &vehicle), ["No frame from it was heard."]);
         assert!(has_silence(&dive, &vehicle));
         vehicle.heard_s = vec![4.0];
-        let told = "The surface heard a frame from it 1 time, with 1 longer pause: 96 s from 1970-01-01T00:00:04Z to 1970-01-01T00:01:40Z.";
+        let told =
+            "The surface heard 1 frame, with 1 longer pause: 96 s from 1970-01-01T00:00:04Z to 1970-01-01T00:01:40Z.";
         assert_eq!(heard(&dive, &vehicle)[1], told);
         assert!(has_silence(&dive, &vehicle));
     }

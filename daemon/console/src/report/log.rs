@@ -56,7 +56,7 @@ pub(super) fn images(events: &[(u64, Event)], runs: &[(u64, u64)]) -> Vec<String
         let (at, event) = of_run.next_back()?;
         // A program that is ended in order counts them once more.
         let is_final = to.saturating_sub(*at) <= 5 * SECOND;
-        let least = if is_final { String::new() } else { format!(" by {}", utc_text(seconds(*at))) };
+        let least = if is_final { String::new() } else { format!(", as last counted at {}", utc_text(seconds(*at))) };
         Some(format!("{}{least}", event.text))
     };
     runs.iter().filter_map(last).collect()

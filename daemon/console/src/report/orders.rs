@@ -213,7 +213,6 @@ impl Dive {
                 format!("<tr><td>{kind}</td><td>{ordered}</td><td class=\"t\">{given}</td><td>{by}</td></tr>\n")
             })
             .collect();
-        let rows = rows + &self.awaited_images(state, vehicle);
         let budget = state.status.as_ref().map_or_else(String::new, |status| {
             format!(
                 " The vehicle kept to a budget of {} bit/s then, the surface to {}.",
@@ -228,9 +227,10 @@ impl Dive {
                  <th>what was ordered</th><th>given (UTC)</th><th>by</th></tr></thead>\n{rows}</table>\n"
             ),
         };
+        *page += &self.awaited_images(state, vehicle);
     }
 
-    /// The images that the last order of them asked for and that have not arrived, as a row of the table.
+    /// The images that the last order of them asked for and that have not arrived, in a paragraph.
     fn awaited_images(&self, state: &VehicleState, vehicle: &DiveVehicle) -> String {
         let slot = SlotId::Requests.name();
         let last = vehicle
@@ -248,13 +248,10 @@ impl Dive {
         if awaited.is_empty() || last.status == OrderStatus::REFUSED || last.status == OrderStatus::WITHDRAWN {
             return String::new();
         }
-        let (by, _) = self.ordered(state, vehicle, order);
-        let images = format!("images of {}, which have not arrived", awaited.join(", "));
         format!(
-            "<tr><td>images</td><td>{}</td><td class=\"t\">{}</td><td>{}</td></tr>\n",
-            Escaped(&images),
+            "<p>Asked for at {} and not arrived since: images of {}.</p>\n",
             utc_text(last.given_s),
-            Escaped(&by)
+            Escaped(&awaited.join(", "))
         )
     }
 

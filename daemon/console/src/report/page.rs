@@ -105,7 +105,7 @@ impl Dive {
             let _ = writeln!(page, "<li>{}</li>", Escaped(&sentence));
         }
         *page += "</ul>\n<h3>What not to trust</h3>\n<ul>\n";
-        for sentence in doubts::doubts(self, vehicle) {
+        for sentence in doubts::doubts(self, state, vehicle) {
             let _ = writeln!(page, "<li>{}</li>", Escaped(&sentence));
         }
         *page += "</ul>\n";
@@ -194,7 +194,7 @@ impl Dive {
             json!({
                 "name": state.name,
                 "summary": summary::summary(self, state, vehicle),
-                "doubts": doubts::doubts(self, vehicle),
+                "doubts": doubts::doubts(self, state, vehicle),
                 "distance_m": vehicle.distance_m(),
                 "cell_m": vehicle.cell_m,
                 "classes": classes.collect::<Vec<_>>(),

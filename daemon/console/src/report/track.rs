@@ -97,8 +97,9 @@ impl DiveVehicle {
         if self.own.track.len() < 2 {
             return None;
         }
-        let (mut moved, mut span) = ((0.0, 0.0), (0.0, 0.0));
+        let (mut moved, mut span, mut total_s) = ((0.0, 0.0), (0.0, 0.0), 0.0);
         for (a, b) in self.steps() {
+            total_s += (b.at_s - a.at_s) * self.mission_speed;
             span = (span.0 + a.distance_m(b), span.1 + (b.at_s - a.at_s) * self.mission_speed);
             if span.1 >= SPAN_S {
                 if span.0 / span.1 >= LEAST_M_S {
@@ -107,7 +108,8 @@ impl DiveVehicle {
                 span = (0.0, 0.0);
             }
         }
-        let (m, s) = if moved.1 > 0.0 { moved } else { span };
+        // A path may be shorter than a span.
+        let (m, s) = if total_s >= SPAN_S { moved } else { span };
         (s > 0.0 && m / s >= LEAST_M_S).then(|| m / s)
     }
 

@@ -57,7 +57,7 @@ pub(super) fn told(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -> 
     sentences.extend(times_of_modes(dive, state, vehicle));
     if !vehicle.own.images.is_empty() {
         sentences
-            .push(format!("Images by the vehicle's own record: {}.", vehicle.own.images.join("; after a restart: ")));
+            .push(format!("Images by the vehicle's own record: {}.", vehicle.own.images.join(". After a restart: ")));
     }
     sentences
 }

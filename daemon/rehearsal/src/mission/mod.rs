@@ -310,7 +310,7 @@ impl Mission {
     pub fn images(&self) -> String {
         let mapped = self.logbook.poses.len();
         match &self.logbook.unreadable {
-            None => format!("{mapped} images mapped, 0 dropped"),
+            None => format!("{mapped} images mapped"),
             Some((count, _)) => format!("{mapped} images mapped, {count} dropped (unreadable {count})"),
         }
     }

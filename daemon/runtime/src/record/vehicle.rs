@@ -64,7 +64,7 @@ impl VehicleRecord {
 
     fn put_images(&mut self, account: Option<impl ToString>, interval_s: f64) {
         let (Some(record), Some(account)) = (&mut self.record, account) else { return };
-        record.put(self.recorder.images(&account.to_string(), interval_s, &self.stamps), &self.stamps);
+        record.put(self.recorder.images(account, interval_s, &self.stamps), &self.stamps);
     }
 
     /// Records an event of the host.
@@ -173,13 +173,17 @@ impl VehicleRecorder {
     }
 
     /// What has become of the images, if that has changed and the last account is `interval_s` old.
-    pub fn images(&mut self, account: &str, interval_s: f64, stamps: &Stamps) -> Option<RecordEntry> {
+    pub fn images(&mut self, account: impl ToString, interval_s: f64, stamps: &Stamps) -> Option<RecordEntry> {
         let (told, told_s) = &mut self.images;
-        if told == account || !is_due(told_s, interval_s, stamps.now_s()) {
+        if !is_due(told_s, interval_s, stamps.now_s()) {
             return None;
         }
-        account.clone_into(told);
-        Some(self.event(Event::INFO, "images", account, stamps))
+        let account = account.to_string();
+        if *told == account {
+            return None;
+        }
+        told.clone_from(&account);
+        Some(self.event(Event::INFO, "images", &account, stamps))
     }
 
     /// What is to be recorded of an event of the host.

@@ -101,12 +101,7 @@ impl Gallery {
         series: Option<Series>,
         link: &mut VehicleLink,
     ) {
-        if self.series.is_some() && series != self.series {
-            // A new run of the surface has no exemplar yet.
-            self.shown.clear();
-            self.seen.clear();
-        }
-        self.series = series;
+        self.follow(series);
         let (kept, dropped) =
             std::mem::take(&mut self.replies).into_iter().partition(|a| requests.wanted.contains(&a.request));
         self.replies = kept;
@@ -117,6 +112,15 @@ impl Gallery {
         if self.has_open_request() {
             self.withdraw_unrequested(link);
         }
+    }
+
+    /// The surface of this series is heard; another one has no exemplar yet.
+    fn follow(&mut self, series: Option<Series>) {
+        if self.series.is_some() && series != self.series {
+            self.shown.clear();
+            self.seen.clear();
+        }
+        self.series = series;
     }
 
     fn withdraw_unrequested(&mut self, link: &mut VehicleLink) {
@@ -153,6 +157,7 @@ impl Gallery {
     /// Sends the requested exemplars that exist. Without a request it sends one of a label of which the surface has none, the
     /// label with the greatest weight first; when it has one of each, larger and further ones.
     pub(super) fn serve(&mut self, epoch: u8, weight: impl Fn(u8) -> f64, link: &mut VehicleLink, now: Instant) {
+        self.follow(link.persistent_state().series());
         for request in self.requests.wanted.clone() {
             self.reply(request, epoch, link, now);
         }
@@ -176,6 +181,7 @@ impl Gallery {
         let head = head(epoch, request.label, request.serial);
         let exemplar =
             chosen.as_ref().and_then(|(n, p)| self.fill(head.clone(), *n, p, request.size, now)).unwrap_or(head);
+        self.withdraw_unrequested(link);
         let Some(object) = link.push_object(exemplar.encode()) else { return };
         self.replies.push(Reply { request, number: exemplar.picture, object: Some(object) });
         if let Some((number, picture)) = chosen {
@@ -193,10 +199,11 @@ impl Gallery {
             return;
         };
         let Some(exemplar) = self.fill(head(epoch, label, 0), number, &picture, size, now) else { return };
-        self.note_shown(label, number, exemplar.size, picture);
         let bytes = exemplar.encode();
-        let object = if is_further { link.push_spare_object(bytes) } else { link.push_background_object(bytes) };
-        self.unrequested = object.map(|object| Unrequested { label, number, object, had });
+        let object = if is_further { link.push_last_object(bytes) } else { link.push_background_object(bytes) };
+        let Some(object) = object else { return };
+        self.note_shown(label, number, exemplar.size, picture);
+        self.unrequested = Some(Unrequested { label, number, object, had });
     }
 
     /// The best exemplar of a label that was not sent.
@@ -213,7 +220,8 @@ impl Gallery {
         };
         let offer = |label: &u8| {
             let shown = self.shown.get(label).map_or(&[][..], Vec::as_slice);
-            let larger = shown.iter().find_map(|s| {
+            let current = self.exemplars.get(label).map_or(&[][..], Vec::as_slice);
+            let larger = shown.iter().filter(|s| current.iter().any(|p| is_same(p, &s.picture))).find_map(|s| {
                 let full = middle_size(&s.picture.patch, LARGEST).filter(|full| *full > s.size)?;
                 let (picture, had) = (s.picture.clone(), Some(s.size));
                 Some(Offer { label: *label, number: s.number, picture, size: full, had })
@@ -270,7 +278,8 @@ impl Gallery {
         self.unrequested = self.unrequested.filter(|u| u.object != id);
     }
 
-    /// A new run of the link has begun: objects in flight are cancelled, and the surface may have lost every exemplar.
+    /// A new run of the link has begun: objects in flight are cancelled. A surface of another series has no exemplar; one without
+    /// a series may have lost them.
     pub(super) fn handle_restart(&mut self, link: &mut VehicleLink) {
         let (met, open) = std::mem::take(&mut self.replies).into_iter().partition(|a| a.object.is_none());
         self.replies = met;
@@ -278,7 +287,9 @@ impl Gallery {
             self.withdraw(request.label, number, object, link);
         }
         self.withdraw_unrequested(link);
-        self.seen.clear();
+        if self.series.is_none() {
+            self.seen.clear();
+        }
     }
 }
 
@@ -334,10 +345,21 @@ mod tests {
     #[test]
     fn each_label_gets_an_image_before_any_gets_a_larger_one() {
         let (mut gallery, mut link) = (Gallery::default(), link());
-        let images = [(1, vec![patch(128, 1.0), patch(128, 2.0)]), (2, vec![patch(64, 3.0)])];
-        gallery.set_exemplars(SharedExemplars::new(images.into()));
-        let first = [(2, 0, None), (1, 0, None), (1, 1, Some(0)), (1, 0, None), (1, 1, Some(0))];
-        assert_eq!(sent(&mut gallery, &mut link, 99), first);
+        let all = (1..=4).map(|n| patch(128, f64::from(n))).collect();
+        gallery.set_exemplars(SharedExemplars::new([(1, all), (2, vec![patch(64, 9.0)])].into()));
+        let larger = [(1, 1, Some(0)), (1, 0, None), (1, 1, Some(0)), (1, 0, None), (1, 1, Some(0))];
+        let expected = [&[(2, 0, None), (1, 0, None)][..], &larger].concat();
+        assert_eq!(sent(&mut gallery, &mut link, 99), expected, "one is left for a request");
+    }
+
+    #[test]
+    fn an_image_that_shows_another_label_by_now_is_not_enlarged() {
+        let (mut gallery, mut link) = (Gallery::default(), link());
+        gallery.set_exemplars(SharedExemplars::new([(1, vec![patch(128, 1.0)])].into()));
+        assert_eq!(sent(&mut gallery, &mut link, 1), [(1, 0, None)]);
+        gallery.set_exemplars(SharedExemplars::new([(1, vec![patch(128, 2.0)])].into()));
+        assert_eq!(sent(&mut gallery, &mut link, 9), [(1, 0, None), (1, 1, Some(0))]);
+        assert_eq!(gallery.shown[&1].iter().map(|s| s.size).collect::<Vec<_>>(), [0, 1]);
     }
 
     #[test]

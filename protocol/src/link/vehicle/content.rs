@@ -123,10 +123,10 @@ impl<S: StateSource> VehicleContent<S> {
         self.status.owe_report(now);
     }
 
-    /// Whether the surface is known to hold the replicated state, its layers, and every object.
+    /// Whether the surface is known to hold the replicated state, its layers, and every object but those that are sent last.
     pub(super) fn is_converged(&self) -> bool {
         let is_map_converged = self.source.is_converged() && self.about_labels_is_converged();
-        is_map_converged && self.layers().all(StateSource::is_converged) && self.objects.has_only_spare()
+        is_map_converged && self.layers().all(StateSource::is_converged) && self.objects.has_only_last()
     }
 
     /// Whether no content waits that could be sent now.
@@ -155,7 +155,12 @@ impl<S: StateSource> VehicleContent<S> {
     fn backlog(&self, budget: &BitBudget, now: Instant) -> Backlog {
         let bytes = |n: usize| u32::try_from(n).unwrap_or(u32::MAX);
         let map = self.source.expected_backlog_bytes() + self.about_labels_backlog();
-        let others = self.shared_layer_backlog() + self.objects.backlog_bytes() + self.background_backlog(budget, now);
+        // People do not wait for what is sent last.
+        let background = match self.objects.has_only_last() {
+            true => self.background_backlog(budget, now).saturating_sub(self.objects.background_backlog_bytes()),
+            false => self.background_backlog(budget, now),
+        };
+        let others = self.shared_layer_backlog() + self.objects.backlog_bytes() + background;
         Backlog { map_bytes: bytes(map), other_bytes: bytes(others) }
     }
 
@@ -164,7 +169,7 @@ impl<S: StateSource> VehicleContent<S> {
         self.urgent_bytes() + self.background_backlog(budget, now)
     }
 
-    /// The same without what spare bits alone may carry.
+    /// The same without layers and objects that spare capacity carries.
     pub(super) fn urgent_bytes(&self) -> usize {
         self.source.backlog_bytes()
             + self.about_labels_backlog()

@@ -126,7 +126,7 @@ impl<S: StateSource> VehicleContent<S> {
         let (spare, refining) = (budget.is_plentiful(now), self.is_refining());
         let finer = self.background.iter().position(|s| s == BackgroundStream::Finer).filter(|_| refining);
         let allowed = move |place: usize| spare || finer.is_some_and(|finer| place <= finer);
-        let is_last = |stream| stream == BackgroundStream::Exemplars && self.objects.has_only_spare();
+        let is_last = |stream| stream == BackgroundStream::Exemplars && self.objects.has_only_last();
         let waits =
             move |&(place, stream): &(usize, BackgroundStream)| allowed(place) && self.waiting_bytes(stream) > 0;
         let in_order = move |last: bool| self.background.iter().enumerate().filter(move |&(_, s)| is_last(s) == last);

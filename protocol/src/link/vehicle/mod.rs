@@ -159,7 +159,7 @@ impl<S: StateSource> VehicleLink<S> {
         }
     }
 
-    /// Whether the surface is known to hold the replicated state, its layers, and every object but those of spare capacity.
+    /// Whether the surface is known to hold the replicated state, its layers, and every object but those that are sent last.
     pub fn is_converged(&self) -> bool {
         self.content.is_converged()
     }
@@ -189,9 +189,9 @@ impl<S: StateSource> VehicleLink<S> {
         self.content.objects.push(bytes)
     }
 
-    /// Queues an object that is sent with what all other content leaves; `None` if it is empty or too large.
-    pub fn push_spare_object(&mut self, bytes: Vec<u8>) -> Option<ObjectId> {
-        self.content.objects.push_spare(bytes)
+    /// Queues an object that is sent after all other content; `None` if it is empty or too large.
+    pub fn push_last_object(&mut self, bytes: Vec<u8>) -> Option<ObjectId> {
+        self.content.objects.push_last(bytes)
     }
 
     /// Queues an object that is sent with spare capacity only ([`crate::schedule::BackgroundStream::Exemplars`]).

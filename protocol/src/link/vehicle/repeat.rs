@@ -36,6 +36,8 @@ pub(super) struct Repeater {
     /// New frames of this turn, including those that are no longer kept.
     new_frames: usize,
     queue: VecDeque<Vec<u8>>,
+    /// Whether this turn has content beside what spare capacity carries.
+    has_urgent: bool,
     /// Whether all data was sent with the last turn.
     is_complete: bool,
     /// Share of the recent turns that began with new data although the turn before had sent all, in 0..=1.
@@ -72,7 +74,7 @@ impl Repeater {
             self.news += (f64::from(u8::from(has_news)) - self.news) * Self::NEWS_WEIGHT;
         }
         self.sent.retain(|s| s.number > horizon);
-        self.new_frames = 0;
+        (self.new_frames, self.has_urgent) = (0, false);
         let has_all = self.sent.len() as u64 == outstanding;
         if !may_repeat || self.sent.len() > Self::MAX_REPEATED_TURN || !has_all {
             self.sent.clear();
@@ -82,6 +84,15 @@ impl Repeater {
 
     pub(super) fn end_turn(&mut self) {
         self.queue.clear();
+    }
+
+    /// This turn has content beside what spare capacity carries.
+    pub(super) fn note_urgent(&mut self) {
+        self.has_urgent = true;
+    }
+
+    pub(super) fn has_urgent(&self) -> bool {
+        self.has_urgent
     }
 
     /// No data waits any more.

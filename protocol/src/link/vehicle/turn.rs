@@ -7,7 +7,7 @@ use crate::link::handshake::FramePurpose;
 use crate::link::{Transmit, TransmitKind, by_class};
 use crate::mac::{Access, quarter_seconds};
 use crate::map::StateSource;
-use crate::schedule::Class;
+use crate::schedule::{BitBudget, Class};
 use crate::time::Instant;
 use crate::wire::{Address, FrameBuilder, Stamp};
 use std::collections::BTreeMap;
@@ -129,16 +129,26 @@ impl<S: StateSource> VehicleLink<S> {
         }
     }
 
-    /// Frames that the content which waits takes. What spare bits carry takes no longer than a change of turns, so that the
-    /// surface's orders do not wait for it.
+    /// Frames that the content which waits takes.
     fn frames_wanted(&self, now: Instant) -> u32 {
-        const LONGEST_SPARE: Duration = Duration::from_secs(2);
-        let modem = &self.config.modem;
-        let room = modem.frame_bytes.saturating_sub(14).max(1);
-        let longest = self.handover().min(LONGEST_SPARE).as_secs_f64() / modem.frame_airtime().as_secs_f64().max(1e-6);
-        let spare = (longest as usize).saturating_sub(self.repeater.new_frames());
-        let frames = self.content.backlog_bytes(&self.budget, now).div_ceil(room).min(spare);
+        let room = self.config.modem.frame_bytes.saturating_sub(14).max(1);
+        let frames = self.content.backlog_bytes(&self.budget, now).div_ceil(room).min(self.spare_frames(now));
         self.content.urgent_bytes().div_ceil(room).max(frames).clamp(1, 255) as u32
+    }
+
+    /// Frames that may be sent in this turn with spare capacity: as long as there is some, and for no longer than a change of
+    /// turns takes, so that orders of the surface do not wait.
+    fn spare_frames(&self, now: Instant) -> usize {
+        const LONGEST: Duration = Duration::from_secs(2);
+        let modem = &self.config.modem;
+        let airtime = modem.frame_airtime().max(Duration::from_micros(1));
+        let longest = (self.handover().min(LONGEST).as_secs_f64() / airtime.as_secs_f64()) as usize;
+        let (mut budget, mut at, mut frames) = (self.budget.clone(), now, 0);
+        while self.repeater.new_frames() + frames < longest && budget.is_plentiful(at) {
+            budget.spend(modem.bits_on_air(modem.frame_bytes), at);
+            (at, frames) = (at + airtime, frames + 1);
+        }
+        frames
     }
 
     /// Time from the end of a turn to the beginning of the next, if both directions get through.
@@ -178,6 +188,12 @@ impl<S: StateSource> VehicleLink<S> {
         }
     }
 
+    /// How often a turn of so many frames and bytes is sent. Objects, which spare capacity carries, have symbols of their own
+    /// against losses.
+    fn copies(&self, frames: u32, bytes: usize, now: Instant) -> u32 {
+        if self.repeater.has_urgent() { self.repeater.copies(frames, bytes, &self.repeat_terms(now)) } else { 1 }
+    }
+
     fn plan(&self, frames: u32, now: Instant) -> FramePlan {
         if self.config.modem.access.is_free() {
             return FramePlan { remaining: 0, is_last_new: false };
@@ -185,12 +201,7 @@ impl<S: StateSource> VehicleLink<S> {
         let wanted = self.frames_wanted(now);
         let turn = self.repeater.kept() + wanted;
         let bytes = self.config.modem.frame_bytes * turn as usize;
-        // Objects have symbols of their own against losses.
-        let copies = match self.content.urgent_bytes() {
-            0 => 1,
-            _ => self.repeater.copies(turn, bytes, &self.repeat_terms(now)),
-        };
-        let repeats = turn * (copies - 1);
+        let repeats = turn * (self.copies(turn, bytes, now) - 1);
         FramePlan { remaining: (wanted + repeats).min(frames) - 1, is_last_new: wanted == 1 || frames == 1 }
     }
 
@@ -204,6 +215,9 @@ impl<S: StateSource> VehicleLink<S> {
             self.pair.repeat_hello();
         }
         let sends_hello = self.pair.must_send_hello();
+        if self.content.urgent_bytes() > 0 || self.content.status.is_waiting(now) {
+            self.repeater.note_urgent();
+        }
         let plan = if sends_hello { FramePlan { remaining: 0, is_last_new: true } } else { self.plan(frames, now) };
         let wish = (plan.is_last_new && !sends_hello).then(|| self.wish(now));
         let stamp = self.stamp(plan.is_last_new, now);
@@ -226,10 +240,7 @@ impl<S: StateSource> VehicleLink<S> {
             carried = self.content.fill(&mut builder, &context);
             self.events.extend(self.content.oversized.take().map(VehicleEvent::Oversized));
         }
-        // Whether a frame after this one would have content.
-        let (rest, next) =
-            (self.budget.after(modem.bits_on_air(builder.len(true)), now), now + modem.airtime(builder.len(true)));
-        let is_complete = takes_turns && !sends_hello && self.content.backlog_bytes(&rest, next) == 0;
+        let is_complete = takes_turns && !sends_hello && self.is_last_with_content(now);
         if is_complete {
             self.repeater.note_complete();
         }
@@ -238,7 +249,7 @@ impl<S: StateSource> VehicleLink<S> {
             true if !carried.is_empty() => {
                 let turn = self.repeater.kept() + 1;
                 let bytes = self.repeater.kept_bytes() + builder.len(true);
-                (turn * (self.repeater.copies(turn, bytes, &self.repeat_terms(now)) - 1)).min(frames - 1)
+                (turn * (self.copies(turn, bytes, now) - 1)).min(frames - 1)
             }
             true => 0,
             // No chunk fits into this frame: the rest waits for the next turn.
@@ -258,6 +269,18 @@ impl<S: StateSource> VehicleLink<S> {
         }
         self.answer_due = sends_hello.then(|| now + self.hello_limit.repeat_interval());
         (transmit, last && takes_turns)
+    }
+
+    /// Whether a frame after the one that is filled at `now` would have no content.
+    fn is_last_with_content(&self, now: Instant) -> bool {
+        let (rest, next) = self.after_a_frame(now);
+        self.content.backlog_bytes(&rest, next) == 0
+    }
+
+    /// The budget that a full frame at `now` leaves, and when it has left.
+    fn after_a_frame(&self, now: Instant) -> (BitBudget, Instant) {
+        let modem = &self.config.modem;
+        (self.budget.after(modem.bits_on_air(modem.frame_bytes), now), now + modem.frame_airtime())
     }
 
     /// The stamp of the next frame, which only the first and the last frame of a turn have.
@@ -298,7 +321,8 @@ impl<S: StateSource> VehicleLink<S> {
         let modem = &self.config.modem;
         let affordable = self.budget.earliest(modem.bits_on_air(modem.frame_bytes) * 2, now).since(now);
         let pause = self.content.next_due().map_or(self.idle_pause(), |due| self.idle_pause().min(due.since(now)));
-        let wait = match self.content.is_idle(&self.budget, now) {
+        let (rest, next) = self.after_a_frame(now);
+        let wait = match self.content.is_idle(&rest, next) {
             true => affordable.max(pause).min(self.config.status_period),
             false => affordable,
         };

@@ -58,7 +58,7 @@ fn object(name: &str, bytes: Vec<u8>, is_lost: impl Fn(usize) -> bool) -> Object
     sender.set_loss(1.0 / 3.0);
     sender.push(bytes.clone()).expect("an object");
     let (mut parts, mut in_flight) = (Vec::<PartVector>::new(), Vec::<(_, SymbolRun, bool)>::new());
-    while !sender.has_only_spare() {
+    while !sender.is_empty() {
         let Some((id, run, payload)) = sender.next_part(48) else {
             for (id, run, lost) in in_flight.drain(..) {
                 sender.handle_fate(id, &run, !lost);
