@@ -294,7 +294,7 @@ impl Dive {
 }
 
 /// The author and the words of an entry of the log, of which the words are to be recognised.
-fn said(text: &str, is_it: impl Fn(&str) -> bool) -> Option<(String, String)> {
+pub(super) fn said(text: &str, is_it: impl Fn(&str) -> bool) -> Option<(String, String)> {
     let (by, words) = text.split_once(": ").filter(|(_, words)| is_it(words)).unwrap_or(("", text));
     is_it(words).then(|| (by.to_owned(), words.to_owned()))
 }

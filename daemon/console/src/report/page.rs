@@ -3,6 +3,7 @@
 use super::areas::ClassArea;
 use super::chart;
 use super::dive::{Dive, DiveVehicle, SettingsRecord};
+use super::orders::said;
 use super::{Escaped, doubts, summary, words};
 use crate::state::VehicleState;
 use base64::Engine;
@@ -137,9 +138,7 @@ impl Dive {
     /// Who named and merged labels, and when.
     fn changes_of_labels(&self, page: &mut String) {
         let is_change = |event: &Event| {
-            let (_, words) =
-                event.text.split_once(": ").filter(|(by, _)| !by.starts_with("label ")).unwrap_or(("", &event.text));
-            event.source == LogKind::Record.name() && words.starts_with("label ")
+            event.source == LogKind::Record.name() && said(&event.text, |words| words.starts_with("label ")).is_some()
         };
         let rows = self.events.iter().filter(|(_, event)| is_change(event)).map(|(at_s, event)| {
             let (vehicle, text) = (Escaped(&event.vehicle), Escaped(&event.text));

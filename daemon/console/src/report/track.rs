@@ -99,8 +99,9 @@ impl DiveVehicle {
         }
         let (mut moved, mut span, mut total_s) = ((0.0, 0.0), (0.0, 0.0), 0.0);
         for (a, b) in self.steps() {
-            total_s += (b.at_s - a.at_s) * self.mission_speed;
-            span = (span.0 + a.distance_m(b), span.1 + (b.at_s - a.at_s) * self.mission_speed);
+            let step_s = (b.at_s - a.at_s) * self.mission_speed;
+            total_s += step_s;
+            span = (span.0 + a.distance_m(b), span.1 + step_s);
             if span.1 >= SPAN_S {
                 if span.0 / span.1 >= LEAST_M_S {
                     moved = (moved.0 + span.0, moved.1 + span.1);

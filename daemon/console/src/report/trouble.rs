@@ -64,8 +64,8 @@ pub(super) fn told(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -> 
 
 /// How long it was in each mode, by its own record.
 fn times_of_modes(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -> Option<String> {
-    let is_mode =
-        |event: &Event| event.source == "mode, on board" && valid_part(&event.vehicle) == valid_part(&state.name);
+    let of_modes = vehicle.mode_source();
+    let is_mode = |event: &Event| event.source == of_modes && valid_part(&event.vehicle) == valid_part(&state.name);
     let modes: Vec<(f64, &str)> = (dive.events.iter().filter(|(_, event)| is_mode(event)))
         .map(|(at_s, event)| (*at_s, event.text.split(": ").next().unwrap_or_default()))
         .collect();
