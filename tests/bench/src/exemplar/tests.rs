@@ -100,20 +100,30 @@ fn a_vehicle_without_an_image_reports_so_and_sends_it_later() {
 }
 
 #[test]
-fn spare_capacity_shows_every_label_once_and_yields_to_requests() {
+fn spare_capacity_shows_every_label_first_and_yields_to_requests() {
     let mut bench = bench(IDLE, 4);
     background(&mut bench, &["exemplars"]);
     let until = bench.now + std::time::Duration::from_secs(120);
     assert!(bench.run_until(until, |w| w.page(1).is_some_and(|p| !p.stored.is_empty())));
     let (seconds, _) = bench.get(LABELS, RequestKind::Another).unwrap().unwrap();
     assert!(seconds < 30.0, "{seconds} s");
-    wait(&mut bench, 300.0);
-    let shown = |label: u8| bench.page(label).unwrap().stored.iter().map(|p| p.requested).collect::<Vec<_>>();
-    assert!((1..LABELS).all(|label| shown(label) == [false]), "{:?}", (1..LABELS).map(shown).collect::<Vec<_>>());
-    assert_eq!(shown(LABELS), [true]);
+    // Size class, and whether it was requested, of each image of a label.
+    let shown = |w: &ExemplarBench, label: u8| {
+        w.page(label).map_or(Vec::new(), |p| p.stored.iter().map(|p| (p.size, p.requested)).collect::<Vec<_>>())
+    };
+    let is_further = |w: &ExemplarBench| (1..LABELS).any(|n| !matches!(shown(w, n)[..], [] | [(0, false)]));
+    assert!(bench.run_until(bench.now + std::time::Duration::from_secs(300), is_further));
+    assert!((1..LABELS).all(|label| !shown(&bench, label).is_empty()), "each label before a further image of any");
+    assert_eq!(shown(&bench, LABELS), [(0, true)]);
+    wait(&mut bench, 600.0);
+    for label in 1..=LABELS {
+        let mut all = shown(&bench, label);
+        all.sort();
+        assert_eq!(all, [(1, false), (1, false), (1, label == LABELS)], "label {label}");
+    }
     let then = exemplar_bytes(&bench);
     wait(&mut bench, 300.0);
-    assert_eq!(exemplar_bytes(&bench), then, "each once");
+    assert_eq!(exemplar_bytes(&bench), then, "three of each in their full size, no more");
 }
 
 #[test]
