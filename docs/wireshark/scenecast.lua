@@ -37,7 +37,7 @@ end
 
 field("uint8", base.DEC, names.yes_no, [[
     flag.ack = Ack statement (A); flag.turn = Turn byte (T); flag.hello = Hello (H); flag.stamp = Time stamp (S);
-    flag.keyed = Keyed (K); flag.up = From the vehicle (U); flag.remaining = Remaining (R); intro.takes_over = Takes over;
+    flag.keyed = Keyed (K); flag.up = From the vehicle (U); intro.takes_over = Takes over;
     intro.refuses = Refuses; intro.no_memory = No memory; intro.plain = Plain; intro.encrypts = Encrypts; intro.tags_all = Tags all;
     intro.full_duplex = Full duplex; part.last = Ends the text (L);
     part.wide = Wide place (W); pose.waypoint = A waypoint follows; pose.silent = The autopilot does not answer;
@@ -46,10 +46,10 @@ field("uint8", base.DEC, names.yes_no, [[
     report.has.placement = Placement; report.has.disk = State of a disk; disk.journal = The journal cannot be written;
     disk.checkpoint = The checkpoint cannot be written;]])
 field("uint32", base.DEC, nil, [[
-    version = Version; reserved = Reserved; vehicle = Vehicle; from = From; to = To; base = Base; number = Number, low bits;
+    version = Version; near = Base, if near; more = Remaining, if few; vehicle = Vehicle; from = From; to = To; base = Base; number = Number, low bits;
     number.full = Number; remaining = Remaining; turn = Turn; stamp.clock = Clock (ms); stamp.one_way = One way (ms);
-    stamp.heard = Last frame of the surface, low 8; stamp.held = Held since (ms); ack.horizon = Horizon, low 12;
-    ack.length = Bytes of loss code; ack.lost = Lost, low 12; chunk.length = Bytes of payload;
+    stamp.heard = Last frame of the surface, low 8; stamp.held = Held since (ms); ack.horizon = Horizon, low 12 or 4;
+    ack.length = Bytes of loss code; ack.lost = Lost, low 12 or 4; chunk.length = Bytes of payload;
     intro.edge = Edge of a cell (0.1 mm, 0: no map); intro.silence = Silence (8 s);
     intro.name_length = Bytes of the name; intro.clock = Clock (hours since 1970);
     intro.frame_bytes = Longest frame (bytes, 0: not known); intro.latitude = Latitude of the origin (180 / 2^24 degrees from -90);
@@ -544,15 +544,23 @@ local function losses(r)
 end
 
 local function ack(r, tree, frame)
-    local horizon = r:put(tree, "ack.horizon", 12)
-    local length = r:put(tree, "ack.length", 4)
-    if length == 15 then length = r:put(tree, "ack.length", 8) end
-    local first = math.floor(r.at / 8)
-    local item = r:bytes(tree, "ack.code", length)
+    local first, size, distances = math.floor(r.at / 8), 4096, {}
+    local is_far = r:take(1) == 1
+    local horizon = r:put(tree, "ack.horizon", is_far and 12 or 4)
+    if is_far then
+        local length = r:put(tree, "ack.length", 3)
+        if length == 7 then length = r:put(tree, "ack.length", 8) end
+        local code = math.floor(r.at / 8)
+        r:bytes(tree, "ack.code", length)
+        distances = losses(reader(r.tvb, code, code + length))
+    else
+        size = 16
+        for distance = 1, 3 do if r:take(1) == 1 then distances[#distances + 1] = distance end end
+    end
     local numbers = {}
-    for i, distance in ipairs(losses(reader(r.tvb, first, first + length))) do
-        numbers[i] = math.floor((horizon - distance) % 4096)
-        item:add(f["ack.lost"], r.tvb(first, length), numbers[i])
+    for i, distance in ipairs(distances) do
+        numbers[i] = math.floor((horizon - distance) % size)
+        tree:add(f["ack.lost"], r.tvb(first, math.floor(r.at / 8) - first), numbers[i])
     end
     local lost = #numbers > 0 and (" (lost %s%s)"):format(table.concat(numbers, " ", 1, math.min(8, #numbers)),
         #numbers > 8 and " ..." or "") or ""
@@ -575,20 +583,30 @@ local function hello_ends(r, tree, frame)
 end
 
 local function numbered_ends(r, tree, frame)
-    local v = r:all(tree, "flag.up 1, flag.remaining 1, reserved 2, vehicle 4")
-    frame.up, frame.more, frame.vehicle = v["flag.up"], v["flag.remaining"], v.vehicle
+    local v = r:all(tree, "flag.up 1, more 3, vehicle 4")
+    frame.up, frame.more, frame.vehicle = v["flag.up"], v.more, v.vehicle
     frame.from, frame.to = frame.up * frame.vehicle, (1 - frame.up) * frame.vehicle
-    local wide = r:take(1)
-    frame.base = r:put(tree, "base", wide == 1 and 15 or 7)
+    local least, wide = 1, 0
+    frame.base = frame.near
+    if frame.near == 0 then
+        wide = r:take(1)
+        frame.base = r:put(tree, "base", wide == 1 and 15 or 7)
+        least = wide == 1 and 128 or 4
+    end
     frame.bits = wide == 1 and 16 or 8
     frame.number = r:put(tree, "number", frame.bits)
     if frame.vehicle < 1 or frame.vehicle > 14 then fail("The vehicle is %d", frame.vehicle) end
-    if v.reserved > 0 then fail("The bits before the vehicle are not 0") end
-    if frame.base < 1 or frame.base > 2048 or wide == 1 and frame.base < 128 then fail("The base is %d", frame.base) end
+    if frame.base < least or frame.base > 2048 then fail("The base is %d", frame.base) end
 end
 
 local function header(r, tree, frame)
-    frame.version = r:put(tree, "version", 3)
+    local first = r.data:byte(1)
+    if math.floor(first / 4) % 2 == 1 or first < 128 then
+        frame.version = r:put(tree, "version", 3)
+    else
+        r:take(1)
+        frame.version, frame.near = 4, r:put(tree, "near", 2)
+    end
     for _, name in ipairs {"ack", "turn", "hello", "stamp", "keyed"} do frame[name] = r:put(tree, "flag." .. name, 1) end
     if frame.version ~= 4 and (frame.hello == 0 or frame.version < 2) then fail("The version is %d", frame.version) end
     local seal = frame.keyed == 1 and 8 or frame.hello == 1 and 3 or 4
@@ -596,7 +614,7 @@ local function header(r, tree, frame)
     r.stop = r.stop - seal * 8
     local ends = frame.hello == 1 and hello_ends or numbered_ends
     ends(r, tree, frame)
-    if frame.hello == 1 or frame.more == 1 then
+    if frame.hello == 1 or frame.more == 7 then
         local value, item = r:put(tree, "remaining", 8)
         item:append_text(frame.from == 0 and (" (%d bits on air)"):format(value * 32) or " (frames)")
     end

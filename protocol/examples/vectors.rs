@@ -69,6 +69,7 @@ pub enum StampVector {
 
 #[derive(Debug, PartialEq, Serialize, Deserialize)]
 pub struct AckVector {
+    pub horizon_bits: u32,
     pub horizon_low: u16,
     /// Distances of the lost frames below the horizon, ascending.
     pub lost: Vec<u16>,
@@ -214,7 +215,11 @@ pub fn content(listener: &mut Listener, bytes: &[u8]) -> Option<Content> {
             StampVector::Vehicle { clock_ms, last_received, held_ms: held.as_millis() as u64 }
         }
     });
-    let ack = header.ack.clone().map(|ack| AckVector { horizon_low: ack.horizon_low, lost: ack.lost });
+    let ack = header.ack.clone().map(|ack| AckVector {
+        horizon_bits: ack.horizon.bits(),
+        horizon_low: ack.horizon.low(),
+        lost: ack.lost,
+    });
     let chunk =
         |kind: ChunkKind, payload: &[u8]| ChunkVector { kind: format!("{kind:?}"), payload: Hex(payload.to_vec()) };
     Some(Content {

@@ -25,6 +25,7 @@ P
   python3 -m scwire.compare "$d" $keys > "$d/compare.txt" 2>&1 || bad=1
   grep -E "differ" "$d/compare.txt" | grep -v " 0 pixels differ\| 0 differ" && bad=1
   grep -q "0 pixels differ" "$d/compare.txt" || { echo "$name: not compared"; tail -3 "$d/compare.txt"; bad=1; }
+  grep "undecodable" "$d/compare.txt" && bad=1
   echo "$name: $(grep -c 'differ' "$d/compare.txt") comparisons"
 }
 "$SCENECAST" key new --out "$out/mission.key" >/dev/null

@@ -43,6 +43,11 @@ enum MediumState {
     Listening {
         until: Instant,
     },
+    /// Copies of frames that came in end the turn at `until`; then as idle.
+    Ending {
+        until: Instant,
+        next: Instant,
+    },
 }
 
 /// Grants turns to one vehicle and recovers from lost grants.
@@ -50,9 +55,9 @@ enum MediumState {
 pub struct Master {
     config: MasterConfig,
     state: MediumState,
-    /// Recent measurements of the two-way propagation time. The least one counts, because every
+    /// Recent measurements of the two-way propagation time, and when they were taken. The least one counts, because every
     /// error makes it look longer.
-    round_trips: VecDeque<Duration>,
+    round_trips: VecDeque<(Instant, Duration)>,
     unanswered: u32,
     granted_airtime: Duration,
     /// When the last turn was granted.
@@ -63,6 +68,8 @@ pub struct Master {
 
 impl Master {
     const ROUND_TRIPS: usize = 4;
+    /// Time in which a vehicle may go so far that an earlier measurement does not count.
+    const ROUND_TRIP_AGE: Duration = Duration::from_secs(180);
     /// Unanswered grants above which an answer is waited for longer: the vehicle may be farther away than assumed.
     const MAX_UNANSWERED_NEARBY: u32 = 4;
 
@@ -82,7 +89,7 @@ impl Master {
 
     /// Two-way propagation time; `None` before the first measurement.
     pub fn round_trip(&self) -> Option<Duration> {
-        self.round_trips.iter().min().copied()
+        self.round_trips.iter().map(|(_, measured)| *measured).min()
     }
 
     /// The number of consecutive grants without an answer.
@@ -95,15 +102,29 @@ impl Master {
         self.begun
     }
 
-    /// Whether a turn of this vehicle, or a grant to it, occupies the medium.
-    pub fn is_engaged(&self) -> bool {
-        !matches!(self.state, MediumState::Idle { .. })
+    /// Whether a turn of this vehicle, or a grant to it, occupies the medium at `now`.
+    pub fn is_engaged(&self, now: Instant) -> bool {
+        match self.state {
+            MediumState::Idle { .. } => false,
+            MediumState::Ending { until, .. } => now < until,
+            _ => true,
+        }
+    }
+
+    /// When a turn that occupies the medium ends; `None` while the surface speaks.
+    pub fn end_of_turn(&self) -> Option<Instant> {
+        match self.state {
+            MediumState::Ending { until, .. } => Some(until),
+            _ => self.next_wakeup(false),
+        }
     }
 
     /// Whether the surface may begin its turn at `now`; `news` (a waiting slot) ends an idle pause.
     pub fn may_speak(&self, news: bool, now: Instant) -> bool {
         match self.state {
-            MediumState::Idle { ready, next } => now >= next || (news && now >= ready),
+            MediumState::Idle { ready, next } | MediumState::Ending { until: ready, next } => {
+                now >= next || (news && now >= ready)
+            }
             MediumState::Speaking => false,
             MediumState::Granted { until, .. } | MediumState::Listening { until } => now >= until,
         }
@@ -112,7 +133,9 @@ impl Master {
     /// When [`Self::may_speak`] next becomes true by itself; `news` has the same meaning.
     pub fn next_wakeup(&self, news: bool) -> Option<Instant> {
         match self.state {
-            MediumState::Idle { ready, next } => Some(if news { ready.min(next) } else { next }),
+            MediumState::Idle { ready, next } | MediumState::Ending { until: ready, next } => {
+                Some(if news { ready.min(next) } else { next })
+            }
             MediumState::Speaking => None,
             MediumState::Granted { until, .. } | MediumState::Listening { until } => Some(until),
         }
@@ -175,9 +198,10 @@ impl Master {
     }
 
     /// Takes a measurement of the two-way propagation time.
-    pub fn handle_round_trip(&mut self, measured: Duration) {
+    pub fn handle_round_trip(&mut self, measured: Duration, now: Instant) {
         if measured <= self.config.max_propagation * 8 {
-            self.round_trips.push_back(measured);
+            self.round_trips.retain(|(at, _)| now.since(*at) < Self::ROUND_TRIP_AGE);
+            self.round_trips.push_back((now, measured));
             if self.round_trips.len() > Self::ROUND_TRIPS {
                 self.round_trips.pop_front();
             }
@@ -201,19 +225,20 @@ impl Master {
         {
             // Before the first stamp, the time of the whole answer is an upper bound.
             let both_ways = now.since(granted).saturating_sub(profile.airtime(bytes) + profile.turn_around);
-            self.handle_round_trip(both_ways);
+            self.handle_round_trip(both_ways, now);
         }
         self.unanswered = 0;
         let rest = profile.frame_airtime() * u32::from(remaining);
         let taken = self.granted.map_or(Duration::ZERO, |at| now.since(at)) + rest;
         self.is_saturated = taken >= self.granted_airtime.mul_f64(0.6);
-        if remaining > 0 {
-            self.state = MediumState::Listening { until: now + self.rest_of_turn(remaining, profile) };
-            return;
-        }
-        let pause = wish.map_or(Duration::ZERO, |quarters| Duration::from_millis(250) * u32::from(quarters));
+        let until = now + self.rest_of_turn(remaining, profile);
+        let pause = wish.map(|quarters| (Duration::from_millis(250) * u32::from(quarters)).min(self.config.max_idle));
         let ready = now + profile.turn_around;
-        self.state = MediumState::Idle { ready, next: ready + pause.min(self.config.max_idle) };
+        self.state = match (remaining, pause) {
+            (0, pause) => MediumState::Idle { ready, next: ready + pause.unwrap_or_default() },
+            (_, Some(pause)) => MediumState::Ending { until, next: until + pause },
+            (_, None) => MediumState::Listening { until },
+        };
     }
 
     /// A frame of the vehicle came in that announces `remaining` further frames and belongs to another pair of runs: the
@@ -261,10 +286,40 @@ mod tests {
     };
 
     #[test]
+    fn copies_end_a_turn_before_the_pause_that_it_asks_for() {
+        let now = Instant::from_secs_f64(100.0);
+        let mut master = Master::new(MasterConfig::default(), now);
+        master.handle_round_trip(Duration::from_secs(1), now);
+        master.begin(40, now);
+        master.handle_turn_sent(&PROFILE, 0, now);
+        master.handle_answer(256, 2, Some(16), &PROFILE, now);
+        let end = master.end_of_turn().unwrap();
+        assert!(end > now + PROFILE.frame_airtime() * 2 && !master.may_speak(true, now + PROFILE.frame_airtime()));
+        assert!(master.is_engaged(now) && !master.is_engaged(end));
+        assert!(master.may_speak(true, end) && !master.may_speak(false, end));
+        assert_eq!(master.next_wakeup(false), Some(end + Duration::from_secs(4)));
+        assert!(master.may_speak(false, end + Duration::from_secs(4)));
+    }
+
+    #[test]
+    fn the_least_recent_round_trip_counts() {
+        let now = Instant::from_secs_f64(100.0);
+        let mut master = Master::new(MasterConfig::default(), now);
+        let mut measure = |ms: u64, at_s: u64| {
+            master.handle_round_trip(Duration::from_millis(ms), now + Duration::from_secs(at_s));
+            master.round_trip().unwrap().as_millis()
+        };
+        assert_eq!(
+            [(500, 0), (700, 100), (900, 200), (800, 210)].map(|(ms, at_s)| measure(ms, at_s)),
+            [500, 500, 700, 700]
+        );
+    }
+
+    #[test]
     fn the_surface_waits_for_a_turn_in_another_run_as_granted() {
         let now = Instant::from_secs_f64(100.0);
         let mut master = Master::new(MasterConfig::default(), now);
-        master.handle_round_trip(Duration::from_secs(1));
+        master.handle_round_trip(Duration::from_secs(1), now);
         master.begin(40, now);
         master.handle_turn_sent(&PROFILE, 0, now);
         let heard = now + Duration::from_secs(1);

@@ -12,12 +12,16 @@ pub const MAX_WINDOW: u64 = 2048;
 /// on it.
 ///
 /// ```text
+///  0 1 2 3 4 5 6 7
+/// +-+-------+-----+
+/// |0|horizon|lost |    near: low 4 bits of the horizon; whether the first, second and third frame below it are lost
+/// +-+-------+-----+
 ///  0                   1
 ///  0 1 2 3 4 5 6 7 8 9 0 1 2 3 4 5
-/// +-----------------------+-------+-----------------+--------------------+
-/// | horizon, low 12 bits  |  len  | [len2, 8 bits]  | loss code          |
-/// +-----------------------+-------+-----------------+--------------------+
-/// len      0..14: bytes of loss code; 15: len2 has the number (15..255)
+/// +-+-----------------------+-----+-----------------+--------------------+
+/// |1| horizon, low 12 bits  | len | [len2, 8 bits]  | loss code          |
+/// +-+-----------------------+-----+-----------------+--------------------+
+/// len      0..6: bytes of loss code; 7: len2 has the number (7..255)
 /// loss code, most significant bit first:
 ///   1 bit       0: bitmap; 1: Rice code
 ///   bitmap      bit i (from 0): 1 = frame horizon-i is lost; frames past the end are held
@@ -26,39 +30,104 @@ pub const MAX_WINDOW: u64 = 2048;
 /// ```
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct AckStatement {
-    /// Low 12 bits of the highest frame number judged.
-    pub horizon_low: u16,
-    /// Distances of the lost frames below the horizon, ascending.
+    /// The highest frame number judged.
+    pub horizon: Horizon,
+    /// Distances of the lost frames below the horizon, ascending; of a near one only 1 to 3.
     pub lost: Vec<u16>,
 }
 
+/// The low bits of the highest frame number that a statement judges.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Horizon {
+    /// Low 4 bits: it is at most 15 after the highest number whose verdict the sender of the frames knows.
+    Near(u8),
+    /// Low 12 bits.
+    Far(u16),
+}
+
+impl Horizon {
+    /// The most that a near one is ahead.
+    pub(crate) const MAX_NEAR: u64 = 15;
+
+    /// The bits as they are sent.
+    pub fn low(self) -> u16 {
+        match self {
+            Self::Near(low) => low.into(),
+            Self::Far(low) => low,
+        }
+    }
+
+    /// The number of bits.
+    pub fn bits(self) -> u32 {
+        match self {
+            Self::Near(_) => 4,
+            Self::Far(_) => 12,
+        }
+    }
+
+    /// How far it is after `known`, the highest number whose verdict is known, modulo its bits.
+    pub(crate) fn ahead_of(self, known: u64) -> u64 {
+        u64::from(self.low().wrapping_sub(known as u16)) & ((1 << self.bits()) - 1)
+    }
+}
+
 impl AckStatement {
+    /// A statement on the frames up to `horizon`; `is_near` allows the form of one byte, if that can name the lost ones.
+    pub fn new(horizon: u64, lost: Vec<u16>, is_near: bool) -> Self {
+        let is_short = is_near && lost.iter().all(|distance| NEAR_LOST.contains(distance));
+        let horizon = if is_short { Horizon::Near(horizon as u8 & 0xF) } else { Horizon::Far(horizon as u16 & 0xFFF) };
+        Self { horizon, lost }
+    }
+
     /// Appends the statement if it takes at most `room` bytes; returns whether it did.
     pub fn encode(&self, room: usize, out: &mut Vec<u8>) -> bool {
-        let code = encode_losses(&self.lost);
-        let long = code.len() >= 15;
-        if code.len() > 255 || 2 + usize::from(long) + code.len() > room {
-            return false;
+        let before = out.len();
+        match self.horizon {
+            Horizon::Near(low) => {
+                let bits = self.lost.iter().filter(|&&lost| lost > 0).fold(0, |bits, &lost| bits | 8u8 >> lost.min(4));
+                out.push(low << 3 | bits);
+            }
+            Horizon::Far(low) => {
+                let code = encode_losses(&self.lost);
+                let is_long = code.len() >= LONG_CODE;
+                if code.len() > 255 {
+                    return false;
+                }
+                let len = if is_long { LONG_CODE as u16 } else { code.len() as u16 };
+                out.extend_from_slice(&(FAR | low << 3 | len).to_be_bytes());
+                out.extend(is_long.then_some(code.len() as u8));
+                out.extend_from_slice(&code);
+            }
         }
-        let len = if long { 15 } else { code.len() as u16 };
-        out.extend_from_slice(&((self.horizon_low << 4) | len).to_be_bytes());
-        if long {
-            out.push(code.len() as u8);
+        let fits = out.len() - before <= room;
+        if !fits {
+            out.truncate(before);
         }
-        out.extend_from_slice(&code);
-        true
+        fits
     }
 
     /// Decodes a statement; the rest stays in `reader`.
     pub fn decode(reader: &mut Reader<'_>) -> Result<Self, Truncated> {
-        let word = reader.u16()?;
-        let len = match word & 15 {
-            15 => usize::from(reader.u8()?),
-            n => usize::from(n),
+        let first = reader.u8()?;
+        if u16::from(first) << 8 & FAR == 0 {
+            let lost = NEAR_LOST.filter(|distance| first & 8 >> distance != 0).collect();
+            return Ok(Self { horizon: Horizon::Near(first >> 3), lost });
+        }
+        let word = u16::from(first) << 8 | u16::from(reader.u8()?);
+        let len = match usize::from(word & 7) {
+            LONG_CODE => usize::from(reader.u8()?),
+            n => n,
         };
-        Ok(Self { horizon_low: word >> 4, lost: decode_losses(reader.take(len)?) })
+        Ok(Self { horizon: Horizon::Far(word >> 3 & 0xFFF), lost: decode_losses(reader.take(len)?) })
     }
 }
+
+/// The first bit of a statement that is not near.
+const FAR: u16 = 0x8000;
+/// The distances of lost frames that a near statement can name.
+const NEAR_LOST: std::ops::RangeInclusive<u16> = 1..=3;
+/// From here on the length of the loss code has a byte of its own.
+const LONG_CODE: usize = 7;
 
 /// Bits of the remainder in a Rice code.
 const RICE_BITS: u32 = 3;
@@ -135,31 +204,39 @@ mod tests {
         back
     }
 
+    fn golden(horizon: u64, lost: Vec<u16>, is_near: bool, bytes: &[u8]) {
+        let (statement, mut written) = (AckStatement::new(horizon, lost, is_near), Vec::new());
+        assert!(!statement.encode(bytes.len() - 1, &mut written) && written.is_empty());
+        assert!(statement.encode(bytes.len(), &mut written));
+        assert_eq!((&written[..], round_trip(&statement)), (bytes, statement));
+    }
+
     #[test]
-    fn a_clean_turn_is_acknowledged_in_two_bytes() {
-        let mut bytes = Vec::new();
-        assert!(AckStatement { horizon_low: 0xABC, lost: vec![] }.encode(2, &mut bytes));
-        assert_eq!(bytes, [0xAB, 0xC0]);
+    fn a_clean_turn_is_acknowledged_in_one_byte() {
+        golden(0xABC, vec![], true, &[0x60]);
+        golden(0xABC, vec![], false, &[0xD5, 0xE0]);
     }
 
     #[test]
     fn golden_bytes_of_two_losses() {
-        let mut bytes = Vec::new();
-        assert!(AckStatement { horizon_low: 7, lost: vec![1, 4] }.encode(20, &mut bytes));
-        assert_eq!(bytes, [0x00, 0x71, 0b0010_0100]);
+        golden(7, vec![1, 3], true, &[0x3D]);
+        golden(7, vec![1, 4], true, &[0x80, 0x39, 0b0010_0100]);
+        golden(7, vec![0], true, &[0x80, 0x39, 0b0100_0000]);
     }
 
     #[test]
     fn fifty_losses_in_500_frames_take_under_40_bytes() {
         let lost: Vec<u16> = (0..50).map(|i| i * 10 + (i * 7 % 5)).collect();
         let mut bytes = Vec::new();
-        assert!(AckStatement { horizon_low: 0, lost }.encode(40, &mut bytes));
+        assert!(AckStatement::new(0, lost, true).encode(40, &mut bytes));
     }
 
     proptest! {
         #[test]
-        fn statements_round_trip(horizon_low in 0u16..4096, lost in proptest::collection::btree_set(0u16..600, 0..120)) {
-            let statement = AckStatement { horizon_low, lost: lost.into_iter().collect() };
+        fn statements_round_trip(
+            horizon: u64, is_near: bool, lost in proptest::collection::btree_set(0u16..600, 0..120),
+        ) {
+            let statement = AckStatement::new(horizon, lost.into_iter().collect(), is_near);
             prop_assert_eq!(round_trip(&statement), statement);
         }
 

@@ -161,7 +161,7 @@ impl<'a> Envelope<'a> {
         let header = Header::decode(&mut reader, to_us)?;
         let body = reader.rest();
         let head = covered.get(..covered.len() - body.len()).ok_or(FrameError::Truncated)?;
-        let version = head.first().map_or(0, |flags| flags >> 5);
+        let version = head.first().map_or(0, |flags| Header::version_of(*flags));
         Ok(Self { header, version, head, body, end })
     }
 
@@ -234,9 +234,12 @@ pub struct FrameBuilder {
     kind: FrameKind,
     seal_bytes: usize,
     remaining: u8,
-    remaining_at: usize,
-    /// Whether there is room for the byte `remaining`.
-    has_turn: bool,
+    turn: Option<u8>,
+    /// Where `remaining` and turn byte go.
+    turn_at: usize,
+    /// The highest `remaining` that there is room for. The frame has its byte wherever it was kept free: the last chunk may reach
+    /// to the end of the frame.
+    most_remaining: u8,
     body_at: usize,
     /// Where the last chunk begins.
     last_chunk: Option<usize>,
@@ -246,12 +249,12 @@ impl FrameBuilder {
     /// Starts a frame of at most `size` bytes; the acknowledgement statement is written only if it fits.
     pub fn new(header: &Header, size: usize) -> Self {
         let mut bytes = Vec::with_capacity(size);
-        let remaining_at = header.encode(&mut bytes);
-        let (kind, remaining) = (header.kind(), header.remaining);
+        let turn_at = header.encode(&mut bytes);
+        let (kind, remaining, turn) = (header.kind(), header.remaining, header.turn);
         let seal_bytes = Seal::bytes(header.keyed, kind);
-        let (has_turn, body_at, last_chunk) = (remaining > 0, 0, None);
+        let (most_remaining, body_at, last_chunk) = (remaining, 0, None);
         let mut builder =
-            Self { bytes, size, kind, seal_bytes, remaining, remaining_at, has_turn, body_at, last_chunk };
+            Self { bytes, size, kind, seal_bytes, remaining, turn, turn_at, most_remaining, body_at, last_chunk };
         let room = builder.room();
         if let Some(ack) = &header.ack
             && ack.encode(room, &mut builder.bytes)
@@ -263,23 +266,37 @@ impl FrameBuilder {
         builder
     }
 
-    /// Keeps room for the header's `remaining` byte, so that [`Self::set_remaining`] may follow the chunks.
+    /// Keeps room for a `remaining` of up to `most`, so that [`Self::set_remaining`] may follow the chunks.
     #[must_use]
-    pub fn in_turn(mut self) -> Self {
-        self.has_turn = true;
+    pub fn in_turn(mut self, most: u8) -> Self {
+        self.most_remaining = self.most_remaining.max(most);
         self
     }
 
-    /// Sets the header's `remaining` byte.
+    /// Sets the header's `remaining`.
     pub fn set_remaining(&mut self, remaining: u8) {
-        self.has_turn |= remaining > 0;
+        self.most_remaining = self.most_remaining.max(remaining);
         self.remaining = remaining;
+    }
+
+    /// Sets the turn byte, if there is room for it.
+    pub fn set_turn(&mut self, turn: u8) {
+        if self.turn.is_some() || self.room() > 0 {
+            self.turn = Some(turn);
+        }
     }
 
     /// Bytes that chunks can still take, their headers included.
     pub fn room(&self) -> usize {
-        let remaining = usize::from(self.has_turn || self.kind.is_hello());
-        self.size.saturating_sub(self.bytes.len() + remaining + self.seal_bytes)
+        self.size.saturating_sub(self.bytes.len() + self.turn_bytes() + self.seal_bytes)
+    }
+
+    fn has_remaining_byte(&self) -> bool {
+        self.kind.is_hello() || self.most_remaining > Header::FEW
+    }
+
+    fn turn_bytes(&self) -> usize {
+        usize::from(self.turn.is_some()) + usize::from(self.has_remaining_byte())
     }
 
     /// Adds a chunk; returns whether it fitted.
@@ -293,17 +310,12 @@ impl FrameBuilder {
     /// The length of the finished frame in bytes.
     pub fn len(&self, short: bool) -> usize {
         let open = usize::from(self.open_chunk().is_some());
-        if short { self.bytes.len() + usize::from(self.has_remaining()) + self.seal_bytes - open } else { self.size }
+        if short { self.bytes.len() + self.turn_bytes() + self.seal_bytes - open } else { self.size }
     }
 
     /// Where the last chunk begins, if it needs no second byte of length in a short frame.
     fn open_chunk(&self) -> Option<usize> {
         self.last_chunk.filter(|&at| self.bytes.get(at).is_some_and(|head| has_second_byte(*head)))
-    }
-
-    /// Whether the frame has the byte `remaining`: a hello always has it.
-    fn has_remaining(&self) -> bool {
-        self.remaining > 0 || self.kind.is_hello()
     }
 
     /// Seals the frame. A `short` frame ends where its content ends; any other is padded to its size.
@@ -312,13 +324,9 @@ impl FrameBuilder {
         if let Some(at) = self.open_chunk().filter(|_| short) {
             to_the_end(at, &mut self.bytes);
         }
-        if self.has_remaining() {
-            self.bytes.insert(self.remaining_at, self.remaining);
-            self.body_at += 1;
-        }
-        if let Some(route) = self.bytes.get_mut(1).filter(|_| self.remaining > 0 && !self.kind.is_hello()) {
-            *route |= Header::REMAINING_FLAG;
-        }
+        self.body_at += self.turn_bytes();
+        let has_byte = self.has_remaining_byte();
+        Header::end_turn(&mut self.bytes, self.turn_at, self.remaining, has_byte, self.turn);
         self.bytes.resize(content, 0);
         seal.close(&mut self.bytes, self.body_at);
         self.bytes
@@ -336,7 +344,7 @@ mod tests {
     const MISSION: MissionId = MissionId(0x5CE7_0001);
 
     fn header() -> Header {
-        let ack = Some(AckStatement { horizon_low: 5, lost: vec![] });
+        let ack = Some(AckStatement::new(5, vec![], true));
         Header { remaining: 2, ack, ..Header::numbered(Address::vehicle(1).unwrap(), Address::SURFACE, 0xFF, 3) }
     }
 
@@ -363,8 +371,8 @@ mod tests {
         let mut b = FrameBuilder::new(&header(), 64);
         assert!(b.push(ChunkKind::Map, &[0xAA, 0xBB]));
         let bytes = b.finish(&run(0x4321, 0x1FF), true);
-        assert_eq!(bytes[..10], [0x90, 0xC1, 3, 0xFF, 2, 0x00, 0x50, 0x22, 0xAA, 0xBB]);
-        assert_eq!(bytes[10..], [0x3E, 0xEC, 0x68, 0x79]);
+        assert_eq!(bytes[..7], [0xF0, 0xA1, 0xFF, 0x28, 0x22, 0xAA, 0xBB]);
+        assert_eq!(bytes[7..], [0x53, 0x46, 0x0F, 0xD7]);
         let read = envelope(&bytes).unwrap();
         assert_eq!(read.header.number_near(0x190), 0x1FF);
         let frame = read.open(&run(0x4321, 0x1FF)).unwrap();
@@ -376,21 +384,31 @@ mod tests {
         let far = Header { number: 0x1234, base: 0x7FF, remaining: 0, ack: None, ..header() };
         let bytes = FrameBuilder::new(&far, 64).finish(&run(7, 0x51234), true);
         assert_eq!(bytes[..6], [0x80, 0x81, 0x87, 0xFF, 0x12, 0x34]);
+        assert!(envelope(&[0x80, 0x81, 0x80, 0x7F, 0, 0, 1, 2, 3, 4]).is_err(), "127 in two bytes");
+        assert!(envelope(&[0x80, 0x81, 3, 0, 1, 2, 3, 4]).is_err(), "3 in a byte");
         let read = envelope(&bytes).unwrap();
         assert_eq!(read.header.number_near(0x50FFF), 0x51234);
         assert_eq!(read.open(&run(7, 0x51234)).unwrap().header, far);
     }
 
     #[test]
-    fn a_remaining_count_of_zero_takes_no_byte() {
-        let frame = |remaining: u8| {
-            let mut builder = FrameBuilder::new(&Header { remaining: 0, ..header() }, 64).in_turn();
+    fn few_remaining_frames_take_no_byte_and_a_turn_byte_fits_late() {
+        let frame = |most: u8, remaining: u8, turn: Option<u8>| {
+            let mut builder = FrameBuilder::new(&Header { remaining: 0, ..header() }, 64).in_turn(most);
             assert!(builder.push(ChunkKind::Map, &[1, 2]));
             builder.set_remaining(remaining);
+            turn.into_iter().for_each(|turn| builder.set_turn(turn));
             let bytes = builder.finish(&run(7, 255), true);
-            (envelope(&bytes).unwrap().open(&run(7, 255)).unwrap().header.remaining, bytes.len())
+            let header = envelope(&bytes).unwrap().open(&run(7, 255)).unwrap().header;
+            assert_eq!((header.remaining, header.turn), (remaining, turn));
+            bytes.len()
         };
-        assert_eq!((frame(0), frame(9)), ((0, 13), (9, 14)));
+        assert_eq!([frame(6, 0, None), frame(6, 6, None), frame(7, 0, None), frame(9, 9, Some(3))], [11, 11, 12, 13]);
+        let mut full = FrameBuilder::new(&Header { remaining: 0, ..header() }, 64);
+        assert!(full.push(ChunkKind::Map, &vec![1; room_for_payload(full.room())]));
+        full.set_turn(3);
+        let bytes = full.finish(&run(7, 255), false);
+        assert_eq!((bytes.len(), envelope(&bytes).unwrap().header.turn), (64, None));
     }
 
     #[test]
@@ -468,12 +486,17 @@ mod tests {
         }
 
         #[test]
-        fn a_flipped_bit_is_noticed(size in 32usize..300, fill in 0usize..300, bit: usize, short: bool, keyed: bool) {
+        fn a_flipped_bit_is_noticed(
+            size in 32usize..300, fill in 0usize..300, bit: usize, short: bool, keyed: bool, (most, remaining) in (0u8..9, 0u8..9),
+        ) {
             let session = key().session(1, 1, 2, 3, fill % 2 == 0);
             let seal = if keyed { Seal::Session(&session, Direction::Up, 255) } else { run(7, 255) };
-            let mut b = FrameBuilder::new(&Header { keyed, ..header() }, size);
+            let header = Header { keyed, remaining: 0, ..header() };
+            let mut b = FrameBuilder::new(&header, size).in_turn(most);
+            // Often it fills the frame to the last byte.
             let payload = vec![5; fill.min(room_for_payload(b.room()))];
             prop_assert!(b.push(ChunkKind::Map, &payload));
+            b.set_remaining(remaining.min(most));
             let announced = b.len(short);
             let mut bytes = b.finish(&seal, short);
             prop_assert_eq!(bytes.len(), announced);

@@ -80,9 +80,9 @@ impl FrameKind {
 /// ```text
 ///  0                   1                   2                   3
 ///  0 1 2 3 4 5 6 7 8 9 0 1 2 3 4 5 6 7 8 9 0 1 2 3 4 5 6 7 8 9 0 1
-/// +-----+-+-+-+-+-+-+-+---+-------+---------------+---------------+
-/// |ver=4|A|T|0|S|K|U|R| 0 |vehicle| base (1-2)    | number (1-2)  |
-/// +-----+-+-+-+-+-+-+-+---+-------+---------------+---------------+
+/// +-+---+-+-+-+-+-+-+-----+-------+---------------+---------------+
+/// |1|nr |A|T|0|S|K|U|more |vehicle| [base (1-2)]  | number (1-2)  |
+/// +-+---+-+-+-+-+-+-+-----+-------+---------------+---------------+
 /// | [remaining]   | [turn]        | [stamp, 5 or 6 bytes]         |
 /// +---------------+---------------+-------------------------------+
 /// | [ack statement ...]           | chunks ...    | CRC or tag    |
@@ -99,16 +99,18 @@ impl FrameKind {
 /// +---------------+---------------+---------------+---------------+
 /// | [turn]        | [stamp, 5 or 6 bytes] | [nonce, 8 bytes]      |
 /// +---------------+-----------------------+-----------------------+
+/// 1          the first bit of a numbered frame of this version; that of earlier versions is 0
+/// nr         near: 1..=3 is `base`, and its bytes are absent; 0: they are present
 /// A          an ack statement is present
 /// T          a turn byte is present
 /// S          a time stamp is present
 /// K          keyed: the frame ends in a tag of 8 bytes under the mission's key instead of a CRC; a hello then has a nonce
 /// U          up: from the vehicle to the surface; otherwise from the surface to the vehicle
-/// R          the byte `remaining` is present; without it nothing follows in this turn
+/// more       0..=6 is `remaining`, and its byte is absent; 7: the byte is present
 /// vehicle    1 to 14
-/// base       number minus the last frame whose fate the sender knows, 1..=2048; 0..127 in one byte, else two with the
+/// base       number minus the last frame whose fate the sender knows, 1..=2048; 4..=127 in one byte, else two with the
 ///            first one's top bit set (7 high bits, then 8 low bits)
-/// number     of this frame in the pair of runs, the first is 1: its low 8 bits if `base` has one byte, else its low 16
+/// number     of this frame in the pair of runs, the first is 1: its low 8 bits below a base of 128, else its low 16
 /// remaining  from the surface: bits on air that follow in this turn, divided by 32, rounded up, 255 = that or more;
 ///            from a vehicle: frames that follow in this turn, 255 = 255 or more
 /// turn       from the surface: airtime granted, in quarter seconds (0 = none), in a call: time to answer in;
@@ -146,10 +148,16 @@ pub struct Header {
 /// Header and seal of a hello have the same layout in every version from this one on.
 const FIRST_COMMON_HELLO: u8 = 2;
 
+/// The first bit of a numbered frame, and the place of the two bits after it.
+const NUMBERED: u8 = 0b1000_0000;
+const NEAR_SHIFT: u32 = 5;
+/// Up to here the two bits of the first byte have `base`.
+const MAX_NEAR: u16 = 3;
 /// The second byte of a numbered frame.
 const UP: u8 = 0b1000_0000;
-const REMAINING: u8 = 0b100_0000;
-const RESERVED: u8 = 0b11_0000;
+const MORE_SHIFT: u32 = 4;
+/// The three bits of the second byte for a `remaining` that has a byte of its own: this or more.
+const FULL: u8 = 7;
 /// From here on `base` has two bytes, and so has the number.
 const LONG_BASE: u8 = 128;
 
@@ -186,12 +194,12 @@ impl Header {
     /// Reads the header of a frame if `to_us` selects its receiver; the frame is not verified yet.
     pub(super) fn decode(r: &mut Reader<'_>, to_us: impl Fn(Address) -> bool) -> Result<Self, FrameError> {
         let flags = r.u8()?;
-        let (version, is_hello) = (flags >> 5, flags & HELLO != 0);
+        let (version, is_hello) = (Self::version_of(flags), flags & HELLO != 0);
         if version != WIRE_VERSION && !(is_hello && version >= FIRST_COMMON_HELLO) {
             return Err(FrameError::Version(version));
         }
         let has = |bit: u8| flags & bit != 0;
-        let header = if is_hello { Self::decode_hello(r)? } else { Self::decode_numbered(r)? };
+        let header = if is_hello { Self::decode_hello(r)? } else { Self::decode_numbered(flags, r)? };
         if !to_us(header.to) || header.from == header.to || header.from == Address::EVERYBODY {
             return Err(FrameError::NotForUs);
         }
@@ -210,20 +218,28 @@ impl Header {
         Ok(Self { remaining, ..Self::hello(Address(addresses >> 4), Address(addresses & 15), session) })
     }
 
-    fn decode_numbered(r: &mut Reader<'_>) -> Result<Self, FrameError> {
+    fn decode_numbered(flags: u8, r: &mut Reader<'_>) -> Result<Self, FrameError> {
         let route = r.u8()?;
-        let vehicle = Address::vehicle(route & 15).filter(|_| route & RESERVED == 0).ok_or(FrameError::BadField)?;
+        let vehicle = Address::vehicle(route & 15).ok_or(FrameError::BadField)?;
         let (from, to) = if route & UP != 0 { (vehicle, Address::SURFACE) } else { (Address::SURFACE, vehicle) };
-        // A small base has one form alone, by which the bits of the number are known.
-        let (least, base, number) = match r.u8()? {
-            b if b < LONG_BASE => (1, u16::from(b), u64::from(r.u8()?)),
-            b => (u16::from(LONG_BASE), u16::from(b - LONG_BASE) << 8 | u16::from(r.u8()?), u64::from(r.u16()?)),
+        // Each base has one form alone, by which the bits of the number are known.
+        let near = u16::from(flags >> NEAR_SHIFT) & MAX_NEAR;
+        let (least, base) = match near {
+            0 => match r.u8()? {
+                b if b < LONG_BASE => (MAX_NEAR + 1, u16::from(b)),
+                b => (u16::from(LONG_BASE), u16::from(b - LONG_BASE) << 8 | u16::from(r.u8()?)),
+            },
+            near => (1, near),
         };
         if base < least || u64::from(base) > MAX_WINDOW {
             return Err(FrameError::BadField);
         }
-        let remaining = if route & REMAINING != 0 { r.u8()? } else { 0 };
-        Ok(Self { remaining, ..Self::numbered(from, to, number, base) })
+        let number = if is_long(base) { r.u16()? } else { u16::from(r.u8()?) };
+        let remaining = match route >> MORE_SHIFT & FULL {
+            FULL => r.u8()?,
+            few => few,
+        };
+        Ok(Self { remaining, ..Self::numbered(from, to, u64::from(number), base) })
     }
 
     /// The whole number of a numbered frame: the one nearest to `highest`, the highest number of the run so far.
@@ -237,22 +253,29 @@ impl Header {
         (0..if is_long(self.base) { 0 } else { 256 }).map(move |high: u16| unwrap_number(high << 8 | low, 16, highest))
     }
 
+    /// The wire version of a frame with this first byte.
+    pub(super) fn version_of(flags: u8) -> u8 {
+        let is_ours = flags & HELLO == 0 && flags & NUMBERED != 0;
+        if is_ours { WIRE_VERSION } else { flags >> 5 }
+    }
+
     /// Whether a frame with this first byte is keyed, and its kind.
     pub(super) fn kind_of(flags: u8) -> (bool, FrameKind) {
         (flags & KEYED != 0, FrameKind::hello_if(flags & HELLO != 0))
     }
 
-    /// The first byte without the bit of the acknowledgement statement.
-    pub(super) fn flags(&self) -> u8 {
+    /// The first byte without the bits of turn byte and acknowledgement statement.
+    fn flags(&self) -> u8 {
         let bit = |on: bool, bit: u8| if on { bit } else { 0 };
-        WIRE_VERSION << 5
-            | bit(self.turn.is_some(), TURN)
-            | bit(self.session.is_some(), HELLO)
-            | bit(self.stamp.is_some(), STAMP)
-            | bit(self.keyed, KEYED)
+        let first = match self.session {
+            Some(_) => WIRE_VERSION << 5 | HELLO,
+            None if self.base <= MAX_NEAR => NUMBERED | (self.base as u8) << NEAR_SHIFT,
+            None => NUMBERED,
+        };
+        first | bit(self.stamp.is_some(), STAMP) | bit(self.keyed, KEYED)
     }
 
-    /// Appends everything up to the acknowledgement statement, but for the byte `remaining`; returns the index of its place.
+    /// Appends everything up to the acknowledgement statement, but for what [`Self::end_turn`] adds; returns the index of its place.
     pub(super) fn encode(&self, out: &mut Vec<u8>) -> usize {
         out.push(self.flags());
         match self.session {
@@ -262,15 +285,28 @@ impl Header {
             }
             None => self.encode_numbered(out),
         }
-        let remaining_at = out.len();
-        out.extend(self.turn);
+        let turn_at = out.len();
         if let Some(stamp) = &self.stamp {
             stamp.encode(out);
         }
         if let Some(nonce) = self.nonce {
             out.extend_from_slice(&nonce.to_be_bytes());
         }
-        remaining_at
+        turn_at
+    }
+
+    /// Adds `remaining` and the turn byte to a frame that [`Self::encode`] began, at the index that it returned. `has_byte` is
+    /// whether `remaining` has a byte of its own, as in a hello and above [`Self::FEW`].
+    pub(super) fn end_turn(frame: &mut Vec<u8>, at: usize, remaining: u8, has_byte: bool, turn: Option<u8>) {
+        let [first, second, ..] = &mut frame[..] else { return };
+        let is_hello = *first & HELLO != 0;
+        *first |= if turn.is_some() { TURN } else { 0 };
+        *second |= match (is_hello, has_byte) {
+            (true, _) => 0,
+            (false, true) => FULL << MORE_SHIFT,
+            (false, false) => remaining << MORE_SHIFT,
+        };
+        frame.splice(at..at, has_byte.then_some(remaining).into_iter().chain(turn));
     }
 
     fn encode_numbered(&self, out: &mut Vec<u8>) {
@@ -279,14 +315,15 @@ impl Header {
             out.extend_from_slice(&(self.base | u16::from(LONG_BASE) << 8).to_be_bytes());
             out.extend_from_slice(&self.number.to_be_bytes());
         } else {
-            out.extend_from_slice(&[self.base as u8, self.number as u8]);
+            out.extend((self.base > MAX_NEAR).then_some(self.base as u8));
+            out.push(self.number as u8);
         }
     }
 
+    /// The highest `remaining` without a byte of its own.
+    pub(super) const FEW: u8 = FULL - 1;
     /// The bit of the first byte that marks an acknowledgement statement.
     pub(super) const ACK_FLAG: u8 = ACK;
-    /// The bit of the second byte of a numbered frame that marks the byte `remaining`.
-    pub(super) const REMAINING_FLAG: u8 = REMAINING;
 }
 
 /// The unbounded number nearest to `near` whose low 8 or 16 bits are `low`.

@@ -123,8 +123,8 @@ impl Stranger<'_> {
             }
             1 => header.base = 1 + self.draw(100) as u16,
             2 => {
-                let horizon_low = (self.draw(4096)) as u16;
-                header.ack = Some(AckStatement { horizon_low, lost: vec![self.draw(8) as u16] });
+                let (horizon, lost) = (self.draw(4096), vec![self.draw(8) as u16]);
+                header.ack = Some(AckStatement::new(horizon, lost, self.draw(2) == 0));
             }
             3 => header.turn = Some(self.draw(256) as u8),
             _ => {}

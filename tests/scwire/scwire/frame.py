@@ -33,7 +33,7 @@ def number_in(f, mission, receiver, sender, highest, crypt=None):
 
 
 def parse(raw):
-    """Fields of a frame (checks 1, 2 and 4 of 2.5). The seal is not verified."""
+    """Fields of a frame (checks 1 to 3 of 2.5). The seal is not verified."""
     f = Frame()
     f.raw = raw
     b0 = raw[0]
@@ -42,7 +42,7 @@ def parse(raw):
     if len(raw) <= n:
         raise Short('truncated')
     f.unsealed, f.seal = raw[:-n], raw[-n:]
-    if not (f.ver == 4 or f.H and f.ver >= 2):
+    if f.ver < (2 if f.H else 4):     # the first bit of a numbered frame is 1
         raise Short('version')
     d, p = f.unsealed, 1
 
@@ -57,33 +57,38 @@ def parse(raw):
         f.src, f.dst = a >> 4, a & 15
         f.session = int.from_bytes(take(2), 'big')
         f.number = f.base = 0
+        if f.session == 0:
+            raise Short('malformed')
         take(3)     # not read
-        bad = f.session == 0
         f.remaining = take(1)[0]
     else:
-        vehicle, f.bits = a & 15, 8
+        vehicle, more, near, f.bits = a & 15, a >> 4 & 7, f.ver & 3, 8
         f.src, f.dst = (vehicle, 0) if a & 0x80 else (0, vehicle)
-        f.base = take(1)[0]
+        f.base, least = near or take(1)[0], 1 if near else 4
         if f.base & 0x80:
-            f.base, f.bits = (f.base & 0x7F) << 8 | take(1)[0], 16
+            f.base, f.bits, least = (f.base & 0x7F) << 8 | take(1)[0], 16, 128
+        if not 1 <= vehicle <= 14 or not least <= f.base <= 2048:
+            raise Short('malformed')
         f.low = int.from_bytes(take(f.bits // 8), 'big')
-        least = 1 if f.bits == 8 else 128
-        bad = a & 0x30 or not 1 <= vehicle <= 14 or not least <= f.base <= 2048
-        f.remaining = take(1)[0] if a & 0x40 else 0
+        f.remaining = more if more < 7 else take(1)[0]
     f.turn = take(1)[0] if f.T else None
     f.stamp = take(5 if f.src == 0 else 6) if f.S else None
     f.nonce = take(8) if f.H and f.K else bytes(8)
-    f.ack = None
-    if f.A:
-        h = int.from_bytes(take(2), 'big')
-        n = h & 15
-        if n == 15:
-            n = take(1)[0]
-        f.ack = (h >> 4, losses(take(n)))
-    if bad:
-        raise Short('malformed')
+    f.ack = read_statement(take) if f.A else None
     f.head, f.body = d[:p], d[p:]
     return f
+
+
+def read_statement(take):
+    """Bits of the horizon, 4 if near and 12 if far; the horizon's low bits; distances. take(k) is the next k bytes."""
+    b = take(1)[0]
+    if b < 0x80:
+        return 4, b >> 3, [d for d in (1, 2, 3) if b >> 3 - d & 1]
+    h = (b & 0x7F) << 8 | take(1)[0]
+    n = h & 7
+    if n == 7:
+        n = take(1)[0]
+    return 12, h >> 3, losses(take(n))
 
 
 def losses(code):
@@ -124,11 +129,13 @@ def loss_code(lost):
     return int(best, 2).to_bytes(len(best) // 8, 'big')
 
 
-def statement(horizon, lost):
-    """lost: distances."""
-    c = loss_code(sorted(lost))
+def statement(bits, horizon, lost):
+    """bits: 4, near, or 12, far. lost: distances, ascending; near, only 1 to 3."""
+    if bits == 4:
+        return bytes([(horizon & 15) << 3 | sum(8 >> d for d in lost)])
+    c = loss_code(lost)
     n = len(c)
-    return ((horizon & 4095) << 4 | min(n, 15)).to_bytes(2, 'big') + (bytes([n]) if n >= 15 else b'') + c
+    return (0x8000 | (horizon & 4095) << 3 | min(n, 7)).to_bytes(2, 'big') + (bytes([n]) if n >= 7 else b'') + c
 
 
 def chunks(body):
@@ -160,7 +167,8 @@ def chunk(kind, payload):
 
 
 def write_base(b):
-    return bytes([b]) if b < 128 else bytes([0x80 | b >> 8, b & 255])
+    """The bytes of a base; 1 to 3 is in `near`."""
+    return b'' if b < 4 else bytes([b]) if b < 128 else bytes([0x80 | b >> 8, b & 255])
 
 
 def nearest(low, high, bits=16):
@@ -173,13 +181,14 @@ def nearest(low, high, bits=16):
 def write(src, dst, session, number, base, remaining, *, turn=None, stamp=None, ack=None, body=b'', hello=False,
           mission, peer, peer_nonce=bytes(8), key=None, nonce=None, ver=4):
     """key: a hello key or a keys.Session, or None. number and base are of a numbered frame."""
-    b0 = ver << 5 | (ack is not None) << 4 | (turn is not None) << 3 | hello << 2 | (stamp is not None) << 1 | (key is not None)
+    first = ver if hello else 4 | (base if base < 4 else 0)
+    b0 = first << 5 | (ack is not None) << 4 | (turn is not None) << 3 | hello << 2 | (stamp is not None) << 1 | (key is not None)
     if hello:
         h = bytes([b0, src << 4 | dst]) + session.to_bytes(2, 'big') + bytes([0, 0, 1, remaining])
     else:
-        b = write_base(base)
-        h = bytes([b0, (src != 0) << 7 | (remaining != 0) << 6 | src | dst]) + b
-        h += (number & (1 << 8 * len(b)) - 1).to_bytes(len(b), 'big') + (bytes([remaining]) if remaining else b'')
+        n = 1 if base < 128 else 2
+        h = bytes([b0, (src != 0) << 7 | min(remaining, 7) << 4 | src | dst]) + write_base(base)
+        h += (number & (1 << 8 * n) - 1).to_bytes(n, 'big') + (bytes([remaining]) if remaining >= 7 else b'')
     if turn is not None:
         h += bytes([turn])
     h += stamp or b''

@@ -1,4 +1,6 @@
 """protocol/vectors, and the examples that WIRE.md itself has, against this package."""
+import argparse
+import io
 import json
 import os
 import pathlib
@@ -6,7 +8,8 @@ import re
 from . import cobs, context, frame, keys, mapchunk, objects, status
 from .bits import Short
 from .passive import Follower
-from .replica import fold, term
+from .replica import Window, fold, term
+from .surface import Pair
 
 VECTORS = pathlib.Path(os.environ.get('VECTORS') or pathlib.Path(__file__).parents[3] / 'protocol' / 'vectors')
 hx = bytes.fromhex
@@ -25,6 +28,7 @@ def main():
         for f in (bytes(n) + b'\1', b'\1' * n + b'\2', os.urandom(n + 1)):
             assert cobs.decode(cobs.encode(f)[1:-1], 5000) == f
     numbers()
+    statements()
     parts({row['name']: hx(row['bytes']) for row in read('parts.json')})
     golden_keys(doc)
     frames(read('frames.json'))
@@ -36,26 +40,43 @@ def main():
 
 
 def numbers():
-    """The end of 11; 2.1 and 2.2: both lengths of a number, a highest number that is too high."""
+    """The end of 11; 2.1 and 2.2: each form of base and remaining, both lengths of a number, a highest number that is too high."""
     assert frame.nearest(3, 250, 8) == 259 and frame.nearest(250, 259, 8) == 250
     assert frame.nearest(3, 65530) == 65539 and frame.nearest(65530, 65540) == 65530
-    for number, base, highest in (300, 127, 173), (300, 127, 2300), (300, 128, 2300), (70000, 2048, 68000):
-        raw = frame.write(1, 0, 7, number, base, 3, mission=5, peer=9)
+    for number, base, highest, remaining, n in (300, 3, 299, 6, 7), (300, 4, 299, 7, 9), (300, 127, 173, 0, 8), (300, 127, 2300, 255, 9), (
+            300, 128, 2300, 6, 10), (70000, 2048, 68000, 7, 11):
+        raw = frame.write(1, 0, 7, number, base, remaining, mission=5, peer=9)
         f = frame.parse(raw)
-        assert (f.base, f.src, f.dst, f.remaining, len(raw)) == (base, 1, 0, 3, 9 if base < 128 else 11)
+        assert (f.base, f.src, f.dst, f.remaining, len(raw)) == (base, 1, 0, remaining, n)
         assert frame.number_in(f, 5, 9, 7, highest) == number
+
+
+def statements():
+    """3.3: near where it may be; 3.4: a near one in the order of the frames alone."""
+    def window(base, closed, lost, highest=20):
+        w = Window()
+        w.base, w.closed, w.highest, w.held = base, closed, highest, {*range(base + 1, highest + 1)} - {*lost}
+        return len(w.statement(9))
+    assert [window(5, 5, ()), window(4, 4, ()), window(5, 20, (17, 18, 19)), window(5, 20, (16,)), window(5, 21, ()), window(5, 5, (20,))] == [
+        1, 2, 1, 3, 2, 3]
+    pair = Pair(argparse.Namespace(key=None), 1, b'')
+    pair.number = 40
+    for number, ack, why, n in ((2, (4, 3, [1]), 'late', 0), (2, (4, 3, [1]), 'ok', 3), (1, (4, 9, []), 'ok', 0), (2, (4, 3, [1]), 'duplicate', 0),
+                                (1, (12, 5, []), 'late', 2), (3, (12, 30, []), 'ok', 25), (4, (4, 14, []), 'ok', 0)):
+        assert len(pair.judge(argparse.Namespace(number=number, ack=ack), why)) == n, number
+    assert pair.horizon == 30
 
 
 def parts(rows):
     """Bases, stamps, statements, heads of chunks, reports, details and parts of texts."""
     named = lambda begin: {name: raw for name, raw in rows.items() if name.startswith(begin)}
-    assert named('base ') == {f'base {b}': frame.write_base(b) for b in (127, 128, 2048)}
+    assert named('base ') == {f'base {b}': frame.write_base(b) for b in (4, 127, 128, 2048)}
     assert [stamp(raw) for raw in named('stamp ').values()] == [
         {'clock_ms': 66051, 'one_way_ms': 667}, {'clock_ms': 1, 'one_way_ms': None},
         {'clock_ms': 16777215, 'last_received': 9, 'held_ms': 258}]
-    lost = [(0xABC, []), (7, [1, 4]), (30, [20, 25])]
-    assert list(named('statement: ').values()) == [frame.statement(*each) for each in lost]
-    assert [frame.losses(raw[2:]) for raw in named('statement: ').values()] == [distances for _, distances in lost]
+    says = [(4, 0xC, []), (4, 7, [1, 3]), (12, 0xABC, []), (12, 7, [1, 4]), (12, 30, [20, 25])]
+    assert list(named('statement: ').values()) == [frame.statement(*each) for each in says]
+    assert [frame.read_statement(io.BytesIO(raw).read) for raw in named('statement: ').values()] == says
     heads = named('head of a map chunk')
     assert frame.chunks(heads.pop('head of a map chunk that fills the rest of a full frame') + bytes(99)) == [(1, bytes(99))]
     assert heads == {f'head of a map chunk of {n} bytes': frame.chunk(1, bytes(n))[:-n] for n in (26, 27, 300)}
@@ -157,7 +178,7 @@ def content(f):
     """What the vectors say about a frame: of a hello number 0 and base 1, of an extended chunk the bytes after its kind."""
     says = {'from': f.src, 'to': f.dst, 'number': f.number, 'base': 1 if f.H else f.base, 'remaining': f.remaining,
             'session': f'{f.session:04x}' if f.H else None, 'turn': f.turn, 'stamp': stamp(f.stamp) if f.stamp else None,
-            'nonce': f.nonce.hex() if f.H and f.K else None, 'ack': {'horizon_low': f.ack[0], 'lost': f.ack[1]} if f.ack else None,
+            'nonce': f.nonce.hex() if f.H and f.K else None, 'ack': dict(zip(('horizon_bits', 'horizon_low', 'lost'), f.ack)) if f.ack else None,
             'chunks': [{'kind': EXTENDED[p[0]] if k == 7 else KINDS[k], 'payload': p[k == 7:].hex()} for k, p in frame.chunks(f.body)]}
     return {name: value for name, value in says.items() if value is not None}
 

@@ -47,8 +47,8 @@ class Follower:
 
     def sent(self, f):
         if f.ack and self.pair == f.peer:
-            h = frame.nearest(f.ack[0], self.replica.window.highest, 12)
-            self.replica.window.closed = max(self.replica.window.closed, h)
+            w, (bits, low, _) = self.replica.window, f.ack
+            w.closed = max(w.closed, w.base + (low - w.base) % (1 << bits))
 
     def take(self, direction, raw):
         try:

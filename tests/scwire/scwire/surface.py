@@ -16,17 +16,24 @@ class Pair:
         self.session, self.nonce = session, nonce
         self.replica = Replica()
         self.number = self.horizon = self.proofs = 0
+        self.stated = 0     # the highest accepted frame with a statement
         self.flight = {}
         self.crypt = keys.Session(s.key, s.mission, s.address, s.nonce, nonce, s.encrypt) if s.key else None
 
-    def judge(self, ack):
-        """3.4; [(number, held)]"""
-        ahead = (ack[0] - self.horizon) & 4095
+    def judge(self, f, why):
+        """3.4, of a frame whose result in the window is `why`; [(number, held)]"""
+        if not f.ack:
+            return []
+        bits, low, lost = f.ack
+        if bits == 4 and (why != 'ok' or f.number < self.stated):
+            return []
+        if why == 'ok':
+            self.stated = max(self.stated, f.number)
+        ahead = (low - self.horizon) % (1 << bits)
         if ahead == 0 or self.horizon + ahead > self.number:
             return []
         h = self.horizon + ahead
-        lost = {h - d for d in ack[1]}
-        out = [(n, n not in lost) for n in range(self.horizon + 1, h + 1)]
+        out = [(n, h - n not in lost) for n in range(self.horizon + 1, h + 1)]
         self.horizon = h
         return out
 
@@ -159,27 +166,22 @@ class Surface:
                 break
         else:
             return self.refuse(self.refusal(f, keyed))
+        before = p.replica.window.highest
+        why = p.replica.take(f)
+        if why not in ('ok', 'late', 'duplicate', 'no base'):     # no effect at all
+            return self.refuse(why)
         if p is not self.pair:
             self.ended[self.pair.session] = self.pair
-            self.pair = p
-            self.offered = {}
+            self.pair, offers = p, [*self.offered.items()]
+            self.offered = dict(offers[offers.index((p.session, p)) + 1:])
             self.log('the vehicle has taken run', hex(p.session))
             self.new_vehicle()
-        judged = []
-        try:
-            frame.chunks(f.body)
-        except Short as e:
-            return self.refuse(str(e))
-        before = p.replica.window.highest
-        if f.ack:
-            judged = p.judge(f.ack)
-        for n, held in judged:
+        for n, held in p.judge(f, why):
             self.count['down held' if held else 'down lost'] += 1
             for s, version in p.flight.pop(n, []):
                 if held and s.version == version and s.state == 'on air':
                     s.state = 'received'
                     self.log(f'slot {s.number} version {s.version} received')
-        why = p.replica.take(f)
         if why != 'ok':
             self.refuse(why)
             if why == 'no base':

@@ -67,8 +67,9 @@ impl FuzzPeer {
         let envelope = Envelope::decode(bytes, ours).expect("a frame for its peer");
         let header = &envelope.header;
         let Some(session) = header.session else {
-            self.heard = self.heard.max(header.number_near(self.heard));
-            return header.ack.iter().for_each(|ack| drop(self.flight.handle_statement(ack)));
+            let number = header.number_near(self.heard);
+            self.heard = self.heard.max(number);
+            return header.ack.iter().for_each(|ack| drop(self.flight.handle_statement(ack, Some(number))));
         };
         let run = (session, header.nonce.unwrap_or_default());
         if header.to == Address::EVERYBODY {
@@ -162,7 +163,7 @@ impl FuzzPeer {
                 false => Stamp::Vehicle { clock_ms, last_received: script.u8(), held: time },
             }
         });
-        let true_ack = AckStatement { horizon_low: (self.heard & 0xFFF) as u16, lost: Vec::new() };
+        let true_ack = AckStatement::new(self.heard, Vec::new(), flags & 0x10 == 0);
         let ack = match flags & 0x28 {
             0x08 => Some(true_ack),
             0x28 => AckStatement::decode(&mut Reader::new(script.bytes())).ok(),

@@ -254,7 +254,8 @@ impl<T> LinkPair<T> {
     fn take<'a>(&mut self, frame: Frame<'a>, restarted: bool) -> Result<Inbound<'a, T>, DropReason> {
         let header = &frame.header;
         let Some(run) = self.handshake.run_mut() else { return Err(DropReason::UnknownSender) };
-        let fates = header.ack.as_ref().map_or_else(Vec::new, |ack| run.flight.handle_statement(ack));
+        let accepted = run.window.preview(frame.number, header.base).is_ok().then_some(frame.number);
+        let fates = header.ack.as_ref().map_or_else(Vec::new, |ack| run.flight.handle_statement(ack, accepted));
         for (_, delivered) in &fates {
             self.stats.judge(*delivered);
         }

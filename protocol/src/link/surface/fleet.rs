@@ -68,13 +68,13 @@ impl<R: StateReplica> Fleet<R> {
     }
 
     /// The vehicle whose turn occupies the medium.
-    fn engaged(&self) -> Option<&VehiclePeer<R>> {
-        self.current.and_then(|a| self.peers.get(&a)).filter(|p| p.master.is_engaged())
+    fn engaged(&self, now: Instant) -> Option<&VehiclePeer<R>> {
+        self.current.and_then(|a| self.peers.get(&a)).filter(|p| p.master.is_engaged(now))
     }
 
     /// Whether the turn of a vehicle still occupies the medium at `now`.
     pub(super) fn is_medium_taken(&self, now: Instant) -> bool {
-        self.engaged().is_some_and(|p| !p.master.may_speak(false, now))
+        self.engaged(now).is_some_and(|p| !p.master.may_speak(false, now))
     }
 
     /// Vehicles that answer their grants.
@@ -113,9 +113,9 @@ impl<R: StateReplica> Fleet<R> {
     }
 
     /// When the next turn may be granted; `discovery` is when the next discovery call is due.
-    pub(super) fn next_turn(&self, discovery: Option<Instant>) -> Option<Instant> {
-        if let Some(peer) = self.engaged() {
-            return peer.master.next_wakeup(false);
+    pub(super) fn next_turn(&self, discovery: Option<Instant>, now: Instant) -> Option<Instant> {
+        if let Some(peer) = self.engaged(now) {
+            return peer.master.end_of_turn();
         }
         let is_alone = self.peers.len() == 1;
         let due = |p: &VehiclePeer<R>| {

@@ -38,7 +38,9 @@ impl<R: StateReplica> SurfaceLink<R> {
             access if access.is_free() => self.fleet.next_without_turn(),
             _ if !self.in_modem.is_empty() => None,
             Access::Polled if !self.turn.is_empty() => self.cycle_gives_up_at(),
-            _ => self.discovery.listens_until(now).or_else(|| self.fleet.next_turn(self.discovery.next_wakeup(now))),
+            _ => {
+                self.discovery.listens_until(now).or_else(|| self.fleet.next_turn(self.discovery.next_wakeup(now), now))
+            }
         };
         next.map(|at| (at, Wakeup::Grant))
     }

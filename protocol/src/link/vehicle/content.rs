@@ -427,8 +427,8 @@ pub(super) mod tests {
     }
 
     pub(in crate::link::vehicle) fn builder(size: usize) -> FrameBuilder {
-        let ack = Some(AckStatement { horizon_low: 0, lost: vec![] });
-        let header = Header { ack, ..Header::numbered(Address::vehicle(1).unwrap(), Address::SURFACE, 1, 0) };
+        let ack = Some(AckStatement::new(0, vec![], true));
+        let header = Header { ack, ..Header::numbered(Address::vehicle(1).unwrap(), Address::SURFACE, 1, 1) };
         FrameBuilder::new(&header, size)
     }
 

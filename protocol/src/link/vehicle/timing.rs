@@ -24,7 +24,7 @@ pub(super) struct SurfaceTiming {
 }
 
 /// The part of the bit budget that stamps may take once the surface has measured the distance. Before, a turn has two of them.
-const STAMP_SHARE: f64 = 0.01;
+const STAMP_SHARE: f64 = 0.005;
 
 impl SurfaceTiming {
     /// A numbered frame came in that was on air for `airtime`. Hellos are not passed in: they may be replays.
@@ -100,6 +100,6 @@ mod tests {
             turns.filter(|&now| (timing.begin_turn(budget_bps, now), timing.stamp(now)).1.is_some()).count()
         };
         let known = Some(Duration::from_millis(300));
-        assert_eq!([stamped(100, None), stamped(100, known), stamped(1000, known)], [10, 2, 10]);
+        assert_eq!([stamped(250, None), stamped(250, known), stamped(1000, known)], [10, 3, 10]);
     }
 }

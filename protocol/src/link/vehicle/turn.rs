@@ -219,7 +219,6 @@ impl<S: StateSource> VehicleLink<S> {
             self.repeater.note_urgent();
         }
         let plan = if sends_hello { FramePlan { remaining: 0, is_last_new: true } } else { self.plan(frames, now) };
-        let wish = (plan.is_last_new && !sends_hello).then(|| self.wish(now));
         let stamp = self.stamp(plan.is_last_new, now);
         let ack_room = self.ack_room(plan.is_last_new);
         if sends_hello {
@@ -227,8 +226,14 @@ impl<S: StateSource> VehicleLink<S> {
             self.pair.set_memory(series.is_none_or(|series| self.inbox.knows(series)));
         }
         let takes_turns = !modem.access.is_free();
-        let mut builder = self.pair.begin_frame(size, ack_room, wish, stamp, FramePurpose::Content);
-        builder = if takes_turns { builder.in_turn() } else { builder };
+        let mut builder = self.pair.begin_frame(size, ack_room, None, stamp, FramePurpose::Content);
+        if takes_turns {
+            builder = builder.in_turn(frames.saturating_sub(1).min(255) as u8);
+        }
+        if plan.is_last_new && !sends_hello {
+            // Room for the byte; the wish is known once the frame is filled.
+            builder.set_turn(0);
+        }
         let mut carried = Carried::new();
         if !sends_hello {
             if modem.access == Access::FullDuplex {
@@ -257,6 +262,9 @@ impl<S: StateSource> VehicleLink<S> {
             false => plan.remaining,
         };
         builder.set_remaining(remaining.min(255) as u8);
+        if is_complete || (plan.is_last_new && !sends_hello) {
+            builder.set_turn(self.wish(now));
+        }
         let last = remaining == 0;
         let purpose = FramePurpose::hello_if(sends_hello);
         let transmit = self.close(builder, carried, purpose, last || is_complete || !takes_turns);
@@ -320,19 +328,24 @@ impl<S: StateSource> VehicleLink<S> {
     fn wish(&self, now: Instant) -> u8 {
         let modem = &self.config.modem;
         let affordable = self.budget.earliest(modem.bits_on_air(modem.frame_bytes) * 2, now).since(now);
-        let pause = self.content.next_due().map_or(self.idle_pause(), |due| self.idle_pause().min(due.since(now)));
         let (rest, next) = self.after_a_frame(now);
-        let wait = match self.content.is_idle(&rest, next) {
-            true => affordable.max(pause).min(self.config.status_period),
-            false => affordable,
+        let wait = match self.content.backlog_bytes(&rest, next) {
+            0 => {
+                let pause = self.idle_pause(self.content.is_idle(&rest, next));
+                let pause = self.content.next_due().map_or(pause, |due| pause.min(due.since(now)));
+                affordable.max(pause).min(self.config.status_period)
+            }
+            _ => affordable,
         };
         quarter_seconds(wait, 254)
     }
 
-    /// Pause between turns while no content waits: empty turns take at most a tenth of the budget.
-    fn idle_pause(&self) -> Duration {
+    /// Pause between turns while no content waits: empty turns take at most a tenth of the budget. While content is under way, which
+    /// waits again if it was lost, there is no least pause.
+    fn idle_pause(&self, is_idle: bool) -> Duration {
         const EMPTY_TURN_BITS: f64 = 240.0;
+        let least = if is_idle { 1.0 } else { 0.0 };
         let tenth = f64::from(self.budget.bits_per_s()) / 10.0;
-        Duration::from_secs_f64((EMPTY_TURN_BITS / tenth).max(1.0))
+        Duration::from_secs_f64((EMPTY_TURN_BITS / tenth).max(least))
     }
 }

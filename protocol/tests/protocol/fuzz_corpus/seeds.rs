@@ -217,7 +217,7 @@ fn body_of(bytes: &[u8]) -> Vec<u8> {
 fn golden() -> Vec<Seed> {
     let losses = |lost: Vec<u16>| {
         let mut bytes = Vec::new();
-        AckStatement { horizon_low: 2000, lost }.encode(300, &mut bytes);
+        AckStatement::new(2000, lost, true).encode(300, &mut bytes);
         bytes
     };
     let key = MissionKey::from_bytes(*b"0123456789abcdef").to_text();

@@ -97,7 +97,7 @@ fn with_a_tag() -> Rows {
 fn refused() -> Rows {
     let order = frame(first_of_surface(false), 64, true, crc(Address::SURFACE, 1), &[(ChunkKind::Slot, hold())]);
     let mut damaged = order.clone();
-    damaged[15] ^= 1;
+    damaged[13] ^= 1;
     // Sealed again: the CRC is right.
     let changed = |at: usize, bits: u8| {
         let mut bytes = order[..order.len() - 4].to_vec();
@@ -119,12 +119,12 @@ fn refused() -> Rows {
             frame(surface_hello(false), 64, true, Seal::Crc(MissionId(7), 0), &introduction(true)),
         ),
         ("refused: hello of run 0", no_session),
-        ("refused: numbered frame of version 3", changed(0, 0b1110_0000)),
+        ("refused: numbered frame of an earlier version", changed(0, 0b1000_0000)),
         ("refused: a bit of the slot differs", damaged),
-        ("refused: base 0", changed(2, 1)),
-        ("refused: a reserved bit is set", changed(1, 0b1_0000)),
+        ("refused: base 1 in a byte of its own", changed(0, 0b10_0000)),
+        ("refused: of vehicle 0", changed(1, 1)),
         ("refused: cut short", order[..10].to_vec()),
-        ("refused: a chunk ends after the frame", changed(11, 1)),
+        ("refused: a chunk ends after the frame", changed(9, 1)),
         (
             "refused: sealed by a run that is not known",
             frame(answer_of_vehicle(false), 64, true, of_another_run, &answered()),

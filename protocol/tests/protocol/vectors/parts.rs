@@ -34,27 +34,30 @@ fn parts_of_a_frame_are_those_of_the_vectors() {
 }
 
 fn header_fields() -> Rows {
+    /// Bytes of a header with a base of up to 3 and nothing optional.
+    const HEADER: usize = 3;
     let in_frame = |header: Header, from: usize, to: usize| {
         frame(header.clone(), 2000, true, crc(header.from, 9), &[])[from..to].to_vec()
     };
     let base = |base: u16, bytes: usize| in_frame(Header { base, ..header(auv(), 9) }, 2, 2 + bytes);
     let stamp = |from: Address, stamp: Stamp, bytes: usize| {
-        in_frame(Header { stamp: Some(stamp), ..header(from, 9) }, 4, 4 + bytes)
+        in_frame(Header { stamp: Some(stamp), ..header(from, 9) }, HEADER, HEADER + bytes)
     };
-    let statement = |horizon_low: u16, lost: Vec<u16>| {
-        let (statement, mut bytes) = (AckStatement { horizon_low, lost }, Vec::new());
+    let statement = |horizon: u64, lost: Vec<u16>, is_near: bool| {
+        let (statement, mut bytes) = (AckStatement::new(horizon, lost, is_near), Vec::new());
         assert!(statement.encode(99, &mut bytes));
         assert_eq!(AckStatement::decode(&mut Reader::new(&bytes)), Ok(statement));
         bytes
     };
     let head = |payload: usize, head: usize, is_full: bool| {
-        let size = if is_full { 4 + head + payload + 4 } else { 1024 };
+        let size = if is_full { HEADER + head + payload + 4 } else { 1024 };
         // The last chunk of a short frame has no second byte.
         let after = if is_full { None } else { Some((ChunkKind::Map, vec![9])) };
         let chunks: Vec<_> = [(ChunkKind::Map, vec![9; payload])].into_iter().chain(after).collect();
-        frame(header(auv(), 9), size, true, crc(auv(), 9), &chunks)[4..4 + head].to_vec()
+        frame(header(auv(), 9), size, true, crc(auv(), 9), &chunks)[HEADER..HEADER + head].to_vec()
     };
     vec![
+        ("base 4", base(4, 1)),
         ("base 127", base(127, 1)),
         ("base 128", base(128, 2)),
         ("base 2048", base(2048, 2)),
@@ -70,9 +73,11 @@ fn header_fields() -> Rows {
             "stamp of a vehicle: clock 16 777 215 ms, frame 9 received 258 ms before",
             stamp(auv(), vehicle_stamp(16_777_215, 9, 258), 6),
         ),
-        ("statement: horizon low ABC, no loss", statement(0xABC, vec![])),
-        ("statement: horizon 7, lost 6 and 3 (distances 1 and 4), a bitmap", statement(7, vec![1, 4])),
-        ("statement: horizon 30, lost 10 and 5 (distances 20 and 25), a Rice code", statement(30, vec![20, 25])),
+        ("statement: horizon low C, no loss", statement(0xABC, vec![], true)),
+        ("statement: horizon 7, lost 6 and 4 (distances 1 and 3)", statement(7, vec![1, 3], true)),
+        ("statement: horizon low ABC, no loss, far", statement(0xABC, vec![], false)),
+        ("statement: horizon 7, lost 6 and 3 (distances 1 and 4), a bitmap", statement(7, vec![1, 4], true)),
+        ("statement: horizon 30, lost 10 and 5 (distances 20 and 25), a Rice code", statement(30, vec![20, 25], true)),
         ("head of a map chunk that fills the rest of a full frame", head(200, 1, true)),
         ("head of a map chunk of 26 bytes", head(26, 1, false)),
         ("head of a map chunk of 27 bytes", head(27, 2, false)),

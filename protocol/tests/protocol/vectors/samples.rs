@@ -37,8 +37,8 @@ pub(crate) fn vehicle_stamp(clock_ms: u32, last_received: u8, held_ms: u64) -> S
     Stamp::Vehicle { clock_ms, last_received, held: Duration::from_millis(held_ms) }
 }
 
-pub(crate) fn all_up_to(horizon_low: u16, lost: Vec<u16>) -> Option<AckStatement> {
-    Some(AckStatement { horizon_low, lost })
+pub(crate) fn all_up_to(horizon: u64, lost: Vec<u16>) -> Option<AckStatement> {
+    Some(AckStatement::new(horizon, lost, true))
 }
 
 /// The CRC of a numbered frame of an end.

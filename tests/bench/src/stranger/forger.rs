@@ -288,8 +288,8 @@ impl Forger {
         if self.below(3) == 0 {
             header.base = 1 + self.below(2000) as u16;
         } else {
-            let horizon_low = self.below(4096) as u16;
-            header.ack = Some(AckStatement { horizon_low, lost: vec![self.below(8) as u16] });
+            let (horizon, lost) = (self.below(4096) as u64, vec![self.below(8) as u16]);
+            header.ack = Some(AckStatement::new(horizon, lost, self.below(2) == 0));
         }
         self.numbered((header, number), &[])
     }

@@ -176,7 +176,7 @@ fn header_fields(header: &Header, number: Option<u64>) -> Fields {
         ]),
     }
     if let Some(ack) = &header.ack {
-        fields.push(("ack", ack.horizon_low.into()));
+        fields.extend([("ack", ack.horizon.low().into()), ("ack_bits", ack.horizon.bits().into())]);
         if !ack.lost.is_empty() {
             fields.push(("lost_before", ack.lost.clone().into()));
         }

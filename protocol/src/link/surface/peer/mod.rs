@@ -477,7 +477,7 @@ impl<R: StateReplica> VehiclePeer<R> {
     fn handle_stamp(&mut self, header: &Header, airtime: Duration, now: Instant) {
         let Some(Stamp::Vehicle { clock_ms, last_received, held }) = header.stamp else { return };
         if let Some(measured) = self.timing.round_trip(last_received, held, now - airtime) {
-            self.master.handle_round_trip(measured);
+            self.master.handle_round_trip(measured, now);
         }
         let one_way = self.master.round_trip().unwrap_or_default() / 2;
         self.timing.measure(clock_ms, airtime + one_way, now);
