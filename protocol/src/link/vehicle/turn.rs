@@ -16,9 +16,10 @@ use std::time::Duration;
 /// Frames smaller than this have no room for both a status and a stamp.
 const SMALL_FRAME: usize = 48;
 
-/// Probability that all copies of a status may be lost where both ends transmit at once. It is above the least loss that the
-/// estimate assumes, so that a link without losses carries no copies.
-const STATUS_LOSS_RISK: f64 = 0.012;
+/// Probability that all copies of a status may be lost where both ends transmit at once.
+const STATUS_LOSS_RISK: f64 = 0.004;
+/// Up to this loss, the least that the estimate assumes, a status has no copies.
+const NO_LOSS: f64 = 0.012;
 const MAX_STATUS_COPIES: u32 = 4;
 
 /// A frame about to be filled.
@@ -237,7 +238,9 @@ impl<S: StateSource> VehicleLink<S> {
         let mut carried = Carried::new();
         if !sends_hello {
             if modem.access == Access::FullDuplex {
-                let copies = self.pair.stats.loss_out.copies(STATUS_LOSS_RISK, MAX_STATUS_COPIES);
+                let loss = self.pair.stats.loss_out;
+                let copies =
+                    if loss.expected() <= NO_LOSS { 1 } else { loss.copies(STATUS_LOSS_RISK, MAX_STATUS_COPIES) };
                 self.content.status.set_copies(copies, self.budget.bits_per_s());
             }
             let (slots, refused_frames) = (self.inbox.reports(), self.pair.stats.refused());
