@@ -29,7 +29,7 @@ pub use command::{
 };
 pub use exemplar_cache::{ExemplarCache, LabelExemplars, OpenRequest, RequestKind, RequestState, StoredExemplar};
 pub use label_book::LabelBook;
-pub use log::{LogEntry, LogKind, MissionLog};
+pub use log::{AUTOPILOT_SILENT, LogEntry, LogKind, MissionLog, NO_FAULT};
 pub use map_in_view::LabelGains;
 pub use orders::{AreaOrder, AreasOrder, DestinationOrder, FenceOrder, LimitsOrder, order_name};
 pub use scenecast_core::{ClientName, Giver, Principal, Role};

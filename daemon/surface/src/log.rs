@@ -3,6 +3,7 @@
 mod watch;
 
 pub(super) use watch::Watch;
+pub use watch::{AUTOPILOT_SILENT, NO_FAULT};
 
 use super::record::{MAX_LOG, StoredLogEntry};
 use scenecast_protocol::time::Instant;
@@ -55,7 +56,7 @@ impl LogKind {
     }
 
     /// The name for people and in the API.
-    pub fn name(self) -> &'static str {
+    pub const fn name(self) -> &'static str {
         match self {
             Self::Order => "order",
             Self::Answer => "answer",

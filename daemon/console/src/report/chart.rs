@@ -4,7 +4,7 @@ use super::Escaped;
 use super::dive::DiveVehicle;
 use super::track::TrackPoint;
 use crate::state::VehicleState;
-use scenecast_core::utc_text;
+use scenecast_core::{Area, utc_text};
 use scenecast_protocol::map::Rect;
 use std::collections::BTreeMap;
 use std::fmt::Write;
@@ -18,7 +18,7 @@ const MAX_MARKER: usize = 30;
 
 /// The map of the operator, north up, with the reported track, a grid of metres, a scale bar and an arrow to the north; `None` without
 /// cells.
-pub(super) fn map(state: &VehicleState, vehicle: &DiveVehicle) -> Option<String> {
+pub(super) fn map(state: &VehicleState, vehicle: &DiveVehicle, area: Option<Area>) -> Option<String> {
     let bounds = vehicle.labels.bounds()?;
     let shift = state.map.shift_m();
     let path = vehicle.path();
@@ -26,6 +26,9 @@ pub(super) fn map(state: &VehicleState, vehicle: &DiveVehicle) -> Option<String>
     let fence_in_force = state.orders.fence_in_force.iter().flat_map(|applied| applied.order.fence.iter().flatten());
     let places = places.chain(state.markers.iter().map(|m| (m.x_m, m.y_m)));
     let places = places.chain(fence_in_force.map(|&[east_m, north_m]| (east_m, north_m)));
+    let corners =
+        area.map(|Area { west, south, east, north }| [(west, south), (east, south), (east, north), (west, north)]);
+    let places = places.chain(corners.into_iter().flatten());
     let frame = Frame::around(bounds, vehicle.cell_m, shift, places);
     let mut svg = format!(
         "<svg viewBox=\"0 0 {WIDTH} {:.0}\" role=\"img\" aria-label=\"map of the sea floor\" xmlns=\"http://www.w3.org/2000/svg\">\n",
@@ -34,6 +37,9 @@ pub(super) fn map(state: &VehicleState, vehicle: &DiveVehicle) -> Option<String>
     let classes = classes(bounds, state, vehicle);
     cells(&mut svg, &frame, bounds, &classes, state, vehicle);
     grid(&mut svg, &frame);
+    if let Some(corners) = corners {
+        let _ = writeln!(svg, "<polygon class=\"area\" points=\"{}\"/>", points(&frame, corners.into_iter()));
+    }
     fence(&mut svg, &frame, state);
     track(&mut svg, &frame, path, vehicle.legs());
     numbers(&mut svg, &frame, bounds, &classes, state, vehicle);

@@ -210,6 +210,13 @@ impl Dive {
         })
     }
 
+    /// The events about the modes of a vehicle.
+    pub(super) fn modes(&self, state: &VehicleState, vehicle: &DiveVehicle) -> impl Iterator<Item = (f64, &Event)> {
+        let (of_modes, part) = (vehicle.mode_source(), valid_part(&state.name));
+        let is_mode = move |event: &Event| event.source == of_modes && valid_part(&event.vehicle) == part;
+        self.events.iter().filter(move |(_, event)| is_mode(event)).map(|(at_s, event)| (*at_s, event))
+    }
+
     /// A time span of the record as mission time, seconds: the mission may run faster than the clock.
     pub(super) fn mission_s(&self, span_s: f64) -> f64 {
         span_s * self.state.mission.speed

@@ -42,22 +42,28 @@ pub(super) fn sea_floor(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle
     })
 }
 
+/// The area of the survey that was configured.
+pub(super) fn of_survey(dive: &Dive, vehicle: &DiveVehicle) -> Option<Area> {
+    let area = dive.ran_with(vehicle).settings.get("survey.area_m")?;
+    let [west, south, east, north] = serde_json::from_value(area.clone()).ok()?;
+    Some(Area { west, south, east, north })
+}
+
 /// How much of the configured area, or else of what the fence leaves, has cells.
 fn unseen(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle, shift: (f64, f64)) -> String {
-    let area = dive.ran_with(vehicle).settings.get("survey.area_m");
-    let corners = area.and_then(|area| serde_json::from_value::<[f64; 4]>(area.clone()).ok());
-    let Some([west, south, east, north]) = corners else {
+    let Some(area) = of_survey(dive, vehicle) else {
         return match seen_of_fence(state, vehicle, shift) {
             Some(share) => format!(" Of the area within the fence, {:.1} % is on the map.", share * 100.0),
             None => " No area of the survey is configured, so how much of it was not seen is not known.".to_owned(),
         };
     };
     let middles = vehicle.labels.iter().map(|(cell, _)| vehicle.middle_of(cell, shift));
-    let share = Area { west, south, east, north }.covered(middles, vehicle.cell_m);
+    let share = area.covered(middles, vehicle.cell_m);
     let fence = seen_of_fence(state, vehicle, shift);
     let fence = fence.map_or_else(String::new, |share| {
         format!(" Of the area within the fence, {:.1} % is on the map.", share * 100.0)
     });
+    let Area { west, south, east, north } = area;
     let all_m2 = (east - west) * (north - south);
     format!(
         " Of the area of the survey, {west} to {east} m east and {south} to {north} m north, {:.1} % is on the map, and {} of {} are not.{fence}",

@@ -257,9 +257,7 @@ impl Dive {
 
     /// What the vehicle was steered by over time, and its modes.
     pub(super) fn steering(&self, page: &mut String, state: &VehicleState, vehicle: &DiveVehicle) {
-        let of_modes = vehicle.mode_source();
-        let modes = self.events.iter().filter(|(_, event)| event.vehicle == state.name && event.source == of_modes);
-        let modes = modes.map(|(at_s, event)| (*at_s, words::event(&state.label_book, event)));
+        let modes = self.modes(state, vehicle).map(|(at_s, event)| (at_s, words::event(&state.label_book, event)));
         let steers = |slot: &str| ![SlotId::Requests.name(), SlotId::Budget.name()].contains(&slot);
         let orders = vehicle.orders_of_people().filter(|((slot, _), _)| steers(slot));
         let orders = orders.filter_map(|(order, way)| {

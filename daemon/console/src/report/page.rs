@@ -4,7 +4,7 @@ use super::areas::ClassArea;
 use super::chart;
 use super::dive::{Dive, DiveVehicle, SettingsRecord};
 use super::orders::said;
-use super::{Escaped, doubts, summary, words};
+use super::{Escaped, doubts, extent, summary, words};
 use crate::state::VehicleState;
 use base64::Engine;
 use base64::prelude::BASE64_STANDARD;
@@ -24,7 +24,7 @@ table{border-collapse:collapse;width:100%;font-size:.9em}th,td{text-align:left;v
 border-bottom:1px solid #ccc}td.n{text-align:right;white-space:nowrap}td.t{white-space:nowrap}figure{margin:1em 0}figcaption{font-size:.85em}svg{width:100%;height:auto}\
 svg text{font:11px system-ui,sans-serif}.grid{stroke:#000;stroke-opacity:.25;stroke-width:.6;fill:none}\
 .track{fill:none;stroke:#000;stroke-width:1.5;stroke-linejoin:round}.line{fill:none;stroke:#000;stroke-width:1.2}\
-thead{display:table-header-group}.swatch,svg{-webkit-print-color-adjust:exact;print-color-adjust:exact}thead tr{break-after:avoid}.fence{fill:none;stroke:#000;stroke-width:1.5;stroke-dasharray:6 3}.out{fill:#000;fill-opacity:.12;stroke:#000;stroke-dasharray:2 2}.scale{fill:none;stroke:#000;stroke-width:1.5}.swatch{display:inline-block;width:1em;height:1em;border:1px solid #000;\
+thead{display:table-header-group}.swatch,svg{-webkit-print-color-adjust:exact;print-color-adjust:exact}thead tr{break-after:avoid}.fence{fill:none;stroke:#000;stroke-width:1.5;stroke-dasharray:6 3}.area{fill:none;stroke:#000;stroke-dasharray:1 4}.out{fill:#000;fill-opacity:.12;stroke:#000;stroke-dasharray:2 2}.scale{fill:none;stroke:#000;stroke-width:1.5}.swatch{display:inline-block;width:1em;height:1em;border:1px solid #000;\
 vertical-align:-.15em;margin-right:.4em}.images{display:flex;flex-wrap:wrap;gap:.6em}.images figure{margin:0;width:188px}.images svg{width:112px}.images img{width:112px;display:block;\
 image-rendering:pixelated}.number{font-weight:600;paint-order:stroke;stroke:#fff;stroke-width:3px}\
 .point{fill:#fff;stroke:#000;stroke-width:1.5}.legend>span{display:inline-block;margin-right:1em}@media(max-width:700px){table{display:block;overflow-x:auto}}\
@@ -110,17 +110,19 @@ impl Dive {
             let _ = writeln!(page, "<li>{}</li>", Escaped(&sentence));
         }
         *page += "</ul>\n";
-        if let Some(map) = chart::map(state, vehicle) {
+        let area = extent::of_survey(self, vehicle);
+        if let Some(map) = chart::map(state, vehicle, area) {
             let _ = writeln!(
                 page,
                 "<figure class=\"map\">{map}<figcaption><div class=\"legend\">{}</div>The operator's map at the end, each class with its number, and the \
-                 track of the vehicle: {}. {}Metres east and \
+                 track of the vehicle: {}. {}{}Metres east and \
                  north of the mission's origin (WGS 84 where it has one); north is up.</figcaption></figure>",
                 legend(state, vehicle),
                 match vehicle.own.track.len() {
                     0 | 1 => "straight lines between the places that the vehicle has reported",
                     _ => "by its own record",
                 },
+                if area.is_some() { "Dots: the area of the survey. " } else { "" },
                 match state.orders.fence_in_force {
                     Some(_) => "Long dashes: the fence that was in force at the end; grey: areas to stay out of. ",
                     None => "",

@@ -1,6 +1,7 @@
 //! The summary of a dive in sentences.
 
 use super::dive::{Dive, DiveVehicle};
+use super::maps::MapsAt;
 use super::orders::OrderStep;
 use super::words::{self, area, counted, duration, interval, on_earth};
 use super::{extent, gaps, trouble};
@@ -10,6 +11,7 @@ use scenecast_core::utc_text;
 use scenecast_messages::scenecast_msgs::{Event, OrderStatus};
 use scenecast_protocol::directive::SlotId;
 use scenecast_protocol::map::{Cell, UNEXPLORED};
+use scenecast_protocol::wire::VehicleMode;
 use scenecast_surface::LogKind;
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -32,8 +34,9 @@ pub(super) fn summary(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) 
     sentences.extend(extent::of_map(dive, state, vehicle));
     sentences.extend(extent::sea_floor(dive, state, vehicle));
     sentences.extend(arrived(dive, state, vehicle, alone));
-    sentences.extend(agreement(vehicle));
-    sentences.extend(lag(vehicle));
+    let surveyed = surveyed(dive, state, vehicle);
+    sentences.extend(agreement(vehicle, &surveyed));
+    sentences.extend(lag(vehicle, &surveyed));
     sentences.push(orders(dive, state, vehicle));
     sentences.extend(link(dive, vehicle));
     sentences.extend(gaps::heard(dive, vehicle));
@@ -82,38 +85,59 @@ fn link(dive: &Dive, vehicle: &DiveVehicle) -> Vec<String> {
     sentences
 }
 
+/// The moments of the comparison at which the vehicle surveyed, or all of them where its modes are not known.
+fn surveyed(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -> Vec<MapsAt> {
+    let modes: Vec<(f64, &Event)> = dive.modes(state, vehicle).collect();
+    let did_survey = |maps: &&MapsAt| {
+        let last = modes.iter().rev().find(|(at_s, _)| *at_s <= maps.at_s);
+        last.is_some_and(|(_, event)| event.text.starts_with(VehicleMode::Survey.name()))
+    };
+    let surveyed: Vec<MapsAt> = vehicle.maps.iter().filter(did_survey).copied().collect();
+    if surveyed.is_empty() { vehicle.maps.clone() } else { surveyed }
+}
+
 /// How far the operator's map was that of the vehicle, where its record says so.
-fn agreement(vehicle: &DiveVehicle) -> Option<String> {
-    let shares: Vec<f64> = vehicle.maps.iter().map(|maps| maps.agreement).filter(|share| share.is_finite()).collect();
-    let mean = shares.iter().sum::<f64>() / shares.len() as f64;
-    shares.last().map(|last| {
+fn agreement(vehicle: &DiveVehicle, surveyed: &[MapsAt]) -> Option<String> {
+    let shares = |maps: &[MapsAt]| -> Vec<f64> {
+        maps.iter().map(|maps| maps.agreement).filter(|share| share.is_finite()).collect()
+    };
+    let [all, surveyed] = [shares(&vehicle.maps), shares(surveyed)];
+    let mean = |shares: &[f64]| shares.iter().sum::<f64>() / shares.len() as f64 * 100.0;
+    let means = match surveyed.len() {
+        0 => format!("{:.0} % on average over the record", mean(&all)),
+        n if n == all.len() => format!("{:.0} % on average over the record", mean(&all)),
+        _ => {
+            format!("{:.0} % on average while it surveyed, {:.0} % over the whole record", mean(&surveyed), mean(&all))
+        }
+    };
+    all.last().map(|last| {
         format!(
             "Of the cells of the vehicle's map that were meant for the operator, {:.0} % had the same label on the operator's map at the end, \
-             and {:.0} % on average over the record.",
+             and {means}.",
             last * 100.0,
-            mean * 100.0
         )
     })
 }
 
 /// How far the operator's map was behind.
-fn lag(vehicle: &DiveVehicle) -> Option<String> {
-    let lags: Vec<f64> = vehicle.maps.iter().map(|maps| maps.lag_s).filter(|lag_s| lag_s.is_finite()).collect();
+fn lag(vehicle: &DiveVehicle, surveyed: &[MapsAt]) -> Option<String> {
+    let lags: Vec<f64> = surveyed.iter().map(|maps| maps.lag_s).filter(|lag_s| lag_s.is_finite()).collect();
     let (median_s, most) = (words::median(&lags)?, duration(lags.iter().copied().fold(0.0, f64::max)));
     let median = duration(median_s);
+    let when = if surveyed.len() == vehicle.maps.len() { "over the record" } else { "while it surveyed" };
     Some(match vehicle.own.runs_s.is_empty() {
         false if median_s < 1.0 => format!(
-            "Both records were compared every ten seconds: at {} of {} moments no change of the vehicle's map was missing on the operator's; at \
-             the worst of them, changes had been missing for {most}.",
+            "Both records were compared at {1} moments {when}: at {0} of them no change of the vehicle's map was missing on the operator's; at \
+             the worst one, changes had been missing for {most}.",
             lags.iter().filter(|lag_s| **lag_s < 1.0).count(),
             lags.len()
         ),
         true => format!(
-            "By the surface's forecast of when all that waits on board will have been sent, the operator's map was behind the vehicle's by \
-             {median} or less half of the time; the longest forecast was {most}."
+            "By the surface's forecast of when all that waits on board will have been sent, {when} the operator's map was behind the vehicle's \
+             by {median} or less half of the time; the longest forecast was {most}."
         ),
         false => format!(
-            "Both records were compared every ten seconds: at half of the {} moments the operator's map had lacked changes of the vehicle's for \
+            "Both records were compared at {} moments {when}: at half of them the operator's map had lacked changes of the vehicle's for \
              {median} or less, at the worst one for {most}.",
             lags.len()
         ),

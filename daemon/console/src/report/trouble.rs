@@ -6,9 +6,12 @@ use crate::state::VehicleState;
 use scenecast_core::utc_text;
 use scenecast_messages::contents::valid_part;
 use scenecast_messages::scenecast_msgs::Event;
-use scenecast_protocol::wire::{ModeReason, VehicleMode};
+use scenecast_protocol::wire::{EquipmentFaults, ModeReason, VehicleMode};
+use scenecast_surface::{AUTOPILOT_SILENT, LogKind, NO_FAULT};
 use std::collections::BTreeSet;
 
+/// The source of events about faults.
+const FAULT: &str = LogKind::Fault.name();
 /// Events that are told in a sentence; of more, the first.
 const MAX_TOLD: usize = 8;
 
@@ -20,7 +23,7 @@ pub(super) fn told(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -> 
     let is_restart = |event: &Event| event.source == "contact" && event.text == words::ANOTHER_RUN;
     let has_own = !vehicle.own.runs_s.is_empty();
     let is_trouble = |event: &Event| match event.source.as_str() {
-        "fault" => true,
+        FAULT => equipment(&event.text).is_none(),
         _ if event.level >= Event::WARN && event.source.ends_with("on board") && event.source != modes => true,
         source if source == modes => !is_planned(&event.text),
         // Its own record says when it was.
@@ -35,6 +38,7 @@ pub(super) fn told(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -> 
         }
     };
     let mut found: Vec<(f64, String)> = of_it().filter(|(_, event)| is_trouble(event)).map(told).collect();
+    found.extend(faults(dive, state));
     found.extend(dive.restarts_s.iter().copied().map(restarts("the surface's", "")));
     found.extend(
         vehicle.own.pauses().map(restarts("the vehicle's", ", and what it had not stored may be lost on board")),
@@ -62,13 +66,44 @@ pub(super) fn told(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -> 
     sentences
 }
 
+/// The faults that a text of the log names; `None` if it is about something else.
+fn equipment(text: &str) -> Option<Vec<&str>> {
+    let known = || EquipmentFaults::decode(u8::MAX).iter().map(|(known, _)| known).chain([AUTOPILOT_SILENT]);
+    let faults: Vec<&str> = if text == NO_FAULT { Vec::new() } else { text.split(", ").collect() };
+    faults.iter().all(|fault| known().any(|known| known == *fault)).then_some(faults)
+}
+
+/// The faults of its equipment as it reported them: when they began and, of those with which the survey does not proceed as planned,
+/// when they ended. The end of others is not reported.
+fn faults(dive: &Dive, state: &VehicleState) -> Vec<(f64, String)> {
+    let is_grave = |fault: &str| {
+        let grave = EquipmentFaults::decode(u8::MAX).grave();
+        fault == AUTOPILOT_SILENT || grave.iter().any(|(known, _)| known == fault)
+    };
+    let mut open: Vec<(&str, f64)> = Vec::new();
+    let mut told: Vec<(f64, String)> = Vec::new();
+    let reports = dive.events.iter().filter(|(_, event)| event.source == FAULT && event.vehicle == state.name);
+    for (at_s, reported) in reports.filter_map(|(at_s, event)| Some((*at_s, equipment(&event.text)?))) {
+        let (last, over): (Vec<_>, Vec<_>) = open.into_iter().partition(|(fault, _)| reported.contains(fault));
+        open = last;
+        told.extend(over.into_iter().map(|(fault, from_s)| {
+            let lasted = words::duration(dive.mission_s(at_s - from_s));
+            (from_s, format!("{fault} until {} ({lasted})", utc_text(at_s)))
+        }));
+        let (grave, minor): (Vec<&str>, Vec<&str>) = reported.into_iter().partition(|fault| is_grave(fault));
+        told.extend(minor.into_iter().map(|fault| (at_s, fault.to_owned())));
+        let begun: Vec<_> = grave.into_iter().filter(|fault| open.iter().all(|(known, _)| known != fault)).collect();
+        open.extend(begun.into_iter().map(|fault| (fault, at_s)));
+    }
+    told.extend(open.into_iter().map(|(fault, from_s)| (from_s, format!("{fault} until the end of the record"))));
+    told
+}
+
 /// How long it was in each mode, by its own record.
 fn times_of_modes(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -> Option<String> {
-    let of_modes = vehicle.mode_source();
-    let is_mode = |event: &Event| event.source == of_modes && valid_part(&event.vehicle) == valid_part(&state.name);
-    let modes: Vec<(f64, &str)> = (dive.events.iter().filter(|(_, event)| is_mode(event)))
-        .map(|(at_s, event)| (*at_s, event.text.split(": ").next().unwrap_or_default()))
-        .collect();
+    let modes =
+        dive.modes(state, vehicle).map(|(at_s, event)| (at_s, event.text.split(": ").next().unwrap_or_default()));
+    let modes: Vec<(f64, &str)> = modes.collect();
     let mut spent: Vec<(&str, f64)> = Vec::new();
     for (n, (at_s, mode)) in modes.iter().enumerate() {
         let Some((_, end_s)) = vehicle.own.runs_s.iter().find(|run| at_s - 1.0 <= run.1) else { continue };
@@ -115,6 +150,37 @@ fn listed(title: &str, found: &[(f64, String)]) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use scenecast_messages::scenecast_msgs::Event;
+
+    #[test]
+    fn a_fault_is_told_with_its_begin_and_its_end() {
+        let (mut dive, state) = (Dive::default(), VehicleState::default());
+        dive.state.mission.speed = 2.0;
+        let event = |(at_s, source, text): (f64, &str, &str)| {
+            (at_s, Event { source: source.to_owned(), text: text.to_owned(), ..Event::default() })
+        };
+        dive.events = [
+            (10.0, FAULT, "no image comes in"),
+            (12.0, FAULT, "the port is closed, it seems"),
+            (20.0, FAULT, "no pose comes in, no image comes in, images are dropped"),
+            (30.0, "mode", "holding"),
+            (40.0, FAULT, "no pose comes in"),
+            (50.0, FAULT, NO_FAULT),
+            (60.0, FAULT, AUTOPILOT_SILENT),
+        ]
+        .map(event)
+        .to_vec();
+        let told: Vec<String> =
+            faults(&dive, &state).into_iter().map(|(at_s, text)| format!("{at_s}: {text}")).collect();
+        let expected = [
+            "20: images are dropped",
+            "10: no image comes in until 1970-01-01T00:00:40Z (60 s)",
+            "20: no pose comes in until 1970-01-01T00:00:50Z (60 s)",
+            "60: the autopilot does not answer until the end of the record",
+        ];
+        assert_eq!(told, expected);
+        assert_eq!(equipment("the port is closed, it seems"), None);
+    }
 
     #[test]
     fn what_was_ordered_is_no_trouble() {

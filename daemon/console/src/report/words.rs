@@ -308,7 +308,7 @@ pub(super) fn order<'a>(slot: &'a str, content: &'a str) -> &'a str {
 /// The name of an order's status.
 pub(super) fn status(status: u8) -> &'static str {
     match status {
-        OrderStatus::QUEUED => "queued",
+        OrderStatus::QUEUED => "queued, not sent",
         OrderStatus::ON_AIR => "sent, not known to have arrived",
         OrderStatus::RECEIVED => "received",
         OrderStatus::APPLIED => "applied",

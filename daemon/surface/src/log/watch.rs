@@ -11,6 +11,11 @@ const MIN_SILENCE: Duration = Duration::from_secs(60);
 /// Time between two entries about faults that are not grave.
 const MINOR_PAUSE: Duration = Duration::from_secs(1800);
 
+/// The text where an autopilot does not answer, beside those of [`EquipmentFaults::iter`].
+pub const AUTOPILOT_SILENT: &str = "the autopilot does not answer";
+/// The text of the end of all faults.
+pub const NO_FAULT: &str = "no fault any more";
+
 /// The facts about a vehicle that the log has.
 #[derive(Debug, Default)]
 pub(crate) struct Watch {
@@ -79,9 +84,9 @@ impl Watch {
         if faults != faults.grave() {
             self.minor_logged = Some(now);
         }
-        let silence = is_silent.then_some("the autopilot does not answer");
+        let silence = is_silent.then_some(AUTOPILOT_SILENT);
         let texts: Vec<&str> = silence.into_iter().chain(faults.iter().map(|(text, _)| text)).collect();
-        Some(if texts.is_empty() { "no fault any more".to_owned() } else { texts.join(", ") })
+        Some(if texts.is_empty() { NO_FAULT.to_owned() } else { texts.join(", ") })
     }
 
     /// Takes the labels on the map; returns those that are new in this epoch.

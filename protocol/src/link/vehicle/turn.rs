@@ -344,11 +344,15 @@ impl<S: StateSource> VehicleLink<S> {
     }
 
     /// Pause between turns while no content waits: empty turns take at most a tenth of the budget. While content is under way, which
-    /// waits again if it was lost, there is no least pause.
+    /// waits again if it was lost, a pause that is not worth much is left out.
     fn idle_pause(&self, is_idle: bool) -> Duration {
         const EMPTY_TURN_BITS: f64 = 240.0;
-        let least = if is_idle { 1.0 } else { 0.0 };
+        const LEAST: Duration = Duration::from_secs(1);
         let tenth = f64::from(self.budget.bits_per_s()) / 10.0;
-        Duration::from_secs_f64((EMPTY_TURN_BITS / tenth).max(least))
+        match Duration::from_secs_f64(EMPTY_TURN_BITS / tenth) {
+            pause if pause >= LEAST => pause,
+            _ if is_idle => LEAST,
+            _ => Duration::ZERO,
+        }
     }
 }
