@@ -227,6 +227,11 @@ impl Dive {
         if vehicle.own.settings.settings.is_empty() { &self.settings } else { &vehicle.own.settings }
     }
 
+    /// Whether the record has what the vehicle ran with.
+    pub(super) fn knows_settings(&self, vehicle: &DiveVehicle) -> bool {
+        !vehicle.own.settings.program.is_empty() || self.settings.is_rehearsal()
+    }
+
     /// The moment of a mission time, seconds since 1970.
     pub(super) fn unix_s(&self, at_s: f64) -> f64 {
         self.clock.nanos(at_s).map_or(self.span_s.1, seconds)
@@ -385,6 +390,13 @@ impl DiveVehicle {
     pub(super) fn middle_of(&self, cell: Cell, shift: (f64, f64)) -> (f64, f64) {
         let middle = |index: i32, shift_m: f64| (f64::from(index) + 0.5) * self.cell_m + shift_m;
         (middle(cell.x, shift.0), middle(cell.y, shift.1))
+    }
+
+    /// Whether the place of an image has the class of its label on the map at the end; true where its place is not known.
+    pub(super) fn shows_class(&self, state: &VehicleState, image: &Exemplar) -> bool {
+        let class = |label: u8| state.label_book.shown_as(label);
+        let label = || self.label_at(state.map.shift_m(), image.middle.x, image.middle.y);
+        image.width_m.is_nan() || class(label()) == class(image.label)
     }
 
     /// The label that a place in the world frame has on the map at the end; 0 without one.

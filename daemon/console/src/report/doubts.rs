@@ -11,7 +11,10 @@ const DOUBTFUL_M: f64 = 5.0;
 /// The doubts about what a report says of a vehicle, a sentence each.
 pub(super) fn doubts(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -> Vec<String> {
     let mut sentences = Vec::new();
-    sentences.extend(dive.damage.iter().map(|damage| format!("Not all of the record could be read: {damage}.")));
+    // How a record is made whole is no part of a report.
+    let told = |damage: &String| damage.split("; scenecast record recover").next().unwrap_or_default().to_owned();
+    let damage = dive.damage.iter().map(|damage| format!("Not all of the record could be read: {}.", told(damage)));
+    sentences.extend(damage);
     sentences.extend(gaps::of_records(dive, vehicle));
     sentences.extend(dive.restarts_s.iter().map(|(stopped_s, _)| {
         format!(
@@ -20,7 +23,11 @@ pub(super) fn doubts(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -
             utc_text(*stopped_s)
         )
     }));
+    sentences.extend(
+        vehicle.made_up(dive).map(|what| format!("Positions or images are not those of a real dive: this was {what}.")),
+    );
     sentences.extend(place(dive, vehicle));
+    sentences.extend(images(state, vehicle));
     if vehicle.own.runs_s.is_empty() {
         sentences.push(
             "Times of modes, faults and restarts are those at which the surface learned of them, and how far its map was behind is its own \
@@ -36,6 +43,18 @@ pub(super) fn doubts(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -
         );
     }
     sentences
+}
+
+/// How many images lie where the map has another class.
+fn images(state: &VehicleState, vehicle: &DiveVehicle) -> Option<String> {
+    let all = || vehicle.exemplars.iter().map(|(_, image)| image);
+    let other = all().filter(|image| !vehicle.shows_class(state, image)).count();
+    (other > 0).then(|| {
+        format!(
+            "{other} of the {} lie where the map at the end has another class than that of which they were sent as examples.",
+            words::counted(all().count(), "image that arrived", "images that arrived")
+        )
+    })
 }
 
 /// When its place was not known well.

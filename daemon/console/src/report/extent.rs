@@ -54,7 +54,12 @@ fn unseen(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle, shift: (f64,
     let Some(area) = of_survey(dive, vehicle) else {
         return match seen_of_fence(state, vehicle, shift) {
             Some(share) => format!(" Of the area within the fence, {:.1} % is on the map.", share * 100.0),
-            None => " No area of the survey is configured, so how much of it was not seen is not known.".to_owned(),
+            None if dive.knows_settings(vehicle) => {
+                " No area of the survey is configured, so how much of it was not seen is not known.".to_owned()
+            }
+            None => " The area of the survey is among the vehicle's settings, which this record does not have, so how much of it was not seen \
+                     is not known."
+                .to_owned(),
         };
     };
     let middles = vehicle.labels.iter().map(|(cell, _)| vehicle.middle_of(cell, shift));

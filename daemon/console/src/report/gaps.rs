@@ -118,7 +118,8 @@ pub(super) fn of_records(dive: &Dive, vehicle: &DiveVehicle) -> Vec<String> {
         )
     });
     let unknown = vehicle.own.runs_s.is_empty().then(|| {
-        "What went on on board between the frames that were heard, such as a restart of its program, is not known without its own record."
+        "What went on on board between the frames that were heard is known only as far as the surface learned of it: the vehicle's own record \
+         is not among these."
             .to_owned()
     });
     idle.chain(unknown).chain(stood).chain(more).collect()

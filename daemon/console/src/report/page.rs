@@ -338,10 +338,7 @@ fn legend(state: &VehicleState, vehicle: &DiveVehicle) -> String {
 fn images(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle, class: u8) -> String {
     let of_class = |label: u8| state.label_book.shown_as(label) == class;
     // The label of a place may have changed since its image was sent.
-    let shows_it = |exemplar: &Exemplar| {
-        let (x, y) = (exemplar.middle.x, exemplar.middle.y);
-        exemplar.width_m.is_nan() || of_class(vehicle.label_at(state.map.shift_m(), x, y))
-    };
+    let shows_it = |exemplar: &Exemplar| vehicle.shows_class(state, exemplar);
     let of_it: Vec<_> = vehicle.exemplars.iter().filter(|(_, exemplar)| of_class(exemplar.label)).collect();
     let mut found: Vec<_> = of_it.iter().copied().filter(|(_, exemplar)| shows_it(exemplar)).collect();
     found.sort_by_key(|(_, exemplar)| std::cmp::Reverse(exemplar.data.len()));

@@ -9,13 +9,15 @@ use crate::replay::FrameCounts;
 use crate::state::{LinkDirection, VehicleState};
 use scenecast_core::utc_text;
 use scenecast_messages::scenecast_msgs::{Event, OrderStatus};
-use scenecast_protocol::directive::SlotId;
+use scenecast_protocol::directive::{PlannerKind, SlotId};
 use scenecast_protocol::map::{Cell, UNEXPLORED};
 use scenecast_protocol::wire::VehicleMode;
 use scenecast_surface::LogKind;
 use serde_json::Value;
 use std::collections::BTreeMap;
 
+/// A shorter jump is not told, metres.
+const LEAST_JUMP_M: f64 = 2.0;
 /// Jumps that are told one by one.
 const MAX_JUMPS: usize = 4;
 
@@ -81,6 +83,8 @@ fn link(dive: &Dive, vehicle: &DiveVehicle) -> Vec<String> {
             "By modem.tx_watts of the surface and the frames that it knows of, the modems of the vehicles spent about {up_j:.0} J on transmitting, \
              that of the surface {down_j:.0} J."
         ));
+    } else if !vehicle.has_modem(dive) {
+        sentences.push("The frames did not go through a modem, so no energy is told.".to_owned());
     }
     sentences
 }
@@ -198,7 +202,10 @@ fn arrived(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle, alone: Opti
         format!(
             "In its last report, {} before the end of the record, the vehicle had {reported} cells; {held} had arrived by the end{}.{coarse}",
             duration(dive.mission_s(before_end_s)),
-            if held > reported { String::new() } else { format!(", {share:.0} %") }
+            match held > reported {
+                true => ", as it mapped and sent more after that".to_owned(),
+                false => format!(", {share:.0} %"),
+            }
         )
     })
 }
@@ -225,7 +232,7 @@ fn is_coarse(vehicle: &DiveVehicle) -> bool {
 
 /// How the vehicle looked at the sea floor.
 fn equipment(dive: &Dive, vehicle: &DiveVehicle) -> String {
-    if vehicle.own.settings.program.is_empty() && !dive.settings.is_rehearsal() {
+    if !dive.knows_settings(vehicle) {
         return "What the vehicle was set to, such as its altitude, speed and camera, and whether its motion and its images were real, is not \
                 known without its own record."
             .to_owned();
@@ -243,8 +250,12 @@ fn equipment(dive: &Dive, vehicle: &DiveVehicle) -> String {
         _ => "",
     };
     let planner = all.settings.get("survey.planner").and_then(Value::as_str).unwrap_or(defaults.survey.planner.name());
+    let way = match planner == PlannerKind::Lawnmower.name() {
+        true => "in straight legs".to_owned(),
+        false => format!("in straight legs and, once a utility was ordered, by the planner {planner}"),
+    };
     format!(
-        "{images}By its settings it was to survey {} m above the sea floor at {} m/s with the planner {planner} at the start, with camera images whose pixels are {} m \
+        "{images}By its settings it was to survey {} m above the sea floor at {} m/s {way}, with camera images whose pixels are {} m \
          wide there.",
         set("survey.altitude_m", defaults.survey.altitude_m),
         set("survey.speed_m_s", defaults.survey.speed_m_s),
@@ -274,7 +285,8 @@ fn place(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -> String {
     };
     let speed = vehicle.speed_m_s().filter(|_| !vehicle.is_played_back());
     let speed = speed.map_or_else(String::new, |m_s| format!(", at {m_s:.2} m/s on average while it moved"));
-    let jumps = vehicle.jumps().map(|(from, to)| format!("{:.0} m at {}", from.distance_m(to), utc_text(to.at_s)));
+    let jumps = vehicle.jumps().filter(|(from, to)| from.distance_m(to) >= LEAST_JUMP_M);
+    let jumps = jumps.map(|(from, to)| format!("{:.0} m at {}", from.distance_m(to), utc_text(to.at_s)));
     let jumps: Vec<String> = jumps.collect();
     let jumps = match jumps.len() {
         0 => String::new(),
@@ -392,9 +404,17 @@ fn orders(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -> String {
                     if n == 1 { "it" } else { "them" }
                 ),
             };
-            let open = match n - applied - refused - withdrawn - replaced {
-                0 => replaced_text,
-                open => format!("{replaced_text} The outcome of {open} is not known."),
+            let unsent = vehicle.orders_of_people().filter(|(order, way)| {
+                way.last().is_some_and(|last| last.status == OrderStatus::QUEUED) && !vehicle.is_replaced(order, way)
+            });
+            let unsent = unsent.count();
+            let unsent_text = match unsent {
+                0 => String::new(),
+                n => format!(" {n} {} never sent.", if n == 1 { "was" } else { "were" }),
+            };
+            let open = match n - applied - refused - withdrawn - replaced - unsent {
+                0 => replaced_text + &unsent_text,
+                open => format!("{replaced_text}{unsent_text} The outcome of {open} is not known."),
             };
             let ends = [(applied, "applied"), (refused, "refused"), (withdrawn, "withdrawn")];
             let ends = ends.iter().filter(|(count, _)| *count > 0).map(|(count, end)| format!("{count} {end}"));

@@ -134,7 +134,7 @@ fn listed(title: &str, found: &[(f64, String)]) -> Option<String> {
     let mut said = BTreeSet::new();
     let told = found.iter().map(|(at_s, text)| match said.insert(text) {
         true => format!("{}, {text}", utc_text(*at_s)),
-        false => format!("{}, {} again", utc_text(*at_s), text.split(": ").next().unwrap_or(text)),
+        false => format!("{}, again {text}", utc_text(*at_s)),
     });
     let told: Vec<String> = told.collect();
     match told.len() {
