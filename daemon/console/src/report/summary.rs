@@ -92,9 +92,14 @@ fn link(dive: &Dive, vehicle: &DiveVehicle) -> Vec<String> {
 /// The moments of the comparison at which the vehicle surveyed, or all of them where its modes are not known.
 fn surveyed(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -> Vec<MapsAt> {
     let modes: Vec<(f64, &Event)> = dive.modes(state, vehicle).collect();
+    // After its record it may have been ended.
+    let is_recorded = |at_s: f64| {
+        let mut runs = vehicle.own.runs_s.iter();
+        runs.len() == 0 || runs.any(|(from_s, to_s)| (*from_s..=*to_s).contains(&at_s))
+    };
     let did_survey = |maps: &&MapsAt| {
         let last = modes.iter().rev().find(|(at_s, _)| *at_s <= maps.at_s);
-        last.is_some_and(|(_, event)| event.text.starts_with(VehicleMode::Survey.name()))
+        is_recorded(maps.at_s) && last.is_some_and(|(_, event)| event.text.starts_with(VehicleMode::Survey.name()))
     };
     let surveyed: Vec<MapsAt> = vehicle.maps.iter().filter(did_survey).copied().collect();
     if surveyed.is_empty() { vehicle.maps.clone() } else { surveyed }
