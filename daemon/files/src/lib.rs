@@ -16,6 +16,7 @@ mod tum_recording;
 mod whole;
 
 pub use bag::Bag;
+pub use bag::stream::HOW_TO_RECOVER;
 pub use bag_recording::{BagTiming, BagTopics};
 pub use configured::{
     configured_calibration, configured_mounting, configured_recording, configured_vocabulary, open_bag, read_vocabulary,

@@ -4,6 +4,7 @@ use super::dive::{Dive, DiveVehicle};
 use super::{extent, gaps, words};
 use crate::state::VehicleState;
 use scenecast_core::utc_text;
+use scenecast_files::HOW_TO_RECOVER;
 
 /// A place with a greater standard deviation is worth a sentence, metres.
 const DOUBTFUL_M: f64 = 5.0;
@@ -12,9 +13,8 @@ const DOUBTFUL_M: f64 = 5.0;
 pub(super) fn doubts(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -> Vec<String> {
     let mut sentences = Vec::new();
     // How a record is made whole is no part of a report.
-    let told = |damage: &String| damage.split("; scenecast record recover").next().unwrap_or_default().to_owned();
-    let damage = dive.damage.iter().map(|damage| format!("Not all of the record could be read: {}.", told(damage)));
-    sentences.extend(damage);
+    let damage = dive.damage.iter().map(|damage| damage.replace(HOW_TO_RECOVER, ""));
+    sentences.extend(damage.map(|damage| format!("Not all of the record could be read: {damage}.")));
     sentences.extend(gaps::of_records(dive, vehicle));
     sentences.extend(dive.restarts_s.iter().map(|(stopped_s, _)| {
         format!(

@@ -112,10 +112,9 @@ fn agreement(vehicle: &DiveVehicle, surveyed: &[MapsAt]) -> Option<String> {
     };
     let [all, surveyed] = [shares(&vehicle.maps), shares(surveyed)];
     let mean = |shares: &[f64]| shares.iter().sum::<f64>() / shares.len() as f64 * 100.0;
-    let means = match surveyed.len() {
-        0 => format!("{:.0} % on average over the record", mean(&all)),
-        n if n == all.len() => format!("{:.0} % on average over the record", mean(&all)),
-        _ => {
+    let means = match surveyed.is_empty() || surveyed.len() == all.len() {
+        true => format!("{:.0} % on average over the record", mean(&all)),
+        false => {
             format!("{:.0} % on average while it surveyed, {:.0} % over the whole record", mean(&surveyed), mean(&all))
         }
     };

@@ -66,34 +66,37 @@ pub(super) fn told(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -> 
     sentences
 }
 
-/// The faults that a text of the log names; `None` if it is about something else.
-fn equipment(text: &str) -> Option<Vec<&str>> {
-    let known = || EquipmentFaults::decode(u8::MAX).iter().map(|(known, _)| known).chain([AUTOPILOT_SILENT]);
-    let faults: Vec<&str> = if text == NO_FAULT { Vec::new() } else { text.split(", ").collect() };
-    faults.iter().all(|fault| known().any(|known| known == *fault)).then_some(faults)
+/// The faults that a text of the log names, and whether the survey does not proceed as planned with each; `None` if it is about
+/// something else.
+fn equipment(text: &str) -> Option<Vec<(&'static str, bool)>> {
+    let known = || EquipmentFaults::decode(u8::MAX).iter().chain([(AUTOPILOT_SILENT, true)]);
+    match text {
+        NO_FAULT => Some(Vec::new()),
+        faults => faults.split(", ").map(|fault| known().find(|(known, _)| *known == fault)).collect(),
+    }
 }
 
 /// The faults of its equipment as it reported them: when they began and, of those with which the survey does not proceed as planned,
 /// when they ended. The end of others is not reported.
 fn faults(dive: &Dive, state: &VehicleState) -> Vec<(f64, String)> {
-    let is_grave = |fault: &str| {
-        let grave = EquipmentFaults::decode(u8::MAX).grave();
-        fault == AUTOPILOT_SILENT || grave.iter().any(|(known, _)| known == fault)
-    };
     let mut open: Vec<(&str, f64)> = Vec::new();
     let mut told: Vec<(f64, String)> = Vec::new();
     let reports = dive.events.iter().filter(|(_, event)| event.source == FAULT && event.vehicle == state.name);
     for (at_s, reported) in reports.filter_map(|(at_s, event)| Some((*at_s, equipment(&event.text)?))) {
-        let (last, over): (Vec<_>, Vec<_>) = open.into_iter().partition(|(fault, _)| reported.contains(fault));
+        let (last, over): (Vec<_>, Vec<_>) =
+            open.into_iter().partition(|(fault, _)| reported.iter().any(|(known, _)| known == fault));
         open = last;
         told.extend(over.into_iter().map(|(fault, from_s)| {
             let lasted = words::duration(dive.mission_s(at_s - from_s));
             (from_s, format!("{fault} until {} ({lasted})", utc_text(at_s)))
         }));
-        let (grave, minor): (Vec<&str>, Vec<&str>) = reported.into_iter().partition(|fault| is_grave(fault));
-        told.extend(minor.into_iter().map(|fault| (at_s, fault.to_owned())));
-        let begun: Vec<_> = grave.into_iter().filter(|fault| open.iter().all(|(known, _)| known != fault)).collect();
-        open.extend(begun.into_iter().map(|fault| (fault, at_s)));
+        for (fault, is_grave) in reported {
+            if !is_grave {
+                told.push((at_s, fault.to_owned()));
+            } else if open.iter().all(|(known, _)| *known != fault) {
+                open.push((fault, at_s));
+            }
+        }
     }
     told.extend(open.into_iter().map(|(fault, from_s)| (from_s, format!("{fault} until the end of the record"))));
     told
@@ -150,7 +153,6 @@ fn listed(title: &str, found: &[(f64, String)]) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use scenecast_messages::scenecast_msgs::Event;
 
     #[test]
     fn a_fault_is_told_with_its_begin_and_its_end() {

@@ -14,6 +14,9 @@ use std::path::{Path, PathBuf};
 
 /// Size of the largest record, bytes: a chunk of some raw images.
 const MAX_RECORD_BYTES: usize = 512 << 20;
+/// What can be done about a file that breaks off, as the account of one ends.
+pub const HOW_TO_RECOVER: &str =
+    "; scenecast record recover FOLDER makes a record whole, and mcap recover OLD.mcap -o NEW.mcap another bag";
 
 /// A topic of a bag.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
@@ -89,10 +92,7 @@ impl BagStream {
                 Ok(None) => self.open = None,
                 Err(error) => {
                     self.open = None;
-                    return Err(format!(
-                        "it breaks off: {error}; scenecast record recover FOLDER makes a record whole, and mcap recover OLD.mcap -o \
-                         NEW.mcap another bag"
-                    ));
+                    return Err(format!("it breaks off: {error}{HOW_TO_RECOVER}"));
                 }
             }
         }
