@@ -48,7 +48,7 @@ field("uint8", base.DEC, names.yes_no, [[
 field("uint32", base.DEC, nil, [[
     version = Version; near = Base, if near; more = Remaining, if few; vehicle = Vehicle; from = From; to = To; base = Base; number = Number, low bits;
     number.full = Number; remaining = Remaining; turn = Turn; stamp.clock = Clock (ms); stamp.one_way = One way (ms);
-    stamp.heard = Last frame of the surface, low 8; stamp.held = Held since (ms); ack.horizon = Horizon, low 12 or 4;
+    stamp.heard = Last frame of the surface, low 8; stamp.held = Held since (ms); ack.horizon = Horizon, low 12, 4 or 2;
     ack.length = Bytes of loss code; ack.lost = Lost, low 12 or 4; chunk.length = Bytes of payload;
     intro.edge = Edge of a cell (0.1 mm, 0: no map); intro.silence = Silence (8 s);
     intro.name_length = Bytes of the name; intro.clock = Clock (hours since 1970);
@@ -618,7 +618,15 @@ local function header(r, tree, frame)
         local value, item = r:put(tree, "remaining", 8)
         item:append_text(frame.from == 0 and (" (%d bits on air)"):format(value * 32) or " (frames)")
     end
-    if frame.turn == 1 then
+    if frame.turn == 1 and frame.from ~= 0 and frame.hello == 0 then
+        local is_heard = r:take(1) == 1
+        if is_heard then table.insert(frame.words, "ack " .. r:put(tree, "ack.horizon", 2))
+        elseif r:take(2) ~= 0 then fail("Low bits of a horizon in a turn byte without a statement") end
+        if is_heard and frame.ack == 1 then fail("There are two statements") end
+        local value, item = r:put(tree, "turn", 5)
+        frame.time = value < 8 and value or (4 + value % 4) * 2 ^ (math.floor(value / 4) - 1)
+        item:append_text((" (%g s)"):format(frame.time / 4))
+    elseif frame.turn == 1 then
         local value, item = r:put(tree, "turn", 8)
         frame.time = value
         item:append_text((" (%g s)"):format(value / 4))

@@ -44,7 +44,7 @@ EXPECTED = {
     'map frame in the middle of a turn': RIGHT | {
         'flag.up': '1', 'base': '2', 'number': '2', 'remaining': '1', 'turn': None, 'chunk.kind': '1', 'map.codec': '0',
         'map.stride': '0', 'map.x': '-1', 'map.y': '2', 'map.width': '2', 'map.height': '1', 'padding': '00' * 29},
-    'frame without content': RIGHT | {'flag.up': '1', 'base': '1', 'number': '3', 'turn': '40', 'chunk.kind': None},
+    'frame without content': RIGHT | {'flag.up': '1', 'base': '1', 'number': '3', 'turn': '20', 'chunk.kind': None},
     'frame with a base of two bytes': RIGHT | {
         'flag.up': '1', 'base': '200', 'number': '300', 'number.full': '300', 'turn': None, 'chunk.kind': None},
     'call': CALL | RIGHT,

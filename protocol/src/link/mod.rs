@@ -15,7 +15,7 @@ mod window;
 
 pub use mismatch::Mismatch;
 pub use pair::HOLDER_SILENCE;
-use pair::{Inbound, LinkPair};
+use pair::{AckRoom, Inbound, LinkPair};
 pub use run::{Authenticity, Identity};
 pub use slots::{Admission, SeriesRecord, SlotInbox, SlotInboxState};
 pub use stats::{DropReason, Goodput, LinkStats, Loss};

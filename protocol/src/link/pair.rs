@@ -30,6 +30,15 @@ struct Strays {
     of_ended_run: bool,
 }
 
+/// Where the acknowledgement of a frame may stand.
+#[derive(Debug, Clone, Copy)]
+pub struct AckRoom {
+    /// The most bytes of a statement.
+    pub bytes: usize,
+    /// At the vehicle: whether the turn byte may have it instead; the frame has one, or gets one if it proves to be the last of its turn.
+    pub in_turn: bool,
+}
+
 /// Handshake, flight, window and counters toward one peer. `T` is the content of a sent frame.
 #[derive(Debug)]
 pub struct LinkPair<T> {
@@ -348,12 +357,12 @@ impl<T> LinkPair<T> {
         }
     }
 
-    /// Starts the next frame, with at most `ack_room` bytes of acknowledgement. It becomes a hello if `purpose` demands it
+    /// Starts the next frame, with acknowledgement as far as there is room for it. It becomes a hello if `purpose` demands it
     /// or the handshake is not complete.
     pub fn begin_frame(
         &mut self,
         size: usize,
-        ack_room: usize,
+        room: AckRoom,
         turn: Option<u8>,
         stamp: Option<Stamp>,
         purpose: FramePurpose,
@@ -370,7 +379,7 @@ impl<T> LinkPair<T> {
             turn,
             stamp,
             nonce: (hello && keyed).then_some(own.nonce),
-            ack: run.and_then(|r| r.window.statement(ack_room)),
+            ack: run.and_then(|r| r.window.statement(room.bytes, room.in_turn)),
             keyed,
             ..Header::numbered(self.us, self.peer, number, base)
         };
@@ -459,6 +468,8 @@ mod tests {
         Some(Authenticity::new(HeldKey::Mission(MissionKey::from_bytes([9; 16])), true, encrypt))
     }
 
+    const ROOM: AckRoom = AckRoom { bytes: 20, in_turn: false };
+
     fn end_of_surface(authenticity: Option<Authenticity>, seed: u64) -> LinkPair<u64> {
         let auv = Address::vehicle(3).unwrap();
         LinkPair::new(MissionId(1), Address::SURFACE, auv, authenticity, introduction(), seed)
@@ -475,7 +486,7 @@ mod tests {
         content: u64,
         purpose: FramePurpose,
     ) -> Vec<(u64, bool)> {
-        let builder = from.begin_frame(64, 20, Some(4), None, purpose);
+        let builder = from.begin_frame(64, ROOM, Some(4), None, purpose);
         let bytes = from.finish_frame(builder, content, purpose, true);
         let us = to.us;
         let envelope = Envelope::decode(&bytes, |a| a == us).unwrap();
@@ -529,7 +540,7 @@ mod tests {
     }
 
     fn sent(from: &mut LinkPair<u64>, purpose: FramePurpose) -> Vec<u8> {
-        let builder = from.begin_frame(64, 20, None, None, purpose);
+        let builder = from.begin_frame(64, ROOM, None, None, purpose);
         from.finish_frame(builder, 0, purpose, true)
     }
 

@@ -1,7 +1,7 @@
 //! The window of received frames, and the sent frames whose fate is not known yet.
 
 use super::FrameNumber;
-use crate::wire::{AckStatement, Horizon, MAX_WINDOW};
+use crate::wire::{AckForm, AckStatement, Horizon, MAX_WINDOW};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Why the window rejects a verified frame.
@@ -83,13 +83,14 @@ impl LinkWindow {
         self.unpersisted.clear();
     }
 
-    /// The verdict on the received frames in at most `room` bytes; `None` if the sender knows all of it.
+    /// The verdict on the received frames in at most `room` bytes, or in the turn byte of a vehicle's frame that `has_turn`; `None`
+    /// if the sender knows all of it.
     ///
     /// A frame that the verdict declares lost is not accepted later.
-    pub fn statement(&mut self, room: usize) -> Option<AckStatement> {
+    pub fn statement(&mut self, room: usize, has_turn: bool) -> Option<AckStatement> {
         let mut horizon = self.utmost();
         loop {
-            let statement = self.verdict(horizon)?;
+            let statement = self.verdict(horizon, has_turn)?;
             if statement.encode(room, &mut Vec::new()) {
                 self.closed = self.closed.max(horizon);
                 return Some(statement);
@@ -101,7 +102,7 @@ impl LinkWindow {
     /// Bytes of a statement on all received frames.
     pub fn statement_bytes(&self) -> usize {
         let mut bytes = Vec::new();
-        if let Some(statement) = self.verdict(self.utmost()) {
+        if let Some(statement) = self.verdict(self.utmost(), false) {
             statement.encode(usize::MAX, &mut bytes);
         }
         bytes.len()
@@ -111,15 +112,15 @@ impl LinkWindow {
         self.unpersisted.first().map_or(self.highest, |&n| n - 1)
     }
 
-    fn verdict(&self, horizon: FrameNumber) -> Option<AckStatement> {
+    fn verdict(&self, horizon: FrameNumber, has_turn: bool) -> Option<AckStatement> {
         if horizon <= self.base {
             return None;
         }
         let lost = (self.base + 1..=horizon).rev().filter(|n| !self.held.contains(n));
         let lost: Vec<u16> = lost.map(|n| (horizon - n) as u16).collect();
         // The sender's horizon is `base` at least, and at most what was stated before.
-        let is_near = horizon - self.base <= Horizon::MAX_NEAR && horizon >= self.closed;
-        Some(AckStatement::new(horizon, lost, is_near))
+        let ahead = if horizon >= self.closed { horizon - self.base } else { u64::MAX };
+        Some(AckStatement::new(horizon, lost, AckForm::shortest(ahead, has_turn)))
     }
 }
 
@@ -173,7 +174,7 @@ impl<T> Flight<T> {
     pub fn handle_statement(&mut self, statement: &AckStatement, number: Option<FrameNumber>) -> Vec<(T, bool)> {
         // The few bits of a near horizon are unambiguous in the order of the frames alone.
         let is_latest = number.is_some_and(|number| number > self.stated);
-        if matches!(statement.horizon, Horizon::Near(_)) && !is_latest {
+        if !matches!(statement.horizon, Horizon::Far(_)) && !is_latest {
             return Vec::new();
         }
         self.stated = self.stated.max(number.unwrap_or(0));
@@ -223,7 +224,7 @@ mod tests {
                     }
                     _ => {
                         stated += 1;
-                        statements.extend(window.statement(room).map(|s| (stated, s)));
+                        statements.extend(window.statement(room, pick % 2 == 0).map(|s| (stated, s)));
                         // Some are lost, some late, some come twice.
                         if let Some((number, s)) = statements.get(pick % (statements.len() + 1)) {
                             fates.extend(flight.handle_statement(s, Some(*number)));
@@ -255,7 +256,7 @@ mod tests {
                 assert_eq!(window.accept(number, distance), Ok(()));
             }
             if i % 300 == 0
-                && let Some(statement) = window.statement(200)
+                && let Some(statement) = window.statement(200, i % 600 == 0)
             {
                 for (number, delivered) in flight.handle_statement(&statement, Some(i)) {
                     judged += 1;
@@ -271,8 +272,8 @@ mod tests {
         let mut w = LinkWindow::default();
         w.accept(1, 1).unwrap();
         w.hold_back(1);
-        assert_eq!(w.statement(10), None);
+        assert_eq!(w.statement(10, false), None);
         w.handle_persisted();
-        assert!(w.statement(10).is_some());
+        assert!(w.statement(10, false).is_some());
     }
 }

@@ -75,6 +75,39 @@ pub fn quarter_seconds(d: Duration, most: u8) -> u8 {
     (d.as_secs_f64() * 4.0).ceil().clamp(0.0, f64::from(most)) as u8
 }
 
+/// When a vehicle would use another turn, in the 5 bits of its turn byte: the value itself up to 7, above it a number of 3 bits, the
+/// first of which is 1 and not sent, shifted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Wish(u8);
+
+impl Wish {
+    const LAST: u8 = 31;
+
+    /// The soonest one that is not before `wait`, or the last, 112 s or later.
+    pub fn after(wait: Duration) -> Self {
+        (0..Self::LAST).map(Self).find(|wish| wish.wait() >= wait).unwrap_or(Self(Self::LAST))
+    }
+
+    /// The one with these 5 bits.
+    pub fn of_bits(bits: u8) -> Self {
+        Self(bits & Self::LAST)
+    }
+
+    /// The low 5 bits of the vehicle's turn byte that carry it.
+    pub fn bits(self) -> u8 {
+        self.0
+    }
+
+    /// The time from the end of the turn.
+    pub fn wait(self) -> Duration {
+        let quarters = match self.0 >> 2 {
+            0 => u32::from(self.0),
+            exponent => u32::from(4 + (self.0 & 3)) << (exponent - 1),
+        };
+        Duration::from_millis(250) * quarters
+    }
+}
+
 /// A turn granted to a vehicle.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Grant {

@@ -1,6 +1,6 @@
 //! The surface's side of medium access.
 
-use super::{Access, ModemProfile, quarter_seconds};
+use super::{Access, ModemProfile, Wish, quarter_seconds};
 use crate::time::Instant;
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -216,7 +216,7 @@ impl Master {
         &mut self,
         bytes: usize,
         remaining: u8,
-        wish: Option<u8>,
+        wish: Option<Wish>,
         profile: &ModemProfile,
         now: Instant,
     ) {
@@ -232,7 +232,7 @@ impl Master {
         let taken = self.granted.map_or(Duration::ZERO, |at| now.since(at)) + rest;
         self.is_saturated = taken >= self.granted_airtime.mul_f64(0.6);
         let until = now + self.rest_of_turn(remaining, profile);
-        let pause = wish.map(|quarters| (Duration::from_millis(250) * u32::from(quarters)).min(self.config.max_idle));
+        let pause = wish.map(|wish| wish.wait().min(self.config.max_idle));
         let ready = now + profile.turn_around;
         self.state = match (remaining, pause) {
             (0, pause) => MediumState::Idle { ready, next: ready + pause.unwrap_or_default() },
@@ -292,7 +292,7 @@ mod tests {
         master.handle_round_trip(Duration::from_secs(1), now);
         master.begin(40, now);
         master.handle_turn_sent(&PROFILE, 0, now);
-        master.handle_answer(256, 2, Some(16), &PROFILE, now);
+        master.handle_answer(256, 2, Some(Wish::after(Duration::from_secs(4))), &PROFILE, now);
         let end = master.end_of_turn().unwrap();
         assert!(end > now + PROFILE.frame_airtime() * 2 && !master.may_speak(true, now + PROFILE.frame_airtime()));
         assert!(master.is_engaged(now) && !master.is_engaged(end));

@@ -7,6 +7,7 @@ mod floor;
 mod master;
 
 pub use floor::Grant;
+pub use floor::Wish;
 pub(crate) use floor::{Floor, quarter_seconds};
 pub(crate) use master::Master;
 pub use master::MasterConfig;

@@ -9,7 +9,7 @@ pub const MAX_WINDOW: u64 = 2048;
 ///
 /// It states: "Of the frames numbered up to `horizon` I hold all but `lost`." A receiver never accepts a frame that it
 /// has declared lost. So both ends agree forever on the fate of every frame up to a horizon, and map chunks can build
-/// on it.
+/// on it. The shortest form is three bits of a vehicle's turn byte ([`Header`](super::Header)); the others are:
 ///
 /// ```text
 ///  0 1 2 3 4 5 6 7
@@ -39,27 +39,51 @@ pub struct AckStatement {
 /// The low bits of the highest frame number that a statement judges.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Horizon {
+    /// Low 2 bits, in the turn byte: it is at most 3 after the highest number whose verdict the sender of the frames knows, and no
+    /// frame is lost.
+    InTurn(u8),
     /// Low 4 bits: it is at most 15 after the highest number whose verdict the sender of the frames knows.
     Near(u8),
-    /// Low 12 bits.
+    /// Low 12 bits, for a horizon or for lost frames that the shorter forms cannot name.
     Far(u16),
 }
 
-impl Horizon {
-    /// The most that a near one is ahead.
-    pub(crate) const MAX_NEAR: u64 = 15;
+/// The forms of a statement, the shortest first.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum AckForm {
+    /// In three bits of a vehicle's turn byte, so that it takes no bytes of its own; it names no lost frame.
+    InTurn,
+    /// One byte: 4 bits of the horizon, and for each of the 3 frames below it whether it is lost.
+    Near,
+    /// Two bytes or more: 12 bits of the horizon, and a code of any lost frames below it.
+    Far,
+}
 
+impl AckForm {
+    /// The shortest form in which a statement may have a horizon so far after the highest number whose verdict is known; `has_turn`
+    /// is whether the frame has the turn byte of a vehicle.
+    pub(crate) fn shortest(ahead: u64, has_turn: bool) -> Self {
+        match ahead {
+            0..=3 if has_turn => Self::InTurn,
+            0..=15 => Self::Near,
+            _ => Self::Far,
+        }
+    }
+}
+
+impl Horizon {
     /// The bits as they are sent.
     pub fn low(self) -> u16 {
         match self {
-            Self::Near(low) => low.into(),
+            Self::InTurn(low) | Self::Near(low) => low.into(),
             Self::Far(low) => low,
         }
     }
 
-    /// The number of bits.
+    /// How many low bits of the horizon are sent.
     pub fn bits(self) -> u32 {
         match self {
+            Self::InTurn(_) => 2,
             Self::Near(_) => 4,
             Self::Far(_) => 12,
         }
@@ -72,17 +96,22 @@ impl Horizon {
 }
 
 impl AckStatement {
-    /// A statement on the frames up to `horizon`; `is_near` allows the form of one byte, if that can name the lost ones.
-    pub fn new(horizon: u64, lost: Vec<u16>, is_near: bool) -> Self {
-        let is_short = is_near && lost.iter().all(|distance| NEAR_LOST.contains(distance));
-        let horizon = if is_short { Horizon::Near(horizon as u8 & 0xF) } else { Horizon::Far(horizon as u16 & 0xFFF) };
+    /// A statement on the frames up to `horizon`, in this form or the shortest longer one that can name the lost ones.
+    pub fn new(horizon: u64, lost: Vec<u16>, shortest: AckForm) -> Self {
+        let is_near = lost.iter().all(|distance| NEAR_LOST.contains(distance));
+        let horizon = match shortest {
+            AckForm::InTurn if lost.is_empty() => Horizon::InTurn(horizon as u8 & 3),
+            AckForm::InTurn | AckForm::Near if is_near => Horizon::Near(horizon as u8 & 0xF),
+            _ => Horizon::Far(horizon as u16 & 0xFFF),
+        };
         Self { horizon, lost }
     }
 
-    /// Appends the statement if it takes at most `room` bytes; returns whether it did.
+    /// Appends the statement if it takes at most `room` bytes; returns whether it did. One in the turn byte takes none.
     pub fn encode(&self, room: usize, out: &mut Vec<u8>) -> bool {
         let before = out.len();
         match self.horizon {
+            Horizon::InTurn(_) => {}
             Horizon::Near(low) => {
                 let bits = self.lost.iter().filter(|&&lost| lost > 0).fold(0, |bits, &lost| bits | 8u8 >> lost.min(4));
                 out.push(low << 3 | bits);
@@ -204,8 +233,8 @@ mod tests {
         back
     }
 
-    fn golden(horizon: u64, lost: Vec<u16>, is_near: bool, bytes: &[u8]) {
-        let (statement, mut written) = (AckStatement::new(horizon, lost, is_near), Vec::new());
+    fn golden(horizon: u64, lost: Vec<u16>, form: AckForm, bytes: &[u8]) {
+        let (statement, mut written) = (AckStatement::new(horizon, lost, form), Vec::new());
         assert!(!statement.encode(bytes.len() - 1, &mut written) && written.is_empty());
         assert!(statement.encode(bytes.len(), &mut written));
         assert_eq!((&written[..], round_trip(&statement)), (bytes, statement));
@@ -213,22 +242,22 @@ mod tests {
 
     #[test]
     fn a_clean_turn_is_acknowledged_in_one_byte() {
-        golden(0xABC, vec![], true, &[0x60]);
-        golden(0xABC, vec![], false, &[0xD5, 0xE0]);
+        golden(0xABC, vec![], AckForm::Near, &[0x60]);
+        golden(0xABC, vec![], AckForm::Far, &[0xD5, 0xE0]);
     }
 
     #[test]
     fn golden_bytes_of_two_losses() {
-        golden(7, vec![1, 3], true, &[0x3D]);
-        golden(7, vec![1, 4], true, &[0x80, 0x39, 0b0010_0100]);
-        golden(7, vec![0], true, &[0x80, 0x39, 0b0100_0000]);
+        golden(7, vec![1, 3], AckForm::Near, &[0x3D]);
+        golden(7, vec![1, 4], AckForm::Near, &[0x80, 0x39, 0b0010_0100]);
+        golden(7, vec![0], AckForm::Near, &[0x80, 0x39, 0b0100_0000]);
     }
 
     #[test]
     fn fifty_losses_in_500_frames_take_under_40_bytes() {
         let lost: Vec<u16> = (0..50).map(|i| i * 10 + (i * 7 % 5)).collect();
         let mut bytes = Vec::new();
-        assert!(AckStatement::new(0, lost, true).encode(40, &mut bytes));
+        assert!(AckStatement::new(0, lost, AckForm::Near).encode(40, &mut bytes));
     }
 
     proptest! {
@@ -236,7 +265,8 @@ mod tests {
         fn statements_round_trip(
             horizon: u64, is_near: bool, lost in proptest::collection::btree_set(0u16..600, 0..120),
         ) {
-            let statement = AckStatement::new(horizon, lost.into_iter().collect(), is_near);
+            let form = if is_near { AckForm::Near } else { AckForm::Far };
+            let statement = AckStatement::new(horizon, lost.into_iter().collect(), form);
             prop_assert_eq!(round_trip(&statement), statement);
         }
 

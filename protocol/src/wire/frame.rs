@@ -235,6 +235,8 @@ pub struct FrameBuilder {
     seal_bytes: usize,
     remaining: u8,
     turn: Option<u8>,
+    /// The bits of the turn byte that have the ack statement.
+    heard: u8,
     /// Where `remaining` and turn byte go.
     turn_at: usize,
     /// The highest `remaining` that there is room for. The frame has its byte wherever it was kept free: the last chunk may reach
@@ -250,13 +252,25 @@ impl FrameBuilder {
     pub fn new(header: &Header, size: usize) -> Self {
         let mut bytes = Vec::with_capacity(size);
         let turn_at = header.encode(&mut bytes);
-        let (kind, remaining, turn) = (header.kind(), header.remaining, header.turn);
+        let (kind, remaining, turn, heard) = (header.kind(), header.remaining, header.turn, header.heard());
         let seal_bytes = Seal::bytes(header.keyed, kind);
         let (most_remaining, body_at, last_chunk) = (remaining, 0, None);
-        let mut builder =
-            Self { bytes, size, kind, seal_bytes, remaining, turn, turn_at, most_remaining, body_at, last_chunk };
+        let mut builder = Self {
+            bytes,
+            size,
+            kind,
+            seal_bytes,
+            remaining,
+            turn,
+            heard,
+            turn_at,
+            most_remaining,
+            body_at,
+            last_chunk,
+        };
         let room = builder.room();
         if let Some(ack) = &header.ack
+            && heard == 0
             && ack.encode(room, &mut builder.bytes)
             && let Some(flags) = builder.bytes.first_mut()
         {
@@ -273,7 +287,7 @@ impl FrameBuilder {
         self
     }
 
-    /// Sets the header's `remaining`.
+    /// Sets how much of this turn follows the frame: from a vehicle in frames, from the surface in units of 32 bits on air.
     pub fn set_remaining(&mut self, remaining: u8) {
         self.most_remaining = self.most_remaining.max(remaining);
         self.remaining = remaining;
@@ -326,7 +340,8 @@ impl FrameBuilder {
         }
         self.body_at += self.turn_bytes();
         let has_byte = self.has_remaining_byte();
-        Header::end_turn(&mut self.bytes, self.turn_at, self.remaining, has_byte, self.turn);
+        let turn = self.turn.map(|turn| self.heard | turn);
+        Header::end_turn(&mut self.bytes, self.turn_at, self.remaining, has_byte, turn);
         self.bytes.resize(content, 0);
         seal.close(&mut self.bytes, self.body_at);
         self.bytes
@@ -335,7 +350,7 @@ impl FrameBuilder {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{AckStatement, Stamp, room_for_payload};
+    use super::super::{AckForm, AckStatement, Stamp, room_for_payload};
     use super::*;
     use crate::seal::MissionKey;
     use proptest::prelude::*;
@@ -344,7 +359,7 @@ mod tests {
     const MISSION: MissionId = MissionId(0x5CE7_0001);
 
     fn header() -> Header {
-        let ack = Some(AckStatement::new(5, vec![], true));
+        let ack = Some(AckStatement::new(5, vec![], AckForm::Near));
         Header { remaining: 2, ack, ..Header::numbered(Address::vehicle(1).unwrap(), Address::SURFACE, 0xFF, 3) }
     }
 
@@ -409,6 +424,21 @@ mod tests {
         full.set_turn(3);
         let bytes = full.finish(&run(7, 255), false);
         assert_eq!((bytes.len(), envelope(&bytes).unwrap().header.turn), (64, None));
+    }
+
+    #[test]
+    fn a_turn_byte_of_a_vehicle_has_a_statement_without_losses() {
+        let frame = |turn: u8, horizon: u64| {
+            let ack = Some(AckStatement::new(horizon, vec![], AckForm::InTurn));
+            let header = Header { remaining: 0, turn: Some(turn), ack, ..header() };
+            let bytes = FrameBuilder::new(&header, 64).finish(&run(7, 255), true);
+            assert_eq!(envelope(&bytes).unwrap().header, header);
+            bytes
+        };
+        assert_eq!(frame(0, 4)[..4], [0xE8, 0x81, 0xFF, 0x80]);
+        assert_eq!(frame(31, 7)[..4], [0xE8, 0x81, 0xFF, 0xFF]);
+        assert!(envelope(&[0xE8, 0x81, 9, 0x61, 0, 0, 0, 0]).is_err(), "no low bits of a horizon");
+        assert!(envelope(&[0xF8, 0x81, 9, 0xE1, 0x28, 0, 0, 0, 0]).is_err(), "two statements");
     }
 
     #[test]

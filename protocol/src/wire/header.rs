@@ -1,6 +1,6 @@
 //! The header of a frame, and its number: a few bits on the wire, unbounded inside.
 
-use super::ack::AckStatement;
+use super::ack::{AckStatement, Horizon};
 use super::frame::FrameError;
 use super::stamp::Stamp;
 use super::{MAX_WINDOW, WIRE_VERSION};
@@ -101,7 +101,7 @@ impl FrameKind {
 /// +---------------+-----------------------+-----------------------+
 /// 1          the first bit of a numbered frame of this version; that of earlier versions is 0
 /// nr         near: 1..=3 is `base`, and its bytes are absent; 0: they are present
-/// A          an ack statement is present
+/// A          an ack statement follows, which is not in the turn byte
 /// T          a turn byte is present
 /// S          a time stamp is present
 /// K          keyed: the frame ends in a tag of 8 bytes under the mission's key instead of a CRC; a hello then has a nonce
@@ -114,7 +114,10 @@ impl FrameKind {
 /// remaining  from the surface: bits on air that follow in this turn, divided by 32, rounded up, 255 = that or more;
 ///            from a vehicle: frames that follow in this turn, 255 = 255 or more
 /// turn       from the surface: airtime granted, in quarter seconds (0 = none), in a call: time to answer in;
-///            from a vehicle: when it would use another turn, in quarter seconds from now (0 = at once, 255 = not known)
+///            from a vehicle in a numbered frame: heard:3 | wish:5
+/// heard      4..=7: an ack statement on all frames up to a horizon with these low 2 bits; 0: not in this byte
+/// wish       when the vehicle would use another turn, in quarter seconds from now: 0..=7; above, with 4 + the low 2 bits,
+///            shifted by the high 3 bits less 1; 31 = 112 s or later
 /// nonce      random number of the sender's run, for the key of the pair of runs
 /// ```
 ///
@@ -133,7 +136,7 @@ pub struct Header {
     pub base: u16,
     /// Bits or frames that follow in this turn, as above.
     pub remaining: u8,
-    /// The turn byte, as above.
+    /// The turn byte, as above, without `heard`.
     pub turn: Option<u8>,
     /// The sender's clock at transmission.
     pub stamp: Option<Stamp>,
@@ -164,6 +167,11 @@ const LONG_BASE: u8 = 128;
 fn is_long(base: u16) -> bool {
     base >= u16::from(LONG_BASE)
 }
+
+/// The turn byte of a vehicle.
+const HEARD: u8 = 0b1000_0000;
+const HEARD_SHIFT: u32 = 5;
+const WISH: u8 = 0b1_1111;
 
 const ACK: u8 = 0b1_0000;
 const TURN: u8 = 0b1000;
@@ -204,9 +212,17 @@ impl Header {
             return Err(FrameError::NotForUs);
         }
         let turn = has(TURN).then(|| r.u8()).transpose()?;
+        let is_answer = header.from.is_vehicle() && !is_hello;
+        let (turn, heard) = turn.filter(|_| is_answer).map_or((turn, 0), |turn| (Some(turn & WISH), turn & !WISH));
+        if heard != 0 && (has(ACK) || heard < HEARD) {
+            return Err(FrameError::BadField);
+        }
         let stamp = has(STAMP).then(|| Stamp::decode(header.from, r)).transpose()?;
         let nonce = (is_hello && has(KEYED)).then(|| r.u64()).transpose()?;
-        let ack = has(ACK).then(|| AckStatement::decode(r)).transpose()?;
+        let ack = match heard {
+            0 => has(ACK).then(|| AckStatement::decode(r)).transpose()?,
+            _ => Some(AckStatement { horizon: Horizon::InTurn(heard >> HEARD_SHIFT & 3), lost: Vec::new() }),
+        };
         Ok(Self { turn, stamp, nonce, ack, keyed: has(KEYED), ..header })
     }
 
@@ -262,6 +278,14 @@ impl Header {
     /// Whether a frame with this first byte is keyed, and its kind.
     pub(super) fn kind_of(flags: u8) -> (bool, FrameKind) {
         (flags & KEYED != 0, FrameKind::hello_if(flags & HELLO != 0))
+    }
+
+    /// The bits of a vehicle's turn byte that have its ack statement, 0 if it is not in the turn byte.
+    pub(super) fn heard(&self) -> u8 {
+        match self.ack {
+            Some(AckStatement { horizon: Horizon::InTurn(low), .. }) => HEARD | low << HEARD_SHIFT,
+            _ => 0,
+        }
     }
 
     /// The first byte without the bits of turn byte and acknowledgement statement.

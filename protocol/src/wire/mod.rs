@@ -15,7 +15,7 @@ mod status;
 mod trail;
 
 pub use crate::bytes::{Reader, Truncated};
-pub use ack::{AckStatement, Horizon, MAX_WINDOW};
+pub use ack::{AckForm, AckStatement, Horizon, MAX_WINDOW};
 pub(crate) use chunk::room_for_payload;
 pub use chunk::{Chunk, ChunkKind, Chunks};
 pub use details::{Backlog, DiskReport, EquipmentFaults, PoseDetails};

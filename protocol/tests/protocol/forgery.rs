@@ -8,7 +8,7 @@ use scenecast_protocol::map_codec::Codec;
 use scenecast_protocol::schedule::{BackgroundOrder, Shares};
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::{
-    AckStatement, Address, ChunkKind, Envelope, FrameBuilder, Header, Introduction, MissionId, Seal, SessionId,
+    AckForm, AckStatement, Address, ChunkKind, Envelope, FrameBuilder, Header, Introduction, MissionId, Seal, SessionId,
 };
 use std::collections::{BTreeSet, VecDeque};
 use std::time::Duration;
@@ -124,7 +124,8 @@ impl Stranger<'_> {
             1 => header.base = 1 + self.draw(100) as u16,
             2 => {
                 let (horizon, lost) = (self.draw(4096), vec![self.draw(8) as u16]);
-                header.ack = Some(AckStatement::new(horizon, lost, self.draw(2) == 0));
+                let form = if self.draw(2) == 0 { AckForm::Near } else { AckForm::Far };
+                header.ack = Some(AckStatement::new(horizon, lost, form));
             }
             3 => header.turn = Some(self.draw(256) as u8),
             _ => {}

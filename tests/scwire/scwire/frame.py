@@ -71,12 +71,24 @@ def parse(raw):
             raise Short('malformed')
         f.low = int.from_bytes(take(f.bits // 8), 'big')
         f.remaining = more if more < 7 else take(1)[0]
-    f.turn = take(1)[0] if f.T else None
+    f.turn, f.ack = take(1)[0] if f.T else None, None
+    if f.T and f.src and not f.H:
+        short, low, f.turn = f.turn >> 7, f.turn >> 5 & 3, f.turn & 31     # the wish
+        if short and f.A or low and not short:
+            raise Short('malformed')
+        if short:
+            f.ack = 2, low, []
     f.stamp = take(5 if f.src == 0 else 6) if f.S else None
     f.nonce = take(8) if f.H and f.K else bytes(8)
-    f.ack = read_statement(take) if f.A else None
+    if f.A:
+        f.ack = read_statement(take)
     f.head, f.body = d[:p], d[p:]
     return f
+
+
+def quarters(wish):
+    """2.1: quarter seconds."""
+    return wish if wish < 8 else 4 + (wish & 3) << (wish >> 2) - 1
 
 
 def read_statement(take):

@@ -28,6 +28,7 @@ def main():
         for f in (bytes(n) + b'\1', b'\1' * n + b'\2', os.urandom(n + 1)):
             assert cobs.decode(cobs.encode(f)[1:-1], 5000) == f
     numbers()
+    turns()
     statements()
     parts({row['name']: hx(row['bytes']) for row in read('parts.json')})
     golden_keys(doc)
@@ -51,8 +52,22 @@ def numbers():
         assert frame.number_in(f, 5, 9, 7, highest) == number
 
 
+def turns():
+    """2.1: the turn byte of a vehicle; a wish."""
+    def read(turn, ack=None):
+        f = frame.parse(frame.write(1, 0, 7, 1, 1, 0, turn=turn, ack=ack, mission=5, peer=9))
+        return f.turn, f.ack
+    assert [read(0x1F), read(0xC4), read(0x80), read(5, b'\x60')] == [(31, None), (4, (2, 2, [])), (0, (2, 0, [])), (5, (4, 12, []))]
+    for turn, ack in (0xC4, b'\x60'), (0x24, None), (0x60, b'\x60'):
+        try:
+            assert not read(turn, ack), turn
+        except Short as e:
+            assert str(e) == 'malformed'
+    assert [frame.quarters(w) for w in (0, 7, 8, 11, 12, 20, 31)] == [0, 7, 8, 14, 16, 64, 448]
+
+
 def statements():
-    """3.3: near where it may be; 3.4: a near one in the order of the frames alone."""
+    """3.3: near where it may be; 3.4: one that is not far in the order of the frames alone."""
     def window(base, closed, lost, highest=20):
         w = Window()
         w.base, w.closed, w.highest, w.held = base, closed, highest, {*range(base + 1, highest + 1)} - {*lost}
@@ -62,9 +77,10 @@ def statements():
     pair = Pair(argparse.Namespace(key=None), 1, b'')
     pair.number = 40
     for number, ack, why, n in ((2, (4, 3, [1]), 'late', 0), (2, (4, 3, [1]), 'ok', 3), (1, (4, 9, []), 'ok', 0), (2, (4, 3, [1]), 'duplicate', 0),
-                                (1, (12, 5, []), 'late', 2), (3, (12, 30, []), 'ok', 25), (4, (4, 14, []), 'ok', 0)):
+                                (1, (12, 5, []), 'late', 2), (3, (12, 30, []), 'ok', 25), (4, (4, 14, []), 'ok', 0), (5, (2, 0, []), 'late', 0),
+                                (6, (2, 0, []), 'ok', 2), (5, (2, 3, []), 'ok', 0), (7, (2, 0, []), 'ok', 0)):
         assert len(pair.judge(argparse.Namespace(number=number, ack=ack), why)) == n, number
-    assert pair.horizon == 30
+    assert pair.horizon == 32
 
 
 def parts(rows):
@@ -166,9 +182,11 @@ def frames(vectors):
             up = f.src != 0
             seal = {'session': f.session, 'peer': f.peer, 'peer_nonce': fo.nonces[f.peer], 'key': fo.hello_key(f)} if f.H else {
                 'session': f.peer[up], 'peer': f.peer[not up], 'key': fo.crypts.get(f.peer)}
+            short = f.ack and f.ack[0] == 2
+            turn = 0x80 | f.ack[1] << 5 | f.turn if short else f.turn
             chunks = b''.join(frame.chunk(*each) for each in frame.chunks(f.body))
-            again = frame.write(f.src, f.dst, number=f.number, base=f.base, remaining=f.remaining, turn=f.turn, stamp=f.stamp, hello=bool(f.H),
-                                ack=frame.statement(*f.ack) if f.ack else None, body=chunks.ljust(len(f.body), b'\0'), nonce=f.nonce,
+            again = frame.write(f.src, f.dst, number=f.number, base=f.base, remaining=f.remaining, turn=turn, stamp=f.stamp, hello=bool(f.H),
+                                ack=frame.statement(*f.ack) if f.ack and not short else None, body=chunks.ljust(len(f.body), b'\0'), nonce=f.nonce,
                                 mission=mission, **seal)
             assert again == raw, (name, again.hex())
     print(len(vectors['frames']), 'frames,', sum(v['says'] is None for v in vectors['frames']), 'of them refused')

@@ -25,7 +25,7 @@ class Pair:
         if not f.ack:
             return []
         bits, low, lost = f.ack
-        if bits == 4 and (why != 'ok' or f.number < self.stated):
+        if bits != 12 and (why != 'ok' or f.number < self.stated):
             return []
         if why == 'ok':
             self.stated = max(self.stated, f.number)
@@ -289,7 +289,7 @@ class Surface:
                     elif kind == 'frame' and answered:
                         end = 0
                     if f.T and kind == 'frame':
-                        pause = 0 if f.turn == 255 else f.turn / 4
+                        pause = frame.quarters(f.turn) / 4
                 self.late = []
             unanswered = 0 if answered else unanswered + 1
             if not answered:

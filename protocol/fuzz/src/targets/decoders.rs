@@ -73,7 +73,7 @@ fn hear(mut script: Script<'_>) {
         }
         if what & 4 != 0 {
             let room = usize::from(what >> 3) + 2;
-            let statement = window.statement(room);
+            let statement = window.statement(room, what & 8 != 0);
             let mut bytes = Vec::new();
             assert!(statement.is_none_or(|s| s.encode(room, &mut bytes) && bytes.len() <= room));
         }

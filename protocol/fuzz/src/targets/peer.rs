@@ -3,9 +3,10 @@
 use super::raw::{self, Covered, Script};
 use scenecast_protocol::directive::Series;
 use scenecast_protocol::link::{Authenticity, Flight};
+use scenecast_protocol::mac::Wish;
 use scenecast_protocol::seal::{Direction, HeldKey, MissionKey};
 use scenecast_protocol::wire::{
-    AckStatement, Address, CellEdge, Envelope, Header, Introduction, MissionId, Reader, SessionId, Stamp,
+    AckForm, AckStatement, Address, CellEdge, Envelope, Header, Introduction, MissionId, Reader, SessionId, Stamp,
 };
 use std::collections::BTreeSet;
 use std::time::Duration;
@@ -154,6 +155,8 @@ impl FuzzPeer {
     fn header(&self, flags: u8, script: &mut Script<'_>) -> Header {
         let from = self.us;
         let turn = (flags & 1 == 0).then(|| script.u8());
+        let has_wish = turn.is_some() && from.is_vehicle();
+        let turn = turn.map(|turn| if has_wish { Wish::of_bits(turn).bits() } else { turn });
         let remaining = script.u8();
         let stamp = (flags & 4 != 0).then(|| {
             let (clock_ms, a) = (u32::from(script.u16()), script.u16());
@@ -163,7 +166,12 @@ impl FuzzPeer {
                 false => Stamp::Vehicle { clock_ms, last_received: script.u8(), held: time },
             }
         });
-        let true_ack = AckStatement::new(self.heard, Vec::new(), flags & 0x10 == 0);
+        let form = match flags & 0x10 {
+            0 if has_wish => AckForm::InTurn,
+            0 => AckForm::Near,
+            _ => AckForm::Far,
+        };
+        let true_ack = AckStatement::new(self.heard, Vec::new(), form);
         let ack = match flags & 0x28 {
             0x08 => Some(true_ack),
             0x28 => AckStatement::decode(&mut Reader::new(script.bytes())).ok(),

@@ -392,7 +392,7 @@ impl<S: StateSource> VehicleContent<S> {
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
-    use crate::wire::{AckStatement, Address, Header};
+    use crate::wire::{AckForm, AckStatement, Address, Header};
 
     /// A source whose chunks are one byte longer than the room it is given.
     #[derive(Debug, Default)]
@@ -427,7 +427,7 @@ pub(super) mod tests {
     }
 
     pub(in crate::link::vehicle) fn builder(size: usize) -> FrameBuilder {
-        let ack = Some(AckStatement::new(0, vec![], true));
+        let ack = Some(AckStatement::new(0, vec![], AckForm::Near));
         let header = Header { ack, ..Header::numbered(Address::vehicle(1).unwrap(), Address::SURFACE, 1, 1) };
         FrameBuilder::new(&header, size)
     }

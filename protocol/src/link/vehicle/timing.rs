@@ -24,7 +24,9 @@ pub(super) struct SurfaceTiming {
 }
 
 /// The part of the bit budget that stamps may take once the surface has measured the distance. Before, a turn has two of them.
-const STAMP_SHARE: f64 = 0.005;
+const STAMP_SHARE: f64 = 0.003;
+/// The surface takes a measured distance for current for three minutes.
+const MOST_BETWEEN_STAMPS: Duration = Duration::from_secs(150);
 
 impl SurfaceTiming {
     /// A numbered frame came in that was on air for `airtime`. Hellos are not passed in: they may be replays.
@@ -66,6 +68,7 @@ impl SurfaceTiming {
     pub(super) fn begin_turn(&mut self, budget_bps: u32, now: Instant) {
         let bits = Stamp::VEHICLE_BYTES as f64 * 8.0;
         let pause = Duration::from_secs_f64(bits / STAMP_SHARE / f64::from(budget_bps.max(1)));
+        let pause = pause.min(MOST_BETWEEN_STAMPS);
         self.is_stamped = self.one_way.is_none() || self.stamped.is_none_or(|at| now.since(at) >= pause);
         if self.is_stamped && self.latest.is_some() {
             self.stamped = Some(now);
@@ -100,6 +103,6 @@ mod tests {
             turns.filter(|&now| (timing.begin_turn(budget_bps, now), timing.stamp(now)).1.is_some()).count()
         };
         let known = Some(Duration::from_millis(300));
-        assert_eq!([stamped(250, None), stamped(250, known), stamped(1000, known)], [10, 3, 10]);
+        assert_eq!([stamped(250, None), stamped(250, known), stamped(1000, known)], [10, 2, 5]);
     }
 }

@@ -4,8 +4,8 @@ use super::content::{Carried, FillContext, Part};
 use super::repeat::RepeatTerms;
 use super::{VehicleEvent, VehicleLink};
 use crate::link::handshake::FramePurpose;
-use crate::link::{Transmit, TransmitKind, by_class};
-use crate::mac::{Access, quarter_seconds};
+use crate::link::{AckRoom, Transmit, TransmitKind, by_class};
+use crate::mac::{Access, Wish};
 use crate::map::StateSource;
 use crate::schedule::{BitBudget, Class};
 use crate::time::Instant;
@@ -159,9 +159,10 @@ impl<S: StateSource> VehicleLink<S> {
         (modem.turn_around + one_way) * 2 + modem.airtime(32)
     }
 
-    /// Bytes for an acknowledgement: in the first frames of a turn, as many as it takes for one to get through, and
-    /// then in every eighth frame.
-    fn ack_room(&self, is_last_new: bool) -> usize {
+    /// Bytes for an acknowledgement: in the first frames of a turn, as many as it takes for one to get through, in every eighth frame,
+    /// and in the last new one, whose turn byte may have it. Where the budget is the limit, a turn that is not seen to be an answer
+    /// costs time alone, so that fewer will do.
+    fn ack_room(&self, is_last_new: bool, now: Instant) -> usize {
         const ACK_INTERVAL: usize = 8;
         let size = self.config.modem.frame_bytes;
         let sent = self.repeater.new_frames();
@@ -170,21 +171,29 @@ impl<S: StateSource> VehicleLink<S> {
             // So many frames were lost that the acknowledgements would fall ever further behind.
             return size / 2;
         }
-        let early = sent < self.pair.stats.loss_out.copies(0.001, 12) as usize;
-        match early || is_last_new || sent.is_multiple_of(ACK_INTERVAL) {
+        let loss = self.pair.stats.loss_out;
+        let first = match self.is_budget_bound(now) {
+            // The last new frame is one of them.
+            true => loss.copies(0.15, 12) - 1,
+            false => loss.copies(0.001, 12),
+        };
+        match sent < first as usize || is_last_new || (sent + 1).is_multiple_of(ACK_INTERVAL) {
             true => usual,
             false => 0,
         }
     }
 
+    fn is_budget_bound(&self, now: Instant) -> bool {
+        let is_limited = f64::from(self.budget.bits_per_s()) < self.config.modem.bit_rate_bps / 2.0;
+        is_limited && !self.budget.is_plentiful(now)
+    }
+
     fn repeat_terms(&self, now: Instant) -> RepeatTerms {
-        let modem = self.config.modem;
-        let is_limited = f64::from(self.budget.bits_per_s()) < modem.bit_rate_bps / 2.0;
         RepeatTerms {
-            modem,
+            modem: self.config.modem,
             outstanding: self.pair.outstanding(),
             loss: self.pair.stats.loss_out.expected(),
-            is_budget_bound: is_limited && !self.budget.is_plentiful(now),
+            is_budget_bound: self.is_budget_bound(now),
             handover: self.handover(),
         }
     }
@@ -221,19 +230,18 @@ impl<S: StateSource> VehicleLink<S> {
         }
         let plan = if sends_hello { FramePlan { remaining: 0, is_last_new: true } } else { self.plan(frames, now) };
         let stamp = self.stamp(plan.is_last_new, now);
-        let ack_room = self.ack_room(plan.is_last_new);
+        let takes_turns = !modem.access.is_free();
+        let bytes = self.ack_room(plan.is_last_new, now);
+        let room = AckRoom { bytes, in_turn: takes_turns && (plan.is_last_new || bytes == 0) };
         if sends_hello {
             let series = self.pair.caller().and_then(|surface| surface.series);
             self.pair.set_memory(series.is_none_or(|series| self.inbox.knows(series)));
         }
-        let takes_turns = !modem.access.is_free();
-        let mut builder = self.pair.begin_frame(size, ack_room, None, stamp, FramePurpose::Content);
+        // Room for the byte; the wish is known once the frame is filled.
+        let turn = (plan.is_last_new && !sends_hello).then_some(0);
+        let mut builder = self.pair.begin_frame(size, room, turn, stamp, FramePurpose::Content);
         if takes_turns {
             builder = builder.in_turn(frames.saturating_sub(1).min(255) as u8);
-        }
-        if plan.is_last_new && !sends_hello {
-            // Room for the byte; the wish is known once the frame is filled.
-            builder.set_turn(0);
         }
         let mut carried = Carried::new();
         if !sends_hello {
@@ -266,7 +274,7 @@ impl<S: StateSource> VehicleLink<S> {
         };
         builder.set_remaining(remaining.min(255) as u8);
         if is_complete || (plan.is_last_new && !sends_hello) {
-            builder.set_turn(self.wish(now));
+            builder.set_turn(self.wish(now).bits());
         }
         let last = remaining == 0;
         let purpose = FramePurpose::hello_if(sends_hello);
@@ -327,8 +335,8 @@ impl<S: StateSource> VehicleLink<S> {
         Transmit { to: Address::SURFACE, bytes, kind: mainly, contents }
     }
 
-    /// When another turn would be of use, in the quarter seconds of the turn byte.
-    fn wish(&self, now: Instant) -> u8 {
+    /// When another turn would be of use.
+    fn wish(&self, now: Instant) -> Wish {
         let modem = &self.config.modem;
         let affordable = self.budget.earliest(modem.bits_on_air(modem.frame_bytes) * 2, now).since(now);
         let (rest, next) = self.after_a_frame(now);
@@ -340,7 +348,7 @@ impl<S: StateSource> VehicleLink<S> {
             }
             _ => affordable,
         };
-        quarter_seconds(wait, 254)
+        Wish::after(wait)
     }
 
     /// Pause between turns while no content waits: empty turns take at most a tenth of the budget. While content is under way, which

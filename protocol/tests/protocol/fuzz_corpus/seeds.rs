@@ -9,7 +9,7 @@ use scenecast_protocol::map_codec::{Codec, encode};
 use scenecast_protocol::object::ObjectSender;
 use scenecast_protocol::seal::MissionKey;
 use scenecast_protocol::time::Instant;
-use scenecast_protocol::wire::{AckStatement, ChunkKind, Envelope, MissionId, Seal, SessionId, WIRE_VERSION};
+use scenecast_protocol::wire::{AckForm, AckStatement, ChunkKind, Envelope, MissionId, Seal, SessionId, WIRE_VERSION};
 use std::time::Duration;
 
 /// Corpus, name of the file, content.
@@ -217,7 +217,7 @@ fn body_of(bytes: &[u8]) -> Vec<u8> {
 fn golden() -> Vec<Seed> {
     let losses = |lost: Vec<u16>| {
         let mut bytes = Vec::new();
-        AckStatement::new(2000, lost, true).encode(300, &mut bytes);
+        AckStatement::new(2000, lost, AckForm::Near).encode(300, &mut bytes);
         bytes
     };
     let key = MissionKey::from_bytes(*b"0123456789abcdef").to_text();

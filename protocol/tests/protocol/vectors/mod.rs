@@ -49,7 +49,7 @@ fn with_a_crc() -> Rows {
         ..header(Address::SURFACE, 3)
     };
     let map = Header { base: 2, remaining: 1, ..header(auv(), 2) };
-    let empty = Header { turn: Some(40), ..header(auv(), 3) };
+    let empty = Header { turn: Some(20), ..header(auv(), 3) };
     let far = Header::numbered(auv(), Address::SURFACE, 300, 200);
     vec![
         ("hello of the surface", frame(surface_hello(false), 64, true, hello_crc(0), &introduction(true))),

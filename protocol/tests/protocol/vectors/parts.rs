@@ -16,8 +16,8 @@ use scenecast_protocol::map::{
 use scenecast_protocol::map_codec;
 use scenecast_protocol::schedule::{BackgroundOrder, BackgroundStream, Shares};
 use scenecast_protocol::wire::{
-    AckStatement, Address, ChunkKind, DiskReport, EquipmentFaults, FrameTie, Header, Intent, Placement, PlannedPath,
-    PoseDetails, Reader, RegistrationReport, Stamp, Trail, TrailCorner, VehicleStatus,
+    AckForm, AckStatement, Address, ChunkKind, DiskReport, EquipmentFaults, FrameTie, Header, Intent, Placement,
+    PlannedPath, PoseDetails, Reader, RegistrationReport, Stamp, Trail, TrailCorner, VehicleStatus,
 };
 
 #[test]
@@ -43,8 +43,8 @@ fn header_fields() -> Rows {
     let stamp = |from: Address, stamp: Stamp, bytes: usize| {
         in_frame(Header { stamp: Some(stamp), ..header(from, 9) }, HEADER, HEADER + bytes)
     };
-    let statement = |horizon: u64, lost: Vec<u16>, is_near: bool| {
-        let (statement, mut bytes) = (AckStatement::new(horizon, lost, is_near), Vec::new());
+    let statement = |horizon: u64, lost: Vec<u16>, form: AckForm| {
+        let (statement, mut bytes) = (AckStatement::new(horizon, lost, form), Vec::new());
         assert!(statement.encode(99, &mut bytes));
         assert_eq!(AckStatement::decode(&mut Reader::new(&bytes)), Ok(statement));
         bytes
@@ -73,11 +73,14 @@ fn header_fields() -> Rows {
             "stamp of a vehicle: clock 16 777 215 ms, frame 9 received 258 ms before",
             stamp(auv(), vehicle_stamp(16_777_215, 9, 258), 6),
         ),
-        ("statement: horizon low C, no loss", statement(0xABC, vec![], true)),
-        ("statement: horizon 7, lost 6 and 4 (distances 1 and 3)", statement(7, vec![1, 3], true)),
-        ("statement: horizon low ABC, no loss, far", statement(0xABC, vec![], false)),
-        ("statement: horizon 7, lost 6 and 3 (distances 1 and 4), a bitmap", statement(7, vec![1, 4], true)),
-        ("statement: horizon 30, lost 10 and 5 (distances 20 and 25), a Rice code", statement(30, vec![20, 25], true)),
+        ("statement: horizon low C, no loss", statement(0xABC, vec![], AckForm::Near)),
+        ("statement: horizon 7, lost 6 and 4 (distances 1 and 3)", statement(7, vec![1, 3], AckForm::Near)),
+        ("statement: horizon low ABC, no loss, far", statement(0xABC, vec![], AckForm::Far)),
+        ("statement: horizon 7, lost 6 and 3 (distances 1 and 4), a bitmap", statement(7, vec![1, 4], AckForm::Near)),
+        (
+            "statement: horizon 30, lost 10 and 5 (distances 20 and 25), a Rice code",
+            statement(30, vec![20, 25], AckForm::Near),
+        ),
         ("head of a map chunk that fills the rest of a full frame", head(200, 1, true)),
         ("head of a map chunk of 26 bytes", head(26, 1, false)),
         ("head of a map chunk of 27 bytes", head(27, 2, false)),

@@ -7,8 +7,9 @@ use scenecast_protocol::directive::{
 };
 use scenecast_protocol::seal::{LinkKey, MissionKey, SessionKey};
 use scenecast_protocol::wire::{
-    AckStatement, Address, Backlog, CellEdge, Chunk, ChunkKind, Envelope, EquipmentFaults, FrameBuilder, Header,
-    Introduction, MissionId, ModeReason, PlannedPath, Seal, SessionId, Stamp, UtcHours, VehicleMode, VehicleStatus,
+    AckForm, AckStatement, Address, Backlog, CellEdge, Chunk, ChunkKind, Envelope, EquipmentFaults, FrameBuilder,
+    Header, Introduction, MissionId, ModeReason, PlannedPath, Seal, SessionId, Stamp, UtcHours, VehicleMode,
+    VehicleStatus,
 };
 use std::time::Duration;
 
@@ -38,7 +39,7 @@ pub(crate) fn vehicle_stamp(clock_ms: u32, last_received: u8, held_ms: u64) -> S
 }
 
 pub(crate) fn all_up_to(horizon: u64, lost: Vec<u16>) -> Option<AckStatement> {
-    Some(AckStatement::new(horizon, lost, true))
+    Some(AckStatement::new(horizon, lost, AckForm::Near))
 }
 
 /// The CRC of a numbered frame of an end.
@@ -194,6 +195,7 @@ pub(crate) fn first_of_surface(keyed: bool) -> Header {
 }
 
 pub(crate) fn answer_of_vehicle(keyed: bool) -> Header {
-    let (turn, stamp, ack) = (Some(4), Some(vehicle_stamp(7_200, 2, 200)), all_up_to(2, vec![]));
+    let (turn, stamp) = (Some(4), Some(vehicle_stamp(7_200, 2, 200)));
+    let ack = Some(AckStatement::new(2, vec![], AckForm::InTurn));
     Header { turn, stamp, ack, keyed, ..header(auv(), 1) }
 }

@@ -7,7 +7,8 @@ use scenecast_protocol::directive::{Constraints, SLOTS, Series, Slot, SlotReport
 use scenecast_protocol::map::{Cell, LabelGrid};
 use scenecast_protocol::map_codec::{Codec, encode};
 use scenecast_protocol::wire::{
-    AckStatement, Address, ChunkKind, Envelope, FrameBuilder, Header, Introduction, Seal, SessionId, VehicleStatus,
+    AckForm, AckStatement, Address, ChunkKind, Envelope, FrameBuilder, Header, Introduction, Seal, SessionId,
+    VehicleStatus,
 };
 use sim_channel::RandomStream;
 use std::collections::VecDeque;
@@ -289,7 +290,8 @@ impl Forger {
             header.base = 1 + self.below(2000) as u16;
         } else {
             let (horizon, lost) = (self.below(4096) as u64, vec![self.below(8) as u16]);
-            header.ack = Some(AckStatement::new(horizon, lost, self.below(2) == 0));
+            let form = if self.below(2) == 0 { AckForm::Near } else { AckForm::Far };
+            header.ack = Some(AckStatement::new(horizon, lost, form));
         }
         self.numbered((header, number), &[])
     }

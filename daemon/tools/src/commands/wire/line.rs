@@ -2,6 +2,7 @@
 
 use super::capture::Captured;
 use super::fields::{self, Fields, text_of};
+use scenecast_protocol::mac::Wish;
 use scenecast_protocol::wire::{Address, Chunk, Chunks, Envelope, FrameError, Header, Listener, Stamp, WIRE_VERSION};
 use serde_json::{Value, json};
 use std::fmt;
@@ -160,8 +161,8 @@ fn header_fields(header: &Header, number: Option<u64>) -> Fields {
         fields.push(("remaining", header.remaining.into()));
     }
     fields.extend(header.turn.map(|turn| match (header.from.is_vehicle(), turn) {
-        (true, 255) => ("turn_s", Value::Null),
-        (_, turn) => ("turn_s", (f64::from(turn) / 4.0).into()),
+        (true, turn) => ("turn_s", Wish::of_bits(turn).wait().as_secs_f64().into()),
+        (false, turn) => ("turn_s", (f64::from(turn) / 4.0).into()),
     }));
     match header.stamp {
         None => {}

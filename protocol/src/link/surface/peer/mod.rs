@@ -21,7 +21,7 @@ use crate::directive::{
 };
 use crate::link::handshake::FramePurpose;
 use crate::link::{Authenticity, DropReason, FrameNumber, Inbound, LinkPair, LinkStats, Mismatch, SurfaceEvent};
-use crate::mac::{Access, Master, MasterConfig, ModemProfile};
+use crate::mac::{Access, Master, MasterConfig, ModemProfile, Wish};
 use crate::map::StateReplica;
 use crate::schedule::Class;
 use crate::time::Instant;
@@ -470,7 +470,7 @@ impl<R: StateReplica> VehiclePeer<R> {
 
     fn handle_turn(&mut self, header: &Header, bytes: usize, modem: &ModemProfile, now: Instant) {
         if self.last_turn.purpose != FramePurpose::Content || self.pair.horizon() >= self.last_turn.began {
-            self.master.handle_answer(bytes, header.remaining, header.turn, modem, now);
+            self.master.handle_answer(bytes, header.remaining, header.turn.map(Wish::of_bits), modem, now);
         }
     }
 
