@@ -108,7 +108,7 @@ pub struct ExemplarView {
     pub width_mm: u16,
     /// The middle of the image in the vehicle's map frame, decimetres east of its origin.
     pub east_dm: i32,
-    /// The same, north.
+    /// The middle of the image in the vehicle's map frame, decimetres north of its origin.
     pub north_dm: i32,
     /// The vehicle's clock when it was taken: milliseconds, low 24; `None` if that is more than four hours
     /// ago, or in an earlier run of its program.

@@ -124,46 +124,74 @@ pub fn read_token(path: &Path) -> Result<Zeroizing<String>, UserError> {
     }
 }
 
-fn parse(text: &str) -> Result<Vec<TokenGrant>, String> {
+/// What is wrong in a file of tokens. No error repeats a token, since logs keep it.
+#[derive(Debug, PartialEq, Eq, thiserror::Error)]
+enum TokenFault {
+    #[error("line {line}: {fault}")]
+    Line { line: usize, fault: GrantFault },
+    #[error("line {line}: the name {name} stands in an earlier line")]
+    NameTwice { line: usize, name: String },
+    #[error("line {line}: it has the token of {name}; each needs its own")]
+    TokenTwice { line: usize, name: String },
+    #[error("line {line}: more than {MAX_TOKENS} tokens")]
+    Many { line: usize },
+    #[error("no token; {LINE_RULE}; {TOKEN_RULE}")]
+    None,
+}
+
+/// What is wrong in a line of a file of tokens.
+#[derive(Debug, PartialEq, Eq, thiserror::Error)]
+enum GrantFault {
+    #[error("{LINE_RULE}; a file with a single token has one word; {TOKEN_RULE}")]
+    Words,
+    #[error("{0:?} is not a role: {LINE_RULE}; {TOKEN_RULE}")]
+    Role(String),
+    #[error("{0:?}: a name has 1 to 32 letters, digits, dots, hyphens or underscores")]
+    Name(String),
+    #[error("no token; {TOKEN_RULE}")]
+    Token,
+}
+
+fn parse(text: &str) -> Result<Vec<TokenGrant>, TokenFault> {
     let lines = text.lines().map(str::trim).enumerate().filter(|(_, l)| !l.is_empty() && !l.starts_with('#'));
     let mut grants: Vec<TokenGrant> = Vec::new();
     let mut is_single = false;
-    for (number, line) in lines.map(|(i, line)| (i + 1, line)) {
-        let grant = match line.split_whitespace().collect::<Vec<_>>()[..] {
+    for (line, text) in lines.map(|(i, text)| (i + 1, text)) {
+        let grant = match text.split_whitespace().collect::<Vec<_>>()[..] {
             [role, name, token] if !is_single => grant(role, name, token),
             [token] if grants.is_empty() => {
                 is_single = true;
                 check_token(token).map(|token| TokenGrant { principal: Principal::sole_administrator(), token })
             }
-            _ => Err(format!("{LINE_RULE}; a file with a single token has one word; {TOKEN_RULE}")),
+            _ => Err(GrantFault::Words),
         };
-        let grant = grant.map_err(|e| format!("line {number}: {e}"))?;
-        if let Some(other) = grants.iter().find(|g| g.principal.name() == grant.principal.name()) {
-            return Err(format!("line {number}: the name {} stands in an earlier line", other.principal.name()));
+        let grant = grant.map_err(|fault| TokenFault::Line { line, fault })?;
+        let name_where = |is_same: &dyn Fn(&TokenGrant) -> bool| {
+            grants.iter().find(|other| is_same(other)).map(|other| other.principal.name().to_owned())
+        };
+        if let Some(name) = name_where(&|other| other.principal.name() == grant.principal.name()) {
+            return Err(TokenFault::NameTwice { line, name });
         }
-        if let Some(other) = grants.iter().find(|g| g.token == grant.token) {
-            return Err(format!("line {number}: it has the token of {}; each needs its own", other.principal.name()));
+        if let Some(name) = name_where(&|other| other.token == grant.token) {
+            return Err(TokenFault::TokenTwice { line, name });
         }
         grants.push(grant);
         if grants.len() > MAX_TOKENS {
-            return Err(format!("line {number}: more than {MAX_TOKENS} tokens"));
+            return Err(TokenFault::Many { line });
         }
     }
-    if grants.is_empty() { Err(format!("no token; {LINE_RULE}; {TOKEN_RULE}")) } else { Ok(grants) }
+    if grants.is_empty() { Err(TokenFault::None) } else { Ok(grants) }
 }
 
-fn grant(role: &str, name: &str, token: &str) -> Result<TokenGrant, String> {
-    let role = Role::from_name(role).ok_or_else(|| format!("{role:?} is not a role: {LINE_RULE}; {TOKEN_RULE}"))?;
-    let principal = Principal::new(name, role);
-    let rule = "a name has 1 to 32 letters, digits, dots, hyphens or underscores";
-    let principal = principal.ok_or_else(|| format!("{name:?}: {rule}"))?;
+fn grant(role: &str, name: &str, token: &str) -> Result<TokenGrant, GrantFault> {
+    let role = Role::from_name(role).ok_or_else(|| GrantFault::Role(role.to_owned()))?;
+    let principal = Principal::new(name, role).ok_or_else(|| GrantFault::Name(name.to_owned()))?;
     Ok(TokenGrant { principal, token: check_token(token)? })
 }
 
-/// The error does not repeat the token, since logs keep it.
-fn check_token(token: &str) -> Result<Zeroizing<String>, String> {
+fn check_token(token: &str) -> Result<Zeroizing<String>, GrantFault> {
     let is_sound = LENGTH.contains(&token.len()) && token.bytes().all(|b| b.is_ascii_graphic());
-    is_sound.then(|| Zeroizing::new(token.to_owned())).ok_or_else(|| format!("no token; {TOKEN_RULE}"))
+    is_sound.then(|| Zeroizing::new(token.to_owned())).ok_or(GrantFault::Token)
 }
 
 /// Maximum size of a configuration, a scenario or a table that is read, bytes.
@@ -339,11 +367,11 @@ mod tests {
             (format!("{ANNA}\nviewer bob 0123456789abcdef\n"), "line 2: it has the token of anna"),
             ("viewer <b> 0123456789abcdef".to_owned(), "line 1: \"<b>\": a name has"),
         ] {
-            let line = parse(&text).unwrap_err();
+            let line = parse(&text).unwrap_err().to_string();
             assert!(line.starts_with(expected) && !line.contains("fedcba"), "{line}");
         }
         let many: String = (0..65).map(|i| format!("viewer v{i} {i:016}\n")).collect();
-        assert!(parse(&many).unwrap_err().contains("more than 64 tokens"));
+        assert!(parse(&many).unwrap_err().to_string().contains("more than 64 tokens"));
     }
 
     #[test]

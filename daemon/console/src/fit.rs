@@ -1,6 +1,6 @@
 //! Settings of the scene model that fit a budget.
 
-use scenecast_core::tuning_table::{self, Row};
+use scenecast_core::tuning_table::{self, NoRow, Row};
 use scenecast_protocol::wire::Address;
 use scenecast_surface::{SettingsOrder, Surface};
 use schemars::JsonSchema;
@@ -62,9 +62,9 @@ impl FittedSettings {
 }
 
 /// Settings that fit a budget in bit/s, by default the share of the map in the vehicle's budget.
-pub(crate) fn fit(surface: &Surface, vehicle: Address, cell_m: f64, bits_per_s: Option<f64>) -> Result<Fit, String> {
+pub(crate) fn fit(surface: &Surface, vehicle: Address, cell_m: f64, bits_per_s: Option<f64>) -> Result<Fit, NoRow> {
     let bits_per_s = bits_per_s.unwrap_or_else(|| surface.map_bits_per_s(vehicle));
-    let fit = surface.fit(cell_m, bits_per_s).map_err(|e| e.to_string())?;
+    let fit = surface.fit(cell_m, bits_per_s)?;
     Ok(Fit {
         bits_per_s,
         chosen: fit.chosen.as_ref().map(|row| FittedSettings::new(&fit, row)),

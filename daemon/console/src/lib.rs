@@ -22,7 +22,7 @@ pub mod state;
 mod tiles;
 mod truth;
 
-pub use export::{CellLayer, MapCaption, MapCells, MapFormat};
+pub use export::{CellLayer, ExportError, MapCaption, MapCells, MapFormat};
 pub use http::{Console, ConsoleListener, PendingRequest, bind, gzip, page_files, start};
 pub use link_meter::LinkMeter;
 pub use orders::OrderChanges;

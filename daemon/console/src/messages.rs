@@ -192,7 +192,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn weights_are_recorded_as_they_were_sent_whatever_is_on_the_map() {
+    fn weights_are_recorded_as_sent_whatever_is_on_the_map() {
         let mut vehicle = VehicleState::default();
         vehicle.orders.utility.weights = [(9, 0.5)].into();
         let slot = OrderProgress {

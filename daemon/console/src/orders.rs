@@ -1,6 +1,7 @@
 //! The bodies of orders, and changes of an order that stays in force.
 
 use scenecast_protocol::directive::{Constraints, SlotId};
+use scenecast_surface::OrderRefusal;
 use schemars::JsonSchema;
 use serde::de::{DeserializeOwned, Error, MapAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
@@ -276,15 +277,15 @@ impl<T: Serialize + DeserializeOwned + Default> OrderChanges<T> {
     /// The order after the changes. `present` is the order before them, which is needed only if a member is absent.
     ///
     /// # Errors
-    /// No member is named, or the present order is not known; one line for the operator.
-    pub fn applied_to(&self, present: impl FnOnce() -> Result<T, String>) -> Result<T, String> {
+    /// No member is named, or the present order is not known.
+    pub fn applied_to(&self, present: impl FnOnce() -> Result<T, OrderRefusal>) -> Result<T, OrderRefusal> {
         let all = members(&T::default());
         if self.named.is_empty() {
             let names: Vec<&str> = all.keys().map(String::as_str).collect();
-            return Err(format!("the order names nothing: it takes {}; null removes one", names.join(", ")));
+            return Err(OrderRefusal::NamesNothing { allowed: names.join(", ") });
         }
         let before = if self.is_whole() { all } else { members(&present()?) };
-        merged(before, &self.named).map_err(|error| error.to_string())
+        merged(before, &self.named).map_err(|error| OrderRefusal::Members { why: error.to_string() })
     }
 }
 
@@ -356,14 +357,14 @@ mod tests {
         assert_eq!(after(r#"{"keep_outs": []}"#).unwrap().keep_outs.len(), 0);
         assert_eq!(after(r#"{"keep_outs": null}"#).unwrap().fence, Some(square));
         assert_eq!(after(r#"{"fence": null}"#).unwrap().fence, None);
-        assert!(after("{}").unwrap_err().starts_with("the order names nothing: it takes fence"));
+        assert!(after("{}").unwrap_err().to_string().starts_with("the order names nothing: it takes fence"));
     }
 
     #[test]
     fn an_unknown_order_matters_only_where_a_member_is_absent() {
-        let unknown = || Err("it is not known".to_owned());
+        let unknown = || Err(OrderRefusal::RestUnknown(SlotId::Limits));
         let one = read::<LimitsOrder>(r#"{"time_s": 60}"#).unwrap();
-        assert_eq!(one.applied_to(unknown), Err("it is not known".to_owned()));
+        assert_eq!(one.applied_to(unknown), unknown());
         let none = OrderChanges::whole(&LimitsOrder::default());
         assert_eq!(none.applied_to(unknown), Ok(LimitsOrder::default()));
     }

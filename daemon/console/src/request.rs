@@ -13,6 +13,7 @@ use crate::snapshot::command_state;
 use crate::state::{AcceptedOrder, ArchivedMap, CellHistory, CommandState, ReplayEventList, ReplayOrder, ReplayState};
 use described::describe;
 pub use maps::{archived_cells, former_labels};
+use scenecast_core::tuning_table::NoRow;
 use scenecast_protocol::coordinates::WorldPoint;
 use scenecast_protocol::directive::{Constraints, Slot, SlotId};
 use scenecast_protocol::map::Cell;
@@ -21,10 +22,11 @@ use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::Address;
 use scenecast_surface::record::StoredLabel;
 use scenecast_surface::{
-    AreasOrder, CommandAction, DestinationOrder, FenceOrder, Giver, LimitsOrder, LogEntry, OrderKind, RequestKind,
-    SettingsOrder, Surface, order_name,
+    AreasOrder, CommandAction, DestinationOrder, FenceOrder, Giver, LimitsOrder, LogEntry, OrderKind, OrderRefusal,
+    RequestKind, SettingsOrder, Surface, order_name,
 };
 use std::collections::BTreeMap;
+use std::error::Error;
 
 /// A request and who makes it.
 #[derive(Debug, Clone, PartialEq)]
@@ -234,7 +236,7 @@ fn handle(surface: &mut Surface, request: SurfaceRequest, cell_m: f64, now: Inst
         }
         SurfaceRequest::Fit(id, bits_per_s) => match fit(surface, known(surface, id)?, cell_m, bits_per_s) {
             Ok(fit) => Reply::Fit(Box::new(fit)),
-            Err(reason) => Reply::Refused(reason),
+            Err(error) => Reply::Refused(error.to_string()),
         },
         SurfaceRequest::Utility(id, weights, terms) => {
             let vehicle = known(surface, id)?;
@@ -320,8 +322,8 @@ fn handle(surface: &mut Surface, request: SurfaceRequest, cell_m: f64, now: Inst
     })
 }
 
-fn done(result: Result<(), String>) -> Reply {
-    result.map_or_else(Reply::Refused, |()| Reply::Done)
+fn done(result: Result<(), impl Error>) -> Reply {
+    result.map_or_else(|refusal| Reply::Refused(refusal.to_string()), |()| Reply::Done)
 }
 
 /// What the latest order in a slot is called.
@@ -330,11 +332,11 @@ fn name_of_order(surface: &Surface, vehicle: Address, slot: SlotId) -> &'static 
     order.map_or(slot.name(), |order| order_name(&order.slot))
 }
 
-fn accepted(vehicle: Address, slot: SlotId, issued: Result<u16, String>) -> Reply {
+fn accepted(vehicle: Address, slot: SlotId, issued: Result<u16, OrderRefusal>) -> Reply {
     accepted_as(slot, slot.name(), vehicle, issued)
 }
 
-fn accepted_as(slot: SlotId, name: &str, vehicle: Address, issued: Result<u16, String>) -> Reply {
+fn accepted_as(slot: SlotId, name: &str, vehicle: Address, issued: Result<u16, OrderRefusal>) -> Reply {
     match issued {
         Ok(version) => Reply::Accepted(AcceptedOrder {
             slot: slot.name().to_owned(),
@@ -342,14 +344,19 @@ fn accepted_as(slot: SlotId, name: &str, vehicle: Address, issued: Result<u16, S
             version: Some(version),
             versions: BTreeMap::from([(vehicle.number(), version)]),
         }),
-        Err(reason) => Reply::Refused(reason),
+        Err(refusal) => Reply::Refused(refusal.to_string()),
     }
 }
 
-fn order_exemplar(surface: &mut Surface, vehicle: Address, order: &ExemplarOrder, now: Instant) -> Result<u16, String> {
+fn order_exemplar(
+    surface: &mut Surface,
+    vehicle: Address,
+    order: &ExemplarOrder,
+    now: Instant,
+) -> Result<u16, OrderRefusal> {
     let ExemplarOrder { label, action, image } = *order;
     if action != ExemplarAction::Larger && image.is_some() {
-        return Err("image is for the action larger only".to_owned());
+        return Err(OrderRefusal::OnlyForLarger);
     }
     match action {
         ExemplarAction::Another => surface.request_exemplar(vehicle, label, RequestKind::Another, now),
@@ -362,9 +369,11 @@ fn budget(surface: &mut Surface, order: BudgetOrder, now: Instant) -> Reply {
     let shares = order.shares.map(|s| Shares([s.directive, s.status, s.fix, s.map, s.exemplar]));
     let background =
         order.background.as_deref().map(|names| BackgroundOrder::from_names(names, &surface.layers())).transpose();
-    let changed = background.and_then(|background| surface.set_budget(order.budget_bps, shares, background, now));
-    if let Err(reason) = changed {
-        return Reply::Refused(reason);
+    let changed = background
+        .map_err(OrderRefusal::from)
+        .and_then(|background| surface.set_budget(order.budget_bps, shares, background, now));
+    if let Err(refusal) = changed {
+        return Reply::Refused(refusal.to_string());
     }
     let issued = |a: Address| surface.view(a)?.slots().find(|s| s.id == SlotId::Budget).map(|s| s.version);
     let versions = surface.vehicles().filter_map(|(a, _)| Some((a.number(), issued(a)?))).collect();
@@ -373,7 +382,7 @@ fn budget(surface: &mut Surface, order: BudgetOrder, now: Instant) -> Reply {
 }
 
 /// The settings that fit a budget, for the cells of the vehicle.
-fn fit(surface: &Surface, vehicle: Address, cell_m: f64, bits_per_s: Option<f64>) -> Result<Fit, String> {
+fn fit(surface: &Surface, vehicle: Address, cell_m: f64, bits_per_s: Option<f64>) -> Result<Fit, NoRow> {
     let cell_m = surface.view(vehicle).and_then(|view| view.cell_m()).unwrap_or(cell_m);
     fit::fit(surface, vehicle, cell_m, bits_per_s)
 }

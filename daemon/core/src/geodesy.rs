@@ -2,7 +2,7 @@
 //! vessel's body.
 
 use scenecast_protocol::coordinates::{DecimetrePoint, WorldPoint};
-use scenecast_protocol::directive::{Fence, Polygon};
+use scenecast_protocol::directive::{Fence, FenceFault, Polygon};
 use std::f64::consts::PI;
 
 /// Latitude and longitude on the WGS-84 ellipsoid, at its surface.
@@ -178,23 +178,34 @@ impl Area {
     }
 }
 
+/// Why corners and places, as they are typed, are no fence, outline or place.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum PlaceError {
+    #[error("{what}: it is smaller than a metre; it takes metres east and north of the origin, not degrees")]
+    Small { what: String },
+    #[error("{what}: [{x}, {y}] is no place within 100 km of the mission's origin")]
+    Far { what: String, x: f64, y: f64 },
+    #[error(transparent)]
+    Fence(#[from] FenceFault),
+}
+
 /// The fence with these parts.
 pub fn fence_of(
     fence: Option<&[[f64; 2]]>,
     keep_outs: &[Vec<[f64; 2]>],
     return_point: Option<[f64; 2]>,
-) -> Result<Fence, String> {
+) -> Result<Fence, PlaceError> {
     let fence = Fence {
         fence: fence.map(|corners| outline_of("fence", corners)).transpose()?,
         keep_outs: keep_outs.iter().map(|corners| outline_of("keep_outs", corners)).collect::<Result<_, _>>()?,
         return_point: return_point.map(|at| place_of("return_point", at)).transpose()?,
     };
-    fence.check().map_err(|fault| fault.to_string())?;
+    fence.check()?;
     Ok(fence)
 }
 
 /// The outline with these corners, which is not checked yet.
-pub fn outline_of(what: &str, corners: &[[f64; 2]]) -> Result<Polygon, String> {
+pub fn outline_of(what: &str, corners: &[[f64; 2]]) -> Result<Polygon, PlaceError> {
     const LEAST_M: f64 = 1.0;
     let extent = |axis: fn(&[f64; 2]) -> f64| {
         let (low, high) =
@@ -203,16 +214,14 @@ pub fn outline_of(what: &str, corners: &[[f64; 2]]) -> Result<Polygon, String> {
     };
     // Latitudes and longitudes of an outline of 100 km lie within a degree of each other.
     if corners.len() > 2 && extent(|c| c[0]) < LEAST_M && extent(|c| c[1]) < LEAST_M {
-        return Err(format!(
-            "{what}: it is smaller than a metre; it takes metres east and north of the origin, not degrees"
-        ));
+        return Err(PlaceError::Small { what: what.to_owned() });
     }
     corners.iter().map(|&corner| place_of(what, corner)).collect::<Result<_, _>>().map(Polygon)
 }
 
 /// The place, if it is near the origin.
-pub fn place_of(what: &str, [x, y]: [f64; 2]) -> Result<DecimetrePoint, String> {
-    let far = || format!("{what}: [{x}, {y}] is no place within 100 km of the mission's origin");
+pub fn place_of(what: &str, [x, y]: [f64; 2]) -> Result<DecimetrePoint, PlaceError> {
+    let far = || PlaceError::Far { what: what.to_owned(), x, y };
     let near = Some(WorldPoint::new(x, y)).filter(|_| x.hypot(y) <= MAX_DISTANCE_M);
     near.and_then(DecimetrePoint::nearest).ok_or_else(far)
 }

@@ -18,6 +18,17 @@ pub enum PictureError {
     Png(#[from] png::EncodingError),
 }
 
+/// Why a picture is not read as a map.
+#[derive(Debug, thiserror::Error)]
+pub enum ReadPictureError {
+    #[error("{width} x {height} pixels are more than the {most} allowed")]
+    TooLarge { width: u32, height: u32, most: u64 },
+    #[error("not an indexed PNG")]
+    NotIndexed,
+    #[error(transparent)]
+    Png(#[from] png::DecodingError),
+}
+
 /// The map within `bounds` as an indexed PNG, north up; pixel value = label.
 pub fn encode_within(grid: &LabelGrid, bounds: Rect) -> Result<Vec<u8>, PictureError> {
     encode_coloured(grid, bounds, colour)
@@ -81,7 +92,7 @@ pub struct Indices {
 const MAX_READ_CELLS: u64 = 1 << 22;
 
 /// Reads the indices of an indexed PNG of at most `most` pixels; `None` if it is another kind of file.
-pub fn read_indices(bytes: &[u8], most: u64) -> Result<Option<Indices>, String> {
+pub fn read_indices(bytes: &[u8], most: u64) -> Result<Option<Indices>, ReadPictureError> {
     let mut decoder = png::Decoder::new(std::io::Cursor::new(bytes));
     decoder.set_transformations(png::Transformations::IDENTITY);
     let Ok(mut reader) = decoder.read_info() else { return Ok(None) };
@@ -90,11 +101,11 @@ pub fn read_indices(bytes: &[u8], most: u64) -> Result<Option<Indices>, String> 
         return Ok(None);
     }
     if u64::from(width) * u64::from(height) > most {
-        return Err(format!("{width} x {height} pixels are more than the {most} allowed"));
+        return Err(ReadPictureError::TooLarge { width, height, most });
     }
     let depth = reader.info().bit_depth as usize;
     let mut raw = vec![0; reader.output_buffer_size().unwrap_or(0)];
-    let info = reader.next_frame(&mut raw).map_err(|e| e.to_string())?;
+    let info = reader.next_frame(&mut raw)?;
     let index = |line: &[u8], column: usize| {
         let bit = column * depth;
         let byte = line.get(bit / 8).copied().unwrap_or(0);
@@ -106,8 +117,8 @@ pub fn read_indices(bytes: &[u8], most: u64) -> Result<Option<Indices>, String> 
 }
 
 /// Reads an indexed PNG as a map whose south-west cell is `(x0, y0)`.
-pub fn decode(bytes: &[u8], x0: i32, y0: i32) -> Result<LabelGrid, String> {
-    let image = read_indices(bytes, MAX_READ_CELLS)?.ok_or("not an indexed PNG")?;
+pub fn decode(bytes: &[u8], x0: i32, y0: i32) -> Result<LabelGrid, ReadPictureError> {
+    let image = read_indices(bytes, MAX_READ_CELLS)?.ok_or(ReadPictureError::NotIndexed)?;
     let mut grid = LabelGrid::default();
     for (row, line) in (0..image.height).rev().zip(image.pixels.chunks(image.width as usize)) {
         for (column, &label) in (0..image.width).zip(line) {

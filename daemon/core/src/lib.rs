@@ -18,13 +18,15 @@ pub mod tuning_table;
 mod usbl_line;
 mod utc;
 
-pub use geodesy::{Area, BodyOffset, LatLon, MAX_DISTANCE_M, TangentPlane, fence_of, outline_of, place_of, wrap_rad};
+pub use geodesy::{
+    Area, BodyOffset, LatLon, MAX_DISTANCE_M, PlaceError, TangentPlane, fence_of, outline_of, place_of, wrap_rad,
+};
 pub use label_picture::{WGS84_AUX_XML, world_file};
 pub use lines::Lines;
 pub use modem_facts::{
     CYCLE_INIT, MicromodemRate, OVERHEAD_BITS, PortAddress, S2C_BURST_FRAME_BYTES, S2C_INSTANT_BYTES,
 };
-pub use output::{UserError, one_line, printable, write_error, write_or_exit};
+pub use output::{Takes, UserError, one_line, printable, write_error, write_or_exit};
 pub use principal::{ClientName, Giver, Principal, Role};
 pub use program::{program, set_program};
 pub use reminder::Reminder;

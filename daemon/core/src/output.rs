@@ -43,6 +43,18 @@ macro_rules! outln {
     ($($text:tt)*) => { $crate::write_or_exit(format_args!("{}\n", format_args!($($text)*))) };
 }
 
+/// Why the text of an option or argument is not its value: what it takes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Takes(pub &'static str);
+
+impl fmt::Display for Takes {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.0)
+    }
+}
+
+impl std::error::Error for Takes {}
+
 /// An error that ends a command; its kind gives the exit code.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum UserError {
@@ -53,6 +65,16 @@ pub enum UserError {
 }
 
 impl UserError {
+    /// Wrong usage or input that a type describes in one line.
+    pub fn input(what: impl fmt::Display) -> Self {
+        Self::Input(what.to_string())
+    }
+
+    /// What could not be done, which a type describes in one line.
+    pub fn failed(what: impl fmt::Display) -> Self {
+        Self::Failed(what.to_string())
+    }
+
     /// An error of a file, as `FILE: cause`.
     pub fn file(path: &Path, what: impl fmt::Display) -> Self {
         Self::Input(format!("{}: {what}", path.display()))

@@ -9,7 +9,7 @@ use std::time::Duration;
 pub struct Reminder {
     /// When people were told last, and for how long they are not told again.
     told: Option<(Instant, Duration)>,
-    /// The last event.
+    /// When the last event came, whether or not it was reported.
     last: Option<Instant>,
     /// Events since people were told.
     untold: u32,
@@ -42,7 +42,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_goes_on_is_told_ever_more_rarely_and_what_returns_at_once() {
+    fn what_lasts_is_told_ever_more_rarely_what_returns_at_once() {
         let mut reminder = Reminder::default();
         let mut tell = |s: u32| reminder.handle(Instant::from_secs_f64(f64::from(s)));
         let told: Vec<(u32, u32)> =

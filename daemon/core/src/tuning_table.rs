@@ -187,6 +187,32 @@ pub struct Row {
     pub measurement: Measurement,
 }
 
+/// A text that is no table: the line, counted from 1, and its fault.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[error("{line}: {fault}")]
+pub struct TableError {
+    line: usize,
+    fault: TableFault,
+}
+
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+enum TableFault {
+    #[error("not a table of this version of scenecast tune, which begins with \"{TITLE}\"")]
+    Title,
+    #[error("has other columns than {HEAD}")]
+    Columns,
+    #[error("more than {MAX_ROWS} lines")]
+    TooManyRows,
+    #[error("{found} fields; the table has {expected}")]
+    Fields { found: usize, expected: usize },
+    #[error("{column} {text:?}: it takes {low} to {high}")]
+    Range { column: &'static str, text: String, low: f64, high: f64 },
+    #[error("cells {0:?}: it takes fine or coarse")]
+    Cells(String),
+    #[error("alpha, beta and gamma: they take 0 each, or at least 1e-9, 1e-9 and 1e-12")]
+    Priors,
+}
+
 /// Settings with their figures, none twice, in order.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct TuningTable {
@@ -206,28 +232,29 @@ impl TuningTable {
     /// # Errors
     /// The file, the line and the fault; a table without a row.
     pub fn parse(file: &str, text: &str) -> Result<Self, UserError> {
-        let table = Self::read(text).map_err(|(line, what)| UserError::Input(format!("{file}:{line}: {what}")))?;
+        let table = Self::read(text).map_err(|error| UserError::Input(format!("{file}:{error}")))?;
         if table.rows.is_empty() {
             return Err(UserError::Input(format!("{file}: the table has no line; scenecast tune writes them")));
         }
         Ok(table)
     }
 
-    /// Reads the text of a table; the error is the line and its fault.
-    pub fn read(text: &str) -> Result<Self, (usize, String)> {
+    /// Reads the text of a table.
+    pub fn read(text: &str) -> Result<Self, TableError> {
+        let refused = |line, fault| TableError { line, fault };
         let mut lines = text.lines().enumerate();
         if lines.next().is_none_or(|(_, title)| title.trim_end() != TITLE) {
-            return Err((1, format!("not a table of this version of scenecast tune, which begins with \"{TITLE}\"")));
+            return Err(refused(1, TableFault::Title));
         }
         if lines.next().is_none_or(|(_, head)| head.trim_end() != HEAD) {
-            return Err((2, format!("has other columns than {HEAD}")));
+            return Err(refused(2, TableFault::Columns));
         }
         let mut table = Self::default();
         for (index, line) in lines.filter(|(_, line)| !line.trim().is_empty()) {
-            let (inputs, row) = parse(line).map_err(|what| (index + 1, what))?;
+            let (inputs, row) = parse(line).map_err(|fault| refused(index + 1, fault))?;
             table.insert(inputs, row);
             if table.rows.len() > MAX_ROWS {
-                return Err((index + 1, format!("more than {MAX_ROWS} lines")));
+                return Err(refused(index + 1, TableFault::TooManyRows));
             }
         }
         Ok(table)
@@ -277,15 +304,15 @@ fn line(inputs: &str, Row { setting, measurement: m }: &Row) -> String {
     format!("{inputs},{of_setting},{told}\n")
 }
 
-fn parse(line: &str) -> Result<(String, Row), String> {
+fn parse(line: &str) -> Result<(String, Row), TableFault> {
     let fields: Vec<&str> = line.trim_end().split(',').collect();
-    let names: Vec<&str> = HEAD.split(',').collect();
+    let names: Vec<&'static str> = HEAD.split(',').collect();
     if fields.len() != names.len() {
-        return Err(format!("{} fields; the table has {}", fields.len(), names.len()));
+        return Err(TableFault::Fields { found: fields.len(), expected: names.len() });
     }
     let number = |at: usize, low: f64, high: f64| {
         let value = fields[at].parse::<f64>().ok().filter(|value| (low..=high).contains(value));
-        value.ok_or_else(|| format!("{} {:?}: it takes {low} to {high}", names[at], fields[at]))
+        value.ok_or_else(|| TableFault::Range { column: names[at], text: fields[at].to_owned(), low, high })
     };
     let band = CellBand::from_name(fields[8]).filter(|&band| band != CellBand::CoarseToFine);
     let setting = Setting {
@@ -296,12 +323,12 @@ fn parse(line: &str) -> Result<(String, Row), String> {
         max_labels: number(5, 2.0, 254.0)? as u32,
         refine_words_per_s: number(6, 0.0, 1e8)?,
         frames_per_s: number(7, 0.01, 30.0)?,
-        cells: band.ok_or_else(|| format!("cells {:?}: it takes fine or coarse", fields[8]))?,
+        cells: band.ok_or_else(|| TableFault::Cells(fields[8].to_owned()))?,
     };
     let Setting { alpha, beta, gamma, .. } = setting;
     let is_of_topics = alpha >= 1e-9 && beta >= 1e-9 && gamma >= 1e-12;
     if !is_of_topics && [alpha, beta, gamma] != [0.0; 3] {
-        return Err("alpha, beta and gamma: they take 0 each, or at least 1e-9, 1e-9 and 1e-12".to_owned());
+        return Err(TableFault::Priors);
     }
     let measurement = Measurement {
         mutual_information_nats: number(9, 0.0, 1e3)?,
@@ -439,15 +466,15 @@ mod tests {
     fn a_malformed_row_is_refused_with_its_line_and_the_rule() {
         let text = filled().text();
         let refused = |from: &str, to: &str| TuningTable::read(&text.replacen(from, to, 1)).unwrap_err();
-        assert_eq!(refused("table 3", "table 4").0, 1);
-        assert_eq!(refused("cells,", "").0, 2);
-        assert_eq!(refused("0.25,1,", "0.25,one,"), (5, "alpha \"one\": it takes 0 to 1000".to_owned()));
-        assert_eq!(refused("0.25,1,", "0.25,NaN,").0, 5);
-        assert_eq!(refused("0.25,1,", "0.25,0,").0, 5, "priors of topics without alpha");
-        assert_eq!(refused("0.25,1,", "0.25,1e-10,").0, 5);
-        assert_eq!(refused(",fine", ",huge"), (3, "cells \"huge\": it takes fine or coarse".to_owned()));
-        assert_eq!(refused(",fine", ""), (3, "15 fields; the table has 16".to_owned()));
-        assert_eq!(TuningTable::read("").unwrap_err().0, 1);
+        assert_eq!(refused("table 3", "table 4").line, 1);
+        assert_eq!(refused("cells,", "").line, 2);
+        assert_eq!(refused("0.25,1,", "0.25,one,").to_string(), "5: alpha \"one\": it takes 0 to 1000");
+        assert_eq!(refused("0.25,1,", "0.25,NaN,").line, 5);
+        assert_eq!(refused("0.25,1,", "0.25,0,").line, 5, "priors of topics without alpha");
+        assert_eq!(refused("0.25,1,", "0.25,1e-10,").line, 5);
+        assert_eq!(refused(",fine", ",huge").to_string(), "3: cells \"huge\": it takes fine or coarse");
+        assert_eq!(refused(",fine", "").to_string(), "3: 15 fields; the table has 16");
+        assert_eq!(TuningTable::read("").unwrap_err().line, 1);
     }
 
     #[test]

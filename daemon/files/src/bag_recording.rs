@@ -1,6 +1,6 @@
 //! Bags as recordings: the images of one topic at the poses of their odometry.
 
-use crate::bag::stream::{BagMessage, BagStream, BagTopic};
+use crate::bag::stream::{BagMessage, BagStream, BagTopic, Damage};
 use crate::bag::{Bag, COMPRESSED, RAW};
 use crate::images::FrameImage;
 use crate::recording::{RecordedFrame, Recording};
@@ -32,7 +32,7 @@ struct Contents {
     /// The first calibration of each topic that can be used, or why the last one cannot.
     infos: BTreeMap<String, Result<CameraInfo, CalibrationError>>,
     /// The first damage, and how many there are.
-    damage: Option<String>,
+    damage: Option<Damage>,
     damages: usize,
     /// Encodings of messages that are not read.
     encodings: BTreeSet<String>,
@@ -249,7 +249,7 @@ impl Recording {
             notes.push(format!("{dropped} of {} images are left out: {left_out}", left_out.all));
         }
         notes.extend(contents.damage.map(|damage| match contents.damages {
-            0 | 1 => damage,
+            0 | 1 => damage.to_string(),
             n => format!("{n} damages, the first: {damage}"),
         }));
         let frames =

@@ -1,7 +1,7 @@
 //! Reads a fence, or weighted areas, from a GeoJSON file (RFC 7946). Features without a geometry are passed over.
 
 use crate::json_file::read_json;
-use scenecast_core::{LatLon, MAX_DISTANCE_M, TangentPlane, UserError, fence_of};
+use scenecast_core::{LatLon, MAX_DISTANCE_M, PlaceError, TangentPlane, UserError, fence_of};
 use scenecast_protocol::directive::Fence;
 use serde_json::Value;
 use std::path::Path;
@@ -19,7 +19,7 @@ pub struct FenceShapes {
 
 impl FenceShapes {
     /// The fence as an order has it. The error is one line that names the allowed values.
-    pub fn to_fence(&self) -> Result<Fence, String> {
+    pub fn to_fence(&self) -> Result<Fence, PlaceError> {
         fence_of(self.fence.as_deref(), &self.keep_outs, self.return_point)
     }
 }
@@ -59,47 +59,108 @@ impl FeatureRole {
     }
 }
 
+/// A file that is no fence, or has no weighted areas.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+enum GeoJsonError {
+    #[error("features[{index}]: {error}")]
+    Feature { index: usize, error: Box<GeoJsonError> },
+    #[error("{member} {found}: expected {expected}")]
+    NotAllowed { member: &'static str, found: String, expected: &'static str },
+    #[error(
+        "crs {0}: only longitude and latitude of WGS 84 are read, as RFC 7946 has it; ogr2ogr -t_srs EPSG:4326 NEW.geojson OLD.geojson converts it"
+    )]
+    Crs(String),
+    #[error("the collection has no list of features")]
+    NoFeatures,
+    #[error("coordinates are missing")]
+    NoCoordinates,
+    #[error("the outline is not a list of corners")]
+    NoCorners,
+    #[error("{0} is not a place")]
+    NoPlace(Value),
+    #[error("{0} holes: draw each as a polygon with role = keep_out")]
+    Holes(usize),
+    #[error("[{x}, {y}] m is more than {} km from the mission's origin", MAX_DISTANCE_M / 1000.0)]
+    FarMetres { x: f64, y: f64 },
+    #[error("[{x}, {y}] is not a longitude and latitude; --metres reads metres east and north of the origin")]
+    NoDegrees { x: f64, y: f64 },
+    #[error(
+        "[{x}, {y}] is {:.0} km from the mission's origin [{}, {}]; expected longitude, latitude at most {} km from it, or --metres for metres east and north",
+        .far_m / 1000.0, .origin.lon_deg, .origin.lat_deg, MAX_DISTANCE_M / 1000.0
+    )]
+    FarDegrees { x: f64, y: f64, far_m: f64, origin: LatLon },
+    #[error("it has no area; scenecast ctl areas clear removes all areas")]
+    NoArea,
+    #[error("it has a role and no weight, as the shapes of a fence, which scenecast ctl fence reads")]
+    RoleWithoutWeight,
+    #[error("the property weight is not a number")]
+    NoWeight,
+    #[error("it contains neither polygon nor point")]
+    NoShape,
+    #[error("it has role = {} and no geometry: draw it, or leave it out", .0.name())]
+    NoGeometry(FeatureRole),
+    #[error("it has a weight: scenecast ctl areas reads weighted areas, and a fence has none")]
+    WeightInFence,
+    #[error("a point without a role: give the return point the property role = return_point, and leave out others")]
+    PointWithoutRole,
+    #[error("a second return point")]
+    SecondReturnPoint,
+    #[error("the return point is a Point")]
+    ReturnPolygon,
+    #[error(
+        "a second fence: an area to stay out of has the property role = keep_out; a fence that is cut at 180 degrees is to be drawn whole, with longitudes beyond 180"
+    )]
+    SecondFence,
+}
+
+impl GeoJsonError {
+    /// The error as that of a feature of a list.
+    fn of_feature(self, index: usize) -> Self {
+        Self::Feature { index, error: Box::new(self) }
+    }
+
+    /// The member `type` of `whole` is another one.
+    fn other_type(whole: &Value, expected: &'static str) -> Self {
+        Self::NotAllowed { member: "type", found: whole["type"].as_str().unwrap_or("is missing").to_owned(), expected }
+    }
+}
+
 /// Reads fence, keep-outs and return point.
 pub fn read_fence(file: &Path, frame: CoordinateFrame) -> Result<FenceShapes, UserError> {
-    let shapes = shapes_of(&read_json(file)?, frame);
-    shapes.and_then(|shapes| shapes.to_fence().map(|_| shapes)).map_err(|line| UserError::file(file, line))
+    let shapes = shapes_of(&read_json(file)?, frame).map_err(|error| UserError::file(file, error))?;
+    shapes.to_fence().map_err(|error| UserError::file(file, error))?;
+    Ok(shapes)
 }
 
 /// Reads weighted areas: polygons with the property `weight`.
 pub fn read_areas(file: &Path, frame: CoordinateFrame) -> Result<Vec<AreaShape>, UserError> {
-    areas_of(&read_json(file)?, frame).map_err(|line| UserError::file(file, line))
+    areas_of(&read_json(file)?, frame).map_err(|error| UserError::file(file, error))
 }
 
-fn areas_of(whole: &Value, frame: CoordinateFrame) -> Result<Vec<AreaShape>, String> {
+fn areas_of(whole: &Value, frame: CoordinateFrame) -> Result<Vec<AreaShape>, GeoJsonError> {
     check_crs(whole, frame)?;
     let features = match whole["type"].as_str() {
-        Some("FeatureCollection") => whole["features"].as_array().ok_or("the collection has no list of features")?,
+        Some("FeatureCollection") => whole["features"].as_array().ok_or(GeoJsonError::NoFeatures)?,
         Some("Feature") => std::slice::from_ref(whole),
-        other => {
-            return Err(format!("type {}: expected a FeatureCollection or a Feature", other.unwrap_or("is missing")));
-        }
+        _ => return Err(GeoJsonError::other_type(whole, "a FeatureCollection or a Feature")),
     };
-    let areas = |(i, feature): (usize, &Value)| {
-        areas_of_feature(feature, frame).map_err(|line| format!("features[{i}]: {line}"))
-    };
+    let areas = |(i, feature): (usize, &Value)| areas_of_feature(feature, frame).map_err(|error| error.of_feature(i));
     let features: Vec<_> = features.iter().enumerate().filter(|(_, feature)| !is_empty(&feature["geometry"])).collect();
     if features.is_empty() {
-        return Err("it has no area; scenecast ctl areas clear removes all areas".to_owned());
+        return Err(GeoJsonError::NoArea);
     }
     let areas: Vec<Vec<AreaShape>> = features.into_iter().map(areas).collect::<Result<_, _>>()?;
     Ok(areas.concat())
 }
 
-fn areas_of_feature(feature: &Value, frame: CoordinateFrame) -> Result<Vec<AreaShape>, String> {
+fn areas_of_feature(feature: &Value, frame: CoordinateFrame) -> Result<Vec<AreaShape>, GeoJsonError> {
     let weight = property(feature, "weight");
     let weight = weight.and_then(Value::as_f64).ok_or(match (weight, property(feature, "role")) {
-        (None, Some(role)) if !role.is_null() => {
-            "it has a role and no weight, as the shapes of a fence, which scenecast ctl fence reads"
-        }
-        _ => "the property weight is not a number",
+        (None, Some(role)) if !role.is_null() => GeoJsonError::RoleWithoutWeight,
+        _ => GeoJsonError::NoWeight,
     });
     let polygons = polygons_of(&feature["geometry"], "a Polygon or a MultiPolygon")?;
-    let area = |polygon: &Value| Ok(AreaShape { outline: outline(polygon, frame)?, weight: weight? });
+    let area = |polygon: &Value| Ok(AreaShape { outline: outline(polygon, frame)?, weight: weight.clone()? });
     polygons.into_iter().map(area).collect()
 }
 
@@ -110,12 +171,15 @@ fn property<'a>(feature: &'a Value, name: &str) -> Option<&'a Value> {
 }
 
 /// The polygons of a geometry; another one is refused with what is `expected`.
-fn polygons_of<'a>(geometry: &'a Value, expected: &str) -> Result<Vec<&'a Value>, String> {
+fn polygons_of<'a>(geometry: &'a Value, expected: &'static str) -> Result<Vec<&'a Value>, GeoJsonError> {
     let coordinates = &geometry["coordinates"];
     match geometry["type"].as_str() {
         Some("Polygon") => Ok(vec![coordinates]),
-        Some("MultiPolygon") => Ok(coordinates.as_array().ok_or("coordinates are missing")?.iter().collect()),
-        other => Err(format!("geometry {}: expected {expected}", other.unwrap_or("null"))),
+        Some("MultiPolygon") => Ok(coordinates.as_array().ok_or(GeoJsonError::NoCoordinates)?.iter().collect()),
+        other => {
+            let found = other.unwrap_or("null").to_owned();
+            Err(GeoJsonError::NotAllowed { member: "geometry", found, expected })
+        }
     }
 }
 
@@ -129,7 +193,7 @@ fn is_empty(geometry: &Value) -> bool {
 
 /// Refuses degrees of another datum: the same numbers lie a hundred metres off. The member `crs` is of GeoJSON before RFC 7946; it may be
 /// that of the file, of a feature or of a geometry.
-fn check_crs(whole: &Value, frame: CoordinateFrame) -> Result<(), String> {
+fn check_crs(whole: &Value, frame: CoordinateFrame) -> Result<(), GeoJsonError> {
     if matches!(frame, CoordinateFrame::Metres) {
         return Ok(());
     }
@@ -138,24 +202,20 @@ fn check_crs(whole: &Value, frame: CoordinateFrame) -> Result<(), String> {
     all.filter(|crs| !crs.is_null()).try_for_each(check_wgs84)
 }
 
-fn check_wgs84(crs: &Value) -> Result<(), String> {
+fn check_wgs84(crs: &Value) -> Result<(), GeoJsonError> {
     let name = crs["properties"]["name"].as_str().map_or_else(|| crs.to_string(), str::to_owned);
     let code = name.rsplit([':', '/']).next().unwrap_or_default();
     let is_wgs84 = matches!(code, "CRS84" | "CRS84h" | "WGS84")
         || matches!(code, "4326" | "4979") && name.to_ascii_uppercase().contains("EPSG");
-    if is_wgs84 {
-        return Ok(());
-    }
-    let convert = "ogr2ogr -t_srs EPSG:4326 NEW.geojson OLD.geojson converts it";
-    Err(format!("crs {name}: only longitude and latitude of WGS 84 are read, as RFC 7946 has it; {convert}"))
+    if is_wgs84 { Ok(()) } else { Err(GeoJsonError::Crs(name)) }
 }
 
-fn shapes_of(whole: &Value, frame: CoordinateFrame) -> Result<FenceShapes, String> {
+fn shapes_of(whole: &Value, frame: CoordinateFrame) -> Result<FenceShapes, GeoJsonError> {
     check_crs(whole, frame)?;
     let mut order = FenceShapes::default();
     match whole["type"].as_str() {
         Some("FeatureCollection") => {
-            let features = whole["features"].as_array().ok_or("the collection has no list of features")?;
+            let features = whole["features"].as_array().ok_or(GeoJsonError::NoFeatures)?;
             let is_drawn = |feature: &&Value| !is_empty(&feature["geometry"]);
             let drawn: Vec<_> = features.iter().filter(is_drawn).map(role).collect();
             // Of the fence and of the return point there is one, so an empty one beside it is none; an area to stay out of may be
@@ -165,7 +225,7 @@ fn shapes_of(whole: &Value, frame: CoordinateFrame) -> Result<FenceShapes, Strin
                 Ok(role) => is_empty(&feature["geometry"]) && drawn.contains(&Ok(role)),
             };
             for (i, feature) in features.iter().enumerate().filter(|(_, feature)| !is_spare(feature)) {
-                add(&mut order, feature, frame).map_err(|line| format!("features[{i}]: {line}"))?;
+                add(&mut order, feature, frame).map_err(|error| error.of_feature(i))?;
             }
         }
         Some("Feature") => add(&mut order, whole, frame)?,
@@ -174,62 +234,50 @@ fn shapes_of(whole: &Value, frame: CoordinateFrame) -> Result<FenceShapes, Strin
             let feature = serde_json::json!({ "properties": { "role": "return_point" }, "geometry": whole });
             add(&mut order, &feature, frame)?;
         }
-        other => {
-            let expected = "expected a FeatureCollection, a Feature, or a geometry: Polygon, MultiPolygon, Point";
-            return Err(format!("type {}: {expected}", other.unwrap_or("is missing")));
+        _ => {
+            let expected = "a FeatureCollection, a Feature, or a geometry: Polygon, MultiPolygon, Point";
+            return Err(GeoJsonError::other_type(whole, expected));
         }
     }
-    if order == FenceShapes::default() {
-        return Err("it contains neither polygon nor point".to_owned());
-    }
-    Ok(order)
+    if order == FenceShapes::default() { Err(GeoJsonError::NoShape) } else { Ok(order) }
 }
 
 /// Adds a feature to the order.
-fn add(order: &mut FenceShapes, feature: &Value, frame: CoordinateFrame) -> Result<(), String> {
+fn add(order: &mut FenceShapes, feature: &Value, frame: CoordinateFrame) -> Result<(), GeoJsonError> {
     let geometry = &feature["geometry"];
     if is_empty(geometry) {
         return match role(feature) {
-            Ok(Some(role)) => Err(format!("it has role = {} and no geometry: draw it, or leave it out", role.name())),
+            Ok(Some(role)) => Err(GeoJsonError::NoGeometry(role)),
             Ok(None) | Err(_) => Ok(()),
         };
     }
     let role = role(feature)?;
     if role.is_none() && property(feature, "weight").is_some_and(Value::is_number) {
-        return Err("it has a weight: scenecast ctl areas reads weighted areas, and a fence has none".to_owned());
+        return Err(GeoJsonError::WeightInFence);
     }
     if geometry["type"] == "Point" && role.is_none() {
-        return Err(
-            "a point without a role: give the return point the property role = return_point, and leave out others"
-                .to_owned(),
-        );
+        return Err(GeoJsonError::PointWithoutRole);
     }
     if geometry["type"] == "Point" && role == Some(FeatureRole::ReturnPoint) {
         let at = place(&geometry["coordinates"], frame)?;
         return match order.return_point.replace(at) {
             None => Ok(()),
-            Some(_) => Err("a second return point".to_owned()),
+            Some(_) => Err(GeoJsonError::SecondReturnPoint),
         };
     }
     for polygon in polygons_of(geometry, "a Polygon, or a Point for the return point")? {
         let outline = outline(polygon, frame)?;
         match role {
             Some(FeatureRole::KeepOut) => order.keep_outs.push(outline),
-            Some(FeatureRole::ReturnPoint) => return Err("the return point is a Point".to_owned()),
+            Some(FeatureRole::ReturnPoint) => return Err(GeoJsonError::ReturnPolygon),
             Some(FeatureRole::Fence) | None if order.fence.is_none() => order.fence = Some(outline),
-            Some(FeatureRole::Fence) | None => {
-                return Err(
-                    "a second fence: an area to stay out of has the property role = keep_out; a fence that is cut at 180 degrees is to \
-                     be drawn whole, with longitudes beyond 180"
-                        .to_owned(),
-                );
-            }
+            Some(FeatureRole::Fence) | None => return Err(GeoJsonError::SecondFence),
         }
     }
     Ok(())
 }
 
-fn role(feature: &Value) -> Result<Option<FeatureRole>, String> {
+fn role(feature: &Value) -> Result<Option<FeatureRole>, GeoJsonError> {
     let role = match property(feature, "role") {
         None | Some(Value::Null) => return Ok(None),
         Some(role) => role,
@@ -239,17 +287,18 @@ fn role(feature: &Value) -> Result<Option<FeatureRole>, String> {
         Some("fence") => Ok(Some(FeatureRole::Fence)),
         Some("keep_out") => Ok(Some(FeatureRole::KeepOut)),
         Some("return_point") => Ok(Some(FeatureRole::ReturnPoint)),
-        _ => Err(format!("role {role}: expected fence, keep_out or return_point")),
+        _ => {
+            let expected = "fence, keep_out or return_point";
+            Err(GeoJsonError::NotAllowed { member: "role", found: role.to_string(), expected })
+        }
     }
 }
 
 /// The corners of a polygon, without the last corner, which repeats the first.
-fn outline(polygon: &Value, frame: CoordinateFrame) -> Result<Vec<[f64; 2]>, String> {
-    let rings = polygon.as_array().ok_or("coordinates are missing")?;
-    let [ring] = &rings[..] else {
-        return Err(format!("{} holes: draw each as a polygon with role = keep_out", rings.len().saturating_sub(1)));
-    };
-    let corners = ring.as_array().ok_or("the outline is not a list of corners")?;
+fn outline(polygon: &Value, frame: CoordinateFrame) -> Result<Vec<[f64; 2]>, GeoJsonError> {
+    let rings = polygon.as_array().ok_or(GeoJsonError::NoCoordinates)?;
+    let [ring] = &rings[..] else { return Err(GeoJsonError::Holes(rings.len().saturating_sub(1))) };
+    let corners = ring.as_array().ok_or(GeoJsonError::NoCorners)?;
     let mut corners: Vec<[f64; 2]> = corners.iter().map(|corner| place(corner, frame)).collect::<Result<_, _>>()?;
     // Programs that project the corners may close the outline with a small error.
     if let [[x, y], .., [last_x, last_y]] = corners[..]
@@ -260,30 +309,18 @@ fn outline(polygon: &Value, frame: CoordinateFrame) -> Result<Vec<[f64; 2]>, Str
     Ok(corners)
 }
 
-fn place(at: &Value, frame: CoordinateFrame) -> Result<[f64; 2], String> {
-    let (x, y) = at[0].as_f64().zip(at[1].as_f64()).ok_or(format!("{at} is not a place"))?;
+fn place(at: &Value, frame: CoordinateFrame) -> Result<[f64; 2], GeoJsonError> {
+    let (x, y) = at[0].as_f64().zip(at[1].as_f64()).ok_or_else(|| GeoJsonError::NoPlace(at.clone()))?;
     match frame {
         CoordinateFrame::Metres if x.hypot(y) <= MAX_DISTANCE_M => Ok([x, y]),
-        CoordinateFrame::Metres => {
-            Err(format!("[{x}, {y}] m is more than {} km from the mission's origin", MAX_DISTANCE_M / 1000.0))
-        }
+        CoordinateFrame::Metres => Err(GeoJsonError::FarMetres { x, y }),
         CoordinateFrame::Wgs84(plane) => {
             // A shape across 180 degrees may have longitudes beyond.
             let turned = if (180.0..=360.0).contains(&x.abs()) { x - 360.0 * x.signum() } else { x };
-            let place = LatLon::new(y, turned).ok_or(format!(
-                "[{x}, {y}] is not a longitude and latitude; --metres reads metres east and north of the origin"
-            ))?;
+            let place = LatLon::new(y, turned).ok_or(GeoJsonError::NoDegrees { x, y })?;
             let far_m = plane.distance_m(place);
             if far_m > MAX_DISTANCE_M {
-                let origin = plane.origin();
-                return Err(format!(
-                    "[{x}, {y}] is {:.0} km from the mission's origin [{}, {}]; expected longitude, latitude at most {} km \
-                     from it, or --metres for metres east and north",
-                    far_m / 1000.0,
-                    origin.lon_deg,
-                    origin.lat_deg,
-                    MAX_DISTANCE_M / 1000.0
-                ));
+                return Err(GeoJsonError::FarDegrees { x, y, far_m, origin: plane.origin() });
             }
             let (x, y) = plane.to_plane(place);
             Ok([x, y])
@@ -296,7 +333,11 @@ mod tests {
     use super::*;
 
     fn read(json: &str, frame: CoordinateFrame) -> Result<FenceShapes, String> {
-        shapes_of(&serde_json::from_str(json).unwrap(), frame)
+        shapes_of(&serde_json::from_str(json).unwrap(), frame).map_err(|error| error.to_string())
+    }
+
+    fn areas_in(json: &str, frame: CoordinateFrame) -> Result<Vec<AreaShape>, String> {
+        areas_of(&serde_json::from_str(json).unwrap(), frame).map_err(|error| error.to_string())
     }
 
     const SQUARE: &str = r#"{"type": "Polygon", "coordinates": [[[0, 0], [90, 0], [90, 60], [0, 60], [0, 0]]]}"#;
@@ -319,7 +360,7 @@ mod tests {
 
     #[test]
     fn polygons_with_a_weight_become_areas() {
-        let areas = |json: &str| areas_of(&serde_json::from_str(json).unwrap(), CoordinateFrame::Metres);
+        let areas = |json: &str| areas_in(json, CoordinateFrame::Metres);
         let feature = format!(r#"{{"type": "Feature", "properties": {{"weight": -0.5}}, "geometry": {SQUARE}}}"#);
         let outline = vec![[0.0, 0.0], [90.0, 0.0], [90.0, 60.0], [0.0, 60.0]];
         let order = vec![AreaShape { outline, weight: -0.5 }];
@@ -388,7 +429,7 @@ mod tests {
         }
         assert!(with_crs(r#"{"type": "link", "properties": {"href": "x.prj"}}"#).unwrap_err().contains("x.prj"));
         let areas = near.replacen('{', r#"{"crs": {"properties": {"name": "EPSG:4230"}}, "#, 1);
-        assert!(areas_of(&serde_json::from_str(&areas).unwrap(), frame).unwrap_err().contains("EPSG:4230"));
+        assert!(areas_in(&areas, frame).unwrap_err().contains("EPSG:4230"));
     }
 
     #[test]

@@ -8,32 +8,55 @@ const MAX_BYTES: u64 = 1 << 20;
 
 const BYTE_ORDER_MARK: &[u8] = b"\xEF\xBB\xBF";
 
+/// Why the text of a file is not taken as GeoJSON.
+#[derive(Debug, thiserror::Error)]
+enum JsonError {
+    #[error("it is empty")]
+    Empty,
+    /// As [`scenecast_config::utf16_fault`] describes it.
+    #[error("{0}")]
+    Utf16(String),
+    #[error(transparent)]
+    Other(#[from] OtherKind),
+    #[error("it is not JSON: {0}")]
+    Json(#[from] serde_json::Error),
+}
+
+/// Another kind of file, with the command that converts it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+enum OtherKind {
+    #[error("it is GeoJSONSeq, with a feature on each line: ogr2ogr -f GeoJSON NEW.geojson GeoJSONSeq:OLD converts it")]
+    Sequence,
+    #[error("it is compressed by gzip: gunzip it first")]
+    Gzip,
+    #[error("it is {0}: ogr2ogr -t_srs EPSG:4326 NEW.geojson OLD converts it")]
+    Geodata(&'static str),
+    #[error(
+        "it is a plan of QGroundControl: the page \"Draw fences in a GIS\" of the documentation has the command that converts its fence"
+    )]
+    Plan,
+    #[error("it is Esri JSON: ogr2ogr -f GeoJSON -t_srs EPSG:4326 NEW.geojson ESRIJSON:OLD converts it")]
+    Esri,
+}
+
 /// How the files of other kinds begin, and what they are.
-const OTHERS: [(&[u8], &str); 6] = [
-    (b"\x1E", SEQUENCE),
-    (b"\x1F\x8B", "it is compressed by gzip: gunzip it first"),
-    (
-        b"PK\x03\x04",
-        "it is a ZIP archive, as of a shapefile or KMZ: ogr2ogr -t_srs EPSG:4326 NEW.geojson OLD converts it",
-    ),
-    (b"SQLite format 3\0", "it is a GeoPackage: ogr2ogr -t_srs EPSG:4326 NEW.geojson OLD converts it"),
-    (b"\0\0\x27\x0A", "it is a shapefile: ogr2ogr -t_srs EPSG:4326 NEW.geojson OLD converts it"),
-    (b"<", "it is XML, as KML and GPX: ogr2ogr -t_srs EPSG:4326 NEW.geojson OLD converts it"),
+const OTHERS: [(&[u8], OtherKind); 6] = [
+    (b"\x1E", OtherKind::Sequence),
+    (b"\x1F\x8B", OtherKind::Gzip),
+    (b"PK\x03\x04", OtherKind::Geodata("a ZIP archive, as of a shapefile or KMZ")),
+    (b"SQLite format 3\0", OtherKind::Geodata("a GeoPackage")),
+    (b"\0\0\x27\x0A", OtherKind::Geodata("a shapefile")),
+    (b"<", OtherKind::Geodata("XML, as KML and GPX")),
 ];
 
-const SEQUENCE: &str =
-    "it is GeoJSONSeq, with a feature on each line: ogr2ogr -f GeoJSON NEW.geojson GeoJSONSeq:OLD converts it";
-
 /// What a file of JSON is that programs of maps write and that is no GeoJSON.
-fn other_json(whole: &Value) -> Option<&'static str> {
+fn other_json(whole: &Value) -> Option<OtherKind> {
     let of_esri = |part: &Value| part["rings"].is_array() || part["geometry"]["rings"].is_array();
     if whole["fileType"] == "Plan" {
-        return Some(
-            "it is a plan of QGroundControl: the page \"Draw fences in a GIS\" of the documentation has the command that converts its fence",
-        );
+        return Some(OtherKind::Plan);
     }
-    (whole["geometryType"].is_string() || of_esri(whole) || of_esri(&whole["features"][0]))
-        .then_some("it is Esri JSON: ogr2ogr -f GeoJSON -t_srs EPSG:4326 NEW.geojson ESRIJSON:OLD converts it")
+    let is_esri = whole["geometryType"].is_string() || of_esri(whole) || of_esri(&whole["features"][0]);
+    is_esri.then_some(OtherKind::Esri)
 }
 
 /// Whether a text has several objects of JSON one after the other.
@@ -46,27 +69,27 @@ fn is_sequence(text: &[u8]) -> bool {
 /// Reads a file of JSON.
 pub(crate) fn read_json(file: &Path) -> Result<Value, UserError> {
     let text = scenecast_config::read_regular(file, MAX_BYTES)?;
-    parse(&text).map_err(|line| UserError::file(file, line))
+    parse(&text).map_err(|error| UserError::file(file, error))
 }
 
-fn parse(text: &[u8]) -> Result<Value, String> {
+fn parse(text: &[u8]) -> Result<Value, JsonError> {
     // Programs that add one may add two.
     let mut text = text;
     while let Some(rest) = text.strip_prefix(BYTE_ORDER_MARK) {
         text = rest;
     }
     if text.iter().all(u8::is_ascii_whitespace) {
-        return Err("it is empty".to_owned());
+        return Err(JsonError::Empty);
     }
     if let Some(fault) = scenecast_config::utf16_fault(text) {
-        return Err(fault);
+        return Err(JsonError::Utf16(fault));
     }
     match OTHERS.iter().find(|(head, _)| text.starts_with(head)) {
-        Some((_, what)) => Err((*what).to_owned()),
+        Some((_, other)) => Err((*other).into()),
         None => match serde_json::from_slice(text) {
-            Ok(whole) => other_json(&whole).map_or(Ok(whole), |what| Err(what.to_owned())),
-            Err(_) if is_sequence(text) => Err(SEQUENCE.to_owned()),
-            Err(error) => Err(format!("it is not JSON: {error}")),
+            Ok(whole) => other_json(&whole).map_or(Ok(whole), |other| Err(other.into())),
+            Err(_) if is_sequence(text) => Err(OtherKind::Sequence.into()),
+            Err(error) => Err(error.into()),
         },
     }
 }
@@ -96,9 +119,9 @@ mod tests {
             (b"{\"features\":[{\"geometry\":{\"rings\":[[[1,2]]]}}]}", "ESRIJSON:OLD"),
             (b"{\"fileType\":\"Plan\",\"geoFence\":{}}", "QGroundControl"),
         ] {
-            let line = parse(bytes).unwrap_err();
+            let line = parse(bytes).unwrap_err().to_string();
             assert!(line.contains(what), "{line}");
         }
-        assert_eq!(parse(b"\xEF\xBB\xBF\xEF\xBB\xBF[1]"), Ok(serde_json::json!([1])));
+        assert_eq!(parse(b"\xEF\xBB\xBF\xEF\xBB\xBF[1]").unwrap(), serde_json::json!([1]));
     }
 }

@@ -30,5 +30,7 @@ pub use record::{
     read_record, recover,
 };
 pub use recording::{DepthFile, RecordedFrame, Recorder, Recording, write_poses};
-pub use tum_recording::{TUM_UNITS_PER_M, TumFolder, TumFrame, TumOptions, read_depth, tum_camera};
+pub use tum_recording::{
+    NumberFault, TUM_UNITS_PER_M, TumFolder, TumFrame, TumOptions, finite_number, read_depth, tum_camera,
+};
 pub use whole::{sync_folder, write_whole};

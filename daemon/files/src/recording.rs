@@ -1,7 +1,7 @@
 //! Recorded missions: images with their poses.
 
 use crate::images::FrameImage;
-use crate::pose_table::{Columns, Placed, PoseRow, reachable_rows};
+use crate::pose_table::{Columns, Placed, PoseRow, PoseTableError, reachable_rows};
 use crate::tum_recording::read_depth;
 use image::RgbImage;
 use scene_model::project::View;
@@ -134,13 +134,9 @@ impl Recording {
 const METRE_COLUMNS: [&str; 6] = ["t_s", "file", "x_m", "y_m", "depth_m", "heading_deg"];
 const MOSAIC_COLUMNS: [&str; 6] = ["file", "time_utc_hms", "x_px", "y_px", "yaw_deg", "scale"];
 
-fn of_metres(dir: &Path, row: PoseRow<'_>) -> Result<RecordedFrame, String> {
-    let t_s = row.number("t_s")?;
-    if t_s < 0.0 {
-        return Err(format!("t_s is {t_s}; expected 0 or more"));
-    }
+fn of_metres(dir: &Path, row: PoseRow<'_>) -> Result<RecordedFrame, PoseTableError> {
     Ok(RecordedFrame {
-        t_s,
+        t_s: row.number_in("t_s", |t_s| t_s >= 0.0, "0 or more")?,
         image: FrameImage::File(row.file(dir)?),
         x_m: row.number("x_m")?,
         y_m: row.number("y_m")?,
@@ -155,13 +151,10 @@ fn of_metres(dir: &Path, row: PoseRow<'_>) -> Result<RecordedFrame, String> {
 const DAY_S: f64 = 86_400.0;
 
 /// A frame placed in a mosaic, at its time of the day.
-fn of_mosaic(dir: &Path, row: PoseRow<'_>, metres_per_pixel: f64) -> Result<RecordedFrame, String> {
+fn of_mosaic(dir: &Path, row: PoseRow<'_>, metres_per_pixel: f64) -> Result<RecordedFrame, PoseTableError> {
     let time = row.text("time_utc_hms")?;
-    let t_s = time_of_day(time).ok_or_else(|| format!("time_utc_hms is {time:?}; expected hhmmss"))?;
-    let scale = row.number("scale")?;
-    if scale <= 0.0 {
-        return Err(format!("scale is {scale}; expected more than 0"));
-    }
+    let t_s = time_of_day(time).ok_or_else(|| PoseTableError::text("time_utc_hms", time, "hhmmss"))?;
+    let scale = row.number_in("scale", |scale| scale > 0.0, "more than 0")?;
     Ok(RecordedFrame {
         t_s,
         image: FrameImage::File(row.file(dir)?),

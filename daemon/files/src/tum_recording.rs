@@ -58,22 +58,56 @@ impl Recording {
     }
 }
 
+/// Why a field of a line is not read as a finite number.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum NumberFault {
+    #[error("{0} is missing")]
+    Missing(&'static str),
+    #[error("{name} = {text:?} is no number")]
+    NoNumber { name: &'static str, text: String },
+    #[error("{name} = {text}: it takes a finite number")]
+    NotFinite { name: &'static str, text: String },
+}
+
+/// The finite number in a field of this name, with blanks around it or without.
+pub fn finite_number(field: Option<&str>, name: &'static str) -> Result<f64, NumberFault> {
+    let text = field.map(str::trim).ok_or(NumberFault::Missing(name))?;
+    match text.parse::<f64>() {
+        Ok(value) if value.is_finite() => Ok(value),
+        Ok(_) => Err(NumberFault::NotFinite { name, text: text.to_owned() }),
+        Err(_) => Err(NumberFault::NoNumber { name, text: text.to_owned() }),
+    }
+}
+
+/// A line of a list, or a pose, that cannot be used.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+enum TumError {
+    #[error(transparent)]
+    Number(#[from] NumberFault),
+    #[error("expected a time and a file")]
+    NoFile,
+    #[error("the file is {0:?}; expected a file below the folder")]
+    FileElsewhere(String),
+    #[error("the quaternion qx qy qz qw has not the length 1")]
+    Rotation,
+    #[error(
+        "the camera looks {off_vertical_deg:.0} degrees away from straight down; with registration.enabled = true, up to {most_deg:.0} are allowed"
+    )]
+    Tilted { off_vertical_deg: f64, most_deg: f64 },
+}
+
 fn recorded(
     frame: &TumFrame,
     began_s: f64,
     calibration: &Arc<Calibration>,
     options: &TumOptions,
-) -> Result<RecordedFrame, String> {
-    let turn = Rotation::from_quaternion(frame.pose.rotation).ok_or("the quaternion has not the length 1")?;
+) -> Result<RecordedFrame, TumError> {
+    let turn = Rotation::from_quaternion(frame.pose.rotation).ok_or(TumError::Rotation)?;
     let pose = turn.camera_pose(frame.pose.position);
     let axis = turn.apply([0.0, 0.0, 1.0]);
     let off_vertical = axis[0].hypot(axis[1]).atan2(-axis[2]);
     if let Some(most) = options.max_tilt_rad.filter(|most| off_vertical > *most) {
-        return Err(format!(
-            "the camera looks {:.0} degrees away from straight down; with registration.enabled = true, up to {:.0} are allowed",
-            off_vertical.to_degrees(),
-            most.to_degrees()
-        ));
+        return Err(TumError::Tilted { off_vertical_deg: off_vertical.to_degrees(), most_deg: most.to_degrees() });
     }
     let tilt = tilt_of(frame.pose.rotation, pose.heading_rad);
     let units_per_m = options.units_per_m.unwrap_or(TUM_UNITS_PER_M);
@@ -193,7 +227,7 @@ fn times_and<T>(list: Vec<Entry<T>>) -> Vec<(f64, T)> {
 }
 
 /// Reads lines `time value` and sorts them by time; errors name the line.
-fn read_list<T>(path: &Path, read: impl Fn(&str) -> Result<T, String>) -> Result<Vec<Entry<T>>, UserError> {
+fn read_list<T>(path: &Path, read: impl Fn(&str) -> Result<T, TumError>) -> Result<Vec<Entry<T>>, UserError> {
     let text = scenecast_config::read_text(path, MAX_LIST_BYTES)?;
     let mut list = Vec::new();
     for (place, line) in (1..).zip(text.lines()) {
@@ -202,8 +236,8 @@ fn read_list<T>(path: &Path, read: impl Fn(&str) -> Result<T, String>) -> Result
             continue;
         }
         let (time, rest) = line.split_once([' ', '\t', ',']).unwrap_or((line, ""));
-        let entry =
-            number(Some(time), "the time").and_then(|t_s| Ok(Entry { line: place, t_s, content: read(rest.trim())? }));
+        let time = finite_number(Some(time), "the time").map_err(TumError::Number);
+        let entry = time.and_then(|t_s| Ok(Entry { line: place, t_s, content: read(rest.trim())? }));
         let place = || format!("{}:{place}", path.display());
         list.push(entry.map_err(|error| UserError::Input(format!("{}: {error}", place())))?);
     }
@@ -214,34 +248,22 @@ fn read_list<T>(path: &Path, read: impl Fn(&str) -> Result<T, String>) -> Result
     Ok(list)
 }
 
-fn file(text: &str) -> Result<PathBuf, String> {
+fn file(text: &str) -> Result<PathBuf, TumError> {
     let is_inside = Path::new(text).components().all(|part| matches!(part, Component::Normal(_) | Component::CurDir));
     match text {
-        "" => Err("expected a time and a file".to_owned()),
-        _ if !is_inside => Err(format!("the file is {text:?}; expected a file below the folder")),
+        "" => Err(TumError::NoFile),
+        _ if !is_inside => Err(TumError::FileElsewhere(text.to_owned())),
         _ => Ok(text.into()),
     }
 }
 
-fn pose(text: &str) -> Result<CameraPose, String> {
+fn pose(text: &str) -> Result<CameraPose, TumError> {
     let mut fields = text.split([' ', '\t', ',']).filter(|field| !field.is_empty());
-    let mut next = |name| number(fields.next(), name);
+    let mut next = |name| finite_number(fields.next(), name);
     let position = [next("tx")?, next("ty")?, next("tz")?];
     let rotation = [next("qx")?, next("qy")?, next("qz")?, next("qw")?];
-    let length: f64 = rotation.iter().map(|q| q * q).sum();
-    if !(0.9..1.1).contains(&length) {
-        return Err("the quaternion qx qy qz qw has not the length 1".to_owned());
-    }
+    Rotation::from_quaternion(rotation).ok_or(TumError::Rotation)?;
     Ok(CameraPose { position, rotation })
-}
-
-fn number(field: Option<&str>, name: &str) -> Result<f64, String> {
-    let text = field.map(str::trim).ok_or_else(|| format!("{name} is missing"))?;
-    match text.parse::<f64>() {
-        Ok(value) if value.is_finite() => Ok(value),
-        Ok(_) => Err(format!("{name} = {text}: it takes a finite number")),
-        Err(_) => Err(format!("{name} = {text:?} is no number")),
-    }
 }
 
 fn nearest<T>(list: &[(f64, T)], t_s: f64) -> Option<&T> {
@@ -266,9 +288,10 @@ mod tests {
     #[test]
     fn a_pose_is_seven_numbers_with_a_rotation() {
         assert_eq!(pose("1 2 3 0 0 0 1").unwrap().position, [1.0, 2.0, 3.0]);
-        assert!(pose("1 2 3 0 0 0 0").unwrap_err().contains("length 1"));
-        assert!(pose("1 2 nan 0 0 0 1").unwrap_err().contains("tz"));
-        assert!(pose("1 2 3 0 0 1").unwrap_err().contains("qw is missing"));
+        let refused = |text| pose(text).unwrap_err().to_string();
+        assert!(refused("1 2 3 0 0 0 0").contains("length 1"));
+        assert!(refused("1 2 nan 0 0 0 1").contains("tz"));
+        assert!(refused("1 2 3 0 0 1").contains("qw is missing"));
     }
 
     #[test]
@@ -292,7 +315,7 @@ mod tests {
     #[test]
     fn a_file_outside_of_the_folder_is_refused() {
         assert!(file("rgb/1.png").is_ok());
-        assert!(file("../1.png").unwrap_err().contains("below the folder"));
+        assert!(file("../1.png").unwrap_err().to_string().contains("below the folder"));
         assert!(file("").is_err());
     }
 }

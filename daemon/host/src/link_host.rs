@@ -28,9 +28,9 @@ pub enum FrameEvent {
     NotSent(Refusal),
     /// A frame was received and given to the link.
     Received {
-        /// The bytes on air.
+        /// The bytes as they came from the modem, header and integrity check or tag included.
         frame: Vec<u8>,
-        /// The same; a vehicle does not know it.
+        /// Bytes of what an accepted frame carries, headers not included; empty at a vehicle, which does not count them.
         contents: BTreeMap<Class, u64>,
         outcome: FrameOutcome,
         /// Why it was dropped, if it was.

@@ -59,7 +59,7 @@ pub struct MeasuredPose {
     pub pitch_rad: f64,
     /// Height above the sea floor, metres, where it is measured.
     pub altitude_m: Option<f64>,
-    /// Time of the measurement.
+    /// When the autopilot's step with these values came in.
     pub at: Instant,
 }
 

@@ -308,8 +308,8 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    fn read(header: &str, picture: &[u8]) -> Result<Item, String> {
-        Item::read(header.as_bytes(), picture).map_err(|why| why.to_string())
+    fn read(header: &str, picture: &[u8]) -> Result<Item, Refusal> {
+        Item::read(header.as_bytes(), picture)
     }
 
     #[test]
@@ -382,7 +382,7 @@ mod tests {
             (r#"{"kind":"band","name":"Backscatter","west_m":0,"south_m":0,"cell_m":1}"#, &[0], "the band: name takes"),
             (r#"{"kind":"image","x_m":1}"#, &[0], "y_m is missing"),
         ] {
-            let told = read(header, picture).unwrap_err();
+            let told = read(header, picture).unwrap_err().to_string();
             assert!(told.contains(said), "{told} for {header}");
         }
     }

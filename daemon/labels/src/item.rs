@@ -1,5 +1,6 @@
 //! One item: its time, the names of classes in it and its content; or why it is not taken.
 
+use crate::ros::MessageFault;
 use crate::stream::{MAX_HEADER_BYTES, MAX_PICTURE_BYTES, MAX_PIXELS, Raster};
 use scenecast_protocol::map::{ClassEntry, Decimal, LayerDescriptor, MAX_CLASS};
 
@@ -184,7 +185,13 @@ pub enum Refusal {
     #[error("the grid is turned by {0:.2} degrees: only grids along east and north are taken")]
     Turned(f64),
     #[error("the message: {0}")]
-    Message(String),
+    Message(#[from] MessageFault),
+    /// So many messages have another type than their topic.
+    #[error("the message: {0} messages have another type than the topic")]
+    OtherType(u64),
+    /// So many messages were not read in time.
+    #[error("the message: {0} messages were dropped: newer ones came before they were read")]
+    Overtaken(u64),
     #[error("it covers {0} cells of the map: at most {1} are taken")]
     Cells(u64, u64),
     #[error("the map would have more than {0} cells")]

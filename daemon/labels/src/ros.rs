@@ -13,6 +13,30 @@ const STILL_FRAMES: [&str; 2] = ["map", "odom"];
 /// Turn of a grid that is taken for none, radians: on 2000 cells less than half a cell.
 const MAX_TURN_RAD: f64 = 1e-4;
 
+/// A message of ROS 2 that contradicts itself, or has another encoding.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum MessageFault {
+    #[error("{names} names of layers and {arrays} arrays")]
+    Layers { names: usize, arrays: usize },
+    #[error("a start index lies outside of the grid")]
+    StartIndex,
+    #[error("layer {0:?}: {1}")]
+    Layer(String, LayerFault),
+    #[error("the encoding {0:?}: mono8 and 8UC1 are taken, whose value is the class")]
+    Encoding(String),
+}
+
+/// An array of numbers that is no layer of its grid.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum LayerFault {
+    #[error("{0} dimensions, and two are taken")]
+    Dimensions(usize),
+    #[error("{} x {} numbers on {rows} x {columns} cells", .sizes.0, .sizes.1)]
+    Sizes { sizes: (u32, u32), rows: u32, columns: u32 },
+    #[error("{found} numbers, and {needed} are needed")]
+    Numbers { found: usize, needed: usize },
+}
+
 /// Refuses a message in another frame of reference than `wanted`; without a wanted one, `map`, `odom` and none are taken.
 fn check_frame(header: &Header, wanted: &str) -> Result<(), Refusal> {
     let frame = header.frame_id.trim_start_matches('/');
@@ -70,7 +94,7 @@ pub fn bands_of_grid_map(map: &GridMap, frame: &str) -> Vec<Result<Item, Refusal
     };
     let band = |(layer, array): (&String, &Float32MultiArray)| {
         let name = band_name(layer);
-        let quantities = place.raster(array).map_err(|why| Refusal::Message(format!("layer {layer:?}: {why}")))?;
+        let quantities = place.raster(array).map_err(|fault| MessageFault::Layer(layer.clone(), fault))?;
         if name.is_empty() {
             return Err(Refusal::Band);
         }
@@ -95,8 +119,7 @@ impl Place {
         check_frame(&map.header, frame)?;
         check_turn(&map.info.pose.orientation)?;
         if map.layers.len() != map.data.len() || map.layers.is_empty() || map.layers.len() > MAX_LAYERS {
-            let text = format!("{} names of layers and {} arrays", map.layers.len(), map.data.len());
-            return Err(Refusal::Message(text));
+            return Err(MessageFault::Layers { names: map.layers.len(), arrays: map.data.len() }.into());
         }
         let cell_m = edge(map.info.resolution)?;
         let cells = |length: f64| (length / cell_m).round().clamp(0.0, f64::from(u32::MAX)) as u32;
@@ -104,7 +127,7 @@ impl Place {
         Raster::<f32>::check(rows, columns)?;
         let first = (u32::from(map.outer_start_index), u32::from(map.inner_start_index));
         if first.0 >= rows || first.1 >= columns {
-            return Err(Refusal::Message("a start index lies outside of the grid".to_owned()));
+            return Err(MessageFault::StartIndex.into());
         }
         let middle = &map.info.pose.position;
         let corner = |middle: f64, cells: u32| middle - f64::from(cells) * cell_m / 2.0;
@@ -117,21 +140,22 @@ impl Place {
     }
 
     /// The numbers of a layer from the north-west on.
-    fn raster(&self, array: &Float32MultiArray) -> Result<Raster<f32>, String> {
+    fn raster(&self, array: &Float32MultiArray) -> Result<Raster<f32>, LayerFault> {
         let Self { rows, columns, first, .. } = *self;
         let [outer, inner] = array.layout.dim.as_slice() else {
-            return Err(format!("{} dimensions, and two are taken", array.layout.dim.len()));
+            return Err(LayerFault::Dimensions(array.layout.dim.len()));
         };
         // grid_map writes column by column; the names of the dimensions tell.
         let is_by_rows = outer.label == "row_index";
         let expected = if is_by_rows { (rows, columns) } else { (columns, rows) };
-        if (outer.size, inner.size) != expected {
-            return Err(format!("{} x {} numbers on {rows} x {columns} cells", outer.size, inner.size));
+        let sizes = (outer.size, inner.size);
+        if sizes != expected {
+            return Err(LayerFault::Sizes { sizes, rows, columns });
         }
         let begin = array.layout.data_offset as usize;
-        let count = rows as usize * columns as usize;
-        let numbers = begin.checked_add(count).and_then(|end| array.data.get(begin..end));
-        let numbers = numbers.ok_or(format!("{} numbers, and {count} are needed", array.data.len()))?;
+        let (found, needed) = (array.data.len(), rows as usize * columns as usize);
+        let numbers = begin.checked_add(needed).and_then(|end| array.data.get(begin..end));
+        let numbers = numbers.ok_or(LayerFault::Numbers { found, needed })?;
         let at = |row: u32, column: u32| {
             let (row, column) = ((row + first.0) % rows, (column + first.1) % columns);
             let (major, minor) = if is_by_rows { (row, column) } else { (column, row) };
@@ -152,8 +176,7 @@ impl Place {
 /// Another encoding, sizes that contradict each other, class 254.
 pub fn item_of_image(image: &Image) -> Result<Item, Refusal> {
     if !matches!(image.encoding.as_str(), "mono8" | "8UC1") {
-        let text = format!("the encoding {:?}: mono8 and 8UC1 are taken, whose value is the class", image.encoding);
-        return Err(Refusal::Message(text));
+        return Err(MessageFault::Encoding(image.encoding.clone()).into());
     }
     let (width, height, step) = (image.width, image.height, image.step as usize);
     Raster::<u8>::check(width, height)?;

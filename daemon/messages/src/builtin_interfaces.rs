@@ -31,7 +31,7 @@ impl Time {
         }
     }
 
-    /// Nanoseconds since 1970.
+    /// The time in nanoseconds: since 1970, or since the start of a simulation.
     pub fn nanos(&self) -> i64 {
         // 2^31 s and 2^32 ns together are below 2^63 ns.
         i64::from(self.sec) * NANOS + i64::from(self.nanosec)

@@ -82,7 +82,7 @@ impl Primitive {
         }
     }
 
-    /// Its number in `type_description_interfaces/msg/FieldType`.
+    /// Its number in `type_description_interfaces/msg/FieldType`, from which type hashes are made.
     pub(crate) fn type_id(self) -> u32 {
         match self {
             Self::Int8 => 2,

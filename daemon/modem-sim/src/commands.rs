@@ -46,25 +46,39 @@ fn is_in_background() -> bool {
     false
 }
 
+/// Why a line is no command.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+enum CommandFault {
+    #[error(
+        "fault {0}: it takes one of {names}, and seconds or an address behind those that have one",
+        names = ModemFault::names()
+    )]
+    Fault(String),
+    #[error("move {0}: it takes three numbers from -1000000 to 1000000 m")]
+    Move(String),
+    #[error("{0}: it takes {HELP}; WHAT is one of {names}", names = ModemFault::names())]
+    Unknown(String),
+}
+
 /// `None` for an empty line.
-fn parse(line: &str) -> Result<Option<EmulatorCommand>, String> {
+fn parse(line: &str) -> Result<Option<EmulatorCommand>, CommandFault> {
     let words: Vec<&str> = line.split_whitespace().collect();
     match words.as_slice() {
         [] => Ok(None),
         ["quit"] => Ok(Some(EmulatorCommand::Quit)),
         ["fault", name, words @ ..] => match ModemFault::parse(words) {
-            Ok(fault) => Ok(Some(EmulatorCommand::Fault((*name).to_owned(), fault))),
-            Err(takes) => Err(format!("fault {}: {takes}", words.join(" "))),
+            Some(fault) => Ok(Some(EmulatorCommand::Fault((*name).to_owned(), fault))),
+            None => Err(CommandFault::Fault(words.join(" "))),
         },
         ["move", name, place @ ..] => {
             let numbers: Option<Vec<f64>> =
                 place.iter().map(|n| n.parse().ok().filter(|n: &f64| n.abs() <= 1e6)).collect();
             match numbers.as_deref() {
                 Some([x, y, z]) => Ok(Some(EmulatorCommand::Move((*name).to_owned(), NodePosition::new(*x, *y, *z)))),
-                _ => Err(format!("move {}: it takes three numbers from -1000000 to 1000000 m", place.join(" "))),
+                _ => Err(CommandFault::Move(place.join(" "))),
             }
         }
-        _ => Err(format!("{line}: it takes {HELP}; WHAT is one of {}", ModemFault::names())),
+        _ => Err(CommandFault::Unknown(line.to_owned())),
     }
 }
 
@@ -97,7 +111,7 @@ mod tests {
             "fault auv wrong_address 300",
             "move a 1 2",
         ] {
-            let error = parse(wrong).expect_err(wrong);
+            let error = parse(wrong).expect_err(wrong).to_string();
             assert!(error.contains("it takes"), "{error}");
         }
     }

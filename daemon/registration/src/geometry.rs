@@ -62,7 +62,7 @@ pub struct CameraGeometry {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum CameraFinding {
     AsConfigured(String),
-    /// What people should change.
+    /// One line for people: what differs from the configuration, and what to change.
     Wrong(String),
 }
 
@@ -177,7 +177,7 @@ struct Pair {
     by_images: Complex<f64>,
     /// By odometry: east, and north as the imaginary part, metres.
     by_odometry: Complex<f64>,
-    /// Halfway.
+    /// The heading halfway between the two frames, clockwise from north, radians.
     heading_rad: f64,
 }
 

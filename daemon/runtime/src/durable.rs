@@ -52,7 +52,7 @@ fn configured_fence(file: &Path, config: &Config) -> Result<Fence, UserError> {
         None => CoordinateFrame::Metres,
     };
     let error = |line: String| UserError::Input(format!("survey.fence_file = {}: {line}", file.display()));
-    let fence = read_fence(file, frame)?.to_fence().map_err(error)?;
+    let fence = read_fence(file, frame)?.to_fence().map_err(|why| error(why.to_string()))?;
     match fence.fence {
         Some(_) => Ok(fence),
         None => Err(error("it has no fence".to_owned())),

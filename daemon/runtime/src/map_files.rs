@@ -2,6 +2,7 @@
 
 use scenecast_console::state::Origin;
 use scenecast_console::{MapCells, MapFormat};
+use scenecast_core::UserError;
 use scenecast_core::WGS84_AUX_XML;
 use scenecast_core::label_picture::MAX_CELLS;
 use scenecast_files::write_whole;
@@ -97,15 +98,16 @@ async fn closed(receiver: &watch::Receiver<Waiting>) {
 
 /// A picture with its world file, or a GeoTIFF where a picture would have too many pixels. The other kind is removed, since it
 /// would be out of date.
-fn write(dir: &Path, vehicle: u8, map: &MapFile) -> Result<(), String> {
+fn write(dir: &Path, vehicle: u8, map: &MapFile) -> Result<(), UserError> {
     let path = |extension: &str| dir.join(format!("operator-map-{vehicle}.{extension}"));
-    let put = |extension: &str, bytes: &[u8]| write_whole(&path(extension), bytes).map_err(|e| e.to_string());
+    let put = |extension: &str, bytes: &[u8]| write_whole(&path(extension), bytes);
     let remove = |extension: &str| match std::fs::remove_file(path(extension)) {
-        Err(e) if e.kind() != std::io::ErrorKind::NotFound => Err(e.to_string()),
+        Err(e) if e.kind() != std::io::ErrorKind::NotFound => Err(UserError::failed(e)),
         _ => Ok(()),
     };
+    let export = |format| map.cells.export(format, map.origin).map_err(UserError::failed);
     if map.cells.bounds.is_some_and(|b| b.area() > MAX_CELLS) {
-        put("tif", &map.cells.export(MapFormat::Tiff, map.origin)?)?;
+        put("tif", &export(MapFormat::Tiff)?)?;
         remove("pgw")?;
         remove("png.aux.xml")?;
         return remove("png");
@@ -114,7 +116,7 @@ fn write(dir: &Path, vehicle: u8, map: &MapFile) -> Result<(), String> {
         put("pgw", text.as_bytes())?;
         put("png.aux.xml", WGS84_AUX_XML.as_bytes())?;
     }
-    put("png", &map.cells.export(MapFormat::Png, map.origin)?)?;
+    put("png", &export(MapFormat::Png)?)?;
     remove("tif")
 }
 

@@ -70,7 +70,7 @@ impl MissionRecord {
         Ok(())
     }
 
-    /// Ends both records.
+    /// Adds the last account of the images and the last state, and ends both records.
     pub fn finish(mut self, mission: &Mission) -> Result<(), UserError> {
         let images = self.vehicle.1.images(mission.images(), 0.0, &stamps(mission.now()));
         write(&mut self.vehicle.0, images)?;
@@ -98,7 +98,7 @@ impl UnseenPage {
         Self { facts, meter: LinkMeter::new(window, mission.now()), counted: [0; 2] }
     }
 
-    /// The state now.
+    /// Counts the bits on air since the last call, and returns the state of the mission now.
     pub fn snapshot(&mut self, mission: &Mission) -> Snapshot {
         count(&mut self.meter, &mut self.counted, mission);
         self.meter.handle_budgets(mission.surface());

@@ -8,8 +8,22 @@ use scenecast_messages::sensor_msgs::CameraInfo;
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{line}: {cause}")]
 pub struct CalibrationFileError {
-    pub line: usize,
-    pub cause: String,
+    line: usize,
+    cause: CalibrationFileFault,
+}
+
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+enum CalibrationFileFault {
+    #[error("{name} is {text:?}; expected a number of pixels")]
+    Pixels { name: String, text: String },
+    #[error("{text:?} in {key} is no number")]
+    Number { key: String, text: String },
+    #[error("{key} has more than {MAX_NUMBERS} numbers")]
+    TooMany { key: String },
+    #[error("{key} has {found} numbers; expected {expected}")]
+    Count { key: String, found: usize, expected: usize },
+    #[error("there is no camera_matrix with its data")]
+    NoMatrix,
 }
 
 /// Most numbers of a matrix.
@@ -41,7 +55,7 @@ struct Reader {
 }
 
 impl Reader {
-    fn handle_line(&mut self, line: &str) -> Result<(), String> {
+    fn handle_line(&mut self, line: &str) -> Result<(), CalibrationFileFault> {
         let line = line.split(" #").next().unwrap_or_default();
         let text = line.trim();
         if text.is_empty() || text.starts_with('#') || text.starts_with("---") || text.starts_with('%') {
@@ -74,7 +88,7 @@ impl Reader {
     }
 
     /// Numbers of a list in brackets.
-    fn handle_numbers(&mut self, text: &str) -> Result<(), String> {
+    fn handle_numbers(&mut self, text: &str) -> Result<(), CalibrationFileFault> {
         let (numbers, is_end) = text.split_once(']').map_or((text, false), |(numbers, _)| (numbers, true));
         for number in numbers.split(',').map(str::trim).filter(|number| !number.is_empty()) {
             self.push(number)?;
@@ -82,19 +96,22 @@ impl Reader {
         if is_end { self.end_list() } else { Ok(()) }
     }
 
-    fn push(&mut self, text: &str) -> Result<(), String> {
-        let number: f64 = text.parse().map_err(|_| format!("{text:?} in {} is no number", self.key))?;
+    fn push(&mut self, text: &str) -> Result<(), CalibrationFileFault> {
+        let key = || self.key.clone();
+        let number = text.parse();
+        let number: f64 = number.map_err(|_| CalibrationFileFault::Number { key: key(), text: text.to_owned() })?;
         let Some((numbers, _)) = &mut self.list else { return Ok(()) };
         if numbers.len() >= MAX_NUMBERS {
-            return Err(format!("{} has more than {MAX_NUMBERS} numbers", self.key));
+            return Err(CalibrationFileFault::TooMany { key: key() });
         }
         numbers.push(number);
         Ok(())
     }
 
-    fn end_list(&mut self) -> Result<(), String> {
+    fn end_list(&mut self) -> Result<(), CalibrationFileFault> {
         let Some((numbers, _)) = self.list.take() else { return Ok(()) };
-        let wrong = |expected: usize| format!("{} has {} numbers; expected {expected}", self.key, numbers.len());
+        let (key, found) = (self.key.clone(), numbers.len());
+        let wrong = |expected| CalibrationFileFault::Count { key, found, expected };
         match self.key.as_str() {
             "camera_matrix" => {
                 self.info.k = numbers.as_slice().try_into().map_err(|_| wrong(9))?;
@@ -108,18 +125,18 @@ impl Reader {
         Ok(())
     }
 
-    fn finish(mut self) -> Result<CameraInfo, String> {
+    fn finish(mut self) -> Result<CameraInfo, CalibrationFileFault> {
         self.end_list()?;
         match self.has_matrix {
             true => Ok(self.info),
-            false => Err("there is no camera_matrix with its data".to_owned()),
+            false => Err(CalibrationFileFault::NoMatrix),
         }
     }
 }
 
-fn pixels(name: &str, text: &str) -> Result<u32, String> {
+fn pixels(name: &str, text: &str) -> Result<u32, CalibrationFileFault> {
     let number = text.parse().ok().filter(|number| (1..=MAX_PIXELS).contains(number));
-    number.ok_or_else(|| format!("{name} is {text:?}; expected a number of pixels"))
+    number.ok_or_else(|| CalibrationFileFault::Pixels { name: name.to_owned(), text: text.to_owned() })
 }
 
 /// The topic `camera_info` in the namespace of a topic of images, and whether these are rectified by their name, as those of

@@ -27,6 +27,15 @@ const FIRST_WAIT: Duration = Duration::from_millis(300);
 /// one are dropped.
 const FIND_TIME: Duration = Duration::from_secs(3);
 
+/// Why an image is dropped for want of the calibration on a topic.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub(crate) enum NoCalibration {
+    #[error("no usable calibration on {topic}")]
+    Unusable { topic: String },
+    #[error("{topic} is looked for, up to {} s; camera.calibration = \"none\" does without", FIND_TIME.as_secs())]
+    Sought { topic: String },
+}
+
 /// The topic of a calibration, and its last usable message.
 pub(crate) struct RosCalibration {
     topic: Option<String>,
@@ -90,7 +99,7 @@ impl RosCalibration {
     ///
     /// # Errors
     /// There is none, and images cannot be used without it, or a publisher of it may still be found.
-    pub(crate) fn current(&mut self, now: Stamp) -> Result<Option<Arc<Calibration>>, String> {
+    pub(crate) fn current(&mut self, now: Stamp) -> Result<Option<Arc<Calibration>>, NoCalibration> {
         let newest = self.inbox.as_ref().and_then(|inbox| {
             if self.first.is_none() {
                 inbox.wait(FIRST_WAIT);
@@ -103,18 +112,17 @@ impl RosCalibration {
         self.for_image(now)
     }
 
-    fn for_image(&mut self, now: Stamp) -> Result<Option<Arc<Calibration>>, String> {
+    fn for_image(&mut self, now: Stamp) -> Result<Option<Arc<Calibration>>, NoCalibration> {
         let Some(topic) = &self.topic else { return Ok(None) };
         let first = *self.first.get_or_insert(now);
         if self.calibration.is_some() {
             return Ok(self.calibration.clone());
         }
         if self.is_needed {
-            return Err(format!("no usable calibration on {topic}"));
+            return Err(NoCalibration::Unusable { topic: topic.clone() });
         }
         if self.last.is_none() && now < first.after(FIND_TIME) {
-            let most_s = FIND_TIME.as_secs();
-            return Err(format!("{topic} is looked for, up to {most_s} s; camera.calibration = \"none\" does without"));
+            return Err(NoCalibration::Sought { topic: topic.clone() });
         }
         if !std::mem::replace(&mut self.is_absence_logged, true) {
             let why = if self.last.is_some() { "has no usable calibration" } else { "was not found" };
@@ -186,7 +194,8 @@ mod tests {
     #[test]
     fn first_images_are_dropped_while_a_calibration_may_be_found() {
         let mut source = beside();
-        assert!(source.for_image(at(10.0)).unwrap_err().contains("/camera/camera_info is looked for, up to 3 s"));
+        let sought = source.for_image(at(10.0)).unwrap_err().to_string();
+        assert!(sought.contains("/camera/camera_info is looked for, up to 3 s"), "{sought}");
         assert!(source.for_image(at(12.9)).is_err());
         source.handle_info(info());
         assert!(source.for_image(at(12.95)).unwrap().is_some());

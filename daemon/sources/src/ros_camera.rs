@@ -86,7 +86,8 @@ impl RosCamera {
 
     fn image(&mut self, stamp: Option<Stamp>, picture: Picture) -> Result<SourceImage, (CameraFault, String)> {
         let arrival = self.clock.now();
-        let calibration = self.calibration.current(arrival).map_err(|text| (CameraFault::Calibration, text))?;
+        let calibration = self.calibration.current(arrival);
+        let calibration = calibration.map_err(|why| (CameraFault::Calibration, why.to_string()))?;
         Ok(SourceImage { stamp, arrival, picture, calibration })
     }
 }

@@ -30,19 +30,31 @@ pub fn read_tum_poses(path: &Path) -> Result<Vec<(Stamp, SensorPose)>, UserError
     Ok(poses)
 }
 
-fn pose(line: &str) -> Result<(Stamp, SensorPose), String> {
+/// A line that is no pose.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+enum PoseLineError {
+    #[error("{name} is missing")]
+    Missing { name: &'static str },
+    #[error("{name} is {text:?}; expected {expected}")]
+    NotAllowed { name: &'static str, text: String, expected: &'static str },
+    #[error("the quaternion qx qy qz qw has not the length 1")]
+    Rotation,
+}
+
+fn pose(line: &str) -> Result<(Stamp, SensorPose), PoseLineError> {
+    let refused = |name, text: &str, expected| PoseLineError::NotAllowed { name, text: text.to_owned(), expected };
     let mut fields = line.split([' ', '\t', ',']).filter(|field| !field.is_empty());
     let time = fields.next().unwrap_or_default();
-    let stamp = Stamp::parse(time).ok_or_else(|| format!("the time is {time:?}; expected seconds or nanoseconds"))?;
+    let stamp = Stamp::parse(time).ok_or_else(|| refused("the time", time, "seconds or nanoseconds"))?;
     let names = ["tx", "ty", "tz", "qx", "qy", "qz", "qw"];
     let mut numbers = [0.0; 7];
     for (number, name) in numbers.iter_mut().zip(names) {
-        let text = fields.next().ok_or_else(|| format!("{name} is missing"))?;
+        let text = fields.next().ok_or(PoseLineError::Missing { name })?;
         let value = text.parse::<f64>().ok().filter(|value| value.is_finite());
-        *number = value.ok_or_else(|| format!("{name} is {text:?}; expected a finite number"))?;
+        *number = value.ok_or_else(|| refused(name, text, "a finite number"))?;
     }
     let [x, y, z, rotation @ ..] = numbers;
-    let body = Rotation::from_quaternion(rotation).ok_or("the quaternion qx qy qz qw has not the length 1")?;
+    let body = Rotation::from_quaternion(rotation).ok_or(PoseLineError::Rotation)?;
     Ok((stamp, body.camera_pose([x, y, z])))
 }
 

@@ -28,34 +28,63 @@ pub struct Annotations {
     pub draft: StoredDraft,
 }
 
+/// Why an annotation is not kept.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum AnnotationRefusal {
+    #[error("the map in view has the labels of an earlier epoch")]
+    EarlierMap,
+    #[error("label {0}: it takes 1 to {MAX_LABEL}")]
+    Label(u8),
+    #[error("name: it takes 1 to {MAX_NAME} characters without control characters, and no blank at its ends, or null")]
+    Name,
+    #[error("colour: it takes # and six hexadecimal digits, or null")]
+    Colour,
+    #[error("merged_into: it takes another label, 1 to {MAX_LABEL}, or null")]
+    Merge,
+    #[error("merged_into: label {0} is what that label is shown as, by its merges")]
+    MergeInCircle(u8),
+    #[error("weights: {0} is no label; they are 1 to {MAX_LABEL}")]
+    WeightOf(u8),
+    #[error("weight {0}: it takes -1 to 1")]
+    Weight(f64),
+    #[error("text: it takes 1 to {MAX_NOTE} characters")]
+    Note,
+    #[error("text: it takes 1 to {MAX_MARKER} characters")]
+    Marker,
+    #[error("x_m, y_m: the place lies more than 838 km from the origin")]
+    Far,
+    #[error("{MAX_MARKERS} markers are set: remove one first")]
+    ManyMarkers,
+    #[error("number: there is no marker {0}")]
+    NoMarker(u32),
+}
+
 impl Annotations {
     /// Maximum number of notes; the oldest goes first.
     const MAX_NOTES: usize = 200;
 
-    /// Sets name, colour and merging of a label. The error is one line for the operator.
-    pub(super) fn set_label(&mut self, label: u8, book: StoredLabel) -> Result<(), String> {
+    /// Sets name, colour and merging of a label.
+    pub(super) fn set_label(&mut self, label: u8, book: StoredLabel) -> Result<(), AnnotationRefusal> {
         if !(1..=MAX_LABEL).contains(&label) {
-            return Err(format!("label {label}: it takes 1 to {MAX_LABEL}"));
+            return Err(AnnotationRefusal::Label(label));
         }
         let is_name = |name: &String| {
             (1..=MAX_NAME).contains(&name.chars().count()) && name.trim() == name && !name.contains(char::is_control)
         };
         if book.name.as_ref().is_some_and(|name| !is_name(name)) {
-            return Err(format!(
-                "name: it takes 1 to {MAX_NAME} characters without control characters, and no blank at its ends, or null"
-            ));
+            return Err(AnnotationRefusal::Name);
         }
         let is_colour = |c: &String| {
             c.strip_prefix('#').is_some_and(|hex| hex.len() == 6 && hex.bytes().all(|b| b.is_ascii_hexdigit()))
         };
         if book.colour.as_ref().is_some_and(|colour| !is_colour(colour)) {
-            return Err("colour: it takes # and six hexadecimal digits, or null".to_owned());
+            return Err(AnnotationRefusal::Colour);
         }
         if book.merged_into.is_some_and(|into| into == label || !(1..=MAX_LABEL).contains(&into)) {
-            return Err(format!("merged_into: it takes another label, 1 to {MAX_LABEL}, or null"));
+            return Err(AnnotationRefusal::Merge);
         }
         if book.merged_into.is_some_and(|into| self.labels.merges(into).any(|at| at == label)) {
-            return Err(format!("merged_into: label {label} is what that label is shown as, by its merges"));
+            return Err(AnnotationRefusal::MergeInCircle(label));
         }
         self.labels.insert(label, book);
         Ok(())
@@ -69,20 +98,20 @@ impl Annotations {
         book.colour = book.colour.take().or(entry.colour().map(text));
     }
 
-    /// Replaces the draft of the weights, -1 to 1. The error is one line for the operator.
+    /// Replaces the draft of the weights, -1 to 1.
     pub fn set_draft(
         &mut self,
         author: &str,
         weights: BTreeMap<u8, f64>,
         (exploration, curiosity): (Option<f64>, Option<f64>),
         now: Instant,
-    ) -> Result<(), String> {
-        if let Some(label) = weights.keys().find(|label| !(1..=MAX_LABEL).contains(*label)) {
-            return Err(format!("weights: {label} is no label; they are 1 to {MAX_LABEL}"));
+    ) -> Result<(), AnnotationRefusal> {
+        if let Some(&label) = weights.keys().find(|label| !(1..=MAX_LABEL).contains(*label)) {
+            return Err(AnnotationRefusal::WeightOf(label));
         }
         let mut all = weights.values().chain(&exploration).chain(&curiosity);
-        if let Some(weight) = all.find(|weight| !(-1.0..=1.0).contains(*weight)) {
-            return Err(format!("weight {weight}: it takes -1 to 1"));
+        if let Some(&weight) = all.find(|weight| !(-1.0..=1.0).contains(*weight)) {
+            return Err(AnnotationRefusal::Weight(weight));
         }
         let (number, author, at) = (self.draft.number.saturating_add(1), author.to_owned(), now.as_micros());
         self.draft = StoredDraft { number, weights, exploration, curiosity, at, author };
@@ -95,11 +124,11 @@ impl Annotations {
         self.draft = StoredDraft { number: self.draft.number.saturating_add(1), ..StoredDraft::default() };
     }
 
-    /// Adds a note. The error is one line for the operator.
-    pub fn add_note(&mut self, author: &str, text: &str, now: Instant) -> Result<(), String> {
+    /// Adds a note.
+    pub fn add_note(&mut self, author: &str, text: &str, now: Instant) -> Result<(), AnnotationRefusal> {
         let text = text.trim();
         if text.is_empty() || text.chars().count() > MAX_NOTE {
-            return Err(format!("text: it takes 1 to {MAX_NOTE} characters"));
+            return Err(AnnotationRefusal::Note);
         }
         let (author, text) = (author.to_owned(), text.to_owned());
         self.notes.push_back(StoredNote { at: now.as_micros(), author, text });
@@ -107,17 +136,23 @@ impl Annotations {
         Ok(())
     }
 
-    /// Adds a marker. The error is one line for the operator.
-    pub fn add_marker(&mut self, author: &str, text: &str, place: WorldPoint, now: Instant) -> Result<(), String> {
+    /// Adds a marker.
+    pub fn add_marker(
+        &mut self,
+        author: &str,
+        text: &str,
+        place: WorldPoint,
+        now: Instant,
+    ) -> Result<(), AnnotationRefusal> {
         let text = text.trim();
         if text.is_empty() || text.chars().count() > MAX_MARKER {
-            return Err(format!("text: it takes 1 to {MAX_MARKER} characters"));
+            return Err(AnnotationRefusal::Marker);
         }
         if DecimetrePoint::nearest(place).is_none() {
-            return Err("x_m, y_m: the place lies more than 838 km from the origin".to_owned());
+            return Err(AnnotationRefusal::Far);
         }
         if self.markers.len() >= MAX_MARKERS {
-            return Err(format!("{MAX_MARKERS} markers are set: remove one first"));
+            return Err(AnnotationRefusal::ManyMarkers);
         }
         let number = self.markers.last_key_value().map_or(1, |(last, _)| last.saturating_add(1));
         let (x_m, y_m) = place.xy();
@@ -127,8 +162,8 @@ impl Annotations {
         Ok(())
     }
 
-    /// Removes a marker. The error is one line for the operator.
-    pub fn remove_marker(&mut self, number: u32) -> Result<(), String> {
-        self.markers.remove(&number).map(|_| ()).ok_or_else(|| format!("number: there is no marker {number}"))
+    /// Removes a marker.
+    pub fn remove_marker(&mut self, number: u32) -> Result<(), AnnotationRefusal> {
+        self.markers.remove(&number).map(drop).ok_or(AnnotationRefusal::NoMarker(number))
     }
 }

@@ -1,5 +1,6 @@
 //! The exemplars of a vehicle's labels that have arrived, and the requests for more.
 
+use super::refusal::OrderRefusal;
 use scenecast_protocol::directive::{ExemplarRequest, ExemplarRequests};
 use scenecast_protocol::exemplar::{Exemplar, ExemplarView, edge_px};
 use scenecast_protocol::time::Instant;
@@ -113,25 +114,22 @@ impl ExemplarCache {
         (entry.serial, entry.request) = (serial, open);
     }
 
-    /// Requests an exemplar of a label. It replaces the label's open request. The error is one line for the operator.
-    pub fn request(&mut self, label: u8, kind: RequestKind, now: Instant) -> Result<(), String> {
+    /// Requests an exemplar of a label. It replaces the label's open request.
+    pub fn request(&mut self, label: u8, kind: RequestKind, now: Instant) -> Result<(), OrderRefusal> {
         let others = self.labels.iter().filter(|(l, p)| **l != label && p.is_open()).count();
         if others >= Self::MAX_REQUESTS {
-            return Err(format!("{others} images are on their way: wait for one, or cancel one"));
+            return Err(OrderRefusal::ManyImages(others));
         }
         let mut request = ExemplarRequest { label, ..ExemplarRequest::default() };
         let entry = self.labels.get(&label);
         if let RequestKind::Larger(number) = kind {
-            let picture = entry.and_then(|p| p.exemplar(number)).ok_or_else(|| match number {
-                Some(number) => format!("picture {number} of label {label} is not here"),
-                None => format!("no image of label {label} is here yet: ask for one first"),
+            let picture = entry.and_then(|p| p.exemplar(number)).ok_or(match number {
+                Some(number) => OrderRefusal::NoPicture { label, number },
+                None => OrderRefusal::NoImage(label),
             })?;
             if picture.size >= Self::MAX_SIZE {
-                let edge = edge_px(picture.size);
-                return Err(format!(
-                    "picture {} of label {label} has its full size already: {edge} pixels",
-                    picture.number
-                ));
+                let (number, edge_px) = (picture.number, edge_px(picture.size));
+                return Err(OrderRefusal::FullSize { label, number, edge_px });
             }
             (request.picture, request.size) = (picture.number, picture.size + 1);
         }
@@ -142,10 +140,10 @@ impl ExemplarCache {
         Ok(())
     }
 
-    /// Withdraws the request of a label. The error is one line for the operator.
-    pub fn cancel(&mut self, label: u8) -> Result<(), String> {
+    /// Withdraws the request of a label.
+    pub fn cancel(&mut self, label: u8) -> Result<(), OrderRefusal> {
         let asked = self.labels.get_mut(&label).and_then(|entry| entry.request.take());
-        asked.map(drop).ok_or_else(|| format!("no image of label {label} is asked for"))
+        asked.map(drop).ok_or(OrderRefusal::NotAsked(label))
     }
 
     /// The open requests, as they are sent.
@@ -245,10 +243,9 @@ mod tests {
     #[test]
     fn a_request_takes_its_own_reply_and_a_larger_image_replaces() {
         let mut cache = ExemplarCache::default();
-        assert_eq!(
-            cache.request(5, RequestKind::Larger(None), NOW).unwrap_err(),
-            "no image of label 5 is here yet: ask for one first"
-        );
+        let refused = |asked: Result<(), OrderRefusal>| asked.unwrap_err().to_string();
+        let none = cache.request(5, RequestKind::Larger(None), NOW);
+        assert_eq!(refused(none), "no image of label 5 is here yet: ask for one first");
         cache.request(5, RequestKind::Another, NOW).unwrap();
         assert_eq!(
             cache.wanted(3),
@@ -264,12 +261,10 @@ mod tests {
         assert!(!cache.handle_exemplar(&come(5, 0, 0, 9), None, NOW), "the larger one stays");
         let sizes: Vec<(u8, u8)> = cache.label(5).unwrap().stored.iter().map(|p| (p.number, p.size)).collect();
         assert_eq!(sizes, [(9, 1)]);
-        let said = cache.request(5, RequestKind::Larger(Some(9)), NOW).unwrap_err();
-        assert_eq!(said, "picture 9 of label 5 has its full size already: 128 pixels");
-        assert_eq!(
-            cache.request(5, RequestKind::Larger(Some(4)), NOW).unwrap_err(),
-            "picture 4 of label 5 is not here"
-        );
+        let full = cache.request(5, RequestKind::Larger(Some(9)), NOW);
+        assert_eq!(refused(full), "picture 9 of label 5 has its full size already: 128 pixels");
+        let missing = cache.request(5, RequestKind::Larger(Some(4)), NOW);
+        assert_eq!(refused(missing), "picture 4 of label 5 is not here");
     }
 
     #[test]
@@ -280,7 +275,7 @@ mod tests {
         cache.request(5, RequestKind::Another, NOW).unwrap();
         cache.cancel(5).unwrap();
         assert!(cache.wanted(0).wanted.is_empty() && cache.label(5).unwrap().stored.len() == 1);
-        assert_eq!(cache.cancel(5).unwrap_err(), "no image of label 5 is asked for");
+        assert_eq!(cache.cancel(5), Err(OrderRefusal::NotAsked(5)));
         cache.handle_progress([0, 5, 1, 0], (1, 2), NOW);
         assert_eq!(cache.label(5).unwrap().request, None, "a late part of what was cancelled");
         cache.request(6, RequestKind::Another, NOW).unwrap();
@@ -305,7 +300,7 @@ mod tests {
     fn requests_and_images_are_bounded() {
         let mut cache = ExemplarCache::default();
         (1..=8).for_each(|label| cache.request(label, RequestKind::Another, NOW).unwrap());
-        assert!(cache.request(9, RequestKind::Another, NOW).unwrap_err().contains("8 images are on their way"));
+        assert_eq!(cache.request(9, RequestKind::Another, NOW), Err(OrderRefusal::ManyImages(8)));
         cache.request(8, RequestKind::Another, NOW).unwrap();
         let large = |label, picture| Exemplar {
             bytes: [vec![0x10, 0, 0], vec![9; 16_000]].concat(),

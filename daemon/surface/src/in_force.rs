@@ -2,8 +2,10 @@
 
 use super::Surface;
 use super::orders::{FenceOrder, LimitsOrder};
+use super::refusal::OrderRefusal;
 use super::vehicle_record::{SentOrder, VehicleRecord};
 use scenecast_protocol::directive::{Constraints, OrderStatus, Slot, SlotId, Withdrawal};
+use scenecast_protocol::link::IssueError;
 use scenecast_protocol::link::{InForce, PeerView};
 use scenecast_protocol::map::MAX_LABEL;
 use scenecast_protocol::time::Instant;
@@ -72,7 +74,7 @@ fn follow_order<T: Clone + Default + PartialEq>(
 ///
 /// # Errors
 /// The vehicle may obey an order that this surface does not know, so that the rest of it would be removed.
-fn present<T: Clone + Default>(order: &SentOrder<T>, id: SlotId, view: &PeerView<'_>) -> Result<T, String> {
+fn present<T: Clone + Default>(order: &SentOrder<T>, id: SlotId, view: &PeerView<'_>) -> Result<T, OrderRefusal> {
     if status(view, id).is_some_and(OrderStatus::is_pending) {
         return Ok(order.sent.clone().unwrap_or_default());
     }
@@ -85,25 +87,19 @@ fn present<T: Clone + Default>(order: &SentOrder<T>, id: SlotId, view: &PeerView
         InForce::NotReported => in_force.or_else(|| order.sent.clone()),
         InForce::Unknown => None,
     };
-    known.ok_or_else(|| {
-        let name = id.name();
-        format!(
-            "the surface does not know yet which {name} the vehicle obeys, so a part cannot be changed: wait for the \
-             vehicle's report, or name the whole {name} (scenecast ctl {name} clear removes it)"
-        )
-    })
+    known.ok_or(OrderRefusal::RestUnknown(id))
 }
 
 impl Surface {
-    /// The fence that a change of a part of it begins with. The error is one line for the operator.
-    pub fn present_fence(&self, vehicle: Address) -> Result<FenceOrder, String> {
-        let (record, view) = self.records.get(&vehicle).zip(self.view(vehicle)).ok_or("no such vehicle")?;
+    /// The fence that a change of a part of it begins with.
+    pub fn present_fence(&self, vehicle: Address) -> Result<FenceOrder, OrderRefusal> {
+        let (record, view) = self.records.get(&vehicle).zip(self.view(vehicle)).ok_or(IssueError::NoVehicle)?;
         present(&record.fence, SlotId::Fence, &view).map(|fence| FenceOrder::from(&fence))
     }
 
-    /// The limits that a change of a part of them begins with. The error is one line for the operator.
-    pub fn present_limits(&self, vehicle: Address) -> Result<LimitsOrder, String> {
-        let (record, view) = self.records.get(&vehicle).zip(self.view(vehicle)).ok_or("no such vehicle")?;
+    /// The limits that a change of a part of them begins with.
+    pub fn present_limits(&self, vehicle: Address) -> Result<LimitsOrder, OrderRefusal> {
+        let (record, view) = self.records.get(&vehicle).zip(self.view(vehicle)).ok_or(IssueError::NoVehicle)?;
         present(&record.limits, SlotId::Limits, &view).map(|limits| LimitsOrder::from(&limits))
     }
 }
@@ -119,14 +115,12 @@ type LastOrder = (Constraints, OrderStatus, Instant);
 type LastMode = (VehicleMode, ModeReason, Instant);
 
 impl Surface {
-    /// Orders a vehicle to hold, or to continue, and leaves an abort as it is. The error is one line for the operator: an
-    /// abort is in force and `hold` is false, or it is not known whether one is.
-    pub fn change_hold(&mut self, vehicle: Address, hold: bool, now: Instant) -> Result<u16, String> {
+    /// Orders a vehicle to hold, or to continue, and leaves an abort as it is. It is refused if an
+    /// abort is in force and `hold` is false, or if it is not known whether one is.
+    pub fn change_hold(&mut self, vehicle: Address, hold: bool, now: Instant) -> Result<u16, OrderRefusal> {
         match self.has_abort(vehicle) {
-            None => {
-                Err("it is not known whether an abort is in force; an order of abort, true or false, settles it".into())
-            }
-            Some(true) if !hold => Err("an abort is in force; the order abort with false ends it".into()),
+            None => Err(OrderRefusal::AbortUnknown),
+            Some(true) if !hold => Err(OrderRefusal::Aborted),
             Some(abort) => self.set_order(vehicle, Constraints { hold, abort }, now),
         }
     }
@@ -216,7 +210,7 @@ mod tests {
     fn a_hold_keeps_an_abort_that_is_not_reported_yet() {
         let mut surface = surface(1);
         surface.set_order(auv(), Constraints { hold: false, abort: true }, at(1)).unwrap();
-        assert!(surface.change_hold(auv(), false, at(2)).unwrap_err().starts_with("an abort is in force"));
+        assert!(surface.change_hold(auv(), false, at(2)) == Err(OrderRefusal::Aborted));
         surface.change_hold(auv(), true, at(3)).unwrap();
         assert_eq!(last(&surface), Constraints { hold: true, abort: true });
         surface.set_order(auv(), Constraints::default(), at(4)).unwrap();
@@ -256,7 +250,7 @@ mod tests {
     fn without_order_and_report_a_hold_is_refused() {
         let mut surface = surface(1);
         for hold in [false, true] {
-            assert!(surface.change_hold(auv(), hold, at(1)).unwrap_err().starts_with("it is not known"));
+            assert!(surface.change_hold(auv(), hold, at(1)) == Err(OrderRefusal::AbortUnknown));
         }
     }
 

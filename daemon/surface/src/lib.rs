@@ -15,13 +15,14 @@ mod orders;
 pub mod position;
 pub mod record;
 pub mod recorder;
+mod refusal;
 mod send_orders;
 mod settings;
 mod surface;
 mod track;
 mod vehicle_record;
 
-pub use annotations::Annotations;
+pub use annotations::{AnnotationRefusal, Annotations};
 pub use assemble::{assemble, link_config};
 pub use command::{
     COMMAND_SILENCE, Command, CommandAction, CommandChange, CommandChangeKind, CommandHolder, CommandRefusal,
@@ -32,6 +33,7 @@ pub use label_book::LabelBook;
 pub use log::{AUTOPILOT_SILENT, LogEntry, LogKind, MissionLog, NO_FAULT};
 pub use map_in_view::LabelGains;
 pub use orders::{AreaOrder, AreasOrder, DestinationOrder, FenceOrder, LimitsOrder, order_name};
+pub use refusal::{OrderRefusal, Weighed};
 pub use scenecast_core::{ClientName, Giver, Principal, Role};
 pub use settings::{SettingsOrder, SettingsRecord};
 pub use surface::{Surface, SurfaceOutput};

@@ -2,6 +2,8 @@
 //! gained.
 
 use super::Surface;
+use super::refusal::OrderRefusal;
+use scenecast_protocol::link::IssueError;
 use scenecast_protocol::link::PeerView;
 use scenecast_protocol::map::{LabelGrid, LayerReplica, Rect, Relabelled, Replica, SharedTiles};
 use scenecast_protocol::time::Instant;
@@ -56,17 +58,13 @@ impl Surface {
         Some(self.replica(vehicle)?.counts().collect())
     }
 
-    /// The labels of the map in view that an order may name. The error is one line for the operator.
-    pub(super) fn labels_for_orders(&self, vehicle: Address) -> Result<BTreeMap<u8, u32>, String> {
-        let record = self.records.get(&vehicle).ok_or("no such vehicle")?;
+    /// The labels of the map in view that an order may name.
+    pub(super) fn labels_for_orders(&self, vehicle: Address) -> Result<BTreeMap<u8, u32>, OrderRefusal> {
+        let record = self.records.get(&vehicle).ok_or(IssueError::NoVehicle)?;
         if let Some(earlier) = record.earlier_map().filter(|earlier| earlier.epoch != record.epoch) {
-            return Err(format!(
-                "the map in view has the labels of epoch {}, and the vehicle is in epoch {}: wait for the current map, or \
-                 dismiss the earlier one",
-                earlier.epoch, record.epoch
-            ));
+            return Err(OrderRefusal::EarlierMap { in_view: earlier.epoch, now: record.epoch });
         }
-        self.labels(vehicle).ok_or_else(|| "no such vehicle".to_owned())
+        Ok(self.labels(vehicle).ok_or(IssueError::NoVehicle)?)
     }
 }
 

@@ -1,5 +1,6 @@
-//! Fences, limits, weighted areas and destinations as the operator types them. Every error is one line that names the allowed values.
+//! Fences, limits, weighted areas and destinations as the operator types them.
 
+use super::refusal::{OrderRefusal, Weighed};
 use scenecast_core::{fence_of, outline_of, place_of};
 use scenecast_protocol::coordinates::DecimetrePoint;
 use scenecast_protocol::directive::{
@@ -147,38 +148,35 @@ impl From<&Limits> for LimitsOrder {
 }
 
 impl FenceOrder {
-    /// Converts the order into the content of the slot. The error is one line for the operator.
-    pub fn read(&self) -> Result<Fence, String> {
-        fence_of(self.fence.as_deref(), &self.keep_outs, self.return_point)
+    /// Converts the order into the content of the slot.
+    pub fn read(&self) -> Result<Fence, OrderRefusal> {
+        Ok(fence_of(self.fence.as_deref(), &self.keep_outs, self.return_point)?)
     }
 }
 
 impl AreasOrder {
-    /// Converts the order into the content of the slot. The error is one line for the operator.
-    pub fn read(&self) -> Result<Areas, String> {
+    /// Converts the order into the content of the slot.
+    pub fn read(&self) -> Result<Areas, OrderRefusal> {
         let area = |(number, order): (usize, &AreaOrder)| {
-            let is_allowed = (-1.0..=1.0).contains(&order.weight);
-            let weight = is_allowed.then_some((order.weight * 100.0).round() as i8);
-            let refusal = || format!("area {number}: weight {} is not within -1 to 1", order.weight);
             let outline = outline_of(&format!("area {number}"), &order.outline)?;
-            Ok(WeightedArea { outline, weight: weight.ok_or_else(refusal)? })
+            Ok(WeightedArea { outline, weight: hundredths(Weighed::Area(number), order.weight)? })
         };
-        let areas = Areas((1..).zip(&self.areas).map(area).collect::<Result<_, String>>()?);
-        areas.check().map_err(|fault| fault.to_string())?;
+        let areas = Areas((1..).zip(&self.areas).map(area).collect::<Result<_, OrderRefusal>>()?);
+        areas.check()?;
         Ok(areas)
     }
 }
 
 impl DestinationOrder {
-    /// Converts the order into the content of the slot. The error is one line for the operator.
-    pub fn read(&self) -> Result<Destination, String> {
+    /// Converts the order into the content of the slot.
+    pub fn read(&self) -> Result<Destination, OrderRefusal> {
         Ok(Destination { place: self.place.map(|p| place_of("place", p)).transpose()? })
     }
 }
 
 impl LimitsOrder {
-    /// Converts the order into the content of the slot. The error is one line for the operator.
-    pub fn read(&self) -> Result<Limits, String> {
+    /// Converts the order into the content of the slot.
+    pub fn read(&self) -> Result<Limits, OrderRefusal> {
         let limits = Limits {
             depth: self.depth_m.map(|b| band("depth_m", b)).transpose()?,
             altitude: self.altitude_m.map(|b| band("altitude_m", b)).transpose()?,
@@ -189,7 +187,7 @@ impl LimitsOrder {
             on_breach: reaction("on_breach", self.on_breach.as_deref())?,
             on_abort: reaction("on_abort", self.on_abort.as_deref())?,
         };
-        limits.check().map_err(|fault| fault.to_string())?;
+        limits.check()?;
         Ok(limits)
     }
 }
@@ -204,23 +202,29 @@ pub fn order_name(order: &Slot) -> &'static str {
     }
 }
 
-fn band(what: &str, [low, high]: [f64; 2]) -> Result<Band, String> {
+/// A weight of -1 to 1 as it is sent.
+pub(super) fn hundredths(what: Weighed, weight: f64) -> Result<i8, OrderRefusal> {
+    let is_allowed = (-1.0..=1.0).contains(&weight);
+    is_allowed.then_some((weight * 100.0).round() as i8).ok_or(OrderRefusal::Weight { what, weight })
+}
+
+fn band(what: &'static str, [low, high]: [f64; 2]) -> Result<Band, OrderRefusal> {
     let dm = |m: f64| {
         let dm = (m * 10.0).round();
         let ok = (0.0..=65_535.0).contains(&dm);
-        ok.then_some(dm as u16).ok_or(format!("{what}: {m} is not within 0 to 6553.5 m"))
+        ok.then_some(dm as u16).ok_or(OrderRefusal::Band { what, metres: m })
     };
     Ok(Band { low_dm: dm(low)?, high_dm: dm(high)? })
 }
 
-fn whole(what: &str, value: f64, most: u32) -> Result<u32, String> {
+fn whole(what: &'static str, value: f64, most: u32) -> Result<u32, OrderRefusal> {
     let ok = (1.0..=f64::from(most)).contains(&value);
-    ok.then_some(value.round() as u32).ok_or(format!("{what} {value}: it takes 1 to {most}"))
+    ok.then_some(value.round() as u32).ok_or(OrderRefusal::Whole { what, value, most })
 }
 
-fn reaction(what: &str, name: Option<&str>) -> Result<Option<Reaction>, String> {
-    let named =
-        |name: &str| Reaction::from_name(name).ok_or(format!("{what} {name:?}: it takes hold, return or surface"));
+fn reaction(what: &'static str, name: Option<&str>) -> Result<Option<Reaction>, OrderRefusal> {
+    let unknown = |name: &str| OrderRefusal::Reaction { what, name: name.to_owned() };
+    let named = |name: &str| Reaction::from_name(name).ok_or_else(|| unknown(name));
     name.map(named).transpose()
 }
 
@@ -229,11 +233,11 @@ mod tests {
     use super::*;
 
     fn fence(json: &str) -> Result<Fence, String> {
-        serde_json::from_str::<FenceOrder>(json).map_err(|e| e.to_string())?.read()
+        serde_json::from_str::<FenceOrder>(json).map_err(|e| e.to_string())?.read().map_err(|e| e.to_string())
     }
 
     fn limits(json: &str) -> Result<Limits, String> {
-        serde_json::from_str::<LimitsOrder>(json).map_err(|e| e.to_string())?.read()
+        serde_json::from_str::<LimitsOrder>(json).map_err(|e| e.to_string())?.read().map_err(|e| e.to_string())
     }
 
     #[test]
@@ -268,20 +272,20 @@ mod tests {
 
     #[test]
     fn areas_and_destinations_are_read_or_refused_with_the_limits() {
-        let areas = |json: &str| serde_json::from_str::<AreasOrder>(json).map_err(|e| e.to_string())?.read();
+        let areas = |json: &str| serde_json::from_str::<AreasOrder>(json).unwrap().read();
         let sent = areas(r#"{"areas": [{"outline": [[0,0],[9.04,0],[9,9]], "weight": -0.255}]}"#).unwrap();
         assert_eq!((sent.0[0].outline.0[1], sent.0[0].weight), (DecimetrePoint::new(90, 0), -26));
         assert_eq!(AreasOrder::from(&sent).areas[0].weight, -0.26);
         let heavy = areas(r#"{"areas": [{"outline": [[0,0],[9,0],[9,9]], "weight": 1.5}]}"#);
-        assert_eq!(heavy.unwrap_err(), "area 1: weight 1.5 is not within -1 to 1");
+        assert_eq!(heavy.unwrap_err().to_string(), "area 1: weight 1.5 is not within -1 to 1");
         let flat = areas(r#"{"areas": [{"outline": [[0,0],[1,1],[2,2]], "weight": 1}]}"#);
-        assert_eq!(flat.unwrap_err(), "area 1: it has no area");
+        assert_eq!(flat.unwrap_err().to_string(), "area 1: it has no area");
         let five = AreasOrder { areas: vec![AreasOrder::from(&sent).areas[0].clone(); 5] };
-        assert_eq!(five.read().unwrap_err(), "5 areas: it takes 4 or fewer");
+        assert_eq!(five.read().unwrap_err().to_string(), "5 areas: it takes 4 or fewer");
         let to = |place| DestinationOrder { place }.read();
         assert_eq!(to(Some([1.26, -3.0])).unwrap().place, Some(DecimetrePoint::new(13, -30)));
         assert_eq!(to(None), Ok(Destination::default()));
-        assert!(to(Some([1e9, 0.0])).unwrap_err().contains("within 100 km"));
+        assert!(to(Some([1e9, 0.0])).unwrap_err().to_string().contains("within 100 km"));
     }
 
     #[test]

@@ -2,35 +2,32 @@
 
 use super::exemplar_cache::{ExemplarCache, RequestKind};
 use super::log::LogKind;
-use super::orders::{AreasOrder, DestinationOrder, FenceOrder, LimitsOrder};
+use super::orders::{AreasOrder, DestinationOrder, FenceOrder, LimitsOrder, hundredths};
+use super::refusal::{OrderRefusal, Weighed};
 use super::settings::SettingsOrder;
 use super::{Surface, SurfaceOutput, VehicleRecord};
 use scenecast_protocol::directive::{Constraints, Fix, OrderStatus, Slot, SlotId, SlotProgress, Utility};
+use scenecast_protocol::link::IssueError;
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::Address;
 use std::collections::BTreeMap;
 
 impl Surface {
-    /// Sends weights of labels, of unexplored cells and of curiosity, each from -1 to 1. The error is
-    /// one line for the operator.
+    /// Sends weights of labels, of unexplored cells and of curiosity, each from -1 to 1.
     pub fn set_utility(
         &mut self,
         vehicle: Address,
         weights: &BTreeMap<u8, f64>,
         (exploration, curiosity): (f64, f64),
         now: Instant,
-    ) -> Result<u16, String> {
+    ) -> Result<u16, OrderRefusal> {
         let known = match weights.is_empty() {
             true => BTreeMap::new(),
             false => self.labels_for_orders(vehicle)?,
         };
-        let hundredths = |what: &str, w: f64| {
-            let ok = w.is_finite() && (-1.0..=1.0).contains(&w);
-            ok.then_some((w * 100.0).round() as i8).ok_or(format!("{what} {w} is not within -1 to 1"))
-        };
         let mut utility = Utility {
-            exploration: hundredths("exploration", exploration)?,
-            curiosity: hundredths("curiosity", curiosity)?,
+            exploration: hundredths(Weighed::Exploration, exploration)?,
+            curiosity: hundredths(Weighed::Curiosity, curiosity)?,
             ..Utility::default()
         };
         // A label may have lost its last cell since the operator looked at the map.
@@ -38,14 +35,14 @@ impl Surface {
         let highest = known.keys().last().map_or(reported, |&highest| highest.max(reported));
         for (&label, &weight) in weights {
             if !(1..=highest).contains(&label) {
-                return Err(format!("label {label} is not on the map"));
+                return Err(OrderRefusal::NotOnMap(label));
             }
-            let weight = hundredths(&format!("weight of label {label}:"), weight)?;
+            let weight = hundredths(Weighed::Label(label), weight)?;
             if weight != 0 {
                 utility.weights.insert(label, weight);
             }
         }
-        let record = self.records.get_mut(&vehicle).ok_or("no such vehicle")?;
+        let record = self.records.get_mut(&vehicle).ok_or(IssueError::NoVehicle)?;
         utility.epoch = record.epoch;
         record.utility = utility.clone();
         record.weighed = highest;
@@ -53,55 +50,60 @@ impl Surface {
     }
 
     /// Orders a vehicle to hold, or to continue.
-    pub fn set_hold(&mut self, vehicle: Address, hold: bool, now: Instant) -> Result<u16, String> {
+    pub fn set_hold(&mut self, vehicle: Address, hold: bool, now: Instant) -> Result<u16, OrderRefusal> {
         self.set_order(vehicle, Constraints { hold, abort: false }, now)
     }
 
     /// Orders a vehicle to hold, to abort, or to continue.
-    pub fn set_order(&mut self, vehicle: Address, order: Constraints, now: Instant) -> Result<u16, String> {
+    pub fn set_order(&mut self, vehicle: Address, order: Constraints, now: Instant) -> Result<u16, OrderRefusal> {
         self.issue(vehicle, Slot::Constraints(order), now)
     }
 
     /// Sends a fence with keep-outs and return point. They replace the last ones.
-    pub fn set_fence(&mut self, vehicle: Address, order: &FenceOrder, now: Instant) -> Result<u16, String> {
+    pub fn set_fence(&mut self, vehicle: Address, order: &FenceOrder, now: Instant) -> Result<u16, OrderRefusal> {
         let fence = order.read()?;
         let version = self.issue(vehicle, Slot::Fence(fence.clone()), now)?;
-        self.records.get_mut(&vehicle).ok_or("no such vehicle")?.fence.sent = Some(fence);
+        self.records.get_mut(&vehicle).ok_or(IssueError::NoVehicle)?.fence.sent = Some(fence);
         Ok(version)
     }
 
     /// Sends limits. They replace the last ones.
-    pub fn set_limits(&mut self, vehicle: Address, order: &LimitsOrder, now: Instant) -> Result<u16, String> {
+    pub fn set_limits(&mut self, vehicle: Address, order: &LimitsOrder, now: Instant) -> Result<u16, OrderRefusal> {
         let limits = order.read()?;
         let version = self.issue(vehicle, Slot::Limits(limits), now)?;
-        self.records.get_mut(&vehicle).ok_or("no such vehicle")?.limits.sent = Some(limits);
+        self.records.get_mut(&vehicle).ok_or(IssueError::NoVehicle)?.limits.sent = Some(limits);
         Ok(version)
     }
 
     /// Sends weighted areas. They replace the last ones.
-    pub fn set_areas(&mut self, vehicle: Address, order: &AreasOrder, now: Instant) -> Result<u16, String> {
+    pub fn set_areas(&mut self, vehicle: Address, order: &AreasOrder, now: Instant) -> Result<u16, OrderRefusal> {
         let areas = order.read()?;
         let version = self.issue(vehicle, Slot::Areas(areas.clone()), now)?;
-        self.records.get_mut(&vehicle).ok_or("no such vehicle")?.areas.sent = Some(areas);
+        self.records.get_mut(&vehicle).ok_or(IssueError::NoVehicle)?.areas.sent = Some(areas);
         Ok(version)
     }
 
     /// Sends a vehicle to a place before it resumes its survey, or withdraws that order.
-    pub fn set_destination(&mut self, vehicle: Address, order: &DestinationOrder, now: Instant) -> Result<u16, String> {
+    pub fn set_destination(
+        &mut self,
+        vehicle: Address,
+        order: &DestinationOrder,
+        now: Instant,
+    ) -> Result<u16, OrderRefusal> {
         let destination = order.read()?;
         let version = self.issue(vehicle, Slot::Destination(destination), now)?;
-        self.records.get_mut(&vehicle).ok_or("no such vehicle")?.destination.sent = Some(destination);
+        self.records.get_mut(&vehicle).ok_or(IssueError::NoVehicle)?.destination.sent = Some(destination);
         Ok(version)
     }
 
     /// Changes settings of a vehicle. Those that the order does not name stay as they are there.
-    pub fn set_settings(&mut self, vehicle: Address, order: &SettingsOrder, now: Instant) -> Result<u16, String> {
-        let view = self.link.vehicle(vehicle).ok_or("no such vehicle")?;
+    pub fn set_settings(&mut self, vehicle: Address, order: &SettingsOrder, now: Instant) -> Result<u16, OrderRefusal> {
+        let view = self.link.vehicle(vehicle).ok_or(IssueError::NoVehicle)?;
         let order = order.read(view.layers())?;
         let last = self.order_status(vehicle, SlotId::Settings);
-        let settings = self.records.get(&vehicle).ok_or("no such vehicle")?.settings.next_order(&order, last);
+        let settings = self.records.get(&vehicle).ok_or(IssueError::NoVehicle)?.settings.next_order(&order, last);
         let version = self.issue(vehicle, Slot::Settings(settings), now)?;
-        self.records.get_mut(&vehicle).ok_or("no such vehicle")?.settings.handle_sent(settings, last);
+        self.records.get_mut(&vehicle).ok_or(IssueError::NoVehicle)?.settings.handle_sent(settings, last);
         Ok(version)
     }
 
@@ -110,75 +112,74 @@ impl Surface {
         self.link.vehicle(vehicle)?.slots().find(|s| s.id == slot).map(|s| s.status)
     }
 
-    pub fn send_fix(&mut self, vehicle: Address, fix: Fix, now: Instant) -> Result<u16, String> {
+    pub fn send_fix(&mut self, vehicle: Address, fix: Fix, now: Instant) -> Result<u16, OrderRefusal> {
         self.issue(vehicle, Slot::Fix(fix), now)
     }
 
-    pub(super) fn issue(&mut self, vehicle: Address, slot: Slot, now: Instant) -> Result<u16, String> {
+    pub(super) fn issue(&mut self, vehicle: Address, slot: Slot, now: Instant) -> Result<u16, OrderRefusal> {
         let replaced = self.replaced(vehicle, slot.id());
-        let version = self.link.issue(vehicle, slot, now).map_err(|e| e.to_string())?;
+        let version = self.link.issue(vehicle, slot, now)?;
         replaced.iter().for_each(|text| self.log_fact(vehicle, LogKind::Answer, text, now));
         self.outputs.push_back(SurfaceOutput::Changed(vehicle));
         Ok(version)
     }
 
-    /// Gives a withdrawn order again, as a new one. The error is one line for the operator.
-    pub fn give_again(&mut self, vehicle: Address, slot: SlotId, now: Instant) -> Result<u16, String> {
-        let version = self.link.give_again(vehicle, slot, now).map_err(|e| e.to_string())?;
+    /// Gives a withdrawn order again, as a new one.
+    pub fn give_again(&mut self, vehicle: Address, slot: SlotId, now: Instant) -> Result<u16, OrderRefusal> {
+        let version = self.link.give_again(vehicle, slot, now)?;
         self.outputs.push_back(SurfaceOutput::Changed(vehicle));
-        version.ok_or_else(|| format!("no order of the kind {} is withdrawn", slot.name()))
+        version.ok_or(OrderRefusal::NotWithdrawn(slot))
     }
 
-    /// Sends the orders that a vehicle has lost again, except one to resume; returns their slots. The error is one line for
-    /// the operator.
-    pub fn restore_lost(&mut self, vehicle: Address, now: Instant) -> Result<Vec<SlotId>, String> {
-        let restored = self.link.restore_lost(vehicle, now).map_err(|e| e.to_string())?;
+    /// Sends the orders that a vehicle has lost again, except one to resume; returns their slots.
+    pub fn restore_lost(&mut self, vehicle: Address, now: Instant) -> Result<Vec<SlotId>, OrderRefusal> {
+        let restored = self.link.restore_lost(vehicle, now)?;
         let names: Vec<&str> = restored.iter().map(|id| id.name()).collect();
         if names.is_empty() {
-            return Err("no order of the vehicle is lost".to_owned());
+            return Err(OrderRefusal::NothingLost);
         }
         self.log_fact(vehicle, LogKind::Answer, &format!("sent again: {}", names.join(", ")), now);
         self.outputs.push_back(SurfaceOutput::Changed(vehicle));
         Ok(restored)
     }
 
-    /// Takes a vehicle over from another surface. The error is one line for the operator.
-    pub fn take_over(&mut self, vehicle: Address, now: Instant) -> Result<(), String> {
-        self.link.take_over(vehicle, now).map_err(|e| e.to_string())?;
+    /// Takes a vehicle over from another surface.
+    pub fn take_over(&mut self, vehicle: Address, now: Instant) -> Result<(), OrderRefusal> {
+        self.link.take_over(vehicle, now)?;
         self.outputs.push_back(SurfaceOutput::Changed(vehicle));
         Ok(())
     }
 
-    /// Requests an exemplar of a label. The error is one line for the operator.
+    /// Requests an exemplar of a label.
     pub fn request_exemplar(
         &mut self,
         vehicle: Address,
         label: u8,
         kind: RequestKind,
         now: Instant,
-    ) -> Result<u16, String> {
+    ) -> Result<u16, OrderRefusal> {
         if !self.labels_for_orders(vehicle)?.contains_key(&label) {
-            return Err(format!("label {label} is not on the map"));
+            return Err(OrderRefusal::NotOnMap(label));
         }
         self.change_requests(vehicle, |cache| cache.request(label, kind, now), now)
     }
 
-    /// Withdraws the request for an exemplar of a label. The error is one line for the operator.
-    pub fn cancel_exemplar(&mut self, vehicle: Address, label: u8, now: Instant) -> Result<u16, String> {
+    /// Withdraws the request for an exemplar of a label.
+    pub fn cancel_exemplar(&mut self, vehicle: Address, label: u8, now: Instant) -> Result<u16, OrderRefusal> {
         self.change_requests(vehicle, |cache| cache.cancel(label), now)
     }
 
     fn change_requests(
         &mut self,
         vehicle: Address,
-        change: impl FnOnce(&mut ExemplarCache) -> Result<(), String>,
+        change: impl FnOnce(&mut ExemplarCache) -> Result<(), OrderRefusal>,
         now: Instant,
-    ) -> Result<u16, String> {
-        let record = self.records.get(&vehicle).ok_or("no such vehicle")?;
+    ) -> Result<u16, OrderRefusal> {
+        let record = self.records.get(&vehicle).ok_or(IssueError::NoVehicle)?;
         let mut cache = record.exemplars.clone();
         change(&mut cache)?;
         let version = self.issue(vehicle, Slot::Requests(cache.wanted(record.epoch)), now)?;
-        self.records.get_mut(&vehicle).ok_or("no such vehicle")?.exemplars = cache;
+        self.records.get_mut(&vehicle).ok_or(IssueError::NoVehicle)?.exemplars = cache;
         Ok(version)
     }
 

@@ -1,5 +1,6 @@
 //! The operator's settings of a vehicle: as typed, as ordered, and as in force.
 
+use super::refusal::OrderRefusal;
 use scenecast_protocol::directive::{
     AtEnd, CellBand, Change, OrderStatus, PlannerKind, Registration, Settings, ShortDecimal,
 };
@@ -61,8 +62,8 @@ fn layer_names(mask: LayerMask, layers: &LayerSet) -> String {
 }
 
 impl SettingsOrder {
-    /// Converts the order into the content of the slot. The error is one line for the operator.
-    pub fn read(&self, layers: &LayerSet) -> Result<Settings, String> {
+    /// Converts the order into the content of the slot.
+    pub fn read(&self, layers: &LayerSet) -> Result<Settings, OrderRefusal> {
         let names: Vec<&str> = layers.iter().map(|(_, layer)| &*layer.name).collect();
         let mut settings = Settings {
             planner: choice("planner", &self.planner, PlannerKind::from_name, "lawnmower, greedy or horizon")?,
@@ -82,7 +83,7 @@ impl SettingsOrder {
             },
             ..Settings::default()
         };
-        settings.check().map_err(|fault| format!("{fault}, or 0 as configured"))?;
+        settings.check()?;
         let given = [self.alpha, self.beta, self.gamma, self.refine_words_per_s, self.frames_per_s];
         let mut changes = [Change::Keep; 5];
         for ((change, value), (name, _, range)) in changes.iter_mut().zip(given).zip(settings.numbers()) {
@@ -91,9 +92,8 @@ impl SettingsOrder {
                 Some(0.0) => Change::Configured,
                 Some(value) => {
                     let figure = ShortDecimal::new(value).filter(|figure| range.contains(&figure.value()));
-                    Change::To(figure.ok_or_else(|| {
-                        format!("{name} {value}: it takes {} to {}, or 0 as configured", range.start(), range.end())
-                    })?)
+                    let (least, most) = (*range.start(), *range.end());
+                    Change::To(figure.ok_or(OrderRefusal::Setting { name, value, least, most })?)
                 }
             };
         }
@@ -103,17 +103,18 @@ impl SettingsOrder {
 }
 
 fn choice<T>(
-    what: &str,
+    what: &'static str,
     name: &Option<String>,
     find: impl Fn(&str) -> Option<T>,
     allowed: &str,
-) -> Result<Change<T>, String> {
+) -> Result<Change<T>, OrderRefusal> {
     match name.as_deref() {
         None => Ok(Change::Keep),
         Some("") => Ok(Change::Configured),
         Some(name) => {
             let found = find(name).map(Change::To);
-            found.ok_or_else(|| format!("{what} {name:?}: it takes {allowed}, or \"\" as configured"))
+            let (name, allowed) = (name.to_owned(), allowed.to_owned());
+            found.ok_or(OrderRefusal::Choice { what, name, allowed })
         }
     }
 }
@@ -209,7 +210,8 @@ mod tests {
     use scenecast_protocol::map::BUILT_IN_LAYERS;
 
     fn read(json: &str) -> Result<Settings, String> {
-        serde_json::from_str::<SettingsOrder>(json).map_err(|e| e.to_string())?.read(&LayerSet::default())
+        let order: SettingsOrder = serde_json::from_str(json).map_err(|e| e.to_string())?;
+        order.read(&LayerSet::default()).map_err(|e| e.to_string())
     }
 
     #[test]

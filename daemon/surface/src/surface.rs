@@ -4,6 +4,7 @@ use super::command::{Command, CommandAction, CommandChange, CommandRefusal, Orde
 use super::in_force;
 use super::log::{LogKind, MissionLog, Watch};
 use super::position::{Relay, UsblSighting};
+use super::refusal::OrderRefusal;
 use super::vehicle_record::VehicleRecord;
 use scenecast_config::RestoreOrders;
 use scenecast_core::tuning_table::{Fit, NoRow, TuningTable};
@@ -199,14 +200,13 @@ impl Surface {
         shares: Option<Shares>,
         background: Option<BackgroundOrder>,
         now: Instant,
-    ) -> Result<(), String> {
+    ) -> Result<(), OrderRefusal> {
         if !(10..=10_000_000).contains(&bits_per_s) {
-            return Err(format!("budget_bps {bits_per_s} is not within 10 to 10000000"));
+            return Err(OrderRefusal::Budget(bits_per_s));
         }
         let shares = shares.unwrap_or(self.link.shares());
         if !shares.is_sound() {
-            let sum: u32 = shares.0.iter().map(|&s| u32::from(s)).sum();
-            return Err(format!("shares add up to {sum} percent: allowed is 100 or less"));
+            return Err(OrderRefusal::Shares(shares.0.iter().map(|&s| u32::from(s)).sum()));
         }
         let vehicles: Vec<Address> = self.records.keys().copied().collect();
         let background = background.unwrap_or(self.background);

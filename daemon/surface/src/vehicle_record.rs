@@ -1,5 +1,6 @@
 //! The operator's data about one vehicle.
 
+use super::annotations::AnnotationRefusal;
 use super::annotations::Annotations;
 use super::exemplar_cache::ExemplarCache;
 use super::label_book::LabelBook;
@@ -207,10 +208,10 @@ impl VehicleRecord {
     }
 
     /// Sets name, colour and merging of a label in the current epoch; without a name or a colour it has those that the
-    /// vehicle gives it. The error is one line for the operator.
-    pub fn set_label(&mut self, label: u8, book: StoredLabel) -> Result<(), String> {
+    /// vehicle gives it.
+    pub fn set_label(&mut self, label: u8, book: StoredLabel) -> Result<(), AnnotationRefusal> {
         if self.earlier_map().is_some_and(|earlier| earlier.epoch != self.epoch) {
-            return Err("the map in view has the labels of an earlier epoch".to_owned());
+            return Err(AnnotationRefusal::EarlierMap);
         }
         self.annotations.set_label(label, book)?;
         self.classes.get(&label).into_iter().for_each(|entry| self.annotations.label_by_default(entry));

@@ -60,7 +60,7 @@ pub struct MapUpdate {
 /// A camera frame after which the map is as it is.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SeenFrame {
-    /// Where the camera was.
+    /// The pose of the camera in the vehicle's map frame: by registration, where that is on.
     pub camera: Pose,
     /// Visual words of each cell.
     pub words: Vec<(Cell, u32)>,

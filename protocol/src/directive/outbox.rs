@@ -573,7 +573,7 @@ mod tests {
     }
 
     #[test]
-    fn an_abort_that_seemed_late_and_had_arrived_is_shown_as_applied() {
+    fn an_abort_that_seemed_lost_and_arrived_is_shown_as_applied() {
         let at = Instant::from_secs_f64;
         let abort = Slot::Constraints(Constraints { hold: false, abort: true });
         for was_sent in [true, false] {
@@ -594,7 +594,7 @@ mod tests {
     }
 
     #[test]
-    fn an_order_is_superseded_once_a_later_one_of_its_series_is_in_force() {
+    fn a_later_order_of_the_series_in_force_supersedes_an_order() {
         let now = Instant::from_secs_f64(5.0);
         for (state, version_low, is_superseded) in [
             (SlotState::Applied, 2, true),

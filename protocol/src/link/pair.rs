@@ -30,6 +30,21 @@ struct Strays {
     of_ended_run: bool,
 }
 
+/// At the vehicle: the surfaces that call it.
+#[derive(Debug, Default)]
+struct Callers {
+    /// Hellos of ended runs of the surface since the last frame that was accepted.
+    ended_hellos: u32,
+    /// Hellos of the surface's current run since the last frame that was accepted, or the last answer that names the vehicle's.
+    known_hellos: u32,
+    /// How long the surface that holds the vehicle was silent; `None` if it was never heard.
+    silence: Option<Duration>,
+    /// The run of a surface that the next hello refuses, and the generation of the key by which it called.
+    refused: Option<(Identity, Generation)>,
+    /// Without a key: another surface that has just called in a run that has ended here.
+    retired: Option<Introduction>,
+}
+
 /// Where the acknowledgement of a frame may stand.
 #[derive(Debug, Clone, Copy)]
 pub struct AckRoom {
@@ -53,17 +68,7 @@ pub struct LinkPair<T> {
     /// At the vehicle: the next frame is a hello, although there is a run.
     owes_hello: bool,
     strays: Strays,
-    /// At the vehicle: hellos of ended runs of the surface since the last frame that was accepted.
-    ended_hellos: u32,
-    /// At the vehicle: hellos of the surface's current run since the last frame that was accepted, or the last answer that
-    /// names the vehicle's.
-    known_hellos: u32,
-    /// At the vehicle: how long the surface that holds it was silent; `None` if it was never heard.
-    silence: Option<Duration>,
-    /// At the vehicle: the run of a surface that the next hello refuses, and the generation of the key by which it called.
-    refused: Option<(Identity, Generation)>,
-    /// At the vehicle, without a key: another surface that has just called in a run that has ended here.
-    retired_caller: Option<Introduction>,
+    callers: Callers,
     rotation: KeyRotation,
     /// Counters and estimates of this link.
     pub stats: LinkStats,
@@ -102,11 +107,7 @@ impl<T> LinkPair<T> {
             mismatch,
             owes_hello: false,
             strays: Strays::default(),
-            ended_hellos: 0,
-            known_hellos: 0,
-            silence: None,
-            refused: None,
-            retired_caller: None,
+            callers: Callers::default(),
             rotation: KeyRotation::default(),
             stats,
         }
@@ -131,17 +132,17 @@ impl<T> LinkPair<T> {
 
     /// At the vehicle: sets how long the surface that holds it was silent.
     pub fn set_silence(&mut self, silence: Option<Duration>) {
-        self.silence = silence;
+        self.callers.silence = silence;
     }
 
     /// At the vehicle: the session of the surface that the next hello refuses.
     pub fn refused_session(&self) -> Option<SessionId> {
-        self.refused.map(|(run, _)| run.session)
+        self.callers.refused.map(|(run, _)| run.session)
     }
 
     /// At the vehicle, without a key: another surface than the one that holds it, which has just called in a run that has ended here.
     pub fn poll_retired_caller(&mut self) -> Option<Introduction> {
-        self.retired_caller.take()
+        self.callers.retired.take()
     }
 
     /// At the vehicle: the introduction of later hellos says that it has no memory of orders, or that it has.
@@ -342,15 +343,15 @@ impl<T> LinkPair<T> {
     /// At the vehicle: leaves the last hello of the surface without an answer.
     pub fn withhold_hello(&mut self) {
         self.owes_hello = self.handshake.is_leaving();
-        self.refused = None;
+        self.callers.refused = None;
     }
 
     /// The introduction in the next hello: at a vehicle that refuses a surface, it names the one that holds it.
     fn next_introduction(&self) -> Introduction {
-        let holder = self.handshake.run().map(|run| run.introduction).filter(|_| self.refused.is_some());
+        let holder = self.handshake.run().map(|run| run.introduction).filter(|_| self.callers.refused.is_some());
         match holder {
             Some(Introduction { series, name, .. }) => {
-                let silence_s = self.silence.map_or(248, |silence| silence.as_secs().min(248) as u8);
+                let silence_s = self.callers.silence.map_or(248, |silence| silence.as_secs().min(248) as u8);
                 Introduction { series, name, refuses: true, silence_s, ..self.introduction }
             }
             None => self.introduction,
@@ -368,7 +369,7 @@ impl<T> LinkPair<T> {
         purpose: FramePurpose,
     ) -> FrameBuilder {
         let hello = purpose.is_hello() || self.must_send_hello();
-        let offered = self.handshake.offered().filter(|_| hello && self.refused.is_none());
+        let offered = self.handshake.offered().filter(|_| hello && self.callers.refused.is_none());
         let own = offered.map_or(self.handshake.own(), |r| r.own);
         let direction = self.direction_out();
         let keyed = if hello { self.authenticity.is_some() } else { self.is_keyed(direction) };
@@ -401,7 +402,7 @@ impl<T> LinkPair<T> {
             self.owes_hello &= self.handshake.is_leaving();
             let is_surface = self.us == Address::SURFACE;
             let named = self.handshake.offered().or(self.handshake.run()).filter(|_| !is_surface);
-            let to = self.refused.take().or(named.map(|r| (r.peer, r.generation)));
+            let to = self.callers.refused.take().or(named.map(|r| (r.peer, r.generation)));
             let (session, nonce) = to.map_or((0, 0), |(p, _)| (p.session.get(), p.nonce));
             let generation = if is_surface { self.next_voice() } else { to.map(|(_, used)| used).unwrap_or_default() };
             return match &self.authenticity {

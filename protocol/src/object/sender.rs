@@ -9,7 +9,7 @@ use std::ops::Range;
 /// What capacity an object may use.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Priority {
-    /// Its share.
+    /// The share of the budget that the class of exemplars has.
     Requested,
     /// The spare capacity, in its place among the background streams.
     Background,

@@ -68,6 +68,25 @@ impl BackgroundStream {
     }
 }
 
+/// Why names are no order of background streams.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum BackgroundError {
+    /// No stream has this name.
+    #[error("background {name:?}: it takes different ones of {allowed}")]
+    Unknown {
+        /// The name as it was given.
+        name: String,
+        /// The names of all streams, as people read them.
+        allowed: String,
+    },
+    /// Two names are the same.
+    #[error("background names one twice: it takes different ones of {allowed}")]
+    Repeated {
+        /// The names of all streams, as people read them.
+        allowed: String,
+    },
+}
+
 /// Background streams in the order in which they get spare capacity. One that is not in it gets none, except that finer cells
 /// then are cells like all others.
 ///
@@ -86,7 +105,7 @@ impl BackgroundStream {
 /// let order = BackgroundOrder::from_names(&["exemplars", "depth"], &layers)?;
 /// assert_eq!(order.names(&layers), ["exemplars", "depth"]);
 /// assert!(BackgroundOrder::from_names(&["depth", "depth"], &layers).is_err());
-/// # Ok::<(), String>(())
+/// # Ok::<(), scenecast_protocol::schedule::BackgroundError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct BackgroundOrder([Option<BackgroundStream>; BackgroundOrder::MAX_STREAMS]);
@@ -112,13 +131,13 @@ impl BackgroundOrder {
         (!is_repeated && places.next().is_none()).then_some(order)
     }
 
-    /// The streams of these names. The error is one line that lists the names that are allowed.
-    pub fn from_names<T: AsRef<str>>(names: &[T], layers: &LayerSet) -> Result<Self, String> {
-        let all = || BackgroundStream::all(layers).map(|s| s.name_in(layers)).collect::<Vec<_>>().join(", ");
-        let unknown = |name: &str| format!("background {name:?}: it takes different ones of {}", all());
+    /// The streams of these names, none of them twice.
+    pub fn from_names<T: AsRef<str>>(names: &[T], layers: &LayerSet) -> Result<Self, BackgroundError> {
+        let allowed = || BackgroundStream::all(layers).map(|s| s.name_in(layers)).collect::<Vec<_>>().join(", ");
+        let unknown = |name: &str| BackgroundError::Unknown { name: name.to_owned(), allowed: allowed() };
         let stream = |name: &str| BackgroundStream::from_name(name, layers).ok_or_else(|| unknown(name));
-        let streams: Result<Vec<BackgroundStream>, String> = names.iter().map(|name| stream(name.as_ref())).collect();
-        Self::new(&streams?).ok_or_else(|| format!("background names one twice: it takes different ones of {}", all()))
+        let streams = names.iter().map(|name| stream(name.as_ref())).collect::<Result<Vec<_>, _>>()?;
+        Self::new(&streams).ok_or_else(|| BackgroundError::Repeated { allowed: allowed() })
     }
 
     /// The streams in their order.
@@ -188,8 +207,12 @@ mod tests {
         let layers = LayerSet::default();
         let message = BackgroundOrder::from_names(&["depth", "sonar"], &layers).unwrap_err();
         let names = BUILT_IN_LAYERS.each_ref().map(|layer| &*layer.descriptor.name).join(", ");
-        assert_eq!(message, format!("background \"sonar\": it takes different ones of finer, exemplars, {names}"));
-        assert!(BackgroundOrder::from_names(&["depth", "depth"], &layers).unwrap_err().contains("twice"));
+        assert_eq!(
+            message.to_string(),
+            format!("background \"sonar\": it takes different ones of finer, exemplars, {names}")
+        );
+        let repeated = BackgroundOrder::from_names(&["depth", "depth"], &layers);
+        assert!(matches!(repeated, Err(BackgroundError::Repeated { .. })));
         let order = BackgroundOrder::from_names(&["exemplars", "finer"], &layers).unwrap();
         assert_eq!(order.names(&layers), ["exemplars", "finer"]);
     }

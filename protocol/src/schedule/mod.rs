@@ -4,6 +4,6 @@ mod background;
 mod budget;
 mod shares;
 
-pub use background::{BackgroundOrder, BackgroundStream};
+pub use background::{BackgroundError, BackgroundOrder, BackgroundStream};
 pub use budget::{Audit, BitBudget};
 pub use shares::{Class, ClassShares, Shares};

@@ -4,7 +4,7 @@ use crate::process::{Process, free_port};
 use crate::program::ProgramArgument;
 use clap::Args;
 use scenecast_config::Ros2;
-use scenecast_core::UserError;
+use scenecast_core::{Takes, UserError};
 use scenecast_messages::geometry_msgs::{Point, Pose, Quaternion};
 use scenecast_messages::nav_msgs::Odometry;
 use scenecast_messages::sensor_msgs::Image;
@@ -58,9 +58,9 @@ pub(crate) struct LiveBench {
     program: ProgramArgument,
 }
 
-fn rate(text: &str) -> Result<f64, String> {
+fn rate(text: &str) -> Result<f64, Takes> {
     let rate = text.parse::<f64>().ok().filter(|rate| (0.1..=30.0).contains(rate));
-    rate.ok_or_else(|| "it takes 0.1 to 30 images a second".to_owned())
+    rate.ok_or(Takes("it takes 0.1 to 30 images a second"))
 }
 
 #[derive(Debug)]

@@ -11,7 +11,7 @@ use scenecast_core::{UserError, one_line};
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct LabelChange {
     pub name: Option<String>,
-    /// As in `#a0b1c2`.
+    /// Red, green and blue in hexadecimal digits, as in `#a0b1c2`.
     pub colour: Option<String>,
     /// Number or name of the label that it is shown as a part of.
     pub merged_into: Option<String>,
@@ -51,7 +51,7 @@ pub async fn remove_mark(session: &Session, number: u32) -> Result<(), UserError
     ask_of(session, vehicle, "markers/remove", &RemoveMarkerOrder { number }).await
 }
 
-/// Prints the markers.
+/// Prints the markers of the chosen vehicle: number, place in metres east and north, text and author.
 pub async fn show_marks(session: &Session) -> Result<(), UserError> {
     let state = session.state().await?;
     let markers = &session.choose(&state)?.markers;

@@ -76,7 +76,7 @@ pub async fn clear_fence(session: &Session) -> Result<(), UserError> {
 
 /// Moves the return point, in metres in the world frame, or removes it. Fence and keep-outs stay.
 pub async fn set_return_point(session: &Session, at: Option<[f64; 2]>) -> Result<(), UserError> {
-    FenceOrder { return_point: at, ..FenceOrder::default() }.read().map_err(UserError::Input)?;
+    FenceOrder { return_point: at, ..FenceOrder::default() }.read().map_err(UserError::input)?;
     let state = session.state().await?;
     send(session, session.choose(&state)?, "fence", &json!({ "return_point": at })).await
 }
@@ -91,7 +91,7 @@ pub async fn show_limits(session: &Session) -> Result<(), UserError> {
 
 /// Sends limits. Those that are not given stay.
 pub async fn set_limits(session: &Session, given: &LimitsOrder) -> Result<(), UserError> {
-    given.read().map_err(UserError::Input)?;
+    given.read().map_err(UserError::input)?;
     let state = session.state().await?;
     send(session, session.choose(&state)?, "limits", &named(given, |_, value| !value.is_null())).await
 }

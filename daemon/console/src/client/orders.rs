@@ -151,7 +151,7 @@ pub async fn set_areas(session: &Session, file: Option<AreasFile<'_>>) -> Result
 pub async fn go(session: &Session, place: Option<[f64; 2]>) -> Result<(), UserError> {
     let state = session.state().await?;
     let order = DestinationOrder { place };
-    order.read().map_err(UserError::Input)?;
+    order.read().map_err(UserError::input)?;
     send(session, session.choose(&state)?, "destination", &order).await
 }
 

@@ -25,7 +25,7 @@ pub async fn change_settings(session: &Session, change: SettingsChange) -> Resul
         return session.print(&vehicle.orders.settings, || table(vehicle));
     }
     // An order that no vehicle can obey is refused before a fit is requested.
-    change.order.read(&layers_of(&state)).map_err(UserError::Input)?;
+    change.order.read(&layers_of(&state)).map_err(UserError::input)?;
     let order = match change.fit {
         None => change.order,
         Some(bits_per_s) => {

@@ -1,5 +1,6 @@
 //! The classes of a map for programs that annotate images: COCO and TagLab.
 
+use super::ExportError;
 use super::cells::{MapCaption, MapCells};
 use super::files::check_picture;
 use scenecast_protocol::map::{Cell, Rect, UNEXPLORED};
@@ -10,7 +11,7 @@ use std::collections::{BTreeMap, BTreeSet};
 /// error is one line for people.
 ///
 /// Source: <https://cocodataset.org/#format-data>.
-pub(super) fn coco(cells: &MapCells) -> Result<Vec<u8>, String> {
+pub(super) fn coco(cells: &MapCells) -> Result<Vec<u8>, ExportError> {
     // The file refers to the PNG, so it has the same limit.
     check_picture(cells)?;
     let Rect { width, height, .. } = cells.rectangle();

@@ -1,5 +1,6 @@
 //! A map in shared tiles, its cells one by one, and its form in JSON.
 
+use super::ExportError;
 use crate::state::{LayerBody, MapBody, ReplaySide, VehicleMarker};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
@@ -196,14 +197,11 @@ impl MapCells {
     }
 
     /// The cells of a region, by default of the bounds. The error is one line for people.
-    pub(crate) fn body(&self, region: Option<Rect>) -> Result<MapBody, String> {
+    pub(crate) fn body(&self, region: Option<Rect>) -> Result<MapBody, ExportError> {
         let region = region.unwrap_or(self.rectangle());
         if region.area() > MAX_JSON_CELLS {
             let Rect { width, height, .. } = region;
-            return Err(format!(
-                "the map spans {width} x {height} cells: JSON has at most {MAX_JSON_CELLS}; request a region with x0, y0, \
-                 width and height in cells, or the tiles of the map"
-            ));
+            return Err(ExportError::LargeJson { width, height });
         }
         let (labels, age_s) = region_body(&self.tiles, region, self.at);
         Ok(MapBody {

@@ -1,5 +1,6 @@
 //! The file formats of a map: indexed PNG with world file and projection, GeoJSON, PLY, CSV.
 
+use super::ExportError;
 use super::annotations::{coco, tag_lab};
 use super::cells::{ExploredCell, MapCaption, MapCells};
 use super::geotiff::{Reference, geotiff};
@@ -14,23 +15,20 @@ use std::collections::BTreeMap;
 use std::fmt::Write;
 
 /// Whether the map is small enough for a picture. The error is one line for people.
-pub(super) fn check_picture(cells: &MapCells) -> Result<(), String> {
+pub(super) fn check_picture(cells: &MapCells) -> Result<(), ExportError> {
     let Rect { width, height, .. } = cells.rectangle();
-    let most = label_picture::MAX_CELLS;
-    if cells.rectangle().area() > most {
-        return Err(format!(
-            "the map spans {width} x {height} cells: a PNG has at most {most}; a GeoTIFF (map.tif) has all"
-        ));
+    if cells.rectangle().area() > label_picture::MAX_CELLS {
+        return Err(ExportError::LargePicture { width, height });
     }
     Ok(())
 }
 
 /// An indexed PNG, north up, pixel value = label. A PNG has no empty tiles, so its extent is limited.
-pub(super) fn indexed_png(cells: &MapCells) -> Result<Vec<u8>, String> {
+pub(super) fn indexed_png(cells: &MapCells) -> Result<Vec<u8>, ExportError> {
     check_picture(cells)?;
     let grid: LabelGrid = cells.explored().map(|c| (c.cell, c.label)).collect();
     let bounds = grid.bounds().unwrap_or(Rect { x: 0, y: 0, width: 1, height: 1 });
-    label_picture::encode_coloured(&grid, bounds, |label| cells.book.class_colour(label)).map_err(|e| e.to_string())
+    Ok(label_picture::encode_coloured(&grid, bounds, |label| cells.book.class_colour(label))?)
 }
 
 /// The six lines of a world file: the size of a pixel and the centre of the north-west pixel.
@@ -338,8 +336,8 @@ impl MapCells {
     ///
     /// # Errors
     ///
-    /// One line for people: the map is too large for the format, or the format needs an origin.
-    pub fn export(&self, format: MapFormat, origin: Option<Origin>) -> Result<Vec<u8>, String> {
+    /// The map is too large for the format, or the format needs an origin.
+    pub fn export(&self, format: MapFormat, origin: Option<Origin>) -> Result<Vec<u8>, ExportError> {
         match format {
             MapFormat::Png => indexed_png(self),
             MapFormat::WorldFile => Ok(world_file(self).into()),

@@ -3,6 +3,7 @@
 //! Tags follow TIFF 6.0 and OGC GeoTIFF 1.1 (19-008r4). Tiles without an explored cell share the data of one empty tile, so
 //! that the size of the file grows with the cells and not with their extent.
 
+use super::ExportError;
 use super::cells::{MapCaption, MapCells};
 use super::files::escaped;
 use super::projection::TransverseMercator;
@@ -15,9 +16,9 @@ use std::collections::BTreeSet;
 use std::io::Write;
 
 /// Edge of a tile of the file in pixels.
-const TILE: u32 = 256;
+pub(super) const TILE: u32 = 256;
 /// The most tiles of a file; their table takes 8 bytes each.
-const MAX_TILES: u64 = 1 << 20;
+pub(super) const MAX_TILES: u64 = 1 << 20;
 /// Metres of one degree of latitude, for the size of a pixel in degrees.
 const DEGREE_M: f64 = 111_320.0;
 
@@ -77,21 +78,17 @@ impl Places {
 
 /// The map as a GeoTIFF, pixel value = label, 0 = no data. In UTM and WGS 84, each pixel has the label of the cell at its centre.
 /// The error is one line for people.
-pub(super) fn geotiff(cells: &MapCells, origin: Option<Origin>, reference: Reference) -> Result<Vec<u8>, String> {
-    let no_origin =
-        "the mission has no origin in latitude and longitude: set mission.origin_deg, or take map.tif in metres";
+pub(super) fn geotiff(cells: &MapCells, origin: Option<Origin>, reference: Reference) -> Result<Vec<u8>, ExportError> {
     let (places, keys) = match (reference, origin) {
         (Reference::Mission, origin) => (Places::Same, origin.map(mission_keys).unwrap_or_default()),
-        (_, None) => return Err(no_origin.to_owned()),
+        (_, None) => return Err(ExportError::NoOrigin),
         (Reference::Utm, Some(origin)) => {
             let zone = TransverseMercator::utm(origin);
-            let (utm, epsg) =
-                zone.ok_or("UTM reaches from 80 degrees south to 84 degrees north: take map.wgs84.tif or map.tif")?;
+            let (utm, epsg) = zone.ok_or(ExportError::OutsideUtm)?;
             (Places::Projected(TransverseMercator::about(origin), utm), utm_keys(epsg))
         }
         (Reference::Wgs84, Some(origin)) if origin.lat_deg.abs() > WGS84_LAT_DEG => {
-            let line = "within a degree of a pole a map has no rectangle of longitudes and latitudes: take map.tif";
-            return Err(line.to_owned());
+            return Err(ExportError::AtPole);
         }
         (Reference::Wgs84, Some(origin)) => (Places::Degrees(TransverseMercator::about(origin)), wgs84_keys()),
     };
@@ -102,7 +99,12 @@ pub(super) fn geotiff(cells: &MapCells, origin: Option<Origin>, reference: Refer
     write(cells, &raster, &keys, tiles)
 }
 
-fn raster(cells: &MapCells, origin: Option<Origin>, reference: Reference, places: &Places) -> Result<Raster, String> {
+fn raster(
+    cells: &MapCells,
+    origin: Option<Origin>,
+    reference: Reference,
+    places: &Places,
+) -> Result<Raster, ExportError> {
     let Rect { x, y, width, height } = cells.bounds.unwrap_or(Rect { x: 0, y: 0, width: 1, height: 1 });
     let (x, y) = (i64::from(x), i64::from(y));
     let size = cells.cell_m;
@@ -110,11 +112,8 @@ fn raster(cells: &MapCells, origin: Option<Origin>, reference: Reference, places
         (Reference::Wgs84, Some(o)) => (size / (DEGREE_M * o.lat_deg.to_radians().cos()), size / DEGREE_M),
         _ => (size, size),
     };
-    let too_large = || {
-        format!("the map spans {width} x {height} cells: a GeoTIFF has at most {MAX_TILES} tiles of {TILE} x {TILE}")
-    };
     if u64::from(width.div_ceil(TILE)) * u64::from(height.div_ceil(TILE)) > MAX_TILES {
-        return Err(too_large());
+        return Err(ExportError::ManyTiles { width, height });
     }
     let (x_end, y_end) = (x + i64::from(width), y + i64::from(height));
     if matches!(places, Places::Same) {
@@ -133,7 +132,7 @@ fn raster(cells: &MapCells, origin: Option<Origin>, reference: Reference, places
     let ((west, east), (south, north)) = (range(|p| p.0), range(|p| p.1));
     let (columns, rows) = (((east - west) / pixel.0).ceil() + 2.0, ((north - south) / pixel.1).ceil() + 2.0);
     if !(columns * rows).is_finite() || columns * rows > MAX_TILES as f64 * f64::from(TILE * TILE) {
-        return Err(too_large());
+        return Err(ExportError::ManyTiles { width, height });
     }
     let (west, north) = (west - pixel.0, north + pixel.1);
     let west = match reference {
@@ -141,10 +140,7 @@ fn raster(cells: &MapCells, origin: Option<Origin>, reference: Reference, places
             // All of it beyond 180 degrees is on the other side; a file across it is none that others read.
             let turned = west - 360.0 * west.signum();
             if turned.abs() > 180.0 || (turned + columns * pixel.0).abs() > 180.0 {
-                return Err(
-                    "the map lies across 180 degrees of longitude: take map.tif, or map.utm.tif up to 84 degrees north"
-                        .to_owned(),
-                );
+                return Err(ExportError::AcrossDateLine);
             }
             turned
         }
@@ -289,18 +285,17 @@ fn write(
     raster: &Raster,
     keys: &GeoKeys,
     tiles: impl Iterator<Item = ((u32, u32), Vec<u8>)>,
-) -> Result<Vec<u8>, String> {
+) -> Result<Vec<u8>, ExportError> {
     let columns = raster.width.div_ceil(TILE);
     let count = (columns * raster.height.div_ceil(TILE)) as usize;
-    let packed = |pixels: &[u8]| deflate(pixels).map_err(|e| e.to_string());
     // Tiles without an explored cell share the first one.
-    let mut data = packed(&[0; (TILE * TILE) as usize])?;
+    let mut data = deflate(&[0; (TILE * TILE) as usize])?;
     let mut places = vec![(0, data.len()); count];
     for ((row, column), pixels) in tiles {
         if pixels.iter().all(|&label| label == 0) {
             continue;
         }
-        let tile = packed(&pixels)?;
+        let tile = deflate(&pixels)?;
         if let Some(place) = places.get_mut((row * columns + column) as usize) {
             *place = (data.len(), tile.len());
             data.extend(tile);
@@ -365,10 +360,10 @@ mod tests {
         {
             let origin = Some(Origin { lat_deg, lon_deg: 12.0 });
             let refused = |reference| geotiff(&cells, origin, reference).err();
-            assert_eq!(refused(Reference::Mission), None);
+            assert!(refused(Reference::Mission).is_none());
             let [of_degrees, of_utm] = [Reference::Wgs84, Reference::Utm].map(refused);
             assert_eq!((of_degrees.is_none(), of_utm.is_none()), (degrees, utm), "{lat_deg}");
-            assert!([of_degrees, of_utm].iter().flatten().all(|line| line.contains("take map.")));
+            assert!([of_degrees, of_utm].iter().flatten().all(|refusal| refusal.to_string().contains("take map.")));
         }
     }
 }

@@ -2,6 +2,7 @@
 //!
 //! Source: TIFF 6.0.
 
+use super::ExportError;
 use std::collections::BTreeMap;
 
 /// The directory of a file under way.
@@ -11,7 +12,7 @@ pub(super) struct Directory {
     fields: BTreeMap<u16, (u16, u32, Vec<u8>)>,
 }
 
-/// Types of fields.
+/// The numbers by which TIFF names the types of a directory's fields.
 const ASCII: u16 = 2;
 const SHORT: u16 = 3;
 const LONG: u16 = 4;
@@ -52,9 +53,8 @@ impl Directory {
         directory
     }
 
-    /// Adds the last fields, the tiles of this edge: the place of each in the data behind the directory, and its length. The error is one
-    /// line for people.
-    pub(super) fn tiles(&mut self, edge: u32, places: &[(usize, usize)]) -> Result<(), String> {
+    /// Adds the last fields, the tiles of this edge: the place of each in the data behind the directory, and its length.
+    pub(super) fn tiles(&mut self, edge: u32, places: &[(usize, usize)]) -> Result<(), ExportError> {
         self.longs(TILE_WIDTH, &[edge]);
         self.longs(TILE_LENGTH, &[edge]);
         self.longs(TILE_BYTE_COUNTS, &places.iter().map(|&(_, length)| length as u32).collect::<Vec<u32>>());
@@ -63,7 +63,7 @@ impl Directory {
         let from = self.length();
         let offset = |&(at, _): &(usize, usize)| u32::try_from(from + at);
         let offsets = places.iter().map(offset).collect::<Result<Vec<u32>, _>>();
-        self.longs(TILE_OFFSETS, &offsets.map_err(|_| "the map is too large for a GeoTIFF of 4 GB")?);
+        self.longs(TILE_OFFSETS, &offsets.map_err(|_| ExportError::ManyBytes)?);
         Ok(())
     }
 

@@ -37,7 +37,7 @@ pub(super) struct Access {
     /// Whoever reaches the listener, where there are no tokens.
     pub(super) local: Principal,
     grants: Vec<TokenGrant>,
-    /// The oldest first.
+    /// The open sessions of all principals, the oldest first; a principal has at most [`MAX_SESSIONS`].
     sessions: Mutex<VecDeque<Session>>,
 }
 

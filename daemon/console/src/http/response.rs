@@ -14,6 +14,7 @@ use flate2::write::GzEncoder;
 use serde::de::value::MapAccessDeserializer;
 use serde::de::{DeserializeOwned, MapAccess, Visitor};
 use serde::{Deserialize, Deserializer};
+use std::fmt::Display;
 use std::fmt::Formatter;
 use std::io::Write;
 use std::marker::PhantomData;
@@ -44,8 +45,8 @@ pub(super) fn respond(reply: Reply) -> Response {
 }
 
 /// An error with one line for people.
-pub(super) fn error(status: StatusCode, line: &str) -> Response {
-    (status, Json(ErrorBody { error: line.to_owned() })).into_response()
+pub(super) fn error(status: StatusCode, line: impl Display) -> Response {
+    (status, Json(ErrorBody { error: line.to_string() })).into_response()
 }
 
 pub(super) fn not_found() -> Response {
@@ -80,7 +81,7 @@ impl<T: DeserializeOwned, S: Send + Sync> FromRequest<S> for JsonOrder<T> {
 
     async fn from_request(request: Request, state: &S) -> Result<Self, Response> {
         let body = Json::<Self>::from_request(request, state).await;
-        body.map(|Json(order)| order).map_err(|e| error(e.status(), &e.body_text()))
+        body.map(|Json(order)| order).map_err(|e| error(e.status(), e.body_text()))
     }
 }
 

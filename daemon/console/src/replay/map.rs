@@ -14,12 +14,12 @@ pub(crate) struct MapHistory {
     changes: Vec<Change>,
     /// The meaning of the layers' levels, by name.
     descriptors: BTreeMap<String, LayerDescriptor>,
-    /// Changes that `shown` has.
+    /// How many of `changes`, from the first on, are in `shown`.
     applied: usize,
     shown: ShownMap,
 }
 
-/// A message about cells.
+/// A recorded message about cells of the labels or of one layer, and its time, nanoseconds since 1970.
 #[derive(Debug)]
 struct Change {
     nanos: u64,

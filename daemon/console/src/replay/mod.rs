@@ -26,6 +26,17 @@ use std::collections::BTreeMap;
 use std::ops::RangeInclusive;
 use std::time::Duration;
 
+/// Why the replay is not changed; as text one line for the operator.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+enum ReplayRefusal {
+    #[error("at_utc_s {0}: it takes seconds since 1970")]
+    Time(f64),
+    #[error("speed {speed}: the range is {} to {}", Replay::SPEEDS.start(), Replay::SPEEDS.end())]
+    Speed { speed: f64 },
+    #[error("side {0:?}: the record of the other end is missing")]
+    Side(ReplaySide),
+}
+
 /// A mission that is played from its records.
 #[derive(Debug)]
 pub struct Replay {
@@ -140,7 +151,7 @@ impl Replay {
         Snapshot::new(state, None, self.stamps.seen_at(mission_s, self.at as i64))
     }
 
-    /// The last recorded state.
+    /// The last state that was recorded up to the moment that is shown; an empty one before the first.
     fn recorded_state(&mut self) -> MissionState {
         let Some(text) = self.recording.timeline.state_at(self.at) else {
             let mut state = MissionState::default();
@@ -234,7 +245,7 @@ impl Replay {
         Some(match request {
             SurfaceRequest::Replay(order) => match self.change(&order) {
                 Ok(()) => Reply::Replay(Box::new(self.replay_state())),
-                Err(reason) => Reply::Refused(reason),
+                Err(refusal) => Reply::Refused(refusal.to_string()),
             },
             SurfaceRequest::ReplayEvents => Reply::ReplayEvents(ReplayEventList { events: self.events.clone() }),
             SurfaceRequest::Report => self.report(),
@@ -255,16 +266,16 @@ impl Replay {
         })
     }
 
-    fn change(&mut self, order: &ReplayOrder) -> Result<(), String> {
+    fn change(&mut self, order: &ReplayOrder) -> Result<(), ReplayRefusal> {
         let (from, to) = self.recording.timeline.span;
         if let Some(at_s) = order.at_utc_s.filter(|at_s| !at_s.is_finite()) {
-            return Err(format!("at_utc_s {at_s}: it takes seconds since 1970"));
+            return Err(ReplayRefusal::Time(at_s));
         }
         if let Some(speed) = order.speed.filter(|speed| !Self::SPEEDS.contains(speed)) {
-            return Err(format!("speed {speed}: the range is {} to {}", Self::SPEEDS.start(), Self::SPEEDS.end()));
+            return Err(ReplayRefusal::Speed { speed });
         }
         if let Some(side) = order.side.filter(|side| !self.sides().contains(side)) {
-            return Err(format!("side {side:?}: the record of the other end is missing"));
+            return Err(ReplayRefusal::Side(side));
         }
         // A float holds the nanoseconds of today to a quarter of a microsecond.
         self.at = order.at_utc_s.map_or(self.at, |at_s| ((at_s.max(0.0) * 1e9) as u64).clamp(from, to));
@@ -283,7 +294,10 @@ impl Replay {
         let dive = Dive::of(&mut self.recording);
         // The maps are at the end now.
         self.show();
-        dive.map_or_else(Reply::Refused, |dive| Reply::File(HTML, dive.html().into_bytes()))
+        match dive {
+            Ok(dive) => Reply::File(HTML, dive.html().into_bytes()),
+            Err(error) => Reply::Refused(error.to_string()),
+        }
     }
 
     fn map(&self, id: u8, part: &str) -> Option<MapCells> {

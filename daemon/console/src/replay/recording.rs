@@ -22,11 +22,11 @@ pub struct Recording {
     pub(crate) timeline: Timeline,
     /// What the operator knew of each vehicle, by the part of its topics.
     pub(crate) operator: BTreeMap<String, Known>,
-    /// What each vehicle knew.
+    /// What each vehicle knew, from its own records, by the part of its topics.
     pub(crate) vehicles: BTreeMap<String, Known>,
-    /// The surface's log.
+    /// The entries of the surface's log with the times at which they were recorded.
     pub(crate) log: Vec<(u64, Event)>,
-    /// Frames of the surface.
+    /// How many frames the surface sent, received and dropped, over all its records.
     pub(crate) frames: FrameCounts,
     /// What the surface ran with, as JSON.
     pub(crate) settings: String,
@@ -97,7 +97,7 @@ pub(super) struct Closed {
 /// How many frames an end has sent, and what became of those that it heard.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct FrameCounts {
-    /// Copies included.
+    /// Frames that were sent, copies of earlier ones included.
     pub(crate) sent: u64,
     pub(crate) received: u64,
     /// By the reason for which they were dropped.
@@ -135,7 +135,7 @@ pub(crate) struct Known {
     pub(super) name: String,
     pub(crate) map: MapHistory,
     pub(crate) exemplars: Vec<(u64, Exemplar)>,
-    /// Frames of the vehicle that the surface received.
+    /// When each frame came in: at a surface of those of the vehicle, at a vehicle of those of the surface.
     pub(crate) heard: Vec<u64>,
     pub(crate) poses: Vec<(u64, PoseWithCovarianceStamped)>,
     /// What the vehicle says of itself.
@@ -154,7 +154,7 @@ pub(crate) struct Known {
     pub(crate) settings: String,
 }
 
-/// One record.
+/// One record of a surface or of a vehicle, on the clock of the end that made it.
 #[derive(Default)]
 struct Record {
     path: PathBuf,

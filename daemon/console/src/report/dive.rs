@@ -19,6 +19,15 @@ use scenecast_protocol::map::{Cell, LabelGrid};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 
+/// Why a record is not told as a dive.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum DiveError {
+    #[error("no record of a surface: it has no topic /scenecast/state")]
+    NoSurface,
+    #[error("/scenecast/state of the record: {0}")]
+    State(#[from] serde_json::Error),
+}
+
 /// The dive of a record of the surface.
 #[derive(Debug, Default)]
 pub struct Dive {
@@ -174,14 +183,12 @@ impl Dive {
     }
 
     /// The dive of a recording, of which the maps are at its end afterwards. The error is one line for people.
-    pub(crate) fn of(recording: &mut Recording) -> Result<Self, String> {
+    pub(crate) fn of(recording: &mut Recording) -> Result<Self, DiveError> {
         let Some(last) = recording.timeline.states.last() else {
-            return Err("no record of a surface: it has no topic /scenecast/state".to_owned());
+            return Err(DiveError::NoSurface);
         };
         let ended_s = seconds(last.nanos);
-        let read = |json: &str| {
-            serde_json::from_str::<MissionState>(json).map_err(|e| format!("/scenecast/state of the record: {e}"))
-        };
+        let read = |json: &str| serde_json::from_str::<MissionState>(json);
         let mut state = read(&last.json)?;
         for (end, _) in recording.timeline.restarts() {
             let LinkSummary { up, down, .. } = read(&end.json)?.link;

@@ -34,10 +34,10 @@ pub struct Nmea {
     answers: bool,
     silence: Duration,
     heard: Option<Instant>,
-    /// Nothing was ever heard.
+    /// Lasts while no sentence has ever come in, and is noted after `silence`.
     absence: Lasting,
     soundings: Soundings,
-    /// No compass is heard.
+    /// Lasts while no compass gives a heading, and is noted after [`UNKNOWN_AFTER`].
     heading_absence: Lasting,
     /// Whether a magnetic heading was heard.
     hears_magnetic: bool,

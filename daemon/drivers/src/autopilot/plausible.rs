@@ -113,7 +113,7 @@ struct Series {
     zero: f64,
     /// The first and the last of the values that agree with each other, and not with the used one.
     other: Option<[(f64, Instant); 2]>,
-    /// Notes of jumps.
+    /// Limits the notes about jumps, which become rarer while jumps go on.
     jumps: Reminder,
     /// Notes of values that have stayed, and of zeros that have moved.
     settled: Reminder,

@@ -33,7 +33,7 @@ pub enum Speaker {
 /// What is wrong at a port.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum PortFinding {
-    /// Nothing comes in.
+    /// Not one byte has come in since the port was opened.
     Silent,
     /// What comes in is no text: the speed of the line is another one, or the line is disturbed.
     NoText,
@@ -91,7 +91,7 @@ impl PortListener {
         }
     }
 
-    /// The port was opened.
+    /// Judges the port from its opening at `now` on; kinds of findings that were reported before are not reported again.
     pub fn handle_open(&mut self, now: Instant) {
         *self = Self { opened: Some(now), told: std::mem::take(&mut self.told), ..Self::new(self.kind) };
     }
@@ -121,7 +121,7 @@ impl PortListener {
         }
     }
 
-    /// Bytes have come in.
+    /// Takes bytes that came in while the port is open; those after the first `MAX_BYTES` of an opening are passed over.
     pub fn handle_bytes(&mut self, bytes: &[u8]) {
         if self.opened.is_none() {
             return;

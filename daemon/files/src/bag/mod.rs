@@ -5,9 +5,9 @@ pub(crate) mod stream;
 
 use image::RgbImage;
 use scenecast_core::UserError;
-use scenecast_messages::decode as decode_cdr;
 use scenecast_messages::sensor_msgs::{CompressedImage, Image};
-use scenecast_sensors::{BitDepth, rgb_of};
+use scenecast_messages::{CdrError, decode as decode_cdr};
+use scenecast_sensors::{BitDepth, DecodeError, RawImageError, rgb_of};
 use std::fmt;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
@@ -29,6 +29,15 @@ pub struct Bag {
 struct Position {
     stream: Option<BagStream>,
     next: u64,
+}
+
+/// Why a message is no image.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[error(transparent)]
+enum BagImageError {
+    Message(#[from] CdrError),
+    Compressed(#[from] DecodeError),
+    Raw(#[from] RawImageError),
 }
 
 impl Bag {
@@ -60,14 +69,14 @@ impl Bag {
         }
     }
 
-    fn decode(&self, message: &BagMessage) -> Result<RgbImage, String> {
+    fn decode(&self, message: &BagMessage) -> Result<RgbImage, BagImageError> {
         if self.topic.kind == COMPRESSED {
-            let image: CompressedImage = decode_cdr(&message.bytes).map_err(|e| e.to_string())?;
-            return scenecast_sensors::decode(&image.data, self.bits).map_err(|e| e.to_string());
+            let image: CompressedImage = decode_cdr(&message.bytes)?;
+            return Ok(scenecast_sensors::decode(&image.data, self.bits)?);
         }
-        let image: Image = decode_cdr(&message.bytes).map_err(|e| e.to_string())?;
+        let image: Image = decode_cdr(&message.bytes)?;
         let mut bits = self.bits;
-        rgb_of(&image, &mut bits).map_err(|e| e.to_string())
+        Ok(rgb_of(&image, &mut bits)?)
     }
 }
 

@@ -7,7 +7,6 @@ use mcap::records::{Channel, Record, SchemaHeader, op};
 use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use scenecast_core::UserError;
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
-use std::fmt;
 use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
@@ -33,6 +32,42 @@ pub(crate) struct BagMessage {
     /// When it was recorded, nanoseconds since 1970.
     pub(crate) nanos: u64,
     pub(crate) bytes: Vec<u8>,
+}
+
+/// Why a record cannot be read.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum RecordError {
+    #[error("it ends in the middle of a record, as when a program is killed")]
+    CutOff,
+    #[error("it has {0} bytes, more than {MAX_RECORD_BYTES}")]
+    TooLarge(u64),
+    #[error(transparent)]
+    Mcap(McapError),
+    #[error(transparent)]
+    Io(#[from] std::io::Error),
+}
+
+/// What could not be read of a bag.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum Damage {
+    /// A line of [`gaps`].
+    #[error("{0}")]
+    Gap(String),
+    #[error("{}: {error}", .path.display())]
+    File { path: PathBuf, error: std::io::Error },
+    #[error("{}: it is empty", .0.display())]
+    Empty(PathBuf),
+    #[error("{}: it does not begin as an MCAP file does", .0.display())]
+    NotMcap(PathBuf),
+    #[error("it breaks off: {0}{HOW_TO_RECOVER}")]
+    BreaksOff(RecordError),
+    #[error("a chunk is damaged and left out: {0}")]
+    Chunk(RecordError),
+    #[error("a message that is compressed by zstd: {0}")]
+    Message(std::io::Error),
+    /// A record outside of chunks, or the end of the file.
+    #[error(transparent)]
+    Record(#[from] RecordError),
 }
 
 /// The files of a bag, which are read from the beginning of the first.
@@ -63,24 +98,24 @@ impl BagStream {
     }
 
     /// The next message of a topic that is `wanted`; `None` at the end. After an error what lies behind the damage follows.
-    pub(crate) fn next(&mut self, wanted: impl Fn(&BagTopic) -> bool) -> Result<Option<BagMessage>, String> {
+    pub(crate) fn next(&mut self, wanted: impl Fn(&BagTopic) -> bool) -> Result<Option<BagMessage>, Damage> {
         loop {
             if let Some(gap) = self.gaps.next() {
-                return Err(gap);
+                return Err(Damage::Gap(gap));
             }
             if let Some(message) = self.read.pop_front() {
-                return Ok(Some(BagMessage { bytes: unpacked(message.bytes)?, ..message }));
+                let bytes = unpacked(message.bytes).map_err(Damage::Message)?;
+                return Ok(Some(BagMessage { bytes, ..message }));
             }
             if self.open.is_none() {
                 let Some(path) = self.rest.next() else { return Ok(None) };
-                let fault = |e| format!("{}: {e}", path.display());
+                let fault = |error| Damage::File { path: path.clone(), error };
                 let mut file = File::open(&path).map_err(fault)?;
                 let mut head = Vec::new();
                 (&mut file).take(mcap::MAGIC.len() as u64).read_to_end(&mut head).map_err(fault)?;
                 file.rewind().map_err(fault)?;
                 if head != mcap::MAGIC {
-                    let what = if head.is_empty() { "it is empty" } else { "it does not begin as an MCAP file does" };
-                    return Err(format!("{}: {what}", path.display()));
+                    return Err(if head.is_empty() { Damage::Empty(path) } else { Damage::NotMcap(path) });
                 }
                 self.open = Some((file, reader()));
                 self.schemas.clear();
@@ -92,32 +127,37 @@ impl BagStream {
                 Ok(None) => self.open = None,
                 Err(error) => {
                     self.open = None;
-                    return Err(format!("it breaks off: {error}{HOW_TO_RECOVER}"));
+                    return Err(Damage::BreaksOff(error));
                 }
             }
         }
     }
 
     /// The next chunk, or record outside of chunks, of the open file: its kind and its bytes.
-    fn next_record(&mut self) -> Result<Option<(u8, Vec<u8>)>, String> {
+    fn next_record(&mut self) -> Result<Option<(u8, Vec<u8>)>, RecordError> {
         let Some((file, reader)) = &mut self.open else { return Ok(None) };
         next_of(reader, file, |opcode, record| (opcode, record.to_vec()))
     }
 
     /// Takes the messages of a chunk, all or none.
-    fn handle_chunk(&mut self, chunk: &[u8], wanted: &impl Fn(&BagTopic) -> bool) -> Result<(), String> {
+    fn handle_chunk(&mut self, chunk: &[u8], wanted: &impl Fn(&BagTopic) -> bool) -> Result<(), Damage> {
         let mut handled = Ok(());
-        read_chunk(chunk, |opcode, record| {
+        let read = read_chunk(chunk, |opcode, record| {
             if handled.is_ok() {
                 handled = self.handle_record(opcode, record, wanted);
             }
-        })?;
-        handled.map_err(|error| format!("a chunk is damaged and left out: {error}"))
+        });
+        read.and(handled).map_err(Damage::Chunk)
     }
 
     /// Takes a record outside of chunks or of a chunk.
-    fn handle_record(&mut self, opcode: u8, bytes: &[u8], wanted: &impl Fn(&BagTopic) -> bool) -> Result<(), String> {
-        match mcap::parse_record(opcode, bytes).map_err(|e| e.to_string())? {
+    fn handle_record(
+        &mut self,
+        opcode: u8,
+        bytes: &[u8],
+        wanted: &impl Fn(&BagTopic) -> bool,
+    ) -> Result<(), RecordError> {
+        match mcap::parse_record(opcode, bytes).map_err(RecordError::Mcap)? {
             Record::Schema { header: SchemaHeader { id, name, .. }, .. } => {
                 self.schemas.insert(id, name);
             }
@@ -165,22 +205,6 @@ pub(crate) fn is_whole(path: &Path) -> Result<bool, UserError> {
     ends(path).map_err(|e| UserError::file(path, e))
 }
 
-/// What could not be read of a file, for people.
-#[derive(Debug)]
-pub(crate) enum Damage {
-    /// A chunk is left out.
-    Chunk(String),
-    /// From here on it is missing or cannot be read.
-    End(String),
-}
-
-impl fmt::Display for Damage {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let (Self::Chunk(why) | Self::End(why)) = self;
-        f.write_str(why)
-    }
-}
-
 /// Gives `take` the records of a file as they are, those of chunks too. Returns the first damage.
 pub(crate) fn records(
     path: &Path,
@@ -210,35 +234,31 @@ pub(crate) fn records(
                 }
             }
             Ok(None) => return Ok(damage),
-            Err(error) => return Ok(damage.or(Some(Damage::End(error)))),
+            Err(error) => return Ok(damage.or(Some(error.into()))),
         }
     }
 }
 
 /// Gives `take` the kinds and the bytes of the records of a chunk.
-fn read_chunk(chunk: &[u8], mut take: impl FnMut(u8, &[u8])) -> Result<(), String> {
-    let damaged = |error: String| format!("a chunk is damaged and left out: {error}");
+fn read_chunk(chunk: &[u8], mut take: impl FnMut(u8, &[u8])) -> Result<(), RecordError> {
     match mcap::parse_record(op::CHUNK, chunk) {
         Ok(Record::Chunk { header, .. }) if header.uncompressed_size > MAX_RECORD_BYTES as u64 => {
-            let size = header.uncompressed_size;
-            return Err(damaged(format!("it has {size} bytes, more than {MAX_RECORD_BYTES}")));
+            return Err(RecordError::TooLarge(header.uncompressed_size));
         }
         Ok(_) => {}
-        Err(error) => return Err(damaged(error.to_string())),
+        Err(error) => return Err(RecordError::Mcap(error)),
     }
     let head = [&[op::CHUNK][..], &(chunk.len() as u64).to_le_bytes()].concat();
     let (mut reader, mut bytes) = (chunk_reader(), head.chain(chunk));
-    while next_of(&mut reader, &mut bytes, &mut take).map_err(damaged)?.is_some() {}
+    while next_of(&mut reader, &mut bytes, &mut take)?.is_some() {}
     Ok(())
 }
 
-/// An error of the reader for people: a program that was killed leaves a record without its length.
-fn said(error: McapError) -> String {
+/// An error of the reader: a program that was killed leaves a record without its length.
+fn fault_of(error: McapError) -> RecordError {
     match error {
-        McapError::RecordTooLarge { .. } | McapError::UnexpectedEof | McapError::UnexpectedEoc => {
-            "it ends in the middle of a record, as when a program is killed".to_owned()
-        }
-        other => other.to_string(),
+        McapError::RecordTooLarge { .. } | McapError::UnexpectedEof | McapError::UnexpectedEoc => RecordError::CutOff,
+        other => RecordError::Mcap(other),
     }
 }
 
@@ -247,11 +267,11 @@ fn next_of<T>(
     reader: &mut LinearReader,
     source: &mut impl Read,
     take: impl FnOnce(u8, &[u8]) -> T,
-) -> Result<Option<T>, String> {
+) -> Result<Option<T>, RecordError> {
     while let Some(event) = reader.next_event() {
-        match event.map_err(said)? {
+        match event.map_err(fault_of)? {
             LinearReadEvent::ReadRequest(length) => {
-                let read = source.read(reader.insert(length)).map_err(|e| e.to_string())?;
+                let read = source.read(reader.insert(length))?;
                 reader.notify_read(read);
             }
             LinearReadEvent::Record { data, opcode } => return Ok(Some(take(opcode, data))),
@@ -262,11 +282,8 @@ fn next_of<T>(
 
 /// A message as it was published: rosbag2 compresses each by itself with `compression_mode: message`. A message in CDR begins with a
 /// zero.
-fn unpacked(bytes: Vec<u8>) -> Result<Vec<u8>, String> {
-    if !bytes.starts_with(ZSTD) {
-        return Ok(bytes);
-    }
-    zstd::bulk::decompress(&bytes, MAX_MESSAGE_BYTES).map_err(|e| format!("a message that is compressed by zstd: {e}"))
+fn unpacked(bytes: Vec<u8>) -> std::io::Result<Vec<u8>> {
+    if bytes.starts_with(ZSTD) { zstd::bulk::decompress(&bytes, MAX_MESSAGE_BYTES) } else { Ok(bytes) }
 }
 
 /// Size of the largest message, bytes.
@@ -300,7 +317,8 @@ mod tests {
     fn a_message_that_is_compressed_by_itself_is_unpacked() {
         let message = [&[0, 1, 0, 0][..], &[7; 1000]].concat();
         let packed = zstd::bulk::compress(&message, 3).unwrap();
-        assert_eq!((unpacked(message.clone()), unpacked(packed.clone())), (Ok(message.clone()), Ok(message)));
+        assert_eq!(unpacked(message.clone()).unwrap(), message);
+        assert_eq!(unpacked(packed.clone()).unwrap(), message);
         assert!(unpacked(packed[..packed.len() / 2].to_vec()).is_err());
     }
 }

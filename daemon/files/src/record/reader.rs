@@ -43,7 +43,7 @@ pub fn read_record(path: &Path, mut take: impl FnMut(RecordedMessage)) -> Result
         match stream.next(|_| true) {
             Ok(Some(message)) => take(RecordedMessage(message)),
             Ok(None) => return Ok(damage),
-            Err(error) => damage = damage.or(Some(error)),
+            Err(error) => damage = damage.or_else(|| Some(error.to_string())),
         }
     }
 }

@@ -16,7 +16,7 @@ pub struct Stamps {
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 struct Moment {
     mission_s: f64,
-    /// Nanoseconds since 1970.
+    /// The time of day at which `mission_s` was reached, nanoseconds since 1970.
     nanos: i64,
 }
 

@@ -66,16 +66,14 @@ impl ModemFault {
     }
 
     /// Reads the words of a command, as in `freeze 60`.
-    pub fn parse(words: &[&str]) -> Result<Self, String> {
-        let wrong =
-            || format!("it takes one of {}, and seconds or an address behind those that have one", Self::names());
-        let (name, rest) = words.split_first().ok_or_else(wrong)?;
+    pub fn parse(words: &[&str]) -> Option<Self> {
+        let (name, rest) = words.split_first()?;
         let number = match rest {
             [] => None,
-            [number] => Some(number.parse().ok().filter(|n| (0.0..=MAX_S).contains(n)).ok_or_else(wrong)?),
-            _ => return Err(wrong()),
+            [number] => Some(number.parse().ok().filter(|n| (0.0..=MAX_S).contains(n))?),
+            _ => return None,
         };
-        Self::new(name, number).ok_or_else(wrong)
+        Self::new(name, number)
     }
 }
 

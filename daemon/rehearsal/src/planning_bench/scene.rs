@@ -156,17 +156,14 @@ impl Scene {
         Self::from_raster(name, &raster).map_err(|fault| UserError::file(path, fault))
     }
 
-    fn from_raster(name: String, raster: &LabelRaster) -> Result<Self, String> {
+    fn from_raster(name: String, raster: &LabelRaster) -> Result<Self, RasterFault> {
         let pixels = raster.width.max(raster.height).div_ceil(MAX_CELLS).max(1);
         let (columns, rows) = (raster.width / pixels, raster.height / pixels);
         if columns.min(rows) < MIN_CELLS {
-            let (width, height) = (raster.width, raster.height);
-            return Err(format!(
-                "{width} x {height} pixels: the shorter side must be a fifth of the longer, and {MIN_CELLS}"
-            ));
+            return Err(RasterFault::Small { width: raster.width, height: raster.height });
         }
         let Some(bare) = (1..=254).find(|label| !raster.labels.contains(label)) else {
-            return Err("it has 254 labels: at most 253 can be used".to_owned());
+            return Err(RasterFault::Full);
         };
         let mut labels = LabelGrid::default();
         let mut cells: BTreeMap<u8, usize> = BTreeMap::new();
@@ -178,11 +175,22 @@ impl Scene {
             *cells.entry(label).or_default() += 1;
             labels.set(Cell::new(x as i32, y as i32), label);
         }
-        let favoured = favoured(&cells, bare).ok_or("it has no label, only the value 0")?;
+        let favoured = favoured(&cells, bare).ok_or(RasterFault::Empty)?;
         let area = Area { west: 0.0, south: 0.0, east: columns as f64 * CELL_M, north: rows as f64 * CELL_M };
         let utility = Utility { exploration: EXPLORATION, weights: [(favoured, 100)].into(), ..Utility::default() };
         Ok(Self { name, labels, area, utility })
     }
+}
+
+/// Why a label map is no scene for a planner.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+enum RasterFault {
+    #[error("{width} x {height} pixels: the shorter side must be a fifth of the longer, and {MIN_CELLS}")]
+    Small { width: usize, height: usize },
+    #[error("it has 254 labels: at most 253 can be used")]
+    Full,
+    #[error("it has no label, only the value 0")]
+    Empty,
 }
 
 /// The most common label of a square of pixels, the lower one of two equally common ones.
@@ -229,7 +237,7 @@ mod tests {
 
     #[test]
     fn maps_that_are_no_scene_are_refused() {
-        let refused = |raster| Scene::from_raster(String::new(), &raster).unwrap_err();
+        let refused = |raster| Scene::from_raster(String::new(), &raster).unwrap_err().to_string();
         assert!(refused(LabelRaster::uniform(200, 30, 1)).starts_with("200 x 30 pixels"), "a cell has 2 x 2 pixels");
         assert!(refused(LabelRaster::uniform(60, 60, 0)).starts_with("it has no label"));
     }

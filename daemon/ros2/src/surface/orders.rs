@@ -26,6 +26,21 @@ pub(super) struct OrderTopics {
     abort: Inbox<Abort>,
 }
 
+/// Why a message is no order.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub(super) enum OrderFault {
+    #[error("its stamp is {seconds} s old; allowed: 60 s at most")]
+    Old { seconds: u64 },
+    #[error("its stamp is {seconds} s in the future; allowed: 60 s at most")]
+    Future { seconds: u64 },
+    #[error("it is in the frame {0:?}; allowed: {WORLD_FRAME:?}")]
+    Frame(String),
+    #[error("{0} keep-outs: it takes {MAX_OUTLINES} or fewer")]
+    KeepOuts(usize),
+    #[error("an outline of {0} vertices: it takes 3 to {MAX_VERTICES}")]
+    Vertices(usize),
+}
+
 /// What became of an order: the level of [`Event`], and one line for people.
 pub(super) type Outcome = (u8, String);
 
@@ -46,7 +61,7 @@ impl OrderTopics {
         let Some(giver) = &desk.giver else { return Vec::new() };
         let by = |request| ClientRequest { by: Some(giver.clone()), request };
         let mut outcomes = Vec::new();
-        let mut order = |name, header: &Header, request: Result<SurfaceRequest, String>| {
+        let mut order = |name, header: &Header, request: Result<SurfaceRequest, OrderFault>| {
             let reply = fresh(header).and(request).map(|request| desk.request(by(request)));
             outcomes.push(outcome(name, giver, reply));
         };
@@ -66,11 +81,11 @@ impl OrderTopics {
     }
 }
 
-fn fresh(header: &Header) -> Result<(), String> {
+fn fresh(header: &Header) -> Result<(), OrderFault> {
     check_age(header, nanos(SystemTime::now()))
 }
 
-fn outcome(name: &str, by: &Giver, reply: Result<Option<Reply>, String>) -> Outcome {
+fn outcome(name: &str, by: &Giver, reply: Result<Option<Reply>, OrderFault>) -> Outcome {
     let refused = |reason: &str| (Event::WARN, format!("{name} of {}: refused: {reason}", by.name()));
     match reply {
         Ok(Some(Reply::Accepted(order))) => {
@@ -81,7 +96,7 @@ fn outcome(name: &str, by: &Giver, reply: Result<Option<Reply>, String>) -> Outc
         Ok(Some(Reply::NotFound)) => refused("no such vehicle or label"),
         Ok(Some(_)) => refused("the surface gave another reply"),
         Ok(None) => refused("the surface is busy"),
-        Err(reason) => refused(&reason),
+        Err(fault) => refused(&fault.to_string()),
     }
 }
 
@@ -94,31 +109,30 @@ const MAX_VERTICES: usize = 34;
 
 /// Refuses an order with a stamp of the past or of the future; one without a stamp, as `ros2 topic pub` sends it, is taken
 /// for new.
-pub(super) fn check_age(header: &Header, now_nanos: i64) -> Result<(), String> {
+pub(super) fn check_age(header: &Header, now_nanos: i64) -> Result<(), OrderFault> {
     let stamp = header.stamp.nanos();
     let age = now_nanos.saturating_sub(stamp);
     if stamp == 0 || age.unsigned_abs() <= MAX_AGE_NANOS as u64 {
         return Ok(());
     }
     let seconds = age.unsigned_abs() / 1_000_000_000;
-    let of = if age > 0 { "old" } else { "in the future" };
-    Err(format!("its stamp is {seconds} s {of}; allowed: 60 s at most"))
+    Err(if age > 0 { OrderFault::Old { seconds } } else { OrderFault::Future { seconds } })
 }
 
-pub(super) fn utility(vehicle: u8, order: &Utility) -> Result<SurfaceRequest, String> {
+pub(super) fn utility(vehicle: u8, order: &Utility) -> Result<SurfaceRequest, OrderFault> {
     let weights = order.labels.iter().map(|l| (l.label, f64::from(l.weight))).collect();
     let terms = (f64::from(order.exploration), f64::from(order.curiosity));
     Ok(SurfaceRequest::Utility(vehicle, weights, terms))
 }
 
 /// An outline is in the world frame, which is also taken for an empty name.
-pub(super) fn fence(vehicle: u8, order: &Fence) -> Result<SurfaceRequest, String> {
+pub(super) fn fence(vehicle: u8, order: &Fence) -> Result<SurfaceRequest, OrderFault> {
     let frame = order.header.frame_id.as_str();
     if !["", WORLD_FRAME].contains(&frame) {
-        return Err(format!("it is in the frame {frame:?}; allowed: {WORLD_FRAME:?}"));
+        return Err(OrderFault::Frame(frame.to_owned()));
     }
     if order.keep_outs.len() > MAX_OUTLINES {
-        return Err(format!("{} keep-outs: it takes {MAX_OUTLINES} or fewer", order.keep_outs.len()));
+        return Err(OrderFault::KeepOuts(order.keep_outs.len()));
     }
     let point = &order.return_point;
     let whole = FenceOrder {
@@ -129,20 +143,20 @@ pub(super) fn fence(vehicle: u8, order: &Fence) -> Result<SurfaceRequest, String
     Ok(SurfaceRequest::Fence(vehicle, OrderChanges::whole(&whole)))
 }
 
-fn outline(polygon: &Polygon) -> Result<Vec<[f64; 2]>, String> {
+fn outline(polygon: &Polygon) -> Result<Vec<[f64; 2]>, OrderFault> {
     let points = &polygon.points;
     if points.len() > MAX_VERTICES {
-        return Err(format!("an outline of {} vertices: it takes 3 to {MAX_VERTICES}", points.len()));
+        return Err(OrderFault::Vertices(points.len()));
     }
     Ok(points.iter().map(|point| [f64::from(point.x), f64::from(point.y)]).collect())
 }
 
 /// Hold leaves an abort as it is; the end of an abort is an order of its own.
-pub(super) fn hold(vehicle: u8, order: &Hold) -> Result<SurfaceRequest, String> {
+pub(super) fn hold(vehicle: u8, order: &Hold) -> Result<SurfaceRequest, OrderFault> {
     Ok(SurfaceRequest::Hold(vehicle, order.hold))
 }
 
-pub(super) fn abort(vehicle: u8, order: &Abort) -> Result<SurfaceRequest, String> {
+pub(super) fn abort(vehicle: u8, order: &Abort) -> Result<SurfaceRequest, OrderFault> {
     Ok(SurfaceRequest::Constraints(vehicle, Constraints { hold: false, abort: order.abort }))
 }
 
@@ -191,9 +205,9 @@ mod tests {
         let now = 1_000_000_000_000;
         assert_eq!(check_age(&stamped(940), now), Ok(()));
         assert_eq!(check_age(&stamped(0), now), Ok(()), "without a stamp");
-        assert!(check_age(&stamped(900), now).unwrap_err().starts_with("its stamp is 100 s old"));
+        assert_eq!(check_age(&stamped(900), now), Err(OrderFault::Old { seconds: 100 }));
         assert_eq!(check_age(&stamped(1060), now), Ok(()), "of a clock that is a little ahead");
-        assert!(check_age(&stamped(1100), now).unwrap_err().starts_with("its stamp is 100 s in the future"));
+        assert_eq!(check_age(&stamped(1100), now), Err(OrderFault::Future { seconds: 100 }));
         assert!(check_age(&stamped(i32::MIN), now).is_err() && check_age(&stamped(i32::MAX), now).is_err());
         let framed = |frame: &str| Fence {
             header: Header { frame_id: frame.to_owned(), ..Header::default() },
@@ -201,8 +215,9 @@ mod tests {
             ..Fence::default()
         };
         assert!(fence(1, &framed("map")).is_ok());
-        assert_eq!(fence(1, &framed("odom")).unwrap_err(), "it is in the frame \"odom\"; allowed: \"map\"");
+        let refused = fence(1, &framed("odom")).unwrap_err();
+        assert_eq!(refused.to_string(), "it is in the frame \"odom\"; allowed: \"map\"");
         let many = Fence { keep_outs: vec![square(1.0); 16], ..Fence::default() };
-        assert!(fence(1, &many).unwrap_err().starts_with("16 keep-outs"));
+        assert_eq!(fence(1, &many), Err(OrderFault::KeepOuts(16)));
     }
 }

@@ -18,7 +18,7 @@ pub(super) struct FaultLog {
 struct Logged {
     at: Instant,
     count: u64,
-    /// Until the next line.
+    /// The shortest time from this line to the next one about the same kind of fault.
     interval: Duration,
 }
 

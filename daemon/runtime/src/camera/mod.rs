@@ -13,7 +13,9 @@ use scene_model::project::View;
 use scenecast_core::UserError;
 use scenecast_files::RecordedFrame;
 use scenecast_host::{CameraPose, MeasuredPose};
-use scenecast_sensors::{BitDepth, CameraTally, DepthError, DepthMessage, SensorPose, Sight};
+use scenecast_sensors::{
+    BitDepth, CalibrationError, CameraTally, DecodeError, DepthError, DepthMessage, SensorPose, Sight,
+};
 use scenecast_sources::Picture;
 use std::time::Duration;
 
@@ -68,7 +70,8 @@ impl CameraFrame {
                 Ok(ReadFrame { image, view, unusable_depth: None })
             }
             FramePicture::Received(received) => {
-                received.read().map_err(|error| UserError::Input(format!("the image at {:.1} s: {error}", self.t_s)))
+                let fault = |fault| UserError::Input(format!("the image at {:.1} s: {fault}", self.t_s));
+                received.read().map_err(fault)
             }
             FramePicture::Taken => Err(UserError::Failed("the image was already read".to_owned())),
         }
@@ -80,10 +83,19 @@ impl CameraFrame {
     }
 }
 
+/// Why a received image is not used.
+#[derive(Debug, thiserror::Error)]
+enum ImageFault {
+    #[error(transparent)]
+    Pixels(#[from] DecodeError),
+    #[error(transparent)]
+    Calibration(#[from] CalibrationError),
+}
+
 impl ReceivedImage {
     /// The image without distortion, and what it sees. Distances that cannot be used leave the floor flat.
-    fn read(self) -> Result<ReadFrame, String> {
-        let image = self.picture.into_rgb(self.bits).map_err(|error| error.to_string())?;
+    fn read(self) -> Result<ReadFrame, ImageFault> {
+        let image = self.picture.into_rgb(self.bits)?;
         let Some(sight) = self.sight else { return Ok(ReadFrame { image, view: None, unusable_depth: None }) };
         let camera = sight.calibration.camera();
         let read = self.depth.map(|(message, units_per_m)| message.read(&camera, image.dimensions(), units_per_m));
@@ -92,7 +104,7 @@ impl ReceivedImage {
             Some(Err(error)) => (None, Some(error)),
             None => (None, None),
         };
-        let (image, view) = sight.view(image, depth).map_err(|error| error.to_string())?;
+        let (image, view) = sight.view(image, depth)?;
         Ok(ReadFrame { image, view: Some(view), unusable_depth })
     }
 }

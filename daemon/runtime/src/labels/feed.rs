@@ -15,7 +15,7 @@ const LOOK_PAUSE: Duration = Duration::from_millis(200);
 const QUEUE: usize = 4;
 
 /// The answer to a source: whether its item was taken.
-pub(crate) type Answer = Result<(), String>;
+pub(crate) type Answer = Result<(), Refusal>;
 
 /// An item with its source.
 pub(crate) struct Arrived {

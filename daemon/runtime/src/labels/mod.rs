@@ -231,7 +231,7 @@ impl Worker {
             }
         }
         if let Some(answer) = answer {
-            let _ = answer.try_send(result.as_ref().map(drop).map_err(ToString::to_string));
+            let _ = answer.try_send(result.as_ref().map(drop).map_err(Clone::clone));
         }
         result.ok()
     }

@@ -73,12 +73,29 @@ pub(super) fn serve<C: Connection>(
     Ok(feed)
 }
 
+/// Why a connection does not go on.
+#[derive(Debug, thiserror::Error)]
+enum ConnectionEnd {
+    #[error("no byte went through it for {} s", IDLE.as_secs())]
+    Silent,
+    #[error(transparent)]
+    Broken(io::Error),
+    #[error("the vehicle's program ends")]
+    ProgramEnds,
+}
+
+impl From<io::Error> for ConnectionEnd {
+    fn from(error: io::Error) -> Self {
+        match error.kind() {
+            io::ErrorKind::WouldBlock | io::ErrorKind::TimedOut => Self::Silent,
+            _ => Self::Broken(error),
+        }
+    }
+}
+
 /// Takes the items of a connection until it ends, or until a header of it is refused.
-///
-/// # Errors
-/// Why the connection does not go on, for people.
-fn receive(mut stream: impl Connection, peer: &str, queue: &LabelQueue) -> Result<(), String> {
-    stream.set_timeouts(IDLE).map_err(|e| e.to_string())?;
+fn receive(mut stream: impl Connection, peer: &str, queue: &LabelQueue) -> Result<(), ConnectionEnd> {
+    stream.set_timeouts(IDLE)?;
     let (mut items, mut buffer) = (Stream::default(), vec![0; 1 << 16]);
     let mut end = Ok(());
     while !items.is_over() {
@@ -87,7 +104,7 @@ fn receive(mut stream: impl Connection, peer: &str, queue: &LabelQueue) -> Resul
             Ok(length) => length,
             Err(e) if e.kind() == io::ErrorKind::Interrupted => continue,
             Err(e) => {
-                end = Err(cause(&e));
+                end = Err(e.into());
                 break;
             }
         };
@@ -103,16 +120,6 @@ fn receive(mut stream: impl Connection, peer: &str, queue: &LabelQueue) -> Resul
     end
 }
 
-/// Why a connection gave no further bytes or took none.
-fn cause(error: &io::Error) -> String {
-    match error.kind() {
-        io::ErrorKind::WouldBlock | io::ErrorKind::TimedOut => {
-            format!("no byte went through it for {} s", IDLE.as_secs())
-        }
-        _ => error.to_string(),
-    }
-}
-
 /// Gives an item to the map and its answer to the connection. The answer comes when the map has taken or refused the item,
 /// however long that takes, so that it is never a wrong one.
 fn hand_over(
@@ -120,7 +127,7 @@ fn hand_over(
     peer: &str,
     queue: &LabelQueue,
     stream: &mut impl Write,
-) -> Result<(), String> {
+) -> Result<(), ConnectionEnd> {
     let (answer, answered) = sync_channel(1);
     let at = Some(Instant::now());
     let is_given = queue.push(Arrived { origin: peer.to_owned(), mark: None, at, item, answer: Some(answer) });
@@ -130,8 +137,8 @@ fn hand_over(
         Some(Err(why)) => format!("refused: {why}\n"),
         None => "refused: the vehicle's program ends\n".to_owned(),
     };
-    stream.write_all(line.as_bytes()).map_err(|e| cause(&e))?;
-    if answer.is_some() { Ok(()) } else { Err("the vehicle's program ends".to_owned()) }
+    stream.write_all(line.as_bytes())?;
+    answer.map(drop).ok_or(ConnectionEnd::ProgramEnds)
 }
 
 #[cfg(test)]
@@ -179,7 +186,7 @@ mod tests {
         let work = std::thread::spawn(move || receive(stream, "here", &queue));
         take(feed);
         let end = work.join().unwrap().unwrap_err();
-        (String::from_utf8(hears.recv().unwrap()).unwrap(), end)
+        (String::from_utf8(hears.recv().unwrap()).unwrap(), end.to_string())
     }
 
     #[test]

@@ -86,7 +86,7 @@ fn named(class: u8, name: &str) -> Item {
 fn an_image_without_a_pose_is_mapped_where_it_was_taken() {
     let mut bench = Bench::new("own-pose");
     let now = || Some(Instant::now());
-    let unknown = bench.give(image(ItemTime::Arrival), now()).unwrap_err();
+    let unknown = bench.give(image(ItemTime::Arrival), now()).unwrap_err().to_string();
     assert!(unknown.contains("does not know its own"), "{unknown}");
     for (x_m, t_s) in [(0.25, 90.0), (20.25, 94.0), (50.25, 98.0), (60.25, 100.0)] {
         bench.place(x_m, t_s);
@@ -104,7 +104,7 @@ fn an_image_without_a_pose_is_mapped_where_it_was_taken() {
     let late = [ItemTime::Mission(80.0), ItemTime::Mission(3e4), ItemTime::Age(50.0), ItemTime::Unix(1e9)];
     let late = late.into_iter().map(|time| (time, now()));
     for (late, at) in late.chain([(ItemTime::Arrival, None), (ItemTime::Mission(92.0), None)]) {
-        let refused = bench.give(image(late), at).unwrap_err();
+        let refused = bench.give(image(late), at).unwrap_err().to_string();
         assert!(refused.contains("does not know its own"), "{refused}");
     }
     bench.cut();

@@ -41,6 +41,7 @@ mod with {
     use scenecast_messages::builtin_interfaces::Time;
     use scenecast_ros2::{Inbox, Received, RosNode};
     use scenecast_sources::SensorNode;
+    use std::fmt::Display;
     use std::sync::Arc;
     use std::time::Duration;
 
@@ -54,7 +55,7 @@ mod with {
     pub(super) fn topic(node: Arc<SensorNode>, wanted: TopicFeed) -> Result<Feed, UserError> {
         let (queue, feed) = LabelQueue::new();
         let read = move || {
-            let open = || node.get().map_err(|e| e.to_string()).and_then(|node| open(&node, &wanted));
+            let open = || node.get().map_err(UserError::failed).and_then(|node| open(&node, &wanted));
             let reader = open_at_last(&queue, &wanted.topic, open, std::thread::sleep);
             reader(&queue);
         };
@@ -64,10 +65,10 @@ mod with {
     }
 
     /// Opens the topic, as often as that takes. Meanwhile the source is missing.
-    fn open_at_last<T>(
+    fn open_at_last<T, E: Display>(
         queue: &LabelQueue,
         topic: &RosName,
-        mut open: impl FnMut() -> Result<T, String>,
+        mut open: impl FnMut() -> Result<T, E>,
         pause: impl Fn(Duration),
     ) -> T {
         let mut is_logged = false;
@@ -86,20 +87,19 @@ mod with {
 
     type Reader = Box<dyn FnOnce(&LabelQueue)>;
 
-    fn open(node: &RosNode, wanted: &TopicFeed) -> Result<Reader, String> {
-        let failed = |e: UserError| e.to_string();
+    fn open(node: &RosNode, wanted: &TopicFeed) -> Result<Reader, UserError> {
         let TopicFeed { topic, message, source, frame } = wanted.clone();
         let origin = topic.to_string();
         Ok(match message {
             LabelMessage::Image => {
-                let inboxes = vec![node.subscribe_images(&topic).map_err(failed)?];
+                let inboxes = vec![node.subscribe_images(&topic)?];
                 let topic = Topic { origin, inboxes, is_overtaken_lost: true, echoes: Echoes::default() };
                 Box::new(move |queue| topic.read(queue, |image| (&image.header.stamp, vec![item_of_image(image)])))
             }
             LabelMessage::OccupancyGrid => {
                 let inboxes = vec![
-                    node.subscribe_label_map(&topic).map_err(failed)?,
-                    node.subscribe(&topic, scenecast_ros2::Qos::Reliable(1), 1).map_err(failed)?,
+                    node.subscribe_label_map(&topic)?,
+                    node.subscribe(&topic, scenecast_ros2::Qos::Reliable(1), 1)?,
                 ];
                 let name = origin.clone();
                 let topic = Topic { origin, inboxes, is_overtaken_lost: false, echoes: Echoes::default() };
@@ -115,8 +115,8 @@ mod with {
             }
             LabelMessage::GridMap => {
                 let inboxes = vec![
-                    node.subscribe_grid_map(&topic).map_err(failed)?,
-                    node.subscribe(&topic, scenecast_ros2::Qos::Reliable(1), 1).map_err(failed)?,
+                    node.subscribe_grid_map(&topic)?,
+                    node.subscribe(&topic, scenecast_ros2::Qos::Reliable(1), 1)?,
                 ];
                 let topic = Topic { origin, inboxes, is_overtaken_lost: false, echoes: Echoes::default() };
                 Box::new(move |queue| topic.read(queue, |map| (&map.header.stamp, bands_of_grid_map(map, &frame))))
@@ -144,12 +144,12 @@ mod with {
                 for (inbox, counted) in self.inboxes.iter().zip(&mut counted) {
                     let now = (inbox.malformed(), if self.is_overtaken_lost { inbox.dropped() } else { 0 });
                     let before = std::mem::replace(counted, now);
-                    for (count, text) in [
-                        (now.0 - before.0, "messages have another type than the topic"),
-                        (now.1 - before.1, "messages were dropped: newer ones came before they were read"),
-                    ] {
-                        let refusal = Err(Refusal::Message(format!("{count} {text}")));
-                        if count > 0 && !queue.push(arrived(&self.origin, None, refusal)) {
+                    let counts = [
+                        (now.0 - before.0, Refusal::OtherType as fn(u64) -> Refusal),
+                        (now.1 - before.1, Refusal::Overtaken),
+                    ];
+                    for (count, refusal) in counts {
+                        if count > 0 && !queue.push(arrived(&self.origin, None, Err(refusal(count)))) {
                             return;
                         }
                     }
@@ -183,7 +183,7 @@ mod with {
             let (mut tries, pauses) = (0, RefCell::new(Vec::new()));
             let open = || {
                 tries += 1;
-                if tries < 3 { Err("the node does not start".to_owned()) } else { Ok(tries) }
+                if tries < 3 { Err("the node does not start") } else { Ok(tries) }
             };
             let pause = |time| pauses.borrow_mut().push((time, feed.is_missing()));
             assert_eq!(open_at_last(&queue, &scenecast_ros2::topic("/labels").unwrap(), open, pause), 3);

@@ -110,7 +110,7 @@ impl UdpPeer {
         }
     }
 
-    /// Where datagrams go.
+    /// The addresses that every datagram goes to: the peer's, once known, then the last other senders of empty ones.
     fn receivers(&self) -> impl Iterator<Item = SocketAddr> {
         let others = self.knockers.iter().copied().filter(|knocker| Some(*knocker) != self.address);
         self.address.into_iter().chain(others)

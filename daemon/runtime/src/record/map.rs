@@ -11,7 +11,7 @@ use std::sync::Arc;
 /// What a record has of a map.
 #[derive(Default)]
 pub(super) struct RecordedMap {
-    /// Epoch and version.
+    /// Epoch and version of the map that was recorded last; `None` before the first one.
     pub(super) key: Option<(u8, u64)>,
     shown: LabelGrid,
     digest: MapDigest,

@@ -161,7 +161,7 @@ fn settings_entry(settings: &str, stamps: &Stamps) -> RecordEntry {
     entry("settings".to_owned(), stamps, &Text { data: settings.to_owned() })
 }
 
-/// That messages are missing.
+/// The event that `count` messages of the record were left out because the disk was too slow.
 fn gap_entry(count: u64, stamps: &Stamps) -> RecordEntry {
     let text = format!("{count} messages of this record were left out: the disk was too slow");
     let (header, source) = (header(stamps.now(), ""), "record".to_owned());

@@ -57,7 +57,7 @@ impl SurfaceRecord {
         self.record.as_ref().map(|record| record.dir.as_path())
     }
 
-    /// Records what has changed.
+    /// Records what has changed since the last call; the whole state after a new file was begun or messages were left out.
     pub fn observe(&mut self, surface: &Surface, snapshot: &Snapshot) {
         let Some(record) = &mut self.record else { return };
         let stamps = &snapshot.stamps;
@@ -65,7 +65,7 @@ impl SurfaceRecord {
         record.put(self.recorder.observe(record.state_number(), surface, snapshot, stamps), stamps);
     }
 
-    /// Records a frame.
+    /// Records a frame that was sent, received or dropped; other events are passed over.
     pub fn handle_frame(&mut self, event: &FrameEvent, stamps: &Stamps) {
         let Some(record) = &mut self.record else { return };
         record.put(self.recorder.frame(event, stamps), stamps);
@@ -90,7 +90,7 @@ pub struct SurfaceRecorder {
     last_state: Option<(Bytes, Stamps)>,
     /// The last entry of the surface's log that was recorded.
     log: u64,
-    /// By address.
+    /// The name and the layers of each vehicle, by its address.
     named: BTreeMap<u8, Named>,
     /// Frames to the vehicle may carry a next key.
     hides_keys: bool,
@@ -102,7 +102,7 @@ pub struct SurfaceRecorder {
 #[derive(Default)]
 struct RecordedVehicle {
     map: RecordedMap,
-    /// By name.
+    /// What the record has of each layer, by the name of the layer.
     layers: BTreeMap<String, RecordedLayer>,
     tree: Option<(u8, MapLabelTree)>,
     /// Version and state by slot.

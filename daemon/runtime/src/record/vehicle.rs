@@ -52,7 +52,7 @@ impl VehicleRecord {
         self.record.as_ref().map(|record| record.dir.as_path())
     }
 
-    /// Records what has changed.
+    /// Records what has changed since the last call; the whole state after a new file was begun or messages were left out.
     pub fn observe(&mut self, vehicle: &Vehicle, now: Instant) {
         let Some(record) = &mut self.record else { return };
         self.stamps.observe(now.as_secs_f64(), unix_nanos());
@@ -86,7 +86,7 @@ impl VehicleRecord {
     }
 }
 
-/// Records the vehicle.
+/// Makes the messages of a vehicle's record from its state and from the events of its host.
 pub struct VehicleRecorder {
     named: Named,
     cell_m: f64,

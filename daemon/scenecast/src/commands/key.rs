@@ -1,7 +1,7 @@
 //! `scenecast key`
 
 use clap::{Args, Subcommand};
-use scenecast_core::{Principal, Role, UserError, errln, outln};
+use scenecast_core::{Principal, Role, Takes, UserError, errln, outln};
 use scenecast_protocol::seal::{HeldKey, KeyFile, MissionKey, VehicleKey};
 use std::fs::OpenOptions;
 use std::io::{ErrorKind, Write};
@@ -91,8 +91,8 @@ Example: scenecast key token --out console.token
 
 console.token_file may have a line of each person: cat anna.token bob.token > console.tokens";
 
-fn role(text: &str) -> Result<Role, String> {
-    Role::from_name(text).ok_or_else(|| "expected viewer, operator or administrator".to_owned())
+fn role(text: &str) -> Result<Role, Takes> {
+    Role::from_name(text).ok_or(Takes("expected viewer, operator or administrator"))
 }
 
 /// Print whose key a file has, and the fingerprint of the mission key, which is equal at all ends of a mission.

@@ -2,11 +2,11 @@
 
 use super::LabelledMap;
 use super::run_report::around;
-use super::words_file::{Lines, number};
+use super::words_file::{LineFault, Lines};
 use image::{GrayImage, Luma};
 use scene_model::topics::{FlatCell, coord_of};
 use scenecast_core::UserError;
-use scenecast_files::read_classes;
+use scenecast_files::{finite_number, read_classes};
 use scenecast_protocol::map::Rect;
 use scenecast_scoring::{Annotations, LabelGrid, SceneScore, score};
 use std::collections::BTreeMap;
@@ -159,13 +159,14 @@ impl Annotated {
     }
 }
 
-fn parse(text: &str) -> Result<([f64; 3], &str), String> {
+fn parse(text: &str) -> Result<([f64; 3], &str), LineFault> {
     let mut fields = text.split(',');
-    let at = [number(fields.next(), "x")?, number(fields.next(), "y")?, number(fields.next(), "z")?];
+    let at =
+        [finite_number(fields.next(), "x")?, finite_number(fields.next(), "y")?, finite_number(fields.next(), "z")?];
     match (fields.next().map(str::trim), fields.next()) {
         (Some(class), None) if !class.is_empty() => Ok((at, class)),
-        (Some(_), Some(_)) => Err("more than x,y,z,class".to_owned()),
-        _ => Err("class is missing".to_owned()),
+        (Some(_), Some(_)) => Err(LineFault::Long),
+        _ => Err(LineFault::NoClass),
     }
 }
 

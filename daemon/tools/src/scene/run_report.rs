@@ -135,13 +135,21 @@ fn peak_in(status: &str) -> Option<u64> {
 /// Maximum number of cells in the rectangle around a map.
 const MAX_CELLS: u64 = 1 << 26;
 
+/// A map whose cells lie too far apart for an image.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "the map would reach over {width} x {height} cells, more than {MAX_CELLS}: a position far off, or --cell-size too small"
+)]
+pub(super) struct LargeExtent {
+    width: u64,
+    height: u64,
+}
+
 /// The rectangle around cells from (west, south) to (east, north); an error if it is too large for an image.
-pub(super) fn rectangle(west: i64, south: i64, east: i64, north: i64) -> Result<Rect, String> {
+pub(super) fn rectangle(west: i64, south: i64, east: i64, north: i64) -> Result<Rect, LargeExtent> {
     let (width, height) = ((east - west + 1) as u64, (north - south + 1) as u64);
     if width.saturating_mul(height) > MAX_CELLS {
-        return Err(format!(
-            "the map would reach over {width} x {height} cells, more than {MAX_CELLS}: a position far off, or --cell-size too small"
-        ));
+        return Err(LargeExtent { width, height });
     }
     Ok(Rect { x: west as i32, y: south as i32, width: width as u32, height: height as u32 })
 }
@@ -154,7 +162,7 @@ pub(super) fn around(map: &[FlatCell]) -> Result<Rect, UserError> {
         limits = (limits.0.min(cell.x), limits.1.min(cell.y), limits.2.max(cell.x), limits.3.max(cell.y));
     }
     let (west, south, east, north) = limits;
-    rectangle(west.into(), south.into(), east.into(), north.into()).map_err(UserError::Input)
+    rectangle(west.into(), south.into(), east.into(), north.into()).map_err(UserError::input)
 }
 
 #[cfg(test)]

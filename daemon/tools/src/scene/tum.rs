@@ -4,7 +4,7 @@ use super::{Sighting, WordSource};
 use image::RgbImage;
 use scene_model::project::PinholeCamera;
 use scene_model::words::WordExtractor;
-use scenecast_core::UserError;
+use scenecast_core::{Takes, UserError};
 use scenecast_files::{TumFolder, TumFrame, read_depth, read_image, tum_camera};
 use std::path::Path;
 
@@ -16,13 +16,13 @@ const CELL_PX: (f32, f32) = (4.0, 200.0);
 pub(crate) struct Intrinsics(pub(crate) [f64; 4]);
 
 impl std::str::FromStr for Intrinsics {
-    type Err = String;
+    type Err = Takes;
 
-    fn from_str(text: &str) -> Result<Self, String> {
+    fn from_str(text: &str) -> Result<Self, Takes> {
         let numbers: Vec<f64> = text.split(',').filter_map(|field| field.trim().parse().ok()).collect();
         let four: Option<[f64; 4]> = numbers.try_into().ok().filter(|_| text.split(',').count() == 4);
         let four = four.filter(|all| all.iter().all(|n: &f64| n.is_finite()) && all[0] > 0.0 && all[1] > 0.0);
-        four.map(Self).ok_or_else(|| "it takes FX,FY,CX,CY in pixels, the focal lengths above 0".to_owned())
+        four.map(Self).ok_or(Takes("it takes FX,FY,CX,CY in pixels, the focal lengths above 0"))
     }
 }
 
@@ -37,7 +37,7 @@ pub(crate) struct Tum {
     cell_m: f64,
     /// About poses that are left out, and images without depth or pose.
     folder_notes: Vec<String>,
-    unreadable: Vec<String>,
+    unreadable: Vec<UserError>,
     words_without_depth: u64,
 }
 
@@ -67,11 +67,11 @@ impl Tum {
         })
     }
 
-    fn see(&mut self, frame: &TumFrame) -> Result<Vec<scene_model::project::Observation>, String> {
-        let image = read_image(&frame.image).map_err(|e| e.to_string())?.to_rgb8();
-        let depth = read_depth(&frame.depth, self.depth_scale).map_err(|e| e.to_string())?;
+    fn see(&mut self, frame: &TumFrame) -> Result<Vec<scene_model::project::Observation>, UserError> {
+        let image = read_image(&frame.image)?.to_rgb8();
+        let depth = read_depth(&frame.depth, self.depth_scale)?;
         let camera = self.camera(&image);
-        let metres = depth.median_m().ok_or_else(|| format!("{}: no depth reading", frame.depth.display()))?;
+        let metres = depth.median_m().ok_or_else(|| UserError::file(&frame.depth, "no depth reading"))?;
         let cell_px = (camera.fx * self.cell_m / metres) as f32;
         let words = self.extractor.extract(&image, cell_px.clamp(CELL_PX.0, CELL_PX.1));
         let projected = camera.project(image.dimensions(), &depth, &frame.pose, &words);

@@ -1,10 +1,11 @@
 //! Words from a file: lines `t,x,y,z,w1,w2,...`, read one by one with bounded memory.
 
-use super::run_report::rectangle;
+use super::run_report::{LargeExtent, rectangle};
 use super::{Sighting, WordSource};
 use scene_model::project::Observation;
 use scene_model::topics::coord_of;
 use scenecast_core::UserError;
+use scenecast_files::{NumberFault, finite_number};
 use std::fmt::Display;
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read, Seek, SeekFrom};
@@ -59,9 +60,10 @@ impl WordsFile {
             }
             let parsed = parse(line.text, number == begun, &mut seen).and_then(|t_s| {
                 if let Some(word) = seen.iter().map(|o| o.word).find(|&word| word >= most) {
-                    let whose = if vocabulary.is_some() { "--vocabulary-size is" } else { "ids go up to" };
-                    let limit = if vocabulary.is_some() { most } else { most - 1 };
-                    return Err(format!("word id {word}: {whose} {limit}"));
+                    return Err(match vocabulary {
+                        Some(size) => LineFault::NotInVocabulary { word, size },
+                        None => LineFault::HighWordId { word, most: most - 1 },
+                    });
                 }
                 seen.first().map_or(Ok(()), |o| extent.take(o))?;
                 Ok(t_s)
@@ -134,18 +136,39 @@ impl WordSource for WordsFile {
     }
 }
 
+/// What is wrong in a line of words or of poses.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub(super) enum LineFault {
+    #[error(transparent)]
+    Number(#[from] NumberFault),
+    #[error("class is missing")]
+    NoClass,
+    #[error("more than x,y,z,class")]
+    Long,
+    #[error("word id {0:?} is no whole number from 0")]
+    WordId(String),
+    #[error("word id {word}: --vocabulary-size is {size}")]
+    NotInVocabulary { word: u32, size: u32 },
+    #[error("word id {word}: ids go up to {most}")]
+    HighWordId { word: u32, most: u32 },
+    #[error("the position is more than 2^30 cells from the origin")]
+    Far,
+    #[error(transparent)]
+    Extent(#[from] LargeExtent),
+}
+
 /// Reads a line; `None` if it names the columns.
-fn parse(text: &str, first: bool, seen: &mut Vec<Observation>) -> Result<Option<f64>, String> {
+fn parse(text: &str, first: bool, seen: &mut Vec<Observation>) -> Result<Option<f64>, LineFault> {
     seen.clear();
     let mut fields = text.split(',');
     if first && text.starts_with('t') {
         return Ok(None);
     }
-    let t_s = number(fields.next(), "t")?;
-    let (x, y) = (number(fields.next(), "x")?, number(fields.next(), "y")?);
-    let z = number(fields.next(), "z")?;
+    let t_s = finite_number(fields.next(), "t")?;
+    let (x, y) = (finite_number(fields.next(), "x")?, finite_number(fields.next(), "y")?);
+    let z = finite_number(fields.next(), "z")?;
     for field in fields {
-        let word = field.trim().parse().map_err(|_| format!("word id {:?} is no whole number from 0", field.trim()))?;
+        let word = field.trim().parse().map_err(|_| LineFault::WordId(field.trim().to_owned()))?;
         seen.push(Observation { word, x, y, z });
     }
     Ok(Some(t_s))
@@ -162,9 +185,9 @@ impl Extent {
         Self { cell_m, limits: None }
     }
 
-    fn take(&mut self, seen: &Observation) -> Result<(), String> {
+    fn take(&mut self, seen: &Observation) -> Result<(), LineFault> {
         let coord = coord_of([seen.x, seen.y, seen.z], self.cell_m);
-        let [x, y, _] = coord.ok_or("the position is more than 2^30 cells from the origin")?.map(i64::from);
+        let [x, y, _] = coord.ok_or(LineFault::Far)?.map(i64::from);
         let [west, south, east, north] = self.limits.unwrap_or([x, y, x, y]);
         let limits = [west.min(x), south.min(y), east.max(x), north.max(y)];
         rectangle(limits[0], limits[1], limits[2], limits[3])?;
@@ -253,17 +276,6 @@ impl Lines {
                 }
             }
         }
-    }
-}
-
-/// Reads a finite number; errors name the field.
-pub(super) fn number(field: Option<&str>, name: &str) -> Result<f64, String> {
-    let text = field.map(str::trim).ok_or_else(|| format!("{name} is missing"))?;
-    let value: Option<f64> = text.parse().ok();
-    match value {
-        Some(value) if value.is_finite() => Ok(value),
-        Some(_) => Err(format!("{name} = {text}: it takes a finite number")),
-        None => Err(format!("{name} = {text:?} is no number")),
     }
 }
 

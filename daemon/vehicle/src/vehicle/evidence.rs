@@ -12,7 +12,7 @@ use std::sync::Arc;
 pub struct MappedFrame {
     /// Mission time at which it was taken, seconds.
     pub taken_s: f64,
-    /// Where the camera was.
+    /// The pose of the camera in the vehicle's map frame: by registration, where that is on.
     pub camera: Pose,
 }
 

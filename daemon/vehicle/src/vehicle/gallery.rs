@@ -363,7 +363,7 @@ mod tests {
     }
 
     #[test]
-    fn a_request_ends_a_larger_image_and_the_smaller_one_stays_known() {
+    fn a_request_ends_a_larger_image_and_keeps_the_smaller_one() {
         let (mut gallery, mut link) = (Gallery::default(), link());
         gallery.set_exemplars(SharedExemplars::new([(1, vec![patch(128, 1.0)]), (2, vec![patch(64, 3.0)])].into()));
         assert_eq!(sent(&mut gallery, &mut link, 2).len(), 2);

@@ -208,7 +208,7 @@ proptest! {
 }
 
 #[test]
-fn a_survey_goes_on_where_the_autopilot_stops_before_its_waypoints() {
+fn a_survey_goes_on_where_the_autopilot_stops_short() {
     for (stops_before_m, goes_on) in [(0.0, true), (0.7, true), (1.8, true), (4.0, false)] {
         let mut sea = Sea { stops_before_m, ..Sea::new(0.0, 1) };
         let mut metres = 0.0;

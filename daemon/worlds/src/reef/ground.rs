@@ -94,7 +94,7 @@ impl Palette {
 #[derive(Clone, Debug)]
 pub(super) struct Ground {
     pub noise: Noise,
-    /// Direction across the ripples.
+    /// The direction across the ripples, as a unit vector.
     turn: [f32; 2],
     /// Where this world's patterns begin, metres.
     shift: [f32; 2],

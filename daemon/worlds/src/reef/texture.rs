@@ -155,7 +155,7 @@ impl Pieces {
 struct Piece {
     x: f32,
     y: f32,
-    /// Texels.
+    /// Half of its width across the long axis, texels.
     radius: f32,
     aspect: f32,
     turn: [f32; 2],

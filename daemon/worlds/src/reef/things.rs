@@ -39,7 +39,7 @@ pub(super) enum Form {
 pub(super) struct Thing {
     pub x: f32,
     pub y: f32,
-    /// Mean radius, metres.
+    /// Mean radius across the long axis, metres; the outline varies around it.
     pub radius_m: f32,
     /// Height of the floor under its middle.
     pub base_m: f32,

@@ -107,7 +107,7 @@ impl<T> LinkPair<T> {
         });
         if refusal.is_some() {
             if own.is_none() {
-                (self.refused, self.owes_hello) = (Some((peer, generation)), true);
+                (self.callers.refused, self.owes_hello) = (Some((peer, generation)), true);
             }
             return Ok(Inbound { refusal, ..Inbound::empty(false, frame) });
         }
@@ -118,19 +118,19 @@ impl<T> LinkPair<T> {
                 // Without a key, a forged frame may have ended the run. If the hello is old indeed, it has no effect: no frame
                 // of that run is sealed to the run that it is offered.
                 let may_be_forged = self.authenticity.is_none();
-                let accepts_ended = may_be_forged && self.ended_hellos + 1 >= Self::ENDED_HELLOS;
+                let accepts_ended = may_be_forged && self.callers.ended_hellos + 1 >= Self::ENDED_HELLOS;
                 self.handshake.handle_call(peer, introduction, accepts_ended, may_be_forged, key)
             }
         };
         if outcome == HandshakeOutcome::Retired {
-            self.ended_hellos += 1;
+            self.callers.ended_hellos += 1;
             let other = introduction.filter(|caller| own.is_none() && self.handshake.other_holder(caller).is_some());
             if other.is_some() && self.authenticity.is_some() {
                 // It takes over, in a run that has ended here: it learns that, and begins another one.
-                (self.refused, self.owes_hello) = (Some((peer, generation)), true);
+                (self.callers.refused, self.owes_hello) = (Some((peer, generation)), true);
                 return Ok(Inbound { refusal: other, ..Inbound::empty(false, frame) });
             }
-            self.retired_caller = other;
+            self.callers.retired = other;
             // Where frames of the vehicle have no tag, a forged one may have proven a false run.
             self.strays.count += u32::from(own.is_some() && !self.is_keyed(self.direction_in()));
             return Err(DropReason::OldSession);
@@ -139,13 +139,13 @@ impl<T> LinkPair<T> {
             // A caller that is refused, or of an ended run, says nothing about the surface that holds the vehicle.
             self.note_introduction(introduction);
         }
-        self.ended_hellos = 0;
+        self.callers.ended_hellos = 0;
         let is_new = outcome == HandshakeOutcome::New;
         // Without a key, a surface that knows a forged run of the vehicle hears nothing but that: it learns the true one again.
-        self.known_hellos += u32::from(!is_new && own.is_none() && self.authenticity.is_none());
-        let names_run = self.known_hellos >= Self::KNOWN_HELLOS;
+        self.callers.known_hellos += u32::from(!is_new && own.is_none() && self.authenticity.is_none());
+        let names_run = self.callers.known_hellos >= Self::KNOWN_HELLOS;
         if names_run {
-            self.known_hellos = 0;
+            self.callers.known_hellos = 0;
             self.handshake.withdraw_offer();
         }
         self.owes_hello = own.is_none() && (is_new || names_run);
@@ -182,7 +182,7 @@ impl<T> LinkPair<T> {
             return Err(DropReason::Undecodable);
         }
         self.mismatch.handle_accepted();
-        (self.ended_hellos, self.known_hellos) = (0, 0);
+        (self.callers.ended_hellos, self.callers.known_hellos) = (0, 0);
         if let Some(index) = offer {
             self.handshake.accept_offered(index);
             if self.us != Address::SURFACE {
@@ -192,7 +192,7 @@ impl<T> LinkPair<T> {
         }
         // Another surface waits for the hello that it is owed, whatever the one that holds the vehicle sends meanwhile.
         let calling = self.handshake.offered().is_some_and(|r| self.handshake.other_holder(&r.introduction).is_some());
-        self.owes_hello &= self.us != Address::SURFACE && (self.refused.is_some() || calling);
+        self.owes_hello &= self.us != Address::SURFACE && (self.callers.refused.is_some() || calling);
         self.owes_hello |= self.handshake.is_leaving();
         if self.handshake.is_leaving() {
             self.strays = Strays::default();
@@ -220,7 +220,7 @@ impl<T> LinkPair<T> {
 
     /// At the vehicle: whether another surface holds it against this caller. Without a key, everybody could.
     fn refuses(&self, caller: &Introduction) -> bool {
-        let is_held = self.silence.is_some_and(|silence| silence < HOLDER_SILENCE);
+        let is_held = self.callers.silence.is_some_and(|silence| silence < HOLDER_SILENCE);
         is_held && !caller.takes_over && self.is_authentic() && self.handshake.other_holder(caller).is_some()
     }
 
@@ -237,7 +237,7 @@ impl<T> LinkPair<T> {
             && self.handshake.other_holder(&introduction).is_some()
         {
             let generation = self.handshake.run().map_or(Generation::Present, |run| run.generation);
-            (self.refused, self.owes_hello) = (Some((identity, generation)), true);
+            (self.callers.refused, self.owes_hello) = (Some((identity, generation)), true);
         }
         sender.is_some()
     }

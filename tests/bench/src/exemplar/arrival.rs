@@ -177,9 +177,9 @@ impl ExemplarBench {
     /// Requests an image; its seconds and bytes, or `None` if it did not arrive.
     pub(super) fn get(&mut self, label: u8, kind: RequestKind) -> Result<Option<(f64, usize)>, UserError> {
         let asked = self.now;
-        self.surface.surface_mut().request_exemplar(self.address, label, kind, asked).map_err(UserError::Failed)?;
+        self.surface.surface_mut().request_exemplar(self.address, label, kind, asked).map_err(UserError::failed)?;
         if !self.run_until(asked + GIVE_UP_TIMEOUT, |w| w.is_met(label)) {
-            self.surface.surface_mut().cancel_exemplar(self.address, label, self.now).map_err(UserError::Failed)?;
+            self.surface.surface_mut().cancel_exemplar(self.address, label, self.now).map_err(UserError::failed)?;
             return Ok(None);
         }
         let bytes = self.page(label).and_then(|page| page.exemplar(None)).map(|p| p.sent_bytes);

@@ -100,7 +100,7 @@ fn a_vehicle_without_an_image_reports_so_and_sends_it_later() {
 }
 
 #[test]
-fn spare_capacity_shows_every_label_first_and_yields_to_requests() {
+fn spare_capacity_shows_each_label_first_and_yields_to_requests() {
     let mut bench = bench(IDLE, 4);
     background(&mut bench, &["exemplars"]);
     let until = bench.now + std::time::Duration::from_secs(120);

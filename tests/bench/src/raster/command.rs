@@ -2,7 +2,7 @@
 
 use super::{AnnotatedFigures, Pattern, RasterFigures, RasterSetting, annotated, changes, whole};
 use clap::Args;
-use scenecast_core::UserError;
+use scenecast_core::{Takes, UserError};
 use scenecast_protocol::mac::Access;
 use scenecast_tools::Progress;
 use serde_json::json;
@@ -52,9 +52,8 @@ pub(crate) struct RasterBench {
     unknown: Option<u8>,
 }
 
-fn share(text: &str) -> Result<f64, String> {
-    let share: f64 = text.parse().map_err(|_| "not a number".to_owned())?;
-    (0.0..=0.9).contains(&share).then_some(share).ok_or("the range is 0 to 0.9".to_owned())
+fn share(text: &str) -> Result<f64, Takes> {
+    text.parse().ok().filter(|share| (0.0..=0.9).contains(share)).ok_or(Takes("the range is 0 to 0.9"))
 }
 
 impl RasterBench {

@@ -95,7 +95,7 @@ fn mode(vehicle: &VehicleState) -> Option<ReportedMode> {
     vehicle.status.as_ref().map(|status| status.mode)
 }
 
-/// The limits in force.
+/// The limits that the vehicle reported last as in force; the default ones where they are unknown.
 fn limits(vehicle: &VehicleState) -> LimitsOrder {
     vehicle.orders.limits_in_force.as_ref().map(|applied| applied.order.clone()).unwrap_or_default()
 }

@@ -2,7 +2,7 @@
 
 use super::{WideFigures, WideSetting, wide};
 use clap::Args;
-use scenecast_core::UserError;
+use scenecast_core::{Takes, UserError};
 use scenecast_files::write_whole;
 use scenecast_tools::Progress;
 use std::path::PathBuf;
@@ -37,9 +37,8 @@ pub(crate) struct WideBench {
     out: Option<PathBuf>,
 }
 
-fn side(text: &str) -> Result<f64, String> {
-    let side: f64 = text.parse().map_err(|_| "not a number".to_owned())?;
-    (100.0..=50_000.0).contains(&side).then_some(side).ok_or("the range is 100 to 50000".to_owned())
+fn side(text: &str) -> Result<f64, Takes> {
+    text.parse().ok().filter(|side| (100.0..=50_000.0).contains(side)).ok_or(Takes("the range is 100 to 50000"))
 }
 
 impl WideBench {

@@ -178,7 +178,7 @@ fn export(cells: &MapCells, format: MapFormat, keep: &mut Keep<'_>) -> Result<Ex
     if let Ok(bytes) = &made {
         keep(format.extension(), bytes)?;
     }
-    Ok(ExportCost { format: format.extension(), cpu_ms, bytes, refused: made.err() })
+    Ok(ExportCost { format: format.extension(), cpu_ms, bytes, refused: made.err().map(|refusal| refusal.to_string()) })
 }
 
 fn median(costs: &[UpdateCost]) -> UpdateCost {

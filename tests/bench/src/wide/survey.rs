@@ -58,10 +58,10 @@ impl WideSurvey {
         };
         let mut link = VehicleLink::new(end, Codec::Auto, seed, SlotInboxState::default(), now);
         let mut surface = scenecast_surface::assemble(config, None, TuningTable::shipped(), modem, seed + 1, now)?;
-        surface.set_budget(BIT_RATE_BPS, None, None, now).map_err(UserError::Failed)?;
+        surface.set_budget(BIT_RATE_BPS, None, None, now).map_err(UserError::failed)?;
         if setting.depth {
             link.set_background(
-                BackgroundOrder::from_names(&["depth".to_owned()], &surface.layers()).map_err(UserError::Failed)?,
+                BackgroundOrder::from_names(&["depth".to_owned()], &surface.layers()).map_err(UserError::failed)?,
             );
             link.add_layer(LayerSource::new(
                 LayerId::DEPTH,

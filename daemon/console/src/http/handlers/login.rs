@@ -38,7 +38,7 @@ pub(in crate::http) async fn login(
 ) -> Response {
     let token = match login {
         Ok(Form(login)) => Zeroizing::new(login.token),
-        Err(e) => return error(e.status(), &e.body_text()),
+        Err(e) => return error(e.status(), e.body_text()),
     };
     let Some(principal) = shared.access.principal_of_token(token.trim()) else {
         let message = "<p class=\"warn\" role=\"alert\">This is not the token.</p>";

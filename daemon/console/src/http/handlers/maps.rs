@@ -61,7 +61,7 @@ pub(in crate::http) async fn map(
 ) -> Response {
     let region = match region(&query) {
         Ok(region) => region,
-        Err(reason) => return error(StatusCode::UNPROCESSABLE_ENTITY, &reason),
+        Err(reason) => return error(StatusCode::UNPROCESSABLE_ENTITY, reason),
     };
     let cached = match latest(&shared, id).await {
         Ok(cached) => cached,
@@ -74,7 +74,7 @@ pub(in crate::http) async fn map(
     let made = tokio::task::spawn_blocking(move || cached.map.cells().body(region)).await;
     match made {
         Ok(Ok(body)) => tagged(&headers, &tag, || Json(body).into_response()),
-        Ok(Err(reason)) => error(StatusCode::UNPROCESSABLE_ENTITY, &reason),
+        Ok(Err(reason)) => error(StatusCode::UNPROCESSABLE_ENTITY, reason),
         Err(_) => StatusCode::INTERNAL_SERVER_ERROR.into_response(),
     }
 }
@@ -92,19 +92,27 @@ fn is_held(headers: &HeaderMap, tag: &str) -> bool {
     tagged(headers, tag, || StatusCode::OK.into_response()).status() == StatusCode::NOT_MODIFIED
 }
 
+/// Why a query of a map is not one; as text one line for the client.
+#[derive(Debug, thiserror::Error)]
+enum QueryFault {
+    #[error("{name}: a region needs x0, y0, width and height in cells; the range is {low} to {high}")]
+    Region { name: &'static str, low: i64, high: i64 },
+    #[error("labels: it takes a number of labels, 1 to {MAX_LABEL}")]
+    Labels,
+}
+
 /// The region of a request, in cells; `None` for the whole map.
-fn region(query: &BTreeMap<String, String>) -> Result<Option<Rect>, String> {
+fn region(query: &BTreeMap<String, String>) -> Result<Option<Rect>, QueryFault> {
     const NAMES: [&str; 4] = ["x0", "y0", "width", "height"];
     if !query.keys().any(|name| NAMES.contains(&name.as_str())) {
         return Ok(None);
     }
-    let number = |name: &str, low: i64, high: i64| {
+    let number = |name: &'static str, low: i64, high: i64| {
         let value = query.get(name).and_then(|text| text.parse::<i64>().ok());
-        let range = format!("{name}: a region needs x0, y0, width and height in cells; the range is {low} to {high}");
-        value.filter(|v| (low..=high).contains(v)).ok_or(range)
+        value.filter(|v| (low..=high).contains(v)).ok_or(QueryFault::Region { name, low, high })
     };
-    let corner = |name: &str| number(name, i32::MIN.into(), i32::MAX.into()).map(|v| v as i32);
-    let size = |name: &str| number(name, 1, u32::MAX.into()).map(|v| v as u32);
+    let corner = |name: &'static str| number(name, i32::MIN.into(), i32::MAX.into()).map(|v| v as i32);
+    let size = |name: &'static str| number(name, 1, u32::MAX.into()).map(|v| v as u32);
     Ok(Some(Rect { x: corner("x0")?, y: corner("y0")?, width: size("width")?, height: size("height")? }))
 }
 
@@ -155,10 +163,10 @@ async fn packed_tiles(cached: Arc<CachedMap>, since: Option<String>, is_packed: 
 pub(in crate::http) type MapQuery = BTreeMap<String, String>;
 
 /// Where the tree is cut; `None` for all labels.
-fn cut(query: &MapQuery) -> Result<Option<usize>, String> {
+fn cut(query: &MapQuery) -> Result<Option<usize>, QueryFault> {
     let Some(text) = query.get("labels") else { return Ok(None) };
     let count = text.parse().ok().filter(|count| (1..=usize::from(MAX_LABEL)).contains(count));
-    count.map(Some).ok_or_else(|| format!("labels: it takes a number of labels, 1 to {MAX_LABEL}"))
+    count.map(Some).ok_or(QueryFault::Labels)
 }
 
 fn cut_at(count: Option<usize>, cells: MapCells) -> MapCells {
@@ -178,7 +186,7 @@ pub(in crate::http) async fn file(
 ) -> Response {
     let count = match cut(&query) {
         Ok(count) => count,
-        Err(reason) => return error(StatusCode::UNPROCESSABLE_ENTITY, &reason),
+        Err(reason) => return error(StatusCode::UNPROCESSABLE_ENTITY, reason),
     };
     let cached = match latest(&shared, id).await {
         Ok(cached) => cached,
@@ -222,7 +230,7 @@ pub(in crate::http) async fn file(
         Ok(Ok(bytes)) => {
             tagged(&headers, &tag, || ([(header::CONTENT_TYPE, format.content_type())], bytes).into_response())
         }
-        Ok(Err(reason)) => error(StatusCode::UNPROCESSABLE_ENTITY, &reason),
+        Ok(Err(reason)) => error(StatusCode::UNPROCESSABLE_ENTITY, reason),
         Err(_) => error(StatusCode::INTERNAL_SERVER_ERROR, "the file could not be made"),
     }
 }
@@ -236,7 +244,7 @@ pub(in crate::http) async fn archives(State(shared): State<Shared>) -> Response 
 pub(in crate::http) async fn archived(shared: Shared, name: String, query: MapQuery, format: MapFormat) -> Response {
     let count = match cut(&query) {
         Ok(count) => count,
-        Err(reason) => return error(StatusCode::UNPROCESSABLE_ENTITY, &reason),
+        Err(reason) => return error(StatusCode::UNPROCESSABLE_ENTITY, reason),
     };
     let cells = match shared.request(SurfaceRequest::ArchivedMap(name)).await {
         Ok(Reply::Map(cells)) => cells,
@@ -249,7 +257,7 @@ pub(in crate::http) async fn archived(shared: Shared, name: String, query: MapQu
     };
     match tokio::task::spawn_blocking(move || cut_at(count, cells).export(format, origin)).await {
         Ok(Ok(bytes)) => ([(header::CONTENT_TYPE, format.content_type())], bytes).into_response(),
-        Ok(Err(reason)) => error(StatusCode::UNPROCESSABLE_ENTITY, &reason),
+        Ok(Err(reason)) => error(StatusCode::UNPROCESSABLE_ENTITY, reason),
         Err(_) => error(StatusCode::INTERNAL_SERVER_ERROR, "the file could not be made"),
     }
 }

@@ -40,7 +40,7 @@ pub(in crate::http) async fn utility(
         Ok(weights) => {
             shared.order(by, SurfaceRequest::Utility(id, weights, (order.exploration, order.curiosity))).await
         }
-        Err(line) => error(StatusCode::UNPROCESSABLE_ENTITY, &line),
+        Err(unknown) => error(StatusCode::UNPROCESSABLE_ENTITY, unknown),
     }
 }
 
@@ -56,16 +56,21 @@ pub(in crate::http) async fn draft(
             let terms = (order.exploration, order.curiosity);
             shared.order(by, SurfaceRequest::Draft(id, author, weights, terms)).await
         }
-        Err(line) => error(StatusCode::UNPROCESSABLE_ENTITY, &line),
+        Err(unknown) => error(StatusCode::UNPROCESSABLE_ENTITY, unknown),
     }
 }
 
-/// The weights by the numbers of their labels. The error is one line for the operator.
-fn by_label(weights: BTreeMap<String, f64>) -> Result<BTreeMap<u8, f64>, String> {
+/// A name of a weight that is not the number of a label.
+#[derive(Debug, thiserror::Error)]
+#[error("{0:?} is not a label")]
+struct NoLabel(String);
+
+/// The weights by the numbers of their labels.
+fn by_label(weights: BTreeMap<String, f64>) -> Result<BTreeMap<u8, f64>, NoLabel> {
     // `+1` and `01` would name label 1 a second time.
     let number = |(label, weight): (String, f64)| match label.parse::<u8>() {
         Ok(number) if number.to_string() == label => Ok((number, weight)),
-        _ => Err(format!("{label:?} is not a label")),
+        _ => Err(NoLabel(label)),
     };
     weights.into_iter().map(number).collect()
 }
@@ -88,7 +93,7 @@ pub(in crate::http) async fn again(
     let of_constraints = CONSTRAINTS.contains(&slot.as_str()).then_some(SlotId::Constraints);
     let Some(found) = of_constraints.or_else(|| SlotId::ALL.into_iter().find(|id| id.name() == slot)) else {
         let names: Vec<&str> = SlotId::ALL.map(SlotId::name).into_iter().chain(CONSTRAINTS).collect();
-        return error(StatusCode::UNPROCESSABLE_ENTITY, &format!("slot {slot:?}: it takes {}", names.join(", ")));
+        return error(StatusCode::UNPROCESSABLE_ENTITY, format!("slot {slot:?}: it takes {}", names.join(", ")));
     };
     shared.order(by, SurfaceRequest::Again(id, found, slot)).await
 }

@@ -175,7 +175,7 @@ pub(in crate::http) async fn table(State(shared): State<Shared>, filter: LogQuer
     };
     match to_csv(&entries) {
         Ok(bytes) => ([(header::CONTENT_TYPE, "text/csv; charset=utf-8")], bytes).into_response(),
-        Err(fault) => error(StatusCode::INTERNAL_SERVER_ERROR, &fault.to_string()),
+        Err(fault) => error(StatusCode::INTERNAL_SERVER_ERROR, fault.to_string()),
     }
 }
 

@@ -175,6 +175,17 @@ enum ViewerRequest {
     Other,
 }
 
+/// Why a viewer does not get a subscription; as text one line for its user.
+#[derive(Debug, thiserror::Error)]
+enum SubscriptionFault {
+    #[error("there is no channel {0}")]
+    NoChannel(usize),
+    #[error("there is a subscription {0} already")]
+    Taken(u32),
+    #[error("there are {MAX_SUBSCRIPTIONS} subscriptions, which is the most")]
+    Most,
+}
+
 #[derive(Debug, Deserialize)]
 #[serde(rename_all = "camelCase")]
 struct Subscription {
@@ -226,7 +237,8 @@ impl Viewer {
     fn handle(&mut self, text: &str) -> Vec<String> {
         match serde_json::from_str(text) {
             Ok(ViewerRequest::Subscribe { subscriptions }) => {
-                subscriptions.into_iter().filter_map(|subscription| self.subscribe(&subscription).err()).collect()
+                let refused = |subscription: Subscription| self.subscribe(&subscription).err();
+                subscriptions.into_iter().filter_map(refused).map(|fault| fault.to_string()).collect()
             }
             Ok(ViewerRequest::Unsubscribe { subscription_ids }) => {
                 let unknown = |id: &u32| {
@@ -239,15 +251,15 @@ impl Viewer {
         }
     }
 
-    fn subscribe(&mut self, &Subscription { id, channel_id }: &Subscription) -> Result<(), String> {
+    fn subscribe(&mut self, &Subscription { id, channel_id }: &Subscription) -> Result<(), SubscriptionFault> {
         if channel_id >= self.channels.len() {
-            return Err(format!("there is no channel {channel_id}"));
+            return Err(SubscriptionFault::NoChannel(channel_id));
         }
         if self.subscriptions.contains_key(&id) {
-            return Err(format!("there is a subscription {id} already"));
+            return Err(SubscriptionFault::Taken(id));
         }
         if self.subscriptions.len() >= MAX_SUBSCRIPTIONS {
-            return Err(format!("there are {MAX_SUBSCRIPTIONS} subscriptions, which is the most"));
+            return Err(SubscriptionFault::Most);
         }
         self.subscriptions.insert(id, Sent { channel: channel_id, ..Sent::default() });
         Ok(())

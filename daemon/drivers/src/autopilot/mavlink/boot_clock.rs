@@ -16,11 +16,11 @@ const CONTESTED_ENDED: Duration = Duration::from_secs(5);
 /// What the time in a message says of it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum BootTime {
-    /// It is the autopilot's.
+    /// It is on the autopilot's clock, or this kind of message does not count by that clock.
     Own,
     /// The autopilot's, which has restarted.
     Restarted,
-    /// Of another vehicle.
+    /// It is on the clock of another vehicle with the same system and component number.
     Foreign,
 }
 

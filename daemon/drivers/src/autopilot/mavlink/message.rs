@@ -4,7 +4,7 @@
 //! and a quarter more time for a clean build. It would also reject messages whose enumerations are newer than the
 //! dialect. The layouts are from `common.xml` of MAVLink; the tests compare them with bytes that pymavlink wrote.
 
-/// The number of HEARTBEAT.
+/// The message number of HEARTBEAT, by which the driver recognises its autopilot.
 pub const HEARTBEAT: u32 = 0;
 
 /// A message that is read.

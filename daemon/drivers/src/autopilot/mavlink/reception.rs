@@ -22,7 +22,7 @@ pub(super) struct Reception {
 }
 
 impl Reception {
-    /// The port was opened.
+    /// Waits again for everything, because the port was opened.
     pub(super) fn handle_open(&mut self) {
         *self = Self::default();
     }

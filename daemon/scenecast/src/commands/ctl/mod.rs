@@ -13,7 +13,7 @@ use constraints::{FenceCommand, LimitsCommand, ReturnPointCommand};
 use places::{AreasCommand, Go};
 use scenecast_console::client::{self, BudgetChange, Client, LogSelection, Session, SettingsChange};
 use scenecast_console::orders::ExemplarAction;
-use scenecast_core::{ClientName, UserError};
+use scenecast_core::{ClientName, Takes, UserError};
 use scenecast_surface::{LogKind, SettingsOrder};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -341,23 +341,24 @@ fn kinds() -> PossibleValuesParser {
     PossibleValuesParser::new(LogKind::ALL.map(LogKind::name))
 }
 
-fn weight(text: &str) -> Result<f64, String> {
+fn weight(text: &str) -> Result<f64, Takes> {
     let weight = text.parse().ok().filter(|w| (-1.0..=1.0).contains(w));
-    weight.ok_or_else(|| "expected a number from -1 to 1".to_owned())
+    weight.ok_or(Takes("expected a number from -1 to 1"))
 }
 
-fn label_weight(text: &str) -> Result<(String, f64), String> {
+fn label_weight(text: &str) -> Result<(String, f64), Takes> {
     // A name may contain an equals sign.
-    let (label, w) = text.rsplit_once('=').ok_or("expected LABEL=WEIGHT, as in 3=0.8 or 'soft coral=0.5'")?;
+    let form = Takes("expected LABEL=WEIGHT, as in 3=0.8 or 'soft coral=0.5'");
+    let (label, w) = text.rsplit_once('=').ok_or(form)?;
     if label.trim().parse().is_ok_and(|number: i64| !(1..=254).contains(&number)) {
-        return Err("a label is a number from 1 to 254, or a name".to_owned());
+        return Err(Takes("a label is a number from 1 to 254, or a name"));
     }
     Ok((label.to_owned(), weight(w)?))
 }
 
-fn class_percent(text: &str) -> Result<(String, u8), String> {
-    let (class, percent) = text.split_once('=').ok_or("expected CLASS=PERCENT, as in map=60")?;
-    let percent = percent.parse().ok().filter(|p| *p <= 100).ok_or("a share is a number from 0 to 100")?;
+fn class_percent(text: &str) -> Result<(String, u8), Takes> {
+    let (class, percent) = text.split_once('=').ok_or(Takes("expected CLASS=PERCENT, as in map=60"))?;
+    let percent = percent.parse().ok().filter(|p| *p <= 100).ok_or(Takes("a share is a number from 0 to 100"))?;
     Ok((class.trim().to_owned(), percent))
 }
 

@@ -2,6 +2,7 @@
 
 use crate::scene::Intrinsics;
 use clap::{Args, ValueEnum};
+use scenecast_core::Takes;
 use std::path::PathBuf;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -83,13 +84,13 @@ pub(super) struct Edges {
     pub(super) z: Option<f64>,
 }
 
-pub(super) fn edges(text: &str) -> Result<Edges, String> {
+pub(super) fn edges(text: &str) -> Result<Edges, Takes> {
     let numbers: Option<Vec<f64>> = text.split(',').map(|field| field.trim().parse().ok()).collect();
     let numbers = numbers.filter(|all| all.iter().all(|edge| (1e-6..=1e6).contains(edge)));
     match numbers.as_deref() {
         Some(&[edge]) => Ok(Edges { x: edge, y: edge, z: None }),
         Some(&[x, y, z]) => Ok(Edges { x, y, z: Some(z) }),
-        _ => Err("it takes metres from 0.000001 to 1000000, one number or three as in 0.5,0.5,1".to_owned()),
+        _ => Err(Takes("it takes metres from 0.000001 to 1000000, one number or three as in 0.5,0.5,1")),
     }
 }
 

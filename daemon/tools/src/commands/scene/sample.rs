@@ -1,8 +1,8 @@
 //! `scenecast scene sample`
 
 use clap::Args;
-use scenecast_core::UserError;
 use scenecast_core::palette::colour;
+use scenecast_core::{Takes, UserError};
 use scenecast_files::write_whole;
 use scenecast_worlds::{LabelWorld, sample};
 use std::path::PathBuf;
@@ -46,10 +46,10 @@ pub struct Sample {
 }
 
 /// Two numbers from 1 to 4096, as in 64x48.
-fn pair(text: &str) -> Result<(u32, u32), String> {
+fn pair(text: &str) -> Result<(u32, u32), Takes> {
     let number = |text: &str| text.parse().ok().filter(|n| (1..=4096).contains(n));
     let pair = text.split_once('x').and_then(|(a, b)| Some((number(a)?, number(b)?)));
-    pair.ok_or_else(|| "it takes two whole numbers from 1 to 4096, as in 64x48".to_owned())
+    pair.ok_or(Takes("it takes two whole numbers from 1 to 4096, as in 64x48"))
 }
 
 impl Sample {

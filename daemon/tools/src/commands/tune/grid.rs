@@ -29,6 +29,20 @@ pub struct Grid {
 /// Maximum number of settings of a grid.
 const MAX_SETTINGS: usize = 100_000;
 
+/// What is wrong in a file of settings to try; as text what follows the name of the file.
+#[derive(Debug, PartialEq, thiserror::Error)]
+enum GridFault {
+    #[error(
+        ":{line}: {} (it takes lists alpha, beta, gamma, max_labels, cell_m, refine_words_per_s, frames_per_s, cells)",
+        error.message()
+    )]
+    Toml { line: usize, error: toml::de::Error },
+    #[error(": {name} has {value}; it takes numbers from {low} to {high}")]
+    Value { name: &'static str, value: f64, low: f64, high: f64 },
+    #[error(": {0} settings; at most {MAX_SETTINGS} are allowed")]
+    Many(usize),
+}
+
 impl Grid {
     /// The grid in a file; parameters that it does not name have their default values.
     pub fn load(path: Option<&Path>, config: &Config) -> Result<Self, UserError> {
@@ -75,14 +89,10 @@ impl Grid {
         Ok(grid)
     }
 
-    fn read(text: &str) -> Result<Self, String> {
-        let mut grid: Self = toml::from_str(text).map_err(|e: toml::de::Error| {
-            let line =
-                e.span().and_then(|span| text.get(..span.start)).map_or(1, |before| before.matches('\n').count() + 1);
-            format!(
-                ":{line}: {} (it takes lists alpha, beta, gamma, max_labels, cell_m, refine_words_per_s, frames_per_s, cells)",
-                e.message()
-            )
+    fn read(text: &str) -> Result<Self, GridFault> {
+        let mut grid: Self = toml::from_str(text).map_err(|error: toml::de::Error| {
+            let before = error.span().and_then(|span| text.get(..span.start));
+            GridFault::Toml { line: before.map_or(1, |before| before.matches('\n').count() + 1), error }
         })?;
         let ranges = [
             ("alpha", &grid.alpha, 1e-9, 1e3),
@@ -93,17 +103,17 @@ impl Grid {
             ("frames_per_s", &grid.frames_per_s, 0.01, 30.0),
         ];
         for (name, values, low, high) in ranges {
-            if let Some(value) = values.iter().find(|value| !(low..=high).contains(*value)) {
-                return Err(format!(": {name} has {value}; it takes numbers from {low} to {high}"));
+            if let Some(&value) = values.iter().find(|value| !(low..=high).contains(*value)) {
+                return Err(GridFault::Value { name, value, low, high });
             }
         }
-        if let Some(labels) = grid.max_labels.iter().find(|labels| !(2..=254).contains(*labels)) {
-            return Err(format!(": max_labels has {labels}; it takes numbers from 2 to 254"));
+        if let Some(&labels) = grid.max_labels.iter().find(|labels| !(2..=254).contains(*labels)) {
+            return Err(GridFault::Value { name: "max_labels", value: labels.into(), low: 2.0, high: 254.0 });
         }
         let count = ranges.iter().map(|(_, values, ..)| values.len()).chain([grid.cells.len(), grid.max_labels.len()]);
         let count = count.map(|n| n.max(1)).fold(1usize, usize::saturating_mul);
         if count > MAX_SETTINGS {
-            return Err(format!(": {count} settings; at most {MAX_SETTINGS} are allowed"));
+            return Err(GridFault::Many(count));
         }
         grid.drop_repeats();
         Ok(grid)
@@ -247,17 +257,19 @@ mod tests {
         let settings = Grid::load(Some(&path), &topics()).unwrap().settings();
         assert_eq!(settings.len(), 2 * 2 * 3 * 3 * 2 * 2);
         assert!(settings.is_sorted_by_key(|s| s.cell_m));
-        let refused = Grid::load(Some(&path), &Config::default()).unwrap_err().to_string();
+        let refused = Grid::load(Some(&path), &Config::default()).unwrap_err().to_string().to_string();
         assert!(refused.contains("have no effect where scene.labels is habitats"), "{refused}");
     }
 
     #[test]
     fn a_wrong_file_is_refused_with_its_line_and_range() {
-        assert!(Grid::read("alpha = [1]\nbta = [1]").unwrap_err().starts_with(":2: unknown field `bta`"));
-        assert!(Grid::read("beta = [0]").unwrap_err().contains("beta has 0; it takes numbers from"));
-        assert!(Grid::read("cells = ['huge']").unwrap_err().contains("it takes fine and coarse"));
-        assert!(Grid::read("frames_per_s = [31]").unwrap_err().contains("it takes numbers from 0.01 to 30"));
-        assert!(Grid::read("max_labels = [1]").unwrap_err().contains("it takes numbers from 2 to 254"));
+        assert!(Grid::read("alpha = [1]\nbta = [1]").unwrap_err().to_string().starts_with(":2: unknown field `bta`"));
+        assert!(Grid::read("beta = [0]").unwrap_err().to_string().contains("beta has 0; it takes numbers from"));
+        assert!(Grid::read("cells = ['huge']").unwrap_err().to_string().contains("it takes fine and coarse"));
+        assert!(
+            Grid::read("frames_per_s = [31]").unwrap_err().to_string().contains("it takes numbers from 0.01 to 30")
+        );
+        assert!(Grid::read("max_labels = [1]").unwrap_err().to_string().contains("it takes numbers from 2 to 254"));
         assert!(Grid::read("alpha = [nan]").is_err() && Grid::read("alpha = 3").is_err());
     }
 

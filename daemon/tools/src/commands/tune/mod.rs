@@ -203,17 +203,17 @@ impl GrowingTable {
 
 /// The table of an earlier run with the same inputs, or an empty one.
 fn open(path: &Path, inputs: &str) -> Result<TuningTable, UserError> {
-    let refused = |line: usize, cause: String| UserError::Input(format!("{}:{line}: {cause}", path.display()));
+    let refused = |cause: String| UserError::Input(format!("{}:{cause}", path.display()));
     let table = match path.exists() {
         true => {
             let text = scenecast_config::read_regular_text(path)?;
-            TuningTable::read(&text).map_err(|(line, cause)| refused(line, format!("{cause}; give another --out")))?
+            TuningTable::read(&text).map_err(|error| refused(format!("{error}; give another --out")))?
         }
         false => TuningTable::default(),
     };
     let cause = "was measured with another sea floor, annotations or options than this run's";
     match table.line_of_others(inputs) {
-        Some(line) => Err(refused(line, format!("{cause}; give those again, or another --out"))),
+        Some(line) => Err(refused(format!("{line}: {cause}; give those again, or another --out"))),
         None => Ok(table),
     }
 }

@@ -14,7 +14,16 @@ pub(super) struct FrameLine<'a> {
     time_s: Option<f64>,
     bytes: &'a [u8],
     /// Or why there is none.
-    content: Result<Content, String>,
+    content: Result<Content, LineFault>,
+}
+
+/// Why the bytes of a line are not shown as a frame.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+enum LineFault {
+    #[error("the capture has only the beginning of it")]
+    Cut,
+    #[error(transparent)]
+    Frame(#[from] FrameError),
 }
 
 #[derive(Debug)]
@@ -41,8 +50,8 @@ impl<'a> FrameLine<'a> {
     pub(super) fn of(number: usize, time_s: Option<f64>, frame: &'a Captured, listener: Option<&mut Listener>) -> Self {
         let bytes = &frame.bytes[..];
         let content = match frame.is_cut {
-            true => Err("the capture has only the beginning of it".to_owned()),
-            false => Content::read(bytes, listener).map_err(|error| error.to_string()),
+            true => Err(LineFault::Cut),
+            false => Content::read(bytes, listener).map_err(LineFault::Frame),
         };
         Self { number, time_s, bytes, content }
     }
@@ -50,7 +59,7 @@ impl<'a> FrameLine<'a> {
     pub(super) fn to_json(&self) -> Value {
         let mut line = json!({ "frame": self.number, "time_s": self.time_s, "bytes": fields::hex(self.bytes) });
         match &self.content {
-            Err(error) => line["error"] = error.as_str().into(),
+            Err(fault) => line["error"] = fault.to_string().into(),
             Ok(content) => {
                 line["from"] = content.from.number().into();
                 line["to"] = content.to.number().into();

@@ -8,7 +8,7 @@ use capture::{Capture, CaptureError, Captured};
 use clap::{Args, Subcommand};
 use line::FrameLine;
 use scenecast_config::{read_key, read_regular};
-use scenecast_core::{UserError, errln};
+use scenecast_core::{Takes, UserError, errln};
 use scenecast_files::{RecordedFrames, is_record};
 use scenecast_protocol::MissionId;
 use scenecast_protocol::seal::HeldKey;
@@ -54,12 +54,12 @@ pub struct Decode {
 const EXAMPLES: &str = "Example: scenecast wire decode frames.pcap --mission 0x5CE70001\n         \
                         echo 8c0fc0de000001000805aecd | scenecast wire decode -";
 
-fn mission(text: &str) -> Result<MissionId, String> {
+fn mission(text: &str) -> Result<MissionId, Takes> {
     let parsed = match text.strip_prefix("0x").or_else(|| text.strip_prefix("0X")) {
         Some(digits) => u32::from_str_radix(digits, 16),
         None => text.parse(),
     };
-    parsed.map(MissionId).map_err(|_| "allowed: 0 to 4294967295, or 0x0 to 0xFFFFFFFF".to_owned())
+    parsed.map(MissionId).map_err(|_| Takes("allowed: 0 to 4294967295, or 0x0 to 0xFFFFFFFF"))
 }
 
 impl Wire {

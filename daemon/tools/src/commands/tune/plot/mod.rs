@@ -14,7 +14,7 @@ const WIDTH: u32 = 1240;
 const SCATTER_HEIGHT: u32 = 620;
 const EXAMPLE_HEIGHT: u32 = 380;
 const HEIGHT: u32 = SCATTER_HEIGHT + EXAMPLE_HEIGHT;
-/// Example maps.
+/// The number of example maps that there is room for below the scatter plots.
 pub const EXAMPLES: usize = 3;
 const LEGEND_WIDTH: u32 = 220;
 /// Height of a line of the legend, pixels.
@@ -69,7 +69,7 @@ impl<'a> Plot<'a> {
         indices.into_iter().filter_map(|index| front.get(index).copied()).collect()
     }
 
-    /// Draws these maps below.
+    /// Draws these maps below the scatter plots, the first [`EXAMPLES`] of them, each with the row that it belongs to.
     pub fn with_examples(self, examples: Vec<(&'a Row, RgbImage)>) -> Self {
         Self { examples, ..self }
     }
