@@ -2,7 +2,7 @@
 
 use crate::clock::Clock;
 use crate::port::{FromPort, Port};
-use scenecast_config::Config;
+use scenecast_config::{Config, ModemKind};
 use scenecast_core::{PortAddress, UserError};
 use scenecast_drivers::modem::{PortFinding, PortListener, Speaker};
 use scenecast_host::{FrameEvent, LinkEnd, LinkHost};
@@ -23,6 +23,7 @@ const MANY_SHORT: u32 = 3;
 pub(super) struct ModemPort {
     port: Port,
     place: PortAddress,
+    kind: ModemKind,
     /// When it was opened again last.
     reopened: Instant,
     listener: PortListener,
@@ -41,9 +42,10 @@ impl ModemPort {
     pub(super) async fn open(config: &Config, now: Instant) -> Result<Self, UserError> {
         let place = scenecast_config::modem_port(config)?;
         let port = Port::open_judged("modem", place.clone()).await.map_err(|e| not_there(&place, &e))?;
-        let (listener, clock) = (PortListener::new(config.modem.kind), Clock::new(1.0));
+        let kind = config.modem.kind;
+        let (listener, clock) = (PortListener::new(kind), Clock::new(1.0));
         let (opened, short, is_lost, note) = (None, 0, false, None);
-        Ok(Self { port, place, reopened: now, listener, clock, opened, short, is_lost, note })
+        Ok(Self { port, place, kind, reopened: now, listener, clock, opened, short, is_lost, note })
     }
 
     /// The next report of the port. Cancel-safe.
@@ -136,7 +138,7 @@ impl ModemPort {
             FrameEvent::ModemLost if self.short > 0 => tracing::debug!("modem: lost"),
             FrameEvent::ModemLost => {
                 self.is_lost = true;
-                self.tell("lost; it is set up again when it answers".to_owned());
+                self.tell(lost(self.kind).to_owned());
             }
             FrameEvent::ModemRefused { reason, was_ready: false } => {
                 return Err(UserError::Failed(format!("modem: {reason}")));
@@ -162,6 +164,17 @@ impl ModemPort {
     /// What the log of the mission is to have about the modem: what is wrong, or that it is no more.
     pub(super) fn poll_note(&mut self) -> Option<String> {
         self.note.take()
+    }
+}
+
+/// What an end loses with its modem.
+fn lost(kind: ModemKind) -> &'static str {
+    match kind {
+        // No modem is between: the program of the other end is what answers or does not.
+        ModemKind::Tcp | ModemKind::Udp => {
+            "the connection to the other end's program ended; it continues when that program answers again"
+        }
+        ModemKind::S2c | ModemKind::Micromodem | ModemKind::Transparent => "lost; it is set up again when it answers",
     }
 }
 
@@ -273,6 +286,12 @@ mod tests {
     use scenecast_surface::Surface;
     use scenecast_vehicle::{Durable, Vehicle};
     use tokio::net::UdpSocket;
+
+    #[test]
+    fn without_a_modem_the_connection_is_what_is_lost() {
+        assert!(lost(ModemKind::Tcp).starts_with("the connection to the other end's program ended"));
+        assert_eq!(lost(ModemKind::Transparent), lost(ModemKind::S2c));
+    }
 
     const WINDOW: Duration = Duration::from_secs(10);
 

@@ -125,7 +125,6 @@ pub fn run_vehicle(load: Load, simulated: Option<SimulatedAutopilot>) -> Result<
             disagreement,
             record,
             reload,
-            missed: 0,
         };
         shell.run(stop).await
     })
@@ -166,8 +165,6 @@ struct VehicleShell {
     disagreement: Disagreement,
     record: VehicleRecord,
     reload: Reload,
-    /// Frames of a recording that could not be read.
-    missed: u64,
 }
 
 impl VehicleShell {
@@ -329,13 +326,7 @@ impl VehicleShell {
 
     /// Logs an unreadable frame; it does not end the mission.
     fn handle_missed(&mut self, error: &UserError) {
-        match &mut self.camera {
-            Camera::Live(camera) => camera.handle_missed(error),
-            Camera::Recorded(_) => {
-                self.missed += 1;
-                tracing::error!("a camera frame was skipped, {} so far: {error}", self.missed);
-            }
-        }
+        self.camera.handle_missed(error);
         self.host.handle_missed();
     }
 

@@ -171,7 +171,7 @@ impl RefusalReason {
             Self::OutOfRange => "a value is outside what the vehicle accepts",
             Self::Contradiction => "it contradicts itself or a constraint in force",
             Self::TooOld => "it came too late to be of use",
-            Self::Outside => "the vehicle is outside of it: it keeps the last one",
+            Self::Outside => "the vehicle is outside of it, so it keeps to what was in force before",
             Self::Unable => "the vehicle flies at an altitude or depth that it does not allow",
             Self::Disk => "the vehicle's disk does not keep it: until it does, the vehicle obeys only hold and abort",
             Self::Forgotten => "the vehicle has lost its journal and may have applied it before: give the order again",

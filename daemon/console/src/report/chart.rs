@@ -307,7 +307,7 @@ fn scale(svg: &mut String, frame: &Frame) {
     );
 }
 
-/// A quantity over time.
+/// The values of one quantity from which [`line`] draws a chart.
 pub(super) struct Series<'a> {
     pub(super) name: &'a str,
     pub(super) unit: &'a str,

@@ -1,9 +1,13 @@
 //! What a record says about a dive.
 
 use super::areas::{ClassArea, areas};
+use super::link::budgets;
 use super::log::{events, images};
 use super::maps::{MapsAt, maps_over_time};
 use super::orders::{OrderKey, OrderStep};
+use super::restart::{SetBack, set_backs};
+use super::settings::SettingsRecord;
+use super::times::is_scaled;
 use super::track::{TrackPoint, measured};
 use super::words;
 use crate::export::{MapCaption, MapCells};
@@ -43,10 +47,10 @@ pub struct Dive {
     pub(super) events: Vec<(f64, Event)>,
     /// Begin and end of the times in which the surface recorded nothing.
     pub(super) gaps_s: Vec<(f64, f64)>,
-    /// Frames of the surface.
+    /// How many frames the surface sent, received and dropped, over all its records.
     pub(super) frames: FrameCounts,
-    /// The mission times.
-    clock: MissionClock,
+    /// The mission time at each recorded state, by which mission times become times of the surface's clock.
+    pub(super) clock: MissionClock,
     /// What the surface ran with.
     pub(super) settings: SettingsRecord,
     /// Why some of the record could not be read.
@@ -55,28 +59,6 @@ pub struct Dive {
     pub(super) restarts_s: Vec<(f64, f64)>,
     /// The files that it was read from; empty while they are written.
     pub(super) files: Vec<RecordFile>,
-}
-
-/// The program that made a record, and its settings that differed from their defaults, by key.
-#[derive(Debug, Default, PartialEq, serde::Deserialize)]
-#[serde(default)]
-pub(super) struct SettingsRecord {
-    pub(super) program: String,
-    pub(super) rehearsal_seed: Option<u64>,
-    /// What records had before the seed.
-    simulated: bool,
-    pub(super) settings: BTreeMap<String, serde_json::Value>,
-}
-
-impl SettingsRecord {
-    pub(super) fn is_rehearsal(&self) -> bool {
-        self.simulated || self.rehearsal_seed.is_some()
-    }
-
-    /// A text among the settings.
-    pub(super) fn text(&self, key: &str) -> Option<&str> {
-        self.settings.get(key).and_then(serde_json::Value::as_str)
-    }
 }
 
 /// What a record says about a vehicle.
@@ -121,15 +103,19 @@ pub(super) struct OwnRecord {
     pub(super) frames: FrameCounts,
     /// The bits of what they carried first, by its name.
     pub(super) sent_bits: BTreeMap<String, u64>,
+    /// Its bit budgets, bit/s, and since when, seconds since 1970.
+    pub(super) budgets_bps: Vec<(f64, u32)>,
     /// When it heard frames of the surface, seconds since 1970.
     pub(super) heard_s: Vec<f64>,
     /// Begin and end of each of its records.
     pub(super) runs_s: Vec<(f64, f64)>,
+    /// The maps before and after each of the times between its records.
+    pub(super) set_backs: Vec<SetBack>,
     /// When it decided about orders.
     pub(super) decided_s: BTreeMap<OrderKey, f64>,
     /// What had become of the images of a live camera at the end of each run.
     pub(super) images: Vec<String>,
-    /// What it ran with.
+    /// The program and the settings of its last run; empty if its records have none.
     pub(super) settings: SettingsRecord,
 }
 
@@ -196,17 +182,18 @@ impl Dive {
             state.link.down = sum(&state.link.down, &down);
         }
         let (first, last) = recording.timeline.span;
+        let mission_speed = state.mission.speed;
         let mut vehicles = BTreeMap::new();
         for vehicle in &state.vehicles {
             let part = valid_part(&vehicle.name);
-            vehicles.extend(DiveVehicle::of(recording, vehicle, &part, state.mission.speed).map(|known| (part, known)));
+            vehicles.extend(DiveVehicle::of(recording, vehicle, &part, mission_speed).map(|known| (part, known)));
         }
         Ok(Self {
             span_s: (seconds(first), seconds(last)),
             surface_s: (seconds(first), ended_s),
             state,
             vehicles,
-            events: events(recording),
+            events: events(recording, is_scaled(mission_speed)),
             gaps_s: gaps(recording),
             restarts_s: restarts_s(recording),
             frames: recording.frames.clone(),
@@ -224,11 +211,6 @@ impl Dive {
         self.events.iter().filter(move |(_, event)| is_mode(event)).map(|(at_s, event)| (*at_s, event))
     }
 
-    /// A time span of the record as mission time, seconds: the mission may run faster than the clock.
-    pub(super) fn mission_s(&self, span_s: f64) -> f64 {
-        span_s * self.state.mission.speed
-    }
-
     /// What the vehicle ran with, by its own record, or else the surface.
     pub(super) fn ran_with<'a>(&'a self, vehicle: &'a DiveVehicle) -> &'a SettingsRecord {
         if vehicle.own.settings.settings.is_empty() { &self.settings } else { &vehicle.own.settings }
@@ -237,11 +219,6 @@ impl Dive {
     /// Whether the record has what the vehicle ran with.
     pub(super) fn knows_settings(&self, vehicle: &DiveVehicle) -> bool {
         !vehicle.own.settings.program.is_empty() || self.settings.is_rehearsal()
-    }
-
-    /// The moment of a mission time, seconds since 1970.
-    pub(super) fn unix_s(&self, at_s: f64) -> f64 {
-        self.clock.nanos(at_s).map_or(self.span_s.1, seconds)
     }
 
     /// The vehicles, as the page showed them last and as the record has them.
@@ -278,6 +255,7 @@ impl DiveVehicle {
     /// What a recording says about a vehicle with this part of topics; `None` if it has nothing.
     fn of(recording: &mut Recording, state: &VehicleState, part: &str, mission_speed: f64) -> Option<Self> {
         let maps = maps_over_time(recording, state.id, part);
+        let set_backs = set_backs(recording, part);
         let Recording { timeline, operator, vehicles, .. } = recording;
         let own = vehicles.get(part);
         let shift = state.map.shift_m();
@@ -306,8 +284,10 @@ impl DiveVehicle {
                 track: measured(own.poses.iter().map(moved).filter(TrackPoint::is_known).collect(), mission_speed),
                 frames: own.frames.clone(),
                 sent_bits: own.sent_bits.clone(),
+                budgets_bps: budgets(own.link.iter().map(|(at, link)| (seconds(*at), link))),
                 heard_s: own.heard.iter().copied().map(seconds).collect(),
                 runs_s: own.runs.iter().map(|(from, to)| (seconds(*from), seconds(*to))).collect(),
+                set_backs,
                 decided_s: BTreeMap::new(),
                 images: images(&own.events, &own.runs),
                 settings: serde_json::from_str(&own.settings).unwrap_or_default(),
@@ -347,15 +327,17 @@ impl DiveVehicle {
             let seed = dive.settings.rehearsal_seed.map_or_else(String::new, |seed| format!(" (seed {seed})"));
             return Some(format!("a rehearsal over a simulated sea floor{seed}"));
         }
-        let source = self.own.settings.text("camera.source").filter(|_| self.is_played_back());
-        source.map(|source| format!("a playback of images and poses from {source}")).or_else(|| {
-            let is_simulated = self.own.settings.text("autopilot.kind") == Some("rehearsal");
-            is_simulated.then(|| match self.own.settings.text("navigation.source") {
-                Some(source) if source != "autopilot" => {
-                    format!("a test: the autopilot was simulated (autopilot.kind = rehearsal), and places came from {source}")
-                }
-                _ => "a test in which the vehicle's motion was simulated (autopilot.kind = rehearsal)".to_owned(),
-            })
+        if self.is_played_back() {
+            return Some("a playback of recorded images and poses".to_owned());
+        }
+        let is_simulated = self.own.settings.text("autopilot.kind") == Some("rehearsal");
+        is_simulated.then(|| match self.own.settings.text("navigation.source") {
+            Some(source) if source != "autopilot" => {
+                format!(
+                    "a test: the autopilot was simulated (autopilot.kind = rehearsal), and places came from {source}"
+                )
+            }
+            _ => "a test in which the vehicle's motion was simulated (autopilot.kind = rehearsal)".to_owned(),
         })
     }
 

@@ -26,8 +26,11 @@ pub(super) fn doubts(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -
     sentences.extend(
         vehicle.made_up(dive).map(|what| format!("Positions or images are not those of a real dive: this was {what}.")),
     );
-    sentences.extend(place(dive, vehicle));
+    sentences.extend(place(dive, state, vehicle));
     sentences.extend(images(state, vehicle));
+    if vehicle.own.runs_s.is_empty() && !vehicle.restarts_s.is_empty() {
+        sentences.push("How far a restart set the vehicle's map back is not known without its own record.".to_owned());
+    }
     if vehicle.own.runs_s.is_empty() {
         sentences.push(
             "Times of modes, faults and restarts are those at which the surface learned of them, and how far its map was behind is its own \
@@ -58,19 +61,24 @@ fn images(state: &VehicleState, vehicle: &DiveVehicle) -> Option<String> {
 }
 
 /// When its place was not known well.
-fn place(dive: &Dive, vehicle: &DiveVehicle) -> Option<String> {
+fn place(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -> Option<String> {
     let known: Vec<_> = vehicle.path().iter().filter(|point| point.sigma_m.is_finite()).collect();
     let is_doubtful = |at: &usize| known[*at].sigma_m >= DOUBTFUL_M;
     let all = || (0..known.len()).filter(is_doubtful);
     let (first, last) = (known[all().next()?], known[all().next_back()?]);
     let most_m = known.iter().map(|point| point.sigma_m).fold(0.0, f64::max);
     let time_s: f64 = all().filter_map(|at| Some(known.get(at + 1)?.at_s - known[at].at_s)).sum();
+    // Images that overlap with earlier ones hold the map together, however well its place on the earth is known.
+    let off = match state.registration.as_ref().is_some_and(|registration| registration.closed > 0) {
+        true => "from its place on the earth; images that were matched to earlier ones lie closer to these",
+        false => "off the rest",
+    };
     Some(format!(
-        "Between {} and {}, for {} in all, the standard deviation of its place was {DOUBTFUL_M} m or more, {most_m:.0} m at most: what was mapped \
-         then may lie so far off the rest.",
+        "Between {} and {}, for {} in all, the uncertainty of its place on the earth (68 %, east and north each) was {DOUBTFUL_M} m or more, \
+         {most_m:.0} m at most: what was mapped then may lie so far {off}.",
         utc_text(first.at_s),
         utc_text(last.at_s),
-        words::duration(dive.mission_s(time_s))
+        dive.lasted(time_s)
     ))
 }
 
@@ -78,6 +86,17 @@ fn place(dive: &Dive, vehicle: &DiveVehicle) -> Option<String> {
 mod tests {
     use super::super::track::TrackPoint;
     use super::*;
+
+    #[test]
+    fn a_restart_that_only_the_surface_knows_is_a_doubt() {
+        let (dive, state, mut vehicle) = (Dive::default(), VehicleState::default(), DiveVehicle::default());
+        let is_told = |vehicle: &DiveVehicle| {
+            doubts(&dive, &state, vehicle).iter().any(|sentence| sentence.starts_with("How far a restart set"))
+        };
+        assert!(!is_told(&vehicle));
+        vehicle.restarts_s = vec![7.0];
+        assert!(is_told(&vehicle));
+    }
 
     #[test]
     fn a_place_is_doubted_for_the_time_in_which_it_was_not_known() {
@@ -94,7 +113,7 @@ mod tests {
             let track = sigmas.iter().enumerate().map(at).collect();
             let mut vehicle = DiveVehicle::default();
             vehicle.track = track;
-            place(&dive, &vehicle)
+            place(&dive, &VehicleState::default(), &vehicle)
         };
         assert_eq!(told(&[1.0, 4.9, f64::NAN]), None);
         let told = told(&[1.0, 50.0, 40.0, 0.5, 0.5, 6.0, 1.0]).unwrap();

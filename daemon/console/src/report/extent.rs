@@ -7,7 +7,7 @@ use scenecast_core::{Area, fence_of, place_of};
 use scenecast_protocol::map::{Cell, Quantity, UNEXPLORED};
 use std::ops::RangeInclusive;
 
-/// Where the map lies.
+/// The limits of the operator's map in words, in metres and, with an origin, in degrees; `None` while it has no cells.
 pub(super) fn of_map(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -> Option<String> {
     let bounds = vehicle.labels.bounds()?;
     let (shift, cell_m) = (state.map.shift_m(), vehicle.cell_m);

@@ -1,7 +1,7 @@
 //! Times in which nothing was heard, and those that a record lacks.
 
 use super::dive::{Dive, DiveVehicle};
-use super::words::{counted, duration, median};
+use super::words::{counted, median};
 use scenecast_core::utc_text;
 
 /// Mission time without a frame that is never told, seconds.
@@ -19,7 +19,7 @@ pub(super) fn heard(dive: &Dive, vehicle: &DiveVehicle) -> Vec<String> {
     let last = format!(
         "The last frame from it was heard at {}, {} before the end of the record.",
         utc_text(*last_s),
-        duration(dive.mission_s(dive.surface_s.1 - last_s))
+        dive.lasted(dive.surface_s.1 - last_s)
     );
     let surface = format!("The surface heard {}", pauses(dive, &vehicle.heard_s, dive.surface_s));
     let span = vehicle.own.runs_s.first().zip(vehicle.own.runs_s.last()).map(|(first, last)| (first.0, last.1));
@@ -50,15 +50,13 @@ fn pauses(dive: &Dive, times_s: &[f64], span_s: (f64, f64)) -> String {
     let all = long.len();
     let told: Vec<String> = longest(long)
         .iter()
-        .map(|gap| {
-            format!("{} from {} to {}", duration(dive.mission_s(gap.1 - gap.0)), utc_text(gap.0), utc_text(gap.1))
-        })
+        .map(|gap| format!("{} from {} to {}", dive.lasted(gap.1 - gap.0), utc_text(gap.0), utc_text(gap.1)))
         .collect();
     let pauses = match all {
         0 => {
-            let pauses = times_s.iter().zip(&times_s[1.min(times_s.len())..]).map(|(a, b)| dive.mission_s(b - a));
+            let pauses = times_s.iter().zip(&times_s[1.min(times_s.len())..]).map(|(a, b)| b - a);
             let longest = pauses.fold(0.0, f64::max);
-            format!("the longest pause was {}", duration(longest))
+            format!("the longest pause was {}", dive.lasted(longest))
         }
         n if n > told.len() => format!("with {n} longer pauses, the longest of which were {}", told.join(", ")),
         n => format!("with {}: {}", counted(n, "longer pause", "longer pauses"), told.join(", ")),
@@ -66,18 +64,17 @@ fn pauses(dive: &Dive, times_s: &[f64], span_s: (f64, f64)) -> String {
     let heard = counted(times_s.len(), "frame", "frames");
     match usual_s {
         Some(_) => format!(
-            "{heard}; half of the time, the last one was at most {:.1} s old, {pauses}.",
-            half_of_time_s(dive, times_s, span_s.1)
+            "{heard}; half of the time, the last one was at most {} old, {pauses}.",
+            dive.lasted_tenths(half_of_time_s(times_s, span_s.1))
         ),
         None => format!("{heard}, {pauses}."),
     }
 }
 
-/// How old the last of these moments was at most, half of the time from the first one to the end, mission seconds.
-fn half_of_time_s(dive: &Dive, times_s: &[f64], end_s: f64) -> f64 {
+/// How old the last of these moments was at most, half of the time from the first one to the end, seconds.
+fn half_of_time_s(times_s: &[f64], end_s: f64) -> f64 {
     let times = || times_s.iter().copied();
-    let pauses =
-        || times().zip(times().skip(1).chain([end_s])).map(|(from_s, to_s)| dive.mission_s(to_s - from_s).max(0.0));
+    let pauses = || times().zip(times().skip(1).chain([end_s])).map(|(from_s, to_s)| (to_s - from_s).max(0.0));
     let half_s = pauses().sum::<f64>() / 2.0;
     let (mut low_s, mut high_s) = (0.0, pauses().fold(0.0, f64::max));
     for _ in 0..40 {
@@ -136,7 +133,7 @@ mod tests {
     }
 
     #[test]
-    fn longer_pauses_than_usual_are_told_in_mission_time() {
+    fn longer_pauses_than_usual_are_told() {
         let dive = dive_of(100.0, 1.0);
         let times: Vec<f64> = (0..=100).filter(|s| !(31..60).contains(s)).map(f64::from).collect();
         let told = "72 frames; half of the time, the last one was at most 0.7 s old, with 1 longer pause: 30 s from 1970-01-01T00:00:30Z to 1970-01-01T00:01:00Z.";
@@ -147,7 +144,7 @@ mod tests {
         let times: Vec<f64> = times.iter().map(|s| s / 10.0).collect();
         assert!(
             pauses(&faster, &times, faster.span_s)
-                .starts_with("72 frames; half of the time, the last one was at most 0.7 s old")
+                .starts_with("72 frames; half of the time, the last one was at most 0.1 s (0.7 s of the mission) old")
         );
     }
 

@@ -4,14 +4,37 @@ use super::Escaped;
 use super::chart::{self, Series};
 use super::dive::{Dive, DiveVehicle};
 use super::words::{self, counted};
-use crate::state::VehicleState;
+use crate::replay::FrameCounts;
+use crate::state::{LinkDirection, LinkSummary, VehicleState};
+use scenecast_core::utc_text;
 use scenecast_messages::scenecast_msgs::Link;
 use std::collections::BTreeMap;
 use std::fmt::Write;
 
 impl Dive {
+    /// What became of the frames, in sentences.
+    pub(super) fn link_sentences(&self, vehicle: &DiveVehicle) -> Vec<String> {
+        let mut sentences = Vec::new();
+        if vehicle.own.frames.sent + vehicle.own.frames.heard() > 0 && self.state.vehicles.len() == 1 {
+            let (own, surface) = (("vehicle", &vehicle.own.frames), ("surface", &self.frames));
+            let is_whole = vehicle.covers(self);
+            sentences.extend([(own, surface), (surface, own)].map(|(from, to)| transmitted(from, to, is_whole)));
+        }
+        sentences.extend(numbered(&self.state.link));
+        let LinkSummary { up, down, .. } = &self.state.link;
+        if !vehicle.has_modem(self) {
+            sentences.push("The frames did not go through a modem, so no energy is told.".to_owned());
+        } else if let (Some(up_j), Some(down_j)) = (up.energy_j, down.energy_j) {
+            sentences.push(format!(
+                "By modem.tx_watts of the surface and the frames that it knows of, the modems of the vehicles spent about {up_j:.0} J on transmitting, \
+                 that of the surface {down_j:.0} J."
+            ));
+        }
+        sentences
+    }
+
     /// The link and the position over time, the link over range, and what its bytes were.
-    pub(super) fn link(&self, page: &mut String, vehicle: &DiveVehicle) {
+    pub(super) fn link(&self, page: &mut String, state: &VehicleState, vehicle: &DiveVehicle) {
         let (begin, end) = self.span_s;
         let series = |name, unit, value: fn(&Link) -> f32| Series {
             name,
@@ -19,7 +42,7 @@ impl Dive {
             points: vehicle.link.iter().map(|(at_s, link)| (at_s - begin, f64::from(value(link)))).collect(),
         };
         let uncertainty = Series {
-            name: "standard deviation of the position",
+            name: "uncertainty of the place on the earth (68 %, east and north each)",
             unit: "m",
             points: vehicle.track.iter().map(|point| (point.at_s - begin, point.sigma_m)).collect(),
         };
@@ -45,26 +68,63 @@ impl Dive {
         } else {
             *page += "<p>The frames did not go through a modem, so their round trips tell no distance.</p>\n";
         }
-        self.frames_and_bytes(page, vehicle);
+        self.frames_and_bytes(page, state, vehicle);
     }
 
-    /// What became of the frames, and what the bytes of each class brought.
-    fn frames_and_bytes(&self, page: &mut String, vehicle: &DiveVehicle) {
-        let directions = [("from the vehicles", &self.state.link.up), ("to the vehicles", &self.state.link.down)];
-        *page += "<table><thead><tr><th>direction</th><th>frames</th><th>lost</th></tr></thead>";
-        for (name, direction) in directions {
-            let (frames, lost) = (direction.frames, direction.loss * 100.0);
-            let _ =
-                write!(page, "<tr><td>{name}</td><td class=\"n\">{frames}</td><td class=\"n\">{lost:.1} %</td></tr>");
+    /// Frames, losses and rates of each direction beside the budget of the end that sends.
+    fn directions(
+        &self,
+        page: &mut String,
+        state: &VehicleState,
+        vehicle: &DiveVehicle,
+        [up, down]: [(&str, &LinkDirection); 2],
+    ) {
+        *page += "<table><thead><tr><th>direction</th><th>frames</th><th>lost</th><th>bytes</th><th>mean rate</th><th>fullest \
+                  minute</th><th>budget of the sender</th></tr></thead>";
+        let of_surface = told_budgets(&budgets(vehicle.link.iter().map(|(at_s, link)| (*at_s, link))));
+        let reported = state.status.as_ref().map(|status| format!("{} bit/s by its last report", status.budget_bps));
+        let of_vehicle = told_budgets(&vehicle.own.budgets_bps).or(reported);
+        let fullest = |rate: fn(&Link) -> f32| {
+            let rates = vehicle.link.iter().map(|(_, link)| f64::from(rate(link)));
+            rates.filter(|bps| bps.is_finite()).fold(0.0, f64::max)
+        };
+        let rows =
+            [(up, fullest(|link| link.received_bps), of_vehicle), (down, fullest(|link| link.sent_bps), of_surface)];
+        for ((name, direction), fullest_bps, budget) in rows {
+            let bytes: u64 = direction.bytes_by_class.values().sum();
+            let _ = write!(
+                page,
+                "<tr><td>{name}</td><td class=\"n\">{}</td><td class=\"n\">{:.1} %</td><td class=\"n\">{bytes}</td><td class=\"n\">{:.0} bit/s</td>\
+                 <td class=\"n\">{fullest_bps:.0} bit/s</td><td>{}</td></tr>",
+                direction.frames,
+                direction.loss * 100.0,
+                bytes as f64 * 8.0 / self.surface_ran_s().max(1.0),
+                budget.as_deref().unwrap_or("not known")
+            );
         }
         let _ = writeln!(
             page,
-            "</table>\n<p>Frames are numbered: those are lost whose number the other end never received, over the whole mission.{}</p>",
+            "</table>\n<p>The surface counted these, copies of a frame once. Frames from the vehicles are lost if the surface never accepted their \
+             numbers, and frames to them if the vehicles did not acknowledge them.{} Bytes and rates from the vehicles are those \
+             that were heard, the others those that were sent. The mean is that over the time in which the surface ran, the fullest minute the \
+             highest mean of a minute.</p>",
             match self.frames.unused() {
                 0 => String::new(),
-                _ => format!(" At the surface, {}.", words::unused(&self.frames)),
+                _ => format!(" Counted one by one, copies too: at the surface, {}.", words::unused(&self.frames)),
             }
         );
+    }
+
+    /// For how long the surface recorded, mission seconds.
+    fn surface_ran_s(&self) -> f64 {
+        let stood_s: f64 = self.restarts_s.iter().map(|(from_s, to_s)| to_s - from_s).sum();
+        self.mission_s(self.surface_s.1 - self.surface_s.0 - stood_s)
+    }
+
+    /// What became of the frames, and what the bytes of each class brought.
+    fn frames_and_bytes(&self, page: &mut String, state: &VehicleState, vehicle: &DiveVehicle) {
+        let directions = [("from the vehicles", &self.state.link.up), ("to the vehicles", &self.state.link.down)];
+        self.directions(page, state, vehicle, directions);
         let has_own = !vehicle.own.sent_bits.is_empty() && self.vehicles.len() == 1;
         let own_title = if has_own { "<th>sent on board, copies not counted</th>" } else { "" };
         let _ = writeln!(
@@ -88,8 +148,7 @@ impl Dive {
                 );
             }
         }
-        *page +=
-            "</table>\n<p>Bytes from the vehicles are those that were heard, bytes to them those that were sent.</p>\n";
+        *page += "</table>\n";
     }
 
     /// What the bytes of a class brought.
@@ -135,6 +194,58 @@ impl Dive {
     }
 }
 
+/// The frames of one direction by the records of both ends.
+fn transmitted((sender, from): (&str, &FrameCounts), (hearer, to): (&str, &FrameCounts), is_whole: bool) -> String {
+    let lost = match from.sent.saturating_sub(to.heard()) {
+        _ if from.sent == to.heard() => String::new(),
+        _ if !is_whole => ", by records that do not cover the same time".to_owned(),
+        lost => format!(" ({:.1} % lost on the way)", lost as f64 / from.sent.max(1) as f64 * 100.0),
+    };
+    let (sent, heard) = (from.sent, to.heard());
+    format!(
+        "Counted by both records, each copy by itself: the {sender} transmitted {sent} frames, and the {hearer} heard {heard}{lost}; {}.",
+        words::unused(to)
+    )
+}
+
+/// What the numbers of the frames say; `None` if nothing came from the vehicles.
+fn numbered(LinkSummary { up, down, .. }: &LinkSummary) -> Option<String> {
+    let lost = |direction: &LinkDirection, none: &str, some: &str| match direction.lost {
+        0 => none.to_owned(),
+        lost => format!("{some}{lost} ({:.1} %)", direction.loss * 100.0),
+    };
+    let again = match up.lost + down.lost {
+        0 => "",
+        _ => "; what missed frames held of the map and of orders was sent again",
+    };
+    (up.frames > 0).then(|| {
+        format!(
+            "Counted by the surface alone, copies of a frame once: it missed {} of the {} frames from the vehicles (those that came \
+             in damaged are missed too), and the vehicles acknowledged {} of the {} frames to them{again}.",
+            lost(up, "none", ""),
+            up.frames,
+            lost(down, "all", "all but "),
+            down.frames
+        )
+    })
+}
+
+/// The budgets of the end that recorded these, and since when each was in force.
+pub(super) fn budgets<'a>(links: impl Iterator<Item = (f64, &'a Link)>) -> Vec<(f64, u32)> {
+    let mut steps: Vec<(f64, u32)> = links.map(|(at_s, link)| (at_s, link.budget_bps)).collect();
+    steps.dedup_by_key(|(_, bps)| *bps);
+    steps
+}
+
+fn told_budgets(budgets: &[(f64, u32)]) -> Option<String> {
+    let told = budgets.iter().enumerate().map(|(n, (at_s, bps))| match n {
+        0 => format!("{bps} bit/s"),
+        _ => format!("{bps} bit/s from {}", utc_text(*at_s)),
+    });
+    let told: Vec<String> = told.collect();
+    (!told.is_empty()).then(|| told.join(", "))
+}
+
 /// The cells of a layer of the maps at the end.
 fn sum_of_layer(dive: &Dive, layer: &str) -> usize {
     dive.vehicles().map(|(_, vehicle)| vehicle.layer_cells.get(layer).copied().unwrap_or_default()).sum()
@@ -173,4 +284,47 @@ fn over_range(vehicle: &DiveVehicle) -> String {
         + "</table>\n<p>Each moment is one of every ten seconds. Half of the round trip is told as a distance at 1500 m/s; the vehicle was nearer than that, \
              as the time that modems and serial lines take is in it. The share lost is that of the last 64 frames, or of all so far while there \
              are fewer.</p>\n"
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_loss_says_who_counted_it() {
+        let counts = |sent, received| FrameCounts { sent, received, ..FrameCounts::default() };
+        let told = |is_whole| transmitted(("vehicle", &counts(100, 0)), ("surface", &counts(0, 75)), is_whole);
+        let begin = "Counted by both records, each copy by itself: the vehicle transmitted 100 frames, and the surface heard 75";
+        assert_eq!(told(true), format!("{begin} (25.0 % lost on the way); all that arrived were used."));
+        assert_eq!(
+            told(false),
+            format!("{begin}, by records that do not cover the same time; all that arrived were used.")
+        );
+        let mut link = LinkSummary::default();
+        assert_eq!(numbered(&link), None);
+        (link.up, link.down) = (
+            LinkDirection { frames: 50, ..LinkDirection::default() },
+            LinkDirection { frames: 40, lost: 4, loss: 0.1, ..LinkDirection::default() },
+        );
+        let told = numbered(&link).unwrap();
+        assert!(told.contains("missed none of the 50") && told.contains("all but 4 (10.0 %) of the 40"), "{told}");
+    }
+
+    #[test]
+    fn rates_of_the_link_stand_beside_the_budget() {
+        let mut dive = Dive::default();
+        (dive.surface_s, dive.state.mission.speed) = ((0.0, 110.0), 1.0);
+        dive.restarts_s = vec![(50.0, 60.0)];
+        dive.state.link.up.bytes_by_class = [("map".to_owned(), 1000), ("status".to_owned(), 250)].into();
+        let link = |(at_s, bps, budget_bps): (f64, f32, u32)| {
+            (at_s, Link { received_bps: bps, budget_bps, ..Link::default() })
+        };
+        let mut vehicle = DiveVehicle::default();
+        vehicle.link = [(0.0, 90.0, 4000), (10.0, 180.0, 4000), (20.0, 60.0, 2500)].map(link).to_vec();
+        let mut page = String::new();
+        dive.frames_and_bytes(&mut page, &VehicleState::default(), &vehicle);
+        let row = "1250</td><td class=\"n\">100 bit/s</td><td class=\"n\">180 bit/s</td><td>not known</td>";
+        assert!(page.contains(row), "{page}");
+        assert!(page.contains("<td>4000 bit/s, 2500 bit/s from 1970-01-01T00:00:20Z</td>"), "{page}");
+    }
 }

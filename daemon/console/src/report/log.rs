@@ -6,22 +6,25 @@ use crate::replay::Recording;
 use scenecast_core::utc_text;
 use scenecast_messages::scenecast_msgs::Event;
 use scenecast_protocol::directive::SlotId;
-use scenecast_surface::LabelBook;
+use scenecast_surface::{LabelBook, LogKind};
 
 /// The source of the accounts of a vehicle's images.
 const IMAGES: &str = "images";
 
-/// A second, nanoseconds.
+/// The number of nanoseconds in a second.
 const SECOND: u64 = 1_000_000_000;
 
 /// The entries of the surface's log at the times at which they happened, each once, and what vehicles have recorded themselves.
-pub(super) fn events(recording: &Recording) -> Vec<(f64, Event)> {
+pub(super) fn events(recording: &Recording, is_scaled: bool) -> Vec<(f64, Event)> {
     let happened = |at: u64, event: &Event| match event.header.stamp.nanos() {
         0 => seconds(at),
         nanos => nanos as f64 / 1e9,
     };
     let mut events: Vec<(f64, Event)> =
         recording.log.iter().map(|(at, event)| (happened(*at, event), event.clone())).collect();
+    if is_scaled {
+        events.iter_mut().for_each(|(_, event)| name_mission_time(event));
+    }
     let unnamed = LabelBook::default();
     for (part, known) in &recording.vehicles {
         let given = recording.operator.get(part).into_iter().flat_map(|known| &known.given);
@@ -49,6 +52,14 @@ pub(super) fn events(recording: &Recording) -> Vec<(f64, Event)> {
     events
 }
 
+/// Says of the times in an event about silence that they are the mission's.
+fn name_mission_time(event: &mut Event) {
+    let is_time = ["silent for ", "received again after "].iter().any(|begin| event.text.starts_with(begin));
+    if event.source == LogKind::Contact.name() && is_time {
+        event.text += " of the mission";
+    }
+}
+
 /// The last account of the images in each of a vehicle's runs.
 pub(super) fn images(events: &[(u64, Event)], runs: &[(u64, u64)]) -> Vec<String> {
     let last = |(from, to): &(u64, u64)| {
@@ -60,4 +71,21 @@ pub(super) fn images(events: &[(u64, Event)], runs: &[(u64, u64)]) -> Vec<String
         Some(format!("{}{least}", event.text))
     };
     runs.iter().filter_map(last).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn times_of_silence_are_named_as_the_missions() {
+        let named = |source: &str, text: &str| {
+            let mut event = Event { source: source.to_owned(), text: text.to_owned(), ..Event::default() };
+            name_mission_time(&mut event);
+            event.text
+        };
+        assert_eq!(named("contact", "silent for 1 min 0 s"), "silent for 1 min 0 s of the mission");
+        assert_eq!(named("contact", "received"), "received");
+        assert_eq!(named("record", "silent for 1 min 0 s"), "silent for 1 min 0 s");
+    }
 }

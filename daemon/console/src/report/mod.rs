@@ -12,7 +12,10 @@ mod log;
 mod maps;
 mod orders;
 mod page;
+mod restart;
+mod settings;
 mod summary;
+mod times;
 mod track;
 mod trouble;
 mod words;
@@ -42,7 +45,7 @@ pub fn report_reply(records: &[PathBuf]) -> Reply {
 
 use std::fmt;
 
-/// A text in HTML.
+/// Displays a text as part of HTML: special characters escaped, control and invisible characters left out.
 struct Escaped<'a>(&'a str);
 
 impl fmt::Display for Escaped<'_> {

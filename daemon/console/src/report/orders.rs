@@ -50,9 +50,9 @@ impl OrderStep {
     }
 }
 
-/// The time from an order to a moment, mission seconds.
+/// The time from an order to a moment.
 fn after(dive: &Dive, given_s: f64, at_s: f64) -> String {
-    format!("{:.1} s", ((at_s - given_s) * dive.state.mission.speed).max(0.0))
+    dive.lasted_tenths((at_s - given_s).max(0.0))
 }
 
 impl DiveVehicle {
@@ -275,6 +275,12 @@ impl Dive {
         if steps.is_empty() {
             return;
         }
+        // A surface logs changes alone.
+        if vehicle.own.runs_s.is_empty() {
+            let unknown =
+                "this record does not have the mode before the first change below; the vehicle's own record has it";
+            steps.push((self.surface_s.0, unknown.to_owned()));
+        }
         steps.sort_by(|a, b| a.0.total_cmp(&b.0));
         *page += "<h3>Orders that steer, and modes, over time</h3>\n<table><thead><tr><th>time (UTC)</th><th>what</th><th>cells on the map by \
                   then</th></tr></thead>\n";
@@ -301,7 +307,7 @@ pub(super) fn said(text: &str, is_it: impl Fn(&str) -> bool) -> Option<(String, 
 mod tests {
     use super::*;
     use scenecast_messages::builtin_interfaces::Time;
-    use scenecast_messages::scenecast_msgs::Order;
+    use scenecast_messages::scenecast_msgs::{Event, Order};
 
     fn status(version: u32, status: u8, s: i64) -> OrderStatus {
         let mut message = OrderStatus { slot: "fence".into(), version, status, ..OrderStatus::default() };
@@ -324,6 +330,22 @@ mod tests {
         assert_eq!(told(2), "images of label 7, beside those of label 4");
         assert_eq!(told(5), "images of label 7, asked for before, again");
         assert_eq!(told(6), "no image is asked for any more");
+    }
+
+    #[test]
+    fn the_first_mode_of_a_surface_alone_is_not_known() {
+        let (mut dive, state, mut vehicle) = (Dive::default(), VehicleState::default(), DiveVehicle::default());
+        let mode =
+            |source: &str| (5.0, Event { source: source.to_owned(), text: "surveying".to_owned(), ..Event::default() });
+        dive.events = vec![mode("mode"), mode("mode, on board")];
+        let told = |vehicle: &DiveVehicle| {
+            let mut page = String::new();
+            dive.steering(&mut page, &state, vehicle);
+            page.contains("surveying").then(|| page.contains("does not have the mode before"))
+        };
+        assert_eq!(told(&vehicle), Some(true));
+        vehicle.own.runs_s = vec![(0.0, 9.0)];
+        assert_eq!(told(&vehicle), Some(false));
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use super::areas::ClassArea;
 use super::chart;
-use super::dive::{Dive, DiveVehicle, SettingsRecord};
+use super::dive::{Dive, DiveVehicle};
 use super::orders::said;
 use super::{Escaped, doubts, extent, summary, words};
 use crate::state::VehicleState;
@@ -52,10 +52,10 @@ impl Dive {
 
     /// Settings, versions, and how to cite.
     fn origin_of_figures(&self, page: &mut String) {
-        settings(page, "the surface", &self.settings);
+        self.settings.table(page, "the surface");
         // Both ends of a rehearsal run with the same.
         let others = self.vehicles().filter(|(_, vehicle)| vehicle.own.settings != self.settings);
-        others.for_each(|(state, vehicle)| settings(page, &state.name, &vehicle.own.settings));
+        others.for_each(|(state, vehicle)| vehicle.own.settings.table(page, &state.name));
         let (begin, end) = (utc_text(self.span_s.0), utc_text(self.span_s.1));
         let (mission, run) = (Escaped(&self.state.mission.name), Escaped(&self.state.mission.id));
         let recorded = if self.settings.program.is_empty() { "an earlier scenecast" } else { &self.settings.program };
@@ -101,15 +101,12 @@ impl Dive {
     }
 
     fn vehicle(&self, page: &mut String, state: &VehicleState, vehicle: &DiveVehicle) {
-        let _ = writeln!(page, "<h2>{}</h2>\n<ul>", Escaped(&state.name));
-        for sentence in summary::summary(self, state, vehicle) {
-            let _ = writeln!(page, "<li>{}</li>", Escaped(&sentence));
+        let _ = writeln!(page, "<h2>{}</h2>", Escaped(&state.name));
+        let doubts = ("How far to trust it", doubts::doubts(self, state, vehicle));
+        for (title, sentences) in summary::summary(self, state, vehicle).into_iter().chain([doubts]) {
+            let items: String = sentences.iter().map(|sentence| format!("<li>{}</li>\n", Escaped(sentence))).collect();
+            let _ = writeln!(page, "<h3>{title}</h3>\n<ul>\n{items}</ul>");
         }
-        *page += "</ul>\n<h3>What not to trust</h3>\n<ul>\n";
-        for sentence in doubts::doubts(self, state, vehicle) {
-            let _ = writeln!(page, "<li>{}</li>", Escaped(&sentence));
-        }
-        *page += "</ul>\n";
         let area = extent::of_survey(self, vehicle);
         if let Some(map) = chart::map(state, vehicle, area) {
             let _ = writeln!(
@@ -134,7 +131,7 @@ impl Dive {
         self.orders_table(page, state, vehicle);
         self.in_force(page, state, vehicle);
         self.steering(page, state, vehicle);
-        self.link(page, vehicle);
+        self.link(page, state, vehicle);
     }
 
     /// Who named and merged labels, and when.
@@ -194,7 +191,7 @@ impl Dive {
             });
             json!({
                 "name": state.name,
-                "summary": summary::summary(self, state, vehicle),
+                "summary": summary::summary(self, state, vehicle).into_iter().flat_map(|(_, told)| told).collect::<Vec<_>>(),
                 "doubts": doubts::doubts(self, state, vehicle),
                 "distance_m": vehicle.distance_m(),
                 "cell_m": vehicle.cell_m,
@@ -226,7 +223,7 @@ impl Dive {
                 .collect::<Vec<_>>(),
             "program": self.settings.program,
             "rehearsal_seed": self.settings.rehearsal_seed,
-            "settings": self.settings.settings,
+            "settings": self.settings.told(),
             "mission_speed": self.state.mission.speed,
             "begin": utc_text(self.span_s.0),
             "end": utc_text(self.span_s.1),
@@ -234,23 +231,6 @@ impl Dive {
             "vehicles": vehicles.collect::<Vec<_>>(),
         })
     }
-}
-
-/// What an end ran with.
-fn settings(page: &mut String, end: &str, settings: &SettingsRecord) {
-    if settings.settings.is_empty() {
-        return;
-    }
-    let _ = write!(
-        page,
-        "<h2>Settings of {}</h2>\n<p>{}: those of the configuration that differ from their defaults, without files, folders and ports of the computer.</p>\n<table>",
-        Escaped(end),
-        Escaped(&settings.program)
-    );
-    for (key, value) in &settings.settings {
-        let _ = write!(page, "<tr><td>{}</td><td>{}</td></tr>", Escaped(key), Escaped(&value.to_string()));
-    }
-    *page += "</table>\n";
 }
 
 fn classes(page: &mut String, dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) {
@@ -288,7 +268,13 @@ fn pictures(page: &mut String, dive: &Dive, state: &VehicleState, vehicle: &Dive
     let bare = bare.map(|(class, _)| words::label(&state.label_book, *class));
     let bare: Vec<String> = bare.collect();
     if !all.is_empty() {
-        let _ = writeln!(page, "<h3>Images of the classes</h3>\n<div class=\"images\">{all}</div>");
+        let sigma = match all.contains('\u{b1}') {
+            true => {
+                "<p>\u{b1}: the uncertainty of the vehicle's place on the earth when the image was taken (68 %, east and north each).</p>\n"
+            }
+            false => "",
+        };
+        let _ = writeln!(page, "<h3>Images of the classes</h3>\n{sigma}<div class=\"images\">{all}</div>");
     }
     if !bare.is_empty() {
         let _ = writeln!(page, "<p>Classes of which no image was received: {}.</p>", Escaped(&bare.join(", ")));
@@ -409,4 +395,23 @@ fn notes(page: &mut String, dive: &Dive, state: &VehicleState) {
         let _ = writeln!(page, "<li>{}, {author}: {}</li>", utc_text(dive.unix_s(at_s)), Escaped(&text));
     }
     *page += "</ul>\n";
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use scenecast_messages::contents::valid_part;
+
+    #[test]
+    fn the_summary_has_headings() {
+        let mut dive = Dive::default();
+        let state = VehicleState { name: "wrasse".to_owned(), ..VehicleState::default() };
+        dive.vehicles.insert(valid_part(&state.name), DiveVehicle::default());
+        dive.state.vehicles = vec![state];
+        let page = dive.html();
+        let places = ["Where and when", "What was found", "What went wrong", "How far to trust it"]
+            .map(|title| page.find(&format!("<h3>{title}</h3>")).unwrap());
+        assert!(places.is_sorted(), "{places:?}");
+        assert!(dive.json()["vehicles"][0]["summary"][0].is_string(), "sentences without headings");
+    }
 }

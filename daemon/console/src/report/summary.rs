@@ -3,10 +3,9 @@
 use super::dive::{Dive, DiveVehicle};
 use super::maps::MapsAt;
 use super::orders::OrderStep;
-use super::words::{self, area, counted, duration, interval, on_earth};
+use super::words::{self, area, counted, interval, on_earth};
 use super::{extent, gaps, trouble};
-use crate::replay::FrameCounts;
-use crate::state::{LinkDirection, VehicleState};
+use crate::state::VehicleState;
 use scenecast_core::utc_text;
 use scenecast_messages::scenecast_msgs::{Event, OrderStatus};
 use scenecast_protocol::directive::{PlannerKind, SlotId};
@@ -21,72 +20,34 @@ const LEAST_JUMP_M: f64 = 2.0;
 /// Jumps that are told one by one.
 const MAX_JUMPS: usize = 4;
 
-/// Where, when, how long, how far, what was found, what was ordered and what failed, a sentence each.
-pub(super) fn summary(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -> Vec<String> {
-    let mut sentences = Vec::new();
-    sentences.extend(vehicle.made_up(dive).map(|what| format!("This was {what}.")));
-    if dive.settings.is_rehearsal() && utc_text(dive.span_s.0).starts_with("2000-01-01") {
-        sentences.push("Its dates mean nothing: a rehearsal in virtual time begins on 2000-01-01.".to_owned());
-    }
-    sentences.push(when(dive, state, vehicle));
-    sentences.push(place(dive, state, vehicle));
-    sentences.push(equipment(dive, vehicle));
-    let alone = is_coarse(vehicle).then(|| alone(vehicle));
-    sentences.push(found(state, vehicle, alone));
-    sentences.extend(extent::of_map(dive, state, vehicle));
-    sentences.extend(extent::sea_floor(dive, state, vehicle));
-    sentences.extend(arrived(dive, state, vehicle, alone));
-    let surveyed = surveyed(dive, state, vehicle);
-    sentences.extend(agreement(vehicle, &surveyed));
-    sentences.extend(lag(vehicle, &surveyed));
-    sentences.push(orders(dive, state, vehicle));
-    sentences.extend(link(dive, vehicle));
-    sentences.extend(gaps::heard(dive, vehicle));
-    sentences.extend(trouble::told(dive, state, vehicle));
-    sentences
-}
+/// A heading, and the sentences below it.
+pub(super) type Part = (&'static str, Vec<String>);
 
-/// What became of the frames.
-fn link(dive: &Dive, vehicle: &DiveVehicle) -> Vec<String> {
-    let mut sentences = Vec::new();
-    let link = &dive.state.link;
-    let lost = |direction: &LinkDirection| direction.loss * 100.0;
-    let (own, surface) = (&vehicle.own.frames, &dive.frames);
-    if own.sent + own.heard() > 0 && dive.state.vehicles.len() == 1 {
-        let is_whole = vehicle.covers(dive);
-        let told = |from: &FrameCounts, to: &FrameCounts| {
-            let lost = from.sent.saturating_sub(to.heard()) as f64 / from.sent.max(1) as f64 * 100.0;
-            let lost = if is_whole { format!(", of which {lost:.1} % were lost") } else { String::new() };
-            format!("{} frames, copies included{lost}; {}", from.sent, words::unused(to))
-        };
-        sentences.push(format!("By both records, the vehicle transmitted {}.", told(own, surface)));
-        sentences.push(format!("By both records, the surface transmitted {}.", told(surface, own)));
-    }
-    sentences.extend(match link.up.lost + link.down.lost {
-        // Of the others nobody knows how many there were.
-        _ if link.up.frames == 0 => None,
-        0 => Some(format!(
-            "Of {} numbered frames from the vehicles and {} to them none was lost.",
-            link.up.frames, link.down.frames
-        )),
-        _ => Some(format!(
-            "Copies not counted, {} frames from the vehicles and {} to them had numbers. {:.1} % and {:.1} % of these never arrived in a usable \
-             form; what they held of the map and of orders was sent again.",
-            link.up.frames,
-            link.down.frames,
-            lost(&link.up),
-            lost(&link.down)
-        )),
-    });
-    if let (Some(up_j), Some(down_j), true) = (link.up.energy_j, link.down.energy_j, vehicle.has_modem(dive)) {
-        sentences.push(format!(
-            "By modem.tx_watts of the surface and the frames that it knows of, the modems of the vehicles spent about {up_j:.0} J on transmitting, \
-             that of the surface {down_j:.0} J."
-        ));
-    } else if !vehicle.has_modem(dive) {
-        sentences.push("The frames did not go through a modem, so no energy is told.".to_owned());
-    }
-    sentences
+/// Where, when, how long, how far, what was found, what was ordered and what failed.
+pub(super) fn summary(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -> Vec<Part> {
+    let dates = (dive.settings.is_rehearsal() && utc_text(dive.span_s.0).starts_with("2000-01-01"))
+        .then(|| "Its dates mean nothing: a rehearsal in virtual time begins on 2000-01-01.".to_owned());
+    let made_up = vehicle.made_up(dive).map(|what| format!("This was {what}."));
+    let way = [when(dive, state, vehicle), place(dive, state, vehicle), equipment(dive, vehicle)];
+    let alone = is_coarse(vehicle).then(|| alone(vehicle));
+    let surveyed = surveyed(dive, state, vehicle);
+    let map = [
+        Some(found(state, vehicle, alone)),
+        extent::of_map(dive, state, vehicle),
+        extent::sea_floor(dive, state, vehicle),
+        arrived(dive, state, vehicle, alone),
+        agreement(vehicle, &surveyed),
+        lag(dive, vehicle, &surveyed),
+    ];
+    let mut sent = vec![orders(dive, state, vehicle)];
+    sent.extend(dive.link_sentences(vehicle));
+    sent.extend(gaps::heard(dive, vehicle));
+    vec![
+        ("Where and when", made_up.into_iter().chain(dates).chain(way).collect()),
+        ("What was found", map.into_iter().flatten().collect()),
+        ("What was ordered and sent", sent),
+        ("What went wrong", trouble::told(dive, state, vehicle)),
+    ]
 }
 
 /// The moments of the comparison at which the vehicle surveyed, or all of them where its modes are not known.
@@ -128,10 +89,10 @@ fn agreement(vehicle: &DiveVehicle, surveyed: &[MapsAt]) -> Option<String> {
 }
 
 /// How far the operator's map was behind.
-fn lag(vehicle: &DiveVehicle, surveyed: &[MapsAt]) -> Option<String> {
+fn lag(dive: &Dive, vehicle: &DiveVehicle, surveyed: &[MapsAt]) -> Option<String> {
     let lags: Vec<f64> = surveyed.iter().map(|maps| maps.lag_s).filter(|lag_s| lag_s.is_finite()).collect();
-    let (median_s, most) = (words::median(&lags)?, duration(lags.iter().copied().fold(0.0, f64::max)));
-    let median = duration(median_s);
+    let (median_s, most) = (words::median(&lags)?, dive.mission_lasted(lags.iter().copied().fold(0.0, f64::max)));
+    let median = dive.mission_lasted(median_s);
     let when = if surveyed.len() == vehicle.maps.len() { "over the record" } else { "while it surveyed" };
     Some(match vehicle.own.runs_s.is_empty() {
         false if median_s < 1.0 => format!(
@@ -154,12 +115,9 @@ fn lag(vehicle: &DiveVehicle, surveyed: &[MapsAt]) -> Option<String> {
 
 fn when(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -> String {
     let (begin, end) = dive.span_s;
-    let is_faster = (dive.state.mission.speed - 1.0).abs() > 0.01;
-    let speed = match is_faster {
+    let speed = match dive.is_scaled() {
         true => format!(
-            " of the clock and {} of the mission, which was played {} times as fast as real time (lengths of time below are the mission's, times of \
-             day the clock's)",
-            duration(dive.mission_s(end - begin)),
+            ", as the mission was played {} times as fast as real time (times are those of the clock; speeds and rates are those of the mission)",
             dive.state.mission.speed
         ),
         false => String::new(),
@@ -173,12 +131,12 @@ fn when(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -> String {
         )
     });
     format!(
-        "The record of {} (address {}) covers {} to {} (UTC){ends}, {}{speed}; the vehicle reported its place {}.",
+        "The record of {} (address {}) covers {} to {}{ends}, {}{speed}; the vehicle reported its place {}.",
         state.name,
         state.id,
         utc_text(begin),
         utc_text(end),
-        duration(end - begin),
+        dive.lasted(end - begin),
         counted(vehicle.track.len(), "time", "times")
     )
 }
@@ -205,7 +163,7 @@ fn arrived(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle, alone: Opti
     (reported > 0).then(|| {
         format!(
             "In its last report, {} before the end of the record, the vehicle had {reported} cells; {held} had arrived by the end{}.{coarse}",
-            duration(dive.mission_s(before_end_s)),
+            dive.lasted(before_end_s),
             match held > reported {
                 true => ", as it mapped and sent more after that".to_owned(),
                 false => format!(", {share:.0} %"),
@@ -289,14 +247,7 @@ fn place(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -> String {
     };
     let speed = vehicle.speed_m_s().filter(|_| !vehicle.is_played_back());
     let speed = speed.map_or_else(String::new, |m_s| format!(", at {m_s:.2} m/s on average while it moved"));
-    let jumps = vehicle.jumps().filter(|(from, to)| from.distance_m(to) >= LEAST_JUMP_M);
-    let jumps = jumps.map(|(from, to)| format!("{:.0} m at {}", from.distance_m(to), utc_text(to.at_s)));
-    let jumps: Vec<String> = jumps.collect();
-    let jumps = match jumps.len() {
-        0 => String::new(),
-        n if n > MAX_JUMPS => format!(" ({n} jumps to another place not counted)"),
-        _ => format!(" (not counted: a jump of {})", jumps.join(", and one of ")),
-    };
+    let jumps = jumps(vehicle);
     format!(
         "By its {} about {:.0} m{jumps}{speed}, {depth} below the surface.{begin}, and ended {} and {} of the origin{}; {origin}.{}{}",
         if vehicle.own.track.len() > 1 { "own record it went" } else { "reports it went at least" },
@@ -307,6 +258,27 @@ fn place(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -> String {
         moved(state, vehicle),
         uncertainty(vehicle)
     )
+}
+
+/// What its path does not have, in brackets: where it would have had to be faster than it ever was, and what it went while its program
+/// did not run.
+fn jumps(vehicle: &DiveVehicle) -> String {
+    let jumps = vehicle.jumps().filter(|(from, to)| from.distance_m(to) >= LEAST_JUMP_M);
+    let told = jumps.map(|(from, to)| {
+        let (m, from_s, to_s) = (from.distance_m(to), utc_text(from.at_s), utc_text(to.at_s));
+        match vehicle.began_between(from, to) {
+            true => format!(
+                "{m:.0} m between its last place before a restart, {from_s}, and the first one after it, {to_s}"
+            ),
+            false => format!("a jump of {m:.0} m at {to_s}"),
+        }
+    });
+    let told: Vec<String> = told.collect();
+    match told.len() {
+        0 => String::new(),
+        n if n > MAX_JUMPS => format!(" ({n} jumps to another place not counted)"),
+        _ => format!(" (not counted: {})", told.join(", and ")),
+    }
 }
 
 /// How far its own record is moved so that it lies on the map.
@@ -322,6 +294,10 @@ fn moved(state: &VehicleState, vehicle: &DiveVehicle) -> String {
     }
 }
 
+/// What the uncertainty of a place is.
+const WITHIN: &str =
+    "the uncertainty of its place on the earth (east and north each are within it with a probability of 68 %) was";
+
 /// The uncertainty of its place over the record.
 fn uncertainty(vehicle: &DiveVehicle) -> String {
     let sigmas = vehicle.path().iter().map(|point| point.sigma_m).filter(|sigma_m| sigma_m.is_finite());
@@ -329,15 +305,16 @@ fn uncertainty(vehicle: &DiveVehicle) -> String {
     let (Some(median_m), Some(last_m)) = (words::median(&sigmas), sigmas.last()) else { return String::new() };
     let most_m = sigmas.iter().copied().fold(0.0, f64::max);
     if !vehicle.measures_sigma() {
-        return format!(" The uncertainty of its place was not measured: it stayed at {last_m:.2} m, as it began.");
+        return format!(
+            " The uncertainty of its place on the earth was not measured: it stayed at {last_m:.2} m, as it began."
+        );
     }
     if format!("{median_m:.2} {last_m:.2}") == format!("{most_m:.2} {most_m:.2}") {
-        return format!(" It reported its place with a standard deviation of {last_m:.2} m.");
+        return format!(" By its own estimate, {WITHIN} {last_m:.2} m.");
     }
     let checked = if vehicle.has_fixes() { "" } else { ", which nothing has checked" };
     format!(
-        " By its own estimate{checked}, the standard deviation of its place was {median_m:.1} m or less half of the time, {most_m:.1} m at most, \
-         and {last_m:.1} m at the end."
+        " By its own estimate{checked}, {WITHIN} {median_m:.1} m or less half of the time, {most_m:.1} m at most, and {last_m:.1} m at the end."
     )
 }
 

@@ -4,6 +4,13 @@ use super::dive::DiveVehicle;
 use super::words;
 use scenecast_messages::geometry_msgs::PoseWithCovarianceStamped;
 
+/// No vehicle is faster, m/s.
+const MAX_M_S: f64 = 3.0;
+/// A record may have each place more than once, so speeds are those of such mission times, seconds.
+const SPAN_S: f64 = 10.0;
+/// A slower vehicle stands, m/s.
+const LEAST_M_S: f64 = 0.05;
+
 /// A reported place, metres in the world frame.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct TrackPoint {
@@ -26,10 +33,14 @@ pub(super) fn measured(mut path: Vec<TrackPoint>, mission_speed: f64) -> Vec<Tra
 impl TrackPoint {
     /// Whether no vehicle is so fast as it would have been from here to there. Times are of the wall clock.
     fn jumps_to(&self, next: &Self, mission_speed: f64) -> bool {
+        self.is_too_far(next, (next.at_s - self.at_s) * mission_speed, MAX_M_S)
+    }
+
+    /// Whether it is farther to another place than a vehicle of this speed gets in a mission time.
+    fn is_too_far(&self, next: &Self, time_s: f64, max_m_s: f64) -> bool {
         const JUMP_M: f64 = 5.0;
-        const MAX_M_S: f64 = 3.0;
-        let (step_m, time_s) = (self.distance_m(next), (next.at_s - self.at_s) * mission_speed);
-        step_m >= JUMP_M && step_m > MAX_M_S * time_s
+        let step_m = self.distance_m(next);
+        step_m >= JUMP_M && step_m > max_m_s * time_s
     }
 
     pub(super) fn distance_m(&self, other: &Self) -> f64 {
@@ -58,14 +69,48 @@ impl DiveVehicle {
         if self.own.track.len() > 1 { &self.own.track } else { &self.track }
     }
 
-    /// The parts of its path between jumps: where its program began again with another place, or no vehicle is so fast.
+    /// The parts of its path between jumps: where its program began again with another place, or where it would have had to be faster
+    /// than it ever was.
     pub(super) fn legs(&self) -> impl Iterator<Item = &[TrackPoint]> {
-        let is_own = self.own.track.len() > 1;
-        let own = self.own.runs_s.iter().skip(1).map(|(began_s, _)| *began_s);
-        let restarts: Vec<f64> = if is_own { own.collect() } else { self.restarts_s.clone() };
+        const DOUBT: f64 = 1.5;
+        let max_m_s = self.fastest_m_s().map_or(MAX_M_S, |m_s| m_s * DOUBT);
+        let mut since_s = f64::NAN;
+        // Asks for each pair once, in order.
         self.path().chunk_by(move |a, b| {
-            let began_between = restarts.iter().any(|began_s| a.at_s < *began_s && b.at_s >= *began_s);
-            a.distance_m(b) < 1.0 || !began_between && !a.jumps_to(b, self.mission_speed)
+            // While nothing measures its place, a record repeats the last one.
+            let is_repeated = a.distance_m(b) == 0.0;
+            let from_s = if since_s.is_nan() { a.at_s } else { since_s };
+            since_s = if is_repeated { from_s } else { f64::NAN };
+            let is_too_far = || a.is_too_far(b, (b.at_s - from_s) * self.mission_speed, max_m_s);
+            a.distance_m(b) < 1.0 || !self.began_between(a, b) && !is_too_far()
+        })
+    }
+
+    /// Whether its program began again between two of its places.
+    pub(super) fn began_between(&self, a: &TrackPoint, b: &TrackPoint) -> bool {
+        let is_between = |began_s: &f64| a.at_s < *began_s && b.at_s >= *began_s;
+        match self.own.track.len() > 1 {
+            true => self.own.runs_s.iter().skip(1).any(|(began_s, _)| is_between(began_s)),
+            false => self.restarts_s.iter().any(is_between),
+        }
+    }
+
+    /// The highest mean speed over ten seconds of the mission, m/s; `None` if it did not move for so long.
+    fn fastest_m_s(&self) -> Option<f64> {
+        let pairs = self.path().iter().zip(self.path().iter().skip(1));
+        let steps = pairs.filter(|(a, b)| !self.began_between(a, b) && !a.jumps_to(b, self.mission_speed));
+        self.spans(steps).map(|(m, s)| m / s).filter(|m_s| *m_s >= LEAST_M_S).reduce(f64::max)
+    }
+
+    /// The length and the mission time of each ten seconds of some steps.
+    fn spans<'a>(
+        &self,
+        steps: impl Iterator<Item = (&'a TrackPoint, &'a TrackPoint)>,
+    ) -> impl Iterator<Item = (f64, f64)> {
+        let mut span = (0.0, 0.0);
+        steps.filter_map(move |(a, b)| {
+            span = (span.0 + a.distance_m(b), span.1 + (b.at_s - a.at_s) * self.mission_speed);
+            (span.1 >= SPAN_S).then(|| std::mem::take(&mut span))
         })
     }
 
@@ -91,26 +136,15 @@ impl DiveVehicle {
 
     /// Its speed while it moved, m/s, where its own record tells it. Times are of the wall clock, which the mission may be ahead of.
     pub(super) fn speed_m_s(&self) -> Option<f64> {
-        const LEAST_M_S: f64 = 0.05;
-        // A record may have each place more than once.
-        const SPAN_S: f64 = 10.0;
         if self.own.track.len() < 2 {
             return None;
         }
-        let (mut moved, mut span, mut total_s) = ((0.0, 0.0), (0.0, 0.0), 0.0);
-        for (a, b) in self.steps() {
-            let step_s = (b.at_s - a.at_s) * self.mission_speed;
-            total_s += step_s;
-            span = (span.0 + a.distance_m(b), span.1 + step_s);
-            if span.1 >= SPAN_S {
-                if span.0 / span.1 >= LEAST_M_S {
-                    moved = (moved.0 + span.0, moved.1 + span.1);
-                }
-                span = (0.0, 0.0);
-            }
-        }
+        let add = |sum: (f64, f64), (m, s): (f64, f64)| (sum.0 + m, sum.1 + s);
+        let step = |(a, b): (&TrackPoint, &TrackPoint)| (a.distance_m(b), (b.at_s - a.at_s) * self.mission_speed);
+        let whole = self.steps().map(step).fold((0.0, 0.0), add);
+        let moved = self.spans(self.steps()).filter(|(m, s)| m / s >= LEAST_M_S).fold((0.0, 0.0), add);
         // A path may be shorter than a span.
-        let (m, s) = if total_s >= SPAN_S { moved } else { span };
+        let (m, s) = if whole.1 >= SPAN_S { moved } else { whole };
         (s > 0.0 && m / s >= LEAST_M_S).then(|| m / s)
     }
 
@@ -153,6 +187,19 @@ mod tests {
         assert_eq!(left(&[0.0, 0.0, 20.0, 21.0]), [20.0, 21.0]);
         assert_eq!(left(&[0.0, 1.0, 2.0, 3.0, 4.0, 20.0]).len(), 6, "a jump under way");
         assert_eq!(left(&[0.0]), [0.0]);
+    }
+
+    #[test]
+    fn a_step_that_its_speed_allows_is_no_jump() {
+        let legs = |east_m: Vec<f64>| {
+            let mut vehicle = vehicle(&east_m, &[]);
+            vehicle.mission_speed = 1.0;
+            vehicle.legs().count()
+        };
+        let way = || (0..30).map(|n| f64::from(n) * 0.5);
+        assert_eq!(legs(way().chain([20.5]).collect()), 2, "6 m in a second at 0.5 m/s");
+        let unmeasured = way().chain(std::iter::repeat_n(14.5, 10)).chain([20.5]);
+        assert_eq!(legs(unmeasured.collect()), 1, "6 m in the 11 s since its place was measured");
     }
 
     #[test]

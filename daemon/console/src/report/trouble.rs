@@ -32,17 +32,14 @@ pub(super) fn told(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -> 
     };
     let of_it = || dive.events.iter().filter(|(_, event)| is_of_it(event));
     let told = |(at_s, event): &(f64, Event)| (*at_s, words::event(&state.label_book, event));
-    let restarts = |who: &'static str, lost: &'static str| {
-        move |(from_s, to_s): (f64, f64)| {
-            (from_s, format!("{who} record stops; its program ran again from {}{lost}", utc_text(to_s)))
-        }
+    let restart = |who: &str, (from_s, to_s): (f64, f64), map: String| {
+        (from_s, format!("{who} record stops; its program ran again from {}{map}", utc_text(to_s)))
     };
     let mut found: Vec<(f64, String)> = of_it().filter(|(_, event)| is_trouble(event)).map(told).collect();
     found.extend(faults(dive, state));
-    found.extend(dive.restarts_s.iter().copied().map(restarts("the surface's", "")));
-    found.extend(
-        vehicle.own.pauses().map(restarts("the vehicle's", ", and what it had not stored may be lost on board")),
-    );
+    found.extend(dive.restarts_s.iter().map(|pause| restart("the surface's", *pause, String::new())));
+    let pauses = vehicle.own.pauses().zip(&vehicle.own.set_backs);
+    found.extend(pauses.map(|(pause, set_back)| restart("the vehicle's", pause, set_back.told(dive))));
     found.sort_by(|a, b| a.0.total_cmp(&b.0));
     let planned = of_it().filter(|(_, event)| event.source == modes && is_limited(&event.text)).map(told);
     let planned: Vec<(f64, String)> = planned.collect();
@@ -50,9 +47,7 @@ pub(super) fn told(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -> 
         true => "No fault and no restart was reported.",
         false => "No fault, no restart and no silence was reported.",
     };
-    let mut sentences = vec![
-        listed("Faults, restarts and silences, when they were reported", &found).unwrap_or_else(|| none.to_owned()),
-    ];
+    let mut sentences = vec![listed("Faults, restarts and silences", &found).unwrap_or_else(|| none.to_owned())];
     let planned_title = match vehicle.own.runs_s.is_empty() {
         true => "Why it did not survey, when the surface learned of it",
         false => "Why it did not survey",
@@ -76,8 +71,8 @@ fn equipment(text: &str) -> Option<Vec<(&'static str, bool)>> {
     }
 }
 
-/// The faults of its equipment as it reported them: when they began and, of those with which the survey does not proceed as planned,
-/// when they ended. The end of others is not reported.
+/// The faults of its equipment: by when they had begun and, of those with which the survey does not proceed as planned, by when they had
+/// ended, as reports of its status come every few seconds. The end of others is not reported.
 fn faults(dive: &Dive, state: &VehicleState) -> Vec<(f64, String)> {
     let mut open: Vec<(&str, f64)> = Vec::new();
     let mut told: Vec<(f64, String)> = Vec::new();
@@ -87,18 +82,20 @@ fn faults(dive: &Dive, state: &VehicleState) -> Vec<(f64, String)> {
             open.into_iter().partition(|(fault, _)| reported.iter().any(|(known, _)| known == fault));
         open = last;
         told.extend(over.into_iter().map(|(fault, from_s)| {
-            let lasted = words::duration(dive.mission_s(at_s - from_s));
-            (from_s, format!("{fault} until {} ({lasted})", utc_text(at_s)))
+            let lasted = dive.lasted(at_s - from_s);
+            (from_s, format!("by then {fault}, reported as over by {}, {lasted} later", utc_text(at_s)))
         }));
         for (fault, is_grave) in reported {
             if !is_grave {
-                told.push((at_s, fault.to_owned()));
+                told.push((at_s, format!("by then {fault}")));
             } else if open.iter().all(|(known, _)| *known != fault) {
                 open.push((fault, at_s));
             }
         }
     }
-    told.extend(open.into_iter().map(|(fault, from_s)| (from_s, format!("{fault} until the end of the record"))));
+    told.extend(
+        open.into_iter().map(|(fault, from_s)| (from_s, format!("by then {fault}, until the end of the record"))),
+    );
     told
 }
 
@@ -111,13 +108,13 @@ fn times_of_modes(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -> O
     for (n, (at_s, mode)) in modes.iter().enumerate() {
         let Some((_, end_s)) = vehicle.own.runs_s.iter().find(|run| at_s - 1.0 <= run.1) else { continue };
         let until_s = modes.get(n + 1).map_or(*end_s, |next| next.0.min(*end_s));
-        let time_s = dive.mission_s(until_s - at_s).max(0.0);
+        let time_s = (until_s - at_s).max(0.0);
         match spent.iter_mut().find(|(known, _)| known == mode) {
             Some((_, sum_s)) => *sum_s += time_s,
             None => spent.push((mode, time_s)),
         }
     }
-    let told: Vec<String> = spent.iter().map(|(mode, time_s)| format!("{mode} {}", words::duration(*time_s))).collect();
+    let told: Vec<String> = spent.iter().map(|(mode, time_s)| format!("{mode} {}", dive.lasted(*time_s))).collect();
     (told.len() > 1).then(|| format!("Time in each mode by its own record: {}.", told.join(", ")))
 }
 
@@ -175,10 +172,10 @@ mod tests {
         let told: Vec<String> =
             faults(&dive, &state).into_iter().map(|(at_s, text)| format!("{at_s}: {text}")).collect();
         let expected = [
-            "20: images are dropped",
-            "10: no image comes in until 1970-01-01T00:00:40Z (60 s)",
-            "20: no pose comes in until 1970-01-01T00:00:50Z (60 s)",
-            "60: the autopilot does not answer until the end of the record",
+            "20: by then images are dropped",
+            "10: by then no image comes in, reported as over by 1970-01-01T00:00:40Z, 30 s (60 s of the mission) later",
+            "20: by then no pose comes in, reported as over by 1970-01-01T00:00:50Z, 30 s (60 s of the mission) later",
+            "60: by then the autopilot does not answer, until the end of the record",
         ];
         assert_eq!(told, expected);
         assert_eq!(equipment("the port is closed, it seems"), None);

@@ -216,7 +216,7 @@ pub(super) fn content(book: &LabelBook, order: &Order) -> String {
     if all.is_empty() { "nothing, so that what was ordered before ends".to_owned() } else { all.join("; ") }
 }
 
-/// A number of things.
+/// The count with its noun: `one` where it is 1, otherwise `several`.
 pub(super) fn counted(count: usize, one: &str, several: &str) -> String {
     format!("{count} {}", if count == 1 { one } else { several })
 }

@@ -184,6 +184,14 @@ impl Camera {
         }
     }
 
+    /// A frame cannot be read, or the scene model does not take it.
+    pub(crate) fn handle_missed(&mut self, error: &UserError) {
+        match self {
+            Self::Recorded(camera) => camera.handle_missed(error),
+            Self::Live(camera) => camera.handle_missed(error),
+        }
+    }
+
     /// Whether a live camera is lost or has stalled.
     pub(crate) fn is_silent(&self) -> bool {
         match self {
@@ -207,10 +215,10 @@ impl Camera {
         }
     }
 
-    /// What became of the images of a live camera.
+    /// What became of the images.
     pub(crate) fn tally(&self) -> Option<&CameraTally> {
         match self {
-            Self::Recorded(_) => None,
+            Self::Recorded(camera) => camera.tally(),
             Self::Live(camera) => Some(camera.tally()),
         }
     }

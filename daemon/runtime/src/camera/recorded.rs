@@ -2,8 +2,10 @@
 
 use super::CameraFrame;
 use crate::clock::Clock;
+use scenecast_core::UserError;
 use scenecast_files::{RecordedFrame, Recording};
 use scenecast_protocol::time::Instant;
+use scenecast_sensors::{CameraFault, CameraTally};
 
 /// The frames of a recording in order, each at its time; no frames without a recording.
 pub(crate) struct RecordedCamera {
@@ -11,6 +13,7 @@ pub(crate) struct RecordedCamera {
     clock: Clock,
     /// Mission time at which this run's clock began.
     began_s: f64,
+    tally: CameraTally,
 }
 
 impl RecordedCamera {
@@ -23,7 +26,7 @@ impl RecordedCamera {
             Some(index) => frames.drain(..=index).next_back().map_or(0.0, |frame| frame.t_s),
             None => 0.0,
         };
-        Self { frames: frames.into_iter().peekable(), clock, began_s }
+        Self { frames: frames.into_iter().peekable(), clock, began_s, tally: CameraTally::default() }
     }
 
     /// Whether the recording has ended.
@@ -43,11 +46,40 @@ impl RecordedCamera {
     /// The next frame, if it is due.
     pub(super) fn poll_frame(&mut self) -> Option<CameraFrame> {
         let (now, began_s) = (self.clock.now(), self.began_s);
-        self.frames.next_if(|frame| due(frame, began_s) <= now).map(CameraFrame::from)
+        let frame = self.frames.next_if(|frame| due(frame, began_s) <= now)?;
+        self.tally.matched += 1;
+        Some(CameraFrame::from(frame))
+    }
+
+    /// A frame cannot be read, or the scene model does not take it.
+    pub(super) fn handle_missed(&mut self, error: &UserError) {
+        self.tally.matched -= 1;
+        self.tally.count(CameraFault::Unreadable);
+        tracing::error!("a camera frame was skipped, {} so far: {error}", self.tally.of(CameraFault::Unreadable));
+    }
+
+    /// What became of the frames; `None` before the first one, as of a vehicle without a camera.
+    pub(super) fn tally(&self) -> Option<&CameraTally> {
+        Some(&self.tally).filter(|tally| **tally != CameraTally::default())
     }
 }
 
 /// When a frame is due by the clock of a run that began at the mission time `began_s`.
 fn due(frame: &RecordedFrame, began_s: f64) -> Instant {
     Instant::from_secs_f64((frame.t_s - began_s).max(0.0))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn frames_that_cannot_be_read_are_counted() {
+        let mut camera = RecordedCamera::new(None, Clock::new(1.0), None);
+        assert_eq!(camera.tally(), None);
+        camera.tally.matched = 3;
+        camera.handle_missed(&UserError::failed("no image"));
+        let tally = camera.tally().unwrap();
+        assert_eq!((tally.matched, tally.of(CameraFault::Unreadable)), (2, 1));
+    }
 }

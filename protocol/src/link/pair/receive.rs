@@ -254,15 +254,16 @@ impl<T> LinkPair<T> {
     fn take<'a>(&mut self, frame: Frame<'a>, restarted: bool) -> Result<Inbound<'a, T>, DropReason> {
         let header = &frame.header;
         let Some(run) = self.handshake.run_mut() else { return Err(DropReason::UnknownSender) };
-        let accepted = run.window.preview(frame.number, header.base).is_ok().then_some(frame.number);
+        let before = run.window.highest();
+        let verdict = run.window.accept(frame.number, header.base);
+        let accepted = verdict.is_ok().then_some(frame.number);
         let fates = header.ack.as_ref().map_or_else(Vec::new, |ack| run.flight.handle_statement(ack, accepted));
         for (_, delivered) in &fates {
             self.stats.judge(*delivered);
         }
         // A rejected frame has still reported fates of ours, so these are returned with it.
-        let before = run.window.highest();
         let mut lacks_base = false;
-        let number = match run.window.accept(frame.number, header.base) {
+        let number = match verdict {
             Ok(()) => {
                 self.stats.take(before, frame.number);
                 Some(frame.number)

@@ -1,0 +1,107 @@
+//! How far restarts of a vehicle's program set its map back.
+
+use super::dive::Dive;
+use crate::replay::Recording;
+use scenecast_protocol::map::{Cell, LabelGrid, UNEXPLORED};
+use scenecast_protocol::time::Instant;
+
+/// The map of a vehicle before a restart of its program and after it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct SetBack {
+    /// Cells before, and those that had the same label after.
+    cells: u64,
+    kept: u64,
+    /// The age of the oldest change that was lost, when the record stops, mission seconds.
+    lost_s: f64,
+}
+
+/// The restarts of a vehicle of which its own record has the maps.
+pub(super) fn set_backs(recording: &mut Recording, part: &str) -> Vec<SetBack> {
+    let Recording { timeline, vehicles, .. } = recording;
+    let Some(own) = vehicles.get_mut(part) else { return Vec::new() };
+    let pauses: Vec<(u64, u64)> = own.runs.windows(2).map(|pair| (pair[0].1, pair[1].0)).collect();
+    let set_back = |(stopped, began): (u64, u64)| {
+        let (epoch, after) = first_map(began, |nanos| {
+            own.map.seek(nanos, |nanos| timeline.mission_time(nanos));
+            (own.map.shown().epoch, own.map.shown().labels.shown().clone())
+        });
+        own.map.seek(stopped, |nanos| timeline.mission_time(nanos));
+        let before = own.map.shown();
+        let is_same = |cell, label| before.epoch == epoch && after.get(cell) == label;
+        let held = before.labels.shown();
+        let lost = held.iter().filter(|&(cell, label)| !is_same(cell, label));
+        let now: Instant = timeline.mission_time(stopped);
+        let lost: Vec<Cell> = lost.map(|(cell, _)| cell).collect();
+        let ages = lost.iter().filter_map(|cell| before.labels.received_at(*cell));
+        SetBack {
+            cells: held.explored() as u64,
+            kept: (held.explored() - lost.len()) as u64,
+            lost_s: ages.map(|at| now.since(at).as_secs_f64()).fold(0.0, f64::max),
+        }
+    };
+    pauses.into_iter().map(set_back).collect()
+}
+
+/// The first map of a run that has cells. A program records what it read from its checkpoint within a moment.
+fn first_map(began: u64, mut map_at: impl FnMut(u64) -> (u8, LabelGrid)) -> (u8, LabelGrid) {
+    const STEP: u64 = 100_000_000;
+    const STEPS: u64 = 30;
+    let mut maps = (0..=STEPS).map(|n| map_at(began.saturating_add(n * STEP)));
+    let has_cells = |(_, labels): &(u8, LabelGrid)| labels.iter().any(|(_, label)| label != UNEXPLORED);
+    maps.find(has_cells).unwrap_or_default()
+}
+
+impl SetBack {
+    /// The end of the sentence about the restart.
+    pub(super) fn told(&self, dive: &Dive) -> String {
+        match (self.cells, self.kept) {
+            (0, _) => String::new(),
+            (cells, kept) if kept == cells => ", with the whole map that it had before".to_owned(),
+            (cells, 0) => format!(", with none of the {cells} cells of its map"),
+            (cells, kept) => format!(
+                ", with {kept} of the {cells} cells of its map as before: on board the changes of the last {} before its record stops were lost",
+                dive.mission_lasted(self.lost_s)
+            ),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::replay::Known;
+    use scenecast_messages::scenecast_msgs::MapCells;
+
+    const SECOND: u64 = 1_000_000_000;
+
+    fn change(whole: bool, cells: &[(i32, u8)]) -> MapCells {
+        let (x, value) = (cells.iter().map(|cell| cell.0).collect(), cells.iter().map(|cell| cell.1).collect());
+        MapCells { whole, x, y: vec![0; cells.len()], value, ..MapCells::default() }
+    }
+
+    /// A run with a map that changed at 10 s and at 30 s and ended at 40 s, and one that began with these cells at 60 s.
+    fn set_back(after: &[(i32, u8)]) -> SetBack {
+        let mut own = Known::default();
+        own.runs = vec![(0, 40 * SECOND), (60 * SECOND, 90 * SECOND)];
+        own.map.take(0, change(true, &[(0, 1), (1, 1), (2, 1)]));
+        own.map.take(10 * SECOND, change(false, &[(0, 2)]));
+        own.map.take(30 * SECOND, change(false, &[(3, 4)]));
+        own.map.take(60 * SECOND, change(true, &[]));
+        own.map.take(60 * SECOND + 1, change(true, after));
+        let mut recording = Recording::default();
+        recording.vehicles.insert("auv".to_owned(), own);
+        set_backs(&mut recording, "auv")[0]
+    }
+
+    #[test]
+    fn a_restart_loses_the_changes_since_the_checkpoint() {
+        let mut dive = Dive::default();
+        dive.state.mission.speed = 1.0;
+        let told = |after: &[(i32, u8)]| set_back(after).told(&dive);
+        assert_eq!(set_back(&[(0, 1), (1, 1), (2, 1)]), SetBack { cells: 4, kept: 2, lost_s: 30.0 });
+        let late = told(&[(0, 2), (1, 1), (2, 1)]);
+        assert!(late.contains("3 of the 4 cells") && late.contains("the last 10 s before"), "{late}");
+        assert_eq!(told(&[(0, 2), (1, 1), (2, 1), (3, 4)]), ", with the whole map that it had before");
+        assert_eq!(told(&[]), ", with none of the 4 cells of its map");
+    }
+}
