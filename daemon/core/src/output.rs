@@ -43,7 +43,7 @@ macro_rules! outln {
     ($($text:tt)*) => { $crate::write_or_exit(format_args!("{}\n", format_args!($($text)*))) };
 }
 
-/// Why the text of an option or argument is not its value: what it takes.
+/// The text of an option or argument is not one of its values, which this sentence describes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Takes(pub &'static str);
 

@@ -2,7 +2,7 @@
 
 use scenecast_config::{Config, survey_depth_m};
 use scenecast_core::{LatLon, TangentPlane, nmea};
-use scenecast_drivers::autopilot::{Autopilot, Counters, Goal, Health, Step, Tray};
+use scenecast_drivers::autopilot::{Autopilot, Counters, Goal, Health, Outbox, Step};
 use scenecast_protocol::time::Instant;
 use scenecast_worlds::Motion;
 use sim_channel::RandomStream;
@@ -60,7 +60,7 @@ pub struct SimulatedAutopilot {
     motion: Motion,
     depth_m: f64,
     next: Instant,
-    tray: Tray,
+    outbox: Outbox,
 }
 
 impl SimulatedAutopilot {
@@ -70,7 +70,7 @@ impl SimulatedAutopilot {
 
     /// A vehicle with the given motion and depth.
     pub fn new(motion: Motion, depth_m: f64, now: Instant) -> Self {
-        Self { motion, depth_m, next: now, tray: Tray::default() }
+        Self { motion, depth_m, next: now, outbox: Outbox::default() }
     }
 }
 
@@ -100,7 +100,7 @@ impl Autopilot for SimulatedAutopilot {
             self.next = self.next + Duration::from_secs_f64(Self::STEP_S);
             let o = self.motion.step_on(Self::STEP_S);
             let (dx_m, dy_m, heading_rad, depth_m) = (o.dx_m, o.dy_m, Some(o.heading_rad), Some(self.depth_m));
-            self.tray.walk(Step { dx_m, dy_m, heading_rad, depth_m, ..Step::default() });
+            self.outbox.walk(Step { dx_m, dy_m, heading_rad, depth_m, ..Step::default() });
         }
     }
 
@@ -108,8 +108,8 @@ impl Autopilot for SimulatedAutopilot {
         self.next
     }
 
-    fn tray(&mut self) -> &mut Tray {
-        &mut self.tray
+    fn outbox(&mut self) -> &mut Outbox {
+        &mut self.outbox
     }
 
     fn set_goal(&mut self, goal: Option<Goal>, _now: Instant) {

@@ -35,7 +35,7 @@ pub(crate) struct SensorFaults {
 }
 
 impl SensorFaults {
-    /// The faults now: what became of the images of a live camera, whether none comes in, and that no pose has come in for
+    /// The faults now: what became of the images of the camera, whether none comes in, and that no pose has come in for
     /// `pose_gap`; `labels_refused` is whether labels of other programs fail.
     pub(crate) fn now(
         &mut self,

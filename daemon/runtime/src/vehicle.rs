@@ -287,8 +287,9 @@ impl VehicleShell {
             // The frames still move the vehicle.
             let pose = self.camera.newest_pose().unwrap_or(frame.camera_pose());
             self.host.handle_pose(pose, self.clock.now());
-            if is_rising {
-                self.camera.drop_rising();
+            match is_rising {
+                true => self.camera.drop_rising(),
+                false => self.camera.leave_unmapped(),
             }
             if self.camera.is_over() {
                 self.host.finish_survey();

@@ -124,7 +124,7 @@ impl Annotations {
         self.draft = StoredDraft { number: self.draft.number.saturating_add(1), ..StoredDraft::default() };
     }
 
-    /// Adds a note.
+    /// Adds a note with the present time, in place of the oldest one when there are too many.
     pub fn add_note(&mut self, author: &str, text: &str, now: Instant) -> Result<(), AnnotationRefusal> {
         let text = text.trim();
         if text.is_empty() || text.chars().count() > MAX_NOTE {
@@ -136,7 +136,7 @@ impl Annotations {
         Ok(())
     }
 
-    /// Adds a marker.
+    /// Adds a marker on the operator's map; its number is one above the highest.
     pub fn add_marker(
         &mut self,
         author: &str,
@@ -162,7 +162,7 @@ impl Annotations {
         Ok(())
     }
 
-    /// Removes a marker.
+    /// Removes the marker with this number.
     pub fn remove_marker(&mut self, number: u32) -> Result<(), AnnotationRefusal> {
         self.markers.remove(&number).map(drop).ok_or(AnnotationRefusal::NoMarker(number))
     }

@@ -305,6 +305,11 @@ impl<T> LinkPair<T> {
         self.handshake.run().map_or(0, |r| r.window.statement_bytes())
     }
 
+    /// At the vehicle: whether a turn byte has room for the acknowledgement statement on all received frames.
+    pub fn fits_turn_byte(&self) -> bool {
+        self.handshake.run().is_none_or(|r| r.window.fits_turn_byte())
+    }
+
     /// The bytes of the seal of our numbered frames.
     pub fn seal_bytes(&self) -> usize {
         Seal::bytes(self.is_keyed(self.direction_out()), FrameKind::Numbered)

@@ -108,6 +108,11 @@ impl LinkWindow {
         bytes.len()
     }
 
+    /// Whether a statement on all received frames, if there is one to make, fits the turn byte of a vehicle.
+    pub fn fits_turn_byte(&self) -> bool {
+        self.verdict(self.utmost(), true).is_none_or(|statement| matches!(statement.horizon, Horizon::InTurn(_)))
+    }
+
     fn utmost(&self) -> FrameNumber {
         self.unpersisted.first().map_or(self.highest, |&n| n - 1)
     }

@@ -141,3 +141,19 @@ impl Grant {
         (left / frame + 1e-6) as u32
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_wish_is_the_soonest_that_is_not_too_soon() {
+        let s = Duration::from_secs_f64;
+        let mut waits = (0..32).map(|bits| Wish::of_bits(bits).wait());
+        assert!(waits.clone().is_sorted_by(|a, b| a < b) && waits.next_back() == Some(s(112.0)));
+        for (wait, told) in [(0.0, 0.0), (1.6, 1.75), (2.1, 2.5), (5.9, 6.0), (6.1, 7.0), (90.0, 96.0), (500.0, 112.0)]
+        {
+            assert_eq!(Wish::after(s(wait)).wait(), s(told), "{wait} s");
+        }
+    }
+}

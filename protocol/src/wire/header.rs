@@ -212,8 +212,11 @@ impl Header {
             return Err(FrameError::NotForUs);
         }
         let turn = has(TURN).then(|| r.u8()).transpose()?;
-        let is_answer = header.from.is_vehicle() && !is_hello;
-        let (turn, heard) = turn.filter(|_| is_answer).map_or((turn, 0), |turn| (Some(turn & WISH), turn & !WISH));
+        let (turn, heard) = match (header.from.is_vehicle(), turn) {
+            (true, Some(_)) if is_hello => (None, 0),
+            (true, Some(turn)) => (Some(turn & WISH), turn & !WISH),
+            (_, turn) => (turn, 0),
+        };
         if heard != 0 && (has(ACK) || heard < HEARD) {
             return Err(FrameError::BadField);
         }
@@ -283,7 +286,9 @@ impl Header {
     /// The bits of a vehicle's turn byte that have its ack statement, 0 if it is not in the turn byte.
     pub(super) fn heard(&self) -> u8 {
         match self.ack {
-            Some(AckStatement { horizon: Horizon::InTurn(low), .. }) => HEARD | low << HEARD_SHIFT,
+            Some(AckStatement { horizon: Horizon::InTurn(low), .. }) if self.from.is_vehicle() => {
+                HEARD | low << HEARD_SHIFT
+            }
             _ => 0,
         }
     }

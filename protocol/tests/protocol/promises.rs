@@ -2,6 +2,7 @@
 
 use crate::pair::{LinkedEnds, LossyChannel, Setup, auv, hold, patchy, surface_of, utility};
 use proptest::prelude::*;
+use scenecast_protocol::directive::OrderStatus;
 use scenecast_protocol::link::{
     Authenticity, DropReason, Mismatch, SlotInboxState, VehicleConfig, VehicleEvent, VehicleLink,
 };
@@ -129,6 +130,22 @@ fn a_clock_that_is_set_right_or_wrong_under_way_is_noticed() {
     assert_eq!(mismatch(&pair), None);
     pair.surface.set_clock(hours(500_200));
     assert_eq!(mismatch(&pair), None, "the computer may have slept");
+}
+
+#[test]
+fn each_frame_that_a_free_modem_carries_first_acknowledges() {
+    let setup = Setup { access: Access::FullDuplex, ..Setup::new(64, 400, Codec::Auto) };
+    let mut pair = LinkedEnds::new(3, setup, STILL);
+    pair.vehicle.set_map(patchy(200, 1).iter(), pair.now);
+    pair.run(pair.now + Duration::from_secs(60), false);
+    for is_held in [true, false, true] {
+        pair.surface.issue(auv(), hold(is_held), pair.now).unwrap();
+        pair.run(pair.now + Duration::from_secs(4), false);
+        let view = pair.surface.vehicle(auv()).unwrap();
+        let status = view.slots().map(|slot| slot.status).last().unwrap();
+        assert!(matches!(status, OrderStatus::Received | OrderStatus::Applied), "{status:?}");
+        pair.run(pair.now + Duration::from_secs(20), false);
+    }
 }
 
 #[test]

@@ -109,11 +109,11 @@ pub(super) struct OwnRecord {
     pub(super) heard_s: Vec<f64>,
     /// Begin and end of each of its records.
     pub(super) runs_s: Vec<(f64, f64)>,
-    /// The maps before and after each of the times between its records.
-    pub(super) set_backs: Vec<SetBack>,
+    /// The maps before and after each restart of its program, which is the time between two of its records.
+    pub(super) set_backs: Vec<Option<SetBack>>,
     /// When it decided about orders.
     pub(super) decided_s: BTreeMap<OrderKey, f64>,
-    /// What had become of the images of a live camera at the end of each run.
+    /// What had become of the images of the camera at the end of each run.
     pub(super) images: Vec<String>,
     /// The program and the settings of its last run; empty if its records have none.
     pub(super) settings: SettingsRecord,

@@ -83,19 +83,24 @@ impl Dive {
                   minute</th><th>budget of the sender</th></tr></thead>";
         let of_surface = told_budgets(&budgets(vehicle.link.iter().map(|(at_s, link)| (*at_s, link))));
         let reported = state.status.as_ref().map(|status| format!("{} bit/s by its last report", status.budget_bps));
-        let of_vehicle = told_budgets(&vehicle.own.budgets_bps).or(reported);
+        // The other figures are those of all vehicles.
+        let of_vehicle = told_budgets(&vehicle.own.budgets_bps).or(reported).filter(|_| self.vehicles.len() == 1);
         let fullest = |rate: fn(&Link) -> f32| {
-            let rates = vehicle.link.iter().map(|(_, link)| f64::from(rate(link)));
-            rates.filter(|bps| bps.is_finite()).fold(0.0, f64::max)
+            let first_s = vehicle.link.first().map_or(0.0, |(at_s, _)| *at_s);
+            // In the first minute, the mean is that of less.
+            let later = vehicle.link.iter().filter(|(at_s, _)| self.mission_s(at_s - first_s) >= 60.0);
+            let rates = later.map(|(_, link)| f64::from(rate(link)));
+            let most = rates.filter(|bps| bps.is_finite()).reduce(f64::max);
+            most.map_or("not known".to_owned(), |bps| format!("{bps:.0} bit/s"))
         };
         let rows =
             [(up, fullest(|link| link.received_bps), of_vehicle), (down, fullest(|link| link.sent_bps), of_surface)];
-        for ((name, direction), fullest_bps, budget) in rows {
+        for ((name, direction), fullest, budget) in rows {
             let bytes: u64 = direction.bytes_by_class.values().sum();
             let _ = write!(
                 page,
                 "<tr><td>{name}</td><td class=\"n\">{}</td><td class=\"n\">{:.1} %</td><td class=\"n\">{bytes}</td><td class=\"n\">{:.0} bit/s</td>\
-                 <td class=\"n\">{fullest_bps:.0} bit/s</td><td>{}</td></tr>",
+                 <td class=\"n\">{fullest}</td><td>{}</td></tr>",
                 direction.frames,
                 direction.loss * 100.0,
                 bytes as f64 * 8.0 / self.surface_ran_s().max(1.0),
@@ -106,8 +111,8 @@ impl Dive {
             page,
             "</table>\n<p>The surface counted these, copies of a frame once. Frames from the vehicles are lost if the surface never accepted their \
              numbers, and frames to them if the vehicles did not acknowledge them.{} Bytes and rates from the vehicles are those \
-             that were heard, the others those that were sent. The mean is that over the time in which the surface ran, the fullest minute the \
-             highest mean of a minute.</p>",
+             that were heard, the others those that were sent. The mean is that of the bytes of frames over the time in which the surface \
+             ran; the fullest minute and the budget count bits on air, with what the modem adds to each frame and with copies.</p>",
             match self.frames.unused() {
                 0 => String::new(),
                 _ => format!(" Counted one by one, copies too: at the surface, {}.", words::unused(&self.frames)),
@@ -198,6 +203,7 @@ impl Dive {
 fn transmitted((sender, from): (&str, &FrameCounts), (hearer, to): (&str, &FrameCounts), is_whole: bool) -> String {
     let lost = match from.sent.saturating_sub(to.heard()) {
         _ if from.sent == to.heard() => String::new(),
+        0 if is_whole => String::new(),
         _ if !is_whole => ", by records that do not cover the same time".to_owned(),
         lost => format!(" ({:.1} % lost on the way)", lost as f64 / from.sent.max(1) as f64 * 100.0),
     };
@@ -320,11 +326,11 @@ mod tests {
             (at_s, Link { received_bps: bps, budget_bps, ..Link::default() })
         };
         let mut vehicle = DiveVehicle::default();
-        vehicle.link = [(0.0, 90.0, 4000), (10.0, 180.0, 4000), (20.0, 60.0, 2500)].map(link).to_vec();
+        vehicle.link = [(0.0, 900.0, 4000), (70.0, 180.0, 4000), (90.0, 60.0, 2500)].map(link).to_vec();
         let mut page = String::new();
         dive.frames_and_bytes(&mut page, &VehicleState::default(), &vehicle);
         let row = "1250</td><td class=\"n\">100 bit/s</td><td class=\"n\">180 bit/s</td><td>not known</td>";
         assert!(page.contains(row), "{page}");
-        assert!(page.contains("<td>4000 bit/s, 2500 bit/s from 1970-01-01T00:00:20Z</td>"), "{page}");
+        assert!(page.contains("<td>4000 bit/s, 2500 bit/s from 1970-01-01T00:01:30Z</td>"), "{page}");
     }
 }

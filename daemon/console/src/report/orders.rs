@@ -271,14 +271,15 @@ impl Dive {
             };
             Some((last.given_s, format!("ordered: {}; {}{end}", self.ordered(state, vehicle, order).1, last.told())))
         });
-        let mut steps: Vec<(f64, String)> = modes.chain(orders).collect();
+        let modes: Vec<(f64, String)> = modes.collect();
+        let has_modes = !modes.is_empty();
+        let mut steps: Vec<(f64, String)> = modes.into_iter().chain(orders).collect();
         if steps.is_empty() {
             return;
         }
         // A surface logs changes alone.
-        if vehicle.own.runs_s.is_empty() {
-            let unknown =
-                "this record does not have the mode before the first change below; the vehicle's own record has it";
+        if has_modes && vehicle.own.runs_s.is_empty() {
+            let unknown = "this record does not have the mode before the first change of it below";
             steps.push((self.surface_s.0, unknown.to_owned()));
         }
         steps.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -349,7 +350,7 @@ mod tests {
     }
 
     #[test]
-    fn what_only_the_vehicle_recorded_ends_an_order_and_is_told_as_such() {
+    fn what_only_the_vehicle_recorded_ends_an_order() {
         let mut vehicle = DiveVehicle::default();
         for (version, state) in [(1, OrderStatus::ON_AIR), (2, OrderStatus::REFUSED)] {
             vehicle.take_order(&status(version, state, 2));

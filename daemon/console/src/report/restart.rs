@@ -15,8 +15,8 @@ pub(super) struct SetBack {
     lost_s: f64,
 }
 
-/// The restarts of a vehicle of which its own record has the maps.
-pub(super) fn set_backs(recording: &mut Recording, part: &str) -> Vec<SetBack> {
+/// The map at each restart of a vehicle by its own record; `None` where that has no map soon after it.
+pub(super) fn set_backs(recording: &mut Recording, part: &str) -> Vec<Option<SetBack>> {
     let Recording { timeline, vehicles, .. } = recording;
     let Some(own) = vehicles.get_mut(part) else { return Vec::new() };
     let pauses: Vec<(u64, u64)> = own.runs.windows(2).map(|pair| (pair[0].1, pair[1].0)).collect();
@@ -24,7 +24,7 @@ pub(super) fn set_backs(recording: &mut Recording, part: &str) -> Vec<SetBack> {
         let (epoch, after) = first_map(began, |nanos| {
             own.map.seek(nanos, |nanos| timeline.mission_time(nanos));
             (own.map.shown().epoch, own.map.shown().labels.shown().clone())
-        });
+        })?;
         own.map.seek(stopped, |nanos| timeline.mission_time(nanos));
         let before = own.map.shown();
         let is_same = |cell, label| before.epoch == epoch && after.get(cell) == label;
@@ -33,22 +33,22 @@ pub(super) fn set_backs(recording: &mut Recording, part: &str) -> Vec<SetBack> {
         let now: Instant = timeline.mission_time(stopped);
         let lost: Vec<Cell> = lost.map(|(cell, _)| cell).collect();
         let ages = lost.iter().filter_map(|cell| before.labels.received_at(*cell));
-        SetBack {
+        Some(SetBack {
             cells: held.explored() as u64,
             kept: (held.explored() - lost.len()) as u64,
             lost_s: ages.map(|at| now.since(at).as_secs_f64()).fold(0.0, f64::max),
-        }
+        })
     };
     pauses.into_iter().map(set_back).collect()
 }
 
 /// The first map of a run that has cells. A program records what it read from its checkpoint within a moment.
-fn first_map(began: u64, mut map_at: impl FnMut(u64) -> (u8, LabelGrid)) -> (u8, LabelGrid) {
+fn first_map(began: u64, mut map_at: impl FnMut(u64) -> (u8, LabelGrid)) -> Option<(u8, LabelGrid)> {
     const STEP: u64 = 100_000_000;
     const STEPS: u64 = 30;
     let mut maps = (0..=STEPS).map(|n| map_at(began.saturating_add(n * STEP)));
     let has_cells = |(_, labels): &(u8, LabelGrid)| labels.iter().any(|(_, label)| label != UNEXPLORED);
-    maps.find(has_cells).unwrap_or_default()
+    maps.find(has_cells)
 }
 
 impl SetBack {
@@ -57,9 +57,8 @@ impl SetBack {
         match (self.cells, self.kept) {
             (0, _) => String::new(),
             (cells, kept) if kept == cells => ", with the whole map that it had before".to_owned(),
-            (cells, 0) => format!(", with none of the {cells} cells of its map"),
             (cells, kept) => format!(
-                ", with {kept} of the {cells} cells of its map as before: on board the changes of the last {} before its record stops were lost",
+                ", with {kept} of the {cells} cells of its map as before: on board, changes up to {} old were lost",
                 dive.mission_lasted(self.lost_s)
             ),
         }
@@ -90,7 +89,7 @@ mod tests {
         own.map.take(60 * SECOND + 1, change(true, after));
         let mut recording = Recording::default();
         recording.vehicles.insert("auv".to_owned(), own);
-        set_backs(&mut recording, "auv")[0]
+        set_backs(&mut recording, "auv")[0].unwrap()
     }
 
     #[test]
@@ -100,8 +99,8 @@ mod tests {
         let told = |after: &[(i32, u8)]| set_back(after).told(&dive);
         assert_eq!(set_back(&[(0, 1), (1, 1), (2, 1)]), SetBack { cells: 4, kept: 2, lost_s: 30.0 });
         let late = told(&[(0, 2), (1, 1), (2, 1)]);
-        assert!(late.contains("3 of the 4 cells") && late.contains("the last 10 s before"), "{late}");
+        assert!(late.contains("3 of the 4 cells") && late.contains("changes up to 10 s old"), "{late}");
         assert_eq!(told(&[(0, 2), (1, 1), (2, 1), (3, 4)]), ", with the whole map that it had before");
-        assert_eq!(told(&[]), ", with none of the 4 cells of its map");
+        assert!(told(&[(9, 1)]).contains("with 0 of the 4 cells"), "{}", told(&[(9, 1)]));
     }
 }

@@ -52,6 +52,9 @@ impl SettingsRecord {
 
 /// A setting without the address or the path in it; `None` if nothing else is left.
 fn told(key: &str, value: &Value) -> Option<Value> {
+    if [".host", ".origins", ".networks", ".device", ".port"].iter().any(|end| key.ends_with(end)) {
+        return None;
+    }
     let Some(text) = value.as_str().filter(|_| !key.ends_with(".name")) else { return Some(value.clone()) };
     let (kind, rest) = text.split_once(':').unwrap_or(("", text));
     let is_port = !kind.is_empty() && rest.parse::<u16>().is_ok();
@@ -72,7 +75,7 @@ mod tests {
     fn addresses_and_paths_are_left_out() {
         let settings = json!({ "settings": {
             "modem.connect": "127.0.0.1:9731", "camera.source": "frames:rec/C", "label.vocabulary": "/home/a/b.json",
-            "modem.kind": "udp", "link.budget_bps": 4000, "vehicle.name": "a/b: c",
+            "console.host": "ship", "console.origins": ["http://a.b"], "modem.kind": "udp", "link.budget_bps": 4000, "vehicle.name": "a/b: c",
         }});
         let record: SettingsRecord = serde_json::from_value(settings).unwrap();
         let told: Vec<String> = record.told().iter().map(|(key, value)| format!("{key} {value}")).collect();

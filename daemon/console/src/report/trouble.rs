@@ -1,6 +1,7 @@
 //! What went wrong in a dive, and what it did by order or because of a limit.
 
 use super::dive::{Dive, DiveVehicle};
+use super::restart::SetBack;
 use super::{gaps, words};
 use crate::state::VehicleState;
 use scenecast_core::utc_text;
@@ -39,7 +40,8 @@ pub(super) fn told(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -> 
     found.extend(faults(dive, state));
     found.extend(dive.restarts_s.iter().map(|pause| restart("the surface's", *pause, String::new())));
     let pauses = vehicle.own.pauses().zip(&vehicle.own.set_backs);
-    found.extend(pauses.map(|(pause, set_back)| restart("the vehicle's", pause, set_back.told(dive))));
+    let told_of = |set_back: &Option<SetBack>| set_back.map_or_else(String::new, |set_back| set_back.told(dive));
+    found.extend(pauses.map(|(pause, set_back)| restart("the vehicle's", pause, told_of(set_back))));
     found.sort_by(|a, b| a.0.total_cmp(&b.0));
     let planned = of_it().filter(|(_, event)| event.source == modes && is_limited(&event.text)).map(told);
     let planned: Vec<(f64, String)> = planned.collect();

@@ -11,14 +11,14 @@
 mod lasting;
 pub mod mavlink;
 mod nmea;
+mod outbox;
 mod plausible;
 mod soundings;
-mod tray;
 
 pub use mavlink::Mavlink;
 pub use nmea::Nmea;
+pub use outbox::Outbox;
 pub use plausible::{Jump, Plausible};
-pub use tray::Tray;
 
 use scenecast_core::LatLon;
 use scenecast_protocol::time::Instant;
@@ -108,20 +108,20 @@ pub trait Autopilot: Send {
 
     fn poll_timeout(&self) -> Instant;
 
-    fn tray(&mut self) -> &mut Tray;
+    fn outbox(&mut self) -> &mut Outbox;
 
     fn poll_output(&mut self) -> Option<Vec<u8>> {
-        self.tray().outputs.pop_front()
+        self.outbox().outputs.pop_front()
     }
 
     /// The next step of the track.
     fn poll_step(&mut self) -> Option<Step> {
-        self.tray().steps.pop_front()
+        self.outbox().steps.pop_front()
     }
 
     /// Something that a person should read.
     fn poll_note(&mut self) -> Option<String> {
-        self.tray().notes.pop_front()
+        self.outbox().notes.pop_front()
     }
 
     /// Sets the goal; `None`: hold position. The host repeats it about every second, as the autopilot may restart.

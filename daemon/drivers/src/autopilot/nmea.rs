@@ -13,7 +13,7 @@
 
 use super::lasting::{Lasting, absence_text};
 use super::soundings::Soundings;
-use super::{Autopilot, Counters, Goal, Health, Step, Tray};
+use super::{Autopilot, Counters, Goal, Health, Outbox, Step};
 use scenecast_core::gps::{Gps, GpsLanguage};
 use scenecast_core::{LatLon, Lines, TangentPlane, nmea};
 use scenecast_protocol::time::Instant;
@@ -47,7 +47,7 @@ pub struct Nmea {
     goal: Option<Goal>,
     has_order: bool,
     second: Instant,
-    tray: Tray,
+    outbox: Outbox,
     was_silent: bool,
 }
 
@@ -69,13 +69,13 @@ impl Nmea {
             goal: None,
             has_order: false,
             second: now,
-            tray: Tray::default(),
+            outbox: Outbox::default(),
             was_silent: false,
         }
     }
 
     fn write(&mut self, body: &str) {
-        self.tray.write(nmea::line(body).into_bytes());
+        self.outbox.write(nmea::line(body).into_bytes());
     }
 
     fn say_goal(&mut self) {
@@ -93,15 +93,15 @@ impl Nmea {
 
     fn handle_place_of_vehicle(&mut self, place: LatLon, now: Instant) {
         if self.position_absence.end() {
-            self.tray.note("the autopilot reports its position again");
+            self.outbox.note("the autopilot reports its position again");
         }
         let heading_rad = self.heading_rad(now);
         if let Some((before, at)) = self.at.replace((place, now)) {
             let (dx_m, dy_m) = TangentPlane::new(before).to_plane(place);
             let passed = now.since(at);
             if dx_m.hypot(dy_m) > 20.0 * passed.as_secs_f64().max(0.1) {
-                self.tray.count("jumps");
-                self.tray
+                self.outbox.count("jumps");
+                self.outbox
                     .note(format!("the position jumps by {:.0} m: this is no way of the vehicle", dx_m.hypot(dy_m)));
                 return self.push_step(0.0, 0.0, heading_rad, passed, now);
             }
@@ -118,9 +118,9 @@ impl Nmea {
         if compass.is_some() {
             self.heading_absence.end();
         } else if self.heading_absence.is_news(UNKNOWN_AFTER, now) {
-            self.tray.count("headings_unknown");
+            self.outbox.count("headings_unknown");
             let magnetic = if self.hears_magnetic { "; HDM and HDG are magnetic and not used" } else { "" };
-            self.tray.note(format!(
+            self.outbox.note(format!(
                 "the vehicle's GPS reports no heading (HDT or THS): its course counts while it is under way, and images have no pose \
                  otherwise{magnetic}"
             ));
@@ -130,22 +130,23 @@ impl Nmea {
 
     fn push_step(&mut self, dx_m: f64, dy_m: f64, heading_rad: Option<f64>, unseen: Duration, now: Instant) {
         let altitude_m = self.soundings.height_m(now);
-        let depth_m = self.soundings.depth_m(&mut self.tray, now);
-        self.tray.walk_measured(Step { dx_m, dy_m, heading_rad, depth_m, altitude_m, unseen, ..Step::default() }, now);
+        let depth_m = self.soundings.depth_m(&mut self.outbox, now);
+        self.outbox
+            .walk_measured(Step { dx_m, dy_m, heading_rad, depth_m, altitude_m, unseen, ..Step::default() }, now);
     }
 
     /// Soundings, and magnetic headings, which are only noticed.
     fn handle_sensor(&mut self, fields: &[&str], now: Instant) {
         let formatter = fields.first().and_then(|field| field.get(2..)).unwrap_or_default();
         self.hears_magnetic |= matches!(formatter, "HDM" | "HDG");
-        self.soundings.handle(formatter, fields, &mut self.tray, now);
+        self.soundings.handle(formatter, fields, &mut self.outbox, now);
     }
 
     /// Notices that other sentences come in without a position.
     fn watch_position(&mut self, now: Instant) {
         if self.is_position_lost(now) && self.position_absence.is_news(Duration::ZERO, now) {
-            self.tray.count("position_losses");
-            self.tray.note("the autopilot reports no position any more");
+            self.outbox.count("position_losses");
+            self.outbox.note("the autopilot reports no position any more");
         }
     }
 
@@ -169,7 +170,7 @@ impl Autopilot for Nmea {
             for fields in nmea::sentences(&line).filter_map(|sentence| nmea::fields(sentence).ok()) {
                 self.handle_sensor(&fields, now);
                 if self.heard.is_none() || self.was_silent {
-                    self.tray.note("the autopilot answers");
+                    self.outbox.note("the autopilot answers");
                 }
                 (self.heard, self.was_silent) = (Some(now), false);
             }
@@ -177,7 +178,7 @@ impl Autopilot for Nmea {
                 self.handle_place_of_vehicle(fix.place, now);
             }
             if let Some(note) = self.gps.poll_note() {
-                self.tray.note(note);
+                self.outbox.note(note);
             }
         }
         // Any sounder has sentences.
@@ -197,11 +198,11 @@ impl Autopilot for Nmea {
             self.watch_position(now);
         }
         if health == Health::Awaited && self.absence.is_news(self.silence, now) {
-            self.tray.note(absence_text("sentence", self.silence));
+            self.outbox.note(absence_text("sentence", self.silence));
         }
         if health == Health::Silent && !std::mem::replace(&mut self.was_silent, true) {
-            self.tray.count("silences");
-            self.tray.note("the autopilot does not answer any more");
+            self.outbox.count("silences");
+            self.outbox.note("the autopilot does not answer any more");
         }
     }
 
@@ -209,8 +210,8 @@ impl Autopilot for Nmea {
         self.second
     }
 
-    fn tray(&mut self) -> &mut Tray {
-        &mut self.tray
+    fn outbox(&mut self) -> &mut Outbox {
+        &mut self.outbox
     }
 
     fn set_goal(&mut self, goal: Option<Goal>, _now: Instant) {
@@ -231,7 +232,7 @@ impl Autopilot for Nmea {
     }
 
     fn counters(&self) -> Counters {
-        let mut counters = self.tray.counters.clone();
+        let mut counters = self.outbox.counters.clone();
         counters.extend(self.gps.faults().map(|(fault, n)| (fault.name(), n)));
         counters
     }

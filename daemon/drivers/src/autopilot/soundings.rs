@@ -1,6 +1,6 @@
 //! The depth of a vehicle of NMEA 0183: that of the water less its height above the sea floor.
 
-use super::Tray;
+use super::Outbox;
 use super::lasting::Lasting;
 use scenecast_protocol::time::Instant;
 use std::time::Duration;
@@ -38,43 +38,43 @@ fn fresh(length: Option<(f64, Instant)>, now: Instant) -> Option<f64> {
 
 impl Soundings {
     /// DBS, from the surface to the sea floor, and DBT: feet, f, metres, M, fathoms, F. DPT: metres, offset of the transducer.
-    pub(super) fn handle(&mut self, formatter: &str, fields: &[&str], tray: &mut Tray, now: Instant) {
+    pub(super) fn handle(&mut self, formatter: &str, fields: &[&str], outbox: &mut Outbox, now: Instant) {
         let number = |index: usize| fields.get(index)?.parse::<f64>().ok();
         let length = |index: usize, metres: f64| number(index).map(|n| n * metres);
         // Sounders without a bottom send 0 or nothing; some send feet alone.
         let sounding = || length(3, 1.0).or_else(|| length(1, FOOT_M)).or_else(|| length(5, FATHOM_M));
         let known = |m: Option<f64>| m.filter(|m| *m > 0.0 && *m < 12_000.0).map(|m| (m, now));
         match formatter {
-            "DBS" => self.set_water(known(sounding()), tray, now),
-            "DBT" => self.set_height(known(sounding()), tray, now),
-            "DPT" => self.set_height(known(number(1)), tray, now),
+            "DBS" => self.set_water(known(sounding()), outbox, now),
+            "DBT" => self.set_height(known(sounding()), outbox, now),
+            "DPT" => self.set_height(known(number(1)), outbox, now),
             _ => {}
         }
     }
 
-    fn set_water(&mut self, water: Option<(f64, Instant)>, tray: &mut Tray, now: Instant) {
+    fn set_water(&mut self, water: Option<(f64, Instant)>, outbox: &mut Outbox, now: Instant) {
         self.water = water.or(self.water);
-        if self.is_above_water(self.height, tray, now) {
+        if self.is_above_water(self.height, outbox, now) {
             self.height = None;
         }
     }
 
-    fn set_height(&mut self, height: Option<(f64, Instant)>, tray: &mut Tray, now: Instant) {
-        if !self.is_above_water(height, tray, now) {
+    fn set_height(&mut self, height: Option<(f64, Instant)>, outbox: &mut Outbox, now: Instant) {
+        if !self.is_above_water(height, outbox, now) {
             self.height = height;
             self.height_trouble.end();
         }
     }
 
     /// Whether a height is greater than the depth of the water, which is named.
-    fn is_above_water(&mut self, height: Option<(f64, Instant)>, tray: &mut Tray, now: Instant) -> bool {
+    fn is_above_water(&mut self, height: Option<(f64, Instant)>, outbox: &mut Outbox, now: Instant) -> bool {
         let Some((height_m, water_m)) = fresh(height, now).zip(fresh(self.water, now)) else { return false };
         if height_m <= water_m + MARGIN_M {
             return false;
         }
-        tray.count("heights_refused");
+        outbox.count("heights_refused");
         if self.height_trouble.is_news(Duration::ZERO, now) {
-            tray.note(format!(
+            outbox.note(format!(
                 "the height above the sea floor (DBT or DPT), {height_m:.1} m, is greater than the depth of the water (DBS), {water_m:.1} \
                  m: it is not used; check the sounders"
             ));
@@ -88,20 +88,20 @@ impl Soundings {
     }
 
     /// The depth of the vehicle, metres; one that is not known, or not any more, is named.
-    pub(super) fn depth_m(&mut self, tray: &mut Tray, now: Instant) -> Option<f64> {
+    pub(super) fn depth_m(&mut self, outbox: &mut Outbox, now: Instant) -> Option<f64> {
         let both = fresh(self.water, now).zip(fresh(self.height, now));
         let depth_m = both.map(|(water_m, height_m)| (water_m - height_m).max(0.0));
         if depth_m.is_some() {
             self.depth_m = depth_m;
             self.depth_absence.end();
         } else if self.water.is_some() || self.height.is_some() {
-            self.say_unknown_depth(tray, now);
+            self.say_unknown_depth(outbox, now);
         }
         depth_m
     }
 
     /// Says once that the depth is not known, when one of its two parts has been missing for a while.
-    fn say_unknown_depth(&mut self, tray: &mut Tray, now: Instant) {
+    fn say_unknown_depth(&mut self, outbox: &mut Outbox, now: Instant) {
         if !self.depth_absence.is_news(UNKNOWN_AFTER, now) {
             return;
         }
@@ -109,8 +109,8 @@ impl Soundings {
             true => "the depth of the water (DBS)",
             false => "the height above the sea floor (DBT or DPT)",
         };
-        tray.count("depths_unknown");
-        tray.note(format!(
+        outbox.count("depths_unknown");
+        outbox.note(format!(
             "the depth of the vehicle is not known, since {missing} is missing: {:.1} m is used",
             self.depth_m.unwrap_or(0.0)
         ));

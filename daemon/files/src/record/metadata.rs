@@ -14,7 +14,7 @@ pub(super) struct Part {
     /// The times of its first and its last message, nanoseconds since 1970.
     pub span: Option<(u64, u64)>,
     pub bytes: u64,
-    /// Messages by topic.
+    /// The number of messages by their topic.
     pub messages: BTreeMap<String, u64>,
 }
 

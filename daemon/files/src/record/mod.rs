@@ -33,9 +33,9 @@ const CHUNK_BYTES: u64 = 256 << 10;
 pub struct RecordEntry {
     pub topic: String,
     pub definition: &'static Definition,
-    /// Nanoseconds since 1970, UTC.
+    /// When it was recorded, nanoseconds since 1970, UTC.
     pub nanos: u64,
-    /// The message in CDR.
+    /// The content of the message, coded as CDR.
     pub data: Vec<u8>,
 }
 

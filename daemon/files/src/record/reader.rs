@@ -83,7 +83,7 @@ pub struct RecordFile {
     /// Its folder and its name.
     pub name: String,
     pub bytes: u64,
-    /// In hexadecimal digits.
+    /// The digest of the file, in hexadecimal digits.
     pub sha256: String,
 }
 

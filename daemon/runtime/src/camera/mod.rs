@@ -184,6 +184,13 @@ impl Camera {
         }
     }
 
+    /// The frame of a recording that was polled last only moves the vehicle.
+    pub(crate) fn leave_unmapped(&mut self) {
+        if let Self::Recorded(camera) = self {
+            camera.leave_unmapped();
+        }
+    }
+
     /// A frame cannot be read, or the scene model does not take it.
     pub(crate) fn handle_missed(&mut self, error: &UserError) {
         match self {

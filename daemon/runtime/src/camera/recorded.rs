@@ -58,6 +58,11 @@ impl RecordedCamera {
         tracing::error!("a camera frame was skipped, {} so far: {error}", self.tally.of(CameraFault::Unreadable));
     }
 
+    /// The frame that was polled last only moves the vehicle, whose labels come from another program.
+    pub(super) fn leave_unmapped(&mut self) {
+        self.tally.matched -= 1;
+    }
+
     /// What became of the frames; `None` before the first one, as of a vehicle without a camera.
     pub(super) fn tally(&self) -> Option<&CameraTally> {
         Some(&self.tally).filter(|tally| **tally != CameraTally::default())

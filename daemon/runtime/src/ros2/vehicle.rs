@@ -26,7 +26,7 @@ impl VehicleRos2 {
         })
     }
 
-    /// Hands the state over, a few times a second; `camera` is what became of the images of a live camera, `labels` what
+    /// Hands the state over, a few times a second; `camera` is what became of the images of the camera, `labels` what
     /// became of the items of other programs.
     pub fn publish(
         &mut self,

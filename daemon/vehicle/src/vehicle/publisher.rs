@@ -3,7 +3,7 @@
 use super::bands::Bands;
 use super::evidence::{Evidence, EvidenceByCell};
 use super::frame_clock::FrameClock;
-use super::storing::Withheld;
+use super::storing::WaitingCells;
 use crate::{LabelChanges, MapUpdate};
 use scenecast_config::Debounce;
 use scenecast_protocol::directive::{CellBand, Settings};
@@ -65,7 +65,7 @@ pub(super) struct MapPublisher {
     /// Bands of another program and their layers, which the vehicle adds when the first of their cells comes.
     bands: Bands,
     /// Cells with labels of another program that are not on the disk yet.
-    withheld: Withheld,
+    waiting: WaitingCells,
 }
 
 impl MapPublisher {
@@ -164,7 +164,7 @@ impl MapPublisher {
         now: Instant,
     ) -> bool {
         self.labels = changes.labels;
-        self.withheld.begin(stored);
+        self.waiting.begin(stored);
         let mut has_changed = false;
         for &(cell, label) in &changes.cells {
             let before = self.map.set(cell, label);
@@ -175,18 +175,18 @@ impl MapPublisher {
         self.version += u64::from(has_changed);
         let (now_sent, later): (Vec<_>, Vec<_>) =
             changes.cells.iter().copied().partition(|&(_, label)| label <= stored);
-        self.withheld.add(&later, now);
+        self.waiting.add(&later, now);
         self.publish_cells(now_sent, link, now);
-        self.withheld.is_waiting()
+        self.waiting.is_any()
     }
 
     /// Labels up to `stored` are on the disk: gives the link the cells that waited for that.
     pub(super) fn handle_stored(&mut self, stored: u8, link: &mut VehicleLink) {
-        if !self.withheld.is_waiting() {
+        if !self.waiting.is_any() {
             return;
         }
-        let now = self.withheld.at();
-        match self.withheld.release(stored) {
+        let now = self.waiting.at();
+        match self.waiting.release(stored) {
             Some(cells) => {
                 let cells = cells.into_iter().map(|cell| (cell, self.map.get(cell)));
                 let cells = cells.filter(|(_, label)| *label <= stored).collect();
@@ -245,8 +245,7 @@ impl MapPublisher {
     /// Where only coarse cells are selected, finer ones that the link already has stay up to date, so that no cell on the
     /// operator's map is older than it looks.
     fn publish_scene(&self, link: &mut VehicleLink, now: Instant) {
-        let is_ready =
-            |&(cell, label): &(Cell, u8)| self.is_sent(Some(link.map()), cell) && self.withheld.allows(label);
+        let is_ready = |&(cell, label): &(Cell, u8)| self.is_sent(Some(link.map()), cell) && self.waiting.allows(label);
         let mut cells: Vec<(Cell, u8)> = self.map.iter().filter(is_ready).collect();
         if self.has_erased {
             let gone = link.map().iter().filter(|&(cell, _)| self.map.get(cell) == UNEXPLORED);

@@ -180,7 +180,7 @@ const MAX_CELLS: usize = 1 << 16;
 
 /// The cells of another program's map that wait for the disk.
 #[derive(Debug, Default)]
-pub(super) struct Withheld {
+pub(super) struct WaitingCells {
     /// The highest label on the disk; `None` before another program's labels came.
     stored: Option<u8>,
     cells: Vec<Cell>,
@@ -189,7 +189,7 @@ pub(super) struct Withheld {
     at: Instant,
 }
 
-impl Withheld {
+impl WaitingCells {
     /// Labels up to `stored` are on the disk.
     pub(super) fn begin(&mut self, stored: u8) {
         self.stored = Some(stored);
@@ -206,7 +206,7 @@ impl Withheld {
         }
     }
 
-    pub(super) fn is_waiting(&self) -> bool {
+    pub(super) fn is_any(&self) -> bool {
         self.is_overflown || !self.cells.is_empty()
     }
 
@@ -234,17 +234,17 @@ mod tests {
 
     #[test]
     fn too_many_cells_become_the_whole_map() {
-        let mut withheld = Withheld::default();
-        assert!(withheld.allows(9) && !withheld.is_waiting());
-        withheld.begin(4);
-        assert!(withheld.allows(4) && !withheld.allows(5));
-        withheld.add(&[(Cell::new(1, 2), 5)], Instant::ZERO);
-        assert_eq!(withheld.release(5), Some(vec![Cell::new(1, 2)]));
-        assert!(withheld.allows(5) && !withheld.is_waiting());
+        let mut waiting = WaitingCells::default();
+        assert!(waiting.allows(9) && !waiting.is_any());
+        waiting.begin(4);
+        assert!(waiting.allows(4) && !waiting.allows(5));
+        waiting.add(&[(Cell::new(1, 2), 5)], Instant::ZERO);
+        assert_eq!(waiting.release(5), Some(vec![Cell::new(1, 2)]));
+        assert!(waiting.allows(5) && !waiting.is_any());
         let many: Vec<(Cell, u8)> = (0..40_000).map(|x| (Cell::new(x, 0), 6)).collect();
-        withheld.add(&many, Instant::ZERO);
-        withheld.add(&many, Instant::ZERO);
-        assert!(withheld.is_waiting() && withheld.cells.is_empty());
-        assert_eq!((withheld.release(6), withheld.is_waiting()), (None, false));
+        waiting.add(&many, Instant::ZERO);
+        waiting.add(&many, Instant::ZERO);
+        assert!(waiting.is_any() && waiting.cells.is_empty());
+        assert_eq!((waiting.release(6), waiting.is_any()), (None, false));
     }
 }

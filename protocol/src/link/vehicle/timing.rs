@@ -23,10 +23,11 @@ pub(super) struct SurfaceTiming {
     is_stamped: bool,
 }
 
-/// The part of the bit budget that stamps may take once the surface has measured the distance. Before, a turn has two of them.
+/// The part of the bit budget that stamps take once the surface has measured the distance, and more of one below 114 bit/s. Before,
+/// a turn has two of them.
 const STAMP_SHARE: f64 = 0.003;
-/// The surface takes a measured distance for current for three minutes.
-const MOST_BETWEEN_STAMPS: Duration = Duration::from_secs(150);
+/// The surface takes a measured distance for current for five minutes, in which two stamps go out: one may be lost.
+const MAX_STAMP_INTERVAL: Duration = Duration::from_secs(140);
 
 impl SurfaceTiming {
     /// A numbered frame came in that was on air for `airtime`. Hellos are not passed in: they may be replays.
@@ -68,7 +69,7 @@ impl SurfaceTiming {
     pub(super) fn begin_turn(&mut self, budget_bps: u32, now: Instant) {
         let bits = Stamp::VEHICLE_BYTES as f64 * 8.0;
         let pause = Duration::from_secs_f64(bits / STAMP_SHARE / f64::from(budget_bps.max(1)));
-        let pause = pause.min(MOST_BETWEEN_STAMPS);
+        let pause = pause.min(MAX_STAMP_INTERVAL);
         self.is_stamped = self.one_way.is_none() || self.stamped.is_none_or(|at| now.since(at) >= pause);
         if self.is_stamped && self.latest.is_some() {
             self.stamped = Some(now);

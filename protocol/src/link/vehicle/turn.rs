@@ -160,8 +160,8 @@ impl<S: StateSource> VehicleLink<S> {
     }
 
     /// Bytes for an acknowledgement: in the first frames of a turn, as many as it takes for one to get through, in every eighth frame,
-    /// and in the last new one, whose turn byte may have it. Where the budget is the limit, a turn that is not seen to be an answer
-    /// costs time alone, so that fewer will do.
+    /// and in the last new one, whose turn byte may have it. Where the budget of a vehicle that is granted turns is the limit, fewer
+    /// will do: one that does not get through comes again in the next turn.
     fn ack_room(&self, is_last_new: bool, now: Instant) -> usize {
         const ACK_INTERVAL: usize = 8;
         let size = self.config.modem.frame_bytes;
@@ -172,9 +172,10 @@ impl<S: StateSource> VehicleLink<S> {
             return size / 2;
         }
         let loss = self.pair.stats.loss_out;
-        let first = match self.is_budget_bound(now) {
-            // The last new frame is one of them.
-            true => loss.copies(0.15, 12) - 1,
+        let is_scarce = !self.config.modem.access.is_free() && self.is_budget_bound(now);
+        let first = match is_scarce {
+            // The last new frame is one of them, with no bytes, whenever the turn proves to end.
+            true => loss.copies(0.15, 12) - u32::from(self.pair.fits_turn_byte()),
             false => loss.copies(0.001, 12),
         };
         match sent < first as usize || is_last_new || (sent + 1).is_multiple_of(ACK_INTERVAL) {
@@ -232,6 +233,7 @@ impl<S: StateSource> VehicleLink<S> {
         let stamp = self.stamp(plan.is_last_new, now);
         let takes_turns = !modem.access.is_free();
         let bytes = self.ack_room(plan.is_last_new, now);
+        // A frame without bytes for it may prove to be the last, which has a turn byte.
         let room = AckRoom { bytes, in_turn: takes_turns && (plan.is_last_new || bytes == 0) };
         if sends_hello {
             let series = self.pair.caller().and_then(|surface| surface.series);
@@ -273,7 +275,7 @@ impl<S: StateSource> VehicleLink<S> {
             false => plan.remaining,
         };
         builder.set_remaining(remaining.min(255) as u8);
-        if is_complete || (plan.is_last_new && !sends_hello) {
+        if takes_turns && !sends_hello && (plan.is_last_new || remaining == 0 || is_complete) {
             builder.set_turn(self.wish(now).bits());
         }
         let last = remaining == 0;

@@ -8,7 +8,7 @@ mod reception;
 mod sources;
 mod targets;
 
-use super::{Autopilot, Counters, Goal, Health, Step, Tray};
+use super::{Autopilot, Counters, Goal, Health, Outbox, Step};
 use attitude::Attitude;
 use boot_clock::{BootClock, BootTime};
 use frame::{Deframer, Frame, encode};
@@ -89,7 +89,7 @@ pub struct Mavlink {
     place: Option<(LatLon, f32, Instant)>,
     command: CommandWatch,
     due: Due,
-    tray: Tray,
+    outbox: Outbox,
     was_silent: bool,
     is_position_lost: bool,
 }
@@ -152,7 +152,7 @@ impl Mavlink {
             place: None,
             command: CommandWatch::default(),
             due: Due { second: now, gps: now, streams: now },
-            tray: Tray::default(),
+            outbox: Outbox::default(),
             was_silent: false,
             is_position_lost: false,
         }
@@ -164,31 +164,31 @@ impl Mavlink {
         let time_ms = now.since(self.began).as_millis() as u32;
         let payload = said.payload(self.config.system, component, time_ms);
         let frame = Frame { system: self.config.system, component: OWN_COMPONENT, id, payload, is_signed: false };
-        self.tray.write(encode(&frame, self.seq, extra));
+        self.outbox.write(encode(&frame, self.seq, extra));
         self.seq = self.seq.wrapping_add(1);
     }
 
     fn handle_frame(&mut self, frame: &Frame, now: Instant) {
         let Some(heard) = Heard::read(frame.id, &frame.payload) else {
-            self.tray.count("unreadable");
+            self.outbox.count("unreadable");
             return;
         };
         if let Heard::Heartbeat { custom_mode, kind, autopilot, base_mode } = heard {
             return match self.claim(frame, kind, autopilot, now) {
                 Claim::Autopilot => self.handle_heartbeat(frame, custom_mode, kind, base_mode, now),
-                Claim::Passed(reason) => self.tray.count(reason),
+                Claim::Passed(reason) => self.outbox.count(reason),
             };
         }
         if frame.system != self.config.system {
-            return self.tray.count(sources::OTHER_SYSTEMS);
+            return self.outbox.count(sources::OTHER_SYSTEMS);
         }
         // Cameras, gimbals and companion computers have clocks, attitudes and positions of their own.
         if self.peer.is_none_or(|peer| peer.component != frame.component) {
-            return self.tray.count(sources::OTHER_COMPONENTS);
+            return self.outbox.count(sources::OTHER_COMPONENTS);
         }
-        self.tray.count("messages");
+        self.outbox.count("messages");
         if self.is_of_other_vehicle(frame, &heard, now) {
-            return self.tray.count(sources::OTHER_VEHICLE);
+            return self.outbox.count(sources::OTHER_VEHICLE);
         }
         match heard {
             Heard::Heartbeat { .. } | Heard::DistanceElsewhere => {}
@@ -215,7 +215,7 @@ impl Mavlink {
                 let velocity = (f64::from(east) / 100.0, f64::from(north) / 100.0);
                 // Without a fix or an origin it has no place.
                 if (lat, lon) == (0, 0) {
-                    return self.tray.count("null_islands");
+                    return self.outbox.count("null_islands");
                 }
                 let local = self.pose.filter(|p| now.since(p.heard) < BRIDGED).and_then(|p| p.local);
                 let depth_m = -f64::from(relative_alt) / 1000.0;
@@ -225,7 +225,7 @@ impl Mavlink {
             Heard::Ack { command, result } => {
                 // In progress is no refusal.
                 if !matches!(result, 0 | 5) {
-                    self.tray.count("commands_refused");
+                    self.outbox.count("commands_refused");
                     if command != INTERVAL {
                         self.note_rarely(format!("the autopilot refuses command {command}: result {result}"), now);
                     }
@@ -243,8 +243,8 @@ impl Mavlink {
     /// Notes a text unless it was noted not long ago.
     fn note_rarely(&mut self, text: String, now: Instant) {
         match self.texts.is_news(&text, now) {
-            true => self.tray.note(text),
-            false => self.tray.count("texts_repeated"),
+            true => self.outbox.note(text),
+            false => self.outbox.count("texts_repeated"),
         }
     }
 
@@ -254,7 +254,7 @@ impl Mavlink {
         let (claim, note) =
             self.sources.judge(&self.config, (frame.system, frame.component), (kind, autopilot), current);
         if let Some(note) = note {
-            self.tray.note(note);
+            self.outbox.note(note);
         }
         claim
     }
@@ -270,13 +270,13 @@ impl Mavlink {
             self.clock = BootClock::default();
             self.echo.forget();
             self.altimeter.forget();
-            self.tray.forget_measured();
+            self.outbox.forget_measured();
         }
         let is_new = self.peer.is_none_or(|p| now.since(p.heard) >= self.config.silence);
         let was_in_command = self.peer.is_some_and(|p| p.is_in_command());
         self.peer = Some(peer);
         if is_new {
-            self.tray.note(match frame.is_signed {
+            self.outbox.note(match frame.is_signed {
                 false => "the autopilot answers",
                 true => {
                     "the autopilot answers and signs its messages: those of this vehicle have no signature, so it may obey none of \
@@ -288,7 +288,7 @@ impl Mavlink {
             self.ask_for_streams(now);
         }
         if self.command.handle_heartbeat(was_in_command, peer.is_in_command(), now) {
-            self.tray.note("the autopilot was taken out of guided mode or disarmed: waypoints wait until it is back");
+            self.outbox.note("the autopilot was taken out of guided mode or disarmed: waypoints wait until it is back");
         }
         if !peer.is_in_command() {
             self.echo.forget();
@@ -308,7 +308,7 @@ impl Mavlink {
         if let Some(apart_s) = self.clock.poll_conflict_s() {
             let MavlinkConfig { system, .. } = self.config;
             let component = frame.component;
-            self.tray.note(format!(
+            self.outbox.note(format!(
                 "two vehicles answer as system {system} component {component}, with clocks {apart_s} s apart: the first one is used; give each a system of its own (SYSID_THISMAV, or MAV_SYSID from ArduSub 4.7 on)"
             ));
         }
@@ -317,11 +317,11 @@ impl Mavlink {
 
     fn handle_restart(&mut self, ms: u32, now: Instant) {
         self.command.handle_restart(ms, self.pose.map(|pose| pose.depth_m), now);
-        self.tray.count("restarts");
-        self.tray.note("the autopilot has restarted");
+        self.outbox.count("restarts");
+        self.outbox.note("the autopilot has restarted");
         self.echo.forget();
         self.altimeter.forget();
-        self.tray.forget_measured();
+        self.outbox.forget_measured();
         self.stay = None;
         self.ask_for_streams(now);
     }
@@ -349,31 +349,31 @@ impl Mavlink {
             }
             return;
         }
-        let pose = Pose { velocity: self.tray.plausible_velocity(pose.velocity, pose.heard), ..pose };
+        let pose = Pose { velocity: self.outbox.plausible_velocity(pose.velocity, pose.heard), ..pose };
         self.pose = Some(pose);
         if let Some([north, east, _]) = pose.local {
-            self.tray.check_place((north.into(), east.into()), pose.heard);
+            self.outbox.check_place((north.into(), east.into()), pose.heard);
         } else if let Some((lat, lon)) = pose.place {
             // Of a degree of latitude, everywhere long enough.
             let metres = |units: i32| f64::from(units) / 1e7 * 111_320.0;
-            self.tray.check_place((metres(lat), metres(lon)), pose.heard);
+            self.outbox.check_place((metres(lat), metres(lon)), pose.heard);
         }
         self.reception.handle_position();
         if std::mem::take(&mut self.is_position_lost) {
-            self.tray.note("the autopilot reports its position again");
+            self.outbox.note("the autopilot reports its position again");
         }
         let Some(before) = before else { return };
         let passed_ms = pose.time_boot_ms.wrapping_sub(before.time_boot_ms);
         // A clock that went back is another run of the autopilot.
         if passed_ms == 0 || u128::from(passed_ms) > BRIDGED.as_millis() {
-            self.tray.count("gaps");
+            self.outbox.count("gaps");
             return self.push_step(0.0, 0.0, &pose, pose.heard.since(before.heard));
         }
         let passed_s = f64::from(passed_ms) / 1000.0;
         let mean = |a: f64, b: f64| (a + b) / 2.0 * passed_s;
         let (dx_m, dy_m) = (mean(before.velocity.0, pose.velocity.0), mean(before.velocity.1, pose.velocity.1));
         if dx_m.hypot(dy_m) > 20.0 * passed_s {
-            self.tray.count("absurd_velocities");
+            self.outbox.count("absurd_velocities");
             return self.push_step(0.0, 0.0, &pose, Duration::from_secs_f64(passed_s));
         }
         if let Some(goal) = &mut self.goal {
@@ -391,20 +391,20 @@ impl Mavlink {
         let altitude_m = self.altimeter.height_m(pose.heard);
         let depth_m = Some(pose.depth_m);
         let step = Step { dx_m, dy_m, heading_rad, depth_m, roll_rad, pitch_rad, altitude_m, unseen };
-        self.tray.walk_measured(step, pose.heard);
+        self.outbox.walk_measured(step, pose.heard);
     }
 
     fn handle_second(&mut self, now: Instant) {
         self.say(&Said::Heartbeat, now);
         let health = self.health(now);
         if health == Health::Silent && !std::mem::replace(&mut self.was_silent, true) {
-            self.tray.count("silences");
-            self.tray.note("the autopilot does not answer any more");
+            self.outbox.count("silences");
+            self.outbox.note("the autopilot does not answer any more");
         }
         let Some(peer) = self.peer.filter(|_| !health.is_silent()) else {
             let refused = self.deframer.refused();
             let note = self.reception.poll_silence(self.config.system, refused, now).filter(|_| self.peer.is_none());
-            note.into_iter().for_each(|note| self.tray.note(note));
+            note.into_iter().for_each(|note| self.outbox.note(note));
             return self.echo.forget();
         };
         if self.pose.is_none_or(|p| now.since(p.heard) > BRIDGED) {
@@ -412,13 +412,13 @@ impl Mavlink {
                 self.ask_for_streams(now);
             }
             if let Some(note) = self.reception.poll_no_position(now) {
-                self.tray.count("position_losses");
-                self.tray.note(note);
+                self.outbox.count("position_losses");
+                self.outbox.note(note);
                 self.is_position_lost = true;
             }
             if self.pose.is_some() && !std::mem::replace(&mut self.is_position_lost, true) {
-                self.tray.count("position_losses");
-                self.tray.note("the autopilot reports no position any more");
+                self.outbox.count("position_losses");
+                self.outbox.note("the autopilot reports no position any more");
             }
             // Without a position no target goes out that it could follow.
             self.echo.forget();
@@ -427,8 +427,8 @@ impl Mavlink {
                 self.ask_for_streams(now);
             }
             if let Some(note) = self.attitude.poll_absence(now) {
-                self.tray.count("attitude_losses");
-                self.tray.note(note);
+                self.outbox.count("attitude_losses");
+                self.outbox.note(note);
             }
         }
         if peer.is_in_command() {
@@ -444,12 +444,12 @@ impl Mavlink {
 
     fn judge_echo(&mut self, now: Instant) {
         if let Some(note) = self.echo.handle_timeout(now) {
-            self.tray.note(note);
+            self.outbox.note(note);
         }
         match self.echo.verdict() {
-            Verdict::Refuses => self.tray.count("targets_refused"),
+            Verdict::Refuses => self.outbox.count("targets_refused"),
             Verdict::Mute => {
-                self.tray.count("targets_unconfirmed");
+                self.outbox.count("targets_unconfirmed");
                 if now >= self.due.streams {
                     self.ask_for_streams(now);
                 }
@@ -498,7 +498,7 @@ impl Autopilot for Mavlink {
             let fresh = self.place.filter(|(_, _, at)| now.since(*at) < PLACE_LASTS);
             if let Some((place, sigma_m, _)) = fresh.filter(|_| !self.health(now).is_silent()) {
                 let (lat, lon) = units(place);
-                self.tray.count("gps_inputs");
+                self.outbox.count("gps_inputs");
                 self.say(&Said::Gps { lat, lon, sigma_m }, now);
             }
         }
@@ -508,8 +508,8 @@ impl Autopilot for Mavlink {
         if self.place.is_some() { self.due.second.min(self.due.gps) } else { self.due.second }
     }
 
-    fn tray(&mut self) -> &mut Tray {
-        &mut self.tray
+    fn outbox(&mut self) -> &mut Outbox {
+        &mut self.outbox
     }
 
     fn set_goal(&mut self, goal: Option<Goal>, _now: Instant) {
@@ -533,7 +533,7 @@ impl Autopilot for Mavlink {
 
     fn counters(&self) -> Counters {
         let refused = self.deframer.refused();
-        let mut counters = self.tray.counters.clone();
+        let mut counters = self.outbox.counters.clone();
         let more = [
             ("checksum", refused.checksum),
             ("incompatible", refused.incompatible),

@@ -37,9 +37,9 @@ impl Mavlink {
     pub(super) fn send_target(&mut self, now: Instant) {
         let Some(pose) = self.pose.filter(|p| now.since(p.heard) < BRIDGED) else { return };
         // Depths of targets count from the autopilot's own zero. While that is in doubt, the last target stays.
-        let Some(zero_m) = self.tray.depth_zero_m() else { return };
+        let Some(zero_m) = self.outbox.depth_zero_m() else { return };
         // A target counts from the position: one false position would send the vehicle far away.
-        if self.tray.is_place_in_doubt() {
+        if self.outbox.is_place_in_doubt() {
             return;
         }
         match (pose.local, self.goal) {
@@ -62,7 +62,7 @@ impl Mavlink {
                 self.say(&Said::Global(lat, lon, -depth as f32), now);
             }
         }
-        self.tray.count("targets");
+        self.outbox.count("targets");
         self.echo.handle_target(now);
     }
 
@@ -98,7 +98,7 @@ impl Mavlink {
 
     fn handle_report(&mut self, report: Report, now: Instant) {
         if let Some(note) = self.echo.handle_report(report, now) {
-            self.tray.note(note);
+            self.outbox.note(note);
         }
     }
 }

@@ -257,7 +257,7 @@ mod tests {
         let settings = Grid::load(Some(&path), &topics()).unwrap().settings();
         assert_eq!(settings.len(), 2 * 2 * 3 * 3 * 2 * 2);
         assert!(settings.is_sorted_by_key(|s| s.cell_m));
-        let refused = Grid::load(Some(&path), &Config::default()).unwrap_err().to_string().to_string();
+        let refused = Grid::load(Some(&path), &Config::default()).unwrap_err().to_string();
         assert!(refused.contains("have no effect where scene.labels is habitats"), "{refused}");
     }
 

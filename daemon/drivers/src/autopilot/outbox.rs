@@ -5,9 +5,9 @@ use super::{Counters, Step};
 use scenecast_protocol::time::Instant;
 use std::collections::VecDeque;
 
-/// Bytes, way and notes that wait to be fetched, at most [`Tray::MAX`] of each, and counters.
+/// Bytes, way and notes that wait to be fetched, at most [`Outbox::MAX`] of each, and counters.
 #[derive(Debug, Default)]
-pub struct Tray {
+pub struct Outbox {
     pub(super) outputs: VecDeque<Vec<u8>>,
     pub(super) steps: VecDeque<Step>,
     pub(super) notes: VecDeque<String>,
@@ -15,7 +15,7 @@ pub struct Tray {
     plausible: Plausible,
 }
 
-impl Tray {
+impl Outbox {
     /// Most of each that waits.
     pub(super) const MAX: usize = 256;
 
@@ -99,17 +99,17 @@ mod tests {
 
     #[test]
     fn unread_steps_are_summed_up_in_bounded_memory() {
-        let mut tray = Tray::default();
+        let mut outbox = Outbox::default();
         for i in 0..10_000 {
             let unseen = Duration::from_millis(u64::from(i % 2 == 0));
-            tray.walk(Step { dx_m: 1.0, dy_m: -2.0, heading_rad: Some(f64::from(i)), unseen, ..Step::default() });
-            tray.note("the same");
-            tray.write(vec![0]);
+            outbox.walk(Step { dx_m: 1.0, dy_m: -2.0, heading_rad: Some(f64::from(i)), unseen, ..Step::default() });
+            outbox.note("the same");
+            outbox.write(vec![0]);
         }
-        assert!([tray.steps.len(), tray.notes.len(), tray.outputs.len()].iter().all(|&n| n == Tray::MAX));
-        let (x, y) = tray.steps.iter().fold((0.0, 0.0), |(x, y), s| (x + s.dx_m, y + s.dy_m));
+        assert!([outbox.steps.len(), outbox.notes.len(), outbox.outputs.len()].iter().all(|&n| n == Outbox::MAX));
+        let (x, y) = outbox.steps.iter().fold((0.0, 0.0), |(x, y), s| (x + s.dx_m, y + s.dy_m));
         assert_eq!((x, y), (10_000.0, -20_000.0));
-        assert_eq!(tray.steps.iter().map(|s| s.unseen).sum::<Duration>(), Duration::from_secs(5));
-        assert_eq!(tray.steps.back().and_then(|s| s.heading_rad), Some(9_999.0));
+        assert_eq!(outbox.steps.iter().map(|s| s.unseen).sum::<Duration>(), Duration::from_secs(5));
+        assert_eq!(outbox.steps.back().and_then(|s| s.heading_rad), Some(9_999.0));
     }
 }
