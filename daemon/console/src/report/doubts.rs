@@ -28,10 +28,11 @@ pub(super) fn doubts(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -
     );
     sentences.extend(place(dive, state, vehicle));
     sentences.extend(images(state, vehicle));
-    if vehicle.own.runs_s.is_empty() && !vehicle.restarts_s.is_empty() {
-        sentences.push("How far a restart set the vehicle's map back is not known without its own record.".to_owned());
-    }
     if vehicle.own.runs_s.is_empty() {
+        if !vehicle.restarts_s.is_empty() {
+            let unknown = "How far a restart set the vehicle's map back is not known without its own record.";
+            sentences.push(unknown.to_owned());
+        }
         sentences.push(
             "Times of modes, faults and restarts are those at which the surface learned of them, and how far its map was behind is its own \
              forecast."

@@ -2,8 +2,7 @@
 
 use super::dive::Dive;
 use crate::replay::Recording;
-use scenecast_protocol::map::{Cell, LabelGrid, UNEXPLORED};
-use scenecast_protocol::time::Instant;
+use scenecast_protocol::map::Cell;
 
 /// The map of a vehicle before a restart of its program and after it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -20,36 +19,35 @@ pub(super) fn set_backs(recording: &mut Recording, part: &str) -> Vec<Option<Set
     let Recording { timeline, vehicles, .. } = recording;
     let Some(own) = vehicles.get_mut(part) else { return Vec::new() };
     let pauses: Vec<(u64, u64)> = own.runs.windows(2).map(|pair| (pair[0].1, pair[1].0)).collect();
+    let time = |nanos: u64| timeline.mission_time(nanos);
     let set_back = |(stopped, began): (u64, u64)| {
-        let (epoch, after) = first_map(began, |nanos| {
-            own.map.seek(nanos, |nanos| timeline.mission_time(nanos));
-            (own.map.shown().epoch, own.map.shown().labels.shown().clone())
-        })?;
-        own.map.seek(stopped, |nanos| timeline.mission_time(nanos));
-        let before = own.map.shown();
-        let is_same = |cell, label| before.epoch == epoch && after.get(cell) == label;
-        let held = before.labels.shown();
-        let lost = held.iter().filter(|&(cell, label)| !is_same(cell, label));
-        let now: Instant = timeline.mission_time(stopped);
-        let lost: Vec<Cell> = lost.map(|(cell, _)| cell).collect();
-        let ages = lost.iter().filter_map(|cell| before.labels.received_at(*cell));
-        Some(SetBack {
-            cells: held.explored() as u64,
-            kept: (held.explored() - lost.len()) as u64,
-            lost_s: ages.map(|at| now.since(at).as_secs_f64()).fold(0.0, f64::max),
+        own.map.seek(stopped, time);
+        let (before, now) = (own.map.shown(), time(stopped));
+        let epoch = before.epoch;
+        let age_s = |cell| before.labels.received_at(cell).map_or(0.0, |at| now.since(at).as_secs_f64());
+        let held = before.labels.shown().iter().map(|(cell, label)| (cell, label, age_s(cell)));
+        let held: Vec<(Cell, u8, f64)> = held.collect();
+        // A program records what it read from its checkpoint within a moment.
+        let has_map = (0..=STEPS).any(|n| {
+            own.map.seek(began.saturating_add(n * STEP), time);
+            own.map.shown().labels.shown().explored() > 0
+        });
+        let after = own.map.shown();
+        let is_kept = |cell, label| after.epoch == epoch && after.labels.shown().get(cell) == label;
+        let lost: Vec<f64> =
+            held.iter().filter(|(cell, label, _)| !is_kept(*cell, *label)).map(|held| held.2).collect();
+        has_map.then(|| SetBack {
+            cells: held.len() as u64,
+            kept: (held.len() - lost.len()) as u64,
+            lost_s: lost.into_iter().fold(0.0, f64::max),
         })
     };
     pauses.into_iter().map(set_back).collect()
 }
 
-/// The first map of a run that has cells. A program records what it read from its checkpoint within a moment.
-fn first_map(began: u64, mut map_at: impl FnMut(u64) -> (u8, LabelGrid)) -> Option<(u8, LabelGrid)> {
-    const STEP: u64 = 100_000_000;
-    const STEPS: u64 = 30;
-    let mut maps = (0..=STEPS).map(|n| map_at(began.saturating_add(n * STEP)));
-    let has_cells = |(_, labels): &(u8, LabelGrid)| labels.iter().any(|(_, label)| label != UNEXPLORED);
-    maps.find(has_cells)
-}
+/// The time between two looks for the first map of a run, nanoseconds, and the number of looks.
+const STEP: u64 = 100_000_000;
+const STEPS: u64 = 30;
 
 impl SetBack {
     /// The end of the sentence about the restart.

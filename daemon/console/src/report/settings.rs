@@ -52,7 +52,7 @@ impl SettingsRecord {
 
 /// A setting without the address or the path in it; `None` if nothing else is left.
 fn told(key: &str, value: &Value) -> Option<Value> {
-    if [".host", ".origins", ".networks", ".device", ".port"].iter().any(|end| key.ends_with(end)) {
+    if [".host", ".origins", ".networks"].iter().any(|end| key.ends_with(end)) {
         return None;
     }
     let Some(text) = value.as_str().filter(|_| !key.ends_with(".name")) else { return Some(value.clone()) };
