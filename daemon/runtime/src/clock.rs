@@ -46,7 +46,9 @@ impl Clock {
 
     /// The mission time of a moment since the computer last slept; `None` before the clock began.
     pub fn at(&self, moment: std::time::Instant) -> Option<Instant> {
-        Some(self.start + self.elapsed().checked_sub(moment.elapsed())?.mul_f64(self.scale))
+        // Its age comes first: time that passes between the two readings must not put it before the clock began.
+        let age = moment.elapsed();
+        Some(self.start + self.elapsed().checked_sub(age)?.mul_f64(self.scale))
     }
 
     /// The wall time of a mission time; now for one that has passed.
